@@ -1,0 +1,2 @@
+//! Dermis.
+#![deny(missing_docs)]

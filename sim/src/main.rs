@@ -1,0 +1,2 @@
+//! Dermis command line.
+fn main() {}
