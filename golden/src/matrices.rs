@@ -19,11 +19,14 @@
 //!
 //! The mirror symmetry of the array holds to the bit in every matrix, so that folding them is exact.
 
+mod inverse;
+mod mirror;
+
 use crate::influence::Influence;
 use crate::sensor::{Sensor, SensorError};
-use faer::linalg::matmul::matmul;
-use faer::{Accum, Col, Mat, Par, Side};
-use std::f64::consts::FRAC_PI_2;
+use faer::Mat;
+use inverse::{product, Inverse};
+use mirror::mirror;
 use thiserror::Error;
 
 /// Most taxels in one subarray: the 48 × 48 of the largest sensor. A matrix then takes 42 MB.
@@ -36,8 +39,6 @@ pub const CUBIC_FROM: f64 = 0.2;
 pub const MAX_DEGREE: usize = 3;
 /// From this r on no degree helps.
 pub const MAX_RADIUS: f64 = 0.9;
-/// Directions of θ tried from 0 to π/2.
-const DIRECTIONS: usize = 9;
 
 /// The precomputed matrices of one subarray shape.
 #[derive(Clone, Debug)]
@@ -163,107 +164,139 @@ fn degree(r: f64, mu_max: f64) -> Option<usize> {
     (least..=MAX_DEGREE).find(enough).filter(|_| r < MAX_RADIUS)
 }
 
-/// A B, on all cores.
-fn product(a: &Mat<f64>, b: &Mat<f64>) -> Mat<f64> {
-    let mut c = Mat::zeros(a.nrows(), b.ncols());
-    matmul(&mut c, Accum::Replace, a, b, 1.0, Par::rayon(0));
-    c
-}
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::Scene;
+    use proptest::prelude::*;
 
-/// Eigenvectors and inverted eigenvalues of Cz, zero for those left out.
-struct Inverse {
-    vectors: Mat<f64>,
-    values: Vec<f64>,
-    condition: f64,
-}
+    /// Rounding of a product of n terms with an inverse of condition κ: n κ ε, here at most 100 · 20 · 2⁻⁵² = 5e-13.
+    const INVERSE_TOLERANCE: f64 = 1e-12;
 
-impl Inverse {
-    fn new(cz: &Mat<f64>) -> Option<Inverse> {
-        let eigen = cz.self_adjoint_eigen(Side::Lower).ok()?;
-        let values: Vec<f64> = eigen.S().column_vector().iter().copied().collect();
-        let largest = values
-            .iter()
-            .fold(0.0f64, |largest, v| v.abs().max(largest));
-        let smallest = values
-            .iter()
-            .fold(f64::INFINITY, |smallest, v| v.abs().min(smallest));
-        let least = values.len() as f64 * f64::EPSILON * largest;
-        let invert = |v: &f64| if v.abs() <= least { 0.0 } else { 1.0 / v };
-        Some(Inverse {
-            vectors: eigen.U().to_owned(),
-            values: values.iter().map(invert).collect(),
-            condition: largest / smallest,
-        })
-    }
-
-    /// U diag(f) Uᵀ with f = 1/λ (`root` 1), or |1/λ|^½ (`root` 2).
-    fn power(&self, root: u32) -> Mat<f64> {
-        let factor = |k: usize| match root {
-            1 => self.values[k],
-            _ => self.values[k].abs().sqrt(),
-        };
-        let n = self.values.len();
-        let scaled = Mat::from_fn(n, n, |i, k| self.vectors[(i, k)] * factor(k));
-        product(&scaled, &self.vectors.transpose().to_owned())
-    }
-
-    /// Largest ‖S (cos θ Cx + sin θ Cy) S‖ over the directions.
-    fn largest_radius(&self, cx: &Mat<f64>, cy: &Mat<f64>) -> f64 {
-        let s = self.power(2);
-        let [kx, ky] = [cx, cy].map(|c| product(&product(&s, c), &s));
-        let radius = |step: usize| {
-            let theta = FRAC_PI_2 * step as f64 / (DIRECTIONS - 1) as f64;
-            let (sin, cos) = theta.sin_cos();
-            norm2(&Mat::from_fn(kx.nrows(), kx.ncols(), |i, j| {
-                cos * kx[(i, j)] + sin * ky[(i, j)]
-            }))
-        };
-        (0..DIRECTIONS).map(radius).fold(0.0, f64::max)
-    }
-}
-
-/// 2-norm of an antisymmetric matrix, by power iteration on KᵀK = −K². The Rayleigh quotient grows towards it and its
-/// error is the square of the vector's.
-fn norm2(k: &Mat<f64>) -> f64 {
-    const STEPS: usize = 300;
-    const ENOUGH: f64 = 1e-7;
-    // A fixed start without symmetry, so that it has a part in every parity.
-    let mut vector = Col::from_fn(k.nrows(), |i| 1.0 + ((i * 37 + 11) % 64) as f64 / 64.0);
-    let mut norm = 0.0;
-    for _ in 0..STEPS {
-        let size = vector.norm_l2();
-        if size == 0.0 {
-            return norm;
-        }
-        let image = k * (vector / size);
-        let next = image.norm_l2();
-        let settled = (next - norm).abs() <= ENOUGH * next;
-        norm = next;
-        vector = k * image;
-        if settled {
-            break;
+    fn sensor(rows: usize, cols: usize, pitch: [f64; 2], thickness_mm: f64) -> Sensor {
+        Sensor {
+            rows,
+            cols,
+            pitch_x_mm: pitch[0],
+            pitch_y_mm: pitch[1],
+            thickness_mm,
         }
     }
-    norm
-}
 
-/// Averages a matrix over the array's mirror images, signs `sx` and `sy` (±1) saying whether a mirror in x or y turns
-/// its sign. Each orbit is averaged once and written to all its places, so that the symmetry holds to the bit.
-fn mirror(sensor: &Sensor, m: &mut Mat<f64>, sx: f64, sy: f64) {
-    let (rows, cols) = (sensor.rows, sensor.cols);
-    let flip_x = |i: usize| i - i % cols + (cols - 1 - i % cols);
-    let flip_y = |i: usize| (rows - 1 - i / cols) * cols + i % cols;
-    for i in 0..sensor.taxels() {
-        for j in 0..sensor.taxels() {
-            let (x, y) = ((flip_x(i), flip_x(j)), (flip_y(i), flip_y(j)));
-            let xy = (flip_y(x.0), flip_y(x.1));
-            let images = [((i, j), 1.0), (x, sx), (y, sy), (xy, sx * sy)];
-            if images.iter().any(|(image, _)| *image < (i, j)) {
-                continue;
+    fn largest(m: &Mat<f64>) -> f64 {
+        m.col_iter()
+            .flat_map(|col| col.iter())
+            .fold(0.0, |size, c| c.abs().max(size))
+    }
+
+    fn off_identity(m: &Matrices) -> f64 {
+        let n = m.sensor.taxels();
+        largest(&(product(&m.cz_pinv, &m.cz) - Mat::<f64>::identity(n, n)))
+    }
+
+    #[test]
+    fn builtin_sensors_have_the_known_radius_and_degree() {
+        // Condition and r to the digits of an independent study, degree by its rule.
+        let known = [
+            ("sensor-1", 17.0, 0.41),
+            ("sensor-2", 4.0, 0.28),
+            ("eight-by-eight", 4.0, 0.28),
+        ];
+        for (name, condition, radius) in known {
+            let scene = Scene::builtin(name).unwrap();
+            let m = Matrices::new(&scene.sensor, scene.search.mu_max).unwrap();
+            assert!(
+                (m.condition - condition).abs() < 0.5,
+                "{name}: {}",
+                m.condition
+            );
+            assert!(
+                (m.spectral_radius - radius).abs() < 0.01,
+                "{name}: {}",
+                m.spectral_radius
+            );
+            assert_eq!(m.degree, 3);
+            assert!(off_identity(&m) < INVERSE_TOLERANCE);
+        }
+    }
+
+    #[test]
+    fn a_thin_cover_needs_degree_one() {
+        let m = Matrices::new(&sensor(12, 12, [8.0, 8.0], 0.91), 0.6).unwrap();
+        assert_eq!(m.degree, 1);
+        assert!(
+            (m.spectral_radius - 0.018).abs() < 0.001,
+            "{}",
+            m.spectral_radius
+        );
+    }
+
+    #[test]
+    fn radius_equals_the_largest_eigenvalue() {
+        let m = Matrices::new(&sensor(4, 5, [2.0, 4.0], 3.0), 0.5).unwrap();
+        let mut largest: f64 = 0.0;
+        for step in 0..64 {
+            let (sin, cos) = (std::f64::consts::TAU * f64::from(step) / 64.0).sin_cos();
+            let a = Mat::from_fn(20, 20, |i, j| cos * m.ax[(i, j)] + sin * m.ay[(i, j)]);
+            for value in a.eigenvalues().unwrap() {
+                largest = largest.max(value.norm());
             }
-            let sum: f64 = images.iter().map(|(image, sign)| sign * m[*image]).sum();
-            for (image, sign) in images {
-                m[image] = sign * sum / 4.0;
+        }
+        // The directions tried miss 0.5 % at most, in both searches.
+        assert!((m.spectral_radius / (0.5 * largest) - 1.0).abs() < 0.006);
+    }
+
+    #[test]
+    fn degree_rule_at_its_edges() {
+        assert_eq!(degree(0.5, 0.0), Some(0));
+        assert_eq!(degree(0.0, 0.6), Some(1));
+        assert_eq!(degree(0.187, 0.6), Some(1));
+        assert_eq!(degree(0.19, 0.6), Some(2));
+        assert_eq!(degree(0.201, 0.6), Some(3));
+        assert_eq!(degree(0.43, 0.6), Some(3));
+        assert_eq!(degree(0.44, 0.6), None);
+        assert_eq!(degree(f64::NAN, 0.6), None);
+    }
+
+    #[test]
+    fn refusals_name_their_reason() {
+        let stiff = Matrices::new(&sensor(8, 8, [1.0, 1.0], 5.0), 0.6).unwrap_err();
+        assert!(stiff.to_string().contains("r = 0.549"), "{stiff}");
+        let large = Matrices::new(&sensor(256, 256, [1.0, 1.0], 1.0), 0.6).unwrap_err();
+        assert!(matches!(
+            large,
+            MatricesError::TooLarge { taxels: 65536, .. }
+        ));
+        let flat = Matrices::new(&sensor(4, 4, [1e-200, 1e-200], 1e-200), 0.6).unwrap_err();
+        assert!(matches!(flat, MatricesError::NotFinite { .. }));
+        assert!(matches!(
+            Matrices::new(&sensor(0, 4, [1.0, 1.0], 1.0), 0.6),
+            Err(MatricesError::Sensor(_))
+        ));
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(24))]
+        #[test]
+        fn symmetric_to_the_bit_and_inverse(
+            rows in 2usize..6, cols in 2usize..6, px in 2.0f64..5.0, py in 2.0f64..5.0, h in 0.8f64..3.0,
+        ) {
+            let sensor = sensor(rows, cols, [px, py], h);
+            let m = Matrices::new(&sensor, 0.3).unwrap();
+            prop_assert!(off_identity(&m) < INVERSE_TOLERANCE);
+            let flip_x = |i: usize| i - i % cols + (cols - 1 - i % cols);
+            let flip_y = |i: usize| (rows - 1 - i / cols) * cols + i % cols;
+            for i in 0..sensor.taxels() {
+                for j in 0..sensor.taxels() {
+                    let (x, y) = ((flip_x(i), flip_x(j)), (flip_y(i), flip_y(j)));
+                    for even in [&m.cz_pinv, &m.cz] {
+                        prop_assert!(even[(i, j)] == even[x] && even[(i, j)] == even[y]);
+                    }
+                    for (odd_x, odd_y) in [(&m.ax, &m.ay), (&m.cx, &m.cy)] {
+                        prop_assert!(odd_x[(i, j)] == -odd_x[x] && odd_x[(i, j)] == odd_x[y]);
+                        prop_assert!(odd_y[(i, j)] == odd_y[x] && odd_y[(i, j)] == -odd_y[y]);
+                    }
+                }
             }
         }
     }

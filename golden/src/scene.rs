@@ -19,6 +19,8 @@ mod error;
 mod load;
 mod parse;
 mod reader;
+#[cfg(test)]
+mod tests;
 
 pub use error::SceneError;
 
