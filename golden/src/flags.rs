@@ -57,7 +57,7 @@ pub fn frame_flags(scene: &Scene, frame: &Frame, codes: &Codes) -> Vec<Flag> {
 /// With truth: the cells hold less than the load. Without: the largest |b| lies on the outermost ring.
 fn load_outside(frame: &Frame) -> bool {
     if let (Some(cells), Some(resultant)) = (&frame.cell_forces_N, frame.resultant_N) {
-        return cells.fz.iter().sum::<f64>() < SHARE_INSIDE * resultant[2];
+        return cells.fz.iter().sum::<f64>().abs() < SHARE_INSIDE * resultant[2].abs();
     }
     let (rows, cols) = (frame.sensor.rows, frame.sensor.cols);
     let on_ring = |index: usize| {

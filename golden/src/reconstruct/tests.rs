@@ -3,6 +3,7 @@
 use super::*;
 use crate::partition::{Case, Subarray};
 use crate::scene::{Condition, Medium};
+use proptest::prelude::*;
 
 /// Targets on sensor 1: median tangential error, normal error of each frame.
 const TANGENTIAL_MEDIAN: f64 = 0.03;
@@ -13,11 +14,8 @@ fn scene() -> Scene {
 }
 
 fn hertz() -> Frame {
-    let frames = Frame::shipped(&scene()).into_iter();
-    frames
-        .filter(|frame| frame.id == "S1-hs-hertz")
-        .last()
-        .unwrap()
+    let mut frames = Frame::shipped(&scene()).into_iter();
+    frames.find(|frame| frame.id == "S1-hs-hertz").unwrap()
 }
 
 fn run(scene: &Scene, frame: &Frame) -> Reconstruction {
@@ -221,4 +219,26 @@ fn the_case_is_counted_from_the_subarrays() {
     );
     assert_eq!(whole.case, Grid { rows: 1, cols: 2 });
     assert_eq!(whole.flags, [Flag::NoContact, Flag::Saturated]);
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(32))]
+    /// Whatever the stress: finite, shear in the stated ratio and within mu_max.
+    #[test]
+    fn any_stress_gives_forces_in_proportion(
+        stress in proptest::collection::vec(-1.0f64..1.0, 64),
+        exponent in -40i32..40,
+    ) {
+        let scene = Scene::builtin("eight-by-eight").unwrap();
+        let stress = stress.iter().map(|b| b * 2f64.powi(exponent)).collect();
+        let frame = Frame::from_stress("random", &scene.sensor, stress).unwrap();
+        let result = run(&scene, &frame);
+        let mu = result.subarrays[0].mu;
+        prop_assert!(mu[0].hypot(mu[1]) <= scene.search.mu_max * (1.0 + f64::EPSILON));
+        let Forces { fx, fy, fz } = &result.forces_N;
+        for k in 0..64 {
+            prop_assert!(fz[k].is_finite());
+            prop_assert_eq!((fx[k], fy[k]), (mu[0] * fz[k], mu[1] * fz[k]));
+        }
+    }
 }
