@@ -57,7 +57,7 @@ pub fn frame_flags(scene: &Scene, frame: &Frame, codes: &Codes) -> Vec<Flag> {
 /// With truth: the cells hold less than the load. Without: the largest |b| lies on the outermost ring.
 fn load_outside(frame: &Frame) -> bool {
     if let (Some(cells), Some(resultant)) = (&frame.cell_forces_N, frame.resultant_N) {
-        return cells.fz.iter().sum::<f64>() < SHARE_INSIDE * resultant[2];
+        return cells.fz.iter().sum::<f64>().abs() < SHARE_INSIDE * resultant[2].abs();
     }
     let (rows, cols) = (frame.sensor.rows, frame.sensor.cols);
     let on_ring = |index: usize| {
@@ -80,4 +80,79 @@ fn shear_unreliable(scene: &Scene, frame: &Frame, codes: &Codes) -> bool {
     let noise = search.noise_floor_MPa.max(codes.lsb_MPa() / 12f64.sqrt());
     let peak = frame.peak_MPa();
     searched && peak > 0.0 && noise > SPARSE_NOISE_LIMIT * peak
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::quantise::quantise;
+    use crate::scene::Medium;
+
+    fn setting() -> (Scene, Frame) {
+        let scene = Scene::builtin("sensor-1").unwrap();
+        let frame = Frame::shipped(&scene).remove(1);
+        (scene, frame)
+    }
+
+    fn flags(scene: &Scene, frame: &Frame, bits: u32, share: f64) -> Vec<Flag> {
+        let peak = frame.peak_MPa();
+        let full_scale = if peak > 0.0 { share * peak } else { 1.0 };
+        frame_flags(scene, frame, &quantise(&frame.stress_MPa, bits, full_scale))
+    }
+
+    #[test]
+    fn names_are_those_of_the_json() {
+        let all = [
+            Flag::NoContact,
+            Flag::NoCompression,
+            Flag::ConditionUnmet,
+            Flag::Saturated,
+            Flag::LoadOutside,
+            Flag::MediumMismatch,
+            Flag::ShearUnreliable,
+        ];
+        let text = serde_json::to_string(&all).unwrap();
+        let wanted = r#"["no-contact","no-compression","condition-unmet","saturated","load-outside","medium-mismatch","shear-unreliable"]"#;
+        assert_eq!(text, wanted);
+    }
+
+    #[test]
+    fn a_good_frame_has_none() {
+        let (scene, mut frame) = setting();
+        assert_eq!(flags(&scene, &frame, 20, 1.0), []);
+        frame.stress_MPa.fill(0.0);
+        frame.cell_forces_N = None;
+        assert_eq!(flags(&scene, &frame, 20, 1.0), []);
+    }
+
+    #[test]
+    fn clipping_and_medium() {
+        let (mut scene, frame) = setting();
+        assert_eq!(flags(&scene, &frame, 20, 0.99), [Flag::Saturated]);
+        scene.medium = Medium::BondedLayer { poisson: 0.48 };
+        assert_eq!(flags(&scene, &frame, 20, 1.0), [Flag::MediumMismatch]);
+    }
+
+    #[test]
+    fn load_outside_by_truth_and_by_the_ring() {
+        let (scene, mut frame) = setting();
+        frame.resultant_N = frame.resultant_N.map(|[x, y, z]| [x, y, z / 0.99]);
+        assert_eq!(flags(&scene, &frame, 20, 1.0), [Flag::LoadOutside]);
+        frame.cell_forces_N = None;
+        assert_eq!(flags(&scene, &frame, 20, 1.0), []);
+        frame.stress_MPa[9] = -frame.peak_MPa();
+        assert_eq!(flags(&scene, &frame, 20, 1.0), [Flag::LoadOutside]);
+    }
+
+    #[test]
+    fn shear_needs_bits_and_quiet() {
+        // LSB/√12 of the peak: 3.5e-5 with 14 bits, 7.0e-5 with 13.
+        let (mut scene, frame) = setting();
+        assert_eq!(flags(&scene, &frame, 14, 1.0), []);
+        assert_eq!(flags(&scene, &frame, 13, 1.0), [Flag::ShearUnreliable]);
+        scene.search.noise_floor_MPa = 6e-5 * frame.peak_MPa();
+        assert_eq!(flags(&scene, &frame, 20, 1.0), [Flag::ShearUnreliable]);
+        scene.search.mu_max = 0.0;
+        assert_eq!(flags(&scene, &frame, 20, 1.0), []);
+    }
 }

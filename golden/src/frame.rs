@@ -16,6 +16,8 @@ mod error;
 mod json;
 mod load;
 mod shipped;
+#[cfg(test)]
+mod tests;
 
 pub use error::FrameError;
 

@@ -183,3 +183,67 @@ impl Influence {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::reference::values;
+    use proptest::prelude::*;
+
+    /// 576 terms of one sign carry at most a few roundings each: 1e-12 is 4500 ε.
+    const RELATIVE: f64 = 1e-12;
+
+    fn near(value: f64, wanted: f64) -> bool {
+        // The reference prints one zero as 2e-53.
+        (value - wanted).abs() <= RELATIVE * wanted.abs() + 1e-40
+    }
+
+    #[test]
+    fn agrees_with_values_of_50_digits() {
+        for r in &values().influence {
+            let (a, b, h) = (r.cell_x_mm, r.cell_y_mm, r.thickness_mm);
+            let got = [cx, cy, cz].map(|f| f(r.dx_mm, r.dy_mm, a, b, h));
+            for (value, wanted) in got.iter().zip([&r.cx, &r.cy, &r.cz]) {
+                assert!(
+                    near(*value, wanted.parse().unwrap()),
+                    "{value:e} {wanted} at {r:?}"
+                );
+            }
+        }
+    }
+
+    #[test]
+    fn quadrature_integrates_what_it_must() {
+        // Exact up to x^47.
+        let power = |k: i32| rule().iter().map(|(x, w)| w * x.powi(k)).sum::<f64>();
+        for k in (0..=46).step_by(2) {
+            assert!((power(k) - 2.0 / f64::from(k + 1)).abs() < 1e-14, "{k}");
+        }
+    }
+
+    #[test]
+    fn far_away_a_cell_is_a_point() {
+        let point = 3.0 * 27.0 / (TAU * rho5(3000.0, 4000.0, 3.0));
+        // The next term of the series in cell size over distance is about (2/5000)².
+        assert!((cz(3000.0, 4000.0, 2.0, 4.0, 3.0) / point - 1.0).abs() < 1e-6);
+    }
+
+    #[test]
+    fn a_wide_cell_hands_its_pressure_on() {
+        // 1 N on a cell much wider than h: under its middle the stress is the pressure 1/(ab).
+        assert!((cz(0.0, 0.0, 1e4, 1e4, 1.0) * 1e8 - 1.0).abs() < 1e-9);
+    }
+
+    proptest! {
+        /// Closed form and quadrature agree where both are good.
+        #[test]
+        fn both_ways_agree(dx in -6.0f64..6.0, dy in -6.0f64..6.0, h in 2.0f64..4.0) {
+            let (a, b) = (2.0, 2.5);
+            prop_assert!(far(dx, dy, a, b, h));
+            let corner = |x: f64, y: f64| y / ((x * x + h * h) * norm(x, y, h));
+            let closed = -h * h / (TAU * a * b) * corners(dx, dy, a, b, corner);
+            // Four corners of up to 1/h² each, rounded; h²/(2πab) h⁻² ε · 10.
+            prop_assert!((cx(dx, dy, a, b, h) - closed).abs() < 1e-15);
+        }
+    }
+}

@@ -29,3 +29,6 @@ pub mod quantise;
 pub mod reconstruct;
 pub mod scene;
 pub mod sensor;
+
+#[cfg(test)]
+mod reference;

@@ -19,11 +19,16 @@
 //!
 //! The mirror symmetry of the array holds to the bit in every matrix, so that folding them is exact.
 
+mod inverse;
+mod mirror;
+#[cfg(test)]
+mod tests;
+
 use crate::influence::Influence;
 use crate::sensor::{Sensor, SensorError};
-use faer::linalg::matmul::matmul;
-use faer::{Accum, Col, Mat, Par, Side};
-use std::f64::consts::FRAC_PI_2;
+use faer::Mat;
+use inverse::{product, Inverse};
+use mirror::mirror;
 use thiserror::Error;
 
 /// Most taxels in one subarray: the 48 × 48 of the largest sensor. A matrix then takes 42 MB.
@@ -36,8 +41,6 @@ pub const CUBIC_FROM: f64 = 0.2;
 pub const MAX_DEGREE: usize = 3;
 /// From this r on no degree helps.
 pub const MAX_RADIUS: f64 = 0.9;
-/// Directions of θ tried from 0 to π/2.
-const DIRECTIONS: usize = 9;
 
 /// The precomputed matrices of one subarray shape.
 #[derive(Clone, Debug)]
@@ -161,110 +164,4 @@ fn degree(r: f64, mu_max: f64) -> Option<usize> {
     let least = if r > CUBIC_FROM { 3 } else { 1 };
     let enough = |d: &usize| r.powi(*d as i32 + 1) <= SERIES_TOLERANCE;
     (least..=MAX_DEGREE).find(enough).filter(|_| r < MAX_RADIUS)
-}
-
-/// A B, on all cores.
-fn product(a: &Mat<f64>, b: &Mat<f64>) -> Mat<f64> {
-    let mut c = Mat::zeros(a.nrows(), b.ncols());
-    matmul(&mut c, Accum::Replace, a, b, 1.0, Par::rayon(0));
-    c
-}
-
-/// Eigenvectors and inverted eigenvalues of Cz, zero for those left out.
-struct Inverse {
-    vectors: Mat<f64>,
-    values: Vec<f64>,
-    condition: f64,
-}
-
-impl Inverse {
-    fn new(cz: &Mat<f64>) -> Option<Inverse> {
-        let eigen = cz.self_adjoint_eigen(Side::Lower).ok()?;
-        let values: Vec<f64> = eigen.S().column_vector().iter().copied().collect();
-        let largest = values
-            .iter()
-            .fold(0.0f64, |largest, v| v.abs().max(largest));
-        let smallest = values
-            .iter()
-            .fold(f64::INFINITY, |smallest, v| v.abs().min(smallest));
-        let least = values.len() as f64 * f64::EPSILON * largest;
-        let invert = |v: &f64| if v.abs() <= least { 0.0 } else { 1.0 / v };
-        Some(Inverse {
-            vectors: eigen.U().to_owned(),
-            values: values.iter().map(invert).collect(),
-            condition: largest / smallest,
-        })
-    }
-
-    /// U diag(f) Uᵀ with f = 1/λ (`root` 1), or |1/λ|^½ (`root` 2).
-    fn power(&self, root: u32) -> Mat<f64> {
-        let factor = |k: usize| match root {
-            1 => self.values[k],
-            _ => self.values[k].abs().sqrt(),
-        };
-        let n = self.values.len();
-        let scaled = Mat::from_fn(n, n, |i, k| self.vectors[(i, k)] * factor(k));
-        product(&scaled, &self.vectors.transpose().to_owned())
-    }
-
-    /// Largest ‖S (cos θ Cx + sin θ Cy) S‖ over the directions.
-    fn largest_radius(&self, cx: &Mat<f64>, cy: &Mat<f64>) -> f64 {
-        let s = self.power(2);
-        let [kx, ky] = [cx, cy].map(|c| product(&product(&s, c), &s));
-        let radius = |step: usize| {
-            let theta = FRAC_PI_2 * step as f64 / (DIRECTIONS - 1) as f64;
-            let (sin, cos) = theta.sin_cos();
-            norm2(&Mat::from_fn(kx.nrows(), kx.ncols(), |i, j| {
-                cos * kx[(i, j)] + sin * ky[(i, j)]
-            }))
-        };
-        (0..DIRECTIONS).map(radius).fold(0.0, f64::max)
-    }
-}
-
-/// 2-norm of an antisymmetric matrix, by power iteration on KᵀK = −K². The Rayleigh quotient grows towards it and its
-/// error is the square of the vector's.
-fn norm2(k: &Mat<f64>) -> f64 {
-    const STEPS: usize = 300;
-    const ENOUGH: f64 = 1e-7;
-    // A fixed start without symmetry, so that it has a part in every parity.
-    let mut vector = Col::from_fn(k.nrows(), |i| 1.0 + ((i * 37 + 11) % 64) as f64 / 64.0);
-    let mut norm = 0.0;
-    for _ in 0..STEPS {
-        let size = vector.norm_l2();
-        if size == 0.0 {
-            return norm;
-        }
-        let image = k * (vector / size);
-        let next = image.norm_l2();
-        let settled = (next - norm).abs() <= ENOUGH * next;
-        norm = next;
-        vector = k * image;
-        if settled {
-            break;
-        }
-    }
-    norm
-}
-
-/// Averages a matrix over the array's mirror images, signs `sx` and `sy` (±1) saying whether a mirror in x or y turns
-/// its sign. Each orbit is averaged once and written to all its places, so that the symmetry holds to the bit.
-fn mirror(sensor: &Sensor, m: &mut Mat<f64>, sx: f64, sy: f64) {
-    let (rows, cols) = (sensor.rows, sensor.cols);
-    let flip_x = |i: usize| i - i % cols + (cols - 1 - i % cols);
-    let flip_y = |i: usize| (rows - 1 - i / cols) * cols + i % cols;
-    for i in 0..sensor.taxels() {
-        for j in 0..sensor.taxels() {
-            let (x, y) = ((flip_x(i), flip_x(j)), (flip_y(i), flip_y(j)));
-            let xy = (flip_y(x.0), flip_y(x.1));
-            let images = [((i, j), 1.0), (x, sx), (y, sy), (xy, sx * sy)];
-            if images.iter().any(|(image, _)| *image < (i, j)) {
-                continue;
-            }
-            let sum: f64 = images.iter().map(|(image, sign)| sign * m[*image]).sum();
-            for (image, sign) in images {
-                m[image] = sign * sum / 4.0;
-            }
-        }
-    }
 }

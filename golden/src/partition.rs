@@ -128,7 +128,7 @@ pub fn subarrays(case: Case, sensor: &Sensor) -> Result<Vec<Subarray>, Partition
 
 /// Lines per part, when the division is exact.
 fn part(direction: &'static str, lines: usize, parts: usize) -> Result<usize, PartitionError> {
-    if parts == 0 || lines % parts != 0 || lines / parts < MIN_LINES {
+    if parts == 0 || !lines.is_multiple_of(parts) || lines / parts < MIN_LINES {
         return Err(PartitionError::NotDividing {
             direction,
             lines,

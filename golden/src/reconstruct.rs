@@ -11,6 +11,8 @@
 //! | out: error | 5 | fraction, where the frame has a resultant |
 
 mod golden;
+#[cfg(test)]
+mod tests;
 
 pub use golden::{Golden, GoldenError};
 

@@ -14,6 +14,9 @@
 //! 1 + d(d + 1) products of n². The remainder of the series is of the order r^(d+1) ([`crate::matrices`]). Feeds
 //! `search` and `force`.
 
+#[cfg(test)]
+mod tests;
+
 use crate::matrices::Matrices;
 use faer::linalg::matmul::matmul;
 use faer::linalg::solvers::Solve;

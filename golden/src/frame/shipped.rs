@@ -26,3 +26,9 @@ fn texts() -> impl Iterator<Item = (String, &'static str)> {
         name.ends_with(".json").then(|| (name.to_string(), text))
     })
 }
+
+/// Whether no shipped file is left out for an error.
+#[cfg(test)]
+pub(super) fn all_parse() -> bool {
+    texts().all(|(file, text)| json::parse(text, &file, &file, None).is_ok())
+}

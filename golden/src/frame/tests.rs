@@ -1,0 +1,203 @@
+//! Frames read and refused; each message names file, field or line, and value.
+
+use super::*;
+use std::path::PathBuf;
+
+const SENSOR: &str =
+    r#""sensor":{"rows":2,"cols":2,"pitch_x_mm":1,"pitch_y_mm":1,"thickness_mm":1}"#;
+
+/// Loads text through a file of the given name, without and with a 2 × 2 scene.
+fn load(name: &str, text: &str, with_scene: bool) -> Result<Frame, FrameError> {
+    let folder = tempfile::tempdir().unwrap();
+    let path: PathBuf = folder.path().join(name);
+    std::fs::write(&path, text).unwrap();
+    let sensor = Sensor {
+        rows: 2,
+        cols: 2,
+        pitch_x_mm: 1.0,
+        pitch_y_mm: 1.0,
+        thickness_mm: 1.0,
+    };
+    let scene = with_scene.then(|| Scene::of_sensor(&sensor, "small"));
+    Frame::load(path, scene.as_ref())
+}
+
+fn json(fields: &str) -> Result<Frame, FrameError> {
+    load("f.json", &format!("{{{SENSOR},{fields}}}"), false)
+}
+
+#[test]
+fn stress_alone_is_enough() {
+    let frame = json(r#""stress_MPa":[1,2.5,-0,0],"colour":"blue""#).unwrap();
+    assert_eq!((frame.id.as_str(), frame.peak_MPa()), ("f", 2.5));
+    let frame = load("g.json", r#"{"id":"own","stress_MPa":[1,2,3,4]}"#, true).unwrap();
+    assert_eq!((frame.id.as_str(), frame.sensor.rows), ("own", 2));
+}
+
+#[test]
+fn csv_is_rows_of_numbers() {
+    let frame = load("f.CSV", "1, 2\n\n-3e-1,4\n", true).unwrap();
+    assert_eq!(frame.stress_MPa, [1.0, 2.0, -0.3, 4.0]);
+}
+
+#[test]
+fn bad_json_is_refused_with_its_place() {
+    let cases = [
+        (
+            r#""stress_MPa":[1,2,3]"#,
+            "stress_MPa has 3 values, wanted 4",
+        ),
+        (r#""stress_MPa":[1,2,3,NaN]"#, "line 1, column"),
+        (r#""stress_MPa":[1,2,3,1e400]"#, "number out of range"),
+        (r#""stress_MPa":[1,2,3,"4"]"#, "invalid type: string"),
+        (r#""id":"x""#, "missing field `stress_MPa`"),
+        (
+            r#""stress_MPa":[1,2,3,4],"resultant_N":[1,2]"#,
+            "line 1, column",
+        ),
+        (
+            r#""stress_MPa":[1,2,3,4],"cell_forces_N":{"fx":[1,2,3,4],"fy":[1,2,3,4],"fz":[1]}"#,
+            "cell_forces_N.fz has 1 values",
+        ),
+        (r#""stress_MPa":[1,2"#, "line 1, column"),
+    ];
+    for (fields, wanted) in cases {
+        let text = json(fields).unwrap_err().to_string();
+        assert!(text.contains("f.json") && text.contains(wanted), "{text}");
+    }
+    let cut = load("f.json", "{\"stress_MPa\":\n[1,2,3", true).unwrap_err();
+    assert!(matches!(cut, FrameError::Json { line: 2, .. }), "{cut}");
+}
+
+#[test]
+fn bad_sensors_are_refused_before_anything_is_allocated() {
+    let huge = r#"{"sensor":{"rows":1000000000,"cols":10,"pitch_x_mm":1,"pitch_y_mm":1,"thickness_mm":1},"stress_MPa":[]}"#;
+    let text = load("f.json", huge, false).unwrap_err().to_string();
+    assert!(
+        text.contains("sensor.rows = 1000000000 is not allowed"),
+        "{text}"
+    );
+    let flat = r#"{"sensor":{"rows":2,"cols":2,"pitch_x_mm":0,"pitch_y_mm":1,"thickness_mm":1},"stress_MPa":[1,2,3,4]}"#;
+    let text = load("f.json", flat, false).unwrap_err().to_string();
+    assert!(text.contains("sensor.pitch_x_mm = 0"), "{text}");
+    let none = load("f.json", r#"{"stress_MPa":[1]}"#, false).unwrap_err();
+    assert!(matches!(none, FrameError::NoSensor { .. }));
+}
+
+#[test]
+fn bad_csv_is_refused_with_its_place() {
+    let cases = [
+        ("1,2\n3\n", "line 2: 1 values, wanted 2"),
+        (
+            "1,2\n3,x\n",
+            "line 2, value 2: \"x\" is not a finite number",
+        ),
+        ("1,2\nNaN,4\n", "line 2, value 1: \"NaN\""),
+        ("1,2\n1e400,4\n", "\"1e400\""),
+        ("1,2\n", "rows has 1 values, wanted 2"),
+        ("", "rows has 0 values, wanted 2"),
+    ];
+    for (csv, wanted) in cases {
+        let text = load("f.csv", csv, true).unwrap_err().to_string();
+        assert!(text.contains("f.csv") && text.contains(wanted), "{text}");
+    }
+    assert!(matches!(
+        load("f.csv", "1,2\n3,4", false),
+        Err(FrameError::NoSensor { .. })
+    ));
+}
+
+#[test]
+fn files_that_are_none_or_too_large() {
+    assert!(matches!(
+        load("f.txt", "", true),
+        Err(FrameError::UnknownKind { .. })
+    ));
+    assert!(matches!(
+        Frame::load("absent.json", None),
+        Err(FrameError::Unreadable { .. })
+    ));
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("f.json");
+    // A sparse file: large by its length, nothing on disk.
+    std::fs::File::create(&path)
+        .unwrap()
+        .set_len((64 << 20) + 1)
+        .unwrap();
+    assert!(matches!(
+        Frame::load(&path, None),
+        Err(FrameError::TooLarge { .. })
+    ));
+}
+
+#[test]
+fn sensors_that_disagree_are_both_printed() {
+    let frame = json(r#""stress_MPa":[1,2,3,4]"#).unwrap();
+    let text = frame
+        .check(&Scene::builtin("sensor-1").unwrap())
+        .unwrap_err()
+        .to_string();
+    let both = [
+        "2×2 taxels, pitch 1×1 mm, thickness 1 mm",
+        "10×10 taxels, pitch 2×4 mm, thickness 3 mm",
+    ];
+    assert!(both.iter().all(|sensor| text.contains(sensor)), "{text}");
+}
+
+#[test]
+fn changed_values_are_checked_again() {
+    let scene = Scene::builtin("sensor-1").unwrap();
+    let mut frame = Frame::eq2(&scene.sensor);
+    assert!(frame.check(&scene).is_ok());
+    frame.stress_MPa[7] = f64::NAN;
+    let text = frame.check(&scene).unwrap_err().to_string();
+    assert_eq!(text, "eq2: stress_MPa[7] = NaN is not a finite number");
+    let short = Frame::from_stress("now", &scene.sensor, vec![0.0; 99]);
+    assert!(matches!(
+        short,
+        Err(FrameError::WrongCount {
+            got: 99,
+            wanted: 100,
+            ..
+        })
+    ));
+}
+
+#[test]
+fn every_shipped_file_parses_and_belongs_to_its_scene() {
+    let counts = [
+        ("sensor-1", 8),
+        ("sensor-2", 9),
+        ("sensor-3", 7),
+        ("sensor-4", 3),
+        ("eight-by-eight", 5),
+    ];
+    for (name, count) in counts {
+        let scene = Scene::builtin(name).unwrap();
+        let frames = Frame::shipped(&scene);
+        assert_eq!(frames.len(), count, "{name}");
+        assert!(frames.windows(2).all(|pair| pair[0].id < pair[1].id));
+        assert!(frames
+            .iter()
+            .all(|frame| frame.check(&scene).is_ok() && frame.resultant_N.is_some()));
+    }
+    assert!(shipped::all_parse());
+}
+
+#[test]
+fn eq2_spans_what_it_should() {
+    // From the corner at 4 × 2 mm: −16 145 … 36 000 N/m².
+    let sensor = Sensor {
+        rows: 10,
+        cols: 10,
+        pitch_x_mm: 4.0,
+        pitch_y_mm: 2.0,
+        thickness_mm: 3.0,
+    };
+    let stress = Frame::eq2(&sensor).stress_MPa;
+    let (low, high) = stress
+        .iter()
+        .fold((0.0f64, 0.0f64), |(l, h), &b| (l.min(b), h.max(b)));
+    assert!((low * 1e6 + 16_145.0).abs() < 1.0 && (high * 1e6 - 36_000.0).abs() < 1e-6);
+    assert_eq!(stress[1], 0.004);
+}
