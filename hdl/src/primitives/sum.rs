@@ -6,7 +6,7 @@ use super::counter::count_bits;
 use super::polynomial_word::{resize, PolynomialWord};
 use crate::wire::{Wire, Word};
 
-/// Adds up the counted lanes of each `fill` into buffer 0 (a first quad starts the coefficient anew); `read` holds a buffer's sum on
+/// Adds up the counted lanes of each `fill` into buffer 0 (quad 0 starts a coefficient anew); `read` holds a buffer's sum on
 /// `word`; `write` replaces a buffer's sum.
 #[derive(LogicBlock)]
 pub struct Sum {
@@ -14,8 +14,8 @@ pub struct Sum {
     pub clk: Signal<In, Clock>,
     /// Add `fill_quad` to coefficient `fill_index`.
     pub fill: Signal<In, Bit>,
-    /// The quad is the coefficient's first.
-    pub fill_first: Signal<In, Bit>,
+    /// Which quad; the first starts the coefficient's sum.
+    pub fill_address: Wire<In>,
     /// Which coefficient.
     pub fill_index: Wire<In>,
     /// Lanes that count.
@@ -39,12 +39,12 @@ pub struct Sum {
 }
 
 impl Sum {
-    /// Sums in `layout` (one lane), of coefficients of `fill_bits` bits.
-    pub fn new(layout: PolynomialWord, fill_bits: usize) -> Self {
+    /// Sums in `layout` (one lane) over `quads` quads, of coefficients of `fill_bits` bits.
+    pub fn new(layout: PolynomialWord, quads: usize, fill_bits: usize) -> Self {
         Sum {
             clk: Default::default(),
             fill: Default::default(),
-            fill_first: Default::default(),
+            fill_address: Wire::new(count_bits(quads)),
             fill_index: Wire::new(count_bits(layout.widths.len())),
             fill_mask: Wire::new(4),
             fill_quad: Wire::new(4 * fill_bits),
@@ -74,7 +74,7 @@ impl Logic for Sum {
                     let added: i64 =
                         (0..4).filter(counted).map(|lane| self.fill_quad.val().signed(lane, bits)).sum();
                     let mut sum = self._layout.get(&self._buffers[0], 0);
-                    sum[k] = added + if self.fill_first.val() { 0 } else { sum[k] };
+                    sum[k] = added + if self.fill_address.val().number() == 0 { 0 } else { sum[k] };
                     self._buffers[0].set(self._layout.offset(k), width, sum[k] as u64);
                 }
             } else if self.write.val() {
@@ -110,7 +110,7 @@ impl Logic for Sum {
                 format!(
                     "\
   if (fill && fill_index == {index_bits}'d{k})
-    buffer0[{low} +: {width}] <= {added} + (fill_first ? {width}'d0 : buffer0[{low} +: {width}]);
+    buffer0[{low} +: {width}] <= {added} + (first ? {width}'d0 : buffer0[{low} +: {width}]);
 ",
                     added = resize("added", wide, width),
                 )
@@ -118,7 +118,8 @@ impl Logic for Sum {
             .collect();
         Verilog::Custom(format!(
             "\
-{lanes}wire [{wide_end}:0] added = {terms};
+{lanes}wire first = fill_address == {address_bits}'d0;
+wire [{wide_end}:0] added = {terms};
 reg [{end}:0] buffer0, buffer1;
 always @(posedge clk) begin
   if (read) word <= read_buffer ? buffer1 : buffer0;
@@ -127,6 +128,7 @@ always @(posedge clk) begin
 {sums}end",
             wide_end = wide - 1,
             end = self._layout.bits() - 1,
+            address_bits = self.fill_address.width(),
             terms = terms.join(" + "),
         ))
     }

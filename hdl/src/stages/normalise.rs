@@ -1,14 +1,14 @@
-//! Block floating point on the input: one left shift for all codes of a subarray.
+//! Stage `normalise`: block floating point on the input, one left shift for all codes of a subarray.
 
 use dermis_golden::fixed::normalise;
 use rust_hdl::prelude::*;
 
-use super::counter::count_bits;
+use crate::primitives::count_bits;
 use crate::wire::{Wire, Word};
 
 /// `start` takes the shift from `magnitude`; then one quad per cycle is shifted (`shifted`, one cycle later).
 #[derive(LogicBlock)]
-pub struct Normaliser {
+pub struct Normalise {
     /// Clock.
     pub clk: Signal<In, Clock>,
     /// Take the shift.
@@ -23,10 +23,10 @@ pub struct Normaliser {
     pub shift: Wire<Out>,
 }
 
-impl Normaliser {
+impl Normalise {
     /// Codes of `bits` bits.
     pub fn new(bits: usize) -> Self {
-        Normaliser {
+        Normalise {
             clk: Default::default(),
             start: Default::default(),
             magnitude: Wire::new(bits - 1),
@@ -37,7 +37,7 @@ impl Normaliser {
     }
 }
 
-impl Logic for Normaliser {
+impl Logic for Normalise {
     fn update(&mut self) {
         if self.clk.pos_edge() {
             let bits = self.quad.width() / 4;

@@ -1,0 +1,212 @@
+//! The engine: all stages in a row, one frame at a time.
+//!
+//! ```text
+//!            receive -> normalise -> fold -> pass -> rescale -> unfold -> search -> force -> send
+//!  s_axis -->  |  frame buffer         |      ^________|  v_ij             |                  |--> m_axis
+//!              '--- magnitude, signs --'                                   '--- μ, score -----'
+//! ```
+//! While a frame is computed and sent, the next one is received into the frame buffer, which is free again as soon as `fold` has
+//! read it.
+
+use dermis_golden::fixed::Model;
+use dermis_golden::scene::Condition;
+use rust_hdl::prelude::*;
+
+use crate::primitives::{Counter, CYCLE_BITS};
+use crate::stages::{Fold, Force, Normalise, Pass, Receive, Rescale, Search, Send, Unfold};
+use crate::wire::Wire;
+
+/// ```text
+///                +---------+
+///  s_axis_t* --> | engine  | --> m_axis_t*
+///      clk, rst  +---------+
+/// ```
+/// | port | direction | width | meaning |
+/// |---|---|---|---|
+/// | `s_axis_tdata` | in | `input_bits` | a taxel's code, signed; row-major, one frame after the other |
+/// | `m_axis_tdata` | out | 96 | `{fz, fy, fx}`, 32 bits signed each; then the status beats |
+/// | `…tvalid`, `…tready`, `…tlast` | | 1 | AXI-Stream handshake; `tlast` on a frame's last beat |
+///
+/// Reset is synchronous and clears all control, not the data.
+#[derive(LogicBlock)]
+pub struct Engine {
+    /// Clock.
+    pub clk: Signal<In, Clock>,
+    /// Reset.
+    pub rst: Signal<In, Bit>,
+    /// A taxel's code.
+    pub s_axis_tdata: Wire<In>,
+    /// It is offered.
+    pub s_axis_tvalid: Signal<In, Bit>,
+    /// It is taken.
+    pub s_axis_tready: Signal<Out, Bit>,
+    /// It is the frame's last.
+    pub s_axis_tlast: Signal<In, Bit>,
+    /// `{fz, fy, fx}`.
+    pub m_axis_tdata: Wire<Out>,
+    /// A beat is offered.
+    pub m_axis_tvalid: Signal<Out, Bit>,
+    /// It is taken.
+    pub m_axis_tready: Signal<In, Bit>,
+    /// It is the frame's last.
+    pub m_axis_tlast: Signal<Out, Bit>,
+    pub(crate) receive: Receive,
+    pub(crate) normalise: Normalise,
+    pub(crate) fold: Fold,
+    pub(crate) pass: Pass,
+    pub(crate) rescale: Rescale,
+    pub(crate) unfold: Unfold,
+    pub(crate) search: Search,
+    pub(crate) force: Force,
+    send: Send,
+    busy: DFF<Bit>,
+    condition: DFF<Bit>,
+    framing: DFF<Bit>,
+    cycles: Counter,
+    both_signs: Constant<Bit>,
+    start: Signal<Local, Bit>,
+}
+
+impl Engine {
+    /// The engine of a scene.
+    pub fn new(model: &Model) -> Self {
+        let formats = &model.formats;
+        let layout = model.layout();
+        let bits = formats.input_bits as usize;
+        let force = Force::new(formats, model.threshold);
+        let mut engine = Engine {
+            clk: Default::default(),
+            rst: Default::default(),
+            s_axis_tdata: Wire::new(bits),
+            s_axis_tvalid: Default::default(),
+            s_axis_tready: Default::default(),
+            s_axis_tlast: Default::default(),
+            m_axis_tdata: Wire::new(force.m_axis_tdata.width()),
+            m_axis_tvalid: Default::default(),
+            m_axis_tready: Default::default(),
+            m_axis_tlast: Default::default(),
+            receive: Receive::new(layout, bits, model.noise_floor),
+            normalise: Normalise::new(bits),
+            fold: Fold::new(formats.quads, bits),
+            pass: Pass::new(formats, &model.quantised),
+            rescale: Rescale::new(formats),
+            unfold: Unfold::new(formats),
+            search: Search::new(formats, layout),
+            force,
+            send: Send::new(layout),
+            busy: Default::default(),
+            condition: Default::default(),
+            framing: Default::default(),
+            cycles: Counter::new(1 << CYCLE_BITS),
+            both_signs: Constant::new(model.scene.partition.condition == Condition::BothSigns),
+            start: Default::default(),
+        };
+        engine.connect_all();
+        engine
+    }
+}
+
+impl Logic for Engine {
+    #[hdl_gen]
+    fn update(&mut self) {
+        self.receive.clk.next = self.clk.val();
+        self.normalise.clk.next = self.clk.val();
+        self.fold.clk.next = self.clk.val();
+        self.pass.clk.next = self.clk.val();
+        self.rescale.clk.next = self.clk.val();
+        self.unfold.clk.next = self.clk.val();
+        self.search.clk.next = self.clk.val();
+        self.force.clk.next = self.clk.val();
+        self.send.clk.next = self.clk.val();
+        self.cycles.clk.next = self.clk.val();
+        self.busy.clock.next = self.clk.val();
+        self.condition.clock.next = self.clk.val();
+        self.framing.clock.next = self.clk.val();
+        self.receive.rst.next = self.rst.val();
+        self.fold.rst.next = self.rst.val();
+        self.pass.rst.next = self.rst.val();
+        self.rescale.rst.next = self.rst.val();
+        self.unfold.rst.next = self.rst.val();
+        self.search.rst.next = self.rst.val();
+        self.force.rst.next = self.rst.val();
+        self.send.rst.next = self.rst.val();
+
+        comment!("A frame begins when it is whole and the one before is gone");
+        self.start.next = self.receive.full.val() & !self.busy.q.val() & !self.rst.val();
+        self.busy.d.next = (self.start.val() | (self.busy.q.val() & !self.send.done.val())) & !self.rst.val();
+        self.cycles.clear.next = !self.busy.q.val() & !self.start.val();
+        self.cycles.enable.next = true;
+        self.condition.d.next = self.condition.q.val();
+        self.framing.d.next = self.framing.q.val();
+        if self.start.val() {
+            self.condition.d.next = self.receive.positive.val() | self.receive.negative.val();
+            if self.both_signs.val() {
+                self.condition.d.next = self.receive.positive.val() & self.receive.negative.val();
+            }
+            self.framing.d.next = self.receive.framing.val();
+        }
+
+        comment!("receive -> normalise -> fold");
+        self.receive.s_axis_tdata.next = self.s_axis_tdata.val();
+        self.receive.s_axis_tvalid.next = self.s_axis_tvalid.val();
+        self.receive.s_axis_tlast.next = self.s_axis_tlast.val();
+        self.s_axis_tready.next = self.receive.s_axis_tready.val();
+        self.receive.quad_address.next = self.fold.quad_address.val();
+        self.receive.release.next = self.fold.release.val();
+        self.receive.reported.next = self.start.val();
+        self.normalise.start.next = self.start.val();
+        self.normalise.magnitude.next = self.receive.magnitude.val();
+        self.normalise.quad.next = self.receive.quad.val();
+        self.fold.start.next = self.start.val();
+        self.fold.normalised.next = self.normalise.shifted.val();
+
+        comment!("fold -> pass -> rescale -> unfold, and back to pass");
+        self.pass.start.next = self.fold.done.val();
+        self.fold.read_address.next = self.pass.input_address.val();
+        self.pass.input_quad.next = self.fold.read_quad.val();
+        self.rescale.start.next = self.start.val();
+        self.rescale.quad.next = self.pass.quad.val();
+        self.rescale.quad_valid.next = self.pass.quad_valid.val();
+        self.pass.vector_quad.next = self.rescale.operands.val();
+        self.pass.vector_valid.next = self.rescale.operands_valid.val();
+        self.unfold.start.next = self.start.val();
+        self.unfold.words.next = self.rescale.words.val();
+        self.unfold.words_valid.next = self.rescale.words_valid.val();
+
+        comment!("unfold -> search");
+        self.search.fill_quad.next = self.unfold.taxels.val();
+        self.search.fill.next = self.unfold.taxels_valid.val();
+        self.search.fill_index.next = self.unfold.index.val();
+        self.search.fill_address.next = self.unfold.address.val();
+        self.search.start.next = self.unfold.done.val();
+        self.search.enabled.next = self.condition.q.val();
+
+        comment!("search -> force -> send");
+        self.force.values.next = self.search.values.val();
+        self.force.values_valid.next = self.search.values_valid.val();
+        self.force.values_address.next = self.search.values_address.val();
+        self.force.start.next = self.search.done.val();
+        self.force.position_x.next = self.search.best_x.val();
+        self.force.position_y.next = self.search.best_y.val();
+        self.force.score.next = self.search.score.val();
+        self.force.found.next = self.search.found.val();
+        self.force.normalise.next = self.normalise.shift.val();
+        self.force.rescale.next = self.rescale.shift.val();
+        self.force.saturations.next = self.rescale.saturations.val();
+        self.force.condition.next = self.condition.q.val();
+        self.force.framing.next = self.framing.q.val();
+        self.force.cycles.next = self.cycles.value.val();
+        self.send.start.next = self.search.done.val();
+        self.force.advance.next = self.send.advance.val();
+        self.force.offer.next = self.send.offer.val();
+        self.force.beat.next = self.send.beat.val();
+        self.force.address.next = self.send.address.val();
+        self.force.lane.next = self.send.lane.val();
+        self.send.m_axis_tvalid.next = self.force.m_axis_tvalid.val();
+        self.send.m_axis_tlast.next = self.force.m_axis_tlast.val();
+        self.send.m_axis_tready.next = self.m_axis_tready.val();
+        self.m_axis_tdata.next = self.force.m_axis_tdata.val();
+        self.m_axis_tvalid.next = self.force.m_axis_tvalid.val();
+        self.m_axis_tlast.next = self.force.m_axis_tlast.val();
+    }
+}

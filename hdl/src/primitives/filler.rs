@@ -1,0 +1,92 @@
+//! Where finished vectors go in the operand memory.
+
+use rust_hdl::prelude::*;
+
+use super::counter::count_bits;
+use crate::wire::{Wire, Word};
+
+/// Counts the quads of a frame's vectors as they arrive: the address of the present one, whether it is an operand of a
+/// later pass at all, and how many vectors are complete.
+#[derive(LogicBlock)]
+pub struct Filler {
+    /// Clock.
+    pub clk: Signal<In, Clock>,
+    /// New frame.
+    pub clear: Signal<In, Bit>,
+    /// A quad arrives.
+    pub valid: Signal<In, Bit>,
+    /// Its address in the operand memory.
+    pub address: Wire<Out>,
+    /// Keep it.
+    pub keep: Signal<Out, Bit>,
+    /// Complete operand vectors.
+    pub finished: Wire<Out>,
+    _quads: usize,
+    _vectors: usize,
+    _seen: usize,
+}
+
+impl Filler {
+    /// `vectors` operand vectors of `quads` quads.
+    pub fn new(vectors: usize, quads: usize) -> Self {
+        Filler {
+            clk: Default::default(),
+            clear: Default::default(),
+            valid: Default::default(),
+            address: Wire::new(count_bits(vectors * quads)),
+            keep: Default::default(),
+            finished: Wire::new(count_bits(vectors + 1)),
+            _quads: quads,
+            _vectors: vectors,
+            _seen: 0,
+        }
+    }
+}
+
+impl Logic for Filler {
+    fn update(&mut self) {
+        if self.clk.pos_edge() {
+            if self.clear.val() {
+                self._seen = 0;
+            } else if self.keep.val() {
+                self._seen += 1;
+            }
+        }
+        let all = self._vectors * self._quads;
+        self.address.next = Word::from(self._seen.min(all - 1) as u64);
+        self.finished.next = Word::from((self._seen / self._quads) as u64);
+        self.keep.next = self.valid.val() && self._seen < all;
+    }
+
+    fn connect(&mut self) {
+        self.address.connect();
+        self.keep.connect();
+        self.finished.connect();
+    }
+
+    fn hdl(&self) -> Verilog {
+        let (a, f) = (self.address.width(), self.finished.width());
+        let q = count_bits(self._quads);
+        Verilog::Custom(format!(
+            "\
+reg [{q_end}:0] quad;
+wire last_quad = quad == {q}'d{last};
+always @(*) keep = valid && finished != {f}'d{vectors};
+always @(posedge clk) begin
+  if (clear) begin
+    quad <= {q}'d0;
+    address <= {a}'d0;
+    finished <= {f}'d0;
+  end else if (keep) begin
+    quad <= last_quad ? {q}'d0 : quad + {q}'d1;
+    if (address != {a}'d{end}) address <= address + {a}'d1;
+    if (last_quad) finished <= finished + {f}'d1;
+  end
+end",
+            q_end = q - 1,
+            last = self._quads - 1,
+            vectors = self._vectors,
+            end = self._vectors * self._quads - 1,
+        ))
+    }
+}

@@ -1,0 +1,368 @@
+//! p to force words, and the output beats with their status.
+
+use dermis_golden::fixed::force::{force, mu_word};
+use dermis_golden::fixed::formats::{force_shift, Formats, FORCE_BITS, FORCE_SHIFT_MAX, MU_ROUND};
+use rust_hdl::prelude::*;
+
+use super::counter::count_bits;
+use super::judge::position_bits;
+use super::polynomial_word::resize;
+use super::raw_length::shift_bits;
+use super::rescaler::SATURATION_BITS;
+use crate::wire::{Wire, Word};
+
+/// A pipeline of five steps that moves while `advance` is high: lane, products, shift, rounding with saturation and
+/// threshold, output. `beat` 0 is a force from `quad`, 1 … 3 are the status beats; the answer stands on `beat_data` five steps after
+/// `offer`. `start` latches μ, the shift and the status of the frame and clears the counts.
+#[derive(LogicBlock)]
+pub struct ForceUnit {
+    /// Clock.
+    pub clk: Signal<In, Clock>,
+    /// Reset of the control pipeline.
+    pub rst: Signal<In, Bit>,
+    /// New frame.
+    pub start: Signal<In, Bit>,
+    /// The pipeline moves.
+    pub advance: Signal<In, Bit>,
+    /// A beat enters.
+    pub offer: Signal<In, Bit>,
+    /// Which beat, 2 bits.
+    pub beat: Wire<In>,
+    /// The quad's lane, with `offer`.
+    pub lane: Wire<In>,
+    /// Four values of p, one step after `offer`.
+    pub quad: Wire<In>,
+    /// μ1 as a position.
+    pub position_x: Wire<In>,
+    /// μ2 as a position.
+    pub position_y: Wire<In>,
+    /// Left shift of `normalise`.
+    pub normalise: Wire<In>,
+    /// Right shift of `rescale`.
+    pub rescale: Wire<In>,
+    /// The scene's condition is met.
+    pub condition: Signal<In, Bit>,
+    /// The search found a candidate.
+    pub found: Signal<In, Bit>,
+    /// `tlast` was early or missing.
+    pub framing: Signal<In, Bit>,
+    /// Score of the winner.
+    pub score: Wire<In>,
+    /// Words that `rescale` saturated.
+    pub saturations: Wire<In>,
+    /// Cycles of the frame so far.
+    pub cycles: Wire<In>,
+    /// A beat stands on the output.
+    pub valid: Signal<Out, Bit>,
+    /// It is the frame's last.
+    pub last: Signal<Out, Bit>,
+    /// `{fz, fy, fx}`.
+    pub beat_data: Wire<Out>,
+    _formats: Formats,
+    _threshold: i64,
+    _pipe: Vec<Option<Entry>>,
+    _frame: Frame,
+}
+
+/// Steps from `offer` to the output.
+pub const STEPS: usize = 5;
+/// Width of the cycle counter.
+pub const CYCLE_BITS: usize = 24;
+
+#[derive(Clone, Copy, Debug, Default)]
+struct Entry {
+    beat: u64,
+    lane: usize,
+    value: i64,
+}
+
+#[derive(Clone, Copy, Debug, Default)]
+struct Frame {
+    position: [i32; 2],
+    normalise: u32,
+    rescale: u32,
+    flags: u32,
+    score: i32,
+    rescale_saturations: u32,
+    cycles: u32,
+    saturations: u32,
+    contact: bool,
+    counting: bool,
+}
+
+impl ForceUnit {
+    /// Widths of `formats`; threshold in force LSBs.
+    pub fn new(formats: &Formats, threshold: i64) -> Self {
+        ForceUnit {
+            clk: Default::default(),
+            rst: Default::default(),
+            start: Default::default(),
+            advance: Default::default(),
+            offer: Default::default(),
+            beat: Wire::new(2),
+            lane: Wire::new(2),
+            quad: Wire::new(4 * formats.search_bits[0] as usize),
+            position_x: Wire::new(position_bits()),
+            position_y: Wire::new(position_bits()),
+            normalise: Wire::new(count_bits(formats.input_bits as usize)),
+            rescale: Wire::new(shift_bits(formats)),
+            condition: Default::default(),
+            found: Default::default(),
+            framing: Default::default(),
+            score: Wire::new(formats.score_bits as usize),
+            saturations: Wire::new(SATURATION_BITS),
+            cycles: Wire::new(CYCLE_BITS),
+            valid: Default::default(),
+            last: Default::default(),
+            beat_data: Wire::new(3 * FORCE_BITS as usize),
+            _formats: formats.clone(),
+            _threshold: threshold,
+            _pipe: vec![None; STEPS - 1],
+            _frame: Frame::default(),
+        }
+    }
+
+    fn latch(&mut self) {
+        let position = |wire: &Wire<In>| wire.val().signed(0, position_bits()) as i32;
+        let flag = |set: bool, bit: u32| u32::from(set) << bit;
+        self._frame = Frame {
+            position: [position(&self.position_x), position(&self.position_y)],
+            normalise: self.normalise.val().number() as u32,
+            rescale: self.rescale.val().number() as u32,
+            flags: flag(self.condition.val(), 0) | flag(self.found.val(), 1) | flag(self.framing.val(), 3),
+            score: if self.found.val() { self.score.val().signed(0, self.score.width()) as i32 } else { 0 },
+            rescale_saturations: self.saturations.val().number() as u32,
+            cycles: 0,
+            saturations: 0,
+            contact: false,
+            counting: true,
+        };
+    }
+
+    fn answer(&mut self, entry: &Entry) -> [i32; 3] {
+        let frame = &mut self._frame;
+        match entry.beat {
+            0 => {
+                let shift = force_shift(&self._formats, frame.normalise, frame.rescale);
+                let mu = frame.position.map(|x| mu_word(&self._formats, x));
+                let result = force(&self._formats, entry.value, mu, shift, self._threshold);
+                frame.saturations = (frame.saturations + result.saturations).min((1 << SATURATION_BITS) - 1);
+                frame.contact |= result.words[2] != 0;
+                result.words
+            }
+            1 => [frame.position[0], frame.position[1], (frame.flags | u32::from(!frame.contact) << 2) as i32],
+            2 => [frame.score, frame.rescale as i32, frame.normalise as i32],
+            _ => [frame.rescale_saturations as i32, frame.saturations as i32, frame.cycles as i32],
+        }
+    }
+}
+
+impl Logic for ForceUnit {
+    fn update(&mut self) {
+        if self.clk.pos_edge() {
+            if self.advance.val() {
+                let leaving = self._pipe.remove(0);
+                if let Some(entry) = leaving {
+                    if self._frame.counting {
+                        // The counter begins a cycle after the last input beat, and the first output beat stands from the
+                        // next cycle on.
+                        self._frame.cycles = self.cycles.val().number() as u32 + 2;
+                        self._frame.counting = false;
+                    }
+                    let words = self.answer(&entry);
+                    self.beat_data.next = Word::of_fields(&words.map(i64::from), FORCE_BITS as usize);
+                }
+                self.valid.next = leaving.is_some();
+                self.last.next = leaving.is_some_and(|entry| entry.beat == 3);
+                if let Some(Some(entry)) = self._pipe.last_mut() {
+                    entry.value = self.quad.val().signed(entry.lane, self.quad.width() / 4);
+                }
+                self._pipe.push(self.offer.val().then(|| Entry {
+                    beat: self.beat.val().number(),
+                    lane: self.lane.val().number() as usize,
+                    value: 0,
+                }));
+            }
+            if self.start.val() {
+                self.latch();
+            }
+            if self.rst.val() {
+                self._pipe.fill(None);
+                self.valid.next = false;
+                self.last.next = false;
+            }
+        }
+    }
+
+    fn connect(&mut self) {
+        self.valid.connect();
+        self.last.connect();
+        self.beat_data.connect();
+    }
+
+    fn hdl(&self) -> Verilog {
+        let f = &self._formats;
+        let v = f.search_bits[0] as usize;
+        let (mu, fraction) = (18, f.mu_fraction as usize);
+        let product = v + mu;
+        let p = position_bits();
+        let (n_bits, r_bits) = (self.normalise.width(), self.rescale.width());
+        // force_shift = base + normalise − rescale, held between 0 and the largest useful shift.
+        let base = force_shift(f, 0, 0) as usize;
+        let (word, cap) = (FORCE_BITS as usize, SATURATION_BITS);
+        let over = product + 1 - word;
+        let score = resize("score", self.score.width(), word);
+        let threshold = match self._threshold {
+            0 => "1'b0".to_string(),
+            t => format!("magnitude < 33'd{}", t.min(1 << 32)),
+        };
+        let magnitude = if self._threshold == 0 {
+            String::new()
+        } else {
+            "wire [32:0] magnitude = words[95] ? -{1'b1, words[95:64]} : {1'b0, words[95:64]};\n".to_string()
+        };
+        Verilog::Custom(format!(
+            "\
+reg [{p_end}:0] x, y;
+reg [{n_end}:0] normalise_held;
+reg [{r_end}:0] rescale_held;
+reg condition_held, found_held, framing_held, contact, counting;
+reg [{word_end}:0] score_held;
+reg [{cap_end}:0] rescale_saturations, force_saturations;
+reg [{c_end}:0] cycles_held;
+reg [5:0] shift;
+reg signed [{mu_end}:0] mu_x, mu_y;
+wire [7:0] raw_shift = 8'd{base} + {{{n_more}'d0, normalise_held}} - {{{r_more}'d0, rescale_held}};
+wire signed [{mp_end}:0] mu_step = {mp}'sd{mu_step};
+wire signed [{mp_end}:0] wide_x = {{{{{mp_more}{{x[{p_end}]}}}}, x}};
+wire signed [{mp_end}:0] wide_y = {{{{{mp_more}{{y[{p_end}]}}}}, y}};
+reg signed [{mp_end}:0] scaled_x, scaled_y;
+// Apart from the addition: an unsigned operand would make the shift logical.
+wire signed [{mp_end}:0] before_x = scaled_x >>> {mu_round_less};
+wire signed [{mp_end}:0] before_y = scaled_y >>> {mu_round_less};
+wire [{mp_end}:0] half_x = before_x + {mp}'sd1;
+wire [{mp_end}:0] half_y = before_y + {mp}'sd1;
+always @(posedge clk) begin
+  if (start) begin
+    x <= position_x;
+    y <= position_y;
+    normalise_held <= normalise;
+    rescale_held <= rescale;
+    condition_held <= condition;
+    found_held <= found;
+    framing_held <= framing;
+    score_held <= found ? {score} : {word}'d0;
+    rescale_saturations <= saturations;
+  end
+  // Settled three cycles after start; the first value needs them in its third step.
+  shift <= raw_shift[7] ? 6'd0 : raw_shift > 8'd{shift_max} ? 6'd{shift_max} : raw_shift[5:0];
+  scaled_x <= wide_x * mu_step;
+  scaled_y <= wide_y * mu_step;
+  mu_x <= half_x[{mu}:1];
+  mu_y <= half_y[{mu}:1];
+end
+reg [3:0] offers;
+reg [1:0] beat1, beat2, beat3, beat4;
+reg [1:0] lane1;
+reg signed [{v_end}:0] value;
+reg signed [{product_end}:0] product_x, product_y;
+reg [{v_end}:0] value3;
+wire signed [{product}:0] doubled_x = {{product_x, 1'b0}};
+wire signed [{product}:0] doubled_y = {{product_y, 1'b0}};
+wire signed [{product}:0] doubled_z = {{{{{z_more}{{value3[{v_end}]}}}}, value3, {fraction_one}'d0}};
+reg signed [{product}:0] moved_x, moved_y, moved_z;
+wire [{all_end}:0] words;
+wire [2:0] clipped;
+genvar axis;
+generate
+  for (axis = 0; axis < 3; axis = axis + 1) begin : component
+    wire [{product}:0] moved = axis == 0 ? moved_x : axis == 1 ? moved_y : moved_z;
+    wire [{product1}:0] half_up = {{moved[{product}], moved}} + {product2}'d1;
+    wire [{product}:0] rounded = half_up[{product1}:1];
+    wire [{over}:0] sign = rounded[{product}:{word_end}];
+    assign clipped[axis] = sign != {{{over1}{{rounded[{product}]}}}};
+    assign words[axis * {word} +: {word}] =
+      clipped[axis] ? {{rounded[{product}], {{{word_end}{{!rounded[{product}]}}}}}} : rounded[{word_end}:0];
+    wire unused = &{{1'b0, half_up[0]}};
+  end
+endgenerate
+{magnitude}wire below = {threshold};
+wire [{cap}:0] count = {{1'b0, force_saturations}} + {{{cap_less}'d0, clipped[0]}} + {{{cap_less}'d0, clipped[1]}}
+  + {{{cap_less}'d0, clipped[2]}};
+reg [{all_end}:0] status;
+always @(*) begin
+  case (beat4)
+    2'd1: status = {{28'd0, framing_held, !contact, found_held, condition_held, {y_word}, {x_word}}};
+    2'd2: status = {{{n_word}'d0, normalise_held, {r_word}'d0, rescale_held, score_held}};
+    default: status = {{{c_word}'d0, cycles_held, {cap_word}'d0, force_saturations, {cap_word}'d0, rescale_saturations}};
+  endcase
+end
+wire force_leaves = advance && offers[3] && beat4 == 2'd0;
+always @(posedge clk) begin
+  if (rst) begin
+    offers <= 4'd0;
+    valid <= 1'b0;
+    last <= 1'b0;
+  end else if (advance) begin
+    offers <= {{offers[2:0], offer}};
+    valid <= offers[3];
+    last <= offers[3] && beat4 == 2'd3;
+  end
+  if (advance) begin
+    {{beat4, beat3, beat2, beat1}} <= {{beat3, beat2, beat1, beat}};
+    lane1 <= lane;
+    value <= quad[lane1 * {v} +: {v}];
+    product_x <= value * mu_x;
+    product_y <= value * mu_y;
+    value3 <= value;
+    moved_x <= doubled_x >>> shift;
+    moved_y <= doubled_y >>> shift;
+    moved_z <= doubled_z >>> shift;
+    if (offers[3]) beat_data <= beat4 != 2'd0 ? status : below ? {all}'d0 : words;
+  end
+  if (start) begin
+    counting <= 1'b1;
+    contact <= 1'b0;
+    force_saturations <= {cap}'d0;
+  end else if (advance && offers[3]) begin
+    if (counting) cycles_held <= cycles + {c}'d2;
+    counting <= 1'b0;
+    if (force_leaves && !below && words[95:64] != 32'd0) contact <= 1'b1;
+    if (force_leaves) force_saturations <= count[{cap}] ? {{{cap}{{1'b1}}}} : count[{cap_end}:0];
+  end
+end",
+            p_end = p - 1,
+            n_end = n_bits - 1,
+            r_end = r_bits - 1,
+            n_more = 8 - n_bits,
+            r_more = 8 - r_bits,
+            word_end = word - 1,
+            all = 3 * word,
+            all_end = 3 * word - 1,
+            cap_end = cap - 1,
+            cap_less = cap,
+            cap_word = word - cap,
+            c = CYCLE_BITS,
+            c_end = CYCLE_BITS - 1,
+            c_word = word - CYCLE_BITS,
+            n_word = word - n_bits,
+            r_word = word - r_bits,
+            mu_end = mu - 1,
+            mp = p + 18,
+            mp_end = p + 17,
+            mp_more = 18,
+            mu_step = f.mu_step,
+            mu_round_less = MU_ROUND - 1,
+            shift_max = FORCE_SHIFT_MAX,
+            v_end = v - 1,
+            product_end = product - 1,
+            product1 = product + 1,
+            product2 = product + 2,
+            over1 = over + 1,
+            z_more = product - v - fraction,
+            fraction_one = fraction + 1,
+            x_word = resize("x", p, word),
+            y_word = resize("y", p, word),
+        ))
+    }
+}

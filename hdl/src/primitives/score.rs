@@ -1,0 +1,151 @@
+//! The sparse objective over one sweep: Σ log2(|p| + ⌊Σp / 2^17⌋) for nine candidates at once.
+
+use dermis_golden::fixed::formats::{Formats, EPSILON_SHIFT, LOG_TABLE_BITS};
+use dermis_golden::fixed::search::log2;
+use rust_hdl::prelude::*;
+
+use super::logarithm::{locate, table, LENGTH_BITS, LOG_BITS};
+use crate::wire::{Wire, Word};
+
+/// Values of a quad's four taxels and of the sum in, `totals` of all valid quads since `clear`, [`LATENCY`] cycles later.
+///
+/// Stages: magnitude; plus ε Σp (0 for Σp < 0, such a candidate is never taken); leading one; table; sum of the
+/// four lanes that count; accumulation.
+#[derive(LogicBlock)]
+pub struct Score {
+    /// Clock.
+    pub clk: Signal<In, Clock>,
+    /// Totals back to 0.
+    pub clear: Signal<In, Bit>,
+    /// `values` are a quad.
+    pub valid: Signal<In, Bit>,
+    /// Lanes that count.
+    pub mask: Wire<In>,
+    /// Nine values per lane.
+    pub values: Wire<In>,
+    /// Σp of the nine candidates, held during the sweep.
+    pub sums: Wire<In>,
+    /// The nine totals.
+    pub totals: Wire<Out>,
+    _pipe: Vec<Option<[i64; 9]>>,
+}
+
+/// Cycles from a quad to the totals that contain it.
+pub const LATENCY: usize = 6;
+
+impl Score {
+    /// Widths of `formats`.
+    pub fn new(formats: &Formats) -> Self {
+        Score {
+            clk: Default::default(),
+            clear: Default::default(),
+            valid: Default::default(),
+            mask: Wire::new(4),
+            values: Wire::new(36 * formats.search_bits[0] as usize),
+            sums: Wire::new(9 * formats.sum_bits[0] as usize),
+            totals: Wire::new(9 * formats.score_bits as usize),
+            _pipe: vec![None; LATENCY - 1],
+        }
+    }
+
+    fn widths(&self) -> (usize, usize, usize) {
+        (self.values.width() / 36, self.sums.width() / 9, self.totals.width() / 9)
+    }
+}
+
+impl Logic for Score {
+    fn update(&mut self) {
+        if self.clk.pos_edge() {
+            let (v, s, t) = self.widths();
+            let logs = self.valid.val().then(|| {
+                std::array::from_fn(|k| {
+                    let epsilon = self.sums.val().signed(k, s).max(0) >> EPSILON_SHIFT;
+                    (0..4)
+                        .filter(|&lane| self.mask.val().field(lane, 1) == 1)
+                        .map(|lane| log2(self.values.val().signed(9 * lane + k, v).abs() + epsilon))
+                        .sum()
+                })
+            });
+            self._pipe.push(logs);
+            let added = self._pipe.remove(0).unwrap_or([0; 9]);
+            let totals: Vec<i64> = (0..9)
+                .map(|k| if self.clear.val() { 0 } else { self.totals.val().signed(k, t) + added[k] })
+                .collect();
+            self.totals.next = Word::of_fields(&totals, t);
+        }
+    }
+
+    fn connect(&mut self) {
+        self.totals.connect();
+    }
+
+    fn hdl(&self) -> Verilog {
+        let (v, s, t) = self.widths();
+        let shift = EPSILON_SHIFT as usize;
+        let e = s - 1 - shift;
+        let x = v.max(e) + 1;
+        let cell = LOG_TABLE_BITS as usize;
+        let lane_sum = LOG_BITS + 2;
+        let pad = |bits: usize| match bits {
+            0 => String::new(),
+            _ => format!("{bits}'d0, "),
+        };
+        Verilog::Custom(format!(
+            "\
+{locate}{table}reg [4:0] valids;
+reg [15:0] masks;
+always @(posedge clk) begin
+  valids <= {{valids[3:0], valid}};
+  masks <= {{masks[11:0], mask}};
+end
+genvar k, l;
+generate
+  for (k = 0; k < 9; k = k + 1) begin : candidate
+    wire [{e_end}:0] epsilon = sums[(k + 1) * {s} - 1] ? {e}'d0 : sums[k * {s} + {shift} +: {e}];
+    wire [{logs_end}:0] logs;
+    reg [{lane_sum_end}:0] together;
+    for (l = 0; l < 4; l = l + 1) begin : lane
+      wire [{v_end}:0] value = values[(9 * l + k) * {v} +: {v}];
+      reg [{v_end}:0] magnitude;
+      reg [{x_end}:0] argument;
+      reg [{found_end}:0] found;
+      reg [{log_end}:0] log;
+      always @(posedge clk) begin
+        magnitude <= value[{v_end}] ? -value : value;
+        argument <= {{{pad_v}magnitude}} + {{{pad_e}epsilon}};
+        found <= locate(argument);
+        log <= {{found[{found_end}:{cell}], fraction(found[{cell_end}:0])}};
+      end
+      assign logs[l * {log_bits} +: {log_bits}] = masks[12 + l] ? log : {log_bits}'d0;
+    end
+    always @(posedge clk) begin
+      together <= {{2'd0, logs[0 +: {log_bits}]}} + {{2'd0, logs[{log_bits} +: {log_bits}]}}
+        + {{2'd0, logs[{log2} +: {log_bits}]}} + {{2'd0, logs[{log3} +: {log_bits}]}};
+      if (clear) totals[k * {t} +: {t}] <= {t}'d0;
+      else if (valids[4]) totals[k * {t} +: {t}] <= totals[k * {t} +: {t}] + {together};
+    end
+  end
+endgenerate",
+            locate = locate("locate", x),
+            table = table("fraction"),
+            e_end = e - 1,
+            logs_end = 4 * LOG_BITS - 1,
+            lane_sum_end = lane_sum - 1,
+            v_end = v - 1,
+            x_end = x - 1,
+            found_end = LENGTH_BITS + cell - 1,
+            cell_end = cell - 1,
+            log_end = LOG_BITS - 1,
+            log_bits = LOG_BITS,
+            log2 = 2 * LOG_BITS,
+            log3 = 3 * LOG_BITS,
+            pad_v = pad(x - v),
+            pad_e = pad(x - e),
+            together = match t.checked_sub(lane_sum) {
+                Some(0) => "together".to_string(),
+                Some(more) => format!("{{{more}'d0, together}}"),
+                None => format!("together[{}:0]", t - 1),
+            },
+        ))
+    }
+}

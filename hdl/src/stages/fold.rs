@@ -1,0 +1,117 @@
+//! Stage `fold`: the frame's normalised quads to parities, into the input memory of the passes.
+//!
+//! One quad per cycle: frame buffer (1 cycle), `normalise` (1), butterfly (1), memory.
+
+use rust_hdl::prelude::*;
+
+use crate::primitives::{count_bits, BitDelay, Butterfly, Counter, Delay, Ram};
+use crate::wire::Wire;
+
+/// Quads pass `normalise` and the butterfly on their way from frame buffer to input memory.
+#[derive(LogicBlock)]
+pub struct Fold {
+    /// Clock.
+    pub clk: Signal<In, Clock>,
+    /// Reset.
+    pub rst: Signal<In, Bit>,
+    /// Fold the frame.
+    pub start: Signal<In, Bit>,
+    /// Quad to read from the frame buffer.
+    pub quad_address: Wire<Out>,
+    /// The last quad is being read.
+    pub release: Signal<Out, Bit>,
+    /// The quad of two cycles ago, normalised.
+    pub normalised: Wire<In>,
+    /// `normalised` is a quad.
+    pub normalised_valid: Signal<Out, Bit>,
+    /// Its parities, one cycle later.
+    pub folded: Wire<Out>,
+    /// `folded` is a quad.
+    pub folded_valid: Signal<Out, Bit>,
+    /// The input memory holds the frame.
+    pub done: Signal<Out, Bit>,
+    /// Quad of the input memory to read.
+    pub read_address: Wire<In>,
+    /// Its parities, one cycle later.
+    pub read_quad: Wire<Out>,
+    quads: Counter,
+    running: DFF<Bit>,
+    two_later: BitDelay,
+    three_later: BitDelay,
+    end: BitDelay,
+    address: Delay,
+    butterfly: Butterfly,
+    memory: Ram,
+    ending: Signal<Local, Bit>,
+}
+
+impl Fold {
+    /// `quads` quads of codes of `bits` bits.
+    pub fn new(quads: usize, bits: usize) -> Self {
+        let address = count_bits(quads);
+        Fold {
+            clk: Default::default(),
+            rst: Default::default(),
+            start: Default::default(),
+            quad_address: Wire::new(address),
+            release: Default::default(),
+            normalised: Wire::new(4 * bits),
+            normalised_valid: Default::default(),
+            folded: Wire::new(4 * (bits + 2)),
+            folded_valid: Default::default(),
+            done: Default::default(),
+            read_address: Wire::new(address),
+            read_quad: Wire::new(4 * (bits + 2)),
+            quads: Counter::new(quads),
+            running: Default::default(),
+            two_later: BitDelay::new(2),
+            three_later: BitDelay::new(1),
+            end: BitDelay::new(4),
+            address: Delay::new(address, 3),
+            butterfly: Butterfly::new(bits),
+            memory: Ram::new(quads, 1, 4 * (bits + 2)),
+            ending: Default::default(),
+        }
+    }
+}
+
+impl Logic for Fold {
+    #[hdl_gen]
+    fn update(&mut self) {
+        self.quads.clk.next = self.clk.val();
+        self.running.clock.next = self.clk.val();
+        self.two_later.clk.next = self.clk.val();
+        self.three_later.clk.next = self.clk.val();
+        self.end.clk.next = self.clk.val();
+        self.address.clk.next = self.clk.val();
+        self.butterfly.clk.next = self.clk.val();
+        self.memory.clk.next = self.clk.val();
+        self.two_later.rst.next = self.rst.val();
+        self.three_later.rst.next = self.rst.val();
+        self.end.rst.next = self.rst.val();
+
+        self.quads.clear.next = self.start.val();
+        self.quads.enable.next = self.running.q.val();
+        self.ending.next = self.running.q.val() & self.quads.last.val();
+        self.running.d.next = (self.start.val() | (self.running.q.val() & !self.quads.last.val())) & !self.rst.val();
+        self.quad_address.next = self.quads.value.val();
+        self.release.next = self.ending.val();
+
+        self.two_later.now.next = self.running.q.val();
+        self.three_later.now.next = self.two_later.then.val();
+        self.normalised_valid.next = self.two_later.then.val();
+        self.butterfly.quad.next = self.normalised.val();
+        self.folded.next = self.butterfly.sums.val();
+        self.folded_valid.next = self.three_later.then.val();
+
+        self.address.now.next = self.quads.value.val();
+        self.memory.write.next = self.three_later.then.val().into();
+        self.memory.write_address.next = self.address.then.val();
+        self.memory.write_data.next = self.butterfly.sums.val();
+        self.memory.read.next = true;
+        self.memory.read_address.next = self.read_address.val();
+        self.read_quad.next = self.memory.read_data.val();
+        self.end.now.next = self.ending.val();
+        self.done.next = self.end.then.val();
+    }
+}

@@ -1,0 +1,132 @@
+//! Stage `force`: p(μ*) by quad into a memory, out of it force words by taxel.
+
+use dermis_golden::fixed::formats::Formats;
+use rust_hdl::prelude::*;
+
+use crate::primitives::{count_bits, position_bits, shift_bits, ForceUnit, Ram, CYCLE_BITS, SATURATION_BITS};
+use crate::wire::Wire;
+
+/// Values in by quad; beats out in the order `send` asks for them.
+#[derive(LogicBlock)]
+pub struct Force {
+    /// Clock.
+    pub clk: Signal<In, Clock>,
+    /// Reset.
+    pub rst: Signal<In, Bit>,
+    /// Four taxels' p(μ*).
+    pub values: Wire<In>,
+    /// `values` are a quad.
+    pub values_valid: Signal<In, Bit>,
+    /// Which quad.
+    pub values_address: Wire<In>,
+    /// All values are in.
+    pub start: Signal<In, Bit>,
+    /// The pipeline moves.
+    pub advance: Signal<In, Bit>,
+    /// A beat is asked for.
+    pub offer: Signal<In, Bit>,
+    /// Which beat: 0 a force, 1 … 3 the status.
+    pub beat: Wire<In>,
+    /// The taxel's quad.
+    pub address: Wire<In>,
+    /// The taxel's lane.
+    pub lane: Wire<In>,
+    /// μ1 as a position.
+    pub position_x: Wire<In>,
+    /// μ2 as a position.
+    pub position_y: Wire<In>,
+    /// Left shift of `normalise`.
+    pub normalise: Wire<In>,
+    /// Right shift of `rescale`.
+    pub rescale: Wire<In>,
+    /// The scene's condition is met.
+    pub condition: Signal<In, Bit>,
+    /// The search found a candidate.
+    pub found: Signal<In, Bit>,
+    /// `tlast` was early or missing.
+    pub framing: Signal<In, Bit>,
+    /// Score of the winner.
+    pub score: Wire<In>,
+    /// Words that `rescale` saturated.
+    pub saturations: Wire<In>,
+    /// Cycles of the frame so far.
+    pub cycles: Wire<In>,
+    /// A beat stands on the output.
+    pub m_axis_tvalid: Signal<Out, Bit>,
+    /// It is the frame's last.
+    pub m_axis_tlast: Signal<Out, Bit>,
+    /// `{fz, fy, fx}`.
+    pub m_axis_tdata: Wire<Out>,
+    store: Ram,
+    unit: ForceUnit,
+}
+
+impl Force {
+    /// Widths of `formats`; threshold in force LSBs.
+    pub fn new(formats: &Formats, threshold: i64) -> Self {
+        let (address, value) = (count_bits(formats.quads), 4 * formats.search_bits[0] as usize);
+        let unit = ForceUnit::new(formats, threshold);
+        Force {
+            clk: Default::default(),
+            rst: Default::default(),
+            values: Wire::new(value),
+            values_valid: Default::default(),
+            values_address: Wire::new(address),
+            start: Default::default(),
+            advance: Default::default(),
+            offer: Default::default(),
+            beat: Wire::new(2),
+            address: Wire::new(address),
+            lane: Wire::new(2),
+            position_x: Wire::new(position_bits()),
+            position_y: Wire::new(position_bits()),
+            normalise: Wire::new(unit.normalise.width()),
+            rescale: Wire::new(shift_bits(formats)),
+            condition: Default::default(),
+            found: Default::default(),
+            framing: Default::default(),
+            score: Wire::new(formats.score_bits as usize),
+            saturations: Wire::new(SATURATION_BITS),
+            cycles: Wire::new(CYCLE_BITS),
+            m_axis_tvalid: Default::default(),
+            m_axis_tlast: Default::default(),
+            m_axis_tdata: Wire::new(unit.beat_data.width()),
+            store: Ram::new(formats.quads, 1, value),
+            unit,
+        }
+    }
+}
+
+impl Logic for Force {
+    #[hdl_gen]
+    fn update(&mut self) {
+        self.store.clk.next = self.clk.val();
+        self.unit.clk.next = self.clk.val();
+        self.unit.rst.next = self.rst.val();
+        self.store.write.next = self.values_valid.val().into();
+        self.store.write_address.next = self.values_address.val();
+        self.store.write_data.next = self.values.val();
+        self.store.read.next = self.advance.val();
+        self.store.read_address.next = self.address.val();
+
+        self.unit.start.next = self.start.val();
+        self.unit.advance.next = self.advance.val();
+        self.unit.offer.next = self.offer.val();
+        self.unit.beat.next = self.beat.val();
+        self.unit.lane.next = self.lane.val();
+        self.unit.quad.next = self.store.read_data.val();
+        self.unit.position_x.next = self.position_x.val();
+        self.unit.position_y.next = self.position_y.val();
+        self.unit.normalise.next = self.normalise.val();
+        self.unit.rescale.next = self.rescale.val();
+        self.unit.condition.next = self.condition.val();
+        self.unit.found.next = self.found.val();
+        self.unit.framing.next = self.framing.val();
+        self.unit.score.next = self.score.val();
+        self.unit.saturations.next = self.saturations.val();
+        self.unit.cycles.next = self.cycles.val();
+        self.m_axis_tvalid.next = self.unit.valid.val();
+        self.m_axis_tlast.next = self.unit.last.val();
+        self.m_axis_tdata.next = self.unit.beat_data.val();
+    }
+}

@@ -1,0 +1,153 @@
+//! Stage `pass`: the matrix-vector products of a subarray, one after the other on the MAC lanes.
+//!
+//! The schedule runs through its steps, one column per cycle, and waits only where a step's operand is not finished yet. From
+//! issue to operands: addresses (1 cycle), memories (1), limb and parity selection (1); then the lanes.
+
+use dermis_golden::fixed::formats::{Formats, Quantised};
+use dermis_golden::fixed::pass::{flip, memory};
+use dermis_golden::fixed::schedule::{schedule, vectors};
+use rust_hdl::prelude::*;
+
+use crate::primitives::{
+    count_bits, matrices, unroll, BitDelay, Counter, Delay, Filler, Lanes, OperandSelect, Ram, Slice, Steps,
+};
+use crate::wire::Wire;
+
+/// Input memory and finished v_ij in, accumulators of whole rows out.
+#[derive(LogicBlock)]
+pub struct Pass {
+    /// Clock.
+    pub clk: Signal<In, Clock>,
+    /// Reset.
+    pub rst: Signal<In, Bit>,
+    /// The input memory holds a frame.
+    pub start: Signal<In, Bit>,
+    /// Quad of the input memory to read.
+    pub input_address: Wire<Out>,
+    /// Its parities, one cycle later.
+    pub input_quad: Wire<In>,
+    /// A finished quad of a v_ij, in order.
+    pub vector_quad: Wire<In>,
+    /// `vector_quad` is one.
+    pub vector_valid: Signal<In, Bit>,
+    /// Accumulators of one row.
+    pub quad: Wire<Out>,
+    /// `quad` is a row.
+    pub quad_valid: Signal<Out, Bit>,
+    step: Counter,
+    column: Counter,
+    running: DFF<Bit>,
+    steps: Steps,
+    vectors: Ram,
+    filler: Filler,
+    kind: Delay,
+    flip: Delay,
+    control: Delay,
+    valid: BitDelay,
+    select: OperandSelect,
+    /// The MAC lanes.
+    pub lanes: Lanes,
+    low_address: Slice,
+    issue: Signal<Local, Bit>,
+    column_end: Signal<Local, Bit>,
+}
+
+impl Pass {
+    /// Products of `quantised` in `formats`.
+    pub fn new(formats: &Formats, quantised: &Quantised) -> Self {
+        let quads = formats.quads;
+        let schedule = schedule(formats);
+        let steps = unroll(formats, &schedule, |matrix| flip(quantised, matrix));
+        let lanes = Lanes::new(formats, memory(formats, quantised, &matrices(&schedule)));
+        // The last degree's v_ij are nobody's operand; without any degree one vector is kept, unread.
+        let operands = vectors(formats.degree.saturating_sub(1));
+        let count = steps.len();
+        let steps = Steps::new(steps, quads, 1 << lanes.address.width(), operands * quads, operands);
+        let parity_bits = 4 * formats.data_bits as usize;
+        Pass {
+            clk: Default::default(),
+            rst: Default::default(),
+            start: Default::default(),
+            input_address: Wire::new(count_bits(quads)),
+            input_quad: Wire::new(4 * formats.fold_bits as usize),
+            vector_quad: Wire::new(parity_bits),
+            vector_valid: Default::default(),
+            quad: Wire::new(4 * formats.acc_bits as usize),
+            quad_valid: Default::default(),
+            step: Counter::new(count),
+            column: Counter::new(quads),
+            running: Default::default(),
+            low_address: Slice::new(steps.operand_address.width(), count_bits(quads)),
+            steps,
+            vectors: Ram::new(operands * quads, 1, parity_bits),
+            filler: Filler::new(operands, quads),
+            kind: Delay::new(2, 1),
+            flip: Delay::new(2, 1),
+            control: Delay::new(3, 2),
+            valid: BitDelay::new(3),
+            select: OperandSelect::new(formats),
+            lanes,
+            issue: Default::default(),
+            column_end: Default::default(),
+        }
+    }
+}
+
+impl Logic for Pass {
+    #[hdl_gen]
+    fn update(&mut self) {
+        self.step.clk.next = self.clk.val();
+        self.column.clk.next = self.clk.val();
+        self.running.clock.next = self.clk.val();
+        self.steps.clk.next = self.clk.val();
+        self.vectors.clk.next = self.clk.val();
+        self.filler.clk.next = self.clk.val();
+        self.kind.clk.next = self.clk.val();
+        self.flip.clk.next = self.clk.val();
+        self.control.clk.next = self.clk.val();
+        self.valid.clk.next = self.clk.val();
+        self.select.clk.next = self.clk.val();
+        self.lanes.clk.next = self.clk.val();
+        self.valid.rst.next = self.rst.val();
+        self.lanes.rst.next = self.rst.val();
+
+        self.issue.next = self.running.q.val() & self.steps.ready.val();
+        self.column_end.next = self.issue.val() & self.column.last.val();
+        self.running.d.next = (self.start.val()
+            | (self.running.q.val() & !(self.column_end.val() & self.step.last.val())))
+            & !self.rst.val();
+        self.column.clear.next = self.start.val();
+        self.column.enable.next = self.issue.val();
+        self.step.clear.next = self.start.val();
+        self.step.enable.next = self.column_end.val();
+        self.steps.step.next = self.step.value.val();
+        self.steps.column.next = self.column.value.val();
+        self.steps.finished.next = self.filler.finished.val();
+
+        self.low_address.word.next = self.steps.operand_address.val();
+        self.input_address.next = self.low_address.low.val();
+        self.vectors.read.next = true;
+        self.vectors.read_address.next = self.steps.operand_address.val();
+        self.filler.clear.next = self.start.val();
+        self.filler.valid.next = self.vector_valid.val();
+        self.vectors.write.next = self.filler.keep.val().into();
+        self.vectors.write_address.next = self.filler.address.val();
+        self.vectors.write_data.next = self.vector_quad.val();
+
+        self.kind.now.next = self.steps.kind.val();
+        self.flip.now.next = self.steps.flip.val();
+        self.select.kind.next = self.kind.then.val();
+        self.select.flip.next = self.flip.then.val();
+        self.select.input_quad.next = self.input_quad.val();
+        self.select.vector_quad.next = self.vectors.read_data.val();
+        self.control.now.next = self.steps.control.val();
+        self.valid.now.next = self.issue.val();
+
+        self.lanes.address.next = self.steps.coefficient_address.val();
+        self.lanes.operands.next = self.select.operands.val();
+        self.lanes.valid.next = self.valid.then.val();
+        self.lanes.control.next = self.control.then.val();
+        self.quad.next = self.lanes.quad.val();
+        self.quad_valid.next = self.lanes.quad_valid.val();
+    }
+}

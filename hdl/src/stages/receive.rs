@@ -1,0 +1,148 @@
+//! Stage `receive`: taxels row-major into the frame buffer, magnitude and signs on the way.
+//!
+//! One beat per cycle while the buffer is free. The frame ends with its last taxel, whatever `tlast` says: a `tlast` that
+//! comes early drops the frame it cut short and starts over with the next beat; a missing one is
+//! only remembered. Both raise `framing` until `reported`.
+
+use dermis_golden::fixed::quads::Quads;
+use rust_hdl::prelude::*;
+
+use crate::primitives::{count_bits, Counter, Gather, Mirror, Ram, Spread};
+use crate::wire::Wire;
+
+/// ```text
+/// s_axis --> frame buffer --> quad (one cycle after quad_address)
+///       \--> magnitude, positive, negative
+/// ```
+/// `full` from the frame's last beat until `release`; the gathered values stand as long.
+#[derive(LogicBlock)]
+pub struct Receive {
+    /// Clock.
+    pub clk: Signal<In, Clock>,
+    /// Reset.
+    pub rst: Signal<In, Bit>,
+    /// A taxel's code.
+    pub s_axis_tdata: Wire<In>,
+    /// It is offered.
+    pub s_axis_tvalid: Signal<In, Bit>,
+    /// It is taken.
+    pub s_axis_tready: Signal<Out, Bit>,
+    /// It is the frame's last.
+    pub s_axis_tlast: Signal<In, Bit>,
+    /// A beat is accepted in this cycle.
+    pub accept: Signal<Out, Bit>,
+    /// The frame buffer holds a whole frame.
+    pub full: Signal<Out, Bit>,
+    /// The frame has been read.
+    pub release: Signal<In, Bit>,
+    /// Which quad to read.
+    pub quad_address: Wire<In>,
+    /// The quad, one cycle later.
+    pub quad: Wire<Out>,
+    /// OR of the codes' magnitudes.
+    pub magnitude: Wire<Out>,
+    /// A code is above the noise floor.
+    pub positive: Signal<Out, Bit>,
+    /// A code is below minus the noise floor.
+    pub negative: Signal<Out, Bit>,
+    /// `tlast` was early or missing.
+    pub framing: Signal<Out, Bit>,
+    /// `framing` has been reported.
+    pub reported: Signal<In, Bit>,
+    column: Counter,
+    row: Counter,
+    mirror: Mirror,
+    spread: Spread,
+    frame: Ram,
+    gather: Gather,
+    whole: DFF<Bit>,
+    broken: DFF<Bit>,
+    taken: Signal<Local, Bit>,
+    at_end: Signal<Local, Bit>,
+    early: Signal<Local, Bit>,
+}
+
+impl Receive {
+    /// Frames in `layout`, codes of `bits` bits, noise floor in codes.
+    pub fn new(layout: Quads, bits: usize, floor: i32) -> Self {
+        Receive {
+            clk: Default::default(),
+            rst: Default::default(),
+            s_axis_tdata: Wire::new(bits),
+            s_axis_tvalid: Default::default(),
+            s_axis_tready: Default::default(),
+            s_axis_tlast: Default::default(),
+            accept: Default::default(),
+            full: Default::default(),
+            release: Default::default(),
+            quad_address: Wire::new(count_bits(layout.len())),
+            quad: Wire::new(4 * bits),
+            magnitude: Wire::new(bits - 1),
+            positive: Default::default(),
+            negative: Default::default(),
+            framing: Default::default(),
+            reported: Default::default(),
+            column: Counter::new(layout.cols),
+            row: Counter::new(layout.rows),
+            mirror: Mirror::new(layout),
+            spread: Spread::new(bits),
+            frame: Ram::new(layout.len(), 4, bits),
+            gather: Gather::new(bits, floor),
+            whole: Default::default(),
+            broken: Default::default(),
+            taken: Default::default(),
+            at_end: Default::default(),
+            early: Default::default(),
+        }
+    }
+}
+
+impl Logic for Receive {
+    #[hdl_gen]
+    fn update(&mut self) {
+        self.column.clk.next = self.clk.val();
+        self.row.clk.next = self.clk.val();
+        self.frame.clk.next = self.clk.val();
+        self.gather.clk.next = self.clk.val();
+        self.whole.clock.next = self.clk.val();
+        self.broken.clock.next = self.clk.val();
+
+        self.s_axis_tready.next = !self.whole.q.val() & !self.rst.val();
+        self.taken.next = self.s_axis_tvalid.val() & !self.whole.q.val() & !self.rst.val();
+        self.at_end.next = self.column.last.val() & self.row.last.val();
+        self.early.next = self.taken.val() & self.s_axis_tlast.val() & !self.at_end.val();
+        self.accept.next = self.taken.val();
+
+        self.column.enable.next = self.taken.val();
+        self.column.clear.next = self.rst.val() | self.early.val();
+        self.row.enable.next = self.taken.val() & self.column.last.val();
+        self.row.clear.next = self.rst.val() | self.early.val();
+        self.mirror.row.next = self.row.value.val();
+        self.mirror.col.next = self.column.value.val();
+        self.spread.word.next = self.s_axis_tdata.val();
+        self.frame.write_address.next = self.mirror.address.val();
+        self.frame.write_data.next = self.spread.quad.val();
+        self.spread.mask.next = self.mirror.mask.val();
+        self.spread.enable.next = self.taken.val();
+        self.frame.write.next = self.spread.write.val();
+        self.frame.read.next = true;
+        self.frame.read_address.next = self.quad_address.val();
+        self.quad.next = self.frame.read_data.val();
+
+        self.gather.accept.next = self.taken.val();
+        self.gather.clear.next = self.rst.val() | self.release.val() | self.early.val();
+        self.gather.code.next = self.s_axis_tdata.val();
+        self.magnitude.next = self.gather.magnitude.val();
+        self.positive.next = self.gather.positive.val();
+        self.negative.next = self.gather.negative.val();
+
+        self.full.next = self.whole.q.val();
+        self.whole.d.next =
+            (self.whole.q.val() | (self.taken.val() & self.at_end.val())) & !self.release.val() & !self.rst.val();
+        self.framing.next = self.broken.q.val();
+        self.broken.d.next = ((self.broken.q.val() & !self.reported.val())
+            | self.early.val()
+            | (self.taken.val() & self.at_end.val() & !self.s_axis_tlast.val()))
+            & !self.rst.val();
+    }
+}

@@ -1,0 +1,141 @@
+//! Stage `rescale`: accumulators to v_ij words, v_00 after its exponent is known.
+//!
+//! The first Q rows of a frame are raw v_00: they wait in a memory while their length is measured, then go through the rescaler
+//! with the measured shift. All later rows go through directly with the constant shift of an A pass; the schedule
+//! keeps the two apart, because no A pass starts before v_00 is complete.
+
+use dermis_golden::fixed::formats::Formats;
+use rust_hdl::prelude::*;
+
+use crate::primitives::{shift_bits, BitDelay, Counter, Ram, RawLength, Rescaler, SATURATION_BITS};
+use crate::wire::Wire;
+
+/// Rows of accumulators in; words two cycles after the rescaler got them, operands three.
+#[derive(LogicBlock)]
+pub struct Rescale {
+    /// Clock.
+    pub clk: Signal<In, Clock>,
+    /// Reset.
+    pub rst: Signal<In, Bit>,
+    /// New frame.
+    pub start: Signal<In, Bit>,
+    /// Accumulators of one row.
+    pub quad: Wire<In>,
+    /// `quad` is a row.
+    pub quad_valid: Signal<In, Bit>,
+    /// Four parities of a v_ij.
+    pub words: Wire<Out>,
+    /// `words` are a quad.
+    pub words_valid: Signal<Out, Bit>,
+    /// The same as operands of later passes.
+    pub operands: Wire<Out>,
+    /// `operands` are a quad.
+    pub operands_valid: Signal<Out, Bit>,
+    /// The measured right shift, until the next frame.
+    pub shift: Wire<Out>,
+    /// Words saturated in this frame.
+    pub saturations: Wire<Out>,
+    collecting: DFF<Bit>,
+    replaying: DFF<Bit>,
+    rows: Counter,
+    replay: Counter,
+    raw: Ram,
+    length: RawLength,
+    rescaler: Rescaler,
+    read: BitDelay,
+    words_later: BitDelay,
+    operands_later: BitDelay,
+    collected: Signal<Local, Bit>,
+    enters: Signal<Local, Bit>,
+}
+
+impl Rescale {
+    /// Widths of `formats`.
+    pub fn new(formats: &Formats) -> Self {
+        let acc = 4 * formats.acc_bits as usize;
+        Rescale {
+            clk: Default::default(),
+            rst: Default::default(),
+            start: Default::default(),
+            quad: Wire::new(acc),
+            quad_valid: Default::default(),
+            words: Wire::new(4 * formats.vector_bits as usize),
+            words_valid: Default::default(),
+            operands: Wire::new(4 * formats.data_bits as usize),
+            operands_valid: Default::default(),
+            shift: Wire::new(shift_bits(formats)),
+            saturations: Wire::new(SATURATION_BITS),
+            collecting: Default::default(),
+            replaying: Default::default(),
+            rows: Counter::new(formats.quads),
+            replay: Counter::new(formats.quads),
+            raw: Ram::new(formats.quads, 1, acc),
+            length: RawLength::new(formats),
+            rescaler: Rescaler::new(formats),
+            read: BitDelay::new(1),
+            words_later: BitDelay::new(2),
+            operands_later: BitDelay::new(1),
+            collected: Default::default(),
+            enters: Default::default(),
+        }
+    }
+}
+
+impl Logic for Rescale {
+    #[hdl_gen]
+    fn update(&mut self) {
+        self.collecting.clock.next = self.clk.val();
+        self.replaying.clock.next = self.clk.val();
+        self.rows.clk.next = self.clk.val();
+        self.replay.clk.next = self.clk.val();
+        self.raw.clk.next = self.clk.val();
+        self.length.clk.next = self.clk.val();
+        self.rescaler.clk.next = self.clk.val();
+        self.read.clk.next = self.clk.val();
+        self.words_later.clk.next = self.clk.val();
+        self.operands_later.clk.next = self.clk.val();
+        self.read.rst.next = self.rst.val();
+        self.words_later.rst.next = self.rst.val();
+        self.operands_later.rst.next = self.rst.val();
+
+        self.collected.next = self.collecting.q.val() & self.quad_valid.val();
+        self.collecting.d.next = (self.start.val()
+            | (self.collecting.q.val() & !(self.quad_valid.val() & self.rows.last.val())))
+            & !self.rst.val();
+        self.rows.clear.next = self.start.val();
+        self.rows.enable.next = self.collected.val();
+        self.raw.write.next = self.collected.val().into();
+        self.raw.write_address.next = self.rows.value.val();
+        self.raw.write_data.next = self.quad.val();
+        self.length.clear.next = self.start.val();
+        self.length.accept.next = self.collected.val();
+        self.length.quad.next = self.quad.val();
+
+        self.replaying.d.next = ((self.collected.val() & self.rows.last.val())
+            | (self.replaying.q.val() & !self.replay.last.val()))
+            & !self.rst.val();
+        self.replay.clear.next = self.start.val();
+        self.replay.enable.next = self.replaying.q.val();
+        self.raw.read.next = true;
+        self.raw.read_address.next = self.replay.value.val();
+        self.read.now.next = self.replaying.q.val();
+
+        self.enters.next = self.read.then.val() | (self.quad_valid.val() & !self.collecting.q.val());
+        self.rescaler.clear.next = self.start.val();
+        self.rescaler.valid.next = self.enters.val();
+        self.rescaler.measured.next = self.read.then.val();
+        self.rescaler.shift.next = self.length.shift.val();
+        self.rescaler.quad.next = self.quad.val();
+        if self.read.then.val() {
+            self.rescaler.quad.next = self.raw.read_data.val();
+        }
+        self.words_later.now.next = self.enters.val();
+        self.operands_later.now.next = self.words_later.then.val();
+        self.words.next = self.rescaler.words.val();
+        self.words_valid.next = self.words_later.then.val();
+        self.operands.next = self.rescaler.operands.val();
+        self.operands_valid.next = self.operands_later.then.val();
+        self.shift.next = self.length.shift.val();
+        self.saturations.next = self.rescaler.saturations.val();
+    }
+}

@@ -1,0 +1,271 @@
+//! Stage `search`: the μ search over the polynomials of all taxels, sweep by sweep.
+//!
+//! `walk` sets up a sweep; one quad per cycle runs through memory (1 cycle), Taylor shift (2) and back into memory, candidates (2),
+//! score (6); `judge` then looks at the nine totals (14) and the next sweep is set up. The sum polynomial takes the
+//! same way one cycle ahead, so that Σp stands when the first taxel is scored. The last sweep only moves to
+//! the winner: its constant coefficients are p(μ*).
+
+use dermis_golden::fixed::formats::Formats;
+use dermis_golden::fixed::quads::Quads;
+use dermis_golden::fixed::schedule::vectors;
+use rust_hdl::prelude::*;
+
+use crate::primitives::{
+    count_bits, position_bits, BitDelay, Candidates, Counter, Counts, Delay, Judge, PolynomialWord, Score, Slice, Store,
+    Sum, Taylor, Walk,
+};
+use crate::wire::Wire;
+
+/// Polynomials in by coefficient, p(μ*) out by quad.
+#[derive(LogicBlock)]
+pub struct Search {
+    /// Clock.
+    pub clk: Signal<In, Clock>,
+    /// Reset.
+    pub rst: Signal<In, Bit>,
+    /// Four taxels' coefficient.
+    pub fill_quad: Wire<In>,
+    /// `fill_quad` is one.
+    pub fill: Signal<In, Bit>,
+    /// Which coefficient.
+    pub fill_index: Wire<In>,
+    /// Which quad.
+    pub fill_address: Wire<In>,
+    /// All coefficients are in.
+    pub start: Signal<In, Bit>,
+    /// Search; otherwise p(0) is passed on.
+    pub enabled: Signal<In, Bit>,
+    /// Four taxels' p(μ*).
+    pub values: Wire<Out>,
+    /// `values` are a quad.
+    pub values_valid: Signal<Out, Bit>,
+    /// Which quad.
+    pub values_address: Wire<Out>,
+    /// All values are out.
+    pub done: Signal<Out, Bit>,
+    /// Best position, x.
+    pub best_x: Wire<Out>,
+    /// Best position, y.
+    pub best_y: Wire<Out>,
+    /// Its score.
+    pub score: Wire<Out>,
+    /// A candidate was found.
+    pub found: Signal<Out, Bit>,
+    /// A sweep has been judged.
+    pub judged: Signal<Out, Bit>,
+    /// Something was taken at this level.
+    pub taken: Signal<Out, Bit>,
+    walk: Walk,
+    judge: Judge,
+    store: Store,
+    taylor: Taylor,
+    candidates: Candidates,
+    scores: Score,
+    counts: Counts,
+    sum: Sum,
+    sum_taylor: Taylor,
+    sum_candidates: Candidates,
+    fill_counts: Counts,
+    constants: Slice,
+    quads: Counter,
+    counting: DFF<Bit>,
+    began: BitDelay,
+    again: BitDelay,
+    go: BitDelay,
+    moved: BitDelay,
+    sum_moved: BitDelay,
+    scored: BitDelay,
+    totals: BitDelay,
+    end: BitDelay,
+    moved_address: Delay,
+    scored_address: Delay,
+    set_up: Signal<Local, Bit>,
+    quad_end: Signal<Local, Bit>,
+}
+
+impl Search {
+    /// Widths of `formats` for subarrays in `layout`.
+    pub fn new(formats: &Formats, layout: Quads) -> Self {
+        let quads = formats.quads;
+        let address = count_bits(quads);
+        let fill_bits = formats.vector_bits as usize + 2;
+        let taxels = PolynomialWord::new(4, &formats.search_bits);
+        let sums = PolynomialWord::new(1, &formats.sum_bits);
+        let value = 4 * formats.search_bits[0] as usize;
+        Search {
+            clk: Default::default(),
+            rst: Default::default(),
+            fill_quad: Wire::new(4 * fill_bits),
+            fill: Default::default(),
+            fill_index: Wire::new(count_bits(vectors(formats.degree))),
+            fill_address: Wire::new(address),
+            start: Default::default(),
+            enabled: Default::default(),
+            values: Wire::new(value),
+            values_valid: Default::default(),
+            values_address: Wire::new(address),
+            done: Default::default(),
+            best_x: Wire::new(position_bits()),
+            best_y: Wire::new(position_bits()),
+            score: Wire::new(formats.score_bits as usize),
+            found: Default::default(),
+            judged: Default::default(),
+            taken: Default::default(),
+            walk: Default::default(),
+            judge: Judge::new(formats, layout.rows * layout.cols),
+            constants: Slice::new(taxels.bits(), value),
+            store: Store::new(taxels.clone(), quads, fill_bits),
+            taylor: Taylor::new(taxels.clone()),
+            candidates: Candidates::new(taxels),
+            scores: Score::new(formats),
+            counts: Counts::new(layout),
+            sum: Sum::new(sums.clone(), quads, fill_bits),
+            sum_taylor: Taylor::new(sums.clone()),
+            sum_candidates: Candidates::new(sums),
+            fill_counts: Counts::new(layout),
+            quads: Counter::new(quads),
+            counting: Default::default(),
+            began: BitDelay::new(1),
+            again: BitDelay::new(1),
+            go: BitDelay::new(1),
+            moved: BitDelay::new(3),
+            sum_moved: BitDelay::new(3),
+            scored: BitDelay::new(2),
+            totals: BitDelay::new(11),
+            end: BitDelay::new(4),
+            moved_address: Delay::new(address, 3),
+            scored_address: Delay::new(address, 2),
+            set_up: Default::default(),
+            quad_end: Default::default(),
+        }
+    }
+}
+
+impl Logic for Search {
+    #[hdl_gen]
+    fn update(&mut self) {
+        self.walk.clk.next = self.clk.val();
+        self.judge.clk.next = self.clk.val();
+        self.store.clk.next = self.clk.val();
+        self.taylor.clk.next = self.clk.val();
+        self.candidates.clk.next = self.clk.val();
+        self.scores.clk.next = self.clk.val();
+        self.sum.clk.next = self.clk.val();
+        self.sum_taylor.clk.next = self.clk.val();
+        self.sum_candidates.clk.next = self.clk.val();
+        self.quads.clk.next = self.clk.val();
+        self.counting.clock.next = self.clk.val();
+        self.began.clk.next = self.clk.val();
+        self.again.clk.next = self.clk.val();
+        self.go.clk.next = self.clk.val();
+        self.moved.clk.next = self.clk.val();
+        self.sum_moved.clk.next = self.clk.val();
+        self.scored.clk.next = self.clk.val();
+        self.totals.clk.next = self.clk.val();
+        self.end.clk.next = self.clk.val();
+        self.moved_address.clk.next = self.clk.val();
+        self.scored_address.clk.next = self.clk.val();
+        self.judge.rst.next = self.rst.val();
+        self.began.rst.next = self.rst.val();
+        self.again.rst.next = self.rst.val();
+        self.go.rst.next = self.rst.val();
+        self.moved.rst.next = self.rst.val();
+        self.sum_moved.rst.next = self.rst.val();
+        self.scored.rst.next = self.rst.val();
+        self.totals.rst.next = self.rst.val();
+        self.end.rst.next = self.rst.val();
+
+        comment!("Coefficients come in");
+        self.store.fill.next = self.fill.val();
+        self.store.fill_index.next = self.fill_index.val();
+        self.store.fill_address.next = self.fill_address.val();
+        self.store.fill_quad.next = self.fill_quad.val();
+        self.fill_counts.address.next = self.fill_address.val();
+        self.sum.fill.next = self.fill.val();
+        self.sum.fill_index.next = self.fill_index.val();
+        self.sum.fill_address.next = self.fill_address.val();
+        self.sum.fill_mask.next = self.fill_counts.mask.val();
+        self.sum.fill_quad.next = self.fill_quad.val();
+
+        comment!("A sweep is set up, and begins a cycle later");
+        self.walk.begin_frame.next = self.start.val();
+        self.walk.enabled.next = self.enabled.val();
+        self.judge.begin_frame.next = self.start.val();
+        self.began.now.next = self.start.val();
+        self.again.now.next = self.judge.done.val();
+        self.set_up.next = self.began.then.val() | self.again.then.val();
+        self.walk.set_up.next = self.set_up.val();
+        self.walk.judged.next = self.judge.done.val();
+        self.walk.improved.next = self.judge.improved.val();
+        self.walk.best_x.next = self.judge.best_x.val();
+        self.walk.best_y.next = self.judge.best_y.val();
+        self.judge.halve.next = self.set_up.val() & self.walk.next_halves.val();
+        self.go.now.next = self.set_up.val();
+
+        comment!("Quads run through memory, shift and candidates");
+        self.quad_end.next = self.counting.q.val() & self.quads.last.val();
+        self.counting.d.next =
+            (self.go.then.val() | (self.counting.q.val() & !self.quads.last.val())) & !self.rst.val();
+        self.quads.clear.next = self.go.then.val();
+        self.quads.enable.next = self.counting.q.val();
+        self.store.read_buffer.next = self.walk.source.val();
+        self.store.read_address.next = self.quads.value.val();
+        self.taylor.word.next = self.store.read_data.val();
+        self.taylor.dx.next = self.walk.dx.val();
+        self.taylor.dy.next = self.walk.dy.val();
+        self.taylor.halving.next = self.walk.halving.val();
+        self.moved.now.next = self.counting.q.val();
+        self.moved_address.now.next = self.quads.value.val();
+        self.store.write.next = self.moved.then.val() & !self.walk.last.val();
+        self.store.write_buffer.next = self.walk.target.val();
+        self.store.write_address.next = self.moved_address.then.val();
+        self.store.write_data.next = self.taylor.moved.val();
+        self.candidates.word.next = self.taylor.moved.val();
+
+        comment!("and so does their sum");
+        self.sum.read.next = self.go.then.val();
+        self.sum.read_buffer.next = self.walk.source.val();
+        self.sum_taylor.word.next = self.sum.word.val();
+        self.sum_taylor.dx.next = self.walk.dx.val();
+        self.sum_taylor.dy.next = self.walk.dy.val();
+        self.sum_taylor.halving.next = self.walk.halving.val();
+        self.sum_moved.now.next = self.go.then.val();
+        self.sum.write.next = self.sum_moved.then.val() & !self.walk.last.val();
+        self.sum.write_buffer.next = self.walk.target.val();
+        self.sum.write_data.next = self.sum_taylor.moved.val();
+        self.sum_candidates.word.next = self.sum_taylor.moved.val();
+
+        comment!("Scores, and the judgement");
+        self.scored.now.next = self.moved.then.val() & !self.walk.last.val();
+        self.scored_address.now.next = self.moved_address.then.val();
+        self.counts.address.next = self.scored_address.then.val();
+        self.scores.clear.next = self.go.then.val();
+        self.scores.valid.next = self.scored.then.val();
+        self.scores.mask.next = self.counts.mask.val();
+        self.scores.values.next = self.candidates.values.val();
+        self.scores.sums.next = self.sum_candidates.values.val();
+        self.totals.now.next = self.quad_end.val() & !self.walk.last.val();
+        self.judge.start.next = self.totals.then.val();
+        self.judge.coarse.next = self.walk.coarse.val();
+        self.judge.totals.next = self.scores.totals.val();
+        self.judge.sums.next = self.sum_candidates.values.val();
+        self.judge.centre_x.next = self.walk.centre_x.val();
+        self.judge.centre_y.next = self.walk.centre_y.val();
+        self.judge.square.next = self.walk.square.val();
+        self.judge.radius.next = self.walk.radius.val();
+
+        comment!("The last sweep's constants are the values");
+        self.constants.word.next = self.taylor.moved.val();
+        self.values.next = self.constants.low.val();
+        self.values_valid.next = self.moved.then.val() & self.walk.last.val();
+        self.values_address.next = self.moved_address.then.val();
+        self.end.now.next = self.quad_end.val() & self.walk.last.val();
+        self.done.next = self.end.then.val();
+        self.best_x.next = self.judge.best_x.val();
+        self.best_y.next = self.judge.best_y.val();
+        self.score.next = self.judge.score.val();
+        self.found.next = self.judge.found.val();
+        self.judged.next = self.judge.done.val();
+        self.taken.next = self.judge.taken.val();
+    }
+}

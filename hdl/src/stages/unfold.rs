@@ -1,0 +1,107 @@
+//! Stage `unfold`: v_ij words back to taxels, coefficient by coefficient into the search memory.
+
+use dermis_golden::fixed::formats::Formats;
+use dermis_golden::fixed::schedule::vectors;
+use rust_hdl::prelude::*;
+
+use crate::primitives::{count_bits, BitDelay, Counter, Delay, Unfolder};
+use crate::wire::Wire;
+
+/// Quads of v_ij in order; two cycles later four taxels with coefficient index and quad address.
+#[derive(LogicBlock)]
+pub struct Unfold {
+    /// Clock.
+    pub clk: Signal<In, Clock>,
+    /// Reset.
+    pub rst: Signal<In, Bit>,
+    /// New frame.
+    pub start: Signal<In, Bit>,
+    /// Four parities of a v_ij.
+    pub words: Wire<In>,
+    /// `words` are a quad.
+    pub words_valid: Signal<In, Bit>,
+    /// Four taxels' coefficient.
+    pub taxels: Wire<Out>,
+    /// `taxels` are a quad.
+    pub taxels_valid: Signal<Out, Bit>,
+    /// Which coefficient.
+    pub index: Wire<Out>,
+    /// Which quad.
+    pub address: Wire<Out>,
+    /// All coefficients of the frame are out.
+    pub done: Signal<Out, Bit>,
+    quads: Counter,
+    vectors: Counter,
+    unfolder: Unfolder,
+    index_first: Delay,
+    index_later: Delay,
+    address_later: Delay,
+    valid_later: BitDelay,
+    end: BitDelay,
+    quad_end: Signal<Local, Bit>,
+}
+
+impl Unfold {
+    /// Widths of `formats`.
+    pub fn new(formats: &Formats) -> Self {
+        let bits = formats.vector_bits as usize;
+        let count = vectors(formats.degree);
+        let (index, address) = (count_bits(count), count_bits(formats.quads));
+        Unfold {
+            clk: Default::default(),
+            rst: Default::default(),
+            start: Default::default(),
+            words: Wire::new(4 * bits),
+            words_valid: Default::default(),
+            taxels: Wire::new(4 * (bits + 2)),
+            taxels_valid: Default::default(),
+            index: Wire::new(index),
+            address: Wire::new(address),
+            done: Default::default(),
+            quads: Counter::new(formats.quads),
+            vectors: Counter::new(count),
+            unfolder: Unfolder::new(bits, count),
+            index_first: Delay::new(index, 1),
+            index_later: Delay::new(index, 1),
+            address_later: Delay::new(address, 2),
+            valid_later: BitDelay::new(2),
+            end: BitDelay::new(3),
+            quad_end: Default::default(),
+        }
+    }
+}
+
+impl Logic for Unfold {
+    #[hdl_gen]
+    fn update(&mut self) {
+        self.quads.clk.next = self.clk.val();
+        self.vectors.clk.next = self.clk.val();
+        self.unfolder.clk.next = self.clk.val();
+        self.index_first.clk.next = self.clk.val();
+        self.index_later.clk.next = self.clk.val();
+        self.address_later.clk.next = self.clk.val();
+        self.valid_later.clk.next = self.clk.val();
+        self.end.clk.next = self.clk.val();
+        self.valid_later.rst.next = self.rst.val();
+        self.end.rst.next = self.rst.val();
+
+        self.quad_end.next = self.words_valid.val() & self.quads.last.val();
+        self.quads.clear.next = self.start.val();
+        self.quads.enable.next = self.words_valid.val();
+        self.vectors.clear.next = self.start.val();
+        self.vectors.enable.next = self.quad_end.val();
+        self.unfolder.quad.next = self.words.val();
+        self.index_first.now.next = self.vectors.value.val();
+        self.unfolder.index.next = self.index_first.then.val();
+        self.index_later.now.next = self.index_first.then.val();
+        self.address_later.now.next = self.quads.value.val();
+        self.valid_later.now.next = self.words_valid.val();
+
+        self.taxels.next = self.unfolder.taxels.val();
+        self.taxels_valid.next = self.valid_later.then.val();
+        self.index.next = self.index_later.then.val();
+        self.address.next = self.address_later.then.val();
+        self.end.now.next = self.quad_end.val() & self.vectors.last.val();
+        self.done.next = self.end.then.val();
+    }
+}
