@@ -1,2 +1,5 @@
 //! Dermis.
 #![deny(missing_docs)]
+
+pub mod board;
+pub mod device;
