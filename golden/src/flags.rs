@@ -1,0 +1,83 @@
+//! Flags: what the reader of a result must know before trusting it.
+//!
+//! | flag | raised when | by |
+//! |---|---|---|
+//! | `no-contact` | no taxel carries a force | [`crate::reconstruct::assemble`] |
+//! | `no-compression` | no candidate μ leaves Σp > 0 | the engine |
+//! | `condition-unmet` | a subarray does not meet the scene's condition and is not searched | `assemble` |
+//! | `saturated` | an input code was clipped, or the engine's arithmetic saturated | [`frame_flags`], the engine |
+//! | `load-outside` | part of the contact lies over the array's edge | `frame_flags` |
+//! | `medium-mismatch` | the frame names another medium than the scene | `frame_flags` |
+//! | `shear-unreliable` | noise floor or LSB/√12 above 5·10⁻⁵ of the peak, with `sparse` | `frame_flags` |
+
+use crate::frame::Frame;
+use crate::quantise::Codes;
+use crate::scene::{ObjectiveKind, Scene};
+use serde::{Deserialize, Serialize};
+
+/// A remark on a result.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Flag {
+    /// No taxel carries a force.
+    NoContact,
+    /// No candidate has a compressive resultant.
+    NoCompression,
+    /// A subarray was not searched.
+    ConditionUnmet,
+    /// A value was held at the end of its range.
+    Saturated,
+    /// The contact hangs over the edge.
+    LoadOutside,
+    /// Frame and scene name different media.
+    MediumMismatch,
+    /// Noise or quantisation is too large for the objective.
+    ShearUnreliable,
+}
+
+/// Share of the true normal load below which the cells do not hold all of it.
+pub const SHARE_INSIDE: f64 = 0.995;
+/// Noise relative to the peak from which the sparse objective loses the shear.
+pub const SPARSE_NOISE_LIMIT: f64 = 5e-5;
+
+/// The flags that follow from the frame and its codes alone, in the order of [`Flag`].
+pub fn frame_flags(scene: &Scene, frame: &Frame, codes: &Codes) -> Vec<Flag> {
+    let medium_differs = frame.medium.is_some_and(|medium| medium != scene.medium);
+    [
+        (Flag::Saturated, codes.clipped.contains(&true)),
+        (Flag::LoadOutside, load_outside(frame)),
+        (Flag::MediumMismatch, medium_differs),
+        (Flag::ShearUnreliable, shear_unreliable(scene, frame, codes)),
+    ]
+    .into_iter()
+    .filter_map(|(flag, raised)| raised.then_some(flag))
+    .collect()
+}
+
+/// With truth: the cells hold less than the load. Without: the largest |b| lies on the outermost ring.
+fn load_outside(frame: &Frame) -> bool {
+    if let (Some(cells), Some(resultant)) = (&frame.cell_forces_N, frame.resultant_N) {
+        return cells.fz.iter().sum::<f64>() < SHARE_INSIDE * resultant[2];
+    }
+    let (rows, cols) = (frame.sensor.rows, frame.sensor.cols);
+    let on_ring = |index: usize| {
+        let (row, col) = (index / cols, index % cols);
+        row == 0 || row == rows - 1 || col == 0 || col == cols - 1
+    };
+    let ring = frame
+        .stress_MPa
+        .iter()
+        .enumerate()
+        .filter(|(index, _)| on_ring(*index));
+    let ring_peak = ring.fold(0.0f64, |peak, (_, b)| b.abs().max(peak));
+    ring_peak > 0.0 && ring_peak >= frame.peak_MPa()
+}
+
+/// Noise floor, or the standard deviation LSB/√12 of rounding, against the peak.
+fn shear_unreliable(scene: &Scene, frame: &Frame, codes: &Codes) -> bool {
+    let search = &scene.search;
+    let searched = search.objective == ObjectiveKind::Sparse && search.mu_max > 0.0;
+    let noise = search.noise_floor_MPa.max(codes.lsb_MPa() / 12f64.sqrt());
+    let peak = frame.peak_MPa();
+    searched && peak > 0.0 && noise > SPARSE_NOISE_LIMIT * peak
+}

@@ -1,0 +1,63 @@
+//! Reading frames from files, with a limit on their size.
+
+use super::{csv, json, Frame, FrameError};
+use crate::scene::Scene;
+use std::fs::File;
+use std::io::{Error, ErrorKind, Read};
+use std::path::Path;
+
+/// Largest frame file in bytes: 64 MB.
+pub const LARGEST_FILE: u64 = 64 << 20;
+
+impl Frame {
+    /// Reads a frame from a `.json` or `.csv` file. A CSV file has no sensor of its own and takes the scene's, a JSON
+    /// file without one as well; whether two sensors agree is asked by [`Frame::check`].
+    ///
+    /// # Errors
+    /// Every [`FrameError`] but `SensorMismatch`.
+    pub fn load(path: impl AsRef<Path>, scene: Option<&Scene>) -> Result<Frame, FrameError> {
+        let path = path.as_ref();
+        let file = path.display().to_string();
+        let extension = path
+            .extension()
+            .map(|extension| extension.to_ascii_lowercase());
+        let parse = match extension.as_ref().and_then(|extension| extension.to_str()) {
+            Some("json") => json::parse,
+            Some("csv") => csv::parse,
+            _ => return Err(FrameError::UnknownKind { file }),
+        };
+        let stem = path
+            .file_stem()
+            .map(|stem| stem.to_string_lossy().into_owned());
+        let text = read(path, &file)?;
+        parse(&text, &file, &stem.unwrap_or_default(), scene)
+    }
+}
+
+/// The file's text. A file that states no size, such as a pipe, is cut off at the limit all the same.
+fn read(path: &Path, file: &str) -> Result<String, FrameError> {
+    let unreadable = |source: Error| {
+        let file = file.to_string();
+        FrameError::Unreadable { file, source }
+    };
+    let too_large = || {
+        let file = file.to_string();
+        FrameError::TooLarge {
+            file,
+            limit: LARGEST_FILE,
+        }
+    };
+    let handle = File::open(path).map_err(unreadable)?;
+    if handle.metadata().map_err(unreadable)?.len() > LARGEST_FILE {
+        return Err(too_large());
+    }
+    let mut bytes = Vec::new();
+    handle
+        .take(LARGEST_FILE + 1)
+        .read_to_end(&mut bytes)
+        .map_err(unreadable)?;
+    if bytes.len() as u64 > LARGEST_FILE {
+        return Err(too_large());
+    }
+    String::from_utf8(bytes).map_err(|error| unreadable(Error::new(ErrorKind::InvalidData, error)))
+}

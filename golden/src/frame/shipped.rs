@@ -1,0 +1,28 @@
+//! The frames that come with the crate.
+
+use super::{json, Frame};
+use crate::scene::Scene;
+use include_dir::{include_dir, Dir};
+
+static FRAMES: Dir = include_dir!("$CARGO_MANIFEST_DIR/data/frames");
+
+impl Frame {
+    /// The shipped frames read with the scene's sensor through the scene's medium, sorted by id.
+    pub fn shipped(scene: &Scene) -> Vec<Frame> {
+        let mut frames: Vec<Frame> = texts()
+            .filter_map(|(file, text)| json::parse(text, &file, &file, None).ok())
+            .filter(|frame| frame.sensor == scene.sensor && frame.medium == Some(scene.medium))
+            .collect();
+        frames.sort_by(|a, b| a.id.cmp(&b.id));
+        frames
+    }
+}
+
+/// Name and text of every shipped JSON file.
+fn texts() -> impl Iterator<Item = (String, &'static str)> {
+    FRAMES.files().filter_map(|file| {
+        let name = file.path().to_str()?;
+        let text = file.contents_utf8()?;
+        name.ends_with(".json").then(|| (name.to_string(), text))
+    })
+}

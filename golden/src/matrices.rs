@@ -1,0 +1,270 @@
+//! Matrices: everything about a subarray that does not depend on the frame.
+//!
+//! Cz⁺ is the pseudo-inverse, Ax = Cz⁺Cx, Ay = Cz⁺Cy. Cz is symmetric (the stress under cell j from cell i is that under
+//! i from j), so its singular values are the sizes of its eigenvalues λ and Cz⁺ = U diag(1/λ) Uᵀ, leaving out
+//! |λ| ≤ n ε max|λ|.
+//!
+//! r = mu_max · max over θ of ρ(cos θ Ax + sin θ Ay) says how fast the series in μ converges. Cx and Cy are antisymmetric;
+//! with S = |Cz⁺|^½ the eigenvalues of cos θ Ax + sin θ Ay are those of the antisymmetric S (cos θ Cx + sin θ Cy) S where
+//! Cz is positive, and bounded by its 2-norm elsewhere. The norm is convex in (cos θ, sin θ) and even in both, so a few
+//! directions of one quadrant are enough: 9 miss at most 1 − cos(π/32) = 0.5 %.
+//!
+//! Degree d: smallest with r^(d+1) ≤ 0.035, at least 3 where r > 0.2, at least 1 where shear is wanted at all.
+//!
+//! | | shape | unit |
+//! |---|---|---|
+//! | in: sensor | n taxels, n ≤ 2304 | mm |
+//! | out: Cz⁺ | n × n | mm² (N per MPa) |
+//! | out: Ax, Ay | n × n | – |
+//!
+//! The mirror symmetry of the array holds to the bit in every matrix, so that folding them is exact.
+
+use crate::influence::Influence;
+use crate::sensor::{Sensor, SensorError};
+use faer::linalg::matmul::matmul;
+use faer::{Accum, Col, Mat, Par, Side};
+use std::f64::consts::FRAC_PI_2;
+use thiserror::Error;
+
+/// Most taxels in one subarray: the 48 × 48 of the largest sensor. A matrix then takes 42 MB.
+pub const MAX_TAXELS: usize = 48 * 48;
+/// Largest remainder of the series, r^(d+1).
+pub const SERIES_TOLERANCE: f64 = 0.035;
+/// From this r on the degree is at least 3.
+pub const CUBIC_FROM: f64 = 0.2;
+/// Highest degree the pipeline is built for.
+pub const MAX_DEGREE: usize = 3;
+/// From this r on no degree helps.
+pub const MAX_RADIUS: f64 = 0.9;
+/// Directions of θ tried from 0 to π/2.
+const DIRECTIONS: usize = 9;
+
+/// The precomputed matrices of one subarray shape.
+#[derive(Clone, Debug)]
+pub struct Matrices {
+    /// The subarray as a sensor.
+    pub sensor: Sensor,
+    /// Pseudo-inverse of Cz.
+    pub cz_pinv: Mat<f64>,
+    /// Cz⁺ Cx.
+    pub ax: Mat<f64>,
+    /// Cz⁺ Cy.
+    pub ay: Mat<f64>,
+    /// Stress per normal force, MPa/N.
+    pub cz: Mat<f64>,
+    /// Stress per force along x, MPa/N.
+    pub cx: Mat<f64>,
+    /// Stress per force along y, MPa/N.
+    pub cy: Mat<f64>,
+    /// Largest over smallest singular value of Cz; infinite when the smallest is 0.
+    pub condition: f64,
+    /// r at the scene's mu_max.
+    pub spectral_radius: f64,
+    /// Degree of the polynomial in μ.
+    pub degree: usize,
+}
+
+/// A subarray without usable matrices.
+#[derive(Clone, Debug, PartialEq, Error)]
+pub enum MatricesError {
+    /// A size or length out of range.
+    #[error("sensor.{0}")]
+    Sensor(#[from] SensorError),
+    /// More taxels than memory and time are meant for.
+    #[error("a subarray of {taxels} taxels ({sensor}) is too large: at most {MAX_TAXELS}; cut it by [partition]")]
+    TooLarge {
+        /// The subarray.
+        sensor: Box<Sensor>,
+        /// Its size.
+        taxels: usize,
+    },
+    /// The lengths are so far apart that the influence is not a finite number, or zero.
+    #[error("{sensor}: the influence of a cell on its taxel is not representable")]
+    NotFinite {
+        /// The subarray.
+        sensor: Box<Sensor>,
+    },
+    /// The eigenvalues did not converge.
+    #[error("{sensor}: no eigenvalues of Cz found")]
+    NotConverged {
+        /// The subarray.
+        sensor: Box<Sensor>,
+    },
+    /// The series in μ converges too slowly or not at all.
+    #[error("{sensor}: r = {radius:.3} at mu_max = {mu_max} needs more than degree {MAX_DEGREE}; a smaller mu_max, or taxels further apart against the thickness, lower r")]
+    SlowSeries {
+        /// The subarray.
+        sensor: Box<Sensor>,
+        /// r, unrounded.
+        radius: f64,
+        /// The scene's mu_max.
+        mu_max: f64,
+    },
+}
+
+impl Matrices {
+    /// Computes the matrices of a (sub)array for shear ratios up to `mu_max` (0 to 2).
+    ///
+    /// # Errors
+    /// [`MatricesError`]; the size is checked before anything is allocated.
+    pub fn new(sensor: &Sensor, mu_max: f64) -> Result<Matrices, MatricesError> {
+        sensor.check()?;
+        let boxed = || Box::new(sensor.clone());
+        let n = sensor.taxels();
+        if n > MAX_TAXELS {
+            let sensor = boxed();
+            return Err(MatricesError::TooLarge { sensor, taxels: n });
+        }
+        let Influence { cx, cy, cz } = Influence::new(sensor);
+        let finite = |m: &Mat<f64>| m.col_iter().all(|col| col.iter().all(|c| c.is_finite()));
+        if !(finite(&cx) && finite(&cy) && finite(&cz) && cz[(0, 0)] > 0.0) {
+            return Err(MatricesError::NotFinite { sensor: boxed() });
+        }
+        let inverse =
+            Inverse::new(&cz).ok_or_else(|| MatricesError::NotConverged { sensor: boxed() })?;
+        let mut cz_pinv = inverse.power(1);
+        mirror(sensor, &mut cz_pinv, 1.0, 1.0);
+        let [mut ax, mut ay] = [&cx, &cy].map(|c| product(&cz_pinv, c));
+        mirror(sensor, &mut ax, -1.0, 1.0);
+        mirror(sensor, &mut ay, 1.0, -1.0);
+        let spectral_radius = mu_max
+            * if mu_max > 0.0 {
+                inverse.largest_radius(&cx, &cy)
+            } else {
+                0.0
+            };
+        let degree = degree(spectral_radius, mu_max).ok_or_else(|| MatricesError::SlowSeries {
+            sensor: boxed(),
+            radius: spectral_radius,
+            mu_max,
+        })?;
+        Ok(Matrices {
+            sensor: sensor.clone(),
+            condition: inverse.condition,
+            cz_pinv,
+            ax,
+            ay,
+            cz,
+            cx,
+            cy,
+            spectral_radius,
+            degree,
+        })
+    }
+}
+
+/// The degree a series of radius `r` needs, `None` when it is more than [`MAX_DEGREE`].
+fn degree(r: f64, mu_max: f64) -> Option<usize> {
+    if mu_max == 0.0 {
+        return Some(0);
+    }
+    let least = if r > CUBIC_FROM { 3 } else { 1 };
+    let enough = |d: &usize| r.powi(*d as i32 + 1) <= SERIES_TOLERANCE;
+    (least..=MAX_DEGREE).find(enough).filter(|_| r < MAX_RADIUS)
+}
+
+/// A B, on all cores.
+fn product(a: &Mat<f64>, b: &Mat<f64>) -> Mat<f64> {
+    let mut c = Mat::zeros(a.nrows(), b.ncols());
+    matmul(&mut c, Accum::Replace, a, b, 1.0, Par::rayon(0));
+    c
+}
+
+/// Eigenvectors and inverted eigenvalues of Cz, zero for those left out.
+struct Inverse {
+    vectors: Mat<f64>,
+    values: Vec<f64>,
+    condition: f64,
+}
+
+impl Inverse {
+    fn new(cz: &Mat<f64>) -> Option<Inverse> {
+        let eigen = cz.self_adjoint_eigen(Side::Lower).ok()?;
+        let values: Vec<f64> = eigen.S().column_vector().iter().copied().collect();
+        let largest = values
+            .iter()
+            .fold(0.0f64, |largest, v| v.abs().max(largest));
+        let smallest = values
+            .iter()
+            .fold(f64::INFINITY, |smallest, v| v.abs().min(smallest));
+        let least = values.len() as f64 * f64::EPSILON * largest;
+        let invert = |v: &f64| if v.abs() <= least { 0.0 } else { 1.0 / v };
+        Some(Inverse {
+            vectors: eigen.U().to_owned(),
+            values: values.iter().map(invert).collect(),
+            condition: largest / smallest,
+        })
+    }
+
+    /// U diag(f) Uᵀ with f = 1/λ (`root` 1), or |1/λ|^½ (`root` 2).
+    fn power(&self, root: u32) -> Mat<f64> {
+        let factor = |k: usize| match root {
+            1 => self.values[k],
+            _ => self.values[k].abs().sqrt(),
+        };
+        let n = self.values.len();
+        let scaled = Mat::from_fn(n, n, |i, k| self.vectors[(i, k)] * factor(k));
+        product(&scaled, &self.vectors.transpose().to_owned())
+    }
+
+    /// Largest ‖S (cos θ Cx + sin θ Cy) S‖ over the directions.
+    fn largest_radius(&self, cx: &Mat<f64>, cy: &Mat<f64>) -> f64 {
+        let s = self.power(2);
+        let [kx, ky] = [cx, cy].map(|c| product(&product(&s, c), &s));
+        let radius = |step: usize| {
+            let theta = FRAC_PI_2 * step as f64 / (DIRECTIONS - 1) as f64;
+            let (sin, cos) = theta.sin_cos();
+            norm2(&Mat::from_fn(kx.nrows(), kx.ncols(), |i, j| {
+                cos * kx[(i, j)] + sin * ky[(i, j)]
+            }))
+        };
+        (0..DIRECTIONS).map(radius).fold(0.0, f64::max)
+    }
+}
+
+/// 2-norm of an antisymmetric matrix, by power iteration on KᵀK = −K². The Rayleigh quotient grows towards it and its
+/// error is the square of the vector's.
+fn norm2(k: &Mat<f64>) -> f64 {
+    const STEPS: usize = 300;
+    const ENOUGH: f64 = 1e-7;
+    // A fixed start without symmetry, so that it has a part in every parity.
+    let mut vector = Col::from_fn(k.nrows(), |i| 1.0 + ((i * 37 + 11) % 64) as f64 / 64.0);
+    let mut norm = 0.0;
+    for _ in 0..STEPS {
+        let size = vector.norm_l2();
+        if size == 0.0 {
+            return norm;
+        }
+        let image = k * (vector / size);
+        let next = image.norm_l2();
+        let settled = (next - norm).abs() <= ENOUGH * next;
+        norm = next;
+        vector = k * image;
+        if settled {
+            break;
+        }
+    }
+    norm
+}
+
+/// Averages a matrix over the array's mirror images, signs `sx` and `sy` (±1) saying whether a mirror in x or y turns
+/// its sign. Each orbit is averaged once and written to all its places, so that the symmetry holds to the bit.
+fn mirror(sensor: &Sensor, m: &mut Mat<f64>, sx: f64, sy: f64) {
+    let (rows, cols) = (sensor.rows, sensor.cols);
+    let flip_x = |i: usize| i - i % cols + (cols - 1 - i % cols);
+    let flip_y = |i: usize| (rows - 1 - i / cols) * cols + i % cols;
+    for i in 0..sensor.taxels() {
+        for j in 0..sensor.taxels() {
+            let (x, y) = ((flip_x(i), flip_x(j)), (flip_y(i), flip_y(j)));
+            let xy = (flip_y(x.0), flip_y(x.1));
+            let images = [((i, j), 1.0), (x, sx), (y, sy), (xy, sx * sy)];
+            if images.iter().any(|(image, _)| *image < (i, j)) {
+                continue;
+            }
+            let sum: f64 = images.iter().map(|(image, sign)| sign * m[*image]).sum();
+            for (image, sign) in images {
+                m[image] = sign * sum / 4.0;
+            }
+        }
+    }
+}

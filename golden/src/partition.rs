@@ -1,0 +1,234 @@
+//! Partition: the array cut into equal rectangles, each with forces and a friction ratio of its own.
+//!
+//! Subarray (i, j) of an R × C partition covers rows i·rows/R … and columns j·cols/C …; both divisions must be exact.
+//!
+//! | quantity | shape | meaning |
+//! |---|---|---|
+//! | case 0, 1, 2, 3 | 1×1, 2×2, 1×2, 2×1 | subarrays along the rows × along the columns, as in the paper |
+//! | gather | rows·cols of the array → of the subarray | row-major in both |
+
+use crate::sensor::{Sensor, MIN_LINES};
+use serde::{Deserialize, Serialize};
+use std::fmt;
+use thiserror::Error;
+
+/// Subarrays along the rows and along the columns.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Grid {
+    /// Subarrays one below the other.
+    pub rows: usize,
+    /// Subarrays side by side.
+    pub cols: usize,
+}
+
+/// How the array is cut.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Case {
+    /// Equal rectangles, known before the frame is.
+    Grid(Grid),
+    /// The finest case in which every loaded subarray meets the condition.
+    Adaptive,
+    /// One region per contact.
+    Contacts,
+}
+
+impl Case {
+    /// Case 0: the whole array as one subarray.
+    pub const WHOLE: Case = Case::Grid(Grid { rows: 1, cols: 1 });
+
+    /// The paper's case 0 to 3, `None` for any other number.
+    pub fn numbered(number: i64) -> Option<Case> {
+        let (rows, cols) = match number {
+            0 => (1, 1),
+            1 => (2, 2),
+            2 => (1, 2),
+            3 => (2, 1),
+            _ => return None,
+        };
+        Some(Case::Grid(Grid { rows, cols }))
+    }
+
+    /// The rectangles' count, `None` where it depends on the frame.
+    pub fn grid(self) -> Option<Grid> {
+        match self {
+            Case::Grid(grid) => Some(grid),
+            Case::Adaptive | Case::Contacts => None,
+        }
+    }
+}
+
+impl fmt::Display for Case {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Case::Grid(grid) => match (grid.rows, grid.cols) {
+                (1, 1) => write!(f, "0"),
+                (2, 2) => write!(f, "1"),
+                (1, 2) => write!(f, "2"),
+                (2, 1) => write!(f, "3"),
+                (rows, cols) => write!(f, "{rows}×{cols}"),
+            },
+            Case::Adaptive => write!(f, "adaptive"),
+            Case::Contacts => write!(f, "contacts"),
+        }
+    }
+}
+
+/// A partition the array does not have.
+#[derive(Clone, Debug, PartialEq, Error)]
+pub enum PartitionError {
+    /// A count of subarrays that does not divide the taxels, or leaves single lines.
+    #[error("{parts} subarrays do not divide {lines} {direction} into equal parts of at least 2")]
+    NotDividing {
+        /// `rows` or `cols`.
+        direction: &'static str,
+        /// Taxel lines of the array in that direction.
+        lines: usize,
+        /// Subarrays asked for.
+        parts: usize,
+    },
+    /// A partition that depends on the frame has no rectangles to list.
+    #[error("partition {case} depends on the frame")]
+    DependsOnFrame {
+        /// The case asked for.
+        case: Case,
+    },
+}
+
+/// A rectangle of taxels.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Subarray {
+    /// First row in the array.
+    pub row0: usize,
+    /// First column in the array.
+    pub col0: usize,
+    /// Number of rows.
+    pub rows: usize,
+    /// Number of columns.
+    pub cols: usize,
+}
+
+/// The subarrays of a case, row-major.
+///
+/// # Errors
+/// A count that does not divide the array, or a case without fixed rectangles.
+pub fn subarrays(case: Case, sensor: &Sensor) -> Result<Vec<Subarray>, PartitionError> {
+    let grid = case.grid().ok_or(PartitionError::DependsOnFrame { case })?;
+    let rows = part("rows", sensor.rows, grid.rows)?;
+    let cols = part("cols", sensor.cols, grid.cols)?;
+    let at = |i: usize, j: usize| Subarray {
+        row0: i * rows,
+        col0: j * cols,
+        rows,
+        cols,
+    };
+    Ok((0..grid.rows)
+        .flat_map(|i| (0..grid.cols).map(move |j| at(i, j)))
+        .collect())
+}
+
+/// Lines per part, when the division is exact.
+fn part(direction: &'static str, lines: usize, parts: usize) -> Result<usize, PartitionError> {
+    if parts == 0 || lines % parts != 0 || lines / parts < MIN_LINES {
+        return Err(PartitionError::NotDividing {
+            direction,
+            lines,
+            parts,
+        });
+    }
+    Ok(lines / parts)
+}
+
+impl Subarray {
+    /// The subarray seen as a sensor of its own: same pitch, same thickness.
+    pub fn sensor(&self, whole: &Sensor) -> Sensor {
+        Sensor {
+            rows: self.rows,
+            cols: self.cols,
+            ..whole.clone()
+        }
+    }
+
+    /// Indices in the array of the subarray's taxels, in the subarray's row-major order.
+    pub fn indices(self, whole: &Sensor) -> impl Iterator<Item = usize> {
+        let cols = whole.cols;
+        (self.row0..self.row0 + self.rows).flat_map(move |row| {
+            (self.col0..self.col0 + self.cols).map(move |col| row * cols + col)
+        })
+    }
+
+    /// The subarray's values out of the array's.
+    pub fn gather<T: Copy>(&self, whole: &Sensor, values: &[T]) -> Vec<T> {
+        self.indices(whole).map(|index| values[index]).collect()
+    }
+
+    /// Writes the subarray's values to their places in the array.
+    pub fn scatter<T: Copy>(&self, whole: &Sensor, part: &[T], values: &mut [T]) {
+        for (index, &value) in self.indices(whole).zip(part) {
+            values[index] = value;
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    fn sensor(rows: usize, cols: usize) -> Sensor {
+        Sensor {
+            rows,
+            cols,
+            pitch_x_mm: 2.0,
+            pitch_y_mm: 4.0,
+            thickness_mm: 3.0,
+        }
+    }
+
+    #[test]
+    fn cases_by_hand() {
+        let names: Vec<_> = (0..4)
+            .filter_map(Case::numbered)
+            .map(|c| c.to_string())
+            .collect();
+        assert_eq!(names, ["0", "1", "2", "3"]);
+        assert_eq!(Case::numbered(4), None);
+        let parts = subarrays(Case::Grid(Grid { rows: 1, cols: 2 }), &sensor(4, 6)).unwrap();
+        assert_eq!(
+            parts[1],
+            Subarray {
+                row0: 0,
+                col0: 3,
+                rows: 4,
+                cols: 3
+            }
+        );
+        let values: Vec<usize> = (0..24).collect();
+        assert_eq!(parts[1].gather(&sensor(4, 6), &values)[..4], [3, 4, 5, 9]);
+    }
+
+    #[test]
+    fn refuses_uneven_cuts() {
+        let uneven = subarrays(Case::Grid(Grid { rows: 2, cols: 1 }), &sensor(5, 4));
+        let expected = PartitionError::NotDividing {
+            direction: "rows",
+            lines: 5,
+            parts: 2,
+        };
+        assert_eq!(uneven, Err(expected));
+        assert!(subarrays(Case::Grid(Grid { rows: 0, cols: 1 }), &sensor(5, 4)).is_err());
+        assert!(subarrays(Case::Adaptive, &sensor(4, 4)).is_err());
+    }
+
+    proptest! {
+        #[test]
+        fn scatter_undoes_gather(rows in 1usize..4, cols in 1usize..4, m in 2usize..5, n in 2usize..5) {
+            let sensor = sensor(rows * m, cols * n);
+            let values: Vec<usize> = (1..=sensor.taxels()).collect();
+            let mut rebuilt = vec![0; values.len()];
+            for part in subarrays(Case::Grid(Grid { rows, cols }), &sensor).unwrap() {
+                part.scatter(&sensor, &part.gather(&sensor, &values), &mut rebuilt);
+            }
+            prop_assert_eq!(rebuilt, values);
+        }
+    }
+}

@@ -1,0 +1,123 @@
+//! Quantise: stress into the codes of a signed converter, as the hardware receives them.
+//!
+//! code = round(b / full_scale · M), M = 2^(bits − 1) − 1, halves away from zero, held to ±M; lsb = full_scale / M.
+//!
+//! | | shape | unit | range |
+//! |---|---|---|---|
+//! | in: stress | taxels | MPa | finite |
+//! | out: codes | taxels | LSB | −M … M, symmetric, so that no negation overflows |
+//! | out: clipped | taxels | flag | the rounded code was beyond ±M |
+//!
+//! Feeds `receive` of all three models. It does not check that the stress is finite: frames are checked when loaded.
+
+use crate::frame::Frame;
+use crate::scene::Scene;
+
+/// Stress as the converter sees it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Codes {
+    /// One signed code per taxel, row-major.
+    pub codes: Vec<i32>,
+    /// Width of a code with its sign, 2 to 31.
+    pub bits: u32,
+    /// Stress of the largest code.
+    pub full_scale_MPa: f64,
+    /// Taxels beyond full scale.
+    pub clipped: Vec<bool>,
+}
+
+/// Largest code of a width: 2^(bits − 1) − 1.
+pub fn largest_code(bits: u32) -> i32 {
+    ((1i64 << (bits - 1)) - 1) as i32
+}
+
+impl Codes {
+    /// Stress of one code step in MPa.
+    pub fn lsb_MPa(&self) -> f64 {
+        self.full_scale_MPa / f64::from(largest_code(self.bits))
+    }
+}
+
+/// Rounds stress in MPa to codes of `bits` bits (2 to 31) whose largest means `full_scale_MPa`.
+pub fn quantise(stress_MPa: &[f64], bits: u32, full_scale_MPa: f64) -> Codes {
+    let largest = f64::from(largest_code(bits));
+    // f64::round takes halves away from zero.
+    let ideal = |b: &f64| (b / full_scale_MPa * largest).round();
+    Codes {
+        codes: stress_MPa
+            .iter()
+            .map(|b| ideal(b).clamp(-largest, largest) as i32)
+            .collect(),
+        bits,
+        full_scale_MPa,
+        clipped: stress_MPa
+            .iter()
+            .map(|b| ideal(b).abs() > largest)
+            .collect(),
+    }
+}
+
+/// What the largest code means: the scene's value, else the frame's largest |b|, else (all zero) 1 MPa.
+pub fn full_scale(scene: &Scene, frame: &Frame) -> f64 {
+    scene.input.full_scale_MPa.unwrap_or_else(|| {
+        let peak = frame.peak_MPa();
+        if peak > 0.0 {
+            peak
+        } else {
+            1.0
+        }
+    })
+}
+
+/// The scene's noise floor in codes, rounded down; a code counts when it is strictly beyond it.
+pub fn noise_floor_codes(scene: &Scene, codes: &Codes) -> i32 {
+    // The cast saturates.
+    (scene.search.noise_floor_MPa / codes.lsb_MPa()).floor() as i32
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    #[test]
+    fn by_hand_with_eight_bits() {
+        let codes = quantise(&[127.0, 0.5, -0.5, 0.49, -127.4, 127.5, -300.0], 8, 127.0);
+        assert_eq!(codes.codes, [127, 1, -1, 0, -127, 127, -127]);
+        let clipped = [false, false, false, false, false, true, true];
+        assert_eq!(codes.clipped, clipped);
+        assert_eq!(codes.lsb_MPa(), 1.0);
+    }
+
+    #[test]
+    fn full_scale_falls_back_to_the_frame() {
+        let mut scene = Scene::builtin("sensor-1").unwrap();
+        let mut frame = Frame::eq2(&scene.sensor);
+        assert_eq!(full_scale(&scene, &frame), frame.peak_MPa());
+        frame.stress_MPa.fill(0.0);
+        assert_eq!(full_scale(&scene, &frame), 1.0);
+        scene.input.full_scale_MPa = Some(0.25);
+        assert_eq!(full_scale(&scene, &frame), 0.25);
+    }
+
+    #[test]
+    fn noise_floor_rounds_down_and_saturates() {
+        let mut scene = Scene::builtin("sensor-1").unwrap();
+        let codes = quantise(&[0.0], 8, 127.0);
+        for (floor, expected) in [(0.0, 0), (2.9, 2), (1e300, i32::MAX)] {
+            scene.search.noise_floor_MPa = floor;
+            assert_eq!(noise_floor_codes(&scene, &codes), expected);
+        }
+    }
+
+    proptest! {
+        #[test]
+        fn half_an_lsb_away_at_most(b in -1.0f64..=1.0, bits in 8u32..=24) {
+            let codes = quantise(&[b], bits, 1.0);
+            let back = f64::from(codes.codes[0]) * codes.lsb_MPa();
+            // Half a step, and the rounding of three operations on values up to 1.
+            prop_assert!((back - b).abs() <= 0.5 * codes.lsb_MPa() + 4.0 * f64::EPSILON);
+            prop_assert!(!codes.clipped[0]);
+        }
+    }
+}

@@ -1,0 +1,262 @@
+//! Scene: everything a run needs to know about sensor, method, number formats and hardware, from a TOML file.
+//!
+//! Every table but `[sensor]` has defaults; an unknown field, a value out of range or a wrong type is an error that
+//! names the file, the field and what is allowed. Sizes are checked here, before anything of their size is allocated.
+//!
+//! | table | fields (default) |
+//! |---|---|
+//! | top | `name` (file name) |
+//! | `[sensor]` | `rows`, `cols` (2 … 256), `pitch_x_mm`, `pitch_y_mm`, `thickness_mm` (0 … 10⁶] |
+//! | `[medium]` | `kind` ("half-space"; "bonded-layer" with `poisson`, 0.48) |
+//! | `[partition]` | `case` (0; 1 … 3, "adaptive", "contacts") or `rows` and `cols`; `condition` ("loaded"; "both-signs") |
+//! | `[search]` | `objective` ("sparse"; …), `mu_max` (0.6; 0 … 2), `noise_floor_MPa` (0) |
+//! | `[threshold]` | `min_force_N` (0) |
+//! | `[fixed]` | `input_bits` (20; 8 … 24), `data_bits` (18; 12 … 18), `coef_bits` (18; 8 … 18), `inverse_bits` (24; coef … 32) |
+//! | `[hardware]` | `board` ("ulx3s-85f") |
+//! | `[input]` | `full_scale_MPa` (the frame's peak) |
+
+mod error;
+mod load;
+mod parse;
+mod reader;
+
+pub use error::SceneError;
+
+use crate::partition::Case;
+use crate::sensor::Sensor;
+use serde::{Deserialize, Serialize};
+use std::fmt;
+
+/// Boards a scene may name.
+pub const BOARDS: [&str; 1] = ["ulx3s-85f"];
+
+/// One complete set of choices.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Scene {
+    /// Name in reports.
+    pub name: String,
+    /// The taxel array.
+    pub sensor: Sensor,
+    /// What lies between surface and taxels.
+    pub medium: Medium,
+    /// How the array is cut and when a subarray is searched.
+    pub partition: PartitionSpec,
+    /// Objective and range of the μ search.
+    pub search: SearchSpec,
+    /// Forces too small to report.
+    pub threshold: ThresholdSpec,
+    /// Widths of the fixed-point pipeline.
+    pub fixed: FixedSpec,
+    /// Target of the generated hardware.
+    pub hardware: HardwareSpec,
+    /// Meaning of the input codes.
+    pub input: InputSpec,
+}
+
+/// Elastic body over the taxels.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(tag = "kind", rename_all = "kebab-case")]
+pub enum Medium {
+    /// Infinitely deep; the stress holds for any Poisson ratio.
+    #[default]
+    HalfSpace,
+    /// A layer of the sensor's thickness on a rigid base.
+    BondedLayer {
+        /// Poisson ratio, above 0 and below 0.5.
+        poisson: f64,
+    },
+}
+
+impl fmt::Display for Medium {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Medium::HalfSpace => write!(f, "half-space"),
+            Medium::BondedLayer { poisson } => write!(f, "bonded-layer, poisson {poisson}"),
+        }
+    }
+}
+
+/// When a subarray's μ is searched.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Condition {
+    /// Wherever the load exceeds the noise floor.
+    #[default]
+    Loaded,
+    /// The paper's centroid condition: compression and tension both exceed it.
+    BothSigns,
+}
+
+/// What the μ search maximises.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum ObjectiveKind {
+    /// Forces on few taxels.
+    #[default]
+    Sparse,
+    /// No tensile forces.
+    Compressive,
+    /// Pressure symmetric about its centre.
+    Symmetric,
+    /// One elliptic contact.
+    Patch,
+    /// Chosen from the noise floor and the pitch.
+    Auto,
+}
+
+/// Table `[partition]`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PartitionSpec {
+    /// Which subarrays.
+    pub case: Case,
+    /// When a subarray is searched.
+    pub condition: Condition,
+}
+
+/// Table `[search]`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SearchSpec {
+    /// What is maximised.
+    pub objective: ObjectiveKind,
+    /// Largest ratio of shear to normal force, 0 to 2; 0 asks for no shear.
+    pub mu_max: f64,
+    /// Stress in MPa that counts as none.
+    pub noise_floor_MPa: f64,
+}
+
+/// Table `[threshold]`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ThresholdSpec {
+    /// Smallest normal force in N that is reported.
+    pub min_force_N: f64,
+}
+
+/// Table `[fixed]`: widths in bits, signs included.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct FixedSpec {
+    /// Converter codes.
+    pub input_bits: u32,
+    /// Vectors between the stages.
+    pub data_bits: u32,
+    /// Coefficients of Ax and Ay.
+    pub coef_bits: u32,
+    /// Coefficients of Cz⁺, taken in limbs.
+    pub inverse_bits: u32,
+}
+
+/// Table `[hardware]`.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct HardwareSpec {
+    /// One of [`BOARDS`].
+    pub board: String,
+}
+
+/// Table `[input]`.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct InputSpec {
+    /// Stress in MPa of the largest code; `None` takes each frame's peak.
+    pub full_scale_MPa: Option<f64>,
+}
+
+impl Default for PartitionSpec {
+    fn default() -> Self {
+        let condition = Condition::default();
+        PartitionSpec {
+            case: Case::WHOLE,
+            condition,
+        }
+    }
+}
+
+impl Default for SearchSpec {
+    fn default() -> Self {
+        SearchSpec {
+            objective: ObjectiveKind::default(),
+            mu_max: 0.6,
+            noise_floor_MPa: 0.0,
+        }
+    }
+}
+
+impl Default for ThresholdSpec {
+    fn default() -> Self {
+        ThresholdSpec { min_force_N: 0.0 }
+    }
+}
+
+impl Default for FixedSpec {
+    fn default() -> Self {
+        FixedSpec {
+            input_bits: 20,
+            data_bits: 18,
+            coef_bits: 18,
+            inverse_bits: 24,
+        }
+    }
+}
+
+impl Default for HardwareSpec {
+    fn default() -> Self {
+        let board = BOARDS[0].to_string();
+        HardwareSpec { board }
+    }
+}
+
+impl ObjectiveKind {
+    /// Every objective with its name in a scene file.
+    pub const NAMES: [(&'static str, ObjectiveKind); 5] = [
+        ("sparse", ObjectiveKind::Sparse),
+        ("compressive", ObjectiveKind::Compressive),
+        ("symmetric", ObjectiveKind::Symmetric),
+        ("patch", ObjectiveKind::Patch),
+        ("auto", ObjectiveKind::Auto),
+    ];
+
+    /// Name in a scene file.
+    pub fn name(self) -> &'static str {
+        let named = Self::NAMES.iter().find(|(_, kind)| *kind == self);
+        named.map_or("", |(name, _)| name)
+    }
+}
+
+impl Scene {
+    /// The default choices for a sensor.
+    pub fn of_sensor(sensor: &Sensor, name: &str) -> Scene {
+        Scene {
+            name: name.to_string(),
+            sensor: sensor.clone(),
+            medium: Medium::default(),
+            partition: PartitionSpec::default(),
+            search: SearchSpec::default(),
+            threshold: ThresholdSpec::default(),
+            fixed: FixedSpec::default(),
+            hardware: HardwareSpec::default(),
+            input: InputSpec::default(),
+        }
+    }
+
+    /// Checks that this version has what the scene asks for.
+    ///
+    /// # Errors
+    /// [`SceneError::NotAvailable`] naming the first choice that is valid but not built yet.
+    pub fn require_supported(&self) -> Result<(), SceneError> {
+        let missing = |field: &'static str, value: String, available: &'static str| {
+            let scene = self.name.clone();
+            Err(SceneError::NotAvailable {
+                scene,
+                field,
+                value,
+                available,
+            })
+        };
+        if self.medium != Medium::HalfSpace {
+            return missing("medium.kind", self.medium.to_string(), "half-space");
+        }
+        if self.partition.case != Case::WHOLE {
+            return missing("partition.case", self.partition.case.to_string(), "0");
+        }
+        if self.search.objective != ObjectiveKind::Sparse {
+            let name = self.search.objective.name().to_string();
+            return missing("search.objective", name, "sparse");
+        }
+        Ok(())
+    }
+}

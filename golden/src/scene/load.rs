@@ -1,0 +1,83 @@
+//! Finding scenes: built in by name, or files by path.
+
+use super::{Scene, SceneError};
+use std::io::Read;
+
+/// Largest scene file in bytes.
+const LARGEST_FILE: u64 = 1 << 20;
+
+/// Scenes that can be named without a path.
+const BUILTINS: [(&str, &str); 5] = [
+    ("sensor-1", include_str!("../../scenes/sensor-1.toml")),
+    ("sensor-2", include_str!("../../scenes/sensor-2.toml")),
+    ("sensor-3", include_str!("../../scenes/sensor-3.toml")),
+    ("sensor-4", include_str!("../../scenes/sensor-4.toml")),
+    (
+        "eight-by-eight",
+        include_str!("../../scenes/eight-by-eight.toml"),
+    ),
+];
+
+impl Scene {
+    /// Names of the built-in scenes.
+    pub fn builtin_names() -> Vec<&'static str> {
+        BUILTINS.iter().map(|(name, _)| *name).collect()
+    }
+
+    /// A built-in scene by its name.
+    ///
+    /// # Errors
+    /// [`SceneError::NotFound`] with the nearest name.
+    pub fn builtin(name: &str) -> Result<Scene, SceneError> {
+        match BUILTINS.iter().find(|(builtin, _)| *builtin == name) {
+            Some((name, text)) => Scene::parse(text, name),
+            None => Err(not_found(name)),
+        }
+    }
+
+    /// A scene by built-in name or by path; a built-in name wins over a file of that name.
+    ///
+    /// # Errors
+    /// Every [`SceneError`] but `NotAvailable`.
+    pub fn load(name_or_path: &str) -> Result<Scene, SceneError> {
+        let builtin = BUILTINS.iter().any(|(name, _)| *name == name_or_path);
+        if builtin || !std::path::Path::new(name_or_path).exists() {
+            return Scene::builtin(name_or_path);
+        }
+        let text = read(name_or_path).map_err(|source| {
+            let file = name_or_path.to_string();
+            SceneError::Unreadable { file, source }
+        })?;
+        if text.len() as u64 > LARGEST_FILE {
+            let file = name_or_path.to_string();
+            return Err(SceneError::TooLarge {
+                file,
+                limit: LARGEST_FILE,
+            });
+        }
+        Scene::parse(&text, name_or_path)
+    }
+}
+
+/// The file's text, cut one byte beyond the limit so that its size can be judged.
+fn read(path: &str) -> std::io::Result<String> {
+    let mut bytes = Vec::new();
+    std::fs::File::open(path)?
+        .take(LARGEST_FILE + 1)
+        .read_to_end(&mut bytes)?;
+    String::from_utf8(bytes)
+        .map_err(|error| std::io::Error::new(std::io::ErrorKind::InvalidData, error))
+}
+
+fn not_found(name: &str) -> SceneError {
+    let builtins = Scene::builtin_names();
+    let likeness = |other: &&&str| strsim::jaro_winkler(name, other);
+    let nearest = builtins
+        .iter()
+        .max_by(|a, b| likeness(a).total_cmp(&likeness(b)));
+    SceneError::NotFound {
+        name: name.to_string(),
+        nearest: nearest.copied().unwrap_or_default(),
+        builtins,
+    }
+}

@@ -1,0 +1,246 @@
+//! Scene text to checked scene: the schema, and one function per table.
+
+use super::reader::Reader;
+use super::{
+    Condition, FixedSpec, HardwareSpec, InputSpec, Medium, ObjectiveKind, PartitionSpec, Scene,
+    SceneError, SearchSpec, ThresholdSpec, BOARDS,
+};
+use crate::partition::{subarrays, Case, Grid};
+use crate::sensor::{Sensor, MAX_LENGTH_MM, MAX_LINES, MIN_LINES};
+use std::ops::RangeInclusive;
+use toml::{Table, Value};
+
+/// Tables and their fields; "" is the top level.
+const SCHEMA: [(&str, &[&str]); 9] = [
+    ("", &["name"]),
+    (
+        "sensor",
+        &["rows", "cols", "pitch_x_mm", "pitch_y_mm", "thickness_mm"],
+    ),
+    ("medium", &["kind", "poisson"]),
+    ("partition", &["case", "condition", "rows", "cols"]),
+    ("search", &["objective", "mu_max", "noise_floor_MPa"]),
+    ("threshold", &["min_force_N"]),
+    (
+        "fixed",
+        &["input_bits", "data_bits", "coef_bits", "inverse_bits"],
+    ),
+    ("hardware", &["board"]),
+    ("input", &["full_scale_MPa"]),
+];
+/// Poisson ratio of soft rubber, where a bonded layer names none.
+const DEFAULT_POISSON: f64 = 0.48;
+/// Longest scene name; it becomes part of file names and reports.
+const LONGEST_NAME: usize = 64;
+
+impl Scene {
+    /// Reads a scene from TOML text; `origin` names the file in errors, and the scene when the text does not.
+    ///
+    /// # Errors
+    /// Every [`SceneError`] but those of finding and reading a file.
+    pub fn parse(text: &str, origin: &str) -> Result<Scene, SceneError> {
+        let root: Table = toml::from_str(text).map_err(|error| syntax(text, origin, &error))?;
+        let reader = Reader::new(origin, &root);
+        reader.check_names(&SCHEMA)?;
+        let sensor = sensor(&reader)?;
+        Ok(Scene {
+            name: name(&reader, origin)?,
+            medium: medium(&reader)?,
+            partition: partition(&reader, &sensor)?,
+            search: search(&reader)?,
+            threshold: threshold(&reader)?,
+            fixed: fixed(&reader)?,
+            hardware: hardware(&reader)?,
+            input: input(&reader)?,
+            sensor,
+        })
+    }
+}
+
+fn syntax(text: &str, origin: &str, error: &toml::de::Error) -> SceneError {
+    let end = error.span().map_or(0, |span| span.start.min(text.len()));
+    SceneError::Syntax {
+        file: origin.to_string(),
+        line: 1 + text.as_bytes()[..end]
+            .iter()
+            .filter(|&&byte| byte == b'\n')
+            .count(),
+        message: error.message().to_string(),
+    }
+}
+
+fn name(reader: &Reader, origin: &str) -> Result<String, SceneError> {
+    let Some(value) = reader.value("name") else {
+        let stem = std::path::Path::new(origin).file_stem();
+        return Ok(stem.map_or("scene".into(), |stem| stem.to_string_lossy().into_owned()));
+    };
+    match value.as_str() {
+        Some(name) if !name.is_empty() && name.chars().count() <= LONGEST_NAME => {
+            Ok(name.to_string())
+        }
+        _ => Err(reader.wrong(
+            "name",
+            value,
+            format!("a text of 1 to {LONGEST_NAME} characters"),
+        )),
+    }
+}
+
+fn sensor(reader: &Reader) -> Result<Sensor, SceneError> {
+    let lines = |path| {
+        let range = MIN_LINES as i64..=MAX_LINES as i64;
+        // In range, so that the cast keeps the value.
+        reader
+            .integer(path, range, None)
+            .map(|lines| lines as usize)
+    };
+    let length = |path| {
+        let allowed = format!("a number above 0, at most {MAX_LENGTH_MM}");
+        let number = reader.number(path, |mm| mm > 0.0 && mm <= MAX_LENGTH_MM, &allowed)?;
+        number.ok_or_else(|| reader.missing(path, allowed))
+    };
+    Ok(Sensor {
+        rows: lines("sensor.rows")?,
+        cols: lines("sensor.cols")?,
+        pitch_x_mm: length("sensor.pitch_x_mm")?,
+        pitch_y_mm: length("sensor.pitch_y_mm")?,
+        thickness_mm: length("sensor.thickness_mm")?,
+    })
+}
+
+fn medium(reader: &Reader) -> Result<Medium, SceneError> {
+    let layer = Medium::BondedLayer {
+        poisson: DEFAULT_POISSON,
+    };
+    let names = [("half-space", Medium::HalfSpace), ("bonded-layer", layer)];
+    let kind = reader.choice("medium.kind", &names)?;
+    let allowed = "a number above 0 and below 0.5";
+    let poisson = reader.number("medium.poisson", |nu| nu > 0.0 && nu < 0.5, allowed)?;
+    match (kind, poisson, reader.value("medium.poisson")) {
+        (Medium::HalfSpace, _, Some(value)) => Err(reader.wrong(
+            "medium.poisson",
+            value,
+            "left out unless medium.kind = \"bonded-layer\"",
+        )),
+        (Medium::BondedLayer { .. }, Some(poisson), _) => Ok(Medium::BondedLayer { poisson }),
+        (kind, _, _) => Ok(kind),
+    }
+}
+
+fn partition(reader: &Reader, sensor: &Sensor) -> Result<PartitionSpec, SceneError> {
+    let names = [
+        ("loaded", Condition::Loaded),
+        ("both-signs", Condition::BothSigns),
+    ];
+    let condition = reader.choice("partition.condition", &names)?;
+    let own = ["partition.rows", "partition.cols"].map(|path| reader.value(path));
+    let (field, case) = match (reader.value("partition.case"), own) {
+        (None, [None, None]) => {
+            return Ok(PartitionSpec {
+                condition,
+                ..Default::default()
+            })
+        }
+        (Some(value), [None, None]) => ("partition.case", named_case(reader, value)?),
+        (None, _) => {
+            let parts = |path| {
+                let parts = reader.integer(path, 1..=(MAX_LINES / MIN_LINES) as i64, None)?;
+                Ok::<_, SceneError>(parts as usize)
+            };
+            let (rows, cols) = (parts("partition.rows")?, parts("partition.cols")?);
+            ("partition.rows", Case::Grid(Grid { rows, cols }))
+        }
+        (Some(value), _) => {
+            return Err(reader.wrong("partition.case", value, "left out beside rows and cols"))
+        }
+    };
+    if case.grid().is_some() {
+        subarrays(case, sensor).map_err(|error| {
+            let value = reader.value(field).unwrap_or(&Value::Boolean(false));
+            reader.wrong(field, value, format!("a partition of {sensor} ({error})"))
+        })?;
+    }
+    Ok(PartitionSpec { case, condition })
+}
+
+fn named_case(reader: &Reader, value: &Value) -> Result<Case, SceneError> {
+    let case = match value {
+        Value::Integer(number) => Case::numbered(*number),
+        Value::String(name) if name == "adaptive" => Some(Case::Adaptive),
+        Value::String(name) if name == "contacts" => Some(Case::Contacts),
+        _ => None,
+    };
+    case.ok_or_else(|| {
+        reader.wrong(
+            "partition.case",
+            value,
+            "0, 1, 2, 3, \"adaptive\" or \"contacts\"",
+        )
+    })
+}
+
+fn search(reader: &Reader) -> Result<SearchSpec, SceneError> {
+    let default = SearchSpec::default();
+    let mu_max = reader.number(
+        "search.mu_max",
+        |mu| (0.0..=2.0).contains(&mu),
+        "a number from 0 to 2",
+    )?;
+    let floor = reader.number(
+        "search.noise_floor_MPa",
+        |mpa| mpa >= 0.0,
+        "a number of at least 0",
+    )?;
+    Ok(SearchSpec {
+        objective: reader.choice("search.objective", &ObjectiveKind::NAMES)?,
+        mu_max: mu_max.unwrap_or(default.mu_max),
+        noise_floor_MPa: floor.unwrap_or(default.noise_floor_MPa),
+    })
+}
+
+fn threshold(reader: &Reader) -> Result<ThresholdSpec, SceneError> {
+    let force = reader.number(
+        "threshold.min_force_N",
+        |n| n >= 0.0,
+        "a number of at least 0",
+    )?;
+    let default = ThresholdSpec::default().min_force_N;
+    Ok(ThresholdSpec {
+        min_force_N: force.unwrap_or(default),
+    })
+}
+
+fn fixed(reader: &Reader) -> Result<FixedSpec, SceneError> {
+    let default = FixedSpec::default();
+    // Every range lies within u32.
+    let bits = |path, range: RangeInclusive<i64>, default: u32| {
+        let bits = reader.integer(path, range, Some(i64::from(default)))?;
+        Ok::<_, SceneError>(bits as u32)
+    };
+    let coef_bits = bits("fixed.coef_bits", 8..=18, default.coef_bits)?;
+    Ok(FixedSpec {
+        input_bits: bits("fixed.input_bits", 8..=24, default.input_bits)?,
+        data_bits: bits("fixed.data_bits", 12..=18, default.data_bits)?,
+        coef_bits,
+        inverse_bits: bits(
+            "fixed.inverse_bits",
+            i64::from(coef_bits)..=32,
+            default.inverse_bits,
+        )?,
+    })
+}
+
+fn hardware(reader: &Reader) -> Result<HardwareSpec, SceneError> {
+    let board = reader.choice("hardware.board", &BOARDS.map(|board| (board, Some(board))))?;
+    Ok(
+        board.map_or_else(HardwareSpec::default, |board| HardwareSpec {
+            board: board.to_string(),
+        }),
+    )
+}
+
+fn input(reader: &Reader) -> Result<InputSpec, SceneError> {
+    let full_scale_MPa =
+        reader.number("input.full_scale_MPa", |mpa| mpa > 0.0, "a number above 0")?;
+    Ok(InputSpec { full_scale_MPa })
+}

@@ -1,0 +1,170 @@
+//! Typed reading of a TOML table, with errors that name file, field, value and what is allowed.
+
+use super::SceneError;
+use std::ops::RangeInclusive;
+use toml::{Table, Value};
+
+/// A scene file being read.
+pub(super) struct Reader<'a> {
+    file: &'a str,
+    root: &'a Table,
+}
+
+impl<'a> Reader<'a> {
+    pub(super) fn new(file: &'a str, root: &'a Table) -> Self {
+        Reader { file, root }
+    }
+
+    /// Refuses every field that is not in the schema (table name, its fields; "" is the top level).
+    pub(super) fn check_names(&self, schema: &[(&str, &[&str])]) -> Result<(), SceneError> {
+        let paths = || {
+            let path = |table: &&str, field: &&str| join(table, field);
+            schema
+                .iter()
+                .flat_map(move |(table, fields)| fields.iter().map(move |field| path(table, field)))
+        };
+        let unknown = |field: String| {
+            let tables = schema.iter().map(|(table, _)| table.to_string());
+            let known = paths().chain(tables.filter(|table| !table.is_empty()));
+            let nearest = nearest_path(&field, known);
+            let file = self.file.to_string();
+            SceneError::UnknownField {
+                file,
+                field,
+                nearest,
+            }
+        };
+        for (name, value) in self.root {
+            let Some((_, fields)) = schema.iter().find(|(t, _)| t == name && !t.is_empty()) else {
+                if paths().any(|path| path == *name) {
+                    continue;
+                }
+                return Err(unknown(name.clone()));
+            };
+            let table = value
+                .as_table()
+                .ok_or_else(|| self.wrong(name, value, "a table"))?;
+            if let Some(field) = table.keys().find(|key| !fields.contains(&key.as_str())) {
+                return Err(unknown(join(name, field)));
+            }
+        }
+        Ok(())
+    }
+
+    /// The value at `table.field`, if there is one.
+    pub(super) fn value(&self, path: &str) -> Option<&'a Value> {
+        match path.split_once('.') {
+            Some((table, field)) => self.root.get(table)?.as_table()?.get(field),
+            None => self.root.get(path),
+        }
+    }
+
+    /// A whole number in a range, or `default`.
+    pub(super) fn integer(
+        &self,
+        path: &str,
+        range: RangeInclusive<i64>,
+        default: Option<i64>,
+    ) -> Result<i64, SceneError> {
+        let allowed = format!("a whole number from {} to {}", range.start(), range.end());
+        let Some(value) = self.value(path) else {
+            return default.ok_or_else(|| self.missing(path, allowed));
+        };
+        match value.as_integer() {
+            Some(number) if range.contains(&number) => Ok(number),
+            _ => Err(self.wrong(path, value, allowed)),
+        }
+    }
+
+    /// A number for which `test` holds, `None` when the field is absent. Whole numbers are taken as well.
+    pub(super) fn number(
+        &self,
+        path: &str,
+        test: impl Fn(f64) -> bool,
+        allowed: &str,
+    ) -> Result<Option<f64>, SceneError> {
+        let Some(value) = self.value(path) else {
+            return Ok(None);
+        };
+        let number = match value {
+            Value::Float(number) => *number,
+            Value::Integer(number) => *number as f64,
+            _ => return Err(self.wrong(path, value, allowed)),
+        };
+        if number.is_finite() && test(number) {
+            Ok(Some(number))
+        } else {
+            Err(self.wrong(path, value, allowed))
+        }
+    }
+
+    /// One of the named choices, or the type's default.
+    pub(super) fn choice<T: Copy + Default>(
+        &self,
+        path: &str,
+        names: &[(&str, T)],
+    ) -> Result<T, SceneError> {
+        let Some(value) = self.value(path) else {
+            return Ok(T::default());
+        };
+        let named = names.iter().find(|(name, _)| value.as_str() == Some(name));
+        named.map(|(_, choice)| *choice).ok_or_else(|| {
+            let quoted: Vec<_> = names.iter().map(|(name, _)| format!("{name:?}")).collect();
+            self.wrong(path, value, quoted.join(" or "))
+        })
+    }
+
+    /// The error for a value that is there and not allowed.
+    pub(super) fn wrong(
+        &self,
+        path: &str,
+        value: &Value,
+        allowed: impl Into<String>,
+    ) -> SceneError {
+        SceneError::WrongValue {
+            file: self.file.to_string(),
+            field: path.to_string(),
+            value: shorten(&value.to_string()),
+            allowed: allowed.into(),
+        }
+    }
+
+    /// The error for a value that must be there.
+    pub(super) fn missing(&self, path: &str, allowed: impl Into<String>) -> SceneError {
+        SceneError::Missing {
+            file: self.file.to_string(),
+            field: path.to_string(),
+            allowed: allowed.into(),
+        }
+    }
+}
+
+/// A value's text, cut to what fits a message.
+fn shorten(text: &str) -> String {
+    const LONGEST: usize = 60;
+    if text.chars().count() <= LONGEST {
+        return text.to_string();
+    }
+    text.chars().take(LONGEST).chain("…".chars()).collect()
+}
+
+/// `table.field`, or `field` at the top level.
+fn join(table: &str, field: &str) -> String {
+    if table.is_empty() {
+        field.to_string()
+    } else {
+        format!("{table}.{field}")
+    }
+}
+
+/// The known path most like `path`. The field's own name decides, so that a field in the wrong table finds its place;
+/// the table breaks ties.
+fn nearest_path(path: &str, known: impl Iterator<Item = String>) -> String {
+    let last = |path: &str| path.rsplit('.').next().unwrap_or(path).to_string();
+    let likeness = |other: &String| {
+        strsim::jaro_winkler(&last(path), &last(other)) + 0.1 * strsim::jaro_winkler(path, other)
+    };
+    known
+        .max_by(|a, b| likeness(a).total_cmp(&likeness(b)))
+        .unwrap_or_default()
+}

@@ -1,0 +1,169 @@
+//! The taxel array: how many taxels, how far apart, under how much rubber.
+//!
+//! Taxel (r, c) has index r·cols + c and lies at
+//! ((c − (cols − 1)/2)·pitch_x, (r − (rows − 1)/2)·pitch_y), at depth h = thickness.
+//!
+//! | quantity | shape | unit | range |
+//! |---|---|---|---|
+//! | rows, cols | scalar | taxels | 2 … 256 |
+//! | pitch, thickness | scalar | mm | above 0, up to 10⁶ |
+
+use serde::{Deserialize, Serialize};
+use std::fmt;
+use thiserror::Error;
+
+/// Fewest rows or columns: one line of taxels cannot tell shear across it.
+pub const MIN_LINES: usize = 2;
+/// Most rows or columns; checked before anything of the array's size is allocated.
+pub const MAX_LINES: usize = 256;
+/// Largest pitch or thickness in mm.
+pub const MAX_LENGTH_MM: f64 = 1e6;
+
+/// A regular rectangular array of taxels under an elastic cover.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Sensor {
+    /// Lines of taxels along y.
+    pub rows: usize,
+    /// Taxels per line, along x.
+    pub cols: usize,
+    /// Distance of neighbouring columns in mm.
+    pub pitch_x_mm: f64,
+    /// Distance of neighbouring rows in mm.
+    pub pitch_y_mm: f64,
+    /// Depth of the taxels under the surface in mm.
+    pub thickness_mm: f64,
+}
+
+/// A size or length outside its range.
+#[derive(Clone, Debug, PartialEq, Error)]
+#[error("{field} = {value} is not allowed: {allowed}")]
+pub struct SensorError {
+    /// The field's name.
+    pub field: &'static str,
+    /// The value found.
+    pub value: f64,
+    /// What the field may hold.
+    pub allowed: String,
+}
+
+impl Sensor {
+    /// Number of taxels.
+    pub fn taxels(&self) -> usize {
+        self.rows * self.cols
+    }
+
+    /// Position of a taxel's centre in mm, [x, y], from the array's centre.
+    pub fn position_mm(&self, row: usize, col: usize) -> [f64; 2] {
+        let from_middle = |index: usize, count: usize| index as f64 - (count as f64 - 1.0) / 2.0;
+        [
+            from_middle(col, self.cols) * self.pitch_x_mm,
+            from_middle(row, self.rows) * self.pitch_y_mm,
+        ]
+    }
+
+    /// Checks every field against its range.
+    ///
+    /// # Errors
+    /// The first field out of range, in the order of the struct.
+    pub fn check(&self) -> Result<(), SensorError> {
+        for (field, value) in [("rows", self.rows), ("cols", self.cols)] {
+            if !(MIN_LINES..=MAX_LINES).contains(&value) {
+                let allowed = format!("a whole number from {MIN_LINES} to {MAX_LINES}");
+                let value = value as f64;
+                return Err(SensorError {
+                    field,
+                    value,
+                    allowed,
+                });
+            }
+        }
+        let lengths = [
+            ("pitch_x_mm", self.pitch_x_mm),
+            ("pitch_y_mm", self.pitch_y_mm),
+            ("thickness_mm", self.thickness_mm),
+        ];
+        for (field, value) in lengths {
+            // A NaN fails the comparison with zero.
+            if !(value > 0.0 && value <= MAX_LENGTH_MM) {
+                let allowed = format!("above 0, at most {MAX_LENGTH_MM} mm");
+                return Err(SensorError {
+                    field,
+                    value,
+                    allowed,
+                });
+            }
+        }
+        Ok(())
+    }
+}
+
+impl fmt::Display for Sensor {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(
+            f,
+            "{}×{} taxels, pitch {}×{} mm, thickness {} mm",
+            self.rows, self.cols, self.pitch_x_mm, self.pitch_y_mm, self.thickness_mm
+        )
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn sensor() -> Sensor {
+        Sensor {
+            rows: 10,
+            cols: 5,
+            pitch_x_mm: 2.0,
+            pitch_y_mm: 4.0,
+            thickness_mm: 3.0,
+        }
+    }
+
+    #[test]
+    fn positions_by_hand() {
+        let sensor = sensor();
+        assert_eq!(sensor.taxels(), 50);
+        assert_eq!(sensor.position_mm(0, 0), [-4.0, -18.0]);
+        assert_eq!(sensor.position_mm(9, 2), [0.0, 18.0]);
+    }
+
+    #[test]
+    fn prints_size_pitch_thickness() {
+        let text = sensor().to_string();
+        assert_eq!(text, "10×5 taxels, pitch 2×4 mm, thickness 3 mm");
+    }
+
+    #[test]
+    fn refuses_what_is_out_of_range() {
+        assert_eq!(sensor().check(), Ok(()));
+        let bad = [
+            Sensor {
+                rows: 1,
+                ..sensor()
+            },
+            Sensor {
+                cols: 257,
+                ..sensor()
+            },
+            Sensor {
+                pitch_x_mm: 0.0,
+                ..sensor()
+            },
+            Sensor {
+                pitch_y_mm: f64::NAN,
+                ..sensor()
+            },
+            Sensor {
+                thickness_mm: f64::INFINITY,
+                ..sensor()
+            },
+        ];
+        let fields = ["rows", "cols", "pitch_x_mm", "pitch_y_mm", "thickness_mm"];
+        for (sensor, field) in bad.iter().zip(fields) {
+            assert_eq!(sensor.check().unwrap_err().field, field);
+        }
+    }
+}
