@@ -3,7 +3,8 @@
 //! Full speed: one code a cycle, output always ready, a frame starts when the one before is out.
 //! Stalls: seeded random gaps on both streams, the next frame offered as soon as the device takes
 //! it. Input codes follow the AXI rule (an offered beat stays until it is taken), and the same rule
-//! is checked on the output.
+//! is checked on the output. Before a run with stalls half a frame is left in the device, and the reset
+//! must clear it.
 //!
 //! **Counting.** Cycles are numbered from 0 at the first cycle of reset. A beat's cycle is the one
 //! in which valid and ready are both set. latency = cycle of the last output beat − cycle of the last
@@ -127,6 +128,9 @@ pub fn record(
     stimulus: Stimulus,
     watchdog: u64,
 ) -> Recording {
+    if let (Stimulus::Stalls { .. }, Some(first)) = (stimulus, frames.first()) {
+        interrupt(device, first);
+    }
     let mut receiver = Receiver::new(taps, frames);
     let mut sender = Sender {
         frames,
@@ -169,6 +173,24 @@ pub fn record(
         }
     }
     receiver.recording
+}
+
+/// Leaves half a frame in the device: the reset that follows must clear every trace of it.
+fn interrupt(device: &mut dyn Device, play: &Play) {
+    for _ in 0..RESET_CYCLES {
+        device.cycle(&Inputs {
+            rst: true,
+            ..Inputs::default()
+        });
+    }
+    for &s_data in &play.codes[..play.codes.len() / 2] {
+        device.cycle(&Inputs {
+            s_valid: true,
+            s_data,
+            m_ready: true,
+            ..Inputs::default()
+        });
+    }
 }
 
 /// Offers the codes.

@@ -14,6 +14,7 @@ const TOY: &str = include_str!("toy/toy.v");
 const GAIN: i64 = 3;
 /// Beats leave one a cycle from the cycle after the last code: 6 forces and 1 status.
 const CYCLES: Cycles = Cycles {
+    first_output: 1,
     latency: 7,
     total: 13,
 };
@@ -76,6 +77,7 @@ fn vectors() -> Vec<Vector> {
                         words: scaled,
                     },
                 ],
+                cycles: CYCLES,
             },
         }
     };
@@ -90,16 +92,12 @@ fn check(
     vectors: &[Vector],
     stimulus: Stimulus,
 ) -> (Findings, Vec<Times>) {
-    run(
-        Bench {
-            name: "toy",
-            device,
-            taps: &TAPS,
-        },
-        vectors,
-        stimulus,
-        Some(CYCLES),
-    )
+    let bench = Bench {
+        name: "toy",
+        device,
+        taps: &TAPS,
+    };
+    run(bench, vectors, stimulus)
 }
 
 #[test]
@@ -166,16 +164,9 @@ fn flipped_bit_in_the_expected_output_is_found_with_its_cycle() {
 
 #[test]
 fn a_wrong_cycle_count_is_found() {
-    let late = Cycles {
-        latency: 8,
-        ..CYCLES
-    };
-    let bench = Bench {
-        name: "toy",
-        device: &mut toy(),
-        taps: &TAPS,
-    };
-    let (findings, _) = run(bench, &vectors()[..1], Stimulus::FullSpeed, Some(late));
+    let mut vectors = vectors();
+    vectors[0].expected.cycles.latency += 1;
+    let (findings, _) = check(&mut toy(), &vectors[..1], Stimulus::FullSpeed);
     assert_eq!(
         findings.kept[0].rule.as_deref(),
         Some("latency: expected 8 cycles, got 7")
