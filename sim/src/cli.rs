@@ -10,7 +10,7 @@ use std::io::{ErrorKind, Write};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
-use anyhow::{Context, Result};
+use anyhow::{anyhow, Result};
 use clap::{Parser, Subcommand, ValueEnum};
 use dermis_golden::fixed::Model;
 use dermis_golden::frame::Frame;
@@ -138,7 +138,7 @@ pub fn main() -> ExitCode {
         Ok(true) => ExitCode::SUCCESS,
         Ok(false) => ExitCode::from(1),
         Err(error) => {
-            eprintln!("error: {error:#}");
+            eprintln!("error: {error}");
             ExitCode::from(exit_code(&error))
         }
     }
@@ -223,14 +223,14 @@ fn reconstruct(
 /// Writes the generated files, each complete or not at all, and lists them.
 fn build(scene: &Scene, out: &Path) -> Result<String> {
     let generated = generate(&Model::new(scene)?)?;
-    std::fs::create_dir_all(out).with_context(|| out.display().to_string())?;
+    std::fs::create_dir_all(out).map_err(|e| anyhow!("{}: {e}", out.display()))?;
     let mut text = String::new();
     for file in &generated.files {
         let path = out.join(&file.name);
         let part = out.join(format!(".{}.part", file.name));
         std::fs::write(&part, &file.text)
             .and_then(|()| std::fs::rename(&part, &path))
-            .with_context(|| path.display().to_string())?;
+            .map_err(|e| anyhow!("{}: {e}", path.display()))?;
         text.push_str(&format!("{} ({} bytes)\n", path.display(), file.text.len()));
     }
     Ok(text)
@@ -240,7 +240,7 @@ fn build(scene: &Scene, out: &Path) -> Result<String> {
 fn print(text: &str) -> Result<()> {
     match std::io::stdout().lock().write_all(text.as_bytes()) {
         Err(error) if error.kind() != ErrorKind::BrokenPipe => {
-            Err(error).context("standard output")
+            Err(anyhow!("standard output: {error}"))
         }
         _ => Ok(()),
     }
