@@ -35,15 +35,19 @@ impl Errors {
         let least = SMALLEST_SHARE * reference.norm();
         // The second condition leaves out a reference of zero.
         let counts = |size: f64| size >= least && size > 0.0;
-        let axis =
-            |k: usize| counts(reference[k].abs()).then(|| (reference[k] - value[k]) / reference[k]);
+        // Against the smallest numbers there are, a quotient can overflow: no meaningful error either.
+        let share = |off: f64, size: f64| Some(off / size).filter(|share| share.is_finite());
+        let axis = |k: usize| {
+            let off = reference[k] - value[k];
+            share(off, reference[k]).filter(|_| counts(reference[k].abs()))
+        };
         let shear = reference.xy().norm();
         let off = (value - reference).xy().norm();
         Errors {
             x1: axis(0),
             x2: axis(1),
             x3: axis(2),
-            tangential: counts(shear).then(|| off / shear),
+            tangential: share(off, shear).filter(|_| counts(shear)),
             normal: axis(2).map(f64::abs),
         }
     }

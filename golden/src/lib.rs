@@ -19,6 +19,7 @@
 
 pub mod errors;
 pub mod flags;
+pub mod float;
 pub mod frame;
 pub mod influence;
 pub mod matrices;

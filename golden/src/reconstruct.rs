@@ -10,6 +10,10 @@
 //! | out: resultant | 3 | N |
 //! | out: error | 5 | fraction, where the frame has a resultant |
 
+mod golden;
+
+pub use golden::{Golden, GoldenError};
+
 use crate::errors::Errors;
 use crate::flags::Flag;
 use crate::frame::{Forces, Frame};

@@ -1,0 +1,114 @@
+//! Integer arithmetic of the bit-true model: every shift, rounding and saturation the hardware has.
+//!
+//! All words are two's complement, held sign-extended in `i64` (products and accumulators in `i64` as
+//! well: the widest one, an accumulator, has 48 bits). Rounding is *half up*, `⌊x / 2ˢ + 1/2⌋`: one adder
+//! in hardware, and its bias of at most half a unit at exact ties is below every error bound used here.
+
+/// Number of bits of a signed word that holds every integer of magnitude `bound` or less.
+///
+/// `bound = 2ᵏ` needs the sign bit and `k + 1` more, because `+2ᵏ` must fit as well.
+pub fn signed_bits(bound: u64) -> u32 {
+    64 - bound.leading_zeros() + 1
+}
+
+/// Smallest and largest value of a signed word of `bits` (1..=63) bits.
+pub fn range(bits: u32) -> (i64, i64) {
+    (-(1i64 << (bits - 1)), (1i64 << (bits - 1)) - 1)
+}
+
+/// `x / 2^shift`, rounded half up; exact for `shift = 0`. `shift` up to 62.
+pub fn round_shift(x: i64, shift: u32) -> i64 {
+    if shift == 0 {
+        x
+    } else {
+        ((x >> (shift - 1)) + 1) >> 1
+    }
+}
+
+/// Clamps `x` into `bits` bits; the flag tells that it had to.
+pub fn saturate(x: i64, bits: u32) -> (i64, bool) {
+    let (low, high) = range(bits);
+    (x.clamp(low, high), x < low || x > high)
+}
+
+/// The bits by which `x` differs from its own sign: `x` for `x ≥ 0`, `!x` below.
+///
+/// Its length is the number of magnitude bits `x` needs; the OR over many words therefore measures a whole
+/// block without a comparator, and counts `-2ᵏ` as `k` bits, which is what fits a signed word of `k + 1`.
+pub fn magnitude_bits(x: i64) -> u64 {
+    (x ^ (x >> 63)) as u64
+}
+
+/// Position of the highest set bit plus one, 0 for 0: `64 − leading zeros`.
+pub fn bit_length(x: u64) -> u32 {
+    64 - x.leading_zeros()
+}
+
+/// The four-point Hadamard butterfly `f_p = Σ_l (−1)^{p·l} x_l`, unnormalised: two bits of growth.
+///
+/// Index `2·(row bit) + (column bit)` on both sides: images of a taxel under the two mirrors going in, parities
+/// coming out. It is its own inverse but for a factor of four, which [`unfold`](super::unfold) accounts for.
+pub fn hadamard(x: [i64; 4]) -> [i64; 4] {
+    let [a, b, c, d] = x;
+    [a + b + c + d, a - b + c - d, a + b - c - d, a - b - c + d]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use fixed::types::{I32F32, I48F16};
+    use proptest::prelude::*;
+
+    #[test]
+    fn values_by_hand() {
+        assert_eq!(round_shift(5, 1), 3);
+        assert_eq!(round_shift(-5, 1), -2);
+        assert_eq!(round_shift(-6, 2), -1);
+        assert_eq!(saturate(200, 8), (127, true));
+        assert_eq!(saturate(-128, 8), (-128, false));
+        assert_eq!(bit_length(magnitude_bits(-8)), 3);
+        assert_eq!(bit_length(magnitude_bits(8)), 4);
+        assert_eq!(signed_bits(8), 5);
+        assert_eq!(hadamard([1, 2, 3, 4]), [10, -2, -4, 0]);
+    }
+
+    proptest! {
+        /// The `fixed` crate is the oracle for rounding: x + 1/2, floored, at 16 fractional bits.
+        #[test]
+        fn rounding_agrees_with_fixed(x in -(1i64 << 46)..(1i64 << 46)) {
+            let oracle = (I48F16::from_bits(x) + I48F16::from_num(0.5)).floor().to_num::<i64>();
+            prop_assert_eq!(round_shift(x, 16), oracle);
+        }
+
+        /// ... and for saturation, at a word of 32 bits.
+        #[test]
+        fn saturation_agrees_with_fixed(x in -(1i64 << 40)..(1i64 << 40)) {
+            let oracle = fixed::types::I32F0::saturating_from_num(x).to_bits();
+            prop_assert_eq!(saturate(x, 32).0, i64::from(oracle));
+        }
+
+        /// Products and sums stay exact: a multiply-accumulate equals the same one in 32.32 fixed point.
+        #[test]
+        fn multiply_accumulate_agrees_with_fixed(
+            terms in prop::collection::vec((-(1i64 << 17)..(1i64 << 17), -(1i64 << 17)..(1i64 << 17)), 1..64)
+        ) {
+            let plain: i64 = terms.iter().map(|(a, b)| a * b).sum();
+            let oracle = terms.iter().fold(I32F32::ZERO, |sum, &(a, b)| {
+                sum + I32F32::from_bits(a * b)
+            });
+            prop_assert_eq!(plain, oracle.to_bits());
+        }
+
+        #[test]
+        fn the_measured_length_fits(x in any::<i32>()) {
+            let bits = bit_length(magnitude_bits(i64::from(x))) + 1;
+            prop_assert!(!saturate(i64::from(x), bits).1);
+            prop_assert!(bits == 1 || saturate(i64::from(x), bits - 1).1);
+        }
+
+        #[test]
+        fn hadamard_twice_is_four_times(x in prop::array::uniform4(-(1i64 << 30)..(1i64 << 30))) {
+            prop_assert_eq!(hadamard(hadamard(x)), x.map(|v| 4 * v));
+        }
+    }
+}

@@ -1,0 +1,258 @@
+//! Every width and scale of the pipeline, derived from the scene and its matrices.
+//!
+//! Widths are bounds, not guesses: the largest input, times the ∞-norm of what it is multiplied with, gives the largest
+//! output of each stage, so that nothing before `rescale` can overflow. `rescale` brings v_00 to a full word with one measured exponent per subarray and saturates (and
+//! counts) what does not fit; where the norms of the scaled A stay below one, nothing ever does.
+//!
+//! | word | bits | default | LSB |
+//! |---|---|---|---|
+//! | code | `input_bits` | 20 | full scale / (2^(input_bits − 1) − 1), times 2^−normalise |
+//! | parity of the input | `fold_bits` = `input_bits` + 2 | 22 | as the code |
+//! | Cz⁺ | `inverse_bits` | 24 | 2^−`inverse_exponent` N/MPa |
+//! | Ax, Ay | `coef_bits` | 18 | 2^−`a_exponent` |
+//! | accumulator | `acc_bits` | 43–46 | v_00: 2^`raw_shift` · code · Cz⁺ |
+//! | v_ij, parities | `vector_bits` = `data_bits` + 4 | 22 | accumulator · 2^rescale |
+//! | v_ij, operand of a pass | `data_bits` | 18 | 16 of the above |
+//! | v_ij, taxels, in the search | `search_bits[k]` | 27 and less | a quarter of `vector_bits`' |
+//! | Σ over taxels of v_ij | `sum_bits[k]` | | the same |
+//! | log2 | `LOG_FRACTION` fraction bits | 10 | 2^−10 |
+//! | μ | 18 | | 2^−`mu_fraction` |
+//! | force | 32 | | `force_exponent` |
+
+use serde::Serialize;
+
+use super::arith::{bit_length, signed_bits};
+use super::coefficients::{parity_blocks, quantise, Blocks, FLIP_X, FLIP_Y};
+use super::quads::Quads;
+use super::schedule::{vectors, EXPONENTS};
+use super::FixedError;
+use crate::matrices::Matrices;
+use crate::scene::Scene;
+
+/// Operand width of the multipliers.
+pub const MULTIPLIER_BITS: u32 = 18;
+/// v_ij carry this many bits more than the passes' operands, for the search.
+pub const SEARCH_EXTRA_BITS: u32 = 4;
+/// ε of the sparse objective is 2^−`EPSILON_SHIFT`.
+pub const EPSILON_SHIFT: u32 = 17;
+/// Fraction bits of a logarithm.
+pub const LOG_FRACTION: u32 = 10;
+/// The logarithm's table has 2^`LOG_TABLE_BITS` entries.
+pub const LOG_TABLE_BITS: u32 = 6;
+/// Halvings of the search step after the coarse grid.
+pub const HALVINGS: u32 = 7;
+/// μ is counted in mu_max / (3·2^7): the grid's step after all halvings.
+pub const MU_STEPS: i64 = 3 << HALVINGS;
+/// Bits by which X·`mu_step` is rounded to a μ word.
+pub const MU_ROUND: u32 = 8;
+/// Width of a force word on the output stream.
+pub const FORCE_BITS: u32 = 32;
+/// Largest right shift of the force stage: more leaves nothing of any product.
+pub const FORCE_SHIFT_MAX: u32 = 62;
+/// Matrix lanes that the engine takes at most; a multiple of four.
+const LANE_BUDGET: usize = 144;
+/// Coarse tiles and candidates beyond the disc reach grid coordinate ±4.
+const REACH: u64 = 4;
+
+/// Widths and scales of one scene's pipeline; see the module's table.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Formats {
+    /// Degree of p(μ).
+    pub degree: usize,
+    /// Quads per subarray, Q.
+    pub quads: usize,
+    /// Matrix lanes per parity; the engine has four times as many.
+    pub lanes_per_parity: usize,
+    /// Groups of `lanes_per_parity` rows that a pass computes one after the other.
+    pub groups: usize,
+    /// Width of a code.
+    pub input_bits: u32,
+    /// Width of a folded input.
+    pub fold_bits: u32,
+    /// Low limb of the folded input, 0 when it fits one multiplier operand.
+    pub input_low_bits: u32,
+    /// Width of Cz⁺.
+    pub inverse_bits: u32,
+    /// Low limb of Cz⁺, 0 when it fits one multiplier operand.
+    pub inverse_low_bits: u32,
+    /// The larger of the two low limbs: the alignment of the product of high limbs.
+    pub limb_align: u32,
+    /// LSB of the raw v_00 is 2^`raw_shift` times the LSBs of its factors.
+    pub raw_shift: u32,
+    /// LSB of Cz⁺ is 2^−`inverse_exponent` N/MPa.
+    pub inverse_exponent: i32,
+    /// Width of Ax, Ay.
+    pub coef_bits: u32,
+    /// LSB of −A·(4/3)·mu_max is 2^−`a_exponent`.
+    pub a_exponent: i32,
+    /// Width of an accumulator.
+    pub acc_bits: u32,
+    /// Largest length of a raw v_00.
+    pub raw_length_max: u32,
+    /// Width of an operand of the passes.
+    pub data_bits: u32,
+    /// Width of a v_ij in parities.
+    pub vector_bits: u32,
+    /// Right shift from the accumulator of an A pass to a v_ij.
+    pub a_shift: u32,
+    /// Width of each v_ij in the search memory, in order of [`EXPONENTS`].
+    pub search_bits: Vec<u32>,
+    /// Width of Σ over taxels of each v_ij.
+    pub sum_bits: Vec<u32>,
+    /// Width of a score.
+    pub score_bits: u32,
+    /// Fraction bits of a μ word.
+    pub mu_fraction: u32,
+    /// μ per step of the search, in 2^−(`mu_fraction` + `MU_ROUND`).
+    pub mu_step: i64,
+    /// LSB of a force word is 2^`force_exponent` · code LSB in MPa · 1 N/MPa.
+    pub force_exponent: i32,
+}
+
+/// Quantised matrices of one subarray shape.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Quantised {
+    /// Cz⁺.
+    pub inverse: Blocks,
+    /// −Ax·(4/3)·mu_max.
+    pub ax: Blocks,
+    /// −Ay·(4/3)·mu_max.
+    pub ay: Blocks,
+}
+
+/// Quantises the matrices of a scene's subarray and derives all formats.
+///
+/// # Errors
+/// [`FixedError::Format`] when a word would leave the 48-bit accumulator or a norm of A asks for more headroom than
+/// the data word has.
+pub fn derive(scene: &Scene, matrices: &Matrices) -> Result<(Formats, Quantised), FixedError> {
+    let spec = &scene.fixed;
+    let quads = Quads { rows: matrices.sensor.rows, cols: matrices.sensor.cols };
+    let count = quads.len();
+    let scale = -4.0 / 3.0 * scene.search.mu_max;
+    let scaled = |blocks: [Vec<f64>; 4]| blocks.map(|block| block.iter().map(|c| c * scale).collect::<Vec<_>>());
+
+    let inverse = parity_blocks(quads, &matrices.cz_pinv, 0);
+    let ax = scaled(parity_blocks(quads, &matrices.ax, FLIP_X));
+    let ay = scaled(parity_blocks(quads, &matrices.ay, FLIP_Y));
+    let [inverse] = <[Blocks; 1]>::try_from(quantise(&[(&inverse, 0)], spec.inverse_bits))
+        .map_err(|_| FixedError::Internal("one matrix in, one out"))?;
+    let [ax, ay] = <[Blocks; 2]>::try_from(quantise(&[(&ax, FLIP_X), (&ay, FLIP_Y)], spec.coef_bits))
+        .map_err(|_| FixedError::Internal("two matrices in, two out"))?;
+
+    let fold_bits = spec.input_bits + 2;
+    let input_low_bits = fold_bits.saturating_sub(MULTIPLIER_BITS);
+    let inverse_low_bits = spec.inverse_bits.saturating_sub(MULTIPLIER_BITS);
+    let limb_align = input_low_bits.max(inverse_low_bits);
+    let raw_shift = input_low_bits.min(inverse_low_bits);
+
+    // v_00 in units of 2^raw_shift: the folded input reaches 2^(fold_bits − 1); one unit more for each dropped low·low product.
+    let raw_bound = ((u128::from(inverse.norm(count)) << (fold_bits - 1)) >> raw_shift) as u64 + 2 * count as u64;
+    let a_norm = ax.norm(count) + ay.norm(count);
+    let a_bound = a_norm << (spec.data_bits - 1);
+    let acc_bits = signed_bits(raw_bound.max(a_bound));
+    if acc_bits > 48 {
+        return Err(FixedError::Format { what: "accumulator", needs: acc_bits, has: 48 });
+    }
+    let vector_bits = spec.data_bits + SEARCH_EXTRA_BITS;
+    let a_shift = if matrices.degree == 0 { 0 } else { ax.exponent - SEARCH_EXTRA_BITS as i32 };
+    let a_shift = u32::try_from(a_shift).map_err(|_| FixedError::Format {
+        what: "scaled A (mu_max too large for this sensor)",
+        needs: SEARCH_EXTRA_BITS,
+        has: ax.exponent.max(0) as u32,
+    })?;
+
+    let growth = growth(&ax, &ay, count, EXPONENTS.len());
+    let taxel_max = 1u64 << (vector_bits + 1);
+    let used = vectors(matrices.degree);
+    let stored: Vec<u64> = (0..used)
+        .map(|k| {
+            let (i, j) = EXPONENTS[k];
+            ((taxel_max as f64 * growth[k].min(1.0)) / 4f64.powi((i + j) as i32)).ceil() as u64 + 1
+        })
+        .collect();
+    let shifted: Vec<u64> = (0..used).map(|k| reach(&stored, k)).collect();
+    let taxels = (quads.rows * quads.cols) as u64;
+    let search_bits: Vec<u32> = shifted.iter().map(|&bound| signed_bits(bound)).collect();
+    let sum_bits: Vec<u32> = shifted.iter().map(|&bound| signed_bits(bound * taxels)).collect();
+
+    // A logarithm is below 2^6; the difference of two sums of `taxels` of them needs a sign.
+    let score_bits = signed_bits(taxels << (6 + LOG_FRACTION));
+    let mu_fraction = (f64::from((1 << 17) - 1) / scene.search.mu_max.max(1e-3)).log2().floor() as u32;
+    let mu_step = (scene.search.mu_max / MU_STEPS as f64 * 2f64.powi((mu_fraction + MU_ROUND) as i32)).round() as i64;
+
+    let raw_length_max = bit_length(raw_bound);
+    let rescale_max = raw_length_max.saturating_sub(vector_bits - 1);
+    let headroom = FORCE_BITS - search_bits[0];
+    let groups = count.div_ceil(LANE_BUDGET / 4);
+    let lanes_per_parity = count.div_ceil(groups);
+    let formats = Formats {
+        degree: matrices.degree,
+        quads: count,
+        lanes_per_parity,
+        groups,
+        input_bits: spec.input_bits,
+        fold_bits,
+        input_low_bits,
+        inverse_bits: spec.inverse_bits,
+        inverse_low_bits,
+        limb_align,
+        raw_shift,
+        inverse_exponent: inverse.exponent,
+        coef_bits: spec.coef_bits,
+        a_exponent: ax.exponent,
+        acc_bits,
+        raw_length_max,
+        data_bits: spec.data_bits,
+        vector_bits,
+        a_shift,
+        search_bits,
+        sum_bits,
+        score_bits,
+        mu_fraction,
+        mu_step,
+        // Taxels are in quarters of a vector's LSB; the largest rescale must still fit the force word.
+        force_exponent: raw_shift as i32 - inverse.exponent - 2 + rescale_max as i32 - headroom as i32,
+    };
+    Ok((formats, Quantised { inverse, ax, ay }))
+}
+
+/// The right shift of the force stage for a subarray normalised by `normalise` and rescaled by `rescale`: the μ word's
+/// fraction, and the distance of this block's exponent from the force word's.
+pub fn force_shift(formats: &Formats, normalise: u32, rescale: u32) -> u32 {
+    let rescale_max = formats.raw_length_max.saturating_sub(formats.vector_bits - 1);
+    let headroom = FORCE_BITS - formats.search_bits[0];
+    (formats.mu_fraction + rescale_max + normalise).saturating_sub(headroom + rescale).min(FORCE_SHIFT_MAX)
+}
+
+/// Bounds of ‖v_ij‖∞ / ‖v_00‖∞ from the ∞-norms of the stored A.
+fn growth(ax: &Blocks, ay: &Blocks, quads: usize, count: usize) -> Vec<f64> {
+    let unit = 2f64.powi(-ax.exponent);
+    let (x, y) = (ax.norm(quads) as f64 * unit, ay.norm(quads) as f64 * unit);
+    let mut bounds: Vec<f64> = Vec::with_capacity(count);
+    for &(i, j) in &EXPONENTS[..count] {
+        let of = |i: u32, j: u32| EXPONENTS.iter().position(|&e| e == (i, j)).and_then(|k| bounds.get(k).copied());
+        let bound = match (i, j) {
+            (0, 0) => 1.0,
+            _ => {
+                let left = i.checked_sub(1).and_then(|i| of(i, j)).unwrap_or(0.0);
+                let below = j.checked_sub(1).and_then(|j| of(i, j)).unwrap_or(0.0);
+                x * left + y * below
+            }
+        };
+        bounds.push(bound);
+    }
+    bounds
+}
+
+/// Bound of coefficient k after the centre moved anywhere within ±[`REACH`]: Σ |v_ij| C(i, k)C(j, l) REACH^(i−k+j−l).
+fn reach(stored: &[u64], k: usize) -> u64 {
+    let (ki, kj) = EXPONENTS[k];
+    let choose = |n: u32, k: u32| (0..k).fold(1u64, |c, t| c * u64::from(n - t) / u64::from(t + 1));
+    stored
+        .iter()
+        .zip(EXPONENTS)
+        .filter(|(_, (i, j))| *i >= ki && *j >= kj)
+        .map(|(&bound, (i, j))| bound * choose(i, ki) * choose(j, kj) * REACH.pow(i - ki + j - kj))
+        .sum()
+}

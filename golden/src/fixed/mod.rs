@@ -1,0 +1,30 @@
+//! The bit-true model: the hardware's arithmetic in integers, stage by stage.
+//!
+//! ```text
+//! codes → receive → normalise → fold → pass → rescale → unfold → search → force → send → beats, status
+//!                                  ↑______________|  v_ij of the next degree
+//! ```
+//! Each stage is one file here and one file of the same name in the hardware description; what a stage passes on is kept in the
+//! [`Trace`] under that name and compared word for word with every simulation of the hardware. How far the
+//! result is from the floating-point model is measured, never assumed: see the tests that span the crates.
+
+pub mod arith;
+pub mod coefficients;
+pub mod cycles;
+pub mod fold;
+pub mod force;
+pub mod formats;
+pub mod normalise;
+pub mod pass;
+pub mod quads;
+pub mod receive;
+pub mod rescale;
+pub mod schedule;
+pub mod search;
+pub mod send;
+pub mod unfold;
+
+mod model;
+
+pub use cycles::Cycles;
+pub use model::{FixedError, Model, Stage, Trace};

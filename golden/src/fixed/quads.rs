@@ -1,0 +1,138 @@
+//! Quads: the four mirror images of a taxel kept in one memory word.
+//!
+//! A regular rectangle is its own mirror image left to right and top to bottom. Taxel (r, c) of the upper left quarter
+//! and its images (r, C−1−c), (R−1−r, c), (R−1−r, C−1−c) share a word, so that fold and unfold are butterflies at
+//! the memory port. An odd row or column count leaves a middle line whose images coincide: its
+//! sample is written to every coinciding lane, which makes the odd parities vanish there and keeps unfold free of
+//! special cases; [`Quads::counts`] says which lanes to count once.
+
+/// The quad layout of a subarray of `rows` × `cols` taxels.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Quads {
+    /// Rows of the subarray.
+    pub rows: usize,
+    /// Columns of the subarray.
+    pub cols: usize,
+}
+
+/// Where one taxel lives.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Place {
+    /// Quad address, row-major over the upper left quarter.
+    pub address: usize,
+    /// Lane `2·(lower half) + (right half)` the taxel is read from.
+    pub lane: usize,
+    /// Lanes the taxel is written to (bit l = lane l): more than one on a middle line.
+    pub mask: u8,
+}
+
+impl Quads {
+    /// Rows of quads, ⌈rows/2⌉.
+    pub fn quad_rows(&self) -> usize {
+        self.rows.div_ceil(2)
+    }
+
+    /// Columns of quads, ⌈cols/2⌉.
+    pub fn quad_cols(&self) -> usize {
+        self.cols.div_ceil(2)
+    }
+
+    /// Number of quads Q.
+    pub fn len(&self) -> usize {
+        self.quad_rows() * self.quad_cols()
+    }
+
+    /// Whether there are none; a subarray has at least one.
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    /// Where taxel (`row`, `col`) of the subarray lives.
+    pub fn place(&self, row: usize, col: usize) -> Place {
+        let (mirror_row, mirror_col) = (self.rows - 1 - row, self.cols - 1 - col);
+        let address = row.min(mirror_row) * self.quad_cols() + col.min(mirror_col);
+        let lane = 2 * usize::from(row > mirror_row) + usize::from(col > mirror_col);
+        let mut mask = 1u8 << lane;
+        if row == mirror_row {
+            mask |= mask << 2;
+        }
+        if col == mirror_col {
+            mask |= mask << 1;
+        }
+        Place { address, lane, mask }
+    }
+
+    /// Taxel index (row-major in the subarray) of `lane` at quad `address`.
+    pub fn taxel(&self, address: usize, lane: usize) -> usize {
+        let (row, col) = (address / self.quad_cols(), address % self.quad_cols());
+        let row = if lane & 2 == 0 { row } else { self.rows - 1 - row };
+        let col = if lane & 1 == 0 { col } else { self.cols - 1 - col };
+        row * self.cols + col
+    }
+
+    /// Which lanes of quad `address` are taxels of their own (bit l = lane l), not a second copy.
+    pub fn counts(&self, address: usize) -> u8 {
+        let (row, col) = (address / self.quad_cols(), address % self.quad_cols());
+        let middle_row = 2 * row + 1 == self.rows;
+        let middle_col = 2 * col + 1 == self.cols;
+        match (middle_row, middle_col) {
+            (false, false) => 0b1111,
+            (false, true) => 0b0101,
+            (true, false) => 0b0011,
+            (true, true) => 0b0001,
+        }
+    }
+
+    /// Packs a row-major vector into quads, middle lines duplicated.
+    pub fn pack(&self, taxels: &[i64]) -> Vec<[i64; 4]> {
+        (0..self.len())
+            .map(|address| std::array::from_fn(|lane| taxels[self.taxel(address, lane)]))
+            .collect()
+    }
+
+    /// Unpacks quads into a row-major vector.
+    pub fn unpack(&self, quads: &[[i64; 4]]) -> Vec<i64> {
+        let mut taxels = vec![0; self.rows * self.cols];
+        for (address, quad) in quads.iter().enumerate() {
+            for (lane, &value) in quad.iter().enumerate() {
+                taxels[self.taxel(address, lane)] = value;
+            }
+        }
+        taxels
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn places_and_taxels_are_inverse_for_even_and_odd_sizes() {
+        for (rows, cols) in [(2, 2), (3, 4), (5, 5), (10, 10), (8, 7)] {
+            let quads = Quads { rows, cols };
+            let mut counted = vec![0; rows * cols];
+            for row in 0..rows {
+                for col in 0..cols {
+                    let place = quads.place(row, col);
+                    for lane in 0..4 {
+                        let here = quads.taxel(place.address, lane) == row * cols + col;
+                        assert_eq!(here, place.mask >> lane & 1 == 1, "{rows}×{cols} ({row}, {col}) lane {lane}");
+                    }
+                }
+            }
+            for address in 0..quads.len() {
+                for lane in 0..4 {
+                    counted[quads.taxel(address, lane)] += usize::from(quads.counts(address) >> lane & 1 == 1);
+                }
+            }
+            assert!(counted.iter().all(|&n| n == 1), "{rows}×{cols}");
+        }
+    }
+
+    #[test]
+    fn packing_rebuilds() {
+        let quads = Quads { rows: 5, cols: 4 };
+        let taxels: Vec<i64> = (0..20).collect();
+        assert_eq!(quads.unpack(&quads.pack(&taxels)), taxels);
+    }
+}

@@ -1,0 +1,42 @@
+//! Stage `receive`: what is known of a subarray when its last taxel has arrived.
+//!
+//! | in | codes, row-major, `input_bits` signed |
+//! |---|---|
+//! | out | the OR of all magnitudes (for [`normalise`](super::normalise)), both sign conditions, the same codes as quads |
+//!
+//! Signs are judged against the noise floor in codes: `c > floor`, `c < −floor`, as the golden model does on the
+//! same codes.
+
+use super::arith::magnitude_bits;
+
+/// What `receive` gathers while samples arrive.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Received {
+    /// OR over all taxels of [`magnitude_bits`], `input_bits − 1` bits.
+    pub magnitude: u64,
+    /// Some code is above the noise floor.
+    pub positive: bool,
+    /// Some code is below minus the noise floor.
+    pub negative: bool,
+}
+
+/// Gathers magnitude and signs of one subarray's `codes` against `floor` (codes, ≥ 0).
+pub fn receive(codes: &[i32], floor: i32) -> Received {
+    codes.iter().fold(Received::default(), |seen, &code| Received {
+        magnitude: seen.magnitude | magnitude_bits(i64::from(code)),
+        positive: seen.positive | (code > floor),
+        negative: seen.negative | (code < -floor),
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn by_hand() {
+        assert_eq!(receive(&[5, -3, 0], 3), Received { magnitude: 7, positive: true, negative: false });
+        assert_eq!(receive(&[0, 0], 0), Received::default());
+        assert!(receive(&[-1], 0).negative);
+    }
+}

@@ -1,0 +1,49 @@
+//! Force: from p and μ to one force vector per taxel, without those too small to report.
+//!
+//! fx = μ1 p, fy = μ2 p, fz = p; where |fz| < min_force all three are zero. A subarray whose largest |fz| is below
+//! min_force, or zero, has no contact.
+//!
+//! | | shape | unit |
+//! |---|---|---|
+//! | in: p, μ, min_force | n, 2, scalar | N, –, N |
+//! | out: fx, fy, fz | n each | N |
+//!
+//! Fed by `pass` and `search`; its forces are scattered into the array's by `reconstruct`.
+
+use crate::frame::Forces;
+
+/// Forces of one subarray, row-major in it.
+pub fn force(p: &[f64], mu: [f64; 2], min_force_N: f64) -> Forces {
+    let kept = |p: &f64| if p.abs() < min_force_N { 0.0 } else { *p };
+    let fz: Vec<f64> = p.iter().map(kept).collect();
+    let along = |mu: f64| fz.iter().map(|fz| mu * fz).collect();
+    Forces {
+        fx: along(mu[0]),
+        fy: along(mu[1]),
+        fz,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn by_hand_with_threshold() {
+        let forces = force(&[1.0, -0.5, 0.25, -0.2], [0.5, -1.0], 0.25);
+        assert_eq!(forces.fz, [1.0, -0.5, 0.25, 0.0]);
+        assert_eq!(forces.fx, [0.5, -0.25, 0.125, 0.0]);
+        assert_eq!(forces.fy, [-1.0, 0.5, -0.25, 0.0]);
+    }
+
+    #[test]
+    fn a_weak_contact_is_none() {
+        assert_eq!(force(&[0.1, -0.2], [0.3, 0.3], 0.5), Forces::zeros(2));
+    }
+
+    #[test]
+    fn without_threshold_everything_stays() {
+        let forces = force(&[1e-300, 0.0], [0.0, 0.0], 0.0);
+        assert_eq!(forces.fz, [1e-300, 0.0]);
+    }
+}

@@ -1,0 +1,163 @@
+//! Receive: is a subarray loaded, does it meet the scene's condition, where are its centroids?
+//!
+//! c⁺ = Σ b⁺ r / Σ b⁺ over the codes above the noise floor, c⁻ = Σ b⁻ r / Σ b⁻ over those below its negative.
+//!
+//! | | shape | unit | range |
+//! |---|---|---|---|
+//! | in: codes | n, row-major in the subarray | LSB | ±(2^(bits − 1) − 1) |
+//! | in: floor | scalar | LSB | at least 0; a code counts when strictly beyond it |
+//! | out: centroids | 2 | mm from the array's centre | inside the subarray |
+//!
+//! Judged on codes, in whole numbers, so that all models decide alike: positions count half pitches, sums stay below
+//! 2^23 · 2304 · 255 < 2^43. Feeds `search`, which runs only where the condition is met.
+
+use crate::partition::Subarray;
+use crate::scene::Condition;
+use crate::sensor::Sensor;
+
+/// What is known of a subarray when its last code has arrived.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Receipt {
+    /// Largest |code|.
+    pub max_code: i32,
+    /// Some code is above the floor.
+    pub positive: bool,
+    /// Some code is below the floor's negative.
+    pub negative: bool,
+    /// Centroid of the codes above the floor.
+    pub compression_centroid_mm: Option<[f64; 2]>,
+    /// Centroid of the codes below the floor's negative.
+    pub tension_centroid_mm: Option<[f64; 2]>,
+    /// The scene's condition is met: μ is to be searched.
+    pub condition_met: bool,
+    /// The largest |code| is beyond the floor.
+    pub loaded: bool,
+}
+
+/// Sums over the codes of one sign.
+#[derive(Default)]
+struct Moments {
+    weight: i64,
+    /// Σ code · position in half pitches from the array's centre.
+    x: i64,
+    y: i64,
+}
+
+impl Moments {
+    fn centroid_mm(&self, sensor: &Sensor) -> Option<[f64; 2]> {
+        let mean = |moment: i64| moment as f64 / self.weight as f64;
+        (self.weight != 0).then(|| {
+            [
+                mean(self.x) * sensor.pitch_x_mm / 2.0,
+                mean(self.y) * sensor.pitch_y_mm / 2.0,
+            ]
+        })
+    }
+}
+
+/// Judges the codes of the subarray `part` of `sensor`.
+pub fn receive(
+    sensor: &Sensor,
+    part: &Subarray,
+    codes: &[i32],
+    floor: i32,
+    condition: Condition,
+) -> Receipt {
+    let (mut compression, mut tension) = (Moments::default(), Moments::default());
+    let mut max_code = 0;
+    let half_pitches = |index: usize, count: usize| 2 * index as i64 - (count as i64 - 1);
+    for (index, &code) in part.indices(sensor).zip(codes) {
+        max_code = max_code.max(code.abs());
+        let sum = match code {
+            _ if code > floor => &mut compression,
+            _ if code < -floor => &mut tension,
+            _ => continue,
+        };
+        let code = i64::from(code);
+        sum.weight += code;
+        sum.x += code * half_pitches(index % sensor.cols, sensor.cols);
+        sum.y += code * half_pitches(index / sensor.cols, sensor.rows);
+    }
+    let (positive, negative) = (compression.weight != 0, tension.weight != 0);
+    let loaded = max_code > floor;
+    Receipt {
+        max_code,
+        positive,
+        negative,
+        compression_centroid_mm: compression.centroid_mm(sensor),
+        tension_centroid_mm: tension.centroid_mm(sensor),
+        condition_met: match condition {
+            Condition::Loaded => loaded,
+            Condition::BothSigns => positive && negative,
+        },
+        loaded,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    fn sensor() -> Sensor {
+        Sensor {
+            rows: 2,
+            cols: 4,
+            pitch_x_mm: 2.0,
+            pitch_y_mm: 4.0,
+            thickness_mm: 3.0,
+        }
+    }
+
+    /// The right half, at x = 1 and 3, y = −2 and 2.
+    const RIGHT: Subarray = Subarray {
+        row0: 0,
+        col0: 2,
+        rows: 2,
+        cols: 2,
+    };
+
+    #[test]
+    fn by_hand() {
+        let receipt = receive(
+            &sensor(),
+            &RIGHT,
+            &[30, 10, -5, -15],
+            4,
+            Condition::BothSigns,
+        );
+        assert_eq!(receipt.max_code, 30);
+        assert_eq!(receipt.compression_centroid_mm, Some([1.5, -2.0]));
+        assert_eq!(receipt.tension_centroid_mm, Some([2.5, 2.0]));
+        assert!(receipt.condition_met && receipt.loaded);
+    }
+
+    #[test]
+    fn the_floor_itself_does_not_count() {
+        let judge = |codes: &[i32], condition| receive(&sensor(), &RIGHT, codes, 5, condition);
+        let quiet = judge(&[5, -5, 0, 0], Condition::Loaded);
+        assert!(!quiet.loaded && !quiet.condition_met && !quiet.positive && !quiet.negative);
+        assert_eq!(quiet.compression_centroid_mm, None);
+        let pressed = [6, -5, 0, 0];
+        assert!(judge(&pressed, Condition::Loaded).condition_met);
+        assert!(!judge(&pressed, Condition::BothSigns).condition_met);
+        assert_eq!(judge(&pressed, Condition::Loaded).tension_centroid_mm, None);
+    }
+
+    #[test]
+    fn a_floor_beyond_every_code_is_quiet() {
+        let codes = [i32::MAX, -i32::MAX, 1, 0];
+        let receipt = receive(&sensor(), &RIGHT, &codes, i32::MAX, Condition::Loaded);
+        assert!(!receipt.loaded && !receipt.positive && !receipt.negative);
+    }
+
+    proptest! {
+        #[test]
+        fn centroids_lie_inside(codes in proptest::collection::vec(-8_388_607i32..=8_388_607, 4)) {
+            let receipt = receive(&sensor(), &RIGHT, &codes, 0, Condition::Loaded);
+            for [x, y] in receipt.compression_centroid_mm.into_iter().chain(receipt.tension_centroid_mm) {
+                prop_assert!((1.0..=3.0).contains(&x) && (-2.0..=2.0).contains(&y));
+            }
+        }
+    }
+}

@@ -1,0 +1,189 @@
+//! Search: the μ whose forces score best, on a grid that is refined seven times.
+//!
+//! Grid: μ = (i, j)·mu_max/3 with i, j in −3 … 3 and i² + j² ≤ 9, 29 candidates, row by row with μ2 the row, both
+//! rising. Then seven times: halve the step, try the eight neighbours of the best so far in the same order. A candidate
+//! takes the place of the best only by a larger score, so that the first found wins ties.
+//!
+//! | | shape | unit | range |
+//! |---|---|---|---|
+//! | in: p(μ) | polynomial | N | – |
+//! | out: position | 2 | mu_max/384 | x² + y² ≤ 384² |
+//! | out: μ | 2 | – | |μ| ≤ mu_max |
+//!
+//! Positions are whole numbers, so that every model judges the disc alike. At most 29 + 7·8 = 85 evaluations.
+
+use super::objective::Objective;
+use super::pass::Polynomial;
+
+/// Halvings after the grid.
+pub const HALVINGS: u32 = 7;
+/// Grid steps from the centre to mu_max.
+pub const GRID: i32 = 3;
+/// Position of mu_max: the grid's radius in finest steps.
+pub const RADIUS: i32 = GRID << HALVINGS;
+
+/// The best candidate.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Found {
+    /// Ratio of shear to normal force, [x, y].
+    pub mu: [f64; 2],
+    /// μ in units of mu_max/[`RADIUS`].
+    pub position: [i32; 2],
+    /// Its score.
+    pub objective: f64,
+    /// Candidates on the disc that were evaluated.
+    pub evaluations: usize,
+}
+
+/// Finds the best μ with |μ| ≤ `mu_max`, `None` when every candidate of the grid has Σp ≤ 0.
+pub fn search(family: &Polynomial, mu_max: f64, objective: &dyn Objective) -> Option<Found> {
+    let mut walk = Walk {
+        family,
+        mu_max,
+        objective,
+        p: vec![0.0; family.coefficients[0].len()],
+        evaluations: 0,
+        best: None,
+    };
+    if mu_max == 0.0 {
+        // Every candidate is the centre.
+        walk.try_position([0, 0]);
+        return walk.found();
+    }
+    let step = RADIUS / GRID;
+    for j in -GRID..=GRID {
+        for i in -GRID..=GRID {
+            walk.try_position([i * step, j * step]);
+        }
+    }
+    for level in 1..=HALVINGS {
+        let (centre, _) = walk.best?;
+        let step = step >> level;
+        for j in -1..=1 {
+            for i in -1..=1 {
+                if (i, j) != (0, 0) {
+                    walk.try_position([centre[0] + i * step, centre[1] + j * step]);
+                }
+            }
+        }
+    }
+    walk.found()
+}
+
+/// A search under way.
+struct Walk<'a> {
+    family: &'a Polynomial,
+    mu_max: f64,
+    objective: &'a dyn Objective,
+    /// Forces of the candidate at hand.
+    p: Vec<f64>,
+    evaluations: usize,
+    best: Option<([i32; 2], f64)>,
+}
+
+impl Walk<'_> {
+    fn mu(&self, position: [i32; 2]) -> [f64; 2] {
+        position.map(|units| f64::from(units) * self.mu_max / f64::from(RADIUS))
+    }
+
+    /// Scores a candidate and keeps it when it is the best; outside the disc it is not evaluated.
+    fn try_position(&mut self, position: [i32; 2]) {
+        let [x, y] = position;
+        if x * x + y * y > RADIUS * RADIUS {
+            return;
+        }
+        self.evaluations += 1;
+        self.family.eval_into(self.mu(position), &mut self.p);
+        let score = self
+            .objective
+            .score(&self.p)
+            .filter(|score| score.is_finite());
+        if let Some(score) = score {
+            if self.best.is_none_or(|(_, best)| score > best) {
+                self.best = Some((position, score));
+            }
+        }
+    }
+
+    fn found(&self) -> Option<Found> {
+        self.best.map(|(position, objective)| Found {
+            mu: self.mu(position),
+            position,
+            objective,
+            evaluations: self.evaluations,
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// p(μ) = (1, μ1, μ2): the objective sees μ itself.
+    fn mu_itself() -> Polynomial {
+        let coefficients = vec![
+            vec![1.0, 0.0, 0.0],
+            vec![0.0, 1.0, 0.0],
+            vec![0.0, 0.0, 1.0],
+        ];
+        Polynomial {
+            degree: 1,
+            coefficients,
+        }
+    }
+
+    struct Score<F>(F);
+    impl<F: Fn(f64, f64) -> Option<f64>> Objective for Score<F> {
+        fn score(&self, p: &[f64]) -> Option<f64> {
+            (self.0)(p[1], p[2])
+        }
+    }
+
+    fn run(mu_max: f64, score: impl Fn(f64, f64) -> Option<f64>) -> Option<Found> {
+        search(&mu_itself(), mu_max, &Score(score))
+    }
+
+    #[test]
+    fn finds_the_top_of_a_hill_to_half_a_finest_step() {
+        let hill = |x: f64, y: f64| Some(-(x - 0.137).powi(2) - (y + 0.251).powi(2));
+        let found = run(0.6, hill).unwrap();
+        let half = 0.5 * 0.6 / f64::from(RADIUS);
+        assert!((found.mu[0] - 0.137).abs() <= half * (1.0 + 1e-9));
+        assert!((found.mu[1] + 0.251).abs() <= half * (1.0 + 1e-9));
+        assert_eq!(found.evaluations, 85);
+    }
+
+    #[test]
+    fn first_found_wins_ties() {
+        let flat = run(0.6, |_, _| Some(1.0)).unwrap();
+        // The first candidate on the disc, row by row, is (0, −3).
+        assert_eq!(flat.position, [0, -RADIUS]);
+        assert_eq!(flat.mu, [0.0, -0.6]);
+    }
+
+    #[test]
+    fn never_leaves_the_disc() {
+        let found = run(0.5, |x, y| Some(x + y)).unwrap();
+        let [x, y] = found.position;
+        assert!(x * x + y * y <= RADIUS * RADIUS && found.mu[0].hypot(found.mu[1]) <= 0.5);
+        assert!(found.evaluations < 85);
+    }
+
+    #[test]
+    fn none_when_nothing_presses() {
+        assert_eq!(run(0.6, |_, _| None), None);
+        assert_eq!(run(0.6, |_, _| Some(f64::NAN)), None);
+    }
+
+    #[test]
+    fn no_shear_asked_for() {
+        let found = run(0.0, |_, _| Some(2.0)).unwrap();
+        let expected = Found {
+            mu: [0.0; 2],
+            position: [0; 2],
+            objective: 2.0,
+            evaluations: 1,
+        };
+        assert_eq!(found, expected);
+    }
+}

@@ -1,0 +1,278 @@
+//! The MAC lanes with their coefficient memory and shift-out chains.
+
+use dermis_golden::fixed::formats::{Formats, MULTIPLIER_BITS};
+use rust_hdl::prelude::*;
+
+use super::counter::count_bits;
+use super::polynomial_word::resize;
+use crate::wire::{Wire, Word};
+
+const M: usize = MULTIPLIER_BITS as usize;
+
+/// ```text
+/// address --> memory --> register --> a \
+///                                        * --> product --> aligned --> accumulator --> chain --> quad
+/// operands -----------------------> b   /
+/// ```
+/// One memory word holds a coefficient for every lane. `operands` and `control` belong to the address of two cycles before; an
+/// accumulation's last product leaves the lanes as `lanes_per_parity` quads, row by row, the first of them
+/// [`LATENCY`] cycles after its `control`.
+#[derive(LogicBlock)]
+pub struct Lanes {
+    /// Clock.
+    pub clk: Signal<In, Clock>,
+    /// Reset of the control pipeline.
+    pub rst: Signal<In, Bit>,
+    /// Address in the coefficient memory.
+    pub address: Wire<In>,
+    /// Four operands, one per parity.
+    pub operands: Wire<In>,
+    /// `operands` are a product to accumulate.
+    pub valid: Signal<In, Bit>,
+    /// Align, first, last.
+    pub control: Wire<In>,
+    /// Accumulators of one row, four parities.
+    pub quad: Wire<Out>,
+    /// `quad` is a row.
+    pub quad_valid: Signal<Out, Bit>,
+    _shape: Shape,
+    _memory: Vec<Vec<i64>>,
+    _pipe: Vec<Beat>,
+    _coefficients: [usize; 2],
+    _accumulators: Vec<i64>,
+    _chain: Vec<i64>,
+    _left: usize,
+    _group: usize,
+}
+
+/// Cycles from the control of an accumulation's last product to its first quad.
+pub const LATENCY: usize = 5;
+
+/// Name of the coefficient memory's file.
+pub const MEMORY_FILE: &str = "coefficients.hex";
+
+#[derive(Clone, Copy, Debug)]
+struct Shape {
+    per_parity: usize,
+    groups: usize,
+    last_rows: usize,
+    acc_bits: usize,
+    align: usize,
+}
+
+#[derive(Clone, Copy, Debug, Default)]
+struct Beat {
+    valid: bool,
+    align: bool,
+    first: bool,
+    last: bool,
+    word: usize,
+    operands: Word,
+}
+
+impl Lanes {
+    /// Lanes of `formats` with coefficient words `memory`.
+    pub fn new(formats: &Formats, memory: Vec<Vec<i64>>) -> Self {
+        let per_parity = formats.lanes_per_parity;
+        let shape = Shape {
+            per_parity,
+            groups: formats.groups,
+            last_rows: formats.quads - (formats.groups - 1) * per_parity,
+            acc_bits: formats.acc_bits as usize,
+            align: formats.limb_align as usize,
+        };
+        Lanes {
+            clk: Default::default(),
+            rst: Default::default(),
+            address: Wire::new(count_bits(memory.len())),
+            operands: Wire::new(4 * M),
+            valid: Default::default(),
+            control: Wire::new(3),
+            quad: Wire::new(4 * shape.acc_bits),
+            quad_valid: Default::default(),
+            _pipe: vec![Beat::default(); 4],
+            _coefficients: [0; 2],
+            _accumulators: vec![0; 4 * per_parity],
+            _chain: vec![0; 4 * per_parity],
+            _left: 0,
+            _group: 0,
+            _shape: shape,
+            _memory: memory,
+        }
+    }
+
+    /// The coefficient memory's words as hex lines for `$readmemh`, lane 0 in the least significant bits.
+    pub fn memory_file(&self) -> String {
+        let digits = (4 * self._shape.per_parity * M).div_ceil(4);
+        self._memory
+            .iter()
+            .map(|word| {
+                let mut nibbles = vec![0u8; digits];
+                for (lane, &c) in word.iter().enumerate() {
+                    for bit in (0..M).filter(|bit| c >> bit & 1 == 1) {
+                        let at = lane * M + bit;
+                        nibbles[at / 4] |= 1 << (at % 4);
+                    }
+                }
+                nibbles.iter().rev().map(|n| format!("{n:x}")).collect::<String>() + "\n"
+            })
+            .collect()
+    }
+
+    fn accumulate(&mut self, beat: &Beat) {
+        let word = &self._memory[beat.word];
+        for (lane, acc) in self._accumulators.iter_mut().enumerate() {
+            let operand = beat.operands.signed(lane / self._shape.per_parity, M);
+            let product = word[lane] * operand << if beat.align { self._shape.align } else { 0 };
+            *acc = if beat.first { product } else { *acc + product };
+        }
+    }
+}
+
+impl Logic for Lanes {
+    fn update(&mut self) {
+        if self.clk.pos_edge() {
+            let per_parity = self._shape.per_parity;
+            // Oldest first: a captured row leaves, then the accumulators move to the chain, then they accumulate.
+            if self._left > 0 {
+                self._left -= 1;
+                for parity in 0..4 {
+                    self._chain[parity * per_parity..(parity + 1) * per_parity].rotate_left(1);
+                }
+            }
+            let captured = self._pipe[0];
+            if captured.valid && captured.last {
+                self._chain.clone_from(&self._accumulators);
+                self._group = (self._group + 1) % self._shape.groups;
+                self._left = if self._group == 0 { self._shape.last_rows } else { per_parity };
+            }
+            let done = self._pipe[1];
+            if done.valid {
+                self.accumulate(&done);
+            }
+            let control = self.control.val().number();
+            self._pipe.remove(0);
+            self._pipe.push(Beat {
+                valid: self.valid.val() && !self.rst.val(),
+                align: control & 1 == 1,
+                first: control & 2 == 2,
+                last: control & 4 == 4,
+                word: self._coefficients[1],
+                operands: self.operands.val(),
+            });
+            let address = self.address.val().number() as usize;
+            self._coefficients = [address.min(self._memory.len() - 1), self._coefficients[0]];
+            if self.rst.val() {
+                self._pipe.iter_mut().for_each(|beat| beat.valid = false);
+                self._left = 0;
+                self._group = 0;
+            }
+            let heads: [i64; 4] = std::array::from_fn(|parity| self._chain[parity * per_parity]);
+            self.quad.next = Word::of_fields(&heads, self._shape.acc_bits);
+            self.quad_valid.next = self._left > 0;
+        }
+    }
+
+    fn connect(&mut self) {
+        self.quad.connect();
+        self.quad_valid.connect();
+    }
+
+    fn hdl(&self) -> Verilog {
+        let Shape { per_parity, groups, last_rows, acc_bits, align } = self._shape;
+        let (lanes, words) = (4 * per_parity, self._memory.len());
+        let row_bits = count_bits(per_parity + 1);
+        let group_bits = count_bits(groups);
+        let product = 2 * M;
+        let wide = product + align;
+        // Only products of two high limbs are shifted; without limbs there is nothing to choose.
+        let (align_registers, shifted) = match align {
+            0 => (String::new(), "product".to_string()),
+            _ => (
+                "reg align1, align2;\nalways @(posedge clk) {align2, align1} <= {align1, control[0]};\n".to_string(),
+                format!("align2 ? {{product, {align}'d0}} : {{{{{align}{{product[{}]}}}}, product}}", product - 1),
+            ),
+        };
+        let aligned = resize("shifted", wide, acc_bits);
+        let rows = if groups == 1 {
+            format!("{row_bits}'d{last_rows}")
+        } else {
+            format!("group == {group_bits}'d{} ? {row_bits}'d{last_rows} : {row_bits}'d{per_parity}", groups - 1)
+        };
+        let count_group = if groups == 1 {
+            String::new()
+        } else {
+            format!(
+                "reg [{end}:0] group;
+always @(posedge clk) begin
+  if (rst) group <= {group_bits}'d0;
+  else if (valid4 && last4) group <= group == {group_bits}'d{last} ? {group_bits}'d0 : group + {group_bits}'d1;
+end
+",
+                end = group_bits - 1,
+                last = groups - 1
+            )
+        };
+        Verilog::Custom(format!(
+            "\
+// One word: a coefficient of {M} bits for each of the {lanes} lanes.
+reg [{word_end}:0] memory [0:{words_end}];
+initial $readmemh(\"{MEMORY_FILE}\", memory);
+reg [{word_end}:0] word, coefficients;
+reg valid1, valid2, valid3, valid4;
+reg first1, first2, first3;
+reg last1, last2, last3, last4;
+reg [{row_end}:0] left;
+wire [{acc_word_end}:0] chain_head;
+always @(posedge clk) begin
+  word <= memory[address];
+  coefficients <= word;
+  valid1 <= !rst && valid;
+  valid2 <= !rst && valid1;
+  valid3 <= !rst && valid2;
+  valid4 <= !rst && valid3;
+  {{first3, first2, first1}} <= {{first2, first1, control[1]}};
+  {{last4, last3, last2, last1}} <= {{last3, last2, last1, control[2]}};
+end
+{align_registers}{count_group}always @(posedge clk) begin
+  if (rst) left <= {row_bits}'d0;
+  else if (valid4 && last4) left <= {rows};
+  else if (left != {row_bits}'d0) left <= left - {row_bits}'d1;
+end
+always @(*) quad_valid = left != {row_bits}'d0;
+always @(*) quad = chain_head;
+genvar p, k;
+generate
+  for (p = 0; p < 4; p = p + 1) begin : parity
+    wire [{chain_end}:0] chain_in;
+    assign chain_in[{chain_end} -: {acc_bits}] = {acc_bits}'d0;
+    assign chain_head[p * {acc_bits} +: {acc_bits}] = chain_in[{acc_end}:0];
+    for (k = 0; k < {per_parity}; k = k + 1) begin : lane
+      reg signed [{m_end}:0] a, b;
+      reg signed [{product_end}:0] product;
+      reg [{acc_end}:0] aligned, accumulator, chain;
+      wire [{wide_end}:0] shifted = {shifted};
+      assign chain_in[k * {acc_bits} +: {acc_bits}] = chain;
+      always @(posedge clk) begin
+        a <= coefficients[(p * {per_parity} + k) * {M} +: {M}];
+        b <= operands[p * {M} +: {M}];
+        product <= a * b;
+        aligned <= {aligned};
+        if (valid3) accumulator <= first3 ? aligned : accumulator + aligned;
+        chain <= valid4 && last4 ? accumulator : chain_in[(k + 1) * {acc_bits} +: {acc_bits}];
+      end
+    end
+  end
+endgenerate",
+            word_end = lanes * M - 1,
+            words_end = words - 1,
+            row_end = row_bits - 1,
+            acc_word_end = 4 * acc_bits - 1,
+            acc_end = acc_bits - 1,
+            chain_end = (per_parity + 1) * acc_bits - 1,
+            wide_end = wide - 1,
+            m_end = M - 1,
+            product_end = product - 1,
+        ))
+    }
+}

@@ -1,0 +1,104 @@
+//! What the lanes multiply: a limb of the input or a v_ij, its parities exchanged as the matrix asks.
+
+use dermis_golden::fixed::formats::{Formats, MULTIPLIER_BITS};
+use rust_hdl::prelude::*;
+
+use super::polynomial_word::resize;
+use crate::wire::{Wire, Word};
+
+/// Memory words of the folded input and of a v_ij in, four multiplier operands out one cycle later.
+#[derive(LogicBlock)]
+pub struct OperandSelect {
+    /// Clock.
+    pub clk: Signal<In, Clock>,
+    /// Four folded inputs.
+    pub input_quad: Wire<In>,
+    /// Four parities of a v_ij.
+    pub vector_quad: Wire<In>,
+    /// 0: v_ij, 1: high limb of the input, 2: low limb.
+    pub kind: Wire<In>,
+    /// Lane group t gets parity t XOR `flip`.
+    pub flip: Wire<In>,
+    /// Operand of each lane group, one cycle later.
+    pub operands: Wire<Out>,
+    _low: usize,
+    _align: usize,
+}
+
+const M: usize = MULTIPLIER_BITS as usize;
+
+impl OperandSelect {
+    /// Widths of `formats`.
+    pub fn new(formats: &Formats) -> Self {
+        OperandSelect {
+            clk: Default::default(),
+            input_quad: Wire::new(4 * formats.fold_bits as usize),
+            vector_quad: Wire::new(4 * formats.data_bits as usize),
+            kind: Wire::new(2),
+            flip: Wire::new(2),
+            operands: Wire::new(4 * M),
+            _low: formats.input_low_bits as usize,
+            _align: formats.limb_align as usize,
+        }
+    }
+}
+
+impl Logic for OperandSelect {
+    fn update(&mut self) {
+        if self.clk.pos_edge() {
+            let flip = self.flip.val().number() as usize;
+            let fields: [i64; 4] = std::array::from_fn(|target| {
+                let source = target ^ flip;
+                let folded = self.input_quad.val().signed(source, self.input_quad.width() / 4);
+                match self.kind.val().number() {
+                    1 => folded >> self._low,
+                    2 => (folded & ((1 << self._low) - 1)) << (self._align - self._low),
+                    _ => self.vector_quad.val().signed(source, self.vector_quad.width() / 4),
+                }
+            });
+            self.operands.next = Word::of_fields(&fields, M);
+        }
+    }
+
+    fn connect(&mut self) {
+        self.operands.connect();
+    }
+
+    fn hdl(&self) -> Verilog {
+        let (fold, data) = (self.input_quad.width() / 4, self.vector_quad.width() / 4);
+        let (low, align) = (self._low, self._align);
+        let wires: String = (0..4)
+            .map(|p| {
+                let low_limb = if low == 0 {
+                    format!("{M}'d0")
+                } else {
+                    let zeros = if align > low { format!(", {}'d0", align - low) } else { String::new() };
+                    format!("{{{}'d0, input_quad[{} +: {low}]{zeros}}}", M - align, p * fold)
+                };
+                format!(
+                    "wire [{high_end}:0] high{p} = input_quad[{high_low} +: {high_bits}];\n\
+                     wire [{data_end}:0] vector{p} = vector_quad[{data_low} +: {data}];\n\
+                     wire [{m_end}:0] q{p} = kind == 2'd1 ? {high} : kind == 2'd2 ? {low_limb} : {vector};\n",
+                    high_bits = fold - low,
+                    high_end = fold - low - 1,
+                    high_low = p * fold + low,
+                    data_end = data - 1,
+                    data_low = p * data,
+                    m_end = M - 1,
+                    high = resize(&format!("high{p}"), fold - low, M),
+                    vector = resize(&format!("vector{p}"), data, M),
+                )
+            })
+            .collect();
+        // Exchange along the rows, then along the columns: parity t XOR flip.
+        Verilog::Custom(format!(
+            "\
+{wires}wire [{end}:0] r0 = flip[0] ? q1 : q0;
+wire [{end}:0] r1 = flip[0] ? q0 : q1;
+wire [{end}:0] r2 = flip[0] ? q3 : q2;
+wire [{end}:0] r3 = flip[0] ? q2 : q3;
+always @(posedge clk) operands <= flip[1] ? {{r1, r0, r3, r2}} : {{r3, r2, r1, r0}};",
+            end = M - 1,
+        ))
+    }
+}

@@ -1,0 +1,63 @@
+//! How polynomials lie in a wire: coefficient by coefficient, each for all lanes.
+
+use dermis_golden::fixed::search::Polynomial;
+
+use crate::wire::Word;
+
+/// The layout of `lanes` polynomials in one word. Coefficient k of lane l has `widths[k]` bits at `offset(k) + l·widths[k]`.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct PolynomialWord {
+    /// Polynomials in the word.
+    pub lanes: usize,
+    /// Width of each coefficient.
+    pub widths: Vec<usize>,
+}
+
+impl PolynomialWord {
+    /// Layout with the coefficient widths of a format.
+    pub fn new(lanes: usize, widths: &[u32]) -> Self {
+        PolynomialWord { lanes, widths: widths.iter().map(|&w| w as usize).collect() }
+    }
+
+    /// Where coefficient `k` begins.
+    pub fn offset(&self, k: usize) -> usize {
+        self.widths[..k].iter().sum::<usize>() * self.lanes
+    }
+
+    /// Bits of the whole word.
+    pub fn bits(&self) -> usize {
+        self.offset(self.widths.len())
+    }
+
+    /// Reads one lane's polynomial.
+    pub fn get(&self, word: &Word, lane: usize) -> Polynomial {
+        std::array::from_fn(|k| match self.widths.get(k) {
+            Some(&bits) => {
+                let raw = word.field(self.offset(k) + lane * bits, bits);
+                (raw << (64 - bits)) as i64 >> (64 - bits)
+            }
+            None => 0,
+        })
+    }
+
+    /// Writes one lane's polynomial.
+    pub fn put(&self, word: &mut Word, lane: usize, polynomial: &Polynomial) {
+        for (k, &bits) in self.widths.iter().enumerate() {
+            word.set(self.offset(k) + lane * bits, bits, polynomial[k] as u64);
+        }
+    }
+
+    /// Verilog part select of coefficient `k` of lane `lane` (an expression) in `word`.
+    pub fn select(&self, word: &str, k: usize, lane: &str) -> String {
+        format!("{word}[{} + {lane} * {} +: {}]", self.offset(k), self.widths[k], self.widths[k])
+    }
+}
+
+/// Verilog that sign-extends or cuts the vector expression `value` of `from` bits to `to` bits.
+pub fn resize(value: &str, from: usize, to: usize) -> String {
+    match to.checked_sub(from) {
+        Some(0) => value.to_string(),
+        Some(more) => format!("{{{{{more}{{{value}[{}]}}}}, {value}}}", from - 1),
+        None => format!("{value}[{}:0]", to - 1),
+    }
+}

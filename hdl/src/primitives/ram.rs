@@ -1,0 +1,97 @@
+//! A simple dual-port memory: one write port with a mask per field, one registered read port.
+
+use rust_hdl::prelude::*;
+
+use super::counter::count_bits;
+use crate::wire::{Wire, Word};
+
+/// ```text
+/// write (one bit per field), write_address, write_data --> memory --> read_data one cycle after read_address
+/// ```
+/// The read register moves only while `read` is high. Reading a word in the cycle that writes it gives the old one; the
+/// content is undefined until written.
+#[derive(LogicBlock)]
+pub struct Ram {
+    /// Clock.
+    pub clk: Signal<In, Clock>,
+    /// Write enable of each field.
+    pub write: Wire<In>,
+    /// Where to write.
+    pub write_address: Wire<In>,
+    /// What to write.
+    pub write_data: Wire<In>,
+    /// Read enable.
+    pub read: Signal<In, Bit>,
+    /// Where to read.
+    pub read_address: Wire<In>,
+    /// What was read.
+    pub read_data: Wire<Out>,
+    _memory: Vec<Word>,
+}
+
+impl Ram {
+    /// `depth` words of `fields` fields of `bits` bits.
+    pub fn new(depth: usize, fields: usize, bits: usize) -> Self {
+        Ram {
+            clk: Default::default(),
+            write: Wire::new(fields),
+            write_address: Wire::new(count_bits(depth)),
+            write_data: Wire::new(fields * bits),
+            read: Default::default(),
+            read_address: Wire::new(count_bits(depth)),
+            read_data: Wire::new(fields * bits),
+            _memory: vec![Word::default(); depth],
+        }
+    }
+}
+
+impl Logic for Ram {
+    fn update(&mut self) {
+        if self.clk.pos_edge() {
+            if self.read.val() {
+                let address = self.read_address.val().number() as usize;
+                self.read_data.next = self._memory.get(address).copied().unwrap_or_default();
+            }
+            let bits = self.write_data.width() / self.write.width();
+            if let Some(word) = self._memory.get_mut(self.write_address.val().number() as usize) {
+                for field in 0..self.write.width() {
+                    if self.write.val().field(field, 1) == 1 {
+                        for at in (0..bits).step_by(64) {
+                            let part = (bits - at).min(64);
+                            let value = self.write_data.val().field(field * bits + at, part);
+                            word.set(field * bits + at, part, value);
+                        }
+                    }
+                }
+            }
+        }
+    }
+
+    fn connect(&mut self) {
+        self.read_data.connect();
+    }
+
+    fn hdl(&self) -> Verilog {
+        let fields = self.write.width();
+        let bits = self.write_data.width() / fields;
+        // One array per field: every synthesiser maps it to plain memories.
+        Verilog::Custom(
+            (0..fields)
+                .map(|field| {
+                    let enable = if fields == 1 { "write".to_string() } else { format!("write[{field}]") };
+                    format!(
+                        "\
+reg [{end}:0] field{field} [0:{depth}];
+always @(posedge clk) begin
+  if ({enable}) field{field}[write_address] <= write_data[{field} * {bits} +: {bits}];
+  if (read) read_data[{field} * {bits} +: {bits}] <= field{field}[read_address];
+end
+",
+                        end = bits - 1,
+                        depth = self._memory.len() - 1,
+                    )
+                })
+                .collect(),
+        )
+    }
+}

@@ -1,0 +1,147 @@
+//! Accumulators to words: round, saturate, count.
+
+use dermis_golden::fixed::arith::{round_shift, saturate};
+use dermis_golden::fixed::formats::{Formats, SEARCH_EXTRA_BITS};
+use rust_hdl::prelude::*;
+
+use super::raw_length::shift_bits;
+use crate::wire::{Wire, Word};
+
+/// A quad of accumulators, shifted right by `shift` when `measured`, by the constant of an A pass otherwise.
+///
+/// `words` follow two cycles later, `operands` (the same, shortened to `data_bits`) three; `saturations` counts the clipped words of valid
+/// quads since `clear`.
+#[derive(LogicBlock)]
+pub struct Rescaler {
+    /// Clock.
+    pub clk: Signal<In, Clock>,
+    /// Saturations back to 0.
+    pub clear: Signal<In, Bit>,
+    /// `quad` is a row.
+    pub valid: Signal<In, Bit>,
+    /// Shift by `shift` instead of the constant.
+    pub measured: Signal<In, Bit>,
+    /// The measured shift.
+    pub shift: Wire<In>,
+    /// Four accumulators.
+    pub quad: Wire<In>,
+    /// Four v_ij, two cycles later.
+    pub words: Wire<Out>,
+    /// Four operands, three cycles later.
+    pub operands: Wire<Out>,
+    /// Words saturated, 16 bits, stops at the largest count.
+    pub saturations: Wire<Out>,
+    _formats: Formats,
+    _shifted: [i64; 4],
+    _valid: bool,
+}
+
+/// Width of a saturation counter.
+pub const SATURATION_BITS: usize = 16;
+
+impl Rescaler {
+    /// Widths of `formats`.
+    pub fn new(formats: &Formats) -> Self {
+        Rescaler {
+            clk: Default::default(),
+            clear: Default::default(),
+            valid: Default::default(),
+            measured: Default::default(),
+            shift: Wire::new(shift_bits(formats)),
+            quad: Wire::new(4 * formats.acc_bits as usize),
+            words: Wire::new(4 * formats.vector_bits as usize),
+            operands: Wire::new(4 * formats.data_bits as usize),
+            saturations: Wire::new(SATURATION_BITS),
+            _formats: formats.clone(),
+            _shifted: [0; 4],
+            _valid: false,
+        }
+    }
+}
+
+impl Logic for Rescaler {
+    fn update(&mut self) {
+        if self.clk.pos_edge() {
+            let f = &self._formats;
+            let operand = |lane| {
+                let word = self.words.val().signed(lane, f.vector_bits as usize);
+                saturate(round_shift(word, SEARCH_EXTRA_BITS), f.data_bits).0
+            };
+            self.operands.next = Word::of_fields(&[0, 1, 2, 3].map(operand), f.data_bits as usize);
+            let rounded = self._shifted.map(|value| saturate(value, f.vector_bits));
+            self.words.next = Word::of_fields(&rounded.map(|(word, _)| word), f.vector_bits as usize);
+            let clipped = rounded.iter().filter(|(_, clipped)| *clipped).count() as u64;
+            let count = self.saturations.val().number() + if self._valid { clipped } else { 0 };
+            self.saturations.next = Word::from(match self.clear.val() {
+                true => 0,
+                false => count.min((1 << SATURATION_BITS) - 1),
+            });
+            let shift = if self.measured.val() { self.shift.val().number() as u32 } else { f.a_shift };
+            self._shifted =
+                std::array::from_fn(|lane| round_shift(self.quad.val().signed(lane, f.acc_bits as usize), shift));
+            self._valid = self.valid.val();
+        }
+    }
+
+    fn connect(&mut self) {
+        self.words.connect();
+        self.operands.connect();
+        self.saturations.connect();
+    }
+
+    fn hdl(&self) -> Verilog {
+        let f = &self._formats;
+        let (acc, r, d) = (f.acc_bits as usize, f.vector_bits as usize, f.data_bits as usize);
+        let extra = SEARCH_EXTRA_BITS as usize;
+        let over = acc + 1 - r;
+        let shift_bits = self.shift.width();
+        let cap = SATURATION_BITS;
+        Verilog::Custom(format!(
+            "\
+wire [{shift_end}:0] amount = measured ? shift : {shift_bits}'d{a_shift};
+reg valid1;
+wire [3:0] clipped;
+wire [2:0] clips = {{2'd0, clipped[0]}} + {{2'd0, clipped[1]}} + {{2'd0, clipped[2]}} + {{2'd0, clipped[3]}};
+wire [{cap}:0] count = {{1'b0, saturations}} + {{{count_more}'d0, clips}};
+always @(posedge clk) begin
+  valid1 <= valid;
+  if (clear) saturations <= {cap}'d0;
+  else if (valid1) saturations <= count[{cap}] ? {{{cap}{{1'b1}}}} : count[{cap_end}:0];
+end
+genvar l;
+generate
+  for (l = 0; l < 4; l = l + 1) begin : lane
+    // One bit below the LSB is kept, so that adding one and dropping it rounds half up.
+    reg signed [{acc}:0] moved;
+    wire signed [{acc}:0] doubled = {{quad[l * {acc} +: {acc}], 1'b0}};
+    wire [{acc1}:0] half_up = {{moved[{acc}], moved}} + {acc2}'d1;
+    wire [{acc}:0] rounded = half_up[{acc1}:1];
+    wire [{over}:0] sign = rounded[{acc}:{r_end}];
+    assign clipped[l] = sign != {{{over1}{{rounded[{acc}]}}}};
+    wire [{r_end}:0] now = words[l * {r} +: {r}];
+    wire [{short_end}:0] operand = {{now[{r_end}], now[{r_end}:{extra_low}]}} + {short}'d1;
+    wire overflow = operand[{short_end}] != operand[{short_less}];
+    always @(posedge clk) begin
+      moved <= doubled >>> amount;
+      words[l * {r} +: {r}] <= clipped[l] ? {{rounded[{acc}], {{{r_less}{{!rounded[{acc}]}}}}}} : rounded[{r_end}:0];
+      operands[l * {d} +: {d}] <= overflow ? {{1'b0, {{{d_less}{{1'b1}}}}}} : operand[{d}:1];
+    end
+  end
+endgenerate",
+            shift_end = shift_bits - 1,
+            a_shift = f.a_shift,
+            count_more = cap + 1 - 3,
+            cap_end = cap - 1,
+            acc1 = acc + 1,
+            acc2 = acc + 2,
+            over1 = over + 1,
+            r_end = r - 1,
+            r_less = r - 1,
+            extra_low = extra - 1,
+            short = d + 2,
+            short_end = d + 1,
+            short_less = d,
+            d_less = d - 1,
+        ))
+    }
+}

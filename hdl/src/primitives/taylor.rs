@@ -1,0 +1,150 @@
+//! The polynomials' centre moved by a grid step, and the step halved: additions and shifts.
+
+use dermis_golden::fixed::schedule::EXPONENTS;
+use dermis_golden::fixed::search::{halve, taylor_shift};
+use rust_hdl::prelude::*;
+
+use super::polynomial_word::{resize, PolynomialWord};
+use crate::wire::{Wire, Word};
+
+/// A word of polynomials in, moved by (`dx`, `dy`) and halved if asked, two cycles later: x in the first cycle, y and the
+/// halving in the second. The moves are held for as long as words go through.
+#[derive(LogicBlock)]
+pub struct Taylor {
+    /// Clock.
+    pub clk: Signal<In, Clock>,
+    /// Step along x: −1, 0 or 1 in two bits.
+    pub dx: Wire<In>,
+    /// Step along y.
+    pub dy: Wire<In>,
+    /// Halve the grid step afterwards.
+    pub halving: Signal<In, Bit>,
+    /// Polynomials.
+    pub word: Wire<In>,
+    /// The same about the new centre.
+    pub moved: Wire<Out>,
+    _layout: PolynomialWord,
+    _between: Word,
+}
+
+impl Taylor {
+    /// Polynomials in `layout`.
+    pub fn new(layout: PolynomialWord) -> Self {
+        Taylor {
+            clk: Default::default(),
+            dx: Wire::new(2),
+            dy: Wire::new(2),
+            halving: Default::default(),
+            word: Wire::new(layout.bits()),
+            moved: Wire::new(layout.bits()),
+            _layout: layout,
+            _between: Word::default(),
+        }
+    }
+
+    fn each(&self, word: Word, change: impl Fn(&[i64; 10]) -> [i64; 10]) -> Word {
+        let mut out = Word::default();
+        for lane in 0..self._layout.lanes {
+            self._layout.put(&mut out, lane, &change(&self._layout.get(&word, lane)));
+        }
+        out
+    }
+}
+
+impl Logic for Taylor {
+    fn update(&mut self) {
+        if self.clk.pos_edge() {
+            let (dx, dy) = (self.dx.val().signed(0, 2), self.dy.val().signed(0, 2));
+            let halving = self.halving.val();
+            self.moved.next = self.each(self._between, |w| {
+                let moved = taylor_shift(w, 0, dy);
+                if halving { halve(&moved) } else { moved }
+            });
+            self._between = self.each(self.word.val(), |w| taylor_shift(w, dx, 0));
+        }
+    }
+
+    fn connect(&mut self) {
+        self.moved.connect();
+    }
+
+    fn hdl(&self) -> Verilog {
+        let along_x = self.shift("x", "dx", |(i, j), by| (i + by, j));
+        let along_y = self.shift("y", "dy", |(i, j), by| (i, j + by));
+        let widths = &self._layout.widths;
+        let mut body = String::new();
+        for (k, &w) in widths.iter().enumerate() {
+            let end = w - 1;
+            body += &format!("    reg [{end}:0] y{k};\n    wire [{end}:0] x{k} = {};\n", self._layout.select("word", k, "l"));
+        }
+        body += &along_x;
+        body += "    always @(posedge clk) begin\n";
+        for k in 0..widths.len() {
+            body += &format!("      y{k} <= x{k}_moved;\n");
+        }
+        body += "    end\n";
+        body += &along_y;
+        body += "    always @(posedge clk) begin\n";
+        for (k, &w) in widths.iter().enumerate() {
+            let degree = (EXPONENTS[k].0 + EXPONENTS[k].1) as usize;
+            let target = self._layout.select("moved", k, "l");
+            let value = match degree {
+                0 => format!("y{k}_moved"),
+                _ => format!("halving ? {{{{{degree}{{y{k}_moved[{}]}}}}, y{k}_moved[{}:{degree}]}} : y{k}_moved", w - 1, w - 1),
+            };
+            body += &format!("      {target} <= {value};\n");
+        }
+        body += "    end\n";
+        Verilog::Custom(format!(
+            "\
+genvar l;
+generate
+  for (l = 0; l < {lanes}; l = l + 1) begin : lane
+{body}  end
+endgenerate",
+            lanes = self._layout.lanes
+        ))
+    }
+}
+
+impl Taylor {
+    /// Verilog of a move along one axis: wires `<axis>k_moved` from `<axis>k`.
+    ///
+    /// c0' = c0 + d (c1 + c3) + d² c2,  c1' = c1 + 2d c2 + 3d² c3,  c2' = c2 + 3d c3: d is −1, 0 or 1, so that
+    /// d² only says whether there is a move and d·c is c, −c or 0.
+    fn shift(&self, axis: &str, step: &str, up: impl Fn((u32, u32), u32) -> (u32, u32)) -> String {
+        let widths = &self._layout.widths;
+        let mut text = String::new();
+        for (k, &w) in widths.iter().enumerate() {
+            let order = if axis == "x" { EXPONENTS[k].0 } else { EXPONENTS[k].1 };
+            let above = |by: u32| {
+                let found = EXPONENTS.iter().position(|&e| e == up(EXPONENTS[k], by));
+                found.filter(|&n| n < widths.len()).map(|n| resize(&format!("{axis}{n}"), widths[n], w))
+            };
+            // Binomials of the terms above: odd distances change sign with the step, even ones do not.
+            let times = |value: &str, factor: u32| match factor {
+                2 => format!("({value} << 1)"),
+                3 => format!("({value} << 1) + {value}"),
+                _ => value.to_string(),
+            };
+            let choose = |n: u32, by: u32| match by {
+                1 => n + 1,
+                2 => (n + 2) * (n + 1) / 2,
+                _ => 1,
+            };
+            let term = |by: u32| above(by).map(|value| times(&value, choose(order, by)));
+            let odd: Vec<String> = [term(1), term(3)].into_iter().flatten().collect();
+            let mut sum = format!("{axis}{k}");
+            if !odd.is_empty() {
+                text += &format!("    wire [{end}:0] {axis}{k}_odd = {};\n", odd.join(" + "), end = w - 1);
+                sum += &format!(" + ({step}[1] ? -{axis}{k}_odd : {step}[0] ? {axis}{k}_odd : {w}'d0)");
+            }
+            if let Some(even) = term(2) {
+                text += &format!("    wire [{end}:0] {axis}{k}_even = {even};\n", end = w - 1);
+                sum += &format!(" + ({step}[0] ? {axis}{k}_even : {w}'d0)");
+            }
+            text += &format!("    wire [{end}:0] {axis}{k}_moved = {sum};\n", end = w - 1);
+        }
+        text
+    }
+}

@@ -1,0 +1,212 @@
+//! Signals whose width the scene decides.
+//!
+//! rust-hdl's `Signal<D, Bits<N>>` fixes N at compile time, but here a scene file read at run time
+//! decides every width. [`Wire`] is a rust-hdl atom like `Signal`, usable in `#[hdl_gen]` kernels, in
+//! the checks, in Verilog generation and in waveforms, that carries its width as a value. Its content is a
+//! [`Word`], a plain bit vector; signedness belongs to the primitives that compute with it.
+
+use std::marker::PhantomData;
+
+use rust_hdl::prelude::*;
+
+/// 64-bit limbs in a [`Word`].
+const LIMBS: usize = 20;
+
+/// Widest wire: 1280 bits, a quad of cubic polynomials with room to spare.
+pub const MAX_BITS: usize = 64 * LIMBS;
+
+/// A bit vector, least significant bit first. Bits beyond a wire's width are zero.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub struct Word([u64; LIMBS]);
+
+impl Default for Word {
+    fn default() -> Self {
+        Word([0; LIMBS])
+    }
+}
+
+impl std::fmt::Debug for Word {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let top = self.0.iter().rposition(|&limb| limb != 0).unwrap_or(0);
+        write!(f, "0x{:x}", self.0[top])?;
+        self.0[..top].iter().rev().try_for_each(|limb| write!(f, "{limb:016x}"))
+    }
+}
+
+impl From<u64> for Word {
+    fn from(value: u64) -> Self {
+        let mut word = Word::default();
+        word.0[0] = value;
+        word
+    }
+}
+
+impl From<bool> for Word {
+    fn from(bit: bool) -> Self {
+        Word::from(u64::from(bit))
+    }
+}
+
+impl Word {
+    /// The unsigned field of `bits` (1..=64) bits at `offset`.
+    pub fn field(&self, offset: usize, bits: usize) -> u64 {
+        let (limb, shift) = (offset / 64, offset % 64);
+        let mut value = self.0[limb] >> shift;
+        if shift + bits > 64 {
+            value |= self.0[limb + 1] << (64 - shift);
+        }
+        value & (u64::MAX >> (64 - bits))
+    }
+
+    /// Field `index` of a word of signed fields, each `bits` wide, sign-extended.
+    pub fn signed(&self, index: usize, bits: usize) -> i64 {
+        (self.field(index * bits, bits) << (64 - bits)) as i64 >> (64 - bits)
+    }
+
+    /// Writes the low `bits` bits of `value` at `offset`.
+    pub fn set(&mut self, offset: usize, bits: usize, value: u64) {
+        let value = value & (u64::MAX >> (64 - bits));
+        let mask = u64::MAX >> (64 - bits);
+        let (limb, shift) = (offset / 64, offset % 64);
+        self.0[limb] = self.0[limb] & !(mask << shift) | value << shift;
+        if shift + bits > 64 {
+            let over = 64 - shift;
+            self.0[limb + 1] = self.0[limb + 1] & !(mask >> over) | value >> over;
+        }
+    }
+
+    /// A word of signed fields, field 0 in the least significant bits, each cut to `bits` bits.
+    pub fn of_fields(fields: &[i64], bits: usize) -> Self {
+        let mut word = Word::default();
+        for (index, &field) in fields.iter().enumerate() {
+            word.set(index * bits, bits, field as u64);
+        }
+        word
+    }
+
+    /// The word's low 64 bits as a number.
+    pub fn number(&self) -> u64 {
+        self.0[0]
+    }
+}
+
+/// A signal of direction `D` with a width known at run time.
+#[derive(Clone, Debug)]
+pub struct Wire<D: Direction> {
+    /// The value after the next update.
+    pub next: Word,
+    value: Word,
+    changed: bool,
+    claimed: bool,
+    id: usize,
+    bits: usize,
+    direction: PhantomData<D>,
+}
+
+impl<D: Direction> Wire<D> {
+    /// A wire of `bits` bits, at least one.
+    pub fn new(bits: usize) -> Self {
+        assert!((1..=MAX_BITS).contains(&bits), "a wire of {bits} bits");
+        Wire {
+            next: Word::default(),
+            value: Word::default(),
+            changed: false,
+            claimed: false,
+            id: rust_hdl::core::signal::get_signal_id(),
+            bits,
+            direction: PhantomData,
+        }
+    }
+
+    /// The present value.
+    pub fn val(&self) -> Word {
+        self.value
+    }
+
+    /// The width.
+    pub fn width(&self) -> usize {
+        self.bits
+    }
+}
+
+impl<D: Direction> Logic for Wire<D> {
+    fn update(&mut self) {}
+    fn connect(&mut self) {
+        self.claimed = true;
+    }
+}
+
+impl<D: Direction> Block for Wire<D> {
+    fn connect_all(&mut self) {}
+
+    fn update_all(&mut self) {
+        self.changed = self.value != self.next;
+        if self.changed {
+            self.value = self.next;
+        }
+    }
+
+    fn has_changed(&self) -> bool {
+        self.changed
+    }
+
+    fn accept(&self, name: &str, probe: &mut dyn rust_hdl::core::probe::Probe) {
+        probe.visit_atom(name, self);
+    }
+}
+
+impl<D: Direction> Atom for Wire<D> {
+    fn bits(&self) -> usize {
+        self.bits
+    }
+
+    fn connected(&self) -> bool {
+        self.claimed
+    }
+
+    fn changed(&self) -> bool {
+        self.changed
+    }
+
+    fn kind(&self) -> AtomKind {
+        D::KIND
+    }
+
+    fn descriptor(&self) -> TypeDescriptor {
+        TypeDescriptor { name: format!("Wire::<{}>", self.bits), kind: TypeKind::Bits(self.bits) }
+    }
+
+    fn vcd(&self) -> VCDValue {
+        // Most significant bit first, as VCD wants it.
+        let bit = |at| if self.value.field(at, 1) == 1 { vcd::Value::V1 } else { vcd::Value::V0 };
+        VCDValue::Vector((0..self.bits).rev().map(bit).collect())
+    }
+
+    fn id(&self) -> usize {
+        self.id
+    }
+
+    fn verilog(&self) -> VerilogLiteral {
+        // Only constants print their value, and a wire never is one.
+        self.value.number().into()
+    }
+
+    fn constraints(&self) -> Vec<PinConstraint> {
+        Vec::new()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn fields_straddle_limbs() {
+        let fields: Vec<i64> = (0..40).map(|i| (i * 977 - 15_000) % (1 << 25)).collect();
+        let word = Word::of_fields(&fields, 27);
+        for (index, &field) in fields.iter().enumerate() {
+            assert_eq!(word.signed(index, 27), field);
+        }
+        assert_eq!(Word::of_fields(&[-1, 0], 48).field(40, 16), 0xff);
+    }
+}
