@@ -69,44 +69,28 @@ impl Board {
     /// # Errors
     /// [`BoardError::Unknown`] lists the boards there are.
     pub fn load(name: &str) -> Result<Board, BoardError> {
-        let unknown = || BoardError::Unknown {
-            name: name.to_owned(),
-            known: Board::names().join(", "),
-        };
+        let unknown = || BoardError::Unknown { name: name.to_owned(), known: Board::names().join(", ") };
         let file = FILES.get_file(format!("{name}.toml")).ok_or_else(unknown)?;
         Board::parse(name, file.contents_utf8().unwrap_or_default())
     }
 
     /// Names of all boards, sorted.
     pub fn names() -> Vec<&'static str> {
-        let stems = FILES
-            .files()
-            .filter(|f| f.path().extension().is_some_and(|e| e == "toml"));
-        let mut names: Vec<_> = stems
-            .filter_map(|f| f.path().file_stem()?.to_str())
-            .collect();
+        let stems = FILES.files().filter(|f| f.path().extension().is_some_and(|e| e == "toml"));
+        let mut names: Vec<_> = stems.filter_map(|f| f.path().file_stem()?.to_str()).collect();
         names.sort_unstable();
         names
     }
 
     fn parse(name: &str, text: &str) -> Result<Board, BoardError> {
-        let invalid = |reason: String| BoardError::Invalid {
-            name: name.to_owned(),
-            reason,
-        };
+        let invalid = |reason: String| BoardError::Invalid { name: name.to_owned(), reason };
         let board: Board = toml::from_str(text).map_err(|e| invalid(e.to_string()))?;
-        for (field, value) in [
-            ("input_clock_MHz", board.input_clock_MHz),
-            ("clock_MHz", board.clock_MHz),
-        ] {
+        for (field, value) in [("input_clock_MHz", board.input_clock_MHz), ("clock_MHz", board.clock_MHz)] {
             if !(value.is_finite() && value > 0.0) {
                 return Err(invalid(format!("{field} = {value}: must be positive")));
             }
         }
-        Ok(Board {
-            name: name.to_owned(),
-            ..board
-        })
+        Ok(Board { name: name.to_owned(), ..board })
     }
 
     /// Time of `cycles` at the engine's clock, in µs.
@@ -132,24 +116,13 @@ mod tests {
     #[test]
     fn an_unknown_board_lists_the_known_ones() {
         let error = Board::load("ulx3s").unwrap_err().to_string();
-        assert!(
-            error.contains("\"ulx3s\"") && error.contains("ulx3s-85f"),
-            "{error}"
-        );
+        assert!(error.contains("\"ulx3s\"") && error.contains("ulx3s-85f"), "{error}");
     }
 
     #[test]
     fn a_clock_of_zero_names_file_field_and_value() {
-        let text = FILES
-            .get_file("ulx3s-85f.toml")
-            .unwrap()
-            .contents_utf8()
-            .unwrap();
-        let error =
-            Board::parse("x", &text.replace("clock_MHz = 100.0", "clock_MHz = 0.0")).unwrap_err();
-        assert_eq!(
-            error.to_string(),
-            "constraints/x.toml: clock_MHz = 0: must be positive"
-        );
+        let text = FILES.get_file("ulx3s-85f.toml").unwrap().contents_utf8().unwrap();
+        let error = Board::parse("x", &text.replace("clock_MHz = 100.0", "clock_MHz = 0.0")).unwrap_err();
+        assert_eq!(error.to_string(), "constraints/x.toml: clock_MHz = 0: must be positive");
     }
 }

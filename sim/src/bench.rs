@@ -36,11 +36,7 @@ impl Layout {
             end += 1 + tap_bits(tap).div_ceil(32);
             offsets.push(end);
         }
-        Layout {
-            input_bits,
-            taps: taps.to_vec(),
-            offsets,
-        }
+        Layout { input_bits, taps: taps.to_vec(), offsets }
     }
 
     /// The taps, in the order of [`Outputs::taps`].
@@ -70,11 +66,7 @@ impl Layout {
             let bits = tap_bits(tap);
             let (first, last) = (32 * self.offsets[index], 32 * self.offsets[index + 1] - 1);
             let padding = last - first + 1 - 32 - bits;
-            let zeros = if padding == 0 {
-                String::new()
-            } else {
-                format!("{padding}'d0, ")
-            };
+            let zeros = if padding == 0 { String::new() } else { format!("{padding}'d0, ") };
             // Writing to a String cannot fail.
             let _ = writeln!(
                 text,
@@ -108,9 +100,7 @@ impl Layout {
         let taps = self.taps.iter().zip(&self.offsets).map(|(tap, &offset)| {
             (words[offset] & 1 == 1).then(|| {
                 let data = &words[offset + 1..];
-                (0..tap.fields)
-                    .map(|i| field(data, i * tap.field_bits as usize, tap.field_bits))
-                    .collect()
+                (0..tap.fields).map(|i| field(data, i * tap.field_bits as usize, tap.field_bits)).collect()
             })
         });
         Outputs {
@@ -143,13 +133,7 @@ mod tests {
     use super::*;
 
     fn tap(name: &'static str, fields: usize, field_bits: u32) -> Tap {
-        Tap {
-            name,
-            valid: "{}v".into(),
-            data: "{}d".into(),
-            fields,
-            field_bits,
-        }
+        Tap { name, valid: "{}v".into(), data: "{}d".into(), fields, field_bits }
     }
 
     #[test]
@@ -168,21 +152,14 @@ mod tests {
         assert_eq!(layout.out_words(), 10);
         let words = [0b110, 1, u32::MAX, 3, 1, 7 | 9 << 18, 0, 0, 1, 2];
         let outputs = layout.unpack(&words);
-        assert_eq!(
-            (outputs.s_ready, outputs.m_valid, outputs.m_last),
-            (false, true, true)
-        );
+        assert_eq!((outputs.s_ready, outputs.m_valid, outputs.m_last), (false, true, true));
         assert_eq!(outputs.m_data, [1, -1, 3]);
         assert_eq!(outputs.taps, vec![Some(vec![7, 9, 0]), None]);
     }
 
     #[test]
     fn negative_codes_keep_to_their_bits() {
-        let inputs = Inputs {
-            s_data: -1,
-            s_valid: true,
-            ..Inputs::default()
-        };
+        let inputs = Inputs { s_data: -1, s_valid: true, ..Inputs::default() };
         assert_eq!(Layout::new(20, &[]).pack(&inputs), 0xf_ffff | 1 << 33);
     }
 }

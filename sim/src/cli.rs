@@ -19,6 +19,7 @@ use dermis_golden::reconstruct::{Golden, Reconstruction};
 use dermis_golden::scene::Scene;
 use dermis_hdl::generate;
 
+use crate::compare::difference;
 use crate::hardware::{Hardware, Simulator};
 use crate::inputs::resolve;
 use crate::report::{self, CosimReport};
@@ -156,35 +157,25 @@ fn exit_code(error: &anyhow::Error) -> u8 {
 fn run(arguments: &Arguments) -> Result<(String, bool)> {
     let build_dir = &arguments.build_dir;
     match &arguments.command {
-        Command::Reconstruct {
-            scene,
-            frame,
-            engine,
-            json,
-        } => {
+        Command::Reconstruct { scene, frame, engine, json } => {
             let (scene, frames) = resolve(scene.as_deref(), frame.as_slice())?;
             let frame = &frames[0];
             let result = reconstruct(&scene, frame, *engine, build_dir)?;
-            let text = if *json {
-                serde_json::to_string(&result)? + "\n"
-            } else {
-                report::reconstruction(&result, &scene.sensor, full_scale(&scene, frame))
-            };
+            if *json {
+                return Ok((serde_json::to_string(&result)? + "\n", true));
+            }
+            let mut text = report::reconstruction(&result, &scene.sensor, full_scale(&scene, frame));
+            if !matches!(engine, Engine::Golden) {
+                text.push_str(&against_golden(&scene, frame, &result)?);
+            }
             Ok((text, true))
         }
         Command::Build { scene, out } => {
             let scene = Scene::load(scene)?;
-            let out = out
-                .clone()
-                .unwrap_or_else(|| build_dir.join(&scene.name).join("rtl"));
+            let out = out.clone().unwrap_or_else(|| build_dir.join(&scene.name).join("rtl"));
             Ok((build(&scene, &out)?, true))
         }
-        Command::Cosim {
-            scene,
-            frames,
-            json,
-            device,
-        } => {
+        Command::Cosim { scene, frames, json, device } => {
             let (scene, frames) = resolve(scene.as_deref(), frames)?;
             let verified = verify(&scene, &frames, device.simulators(), build_dir)?;
             let text = if *json {
@@ -206,18 +197,21 @@ fn run(arguments: &Arguments) -> Result<(String, bool)> {
     }
 }
 
-fn reconstruct(
-    scene: &Scene,
-    frame: &Frame,
-    engine: Engine,
-    build_dir: &Path,
-) -> Result<Reconstruction> {
+fn reconstruct(scene: &Scene, frame: &Frame, engine: Engine, build_dir: &Path) -> Result<Reconstruction> {
     let model = || Model::for_frames(scene, std::slice::from_ref(frame));
     Ok(match engine {
         Engine::Golden => Golden::new(scene)?.run(frame)?,
         Engine::Fixed => model()?.reconstruct(frame)?,
         Engine::Rtl => Hardware::new(model()?, build_dir)?.reconstruct(frame)?,
     })
+}
+
+/// One line: how far a result is from the floating-point model's.
+fn against_golden(scene: &Scene, frame: &Frame, result: &Reconstruction) -> Result<String> {
+    let golden = Golden::new(scene)?.run(frame)?;
+    let model = Model::for_frames(scene, std::slice::from_ref(frame))?;
+    let lsb_N = model.force_lsb_N(full_scale(scene, frame));
+    Ok(report::difference(&difference(&golden.forces_N, &result.forces_N, lsb_N)))
 }
 
 /// Writes the generated files, each complete or not at all, and lists them.
@@ -239,9 +233,7 @@ fn build(scene: &Scene, out: &Path) -> Result<String> {
 /// Writes to stdout; a reader that has gone away is no error.
 fn print(text: &str) -> Result<()> {
     match std::io::stdout().lock().write_all(text.as_bytes()) {
-        Err(error) if error.kind() != ErrorKind::BrokenPipe => {
-            Err(anyhow!("standard output: {error}"))
-        }
+        Err(error) if error.kind() != ErrorKind::BrokenPipe => Err(anyhow!("standard output: {error}")),
         _ => Ok(()),
     }
 }

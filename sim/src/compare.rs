@@ -25,31 +25,15 @@ pub struct Difference {
 
 /// Compares `other` with `reference`; `lsb_N` > 0 is the force of one LSB.
 pub fn difference(reference: &Forces, other: &Forces, lsb_N: f64) -> Difference {
-    let components = |f: &Forces| -> Vec<f64> {
-        [&f.fx, &f.fy, &f.fz]
-            .into_iter()
-            .flatten()
-            .copied()
-            .collect()
-    };
+    let components = |f: &Forces| -> Vec<f64> { [&f.fx, &f.fy, &f.fz].into_iter().flatten().copied().collect() };
     let (reference, other) = (components(reference), components(other));
-    let largest =
-        |values: &mut dyn Iterator<Item = f64>| values.fold(0.0, |m: f64, v| m.max(v.abs()));
+    let largest = |values: &mut dyn Iterator<Item = f64>| values.fold(0.0, |m: f64, v| m.max(v.abs()));
     let max = largest(&mut reference.iter().zip(&other).map(|(a, b)| a - b));
-    let square: f64 = reference
-        .iter()
-        .zip(&other)
-        .map(|(a, b)| (a - b).powi(2))
-        .sum();
+    let square: f64 = reference.iter().zip(&other).map(|(a, b)| (a - b).powi(2)).sum();
     let rms = (square / reference.len().max(1) as f64).sqrt();
     let peak = largest(&mut reference.iter().copied());
     let share = |value: f64| if peak > 0.0 { value / peak } else { 0.0 };
-    Difference {
-        max_lsb: max / lsb_N,
-        rms_lsb: rms / lsb_N,
-        max_share: share(max),
-        rms_share: share(rms),
-    }
+    Difference { max_lsb: max / lsb_N, rms_lsb: rms / lsb_N, max_share: share(max), rms_share: share(rms) }
 }
 
 /// The middle value; of an even number of values the larger of the two middle ones. `None` without values.
@@ -63,11 +47,7 @@ mod tests {
     use super::*;
 
     fn forces(fz: [f64; 2]) -> Forces {
-        Forces {
-            fx: vec![0.0; 2],
-            fy: vec![0.0; 2],
-            fz: fz.to_vec(),
-        }
+        Forces { fx: vec![0.0; 2], fy: vec![0.0; 2], fz: fz.to_vec() }
     }
 
     #[test]
@@ -80,10 +60,7 @@ mod tests {
 
     #[test]
     fn no_force_at_all_is_no_difference() {
-        assert_eq!(
-            difference(&forces([0.0; 2]), &forces([0.0; 2]), 1.0),
-            Difference::default()
-        );
+        assert_eq!(difference(&forces([0.0; 2]), &forces([0.0; 2]), 1.0), Difference::default());
     }
 
     #[test]

@@ -9,16 +9,15 @@
 //! | [`Vector`]s: codes and the model's [`Trace`] | [`Findings`]: kept [`Mismatch`]es and their true number |
 //! | a [`Device`] with its tap names | [`Times`] of every frame |
 
-use std::fmt;
+mod findings;
+
+pub use findings::{Findings, Mismatch, KEPT_PER_FRAME};
 
 use dermis_hdl::device::Device;
-use serde::Serialize;
 
 use crate::drive::{record, Play, Recording, Stimulus, Times};
 use dermis_golden::fixed::{Cycles, Trace};
 
-/// Mismatches kept per frame; the rest are counted.
-pub const KEPT_PER_FRAME: usize = 16;
 /// The watchdog never bites below this many cycles without a transfer.
 const WATCHDOG_MIN: u64 = 10_000;
 
@@ -32,80 +31,6 @@ pub struct Vector {
     pub codes: Vec<i32>,
     /// The model's stages, beats, status and cycle counts.
     pub expected: Trace,
-}
-
-/// One difference.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
-pub struct Mismatch {
-    /// Device and stimulus, for example `verilator, full speed`.
-    pub run: String,
-    /// Frame name.
-    pub frame: String,
-    /// Stage name; `forces` and `status` for the output beats, `handshake`, `cycles`, `watchdog`.
-    pub stage: String,
-    /// Index of the word in the stage's stream of this frame.
-    pub index: usize,
-    /// Row and column of the taxel, where a word is one (`forces`, and stages with a word per taxel).
-    pub taxel: Option<[usize; 2]>,
-    /// Cycle of the differing word, none for a missing word.
-    pub cycle: Option<u64>,
-    /// The model's word, none where nothing was due.
-    pub expected: Option<Vec<i64>>,
-    /// The device's word, none where nothing came.
-    pub got: Option<Vec<i64>>,
-    /// The broken rule in words, for handshake, watchdog and key sets.
-    pub rule: Option<String>,
-}
-
-impl fmt::Display for Mismatch {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(
-            f,
-            "{}: frame {}, stage {}, word {}",
-            self.run, self.frame, self.stage, self.index
-        )?;
-        if let Some([row, col]) = self.taxel {
-            write!(f, " (taxel {row},{col})")?;
-        }
-        if let Some(cycle) = self.cycle {
-            write!(f, ", cycle {cycle}")?;
-        }
-        if let Some(rule) = &self.rule {
-            return write!(f, ": {rule}");
-        }
-        let word = |w: &Option<Vec<i64>>| {
-            w.as_ref()
-                .map_or("nothing".to_owned(), |w| format!("{w:?}"))
-        };
-        write!(
-            f,
-            ": expected {}, got {}",
-            word(&self.expected),
-            word(&self.got)
-        )
-    }
-}
-
-/// What a comparison found.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct Findings {
-    /// The first [`KEPT_PER_FRAME`] of every frame.
-    pub kept: Vec<Mismatch>,
-    /// All of them.
-    pub count: usize,
-}
-
-impl Findings {
-    /// Whether nothing differed.
-    pub fn is_equal(&self) -> bool {
-        self.count == 0
-    }
-
-    /// Adds another comparison's findings.
-    pub fn extend(&mut self, other: Findings) {
-        self.kept.extend(other.kept);
-        self.count += other.count;
-    }
 }
 
 /// A device with its name and its tap names in the order of its outputs.
@@ -122,55 +47,30 @@ pub struct Bench<'a> {
 pub fn run(bench: Bench, vectors: &[Vector], stimulus: Stimulus) -> (Findings, Vec<Times>) {
     let plays: Vec<Play> = vectors
         .iter()
-        .map(|v| Play {
-            codes: &v.codes,
-            beats: v.expected.beats.len() + v.expected.status.len(),
-        })
+        .map(|v| Play { codes: &v.codes, beats: v.expected.beats.len() + v.expected.status.len() })
         .collect();
-    let longest = vectors
-        .iter()
-        .map(|v| v.expected.cycles.total)
-        .max()
-        .unwrap_or(0);
+    let longest = vectors.iter().map(|v| v.expected.cycles.total).max().unwrap_or(0);
     let watchdog = WATCHDOG_MIN.max(4 * longest);
     let recording = record(bench.device, bench.taps.len(), &plays, stimulus, watchdog);
     let exact = stimulus == Stimulus::FullSpeed;
     let label = format!("{}, {stimulus}", bench.name);
-    (
-        judge(&label, bench.taps, vectors, &recording, exact),
-        recording.times,
-    )
+    (judge(&label, bench.taps, vectors, &recording, exact), recording.times)
 }
 
 /// Compares a recording with the model; `exact` compares the cycle counts as well.
-pub fn judge(
-    run: &str,
-    taps: &[&'static str],
-    vectors: &[Vector],
-    recording: &Recording,
-    exact: bool,
-) -> Findings {
+pub fn judge(run: &str, taps: &[&'static str], vectors: &[Vector], recording: &Recording, exact: bool) -> Findings {
     let mut findings = Findings::default();
     let mut beats = recording.beats.iter();
     let mut streams: Vec<_> = recording.taps.iter().map(|words| words.iter()).collect();
     let mut beats_before = 0;
     for (number, vector) in vectors.iter().enumerate() {
-        let mut judge = Judge {
-            run,
-            vector,
-            findings: Findings::default(),
-        };
+        let mut judge = Judge { run, vector, findings: Findings::default() };
         let beats_after = beats_before + vector.expected.beats.len() + vector.expected.status.len();
         let last = number + 1 == vectors.len();
         let here = |beat: usize| beat >= beats_before && (beat < beats_after || last);
         // First, because a run that was given up explains every missing word after it.
         for timeout in recording.timeout.iter().filter(|t| here(t.beat)) {
-            judge.rule(
-                "watchdog",
-                timeout.beat - beats_before,
-                Some(timeout.cycle),
-                timeout.rule.clone(),
-            );
+            judge.rule("watchdog", timeout.beat - beats_before, Some(timeout.cycle), timeout.rule.clone());
         }
         judge.same_stages(taps);
         for stage in &vector.expected.stages {
@@ -189,44 +89,22 @@ pub fn judge(
                 );
             }
         }
-        for (stage, words) in [
-            ("forces", &vector.expected.beats),
-            ("status", &vector.expected.status),
-        ] {
+        for (stage, words) in [("forces", &vector.expected.beats), ("status", &vector.expected.status)] {
             for (index, expected) in words.iter().enumerate() {
-                let got = beats
-                    .next()
-                    .map(|b| (b.cycle, b.data.map(i64::from).to_vec()));
-                judge.word(
-                    stage,
-                    stage == "forces",
-                    index,
-                    Some(expected.map(i64::from).to_vec()),
-                    got,
-                );
+                let got = beats.next().map(|b| (b.cycle, b.data.map(i64::from).to_vec()));
+                judge.word(stage, stage == "forces", index, Some(expected.map(i64::from).to_vec()), got);
             }
         }
         if last {
             // What is left over belongs to no frame; it is reported with the last one.
             for (stream, name) in streams.iter_mut().zip(taps) {
                 for (extra, word) in stream.enumerate() {
-                    judge.word(
-                        name,
-                        false,
-                        extra,
-                        None,
-                        Some((word.cycle, word.fields.clone())),
-                    );
+                    judge.word(name, false, extra, None, Some((word.cycle, word.fields.clone())));
                 }
             }
         }
         for breach in recording.breaches.iter().filter(|b| here(b.beat)) {
-            judge.rule(
-                "handshake",
-                breach.beat - beats_before,
-                Some(breach.cycle),
-                breach.rule.clone(),
-            );
+            judge.rule("handshake", breach.beat - beats_before, Some(breach.cycle), breach.rule.clone());
         }
         if exact {
             judge.cycles(vector.expected.cycles, &recording.times[number]);
@@ -248,9 +126,7 @@ impl Judge<'_> {
     fn add(&mut self, make: impl FnOnce(String, String) -> Mismatch) {
         self.findings.count += 1;
         if self.findings.kept.len() < KEPT_PER_FRAME {
-            self.findings
-                .kept
-                .push(make(self.run.to_owned(), self.vector.frame.clone()));
+            self.findings.kept.push(make(self.run.to_owned(), self.vector.frame.clone()));
         }
     }
 
@@ -300,37 +176,19 @@ impl Judge<'_> {
     fn same_stages(&mut self, taps: &[&'static str]) {
         let stages: Vec<&str> = self.vector.expected.stages.iter().map(|s| s.name).collect();
         for name in taps.iter().filter(|t| !stages.contains(t)) {
-            self.rule(
-                name,
-                0,
-                None,
-                "a tap of the hardware that the model has no stage for".into(),
-            );
+            self.rule(name, 0, None, "a tap of the hardware that the model has no stage for".into());
         }
         for name in stages.iter().filter(|s| !taps.contains(s)) {
-            self.rule(
-                name,
-                0,
-                None,
-                "a stage of the model that the hardware has no tap for".into(),
-            );
+            self.rule(name, 0, None, "a stage of the model that the hardware has no tap for".into());
         }
     }
 
     fn cycles(&mut self, promised: Cycles, times: &Times) {
-        let pairs = [
-            ("latency", promised.latency, times.latency()),
-            ("total", promised.total, times.total()),
-        ];
+        let pairs = [("latency", promised.latency, times.latency()), ("total", promised.total, times.total())];
         for (index, (name, expected, got)) in pairs.into_iter().enumerate() {
             if got != Some(expected) {
                 let got = got.map_or("no end".to_owned(), |g| g.to_string());
-                self.rule(
-                    "cycles",
-                    index,
-                    times.last_out,
-                    format!("{name}: expected {expected} cycles, got {got}"),
-                );
+                self.rule("cycles", index, times.last_out, format!("{name}: expected {expected} cycles, got {got}"));
             }
         }
     }

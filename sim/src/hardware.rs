@@ -57,11 +57,7 @@ impl Hardware {
     /// A design that the generator refuses.
     pub fn new(model: Model, build: &Path) -> Result<Self> {
         let generated = generate(&model)?;
-        Ok(Hardware {
-            model,
-            generated,
-            cache: build.join("verilator"),
-        })
+        Ok(Hardware { model, generated, cache: build.join("verilator") })
     }
 
     /// Starts a simulation.
@@ -76,11 +72,7 @@ impl Hardware {
     }
 
     fn verilated(&self) -> Result<Verilated, VerilatorError> {
-        let files = self
-            .generated
-            .files
-            .iter()
-            .map(|f| (f.name.as_str(), f.text.as_str()));
+        let files = self.generated.files.iter().map(|f| (f.name.as_str(), f.text.as_str()));
         let design = Design {
             top: &self.generated.top,
             files: files.collect(),
@@ -102,12 +94,7 @@ impl Hardware {
     pub fn vector(&self, frame: &Frame) -> Result<Vector> {
         let codes = self.model.codes(frame)?.codes;
         let expected = self.model.run(&codes);
-        Ok(Vector {
-            frame: frame.id.clone(),
-            cols: self.model.scene.sensor.cols,
-            codes,
-            expected,
-        })
+        Ok(Vector { frame: frame.id.clone(), cols: self.model.scene.sensor.cols, codes, expected })
     }
 
     /// Reconstructs a frame in the Verilated hardware, engine `rtl`.
@@ -117,19 +104,11 @@ impl Hardware {
     pub fn reconstruct(&self, frame: &Frame) -> Result<Reconstruction> {
         let vector = self.vector(frame)?;
         let taxels = vector.codes.len();
-        let plays = [Play {
-            codes: &vector.codes,
-            beats: taxels + vector.expected.status.len(),
-        }];
+        let plays = [Play { codes: &vector.codes, beats: taxels + vector.expected.status.len() }];
         let mut device = self.device(Simulator::Verilator)?;
         let recording = record(device.as_mut(), 0, &plays, Stimulus::FullSpeed, WATCHDOG);
         if let Some(timeout) = recording.timeout {
-            anyhow::bail!(
-                "frame {}, cycle {}: {}",
-                frame.id,
-                timeout.cycle,
-                timeout.rule
-            );
+            anyhow::bail!("frame {}, cycle {}: {}", frame.id, timeout.cycle, timeout.rule);
         }
         let beats: Vec<[i32; 3]> = recording.beats.iter().map(|beat| beat.data).collect();
         let (forces, status) = beats.split_at(taxels.min(beats.len()));

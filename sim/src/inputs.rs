@@ -30,18 +30,11 @@ pub fn resolve(scene: Option<&str>, frames: &[String]) -> Result<(Scene, Vec<Fra
     let frames = if frames.is_empty() {
         let shipped = Frame::shipped(&scene);
         if shipped.is_empty() {
-            bail!(
-                "scene {}: no frame is shipped for {}: give one with --frame",
-                scene.name,
-                scene.sensor
-            );
+            bail!("scene {}: no frame is shipped for {}: give one with --frame", scene.name, scene.sensor);
         }
         shipped
     } else {
-        frames
-            .iter()
-            .map(|path| load(path, &scene))
-            .collect::<Result<_>>()?
+        frames.iter().map(|path| load(path, &scene)).collect::<Result<_>>()?
     };
     Ok((scene, frames))
 }

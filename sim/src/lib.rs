@@ -9,7 +9,7 @@
 //!
 //! | module | does |
 //! |---|---|
-//! | [`bench`] | the Verilog wrapper that packs pins and taps into two vectors |
+//! | [`mod@bench`] | the Verilog wrapper that packs pins and taps into two vectors |
 //! | [`verilator`] | builds, caches and loads a verilated design as a [`Device`](dermis_hdl::device::Device) |
 //! | [`drive`] | plays frames into a device and records every transfer with its cycle |
 //! | [`cosim`] | compares a recording with the bit-true model |

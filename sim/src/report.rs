@@ -6,7 +6,7 @@
 mod result;
 mod table;
 
-pub use result::reconstruction;
+pub use result::{difference, reconstruction};
 pub use table::{cosim, scenes};
 
 use serde::Serialize;
@@ -33,11 +33,7 @@ impl Spread {
         let mut values: Vec<u64> = values.collect();
         values.sort_unstable();
         let median = values.get(values.len() / 2).copied();
-        Spread {
-            min: values.first().copied(),
-            median,
-            max: values.last().copied(),
-        }
+        Spread { min: values.first().copied(), median, max: values.last().copied() }
     }
 }
 
@@ -86,10 +82,7 @@ impl CosimReport {
             cycles: Spread::of(verified.rows.iter().filter_map(|row| row.times.latency())),
             total_cycles,
             clock_MHz: verified.board.clock_MHz,
-            time_us: Time {
-                median: time(total_cycles.median),
-                max: time(total_cycles.max),
-            },
+            time_us: Time { median: time(total_cycles.median), max: time(total_cycles.max) },
             budget_us: BUDGET_US,
         }
     }

@@ -65,27 +65,14 @@ pub struct Verified {
 ///
 /// # Errors
 /// A scene that cannot be built, a frame of another sensor, no Verilator.
-pub fn verify(
-    scene: &Scene,
-    frames: &[Frame],
-    simulators: &[Simulator],
-    build: &Path,
-) -> Result<Verified> {
+pub fn verify(scene: &Scene, frames: &[Frame], simulators: &[Simulator], build: &Path) -> Result<Verified> {
     let board = Board::load(&scene.hardware.board)?;
     let golden = Golden::new(scene)?;
     let hardware = Hardware::new(Model::for_frames(scene, frames)?, build)?;
-    let vectors = frames
-        .iter()
-        .map(|frame| hardware.vector(frame))
-        .collect::<Result<Vec<_>>>()?;
+    let vectors = frames.iter().map(|frame| hardware.vector(frame)).collect::<Result<Vec<_>>>()?;
 
-    let mut verified = Verified {
-        scene: scene.clone(),
-        board,
-        rows: Vec::new(),
-        findings: Findings::default(),
-        runs: Vec::new(),
-    };
+    let mut verified =
+        Verified { scene: scene.clone(), board, rows: Vec::new(), findings: Findings::default(), runs: Vec::new() };
     let mut times: Vec<Times> = Vec::new();
     for &simulator in simulators {
         let seen = simulate(&hardware, simulator, &vectors, &mut verified)?;
@@ -96,12 +83,7 @@ pub fn verify(
     for ((frame, vector), times) in frames.iter().zip(&vectors).zip(times) {
         let full_scale_MPa = full_scale(&hardware.model.scene, frame);
         let golden = golden.run(frame)?;
-        let fixed = hardware.model.decode(
-            frame,
-            "fixed",
-            &vector.expected.beats,
-            &vector.expected.status,
-        )?;
+        let fixed = hardware.model.decode(frame, "fixed", &vector.expected.beats, &vector.expected.status)?;
         let lsb_N = hardware.model.force_lsb_N(full_scale_MPa);
         verified.rows.push(Row {
             frame: frame.id.clone(),
@@ -133,11 +115,7 @@ fn simulate(
     for &stimulus in stimuli {
         let label = format!("{}, {stimulus}", simulator.name());
         let _progress = Progress::start(&format!("{}: {label}", verified.scene.name));
-        let bench = Bench {
-            name: simulator.name(),
-            device: device.as_mut(),
-            taps: &taps,
-        };
+        let bench = Bench { name: simulator.name(), device: device.as_mut(), taps: &taps };
         let (findings, times) = run(bench, vectors, stimulus);
         verified.findings.extend(findings);
         verified.runs.push(label);

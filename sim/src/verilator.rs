@@ -96,43 +96,25 @@ impl Verilated {
     pub fn new(design: &Design, cache: &Path) -> Result<Self, VerilatorError> {
         let layout = Layout::new(design.input_bits, design.taps);
         let path = library(design, &layout, cache)?;
-        let fail = |reason: String| VerilatorError::Library {
-            path: path.clone(),
-            reason,
-        };
+        let fail = |reason: String| VerilatorError::Library { path: path.clone(), reason };
         // SAFETY: the library was built from this module's shim, whose symbols have these types and
         // whose constructors have no side effects; the layout is checked before the first cycle.
         unsafe {
             let library = Library::new(&path).map_err(|e| fail(e.to_string()))?;
             let symbol = |e: libloading::Error| fail(e.to_string());
-            let bytes = *library
-                .get::<extern "C" fn() -> u32>(b"dermis_out_bytes")
-                .map_err(symbol)?;
-            let start = *library
-                .get::<extern "C" fn(*const c_char, i32) -> *mut c_void>(b"dermis_new")
-                .map_err(symbol)?;
+            let bytes = *library.get::<extern "C" fn() -> u32>(b"dermis_out_bytes").map_err(symbol)?;
+            let start =
+                *library.get::<extern "C" fn(*const c_char, i32) -> *mut c_void>(b"dermis_new").map_err(symbol)?;
             let cycle = *library.get(b"dermis_cycle").map_err(symbol)?;
             let free = *library.get(b"dermis_free").map_err(symbol)?;
             if bytes() as usize != 4 * layout.out_words() {
-                return Err(fail(format!(
-                    "{} output bytes, {} expected",
-                    bytes(),
-                    4 * layout.out_words()
-                )));
+                return Err(fail(format!("{} output bytes, {} expected", bytes(), 4 * layout.out_words())));
             }
             let memories = memory_folder(design)?;
-            let folder = CString::new(memories.path().to_string_lossy().as_bytes())
-                .map_err(|e| fail(e.to_string()))?;
+            let folder = CString::new(memories.path().to_string_lossy().as_bytes()).map_err(|e| fail(e.to_string()))?;
             let handle = start(folder.as_ptr(), RESET_SEED);
             let words = vec![0; layout.out_words()];
-            Ok(Verilated {
-                layout,
-                handle,
-                cycle,
-                free,
-                words,
-                _library: library,
-            })
+            Ok(Verilated { layout, handle, cycle, free, words, _library: library })
         }
     }
 }
@@ -140,13 +122,7 @@ impl Verilated {
 impl Device for Verilated {
     fn cycle(&mut self, inputs: &Inputs) -> Outputs {
         // SAFETY: `handle` lives until drop, `words` has the length checked in `new`.
-        unsafe {
-            (self.cycle)(
-                self.handle,
-                self.layout.pack(inputs),
-                self.words.as_mut_ptr(),
-            )
-        };
+        unsafe { (self.cycle)(self.handle, self.layout.pack(inputs), self.words.as_mut_ptr()) };
         self.layout.unpack(&self.words)
     }
 }
@@ -163,23 +139,13 @@ impl Drop for Verilated {
 /// # Errors
 /// [`VerilatorError::Missing`] when it cannot be started.
 pub fn version() -> Result<String, VerilatorError> {
-    let output = Command::new("verilator")
-        .arg("--version")
-        .output()
-        .map_err(|_| VerilatorError::Missing)?;
-    Ok(String::from_utf8_lossy(&output.stdout)
-        .lines()
-        .next()
-        .unwrap_or_default()
-        .to_owned())
+    let output = Command::new("verilator").arg("--version").output().map_err(|_| VerilatorError::Missing)?;
+    Ok(String::from_utf8_lossy(&output.stdout).lines().next().unwrap_or_default().to_owned())
 }
 
 /// Writes the design's memory files where `$readmemh` will look for them.
 fn memory_folder(design: &Design) -> Result<tempfile::TempDir, VerilatorError> {
-    let folder = tempfile::tempdir().map_err(|source| VerilatorError::Io {
-        path: std::env::temp_dir(),
-        source,
-    })?;
+    let folder = tempfile::tempdir().map_err(|source| VerilatorError::Io { path: std::env::temp_dir(), source })?;
     for (name, text) in design.files.iter().filter(|(name, _)| !is_source(name)) {
         write(&folder.path().join(name), text)?;
     }
@@ -196,79 +162,37 @@ static BUILDING: Mutex<()> = Mutex::new(());
 
 /// Path of the design's library, built when the cache does not hold it.
 fn library(design: &Design, layout: &Layout, cache: &Path) -> Result<PathBuf, VerilatorError> {
-    let mut sources: Vec<(&str, &str)> = design
-        .files
-        .iter()
-        .filter(|(name, _)| is_source(name))
-        .copied()
-        .collect();
+    let mut sources: Vec<(&str, &str)> = design.files.iter().filter(|(name, _)| is_source(name)).copied().collect();
     let bench = layout.verilog(design.top);
     // Verilator applies a waiver only to what it reads afterwards.
     sources.sort_by_key(|(name, _)| !name.ends_with(".vlt"));
     sources.extend([("bench.v", bench.as_str()), ("shim.cpp", SHIM)]);
     let folder = cache.join(fingerprint(&sources, &version()?));
     let ready = folder.join("libbench.so");
-    let _one = BUILDING
-        .lock()
-        .unwrap_or_else(std::sync::PoisonError::into_inner);
+    let _one = BUILDING.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
     if !ready.is_file() {
         build(design.top, &sources, &folder, cache)?;
     }
-    ready.canonicalize().map_err(|source| VerilatorError::Io {
-        path: ready,
-        source,
-    })
+    ready.canonicalize().map_err(|source| VerilatorError::Io { path: ready, source })
 }
 
 /// Builds in a temporary folder beside `folder` and renames it into place.
-fn build(
-    top: &str,
-    sources: &[(&str, &str)],
-    folder: &Path,
-    cache: &Path,
-) -> Result<(), VerilatorError> {
+fn build(top: &str, sources: &[(&str, &str)], folder: &Path, cache: &Path) -> Result<(), VerilatorError> {
     let io_at = |path: &Path| {
         let path = path.to_owned();
         move |source| VerilatorError::Io { path, source }
     };
     fs::create_dir_all(cache).map_err(io_at(cache))?;
-    let work = tempfile::Builder::new()
-        .prefix("building-")
-        .tempdir_in(cache)
-        .map_err(io_at(cache))?;
+    let work = tempfile::Builder::new().prefix("building-").tempdir_in(cache).map_err(io_at(cache))?;
     for (name, text) in sources {
         write(&work.path().join(name), text)?;
     }
     let _progress = Progress::start(&format!("verilating {top}"));
     let output = Command::new("verilator")
         .current_dir(work.path())
-        .args([
-            "--cc",
-            "--exe",
-            "--build",
-            "-j",
-            "2",
-            "--top-module",
-            "bench",
-            "--prefix",
-            "Vbench",
-        ])
-        .args([
-            "--x-initial",
-            "unique",
-            "--x-assign",
-            "unique",
-            "-O3",
-            "-Wno-DECLFILENAME",
-        ])
-        .args([
-            "-CFLAGS",
-            "-fPIC -O1",
-            "-LDFLAGS",
-            "-shared -Wl,--wrap=fopen",
-            "-o",
-            "../libbench.so",
-        ])
+        .args(["--cc", "--exe", "--build", "-j", "2", "--top-module", "bench", "--prefix", "Vbench"])
+        .args(["--x-initial", "unique", "--x-assign", "unique", "-O3", "-Wno-DECLFILENAME"])
+        .args(["-CFLAGS", "-fPIC -O1", "-LDFLAGS", "-shared -Wl,--wrap=fopen", "-o", "../libbench.so"])
         .args(sources.iter().map(|(name, _)| *name))
         .output()
         .map_err(|_| VerilatorError::Missing)?;
@@ -277,11 +201,7 @@ fn build(
         let text = String::from_utf8_lossy(&text);
         let log: Vec<&str> = text.lines().take(LOG_LINES).collect();
         // Kept, so that the named folder can be looked at.
-        return Err(VerilatorError::Build {
-            design: top.into(),
-            folder: work.keep(),
-            log: log.join("\n"),
-        });
+        return Err(VerilatorError::Build { design: top.into(), folder: work.keep(), log: log.join("\n") });
     }
     // Only the library and its sources stay; the object files are ten times as large.
     fs::remove_dir_all(work.path().join("obj_dir")).map_err(io_at(work.path()))?;
@@ -289,21 +209,13 @@ fn build(
     match fs::rename(&built, folder) {
         Ok(()) => Ok(()),
         // Somebody else finished the same build first: theirs serves as well.
-        Err(_) if folder.join("libbench.so").is_file() => {
-            fs::remove_dir_all(&built).map_err(io_at(&built))
-        }
-        Err(source) => Err(VerilatorError::Io {
-            path: folder.to_owned(),
-            source,
-        }),
+        Err(_) if folder.join("libbench.so").is_file() => fs::remove_dir_all(&built).map_err(io_at(&built)),
+        Err(source) => Err(VerilatorError::Io { path: folder.to_owned(), source }),
     }
 }
 
 fn write(path: &Path, text: &str) -> Result<(), VerilatorError> {
-    fs::write(path, text).map_err(|source| VerilatorError::Io {
-        path: path.to_owned(),
-        source,
-    })
+    fs::write(path, text).map_err(|source| VerilatorError::Io { path: path.to_owned(), source })
 }
 
 /// FNV-1a of all names, texts and the tool's version, 128 bits in hexadecimal.

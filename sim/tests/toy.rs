@@ -13,11 +13,7 @@ use dermis_sim::verilator::{Design, Verilated, VerilatorError};
 const TOY: &str = include_str!("toy/toy.v");
 const GAIN: i64 = 3;
 /// Beats leave one a cycle from the cycle after the last code: 6 forces and 1 status.
-const CYCLES: Cycles = Cycles {
-    first_output: 1,
-    latency: 7,
-    total: 13,
-};
+const CYCLES: Cycles = Cycles { first_output: 1, latency: 7, total: 13 };
 const TAPS: [&str; 2] = ["receive", "scale"];
 const STALLS: Stimulus = Stimulus::Stalls { seed: 7 };
 
@@ -29,10 +25,7 @@ fn taps() -> Vec<Tap> {
         fields: 1,
         field_bits,
     };
-    vec![
-        tap("receive", "{}take", "{}s_axis_tdata", 12),
-        tap("scale", "{}scale_valid", "{}scaled", 32),
-    ]
+    vec![tap("receive", "{}take", "{}s_axis_tdata", 12), tap("scale", "{}scale_valid", "{}scaled", 32)]
 }
 
 fn cache() -> PathBuf {
@@ -41,15 +34,7 @@ fn cache() -> PathBuf {
 
 fn toy_with(verilog: &str, gain: &str) -> Result<Verilated, VerilatorError> {
     let files = vec![("toy.v", verilog), ("gain.hex", gain)];
-    Verilated::new(
-        &Design {
-            top: "toy",
-            files,
-            taps: &taps(),
-            input_bits: 12,
-        },
-        &cache(),
-    )
+    Verilated::new(&Design { top: "toy", files, taps: &taps(), input_bits: 12 }, &cache())
 }
 
 fn toy() -> Verilated {
@@ -68,35 +53,18 @@ fn vectors() -> Vec<Vector> {
                 beats: codes.iter().map(|&c| [GAIN as i32 * c, c, c]).collect(),
                 status: vec![[6, 0, 0]],
                 stages: vec![
-                    Stage {
-                        name: "receive",
-                        words: codes.iter().map(word).collect(),
-                    },
-                    Stage {
-                        name: "scale",
-                        words: scaled,
-                    },
+                    Stage { name: "receive", words: codes.iter().map(word).collect() },
+                    Stage { name: "scale", words: scaled },
                 ],
                 cycles: CYCLES,
             },
         }
     };
-    vec![
-        frame("ramp", [0, 1, 2, 3, 4, 5]),
-        frame("extremes", [-2048, 2047, -1, 0, 1, -2047]),
-    ]
+    vec![frame("ramp", [0, 1, 2, 3, 4, 5]), frame("extremes", [-2048, 2047, -1, 0, 1, -2047])]
 }
 
-fn check(
-    device: &mut dyn Device,
-    vectors: &[Vector],
-    stimulus: Stimulus,
-) -> (Findings, Vec<Times>) {
-    let bench = Bench {
-        name: "toy",
-        device,
-        taps: &TAPS,
-    };
+fn check(device: &mut dyn Device, vectors: &[Vector], stimulus: Stimulus) -> (Findings, Vec<Times>) {
+    let bench = Bench { name: "toy", device, taps: &TAPS };
     run(bench, vectors, stimulus)
 }
 
@@ -104,36 +72,18 @@ fn check(
 fn equal_at_full_speed_with_exact_cycles_and_equal_with_stalls() {
     let (findings, times) = check(&mut toy(), &vectors(), Stimulus::FullSpeed);
     assert_eq!(findings, Findings::default());
-    assert!(
-        times
-            .iter()
-            .all(|t| t.latency() == Some(7) && t.total() == Some(13)),
-        "{times:?}"
-    );
+    assert!(times.iter().all(|t| t.latency() == Some(7) && t.total() == Some(13)), "{times:?}");
     let (findings, times) = check(&mut toy(), &vectors(), STALLS);
     assert_eq!(findings, Findings::default());
-    assert!(
-        times[0].total() > Some(13),
-        "the stalls did not stall: {times:?}"
-    );
+    assert!(times[0].total() > Some(13), "the stalls did not stall: {times:?}");
 }
 
 #[test]
 fn flipped_bit_in_a_memory_file_is_found_in_its_stage() {
-    let (findings, _) = check(
-        &mut toy_with(TOY, "02\n").unwrap(),
-        &vectors(),
-        Stimulus::FullSpeed,
-    );
+    let (findings, _) = check(&mut toy_with(TOY, "02\n").unwrap(), &vectors(), Stimulus::FullSpeed);
     let first = &findings.kept[0];
-    assert_eq!(
-        (first.stage.as_str(), first.index, first.taxel),
-        ("scale", 1, Some([0, 1]))
-    );
-    assert_eq!(
-        (&first.expected, &first.got),
-        (&Some(vec![3]), &Some(vec![2]))
-    );
+    assert_eq!((first.stage.as_str(), first.index, first.taxel), ("scale", 1, Some([0, 1])));
+    assert_eq!((&first.expected, &first.got), (&Some(vec![3]), &Some(vec![2])));
 }
 
 #[test]
@@ -142,10 +92,7 @@ fn flipped_bit_in_a_vector_is_found_at_the_input() {
     vectors[1].codes[4] ^= 1 << 3;
     let (findings, _) = check(&mut toy(), &vectors, STALLS);
     let first = &findings.kept[0];
-    assert_eq!(
-        (first.frame.as_str(), first.stage.as_str(), first.taxel),
-        ("extremes", "receive", Some([1, 1]))
-    );
+    assert_eq!((first.frame.as_str(), first.stage.as_str(), first.taxel), ("extremes", "receive", Some([1, 1])));
 }
 
 #[test]
@@ -167,10 +114,7 @@ fn a_wrong_cycle_count_is_found() {
     let mut vectors = vectors();
     vectors[0].expected.cycles.latency += 1;
     let (findings, _) = check(&mut toy(), &vectors[..1], Stimulus::FullSpeed);
-    assert_eq!(
-        findings.kept[0].rule.as_deref(),
-        Some("latency: expected 8 cycles, got 7")
-    );
+    assert_eq!(findings.kept[0].rule.as_deref(), Some("latency: expected 8 cycles, got 7"));
 }
 
 #[test]
@@ -178,20 +122,13 @@ fn a_stage_without_a_tap_and_a_tap_without_a_stage_are_found() {
     let mut vectors = vectors();
     vectors[0].expected.stages[1].name = "other";
     let (findings, _) = check(&mut toy(), &vectors[..1], Stimulus::FullSpeed);
-    let stages: Vec<&str> = findings
-        .kept
-        .iter()
-        .filter(|m| m.rule.is_some())
-        .map(|m| m.stage.as_str())
-        .collect();
+    let stages: Vec<&str> = findings.kept.iter().filter(|m| m.rule.is_some()).map(|m| m.stage.as_str()).collect();
     assert_eq!(stages, ["scale", "other"]);
 }
 
 #[test]
 fn a_broken_design_is_an_error_with_the_tools_words() {
-    let Err(error) = toy_with(&TOY.replace("wire take =", "wire taken ="), "03\n") else {
-        panic!("built")
-    };
+    let Err(error) = toy_with(&TOY.replace("wire take =", "wire taken ="), "03\n") else { panic!("built") };
     assert!(error.to_string().contains("toy.v:"), "{error}");
 }
 
@@ -214,10 +151,7 @@ fn a_beat_that_changes_while_it_waits_is_found() {
         outputs.m_valid &= flicker;
     });
     let (findings, _) = check(&mut device, &vectors(), STALLS);
-    assert!(findings
-        .kept
-        .iter()
-        .any(|m| m.rule.as_deref() == Some("an offered beat must stay until it is taken")));
+    assert!(findings.kept.iter().any(|m| m.rule.as_deref() == Some("an offered beat must stay until it is taken")));
 }
 
 #[test]
@@ -225,10 +159,7 @@ fn a_missing_tlast_is_found() {
     let mut device = Spoiled(toy(), |outputs| outputs.m_last = false);
     let (findings, _) = check(&mut device, &vectors(), Stimulus::FullSpeed);
     assert_eq!(findings.count, 2);
-    assert_eq!(
-        (findings.kept[0].stage.as_str(), findings.kept[0].index),
-        ("handshake", 6)
-    );
+    assert_eq!((findings.kept[0].stage.as_str(), findings.kept[0].index), ("handshake", 6));
 }
 
 #[test]
@@ -239,10 +170,7 @@ fn a_beat_too_many_is_found() {
         outputs.m_valid |= beats == 14;
     });
     let (findings, _) = check(&mut device, &vectors(), Stimulus::FullSpeed);
-    assert_eq!(
-        findings.kept[0].rule.as_deref(),
-        Some("no beat may follow the last frame's")
-    );
+    assert_eq!(findings.kept[0].rule.as_deref(), Some("no beat may follow the last frame's"));
 }
 
 #[test]
@@ -253,13 +181,35 @@ fn a_dead_output_ends_the_run_and_names_what_was_awaited() {
         findings.kept[0].rule.clone().unwrap()
     };
     let dead = awaited(|outputs| outputs.m_valid = false, &vectors());
-    assert_eq!(
-        dead,
-        "nothing moved for 10000 cycles while waiting for output beat 0 of 7"
-    );
+    assert_eq!(dead, "nothing moved for 10000 cycles while waiting for output beat 0 of 7");
     let deaf = awaited(|outputs| outputs.s_ready = false, &vectors()[..1]);
-    assert_eq!(
-        deaf,
-        "nothing moved for 10000 cycles while waiting for s_axis_tready for taxel 0 of 6"
-    );
+    assert_eq!(deaf, "nothing moved for 10000 cycles while waiting for s_axis_tready for taxel 0 of 6");
+}
+
+#[test]
+fn a_device_that_sends_without_end_does_not_hang_the_bench() {
+    let mut device = Spoiled(toy(), |outputs| {
+        outputs.m_valid = true;
+        outputs.s_ready = false;
+    });
+    let (findings, _) = check(&mut device, &vectors(), Stimulus::FullSpeed);
+    assert!(findings.kept[0].to_string().contains("waiting for s_axis_tready"), "{}", findings.kept[0]);
+}
+
+/// The toy without its reset.
+struct Stubborn(Verilated);
+
+impl Device for Stubborn {
+    fn cycle(&mut self, inputs: &Inputs) -> Outputs {
+        self.0.cycle(&Inputs { rst: false, ..*inputs })
+    }
+}
+
+#[test]
+fn work_that_survives_a_reset_is_found() {
+    let mut device = toy();
+    // A defined start; from here on the reset does nothing.
+    device.cycle(&Inputs { rst: true, ..Inputs::default() });
+    let (findings, _) = check(&mut Stubborn(device), &vectors(), STALLS);
+    assert!(!findings.is_equal());
 }

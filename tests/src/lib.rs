@@ -4,6 +4,7 @@
 //! |---|---|
 //! | `equality` | generated Verilog = rust-hdl's simulation = bit-true model, on every shipped frame; cycle budgets |
 //! | `accuracy` | golden against the truth, bit-true against golden |
+//! | `boards` | scenes may name every board and no other |
 //! | `flipped_bit` | one wrong bit in a coefficient, a vector or the expected output is found |
 //! | `lint` | the generated Verilog is clean under Verilator with its waivers, and needs every one of them |
 #![deny(missing_docs)]

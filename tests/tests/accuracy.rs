@@ -24,10 +24,7 @@ fn sensor_1_meets_its_targets() {
     let golden = Golden::new(&scene).unwrap();
     let golden: Vec<_> = frames.iter().map(|f| golden.run(f).unwrap()).collect();
     let model = Model::new(&scene).unwrap();
-    let fixed: Vec<_> = frames
-        .iter()
-        .map(|f| model.reconstruct(f).unwrap())
-        .collect();
+    let fixed: Vec<_> = frames.iter().map(|f| model.reconstruct(f).unwrap()).collect();
 
     for result in &golden {
         let normal = result.error.as_ref().unwrap().normal.unwrap();
@@ -35,8 +32,5 @@ fn sensor_1_meets_its_targets() {
     }
     let (float, integer) = (tangential(&golden), tangential(&fixed));
     assert!(float <= GOLDEN_TANGENTIAL, "golden e_t {float}");
-    assert!(
-        integer <= float + FIXED_ADDS,
-        "fixed e_t {integer}, golden {float}"
-    );
+    assert!(integer <= float + FIXED_ADDS, "fixed e_t {integer}, golden {float}");
 }

@@ -9,20 +9,8 @@ use dermis_sim::verify::{verify, Verified};
 use dermis_tests::{build_dir, scene, SCENES};
 
 fn check(scene: &Scene, frames: &[Frame]) -> Verified {
-    let verified = verify(
-        scene,
-        frames,
-        &[Simulator::Verilator, Simulator::RustHdl],
-        &build_dir(),
-    )
-    .unwrap();
-    let first: Vec<String> = verified
-        .findings
-        .kept
-        .iter()
-        .take(3)
-        .map(ToString::to_string)
-        .collect();
+    let verified = verify(scene, frames, &[Simulator::Verilator, Simulator::RustHdl], &build_dir()).unwrap();
+    let first: Vec<String> = verified.findings.kept.iter().take(3).map(ToString::to_string).collect();
     assert!(verified.findings.is_equal(), "{}: {first:#?}", scene.name);
     verified
 }
@@ -33,11 +21,7 @@ fn every_shipped_frame_is_equal_and_within_its_cycles() {
         let (scene, frames) = scene(name);
         for row in check(&scene, &frames).rows {
             let total = row.times.total().unwrap();
-            assert!(
-                total <= budget,
-                "{name}, {}: {total} cycles, at most {budget}",
-                row.frame
-            );
+            assert!(total <= budget, "{name}, {}: {total} cycles, at most {budget}", row.frame);
         }
     }
 }
@@ -45,19 +29,13 @@ fn every_shipped_frame_is_equal_and_within_its_cycles() {
 #[test]
 fn degenerate_frames_are_equal() {
     let (scene, frames) = scene("eight-by-eight");
-    let with = |id: &str, stress: Vec<f64>| Frame {
-        id: id.into(),
-        stress_MPa: stress,
-        ..frames[0].clone()
-    };
+    let with = |id: &str, stress: Vec<f64>| Frame { id: id.into(), stress_MPa: stress, ..frames[0].clone() };
     let one = |taxel: usize, value: f64| {
         let mut stress = vec![0.0; scene.sensor.taxels()];
         stress[taxel] = value;
         stress
     };
-    let checks: Vec<f64> = (0..scene.sensor.taxels())
-        .map(|i| if (i / 8 + i) % 2 == 0 { 0.2 } else { -0.2 })
-        .collect();
+    let checks: Vec<f64> = (0..scene.sensor.taxels()).map(|i| if (i / 8 + i) % 2 == 0 { 0.2 } else { -0.2 }).collect();
     let tension = frames[0].stress_MPa.iter().map(|b| -b).collect();
     let frames = [
         with("zeros", vec![0.0; scene.sensor.taxels()]),

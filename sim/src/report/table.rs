@@ -6,6 +6,9 @@ use super::{CosimReport, BUDGET_US};
 use crate::compare::median;
 use crate::verify::{Row, Verified};
 
+/// Mismatches printed for people; `--json` holds more.
+const PRINTED: usize = 16;
+
 /// One co-simulation: a row per frame, the runs, the mismatches.
 pub fn cosim(verified: &Verified) -> String {
     let head = [
@@ -36,9 +39,7 @@ pub fn cosim(verified: &Verified) -> String {
             yes(row.equal),
             count(row.times.latency()),
             count(row.times.total()),
-            row.times.total().map_or("-".into(), |c| {
-                format!("{:.2}", verified.board.microseconds(c))
-            }),
+            row.times.total().map_or("-".into(), |c| format!("{:.2}", verified.board.microseconds(c))),
         ]
     });
     let mut text = markdown(&head, rows.collect());
@@ -52,16 +53,11 @@ fn summary(verified: &Verified) -> String {
     let findings = &verified.findings;
     let mut text = String::new();
     if findings.is_equal() {
-        text.push_str(
-            "equal to the bit-true model to the bit: every stage, every beat, every cycle count\n",
-        );
+        text.push_str("equal to the bit-true model to the bit: every stage, every beat, every cycle count\n");
     } else {
-        text.push_str(&format!(
-            "NOT EQUAL: {} mismatches, the first {}:\n",
-            findings.count,
-            findings.kept.len()
-        ));
-        for mismatch in &findings.kept {
+        let shown = &findings.kept[..findings.kept.len().min(PRINTED)];
+        text.push_str(&format!("NOT EQUAL: {} mismatches, the first {}:\n", findings.count, shown.len()));
+        for mismatch in shown {
             text.push_str(&format!("  {mismatch}\n"));
         }
     }
@@ -95,9 +91,7 @@ pub fn scenes(all: &[Verified]) -> String {
     ];
     let rows = all.iter().map(|verified| {
         let report = CosimReport::new(verified);
-        let of = |value: fn(&Row) -> Option<f64>| {
-            percent(median(verified.rows.iter().filter_map(value).collect()))
-        };
+        let of = |value: fn(&Row) -> Option<f64>| percent(median(verified.rows.iter().filter_map(value).collect()));
         let time = report.time_us.max;
         vec![
             report.scene,
@@ -145,26 +139,19 @@ fn yes(equal: bool) -> String {
 fn markdown(head: &[&str], rows: Vec<Vec<String>>) -> String {
     let head: Vec<String> = head.iter().map(|&h| h.to_owned()).collect();
     let width = |column: usize| {
-        let cells = rows
-            .iter()
-            .chain([&head])
-            .map(|row| row[column].chars().count());
+        let cells = rows.iter().chain([&head]).map(|row| row[column].chars().count());
         cells.max().unwrap_or(0)
     };
     let widths: Vec<usize> = (0..head.len()).map(width).collect();
     let line = |row: &Vec<String>| {
-        let cells = row
-            .iter()
-            .zip(&widths)
-            .enumerate()
-            .map(|(column, (cell, &width))| {
-                let pad = " ".repeat(width - cell.chars().count());
-                if column == 0 {
-                    format!("{cell}{pad}")
-                } else {
-                    format!("{pad}{cell}")
-                }
-            });
+        let cells = row.iter().zip(&widths).enumerate().map(|(column, (cell, &width))| {
+            let pad = " ".repeat(width - cell.chars().count());
+            if column == 0 {
+                format!("{cell}{pad}")
+            } else {
+                format!("{pad}{cell}")
+            }
+        });
         format!("| {} |\n", cells.collect::<Vec<_>>().join(" | "))
     };
     let rule = widths.iter().enumerate().map(|(column, &width)| {
@@ -186,9 +173,6 @@ mod tests {
     #[test]
     fn columns_are_padded_by_characters_not_bytes() {
         let table = markdown(&["frame", "µs"], vec![vec!["a".into(), "12.50".into()]]);
-        assert_eq!(
-            table,
-            "| frame |    µs |\n|-------|------:|\n| a     | 12.50 |\n"
-        );
+        assert_eq!(table, "| frame |    µs |\n|-------|------:|\n| a     | 12.50 |\n");
     }
 }
