@@ -18,6 +18,7 @@
 #![allow(non_snake_case)]
 
 pub mod errors;
+pub mod fixed;
 pub mod flags;
 pub mod float;
 pub mod frame;

@@ -12,9 +12,10 @@ use super::search::{search, Block};
 use super::send::{Status, FLAG_CONDITION, FLAG_FOUND, FLAG_NO_CONTACT};
 use super::{fold, force, normalise, receive, rescale, unfold};
 use crate::flags::{frame_flags, Flag};
-use crate::float::receive as float_receive;
+use crate::float::receive::receive as judge;
 use crate::frame::{Forces, Frame, FrameError};
 use crate::matrices::{Matrices, MatricesError};
+use crate::partition::Subarray;
 use crate::quantise::{full_scale, noise_floor_codes, quantise, Codes};
 use crate::reconstruct::{assemble, Reconstruction, SubarrayResult};
 use crate::scene::{Condition, Scene, SceneError};
@@ -292,15 +293,17 @@ impl Model {
         let met = status.flags & FLAG_CONDITION != 0;
         let step = self.scene.search.mu_max / MU_STEPS as f64;
         let floor = noise_floor_codes(&self.scene, &codes);
-        let seen = float_receive::centroids(&self.scene.sensor, &codes.codes, floor);
+        let sensor = &self.scene.sensor;
+        let part = Subarray { row0: 0, col0: 0, rows: sensor.rows, cols: sensor.cols };
+        let receipt = judge(sensor, &part, &codes.codes, floor, self.scene.partition.condition);
         let subarray = SubarrayResult {
-            row0: 0,
-            col0: 0,
-            rows: self.scene.sensor.rows,
-            cols: self.scene.sensor.cols,
+            row0: part.row0,
+            col0: part.col0,
+            rows: part.rows,
+            cols: part.cols,
             centroid_condition: met,
-            compression_centroid_mm: seen.0,
-            tension_centroid_mm: seen.1,
+            compression_centroid_mm: receipt.compression_centroid_mm,
+            tension_centroid_mm: receipt.tension_centroid_mm,
             mu: status.position.map(|x| f64::from(x) * step),
             objective_value: found.then(|| -f64::from(status.score) / f64::from(1u32 << LOG_FRACTION)),
         };
