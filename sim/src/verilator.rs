@@ -191,7 +191,7 @@ fn build(top: &str, sources: &[(&str, &str)], folder: &Path, cache: &Path) -> Re
     let output = Command::new("verilator")
         .current_dir(work.path())
         .args(["--cc", "--exe", "--build", "-j", "2", "--top-module", "bench", "--prefix", "Vbench"])
-        .args(["--x-initial", "unique", "--x-assign", "unique", "-O3", "-Wno-DECLFILENAME"])
+        .args(["--x-initial", "unique", "--x-assign", "unique", "-O3"])
         .args(["-CFLAGS", "-fPIC -O1", "-LDFLAGS", "-shared -Wl,--wrap=fopen", "-o", "../libbench.so"])
         .args(sources.iter().map(|(name, _)| *name))
         .output()
