@@ -4,19 +4,25 @@
 //! codes → receive → normalise → fold → pass → rescale → unfold → search → force → send → beats, status
 //! ```
 //! [`engine`] wires the [`stages`] together; a stage is control and wiring in a `#[hdl_gen]` kernel around the
-//! [`primitives`] that hold arithmetic and memory. All widths come from the formats of the bit-true model, which is also what every
-//! simulation is compared with.
+//! [`primitives`] that hold arithmetic and memory. All widths come from the formats of the bit-true model, which is also
+//! what every simulation is compared with.
 #![deny(missing_docs)]
-// Field names carry their unit as SI writes it.
-#![allow(non_snake_case)]
 
 /// A comment that `#[hdl_gen]` copies into the Verilog; nothing in Rust.
 macro_rules! comment {
     ($text:literal) => {};
 }
 
+pub mod board;
 pub mod device;
 pub mod engine;
 pub mod primitives;
 pub mod stages;
 pub mod wire;
+
+mod generate;
+mod simulate;
+mod taps;
+
+pub use generate::{generate, Generated, GeneratedFile, HdlError};
+pub use simulate::simulator;

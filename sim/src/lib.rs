@@ -1,2 +1,36 @@
-//! Dermis.
+//! Co-simulation of the generated hardware, its reports and the `dermis` command line.
+//!
+//! ```text
+//! frame -> codes --+--> bit-true model ------------> Trace ----+
+//!                  |                                           +--> cosim::judge -> report
+//!                  +--> drive -> Device (Verilator,            |
+//!                                rust-hdl) -> Recording -------+
+//! ```
+//!
+//! | module | does |
+//! |---|---|
+//! | [`mod@bench`] | the Verilog wrapper that packs pins and taps into two vectors |
+//! | [`verilator`] | builds, caches and loads a verilated design as a [`Device`](dermis_hdl::device::Device) |
+//! | [`drive`] | plays frames into a device and records every transfer with its cycle |
+//! | [`cosim`] | compares a recording with the bit-true model |
+//! | [`hardware`] | a scene's generated hardware and its simulators |
+//! | [`compare`] | how far two force fields are apart |
+//! | [`verify`] | one scene's frames through all three models |
+//! | [`report`] | tables and the JSON contract |
+//! | [`inputs`] | scene and frames from what the command line names |
+//! | [`cli`] | arguments, commands, exit codes |
 #![deny(missing_docs)]
+// Names carry their unit as SI writes it: `full_scale_MPa`.
+#![allow(non_snake_case)]
+
+pub mod bench;
+pub mod cli;
+pub mod compare;
+pub mod cosim;
+pub mod drive;
+pub mod hardware;
+pub mod inputs;
+mod progress;
+pub mod report;
+pub mod verify;
+pub mod verilator;

@@ -1,2 +1,6 @@
-//! Dermis command line.
-fn main() {}
+//! The `dermis` program; everything is in [`dermis_sim::cli`].
+use std::process::ExitCode;
+
+fn main() -> ExitCode {
+    dermis_sim::cli::main()
+}

@@ -1,2 +1,34 @@
-//! Dermis.
+//! What the tests of this crate share: scenes, their shipped frames, and where built libraries live.
+//!
+//! | test | claims |
+//! |---|---|
+//! | `equality` | generated Verilog = rust-hdl's simulation = bit-true model, on every shipped frame; cycle budgets |
+//! | `accuracy` | golden against the truth, bit-true against golden |
+//! | `boards` | scenes may name every board and no other |
+//! | `flipped_bit` | one wrong bit in a coefficient, a vector or the expected output is found |
+//! | `lint` | the generated Verilog is clean under Verilator with its waivers, and needs every one of them |
 #![deny(missing_docs)]
+
+use std::path::PathBuf;
+
+use dermis_golden::frame::Frame;
+use dermis_golden::scene::Scene;
+
+/// Scenes that are verified on real frames, with the most cycles that a frame may take.
+pub const SCENES: [(&str, u64); 2] = [("sensor-1", 5_000), ("eight-by-eight", 3_000)];
+
+/// A built-in scene and its shipped half-space frames.
+///
+/// # Panics
+/// When the scene does not exist or has no frames; this crate holds tests only.
+pub fn scene(name: &str) -> (Scene, Vec<Frame>) {
+    let scene = Scene::builtin(name).expect("a built-in scene");
+    let frames = Frame::shipped(&scene);
+    assert!(!frames.is_empty(), "{name} has no frames");
+    (scene, frames)
+}
+
+/// The workspace's folder for built things: the libraries that `make run` has built serve here too.
+pub fn build_dir() -> PathBuf {
+    PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../build")
+}

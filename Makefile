@@ -1,0 +1,68 @@
+# Targets for Debian 12 with a Rust toolchain; `make help` lists them. Logic belongs to the `dermis` command.
+
+SCENE     ?= sensor-1
+SCENES    ?= sensor-1 eight-by-eight
+BUILD     ?= build
+CARGO     ?= cargo
+VERILATOR ?= verilator
+# Cargo's own variable, so that a folder elsewhere is found too.
+CARGO_TARGET_DIR ?= target
+DERMIS     = $(CARGO_TARGET_DIR)/release/dermis
+PACKAGES   = verilator yosys g++ make
+
+.DEFAULT_GOAL := help
+.PHONY: help setup program run test fmt clippy unit lint docs bench build cosim clean
+
+help: ## list the targets
+	@sed -n 's/^\([a-z]*\):.*## /\1	/p' $(MAKEFILE_LIST) | expand -t 10
+
+setup: ## install the Debian packages that are missing
+	@missing=$$(dpkg-query -W -f '$${db:Status-Status} $${Package}\n' $(PACKAGES) 2>&1 | grep -v '^installed ' | grep -o '[^ ]*$$'); \
+	if [ -z "$$missing" ]; then exit 0; fi; \
+	if [ "$$(id -u)" = 0 ]; then sudo=; else sudo=sudo; fi; \
+	$$sudo apt-get update -q && $$sudo apt-get install -y --no-install-recommends $(PACKAGES)
+
+program: setup
+	$(CARGO) build --release --bins
+
+run: program ## co-simulate both scenes on real frames and print the table
+	$(DERMIS) --build-dir $(BUILD) table $(SCENES)
+
+test: setup fmt clippy unit lint docs ## all checks; what .ci/run calls
+
+fmt: ## check the formatting
+	@echo '== fmt'
+	$(CARGO) fmt --all --check
+
+clippy: ## check the code, warnings are errors
+	@echo '== clippy'
+	$(CARGO) clippy --workspace --all-targets -- -D warnings
+
+unit: setup ## run all tests: units, command line, co-simulation
+	@echo '== unit'
+	$(CARGO) test --workspace
+
+lint: setup ## lint the generated Verilog with its waivers
+	@echo '== lint'
+	@set -e; for scene in $(SCENES); do \
+	  $(CARGO) run --quiet --bin dermis -- build $$scene --out $(BUILD)/$$scene/rtl >/dev/null; \
+	  (cd $(BUILD)/$$scene/rtl && $(VERILATOR) --lint-only -Wall *.vlt *.v); \
+	  echo "$$scene: verilator --lint-only -Wall is clean"; \
+	done
+
+docs: ## build the documentation, warnings are errors
+	@echo '== docs'
+	RUSTDOCFLAGS="-D warnings" $(CARGO) doc --workspace --no-deps
+
+bench: ## time a golden reconstruction
+	$(CARGO) bench --package dermis-golden
+
+build: program ## generate the hardware of SCENE
+	$(DERMIS) --build-dir $(BUILD) build $(SCENE)
+
+cosim: program ## co-simulate SCENE on its shipped frames
+	$(DERMIS) --build-dir $(BUILD) cosim $(SCENE)
+
+clean: ## remove everything built
+	$(CARGO) clean
+	rm -rf $(BUILD)

@@ -1,0 +1,128 @@
+//! Boards: the device a design is generated for, from `constraints/<board>.toml`.
+//!
+//! The files are embedded, so the program needs no folder beside it.
+//!
+//! | field | unit | meaning |
+//! |---|---|---|
+//! | `device`, `package`, `speed_grade` | | as the place and route tool names them |
+//! | `input_clock_MHz` | MHz | oscillator on the board |
+//! | `clock_MHz` | MHz | the engine's clock: a design target until place and route has measured it |
+//! | `multipliers` | | 18×18 multipliers |
+//! | `block_rams` | | block RAMs of 18 kbit |
+
+use include_dir::{include_dir, Dir};
+use serde::{Deserialize, Serialize};
+use thiserror::Error;
+
+static FILES: Dir = include_dir!("$CARGO_MANIFEST_DIR/../constraints");
+
+/// A board and its device.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+#[allow(non_snake_case)]
+pub struct Board {
+    /// Name of the file and of `[hardware] board` in a scene.
+    #[serde(skip_deserializing)]
+    pub name: String,
+    /// One line for people.
+    pub description: String,
+    /// Ordering code of the device.
+    pub device: String,
+    /// Package name.
+    pub package: String,
+    /// Speed grade.
+    pub speed_grade: u32,
+    /// Oscillator on the board, MHz, > 0.
+    pub input_clock_MHz: f64,
+    /// Clock of the engine, MHz, > 0.
+    pub clock_MHz: f64,
+    /// 18×18 multipliers.
+    pub multipliers: u32,
+    /// Block RAMs of 18 kbit.
+    pub block_rams: u32,
+}
+
+/// Why a board cannot be used.
+#[derive(Clone, Debug, PartialEq, Eq, Error)]
+pub enum BoardError {
+    /// No file of this name.
+    #[error("hardware.board = \"{name}\": unknown board; there are: {known}")]
+    Unknown {
+        /// The name asked for.
+        name: String,
+        /// The names there are, separated by commas.
+        known: String,
+    },
+    /// A file that is not a board.
+    #[error("constraints/{name}.toml: {reason}")]
+    Invalid {
+        /// The board's name.
+        name: String,
+        /// What is wrong.
+        reason: String,
+    },
+}
+
+impl Board {
+    /// The board called `name`.
+    ///
+    /// # Errors
+    /// [`BoardError::Unknown`] lists the boards there are.
+    pub fn load(name: &str) -> Result<Board, BoardError> {
+        let unknown = || BoardError::Unknown { name: name.to_owned(), known: Board::names().join(", ") };
+        let file = FILES.get_file(format!("{name}.toml")).ok_or_else(unknown)?;
+        Board::parse(name, file.contents_utf8().unwrap_or_default())
+    }
+
+    /// Names of all boards, sorted.
+    pub fn names() -> Vec<&'static str> {
+        let stems = FILES.files().filter(|f| f.path().extension().is_some_and(|e| e == "toml"));
+        let mut names: Vec<_> = stems.filter_map(|f| f.path().file_stem()?.to_str()).collect();
+        names.sort_unstable();
+        names
+    }
+
+    fn parse(name: &str, text: &str) -> Result<Board, BoardError> {
+        let invalid = |reason: String| BoardError::Invalid { name: name.to_owned(), reason };
+        let board: Board = toml::from_str(text).map_err(|e| invalid(e.to_string()))?;
+        for (field, value) in [("input_clock_MHz", board.input_clock_MHz), ("clock_MHz", board.clock_MHz)] {
+            if !(value.is_finite() && value > 0.0) {
+                return Err(invalid(format!("{field} = {value}: must be positive")));
+            }
+        }
+        Ok(Board { name: name.to_owned(), ..board })
+    }
+
+    /// Time of `cycles` at the engine's clock, in µs.
+    pub fn microseconds(&self, cycles: u64) -> f64 {
+        cycles as f64 / self.clock_MHz
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_shipped_board_loads() {
+        assert!(Board::names().contains(&"ulx3s-85f"));
+        for name in Board::names() {
+            assert_eq!(Board::load(name).unwrap().name, name);
+        }
+        // 100 MHz: one cycle is 10 ns.
+        assert_eq!(Board::load("ulx3s-85f").unwrap().microseconds(100), 1.0);
+    }
+
+    #[test]
+    fn an_unknown_board_lists_the_known_ones() {
+        let error = Board::load("ulx3s").unwrap_err().to_string();
+        assert!(error.contains("\"ulx3s\"") && error.contains("ulx3s-85f"), "{error}");
+    }
+
+    #[test]
+    fn a_clock_of_zero_names_file_field_and_value() {
+        let text = FILES.get_file("ulx3s-85f.toml").unwrap().contents_utf8().unwrap();
+        let error = Board::parse("x", &text.replace("clock_MHz = 100.0", "clock_MHz = 0.0")).unwrap_err();
+        assert_eq!(error.to_string(), "constraints/x.toml: clock_MHz = 0: must be positive");
+    }
+}

@@ -1,0 +1,165 @@
+//! The generated module `bench`: one instance of the design, its pins and taps packed into two
+//! vectors, so that one C++ shim serves every design.
+//!
+//! | vector | bits | holds |
+//! |---|---|---|
+//! | `in` | 31:0 | `s_axis_tdata`, two's complement |
+//! | | 32, 33, 34, 35 | `rst`, `s_axis_tvalid`, `s_axis_tlast`, `m_axis_tready` |
+//! | `out` | 0, 1, 2 | `s_axis_tready`, `m_axis_tvalid`, `m_axis_tlast` |
+//! | | 127:32 | `m_axis_tdata` = {fz, fy, fx} |
+//! | | from 128 | per tap: one 32-bit word with valid in bit 0, then the data padded to 32-bit words |
+//!
+//! The taps are hierarchical references into the design: nothing is added to what is synthesised.
+
+use std::fmt::Write as _;
+
+use dermis_hdl::device::{Inputs, Outputs, Tap};
+
+/// Words of `out` before the first tap.
+const PIN_WORDS: usize = 4;
+
+/// Where each pin and tap of one design sits in the packed vectors.
+#[derive(Clone, Debug)]
+pub struct Layout {
+    input_bits: u32,
+    taps: Vec<Tap>,
+    /// First word of each tap in `out`; one more entry for the end.
+    offsets: Vec<usize>,
+}
+
+impl Layout {
+    /// The layout of a design with `input_bits`-wide codes (1..=32) and these taps.
+    pub fn new(input_bits: u32, taps: &[Tap]) -> Self {
+        let mut offsets = vec![PIN_WORDS];
+        let mut end = PIN_WORDS;
+        for tap in taps {
+            end += 1 + tap_bits(tap).div_ceil(32);
+            offsets.push(end);
+        }
+        Layout { input_bits, taps: taps.to_vec(), offsets }
+    }
+
+    /// The taps, in the order of [`Outputs::taps`].
+    pub fn taps(&self) -> &[Tap] {
+        &self.taps
+    }
+
+    /// Length of `out` in 32-bit words.
+    pub fn out_words(&self) -> usize {
+        self.offsets[self.taps.len()]
+    }
+
+    /// Verilog text of `bench` around an instance `dut` of module `top`.
+    pub fn verilog(&self, top: &str) -> String {
+        let mut text = format!(
+            "// Test bench of {top}: pins and taps packed into two vectors. Generated, do not edit.\n\
+             module bench(input wire clk, input wire [63:0] in, output wire [{out}:0] out);\n  \
+             wire s_ready, m_valid, m_last;\n  wire [95:0] m_data;\n  {top} dut(\n    \
+             .clk(clk), .rst(in[32]),\n    \
+             .s_axis_tdata(in[{data}:0]), .s_axis_tvalid(in[33]), .s_axis_tready(s_ready), .s_axis_tlast(in[34]),\n    \
+             .m_axis_tdata(m_data), .m_axis_tvalid(m_valid), .m_axis_tready(in[35]), .m_axis_tlast(m_last));\n  \
+             assign out[127:0] = {{m_data, 29'd0, m_last, m_valid, s_ready}};\n",
+            out = 32 * self.out_words() - 1,
+            data = self.input_bits - 1,
+        );
+        for (index, tap) in self.taps.iter().enumerate() {
+            let bits = tap_bits(tap);
+            let (first, last) = (32 * self.offsets[index], 32 * self.offsets[index + 1] - 1);
+            let padding = last - first + 1 - 32 - bits;
+            let zeros = if padding == 0 { String::new() } else { format!("{padding}'d0, ") };
+            // Writing to a String cannot fail.
+            let _ = writeln!(
+                text,
+                "  // tap {name}: {fields} fields of {width} bits\n  \
+                 wire tap{index}_valid = {valid};\n  wire [{top_bit}:0] tap{index}_data = {data};\n  \
+                 assign out[{last}:{first}] = {{{zeros}tap{index}_data, 31'd0, tap{index}_valid}};",
+                name = tap.name,
+                fields = tap.fields,
+                width = tap.field_bits,
+                valid = tap.valid.replace("{}", "dut."),
+                data = tap.data.replace("{}", "dut."),
+                top_bit = bits - 1,
+            );
+        }
+        text.push_str("endmodule\n");
+        text
+    }
+
+    /// Packs one cycle's inputs.
+    pub fn pack(&self, inputs: &Inputs) -> u64 {
+        let mask = u64::MAX >> (64 - self.input_bits);
+        (inputs.s_data as i64 as u64 & mask)
+            | u64::from(inputs.rst) << 32
+            | u64::from(inputs.s_valid) << 33
+            | u64::from(inputs.s_last) << 34
+            | u64::from(inputs.m_ready) << 35
+    }
+
+    /// Unpacks one cycle's outputs from [`Layout::out_words`] words.
+    pub fn unpack(&self, words: &[u32]) -> Outputs {
+        let taps = self.taps.iter().zip(&self.offsets).map(|(tap, &offset)| {
+            (words[offset] & 1 == 1).then(|| {
+                let data = &words[offset + 1..];
+                (0..tap.fields).map(|i| field(data, i * tap.field_bits as usize, tap.field_bits)).collect()
+            })
+        });
+        Outputs {
+            s_ready: words[0] & 1 == 1,
+            m_valid: words[0] >> 1 & 1 == 1,
+            m_last: words[0] >> 2 & 1 == 1,
+            m_data: [words[1] as i32, words[2] as i32, words[3] as i32],
+            taps: taps.collect(),
+        }
+    }
+}
+
+/// Bits of a tap's word, at least one.
+fn tap_bits(tap: &Tap) -> usize {
+    (tap.fields * tap.field_bits as usize).max(1)
+}
+
+/// The signed field of `bits` (1..=64) at bit `start` of little-endian 32-bit words.
+fn field(words: &[u32], start: usize, bits: u32) -> i64 {
+    let word = |index: usize| u128::from(words.get(index).copied().unwrap_or(0));
+    let first = start / 32;
+    // 31 bits of offset and 64 bits of field span at most three words.
+    let window = word(first) | word(first + 1) << 32 | word(first + 2) << 64;
+    let raw = (window >> (start % 32)) as u64;
+    ((raw << (64 - bits)) as i64) >> (64 - bits)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn tap(name: &'static str, fields: usize, field_bits: u32) -> Tap {
+        Tap { name, valid: "{}v".into(), data: "{}d".into(), fields, field_bits }
+    }
+
+    #[test]
+    fn fields_across_word_borders_are_sign_extended() {
+        // Field 0 = -2 in 33 bits, field 1 = 5: bits 0..=32 hold 0x1_ffff_fffe, bits 33.. hold 5.
+        let words = [0xffff_fffe, 1 | 5 << 1, 0];
+        assert_eq!(field(&words, 0, 33), -2);
+        assert_eq!(field(&words, 33, 33), 5);
+        assert_eq!(field(&[0, 0x8000_0000], 0, 64), i64::MIN);
+    }
+
+    #[test]
+    fn pins_and_taps_unpack_where_the_layout_says() {
+        let layout = Layout::new(20, &[tap("a", 3, 18), tap("b", 1, 64)]);
+        // 54 bits need two words, 64 bits two: 4 + 3 + 3.
+        assert_eq!(layout.out_words(), 10);
+        let words = [0b110, 1, u32::MAX, 3, 1, 7 | 9 << 18, 0, 0, 1, 2];
+        let outputs = layout.unpack(&words);
+        assert_eq!((outputs.s_ready, outputs.m_valid, outputs.m_last), (false, true, true));
+        assert_eq!(outputs.m_data, [1, -1, 3]);
+        assert_eq!(outputs.taps, vec![Some(vec![7, 9, 0]), None]);
+    }
+
+    #[test]
+    fn negative_codes_keep_to_their_bits() {
+        let inputs = Inputs { s_data: -1, s_valid: true, ..Inputs::default() };
+        assert_eq!(Layout::new(20, &[]).pack(&inputs), 0xf_ffff | 1 << 33);
+    }
+}

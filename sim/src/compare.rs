@@ -1,0 +1,72 @@
+//! Differences between two reconstructions of the same frame.
+//!
+//! Over all 3·taxels components: max |a − b| and RMS = √(Σ (a − b)² / 3n), in LSBs of the force word and
+//! as a share of the reference's largest |component|.
+//!
+//! | | unit | range |
+//! |---|---|---|
+//! | in: reference, other, LSB | N | finite, equal lengths |
+//! | out: [`Difference`] | LSB, fraction | ≥ 0; fractions 0 where the reference has no force |
+
+use dermis_golden::frame::Forces;
+
+/// How far two force fields are apart.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Difference {
+    /// Largest difference of a component, in LSBs.
+    pub max_lsb: f64,
+    /// Root mean square over all components, in LSBs.
+    pub rms_lsb: f64,
+    /// Largest difference over the reference's largest component.
+    pub max_share: f64,
+    /// Root mean square over the reference's largest component.
+    pub rms_share: f64,
+}
+
+/// Compares `other` with `reference`; `lsb_N` > 0 is the force of one LSB.
+pub fn difference(reference: &Forces, other: &Forces, lsb_N: f64) -> Difference {
+    let components = |f: &Forces| -> Vec<f64> { [&f.fx, &f.fy, &f.fz].into_iter().flatten().copied().collect() };
+    let (reference, other) = (components(reference), components(other));
+    let largest = |values: &mut dyn Iterator<Item = f64>| values.fold(0.0, |m: f64, v| m.max(v.abs()));
+    let max = largest(&mut reference.iter().zip(&other).map(|(a, b)| a - b));
+    let square: f64 = reference.iter().zip(&other).map(|(a, b)| (a - b).powi(2)).sum();
+    let rms = (square / reference.len().max(1) as f64).sqrt();
+    let peak = largest(&mut reference.iter().copied());
+    let share = |value: f64| if peak > 0.0 { value / peak } else { 0.0 };
+    Difference { max_lsb: max / lsb_N, rms_lsb: rms / lsb_N, max_share: share(max), rms_share: share(rms) }
+}
+
+/// The middle value; of an even number of values the larger of the two middle ones. `None` without values.
+pub fn median(mut values: Vec<f64>) -> Option<f64> {
+    values.sort_by(f64::total_cmp);
+    values.get(values.len() / 2).copied()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn forces(fz: [f64; 2]) -> Forces {
+        Forces { fx: vec![0.0; 2], fy: vec![0.0; 2], fz: fz.to_vec() }
+    }
+
+    #[test]
+    fn one_component_of_six_off_by_three_lsb() {
+        let d = difference(&forces([4.0, 2.0]), &forces([4.0, 0.5]), 0.5);
+        // 1.5 N = 3 LSB; RMS √(9/6) LSB; peak 4 N.
+        assert_eq!((d.max_lsb, d.max_share), (3.0, 0.375));
+        assert!((d.rms_lsb - 1.5f64.sqrt()).abs() < 1e-15);
+    }
+
+    #[test]
+    fn no_force_at_all_is_no_difference() {
+        assert_eq!(difference(&forces([0.0; 2]), &forces([0.0; 2]), 1.0), Difference::default());
+    }
+
+    #[test]
+    fn medians() {
+        assert_eq!(median(vec![3.0, 1.0, 2.0]), Some(2.0));
+        assert_eq!(median(vec![4.0, 1.0]), Some(4.0));
+        assert_eq!(median(vec![]), None);
+    }
+}

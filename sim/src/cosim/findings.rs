@@ -1,0 +1,70 @@
+//! Differences: what each names, how they are counted and printed.
+
+use std::fmt;
+
+use serde::Serialize;
+
+/// Mismatches kept per frame; the rest are counted.
+pub const KEPT_PER_FRAME: usize = 16;
+
+/// One difference.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+pub struct Mismatch {
+    /// Device and stimulus, for example `verilator, full speed`.
+    pub run: String,
+    /// Frame name.
+    pub frame: String,
+    /// Stage name; `forces` and `status` for the output beats, `handshake`, `cycles`, `watchdog`.
+    pub stage: String,
+    /// Index of the word in the stage's stream of this frame.
+    pub index: usize,
+    /// Row and column of the taxel, where a word is one (`forces`, and stages with a word per taxel).
+    pub taxel: Option<[usize; 2]>,
+    /// Cycle of the differing word, none for a missing word.
+    pub cycle: Option<u64>,
+    /// The model's word, none where nothing was due.
+    pub expected: Option<Vec<i64>>,
+    /// The device's word, none where nothing came.
+    pub got: Option<Vec<i64>>,
+    /// The broken rule in words, for handshake, watchdog and key sets.
+    pub rule: Option<String>,
+}
+
+impl fmt::Display for Mismatch {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}: frame {}, stage {}, word {}", self.run, self.frame, self.stage, self.index)?;
+        if let Some([row, col]) = self.taxel {
+            write!(f, " (taxel {row},{col})")?;
+        }
+        if let Some(cycle) = self.cycle {
+            write!(f, ", cycle {cycle}")?;
+        }
+        if let Some(rule) = &self.rule {
+            return write!(f, ": {rule}");
+        }
+        let word = |w: &Option<Vec<i64>>| w.as_ref().map_or("nothing".to_owned(), |w| format!("{w:?}"));
+        write!(f, ": expected {}, got {}", word(&self.expected), word(&self.got))
+    }
+}
+
+/// What a comparison found.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Findings {
+    /// The first [`KEPT_PER_FRAME`] of every frame.
+    pub kept: Vec<Mismatch>,
+    /// All of them.
+    pub count: usize,
+}
+
+impl Findings {
+    /// Whether nothing differed.
+    pub fn is_equal(&self) -> bool {
+        self.count == 0
+    }
+
+    /// Adds another comparison's findings.
+    pub fn extend(&mut self, other: Findings) {
+        self.kept.extend(other.kept);
+        self.count += other.count;
+    }
+}

@@ -1,0 +1,94 @@
+//! The output side of the bench: collects beats and taps and watches the rules of the stream.
+
+use dermis_hdl::device::{Inputs, Outputs};
+
+use super::recording::{Beat, Breach, Play, Recording, TapWord, Times};
+use super::sender::Sender;
+
+/// Collects beats and taps and watches the output's rules.
+pub(super) struct Receiver {
+    /// So far.
+    pub(super) recording: Recording,
+    /// Beats up to and including each frame.
+    ends: Vec<usize>,
+    /// Frames whose beats are all out.
+    pub(super) frame: usize,
+    /// A beat that was offered and not taken in the cycle before.
+    held: Option<([i32; 3], bool)>,
+}
+
+impl Receiver {
+    pub(super) fn new(taps: usize, frames: &[Play]) -> Self {
+        let ends = frames.iter().scan(0, |sum, f| {
+            *sum += f.beats;
+            Some(*sum)
+        });
+        let recording = Recording {
+            taps: vec![Vec::new(); taps],
+            times: vec![Times::default(); frames.len()],
+            ..Recording::default()
+        };
+        Receiver { recording, ends: ends.collect(), frame: 0, held: None }
+    }
+
+    fn breach(&mut self, cycle: u64, rule: String) {
+        let beat = self.recording.beats.len();
+        self.recording.breaches.push(Breach { cycle, beat, rule });
+    }
+
+    /// Whether a beat was transferred.
+    pub(super) fn observe(&mut self, cycle: u64, inputs: &Inputs, outputs: Outputs) -> bool {
+        for (stream, word) in self.recording.taps.iter_mut().zip(outputs.taps) {
+            if let Some(fields) = word {
+                stream.push(TapWord { cycle, fields });
+            }
+        }
+        let offered = outputs.m_valid.then_some((outputs.m_data, outputs.m_last));
+        if let Some(held) = self.held {
+            if offered != Some(held) {
+                self.breach(cycle, "an offered beat must stay until it is taken".into());
+            }
+        }
+        self.held = offered.filter(|_| !inputs.m_ready);
+        let Some((data, last)) = offered.filter(|_| inputs.m_ready) else {
+            return false;
+        };
+        match self.recording.times.get(self.frame).map(|t| t.last_in) {
+            None => self.breach(cycle, "no beat may follow the last frame's".into()),
+            Some(None) => self.breach(cycle, "no beat may come before the frame's last input".into()),
+            Some(Some(_)) => {
+                let end = self.ends[self.frame];
+                let final_beat = self.recording.beats.len() + 1 == end;
+                if last != final_beat {
+                    let rule =
+                        if last { "tlast only on the last status beat" } else { "tlast on the last status beat" };
+                    self.breach(cycle, rule.into());
+                }
+                if final_beat {
+                    self.recording.times[self.frame].last_out = Some(cycle);
+                    self.frame += 1;
+                }
+            }
+        }
+        self.recording.beats.push(Beat { cycle, data, last });
+        true
+    }
+
+    pub(super) fn give_up(&mut self, cycle: u64, watchdog: u64, sender: &Sender) {
+        let awaited = match sender.frames.get(sender.frame) {
+            // The output is behind: what is missing is a beat, whatever the input does.
+            Some(_) if self.frame < sender.frame => self.awaited_beat(),
+            Some(play) => format!("s_axis_tready for taxel {} of {}", sender.taxel, play.codes.len()),
+            None => self.awaited_beat(),
+        };
+        let rule = format!("nothing moved for {watchdog} cycles while waiting for {awaited}");
+        let beat = self.recording.beats.len();
+        self.recording.timeout = Some(Breach { cycle, beat, rule });
+    }
+
+    fn awaited_beat(&self) -> String {
+        let before = self.frame.checked_sub(1).map_or(0, |f| self.ends[f]);
+        let end = self.ends.get(self.frame).copied().unwrap_or(before);
+        format!("output beat {} of {}", self.recording.beats.len() - before, end - before)
+    }
+}

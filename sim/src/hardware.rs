@@ -1,0 +1,117 @@
+//! The generated hardware of one scene, ready to be simulated.
+//!
+//! | in | out |
+//! |---|---|
+//! | bit-true [`Model`] | Verilog, taps and manifest ([`Generated`]) |
+//! | which simulator | a [`Device`] |
+
+use std::path::{Path, PathBuf};
+
+use anyhow::Result;
+use dermis_golden::fixed::Model;
+use dermis_golden::frame::Frame;
+use dermis_golden::reconstruct::Reconstruction;
+use dermis_hdl::device::Device;
+use dermis_hdl::{generate, simulator, Generated};
+
+use crate::cosim::Vector;
+use crate::drive::{record, Play, Stimulus};
+use crate::verilator::{Design, Verilated, VerilatorError};
+
+/// Cycles without a transfer after which a reconstruction is given up; far beyond any scene's pause.
+const WATCHDOG: u64 = 1_000_000;
+
+/// What simulates the hardware.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Simulator {
+    /// The generated Verilog under Verilator.
+    Verilator,
+    /// The same design in rust-hdl's own simulation.
+    RustHdl,
+}
+
+impl Simulator {
+    /// Name in messages.
+    pub fn name(self) -> &'static str {
+        match self {
+            Simulator::Verilator => "verilator",
+            Simulator::RustHdl => "rust-hdl",
+        }
+    }
+}
+
+/// A scene's model and the hardware generated from it.
+pub struct Hardware {
+    /// The bit-true model.
+    pub model: Model,
+    /// Verilog, memory files, taps, manifest.
+    pub generated: Generated,
+    /// Folder of built Verilator libraries.
+    cache: PathBuf,
+}
+
+impl Hardware {
+    /// Generates the hardware of `model`; `build` is the folder for everything built on the way.
+    ///
+    /// # Errors
+    /// A design that the generator refuses.
+    pub fn new(model: Model, build: &Path) -> Result<Self> {
+        let generated = generate(&model)?;
+        Ok(Hardware { model, generated, cache: build.join("verilator") })
+    }
+
+    /// Starts a simulation.
+    ///
+    /// # Errors
+    /// No Verilator, a design that a simulator refuses, or files that cannot be written.
+    pub fn device(&self, simulator: Simulator) -> Result<Box<dyn Device>> {
+        Ok(match simulator {
+            Simulator::Verilator => Box::new(self.verilated()?),
+            Simulator::RustHdl => self::simulator(&self.model)?,
+        })
+    }
+
+    fn verilated(&self) -> Result<Verilated, VerilatorError> {
+        let files = self.generated.files.iter().map(|f| (f.name.as_str(), f.text.as_str()));
+        let design = Design {
+            top: &self.generated.top,
+            files: files.collect(),
+            taps: &self.generated.taps,
+            input_bits: self.model.formats.input_bits,
+        };
+        Verilated::new(&design, &self.cache)
+    }
+
+    /// Stage names of the taps, in the order of a device's outputs.
+    pub fn tap_names(&self) -> Vec<&'static str> {
+        self.generated.taps.iter().map(|tap| tap.name).collect()
+    }
+
+    /// A frame as the device gets it, with what the bit-true model makes of it.
+    ///
+    /// # Errors
+    /// A frame of another sensor.
+    pub fn vector(&self, frame: &Frame) -> Result<Vector> {
+        let codes = self.model.codes(frame)?.codes;
+        let expected = self.model.run(&codes);
+        Ok(Vector { frame: frame.id.clone(), cols: self.model.scene.sensor.cols, codes, expected })
+    }
+
+    /// Reconstructs a frame in the Verilated hardware, engine `rtl`.
+    ///
+    /// # Errors
+    /// As [`Hardware::device`]; hardware that stops answering.
+    pub fn reconstruct(&self, frame: &Frame) -> Result<Reconstruction> {
+        let vector = self.vector(frame)?;
+        let taxels = vector.codes.len();
+        let plays = [Play { codes: &vector.codes, beats: taxels + vector.expected.status.len() }];
+        let mut device = self.device(Simulator::Verilator)?;
+        let recording = record(device.as_mut(), 0, &plays, Stimulus::FullSpeed, WATCHDOG);
+        if let Some(timeout) = recording.timeout {
+            anyhow::bail!("frame {}, cycle {}: {}", frame.id, timeout.cycle, timeout.rule);
+        }
+        let beats: Vec<[i32; 3]> = recording.beats.iter().map(|beat| beat.data).collect();
+        let (forces, status) = beats.split_at(taxels.min(beats.len()));
+        Ok(self.model.decode(frame, "rtl", forces, status)?)
+    }
+}

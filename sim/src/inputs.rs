@@ -1,0 +1,61 @@
+//! Scene and frames from what the command line names.
+//!
+//! | SCENE | `--frame` | gives |
+//! |---|---|---|
+//! | named | files, `eq2` | the scene, those frames |
+//! | named | none | the scene, its shipped frames |
+//! | none | files | the built-in scene with the first file's sensor, else the default scene of that sensor |
+
+use anyhow::{bail, Result};
+use dermis_golden::frame::Frame;
+use dermis_golden::scene::Scene;
+
+/// `--frame` value that stands for the paper's Eq. 2.
+pub const EQ2: &str = "eq2";
+
+/// Finds the scene and its frames, at least one.
+///
+/// # Errors
+/// Unknown scene, unreadable frame, a frame of another sensor, neither scene nor sensor, no frames at all.
+pub fn resolve(scene: Option<&str>, frames: &[String]) -> Result<(Scene, Vec<Frame>)> {
+    let scene = match (scene, frames.first().map(String::as_str)) {
+        (Some(scene), _) => Scene::load(scene)?,
+        (None, Some(first)) if first != EQ2 => of_frame(first)?,
+        (None, Some(_)) => bail!("--frame {EQ2} has no sensor of its own: name a scene"),
+        (None, None) => bail!(
+            "name a scene ({}, or a file), or a frame file that holds its sensor",
+            Scene::builtin_names().join(", ")
+        ),
+    };
+    let frames = if frames.is_empty() {
+        let shipped = Frame::shipped(&scene);
+        if shipped.is_empty() {
+            bail!("scene {}: no frame is shipped for {}: give one with --frame", scene.name, scene.sensor);
+        }
+        shipped
+    } else {
+        frames.iter().map(|path| load(path, &scene)).collect::<Result<_>>()?
+    };
+    Ok((scene, frames))
+}
+
+fn load(path: &str, scene: &Scene) -> Result<Frame> {
+    if path == EQ2 {
+        return Ok(Frame::eq2(&scene.sensor));
+    }
+    let frame = Frame::load(path, Some(scene))?;
+    frame.check(scene)?;
+    Ok(frame)
+}
+
+/// The scene that a frame file's own sensor stands for.
+fn of_frame(path: &str) -> Result<Scene> {
+    let sensor = Frame::load(path, None)?.sensor;
+    for name in Scene::builtin_names() {
+        let scene = Scene::builtin(name)?;
+        if scene.sensor == sensor {
+            return Ok(scene);
+        }
+    }
+    Ok(Scene::of_sensor(&sensor, "frame"))
+}

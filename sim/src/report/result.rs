@@ -1,0 +1,90 @@
+//! One reconstruction for people: resultant, error, μ per subarray, flags, and a picture of fz.
+
+use std::fmt::Write as _;
+
+use dermis_golden::reconstruct::Reconstruction;
+use dermis_golden::sensor::Sensor;
+
+use super::table::percent;
+use crate::compare::Difference;
+
+/// Shades from no force to the largest.
+const SHADES: [char; 8] = [' ', '.', ':', '-', '=', '+', '*', '#'];
+/// Widest picture in characters; a wider array is shown by the largest force of each group of taxels.
+const PICTURE_COLUMNS: usize = 60;
+
+/// The summary of one result. `full_scale_MPa` is what the largest input code stood for.
+pub fn reconstruction(result: &Reconstruction, sensor: &Sensor, full_scale_MPa: f64) -> String {
+    let mut text = String::new();
+    // Writing to a String cannot fail.
+    let _ = lines(&mut text, result, full_scale_MPa);
+    picture(&mut text, sensor, &result.forces_N.fz);
+    text
+}
+
+fn lines(text: &mut String, result: &Reconstruction, full_scale_MPa: f64) -> std::fmt::Result {
+    let [x1, x2, x3] = result.resultant_N;
+    writeln!(text, "{}, frame {}, engine {}", result.scene, result.frame, result.engine)?;
+    writeln!(text, "full scale      {full_scale_MPa:.6} MPa")?;
+    writeln!(text, "resultant, N    x {x1:+.4}   y {x2:+.4}   normal {x3:+.4}")?;
+    if let Some(e) = &result.error {
+        let axes = [e.x1, e.x2, e.x3].map(percent);
+        writeln!(text, "error           x {}   y {}   normal {}", axes[0], axes[1], axes[2])?;
+        writeln!(text, "error, resultant   e_t {}   e_n {}", percent(e.tangential), percent(e.normal))?;
+    }
+    for s in &result.subarrays {
+        let centroid = |c: Option<[f64; 2]>| c.map_or("-".to_owned(), |[x, y]| format!("({x:+.2}, {y:+.2}) mm"));
+        writeln!(
+            text,
+            "subarray {}x{} at row {}, column {}: condition {}, mu ({:+.4}, {:+.4}), compression at {}, tension at {}",
+            s.rows,
+            s.cols,
+            s.row0,
+            s.col0,
+            if s.centroid_condition { "met" } else { "not met" },
+            s.mu[0],
+            s.mu[1],
+            centroid(s.compression_centroid_mm),
+            centroid(s.tension_centroid_mm),
+        )?;
+    }
+    let flags: Vec<String> =
+        result.flags.iter().filter_map(|f| serde_json::to_value(f).ok()?.as_str().map(str::to_owned)).collect();
+    writeln!(text, "flags           {}", if flags.is_empty() { "none".to_owned() } else { flags.join(", ") })
+}
+
+/// One line for a result's distance from the golden model's.
+pub fn difference(d: &Difference) -> String {
+    format!(
+        "against golden  at most {:.0} LSB = {} of the largest force, RMS {:.0} LSB = {}\n",
+        d.max_lsb,
+        percent(Some(d.max_share)),
+        d.rms_lsb,
+        percent(Some(d.rms_share)),
+    )
+}
+
+/// fz as shades, row 0 on top, two characters per taxel where they fit.
+fn picture(text: &mut String, sensor: &Sensor, fz: &[f64]) {
+    let peak = fz.iter().fold(0.0, |m: f64, v| m.max(v.abs()));
+    if peak == 0.0 {
+        return;
+    }
+    let group = sensor.cols.max(sensor.rows).div_ceil(PICTURE_COLUMNS);
+    let repeat = if 2 * sensor.cols <= PICTURE_COLUMNS { 2 } else { 1 };
+    text.push_str(&format!("fz, darkest {peak:.4} N per taxel, o is tension\n"));
+    for row in (0..sensor.rows).step_by(group) {
+        let shades = (0..sensor.cols).step_by(group).map(|col| {
+            let rows = row..(row + group).min(sensor.rows);
+            let cells = rows.flat_map(|r| (col..(col + group).min(sensor.cols)).map(move |c| r * sensor.cols + c));
+            let force = cells.map(|index| fz[index]).fold(0.0, |m: f64, v| if v.abs() > m.abs() { v } else { m });
+            let level = (force.abs() / peak * (SHADES.len() - 1) as f64).round() as usize;
+            match (level, force < 0.0) {
+                (0, _) | (_, false) => SHADES[level.min(SHADES.len() - 1)],
+                (_, true) => 'o',
+            }
+        });
+        let line: String = shades.flat_map(|shade| std::iter::repeat_n(shade, repeat)).collect();
+        text.push_str(&format!("  |{line}|\n"));
+    }
+}

@@ -1,0 +1,178 @@
+//! Tables in Markdown, aligned, so that they read in a terminal and in a README.
+
+use dermis_golden::reconstruct::Reconstruction;
+
+use super::{CosimReport, BUDGET_US};
+use crate::compare::median;
+use crate::verify::{Row, Verified};
+
+/// Mismatches printed for people; `--json` holds more.
+const PRINTED: usize = 16;
+
+/// One co-simulation: a row per frame, the runs, the mismatches.
+pub fn cosim(verified: &Verified) -> String {
+    let head = [
+        "frame",
+        "full scale MPa",
+        "e_t golden",
+        "e_t fixed",
+        "e_n golden",
+        "e_n fixed",
+        "fixed − golden max",
+        "RMS",
+        "RTL = fixed",
+        "latency",
+        "total",
+        "µs",
+    ];
+    let rows = verified.rows.iter().map(|row| {
+        let d = &row.difference;
+        vec![
+            row.frame.clone(),
+            format!("{:.4}", row.full_scale_MPa),
+            percent(tangential(&row.golden)),
+            percent(tangential(&row.fixed)),
+            percent(normal(&row.golden)),
+            percent(normal(&row.fixed)),
+            format!("{:.0} LSB = {}", d.max_lsb, percent(Some(d.max_share))),
+            format!("{:.0} LSB = {}", d.rms_lsb, percent(Some(d.rms_share))),
+            yes(row.equal),
+            count(row.times.latency()),
+            count(row.times.total()),
+            row.times.total().map_or("-".into(), |c| format!("{:.2}", verified.board.microseconds(c))),
+        ]
+    });
+    let mut text = markdown(&head, rows.collect());
+    text.push_str(&format!("\nruns: {}\n", verified.runs.join("; ")));
+    text.push_str(&summary(verified));
+    text
+}
+
+/// Verdict, mismatches and margin.
+fn summary(verified: &Verified) -> String {
+    let findings = &verified.findings;
+    let mut text = String::new();
+    if findings.is_equal() {
+        text.push_str("equal to the bit-true model to the bit: every stage, every beat, every cycle count\n");
+    } else {
+        let shown = &findings.kept[..findings.kept.len().min(PRINTED)];
+        text.push_str(&format!("NOT EQUAL: {} mismatches, the first {}:\n", findings.count, shown.len()));
+        for mismatch in shown {
+            text.push_str(&format!("  {mismatch}\n"));
+        }
+    }
+    let report = CosimReport::new(verified);
+    if let (Some(cycles), Some(time)) = (report.total_cycles.max, report.time_us.max) {
+        text.push_str(&format!(
+            "at most {cycles} cycles = {time:.2} µs at {} MHz ({}, design target), {:.2} µs below the budget of {BUDGET_US} µs\n",
+            report.clock_MHz,
+            verified.board.name,
+            BUDGET_US as f64 - time,
+        ));
+    }
+    text
+}
+
+/// One row per scene.
+pub fn scenes(all: &[Verified]) -> String {
+    let head = [
+        "scene",
+        "frames",
+        "e_t golden",
+        "e_t fixed",
+        "e_n golden",
+        "e_n fixed",
+        "RTL = fixed",
+        "latency, cycles",
+        "total, cycles",
+        "MHz",
+        "µs",
+        "margin to 1 ms",
+    ];
+    let rows = all.iter().map(|verified| {
+        let report = CosimReport::new(verified);
+        let of = |value: fn(&Row) -> Option<f64>| percent(median(verified.rows.iter().filter_map(value).collect()));
+        let time = report.time_us.max;
+        vec![
+            report.scene,
+            report.frames.to_string(),
+            of(|row| tangential(&row.golden)),
+            of(|row| tangential(&row.fixed)),
+            of(|row| normal(&row.golden)),
+            of(|row| normal(&row.fixed)),
+            yes(report.equal),
+            count(report.cycles.max),
+            count(report.total_cycles.max),
+            report.clock_MHz.to_string(),
+            time.map_or("-".into(), |t| format!("{t:.2}")),
+            time.map_or("-".into(), |t| format!("{:.2} µs", BUDGET_US as f64 - t)),
+        ]
+    });
+    let mut text = markdown(&head, rows.collect());
+    text.push_str(
+        "\ne_t, e_n: tangential and normal error of the resultant, median over the frames; cycles: the slowest frame\n",
+    );
+    text
+}
+
+fn tangential(result: &Reconstruction) -> Option<f64> {
+    result.error.as_ref()?.tangential
+}
+
+fn normal(result: &Reconstruction) -> Option<f64> {
+    result.error.as_ref()?.normal
+}
+
+pub(super) fn percent(fraction: Option<f64>) -> String {
+    fraction.map_or("-".into(), |f| format!("{:.2} %", 100.0 * f))
+}
+
+fn count(cycles: Option<u64>) -> String {
+    cycles.map_or("-".into(), |c| c.to_string())
+}
+
+fn yes(equal: bool) -> String {
+    if equal { "yes" } else { "NO" }.into()
+}
+
+/// A Markdown table with columns padded to the same width; the first column is left-aligned.
+fn markdown(head: &[&str], rows: Vec<Vec<String>>) -> String {
+    let head: Vec<String> = head.iter().map(|&h| h.to_owned()).collect();
+    let width = |column: usize| {
+        let cells = rows.iter().chain([&head]).map(|row| row[column].chars().count());
+        cells.max().unwrap_or(0)
+    };
+    let widths: Vec<usize> = (0..head.len()).map(width).collect();
+    let line = |row: &Vec<String>| {
+        let cells = row.iter().zip(&widths).enumerate().map(|(column, (cell, &width))| {
+            let pad = " ".repeat(width - cell.chars().count());
+            if column == 0 {
+                format!("{cell}{pad}")
+            } else {
+                format!("{pad}{cell}")
+            }
+        });
+        format!("| {} |\n", cells.collect::<Vec<_>>().join(" | "))
+    };
+    let rule = widths.iter().enumerate().map(|(column, &width)| {
+        if column == 0 {
+            "-".repeat(width + 2)
+        } else {
+            format!("{}:", "-".repeat(width + 1))
+        }
+    });
+    let rule = format!("|{}|\n", rule.collect::<Vec<_>>().join("|"));
+    let body: String = rows.iter().map(line).collect();
+    format!("{}{rule}{body}", line(&head))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn columns_are_padded_by_characters_not_bytes() {
+        let table = markdown(&["frame", "µs"], vec![vec!["a".into(), "12.50".into()]]);
+        assert_eq!(table, "| frame |    µs |\n|-------|------:|\n| a     | 12.50 |\n");
+    }
+}

@@ -1,0 +1,127 @@
+//! One scene's co-simulation: every frame through the golden model, the bit-true model and the
+//! simulated hardware, and how they differ.
+//!
+//! ```text
+//! frame -> golden ------------------------------> Reconstruction --+
+//!       -> bit-true model --> Trace, Reconstruction ---------------+--> Row
+//!       -> Verilator: full speed, then stalls --> Findings, Times -+
+//!       -> rust-hdl: full speed ----------------> Findings --------+
+//! ```
+
+use std::path::Path;
+
+use anyhow::Result;
+use dermis_golden::fixed::Model;
+use dermis_golden::frame::Frame;
+use dermis_golden::quantise::full_scale;
+use dermis_golden::reconstruct::{Golden, Reconstruction};
+use dermis_golden::scene::Scene;
+use dermis_hdl::board::Board;
+
+use crate::compare::{difference, Difference};
+use crate::cosim::{run, Bench, Findings, Vector};
+use crate::drive::{Stimulus, Times};
+use crate::hardware::{Hardware, Simulator};
+use crate::progress::Progress;
+
+/// Of the stalls; any number serves, a fixed one repeats.
+const SEED: u64 = 1;
+
+/// One frame's outcome.
+#[derive(Clone, Debug)]
+pub struct Row {
+    /// Frame name.
+    pub frame: String,
+    /// Stress of the largest code, MPa.
+    pub full_scale_MPa: f64,
+    /// The floating-point result.
+    pub golden: Reconstruction,
+    /// The bit-true result, which the hardware's equals when `equal`.
+    pub fixed: Reconstruction,
+    /// Of `fixed` against `golden`.
+    pub difference: Difference,
+    /// Whether no run differed from the bit-true model on this frame.
+    pub equal: bool,
+    /// Cycles at full speed.
+    pub times: Times,
+}
+
+/// One scene's outcome.
+#[derive(Clone, Debug)]
+pub struct Verified {
+    /// The scene.
+    pub scene: Scene,
+    /// Its board.
+    pub board: Board,
+    /// Per frame, in the given order.
+    pub rows: Vec<Row>,
+    /// All mismatches of all runs.
+    pub findings: Findings,
+    /// Every run, for example `verilator, full speed`.
+    pub runs: Vec<String>,
+}
+
+/// Co-simulates `frames` (at least one) on the given simulators; cycles come from the first.
+///
+/// # Errors
+/// A scene that cannot be built, a frame of another sensor, no Verilator.
+pub fn verify(scene: &Scene, frames: &[Frame], simulators: &[Simulator], build: &Path) -> Result<Verified> {
+    let board = Board::load(&scene.hardware.board)?;
+    let golden = Golden::new(scene)?;
+    let hardware = Hardware::new(Model::for_frames(scene, frames)?, build)?;
+    let vectors = frames.iter().map(|frame| hardware.vector(frame)).collect::<Result<Vec<_>>>()?;
+
+    let mut verified =
+        Verified { scene: scene.clone(), board, rows: Vec::new(), findings: Findings::default(), runs: Vec::new() };
+    let mut times: Vec<Times> = Vec::new();
+    for &simulator in simulators {
+        let seen = simulate(&hardware, simulator, &vectors, &mut verified)?;
+        if times.is_empty() {
+            times = seen;
+        }
+    }
+    for ((frame, vector), times) in frames.iter().zip(&vectors).zip(times) {
+        let full_scale_MPa = full_scale(&hardware.model.scene, frame);
+        let golden = golden.run(frame)?;
+        let fixed = hardware.model.decode(frame, "fixed", &vector.expected.beats, &vector.expected.status)?;
+        let lsb_N = hardware.model.force_lsb_N(full_scale_MPa);
+        verified.rows.push(Row {
+            frame: frame.id.clone(),
+            full_scale_MPa,
+            difference: difference(&golden.forces_N, &fixed.forces_N, lsb_N),
+            golden,
+            fixed,
+            equal: verified.findings.kept.iter().all(|m| m.frame != frame.id),
+            times,
+        });
+    }
+    Ok(verified)
+}
+
+/// All runs on one simulator; returns the times at full speed.
+fn simulate(
+    hardware: &Hardware,
+    simulator: Simulator,
+    vectors: &[Vector],
+    verified: &mut Verified,
+) -> Result<Vec<Times>> {
+    let stimuli: &[Stimulus] = match simulator {
+        Simulator::Verilator => &[Stimulus::FullSpeed, Stimulus::Stalls { seed: SEED }],
+        Simulator::RustHdl => &[Stimulus::FullSpeed],
+    };
+    let mut device = hardware.device(simulator)?;
+    let taps = hardware.tap_names();
+    let mut full_speed = Vec::new();
+    for &stimulus in stimuli {
+        let label = format!("{}, {stimulus}", simulator.name());
+        let _progress = Progress::start(&format!("{}: {label}", verified.scene.name));
+        let bench = Bench { name: simulator.name(), device: device.as_mut(), taps: &taps };
+        let (findings, times) = run(bench, vectors, stimulus);
+        verified.findings.extend(findings);
+        verified.runs.push(label);
+        if stimulus == Stimulus::FullSpeed {
+            full_speed = times;
+        }
+    }
+    Ok(full_speed)
+}

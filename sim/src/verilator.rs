@@ -1,0 +1,238 @@
+//! A design under Verilator as a [`Device`].
+//!
+//! ```text
+//! Verilog + bench.v + shim.cpp --verilator--> build/verilator/<fingerprint>/libbench.so --> Device
+//! memory files ----------------------------------------- read when the device starts ----^
+//! ```
+//!
+//! The library's key is a fingerprint of every Verilog, waiver and shim byte and of Verilator's
+//! version; memory files are data and do not rebuild it. A library is built in a folder of its own
+//! and renamed into place: an interrupted or concurrent build never leaves half a library.
+
+use std::ffi::{c_char, c_void, CString};
+use std::fs;
+use std::io;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+use std::sync::Mutex;
+
+use dermis_hdl::device::{Device, Inputs, Outputs, Tap};
+use libloading::Library;
+use thiserror::Error;
+
+use crate::bench::Layout;
+use crate::progress::Progress;
+
+/// The C++ side, compiled into every library.
+const SHIM: &str = include_str!("../shim/shim.cpp");
+/// Start value of registers without an initial value; any number shows a missing reset.
+const RESET_SEED: i32 = 20_240_501;
+/// Lines of a failed tool's output that an error repeats.
+const LOG_LINES: usize = 20;
+
+/// Why a design could not be simulated.
+#[derive(Debug, Error)]
+pub enum VerilatorError {
+    /// The program is not installed.
+    #[error("verilator is not installed; on Debian: sudo apt-get install verilator g++ make")]
+    Missing,
+    /// The program ran and failed.
+    #[error("verilator refused {design} (folder {folder}):\n{log}")]
+    Build {
+        /// Name of the top module.
+        design: String,
+        /// Folder with the sources.
+        folder: PathBuf,
+        /// Last lines of its output.
+        log: String,
+    },
+    /// A file or folder could not be used.
+    #[error("{path}: {source}")]
+    Io {
+        /// The file or folder.
+        path: PathBuf,
+        /// The system's reason.
+        source: io::Error,
+    },
+    /// The built library does not load or does not fit its bench.
+    #[error("{path}: {reason}")]
+    Library {
+        /// The library.
+        path: PathBuf,
+        /// What is wrong with it.
+        reason: String,
+    },
+}
+
+/// What Verilator compiles.
+#[derive(Clone, Debug)]
+pub struct Design<'a> {
+    /// Name of the top module.
+    pub top: &'a str,
+    /// File names without folder, and texts: Verilog (`.v`), waivers (`.vlt`), memory files (any other).
+    pub files: Vec<(&'a str, &'a str)>,
+    /// Streams to observe.
+    pub taps: &'a [Tap],
+    /// Width of `s_axis_tdata`, 1..=32.
+    pub input_bits: u32,
+}
+
+/// A running verilated design.
+pub struct Verilated {
+    layout: Layout,
+    handle: *mut c_void,
+    cycle: unsafe extern "C" fn(*mut c_void, u64, *mut u32),
+    free: unsafe extern "C" fn(*mut c_void),
+    words: Vec<u32>,
+    /// Keeps the code behind the pointers above loaded; dropped after `drop` has freed the model.
+    _library: Library,
+}
+
+impl Verilated {
+    /// Builds `design`, or takes it from `cache` (usually `build/verilator`), and starts it.
+    ///
+    /// # Errors
+    /// [`VerilatorError`]: no Verilator, a design it refuses, or files that cannot be written.
+    pub fn new(design: &Design, cache: &Path) -> Result<Self, VerilatorError> {
+        let layout = Layout::new(design.input_bits, design.taps);
+        let path = library(design, &layout, cache)?;
+        let fail = |reason: String| VerilatorError::Library { path: path.clone(), reason };
+        // SAFETY: the library was built from this module's shim, whose symbols have these types and
+        // whose constructors have no side effects; the layout is checked before the first cycle.
+        unsafe {
+            let library = Library::new(&path).map_err(|e| fail(e.to_string()))?;
+            let symbol = |e: libloading::Error| fail(e.to_string());
+            let bytes = *library.get::<extern "C" fn() -> u32>(b"dermis_out_bytes").map_err(symbol)?;
+            let start =
+                *library.get::<extern "C" fn(*const c_char, i32) -> *mut c_void>(b"dermis_new").map_err(symbol)?;
+            let cycle = *library.get(b"dermis_cycle").map_err(symbol)?;
+            let free = *library.get(b"dermis_free").map_err(symbol)?;
+            if bytes() as usize != 4 * layout.out_words() {
+                return Err(fail(format!("{} output bytes, {} expected", bytes(), 4 * layout.out_words())));
+            }
+            let memories = memory_folder(design)?;
+            let folder = CString::new(memories.path().to_string_lossy().as_bytes()).map_err(|e| fail(e.to_string()))?;
+            let handle = start(folder.as_ptr(), RESET_SEED);
+            let words = vec![0; layout.out_words()];
+            Ok(Verilated { layout, handle, cycle, free, words, _library: library })
+        }
+    }
+}
+
+impl Device for Verilated {
+    fn cycle(&mut self, inputs: &Inputs) -> Outputs {
+        // SAFETY: `handle` lives until drop, `words` has the length checked in `new`.
+        unsafe { (self.cycle)(self.handle, self.layout.pack(inputs), self.words.as_mut_ptr()) };
+        self.layout.unpack(&self.words)
+    }
+}
+
+impl Drop for Verilated {
+    fn drop(&mut self) {
+        // SAFETY: the only call, with the handle that `dermis_new` returned.
+        unsafe { (self.free)(self.handle) };
+    }
+}
+
+/// First line of `verilator --version`.
+///
+/// # Errors
+/// [`VerilatorError::Missing`] when it cannot be started.
+pub fn version() -> Result<String, VerilatorError> {
+    let output = Command::new("verilator").arg("--version").output().map_err(|_| VerilatorError::Missing)?;
+    Ok(String::from_utf8_lossy(&output.stdout).lines().next().unwrap_or_default().to_owned())
+}
+
+/// Writes the design's memory files where `$readmemh` will look for them.
+fn memory_folder(design: &Design) -> Result<tempfile::TempDir, VerilatorError> {
+    let folder = tempfile::tempdir().map_err(|source| VerilatorError::Io { path: std::env::temp_dir(), source })?;
+    for (name, text) in design.files.iter().filter(|(name, _)| !is_source(name)) {
+        write(&folder.path().join(name), text)?;
+    }
+    Ok(folder)
+}
+
+/// Whether Verilator compiles the file (and does not read it at run time).
+fn is_source(name: &str) -> bool {
+    name.ends_with(".v") || name.ends_with(".vlt")
+}
+
+/// One build at a time in a process: a second caller for the same design then finds it built.
+static BUILDING: Mutex<()> = Mutex::new(());
+
+/// Path of the design's library, built when the cache does not hold it.
+fn library(design: &Design, layout: &Layout, cache: &Path) -> Result<PathBuf, VerilatorError> {
+    let mut sources: Vec<(&str, &str)> = design.files.iter().filter(|(name, _)| is_source(name)).copied().collect();
+    let bench = layout.verilog(design.top);
+    // Verilator applies a waiver only to what it reads afterwards.
+    sources.sort_by_key(|(name, _)| !name.ends_with(".vlt"));
+    sources.extend([("bench.v", bench.as_str()), ("shim.cpp", SHIM)]);
+    let folder = cache.join(fingerprint(&sources, &version()?));
+    let ready = folder.join("libbench.so");
+    let _one = BUILDING.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
+    if !ready.is_file() {
+        build(design.top, &sources, &folder, cache)?;
+    }
+    ready.canonicalize().map_err(|source| VerilatorError::Io { path: ready, source })
+}
+
+/// Builds in a temporary folder beside `folder` and renames it into place.
+fn build(top: &str, sources: &[(&str, &str)], folder: &Path, cache: &Path) -> Result<(), VerilatorError> {
+    let io_at = |path: &Path| {
+        let path = path.to_owned();
+        move |source| VerilatorError::Io { path, source }
+    };
+    fs::create_dir_all(cache).map_err(io_at(cache))?;
+    let work = tempfile::Builder::new().prefix("building-").tempdir_in(cache).map_err(io_at(cache))?;
+    for (name, text) in sources {
+        write(&work.path().join(name), text)?;
+    }
+    let _progress = Progress::start(&format!("verilating {top}"));
+    let output = Command::new("verilator")
+        .current_dir(work.path())
+        .args(["--cc", "--exe", "--build", "-j", "2", "--top-module", "bench", "--prefix", "Vbench"])
+        .args(["--x-initial", "unique", "--x-assign", "unique", "-O3"])
+        .args(["-CFLAGS", "-fPIC -O1", "-LDFLAGS", "-shared -Wl,--wrap=fopen", "-o", "../libbench.so"])
+        .args(sources.iter().map(|(name, _)| *name))
+        .output()
+        .map_err(|_| VerilatorError::Missing)?;
+    if !output.status.success() {
+        let text = [output.stderr, output.stdout].concat();
+        let text = String::from_utf8_lossy(&text);
+        let log: Vec<&str> = text.lines().take(LOG_LINES).collect();
+        // Kept, so that the named folder can be looked at.
+        return Err(VerilatorError::Build { design: top.into(), folder: work.keep(), log: log.join("\n") });
+    }
+    // Only the library and its sources stay; the object files are ten times as large.
+    fs::remove_dir_all(work.path().join("obj_dir")).map_err(io_at(work.path()))?;
+    let built = work.keep();
+    match fs::rename(&built, folder) {
+        Ok(()) => Ok(()),
+        // Somebody else finished the same build first: theirs serves as well.
+        Err(_) if folder.join("libbench.so").is_file() => fs::remove_dir_all(&built).map_err(io_at(&built)),
+        Err(source) => Err(VerilatorError::Io { path: folder.to_owned(), source }),
+    }
+}
+
+fn write(path: &Path, text: &str) -> Result<(), VerilatorError> {
+    fs::write(path, text).map_err(|source| VerilatorError::Io { path: path.to_owned(), source })
+}
+
+/// FNV-1a of all names, texts and the tool's version, 128 bits in hexadecimal.
+fn fingerprint(sources: &[(&str, &str)], version: &str) -> String {
+    const OFFSET: u128 = 0x6c62_272e_07bb_0142_62b8_2175_6295_c58d;
+    const PRIME: u128 = 0x0000_0000_0100_0000_0000_0000_0000_013b;
+    let mut hash = OFFSET;
+    let mut add = |text: &str| {
+        // The terminating zero keeps ("ab", "c") and ("a", "bc") apart.
+        for byte in text.bytes().chain([0]) {
+            hash = (hash ^ u128::from(byte)).wrapping_mul(PRIME);
+        }
+    };
+    add(version);
+    for (name, text) in sources {
+        add(name);
+        add(text);
+    }
+    format!("{hash:032x}")
+}

@@ -1,0 +1,82 @@
+//! The JSON that other programs read: fields, their order, and `null` for what does not exist.
+
+use std::path::Path;
+use std::process::Command;
+
+use serde_json::Value;
+
+/// Stdout of a run that must succeed; built libraries are shared with the other tests.
+fn dermis(args: &[&str]) -> String {
+    let build = Path::new(env!("CARGO_MANIFEST_DIR")).join("../build");
+    let output = Command::new(env!("CARGO_BIN_EXE_dermis")).args(args).arg("--build-dir").arg(build).output().unwrap();
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    String::from_utf8(output.stdout).unwrap()
+}
+
+/// Names of the fields of the first object, in the order of the text.
+fn fields(text: &str, nesting: usize) -> Vec<String> {
+    let (mut depth, mut names, mut rest) = (0usize, Vec::new(), text);
+    while let Some(at) = rest.find(['{', '}', '"']) {
+        let (mark, after) = (rest.as_bytes()[at], &rest[at + 1..]);
+        rest = after;
+        match mark {
+            b'{' => depth += 1,
+            b'}' => depth -= 1,
+            _ => {
+                let end = after.find('"').unwrap();
+                rest = &after[end + 1..];
+                if depth == nesting && rest.starts_with(':') {
+                    names.push(after[..end].to_owned());
+                }
+            }
+        }
+    }
+    names
+}
+
+#[test]
+fn reconstruct() {
+    for engine in ["golden", "fixed", "rtl"] {
+        let text = dermis(&["reconstruct", "eight-by-eight", "--engine", engine, "--json"]);
+        let top = ["scene", "frame", "engine", "case", "subarrays", "resultant_N", "forces_N", "error", "flags"];
+        assert_eq!(fields(&text, 1), top);
+        let value: Value = serde_json::from_str(&text).unwrap();
+        assert_eq!((&value["scene"], &value["engine"]), (&"eight-by-eight".into(), &engine.into()));
+        for axis in ["fx", "fy", "fz"] {
+            assert_eq!(value["forces_N"][axis].as_array().unwrap().len(), 64);
+        }
+        let subarray = [
+            "row0",
+            "col0",
+            "rows",
+            "cols",
+            "centroid_condition",
+            "compression_centroid_mm",
+            "tension_centroid_mm",
+            "mu",
+            "objective_value",
+        ];
+        assert_eq!(fields(&value["subarrays"][0].to_string(), 1).len(), subarray.len());
+        assert!(subarray.iter().all(|name| value["subarrays"][0].get(name).is_some()));
+        assert!(["x1", "x2", "x3", "tangential", "normal"].iter().all(|name| value["error"].get(name).is_some()));
+    }
+}
+
+#[test]
+fn reconstruct_without_reference_has_null_errors() {
+    let text = dermis(&["reconstruct", "sensor-1", "--frame", "eq2", "--json"]);
+    let value: Value = serde_json::from_str(&text).unwrap();
+    assert_eq!(value["error"], Value::Null);
+}
+
+#[test]
+fn cosim() {
+    let text = dermis(&["cosim", "eight-by-eight", "--frame", "eq2", "--json"]);
+    let top = ["scene", "frames", "equal", "mismatches", "cycles", "total_cycles", "clock_MHz", "time_us", "budget_us"];
+    assert_eq!(fields(&text, 1), top);
+    assert_eq!(fields(&text, 2), ["min", "median", "max", "min", "median", "max", "median", "max"]);
+    let value: Value = serde_json::from_str(&text).unwrap();
+    assert_eq!((&value["equal"], &value["frames"]), (&true.into(), &1.into()));
+    let cycles = value["total_cycles"]["max"].as_u64().unwrap() as f64;
+    assert_eq!(value["time_us"]["max"].as_f64().unwrap(), cycles / value["clock_MHz"].as_f64().unwrap());
+}

@@ -1,0 +1,216 @@
+//! The bench itself, on a hand-written toy engine: it passes what is right, and every kind of
+//! defect turns it red (wrong vector, wrong expectation, wrong coefficient, broken handshake,
+//! missing beat, wrong cycle count). Seconds, and independent of the real design.
+
+use std::path::PathBuf;
+
+use dermis_golden::fixed::{Cycles, Stage, Trace};
+use dermis_hdl::device::{Device, Inputs, Outputs, Tap};
+use dermis_sim::cosim::{run, Bench, Findings, Vector, KEPT_PER_FRAME};
+use dermis_sim::drive::{Stimulus, Times};
+use dermis_sim::verilator::{Design, Verilated, VerilatorError};
+
+const TOY: &str = include_str!("toy/toy.v");
+const GAIN: i64 = 3;
+/// Beats leave one a cycle from the cycle after the last code: 6 forces and 1 status.
+const CYCLES: Cycles = Cycles { first_output: 1, latency: 7, total: 13 };
+const TAPS: [&str; 2] = ["receive", "scale"];
+const STALLS: Stimulus = Stimulus::Stalls { seed: 7 };
+
+fn taps() -> Vec<Tap> {
+    let tap = |name, valid: &str, data: &str, field_bits| Tap {
+        name,
+        valid: valid.into(),
+        data: data.into(),
+        fields: 1,
+        field_bits,
+    };
+    vec![tap("receive", "{}take", "{}s_axis_tdata", 12), tap("scale", "{}scale_valid", "{}scaled", 32)]
+}
+
+fn cache() -> PathBuf {
+    PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join("verilator")
+}
+
+fn toy_with(verilog: &str, gain: &str) -> Result<Verilated, VerilatorError> {
+    let files = vec![("toy.v", verilog), ("gain.hex", gain)];
+    Verilated::new(&Design { top: "toy", files, taps: &taps(), input_bits: 12 }, &cache())
+}
+
+fn toy() -> Verilated {
+    toy_with(TOY, "03\n").unwrap()
+}
+
+fn vectors() -> Vec<Vector> {
+    let frame = |name: &str, codes: [i32; 6]| {
+        let word = |c: &i32| vec![i64::from(*c)];
+        let scaled: Vec<Vec<i64>> = codes.iter().map(|c| vec![GAIN * i64::from(*c)]).collect();
+        Vector {
+            frame: name.into(),
+            cols: 3,
+            codes: codes.to_vec(),
+            expected: Trace {
+                beats: codes.iter().map(|&c| [GAIN as i32 * c, c, c]).collect(),
+                status: vec![[6, 0, 0]],
+                stages: vec![
+                    Stage { name: "receive", words: codes.iter().map(word).collect() },
+                    Stage { name: "scale", words: scaled },
+                ],
+                cycles: CYCLES,
+            },
+        }
+    };
+    vec![frame("ramp", [0, 1, 2, 3, 4, 5]), frame("extremes", [-2048, 2047, -1, 0, 1, -2047])]
+}
+
+fn check(device: &mut dyn Device, vectors: &[Vector], stimulus: Stimulus) -> (Findings, Vec<Times>) {
+    let bench = Bench { name: "toy", device, taps: &TAPS };
+    run(bench, vectors, stimulus)
+}
+
+#[test]
+fn equal_at_full_speed_with_exact_cycles_and_equal_with_stalls() {
+    let (findings, times) = check(&mut toy(), &vectors(), Stimulus::FullSpeed);
+    assert_eq!(findings, Findings::default());
+    assert!(times.iter().all(|t| t.latency() == Some(7) && t.total() == Some(13)), "{times:?}");
+    let (findings, times) = check(&mut toy(), &vectors(), STALLS);
+    assert_eq!(findings, Findings::default());
+    assert!(times[0].total() > Some(13), "the stalls did not stall: {times:?}");
+}
+
+#[test]
+fn flipped_bit_in_a_memory_file_is_found_in_its_stage() {
+    let (findings, _) = check(&mut toy_with(TOY, "02\n").unwrap(), &vectors(), Stimulus::FullSpeed);
+    let first = &findings.kept[0];
+    assert_eq!((first.stage.as_str(), first.index, first.taxel), ("scale", 1, Some([0, 1])));
+    assert_eq!((&first.expected, &first.got), (&Some(vec![3]), &Some(vec![2])));
+}
+
+#[test]
+fn flipped_bit_in_a_vector_is_found_at_the_input() {
+    let mut vectors = vectors();
+    vectors[1].codes[4] ^= 1 << 3;
+    let (findings, _) = check(&mut toy(), &vectors, STALLS);
+    let first = &findings.kept[0];
+    assert_eq!((first.frame.as_str(), first.stage.as_str(), first.taxel), ("extremes", "receive", Some([1, 1])));
+}
+
+#[test]
+fn flipped_bit_in_the_expected_output_is_found_with_its_cycle() {
+    let mut vectors = vectors();
+    vectors[0].expected.beats[5][2] ^= 1;
+    let (findings, times) = check(&mut toy(), &vectors, Stimulus::FullSpeed);
+    assert_eq!(findings.count, 1);
+    let (last_out, text) = (times[0].last_out.unwrap(), findings.kept[0].to_string());
+    let wanted = format!(
+        "toy, full speed: frame ramp, stage forces, word 5 (taxel 1,2), cycle {}: expected [15, 5, 4], got [15, 5, 5]",
+        last_out - 1
+    );
+    assert_eq!(text, wanted);
+}
+
+#[test]
+fn a_wrong_cycle_count_is_found() {
+    let mut vectors = vectors();
+    vectors[0].expected.cycles.latency += 1;
+    let (findings, _) = check(&mut toy(), &vectors[..1], Stimulus::FullSpeed);
+    assert_eq!(findings.kept[0].rule.as_deref(), Some("latency: expected 8 cycles, got 7"));
+}
+
+#[test]
+fn a_stage_without_a_tap_and_a_tap_without_a_stage_are_found() {
+    let mut vectors = vectors();
+    vectors[0].expected.stages[1].name = "other";
+    let (findings, _) = check(&mut toy(), &vectors[..1], Stimulus::FullSpeed);
+    let stages: Vec<&str> = findings.kept.iter().filter(|m| m.rule.is_some()).map(|m| m.stage.as_str()).collect();
+    assert_eq!(stages, ["scale", "other"]);
+}
+
+#[test]
+fn a_broken_design_is_an_error_with_the_tools_words() {
+    let Err(error) = toy_with(&TOY.replace("wire take =", "wire taken ="), "03\n") else { panic!("built") };
+    assert!(error.to_string().contains("toy.v:"), "{error}");
+}
+
+/// The toy's outputs, spoiled on the way.
+struct Spoiled<F: FnMut(&mut Outputs)>(Verilated, F);
+
+impl<F: FnMut(&mut Outputs)> Device for Spoiled<F> {
+    fn cycle(&mut self, inputs: &Inputs) -> Outputs {
+        let mut outputs = self.0.cycle(inputs);
+        (self.1)(&mut outputs);
+        outputs
+    }
+}
+
+#[test]
+fn a_beat_that_changes_while_it_waits_is_found() {
+    let mut flicker = false;
+    let mut device = Spoiled(toy(), |outputs| {
+        flicker = !flicker;
+        outputs.m_valid &= flicker;
+    });
+    let (findings, _) = check(&mut device, &vectors(), STALLS);
+    assert!(findings.kept.iter().any(|m| m.rule.as_deref() == Some("an offered beat must stay until it is taken")));
+}
+
+#[test]
+fn a_missing_tlast_is_found() {
+    let mut device = Spoiled(toy(), |outputs| outputs.m_last = false);
+    let (findings, _) = check(&mut device, &vectors(), Stimulus::FullSpeed);
+    assert_eq!(findings.count, 2);
+    assert_eq!((findings.kept[0].stage.as_str(), findings.kept[0].index), ("handshake", 6));
+}
+
+#[test]
+fn a_beat_too_many_is_found() {
+    let mut beats = 0;
+    let mut device = Spoiled(toy(), |outputs| {
+        beats += usize::from(outputs.m_valid);
+        outputs.m_valid |= beats == 14;
+    });
+    let (findings, _) = check(&mut device, &vectors(), Stimulus::FullSpeed);
+    assert_eq!(findings.kept[0].rule.as_deref(), Some("no beat may follow the last frame's"));
+}
+
+#[test]
+fn a_dead_output_ends_the_run_and_names_what_was_awaited() {
+    let awaited = |spoil: fn(&mut Outputs), vectors: &[Vector]| {
+        let (findings, _) = check(&mut Spoiled(toy(), spoil), vectors, Stimulus::FullSpeed);
+        assert!(findings.count > KEPT_PER_FRAME);
+        findings.kept[0].rule.clone().unwrap()
+    };
+    let dead = awaited(|outputs| outputs.m_valid = false, &vectors());
+    assert_eq!(dead, "nothing moved for 10000 cycles while waiting for output beat 0 of 7");
+    let deaf = awaited(|outputs| outputs.s_ready = false, &vectors()[..1]);
+    assert_eq!(deaf, "nothing moved for 10000 cycles while waiting for s_axis_tready for taxel 0 of 6");
+}
+
+#[test]
+fn a_device_that_sends_without_end_does_not_hang_the_bench() {
+    let mut device = Spoiled(toy(), |outputs| {
+        outputs.m_valid = true;
+        outputs.s_ready = false;
+    });
+    let (findings, _) = check(&mut device, &vectors(), Stimulus::FullSpeed);
+    let gave_up = findings.kept.iter().find(|m| m.stage == "watchdog").map(ToString::to_string);
+    assert!(gave_up.as_ref().is_some_and(|text| text.contains("waiting for s_axis_tready")), "{gave_up:?}");
+}
+
+/// The toy without its reset.
+struct Stubborn(Verilated);
+
+impl Device for Stubborn {
+    fn cycle(&mut self, inputs: &Inputs) -> Outputs {
+        self.0.cycle(&Inputs { rst: false, ..*inputs })
+    }
+}
+
+#[test]
+fn work_that_survives_a_reset_is_found() {
+    let mut device = toy();
+    // A defined start; from here on the reset does nothing.
+    device.cycle(&Inputs { rst: true, ..Inputs::default() });
+    let (findings, _) = check(&mut Stubborn(device), &vectors(), STALLS);
+    assert!(!findings.is_equal());
+}

@@ -1,0 +1,58 @@
+//! Equality to the bit, from the first word of the first stage to the last status beat: the generated
+//! Verilog (full speed, and with stalls after an interrupted frame) and rust-hdl's own simulation
+//! against the bit-true model, on every shipped frame, with exact cycle counts and their budgets.
+
+use dermis_golden::frame::Frame;
+use dermis_golden::scene::Scene;
+use dermis_sim::hardware::Simulator;
+use dermis_sim::verify::{verify, Verified};
+use dermis_tests::{build_dir, scene, SCENES};
+
+fn check(scene: &Scene, frames: &[Frame]) -> Verified {
+    let verified = verify(scene, frames, &[Simulator::Verilator, Simulator::RustHdl], &build_dir()).unwrap();
+    let first: Vec<String> = verified.findings.kept.iter().take(3).map(ToString::to_string).collect();
+    assert!(verified.findings.is_equal(), "{}: {first:#?}", scene.name);
+    verified
+}
+
+#[test]
+fn every_shipped_frame_is_equal_and_within_its_cycles() {
+    for (name, budget) in SCENES {
+        let (scene, frames) = scene(name);
+        for row in check(&scene, &frames).rows {
+            let total = row.times.total().unwrap();
+            assert!(total <= budget, "{name}, {}: {total} cycles, at most {budget}", row.frame);
+        }
+    }
+}
+
+#[test]
+fn degenerate_frames_are_equal() {
+    let (scene, frames) = scene("eight-by-eight");
+    let with = |id: &str, stress: Vec<f64>| Frame { id: id.into(), stress_MPa: stress, ..frames[0].clone() };
+    let one = |taxel: usize, value: f64| {
+        let mut stress = vec![0.0; scene.sensor.taxels()];
+        stress[taxel] = value;
+        stress
+    };
+    let checks: Vec<f64> = (0..scene.sensor.taxels()).map(|i| if (i / 8 + i) % 2 == 0 { 0.2 } else { -0.2 }).collect();
+    let tension = frames[0].stress_MPa.iter().map(|b| -b).collect();
+    let frames = [
+        with("zeros", vec![0.0; scene.sensor.taxels()]),
+        with("one taxel", one(27, 0.1)),
+        with("one corner in tension", one(0, -0.1)),
+        with("all at full scale", vec![0.3; scene.sensor.taxels()]),
+        with("checkerboard", checks),
+        with("all in tension", tension),
+        Frame::eq2(&scene.sensor),
+    ];
+    check(&scene, &frames);
+}
+
+#[test]
+fn clipped_codes_are_equal() {
+    let (mut scene, frames) = scene("eight-by-eight");
+    // A tenth of the peak: most of the contact is clipped.
+    scene.input.full_scale_MPa = Some(frames[0].peak_MPa() / 10.0);
+    check(&scene, &frames[..2]);
+}

@@ -1,0 +1,46 @@
+//! The generated Verilog is clean under `verilator --lint-only -Wall` with its waiver file, every waiver
+//! is still needed, and every waiver gives its reason.
+
+use std::path::Path;
+use std::process::Command;
+
+use dermis_golden::fixed::Model;
+use dermis_hdl::{generate, Generated};
+use dermis_tests::{scene, SCENES};
+
+fn lint(folder: &Path, generated: &Generated) -> Result<(), String> {
+    for file in &generated.files {
+        std::fs::write(folder.join(&file.name), &file.text).unwrap();
+    }
+    let of = |end: &str| -> Vec<&str> {
+        generated.files.iter().map(|f| f.name.as_str()).filter(|n| n.ends_with(end)).collect()
+    };
+    let output = Command::new("verilator")
+        .current_dir(folder)
+        .args(["--lint-only", "-Wall", "--top-module", &generated.top])
+        .args(of(".vlt"))
+        .args(of(".v"))
+        .output()
+        .expect("verilator is installed (make setup)");
+    output.status.success().then_some(()).ok_or_else(|| String::from_utf8_lossy(&output.stderr).into_owned())
+}
+
+#[test]
+fn generated_verilog_is_clean_and_needs_each_waiver() {
+    for (name, _) in SCENES {
+        let mut generated = generate(&Model::new(&scene(name).0).unwrap()).unwrap();
+        let folder = tempfile::tempdir().unwrap();
+        lint(folder.path(), &generated).unwrap_or_else(|log| panic!("{name}: {log}"));
+        let Some(index) = generated.files.iter().position(|f| f.name.ends_with(".vlt")) else {
+            continue;
+        };
+        let waivers = generated.files[index].text.clone();
+        let lines: Vec<&str> = waivers.lines().collect();
+        for (number, line) in lines.iter().enumerate().filter(|(_, l)| l.starts_with("lint_off")) {
+            assert!(number > 0 && lines[number - 1].starts_with("//"), "{name}: no reason above: {line}");
+            let without = lines.iter().enumerate().filter(|(n, _)| *n != number).map(|(_, l)| *l);
+            generated.files[index].text = without.collect::<Vec<_>>().join("\n") + "\n";
+            assert!(lint(folder.path(), &generated).is_err(), "{name}: nothing needs: {line}");
+        }
+    }
+}
