@@ -68,16 +68,10 @@ mod tests {
     #[test]
     fn axes_without_reference_are_none() {
         let errors = Errors::new([0.0, 0.05, 10.0], [1.0, 1.0, 10.0]);
-        assert_eq!(
-            (errors.x1, errors.x2, errors.tangential),
-            (None, None, None)
-        );
+        assert_eq!((errors.x1, errors.x2, errors.tangential), (None, None, None));
         assert_eq!((errors.x3, errors.normal), (Some(0.0), Some(0.0)));
         let nothing = Errors::new([0.0; 3], [1.0; 3]);
-        assert_eq!(
-            (nothing.x3, nothing.normal, nothing.tangential),
-            (None, None, None)
-        );
+        assert_eq!((nothing.x3, nothing.normal, nothing.tangential), (None, None, None));
     }
 
     #[test]

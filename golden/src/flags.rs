@@ -64,11 +64,7 @@ fn load_outside(frame: &Frame) -> bool {
         let (row, col) = (index / cols, index % cols);
         row == 0 || row == rows - 1 || col == 0 || col == cols - 1
     };
-    let ring = frame
-        .stress_MPa
-        .iter()
-        .enumerate()
-        .filter(|(index, _)| on_ring(*index));
+    let ring = frame.stress_MPa.iter().enumerate().filter(|(index, _)| on_ring(*index));
     let ring_peak = ring.fold(0.0f64, |peak, (_, b)| b.abs().max(peak));
     ring_peak > 0.0 && ring_peak >= frame.peak_MPa()
 }

@@ -40,11 +40,7 @@ impl Forces {
     /// No force on any of `taxels` taxels.
     pub fn zeros(taxels: usize) -> Forces {
         let zero = || vec![0.0; taxels];
-        Forces {
-            fx: zero(),
-            fy: zero(),
-            fz: zero(),
-        }
+        Forces { fx: zero(), fy: zero(), fz: zero() }
     }
 
     /// Sum over the taxels, [x, y, normal].
@@ -99,11 +95,7 @@ impl Frame {
     ///
     /// # Errors
     /// A wrong count or a value that is not finite; `id` stands for the file.
-    pub fn from_stress(
-        id: &str,
-        sensor: &Sensor,
-        stress_MPa: Vec<f64>,
-    ) -> Result<Frame, FrameError> {
+    pub fn from_stress(id: &str, sensor: &Sensor, stress_MPa: Vec<f64>) -> Result<Frame, FrameError> {
         let frame = Frame {
             id: id.to_string(),
             medium: None,
@@ -143,9 +135,7 @@ impl Frame {
 
     /// Largest |b| in MPa.
     pub fn peak_MPa(&self) -> f64 {
-        self.stress_MPa
-            .iter()
-            .fold(0.0, |peak, b| b.abs().max(peak))
+        self.stress_MPa.iter().fold(0.0, |peak, b| b.abs().max(peak))
     }
 
     /// Checks that the frame was read with the scene's sensor.
@@ -167,20 +157,12 @@ impl Frame {
     /// Checks counts and values, which the fields being public cannot promise.
     fn check_values(&self, file: &str) -> Result<(), FrameError> {
         let forces = self.cell_forces_N.iter().flat_map(|forces| {
-            [
-                ("cell_forces_N.fx", &forces.fx),
-                ("cell_forces_N.fy", &forces.fy),
-                ("cell_forces_N.fz", &forces.fz),
-            ]
+            [("cell_forces_N.fx", &forces.fx), ("cell_forces_N.fy", &forces.fy), ("cell_forces_N.fz", &forces.fz)]
         });
         for (field, values) in forces.chain([("stress_MPa", &self.stress_MPa)]) {
             error::check_count(file, field, values.len(), self.sensor.taxels())?;
             error::check_finite(file, field, values)?;
         }
-        error::check_finite(
-            file,
-            "resultant_N",
-            self.resultant_N.as_ref().map_or(&[][..], |r| r),
-        )
+        error::check_finite(file, "resultant_N", self.resultant_N.as_ref().map_or(&[][..], |r| r))
     }
 }

@@ -80,8 +80,7 @@ fn far(dx: f64, dy: f64, a: f64, b: f64, h: f64) -> bool {
     // E^(−2N) = ε
     let least = f64::EPSILON.powf(-0.5 / NODES as f64);
     let gap = |d: f64, side: f64| (d.abs() - side / 2.0).max(0.0);
-    ellipse(dx, gap(dy, b).hypot(h), a / 2.0) >= least
-        && ellipse(dy, gap(dx, a).hypot(h), b / 2.0) >= least
+    ellipse(dx, gap(dy, b).hypot(h), a / 2.0) >= least && ellipse(dy, gap(dx, a).hypot(h), b / 2.0) >= least
 }
 
 /// Sum of the half-axes, in units of `half`, of the ellipse with foci ±half through along + i·across.
@@ -143,24 +142,10 @@ pub struct Influence {
 impl Influence {
     /// The three matrices; mirror symmetry of the array holds to the bit.
     pub fn new(sensor: &Sensor) -> Influence {
-        let Sensor {
-            rows,
-            cols,
-            pitch_x_mm: a,
-            pitch_y_mm: b,
-            thickness_mm: h,
-        } = *sensor;
+        let Sensor { rows, cols, pitch_x_mm: a, pitch_y_mm: b, thickness_mm: h } = *sensor;
         // Equal offsets have equal entries: one evaluation for each distance in rows and columns.
         let table = |f: fn(f64, f64, f64, f64, f64) -> f64| -> Vec<f64> {
-            let at = |index: usize| {
-                f(
-                    (index % cols) as f64 * a,
-                    (index / cols) as f64 * b,
-                    a,
-                    b,
-                    h,
-                )
-            };
+            let at = |index: usize| f((index % cols) as f64 * a, (index / cols) as f64 * b, a, b, h);
             (0..sensor.taxels()).map(at).collect()
         };
         let (tx, ty, tz) = (table(cx), table(cy), table(cz));
@@ -176,11 +161,7 @@ impl Influence {
                 }
             })
         };
-        Influence {
-            cx: fill(&tx, true, false),
-            cy: fill(&ty, false, true),
-            cz: fill(&tz, false, false),
-        }
+        Influence { cx: fill(&tx, true, false), cy: fill(&ty, false, true), cz: fill(&tz, false, false) }
     }
 }
 
@@ -204,10 +185,7 @@ mod tests {
             let (a, b, h) = (r.cell_x_mm, r.cell_y_mm, r.thickness_mm);
             let got = [cx, cy, cz].map(|f| f(r.dx_mm, r.dy_mm, a, b, h));
             for (value, wanted) in got.iter().zip([&r.cx, &r.cy, &r.cz]) {
-                assert!(
-                    near(*value, wanted.parse().unwrap()),
-                    "{value:e} {wanted} at {r:?}"
-                );
+                assert!(near(*value, wanted.parse().unwrap()), "{value:e} {wanted} at {r:?}");
             }
         }
     }

@@ -123,19 +123,13 @@ impl Matrices {
         if !(finite(&cx) && finite(&cy) && finite(&cz) && cz[(0, 0)] > 0.0) {
             return Err(MatricesError::NotFinite { sensor: boxed() });
         }
-        let inverse =
-            Inverse::new(&cz).ok_or_else(|| MatricesError::NotConverged { sensor: boxed() })?;
+        let inverse = Inverse::new(&cz).ok_or_else(|| MatricesError::NotConverged { sensor: boxed() })?;
         let mut cz_pinv = inverse.power(1);
         mirror(sensor, &mut cz_pinv, 1.0, 1.0);
         let [mut ax, mut ay] = [&cx, &cy].map(|c| product(&cz_pinv, c));
         mirror(sensor, &mut ax, -1.0, 1.0);
         mirror(sensor, &mut ay, 1.0, -1.0);
-        let spectral_radius = mu_max
-            * if mu_max > 0.0 {
-                inverse.largest_radius(&cx, &cy)
-            } else {
-                0.0
-            };
+        let spectral_radius = mu_max * if mu_max > 0.0 { inverse.largest_radius(&cx, &cy) } else { 0.0 };
         let degree = degree(spectral_radius, mu_max).ok_or_else(|| MatricesError::SlowSeries {
             sensor: boxed(),
             radius: spectral_radius,

@@ -115,25 +115,14 @@ pub fn subarrays(case: Case, sensor: &Sensor) -> Result<Vec<Subarray>, Partition
     let grid = case.grid().ok_or(PartitionError::DependsOnFrame { case })?;
     let rows = part("rows", sensor.rows, grid.rows)?;
     let cols = part("cols", sensor.cols, grid.cols)?;
-    let at = |i: usize, j: usize| Subarray {
-        row0: i * rows,
-        col0: j * cols,
-        rows,
-        cols,
-    };
-    Ok((0..grid.rows)
-        .flat_map(|i| (0..grid.cols).map(move |j| at(i, j)))
-        .collect())
+    let at = |i: usize, j: usize| Subarray { row0: i * rows, col0: j * cols, rows, cols };
+    Ok((0..grid.rows).flat_map(|i| (0..grid.cols).map(move |j| at(i, j))).collect())
 }
 
 /// Lines per part, when the division is exact.
 fn part(direction: &'static str, lines: usize, parts: usize) -> Result<usize, PartitionError> {
     if parts == 0 || !lines.is_multiple_of(parts) || lines / parts < MIN_LINES {
-        return Err(PartitionError::NotDividing {
-            direction,
-            lines,
-            parts,
-        });
+        return Err(PartitionError::NotDividing { direction, lines, parts });
     }
     Ok(lines / parts)
 }
@@ -141,19 +130,14 @@ fn part(direction: &'static str, lines: usize, parts: usize) -> Result<usize, Pa
 impl Subarray {
     /// The subarray seen as a sensor of its own: same pitch, same thickness.
     pub fn sensor(&self, whole: &Sensor) -> Sensor {
-        Sensor {
-            rows: self.rows,
-            cols: self.cols,
-            ..whole.clone()
-        }
+        Sensor { rows: self.rows, cols: self.cols, ..whole.clone() }
     }
 
     /// Indices in the array of the subarray's taxels, in the subarray's row-major order.
     pub fn indices(self, whole: &Sensor) -> impl Iterator<Item = usize> {
         let cols = whole.cols;
-        (self.row0..self.row0 + self.rows).flat_map(move |row| {
-            (self.col0..self.col0 + self.cols).map(move |col| row * cols + col)
-        })
+        (self.row0..self.row0 + self.rows)
+            .flat_map(move |row| (self.col0..self.col0 + self.cols).map(move |col| row * cols + col))
     }
 
     /// The subarray's values out of the array's.
@@ -175,33 +159,16 @@ mod tests {
     use proptest::prelude::*;
 
     fn sensor(rows: usize, cols: usize) -> Sensor {
-        Sensor {
-            rows,
-            cols,
-            pitch_x_mm: 2.0,
-            pitch_y_mm: 4.0,
-            thickness_mm: 3.0,
-        }
+        Sensor { rows, cols, pitch_x_mm: 2.0, pitch_y_mm: 4.0, thickness_mm: 3.0 }
     }
 
     #[test]
     fn cases_by_hand() {
-        let names: Vec<_> = (0..4)
-            .filter_map(Case::numbered)
-            .map(|c| c.to_string())
-            .collect();
+        let names: Vec<_> = (0..4).filter_map(Case::numbered).map(|c| c.to_string()).collect();
         assert_eq!(names, ["0", "1", "2", "3"]);
         assert_eq!(Case::numbered(4), None);
         let parts = subarrays(Case::Grid(Grid { rows: 1, cols: 2 }), &sensor(4, 6)).unwrap();
-        assert_eq!(
-            parts[1],
-            Subarray {
-                row0: 0,
-                col0: 3,
-                rows: 4,
-                cols: 3
-            }
-        );
+        assert_eq!(parts[1], Subarray { row0: 0, col0: 3, rows: 4, cols: 3 });
         let values: Vec<usize> = (0..24).collect();
         assert_eq!(parts[1].gather(&sensor(4, 6), &values)[..4], [3, 4, 5, 9]);
     }
@@ -209,11 +176,7 @@ mod tests {
     #[test]
     fn refuses_uneven_cuts() {
         let uneven = subarrays(Case::Grid(Grid { rows: 2, cols: 1 }), &sensor(5, 4));
-        let expected = PartitionError::NotDividing {
-            direction: "rows",
-            lines: 5,
-            parts: 2,
-        };
+        let expected = PartitionError::NotDividing { direction: "rows", lines: 5, parts: 2 };
         assert_eq!(uneven, Err(expected));
         assert!(subarrays(Case::Grid(Grid { rows: 0, cols: 1 }), &sensor(5, 4)).is_err());
         assert!(subarrays(Case::Adaptive, &sensor(4, 4)).is_err());

@@ -44,16 +44,10 @@ pub fn quantise(stress_MPa: &[f64], bits: u32, full_scale_MPa: f64) -> Codes {
     // f64::round takes halves away from zero.
     let ideal = |b: &f64| (b / full_scale_MPa * largest).round();
     Codes {
-        codes: stress_MPa
-            .iter()
-            .map(|b| ideal(b).clamp(-largest, largest) as i32)
-            .collect(),
+        codes: stress_MPa.iter().map(|b| ideal(b).clamp(-largest, largest) as i32).collect(),
         bits,
         full_scale_MPa,
-        clipped: stress_MPa
-            .iter()
-            .map(|b| ideal(b).abs() > largest)
-            .collect(),
+        clipped: stress_MPa.iter().map(|b| ideal(b).abs() > largest).collect(),
     }
 }
 

@@ -85,10 +85,7 @@ pub fn assemble(
     if forces.fz.iter().all(|&fz| fz == 0.0) {
         flags.insert(Flag::NoContact);
     }
-    if subarrays
-        .iter()
-        .any(|subarray| !subarray.centroid_condition)
-    {
+    if subarrays.iter().any(|subarray| !subarray.centroid_condition) {
         flags.insert(Flag::ConditionUnmet);
     }
     Reconstruction {
@@ -97,9 +94,7 @@ pub fn assemble(
         engine: engine.to_string(),
         case: grid(&subarrays),
         resultant_N,
-        error: frame
-            .resultant_N
-            .map(|truth| Errors::new(truth, resultant_N)),
+        error: frame.resultant_N.map(|truth| Errors::new(truth, resultant_N)),
         subarrays,
         forces_N: forces,
         flags: flags.into_iter().collect(),
@@ -110,8 +105,5 @@ pub fn assemble(
 fn grid(subarrays: &[SubarrayResult]) -> Grid {
     let rows: BTreeSet<usize> = subarrays.iter().map(|subarray| subarray.row0).collect();
     let cols: BTreeSet<usize> = subarrays.iter().map(|subarray| subarray.col0).collect();
-    Grid {
-        rows: rows.len(),
-        cols: cols.len(),
-    }
+    Grid { rows: rows.len(), cols: cols.len() }
 }

@@ -162,20 +162,13 @@ pub struct InputSpec {
 impl Default for PartitionSpec {
     fn default() -> Self {
         let condition = Condition::default();
-        PartitionSpec {
-            case: Case::WHOLE,
-            condition,
-        }
+        PartitionSpec { case: Case::WHOLE, condition }
     }
 }
 
 impl Default for SearchSpec {
     fn default() -> Self {
-        SearchSpec {
-            objective: ObjectiveKind::default(),
-            mu_max: 0.6,
-            noise_floor_MPa: 0.0,
-        }
+        SearchSpec { objective: ObjectiveKind::default(), mu_max: 0.6, noise_floor_MPa: 0.0 }
     }
 }
 
@@ -187,12 +180,7 @@ impl Default for ThresholdSpec {
 
 impl Default for FixedSpec {
     fn default() -> Self {
-        FixedSpec {
-            input_bits: 20,
-            data_bits: 18,
-            coef_bits: 18,
-            inverse_bits: 24,
-        }
+        FixedSpec { input_bits: 20, data_bits: 18, coef_bits: 18, inverse_bits: 24 }
     }
 }
 

@@ -56,10 +56,7 @@ impl Sensor {
     /// Position of a taxel's centre in mm, [x, y], from the array's centre.
     pub fn position_mm(&self, row: usize, col: usize) -> [f64; 2] {
         let from_middle = |index: usize, count: usize| index as f64 - (count as f64 - 1.0) / 2.0;
-        [
-            from_middle(col, self.cols) * self.pitch_x_mm,
-            from_middle(row, self.rows) * self.pitch_y_mm,
-        ]
+        [from_middle(col, self.cols) * self.pitch_x_mm, from_middle(row, self.rows) * self.pitch_y_mm]
     }
 
     /// Checks every field against its range.
@@ -71,27 +68,16 @@ impl Sensor {
             if !(MIN_LINES..=MAX_LINES).contains(&value) {
                 let allowed = format!("a whole number from {MIN_LINES} to {MAX_LINES}");
                 let value = value as f64;
-                return Err(SensorError {
-                    field,
-                    value,
-                    allowed,
-                });
+                return Err(SensorError { field, value, allowed });
             }
         }
-        let lengths = [
-            ("pitch_x_mm", self.pitch_x_mm),
-            ("pitch_y_mm", self.pitch_y_mm),
-            ("thickness_mm", self.thickness_mm),
-        ];
+        let lengths =
+            [("pitch_x_mm", self.pitch_x_mm), ("pitch_y_mm", self.pitch_y_mm), ("thickness_mm", self.thickness_mm)];
         for (field, value) in lengths {
             // A NaN fails the comparison with zero.
             if !(value > 0.0 && value <= MAX_LENGTH_MM) {
                 let allowed = format!("above 0, at most {MAX_LENGTH_MM} mm");
-                return Err(SensorError {
-                    field,
-                    value,
-                    allowed,
-                });
+                return Err(SensorError { field, value, allowed });
             }
         }
         Ok(())
@@ -113,13 +99,7 @@ mod tests {
     use super::*;
 
     fn sensor() -> Sensor {
-        Sensor {
-            rows: 10,
-            cols: 5,
-            pitch_x_mm: 2.0,
-            pitch_y_mm: 4.0,
-            thickness_mm: 3.0,
-        }
+        Sensor { rows: 10, cols: 5, pitch_x_mm: 2.0, pitch_y_mm: 4.0, thickness_mm: 3.0 }
     }
 
     #[test]
@@ -140,26 +120,11 @@ mod tests {
     fn refuses_what_is_out_of_range() {
         assert_eq!(sensor().check(), Ok(()));
         let bad = [
-            Sensor {
-                rows: 1,
-                ..sensor()
-            },
-            Sensor {
-                cols: 257,
-                ..sensor()
-            },
-            Sensor {
-                pitch_x_mm: 0.0,
-                ..sensor()
-            },
-            Sensor {
-                pitch_y_mm: f64::NAN,
-                ..sensor()
-            },
-            Sensor {
-                thickness_mm: f64::INFINITY,
-                ..sensor()
-            },
+            Sensor { rows: 1, ..sensor() },
+            Sensor { cols: 257, ..sensor() },
+            Sensor { pitch_x_mm: 0.0, ..sensor() },
+            Sensor { pitch_y_mm: f64::NAN, ..sensor() },
+            Sensor { thickness_mm: f64::INFINITY, ..sensor() },
         ];
         let fields = ["rows", "cols", "pitch_x_mm", "pitch_y_mm", "thickness_mm"];
         for (sensor, field) in bad.iter().zip(fields) {

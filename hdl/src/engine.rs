@@ -57,7 +57,7 @@ pub struct Engine {
     pub(crate) rescale: Rescale,
     pub(crate) unfold: Unfold,
     pub(crate) search: Search,
-    pub(crate) force: Force,
+    pub(crate) forces: Force,
     send: Send,
     busy: DFF<Bit>,
     condition: DFF<Bit>,
@@ -92,7 +92,7 @@ impl Engine {
             rescale: Rescale::new(formats),
             unfold: Unfold::new(formats),
             search: Search::new(formats, layout),
-            force,
+            forces: force,
             send: Send::new(layout),
             busy: Default::default(),
             condition: Default::default(),
@@ -116,7 +116,7 @@ impl Logic for Engine {
         self.rescale.clk.next = self.clk.val();
         self.unfold.clk.next = self.clk.val();
         self.search.clk.next = self.clk.val();
-        self.force.clk.next = self.clk.val();
+        self.forces.clk.next = self.clk.val();
         self.send.clk.next = self.clk.val();
         self.cycles.clk.next = self.clk.val();
         self.busy.clock.next = self.clk.val();
@@ -128,13 +128,13 @@ impl Logic for Engine {
         self.rescale.rst.next = self.rst.val();
         self.unfold.rst.next = self.rst.val();
         self.search.rst.next = self.rst.val();
-        self.force.rst.next = self.rst.val();
+        self.forces.rst.next = self.rst.val();
         self.send.rst.next = self.rst.val();
 
         comment!("A frame begins when it is whole and the one before is gone");
         self.start.next = self.receive.full.val() & !self.busy.q.val() & !self.rst.val();
         self.busy.d.next = (self.start.val() | (self.busy.q.val() & !self.send.done.val())) & !self.rst.val();
-        self.cycles.clear.next = !self.busy.q.val() & !self.start.val();
+        self.cycles.clear.next = self.start.val();
         self.cycles.enable.next = true;
         self.condition.d.next = self.condition.q.val();
         self.framing.d.next = self.framing.q.val();
@@ -152,7 +152,7 @@ impl Logic for Engine {
         self.receive.s_axis_tlast.next = self.s_axis_tlast.val();
         self.s_axis_tready.next = self.receive.s_axis_tready.val();
         self.receive.quad_address.next = self.fold.quad_address.val();
-        self.receive.release.next = self.fold.release.val();
+        self.receive.free.next = self.fold.free.val();
         self.receive.reported.next = self.start.val();
         self.normalise.start.next = self.start.val();
         self.normalise.magnitude.next = self.receive.magnitude.val();
@@ -182,31 +182,31 @@ impl Logic for Engine {
         self.search.enabled.next = self.condition.q.val();
 
         comment!("search -> force -> send");
-        self.force.values.next = self.search.values.val();
-        self.force.values_valid.next = self.search.values_valid.val();
-        self.force.values_address.next = self.search.values_address.val();
-        self.force.start.next = self.search.done.val();
-        self.force.position_x.next = self.search.best_x.val();
-        self.force.position_y.next = self.search.best_y.val();
-        self.force.score.next = self.search.score.val();
-        self.force.found.next = self.search.found.val();
-        self.force.normalise.next = self.normalise.shift.val();
-        self.force.rescale.next = self.rescale.shift.val();
-        self.force.saturations.next = self.rescale.saturations.val();
-        self.force.condition.next = self.condition.q.val();
-        self.force.framing.next = self.framing.q.val();
-        self.force.cycles.next = self.cycles.value.val();
+        self.forces.values.next = self.search.values.val();
+        self.forces.values_valid.next = self.search.values_valid.val();
+        self.forces.values_address.next = self.search.values_address.val();
+        self.forces.start.next = self.search.done.val();
+        self.forces.position_x.next = self.search.best_x.val();
+        self.forces.position_y.next = self.search.best_y.val();
+        self.forces.score.next = self.search.score.val();
+        self.forces.found.next = self.search.found.val();
+        self.forces.normalise.next = self.normalise.shift.val();
+        self.forces.rescale.next = self.rescale.shift.val();
+        self.forces.saturations.next = self.rescale.saturations.val();
+        self.forces.condition.next = self.condition.q.val();
+        self.forces.framing.next = self.framing.q.val();
+        self.forces.cycles.next = self.cycles.value.val();
         self.send.start.next = self.search.done.val();
-        self.force.advance.next = self.send.advance.val();
-        self.force.offer.next = self.send.offer.val();
-        self.force.beat.next = self.send.beat.val();
-        self.force.address.next = self.send.address.val();
-        self.force.lane.next = self.send.lane.val();
-        self.send.m_axis_tvalid.next = self.force.m_axis_tvalid.val();
-        self.send.m_axis_tlast.next = self.force.m_axis_tlast.val();
+        self.forces.advance.next = self.send.advance.val();
+        self.forces.offer.next = self.send.offer.val();
+        self.forces.beat.next = self.send.beat.val();
+        self.forces.address.next = self.send.address.val();
+        self.forces.lane.next = self.send.lane.val();
+        self.send.m_axis_tvalid.next = self.forces.m_axis_tvalid.val();
+        self.send.m_axis_tlast.next = self.forces.m_axis_tlast.val();
         self.send.m_axis_tready.next = self.m_axis_tready.val();
-        self.m_axis_tdata.next = self.force.m_axis_tdata.val();
-        self.m_axis_tvalid.next = self.force.m_axis_tvalid.val();
-        self.m_axis_tlast.next = self.force.m_axis_tlast.val();
+        self.m_axis_tdata.next = self.forces.m_axis_tdata.val();
+        self.m_axis_tvalid.next = self.forces.m_axis_tvalid.val();
+        self.m_axis_tlast.next = self.forces.m_axis_tlast.val();
     }
 }

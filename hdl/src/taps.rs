@@ -38,13 +38,7 @@ pub fn taps(model: &Model) -> Vec<Tap> {
         tap("pass", "pass$quad_valid", "pass$quad", 4, f.acc_bits),
         tap("rescale", "rescale$words_valid", "rescale$words", 4, f.vector_bits),
         tap("unfold", "unfold$taxels_valid", "unfold$taxels", 4, f.vector_bits + 2),
-        Tap {
-            name: "search",
-            valid: "{}search$judged".into(),
-            data: search,
-            fields: 4,
-            field_bits: SEARCH_FIELD,
-        },
+        Tap { name: "search", valid: "{}search$judged".into(), data: search, fields: 4, field_bits: SEARCH_FIELD },
         tap("force", "search$values_valid", "search$values", 4, f.search_bits[0]),
     ]
 }

@@ -128,8 +128,7 @@ mod tests {
                         .collect();
                     for lane in 0..4 {
                         let unfolded: f64 = (0..4).map(|p| sign(p, lane) * y[p]).sum::<f64>() / 4.0;
-                        let dense: f64 =
-                            (0..x.len()).map(|t| matrix[(quads.taxel(i, lane), t)] * x[t] as f64).sum();
+                        let dense: f64 = (0..x.len()).map(|t| matrix[(quads.taxel(i, lane), t)] * x[t] as f64).sum();
                         assert!((unfolded - dense).abs() < 1e-9 * (1.0 + dense.abs()), "{rows}×{cols} {i} {lane}");
                     }
                 }

@@ -1,9 +1,43 @@
 //! Cycle counts of the engine at full speed: input one beat a cycle, output always ready.
+//!
+//! The hardware's schedule replayed on paper: each stage's latency is a named constant here and a pipeline there, and the co-simulation
+//! asserts that both agree to the cycle. With Q quads, G groups of rows, K rows in the last group:
+//! ```text
+//! fold     Q + 5                                from the last input beat to the first product
+//! pass     Q for each product, waiting until a step's operand has been finished
+//! rescale  v_00 is replayed once its exponent is known: Q more
+//! search   15 sweeps of Q + 27, one of Q + 5    (the last alone when nothing is searched)
+//! send     6 to the first beat, then one beat a cycle
+//! ```
 
 use serde::Serialize;
 
+use super::formats::{Formats, HALVINGS};
 use super::model::Model;
+use super::schedule::schedule;
+use super::search::COARSE_CENTRES;
 use super::send::STATUS_BEATS;
+
+/// From the last input beat to the cycle in which the frame starts.
+const ACCEPT: u64 = 1;
+/// `fold` beyond its Q quads: start, frame buffer, normalise, butterfly, memory.
+const FOLD: u64 = 5;
+/// From a product's issue to the first row of its accumulators: addresses, memories, selection, five steps of the lanes.
+const LANES: u64 = 8;
+/// From a row to its operand being readable: rescaler, operand memory.
+const OPERAND: u64 = 4;
+/// From the last raw row of v_00 to its first replayed row.
+const REPLAY: u64 = 2;
+/// From the last row to the search's start: rescaler, unfold, memory.
+const UNFOLD: u64 = 5;
+/// From the search's start to its first sweep.
+const BEGIN: u64 = 1;
+/// A judged sweep beyond its Q quads: set-up 2, memory 1, Taylor 2, candidates 2, score 6, judge 14.
+const SWEEP: u64 = 27;
+/// The last sweep beyond its Q quads.
+const LAST_SWEEP: u64 = 5;
+/// From the values' end to the first beat on the output.
+const SEND: u64 = 6;
 
 /// How long a frame takes, in clock cycles.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
@@ -20,8 +54,37 @@ impl Cycles {
     /// The counts of a frame of `model`; a frame that is not searched is done sooner.
     pub fn of(model: &Model, searching: bool) -> Self {
         let taxels = model.scene.sensor.taxels() as u64;
-        let first_output = u64::from(searching);
+        let quads = model.formats.quads as u64;
+        let judged = COARSE_CENTRES.len() as u64 + u64::from(HALVINGS);
+        let sweeps = if searching { judged * (quads + SWEEP) } else { 0 };
+        let values = ACCEPT + passes(&model.formats) + BEGIN + sweeps + quads + LAST_SWEEP;
+        let first_output = values + SEND;
         let latency = first_output + taxels + STATUS_BEATS as u64 - 1;
         Cycles { first_output, latency, total: taxels + latency }
     }
+}
+
+/// From a frame's start to its last coefficient in the search memory.
+fn passes(formats: &Formats) -> u64 {
+    let quads = formats.quads as u64;
+    let last_rows = quads - (formats.groups as u64 - 1) * formats.lanes_per_parity as u64;
+    let mut now = quads + FOLD;
+    let mut finished: Vec<u64> = Vec::new();
+    let mut last_row = 0;
+    for (k, products) in schedule(formats).iter().enumerate() {
+        for _ in 0..formats.groups {
+            for product in products {
+                if k > 0 {
+                    now = now.max(finished[product.operand_index()]);
+                }
+                now += quads;
+            }
+        }
+        last_row = now - 1 + LANES + last_rows - 1;
+        if k == 0 {
+            last_row += REPLAY - 1 + quads;
+        }
+        finished.push(last_row + OPERAND);
+    }
+    last_row + UNFOLD
 }

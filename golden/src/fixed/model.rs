@@ -236,7 +236,9 @@ impl Model {
         let sweeps = found
             .sweeps
             .iter()
-            .map(|best| vec![i64::from(best.position[0]), i64::from(best.position[1]), best.score, i64::from(best.taken)])
+            .map(|best| {
+                vec![i64::from(best.position[0]), i64::from(best.position[1]), best.score, i64::from(best.taken)]
+            })
             .collect();
         Trace {
             beats: forces.iter().map(|f| f.words).collect(),

@@ -97,13 +97,15 @@ pub fn memory(formats: &Formats, quantised: &Quantised, matrices: &[Matrix]) -> 
     let word = |matrix, group: usize, j| {
         (0..4)
             .flat_map(|parity| (0..lanes).map(move |k| (parity, group * lanes + k)))
-            .map(|(parity, i)| {
-                if i < formats.quads {
-                    coefficient(formats, quantised, matrix, parity, i, j)
-                } else {
-                    0
-                }
-            })
+            .map(
+                |(parity, i)| {
+                    if i < formats.quads {
+                        coefficient(formats, quantised, matrix, parity, i, j)
+                    } else {
+                        0
+                    }
+                },
+            )
             .collect()
     };
     matrices

@@ -55,7 +55,8 @@ impl Status {
 
     /// Reads a status back; `None` when the number of beats is wrong.
     pub fn of_beats(beats: &[[i32; 3]]) -> Option<Self> {
-        let &[[x, y, flags], [score, rescale, normalise], [rescale_saturations, force_saturations, cycles]] = beats else {
+        let &[[x, y, flags], [score, rescale, normalise], [rescale_saturations, force_saturations, cycles]] = beats
+        else {
             return None;
         };
         Some(Status {
@@ -77,7 +78,8 @@ mod tests {
 
     #[test]
     fn beats_read_back() {
-        let status = Status { position: [-3, 384], flags: 5, score: -70_000, rescale: 20, normalise: 3, ..Status::default() };
+        let status =
+            Status { position: [-3, 384], flags: 5, score: -70_000, rescale: 20, normalise: 3, ..Status::default() };
         assert_eq!(Status::of_beats(&status.beats()), Some(status));
         assert_eq!(Status::of_beats(&[[0; 3]]), None);
     }

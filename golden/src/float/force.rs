@@ -17,11 +17,7 @@ pub fn force(p: &[f64], mu: [f64; 2], min_force_N: f64) -> Forces {
     let kept = |p: &f64| if p.abs() < min_force_N { 0.0 } else { *p };
     let fz: Vec<f64> = p.iter().map(kept).collect();
     let along = |mu: f64| fz.iter().map(|fz| mu * fz).collect();
-    Forces {
-        fx: along(mu[0]),
-        fy: along(mu[1]),
-        fz,
-    }
+    Forces { fx: along(mu[0]), fy: along(mu[1]), fz }
 }
 
 #[cfg(test)]

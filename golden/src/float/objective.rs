@@ -63,9 +63,7 @@ mod tests {
 
     fn plain(epsilon: f64, p: &[f64]) -> f64 {
         let sum: f64 = p.iter().sum();
-        -p.iter()
-            .map(|p| (epsilon + p.abs() / sum).log2())
-            .sum::<f64>()
+        -p.iter().map(|p| (epsilon + p.abs() / sum).log2()).sum::<f64>()
     }
 
     #[test]
@@ -78,13 +76,7 @@ mod tests {
     #[test]
     fn pulling_forces_have_no_score() {
         let objective = Sparse::default();
-        for p in [
-            [1.0, -1.0],
-            [0.0, 0.0],
-            [-1.0, 0.5],
-            [f64::NAN, 1.0],
-            [f64::INFINITY, 1.0],
-        ] {
+        for p in [[1.0, -1.0], [0.0, 0.0], [-1.0, 0.5], [f64::NAN, 1.0], [f64::INFINITY, 1.0]] {
             assert_eq!(objective.score(&p), None);
         }
     }

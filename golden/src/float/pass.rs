@@ -40,14 +40,7 @@ pub fn place(i: usize, j: usize) -> usize {
 /// out += factor · m · v
 fn accumulate(m: &Mat<f64>, v: &[f64], factor: f64, out: &mut [f64]) {
     let v = ColRef::from_slice(v);
-    matmul(
-        ColMut::from_slice_mut(out),
-        Accum::Add,
-        m,
-        v,
-        factor,
-        Par::Seq,
-    );
+    matmul(ColMut::from_slice_mut(out), Accum::Add, m, v, factor, Par::Seq);
 }
 
 impl Polynomial {
@@ -75,10 +68,7 @@ impl Polynomial {
                 coefficients.push(v);
             }
         }
-        Polynomial {
-            degree,
-            coefficients,
-        }
+        Polynomial { degree, coefficients }
     }
 
     /// v_ij, i + j up to the degree.
@@ -112,9 +102,7 @@ impl Polynomial {
 /// p(μ) without series, from (Cz + μ1 Cx + μ2 Cy) p = b by LU with row exchanges: n³/3 products, for checking.
 pub fn solve_direct(matrices: &Matrices, b: &[f64], mu: [f64; 2]) -> Vec<f64> {
     let Matrices { cx, cy, cz, .. } = matrices;
-    let sum = Mat::from_fn(cz.nrows(), cz.ncols(), |i, j| {
-        cz[(i, j)] + mu[0] * cx[(i, j)] + mu[1] * cy[(i, j)]
-    });
+    let sum = Mat::from_fn(cz.nrows(), cz.ncols(), |i, j| cz[(i, j)] + mu[0] * cx[(i, j)] + mu[1] * cy[(i, j)]);
     let p: Col<f64> = sum.partial_piv_lu().solve(ColRef::from_slice(b));
     p.iter().copied().collect()
 }

@@ -46,23 +46,12 @@ struct Moments {
 impl Moments {
     fn centroid_mm(&self, sensor: &Sensor) -> Option<[f64; 2]> {
         let mean = |moment: i64| moment as f64 / self.weight as f64;
-        (self.weight != 0).then(|| {
-            [
-                mean(self.x) * sensor.pitch_x_mm / 2.0,
-                mean(self.y) * sensor.pitch_y_mm / 2.0,
-            ]
-        })
+        (self.weight != 0).then(|| [mean(self.x) * sensor.pitch_x_mm / 2.0, mean(self.y) * sensor.pitch_y_mm / 2.0])
     }
 }
 
 /// Judges the codes of the subarray `part` of `sensor`.
-pub fn receive(
-    sensor: &Sensor,
-    part: &Subarray,
-    codes: &[i32],
-    floor: i32,
-    condition: Condition,
-) -> Receipt {
+pub fn receive(sensor: &Sensor, part: &Subarray, codes: &[i32], floor: i32, condition: Condition) -> Receipt {
     let (mut compression, mut tension) = (Moments::default(), Moments::default());
     let mut max_code = 0;
     let half_pitches = |index: usize, count: usize| 2 * index as i64 - (count as i64 - 1);
@@ -100,32 +89,15 @@ mod tests {
     use proptest::prelude::*;
 
     fn sensor() -> Sensor {
-        Sensor {
-            rows: 2,
-            cols: 4,
-            pitch_x_mm: 2.0,
-            pitch_y_mm: 4.0,
-            thickness_mm: 3.0,
-        }
+        Sensor { rows: 2, cols: 4, pitch_x_mm: 2.0, pitch_y_mm: 4.0, thickness_mm: 3.0 }
     }
 
     /// The right half, at x = 1 and 3, y = −2 and 2.
-    const RIGHT: Subarray = Subarray {
-        row0: 0,
-        col0: 2,
-        rows: 2,
-        cols: 2,
-    };
+    const RIGHT: Subarray = Subarray { row0: 0, col0: 2, rows: 2, cols: 2 };
 
     #[test]
     fn by_hand() {
-        let receipt = receive(
-            &sensor(),
-            &RIGHT,
-            &[30, 10, -5, -15],
-            4,
-            Condition::BothSigns,
-        );
+        let receipt = receive(&sensor(), &RIGHT, &[30, 10, -5, -15], 4, Condition::BothSigns);
         assert_eq!(receipt.max_code, 30);
         assert_eq!(receipt.compression_centroid_mm, Some([1.5, -2.0]));
         assert_eq!(receipt.tension_centroid_mm, Some([2.5, 2.0]));

@@ -37,14 +37,8 @@ pub struct Found {
 
 /// Finds the best μ with |μ| ≤ `mu_max`, `None` when every candidate of the grid has Σp ≤ 0.
 pub fn search(family: &Polynomial, mu_max: f64, objective: &dyn Objective) -> Option<Found> {
-    let mut walk = Walk {
-        family,
-        mu_max,
-        objective,
-        p: vec![0.0; family.coefficients[0].len()],
-        evaluations: 0,
-        best: None,
-    };
+    let mut walk =
+        Walk { family, mu_max, objective, p: vec![0.0; family.coefficients[0].len()], evaluations: 0, best: None };
     if mu_max == 0.0 {
         // Every candidate is the centre.
         walk.try_position([0, 0]);
@@ -94,10 +88,7 @@ impl Walk<'_> {
         }
         self.evaluations += 1;
         self.family.eval_into(self.mu(position), &mut self.p);
-        let score = self
-            .objective
-            .score(&self.p)
-            .filter(|score| score.is_finite());
+        let score = self.objective.score(&self.p).filter(|score| score.is_finite());
         if let Some(score) = score {
             if self.best.is_none_or(|(_, best)| score > best) {
                 self.best = Some((position, score));
@@ -121,15 +112,8 @@ mod tests {
 
     /// p(μ) = (1, μ1, μ2): the objective sees μ itself.
     fn mu_itself() -> Polynomial {
-        let coefficients = vec![
-            vec![1.0, 0.0, 0.0],
-            vec![0.0, 1.0, 0.0],
-            vec![0.0, 0.0, 1.0],
-        ];
-        Polynomial {
-            degree: 1,
-            coefficients,
-        }
+        let coefficients = vec![vec![1.0, 0.0, 0.0], vec![0.0, 1.0, 0.0], vec![0.0, 0.0, 1.0]];
+        Polynomial { degree: 1, coefficients }
     }
 
     struct Score<F>(F);
@@ -178,12 +162,7 @@ mod tests {
     #[test]
     fn no_shear_asked_for() {
         let found = run(0.0, |_, _| Some(2.0)).unwrap();
-        let expected = Found {
-            mu: [0.0; 2],
-            position: [0; 2],
-            objective: 2.0,
-            evaluations: 1,
-        };
+        let expected = Found { mu: [0.0; 2], position: [0; 2], objective: 2.0, evaluations: 1 };
         assert_eq!(found, expected);
     }
 }

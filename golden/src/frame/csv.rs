@@ -5,42 +5,21 @@ use super::{Frame, FrameError};
 use crate::scene::Scene;
 
 /// Reads a frame of the scene's sensor; blank lines are passed over.
-pub(super) fn parse(
-    text: &str,
-    file: &str,
-    stem: &str,
-    scene: Option<&Scene>,
-) -> Result<Frame, FrameError> {
+pub(super) fn parse(text: &str, file: &str, stem: &str, scene: Option<&Scene>) -> Result<Frame, FrameError> {
     let sensor = match scene {
         Some(scene) => &scene.sensor,
-        None => {
-            return Err(FrameError::NoSensor {
-                file: file.to_string(),
-            })
-        }
+        None => return Err(FrameError::NoSensor { file: file.to_string() }),
     };
     let mut stress = Vec::with_capacity(sensor.taxels());
     let mut rows = 0;
-    let filled = text
-        .lines()
-        .enumerate()
-        .filter(|(_, line)| !line.trim().is_empty());
+    let filled = text.lines().enumerate().filter(|(_, line)| !line.trim().is_empty());
     for (index, line) in filled {
         let got = line.split(',').count();
         if got != sensor.cols {
-            return Err(FrameError::CsvRagged {
-                file: file.to_string(),
-                line: index + 1,
-                got,
-                wanted: sensor.cols,
-            });
+            return Err(FrameError::CsvRagged { file: file.to_string(), line: index + 1, got, wanted: sensor.cols });
         }
         for (column, cell) in line.split(',').enumerate() {
-            let value = cell
-                .trim()
-                .parse()
-                .ok()
-                .filter(|value: &f64| value.is_finite());
+            let value = cell.trim().parse().ok().filter(|value: &f64| value.is_finite());
             stress.push(value.ok_or_else(|| FrameError::CsvValue {
                 file: file.to_string(),
                 line: index + 1,

@@ -103,7 +103,9 @@ pub enum FrameError {
         wanted: usize,
     },
     /// The frame was read with another sensor than the scene's.
-    #[error("frame {frame} and scene {scene} disagree: the frame's sensor is {frame_sensor}, the scene's is {scene_sensor}")]
+    #[error(
+        "frame {frame} and scene {scene} disagree: the frame's sensor is {frame_sensor}, the scene's is {scene_sensor}"
+    )]
     SensorMismatch {
         /// The frame's id.
         frame: String,
@@ -117,32 +119,19 @@ pub enum FrameError {
 }
 
 /// Compares a count with the one wanted.
-pub(super) fn check_count(
-    file: &str,
-    field: &str,
-    got: usize,
-    wanted: usize,
-) -> Result<(), FrameError> {
+pub(super) fn check_count(file: &str, field: &str, got: usize, wanted: usize) -> Result<(), FrameError> {
     if got == wanted {
         return Ok(());
     }
-    Err(FrameError::WrongCount {
-        file: file.to_string(),
-        field: field.to_string(),
-        got,
-        wanted,
-    })
+    Err(FrameError::WrongCount { file: file.to_string(), field: field.to_string(), got, wanted })
 }
 
 /// Finds the first value that is not finite.
 pub(super) fn check_finite(file: &str, field: &str, values: &[f64]) -> Result<(), FrameError> {
     match values.iter().position(|value| !value.is_finite()) {
         None => Ok(()),
-        Some(index) => Err(FrameError::NotFinite {
-            file: file.to_string(),
-            field: field.to_string(),
-            index,
-            value: values[index],
-        }),
+        Some(index) => {
+            Err(FrameError::NotFinite { file: file.to_string(), field: field.to_string(), index, value: values[index] })
+        }
     }
 }

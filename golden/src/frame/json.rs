@@ -20,24 +20,15 @@ struct Raw {
 }
 
 /// Reads a frame; `stem` is its id when the text has none, the scene's sensor its sensor.
-pub(super) fn parse(
-    text: &str,
-    file: &str,
-    stem: &str,
-    scene: Option<&Scene>,
-) -> Result<Frame, FrameError> {
+pub(super) fn parse(text: &str, file: &str, stem: &str, scene: Option<&Scene>) -> Result<Frame, FrameError> {
     let raw: Raw = serde_json::from_str(text).map_err(|error| FrameError::Json {
         file: file.to_string(),
         line: error.line(),
         column: error.column(),
         message: error.to_string(),
     })?;
-    let sensor = raw
-        .sensor
-        .or_else(|| scene.map(|scene| scene.sensor.clone()));
-    let sensor = sensor.ok_or_else(|| FrameError::NoSensor {
-        file: file.to_string(),
-    })?;
+    let sensor = raw.sensor.or_else(|| scene.map(|scene| scene.sensor.clone()));
+    let sensor = sensor.ok_or_else(|| FrameError::NoSensor { file: file.to_string() })?;
     sensor.check().map_err(|source| {
         let file = file.to_string();
         FrameError::Sensor { file, source }

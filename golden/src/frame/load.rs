@@ -18,17 +18,13 @@ impl Frame {
     pub fn load(path: impl AsRef<Path>, scene: Option<&Scene>) -> Result<Frame, FrameError> {
         let path = path.as_ref();
         let file = path.display().to_string();
-        let extension = path
-            .extension()
-            .map(|extension| extension.to_ascii_lowercase());
+        let extension = path.extension().map(|extension| extension.to_ascii_lowercase());
         let parse = match extension.as_ref().and_then(|extension| extension.to_str()) {
             Some("json") => json::parse,
             Some("csv") => csv::parse,
             _ => return Err(FrameError::UnknownKind { file }),
         };
-        let stem = path
-            .file_stem()
-            .map(|stem| stem.to_string_lossy().into_owned());
+        let stem = path.file_stem().map(|stem| stem.to_string_lossy().into_owned());
         let text = read(path, &file)?;
         parse(&text, &file, &stem.unwrap_or_default(), scene)
     }
@@ -42,20 +38,14 @@ fn read(path: &Path, file: &str) -> Result<String, FrameError> {
     };
     let too_large = || {
         let file = file.to_string();
-        FrameError::TooLarge {
-            file,
-            limit: LARGEST_FILE,
-        }
+        FrameError::TooLarge { file, limit: LARGEST_FILE }
     };
     let handle = File::open(path).map_err(unreadable)?;
     if handle.metadata().map_err(unreadable)?.len() > LARGEST_FILE {
         return Err(too_large());
     }
     let mut bytes = Vec::new();
-    handle
-        .take(LARGEST_FILE + 1)
-        .read_to_end(&mut bytes)
-        .map_err(unreadable)?;
+    handle.take(LARGEST_FILE + 1).read_to_end(&mut bytes).map_err(unreadable)?;
     if bytes.len() as u64 > LARGEST_FILE {
         return Err(too_large());
     }

@@ -3,21 +3,14 @@
 use super::*;
 use std::path::PathBuf;
 
-const SENSOR: &str =
-    r#""sensor":{"rows":2,"cols":2,"pitch_x_mm":1,"pitch_y_mm":1,"thickness_mm":1}"#;
+const SENSOR: &str = r#""sensor":{"rows":2,"cols":2,"pitch_x_mm":1,"pitch_y_mm":1,"thickness_mm":1}"#;
 
 /// Loads text through a file of the given name, without and with a 2 × 2 scene.
 fn load(name: &str, text: &str, with_scene: bool) -> Result<Frame, FrameError> {
     let folder = tempfile::tempdir().unwrap();
     let path: PathBuf = folder.path().join(name);
     std::fs::write(&path, text).unwrap();
-    let sensor = Sensor {
-        rows: 2,
-        cols: 2,
-        pitch_x_mm: 1.0,
-        pitch_y_mm: 1.0,
-        thickness_mm: 1.0,
-    };
+    let sensor = Sensor { rows: 2, cols: 2, pitch_x_mm: 1.0, pitch_y_mm: 1.0, thickness_mm: 1.0 };
     let scene = with_scene.then(|| Scene::of_sensor(&sensor, "small"));
     Frame::load(path, scene.as_ref())
 }
@@ -43,18 +36,12 @@ fn csv_is_rows_of_numbers() {
 #[test]
 fn bad_json_is_refused_with_its_place() {
     let cases = [
-        (
-            r#""stress_MPa":[1,2,3]"#,
-            "stress_MPa has 3 values, wanted 4",
-        ),
+        (r#""stress_MPa":[1,2,3]"#, "stress_MPa has 3 values, wanted 4"),
         (r#""stress_MPa":[1,2,3,NaN]"#, "line 1, column"),
         (r#""stress_MPa":[1,2,3,1e400]"#, "number out of range"),
         (r#""stress_MPa":[1,2,3,"4"]"#, "invalid type: string"),
         (r#""id":"x""#, "missing field `stress_MPa`"),
-        (
-            r#""stress_MPa":[1,2,3,4],"resultant_N":[1,2]"#,
-            "line 1, column",
-        ),
+        (r#""stress_MPa":[1,2,3,4],"resultant_N":[1,2]"#, "line 1, column"),
         (
             r#""stress_MPa":[1,2,3,4],"cell_forces_N":{"fx":[1,2,3,4],"fy":[1,2,3,4],"fz":[1]}"#,
             "cell_forces_N.fz has 1 values",
@@ -71,13 +58,12 @@ fn bad_json_is_refused_with_its_place() {
 
 #[test]
 fn bad_sensors_are_refused_before_anything_is_allocated() {
-    let huge = r#"{"sensor":{"rows":1000000000,"cols":10,"pitch_x_mm":1,"pitch_y_mm":1,"thickness_mm":1},"stress_MPa":[]}"#;
+    let huge =
+        r#"{"sensor":{"rows":1000000000,"cols":10,"pitch_x_mm":1,"pitch_y_mm":1,"thickness_mm":1},"stress_MPa":[]}"#;
     let text = load("f.json", huge, false).unwrap_err().to_string();
-    assert!(
-        text.contains("sensor.rows = 1000000000 is not allowed"),
-        "{text}"
-    );
-    let flat = r#"{"sensor":{"rows":2,"cols":2,"pitch_x_mm":0,"pitch_y_mm":1,"thickness_mm":1},"stress_MPa":[1,2,3,4]}"#;
+    assert!(text.contains("sensor.rows = 1000000000 is not allowed"), "{text}");
+    let flat =
+        r#"{"sensor":{"rows":2,"cols":2,"pitch_x_mm":0,"pitch_y_mm":1,"thickness_mm":1},"stress_MPa":[1,2,3,4]}"#;
     let text = load("f.json", flat, false).unwrap_err().to_string();
     assert!(text.contains("sensor.pitch_x_mm = 0"), "{text}");
     let none = load("f.json", r#"{"stress_MPa":[1]}"#, false).unwrap_err();
@@ -88,10 +74,7 @@ fn bad_sensors_are_refused_before_anything_is_allocated() {
 fn bad_csv_is_refused_with_its_place() {
     let cases = [
         ("1,2\n3\n", "line 2: 1 values, wanted 2"),
-        (
-            "1,2\n3,x\n",
-            "line 2, value 2: \"x\" is not a finite number",
-        ),
+        ("1,2\n3,x\n", "line 2, value 2: \"x\" is not a finite number"),
         ("1,2\nNaN,4\n", "line 2, value 1: \"NaN\""),
         ("1,2\n1e400,4\n", "\"1e400\""),
         ("1,2\n", "rows has 1 values, wanted 2"),
@@ -101,46 +84,25 @@ fn bad_csv_is_refused_with_its_place() {
         let text = load("f.csv", csv, true).unwrap_err().to_string();
         assert!(text.contains("f.csv") && text.contains(wanted), "{text}");
     }
-    assert!(matches!(
-        load("f.csv", "1,2\n3,4", false),
-        Err(FrameError::NoSensor { .. })
-    ));
+    assert!(matches!(load("f.csv", "1,2\n3,4", false), Err(FrameError::NoSensor { .. })));
 }
 
 #[test]
 fn files_that_are_none_or_too_large() {
-    assert!(matches!(
-        load("f.txt", "", true),
-        Err(FrameError::UnknownKind { .. })
-    ));
-    assert!(matches!(
-        Frame::load("absent.json", None),
-        Err(FrameError::Unreadable { .. })
-    ));
+    assert!(matches!(load("f.txt", "", true), Err(FrameError::UnknownKind { .. })));
+    assert!(matches!(Frame::load("absent.json", None), Err(FrameError::Unreadable { .. })));
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("f.json");
     // A sparse file: large by its length, nothing on disk.
-    std::fs::File::create(&path)
-        .unwrap()
-        .set_len((64 << 20) + 1)
-        .unwrap();
-    assert!(matches!(
-        Frame::load(&path, None),
-        Err(FrameError::TooLarge { .. })
-    ));
+    std::fs::File::create(&path).unwrap().set_len((64 << 20) + 1).unwrap();
+    assert!(matches!(Frame::load(&path, None), Err(FrameError::TooLarge { .. })));
 }
 
 #[test]
 fn sensors_that_disagree_are_both_printed() {
     let frame = json(r#""stress_MPa":[1,2,3,4]"#).unwrap();
-    let text = frame
-        .check(&Scene::builtin("sensor-1").unwrap())
-        .unwrap_err()
-        .to_string();
-    let both = [
-        "2×2 taxels, pitch 1×1 mm, thickness 1 mm",
-        "10×10 taxels, pitch 2×4 mm, thickness 3 mm",
-    ];
+    let text = frame.check(&Scene::builtin("sensor-1").unwrap()).unwrap_err().to_string();
+    let both = ["2×2 taxels, pitch 1×1 mm, thickness 1 mm", "10×10 taxels, pitch 2×4 mm, thickness 3 mm"];
     assert!(both.iter().all(|sensor| text.contains(sensor)), "{text}");
 }
 
@@ -153,33 +115,18 @@ fn changed_values_are_checked_again() {
     let text = frame.check(&scene).unwrap_err().to_string();
     assert_eq!(text, "eq2: stress_MPa[7] = NaN is not a finite number");
     let short = Frame::from_stress("now", &scene.sensor, vec![0.0; 99]);
-    assert!(matches!(
-        short,
-        Err(FrameError::WrongCount {
-            got: 99,
-            wanted: 100,
-            ..
-        })
-    ));
+    assert!(matches!(short, Err(FrameError::WrongCount { got: 99, wanted: 100, .. })));
 }
 
 #[test]
 fn every_shipped_file_parses_and_belongs_to_its_scene() {
-    let counts = [
-        ("sensor-1", 8),
-        ("sensor-2", 9),
-        ("sensor-3", 7),
-        ("sensor-4", 3),
-        ("eight-by-eight", 5),
-    ];
+    let counts = [("sensor-1", 8), ("sensor-2", 9), ("sensor-3", 7), ("sensor-4", 3), ("eight-by-eight", 5)];
     for (name, count) in counts {
         let scene = Scene::builtin(name).unwrap();
         let frames = Frame::shipped(&scene);
         assert_eq!(frames.len(), count, "{name}");
         assert!(frames.windows(2).all(|pair| pair[0].id < pair[1].id));
-        assert!(frames
-            .iter()
-            .all(|frame| frame.check(&scene).is_ok() && frame.resultant_N.is_some()));
+        assert!(frames.iter().all(|frame| frame.check(&scene).is_ok() && frame.resultant_N.is_some()));
     }
     assert!(shipped::all_parse());
 }
@@ -187,17 +134,9 @@ fn every_shipped_file_parses_and_belongs_to_its_scene() {
 #[test]
 fn eq2_spans_what_it_should() {
     // From the corner at 4 × 2 mm: −16 145 … 36 000 N/m².
-    let sensor = Sensor {
-        rows: 10,
-        cols: 10,
-        pitch_x_mm: 4.0,
-        pitch_y_mm: 2.0,
-        thickness_mm: 3.0,
-    };
+    let sensor = Sensor { rows: 10, cols: 10, pitch_x_mm: 4.0, pitch_y_mm: 2.0, thickness_mm: 3.0 };
     let stress = Frame::eq2(&sensor).stress_MPa;
-    let (low, high) = stress
-        .iter()
-        .fold((0.0f64, 0.0f64), |(l, h), &b| (l.min(b), h.max(b)));
+    let (low, high) = stress.iter().fold((0.0f64, 0.0f64), |(l, h), &b| (l.min(b), h.max(b)));
     assert!((low * 1e6 + 16_145.0).abs() < 1.0 && (high * 1e6 - 36_000.0).abs() < 1e-6);
     assert_eq!(stress[1], 0.004);
 }

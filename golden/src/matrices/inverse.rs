@@ -29,12 +29,8 @@ impl Inverse {
     pub(super) fn new(cz: &Mat<f64>) -> Option<Inverse> {
         let eigen = cz.self_adjoint_eigen(Side::Lower).ok()?;
         let values: Vec<f64> = eigen.S().column_vector().iter().copied().collect();
-        let largest = values
-            .iter()
-            .fold(0.0f64, |largest, v| v.abs().max(largest));
-        let smallest = values
-            .iter()
-            .fold(f64::INFINITY, |smallest, v| v.abs().min(smallest));
+        let largest = values.iter().fold(0.0f64, |largest, v| v.abs().max(largest));
+        let smallest = values.iter().fold(f64::INFINITY, |smallest, v| v.abs().min(smallest));
         let least = values.len() as f64 * f64::EPSILON * largest;
         let invert = |v: &f64| if v.abs() <= least { 0.0 } else { 1.0 / v };
         Some(Inverse {
@@ -62,9 +58,7 @@ impl Inverse {
         let radius = |step: usize| {
             let theta = FRAC_PI_2 * step as f64 / (DIRECTIONS - 1) as f64;
             let (sin, cos) = theta.sin_cos();
-            norm2(&Mat::from_fn(kx.nrows(), kx.ncols(), |i, j| {
-                cos * kx[(i, j)] + sin * ky[(i, j)]
-            }))
+            norm2(&Mat::from_fn(kx.nrows(), kx.ncols(), |i, j| cos * kx[(i, j)] + sin * ky[(i, j)]))
         };
         (0..DIRECTIONS).map(radius).fold(0.0, f64::max)
     }

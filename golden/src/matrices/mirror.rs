@@ -32,13 +32,7 @@ mod tests {
 
     #[test]
     fn odd_counts_keep_their_middle() {
-        let sensor = Sensor {
-            rows: 3,
-            cols: 5,
-            pitch_x_mm: 1.0,
-            pitch_y_mm: 1.0,
-            thickness_mm: 1.0,
-        };
+        let sensor = Sensor { rows: 3, cols: 5, pitch_x_mm: 1.0, pitch_y_mm: 1.0, thickness_mm: 1.0 };
         let mut m = Mat::from_fn(15, 15, |i, j| ((i * 31 + j * 17) % 23) as f64 / 7.0);
         mirror(&sensor, &mut m, -1.0, 1.0);
         for i in 0..15 {
@@ -55,13 +49,7 @@ mod tests {
 
     #[test]
     fn a_symmetric_matrix_stays() {
-        let sensor = Sensor {
-            rows: 2,
-            cols: 2,
-            pitch_x_mm: 1.0,
-            pitch_y_mm: 1.0,
-            thickness_mm: 1.0,
-        };
+        let sensor = Sensor { rows: 2, cols: 2, pitch_x_mm: 1.0, pitch_y_mm: 1.0, thickness_mm: 1.0 };
         let original = Mat::from_fn(4, 4, |i, j| [3.0, 2.0, 1.5, 0.25][i ^ j]);
         let mut m = original.clone();
         mirror(&sensor, &mut m, 1.0, 1.0);

@@ -8,19 +8,11 @@ use proptest::prelude::*;
 const INVERSE_TOLERANCE: f64 = 1e-12;
 
 fn sensor(rows: usize, cols: usize, pitch: [f64; 2], thickness_mm: f64) -> Sensor {
-    Sensor {
-        rows,
-        cols,
-        pitch_x_mm: pitch[0],
-        pitch_y_mm: pitch[1],
-        thickness_mm,
-    }
+    Sensor { rows, cols, pitch_x_mm: pitch[0], pitch_y_mm: pitch[1], thickness_mm }
 }
 
 fn largest(m: &Mat<f64>) -> f64 {
-    m.col_iter()
-        .flat_map(|col| col.iter())
-        .fold(0.0, |size, c| c.abs().max(size))
+    m.col_iter().flat_map(|col| col.iter()).fold(0.0, |size, c| c.abs().max(size))
 }
 
 fn off_identity(m: &Matrices) -> f64 {
@@ -31,24 +23,12 @@ fn off_identity(m: &Matrices) -> f64 {
 #[test]
 fn builtin_sensors_have_the_known_radius_and_degree() {
     // Condition and r to the digits of an independent study, degree by its rule.
-    let known = [
-        ("sensor-1", 17.0, 0.41),
-        ("sensor-2", 4.0, 0.28),
-        ("eight-by-eight", 4.0, 0.28),
-    ];
+    let known = [("sensor-1", 17.0, 0.41), ("sensor-2", 4.0, 0.28), ("eight-by-eight", 4.0, 0.28)];
     for (name, condition, radius) in known {
         let scene = Scene::builtin(name).unwrap();
         let m = Matrices::new(&scene.sensor, scene.search.mu_max).unwrap();
-        assert!(
-            (m.condition - condition).abs() < 0.5,
-            "{name}: {}",
-            m.condition
-        );
-        assert!(
-            (m.spectral_radius - radius).abs() < 0.01,
-            "{name}: {}",
-            m.spectral_radius
-        );
+        assert!((m.condition - condition).abs() < 0.5, "{name}: {}", m.condition);
+        assert!((m.spectral_radius - radius).abs() < 0.01, "{name}: {}", m.spectral_radius);
         assert_eq!(m.degree, 3);
         assert!(off_identity(&m) < INVERSE_TOLERANCE);
     }
@@ -58,11 +38,7 @@ fn builtin_sensors_have_the_known_radius_and_degree() {
 fn a_thin_cover_needs_degree_one() {
     let m = Matrices::new(&sensor(12, 12, [8.0, 8.0], 0.91), 0.6).unwrap();
     assert_eq!(m.degree, 1);
-    assert!(
-        (m.spectral_radius - 0.018).abs() < 0.001,
-        "{}",
-        m.spectral_radius
-    );
+    assert!((m.spectral_radius - 0.018).abs() < 0.001, "{}", m.spectral_radius);
 }
 
 #[test]
@@ -97,16 +73,10 @@ fn refusals_name_their_reason() {
     let stiff = Matrices::new(&sensor(8, 8, [1.0, 1.0], 5.0), 0.6).unwrap_err();
     assert!(stiff.to_string().contains("r = 0.549"), "{stiff}");
     let large = Matrices::new(&sensor(256, 256, [1.0, 1.0], 1.0), 0.6).unwrap_err();
-    assert!(matches!(
-        large,
-        MatricesError::TooLarge { taxels: 65536, .. }
-    ));
+    assert!(matches!(large, MatricesError::TooLarge { taxels: 65536, .. }));
     let flat = Matrices::new(&sensor(4, 4, [1e-200, 1e-200], 1e-200), 0.6).unwrap_err();
     assert!(matches!(flat, MatricesError::NotFinite { .. }));
-    assert!(matches!(
-        Matrices::new(&sensor(0, 4, [1.0, 1.0], 1.0), 0.6),
-        Err(MatricesError::Sensor(_))
-    ));
+    assert!(matches!(Matrices::new(&sensor(0, 4, [1.0, 1.0], 1.0), 0.6), Err(MatricesError::Sensor(_))));
 }
 
 proptest! {

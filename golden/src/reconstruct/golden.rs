@@ -35,9 +35,7 @@ pub enum GoldenError {
     #[error(transparent)]
     Frame(#[from] FrameError),
     /// Stress so large that its forces are no finite numbers.
-    #[error(
-        "frame {frame}: peak stress {peak_MPa:e} MPa gives forces beyond the range of numbers"
-    )]
+    #[error("frame {frame}: peak stress {peak_MPa:e} MPa gives forces beyond the range of numbers")]
     TooStrong {
         /// The frame's id.
         frame: String,
@@ -55,11 +53,7 @@ impl Golden {
         scene.require_supported()?;
         let parts = subarrays(scene.partition.case, &scene.sensor)?;
         let shape = parts[0].sensor(&scene.sensor);
-        Ok(Golden {
-            scene: scene.clone(),
-            matrices: Matrices::new(&shape, scene.search.mu_max)?,
-            parts,
-        })
+        Ok(Golden { scene: scene.clone(), matrices: Matrices::new(&shape, scene.search.mu_max)?, parts })
     }
 
     /// The matrices of a subarray.
@@ -74,24 +68,14 @@ impl Golden {
     pub fn run(&self, frame: &Frame) -> Result<Reconstruction, GoldenError> {
         let scene = &self.scene;
         frame.check(scene)?;
-        let codes = quantise(
-            &frame.stress_MPa,
-            scene.fixed.input_bits,
-            full_scale(scene, frame),
-        );
+        let codes = quantise(&frame.stress_MPa, scene.fixed.input_bits, full_scale(scene, frame));
         let floor = noise_floor_codes(scene, &codes);
         let mut flags = frame_flags(scene, frame, &codes);
         let mut forces = Forces::zeros(scene.sensor.taxels());
         let mut results = Vec::with_capacity(self.parts.len());
         for part in &self.parts {
             let own_codes = part.gather(&scene.sensor, &codes.codes);
-            let receipt = receive(
-                &scene.sensor,
-                part,
-                &own_codes,
-                floor,
-                scene.partition.condition,
-            );
+            let receipt = receive(&scene.sensor, part, &own_codes, floor, scene.partition.condition);
             let b = part.gather(&scene.sensor, &frame.stress_MPa);
             let (found, own) = self.solve(&b, receipt.condition_met);
             if receipt.condition_met && found.is_none() {

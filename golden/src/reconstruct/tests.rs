@@ -28,11 +28,7 @@ fn sensor_1_meets_its_targets() {
     let mut tangential = Vec::new();
     for frame in Frame::shipped(&scene()) {
         let errors = golden.run(&frame).unwrap().error.unwrap();
-        assert!(
-            errors.normal.unwrap() <= NORMAL_EACH,
-            "{}: {errors:?}",
-            frame.id
-        );
+        assert!(errors.normal.unwrap() <= NORMAL_EACH, "{}: {errors:?}", frame.id);
         tangential.push(errors.tangential.unwrap());
     }
     tangential.sort_by(f64::total_cmp);
@@ -65,16 +61,10 @@ fn json_keeps_the_contract_and_comes_back() {
     ];
     let mut from = 0;
     for key in keys {
-        from += text[from..]
-            .find(key)
-            .unwrap_or_else(|| panic!("{key} after {from}"))
-            + key.len();
+        from += text[from..].find(key).unwrap_or_else(|| panic!("{key} after {from}")) + key.len();
     }
     assert_eq!(from, text.len());
-    assert_eq!(
-        serde_json::from_str::<Reconstruction>(&text).unwrap(),
-        result
-    );
+    assert_eq!(serde_json::from_str::<Reconstruction>(&text).unwrap(), result);
 }
 
 #[test]
@@ -82,10 +72,7 @@ fn shear_points_from_tension_to_compression() {
     // Full sliding: b is positive ahead of the contact.
     let result = run(&scene(), &hertz());
     let part = &result.subarrays[0];
-    let (c, t) = (
-        part.compression_centroid_mm.unwrap(),
-        part.tension_centroid_mm.unwrap(),
-    );
+    let (c, t) = (part.compression_centroid_mm.unwrap(), part.tension_centroid_mm.unwrap());
     assert!(part.mu[0] * (c[0] - t[0]) + part.mu[1] * (c[1] - t[1]) > 0.0);
 }
 
@@ -121,11 +108,7 @@ fn pure_tension_is_no_compression() {
     let mut frame = hertz();
     frame.stress_MPa.iter_mut().for_each(|b| *b = -b.abs());
     let result = run(&scene(), &frame);
-    assert!(
-        result.flags.contains(&Flag::NoCompression),
-        "{:?}",
-        result.flags
-    );
+    assert!(result.flags.contains(&Flag::NoCompression), "{:?}", result.flags);
     assert_eq!(result.subarrays[0].mu, [0.0; 2]);
     assert!(result.resultant_N[2] < 0.0);
 }
@@ -147,11 +130,7 @@ fn threshold_drops_small_forces() {
     let mut scene = scene();
     scene.threshold.min_force_N = 0.01;
     let kept = run(&scene, &hertz());
-    assert!(kept
-        .forces_N
-        .fz
-        .iter()
-        .all(|&fz| fz == 0.0 || fz.abs() >= 0.01));
+    assert!(kept.forces_N.fz.iter().all(|&fz| fz == 0.0 || fz.abs() >= 0.01));
     assert!(kept.forces_N.fz.contains(&0.0));
     scene.threshold.min_force_N = 1e3;
     assert_eq!(run(&scene, &hertz()).flags, [Flag::NoContact]);
@@ -209,14 +188,7 @@ fn the_case_is_counted_from_the_subarrays() {
     };
     let results = parts.iter().map(result).collect();
     let flags = vec![Flag::Saturated, Flag::Saturated];
-    let whole = assemble(
-        &scene,
-        &hertz(),
-        "fixed",
-        results,
-        Forces::zeros(100),
-        flags,
-    );
+    let whole = assemble(&scene, &hertz(), "fixed", results, Forces::zeros(100), flags);
     assert_eq!(whole.case, Grid { rows: 1, cols: 2 });
     assert_eq!(whole.flags, [Flag::NoContact, Flag::Saturated]);
 }

@@ -12,10 +12,7 @@ const BUILTINS: [(&str, &str); 5] = [
     ("sensor-2", include_str!("../../scenes/sensor-2.toml")),
     ("sensor-3", include_str!("../../scenes/sensor-3.toml")),
     ("sensor-4", include_str!("../../scenes/sensor-4.toml")),
-    (
-        "eight-by-eight",
-        include_str!("../../scenes/eight-by-eight.toml"),
-    ),
+    ("eight-by-eight", include_str!("../../scenes/eight-by-eight.toml")),
 ];
 
 impl Scene {
@@ -50,10 +47,7 @@ impl Scene {
         })?;
         if text.len() as u64 > LARGEST_FILE {
             let file = name_or_path.to_string();
-            return Err(SceneError::TooLarge {
-                file,
-                limit: LARGEST_FILE,
-            });
+            return Err(SceneError::TooLarge { file, limit: LARGEST_FILE });
         }
         Scene::parse(&text, name_or_path)
     }
@@ -62,22 +56,13 @@ impl Scene {
 /// The file's text, cut one byte beyond the limit so that its size can be judged.
 fn read(path: &str) -> std::io::Result<String> {
     let mut bytes = Vec::new();
-    std::fs::File::open(path)?
-        .take(LARGEST_FILE + 1)
-        .read_to_end(&mut bytes)?;
-    String::from_utf8(bytes)
-        .map_err(|error| std::io::Error::new(std::io::ErrorKind::InvalidData, error))
+    std::fs::File::open(path)?.take(LARGEST_FILE + 1).read_to_end(&mut bytes)?;
+    String::from_utf8(bytes).map_err(|error| std::io::Error::new(std::io::ErrorKind::InvalidData, error))
 }
 
 fn not_found(name: &str) -> SceneError {
     let builtins = Scene::builtin_names();
     let likeness = |other: &&&str| strsim::jaro_winkler(name, other);
-    let nearest = builtins
-        .iter()
-        .max_by(|a, b| likeness(a).total_cmp(&likeness(b)));
-    SceneError::NotFound {
-        name: name.to_string(),
-        nearest: nearest.copied().unwrap_or_default(),
-        builtins,
-    }
+    let nearest = builtins.iter().max_by(|a, b| likeness(a).total_cmp(&likeness(b)));
+    SceneError::NotFound { name: name.to_string(), nearest: nearest.copied().unwrap_or_default(), builtins }
 }

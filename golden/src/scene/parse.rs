@@ -2,8 +2,8 @@
 
 use super::reader::Reader;
 use super::{
-    Condition, FixedSpec, HardwareSpec, InputSpec, Medium, ObjectiveKind, PartitionSpec, Scene,
-    SceneError, SearchSpec, ThresholdSpec, BOARDS,
+    Condition, FixedSpec, HardwareSpec, InputSpec, Medium, ObjectiveKind, PartitionSpec, Scene, SceneError, SearchSpec,
+    ThresholdSpec, BOARDS,
 };
 use crate::partition::{subarrays, Case, Grid};
 use crate::sensor::{Sensor, MAX_LENGTH_MM, MAX_LINES, MIN_LINES};
@@ -13,18 +13,12 @@ use toml::{Table, Value};
 /// Tables and their fields; "" is the top level.
 const SCHEMA: [(&str, &[&str]); 9] = [
     ("", &["name"]),
-    (
-        "sensor",
-        &["rows", "cols", "pitch_x_mm", "pitch_y_mm", "thickness_mm"],
-    ),
+    ("sensor", &["rows", "cols", "pitch_x_mm", "pitch_y_mm", "thickness_mm"]),
     ("medium", &["kind", "poisson"]),
     ("partition", &["case", "condition", "rows", "cols"]),
     ("search", &["objective", "mu_max", "noise_floor_MPa"]),
     ("threshold", &["min_force_N"]),
-    (
-        "fixed",
-        &["input_bits", "data_bits", "coef_bits", "inverse_bits"],
-    ),
+    ("fixed", &["input_bits", "data_bits", "coef_bits", "inverse_bits"]),
     ("hardware", &["board"]),
     ("input", &["full_scale_MPa"]),
 ];
@@ -61,10 +55,7 @@ fn syntax(text: &str, origin: &str, error: &toml::de::Error) -> SceneError {
     let end = error.span().map_or(0, |span| span.start.min(text.len()));
     SceneError::Syntax {
         file: origin.to_string(),
-        line: 1 + text.as_bytes()[..end]
-            .iter()
-            .filter(|&&byte| byte == b'\n')
-            .count(),
+        line: 1 + text.as_bytes()[..end].iter().filter(|&&byte| byte == b'\n').count(),
         message: error.message().to_string(),
     }
 }
@@ -75,14 +66,8 @@ fn name(reader: &Reader, origin: &str) -> Result<String, SceneError> {
         return Ok(stem.map_or("scene".into(), |stem| stem.to_string_lossy().into_owned()));
     };
     match value.as_str() {
-        Some(name) if !name.is_empty() && name.chars().count() <= LONGEST_NAME => {
-            Ok(name.to_string())
-        }
-        _ => Err(reader.wrong(
-            "name",
-            value,
-            format!("a text of 1 to {LONGEST_NAME} characters"),
-        )),
+        Some(name) if !name.is_empty() && name.chars().count() <= LONGEST_NAME => Ok(name.to_string()),
+        _ => Err(reader.wrong("name", value, format!("a text of 1 to {LONGEST_NAME} characters"))),
     }
 }
 
@@ -90,9 +75,7 @@ fn sensor(reader: &Reader) -> Result<Sensor, SceneError> {
     let lines = |path| {
         let range = MIN_LINES as i64..=MAX_LINES as i64;
         // In range, so that the cast keeps the value.
-        reader
-            .integer(path, range, None)
-            .map(|lines| lines as usize)
+        reader.integer(path, range, None).map(|lines| lines as usize)
     };
     let length = |path| {
         let allowed = format!("a number above 0, at most {MAX_LENGTH_MM}");
@@ -109,38 +92,26 @@ fn sensor(reader: &Reader) -> Result<Sensor, SceneError> {
 }
 
 fn medium(reader: &Reader) -> Result<Medium, SceneError> {
-    let layer = Medium::BondedLayer {
-        poisson: DEFAULT_POISSON,
-    };
+    let layer = Medium::BondedLayer { poisson: DEFAULT_POISSON };
     let names = [("half-space", Medium::HalfSpace), ("bonded-layer", layer)];
     let kind = reader.choice("medium.kind", &names)?;
     let allowed = "a number above 0 and below 0.5";
     let poisson = reader.number("medium.poisson", |nu| nu > 0.0 && nu < 0.5, allowed)?;
     match (kind, poisson, reader.value("medium.poisson")) {
-        (Medium::HalfSpace, _, Some(value)) => Err(reader.wrong(
-            "medium.poisson",
-            value,
-            "left out unless medium.kind = \"bonded-layer\"",
-        )),
+        (Medium::HalfSpace, _, Some(value)) => {
+            Err(reader.wrong("medium.poisson", value, "left out unless medium.kind = \"bonded-layer\""))
+        }
         (Medium::BondedLayer { .. }, Some(poisson), _) => Ok(Medium::BondedLayer { poisson }),
         (kind, _, _) => Ok(kind),
     }
 }
 
 fn partition(reader: &Reader, sensor: &Sensor) -> Result<PartitionSpec, SceneError> {
-    let names = [
-        ("loaded", Condition::Loaded),
-        ("both-signs", Condition::BothSigns),
-    ];
+    let names = [("loaded", Condition::Loaded), ("both-signs", Condition::BothSigns)];
     let condition = reader.choice("partition.condition", &names)?;
     let own = ["partition.rows", "partition.cols"].map(|path| reader.value(path));
     let (field, case) = match (reader.value("partition.case"), own) {
-        (None, [None, None]) => {
-            return Ok(PartitionSpec {
-                condition,
-                ..Default::default()
-            })
-        }
+        (None, [None, None]) => return Ok(PartitionSpec { condition, ..Default::default() }),
         (Some(value), [None, None]) => ("partition.case", named_case(reader, value)?),
         (None, _) => {
             let parts = |path| {
@@ -150,9 +121,7 @@ fn partition(reader: &Reader, sensor: &Sensor) -> Result<PartitionSpec, SceneErr
             let (rows, cols) = (parts("partition.rows")?, parts("partition.cols")?);
             ("partition.rows", Case::Grid(Grid { rows, cols }))
         }
-        (Some(value), _) => {
-            return Err(reader.wrong("partition.case", value, "left out beside rows and cols"))
-        }
+        (Some(value), _) => return Err(reader.wrong("partition.case", value, "left out beside rows and cols")),
     };
     if case.grid().is_some() {
         subarrays(case, sensor).map_err(|error| {
@@ -170,27 +139,13 @@ fn named_case(reader: &Reader, value: &Value) -> Result<Case, SceneError> {
         Value::String(name) if name == "contacts" => Some(Case::Contacts),
         _ => None,
     };
-    case.ok_or_else(|| {
-        reader.wrong(
-            "partition.case",
-            value,
-            "0, 1, 2, 3, \"adaptive\" or \"contacts\"",
-        )
-    })
+    case.ok_or_else(|| reader.wrong("partition.case", value, "0, 1, 2, 3, \"adaptive\" or \"contacts\""))
 }
 
 fn search(reader: &Reader) -> Result<SearchSpec, SceneError> {
     let default = SearchSpec::default();
-    let mu_max = reader.number(
-        "search.mu_max",
-        |mu| (0.0..=2.0).contains(&mu),
-        "a number from 0 to 2",
-    )?;
-    let floor = reader.number(
-        "search.noise_floor_MPa",
-        |mpa| mpa >= 0.0,
-        "a number of at least 0",
-    )?;
+    let mu_max = reader.number("search.mu_max", |mu| (0.0..=2.0).contains(&mu), "a number from 0 to 2")?;
+    let floor = reader.number("search.noise_floor_MPa", |mpa| mpa >= 0.0, "a number of at least 0")?;
     Ok(SearchSpec {
         objective: reader.choice("search.objective", &ObjectiveKind::NAMES)?,
         mu_max: mu_max.unwrap_or(default.mu_max),
@@ -199,15 +154,9 @@ fn search(reader: &Reader) -> Result<SearchSpec, SceneError> {
 }
 
 fn threshold(reader: &Reader) -> Result<ThresholdSpec, SceneError> {
-    let force = reader.number(
-        "threshold.min_force_N",
-        |n| n >= 0.0,
-        "a number of at least 0",
-    )?;
+    let force = reader.number("threshold.min_force_N", |n| n >= 0.0, "a number of at least 0")?;
     let default = ThresholdSpec::default().min_force_N;
-    Ok(ThresholdSpec {
-        min_force_N: force.unwrap_or(default),
-    })
+    Ok(ThresholdSpec { min_force_N: force.unwrap_or(default) })
 }
 
 fn fixed(reader: &Reader) -> Result<FixedSpec, SceneError> {
@@ -222,25 +171,16 @@ fn fixed(reader: &Reader) -> Result<FixedSpec, SceneError> {
         input_bits: bits("fixed.input_bits", 8..=24, default.input_bits)?,
         data_bits: bits("fixed.data_bits", 12..=18, default.data_bits)?,
         coef_bits,
-        inverse_bits: bits(
-            "fixed.inverse_bits",
-            i64::from(coef_bits)..=32,
-            default.inverse_bits,
-        )?,
+        inverse_bits: bits("fixed.inverse_bits", i64::from(coef_bits)..=32, default.inverse_bits)?,
     })
 }
 
 fn hardware(reader: &Reader) -> Result<HardwareSpec, SceneError> {
     let board = reader.choice("hardware.board", &BOARDS.map(|board| (board, Some(board))))?;
-    Ok(
-        board.map_or_else(HardwareSpec::default, |board| HardwareSpec {
-            board: board.to_string(),
-        }),
-    )
+    Ok(board.map_or_else(HardwareSpec::default, |board| HardwareSpec { board: board.to_string() }))
 }
 
 fn input(reader: &Reader) -> Result<InputSpec, SceneError> {
-    let full_scale_MPa =
-        reader.number("input.full_scale_MPa", |mpa| mpa > 0.0, "a number above 0")?;
+    let full_scale_MPa = reader.number("input.full_scale_MPa", |mpa| mpa > 0.0, "a number above 0")?;
     Ok(InputSpec { full_scale_MPa })
 }

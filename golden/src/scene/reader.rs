@@ -19,20 +19,14 @@ impl<'a> Reader<'a> {
     pub(super) fn check_names(&self, schema: &[(&str, &[&str])]) -> Result<(), SceneError> {
         let paths = || {
             let path = |table: &&str, field: &&str| join(table, field);
-            schema
-                .iter()
-                .flat_map(move |(table, fields)| fields.iter().map(move |field| path(table, field)))
+            schema.iter().flat_map(move |(table, fields)| fields.iter().map(move |field| path(table, field)))
         };
         let unknown = |field: String| {
             let tables = schema.iter().map(|(table, _)| table.to_string());
             let known = paths().chain(tables.filter(|table| !table.is_empty()));
             let nearest = nearest_path(&field, known);
             let file = self.file.to_string();
-            SceneError::UnknownField {
-                file,
-                field,
-                nearest,
-            }
+            SceneError::UnknownField { file, field, nearest }
         };
         for (name, value) in self.root {
             let Some((_, fields)) = schema.iter().find(|(t, _)| t == name && !t.is_empty()) else {
@@ -41,9 +35,7 @@ impl<'a> Reader<'a> {
                 }
                 return Err(unknown(name.clone()));
             };
-            let table = value
-                .as_table()
-                .ok_or_else(|| self.wrong(name, value, "a table"))?;
+            let table = value.as_table().ok_or_else(|| self.wrong(name, value, "a table"))?;
             if let Some(field) = table.keys().find(|key| !fields.contains(&key.as_str())) {
                 return Err(unknown(join(name, field)));
             }
@@ -99,11 +91,7 @@ impl<'a> Reader<'a> {
     }
 
     /// One of the named choices, or the type's default.
-    pub(super) fn choice<T: Copy + Default>(
-        &self,
-        path: &str,
-        names: &[(&str, T)],
-    ) -> Result<T, SceneError> {
+    pub(super) fn choice<T: Copy + Default>(&self, path: &str, names: &[(&str, T)]) -> Result<T, SceneError> {
         let Some(value) = self.value(path) else {
             return Ok(T::default());
         };
@@ -115,12 +103,7 @@ impl<'a> Reader<'a> {
     }
 
     /// The error for a value that is there and not allowed.
-    pub(super) fn wrong(
-        &self,
-        path: &str,
-        value: &Value,
-        allowed: impl Into<String>,
-    ) -> SceneError {
+    pub(super) fn wrong(&self, path: &str, value: &Value, allowed: impl Into<String>) -> SceneError {
         SceneError::WrongValue {
             file: self.file.to_string(),
             field: path.to_string(),
@@ -131,11 +114,7 @@ impl<'a> Reader<'a> {
 
     /// The error for a value that must be there.
     pub(super) fn missing(&self, path: &str, allowed: impl Into<String>) -> SceneError {
-        SceneError::Missing {
-            file: self.file.to_string(),
-            field: path.to_string(),
-            allowed: allowed.into(),
-        }
+        SceneError::Missing { file: self.file.to_string(), field: path.to_string(), allowed: allowed.into() }
     }
 }
 
@@ -161,10 +140,7 @@ fn join(table: &str, field: &str) -> String {
 /// the table breaks ties.
 fn nearest_path(path: &str, known: impl Iterator<Item = String>) -> String {
     let last = |path: &str| path.rsplit('.').next().unwrap_or(path).to_string();
-    let likeness = |other: &String| {
-        strsim::jaro_winkler(&last(path), &last(other)) + 0.1 * strsim::jaro_winkler(path, other)
-    };
-    known
-        .max_by(|a, b| likeness(a).total_cmp(&likeness(b)))
-        .unwrap_or_default()
+    let likeness =
+        |other: &String| strsim::jaro_winkler(&last(path), &last(other)) + 0.1 * strsim::jaro_winkler(path, other);
+    known.max_by(|a, b| likeness(a).total_cmp(&likeness(b))).unwrap_or_default()
 }

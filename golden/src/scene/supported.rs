@@ -11,12 +11,7 @@ impl Scene {
     pub fn require_supported(&self) -> Result<(), SceneError> {
         let missing = |field: &'static str, value: String, available: &'static str| {
             let scene = self.name.clone();
-            Err(SceneError::NotAvailable {
-                scene,
-                field,
-                value,
-                available,
-            })
+            Err(SceneError::NotAvailable { scene, field, value, available })
         };
         if self.medium != Medium::HalfSpace {
             return missing("medium.kind", self.medium.to_string(), "half-space");

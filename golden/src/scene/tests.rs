@@ -3,8 +3,7 @@
 use super::*;
 use crate::partition::Grid;
 
-const SENSOR: &str =
-    "[sensor]\nrows = 10\ncols = 10\npitch_x_mm = 2.0\npitch_y_mm = 4\nthickness_mm = 3.0\n";
+const SENSOR: &str = "[sensor]\nrows = 10\ncols = 10\npitch_x_mm = 2.0\npitch_y_mm = 4\nthickness_mm = 3.0\n";
 
 fn with(more: &str) -> Result<Scene, SceneError> {
     Scene::parse(&format!("{SENSOR}{more}"), "my.toml")
@@ -20,19 +19,8 @@ fn everything_but_the_sensor_has_a_default() {
     assert_eq!(scene.name, "my");
     let default = Scene::of_sensor(&scene.sensor, "my");
     assert_eq!(scene, default);
-    assert_eq!(
-        scene.fixed,
-        FixedSpec {
-            input_bits: 20,
-            data_bits: 18,
-            coef_bits: 18,
-            inverse_bits: 24
-        }
-    );
-    assert_eq!(
-        (scene.search.mu_max, scene.hardware.board.as_str()),
-        (0.6, "ulx3s-85f")
-    );
+    assert_eq!(scene.fixed, FixedSpec { input_bits: 20, data_bits: 18, coef_bits: 18, inverse_bits: 24 });
+    assert_eq!((scene.search.mu_max, scene.hardware.board.as_str()), (0.6, "ulx3s-85f"));
     assert!(scene.require_supported().is_ok());
 }
 
@@ -66,20 +54,9 @@ fn every_field_is_read() {
     assert_eq!(scene.partition.case, Case::Grid(Grid { rows: 2, cols: 5 }));
     assert_eq!(scene.partition.condition, Condition::BothSigns);
     assert_eq!(scene.search.objective, ObjectiveKind::Patch);
-    assert_eq!(
-        (scene.search.mu_max, scene.search.noise_floor_MPa),
-        (1.0, 0.001)
-    );
+    assert_eq!((scene.search.mu_max, scene.search.noise_floor_MPa), (1.0, 0.001));
     assert_eq!(scene.threshold.min_force_N, 0.01);
-    assert_eq!(
-        scene.fixed,
-        FixedSpec {
-            input_bits: 16,
-            data_bits: 16,
-            coef_bits: 14,
-            inverse_bits: 18
-        }
-    );
+    assert_eq!(scene.fixed, FixedSpec { input_bits: 16, data_bits: 16, coef_bits: 14, inverse_bits: 18 });
     assert_eq!(scene.input.full_scale_MPa, Some(0.25));
 }
 
@@ -90,10 +67,7 @@ fn builtins_are_complete_and_distinct() {
         assert_eq!(scene.name, name);
         assert_eq!(scene.require_supported().is_ok(), name != "sensor-4");
     }
-    let four = Scene::builtin("sensor-4")
-        .unwrap()
-        .require_supported()
-        .unwrap_err();
+    let four = Scene::builtin("sensor-4").unwrap().require_supported().unwrap_err();
     let wanted = "scene sensor-4: not available yet: partition.case = 1; available: 0";
     assert_eq!(four.to_string(), wanted);
 }
@@ -101,31 +75,16 @@ fn builtins_are_complete_and_distinct() {
 #[test]
 fn an_unknown_scene_names_the_nearest() {
     let text = Scene::load("sensor1").unwrap_err().to_string();
-    assert!(
-        text.contains("eight-by-eight") && text.ends_with("did you mean \"sensor-1\"?"),
-        "{text}"
-    );
+    assert!(text.contains("eight-by-eight") && text.ends_with("did you mean \"sensor-1\"?"), "{text}");
 }
 
 #[test]
 fn unknown_fields_name_the_nearest() {
     let cases = [
-        (
-            "[search]\nmu_maks = 1",
-            "unknown field search.mu_maks; the nearest valid field is search.mu_max",
-        ),
-        (
-            "[fixed]\nmu_max = 1",
-            "unknown field fixed.mu_max; the nearest valid field is search.mu_max",
-        ),
-        (
-            "[serach]\nmu_max = 1",
-            "unknown field serach; the nearest valid field is search",
-        ),
-        (
-            "[input]\nfull_scale = 1",
-            "unknown field input.full_scale; the nearest valid field is input.full_scale_MPa",
-        ),
+        ("[search]\nmu_maks = 1", "unknown field search.mu_maks; the nearest valid field is search.mu_max"),
+        ("[fixed]\nmu_max = 1", "unknown field fixed.mu_max; the nearest valid field is search.mu_max"),
+        ("[serach]\nmu_max = 1", "unknown field serach; the nearest valid field is search"),
+        ("[input]\nfull_scale = 1", "unknown field input.full_scale; the nearest valid field is input.full_scale_MPa"),
     ];
     for (more, wanted) in cases {
         assert_eq!(message(more), format!("my.toml: {wanted}"));
@@ -137,69 +96,31 @@ fn wrong_values_name_what_is_allowed() {
     let cases = [
         ("[search]\nmu_max = nan", "search.mu_max = nan"),
         ("[search]\nmu_max = 2.1", "from 0 to 2"),
-        (
-            "[search]\nnoise_floor_MPa = inf",
-            "search.noise_floor_MPa = inf",
-        ),
-        (
-            "[search]\nobjective = \"spares\"",
-            "\"sparse\" or \"compressive\"",
-        ),
-        (
-            "[threshold]\nmin_force_N = -1",
-            "threshold.min_force_N = -1",
-        ),
-        (
-            "[fixed]\ndata_bits = 0",
-            "fixed.data_bits = 0 is not allowed; it must be a whole number from 12 to 18",
-        ),
+        ("[search]\nnoise_floor_MPa = inf", "search.noise_floor_MPa = inf"),
+        ("[search]\nobjective = \"spares\"", "\"sparse\" or \"compressive\""),
+        ("[threshold]\nmin_force_N = -1", "threshold.min_force_N = -1"),
+        ("[fixed]\ndata_bits = 0", "fixed.data_bits = 0 is not allowed; it must be a whole number from 12 to 18"),
         ("[fixed]\ndata_bits = 63", "fixed.data_bits = 63"),
-        (
-            "[fixed]\ncoef_bits = 16\ninverse_bits = 15",
-            "from 16 to 32",
-        ),
+        ("[fixed]\ncoef_bits = 16\ninverse_bits = 15", "from 16 to 32"),
         ("[fixed]\ninput_bits = \"20\"", "fixed.input_bits = \"20\""),
         ("[hardware]\nboard = \"icebreaker\"", "\"ulx3s-85f\""),
         ("[input]\nfull_scale_MPa = 0", "above 0"),
-        (
-            "[partition]\ncase = 4",
-            "0, 1, 2, 3, \"adaptive\" or \"contacts\"",
-        ),
-        (
-            "[partition]\nrows = 3\ncols = 1",
-            "3 subarrays do not divide 10 rows",
-        ),
+        ("[partition]\ncase = 4", "0, 1, 2, 3, \"adaptive\" or \"contacts\""),
+        ("[partition]\nrows = 3\ncols = 1", "3 subarrays do not divide 10 rows"),
         ("[partition]\nrows = 2", "partition.cols is missing"),
-        (
-            "[partition]\ncase = 0\nrows = 2",
-            "left out beside rows and cols",
-        ),
+        ("[partition]\ncase = 0\nrows = 2", "left out beside rows and cols"),
         ("[medium]\npoisson = 0.3", "left out unless"),
-        (
-            "[medium]\nkind = \"bonded-layer\"\npoisson = 0.5",
-            "medium.poisson = 0.5",
-        ),
+        ("[medium]\nkind = \"bonded-layer\"\npoisson = 0.5", "medium.poisson = 0.5"),
     ];
     for (more, wanted) in cases {
         let text = message(more);
-        assert!(
-            text.starts_with("my.toml: ") && text.contains(wanted),
-            "{text}"
-        );
+        assert!(text.starts_with("my.toml: ") && text.contains(wanted), "{text}");
     }
     let flat = "name = 3\n[sensor]\nrows = 10\ncols = 10\npitch_x_mm = 0\npitch_y_mm = 4\nthickness_mm = 3\n";
     let text = Scene::parse(flat, "flat.toml").unwrap_err().to_string();
-    assert!(
-        text.contains("sensor.pitch_x_mm = 0 is not allowed"),
-        "{text}"
-    );
-    let text = Scene::parse("sensor = 1", "s.toml")
-        .unwrap_err()
-        .to_string();
-    assert!(
-        text.contains("sensor = 1 is not allowed; it must be a table"),
-        "{text}"
-    );
+    assert!(text.contains("sensor.pitch_x_mm = 0 is not allowed"), "{text}");
+    let text = Scene::parse("sensor = 1", "s.toml").unwrap_err().to_string();
+    assert!(text.contains("sensor = 1 is not allowed; it must be a table"), "{text}");
     let text = Scene::parse("", "s.toml").unwrap_err().to_string();
     assert!(text.contains("sensor.rows is missing"), "{text}");
 }
@@ -207,30 +128,14 @@ fn wrong_values_name_what_is_allowed() {
 #[test]
 fn choices_not_built_yet_say_so() {
     let cases = [
-        (
-            "[medium]\nkind = \"bonded-layer\"",
-            "medium.kind = bonded-layer, poisson 0.48; available: half-space",
-        ),
-        (
-            "[partition]\ncase = \"contacts\"",
-            "partition.case = contacts; available: 0",
-        ),
+        ("[medium]\nkind = \"bonded-layer\"", "medium.kind = bonded-layer, poisson 0.48; available: half-space"),
+        ("[partition]\ncase = \"contacts\"", "partition.case = contacts; available: 0"),
         ("[partition]\nrows = 5\ncols = 2", "partition.case = 5×2"),
-        (
-            "[search]\nobjective = \"auto\"",
-            "search.objective = auto; available: sparse",
-        ),
+        ("[search]\nobjective = \"auto\"", "search.objective = auto; available: sparse"),
     ];
     for (more, wanted) in cases {
-        let text = with(more)
-            .unwrap()
-            .require_supported()
-            .unwrap_err()
-            .to_string();
-        assert!(
-            text.contains("not available yet") && text.contains(wanted),
-            "{text}"
-        );
+        let text = with(more).unwrap().require_supported().unwrap_err().to_string();
+        assert!(text.contains("not available yet") && text.contains(wanted), "{text}");
     }
 }
 
@@ -248,18 +153,9 @@ fn files_are_read_and_bounded() {
     std::fs::write(&path, SENSOR).unwrap();
     assert_eq!(Scene::load(name).unwrap().name, "own");
     std::fs::write(&path, vec![b'#'; (1 << 20) + 1]).unwrap();
-    assert!(matches!(
-        Scene::load(name),
-        Err(SceneError::TooLarge { .. })
-    ));
+    assert!(matches!(Scene::load(name), Err(SceneError::TooLarge { .. })));
     std::fs::write(&path, [0xff, 0xfe]).unwrap();
-    assert!(matches!(
-        Scene::load(name),
-        Err(SceneError::Unreadable { .. })
-    ));
+    assert!(matches!(Scene::load(name), Err(SceneError::Unreadable { .. })));
     let folder = folder.path().to_str().unwrap();
-    assert!(matches!(
-        Scene::load(folder),
-        Err(SceneError::Unreadable { .. })
-    ));
+    assert!(matches!(Scene::load(folder), Err(SceneError::Unreadable { .. })));
 }

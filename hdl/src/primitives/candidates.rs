@@ -37,9 +37,8 @@ impl Candidates {
 impl Logic for Candidates {
     fn update(&mut self) {
         if self.clk.pos_edge() {
-            let values: Vec<i64> = (0..self._layout.lanes)
-                .flat_map(|lane| candidates(&self._layout.get(&self._between, lane)))
-                .collect();
+            let values: Vec<i64> =
+                (0..self._layout.lanes).flat_map(|lane| candidates(&self._layout.get(&self._between, lane))).collect();
             self.values.next = Word::of_fields(&values, self._layout.widths[0]);
             self._between = self.word.val();
         }
@@ -66,7 +65,11 @@ impl Logic for Candidates {
         };
         let sum = |terms: [Option<String>; 2]| {
             let present: Vec<String> = terms.into_iter().flatten().collect();
-            if present.is_empty() { format!("{v}'d0") } else { present.join(" + ") }
+            if present.is_empty() {
+                format!("{v}'d0")
+            } else {
+                present.join(" + ")
+            }
         };
         // Row j: even part and odd part in x, then its value at x = −1, 0, 1.
         let rows = (0..4).filter(|&j| coefficient(0, j).is_some()).collect::<Vec<u32>>();

@@ -164,9 +164,9 @@ impl Logic for ForceUnit {
                 let leaving = self._pipe.remove(0);
                 if let Some(entry) = leaving {
                     if self._frame.counting {
-                        // The counter begins a cycle after the last input beat, and the first output beat stands from the
-                        // next cycle on.
-                        self._frame.cycles = self.cycles.val().number() as u32 + 2;
+                        // The counter is 0 two cycles after the last input beat, and the first output beat stands from
+                        // the next cycle on.
+                        self._frame.cycles = self.cycles.val().number() as u32 + 3;
                         self._frame.counting = false;
                     }
                     let words = self.answer(&entry);
@@ -242,6 +242,7 @@ wire signed [{mp_end}:0] before_x = scaled_x >>> {mu_round_less};
 wire signed [{mp_end}:0] before_y = scaled_y >>> {mu_round_less};
 wire [{mp_end}:0] half_x = before_x + {mp}'sd1;
 wire [{mp_end}:0] half_y = before_y + {mp}'sd1;
+wire unused_mu = &{{1'b0, half_x, half_y}};
 always @(posedge clk) begin
   if (start) begin
     x <= position_x;
@@ -325,7 +326,7 @@ always @(posedge clk) begin
     contact <= 1'b0;
     force_saturations <= {cap}'d0;
   end else if (advance && offers[3]) begin
-    if (counting) cycles_held <= cycles + {c}'d2;
+    if (counting) cycles_held <= cycles + {c}'d3;
     counting <= 1'b0;
     if (force_leaves && !below && words[95:64] != 32'd0) contact <= 1'b1;
     if (force_leaves) force_saturations <= count[{cap}] ? {{{cap}{{1'b1}}}} : count[{cap_end}:0];

@@ -114,7 +114,8 @@ impl Judge {
         for k in ORDERS[usize::from(coarse)] {
             let (ux, uy) = ((k % 3) as i64 - 1, (k / 3) as i64 - 1);
             let sum = self.sums.val().signed(k, s);
-            let square = self.square.val().number() as i64 + 2 * (ux * centre[0] + uy * centre[1]) + ux.abs() + uy.abs();
+            let square =
+                self.square.val().number() as i64 + 2 * (ux * centre[0] + uy * centre[1]) + ux.abs() + uy.abs();
             let inside = square <= self.radius.val().number() as i64;
             if sum <= 0 || !inside || !(coarse || self._found) {
                 continue;
@@ -174,7 +175,7 @@ impl Logic for Judge {
     fn hdl(&self) -> Verilog {
         let (s, t) = (self.sums.width() / 9, self.totals.width() / 9);
         let (p, q) = (position_bits(), square_bits());
-        let cell = LOG_TABLE_BITS as usize;
+        let slot = LOG_TABLE_BITS as usize;
         let product = LOG_BITS + 64 - (self._taxels as u64).leading_zeros() as usize;
         // n·log2 Σp without a multiplier: one term for each bit of n.
         let terms: Vec<String> = (0..64)
@@ -240,7 +241,7 @@ always @(posedge clk) begin
   x1 <= centre_x + step_x;
   y1 <= centre_y + step_y;
   found2 <= locate(sum1);
-  log <= {{found2[{found_end}:{cell}], fraction(found2[{cell_end}:0])}};
+  log <= {{found2[{found_end}:{slot}], fraction(found2[{slot_end}:0])}};
   weighted <= {terms};
   {{total4, total3, total2}} <= {{total3, total2, total1}};
   {{ok4, ok3, ok2}} <= {{ok3, ok2, ok1}};
@@ -287,8 +288,8 @@ end",
             sums = select("sum", s),
             t_end = t - 1,
             s_end = s - 1,
-            found_end = LENGTH_BITS + cell - 1,
-            cell_end = cell - 1,
+            found_end = LENGTH_BITS + slot - 1,
+            slot_end = slot - 1,
             log_end = LOG_BITS - 1,
             product_end = product - 1,
             p_end = p - 1,

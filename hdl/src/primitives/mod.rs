@@ -8,11 +8,11 @@
 
 mod butterfly;
 mod candidates;
-mod counts;
 mod counter;
+mod counts;
 mod delay;
-mod force_unit;
 mod filler;
+mod force_unit;
 mod gather;
 mod judge;
 mod lanes;

@@ -70,7 +70,12 @@ impl Logic for RawLength {
         let magnitudes: String = (0..4)
             .map(|lane| {
                 let (low, top) = (lane * bits, lane * bits + bits - 1);
-                format!("wire [{end}:0] m{lane} = quad[{before}:{low}] ^ {{{less}{{quad[{top}]}}}};\n", end = bits - 2, before = top - 1, less = bits - 1)
+                format!(
+                    "wire [{end}:0] m{lane} = quad[{before}:{low}] ^ {{{less}{{quad[{top}]}}}};\n",
+                    end = bits - 2,
+                    before = top - 1,
+                    less = bits - 1
+                )
             })
             .collect();
         // The highest set bit comes last and wins.

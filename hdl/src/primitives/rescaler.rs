@@ -121,6 +121,7 @@ generate
     wire [{r_end}:0] now = words[l * {r} +: {r}];
     wire [{short_end}:0] operand = {{now[{r_end}], now[{r_end}:{extra_low}]}} + {short}'d1;
     wire overflow = operand[{short_end}] != operand[{short_less}];
+    wire unused = &{{1'b0, operand[0], now, half_up[0]}};
     always @(posedge clk) begin
       moved <= doubled >>> amount;
       words[l * {r} +: {r}] <= clipped[l] ? {{rounded[{acc}], {{{r_less}{{!rounded[{acc}]}}}}}} : rounded[{r_end}:0];

@@ -68,9 +68,8 @@ impl Logic for Score {
             });
             self._pipe.push(logs);
             let added = self._pipe.remove(0).unwrap_or([0; 9]);
-            let totals: Vec<i64> = (0..9)
-                .map(|k| if self.clear.val() { 0 } else { self.totals.val().signed(k, t) + added[k] })
-                .collect();
+            let totals: Vec<i64> =
+                (0..9).map(|k| if self.clear.val() { 0 } else { self.totals.val().signed(k, t) + added[k] }).collect();
             self.totals.next = Word::of_fields(&totals, t);
         }
     }
@@ -84,7 +83,7 @@ impl Logic for Score {
         let shift = EPSILON_SHIFT as usize;
         let e = s - 1 - shift;
         let x = v.max(e) + 1;
-        let cell = LOG_TABLE_BITS as usize;
+        let slot = LOG_TABLE_BITS as usize;
         let lane_sum = LOG_BITS + 2;
         let pad = |bits: usize| match bits {
             0 => String::new(),
@@ -102,6 +101,7 @@ genvar k, l;
 generate
   for (k = 0; k < 9; k = k + 1) begin : candidate
     wire [{e_end}:0] epsilon = sums[(k + 1) * {s} - 1] ? {e}'d0 : sums[k * {s} + {shift} +: {e}];
+    wire unused = &{{1'b0, sums[k * {s} +: {shift}]}};
     wire [{logs_end}:0] logs;
     reg [{lane_sum_end}:0] together;
     for (l = 0; l < 4; l = l + 1) begin : lane
@@ -114,7 +114,7 @@ generate
         magnitude <= value[{v_end}] ? -value : value;
         argument <= {{{pad_v}magnitude}} + {{{pad_e}epsilon}};
         found <= locate(argument);
-        log <= {{found[{found_end}:{cell}], fraction(found[{cell_end}:0])}};
+        log <= {{found[{found_end}:{slot}], fraction(found[{slot_end}:0])}};
       end
       assign logs[l * {log_bits} +: {log_bits}] = masks[12 + l] ? log : {log_bits}'d0;
     end
@@ -133,8 +133,8 @@ endgenerate",
             lane_sum_end = lane_sum - 1,
             v_end = v - 1,
             x_end = x - 1,
-            found_end = LENGTH_BITS + cell - 1,
-            cell_end = cell - 1,
+            found_end = LENGTH_BITS + slot - 1,
+            slot_end = slot - 1,
             log_end = LOG_BITS - 1,
             log_bits = LOG_BITS,
             log2 = 2 * LOG_BITS,

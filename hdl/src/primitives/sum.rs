@@ -71,8 +71,7 @@ impl Logic for Sum {
                 if let Some(&width) = self._layout.widths.get(k) {
                     let bits = self.fill_quad.width() / 4;
                     let counted = |lane: &usize| self.fill_mask.val().field(*lane, 1) == 1;
-                    let added: i64 =
-                        (0..4).filter(counted).map(|lane| self.fill_quad.val().signed(lane, bits)).sum();
+                    let added: i64 = (0..4).filter(counted).map(|lane| self.fill_quad.val().signed(lane, bits)).sum();
                     let mut sum = self._layout.get(&self._buffers[0], 0);
                     sum[k] = added + if self.fill_address.val().number() == 0 { 0 } else { sum[k] };
                     self._buffers[0].set(self._layout.offset(k), width, sum[k] as u64);

@@ -58,7 +58,11 @@ impl Logic for Taylor {
             let halving = self.halving.val();
             self.moved.next = self.each(self._between, |w| {
                 let moved = taylor_shift(w, 0, dy);
-                if halving { halve(&moved) } else { moved }
+                if halving {
+                    halve(&moved)
+                } else {
+                    moved
+                }
             });
             self._between = self.each(self.word.val(), |w| taylor_shift(w, dx, 0));
         }
@@ -75,7 +79,10 @@ impl Logic for Taylor {
         let mut body = String::new();
         for (k, &w) in widths.iter().enumerate() {
             let end = w - 1;
-            body += &format!("    reg [{end}:0] y{k};\n    wire [{end}:0] x{k} = {};\n", self._layout.select("word", k, "l"));
+            body += &format!(
+                "    reg [{end}:0] y{k};\n    wire [{end}:0] x{k} = {};\n",
+                self._layout.select("word", k, "l")
+            );
         }
         body += &along_x;
         body += "    always @(posedge clk) begin\n";
@@ -90,7 +97,11 @@ impl Logic for Taylor {
             let target = self._layout.select("moved", k, "l");
             let value = match degree {
                 0 => format!("y{k}_moved"),
-                _ => format!("halving ? {{{{{degree}{{y{k}_moved[{}]}}}}, y{k}_moved[{}:{degree}]}} : y{k}_moved", w - 1, w - 1),
+                _ => format!(
+                    "halving ? {{{{{degree}{{y{k}_moved[{}]}}}}, y{k}_moved[{}:{degree}]}} : y{k}_moved",
+                    w - 1,
+                    w - 1
+                ),
             };
             body += &format!("      {target} <= {value};\n");
         }

@@ -19,7 +19,7 @@ pub struct Fold {
     /// Quad to read from the frame buffer.
     pub quad_address: Wire<Out>,
     /// The last quad is being read.
-    pub release: Signal<Out, Bit>,
+    pub free: Signal<Out, Bit>,
     /// The quad of two cycles ago, normalised.
     pub normalised: Wire<In>,
     /// `normalised` is a quad.
@@ -38,7 +38,7 @@ pub struct Fold {
     running: DFF<Bit>,
     two_later: BitDelay,
     three_later: BitDelay,
-    end: BitDelay,
+    finish: BitDelay,
     address: Delay,
     butterfly: Butterfly,
     memory: Ram,
@@ -54,7 +54,7 @@ impl Fold {
             rst: Default::default(),
             start: Default::default(),
             quad_address: Wire::new(address),
-            release: Default::default(),
+            free: Default::default(),
             normalised: Wire::new(4 * bits),
             normalised_valid: Default::default(),
             folded: Wire::new(4 * (bits + 2)),
@@ -66,7 +66,7 @@ impl Fold {
             running: Default::default(),
             two_later: BitDelay::new(2),
             three_later: BitDelay::new(1),
-            end: BitDelay::new(4),
+            finish: BitDelay::new(4),
             address: Delay::new(address, 3),
             butterfly: Butterfly::new(bits),
             memory: Ram::new(quads, 1, 4 * (bits + 2)),
@@ -82,20 +82,20 @@ impl Logic for Fold {
         self.running.clock.next = self.clk.val();
         self.two_later.clk.next = self.clk.val();
         self.three_later.clk.next = self.clk.val();
-        self.end.clk.next = self.clk.val();
+        self.finish.clk.next = self.clk.val();
         self.address.clk.next = self.clk.val();
         self.butterfly.clk.next = self.clk.val();
         self.memory.clk.next = self.clk.val();
         self.two_later.rst.next = self.rst.val();
         self.three_later.rst.next = self.rst.val();
-        self.end.rst.next = self.rst.val();
+        self.finish.rst.next = self.rst.val();
 
         self.quads.clear.next = self.start.val();
         self.quads.enable.next = self.running.q.val();
         self.ending.next = self.running.q.val() & self.quads.last.val();
         self.running.d.next = (self.start.val() | (self.running.q.val() & !self.quads.last.val())) & !self.rst.val();
         self.quad_address.next = self.quads.value.val();
-        self.release.next = self.ending.val();
+        self.free.next = self.ending.val();
 
         self.two_later.now.next = self.running.q.val();
         self.three_later.now.next = self.two_later.then.val();
@@ -111,7 +111,7 @@ impl Logic for Fold {
         self.memory.read.next = true;
         self.memory.read_address.next = self.read_address.val();
         self.read_quad.next = self.memory.read_data.val();
-        self.end.now.next = self.ending.val();
-        self.done.next = self.end.then.val();
+        self.finish.now.next = self.ending.val();
+        self.done.next = self.finish.then.val();
     }
 }

@@ -14,7 +14,7 @@ use crate::wire::Wire;
 /// s_axis --> frame buffer --> quad (one cycle after quad_address)
 ///       \--> magnitude, positive, negative
 /// ```
-/// `full` from the frame's last beat until `release`; the gathered values stand as long.
+/// `full` from the frame's last beat until `free`; the gathered values stand as long.
 #[derive(LogicBlock)]
 pub struct Receive {
     /// Clock.
@@ -34,7 +34,7 @@ pub struct Receive {
     /// The frame buffer holds a whole frame.
     pub full: Signal<Out, Bit>,
     /// The frame has been read.
-    pub release: Signal<In, Bit>,
+    pub free: Signal<In, Bit>,
     /// Which quad to read.
     pub quad_address: Wire<In>,
     /// The quad, one cycle later.
@@ -74,7 +74,7 @@ impl Receive {
             s_axis_tlast: Default::default(),
             accept: Default::default(),
             full: Default::default(),
-            release: Default::default(),
+            free: Default::default(),
             quad_address: Wire::new(count_bits(layout.len())),
             quad: Wire::new(4 * bits),
             magnitude: Wire::new(bits - 1),
@@ -130,7 +130,7 @@ impl Logic for Receive {
         self.quad.next = self.frame.read_data.val();
 
         self.gather.accept.next = self.taken.val();
-        self.gather.clear.next = self.rst.val() | self.release.val() | self.early.val();
+        self.gather.clear.next = self.rst.val() | self.free.val() | self.early.val();
         self.gather.code.next = self.s_axis_tdata.val();
         self.magnitude.next = self.gather.magnitude.val();
         self.positive.next = self.gather.positive.val();
@@ -138,7 +138,7 @@ impl Logic for Receive {
 
         self.full.next = self.whole.q.val();
         self.whole.d.next =
-            (self.whole.q.val() | (self.taken.val() & self.at_end.val())) & !self.release.val() & !self.rst.val();
+            (self.whole.q.val() | (self.taken.val() & self.at_end.val())) & !self.free.val() & !self.rst.val();
         self.framing.next = self.broken.q.val();
         self.broken.d.next = ((self.broken.q.val() & !self.reported.val())
             | self.early.val()

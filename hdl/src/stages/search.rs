@@ -11,8 +11,8 @@ use dermis_golden::fixed::schedule::vectors;
 use rust_hdl::prelude::*;
 
 use crate::primitives::{
-    count_bits, position_bits, BitDelay, Candidates, Counter, Counts, Delay, Judge, PolynomialWord, Score, Slice, Store,
-    Sum, Taylor, Walk,
+    count_bits, position_bits, BitDelay, Candidates, Counter, Counts, Delay, Judge, PolynomialWord, Score, Slice,
+    Store, Sum, Taylor, Walk,
 };
 use crate::wire::Wire;
 
@@ -76,7 +76,7 @@ pub struct Search {
     sum_moved: BitDelay,
     scored: BitDelay,
     totals: BitDelay,
-    end: BitDelay,
+    finish: BitDelay,
     moved_address: Delay,
     scored_address: Delay,
     set_up: Signal<Local, Bit>,
@@ -132,7 +132,7 @@ impl Search {
             sum_moved: BitDelay::new(3),
             scored: BitDelay::new(2),
             totals: BitDelay::new(11),
-            end: BitDelay::new(4),
+            finish: BitDelay::new(4),
             moved_address: Delay::new(address, 3),
             scored_address: Delay::new(address, 2),
             set_up: Default::default(),
@@ -162,7 +162,7 @@ impl Logic for Search {
         self.sum_moved.clk.next = self.clk.val();
         self.scored.clk.next = self.clk.val();
         self.totals.clk.next = self.clk.val();
-        self.end.clk.next = self.clk.val();
+        self.finish.clk.next = self.clk.val();
         self.moved_address.clk.next = self.clk.val();
         self.scored_address.clk.next = self.clk.val();
         self.judge.rst.next = self.rst.val();
@@ -173,7 +173,7 @@ impl Logic for Search {
         self.sum_moved.rst.next = self.rst.val();
         self.scored.rst.next = self.rst.val();
         self.totals.rst.next = self.rst.val();
-        self.end.rst.next = self.rst.val();
+        self.finish.rst.next = self.rst.val();
 
         comment!("Coefficients come in");
         self.store.fill.next = self.fill.val();
@@ -259,8 +259,8 @@ impl Logic for Search {
         self.values.next = self.constants.low.val();
         self.values_valid.next = self.moved.then.val() & self.walk.last.val();
         self.values_address.next = self.moved_address.then.val();
-        self.end.now.next = self.quad_end.val() & self.walk.last.val();
-        self.done.next = self.end.then.val();
+        self.finish.now.next = self.quad_end.val() & self.walk.last.val();
+        self.done.next = self.finish.then.val();
         self.best_x.next = self.judge.best_x.val();
         self.best_y.next = self.judge.best_y.val();
         self.score.next = self.judge.score.val();

@@ -37,7 +37,7 @@ pub struct Unfold {
     index_later: Delay,
     address_later: Delay,
     valid_later: BitDelay,
-    end: BitDelay,
+    finish: BitDelay,
     quad_end: Signal<Local, Bit>,
 }
 
@@ -65,7 +65,7 @@ impl Unfold {
             index_later: Delay::new(index, 1),
             address_later: Delay::new(address, 2),
             valid_later: BitDelay::new(2),
-            end: BitDelay::new(3),
+            finish: BitDelay::new(3),
             quad_end: Default::default(),
         }
     }
@@ -81,9 +81,9 @@ impl Logic for Unfold {
         self.index_later.clk.next = self.clk.val();
         self.address_later.clk.next = self.clk.val();
         self.valid_later.clk.next = self.clk.val();
-        self.end.clk.next = self.clk.val();
+        self.finish.clk.next = self.clk.val();
         self.valid_later.rst.next = self.rst.val();
-        self.end.rst.next = self.rst.val();
+        self.finish.rst.next = self.rst.val();
 
         self.quad_end.next = self.words_valid.val() & self.quads.last.val();
         self.quads.clear.next = self.start.val();
@@ -101,7 +101,7 @@ impl Logic for Unfold {
         self.taxels_valid.next = self.valid_later.then.val();
         self.index.next = self.index_later.then.val();
         self.address.next = self.address_later.then.val();
-        self.end.now.next = self.quad_end.val() & self.vectors.last.val();
-        self.done.next = self.end.then.val();
+        self.finish.now.next = self.quad_end.val() & self.vectors.last.val();
+        self.done.next = self.finish.then.val();
     }
 }

@@ -11,10 +11,7 @@ const REFERENCE: f64 = 1e-9;
 
 fn setting(sensor: &str, frame: &str) -> (Matrices, Vec<f64>) {
     let scene = Scene::builtin(sensor).unwrap();
-    let frame = Frame::shipped(&scene)
-        .into_iter()
-        .find(|f| f.id == frame)
-        .unwrap();
+    let frame = Frame::shipped(&scene).into_iter().find(|f| f.id == frame).unwrap();
     let matrices = Matrices::new(&scene.sensor, scene.search.mu_max).unwrap();
     (matrices, frame.stress_MPa)
 }
@@ -22,25 +19,13 @@ fn setting(sensor: &str, frame: &str) -> (Matrices, Vec<f64>) {
 fn agree(got: &[f64], wanted: &[f64]) {
     let size = wanted.iter().fold(0.0f64, |size, w| w.abs().max(size));
     for (got, wanted) in got.iter().zip(wanted) {
-        assert!(
-            (got - wanted).abs() <= REFERENCE * size,
-            "{got:e} {wanted:e}"
-        );
+        assert!((got - wanted).abs() <= REFERENCE * size, "{got:e} {wanted:e}");
     }
 }
 
 #[test]
 fn places_are_in_order() {
-    let order = [
-        (0, 0),
-        (1, 0),
-        (0, 1),
-        (2, 0),
-        (1, 1),
-        (0, 2),
-        (3, 0),
-        (2, 1),
-    ];
+    let order = [(0, 0), (1, 0), (0, 1), (2, 0), (1, 1), (0, 2), (3, 0), (2, 1)];
     for (k, (i, j)) in order.into_iter().enumerate() {
         assert_eq!(place(i, j), k);
     }
@@ -73,20 +58,11 @@ fn series_differs_from_the_solve_by_its_truncation() {
     let family = Polynomial::new(&matrices, &b);
     for mu in [[0.0, 0.0], [0.26, 0.145], [-0.4, 0.3], [0.0, 0.6]] {
         let direct = solve_direct(&matrices, &b, mu);
-        let off: Vec<f64> = family
-            .eval(mu)
-            .iter()
-            .zip(&direct)
-            .map(|(p, q)| p - q)
-            .collect();
+        let off: Vec<f64> = family.eval(mu).iter().zip(&direct).map(|(p, q)| p - q).collect();
         // Ratio of terms at this μ, r in proportion; the terms that are left out sum to ratio^4/(1 − ratio).
         let ratio = matrices.spectral_radius * mu[0].hypot(mu[1]) / 0.6;
         let bound = ratio.powi(4) / (1.0 - ratio) + 1e-13;
-        assert!(
-            norm(&off) <= bound * norm(&direct),
-            "{mu:?}: {:e}",
-            norm(&off) / norm(&direct)
-        );
+        assert!(norm(&off) <= bound * norm(&direct), "{mu:?}: {:e}", norm(&off) / norm(&direct));
     }
 }
 
@@ -121,25 +97,14 @@ fn orthogonal_form_is_the_same() {
 #[test]
 fn stiff_frames_come_back() {
     for (h, bound) in [(1, 1e-13), (3, 1e-9), (5, 1e-7)] {
-        let path = format!(
-            "{}/data/reference/stiff-8x8-h{h}.json",
-            env!("CARGO_MANIFEST_DIR")
-        );
+        let path = format!("{}/data/reference/stiff-8x8-h{h}.json", env!("CARGO_MANIFEST_DIR"));
         let frame = Frame::load(path, None).unwrap();
         let [t1, t2, n] = frame.resultant_N.unwrap();
         // The series of the stiffest would not converge; the solve does not need it.
         let matrices = Matrices::new(&frame.sensor, 0.0).unwrap();
         let p = solve_direct(&matrices, &frame.stress_MPa, [t1 / n, t2 / n]);
         let truth = frame.cell_forces_N.unwrap().fz;
-        let off = p
-            .iter()
-            .zip(&truth)
-            .map(|(p, q)| (p - q).abs())
-            .fold(0.0, f64::max);
-        assert!(
-            off < bound,
-            "h {h}: {off:e}, condition {:e}",
-            matrices.condition
-        );
+        let off = p.iter().zip(&truth).map(|(p, q)| (p - q).abs()).fold(0.0, f64::max);
+        assert!(off < bound, "h {h}: {off:e}, condition {:e}", matrices.condition);
     }
 }
