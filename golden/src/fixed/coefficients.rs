@@ -93,7 +93,7 @@ fn lives(quads: Quads, index: usize, parity: usize) -> bool {
 }
 
 fn sign(parity: usize, lane: usize) -> f64 {
-    if (parity & lane).count_ones() % 2 == 0 {
+    if (parity & lane).count_ones().is_multiple_of(2) {
         1.0
     } else {
         -1.0

@@ -15,8 +15,8 @@ const M: usize = MULTIPLIER_BITS as usize;
 /// operands -----------------------> b   /
 /// ```
 /// One memory word holds a coefficient for every lane. `operands` and `control` belong to the address of two cycles before; an
-/// accumulation's last product leaves the lanes as `lanes_per_parity` quads, row by row, the first of them
-/// [`LATENCY`] cycles after its `control`.
+/// accumulation's last product leaves the lanes as `lanes_per_parity` quads, row by row, the first of them five cycles
+/// after its `control`.
 #[derive(LogicBlock)]
 pub struct Lanes {
     /// Clock.
@@ -44,9 +44,6 @@ pub struct Lanes {
     _left: usize,
     _group: usize,
 }
-
-/// Cycles from the control of an accumulation's last product to its first quad.
-pub const LATENCY: usize = 5;
 
 /// Name of the coefficient memory's file.
 pub const MEMORY_FILE: &str = "coefficients.hex";
@@ -123,7 +120,7 @@ impl Lanes {
         let word = &self._memory[beat.word];
         for (lane, acc) in self._accumulators.iter_mut().enumerate() {
             let operand = beat.operands.signed(lane / self._shape.per_parity, M);
-            let product = word[lane] * operand << if beat.align { self._shape.align } else { 0 };
+            let product = (word[lane] * operand) << if beat.align { self._shape.align } else { 0 };
             *acc = if beat.first { product } else { *acc + product };
         }
     }

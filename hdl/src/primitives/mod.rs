@@ -50,7 +50,7 @@ pub use polynomial_word::PolynomialWord;
 pub use ram::Ram;
 pub use raw_length::{shift_bits, RawLength};
 pub use rescaler::{Rescaler, SATURATION_BITS};
-pub use score::Score;
+pub use score::{Score, LATENCY as SCORE_LATENCY};
 pub use slice::Slice;
 pub use spread::Spread;
 pub use steps::{matrices, unroll, Steps};

@@ -12,7 +12,7 @@ use rust_hdl::prelude::*;
 
 use crate::primitives::{
     count_bits, position_bits, BitDelay, Candidates, Counter, Counts, Delay, Judge, PolynomialWord, Score, Slice,
-    Store, Sum, Taylor, Walk,
+    Store, Sum, Taylor, Walk, SCORE_LATENCY,
 };
 use crate::wire::Wire;
 
@@ -131,7 +131,7 @@ impl Search {
             moved: BitDelay::new(3),
             sum_moved: BitDelay::new(3),
             scored: BitDelay::new(2),
-            totals: BitDelay::new(11),
+            totals: BitDelay::new(5 + SCORE_LATENCY),
             finish: BitDelay::new(4),
             moved_address: Delay::new(address, 3),
             scored_address: Delay::new(address, 2),
