@@ -178,7 +178,8 @@ pub fn derive(scene: &Scene, matrices: &Matrices) -> Result<(Formats, Quantised)
 
     // A logarithm is below 2^6; the difference of two sums of `taxels` of them needs a sign.
     let score_bits = signed_bits(taxels << (6 + LOG_FRACTION));
-    let mu_fraction = (f64::from((1 << 17) - 1) / scene.search.mu_max.max(1e-3)).log2().floor() as u32;
+    // 18 bits of μ; fz, with its factor 1, needs no more fraction than that.
+    let mu_fraction = (f64::from((1 << 17) - 1) / scene.search.mu_max).log2().floor().min(17.0) as u32;
     let mu_step = (scene.search.mu_max / MU_STEPS as f64 * 2f64.powi((mu_fraction + MU_ROUND) as i32)).round() as i64;
 
     let raw_length_max = bit_length(raw_bound);

@@ -104,12 +104,10 @@ impl Block {
 }
 
 /// log2 of `x` with [`LOG_FRACTION`] fraction bits: the position of the leading one, and a table over the next
-/// [`LOG_TABLE_BITS`] bits, each entry the logarithm at its cell's middle. 0 for 0.
+/// [`LOG_TABLE_BITS`] bits, each entry the logarithm at its cell's middle. 0 counts as 1.
 pub fn log2(x: i64) -> i64 {
+    let x = x.max(1);
     let length = bit_length(x as u64);
-    if length == 0 {
-        return 0;
-    }
     let fraction = ((x as u64) << (64 - length)) << 1;
     let cell = (fraction >> (64 - LOG_TABLE_BITS)) as usize;
     (i64::from(length - 1) << LOG_FRACTION) + log_table()[cell]
@@ -250,7 +248,7 @@ mod tests {
 
     #[test]
     fn logarithms_by_hand() {
-        assert_eq!(log2(0), 0);
+        assert_eq!(log2(0), log2(1));
         // 1 stands for the cell 1 … 1 + 1/64, of which the table holds the middle.
         assert_eq!(log2(1), ((1.0f64 + 0.5 / 64.0).log2() * 1024.0).round() as i64);
         assert_eq!(log2(1 << 20), (20 << 10) + log2(1));

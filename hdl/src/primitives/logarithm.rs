@@ -9,7 +9,7 @@ pub const LENGTH_BITS: usize = 6;
 pub const LOG_BITS: usize = LENGTH_BITS + LOG_FRACTION as usize;
 
 /// A function `name` from a vector of `bits` bits to {length − 1, slot}: the position of its leading one and the bits behind it.
-/// Zero gives zero.
+/// Zero gives zero, as one does.
 pub fn locate(name: &str, bits: usize) -> String {
     let slot = LOG_TABLE_BITS as usize;
     let cases: String = (0..bits)

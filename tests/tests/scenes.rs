@@ -1,0 +1,104 @@
+//! The scene decides the hardware: scenes far from the built-in ones are equal to the bit as well.
+//!
+//! A handful of shapes and formats goes through Verilator and rust-hdl's simulation; many random ones through
+//! rust-hdl's simulation alone, which needs no compiler.
+
+use dermis_golden::fixed::Model;
+use dermis_golden::frame::Frame;
+use dermis_golden::scene::Scene;
+use dermis_sim::cosim::{run, Bench};
+use dermis_sim::drive::Stimulus;
+use dermis_sim::hardware::{Hardware, Simulator};
+use dermis_sim::verify::verify;
+use dermis_tests::build_dir;
+use proptest::prelude::*;
+
+/// Name, and what differs from an ordinary scene of 6×6 taxels.
+const SCENES: [(&str, &str); 5] = [
+    // Middle lines: quads whose lanes coincide.
+    ("odd", "[sensor]\nrows = 5\ncols = 7\npitch_x_mm = 2.0\npitch_y_mm = 4.0\nthickness_mm = 3.0\n"),
+    // Degree 1: a small r leaves seven of ten coefficients out.
+    ("degree-1", "[search]\nmu_max = 0.05\n"),
+    // No limbs, the smallest words.
+    ("narrow", "[fixed]\ninput_bits = 8\ndata_bits = 12\ncoef_bits = 8\ninverse_bits = 8\n"),
+    // One limb only.
+    ("16-bit", "[fixed]\ninput_bits = 16\ndata_bits = 16\ncoef_bits = 16\ninverse_bits = 18\n"),
+    (
+        "thresholds",
+        "[partition]\ncondition = \"both-signs\"\n[threshold]\nmin_force_N = 0.05\n[search]\nnoise_floor_MPa = 0.001\n\
+         [input]\nfull_scale_MPa = 0.05\n",
+    ),
+];
+
+fn parse(name: &str, text: &str) -> Scene {
+    let sensor = "[sensor]\nrows = 6\ncols = 6\npitch_x_mm = 3.0\npitch_y_mm = 4.0\nthickness_mm = 3.0\n";
+    let sensor = if text.contains("[sensor]") { "" } else { sensor };
+    Scene::parse(&format!("name = \"{name}\"\n{sensor}{text}"), name).unwrap()
+}
+
+/// A pressure and its shear somewhere on the array, reproducible.
+fn frames(scene: &Scene) -> Vec<Frame> {
+    let sensor = &scene.sensor;
+    let at = |centre: [f64; 2], shear: f64| {
+        let stress = (0..sensor.taxels()).map(|t| {
+            let [x, y] = sensor.position_mm(t / sensor.cols, t % sensor.cols);
+            let (dx, dy) = ((x - centre[0]) / 4.0, (y - centre[1]) / 4.0);
+            0.05 * (-dx * dx - dy * dy).exp() * (1.0 + shear * dx)
+        });
+        Frame::from_stress(&format!("{centre:?}"), sensor, stress.collect()).unwrap()
+    };
+    vec![Frame::eq2(sensor), at([1.0, -2.0], 0.4), at([-4.0, 3.0], -2.0)]
+}
+
+#[test]
+fn unlike_scenes_are_equal() {
+    for (name, text) in SCENES {
+        let scene = parse(name, text);
+        let simulators = [Simulator::Verilator, Simulator::RustHdl];
+        let verified = verify(&scene, &frames(&scene), &simulators, &build_dir()).unwrap();
+        let first: Vec<String> = verified.findings.kept.iter().take(3).map(ToString::to_string).collect();
+        assert!(verified.findings.is_equal(), "{name}: {first:#?}");
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 24, ..ProptestConfig::default() })]
+
+    #[test]
+    fn random_scenes_and_codes_are_equal(
+        (rows, cols) in (2usize..9, 2usize..9),
+        mu_max in 0.02f64..0.6,
+        (input_bits, data_bits, coef_bits, inverse_bits) in (8u32..=20, 12u32..=18, 8u32..=18, 18u32..=26),
+        seed in any::<u64>(),
+    ) {
+        let sensor = format!(
+            "[sensor]\nrows = {rows}\ncols = {cols}\npitch_x_mm = 4.0\npitch_y_mm = 4.0\nthickness_mm = 3.0\n"
+        );
+        let fixed = format!(
+            "[fixed]\ninput_bits = {input_bits}\ndata_bits = {data_bits}\ncoef_bits = {coef_bits}\n\
+             inverse_bits = {inverse_bits}\n[search]\nmu_max = {mu_max}\n"
+        );
+        let model = Model::new(&parse("random", &(sensor + &fixed))).unwrap();
+        let hardware = Hardware::new(model, &build_dir()).unwrap();
+        // Codes from a small generator: a value, its extremes and zero in turn.
+        let most = (1i64 << (input_bits - 1)) - 1;
+        let mut state = seed;
+        let codes: Vec<i32> = (0..rows * cols)
+            .map(|_| {
+                state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+                (match state >> 61 {
+                    0 => most,
+                    1 => -most - 1,
+                    2 => 0,
+                    _ => (state >> 20) as i64 % (2 * most) - most,
+                }) as i32
+            })
+            .collect();
+        let expected = hardware.model.run(&codes);
+        let vectors = [dermis_sim::cosim::Vector { frame: "random".into(), cols, codes, expected }];
+        let mut device = hardware.device(Simulator::RustHdl).unwrap();
+        let bench = Bench { name: "rust-hdl", device: device.as_mut(), taps: &hardware.tap_names() };
+        let (findings, _) = run(bench, &vectors, Stimulus::FullSpeed);
+        prop_assert!(findings.is_equal(), "{:?}", findings.kept.first().map(ToString::to_string));
+    }
+}
