@@ -11,7 +11,7 @@
 //! | `[partition]` | `case` (0; 1 … 3, "adaptive", "contacts") or `rows` and `cols`; `condition` ("loaded"; "both-signs") |
 //! | `[search]` | `objective` ("sparse"; …), `mu_max` (0.6; 0 … 2), `noise_floor_MPa` (0) |
 //! | `[threshold]` | `min_force_N` (0) |
-//! | `[fixed]` | `input_bits` (20; 8 … 24), `data_bits` (18; 12 … 18), `coef_bits` (18; 8 … 18), `inverse_bits` (24; coef … 32) |
+//! | `[fixed]` | `input_bits` (20; 8 … 24), `data_bits` (18; 12 … 18), `coef_bits` (18; 8 … 18), `inverse_bits` (24; coef … 32), `prune_bits` (20; 8 … 31) |
 //! | `[hardware]` | `board` ("ulx3s-85f") |
 //! | `[input]` | `full_scale_MPa` (the frame's peak) |
 
@@ -143,6 +143,8 @@ pub struct FixedSpec {
     pub coef_bits: u32,
     /// Coefficients of Cz⁺, taken in limbs.
     pub inverse_bits: u32,
+    /// Columns whose coefficients all stay below 2^−`prune_bits` are not stored; 8 to 31.
+    pub prune_bits: u32,
 }
 
 /// Table `[hardware]`.
@@ -180,7 +182,7 @@ impl Default for ThresholdSpec {
 
 impl Default for FixedSpec {
     fn default() -> Self {
-        FixedSpec { input_bits: 20, data_bits: 18, coef_bits: 18, inverse_bits: 24 }
+        FixedSpec { input_bits: 20, data_bits: 18, coef_bits: 18, inverse_bits: 24, prune_bits: 20 }
     }
 }
 

@@ -1,4 +1,4 @@
-//! The engine: all stages in a row, one frame at a time.
+//! The engine: all stages in a row, one subarray after the other with the same matrices.
 //!
 //! ```text
 //!            receive -> normalise -> fold -> pass -> rescale -> unfold -> search -> force -> send
@@ -12,7 +12,7 @@ use dermis_golden::fixed::Model;
 use dermis_golden::scene::Condition;
 use rust_hdl::prelude::*;
 
-use crate::primitives::{Counter, CYCLE_BITS};
+use crate::primitives::{BitDelay, Counter, CYCLE_BITS};
 use crate::stages::{Fold, Force, Normalise, Pass, Receive, Rescale, Search, Send, Unfold};
 use crate::wire::Wire;
 
@@ -63,7 +63,10 @@ pub struct Engine {
     condition: DFF<Bit>,
     framing: DFF<Bit>,
     cycles: Counter,
+    part: Counter,
+    again: BitDelay,
     both_signs: Constant<Bit>,
+    begin_frame: Signal<Local, Bit>,
     start: Signal<Local, Bit>,
 }
 
@@ -73,7 +76,9 @@ impl Engine {
         let formats = &model.formats;
         let layout = model.layout();
         let bits = formats.input_bits as usize;
-        let force = Force::new(formats, model.threshold);
+        let parts = model.grid();
+        let count = model.parts.len();
+        let force = Force::new(formats, count, model.threshold);
         let mut engine = Engine {
             clk: Default::default(),
             rst: Default::default(),
@@ -85,20 +90,23 @@ impl Engine {
             m_axis_tvalid: Default::default(),
             m_axis_tready: Default::default(),
             m_axis_tlast: Default::default(),
-            receive: Receive::new(layout, bits, model.noise_floor),
+            receive: Receive::new(layout, parts, bits, model.noise_floor),
             normalise: Normalise::new(bits),
-            fold: Fold::new(formats.quads, bits),
-            pass: Pass::new(formats, &model.quantised),
+            fold: Fold::new(formats.quads, count, bits),
+            pass: Pass::new(model),
             rescale: Rescale::new(formats),
-            unfold: Unfold::new(formats),
+            unfold: Unfold::new(model),
             search: Search::new(formats, layout),
             forces: force,
-            send: Send::new(layout),
+            send: Send::new(layout, parts),
             busy: Default::default(),
             condition: Default::default(),
             framing: Default::default(),
             cycles: Counter::new(1 << CYCLE_BITS),
+            part: Counter::new(count),
+            again: BitDelay::new(1),
             both_signs: Constant::new(model.scene.partition.condition == Condition::BothSigns),
+            begin_frame: Default::default(),
             start: Default::default(),
         };
         engine.connect_all();
@@ -119,6 +127,9 @@ impl Logic for Engine {
         self.forces.clk.next = self.clk.val();
         self.send.clk.next = self.clk.val();
         self.cycles.clk.next = self.clk.val();
+        self.part.clk.next = self.clk.val();
+        self.again.clk.next = self.clk.val();
+        self.again.rst.next = self.rst.val();
         self.busy.clock.next = self.clk.val();
         self.condition.clock.next = self.clk.val();
         self.framing.clock.next = self.clk.val();
@@ -131,10 +142,14 @@ impl Logic for Engine {
         self.forces.rst.next = self.rst.val();
         self.send.rst.next = self.rst.val();
 
-        comment!("A frame begins when it is whole and the one before is gone");
-        self.start.next = self.receive.full.val() & !self.busy.q.val() & !self.rst.val();
-        self.busy.d.next = (self.start.val() | (self.busy.q.val() & !self.send.done.val())) & !self.rst.val();
-        self.cycles.clear.next = self.start.val();
+        comment!("A frame begins when it is whole and the last one gone");
+        self.begin_frame.next = self.receive.full.val() & !self.busy.q.val() & !self.rst.val();
+        self.busy.d.next = (self.begin_frame.val() | (self.busy.q.val() & !self.send.done.val())) & !self.rst.val();
+        self.part.clear.next = self.rst.val();
+        self.part.enable.next = self.search.done.val();
+        self.again.now.next = self.search.done.val() & !self.part.last.val();
+        self.start.next = self.begin_frame.val() | self.again.then.val();
+        self.cycles.clear.next = self.begin_frame.val();
         self.cycles.enable.next = true;
         self.condition.d.next = self.condition.q.val();
         self.framing.d.next = self.framing.q.val();
@@ -143,6 +158,8 @@ impl Logic for Engine {
             if self.both_signs.val() {
                 self.condition.d.next = self.receive.positive.val() & self.receive.negative.val();
             }
+        }
+        if self.begin_frame.val() {
             self.framing.d.next = self.receive.framing.val();
         }
 
@@ -153,11 +170,14 @@ impl Logic for Engine {
         self.s_axis_tready.next = self.receive.s_axis_tready.val();
         self.receive.quad_address.next = self.fold.quad_address.val();
         self.receive.free.next = self.fold.free.val();
-        self.receive.reported.next = self.start.val();
+        self.receive.reported.next = self.begin_frame.val();
+        self.receive.part.next = self.part.value.val();
         self.normalise.start.next = self.start.val();
         self.normalise.magnitude.next = self.receive.magnitude.val();
         self.normalise.quad.next = self.receive.quad.val();
+        self.fold.begin_frame.next = self.begin_frame.val();
         self.fold.start.next = self.start.val();
+        self.fold.last_part.next = self.part.last.val();
         self.fold.normalised.next = self.normalise.shifted.val();
 
         comment!("fold -> pass -> rescale -> unfold, and back to pass");
@@ -184,8 +204,9 @@ impl Logic for Engine {
         comment!("search -> force -> send");
         self.forces.values.next = self.search.values.val();
         self.forces.values_valid.next = self.search.values_valid.val();
-        self.forces.values_address.next = self.search.values_address.val();
+        self.forces.begin_frame.next = self.begin_frame.val();
         self.forces.start.next = self.search.done.val();
+        self.forces.part.next = self.part.value.val();
         self.forces.position_x.next = self.search.best_x.val();
         self.forces.position_y.next = self.search.best_y.val();
         self.forces.score.next = self.search.score.val();
@@ -196,10 +217,11 @@ impl Logic for Engine {
         self.forces.condition.next = self.condition.q.val();
         self.forces.framing.next = self.framing.q.val();
         self.forces.cycles.next = self.cycles.value.val();
-        self.send.start.next = self.search.done.val();
+        self.send.start.next = self.search.done.val() & self.part.last.val();
         self.forces.advance.next = self.send.advance.val();
         self.forces.offer.next = self.send.offer.val();
         self.forces.beat.next = self.send.beat.val();
+        self.forces.beat_part.next = self.send.part.val();
         self.forces.address.next = self.send.address.val();
         self.forces.lane.next = self.send.lane.val();
         self.send.m_axis_tvalid.next = self.forces.m_axis_tvalid.val();

@@ -1,6 +1,7 @@
 //! The engine as files: Verilog, memory files, lint waivers, manifest.
 
-use dermis_golden::fixed::send::{FLAG_CONDITION, FLAG_FOUND, FLAG_FRAMING, FLAG_NO_CONTACT, STATUS_BEATS};
+use dermis_golden::fixed::send::{FLAG_CONDITION, FLAG_FOUND, FLAG_FRAMING, FLAG_NO_CONTACT};
+use dermis_golden::fixed::storage::word_bits;
 use dermis_golden::fixed::{Cycles, Model};
 use rust_hdl::prelude::*;
 use serde_json::json;
@@ -9,7 +10,7 @@ use thiserror::Error;
 use crate::board::{Board, BoardError};
 use crate::device::Tap;
 use crate::engine::Engine;
-use crate::primitives::MEMORY_FILE;
+use crate::primitives::{COLUMN_FILE, MEMORY_FILE};
 use crate::taps::taps;
 
 /// Version of the generated files' meaning; a reader refuses another one.
@@ -83,12 +84,13 @@ pub fn generate(model: &Model) -> Result<Generated, HdlError> {
     let manifest = manifest(model, &board, &top);
     let file = |name: String, text: String| GeneratedFile { name, text };
     let verilog = header(model, &top) + &rename(&generate_verilog_unchecked(&engine), &top);
-    let files = vec![
+    let mut files = vec![
         file(format!("{top}.v"), verilog),
         file(MEMORY_FILE.to_string(), engine.pass.lanes.memory_file()),
         file(format!("{top}.vlt"), include_str!("waivers.vlt").to_string()),
         file("manifest.json".to_string(), format!("{manifest:#}\n")),
     ];
+    files.extend(engine.pass.steps.column_file().map(|text| file(COLUMN_FILE.to_string(), text)));
     Ok(Generated { top, files, taps: taps(model), manifest })
 }
 
@@ -117,7 +119,7 @@ fn header(model: &Model, top: &str) -> String {
 //
 //   clk, rst         clock; synchronous reset, active high
 //   s_axis_tdata     [{input_end}:0], a taxel's code, signed; row-major, tlast on a frame's last
-//   m_axis_tdata     [95:0], {{fz, fy, fx}} of 32 bits signed; {taxels} forces row-major, then {STATUS_BEATS} status beats
+//   m_axis_tdata     [95:0], {{fz, fy, fx}} of 32 bits signed; {taxels} forces row-major, then {status} status beats
 //
 // {lanes} MAC lanes, degree {degree}; coefficients in {MEMORY_FILE}, one line per word of the lanes' memory.
 ",
@@ -125,6 +127,7 @@ fn header(model: &Model, top: &str) -> String {
         name = scene.name,
         input_end = f.input_bits - 1,
         taxels = scene.sensor.taxels(),
+        status = model.status_beats(),
         lanes = 4 * f.lanes_per_parity,
         degree = f.degree,
     )
@@ -148,7 +151,7 @@ fn manifest(model: &Model, board: &Board, top: &str) -> serde_json::Value {
         },
         "output": {
             "force_beats": scene.sensor.taxels(),
-            "status_beats": STATUS_BEATS,
+            "status_beats": model.status_beats(),
             // Without a full scale a force word means this many N for each MPa of the largest code.
             "force_lsb_N": full_scale.map(|full_scale| model.force_lsb_N(full_scale)),
             "force_lsb_N_per_MPa": model.force_lsb_N(1.0),
@@ -163,18 +166,14 @@ fn manifest(model: &Model, board: &Board, top: &str) -> serde_json::Value {
         "sizes": {
             "quads": f.quads,
             "lanes": 4 * f.lanes_per_parity,
-            "coefficient_words": engine_words(model),
-            "coefficient_word_bits": 4 * f.lanes_per_parity * 18,
+            "coefficient_words": model.storage.words(),
+            "coefficient_block_rams": model.storage.block_rams(4 * f.lanes_per_parity),
+            "columns_left_out": model.storage.is_pruned(f.quads),
+            "coefficient_word_bits": word_bits(f),
         },
         "cycles": {
-            "searched": Cycles::of(model, true),
-            "not_searched": Cycles::of(model, false),
+            "searched": Cycles::of(model, &vec![true; model.parts.len()]),
+            "not_searched": Cycles::of(model, &vec![false; model.parts.len()]),
         },
     })
-}
-
-/// Words of the coefficient memory: one per matrix, group of rows and column.
-fn engine_words(model: &Model) -> usize {
-    let schedule = dermis_golden::fixed::schedule::schedule(&model.formats);
-    crate::primitives::matrices(&schedule).len() * model.formats.groups * model.formats.quads
 }

@@ -4,19 +4,19 @@
 //! asserts that both agree to the cycle. With Q quads, G groups of rows, K rows in the last group:
 //! ```text
 //! fold     Q + 5                                from the last input beat to the first product
-//! pass     Q for each product, waiting until a step's operand has been finished
+//! pass     the kept columns of each product, at most Q, waiting until a step's operand has been finished
 //! rescale  v_00 is replayed once its exponent is known: Q more
 //! search   15 sweeps of Q + 27, one of Q + 5    (the last alone when nothing is searched)
+//! next     1 between two subarrays
 //! send     6 to the first beat, then one beat a cycle
 //! ```
 
 use serde::Serialize;
 
-use super::formats::{Formats, HALVINGS};
+use super::formats::HALVINGS;
 use super::model::Model;
 use super::schedule::schedule;
 use super::search::COARSE_CENTRES;
-use super::send::STATUS_BEATS;
 
 /// From the last input beat to the cycle in which the frame starts.
 const ACCEPT: u64 = 1;
@@ -24,6 +24,8 @@ const ACCEPT: u64 = 1;
 const FOLD: u64 = 5;
 /// From a product's issue to the first row of its accumulators: addresses, memories, selection, five steps of the lanes.
 const LANES: u64 = 8;
+/// More of them where columns are left out: the list of columns is a memory of its own.
+const COLUMNS: u64 = 2;
 /// From a row to its operand being readable: rescaler, operand memory.
 const OPERAND: u64 = 4;
 /// From the last raw row of v_00 to its first replayed row.
@@ -36,6 +38,8 @@ const BEGIN: u64 = 1;
 const SWEEP: u64 = 27;
 /// The last sweep beyond its Q quads.
 const LAST_SWEEP: u64 = 5;
+/// From a subarray's values to the next one's start.
+const NEXT: u64 = 1;
 /// From the values' end to the first beat on the output.
 const SEND: u64 = 6;
 
@@ -51,36 +55,41 @@ pub struct Cycles {
 }
 
 impl Cycles {
-    /// The counts of a frame of `model`; a frame that is not searched is done sooner.
-    pub fn of(model: &Model, searching: bool) -> Self {
+    /// The counts of a frame of `model`; `searched` says of each subarray whether it is searched.
+    pub fn of(model: &Model, searched: &[bool]) -> Self {
         let taxels = model.scene.sensor.taxels() as u64;
         let quads = model.formats.quads as u64;
         let judged = COARSE_CENTRES.len() as u64 + u64::from(HALVINGS);
-        let sweeps = if searching { judged * (quads + SWEEP) } else { 0 };
-        let values = ACCEPT + passes(&model.formats) + BEGIN + sweeps + quads + LAST_SWEEP;
-        let first_output = values + SEND;
-        let latency = first_output + taxels + STATUS_BEATS as u64 - 1;
+        let solve = |&searching: &bool| {
+            let sweeps = if searching { judged * (quads + SWEEP) } else { 0 };
+            passes(model) + BEGIN + sweeps + quads + LAST_SWEEP
+        };
+        let solved: u64 = searched.iter().map(solve).sum();
+        let first_output = ACCEPT + solved + (searched.len() as u64 - 1) * NEXT + SEND;
+        let latency = first_output + taxels + model.status_beats() as u64 - 1;
         Cycles { first_output, latency, total: taxels + latency }
     }
 }
 
-/// From a frame's start to its last coefficient in the search memory.
-fn passes(formats: &Formats) -> u64 {
+/// From a subarray's start to its last coefficient in the search memory.
+fn passes(model: &Model) -> u64 {
+    let (formats, storage) = (&model.formats, &model.storage);
     let quads = formats.quads as u64;
     let last_rows = quads - (formats.groups as u64 - 1) * formats.lanes_per_parity as u64;
+    let lanes = LANES + if storage.is_listed(formats) { COLUMNS } else { 0 };
     let mut now = quads + FOLD;
     let mut finished: Vec<u64> = Vec::new();
     let mut last_row = 0;
     for (k, products) in schedule(formats).iter().enumerate() {
-        for _ in 0..formats.groups {
+        for group in 0..formats.groups {
             for product in products {
                 if k > 0 {
                     now = now.max(finished[product.operand_index()]);
                 }
-                now += quads;
+                now += storage.columns_of(product.matrix, group).len() as u64;
             }
         }
-        last_row = now - 1 + LANES + last_rows - 1;
+        last_row = now - 1 + lanes + last_rows - 1;
         if k == 0 {
             last_row += REPLAY - 1 + quads;
         }

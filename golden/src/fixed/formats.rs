@@ -24,7 +24,8 @@ use serde::Serialize;
 use super::arith::{bit_length, signed_bits};
 use super::coefficients::{parity_blocks, quantise, Blocks, FLIP_X, FLIP_Y};
 use super::quads::Quads;
-use super::schedule::{vectors, EXPONENTS};
+use super::schedule::{products, vectors, Matrix, EXPONENTS};
+use super::storage::{stored, Storage};
 use super::FixedError;
 use crate::matrices::Matrices;
 use crate::scene::Scene;
@@ -49,8 +50,12 @@ pub const MU_ROUND: u32 = 8;
 pub const FORCE_BITS: u32 = 32;
 /// Largest right shift of the force stage: more leaves nothing of any product.
 pub const FORCE_SHIFT_MAX: u32 = 62;
-/// Matrix lanes that the engine takes at most; a multiple of four.
+/// Matrix lanes that the engine takes at most; a multiple of four. An LFE5U-85F has 156 multipliers, the force unit needs six.
 const LANE_BUDGET: usize = 144;
+/// Block RAMs the coefficients may take: of the 208 of an LFE5U-85F, with room for the other memories and the router.
+const COEFFICIENT_RAMS: usize = 168;
+/// Least rows per group worth computing side by side; below, the lanes would wait for the shift-out.
+const LEAST_LANES: usize = 4;
 /// Coarse tiles and candidates beyond the disc reach grid coordinate ±4.
 const REACH: u64 = 4;
 
@@ -65,6 +70,8 @@ pub struct Formats {
     pub lanes_per_parity: usize,
     /// Groups of `lanes_per_parity` rows that a pass computes one after the other.
     pub groups: usize,
+    /// Ay is Ax transposed, and not stored.
+    pub shared_a: bool,
     /// Width of a code.
     pub input_bits: u32,
     /// Width of a folded input.
@@ -120,12 +127,13 @@ pub struct Quantised {
     pub ay: Blocks,
 }
 
-/// Quantises the matrices of a scene's subarray and derives all formats.
+/// Quantises the matrices of a scene's subarray, derives all formats and lays out the coefficient memory.
 ///
 /// # Errors
+/// [`FixedError::TooLarge`] when the coefficients fit no device.
 /// [`FixedError::Format`] when a word would leave the 48-bit accumulator or a norm of A asks for more headroom than
 /// the data word has.
-pub fn derive(scene: &Scene, matrices: &Matrices) -> Result<(Formats, Quantised), FixedError> {
+pub fn derive(scene: &Scene, matrices: &Matrices) -> Result<(Formats, Quantised, Storage), FixedError> {
     let spec = &scene.fixed;
     let quads = Quads { rows: matrices.sensor.rows, cols: matrices.sensor.cols };
     let count = quads.len();
@@ -140,6 +148,10 @@ pub fn derive(scene: &Scene, matrices: &Matrices) -> Result<(Formats, Quantised)
     let [ax, ay] = <[Blocks; 2]>::try_from(quantise(&[(&ax, FLIP_X), (&ay, FLIP_Y)], spec.coef_bits))
         .map_err(|_| FixedError::Internal("two matrices in, two out"))?;
 
+    let sensor = &matrices.sensor;
+    let shared_a = matrices.degree == 1 && sensor.rows == sensor.cols && sensor.pitch_x_mm == sensor.pitch_y_mm;
+    let mut quantised = Quantised { inverse, ax, ay };
+
     let fold_bits = spec.input_bits + 2;
     let input_low_bits = fold_bits.saturating_sub(MULTIPLIER_BITS);
     let inverse_low_bits = spec.inverse_bits.saturating_sub(MULTIPLIER_BITS);
@@ -147,31 +159,32 @@ pub fn derive(scene: &Scene, matrices: &Matrices) -> Result<(Formats, Quantised)
     let raw_shift = input_low_bits.min(inverse_low_bits);
 
     // v_00 in units of 2^raw_shift: the folded input reaches 2^(fold_bits − 1); one unit more for each dropped low·low product.
-    let raw_bound = ((u128::from(inverse.norm(count)) << (fold_bits - 1)) >> raw_shift) as u64 + 2 * count as u64;
-    let a_norm = ax.norm(count) + ay.norm(count);
+    let raw_bound =
+        ((u128::from(quantised.inverse.norm(count)) << (fold_bits - 1)) >> raw_shift) as u64 + 2 * count as u64;
+    let a_norm = quantised.ax.norm(count) + quantised.ay.norm(count);
     let a_bound = a_norm << (spec.data_bits - 1);
     let acc_bits = signed_bits(raw_bound.max(a_bound));
     if acc_bits > 48 {
         return Err(FixedError::Format { what: "accumulator", needs: acc_bits, has: 48 });
     }
     let vector_bits = spec.data_bits + SEARCH_EXTRA_BITS;
-    let a_shift = if matrices.degree == 0 { 0 } else { ax.exponent - SEARCH_EXTRA_BITS as i32 };
+    let a_shift = if matrices.degree == 0 { 0 } else { quantised.ax.exponent - SEARCH_EXTRA_BITS as i32 };
     let a_shift = u32::try_from(a_shift).map_err(|_| FixedError::Format {
         what: "scaled A (mu_max too large for this sensor)",
         needs: SEARCH_EXTRA_BITS,
-        has: ax.exponent.max(0) as u32,
+        has: quantised.ax.exponent.max(0) as u32,
     })?;
 
-    let growth = growth(&ax, &ay, count, EXPONENTS.len());
+    let growth = growth(&quantised.ax, &quantised.ay, count, EXPONENTS.len());
     let taxel_max = 1u64 << (vector_bits + 1);
     let used = vectors(matrices.degree);
-    let stored: Vec<u64> = (0..used)
+    let coefficients: Vec<u64> = (0..used)
         .map(|k| {
             let (i, j) = EXPONENTS[k];
             ((taxel_max as f64 * growth[k].min(1.0)) / 4f64.powi((i + j) as i32)).ceil() as u64 + 1
         })
         .collect();
-    let shifted: Vec<u64> = (0..used).map(|k| reach(&stored, k)).collect();
+    let shifted: Vec<u64> = (0..used).map(|k| reach(&coefficients, k)).collect();
     let taxels = (quads.rows * quads.cols) as u64;
     let search_bits: Vec<u32> = shifted.iter().map(|&bound| signed_bits(bound)).collect();
     let sum_bits: Vec<u32> = shifted.iter().map(|&bound| signed_bits(bound * taxels)).collect();
@@ -185,13 +198,16 @@ pub fn derive(scene: &Scene, matrices: &Matrices) -> Result<(Formats, Quantised)
     let raw_length_max = bit_length(raw_bound);
     let rescale_max = raw_length_max.saturating_sub(vector_bits - 1);
     let headroom = FORCE_BITS - search_bits[0];
-    let groups = count.div_ceil(LANE_BUDGET / 4);
-    let lanes_per_parity = count.div_ceil(groups);
+    let limbs = (input_low_bits > 0, inverse_low_bits > 0);
+    let order = stored(&products(matrices.degree, limbs, shared_a));
+    let (lanes_per_parity, storage) = fit(&order, &quantised, count, spec.prune_bits)?;
+    storage.drop_from(&mut quantised, count, lanes_per_parity);
     let formats = Formats {
         degree: matrices.degree,
         quads: count,
         lanes_per_parity,
-        groups,
+        groups: count.div_ceil(lanes_per_parity),
+        shared_a,
         input_bits: spec.input_bits,
         fold_bits,
         input_low_bits,
@@ -199,9 +215,9 @@ pub fn derive(scene: &Scene, matrices: &Matrices) -> Result<(Formats, Quantised)
         inverse_low_bits,
         limb_align,
         raw_shift,
-        inverse_exponent: inverse.exponent,
+        inverse_exponent: quantised.inverse.exponent,
         coef_bits: spec.coef_bits,
-        a_exponent: ax.exponent,
+        a_exponent: quantised.ax.exponent,
         acc_bits,
         raw_length_max,
         data_bits: spec.data_bits,
@@ -213,9 +229,35 @@ pub fn derive(scene: &Scene, matrices: &Matrices) -> Result<(Formats, Quantised)
         mu_fraction,
         mu_step,
         // Taxels are in quarters of a vector's LSB; the largest rescale must still fit the force word.
-        force_exponent: raw_shift as i32 - inverse.exponent - 2 + rescale_max as i32 - headroom as i32,
+        force_exponent: raw_shift as i32 - quantised.inverse.exponent - 2 + rescale_max as i32 - headroom as i32,
     };
-    Ok((formats, Quantised { inverse, ax, ay }))
+    Ok((formats, quantised, storage))
+}
+
+/// The fewest groups of rows whose coefficients fit the block RAMs, and what is stored then.
+fn fit(
+    matrices: &[Matrix],
+    quantised: &Quantised,
+    quads: usize,
+    prune_bits: u32,
+) -> Result<(usize, Storage), FixedError> {
+    let largest = quantised.inverse.parity.iter().flatten().map(|c| c.abs()).max().unwrap_or(0);
+    let threshold = |matrix| match matrix {
+        Matrix::InverseHigh | Matrix::InverseLow => largest >> prune_bits,
+        Matrix::Ax => 2f64.powi(quantised.ax.exponent - prune_bits as i32) as i64,
+        Matrix::Ay => 2f64.powi(quantised.ay.exponent - prune_bits as i32) as i64,
+    };
+    let mut least = usize::MAX;
+    for groups in quads.div_ceil(LANE_BUDGET / 4)..=quads.div_ceil(LEAST_LANES.min(quads)) {
+        let lanes = quads.div_ceil(groups);
+        let storage = Storage::new(matrices.to_vec(), quantised, quads, lanes, threshold);
+        let rams = storage.block_rams(4 * lanes);
+        if rams <= COEFFICIENT_RAMS {
+            return Ok((lanes, storage));
+        }
+        least = least.min(rams);
+    }
+    Err(FixedError::TooLarge { quads, rams: least, has: COEFFICIENT_RAMS })
 }
 
 /// The right shift of the force stage for a subarray normalised by `normalise` and rescaled by `rescale`: the μ word's

@@ -22,9 +22,11 @@ pub mod rescale;
 pub mod schedule;
 pub mod search;
 pub mod send;
+pub mod storage;
 pub mod unfold;
 
 mod model;
+mod subarray;
 
 pub use cycles::Cycles;
 pub use model::{FixedError, Model, Stage, Trace};

@@ -2,23 +2,22 @@
 
 use thiserror::Error;
 
-use super::arith::signed_bits;
 use super::cycles::Cycles;
-use super::formats::{derive, force_shift, Formats, Quantised, HALVINGS, LOG_FRACTION, MU_STEPS};
-use super::pass::{pass, Operands};
+use super::force::Force;
+use super::formats::{derive, Formats, Quantised, LOG_FRACTION, MU_STEPS};
 use super::quads::Quads;
-use super::schedule::{schedule, EXPONENTS};
-use super::search::{search, Block};
-use super::send::{Status, FLAG_CONDITION, FLAG_FOUND, FLAG_NO_CONTACT};
-use super::{fold, force, normalise, receive, rescale, unfold};
+use super::search::Best;
+use super::send::{Status, FLAG_CONDITION, FLAG_FOUND, FLAG_NO_CONTACT, STATUS_BEATS};
+use super::storage::Storage;
+use super::subarray::Solved;
 use crate::flags::{frame_flags, Flag};
 use crate::float::receive::receive as judge;
 use crate::frame::{Forces, Frame, FrameError};
 use crate::matrices::{Matrices, MatricesError};
-use crate::partition::Subarray;
+use crate::partition::{subarrays, Grid, PartitionError, Subarray};
 use crate::quantise::{full_scale, noise_floor_codes, quantise, Codes};
 use crate::reconstruct::{assemble, Reconstruction, SubarrayResult};
-use crate::scene::{Condition, Scene, SceneError};
+use crate::scene::{Scene, SceneError};
 
 /// Why a scene has no bit-true model, or a frame no result.
 #[derive(Debug, Error)]
@@ -32,6 +31,19 @@ pub enum FixedError {
     /// The matrices of the scene cannot be computed.
     #[error(transparent)]
     Matrices(#[from] MatricesError),
+    /// The partition does not fit the array.
+    #[error(transparent)]
+    Partition(#[from] PartitionError),
+    /// The coefficients of a subarray fit no device at any number of lanes.
+    #[error("a subarray of {quads} quads needs {rams} block RAMs for its coefficients, the device has {has} for them: take a finer partition or a smaller fixed.prune_bits")]
+    TooLarge {
+        /// Quads of the subarray.
+        quads: usize,
+        /// Block RAMs at best.
+        rams: usize,
+        /// Block RAMs there are.
+        has: usize,
+    },
     /// A word would need more bits than the hardware has.
     #[error("{what} needs {needs} bits, the hardware has {has}: lower fixed.input_bits, fixed.inverse_bits or search.mu_max")]
     Format {
@@ -59,6 +71,14 @@ pub enum FixedError {
         got: usize,
         /// How many belong there.
         expected: usize,
+    },
+    /// Stress so large that its forces are no finite numbers.
+    #[error("frame {frame}: peak stress {peak_MPa:e} MPa gives forces beyond the range of numbers")]
+    TooStrong {
+        /// The frame's id.
+        frame: String,
+        /// Its largest |b|.
+        peak_MPa: f64,
     },
     /// A derivation contradicts itself; a defect of this crate.
     #[error("internal: {0}")]
@@ -100,6 +120,10 @@ pub struct Model {
     pub noise_floor: i32,
     /// Threshold in force LSBs.
     pub threshold: i64,
+    /// The coefficient memory's layout.
+    pub storage: Storage,
+    /// The subarrays, row-major.
+    pub parts: Vec<Subarray>,
     layout: Quads,
 }
 
@@ -111,8 +135,10 @@ impl Model {
     /// lacks its full scale.
     pub fn new(scene: &Scene) -> Result<Self, FixedError> {
         scene.require_supported()?;
-        let matrices = Matrices::new(&scene.sensor, scene.search.mu_max)?;
-        let (formats, quantised) = derive(scene, &matrices)?;
+        let parts = subarrays(scene.partition.case, &scene.sensor)?;
+        let shape = parts[0].sensor(&scene.sensor);
+        let matrices = Matrices::new(&shape, scene.search.mu_max)?;
+        let (formats, quantised, storage) = derive(scene, &matrices)?;
         let scaled = |field, value: f64, unit: &dyn Fn(f64) -> f64| match scene.input.full_scale_MPa {
             _ if value == 0.0 => Ok(0.0),
             Some(full_scale) => Ok(value / unit(full_scale)),
@@ -126,13 +152,16 @@ impl Model {
             scene: scene.clone(),
             noise_floor: noise_floor.floor().min(f64::from(i32::MAX)) as i32,
             threshold: threshold.ceil().min(f64::from(u32::MAX)) as i64,
-            layout: Quads { rows: scene.sensor.rows, cols: scene.sensor.cols },
+            layout: Quads { rows: shape.rows, cols: shape.cols },
+            parts,
             formats,
             quantised,
+            storage,
         })
     }
 
-    /// The model for `frames`: a scene without full scale whose threshold or noise floor needs one takes the frames' largest |b|.
+    /// The model for `frames`: a scene without full scale whose threshold or noise floor
+    /// needs one takes the frames' largest |b|, one scale for all of them.
     ///
     /// # Errors
     /// As [`Model::new`].
@@ -140,15 +169,22 @@ impl Model {
         let mut scene = scene.clone();
         let needs = scene.search.noise_floor_MPa > 0.0 || scene.threshold.min_force_N > 0.0;
         if needs && scene.input.full_scale_MPa.is_none() {
-            let largest = frames.iter().map(|frame| full_scale(&scene, frame)).fold(0.0, f64::max);
-            scene.input.full_scale_MPa = (largest > 0.0).then_some(largest);
+            let largest = frames.iter().map(Frame::peak_MPa).fold(0.0, f64::max);
+            // Frames of nothing but zeros leave any scale: the default of a single one.
+            scene.input.full_scale_MPa = Some(if largest > 0.0 { largest } else { 1.0 });
         }
         Model::new(&scene)
     }
 
-    /// The quad layout of the array.
+    /// The quad layout of a subarray.
     pub fn layout(&self) -> Quads {
         self.layout
+    }
+
+    /// Subarrays along the rows and along the columns.
+    pub fn grid(&self) -> Grid {
+        let shape = self.layout;
+        Grid { rows: self.scene.sensor.rows / shape.rows, cols: self.scene.sensor.cols / shape.cols }
     }
 
     /// Whether the hardware has a μ search.
@@ -170,88 +206,55 @@ impl Model {
         Ok(quantise(&frame.stress_MPa, self.formats.input_bits, full_scale(&self.scene, frame)))
     }
 
-    /// Runs one frame of `codes`, row-major, `input_bits` wide.
+    /// Runs one frame of `codes`, row-major over the array, `input_bits` wide.
     pub fn run(&self, codes: &[i32]) -> Trace {
-        let formats = &self.formats;
-        let received = receive::receive(codes, self.noise_floor);
-        let condition = match self.scene.partition.condition {
-            Condition::Loaded => received.positive || received.negative,
-            Condition::BothSigns => received.positive && received.negative,
-        };
-        let samples: Vec<i64> = codes.iter().map(|&code| i64::from(code)).collect();
-        let left = normalise::shift(received.magnitude, formats.input_bits);
-        let normalised = normalise::normalise(&self.layout.pack(&samples), left);
-        let folded = fold::fold(&normalised);
+        let sensor = &self.scene.sensor;
+        let solved: Vec<Solved> =
+            self.parts.iter().map(|part| Solved::new(self, &part.gather(sensor, codes))).collect();
+        let searched: Vec<bool> = solved.iter().map(|s| s.condition && self.searches()).collect();
+        let cycles = Cycles::of(self, &searched);
 
-        let mut operands = Operands::of_input(&folded, formats);
-        let (mut passed, mut rescaled, mut unfolded) = (Vec::new(), Vec::new(), Vec::new());
-        let (mut right, mut rescale_saturations) = (0, 0);
-        let mut polynomials = vec![[[0i64; 10]; 4]; formats.quads];
-        for (k, products) in schedule(formats).iter().enumerate() {
-            let accumulators = pass(formats, &self.quantised, products, &operands);
-            if k == 0 {
-                right = rescale::shift(formats, rescale::raw_length(&accumulators));
-            }
-            let shift = if k == 0 { right } else { formats.a_shift };
-            let (words, saturations) = rescale::rescale(formats, &accumulators, shift);
-            rescale_saturations += saturations;
-            operands.vectors.push(rescale::operand(formats, &words));
-            let taxels = unfold::unfold(&words, EXPONENTS[k].0 + EXPONENTS[k].1);
-            for (quad, values) in polynomials.iter_mut().zip(&taxels) {
-                for (w, &value) in quad.iter_mut().zip(values) {
-                    w[k] = value;
-                }
-            }
-            passed.extend(accumulators);
-            rescaled.extend(words);
-            unfolded.extend(taxels);
+        let mut forces = vec![Force::default(); sensor.taxels()];
+        for (part, solved) in self.parts.iter().zip(&solved) {
+            part.scatter(sensor, &solved.forces(self), &mut forces);
         }
-
-        let searching = condition && self.searches();
-        let found = search(self.layout, Block::new(self.layout, polynomials), searching);
-        let mu = found.position.map(|x| force::mu_word(formats, x));
-        let shift = force_shift(formats, left, right);
-        let forces: Vec<force::Force> = self
-            .layout
-            .unpack(&found.values)
-            .into_iter()
-            .map(|value| force::force(formats, value, mu, shift, self.threshold))
-            .collect();
         let contact = forces.iter().any(|f| f.words[2] != 0);
-        let cycles = Cycles::of(self, searching);
+        let force_saturations = forces.iter().map(|f| f.saturations).sum();
         let flag = |set: bool, bit: u32| if set { bit } else { 0 };
-        let status = Status {
-            position: found.position,
-            flags: flag(condition, FLAG_CONDITION)
-                | flag(found.score.is_some(), FLAG_FOUND)
-                | flag(!contact, FLAG_NO_CONTACT),
-            score: found.score.unwrap_or(0) as i32,
-            rescale: right,
-            normalise: left,
-            rescale_saturations,
-            force_saturations: forces.iter().map(|f| f.saturations).sum(),
-            cycles: cycles.first_output as u32,
+        let status = solved.iter().flat_map(|s| {
+            let status = Status {
+                position: s.found.position,
+                flags: flag(s.condition, FLAG_CONDITION)
+                    | flag(s.found.score.is_some(), FLAG_FOUND)
+                    | flag(!contact, FLAG_NO_CONTACT),
+                score: s.found.score.unwrap_or(0) as i32,
+                rescale: s.rescale,
+                normalise: s.normalise,
+                rescale_saturations: s.saturations,
+                force_saturations,
+                cycles: cycles.first_output as u32,
+            };
+            status.beats()
+        });
+        let status = status.collect();
+        let quads = |name, stream: fn(&Solved) -> &[[i64; 4]]| Stage {
+            name,
+            words: solved.iter().flat_map(stream).map(|quad| quad.to_vec()).collect(),
         };
-        let quads = |words: &[[i64; 4]]| words.iter().map(|quad| quad.to_vec()).collect();
-        let sweeps = found
-            .sweeps
-            .iter()
-            .map(|best| {
-                vec![i64::from(best.position[0]), i64::from(best.position[1]), best.score, i64::from(best.taken)]
-            })
-            .collect();
+        let sweeps = solved.iter().flat_map(|s| &s.found.sweeps);
+        let judged = |b: &Best| vec![i64::from(b.position[0]), i64::from(b.position[1]), b.score, i64::from(b.taken)];
         Trace {
             beats: forces.iter().map(|f| f.words).collect(),
-            status: status.beats().to_vec(),
+            status,
             stages: vec![
-                Stage { name: "receive", words: samples.iter().map(|&s| vec![s]).collect() },
-                Stage { name: "normalise", words: quads(&normalised) },
-                Stage { name: "fold", words: quads(&folded) },
-                Stage { name: "pass", words: quads(&passed) },
-                Stage { name: "rescale", words: quads(&rescaled) },
-                Stage { name: "unfold", words: quads(&unfolded) },
-                Stage { name: "search", words: sweeps },
-                Stage { name: "force", words: quads(&found.values) },
+                Stage { name: "receive", words: codes.iter().map(|&code| vec![i64::from(code)]).collect() },
+                quads("normalise", |s| &s.normalised),
+                quads("fold", |s| &s.folded),
+                quads("pass", |s| &s.passed),
+                quads("rescale", |s| &s.rescaled),
+                quads("unfold", |s| &s.unfolded),
+                Stage { name: "search", words: sweeps.map(judged).collect() },
+                quads("force", |s| &s.found.values),
             ],
             cycles,
         }
@@ -282,45 +285,51 @@ impl Model {
         if beats.len() != taxels {
             return Err(FixedError::Beats { what: "forces", got: beats.len(), expected: taxels });
         }
-        let status = Status::of_beats(status).ok_or(FixedError::Beats {
-            what: "status",
-            got: status.len(),
-            expected: super::send::STATUS_BEATS,
-        })?;
+        let expected = self.status_beats();
+        if status.len() != expected {
+            return Err(FixedError::Beats { what: "status", got: status.len(), expected });
+        }
         let lsb = self.force_lsb_N(codes.full_scale_MPa);
         let axis = |axis: usize| beats.iter().map(|beat| f64::from(beat[axis]) * lsb).collect();
         let forces = Forces { fx: axis(0), fy: axis(1), fz: axis(2) };
 
-        let found = status.flags & FLAG_FOUND != 0;
-        let met = status.flags & FLAG_CONDITION != 0;
+        if !forces.resultant().iter().all(|sum| sum.is_finite()) {
+            return Err(FixedError::TooStrong { frame: frame.id.clone(), peak_MPa: frame.peak_MPa() });
+        }
         let step = self.scene.search.mu_max / MU_STEPS as f64;
         let floor = noise_floor_codes(&self.scene, &codes);
         let sensor = &self.scene.sensor;
-        let part = Subarray { row0: 0, col0: 0, rows: sensor.rows, cols: sensor.cols };
-        let receipt = judge(sensor, &part, &codes.codes, floor, self.scene.partition.condition);
-        let subarray = SubarrayResult {
-            row0: part.row0,
-            col0: part.col0,
-            rows: part.rows,
-            cols: part.cols,
-            centroid_condition: met,
-            compression_centroid_mm: receipt.compression_centroid_mm,
-            tension_centroid_mm: receipt.tension_centroid_mm,
-            mu: status.position.map(|x| f64::from(x) * step),
-            objective_value: found.then(|| -f64::from(status.score) / f64::from(1u32 << LOG_FRACTION)),
-        };
         let mut flags = frame_flags(&self.scene, frame, &codes);
-        if met && self.searches() && !found {
-            flags.push(Flag::NoCompression);
+        let mut subarrays = Vec::with_capacity(self.parts.len());
+        for (part, beats) in self.parts.iter().zip(status.chunks(STATUS_BEATS)) {
+            let Some(status) = Status::of_beats(beats) else { continue };
+            let own = part.gather(sensor, &codes.codes);
+            let receipt = judge(sensor, part, &own, floor, self.scene.partition.condition);
+            let met = status.flags & FLAG_CONDITION != 0;
+            let found = status.flags & FLAG_FOUND != 0;
+            if met && self.searches() && !found {
+                flags.push(Flag::NoCompression);
+            }
+            if status.rescale_saturations + status.force_saturations > 0 {
+                flags.push(Flag::Saturated);
+            }
+            subarrays.push(SubarrayResult {
+                row0: part.row0,
+                col0: part.col0,
+                rows: part.rows,
+                cols: part.cols,
+                centroid_condition: met,
+                compression_centroid_mm: receipt.compression_centroid_mm,
+                tension_centroid_mm: receipt.tension_centroid_mm,
+                mu: status.position.map(|x| f64::from(x) * step),
+                objective_value: found.then(|| -f64::from(status.score) / f64::from(1u32 << LOG_FRACTION)),
+            });
         }
-        if status.rescale_saturations + status.force_saturations > 0 {
-            flags.push(Flag::Saturated);
-        }
-        Ok(assemble(&self.scene, frame, engine, vec![subarray], forces, flags))
+        Ok(assemble(&self.scene, frame, engine, subarrays, forces, flags))
     }
 
-    /// Bits of a position word: ±(3·2^7), and one step beyond at the last level.
-    pub fn position_bits(&self) -> u32 {
-        signed_bits(4u64 << HALVINGS)
+    /// Status beats of a frame: [`STATUS_BEATS`] per subarray, in order.
+    pub fn status_beats(&self) -> usize {
+        STATUS_BEATS * self.parts.len()
     }
 }

@@ -9,9 +9,10 @@
 //! The product of the two low limbs is dropped: below 2^−22 of the largest result. The smaller low limb is stored shifted (a, c), so that
 //! both mixed products have one weight.
 
-use super::coefficients::Blocks;
 use super::formats::{Formats, Quantised};
+use super::quads::Quads;
 use super::schedule::{Matrix, Operand, Product};
+use super::storage::blocks;
 
 /// A folded input or v_ij as operands: parities per quad.
 pub type Vector = Vec<[i64; 4]>;
@@ -51,33 +52,32 @@ impl Operands {
 
 /// The coefficient of `matrix` that a lane of parity `target` multiplies for row `i`, column `j`: an 18-bit operand.
 pub fn coefficient(formats: &Formats, quantised: &Quantised, matrix: Matrix, target: usize, i: usize, j: usize) -> i64 {
-    let at = |blocks: &Blocks| blocks.parity[target][i * formats.quads + j];
+    let c = blocks(quantised, matrix).parity[target][i * formats.quads + j];
     let low = formats.inverse_low_bits;
     match matrix {
-        Matrix::InverseHigh => at(&quantised.inverse) >> low,
-        Matrix::InverseLow => (at(&quantised.inverse) & ((1 << low) - 1)) << (formats.limb_align - low),
-        Matrix::Ax => at(&quantised.ax),
-        Matrix::Ay => at(&quantised.ay),
-    }
-}
-
-/// Source parity = target parity XOR this.
-pub fn flip(quantised: &Quantised, matrix: Matrix) -> usize {
-    match matrix {
-        Matrix::InverseHigh | Matrix::InverseLow => quantised.inverse.flip,
-        Matrix::Ax => quantised.ax.flip,
-        Matrix::Ay => quantised.ay.flip,
+        Matrix::InverseHigh => c >> low,
+        Matrix::InverseLow => (c & ((1 << low) - 1)) << (formats.limb_align - low),
+        Matrix::Ax | Matrix::Ay => c,
     }
 }
 
 /// Accumulates all `products` of one v_ij: accumulators per quad and parity, in row order.
-pub fn pass(formats: &Formats, quantised: &Quantised, products: &[Product], operands: &Operands) -> Vector {
+///
+/// A transposed product takes its operand with x and y exchanged and gives its result so.
+pub fn pass(
+    formats: &Formats,
+    quantised: &Quantised,
+    layout: Quads,
+    products: &[Product],
+    operands: &Operands,
+) -> Vector {
     let quads = formats.quads;
     let mut accumulators = vec![[0i64; 4]; quads];
     for product in products {
         let source = operands.get(product.operand);
         let align = if product.align { formats.limb_align } else { 0 };
-        let flip = flip(quantised, product.matrix);
+        let flip = blocks(quantised, product.matrix).flip;
+        let source = if product.transposed { &transpose(layout, source) } else { source };
         for (i, row) in accumulators.iter_mut().enumerate() {
             for (target, acc) in row.iter_mut().enumerate() {
                 for (j, quad) in source.iter().enumerate() {
@@ -90,28 +90,12 @@ pub fn pass(formats: &Formats, quantised: &Quantised, products: &[Product], oper
     accumulators
 }
 
-/// The coefficient memory: one word per (matrix, group, column), each holding one coefficient per lane, lane
-/// `parity·lanes_per_parity + k` for row `group·lanes_per_parity + k`; rows past the last are zero.
-pub fn memory(formats: &Formats, quantised: &Quantised, matrices: &[Matrix]) -> Vec<Vec<i64>> {
-    let lanes = formats.lanes_per_parity;
-    let word = |matrix, group: usize, j| {
-        (0..4)
-            .flat_map(|parity| (0..lanes).map(move |k| (parity, group * lanes + k)))
-            .map(
-                |(parity, i)| {
-                    if i < formats.quads {
-                        coefficient(formats, quantised, matrix, parity, i, j)
-                    } else {
-                        0
-                    }
-                },
-            )
-            .collect()
-    };
-    matrices
-        .iter()
-        .flat_map(|&matrix| (0..formats.groups).map(move |group| (matrix, group)))
-        .flat_map(|(matrix, group)| (0..formats.quads).map(move |j| (matrix, group, j)))
-        .map(|(matrix, group, j)| word(matrix, group, j))
-        .collect()
+/// A quad vector with x and y exchanged: quad (r, c) from quad (c, r), fields 1 and 2 swapped. For square subarrays.
+pub fn transpose(layout: Quads, quads: &[[i64; 4]]) -> Vector {
+    (0..quads.len()).map(|address| swap(quads[layout.transposed(address)])).collect()
+}
+
+/// A quad with its two mirrors exchanged.
+pub fn swap([a, b, c, d]: [i64; 4]) -> [i64; 4] {
+    [a, c, b, d]
 }

@@ -70,6 +70,11 @@ impl Quads {
         row * self.cols + col
     }
 
+    /// Address of the quad with row and column exchanged, in a square layout.
+    pub fn transposed(&self, address: usize) -> usize {
+        address % self.quad_cols() * self.quad_rows() + address / self.quad_cols()
+    }
+
     /// Which lanes of quad `address` are taxels of their own (bit l = lane l), not a second copy.
     pub fn counts(&self, address: usize) -> u8 {
         let (row, col) = (address / self.quad_cols(), address % self.quad_cols());

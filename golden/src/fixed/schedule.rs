@@ -48,27 +48,35 @@ pub struct Product {
     pub operand: Operand,
     /// Whether the product of two high limbs is aligned by `formats.limb_align` bits to the left.
     pub align: bool,
+    /// The operand is transposed, and so is the result: x and y exchanged.
+    pub transposed: bool,
 }
 
 /// The products of every v_ij, in order of [`EXPONENTS`].
 pub fn schedule(formats: &Formats) -> Vec<Vec<Product>> {
-    let product = |matrix, operand, align| Product { matrix, operand, align };
-    let mut first = vec![product(Matrix::InverseHigh, Operand::InputHigh, true)];
-    if formats.input_low_bits > 0 {
-        first.push(product(Matrix::InverseHigh, Operand::InputLow, false));
+    products(formats.degree, (formats.input_low_bits > 0, formats.inverse_low_bits > 0), formats.shared_a)
+}
+
+/// The same from its ingredients: the degree, whether input and Cz⁺ have a low limb, whether Ax serves for Ay.
+pub fn products(degree: usize, limbs: (bool, bool), shared_a: bool) -> Vec<Vec<Product>> {
+    let product = |matrix, operand| Product { matrix, operand, align: false, transposed: false };
+    let mut first = vec![Product { align: true, ..product(Matrix::InverseHigh, Operand::InputHigh) }];
+    if limbs.0 {
+        first.push(product(Matrix::InverseHigh, Operand::InputLow));
     }
-    if formats.inverse_low_bits > 0 {
-        first.push(product(Matrix::InverseLow, Operand::InputHigh, false));
+    if limbs.1 {
+        first.push(product(Matrix::InverseLow, Operand::InputHigh));
     }
     let index = |i, j| EXPONENTS.iter().position(|&e| e == (i, j));
     let mut all = vec![first];
-    for &(i, j) in EXPONENTS[..vectors(formats.degree)].iter().skip(1) {
+    for &(i, j) in EXPONENTS[..vectors(degree)].iter().skip(1) {
         let mut products = Vec::new();
         if let Some(source) = j.checked_sub(1).and_then(|below| index(i, below)) {
-            products.push(product(Matrix::Ay, Operand::Vector(source), false));
+            let matrix = if shared_a { Matrix::Ax } else { Matrix::Ay };
+            products.push(Product { transposed: shared_a, ..product(matrix, Operand::Vector(source)) });
         }
         if let Some(source) = i.checked_sub(1).and_then(|left| index(left, j)) {
-            products.push(product(Matrix::Ax, Operand::Vector(source), false));
+            products.push(product(Matrix::Ax, Operand::Vector(source)));
         }
         // The older operand first: its pass hides the latency of the younger one.
         products.sort_by_key(Product::operand_index);

@@ -18,7 +18,7 @@ const SCHEMA: [(&str, &[&str]); 9] = [
     ("partition", &["case", "condition", "rows", "cols"]),
     ("search", &["objective", "mu_max", "noise_floor_MPa"]),
     ("threshold", &["min_force_N"]),
-    ("fixed", &["input_bits", "data_bits", "coef_bits", "inverse_bits"]),
+    ("fixed", &["input_bits", "data_bits", "coef_bits", "inverse_bits", "prune_bits"]),
     ("hardware", &["board"]),
     ("input", &["full_scale_MPa"]),
 ];
@@ -172,6 +172,7 @@ fn fixed(reader: &Reader) -> Result<FixedSpec, SceneError> {
         data_bits: bits("fixed.data_bits", 12..=18, default.data_bits)?,
         coef_bits,
         inverse_bits: bits("fixed.inverse_bits", i64::from(coef_bits)..=32, default.inverse_bits)?,
+        prune_bits: bits("fixed.prune_bits", 8..=31, default.prune_bits)?,
     })
 }
 

@@ -1,7 +1,6 @@
 //! What of the schema this version builds.
 
 use super::{Medium, ObjectiveKind, Scene, SceneError};
-use crate::partition::Case;
 
 impl Scene {
     /// Checks that this version has what the scene asks for.
@@ -16,8 +15,8 @@ impl Scene {
         if self.medium != Medium::HalfSpace {
             return missing("medium.kind", self.medium.to_string(), "half-space");
         }
-        if self.partition.case != Case::WHOLE {
-            return missing("partition.case", self.partition.case.to_string(), "0");
+        if self.partition.case.grid().is_none() {
+            return missing("partition.case", self.partition.case.to_string(), "0, 1, 2, 3, rows and cols");
         }
         if self.search.objective != ObjectiveKind::Sparse {
             let name = self.search.objective.name().to_string();

@@ -2,6 +2,7 @@
 
 use dermis_golden::fixed::force::{force, mu_word};
 use dermis_golden::fixed::formats::{force_shift, Formats, FORCE_BITS, FORCE_SHIFT_MAX, MU_ROUND};
+use dermis_golden::fixed::send::{FLAG_CONDITION, FLAG_FOUND, FLAG_FRAMING, FLAG_NO_CONTACT};
 use rust_hdl::prelude::*;
 
 use super::counter::count_bits;
@@ -13,21 +14,28 @@ use crate::wire::{Wire, Word};
 
 /// A pipeline of five steps that moves while `advance` is high: lane, products, shift, rounding with saturation and
 /// threshold, output. `beat` 0 is a force from `quad`, 1 … 3 are the status beats; the answer stands on `beat_data` five steps after
-/// `offer`. `start` latches μ, the shift and the status of the frame and clears the counts.
+/// `offer`. `start` keeps μ, the shift and the status of subarray `part`, settled three cycles later; `begin_frame` clears the
+/// frame's counts.
 #[derive(LogicBlock)]
 pub struct ForceUnit {
     /// Clock.
     pub clk: Signal<In, Clock>,
     /// Reset of the control pipeline.
     pub rst: Signal<In, Bit>,
-    /// New frame.
+    /// New frame: counts back to 0.
+    pub begin_frame: Signal<In, Bit>,
+    /// Keep what is known of subarray `part`.
     pub start: Signal<In, Bit>,
+    /// Which subarray.
+    pub part: Wire<In>,
     /// The pipeline moves.
     pub advance: Signal<In, Bit>,
     /// A beat enters.
     pub offer: Signal<In, Bit>,
     /// Which beat, 2 bits.
     pub beat: Wire<In>,
+    /// Its subarray.
+    pub beat_part: Wire<In>,
     /// The quad's lane, with `offer`.
     pub lane: Wire<In>,
     /// Four values of p, one step after `offer`.
@@ -62,6 +70,7 @@ pub struct ForceUnit {
     _threshold: i64,
     _pipe: Vec<Option<Entry>>,
     _frame: Frame,
+    _parts: Vec<Part>,
 }
 
 /// Steps from `offer` to the output.
@@ -72,18 +81,26 @@ pub const CYCLE_BITS: usize = 24;
 #[derive(Clone, Copy, Debug, Default)]
 struct Entry {
     beat: u64,
+    part: usize,
     lane: usize,
     value: i64,
 }
 
+/// What is kept of a subarray.
 #[derive(Clone, Copy, Debug, Default)]
-struct Frame {
+struct Part {
     position: [i32; 2],
     normalise: u32,
     rescale: u32,
-    flags: u32,
+    condition: bool,
+    found: bool,
     score: i32,
-    rescale_saturations: u32,
+    saturations: u32,
+}
+
+/// What is kept of a frame.
+#[derive(Clone, Copy, Debug, Default)]
+struct Frame {
     cycles: u32,
     saturations: u32,
     contact: bool,
@@ -91,12 +108,15 @@ struct Frame {
 }
 
 impl ForceUnit {
-    /// Widths of `formats`; threshold in force LSBs.
-    pub fn new(formats: &Formats, threshold: i64) -> Self {
+    /// Widths of `formats`, `parts` subarrays, threshold in force LSBs.
+    pub fn new(formats: &Formats, parts: usize, threshold: i64) -> Self {
         ForceUnit {
             clk: Default::default(),
             rst: Default::default(),
+            begin_frame: Default::default(),
             start: Default::default(),
+            part: Wire::new(count_bits(parts)),
+            beat_part: Wire::new(count_bits(parts)),
             advance: Default::default(),
             offer: Default::default(),
             beat: Wire::new(2),
@@ -119,40 +139,48 @@ impl ForceUnit {
             _threshold: threshold,
             _pipe: vec![None; STEPS - 1],
             _frame: Frame::default(),
+            _parts: vec![Part::default(); parts],
         }
     }
 
-    fn latch(&mut self) {
+    fn keep(&mut self) {
         let position = |wire: &Wire<In>| wire.val().signed(0, position_bits()) as i32;
-        let flag = |set: bool, bit: u32| u32::from(set) << bit;
-        self._frame = Frame {
+        let part = Part {
             position: [position(&self.position_x), position(&self.position_y)],
             normalise: self.normalise.val().number() as u32,
             rescale: self.rescale.val().number() as u32,
-            flags: flag(self.condition.val(), 0) | flag(self.found.val(), 1) | flag(self.framing.val(), 3),
+            condition: self.condition.val(),
+            found: self.found.val(),
             score: if self.found.val() { self.score.val().signed(0, self.score.width()) as i32 } else { 0 },
-            rescale_saturations: self.saturations.val().number() as u32,
-            cycles: 0,
-            saturations: 0,
-            contact: false,
-            counting: true,
+            saturations: self.saturations.val().number() as u32,
         };
+        if let Some(kept) = self._parts.get_mut(self.part.val().number() as usize) {
+            *kept = part;
+        }
     }
 
     fn answer(&mut self, entry: &Entry) -> [i32; 3] {
         let frame = &mut self._frame;
+        let part = self._parts.get(entry.part).copied().unwrap_or_default();
         match entry.beat {
             0 => {
-                let shift = force_shift(&self._formats, frame.normalise, frame.rescale);
-                let mu = frame.position.map(|x| mu_word(&self._formats, x));
+                let shift = force_shift(&self._formats, part.normalise, part.rescale);
+                let mu = part.position.map(|x| mu_word(&self._formats, x));
                 let result = force(&self._formats, entry.value, mu, shift, self._threshold);
                 frame.saturations = (frame.saturations + result.saturations).min((1 << SATURATION_BITS) - 1);
                 frame.contact |= result.words[2] != 0;
                 result.words
             }
-            1 => [frame.position[0], frame.position[1], (frame.flags | u32::from(!frame.contact) << 2) as i32],
-            2 => [frame.score, frame.rescale as i32, frame.normalise as i32],
-            _ => [frame.rescale_saturations as i32, frame.saturations as i32, frame.cycles as i32],
+            1 => {
+                let flag = |set: bool, bit: u32| if set { bit } else { 0 };
+                let flags = flag(part.condition, FLAG_CONDITION)
+                    | flag(part.found, FLAG_FOUND)
+                    | flag(!frame.contact, FLAG_NO_CONTACT)
+                    | flag(self.framing.val(), FLAG_FRAMING);
+                [part.position[0], part.position[1], flags as i32]
+            }
+            2 => [part.score, part.rescale as i32, part.normalise as i32],
+            _ => [part.saturations as i32, frame.saturations as i32, frame.cycles as i32],
         }
     }
 }
@@ -173,18 +201,22 @@ impl Logic for ForceUnit {
                     self.beat_data.next = Word::of_fields(&words.map(i64::from), FORCE_BITS as usize);
                 }
                 self.valid.next = leaving.is_some();
-                self.last.next = leaving.is_some_and(|entry| entry.beat == 3);
+                self.last.next = leaving.is_some_and(|entry| entry.beat == 3 && entry.part + 1 == self._parts.len());
                 if let Some(Some(entry)) = self._pipe.last_mut() {
                     entry.value = self.quad.val().signed(entry.lane, self.quad.width() / 4);
                 }
                 self._pipe.push(self.offer.val().then(|| Entry {
                     beat: self.beat.val().number(),
+                    part: self.beat_part.val().number() as usize,
                     lane: self.lane.val().number() as usize,
                     value: 0,
                 }));
             }
+            if self.begin_frame.val() {
+                self._frame = Frame { counting: true, ..Frame::default() };
+            }
             if self.start.val() {
-                self.latch();
+                self.keep();
             }
             if self.rst.val() {
                 self._pipe.fill(None);
@@ -226,12 +258,23 @@ impl Logic for ForceUnit {
 reg [{p_end}:0] x, y;
 reg [{n_end}:0] normalise_held;
 reg [{r_end}:0] rescale_held;
-reg condition_held, found_held, framing_held, contact, counting;
-reg [{word_end}:0] score_held;
-reg [{cap_end}:0] rescale_saturations, force_saturations;
+reg [{part_end}:0] part1, part2;
+reg start1, start2;
+// Kept per subarray: what the pipeline and the status beats need.
+reg [{mu_end}:0] mu_xs [0:{last_part}];
+reg [{mu_end}:0] mu_ys [0:{last_part}];
+reg [5:0] shifts [0:{last_part}];
+reg [{p_end}:0] xs [0:{last_part}];
+reg [{p_end}:0] ys [0:{last_part}];
+reg [{n_end}:0] normalises [0:{last_part}];
+reg [{r_end}:0] rescales [0:{last_part}];
+reg [{word_end}:0] scores [0:{last_part}];
+reg [{cap_end}:0] rescale_saturations [0:{last_part}];
+reg [{last_part}:0] conditions, founds;
+reg contact, counting;
+reg [{cap_end}:0] force_saturations;
 reg [{c_end}:0] cycles_held;
-reg [5:0] shift;
-reg signed [{mu_end}:0] mu_x, mu_y;
+reg [5:0] shift_now;
 wire [7:0] raw_shift = 8'd{base} + {{{n_more}'d0, normalise_held}} - {{{r_more}'d0, rescale_held}};
 wire signed [{mp_end}:0] mu_step = {mp}'sd{mu_step};
 wire signed [{mp_end}:0] wide_x = {{{{{mp_more}{{x[{p_end}]}}}}, x}};
@@ -244,27 +287,40 @@ wire [{mp_end}:0] half_x = before_x + {mp}'sd1;
 wire [{mp_end}:0] half_y = before_y + {mp}'sd1;
 wire unused_mu = &{{1'b0, half_x, half_y}};
 always @(posedge clk) begin
-  if (start) begin
-    x <= position_x;
-    y <= position_y;
-    normalise_held <= normalise;
-    rescale_held <= rescale;
-    condition_held <= condition;
-    found_held <= found;
-    framing_held <= framing;
-    score_held <= found ? {score} : {word}'d0;
-    rescale_saturations <= saturations;
-  end
-  // Settled three cycles after start; the first value needs them in its third step.
-  shift <= raw_shift[7] ? 6'd0 : raw_shift > 8'd{shift_max} ? 6'd{shift_max} : raw_shift[5:0];
+  x <= position_x;
+  y <= position_y;
+  normalise_held <= normalise;
+  rescale_held <= rescale;
+  start1 <= start;
+  part1 <= part;
   scaled_x <= wide_x * mu_step;
   scaled_y <= wide_y * mu_step;
-  mu_x <= half_x[{mu}:1];
-  mu_y <= half_y[{mu}:1];
+  shift_now <= raw_shift[7] ? 6'd0 : raw_shift > 8'd{shift_max} ? 6'd{shift_max} : raw_shift[5:0];
+  start2 <= start1;
+  part2 <= part1;
+  if (start) begin
+    xs[part] <= position_x;
+    ys[part] <= position_y;
+    normalises[part] <= normalise;
+    rescales[part] <= rescale;
+    scores[part] <= found ? {score} : {word}'d0;
+    rescale_saturations[part] <= saturations;
+    conditions[part] <= condition;
+    founds[part] <= found;
+  end
+  if (start2) begin
+    mu_xs[part2] <= half_x[{mu}:1];
+    mu_ys[part2] <= half_y[{mu}:1];
+    shifts[part2] <= shift_now;
+  end
 end
 reg [3:0] offers;
 reg [1:0] beat1, beat2, beat3, beat4;
 reg [1:0] lane1;
+reg [{part_end}:0] at1, at2, at3, at4;
+wire signed [{mu_end}:0] mu_x = mu_xs[at2];
+wire signed [{mu_end}:0] mu_y = mu_ys[at2];
+wire [5:0] shift = shifts[at3];
 reg signed [{v_end}:0] value;
 reg signed [{product_end}:0] product_x, product_y;
 reg [{v_end}:0] value3;
@@ -291,11 +347,13 @@ endgenerate
 wire [{cap}:0] count = {{1'b0, force_saturations}} + {{{cap_less}'d0, clipped[0]}} + {{{cap_less}'d0, clipped[1]}}
   + {{{cap_less}'d0, clipped[2]}};
 reg [{all_end}:0] status;
+wire [{p_end}:0] status_x = xs[at4];
+wire [{p_end}:0] status_y = ys[at4];
 always @(*) begin
   case (beat4)
-    2'd1: status = {{28'd0, framing_held, !contact, found_held, condition_held, {y_word}, {x_word}}};
-    2'd2: status = {{{n_word}'d0, normalise_held, {r_word}'d0, rescale_held, score_held}};
-    default: status = {{{c_word}'d0, cycles_held, {cap_word}'d0, force_saturations, {cap_word}'d0, rescale_saturations}};
+    2'd1: status = {{28'd0, framing, !contact, founds[at4], conditions[at4], {y_word}, {x_word}}};
+    2'd2: status = {{{n_word}'d0, normalises[at4], {r_word}'d0, rescales[at4], scores[at4]}};
+    default: status = {{{c_word}'d0, cycles_held, {cap_word}'d0, force_saturations, {cap_word}'d0, rescale_saturations[at4]}};
   endcase
 end
 wire force_leaves = advance && offers[3] && beat4 == 2'd0;
@@ -307,10 +365,11 @@ always @(posedge clk) begin
   end else if (advance) begin
     offers <= {{offers[2:0], offer}};
     valid <= offers[3];
-    last <= offers[3] && beat4 == 2'd3;
+    last <= offers[3] && beat4 == 2'd3 && at4 == {part_bits}'d{last_part};
   end
   if (advance) begin
     {{beat4, beat3, beat2, beat1}} <= {{beat3, beat2, beat1, beat}};
+    {{at4, at3, at2, at1}} <= {{at3, at2, at1, beat_part}};
     lane1 <= lane;
     value <= quad[lane1 * {v} +: {v}];
     product_x <= value * mu_x;
@@ -321,7 +380,7 @@ always @(posedge clk) begin
     moved_z <= doubled_z >>> shift;
     if (offers[3]) beat_data <= beat4 != 2'd0 ? status : below ? {all}'d0 : words;
   end
-  if (start) begin
+  if (begin_frame) begin
     counting <= 1'b1;
     contact <= 1'b0;
     force_saturations <= {cap}'d0;
@@ -333,6 +392,9 @@ always @(posedge clk) begin
   end
 end",
             p_end = p - 1,
+            part_bits = self.part.width(),
+            part_end = self.part.width() - 1,
+            last_part = self._parts.len() - 1,
             n_end = n_bits - 1,
             r_end = r_bits - 1,
             n_more = 8 - n_bits,
@@ -362,8 +424,8 @@ end",
             over1 = over + 1,
             z_more = product - v - fraction,
             fraction_one = fraction + 1,
-            x_word = resize("x", p, word),
-            y_word = resize("y", p, word),
+            x_word = resize("status_x", p, word),
+            y_word = resize("status_y", p, word),
         ))
     }
 }

@@ -1,11 +1,14 @@
 //! Magnitude and signs of a frame while its samples arrive.
 
 use dermis_golden::fixed::arith::magnitude_bits;
+use dermis_golden::fixed::receive::Received;
 use rust_hdl::prelude::*;
 
+use super::counter::count_bits;
 use crate::wire::{Wire, Word};
 
-/// ORs the magnitudes of all accepted codes and remembers whether one lay above the noise floor or below its negative.
+/// For every subarray, ORs the magnitudes of its accepted codes and remembers whether one lay above the noise floor or below its
+/// negative. `select` picks the subarray that the outputs tell of.
 #[derive(LogicBlock)]
 pub struct Gather {
     /// Clock.
@@ -16,6 +19,10 @@ pub struct Gather {
     pub accept: Signal<In, Bit>,
     /// A code.
     pub code: Wire<In>,
+    /// The code's subarray.
+    pub part: Wire<In>,
+    /// The subarray to tell of.
+    pub select: Wire<In>,
     /// OR of the magnitudes, one bit narrower than a code.
     pub magnitude: Wire<Out>,
     /// A code was above the floor.
@@ -23,21 +30,25 @@ pub struct Gather {
     /// A code was below minus the floor.
     pub negative: Signal<Out, Bit>,
     _floor: i64,
+    _parts: Vec<Received>,
 }
 
 impl Gather {
-    /// Codes of `bits` bits, `floor` in codes.
-    pub fn new(bits: usize, floor: i32) -> Self {
+    /// Codes of `bits` bits, `floor` in codes, `parts` subarrays.
+    pub fn new(bits: usize, floor: i32, parts: usize) -> Self {
         Gather {
             clk: Default::default(),
             clear: Default::default(),
             accept: Default::default(),
             code: Wire::new(bits),
+            part: Wire::new(count_bits(parts)),
+            select: Wire::new(count_bits(parts)),
             magnitude: Wire::new(bits - 1),
             positive: Default::default(),
             negative: Default::default(),
             // A floor beyond the code's range is never exceeded; the range's end says the same in the code's width.
             _floor: i64::from(floor).min((1 << (bits - 1)) - 1),
+            _parts: vec![Received::default(); parts],
         }
     }
 }
@@ -46,16 +57,21 @@ impl Logic for Gather {
     fn update(&mut self) {
         if self.clk.pos_edge() {
             let code = self.code.val().signed(0, self.code.width());
+            let floor = self._floor;
             if self.clear.val() {
-                self.magnitude.next = Word::default();
-                self.positive.next = false;
-                self.negative.next = false;
+                self._parts.fill(Received::default());
             } else if self.accept.val() {
-                self.magnitude.next = Word::from(self.magnitude.val().number() | magnitude_bits(code));
-                self.positive.next = self.positive.val() || code > self._floor;
-                self.negative.next = self.negative.val() || code < -self._floor;
+                if let Some(seen) = self._parts.get_mut(self.part.val().number() as usize) {
+                    seen.magnitude |= magnitude_bits(code);
+                    seen.positive |= code > floor;
+                    seen.negative |= code < -floor;
+                }
             }
         }
+        let seen = self._parts.get(self.select.val().number() as usize).copied().unwrap_or_default();
+        self.magnitude.next = Word::from(seen.magnitude);
+        self.positive.next = seen.positive;
+        self.negative.next = seen.negative;
     }
 
     fn connect(&mut self) {
@@ -70,17 +86,27 @@ impl Logic for Gather {
             "\
 wire signed [{end}:0] value = code;
 wire signed [{end}:0] floor_code = {bits}'sd{floor};
+reg [{less_end}:0] magnitudes [0:{last}];
+reg [{last}:0] positives, negatives;
+integer i;
 always @(posedge clk) begin
   if (clear) begin
-    magnitude <= {less}'d0;
-    positive <= 1'b0;
-    negative <= 1'b0;
+    for (i = 0; i <= {last}; i = i + 1) magnitudes[i] <= {less}'d0;
+    positives <= {parts}'d0;
+    negatives <= {parts}'d0;
   end else if (accept) begin
-    magnitude <= magnitude | (code[{less_end}:0] ^ {{{less}{{code[{end}]}}}});
-    positive <= positive || value > floor_code;
-    negative <= negative || value < -floor_code;
+    magnitudes[part] <= magnitudes[part] | (code[{less_end}:0] ^ {{{less}{{code[{end}]}}}});
+    positives[part] <= positives[part] || value > floor_code;
+    negatives[part] <= negatives[part] || value < -floor_code;
   end
+end
+always @(*) begin
+  magnitude = magnitudes[select];
+  positive = positives[select];
+  negative = negatives[select];
 end",
+            last = self._parts.len() - 1,
+            parts = self._parts.len(),
             end = bits - 1,
             less = bits - 1,
             less_end = bits - 2,

@@ -249,6 +249,7 @@ generate
       reg signed [{product_end}:0] product;
       reg [{acc_end}:0] aligned, accumulator, chain;
       wire [{wide_end}:0] shifted = {shifted};
+      wire unused = &{{1'b0, shifted}};
       assign chain_in[k * {acc_bits} +: {acc_bits}] = chain;
       always @(posedge clk) begin
         a <= coefficients[(p * {per_parity} + k) * {M} +: {M}];

@@ -4,6 +4,7 @@ use dermis_golden::fixed::formats::{Formats, MULTIPLIER_BITS};
 use rust_hdl::prelude::*;
 
 use super::polynomial_word::resize;
+use super::steps::SOURCE_BITS;
 use crate::wire::{Wire, Word};
 
 /// Memory words of the folded input and of a v_ij in, four multiplier operands out one cycle later.
@@ -15,10 +16,9 @@ pub struct OperandSelect {
     pub input_quad: Wire<In>,
     /// Four parities of a v_ij.
     pub vector_quad: Wire<In>,
-    /// 0: v_ij, 1: high limb of the input, 2: low limb.
-    pub kind: Wire<In>,
-    /// Lane group t gets parity t XOR `flip`.
-    pub flip: Wire<In>,
+    /// Kind (0: v_ij, 1: high limb of the input, 2: low limb) in bits 0 and 1; flip in bits 2 and 3: lane group t gets parity
+    /// t XOR flip; in bit 4, the mirrors exchanged before that.
+    pub source: Wire<In>,
     /// Operand of each lane group, one cycle later.
     pub operands: Wire<Out>,
     _low: usize,
@@ -34,8 +34,7 @@ impl OperandSelect {
             clk: Default::default(),
             input_quad: Wire::new(4 * formats.fold_bits as usize),
             vector_quad: Wire::new(4 * formats.data_bits as usize),
-            kind: Wire::new(2),
-            flip: Wire::new(2),
+            source: Wire::new(SOURCE_BITS),
             operands: Wire::new(4 * M),
             _low: formats.input_low_bits as usize,
             _align: formats.limb_align as usize,
@@ -46,11 +45,12 @@ impl OperandSelect {
 impl Logic for OperandSelect {
     fn update(&mut self) {
         if self.clk.pos_edge() {
-            let flip = self.flip.val().number() as usize;
+            let control = self.source.val().number();
+            let flip = (control >> 2 & 3) as usize;
             let fields: [i64; 4] = std::array::from_fn(|target| {
-                let source = target ^ flip;
+                let source = if control >> 4 == 1 { [0, 2, 1, 3][target ^ flip] } else { target ^ flip };
                 let folded = self.input_quad.val().signed(source, self.input_quad.width() / 4);
-                match self.kind.val().number() {
+                match control & 3 {
                     1 => folded >> self._low,
                     2 => (folded & ((1 << self._low) - 1)) << (self._align - self._low),
                     _ => self.vector_quad.val().signed(source, self.vector_quad.width() / 4),
@@ -78,7 +78,7 @@ impl Logic for OperandSelect {
                 format!(
                     "wire [{high_end}:0] high{p} = input_quad[{high_low} +: {high_bits}];\n\
                      wire [{data_end}:0] vector{p} = vector_quad[{data_low} +: {data}];\n\
-                     wire [{m_end}:0] q{p} = kind == 2'd1 ? {high} : kind == 2'd2 ? {low_limb} : {vector};\n",
+                     wire [{m_end}:0] q{p} = source[1:0] == 2'd1 ? {high} : source[1:0] == 2'd2 ? {low_limb} : {vector};\n",
                     high_bits = fold - low,
                     high_end = fold - low - 1,
                     high_low = p * fold + low,
@@ -90,14 +90,16 @@ impl Logic for OperandSelect {
                 )
             })
             .collect();
-        // Exchange along the rows, then along the columns: parity t XOR flip.
+        // Exchange the mirrors if asked, then along the rows, then along the columns: parity t XOR flip.
         Verilog::Custom(format!(
             "\
-{wires}wire [{end}:0] r0 = flip[0] ? q1 : q0;
-wire [{end}:0] r1 = flip[0] ? q0 : q1;
-wire [{end}:0] r2 = flip[0] ? q3 : q2;
-wire [{end}:0] r3 = flip[0] ? q2 : q3;
-always @(posedge clk) operands <= flip[1] ? {{r1, r0, r3, r2}} : {{r3, r2, r1, r0}};",
+{wires}wire [{end}:0] s1 = source[4] ? q2 : q1;
+wire [{end}:0] s2 = source[4] ? q1 : q2;
+wire [{end}:0] r0 = source[2] ? s1 : q0;
+wire [{end}:0] r1 = source[2] ? q0 : s1;
+wire [{end}:0] r2 = source[2] ? q3 : s2;
+wire [{end}:0] r3 = source[2] ? s2 : q3;
+always @(posedge clk) operands <= source[3] ? {{r1, r0, r3, r2}} : {{r3, r2, r1, r0}};",
             end = M - 1,
         ))
     }

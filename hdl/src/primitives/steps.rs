@@ -1,7 +1,8 @@
 //! The schedule of the matrix passes, as a small memory.
 
-use dermis_golden::fixed::formats::Formats;
-use dermis_golden::fixed::schedule::{Matrix, Operand, Product};
+use dermis_golden::fixed::schedule::{schedule, vectors, Operand};
+use dermis_golden::fixed::storage::blocks;
+use dermis_golden::fixed::Model;
 use rust_hdl::prelude::*;
 
 use super::counter::count_bits;
@@ -12,12 +13,16 @@ use crate::wire::{Wire, Word};
 pub struct Step {
     /// First word in the coefficient memory.
     pub coefficients: usize,
+    /// Words of it: the columns that are kept.
+    pub columns: usize,
     /// First word in the operand memory.
     pub operand: usize,
     /// 0: a v_ij; 1: the input's high limb; 2: its low limb.
     pub kind: u64,
     /// Source parity = target parity XOR this.
     pub flip: u64,
+    /// Read the operand with x and y exchanged.
+    pub transposed: bool,
     /// Align the products of the two high limbs.
     pub align: bool,
     /// Begins a new accumulation.
@@ -28,35 +33,25 @@ pub struct Step {
     pub needs: usize,
 }
 
-/// Matrices in the order of the coefficient memory.
-pub fn matrices(schedule: &[Vec<Product>]) -> Vec<Matrix> {
-    let mut order = Vec::new();
-    for product in schedule.iter().flatten() {
-        if !order.contains(&product.matrix) {
-            order.push(product.matrix);
-        }
-    }
-    order
-}
-
-/// Unrolls a schedule: for each v_ij, for each group of rows, its products.
-pub fn unroll(formats: &Formats, schedule: &[Vec<Product>], flip: impl Fn(Matrix) -> usize) -> Vec<Step> {
-    let order = matrices(schedule);
+/// Unrolls a model's schedule: for each v_ij, for each group of rows, its products.
+pub fn unroll(model: &Model) -> Vec<Step> {
+    let (formats, storage) = (&model.formats, &model.storage);
     let mut steps = Vec::new();
-    for products in schedule {
+    for products in schedule(formats) {
         for group in 0..formats.groups {
             for (index, product) in products.iter().enumerate() {
-                let matrix = order.iter().position(|&m| m == product.matrix).unwrap_or(0);
                 let (kind, operand, needs) = match product.operand {
                     Operand::Vector(k) => (0, k * formats.quads, k + 1),
                     Operand::InputHigh => (1, 0, 0),
                     Operand::InputLow => (2, 0, 0),
                 };
                 steps.push(Step {
-                    coefficients: (matrix * formats.groups + group) * formats.quads,
+                    coefficients: storage.address_of(product.matrix, group),
+                    columns: storage.columns_of(product.matrix, group).len(),
                     operand,
                     kind,
-                    flip: flip(product.matrix) as u64,
+                    flip: blocks(&model.quantised, product.matrix).flip as u64,
+                    transposed: product.transposed,
                     align: product.align,
                     first: index == 0,
                     last: index + 1 == products.len(),
@@ -68,51 +63,109 @@ pub fn unroll(formats: &Formats, schedule: &[Vec<Product>], flip: impl Fn(Matrix
     steps
 }
 
-/// Step and column in; addresses and control of the next cycle out. `ready` is combinational: the step's operand is finished.
+/// Step and position in its columns in; addresses and control out, one cycle later, or three where a list of columns is read.
+///
+/// `ready` (the step's operand is finished) and `last` (its last column) are combinational.
 #[derive(LogicBlock)]
 pub struct Steps {
     /// Clock.
     pub clk: Signal<In, Clock>,
     /// Index of the step.
     pub step: Wire<In>,
-    /// Column.
+    /// Position in the step's columns.
     pub column: Wire<In>,
-    /// Finished vectors of this frame.
+    /// Finished vectors of this subarray.
     pub finished: Wire<In>,
     /// The step may run.
     pub ready: Signal<Out, Bit>,
+    /// The position is the step's last.
+    pub last: Signal<Out, Bit>,
     /// Address in the coefficient memory.
     pub coefficient_address: Wire<Out>,
     /// Address in the operand memories.
     pub operand_address: Wire<Out>,
-    /// Kind of operand, 2 bits.
-    pub kind: Wire<Out>,
-    /// Parity flip, 2 bits.
-    pub flip: Wire<Out>,
+    /// Kind of operand, 2 bits; parity flip, 2 bits; exchange of the mirrors: from bit 0.
+    pub source: Wire<Out>,
     /// `align`, `first product of an accumulation`, `last product`, from bit 0.
     pub control: Wire<Out>,
     _steps: Vec<Step>,
-    _quads: usize,
+    _list: Vec<[usize; 2]>,
+    _pipe: Vec<(Step, usize)>,
 }
 
+/// Name of the column list's file.
+pub const COLUMN_FILE: &str = "columns.hex";
+/// Bits of `source`.
+pub const SOURCE_BITS: usize = 5;
+
 impl Steps {
-    /// A memory of `steps` over `quads` columns.
-    pub fn new(steps: Vec<Step>, quads: usize, coefficient_words: usize, operand_words: usize, vectors: usize) -> Self {
+    /// The schedule of `model`.
+    pub fn new(model: &Model) -> Self {
+        let (formats, storage, layout) = (&model.formats, &model.storage, model.layout());
+        let steps = unroll(model);
+        // Straight and transposed address of each word's column.
+        let list: Vec<[usize; 2]> = match storage.is_listed(formats) {
+            true if formats.shared_a => storage.column_list().iter().map(|&j| [j, layout.transposed(j)]).collect(),
+            true => storage.column_list().iter().map(|&j| [j, j]).collect(),
+            false => Vec::new(),
+        };
+        let vectors = operand_vectors(formats.degree);
         Steps {
             clk: Default::default(),
             step: Wire::new(count_bits(steps.len())),
-            column: Wire::new(count_bits(quads)),
+            column: Wire::new(count_bits(formats.quads)),
             finished: Wire::new(count_bits(vectors + 1)),
             ready: Default::default(),
-            coefficient_address: Wire::new(count_bits(coefficient_words)),
-            operand_address: Wire::new(count_bits(operand_words)),
-            kind: Wire::new(2),
-            flip: Wire::new(2),
+            last: Default::default(),
+            coefficient_address: Wire::new(count_bits(storage.words())),
+            operand_address: Wire::new(count_bits(vectors * formats.quads)),
+            source: Wire::new(SOURCE_BITS),
             control: Wire::new(3),
+            _pipe: Vec::new(),
+            _list: list,
             _steps: steps,
-            _quads: quads,
         }
     }
+
+    /// Number of steps.
+    pub fn count(&self) -> usize {
+        self._steps.len()
+    }
+
+    /// Cycles from step and position to the addresses.
+    pub fn latency(&self) -> usize {
+        if self._list.is_empty() {
+            1
+        } else {
+            3
+        }
+    }
+
+    /// The column list as hex lines for `$readmemh`, straight address in the low half; `None` without a list.
+    pub fn column_file(&self) -> Option<String> {
+        let bits = self.column.width();
+        let word = |&[straight, transposed]: &[usize; 2]| format!("{:x}\n", transposed << bits | straight);
+        (!self._list.is_empty()).then(|| self._list.iter().map(word).collect())
+    }
+
+    fn put(&mut self, step: &Step, column: usize) {
+        let address = step.coefficients + column;
+        let quad = match self._list.get(address) {
+            Some(pair) => pair[usize::from(step.transposed)],
+            None => column,
+        };
+        self.coefficient_address.next = Word::from(address as u64);
+        self.operand_address.next = Word::from((step.operand + quad) as u64);
+        self.source.next = Word::from(step.kind | step.flip << 2 | u64::from(step.transposed) << 4);
+        let first = step.first && column == 0;
+        let last = step.last && column + 1 == step.columns;
+        self.control.next = Word::from(u64::from(step.align) | u64::from(first) << 1 | u64::from(last) << 2);
+    }
+}
+
+/// The v_ij that later passes read: all but those of the highest degree; at least one, unread at degree 0.
+pub fn operand_vectors(degree: usize) -> usize {
+    vectors(degree.saturating_sub(1))
 }
 
 impl Logic for Steps {
@@ -120,23 +173,22 @@ impl Logic for Steps {
         let Some(step) = self._steps.get(self.step.val().number() as usize).copied() else { return };
         let column = self.column.val().number() as usize;
         self.ready.next = self.finished.val().number() as usize >= step.needs;
+        self.last.next = column + 1 == step.columns;
         if self.clk.pos_edge() {
-            self.coefficient_address.next = Word::from((step.coefficients + column) as u64);
-            self.operand_address.next = Word::from((step.operand + column) as u64);
-            self.kind.next = Word::from(step.kind);
-            self.flip.next = Word::from(step.flip);
-            let first = step.first && column == 0;
-            let last = step.last && column + 1 == self._quads;
-            self.control.next = Word::from(u64::from(step.align) | u64::from(first) << 1 | u64::from(last) << 2);
+            self._pipe.push((step, column));
+            if self._pipe.len() == self.latency() {
+                let (step, column) = self._pipe.remove(0);
+                self.put(&step, column);
+            }
         }
     }
 
     fn connect(&mut self) {
         self.ready.connect();
+        self.last.connect();
         self.coefficient_address.connect();
         self.operand_address.connect();
-        self.kind.connect();
-        self.flip.connect();
+        self.source.connect();
         self.control.connect();
     }
 
@@ -145,6 +197,7 @@ impl Logic for Steps {
         let column_bits = self.column.width();
         let needs_bits = self.finished.width();
         let (c_bits, o_bits) = (self.coefficient_address.width(), self.operand_address.width());
+        let bit = |b: bool| u8::from(b);
         let cases: String = self
             ._steps
             .iter()
@@ -152,49 +205,98 @@ impl Logic for Steps {
             .map(|(index, s)| {
                 format!(
                     "    {step_bits}'d{index}: begin c_base = {c_bits}'d{}; o_base = {o_bits}'d{}; needs = {needs_bits}'d{}; \
-                     fixed = 7'b{:02b}{:02b}{}{}{}; end\n",
+                     final_column = {column_bits}'d{}; fixed = 8'b{}{:02b}{:02b}{}{}{}; end\n",
                     s.coefficients,
                     s.operand,
                     s.needs,
-                    s.kind,
+                    s.columns - 1,
+                    bit(s.transposed),
                     s.flip,
-                    u8::from(s.last),
-                    u8::from(s.first),
-                    u8::from(s.align),
+                    s.kind,
+                    bit(s.last),
+                    bit(s.first),
+                    bit(s.align),
                 )
             })
             .collect();
-        let extend = |bits: usize| match bits - column_bits {
-            0 => "column".to_string(),
-            more => format!("{{{more}'d0, column}}"),
-        };
-        Verilog::Custom(format!(
+        let to_c = widen("column", column_bits, c_bits);
+        let declare = format!(
             "\
 reg [{c_end}:0] c_base;
 reg [{o_end}:0] o_base;
 reg [{n_end}:0] needs;
-reg [6:0] fixed;  // kind, flip, last, first, align
+reg [{column_end}:0] final_column;
+reg [7:0] fixed;  // transposed, flip, kind, last, first, align
 always @(*) begin
   case (step)
-{cases}    default: begin c_base = {c_bits}'d0; o_base = {o_bits}'d0; needs = {needs_bits}'d0; fixed = 7'd0; end
+{cases}    default: begin
+      c_base = {c_bits}'d0; o_base = {o_bits}'d0; needs = {needs_bits}'d0; final_column = {column_bits}'d0; fixed = 8'd0;
+    end
   endcase
 end
 always @(*) ready = finished >= needs;
-always @(posedge clk) begin
-  coefficient_address <= c_base + {c_column};
-  operand_address <= o_base + {o_column};
-  kind <= fixed[6:5];
-  flip <= fixed[4:3];
-  control[0] <= fixed[0];
-  control[1] <= fixed[1] && column == {column_bits}'d0;
-  control[2] <= fixed[2] && column == {column_bits}'d{last_column};
-end",
+always @(*) last = column == final_column;
+wire [2:0] flags = {{fixed[2] && last, fixed[1] && column == {column_bits}'d0, fixed[0]}};
+",
             c_end = c_bits - 1,
             o_end = o_bits - 1,
             n_end = needs_bits - 1,
-            c_column = extend(c_bits),
-            o_column = extend(o_bits),
-            last_column = self._quads - 1,
-        ))
+            column_end = column_bits - 1,
+        );
+        let body = if self._list.is_empty() {
+            format!(
+                "\
+always @(posedge clk) begin
+  coefficient_address <= c_base + {to_c};
+  operand_address <= o_base + {to_o};
+  source <= fixed[7:3];
+  control <= flags;
+end",
+                to_o = widen("column", column_bits, o_bits)
+            )
+        } else {
+            format!(
+                "\
+// The column of each coefficient word, straight and transposed.
+reg [{pair_end}:0] columns [0:{list_end}];
+initial $readmemh(\"{COLUMN_FILE}\", columns);
+reg [{pair_end}:0] pair;
+reg [{c_end}:0] c_address1, c_address2;
+reg [{o_end}:0] o_base1, o_base2;
+reg [4:0] source1, source2;
+reg [2:0] control1, control2;
+wire [{column_end}:0] kept = source2[4] ? pair[{pair_end}:{column_bits}] : pair[{column_end}:0];
+always @(posedge clk) begin
+  c_address1 <= c_base + {to_c};
+  o_base1 <= o_base;
+  source1 <= fixed[7:3];
+  control1 <= flags;
+  pair <= columns[c_address1];
+  c_address2 <= c_address1;
+  o_base2 <= o_base1;
+  source2 <= source1;
+  control2 <= control1;
+  coefficient_address <= c_address2;
+  operand_address <= o_base2 + {to_o};
+  source <= source2;
+  control <= control2;
+end",
+                pair_end = 2 * column_bits - 1,
+                list_end = self._list.len() - 1,
+                c_end = c_bits - 1,
+                o_end = o_bits - 1,
+                column_end = column_bits - 1,
+                to_o = widen("kept", column_bits, o_bits)
+            )
+        };
+        Verilog::Custom(declare + &body)
+    }
+}
+
+/// Verilog that puts zeros before `name` of `from` bits to make `to` of them.
+fn widen(name: &str, from: usize, to: usize) -> String {
+    match to - from {
+        0 => name.to_string(),
+        more => format!("{{{more}'d0, {name}}}"),
     }
 }

@@ -14,11 +14,15 @@ pub struct Fold {
     pub clk: Signal<In, Clock>,
     /// Reset.
     pub rst: Signal<In, Bit>,
-    /// Fold the frame.
+    /// The frame's first quad comes next.
+    pub begin_frame: Signal<In, Bit>,
+    /// Fold the next subarray.
     pub start: Signal<In, Bit>,
+    /// It is the frame's last.
+    pub last_part: Signal<In, Bit>,
     /// Quad to read from the frame buffer.
     pub quad_address: Wire<Out>,
-    /// The last quad is being read.
+    /// The frame's last quad is being read.
     pub free: Signal<Out, Bit>,
     /// The quad of two cycles ago, normalised.
     pub normalised: Wire<In>,
@@ -35,6 +39,7 @@ pub struct Fold {
     /// Its parities, one cycle later.
     pub read_quad: Wire<Out>,
     quads: Counter,
+    frame_quads: Counter,
     running: DFF<Bit>,
     two_later: BitDelay,
     three_later: BitDelay,
@@ -46,14 +51,16 @@ pub struct Fold {
 }
 
 impl Fold {
-    /// `quads` quads of codes of `bits` bits.
-    pub fn new(quads: usize, bits: usize) -> Self {
+    /// `parts` subarrays of `quads` quads of codes of `bits` bits.
+    pub fn new(quads: usize, parts: usize, bits: usize) -> Self {
         let address = count_bits(quads);
         Fold {
             clk: Default::default(),
             rst: Default::default(),
+            begin_frame: Default::default(),
             start: Default::default(),
-            quad_address: Wire::new(address),
+            last_part: Default::default(),
+            quad_address: Wire::new(count_bits(parts * quads)),
             free: Default::default(),
             normalised: Wire::new(4 * bits),
             normalised_valid: Default::default(),
@@ -63,6 +70,7 @@ impl Fold {
             read_address: Wire::new(address),
             read_quad: Wire::new(4 * (bits + 2)),
             quads: Counter::new(quads),
+            frame_quads: Counter::new(parts * quads),
             running: Default::default(),
             two_later: BitDelay::new(2),
             three_later: BitDelay::new(1),
@@ -79,6 +87,7 @@ impl Logic for Fold {
     #[hdl_gen]
     fn update(&mut self) {
         self.quads.clk.next = self.clk.val();
+        self.frame_quads.clk.next = self.clk.val();
         self.running.clock.next = self.clk.val();
         self.two_later.clk.next = self.clk.val();
         self.three_later.clk.next = self.clk.val();
@@ -94,8 +103,10 @@ impl Logic for Fold {
         self.quads.enable.next = self.running.q.val();
         self.ending.next = self.running.q.val() & self.quads.last.val();
         self.running.d.next = (self.start.val() | (self.running.q.val() & !self.quads.last.val())) & !self.rst.val();
-        self.quad_address.next = self.quads.value.val();
-        self.free.next = self.ending.val();
+        self.frame_quads.clear.next = self.begin_frame.val();
+        self.frame_quads.enable.next = self.running.q.val();
+        self.quad_address.next = self.frame_quads.value.val();
+        self.free.next = self.ending.val() & self.last_part.val();
 
         self.two_later.now.next = self.running.q.val();
         self.three_later.now.next = self.two_later.then.val();

@@ -3,7 +3,7 @@
 use dermis_golden::fixed::formats::Formats;
 use rust_hdl::prelude::*;
 
-use crate::primitives::{count_bits, position_bits, shift_bits, ForceUnit, Ram, CYCLE_BITS, SATURATION_BITS};
+use crate::primitives::{count_bits, position_bits, shift_bits, Counter, ForceUnit, Ram, CYCLE_BITS, SATURATION_BITS};
 use crate::wire::Wire;
 
 /// Values in by quad; beats out in the order `send` asks for them.
@@ -17,16 +17,20 @@ pub struct Force {
     pub values: Wire<In>,
     /// `values` are a quad.
     pub values_valid: Signal<In, Bit>,
-    /// Which quad.
-    pub values_address: Wire<In>,
-    /// All values are in.
+    /// The frame's first values come next.
+    pub begin_frame: Signal<In, Bit>,
+    /// A subarray's values are in: keep its μ, exponents and status.
     pub start: Signal<In, Bit>,
+    /// Which subarray.
+    pub part: Wire<In>,
     /// The pipeline moves.
     pub advance: Signal<In, Bit>,
     /// A beat is asked for.
     pub offer: Signal<In, Bit>,
     /// Which beat: 0 a force, 1 … 3 the status.
     pub beat: Wire<In>,
+    /// The beat's subarray.
+    pub beat_part: Wire<In>,
     /// The taxel's quad.
     pub address: Wire<In>,
     /// The taxel's lane.
@@ -57,22 +61,26 @@ pub struct Force {
     pub m_axis_tlast: Signal<Out, Bit>,
     /// `{fz, fy, fx}`.
     pub m_axis_tdata: Wire<Out>,
+    quads: Counter,
     store: Ram,
     unit: ForceUnit,
 }
 
 impl Force {
-    /// Widths of `formats`; threshold in force LSBs.
-    pub fn new(formats: &Formats, threshold: i64) -> Self {
-        let (address, value) = (count_bits(formats.quads), 4 * formats.search_bits[0] as usize);
-        let unit = ForceUnit::new(formats, threshold);
+    /// Widths of `formats`, `parts` subarrays, threshold in force LSBs.
+    pub fn new(formats: &Formats, parts: usize, threshold: i64) -> Self {
+        let quads = parts * formats.quads;
+        let (address, value) = (count_bits(quads), 4 * formats.search_bits[0] as usize);
+        let unit = ForceUnit::new(formats, parts, threshold);
         Force {
             clk: Default::default(),
             rst: Default::default(),
             values: Wire::new(value),
             values_valid: Default::default(),
-            values_address: Wire::new(address),
+            begin_frame: Default::default(),
             start: Default::default(),
+            part: Wire::new(count_bits(parts)),
+            beat_part: Wire::new(count_bits(parts)),
             advance: Default::default(),
             offer: Default::default(),
             beat: Wire::new(2),
@@ -91,7 +99,8 @@ impl Force {
             m_axis_tvalid: Default::default(),
             m_axis_tlast: Default::default(),
             m_axis_tdata: Wire::new(unit.beat_data.width()),
-            store: Ram::new(formats.quads, 1, value),
+            quads: Counter::new(quads),
+            store: Ram::new(quads, 1, value),
             unit,
         }
     }
@@ -100,15 +109,21 @@ impl Force {
 impl Logic for Force {
     #[hdl_gen]
     fn update(&mut self) {
+        self.quads.clk.next = self.clk.val();
         self.store.clk.next = self.clk.val();
         self.unit.clk.next = self.clk.val();
         self.unit.rst.next = self.rst.val();
         self.store.write.next = self.values_valid.val().into();
-        self.store.write_address.next = self.values_address.val();
+        self.quads.clear.next = self.begin_frame.val();
+        self.quads.enable.next = self.values_valid.val();
+        self.store.write_address.next = self.quads.value.val();
         self.store.write_data.next = self.values.val();
         self.store.read.next = self.advance.val();
         self.store.read_address.next = self.address.val();
 
+        self.unit.begin_frame.next = self.begin_frame.val();
+        self.unit.part.next = self.part.val();
+        self.unit.beat_part.next = self.beat_part.val();
         self.unit.start.next = self.start.val();
         self.unit.advance.next = self.advance.val();
         self.unit.offer.next = self.offer.val();

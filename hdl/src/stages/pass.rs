@@ -1,15 +1,14 @@
 //! Stage `pass`: the matrix-vector products of a subarray, one after the other on the MAC lanes.
 //!
 //! The schedule runs through its steps, one column per cycle, and waits only where a step's operand is not finished yet. From
-//! issue to operands: addresses (1 cycle), memories (1), limb and parity selection (1); then the lanes.
+//! issue to operands: addresses (1 cycle, 3 through a list of columns), memories (1), limb and parity selection (1); then
+//! the lanes.
 
-use dermis_golden::fixed::formats::{Formats, Quantised};
-use dermis_golden::fixed::pass::{flip, memory};
-use dermis_golden::fixed::schedule::{schedule, vectors};
+use dermis_golden::fixed::Model;
 use rust_hdl::prelude::*;
 
 use crate::primitives::{
-    count_bits, matrices, unroll, BitDelay, Counter, Delay, Filler, Lanes, OperandSelect, Ram, Slice, Steps,
+    count_bits, operand_vectors, BitDelay, Counter, Delay, Filler, Lanes, OperandSelect, Ram, Slice, Steps, SOURCE_BITS,
 };
 use crate::wire::Wire;
 
@@ -37,11 +36,11 @@ pub struct Pass {
     step: Counter,
     column: Counter,
     running: DFF<Bit>,
-    steps: Steps,
+    /// The schedule.
+    pub steps: Steps,
     vectors: Ram,
     filler: Filler,
-    kind: Delay,
-    flip: Delay,
+    source: Delay,
     control: Delay,
     valid: BitDelay,
     select: OperandSelect,
@@ -53,16 +52,13 @@ pub struct Pass {
 }
 
 impl Pass {
-    /// Products of `quantised` in `formats`.
-    pub fn new(formats: &Formats, quantised: &Quantised) -> Self {
+    /// The products of `model`.
+    pub fn new(model: &Model) -> Self {
+        let formats = &model.formats;
         let quads = formats.quads;
-        let schedule = schedule(formats);
-        let steps = unroll(formats, &schedule, |matrix| flip(quantised, matrix));
-        let lanes = Lanes::new(formats, memory(formats, quantised, &matrices(&schedule)));
-        // The last degree's v_ij are nobody's operand; without any degree one vector is kept, unread.
-        let operands = vectors(formats.degree.saturating_sub(1));
-        let count = steps.len();
-        let steps = Steps::new(steps, quads, 1 << lanes.address.width(), operands * quads, operands);
+        let steps = Steps::new(model);
+        let lanes = Lanes::new(formats, model.storage.memory(formats, &model.quantised));
+        let operands = operand_vectors(formats.degree);
         let parity_bits = 4 * formats.data_bits as usize;
         Pass {
             clk: Default::default(),
@@ -74,18 +70,17 @@ impl Pass {
             vector_valid: Default::default(),
             quad: Wire::new(4 * formats.acc_bits as usize),
             quad_valid: Default::default(),
-            step: Counter::new(count),
+            step: Counter::new(steps.count()),
             column: Counter::new(quads),
             running: Default::default(),
             low_address: Slice::new(steps.operand_address.width(), count_bits(quads)),
-            steps,
             vectors: Ram::new(operands * quads, 1, parity_bits),
             filler: Filler::new(operands, quads),
-            kind: Delay::new(2, 1),
-            flip: Delay::new(2, 1),
+            source: Delay::new(SOURCE_BITS, 1),
             control: Delay::new(3, 2),
-            valid: BitDelay::new(3),
+            valid: BitDelay::new(2 + steps.latency()),
             select: OperandSelect::new(formats),
+            steps,
             lanes,
             issue: Default::default(),
             column_end: Default::default(),
@@ -102,8 +97,7 @@ impl Logic for Pass {
         self.steps.clk.next = self.clk.val();
         self.vectors.clk.next = self.clk.val();
         self.filler.clk.next = self.clk.val();
-        self.kind.clk.next = self.clk.val();
-        self.flip.clk.next = self.clk.val();
+        self.source.clk.next = self.clk.val();
         self.control.clk.next = self.clk.val();
         self.valid.clk.next = self.clk.val();
         self.select.clk.next = self.clk.val();
@@ -112,11 +106,11 @@ impl Logic for Pass {
         self.lanes.rst.next = self.rst.val();
 
         self.issue.next = self.running.q.val() & self.steps.ready.val();
-        self.column_end.next = self.issue.val() & self.column.last.val();
+        self.column_end.next = self.issue.val() & self.steps.last.val();
         self.running.d.next = (self.start.val()
             | (self.running.q.val() & !(self.column_end.val() & self.step.last.val())))
             & !self.rst.val();
-        self.column.clear.next = self.start.val();
+        self.column.clear.next = self.start.val() | self.column_end.val();
         self.column.enable.next = self.issue.val();
         self.step.clear.next = self.start.val();
         self.step.enable.next = self.column_end.val();
@@ -134,10 +128,8 @@ impl Logic for Pass {
         self.vectors.write_address.next = self.filler.address.val();
         self.vectors.write_data.next = self.vector_quad.val();
 
-        self.kind.now.next = self.steps.kind.val();
-        self.flip.now.next = self.steps.flip.val();
-        self.select.kind.next = self.kind.then.val();
-        self.select.flip.next = self.flip.then.val();
+        self.source.now.next = self.steps.source.val();
+        self.select.source.next = self.source.then.val();
         self.select.input_quad.next = self.input_quad.val();
         self.select.vector_quad.next = self.vectors.read_data.val();
         self.control.now.next = self.steps.control.val();

@@ -5,9 +5,10 @@
 //! only remembered. Both raise `framing` until `reported`.
 
 use dermis_golden::fixed::quads::Quads;
+use dermis_golden::partition::Grid;
 use rust_hdl::prelude::*;
 
-use crate::primitives::{count_bits, Counter, Gather, Mirror, Ram, Spread};
+use crate::primitives::{count_bits, Gather, Ram, Scan, Spread};
 use crate::wire::Wire;
 
 /// ```text
@@ -39,6 +40,8 @@ pub struct Receive {
     pub quad_address: Wire<In>,
     /// The quad, one cycle later.
     pub quad: Wire<Out>,
+    /// The subarray that magnitude and signs are asked of.
+    pub part: Wire<In>,
     /// OR of the codes' magnitudes.
     pub magnitude: Wire<Out>,
     /// A code is above the noise floor.
@@ -49,22 +52,21 @@ pub struct Receive {
     pub framing: Signal<Out, Bit>,
     /// `framing` has been reported.
     pub reported: Signal<In, Bit>,
-    column: Counter,
-    row: Counter,
-    mirror: Mirror,
+    scan: Scan,
     spread: Spread,
     frame: Ram,
     gather: Gather,
     whole: DFF<Bit>,
     broken: DFF<Bit>,
     taken: Signal<Local, Bit>,
-    at_end: Signal<Local, Bit>,
     early: Signal<Local, Bit>,
 }
 
 impl Receive {
-    /// Frames in `layout`, codes of `bits` bits, noise floor in codes.
-    pub fn new(layout: Quads, bits: usize, floor: i32) -> Self {
+    /// Frames of `parts` subarrays in `layout`, codes of `bits` bits, noise floor in codes.
+    pub fn new(layout: Quads, parts: Grid, bits: usize, floor: i32) -> Self {
+        let count = parts.rows * parts.cols;
+        let quads = count * layout.len();
         Receive {
             clk: Default::default(),
             rst: Default::default(),
@@ -75,23 +77,21 @@ impl Receive {
             accept: Default::default(),
             full: Default::default(),
             free: Default::default(),
-            quad_address: Wire::new(count_bits(layout.len())),
+            quad_address: Wire::new(count_bits(quads)),
+            part: Wire::new(count_bits(count)),
             quad: Wire::new(4 * bits),
             magnitude: Wire::new(bits - 1),
             positive: Default::default(),
             negative: Default::default(),
             framing: Default::default(),
             reported: Default::default(),
-            column: Counter::new(layout.cols),
-            row: Counter::new(layout.rows),
-            mirror: Mirror::new(layout),
+            scan: Scan::new(layout, parts),
             spread: Spread::new(bits),
-            frame: Ram::new(layout.len(), 4, bits),
-            gather: Gather::new(bits, floor),
+            frame: Ram::new(quads, 4, bits),
+            gather: Gather::new(bits, floor, count),
             whole: Default::default(),
             broken: Default::default(),
             taken: Default::default(),
-            at_end: Default::default(),
             early: Default::default(),
         }
     }
@@ -100,8 +100,7 @@ impl Receive {
 impl Logic for Receive {
     #[hdl_gen]
     fn update(&mut self) {
-        self.column.clk.next = self.clk.val();
-        self.row.clk.next = self.clk.val();
+        self.scan.clk.next = self.clk.val();
         self.frame.clk.next = self.clk.val();
         self.gather.clk.next = self.clk.val();
         self.whole.clock.next = self.clk.val();
@@ -109,20 +108,15 @@ impl Logic for Receive {
 
         self.s_axis_tready.next = !self.whole.q.val() & !self.rst.val();
         self.taken.next = self.s_axis_tvalid.val() & !self.whole.q.val() & !self.rst.val();
-        self.at_end.next = self.column.last.val() & self.row.last.val();
-        self.early.next = self.taken.val() & self.s_axis_tlast.val() & !self.at_end.val();
+        self.early.next = self.taken.val() & self.s_axis_tlast.val() & !self.scan.last.val();
         self.accept.next = self.taken.val();
 
-        self.column.enable.next = self.taken.val();
-        self.column.clear.next = self.rst.val() | self.early.val();
-        self.row.enable.next = self.taken.val() & self.column.last.val();
-        self.row.clear.next = self.rst.val() | self.early.val();
-        self.mirror.row.next = self.row.value.val();
-        self.mirror.col.next = self.column.value.val();
+        self.scan.enable.next = self.taken.val();
+        self.scan.clear.next = self.rst.val() | self.early.val();
         self.spread.word.next = self.s_axis_tdata.val();
-        self.frame.write_address.next = self.mirror.address.val();
+        self.frame.write_address.next = self.scan.address.val();
         self.frame.write_data.next = self.spread.quad.val();
-        self.spread.mask.next = self.mirror.mask.val();
+        self.spread.mask.next = self.scan.mask.val();
         self.spread.enable.next = self.taken.val();
         self.frame.write.next = self.spread.write.val();
         self.frame.read.next = true;
@@ -131,6 +125,8 @@ impl Logic for Receive {
 
         self.gather.accept.next = self.taken.val();
         self.gather.clear.next = self.rst.val() | self.free.val() | self.early.val();
+        self.gather.part.next = self.scan.part.val();
+        self.gather.select.next = self.part.val();
         self.gather.code.next = self.s_axis_tdata.val();
         self.magnitude.next = self.gather.magnitude.val();
         self.positive.next = self.gather.positive.val();
@@ -138,11 +134,11 @@ impl Logic for Receive {
 
         self.full.next = self.whole.q.val();
         self.whole.d.next =
-            (self.whole.q.val() | (self.taken.val() & self.at_end.val())) & !self.free.val() & !self.rst.val();
+            (self.whole.q.val() | (self.taken.val() & self.scan.last.val())) & !self.free.val() & !self.rst.val();
         self.framing.next = self.broken.q.val();
         self.broken.d.next = ((self.broken.q.val() & !self.reported.val())
             | self.early.val()
-            | (self.taken.val() & self.at_end.val() & !self.s_axis_tlast.val()))
+            | (self.taken.val() & self.scan.last.val() & !self.s_axis_tlast.val()))
             & !self.rst.val();
     }
 }

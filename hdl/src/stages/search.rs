@@ -39,8 +39,6 @@ pub struct Search {
     pub values: Wire<Out>,
     /// `values` are a quad.
     pub values_valid: Signal<Out, Bit>,
-    /// Which quad.
-    pub values_address: Wire<Out>,
     /// All values are out.
     pub done: Signal<Out, Bit>,
     /// Best position, x.
@@ -103,7 +101,6 @@ impl Search {
             enabled: Default::default(),
             values: Wire::new(value),
             values_valid: Default::default(),
-            values_address: Wire::new(address),
             done: Default::default(),
             best_x: Wire::new(position_bits()),
             best_y: Wire::new(position_bits()),
@@ -258,7 +255,6 @@ impl Logic for Search {
         self.constants.word.next = self.taylor.moved.val();
         self.values.next = self.constants.low.val();
         self.values_valid.next = self.moved.then.val() & self.walk.last.val();
-        self.values_address.next = self.moved_address.then.val();
         self.finish.now.next = self.quad_end.val() & self.walk.last.val();
         self.done.next = self.finish.then.val();
         self.best_x.next = self.judge.best_x.val();

@@ -1,10 +1,11 @@
-//! Stage `send`: asks for the forces row-major, then for the status, at the receiver's pace.
+//! Stage `send`: asks for the forces row-major, then for each subarray's status, at the receiver's pace.
 
 use dermis_golden::fixed::quads::Quads;
 use dermis_golden::fixed::send::STATUS_BEATS;
+use dermis_golden::partition::Grid;
 use rust_hdl::prelude::*;
 
-use crate::primitives::{count_bits, Counter, Mirror};
+use crate::primitives::{count_bits, Counter, Scan, StatusCode};
 use crate::wire::Wire;
 
 /// From `start` one beat is offered per moving cycle: all taxels, then the status beats.
@@ -28,26 +29,30 @@ pub struct Send {
     pub offer: Signal<Out, Bit>,
     /// Which beat: 0 a force, 1 … 3 the status.
     pub beat: Wire<Out>,
+    /// The beat's subarray.
+    pub part: Wire<Out>,
     /// The taxel's quad.
     pub address: Wire<Out>,
     /// The taxel's lane.
     pub lane: Wire<Out>,
     /// The frame's last beat is taken.
     pub done: Signal<Out, Bit>,
-    column: Counter,
-    row: Counter,
-    mirror: Mirror,
-    beats: Counter,
+    scan: Scan,
+    words: Counter,
+    parts: Counter,
+    code: StatusCode,
     sending: DFF<Bit>,
     status: DFF<Bit>,
     moves: Signal<Local, Bit>,
     step: Signal<Local, Bit>,
     at_end: Signal<Local, Bit>,
+    finish: Signal<Local, Bit>,
 }
 
 impl Send {
-    /// Frames in `layout`.
-    pub fn new(layout: Quads) -> Self {
+    /// Frames of `parts` subarrays in `layout`.
+    pub fn new(layout: Quads, parts: Grid) -> Self {
+        let count = parts.rows * parts.cols;
         Send {
             clk: Default::default(),
             rst: Default::default(),
@@ -57,19 +62,21 @@ impl Send {
             m_axis_tlast: Default::default(),
             advance: Default::default(),
             offer: Default::default(),
-            beat: Wire::new(count_bits(1 + STATUS_BEATS)),
-            address: Wire::new(count_bits(layout.len())),
+            beat: Wire::new(2),
+            part: Wire::new(count_bits(count)),
+            address: Wire::new(count_bits(count * layout.len())),
             lane: Wire::new(2),
             done: Default::default(),
-            column: Counter::new(layout.cols),
-            row: Counter::new(layout.rows),
-            mirror: Mirror::new(layout),
-            beats: Counter::new(1 + STATUS_BEATS),
+            scan: Scan::new(layout, parts),
+            words: Counter::new(STATUS_BEATS),
+            parts: Counter::new(count),
+            code: StatusCode::new(count_bits(STATUS_BEATS), count_bits(count)),
             sending: Default::default(),
             status: Default::default(),
             moves: Default::default(),
             step: Default::default(),
             at_end: Default::default(),
+            finish: Default::default(),
         }
     }
 }
@@ -77,34 +84,36 @@ impl Send {
 impl Logic for Send {
     #[hdl_gen]
     fn update(&mut self) {
-        self.column.clk.next = self.clk.val();
-        self.row.clk.next = self.clk.val();
-        self.beats.clk.next = self.clk.val();
+        self.scan.clk.next = self.clk.val();
+        self.words.clk.next = self.clk.val();
+        self.parts.clk.next = self.clk.val();
         self.sending.clock.next = self.clk.val();
         self.status.clock.next = self.clk.val();
 
         self.moves.next = !self.m_axis_tvalid.val() | self.m_axis_tready.val();
         self.step.next = self.sending.q.val() & self.moves.val();
-        self.at_end.next = self.step.val() & !self.status.q.val() & self.column.last.val() & self.row.last.val();
+        self.at_end.next = self.step.val() & !self.status.q.val() & self.scan.last.val();
+        self.finish.next = self.step.val() & self.status.q.val() & self.words.last.val() & self.parts.last.val();
         self.advance.next = self.moves.val();
         self.offer.next = self.sending.q.val();
 
-        self.column.clear.next = self.start.val();
-        self.column.enable.next = self.step.val() & !self.status.q.val();
-        self.row.clear.next = self.start.val();
-        self.row.enable.next = self.step.val() & !self.status.q.val() & self.column.last.val();
-        self.beats.clear.next = self.start.val();
-        self.beats.enable.next = self.at_end.val() | (self.step.val() & self.status.q.val());
-        self.beat.next = self.beats.value.val();
-        self.mirror.row.next = self.row.value.val();
-        self.mirror.col.next = self.column.value.val();
-        self.address.next = self.mirror.address.val();
-        self.lane.next = self.mirror.lane.val();
+        self.scan.clear.next = self.start.val();
+        self.scan.enable.next = self.step.val() & !self.status.q.val();
+        self.words.clear.next = self.start.val();
+        self.words.enable.next = self.step.val() & self.status.q.val();
+        self.parts.clear.next = self.start.val();
+        self.parts.enable.next = self.step.val() & self.status.q.val() & self.words.last.val();
+        self.code.status.next = self.status.q.val();
+        self.code.word.next = self.words.value.val();
+        self.code.status_part.next = self.parts.value.val();
+        self.code.scan_part.next = self.scan.part.val();
+        self.beat.next = self.code.beat.val();
+        self.part.next = self.code.part.val();
+        self.address.next = self.scan.address.val();
+        self.lane.next = self.scan.lane.val();
 
-        self.sending.d.next =
-            (self.start.val() | (self.sending.q.val() & !(self.step.val() & self.beats.last.val()))) & !self.rst.val();
-        self.status.d.next =
-            (self.at_end.val() | (self.status.q.val() & !(self.step.val() & self.beats.last.val()))) & !self.rst.val();
+        self.sending.d.next = (self.start.val() | (self.sending.q.val() & !self.finish.val())) & !self.rst.val();
+        self.status.d.next = (self.at_end.val() | (self.status.q.val() & !self.finish.val())) & !self.rst.val();
         self.done.next = self.m_axis_tvalid.val() & self.m_axis_tready.val() & self.m_axis_tlast.val();
     }
 }

@@ -1,10 +1,10 @@
 //! Stage `unfold`: v_ij words back to taxels, coefficient by coefficient into the search memory.
 
-use dermis_golden::fixed::formats::Formats;
-use dermis_golden::fixed::schedule::vectors;
+use dermis_golden::fixed::schedule::{schedule, vectors};
+use dermis_golden::fixed::Model;
 use rust_hdl::prelude::*;
 
-use crate::primitives::{count_bits, BitDelay, Counter, Delay, Unfolder};
+use crate::primitives::{count_bits, BitDelay, Counter, Delay, Placer, Unfolder};
 use crate::wire::Wire;
 
 /// Quads of v_ij in order; two cycles later four taxels with coefficient index and quad address.
@@ -33,6 +33,7 @@ pub struct Unfold {
     quads: Counter,
     vectors: Counter,
     unfolder: Unfolder,
+    placer: Placer,
     index_first: Delay,
     index_later: Delay,
     address_later: Delay,
@@ -42,8 +43,12 @@ pub struct Unfold {
 }
 
 impl Unfold {
-    /// Widths of `formats`.
-    pub fn new(formats: &Formats) -> Self {
+    /// Widths of `model`.
+    pub fn new(model: &Model) -> Self {
+        let formats = &model.formats;
+        let transposed =
+            |products: &Vec<dermis_golden::fixed::schedule::Product>| products.iter().any(|p| p.transposed);
+        let across = schedule(formats).iter().enumerate().filter(|(_, p)| transposed(p)).map(|(k, _)| k).collect();
         let bits = formats.vector_bits as usize;
         let count = vectors(formats.degree);
         let (index, address) = (count_bits(count), count_bits(formats.quads));
@@ -61,6 +66,7 @@ impl Unfold {
             quads: Counter::new(formats.quads),
             vectors: Counter::new(count),
             unfolder: Unfolder::new(bits, count),
+            placer: Placer::new(model.layout(), bits + 2, count, across),
             index_first: Delay::new(index, 1),
             index_later: Delay::new(index, 1),
             address_later: Delay::new(address, 2),
@@ -97,10 +103,13 @@ impl Logic for Unfold {
         self.address_later.now.next = self.quads.value.val();
         self.valid_later.now.next = self.words_valid.val();
 
-        self.taxels.next = self.unfolder.taxels.val();
+        self.placer.index.next = self.index_later.then.val();
+        self.placer.address.next = self.address_later.then.val();
+        self.placer.quad.next = self.unfolder.taxels.val();
+        self.taxels.next = self.placer.taxels.val();
         self.taxels_valid.next = self.valid_later.then.val();
         self.index.next = self.index_later.then.val();
-        self.address.next = self.address_later.then.val();
+        self.address.next = self.placer.placed.val();
         self.finish.now.next = self.quad_end.val() & self.vectors.last.val();
         self.done.next = self.finish.then.val();
     }

@@ -1,0 +1,180 @@
+//! The coefficient memory: which columns of which matrix are kept for which group of rows, and in what order.
+//!
+//! A lane holds one row of each group. Far from the diagonal the coefficients of a whole group fall below what matters, so a
+//! column is left out for a group when all its coefficients are below 2^−`prune_bits`: of the largest coefficient of
+//! Cz⁺, and of one for the scaled A (whose entries act on v_ij of the size of v_00). What is left out is zero in
+//! the bit-true model as well; a kept column keeps all its bits. Small arrays keep every column.
+//!
+//! On a square subarray of square pitch, Ay is Ax with x and y exchanged. At degree 1, where no v_ij adds both, Ay is not stored:
+//! v_01 is Ax's pass over the transposed v_00, and comes out transposed.
+
+use super::coefficients::Blocks;
+use super::formats::{Formats, Quantised, MULTIPLIER_BITS};
+use super::pass::coefficient;
+use super::schedule::{Matrix, Product};
+
+/// Words of a block RAM that is 18 bits wide, and half of that at 36 bits.
+const RAM_WORDS: usize = 1024;
+
+/// The kept columns, per matrix in order of storage and per group of rows.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Storage {
+    /// The stored matrices.
+    pub matrices: Vec<Matrix>,
+    /// `columns[matrix][group]`: kept columns, ascending.
+    pub columns: Vec<Vec<Vec<usize>>>,
+}
+
+/// Rows of one group: which of them a lane has.
+fn rows(group: usize, per_parity: usize, quads: usize) -> std::ops::Range<usize> {
+    group * per_parity..((group + 1) * per_parity).min(quads)
+}
+
+/// Matrices in the order in which a schedule first needs them.
+pub fn stored(schedule: &[Vec<Product>]) -> Vec<Matrix> {
+    let mut order = Vec::new();
+    for product in schedule.iter().flatten() {
+        if !order.contains(&product.matrix) {
+            order.push(product.matrix);
+        }
+    }
+    order
+}
+
+impl Storage {
+    /// Chooses the columns for `per_parity` lanes per parity; coefficients below `threshold(matrix)` LSBs count as nothing.
+    pub fn new(
+        matrices: Vec<Matrix>,
+        quantised: &Quantised,
+        quads: usize,
+        per_parity: usize,
+        threshold: impl Fn(Matrix) -> i64,
+    ) -> Self {
+        let kept = |matrix, group| {
+            let blocks = blocks(quantised, matrix);
+            let limit = threshold(matrix);
+            let matters = |&j: &usize| {
+                blocks
+                    .parity
+                    .iter()
+                    .any(|block| rows(group, per_parity, quads).any(|i| block[i * quads + j].abs() >= limit))
+            };
+            // A group of which nothing matters still needs a column to accumulate zeros.
+            let columns: Vec<usize> = (0..quads).filter(matters).collect();
+            if columns.is_empty() {
+                vec![0]
+            } else {
+                columns
+            }
+        };
+        let groups = quads.div_ceil(per_parity);
+        let columns = matrices.iter().map(|&matrix| (0..groups).map(|group| kept(matrix, group)).collect()).collect();
+        Storage { matrices, columns }
+    }
+
+    /// The kept columns of a stored matrix for a group of rows.
+    pub fn columns_of(&self, matrix: Matrix, group: usize) -> &[usize] {
+        self.matrices.iter().position(|&m| m == matrix).map_or(&[], |index| &self.columns[index][group])
+    }
+
+    /// Address of the first word of (matrix, group); the words follow by column.
+    pub fn address_of(&self, matrix: Matrix, group: usize) -> usize {
+        let mut address = 0;
+        for (index, groups) in self.columns.iter().enumerate() {
+            for (g, columns) in groups.iter().enumerate() {
+                if (self.matrices[index], g) == (matrix, group) {
+                    return address;
+                }
+                address += columns.len();
+            }
+        }
+        address
+    }
+
+    /// Words of the memory.
+    pub fn words(&self) -> usize {
+        self.columns.iter().flatten().map(Vec::len).sum()
+    }
+
+    /// Whether any column was left out.
+    pub fn is_pruned(&self, quads: usize) -> bool {
+        self.columns.iter().flatten().any(|columns| columns.len() < quads)
+    }
+
+    /// Whether a list of columns stands beside the coefficients: some are left out, or some are read transposed.
+    pub fn is_listed(&self, formats: &Formats) -> bool {
+        formats.shared_a || self.is_pruned(formats.quads)
+    }
+
+    /// The columns of the memory's words, one after the other.
+    pub fn column_list(&self) -> Vec<usize> {
+        self.columns.iter().flatten().flatten().copied().collect()
+    }
+
+    /// Block RAMs of 18 kbit for `lanes` lanes: one word of 18 bits per lane, two lanes to a RAM where half its depth is enough.
+    pub fn block_rams(&self, lanes: usize) -> usize {
+        match self.words() {
+            words if words <= RAM_WORDS / 2 => lanes.div_ceil(2),
+            words => lanes * words.div_ceil(RAM_WORDS),
+        }
+    }
+
+    /// Zeroes what the memory does not hold, so that the model multiplies with what the hardware has.
+    pub fn drop_from(&self, quantised: &mut Quantised, quads: usize, per_parity: usize) {
+        for (index, &matrix) in self.matrices.iter().enumerate() {
+            for (group, kept) in self.columns[index].iter().enumerate() {
+                for block in &mut blocks_mut(quantised, matrix).parity {
+                    for i in rows(group, per_parity, quads) {
+                        for j in (0..quads).filter(|j| kept.binary_search(j).is_err()) {
+                            block[i * quads + j] = 0;
+                        }
+                    }
+                }
+            }
+        }
+    }
+
+    /// The memory's words: one coefficient per lane, lane `parity·lanes_per_parity + k` for row
+    /// `group·lanes_per_parity + k`; rows past the last are zero.
+    pub fn memory(&self, formats: &Formats, quantised: &Quantised) -> Vec<Vec<i64>> {
+        let lanes = formats.lanes_per_parity;
+        let word = |matrix, group: usize, j: usize| -> Vec<i64> {
+            (0..4)
+                .flat_map(|parity| (0..lanes).map(move |k| (parity, group * lanes + k)))
+                .map(|(parity, i)| match i < formats.quads {
+                    true => coefficient(formats, quantised, matrix, parity, i, j),
+                    false => 0,
+                })
+                .collect()
+        };
+        let mut words = Vec::with_capacity(self.words());
+        for (index, &matrix) in self.matrices.iter().enumerate() {
+            for (group, columns) in self.columns[index].iter().enumerate() {
+                words.extend(columns.iter().map(|&j| word(matrix, group, j)));
+            }
+        }
+        words
+    }
+}
+
+/// The blocks a stored matrix is made of; both limbs of Cz⁺ keep the same columns.
+pub fn blocks(quantised: &Quantised, matrix: Matrix) -> &Blocks {
+    match matrix {
+        Matrix::InverseHigh | Matrix::InverseLow => &quantised.inverse,
+        Matrix::Ax => &quantised.ax,
+        Matrix::Ay => &quantised.ay,
+    }
+}
+
+fn blocks_mut(quantised: &mut Quantised, matrix: Matrix) -> &mut Blocks {
+    match matrix {
+        Matrix::InverseHigh | Matrix::InverseLow => &mut quantised.inverse,
+        Matrix::Ax => &mut quantised.ax,
+        Matrix::Ay => &mut quantised.ay,
+    }
+}
+
+/// Bits of the coefficient memory's words.
+pub fn word_bits(formats: &Formats) -> usize {
+    4 * formats.lanes_per_parity * MULTIPLIER_BITS as usize
+}

@@ -1,0 +1,112 @@
+//! One subarray through the stages between frame buffer and force memory.
+
+use super::formats::force_shift;
+use super::model::Model;
+use super::pass::{pass, swap, Operands};
+use super::receive::Received;
+use super::schedule::{schedule, EXPONENTS};
+use super::search::{search, Block, Found};
+use super::{fold, force, normalise, receive, rescale, unfold};
+use crate::scene::Condition;
+
+/// A vector of quads that a stage passed on.
+type Quads = Vec<[i64; 4]>;
+
+/// What became of a subarray, and what each stage passed on.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Solved {
+    /// The scene's condition is met.
+    pub condition: bool,
+    /// Left shift of `normalise`.
+    pub normalise: u32,
+    /// Right shift of `rescale`.
+    pub rescale: u32,
+    /// Words that `rescale` saturated.
+    pub saturations: u32,
+    /// The search's outcome, with p(μ*).
+    pub found: Found,
+    /// Stream of `normalise`.
+    pub normalised: Quads,
+    /// Stream of `fold`.
+    pub folded: Quads,
+    /// Stream of `pass`.
+    pub passed: Quads,
+    /// Stream of `rescale`.
+    pub rescaled: Quads,
+    /// Stream of `unfold`.
+    pub unfolded: Quads,
+}
+
+impl Solved {
+    /// Solves the subarray with these `codes`, row-major in it.
+    pub fn new(model: &Model, codes: &[i32]) -> Self {
+        let formats = &model.formats;
+        let layout = model.layout();
+        let received = receive::receive(codes, model.noise_floor);
+        let condition = condition(model, &received);
+        let samples: Vec<i64> = codes.iter().map(|&code| i64::from(code)).collect();
+        let left = normalise::shift(received.magnitude, formats.input_bits);
+        let normalised = normalise::normalise(&layout.pack(&samples), left);
+        let folded = fold::fold(&normalised);
+
+        let mut operands = Operands::of_input(&folded, formats);
+        let (mut passed, mut rescaled, mut unfolded) = (Vec::new(), Vec::new(), Vec::new());
+        let (mut right, mut saturations) = (0, 0);
+        let mut polynomials = vec![[[0i64; 10]; 4]; formats.quads];
+        for (k, products) in schedule(formats).iter().enumerate() {
+            let accumulators = pass(formats, &model.quantised, layout, products, &operands);
+            if k == 0 {
+                right = rescale::shift(formats, rescale::raw_length(&accumulators));
+            }
+            let shift = if k == 0 { right } else { formats.a_shift };
+            let (words, clipped) = rescale::rescale(formats, &accumulators, shift);
+            saturations += clipped;
+            operands.vectors.push(rescale::operand(formats, &words));
+            // A transposed result goes back on the way to the search memory.
+            let transposed = products.iter().any(|p| p.transposed);
+            let mut taxels = unfold::unfold(&words, EXPONENTS[k].0 + EXPONENTS[k].1);
+            if transposed {
+                taxels.iter_mut().for_each(|quad| *quad = swap(*quad));
+            }
+            for (address, values) in taxels.iter().enumerate() {
+                let to = if transposed { layout.transposed(address) } else { address };
+                for (w, &value) in polynomials[to].iter_mut().zip(values) {
+                    w[k] = value;
+                }
+            }
+            passed.extend(accumulators);
+            rescaled.extend(words);
+            unfolded.extend(taxels);
+        }
+        let searching = condition && model.searches();
+        let found = search(layout, Block::new(layout, polynomials), searching);
+        Solved {
+            condition,
+            normalise: left,
+            rescale: right,
+            saturations,
+            found,
+            normalised,
+            folded,
+            passed,
+            rescaled,
+            unfolded,
+        }
+    }
+
+    /// The subarray's forces, row-major in it.
+    pub fn forces(&self, model: &Model) -> Vec<force::Force> {
+        let formats = &model.formats;
+        let mu = self.found.position.map(|x| force::mu_word(formats, x));
+        let shift = force_shift(formats, self.normalise, self.rescale);
+        let values = model.layout().unpack(&self.found.values);
+        values.into_iter().map(|value| force::force(formats, value, mu, shift, model.threshold)).collect()
+    }
+}
+
+fn condition(model: &Model, received: &Received) -> bool {
+    match model.scene.partition.condition {
+        Condition::Loaded => received.positive || received.negative,
+        Condition::BothSigns => received.positive && received.negative,
+    }
+}
