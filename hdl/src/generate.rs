@@ -32,6 +32,22 @@ pub enum HdlError {
         /// What would be left out.
         what: &'static str,
     },
+    /// The design needs more of something than the board's device has.
+    #[error(
+        "scene {scene} needs {needs} {what}, {board} has {has}: take a finer partition or a smaller fixed.prune_bits"
+    )]
+    DoesNotFit {
+        /// The scene.
+        scene: String,
+        /// What there is too little of.
+        what: &'static str,
+        /// How many it needs.
+        needs: usize,
+        /// The board.
+        board: String,
+        /// How many it has.
+        has: u32,
+    },
     /// rust-hdl's checks of the description failed; a defect of this crate.
     #[error("internal: the hardware description does not pass its checks: {0}")]
     Check(String),
@@ -79,6 +95,7 @@ pub(crate) fn engine(model: &Model) -> Result<Engine, HdlError> {
 /// [`HdlError`] when the scene's board is unknown or the scene leaves out what this engine always has.
 pub fn generate(model: &Model) -> Result<Generated, HdlError> {
     let board = Board::load(&model.scene.hardware.board)?;
+    fits(model, &board)?;
     let engine = engine(model)?;
     let top = top_name(&model.scene.name);
     let manifest = manifest(model, &board, &top);
@@ -92,6 +109,24 @@ pub fn generate(model: &Model) -> Result<Generated, HdlError> {
     ];
     files.extend(engine.pass.steps.column_file().map(|text| file(COLUMN_FILE.to_string(), text)));
     Ok(Generated { top, files, taps: taps(model), manifest })
+}
+
+/// Multipliers of the force unit: two products of a value and a μ word, two μ words, each of two 18-bit halves or less.
+const FORCE_MULTIPLIERS: usize = 6;
+
+/// Compares multipliers and coefficient memory with the device.
+fn fits(model: &Model, board: &Board) -> Result<(), HdlError> {
+    let lanes = 4 * model.formats.lanes_per_parity;
+    let needs = [
+        ("multipliers", lanes + FORCE_MULTIPLIERS, board.multipliers),
+        ("block RAMs for coefficients", model.storage.block_rams(lanes), board.block_rams),
+    ];
+    match needs.into_iter().find(|&(_, needs, has)| needs > has as usize) {
+        Some((what, needs, has)) => {
+            Err(HdlError::DoesNotFit { scene: model.scene.name.clone(), what, needs, board: board.name.clone(), has })
+        }
+        None => Ok(()),
+    }
 }
 
 /// `dermis_` and the scene's name, with everything but letters and digits as underscores.

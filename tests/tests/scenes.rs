@@ -14,7 +14,11 @@ use dermis_tests::build_dir;
 use proptest::prelude::*;
 
 /// Name, and what differs from an ordinary scene of 6×6 taxels.
-const SCENES: [(&str, &str); 5] = [
+const SCENES: [(&str, &str); 7] = [
+    // Six subarrays in turn, odd rows.
+    ("partition", "[sensor]\nrows = 10\ncols = 12\npitch_x_mm = 2.0\npitch_y_mm = 4.0\nthickness_mm = 3.0\n[partition]\nrows = 2\ncols = 3\n"),
+    // Ax serves for Ay, and columns are left out.
+    ("thin", "[sensor]\nrows = 12\ncols = 12\npitch_x_mm = 8.0\npitch_y_mm = 8.0\nthickness_mm = 0.91\n[fixed]\nprune_bits = 12\n"),
     // Middle lines: quads whose lanes coincide.
     ("odd", "[sensor]\nrows = 5\ncols = 7\npitch_x_mm = 2.0\npitch_y_mm = 4.0\nthickness_mm = 3.0\n"),
     // Degree 1: a small r leaves seven of ten coefficients out.

@@ -10,7 +10,7 @@
 //! | parity of the input | `fold_bits` = `input_bits` + 2 | 22 | as the code |
 //! | Cz⁺ | `inverse_bits` | 24 | 2^−`inverse_exponent` N/MPa |
 //! | Ax, Ay | `coef_bits` | 18 | 2^−`a_exponent` |
-//! | accumulator | `acc_bits` | 43–46 | v_00: 2^`raw_shift` · code · Cz⁺ |
+//! | accumulator | `acc_bits` | 42 | v_00: 2^`raw_shift` · code · Cz⁺ |
 //! | v_ij, parities | `vector_bits` = `data_bits` + 4 | 22 | accumulator · 2^rescale |
 //! | v_ij, operand of a pass | `data_bits` | 18 | 16 of the above |
 //! | v_ij, taxels, in the search | `search_bits[k]` | 27 and less | a quarter of `vector_bits`' |

@@ -1,12 +1,13 @@
 //! Stage `send`: what follows the forces on the output stream.
 //!
-//! Forces leave row-major, one beat per taxel, `{fz, fy, fx}`; then [`STATUS_BEATS`] beats per frame:
+//! Forces leave row-major over the array, one beat per taxel, `{fz, fy, fx}`; then [`STATUS_BEATS`] beats for each subarray, row-major.
+//! Saturations of `force`, the contact flag and the cycles are the frame's and the same in all of them:
 //!
 //! | beat | fx word | fy word | fz word |
 //! |---|---|---|---|
 //! | 0 | μ1 in mu_max/384 | μ2 in mu_max/384 | flags, see [`Status`] |
 //! | 1 | score, 2^−10 | right shift of `rescale` | left shift of `normalise` |
-//! | 2 | saturations of `rescale` | saturations of `force` | cycles from the last input beat to the first output beat |
+//! | 2 | saturations of `rescale` | saturations of `force` | cycles to the first output beat, see [`Status::cycles`] |
 
 use serde::Serialize;
 
@@ -39,7 +40,8 @@ pub struct Status {
     pub rescale_saturations: u32,
     /// Force words saturated.
     pub force_saturations: u32,
-    /// Cycles from the last input beat to the first output beat.
+    /// Cycles to the first output beat: from the frame's last input beat, or, for a frame that waited in the buffer, from the
+    /// cycle before it was begun.
     pub cycles: u32,
 }
 
