@@ -54,12 +54,17 @@ pub fn frame_flags(scene: &Scene, frame: &Frame, codes: &Codes) -> Vec<Flag> {
     .collect()
 }
 
-/// With truth: the cells hold less than the load. Without: the largest |b| lies on the outermost ring.
+/// With truth: the cells hold less than the load. Without: the largest |b| lies on the outermost ring of an array that
+/// has an interior.
 fn load_outside(frame: &Frame) -> bool {
     if let (Some(cells), Some(resultant)) = (&frame.cell_forces_N, frame.resultant_N) {
         return cells.fz.iter().sum::<f64>().abs() < SHARE_INSIDE * resultant[2].abs();
     }
     let (rows, cols) = (frame.sensor.rows, frame.sensor.cols);
+    if rows < 3 || cols < 3 {
+        // All ring: that the peak lies on it says nothing.
+        return false;
+    }
     let on_ring = |index: usize| {
         let (row, col) = (index / cols, index % cols);
         row == 0 || row == rows - 1 || col == 0 || col == cols - 1
@@ -108,8 +113,16 @@ mod tests {
             Flag::ShearUnreliable,
         ];
         let text = serde_json::to_string(&all).unwrap();
-        let wanted = r#"["no-contact","no-compression","condition-unmet","saturated","load-outside","medium-mismatch","shear-unreliable"]"#;
-        assert_eq!(text, wanted);
+        let wanted = [
+            "no-contact",
+            "no-compression",
+            "condition-unmet",
+            "saturated",
+            "load-outside",
+            "medium-mismatch",
+            "shear-unreliable",
+        ];
+        assert_eq!(text, serde_json::to_string(&wanted).unwrap());
     }
 
     #[test]
@@ -138,6 +151,19 @@ mod tests {
         assert_eq!(flags(&scene, &frame, 20, 1.0), []);
         frame.stress_MPa[9] = -frame.peak_MPa();
         assert_eq!(flags(&scene, &frame, 20, 1.0), [Flag::LoadOutside]);
+    }
+
+    #[test]
+    fn without_an_interior_the_ring_says_nothing() {
+        let (scene, frame) = setting();
+        let outside = |rows: usize, cols: usize| {
+            let sensor = crate::sensor::Sensor { rows, cols, ..scene.sensor.clone() };
+            let mut frame = Frame { sensor, cell_forces_N: None, ..frame.clone() };
+            frame.stress_MPa = vec![0.0; rows * cols];
+            frame.stress_MPa[1] = 1.0;
+            flags(&Scene::of_sensor(&frame.sensor, "small"), &frame, 20, 1.0).contains(&Flag::LoadOutside)
+        };
+        assert_eq!([outside(2, 2), outside(2, 9), outside(9, 2), outside(3, 3)], [false, false, false, true]);
     }
 
     #[test]

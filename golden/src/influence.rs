@@ -9,11 +9,11 @@
 //! ```
 //!
 //! Far from the cell the four corners cancel to a billionth of their size, and the closed form keeps 8 digits of 16.
-//! There the mean of the point kernel 3h²(dx, dy, h)/(2πρ⁵) over the cell is taken by Gauss–Legendre quadrature instead:
-//! its terms do not cancel. The kernel is analytic up to ρ = 0, so that with N nodes the error falls as E^(−2N), where
-//! E is the sum of the half-axes of the ellipse around the cell's side through the nearest singularity. The quadrature
-//! is used where E^(−2N) is below the rounding in both directions, the closed form elsewhere, that is close to cells
-//! much wider than h.
+//! There the mean of the point kernel 3h²(dx, dy, h)/(2πρ⁵) over the cell is taken by Gauss–Legendre quadrature
+//! instead: its terms do not cancel. The kernel is analytic up to ρ = 0, so that with N nodes the error falls as
+//! E^(−2N), where E is the sum of the half-axes of the ellipse around the cell's side through the nearest singularity.
+//! The quadrature is used where E^(−2N) is below the rounding in both directions, the closed form elsewhere, that is
+//! close to cells much wider than h.
 //!
 //! | | shape | unit |
 //! |---|---|---|

@@ -1,13 +1,13 @@
 //! Matrices: everything about a subarray that does not depend on the frame.
 //!
-//! Cz⁺ is the pseudo-inverse, Ax = Cz⁺Cx, Ay = Cz⁺Cy. Cz is symmetric (the stress under cell j from cell i is that under
-//! i from j), so its singular values are the sizes of its eigenvalues λ and Cz⁺ = U diag(1/λ) Uᵀ, leaving out
+//! Cz⁺ is the pseudo-inverse, Ax = Cz⁺Cx, Ay = Cz⁺Cy. Cz is symmetric (the stress under cell j from cell i is that
+//! under i from j), so its singular values are the sizes of its eigenvalues λ and Cz⁺ = U diag(1/λ) Uᵀ, leaving out
 //! |λ| ≤ n ε max|λ|.
 //!
-//! r = mu_max · max over θ of ρ(cos θ Ax + sin θ Ay) says how fast the series in μ converges. Cx and Cy are antisymmetric;
-//! with S = |Cz⁺|^½ the eigenvalues of cos θ Ax + sin θ Ay are those of the antisymmetric S (cos θ Cx + sin θ Cy) S where
-//! Cz is positive, and bounded by its 2-norm elsewhere. The norm is convex in (cos θ, sin θ) and even in both, so a few
-//! directions of one quadrant are enough: 9 miss at most 1 − cos(π/32) = 0.5 %.
+//! r = mu_max · max over θ of ρ(cos θ Ax + sin θ Ay) says how fast the series in μ converges. Cx and Cy are
+//! antisymmetric; with S = |Cz⁺|^½ the eigenvalues of cos θ Ax + sin θ Ay are those of the antisymmetric S (cos θ Cx +
+//! sin θ Cy) S where Cz is positive, and bounded by its 2-norm elsewhere. The norm is convex in (cos θ, sin θ) and even
+//! in both, so a few directions of one quadrant are enough: 9 miss at most 1 − cos(π/32) = 0.5 %.
 //!
 //! Degree d: smallest with r^(d+1) ≤ 0.035, at least 3 where r > 0.2, at least 1 where shear is wanted at all.
 //!
@@ -109,7 +109,10 @@ pub enum MatricesError {
         sensor: Box<Sensor>,
     },
     /// The series in μ converges too slowly or not at all.
-    #[error("{sensor}: r = {radius:.3} at mu_max = {mu_max} needs more than degree {MAX_DEGREE}; a smaller mu_max, or taxels further apart against the thickness, lower r")]
+    #[error(
+        "{sensor}: r = {radius:.3} at mu_max = {mu_max} needs more than degree {MAX_DEGREE}; \
+         a smaller mu_max, or taxels further apart against the thickness, lower r"
+    )]
     SlowSeries {
         /// The subarray.
         sensor: Box<Sensor>,

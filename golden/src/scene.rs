@@ -5,13 +5,15 @@
 //!
 //! | table | fields (default) |
 //! |---|---|
-//! | top | `name` (file name) |
+//! | top | `name` (file name; 1 … 64 letters, digits, `-`, `_`, `.`, inner spaces) |
 //! | `[sensor]` | `rows`, `cols` (2 … 256), `pitch_x_mm`, `pitch_y_mm`, `thickness_mm` (0 … 10⁶] |
 //! | `[medium]` | `kind` ("half-space"; "bonded-layer" with `poisson`, 0.48) |
-//! | `[partition]` | `case` (0; 1 … 3, "adaptive", "contacts") or `rows` and `cols`; `condition` ("loaded"; "both-signs") |
-//! | `[search]` | `objective` ("sparse"; …), `mu_max` (0.6; 0 … 2), `noise_floor_MPa` (0) |
+//! | `[partition]` | `case` (0; 1 … 3, "adaptive", "contacts") or `rows`, `cols` |
+//! | | `condition` ("loaded"; "both-signs") |
+//! | `[search]` | `objective` ("sparse"; …), `mu_max` (0.6; 0, or 0.001 … 2), `noise_floor_MPa` (0) |
 //! | `[threshold]` | `min_force_N` (0) |
-//! | `[fixed]` | `input_bits` (20; 8 … 24), `data_bits` (18; 12 … 18), `coef_bits` (18; 8 … 18), `inverse_bits` (24; coef … 32), `prune_bits` (20; 8 … 31) |
+//! | `[fixed]` | `input_bits` (20; 8 … 24), `data_bits` (18; 12 … 18), `coef_bits` (18; 8 … 18) |
+//! | | `inverse_bits` (24; `coef_bits` … 32), `prune_bits` (20; 8 … 31) |
 //! | `[hardware]` | `board` ("ulx3s-85f") |
 //! | `[input]` | `full_scale_MPa` (the frame's peak) |
 
@@ -70,6 +72,16 @@ pub enum Medium {
     },
 }
 
+impl Medium {
+    /// What [`Medium::allows_poisson`] accepts, for messages.
+    pub const POISSON_ALLOWED: &'static str = "a number above 0 and below 0.5";
+
+    /// Whether a bonded layer may have this Poisson ratio, in scenes and frames alike.
+    pub fn allows_poisson(poisson: f64) -> bool {
+        poisson > 0.0 && poisson < 0.5
+    }
+}
+
 impl fmt::Display for Medium {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
@@ -119,7 +131,7 @@ pub struct PartitionSpec {
 pub struct SearchSpec {
     /// What is maximised.
     pub objective: ObjectiveKind,
-    /// Largest ratio of shear to normal force, 0 to 2; 0 asks for no shear.
+    /// Largest ratio of shear to normal force, 0.001 to 2; or 0, which asks for no shear and for no search.
     pub mu_max: f64,
     /// Stress in MPa that counts as none.
     pub noise_floor_MPa: f64,

@@ -21,7 +21,6 @@ pub const MAX_LENGTH_MM: f64 = 1e6;
 
 /// A regular rectangular array of taxels under an elastic cover.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
 pub struct Sensor {
     /// Lines of taxels along y.
     pub rows: usize,

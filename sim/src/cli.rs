@@ -3,8 +3,8 @@
 //! | exit code | when |
 //! |---|---|
 //! | 0 | done, and equal where something was compared |
-//! | 1 | hardware and model differ, or a tool failed on generated files |
-//! | 2 | the input or the call is wrong, or a needed program is not installed |
+//! | 1 | hardware and model differ, a tool failed on generated files, or this program contradicts itself |
+//! | 2 | the input or the call is wrong, a file cannot be used, or a needed program is not installed |
 
 use std::io::{ErrorKind, Write};
 use std::path::{Path, PathBuf};
@@ -12,15 +12,16 @@ use std::process::ExitCode;
 
 use anyhow::{anyhow, Result};
 use clap::{Parser, Subcommand, ValueEnum};
-use dermis_golden::fixed::Model;
+use dermis_golden::fixed::{FixedError, Model};
 use dermis_golden::frame::Frame;
 use dermis_golden::quantise::full_scale;
 use dermis_golden::reconstruct::{Golden, Reconstruction};
 use dermis_golden::scene::Scene;
 use dermis_hdl::generate;
+use dermis_hdl::HdlError;
 
 use crate::compare::difference;
-use crate::hardware::{Hardware, Simulator};
+use crate::hardware::{Hardware, Simulator, Stuck};
 use crate::inputs::resolve;
 use crate::report::{self, CosimReport};
 use crate::verify::{verify, Verified};
@@ -94,6 +95,9 @@ enum Command {
         device: DeviceChoice,
     },
     /// Co-simulate scenes on their shipped frames and print one line for each.
+    #[command(after_help = "Examples:
+  dermis table sensor-1
+  dermis table sensor-1 my-scene.toml")]
     Table {
         /// Built-in names or paths of scenes.
         #[arg(required = true)]
@@ -145,11 +149,19 @@ pub fn main() -> ExitCode {
     }
 }
 
-/// 1 for a tool that failed on generated files, 2 for what the caller can mend.
+/// 1 for what is this program's own fault, a tool that failed on generated files among it; 2 for what the caller can
+/// mend.
 fn exit_code(error: &anyhow::Error) -> u8 {
-    match error.downcast_ref::<VerilatorError>() {
-        None | Some(VerilatorError::Missing) => 2,
-        Some(_) => 1,
+    let tool = matches!(
+        error.downcast_ref::<VerilatorError>(),
+        Some(VerilatorError::Build { .. } | VerilatorError::Library { .. })
+    );
+    let hardware = error.is::<Stuck>() || matches!(error.downcast_ref::<HdlError>(), Some(HdlError::Check(_)));
+    let model = matches!(error.downcast_ref::<FixedError>(), Some(FixedError::Internal(_) | FixedError::Beats { .. }));
+    if tool || hardware || model {
+        1
+    } else {
+        2
     }
 }
 
@@ -235,5 +247,38 @@ fn print(text: &str) -> Result<()> {
     match std::io::stdout().lock().write_all(text.as_bytes()) {
         Err(error) if error.kind() != ErrorKind::BrokenPipe => Err(anyhow!("standard output: {error}")),
         _ => Ok(()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use dermis_hdl::board::Board;
+
+    #[test]
+    fn own_faults_exit_with_1_and_what_the_caller_can_mend_with_2() {
+        let io = |kind| VerilatorError::Io { path: "build".into(), source: ErrorKind::into(kind) };
+        let stuck = Stuck { frame: "press".into(), cycle: 7, rule: "nothing moved".into() };
+        let own: [anyhow::Error; 6] = [
+            VerilatorError::Build { design: "d".into(), folder: "f".into(), log: "l".into() }.into(),
+            VerilatorError::Library { path: "l".into(), reason: "r".into() }.into(),
+            HdlError::Check("loop".into()).into(),
+            FixedError::Internal("limbs").into(),
+            FixedError::Beats { what: "forces", got: 1, expected: 2 }.into(),
+            stuck.into(),
+        ];
+        let callers: [anyhow::Error; 6] = [
+            VerilatorError::Missing.into(),
+            VerilatorError::MissingTool { program: "make" }.into(),
+            io(ErrorKind::PermissionDenied).into(),
+            HdlError::Board(Board::load("none").unwrap_err()).into(),
+            FixedError::NoFullScale { field: "threshold.min_force_N", value: 1.0 }.into(),
+            anyhow!("rtl: File exists"),
+        ];
+        for (errors, code) in [(own, 1), (callers, 2)] {
+            for error in errors {
+                assert_eq!(exit_code(&error), code, "{error}");
+            }
+        }
     }
 }

@@ -1,8 +1,9 @@
 //! Compares what a device did with the bit-true model, stage by stage and beat by beat.
 //!
 //! Equal means equal: every tap's stream, every force beat, every status beat, the handshake in
-//! every cycle, and at full speed the two cycle counts. The first differing stage in hardware order
-//! comes first in the list.
+//! every cycle, and at full speed the two cycle counts and the cycle of every output beat: beat k leaves
+//! `first_output + k` cycles after the last input beat. The first differing stage in hardware order comes first
+//! in the list.
 //!
 //! | in | out |
 //! |---|---|
@@ -15,7 +16,7 @@ pub use findings::{Findings, Mismatch, KEPT_PER_FRAME};
 
 use dermis_hdl::device::Device;
 
-use crate::drive::{record, Play, Recording, Stimulus, Times};
+use crate::drive::{record, Beat, Play, Recording, Stimulus, Times};
 use dermis_golden::fixed::{Cycles, Trace};
 
 /// The watchdog never bites below this many cycles without a transfer.
@@ -57,14 +58,14 @@ pub fn run(bench: Bench, vectors: &[Vector], stimulus: Stimulus) -> (Findings, V
     (judge(&label, bench.taps, vectors, &recording, exact), recording.times)
 }
 
-/// Compares a recording with the model; `exact` compares the cycle counts as well.
+/// Compares a recording with the model; `exact` compares the cycle counts and every output beat's cycle as well.
 pub fn judge(run: &str, taps: &[&'static str], vectors: &[Vector], recording: &Recording, exact: bool) -> Findings {
     let mut findings = Findings::default();
     let mut beats = recording.beats.iter();
     let mut streams: Vec<_> = recording.taps.iter().map(|words| words.iter()).collect();
     let mut beats_before = 0;
     for (number, vector) in vectors.iter().enumerate() {
-        let mut judge = Judge { run, vector, findings: Findings::default() };
+        let mut judge = Judge { run, vector, number, findings: Findings::default() };
         let beats_after = beats_before + vector.expected.beats.len() + vector.expected.status.len();
         let last = number + 1 == vectors.len();
         let here = |beat: usize| beat >= beats_before && (beat < beats_after || last);
@@ -78,28 +79,21 @@ pub fn judge(run: &str, taps: &[&'static str], vectors: &[Vector], recording: &R
                 continue;
             };
             for (index, expected) in stage.words.iter().enumerate() {
-                let got = streams[tap].next();
-                let per_taxel = stage.words.len() == vector.codes.len();
-                judge.word(
-                    stage.name,
-                    per_taxel,
-                    index,
-                    Some(expected.clone()),
-                    got.map(|w| (w.cycle, w.fields.clone())),
-                );
+                let got = streams[tap].next().map(|w| (w.cycle, w.fields.clone()));
+                judge.word(stage.name, index, Some(expected.clone()), got);
             }
         }
         for (stage, words) in [("forces", &vector.expected.beats), ("status", &vector.expected.status)] {
             for (index, expected) in words.iter().enumerate() {
                 let got = beats.next().map(|b| (b.cycle, b.data.map(i64::from).to_vec()));
-                judge.word(stage, stage == "forces", index, Some(expected.map(i64::from).to_vec()), got);
+                judge.word(stage, index, Some(expected.map(i64::from).to_vec()), got);
             }
         }
         if last {
             // What is left over belongs to no frame; it is reported with the last one.
             for (stream, name) in streams.iter_mut().zip(taps) {
                 for (extra, word) in stream.enumerate() {
-                    judge.word(name, false, extra, None, Some((word.cycle, word.fields.clone())));
+                    judge.word(name, extra, None, Some((word.cycle, word.fields.clone())));
                 }
             }
         }
@@ -107,7 +101,10 @@ pub fn judge(run: &str, taps: &[&'static str], vectors: &[Vector], recording: &R
             judge.rule("handshake", breach.beat - beats_before, Some(breach.cycle), breach.rule.clone());
         }
         if exact {
-            judge.cycles(vector.expected.cycles, &recording.times[number]);
+            let times = &recording.times[number];
+            judge.cycles(vector.expected.cycles, times);
+            let end = beats_after.min(recording.beats.len());
+            judge.beat_cycles(vector.expected.cycles, times, &recording.beats[beats_before.min(end)..end]);
         }
         beats_before = beats_after;
         findings.extend(judge.findings);
@@ -119,30 +116,28 @@ pub fn judge(run: &str, taps: &[&'static str], vectors: &[Vector], recording: &R
 struct Judge<'a> {
     run: &'a str,
     vector: &'a Vector,
+    /// Index of the frame.
+    number: usize,
     findings: Findings,
 }
 
 impl Judge<'_> {
     fn add(&mut self, make: impl FnOnce(String, String) -> Mismatch) {
         self.findings.count += 1;
+        self.findings.unequal.insert(self.number);
         if self.findings.kept.len() < KEPT_PER_FRAME {
             self.findings.kept.push(make(self.run.to_owned(), self.vector.frame.clone()));
         }
     }
 
     /// One word against another; both missing cannot happen.
-    fn word(
-        &mut self,
-        stage: &str,
-        per_taxel: bool,
-        index: usize,
-        expected: Option<Vec<i64>>,
-        got: Option<(u64, Vec<i64>)>,
-    ) {
+    fn word(&mut self, stage: &str, index: usize, expected: Option<Vec<i64>>, got: Option<(u64, Vec<i64>)>) {
         let (cycle, got) = got.unzip();
         if expected == got {
             return;
         }
+        // The streams whose words are taxels in the array's order; other stages may have as many words by chance.
+        let per_taxel = ["receive", "forces"].contains(&stage) && expected.is_some();
         let cols = self.vector.cols;
         let taxel = per_taxel.then(|| [index / cols, index % cols]);
         self.add(|run, frame| Mismatch {
@@ -180,6 +175,19 @@ impl Judge<'_> {
         }
         for name in stages.iter().filter(|s| !taps.contains(s)) {
             self.rule(name, 0, None, "a stage of the model that the hardware has no tap for".into());
+        }
+    }
+
+    /// The cycle of every output beat: beat k of the frame at last input + `first_output` + k.
+    fn beat_cycles(&mut self, promised: Cycles, times: &Times, beats: &[Beat]) {
+        let Some(last_in) = times.last_in else {
+            return;
+        };
+        for (index, beat) in beats.iter().enumerate() {
+            let due = last_in + promised.first_output + index as u64;
+            if beat.cycle != due {
+                self.rule("cycles", index, Some(beat.cycle), format!("output beat {index} was due in cycle {due}"));
+            }
         }
     }
 

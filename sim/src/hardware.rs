@@ -13,6 +13,7 @@ use dermis_golden::frame::Frame;
 use dermis_golden::reconstruct::Reconstruction;
 use dermis_hdl::device::Device;
 use dermis_hdl::{generate, simulator, Generated};
+use thiserror::Error;
 
 use crate::cosim::Vector;
 use crate::drive::{record, Play, Stimulus};
@@ -20,6 +21,18 @@ use crate::verilator::{Design, Verilated, VerilatorError};
 
 /// Cycles without a transfer after which a reconstruction is given up; far beyond any scene's pause.
 const WATCHDOG: u64 = 1_000_000;
+
+/// Hardware that stopped answering; a defect of this program.
+#[derive(Clone, Debug, PartialEq, Eq, Error)]
+#[error("frame {frame}, cycle {cycle}: {rule}")]
+pub struct Stuck {
+    /// Frame name.
+    pub frame: String,
+    /// When it was given up.
+    pub cycle: u64,
+    /// What was awaited.
+    pub rule: String,
+}
 
 /// What simulates the hardware.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -100,7 +113,7 @@ impl Hardware {
     /// Reconstructs a frame in the Verilated hardware, engine `rtl`.
     ///
     /// # Errors
-    /// As [`Hardware::device`]; hardware that stops answering.
+    /// As [`Hardware::device`]; [`Stuck`].
     pub fn reconstruct(&self, frame: &Frame) -> Result<Reconstruction> {
         let vector = self.vector(frame)?;
         let taxels = vector.codes.len();
@@ -108,7 +121,7 @@ impl Hardware {
         let mut device = self.device(Simulator::Verilator)?;
         let recording = record(device.as_mut(), 0, &plays, Stimulus::FullSpeed, WATCHDOG);
         if let Some(timeout) = recording.timeout {
-            anyhow::bail!("frame {}, cycle {}: {}", frame.id, timeout.cycle, timeout.rule);
+            return Err(Stuck { frame: frame.id.clone(), cycle: timeout.cycle, rule: timeout.rule }.into());
         }
         let beats: Vec<[i32; 3]> = recording.beats.iter().map(|beat| beat.data).collect();
         let (forces, status) = beats.split_at(taxels.min(beats.len()));

@@ -36,6 +36,12 @@ pub enum VerilatorError {
     /// The program is not installed.
     #[error("verilator is not installed; on Debian: sudo apt-get install verilator g++ make")]
     Missing,
+    /// What Verilator calls is not installed.
+    #[error("verilator needs {program}, which is not installed; on Debian: sudo apt-get install g++ make")]
+    MissingTool {
+        /// The program.
+        program: &'static str,
+    },
     /// The program ran and failed.
     #[error("verilator refused {design} (folder {folder}):\n{log}")]
     Build {
@@ -197,6 +203,9 @@ fn build(top: &str, sources: &[(&str, &str)], folder: &Path, cache: &Path) -> Re
         .output()
         .map_err(|_| VerilatorError::Missing)?;
     if !output.status.success() {
+        if let Some(program) = ["make", "g++"].into_iter().find(|program| !is_installed(program)) {
+            return Err(VerilatorError::MissingTool { program });
+        }
         let text = [output.stderr, output.stdout].concat();
         let text = String::from_utf8_lossy(&text);
         let log: Vec<&str> = text.lines().take(LOG_LINES).collect();
@@ -212,6 +221,10 @@ fn build(top: &str, sources: &[(&str, &str)], folder: &Path, cache: &Path) -> Re
         Err(_) if folder.join("libbench.so").is_file() => fs::remove_dir_all(&built).map_err(io_at(&built)),
         Err(source) => Err(VerilatorError::Io { path: folder.to_owned(), source }),
     }
+}
+
+fn is_installed(program: &str) -> bool {
+    Command::new(program).arg("--version").output().is_ok()
 }
 
 fn write(path: &Path, text: &str) -> Result<(), VerilatorError> {

@@ -78,7 +78,8 @@ fn wrong_input_ends_with_its_exit_code_and_message() {
         let missing: Vec<&str> = case.section("stdout").lines().filter(|line| !stdout.contains(line)).collect();
         if output.status.code() != Some(case.exit) || stderr != case.section("stderr") || !missing.is_empty() {
             failures += &format!(
-                "{}\n  exit {:?}, expected {}\n  stderr:\n{stderr}  expected:\n{}  lines missing in stdout: {missing:?}\n",
+                "{}\n  exit {:?}, expected {}\n  stderr:\n{stderr}  expected:\n{}  lines missing in stdout: \
+                 {missing:?}\n",
                 case.path.display(),
                 output.status.code(),
                 case.exit,
@@ -105,11 +106,40 @@ fn without_verilator_the_message_says_how_to_get_it() {
 }
 
 #[test]
+fn without_a_compiler_the_message_says_what_is_missing() {
+    let work = tempfile::tempdir().unwrap();
+    // A Verilator that is there and cannot build; nothing else is on the path.
+    let fake = work.path().join("verilator");
+    fs::write(&fake, "#!/bin/sh\n[ \"$1\" = --version ] && echo Verilator 0 && exit 0\nexit 127\n").unwrap();
+    fs::set_permissions(&fake, std::os::unix::fs::PermissionsExt::from_mode(0o755)).unwrap();
+    let output = Command::new(env!("CARGO_BIN_EXE_dermis"))
+        .current_dir(work.path())
+        .env("PATH", work.path())
+        .args(["reconstruct", "eight-by-eight", "--engine", "rtl"])
+        .output()
+        .unwrap();
+    let stderr = String::from_utf8(output.stderr).unwrap();
+    let wanted = "error: verilator needs make, which is not installed; on Debian: sudo apt-get install g++ make\n";
+    assert_eq!((output.status.code(), stderr.as_str()), (Some(2), wanted));
+}
+
+#[test]
 fn help_has_examples_for_every_command() {
-    for command in [&["--help"][..], &["reconstruct", "--help"], &["build", "--help"], &["cosim", "--help"]] {
-        let args: Vec<String> = command.iter().map(|a| (*a).to_owned()).collect();
+    let help = |command: &[&str]| {
+        let args: Vec<String> = command.iter().chain(&["--help"]).map(|a| (*a).to_owned()).collect();
         let output = dermis(Path::new("."), &args);
         assert_eq!(output.status.code(), Some(0));
-        assert!(String::from_utf8(output.stdout).unwrap().contains("dermis "), "{command:?}");
+        String::from_utf8(output.stdout).unwrap()
+    };
+    let overview = help(&[]);
+    assert!(overview.contains("Examples:\n  dermis "), "{overview}");
+    let listed = overview.split("Commands:\n").nth(1).unwrap().split("\n\n").next().unwrap();
+    let names = listed.lines().filter_map(|line| line.split_whitespace().next()).filter(|name| *name != "help");
+    let names: Vec<&str> = names.collect();
+    assert!(names.len() >= 4, "{listed}");
+    for name in names {
+        let text = help(&[name]);
+        let examples = text.split("Example").nth(1);
+        assert!(examples.is_some_and(|e| e.contains(&format!("\n  dermis {name} "))), "{name}: {text}");
     }
 }

@@ -6,6 +6,7 @@
 //! | `accuracy` | golden against the truth, bit-true against golden |
 //! | `boards` | scenes may name every board and no other |
 //! | `flipped_bit` | one wrong bit in a coefficient, a vector or the expected output is found |
+//! | `framing` | early and missing `tlast`: what is dropped, what is flagged, and equality right after |
 //! | `synthesis` | Yosys reads the Verilog without latch or undriven signal |
 //! | `scenes` | the same equality for scenes of other shapes, degrees, words and conditions |
 //! | `lint` | the generated Verilog is clean under Verilator with its waivers, and needs every one of them |

@@ -2,9 +2,11 @@
 //! Verilog (full speed, and with stalls after an interrupted frame) and rust-hdl's own simulation
 //! against the bit-true model, on every shipped frame, with exact cycle counts and their budgets.
 
+use dermis_golden::flags::Flag;
 use dermis_golden::frame::Frame;
 use dermis_golden::scene::Scene;
 use dermis_sim::hardware::Simulator;
+use dermis_sim::report;
 use dermis_sim::verify::{verify, Verified};
 use dermis_tests::{build_dir, scene, SCENES};
 
@@ -55,4 +57,27 @@ fn clipped_codes_are_equal() {
     // A tenth of the peak: most of the contact is clipped.
     scene.input.full_scale_MPa = Some(frames[0].peak_MPa() / 10.0);
     check(&scene, &frames[..2]);
+}
+
+#[test]
+fn golden_judges_the_codes_that_the_hardware_gets() {
+    let (mut scene, mut frames) = scene("eight-by-eight");
+    // A noise floor gives all frames one full scale, that of the strongest: too coarse for a frame of a 200th.
+    scene.search.noise_floor_MPa = 1e-9;
+    frames.truncate(2);
+    let peak = frames[0].peak_MPa();
+    let share = peak / frames[1].peak_MPa() / 200.0;
+    frames[1].stress_MPa.iter_mut().for_each(|b| *b *= share);
+    let verified = verify(&scene, &frames, &[Simulator::RustHdl], &build_dir()).unwrap();
+    let unreliable = |flags: &[Flag]| flags.contains(&Flag::ShearUnreliable);
+    let rows: Vec<[bool; 2]> =
+        verified.rows.iter().map(|row| [unreliable(&row.golden.flags), unreliable(&row.fixed.flags)]).collect();
+    assert_eq!(rows, [[false; 2], [true; 2]]);
+    // And where no Verilog has run, the table does not say that it is equal.
+    let (cosim, scenes) = (report::cosim(&verified), report::scenes(&[verified]));
+    for table in [cosim, scenes] {
+        let cells = |line: usize| table.lines().nth(line).unwrap().split('|').map(str::trim).collect::<Vec<_>>();
+        let column = cells(0).iter().position(|head| *head == "RTL = fixed").unwrap();
+        assert_eq!(cells(2)[column], "-", "{table}");
+    }
 }

@@ -25,8 +25,8 @@ const SCENES: [(&str, &str); 7] = [
     ("degree-1", "[search]\nmu_max = 0.05\n"),
     // No limbs, the smallest words.
     ("narrow", "[fixed]\ninput_bits = 8\ndata_bits = 12\ncoef_bits = 8\ninverse_bits = 8\n"),
-    // One limb only.
-    ("16-bit", "[fixed]\ninput_bits = 16\ndata_bits = 16\ncoef_bits = 16\ninverse_bits = 18\n"),
+    // A low limb of Cz⁺ and none of the input.
+    ("16-bit", "[fixed]\ninput_bits = 16\ndata_bits = 16\ncoef_bits = 16\ninverse_bits = 24\n"),
     (
         "thresholds",
         "[partition]\ncondition = \"both-signs\"\n[threshold]\nmin_force_N = 0.05\n[search]\nnoise_floor_MPa = 0.001\n\
@@ -52,6 +52,15 @@ fn frames(scene: &Scene) -> Vec<Frame> {
         Frame::from_stress(&format!("{centre:?}"), sensor, stress.collect()).unwrap()
     };
     vec![Frame::eq2(sensor), at([1.0, -2.0], 0.4), at([-4.0, 3.0], -2.0)]
+}
+
+#[test]
+fn the_scenes_have_the_limbs_they_are_here_for() {
+    for (name, limbs) in [("narrow", [false, false]), ("16-bit", [false, true]), ("odd", [true, true])] {
+        let (_, text) = SCENES.iter().find(|(n, _)| *n == name).unwrap();
+        let formats = Model::new(&parse(name, text)).unwrap().formats;
+        assert_eq!([formats.input_low_bits > 0, formats.inverse_low_bits > 0], limbs, "{name}");
+    }
 }
 
 #[test]

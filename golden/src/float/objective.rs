@@ -41,7 +41,7 @@ impl Objective for Sparse {
         }
         let share = |p: &f64| self.epsilon + p.abs() / sum;
         let logs = p.chunks(CHUNK).map(|chunk| {
-            // log2 of the product is the sum of the logs; where the product leaves the normal range, the logs are taken.
+            // log2 of the product is the sum of the logs; where the product leaves the normal range, the logs are.
             let product: f64 = chunk.iter().map(share).product();
             if product.is_normal() {
                 product.log2()
@@ -58,7 +58,8 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
-    /// Products of 8 carry 8 roundings each, in bits 8 ε/ln 2 per chunk, below 1e-14; sums of scores around 1000 add ε·1000.
+    /// Products of 8 carry 8 roundings each, in bits 8 ε/ln 2 per chunk, below 1e-14; sums of scores around 1000 add
+    /// ε·1000.
     const SCORE_TOLERANCE: f64 = 1e-12;
 
     fn plain(epsilon: f64, p: &[f64]) -> f64 {

@@ -14,9 +14,10 @@ pub(super) fn parse(text: &str, file: &str, stem: &str, scene: Option<&Scene>) -
     let mut rows = 0;
     let filled = text.lines().enumerate().filter(|(_, line)| !line.trim().is_empty());
     for (index, line) in filled {
-        let got = line.split(',').count();
-        if got != sensor.cols {
-            return Err(FrameError::CsvRagged { file: file.to_string(), line: index + 1, got, wanted: sensor.cols });
+        let hint = if line.contains([';', '\t']) { "; values are separated by commas" } else { "" };
+        let (got, wanted) = (line.split(',').count(), sensor.cols);
+        if got != wanted {
+            return Err(FrameError::CsvRagged { file: file.to_string(), line: index + 1, got, wanted, hint });
         }
         for (column, cell) in line.split(',').enumerate() {
             let value = cell.trim().parse().ok().filter(|value: &f64| value.is_finite());
@@ -25,6 +26,7 @@ pub(super) fn parse(text: &str, file: &str, stem: &str, scene: Option<&Scene>) -
                 line: index + 1,
                 column: column + 1,
                 value: cell.trim().chars().take(40).collect(),
+                hint,
             })?);
         }
         rows += 1;

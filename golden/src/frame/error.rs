@@ -29,7 +29,7 @@ pub enum FrameError {
         file: String,
     },
     /// Not JSON, cut short, or a value of the wrong type.
-    #[error("{file}, line {line}, column {column}: {message}")]
+    #[error("{file}, line {line}, column {column}{}: {message}", in_field(field))]
     Json {
         /// Path as given.
         file: String,
@@ -37,8 +37,22 @@ pub enum FrameError {
         line: usize,
         /// Column, from 1.
         column: usize,
-        /// The JSON reader's reason.
+        /// Path of the field, where the reader was in one.
+        field: Option<String>,
+        /// What is wrong there.
         message: String,
+    },
+    /// A value out of its range.
+    #[error("{file}: {field} = {value} is not allowed; it must be {allowed}")]
+    WrongValue {
+        /// Path as given.
+        file: String,
+        /// The field.
+        field: &'static str,
+        /// The value found.
+        value: f64,
+        /// What the field may hold.
+        allowed: &'static str,
     },
     /// The frame does not say which sensor it was read with, and no scene does either.
     #[error("{file}: no sensor in the file; name a scene")]
@@ -79,7 +93,7 @@ pub enum FrameError {
         value: f64,
     },
     /// A CSV cell that is no finite number.
-    #[error("{file}, line {line}, value {column}: {value:?} is not a finite number")]
+    #[error("{file}, line {line}, value {column}: {value:?} is not a finite number{hint}")]
     CsvValue {
         /// Path as given.
         file: String,
@@ -89,9 +103,11 @@ pub enum FrameError {
         column: usize,
         /// The text found.
         value: String,
+        /// A guess at the reason, or nothing.
+        hint: &'static str,
     },
     /// A CSV line with more or fewer values than columns.
-    #[error("{file}, line {line}: {got} values, wanted {wanted}")]
+    #[error("{file}, line {line}: {got} values, wanted {wanted}{hint}")]
     CsvRagged {
         /// Path as given.
         file: String,
@@ -101,6 +117,8 @@ pub enum FrameError {
         got: usize,
         /// The sensor's columns.
         wanted: usize,
+        /// A guess at the reason, or nothing.
+        hint: &'static str,
     },
     /// The frame was read with another sensor than the scene's.
     #[error(
@@ -116,6 +134,11 @@ pub enum FrameError {
         /// Sensor of the scene.
         scene_sensor: Box<Sensor>,
     },
+}
+
+/// The field's path as it follows a place.
+fn in_field(field: &Option<String>) -> String {
+    field.as_ref().map_or(String::new(), |field| format!(", {field}"))
 }
 
 /// Compares a count with the one wanted.

@@ -1,4 +1,5 @@
-//! Frames in JSON. Only `stress_MPa` must be there; fields this version does not know are passed over.
+//! Frames in JSON. Only `stress_MPa` must be there; fields this version does not know are passed over, at the top and
+//! in every object below.
 
 use super::{Contact, Forces, Frame, FrameError};
 use crate::scene::{Medium, Scene};
@@ -21,12 +22,18 @@ struct Raw {
 
 /// Reads a frame; `stem` is its id when the text has none, the scene's sensor its sensor.
 pub(super) fn parse(text: &str, file: &str, stem: &str, scene: Option<&Scene>) -> Result<Frame, FrameError> {
-    let raw: Raw = serde_json::from_str(text).map_err(|error| FrameError::Json {
-        file: file.to_string(),
-        line: error.line(),
-        column: error.column(),
-        message: error.to_string(),
+    let mut reader = serde_json::Deserializer::from_str(text);
+    let raw: Raw = serde_path_to_error::deserialize(&mut reader).map_err(|error| {
+        let path = error.path().to_string();
+        // The reader calls the top level "."; where it cannot tell an entry's name, it writes "?".
+        let field = (path != "." && !path.contains('?')).then_some(path);
+        wrong(file, field, error.inner())
     })?;
+    reader.end().map_err(|error| wrong(file, None, &error))?;
+    if let Some(Medium::BondedLayer { poisson: value }) = raw.medium.filter(|medium| !is_possible(medium)) {
+        let (file, allowed) = (file.to_string(), Medium::POISSON_ALLOWED);
+        return Err(FrameError::WrongValue { file, field: "medium.poisson", value, allowed });
+    }
     let sensor = raw.sensor.or_else(|| scene.map(|scene| scene.sensor.clone()));
     let sensor = sensor.ok_or_else(|| FrameError::NoSensor { file: file.to_string() })?;
     sensor.check().map_err(|source| {
@@ -46,4 +53,37 @@ pub(super) fn parse(text: &str, file: &str, stem: &str, scene: Option<&Scene>) -
     };
     frame.check_values(file)?;
     Ok(frame)
+}
+
+/// Whether the medium's numbers are in range.
+fn is_possible(medium: &Medium) -> bool {
+    match *medium {
+        Medium::HalfSpace => true,
+        Medium::BondedLayer { poisson } => Medium::allows_poisson(poisson),
+    }
+}
+
+/// The reader's error with its place once, in the words of JSON.
+fn wrong(file: &str, field: Option<String>, error: &serde_json::Error) -> FrameError {
+    let (line, column) = (error.line(), error.column());
+    let text = error.to_string();
+    let message = text.strip_suffix(&format!(" at line {line} column {column}")).unwrap_or(&text);
+    // At a line's very start the reader counts column 0.
+    FrameError::Json { file: file.to_string(), line, column: column.max(1), field, message: in_json_words(message) }
+}
+
+/// Replaces the reader's names of types by what a JSON file holds.
+fn in_json_words(message: &str) -> String {
+    let Some((before, expected)) = message.split_once("expected ") else {
+        return message.to_string();
+    };
+    let expected = match expected {
+        "f64" => "a number",
+        "usize" => "a whole number",
+        "a sequence" => "a list",
+        _ if expected.starts_with("struct ") || expected.contains("enum ") => "an object",
+        other => other,
+    };
+    let before = before.replace("type: map", "type: object").replace("type: sequence", "type: list");
+    format!("{before}expected {}", expected.replace("an array of length", "a list of length"))
 }

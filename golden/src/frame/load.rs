@@ -26,7 +26,9 @@ impl Frame {
         };
         let stem = path.file_stem().map(|stem| stem.to_string_lossy().into_owned());
         let text = read(path, &file)?;
-        parse(&text, &file, &stem.unwrap_or_default(), scene)
+        // Spreadsheets mark UTF-8 with U+FEFF, which belongs to no value.
+        let text = text.strip_prefix('\u{feff}').unwrap_or(&text);
+        parse(text, &file, &stem.unwrap_or_default(), scene)
     }
 }
 

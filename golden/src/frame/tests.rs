@@ -39,7 +39,11 @@ fn bad_json_is_refused_with_its_place() {
         (r#""stress_MPa":[1,2,3]"#, "stress_MPa has 3 values, wanted 4"),
         (r#""stress_MPa":[1,2,3,NaN]"#, "line 1, column"),
         (r#""stress_MPa":[1,2,3,1e400]"#, "number out of range"),
-        (r#""stress_MPa":[1,2,3,"4"]"#, "invalid type: string"),
+        (r#""stress_MPa":[1,2,3,"4"]"#, ", stress_MPa[3]: invalid type: string \"4\", expected a number"),
+        (r#""stress_MPa":{}"#, ", stress_MPa: invalid type: object, expected a list"),
+        (r#""stress_MPa":[1,2,3,4],"cell_forces_N":[]"#, ", cell_forces_N: "),
+        (r#""stress_MPa":[1,2,3,4],"medium":"rubber""#, ", medium: "),
+        (r#""stress_MPa":[1,2,3,4],"contacts":[{"centre_mm":[1]}]"#, ", contacts[0].centre_mm: "),
         (r#""id":"x""#, "missing field `stress_MPa`"),
         (r#""stress_MPa":[1,2,3,4],"resultant_N":[1,2]"#, "line 1, column"),
         (
@@ -51,9 +55,43 @@ fn bad_json_is_refused_with_its_place() {
     for (fields, wanted) in cases {
         let text = json(fields).unwrap_err().to_string();
         assert!(text.contains("f.json") && text.contains(wanted), "{text}");
+        let names = ["f64", "usize", "struct", "enum", "Sensor,", "Forces", "Medium", "Contact"];
+        assert!(!names.iter().any(|name| text.contains(name)), "{text}");
+        assert!(text.matches("column").count() <= 1, "{text}");
     }
+    let after = load("f.json", &format!("{{{SENSOR},\"stress_MPa\":[1,2,3,4]}} 5"), false);
+    assert!(matches!(after, Err(FrameError::Json { field: None, .. })));
+    let half = r#"{"sensor":{"rows":2.5},"stress_MPa":[]}"#;
+    let text = load("f.json", half, false).unwrap_err().to_string();
+    assert!(text.ends_with(", sensor.rows: invalid type: floating point `2.5`, expected a whole number"), "{text}");
     let cut = load("f.json", "{\"stress_MPa\":\n[1,2,3", true).unwrap_err();
     assert!(matches!(cut, FrameError::Json { line: 2, .. }), "{cut}");
+}
+
+#[test]
+fn a_mediums_poisson_ratio_has_the_scenes_range() {
+    let with = |poisson: &str| {
+        json(&format!(r#""stress_MPa":[1,2,3,4],"medium":{{"kind":"bonded-layer","poisson":{poisson}}}"#))
+    };
+    assert_eq!(with("0.49").unwrap().medium, Some(Medium::BondedLayer { poisson: 0.49 }));
+    for poisson in ["0", "0.5", "-0.1"] {
+        let text = with(poisson).unwrap_err().to_string();
+        let wanted = format!("medium.poisson = {poisson} is not allowed; it must be a number above 0 and below 0.5");
+        assert!(text.contains("f.json") && text.ends_with(&wanted), "{text}");
+    }
+}
+
+#[test]
+fn fields_unknown_to_this_version_are_passed_over_in_the_sensor_too() {
+    let sensor = SENSOR.replace("{\"rows\"", "{\"maker\":\"own\",\"rows\"");
+    let frame = load("f.json", &format!("{{{sensor},\"stress_MPa\":[1,2,3,4]}}"), false).unwrap();
+    assert_eq!(frame.sensor.rows, 2);
+}
+
+#[test]
+fn a_byte_order_mark_is_passed_over() {
+    assert_eq!(load("f.csv", "\u{feff}1,2\n3,4\n", true).unwrap().stress_MPa, [1.0, 2.0, 3.0, 4.0]);
+    assert!(load("f.json", "\u{feff}{\"stress_MPa\":[1,2,3,4]}", true).is_ok());
 }
 
 #[test]
@@ -74,6 +112,9 @@ fn bad_sensors_are_refused_before_anything_is_allocated() {
 fn bad_csv_is_refused_with_its_place() {
     let cases = [
         ("1,2\n3\n", "line 2: 1 values, wanted 2"),
+        ("1;2\n3;4\n", "line 1: 1 values, wanted 2; values are separated by commas"),
+        ("1\t2\n3\t4\n", "line 1: 1 values, wanted 2; values are separated by commas"),
+        ("1,2;3\n3,4;5\n", "line 1, value 2: \"2;3\" is not a finite number; values are separated by commas"),
         ("1,2\n3,x\n", "line 2, value 2: \"x\" is not a finite number"),
         ("1,2\nNaN,4\n", "line 2, value 1: \"NaN\""),
         ("1,2\n1e400,4\n", "\"1e400\""),

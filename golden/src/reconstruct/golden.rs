@@ -77,8 +77,10 @@ impl Golden {
             let own_codes = part.gather(&scene.sensor, &codes.codes);
             let receipt = receive(&scene.sensor, part, &own_codes, floor, scene.partition.condition);
             let b = part.gather(&scene.sensor, &frame.stress_MPa);
-            let (found, own) = self.solve(&b, receipt.condition_met);
-            if receipt.condition_met && found.is_none() {
+            // With mu_max = 0 there is nothing to search for: no score and no verdict on compression.
+            let searched = receipt.condition_met && scene.search.mu_max > 0.0;
+            let (found, own) = self.solve(&b, searched);
+            if searched && found.is_none() {
                 flags.push(Flag::NoCompression);
             }
             part.scatter(&scene.sensor, &own.fx, &mut forces.fx);
@@ -103,10 +105,10 @@ impl Golden {
         Ok(assemble(scene, frame, "golden", results, forces, flags))
     }
 
-    /// One subarray: the family, the search where the condition is met, the forces.
-    fn solve(&self, b: &[f64], condition_met: bool) -> (Option<Found>, Forces) {
+    /// One subarray: the family, the search where one is made, the forces.
+    fn solve(&self, b: &[f64], searched: bool) -> (Option<Found>, Forces) {
         let min_force = self.scene.threshold.min_force_N;
-        if !condition_met {
+        if !searched {
             let family = Polynomial::of_degree(&self.matrices, b, 0);
             return (None, force(family.v(0, 0), [0.0; 2], min_force));
         }

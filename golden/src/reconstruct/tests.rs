@@ -146,6 +146,22 @@ fn a_mu_max_of_zero_asks_for_no_shear() {
 }
 
 #[test]
+fn a_mu_max_of_zero_is_no_search_in_both_models() {
+    let mut scene = scene();
+    scene.search.mu_max = 0.0;
+    let mut frame = hertz();
+    for sign in [1.0, -1.0] {
+        frame.stress_MPa.iter_mut().for_each(|b| *b = sign * b.abs());
+        let golden = run(&scene, &frame);
+        let fixed = crate::fixed::Model::new(&scene).unwrap().reconstruct(&frame).unwrap();
+        for result in [golden, fixed] {
+            assert_eq!(result.subarrays[0].objective_value, None, "{}, sign {sign}", result.engine);
+            assert!(!result.flags.contains(&Flag::NoCompression), "{}, sign {sign}", result.engine);
+        }
+    }
+}
+
+#[test]
 fn extreme_stress_is_an_error_or_a_finite_result() {
     let golden = Golden::new(&scene()).unwrap();
     for scale in [1e-300, 1e300, 1e308] {

@@ -24,6 +24,10 @@ const SCHEMA: [(&str, &[&str]); 9] = [
 ];
 /// Poisson ratio of soft rubber, where a bonded layer names none.
 const DEFAULT_POISSON: f64 = 0.48;
+/// Least search range above none: with less, the family's powers of μ vanish in every word the hardware has.
+const LEAST_MU_MAX: f64 = 0.001;
+/// Largest search range; no elastic cover sticks better.
+const LARGEST_MU_MAX: f64 = 2.0;
 /// Longest scene name; it becomes part of file names and reports.
 const LONGEST_NAME: usize = 64;
 
@@ -61,14 +65,32 @@ fn syntax(text: &str, origin: &str, error: &toml::de::Error) -> SceneError {
 }
 
 fn name(reader: &Reader, origin: &str) -> Result<String, SceneError> {
-    let Some(value) = reader.value("name") else {
+    let stem = || {
         let stem = std::path::Path::new(origin).file_stem();
-        return Ok(stem.map_or("scene".into(), |stem| stem.to_string_lossy().into_owned()));
+        Value::String(stem.map_or("scene".into(), |stem| stem.to_string_lossy().into_owned()))
     };
+    let value = reader.value("name").cloned().unwrap_or_else(stem);
     match value.as_str() {
-        Some(name) if !name.is_empty() && name.chars().count() <= LONGEST_NAME => Ok(name.to_string()),
-        _ => Err(reader.wrong("name", value, format!("a text of 1 to {LONGEST_NAME} characters"))),
+        Some(name) if is_name(name) => Ok(name.to_string()),
+        _ => Err(reader.wrong(
+            "name",
+            &value,
+            format!(
+                "1 to {LONGEST_NAME} letters, digits, '-', '_', '.' and spaces, without a dot in front or a space at \
+                 either end"
+            ),
+        )),
     }
+}
+
+/// Whether a name may stand in paths, reports and the comments of generated files.
+fn is_name(name: &str) -> bool {
+    let tame = |c: char| c.is_alphanumeric() || "-_. ".contains(c);
+    !name.is_empty()
+        && name.chars().count() <= LONGEST_NAME
+        && name.chars().all(tame)
+        && !name.starts_with('.')
+        && name.trim() == name
 }
 
 fn sensor(reader: &Reader) -> Result<Sensor, SceneError> {
@@ -95,8 +117,7 @@ fn medium(reader: &Reader) -> Result<Medium, SceneError> {
     let layer = Medium::BondedLayer { poisson: DEFAULT_POISSON };
     let names = [("half-space", Medium::HalfSpace), ("bonded-layer", layer)];
     let kind = reader.choice("medium.kind", &names)?;
-    let allowed = "a number above 0 and below 0.5";
-    let poisson = reader.number("medium.poisson", |nu| nu > 0.0 && nu < 0.5, allowed)?;
+    let poisson = reader.number("medium.poisson", Medium::allows_poisson, Medium::POISSON_ALLOWED)?;
     match (kind, poisson, reader.value("medium.poisson")) {
         (Medium::HalfSpace, _, Some(value)) => {
             Err(reader.wrong("medium.poisson", value, "left out unless medium.kind = \"bonded-layer\""))
@@ -144,7 +165,9 @@ fn named_case(reader: &Reader, value: &Value) -> Result<Case, SceneError> {
 
 fn search(reader: &Reader) -> Result<SearchSpec, SceneError> {
     let default = SearchSpec::default();
-    let mu_max = reader.number("search.mu_max", |mu| (0.0..=2.0).contains(&mu), "a number from 0 to 2")?;
+    let allowed = format!("0, or a number from {LEAST_MU_MAX} to {LARGEST_MU_MAX}");
+    let in_range = |mu| mu == 0.0 || (LEAST_MU_MAX..=LARGEST_MU_MAX).contains(&mu);
+    let mu_max = reader.number("search.mu_max", in_range, &allowed)?;
     let floor = reader.number("search.noise_floor_MPa", |mpa| mpa >= 0.0, "a number of at least 0")?;
     Ok(SearchSpec {
         objective: reader.choice("search.objective", &ObjectiveKind::NAMES)?,

@@ -1,5 +1,6 @@
 //! Differences: what each names, how they are counted and printed.
 
+use std::collections::BTreeSet;
 use std::fmt;
 
 use serde::Serialize;
@@ -18,7 +19,7 @@ pub struct Mismatch {
     pub stage: String,
     /// Index of the word in the stage's stream of this frame.
     pub index: usize,
-    /// Row and column of the taxel, where a word is one (`forces`, and stages with a word per taxel).
+    /// Row and column of the taxel, where a word is one: in `receive` and `forces`.
     pub taxel: Option<[usize; 2]>,
     /// Cycle of the differing word, none for a missing word.
     pub cycle: Option<u64>,
@@ -54,6 +55,8 @@ pub struct Findings {
     pub kept: Vec<Mismatch>,
     /// All of them.
     pub count: usize,
+    /// Index of every frame with a difference; names may repeat.
+    pub unequal: BTreeSet<usize>,
 }
 
 impl Findings {
@@ -66,5 +69,6 @@ impl Findings {
     pub fn extend(&mut self, other: Findings) {
         self.kept.extend(other.kept);
         self.count += other.count;
+        self.unequal.extend(other.unequal);
     }
 }

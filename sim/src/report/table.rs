@@ -29,14 +29,14 @@ pub fn cosim(verified: &Verified) -> String {
         let d = &row.difference;
         vec![
             row.frame.clone(),
-            format!("{:.4}", row.full_scale_MPa),
+            figures(row.full_scale_MPa, row.full_scale_MPa),
             percent(tangential(&row.golden)),
             percent(tangential(&row.fixed)),
             percent(normal(&row.golden)),
             percent(normal(&row.fixed)),
             format!("{:.0} LSB = {}", d.max_lsb, percent(Some(d.max_share))),
             format!("{:.0} LSB = {}", d.rms_lsb, percent(Some(d.rms_share))),
-            yes(row.equal),
+            verdict(verified, row.equal),
             count(row.times.latency()),
             count(row.times.total()),
             row.times.total().map_or("-".into(), |c| format!("{:.2}", verified.board.microseconds(c))),
@@ -64,7 +64,8 @@ fn summary(verified: &Verified) -> String {
     let report = CosimReport::new(verified);
     if let (Some(cycles), Some(time)) = (report.total_cycles.max, report.time_us.max) {
         text.push_str(&format!(
-            "at most {cycles} cycles = {time:.2} µs at {} MHz ({}, design target), {:.2} µs below the budget of {BUDGET_US} µs\n",
+            "at most {cycles} cycles = {time:.2} µs at {} MHz ({}, design target), {:.2} µs below the budget of \
+             {BUDGET_US} µs\n",
             report.clock_MHz,
             verified.board.name,
             BUDGET_US as f64 - time,
@@ -100,7 +101,7 @@ pub fn scenes(all: &[Verified]) -> String {
             of(|row| tangential(&row.fixed)),
             of(|row| normal(&row.golden)),
             of(|row| normal(&row.fixed)),
-            yes(report.equal),
+            verdict(verified, report.equal),
             count(report.cycles.max),
             count(report.total_cycles.max),
             report.clock_MHz.to_string(),
@@ -131,8 +132,27 @@ fn count(cycles: Option<u64>) -> String {
     cycles.map_or("-".into(), |c| c.to_string())
 }
 
-fn yes(equal: bool) -> String {
-    if equal { "yes" } else { "NO" }.into()
+/// Whether the Verilog equals the model; nothing to say where only rust-hdl's simulation ran.
+fn verdict(verified: &Verified, equal: bool) -> String {
+    match (verified.verilog, equal) {
+        (false, _) => "-",
+        (true, true) => "yes",
+        (true, false) => "NO",
+    }
+    .into()
+}
+
+/// `value` with the decimals that give `largest` (of the values shown together) five significant digits; powers of
+/// ten where that takes too many zeros.
+pub(super) fn figures(value: f64, largest: f64) -> String {
+    const DIGITS: i32 = 5;
+    let magnitude = if largest == 0.0 { 0 } else { largest.abs().log10().floor() as i32 };
+    if (-4..=6).contains(&magnitude) {
+        // Never negative: cast to a count of decimals.
+        format!("{value:.*}", (DIGITS - 1 - magnitude).max(0) as usize)
+    } else {
+        format!("{value:.*e}", (DIGITS - 1) as usize)
+    }
 }
 
 /// A Markdown table with columns padded to the same width; the first column is left-aligned.
@@ -169,6 +189,23 @@ fn markdown(head: &[&str], rows: Vec<Vec<String>>) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn figures_keep_five_digits_of_the_largest() {
+        let cases = [
+            (0.25, 0.25, "0.25000"),
+            (4.123_456, 4.2, "4.1235"),
+            (-0.001, 12.5, "-0.001"),
+            (123_456.7, 123_456.7, "123457"),
+            (3.2e-4, 3.2e-4, "0.00032000"),
+            (2.5e-9, 2.5e-9, "2.5000e-9"),
+            (1.5e12, 1.5e12, "1.5000e12"),
+            (0.0, 0.0, "0.0000"),
+        ];
+        for (value, largest, text) in cases {
+            assert_eq!(figures(value, largest), text);
+        }
+    }
 
     #[test]
     fn columns_are_padded_by_characters_not_bytes() {
