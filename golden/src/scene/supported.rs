@@ -37,9 +37,6 @@ impl Scene {
         if self.medium != Medium::HalfSpace {
             return missing("medium.kind", self.medium.to_string(), "half-space");
         }
-        if self.partition.case.grid().is_none() {
-            return missing("partition.case", self.partition.case.to_string(), "0, 1, 2, 3, rows and cols");
-        }
         if self.search.objective != ObjectiveKind::Sparse {
             let name = self.search.objective.name().to_string();
             return missing("search.objective", name, "sparse");
