@@ -9,7 +9,7 @@
 //! | `[sensor]` | `rows`, `cols` (2 … 256), `pitch_x_mm`, `pitch_y_mm`, `thickness_mm` (0 … 10⁶] |
 //! | `[medium]` | `kind` ("half-space"; "bonded-layer" with `poisson`, 0.48) |
 //! | `[partition]` | `case` (0; 1 … 3, "adaptive", "contacts") or `rows` and `cols`; `condition` ("loaded"; "both-signs") |
-//! | `[search]` | `objective` ("sparse"; …), `mu_max` (0.6; 0 … 2), `noise_floor_MPa` (0) |
+//! | `[search]` | `objective` ("sparse"; …), `mu_max` (0.6; 0 … 2), `noise_floor_MPa` (0), `form` ("oblique"; "orthogonal") |
 //! | `[threshold]` | `min_force_N` (0) |
 //! | `[fixed]` | `input_bits` (20; 8 … 24), `data_bits` (18; 12 … 18), `coef_bits` (18; 8 … 18), `inverse_bits` (24; coef … 32) |
 //! | `[hardware]` | `board` ("ulx3s-85f") |
@@ -105,6 +105,16 @@ pub enum ObjectiveKind {
     Auto,
 }
 
+/// How Eq. 1 is computed.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Form {
+    /// p = Cz⁺ b and its series in μ, a quarter of the storage.
+    #[default]
+    Oblique,
+    /// C†b + (I − C†C) w, as printed.
+    Orthogonal,
+}
+
 /// Table `[partition]`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PartitionSpec {
@@ -123,6 +133,8 @@ pub struct SearchSpec {
     pub mu_max: f64,
     /// Stress in MPa that counts as none.
     pub noise_floor_MPa: f64,
+    /// How Eq. 1 is computed.
+    pub form: Form,
 }
 
 /// Table `[threshold]`.
@@ -168,7 +180,7 @@ impl Default for PartitionSpec {
 
 impl Default for SearchSpec {
     fn default() -> Self {
-        SearchSpec { objective: ObjectiveKind::default(), mu_max: 0.6, noise_floor_MPa: 0.0 }
+        SearchSpec { objective: ObjectiveKind::default(), mu_max: 0.6, noise_floor_MPa: 0.0, form: Form::default() }
     }
 }
 

@@ -4,6 +4,7 @@
 //! |---|---|---|
 //! | `taken` | `partition.case = "adaptive"` | the case taken and why, and why the finer ones were not |
 //! | `regions` | `partition.case = "contacts"` | μ, centre, load and taxels of each contact |
+//! | `truncation` | `search.form = "orthogonal"` | ‖x − w‖/‖w‖ of each subarray: what the series in μ leaves out |
 //! | `sweeps`, `converged` | `partition.case = "contacts"` | how the search over the regions went |
 
 use crate::float::contacts::Contacts;
@@ -27,6 +28,9 @@ pub struct Extra {
     /// Whether the last sweep moved no μ and no region.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub converged: Option<bool>,
+    /// ‖x − w‖/‖w‖ of each subarray.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub truncation: Option<Vec<f64>>,
 }
 
 /// A choice of case.

@@ -11,15 +11,17 @@ use super::extra::{regions, Refused, Taken};
 use super::{assemble, Reconstruction, SubarrayResult};
 use crate::flags::{frame_flags, Flag};
 use crate::float::contacts::Solver;
+use crate::float::force::{force, threshold};
+use crate::float::orthogonal::{truncation, Orthogonal, OrthogonalError};
 use crate::float::receive::{receive, Receipt};
 use crate::float::search::{search, Found};
 use crate::float::segment::{segment, Segments, WIDTH};
-use crate::float::{force::force, objective::Sparse, pass::Polynomial};
+use crate::float::{objective::Sparse, pass::Polynomial};
 use crate::frame::{Forces, Frame, FrameError};
 use crate::matrices::{Matrices, MatricesError};
 use crate::partition::{subarrays, Case, PartitionError, Subarray};
 use crate::quantise::{full_scale, noise_floor_codes, quantise};
-use crate::scene::{Condition, Scene, SceneError};
+use crate::scene::{Condition, Form, Scene, SceneError};
 use thiserror::Error;
 
 /// A scene made ready for frames.
@@ -35,6 +37,8 @@ struct Cut {
     parts: Vec<Subarray>,
     /// Shared by all subarrays: a partition's rectangles are equal.
     matrices: Matrices,
+    /// Where the scene asks for Eq. 1 as printed.
+    orthogonal: Option<Orthogonal>,
 }
 
 /// A frame with what all subarrays ask of it.
@@ -49,6 +53,8 @@ struct Outcome {
     subarrays: Vec<SubarrayResult>,
     forces: Forces,
     flags: Vec<Flag>,
+    /// Of each subarray, with the orthogonal form.
+    truncation: Vec<f64>,
 }
 
 /// A scene or frame that cannot be reconstructed.
@@ -63,6 +69,9 @@ pub enum GoldenError {
     /// The subarray has no usable matrices.
     #[error(transparent)]
     Matrices(#[from] MatricesError),
+    /// The subarray has no literal form.
+    #[error(transparent)]
+    Orthogonal(#[from] OrthogonalError),
     /// The frame is not one of this scene.
     #[error(transparent)]
     Frame(#[from] FrameError),
@@ -86,7 +95,9 @@ impl Golden {
         let cut = |case: Case| -> Result<Cut, GoldenError> {
             let parts = subarrays(case, &scene.sensor)?;
             let matrices = Matrices::new(&parts[0].sensor(&scene.sensor), scene.search.mu_max)?;
-            Ok(Cut { case, parts, matrices })
+            let literal = scene.search.form == Form::Orthogonal;
+            let orthogonal = literal.then(|| Orthogonal::new(&matrices)).transpose()?;
+            Ok(Cut { case, parts, matrices, orthogonal })
         };
         let cases = match scene.partition.case {
             Case::Adaptive => {
@@ -135,8 +146,11 @@ impl Golden {
         Ok(result)
     }
 
-    fn finish(&self, frame: &Frame, Outcome { subarrays, forces, flags }: Outcome) -> Reconstruction {
-        assemble(&self.scene, frame, "golden", subarrays, forces, flags)
+    fn finish(&self, frame: &Frame, outcome: Outcome) -> Reconstruction {
+        let Outcome { subarrays, forces, flags, truncation } = outcome;
+        let mut result = assemble(&self.scene, frame, "golden", subarrays, forces, flags);
+        result.extra.truncation = Some(truncation).filter(|truncation| !truncation.is_empty());
+        result
     }
 
     /// The finest case that nothing stands against.
@@ -186,10 +200,12 @@ impl Golden {
         let (mu_max, p0) = (scene.search.mu_max, family.v(0, 0));
         let solver = Solver { matrices, mu_max, objective: &Sparse::default(), p0, searched: &met };
         let contacts = solver.solve(&family, found);
-        let mu: Vec<[f64; 2]> = contacts.segments.labels.iter().map(|&region| contacts.mu(region)).collect();
-        let mut forces = force(&contacts.p, [0.0; 2], scene.threshold.min_force_N);
-        forces.fx = forces.fz.iter().zip(&mu).map(|(fz, mu)| mu[0] * fz).collect();
-        forces.fy = forces.fz.iter().zip(&mu).map(|(fz, mu)| mu[1] * fz).collect();
+        let of_taxel = |k: usize| contacts.mu(contacts.segments.labels[k]);
+        let along = |axis: usize| contacts.p.iter().enumerate().map(|(k, p)| of_taxel(k)[axis] * p).collect();
+        let w = Forces { fx: along(0), fy: along(1), fz: contacts.p.clone() };
+        let (x, truncation) = self.whole().meet(input.stress_MPa, w);
+        outcome.truncation = truncation.into_iter().collect();
+        let forces = threshold(x, scene.threshold.min_force_N);
         let met: Vec<bool> = (0..contacts.segments.count).map(|k| met(&contacts.segments, k)).collect();
         let own = regions(&scene.sensor, &contacts, &met, &forces);
         outcome.forces = forces;
@@ -208,11 +224,15 @@ impl Golden {
     /// Every subarray of a case for itself.
     fn subarrays(&self, input: &Input, cut: &Cut) -> Outcome {
         let sensor = &self.scene.sensor;
-        let mut outcome = Outcome { subarrays: Vec::new(), forces: Forces::zeros(sensor.taxels()), flags: Vec::new() };
+        let forces = Forces::zeros(sensor.taxels());
+        let mut outcome = Outcome { subarrays: Vec::new(), forces, flags: Vec::new(), truncation: Vec::new() };
         for part in &cut.parts {
             let receipt = self.receive(input, part);
             let b = part.gather(sensor, input.stress_MPa);
-            let (found, own) = self.solve(&cut.matrices, &b, receipt.condition_met);
+            let (found, w) = self.solve(&cut.matrices, &b, receipt.condition_met);
+            let (x, truncation) = cut.meet(&b, w);
+            outcome.truncation.extend(truncation);
+            let own = threshold(x, self.scene.threshold.min_force_N);
             if receipt.condition_met && found.is_none() {
                 outcome.flags.push(Flag::NoCompression);
             }
@@ -234,16 +254,29 @@ impl Golden {
         outcome
     }
 
-    /// One subarray: the family, the search where the condition is met, the forces.
+    /// One subarray: the family, the search where the condition is met, the forces before the threshold.
     fn solve(&self, matrices: &Matrices, b: &[f64], condition_met: bool) -> (Option<Found>, Forces) {
-        let min_force = self.scene.threshold.min_force_N;
         if !condition_met {
             let family = Polynomial::of_degree(matrices, b, 0);
-            return (None, force(family.v(0, 0), [0.0; 2], min_force));
+            return (None, force(family.v(0, 0), [0.0; 2], 0.0));
         }
         let family = Polynomial::new(matrices, b);
         let found = search(&family, self.scene.search.mu_max, &Sparse::default());
         let mu = found.map_or([0.0; 2], |found| found.mu);
-        (found, force(&family.eval(mu), mu, min_force))
+        (found, force(&family.eval(mu), mu, 0.0))
+    }
+}
+
+impl Cut {
+    /// The forces of Eq. 1 for w: w itself, or with the orthogonal form the nearest that meet b, and how far they are.
+    fn meet(&self, b: &[f64], w: Forces) -> (Forces, Option<f64>) {
+        match &self.orthogonal {
+            None => (w, None),
+            Some(orthogonal) => {
+                let x = orthogonal.apply(b, &w);
+                let off = truncation(&x, &w);
+                (x, Some(off))
+            }
+        }
     }
 }

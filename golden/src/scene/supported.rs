@@ -1,6 +1,6 @@
 //! What of the schema this version builds.
 
-use super::{Medium, ObjectiveKind, Scene, SceneError};
+use super::{Form, Medium, ObjectiveKind, Scene, SceneError};
 use crate::partition::Case;
 
 impl Scene {
@@ -22,6 +22,9 @@ impl Scene {
         if self.search.objective != ObjectiveKind::Sparse {
             let name = self.search.objective.name().to_string();
             return missing("search.objective", name, "sparse");
+        }
+        if self.search.form != Form::Oblique {
+            return missing("search.form", "orthogonal".to_string(), "oblique");
         }
         Ok(())
     }

@@ -38,6 +38,7 @@ fn every_field_is_read() {
         objective = "patch"
         mu_max = 1
         noise_floor_MPa = 0.001
+        form = "orthogonal"
         [threshold]
         min_force_N = 0.01
         [fixed]
@@ -55,6 +56,7 @@ fn every_field_is_read() {
     assert_eq!(scene.partition.condition, Condition::BothSigns);
     assert_eq!(scene.search.objective, ObjectiveKind::Patch);
     assert_eq!((scene.search.mu_max, scene.search.noise_floor_MPa), (1.0, 0.001));
+    assert_eq!(scene.search.form, Form::Orthogonal);
     assert_eq!(scene.threshold.min_force_N, 0.01);
     assert_eq!(scene.fixed, FixedSpec { input_bits: 16, data_bits: 16, coef_bits: 14, inverse_bits: 18 });
     assert_eq!(scene.input.full_scale_MPa, Some(0.25));
@@ -132,6 +134,7 @@ fn choices_not_built_yet_say_so() {
         ("[partition]\ncase = \"contacts\"", "partition.case = contacts; available: 0"),
         ("[partition]\nrows = 5\ncols = 2", "partition.case = 5×2"),
         ("[search]\nobjective = \"auto\"", "search.objective = auto; available: sparse"),
+        ("[search]\nform = \"orthogonal\"", "search.form = orthogonal; available: oblique"),
     ];
     for (more, wanted) in cases {
         let text = with(more).unwrap().require_supported().unwrap_err().to_string();
