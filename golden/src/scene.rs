@@ -11,6 +11,7 @@
 //! | `[partition]` | `case` (0; 1 … 3, "adaptive", "contacts") or `rows`, `cols` |
 //! | | `condition` ("loaded"; "both-signs") |
 //! | `[search]` | `objective` ("sparse"; …), `mu_max` (0.6; 0, or 0.001 … 2), `noise_floor_MPa` (0) |
+//! | | `form` ("oblique"; "orthogonal") |
 //! | `[threshold]` | `min_force_N` (0) |
 //! | `[fixed]` | `input_bits` (20; 8 … 24), `data_bits` (18; 12 … 18), `coef_bits` (18; 8 … 18) |
 //! | | `inverse_bits` (24; `coef_bits` … 32), `prune_bits` (20; 8 … 31) |
@@ -117,6 +118,16 @@ pub enum ObjectiveKind {
     Auto,
 }
 
+/// How Eq. 1 is computed.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Form {
+    /// p = Cz⁺ b and its series in μ, a quarter of the storage.
+    #[default]
+    Oblique,
+    /// C†b + (I − C†C) w, as printed.
+    Orthogonal,
+}
+
 /// Table `[partition]`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PartitionSpec {
@@ -135,6 +146,8 @@ pub struct SearchSpec {
     pub mu_max: f64,
     /// Stress in MPa that counts as none.
     pub noise_floor_MPa: f64,
+    /// How Eq. 1 is computed.
+    pub form: Form,
 }
 
 /// Table `[threshold]`.
@@ -182,7 +195,7 @@ impl Default for PartitionSpec {
 
 impl Default for SearchSpec {
     fn default() -> Self {
-        SearchSpec { objective: ObjectiveKind::default(), mu_max: 0.6, noise_floor_MPa: 0.0 }
+        SearchSpec { objective: ObjectiveKind::default(), mu_max: 0.6, noise_floor_MPa: 0.0, form: Form::default() }
     }
 }
 

@@ -14,10 +14,18 @@ use crate::frame::Forces;
 
 /// Forces of one subarray, row-major in it.
 pub fn force(p: &[f64], mu: [f64; 2], min_force_N: f64) -> Forces {
-    let kept = |p: &f64| if p.abs() < min_force_N { 0.0 } else { *p };
-    let fz: Vec<f64> = p.iter().map(kept).collect();
-    let along = |mu: f64| fz.iter().map(|fz| mu * fz).collect();
-    Forces { fx: along(mu[0]), fy: along(mu[1]), fz }
+    let along = |mu: f64| p.iter().map(|p| mu * p).collect();
+    threshold(Forces { fx: along(mu[0]), fy: along(mu[1]), fz: p.to_vec() }, min_force_N)
+}
+
+/// Takes away the forces too small to report.
+pub fn threshold(mut forces: Forces, min_force_N: f64) -> Forces {
+    for k in 0..forces.fz.len() {
+        if forces.fz[k].abs() < min_force_N {
+            (forces.fx[k], forces.fy[k], forces.fz[k]) = (0.0, 0.0, 0.0);
+        }
+    }
+    forces
 }
 
 #[cfg(test)]

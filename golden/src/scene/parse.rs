@@ -2,8 +2,8 @@
 
 use super::reader::Reader;
 use super::{
-    Condition, FixedSpec, HardwareSpec, InputSpec, Medium, ObjectiveKind, PartitionSpec, Scene, SceneError, SearchSpec,
-    ThresholdSpec, BOARDS,
+    Condition, FixedSpec, Form, HardwareSpec, InputSpec, Medium, ObjectiveKind, PartitionSpec, Scene, SceneError,
+    SearchSpec, ThresholdSpec, BOARDS,
 };
 use crate::partition::{subarrays, Case, Grid};
 use crate::sensor::{Sensor, MAX_LENGTH_MM, MAX_LINES, MIN_LINES};
@@ -16,7 +16,7 @@ const SCHEMA: [(&str, &[&str]); 9] = [
     ("sensor", &["rows", "cols", "pitch_x_mm", "pitch_y_mm", "thickness_mm"]),
     ("medium", &["kind", "poisson"]),
     ("partition", &["case", "condition", "rows", "cols"]),
-    ("search", &["objective", "mu_max", "noise_floor_MPa"]),
+    ("search", &["objective", "mu_max", "noise_floor_MPa", "form"]),
     ("threshold", &["min_force_N"]),
     ("fixed", &["input_bits", "data_bits", "coef_bits", "inverse_bits", "prune_bits"]),
     ("hardware", &["board"]),
@@ -173,6 +173,7 @@ fn search(reader: &Reader) -> Result<SearchSpec, SceneError> {
         objective: reader.choice("search.objective", &ObjectiveKind::NAMES)?,
         mu_max: mu_max.unwrap_or(default.mu_max),
         noise_floor_MPa: floor.unwrap_or(default.noise_floor_MPa),
+        form: reader.choice("search.form", &[("oblique", Form::Oblique), ("orthogonal", Form::Orthogonal)])?,
     })
 }
 

@@ -1,6 +1,6 @@
 //! What of the schema this version builds.
 
-use super::{Medium, ObjectiveKind, Scene, SceneError};
+use super::{Form, Medium, ObjectiveKind, Scene, SceneError};
 
 impl Scene {
     /// Checks that this version has what the scene asks for.
@@ -22,6 +22,9 @@ impl Scene {
             let name = self.search.objective.name().to_string();
             return missing("search.objective", name, "sparse");
         }
+        if self.search.form != Form::Oblique {
+            return missing("search.form", "orthogonal".to_string(), "oblique");
+        }
         Ok(())
     }
     /// Checks that the golden model has what the scene asks for: more than the hardware.
@@ -35,9 +38,6 @@ impl Scene {
         };
         if self.medium != Medium::HalfSpace {
             return missing("medium.kind", self.medium.to_string(), "half-space");
-        }
-        if self.partition.case.grid().is_none() {
-            return missing("partition.case", self.partition.case.to_string(), "0, 1, 2, 3, rows and cols");
         }
         if self.search.objective != ObjectiveKind::Sparse {
             let name = self.search.objective.name().to_string();

@@ -41,6 +41,7 @@ fn every_field_is_read() {
         objective = "patch"
         mu_max = 1
         noise_floor_MPa = 0.001
+        form = "orthogonal"
         [threshold]
         min_force_N = 0.01
         [fixed]
@@ -58,6 +59,7 @@ fn every_field_is_read() {
     assert_eq!(scene.partition.condition, Condition::BothSigns);
     assert_eq!(scene.search.objective, ObjectiveKind::Patch);
     assert_eq!((scene.search.mu_max, scene.search.noise_floor_MPa), (1.0, 0.001));
+    assert_eq!(scene.search.form, Form::Orthogonal);
     assert_eq!(scene.threshold.min_force_N, 0.01);
     assert_eq!(
         scene.fixed,
@@ -161,6 +163,7 @@ fn choices_not_built_yet_say_so() {
         ("[partition]\ncase = \"contacts\"", "partition.case = contacts; available: 0, 1, 2, 3, rows and cols"),
         ("[partition]\ncase = \"adaptive\"", "partition.case = adaptive"),
         ("[search]\nobjective = \"auto\"", "search.objective = auto; available: sparse"),
+        ("[search]\nform = \"orthogonal\"", "search.form = orthogonal; available: oblique"),
     ];
     for (more, wanted) in cases {
         let text = with(more).unwrap().require_supported().unwrap_err().to_string();
