@@ -24,6 +24,8 @@ pub mod float;
 pub mod frame;
 pub mod influence;
 pub mod matrices;
+pub mod noise;
+pub mod paper;
 pub mod partition;
 pub mod quantise;
 pub mod reconstruct;

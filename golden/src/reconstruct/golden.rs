@@ -2,8 +2,8 @@
 
 use super::{assemble, Reconstruction, SubarrayResult};
 use crate::flags::{frame_flags, Flag};
-use crate::float::search::{search, Found};
-use crate::float::{force::force, objective::Sparse, pass::Polynomial, receive::receive};
+use crate::float::objective::{of_kind, Estimate, Objective, Subject};
+use crate::float::{force::force, pass::Polynomial, receive::receive};
 use crate::frame::{Forces, Frame, FrameError};
 use crate::matrices::{Matrices, MatricesError};
 use crate::partition::{subarrays, PartitionError, Subarray};
@@ -17,6 +17,7 @@ pub struct Golden {
     parts: Vec<Subarray>,
     /// Shared by all subarrays: a partition's rectangles are equal.
     matrices: Matrices,
+    objective: Box<dyn Objective + Send + Sync>,
 }
 
 /// A scene or frame that cannot be reconstructed.
@@ -50,10 +51,12 @@ impl Golden {
     /// # Errors
     /// [`GoldenError`] but `Frame` and `TooStrong`.
     pub fn new(scene: &Scene) -> Result<Golden, GoldenError> {
-        scene.require_supported()?;
+        scene.require_golden()?;
         let parts = subarrays(scene.partition.case, &scene.sensor)?;
         let shape = parts[0].sensor(&scene.sensor);
-        Ok(Golden { scene: scene.clone(), matrices: Matrices::new(&shape, scene.search.mu_max)?, parts })
+        let matrices = Matrices::new(&shape, scene.search.mu_max)?;
+        let objective = of_kind(scene.search.objective, &shape);
+        Ok(Golden { scene: scene.clone(), matrices, parts, objective })
     }
 
     /// The matrices of a subarray.
@@ -66,6 +69,14 @@ impl Golden {
     /// # Errors
     /// `Frame` when the frame is not the scene's, `TooStrong` when a force overflows.
     pub fn run(&self, frame: &Frame) -> Result<Reconstruction, GoldenError> {
+        self.run_with_noise(frame, self.scene.search.noise_floor_MPa)
+    }
+
+    /// Reconstructs one frame whose noise the objective is told to have the deviation `noise_MPa`.
+    ///
+    /// # Errors
+    /// As [`Golden::run`].
+    pub fn run_with_noise(&self, frame: &Frame, noise_MPa: f64) -> Result<Reconstruction, GoldenError> {
         let scene = &self.scene;
         frame.check(scene)?;
         let codes = quantise(&frame.stress_MPa, scene.fixed.input_bits, full_scale(scene, frame));
@@ -77,7 +88,7 @@ impl Golden {
             let own_codes = part.gather(&scene.sensor, &codes.codes);
             let receipt = receive(&scene.sensor, part, &own_codes, floor, scene.partition.condition);
             let b = part.gather(&scene.sensor, &frame.stress_MPa);
-            let (found, own) = self.solve(&b, receipt.condition_met);
+            let (found, own) = self.solve(&b, receipt.condition_met, noise_MPa);
             if receipt.condition_met && found.is_none() {
                 flags.push(Flag::NoCompression);
             }
@@ -92,8 +103,8 @@ impl Golden {
                 centroid_condition: receipt.condition_met,
                 compression_centroid_mm: receipt.compression_centroid_mm,
                 tension_centroid_mm: receipt.tension_centroid_mm,
-                mu: found.map_or([0.0; 2], |found| found.mu),
-                objective_value: found.map(|found| found.objective),
+                mu: found.map_or([0.0; 2], |estimate| estimate.found.mu),
+                objective_value: found.map(|estimate| estimate.found.objective),
             });
         }
         if !forces.resultant().iter().all(|sum| sum.is_finite()) {
@@ -104,15 +115,22 @@ impl Golden {
     }
 
     /// One subarray: the family, the search where the condition is met, the forces.
-    fn solve(&self, b: &[f64], condition_met: bool) -> (Option<Found>, Forces) {
+    fn solve(&self, b: &[f64], condition_met: bool, noise_MPa: f64) -> (Option<Estimate>, Forces) {
         let min_force = self.scene.threshold.min_force_N;
         if !condition_met {
             let family = Polynomial::of_degree(&self.matrices, b, 0);
             return (None, force(family.v(0, 0), [0.0; 2], min_force));
         }
         let family = Polynomial::new(&self.matrices, b);
-        let found = search(&family, self.scene.search.mu_max, &Sparse::default());
-        let mu = found.map_or([0.0; 2], |found| found.mu);
-        (found, force(&family.eval(mu), mu, min_force))
+        let estimate = self.objective.find(&Subject {
+            sensor: &self.matrices.sensor,
+            b,
+            family: &family,
+            mu_max: self.scene.search.mu_max,
+            noise_MPa,
+        });
+        let mu = estimate.map_or([0.0; 2], |estimate| estimate.found.mu);
+        let p = estimate.map_or_else(|| family.eval(mu), |estimate| estimate.pressure(&family));
+        (estimate, force(&p, mu, min_force))
     }
 }

@@ -25,4 +25,18 @@ impl Scene {
         }
         Ok(())
     }
+
+    /// Checks that the golden model has what the scene asks for.
+    ///
+    /// # Errors
+    /// [`SceneError::NotAvailable`] naming the first choice that is valid but not built yet.
+    pub fn require_golden(&self) -> Result<(), SceneError> {
+        // Every objective and every partition into rectangles is there; the rest is asked of a scene with the hardware's.
+        let mut scene = self.clone();
+        scene.search.objective = ObjectiveKind::Sparse;
+        if scene.partition.case.grid().is_some() {
+            scene.partition.case = Case::WHOLE;
+        }
+        scene.require_supported()
+    }
 }
