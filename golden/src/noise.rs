@@ -17,5 +17,7 @@ pub mod bound;
 pub mod contact;
 mod random;
 mod study;
+#[cfg(test)]
+mod tests;
 
 pub use study::{study, Averaging, Row, Spread, Study, StudyError};

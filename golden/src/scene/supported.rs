@@ -26,17 +26,21 @@ impl Scene {
         Ok(())
     }
 
-    /// Checks that the golden model has what the scene asks for.
+    /// Checks that the golden model has what the scene asks for: more than the hardware.
     ///
     /// # Errors
     /// [`SceneError::NotAvailable`] naming the first choice that is valid but not built yet.
     pub fn require_golden(&self) -> Result<(), SceneError> {
-        // Every objective and every partition into rectangles is there; the rest is asked of a scene with the hardware's.
-        let mut scene = self.clone();
-        scene.search.objective = ObjectiveKind::Sparse;
-        if scene.partition.case.grid().is_some() {
-            scene.partition.case = Case::WHOLE;
+        let missing = |field: &'static str, value: String, available: &'static str| {
+            let scene = self.name.clone();
+            Err(SceneError::NotAvailable { scene, field, value, available })
+        };
+        if self.medium != Medium::HalfSpace {
+            return missing("medium.kind", self.medium.to_string(), "half-space");
         }
-        scene.require_supported()
+        if self.partition.case.grid().is_none() {
+            return missing("partition.case", self.partition.case.to_string(), "0, 1, 2, 3, rows and cols");
+        }
+        Ok(())
     }
 }

@@ -178,10 +178,12 @@ mod tests {
         let (x, y, d) = (0.4, -1.1, 1e-5);
         let mut field = empty();
         taxels.field([x, y], force, &mut field);
-        for i in 0..6 {
-            assert!((field[0][i] - at([x, y])[i]).abs() < 1e-15);
-            assert!((field[1][i] - (at([x + d, y])[i] - at([x - d, y])[i]) / (2.0 * d)).abs() < 1e-9);
-            assert!((field[2][i] - (at([x, y + d])[i] - at([x, y - d])[i]) / (2.0 * d)).abs() < 1e-9);
+        let [value, along_x, along_y] = field;
+        let ([right, left], [up, down]) = ([at([x + d, y]), at([x - d, y])], [at([x, y + d]), at([x, y - d])]);
+        for (i, at) in at([x, y]).into_iter().enumerate() {
+            assert!((value[i] - at).abs() < 1e-15);
+            assert!((along_x[i] - (right[i] - left[i]) / (2.0 * d)).abs() < 1e-9);
+            assert!((along_y[i] - (up[i] - down[i]) / (2.0 * d)).abs() < 1e-9);
         }
     }
 }

@@ -113,8 +113,7 @@ pub(super) fn fit(model: &mut dyn Model, b: &DVector<f64>, start: &[f64]) -> Opt
                 None => lambda *= 10.0,
             }
         }
-        // Written so that a misfit which is no number ends the fit too.
-        if !(before - best.misfit() > ENOUGH * before) {
+        if before - best.misfit() <= ENOUGH * before {
             break;
         }
     }
