@@ -26,7 +26,7 @@ program: setup
 	$(CARGO) build --release --bins
 
 run: program ## co-simulate both scenes on real frames and print the table
-	$(DERMIS) --build-dir $(BUILD) table $(SCENES)
+	$(DERMIS) --build-dir $(BUILD) table --cosim $(SCENES)
 
 test: setup fmt clippy unit lint docs ## all checks; what .ci/run calls
 

@@ -25,6 +25,8 @@ pub mod folded;
 pub mod frame;
 pub mod influence;
 pub mod matrices;
+pub mod noise;
+pub mod paper;
 pub mod partition;
 pub mod quantise;
 pub mod reconstruct;

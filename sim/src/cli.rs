@@ -14,16 +14,19 @@ use anyhow::{anyhow, Result};
 use clap::{Parser, Subcommand, ValueEnum};
 use dermis_golden::fixed::{FixedError, Model};
 use dermis_golden::frame::Frame;
+use dermis_golden::noise::{study, Study};
 use dermis_golden::quantise::full_scale;
 use dermis_golden::reconstruct::{Golden, Reconstruction};
-use dermis_golden::scene::Scene;
+use dermis_golden::scene::{ObjectiveKind, Scene};
 use dermis_hdl::generate;
 use dermis_hdl::HdlError;
 
 use crate::compare::difference;
 use crate::hardware::{Hardware, Simulator, Stuck};
 use crate::inputs::resolve;
-use crate::report::{self, CosimReport};
+use crate::progress::Progress;
+use crate::report::{self, CosimReport, Format};
+use crate::tabulate::tabulate;
 use crate::verify::{verify, Verified};
 use crate::verilator::VerilatorError;
 
@@ -44,7 +47,8 @@ const EXAMPLES: &str = "Examples:
   dermis reconstruct sensor-1 --engine rtl           the same in the Verilated hardware
   dermis build eight-by-eight --out rtl              Verilog, memory files, manifest.json
   dermis cosim sensor-1                              all shipped frames, model against hardware
-  dermis table sensor-1 eight-by-eight               one line per scene";
+  dermis table                                       errors of all scenes, beside the paper's
+  dermis noise sensor-1                              errors under noise, beside the Cramér–Rao bound";
 
 #[derive(Subcommand, Debug)]
 enum Command {
@@ -94,14 +98,50 @@ enum Command {
         #[arg(long, value_enum, default_value = "both")]
         device: DeviceChoice,
     },
-    /// Co-simulate scenes on their shipped frames and print one line for each.
+    /// Print the errors of scenes in the paper's cases on their shipped frames, beside the paper's.
     #[command(after_help = "Examples:
-  dermis table sensor-1
-  dermis table sensor-1 my-scene.toml")]
+  dermis table                                       every built-in scene, cases 0 to 3
+  dermis table sensor-1 --case 0 --format csv
+  dermis table sensor-1 eight-by-eight --cosim       co-simulate, one line per scene")]
     Table {
-        /// Built-in names or paths of scenes.
-        #[arg(required = true)]
+        /// Built-in names or paths of scenes; without any all built-in ones.
+        #[arg(required_if_eq("cosim", "true"))]
         scenes: Vec<String>,
+        /// Case, repeatable; without it all four.
+        #[arg(long = "case", value_name = "0..3", value_parser = clap::value_parser!(i64).range(0..=3))]
+        cases: Vec<i64>,
+        /// Form of the table.
+        #[arg(long, value_enum, default_value = "markdown", conflicts_with = "cosim")]
+        format: Format,
+        /// Co-simulate the hardware in place of the errors: one line per scene.
+        #[arg(long, conflicts_with = "cases")]
+        cosim: bool,
+    },
+    /// Measure the shear's error under noise, beside the Cramér–Rao bound.
+    #[command(after_help = "Examples:
+  dermis noise sensor-1
+  dermis noise sensor-2 --objective patch --objective auto --draws 1000 --format csv")]
+    Noise {
+        /// Built-in name or path of a scene.
+        scene: String,
+        /// Noise as a share of max |b|, repeatable; without it 0, 0.0001, 0.0005, 0.002 and 0.01.
+        #[arg(long = "level", value_name = "SHARE")]
+        levels: Vec<f64>,
+        /// Random contacts.
+        #[arg(long, default_value_t = 200)]
+        draws: usize,
+        /// Of contacts and noise.
+        #[arg(long, default_value_t = 1)]
+        seed: u64,
+        /// Frames averaged in the table's second half; 1 leaves it out.
+        #[arg(long, default_value_t = 64)]
+        frames: usize,
+        /// Objective, repeatable; without it all.
+        #[arg(long = "objective", value_name = "NAME", value_parser = objective)]
+        objectives: Vec<ObjectiveKind>,
+        /// Form of the table.
+        #[arg(long, value_enum, default_value = "markdown")]
+        format: Format,
     },
 }
 
@@ -197,7 +237,21 @@ fn run(arguments: &Arguments) -> Result<(String, bool)> {
             };
             Ok((text, verified.findings.is_equal()))
         }
-        Command::Table { scenes } => {
+        Command::Table { scenes, cases, format, cosim: false } => Ok((table(scenes, cases, *format)?, true)),
+        Command::Noise { scene, levels, draws, seed, frames, objectives, format } => {
+            let mut wanted = Study { draws: *draws, seed: *seed, frames: *frames, ..Study::default() };
+            if !levels.is_empty() {
+                wanted.levels = levels.clone();
+            }
+            if !objectives.is_empty() {
+                wanted.objectives = objectives.clone();
+            }
+            let scene = Scene::load(scene)?;
+            let bar = Progress::steps(&format!("{}: noise", scene.name), 0);
+            let rows = study(&scene, &wanted, &mut |done, total| bar.of(done as u64, total as u64))?;
+            Ok((report::noise(&rows, *format)?, true))
+        }
+        Command::Table { scenes, cosim: true, .. } => {
             let verify = |name: &String| -> Result<Verified> {
                 let (scene, frames) = resolve(Some(name), &[])?;
                 verify(&scene, &frames, DeviceChoice::Both.simulators(), build_dir)
@@ -207,6 +261,32 @@ fn run(arguments: &Arguments) -> Result<(String, bool)> {
             Ok((report::scenes(&all), equal))
         }
     }
+}
+
+/// The error table of scenes, all built-in ones when none is named.
+fn table(scenes: &[String], cases: &[i64], format: Format) -> Result<String> {
+    let builtin = || Scene::builtin_names().into_iter().map(str::to_owned).collect();
+    let scenes: Vec<String> = if scenes.is_empty() { builtin() } else { scenes.to_vec() };
+    let cases = if cases.is_empty() { &[0, 1, 2, 3] } else { cases };
+    let mut lines = Vec::new();
+    for name in &scenes {
+        let (scene, frames) = resolve(Some(name), &[])?;
+        let bar = Progress::steps(&format!("{}: errors", scene.name), (cases.len() * frames.len()) as u64);
+        let mut done = 0;
+        let mut step = || {
+            done += 1;
+            bar.at(done);
+        };
+        lines.extend(tabulate(&scene, cases, &frames, &mut step)?);
+    }
+    report::errors(&lines, format)
+}
+
+/// An objective by its name in scenes.
+fn objective(name: &str) -> Result<ObjectiveKind, String> {
+    let names = ObjectiveKind::NAMES;
+    let known = || names.map(|(name, _)| name).join(", ");
+    names.iter().find(|(known, _)| *known == name).map(|(_, kind)| *kind).ok_or_else(|| format!("one of {}", known()))
 }
 
 fn reconstruct(scene: &Scene, frame: &Frame, engine: Engine, build_dir: &Path) -> Result<Reconstruction> {

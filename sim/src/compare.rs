@@ -9,9 +9,10 @@
 //! | out: [`Difference`] | LSB, fraction | ≥ 0; fractions 0 where the reference has no force |
 
 use dermis_golden::frame::Forces;
+use serde::Serialize;
 
 /// How far two force fields are apart.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct Difference {
     /// Largest difference of a component, in LSBs.
     pub max_lsb: f64,

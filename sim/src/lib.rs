@@ -32,5 +32,6 @@ pub mod hardware;
 pub mod inputs;
 mod progress;
 pub mod report;
+pub mod tabulate;
 pub mod verify;
 pub mod verilator;

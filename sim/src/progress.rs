@@ -18,6 +18,27 @@ impl Progress {
         bar.enable_steady_tick(Duration::from_millis(120));
         Progress(bar)
     }
+
+    /// Shows `message` with a bar of `total` steps. Hidden when stderr is not a terminal.
+    pub fn steps(message: &str, total: u64) -> Self {
+        let bar = ProgressBar::new(total);
+        if let Ok(style) = ProgressStyle::with_template("{msg} [{bar:30}] {pos}/{len} ({elapsed}, {eta} left)") {
+            bar.set_style(style);
+        }
+        bar.set_message(message.to_owned());
+        Progress(bar)
+    }
+
+    /// Shows how many of how many steps are done.
+    pub fn of(&self, done: u64, total: u64) {
+        self.0.set_length(total);
+        self.0.set_position(done);
+    }
+
+    /// Shows how many steps are done.
+    pub fn at(&self, done: u64) {
+        self.0.set_position(done);
+    }
 }
 
 impl Drop for Progress {

@@ -3,9 +3,13 @@
 //! Times are total cycles (first input beat to last output beat) at the engine's clock; the margin is
 //! what they leave of [`BUDGET_US`].
 
+mod errors;
+mod noise;
 mod result;
 mod table;
 
+pub use errors::errors;
+pub use noise::noise;
 pub use result::{difference, reconstruction};
 pub use table::{cosim, scenes};
 
@@ -13,6 +17,17 @@ use serde::Serialize;
 
 use crate::cosim::Mismatch;
 use crate::verify::Verified;
+
+/// Form of a table.
+#[derive(clap::ValueEnum, Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Format {
+    /// For people.
+    Markdown,
+    /// For spreadsheets.
+    Csv,
+    /// For programs.
+    Json,
+}
 
 /// Time that touch allows for a frame, in µs.
 pub const BUDGET_US: u64 = 1000;

@@ -1,6 +1,12 @@
-//! Objective: how much a candidate p looks like real contact forces.
+//! Objective: how much a candidate p looks like real contact forces, and how its best μ is found.
 //!
-//! `sparse`: Π = −Σ log2(ε + |p_i|/Σp), largest where the force sits on few taxels and the rest is next to nothing.
+//! | name | Π, maximised | right for |
+//! |---|---|---|
+//! | [`Sparse`] | −Σ log2(ε + \|p_i\|/Σp): force on few taxels, next to nothing elsewhere | any shape, next to no noise |
+//! | [`Compressive`] | −Σ min(p, 0)²/(Σp)²: the paper's constraint i) alone | a baseline |
+//! | [`Symmetric`] | pressure symmetric about its centre | noise, shapes that are symmetric |
+//! | [`Patch`] | likelihood of one elliptic contact | noise, one contact per subarray |
+//! | [`Auto`] | chosen by frame and noise floor | – |
 //!
 //! | | shape | unit | range |
 //! |---|---|---|---|
@@ -9,10 +15,59 @@
 //!
 //! Any scale of p gives the same score. Used by `search`.
 
+mod auto;
+mod compressive;
+pub(crate) mod disc;
+mod fit;
+pub(crate) mod patch;
+mod subject;
+mod symmetric;
+
+pub use auto::Auto;
+pub use compressive::Compressive;
+pub use patch::Patch;
+pub use subject::{Estimate, Subject};
+pub use symmetric::Symmetric;
+
+use super::search::search;
+use crate::scene::ObjectiveKind;
+use crate::sensor::Sensor;
+
 /// A measure of candidates; the search takes the largest.
 pub trait Objective {
     /// Score of the forces p in N, `None` when Σp is not above zero: such forces pull.
     fn score(&self, p: &[f64]) -> Option<f64>;
+
+    /// The best μ of a subarray, `None` when no candidate presses: the shared search over the scores, unless the
+    /// objective has a way of its own.
+    fn find(&self, subject: &Subject) -> Option<Estimate> {
+        let found = search(subject.family, subject.mu_max, &ByScore(self))?;
+        Some(Estimate { found, load_N: None })
+    }
+}
+
+/// An objective of which only the scores are used.
+struct ByScore<'a, T: ?Sized>(&'a T);
+
+impl<T: Objective + ?Sized> Objective for ByScore<'_, T> {
+    fn score(&self, p: &[f64]) -> Option<f64> {
+        self.0.score(p)
+    }
+
+    fn find(&self, subject: &Subject) -> Option<Estimate> {
+        self.0.find(subject)
+    }
+}
+
+/// The objective of a scene for subarrays shaped like `sensor`.
+pub fn of_kind(kind: ObjectiveKind, sensor: &Sensor) -> Box<dyn Objective + Send + Sync> {
+    match kind {
+        ObjectiveKind::Sparse => Box::new(Sparse::default()),
+        ObjectiveKind::Compressive => Box::new(Compressive),
+        ObjectiveKind::Symmetric => Box::new(Symmetric::new(sensor)),
+        ObjectiveKind::Patch => Box::new(Patch::default()),
+        ObjectiveKind::Auto => Box::new(Auto::new(sensor)),
+    }
 }
 
 /// ε of the pipeline. From 2⁻¹⁶ to 2⁻²⁰ results are alike, 2⁻¹⁴ ruins them.

@@ -12,11 +12,12 @@ use super::{assemble, Reconstruction, SubarrayResult};
 use crate::flags::{frame_flags, Flag};
 use crate::float::contacts::Solver;
 use crate::float::force::{force, threshold};
+use crate::float::objective::{of_kind, Estimate, Objective, Sparse, Subject};
 use crate::float::orthogonal::{truncation, Orthogonal, OrthogonalError};
+use crate::float::pass::Polynomial;
 use crate::float::receive::{receive, Receipt};
-use crate::float::search::{search, Found};
+use crate::float::search::search;
 use crate::float::segment::{segment, Segments, WIDTH};
-use crate::float::{objective::Sparse, pass::Polynomial};
 use crate::frame::{Forces, Frame, FrameError};
 use crate::matrices::{Matrices, MatricesError};
 use crate::partition::{subarrays, Case, PartitionError, Subarray};
@@ -39,6 +40,7 @@ struct Cut {
     matrices: Matrices,
     /// Where the scene asks for Eq. 1 as printed.
     orthogonal: Option<Orthogonal>,
+    objective: Box<dyn Objective + Send + Sync>,
 }
 
 /// A frame with what all subarrays ask of it.
@@ -46,6 +48,8 @@ struct Input<'a> {
     stress_MPa: &'a [f64],
     codes: &'a [i32],
     floor: i32,
+    /// Standard deviation of the stress, for objectives that ask.
+    noise_MPa: f64,
 }
 
 /// What the subarrays of a case came to.
@@ -94,10 +98,12 @@ impl Golden {
         scene.require_golden()?;
         let cut = |case: Case| -> Result<Cut, GoldenError> {
             let parts = subarrays(case, &scene.sensor)?;
-            let matrices = Matrices::new(&parts[0].sensor(&scene.sensor), scene.search.mu_max)?;
+            let shape = parts[0].sensor(&scene.sensor);
+            let matrices = Matrices::new(&shape, scene.search.mu_max)?;
             let literal = scene.search.form == Form::Orthogonal;
             let orthogonal = literal.then(|| Orthogonal::new(&matrices)).transpose()?;
-            Ok(Cut { case, parts, matrices, orthogonal })
+            let objective = of_kind(scene.search.objective, &shape);
+            Ok(Cut { case, parts, matrices, orthogonal, objective })
         };
         let cases = match scene.partition.case {
             Case::Adaptive => {
@@ -126,11 +132,19 @@ impl Golden {
     /// # Errors
     /// `Frame` when the frame is not the scene's, `TooStrong` when a force overflows.
     pub fn run(&self, frame: &Frame) -> Result<Reconstruction, GoldenError> {
+        self.run_with_noise(frame, self.scene.search.noise_floor_MPa)
+    }
+
+    /// Reconstructs one frame whose noise the objective is told to have the deviation `noise_MPa`.
+    ///
+    /// # Errors
+    /// As [`Golden::run`].
+    pub fn run_with_noise(&self, frame: &Frame, noise_MPa: f64) -> Result<Reconstruction, GoldenError> {
         let scene = &self.scene;
         frame.check(scene)?;
         let codes = quantise(&frame.stress_MPa, scene.fixed.input_bits, full_scale(scene, frame));
         let floor = noise_floor_codes(scene, &codes);
-        let input = Input { stress_MPa: &frame.stress_MPa, codes: &codes.codes, floor };
+        let input = Input { stress_MPa: &frame.stress_MPa, codes: &codes.codes, floor, noise_MPa };
         let mut result = match scene.partition.case {
             Case::Grid(_) => self.finish(frame, self.subarrays(&input, self.whole())),
             Case::Adaptive => self.adaptive(frame, &input),
@@ -231,11 +245,11 @@ impl Golden {
             let b = part.gather(sensor, input.stress_MPa);
             // With mu_max = 0 there is nothing to search for: no score and no verdict on compression.
             let searched = receipt.condition_met && self.scene.search.mu_max > 0.0;
-            let (found, w) = self.solve(&cut.matrices, &b, searched);
+            let (estimate, w) = self.solve(cut, &b, searched, input.noise_MPa);
             let (x, truncation) = cut.meet(&b, w);
             outcome.truncation.extend(truncation);
             let own = threshold(x, self.scene.threshold.min_force_N);
-            if searched && found.is_none() {
+            if searched && estimate.is_none() {
                 outcome.flags.push(Flag::NoCompression);
             }
             part.scatter(sensor, &own.fx, &mut outcome.forces.fx);
@@ -249,23 +263,26 @@ impl Golden {
                 centroid_condition: receipt.condition_met,
                 compression_centroid_mm: receipt.compression_centroid_mm,
                 tension_centroid_mm: receipt.tension_centroid_mm,
-                mu: found.map_or([0.0; 2], |found| found.mu),
-                objective_value: found.map(|found| found.objective),
+                mu: estimate.map_or([0.0; 2], |estimate| estimate.found.mu),
+                objective_value: estimate.map(|estimate| estimate.found.objective),
             });
         }
         outcome
     }
 
     /// One subarray: the family, the search where the condition is met, the forces before the threshold.
-    fn solve(&self, matrices: &Matrices, b: &[f64], condition_met: bool) -> (Option<Found>, Forces) {
+    fn solve(&self, cut: &Cut, b: &[f64], condition_met: bool, noise_MPa: f64) -> (Option<Estimate>, Forces) {
+        let matrices = &cut.matrices;
         if !condition_met {
             let family = Polynomial::of_degree(matrices, b, 0);
             return (None, force(family.v(0, 0), [0.0; 2], 0.0));
         }
         let family = Polynomial::new(matrices, b);
-        let found = search(&family, self.scene.search.mu_max, &Sparse::default());
-        let mu = found.map_or([0.0; 2], |found| found.mu);
-        (found, force(&family.eval(mu), mu, 0.0))
+        let (sensor, mu_max) = (&matrices.sensor, self.scene.search.mu_max);
+        let estimate = cut.objective.find(&Subject { sensor, b, family: &family, mu_max, noise_MPa });
+        let mu = estimate.map_or([0.0; 2], |estimate| estimate.found.mu);
+        let p = estimate.map_or_else(|| family.eval(mu), |estimate| estimate.pressure(&family));
+        (estimate, force(&p, mu, 0.0))
     }
 }
 

@@ -156,7 +156,7 @@ pub(super) fn figures(value: f64, largest: f64) -> String {
 }
 
 /// A Markdown table with columns padded to the same width; the first column is left-aligned.
-fn markdown(head: &[&str], rows: Vec<Vec<String>>) -> String {
+pub(super) fn markdown(head: &[&str], rows: Vec<Vec<String>>) -> String {
     let head: Vec<String> = head.iter().map(|&h| h.to_owned()).collect();
     let width = |column: usize| {
         let cells = rows.iter().chain([&head]).map(|row| row[column].chars().count());

@@ -1,0 +1,164 @@
+//! Patch: maximum likelihood of one elliptic contact.
+//!
+//! Pressure ∝ (1 − r²)^g on the ellipse x = x₀ + L u, |u| ≤ 1, L symmetric; shear in proportion. With equal noise on
+//! every taxel the likelihood is largest where the misfit is smallest:
+//!
+//! ```text
+//! Π = −min over x₀, L, g, F of ‖b − K(x₀, L, g) F‖²        F = (Fx, Fy, Fz), μ = (Fx, Fy)/Fz
+//! ```
+//!
+//! x₀, the three entries of L and g by Levenberg–Marquardt, F linear inside it. L in place of two radii and an angle: a
+//! circle has no angle, and would stall the fit. 0 is the uniform pressure's g, ½ Hertz's.
+//!
+//! | | shape | unit | range |
+//! |---|---|---|---|
+//! | in: b | n | MPa | finite |
+//! | out: μ | 2 | – | |μ| ≤ mu_max |
+//! | out: load | scalar | N | above 0 |
+//!
+//! Found first with few nodes, then a few steps with many. For one contact per subarray on a half-space.
+
+use super::disc::{Disc, Taxels};
+use super::fit::{fit, misfit, Fit, Model};
+use super::{Estimate, Objective, Subject};
+use nalgebra::{DMatrix, DVector};
+
+/// Rings and angles of the first fit: 60 nodes.
+const COARSE: [usize; 2] = [5, 12];
+/// Rings and angles of the second.
+const FINE: [usize; 2] = [8, 24];
+/// Starting radii over the depth.
+const START_RADII: [f64; 4] = [0.5, 1.0, 1.7, 2.7];
+/// Least and largest g.
+const EXPONENTS: [f64; 2] = [0.0, 2.0];
+/// Smallest radius over the depth; below, a contact cannot be told from a point.
+const LEAST_RADIUS: f64 = 0.1;
+
+/// The objective.
+#[derive(Clone, Debug)]
+pub struct Patch {
+    coarse: Disc,
+    fine: Disc,
+}
+
+impl Default for Patch {
+    fn default() -> Self {
+        Patch { coarse: Disc::new(COARSE[0], COARSE[1]), fine: Disc::new(FINE[0], FINE[1]) }
+    }
+}
+
+/// θ = x₀, y₀, L₁₁, L₂₂, L₁₂, g in mm, mm, mm, mm, mm, –.
+pub(crate) const PARAMETERS: usize = 6;
+
+/// Stress of the patch.
+pub(crate) struct Ellipse<'a> {
+    pub taxels: &'a Taxels,
+    pub disc: &'a Disc,
+}
+
+/// The place of a node.
+pub(super) fn place(theta: &[f64], [u, v]: [f64; 2]) -> [f64; 2] {
+    [theta[0] + theta[2] * u + theta[4] * v, theta[1] + theta[4] * u + theta[3] * v]
+}
+
+/// Holds the centre inside the array and the ellipse to sizes that can be seen.
+pub(super) fn confine_ellipse(taxels: &Taxels, theta: &mut [f64]) {
+    let reach = |positions: &[f64]| positions.iter().fold(0.0f64, |reach, x| x.abs().max(reach));
+    let (x, y) = (reach(&taxels.x), reach(&taxels.y));
+    let radii = [LEAST_RADIUS * taxels.depth, 2.0 * x.max(y)];
+    theta[0] = theta[0].clamp(-x, x);
+    theta[1] = theta[1].clamp(-y, y);
+    theta[2] = theta[2].clamp(radii[0], radii[1].max(radii[0]));
+    theta[3] = theta[3].clamp(radii[0], radii[1].max(radii[0]));
+    // Positive definite, with the shorter radius at least a tenth of the longer.
+    let most = 0.9 * (theta[2] * theta[3]).sqrt();
+    theta[4] = theta[4].clamp(-most, most);
+}
+
+impl Ellipse<'_> {
+    /// Stress of 1 N along x, y and z.
+    pub fn unit_loads(&self, theta: &[f64]) -> [Vec<f64>; 3] {
+        let mut columns = [(); 3].map(|()| vec![0.0; self.taxels.count()]);
+        let (weights, _) = self.disc.weights(theta[5]);
+        for (&node, weight) in self.disc.nodes.iter().zip(weights) {
+            self.taxels.add_unit_forces(place(theta, node), weight, &mut columns);
+        }
+        columns
+    }
+
+    /// Derivatives of the stress under a force with respect to θ.
+    pub fn derivatives(&self, theta: &[f64], force: [f64; 3]) -> [Vec<f64>; PARAMETERS] {
+        let n = self.taxels.count();
+        let mut out = [(); PARAMETERS].map(|()| vec![0.0; n]);
+        let mut field = [(); 3].map(|()| vec![0.0; n]);
+        let (weights, slopes) = self.disc.weights(theta[5]);
+        for ((&[u, v], weight), slope) in self.disc.nodes.iter().zip(weights).zip(slopes) {
+            self.taxels.field(place(theta, [u, v]), force, &mut field);
+            let [o0, o1, o2, o3, o4, o5] = &mut out;
+            let outs = o0.iter_mut().zip(o1).zip(o2).zip(o3).zip(o4).zip(o5);
+            let fields = field[0].iter().zip(&field[1]).zip(&field[2]);
+            for ((((((o0, o1), o2), o3), o4), o5), ((value, along_x), along_y)) in outs.zip(fields) {
+                let (x, y) = (weight * along_x, weight * along_y);
+                *o0 += x;
+                *o1 += y;
+                *o2 += x * u;
+                *o3 += y * v;
+                *o4 += x * v + y * u;
+                *o5 += slope * value;
+            }
+        }
+        out
+    }
+}
+
+impl Model for Ellipse<'_> {
+    fn columns(&mut self, theta: &[f64]) -> DMatrix<f64> {
+        matrix(self.unit_loads(theta))
+    }
+
+    fn slopes(&mut self, theta: &[f64], loads: &DVector<f64>) -> DMatrix<f64> {
+        matrix(self.derivatives(theta, [loads[0], loads[1], loads[2]]))
+    }
+
+    fn confine(&self, theta: &mut [f64]) {
+        confine_ellipse(self.taxels, theta);
+        theta[5] = theta[5].clamp(EXPONENTS[0], EXPONENTS[1]);
+    }
+}
+
+/// Columns side by side.
+pub(super) fn matrix<const K: usize>(columns: [Vec<f64>; K]) -> DMatrix<f64> {
+    let n = columns[0].len();
+    DMatrix::from_iterator(n, K, columns.into_iter().flatten())
+}
+
+impl Patch {
+    /// The fitted contact, and the fit's evaluations of both stages together.
+    pub(super) fn fit(&self, taxels: &Taxels, b: &DVector<f64>, centre: [f64; 2]) -> Option<Fit> {
+        let mut model = Ellipse { taxels, disc: &self.coarse };
+        let start = |radius: &f64| {
+            let radius = radius * taxels.depth;
+            let theta = [centre[0], centre[1], radius, radius, 0.0, 0.5];
+            misfit(&mut model, b, &theta).map(|misfit| (theta, misfit))
+        };
+        let starts: Vec<_> = START_RADII.iter().filter_map(start).collect();
+        let (theta, _) = starts.iter().min_by(|a, b| a.1.total_cmp(&b.1))?;
+        let coarse = fit(&mut model, b, theta)?;
+        let fine = fit(&mut Ellipse { taxels, disc: &self.fine }, b, &coarse.theta)?;
+        Some(Fit { evaluations: START_RADII.len() + coarse.evaluations + fine.evaluations, ..fine })
+    }
+}
+
+impl Objective for Patch {
+    /// `None`: a patch is judged against the stress, not by forces on taxels.
+    fn score(&self, _p: &[f64]) -> Option<f64> {
+        None
+    }
+
+    fn find(&self, subject: &Subject) -> Option<Estimate> {
+        let taxels = Taxels::new(subject.sensor);
+        let b = DVector::from_column_slice(subject.b);
+        let fit = self.fit(&taxels, &b, subject.centre_mm())?;
+        Estimate::of_force([fit.loads[0], fit.loads[1], fit.loads[2]], subject.mu_max, -fit.misfit, fit.evaluations)
+    }
+}

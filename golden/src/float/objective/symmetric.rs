@@ -1,0 +1,212 @@
+//! Symmetric: a contact's pressure is the same on opposite sides of its centre.
+//!
+//! Two stages. The shared search over μ, with q the Gaussian-smoothed p(μ) (width s) and x₀ its peak, scores by the
+//! odd derivatives of third order, in units of s:
+//!
+//! ```text
+//! Π = −‖[q_xxx, 1.7 q_xxy, 1.7 q_xyy, q_yyy]/q‖²  at x₀
+//! ```
+//!
+//! Its p lives on cells; where the pitch exceeds the depth their coarseness looks like shear (aliasing). So the best μ
+//! is only a start. The second stage asks the same of the stress itself: the pressure is an even polynomial e(u) times
+//! (1 − |u|²)^½ on an ellipse x = x₀ + L u, seen by the taxels where they are,
+//!
+//! ```text
+//! min over x₀, μ, L, e of ‖b − (μ1 Kx + μ2 Ky + Kz) e(u)(1 − |u|²)^½‖²
+//! ```
+//!
+//! with x₀, μ and the symmetric L by Levenberg–Marquardt and the coefficients of e linear inside (variable projection).
+//!
+//! | | shape | unit | range |
+//! |---|---|---|---|
+//! | in: b, p(μ) | n | MPa, N | finite |
+//! | out: μ | 2 | – | |μ| ≤ mu_max |
+//! | out: load | scalar | N | above 0 |
+
+use super::disc::{Disc, Taxels};
+use super::fit::{fit, Fit, Model};
+use super::patch::{confine_ellipse, place};
+use super::{Estimate, Objective, Subject};
+use crate::float::search::search;
+use crate::sensor::Sensor;
+use nalgebra::{DMatrix, DVector};
+
+/// Width of the smoothing over the depth.
+const WIDTH: f64 = 2.0;
+/// Weight of the mixed derivatives: √3, that of a rotation-invariant norm of third order.
+const MIXED: f64 = 1.732;
+/// Newton steps to the peak of q.
+const PEAK_STEPS: usize = 4;
+/// Starting radii of the support over the depth.
+const SUPPORTS: [f64; 2] = [1.2, 2.4];
+/// Rings and angles of the quadrature.
+const NODES: [usize; 2] = [5, 14];
+
+/// The objective.
+#[derive(Clone, Debug)]
+pub struct Symmetric {
+    taxels: Taxels,
+    disc: Disc,
+}
+
+impl Symmetric {
+    /// For subarrays of one shape.
+    pub fn new(sensor: &Sensor) -> Symmetric {
+        Symmetric { taxels: Taxels::new(sensor), disc: Disc::new(NODES[0], NODES[1]) }
+    }
+
+    /// Derivatives of q at a place, in units of the width: orders 0, 1 (2), 2 (3), 3 (4).
+    fn derivatives(&self, p: &[f64], place: [f64; 2]) -> [f64; 10] {
+        let width = WIDTH * self.taxels.depth;
+        let mut out = [0.0; 10];
+        for ((x, y), p) in self.taxels.x.iter().zip(&self.taxels.y).zip(p) {
+            let (u, v) = ((place[0] - x) / width, (place[1] - y) / width);
+            let q = p * (-0.5 * (u * u + v * v)).exp();
+            // (−1)^n He_n, the derivatives of a Gaussian over it.
+            let along = |u: f64| [1.0, -u, u * u - 1.0, 3.0 * u - u * u * u];
+            let (a, b) = (along(u), along(v));
+            let orders = [(0, 0), (1, 0), (0, 1), (2, 0), (1, 1), (0, 2), (3, 0), (2, 1), (1, 2), (0, 3)];
+            for (out, (i, j)) in out.iter_mut().zip(orders) {
+                *out += q * a[i] * b[j];
+            }
+        }
+        out
+    }
+
+    /// The peak of q near the centroid of the pressing p.
+    fn peak(&self, p: &[f64]) -> [f64; 2] {
+        let width = WIDTH * self.taxels.depth;
+        let largest = p.iter().copied().fold(0.0, f64::max);
+        let strong = |p: f64| (p - 0.3 * largest).max(0.0);
+        let weight: f64 = p.iter().map(|p| strong(*p)).sum();
+        let mean = |at: &[f64]| at.iter().zip(p).map(|(at, p)| at * strong(*p)).sum::<f64>() / weight;
+        let mut place = [mean(&self.taxels.x), mean(&self.taxels.y)];
+        for _ in 0..PEAK_STEPS {
+            let [_, x, y, xx, xy, yy, ..] = self.derivatives(p, place);
+            let determinant = xx * yy - xy * xy;
+            if !(xx < 0.0 && determinant > 0.0) {
+                break;
+            }
+            // At most one width at a time.
+            let step = [(xy * y - yy * x) / determinant, (xy * x - xx * y) / determinant];
+            place = [place[0] + width * step[0].clamp(-1.0, 1.0), place[1] + width * step[1].clamp(-1.0, 1.0)];
+        }
+        place
+    }
+
+    /// The second stage from a start, for the best support.
+    fn refine(&self, subject: &Subject, start: [f64; 4]) -> Option<Fit> {
+        let b = DVector::from_column_slice(subject.b);
+        let (mut best, mut evaluations): (Option<Fit>, usize) = (None, 0);
+        for support in SUPPORTS {
+            let mut model = Even::new(&self.taxels, &self.disc, subject.mu_max);
+            let [x, y, mu_x, mu_y] = start;
+            let radius = support * self.taxels.depth;
+            let theta = [x, y, radius, radius, 0.0, mu_x, mu_y];
+            let Some(fit) = fit(&mut model, &b, &theta) else { continue };
+            evaluations += fit.evaluations;
+            if best.as_ref().is_none_or(|best| fit.misfit < best.misfit) && model.load(&fit.loads) > 0.0 {
+                best = Some(Fit { loads: DVector::from_element(1, model.load(&fit.loads)), ..fit });
+            }
+        }
+        best.map(|best| Fit { evaluations, ..best })
+    }
+}
+
+impl Objective for Symmetric {
+    fn score(&self, p: &[f64]) -> Option<f64> {
+        let sum: f64 = p.iter().sum();
+        if !(sum > 0.0 && sum.is_finite()) {
+            return None;
+        }
+        let [q, .., xxx, xxy, xyy, yyy] = self.derivatives(p, self.peak(p));
+        let squares = [xxx, MIXED * xxy, MIXED * xyy, yyy].map(|odd| (odd / q).powi(2));
+        Some(-squares.iter().sum::<f64>()).filter(|score| score.is_finite())
+    }
+
+    fn find(&self, subject: &Subject) -> Option<Estimate> {
+        let found = search(subject.family, subject.mu_max, self)?;
+        let [x, y] = self.peak(&subject.family.eval(found.mu));
+        let Some(fit) = self.refine(subject, [x, y, found.mu[0], found.mu[1]]) else {
+            return Some(Estimate { found, load_N: None });
+        };
+        let load = fit.loads[0];
+        let evaluations = found.evaluations + fit.evaluations;
+        Estimate::of_force([fit.theta[5] * load, fit.theta[6] * load, load], subject.mu_max, -fit.misfit, evaluations)
+    }
+}
+
+/// Coefficients of e: 1, u², uv, v². Fourth powers would show shear and shape to be alike: they double the error with noise.
+const TERMS: [(i32, i32); 4] = [(0, 0), (2, 0), (1, 1), (0, 2)];
+
+/// Stress of an even pressure; θ = x₀, y₀, L₁₁, L₂₂, L₁₂, μ1, μ2.
+struct Even<'a> {
+    taxels: &'a Taxels,
+    disc: &'a Disc,
+    mu_max: f64,
+    /// Load of each node under each coefficient: nodes × 9.
+    basis: DMatrix<f64>,
+}
+
+impl<'a> Even<'a> {
+    fn new(taxels: &'a Taxels, disc: &'a Disc, mu_max: f64) -> Even<'a> {
+        let (weights, _) = disc.weights(0.5);
+        let basis = DMatrix::from_fn(weights.len(), TERMS.len(), |node, term| {
+            let ([u, v], (i, j)) = (disc.nodes[node], TERMS[term]);
+            weights[node] * u.powi(i) * v.powi(j)
+        });
+        Even { taxels, disc, mu_max, basis }
+    }
+
+    /// Σ of the pressure.
+    fn load(&self, coefficients: &DVector<f64>) -> f64 {
+        (&self.basis * coefficients).sum()
+    }
+}
+
+impl Model for Even<'_> {
+    fn columns(&mut self, theta: &[f64]) -> DMatrix<f64> {
+        let n = self.taxels.count();
+        let mut nodes = DMatrix::zeros(n, self.disc.nodes.len());
+        let mut field = [(); 3].map(|()| vec![0.0; n]);
+        for (&node, mut column) in self.disc.nodes.iter().zip(nodes.column_iter_mut()) {
+            self.taxels.field(place(theta, node), [theta[5], theta[6], 1.0], &mut field);
+            column.copy_from_slice(&field[0]);
+        }
+        nodes * &self.basis
+    }
+
+    fn slopes(&mut self, theta: &[f64], loads: &DVector<f64>) -> DMatrix<f64> {
+        let n = self.taxels.count();
+        let weights = &self.basis * loads;
+        let mut slopes = DMatrix::zeros(n, 7);
+        let mut field = [(); 3].map(|()| vec![0.0; n]);
+        let mut units = [(); 3].map(|()| vec![0.0; n]);
+        for (&node, &weight) in self.disc.nodes.iter().zip(&weights) {
+            let place = place(theta, node);
+            self.taxels.field(place, [theta[5] * weight, theta[6] * weight, weight], &mut field);
+            let [u, v] = node;
+            for i in 0..n {
+                let (x, y) = (field[1][i], field[2][i]);
+                slopes[(i, 0)] += x;
+                slopes[(i, 1)] += y;
+                slopes[(i, 2)] += x * u;
+                slopes[(i, 3)] += y * v;
+                slopes[(i, 4)] += x * v + y * u;
+            }
+            self.taxels.add_unit_forces(place, weight, &mut units);
+        }
+        slopes.column_mut(5).copy_from_slice(&units[0]);
+        slopes.column_mut(6).copy_from_slice(&units[1]);
+        slopes
+    }
+
+    fn confine(&self, theta: &mut [f64]) {
+        confine_ellipse(self.taxels, theta);
+        let ratio = theta[5].hypot(theta[6]);
+        if ratio > self.mu_max {
+            theta[5] *= self.mu_max / ratio;
+            theta[6] *= self.mu_max / ratio;
+        }
+    }
+}

@@ -1,0 +1,229 @@
+//! The study: draws, noise, estimates, and their spread.
+
+use super::bound::Bound;
+use super::contact::{Contact, Truth};
+use super::random::Random;
+use crate::frame::{Frame, FrameError};
+use crate::reconstruct::{Golden, GoldenError};
+use crate::scene::{ObjectiveKind, Scene};
+use nalgebra::Vector2;
+use serde::Serialize;
+use thiserror::Error;
+
+/// What to run.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Study {
+    /// σ over max|b|.
+    pub levels: Vec<f64>,
+    /// Contacts.
+    pub draws: usize,
+    /// Of contacts and noise.
+    pub seed: u64,
+    /// Objectives to compare.
+    pub objectives: Vec<ObjectiveKind>,
+    /// Frames averaged in the second half of the table.
+    pub frames: usize,
+}
+
+impl Default for Study {
+    fn default() -> Self {
+        let objectives = ObjectiveKind::NAMES.iter().map(|(_, kind)| *kind).collect();
+        Study { levels: vec![0.0, 1e-4, 5e-4, 2e-3, 1e-2], draws: 200, seed: 1, objectives, frames: 64 }
+    }
+}
+
+/// How many frames were averaged.
+pub type Averaging = usize;
+
+/// Quantiles of errors, as fractions.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+pub struct Spread {
+    /// Middle.
+    pub median: f64,
+    /// Nine of ten are below.
+    pub ninety: f64,
+    /// Root mean square.
+    pub rms: f64,
+}
+
+/// One line of the table.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Row {
+    /// σ over max|b| of a single frame.
+    pub noise: f64,
+    /// Frames averaged.
+    pub frames: Averaging,
+    /// Objective, by its name in scenes.
+    pub objective: &'static str,
+    /// e_t found.
+    pub found: Spread,
+    /// e_t of the 6-parameter bound.
+    pub bound_6: Spread,
+    /// e_t of the 9-parameter bound.
+    pub bound_9: Spread,
+    /// Median found over the 6-parameter bound's median, none without noise.
+    pub ratio_6: Option<f64>,
+    /// Median found over the 9-parameter bound's median, none without noise.
+    pub ratio_9: Option<f64>,
+}
+
+/// A study that cannot be run.
+#[derive(Debug, Error)]
+pub enum StudyError {
+    /// The scene cannot be reconstructed.
+    #[error(transparent)]
+    Golden(#[from] GoldenError),
+    /// A frame is not finite.
+    #[error(transparent)]
+    Frame(#[from] FrameError),
+    /// A parameter of the study is out of range.
+    #[error("{field} = {value}: {allowed}")]
+    Parameter {
+        /// Which.
+        field: &'static str,
+        /// Its value.
+        value: String,
+        /// What is allowed.
+        allowed: &'static str,
+    },
+}
+
+impl Spread {
+    fn of(mut values: Vec<f64>) -> Spread {
+        values.sort_by(f64::total_cmp);
+        let at = |share: f64| values.get((share * values.len() as f64) as usize).copied().unwrap_or_default();
+        let square: f64 = values.iter().map(|v| v * v).sum();
+        Spread { median: at(0.5), ninety: at(0.9), rms: (square / values.len().max(1) as f64).sqrt() }
+    }
+}
+
+/// A contact, its stress and its bound.
+struct Draw {
+    contact: Contact,
+    stress_MPa: Vec<f64>,
+    peak_MPa: f64,
+    bound: Bound,
+}
+
+/// Largest number of draws and of frames.
+const MOST: usize = 100_000;
+/// Errors drawn from the bound's covariance for each contact.
+const BOUND_DRAWS: usize = 32;
+
+/// Runs a study; `progress` is called after every row with the rows done and all rows.
+///
+/// # Errors
+/// A scene the golden model refuses, a parameter out of range.
+pub fn study(scene: &Scene, study: &Study, progress: &mut dyn FnMut(usize, usize)) -> Result<Vec<Row>, StudyError> {
+    check(study)?;
+    let draws = draws(scene, study);
+    let averagings: Vec<Averaging> = if study.frames == 1 { vec![1] } else { vec![1, study.frames] };
+    let total = averagings.len() * study.levels.len() * study.objectives.len();
+    let mut rows = Vec::with_capacity(total);
+    let mut engines = Vec::new();
+    for &kind in &study.objectives {
+        let mut scene = scene.clone();
+        scene.search.objective = kind;
+        engines.push((kind, Golden::new(&scene)?));
+    }
+    for &frames in &averagings {
+        for (level, &noise) in study.levels.iter().enumerate() {
+            let single = (level * 2 + usize::from(frames > 1)) as u64;
+            // The same noise for every objective.
+            let noisy = noisy(&draws, noise, frames, study.seed.wrapping_add(0x1000 + single));
+            let share = noise / (frames as f64).sqrt();
+            let bounds = [|bound: &Bound| bound.six, |bound: &Bound| bound.nine];
+            let [bound_6, bound_9] = bounds.map(|block| Spread::of(bound_errors(&draws, share, block)));
+            for (kind, engine) in &engines {
+                let mut errors = Vec::with_capacity(draws.len());
+                for (draw, stress) in draws.iter().zip(&noisy) {
+                    errors.push(error(engine, scene, draw, stress, share * draw.peak_MPa)?);
+                }
+                let found = Spread::of(errors);
+                let ratio = |bound: Spread| (bound.median > 0.0).then(|| found.median / bound.median);
+                rows.push(Row {
+                    noise,
+                    frames,
+                    objective: kind.name(),
+                    found,
+                    bound_6,
+                    bound_9,
+                    ratio_6: ratio(bound_6),
+                    ratio_9: ratio(bound_9),
+                });
+                progress(rows.len(), total);
+            }
+        }
+    }
+    Ok(rows)
+}
+
+fn check(study: &Study) -> Result<(), StudyError> {
+    let wrong = |field, value: String, allowed| Err(StudyError::Parameter { field, value, allowed });
+    if !(1..=MOST).contains(&study.draws) {
+        return wrong("draws", study.draws.to_string(), "1 to 100000");
+    }
+    if !(1..=MOST).contains(&study.frames) {
+        return wrong("frames", study.frames.to_string(), "1 to 100000");
+    }
+    match study.levels.iter().find(|level| !(0.0..=1.0).contains(*level)) {
+        Some(level) => wrong("noise", level.to_string(), "a share of max |b|, 0 to 1"),
+        None => Ok(()),
+    }
+}
+
+/// The contacts; one whose unknowns cannot be told apart is drawn again.
+fn draws(scene: &Scene, study: &Study) -> Vec<Draw> {
+    let truth = Truth::new(&scene.sensor);
+    let mut random = Random::new(study.seed);
+    let mut draws = Vec::with_capacity(study.draws);
+    // Bounded, so that an array that never shows its contact ends too.
+    for _ in 0..4 * study.draws {
+        let contact = Contact::draw(&scene.sensor, &mut random);
+        let Some(bound) = Bound::new(&truth, &contact) else { continue };
+        let stress_MPa = truth.stress_MPa(&contact);
+        let peak_MPa = stress_MPa.iter().fold(0.0f64, |peak, b| b.abs().max(peak));
+        draws.push(Draw { contact, stress_MPa, peak_MPa, bound });
+        if draws.len() == study.draws {
+            break;
+        }
+    }
+    draws
+}
+
+/// The stresses with noise, averaged over frames.
+fn noisy(draws: &[Draw], noise: f64, frames: usize, seed: u64) -> Vec<Vec<f64>> {
+    let mut random = Random::new(seed.wrapping_mul(0x9e37_79b9));
+    let mut one = |draw: &Draw| -> Vec<f64> {
+        let sigma = noise * draw.peak_MPa;
+        let mut mean = || (0..frames).map(|_| random.normal()).sum::<f64>() / frames as f64;
+        draw.stress_MPa.iter().map(|b| if sigma > 0.0 { b + sigma * mean() } else { *b }).collect()
+    };
+    draws.iter().map(&mut one).collect()
+}
+
+/// e_t of errors drawn from a covariance.
+fn bound_errors(draws: &[Draw], share: f64, block: impl Fn(&Bound) -> nalgebra::Matrix2<f64>) -> Vec<f64> {
+    let mut random = Random::new(0xb0_0d);
+    let mut errors = Vec::with_capacity(draws.len() * BOUND_DRAWS);
+    for draw in draws {
+        let sigma = share * draw.peak_MPa;
+        let root = block(&draw.bound).cholesky().map_or_else(nalgebra::Matrix2::zeros, |root| root.l());
+        let shear = draw.contact.mu[0].hypot(draw.contact.mu[1]);
+        for _ in 0..BOUND_DRAWS {
+            let error = root * Vector2::new(random.normal(), random.normal());
+            errors.push(sigma * error.norm() / shear);
+        }
+    }
+    errors
+}
+
+/// e_t of one reconstruction.
+fn error(engine: &Golden, scene: &Scene, draw: &Draw, stress: &[f64], noise_MPa: f64) -> Result<f64, StudyError> {
+    let mut frame = Frame::from_stress("draw", &scene.sensor, stress.to_vec())?;
+    frame.resultant_N = Some(draw.contact.force_N());
+    let result = engine.run_with_noise(&frame, noise_MPa)?;
+    let [x, y, _] = result.resultant_N;
+    let [tx, ty] = draw.contact.mu;
+    Ok((x - tx).hypot(y - ty) / tx.hypot(ty))
+}

@@ -1,0 +1,35 @@
+//! Paper: the figures of its tables that results are set beside.
+//!
+//! Table 2: errors by Eq. 3 in % per sensor and case; sensors 1 and 2 against a finite-element model, 3 and 4 against
+//! case 0.
+
+use crate::partition::Case;
+
+const TABLE_2: &str = include_str!("../data/paper/table2_errors_percent.csv");
+
+/// The paper's errors of one sensor in one case, as fractions: X1, X2, X3; `None` where it prints none.
+pub fn table_2(sensor: u32, case: Case) -> Option<[f64; 3]> {
+    TABLE_2.lines().skip(1).find_map(|line| {
+        let mut fields = line.split(',');
+        let mut number = || fields.next()?.parse::<f64>().ok();
+        let (of_sensor, of_case) = (number()?, number()?);
+        let (_rows, _cols) = (number()?, number()?);
+        let errors = [number()? / 100.0, number()? / 100.0, number()? / 100.0];
+        let same = of_sensor == f64::from(sensor) && Case::numbered(of_case as i64) == Some(case);
+        same.then_some(errors)
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::partition::Grid;
+
+    #[test]
+    fn rows_of_the_table() {
+        assert_eq!(table_2(1, Case::WHOLE), Some([0.1284, 0.1293, 0.0754]));
+        assert_eq!(table_2(2, Case::Grid(Grid { rows: 2, cols: 1 })), Some([0.42, -0.01, -0.07]));
+        assert_eq!(table_2(4, Case::Grid(Grid { rows: 3, cols: 1 })), None);
+        assert!((1..=4).all(|sensor| (0..4).all(|case| table_2(sensor, Case::numbered(case).unwrap()).is_some())));
+    }
+}

@@ -1,0 +1,194 @@
+//! The error table as Markdown, CSV and JSON.
+
+use anyhow::Result;
+use dermis_golden::errors::Errors;
+use serde::Serialize;
+
+use super::table::{markdown, percent};
+use super::Format;
+use crate::compare::median;
+use crate::tabulate::Line;
+
+/// Lines in one form. Fractions in CSV and JSON, percent in Markdown.
+///
+/// # Errors
+/// A number JSON cannot hold.
+pub fn errors(lines: &[Line], format: Format) -> Result<String> {
+    Ok(match format {
+        Format::Json => serde_json::to_string(&Document { lines, medians: medians(lines) })? + "\n",
+        Format::Csv => csv(lines),
+        Format::Markdown => text(lines),
+    })
+}
+
+/// The JSON.
+#[derive(Serialize)]
+struct Document<'a> {
+    lines: &'a [Line],
+    medians: Vec<Medians>,
+}
+
+/// One scene and case over its frames; axes by size, as signs cancel.
+#[derive(Serialize)]
+struct Medians {
+    scene: String,
+    case: String,
+    frames: usize,
+    axes: [Option<f64>; 3],
+    axes_case_0: [Option<f64>; 3],
+    tangential: Option<f64>,
+    normal: Option<f64>,
+    l2: Option<f64>,
+    paper: Option<[f64; 3]>,
+}
+
+type Axis = fn(&Errors) -> Option<f64>;
+const AXES: [Axis; 3] = [|e| e.x1, |e| e.x2, |e| e.x3];
+
+fn axes(errors: Option<&Errors>) -> [Option<f64>; 3] {
+    AXES.map(|axis| errors.and_then(axis))
+}
+
+fn medians(lines: &[Line]) -> Vec<Medians> {
+    let same = |a: &Line, b: &Line| (&a.scene, &a.case) == (&b.scene, &b.case);
+    let of = |group: &[Line]| {
+        let over = |value: &dyn Fn(&Line) -> Option<f64>| median(group.iter().filter_map(value).collect());
+        Medians {
+            scene: group[0].scene.clone(),
+            case: group[0].case.clone(),
+            frames: group.len(),
+            axes: AXES.map(|axis| over(&|line| Some(axis(line.error.as_ref()?)?.abs()))),
+            axes_case_0: AXES.map(|axis| over(&|line| Some(axis(line.error_case_0.as_ref()?)?.abs()))),
+            tangential: over(&|line| line.error.as_ref()?.tangential),
+            normal: over(&|line| line.error.as_ref()?.normal),
+            l2: over(&|line| line.l2),
+            paper: group[0].paper,
+        }
+    };
+    lines.chunk_by(same).map(of).collect()
+}
+
+fn text(lines: &[Line]) -> String {
+    let head = [
+        "scene",
+        "case",
+        "frame",
+        "X1",
+        "X2",
+        "X3",
+        "e_t",
+        "e_n",
+        "ℓ2",
+        "to case 0: X1",
+        "X2",
+        "X3",
+        "fixed X1",
+        "X2",
+        "X3",
+        "e_t",
+        "e_n",
+        "fixed − float max",
+        "RMS",
+        "paper X1",
+        "X2",
+        "X3",
+        "both signs",
+        "μ",
+    ];
+    let rows = lines.iter().map(|line| {
+        let fixed = line.fixed.as_ref();
+        let fixed_error = fixed.and_then(|fixed| fixed.error.as_ref());
+        let error = line.error.as_ref();
+        let mut row = vec![line.scene.clone(), line.case.clone(), line.frame.clone()];
+        row.extend(axes(error).map(percent));
+        row.extend([error.and_then(|e| e.tangential), error.and_then(|e| e.normal), line.l2].map(percent));
+        row.extend(axes(line.error_case_0.as_ref()).map(percent));
+        row.extend(axes(fixed_error).map(percent));
+        row.extend([fixed_error.and_then(|e| e.tangential), fixed_error.and_then(|e| e.normal)].map(percent));
+        let words = |lsb: f64, share: f64| format!("{lsb:.0} LSB = {}", percent(Some(share)));
+        let gap = fixed.map(|fixed| &fixed.difference);
+        row.push(gap.map_or("-".into(), |d| words(d.max_lsb, d.max_share)));
+        row.push(gap.map_or("-".into(), |d| words(d.rms_lsb, d.rms_share)));
+        row.extend((0..3).map(|k| percent(line.paper.map(|paper| paper[k]))));
+        row.push(line.subarrays.iter().map(|part| if part.both_signs { "y" } else { "n" }).collect());
+        let mus = line.subarrays.iter().map(|part| format!("({:+.3}, {:+.3})", part.mu[0], part.mu[1]));
+        row.push(mus.collect::<Vec<_>>().join(" "));
+        row
+    });
+    let head_of_medians = [
+        "scene",
+        "case",
+        "frames",
+        "|X1|",
+        "|X2|",
+        "|X3|",
+        "e_t",
+        "e_n",
+        "ℓ2",
+        "to case 0: |X1|",
+        "|X2|",
+        "|X3|",
+        "paper X1",
+        "X2",
+        "X3",
+    ];
+    let of_medians = medians(lines).into_iter().map(|m| {
+        let mut row = vec![m.scene, m.case, m.frames.to_string()];
+        row.extend(m.axes.map(percent));
+        row.extend([m.tangential, m.normal, m.l2].map(percent));
+        row.extend(m.axes_case_0.map(percent));
+        row.extend((0..3).map(|k| percent(m.paper.map(|paper| paper[k]))));
+        row
+    });
+    format!(
+        "{}\nMedians over the frames; the paper's sensors 3 and 4 are against case 0.\n\n{}",
+        markdown(&head, rows.collect()),
+        markdown(
+            &head_of_medians.map(|name| name.replace('|', "\\|")).each_ref().map(String::as_str),
+            of_medians.collect()
+        ),
+    )
+}
+
+fn csv(lines: &[Line]) -> String {
+    let mut text = "scene,case,frame,x1,x2,x3,e_t,e_n,l2,x1_case0,x2_case0,x3_case0,fixed_x1,fixed_x2,fixed_x3,\
+                    fixed_e_t,fixed_e_n,max_lsb,max_share,rms_lsb,rms_share,paper_x1,paper_x2,paper_x3,both_signs,\
+                    condition,mu\n"
+        .to_owned();
+    for line in lines {
+        let fixed = line.fixed.as_ref();
+        let fixed_error = fixed.and_then(|fixed| fixed.error.as_ref());
+        let error = line.error.as_ref();
+        let gap = fixed.map(|fixed| fixed.difference);
+        let mut numbers: Vec<Option<f64>> = axes(error).to_vec();
+        numbers.extend([error.and_then(|e| e.tangential), error.and_then(|e| e.normal), line.l2]);
+        numbers.extend(axes(line.error_case_0.as_ref()));
+        numbers.extend(axes(fixed_error));
+        numbers.extend([fixed_error.and_then(|e| e.tangential), fixed_error.and_then(|e| e.normal)]);
+        numbers.extend([
+            gap.map(|d| d.max_lsb),
+            gap.map(|d| d.max_share),
+            gap.map(|d| d.rms_lsb),
+            gap.map(|d| d.rms_share),
+        ]);
+        numbers.extend((0..3).map(|k| line.paper.map(|paper| paper[k])));
+        let numbers: Vec<String> = numbers.iter().map(|n| n.map_or(String::new(), |n| n.to_string())).collect();
+        let yes = |met: bool| if met { 'y' } else { 'n' };
+        let both: String = line.subarrays.iter().map(|part| yes(part.both_signs)).collect();
+        let condition: String = line.subarrays.iter().map(|part| yes(part.condition)).collect();
+        let mus = line.subarrays.iter().map(|part| format!("{} {}", part.mu[0], part.mu[1]));
+        let (scene, mus) = (quoted(&line.scene), mus.collect::<Vec<_>>().join(";"));
+        let frame = quoted(&line.frame);
+        text.push_str(&format!("{scene},{},{frame},{},{both},{condition},{mus}\n", line.case, numbers.join(",")));
+    }
+    text
+}
+
+/// A name as a CSV field.
+fn quoted(name: &str) -> String {
+    if name.contains([',', '"', '\n', '\r']) {
+        format!("\"{}\"", name.replace('"', "\"\""))
+    } else {
+        name.to_owned()
+    }
+}

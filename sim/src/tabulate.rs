@@ -1,0 +1,178 @@
+//! Error tables: each scene in each of the paper's cases on each frame, beside the paper's own figures.
+//!
+//! ```text
+//! scene × case × frame -> golden ------> errors against truth, against case 0, per taxel --+
+//!                      -> bit-true ----> errors, difference in LSB and % ------------------+--> Line
+//! paper's Table 2 -------------------------------------------------------------------------+
+//! ```
+//!
+//! | figure | unit |
+//! |---|---|
+//! | errors, ℓ2, paper | fractions; X1 X2 X3 signed as in Eq. 3 |
+//! | difference | LSB of the force word, share of the largest force |
+//!
+//! ℓ2 = ‖f − f_ref‖/‖f_ref‖ over all taxels and components. The bit-true columns are empty where the hardware does not
+//! have the case.
+
+use anyhow::Result;
+use dermis_golden::errors::Errors;
+use dermis_golden::fixed::Model;
+use dermis_golden::flags::Flag;
+use dermis_golden::frame::{Forces, Frame};
+use dermis_golden::paper::table_2;
+use dermis_golden::partition::Case;
+use dermis_golden::quantise::full_scale;
+use dermis_golden::reconstruct::{Golden, Reconstruction};
+use dermis_golden::scene::Scene;
+use serde::Serialize;
+
+use crate::compare::{difference, Difference};
+
+/// One subarray of one line.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Part {
+    /// Ratio of shear to normal force.
+    pub mu: [f64; 2],
+    /// Whether compression and tension both exceed the noise floor, the paper's condition.
+    pub both_signs: bool,
+    /// Whether the scene's own condition is met.
+    pub condition: bool,
+}
+
+/// The bit-true model on one frame.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Fixed {
+    /// Against truth.
+    pub error: Option<Errors>,
+    /// From the floating-point result.
+    pub difference: Difference,
+}
+
+/// One scene, case and frame.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Line {
+    /// Scene name.
+    pub scene: String,
+    /// Case as scenes name it.
+    pub case: String,
+    /// Frame name.
+    pub frame: String,
+    /// Against truth.
+    pub error: Option<Errors>,
+    /// Against case 0 of the same frame, as the paper does for sensors 3 and 4.
+    pub error_case_0: Option<Errors>,
+    /// Per taxel, against truth.
+    pub l2: Option<f64>,
+    /// Per subarray, row-major.
+    pub subarrays: Vec<Part>,
+    /// The bit-true model, where it has the case.
+    pub fixed: Option<Fixed>,
+    /// The paper's X1 X2 X3 of this sensor and case.
+    pub paper: Option<[f64; 3]>,
+    /// Remarks on the golden result.
+    pub flags: Vec<Flag>,
+}
+
+/// The paper's sensor a built-in scene stands for.
+fn paper_sensor(scene: &Scene) -> Option<u32> {
+    let number: u32 = scene.name.strip_prefix("sensor-")?.parse().ok()?;
+    let builtin = Scene::builtin(&scene.name).ok()?;
+    (builtin.sensor == scene.sensor).then_some(number)
+}
+
+/// All lines of one scene, case by case; a case that does not divide the array has none.
+///
+/// # Errors
+/// A scene or frame the golden model refuses.
+pub fn tabulate(scene: &Scene, cases: &[i64], frames: &[Frame], progress: &mut dyn FnMut()) -> Result<Vec<Line>> {
+    let mut lines = Vec::new();
+    let mut whole: Vec<Reconstruction> = Vec::new();
+    for case in cases.iter().filter_map(|&number| Case::numbered(number)) {
+        if dermis_golden::partition::subarrays(case, &scene.sensor).is_err() {
+            continue;
+        }
+        let mut scene = scene.clone();
+        scene.partition.case = case;
+        let golden = Golden::new(&scene)?;
+        // What hardware does not have is not an error here: the columns stay empty.
+        let model = Model::for_frames(&scene, frames).ok();
+        for (index, frame) in frames.iter().enumerate() {
+            let result = golden.run(frame)?;
+            let fixed = model.as_ref().map(|model| fixed(model, frame, &result)).transpose()?;
+            lines.push(line(&scene, case, frame, &result, fixed, whole.get(index)));
+            if case == Case::WHOLE {
+                whole.push(result);
+            }
+            progress();
+        }
+    }
+    Ok(lines)
+}
+
+fn fixed(model: &Model, frame: &Frame, golden: &Reconstruction) -> Result<Fixed> {
+    let result = model.reconstruct(frame)?;
+    let lsb_N = model.force_lsb_N(full_scale(&model.scene, frame));
+    Ok(Fixed { error: result.error, difference: difference(&golden.forces_N, &result.forces_N, lsb_N) })
+}
+
+fn line(
+    scene: &Scene,
+    case: Case,
+    frame: &Frame,
+    result: &Reconstruction,
+    fixed: Option<Fixed>,
+    whole: Option<&Reconstruction>,
+) -> Line {
+    let parts = result.subarrays.iter().map(|part| Part {
+        mu: part.mu,
+        both_signs: part.compression_centroid_mm.is_some() && part.tension_centroid_mm.is_some(),
+        condition: part.centroid_condition,
+    });
+    Line {
+        scene: scene.name.clone(),
+        case: case.to_string(),
+        frame: frame.id.clone(),
+        error: result.error,
+        error_case_0: whole.map(|whole| Errors::new(whole.resultant_N, result.resultant_N)),
+        l2: frame.cell_forces_N.as_ref().and_then(|truth| relative_l2(truth, &result.forces_N)),
+        subarrays: parts.collect(),
+        fixed,
+        paper: paper_sensor(scene).and_then(|sensor| table_2(sensor, case)),
+        flags: result.flags.clone(),
+    }
+}
+
+/// ‖value − truth‖/‖truth‖, `None` without force.
+fn relative_l2(truth: &Forces, value: &Forces) -> Option<f64> {
+    let pairs = [(&truth.fx, &value.fx), (&truth.fy, &value.fy), (&truth.fz, &value.fz)];
+    let each = || pairs.iter().flat_map(|(truth, value)| truth.iter().zip(value.iter()));
+    let off: f64 = each().map(|(truth, value)| (value - truth).powi(2)).sum();
+    let size: f64 = each().map(|(truth, _)| truth.powi(2)).sum();
+    (size > 0.0).then(|| (off / size).sqrt())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn l2_by_hand() {
+        let truth = Forces { fx: vec![0.0; 2], fy: vec![0.0; 2], fz: vec![3.0, 4.0] };
+        let value = Forces { fz: vec![3.0, 3.0], ..truth.clone() };
+        assert_eq!(relative_l2(&truth, &value), Some(0.2));
+        assert_eq!(relative_l2(&Forces::zeros(2), &value), None);
+    }
+
+    #[test]
+    fn every_case_of_a_small_scene() {
+        let scene = Scene::builtin("sensor-1").unwrap();
+        let frames = &Frame::shipped(&scene)[..1];
+        let mut done = 0;
+        let lines = tabulate(&scene, &[0, 1, 2, 3], frames, &mut || done += 1).unwrap();
+        assert_eq!((lines.len(), done), (4, 4));
+        assert_eq!(lines.iter().map(|line| line.subarrays.len()).collect::<Vec<_>>(), [1, 4, 2, 2]);
+        assert!(lines[0].fixed.is_some() && lines[0].error_case_0.is_none());
+        assert!(lines[1].error_case_0.is_some());
+        assert_eq!(lines[0].paper, Some([0.1284, 0.1293, 0.0754]));
+    }
+}
