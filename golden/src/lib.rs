@@ -17,11 +17,13 @@
 // Names carry their unit as SI writes it: `stress_MPa`, `resultant_N`.
 #![allow(non_snake_case)]
 
+pub mod bonded;
 pub mod errors;
 pub mod fixed;
 pub mod flags;
 pub mod float;
 pub mod frame;
+pub mod gauss;
 pub mod influence;
 pub mod matrices;
 pub mod partition;

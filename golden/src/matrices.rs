@@ -25,6 +25,7 @@ mod mirror;
 mod tests;
 
 use crate::influence::Influence;
+use crate::scene::Medium;
 use crate::sensor::{Sensor, SensorError};
 use faer::Mat;
 use inverse::{product, Inverse};
@@ -106,11 +107,19 @@ pub enum MatricesError {
 }
 
 impl Matrices {
-    /// Computes the matrices of a (sub)array for shear ratios up to `mu_max` (0 to 2).
+    /// Computes the matrices of a (sub)array on a half-space for shear ratios up to `mu_max` (0 to 2).
     ///
     /// # Errors
     /// [`MatricesError`]; the size is checked before anything is allocated.
     pub fn new(sensor: &Sensor, mu_max: f64) -> Result<Matrices, MatricesError> {
+        Matrices::through(sensor, Medium::HalfSpace, mu_max)
+    }
+
+    /// Computes the matrices of a (sub)array under any medium for shear ratios up to `mu_max` (0 to 2).
+    ///
+    /// # Errors
+    /// As [`Matrices::new`].
+    pub fn through(sensor: &Sensor, medium: Medium, mu_max: f64) -> Result<Matrices, MatricesError> {
         sensor.check()?;
         let boxed = || Box::new(sensor.clone());
         let n = sensor.taxels();
@@ -118,7 +127,7 @@ impl Matrices {
             let sensor = boxed();
             return Err(MatricesError::TooLarge { sensor, taxels: n });
         }
-        let Influence { cx, cy, cz } = Influence::new(sensor);
+        let Influence { cx, cy, cz } = Influence::new(sensor, medium);
         let finite = |m: &Mat<f64>| m.col_iter().all(|col| col.iter().all(|c| c.is_finite()));
         if !(finite(&cx) && finite(&cy) && finite(&cz) && cz[(0, 0)] > 0.0) {
             return Err(MatricesError::NotFinite { sensor: boxed() });

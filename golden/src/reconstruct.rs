@@ -10,6 +10,8 @@
 //! | out: resultant | 3 | N |
 //! | out: error | 5 | fraction, where the frame has a resultant |
 
+#[cfg(test)]
+mod bonded_tests;
 mod golden;
 #[cfg(test)]
 mod tests;

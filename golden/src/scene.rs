@@ -65,7 +65,7 @@ pub enum Medium {
     HalfSpace,
     /// A layer of the sensor's thickness on a rigid base.
     BondedLayer {
-        /// Poisson ratio, above 0 and below 0.5.
+        /// Poisson ratio, at least 0 and below 0.5.
         poisson: f64,
     },
 }

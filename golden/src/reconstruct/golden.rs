@@ -50,10 +50,14 @@ impl Golden {
     /// # Errors
     /// [`GoldenError`] but `Frame` and `TooStrong`.
     pub fn new(scene: &Scene) -> Result<Golden, GoldenError> {
-        scene.require_supported()?;
+        scene.require_golden()?;
         let parts = subarrays(scene.partition.case, &scene.sensor)?;
         let shape = parts[0].sensor(&scene.sensor);
-        Ok(Golden { scene: scene.clone(), matrices: Matrices::new(&shape, scene.search.mu_max)?, parts })
+        Ok(Golden {
+            scene: scene.clone(),
+            matrices: Matrices::through(&shape, scene.medium, scene.search.mu_max)?,
+            parts,
+        })
     }
 
     /// The matrices of a subarray.

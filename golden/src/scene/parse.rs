@@ -95,8 +95,8 @@ fn medium(reader: &Reader) -> Result<Medium, SceneError> {
     let layer = Medium::BondedLayer { poisson: DEFAULT_POISSON };
     let names = [("half-space", Medium::HalfSpace), ("bonded-layer", layer)];
     let kind = reader.choice("medium.kind", &names)?;
-    let allowed = "a number above 0 and below 0.5";
-    let poisson = reader.number("medium.poisson", |nu| nu > 0.0 && nu < 0.5, allowed)?;
+    let allowed = "a number of at least 0 and below 0.5";
+    let poisson = reader.number("medium.poisson", |nu| (0.0..0.5).contains(&nu), allowed)?;
     match (kind, poisson, reader.value("medium.poisson")) {
         (Medium::HalfSpace, _, Some(value)) => {
             Err(reader.wrong("medium.poisson", value, "left out unless medium.kind = \"bonded-layer\""))
