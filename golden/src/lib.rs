@@ -8,6 +8,8 @@
 //!                      v_ij           μ               fx, fy, fz      resultant, errors, flags
 //! ```
 //!
+//! [`generator`] makes frames with known forces; [`bonded`] is the influence of a layer on a rigid base.
+//!
 //! The method: forces x = (μ1 p, μ2 p, p), shear and pressure alike in distribution, meet the measured stress b exactly
 //! when (μ1 Cx + μ2 Cy + Cz) p = b. That leaves two unknowns per subarray, found by a search over μ.
 //!
@@ -24,6 +26,7 @@ pub mod flags;
 pub mod float;
 pub mod frame;
 pub mod gauss;
+pub mod generator;
 pub mod influence;
 pub mod matrices;
 pub mod partition;

@@ -43,7 +43,8 @@ const EXAMPLES: &str = "Examples:
   dermis reconstruct sensor-1 --engine rtl           the same in the Verilated hardware
   dermis build eight-by-eight --out rtl              Verilog, memory files, manifest.json
   dermis cosim sensor-1                              all shipped frames, model against hardware
-  dermis table sensor-1 eight-by-eight               one line per scene";
+  dermis table sensor-1 eight-by-eight               one line per scene
+  dermis generate sensor-3 --random 2 --out two.json a frame with known forces";
 
 #[derive(Subcommand, Debug)]
 enum Command {
@@ -93,6 +94,8 @@ enum Command {
         #[arg(long, value_enum, default_value = "both")]
         device: DeviceChoice,
     },
+    /// Make a frame with known forces from described contacts.
+    Generate(crate::generate::Arguments),
     /// Co-simulate scenes on their shipped frames and print one line for each.
     Table {
         /// Built-in names or paths of scenes.
@@ -185,6 +188,7 @@ fn run(arguments: &Arguments) -> Result<(String, bool)> {
             };
             Ok((text, verified.findings.is_equal()))
         }
+        Command::Generate(arguments) => Ok((crate::generate::run(arguments)?, true)),
         Command::Table { scenes } => {
             let verify = |name: &String| -> Result<Verified> {
                 let (scene, frames) = resolve(Some(name), &[])?;
