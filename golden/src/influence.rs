@@ -104,6 +104,21 @@ fn mean(dx: f64, dy: f64, a: f64, b: f64, f: impl Fn(f64, f64) -> f64) -> f64 {
     sum / 4.0
 }
 
+/// Stress per unit force along x, y, z at each distance in rows and columns, row-major: equal offsets have equal entries.
+/// cx is odd in the columns' direction, cy in the rows'.
+pub fn table(sensor: &Sensor, medium: Medium) -> Vec<[f64; 3]> {
+    let Sensor { cols, pitch_x_mm: a, pitch_y_mm: b, thickness_mm: h, .. } = *sensor;
+    let offset = |index: usize| [(index % cols) as f64 * a, (index / cols) as f64 * b];
+    let offsets = (0..sensor.taxels()).map(offset);
+    match medium {
+        Medium::HalfSpace => offsets.map(|[dx, dy]| [cx, cy, cz].map(|f| f(dx, dy, a, b, h))).collect(),
+        Medium::BondedLayer { poisson } => {
+            let kernel = Kernel::new(poisson);
+            offsets.map(|offset| cell::influence(&kernel, offset, [a, b], h)).collect()
+        }
+    }
+}
+
 /// Influence matrices of an array, taxels × cells; row t, column f is the stress at taxel t per unit force on cell f.
 pub struct Influence {
     /// Forces along x.
@@ -115,19 +130,15 @@ pub struct Influence {
 }
 
 impl Influence {
-    /// The three matrices; mirror symmetry of the array holds to the bit.
-    pub fn new(sensor: &Sensor, medium: Medium) -> Influence {
-        let Sensor { rows, cols, pitch_x_mm: a, pitch_y_mm: b, thickness_mm: h } = *sensor;
-        // Equal offsets have equal entries: one evaluation for each distance in rows and columns.
-        let offset = |index: usize| [(index % cols) as f64 * a, (index / cols) as f64 * b];
-        let offsets = (0..sensor.taxels()).map(offset);
-        let table: Vec<[f64; 3]> = match medium {
-            Medium::HalfSpace => offsets.map(|[dx, dy]| [cx, cy, cz].map(|f| f(dx, dy, a, b, h))).collect(),
-            Medium::BondedLayer { poisson } => {
-                let kernel = Kernel::new(poisson);
-                offsets.map(|offset| cell::influence(&kernel, offset, [a, b], h)).collect()
-            }
-        };
+    /// The three matrices of a half-space; mirror symmetry of the array holds to the bit.
+    pub fn new(sensor: &Sensor) -> Influence {
+        Influence::through(sensor, Medium::HalfSpace)
+    }
+
+    /// The three matrices of any medium; mirror symmetry of the array holds to the bit.
+    pub fn through(sensor: &Sensor, medium: Medium) -> Influence {
+        let Sensor { rows, cols, .. } = *sensor;
+        let table = table(sensor, medium);
         let fill = |axis: usize, odd_x: bool, odd_y: bool| {
             Mat::from_fn(rows * cols, rows * cols, |taxel, force| {
                 let (r, c) = (taxel / cols, taxel % cols);

@@ -24,6 +24,7 @@ pub mod errors;
 pub mod fixed;
 pub mod flags;
 pub mod float;
+pub mod folded;
 pub mod frame;
 pub mod gauss;
 pub mod generator;

@@ -17,19 +17,19 @@
 //! | out: Cz⁺ | n × n | mm² (N per MPa) |
 //! | out: Ax, Ay | n × n | – |
 //!
-//! The mirror symmetry of the array holds to the bit in every matrix, so that folding them is exact.
+//! Everything is computed in the basis of mirror parities ([`crate::folded`]), a sixteenth of the work; the mirror symmetry
+//! of the array holds to the bit in every matrix, so that folding them again is exact.
 
 mod inverse;
-mod mirror;
 #[cfg(test)]
 mod tests;
 
+use crate::folded::{Basis, Operator, EVEN, ODD_X, ODD_Y};
 use crate::influence::Influence;
 use crate::scene::Medium;
 use crate::sensor::{Sensor, SensorError};
 use faer::Mat;
-use inverse::{product, Inverse};
-use mirror::mirror;
+use inverse::{chain, Inverse};
 use thiserror::Error;
 
 /// Most taxels in one subarray: the 48 × 48 of the largest sensor. A matrix then takes 42 MB.
@@ -66,6 +66,21 @@ pub struct Matrices {
     pub spectral_radius: f64,
     /// Degree of the polynomial in μ.
     pub degree: usize,
+    /// Cz⁺, Ax and Ay again, folded, for fast products.
+    pub passes: Passes,
+}
+
+/// The matrices a frame is multiplied by, in the basis of the mirror parities or, without symmetry, of the taxels.
+#[derive(Clone, Debug)]
+pub struct Passes {
+    /// The basis of the three matrices.
+    pub basis: Basis,
+    /// Cz⁺.
+    pub cz_pinv: Operator,
+    /// Cz⁺ Cx.
+    pub ax: Operator,
+    /// Cz⁺ Cy.
+    pub ay: Operator,
 }
 
 /// A subarray without usable matrices.
@@ -127,18 +142,20 @@ impl Matrices {
             let sensor = boxed();
             return Err(MatricesError::TooLarge { sensor, taxels: n });
         }
-        let Influence { cx, cy, cz } = Influence::new(sensor, medium);
+        let Influence { cx, cy, cz } = Influence::through(sensor, medium);
         let finite = |m: &Mat<f64>| m.col_iter().all(|col| col.iter().all(|c| c.is_finite()));
         if !(finite(&cx) && finite(&cy) && finite(&cz) && cz[(0, 0)] > 0.0) {
             return Err(MatricesError::NotFinite { sensor: boxed() });
         }
-        let inverse = Inverse::new(&cz).ok_or_else(|| MatricesError::NotConverged { sensor: boxed() })?;
-        let mut cz_pinv = inverse.power(1);
-        mirror(sensor, &mut cz_pinv, 1.0, 1.0);
-        let [mut ax, mut ay] = [&cx, &cy].map(|c| product(&cz_pinv, c));
-        mirror(sensor, &mut ax, -1.0, 1.0);
-        mirror(sensor, &mut ay, 1.0, -1.0);
-        let spectral_radius = mu_max * if mu_max > 0.0 { inverse.largest_radius(&cx, &cy) } else { 0.0 };
+        let basis = Basis::parities(sensor.rows, sensor.cols);
+        let folded = |flip: usize, m: &Mat<f64>| basis.fold_matrix(flip, |i, j| m[(i, j)]);
+        let (folded_cx, folded_cy) = (folded(ODD_X, &cx), folded(ODD_Y, &cy));
+        let inverse =
+            Inverse::new(&folded(EVEN, &cz)).ok_or_else(|| MatricesError::NotConverged { sensor: boxed() })?;
+        let cz_pinv = inverse.power(1);
+        let (ax, ay) = (chain(&cz_pinv, &folded_cx), chain(&cz_pinv, &folded_cy));
+        let shear = mu_max > 0.0;
+        let spectral_radius = if shear { mu_max * inverse.largest_radius(&folded_cx, &folded_cy) } else { 0.0 };
         let degree = degree(spectral_radius, mu_max).ok_or_else(|| MatricesError::SlowSeries {
             sensor: boxed(),
             radius: spectral_radius,
@@ -147,12 +164,13 @@ impl Matrices {
         Ok(Matrices {
             sensor: sensor.clone(),
             condition: inverse.condition,
-            cz_pinv,
-            ax,
-            ay,
+            cz_pinv: basis.unfold_matrix(EVEN, &cz_pinv),
+            ax: basis.unfold_matrix(ODD_X, &ax),
+            ay: basis.unfold_matrix(ODD_Y, &ay),
             cz,
             cx,
             cy,
+            passes: Passes { basis, cz_pinv, ax, ay },
             spectral_radius,
             degree,
         })

@@ -11,16 +11,15 @@
 //! | in: b | n | MPa |
 //! | out: v_ij | (d + 1)(d + 2)/2 of n | N |
 //!
-//! 1 + d(d + 1) products of n². The remainder of the series is of the order r^(d+1) ([`crate::matrices`]). Feeds
+//! 1 + d(d + 1) products, of n²/4 in the basis of mirror parities ([`crate::folded`]). The remainder of the series is of the order r^(d+1) ([`crate::matrices`]). Feeds
 //! `search` and `force`.
 
 #[cfg(test)]
 mod tests;
 
-use crate::matrices::Matrices;
-use faer::linalg::matmul::matmul;
+use crate::matrices::{Matrices, Passes};
 use faer::linalg::solvers::Solve;
-use faer::{Accum, Col, ColMut, ColRef, Mat, Par};
+use faer::{Col, ColRef, Mat};
 
 /// The family p(μ) of one subarray and frame.
 #[derive(Clone, Debug, PartialEq)]
@@ -37,12 +36,6 @@ pub fn place(i: usize, j: usize) -> usize {
     order * (order + 1) / 2 + j
 }
 
-/// out += factor · m · v
-fn accumulate(m: &Mat<f64>, v: &[f64], factor: f64, out: &mut [f64]) {
-    let v = ColRef::from_slice(v);
-    matmul(ColMut::from_slice_mut(out), Accum::Add, m, v, factor, Par::Seq);
-}
-
 impl Polynomial {
     /// The family for stress `b` in MPa, of the matrices' degree.
     pub fn new(matrices: &Matrices, b: &[f64]) -> Polynomial {
@@ -51,23 +44,25 @@ impl Polynomial {
 
     /// The family cut off at a degree; 0 is p₀ alone, for a subarray that is not searched.
     pub fn of_degree(matrices: &Matrices, b: &[f64], degree: usize) -> Polynomial {
+        let Passes { basis, cz_pinv, ax, ay } = &matrices.passes;
         let n = b.len();
         let mut first = vec![0.0; n];
-        accumulate(&matrices.cz_pinv, b, 1.0, &mut first);
-        let mut coefficients = vec![first];
+        cz_pinv.accumulate(&basis.fold(b), 1.0, &mut first);
+        let mut folded = vec![first];
         for order in 1..=degree {
             for j in 0..=order {
                 let i = order - j;
                 let mut v = vec![0.0; n];
                 if i > 0 {
-                    accumulate(&matrices.ax, &coefficients[place(i - 1, j)], -1.0, &mut v);
+                    ax.accumulate(&folded[place(i - 1, j)], -1.0, &mut v);
                 }
                 if j > 0 {
-                    accumulate(&matrices.ay, &coefficients[place(i, j - 1)], -1.0, &mut v);
+                    ay.accumulate(&folded[place(i, j - 1)], -1.0, &mut v);
                 }
-                coefficients.push(v);
+                folded.push(v);
             }
         }
+        let coefficients = folded.iter().map(|v| basis.unfold(v)).collect();
         Polynomial { degree, coefficients }
     }
 

@@ -1,9 +1,11 @@
 //! Inverse: powers of the pseudo-inverse of the symmetric Cz, and the radius of the series in μ.
 //!
-//! Cz = U diag(λ) Uᵀ; f(Cz)⁺ = U diag(f) Uᵀ without the λ that are rounding only, |λ| ≤ n ε max|λ|.
+//! Cz = U diag(λ) Uᵀ, block by block of the folded basis; f(Cz)⁺ = U diag(f) Uᵀ without the λ that are rounding only,
+//! |λ| ≤ n ε max|λ|.
 
+use crate::folded::{Block, Operator};
 use faer::linalg::matmul::matmul;
-use faer::{Accum, Col, Mat, Par, Side};
+use faer::{Accum, Mat, Par, Side};
 use std::f64::consts::FRAC_PI_2;
 
 /// Directions of θ tried from 0 to π/2.
@@ -16,75 +18,137 @@ pub(super) fn product(a: &Mat<f64>, b: &Mat<f64>) -> Mat<f64> {
     c
 }
 
-/// Eigenvectors and inverted eigenvalues of Cz, zero for those left out.
+/// A B in the folded basis.
+pub(super) fn chain(a: &Operator, b: &Operator) -> Operator {
+    let pairs = a.blocks.iter().flat_map(|left| {
+        let fits = |right: &&Block| right.row0 == left.col0 && right.entries.nrows() == left.entries.ncols();
+        b.blocks.iter().find(fits).map(|right| (left, right))
+    });
+    let multiply = |(left, right): (&Block, &Block)| Block {
+        row0: left.row0,
+        col0: right.col0,
+        entries: product(&left.entries, &right.entries),
+    };
+    Operator { blocks: pairs.map(multiply).collect() }
+}
+
+/// Eigenvectors and inverted eigenvalues of each block of Cz, zero for those left out.
 pub(super) struct Inverse {
-    vectors: Mat<f64>,
-    values: Vec<f64>,
+    blocks: Vec<(usize, Mat<f64>, Vec<f64>)>,
     /// Largest over smallest |λ|.
     pub(super) condition: f64,
 }
 
 impl Inverse {
-    /// Decomposes Cz, `None` when the eigenvalues do not converge.
-    pub(super) fn new(cz: &Mat<f64>) -> Option<Inverse> {
-        let eigen = cz.self_adjoint_eigen(Side::Lower).ok()?;
-        let values: Vec<f64> = eigen.S().column_vector().iter().copied().collect();
-        let largest = values.iter().fold(0.0f64, |largest, v| v.abs().max(largest));
-        let smallest = values.iter().fold(f64::INFINITY, |smallest, v| v.abs().min(smallest));
-        let least = values.len() as f64 * f64::EPSILON * largest;
-        let invert = |v: &f64| if v.abs() <= least { 0.0 } else { 1.0 / v };
-        Some(Inverse {
-            vectors: eigen.U().to_owned(),
-            values: values.iter().map(invert).collect(),
-            condition: largest / smallest,
-        })
+    /// Decomposes the folded Cz, `None` when the eigenvalues do not converge.
+    pub(super) fn new(cz: &Operator) -> Option<Inverse> {
+        let mut blocks = Vec::with_capacity(cz.blocks.len());
+        for block in &cz.blocks {
+            let eigen = block.entries.self_adjoint_eigen(Side::Lower).ok()?;
+            let values: Vec<f64> = eigen.S().column_vector().iter().copied().collect();
+            blocks.push((block.row0, eigen.U().to_owned(), values));
+        }
+        let all = || blocks.iter().flat_map(|(_, _, values)| values.iter().map(|v| v.abs()));
+        let (largest, smallest) = (all().fold(0.0, f64::max), all().fold(f64::INFINITY, f64::min));
+        let least = all().count() as f64 * f64::EPSILON * largest;
+        for value in blocks.iter_mut().flat_map(|(_, _, values)| values) {
+            *value = if value.abs() <= least { 0.0 } else { 1.0 / *value };
+        }
+        Some(Inverse { blocks, condition: largest / smallest })
     }
 
     /// U diag(f) Uᵀ with f = 1/λ (`root` 1), or |1/λ|^½ (`root` 2).
-    pub(super) fn power(&self, root: u32) -> Mat<f64> {
-        let factor = |k: usize| match root {
-            1 => self.values[k],
-            _ => self.values[k].abs().sqrt(),
+    pub(super) fn power(&self, root: u32) -> Operator {
+        let power = |(start, vectors, values): &(usize, Mat<f64>, Vec<f64>)| {
+            let factor = |k: usize| match root {
+                1 => values[k],
+                _ => values[k].abs().sqrt(),
+            };
+            let n = values.len();
+            let scaled = Mat::from_fn(n, n, |i, k| vectors[(i, k)] * factor(k));
+            let entries = product(&scaled, &vectors.transpose().to_owned());
+            Block { row0: *start, col0: *start, entries }
         };
-        let n = self.values.len();
-        let scaled = Mat::from_fn(n, n, |i, k| self.vectors[(i, k)] * factor(k));
-        product(&scaled, &self.vectors.transpose().to_owned())
+        Operator { blocks: self.blocks.iter().map(power).collect() }
     }
 
     /// Largest ‖S (cos θ Cx + sin θ Cy) S‖ over the directions.
-    pub(super) fn largest_radius(&self, cx: &Mat<f64>, cy: &Mat<f64>) -> f64 {
+    pub(super) fn largest_radius(&self, cx: &Operator, cy: &Operator) -> f64 {
         let s = self.power(2);
-        let [kx, ky] = [cx, cy].map(|c| product(&product(&s, c), &s));
+        let [kx, ky] = [cx, cy].map(|c| chain(&chain(&s, c), &s));
+        let n = self.blocks.iter().map(|(_, _, values)| values.len()).sum();
         let radius = |step: usize| {
             let theta = FRAC_PI_2 * step as f64 / (DIRECTIONS - 1) as f64;
             let (sin, cos) = theta.sin_cos();
-            norm2(&Mat::from_fn(kx.nrows(), kx.ncols(), |i, j| cos * kx[(i, j)] + sin * ky[(i, j)]))
+            norm2(n, |v, image| {
+                kx.accumulate(v, cos, image);
+                ky.accumulate(v, sin, image);
+            })
         };
         (0..DIRECTIONS).map(radius).fold(0.0, f64::max)
     }
 }
 
-/// 2-norm of an antisymmetric matrix, by power iteration on KᵀK = −K². The Rayleigh quotient grows towards it and its
-/// error is the square of the vector's.
-fn norm2(k: &Mat<f64>) -> f64 {
-    const STEPS: usize = 300;
+/// 2-norm of an antisymmetric K, given as `image += K v`, by Lanczos' method on KᵀK = −K², every new vector made
+/// orthogonal to all before. The largest eigenvalue of the tridiagonal matrix grows towards ‖K‖².
+fn norm2(n: usize, apply: impl Fn(&[f64], &mut [f64])) -> f64 {
+    const STEPS: usize = 60;
     const ENOUGH: f64 = 1e-7;
+    let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
     // A fixed start without symmetry, so that it has a part in every parity.
-    let mut vector = Col::from_fn(k.nrows(), |i| 1.0 + ((i * 37 + 11) % 64) as f64 / 64.0);
+    let mut next: Vec<f64> = (0..n).map(|i| 1.0 + ((i * 37 + 11) % 64) as f64 / 64.0).collect();
+    let mut vectors: Vec<Vec<f64>> = Vec::new();
+    let (mut diagonal, mut beside): (Vec<f64>, Vec<f64>) = (Vec::new(), Vec::new());
     let mut norm = 0.0;
-    for _ in 0..STEPS {
-        let size = vector.norm_l2();
-        if size == 0.0 {
-            return norm;
+    for _ in 0..STEPS.min(n) {
+        let size = dot(&next, &next).sqrt();
+        if size <= f64::EPSILON * norm * norm || size == 0.0 {
+            break;
         }
-        let image = k * (vector / size);
-        let next = image.norm_l2();
-        let settled = (next - norm).abs() <= ENOUGH * next;
-        norm = next;
-        vector = k * image;
+        beside.push(size);
+        vectors.push(next.iter().map(|x| x / size).collect());
+        let vector = &vectors[vectors.len() - 1];
+        let (mut image, mut twice) = (vec![0.0; n], vec![0.0; n]);
+        apply(vector, &mut image);
+        apply(&image, &mut twice);
+        next = twice.iter().map(|x| -x).collect();
+        diagonal.push(dot(&next, vector));
+        for _ in 0..2 {
+            for vector in &vectors {
+                let part = dot(&next, vector);
+                next.iter_mut().zip(vector).for_each(|(x, v)| *x -= part * v);
+            }
+        }
+        let larger = largest_eigenvalue(&diagonal, &beside[1..]).max(0.0).sqrt();
+        let settled = (larger - norm).abs() <= ENOUGH * larger;
+        norm = larger;
         if settled {
             break;
         }
     }
     norm
+}
+
+/// Largest eigenvalue of a symmetric tridiagonal matrix, by halving an interval that holds it: x is above all of them
+/// when the pivots of T − x are all negative.
+fn largest_eigenvalue(diagonal: &[f64], beside: &[f64]) -> f64 {
+    let edge = |k: usize| if k < beside.len() { beside[k].abs() } else { 0.0 };
+    let bound = |k: usize| diagonal[k].abs() + edge(k) + if k > 0 { edge(k - 1) } else { 0.0 };
+    let mut high = (0..diagonal.len()).map(bound).fold(0.0, f64::max);
+    let mut low = -high;
+    for _ in 0..64 {
+        let x = (low + high) / 2.0;
+        let mut pivot = -1.0;
+        let above = (0..diagonal.len()).all(|k| {
+            let off = if k > 0 { beside[k - 1] * beside[k - 1] / pivot } else { 0.0 };
+            pivot = diagonal[k] - x - off;
+            pivot < 0.0
+        });
+        if above {
+            high = x;
+        } else {
+            low = x;
+        }
+    }
+    high
 }

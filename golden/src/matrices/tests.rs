@@ -1,5 +1,6 @@
 //! Matrices against known figures, their rebuild property and their refusals.
 
+use super::inverse::product;
 use super::*;
 use crate::scene::Scene;
 use proptest::prelude::*;

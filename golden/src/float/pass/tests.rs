@@ -2,6 +2,7 @@
 
 use super::*;
 use crate::float::objective::{Objective, Sparse};
+use crate::folded::accumulate;
 use crate::frame::Frame;
 use crate::reference::values;
 use crate::scene::Scene;
