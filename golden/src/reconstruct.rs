@@ -10,12 +10,15 @@
 //! | out: resultant | 3 | N |
 //! | out: error | 5 | fraction, where the frame has a resultant |
 
+mod adaptive;
 #[cfg(test)]
 mod bonded_tests;
+mod extra;
 mod golden;
 #[cfg(test)]
 mod tests;
 
+pub use extra::{Extra, Refused, Region, Taken};
 pub use golden::{Golden, GoldenError};
 
 use crate::errors::Errors;
@@ -70,6 +73,9 @@ pub struct Reconstruction {
     pub error: Option<Errors>,
     /// Remarks, sorted, each once.
     pub flags: Vec<Flag>,
+    /// What only some scenes ask for; its fields stand beside the others.
+    #[serde(flatten)]
+    pub extra: Extra,
 }
 
 /// Puts a result together: resultant, errors against the frame's truth, and the flags `no-contact` and
@@ -100,6 +106,7 @@ pub fn assemble(
         subarrays,
         forces_N: forces,
         flags: flags.into_iter().collect(),
+        extra: Extra::default(),
     }
 }
 

@@ -8,11 +8,15 @@
 //! | [`search`] | v_ij, objective | μ |
 //! | [`force`] | p(μ), μ | fx, fy, fz |
 //!
+//! With `partition.case = "contacts"` two more: [`segment`] draws a region for each contact, [`contacts`] finds their μ.
+//!
 //! The hardware's `normalise`, `fold` and `unfold` change no value here: floating point carries its exponent along, and
 //! folding is an exact change of basis.
 
+pub mod contacts;
 pub mod force;
 pub mod objective;
 pub mod pass;
 pub mod receive;
 pub mod search;
+pub mod segment;

@@ -35,8 +35,6 @@ impl Scene {
             let scene = self.name.clone();
             Err(SceneError::NotAvailable { scene, field, value, available })
         };
-        if self.partition.case.grid().is_none() {
-            return missing("partition.case", self.partition.case.to_string(), "0, 1, 2, 3, rows and cols");
         }
         if self.search.objective != ObjectiveKind::Sparse {
             let name = self.search.objective.name().to_string();

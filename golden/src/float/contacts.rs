@@ -1,0 +1,247 @@
+//! Contacts: one μ for each contact instead of one for each rectangle.
+//!
+//! With μ constant on each region, m the μ of each taxel, the stress is met exactly when
+//!
+//! ```text
+//! p = p₀ − Ax(m1∘p) − Ay(m2∘p)
+//! ```
+//!
+//! with the same matrices as for one μ. Region k in turn, M its mask, the others as they are:
+//!
+//! ```text
+//! v_00 = p₀ − Ax((1−M)∘m1∘p) − Ay((1−M)∘m2∘p)      v_ij = −(Ax(M∘v_{i−1,j}) + Ay(M∘v_{i,j−1}))
+//! ```
+//!
+//! and μ_k is what `search` finds for this family. A sweep visits all regions; it is repeated until no μ moves by more
+//! than 1/400 of mu_max, at most [`SWEEPS`] times. Then neighbours whose μ came out alike are joined, and the regions are
+//! drawn again from the better p, until neither changes them.
+//!
+//! All this is done once for each width of smoothing in `segment`: contacts that touch need a narrow one, rings a wide
+//! one. Of the results, one μ for all among them, the one whose p scores best over the whole array is taken, less a
+//! charge for each region beyond the first.
+//!
+//! | | shape | unit |
+//! |---|---|---|
+//! | in: family of one μ and its μ | polynomial, 2 | N, – |
+//! | out: p, regions, μ of each | n, n, count × 2 | N, –, – |
+//!
+//! With one region it is the plain method, to the bit.
+
+use super::objective::Objective;
+use super::pass::{place, Polynomial};
+use super::search::{search, Found};
+use super::segment::{neighbours, segment, Segments, WIDTH};
+use crate::matrices::{Matrices, Passes};
+
+/// Most sweeps over one set of regions.
+pub const SWEEPS: usize = 6;
+/// Most times regions are drawn.
+pub const ROUNDS: usize = 4;
+/// Movement of μ that counts as none, and distance of two μ that are one, over mu_max.
+const STILL: f64 = 1.0 / 400.0;
+const ALIKE: f64 = 0.05;
+/// Widths of smoothing tried, over h.
+const WIDTHS: [f64; 2] = [WIDTH, 0.6];
+/// What a further region must add to the score, in bits.
+const REGION_COST: f64 = 5.0;
+/// Change of p that counts as none, relative to its largest entry.
+const SETTLED: f64 = 1e-9;
+/// Most relaxations of p for given μ; each takes the error down by r or better.
+const RELAXATIONS: usize = 60;
+
+/// What was found for the contacts of one frame.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Contacts {
+    /// Region of each taxel.
+    pub segments: Segments,
+    /// What the last search in each region found, `None` where it was not searched or found nothing.
+    pub found: Vec<Option<Found>>,
+    /// Normal forces in N.
+    pub p: Vec<f64>,
+    /// Sweeps over all regions.
+    pub sweeps: usize,
+    /// Whether the last sweep moved no μ and the regions stayed.
+    pub converged: bool,
+}
+
+/// The solver of one frame.
+pub struct Solver<'a> {
+    /// The array's matrices.
+    pub matrices: &'a Matrices,
+    /// Largest |μ|.
+    pub mu_max: f64,
+    /// What a search maximises.
+    pub objective: &'a dyn Objective,
+    /// p₀ = Cz⁺ b in N.
+    pub p0: &'a [f64],
+    /// Whether the region of these labels with this number is to be searched.
+    pub searched: &'a dyn Fn(&Segments, usize) -> bool,
+}
+
+impl Contacts {
+    /// Ratio of shear to normal force of a region.
+    pub fn mu(&self, region: usize) -> [f64; 2] {
+        mu_of(&self.found[region])
+    }
+}
+
+fn mu_of(found: &Option<Found>) -> [f64; 2] {
+    found.map_or([0.0; 2], |found| found.mu)
+}
+
+impl Solver<'_> {
+    /// Finds the contacts, starting from the family of one μ and what was found in it.
+    pub fn solve(&self, family: &Polynomial, found: Found) -> Contacts {
+        let p = family.eval(found.mu);
+        let segments = Segments::whole(p.len());
+        let start = Contacts { segments, found: vec![Some(found)], p, sweeps: 0, converged: true };
+        let mut best = (found.objective, start.clone());
+        for width in WIDTHS {
+            let state = self.drawn(width, &start);
+            let cost = REGION_COST * (state.segments.count - 1) as f64;
+            if let Some(score) = self.objective.score(&state.p).filter(|score| score - cost > best.0) {
+                best = (score - cost, state);
+            }
+        }
+        best.1
+    }
+
+    /// Solves for regions drawn with one width of smoothing.
+    fn drawn(&self, width: f64, start: &Contacts) -> Contacts {
+        let mut state = self.redrawn(start, width);
+        if state.segments.count == 1 {
+            return start.clone();
+        }
+        for _ in 0..ROUNDS {
+            self.sweep(&mut state);
+            while let Some((a, b)) = self.alike(&state) {
+                state.found[a] = state.found[a].or(state.found[b]);
+                state.found.remove(b);
+                state.segments = state.segments.joined(a, b);
+                if state.segments.count == 1 {
+                    return Contacts { sweeps: state.sweeps, ..start.clone() };
+                }
+                self.sweep(&mut state);
+            }
+            let drawn = self.redrawn(&state, width);
+            if drawn.segments == state.segments {
+                return state;
+            }
+            state = Contacts { converged: false, ..drawn };
+        }
+        self.sweep(&mut state);
+        state
+    }
+
+    /// The regions of the state's p, each with the μ that its strongest taxel had.
+    fn redrawn(&self, state: &Contacts, width: f64) -> Contacts {
+        let segments = segment(&self.matrices.sensor, &state.p, width);
+        let strongest = |region: usize| {
+            let own = (0..state.p.len()).filter(|&k| segments.labels[k] == region);
+            own.max_by(|&a, &b| state.p[a].total_cmp(&state.p[b]))
+        };
+        let old = |region| strongest(region).and_then(|taxel| state.found[state.segments.labels[taxel]]);
+        Contacts { found: (0..segments.count).map(old).collect(), segments, ..state.clone() }
+    }
+
+    /// Searches all regions in turn until no μ moves.
+    fn sweep(&self, state: &mut Contacts) {
+        let searched: Vec<bool> = (0..state.segments.count).map(|k| (self.searched)(&state.segments, k)).collect();
+        for (found, searched) in state.found.iter_mut().zip(&searched) {
+            *found = found.filter(|_| *searched);
+        }
+        self.relax(state);
+        state.converged = false;
+        for _ in 0..SWEEPS {
+            let mut moved = 0.0f64;
+            for region in (0..state.segments.count).filter(|&k| searched[k]) {
+                let family = self.family(state, region);
+                let [x, y] = state.mu(region);
+                state.found[region] = search(&family, self.mu_max, self.objective);
+                let mu = state.mu(region);
+                moved = moved.max((mu[0] - x).hypot(mu[1] - y));
+                state.p = family.eval(mu);
+                self.relax(state);
+            }
+            state.sweeps += 1;
+            state.converged = moved <= STILL * self.mu_max;
+            if state.converged {
+                break;
+            }
+        }
+    }
+
+    /// The family of one region, the others held.
+    fn family(&self, state: &Contacts, region: usize) -> Polynomial {
+        let inside = |k: usize| state.segments.labels[k] == region;
+        let held: Vec<[f64; 2]> =
+            (0..state.p.len()).map(|k| if inside(k) { [0.0; 2] } else { state.mu(state.segments.labels[k]) }).collect();
+        let mut coefficients = vec![self.answer(&state.p, &held)];
+        let masked = |v: &[f64]| -> Vec<f64> { (0..v.len()).map(|k| if inside(k) { v[k] } else { 0.0 }).collect() };
+        let Passes { basis, ax, ay, .. } = &self.matrices.passes;
+        let degree = self.matrices.degree;
+        let mut last = vec![basis.fold(&masked(&coefficients[0]))];
+        for order in 1..=degree {
+            let mut folded = Vec::with_capacity(order + 1);
+            for j in 0..=order {
+                let mut v = vec![0.0; state.p.len()];
+                if j < order {
+                    ax.accumulate(&last[j], -1.0, &mut v);
+                }
+                if j > 0 {
+                    ay.accumulate(&last[j - 1], -1.0, &mut v);
+                }
+                debug_assert_eq!(coefficients.len(), place(order - j, j));
+                coefficients.push(basis.unfold(&v));
+                folded.push(basis.fold(&masked(&coefficients[coefficients.len() - 1])));
+            }
+            last = folded;
+        }
+        Polynomial { degree, coefficients }
+    }
+
+    /// p₀ − Ax(m1∘p) − Ay(m2∘p)
+    fn answer(&self, p: &[f64], mu: &[[f64; 2]]) -> Vec<f64> {
+        let Passes { basis, ax, ay, .. } = &self.matrices.passes;
+        let mut answer = vec![0.0; p.len()];
+        for (axis, a) in [ax, ay].into_iter().enumerate() {
+            let shear: Vec<f64> = p.iter().zip(mu).map(|(p, mu)| mu[axis] * p).collect();
+            a.accumulate(&basis.fold(&shear), -1.0, &mut answer);
+        }
+        let mut answer = basis.unfold(&answer);
+        answer.iter_mut().zip(self.p0).for_each(|(p, p0)| *p += p0);
+        answer
+    }
+
+    /// Iterates p = p₀ − Ax(m1∘p) − Ay(m2∘p) for the state's μ until it stands still.
+    fn relax(&self, state: &mut Contacts) {
+        let mu: Vec<[f64; 2]> = state.segments.labels.iter().map(|&region| state.mu(region)).collect();
+        for _ in 0..RELAXATIONS {
+            let next = self.answer(&state.p, &mu);
+            let size = next.iter().fold(0.0f64, |size, p| p.abs().max(size));
+            let moved = next.iter().zip(&state.p).fold(0.0f64, |moved, (a, b)| (a - b).abs().max(moved));
+            state.p = next;
+            if moved <= SETTLED * size {
+                return;
+            }
+        }
+    }
+
+    /// Two neighbours whose μ came out alike.
+    fn alike(&self, state: &Contacts) -> Option<(usize, usize)> {
+        let labels = &state.segments.labels;
+        let sensor = &self.matrices.sensor;
+        let pairs = (0..labels.len()).flat_map(|k| neighbours(sensor, k).map(move |other| (labels[k], labels[other])));
+        let distance = |&(a, b): &(usize, usize)| {
+            let (a, b) = (state.mu(a), state.mu(b));
+            (a[0] - b[0]).hypot(a[1] - b[1])
+        };
+        pairs
+            .filter(|(a, b)| a < b)
+            .filter(|pair| distance(pair) <= ALIKE * self.mu_max)
+            .min_by(|a, b| distance(a).total_cmp(&distance(b)))
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,128 @@
+//! Adaptive: the finest of the paper's cases that neither leaves a loaded subarray unmet nor cuts a contact.
+//!
+//! Cases 1, 2, 3 and 0 are tried in this order, as far as they divide the array. The contacts are the regions of
+//! `segment`, drawn in the forces of the whole array with one μ. A contact's cells are those that carry at least 5 % of
+//! its largest force; a boundary cuts the contact when it runs between them. What a contact presses is seen up to 1.5 h
+//! beyond its rim, and a subarray cannot tell it from a load of its own: a contact that is alone, which case 0 solves
+//! best, keeps that distance. Between several the distance is not asked for: one μ for all of them costs more. Case 0
+//! has no boundary and is taken when nothing finer is left.
+//!
+//! | | shape | unit |
+//! |---|---|---|
+//! | in: p of the whole array | n | N |
+//! | in: per case, receipts of its subarrays | parts | – |
+//! | out: what stands against the case | text | – |
+
+use crate::float::receive::Receipt;
+use crate::float::segment::Segments;
+use crate::partition::Subarray;
+use crate::sensor::Sensor;
+
+/// Share of a contact's largest force from which a cell is part of it.
+const CELL_SHARE: f64 = 0.05;
+/// Least distance of a boundary from the cells of a lone contact, over the thickness.
+const LONE_CLEARANCE: f64 = 1.5;
+
+/// The cells of one contact as a rectangle.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Extent {
+    /// Left and right end in mm from the array's centre.
+    pub x: [f64; 2],
+    /// Upper and lower end in mm.
+    pub y: [f64; 2],
+}
+
+/// The rectangles around the contacts.
+pub fn extents(sensor: &Sensor, p: &[f64], segments: &Segments) -> Vec<Extent> {
+    let extent = |region: usize| {
+        let own = || (0..p.len()).filter(|&k| segments.labels[k] == region);
+        let largest = own().map(|k| p[k]).fold(0.0, f64::max);
+        let nowhere = Extent { x: [f64::INFINITY, f64::NEG_INFINITY], y: [f64::INFINITY, f64::NEG_INFINITY] };
+        own().filter(|&k| largest > 0.0 && p[k] >= CELL_SHARE * largest).fold(nowhere, |extent, k| {
+            let at = sensor.position_mm(k / sensor.cols, k % sensor.cols);
+            let wider =
+                |[low, high]: [f64; 2], at: f64, pitch: f64| [low.min(at - pitch / 2.0), high.max(at + pitch / 2.0)];
+            Extent { x: wider(extent.x, at[0], sensor.pitch_x_mm), y: wider(extent.y, at[1], sensor.pitch_y_mm) }
+        })
+    };
+    (0..segments.count).map(extent).collect()
+}
+
+/// What stands against a case, `None` when nothing does.
+pub fn objection(sensor: &Sensor, parts: &[Subarray], receipts: &[Receipt], contacts: &[Extent]) -> Option<String> {
+    if let [_] = parts {
+        return None;
+    }
+    for (part, receipt) in parts.iter().zip(receipts) {
+        if receipt.loaded && !receipt.condition_met {
+            let Subarray { row0, col0, .. } = part;
+            return Some(format!(
+                "the subarray at row {row0}, column {col0} is loaded and does not meet the condition"
+            ));
+        }
+    }
+    let clearance = if contacts.len() > 1 { 0.0 } else { LONE_CLEARANCE * sensor.thickness_mm };
+    let edge = |first: usize, count: usize, pitch: f64| (first as f64 - count as f64 / 2.0) * pitch;
+    for part in parts {
+        let x = (part.col0 > 0).then(|| edge(part.col0, sensor.cols, sensor.pitch_x_mm));
+        let y = (part.row0 > 0).then(|| edge(part.row0, sensor.rows, sensor.pitch_y_mm));
+        for (k, contact) in contacts.iter().enumerate() {
+            for (name, edge, [low, high]) in [("x", x, contact.x), ("y", y, contact.y)] {
+                if let Some(edge) = edge.filter(|edge| low - clearance < *edge && *edge < high + clearance) {
+                    return Some(format!(
+                        "the boundary {name} = {edge} mm cuts contact {k}, from {low} to {high} mm, or comes closer than {clearance} mm"
+                    ));
+                }
+            }
+        }
+    }
+    None
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::float::receive::receive;
+    use crate::partition::{subarrays, Case};
+    use crate::scene::Condition;
+
+    fn sensor() -> Sensor {
+        Sensor { rows: 8, cols: 12, pitch_x_mm: 2.0, pitch_y_mm: 2.0, thickness_mm: 1.0 }
+    }
+
+    /// A force of 1 N on the taxel at row 2, column 2, and 0.01 N beside it.
+    fn contact() -> Vec<Extent> {
+        let mut p = vec![0.0; 96];
+        (p[26], p[27]) = (1.0, 0.01);
+        extents(&sensor(), &p, &Segments::whole(96))
+    }
+
+    fn against(case: i64, codes: &[i32], condition: Condition) -> Option<String> {
+        let parts = subarrays(Case::numbered(case).unwrap(), &sensor()).unwrap();
+        let judge = |part: &Subarray| receive(&sensor(), part, &part.gather(&sensor(), codes), 0, condition);
+        let receipts: Vec<Receipt> = parts.iter().map(judge).collect();
+        objection(&sensor(), &parts, &receipts, &contact())
+    }
+
+    #[test]
+    fn the_cells_that_count() {
+        assert_eq!(contact(), [Extent { x: [-8.0, -6.0], y: [-4.0, -2.0] }]);
+        let nothing = extents(&sensor(), &[0.0; 96], &Segments::whole(96));
+        assert!(nothing[0].x[0] > nothing[0].x[1]);
+    }
+
+    #[test]
+    fn a_near_boundary_is_named() {
+        assert_eq!(against(0, &[1; 96], Condition::Loaded), None);
+        assert_eq!(against(2, &[1; 96], Condition::Loaded), None);
+        let cut = against(3, &[1; 96], Condition::Loaded);
+        assert_eq!(cut, None);
+    }
+
+    #[test]
+    fn an_unmet_condition_is_named() {
+        let unmet = against(2, &[1; 96], Condition::BothSigns).unwrap();
+        assert!(unmet.starts_with("the subarray at row 0, column 0 is loaded"), "{unmet}");
+        assert_eq!(against(2, &[0; 96], Condition::BothSigns), None);
+    }
+}
