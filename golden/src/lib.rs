@@ -29,6 +29,7 @@ pub mod frame;
 pub mod gauss;
 pub mod generator;
 pub mod influence;
+pub mod input;
 pub mod matrices;
 pub mod partition;
 pub mod quantise;

@@ -21,6 +21,7 @@
 //! of the array holds to the bit in every matrix, so that folding them again is exact.
 
 mod inverse;
+mod masked;
 #[cfg(test)]
 mod tests;
 
@@ -108,6 +109,14 @@ pub enum MatricesError {
     NotConverged {
         /// The subarray.
         sensor: Box<Sensor>,
+    },
+    /// Too few taxels are left after masking.
+    #[error("{sensor}: {dead} masked taxels leave too few readings")]
+    TooManyDead {
+        /// The subarray.
+        sensor: Box<Sensor>,
+        /// Masked taxels in it.
+        dead: usize,
     },
     /// The series in μ converges too slowly or not at all.
     #[error("{sensor}: r = {radius:.3} at mu_max = {mu_max} needs more than degree {MAX_DEGREE}; a smaller mu_max, or taxels further apart against the thickness, lower r")]

@@ -10,6 +10,7 @@
 //! | in: dead, stuck | lists | \[row, col\], MPa | inside the array |
 //! | out: frame | taxels | MPa | the truth is carried along |
 
+use super::random::seeded;
 use super::GeneratorError;
 use crate::frame::Frame;
 use crate::quantise::quantise;
@@ -45,7 +46,7 @@ impl Converter {
         self.check()?;
         let mut frame = frame.clone();
         let peak = frame.peak_MPa();
-        let mut rng = Rng::with_seed(self.seed);
+        let mut rng = seeded(self.seed);
         for b in &mut frame.stress_MPa {
             if self.noise > 0.0 {
                 *b += self.noise * peak * gaussian(&mut rng);

@@ -13,9 +13,18 @@ const TRIES: usize = 200;
 /// Half-axes in thicknesses.
 const HALF_AXES: [f64; 2] = [0.8, 2.2];
 
+/// A generator whose draws have nothing to do with those of neighbouring seeds: the seed goes through SplitMix64's
+/// mixing first, as `fastrand` starts from it as it is and consecutive seeds then give related draws.
+pub(super) fn seeded(seed: u64) -> Rng {
+    let mut z = seed.wrapping_add(0x9e37_79b9_7f4a_7c15);
+    z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+    z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+    Rng::with_seed(z ^ (z >> 31))
+}
+
 /// Draws `count` contacts; the same seed gives the same contacts.
 pub fn random_contacts(sensor: &Sensor, count: usize, seed: u64) -> Vec<Contact> {
-    let mut rng = Rng::with_seed(seed);
+    let mut rng = seeded(seed);
     let mut contacts: Vec<(Contact, [f64; 2], f64)> = Vec::with_capacity(count);
     let spread = |rng: &mut Rng, [low, high]: [f64; 2]| low + (high - low) * rng.f64();
     let size = [sensor.cols as f64 * sensor.pitch_x_mm / 2.0, sensor.rows as f64 * sensor.pitch_y_mm / 2.0];

@@ -4,10 +4,14 @@
 //! |---|---|---|
 //! | `taken` | `partition.case = "adaptive"` | the case taken and why, and why the finer ones were not |
 //! | `regions` | `partition.case = "contacts"` | μ, centre, load and taxels of each contact |
+//! | `unipolar` | `input.unipolar = true` | clipped taxels, iterations, misfit |
+//! | `resultants` | `output.forces = "resultants"` | force and centre of pressure per subarray or contact |
 //! | `sweeps`, `converged` | `partition.case = "contacts"` | how the search over the regions went |
 
+use super::output::Resultant;
 use crate::float::contacts::Contacts;
 use crate::frame::Forces;
+use crate::input::unipolar::Unipolar;
 use crate::sensor::Sensor;
 use serde::{Deserialize, Serialize};
 
@@ -27,6 +31,12 @@ pub struct Extra {
     /// Whether the last sweep moved no μ and no region.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub converged: Option<bool>,
+    /// How `input.unipolar` went.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub unipolar: Option<Unipolar>,
+    /// The forces of `output.forces = "resultants"`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub resultants: Option<Vec<Resultant>>,
 }
 
 /// A choice of case.

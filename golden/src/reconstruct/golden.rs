@@ -16,6 +16,7 @@ use crate::float::search::{search, Found};
 use crate::float::segment::{segment, Segments, WIDTH};
 use crate::float::{force::force, objective::Sparse, pass::Polynomial};
 use crate::frame::{Forces, Frame, FrameError};
+use crate::input::{Input as InputOptions, InputError};
 use crate::matrices::{Matrices, MatricesError};
 use crate::partition::{subarrays, Case, PartitionError, Subarray};
 use crate::quantise::{full_scale, noise_floor_codes, quantise};
@@ -24,17 +25,38 @@ use thiserror::Error;
 
 /// A scene made ready for frames.
 pub struct Golden {
-    scene: Scene,
+    pub(super) scene: Scene,
+    /// The scene's input options.
+    pub(super) input: InputOptions,
     /// The case; of `adaptive` all cases that divide the array, the finest first, the whole last.
     cuts: Vec<Cut>,
 }
 
 /// A case with its matrices.
+#[derive(Clone)]
 struct Cut {
     case: Case,
     parts: Vec<Subarray>,
     /// Shared by all subarrays: a partition's rectangles are equal.
-    matrices: Matrices,
+    shared: Matrices,
+    /// One for each subarray where taxels are masked.
+    masked: Vec<Matrices>,
+}
+
+impl Cut {
+    fn matrices(&self, part: usize) -> &Matrices {
+        self.masked.get(part).unwrap_or(&self.shared)
+    }
+
+    /// Leaves the taxels `dead` out, and no others.
+    fn mask(mut self, dead: &[[usize; 2]]) -> Result<Cut, MatricesError> {
+        let own = |part: &Subarray| self.shared.without(&part.own(dead));
+        self.masked = match dead {
+            [] => Vec::new(),
+            _ => self.parts.iter().map(own).collect::<Result<_, _>>()?,
+        };
+        Ok(self)
+    }
 }
 
 /// A frame with what all subarrays ask of it.
@@ -66,6 +88,9 @@ pub enum GoldenError {
     /// The frame is not one of this scene.
     #[error(transparent)]
     Frame(#[from] FrameError),
+    /// A file the input options name, or frames that do not fit them.
+    #[error(transparent)]
+    Input(#[from] InputError),
     /// Stress so large that its forces are no finite numbers.
     #[error("frame {frame}: peak stress {peak_MPa:e} MPa gives forces beyond the range of numbers")]
     TooStrong {
@@ -85,8 +110,8 @@ impl Golden {
         scene.require_golden()?;
         let cut = |case: Case| -> Result<Cut, GoldenError> {
             let parts = subarrays(case, &scene.sensor)?;
-            let matrices = Matrices::through(&parts[0].sensor(&scene.sensor), scene.medium, scene.search.mu_max)?;
-            Ok(Cut { case, parts, matrices })
+            let shared = Matrices::through(&parts[0].sensor(&scene.sensor), scene.medium, scene.search.mu_max)?;
+            Ok(Cut { case, parts, shared, masked: Vec::new() }.mask(&scene.input.dead)?)
         };
         let cases = match scene.partition.case {
             Case::Adaptive => {
@@ -97,12 +122,12 @@ impl Golden {
             grid @ Case::Grid(_) => vec![grid],
         };
         let cuts = cases.into_iter().map(cut).collect::<Result<_, _>>()?;
-        Ok(Golden { scene: scene.clone(), cuts })
+        Ok(Golden { scene: scene.clone(), input: InputOptions::new(scene)?, cuts })
     }
 
     /// The matrices of a subarray; of `adaptive` those of the whole array.
     pub fn matrices(&self) -> &Matrices {
-        &self.whole().matrices
+        self.whole().matrices(0)
     }
 
     /// The coarsest case.
@@ -110,11 +135,20 @@ impl Golden {
         &self.cuts[self.cuts.len() - 1]
     }
 
-    /// Reconstructs one frame. Forces come from the stress as it is, the condition from its codes.
+    /// The same scene without the readings of the taxels `dead`.
+    ///
+    /// # Errors
+    /// `Matrices` when too few readings are left.
+    pub(super) fn masked(&self, dead: &[[usize; 2]]) -> Result<Golden, GoldenError> {
+        let cuts = self.cuts.iter().map(|cut| cut.clone().mask(dead)).collect::<Result<_, _>>()?;
+        Ok(Golden { scene: self.scene.clone(), input: self.input.clone(), cuts })
+    }
+
+    /// Reconstructs calibrated stress. Forces come from the stress as it is, the condition from its codes.
     ///
     /// # Errors
     /// `Frame` when the frame is not the scene's, `TooStrong` when a force overflows.
-    pub fn run(&self, frame: &Frame) -> Result<Reconstruction, GoldenError> {
+    pub(super) fn engine(&self, frame: &Frame) -> Result<Reconstruction, GoldenError> {
         let scene = &self.scene;
         frame.check(scene)?;
         let codes = quantise(&frame.stress_MPa, scene.fixed.input_bits, full_scale(scene, frame));
@@ -209,10 +243,10 @@ impl Golden {
     fn subarrays(&self, input: &Input, cut: &Cut) -> Outcome {
         let sensor = &self.scene.sensor;
         let mut outcome = Outcome { subarrays: Vec::new(), forces: Forces::zeros(sensor.taxels()), flags: Vec::new() };
-        for part in &cut.parts {
+        for (index, part) in cut.parts.iter().enumerate() {
             let receipt = self.receive(input, part);
             let b = part.gather(sensor, input.stress_MPa);
-            let (found, own) = self.solve(&cut.matrices, &b, receipt.condition_met);
+            let (found, own) = self.solve(cut.matrices(index), &b, receipt.condition_met);
             if receipt.condition_met && found.is_none() {
                 outcome.flags.push(Flag::NoCompression);
             }

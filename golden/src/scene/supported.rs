@@ -1,6 +1,6 @@
 //! What of the schema this version builds.
 
-use super::{Medium, ObjectiveKind, Scene, SceneError};
+use super::{ForceOutput, Medium, ObjectiveKind, Scene, SceneError};
 use crate::partition::Case;
 
 impl Scene {
@@ -23,6 +23,24 @@ impl Scene {
             let name = self.search.objective.name().to_string();
             return missing("search.objective", name, "sparse");
         }
+        let input = &self.input;
+        if input.average > 0 {
+            return missing("input.average", input.average.to_string(), "0");
+        }
+        for (field, file) in [("input.calibration", &input.calibration), ("input.tare", &input.tare)] {
+            if let Some(path) = file {
+                return missing(field, format!("{path:?}"), "none");
+            }
+        }
+        if let Some(taxel) = input.dead.first() {
+            return missing("input.dead", format!("[{taxel:?}, …]"), "none");
+        }
+        if input.unipolar {
+            return missing("input.unipolar", "true".to_string(), "false");
+        }
+        if self.output.forces != ForceOutput::Taxels {
+            return missing("output.forces", "resultants".to_string(), "taxels");
+        }
         Ok(())
     }
 
@@ -35,7 +53,6 @@ impl Scene {
             let scene = self.name.clone();
             Err(SceneError::NotAvailable { scene, field, value, available })
         };
-        }
         if self.search.objective != ObjectiveKind::Sparse {
             let name = self.search.objective.name().to_string();
             return missing("search.objective", name, "sparse");
