@@ -35,7 +35,7 @@ fn a_dead_taxel_costs_little_and_its_reading_nothing() {
         let result = golden.run(&frame).unwrap();
         let mut stuck = frame.clone();
         // Small, so that the codes' full scale, the frame's peak, stays out of it.
-        stuck.stress_MPa[peak] = -0.5 * stuck.stress_MPa[peak];
+        stuck.stress_MPa[peak] *= -0.5;
         let stuck = golden.run(&stuck).unwrap();
         // Masked, it may read anything.
         assert_eq!(stuck.forces_N, result.forces_N);
