@@ -11,6 +11,11 @@
 //! until no taxel leaves. What the pressing forces alone (contacts do not pull) miss of the known readings is the
 //! misfit, by which a result can be judged.
 //!
+//! It limits the damage and does not undo it: the tension that is lost is what tells shear from an uneven pressure.
+//! Tangential error with `sparse`, shipped half-space frames with clipped taxels, median and worst: sensor 1 (6 frames)
+//! 12 % and 66 %, against 8 % and 93 % with zeros in their place and 1 % unclipped; sensor 2 (8 frames) 10 % and 30 %,
+//! against 6 % and 44 %.
+//!
 //! | | shape | unit |
 //! |---|---|---|
 //! | in: stress | taxels | MPa, clipped at 0 |
