@@ -49,7 +49,7 @@ impl Forces {
     }
 }
 
-/// A contact as the frame's author describes it; carried along, not computed with.
+/// A contact as the frame's author describes it: input of [`crate::generator`], carried along everywhere else.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct Contact {
@@ -65,6 +65,12 @@ pub struct Contact {
     pub tangential_N: Option<[f64; 2]>,
     /// How the shear is distributed.
     pub kind_of_slip: Option<String>,
+    /// Coefficient of friction, where the slip is partial.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub friction: Option<f64>,
+    /// Angle of the shape in radians, where it is not part of its sizes.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub rotation_rad: Option<f64>,
 }
 
 /// Stress on every taxel at one moment.

@@ -9,21 +9,23 @@
 //! ```
 //!
 //! Far from the cell the four corners cancel to a billionth of their size, and the closed form keeps 8 digits of 16.
-//! There the mean of the point kernel 3h²(dx, dy, h)/(2πρ⁵) over the cell is taken by Gauss–Legendre quadrature
-//! instead: its terms do not cancel. The kernel is analytic up to ρ = 0, so that with N nodes the error falls as
-//! E^(−2N), where E is the sum of the half-axes of the ellipse around the cell's side through the nearest singularity.
-//! The quadrature is used where E^(−2N) is below the rounding in both directions, the closed form elsewhere, that is
-//! close to cells much wider than h.
+//! There the mean of the point kernel 3h²(dx, dy, h)/(2πρ⁵) over the cell is taken by Gauss–Legendre quadrature instead:
+//! its terms do not cancel. The kernel is analytic up to ρ = 0, so that with N nodes the error falls as E^(−2N), where
+//! E is the sum of the half-axes of the ellipse around the cell's side through the nearest singularity. The quadrature
+//! is used where E^(−2N) is below the rounding in both directions, the closed form elsewhere, that is close to cells
+//! much wider than h. On a bonded layer [`crate::bonded`] takes the place of both.
 //!
 //! | | shape | unit |
 //! |---|---|---|
 //! | in: dx, dy, a, b, h | scalars | mm, a, b, h above 0 |
 //! | out: cx, cy, cz | scalars | 1/mm², that is MPa per N |
 
+use crate::bonded::{cell, kernel::Kernel};
+use crate::gauss::rule;
+use crate::scene::Medium;
 use crate::sensor::Sensor;
 use faer::Mat;
-use std::f64::consts::{PI, TAU};
-use std::sync::OnceLock;
+use std::f64::consts::TAU;
 
 /// Nodes of the quadrature along each side of a cell.
 const NODES: usize = 24;
@@ -92,7 +94,7 @@ fn ellipse(along: f64, across: f64, half: f64) -> f64 {
 
 /// Mean of f over the cell, f being a function of taxel − force.
 fn mean(dx: f64, dy: f64, a: f64, b: f64, f: impl Fn(f64, f64) -> f64) -> f64 {
-    let rule = rule();
+    let rule = rule(NODES);
     let mut sum = 0.0;
     for &(y, wy) in rule {
         for &(x, wx) in rule {
@@ -102,31 +104,19 @@ fn mean(dx: f64, dy: f64, a: f64, b: f64, f: impl Fn(f64, f64) -> f64) -> f64 {
     sum / 4.0
 }
 
-/// Gauss–Legendre nodes and weights on −1 … 1: zeros z of the Legendre polynomial P, w = 2/((1 − z²) P′(z)²).
-fn rule() -> &'static [(f64, f64); NODES] {
-    static RULE: OnceLock<[(f64, f64); NODES]> = OnceLock::new();
-    RULE.get_or_init(|| {
-        std::array::from_fn(|k| {
-            let mut z = (PI * (k as f64 + 0.75) / (NODES as f64 + 0.5)).cos();
-            // Newton's method from this start is at rounding after four steps; one more costs nothing.
-            for _ in 0..5 {
-                let (p, slope) = legendre(z);
-                z -= p / slope;
-            }
-            let slope = legendre(z).1;
-            (z, 2.0 / ((1.0 - z * z) * slope * slope))
-        })
-    })
-}
-
-/// P_N(z) and its slope, by the three-term recurrence.
-fn legendre(z: f64) -> (f64, f64) {
-    let (mut before, mut p) = (1.0, z);
-    for n in 2..=NODES {
-        let n = n as f64;
-        (before, p) = (p, ((2.0 * n - 1.0) * z * p - (n - 1.0) * before) / n);
+/// Stress per unit force along x, y, z at each distance in rows and columns, row-major: equal offsets have equal entries.
+/// cx is odd in the columns' direction, cy in the rows'.
+pub fn table(sensor: &Sensor, medium: Medium) -> Vec<[f64; 3]> {
+    let Sensor { cols, pitch_x_mm: a, pitch_y_mm: b, thickness_mm: h, .. } = *sensor;
+    let offset = |index: usize| [(index % cols) as f64 * a, (index / cols) as f64 * b];
+    let offsets = (0..sensor.taxels()).map(offset);
+    match medium {
+        Medium::HalfSpace => offsets.map(|[dx, dy]| [cx, cy, cz].map(|f| f(dx, dy, a, b, h))).collect(),
+        Medium::BondedLayer { poisson } => {
+            let kernel = Kernel::new(poisson);
+            offsets.map(|offset| cell::influence(&kernel, offset, [a, b], h)).collect()
+        }
     }
-    (p, NODES as f64 * (before - z * p) / (1.0 - z * z))
 }
 
 /// Influence matrices of an array, taxels × cells; row t, column f is the stress at taxel t per unit force on cell f.
@@ -140,20 +130,20 @@ pub struct Influence {
 }
 
 impl Influence {
-    /// The three matrices; mirror symmetry of the array holds to the bit.
+    /// The three matrices of a half-space; mirror symmetry of the array holds to the bit.
     pub fn new(sensor: &Sensor) -> Influence {
-        let Sensor { rows, cols, pitch_x_mm: a, pitch_y_mm: b, thickness_mm: h } = *sensor;
-        // Equal offsets have equal entries: one evaluation for each distance in rows and columns.
-        let table = |f: fn(f64, f64, f64, f64, f64) -> f64| -> Vec<f64> {
-            let at = |index: usize| f((index % cols) as f64 * a, (index / cols) as f64 * b, a, b, h);
-            (0..sensor.taxels()).map(at).collect()
-        };
-        let (tx, ty, tz) = (table(cx), table(cy), table(cz));
-        let fill = |table: &[f64], odd_x: bool, odd_y: bool| {
+        Influence::through(sensor, Medium::HalfSpace)
+    }
+
+    /// The three matrices of any medium; mirror symmetry of the array holds to the bit.
+    pub fn through(sensor: &Sensor, medium: Medium) -> Influence {
+        let Sensor { rows, cols, .. } = *sensor;
+        let table = table(sensor, medium);
+        let fill = |axis: usize, odd_x: bool, odd_y: bool| {
             Mat::from_fn(rows * cols, rows * cols, |taxel, force| {
                 let (r, c) = (taxel / cols, taxel % cols);
                 let (s, d) = (force / cols, force % cols);
-                let value = table[r.abs_diff(s) * cols + c.abs_diff(d)];
+                let value = table[r.abs_diff(s) * cols + c.abs_diff(d)][axis];
                 if (odd_x && c < d) != (odd_y && r < s) {
                     -value
                 } else {
@@ -161,7 +151,7 @@ impl Influence {
                 }
             })
         };
-        Influence { cx: fill(&tx, true, false), cy: fill(&ty, false, true), cz: fill(&tz, false, false) }
+        Influence { cx: fill(0, true, false), cy: fill(1, false, true), cz: fill(2, false, false) }
     }
 }
 
@@ -187,15 +177,6 @@ mod tests {
             for (value, wanted) in got.iter().zip([&r.cx, &r.cy, &r.cz]) {
                 assert!(near(*value, wanted.parse().unwrap()), "{value:e} {wanted} at {r:?}");
             }
-        }
-    }
-
-    #[test]
-    fn quadrature_integrates_what_it_must() {
-        // Exact up to x^47.
-        let power = |k: i32| rule().iter().map(|(x, w)| w * x.powi(k)).sum::<f64>();
-        for k in (0..=46).step_by(2) {
-            assert!((power(k) - 2.0 / f64::from(k + 1)).abs() < 1e-14, "{k}");
         }
     }
 

@@ -8,6 +8,8 @@
 //!                      v_ij           μ               fx, fy, fz      resultant, errors, flags
 //! ```
 //!
+//! [`generator`] makes frames with known forces; [`bonded`] is the influence of a layer on a rigid base.
+//!
 //! The method: forces x = (μ1 p, μ2 p, p), shear and pressure alike in distribution, meet the measured stress b exactly
 //! when (μ1 Cx + μ2 Cy + Cz) p = b. That leaves two unknowns per subarray, found by a search over μ.
 //!
@@ -17,13 +19,17 @@
 // Names carry their unit as SI writes it: `stress_MPa`, `resultant_N`.
 #![allow(non_snake_case)]
 
+pub mod bonded;
 pub mod errors;
 pub mod fixed;
 pub mod flags;
 pub mod float;
 pub mod folded;
 pub mod frame;
+pub mod gauss;
+pub mod generator;
 pub mod influence;
+pub mod input;
 pub mod matrices;
 pub mod noise;
 pub mod paper;

@@ -21,11 +21,13 @@
 //! of the array holds to the bit in every matrix, so that folding them again is exact.
 
 mod inverse;
+mod masked;
 #[cfg(test)]
 mod tests;
 
 use crate::folded::{Basis, Operator, EVEN, ODD_X, ODD_Y};
 use crate::influence::Influence;
+use crate::scene::Medium;
 use crate::sensor::{Sensor, SensorError};
 use faer::Mat;
 use inverse::{chain, Inverse};
@@ -108,6 +110,14 @@ pub enum MatricesError {
         /// The subarray.
         sensor: Box<Sensor>,
     },
+    /// Too few taxels are left after masking.
+    #[error("{sensor}: {dead} masked taxels leave too few readings")]
+    TooManyDead {
+        /// The subarray.
+        sensor: Box<Sensor>,
+        /// Masked taxels in it.
+        dead: usize,
+    },
     /// The series in μ converges too slowly or not at all.
     #[error(
         "{sensor}: r = {radius:.3} at mu_max = {mu_max} needs more than degree {MAX_DEGREE}; \
@@ -124,11 +134,19 @@ pub enum MatricesError {
 }
 
 impl Matrices {
-    /// Computes the matrices of a (sub)array for shear ratios up to `mu_max` (0 to 2).
+    /// Computes the matrices of a (sub)array on a half-space for shear ratios up to `mu_max` (0 to 2).
     ///
     /// # Errors
     /// [`MatricesError`]; the size is checked before anything is allocated.
     pub fn new(sensor: &Sensor, mu_max: f64) -> Result<Matrices, MatricesError> {
+        Matrices::through(sensor, Medium::HalfSpace, mu_max)
+    }
+
+    /// Computes the matrices of a (sub)array under any medium for shear ratios up to `mu_max` (0 to 2).
+    ///
+    /// # Errors
+    /// As [`Matrices::new`].
+    pub fn through(sensor: &Sensor, medium: Medium, mu_max: f64) -> Result<Matrices, MatricesError> {
         sensor.check()?;
         let boxed = || Box::new(sensor.clone());
         let n = sensor.taxels();
@@ -136,7 +154,7 @@ impl Matrices {
             let sensor = boxed();
             return Err(MatricesError::TooLarge { sensor, taxels: n });
         }
-        let Influence { cx, cy, cz } = Influence::new(sensor);
+        let Influence { cx, cy, cz } = Influence::through(sensor, medium);
         let finite = |m: &Mat<f64>| m.col_iter().all(|col| col.iter().all(|c| c.is_finite()));
         if !(finite(&cx) && finite(&cy) && finite(&cz) && cz[(0, 0)] > 0.0) {
             return Err(MatricesError::NotFinite { sensor: boxed() });

@@ -140,6 +140,15 @@ impl Subarray {
             .flat_map(move |row| (self.col0..self.col0 + self.cols).map(move |col| row * cols + col))
     }
 
+    /// Indices in the subarray of those of the array's taxels, [row, col], that it holds.
+    pub fn own(&self, taxels: &[[usize; 2]]) -> Vec<usize> {
+        let place = |[row, col]: [usize; 2]| {
+            let (row, col) = (row.checked_sub(self.row0)?, col.checked_sub(self.col0)?);
+            (row < self.rows && col < self.cols).then_some(row * self.cols + col)
+        };
+        taxels.iter().filter_map(|taxel| place(*taxel)).collect()
+    }
+
     /// The subarray's values out of the array's.
     pub fn gather<T: Copy>(&self, whole: &Sensor, values: &[T]) -> Vec<T> {
         self.indices(whole).map(|index| values[index]).collect()

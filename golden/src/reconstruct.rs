@@ -11,13 +11,18 @@
 //! | out: error | 5 | fraction, where the frame has a resultant |
 
 mod adaptive;
+#[cfg(test)]
+mod bonded_tests;
 mod extra;
+mod front;
 mod golden;
+mod output;
 #[cfg(test)]
 mod tests;
 
 pub use extra::{Extra, Refused, Region, Taken};
 pub use golden::{Golden, GoldenError};
+pub use output::Resultant;
 
 use crate::errors::Errors;
 use crate::flags::Flag;

@@ -16,7 +16,8 @@
 //! | `[fixed]` | `input_bits` (20; 8 … 24), `data_bits` (18; 12 … 18), `coef_bits` (18; 8 … 18) |
 //! | | `inverse_bits` (24; `coef_bits` … 32), `prune_bits` (20; 8 … 31) |
 //! | `[hardware]` | `board` ("ulx3s-85f") |
-//! | `[input]` | `full_scale_MPa` (the frame's peak) |
+//! | `[input]` | `full_scale_MPa` (the frame's peak), `average` (0 … 12), `calibration`, `tare` (files), `dead` (\[row, col\] each), `unipolar` (false) |
+//! | `[output]` | `forces` ("taxels"; "resultants") |
 
 mod error;
 mod load;
@@ -32,6 +33,7 @@ use crate::partition::Case;
 use crate::sensor::Sensor;
 use serde::{Deserialize, Serialize};
 use std::fmt;
+use std::path::PathBuf;
 
 /// Boards a scene may name.
 pub const BOARDS: [&str; 1] = ["ulx3s-85f"];
@@ -57,6 +59,8 @@ pub struct Scene {
     pub hardware: HardwareSpec,
     /// Meaning of the input codes.
     pub input: InputSpec,
+    /// What a result holds.
+    pub output: OutputSpec,
 }
 
 /// Elastic body over the taxels.
@@ -68,7 +72,7 @@ pub enum Medium {
     HalfSpace,
     /// A layer of the sensor's thickness on a rigid base.
     BondedLayer {
-        /// Poisson ratio, above 0 and below 0.5.
+        /// Poisson ratio, at least 0 and below 0.5.
         poisson: f64,
     },
 }
@@ -179,11 +183,38 @@ pub struct HardwareSpec {
     pub board: String,
 }
 
-/// Table `[input]`.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+/// Table `[input]`; its meaning is in [`crate::input`].
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct InputSpec {
     /// Stress in MPa of the largest code; `None` takes each frame's peak.
     pub full_scale_MPa: Option<f64>,
+    /// 2^average frames are averaged, 0 to 12.
+    pub average: u32,
+    /// Table of offsets and gains, found from the working folder.
+    pub calibration: Option<PathBuf>,
+    /// Frame read without contact, found from the working folder.
+    pub tare: Option<PathBuf>,
+    /// Taxels left out of the inverse, [row, col], sorted, each once, fewer than all.
+    pub dead: Vec<[usize; 2]>,
+    /// The sensor reads tension as zero.
+    pub unipolar: bool,
+}
+
+/// Forces in a result.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum ForceOutput {
+    /// One vector per taxel.
+    #[default]
+    Taxels,
+    /// One per subarray or contact, with its centre of pressure.
+    Resultants,
+}
+
+/// Table `[output]`.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct OutputSpec {
+    /// Taxels or resultants.
+    pub forces: ForceOutput,
 }
 
 impl Default for PartitionSpec {
@@ -248,6 +279,7 @@ impl Scene {
             fixed: FixedSpec::default(),
             hardware: HardwareSpec::default(),
             input: InputSpec::default(),
+            output: OutputSpec::default(),
         }
     }
 }

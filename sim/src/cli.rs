@@ -48,7 +48,8 @@ const EXAMPLES: &str = "Examples:
   dermis build eight-by-eight --out rtl              Verilog, memory files, manifest.json
   dermis cosim sensor-1                              all shipped frames, model against hardware
   dermis table                                       errors of all scenes, beside the paper's
-  dermis noise sensor-1                              errors under noise, beside the Cramér–Rao bound";
+  dermis noise sensor-1                              errors under noise, beside the Cramér–Rao bound
+  dermis generate sensor-3 --random 2 --out two.json a frame with known forces";
 
 #[derive(Subcommand, Debug)]
 enum Command {
@@ -98,6 +99,8 @@ enum Command {
         #[arg(long, value_enum, default_value = "both")]
         device: DeviceChoice,
     },
+    /// Make a frame with known forces from described contacts.
+    Generate(crate::generate::Arguments),
     /// Print the errors of scenes in the paper's cases on their shipped frames, beside the paper's.
     #[command(after_help = "Examples:
   dermis table                                       every built-in scene, cases 0 to 3
@@ -237,6 +240,7 @@ fn run(arguments: &Arguments) -> Result<(String, bool)> {
             };
             Ok((text, verified.findings.is_equal()))
         }
+        Command::Generate(arguments) => Ok((crate::generate::run(arguments)?, true)),
         Command::Table { scenes, cases, format, cosim: false } => Ok((table(scenes, cases, *format)?, true)),
         Command::Noise { scene, levels, draws, seed, frames, objectives, format } => {
             let mut wanted = Study { draws: *draws, seed: *seed, frames: *frames, ..Study::default() };

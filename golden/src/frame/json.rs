@@ -1,10 +1,10 @@
-//! Frames in JSON. Only `stress_MPa` must be there; fields this version does not know are passed over, at the top and
-//! in every object below.
+//! Frames in JSON. Read: only `stress_MPa` must be there; fields this version does not know are passed over, at the top
+//! and in every object below.
 
 use super::{Contact, Forces, Frame, FrameError};
 use crate::scene::{Medium, Scene};
 use crate::sensor::Sensor;
-use serde::Deserialize;
+use serde::{Deserialize, Serialize};
 
 /// The file's fields as they come.
 #[derive(Deserialize)]
@@ -18,6 +18,44 @@ struct Raw {
     cell_forces_N: Option<Forces>,
     stress_MPa: Vec<f64>,
     notes: Option<String>,
+}
+
+/// The file's fields as they are written.
+#[derive(Serialize)]
+struct Written<'a> {
+    id: &'a str,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    medium: Option<Medium>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    source: Option<&'a str>,
+    sensor: &'a Sensor,
+    contacts: &'a [Contact],
+    #[serde(skip_serializing_if = "Option::is_none")]
+    resultant_N: Option<[f64; 3]>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    cell_forces_N: Option<&'a Forces>,
+    stress_MPa: &'a [f64],
+    #[serde(skip_serializing_if = "Option::is_none")]
+    notes: Option<&'a str>,
+}
+
+impl Frame {
+    /// The frame as JSON that [`Frame::load`] reads back unchanged, on one line.
+    pub fn to_json(&self) -> String {
+        let written = Written {
+            id: &self.id,
+            medium: self.medium,
+            source: self.source.as_deref(),
+            sensor: &self.sensor,
+            contacts: &self.contacts,
+            resultant_N: self.resultant_N,
+            cell_forces_N: self.cell_forces_N.as_ref(),
+            stress_MPa: &self.stress_MPa,
+            notes: self.notes.as_deref(),
+        };
+        // Numbers, texts and lists of them always have a JSON form.
+        serde_json::to_string(&written).unwrap_or_default()
+    }
 }
 
 /// Reads a frame; `stem` is its id when the text has none, the scene's sensor its sensor.

@@ -5,10 +5,14 @@
 //! | `taken` | `partition.case = "adaptive"` | the case taken and why, and why the finer ones were not |
 //! | `regions` | `partition.case = "contacts"` | μ, centre, load and taxels of each contact |
 //! | `truncation` | `search.form = "orthogonal"` | ‖x − w‖/‖w‖ of each subarray: what the series in μ leaves out |
+//! | `unipolar` | `input.unipolar = true` | clipped taxels, iterations, misfit |
+//! | `resultants` | `output.forces = "resultants"` | force and centre of pressure per subarray or contact |
 //! | `sweeps`, `converged` | `partition.case = "contacts"` | how the search over the regions went |
 
+use super::output::Resultant;
 use crate::float::contacts::Contacts;
 use crate::frame::Forces;
+use crate::input::unipolar::Unipolar;
 use crate::sensor::Sensor;
 use serde::{Deserialize, Serialize};
 
@@ -31,6 +35,12 @@ pub struct Extra {
     /// ‖x − w‖/‖w‖ of each subarray.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub truncation: Option<Vec<f64>>,
+    /// How `input.unipolar` went.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub unipolar: Option<Unipolar>,
+    /// The forces of `output.forces = "resultants"`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub resultants: Option<Vec<Resultant>>,
 }
 
 /// A choice of case.

@@ -19,28 +19,51 @@ use crate::float::receive::{receive, Receipt};
 use crate::float::search::search;
 use crate::float::segment::{segment, Segments, WIDTH};
 use crate::frame::{Forces, Frame, FrameError};
+use crate::input::{Input as InputOptions, InputError};
 use crate::matrices::{Matrices, MatricesError};
 use crate::partition::{subarrays, Case, PartitionError, Subarray};
 use crate::quantise::{full_scale, noise_floor_codes, quantise};
 use crate::scene::{Condition, Form, Scene, SceneError};
+use std::sync::Arc;
 use thiserror::Error;
 
 /// A scene made ready for frames.
 pub struct Golden {
-    scene: Scene,
+    pub(super) scene: Scene,
+    /// The scene's input options.
+    pub(super) input: InputOptions,
     /// The case; of `adaptive` all cases that divide the array, the finest first, the whole last.
     cuts: Vec<Cut>,
 }
 
 /// A case with its matrices.
+#[derive(Clone)]
 struct Cut {
     case: Case,
     parts: Vec<Subarray>,
     /// Shared by all subarrays: a partition's rectangles are equal.
-    matrices: Matrices,
+    shared: Matrices,
+    /// One for each subarray where taxels are masked.
+    masked: Vec<Matrices>,
     /// Where the scene asks for Eq. 1 as printed.
     orthogonal: Option<Orthogonal>,
-    objective: Box<dyn Objective + Send + Sync>,
+    objective: Arc<dyn Objective + Send + Sync>,
+}
+
+impl Cut {
+    fn matrices(&self, part: usize) -> &Matrices {
+        self.masked.get(part).unwrap_or(&self.shared)
+    }
+
+    /// Leaves the taxels `dead` out, and no others.
+    fn mask(mut self, dead: &[[usize; 2]]) -> Result<Cut, MatricesError> {
+        let own = |part: &Subarray| self.shared.without(&part.own(dead));
+        self.masked = match dead {
+            [] => Vec::new(),
+            _ => self.parts.iter().map(own).collect::<Result<_, _>>()?,
+        };
+        Ok(self)
+    }
 }
 
 /// A frame with what all subarrays ask of it.
@@ -79,6 +102,9 @@ pub enum GoldenError {
     /// The frame is not one of this scene.
     #[error(transparent)]
     Frame(#[from] FrameError),
+    /// A file the input options name, or frames that do not fit them.
+    #[error(transparent)]
+    Input(#[from] InputError),
     /// Stress so large that its forces are no finite numbers.
     #[error("frame {frame}: peak stress {peak_MPa:e} MPa gives forces beyond the range of numbers")]
     TooStrong {
@@ -99,11 +125,11 @@ impl Golden {
         let cut = |case: Case| -> Result<Cut, GoldenError> {
             let parts = subarrays(case, &scene.sensor)?;
             let shape = parts[0].sensor(&scene.sensor);
-            let matrices = Matrices::new(&shape, scene.search.mu_max)?;
+            let shared = Matrices::through(&shape, scene.medium, scene.search.mu_max)?;
             let literal = scene.search.form == Form::Orthogonal;
-            let orthogonal = literal.then(|| Orthogonal::new(&matrices)).transpose()?;
-            let objective = of_kind(scene.search.objective, &shape);
-            Ok(Cut { case, parts, matrices, orthogonal, objective })
+            let orthogonal = literal.then(|| Orthogonal::new(&shared)).transpose()?;
+            let objective = Arc::from(of_kind(scene.search.objective, &shape));
+            Ok(Cut { case, parts, shared, masked: Vec::new(), orthogonal, objective }.mask(&scene.input.dead)?)
         };
         let cases = match scene.partition.case {
             Case::Adaptive => {
@@ -114,12 +140,12 @@ impl Golden {
             grid @ Case::Grid(_) => vec![grid],
         };
         let cuts = cases.into_iter().map(cut).collect::<Result<_, _>>()?;
-        Ok(Golden { scene: scene.clone(), cuts })
+        Ok(Golden { scene: scene.clone(), input: InputOptions::new(scene)?, cuts })
     }
 
     /// The matrices of a subarray; of `adaptive` those of the whole array.
     pub fn matrices(&self) -> &Matrices {
-        &self.whole().matrices
+        self.whole().matrices(0)
     }
 
     /// The coarsest case.
@@ -127,19 +153,20 @@ impl Golden {
         &self.cuts[self.cuts.len() - 1]
     }
 
-    /// Reconstructs one frame. Forces come from the stress as it is, the condition from its codes.
+    /// The same scene without the readings of the taxels `dead`.
+    ///
+    /// # Errors
+    /// `Matrices` when too few readings are left.
+    pub(super) fn masked(&self, dead: &[[usize; 2]]) -> Result<Golden, GoldenError> {
+        let cuts = self.cuts.iter().map(|cut| cut.clone().mask(dead)).collect::<Result<_, _>>()?;
+        Ok(Golden { scene: self.scene.clone(), input: self.input.clone(), cuts })
+    }
+
+    /// Reconstructs calibrated stress. Forces come from the stress as it is, the condition from its codes.
     ///
     /// # Errors
     /// `Frame` when the frame is not the scene's, `TooStrong` when a force overflows.
-    pub fn run(&self, frame: &Frame) -> Result<Reconstruction, GoldenError> {
-        self.run_with_noise(frame, self.scene.search.noise_floor_MPa)
-    }
-
-    /// Reconstructs one frame whose noise the objective is told to have the deviation `noise_MPa`.
-    ///
-    /// # Errors
-    /// As [`Golden::run`].
-    pub fn run_with_noise(&self, frame: &Frame, noise_MPa: f64) -> Result<Reconstruction, GoldenError> {
+    pub(super) fn engine(&self, frame: &Frame, noise_MPa: f64) -> Result<Reconstruction, GoldenError> {
         let scene = &self.scene;
         frame.check(scene)?;
         let codes = quantise(&frame.stress_MPa, scene.fixed.input_bits, full_scale(scene, frame));
@@ -240,12 +267,12 @@ impl Golden {
         let sensor = &self.scene.sensor;
         let forces = Forces::zeros(sensor.taxels());
         let mut outcome = Outcome { subarrays: Vec::new(), forces, flags: Vec::new(), truncation: Vec::new() };
-        for part in &cut.parts {
+        for (index, part) in cut.parts.iter().enumerate() {
             let receipt = self.receive(input, part);
             let b = part.gather(sensor, input.stress_MPa);
             // With mu_max = 0 there is nothing to search for: no score and no verdict on compression.
             let searched = receipt.condition_met && self.scene.search.mu_max > 0.0;
-            let (estimate, w) = self.solve(cut, &b, searched, input.noise_MPa);
+            let (estimate, w) = self.solve(cut, index, &b, searched, input.noise_MPa);
             let (x, truncation) = cut.meet(&b, w);
             outcome.truncation.extend(truncation);
             let own = threshold(x, self.scene.threshold.min_force_N);
@@ -271,8 +298,15 @@ impl Golden {
     }
 
     /// One subarray: the family, the search where the condition is met, the forces before the threshold.
-    fn solve(&self, cut: &Cut, b: &[f64], condition_met: bool, noise_MPa: f64) -> (Option<Estimate>, Forces) {
-        let matrices = &cut.matrices;
+    fn solve(
+        &self,
+        cut: &Cut,
+        part: usize,
+        b: &[f64],
+        condition_met: bool,
+        noise_MPa: f64,
+    ) -> (Option<Estimate>, Forces) {
+        let matrices = cut.matrices(part);
         if !condition_met {
             let family = Polynomial::of_degree(matrices, b, 0);
             return (None, force(family.v(0, 0), [0.0; 2], 0.0));

@@ -2,7 +2,7 @@
 
 use super::*;
 use crate::partition::{Case, Subarray};
-use crate::scene::{Condition, Medium};
+use crate::scene::Condition;
 use proptest::prelude::*;
 
 /// Targets on sensor 1: median tangential error, normal error of each frame.
@@ -179,9 +179,6 @@ fn what_is_not_the_scenes_is_refused() {
     let eight = Scene::builtin("eight-by-eight").unwrap();
     let other = Golden::new(&eight).unwrap().run(&hertz());
     assert!(matches!(other, Err(GoldenError::Frame(_))));
-    let mut layer = scene();
-    layer.medium = Medium::BondedLayer { poisson: 0.48 };
-    assert!(matches!(Golden::new(&layer), Err(GoldenError::Scene(_))));
 }
 
 #[test]

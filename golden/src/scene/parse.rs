@@ -2,16 +2,17 @@
 
 use super::reader::Reader;
 use super::{
-    Condition, FixedSpec, Form, HardwareSpec, InputSpec, Medium, ObjectiveKind, PartitionSpec, Scene, SceneError,
-    SearchSpec, ThresholdSpec, BOARDS,
+    Condition, FixedSpec, ForceOutput, Form, HardwareSpec, InputSpec, Medium, ObjectiveKind, OutputSpec, PartitionSpec,
+    Scene, SceneError, SearchSpec, ThresholdSpec, BOARDS,
 };
 use crate::partition::{subarrays, Case, Grid};
 use crate::sensor::{Sensor, MAX_LENGTH_MM, MAX_LINES, MIN_LINES};
 use std::ops::RangeInclusive;
+use std::path::Path;
 use toml::{Table, Value};
 
 /// Tables and their fields; "" is the top level.
-const SCHEMA: [(&str, &[&str]); 9] = [
+const SCHEMA: [(&str, &[&str]); 10] = [
     ("", &["name"]),
     ("sensor", &["rows", "cols", "pitch_x_mm", "pitch_y_mm", "thickness_mm"]),
     ("medium", &["kind", "poisson"]),
@@ -20,7 +21,8 @@ const SCHEMA: [(&str, &[&str]); 9] = [
     ("threshold", &["min_force_N"]),
     ("fixed", &["input_bits", "data_bits", "coef_bits", "inverse_bits", "prune_bits"]),
     ("hardware", &["board"]),
-    ("input", &["full_scale_MPa"]),
+    ("input", &["full_scale_MPa", "average", "calibration", "tare", "dead", "unipolar"]),
+    ("output", &["forces"]),
 ];
 /// Poisson ratio of soft rubber, where a bonded layer names none.
 const DEFAULT_POISSON: f64 = 0.48;
@@ -49,7 +51,8 @@ impl Scene {
             threshold: threshold(&reader)?,
             fixed: fixed(&reader)?,
             hardware: hardware(&reader)?,
-            input: input(&reader)?,
+            input: input(&reader, origin, &sensor)?,
+            output: output(&reader)?,
             sensor,
         })
     }
@@ -205,7 +208,52 @@ fn hardware(reader: &Reader) -> Result<HardwareSpec, SceneError> {
     Ok(board.map_or_else(HardwareSpec::default, |board| HardwareSpec { board: board.to_string() }))
 }
 
-fn input(reader: &Reader) -> Result<InputSpec, SceneError> {
+fn input(reader: &Reader, origin: &str, sensor: &Sensor) -> Result<InputSpec, SceneError> {
     let full_scale_MPa = reader.number("input.full_scale_MPa", |mpa| mpa > 0.0, "a number above 0")?;
-    Ok(InputSpec { full_scale_MPa })
+    // Beside the scene's own file.
+    let file = |path| match reader.value(path) {
+        None => Ok(None),
+        Some(Value::String(name)) if !name.is_empty() => Ok(Some(Path::new(origin).with_file_name(name))),
+        Some(value) => Err(reader.wrong(path, value, "the name of a file")),
+    };
+    Ok(InputSpec {
+        full_scale_MPa,
+        // In range, so that the cast keeps the value.
+        average: reader.integer("input.average", 0..=12, Some(0))? as u32,
+        calibration: file("input.calibration")?,
+        tare: file("input.tare")?,
+        dead: dead(reader, sensor)?,
+        unipolar: reader.typed("input.unipolar", Value::as_bool, "true or false")?.unwrap_or(false),
+    })
+}
+
+fn dead(reader: &Reader, sensor: &Sensor) -> Result<Vec<[usize; 2]>, SceneError> {
+    let path = "input.dead";
+    let Some(value) = reader.value(path) else {
+        return Ok(Vec::new());
+    };
+    let (rows, cols) = (sensor.rows, sensor.cols);
+    let wrong = |value| {
+        let ranges = format!("row 0 to {}, col 0 to {}", rows - 1, cols - 1);
+        reader.wrong(path, value, format!("a list of [row, col], {ranges}, fewer than all taxels"))
+    };
+    let taxel = |value: &Value| {
+        let [row, col] = value.as_array()?.as_slice() else { return None };
+        let index =
+            |value: &Value, count: usize| usize::try_from(value.as_integer()?).ok().filter(|index| *index < count);
+        Some([index(row, rows)?, index(col, cols)?])
+    };
+    let list = value.as_array().ok_or_else(|| wrong(value))?;
+    let mut dead = list.iter().map(|value| taxel(value).ok_or_else(|| wrong(value))).collect::<Result<Vec<_>, _>>()?;
+    dead.sort_unstable();
+    dead.dedup();
+    if dead.len() == sensor.taxels() {
+        return Err(wrong(value));
+    }
+    Ok(dead)
+}
+
+fn output(reader: &Reader) -> Result<OutputSpec, SceneError> {
+    let names = [("taxels", ForceOutput::Taxels), ("resultants", ForceOutput::Resultants)];
+    Ok(OutputSpec { forces: reader.choice("output.forces", &names)? })
 }

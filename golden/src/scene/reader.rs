@@ -90,6 +90,17 @@ impl<'a> Reader<'a> {
         }
     }
 
+    /// A value of another type, read by `read`.
+    pub(super) fn typed<T>(
+        &self,
+        path: &str,
+        read: impl Fn(&Value) -> Option<T>,
+        allowed: &str,
+    ) -> Result<Option<T>, SceneError> {
+        let value = self.value(path);
+        value.map(|value| read(value).ok_or_else(|| self.wrong(path, value, allowed))).transpose()
+    }
+
     /// One of the named choices, or the type's default.
     pub(super) fn choice<T: Copy + Default>(&self, path: &str, names: &[(&str, T)]) -> Result<T, SceneError> {
         let Some(value) = self.value(path) else {

@@ -52,7 +52,14 @@ fn every_field_is_read() {
         [hardware]
         board = "ulx3s-85f"
         [input]
-        full_scale_MPa = 0.25"#;
+        full_scale_MPa = 0.25
+        average = 6
+        calibration = "table.csv"
+        tare = "zero.json"
+        dead = [[3, 4], [0, 9], [3, 4]]
+        unipolar = true
+        [output]
+        forces = "resultants""#;
     let scene = with(more).unwrap();
     assert_eq!(scene.medium, Medium::BondedLayer { poisson: 0.4 });
     assert_eq!(scene.partition.case, Case::Grid(Grid { rows: 2, cols: 5 }));
@@ -65,7 +72,17 @@ fn every_field_is_read() {
         scene.fixed,
         FixedSpec { input_bits: 16, data_bits: 16, coef_bits: 14, inverse_bits: 18, prune_bits: 20 }
     );
-    assert_eq!(scene.input.full_scale_MPa, Some(0.25));
+    let input = InputSpec {
+        full_scale_MPa: Some(0.25),
+        average: 6,
+        calibration: Some("table.csv".into()),
+        tare: Some("zero.json".into()),
+        dead: vec![[0, 9], [3, 4]],
+        unipolar: true,
+    };
+    assert_eq!((scene.input, scene.output.forces), (input, ForceOutput::Resultants));
+    let beside = Scene::parse(&format!("{SENSOR}[input]\ntare = \"zero.json\""), "rig/my.toml").unwrap();
+    assert_eq!(beside.input.tare, Some("rig/zero.json".into()));
 }
 
 #[test]
@@ -112,6 +129,12 @@ fn wrong_values_name_what_is_allowed() {
         ("[fixed]\ninput_bits = \"20\"", "fixed.input_bits = \"20\""),
         ("[hardware]\nboard = \"icebreaker\"", "\"ulx3s-85f\""),
         ("[input]\nfull_scale_MPa = 0", "above 0"),
+        ("[input]\naverage = 13", "from 0 to 12"),
+        ("[input]\ndead = [[0, 10]]", "a list of [row, col], row 0 to 9, col 0 to 9"),
+        ("[input]\ndead = [3]", "a list of [row, col]"),
+        ("[input]\nunipolar = 1", "true or false"),
+        ("[input]\ntare = 1", "the name of a file"),
+        ("[output]\nforces = \"all\"", "\"taxels\" or \"resultants\""),
         ("[partition]\ncase = 4", "0, 1, 2, 3, \"adaptive\" or \"contacts\""),
         ("[partition]\nrows = 3\ncols = 1", "3 subarrays do not divide 10 rows"),
         ("[partition]\nrows = 2", "partition.cols is missing"),
@@ -162,6 +185,11 @@ fn choices_not_built_yet_say_so() {
         ("[medium]\nkind = \"bonded-layer\"", "medium.kind = bonded-layer, poisson 0.48; available: half-space"),
         ("[partition]\ncase = \"contacts\"", "partition.case = contacts; available: 0, 1, 2, 3, rows and cols"),
         ("[partition]\ncase = \"adaptive\"", "partition.case = adaptive"),
+        ("[input]\naverage = 1", "input.average = 1; available: 0"),
+        ("[input]\ncalibration = \"t.csv\"", "input.calibration"),
+        ("[input]\ndead = [[0, 1]]", "input.dead"),
+        ("[input]\nunipolar = true", "input.unipolar"),
+        ("[output]\nforces = \"resultants\"", "output.forces = resultants; available: taxels"),
         ("[search]\nobjective = \"auto\"", "search.objective = auto; available: sparse"),
         ("[search]\nform = \"orthogonal\"", "search.form = orthogonal; available: oblique"),
     ];

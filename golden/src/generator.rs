@@ -1,0 +1,86 @@
+//! Generator: frames of stress from contacts described by shape, place, load and slip, with their exact forces.
+//!
+//! ```text
+//! contacts ── traction ─┬─ stress ── frame ── converter ── frame as a sensor gives it
+//!             pieces    └─ cells ──┘          noise, clipping, codes, dead and stuck taxels
+//! ```
+//!
+//! Stress is integrated over the continuous traction through the kernel of a point force, not over cells, so that the
+//! truth is not made with the model that is tested on it.
+//!
+//! | shape | `size_mm` | pressure |
+//! |---|---|---|
+//! | `hertz-circle` | \[a\] | p0 √(1 − r²/a²) |
+//! | `hertz-ellipse` | \[a, b, angle\] | p0 √(1 − X²/a² − Y²/b²) |
+//! | `flat-punch` | \[a\] or \[a, b, angle\] | uniform on a disc or ellipse |
+//! | `ring` | \[outer, inner\] | uniform between two circles |
+//! | `rectangle` | \[width, height, angle\] | uniform |
+//! | `plantar-left`, `plantar-right` | \[width, length, angle\] or none | measured template, uniform on each pixel |
+//!
+//! Half-axes for ellipses, full lengths for rectangles and feet; angles in degrees from +x towards +y.
+//!
+//! | `kind_of_slip` | shear traction |
+//! |---|---|
+//! | `none` | none; the tangential load must be zero |
+//! | `full-sliding` (default), `proportional` | \|T\|/N times the pressure |
+//! | `partial-slip` | Cattaneo–Mindlin, Hertz shapes: friction · (p over a − c/a · p over c), c/a = (1 − \|T\|/(friction N))^⅓ |
+
+mod cells;
+pub mod converter;
+mod error;
+mod plantar;
+mod random;
+mod stress;
+#[cfg(test)]
+mod tests;
+mod traction;
+
+pub use error::GeneratorError;
+pub use random::random_contacts;
+
+use crate::bonded::kernel::Kernel;
+use crate::frame::{Contact, Frame};
+use crate::scene::Medium;
+use crate::sensor::Sensor;
+use stress::Body;
+
+/// Computes the frame of contacts on a body: stress under each taxel, force on each cell, resultant.
+///
+/// # Errors
+/// A sensor out of range, no contact, or a contact whose shape, sizes, loads or slip do not fit together.
+pub fn generate(id: &str, sensor: &Sensor, medium: Medium, contacts: &[Contact]) -> Result<Frame, GeneratorError> {
+    sensor.check()?;
+    if contacts.is_empty() {
+        return Err(GeneratorError::NoContact);
+    }
+    let mut pieces = Vec::new();
+    for (index, contact) in contacts.iter().enumerate() {
+        pieces.extend(traction::pieces(index, contact)?);
+    }
+    let h = sensor.thickness_mm;
+    let (body, source) = match medium {
+        Medium::HalfSpace => (Body::HalfSpace { h }, "half-space-quadrature"),
+        Medium::BondedLayer { poisson } => (Body::Layer { h, kernel: Kernel::new(poisson) }, "bonded-layer-quadrature"),
+    };
+    let at = |index: usize| sensor.position_mm(index / sensor.cols, index % sensor.cols);
+    let stress_MPa: Vec<f64> = (0..sensor.taxels()).map(|index| body.stress_MPa(at(index), &pieces)).collect();
+    if let Some(index) = stress_MPa.iter().position(|b| !b.is_finite()) {
+        return Err(GeneratorError::NotFinite { index });
+    }
+    let cell_forces = cells::forces(sensor, &pieces);
+    let mut resultant = [0.0; 3];
+    for piece in &pieces {
+        (0..3).for_each(|axis| resultant[axis] += piece.force_N[axis]);
+    }
+    Ok(Frame {
+        id: id.to_string(),
+        medium: Some(medium),
+        source: Some(source.to_string()),
+        sensor: sensor.clone(),
+        contacts: contacts.to_vec(),
+        resultant_N: Some(resultant),
+        cell_forces_N: Some(cell_forces),
+        stress_MPa,
+        notes: None,
+    })
+}

@@ -1,0 +1,202 @@
+//! Cells: the traction integrated over each taxel's cell.
+//!
+//! Along x the integral of a piece's pressure is a closed form of the chord's ends; along y it is taken by quadrature
+//! between the lines where the outline meets a cell boundary. Between those it is analytic but for square roots at the
+//! ends, which y = middle + half · sin removes.
+//!
+//! ```text
+//! ellipse  Q(x, y) = A x² + 2 B x y + C y² ≤ 1:  1 − Q = m − A (x − x0)²,  m = 1 − (C − B²/A) y²,  x0 = −B y/A
+//! Hertz    ∫ √(1 − Q) dx from the chord's start to τ half chords beside its middle = m/√A ½ (τ √(1 − τ²) + asin τ + π/2)
+//! uniform  ∫ dx = √(m/A) (τ + 1)
+//! ```
+
+use super::traction::{Form, Piece};
+use crate::frame::Forces;
+use crate::gauss::rule;
+use crate::sensor::Sensor;
+use std::f64::consts::{FRAC_PI_2, PI};
+use std::ops::Range;
+
+/// Nodes between two neighbouring lines.
+const NODES: usize = 32;
+
+/// Force on each cell in N, row-major.
+pub(super) fn forces(sensor: &Sensor, pieces: &[Piece]) -> Forces {
+    let mut forces = Forces::zeros(sensor.taxels());
+    for piece in pieces {
+        let outline = Outline::new(piece);
+        let x_edges = Edges { count: sensor.cols, pitch: sensor.pitch_x_mm, shift: piece.centre_mm[0] };
+        let y_edges = Edges { count: sensor.rows, pitch: sensor.pitch_y_mm, shift: piece.centre_mm[1] };
+        let cols = x_edges.cells(outline.reach()[0]);
+        for row in y_edges.cells(outline.reach()[1]) {
+            let shares = outline.strip([y_edges.at(row), y_edges.at(row + 1)], &x_edges, cols.clone());
+            for (col, share) in cols.clone().zip(shares) {
+                let cell = row * sensor.cols + col;
+                forces.fx[cell] += share * piece.force_N[0];
+                forces.fy[cell] += share * piece.force_N[1];
+                forces.fz[cell] += share * piece.force_N[2];
+            }
+        }
+    }
+    forces
+}
+
+/// Boundaries of the cells in one direction, seen from a piece's centre.
+struct Edges {
+    count: usize,
+    pitch: f64,
+    shift: f64,
+}
+
+impl Edges {
+    fn at(&self, index: usize) -> f64 {
+        (index as f64 - self.count as f64 / 2.0) * self.pitch - self.shift
+    }
+
+    /// The cells that a piece of half length `reach` can touch.
+    fn cells(&self, reach: f64) -> Range<usize> {
+        let place = |mm: f64| (mm + self.shift) / self.pitch + self.count as f64 / 2.0;
+        // The casts saturate at 0.
+        let first = place(-reach).floor() as usize;
+        let last = (place(reach).ceil() as usize).min(self.count);
+        first.min(last)..last
+    }
+}
+
+/// A piece's region around its centre.
+enum Outline {
+    /// A, B, C of the quadratic form, and whether the pressure is Hertz's.
+    Ellipse { a: f64, b: f64, c: f64, hertz: bool },
+    /// The corners in order, and the area.
+    Polygon { corners: [[f64; 2]; 4], area: f64 },
+}
+
+impl Outline {
+    fn new(piece: &Piece) -> Outline {
+        let ([p, q], [cos, sin]) = (piece.half_mm, piece.turn);
+        match piece.form {
+            Form::Hertz | Form::Disc => {
+                let (p, q) = (1.0 / (p * p), 1.0 / (q * q));
+                Outline::Ellipse {
+                    a: cos * cos * p + sin * sin * q,
+                    b: cos * sin * (p - q),
+                    c: sin * sin * p + cos * cos * q,
+                    hertz: piece.form == Form::Hertz,
+                }
+            }
+            Form::Square => {
+                let corner = |x: f64, y: f64| [x * p * cos - y * q * sin, x * p * sin + y * q * cos];
+                let corners = [corner(-1.0, -1.0), corner(1.0, -1.0), corner(1.0, 1.0), corner(-1.0, 1.0)];
+                Outline::Polygon { corners, area: 4.0 * p * q }
+            }
+        }
+    }
+
+    /// Largest |x| and |y|.
+    fn reach(&self) -> [f64; 2] {
+        match self {
+            Outline::Ellipse { a, b, c, .. } => {
+                let root = (a * c - b * b).sqrt();
+                [c.sqrt() / root, a.sqrt() / root]
+            }
+            Outline::Polygon { corners, .. } => {
+                [0, 1].map(|axis| corners.iter().fold(0.0, |most: f64, corner| most.max(corner[axis].abs())))
+            }
+        }
+    }
+
+    /// Shares of the load in the cells of one row of cells.
+    fn strip(&self, [low, high]: [f64; 2], edges: &Edges, cols: Range<usize>) -> Vec<f64> {
+        let reach = self.reach()[1];
+        let mut lines = vec![low, high, -reach, reach];
+        (cols.start..=cols.end).for_each(|edge| self.meet(edges.at(edge), &mut lines));
+        if let Outline::Polygon { corners, .. } = self {
+            lines.extend(corners.map(|corner| corner[1]));
+        }
+        lines.iter_mut().for_each(|line| *line = line.clamp(low.max(-reach), high.min(reach).max(low.max(-reach))));
+        lines.sort_by(f64::total_cmp);
+        let mut shares = vec![0.0; cols.len()];
+        for pair in lines.windows(2).filter(|pair| pair[1] > pair[0]) {
+            let (middle, half) = ((pair[0] + pair[1]) / 2.0, (pair[1] - pair[0]) / 2.0);
+            for &(t, weight) in rule(NODES) {
+                let angle = t * FRAC_PI_2;
+                let weight = weight * FRAC_PI_2 * half * angle.cos();
+                let chord = self.chord(middle + half * angle.sin());
+                let mut before = chord.up_to(edges.at(cols.start));
+                for (share, col) in shares.iter_mut().zip(cols.clone()) {
+                    let after = chord.up_to(edges.at(col + 1));
+                    *share += weight * (after - before);
+                    before = after;
+                }
+            }
+        }
+        shares
+    }
+
+    /// Adds the y where the outline meets the line at x.
+    fn meet(&self, x: f64, lines: &mut Vec<f64>) {
+        match self {
+            Outline::Ellipse { a, b, c, .. } => {
+                let square = b * b * x * x - c * (a * x * x - 1.0);
+                if square > 0.0 {
+                    lines.extend([-1.0, 1.0].map(|sign| (-b * x + sign * square.sqrt()) / c));
+                }
+            }
+            Outline::Polygon { corners, .. } => {
+                for k in 0..4 {
+                    let ([x0, y0], [x1, y1]) = (corners[k], corners[(k + 1) % 4]);
+                    if (x0 < x) != (x1 < x) {
+                        lines.push(y0 + (y1 - y0) * (x - x0) / (x1 - x0));
+                    }
+                }
+            }
+        }
+    }
+
+    /// The region's chord at y.
+    fn chord(&self, y: f64) -> Chord {
+        match self {
+            Outline::Ellipse { a, b, c, hertz } => {
+                let m = (1.0 - (c - b * b / a) * y * y).max(0.0);
+                let area = PI / (a * c - b * b).sqrt();
+                let (half, middle) = ((m / a).sqrt(), -b * y / a);
+                let scale = if *hertz { 1.5 * m / a.sqrt() / area } else { half / area };
+                Chord { middle, half, scale, hertz: *hertz }
+            }
+            Outline::Polygon { corners, area } => {
+                let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
+                for k in 0..4 {
+                    let ([x0, y0], [x1, y1]) = (corners[k], corners[(k + 1) % 4]);
+                    if (y0 < y) != (y1 < y) {
+                        let x = x0 + (x1 - x0) * (y - y0) / (y1 - y0);
+                        (low, high) = (low.min(x), high.max(x));
+                    }
+                }
+                if low > high {
+                    (low, high) = (0.0, 0.0);
+                }
+                let half = (high - low) / 2.0;
+                Chord { middle: (low + high) / 2.0, half, scale: half / area, hertz: false }
+            }
+        }
+    }
+}
+
+/// A chord and the share of the load per mm of y up to a point of it.
+struct Chord {
+    middle: f64,
+    half: f64,
+    scale: f64,
+    hertz: bool,
+}
+
+impl Chord {
+    fn up_to(&self, x: f64) -> f64 {
+        if self.half <= 0.0 {
+            return 0.0;
+        }
+        let t = ((x - self.middle) / self.half).clamp(-1.0, 1.0);
+        let form = if self.hertz { (t * (1.0 - t * t).sqrt() + t.asin() + FRAC_PI_2) / 2.0 } else { t + 1.0 };
+        self.scale * form
+    }
+}

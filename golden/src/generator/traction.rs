@@ -1,0 +1,143 @@
+//! Traction: a described contact as a sum of simple pieces.
+//!
+//! A piece is a region with a pressure of one form and a force along a fixed direction. Every contact is a sum of such:
+//! a ring is a disc less a disc, partial slip two Hertz pressures of different radius, a foot one square per pixel.
+
+use super::plantar::{self, Foot};
+use super::GeneratorError;
+use crate::frame::Contact;
+use std::f64::consts::PI;
+
+/// Form of a piece, in coordinates that are ±1 at its half-axes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Form {
+    /// √(1 − ρ²) on the disc.
+    Hertz,
+    /// Uniform on the disc.
+    Disc,
+    /// Uniform on the square.
+    Square,
+}
+
+/// A region of traction.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Piece {
+    /// Pressure and region.
+    pub(super) form: Form,
+    /// Middle of the region.
+    pub(super) centre_mm: [f64; 2],
+    /// Half-axes.
+    pub(super) half_mm: [f64; 2],
+    /// Cosine and sine of the angle from +x to the first half-axis.
+    pub(super) turn: [f64; 2],
+    /// Force of the whole piece.
+    pub(super) force_N: [f64; 3],
+}
+
+/// The pieces of one contact; `index` names it in errors.
+pub(super) fn pieces(index: usize, contact: &Contact) -> Result<Vec<Piece>, GeneratorError> {
+    let fail = |field, value: String, allowed: &str| {
+        Err(GeneratorError::Contact { index, field, value, allowed: allowed.to_string() })
+    };
+    let centre_mm = contact.centre_mm.unwrap_or_default();
+    if !centre_mm.iter().all(|c| c.is_finite()) {
+        return fail("centre_mm", format!("{centre_mm:?}"), "two finite numbers");
+    }
+    let Some(normal) = contact.normal_N.filter(|n| *n > 0.0 && n.is_finite()) else {
+        return fail("normal_N", format!("{:?}", contact.normal_N), "a finite number above 0");
+    };
+    let shear = contact.tangential_N.unwrap_or_default();
+    if !shear.iter().all(|t| t.is_finite()) {
+        return fail("tangential_N", format!("{shear:?}"), "two finite numbers");
+    }
+    let sizes = &contact.size_mm;
+    let lengths = |count: usize| sizes.iter().take(count).all(|s| *s > 0.0 && s.is_finite());
+    let shape = contact.shape.as_deref().unwrap_or_default();
+    let allowed = match (shape, sizes.as_slice()) {
+        ("hertz-circle", [_]) | ("flat-punch", [_]) if lengths(1) => None,
+        ("hertz-ellipse" | "flat-punch" | "rectangle", [_, _, angle]) if lengths(2) && angle.is_finite() => None,
+        ("ring", [outer, inner]) if lengths(2) && inner < outer => None,
+        ("rectangle", [_, _]) | ("hertz-ellipse", [_, _]) if lengths(2) => None,
+        (_, []) if Foot::named(shape).is_some() => None,
+        (_, [_, _]) if Foot::named(shape).is_some() && lengths(2) => None,
+        (_, [_, _, angle]) if Foot::named(shape).is_some() && lengths(2) && angle.is_finite() => None,
+        ("hertz-circle", _) => Some("[a], a above 0"),
+        ("hertz-ellipse", _) => Some("[a, b, angle], a and b above 0"),
+        ("flat-punch", _) => Some("[a] or [a, b, angle], a and b above 0"),
+        ("ring", _) => Some("[outer, inner], inner above 0 and below outer"),
+        ("rectangle", _) => Some("[width, height, angle], width and height above 0"),
+        _ if Foot::named(shape).is_some() => Some("[], or [width, length, angle], width and length above 0"),
+        _ => {
+            let known = "hertz-circle, hertz-ellipse, flat-punch, ring, rectangle, plantar-left or plantar-right";
+            return fail("shape", format!("{shape:?}"), known);
+        }
+    };
+    if let Some(allowed) = allowed {
+        return fail("size_mm", format!("{sizes:?}"), allowed);
+    }
+    let angle = contact.rotation_rad.unwrap_or_else(|| sizes.get(2).map_or(0.0, |degrees| degrees.to_radians()));
+    let turn = [angle.cos(), angle.sin()];
+    let piece = |form, half_mm, force_N| Piece { form, centre_mm, half_mm, turn, force_N };
+    let force = [shear[0], shear[1], normal];
+    let both = |sizes: &[f64]| [sizes[0], *sizes.get(1).unwrap_or(&sizes[0])];
+    let slip = contact.kind_of_slip.as_deref().unwrap_or("full-sliding");
+    match slip {
+        "none" if shear == [0.0; 2] => {}
+        "none" => return fail("tangential_N", format!("{shear:?}"), "[0, 0] without slip"),
+        "full-sliding" | "proportional" => {}
+        "partial-slip" if shape.starts_with("hertz") => {
+            let ratio = shear[0].hypot(shear[1]) / normal;
+            let friction = contact.friction.unwrap_or(f64::NAN);
+            // A NaN fails the comparison.
+            if !(friction > ratio && friction.is_finite()) {
+                let value = format!("{:?}", contact.friction);
+                return fail("friction", value, "given and above the ratio of tangential to normal load");
+            }
+            return Ok(partial_slip(piece, both(sizes), force, friction));
+        }
+        "partial-slip" => return fail("kind_of_slip", format!("{slip:?}"), "full-sliding but for Hertz shapes"),
+        _ => return fail("kind_of_slip", format!("{slip:?}"), "none, full-sliding or partial-slip"),
+    }
+    let times = |factor: f64| force.map(|f| f * factor);
+    Ok(match shape {
+        "hertz-circle" | "hertz-ellipse" => vec![piece(Form::Hertz, both(sizes), force)],
+        "flat-punch" => vec![piece(Form::Disc, both(sizes), force)],
+        "rectangle" => vec![piece(Form::Square, [sizes[0] / 2.0, sizes[1] / 2.0], force)],
+        "ring" => {
+            let [outer, inner] = [sizes[0], sizes[1]].map(|r| PI * r * r);
+            let disc = |radius, share| piece(Form::Disc, [radius; 2], times(share));
+            vec![disc(sizes[0], outer / (outer - inner)), disc(sizes[1], -inner / (outer - inner))]
+        }
+        _ => plantar::pixels(shape, sizes)
+            .into_iter()
+            .map(|pixel| {
+                let [x, y] = pixel.centre_mm;
+                let centre = [x * turn[0] - y * turn[1] + centre_mm[0], x * turn[1] + y * turn[0] + centre_mm[1]];
+                Piece { centre_mm: centre, ..piece(Form::Square, pixel.half_mm, times(pixel.share)) }
+            })
+            .collect(),
+    })
+}
+
+/// Pressure with shear at the friction limit, less the shear of the part that sticks: c/a times a Hertz pressure of
+/// the same p0 on half-axes c/a times as long, which is (c/a)³ of the load.
+fn partial_slip(
+    piece: impl Fn(Form, [f64; 2], [f64; 3]) -> Piece,
+    half_mm: [f64; 2],
+    force: [f64; 3],
+    friction: f64,
+) -> Vec<Piece> {
+    let [tx, ty, normal] = force;
+    let shear = tx.hypot(ty);
+    if shear == 0.0 {
+        return vec![piece(Form::Hertz, half_mm, force)];
+    }
+    let limit = friction * normal / shear;
+    let stick = (1.0 - 1.0 / limit).cbrt();
+    // −limit (c/a)³ of the load, (c/a)³ = 1 − 1/limit.
+    let held = 1.0 - limit;
+    vec![
+        piece(Form::Hertz, half_mm, [tx * limit, ty * limit, normal]),
+        piece(Form::Hertz, half_mm.map(|a| a * stick), [tx * held, ty * held, 0.0]),
+    ]
+}

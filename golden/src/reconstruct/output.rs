@@ -1,0 +1,55 @@
+//! Output: one force and its centre of pressure per subarray or contact, for robots that need no more.
+//!
+//! F = Σ f, centre = Σ fz r / Σ fz over the taxels that press.
+//!
+//! | | shape | unit |
+//! |---|---|---|
+//! | in: forces | 3 × taxels | N |
+//! | out: force | 3 per subarray, or per region of `partition.case = "contacts"` | N |
+//! | out: centre | 2, none where nothing presses | mm from the array's centre |
+
+use super::Reconstruction;
+use crate::partition::Subarray;
+use crate::sensor::Sensor;
+use serde::{Deserialize, Serialize};
+
+/// The force on one subarray or contact.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Resultant {
+    /// Sum of the forces, [x, y, normal].
+    pub force_N: [f64; 3],
+    /// Centre of pressure from the array's centre.
+    pub centre_mm: Option<[f64; 2]>,
+}
+
+/// The resultants of a result, in the order of its regions, else of its subarrays.
+pub(super) fn resultants(sensor: &Sensor, result: &Reconstruction) -> Vec<Resultant> {
+    match &result.extra.regions {
+        Some(regions) => {
+            regions.iter().map(|region| resultant(sensor, result, region.taxels.iter().copied())).collect()
+        }
+        None => {
+            let parts = result.subarrays.iter().map(|part| Subarray {
+                row0: part.row0,
+                col0: part.col0,
+                rows: part.rows,
+                cols: part.cols,
+            });
+            parts.map(|part| resultant(sensor, result, part.indices(sensor))).collect()
+        }
+    }
+}
+
+fn resultant(sensor: &Sensor, result: &Reconstruction, taxels: impl Iterator<Item = usize>) -> Resultant {
+    let forces = &result.forces_N;
+    let (mut force_N, mut pressed, mut moment) = ([0.0; 3], 0.0, [0.0; 2]);
+    for k in taxels {
+        let own = [forces.fx[k], forces.fy[k], forces.fz[k]];
+        (0..3).for_each(|axis| force_N[axis] += own[axis]);
+        let load = own[2].max(0.0);
+        let place = sensor.position_mm(k / sensor.cols, k % sensor.cols);
+        pressed += load;
+        (0..2).for_each(|axis| moment[axis] += load * place[axis]);
+    }
+    Resultant { force_N, centre_mm: (pressed > 0.0).then(|| moment.map(|m| m / pressed)) }
+}

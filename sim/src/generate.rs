@@ -1,0 +1,149 @@
+//! `dermis generate`: a frame with known forces, from contacts on the command line.
+//!
+//! | contact | from |
+//! |---|---|
+//! | `--contact shape:key=value:…` | keys `at`, `size`, `normal`, `shear`, `slip`, `friction` |
+//! | `--like FILE` | the contacts described in a frame file |
+//! | `--random N` | drawn from the seed |
+
+use std::path::PathBuf;
+
+use anyhow::{anyhow, bail, Result};
+use clap::Args;
+use dermis_golden::frame::{Contact, Frame};
+use dermis_golden::generator::converter::Converter;
+use dermis_golden::generator::{generate, random_contacts};
+use dermis_golden::scene::Scene;
+
+/// What to generate.
+#[derive(Args, Debug)]
+#[command(after_help = EXAMPLES)]
+pub struct Arguments {
+    /// Built-in name or path of a scene: gives sensor and medium.
+    scene: String,
+    /// A contact, repeatable: shape:key=value:… with at=X,Y (mm), size=… (mm, degrees), normal=N, shear=X,Y (N),
+    /// slip=none|full-sliding|partial-slip, friction=F.
+    #[arg(long = "contact", value_name = "TEXT")]
+    contacts: Vec<String>,
+    /// Take the contacts described in a frame file.
+    #[arg(long, value_name = "FILE")]
+    like: Option<PathBuf>,
+    /// Draw N elliptic contacts.
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    random: usize,
+    /// Start of everything drawn.
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+    /// Standard deviation of Gaussian noise over the largest |b|.
+    #[arg(long, value_name = "SHARE", default_value_t = 0.0)]
+    noise: f64,
+    /// Tension reads as zero.
+    #[arg(long)]
+    unipolar: bool,
+    /// Round to codes of this width.
+    #[arg(long)]
+    bits: Option<u32>,
+    /// Stress of the largest code; without it the frame's peak.
+    #[arg(long, value_name = "MPA")]
+    full_scale: Option<f64>,
+    /// A taxel that reads zero, repeatable.
+    #[arg(long, value_name = "ROW,COL")]
+    dead: Vec<String>,
+    /// A taxel that reads the same always, repeatable.
+    #[arg(long, value_name = "ROW,COL=MPA")]
+    stuck: Vec<String>,
+    /// Name of the frame.
+    #[arg(long, default_value = "generated")]
+    id: String,
+    /// File to write; without it standard output.
+    #[arg(long, value_name = "FILE")]
+    out: Option<PathBuf>,
+}
+
+const EXAMPLES: &str = "Examples:
+  dermis generate sensor-1 --contact hertz-circle:size=3:normal=5:shear=1,0.5 --out press.json
+  dermis generate sensor-2 --contact ring:at=2,-3:size=7,3:normal=8 --noise 0.001 --bits 16 --seed 7
+  dermis generate sensor-3 --contact flat-punch:at=-8,-20:size=4:normal=6:shear=0,2 \\
+                           --contact hertz-ellipse:at=6,15:size=3,5,30:normal=9:shear=2,0:slip=partial-slip:friction=0.6
+  dermis generate sensor-4 --contact plantar-left:at=-70,0:normal=350:shear=10,50
+  dermis generate sensor-3 --random 4 --seed 12 --dead 3,4 --stuck 0,7=0.2
+Shapes and sizes: hertz-circle a; hertz-ellipse a,b,angle; flat-punch a or a,b,angle; ring outer,inner;
+  rectangle width,height,angle; plantar-left, plantar-right none or width,length,angle.";
+
+/// Generates the frame: its JSON, or where it was written.
+///
+/// # Errors
+/// Contacts that cannot be read or do not fit together, options out of range, a file that cannot be written.
+pub fn run(arguments: &Arguments) -> Result<String> {
+    let scene = Scene::load(&arguments.scene)?;
+    let mut contacts = arguments.contacts.iter().map(|text| contact(text)).collect::<Result<Vec<_>>>()?;
+    if let Some(path) = &arguments.like {
+        contacts.extend(Frame::load(path, Some(&scene))?.contacts);
+    }
+    contacts.extend(random_contacts(&scene.sensor, arguments.random, arguments.seed));
+    if contacts.is_empty() {
+        bail!("no contact: give --contact, --like or --random");
+    }
+    let converter = Converter {
+        noise: arguments.noise,
+        unipolar: arguments.unipolar,
+        bits: arguments.bits,
+        full_scale_MPa: arguments.full_scale,
+        dead: arguments.dead.iter().map(|text| taxel("--dead", text)).collect::<Result<_>>()?,
+        stuck: arguments.stuck.iter().map(|text| stuck(text)).collect::<Result<_>>()?,
+        seed: arguments.seed,
+    };
+    let frame = generate(&arguments.id, &scene.sensor, scene.medium, &contacts)?;
+    let text = converter.convert(&frame)?.to_json() + "\n";
+    match &arguments.out {
+        None => Ok(text),
+        Some(path) => {
+            std::fs::write(path, &text).map_err(|e| anyhow!("{}: {e}", path.display()))?;
+            Ok(format!("{} ({} bytes)\n", path.display(), text.len()))
+        }
+    }
+}
+
+/// shape:key=value:…
+fn contact(text: &str) -> Result<Contact> {
+    let mut parts = text.split(':');
+    let mut contact = Contact { shape: parts.next().map(str::to_string), ..Default::default() };
+    for part in parts {
+        let wrong = || anyhow!("--contact {text}: {part:?} is not allowed");
+        let (key, value) = part.split_once('=').ok_or_else(wrong)?;
+        let list = || numbers(value).ok_or_else(|| anyhow!("--contact {text}: {key} = {value:?} is not numbers"));
+        let fixed = |count: usize| {
+            list().and_then(|list| match list.len() {
+                got if got == count => Ok(list),
+                got => Err(anyhow!("--contact {text}: {key} has {got} values, wanted {count}")),
+            })
+        };
+        match key {
+            "at" => contact.centre_mm = Some(fixed(2).map(|v| [v[0], v[1]])?),
+            "size" => contact.size_mm = list()?,
+            "normal" => contact.normal_N = Some(fixed(1)?[0]),
+            "shear" => contact.tangential_N = Some(fixed(2).map(|v| [v[0], v[1]])?),
+            "slip" => contact.kind_of_slip = Some(value.to_string()),
+            "friction" => contact.friction = Some(fixed(1)?[0]),
+            _ => bail!("--contact {text}: unknown key {key}; known: at, size, normal, shear, slip, friction"),
+        }
+    }
+    Ok(contact)
+}
+
+fn numbers(text: &str) -> Option<Vec<f64>> {
+    text.split(',').map(|number| number.trim().parse().ok()).collect()
+}
+
+/// row,col
+fn taxel(option: &str, text: &str) -> Result<[usize; 2]> {
+    let parse = |(row, col): (&str, &str)| Some([row.trim().parse().ok()?, col.trim().parse().ok()?]);
+    text.split_once(',').and_then(parse).ok_or_else(|| anyhow!("{option} {text:?}: wanted row,col"))
+}
+
+/// row,col=MPa
+fn stuck(text: &str) -> Result<([usize; 2], f64)> {
+    let (place, reads) = text.split_once('=').ok_or_else(|| anyhow!("--stuck {text:?}: wanted row,col=MPa"))?;
+    let reads = reads.trim().parse().map_err(|_| anyhow!("--stuck {text:?}: {reads:?} is not a number"))?;
+    Ok((taxel("--stuck", place)?, reads))
+}
