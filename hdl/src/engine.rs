@@ -205,7 +205,7 @@ impl Logic for Engine {
         self.forces.values.next = self.search.values.val();
         self.forces.values_valid.next = self.search.values_valid.val();
         self.forces.begin_frame.next = self.begin_frame.val();
-        self.forces.start.next = self.search.done.val();
+        self.forces.start.next = self.search.settled.val();
         self.forces.part.next = self.part.value.val();
         self.forces.position_x.next = self.search.best_x.val();
         self.forces.position_y.next = self.search.best_y.val();
@@ -217,7 +217,7 @@ impl Logic for Engine {
         self.forces.condition.next = self.condition.q.val();
         self.forces.framing.next = self.framing.q.val();
         self.forces.cycles.next = self.cycles.value.val();
-        self.send.start.next = self.search.done.val() & self.part.last.val();
+        self.send.start.next = self.search.values_begin.val() & self.part.last.val();
         self.forces.advance.next = self.send.advance.val();
         self.forces.offer.next = self.send.offer.val();
         self.forces.beat.next = self.send.beat.val();

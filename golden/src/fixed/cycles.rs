@@ -6,9 +6,9 @@
 //! fold     Q + 5                                from the last input beat to the first product
 //! pass     the kept columns of each product, at most Q, waiting until a step's operand has been finished
 //! rescale  v_00 is replayed once its exponent is known: Q more
-//! search   15 sweeps of Q + 27, one of Q + 5    (the last alone when nothing is searched)
+//! search   15 sweeps of Q + 21, one of Q + 4    (the last alone when nothing is searched)
 //! next     1 between two subarrays
-//! send     6 to the first beat, then one beat a cycle
+//! send     begins with the last subarray's first value: 6 to the first beat, then one beat a cycle
 //! ```
 
 use serde::Serialize;
@@ -34,13 +34,13 @@ const REPLAY: u64 = 2;
 const UNFOLD: u64 = 5;
 /// From the search's start to its first sweep.
 const BEGIN: u64 = 1;
-/// A judged sweep beyond its Q quads: set-up 2, memory 1, Taylor 2, candidates 2, score 6, judge 14.
-const SWEEP: u64 = 27;
+/// A judged sweep beyond its Q quads: memory 1, Taylor 2, candidates 2, score 6, judge 14 of which 4 overlap the score.
+const SWEEP: u64 = 21;
 /// The last sweep beyond its Q quads.
-const LAST_SWEEP: u64 = 5;
+const LAST_SWEEP: u64 = 4;
 /// From a subarray's values to the next one's start.
 const NEXT: u64 = 1;
-/// From the values' end to the first beat on the output.
+/// From the last subarray's first value, which stands Q cycles before their end, to the first beat on the output.
 const SEND: u64 = 6;
 
 /// How long a frame takes, in clock cycles.
@@ -65,7 +65,8 @@ impl Cycles {
             passes(model) + BEGIN + sweeps + quads + LAST_SWEEP
         };
         let solved: u64 = searched.iter().map(solve).sum();
-        let first_output = ACCEPT + solved + (searched.len() as u64 - 1) * NEXT + SEND;
+        // The last subarray's values leave while they come.
+        let first_output = ACCEPT + solved + (searched.len() as u64 - 1) * NEXT - quads + SEND;
         let latency = first_output + taxels + model.status_beats() as u64 - 1;
         Cycles { first_output, latency, total: taxels + latency }
     }

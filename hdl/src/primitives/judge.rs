@@ -21,7 +21,7 @@ pub fn square_bits() -> usize {
 
 /// One candidate per cycle: score = total − n·log2 Σp, and the rules of the search (disc, Σp > 0, ties).
 ///
-/// `start` with the sweep's totals, sums, centre and squared distances; `done` [`LATENCY`] cycles later, `improved` with it. `begin_frame` forgets the frame,
+/// `start` with the sweep's sums, centre and squared distances, its totals [`TOTALS_LATER`] cycles later; `done` [`LATENCY`] cycles later, `improved` with it. `begin_frame` forgets the frame,
 /// `halve` doubles the position for the next level.
 #[derive(LogicBlock)]
 pub struct Judge {
@@ -71,6 +71,8 @@ pub struct Judge {
 
 /// Cycles from `start` to `done`.
 pub const LATENCY: usize = 14;
+/// Cycles from `start` to the first look at the totals: the logarithms of the sums come first.
+pub const TOTALS_LATER: usize = 4;
 /// Order of the candidates: row-major in the coarse grid, the centre first in a halving.
 const ORDERS: [[usize; 9]; 2] = [[4, 0, 1, 2, 3, 5, 6, 7, 8], [0, 1, 2, 3, 4, 5, 6, 7, 8]];
 
@@ -182,11 +184,11 @@ impl Logic for Judge {
             .filter(|bit| self._taxels >> bit & 1 == 1)
             .map(|bit| format!("({{{}'d0, log}} << {bit})", product - LOG_BITS))
             .collect();
-        let select = |word: &str, width: usize| {
+        let select = |word: &str, by: &str, width: usize| {
             let cases: String =
                 (0..9).map(|k| format!("    4'd{k}: {word}_k = {word}s[{} +: {width}];\n", k * width)).collect();
             format!(
-                "reg [{end}:0] {word}_k;\nalways @(*) begin\n  case (k)\n{cases}    default: {word}_k = {width}'d0;\n  endcase\nend\n",
+                "reg [{end}:0] {word}_k;\nalways @(*) begin\n  case ({by})\n{cases}    default: {word}_k = {width}'d0;\n  endcase\nend\n",
                 end = width - 1
             )
         };
@@ -196,10 +198,11 @@ impl Logic for Judge {
 reg [3:0] turn;
 reg running;
 wire [3:0] k = coarse ? turn : turn == 4'd0 ? 4'd4 : turn <= 4'd4 ? turn - 4'd1 : turn;
+reg [3:0] k1, k2, k3;
 {totals}{sums}// Stage 1: select; offsets −1, 0, 1 in x (low bits) and y.
 reg [3:0] valid;
 reg [3:0] finish;
-reg [{t_end}:0] total1, total2, total3, total4;
+reg [{t_end}:0] total4;
 reg [{s_end}:0] sum1;
 reg [{found_end}:0] found2;
 reg [{log_end}:0] log;
@@ -235,7 +238,8 @@ wire earlier = coarse && (y4 < by || (y4 == by && x4 < bx));
 wire better = !taken || score_k < score_best || (score_k == score_best && earlier);
 wire take = valid[3] && ok4 && better;
 always @(posedge clk) begin
-  total1 <= total_k;
+  {{k3, k2, k1}} <= {{k2, k1, k}};
+  total4 <= total_k;
   sum1 <= sum_k;
   ok1 <= !sum_k[{s_end}] && sum_k != {s}'d0 && distance <= radius && (coarse || found);
   x1 <= centre_x + step_x;
@@ -243,7 +247,6 @@ always @(posedge clk) begin
   found2 <= locate(sum1);
   log <= {{found2[{found_end}:{slot}], fraction(found2[{slot_end}:0])}};
   weighted <= {terms};
-  {{total4, total3, total2}} <= {{total3, total2, total1}};
   {{ok4, ok3, ok2}} <= {{ok3, ok2, ok1}};
   {{x4, x3, x2}} <= {{x3, x2, x1}};
   {{y4, y3, y2}} <= {{y3, y2, y1}};
@@ -284,8 +287,8 @@ always @(posedge clk) begin
 end",
             locate = locate("locate", s),
             table = table("fraction"),
-            totals = select("total", t),
-            sums = select("sum", s),
+            totals = select("total", "k3", t),
+            sums = select("sum", "k", s),
             t_end = t - 1,
             s_end = s - 1,
             found_end = LENGTH_BITS + slot - 1,

@@ -45,7 +45,7 @@ pub use delay::{BitDelay, Delay};
 pub use filler::Filler;
 pub use force_unit::{ForceUnit, CYCLE_BITS};
 pub use gather::Gather;
-pub use judge::{position_bits, Judge};
+pub use judge::{position_bits, Judge, TOTALS_LATER};
 pub use lanes::{Lanes, MEMORY_FILE};
 pub use mirror::Mirror;
 pub use operand_select::OperandSelect;

@@ -9,7 +9,7 @@ use crate::wire::{Wire, Word};
 
 /// Sweeps over the coarse tiles, then the halvings, then one that only moves to the winner.
 ///
-/// `set_up` begins a sweep, whose move, centre and buffers stand from the next cycle until the following `set_up`. Two buffers are enough: a coarse sweep
+/// `set_up`, which may come with `judged`, begins a sweep, whose move, centre and buffers stand from the next cycle until the following `set_up`. Two buffers are enough: a coarse sweep
 /// writes over its source unless that holds the best polynomial so far; halvings work in place. `judged` with
 /// `improved` makes the sweep's buffer the best.
 #[derive(LogicBlock)]
@@ -156,11 +156,13 @@ impl Logic for Walk {
             if self.begin_frame.val() {
                 let sweep = if self.enabled.val() { 0 } else { JUDGED };
                 self._state = State { sweep, radius: 9, ..State::default() };
-            } else if self.set_up.val() {
-                self.advance();
-            } else if self.judged.val() && self.improved.val() && self.coarse.val() {
+            }
+            if self.judged.val() && self.improved.val() && self.coarse.val() {
                 let s = &mut self._state;
                 (s.kept_centre, s.kept_square, s.kept) = (s.centre, s.square, s.current);
+            }
+            if self.set_up.val() {
+                self.advance();
             }
             let s = &self._state;
             self.centre_x.next = Word::of_fields(&s.centre[..1], position_bits());
@@ -207,12 +209,18 @@ end
 wire is_coarse = sweep < {SWEEP_BITS}'d{coarse_count};
 wire is_halving = !is_coarse && sweep < {SWEEP_BITS}'d{JUDGED};
 always @(*) next_halves = is_halving;
-wire [{p_end}:0] from_x = is_coarse ? centre_x : kept_x;
-wire [{p_end}:0] from_y = is_coarse ? centre_y : kept_y;
-wire [{q_end}:0] from_square = is_coarse ? square : kept_square;
+// A judgement takes effect for a sweep that is set up with it.
+wire keep = judged && improved && coarse;
+wire best_buffer = keep ? current : kept;
+wire [{p_end}:0] best_centre_x = keep ? centre_x : kept_x;
+wire [{p_end}:0] best_centre_y = keep ? centre_y : kept_y;
+wire [{q_end}:0] best_square = keep ? square : kept_square;
+wire [{p_end}:0] from_x = is_coarse ? centre_x : best_centre_x;
+wire [{p_end}:0] from_y = is_coarse ? centre_y : best_centre_y;
+wire [{q_end}:0] from_square = is_coarse ? square : best_square;
 // The best is at most one step away from the centre of its polynomial.
-wire [1:0] step_x = is_coarse ? table_x : best_x[1:0] - kept_x[1:0];
-wire [1:0] step_y = is_coarse ? table_y : best_y[1:0] - kept_y[1:0];
+wire [1:0] step_x = is_coarse ? table_x : best_x[1:0] - best_centre_x[1:0];
+wire [1:0] step_y = is_coarse ? table_y : best_y[1:0] - best_centre_y[1:0];
 wire [{q_end}:0] wide_x = {{{{{q_more}{{from_x[{p_end}]}}}}, from_x}};
 wire [{q_end}:0] wide_y = {{{{{q_more}{{from_y[{p_end}]}}}}, from_y}};
 wire [{q_end}:0] along_x = step_x[1] ? {q}'d1 - (wide_x << 1) : step_x[0] ? {q}'d1 + (wide_x << 1) : {q}'d0;
@@ -223,7 +231,7 @@ wire [{p_end}:0] to_y = from_y + {{{{{p_more}{{step_y[1]}}}}, step_y}};
 wire [{p_end}:0] new_x = is_halving ? to_x << 1 : to_x;
 wire [{p_end}:0] new_y = is_halving ? to_y << 1 : to_y;
 wire [{q_end}:0] new_square = is_halving ? to_square << 2 : to_square;
-wire new_current = current == kept ? !current : current;
+wire new_current = current == best_buffer ? !current : current;
 wire unused = &{{1'b0, best_x, best_y}};
 always @(posedge clk) begin
   if (begin_frame) begin
@@ -237,7 +245,14 @@ always @(posedge clk) begin
     kept_y <= {p}'d0;
     kept_square <= {q}'d0;
     radius <= {q}'d9;
-  end else if (set_up) begin
+  end else begin
+    if (keep) begin
+      kept <= current;
+      kept_x <= centre_x;
+      kept_y <= centre_y;
+      kept_square <= square;
+    end
+    if (set_up) begin
     sweep <= sweep + {SWEEP_BITS}'d1;
     dx <= step_x;
     dy <= step_y;
@@ -248,19 +263,15 @@ always @(posedge clk) begin
     centre_y <= new_y;
     square <= new_square;
     if (is_halving) radius <= radius << 2;
-    source <= is_coarse ? current : kept;
-    target <= is_coarse ? new_current : kept;
+    source <= is_coarse ? current : best_buffer;
+    target <= is_coarse ? new_current : best_buffer;
     if (is_coarse) current <= new_current;
     else begin
       kept_x <= new_x;
       kept_y <= new_y;
       kept_square <= new_square;
     end
-  end else if (judged && improved && coarse) begin
-    kept <= current;
-    kept_x <= centre_x;
-    kept_y <= centre_y;
-    kept_square <= square;
+    end
   end
 end",
             s_end = SWEEP_BITS - 1,

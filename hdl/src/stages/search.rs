@@ -2,7 +2,7 @@
 //!
 //! `walk` sets up a sweep; one quad per cycle runs through memory (1 cycle), Taylor shift (2) and back into memory, candidates (2),
 //! score (6); `judge` then looks at the nine totals (14) and the next sweep is set up. The sum polynomial takes the
-//! same way one cycle ahead, so that Σp stands when the first taxel is scored. The last sweep only moves to
+//! same way beside the first quad and stays, so that Σp stands when the first taxel is scored. The last sweep only moves to
 //! the winner: its constant coefficients are p(μ*).
 
 use dermis_golden::fixed::formats::Formats;
@@ -12,7 +12,7 @@ use rust_hdl::prelude::*;
 
 use crate::primitives::{
     count_bits, position_bits, BitDelay, Candidates, Counter, Counts, Delay, Judge, PolynomialWord, Score, Slice,
-    Store, Sum, Taylor, Walk, SCORE_LATENCY,
+    Store, Sum, Taylor, Walk, SCORE_LATENCY, TOTALS_LATER,
 };
 use crate::wire::Wire;
 
@@ -39,6 +39,10 @@ pub struct Search {
     pub values: Wire<Out>,
     /// `values` are a quad.
     pub values_valid: Signal<Out, Bit>,
+    /// μ* is settled, the values follow.
+    pub settled: Signal<Out, Bit>,
+    /// The first of the values.
+    pub values_begin: Signal<Out, Bit>,
     /// All values are out.
     pub done: Signal<Out, Bit>,
     /// Best position, x.
@@ -68,7 +72,6 @@ pub struct Search {
     quads: Counter,
     counting: DFF<Bit>,
     began: BitDelay,
-    again: BitDelay,
     go: BitDelay,
     moved: BitDelay,
     sum_moved: BitDelay,
@@ -101,6 +104,8 @@ impl Search {
             enabled: Default::default(),
             values: Wire::new(value),
             values_valid: Default::default(),
+            settled: Default::default(),
+            values_begin: Default::default(),
             done: Default::default(),
             best_x: Wire::new(position_bits()),
             best_y: Wire::new(position_bits()),
@@ -123,12 +128,11 @@ impl Search {
             quads: Counter::new(quads),
             counting: Default::default(),
             began: BitDelay::new(1),
-            again: BitDelay::new(1),
             go: BitDelay::new(1),
             moved: BitDelay::new(3),
             sum_moved: BitDelay::new(3),
             scored: BitDelay::new(2),
-            totals: BitDelay::new(5 + SCORE_LATENCY),
+            totals: BitDelay::new(5 + SCORE_LATENCY - TOTALS_LATER),
             finish: BitDelay::new(4),
             moved_address: Delay::new(address, 3),
             scored_address: Delay::new(address, 2),
@@ -153,7 +157,6 @@ impl Logic for Search {
         self.quads.clk.next = self.clk.val();
         self.counting.clock.next = self.clk.val();
         self.began.clk.next = self.clk.val();
-        self.again.clk.next = self.clk.val();
         self.go.clk.next = self.clk.val();
         self.moved.clk.next = self.clk.val();
         self.sum_moved.clk.next = self.clk.val();
@@ -164,7 +167,6 @@ impl Logic for Search {
         self.scored_address.clk.next = self.clk.val();
         self.judge.rst.next = self.rst.val();
         self.began.rst.next = self.rst.val();
-        self.again.rst.next = self.rst.val();
         self.go.rst.next = self.rst.val();
         self.moved.rst.next = self.rst.val();
         self.sum_moved.rst.next = self.rst.val();
@@ -189,8 +191,7 @@ impl Logic for Search {
         self.walk.enabled.next = self.enabled.val();
         self.judge.begin_frame.next = self.start.val();
         self.began.now.next = self.start.val();
-        self.again.now.next = self.judge.done.val();
-        self.set_up.next = self.began.then.val() | self.again.then.val();
+        self.set_up.next = self.began.then.val() | self.judge.done.val();
         self.walk.set_up.next = self.set_up.val();
         self.walk.judged.next = self.judge.done.val();
         self.walk.improved.next = self.judge.improved.val();
@@ -201,9 +202,8 @@ impl Logic for Search {
 
         comment!("Quads run through memory, shift and candidates");
         self.quad_end.next = self.counting.q.val() & self.quads.last.val();
-        self.counting.d.next =
-            (self.go.then.val() | (self.counting.q.val() & !self.quads.last.val())) & !self.rst.val();
-        self.quads.clear.next = self.go.then.val();
+        self.counting.d.next = (self.set_up.val() | (self.counting.q.val() & !self.quads.last.val())) & !self.rst.val();
+        self.quads.clear.next = self.set_up.val();
         self.quads.enable.next = self.counting.q.val();
         self.store.read_buffer.next = self.walk.source.val();
         self.store.read_address.next = self.quads.value.val();
@@ -255,6 +255,8 @@ impl Logic for Search {
         self.constants.word.next = self.taylor.moved.val();
         self.values.next = self.constants.low.val();
         self.values_valid.next = self.moved.then.val() & self.walk.last.val();
+        self.settled.next = self.go.then.val() & self.walk.last.val();
+        self.values_begin.next = self.sum_moved.then.val() & self.walk.last.val();
         self.finish.now.next = self.quad_end.val() & self.walk.last.val();
         self.done.next = self.finish.then.val();
         self.best_x.next = self.judge.best_x.val();
