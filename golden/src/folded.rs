@@ -18,7 +18,7 @@
 //!
 //! A matrix without the symmetry, as one without some of its taxels, is one block in the basis of the taxels.
 
-use crate::fixed::coefficients::{FLIP_X, FLIP_Y};
+use crate::fixed::coefficients::{lives, sign, FLIP_X, FLIP_Y};
 use crate::fixed::quads::Quads;
 use faer::linalg::matmul::matmul;
 use faer::{Accum, ColMut, ColRef, Mat, Par};
@@ -194,20 +194,6 @@ impl Basis {
     /// Whether a lane is a taxel of its own, not a second copy.
     fn counts(&self, quad: usize, lane: usize) -> bool {
         self.quads.counts(quad) >> lane & 1 == 1
-    }
-}
-
-/// Whether a quad has an entry of `parity`: odd parities vanish on the middle line they mirror.
-fn lives(quads: Quads, quad: usize, parity: usize) -> bool {
-    let own = |lane: usize, flip: usize| parity & flip == 0 || quads.counts(quad) >> lane & 1 == 1;
-    own(1, FLIP_X) && own(2, FLIP_Y)
-}
-
-fn sign(parity: usize, lane: usize) -> f64 {
-    if (parity & lane).count_ones().is_multiple_of(2) {
-        1.0
-    } else {
-        -1.0
     }
 }
 

@@ -85,14 +85,15 @@ pub fn quantise(folded: &[(&[Vec<f64>; 4], usize)], bits: u32) -> Vec<Blocks> {
 }
 
 /// Whether quad `index` has an entry of `parity`: odd parities vanish on the middle line they mirror.
-fn lives(quads: Quads, index: usize, parity: usize) -> bool {
+pub fn lives(quads: Quads, index: usize, parity: usize) -> bool {
     let counts = quads.counts(index);
     let own_column = counts & 0b0010 != 0;
     let own_row = counts & 0b0100 != 0;
     (own_column || parity & FLIP_X == 0) && (own_row || parity & FLIP_Y == 0)
 }
 
-fn sign(parity: usize, lane: usize) -> f64 {
+/// Sign of the image `lane` under `parity`: (−1)^(parity·lane).
+pub fn sign(parity: usize, lane: usize) -> f64 {
     if (parity & lane).count_ones().is_multiple_of(2) {
         1.0
     } else {
