@@ -19,9 +19,7 @@ impl Golden {
     /// # Errors
     /// `Frame` when the frame is not the scene's, `TooStrong` when a force overflows.
     pub fn run(&self, frame: &Frame) -> Result<Reconstruction, GoldenError> {
-        // The mean of 2^k frames has 2^(−k/2) of a single one's noise.
-        let averaged = 2f64.powf(-f64::from(self.scene.input.average) / 2.0);
-        self.run_with_noise(frame, self.scene.search.noise_floor_MPa * averaged)
+        self.run_with_noise(frame, self.scene.search.noise_floor_MPa * self.scene.input.noise_share())
     }
 
     /// Reconstructs one frame whose noise the objective is told to have the deviation `noise_MPa`.
