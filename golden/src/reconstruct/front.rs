@@ -51,4 +51,12 @@ impl Golden {
     pub fn run_averaged(&self, frames: &[Frame]) -> Result<Reconstruction, GoldenError> {
         self.run(&self.input.average(&self.scene, frames)?)
     }
+
+    /// The stress that [`Golden::run_averaged`] reconstructs: the calibrated mean of 2^k frames.
+    ///
+    /// # Errors
+    /// `Input` when there are not 2^k frames or one is not the scene's.
+    pub fn stress(&self, frames: &[Frame]) -> Result<Frame, GoldenError> {
+        Ok(self.input.calibrate(&self.input.average(&self.scene, frames)?))
+    }
 }
