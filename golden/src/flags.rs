@@ -74,11 +74,11 @@ fn load_outside(frame: &Frame) -> bool {
     ring_peak > 0.0 && ring_peak >= frame.peak_MPa()
 }
 
-/// Noise floor, or the standard deviation LSB/√12 of rounding, against the peak.
+/// Noise floor after averaging, or the standard deviation LSB/√12 of rounding, against the peak.
 fn shear_unreliable(scene: &Scene, frame: &Frame, codes: &Codes) -> bool {
     let search = &scene.search;
     let searched = search.objective == ObjectiveKind::Sparse && search.mu_max > 0.0;
-    let noise = search.noise_floor_MPa.max(codes.lsb_MPa() / 12f64.sqrt());
+    let noise = (search.noise_floor_MPa * scene.input.noise_share()).max(codes.lsb_MPa() / 12f64.sqrt());
     let peak = frame.peak_MPa();
     searched && peak > 0.0 && noise > SPARSE_NOISE_LIMIT * peak
 }
@@ -174,6 +174,10 @@ mod tests {
         assert_eq!(flags(&scene, &frame, 13, 1.0), [Flag::ShearUnreliable]);
         scene.search.noise_floor_MPa = 6e-5 * frame.peak_MPa();
         assert_eq!(flags(&scene, &frame, 20, 1.0), [Flag::ShearUnreliable]);
+        // The mean of two frames has less.
+        scene.input.average = 1;
+        assert_eq!(flags(&scene, &frame, 20, 1.0), []);
+        scene.input.average = 0;
         scene.search.mu_max = 0.0;
         assert_eq!(flags(&scene, &frame, 20, 1.0), []);
     }

@@ -43,10 +43,12 @@ pub enum InputError {
     #[error(transparent)]
     Frame(#[from] FrameError),
     /// Not as many frames as are averaged.
-    #[error("scene {scene}: input.average takes {wanted} frames at a time, got {got}")]
+    #[error("scene {scene}: input.average = {average} takes {wanted} frames at a time, got {got}")]
     Count {
         /// The scene's name.
         scene: String,
+        /// k.
+        average: u32,
         /// 2^k.
         wanted: usize,
         /// Frames given.
@@ -88,11 +90,9 @@ impl Input {
     /// # Errors
     /// [`InputError::Count`] unless there are 2^k of them, `Frame` when one is not the scene's.
     pub fn average(&self, scene: &Scene, frames: &[Frame]) -> Result<Frame, InputError> {
-        let [first, ..] = frames else {
-            return Err(InputError::Count { scene: scene.name.clone(), wanted: self.frames, got: 0 });
-        };
+        let [first, ..] = frames else { return Err(self.miscounted(scene, 0)) };
         if frames.len() != self.frames {
-            return Err(InputError::Count { scene: scene.name.clone(), wanted: self.frames, got: frames.len() });
+            return Err(self.miscounted(scene, frames.len()));
         }
         frames.iter().try_for_each(|frame| frame.check(scene))?;
         let mut mean = first.clone();
@@ -101,6 +101,11 @@ impl Input {
             *b = frames.iter().map(|frame| frame.stress_MPa[index] / frames.len() as f64).sum();
         }
         Ok(mean)
+    }
+
+    fn miscounted(&self, scene: &Scene, got: usize) -> InputError {
+        let average = self.frames.trailing_zeros();
+        InputError::Count { scene: scene.name.clone(), average, wanted: self.frames, got }
     }
 
     /// Readings to stress; without table and tare frame they are the same.

@@ -39,5 +39,6 @@ pub mod reconstruct;
 pub mod scene;
 pub mod sensor;
 
+mod random;
 #[cfg(test)]
 mod reference;

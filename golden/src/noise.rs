@@ -15,7 +15,6 @@
 
 pub mod bound;
 pub mod contact;
-mod random;
 mod study;
 #[cfg(test)]
 mod tests;

@@ -217,6 +217,13 @@ pub struct OutputSpec {
     pub forces: ForceOutput,
 }
 
+impl InputSpec {
+    /// Noise of the mean of 2^average frames over that of a single one, 2^(−average/2).
+    pub fn noise_share(&self) -> f64 {
+        2f64.powf(-f64::from(self.average) / 2.0)
+    }
+}
+
 impl Default for PartitionSpec {
     fn default() -> Self {
         let condition = Condition::default();

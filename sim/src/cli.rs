@@ -23,7 +23,7 @@ use dermis_hdl::HdlError;
 
 use crate::compare::difference;
 use crate::hardware::{Hardware, Simulator, Stuck};
-use crate::inputs::resolve;
+use crate::inputs::{resolve, resolve_one};
 use crate::progress::Progress;
 use crate::report::{self, CosimReport, Format};
 use crate::tabulate::tabulate;
@@ -57,13 +57,15 @@ enum Command {
     #[command(after_help = "Examples:
   dermis reconstruct sensor-1
   dermis reconstruct sensor-1 --frame press.csv --engine fixed
-  dermis reconstruct my-scene.toml --frame eq2 --json")]
+  dermis reconstruct my-scene.toml --frame eq2 --json
+  dermis reconstruct averaging.toml --frame 1.csv --frame 2.csv     the mean of 2 frames, input.average = 1")]
     Reconstruct {
         /// Built-in name or path of a scene; may be left out when the frame holds its sensor.
         scene: Option<String>,
-        /// Frame file (.json, .csv) or `eq2`; without it the scene's first shipped frame.
-        #[arg(long, value_name = "FILE")]
-        frame: Option<String>,
+        /// Frame file (.json, .csv) or `eq2`; without it the scene's first shipped frame. Repeat it 2^k times where the
+        /// scene has input.average = k.
+        #[arg(long = "frame", value_name = "FILE")]
+        frames: Vec<String>,
         /// What computes.
         #[arg(long, value_enum, default_value = "golden")]
         engine: Engine,
@@ -212,16 +214,15 @@ fn exit_code(error: &anyhow::Error) -> u8 {
 fn run(arguments: &Arguments) -> Result<(String, bool)> {
     let build_dir = &arguments.build_dir;
     match &arguments.command {
-        Command::Reconstruct { scene, frame, engine, json } => {
-            let (scene, frames) = resolve(scene.as_deref(), frame.as_slice())?;
-            let frame = &frames[0];
-            let result = reconstruct(&scene, frame, *engine, build_dir)?;
+        Command::Reconstruct { scene, frames, engine, json } => {
+            let (scene, frames) = resolve_one(scene.as_deref(), frames)?;
+            let (result, full_scale_MPa) = reconstruct(&scene, &frames, *engine, build_dir)?;
             if *json {
                 return Ok((serde_json::to_string(&result)? + "\n", true));
             }
-            let mut text = report::reconstruction(&result, &scene.sensor, full_scale(&scene, frame));
+            let mut text = report::reconstruction(&result, &scene.sensor, full_scale_MPa);
             if !matches!(engine, Engine::Golden) {
-                text.push_str(&against_golden(&scene, frame, &result)?);
+                text.push_str(&against_golden(&scene, &frames[0], &result)?);
             }
             Ok((text, true))
         }
@@ -293,13 +294,19 @@ fn objective(name: &str) -> Result<ObjectiveKind, String> {
     names.iter().find(|(known, _)| *known == name).map(|(_, kind)| *kind).ok_or_else(|| format!("one of {}", known()))
 }
 
-fn reconstruct(scene: &Scene, frame: &Frame, engine: Engine, build_dir: &Path) -> Result<Reconstruction> {
+/// The result and the stress in MPa of the largest code. Hardware takes the first frame: it refuses to average.
+fn reconstruct(scene: &Scene, frames: &[Frame], engine: Engine, build_dir: &Path) -> Result<(Reconstruction, f64)> {
+    let frame = &frames[0];
     let model = || Model::for_frames(scene, std::slice::from_ref(frame));
-    Ok(match engine {
-        Engine::Golden => Golden::new(scene)?.run(frame)?,
+    let result = match engine {
+        Engine::Golden => {
+            let golden = Golden::new(scene)?;
+            return Ok((golden.run_averaged(frames)?, full_scale(scene, &golden.stress(frames)?)));
+        }
         Engine::Fixed => model()?.reconstruct(frame)?,
         Engine::Rtl => Hardware::new(model()?, build_dir)?.reconstruct(frame)?,
-    })
+    };
+    Ok((result, full_scale(scene, frame)))
 }
 
 /// One line: how far a result is from the floating-point model's.

@@ -5,6 +5,8 @@
 //! | named | files, `eq2` | the scene, those frames |
 //! | named | none | the scene, its shipped frames |
 //! | none | files | the built-in scene with the first file's sensor, else the default scene of that sensor |
+//!
+//! One reconstruction takes 2^k frames, k the scene's `input.average`.
 
 use anyhow::{bail, Result};
 use dermis_golden::frame::Frame;
@@ -36,6 +38,24 @@ pub fn resolve(scene: Option<&str>, frames: &[String]) -> Result<(Scene, Vec<Fra
     } else {
         frames.iter().map(|path| load(path, &scene)).collect::<Result<_>>()?
     };
+    Ok((scene, frames))
+}
+
+/// Finds the scene and the frames of one reconstruction, 2^k of them; without `--frame` and averaging the first shipped.
+///
+/// # Errors
+/// As [`resolve`]; another number of frames than the scene averages.
+pub fn resolve_one(scene: Option<&str>, files: &[String]) -> Result<(Scene, Vec<Frame>)> {
+    let named = scene;
+    let (scene, mut frames) = resolve(named, files)?;
+    let average = scene.input.average;
+    let wanted = 1usize << average;
+    if files.is_empty() && wanted == 1 {
+        frames.truncate(1);
+    } else if files.len() != wanted {
+        let (origin, got) = (named.unwrap_or(&scene.name), files.len());
+        bail!("{origin}: input.average = {average}: the number of --frame options must be 2^{average} = {wanted}, got {got}");
+    }
     Ok((scene, frames))
 }
 

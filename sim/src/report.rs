@@ -5,6 +5,8 @@
 
 mod errors;
 mod noise;
+#[cfg(test)]
+mod read;
 mod result;
 mod table;
 

@@ -91,18 +91,22 @@ fn wrong_input_ends_with_its_exit_code_and_message() {
     assert!(failures.is_empty(), "{failures}");
 }
 
-#[test]
-fn without_verilator_the_message_says_how_to_get_it() {
-    let work = tempfile::tempdir().unwrap();
+/// The exit code and the message of the simulated hardware with nothing on the path but what is in `work`.
+fn rtl_in(work: &Path) -> (Option<i32>, String) {
     let output = Command::new(env!("CARGO_BIN_EXE_dermis"))
-        .current_dir(work.path())
-        .env("PATH", work.path())
+        .current_dir(work)
+        .env("PATH", work)
         .args(["reconstruct", "eight-by-eight", "--engine", "rtl"])
         .output()
         .unwrap();
-    assert_eq!(output.status.code(), Some(2));
-    let stderr = String::from_utf8(output.stderr).unwrap();
-    assert_eq!(stderr, "error: verilator is not installed; on Debian: sudo apt-get install verilator g++ make\n");
+    (output.status.code(), String::from_utf8(output.stderr).unwrap())
+}
+
+#[test]
+fn without_verilator_the_message_says_how_to_get_it() {
+    let work = tempfile::tempdir().unwrap();
+    let wanted = "error: verilator is not installed; on Debian: sudo apt-get install verilator g++ make\n";
+    assert_eq!(rtl_in(work.path()), (Some(2), wanted.to_owned()));
 }
 
 #[test]
@@ -112,15 +116,8 @@ fn without_a_compiler_the_message_says_what_is_missing() {
     let fake = work.path().join("verilator");
     fs::write(&fake, "#!/bin/sh\n[ \"$1\" = --version ] && echo Verilator 0 && exit 0\nexit 127\n").unwrap();
     fs::set_permissions(&fake, std::os::unix::fs::PermissionsExt::from_mode(0o755)).unwrap();
-    let output = Command::new(env!("CARGO_BIN_EXE_dermis"))
-        .current_dir(work.path())
-        .env("PATH", work.path())
-        .args(["reconstruct", "eight-by-eight", "--engine", "rtl"])
-        .output()
-        .unwrap();
-    let stderr = String::from_utf8(output.stderr).unwrap();
     let wanted = "error: verilator needs make, which is not installed; on Debian: sudo apt-get install g++ make\n";
-    assert_eq!((output.status.code(), stderr.as_str()), (Some(2), wanted));
+    assert_eq!(rtl_in(work.path()), (Some(2), wanted.to_owned()));
 }
 
 #[test]

@@ -10,13 +10,11 @@
 //! | in: dead, stuck | lists | \[row, col\], MPa | inside the array |
 //! | out: frame | taxels | MPa | the truth is carried along |
 
-use super::random::seeded;
 use super::GeneratorError;
 use crate::frame::Frame;
 use crate::quantise::quantise;
+use crate::random::Random;
 use crate::sensor::Sensor;
-use fastrand::Rng;
-use std::f64::consts::TAU;
 
 /// Faults and limits of a sensor.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -46,10 +44,10 @@ impl Converter {
         self.check()?;
         let mut frame = frame.clone();
         let peak = frame.peak_MPa();
-        let mut rng = seeded(self.seed);
+        let mut random = Random::new(self.seed);
         for b in &mut frame.stress_MPa {
             if self.noise > 0.0 {
-                *b += self.noise * peak * gaussian(&mut rng);
+                *b += self.noise * peak * random.normal();
             }
             if self.unipolar {
                 *b = b.max(0.0);
@@ -97,12 +95,6 @@ fn index(field: &'static str, sensor: &Sensor, [row, col]: [usize; 2]) -> Result
     } else {
         Err(GeneratorError::Taxel { field, row, col, rows, cols })
     }
-}
-
-/// One draw of the normal distribution, by Box and Muller.
-fn gaussian(rng: &mut Rng) -> f64 {
-    // 1 − f64() lies in (0, 1].
-    (-2.0 * (1.0 - rng.f64()).ln()).sqrt() * (TAU * rng.f64()).cos()
 }
 
 #[cfg(test)]

@@ -138,7 +138,7 @@ fn averages_lower_the_noise_by_the_root_of_their_count() {
     // 100 draws estimate a deviation to 1/√200 = 7 %; four times that.
     assert!((deviation / 0.00125 - 1.0).abs() < 0.28, "{deviation}");
     let error = Golden::new(&scene).unwrap().run_averaged(&frames[1..]).unwrap_err().to_string();
-    assert_eq!(error, "scene sensor-1: input.average takes 64 frames at a time, got 63");
+    assert_eq!(error, "scene sensor-1: input.average = 6 takes 64 frames at a time, got 63");
     assert!(input.average(&scene, &[]).is_err());
 }
 

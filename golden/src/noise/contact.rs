@@ -9,9 +9,9 @@
 //! | place | the ellipse's longer radius inside the taxels' outermost lines |
 //! | shear over load | 0.1 … 0.5, any direction |
 
-use super::random::Random;
 use crate::float::objective::disc::{Disc, Taxels};
 use crate::float::objective::patch::Ellipse;
+use crate::random::Random;
 use crate::sensor::Sensor;
 use std::f64::consts::{PI, TAU};
 

@@ -2,8 +2,8 @@
 
 use super::bound::Bound;
 use super::contact::{Contact, Truth};
-use super::random::Random;
 use crate::frame::{Frame, FrameError};
+use crate::random::Random;
 use crate::reconstruct::{Golden, GoldenError};
 use crate::scene::{ObjectiveKind, Scene};
 use nalgebra::Vector2;

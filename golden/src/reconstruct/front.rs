@@ -19,9 +19,7 @@ impl Golden {
     /// # Errors
     /// `Frame` when the frame is not the scene's, `TooStrong` when a force overflows.
     pub fn run(&self, frame: &Frame) -> Result<Reconstruction, GoldenError> {
-        // The mean of 2^k frames has 2^(−k/2) of a single one's noise.
-        let averaged = 2f64.powf(-f64::from(self.scene.input.average) / 2.0);
-        self.run_with_noise(frame, self.scene.search.noise_floor_MPa * averaged)
+        self.run_with_noise(frame, self.scene.search.noise_floor_MPa * self.scene.input.noise_share())
     }
 
     /// Reconstructs one frame whose noise the objective is told to have the deviation `noise_MPa`.
@@ -52,5 +50,13 @@ impl Golden {
     /// As [`Golden::run`]; `Input` when there are not 2^k frames.
     pub fn run_averaged(&self, frames: &[Frame]) -> Result<Reconstruction, GoldenError> {
         self.run(&self.input.average(&self.scene, frames)?)
+    }
+
+    /// The stress that [`Golden::run_averaged`] reconstructs: the calibrated mean of 2^k frames.
+    ///
+    /// # Errors
+    /// `Input` when there are not 2^k frames or one is not the scene's.
+    pub fn stress(&self, frames: &[Frame]) -> Result<Frame, GoldenError> {
+        Ok(self.input.calibrate(&self.input.average(&self.scene, frames)?))
     }
 }

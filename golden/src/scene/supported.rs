@@ -1,79 +1,119 @@
-//! What of the schema this version builds.
+//! Supported: what of the schema the golden model has, and what the hardware and its bit-true model have.
+//!
+//! | field | golden model | hardware, bit-true model |
+//! |---|---|---|
+//! | `medium.kind` | all | "half-space" |
+//! | `partition.case` | all | 0 … 3 and rows × cols, where the device holds it |
+//! | `search.objective` | all; on a bonded layer "sparse" and "compressive"; with "adaptive" and "contacts" "sparse" | "sparse" |
+//! | `search.form` | all, "orthogonal" for subarrays of few taxels ([`crate::float::orthogonal::MAX_TAXELS`]) | "oblique" |
+//! | `input.average`, `input.calibration`, `input.tare` | all | none |
+//! | `input.dead`, `input.unipolar` | all; with "orthogonal" none | none |
+//! | `output.forces` | all | "taxels" |
+//!
+//! Fields not listed are the same for both. Rules are asked in the order of the table, so that a scene with several
+//! refused choices always names the same one.
 
 use super::{ForceOutput, Form, Medium, ObjectiveKind, Scene, SceneError};
 
+/// A choice that may not be had.
+struct Rule {
+    refused: bool,
+    field: &'static str,
+    value: String,
+    available: &'static str,
+}
+
 impl Scene {
-    /// Checks that this version has what the scene asks for.
+    /// Checks that the hardware has what the scene asks for.
     ///
     /// # Errors
-    /// [`SceneError::NotAvailable`] naming the first choice that is valid but not built yet.
+    /// [`SceneError::NotAvailable`] naming the first choice that is valid but not built.
     pub fn require_supported(&self) -> Result<(), SceneError> {
-        let missing = |field: &'static str, value: String, available: &'static str| {
-            let scene = self.name.clone();
-            Err(SceneError::NotAvailable { scene, field, value, available })
-        };
-        if self.medium != Medium::HalfSpace {
-            return missing("medium.kind", self.medium.to_string(), "half-space");
-        }
-        if self.partition.case.grid().is_none() {
-            return missing("partition.case", self.partition.case.to_string(), "0, 1, 2, 3, rows and cols");
-        }
-        if self.search.objective != ObjectiveKind::Sparse {
-            let name = self.search.objective.name().to_string();
-            return missing("search.objective", name, "sparse");
-        }
-        if self.search.form != Form::Oblique {
-            return missing("search.form", "orthogonal".to_string(), "oblique");
-        }
-        let input = &self.input;
-        if input.average > 0 {
-            return missing("input.average", input.average.to_string(), "0");
-        }
-        for (field, file) in [("input.calibration", &input.calibration), ("input.tare", &input.tare)] {
-            if let Some(path) = file {
-                return missing(field, format!("{path:?}"), "none");
-            }
-        }
-        if let Some(taxel) = input.dead.first() {
-            return missing("input.dead", format!("[{taxel:?}, …]"), "none");
-        }
-        if input.unipolar {
-            return missing("input.unipolar", "true".to_string(), "false");
-        }
-        if self.output.forces != ForceOutput::Taxels {
-            return missing("output.forces", "resultants".to_string(), "taxels");
-        }
-        Ok(())
+        let (search, input) = (&self.search, &self.input);
+        let rule = |refused, field, value, available| Rule { refused, field, value, available };
+        self.require([
+            rule(self.medium != Medium::HalfSpace, "medium.kind", self.medium.to_string(), "half-space"),
+            rule(
+                self.partition.case.grid().is_none(),
+                "partition.case",
+                self.partition.case.to_string(),
+                "0, 1, 2, 3, rows and cols",
+            ),
+            rule(
+                search.objective != ObjectiveKind::Sparse,
+                "search.objective",
+                search.objective.name().to_string(),
+                "sparse",
+            ),
+            rule(search.form != Form::Oblique, "search.form", "orthogonal".to_string(), "oblique"),
+            rule(input.average > 0, "input.average", input.average.to_string(), "0"),
+            rule(input.calibration.is_some(), "input.calibration", path(&input.calibration), "none"),
+            rule(input.tare.is_some(), "input.tare", path(&input.tare), "none"),
+            rule(!input.dead.is_empty(), "input.dead", self.dead(), "none"),
+            rule(input.unipolar, "input.unipolar", "true".to_string(), "false"),
+            rule(self.output.forces != ForceOutput::Taxels, "output.forces", "resultants".to_string(), "taxels"),
+        ])
     }
 
     /// Checks that the golden model has what the scene asks for: more than the hardware.
     ///
     /// # Errors
-    /// [`SceneError::NotAvailable`] naming the first choice that is valid but not built yet.
+    /// [`SceneError::NotAvailable`] naming the first choice that is valid but not built.
     pub fn require_golden(&self) -> Result<(), SceneError> {
-        let missing = |field: &'static str, value: String, available: &'static str| {
-            let scene = self.name.clone();
-            Err(SceneError::NotAvailable { scene, field, value, available })
-        };
-        let orthogonal = self.search.form == Form::Orthogonal;
-        if orthogonal && !self.input.dead.is_empty() {
-            return missing("input.dead", format!("{:?}", self.input.dead), "none, with search.form = orthogonal");
-        }
-        if orthogonal && self.input.unipolar {
-            return missing("input.unipolar", "true".to_string(), "false, with search.form = orthogonal");
-        }
-        // Patch, symmetric and the choice between them know the half-space's kernel.
-        let by_score = matches!(self.search.objective, ObjectiveKind::Sparse | ObjectiveKind::Compressive);
-        if self.medium != Medium::HalfSpace && !by_score {
-            let name = self.search.objective.name().to_string();
-            return missing("search.objective", name, "sparse and compressive, on a bonded layer");
-        }
+        let objective = self.search.objective;
+        let literal = self.search.form == Form::Orthogonal;
+        // The fits, and `auto` that chooses between them, know the half-space's kernel alone.
+        let by_score = matches!(objective, ObjectiveKind::Sparse | ObjectiveKind::Compressive);
         // Regions and the choice of a case are judged by the sparse objective.
         let by_contact = self.partition.case.grid().is_none();
-        if by_contact && self.search.objective != ObjectiveKind::Sparse {
-            let name = self.search.objective.name().to_string();
-            return missing("search.objective", name, "sparse, with partition.case = adaptive or contacts");
-        }
-        Ok(())
+        let rule = |refused, field, value, available| Rule { refused, field, value, available };
+        self.require([
+            rule(
+                self.medium != Medium::HalfSpace && !by_score,
+                "search.objective",
+                objective.name().to_string(),
+                "sparse and compressive, on a bonded layer",
+            ),
+            rule(
+                by_contact && objective != ObjectiveKind::Sparse,
+                "search.objective",
+                objective.name().to_string(),
+                "sparse, with partition.case = adaptive or contacts",
+            ),
+            rule(
+                literal && !self.input.dead.is_empty(),
+                "input.dead",
+                self.dead(),
+                "none, with search.form = orthogonal",
+            ),
+            rule(
+                literal && self.input.unipolar,
+                "input.unipolar",
+                "true".to_string(),
+                "false, with search.form = orthogonal",
+            ),
+        ])
     }
+
+    /// The first rule that refuses.
+    fn require<const N: usize>(&self, rules: [Rule; N]) -> Result<(), SceneError> {
+        let refusal = |Rule { field, value, available, .. }| {
+            let scene = self.name.clone();
+            SceneError::NotAvailable { scene, field, value, available }
+        };
+        rules.into_iter().find(|rule| rule.refused).map_or(Ok(()), |rule| Err(refusal(rule)))
+    }
+
+    /// Dead taxels for a message: the first stands for all.
+    fn dead(&self) -> String {
+        match self.input.dead.as_slice() {
+            [] => "[]".to_string(),
+            [one] => format!("[{one:?}]"),
+            [first, ..] => format!("[{first:?}, …]"),
+        }
+    }
+}
+
+fn path(file: &Option<std::path::PathBuf>) -> String {
+    file.as_ref().map(|path| format!("{path:?}")).unwrap_or_default()
 }

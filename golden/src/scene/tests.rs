@@ -200,6 +200,28 @@ fn choices_not_built_yet_say_so() {
 }
 
 #[test]
+fn the_golden_model_refuses_what_does_not_go_together() {
+    let orthogonal = "[search]\nform = \"orthogonal\"\n";
+    let patch = "[search]\nobjective = \"patch\"\n";
+    let cases = [
+        (format!("[medium]\nkind = \"bonded-layer\"\n{patch}"), "search.objective = patch; available: sparse and comp"),
+        (format!("[partition]\ncase = \"adaptive\"\n{patch}"), "search.objective = patch; available: sparse, with"),
+        (format!("{orthogonal}[input]\ndead = [[0, 1]]"), "input.dead = [[0, 1]]; available: none, with"),
+        (format!("{orthogonal}[input]\ndead = [[0, 1], [2, 3]]"), "input.dead = [[0, 1], …]; available: none, with"),
+        (format!("{orthogonal}[input]\nunipolar = true"), "input.unipolar = true; available: false, with"),
+        // Of several the first in the order of the schema.
+        (format!("{orthogonal}[input]\nunipolar = true\ndead = [[0, 1]]"), "input.dead"),
+    ];
+    for (more, wanted) in cases {
+        let text = with(&more).unwrap().require_golden().unwrap_err().to_string();
+        assert!(text.contains("not available yet") && text.contains(wanted), "{text}");
+    }
+    for more in [patch, orthogonal, "[medium]\nkind = \"bonded-layer\"", "[input]\nunipolar = true\ndead = [[0, 1]]"] {
+        assert!(with(more).unwrap().require_golden().is_ok(), "{more}");
+    }
+}
+
+#[test]
 fn syntax_errors_name_the_line() {
     let text = message("[search]\nmu_max = = 1");
     assert!(text.starts_with("my.toml, line 8: "), "{text}");

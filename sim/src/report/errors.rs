@@ -192,3 +192,112 @@ fn quoted(name: &str) -> String {
         name.to_owned()
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::read;
+    use super::*;
+    use crate::compare::Difference;
+    use crate::tabulate::{Fixed, Part};
+    use dermis_golden::flags::Flag;
+    use serde_json::Value;
+
+    fn part(mu: [f64; 2], both_signs: bool) -> Part {
+        Part { mu, both_signs, condition: true }
+    }
+
+    /// One line with every field and a name that CSV must quote, one with next to none.
+    fn lines() -> Vec<Line> {
+        let error =
+            Errors { x1: Some(-0.1), x2: None, x3: Some(1.0 / 3.0), tangential: Some(0.25), normal: Some(1.0 / 3.0) };
+        let difference = Difference { max_lsb: 12.0, rms_lsb: 3.5, max_share: 1e-4, rms_share: 2e-5 };
+        let bare = Line {
+            scene: "plain".into(),
+            case: "1".into(),
+            frame: "b".into(),
+            error: None,
+            error_case_0: None,
+            l2: None,
+            subarrays: vec![part([0.0, 0.0], false)],
+            fixed: None,
+            paper: None,
+            flags: Vec::new(),
+        };
+        let full = Line {
+            scene: "odd, \"quoted\"\nname".into(),
+            case: "0".into(),
+            frame: "a,b".into(),
+            error: Some(error),
+            error_case_0: Some(Errors { x1: Some(0.5), ..error }),
+            l2: Some(0.125),
+            subarrays: vec![part([0.1, -0.2], true), part([0.3, 0.4], false)],
+            fixed: Some(Fixed { error: Some(Errors { x2: Some(0.75), ..error }), difference }),
+            paper: Some([0.1284, 0.1293, 0.0754]),
+            flags: vec![Flag::LoadOutside],
+        };
+        vec![full, bare]
+    }
+
+    #[test]
+    fn csv_comes_back() {
+        let lines = lines();
+        let (head, records) = read::csv(&errors(&lines, Format::Csv).unwrap());
+        assert_eq!((head.len(), records.len()), (27, 2));
+        let of = |record: usize, name: &str| read::field(&head, &records[record], name).to_owned();
+        assert_eq!((of(0, "scene"), of(0, "frame")), (lines[0].scene.clone(), lines[0].frame.clone()));
+        let numbers = [
+            ("x1", -0.1),
+            ("x3", 1.0 / 3.0),
+            ("e_t", 0.25),
+            ("e_n", 1.0 / 3.0),
+            ("l2", 0.125),
+            ("x1_case0", 0.5),
+            ("fixed_x2", 0.75),
+            ("fixed_e_t", 0.25),
+            ("max_lsb", 12.0),
+            ("max_share", 1e-4),
+            ("rms_lsb", 3.5),
+            ("rms_share", 2e-5),
+            ("paper_x1", 0.1284),
+            ("paper_x3", 0.0754),
+        ];
+        for (name, wanted) in numbers {
+            // The shortest text that reads back as the same number.
+            assert_eq!(of(0, name).parse::<f64>().unwrap(), wanted, "{name}");
+            assert_eq!(of(1, name), "", "{name}");
+        }
+        assert_eq!(of(0, "x2"), "");
+        assert_eq!((of(0, "both_signs"), of(0, "condition")), ("yn".into(), "yy".into()));
+        assert_eq!((of(0, "mu"), of(1, "mu")), ("0.1 -0.2;0.3 0.4".into(), "0 0".into()));
+    }
+
+    #[test]
+    fn json_comes_back() {
+        let lines = lines();
+        let text = errors(&lines, Format::Json).unwrap();
+        let read: Value = serde_json::from_str(&text).unwrap();
+        assert!(text.ends_with("}\n"));
+        let [full, bare] = [&read["lines"][0], &read["lines"][1]];
+        assert_eq!(full["scene"], lines[0].scene.as_str());
+        assert_eq!((&full["error"]["x1"], &full["error"]["x2"]), (&Value::from(-0.1), &Value::Null));
+        assert_eq!(full["error"]["x3"], 1.0 / 3.0);
+        assert_eq!(full["fixed"]["difference"]["rms_share"], 2e-5);
+        assert_eq!(full["subarrays"][1]["mu"][1], 0.4);
+        assert_eq!(full["flags"][0], "load-outside");
+        for field in ["error", "error_case_0", "l2", "fixed", "paper"] {
+            assert_eq!(bare[field], Value::Null, "{field}");
+        }
+        let medians = read["medians"].as_array().unwrap();
+        assert_eq!(medians.len(), 2);
+        // By size: the sign of X1 is gone.
+        assert_eq!((&medians[0]["axes"][0], &medians[0]["frames"]), (&Value::from(0.1), &Value::from(1)));
+        assert_eq!(medians[1]["tangential"], Value::Null);
+    }
+
+    #[test]
+    fn no_lines_are_a_head_alone() {
+        let (head, records) = read::csv(&errors(&[], Format::Csv).unwrap());
+        assert_eq!((head.len(), records.len()), (27, 0));
+        assert_eq!(errors(&[], Format::Json).unwrap(), "{\"lines\":[],\"medians\":[]}\n");
+    }
+}

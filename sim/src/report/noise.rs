@@ -77,3 +77,79 @@ fn csv(rows: &[Row]) -> String {
     }
     text
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::read;
+    use super::*;
+    use serde_json::Value;
+
+    fn rows() -> Vec<Row> {
+        let spread = |by: f64| Spread { median: by / 3.0, ninety: 2.0 * by, rms: 0.1 * by };
+        let noisy = Row {
+            noise: 1e-4,
+            frames: 64,
+            objective: "patch",
+            found: spread(1.0),
+            bound_6: spread(0.5),
+            bound_9: spread(0.25),
+            ratio_6: Some(2.0),
+            ratio_9: Some(4.0),
+        };
+        let silent = Row { noise: 0.0, frames: 1, bound_6: spread(0.0), ratio_6: None, ratio_9: None, ..noisy.clone() };
+        vec![noisy, silent]
+    }
+
+    /// Every number of a row by its CSV name and its place in the JSON.
+    fn numbers(row: &Row) -> [(&'static str, &'static str, Option<f64>); 12] {
+        [
+            ("noise", "/noise", Some(row.noise)),
+            ("median", "/found/median", Some(row.found.median)),
+            ("ninety", "/found/ninety", Some(row.found.ninety)),
+            ("rms", "/found/rms", Some(row.found.rms)),
+            ("bound6_median", "/bound_6/median", Some(row.bound_6.median)),
+            ("bound6_ninety", "/bound_6/ninety", Some(row.bound_6.ninety)),
+            ("bound6_rms", "/bound_6/rms", Some(row.bound_6.rms)),
+            ("bound9_median", "/bound_9/median", Some(row.bound_9.median)),
+            ("bound9_ninety", "/bound_9/ninety", Some(row.bound_9.ninety)),
+            ("bound9_rms", "/bound_9/rms", Some(row.bound_9.rms)),
+            ("ratio6", "/ratio_6", row.ratio_6),
+            ("ratio9", "/ratio_9", row.ratio_9),
+        ]
+    }
+
+    #[test]
+    fn csv_comes_back() {
+        let rows = rows();
+        let (head, records) = read::csv(&noise(&rows, Format::Csv).unwrap());
+        assert_eq!((head.len(), records.len()), (14, 2));
+        for (row, record) in rows.iter().zip(&records) {
+            let of = |name: &str| read::field(&head, record, name);
+            assert_eq!((of("frames"), of("objective")), (row.frames.to_string().as_str(), row.objective));
+            for (name, _, wanted) in numbers(row) {
+                // The shortest text that reads back as the same number; empty where there is none.
+                assert_eq!(of(name).parse::<f64>().ok(), wanted, "{name}");
+            }
+        }
+    }
+
+    #[test]
+    fn json_comes_back() {
+        let rows = rows();
+        let read: Value = serde_json::from_str(&noise(&rows, Format::Json).unwrap()).unwrap();
+        assert_eq!(read.as_array().map(Vec::len), Some(2));
+        for (index, row) in rows.iter().enumerate() {
+            let of = &read[index];
+            assert_eq!((&of["frames"], &of["objective"]), (&Value::from(row.frames), &Value::from(row.objective)));
+            for (_, place, wanted) in numbers(row) {
+                assert_eq!(of.pointer(place).unwrap().as_f64(), wanted, "{place}");
+            }
+        }
+    }
+
+    #[test]
+    fn no_rows_are_a_head_alone() {
+        assert_eq!(read::csv(&noise(&[], Format::Csv).unwrap()).1.len(), 0);
+        assert_eq!(noise(&[], Format::Json).unwrap(), "[]\n");
+    }
+}

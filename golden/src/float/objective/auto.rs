@@ -19,6 +19,7 @@
 
 use super::{Estimate, Objective, Patch, Sparse, Subject, Symmetric};
 use crate::flags::SPARSE_NOISE_LIMIT;
+use crate::float::search::Found;
 use crate::sensor::Sensor;
 
 /// Error of the fits' own over the peak: their quadrature's, and that of frames made by another.
@@ -72,12 +73,121 @@ impl Objective for Auto {
         let symmetric = counted(self.symmetric.find(subject));
         match (patch, symmetric) {
             (Some(patch), Some(symmetric)) if patch.found.objective > symmetric.found.objective => {
-                counted(Some(Estimate {
-                    found: crate::float::search::Found { evaluations: 0, ..patch.found },
-                    ..patch
-                }))
+                counted(Some(Estimate { found: Found { evaluations: 0, ..patch.found }, ..patch }))
             }
             (patch, symmetric) => symmetric.or(patch),
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::float::pass::Polynomial;
+    use crate::frame::Frame;
+    use crate::matrices::Matrices;
+    use crate::scene::Scene;
+
+    /// What `auto` takes, and what each of the three finds by itself.
+    struct Four {
+        auto: Option<Estimate>,
+        patch: Option<Estimate>,
+        sparse: Option<Estimate>,
+        symmetric: Option<Estimate>,
+    }
+
+    /// All four on a frame of `sensor-2` whose noise is stated as a share of its peak.
+    fn four(matrices: &Matrices, frame: &Frame, noise: f64) -> Four {
+        let b = frame.stress_MPa.as_slice();
+        let family = Polynomial::new(matrices, b);
+        let sensor = &frame.sensor;
+        let subject = Subject { sensor, b, family: &family, mu_max: 0.6, noise_MPa: noise * frame.peak_MPa() };
+        Four {
+            auto: Auto::new(sensor).find(&subject),
+            patch: Patch::default().find(&subject),
+            sparse: Sparse::default().find(&subject),
+            symmetric: Symmetric::new(sensor).find(&subject),
+        }
+    }
+
+    fn evaluations(estimates: &[Option<Estimate>]) -> usize {
+        estimates.iter().flatten().map(|estimate| estimate.found.evaluations).sum()
+    }
+
+    /// Whether two estimates are the same but for their count of evaluations.
+    fn same(a: Option<Estimate>, b: Option<Estimate>) -> bool {
+        let bare = |estimate: Estimate| Estimate { found: Found { evaluations: 0, ..estimate.found }, ..estimate };
+        a.map(bare) == b.map(bare)
+    }
+
+    fn frames() -> (Matrices, Vec<Frame>) {
+        let scene = Scene::builtin("sensor-2").unwrap();
+        (Matrices::new(&scene.sensor, 0.6).unwrap(), Frame::shipped(&scene))
+    }
+
+    fn named(frames: &[Frame], id: &str) -> Frame {
+        frames.iter().find(|frame| frame.id == id).unwrap().clone()
+    }
+
+    #[test]
+    fn a_patch_that_explains_the_frame_is_taken() {
+        let (matrices, frames) = frames();
+        let found = four(&matrices, &named(&frames, "S2-hs-hertz"), 0.0);
+        assert!(found.auto.is_some() && found.auto == found.patch);
+    }
+
+    #[test]
+    fn another_shape_without_noise_is_left_to_sparse() {
+        let (matrices, frames) = frames();
+        let found = four(&matrices, &named(&frames, "S2-hs-ring"), 0.0);
+        assert!(found.auto.is_some() && same(found.auto, found.sparse));
+        assert_eq!(evaluations(&[found.auto]), evaluations(&[found.patch, found.sparse]));
+    }
+
+    #[test]
+    fn another_shape_with_noise_goes_to_the_smaller_misfit() {
+        let (matrices, frames) = frames();
+        // Beyond the limit of `sparse`, too little to explain what a wrong shape leaves.
+        let noise = 2.0 * SPARSE_NOISE_LIMIT;
+        let (mut symmetric, mut patch) = (0, 0);
+        for frame in &frames {
+            // Twice: as it is, and with a second contact that neither fits.
+            let mut two = frame.clone();
+            two.stress_MPa.iter_mut().zip(frame.stress_MPa.iter().rev()).for_each(|(b, other)| *b += 0.5 * other);
+            for frame in [frame, &two] {
+                let found = four(&matrices, frame, noise);
+                let objective = |estimate: Option<Estimate>| estimate.map_or(f64::NEG_INFINITY, |e| e.found.objective);
+                if found.auto == found.patch {
+                    continue;
+                }
+                let all = evaluations(&[found.patch, found.symmetric]);
+                assert_eq!(evaluations(&[found.auto]), all, "{}", frame.id);
+                if objective(found.patch) > objective(found.symmetric) {
+                    assert!(same(found.auto, found.patch), "{}", frame.id);
+                    patch += 1;
+                } else {
+                    assert!(same(found.auto, found.symmetric), "{}", frame.id);
+                    symmetric += 1;
+                }
+            }
+        }
+        assert!(symmetric > 0 && patch > 0, "{symmetric} {patch}");
+    }
+
+    #[test]
+    fn stress_that_pulls_has_no_estimate() {
+        let (matrices, frames) = frames();
+        let mut frame = named(&frames, "S2-hs-hertz");
+        frame.stress_MPa.iter_mut().for_each(|b| *b = -*b);
+        for noise in [0.0, 0.01] {
+            assert_eq!(four(&matrices, &frame, noise).auto, None, "{noise}");
+        }
+    }
+
+    #[test]
+    fn it_scores_as_sparse_does() {
+        let (_, frames) = frames();
+        let p = [0.5, 2.0, -0.1, 1.0];
+        assert_eq!(Auto::new(&frames[0].sensor).score(&p), Sparse::default().score(&p));
     }
 }

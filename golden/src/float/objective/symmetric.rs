@@ -210,3 +210,103 @@ impl Model for Even<'_> {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::float::pass::Polynomial;
+    use crate::frame::Frame;
+    use crate::matrices::Matrices;
+    use crate::scene::Scene;
+
+    /// Central differences of step 10⁻⁴ mm: truncation (10⁻⁴/h)² ≈ 10⁻⁹ and rounding 10⁻¹⁶/10⁻⁴, with a margin of 10³.
+    const SLOPE_TOLERANCE: f64 = 1e-6;
+
+    fn sensor() -> Sensor {
+        Scene::builtin("sensor-1").unwrap().sensor
+    }
+
+    /// A pressure on every cell, from its place in mm.
+    fn pressure(value: impl Fn(f64, f64) -> f64) -> Vec<f64> {
+        let sensor = sensor();
+        let place = |k: usize| sensor.position_mm(k / sensor.cols, k % sensor.cols);
+        (0..sensor.taxels()).map(|k| value(place(k)[0], place(k)[1])).collect()
+    }
+
+    #[test]
+    fn derivatives_by_hand() {
+        let sensor = Sensor { rows: 1, cols: 1, pitch_x_mm: 1.0, pitch_y_mm: 1.0, thickness_mm: 2.0 };
+        // One force of 3 N at the origin, seen one width to the right: u = 1, v = 0.
+        let width = WIDTH * sensor.thickness_mm;
+        let seen = Symmetric::new(&sensor).derivatives(&[3.0], [width, 0.0]);
+        let q = 3.0 * (-0.5f64).exp();
+        // q, q_x = −u q, q_y, q_xx = (u² − 1) q, q_xy, q_yy = (v² − 1) q, q_xxx = (3u − u³) q, q_xxy, q_xyy = u q, q_yyy.
+        let wanted = [1.0, -1.0, 0.0, 0.0, 0.0, -1.0, 2.0, 0.0, 1.0, 0.0];
+        for (seen, wanted) in seen.iter().zip(wanted) {
+            assert!((seen - wanted * q).abs() < 1e-14, "{seen} {wanted}");
+        }
+    }
+
+    #[test]
+    fn symmetric_pressure_beats_uneven_pressure_at_any_scale() {
+        let objective = Symmetric::new(&sensor());
+        let bell = |x: f64, y: f64| (-(x * x + 2.0 * y * y) / 18.0).exp();
+        let even = objective.score(&pressure(bell)).unwrap();
+        assert!((-1e-20..=0.0).contains(&even), "{even}");
+        let uneven = pressure(|x, y| bell(x, y) * (1.0 + (0.2 * x).tanh() + 0.5 * (0.3 * y).tanh()));
+        let score = objective.score(&uneven).unwrap();
+        assert!(score < -1e-4, "{score}");
+        let tenfold: Vec<f64> = uneven.iter().map(|p| 10.0 * p).collect();
+        assert!((objective.score(&tenfold).unwrap() / score - 1.0).abs() < 1e-9);
+    }
+
+    #[test]
+    fn pulling_and_broken_pressure_has_no_score() {
+        let objective = Symmetric::new(&sensor());
+        for value in [0.0, -1.0, f64::NAN, f64::INFINITY] {
+            assert_eq!(objective.score(&vec![value; sensor().taxels()]), None, "{value}");
+        }
+    }
+
+    #[test]
+    fn slopes_are_those_of_the_columns() {
+        let (taxels, disc) = (Taxels::new(&sensor()), Disc::new(NODES[0], NODES[1]));
+        let mut model = Even::new(&taxels, &disc, 0.6);
+        let theta = [0.7, -1.1, 3.0, 4.0, 0.5, 0.2, -0.1];
+        let loads = DVector::from_vec(vec![5.0, -1.0, 0.4, 0.8]);
+        let slopes = model.slopes(&theta, &loads);
+        let largest = slopes.amax();
+        for index in 0..theta.len() {
+            let mut at = |by: f64| {
+                let mut theta = theta;
+                theta[index] += by;
+                model.columns(&theta) * &loads
+            };
+            let step = 1e-4;
+            let difference = (at(step) - at(-step)) / (2.0 * step);
+            let off = (slopes.column(index) - difference).amax();
+            assert!(off <= SLOPE_TOLERANCE * largest, "θ{index}: {off:e} of {largest:e}");
+        }
+    }
+
+    #[test]
+    fn finds_the_shear_of_a_symmetric_contact_and_stays_within_mu_max() {
+        let scene = Scene::builtin("sensor-1").unwrap();
+        let frame = Frame::shipped(&scene).into_iter().find(|frame| frame.id == "S1-hs-hertz").unwrap();
+        let [tx, ty, load] = frame.resultant_N.unwrap();
+        let find = |mu_max: f64| {
+            let matrices = Matrices::new(&scene.sensor, mu_max).unwrap();
+            let family = Polynomial::new(&matrices, &frame.stress_MPa);
+            let (sensor, b) = (&scene.sensor, frame.stress_MPa.as_slice());
+            Symmetric::new(sensor).find(&Subject { sensor, b, family: &family, mu_max, noise_MPa: 0.0 }).unwrap()
+        };
+        let free = find(0.6);
+        let (x, y) = (free.found.mu[0] - tx / load, free.found.mu[1] - ty / load);
+        assert!(x.hypot(y) <= 0.02 * (tx / load).hypot(ty / load), "{free:?}");
+        assert!((free.load_N.unwrap() / load - 1.0).abs() < 0.01, "{free:?}");
+        // More than the search alone: the fit is counted too.
+        assert!(free.found.evaluations > 85 && free.found.objective <= 0.0, "{free:?}");
+        let held = find(0.05);
+        assert!(held.found.mu[0].hypot(held.found.mu[1]) <= 0.05 * (1.0 + 1e-12), "{held:?}");
+    }
+}

@@ -4,11 +4,11 @@ use std::f64::consts::TAU;
 
 /// A stream of numbers.
 #[derive(Clone, Debug)]
-pub(super) struct Random(u64);
+pub(crate) struct Random(u64);
 
 impl Random {
     /// The stream of a seed.
-    pub(super) fn new(seed: u64) -> Random {
+    pub(crate) fn new(seed: u64) -> Random {
         Random(seed)
     }
 
@@ -21,13 +21,18 @@ impl Random {
     }
 
     /// Uniform in low … high.
-    pub(super) fn between(&mut self, low: f64, high: f64) -> f64 {
+    pub(crate) fn between(&mut self, low: f64, high: f64) -> f64 {
         // 53 bits, every one of them exact.
         low + (high - low) * (self.bits() >> 11) as f64 / (1u64 << 53) as f64
     }
 
+    /// Heads or tails.
+    pub(crate) fn coin(&mut self) -> bool {
+        self.bits() >> 63 == 1
+    }
+
     /// Normal, mean 0, deviation 1.
-    pub(super) fn normal(&mut self) -> f64 {
+    pub(crate) fn normal(&mut self) -> f64 {
         // 1 − u is above 0.
         let radius = (-2.0 * (1.0 - self.between(0.0, 1.0)).ln()).sqrt();
         radius * (TAU * self.between(0.0, 1.0)).cos()
