@@ -21,7 +21,7 @@ pub fn square_bits() -> usize {
 
 /// One candidate per cycle: score = total − n·log2 Σp, and the rules of the search (disc, Σp > 0, ties).
 ///
-/// `start` with the sweep's sums, centre and squared distances, its totals [`TOTALS_LATER`] cycles later; `done` [`LATENCY`] cycles later, `improved` with it. `begin_frame` forgets the frame,
+/// `start` with the sweep's sums, centre and squared distances, its totals `TOTALS_LATER` cycles later; `done` `LATENCY` cycles later, `improved` with it. `begin_frame` forgets the frame,
 /// `halve` doubles the position for the next level.
 #[derive(LogicBlock)]
 pub struct Judge {
