@@ -1,7 +1,7 @@
 //! Input: from the readings of a real sensor to the stress a frame stands for.
 //!
 //! ```text
-//! 2^k frames ── average ── calibrate ── stress ── engine ── (unipolar: estimate clipped taxels, again) ── forces
+//! 2^k frames ── average ── calibrate ── (unipolar: tension for clipped readings) ── stress ── engine ── forces
 //!                          b = gain · (reading − zero),  zero = the tare frame, else the table's offset
 //! ```
 //!

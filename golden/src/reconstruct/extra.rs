@@ -5,7 +5,7 @@
 //! | `taken` | `partition.case = "adaptive"` | the case taken and why, and why the finer ones were not |
 //! | `regions` | `partition.case = "contacts"` | μ, centre, load and taxels of each contact |
 //! | `truncation` | `search.form = "orthogonal"` | ‖x − w‖/‖w‖ of each subarray: what the series in μ leaves out |
-//! | `unipolar` | `input.unipolar = true` | clipped taxels, iterations, misfit |
+//! | `unipolar` | `input.unipolar = true` | clipped and pulled taxels, evaluations, misfit |
 //! | `resultants` | `output.forces = "resultants"` | force and centre of pressure per subarray or contact |
 //! | `sweeps`, `converged` | `partition.case = "contacts"` | how the search over the regions went |
 

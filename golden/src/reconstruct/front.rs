@@ -4,14 +4,14 @@
 //! |---|---|
 //! | `input.average` | [`Golden::run_averaged`]; [`Golden::run`] takes a frame that is averaged already |
 //! | `input.calibration`, `input.tare` | readings to stress |
-//! | `input.unipolar` | clipped taxels are estimated, [`crate::input::unipolar`] |
+//! | `input.unipolar` | clipped taxels are given the tension that suits best, [`crate::input::unipolar`] |
 //! | `output.forces` | resultants in the place of forces per taxel |
 
 use super::output::resultants;
 use super::{Golden, GoldenError, Reconstruction};
 use crate::frame::{Forces, Frame};
-use crate::input::unipolar::estimate;
-use crate::scene::ForceOutput;
+use crate::input::unipolar::{fill, misfit, Unipolar};
+use crate::scene::{ForceOutput, Scene};
 
 impl Golden {
     /// Reconstructs one frame of readings.
@@ -30,8 +30,9 @@ impl Golden {
         frame.check(&self.scene)?;
         let frame = self.input.calibrate(frame);
         let mut result = if self.scene.input.unipolar {
-            let (mut result, report) =
-                estimate(&self.scene, &frame, |frame, unknown| self.masked(unknown)?.engine(frame, noise_MPa))?;
+            let (filled, mut report) = self.filled(&frame);
+            let mut result = self.engine(&filled, noise_MPa)?;
+            report.misfit = misfit(&self.scene, &frame, &result.forces_N);
             result.extra.unipolar = Some(report);
             result
         } else {
@@ -42,6 +43,25 @@ impl Golden {
             result.forces_N = Forces::default();
         }
         Ok(result)
+    }
+
+    /// The frame with tension in the place of clipped readings; the misfit is still to come.
+    fn filled(&self, frame: &Frame) -> (Frame, Unipolar) {
+        let Scene { sensor, input, search, .. } = &self.scene;
+        let mut filled = frame.clone();
+        filled.stress_MPa.iter_mut().for_each(|b| *b = b.max(0.0));
+        let mut report = Unipolar { clipped: 0, pulled: 0, evaluations: 0, misfit: 0.0 };
+        for (part, matrices) in self.parts() {
+            let b = part.gather(sensor, &filled.stress_MPa);
+            let dead = part.own(&input.dead);
+            let clipped: Vec<usize> = (0..b.len()).filter(|k| b[*k] == 0.0 && !dead.contains(k)).collect();
+            report.clipped += clipped.len();
+            let own = fill(matrices, b, clipped, search.mu_max);
+            report.pulled += own.stress_MPa.iter().filter(|b| **b < 0.0).count();
+            report.evaluations += own.evaluations;
+            part.scatter(sensor, &own.stress_MPa, &mut filled.stress_MPa);
+        }
+        (filled, report)
     }
 
     /// Averages 2^k frames, k the scene's `input.average`, and reconstructs their mean; the first one's truth stays.

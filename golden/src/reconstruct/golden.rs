@@ -24,7 +24,6 @@ use crate::matrices::{Matrices, MatricesError};
 use crate::partition::{subarrays, Case, PartitionError, Subarray};
 use crate::quantise::{full_scale, noise_floor_codes, quantise};
 use crate::scene::{Condition, Form, Scene, SceneError};
-use std::sync::Arc;
 use thiserror::Error;
 
 /// A scene made ready for frames.
@@ -37,7 +36,6 @@ pub struct Golden {
 }
 
 /// A case with its matrices.
-#[derive(Clone)]
 struct Cut {
     case: Case,
     parts: Vec<Subarray>,
@@ -47,7 +45,7 @@ struct Cut {
     masked: Vec<Matrices>,
     /// Where the scene asks for Eq. 1 as printed.
     orthogonal: Option<Orthogonal>,
-    objective: Arc<dyn Objective + Send + Sync>,
+    objective: Box<dyn Objective + Send + Sync>,
 }
 
 impl Cut {
@@ -128,7 +126,7 @@ impl Golden {
             let shared = Matrices::through(&shape, scene.medium, scene.search.mu_max)?;
             let literal = scene.search.form == Form::Orthogonal;
             let orthogonal = literal.then(|| Orthogonal::new(&shared)).transpose()?;
-            let objective = Arc::from(of_kind(scene.search.objective, &shape));
+            let objective = of_kind(scene.search.objective, &shape);
             Ok(Cut { case, parts, shared, masked: Vec::new(), orthogonal, objective }.mask(&scene.input.dead)?)
         };
         let cases = match scene.partition.case {
@@ -153,13 +151,10 @@ impl Golden {
         &self.cuts[self.cuts.len() - 1]
     }
 
-    /// The same scene without the readings of the taxels `dead`.
-    ///
-    /// # Errors
-    /// `Matrices` when too few readings are left.
-    pub(super) fn masked(&self, dead: &[[usize; 2]]) -> Result<Golden, GoldenError> {
-        let cuts = self.cuts.iter().map(|cut| cut.clone().mask(dead)).collect::<Result<_, _>>()?;
-        Ok(Golden { scene: self.scene.clone(), input: self.input.clone(), cuts })
+    /// The subarrays of the coarsest case.
+    pub(super) fn parts(&self) -> impl Iterator<Item = (&Subarray, &Matrices)> {
+        let whole = self.whole();
+        whole.parts.iter().enumerate().map(|(index, part)| (part, whole.matrices(index)))
     }
 
     /// Reconstructs calibrated stress. Forces come from the stress as it is, the condition from its codes.
