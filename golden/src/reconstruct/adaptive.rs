@@ -1,25 +1,38 @@
-//! Adaptive: the finest of the paper's cases that neither leaves a loaded subarray unmet nor cuts a contact.
+//! Adaptive: of the paper's cases that leave no loaded subarray unmet the one that comes nearest to the contacts, in
+//! preference one that cuts none.
 //!
-//! Cases 1, 2, 3 and 0 are tried in this order, as far as they divide the array. The contacts are the regions of
-//! `segment`, drawn in the forces of the whole array with one μ. A contact's cells are those that carry at least 5 % of
-//! its largest force; a boundary cuts the contact when it runs between them. What a contact presses is seen up to 1.5 h
-//! beyond its rim, and a subarray cannot tell it from a load of its own: a contact that is alone, which case 0 solves
-//! best, keeps that distance. Between several the distance is not asked for: one μ for all of them costs more. Case 0
-//! has no boundary and is taken when nothing finer is left.
+//! Cases 1, 2, 3 and 0 are tried in this order, as far as they divide the array. The contacts are those of
+//! `float::contacts`. A contact's cells are those that carry at least 5 % of its largest force; a boundary cuts the contact
+//! when it runs between them. What a contact presses is seen up to 1.5 h beyond its rim, and a subarray cannot tell it
+//! from a load of its own: a contact that is alone, which case 0 solves best, keeps that distance. Between several no
+//! distance is asked for. Case 0 has no boundary and is always possible.
+//!
+//! More subarrays are not always better: each is a smaller array that sees its neighbours' load without knowing of it.
+//! Taken is the case with the least
+//!
+//! ```text
+//! |T_case − T_contacts|        T: shear over the whole array
+//! ```
+//!
+//! and of equals the finest. Of a case that cuts a contact the distance counts twice: now and then a cut contact costs
+//! less than one μ for several. A case that leaves a loaded subarray unmet is never taken.
 //!
 //! | | shape | unit |
 //! |---|---|---|
-//! | in: p of the whole array | n | N |
+//! | in: contacts and their forces | n, 3 × n | –, N |
 //! | in: per case, receipts of its subarrays | parts | – |
 //! | out: what stands against the case | text | – |
 
 use crate::float::receive::Receipt;
 use crate::float::segment::Segments;
+use crate::frame::Forces;
 use crate::partition::Subarray;
 use crate::sensor::Sensor;
 
 /// Share of a contact's largest force from which a cell is part of it.
 const CELL_SHARE: f64 = 0.05;
+/// Distance of a case that cuts a contact, as it counts against one that does not: it must be half as far, or nearer.
+pub const CUT_COUNTS: f64 = 2.0;
 /// Least distance of a boundary from the cells of a lone contact, over the thickness.
 const LONE_CLEARANCE: f64 = 1.5;
 
@@ -48,17 +61,26 @@ pub fn extents(sensor: &Sensor, p: &[f64], segments: &Segments) -> Vec<Extent> {
     (0..segments.count).map(extent).collect()
 }
 
+/// What stands against a case.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Objection {
+    /// A loaded subarray does not meet the condition: the case is not possible.
+    Unmet(String),
+    /// A boundary cuts a contact: the case must come much nearer than those without.
+    Cut(String),
+}
+
 /// What stands against a case, `None` when nothing does.
-pub fn objection(sensor: &Sensor, parts: &[Subarray], receipts: &[Receipt], contacts: &[Extent]) -> Option<String> {
+pub fn objection(sensor: &Sensor, parts: &[Subarray], receipts: &[Receipt], contacts: &[Extent]) -> Option<Objection> {
     if let [_] = parts {
         return None;
     }
     for (part, receipt) in parts.iter().zip(receipts) {
         if receipt.loaded && !receipt.condition_met {
             let Subarray { row0, col0, .. } = part;
-            return Some(format!(
+            return Some(Objection::Unmet(format!(
                 "the subarray at row {row0}, column {col0} is loaded and does not meet the condition"
-            ));
+            )));
         }
     }
     let clearance = if contacts.len() > 1 { 0.0 } else { LONE_CLEARANCE * sensor.thickness_mm };
@@ -69,14 +91,25 @@ pub fn objection(sensor: &Sensor, parts: &[Subarray], receipts: &[Receipt], cont
         for (k, contact) in contacts.iter().enumerate() {
             for (name, edge, [low, high]) in [("x", x, contact.x), ("y", y, contact.y)] {
                 if let Some(edge) = edge.filter(|edge| low - clearance < *edge && *edge < high + clearance) {
-                    return Some(format!(
+                    return Some(Objection::Cut(format!(
                         "the boundary {name} = {edge} mm cuts contact {k}, from {low} to {high} mm, or comes closer than {clearance} mm"
-                    ));
+)));
                 }
             }
         }
     }
     None
+}
+
+/// How far the shear of two sets of forces is apart, in N.
+pub fn distance(a: &Forces, b: &Forces) -> f64 {
+    let ([ax, ay, _], [bx, by, _]) = (a.resultant(), b.resultant());
+    (ax - bx).hypot(ay - by)
+}
+
+/// Why a case was not the nearest.
+pub fn farther(off: f64) -> String {
+    format!("its shear is {off:.3} N from that of the contacts: another case is nearer, or finer and as near")
 }
 
 #[cfg(test)]
@@ -97,7 +130,7 @@ mod tests {
         extents(&sensor(), &p, &Segments::whole(96))
     }
 
-    fn against(case: i64, codes: &[i32], condition: Condition) -> Option<String> {
+    fn against(case: i64, codes: &[i32], condition: Condition) -> Option<Objection> {
         let parts = subarrays(Case::numbered(case).unwrap(), &sensor()).unwrap();
         let judge = |part: &Subarray| receive(&sensor(), part, &part.gather(&sensor(), codes), 0, condition);
         let receipts: Vec<Receipt> = parts.iter().map(judge).collect();
@@ -121,7 +154,7 @@ mod tests {
 
     #[test]
     fn an_unmet_condition_is_named() {
-        let unmet = against(2, &[1; 96], Condition::BothSigns).unwrap();
+        let Some(Objection::Unmet(unmet)) = against(2, &[1; 96], Condition::BothSigns) else { panic!("no objection") };
         assert!(unmet.starts_with("the subarray at row 0, column 0 is loaded"), "{unmet}");
         assert_eq!(against(2, &[0; 96], Condition::BothSigns), None);
     }
