@@ -26,7 +26,7 @@ pub struct Grid {
 pub enum Case {
     /// Equal rectangles, known before the frame is.
     Grid(Grid),
-    /// The finest case in which every loaded subarray meets the condition.
+    /// The case nearest to the contacts, among those in which every loaded subarray meets the condition.
     Adaptive,
     /// One region per contact.
     Contacts,

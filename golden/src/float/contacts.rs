@@ -20,17 +20,26 @@
 //! one. Of the results, one μ for all among them, the one whose p scores best over the whole array is taken, less a
 //! charge for each region beyond the first.
 //!
+//! Cells larger than the depth smear a contact's rim, which shifts μ, and what one contact is off by is taken for shear
+//! of its neighbours. Where elliptic contacts explain the stress (the misfit is what noise and quadrature leave, as in
+//! `auto`) they are free of both: `objective::several` fits them together, from the regions found above and from those
+//! of narrower smoothing, and each contact's μ, load and cells are its ellipse's. Anything else stays as it was found.
+//!
 //! | | shape | unit |
 //! |---|---|---|
 //! | in: family of one μ and its μ | polynomial, 2 | N, – |
+//! | in: stress and noise, for the fit | n, scalar | MPa |
 //! | out: p, regions, μ of each | n, n, count × 2 | N, –, – |
 //!
 //! With one region it is the plain method, to the bit.
+
+mod ellipses;
 
 use super::objective::Objective;
 use super::pass::{place, Polynomial};
 use super::search::{search, Found};
 use super::segment::{neighbours, segment, Segments, WIDTH};
+use crate::frame::Forces;
 use crate::matrices::{Matrices, Passes};
 
 /// Most sweeps over one set of regions.
@@ -74,6 +83,8 @@ pub struct Solver<'a> {
     pub objective: &'a dyn Objective,
     /// p₀ = Cz⁺ b in N.
     pub p0: &'a [f64],
+    /// Stress in MPa and its noise, where ellipses may be fitted to it: on a half-space, every taxel read.
+    pub stress: Option<(&'a [f64], f64)>,
     /// Whether the region of these labels with this number is to be searched.
     pub searched: &'a dyn Fn(&Segments, usize) -> bool,
 }
@@ -82,6 +93,14 @@ impl Contacts {
     /// Ratio of shear to normal force of a region.
     pub fn mu(&self, region: usize) -> [f64; 2] {
         mu_of(&self.found[region])
+    }
+
+    /// The forces of all regions in N.
+    pub fn forces(&self) -> Forces {
+        let along = |axis: usize| {
+            self.p.iter().zip(&self.segments.labels).map(|(p, &region)| self.mu(region)[axis] * p).collect()
+        };
+        Forces { fx: along(0), fy: along(1), fz: self.p.clone() }
     }
 }
 
@@ -103,7 +122,7 @@ impl Solver<'_> {
                 best = (score - cost, state);
             }
         }
-        best.1
+        self.fitted(&best.1).unwrap_or(best.1)
     }
 
     /// Solves for regions drawn with one width of smoothing.

@@ -20,9 +20,11 @@ mod compressive;
 pub(crate) mod disc;
 mod fit;
 pub(crate) mod patch;
+pub(crate) mod several;
 mod subject;
 mod symmetric;
 
+pub(crate) use auto::explained;
 pub use auto::Auto;
 pub use compressive::Compressive;
 pub use patch::Patch;

@@ -1,20 +1,30 @@
-//! Adaptive: the finest of the paper's cases that neither leaves a loaded subarray unmet nor cuts a contact.
+//! Adaptive: of the paper's cases that leave no loaded subarray unmet and cut no contact, the one that comes nearest to the
+//! contacts.
 //!
-//! Cases 1, 2, 3 and 0 are tried in this order, as far as they divide the array. The contacts are the regions of
-//! `segment`, drawn in the forces of the whole array with one μ. A contact's cells are those that carry at least 5 % of
-//! its largest force; a boundary cuts the contact when it runs between them. What a contact presses is seen up to 1.5 h
-//! beyond its rim, and a subarray cannot tell it from a load of its own: a contact that is alone, which case 0 solves
-//! best, keeps that distance. Between several the distance is not asked for: one μ for all of them costs more. Case 0
-//! has no boundary and is taken when nothing finer is left.
+//! Cases 1, 2, 3 and 0 are tried in this order, as far as they divide the array. The contacts are those of
+//! `float::contacts`. A contact's cells are those that carry at least 5 % of its largest force; a boundary cuts the contact
+//! when it runs between them. What a contact presses is seen up to 1.5 h beyond its rim, and a subarray cannot tell it
+//! from a load of its own: a contact that is alone, which case 0 solves best, keeps that distance. Between several no
+//! distance is asked for. Case 0 has no boundary and is always possible.
+//!
+//! More subarrays are not always better: each is a smaller array that sees its neighbours' load without knowing of it.
+//! Taken is the case with the least
+//!
+//! ```text
+//! |T_case − T_contacts|        T: shear over the whole array
+//! ```
+//!
+//! and of equals the finest.
 //!
 //! | | shape | unit |
 //! |---|---|---|
-//! | in: p of the whole array | n | N |
+//! | in: contacts and their forces | n, 3 × n | –, N |
 //! | in: per case, receipts of its subarrays | parts | – |
 //! | out: what stands against the case | text | – |
 
 use crate::float::receive::Receipt;
 use crate::float::segment::Segments;
+use crate::frame::Forces;
 use crate::partition::Subarray;
 use crate::sensor::Sensor;
 
@@ -71,12 +81,23 @@ pub fn objection(sensor: &Sensor, parts: &[Subarray], receipts: &[Receipt], cont
                 if let Some(edge) = edge.filter(|edge| low - clearance < *edge && *edge < high + clearance) {
                     return Some(format!(
                         "the boundary {name} = {edge} mm cuts contact {k}, from {low} to {high} mm, or comes closer than {clearance} mm"
-                    ));
+));
                 }
             }
         }
     }
     None
+}
+
+/// How far the shear of two sets of forces is apart, in N.
+pub fn distance(a: &Forces, b: &Forces) -> f64 {
+    let ([ax, ay, _], [bx, by, _]) = (a.resultant(), b.resultant());
+    (ax - bx).hypot(ay - by)
+}
+
+/// Why a case was not the nearest.
+pub fn farther(off: f64) -> String {
+    format!("its shear is {off:.3} N from that of the contacts: another case is nearer, or finer and as near")
 }
 
 #[cfg(test)]
@@ -121,7 +142,7 @@ mod tests {
 
     #[test]
     fn an_unmet_condition_is_named() {
-        let unmet = against(2, &[1; 96], Condition::BothSigns).unwrap();
+        let Some(unmet) = against(2, &[1; 96], Condition::BothSigns) else { panic!("no objection") };
         assert!(unmet.starts_with("the subarray at row 0, column 0 is loaded"), "{unmet}");
         assert_eq!(against(2, &[0; 96], Condition::BothSigns), None);
     }

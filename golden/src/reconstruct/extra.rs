@@ -48,7 +48,7 @@ pub struct Extra {
 pub struct Taken {
     /// The case, as a scene names it.
     pub case: String,
-    /// Why it is the finest possible.
+    /// Why it was taken.
     pub reason: String,
     /// The finer cases and why they were not taken.
     pub refused: Vec<Refused>,

@@ -6,11 +6,11 @@
 //! | adaptive | the whole array first, to see the contacts; then the case that `adaptive` allows |
 //! | contacts | the whole array first; then its regions, one μ each |
 
-use super::adaptive::{extents, objection};
+use super::adaptive::{distance, extents, farther, objection};
 use super::extra::{regions, Refused, Taken};
 use super::{assemble, Reconstruction, SubarrayResult};
 use crate::flags::{frame_flags, Flag};
-use crate::float::contacts::Solver;
+use crate::float::contacts::{Contacts, Solver};
 use crate::float::force::{force, threshold};
 use crate::float::objective::{of_kind, Estimate, Objective, Sparse, Subject};
 use crate::float::orthogonal::{truncation, Orthogonal, OrthogonalError};
@@ -23,7 +23,7 @@ use crate::input::{Input as InputOptions, InputError};
 use crate::matrices::{Matrices, MatricesError};
 use crate::partition::{subarrays, Case, PartitionError, Subarray};
 use crate::quantise::{full_scale, noise_floor_codes, quantise};
-use crate::scene::{Condition, Form, Scene, SceneError};
+use crate::scene::{Condition, Form, Medium, Scene, SceneError};
 use thiserror::Error;
 
 /// A scene made ready for frames.
@@ -189,60 +189,82 @@ impl Golden {
         result
     }
 
-    /// The finest case that nothing stands against.
+    /// Of the cases that are possible the one whose shear is nearest to that of the contacts.
     fn adaptive(&self, frame: &Frame, input: &Input) -> Reconstruction {
         let sensor = &self.scene.sensor;
         let whole = self.subarrays(input, self.whole());
-        let contacts = extents(sensor, &whole.forces.fz, &segment(sensor, &whole.forces.fz, WIDTH));
-        let mut refused = Vec::new();
-        for cut in &self.cuts {
+        let solved = self.solved(input);
+        let target = solved.as_ref().map(Contacts::forces);
+        let contacts = match &solved {
+            Some(contacts) if contacts.segments.count > 1 => extents(sensor, &contacts.p, &contacts.segments),
+            _ => extents(sensor, &whole.forces.fz, &segment(sensor, &whole.forces.fz, WIDTH)),
+        };
+        let off = |outcome: &Outcome| target.as_ref().map_or(0.0, |target| distance(target, &outcome.forces));
+        let nothing = "nothing finer is as near to the contacts".to_string();
+        let mut refused: Vec<(Case, String)> = Vec::new();
+        let mut best = (off(&whole), Case::WHOLE, whole, nothing);
+        for cut in self.cuts.iter().rev().filter(|cut| cut.case != Case::WHOLE) {
             let receipts: Vec<Receipt> = cut.parts.iter().map(|part| self.receive(input, part)).collect();
-            let case = cut.case.to_string();
             if let Some(reason) = objection(sensor, &cut.parts, &receipts, &contacts) {
-                refused.push(Refused { case, reason });
+                refused.push((cut.case, reason));
                 continue;
             }
-            if cut.case == Case::WHOLE {
-                break;
+            let outcome = self.subarrays(input, cut);
+            let own = off(&outcome);
+            if own <= best.0 {
+                let reason = "no boundary cuts a contact and nothing is nearer to them".to_string();
+                let (off, case, ..) = std::mem::replace(&mut best, (own, cut.case, outcome, reason));
+                refused.push((case, farther(off)));
+            } else {
+                refused.push((cut.case, farther(own)));
             }
-            let reason = "every loaded subarray meets the condition and no boundary cuts a contact".to_string();
-            let mut result = self.finish(frame, self.subarrays(input, cut));
-            result.extra.taken = Some(Taken { case, reason, refused });
-            return result;
         }
-        let mut result = self.finish(frame, whole);
-        let reason = "no finer case is possible".to_string();
-        result.extra.taken = Some(Taken { case: Case::WHOLE.to_string(), reason, refused });
+        let (_, case, outcome, reason) = best;
+        // The finer ones, in their order.
+        let finer = self.cuts.iter().take_while(|cut| cut.case != case);
+        let refused = finer
+            .filter_map(|cut| refused.iter().find(|(other, _)| *other == cut.case))
+            .map(|(case, reason)| Refused { case: case.to_string(), reason: reason.clone() })
+            .collect();
+        let mut result = self.finish(frame, outcome);
+        result.extra.taken = Some(Taken { case: case.to_string(), reason, refused });
         result
+    }
+
+    /// The regions of the contacts and their μ, `None` when no candidate presses.
+    fn solved(&self, input: &Input) -> Option<Contacts> {
+        let (scene, matrices) = (&self.scene, self.matrices());
+        let family = Polynomial::new(matrices, input.stress_MPa);
+        let found = search(&family, scene.search.mu_max, &Sparse::default())?;
+        let (mu_max, p0) = (scene.search.mu_max, family.v(0, 0));
+        let fits = scene.medium == Medium::HalfSpace && self.whole().masked.is_empty() && mu_max > 0.0;
+        let stress = fits.then_some((input.stress_MPa, input.noise_MPa));
+        let searched = |segments: &Segments, region: usize| self.met(input, segments, region);
+        let solver = Solver { matrices, mu_max, objective: &Sparse::default(), p0, stress, searched: &searched };
+        Some(solver.solve(&family, found))
+    }
+
+    /// Whether the taxels of a region meet the scene's condition.
+    fn met(&self, input: &Input, segments: &Segments, region: usize) -> bool {
+        let own = || (0..input.codes.len()).filter(move |&k| segments.labels[k] == region).map(|k| input.codes[k]);
+        let (above, below) = (own().any(|code| code > input.floor), own().any(|code| code < -input.floor));
+        match self.scene.partition.condition {
+            Condition::Loaded => above || below,
+            Condition::BothSigns => above && below,
+        }
     }
 
     /// One region per contact.
     fn contacts(&self, frame: &Frame, input: &Input) -> Reconstruction {
         let scene = &self.scene;
-        let matrices = self.matrices();
         let mut outcome = self.subarrays(input, self.whole());
-        let family = Polynomial::new(matrices, input.stress_MPa);
-        let met = |segments: &Segments, region: usize| {
-            let own = || (0..input.codes.len()).filter(move |&k| segments.labels[k] == region).map(|k| input.codes[k]);
-            let (above, below) = (own().any(|code| code > input.floor), own().any(|code| code < -input.floor));
-            match scene.partition.condition {
-                Condition::Loaded => above || below,
-                Condition::BothSigns => above && below,
-            }
-        };
-        let Some(found) = search(&family, scene.search.mu_max, &Sparse::default()) else {
+        let Some(contacts) = self.solved(input) else {
             return self.finish(frame, outcome);
         };
-        let (mu_max, p0) = (scene.search.mu_max, family.v(0, 0));
-        let solver = Solver { matrices, mu_max, objective: &Sparse::default(), p0, searched: &met };
-        let contacts = solver.solve(&family, found);
-        let of_taxel = |k: usize| contacts.mu(contacts.segments.labels[k]);
-        let along = |axis: usize| contacts.p.iter().enumerate().map(|(k, p)| of_taxel(k)[axis] * p).collect();
-        let w = Forces { fx: along(0), fy: along(1), fz: contacts.p.clone() };
-        let (x, truncation) = self.whole().meet(input.stress_MPa, w);
+        let (x, truncation) = self.whole().meet(input.stress_MPa, contacts.forces());
         outcome.truncation = truncation.into_iter().collect();
         let forces = threshold(x, scene.threshold.min_force_N);
-        let met: Vec<bool> = (0..contacts.segments.count).map(|k| met(&contacts.segments, k)).collect();
+        let met: Vec<bool> = (0..contacts.segments.count).map(|k| self.met(input, &contacts.segments, k)).collect();
         let own = regions(&scene.sensor, &contacts, &met, &forces);
         outcome.forces = forces;
         let mut result = self.finish(frame, outcome);

@@ -3,6 +3,9 @@
 use super::*;
 use crate::float::objective::Sparse;
 use crate::folded::accumulate;
+use crate::frame::Contact;
+use crate::generator::generate;
+use crate::scene::Medium;
 use crate::sensor::Sensor;
 
 fn sensor() -> Sensor {
@@ -33,7 +36,8 @@ fn solve(matrices: &Matrices, b: &[f64], searched: &dyn Fn(&Segments, usize) -> 
     let family = Polynomial::new(matrices, b);
     let objective = &Sparse::default();
     let found = search(&family, 0.6, objective).unwrap();
-    Solver { matrices, mu_max: 0.6, objective, p0: family.v(0, 0), searched }.solve(&family, found)
+    Solver { matrices, mu_max: 0.6, objective, p0: family.v(0, 0), stress: Some((b, 0.0)), searched }
+        .solve(&family, found)
 }
 
 #[test]
@@ -71,4 +75,51 @@ fn a_region_that_is_not_searched_has_no_shear() {
     assert_eq!((contacts.segments.count, contacts.mu(1)), (2, [0.0; 2]));
     assert!(contacts.found[1].is_none());
     assert!((contacts.mu(0)[0] - 0.3).abs() < 0.01);
+}
+
+/// Stress of two contacts that touch, by the generator's quadrature.
+fn touching(shape: &str) -> Vec<f64> {
+    let contact = |x: f64, tangential: [f64; 2]| Contact {
+        shape: Some(shape.to_string()),
+        centre_mm: Some([x, 1.0]),
+        size_mm: vec![5.0, 4.0, 0.0],
+        normal_N: Some(4.0),
+        tangential_N: Some(tangential),
+        ..Default::default()
+    };
+    let contacts = [contact(-5.0, [1.2, 0.0]), contact(5.2, [-0.4, 0.8])];
+    generate("touching", &sensor(), Medium::HalfSpace, &contacts).unwrap().stress_MPa
+}
+
+#[test]
+fn ellipses_that_touch_are_told_apart() {
+    let matrices = Matrices::new(&sensor(), 0.6).unwrap();
+    let contacts = solve(&matrices, &touching("hertz-ellipse"), &|_, _| true);
+    assert_eq!(contacts.segments.count, 2);
+    let left = contacts.segments.labels[8 * 16 + 6];
+    for (region, mu) in [(left, [0.3, 0.0]), (1 - left, [-0.1, 0.2])] {
+        let found = contacts.mu(region);
+        // The quadrature of the fit is good to 1e-4 of the peak.
+        assert!((found[0] - mu[0]).hypot(found[1] - mu[1]) < 0.005, "{found:?} {mu:?}");
+    }
+    let load: f64 = contacts.p.iter().sum();
+    assert!((load - 8.0).abs() < 0.02, "{load}");
+}
+
+#[test]
+fn what_is_no_ellipse_stays_as_it_was() {
+    let matrices = Matrices::new(&sensor(), 0.6).unwrap();
+    let b = touching("rectangle");
+    let family = Polynomial::new(&matrices, &b);
+    let objective = &Sparse::default();
+    let found = search(&family, 0.6, objective).unwrap();
+    let plain = Solver {
+        matrices: &matrices,
+        mu_max: 0.6,
+        objective,
+        p0: family.v(0, 0),
+        stress: None,
+        searched: &|_, _| true,
+    };
+    assert_eq!(solve(&matrices, &b, &|_, _| true), plain.solve(&family, found));
 }

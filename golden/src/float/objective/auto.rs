@@ -27,6 +27,14 @@ const OWN_ERROR: f64 = 1e-4;
 /// Deviations of χ² beyond which a misfit is no accident.
 const DEVIATIONS: f64 = 4.0;
 
+/// Largest squared misfit in MPa² of a fit that explains b.
+pub(crate) fn explained(b: &[f64], noise_MPa: f64) -> f64 {
+    let peak = b.iter().fold(0.0f64, |peak, b| b.abs().max(peak));
+    let n = b.len() as f64;
+    let variance = noise_MPa.powi(2) + (OWN_ERROR * peak).powi(2);
+    n * variance * (1.0 + DEVIATIONS * (2.0 / n).sqrt())
+}
+
 /// The objective.
 #[derive(Clone, Debug)]
 pub struct Auto {
@@ -50,9 +58,7 @@ impl Objective for Auto {
 
     fn find(&self, subject: &Subject) -> Option<Estimate> {
         let peak = subject.b.iter().fold(0.0f64, |peak, b| b.abs().max(peak));
-        let n = subject.b.len() as f64;
-        let variance = subject.noise_MPa.powi(2) + (OWN_ERROR * peak).powi(2);
-        let most = n * variance * (1.0 + DEVIATIONS * (2.0 / n).sqrt());
+        let most = explained(subject.b, subject.noise_MPa);
         // The objective of a fit is its negative misfit.
         let explains = |estimate: &Estimate| -estimate.found.objective <= most;
         let mut evaluations = 0;

@@ -24,9 +24,9 @@ use super::{Estimate, Objective, Subject};
 use nalgebra::{DMatrix, DVector};
 
 /// Rings and angles of the first fit: 60 nodes.
-const COARSE: [usize; 2] = [5, 12];
+pub(super) const COARSE: [usize; 2] = [5, 12];
 /// Rings and angles of the second.
-const FINE: [usize; 2] = [8, 24];
+pub(super) const FINE: [usize; 2] = [8, 24];
 /// Starting radii over the depth.
 const START_RADII: [f64; 4] = [0.5, 1.0, 1.7, 2.7];
 /// Least and largest g.

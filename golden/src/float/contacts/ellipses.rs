@@ -1,0 +1,77 @@
+//! Ellipses: elliptic contacts in the place of the regions, where they explain the stress.
+//!
+//! | | shape | unit |
+//! |---|---|---|
+//! | in: p and regions found without them | n | N, – |
+//! | in: stress, noise | n, scalar | MPa |
+//! | out: p, regions, μ of each | n, n, count × 2 | N, –, – |
+//!
+//! A single ellipse changes nothing: one contact is the plain method. A region's forces are its ellipse's pressure over each cell, scaled to its load; a cell under two belongs to the one
+//! that presses it more.
+
+use super::{Contacts, Solver};
+use crate::float::objective::explained;
+use crate::float::objective::several::{explain, starts, Explanation};
+use crate::float::search::{Found, RADIUS};
+use crate::float::segment::{segment, Segments, WIDTH};
+
+/// Widths that fits start from besides.
+const FIT_WIDTHS: [f64; 3] = [WIDTH, 0.6, 0.4];
+/// Share by which an ellipse's |μ| may exceed mu_max, to which it is cut.
+const BEYOND: f64 = 0.05;
+
+impl Solver<'_> {
+    /// Ellipses in place of the regions, where they explain the stress.
+    pub(super) fn fitted(&self, state: &Contacts) -> Option<Contacts> {
+        let (b, noise_MPa) = self.stress?;
+        let sensor = &self.matrices.sensor;
+        // What differs is the number of regions; the rest the fit finds by itself.
+        let drawn = FIT_WIDTHS.map(|width| segment(sensor, &state.p, width));
+        let mut drawings = vec![&state.segments];
+        drawings.extend(&drawn);
+        let mut counts = Vec::new();
+        drawings.retain(|segments| {
+            let new = !counts.contains(&segments.count);
+            counts.push(segments.count);
+            new
+        });
+        let starts: Vec<Vec<f64>> = drawings.into_iter().map(|segments| starts(sensor, &state.p, segments)).collect();
+        let enough = explained(b, noise_MPa);
+        let explanation = explain(sensor, b, &starts, enough)?;
+        if explanation.misfit > enough || explanation.patches.len() == 1 {
+            return None;
+        }
+        self.of_ellipses(&explanation, state)
+    }
+
+    /// The regions of ellipses, each with its ellipse's forces; `None` where a region has none, is not to be searched
+    /// or has more shear than there may be.
+    fn of_ellipses(&self, explanation: &Explanation, state: &Contacts) -> Option<Contacts> {
+        let sensor = &self.matrices.sensor;
+        let cells = explanation.cells(sensor);
+        let labels = explanation.labels(sensor, &cells);
+        let segments = Segments::numbered(&labels);
+        let mut p: Vec<f64> = (0..labels.len()).map(|k| cells.iter().map(|cells| cells[k]).sum()).collect();
+        let mut found = vec![None; segments.count];
+        let mut seen = 0;
+        for (ellipse, patch) in explanation.patches.iter().enumerate() {
+            let first = labels.iter().position(|&label| label == ellipse)?;
+            let region = segments.labels[first];
+            let sum: f64 = (0..p.len()).filter(|&k| labels[k] == ellipse).map(|k| p[k]).sum();
+            let [x, y, load] = patch.force;
+            let ratio = (x / load).hypot(y / load);
+            if !(self.searched)(&segments, region) || sum <= 0.0 || ratio > (1.0 + BEYOND) * self.mu_max {
+                return None;
+            }
+            (0..p.len()).filter(|&k| labels[k] == ellipse).for_each(|k| p[k] *= load / sum);
+            let cut = if ratio > self.mu_max { self.mu_max / ratio } else { 1.0 };
+            let mu = [x, y].map(|f| f / load * cut);
+            let position = mu.map(|mu| (mu * f64::from(RADIUS) / self.mu_max) as i32);
+            found[region] = Some(Found { mu, position, objective: 0.0, evaluations: explanation.evaluations });
+            seen += 1;
+        }
+        let objective = self.objective.score(&p)?;
+        found.iter_mut().flatten().for_each(|found| found.objective = objective);
+        (seen == segments.count).then_some(Contacts { segments, found, p, sweeps: state.sweeps, converged: true })
+    }
+}

@@ -1,0 +1,247 @@
+//! Several: least squares of several elliptic contacts at once, each with its own μ.
+//!
+//! ```text
+//! min over θ_k, F_k of ‖b − Σ_k K(θ_k) F_k‖²        θ_k = centre, L, g as in `patch`;  F_k = (Fx, Fy, Fz)
+//! ```
+//!
+//! | | shape | unit |
+//! |---|---|---|
+//! | in: b | n | MPa |
+//! | in: where the fit starts | 6 per contact | as in `patch` |
+//! | out: ellipses and their forces | 6 + 3 per contact | as in `patch`, N |
+//! | out: squared misfit | scalar | MPa² |
+//!
+//! Started from several drawings of the regions. Where none explains b, an ellipse is added where the misfit of the best
+//! is largest, or its ellipse cut in two, twice at most and as long as that helps. On a half-space.
+
+use super::disc::{Disc, Taxels};
+use super::fit::{fit, Fit, Model};
+use super::patch::{place, Ellipse, COARSE, FINE, PARAMETERS};
+use crate::float::segment::Segments;
+use crate::sensor::Sensor;
+use nalgebra::{DMatrix, DVector};
+
+/// Most ellipses.
+const MOST: usize = 8;
+/// Most ellipses times taxels: beyond, a fit takes longer than it is worth.
+const WORK: usize = 10_000;
+/// A further ellipse must bring the squared misfit below this share.
+const WORTH: f64 = 0.5;
+/// Coarse misfit over the one asked for beyond which many nodes do not help.
+const HOPELESS: f64 = 1e5;
+/// Ellipses that may be added.
+const ADDED: usize = 2;
+/// Rings and angles for the shares of the cells.
+const CELLS: [usize; 2] = [32, 96];
+/// Share of a region's largest force from which a cell counts for where its ellipse starts.
+const COUNTS_FROM: f64 = 0.15;
+/// g at the start, between Hertz's and a uniform pressure's.
+const START_EXPONENT: f64 = 0.4;
+/// ⟨x²⟩ of Hertz's pressure is a²/5, of a uniform one a²/4: between the two.
+const SPREAD: f64 = 4.5;
+
+/// One elliptic contact.
+#[derive(Clone, Debug)]
+pub(crate) struct Patched {
+    theta: [f64; PARAMETERS],
+    /// Its force in N, [x, y, normal].
+    pub force: [f64; 3],
+}
+
+/// Ellipses and what they leave of b.
+#[derive(Clone, Debug)]
+pub(crate) struct Explanation {
+    /// At least one.
+    pub patches: Vec<Patched>,
+    /// ‖b − Σ K F‖² in MPa².
+    pub misfit: f64,
+    /// Sets of columns computed, over all fits.
+    pub evaluations: usize,
+}
+
+/// Stress of several ellipses.
+struct Several<'a> {
+    taxels: &'a Taxels,
+    disc: &'a Disc,
+}
+
+impl Several<'_> {
+    fn one(&self) -> Ellipse<'_> {
+        Ellipse { taxels: self.taxels, disc: self.disc }
+    }
+
+    /// b − Σ K F.
+    fn rest(&self, b: &DVector<f64>, found: &Fit) -> DVector<f64> {
+        let mut rest = b.clone();
+        for (theta, force) in found.theta.chunks(PARAMETERS).zip(found.loads.as_slice().chunks(3)) {
+            for (column, f) in self.one().unit_loads(theta).iter().zip(force) {
+                rest.iter_mut().zip(column).for_each(|(rest, c)| *rest -= f * c);
+            }
+        }
+        rest
+    }
+}
+
+/// The columns of all ellipses side by side.
+fn joined(n: usize, columns: Vec<Vec<f64>>) -> DMatrix<f64> {
+    DMatrix::from_iterator(n, columns.len(), columns.into_iter().flatten())
+}
+
+impl Model for Several<'_> {
+    fn columns(&mut self, theta: &[f64]) -> DMatrix<f64> {
+        let columns = theta.chunks(PARAMETERS).flat_map(|theta| self.one().unit_loads(theta)).collect();
+        joined(self.taxels.count(), columns)
+    }
+
+    fn slopes(&mut self, theta: &[f64], loads: &DVector<f64>) -> DMatrix<f64> {
+        let each = theta.chunks(PARAMETERS).zip(loads.as_slice().chunks(3));
+        let columns = each.flat_map(|(theta, f)| self.one().derivatives(theta, [f[0], f[1], f[2]])).collect();
+        joined(self.taxels.count(), columns)
+    }
+
+    fn confine(&self, theta: &mut [f64]) {
+        theta.chunks_mut(PARAMETERS).for_each(|theta| self.one().confine(theta));
+    }
+}
+
+/// Where the ellipses of drawn regions start: centroid and spread of their compressive forces.
+pub(crate) fn starts(sensor: &Sensor, p: &[f64], segments: &Segments) -> Vec<f64> {
+    let least = (0.5 * sensor.thickness_mm).powi(2);
+    let start = |region: usize| -> Option<[f64; PARAMETERS]> {
+        let own = || (0..p.len()).filter(|&k| segments.labels[k] == region);
+        let largest = own().map(|k| p[k]).fold(0.0, f64::max);
+        if largest <= 0.0 {
+            return None;
+        }
+        let counted = || own().filter(|&k| p[k] >= COUNTS_FROM * largest);
+        let at = |k: usize| sensor.position_mm(k / sensor.cols, k % sensor.cols);
+        let weight: f64 = counted().map(|k| p[k]).sum();
+        let mean = |value: &dyn Fn([f64; 2]) -> f64| counted().map(|k| p[k] * value(at(k))).sum::<f64>() / weight;
+        let [x, y] = [mean(&|at| at[0]), mean(&|at| at[1])];
+        let xx = SPREAD * (mean(&|at| (at[0] - x).powi(2)) - sensor.pitch_x_mm.powi(2) / 12.0);
+        let yy = SPREAD * (mean(&|at| (at[1] - y).powi(2)) - sensor.pitch_y_mm.powi(2) / 12.0);
+        let xy = SPREAD * mean(&|at| (at[0] - x) * (at[1] - y));
+        let (xx, yy) = (xx.max(least), yy.max(least));
+        let most = 0.8 * (xx * yy).sqrt();
+        let xy = xy.clamp(-most, most);
+        // The square root of a symmetric 2 × 2 matrix.
+        let root = (xx * yy - xy * xy).sqrt();
+        let trace = (xx + yy + 2.0 * root).sqrt();
+        Some([x, y, (xx + root) / trace, (yy + root) / trace, xy / trace, START_EXPONENT])
+    };
+    (0..segments.count).filter_map(start).flatten().collect()
+}
+
+/// Fits from each start in turn until the squared misfit is at most `enough`; the best fit in which every contact
+/// presses, `None` where there is none.
+pub(crate) fn explain(sensor: &Sensor, b: &[f64], starts: &[Vec<f64>], enough: f64) -> Option<Explanation> {
+    let (taxels, b) = (Taxels::new(sensor), DVector::from_column_slice(b));
+    let discs = [COARSE, FINE].map(|[rings, angles]| Disc::new(rings, angles));
+    let [mut coarse, mut fine] = [0, 1].map(|k| Several { taxels: &taxels, disc: &discs[k] });
+    let mut evaluations = 0;
+    let mut both = |theta: &[f64]| -> Option<Fit> {
+        let first = fit(&mut coarse, &b, theta)?;
+        evaluations += first.evaluations;
+        let mut found = first;
+        if found.misfit <= HOPELESS * enough {
+            found = fit(&mut fine, &b, &found.theta)?;
+            evaluations += found.evaluations;
+        }
+        let presses = |force: &[f64]| force[2] > 0.0 && force.iter().all(|f| f.is_finite());
+        Some(found).filter(|found| found.loads.as_slice().chunks(3).all(presses))
+    };
+    let less = |a: &Fit, b: &Fit| a.misfit.total_cmp(&b.misfit);
+    let most = MOST.min(WORK / taxels.count().max(1)) * PARAMETERS;
+    let mut best: Option<Fit> = None;
+    for start in starts.iter().filter(|start| !start.is_empty() && start.len() <= most) {
+        best = best.into_iter().chain(both(start)).min_by(less);
+        if best.as_ref().is_some_and(|best| best.misfit <= enough) {
+            break;
+        }
+    }
+    let mut best = best?;
+    for _ in 0..ADDED {
+        if best.misfit <= enough || best.theta.len() >= most {
+            break;
+        }
+        let rest = Several { taxels: &taxels, disc: &discs[1] }.rest(&b, &best);
+        let worst = rest.iamax();
+        let further = further(&best.theta, [taxels.x[worst], taxels.y[worst]], taxels.depth);
+        let better = further.iter().filter_map(|theta| both(theta)).min_by(less);
+        match better.filter(|found| found.misfit < WORTH * best.misfit) {
+            Some(better) => best = better,
+            None => break,
+        }
+    }
+    let patch = |(theta, force): (&[f64], &[f64])| {
+        let mut own = [0.0; PARAMETERS];
+        own.copy_from_slice(theta);
+        Patched { theta: own, force: [force[0], force[1], force[2]] }
+    };
+    let patches: Vec<Patched> = best.theta.chunks(PARAMETERS).zip(best.loads.as_slice().chunks(3)).map(patch).collect();
+    Some(Explanation { patches, misfit: best.misfit, evaluations })
+}
+
+/// Two ways to one ellipse more: at the place of the largest misfit, or the ellipse that it lies in, or nearest to, cut
+/// across its longer axis.
+fn further(theta: &[f64], [x, y]: [f64; 2], depth: f64) -> [Vec<f64>; 2] {
+    let mut added = theta.to_vec();
+    added.extend([x, y, depth, depth, 0.0, START_EXPONENT]);
+    let mut cut = theta.to_vec();
+    let off = |own: &[f64]| (own[0] - x).hypot(own[1] - y) - own[2].max(own[3]);
+    let nearest = theta.chunks(PARAMETERS).enumerate().min_by(|a, b| off(a.1).total_cmp(&off(b.1)));
+    if let Some((k, own)) = nearest {
+        let (a, b, c) = (own[2], own[3], own[4]);
+        let (mean, apart) = ((a + b) / 2.0, ((a - b) / 2.0).hypot(c));
+        let (long, short) = (mean + apart, mean - apart);
+        let angle = 0.5 * c.atan2((a - b) / 2.0);
+        let [dx, dy] = [angle.cos() * long / 2.0, angle.sin() * long / 2.0];
+        let radius = (long / 2.0).max(short / 2.0);
+        let half = |sign: f64| [own[0] + sign * dx, own[1] + sign * dy, radius, radius, 0.0, START_EXPONENT];
+        cut[k * PARAMETERS..(k + 1) * PARAMETERS].copy_from_slice(&half(-1.0));
+        cut.extend(half(1.0));
+    }
+    [added, cut]
+}
+
+impl Explanation {
+    /// Normal force of each ellipse on each cell, in N.
+    pub fn cells(&self, sensor: &Sensor) -> Vec<Vec<f64>> {
+        let disc = Disc::new(CELLS[0], CELLS[1]);
+        let index = |mm: f64, pitch: f64, count: usize| {
+            let index = (mm / pitch + count as f64 / 2.0).floor();
+            (index >= 0.0 && index < count as f64).then_some(index as usize)
+        };
+        let cells = |patch: &Patched| {
+            let mut cells = vec![0.0; sensor.taxels()];
+            for (node, weight) in disc.nodes.iter().zip(disc.weights(patch.theta[5]).0) {
+                let [x, y] = place(&patch.theta, *node);
+                let (col, row) = (index(x, sensor.pitch_x_mm, sensor.cols), index(y, sensor.pitch_y_mm, sensor.rows));
+                if let (Some(col), Some(row)) = (col, row) {
+                    cells[row * sensor.cols + col] += weight * patch.force[2];
+                }
+            }
+            cells
+        };
+        self.patches.iter().map(cells).collect()
+    }
+
+    /// The ellipse each taxel belongs to: of the largest force on its cell, else the one whose rim is nearest.
+    pub fn labels(&self, sensor: &Sensor, cells: &[Vec<f64>]) -> Vec<usize> {
+        let label = |k: usize| {
+            let [x, y] = sensor.position_mm(k / sensor.cols, k % sensor.cols);
+            let beyond = |patch: &Patched| {
+                let [x0, y0, a, b, c, _] = patch.theta;
+                let (dx, dy, det) = (x - x0, y - y0, a * b - c * c);
+                // |L⁻¹ d| is 1 on the rim.
+                let r = ((b * dx - c * dy) / det).hypot((a * dy - c * dx) / det);
+                dx.hypot(dy) * (1.0 - 1.0 / r.max(f64::MIN_POSITIVE))
+            };
+            let all = 0..self.patches.len();
+            let nearer = |&i: &usize, &j: &usize| beyond(&self.patches[i]).total_cmp(&beyond(&self.patches[j]));
+            let strongest = all.clone().max_by(|&i, &j| cells[i][k].total_cmp(&cells[j][k]));
+            strongest.filter(|&i| cells[i][k] > 0.0).or(all.min_by(nearer)).unwrap_or(0)
+        };
+        (0..sensor.taxels()).map(label).collect()
+    }
+}
