@@ -15,7 +15,7 @@ use crate::float::receive::receive as judge;
 use crate::frame::{Forces, Frame, FrameError};
 use crate::matrices::{Matrices, MatricesError};
 use crate::partition::{subarrays, Grid, PartitionError, Subarray};
-use crate::quantise::{full_scale, noise_floor_codes, quantise, Codes};
+use crate::quantise::{full_scale, quantise, Codes};
 use crate::reconstruct::{assemble, Reconstruction, SubarrayResult};
 use crate::scene::{Scene, SceneError};
 
@@ -297,14 +297,13 @@ impl Model {
             return Err(FixedError::TooStrong { frame: frame.id.clone(), peak_MPa: frame.peak_MPa() });
         }
         let step = self.scene.search.mu_max / MU_STEPS as f64;
-        let floor = noise_floor_codes(&self.scene, &codes);
         let sensor = &self.scene.sensor;
         let mut flags = frame_flags(&self.scene, frame, &codes);
         let mut subarrays = Vec::with_capacity(self.parts.len());
         for (part, beats) in self.parts.iter().zip(status.chunks(STATUS_BEATS)) {
             let Some(status) = Status::of_beats(beats) else { continue };
             let own = part.gather(sensor, &codes.codes);
-            let receipt = judge(sensor, part, &own, floor, self.scene.partition.condition);
+            let receipt = judge(sensor, part, &own, self.noise_floor, self.scene.partition.condition);
             let met = status.flags & FLAG_CONDITION != 0;
             let found = status.flags & FLAG_FOUND != 0;
             if met && self.searches() && !found {

@@ -85,6 +85,11 @@ pub fn products(degree: usize, limbs: (bool, bool), shared_a: bool) -> Vec<Vec<P
     all
 }
 
+/// Whether the v_ij of these products comes out with x and y exchanged.
+pub fn is_transposed(products: &[Product]) -> bool {
+    products.iter().any(|product| product.transposed)
+}
+
 impl Product {
     /// Index of the operand's v_ij; 0 for the limbs of the input.
     pub fn operand_index(&self) -> usize {

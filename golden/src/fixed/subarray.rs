@@ -4,7 +4,7 @@ use super::formats::force_shift;
 use super::model::Model;
 use super::pass::{pass, swap, Operands};
 use super::receive::Received;
-use super::schedule::{schedule, EXPONENTS};
+use super::schedule::{is_transposed, schedule, EXPONENTS};
 use super::search::{search, Block, Found};
 use super::{fold, force, normalise, receive, rescale, unfold};
 use crate::scene::Condition;
@@ -63,7 +63,7 @@ impl Solved {
             saturations += clipped;
             operands.vectors.push(rescale::operand(formats, &words));
             // A transposed result goes back on the way to the search memory.
-            let transposed = products.iter().any(|p| p.transposed);
+            let transposed = is_transposed(products);
             let mut taxels = unfold::unfold(&words, EXPONENTS[k].0 + EXPONENTS[k].1);
             if transposed {
                 taxels.iter_mut().for_each(|quad| *quad = swap(*quad));

@@ -2,7 +2,7 @@
 
 use dermis_golden::fixed::arith::signed_bits;
 use dermis_golden::fixed::formats::{Formats, HALVINGS, LOG_TABLE_BITS};
-use dermis_golden::fixed::search::log2;
+use dermis_golden::fixed::search::{log2, Best};
 use rust_hdl::prelude::*;
 
 use super::logarithm::{locate, table, LENGTH_BITS, LOG_BITS};
@@ -65,7 +65,7 @@ pub struct Judge {
     pub found: Signal<Out, Bit>,
     _taxels: i64,
     _left: usize,
-    _best: dermis_golden::fixed::search::Best,
+    _best: Best,
     _found: bool,
 }
 
@@ -127,7 +127,7 @@ impl Judge {
             let best = &mut self._best;
             let earlier = coarse && (position[1], position[0]) < (best.position[1], best.position[0]);
             if !best.taken || score < best.score || (score == best.score && earlier) {
-                *best = dermis_golden::fixed::search::Best { position, score, taken: true };
+                *best = Best { position, score, taken: true };
                 improved = true;
             }
         }

@@ -1,6 +1,6 @@
 //! Stage `unfold`: v_ij words back to taxels, coefficient by coefficient into the search memory.
 
-use dermis_golden::fixed::schedule::{schedule, vectors};
+use dermis_golden::fixed::schedule::{is_transposed, schedule, vectors};
 use dermis_golden::fixed::Model;
 use rust_hdl::prelude::*;
 
@@ -46,9 +46,7 @@ impl Unfold {
     /// Widths of `model`.
     pub fn new(model: &Model) -> Self {
         let formats = &model.formats;
-        let transposed =
-            |products: &Vec<dermis_golden::fixed::schedule::Product>| products.iter().any(|p| p.transposed);
-        let across = schedule(formats).iter().enumerate().filter(|(_, p)| transposed(p)).map(|(k, _)| k).collect();
+        let across = schedule(formats).iter().enumerate().filter(|(_, p)| is_transposed(p)).map(|(k, _)| k).collect();
         let bits = formats.vector_bits as usize;
         let count = vectors(formats.degree);
         let (index, address) = (count_bits(count), count_bits(formats.quads));
