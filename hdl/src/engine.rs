@@ -96,7 +96,7 @@ impl Engine {
             pass: Pass::new(model),
             rescale: Rescale::new(formats),
             unfold: Unfold::new(model),
-            search: Search::new(formats, layout),
+            search: Search::new(formats, layout, count > 1),
             forces: force,
             send: Send::new(layout, parts),
             busy: Default::default(),

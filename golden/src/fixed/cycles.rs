@@ -6,7 +6,8 @@
 //! fold     Q + 5                                from the last input beat to the first product
 //! pass     the kept columns of each product, at most Q, waiting until a step's operand has been finished
 //! rescale  v_00 is replayed once its exponent is known: Q more
-//! search   15 sweeps of Q + 21, one of Q + 4    (the last alone when nothing is searched)
+//! search   7 coarse sweeps of Q, at least 15; the eighth and 7 halvings of Q + 15; one of Q + 4
+//!          (the last alone when nothing is searched)
 //! next     1 between two subarrays
 //! send     begins with the last subarray's first value: 6 to the first beat, then one beat a cycle
 //! ```
@@ -34,8 +35,12 @@ const REPLAY: u64 = 2;
 const UNFOLD: u64 = 5;
 /// From the search's start to its first sweep.
 const BEGIN: u64 = 1;
-/// A judged sweep beyond its Q quads: memory 1, Taylor 2, candidates 2, score 6, judge 14 of which 4 overlap the score.
-const SWEEP: u64 = 21;
+/// A sweep that the next one waits for, beyond its Q quads: memory 1, Taylor 2, candidates 2, score 6, judge 4.
+const SWEEP: u64 = 15;
+/// Quads that a judged sweep lasts at least: its sums are weighed meanwhile.
+pub const SHORTEST_SWEEP: u64 = 4;
+/// From a coarse sweep to the next at least: a sweep is judged before the next but one, which may write over its source.
+pub const COARSE_PERIOD: u64 = SWEEP;
 /// The last sweep beyond its Q quads.
 const LAST_SWEEP: u64 = 4;
 /// From a subarray's values to the next one's start.
@@ -59,11 +64,10 @@ impl Cycles {
     pub fn of(model: &Model, searched: &[bool]) -> Self {
         let taxels = model.scene.sensor.taxels() as u64;
         let quads = model.formats.quads as u64;
-        let judged = COARSE_CENTRES.len() as u64 + u64::from(HALVINGS);
-        let solve = |&searching: &bool| {
-            let sweeps = if searching { judged * (quads + SWEEP) } else { 0 };
-            passes(model) + BEGIN + sweeps + quads + LAST_SWEEP
-        };
+        let chained = COARSE_CENTRES.len() as u64 - 1;
+        let awaited = 1 + u64::from(HALVINGS);
+        let sweeps = chained * quads.max(COARSE_PERIOD) + awaited * (quads.max(SHORTEST_SWEEP) + SWEEP);
+        let solve = |&searching: &bool| passes(model) + BEGIN + if searching { sweeps } else { 0 } + quads + LAST_SWEEP;
         let solved: u64 = searched.iter().map(solve).sum();
         // The last subarray's values leave while they come.
         let first_output = ACCEPT + solved + (searched.len() as u64 - 1) * NEXT - quads + SEND;

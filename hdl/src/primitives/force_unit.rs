@@ -6,10 +6,10 @@ use dermis_golden::fixed::send::{FLAG_CONDITION, FLAG_FOUND, FLAG_FRAMING, FLAG_
 use rust_hdl::prelude::*;
 
 use super::counter::count_bits;
-use super::judge::position_bits;
 use super::polynomial_word::resize;
 use super::raw_length::shift_bits;
 use super::rescaler::SATURATION_BITS;
+use super::sweep::position_bits;
 use crate::wire::{Wire, Word};
 
 /// A pipeline of five steps that moves while `advance` is high: lane, products, shift, rounding with saturation and

@@ -1,28 +1,18 @@
 //! After a sweep: which of the nine candidates is the best so far.
 
-use dermis_golden::fixed::arith::signed_bits;
-use dermis_golden::fixed::formats::{Formats, HALVINGS, LOG_TABLE_BITS};
-use dermis_golden::fixed::search::{log2, Best};
+use dermis_golden::fixed::formats::Formats;
+use dermis_golden::fixed::search::Best;
 use rust_hdl::prelude::*;
 
-use super::logarithm::{locate, table, LENGTH_BITS, LOG_BITS};
-use super::polynomial_word::resize;
+use super::sweep::{position_bits, sweep_bits, unpack, Sweep};
+use super::weigh::weight_bits;
 use crate::wire::{Wire, Word};
 
-/// Bits of a position: three grid steps and a candidate beyond, after all halvings.
-pub fn position_bits() -> usize {
-    signed_bits(4 << HALVINGS) as usize
-}
-
-/// Bits of a squared distance in grid steps of the last level.
-pub fn square_bits() -> usize {
-    2 * position_bits()
-}
-
-/// One candidate per cycle: score = total − n·log2 Σp, and the rules of the search (disc, Σp > 0, ties).
+/// Score = total − weight for all nine at once, then a tree of comparisons by the search's rules of ties: row-major in
+/// the coarse grid; in a halving the centre, then row-major.
 ///
-/// `start` with the sweep's sums, centre and squared distances, its totals `TOTALS_LATER` cycles later; `done` `LATENCY` cycles later, `improved` with it. `begin_frame` forgets the frame,
-/// `halve` doubles the position for the next level.
+/// `start` with totals, weights and sweep; `done` [`LATENCY`] cycles later, `improved` with it. `begin_frame`
+/// forgets the frame, `halve` doubles the position for the next level.
 #[derive(LogicBlock)]
 pub struct Judge {
     /// Clock.
@@ -35,24 +25,22 @@ pub struct Judge {
     pub halve: Signal<In, Bit>,
     /// Judge the nine.
     pub start: Signal<In, Bit>,
-    /// The sweep is one of the coarse grid.
-    pub coarse: Signal<In, Bit>,
     /// Nine totals.
     pub totals: Wire<In>,
-    /// Nine Σp.
-    pub sums: Wire<In>,
-    /// Centre of the nine, x.
-    pub centre_x: Wire<In>,
-    /// Centre of the nine, y.
-    pub centre_y: Wire<In>,
-    /// Squared distance of the centre from μ = 0.
-    pub square: Wire<In>,
-    /// Squared radius of the disc.
-    pub radius: Wire<In>,
+    /// Nine n·log2 Σp.
+    pub weights: Wire<In>,
+    /// Nine bits: the candidate may be taken.
+    pub eligible: Wire<In>,
+    /// The sweep they belong to.
+    pub sweep: Wire<In>,
     /// Judged; one cycle.
     pub done: Signal<Out, Bit>,
-    /// The sweep just judged changed the best.
+    /// With `done`: it changed the best.
     pub improved: Signal<Out, Bit>,
+    /// With `done`: the next sweep waits for this.
+    pub closes: Signal<Out, Bit>,
+    /// The sweep just judged.
+    pub judged: Wire<Out>,
     /// Best position, x.
     pub best_x: Wire<Out>,
     /// Best position, y.
@@ -63,75 +51,64 @@ pub struct Judge {
     pub taken: Signal<Out, Bit>,
     /// Something was taken in the coarse grid.
     pub found: Signal<Out, Bit>,
-    _taxels: i64,
     _left: usize,
+    _next: (Word, Word, Word),
     _best: Best,
     _found: bool,
 }
 
 /// Cycles from `start` to `done`.
-pub const LATENCY: usize = 14;
-/// Cycles from `start` to the first look at the totals: the logarithms of the sums come first.
-pub const TOTALS_LATER: usize = 4;
-/// Order of the candidates: row-major in the coarse grid, the centre first in a halving.
+pub const LATENCY: usize = 4;
+/// Order of the candidates: the centre first in a halving, row-major in the coarse grid.
 const ORDERS: [[usize; 9]; 2] = [[4, 0, 1, 2, 3, 5, 6, 7, 8], [0, 1, 2, 3, 4, 5, 6, 7, 8]];
 
 impl Judge {
     /// Widths of `formats`, for subarrays of `taxels` taxels.
     pub fn new(formats: &Formats, taxels: usize) -> Self {
-        let bit = || Default::default();
         Judge {
             clk: Default::default(),
-            rst: bit(),
-            begin_frame: bit(),
-            halve: bit(),
-            start: bit(),
-            coarse: bit(),
+            rst: Default::default(),
+            begin_frame: Default::default(),
+            halve: Default::default(),
+            start: Default::default(),
             totals: Wire::new(9 * formats.score_bits as usize),
-            sums: Wire::new(9 * formats.sum_bits[0] as usize),
-            centre_x: Wire::new(position_bits()),
-            centre_y: Wire::new(position_bits()),
-            square: Wire::new(square_bits()),
-            radius: Wire::new(square_bits()),
+            weights: Wire::new(9 * weight_bits(taxels)),
+            eligible: Wire::new(9),
+            sweep: Wire::new(sweep_bits()),
             done: Default::default(),
             improved: Default::default(),
+            closes: Default::default(),
+            judged: Wire::new(sweep_bits()),
             best_x: Wire::new(position_bits()),
             best_y: Wire::new(position_bits()),
             score: Wire::new(formats.score_bits as usize),
             taken: Default::default(),
             found: Default::default(),
-            _taxels: taxels as i64,
             _left: 0,
+            _next: Default::default(),
             _best: Default::default(),
             _found: false,
         }
     }
 
-    /// Judges all nine at once, as they stand at the last cycle of the pipeline.
-    fn judge(&mut self) -> bool {
-        let (s, t) = (self.sums.width() / 9, self.totals.width() / 9);
-        let coarse = self.coarse.val();
-        let centre = [&self.centre_x, &self.centre_y].map(|wire| wire.val().signed(0, position_bits()));
+    /// Judges all nine candidates one after the other.
+    fn judge(&mut self, totals: Word, weights: Word, sweep: Sweep, eligible: u64) -> bool {
+        let (t, w) = (self.totals.width() / 9, self.weights.width() / 9);
         let mut improved = false;
-        for k in ORDERS[usize::from(coarse)] {
-            let (ux, uy) = ((k % 3) as i64 - 1, (k / 3) as i64 - 1);
-            let sum = self.sums.val().signed(k, s);
-            let square =
-                self.square.val().number() as i64 + 2 * (ux * centre[0] + uy * centre[1]) + ux.abs() + uy.abs();
-            let inside = square <= self.radius.val().number() as i64;
-            if sum <= 0 || !inside || !(coarse || self._found) {
+        for k in ORDERS[usize::from(sweep.coarse)] {
+            if eligible >> k & 1 == 0 || !(sweep.coarse || self._found) {
                 continue;
             }
-            let score = self.totals.val().signed(k, t) - self._taxels * log2(sum);
-            let position = [(centre[0] + ux) as i32, (centre[1] + uy) as i32];
+            let score = totals.signed(k, t) - weights.field(k * w, w) as i64;
+            let position = [sweep.centre[0] as i32 + k as i32 % 3 - 1, sweep.centre[1] as i32 + k as i32 / 3 - 1];
             let best = &mut self._best;
-            let earlier = coarse && (position[1], position[0]) < (best.position[1], best.position[0]);
+            let earlier = sweep.coarse && (position[1], position[0]) < (best.position[1], best.position[0]);
             if !best.taken || score < best.score || (score == best.score && earlier) {
                 *best = Best { position, score, taken: true };
                 improved = true;
             }
         }
-        self._found |= coarse && self._best.taken;
+        self._found |= sweep.coarse && self._best.taken;
         improved
     }
 }
@@ -141,7 +118,12 @@ impl Logic for Judge {
         if self.clk.pos_edge() {
             self.done.next = false;
             if self._left == 1 {
-                self.improved.next = self.judge();
+                let (totals, weights, word) = self._next;
+                let sweep = Sweep::of_word(&word);
+                let eligible = word.field(sweep_bits(), 9);
+                self.improved.next = self.judge(totals, weights, sweep, eligible);
+                self.closes.next = sweep.closes;
+                self.judged.next = sweep.word();
                 self.done.next = true;
             }
             self._left = match (self.rst.val(), self.start.val()) {
@@ -149,6 +131,11 @@ impl Logic for Judge {
                 (false, true) => LATENCY - 1,
                 (false, false) => self._left.saturating_sub(1),
             };
+            if self.start.val() {
+                let mut word = self.sweep.val();
+                word.set(sweep_bits(), 9, self.eligible.val().number());
+                self._next = (self.totals.val(), self.weights.val(), word);
+            }
             if self.begin_frame.val() {
                 self._best = Default::default();
                 self._found = false;
@@ -165,108 +152,117 @@ impl Logic for Judge {
     }
 
     fn connect(&mut self) {
-        self.done.connect();
-        self.improved.connect();
-        self.best_x.connect();
-        self.best_y.connect();
-        self.score.connect();
-        self.taken.connect();
-        self.found.connect();
+        for bit in [&mut self.done, &mut self.improved, &mut self.closes, &mut self.taken, &mut self.found] {
+            bit.connect();
+        }
+        for wire in [&mut self.judged, &mut self.best_x, &mut self.best_y, &mut self.score] {
+            wire.connect();
+        }
     }
 
     fn hdl(&self) -> Verilog {
-        let (s, t) = (self.sums.width() / 9, self.totals.width() / 9);
-        let (p, q) = (position_bits(), square_bits());
-        let slot = LOG_TABLE_BITS as usize;
-        let product = LOG_BITS + 64 - (self._taxels as u64).leading_zeros() as usize;
-        // n·log2 Σp without a multiplier: one term for each bit of n.
-        let terms: Vec<String> = (0..64)
-            .filter(|bit| self._taxels >> bit & 1 == 1)
-            .map(|bit| format!("({{{}'d0, log}} << {bit})", product - LOG_BITS))
-            .collect();
-        let select = |word: &str, by: &str, width: usize| {
-            let cases: String =
-                (0..9).map(|k| format!("    4'd{k}: {word}_k = {word}s[{} +: {width}];\n", k * width)).collect();
+        let (t, w) = (self.totals.width() / 9, self.weights.width() / 9);
+        let p = position_bits();
+        let weight = match t.checked_sub(w) {
+            Some(0) => format!("weights[k * {w} +: {w}]"),
+            Some(more) => format!("{{{more}'d0, weights[k * {w} +: {w}]}}"),
+            None => format!("weights[k * {w} +: {t}]"),
+        };
+        // Declarations of a candidate: may it be taken, its score, its number.
+        let declare = |kind: &str, names: &[&str]| -> String {
+            let one = |n: &&str| format!("{kind} ok_{n};\n{kind} signed [{}:0] s_{n};\n{kind} [3:0] k_{n};\n", t - 1);
+            names.iter().map(one).collect()
+        };
+        // The winner of two, the first on a tie, one cycle later.
+        let duel = |a: &str, b: &str, to: &str| {
             format!(
-                "reg [{end}:0] {word}_k;\nalways @(*) begin\n  case ({by})\n{cases}    default: {word}_k = {width}'d0;\n  endcase\nend\n",
-                end = width - 1
+                "  ok_{to} <= ok_{a} || ok_{b};\n  if (ok_{b} && (!ok_{a} || s_{b} < s_{a})) begin\n    s_{to} <= s_{b};\n    \
+                 k_{to} <= k_{b};\n  end else begin\n    s_{to} <= s_{a};\n    k_{to} <= k_{a};\n  end\n"
             )
         };
+        let candidates = ["0", "1", "2", "3", "4", "5", "6", "7", "8"];
+        let leaves: String = candidates
+            .iter()
+            .map(|k| {
+                format!(
+                    "always @(*) ok_{k} = fits[{k}];\nalways @(*) s_{k} = scores[{k} * {t} +: {t}];\n\
+                     always @(*) k_{k} = 4'd{k};\n"
+                )
+            })
+            .collect();
+        // The eight about the centre keep their order: four pairs, then those before and those after the centre.
+        let pairs = duel("0", "1", "a") + &duel("2", "3", "b") + &duel("5", "6", "c") + &duel("7", "8", "d");
+        let halves = duel("a", "b", "before") + &duel("c", "d", "after");
+        let positions: String = ["before", "centre", "after"]
+            .iter()
+            .map(|n| {
+                format!(
+                    "wire signed [{end}:0] x_{n} = held_centre_x + along(column(k_{n}));\n\
+                     wire signed [{end}:0] y_{n} = held_centre_y + along(row(k_{n}));\n\
+                     wire better_{n} = !taken || s_{n} < s_best || (s_{n} == s_best && held_coarse\n  \
+                     && (y_{n} < by || (y_{n} == by && x_{n} < bx)));\n",
+                    end = p - 1
+                )
+            })
+            .collect();
         Verilog::Custom(format!(
             "\
-{locate}{table}// Turn m = 0 … 8 looks at candidate k.
-reg [3:0] turn;
-reg running;
-wire [3:0] k = coarse ? turn : turn == 4'd0 ? 4'd4 : turn <= 4'd4 ? turn - 4'd1 : turn;
-reg [3:0] k1, k2, k3;
-{totals}{sums}// Stage 1: select; offsets −1, 0, 1 in x (low bits) and y.
-reg [3:0] valid;
-reg [3:0] finish;
-reg [{t_end}:0] total4;
-reg [{s_end}:0] sum1;
-reg [{found_end}:0] found2;
-reg [{log_end}:0] log;
-reg [{product_end}:0] weighted;
-reg ok1, ok2, ok3, ok4;
-reg signed [{p_end}:0] x1, y1, x2, y2, x3, y3, x4, y4;
-reg signed [1:0] ux, uy;
-always @(*) begin
+function [1:0] column;
+  input [3:0] k;
   case (k)
-    4'd0, 4'd3, 4'd6: ux = -2'sd1;
-    4'd1, 4'd4, 4'd7: ux = 2'sd0;
-    default: ux = 2'sd1;
+    4'd0, 4'd3, 4'd6: column = 2'b11;
+    4'd1, 4'd4, 4'd7: column = 2'b00;
+    default: column = 2'b01;
   endcase
-  case (k)
-    4'd0, 4'd1, 4'd2: uy = -2'sd1;
-    4'd3, 4'd4, 4'd5: uy = 2'sd0;
-    default: uy = 2'sd1;
-  endcase
+endfunction
+function [1:0] row;
+  input [3:0] k;
+  row = k < 4'd3 ? 2'b11 : k < 4'd6 ? 2'b00 : 2'b01;
+endfunction
+function [{p_end}:0] along;
+  input [1:0] step;
+  along = {{{{{p_more}{{step[1]}}}}, step}};
+endfunction
+reg [{scores_end}:0] scores;
+reg [8:0] fits;
+reg [{sweep_end}:0] held;
+reg [2:0] valid;
+{declared}{leaves}genvar k;
+generate
+  for (k = 0; k < 9; k = k + 1) begin : candidate
+    always @(posedge clk) scores[k * {t} +: {t}] <= totals[k * {t} +: {t}] - {weight};
+  end
+endgenerate
+always @(posedge clk) begin
+  if (start) begin
+    fits <= eligible;
+    held <= sweep;
+  end
+{pairs}  {{ok_middle, s_middle, k_middle}} <= {{ok_4, s_4, k_4}};
+{halves}  {{ok_centre, s_centre, k_centre}} <= {{ok_middle, s_middle, k_middle}};
 end
-// |c + u|² = |c|² + 2 (ux cx + uy cy) + |ux| + |uy|: the disc needs no multiplier.
-wire [{q_end}:0] wide_x = {{{{{q_more}{{centre_x[{p_end}]}}}}, centre_x}};
-wire [{q_end}:0] wide_y = {{{{{q_more}{{centre_y[{p_end}]}}}}, centre_y}};
-wire [{q_end}:0] along_x = ux[1] ? {q}'d1 - (wide_x << 1) : ux[0] ? {q}'d1 + (wide_x << 1) : {q}'d0;
-wire [{q_end}:0] along_y = uy[1] ? {q}'d1 - (wide_y << 1) : uy[0] ? {q}'d1 + (wide_y << 1) : {q}'d0;
-wire [{q_end}:0] distance = square + along_x + along_y;
-wire [{p_end}:0] step_x = {{{{{p_more}{{ux[1]}}}}, ux}};
-wire [{p_end}:0] step_y = {{{{{p_more}{{uy[1]}}}}, uy}};
-wire signed [{t_end}:0] score_k = total4 - {weighted};
-wire signed [{t_end}:0] score_best = score;
+{fields}wire unused = &{{1'b0, held_square, held_buffer}};
+// The first to come wins ties; in a halving that is the centre.
+wire centre_wins = ok_centre && (!ok_before || s_centre < s_before || (!held_coarse && s_centre == s_before));
+wire after_wins = ok_after && (!ok_before || s_after < s_before) && (!ok_centre || s_after < s_centre);
+wire signed [{t_end}:0] s_best = score;
 wire signed [{p_end}:0] bx = best_x;
 wire signed [{p_end}:0] by = best_y;
-wire earlier = coarse && (y4 < by || (y4 == by && x4 < bx));
-wire better = !taken || score_k < score_best || (score_k == score_best && earlier);
-wire take = valid[3] && ok4 && better;
-always @(posedge clk) begin
-  {{k3, k2, k1}} <= {{k2, k1, k}};
-  total4 <= total_k;
-  sum1 <= sum_k;
-  ok1 <= !sum_k[{s_end}] && sum_k != {s}'d0 && distance <= radius && (coarse || found);
-  x1 <= centre_x + step_x;
-  y1 <= centre_y + step_y;
-  found2 <= locate(sum1);
-  log <= {{found2[{found_end}:{slot}], fraction(found2[{slot_end}:0])}};
-  weighted <= {terms};
-  {{ok4, ok3, ok2}} <= {{ok3, ok2, ok1}};
-  {{x4, x3, x2}} <= {{x3, x2, x1}};
-  {{y4, y3, y2}} <= {{y3, y2, y1}};
-end
+{positions}wire better = after_wins ? better_after : centre_wins ? better_centre : ok_before && better_before;
+wire take = valid[2] && better && (held_coarse || found);
 always @(posedge clk) begin
   if (rst) begin
-    running <= 1'b0;
-    valid <= 4'd0;
-    finish <= 4'd0;
+    valid <= 3'd0;
     done <= 1'b0;
   end else begin
-    if (start) running <= 1'b1;
-    else if (turn == 4'd8) running <= 1'b0;
-    valid <= {{valid[2:0], running}};
-    finish <= {{finish[2:0], running && turn == 4'd8}};
-    done <= finish[3];
+    valid <= {{valid[1:0], start}};
+    done <= valid[2];
   end
-  turn <= start ? 4'd0 : turn + 4'd1;
-  if (start) improved <= 1'b0;
-  else if (take) improved <= 1'b1;
+  improved <= take;
+  if (valid[2]) begin
+    closes <= held_closes;
+    judged <= held;
+  end
   if (begin_frame) begin
     best_x <= {p}'d0;
     best_y <= {p}'d0;
@@ -278,33 +274,21 @@ always @(posedge clk) begin
     best_y <= best_y << 1;
     taken <= 1'b0;
   end else if (take) begin
-    best_x <= x4;
-    best_y <= y4;
-    score <= score_k;
+    best_x <= after_wins ? x_after : centre_wins ? x_centre : x_before;
+    best_y <= after_wins ? y_after : centre_wins ? y_centre : y_before;
+    score <= after_wins ? s_after : centre_wins ? s_centre : s_before;
     taken <= 1'b1;
-    if (coarse) found <= 1'b1;
+    if (held_coarse) found <= 1'b1;
   end
 end",
-            locate = locate("locate", s),
-            table = table("fraction"),
-            totals = select("total", "k3", t),
-            sums = select("sum", "k", s),
-            t_end = t - 1,
-            s_end = s - 1,
-            found_end = LENGTH_BITS + slot - 1,
-            slot_end = slot - 1,
-            log_end = LOG_BITS - 1,
-            product_end = product - 1,
             p_end = p - 1,
             p_more = p - 2,
-            q_end = q - 1,
-            q_more = q - p,
-            weighted = match t.checked_sub(product) {
-                Some(0) => "weighted".to_string(),
-                Some(more) => format!("{{{more}'d0, weighted}}"),
-                None => resize("weighted", product, t),
-            },
-            terms = terms.join(" + "),
+            t_end = t - 1,
+            scores_end = 9 * t - 1,
+            sweep_end = sweep_bits() - 1,
+            declared = declare("reg", &candidates)
+                + &declare("reg", &["a", "b", "c", "d", "middle", "before", "centre", "after"]),
+            fields = unpack("held", "held_"),
         ))
     }
 }

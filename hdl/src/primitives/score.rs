@@ -7,7 +7,8 @@ use rust_hdl::prelude::*;
 use super::logarithm::{locate, table, LENGTH_BITS, LOG_BITS};
 use crate::wire::{Wire, Word};
 
-/// Values of a quad's four taxels and of the sum in, `totals` of all valid quads since `clear`, [`LATENCY`] cycles later.
+/// Values of a quad's four taxels and of the sum in, `totals` of all valid quads since the `first`, [`LATENCY`] cycles
+/// later.
 ///
 /// Stages: magnitude; plus ε Σp (0 for Σp < 0, such a candidate is never taken); leading one; table; sum of the
 /// four lanes that count; accumulation.
@@ -15,19 +16,19 @@ use crate::wire::{Wire, Word};
 pub struct Score {
     /// Clock.
     pub clk: Signal<In, Clock>,
-    /// Totals back to 0.
-    pub clear: Signal<In, Bit>,
     /// `values` are a quad.
     pub valid: Signal<In, Bit>,
+    /// It is a sweep's first.
+    pub first: Signal<In, Bit>,
     /// Lanes that count.
     pub mask: Wire<In>,
     /// Nine values per lane.
     pub values: Wire<In>,
-    /// Σp of the nine candidates, held during the sweep.
+    /// Σp of the nine candidates.
     pub sums: Wire<In>,
     /// The nine totals.
     pub totals: Wire<Out>,
-    _pipe: Vec<Option<[i64; 9]>>,
+    _pipe: Vec<Option<(bool, [i64; 9])>>,
 }
 
 /// Cycles from a quad to the totals that contain it.
@@ -38,8 +39,8 @@ impl Score {
     pub fn new(formats: &Formats) -> Self {
         Score {
             clk: Default::default(),
-            clear: Default::default(),
             valid: Default::default(),
+            first: Default::default(),
             mask: Wire::new(4),
             values: Wire::new(36 * formats.search_bits[0] as usize),
             sums: Wire::new(9 * formats.sum_bits[0] as usize),
@@ -58,19 +59,21 @@ impl Logic for Score {
         if self.clk.pos_edge() {
             let (v, s, t) = self.widths();
             let logs = self.valid.val().then(|| {
-                std::array::from_fn(|k| {
+                let logs = std::array::from_fn(|k| {
                     let epsilon = self.sums.val().signed(k, s).max(0) >> EPSILON_SHIFT;
                     (0..4)
                         .filter(|&lane| self.mask.val().field(lane, 1) == 1)
                         .map(|lane| log2(self.values.val().signed(9 * lane + k, v).abs() + epsilon))
                         .sum()
-                })
+                });
+                (self.first.val(), logs)
             });
             self._pipe.push(logs);
-            let added = self._pipe.remove(0).unwrap_or([0; 9]);
-            let totals: Vec<i64> =
-                (0..9).map(|k| if self.clear.val() { 0 } else { self.totals.val().signed(k, t) + added[k] }).collect();
-            self.totals.next = Word::of_fields(&totals, t);
+            if let Some((first, added)) = self._pipe.remove(0) {
+                let before = |k| if first { 0 } else { self.totals.val().signed(k, t) };
+                let totals: [i64; 9] = std::array::from_fn(|k| before(k) + added[k]);
+                self.totals.next = Word::of_fields(&totals, t);
+            }
         }
     }
 
@@ -91,16 +94,18 @@ impl Logic for Score {
         };
         Verilog::Custom(format!(
             "\
-{locate}{table}reg [4:0] valids;
+{locate}{table}reg [4:0] valids, firsts;
 reg [15:0] masks;
 always @(posedge clk) begin
   valids <= {{valids[3:0], valid}};
+  firsts <= {{firsts[3:0], first}};
   masks <= {{masks[11:0], mask}};
 end
 genvar k, l;
 generate
   for (k = 0; k < 9; k = k + 1) begin : candidate
-    wire [{e_end}:0] epsilon = sums[(k + 1) * {s} - 1] ? {e}'d0 : sums[k * {s} + {shift} +: {e}];
+    reg [{e_end}:0] epsilon;
+    always @(posedge clk) epsilon <= sums[(k + 1) * {s} - 1] ? {e}'d0 : sums[k * {s} + {shift} +: {e}];
     wire unused = &{{1'b0, sums[k * {s} +: {shift}]}};
     wire [{logs_end}:0] logs;
     reg [{lane_sum_end}:0] together;
@@ -121,8 +126,8 @@ generate
     always @(posedge clk) begin
       together <= {{2'd0, logs[0 +: {log_bits}]}} + {{2'd0, logs[{log_bits} +: {log_bits}]}}
         + {{2'd0, logs[{log2} +: {log_bits}]}} + {{2'd0, logs[{log3} +: {log_bits}]}};
-      if (clear) totals[k * {t} +: {t}] <= {t}'d0;
-      else if (valids[4]) totals[k * {t} +: {t}] <= totals[k * {t} +: {t}] + {together};
+      if (valids[4])
+        totals[k * {t} +: {t}] <= (firsts[4] ? {t}'d0 : totals[k * {t} +: {t}]) + {together};
     end
   end
 endgenerate",

@@ -1,13 +1,17 @@
-//! The search memory: every taxel's polynomial, twice.
+//! The search memory: every taxel's polynomial, about up to three centres.
 
 use rust_hdl::prelude::*;
 
 use super::counter::count_bits;
 use super::polynomial_word::{resize, PolynomialWord};
+use super::sweep::{BUFFERS, BUFFER_BITS, START};
 use crate::wire::{Wire, Word};
 
-/// Two buffers of quads of polynomials. `fill` writes one coefficient of a quad into buffer 0; `write` a whole quad; the
-/// read register follows the address by one cycle. `fill` and `write` never coincide.
+/// Buffers of quads of polynomials. `fill` writes one coefficient of a quad into buffer [`START`]; `write` a whole quad
+/// into one of the others; the read register follows the address by one cycle.
+///
+/// Where one subarray is filled while another is searched, `START` is a memory of its own. Otherwise it is another name
+/// of buffer 0, and `fill` and `write` never coincide.
 #[derive(LogicBlock)]
 pub struct Store {
     /// Clock.
@@ -23,24 +27,27 @@ pub struct Store {
     /// Write `write_data`.
     pub write: Signal<In, Bit>,
     /// Buffer to write.
-    pub write_buffer: Signal<In, Bit>,
+    pub write_buffer: Wire<In>,
     /// Which quad.
     pub write_address: Wire<In>,
     /// A quad of polynomials.
     pub write_data: Wire<In>,
     /// Buffer to read.
-    pub read_buffer: Signal<In, Bit>,
+    pub read_buffer: Wire<In>,
     /// Which quad.
     pub read_address: Wire<In>,
     /// A quad of polynomials, one cycle later.
     pub read_data: Wire<Out>,
     _layout: PolynomialWord,
-    _memory: [Vec<Word>; 2],
+    _quads: usize,
+    _apart: bool,
+    _memory: Vec<Vec<Word>>,
 }
 
 impl Store {
-    /// `quads` quads of polynomials in `layout`, filled with coefficients of `fill_bits` bits.
-    pub fn new(layout: PolynomialWord, quads: usize, fill_bits: usize) -> Self {
+    /// `quads` quads of polynomials in `layout`, filled with coefficients of `fill_bits` bits; `apart` says whether
+    /// one subarray is filled while another is searched.
+    pub fn new(layout: PolynomialWord, quads: usize, fill_bits: usize, apart: bool) -> Self {
         let address = count_bits(quads);
         Store {
             clk: Default::default(),
@@ -49,37 +56,49 @@ impl Store {
             fill_address: Wire::new(address),
             fill_quad: Wire::new(4 * fill_bits),
             write: Default::default(),
-            write_buffer: Default::default(),
+            write_buffer: Wire::new(BUFFER_BITS),
             write_address: Wire::new(address),
             write_data: Wire::new(layout.bits()),
-            read_buffer: Default::default(),
+            read_buffer: Wire::new(BUFFER_BITS),
             read_address: Wire::new(address),
             read_data: Wire::new(layout.bits()),
+            _quads: quads,
+            _apart: apart,
+            _memory: vec![vec![Word::default(); quads]; BUFFERS + usize::from(apart)],
             _layout: layout,
-            _memory: [vec![Word::default(); quads], vec![Word::default(); quads]],
         }
+    }
+
+    /// Index of a buffer's memory.
+    fn memory(&mut self, buffer: Word) -> &mut Vec<Word> {
+        let buffer = buffer.number() as usize;
+        &mut self._memory[if buffer == START && !self._apart { 0 } else { buffer }]
     }
 }
 
 impl Logic for Store {
     fn update(&mut self) {
         if self.clk.pos_edge() {
-            let read = self._memory[usize::from(self.read_buffer.val())].get(self.read_address.val().number() as usize);
-            self.read_data.next = read.copied().unwrap_or_default();
+            let (read_buffer, read_address) = (self.read_buffer.val(), self.read_address.val().number() as usize);
+            let read = self.memory(read_buffer).get(read_address).copied();
+            self.read_data.next = read.unwrap_or_default();
+            if self.write.val() {
+                let (buffer, data) = (self.write_buffer.val(), self.write_data.val());
+                let address = self.write_address.val().number() as usize;
+                if let Some(word) = self.memory(buffer).get_mut(address) {
+                    *word = data;
+                }
+            }
             if self.fill.val() {
                 let k = self.fill_index.val().number() as usize;
                 let bits = self.fill_quad.width() / 4;
-                let word = self._memory[0].get_mut(self.fill_address.val().number() as usize);
-                if let (Some(word), Some(&width)) = (word, self._layout.widths.get(k)) {
+                let address = self.fill_address.val().number() as usize;
+                let (layout, quad) = (self._layout.clone(), self.fill_quad.val());
+                let word = self.memory(Word::from(START as u64)).get_mut(address);
+                if let (Some(word), Some(&width)) = (word, layout.widths.get(k)) {
                     for lane in 0..4 {
-                        let value = self.fill_quad.val().signed(lane, bits);
-                        word.set(self._layout.offset(k) + lane * width, width, value as u64);
+                        word.set(layout.offset(k) + lane * width, width, quad.signed(lane, bits) as u64);
                     }
-                }
-            } else if self.write.val() {
-                let buffer = &mut self._memory[usize::from(self.write_buffer.val())];
-                if let Some(word) = buffer.get_mut(self.write_address.val().number() as usize) {
-                    *word = self.write_data.val();
                 }
             }
         }
@@ -92,39 +111,77 @@ impl Logic for Store {
     fn hdl(&self) -> Verilog {
         let bits = self.fill_quad.width() / 4;
         let index_bits = self.fill_index.width();
-        let address_bits = self.fill_address.width();
         let lanes: String = (0..4)
             .map(|lane| format!("wire [{}:0] t{lane} = fill_quad[{} +: {bits}];\n", bits - 1, lane * bits))
             .collect();
-        let memories: String = self
-            ._layout
-            .widths
-            .iter()
-            .enumerate()
-            .map(|(k, &width)| {
-                let (low, all) = (self._layout.offset(k), 4 * width);
+        let depth = BUFFERS * self._quads;
+        let address_bits = count_bits(depth);
+        let pad = match address_bits - self.read_address.width() {
+            0 => String::new(),
+            more => format!("{more}'d0, "),
+        };
+        // Buffers lie one behind the other, without gaps.
+        let place = |name: &str, buffer: &str, address: &str| {
+            format!(
+                "wire [{end}:0] {name} = {{{pad}{address}}} + ({buffer} == 2'd1 ? {address_bits}'d{one} : \
+                 {buffer} == 2'd2 ? {address_bits}'d{two} : {address_bits}'d0);\n",
+                end = address_bits - 1,
+                one = self._quads,
+                two = 2 * self._quads,
+            )
+        };
+        let write_to = match self._apart {
+            true => place("write_to", "write_buffer", "write_address"),
+            false => {
+                place("to_buffer", "write_buffer", "write_address")
+                    + &format!("wire [{}:0] write_to = fill ? {{{pad}fill_address}} : to_buffer;\n", address_bits - 1)
+            }
+        };
+        let memories: String = (0..self._layout.widths.len())
+            .map(|k| {
+                let (width, low) = (self._layout.widths[k], self._layout.offset(k));
+                let all = 4 * width;
                 let filled: Vec<String> = (0..4).rev().map(|lane| resize(&format!("t{lane}"), bits, width)).collect();
-                format!(
-                    "\
-reg [{end}:0] memory{k} [0:{depth}];
-wire write{k} = fill ? fill_index == {index_bits}'d{k} : write;
+                let filled = filled.join(", ");
+                let declare = format!("reg [{}:0] memory{k} [0:{}];\n", all - 1, depth - 1);
+                if self._apart {
+                    format!(
+                        "\
+{declare}reg [{end}:0] start{k} [0:{last}];
+reg [{end}:0] read{k}, read_start{k};
+always @(posedge clk) begin
+  if (write) memory{k}[write_to] <= write_data[{low} +: {all}];
+  if (fill && fill_index == {index_bits}'d{k}) start{k}[fill_address] <= {{{filled}}};
+  read{k} <= memory{k}[read_from];
+  read_start{k} <= start{k}[read_address];
+end
+always @(*) read_data[{low} +: {all}] = from_start ? read_start{k} : read{k};
+",
+                        end = all - 1,
+                        last = self._quads - 1,
+                    )
+                } else {
+                    format!(
+                        "\
+{declare}wire write{k} = fill ? fill_index == {index_bits}'d{k} : write;
 wire [{end}:0] data{k} = fill ? {{{filled}}} : write_data[{low} +: {all}];
 always @(posedge clk) begin
   if (write{k}) memory{k}[write_to] <= data{k};
   read_data[{low} +: {all}] <= memory{k}[read_from];
 end
 ",
-                    end = all - 1,
-                    depth = (2usize << address_bits) - 1,
-                    filled = filled.join(", "),
-                )
+                        end = all - 1,
+                    )
+                }
             })
             .collect();
+        let from_start = match self._apart {
+            true => format!("reg from_start;\nalways @(posedge clk) from_start <= read_buffer == 2'd{START};\n"),
+            false => String::new(),
+        };
         Verilog::Custom(format!(
-            "\
-{lanes}wire [{address_bits}:0] write_to = fill ? {{1'b0, fill_address}} : {{write_buffer, write_address}};
-wire [{address_bits}:0] read_from = {{read_buffer, read_address}};
-{memories}"
+            "{lanes}{write_to}{read_from}{from_start}{memories}",
+            read_from = place("read_from", "read_buffer", "read_address"),
         ))
     }
 }

@@ -4,10 +4,12 @@ use rust_hdl::prelude::*;
 
 use super::counter::count_bits;
 use super::polynomial_word::{resize, PolynomialWord};
+use super::sweep::{BUFFERS, BUFFER_BITS, START};
 use crate::wire::{Wire, Word};
 
-/// Adds up the counted lanes of each `fill` into buffer 0 (quad 0 starts a coefficient anew); `read` holds a buffer's sum on
-/// `word`; `write` replaces a buffer's sum.
+/// Adds up the counted lanes of each `fill` into buffer [`START`] (quad 0 starts a coefficient anew); `read` holds a
+/// buffer's sum on `word`; `write` replaces a buffer's sum. As in the search memory, `START` is buffer 0 unless one
+/// subarray is filled while another is searched.
 #[derive(LogicBlock)]
 pub struct Sum {
     /// Clock.
@@ -25,22 +27,24 @@ pub struct Sum {
     /// Put the sum of `read_buffer` on `word`.
     pub read: Signal<In, Bit>,
     /// Buffer to read.
-    pub read_buffer: Signal<In, Bit>,
+    pub read_buffer: Wire<In>,
     /// The sum read last.
     pub word: Wire<Out>,
     /// Replace the sum of `write_buffer`.
     pub write: Signal<In, Bit>,
     /// Buffer to write.
-    pub write_buffer: Signal<In, Bit>,
+    pub write_buffer: Wire<In>,
     /// The new sum.
     pub write_data: Wire<In>,
     _layout: PolynomialWord,
-    _buffers: [Word; 2],
+    _apart: bool,
+    _buffers: [Word; BUFFERS + 1],
 }
 
 impl Sum {
-    /// Sums in `layout` (one lane) over `quads` quads, of coefficients of `fill_bits` bits.
-    pub fn new(layout: PolynomialWord, quads: usize, fill_bits: usize) -> Self {
+    /// Sums in `layout` (one lane) over `quads` quads, of coefficients of `fill_bits` bits; `apart` as in
+    /// the search memory.
+    pub fn new(layout: PolynomialWord, quads: usize, fill_bits: usize, apart: bool) -> Self {
         Sum {
             clk: Default::default(),
             fill: Default::default(),
@@ -49,13 +53,25 @@ impl Sum {
             fill_mask: Wire::new(4),
             fill_quad: Wire::new(4 * fill_bits),
             read: Default::default(),
-            read_buffer: Default::default(),
+            read_buffer: Wire::new(BUFFER_BITS),
             word: Wire::new(layout.bits()),
             write: Default::default(),
-            write_buffer: Default::default(),
+            write_buffer: Wire::new(BUFFER_BITS),
             write_data: Wire::new(layout.bits()),
             _layout: layout,
-            _buffers: [Word::default(); 2],
+            _apart: apart,
+            _buffers: Default::default(),
+        }
+    }
+}
+
+impl Sum {
+    /// Index of a buffer's sum.
+    fn buffer(&self, buffer: usize) -> usize {
+        if buffer == START && !self._apart {
+            0
+        } else {
+            buffer
         }
     }
 }
@@ -64,20 +80,21 @@ impl Logic for Sum {
     fn update(&mut self) {
         if self.clk.pos_edge() {
             if self.read.val() {
-                self.word.next = self._buffers[usize::from(self.read_buffer.val())];
+                self.word.next = self._buffers[self.buffer(self.read_buffer.val().number() as usize)];
+            }
+            if self.write.val() {
+                let buffer = self.buffer(self.write_buffer.val().number() as usize);
+                self._buffers[buffer] = self.write_data.val();
             }
             let k = self.fill_index.val().number() as usize;
-            if self.fill.val() {
-                if let Some(&width) = self._layout.widths.get(k) {
-                    let bits = self.fill_quad.width() / 4;
-                    let counted = |lane: &usize| self.fill_mask.val().field(*lane, 1) == 1;
-                    let added: i64 = (0..4).filter(counted).map(|lane| self.fill_quad.val().signed(lane, bits)).sum();
-                    let mut sum = self._layout.get(&self._buffers[0], 0);
-                    sum[k] = added + if self.fill_address.val().number() == 0 { 0 } else { sum[k] };
-                    self._buffers[0].set(self._layout.offset(k), width, sum[k] as u64);
-                }
-            } else if self.write.val() {
-                self._buffers[usize::from(self.write_buffer.val())] = self.write_data.val();
+            if let Some(&width) = self._layout.widths.get(k).filter(|_| self.fill.val()) {
+                let bits = self.fill_quad.width() / 4;
+                let counted = |lane: &usize| self.fill_mask.val().field(*lane, 1) == 1;
+                let added: i64 = (0..4).filter(counted).map(|lane| self.fill_quad.val().signed(lane, bits)).sum();
+                let start = self.buffer(START);
+                let mut sum = self._layout.get(&self._buffers[start], 0);
+                sum[k] = added + if self.fill_address.val().number() == 0 { 0 } else { sum[k] };
+                self._buffers[start].set(self._layout.offset(k), width, sum[k] as u64);
             }
         }
     }
@@ -109,26 +126,37 @@ impl Logic for Sum {
                 format!(
                     "\
   if (fill && fill_index == {index_bits}'d{k})
-    buffer0[{low} +: {width}] <= {added} + (first ? {width}'d0 : buffer0[{low} +: {width}]);
+    buffer{start}[{low} +: {width}] <= {added} + (first ? {width}'d0 : buffer{start}[{low} +: {width}]);
 ",
+                    start = self.buffer(START),
                     added = resize("added", wide, width),
                 )
             })
+            .collect();
+        let names: Vec<String> = (0..BUFFERS + usize::from(self._apart)).map(|b| format!("buffer{b}")).collect();
+        let writes: String = (0..BUFFERS)
+            .map(|b| format!("  if (write && write_buffer == 2'd{b}) buffer{b} <= write_data;\n"))
             .collect();
         Verilog::Custom(format!(
             "\
 {lanes}wire first = fill_address == {address_bits}'d0;
 wire [{wide_end}:0] added = {terms};
-reg [{end}:0] buffer0, buffer1;
+reg [{end}:0] {names};
 always @(posedge clk) begin
-  if (read) word <= read_buffer ? buffer1 : buffer0;
-  if (!fill && write && write_buffer) buffer1 <= write_data;
-  if (!fill && write && !write_buffer) buffer0 <= write_data;
-{sums}end",
+  if (read) begin
+    case (read_buffer)
+      2'd1: word <= buffer1;
+      2'd2: word <= buffer2;
+{from_start}      default: word <= buffer0;
+    endcase
+  end
+{writes}{sums}end",
             wide_end = wide - 1,
             end = self._layout.bits() - 1,
             address_bits = self.fill_address.width(),
             terms = terms.join(" + "),
+            names = names.join(", "),
+            from_start = if self._apart { "      2'd3: word <= buffer3;\n" } else { "" },
         ))
     }
 }

@@ -7,24 +7,21 @@ use rust_hdl::prelude::*;
 use super::polynomial_word::{resize, PolynomialWord};
 use crate::wire::{Wire, Word};
 
-/// A word of polynomials in, moved by (`dx`, `dy`) and halved if asked, two cycles later: x in the first cycle, y and the
-/// halving in the second. The moves are held for as long as words go through.
+/// A word of polynomials in with its `step`, moved and halved if asked two cycles later: x in the first cycle, y and
+/// the halving in the second.
 #[derive(LogicBlock)]
 pub struct Taylor {
     /// Clock.
     pub clk: Signal<In, Clock>,
-    /// Step along x: −1, 0 or 1 in two bits.
-    pub dx: Wire<In>,
-    /// Step along y.
-    pub dy: Wire<In>,
-    /// Halve the grid step afterwards.
-    pub halving: Signal<In, Bit>,
+    /// Halve the grid step afterwards; move along y and along x, −1, 0 or 1 in two bits each.
+    pub step: Wire<In>,
     /// Polynomials.
     pub word: Wire<In>,
     /// The same about the new centre.
     pub moved: Wire<Out>,
     _layout: PolynomialWord,
     _between: Word,
+    _step: Word,
 }
 
 impl Taylor {
@@ -32,13 +29,12 @@ impl Taylor {
     pub fn new(layout: PolynomialWord) -> Self {
         Taylor {
             clk: Default::default(),
-            dx: Wire::new(2),
-            dy: Wire::new(2),
-            halving: Default::default(),
+            step: Wire::new(5),
             word: Wire::new(layout.bits()),
             moved: Wire::new(layout.bits()),
             _layout: layout,
             _between: Word::default(),
+            _step: Word::default(),
         }
     }
 
@@ -54,8 +50,8 @@ impl Taylor {
 impl Logic for Taylor {
     fn update(&mut self) {
         if self.clk.pos_edge() {
-            let (dx, dy) = (self.dx.val().signed(0, 2), self.dy.val().signed(0, 2));
-            let halving = self.halving.val();
+            let (dx, dy) = (self.step.val().signed(0, 2), self._step.signed(1, 2));
+            let halving = self._step.field(4, 1) == 1;
             self.moved.next = self.each(self._between, |w| {
                 let moved = taylor_shift(w, 0, dy);
                 if halving {
@@ -65,6 +61,7 @@ impl Logic for Taylor {
                 }
             });
             self._between = self.each(self.word.val(), |w| taylor_shift(w, dx, 0));
+            self._step = self.step.val();
         }
     }
 
@@ -108,6 +105,10 @@ impl Logic for Taylor {
         body += "    end\n";
         Verilog::Custom(format!(
             "\
+wire [1:0] dx = step[1:0];
+reg [1:0] dy;
+reg halving;
+always @(posedge clk) {{halving, dy}} <= step[4:2];
 genvar l;
 generate
   for (l = 0; l < {lanes}; l = l + 1) begin : lane

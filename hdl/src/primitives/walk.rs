@@ -4,18 +4,22 @@ use dermis_golden::fixed::formats::HALVINGS;
 use dermis_golden::fixed::search::COARSE_CENTRES;
 use rust_hdl::prelude::*;
 
-use super::judge::{position_bits, square_bits};
+use super::sweep::{position_bits, square_bits, sweep_bits, unpack, Sweep, BUFFERS, BUFFER_BITS, START};
 use crate::wire::{Wire, Word};
 
 /// Sweeps over the coarse tiles, then the halvings, then one that only moves to the winner.
 ///
-/// `set_up`, which may come with `judged`, begins a sweep, whose move, centre and buffers stand from the next cycle until the following `set_up`. Two buffers are enough: a coarse sweep
-/// writes over its source unless that holds the best polynomial so far; halvings work in place. `judged` with
-/// `improved` makes the sweep's buffer the best.
+/// `set_up`, which may come with `judged`, begins a sweep, whose move, word and buffers stand from the next cycle until
+/// the following `set_up`. Coarse sweeps follow one another without waiting for their judgement (`chains`): each reads
+/// what the one before has written, and writes the buffer that is neither that nor the best so far. So three buffers
+/// are enough as long as a sweep is judged before the next but one is set up. Halvings work in place. `judged` with
+/// `improved` makes the buffer of a coarse sweep the best.
 #[derive(LogicBlock)]
 pub struct Walk {
     /// Clock.
     pub clk: Signal<In, Clock>,
+    /// Reset.
+    pub rst: Signal<In, Bit>,
     /// New frame.
     pub begin_frame: Signal<In, Bit>,
     /// Search it; otherwise only the last sweep follows.
@@ -26,127 +30,110 @@ pub struct Walk {
     pub judged: Signal<In, Bit>,
     /// It changed the best.
     pub improved: Signal<In, Bit>,
+    /// Which sweep it was.
+    pub judged_sweep: Wire<In>,
     /// Best position, x.
     pub best_x: Wire<In>,
     /// Best position, y.
     pub best_y: Wire<In>,
-    /// Move along x, −1, 0 or 1.
-    pub dx: Wire<Out>,
-    /// Move along y.
-    pub dy: Wire<Out>,
-    /// Halve the step after the move.
-    pub halving: Signal<Out, Bit>,
-    /// The sweep is one of the coarse grid.
-    pub coarse: Signal<Out, Bit>,
+    /// Halve after the move; move along y and along x, −1, 0 or 1 in two bits each.
+    pub step: Wire<Out>,
     /// The sweep is the last: move to the winner.
     pub last: Signal<Out, Bit>,
     /// The next sweep is a halving.
     pub next_halves: Signal<Out, Bit>,
+    /// The next sweep may follow at once.
+    pub chains: Signal<Out, Bit>,
     /// Buffer to read.
-    pub source: Signal<Out, Bit>,
+    pub source: Wire<Out>,
     /// Buffer to write.
-    pub target: Signal<Out, Bit>,
-    /// The new centre, x.
-    pub centre_x: Wire<Out>,
-    /// The new centre, y.
-    pub centre_y: Wire<Out>,
-    /// Its squared distance from μ = 0.
-    pub square: Wire<Out>,
+    pub target: Wire<Out>,
+    /// The sweep.
+    pub sweep: Wire<Out>,
     /// Squared radius of the disc.
     pub radius: Wire<Out>,
     _state: State,
 }
 
 /// Number of sweeps that are judged.
-pub const JUDGED: usize = COARSE_CENTRES.len() + HALVINGS as usize;
+const JUDGED: usize = COARSE_CENTRES.len() + HALVINGS as usize;
 const SWEEP_BITS: usize = 4;
 
 #[derive(Clone, Copy, Debug, Default)]
 struct State {
-    sweep: usize,
-    centre: [i64; 2],
-    square: i64,
-    kept_centre: [i64; 2],
-    kept_square: i64,
-    current: bool,
-    kept: bool,
+    count: usize,
+    sweep: Sweep,
+    kept: Sweep,
     radius: i64,
 }
 
 impl Default for Walk {
     fn default() -> Self {
-        let (p, q) = (position_bits(), square_bits());
+        let p = position_bits();
         Walk {
             clk: Default::default(),
+            rst: Default::default(),
             begin_frame: Default::default(),
             enabled: Default::default(),
             set_up: Default::default(),
             judged: Default::default(),
             improved: Default::default(),
+            judged_sweep: Wire::new(sweep_bits()),
             best_x: Wire::new(p),
             best_y: Wire::new(p),
-            dx: Wire::new(2),
-            dy: Wire::new(2),
-            halving: Default::default(),
-            coarse: Default::default(),
+            step: Wire::new(5),
             last: Default::default(),
             next_halves: Default::default(),
-            source: Default::default(),
-            target: Default::default(),
-            centre_x: Wire::new(p),
-            centre_y: Wire::new(p),
-            square: Wire::new(q),
-            radius: Wire::new(q),
+            chains: Default::default(),
+            source: Wire::new(BUFFER_BITS),
+            target: Wire::new(BUFFER_BITS),
+            sweep: Wire::new(sweep_bits()),
+            radius: Wire::new(square_bits()),
             _state: State::default(),
         }
     }
 }
 
 /// Moves of the coarse sweeps.
-fn coarse_moves() -> Vec<[i32; 2]> {
+fn coarse_moves() -> Vec<[i64; 2]> {
     let mut at = [0, 0];
-    COARSE_CENTRES
-        .iter()
-        .map(|to| {
-            let step = [to[0] - at[0], to[1] - at[1]];
-            at = *to;
-            step
-        })
-        .collect()
+    let step = |to: &[i32; 2]| {
+        let step = [to[0] - at[0], to[1] - at[1]].map(i64::from);
+        at = *to;
+        step
+    };
+    COARSE_CENTRES.iter().map(step).collect()
 }
 
 impl Walk {
     fn advance(&mut self) {
         let s = &mut self._state;
-        let coarse = s.sweep < COARSE_CENTRES.len();
-        let halving = !coarse && s.sweep < JUDGED;
+        let coarse = s.count < COARSE_CENTRES.len();
+        let halving = !coarse && s.count < JUDGED;
         let best = [&self.best_x, &self.best_y].map(|wire| wire.val().signed(0, position_bits()));
-        let (from, square) = if coarse { (s.centre, s.square) } else { (s.kept_centre, s.kept_square) };
-        let step = match coarse_moves().get(s.sweep) {
-            Some(step) => step.map(i64::from),
-            None => [best[0] - from[0], best[1] - from[1]],
+        let from = if coarse { s.sweep } else { s.kept };
+        let by = match coarse_moves().get(s.count) {
+            Some(by) => *by,
+            None => [best[0] - from.centre[0], best[1] - from.centre[1]],
         };
-        let moved = [from[0] + step[0], from[1] + step[1]];
-        let square = square + 2 * (step[0] * from[0] + step[1] * from[1]) + step[0].abs() + step[1].abs();
-        self.source.next = if coarse { s.current } else { s.kept };
-        let double = i64::from(halving);
-        s.centre = moved.map(|c| c << double);
-        s.square = square << (2 * double);
+        let moved = [from.centre[0] + by[0], from.centre[1] + by[1]];
+        let square = from.square + 2 * (by[0] * from.centre[0] + by[1] * from.centre[1]) + by[0].abs() + by[1].abs();
+        let double = u32::from(halving);
+        let free = (1..=BUFFERS).map(|b| b % BUFFERS).find(|b| *b != from.buffer && *b != s.kept.buffer);
+        let buffer = if coarse { free.unwrap_or(0) } else { s.kept.buffer };
+        let closes = !coarse || s.count + 1 == COARSE_CENTRES.len();
+        s.sweep = Sweep { centre: moved.map(|c| c << double), square: square << (2 * double), buffer, coarse, closes };
         s.radius <<= 2 * double;
-        if coarse {
-            s.current = if s.current == s.kept { !s.current } else { s.current };
-            self.target.next = s.current;
-        } else {
-            s.kept_centre = s.centre;
-            s.kept_square = s.square;
-            self.target.next = s.kept;
+        // The first coarse sweep takes the place of what came in, which is one step away from it.
+        if !coarse || s.count == 0 {
+            s.kept = s.sweep;
         }
-        self.dx.next = Word::of_fields(&[step[0]], 2);
-        self.dy.next = Word::of_fields(&[step[1]], 2);
-        self.coarse.next = coarse;
-        self.halving.next = halving;
+        s.count += 1;
+        self.source.next = Word::from(from.buffer as u64);
+        self.target.next = Word::from(buffer as u64);
+        self.step.next = Word::of_fields(&[by[0], by[1], i64::from(halving)], 2);
         self.last.next = !coarse && !halving;
-        s.sweep += 1;
+        self.chains.next = !closes;
     }
 }
 
@@ -154,132 +141,113 @@ impl Logic for Walk {
     fn update(&mut self) {
         if self.clk.pos_edge() {
             if self.begin_frame.val() {
-                let sweep = if self.enabled.val() { 0 } else { JUDGED };
-                self._state = State { sweep, radius: 9, ..State::default() };
+                let start = Sweep { buffer: START, ..Sweep::default() };
+                let count = if self.enabled.val() { 0 } else { JUDGED };
+                self._state = State { count, radius: 9, sweep: start, kept: start };
             }
-            if self.judged.val() && self.improved.val() && self.coarse.val() {
-                let s = &mut self._state;
-                (s.kept_centre, s.kept_square, s.kept) = (s.centre, s.square, s.current);
+            let judged = Sweep::of_word(&self.judged_sweep.val());
+            if self.judged.val() && self.improved.val() && judged.coarse {
+                self._state.kept = judged;
             }
             if self.set_up.val() {
                 self.advance();
             }
+            if self.rst.val() {
+                self.chains.next = false;
+            }
             let s = &self._state;
-            self.centre_x.next = Word::of_fields(&s.centre[..1], position_bits());
-            self.centre_y.next = Word::of_fields(&s.centre[1..], position_bits());
-            self.square.next = Word::from(s.square as u64);
+            self.sweep.next = s.sweep.word();
             self.radius.next = Word::from(s.radius as u64);
-            self.next_halves.next = (COARSE_CENTRES.len()..JUDGED).contains(&s.sweep);
+            self.next_halves.next = (COARSE_CENTRES.len()..JUDGED).contains(&s.count);
         }
     }
 
     fn connect(&mut self) {
-        for wire in [&mut self.dx, &mut self.dy, &mut self.centre_x, &mut self.centre_y, &mut self.square] {
+        for wire in [&mut self.step, &mut self.source, &mut self.target, &mut self.sweep, &mut self.radius] {
             wire.connect();
         }
-        self.radius.connect();
-        for bit in [&mut self.halving, &mut self.coarse, &mut self.last, &mut self.next_halves, &mut self.source] {
+        for bit in [&mut self.last, &mut self.next_halves, &mut self.chains] {
             bit.connect();
         }
-        self.target.connect();
     }
 
     fn hdl(&self) -> Verilog {
-        let (p, q) = (position_bits(), square_bits());
-        let two = |value: i32| value & 3;
+        let (p, q, w) = (position_bits(), square_bits(), sweep_bits());
         let cases: String = coarse_moves()
             .iter()
             .enumerate()
-            .map(|(sweep, [x, y])| {
-                format!("    {SWEEP_BITS}'d{sweep}: {{table_y, table_x}} = 4'b{:02b}{:02b};\n", two(*y), two(*x))
+            .map(|(count, [x, y])| {
+                format!("    {SWEEP_BITS}'d{count}: {{table_y, table_x}} = 4'b{:02b}{:02b};\n", y & 3, x & 3)
             })
             .collect();
         Verilog::Custom(format!(
             "\
-reg [{s_end}:0] sweep;
-reg current, kept;
-reg [{p_end}:0] kept_x, kept_y;
-reg [{q_end}:0] kept_square;
+reg [{s_end}:0] count;
+reg [{w_end}:0] kept;
 reg [1:0] table_x, table_y;
 always @(*) begin
-  case (sweep)
+  case (count)
 {cases}    default: {{table_y, table_x}} = 4'd0;
   endcase
 end
-wire is_coarse = sweep < {SWEEP_BITS}'d{coarse_count};
-wire is_halving = !is_coarse && sweep < {SWEEP_BITS}'d{JUDGED};
+wire is_coarse = count < {SWEEP_BITS}'d{coarse};
+wire is_halving = !is_coarse && count < {SWEEP_BITS}'d{JUDGED};
+wire closing = !is_coarse || count == {SWEEP_BITS}'d{final_coarse};
 always @(*) next_halves = is_halving;
 // A judgement takes effect for a sweep that is set up with it.
-wire keep = judged && improved && coarse;
-wire best_buffer = keep ? current : kept;
-wire [{p_end}:0] best_centre_x = keep ? centre_x : kept_x;
-wire [{p_end}:0] best_centre_y = keep ? centre_y : kept_y;
-wire [{q_end}:0] best_square = keep ? square : kept_square;
-wire [{p_end}:0] from_x = is_coarse ? centre_x : best_centre_x;
-wire [{p_end}:0] from_y = is_coarse ? centre_y : best_centre_y;
-wire [{q_end}:0] from_square = is_coarse ? square : best_square;
+{judged_fields}wire [{w_end}:0] best = judged && improved && judged_coarse ? judged_sweep : kept;
+{best_fields}wire [{w_end}:0] from = is_coarse ? sweep : best;
+{from_fields}wire unused = &{{1'b0, best_square, best_coarse, best_closes, from_coarse, from_closes, best_x, best_y,
+  best_centre_x, best_centre_y, judged_centre_x, judged_centre_y, judged_square, judged_buffer, judged_closes}};
 // The best is at most one step away from the centre of its polynomial.
 wire [1:0] step_x = is_coarse ? table_x : best_x[1:0] - best_centre_x[1:0];
 wire [1:0] step_y = is_coarse ? table_y : best_y[1:0] - best_centre_y[1:0];
-wire [{q_end}:0] wide_x = {{{{{q_more}{{from_x[{p_end}]}}}}, from_x}};
-wire [{q_end}:0] wide_y = {{{{{q_more}{{from_y[{p_end}]}}}}, from_y}};
-wire [{q_end}:0] along_x = step_x[1] ? {q}'d1 - (wide_x << 1) : step_x[0] ? {q}'d1 + (wide_x << 1) : {q}'d0;
-wire [{q_end}:0] along_y = step_y[1] ? {q}'d1 - (wide_y << 1) : step_y[0] ? {q}'d1 + (wide_y << 1) : {q}'d0;
+wire [{q_end}:0] twice_x = {{{{{q_more}{{from_centre_x[{p_end}]}}}}, from_centre_x, 1'b0}};
+wire [{q_end}:0] twice_y = {{{{{q_more}{{from_centre_y[{p_end}]}}}}, from_centre_y, 1'b0}};
+wire [{q_end}:0] along_x = step_x[1] ? {q}'d1 - twice_x : step_x[0] ? {q}'d1 + twice_x : {q}'d0;
+wire [{q_end}:0] along_y = step_y[1] ? {q}'d1 - twice_y : step_y[0] ? {q}'d1 + twice_y : {q}'d0;
 wire [{q_end}:0] to_square = from_square + along_x + along_y;
-wire [{p_end}:0] to_x = from_x + {{{{{p_more}{{step_x[1]}}}}, step_x}};
-wire [{p_end}:0] to_y = from_y + {{{{{p_more}{{step_y[1]}}}}, step_y}};
-wire [{p_end}:0] new_x = is_halving ? to_x << 1 : to_x;
-wire [{p_end}:0] new_y = is_halving ? to_y << 1 : to_y;
-wire [{q_end}:0] new_square = is_halving ? to_square << 2 : to_square;
-wire new_current = current == best_buffer ? !current : current;
-wire unused = &{{1'b0, best_x, best_y}};
+wire [{p_end}:0] to_x = from_centre_x + {{{{{p_more}{{step_x[1]}}}}, step_x}};
+wire [{p_end}:0] to_y = from_centre_y + {{{{{p_more}{{step_y[1]}}}}, step_y}};
+// The first of 1, 2, 0 that is neither read nor the best.
+wire [1:0] free_buffer = from_buffer != 2'd1 && best_buffer != 2'd1 ? 2'd1
+  : from_buffer != 2'd2 && best_buffer != 2'd2 ? 2'd2 : 2'd0;
+wire [1:0] to_buffer = is_coarse ? free_buffer : best_buffer;
+wire [{w_end}:0] next_sweep = {{closing, is_coarse, to_buffer, is_halving ? to_square << 2 : to_square,
+  is_halving ? to_y << 1 : to_y, is_halving ? to_x << 1 : to_x}};
 always @(posedge clk) begin
   if (begin_frame) begin
-    sweep <= enabled ? {SWEEP_BITS}'d0 : {SWEEP_BITS}'d{JUDGED};
-    current <= 1'b0;
-    kept <= 1'b0;
-    centre_x <= {p}'d0;
-    centre_y <= {p}'d0;
-    square <= {q}'d0;
-    kept_x <= {p}'d0;
-    kept_y <= {p}'d0;
-    kept_square <= {q}'d0;
+    count <= enabled ? {SWEEP_BITS}'d0 : {SWEEP_BITS}'d{JUDGED};
+    sweep <= {start};
+    kept <= {start};
     radius <= {q}'d9;
   end else begin
-    if (keep) begin
-      kept <= current;
-      kept_x <= centre_x;
-      kept_y <= centre_y;
-      kept_square <= square;
-    end
+    kept <= set_up && (!is_coarse || count == {SWEEP_BITS}'d0) ? next_sweep : best;
     if (set_up) begin
-    sweep <= sweep + {SWEEP_BITS}'d1;
-    dx <= step_x;
-    dy <= step_y;
-    coarse <= is_coarse;
-    halving <= is_halving;
-    last <= !is_coarse && !is_halving;
-    centre_x <= new_x;
-    centre_y <= new_y;
-    square <= new_square;
-    if (is_halving) radius <= radius << 2;
-    source <= is_coarse ? current : best_buffer;
-    target <= is_coarse ? new_current : best_buffer;
-    if (is_coarse) current <= new_current;
-    else begin
-      kept_x <= new_x;
-      kept_y <= new_y;
-      kept_square <= new_square;
-    end
+      count <= count + {SWEEP_BITS}'d1;
+      sweep <= next_sweep;
+      step <= {{is_halving, step_y, step_x}};
+      last <= !is_coarse && !is_halving;
+      source <= from_buffer;
+      target <= to_buffer;
+      if (is_halving) radius <= radius << 2;
     end
   end
+  if (rst) chains <= 1'b0;
+  else if (set_up) chains <= !closing;
 end",
             s_end = SWEEP_BITS - 1,
+            w_end = w - 1,
             p_end = p - 1,
             q_end = q - 1,
-            q_more = q - p,
+            q_more = q - p - 1,
             p_more = p - 2,
-            coarse_count = COARSE_CENTRES.len(),
+            coarse = COARSE_CENTRES.len(),
+            final_coarse = COARSE_CENTRES.len() - 1,
+            start = format_args!("{{2'd0, 2'd{START}, {}'d0}}", q + 2 * p),
+            judged_fields = unpack("judged_sweep", "judged_"),
+            best_fields = unpack("best", "best_"),
+            from_fields = unpack("from", "from_"),
         ))
     }
 }

@@ -1,10 +1,12 @@
 //! Stage `search`: the μ search over the polynomials of all taxels, sweep by sweep.
 //!
-//! `walk` sets up a sweep; one quad per cycle runs through memory (1 cycle), Taylor shift (2) and back into memory, candidates (2),
-//! score (6); `judge` then looks at the nine totals (14) and the next sweep is set up. The sum polynomial takes the
-//! same way beside the first quad and stays, so that Σp stands when the first taxel is scored. The last sweep only moves to
-//! the winner: its constant coefficients are p(μ*).
+//! `walk` sets up a sweep; one quad per cycle runs through memory (1 cycle), Taylor shift (2) and back into memory,
+//! candidates (2), score (6). The sum polynomial takes the same way beside the first quad and stays, so that Σp stands
+//! when the first taxel is scored; `weigh` makes of it what the totals are compared with, and `judge` compares (4). Coarse
+//! sweeps follow one another without a gap; a halving is set up when the sweep before it has been judged. The last sweep
+//! only moves to the winner: its constant coefficients are p(μ*).
 
+use dermis_golden::fixed::cycles::{COARSE_PERIOD, SHORTEST_SWEEP};
 use dermis_golden::fixed::formats::Formats;
 use dermis_golden::fixed::quads::Quads;
 use dermis_golden::fixed::schedule::vectors;
@@ -12,7 +14,7 @@ use rust_hdl::prelude::*;
 
 use crate::primitives::{
     count_bits, position_bits, BitDelay, Candidates, Counter, Counts, Delay, Judge, PolynomialWord, Score, Slice,
-    Store, Sum, Taylor, Walk, SCORE_LATENCY, TOTALS_LATER,
+    Store, Sum, Taylor, Walk, Weigh, BUFFER_BITS, SCORE_LATENCY,
 };
 use crate::wire::Wire;
 
@@ -58,6 +60,7 @@ pub struct Search {
     /// Something was taken at this level.
     pub taken: Signal<Out, Bit>,
     walk: Walk,
+    weigh: Weigh,
     judge: Judge,
     store: Store,
     taylor: Taylor,
@@ -70,14 +73,19 @@ pub struct Search {
     fill_counts: Counts,
     constants: Slice,
     quads: Counter,
+    period: Counter,
     counting: DFF<Bit>,
     began: BitDelay,
     go: BitDelay,
     moved: BitDelay,
     sum_moved: BitDelay,
     scored: BitDelay,
+    first: BitDelay,
+    weighs: BitDelay,
     totals: BitDelay,
     finish: BitDelay,
+    step: Delay,
+    target: Delay,
     moved_address: Delay,
     scored_address: Delay,
     set_up: Signal<Local, Bit>,
@@ -85,9 +93,11 @@ pub struct Search {
 }
 
 impl Search {
-    /// Widths of `formats` for subarrays in `layout`.
-    pub fn new(formats: &Formats, layout: Quads) -> Self {
+    /// Widths of `formats` for subarrays in `layout`; `apart` says whether one is filled while another is searched.
+    pub fn new(formats: &Formats, layout: Quads, apart: bool) -> Self {
         let quads = formats.quads;
+        let taxel_count = layout.rows * layout.cols;
+        let padding = (SHORTEST_SWEEP as usize).saturating_sub(quads);
         let address = count_bits(quads);
         let fill_bits = formats.vector_bits as usize + 2;
         let taxels = PolynomialWord::new(4, &formats.search_bits);
@@ -114,26 +124,33 @@ impl Search {
             judged: Default::default(),
             taken: Default::default(),
             walk: Default::default(),
-            judge: Judge::new(formats, layout.rows * layout.cols),
+            weigh: Weigh::new(formats, taxel_count),
+            judge: Judge::new(formats, taxel_count),
             constants: Slice::new(taxels.bits(), value),
-            store: Store::new(taxels.clone(), quads, fill_bits),
+            store: Store::new(taxels.clone(), quads, fill_bits, apart),
             taylor: Taylor::new(taxels.clone()),
             candidates: Candidates::new(taxels),
             scores: Score::new(formats),
             counts: Counts::new(layout),
-            sum: Sum::new(sums.clone(), quads, fill_bits),
+            sum: Sum::new(sums.clone(), quads, fill_bits, apart),
             sum_taylor: Taylor::new(sums.clone()),
             sum_candidates: Candidates::new(sums),
             fill_counts: Counts::new(layout),
             quads: Counter::new(quads),
+            period: Counter::new(quads.max(COARSE_PERIOD as usize)),
             counting: Default::default(),
             began: BitDelay::new(1),
             go: BitDelay::new(1),
             moved: BitDelay::new(3),
             sum_moved: BitDelay::new(3),
             scored: BitDelay::new(2),
-            totals: BitDelay::new(5 + SCORE_LATENCY - TOTALS_LATER),
+            // A cycle after the first quad's candidates, so that a sweep is judged before the next is weighed.
+            first: BitDelay::new(5),
+            weighs: BitDelay::new(6),
+            totals: BitDelay::new(5 + SCORE_LATENCY + padding),
             finish: BitDelay::new(4),
+            step: Delay::new(5, 1),
+            target: Delay::new(BUFFER_BITS, 3),
             moved_address: Delay::new(address, 3),
             scored_address: Delay::new(address, 2),
             set_up: Default::default(),
@@ -146,7 +163,13 @@ impl Logic for Search {
     #[hdl_gen]
     fn update(&mut self) {
         self.walk.clk.next = self.clk.val();
+        self.weigh.clk.next = self.clk.val();
         self.judge.clk.next = self.clk.val();
+        self.period.clk.next = self.clk.val();
+        self.first.clk.next = self.clk.val();
+        self.weighs.clk.next = self.clk.val();
+        self.step.clk.next = self.clk.val();
+        self.target.clk.next = self.clk.val();
         self.store.clk.next = self.clk.val();
         self.taylor.clk.next = self.clk.val();
         self.candidates.clk.next = self.clk.val();
@@ -165,7 +188,11 @@ impl Logic for Search {
         self.finish.clk.next = self.clk.val();
         self.moved_address.clk.next = self.clk.val();
         self.scored_address.clk.next = self.clk.val();
+        self.walk.rst.next = self.rst.val();
+        self.weigh.rst.next = self.rst.val();
         self.judge.rst.next = self.rst.val();
+        self.first.rst.next = self.rst.val();
+        self.weighs.rst.next = self.rst.val();
         self.began.rst.next = self.rst.val();
         self.go.rst.next = self.rst.val();
         self.moved.rst.next = self.rst.val();
@@ -191,10 +218,15 @@ impl Logic for Search {
         self.walk.enabled.next = self.enabled.val();
         self.judge.begin_frame.next = self.start.val();
         self.began.now.next = self.start.val();
-        self.set_up.next = self.began.then.val() | self.judge.done.val();
+        self.set_up.next = self.began.then.val()
+            | (self.judge.done.val() & self.judge.closes.val())
+            | (self.walk.chains.val() & self.period.last.val());
+        self.period.clear.next = self.set_up.val();
+        self.period.enable.next = true;
         self.walk.set_up.next = self.set_up.val();
         self.walk.judged.next = self.judge.done.val();
         self.walk.improved.next = self.judge.improved.val();
+        self.walk.judged_sweep.next = self.judge.judged.val();
         self.walk.best_x.next = self.judge.best_x.val();
         self.walk.best_y.next = self.judge.best_y.val();
         self.judge.halve.next = self.set_up.val() & self.walk.next_halves.val();
@@ -205,16 +237,16 @@ impl Logic for Search {
         self.counting.d.next = (self.set_up.val() | (self.counting.q.val() & !self.quads.last.val())) & !self.rst.val();
         self.quads.clear.next = self.set_up.val();
         self.quads.enable.next = self.counting.q.val();
+        self.step.now.next = self.walk.step.val();
+        self.target.now.next = self.walk.target.val();
         self.store.read_buffer.next = self.walk.source.val();
         self.store.read_address.next = self.quads.value.val();
         self.taylor.word.next = self.store.read_data.val();
-        self.taylor.dx.next = self.walk.dx.val();
-        self.taylor.dy.next = self.walk.dy.val();
-        self.taylor.halving.next = self.walk.halving.val();
+        self.taylor.step.next = self.step.then.val();
         self.moved.now.next = self.counting.q.val();
         self.moved_address.now.next = self.quads.value.val();
         self.store.write.next = self.moved.then.val() & !self.walk.last.val();
-        self.store.write_buffer.next = self.walk.target.val();
+        self.store.write_buffer.next = self.target.then.val();
         self.store.write_address.next = self.moved_address.then.val();
         self.store.write_data.next = self.taylor.moved.val();
         self.candidates.word.next = self.taylor.moved.val();
@@ -223,12 +255,10 @@ impl Logic for Search {
         self.sum.read.next = self.go.then.val();
         self.sum.read_buffer.next = self.walk.source.val();
         self.sum_taylor.word.next = self.sum.word.val();
-        self.sum_taylor.dx.next = self.walk.dx.val();
-        self.sum_taylor.dy.next = self.walk.dy.val();
-        self.sum_taylor.halving.next = self.walk.halving.val();
+        self.sum_taylor.step.next = self.step.then.val();
         self.sum_moved.now.next = self.go.then.val();
         self.sum.write.next = self.sum_moved.then.val() & !self.walk.last.val();
-        self.sum.write_buffer.next = self.walk.target.val();
+        self.sum.write_buffer.next = self.target.then.val();
         self.sum.write_data.next = self.sum_taylor.moved.val();
         self.sum_candidates.word.next = self.sum_taylor.moved.val();
 
@@ -236,20 +266,23 @@ impl Logic for Search {
         self.scored.now.next = self.moved.then.val() & !self.walk.last.val();
         self.scored_address.now.next = self.moved_address.then.val();
         self.counts.address.next = self.scored_address.then.val();
-        self.scores.clear.next = self.go.then.val();
+        self.first.now.next = self.go.then.val();
+        self.scores.first.next = self.first.then.val();
         self.scores.valid.next = self.scored.then.val();
         self.scores.mask.next = self.counts.mask.val();
         self.scores.values.next = self.candidates.values.val();
         self.scores.sums.next = self.sum_candidates.values.val();
         self.totals.now.next = self.quad_end.val() & !self.walk.last.val();
+        self.weighs.now.next = self.go.then.val() & !self.walk.last.val();
+        self.weigh.start.next = self.weighs.then.val();
+        self.weigh.sweep.next = self.walk.sweep.val();
+        self.weigh.radius.next = self.walk.radius.val();
+        self.weigh.sums.next = self.sum_candidates.values.val();
         self.judge.start.next = self.totals.then.val();
-        self.judge.coarse.next = self.walk.coarse.val();
         self.judge.totals.next = self.scores.totals.val();
-        self.judge.sums.next = self.sum_candidates.values.val();
-        self.judge.centre_x.next = self.walk.centre_x.val();
-        self.judge.centre_y.next = self.walk.centre_y.val();
-        self.judge.square.next = self.walk.square.val();
-        self.judge.radius.next = self.walk.radius.val();
+        self.judge.weights.next = self.weigh.weights.val();
+        self.judge.eligible.next = self.weigh.eligible.val();
+        self.judge.sweep.next = self.weigh.weighed.val();
 
         comment!("The last sweep's constants are the values");
         self.constants.word.next = self.taylor.moved.val();

@@ -1,0 +1,196 @@
+//! What a candidate's total is compared with: n·log2 Σp, and whether it may be taken at all.
+
+use dermis_golden::fixed::formats::{Formats, LOG_TABLE_BITS};
+use dermis_golden::fixed::search::log2;
+use rust_hdl::prelude::*;
+
+use super::logarithm::{locate, table, LENGTH_BITS, LOG_BITS};
+use super::sweep::{position_bits, square_bits, sweep_bits, unpack, Sweep};
+use crate::wire::{Wire, Word};
+
+/// Three candidates per cycle, a row of equal y each: Σp selected and the disc tested, leading one, table, times n.
+///
+/// `start` with the sweep's sums, which stand three cycles more; its answers [`LATENCY`] cycles later, with the sweep
+/// they belong to, until those of the next sweep come.
+#[derive(LogicBlock)]
+pub struct Weigh {
+    /// Clock.
+    pub clk: Signal<In, Clock>,
+    /// Reset.
+    pub rst: Signal<In, Bit>,
+    /// Weigh the nine.
+    pub start: Signal<In, Bit>,
+    /// The sweep, with `start`.
+    pub sweep: Wire<In>,
+    /// Squared radius of the disc, with `start`.
+    pub radius: Wire<In>,
+    /// Nine Σp.
+    pub sums: Wire<In>,
+    /// Nine n·log2 Σp.
+    pub weights: Wire<Out>,
+    /// Nine bits: Σp > 0 and inside the disc.
+    pub eligible: Wire<Out>,
+    /// The sweep weighed.
+    pub weighed: Wire<Out>,
+    _taxels: i64,
+    _left: usize,
+    _next: (Word, Word, Word),
+}
+
+/// Cycles from `start` to the answers.
+pub const LATENCY: usize = 7;
+
+/// Bits of n·log2 Σp for subarrays of `taxels` taxels.
+pub fn weight_bits(taxels: usize) -> usize {
+    LOG_BITS + count(taxels as i64)
+}
+
+fn count(taxels: i64) -> usize {
+    64 - (taxels as u64).leading_zeros() as usize
+}
+
+impl Weigh {
+    /// Widths of `formats`, for subarrays of `taxels` taxels.
+    pub fn new(formats: &Formats, taxels: usize) -> Self {
+        Weigh {
+            clk: Default::default(),
+            rst: Default::default(),
+            start: Default::default(),
+            sweep: Wire::new(sweep_bits()),
+            radius: Wire::new(square_bits()),
+            sums: Wire::new(9 * formats.sum_bits[0] as usize),
+            weights: Wire::new(9 * weight_bits(taxels)),
+            eligible: Wire::new(9),
+            weighed: Wire::new(sweep_bits()),
+            _taxels: taxels as i64,
+            _left: 0,
+            _next: Default::default(),
+        }
+    }
+
+    fn weigh(&self) -> (Word, Word, Word) {
+        let sweep = Sweep::of_word(&self.sweep.val());
+        let radius = self.radius.val().number() as i64;
+        let s = self.sums.width() / 9;
+        let sums: [i64; 9] = std::array::from_fn(|k| self.sums.val().signed(k, s));
+        let eligible = (0..9).filter(|&k| {
+            let (ux, uy) = ((k % 3) as i64 - 1, (k / 3) as i64 - 1);
+            let square = sweep.square + 2 * (ux * sweep.centre[0] + uy * sweep.centre[1]) + ux.abs() + uy.abs();
+            sums[k] > 0 && square <= radius
+        });
+        let eligible: u64 = eligible.map(|k| 1 << k).sum();
+        let weights = sums.map(|sum| self._taxels * log2(sum));
+        (Word::of_fields(&weights, self.weights.width() / 9), Word::from(eligible), self.sweep.val())
+    }
+}
+
+impl Logic for Weigh {
+    fn update(&mut self) {
+        if self.clk.pos_edge() {
+            if self._left == 1 {
+                (self.weights.next, self.eligible.next, self.weighed.next) = self._next;
+            }
+            self._left = match (self.rst.val(), self.start.val()) {
+                (true, _) => 0,
+                (false, true) => LATENCY - 1,
+                (false, false) => self._left.saturating_sub(1),
+            };
+            if self.start.val() {
+                self._next = self.weigh();
+            }
+        }
+    }
+
+    fn connect(&mut self) {
+        self.weights.connect();
+        self.eligible.connect();
+        self.weighed.connect();
+    }
+
+    fn hdl(&self) -> Verilog {
+        let s = self.sums.width() / 9;
+        let w = self.weights.width() / 9;
+        let (p, q) = (position_bits(), square_bits());
+        let slot = LOG_TABLE_BITS as usize;
+        // n·log2 Σp without a multiplier: one term for each bit of n.
+        let terms: Vec<String> = (0..64)
+            .filter(|bit| self._taxels >> bit & 1 == 1)
+            .map(|bit| format!("({{{}'d0, log}} << {bit})", w - LOG_BITS))
+            .collect();
+        let rows: String = (0..3)
+            .map(|row| {
+                format!(
+                    "      if (row4 == 2'd{row}) begin\n        weights[({row} * 3 + c) * {w} +: {w}] <= product;\n        \
+                     eligible[{row} * 3 + c] <= fits3;\n      end\n"
+                )
+            })
+            .collect();
+        Verilog::Custom(format!(
+            "\
+{locate}{table}reg [{sweep_end}:0] held;
+reg [{q_end}:0] held_radius;
+reg [1:0] row, row2, row3, row4;
+reg running;
+reg [2:0] valid;
+{fields}wire unused = &{{1'b0, held_buffer, held_coarse, held_closes}};
+// |c + u|² = |c|² + 2 (ux cx + uy cy) + |ux| + |uy|: the disc needs no multiplier. Row by row uy is −1, 0, 1.
+wire [{q_end}:0] twice_x = {{{{{q_more}{{held_centre_x[{p_end}]}}}}, held_centre_x, 1'b0}};
+wire [{q_end}:0] twice_y = {{{{{q_more}{{held_centre_y[{p_end}]}}}}, held_centre_y, 1'b0}};
+wire [{q_end}:0] along_y = row == 2'd0 ? {q}'d1 - twice_y : row == 2'd2 ? {q}'d1 + twice_y : {q}'d0;
+wire [{q_end}:0] in_row = held_square + along_y;
+wire [{distances_end}:0] distance = {{in_row + twice_x + {q}'d1, in_row, in_row - twice_x + {q}'d1}};
+always @(posedge clk) begin
+  if (rst) begin
+    running <= 1'b0;
+    valid <= 3'd0;
+  end else begin
+    if (start) running <= 1'b1;
+    else if (row == 2'd2) running <= 1'b0;
+    valid <= {{valid[1:0], running}};
+  end
+  if (start) begin
+    held <= sweep;
+    held_radius <= radius;
+  end
+  row <= start ? 2'd0 : row + 2'd1;
+  {{row4, row3, row2}} <= {{row3, row2, row}};
+  if (valid[2] && row4 == 2'd2) weighed <= held;
+end
+genvar c;
+generate
+  for (c = 0; c < 3; c = c + 1) begin : column
+    wire [{s_end}:0] sum = row == 2'd0 ? sums[c * {s} +: {s}] : row == 2'd1 ? sums[(3 + c) * {s} +: {s}]
+      : sums[(6 + c) * {s} +: {s}];
+    reg [{s_end}:0] sum1;
+    reg [{found_end}:0] found2;
+    reg [{log_end}:0] log;
+    reg fits1, fits2, fits3;
+    wire [{w_end}:0] product = {terms};
+    always @(posedge clk) begin
+      sum1 <= sum;
+      fits1 <= !sum[{s_end}] && sum != {s}'d0 && distance[c * {q} +: {q}] <= held_radius;
+      found2 <= locate(sum1);
+      log <= {{found2[{found_end}:{slot}], fraction(found2[{slot_end}:0])}};
+      {{fits3, fits2}} <= {{fits2, fits1}};
+      if (valid[2]) begin
+{rows}      end
+    end
+  end
+endgenerate",
+            locate = locate("locate", s),
+            table = table("fraction"),
+            fields = unpack("held", "held_"),
+            sweep_end = sweep_bits() - 1,
+            s_end = s - 1,
+            w_end = w - 1,
+            found_end = LENGTH_BITS + slot - 1,
+            slot_end = slot - 1,
+            log_end = LOG_BITS - 1,
+            p_end = p - 1,
+            q_end = q - 1,
+            q_more = q - p - 1,
+            distances_end = 3 * q - 1,
+            terms = terms.join(" + "),
+        ))
+    }
+}
