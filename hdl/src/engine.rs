@@ -5,14 +5,15 @@
 //!  s_axis -->  |  frame buffer         |      ^________|  v_ij             |                  |--> m_axis
 //!              '--- magnitude, signs --'                                   '--- μ, score -----'
 //! ```
-//! While a frame is computed and sent, the next one is received into the frame buffer, which is free again as soon as `fold` has
-//! read it.
+//! Three things go on at once: while one subarray is searched, the next one's v_ij are computed; while a frame is
+//! computed, the next is received into the frame buffer, which is free again as soon as `fold` has read it; while a frame
+//! is sent, the next one's first v_ij are computed, and wait until it is out.
 
 use dermis_golden::fixed::Model;
 use dermis_golden::scene::Condition;
 use rust_hdl::prelude::*;
 
-use crate::primitives::{BitDelay, Counter, CYCLE_BITS};
+use crate::primitives::{count_bits, BitDelay, Counter, Keep, CYCLE_BITS};
 use crate::stages::{Fold, Force, Normalise, Pass, Receive, Rescale, Search, Send, Unfold};
 use crate::wire::Wire;
 
@@ -59,15 +60,31 @@ pub struct Engine {
     pub(crate) search: Search,
     pub(crate) forces: Force,
     send: Send,
-    busy: DFF<Bit>,
+    computing: DFF<Bit>,
+    first: DFF<Bit>,
+    filled: DFF<Bit>,
+    searching: DFF<Bit>,
+    sending: DFF<Bit>,
     condition: DFF<Bit>,
     framing: DFF<Bit>,
+    searched_condition: DFF<Bit>,
+    searched_last: DFF<Bit>,
+    sent_framing: DFF<Bit>,
+    searched_part: Keep,
+    searched_normalise: Keep,
+    searched_rescale: Keep,
+    searched_saturations: Keep,
     cycles: Counter,
     part: Counter,
     again: BitDelay,
+    finish: BitDelay,
     both_signs: Constant<Bit>,
     begin_frame: Signal<Local, Bit>,
     start: Signal<Local, Bit>,
+    complete: Signal<Local, Bit>,
+    behind: Signal<Local, Bit>,
+    hand_over: Signal<Local, Bit>,
+    begin_send: Signal<Local, Bit>,
 }
 
 impl Engine {
@@ -78,6 +95,7 @@ impl Engine {
         let bits = formats.input_bits as usize;
         let parts = model.grid();
         let count = model.parts.len();
+        let (normalise, rescale) = (Normalise::new(bits), Rescale::new(formats));
         let force = Force::new(formats, count, model.threshold);
         let mut engine = Engine {
             clk: Default::default(),
@@ -91,23 +109,40 @@ impl Engine {
             m_axis_tready: Default::default(),
             m_axis_tlast: Default::default(),
             receive: Receive::new(layout, parts, bits, model.noise_floor),
-            normalise: Normalise::new(bits),
             fold: Fold::new(formats.quads, count, bits),
             pass: Pass::new(model),
-            rescale: Rescale::new(formats),
             unfold: Unfold::new(model),
             search: Search::new(formats, layout, count > 1),
             forces: force,
             send: Send::new(layout, parts),
-            busy: Default::default(),
+            computing: Default::default(),
+            first: Default::default(),
+            filled: Default::default(),
+            searching: Default::default(),
+            sending: Default::default(),
             condition: Default::default(),
             framing: Default::default(),
+            searched_condition: Default::default(),
+            searched_last: Default::default(),
+            sent_framing: Default::default(),
+            searched_part: Keep::new(count_bits(count)),
+            searched_normalise: Keep::new(normalise.shift.width()),
+            searched_rescale: Keep::new(rescale.shift.width()),
+            searched_saturations: Keep::new(rescale.saturations.width()),
+            normalise,
+            rescale,
             cycles: Counter::new(1 << CYCLE_BITS),
             part: Counter::new(count),
             again: BitDelay::new(1),
+            // The first beat, which takes the count of cycles, is out by then.
+            finish: BitDelay::new(6),
             both_signs: Constant::new(model.scene.partition.condition == Condition::BothSigns),
             begin_frame: Default::default(),
             start: Default::default(),
+            complete: Default::default(),
+            behind: Default::default(),
+            hand_over: Default::default(),
+            begin_send: Default::default(),
         };
         engine.connect_all();
         engine
@@ -130,9 +165,22 @@ impl Logic for Engine {
         self.part.clk.next = self.clk.val();
         self.again.clk.next = self.clk.val();
         self.again.rst.next = self.rst.val();
-        self.busy.clock.next = self.clk.val();
+        self.finish.clk.next = self.clk.val();
+        self.finish.rst.next = self.rst.val();
+        self.computing.clock.next = self.clk.val();
+        self.first.clock.next = self.clk.val();
+        self.filled.clock.next = self.clk.val();
+        self.searching.clock.next = self.clk.val();
+        self.sending.clock.next = self.clk.val();
         self.condition.clock.next = self.clk.val();
         self.framing.clock.next = self.clk.val();
+        self.searched_condition.clock.next = self.clk.val();
+        self.searched_last.clock.next = self.clk.val();
+        self.sent_framing.clock.next = self.clk.val();
+        self.searched_part.clk.next = self.clk.val();
+        self.searched_normalise.clk.next = self.clk.val();
+        self.searched_rescale.clk.next = self.clk.val();
+        self.searched_saturations.clk.next = self.clk.val();
         self.receive.rst.next = self.rst.val();
         self.fold.rst.next = self.rst.val();
         self.pass.rst.next = self.rst.val();
@@ -142,15 +190,52 @@ impl Logic for Engine {
         self.forces.rst.next = self.rst.val();
         self.send.rst.next = self.rst.val();
 
-        comment!("A frame begins when it is whole and the last one gone");
-        self.begin_frame.next = self.receive.full.val() & !self.busy.q.val() & !self.rst.val();
-        self.busy.d.next = (self.begin_frame.val() | (self.busy.q.val() & !self.send.done.val())) & !self.rst.val();
+        comment!("A frame begins when it is whole and the last one computed");
+        self.begin_frame.next = self.receive.full.val() & !self.computing.q.val() & !self.rst.val();
+        self.computing.d.next =
+            (self.begin_frame.val() | (self.computing.q.val() & !self.finish.then.val())) & !self.rst.val();
+
+        comment!("A subarray is handed over to the search when that is free");
+        comment!("and, a frame's first one, when the last frame is out");
+        self.begin_send.next = self.search.values_begin.val() & self.searched_last.q.val();
+        self.sending.d.next =
+            (self.begin_send.val() | (self.sending.q.val() & !self.send.done.val())) & !self.rst.val();
+        self.complete.next = self.filled.q.val() | self.unfold.done.val();
+        self.behind.next = self.first.q.val() & self.sending.q.val() & !self.send.done.val();
+        self.hand_over.next = self.complete.val()
+            & !self.behind.val()
+            & (!self.searching.q.val() | self.search.done.val())
+            & !self.rst.val();
+        self.filled.d.next = self.complete.val() & !self.hand_over.val() & !self.rst.val();
+        self.searching.d.next =
+            (self.hand_over.val() | (self.searching.q.val() & !self.search.done.val())) & !self.rst.val();
+        self.first.d.next = self.begin_frame.val() | (self.first.q.val() & !self.hand_over.val());
+        self.finish.now.next = self.search.done.val() & self.searched_last.q.val();
+        self.searched_condition.d.next = self.searched_condition.q.val();
+        self.searched_last.d.next = self.searched_last.q.val();
+        self.sent_framing.d.next = self.sent_framing.q.val();
+        if self.hand_over.val() {
+            self.searched_condition.d.next = self.condition.q.val();
+            self.searched_last.d.next = self.part.last.val();
+            self.sent_framing.d.next = self.framing.q.val();
+        }
+        self.searched_part.keep.next = self.hand_over.val();
+        self.searched_part.word.next = self.part.value.val();
+        self.searched_normalise.keep.next = self.hand_over.val();
+        self.searched_normalise.word.next = self.normalise.shift.val();
+        self.searched_rescale.keep.next = self.hand_over.val();
+        self.searched_rescale.word.next = self.rescale.shift.val();
+        self.searched_saturations.keep.next = self.hand_over.val();
+        self.searched_saturations.word.next = self.rescale.saturations.val();
+
+        comment!("Then the next one begins");
         self.part.clear.next = self.rst.val();
-        self.part.enable.next = self.search.done.val();
-        self.again.now.next = self.search.done.val() & !self.part.last.val();
+        self.part.enable.next = self.hand_over.val();
+        self.again.now.next = self.hand_over.val() & !self.part.last.val();
         self.start.next = self.begin_frame.val() | self.again.then.val();
+        comment!("Waiting for the last frame does not count");
         self.cycles.clear.next = self.begin_frame.val();
-        self.cycles.enable.next = true;
+        self.cycles.enable.next = !(self.complete.val() & self.behind.val());
         self.condition.d.next = self.condition.q.val();
         self.framing.d.next = self.framing.q.val();
         if self.start.val() {
@@ -198,26 +283,26 @@ impl Logic for Engine {
         self.search.fill.next = self.unfold.taxels_valid.val();
         self.search.fill_index.next = self.unfold.index.val();
         self.search.fill_address.next = self.unfold.address.val();
-        self.search.start.next = self.unfold.done.val();
+        self.search.start.next = self.hand_over.val();
         self.search.enabled.next = self.condition.q.val();
 
         comment!("search -> force -> send");
         self.forces.values.next = self.search.values.val();
         self.forces.values_valid.next = self.search.values_valid.val();
-        self.forces.begin_frame.next = self.begin_frame.val();
+        self.forces.begin_frame.next = self.hand_over.val() & self.first.q.val();
         self.forces.start.next = self.search.settled.val();
-        self.forces.part.next = self.part.value.val();
+        self.forces.part.next = self.searched_part.kept.val();
         self.forces.position_x.next = self.search.best_x.val();
         self.forces.position_y.next = self.search.best_y.val();
         self.forces.score.next = self.search.score.val();
         self.forces.found.next = self.search.found.val();
-        self.forces.normalise.next = self.normalise.shift.val();
-        self.forces.rescale.next = self.rescale.shift.val();
-        self.forces.saturations.next = self.rescale.saturations.val();
-        self.forces.condition.next = self.condition.q.val();
-        self.forces.framing.next = self.framing.q.val();
+        self.forces.normalise.next = self.searched_normalise.kept.val();
+        self.forces.rescale.next = self.searched_rescale.kept.val();
+        self.forces.saturations.next = self.searched_saturations.kept.val();
+        self.forces.condition.next = self.searched_condition.q.val();
+        self.forces.framing.next = self.sent_framing.q.val();
         self.forces.cycles.next = self.cycles.value.val();
-        self.send.start.next = self.search.values_begin.val() & self.part.last.val();
+        self.send.start.next = self.begin_send.val();
         self.forces.advance.next = self.send.advance.val();
         self.forces.offer.next = self.send.offer.val();
         self.forces.beat.next = self.send.beat.val();

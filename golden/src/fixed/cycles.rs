@@ -8,7 +8,7 @@
 //! rescale  v_00 is replayed once its exponent is known: Q more
 //! search   7 coarse sweeps of Q, at least 15; the eighth and 7 halvings of Q + 15; one of Q + 4
 //!          (the last alone when nothing is searched)
-//! next     1 between two subarrays
+//! next     1 from a subarray's search to the passes of the one after it, which go on at the same time
 //! send     begins with the last subarray's first value: 6 to the first beat, then one beat a cycle
 //! ```
 
@@ -43,7 +43,7 @@ pub const SHORTEST_SWEEP: u64 = 4;
 pub const COARSE_PERIOD: u64 = SWEEP;
 /// The last sweep beyond its Q quads.
 const LAST_SWEEP: u64 = 4;
-/// From a subarray's values to the next one's start.
+/// From the start of a subarray's search to that of the next one's passes.
 const NEXT: u64 = 1;
 /// From the last subarray's first value, which stands Q cycles before their end, to the first beat on the output.
 const SEND: u64 = 6;
@@ -67,10 +67,16 @@ impl Cycles {
         let chained = COARSE_CENTRES.len() as u64 - 1;
         let awaited = 1 + u64::from(HALVINGS);
         let sweeps = chained * quads.max(COARSE_PERIOD) + awaited * (quads.max(SHORTEST_SWEEP) + SWEEP);
-        let solve = |&searching: &bool| passes(model) + BEGIN + if searching { sweeps } else { 0 } + quads + LAST_SWEEP;
-        let solved: u64 = searched.iter().map(solve).sum();
+        // A subarray is handed over when it is complete and the one before has been searched.
+        let (mut complete, mut searched_at) = (0, 0);
+        for &searching in searched {
+            complete += passes(model);
+            let handed_over = complete.max(searched_at);
+            searched_at = handed_over + BEGIN + if searching { sweeps } else { 0 } + quads + LAST_SWEEP;
+            complete = handed_over + NEXT;
+        }
         // The last subarray's values leave while they come.
-        let first_output = ACCEPT + solved + (searched.len() as u64 - 1) * NEXT - quads + SEND;
+        let first_output = ACCEPT + searched_at - quads + SEND;
         let latency = first_output + taxels + model.status_beats() as u64 - 1;
         Cycles { first_output, latency, total: taxels + latency }
     }

@@ -1,0 +1,51 @@
+//! A register that keeps a word.
+
+use rust_hdl::prelude::*;
+
+use crate::wire::{Wire, Word};
+
+/// `kept` is the word that stood on `word` when `keep` was last high, from the next cycle on.
+#[derive(LogicBlock)]
+pub struct Keep {
+    /// Clock.
+    pub clk: Signal<In, Clock>,
+    /// Keep it.
+    pub keep: Signal<In, Bit>,
+    /// The word.
+    pub word: Wire<In>,
+    /// The word kept.
+    pub kept: Wire<Out>,
+    _value: Word,
+}
+
+impl Keep {
+    /// Keeps words of `bits` bits.
+    pub fn new(bits: usize) -> Self {
+        Keep {
+            clk: Default::default(),
+            keep: Default::default(),
+            word: Wire::new(bits),
+            kept: Wire::new(bits),
+            _value: Word::default(),
+        }
+    }
+}
+
+impl Logic for Keep {
+    fn update(&mut self) {
+        if self.clk.pos_edge() {
+            if self.keep.val() {
+                self._value = self.word.val();
+            }
+            self.kept.next = self._value;
+        }
+    }
+
+    fn connect(&mut self) {
+        self.kept.connect();
+    }
+
+    fn hdl(&self) -> Verilog {
+        Verilog::Custom("always @(posedge clk) if (keep) kept <= word;".to_string())
+    }
+}
