@@ -14,7 +14,7 @@
 //! | | `form` ("oblique"; "orthogonal") |
 //! | `[threshold]` | `min_force_N` (0) |
 //! | `[fixed]` | `input_bits` (20; 8 … 24), `data_bits` (18; 12 … 18), `coef_bits` (18; 8 … 18) |
-//! | | `inverse_bits` (24; `coef_bits` … 32), `prune_bits` (20; 8 … 31) |
+//! | | `inverse_bits` (24; `coef_bits` … 32), `prune_bits` (20; 8 … 31), `lanes` (what the board allows; 4, 8 … 1024) |
 //! | `[hardware]` | `board` ("ulx3s-85f") |
 //! | `[input]` | `full_scale_MPa` (the frame's peak), `average` (0 … 12), `calibration`, `tare` (files), `dead` (\[row, col\] each), `unipolar` (false) |
 //! | `[output]` | `forces` ("taxels"; "resultants") |
@@ -34,9 +34,6 @@ use crate::sensor::Sensor;
 use serde::{Deserialize, Serialize};
 use std::fmt;
 use std::path::PathBuf;
-
-/// Boards a scene may name.
-pub const BOARDS: [&str; 1] = ["ulx3s-85f"];
 
 /// One complete set of choices.
 #[derive(Clone, Debug, PartialEq)]
@@ -174,12 +171,14 @@ pub struct FixedSpec {
     pub inverse_bits: u32,
     /// Columns whose coefficients all stay below 2^−`prune_bits` are not stored; 8 to 31.
     pub prune_bits: u32,
+    /// Matrix lanes, a multiple of 4; `None` takes as many as the board's multipliers and block RAMs allow.
+    pub lanes: Option<u32>,
 }
 
 /// Table `[hardware]`.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct HardwareSpec {
-    /// One of [`BOARDS`].
+    /// One of [`crate::board::Board::names`].
     pub board: String,
 }
 
@@ -245,14 +244,13 @@ impl Default for ThresholdSpec {
 
 impl Default for FixedSpec {
     fn default() -> Self {
-        FixedSpec { input_bits: 20, data_bits: 18, coef_bits: 18, inverse_bits: 24, prune_bits: 20 }
+        FixedSpec { input_bits: 20, data_bits: 18, coef_bits: 18, inverse_bits: 24, prune_bits: 20, lanes: None }
     }
 }
 
 impl Default for HardwareSpec {
     fn default() -> Self {
-        let board = BOARDS[0].to_string();
-        HardwareSpec { board }
+        HardwareSpec { board: "ulx3s-85f".to_string() }
     }
 }
 

@@ -1,13 +1,13 @@
 //! The engine as files: Verilog, memory files, lint waivers, manifest.
 
 use dermis_golden::fixed::send::{FLAG_CONDITION, FLAG_FOUND, FLAG_FRAMING, FLAG_NO_CONTACT};
+use dermis_golden::fixed::resources::Memory;
 use dermis_golden::fixed::storage::word_bits;
 use dermis_golden::fixed::{Cycles, Model};
 use rust_hdl::prelude::*;
 use serde_json::json;
 use thiserror::Error;
 
-use crate::board::{Board, BoardError};
 use crate::device::Tap;
 use crate::engine::Engine;
 use crate::primitives::{COLUMN_FILE, MEMORY_FILE};
@@ -19,9 +19,6 @@ const MANIFEST_VERSION: u32 = 1;
 /// Why a model has no hardware.
 #[derive(Debug, Error)]
 pub enum HdlError {
-    /// The scene's board is unknown or its file is broken.
-    #[error(transparent)]
-    Board(#[from] BoardError),
     /// The scene asks for less than this engine can leave out.
     #[error("{field} = {value}: the hardware without {what} is not available yet")]
     Unsupported {
@@ -31,22 +28,6 @@ pub enum HdlError {
         value: String,
         /// What would be left out.
         what: &'static str,
-    },
-    /// The design needs more of something than the board's device has.
-    #[error(
-        "scene {scene} needs {needs} {what}, {board} has {has}: take a finer partition or a smaller fixed.prune_bits"
-    )]
-    DoesNotFit {
-        /// The scene.
-        scene: String,
-        /// What there is too little of.
-        what: &'static str,
-        /// How many it needs.
-        needs: usize,
-        /// The board.
-        board: String,
-        /// How many it has.
-        has: u32,
     },
     /// rust-hdl's checks of the description failed; a defect of this crate.
     #[error("internal: the hardware description does not pass its checks: {0}")]
@@ -92,15 +73,14 @@ pub(crate) fn engine(model: &Model) -> Result<Engine, HdlError> {
 /// Generates the hardware of `model`. The same model always gives the same bytes.
 ///
 /// # Errors
-/// [`HdlError`] when the scene's board is unknown or the scene leaves out what this engine always has.
+/// [`HdlError`] when the scene leaves out what this engine always has.
 pub fn generate(model: &Model) -> Result<Generated, HdlError> {
-    let board = Board::load(&model.scene.hardware.board)?;
-    fits(model, &board)?;
     let engine = engine(model)?;
     let top = top_name(&model.scene.name);
-    let manifest = manifest(model, &board, &top);
+    let manifest = manifest(model, &top);
     let file = |name: String, text: String| GeneratedFile { name, text };
-    let verilog = header(model, &top) + &rename(&generate_verilog_unchecked(&engine), &top);
+    let verilog = place(&generate_verilog_unchecked(&engine), model)?;
+    let verilog = header(model, &top) + &rename(&verilog, &top);
     let mut files = vec![
         file(format!("{top}.v"), verilog),
         file(MEMORY_FILE.to_string(), engine.pass.lanes.memory_file()),
@@ -111,21 +91,31 @@ pub fn generate(model: &Model) -> Result<Generated, HdlError> {
     Ok(Generated { top, files, taps: taps(model), manifest })
 }
 
-/// Multipliers of the force unit: two products of a value and a μ word, two μ words, each of two 18-bit halves or less.
-const FORCE_MULTIPLIERS: usize = 6;
-
-/// Compares multipliers and coefficient memory with the device.
-fn fits(model: &Model, board: &Board) -> Result<(), HdlError> {
-    let lanes = 4 * model.formats.lanes_per_parity;
-    let needs = [
-        ("multipliers", lanes + FORCE_MULTIPLIERS, board.multipliers),
-        ("block RAMs for coefficients", model.storage.block_rams(lanes), board.block_rams),
-    ];
-    match needs.into_iter().find(|&(_, needs, has)| needs > has as usize) {
-        Some((what, needs, has)) => {
-            Err(HdlError::DoesNotFit { scene: model.scene.name.clone(), what, needs, board: board.name.clone(), has })
+/// Marks every memory of the model with where the synthesiser is to put it.
+fn place(verilog: &str, model: &Model) -> Result<String, HdlError> {
+    let mut placed = String::with_capacity(verilog.len());
+    let mut module = "";
+    let mut marked = 0;
+    for line in verilog.lines() {
+        if let Some(rest) = line.strip_prefix("module top$") {
+            module = rest.split('(').next().unwrap_or_default();
         }
-        None => Ok(()),
+        let own = model.resources.memories.iter().filter(|memory| memory.block == module);
+        let declares = |memory: &&Memory| {
+            let end = format!("[{}:0] {} [0:{}];", memory.bits - 1, memory.array, memory.words - 1);
+            line.trim_start().strip_prefix("reg ") == Some(&end)
+        };
+        if let Some(memory) = own.into_iter().find(declares) {
+            let style = if memory.block_rams > 0 { "block" } else { "distributed" };
+            placed.push_str(&format!("(* ram_style = \"{style}\" *)\n"));
+            marked += 1;
+        }
+        placed.push_str(line);
+        placed.push('\n');
+    }
+    match model.resources.memories.len() {
+        all if all == marked => Ok(placed),
+        all => Err(HdlError::Check(format!("{marked} of the model's {all} memories are in the Verilog"))),
     }
 }
 
@@ -168,7 +158,7 @@ fn header(model: &Model, top: &str) -> String {
     )
 }
 
-fn manifest(model: &Model, board: &Board, top: &str) -> serde_json::Value {
+fn manifest(model: &Model, top: &str) -> serde_json::Value {
     let (scene, f) = (&model.scene, &model.formats);
     let full_scale = scene.input.full_scale_MPa;
     json!({
@@ -176,8 +166,8 @@ fn manifest(model: &Model, board: &Board, top: &str) -> serde_json::Value {
         "scene": scene.name,
         "top": top,
         "sensor": scene.sensor,
-        "board": board.name,
-        "clock_MHz": board.clock_MHz,
+        "board": model.board.name,
+        "clock_MHz": model.board.clock_MHz,
         "formats": f,
         "input": {
             "bits": f.input_bits,
@@ -202,9 +192,14 @@ fn manifest(model: &Model, board: &Board, top: &str) -> serde_json::Value {
             "quads": f.quads,
             "lanes": 4 * f.lanes_per_parity,
             "coefficient_words": model.storage.words(),
-            "coefficient_block_rams": model.storage.block_rams(4 * f.lanes_per_parity),
             "columns_left_out": model.storage.is_pruned(f.quads),
             "coefficient_word_bits": word_bits(f),
+        },
+        "resources": {
+            "block_rams": model.resources.block_rams(),
+            "multipliers": model.resources.multipliers(),
+            "memories": model.resources.memories,
+            "multipliers_by_block": model.resources.multipliers,
         },
         "cycles": {
             "searched": Cycles::of(model, &vec![true; model.parts.len()]),

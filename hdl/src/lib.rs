@@ -13,7 +13,6 @@ macro_rules! comment {
     ($text:literal) => {};
 }
 
-pub mod board;
 pub mod device;
 pub mod engine;
 pub mod primitives;

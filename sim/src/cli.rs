@@ -344,7 +344,7 @@ fn print(text: &str) -> Result<()> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use dermis_hdl::board::Board;
+    use dermis_golden::board::Board;
 
     #[test]
     fn own_faults_exit_with_1_and_what_the_caller_can_mend_with_2() {
@@ -362,7 +362,7 @@ mod tests {
             VerilatorError::Missing.into(),
             VerilatorError::MissingTool { program: "make" }.into(),
             io(ErrorKind::PermissionDenied).into(),
-            HdlError::Board(Board::load("none").unwrap_err()).into(),
+            FixedError::Board(Board::load("none").unwrap_err()).into(),
             FixedError::NoFullScale { field: "threshold.min_force_N", value: 1.0 }.into(),
             anyhow!("rtl: File exists"),
         ];

@@ -16,7 +16,7 @@ use dermis_golden::frame::Frame;
 use dermis_golden::quantise::full_scale;
 use dermis_golden::reconstruct::{Golden, Reconstruction};
 use dermis_golden::scene::Scene;
-use dermis_hdl::board::Board;
+use dermis_golden::board::Board;
 
 use crate::compare::{difference, Difference};
 use crate::cosim::{run, Bench, Findings, Vector};

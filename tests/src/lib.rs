@@ -4,7 +4,6 @@
 //! |---|---|
 //! | `equality` | generated Verilog = rust-hdl's simulation = bit-true model, on every shipped frame; cycle budgets |
 //! | `accuracy` | golden against the truth, bit-true against golden |
-//! | `boards` | scenes may name every board and no other |
 //! | `flipped_bit` | one wrong bit in a coefficient, a vector or the expected output is found |
 //! | `framing` | early and missing `tlast`: what is dropped, what is flagged, and equality right after |
 //! | `synthesis` | Yosys reads the Verilog without latch or undriven signal |

@@ -24,9 +24,11 @@ use serde::Serialize;
 use super::arith::{bit_length, signed_bits};
 use super::coefficients::{parity_blocks, quantise, Blocks, FLIP_X, FLIP_Y};
 use super::quads::Quads;
+use super::resources::{force_multipliers, Fit, Resources};
 use super::schedule::{products, vectors, Matrix, EXPONENTS};
 use super::storage::{stored, Storage};
 use super::FixedError;
+use crate::board::Board;
 use crate::matrices::Matrices;
 use crate::scene::Scene;
 
@@ -50,10 +52,6 @@ pub const MU_ROUND: u32 = 8;
 pub const FORCE_BITS: u32 = 32;
 /// Largest right shift of the force stage: more leaves nothing of any product.
 pub const FORCE_SHIFT_MAX: u32 = 62;
-/// Matrix lanes that the engine takes at most; a multiple of four. An LFE5U-85F has 156 multipliers, the force unit needs six.
-const LANE_BUDGET: usize = 144;
-/// Block RAMs the coefficients may take: of the 208 of an LFE5U-85F, with room for the other memories and the router.
-const COEFFICIENT_RAMS: usize = 168;
 /// Least rows per group worth computing side by side; below, the lanes would wait for the shift-out.
 const LEAST_LANES: usize = 4;
 /// Coarse tiles and candidates beyond the disc reach grid coordinate ±4.
@@ -127,13 +125,26 @@ pub struct Quantised {
     pub ay: Blocks,
 }
 
-/// Quantises the matrices of a scene's subarray, derives all formats and lays out the coefficient memory.
+/// Everything that follows from a scene's matrices.
+#[derive(Clone, Debug)]
+pub struct Design {
+    /// Widths and scales.
+    pub formats: Formats,
+    /// Matrices as stored.
+    pub quantised: Quantised,
+    /// The coefficient memory's layout.
+    pub storage: Storage,
+    /// Memories and multipliers.
+    pub resources: Resources,
+}
+
+/// Quantises the matrices of a scene's subarray, derives all formats, lays out the coefficient memory and counts what all
+/// `parts` subarrays need of `board`, whether it has that or not.
 ///
 /// # Errors
-/// [`FixedError::TooLarge`] when the coefficients fit no device.
 /// [`FixedError::Format`] when a word would leave the 48-bit accumulator or a norm of A asks for more headroom than
 /// the data word has.
-pub fn derive(scene: &Scene, matrices: &Matrices) -> Result<(Formats, Quantised, Storage), FixedError> {
+pub fn derive(scene: &Scene, matrices: &Matrices, parts: usize, board: &Board) -> Result<Design, FixedError> {
     let spec = &scene.fixed;
     let quads = Quads { rows: matrices.sensor.rows, cols: matrices.sensor.cols };
     let count = quads.len();
@@ -200,13 +211,11 @@ pub fn derive(scene: &Scene, matrices: &Matrices) -> Result<(Formats, Quantised,
     let headroom = FORCE_BITS - search_bits[0];
     let limbs = (input_low_bits > 0, inverse_low_bits > 0);
     let order = stored(&products(matrices.degree, limbs, shared_a));
-    let (lanes_per_parity, storage) = fit(&order, &quantised, count, spec.prune_bits)?;
-    storage.drop_from(&mut quantised, count, lanes_per_parity);
     let formats = Formats {
         degree: matrices.degree,
         quads: count,
-        lanes_per_parity,
-        groups: count.div_ceil(lanes_per_parity),
+        lanes_per_parity: count,
+        groups: 1,
         shared_a,
         input_bits: spec.input_bits,
         fold_bits,
@@ -231,33 +240,59 @@ pub fn derive(scene: &Scene, matrices: &Matrices) -> Result<(Formats, Quantised,
         // Taxels are in quarters of a vector's LSB; the largest rescale must still fit the force word.
         force_exponent: raw_shift as i32 - quantised.inverse.exponent - 2 + rescale_max as i32 - headroom as i32,
     };
-    Ok((formats, quantised, storage))
+    let (formats, storage, resources) = fit(formats, &order, &quantised, scene, parts, board);
+    storage.drop_from(&mut quantised, count, formats.lanes_per_parity);
+    Ok(Design { formats, quantised, storage, resources })
 }
 
-/// The fewest groups of rows whose coefficients fit the block RAMs, and what is stored then.
+/// Chooses lanes and memories: the lanes that the scene says, else the most for which everything fits with room for the router, else
+/// the most for which it fits at all; block RAMs rather than distributed ones where there is the choice.
 fn fit(
+    formats: Formats,
     matrices: &[Matrix],
     quantised: &Quantised,
-    quads: usize,
-    prune_bits: u32,
-) -> Result<(usize, Storage), FixedError> {
+    scene: &Scene,
+    parts: usize,
+    board: &Board,
+) -> (Formats, Storage, Resources) {
+    let (quads, prune_bits) = (formats.quads, scene.fixed.prune_bits);
     let largest = quantised.inverse.parity.iter().flatten().map(|c| c.abs()).max().unwrap_or(0);
     let threshold = |matrix| match matrix {
         Matrix::InverseHigh | Matrix::InverseLow => largest >> prune_bits,
         Matrix::Ax => 2f64.powi(quantised.ax.exponent - prune_bits as i32) as i64,
         Matrix::Ay => 2f64.powi(quantised.ay.exponent - prune_bits as i32) as i64,
     };
-    let mut least = usize::MAX;
-    for groups in quads.div_ceil(LANE_BUDGET / 4)..=quads.div_ceil(LEAST_LANES.min(quads)) {
-        let lanes = quads.div_ceil(groups);
-        let storage = Storage::new(matrices.to_vec(), quantised, quads, lanes, threshold);
-        let rams = storage.block_rams(4 * lanes);
-        if rams <= COEFFICIENT_RAMS {
-            return Ok((lanes, storage));
+    let with = |groups: usize| {
+        let lanes_per_parity = quads.div_ceil(groups);
+        let formats = Formats { lanes_per_parity, groups: quads.div_ceil(lanes_per_parity), ..formats.clone() };
+        let storage = Storage::new(matrices.to_vec(), quantised, quads, lanes_per_parity, threshold);
+        let [first, second] =
+            board.distributed_words.map(|shallow| Resources::new(&formats, &storage, parts, board, shallow));
+        let resources = if first.fit(board) == Fit::WithRoom { first } else { second };
+        (formats, storage, resources)
+    };
+    let product = board.multipliers_for(MULTIPLIER_BITS, MULTIPLIER_BITS);
+    let left = (board.multipliers as usize).saturating_sub(force_multipliers(&formats, board));
+    let least = LEAST_LANES.min(quads);
+    let per_parity = match scene.fixed.lanes {
+        Some(lanes) => (lanes as usize / 4).clamp(1, quads)..=(lanes as usize / 4).clamp(1, quads),
+        None => least..=(left / (4 * product)).clamp(least, quads),
+    };
+    let mut groups: Vec<usize> = per_parity.rev().map(|lanes| quads.div_ceil(lanes)).collect();
+    groups.dedup();
+    let mut best: Option<(Formats, Storage, Resources)> = None;
+    for groups in groups {
+        let design = with(groups);
+        let kept = best.as_ref().map(|(_, _, resources)| resources.fit(board));
+        // Of those that do not fit, the last comes closest.
+        if kept.is_none_or(|kept| design.2.fit(board) < kept || kept == Fit::Not) {
+            best = Some(design);
         }
-        least = least.min(rams);
+        if best.as_ref().is_some_and(|(_, _, resources)| resources.fit(board) == Fit::WithRoom) {
+            break;
+        }
     }
-    Err(FixedError::TooLarge { quads, rams: least, has: COEFFICIENT_RAMS })
+    best.unwrap_or_else(|| with(1))
 }
 
 /// The right shift of the force stage for a subarray normalised by `normalise` and rescaled by `rescale`: the μ word's

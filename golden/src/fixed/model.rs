@@ -4,12 +4,15 @@ use thiserror::Error;
 
 use super::cycles::Cycles;
 use super::force::Force;
-use super::formats::{derive, Formats, Quantised, LOG_FRACTION, MU_STEPS};
+use super::formats::{derive, Design, Formats, Quantised, LOG_FRACTION, MU_STEPS};
 use super::quads::Quads;
 use super::search::Best;
 use super::send::{Status, FLAG_CONDITION, FLAG_FOUND, FLAG_NO_CONTACT, STATUS_BEATS};
+use super::remedy::{remedies, Shortage};
+use super::resources::Resources;
 use super::storage::Storage;
 use super::subarray::Solved;
+use crate::board::{Board, BoardError};
 use crate::flags::{frame_flags, Flag};
 use crate::float::receive::receive as judge;
 use crate::frame::{Forces, Frame, FrameError};
@@ -34,16 +37,12 @@ pub enum FixedError {
     /// The partition does not fit the array.
     #[error(transparent)]
     Partition(#[from] PartitionError),
-    /// The coefficients of a subarray fit no device at any number of lanes.
-    #[error("a subarray of {quads} quads needs {rams} block RAMs for its coefficients, the device has {has} for them: take a finer partition or a smaller fixed.prune_bits")]
-    TooLarge {
-        /// Quads of the subarray.
-        quads: usize,
-        /// Block RAMs at best.
-        rams: usize,
-        /// Block RAMs there are.
-        has: usize,
-    },
+    /// The board has too little of something.
+    #[error("{0}")]
+    DoesNotFit(Box<Shortage>),
+    /// The scene's board.
+    #[error(transparent)]
+    Board(#[from] BoardError),
     /// A word would need more bits than the hardware has.
     #[error("{what} needs {needs} bits, the hardware has {has}: lower fixed.input_bits, fixed.inverse_bits or search.mu_max")]
     Format {
@@ -122,6 +121,10 @@ pub struct Model {
     pub threshold: i64,
     /// The coefficient memory's layout.
     pub storage: Storage,
+    /// Memories and multipliers.
+    pub resources: Resources,
+    /// The board.
+    pub board: Board,
     /// The subarrays, row-major.
     pub parts: Vec<Subarray>,
     layout: Quads,
@@ -132,13 +135,25 @@ impl Model {
     ///
     /// # Errors
     /// What the scene asks for is not available, its matrices or formats do not exist, or a threshold or noise floor
-    /// lacks its full scale.
+    /// lacks its full scale. [`FixedError::DoesNotFit`] says what of the board is too small and what would fit.
     pub fn new(scene: &Scene) -> Result<Self, FixedError> {
+        let model = Model::unfitted(scene)?;
+        let short = model.resources.shortages(&model.board);
+        if short.is_empty() {
+            return Ok(model);
+        }
+        let (board, scene) = (model.board.name.clone(), scene.name.clone());
+        Err(FixedError::DoesNotFit(Box::new(Shortage { scene, board, short, remedies: remedies(&model) })))
+    }
+
+    /// The model of a scene that may be too large for its board.
+    pub(super) fn unfitted(scene: &Scene) -> Result<Self, FixedError> {
         scene.require_supported()?;
+        let board = Board::load(&scene.hardware.board)?;
         let parts = subarrays(scene.partition.case, &scene.sensor)?;
         let shape = parts[0].sensor(&scene.sensor);
         let matrices = Matrices::new(&shape, scene.search.mu_max)?;
-        let (formats, quantised, storage) = derive(scene, &matrices)?;
+        let Design { formats, quantised, storage, resources } = derive(scene, &matrices, parts.len(), &board)?;
         let scaled = |field, value: f64, unit: &dyn Fn(f64) -> f64| match scene.input.full_scale_MPa {
             _ if value == 0.0 => Ok(0.0),
             Some(full_scale) => Ok(value / unit(full_scale)),
@@ -157,6 +172,8 @@ impl Model {
             formats,
             quantised,
             storage,
+            resources,
+            board,
         })
     }
 

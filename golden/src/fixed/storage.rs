@@ -13,9 +13,6 @@ use super::formats::{Formats, Quantised, MULTIPLIER_BITS};
 use super::pass::coefficient;
 use super::schedule::{Matrix, Product};
 
-/// Words of a block RAM that is 18 bits wide, and half of that at 36 bits.
-const RAM_WORDS: usize = 1024;
-
 /// The kept columns, per matrix in order of storage and per group of rows.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Storage {
@@ -109,14 +106,6 @@ impl Storage {
     /// The columns of the memory's words, one after the other.
     pub fn column_list(&self) -> Vec<usize> {
         self.columns.iter().flatten().flatten().copied().collect()
-    }
-
-    /// Block RAMs of 18 kbit for `lanes` lanes: one word of 18 bits per lane, two lanes to a RAM where half its depth is enough.
-    pub fn block_rams(&self, lanes: usize) -> usize {
-        match self.words() {
-            words if words <= RAM_WORDS / 2 => lanes.div_ceil(2),
-            words => lanes * words.div_ceil(RAM_WORDS),
-        }
     }
 
     /// Zeroes what the memory does not hold, so that the model multiplies with what the hardware has.

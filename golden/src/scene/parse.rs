@@ -3,8 +3,9 @@
 use super::reader::Reader;
 use super::{
     Condition, FixedSpec, ForceOutput, Form, HardwareSpec, InputSpec, Medium, ObjectiveKind, OutputSpec, PartitionSpec,
-    Scene, SceneError, SearchSpec, ThresholdSpec, BOARDS,
+    Scene, SceneError, SearchSpec, ThresholdSpec,
 };
+use crate::board::Board;
 use crate::partition::{subarrays, Case, Grid};
 use crate::sensor::{Sensor, MAX_LENGTH_MM, MAX_LINES, MIN_LINES};
 use std::ops::RangeInclusive;
@@ -19,7 +20,7 @@ const SCHEMA: [(&str, &[&str]); 10] = [
     ("partition", &["case", "condition", "rows", "cols"]),
     ("search", &["objective", "mu_max", "noise_floor_MPa", "form"]),
     ("threshold", &["min_force_N"]),
-    ("fixed", &["input_bits", "data_bits", "coef_bits", "inverse_bits", "prune_bits"]),
+    ("fixed", &["input_bits", "data_bits", "coef_bits", "inverse_bits", "prune_bits", "lanes"]),
     ("hardware", &["board"]),
     ("input", &["full_scale_MPa", "average", "calibration", "tare", "dead", "unipolar"]),
     ("output", &["forces"]),
@@ -200,11 +201,19 @@ fn fixed(reader: &Reader) -> Result<FixedSpec, SceneError> {
         coef_bits,
         inverse_bits: bits("fixed.inverse_bits", i64::from(coef_bits)..=32, default.inverse_bits)?,
         prune_bits: bits("fixed.prune_bits", 8..=31, default.prune_bits)?,
+        lanes: lanes(reader)?,
     })
 }
 
+fn lanes(reader: &Reader) -> Result<Option<u32>, SceneError> {
+    let read = |value: &Value| value.as_integer().filter(|n| (4..=1024).contains(n) && n % 4 == 0);
+    // In range, so that the cast keeps the value.
+    Ok(reader.typed("fixed.lanes", read, "a multiple of 4 from 4 to 1024")?.map(|lanes| lanes as u32))
+}
+
 fn hardware(reader: &Reader) -> Result<HardwareSpec, SceneError> {
-    let board = reader.choice("hardware.board", &BOARDS.map(|board| (board, Some(board))))?;
+    let boards: Vec<_> = Board::names().into_iter().map(|board| (board, Some(board))).collect();
+    let board = reader.choice("hardware.board", &boards)?;
     Ok(board.map_or_else(HardwareSpec::default, |board| HardwareSpec { board: board.to_string() }))
 }
 

@@ -1,6 +1,6 @@
 //! A counter from 0 to `limit − 1` that wraps.
 
-use dermis_golden::fixed::arith::bit_length;
+pub use dermis_golden::fixed::resources::count_bits;
 use rust_hdl::prelude::*;
 
 use crate::wire::{Wire, Word};
@@ -23,11 +23,6 @@ pub struct Counter {
     /// The count is at its last value.
     pub last: Signal<Out, Bit>,
     _limit: u64,
-}
-
-/// Bits of a count below `limit`, at least one.
-pub fn count_bits(limit: usize) -> usize {
-    bit_length(limit.saturating_sub(1) as u64).max(1) as usize
 }
 
 impl Counter {

@@ -371,7 +371,8 @@ always @(posedge clk) begin
     {{beat4, beat3, beat2, beat1}} <= {{beat3, beat2, beat1, beat}};
     {{at4, at3, at2, at1}} <= {{at3, at2, at1, beat_part}};
     lane1 <= lane;
-    value <= quad[lane1 * {v} +: {v}];
+    value <= lane1[1] ? (lane1[0] ? quad[{v3} +: {v}] : quad[{v2} +: {v}])
+      : (lane1[0] ? quad[{v} +: {v}] : quad[0 +: {v}]);
     product_x <= value * mu_x;
     product_y <= value * mu_y;
     value3 <= value;
@@ -418,6 +419,8 @@ end",
             mu_round_less = MU_ROUND - 1,
             shift_max = FORCE_SHIFT_MAX,
             v_end = v - 1,
+            v2 = 2 * v,
+            v3 = 3 * v,
             product_end = product - 1,
             product1 = product + 1,
             product2 = product + 2,

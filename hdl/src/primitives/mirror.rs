@@ -4,6 +4,7 @@ use dermis_golden::fixed::quads::Quads;
 use dermis_golden::partition::Grid;
 use rust_hdl::prelude::*;
 
+use super::constant_product::times;
 use super::counter::count_bits;
 use crate::wire::{Wire, Word};
 
@@ -84,14 +85,13 @@ impl Logic for Mirror {
         // The middle line of an odd count is its own image: written to both lanes.
         let middle_row = if rows % 2 == 1 { format!("row == {row_bits}'d{}", rows / 2) } else { "1'b0".into() };
         let middle_col = if cols % 2 == 1 { format!("col == {col_bits}'d{}", cols / 2) } else { "1'b0".into() };
-        let quad_cols = self._layout.quad_cols();
         let cut = |bits: usize| if wide == bits { String::new() } else { format!("[{}:0]", bits - 1) };
         let single = self._parts.rows * self._parts.cols == 1;
         let number = if single {
             format!("{} | {}", extend("part_row", part_row_bits), extend("part_col", part_col_bits))
         } else {
             let row = extend("part_row", part_row_bits);
-            format!("{row} * {wide}'d{} + {}", self._parts.cols, extend("part_col", part_col_bits))
+            format!("{} + {}", times(&row, self._parts.cols), extend("part_col", part_col_bits))
         };
         // What is wider than its target never carries anything there.
         Verilog::Custom(format!(
@@ -102,7 +102,7 @@ wire right = col > {col_bits}'d{col_half};
 wire [{row_end}:0] near_row = lower ? {row_bits}'d{row_last} - row : row;
 wire [{col_end}:0] near_col = right ? {col_bits}'d{col_last} - col : col;
 wire [{wide_end}:0] number = {number};
-wire [{wide_end}:0] place = {base}{row_wide} * {wide}'d{quad_cols} + {col_wide};
+wire [{wide_end}:0] place = {base}{row_place} + {col_wide};
 wire both_rows = {middle_row};
 wire both_cols = {middle_col};
 always @(*) begin
@@ -114,7 +114,7 @@ always @(*) begin
   mask[2] = (lower || both_rows) && (!right || both_cols);
   mask[3] = (lower || both_rows) && (right || both_cols);
 end",
-            base = if single { String::new() } else { format!("number * {wide}'d{} + ", self._layout.len()) },
+            base = if single { String::new() } else { format!("{} + ", times("number", self._layout.len())) },
             address_cut = cut(bits),
             part_cut = cut(part_bits),
             row_half = (rows - 1) / 2,
@@ -124,7 +124,7 @@ end",
             row_end = row_bits - 1,
             col_end = col_bits - 1,
             wide_end = wide - 1,
-            row_wide = extend("near_row", row_bits),
+            row_place = times(&extend("near_row", row_bits), self._layout.quad_cols()),
             col_wide = extend("near_col", col_bits),
         ))
     }

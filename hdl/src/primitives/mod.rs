@@ -8,6 +8,7 @@
 
 mod butterfly;
 mod candidates;
+mod constant_product;
 mod counter;
 mod counts;
 mod delay;
@@ -62,7 +63,7 @@ pub use score::{Score, LATENCY as SCORE_LATENCY};
 pub use slice::Slice;
 pub use spread::Spread;
 pub use status_code::StatusCode;
-pub use steps::{operand_vectors, Steps, COLUMN_FILE, SOURCE_BITS};
+pub use steps::{Steps, COLUMN_FILE, SOURCE_BITS};
 pub use store::Store;
 pub use sum::Sum;
 pub use sweep::{position_bits, BUFFER_BITS};

@@ -1,6 +1,7 @@
 //! The schedule of the matrix passes, as a small memory.
 
-use dermis_golden::fixed::schedule::{schedule, vectors, Operand};
+use dermis_golden::fixed::resources::operand_vectors;
+use dermis_golden::fixed::schedule::{schedule, Operand};
 use dermis_golden::fixed::storage::blocks;
 use dermis_golden::fixed::Model;
 use rust_hdl::prelude::*;
@@ -163,11 +164,6 @@ impl Steps {
     }
 }
 
-/// The v_ij that later passes read: all but those of the highest degree; at least one, unread at degree 0.
-pub fn operand_vectors(degree: usize) -> usize {
-    vectors(degree.saturating_sub(1))
-}
-
 impl Logic for Steps {
     fn update(&mut self) {
         let Some(step) = self._steps.get(self.step.val().number() as usize).copied() else { return };
@@ -228,6 +224,8 @@ reg [{n_end}:0] needs;
 reg [{column_end}:0] final_column;
 reg [7:0] fixed;  // transposed, flip, kind, last, first, align
 always @(*) begin
+  // A few words that change with the scene: no block RAM.
+  (* rom_style = \"logic\" *)
   case (step)
 {cases}    default: begin
       c_base = {c_bits}'d0; o_base = {o_bits}'d0; needs = {needs_bits}'d0; final_column = {column_bits}'d0; fixed = 8'd0;

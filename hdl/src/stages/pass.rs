@@ -4,11 +4,12 @@
 //! issue to operands: addresses (1 cycle, 3 through a list of columns), memories (1), limb and parity selection (1); then
 //! the lanes.
 
+use dermis_golden::fixed::resources::operand_vectors;
 use dermis_golden::fixed::Model;
 use rust_hdl::prelude::*;
 
 use crate::primitives::{
-    count_bits, operand_vectors, BitDelay, Counter, Delay, Filler, Lanes, OperandSelect, Ram, Slice, Steps, SOURCE_BITS,
+    count_bits, BitDelay, Counter, Delay, Filler, Lanes, OperandSelect, Ram, Slice, Steps, SOURCE_BITS,
 };
 use crate::wire::Wire;
 

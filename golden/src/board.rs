@@ -7,8 +7,10 @@
 //! | `device`, `package`, `speed_grade` | | as the place and route tool names them |
 //! | `input_clock_MHz` | MHz | oscillator on the board |
 //! | `clock_MHz` | MHz | the engine's clock: a design target until place and route has measured it |
-//! | `multipliers` | | 18×18 multipliers |
-//! | `block_rams` | | block RAMs of 18 kbit |
+//! | `multipliers`, `multiplier_bits` | , bits | signed multipliers and the width of their operands |
+//! | `block_rams`, `block_ram_shapes` | , [words, bits] | block RAMs and what one of them can be |
+//! | `distributed_words` | words | memories of at most so many words go into distributed RAM: always; where block RAM is short |
+//! | `luts`, `flip_flops` | | logic cells, for the estimates' shares |
 
 use include_dir::{include_dir, Dir};
 use serde::{Deserialize, Serialize};
@@ -36,10 +38,20 @@ pub struct Board {
     pub input_clock_MHz: f64,
     /// Clock of the engine, MHz, > 0.
     pub clock_MHz: f64,
-    /// 18×18 multipliers.
+    /// Multipliers.
     pub multipliers: u32,
-    /// Block RAMs of 18 kbit.
+    /// Width of a multiplier's signed operands.
+    pub multiplier_bits: u32,
+    /// Block RAMs.
     pub block_rams: u32,
+    /// What one block RAM with a read and a write port can be: [words, bits].
+    pub block_ram_shapes: Vec<[usize; 2]>,
+    /// Memories of at most so many words go into distributed RAM: always, and where block RAM is short.
+    pub distributed_words: [usize; 2],
+    /// Four-input look-up tables.
+    pub luts: u32,
+    /// Flip-flops.
+    pub flip_flops: u32,
 }
 
 /// Why a board cannot be used.
@@ -90,7 +102,24 @@ impl Board {
                 return Err(invalid(format!("{field} = {value}: must be positive")));
             }
         }
+        if board.block_ram_shapes.is_empty() || board.block_ram_shapes.iter().flatten().any(|&size| size == 0) {
+            return Err(invalid(format!("block_ram_shapes = {:?}: must be [words, bits]", board.block_ram_shapes)));
+        }
+        if board.multiplier_bits < 2 {
+            return Err(invalid(format!("multiplier_bits = {}: must be at least 2", board.multiplier_bits)));
+        }
         Ok(Board { name: name.to_owned(), ..board })
+    }
+
+    /// Block RAMs for a memory of `words` words of `bits` bits: of the shape that takes the fewest.
+    pub fn block_rams_for(&self, words: usize, bits: usize) -> usize {
+        let of = |&[w, b]: &[usize; 2]| words.div_ceil(w) * bits.div_ceil(b);
+        self.block_ram_shapes.iter().map(of).min().unwrap_or(0)
+    }
+
+    /// Multipliers for a product of signed operands of `a` and `b` bits, each cut into as few pieces as it takes.
+    pub fn multipliers_for(&self, a: u32, b: u32) -> usize {
+        (a.div_ceil(self.multiplier_bits) * b.div_ceil(self.multiplier_bits)) as usize
     }
 
     /// Time of `cycles` at the engine's clock, in µs.
@@ -110,7 +139,11 @@ mod tests {
             assert_eq!(Board::load(name).unwrap().name, name);
         }
         // 100 MHz: one cycle is 10 ns.
-        assert_eq!(Board::load("ulx3s-85f").unwrap().microseconds(100), 1.0);
+        let board = Board::load("ulx3s-85f").unwrap();
+        assert_eq!(board.microseconds(100), 1.0);
+        // Two lanes share a RAM up to 512 words; 27 bits are two pieces of 18.
+        assert_eq!([(512, 36), (513, 36), (1025, 72), (2048, 9)].map(|(w, b)| board.block_rams_for(w, b)), [1, 2, 6, 1]);
+        assert_eq!([board.multipliers_for(27, 18), board.multipliers_for(18, 18)], [2, 1]);
     }
 
     #[test]

@@ -1,0 +1,148 @@
+//! What makes a scene fit its board: each change is tried with the model, none is guessed.
+//!
+//! | change | tried |
+//! |---|---|
+//! | `fixed.lanes` left out | where the scene sets it: as many as fit are taken then |
+//! | `partition` | finer ones that divide the array, the coarsest first, the paper's cases before all |
+//! | `search.mu_max` | the largest of three digits that a polynomial of lower degree serves, then 0 |
+//! | `fixed.prune_bits` | ever fewer |
+
+use std::fmt;
+
+use super::cycles::Cycles;
+use super::model::Model;
+use crate::matrices::{Matrices, CUBIC_FROM, SERIES_TOLERANCE};
+use crate::partition::{Case, Grid};
+use crate::scene::Scene;
+use crate::sensor::MIN_LINES;
+
+/// A change to a scene, and what it needs then.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Remedy {
+    /// The change as it stands in a scene file.
+    pub change: String,
+    /// Degree of the polynomial with it.
+    pub degree: usize,
+    /// Lanes with it.
+    pub lanes: usize,
+    /// Block RAMs with it.
+    pub block_rams: usize,
+    /// Multipliers with it.
+    pub multipliers: usize,
+    /// Cycles from the last input beat to the last output beat with it, everything searched.
+    pub cycles: u64,
+}
+
+/// How a scene exceeds its board.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Shortage {
+    /// The scene's name.
+    pub scene: String,
+    /// The board's name.
+    pub board: String,
+    /// Name, needed, there.
+    pub short: Vec<(&'static str, usize, usize)>,
+    /// Single changes that make it fit.
+    pub remedies: Vec<Remedy>,
+}
+
+impl fmt::Display for Shortage {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let short = self.short.iter().map(|(what, needs, has)| format!("{needs} {what}, there are {has}"));
+        write!(f, "scene {} does not fit {}: it needs ", self.scene, self.board)?;
+        write!(f, "{}", short.collect::<Vec<_>>().join("; "))?;
+        if self.remedies.is_empty() {
+            return write!(f, "; no finer partition, lower degree, pruning or number of lanes makes it fit");
+        }
+        write!(f, "; it fits with any one of:")?;
+        for Remedy { change, degree, lanes, block_rams, multipliers, cycles } in &self.remedies {
+            write!(f, "\n  {change}: {block_rams} block RAMs, {multipliers} multipliers, ")?;
+            write!(f, "{lanes} lanes, degree {degree}, {cycles} cycles")?;
+        }
+        Ok(())
+    }
+}
+
+/// The single changes that make a scene fit, the first of each kind.
+pub(super) fn remedies(model: &Model) -> Vec<Remedy> {
+    let scene = &model.scene;
+    let kinds = [
+        lanes(scene).into_iter().find_map(fitting),
+        partitions(scene).into_iter().find_map(fitting),
+        degrees(model).into_iter().find_map(fitting),
+        pruned(scene).find_map(fitting),
+    ];
+    kinds.into_iter().flatten().collect()
+}
+
+/// A scene's text and the scene.
+type Change = (String, Scene);
+
+fn fitting((change, scene): Change) -> Option<Remedy> {
+    let model = Model::unfitted(&scene).ok()?;
+    model.resources.shortages(&model.board).is_empty().then(|| Remedy {
+        change,
+        degree: model.formats.degree,
+        lanes: 4 * model.formats.lanes_per_parity,
+        block_rams: model.resources.block_rams(),
+        multipliers: model.resources.multipliers(),
+        cycles: Cycles::of(&model, &vec![true; model.parts.len()]).latency,
+    })
+}
+
+fn changed(scene: &Scene, change: impl FnOnce(&mut Scene)) -> Scene {
+    let mut scene = scene.clone();
+    change(&mut scene);
+    scene
+}
+
+fn lanes(scene: &Scene) -> Option<Change> {
+    scene.fixed.lanes.map(|_| ("fixed.lanes left out".to_string(), changed(scene, |s| s.fixed.lanes = None)))
+}
+
+fn partitions(scene: &Scene) -> Vec<Change> {
+    let sensor = &scene.sensor;
+    let now = scene.partition.case.grid().map_or(1, |grid| grid.rows * grid.cols);
+    let divides = |lines: usize, parts: &usize| lines.is_multiple_of(*parts) && lines / parts >= MIN_LINES;
+    let mut grids: Vec<Grid> = (1..=sensor.rows)
+        .filter(|rows| divides(sensor.rows, rows))
+        .flat_map(|rows| (1..=sensor.cols).map(move |cols| Grid { rows, cols }))
+        .filter(|grid| divides(sensor.cols, &grid.cols) && grid.rows * grid.cols > now)
+        .collect();
+    let numbered = |grid: Grid| (1..=3).find(|&number| Case::numbered(number) == Some(Case::Grid(grid)));
+    // Of equally many subarrays the squarest have the widest view.
+    grids.sort_by_key(|&g| (numbered(g).is_none(), g.rows * g.cols, g.rows.abs_diff(g.cols)));
+    let change = |grid: Grid| {
+        let case = Case::Grid(grid);
+        let text = match numbered(grid) {
+            Some(number) => format!("partition.case = {number}"),
+            None => format!("partition.rows = {}, partition.cols = {}", grid.rows, grid.cols),
+        };
+        (text, changed(scene, |s| s.partition.case = case))
+    };
+    grids.into_iter().map(change).collect()
+}
+
+fn degrees(model: &Model) -> Vec<Change> {
+    let scene = &model.scene;
+    let Ok(matrices) = Matrices::new(&model.parts[0].sensor(&scene.sensor), scene.search.mu_max) else {
+        return Vec::new();
+    };
+    let radii = [CUBIC_FROM.min(SERIES_TOLERANCE.cbrt()), SERIES_TOLERANCE.sqrt()];
+    // r grows in proportion to mu_max.
+    let largest = |radius: f64| (scene.search.mu_max * radius / matrices.spectral_radius * 1e3).floor() / 1e3;
+    let lower = radii.map(largest).into_iter().chain([0.0]);
+    lower
+        .filter(|&mu_max| mu_max < scene.search.mu_max)
+        .map(|mu_max| (format!("search.mu_max = {mu_max}"), changed(scene, |s| s.search.mu_max = mu_max)))
+        .collect()
+}
+
+/// Least sensible `fixed.prune_bits`, as in the scene's schema.
+const LEAST_PRUNE_BITS: u32 = 8;
+
+fn pruned(scene: &Scene) -> impl Iterator<Item = Change> + '_ {
+    (LEAST_PRUNE_BITS..scene.fixed.prune_bits)
+        .rev()
+        .map(|bits| (format!("fixed.prune_bits = {bits}"), changed(scene, |s| s.fixed.prune_bits = bits)))
+}

@@ -1,0 +1,148 @@
+//! Memories and multipliers of the hardware, counted as the synthesiser counts them.
+//!
+//! Every memory of more than one word is listed by its name in the Verilog, which carries the choice as an attribute: block RAM, of the
+//! board's shape that takes the fewest, or distributed RAM where it has few words. Both counts are exact; the tests
+//! compare them with Yosys.
+//!
+//! | stage | memory | words × bits |
+//! |---|---|---|
+//! | receive | frame buffer, four lanes | subarrays · Q × `input_bits` |
+//! | fold | input of the passes | Q × 4 · `fold_bits` |
+//! | pass | v_ij as operands, but those of the highest degree | so many · Q × 4 · `data_bits` |
+//! | pass | coefficients; list of their columns | words × 18 · lanes; words × 2 addresses |
+//! | rescale | raw v_00 | Q × 4 · `acc_bits` |
+//! | search | polynomials, one memory per coefficient | 2 buffers of Q, rounded up to 2^k × 4 · `search_bits` |
+//! | force | p(μ*) | subarrays · Q × 4 · `search_bits` |
+
+use serde::Serialize;
+
+use super::arith::{bit_length, signed_bits};
+use super::formats::{Formats, HALVINGS, MULTIPLIER_BITS};
+use super::schedule::vectors;
+use super::storage::{word_bits, Storage};
+use crate::board::Board;
+
+/// Share of a board's block RAMs that a design takes where it has the choice: the router needs the rest.
+const ROUTABLE: f64 = 0.8;
+
+/// A memory of the hardware.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+pub struct Memory {
+    /// Its block in the hardware, stages and primitives separated by `$`.
+    pub block: &'static str,
+    /// Its name in that block.
+    pub array: String,
+    /// Words.
+    pub words: usize,
+    /// Bits of a word.
+    pub bits: usize,
+    /// Block RAMs; none for distributed RAM.
+    pub block_rams: usize,
+}
+
+/// What a design needs of its device.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+pub struct Resources {
+    /// Every memory, in pipeline order.
+    pub memories: Vec<Memory>,
+    /// Multipliers of each block that has some.
+    pub multipliers: Vec<(&'static str, usize)>,
+}
+
+/// How block RAMs fit a board; the better, the smaller.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Fit {
+    /// At most 80 % are taken.
+    WithRoom,
+    /// All fit.
+    Tight,
+    /// There are too few.
+    Not,
+}
+
+/// Bits of a count below `limit`, at least one.
+pub fn count_bits(limit: usize) -> usize {
+    bit_length(limit.saturating_sub(1) as u64).max(1) as usize
+}
+
+/// Bits of a position of the search: three grid steps and a candidate beyond, after all halvings.
+pub fn position_bits() -> usize {
+    signed_bits(4 << HALVINGS) as usize
+}
+
+/// The v_ij that later passes read: all but those of the highest degree; at least one, unread at degree 0.
+pub fn operand_vectors(degree: usize) -> usize {
+    vectors(degree.saturating_sub(1))
+}
+
+impl Resources {
+    /// What `formats` and `storage` need for `parts` subarrays on `board`; memories of at most `shallow` words go into distributed RAM.
+    pub fn new(formats: &Formats, storage: &Storage, parts: usize, board: &Board, shallow: usize) -> Self {
+        let (f, quads) = (formats, formats.quads);
+        let quad = |bits: u32| 4 * bits as usize;
+        let memory = |block, array: &str, words: usize, bits: usize, rom: bool| Memory {
+            block,
+            array: array.to_string(),
+            words,
+            bits,
+            block_rams: if rom || words > shallow { board.block_rams_for(words, bits) } else { 0 },
+        };
+        let ram = |block, words, bits| memory(block, "field0", words, bits, false);
+        let mut memories: Vec<Memory> = (0..4)
+            .map(|lane| memory("receive$frame", &format!("field{lane}"), parts * quads, f.input_bits as usize, false))
+            .collect();
+        memories.push(ram("fold$memory", quads, quad(f.fold_bits)));
+        memories.push(ram("pass$vectors", operand_vectors(f.degree) * quads, quad(f.data_bits)));
+        memories.push(memory("pass$lanes", "memory", storage.words(), word_bits(f), true));
+        if storage.is_listed(f) {
+            memories.push(memory("pass$steps", "columns", storage.words(), 2 * count_bits(quads), true));
+        }
+        memories.push(ram("rescale$raw", quads, quad(f.acc_bits)));
+        let polynomials = f.search_bits.iter().enumerate().map(|(k, &bits)| {
+            memory("search$store", &format!("memory{k}"), 2 << count_bits(quads), quad(bits), false)
+        });
+        memories.extend(polynomials);
+        memories.push(ram("forces$store", parts * quads, quad(f.search_bits[0])));
+        let multipliers = vec![
+            ("pass$lanes", 4 * f.lanes_per_parity * board.multipliers_for(MULTIPLIER_BITS, MULTIPLIER_BITS)),
+            ("forces$unit", force_multipliers(f, board)),
+        ];
+        Resources { memories, multipliers }
+    }
+
+    /// Block RAMs of all memories.
+    pub fn block_rams(&self) -> usize {
+        self.memories.iter().map(|memory| memory.block_rams).sum()
+    }
+
+    /// Multipliers of all blocks.
+    pub fn multipliers(&self) -> usize {
+        self.multipliers.iter().map(|(_, count)| count).sum()
+    }
+
+    /// What there is too little of: name, needed, there.
+    pub fn shortages(&self, board: &Board) -> Vec<(&'static str, usize, usize)> {
+        let all = [
+            ("block RAMs", self.block_rams(), board.block_rams as usize),
+            ("multipliers", self.multipliers(), board.multipliers as usize),
+        ];
+        all.into_iter().filter(|(_, needs, has)| needs > has).collect()
+    }
+
+    /// How well the block RAMs fit: with room for the router, at all, or not.
+    pub fn fit(&self, board: &Board) -> Fit {
+        match self.block_rams() {
+            rams if rams as f64 <= ROUTABLE * f64::from(board.block_rams) => Fit::WithRoom,
+            rams if rams <= board.block_rams as usize => Fit::Tight,
+            _ => Fit::Not,
+        }
+    }
+}
+
+/// Multipliers of the force unit: μ1 and μ2 from their positions, and both times p.
+pub fn force_multipliers(formats: &Formats, board: &Board) -> usize {
+    let step = signed_bits(formats.mu_step.unsigned_abs());
+    // A step that is a power of two is wiring.
+    let words = if formats.mu_step.count_ones() == 1 { 0 } else { board.multipliers_for(position_bits() as u32, step) };
+    2 * words + 2 * board.multipliers_for(formats.search_bits[0], MULTIPLIER_BITS)
+}
