@@ -11,7 +11,8 @@
 //! | pass | v_ij as operands, but those of the highest degree | so many · Q × 4 · `data_bits` |
 //! | pass | coefficients; list of their columns | words × 18 · lanes; words × 2 addresses |
 //! | rescale | raw v_00 | Q × 4 · `acc_bits` |
-//! | search | polynomials, one memory per coefficient | 2 buffers of Q, rounded up to 2^k × 4 · `search_bits` |
+//! | search | polynomials, one memory per coefficient | 3 buffers of Q × 4 · `search_bits` |
+//! | search | the next subarray's, where there are several | Q × 4 · `search_bits` |
 //! | force | p(μ*) | subarrays · Q × 4 · `search_bits` |
 
 use serde::Serialize;
@@ -24,6 +25,9 @@ use crate::board::Board;
 
 /// Share of a board's block RAMs that a design takes where it has the choice: the router needs the rest.
 const ROUTABLE: f64 = 0.8;
+
+/// Buffers that the sweeps of the search write.
+pub const SEARCH_BUFFERS: usize = 3;
 
 /// A memory of the hardware.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
@@ -98,10 +102,12 @@ impl Resources {
             memories.push(memory("pass$steps", "columns", storage.words(), 2 * count_bits(quads), true));
         }
         memories.push(ram("rescale$raw", quads, quad(f.acc_bits)));
-        let polynomials = f.search_bits.iter().enumerate().map(|(k, &bits)| {
-            memory("search$store", &format!("memory{k}"), 2 << count_bits(quads), quad(bits), false)
-        });
-        memories.extend(polynomials);
+        for (k, &bits) in f.search_bits.iter().enumerate() {
+            memories.push(memory("search$store", &format!("memory{k}"), SEARCH_BUFFERS * quads, quad(bits), false));
+            if parts > 1 {
+                memories.push(memory("search$store", &format!("start{k}"), quads, quad(bits), false));
+            }
+        }
         memories.push(ram("forces$store", parts * quads, quad(f.search_bits[0])));
         let multipliers = vec![
             ("pass$lanes", 4 * f.lanes_per_parity * board.multipliers_for(MULTIPLIER_BITS, MULTIPLIER_BITS)),

@@ -1,14 +1,9 @@
 //! What a sweep of the search is: the word that accompanies its totals to the judgement.
 
-use dermis_golden::fixed::arith::signed_bits;
-use dermis_golden::fixed::formats::HALVINGS;
+pub use dermis_golden::fixed::resources::position_bits;
+use dermis_golden::fixed::resources::SEARCH_BUFFERS;
 
 use crate::wire::Word;
-
-/// Bits of a position: three grid steps and a candidate beyond, after all halvings.
-pub fn position_bits() -> usize {
-    signed_bits(4 << HALVINGS) as usize
-}
 
 /// Bits of a squared distance in grid steps of the last level.
 pub fn square_bits() -> usize {
@@ -20,7 +15,7 @@ pub const BUFFER_BITS: usize = 2;
 /// The buffer that holds the polynomials about μ = 0, as they came in.
 pub const START: usize = 3;
 /// Buffers that sweeps write.
-pub const BUFFERS: usize = 3;
+pub const BUFFERS: usize = SEARCH_BUFFERS;
 
 /// One sweep.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
