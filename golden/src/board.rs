@@ -142,7 +142,10 @@ mod tests {
         let board = Board::load("ulx3s-85f").unwrap();
         assert_eq!(board.microseconds(100), 1.0);
         // Two lanes share a RAM up to 512 words; 27 bits are two pieces of 18.
-        assert_eq!([(512, 36), (513, 36), (1025, 72), (2048, 9)].map(|(w, b)| board.block_rams_for(w, b)), [1, 2, 6, 1]);
+        assert_eq!(
+            [(512, 36), (513, 36), (1025, 72), (2048, 9)].map(|(w, b)| board.block_rams_for(w, b)),
+            [1, 2, 6, 1]
+        );
         assert_eq!([board.multipliers_for(27, 18), board.multipliers_for(18, 18)], [2, 1]);
     }
 

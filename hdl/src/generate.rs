@@ -1,7 +1,7 @@
 //! The engine as files: Verilog, memory files, lint waivers, manifest.
 
-use dermis_golden::fixed::send::{FLAG_CONDITION, FLAG_FOUND, FLAG_FRAMING, FLAG_NO_CONTACT};
 use dermis_golden::fixed::resources::Memory;
+use dermis_golden::fixed::send::{FLAG_CONDITION, FLAG_FOUND, FLAG_FRAMING, FLAG_NO_CONTACT};
 use dermis_golden::fixed::storage::word_bits;
 use dermis_golden::fixed::{Cycles, Model};
 use rust_hdl::prelude::*;

@@ -11,12 +11,12 @@
 use std::path::Path;
 
 use anyhow::Result;
+use dermis_golden::board::Board;
 use dermis_golden::fixed::Model;
 use dermis_golden::frame::Frame;
 use dermis_golden::quantise::full_scale;
 use dermis_golden::reconstruct::{Golden, Reconstruction};
 use dermis_golden::scene::Scene;
-use dermis_golden::board::Board;
 
 use crate::compare::{difference, Difference};
 use crate::cosim::{run, Bench, Findings, Vector};

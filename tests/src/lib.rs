@@ -8,6 +8,7 @@
 //! | `framing` | early and missing `tlast`: what is dropped, what is flagged, and equality right after |
 //! | `synthesis` | Yosys reads the Verilog without latch or undriven signal |
 //! | `scenes` | the same equality for scenes of other shapes, degrees, words and conditions |
+//! | `scale` | the largest array, and a thousand random frames with stalls on both streams |
 //! | `lint` | the generated Verilog is clean under Verilator with its waivers, and needs every one of them |
 #![deny(missing_docs)]
 

@@ -1,0 +1,80 @@
+//! Co-simulation at scale, under Verilator, all stages compared: the largest array with a foot on it, and a thousand
+//! random frames of small sensors with random gaps and back-pressure on both streams.
+
+use dermis_golden::fixed::Model;
+use dermis_golden::partition::Case;
+use dermis_golden::scene::Scene;
+use dermis_sim::cosim::{run, Bench, Vector};
+use dermis_sim::drive::Stimulus;
+use dermis_sim::hardware::{Hardware, Simulator};
+use dermis_sim::verify::verify;
+use dermis_tests::{build_dir, scene};
+
+/// Frames of one run; their traces are in memory together.
+const CHUNK: u64 = 50;
+
+#[test]
+fn a_foot_on_the_largest_array_is_equal() {
+    let (scene, mut frames) = scene("sensor-4");
+    frames.retain(|frame| frame.id.contains("plantar"));
+    let verified = verify(&scene, &frames[..1], &[Simulator::Verilator], &build_dir()).unwrap();
+    let first: Vec<String> = verified.findings.kept.iter().take(3).map(ToString::to_string).collect();
+    assert!(verified.findings.is_equal(), "{first:#?}");
+    let latency = verified.rows[0].times.latency().unwrap();
+    assert!(latency <= 31_000, "{latency} cycles");
+}
+
+/// Codes of one of the kinds that a converter may give: noise, sparse spikes, a bump, saturated patches.
+fn codes(random: &mut fastrand::Rng, scene: &Scene) -> Vec<i32> {
+    let most = (1i32 << (scene.fixed.input_bits - 1)) - 1;
+    let taxels = scene.sensor.taxels();
+    let size = most >> random.u32(..scene.fixed.input_bits - 1);
+    let kind = random.u8(..4);
+    let (centre, width) = (random.usize(..taxels), 1.0 + 3.0 * random.f64());
+    (0..taxels)
+        .map(|taxel| match kind {
+            0 => random.i32(-size..=size),
+            1 if random.u8(..8) == 0 => random.i32(-size..=size),
+            1 => 0,
+            2 => {
+                let cols = scene.sensor.cols;
+                let dx = (taxel % cols) as f64 - (centre % cols) as f64;
+                let dy = (taxel / cols) as f64 - (centre / cols) as f64;
+                (f64::from(size) * (1.0 + 0.3 * dx) * (-(dx * dx + dy * dy) / width).exp()) as i32
+            }
+            _ => *[most, -most - 1, 0].get(random.usize(..3)).unwrap_or(&0),
+        })
+        .collect()
+}
+
+fn random_frames(scene: &Scene, frames: u64) {
+    let hardware = Hardware::new(Model::new(scene).unwrap(), &build_dir()).unwrap();
+    let taps = hardware.tap_names();
+    let mut device = hardware.device(Simulator::Verilator).unwrap();
+    let mut random = fastrand::Rng::with_seed(4);
+    for seed in 0..frames / CHUNK {
+        let vectors: Vec<Vector> = (0..CHUNK)
+            .map(|k| {
+                let codes = codes(&mut random, scene);
+                let expected = hardware.model.run(&codes);
+                Vector { frame: format!("random {}", CHUNK * seed + k), cols: scene.sensor.cols, codes, expected }
+            })
+            .collect();
+        let bench = Bench { name: "verilator", device: device.as_mut(), taps: &taps };
+        let (findings, _) = run(bench, &vectors, Stimulus::Stalls { seed });
+        let first: Vec<String> = findings.kept.iter().take(3).map(ToString::to_string).collect();
+        assert!(findings.is_equal(), "{}: {first:#?}", scene.name);
+    }
+}
+
+#[test]
+fn random_frames_of_a_whole_array_are_equal() {
+    random_frames(&scene("eight-by-eight").0, 500);
+}
+
+#[test]
+fn random_frames_of_a_partitioned_array_are_equal() {
+    let (mut scene, _) = scene("sensor-1");
+    scene.partition.case = Case::numbered(1).unwrap();
+    random_frames(&scene, 500);
+}
