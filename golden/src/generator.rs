@@ -36,7 +36,7 @@ mod tests;
 mod traction;
 
 pub use error::GeneratorError;
-pub use random::random_contacts;
+pub use random::{random_contacts, Draw, Shapes};
 
 use crate::bonded::kernel::Kernel;
 use crate::frame::{Contact, Frame};

@@ -10,6 +10,7 @@
 use crate::sensor::{Sensor, MIN_LINES};
 use serde::{Deserialize, Serialize};
 use std::fmt;
+use std::str::FromStr;
 use thiserror::Error;
 
 /// Subarrays along the rows and along the columns.
@@ -53,6 +54,24 @@ impl Case {
         match self {
             Case::Grid(grid) => Some(grid),
             Case::Adaptive | Case::Contacts => None,
+        }
+    }
+}
+
+impl FromStr for Case {
+    type Err = String;
+
+    /// A case by its name: `0` to `3`, rows × columns as `4x2` or `4×2`, `adaptive`, `contacts`.
+    fn from_str(name: &str) -> Result<Case, String> {
+        let numbered = || Case::numbered(name.parse().ok()?);
+        let grid = || {
+            let (rows, cols) = name.split_once(['x', '×'])?;
+            Some(Case::Grid(Grid { rows: rows.parse().ok()?, cols: cols.parse().ok()? }))
+        };
+        match name {
+            "adaptive" => Ok(Case::Adaptive),
+            "contacts" => Ok(Case::Contacts),
+            _ => numbered().or_else(grid).ok_or_else(|| "0 to 3, rows x columns as 4x2, adaptive or contacts".into()),
         }
     }
 }
@@ -176,6 +195,11 @@ mod tests {
         let names: Vec<_> = (0..4).filter_map(Case::numbered).map(|c| c.to_string()).collect();
         assert_eq!(names, ["0", "1", "2", "3"]);
         assert_eq!(Case::numbered(4), None);
+        assert_eq!("1".parse(), Ok(Case::Grid(Grid { rows: 2, cols: 2 })));
+        for case in ["5x2", "5×2", "adaptive", "contacts"] {
+            assert_eq!(case.parse::<Case>().unwrap().to_string(), case.replace('x', "×"));
+        }
+        assert!(["4", "x", "2x", "-1x2", "finest"].iter().all(|name| name.parse::<Case>().is_err()));
         let parts = subarrays(Case::Grid(Grid { rows: 1, cols: 2 }), &sensor(4, 6)).unwrap();
         assert_eq!(parts[1], Subarray { row0: 0, col0: 3, rows: 4, cols: 3 });
         let values: Vec<usize> = (0..24).collect();

@@ -31,6 +31,12 @@ impl Random {
         self.bits() >> 63 == 1
     }
 
+    /// One of several, all alike likely; `None` of none, which takes a number too.
+    pub(crate) fn pick<'a, T>(&mut self, of: &'a [T]) -> Option<&'a T> {
+        let at = self.between(0.0, of.len() as f64) as usize;
+        of.get(at)
+    }
+
     /// Normal, mean 0, deviation 1.
     pub(crate) fn normal(&mut self) -> f64 {
         // 1 − u is above 0.

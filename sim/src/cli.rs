@@ -15,6 +15,7 @@ use clap::{Parser, Subcommand, ValueEnum};
 use dermis_golden::fixed::{FixedError, Model};
 use dermis_golden::frame::Frame;
 use dermis_golden::noise::{study, Study};
+use dermis_golden::partition::Case;
 use dermis_golden::quantise::full_scale;
 use dermis_golden::reconstruct::{Golden, Reconstruction};
 use dermis_golden::scene::{ObjectiveKind, Scene};
@@ -22,6 +23,7 @@ use dermis_hdl::generate;
 use dermis_hdl::HdlError;
 
 use crate::compare::difference;
+use crate::fresh::Fresh;
 use crate::hardware::{Hardware, Simulator, Stuck};
 use crate::inputs::{resolve, resolve_one};
 use crate::progress::Progress;
@@ -107,19 +109,23 @@ enum Command {
     #[command(after_help = "Examples:
   dermis table                                       every built-in scene, cases 0 to 3
   dermis table sensor-1 --case 0 --format csv
+  dermis table sensor-3 --case adaptive --case contacts --case 4x2
+  dermis table sensor-3 --case contacts --fresh 40 --contacts 2 --contacts 3 --shapes other
   dermis table sensor-1 eight-by-eight --cosim       co-simulate, one line per scene")]
     Table {
         /// Built-in names or paths of scenes; without any all built-in ones.
         #[arg(required_if_eq("cosim", "true"))]
         scenes: Vec<String>,
-        /// Case, repeatable; without it all four.
-        #[arg(long = "case", value_name = "0..3", value_parser = clap::value_parser!(i64).range(0..=3))]
-        cases: Vec<i64>,
+        /// Case, repeatable: 0 to 3, ROWSxCOLS, adaptive, contacts; without it 0 to 3.
+        #[arg(long = "case", value_name = "CASE")]
+        cases: Vec<Case>,
+        #[command(flatten)]
+        fresh: Fresh,
         /// Form of the table.
         #[arg(long, value_enum, default_value = "markdown", conflicts_with = "cosim")]
         format: Format,
         /// Co-simulate the hardware in place of the errors: one line per scene.
-        #[arg(long, conflicts_with = "cases")]
+        #[arg(long, conflicts_with_all = ["cases", "frames"])]
         cosim: bool,
     },
     /// Measure the shear's error under noise, beside the Cramér–Rao bound.
@@ -242,7 +248,9 @@ fn run(arguments: &Arguments) -> Result<(String, bool)> {
             Ok((text, verified.findings.is_equal()))
         }
         Command::Generate(arguments) => Ok((crate::generate::run(arguments)?, true)),
-        Command::Table { scenes, cases, format, cosim: false } => Ok((table(scenes, cases, *format)?, true)),
+        Command::Table { scenes, cases, fresh, format, cosim: false } => {
+            Ok((table(scenes, cases, fresh, *format)?, true))
+        }
         Command::Noise { scene, levels, draws, seed, frames, objectives, format } => {
             let mut wanted = Study { draws: *draws, seed: *seed, frames: *frames, ..Study::default() };
             if !levels.is_empty() {
@@ -269,13 +277,20 @@ fn run(arguments: &Arguments) -> Result<(String, bool)> {
 }
 
 /// The error table of scenes, all built-in ones when none is named.
-fn table(scenes: &[String], cases: &[i64], format: Format) -> Result<String> {
+fn table(scenes: &[String], cases: &[Case], fresh: &Fresh, format: Format) -> Result<String> {
     let builtin = || Scene::builtin_names().into_iter().map(str::to_owned).collect();
     let scenes: Vec<String> = if scenes.is_empty() { builtin() } else { scenes.to_vec() };
-    let cases = if cases.is_empty() { &[0, 1, 2, 3] } else { cases };
+    let numbered: Vec<Case> = (0..4).filter_map(Case::numbered).collect();
+    let cases = if cases.is_empty() { &numbered } else { cases };
     let mut lines = Vec::new();
     for name in &scenes {
-        let (scene, frames) = resolve(Some(name), &[])?;
+        let (scene, frames) = if fresh.frames > 0 {
+            let scene = Scene::load(name)?;
+            let frames = fresh.draw(&scene)?;
+            (scene, frames)
+        } else {
+            resolve(Some(name), &[])?
+        };
         let bar = Progress::steps(&format!("{}: errors", scene.name), (cases.len() * frames.len()) as u64);
         let mut done = 0;
         let mut step = || {

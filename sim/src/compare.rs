@@ -38,9 +38,15 @@ pub fn difference(reference: &Forces, other: &Forces, lsb_N: f64) -> Difference 
 }
 
 /// The middle value; of an even number of values the larger of the two middle ones. `None` without values.
-pub fn median(mut values: Vec<f64>) -> Option<f64> {
+pub fn median(values: Vec<f64>) -> Option<f64> {
+    quantile(values, 0.5)
+}
+
+/// The smallest value that more than a share of the values, 0 … 1, does not exceed. `None` without values.
+pub fn quantile(mut values: Vec<f64>, share: f64) -> Option<f64> {
     values.sort_by(f64::total_cmp);
-    values.get(values.len() / 2).copied()
+    let last = values.len().checked_sub(1)?;
+    values.get(((share * values.len() as f64) as usize).min(last)).copied()
 }
 
 #[cfg(test)]
@@ -69,5 +75,7 @@ mod tests {
         assert_eq!(median(vec![3.0, 1.0, 2.0]), Some(2.0));
         assert_eq!(median(vec![4.0, 1.0]), Some(4.0));
         assert_eq!(median(vec![]), None);
+        let ten: Vec<f64> = (0..10).map(f64::from).collect();
+        assert_eq!((quantile(ten.clone(), 0.9), quantile(ten, 1.0)), (Some(9.0), Some(9.0)));
     }
 }

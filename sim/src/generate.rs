@@ -12,8 +12,10 @@ use anyhow::{anyhow, bail, Result};
 use clap::Args;
 use dermis_golden::frame::{Contact, Frame};
 use dermis_golden::generator::converter::Converter;
-use dermis_golden::generator::{generate, random_contacts};
+use dermis_golden::generator::{generate, random_contacts, Draw};
 use dermis_golden::scene::Scene;
+
+use crate::fresh::Shapes;
 
 /// What to generate.
 #[derive(Args, Debug)]
@@ -28,9 +30,15 @@ pub struct Arguments {
     /// Take the contacts described in a frame file.
     #[arg(long, value_name = "FILE")]
     like: Option<PathBuf>,
-    /// Draw N elliptic contacts.
+    /// Draw N contacts.
     #[arg(long, value_name = "N", default_value_t = 0)]
     random: usize,
+    /// Shapes that are drawn.
+    #[arg(long, value_enum, default_value = "elliptic")]
+    shapes: Shapes,
+    /// Drawn contacts touch each other.
+    #[arg(long)]
+    touching: bool,
     /// Start of everything drawn.
     #[arg(long, default_value_t = 1)]
     seed: u64,
@@ -80,7 +88,8 @@ pub fn run(arguments: &Arguments) -> Result<String> {
     if let Some(path) = &arguments.like {
         contacts.extend(Frame::load(path, Some(&scene))?.contacts);
     }
-    contacts.extend(random_contacts(&scene.sensor, arguments.random, arguments.seed));
+    let Arguments { random: count, shapes, touching, seed, .. } = *arguments;
+    contacts.extend(random_contacts(&scene.sensor, Draw { count, shapes: shapes.into(), touching, seed }));
     if contacts.is_empty() {
         bail!("no contact: give --contact, --like or --random");
     }

@@ -13,6 +13,7 @@
 //! | [`verilator`] | builds, caches and loads a verilated design as a [`Device`](dermis_hdl::device::Device) |
 //! | [`drive`] | plays frames into a device and records every transfer with its cycle |
 //! | [`cosim`] | compares a recording with the bit-true model |
+//! | [`fresh`] | frames of drawn contacts for `dermis table --fresh` |
 //! | [`mod@generate`] | `dermis generate`: frames with known forces from described contacts |
 //! | [`hardware`] | a scene's generated hardware and its simulators |
 //! | [`compare`] | how far two force fields are apart |
@@ -29,6 +30,7 @@ pub mod cli;
 pub mod compare;
 pub mod cosim;
 pub mod drive;
+pub mod fresh;
 pub mod generate;
 pub mod hardware;
 pub mod inputs;

@@ -11,18 +11,19 @@
 //! | errors, ℓ2, paper | fractions; X1 X2 X3 signed as in Eq. 3 |
 //! | difference | LSB of the force word, share of the largest force |
 //!
-//! ℓ2 = ‖f − f_ref‖/‖f_ref‖ over all taxels and components. The bit-true columns are empty where the hardware does not
-//! have the case.
+//! ℓ2 = ‖f − f_ref‖/‖f_ref‖ over all taxels and components. Of several contacts, whose shears may cancel, the error of
+//! the whole shear is also given over Σ|t_k|, and of case `contacts` each contact's own shear, ‖T_k − t_k‖/|t_k|, T_k of
+//! the region whose centre is nearest. The bit-true columns are empty where the hardware does not have the case.
 
 use anyhow::Result;
 use dermis_golden::errors::Errors;
 use dermis_golden::fixed::Model;
 use dermis_golden::flags::Flag;
-use dermis_golden::frame::{Forces, Frame};
+use dermis_golden::frame::{Contact, Forces, Frame};
 use dermis_golden::paper::table_2;
-use dermis_golden::partition::Case;
+use dermis_golden::partition::{subarrays, Case, PartitionError};
 use dermis_golden::quantise::full_scale;
-use dermis_golden::reconstruct::{Golden, Reconstruction};
+use dermis_golden::reconstruct::{Golden, Reconstruction, Region};
 use dermis_golden::scene::Scene;
 use serde::Serialize;
 
@@ -63,6 +64,14 @@ pub struct Line {
     pub error_case_0: Option<Errors>,
     /// Per taxel, against truth.
     pub l2: Option<f64>,
+    /// Contacts that the frame describes.
+    pub contacts: usize,
+    /// ‖T − T_ref‖/Σ|t_k|: against the shear of all contacts.
+    pub of_all: Option<f64>,
+    /// Of `contacts`, the error of each contact's own shear.
+    pub own: Vec<f64>,
+    /// The case that `adaptive` took.
+    pub taken: Option<String>,
     /// Per subarray, row-major.
     pub subarrays: Vec<Part>,
     /// The bit-true model, where it has the case.
@@ -84,11 +93,11 @@ fn paper_sensor(scene: &Scene) -> Option<u32> {
 ///
 /// # Errors
 /// A scene or frame the golden model refuses.
-pub fn tabulate(scene: &Scene, cases: &[i64], frames: &[Frame], progress: &mut dyn FnMut()) -> Result<Vec<Line>> {
+pub fn tabulate(scene: &Scene, cases: &[Case], frames: &[Frame], progress: &mut dyn FnMut()) -> Result<Vec<Line>> {
     let mut lines = Vec::new();
     let mut whole: Vec<Reconstruction> = Vec::new();
-    for case in cases.iter().filter_map(|&number| Case::numbered(number)) {
-        if dermis_golden::partition::subarrays(case, &scene.sensor).is_err() {
+    for &case in cases {
+        if matches!(subarrays(case, &scene.sensor), Err(PartitionError::NotDividing { .. })) {
             continue;
         }
         let mut scene = scene.clone();
@@ -135,6 +144,10 @@ fn line(
         error: result.error,
         error_case_0: whole.map(|whole| Errors::new(whole.resultant_N, result.resultant_N)),
         l2: frame.cell_forces_N.as_ref().and_then(|truth| relative_l2(truth, &result.forces_N)),
+        contacts: frame.contacts.len(),
+        of_all: of_all(&frame.contacts, frame.resultant_N, result.resultant_N),
+        own: result.extra.regions.as_ref().map_or(Vec::new(), |regions| own(&frame.contacts, regions)),
+        taken: result.extra.taken.as_ref().map(|taken| taken.case.clone()),
         subarrays: parts.collect(),
         fixed,
         paper: paper_sensor(scene).and_then(|sensor| table_2(sensor, case)),
@@ -151,6 +164,25 @@ fn relative_l2(truth: &Forces, value: &Forces) -> Option<f64> {
     (size > 0.0).then(|| (off / size).sqrt())
 }
 
+/// The error of the whole shear over the shear of all contacts, `None` without shear or where one is not known.
+fn of_all(contacts: &[Contact], truth: Option<[f64; 3]>, value: [f64; 3]) -> Option<f64> {
+    let truth = truth?;
+    let shears: Option<Vec<[f64; 2]>> = contacts.iter().map(|contact| contact.tangential_N).collect();
+    let all: f64 = shears?.iter().map(|[x, y]| x.hypot(*y)).sum();
+    (all > 0.0).then(|| (value[0] - truth[0]).hypot(value[1] - truth[1]) / all)
+}
+
+/// The error of each contact's shear; contacts without shear or place have none.
+fn own(contacts: &[Contact], regions: &[Region]) -> Vec<f64> {
+    let error = |contact: &Contact| {
+        let ([x, y], [tx, ty]) = (contact.centre_mm?, contact.tangential_N?);
+        let far = |region: &Region| region.centre_mm.map_or(f64::INFINITY, |at| (at[0] - x).hypot(at[1] - y));
+        let [fx, fy, _] = regions.iter().min_by(|a, b| far(a).total_cmp(&far(b)))?.load_N;
+        Some((fx - tx).hypot(fy - ty) / tx.hypot(ty)).filter(|error| error.is_finite())
+    };
+    contacts.iter().filter_map(error).collect()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -164,14 +196,41 @@ mod tests {
     }
 
     #[test]
+    fn shear_of_several_by_hand() {
+        let contact = |x: f64, tangential_N: [f64; 2]| Contact {
+            centre_mm: Some([x, 0.0]),
+            tangential_N: Some(tangential_N),
+            ..Contact::default()
+        };
+        let contacts = [contact(-5.0, [3.0, 0.0]), contact(5.0, [0.0, -1.0])];
+        assert_eq!(of_all(&contacts, Some([3.0, -1.0, 9.0]), [3.0, 1.0, 9.0]), Some(0.5));
+        assert_eq!(of_all(&[], Some([3.0, -1.0, 9.0]), [3.0, 1.0, 9.0]), None);
+        let region = |x: f64, load_N: [f64; 3]| Region {
+            centroid_condition: true,
+            mu: [0.0; 2],
+            objective_value: None,
+            centre_mm: Some([x, 0.0]),
+            load_N,
+            taxels: Vec::new(),
+        };
+        assert_eq!(own(&contacts, &[region(4.0, [0.0, -2.0, 5.0]), region(-6.0, [3.0, 1.5, 4.0])]), [0.5, 1.0]);
+    }
+
+    #[test]
     fn every_case_of_a_small_scene() {
         let scene = Scene::builtin("sensor-1").unwrap();
         let frames = &Frame::shipped(&scene)[..1];
         let mut done = 0;
-        let lines = tabulate(&scene, &[0, 1, 2, 3], frames, &mut || done += 1).unwrap();
-        assert_eq!((lines.len(), done), (4, 4));
-        assert_eq!(lines.iter().map(|line| line.subarrays.len()).collect::<Vec<_>>(), [1, 4, 2, 2]);
-        assert!(lines[0].fixed.is_some() && lines[0].error_case_0.is_none());
+        let cases = ["0", "1", "2", "3", "5x2", "3x3", "adaptive", "contacts"].map(|name| name.parse().unwrap());
+        let lines = tabulate(&scene, &cases, frames, &mut || done += 1).unwrap();
+        // Three does not divide ten.
+        assert_eq!((lines.len(), done), (7, 7));
+        assert_eq!(lines.iter().map(|line| line.subarrays.len()).collect::<Vec<_>>(), [1, 4, 2, 2, 10, 1, 1]);
+        // Every case of rectangles has its bit-true model.
+        assert!(lines.iter().all(|line| line.fixed.is_some() == !["adaptive", "contacts"].contains(&&*line.case)));
+        assert_eq!(lines[5].taken.as_deref(), Some("0"));
+        assert_eq!(lines.iter().map(|line| line.own.len()).collect::<Vec<_>>(), [0, 0, 0, 0, 0, 0, 1]);
+        assert!(lines[6].own[0] < 0.05 && lines[0].error_case_0.is_none());
         assert!(lines[1].error_case_0.is_some());
         assert_eq!(lines[0].paper, Some([0.1284, 0.1293, 0.0754]));
     }

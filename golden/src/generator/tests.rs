@@ -103,13 +103,30 @@ fn partial_slip_holds_its_load() {
 #[test]
 fn drawn_contacts_lie_inside_and_repeat() {
     let sensor = Scene::builtin("sensor-3").unwrap().sensor;
-    for seed in 0..20 {
-        let contacts = random_contacts(&sensor, 3, seed);
-        assert_eq!(contacts, random_contacts(&sensor, 3, seed));
+    for (seed, shapes) in (0..20).map(|seed| (seed, if seed < 10 { Shapes::Elliptic } else { Shapes::Other })) {
+        let draw = Draw { count: 3, shapes, touching: false, seed };
+        let contacts = random_contacts(&sensor, draw);
+        assert_eq!(contacts, random_contacts(&sensor, draw));
+        generate("drawn", &sensor, Medium::HalfSpace, &contacts).unwrap();
         for contact in contacts {
-            let ([x, y], a) = (contact.centre_mm.unwrap(), contact.size_mm[0].max(contact.size_mm[1]));
+            let ([x, y], a) = (contact.centre_mm.unwrap(), contact.size_mm[0]);
             assert!(x.abs() + a <= 20.0 && y.abs() + a <= 40.0);
         }
+    }
+}
+
+#[test]
+fn drawn_contacts_touch_where_they_are_to() {
+    let sensor = Scene::builtin("sensor-3").unwrap().sensor;
+    for seed in 0..10 {
+        let gap = |touching: bool| {
+            let draw = Draw { count: 2, shapes: Shapes::Elliptic, touching, seed };
+            let [a, b] = random_contacts(&sensor, draw).try_into().unwrap();
+            let reach = |contact: &Contact| contact.size_mm[0].max(contact.size_mm[1]);
+            let ([x, y], [u, v]) = (a.centre_mm.unwrap(), b.centre_mm.unwrap());
+            (x - u).hypot(y - v) - reach(&a) - reach(&b)
+        };
+        assert!(gap(true).abs() < 1e-9 && gap(false) > 1.0, "{} {}", gap(true), gap(false));
     }
 }
 
@@ -153,7 +170,8 @@ fn refusals_name_contact_field_and_value() {
 #[test]
 fn written_frames_come_back() {
     let sensor = Scene::builtin("sensor-1").unwrap().sensor;
-    let frame = generate("mine", &sensor, Medium::HalfSpace, &random_contacts(&sensor, 1, 7)).unwrap();
+    let draw = Draw { count: 1, shapes: Shapes::Elliptic, touching: false, seed: 7 };
+    let frame = generate("mine", &sensor, Medium::HalfSpace, &random_contacts(&sensor, draw)).unwrap();
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("mine.json");
     std::fs::write(&path, frame.to_json()).unwrap();

@@ -6,7 +6,7 @@ use serde::Serialize;
 
 use super::table::{markdown, percent};
 use super::Format;
-use crate::compare::median;
+use crate::compare::{median, quantile};
 use crate::tabulate::Line;
 
 /// Lines in one form. Fractions in CSV and JSON, percent in Markdown.
@@ -37,8 +37,13 @@ struct Medians {
     axes: [Option<f64>; 3],
     axes_case_0: [Option<f64>; 3],
     tangential: Option<f64>,
+    tangential_ninety: Option<f64>,
     normal: Option<f64>,
+    normal_ninety: Option<f64>,
     l2: Option<f64>,
+    of_all: Option<f64>,
+    of_all_ninety: Option<f64>,
+    own: Option<f64>,
     paper: Option<[f64; 3]>,
 }
 
@@ -52,16 +57,25 @@ fn axes(errors: Option<&Errors>) -> [Option<f64>; 3] {
 fn medians(lines: &[Line]) -> Vec<Medians> {
     let same = |a: &Line, b: &Line| (&a.scene, &a.case) == (&b.scene, &b.case);
     let of = |group: &[Line]| {
+        let ninety = |value: &dyn Fn(&Line) -> Option<f64>| quantile(group.iter().filter_map(value).collect(), 0.9);
         let over = |value: &dyn Fn(&Line) -> Option<f64>| median(group.iter().filter_map(value).collect());
+        let tangential = |line: &Line| line.error.as_ref()?.tangential;
+        let normal = |line: &Line| line.error.as_ref()?.normal;
+        let of_all = |line: &Line| line.of_all.filter(|_| line.contacts > 1);
         Medians {
             scene: group[0].scene.clone(),
             case: group[0].case.clone(),
             frames: group.len(),
             axes: AXES.map(|axis| over(&|line| Some(axis(line.error.as_ref()?)?.abs()))),
             axes_case_0: AXES.map(|axis| over(&|line| Some(axis(line.error_case_0.as_ref()?)?.abs()))),
-            tangential: over(&|line| line.error.as_ref()?.tangential),
-            normal: over(&|line| line.error.as_ref()?.normal),
+            tangential: over(&tangential),
+            tangential_ninety: ninety(&tangential),
+            normal: over(&normal),
+            normal_ninety: ninety(&normal),
             l2: over(&|line| line.l2),
+            of_all: over(&of_all),
+            of_all_ninety: ninety(&of_all),
+            own: median(group.iter().flat_map(|line| line.own.clone()).collect()),
             paper: group[0].paper,
         }
     };
@@ -79,6 +93,7 @@ fn text(lines: &[Line]) -> String {
         "e_t",
         "e_n",
         "ℓ2",
+        "e_t of Σ|t|",
         "to case 0: X1",
         "X2",
         "X3",
@@ -99,9 +114,11 @@ fn text(lines: &[Line]) -> String {
         let fixed = line.fixed.as_ref();
         let fixed_error = fixed.and_then(|fixed| fixed.error.as_ref());
         let error = line.error.as_ref();
-        let mut row = vec![line.scene.clone(), line.case.clone(), line.frame.clone()];
+        let case = line.taken.as_ref().map_or(line.case.clone(), |taken| format!("{}: {taken}", line.case));
+        let mut row = vec![line.scene.clone(), case, line.frame.clone()];
         row.extend(axes(error).map(percent));
         row.extend([error.and_then(|e| e.tangential), error.and_then(|e| e.normal), line.l2].map(percent));
+        row.push(percent(line.of_all));
         row.extend(axes(line.error_case_0.as_ref()).map(percent));
         row.extend(axes(fixed_error).map(percent));
         row.extend([fixed_error.and_then(|e| e.tangential), fixed_error.and_then(|e| e.normal)].map(percent));
@@ -123,8 +140,13 @@ fn text(lines: &[Line]) -> String {
         "|X2|",
         "|X3|",
         "e_t",
+        "90 %",
         "e_n",
+        "90 %",
         "ℓ2",
+        "several: e_t of Σ|t|",
+        "90 %",
+        "own e_t",
         "to case 0: |X1|",
         "|X2|",
         "|X3|",
@@ -135,13 +157,15 @@ fn text(lines: &[Line]) -> String {
     let of_medians = medians(lines).into_iter().map(|m| {
         let mut row = vec![m.scene, m.case, m.frames.to_string()];
         row.extend(m.axes.map(percent));
-        row.extend([m.tangential, m.normal, m.l2].map(percent));
+        row.extend([m.tangential, m.tangential_ninety, m.normal, m.normal_ninety, m.l2].map(percent));
+        row.extend([m.of_all, m.of_all_ninety, m.own].map(percent));
         row.extend(m.axes_case_0.map(percent));
         row.extend((0..3).map(|k| percent(m.paper.map(|paper| paper[k]))));
         row
     });
     format!(
-        "{}\nMedians over the frames; the paper's sensors 3 and 4 are against case 0.\n\n{}",
+        "{}\nMedians over the frames, and what nine of ten do not exceed; several: frames of several contacts, and with \
+         case contacts each contact's own shear. The paper's sensors 3 and 4 are against case 0.\n\n{}",
         markdown(&head, rows.collect()),
         markdown(
             &head_of_medians.map(|name| name.replace('|', "\\|")).each_ref().map(String::as_str),
@@ -151,17 +175,18 @@ fn text(lines: &[Line]) -> String {
 }
 
 fn csv(lines: &[Line]) -> String {
-    let mut text = "scene,case,frame,x1,x2,x3,e_t,e_n,l2,x1_case0,x2_case0,x3_case0,fixed_x1,fixed_x2,fixed_x3,\
+    let mut text =
+        "scene,case,taken,frame,x1,x2,x3,e_t,e_n,l2,of_all,x1_case0,x2_case0,x3_case0,fixed_x1,fixed_x2,fixed_x3,\
                     fixed_e_t,fixed_e_n,max_lsb,max_share,rms_lsb,rms_share,paper_x1,paper_x2,paper_x3,both_signs,\
-                    condition,mu\n"
-        .to_owned();
+                    condition,mu,own\n"
+            .to_owned();
     for line in lines {
         let fixed = line.fixed.as_ref();
         let fixed_error = fixed.and_then(|fixed| fixed.error.as_ref());
         let error = line.error.as_ref();
         let gap = fixed.map(|fixed| fixed.difference);
         let mut numbers: Vec<Option<f64>> = axes(error).to_vec();
-        numbers.extend([error.and_then(|e| e.tangential), error.and_then(|e| e.normal), line.l2]);
+        numbers.extend([error.and_then(|e| e.tangential), error.and_then(|e| e.normal), line.l2, line.of_all]);
         numbers.extend(axes(line.error_case_0.as_ref()));
         numbers.extend(axes(fixed_error));
         numbers.extend([fixed_error.and_then(|e| e.tangential), fixed_error.and_then(|e| e.normal)]);
@@ -179,7 +204,10 @@ fn csv(lines: &[Line]) -> String {
         let mus = line.subarrays.iter().map(|part| format!("{} {}", part.mu[0], part.mu[1]));
         let (scene, mus) = (quoted(&line.scene), mus.collect::<Vec<_>>().join(";"));
         let frame = quoted(&line.frame);
-        text.push_str(&format!("{scene},{},{frame},{},{both},{condition},{mus}\n", line.case, numbers.join(",")));
+        let own: Vec<String> = line.own.iter().map(f64::to_string).collect();
+        let (case, taken) = (&line.case, line.taken.as_deref().unwrap_or_default());
+        let (numbers, own) = (numbers.join(","), own.join(";"));
+        text.push_str(&format!("{scene},{case},{taken},{frame},{numbers},{both},{condition},{mus},{own}\n"));
     }
     text
 }
@@ -218,6 +246,10 @@ mod tests {
             error: None,
             error_case_0: None,
             l2: None,
+            contacts: 0,
+            of_all: None,
+            own: Vec::new(),
+            taken: None,
             subarrays: vec![part([0.0, 0.0], false)],
             fixed: None,
             paper: None,
@@ -230,6 +262,10 @@ mod tests {
             error: Some(error),
             error_case_0: Some(Errors { x1: Some(0.5), ..error }),
             l2: Some(0.125),
+            contacts: 2,
+            of_all: Some(0.0625),
+            own: vec![0.5, 0.75],
+            taken: Some("3".into()),
             subarrays: vec![part([0.1, -0.2], true), part([0.3, 0.4], false)],
             fixed: Some(Fixed { error: Some(Errors { x2: Some(0.75), ..error }), difference }),
             paper: Some([0.1284, 0.1293, 0.0754]),
@@ -242,7 +278,7 @@ mod tests {
     fn csv_comes_back() {
         let lines = lines();
         let (head, records) = read::csv(&errors(&lines, Format::Csv).unwrap());
-        assert_eq!((head.len(), records.len()), (27, 2));
+        assert_eq!((head.len(), records.len()), (30, 2));
         let of = |record: usize, name: &str| read::field(&head, &records[record], name).to_owned();
         assert_eq!((of(0, "scene"), of(0, "frame")), (lines[0].scene.clone(), lines[0].frame.clone()));
         let numbers = [
@@ -251,6 +287,7 @@ mod tests {
             ("e_t", 0.25),
             ("e_n", 1.0 / 3.0),
             ("l2", 0.125),
+            ("of_all", 0.0625),
             ("x1_case0", 0.5),
             ("fixed_x2", 0.75),
             ("fixed_e_t", 0.25),
@@ -268,6 +305,8 @@ mod tests {
         }
         assert_eq!(of(0, "x2"), "");
         assert_eq!((of(0, "both_signs"), of(0, "condition")), ("yn".into(), "yy".into()));
+        assert_eq!((of(0, "taken"), of(1, "taken")), ("3".into(), String::new()));
+        assert_eq!((of(0, "own"), of(1, "own")), ("0.5;0.75".into(), String::new()));
         assert_eq!((of(0, "mu"), of(1, "mu")), ("0.1 -0.2;0.3 0.4".into(), "0 0".into()));
     }
 
@@ -291,13 +330,14 @@ mod tests {
         assert_eq!(medians.len(), 2);
         // By size: the sign of X1 is gone.
         assert_eq!((&medians[0]["axes"][0], &medians[0]["frames"]), (&Value::from(0.1), &Value::from(1)));
+        assert_eq!((&medians[0]["of_all_ninety"], &medians[0]["own"]), (&Value::from(0.0625), &Value::from(0.75)));
         assert_eq!(medians[1]["tangential"], Value::Null);
     }
 
     #[test]
     fn no_lines_are_a_head_alone() {
         let (head, records) = read::csv(&errors(&[], Format::Csv).unwrap());
-        assert_eq!((head.len(), records.len()), (27, 0));
+        assert_eq!((head.len(), records.len()), (30, 0));
         assert_eq!(errors(&[], Format::Json).unwrap(), "{\"lines\":[],\"medians\":[]}\n");
     }
 }
