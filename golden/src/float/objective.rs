@@ -72,9 +72,11 @@ pub fn of_kind(kind: ObjectiveKind, sensor: &Sensor) -> Box<dyn Objective + Send
     }
 }
 
-/// ε of the pipeline. From 2⁻¹⁶ to 2⁻²⁰ results are alike, 2⁻¹⁴ ruins them.
-pub const EPSILON: f64 = 1.0 / (1 << 17) as f64;
-/// Values multiplied before a logarithm is taken. With ε = 2⁻¹⁷ a product of 8 is at least 2⁻¹³⁶, far from underflow.
+/// ε of the floating-point model. Nine of ten of 400 fresh frames of sensor 1 (`dermis table sensor-1 --case 0 --fresh
+/// 400`) are found to 8 % with 2⁻¹⁷, 6 % with 2⁻¹⁹, 5 % with 2⁻²⁰; from there on partial slip is found worse. The
+/// integers of the hardware resolve 2⁻¹⁷.
+pub const EPSILON: f64 = 1.0 / (1 << 19) as f64;
+/// Values multiplied before a logarithm is taken. With ε = 2⁻¹⁹ a product of 8 is at least 2⁻¹⁵², far from underflow.
 const CHUNK: usize = 8;
 
 /// The default objective.
@@ -145,7 +147,7 @@ mod tests {
         let mut peak = vec![0.0; 100];
         peak[17] = 1.0;
         assert!(objective.score(&peak) > objective.score(&[0.01; 100]));
-        assert!(objective.score(&peak).unwrap() <= 1700.0);
+        assert!(objective.score(&peak).unwrap() <= 1900.0);
     }
 
     #[test]
