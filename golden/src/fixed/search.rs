@@ -5,7 +5,7 @@
 //! halving of the step divides w_ij by 2^(i+j), floored. One sweep over the taxels shifts, evaluates the nine candidates of the 3×3 about
 //! the new centre and adds up
 //! ```text
-//! score = Σ_taxels log2(|p| + ⌊Σp / 2^17⌋) − n log2 Σp        (−Π; the smallest wins)
+//! score = Σ_taxels log2(|p| + ⌊Σp / 2^20⌋) − n log2 Σp        (−Π; the smallest wins)
 //! ```
 //! with Σp from the sum of the polynomials, shifted alongside. Eight sweeps walk the coarse tiles that cover the disc, seven
 //! halve the step. A candidate outside the disc or with Σp ≤ 0 is never taken. Ties: in the
@@ -249,9 +249,9 @@ mod tests {
     #[test]
     fn logarithms_by_hand() {
         assert_eq!(log2(0), log2(1));
-        // 1 stands for the cell 1 … 1 + 1/64, of which the table holds the middle.
-        assert_eq!(log2(1), ((1.0f64 + 0.5 / 64.0).log2() * 1024.0).round() as i64);
-        assert_eq!(log2(1 << 20), (20 << 10) + log2(1));
+        // 1 stands for the cell 1 … 1 + 1/16, of which the table holds the middle: 2^6 log2(1 + 1/32) = 2.84.
+        assert_eq!(log2(1), 3);
+        assert_eq!(log2(1 << 20), 20 * 64 + 3);
     }
 
     proptest! {
@@ -281,11 +281,11 @@ mod tests {
             prop_assert!((direct(&halve(&w), x, y) as f64 - exact).abs() <= 9.0);
         }
 
-        /// The table's logarithm is within half a cell: log2(1 + 1/64) / 2 plus rounding.
+        /// The table's logarithm is within half a cell: log2(1 + 1/16) / 2 plus rounding.
         #[test]
         fn logarithm_is_within_half_a_cell(x in 64i64..(1i64 << 50)) {
-            let error = log2(x) as f64 / 1024.0 - (x as f64).log2();
-            prop_assert!(error.abs() <= (1.0f64 + 1.0 / 64.0).log2() / 2.0 + 1.0 / 1024.0, "{error}");
+            let error = log2(x) as f64 / 64.0 - (x as f64).log2();
+            prop_assert!(error.abs() <= (1.0f64 + 1.0 / 16.0).log2() / 2.0 + 1.0 / 64.0, "{error}");
         }
     }
 

@@ -6,7 +6,7 @@
 //! | beat | fx word | fy word | fz word |
 //! |---|---|---|---|
 //! | 0 | μ1 in mu_max/384 | μ2 in mu_max/384 | flags, see [`Status`] |
-//! | 1 | score, 2^−10 | right shift of `rescale` | left shift of `normalise` |
+//! | 1 | score, 2^−6 | right shift of `rescale` | left shift of `normalise` |
 //! | 2 | saturations of `rescale` | saturations of `force` | cycles to the first output beat, see [`Status::cycles`] |
 
 use serde::Serialize;

@@ -21,7 +21,7 @@ fn everything_but_the_sensor_has_a_default() {
     assert_eq!(scene, default);
     assert_eq!(
         scene.fixed,
-        FixedSpec { input_bits: 20, data_bits: 18, coef_bits: 18, inverse_bits: 24, prune_bits: 20 }
+        FixedSpec { input_bits: 20, data_bits: 18, coef_bits: 18, inverse_bits: 24, prune_bits: 20, lanes: None }
     );
     assert_eq!((scene.search.mu_max, scene.hardware.board.as_str()), (0.6, "ulx3s-85f"));
     assert!(scene.require_supported().is_ok());
@@ -70,7 +70,7 @@ fn every_field_is_read() {
     assert_eq!(scene.threshold.min_force_N, 0.01);
     assert_eq!(
         scene.fixed,
-        FixedSpec { input_bits: 16, data_bits: 16, coef_bits: 14, inverse_bits: 18, prune_bits: 20 }
+        FixedSpec { input_bits: 16, data_bits: 16, coef_bits: 14, inverse_bits: 18, prune_bits: 20, lanes: None }
     );
     let input = InputSpec {
         full_scale_MPa: Some(0.25),

@@ -1,4 +1,4 @@
-//! The sparse objective over one sweep: Σ log2(|p| + ⌊Σp / 2^17⌋) for nine candidates at once.
+//! The sparse objective over one sweep: Σ log2(|p| + ⌊Σp / 2^20⌋) for nine candidates at once.
 
 use dermis_golden::fixed::formats::{Formats, EPSILON_SHIFT, LOG_TABLE_BITS};
 use dermis_golden::fixed::search::log2;
