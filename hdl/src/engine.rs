@@ -7,14 +7,16 @@
 //! ```
 //! Three things go on at once: while one subarray is searched, the next one's v_ij are computed; while a frame is
 //! computed, the next is received into the frame buffer, which is free again as soon as `fold` has read it; while a frame
-//! is sent, the next one's first v_ij are computed, and wait until it is out.
+//! is sent, the next one's first v_ij are computed, and wait until it is out. (Without a search there is no memory where they
+//! could wait: then a frame begins when the last one is out.)
 
 use dermis_golden::fixed::Model;
 use dermis_golden::scene::Condition;
 use rust_hdl::prelude::*;
 
+use super::Search;
 use crate::primitives::{count_bits, BitDelay, Counter, Keep, CYCLE_BITS};
-use crate::stages::{Fold, Force, Normalise, Pass, Receive, Rescale, Search, Send, Unfold};
+use crate::stages::{Fold, Force, Normalise, Pass, Receive, Rescale, Send, Unfold};
 use crate::wire::Wire;
 
 /// ```text
@@ -79,6 +81,7 @@ pub struct Engine {
     again: BitDelay,
     finish: BitDelay,
     both_signs: Constant<Bit>,
+    ahead: Constant<Bit>,
     begin_frame: Signal<Local, Bit>,
     start: Signal<Local, Bit>,
     complete: Signal<Local, Bit>,
@@ -137,6 +140,7 @@ impl Engine {
             // The first beat, which takes the count of cycles, is out by then.
             finish: BitDelay::new(6),
             both_signs: Constant::new(model.scene.partition.condition == Condition::BothSigns),
+            ahead: Constant::new(model.searches()),
             begin_frame: Default::default(),
             start: Default::default(),
             complete: Default::default(),
@@ -191,7 +195,10 @@ impl Logic for Engine {
         self.send.rst.next = self.rst.val();
 
         comment!("A frame begins when it is whole and the last one computed");
-        self.begin_frame.next = self.receive.full.val() & !self.computing.q.val() & !self.rst.val();
+        self.begin_frame.next = self.receive.full.val()
+            & !self.computing.q.val()
+            & (!self.sending.q.val() | self.ahead.val())
+            & !self.rst.val();
         self.computing.d.next =
             (self.begin_frame.val() | (self.computing.q.val() & !self.finish.then.val())) & !self.rst.val();
 
@@ -289,7 +296,10 @@ impl Logic for Engine {
         comment!("search -> force -> send");
         self.forces.values.next = self.search.values.val();
         self.forces.values_valid.next = self.search.values_valid.val();
-        self.forces.begin_frame.next = self.hand_over.val() & self.first.q.val();
+        self.forces.begin_frame.next = self.begin_frame.val();
+        if self.ahead.val() {
+            self.forces.begin_frame.next = self.hand_over.val() & self.first.q.val();
+        }
         self.forces.start.next = self.search.settled.val();
         self.forces.part.next = self.searched_part.kept.val();
         self.forces.position_x.next = self.search.best_x.val();

@@ -1,17 +1,19 @@
 //! The engine as files: Verilog, memory files, lint waivers, manifest.
 
+use std::collections::BTreeMap;
+
 use dermis_golden::fixed::resources::Memory;
 use dermis_golden::fixed::send::{FLAG_CONDITION, FLAG_FOUND, FLAG_FRAMING, FLAG_NO_CONTACT};
 use dermis_golden::fixed::storage::word_bits;
 use dermis_golden::fixed::{Cycles, Model};
-use rust_hdl::prelude::*;
 use serde_json::json;
 use thiserror::Error;
 
 use crate::device::Tap;
-use crate::engine::Engine;
-use crate::primitives::{COLUMN_FILE, MEMORY_FILE};
+use crate::primitives::MEMORY_FILE;
+use crate::simulate::design;
 use crate::taps::taps;
+use crate::usage::{stages, total, Usage};
 
 /// Version of the generated files' meaning; a reader refuses another one.
 const MANIFEST_VERSION: u32 = 1;
@@ -19,16 +21,6 @@ const MANIFEST_VERSION: u32 = 1;
 /// Why a model has no hardware.
 #[derive(Debug, Error)]
 pub enum HdlError {
-    /// The scene asks for less than this engine can leave out.
-    #[error("{field} = {value}: the hardware without {what} is not available yet")]
-    Unsupported {
-        /// The scene's field.
-        field: &'static str,
-        /// Its value.
-        value: String,
-        /// What would be left out.
-        what: &'static str,
-    },
     /// rust-hdl's checks of the description failed; a defect of this crate.
     #[error("internal: the hardware description does not pass its checks: {0}")]
     Check(String),
@@ -54,20 +46,8 @@ pub struct Generated {
     pub taps: Vec<Tap>,
     /// Content of `manifest.json`.
     pub manifest: serde_json::Value,
-}
-
-/// The engine of `model`, checked.
-pub(crate) fn engine(model: &Model) -> Result<Engine, HdlError> {
-    if !model.searches() {
-        return Err(HdlError::Unsupported {
-            field: "search.mu_max",
-            value: model.scene.search.mu_max.to_string(),
-            what: "a μ search",
-        });
-    }
-    let engine = Engine::new(model);
-    check_all(&engine).map_err(|error| HdlError::Check(format!("{error:?}")))?;
-    Ok(engine)
+    /// What each stage takes of the device.
+    pub usage: BTreeMap<String, Usage>,
 }
 
 /// Generates the hardware of `model`. The same model always gives the same bytes.
@@ -75,20 +55,20 @@ pub(crate) fn engine(model: &Model) -> Result<Engine, HdlError> {
 /// # Errors
 /// [`HdlError`] when the scene leaves out what this engine always has.
 pub fn generate(model: &Model) -> Result<Generated, HdlError> {
-    let engine = engine(model)?;
+    let engine = design(model)?;
     let top = top_name(&model.scene.name);
-    let manifest = manifest(model, &top);
     let file = |name: String, text: String| GeneratedFile { name, text };
-    let verilog = place(&generate_verilog_unchecked(&engine), model)?;
+    let verilog = place(&engine.verilog(), model)?;
+    let usage = stages(model, &verilog);
+    let manifest = manifest(model, &top, &usage);
     let verilog = header(model, &top) + &rename(&verilog, &top);
     let mut files = vec![
         file(format!("{top}.v"), verilog),
-        file(MEMORY_FILE.to_string(), engine.pass.lanes.memory_file()),
         file(format!("{top}.vlt"), include_str!("waivers.vlt").to_string()),
         file("manifest.json".to_string(), format!("{manifest:#}\n")),
     ];
-    files.extend(engine.pass.steps.column_file().map(|text| file(COLUMN_FILE.to_string(), text)));
-    Ok(Generated { top, files, taps: taps(model), manifest })
+    files.extend(engine.memory_files().into_iter().map(|(name, text)| file(name.to_string(), text)));
+    Ok(Generated { top, files, taps: taps(model), manifest, usage })
 }
 
 /// Marks every memory of the model with where the synthesiser is to put it.
@@ -158,7 +138,7 @@ fn header(model: &Model, top: &str) -> String {
     )
 }
 
-fn manifest(model: &Model, top: &str) -> serde_json::Value {
+fn manifest(model: &Model, top: &str, usage: &BTreeMap<String, Usage>) -> serde_json::Value {
     let (scene, f) = (&model.scene, &model.formats);
     let full_scale = scene.input.full_scale_MPa;
     json!({
@@ -196,10 +176,9 @@ fn manifest(model: &Model, top: &str) -> serde_json::Value {
             "coefficient_word_bits": word_bits(f),
         },
         "resources": {
-            "block_rams": model.resources.block_rams(),
-            "multipliers": model.resources.multipliers(),
+            "total": total(usage),
+            "stages": usage,
             "memories": model.resources.memories,
-            "multipliers_by_block": model.resources.multipliers,
         },
         "cycles": {
             "searched": Cycles::of(model, &vec![true; model.parts.len()]),

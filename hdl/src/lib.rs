@@ -15,13 +15,19 @@ macro_rules! comment {
 
 pub mod device;
 pub mod engine;
+pub mod estimate;
 pub mod primitives;
 pub mod stages;
+pub mod unsearched;
+pub mod usage;
 pub mod wire;
 
 mod generate;
 mod simulate;
 mod taps;
+
+// The search of [`engine`]; that of [`unsearched`] is another one.
+use stages::Search;
 
 pub use generate::{generate, Generated, GeneratedFile, HdlError};
 pub use simulate::simulator;

@@ -4,16 +4,104 @@ use dermis_golden::fixed::Model;
 use rust_hdl::prelude::*;
 
 use crate::device::{Device, Inputs, Outputs, Tap};
-use crate::engine::Engine;
-use crate::generate::{engine, HdlError};
-use crate::taps::{sample, taps};
+use crate::generate::HdlError;
+use crate::primitives::{position_bits, COLUMN_FILE, MEMORY_FILE};
+use crate::taps::{taps, SEARCH_FIELD};
 use crate::wire::Word;
+use crate::{engine, unsearched};
 
 /// Update rounds after which signals that still change are taken for a combinational loop.
 const SETTLE_ROUNDS: usize = 200;
 
+/// What every engine does in a simulation and in generation, whatever its stages.
+pub(crate) trait Design: Block {
+    /// Puts the inputs and the clock on the pins.
+    fn drive(&mut self, inputs: &Inputs, clock: bool);
+    /// The outputs, and the stages' streams in the order of their taps.
+    fn observe(&self, taps: &[Tap]) -> Outputs;
+    /// The Verilog.
+    fn verilog(&self) -> String;
+    /// Memory files beside the Verilog: name and text.
+    fn memory_files(&self) -> Vec<(&'static str, String)>;
+}
+
+macro_rules! design {
+    ($engine:ty) => {
+        impl Design for $engine {
+            fn drive(&mut self, inputs: &Inputs, clock: bool) {
+                self.rst.next = inputs.rst;
+                self.s_axis_tvalid.next = inputs.s_valid;
+                self.s_axis_tdata.next = Word::of_fields(&[i64::from(inputs.s_data)], self.s_axis_tdata.width());
+                self.s_axis_tlast.next = inputs.s_last;
+                self.m_axis_tready.next = inputs.m_ready;
+                self.clk.next = clock.into();
+            }
+
+            fn observe(&self, taps: &[Tap]) -> Outputs {
+                let search = &self.search;
+                let best = Word::of_fields(
+                    &[
+                        search.best_x.val().signed(0, position_bits()),
+                        search.best_y.val().signed(0, position_bits()),
+                        search.score.val().signed(0, search.score.width()),
+                        i64::from(search.taken.val()),
+                    ],
+                    SEARCH_FIELD as usize,
+                );
+                let streams = [
+                    (self.receive.accept.val(), self.receive.s_axis_tdata.val()),
+                    (self.fold.normalised_valid.val(), self.normalise.shifted.val()),
+                    (self.fold.folded_valid.val(), self.fold.folded.val()),
+                    (self.pass.quad_valid.val(), self.pass.quad.val()),
+                    (self.rescale.words_valid.val(), self.rescale.words.val()),
+                    (self.unfold.taxels_valid.val(), self.unfold.taxels.val()),
+                    (search.judged.val(), best),
+                    (search.values_valid.val(), search.values.val()),
+                ];
+                let sample = |((valid, word), tap): (&(bool, Word), &Tap)| {
+                    valid.then(|| (0..tap.fields).map(|field| word.signed(field, tap.field_bits as usize)).collect())
+                };
+                let data = self.m_axis_tdata.val();
+                Outputs {
+                    s_ready: self.s_axis_tready.val(),
+                    m_valid: self.m_axis_tvalid.val(),
+                    m_data: [0, 1, 2].map(|word| data.signed(word, 32) as i32),
+                    m_last: self.m_axis_tlast.val(),
+                    taps: streams.iter().zip(taps).map(sample).collect(),
+                }
+            }
+
+            fn verilog(&self) -> String {
+                generate_verilog_unchecked(self)
+            }
+
+            fn memory_files(&self) -> Vec<(&'static str, String)> {
+                let columns = self.pass.steps.column_file().map(|text| (COLUMN_FILE, text));
+                [(MEMORY_FILE, self.pass.lanes.memory_file())].into_iter().chain(columns).collect()
+            }
+        }
+    };
+}
+
+design!(engine::Engine);
+design!(unsearched::engine::Engine);
+
+/// The engine of `model`, checked.
+pub(crate) fn design(model: &Model) -> Result<Box<dyn Design>, HdlError> {
+    let design: Box<dyn Design> = match model.searches() {
+        true => checked(engine::Engine::new(model))?,
+        false => checked(unsearched::engine::Engine::new(model))?,
+    };
+    Ok(design)
+}
+
+fn checked<E: Design + 'static>(engine: E) -> Result<Box<dyn Design>, HdlError> {
+    check_all(&engine).map_err(|error| HdlError::Check(format!("{error:?}")))?;
+    Ok(Box::new(engine))
+}
+
 struct Simulator {
-    engine: Engine,
+    engine: Box<dyn Design>,
     taps: Vec<Tap>,
 }
 
@@ -22,36 +110,25 @@ struct Simulator {
 /// # Errors
 /// As [`crate::generate`].
 pub fn simulator(model: &Model) -> Result<Box<dyn Device>, HdlError> {
-    Ok(Box::new(Simulator { engine: engine(model)?, taps: taps(model) }))
+    Ok(Box::new(Simulator { engine: design(model)?, taps: taps(model) }))
 }
 
 impl Simulator {
-    fn settle(&mut self, clock: bool) {
-        self.engine.clk.next = clock.into();
-        let settled = simulate(&mut self.engine, SETTLE_ROUNDS);
+    fn settle(&mut self, inputs: &Inputs, clock: bool) {
+        self.engine.drive(inputs, clock);
+        let settled = (0..SETTLE_ROUNDS).any(|_| {
+            self.engine.update_all();
+            !self.engine.has_changed()
+        });
         assert!(settled, "the engine has a combinational loop: a defect of this crate");
     }
 }
 
 impl Device for Simulator {
     fn cycle(&mut self, inputs: &Inputs) -> Outputs {
-        let engine = &mut self.engine;
-        engine.rst.next = inputs.rst;
-        engine.s_axis_tvalid.next = inputs.s_valid;
-        engine.s_axis_tdata.next = Word::of_fields(&[i64::from(inputs.s_data)], engine.s_axis_tdata.width());
-        engine.s_axis_tlast.next = inputs.s_last;
-        engine.m_axis_tready.next = inputs.m_ready;
-        self.settle(false);
-        let engine = &self.engine;
-        let data = engine.m_axis_tdata.val();
-        let outputs = Outputs {
-            s_ready: engine.s_axis_tready.val(),
-            m_valid: engine.m_axis_tvalid.val(),
-            m_data: [0, 1, 2].map(|word| data.signed(word, 32) as i32),
-            m_last: engine.m_axis_tlast.val(),
-            taps: sample(engine, &self.taps),
-        };
-        self.settle(true);
+        self.settle(inputs, false);
+        let outputs = self.engine.observe(&self.taps);
+        self.settle(inputs, true);
         outputs
     }
 }

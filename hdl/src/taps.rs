@@ -3,12 +3,10 @@
 use dermis_golden::fixed::Model;
 
 use crate::device::Tap;
-use crate::engine::Engine;
 use crate::primitives::position_bits;
-use crate::wire::Word;
 
 /// Field width of the search's tap, whose fields have different widths in hardware.
-const SEARCH_FIELD: u32 = 32;
+pub const SEARCH_FIELD: u32 = 32;
 
 /// Names, Verilog expressions and shapes, in pipeline order.
 pub fn taps(model: &Model) -> Vec<Tap> {
@@ -41,35 +39,4 @@ pub fn taps(model: &Model) -> Vec<Tap> {
         Tap { name: "search", valid: "{}search$judged".into(), data: search, fields: 4, field_bits: SEARCH_FIELD },
         tap("force", "search$values_valid", "search$values", 4, f.search_bits[0]),
     ]
-}
-
-/// The same streams in a cycle of rust-hdl's simulation.
-pub fn sample(engine: &Engine, taps: &[Tap]) -> Vec<Option<Vec<i64>>> {
-    let search = &engine.search;
-    let best = Word::of_fields(
-        &[
-            search.best_x.val().signed(0, position_bits()),
-            search.best_y.val().signed(0, position_bits()),
-            search.score.val().signed(0, search.score.width()),
-            i64::from(search.taken.val()),
-        ],
-        SEARCH_FIELD as usize,
-    );
-    let streams = [
-        (engine.receive.accept.val(), engine.receive.s_axis_tdata.val()),
-        (engine.fold.normalised_valid.val(), engine.normalise.shifted.val()),
-        (engine.fold.folded_valid.val(), engine.fold.folded.val()),
-        (engine.pass.quad_valid.val(), engine.pass.quad.val()),
-        (engine.rescale.words_valid.val(), engine.rescale.words.val()),
-        (engine.unfold.taxels_valid.val(), engine.unfold.taxels.val()),
-        (search.judged.val(), best),
-        (search.values_valid.val(), search.values.val()),
-    ];
-    streams
-        .iter()
-        .zip(taps)
-        .map(|((valid, word), tap)| {
-            valid.then(|| (0..tap.fields).map(|field| word.signed(field, tap.field_bits as usize)).collect())
-        })
-        .collect()
 }

@@ -26,6 +26,7 @@ use crate::compare::difference;
 use crate::fresh::Fresh;
 use crate::hardware::{Hardware, Simulator, Stuck};
 use crate::inputs::{resolve, resolve_one};
+use crate::needs::resources;
 use crate::progress::Progress;
 use crate::report::{self, CosimReport, Format};
 use crate::tabulate::tabulate;
@@ -334,7 +335,8 @@ fn against_golden(scene: &Scene, frame: &Frame, result: &Reconstruction) -> Resu
 
 /// Writes the generated files, each complete or not at all, and lists them.
 fn build(scene: &Scene, out: &Path) -> Result<String> {
-    let generated = generate(&Model::new(scene)?)?;
+    let model = Model::new(scene)?;
+    let generated = generate(&model)?;
     std::fs::create_dir_all(out).map_err(|e| anyhow!("{}: {e}", out.display()))?;
     let mut text = String::new();
     for file in &generated.files {
@@ -345,6 +347,7 @@ fn build(scene: &Scene, out: &Path) -> Result<String> {
             .map_err(|e| anyhow!("{}: {e}", path.display()))?;
         text.push_str(&format!("{} ({} bytes)\n", path.display(), file.text.len()));
     }
+    text.push_str(&resources(&model, &generated.usage));
     Ok(text)
 }
 

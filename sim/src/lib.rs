@@ -34,6 +34,7 @@ pub mod fresh;
 pub mod generate;
 pub mod hardware;
 pub mod inputs;
+pub mod needs;
 mod progress;
 pub mod report;
 pub mod tabulate;

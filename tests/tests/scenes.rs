@@ -14,7 +14,7 @@ use dermis_tests::build_dir;
 use proptest::prelude::*;
 
 /// Name, and what differs from an ordinary scene of 6×6 taxels.
-const SCENES: [(&str, &str); 7] = [
+const SCENES: [(&str, &str); 8] = [
     // Six subarrays in turn, odd rows.
     ("partition", "[sensor]\nrows = 10\ncols = 12\npitch_x_mm = 2.0\npitch_y_mm = 4.0\nthickness_mm = 3.0\n[partition]\nrows = 2\ncols = 3\n"),
     // Ax serves for Ay, and columns are left out.
@@ -23,6 +23,8 @@ const SCENES: [(&str, &str); 7] = [
     ("odd", "[sensor]\nrows = 5\ncols = 7\npitch_x_mm = 2.0\npitch_y_mm = 4.0\nthickness_mm = 3.0\n"),
     // Degree 1: a small r leaves seven of ten coefficients out.
     ("degree-1", "[search]\nmu_max = 0.05\n"),
+    // No search, in two subarrays.
+    ("no-search", "[search]\nmu_max = 0\n[partition]\ncase = 2\n"),
     // No limbs, the smallest words.
     ("narrow", "[fixed]\ninput_bits = 8\ndata_bits = 12\ncoef_bits = 8\ninverse_bits = 8\n"),
     // A low limb of Cz⁺ and none of the input.

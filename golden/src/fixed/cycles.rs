@@ -43,6 +43,8 @@ pub const SHORTEST_SWEEP: u64 = 4;
 pub const COARSE_PERIOD: u64 = SWEEP;
 /// The last sweep beyond its Q quads.
 const LAST_SWEEP: u64 = 4;
+/// From a subarray's values to their sending, where nothing is searched.
+const UNSEARCHED: u64 = 1;
 /// From the start of a subarray's search to that of the next one's passes.
 const NEXT: u64 = 1;
 /// From the last subarray's first value, which stands Q cycles before their end, to the first beat on the output.
@@ -67,16 +69,21 @@ impl Cycles {
         let chained = COARSE_CENTRES.len() as u64 - 1;
         let awaited = 1 + u64::from(HALVINGS);
         let sweeps = chained * quads.max(COARSE_PERIOD) + awaited * (quads.max(SHORTEST_SWEEP) + SWEEP);
+        let search = |&searching: &bool| match model.searches() {
+            true => BEGIN + if searching { sweeps } else { 0 } + quads + LAST_SWEEP,
+            false => UNSEARCHED,
+        };
         // A subarray is handed over when it is complete and the one before has been searched.
         let (mut complete, mut searched_at) = (0, 0);
-        for &searching in searched {
+        for searching in searched {
             complete += passes(model);
             let handed_over = complete.max(searched_at);
-            searched_at = handed_over + BEGIN + if searching { sweeps } else { 0 } + quads + LAST_SWEEP;
+            searched_at = handed_over + search(searching);
             complete = handed_over + NEXT;
         }
-        // The last subarray's values leave while they come.
-        let first_output = ACCEPT + searched_at - quads + SEND;
+        // Out of a search the last subarray's values leave while they come.
+        let early = if model.searches() { quads } else { 0 };
+        let first_output = ACCEPT + searched_at - early + SEND;
         let latency = first_output + taxels + model.status_beats() as u64 - 1;
         Cycles { first_output, latency, total: taxels + latency }
     }
@@ -84,11 +91,33 @@ impl Cycles {
 
 /// From a subarray's start to its last coefficient in the search memory.
 fn passes(model: &Model) -> u64 {
+    timeline(model).last_row + UNFOLD
+}
+
+/// Share of the multiplications that the lanes do of those they could, from a subarray's first product to its last.
+pub fn lanes_busy(model: &Model) -> f64 {
+    let Timeline { first_issue, last_issue, products, .. } = timeline(model);
+    let lanes = 4 * model.formats.lanes_per_parity as u64;
+    products as f64 / ((last_issue + 1 - first_issue) * lanes) as f64
+}
+
+/// When a subarray's products are issued, in cycles from its start.
+struct Timeline {
+    first_issue: u64,
+    last_issue: u64,
+    /// Multiplications by a row of the subarray; the last group of rows may leave lanes without one.
+    products: u64,
+    /// When the last row leaves the lanes.
+    last_row: u64,
+}
+
+fn timeline(model: &Model) -> Timeline {
     let (formats, storage) = (&model.formats, &model.storage);
     let quads = formats.quads as u64;
     let last_rows = quads - (formats.groups as u64 - 1) * formats.lanes_per_parity as u64;
     let lanes = LANES + if storage.is_listed(formats) { COLUMNS } else { 0 };
-    let mut now = quads + FOLD;
+    let first_issue = quads + FOLD;
+    let (mut now, mut products_done) = (first_issue, 0);
     let mut finished: Vec<u64> = Vec::new();
     let mut last_row = 0;
     for (k, products) in schedule(formats).iter().enumerate() {
@@ -97,7 +126,10 @@ fn passes(model: &Model) -> u64 {
                 if k > 0 {
                     now = now.max(finished[product.operand_index()]);
                 }
-                now += storage.columns_of(product.matrix, group).len() as u64;
+                let columns = storage.columns_of(product.matrix, group).len() as u64;
+                let rows = if group + 1 == formats.groups { last_rows } else { formats.lanes_per_parity as u64 };
+                products_done += 4 * columns * rows;
+                now += columns;
             }
         }
         last_row = now - 1 + lanes + last_rows - 1;
@@ -106,5 +138,5 @@ fn passes(model: &Model) -> u64 {
         }
         finished.push(last_row + OPERAND);
     }
-    last_row + UNFOLD
+    Timeline { first_issue, last_issue: now - 1, products: products_done, last_row }
 }

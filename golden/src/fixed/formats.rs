@@ -198,7 +198,11 @@ pub fn derive(scene: &Scene, matrices: &Matrices, parts: usize, board: &Board) -
         .collect();
     let shifted: Vec<u64> = (0..used).map(|k| reach(&coefficients, k)).collect();
     let taxels = (quads.rows * quads.cols) as u64;
-    let search_bits: Vec<u32> = shifted.iter().map(|&bound| signed_bits(bound)).collect();
+    // Without a search v_00 stays as it is unfolded.
+    let search_bits: Vec<u32> = match matrices.degree {
+        0 => vec![vector_bits + 2],
+        _ => shifted.iter().map(|&bound| signed_bits(bound)).collect(),
+    };
     let sum_bits: Vec<u32> = shifted.iter().map(|&bound| signed_bits(bound * taxels)).collect();
 
     // A logarithm is below 2^6; the difference of two sums of `taxels` of them needs a sign.

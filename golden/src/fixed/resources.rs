@@ -74,9 +74,9 @@ pub fn position_bits() -> usize {
     signed_bits(4 << HALVINGS) as usize
 }
 
-/// The v_ij that later passes read: all but those of the highest degree; at least one, unread at degree 0.
+/// The v_ij that later passes read: all but those of the highest degree.
 pub fn operand_vectors(degree: usize) -> usize {
-    vectors(degree.saturating_sub(1))
+    degree.checked_sub(1).map_or(0, vectors)
 }
 
 impl Resources {
@@ -96,13 +96,15 @@ impl Resources {
             .map(|lane| memory("receive$frame", &format!("field{lane}"), parts * quads, f.input_bits as usize, false))
             .collect();
         memories.push(ram("fold$memory", quads, quad(f.fold_bits)));
-        memories.push(ram("pass$vectors", operand_vectors(f.degree) * quads, quad(f.data_bits)));
+        if f.degree > 0 {
+            memories.push(ram("pass$vectors", operand_vectors(f.degree) * quads, quad(f.data_bits)));
+        }
         memories.push(memory("pass$lanes", "memory", storage.words(), word_bits(f), true));
         if storage.is_listed(f) {
             memories.push(memory("pass$steps", "columns", storage.words(), 2 * count_bits(quads), true));
         }
         memories.push(ram("rescale$raw", quads, quad(f.acc_bits)));
-        for (k, &bits) in f.search_bits.iter().enumerate() {
+        for (k, &bits) in f.search_bits.iter().enumerate().filter(|_| f.degree > 0) {
             memories.push(memory("search$store", &format!("memory{k}"), SEARCH_BUFFERS * quads, quad(bits), false));
             if parts > 1 {
                 memories.push(memory("search$store", &format!("start{k}"), quads, quad(bits), false));
@@ -145,8 +147,11 @@ impl Resources {
     }
 }
 
-/// Multipliers of the force unit: μ1 and μ2 from their positions, and both times p.
+/// Multipliers of the force unit: μ1 and μ2 from their positions, and both times p; none without a search.
 pub fn force_multipliers(formats: &Formats, board: &Board) -> usize {
+    if formats.degree == 0 {
+        return 0;
+    }
     let step = signed_bits(formats.mu_step.unsigned_abs());
     // A step that is a power of two is wiring.
     let words = if formats.mu_step.count_ones() == 1 { 0 } else { board.multipliers_for(position_bits() as u32, step) };

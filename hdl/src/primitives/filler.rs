@@ -33,7 +33,7 @@ impl Filler {
             clk: Default::default(),
             clear: Default::default(),
             valid: Default::default(),
-            address: Wire::new(count_bits(vectors * quads)),
+            address: Wire::new(count_bits(vectors.max(1) * quads)),
             keep: Default::default(),
             finished: Wire::new(count_bits(vectors + 1)),
             _quads: quads,
@@ -53,7 +53,7 @@ impl Logic for Filler {
             }
         }
         let all = self._vectors * self._quads;
-        self.address.next = Word::from(self._seen.min(all - 1) as u64);
+        self.address.next = Word::from(self._seen.min(all.saturating_sub(1)) as u64);
         self.finished.next = Word::from((self._seen / self._quads) as u64);
         self.keep.next = self.valid.val() && self._seen < all;
     }
@@ -67,6 +67,13 @@ impl Logic for Filler {
     fn hdl(&self) -> Verilog {
         let (a, f) = (self.address.width(), self.finished.width());
         let q = count_bits(self._quads);
+        if self._vectors == 0 {
+            return Verilog::Custom(format!(
+                "// No v_ij is an operand.\nwire unused = &{{1'b0, clk, clear, valid}};\n\
+                 always @(*) {{keep, address, finished}} = {}'d0;",
+                1 + a + f
+            ));
+        }
         Verilog::Custom(format!(
             "\
 reg [{q_end}:0] quad;

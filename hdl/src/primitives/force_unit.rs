@@ -183,6 +183,85 @@ impl ForceUnit {
             _ => [part.saturations as i32, frame.saturations as i32, frame.cycles as i32],
         }
     }
+
+    /// Verilog of what shear needs: the μ words of each subarray, then their products with p. None of it without a search.
+    fn shear(&self) -> (String, String) {
+        let f = &self._formats;
+        let (p, mu) = (position_bits(), 18);
+        let product = f.search_bits[0] as usize + mu;
+        let words = format!(
+            "\
+reg [{p_end}:0] x, y;
+reg [{mu_end}:0] mu_xs [0:{last_part}];
+reg [{mu_end}:0] mu_ys [0:{last_part}];
+reg [{p_end}:0] xs [0:{last_part}];
+reg [{p_end}:0] ys [0:{last_part}];
+wire signed [{mp_end}:0] mu_step = {mp}'sd{mu_step};
+wire signed [{mp_end}:0] wide_x = {{{{{mp_more}{{x[{p_end}]}}}}, x}};
+wire signed [{mp_end}:0] wide_y = {{{{{mp_more}{{y[{p_end}]}}}}, y}};
+reg signed [{mp_end}:0] scaled_x, scaled_y;
+// Apart from the addition: an unsigned operand would make the shift logical.
+wire signed [{mp_end}:0] before_x = scaled_x >>> {mu_round_less};
+wire signed [{mp_end}:0] before_y = scaled_y >>> {mu_round_less};
+wire [{mp_end}:0] half_x = before_x + {mp}'sd1;
+wire [{mp_end}:0] half_y = before_y + {mp}'sd1;
+wire unused_mu = &{{1'b0, half_x, half_y}};
+always @(posedge clk) begin
+  x <= position_x;
+  y <= position_y;
+  scaled_x <= wide_x * mu_step;
+  scaled_y <= wide_y * mu_step;
+  if (start) begin
+    xs[part] <= position_x;
+    ys[part] <= position_y;
+  end
+  if (start2) begin
+    mu_xs[part2] <= half_x[{mu}:1];
+    mu_ys[part2] <= half_y[{mu}:1];
+  end
+end
+",
+            p_end = p - 1,
+            mu_end = mu - 1,
+            last_part = self._parts.len() - 1,
+            mp = p + mu,
+            mp_end = p + mu - 1,
+            mp_more = mu,
+            mu_step = f.mu_step,
+            mu_round_less = MU_ROUND - 1,
+        );
+        let products = format!(
+            "\
+wire signed [{mu_end}:0] mu_x = mu_xs[at2];
+wire signed [{mu_end}:0] mu_y = mu_ys[at2];
+reg signed [{product_end}:0] product_x, product_y;
+wire signed [{product}:0] doubled_x = {{product_x, 1'b0}};
+wire signed [{product}:0] doubled_y = {{product_y, 1'b0}};
+reg signed [{product}:0] moved_x, moved_y;
+wire [{p_end}:0] status_x = xs[at4];
+wire [{p_end}:0] status_y = ys[at4];
+always @(posedge clk) begin
+  if (advance) begin
+    product_x <= value * mu_x;
+    product_y <= value * mu_y;
+    moved_x <= doubled_x >>> shift;
+    moved_y <= doubled_y >>> shift;
+  end
+end
+",
+            mu_end = mu - 1,
+            product_end = product - 1,
+            p_end = p - 1,
+        );
+        (words, products)
+    }
+
+    /// Verilog in their place: fx and fy are zero.
+    fn no_shear(&self) -> (String, String) {
+        let unused = "wire unused_mu = &{1'b0, position_x, position_y};\n";
+        let zero = "assign words[63:0] = 64'd0;\nassign clipped[1:0] = 2'd0;\n";
+        (unused.to_string(), zero.to_string())
+    }
 }
 
 impl Logic for ForceUnit {
@@ -248,6 +327,8 @@ impl Logic for ForceUnit {
             0 => "1'b0".to_string(),
             t => format!("magnitude < 33'd{}", t.min(1 << 32)),
         };
+        let searched = f.degree > 0;
+        let (mu_words, shear) = if searched { self.shear() } else { self.no_shear() };
         let magnitude = if self._threshold == 0 {
             String::new()
         } else {
@@ -255,17 +336,12 @@ impl Logic for ForceUnit {
         };
         Verilog::Custom(format!(
             "\
-reg [{p_end}:0] x, y;
 reg [{n_end}:0] normalise_held;
 reg [{r_end}:0] rescale_held;
 reg [{part_end}:0] part1, part2;
 reg start1, start2;
 // Kept per subarray: what the pipeline and the status beats need.
-reg [{mu_end}:0] mu_xs [0:{last_part}];
-reg [{mu_end}:0] mu_ys [0:{last_part}];
 reg [5:0] shifts [0:{last_part}];
-reg [{p_end}:0] xs [0:{last_part}];
-reg [{p_end}:0] ys [0:{last_part}];
 reg [{n_end}:0] normalises [0:{last_part}];
 reg [{r_end}:0] rescales [0:{last_part}];
 reg [{word_end}:0] scores [0:{last_part}];
@@ -276,31 +352,15 @@ reg [{cap_end}:0] force_saturations;
 reg [{c_end}:0] cycles_held;
 reg [5:0] shift_now;
 wire [7:0] raw_shift = 8'd{base} + {{{n_more}'d0, normalise_held}} - {{{r_more}'d0, rescale_held}};
-wire signed [{mp_end}:0] mu_step = {mp}'sd{mu_step};
-wire signed [{mp_end}:0] wide_x = {{{{{mp_more}{{x[{p_end}]}}}}, x}};
-wire signed [{mp_end}:0] wide_y = {{{{{mp_more}{{y[{p_end}]}}}}, y}};
-reg signed [{mp_end}:0] scaled_x, scaled_y;
-// Apart from the addition: an unsigned operand would make the shift logical.
-wire signed [{mp_end}:0] before_x = scaled_x >>> {mu_round_less};
-wire signed [{mp_end}:0] before_y = scaled_y >>> {mu_round_less};
-wire [{mp_end}:0] half_x = before_x + {mp}'sd1;
-wire [{mp_end}:0] half_y = before_y + {mp}'sd1;
-wire unused_mu = &{{1'b0, half_x, half_y}};
-always @(posedge clk) begin
-  x <= position_x;
-  y <= position_y;
+{mu_words}always @(posedge clk) begin
   normalise_held <= normalise;
   rescale_held <= rescale;
   start1 <= start;
   part1 <= part;
-  scaled_x <= wide_x * mu_step;
-  scaled_y <= wide_y * mu_step;
   shift_now <= raw_shift[7] ? 6'd0 : raw_shift > 8'd{shift_max} ? 6'd{shift_max} : raw_shift[5:0];
   start2 <= start1;
   part2 <= part1;
   if (start) begin
-    xs[part] <= position_x;
-    ys[part] <= position_y;
     normalises[part] <= normalise;
     rescales[part] <= rescale;
     scores[part] <= found ? {score} : {word}'d0;
@@ -309,8 +369,6 @@ always @(posedge clk) begin
     founds[part] <= found;
   end
   if (start2) begin
-    mu_xs[part2] <= half_x[{mu}:1];
-    mu_ys[part2] <= half_y[{mu}:1];
     shifts[part2] <= shift_now;
   end
 end
@@ -318,22 +376,17 @@ reg [3:0] offers;
 reg [1:0] beat1, beat2, beat3, beat4;
 reg [1:0] lane1;
 reg [{part_end}:0] at1, at2, at3, at4;
-wire signed [{mu_end}:0] mu_x = mu_xs[at2];
-wire signed [{mu_end}:0] mu_y = mu_ys[at2];
 wire [5:0] shift = shifts[at3];
 reg signed [{v_end}:0] value;
-reg signed [{product_end}:0] product_x, product_y;
 reg [{v_end}:0] value3;
-wire signed [{product}:0] doubled_x = {{product_x, 1'b0}};
-wire signed [{product}:0] doubled_y = {{product_y, 1'b0}};
 wire signed [{product}:0] doubled_z = {{{{{z_more}{{value3[{v_end}]}}}}, value3, {fraction_one}'d0}};
-reg signed [{product}:0] moved_x, moved_y, moved_z;
+reg signed [{product}:0] moved_z;
 wire [{all_end}:0] words;
 wire [2:0] clipped;
-genvar axis;
+{shear}genvar axis;
 generate
-  for (axis = 0; axis < 3; axis = axis + 1) begin : component
-    wire [{product}:0] moved = axis == 0 ? moved_x : axis == 1 ? moved_y : moved_z;
+  for (axis = {first_axis}; axis < 3; axis = axis + 1) begin : component
+    wire [{product}:0] moved = {moved};
     wire [{product1}:0] half_up = {{moved[{product}], moved}} + {product2}'d1;
     wire [{product}:0] rounded = half_up[{product1}:1];
     wire [{over}:0] sign = rounded[{product}:{word_end}];
@@ -347,8 +400,6 @@ endgenerate
 wire [{cap}:0] count = {{1'b0, force_saturations}} + {{{cap_less}'d0, clipped[0]}} + {{{cap_less}'d0, clipped[1]}}
   + {{{cap_less}'d0, clipped[2]}};
 reg [{all_end}:0] status;
-wire [{p_end}:0] status_x = xs[at4];
-wire [{p_end}:0] status_y = ys[at4];
 always @(*) begin
   case (beat4)
     2'd1: status = {{28'd0, framing, !contact, founds[at4], conditions[at4], {y_word}, {x_word}}};
@@ -373,11 +424,7 @@ always @(posedge clk) begin
     lane1 <= lane;
     value <= lane1[1] ? (lane1[0] ? quad[{v3} +: {v}] : quad[{v2} +: {v}])
       : (lane1[0] ? quad[{v} +: {v}] : quad[0 +: {v}]);
-    product_x <= value * mu_x;
-    product_y <= value * mu_y;
     value3 <= value;
-    moved_x <= doubled_x >>> shift;
-    moved_y <= doubled_y >>> shift;
     moved_z <= doubled_z >>> shift;
     if (offers[3]) beat_data <= beat4 != 2'd0 ? status : below ? {all}'d0 : words;
   end
@@ -392,7 +439,6 @@ always @(posedge clk) begin
     if (force_leaves) force_saturations <= count[{cap}] ? {{{cap}{{1'b1}}}} : count[{cap_end}:0];
   end
 end",
-            p_end = p - 1,
             part_bits = self.part.width(),
             part_end = self.part.width() - 1,
             last_part = self._parts.len() - 1,
@@ -411,24 +457,19 @@ end",
             c_word = word - CYCLE_BITS,
             n_word = word - n_bits,
             r_word = word - r_bits,
-            mu_end = mu - 1,
-            mp = p + 18,
-            mp_end = p + 17,
-            mp_more = 18,
-            mu_step = f.mu_step,
-            mu_round_less = MU_ROUND - 1,
             shift_max = FORCE_SHIFT_MAX,
             v_end = v - 1,
             v2 = 2 * v,
             v3 = 3 * v,
-            product_end = product - 1,
             product1 = product + 1,
             product2 = product + 2,
             over1 = over + 1,
             z_more = product - v - fraction,
             fraction_one = fraction + 1,
-            x_word = resize("status_x", p, word),
-            y_word = resize("status_y", p, word),
+            first_axis = if searched { 0 } else { 2 },
+            moved = if searched { "axis == 0 ? moved_x : axis == 1 ? moved_y : moved_z" } else { "moved_z" },
+            x_word = if searched { resize("status_x", p, word) } else { format!("{word}'d0") },
+            y_word = if searched { resize("status_y", p, word) } else { format!("{word}'d0") },
         ))
     }
 }

@@ -43,6 +43,12 @@ impl Ram {
             _memory: vec![Word::default(); depth],
         }
     }
+
+    /// The same without the memory, for scenes that never read it: it reads as zero.
+    pub fn left_out(mut self) -> Self {
+        self._memory.clear();
+        self
+    }
 }
 
 impl Logic for Ram {
@@ -74,6 +80,13 @@ impl Logic for Ram {
     fn hdl(&self) -> Verilog {
         let fields = self.write.width();
         let bits = self.write_data.width() / fields;
+        if self._memory.is_empty() {
+            return Verilog::Custom(format!(
+                "always @(*) read_data = {}'d0;\n\
+                 wire unused = &{{1'b0, clk, write, write_address, write_data, read, read_address}};",
+                self.read_data.width()
+            ));
+        }
         // One array per field: every synthesiser maps it to plain memories.
         Verilog::Custom(
             (0..fields)

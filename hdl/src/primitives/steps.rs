@@ -119,7 +119,7 @@ impl Steps {
             ready: Default::default(),
             last: Default::default(),
             coefficient_address: Wire::new(count_bits(storage.words())),
-            operand_address: Wire::new(count_bits(vectors * formats.quads)),
+            operand_address: Wire::new(count_bits(vectors.max(1) * formats.quads)),
             source: Wire::new(SOURCE_BITS),
             control: Wire::new(3),
             _pipe: Vec::new(),

@@ -12,6 +12,7 @@ mod rescale;
 mod search;
 mod send;
 mod unfold;
+mod unsearched;
 
 pub use fold::Fold;
 pub use force::Force;
@@ -22,3 +23,4 @@ pub use rescale::Rescale;
 pub use search::Search;
 pub use send::Send;
 pub use unfold::Unfold;
+pub use unsearched::Unsearched;

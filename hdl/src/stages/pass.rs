@@ -60,6 +60,7 @@ impl Pass {
         let steps = Steps::new(model);
         let lanes = Lanes::new(formats, model.storage.memory(formats, &model.quantised));
         let operands = operand_vectors(formats.degree);
+        let vectors = |memory: Ram| if operands == 0 { memory.left_out() } else { memory };
         let parity_bits = 4 * formats.data_bits as usize;
         Pass {
             clk: Default::default(),
@@ -75,7 +76,7 @@ impl Pass {
             column: Counter::new(quads),
             running: Default::default(),
             low_address: Slice::new(steps.operand_address.width(), count_bits(quads)),
-            vectors: Ram::new(operands * quads, 1, parity_bits),
+            vectors: vectors(Ram::new(operands.max(1) * quads, 1, parity_bits)),
             filler: Filler::new(operands, quads),
             source: Delay::new(SOURCE_BITS, 1),
             control: Delay::new(3, 2),

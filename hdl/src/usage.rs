@@ -1,0 +1,77 @@
+//! What a generated design takes of its device, stage by stage: block RAMs and multipliers exactly, logic as an estimate.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use dermis_golden::fixed::resources::Memory;
+use dermis_golden::fixed::Model;
+use serde::Serialize;
+
+use crate::estimate::modules;
+
+/// Words, bits and LUTs of a distributed RAM cell of the ECP5.
+const CELL: [usize; 3] = [16, 4, 6];
+
+/// Resources of a part of the design.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+pub struct Usage {
+    /// Block RAMs, exact.
+    pub block_rams: usize,
+    /// Multipliers, exact.
+    pub multipliers: usize,
+    /// Flip-flops, estimated.
+    pub flip_flops: usize,
+    /// Look-up tables with four inputs, those of carry chains and distributed RAM included, estimated.
+    pub luts: usize,
+}
+
+impl std::ops::AddAssign for Usage {
+    fn add_assign(&mut self, other: Usage) {
+        self.block_rams += other.block_rams;
+        self.multipliers += other.multipliers;
+        self.flip_flops += other.flip_flops;
+        self.luts += other.luts;
+    }
+}
+
+/// Usage of each stage by its name in the hardware, what belongs to none under `engine`.
+pub fn stages(model: &Model, verilog: &str) -> BTreeMap<String, Usage> {
+    let mut all: BTreeMap<String, Usage> = BTreeMap::new();
+    let mut add = |block: &str, usage: Usage| {
+        let stage = block.split('$').next().filter(|stage| !stage.is_empty()).unwrap_or("engine");
+        let stage = if model_stage(stage) { stage } else { "engine" };
+        *all.entry(stage.to_string()).or_default() += usage;
+    };
+    let memories = &model.resources.memories;
+    let placed: BTreeSet<(String, String)> =
+        memories.iter().map(|memory| (format!("top${}", memory.block), memory.array.clone())).collect();
+    for (module, logic) in modules(verilog, &placed) {
+        let block = module.strip_prefix("top$").unwrap_or_default();
+        add(block, Usage { flip_flops: logic.flip_flops, luts: logic.luts.round() as usize, ..Usage::default() });
+    }
+    for memory in memories {
+        add(memory.block, Usage { block_rams: memory.block_rams, luts: distributed_luts(memory), ..Usage::default() });
+    }
+    for &(block, multipliers) in &model.resources.multipliers {
+        add(block, Usage { multipliers, ..Usage::default() });
+    }
+    all
+}
+
+/// The sum over all stages.
+pub fn total(stages: &BTreeMap<String, Usage>) -> Usage {
+    let mut sum = Usage::default();
+    stages.values().for_each(|&usage| sum += usage);
+    sum
+}
+
+fn model_stage(name: &str) -> bool {
+    ["receive", "normalise", "fold", "pass", "rescale", "unfold", "search", "forces", "send"].contains(&name)
+}
+
+fn distributed_luts(memory: &Memory) -> usize {
+    let [words, bits, luts] = CELL;
+    match memory.block_rams {
+        0 => memory.words.div_ceil(words) * memory.bits.div_ceil(bits) * luts,
+        _ => 0,
+    }
+}

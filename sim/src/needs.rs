@@ -1,0 +1,45 @@
+//! What a built design takes of its board, as text.
+
+use std::collections::BTreeMap;
+
+use dermis_golden::fixed::cycles::lanes_busy;
+use dermis_golden::fixed::{Cycles, Model};
+use dermis_hdl::usage::{total, Usage};
+
+/// The stages in the order of the pipeline, by their names in the hardware.
+const STAGES: [&str; 10] =
+    ["receive", "normalise", "fold", "pass", "rescale", "unfold", "search", "forces", "send", "engine"];
+
+/// A table of the stages, the board's share, lanes and cycles.
+pub fn resources(model: &Model, usage: &BTreeMap<String, Usage>) -> String {
+    let board = &model.board;
+    let row = |name: &str, cells: [String; 4]| format!("| {name:9} | {} |\n", cells.join(" | "));
+    let line = |name: &str, u: &Usage| {
+        let counts = [u.block_rams, u.multipliers, u.flip_flops, u.luts];
+        row(name, std::array::from_fn(|k| format!("{:>w$}", counts[k], w = WIDTHS[k])))
+    };
+    const HEADS: [&str; 4] = ["block RAMs", "multipliers", "flip-flops*", "LUTs*"];
+    const WIDTHS: [usize; 4] = [10, 11, 11, 6];
+    let mut text = row("stage", std::array::from_fn(|k| format!("{:>w$}", HEADS[k], w = WIDTHS[k])));
+    text.push_str(&format!("|-----------|{}|\n", WIDTHS.map(|w| "-".repeat(w + 1) + ":").join("|")));
+    let present = STAGES.iter().filter_map(|stage| usage.get(*stage).map(|usage| (stage, usage)));
+    present.for_each(|(stage, usage)| text.push_str(&line(stage, usage)));
+    let all = total(usage);
+    text.push_str(&line("all", &all));
+    let share = |needs: usize, has: u32| format!("{:.0} %", 100.0 * needs as f64 / f64::from(has));
+    let shares = [
+        share(all.block_rams, board.block_rams),
+        share(all.multipliers, board.multipliers),
+        share(all.flip_flops, board.flip_flops),
+        share(all.luts, board.luts),
+    ];
+    text.push_str(&row("of board", std::array::from_fn(|k| format!("{:>w$}", shares[k], w = WIDTHS[k]))));
+    let latency = Cycles::of(model, &vec![true; model.parts.len()]).latency;
+    text.push_str(&format!(
+        "* estimated\n{}: {} lanes, {:.0} % busy during the passes; {latency} cycles from last input to last output beat\n",
+        board.name,
+        4 * model.formats.lanes_per_parity,
+        100.0 * lanes_busy(model),
+    ));
+    text
+}

@@ -1,0 +1,81 @@
+//! The resource model against Yosys: block RAMs and multipliers are equal, flip-flops and LUTs near.
+//!
+//! A model that is wrong by one is found: the count is compared, not bounded.
+
+use std::process::Command;
+
+use dermis_golden::fixed::Model;
+use dermis_golden::scene::Scene;
+use dermis_hdl::usage::total;
+use dermis_hdl::{generate, Generated};
+use dermis_tests::scene;
+
+/// How far the estimate of flip-flops and LUTs may be from Yosys; the largest deviation of the scenes here is 7 %.
+const NEAR: f64 = 0.15;
+
+/// Runs Yosys to the end of a `synth_ecp5` stage and returns the counts of cells by type.
+fn synthesise(generated: &Generated, until: &str) -> impl Fn(&str) -> usize {
+    let folder = tempfile::tempdir().unwrap();
+    for file in &generated.files {
+        std::fs::write(folder.path().join(&file.name), &file.text).unwrap();
+    }
+    let top = &generated.top;
+    let script = format!("read_verilog {top}.v; synth_ecp5 -top {top} -run begin:{until}; tee -o stat.json stat -json");
+    let output = Command::new("yosys").current_dir(folder.path()).args(["-q", "-p", &script]).output().unwrap();
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let text = std::fs::read_to_string(folder.path().join("stat.json")).unwrap();
+    let stat: serde_json::Value = serde_json::from_str(&text).unwrap();
+    let cells = stat["design"]["num_cells_by_type"].clone();
+    move |cell| cells[cell].as_u64().unwrap_or(0) as usize
+}
+
+fn small(name: &str, more: &str) -> Model {
+    let sensor = "[sensor]\nrows = 12\ncols = 18\npitch_x_mm = 4.0\npitch_y_mm = 4.0\nthickness_mm = 3.0\n";
+    Model::new(&Scene::parse(&format!("name = \"{name}\"\n{sensor}{more}"), name).unwrap()).unwrap()
+}
+
+#[test]
+fn block_rams_and_multipliers_are_those_of_yosys() {
+    let models = [
+        Model::new(&scene("sensor-1").0).unwrap(),
+        // Six subarrays, groups of rows, a list of columns.
+        small("partition", "[partition]\nrows = 2\ncols = 3\n[fixed]\nlanes = 16\nprune_bits = 10\n"),
+        // A word of the lanes that no block RAM divides evenly; deep coefficients.
+        small("deep", "[search]\nmu_max = 0.1\n[fixed]\nlanes = 12\ninput_bits = 16\n"),
+    ];
+    for model in &models {
+        let generated = generate(model).unwrap();
+        let cells = synthesise(&generated, "map_ffram");
+        let name = &model.scene.name;
+        assert_eq!(cells("DP16KD"), model.resources.block_rams(), "{name}: block RAMs");
+        assert_eq!(cells("MULT18X18D"), model.resources.multipliers(), "{name}: multipliers");
+    }
+}
+
+#[test]
+fn flip_flops_and_luts_are_near_those_of_yosys() {
+    let generated = generate(&Model::new(&scene("eight-by-eight").0).unwrap()).unwrap();
+    let cells = synthesise(&generated, "check");
+    let counted = [cells("TRELLIS_FF"), cells("LUT4") + 2 * cells("CCU2C") + 6 * cells("TRELLIS_DPR16X4")];
+    let usage = total(&generated.usage);
+    assert_eq!([cells("DP16KD"), cells("MULT18X18D")], [usage.block_rams, usage.multipliers]);
+    for (counted, estimated) in counted.into_iter().zip([usage.flip_flops, usage.luts]) {
+        let share = estimated as f64 / counted as f64;
+        assert!((share - 1.0).abs() < NEAR, "estimated {estimated}, counted {counted}");
+    }
+}
+
+#[test]
+fn a_missing_memory_and_a_wrong_count_are_found() {
+    let mut model = small("wrong", "[partition]\nrows = 2\ncols = 3\n[fixed]\nlanes = 16\n");
+    let right = model.resources.clone();
+    model.resources.memories[0].words += 1;
+    assert!(generate(&model).unwrap_err().to_string().contains("memories"));
+    // One memory moved from block RAM to LUTs: Yosys no longer counts what the model of the scene says.
+    model.resources = right.clone();
+    let moved = model.resources.memories.iter_mut().find(|memory| memory.block == "forces$store").unwrap();
+    assert!(std::mem::take(&mut moved.block_rams) > 0);
+    let counted = synthesise(&generate(&model).unwrap(), "map_ffram")("DP16KD");
+    assert_eq!(counted, model.resources.block_rams());
+    assert_ne!(counted, right.block_rams());
+}
