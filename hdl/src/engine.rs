@@ -1,7 +1,7 @@
 //! The engine: all stages in a row, one subarray after the other with the same matrices.
 //!
 //! ```text
-//!            receive -> normalise -> fold -> pass -> rescale -> unfold -> search -> force -> send
+//! prepare -> receive -> normalise -> fold -> pass -> rescale -> unfold -> search -> force -> send
 //!  s_axis -->  |  frame buffer         |      ^________|  v_ij             |                  |--> m_axis
 //!              '--- magnitude, signs --'                                   '--- μ, score -----'
 //! ```
@@ -16,7 +16,7 @@ use rust_hdl::prelude::*;
 
 use super::Search;
 use crate::primitives::{count_bits, BitDelay, Counter, Keep, CYCLE_BITS};
-use crate::stages::{Fold, Force, Normalise, Pass, Receive, Rescale, Send, Unfold};
+use crate::stages::{Fold, Force, Normalise, Pass, Prepare, Receive, Rescale, Send, Unfold};
 use crate::wire::Wire;
 
 /// ```text
@@ -26,7 +26,7 @@ use crate::wire::Wire;
 /// ```
 /// | port | direction | width | meaning |
 /// |---|---|---|---|
-/// | `s_axis_tdata` | in | `input_bits` | a taxel's code, signed; row-major, one frame after the other |
+/// | `s_axis_tdata` | in | `code_bits` | a taxel's code, signed; row-major, one frame after the other |
 /// | `m_axis_tdata` | out | 96 | `{fz, fy, fx}`, 32 bits signed each; then the status beats |
 /// | `…tvalid`, `…tready`, `…tlast` | | 1 | AXI-Stream handshake; `tlast` on a frame's last beat |
 ///
@@ -53,6 +53,7 @@ pub struct Engine {
     pub m_axis_tready: Signal<In, Bit>,
     /// It is the frame's last.
     pub m_axis_tlast: Signal<Out, Bit>,
+    pub(crate) prepare: Prepare,
     pub(crate) receive: Receive,
     pub(crate) normalise: Normalise,
     pub(crate) fold: Fold,
@@ -103,7 +104,7 @@ impl Engine {
         let mut engine = Engine {
             clk: Default::default(),
             rst: Default::default(),
-            s_axis_tdata: Wire::new(bits),
+            s_axis_tdata: Wire::new(formats.code_bits as usize),
             s_axis_tvalid: Default::default(),
             s_axis_tready: Default::default(),
             s_axis_tlast: Default::default(),
@@ -111,6 +112,7 @@ impl Engine {
             m_axis_tvalid: Default::default(),
             m_axis_tready: Default::default(),
             m_axis_tlast: Default::default(),
+            prepare: Prepare::new(model),
             receive: Receive::new(layout, parts, bits, model.noise_floor),
             fold: Fold::new(formats.quads, count, bits),
             pass: Pass::new(model),
@@ -156,6 +158,8 @@ impl Engine {
 impl Logic for Engine {
     #[hdl_gen]
     fn update(&mut self) {
+        self.prepare.clk.next = self.clk.val();
+        self.prepare.rst.next = self.rst.val();
         self.receive.clk.next = self.clk.val();
         self.normalise.clk.next = self.clk.val();
         self.fold.clk.next = self.clk.val();
@@ -255,11 +259,15 @@ impl Logic for Engine {
             self.framing.d.next = self.receive.framing.val();
         }
 
-        comment!("receive -> normalise -> fold");
-        self.receive.s_axis_tdata.next = self.s_axis_tdata.val();
-        self.receive.s_axis_tvalid.next = self.s_axis_tvalid.val();
-        self.receive.s_axis_tlast.next = self.s_axis_tlast.val();
-        self.s_axis_tready.next = self.receive.s_axis_tready.val();
+        comment!("prepare -> receive -> normalise -> fold");
+        self.prepare.s_axis_tdata.next = self.s_axis_tdata.val();
+        self.prepare.s_axis_tvalid.next = self.s_axis_tvalid.val();
+        self.prepare.s_axis_tlast.next = self.s_axis_tlast.val();
+        self.s_axis_tready.next = self.prepare.s_axis_tready.val();
+        self.receive.s_axis_tdata.next = self.prepare.m_axis_tdata.val();
+        self.receive.s_axis_tvalid.next = self.prepare.m_axis_tvalid.val();
+        self.receive.s_axis_tlast.next = self.prepare.m_axis_tlast.val();
+        self.prepare.m_axis_tready.next = self.receive.s_axis_tready.val();
         self.receive.quad_address.next = self.fold.quad_address.val();
         self.receive.free.next = self.fold.free.val();
         self.receive.reported.next = self.begin_frame.val();

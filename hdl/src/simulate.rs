@@ -5,7 +5,7 @@ use rust_hdl::prelude::*;
 
 use crate::device::{Device, Inputs, Outputs, Tap};
 use crate::generate::HdlError;
-use crate::primitives::{position_bits, COLUMN_FILE, MEMORY_FILE};
+use crate::primitives::{position_bits, CALIBRATION_FILE, COLUMN_FILE, MEMORY_FILE};
 use crate::taps::{taps, SEARCH_FIELD};
 use crate::wire::Word;
 use crate::{engine, unsearched};
@@ -77,7 +77,8 @@ macro_rules! design {
 
             fn memory_files(&self) -> Vec<(&'static str, String)> {
                 let columns = self.pass.steps.column_file().map(|text| (COLUMN_FILE, text));
-                [(MEMORY_FILE, self.pass.lanes.memory_file())].into_iter().chain(columns).collect()
+                let table = self.prepare.calibrate.table_file().map(|text| (CALIBRATION_FILE, text));
+                [(MEMORY_FILE, self.pass.lanes.memory_file())].into_iter().chain(columns).chain(table).collect()
             }
         }
     };

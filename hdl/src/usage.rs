@@ -65,7 +65,7 @@ pub fn total(stages: &BTreeMap<String, Usage>) -> Usage {
 }
 
 fn model_stage(name: &str) -> bool {
-    ["receive", "normalise", "fold", "pass", "rescale", "unfold", "search", "forces", "send"].contains(&name)
+    ["prepare", "receive", "normalise", "fold", "pass", "rescale", "unfold", "search", "forces", "send"].contains(&name)
 }
 
 fn distributed_luts(memory: &Memory) -> usize {

@@ -229,7 +229,7 @@ fn run(arguments: &Arguments) -> Result<(String, bool)> {
             }
             let mut text = report::reconstruction(&result, &scene.sensor, full_scale_MPa);
             if !matches!(engine, Engine::Golden) {
-                text.push_str(&against_golden(&scene, &frames[0], &result)?);
+                text.push_str(&against_golden(&scene, &frames, &result)?);
             }
             Ok((text, true))
         }
@@ -310,26 +310,32 @@ fn objective(name: &str) -> Result<ObjectiveKind, String> {
     names.iter().find(|(known, _)| *known == name).map(|(_, kind)| *kind).ok_or_else(|| format!("one of {}", known()))
 }
 
-/// The result and the stress in MPa of the largest code. Hardware takes the first frame: it refuses to average.
+/// The result and the stress in MPa of the largest code.
 fn reconstruct(scene: &Scene, frames: &[Frame], engine: Engine, build_dir: &Path) -> Result<(Reconstruction, f64)> {
-    let frame = &frames[0];
-    let model = || Model::for_frames(scene, std::slice::from_ref(frame));
+    let model = || Model::for_frames(scene, frames);
+    let stress = |model: &Model| Ok::<_, anyhow::Error>(full_scale(&model.scene, &model.stress(frames)?));
     let result = match engine {
         Engine::Golden => {
             let golden = Golden::new(scene)?;
             return Ok((golden.run_averaged(frames)?, full_scale(scene, &golden.stress(frames)?)));
         }
-        Engine::Fixed => model()?.reconstruct(frame)?,
-        Engine::Rtl => Hardware::new(model()?, build_dir)?.reconstruct(frame)?,
+        Engine::Fixed => {
+            let model = model()?;
+            (model.reconstruct_averaged(frames)?, stress(&model)?)
+        }
+        Engine::Rtl => {
+            let hardware = Hardware::new(model()?, build_dir)?;
+            (hardware.reconstruct(frames)?, stress(&hardware.model)?)
+        }
     };
-    Ok((result, full_scale(scene, frame)))
+    Ok(result)
 }
 
 /// One line: how far a result is from the floating-point model's.
-fn against_golden(scene: &Scene, frame: &Frame, result: &Reconstruction) -> Result<String> {
-    let golden = Golden::new(scene)?.run(frame)?;
-    let model = Model::for_frames(scene, std::slice::from_ref(frame))?;
-    let lsb_N = model.force_lsb_N(full_scale(scene, frame));
+fn against_golden(scene: &Scene, frames: &[Frame], result: &Reconstruction) -> Result<String> {
+    let golden = Golden::new(scene)?.run_averaged(frames)?;
+    let model = Model::for_frames(scene, frames)?;
+    let lsb_N = model.force_lsb_N(full_scale(&model.scene, &model.stress(frames)?));
     Ok(report::difference(&difference(&golden.forces_N, &result.forces_N, lsb_N)))
 }
 
@@ -381,7 +387,7 @@ mod tests {
             VerilatorError::MissingTool { program: "make" }.into(),
             io(ErrorKind::PermissionDenied).into(),
             FixedError::Board(Board::load("none").unwrap_err()).into(),
-            FixedError::NoFullScale { field: "threshold.min_force_N", value: 1.0 }.into(),
+            FixedError::NoFullScale { field: "threshold.min_force_N", value: "1".into() }.into(),
             anyhow!("rtl: File exists"),
         ];
         for (errors, code) in [(own, 1), (callers, 2)] {

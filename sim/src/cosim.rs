@@ -28,8 +28,10 @@ pub struct Vector {
     pub frame: String,
     /// Columns of the array, to name a taxel by row and column.
     pub cols: usize,
-    /// One code per taxel, row-major.
+    /// One code per taxel, row-major, of one frame after the other.
     pub codes: Vec<i32>,
+    /// Taxels of a frame.
+    pub taxels: usize,
     /// The model's stages, beats, status and cycle counts.
     pub expected: Trace,
 }
@@ -48,7 +50,7 @@ pub struct Bench<'a> {
 pub fn run(bench: Bench, vectors: &[Vector], stimulus: Stimulus) -> (Findings, Vec<Times>) {
     let plays: Vec<Play> = vectors
         .iter()
-        .map(|v| Play { codes: &v.codes, beats: v.expected.beats.len() + v.expected.status.len() })
+        .map(|v| Play { codes: &v.codes, taxels: v.taxels, beats: v.expected.beats.len() + v.expected.status.len() })
         .collect();
     let longest = vectors.iter().map(|v| v.expected.cycles.total).max().unwrap_or(0);
     let watchdog = WATCHDOG_MIN.max(4 * longest);

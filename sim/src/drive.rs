@@ -97,7 +97,7 @@ fn interrupt(device: &mut dyn Device, play: &Play) {
             device.cycle(&Inputs { rst: true, ..Inputs::default() });
         }
         for (taxel, &s_data) in play.codes[..taken].iter().enumerate() {
-            let s_last = taxel + 1 == whole;
+            let s_last = (taxel + 1).is_multiple_of(play.taxels);
             device.cycle(&Inputs { s_valid: true, s_data, s_last, ..Inputs::default() });
         }
         for _ in 0..taken {

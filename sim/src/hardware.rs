@@ -90,7 +90,7 @@ impl Hardware {
             top: &self.generated.top,
             files: files.collect(),
             taps: &self.generated.taps,
-            input_bits: self.model.formats.input_bits,
+            input_bits: self.model.formats.code_bits,
         };
         Verilated::new(&design, &self.cache)
     }
@@ -100,31 +100,34 @@ impl Hardware {
         self.generated.taps.iter().map(|tap| tap.name).collect()
     }
 
-    /// A frame as the device gets it, with what the bit-true model makes of it.
+    /// The frames of one reconstruction as the device gets them, with what the bit-true model makes of them.
     ///
     /// # Errors
-    /// A frame of another sensor.
-    pub fn vector(&self, frame: &Frame) -> Result<Vector> {
-        let codes = self.model.codes(frame)?.codes;
+    /// A frame of another sensor, or not as many as the scene averages.
+    pub fn vector(&self, frames: &[Frame]) -> Result<Vector> {
+        let codes = self.model.readings(frames)?;
         let expected = self.model.run(&codes);
-        Ok(Vector { frame: frame.id.clone(), cols: self.model.scene.sensor.cols, codes, expected })
+        let sensor = &self.model.scene.sensor;
+        let frame = frames.first().map_or_else(String::new, |frame| frame.id.clone());
+        Ok(Vector { frame, cols: sensor.cols, taxels: sensor.taxels(), codes, expected })
     }
 
-    /// Reconstructs a frame in the Verilated hardware, engine `rtl`.
+    /// Reconstructs the mean of the scene's number of frames in the Verilated hardware, engine `rtl`.
     ///
     /// # Errors
     /// As [`Hardware::device`]; [`Stuck`].
-    pub fn reconstruct(&self, frame: &Frame) -> Result<Reconstruction> {
-        let vector = self.vector(frame)?;
-        let taxels = vector.codes.len();
-        let plays = [Play { codes: &vector.codes, beats: taxels + vector.expected.status.len() }];
+    pub fn reconstruct(&self, frames: &[Frame]) -> Result<Reconstruction> {
+        let vector = self.vector(frames)?;
+        let forces = vector.expected.beats.len();
+        let plays =
+            [Play { codes: &vector.codes, taxels: vector.taxels, beats: forces + vector.expected.status.len() }];
         let mut device = self.device(Simulator::Verilator)?;
         let recording = record(device.as_mut(), 0, &plays, Stimulus::FullSpeed, WATCHDOG);
         if let Some(timeout) = recording.timeout {
-            return Err(Stuck { frame: frame.id.clone(), cycle: timeout.cycle, rule: timeout.rule }.into());
+            return Err(Stuck { frame: vector.frame, cycle: timeout.cycle, rule: timeout.rule }.into());
         }
         let beats: Vec<[i32; 3]> = recording.beats.iter().map(|beat| beat.data).collect();
-        let (forces, status) = beats.split_at(taxels.min(beats.len()));
-        Ok(self.model.decode(frame, "rtl", forces, status)?)
+        let (forces, status) = beats.split_at(forces.min(beats.len()));
+        Ok(self.model.decode(&self.model.stress(frames)?, "rtl", forces, status)?)
     }
 }

@@ -7,8 +7,8 @@ use dermis_golden::fixed::{Cycles, Model};
 use dermis_hdl::usage::{total, Usage};
 
 /// The stages in the order of the pipeline, by their names in the hardware.
-const STAGES: [&str; 10] =
-    ["receive", "normalise", "fold", "pass", "rescale", "unfold", "search", "forces", "send", "engine"];
+const STAGES: [&str; 11] =
+    ["prepare", "receive", "normalise", "fold", "pass", "rescale", "unfold", "search", "forces", "send", "engine"];
 
 /// A table of the stages, the board's share, lanes and cycles.
 pub fn resources(model: &Model, usage: &BTreeMap<String, Usage>) -> String {

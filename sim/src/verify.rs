@@ -72,7 +72,8 @@ pub fn verify(scene: &Scene, frames: &[Frame], simulators: &[Simulator], build: 
     let hardware = Hardware::new(Model::for_frames(scene, frames)?, build)?;
     // With the full scale that the model has settled on: all models judge the same codes.
     let golden = Golden::new(&hardware.model.scene)?;
-    let vectors = frames.iter().map(|frame| hardware.vector(frame)).collect::<Result<Vec<_>>>()?;
+    let vectors =
+        frames.chunks(1 << scene.input.average).map(|frames| hardware.vector(frames)).collect::<Result<Vec<_>>>()?;
 
     let mut verified = Verified {
         scene: scene.clone(),
@@ -89,9 +90,12 @@ pub fn verify(scene: &Scene, frames: &[Frame], simulators: &[Simulator], build: 
             times = seen;
         }
     }
-    for (index, ((frame, vector), times)) in frames.iter().zip(&vectors).zip(times).enumerate() {
+    for (index, ((frames, vector), times)) in
+        frames.chunks(1 << scene.input.average).zip(&vectors).zip(times).enumerate()
+    {
+        let frame = &hardware.model.stress(frames)?;
         let full_scale_MPa = full_scale(&hardware.model.scene, frame);
-        let golden = golden.run(frame)?;
+        let golden = golden.run_averaged(frames)?;
         let fixed = hardware.model.decode(frame, "fixed", &vector.expected.beats, &vector.expected.status)?;
         let lsb_N = hardware.model.force_lsb_N(full_scale_MPa);
         verified.rows.push(Row {

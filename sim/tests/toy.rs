@@ -48,6 +48,7 @@ fn vectors() -> Vec<Vector> {
         Vector {
             frame: name.into(),
             cols: 3,
+            taxels: 6,
             codes: codes.to_vec(),
             expected: Trace {
                 beats: codes.iter().map(|&c| [GAIN as i32 * c, c, c]).collect(),
@@ -120,7 +121,7 @@ fn a_wrong_cycle_count_is_found() {
 #[test]
 fn every_output_beat_has_its_cycle() {
     let vectors = vectors();
-    let plays: Vec<Play> = vectors.iter().map(|v| Play { codes: &v.codes, beats: 7 }).collect();
+    let plays: Vec<Play> = vectors.iter().map(|v| Play { codes: &v.codes, taxels: v.taxels, beats: 7 }).collect();
     let mut recording = record(&mut toy(), TAPS.len(), &plays, Stimulus::FullSpeed, 10_000);
     // The third beat of the second frame, a cycle late; the last one is in time.
     recording.beats[9].cycle += 1;

@@ -10,7 +10,7 @@ use dermis_tests::{build_dir, scene};
 fn setup() -> (Hardware, Vec<Vector>) {
     let (scene, frames) = scene("eight-by-eight");
     let hardware = Hardware::new(Model::new(&scene).unwrap(), &build_dir()).unwrap();
-    let vectors = vec![hardware.vector(&frames[0]).unwrap()];
+    let vectors = vec![hardware.vector(&frames[..1]).unwrap()];
     (hardware, vectors)
 }
 

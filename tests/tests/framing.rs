@@ -74,7 +74,7 @@ struct Setting {
 fn setting() -> Setting {
     let (scene, frames) = scene("eight-by-eight");
     let hardware = Hardware::new(Model::new(&scene).unwrap(), &build_dir()).unwrap();
-    let codes = [0, 1].map(|index| hardware.vector(&frames[index]).unwrap().codes);
+    let codes = [0, 1].map(|index| hardware.vector(&frames[index..=index]).unwrap().codes);
     let sent = |flag: u32| {
         [0, 1].map(|index| {
             let mut trace = hardware.model.run(&codes[index]);

@@ -110,7 +110,7 @@ proptest! {
             })
             .collect();
         let expected = hardware.model.run(&codes);
-        let vectors = [dermis_sim::cosim::Vector { frame: "random".into(), cols, codes, expected }];
+        let vectors = [dermis_sim::cosim::Vector { frame: "random".into(), cols, taxels: codes.len(), codes, expected }];
         let mut device = hardware.device(Simulator::RustHdl).unwrap();
         let bench = Bench { name: "rust-hdl", device: device.as_mut(), taps: &hardware.tap_names() };
         let (findings, _) = run(bench, &vectors, Stimulus::FullSpeed);

@@ -6,7 +6,8 @@
 //!
 //! | word | bits | default | LSB |
 //! |---|---|---|---|
-//! | code | `input_bits` | 20 | full scale / (2^(input_bits − 1) − 1), times 2^−normalise |
+//! | code | `code_bits` | 20 | full scale / (2^(code_bits − 1) − 1) |
+//! | word of the frame buffer | `input_bits` = `code_bits` + `input.average` | 20 | that / 2^average, times 2^−normalise |
 //! | parity of the input | `fold_bits` = `input_bits` + 2 | 22 | as the code |
 //! | Cz⁺ | `inverse_bits` | 24 | 2^−`inverse_exponent` N/MPa |
 //! | Ax, Ay | `coef_bits` | 18 | 2^−`a_exponent` |
@@ -71,7 +72,9 @@ pub struct Formats {
     pub groups: usize,
     /// Ay is Ax transposed, and not stored.
     pub shared_a: bool,
-    /// Width of a code.
+    /// Width of a code on the input stream.
+    pub code_bits: u32,
+    /// Width of a word of the frame buffer: a code, or a sum of several.
     pub input_bits: u32,
     /// Width of a folded input.
     pub fold_bits: u32,
@@ -164,8 +167,12 @@ pub fn derive(scene: &Scene, matrices: &Matrices, parts: usize, board: &Board) -
     let shared_a = matrices.degree == 1 && sensor.rows == sensor.cols && sensor.pitch_x_mm == sensor.pitch_y_mm;
     let mut quantised = Quantised { inverse, ax, ay };
 
-    let fold_bits = spec.input_bits + 2;
+    let input_bits = spec.input_bits + scene.input.average;
+    let fold_bits = input_bits + 2;
     let input_low_bits = fold_bits.saturating_sub(MULTIPLIER_BITS);
+    if input_low_bits >= MULTIPLIER_BITS {
+        return Err(FixedError::Format { what: "folded input", needs: fold_bits, has: 2 * MULTIPLIER_BITS - 1 });
+    }
     let inverse_low_bits = spec.inverse_bits.saturating_sub(MULTIPLIER_BITS);
     let limb_align = input_low_bits.max(inverse_low_bits);
     let raw_shift = input_low_bits.min(inverse_low_bits);
@@ -222,7 +229,8 @@ pub fn derive(scene: &Scene, matrices: &Matrices, parts: usize, board: &Board) -
         lanes_per_parity: count,
         groups: 1,
         shared_a,
-        input_bits: spec.input_bits,
+        code_bits: spec.input_bits,
+        input_bits,
         fold_bits,
         input_low_bits,
         inverse_bits: spec.inverse_bits,
@@ -272,7 +280,7 @@ fn fit(
         let formats = Formats { lanes_per_parity, groups: quads.div_ceil(lanes_per_parity), ..formats.clone() };
         let storage = Storage::new(matrices.to_vec(), quantised, quads, lanes_per_parity, threshold);
         let [first, second] =
-            board.distributed_words.map(|shallow| Resources::new(&formats, &storage, parts, board, shallow));
+            board.distributed_words.map(|shallow| Resources::new(&formats, &storage, parts, scene, board, shallow));
         let resources = if first.fit(board) == Fit::WithRoom { first } else { second };
         (formats, storage, resources)
     };

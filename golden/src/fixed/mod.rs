@@ -16,6 +16,7 @@ pub mod force;
 pub mod formats;
 pub mod normalise;
 pub mod pass;
+pub mod prepare;
 pub mod quads;
 pub mod receive;
 pub mod remedy;

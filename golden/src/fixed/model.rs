@@ -5,6 +5,7 @@ use thiserror::Error;
 use super::cycles::Cycles;
 use super::force::Force;
 use super::formats::{derive, Design, Formats, Quantised, LOG_FRACTION, MU_STEPS};
+use super::prepare::{Prepare, Scale};
 use super::quads::Quads;
 use super::remedy::{remedies, Shortage};
 use super::resources::Resources;
@@ -16,9 +17,10 @@ use crate::board::{Board, BoardError};
 use crate::flags::{frame_flags, Flag};
 use crate::float::receive::receive as judge;
 use crate::frame::{Forces, Frame, FrameError};
+use crate::input::{Input, InputError};
 use crate::matrices::{Matrices, MatricesError};
 use crate::partition::{subarrays, Grid, PartitionError, Subarray};
-use crate::quantise::{full_scale, quantise, Codes};
+use crate::quantise::{full_scale, noise_floor_codes, quantise, Codes};
 use crate::reconstruct::{assemble, Reconstruction, SubarrayResult};
 use crate::scene::{Scene, SceneError};
 
@@ -44,7 +46,7 @@ pub enum FixedError {
     #[error(transparent)]
     Board(#[from] BoardError),
     /// A word would need more bits than the hardware has.
-    #[error("{what} needs {needs} bits, the hardware has {has}: lower fixed.input_bits, fixed.inverse_bits or search.mu_max")]
+    #[error("{what} needs {needs} bits, the hardware has {has}: lower fixed.input_bits, input.average, fixed.inverse_bits or search.mu_max")]
     Format {
         /// The word.
         what: &'static str,
@@ -59,8 +61,11 @@ pub enum FixedError {
         /// The scene's field.
         field: &'static str,
         /// Its value.
-        value: f64,
+        value: String,
     },
+    /// A file the input options name, or frames that do not fit them.
+    #[error(transparent)]
+    Input(#[from] InputError),
     /// A device sent another number of beats than the scene has.
     #[error("{what}: got {got} beats, expected {expected}")]
     Beats {
@@ -115,8 +120,10 @@ pub struct Model {
     pub formats: Formats,
     /// Quantised matrices.
     pub quantised: Quantised,
-    /// Noise floor in codes.
+    /// Noise floor in words of the frame buffer.
     pub noise_floor: i32,
+    /// The input options.
+    pub prepare: Prepare,
     /// Threshold in force LSBs.
     pub threshold: i64,
     /// The coefficient memory's layout.
@@ -157,9 +164,13 @@ impl Model {
         let scaled = |field, value: f64, unit: &dyn Fn(f64) -> f64| match scene.input.full_scale_MPa {
             _ if value == 0.0 => Ok(0.0),
             Some(full_scale) => Ok(value / unit(full_scale)),
-            None => Err(FixedError::NoFullScale { field, value }),
+            None => Err(FixedError::NoFullScale { field, value: value.to_string() }),
         };
-        let code_lsb = |full_scale: f64| quantise(&[], scene.fixed.input_bits, full_scale).lsb_MPa();
+        if let (Some(field), None) = (scene.scaled_input(), scene.input.full_scale_MPa) {
+            return Err(FixedError::NoFullScale { field, value: scene.field_value(field) });
+        }
+        let prepare = Prepare::new(scene, Scale::new(scene)?, scene.input.full_scale_MPa.unwrap_or(1.0));
+        let code_lsb = |full_scale: f64| full_scale / prepare.largest();
         let noise_floor = scaled("search.noise_floor_MPa", scene.search.noise_floor_MPa, &code_lsb)?;
         let force_lsb = |full_scale: f64| code_lsb(full_scale) * 2f64.powi(formats.force_exponent);
         let threshold = scaled("threshold.min_force_N", scene.threshold.min_force_N, &force_lsb)?;
@@ -167,6 +178,7 @@ impl Model {
             scene: scene.clone(),
             noise_floor: noise_floor.floor().min(f64::from(i32::MAX)) as i32,
             threshold: threshold.ceil().min(f64::from(u32::MAX)) as i64,
+            prepare,
             layout: Quads { rows: shape.rows, cols: shape.cols },
             parts,
             formats,
@@ -184,9 +196,11 @@ impl Model {
     /// As [`Model::new`].
     pub fn for_frames(scene: &Scene, frames: &[Frame]) -> Result<Self, FixedError> {
         let mut scene = scene.clone();
-        let needs = scene.search.noise_floor_MPa > 0.0 || scene.threshold.min_force_N > 0.0;
+        let needs =
+            scene.search.noise_floor_MPa > 0.0 || scene.threshold.min_force_N > 0.0 || scene.scaled_input().is_some();
         if needs && scene.input.full_scale_MPa.is_none() {
-            let largest = frames.iter().map(Frame::peak_MPa).fold(0.0, f64::max);
+            let gain = Scale::new(&scene)?.largest;
+            let largest = gain * frames.iter().map(Frame::peak_MPa).fold(0.0, f64::max);
             // Frames of nothing but zeros leave any scale: the default of a single one.
             scene.input.full_scale_MPa = Some(if largest > 0.0 { largest } else { 1.0 });
         }
@@ -211,20 +225,40 @@ impl Model {
 
     /// Force per LSB of the output words in N, for codes whose largest means `full_scale_MPa`.
     pub fn force_lsb_N(&self, full_scale_MPa: f64) -> f64 {
-        quantise(&[], self.formats.input_bits, full_scale_MPa).lsb_MPa() * 2f64.powi(self.formats.force_exponent)
+        full_scale_MPa / self.prepare.largest() * 2f64.powi(self.formats.force_exponent)
     }
 
-    /// The codes of a frame as this scene's converter gives them.
+    /// The stress that a reconstruction's frames stand for: their calibrated mean.
+    ///
+    /// # Errors
+    /// [`InputError`] when they are not 2^k, or one is not the scene's.
+    pub fn stress(&self, frames: &[Frame]) -> Result<Frame, FixedError> {
+        let input = Input::new(&self.scene)?;
+        Ok(input.calibrate(&input.average(&self.scene, frames)?))
+    }
+
+    /// What the converter makes of the frames of one reconstruction, one after the other.
+    ///
+    /// # Errors
+    /// As [`Model::stress`].
+    pub fn readings(&self, frames: &[Frame]) -> Result<Vec<i32>, FixedError> {
+        let full_scale = full_scale(&self.scene, &self.stress(frames)?) * self.prepare.reading_per_MPa;
+        let codes = |frame: &Frame| quantise(&frame.stress_MPa, self.formats.code_bits, full_scale).codes;
+        Ok(frames.iter().flat_map(codes).collect())
+    }
+
+    /// The codes of a frame of stress, as a converter without input options gives them.
     ///
     /// # Errors
     /// [`FrameError`] when the frame's sensor is not the scene's.
     pub fn codes(&self, frame: &Frame) -> Result<Codes, FixedError> {
         frame.check(&self.scene)?;
-        Ok(quantise(&frame.stress_MPa, self.formats.input_bits, full_scale(&self.scene, frame)))
+        Ok(quantise(&frame.stress_MPa, self.formats.code_bits, full_scale(&self.scene, frame)))
     }
 
-    /// Runs one frame of `codes`, row-major over the array, `input_bits` wide.
+    /// Runs the `codes` of one reconstruction, row-major over the array, `code_bits` wide: 2^average frames of them.
     pub fn run(&self, codes: &[i32]) -> Trace {
+        let codes = &self.prepare.run(codes);
         let sensor = &self.scene.sensor;
         let solved: Vec<Solved> =
             self.parts.iter().map(|part| Solved::new(self, &part.gather(sensor, codes))).collect();
@@ -249,7 +283,7 @@ impl Model {
                 normalise: s.normalise,
                 rescale_saturations: s.saturations,
                 force_saturations,
-                cycles: cycles.first_output as u32,
+                cycles: (cycles.first_output - self.prepare.latency()) as u32,
             };
             status.beats()
         });
@@ -277,16 +311,24 @@ impl Model {
         }
     }
 
-    /// Reconstructs a frame with the bit-true model.
+    /// Reconstructs one frame of a scene that averages none.
     ///
     /// # Errors
-    /// As [`Model::codes`].
+    /// As [`Model::stress`].
     pub fn reconstruct(&self, frame: &Frame) -> Result<Reconstruction, FixedError> {
-        let trace = self.run(&self.codes(frame)?.codes);
-        self.decode(frame, "fixed", &trace.beats, &trace.status)
+        self.reconstruct_averaged(std::slice::from_ref(frame))
     }
 
-    /// Puts what a device sent for `frame` into physical units.
+    /// Reconstructs the mean of 2^average frames with the bit-true model.
+    ///
+    /// # Errors
+    /// As [`Model::stress`].
+    pub fn reconstruct_averaged(&self, frames: &[Frame]) -> Result<Reconstruction, FixedError> {
+        let trace = self.run(&self.readings(frames)?);
+        self.decode(&self.stress(frames)?, "fixed", &trace.beats, &trace.status)
+    }
+
+    /// Puts what a device sent for `frame`, the frames' [`Model::stress`], into physical units.
     ///
     /// # Errors
     /// [`FixedError::Beats`] when forces or status are not complete; the frame's errors as in [`Model::codes`].
@@ -320,7 +362,8 @@ impl Model {
         for (part, beats) in self.parts.iter().zip(status.chunks(STATUS_BEATS)) {
             let Some(status) = Status::of_beats(beats) else { continue };
             let own = part.gather(sensor, &codes.codes);
-            let receipt = judge(sensor, part, &own, self.noise_floor, self.scene.partition.condition);
+            let floor = noise_floor_codes(&self.scene, &codes);
+            let receipt = judge(sensor, part, &own, floor, self.scene.partition.condition);
             let met = status.flags & FLAG_CONDITION != 0;
             let found = status.flags & FLAG_FOUND != 0;
             if met && self.searches() && !found {

@@ -6,6 +6,7 @@
 //!
 //! | stage | memory | words × bits |
 //! |---|---|---|
+//! | prepare | zero and gain; sums of several frames | taxels × `code_bits` and 18; taxels × `input_bits` |
 //! | receive | frame buffer, four lanes | subarrays · Q × `input_bits` |
 //! | fold | input of the passes | Q × 4 · `fold_bits` |
 //! | pass | v_ij as operands, but those of the highest degree | so many · Q × 4 · `data_bits` |
@@ -19,9 +20,11 @@ use serde::Serialize;
 
 use super::arith::{bit_length, signed_bits};
 use super::formats::{Formats, HALVINGS, MULTIPLIER_BITS};
+use super::prepare::GAIN_BITS;
 use super::schedule::vectors;
 use super::storage::{word_bits, Storage};
 use crate::board::Board;
+use crate::scene::Scene;
 
 /// Share of a board's block RAMs that a design takes where it has the choice: the router needs the rest.
 const ROUTABLE: f64 = 0.8;
@@ -81,7 +84,14 @@ pub fn operand_vectors(degree: usize) -> usize {
 
 impl Resources {
     /// What `formats` and `storage` need for `parts` subarrays on `board`; memories of at most `shallow` words go into distributed RAM.
-    pub fn new(formats: &Formats, storage: &Storage, parts: usize, board: &Board, shallow: usize) -> Self {
+    pub fn new(
+        formats: &Formats,
+        storage: &Storage,
+        parts: usize,
+        scene: &Scene,
+        board: &Board,
+        shallow: usize,
+    ) -> Self {
         let (f, quads) = (formats, formats.quads);
         let quad = |bits: u32| 4 * bits as usize;
         let memory = |block, array: &str, words: usize, bits: usize, rom: bool| Memory {
@@ -92,9 +102,20 @@ impl Resources {
             block_rams: if rom || words > shallow { board.block_rams_for(words, bits) } else { 0 },
         };
         let ram = |block, words, bits| memory(block, "field0", words, bits, false);
-        let mut memories: Vec<Memory> = (0..4)
-            .map(|lane| memory("receive$frame", &format!("field{lane}"), parts * quads, f.input_bits as usize, false))
-            .collect();
+        let (input, taxels) = (&scene.input, scene.sensor.taxels());
+        let mut memories = Vec::new();
+        if input.calibration.is_some() || input.tare.is_some() {
+            let gain = if input.calibration.is_some() { GAIN_BITS } else { 0 };
+            memories.push(memory("prepare$calibrate", "entries", taxels, (f.code_bits + gain) as usize, true));
+        }
+        if input.average > 0 {
+            memories.push(memory("prepare$average", "sums", taxels, f.input_bits as usize, false));
+        }
+        memories.extend(
+            (0..4).map(|lane| {
+                memory("receive$frame", &format!("field{lane}"), parts * quads, f.input_bits as usize, false)
+            }),
+        );
         memories.push(ram("fold$memory", quads, quad(f.fold_bits)));
         if f.degree > 0 {
             memories.push(ram("pass$vectors", operand_vectors(f.degree) * quads, quad(f.data_bits)));
@@ -111,7 +132,12 @@ impl Resources {
             }
         }
         memories.push(ram("forces$store", parts * quads, quad(f.search_bits[0])));
+        let calibrate = match input.calibration {
+            Some(_) => board.multipliers_for(f.code_bits + 1, GAIN_BITS),
+            None => 0,
+        };
         let multipliers = vec![
+            ("prepare$calibrate", calibrate),
             ("pass$lanes", 4 * f.lanes_per_parity * board.multipliers_for(MULTIPLIER_BITS, MULTIPLIER_BITS)),
             ("forces$unit", force_multipliers(f, board)),
         ];

@@ -40,7 +40,7 @@ pub struct Status {
     pub rescale_saturations: u32,
     /// Force words saturated.
     pub force_saturations: u32,
-    /// Cycles to the first output beat: from the frame's last input beat, or, for a frame that waited in the buffer, from the
+    /// Cycles to the first output beat: from the frame's last beat into `receive`, or, for a frame that waited in the buffer, from the
     /// cycle before it was begun.
     pub cycles: u32,
 }

@@ -6,7 +6,6 @@
 //! | `partition.case` | all | 0 … 3 and rows × cols, where the device holds it |
 //! | `search.objective` | all; on a bonded layer "sparse" and "compressive"; with "adaptive" and "contacts" "sparse" | "sparse" |
 //! | `search.form` | all, "orthogonal" for subarrays of few taxels ([`crate::float::orthogonal::MAX_TAXELS`]) | "oblique" |
-//! | `input.average`, `input.calibration`, `input.tare` | all | none |
 //! | `input.dead`, `input.unipolar` | all; with "orthogonal" none | none |
 //! | `output.forces` | all | "taxels" |
 //!
@@ -46,9 +45,6 @@ impl Scene {
                 "sparse",
             ),
             rule(search.form != Form::Oblique, "search.form", "orthogonal".to_string(), "oblique"),
-            rule(input.average > 0, "input.average", input.average.to_string(), "0"),
-            rule(input.calibration.is_some(), "input.calibration", path(&input.calibration), "none"),
-            rule(input.tare.is_some(), "input.tare", path(&input.tare), "none"),
             rule(!input.dead.is_empty(), "input.dead", self.dead(), "none"),
             rule(input.unipolar, "input.unipolar", "true".to_string(), "false"),
             rule(self.output.forces != ForceOutput::Taxels, "output.forces", "resultants".to_string(), "taxels"),
@@ -102,6 +98,26 @@ impl Scene {
             SceneError::NotAvailable { scene, field, value, available }
         };
         rules.into_iter().find(|rule| rule.refused).map_or(Ok(()), |rule| Err(refusal(rule)))
+    }
+
+    /// The input option that needs `input.full_scale_MPa` in hardware, if there is one: its words are relative to it.
+    pub(crate) fn scaled_input(&self) -> Option<&'static str> {
+        let input = &self.input;
+        let asked = [
+            ("input.average", input.average > 0),
+            ("input.calibration", input.calibration.is_some()),
+            ("input.tare", input.tare.is_some()),
+        ];
+        asked.into_iter().find(|(_, asked)| *asked).map(|(field, _)| field)
+    }
+
+    /// The value of one of those options, for messages.
+    pub(crate) fn field_value(&self, field: &str) -> String {
+        match field {
+            "input.average" => self.input.average.to_string(),
+            "input.calibration" => path(&self.input.calibration),
+            _ => path(&self.input.tare),
+        }
     }
 
     /// Dead taxels for a message: the first stands for all.

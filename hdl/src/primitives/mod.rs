@@ -6,7 +6,9 @@
 //! stages around them are plain `#[hdl_gen]` kernels of single-bit control and wiring. Every primitive is
 //! run against its printed Verilog in the co-simulation, stage by stage.
 
+mod average;
 mod butterfly;
+mod calibrate;
 mod candidates;
 mod constant_product;
 mod counter;
@@ -40,7 +42,9 @@ mod unfolder;
 mod walk;
 mod weigh;
 
+pub use average::Average;
 pub use butterfly::Butterfly;
+pub use calibrate::{Calibrate, CALIBRATION_FILE};
 pub use candidates::Candidates;
 pub use counter::{count_bits, Counter};
 pub use counts::Counts;

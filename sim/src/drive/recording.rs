@@ -3,8 +3,10 @@
 /// One frame to play: its codes and how many beats it must give.
 #[derive(Clone, Copy, Debug)]
 pub struct Play<'a> {
-    /// One code per taxel, row-major.
+    /// One code per taxel, row-major, of one frame after the other.
     pub codes: &'a [i32],
+    /// Taxels of a frame, which ends with `tlast`.
+    pub taxels: usize,
     /// Output beats of the frame, status included.
     pub beats: usize,
 }

@@ -35,7 +35,7 @@ impl<'a> Sender<'a> {
         if self.offering {
             inputs.s_valid = true;
             inputs.s_data = play.codes[self.taxel];
-            inputs.s_last = self.taxel + 1 == play.codes.len();
+            inputs.s_last = (self.taxel + 1).is_multiple_of(play.taxels);
         }
     }
 

@@ -1,0 +1,79 @@
+//! Stage `prepare`: calibration and averaging before `receive`; what the scene does not ask for is wire.
+
+use dermis_golden::fixed::Model;
+use rust_hdl::prelude::*;
+
+use crate::primitives::{Average, Calibrate};
+use crate::wire::Wire;
+
+/// Codes in, words of the frame buffer out.
+#[derive(LogicBlock)]
+pub struct Prepare {
+    /// Clock.
+    pub clk: Signal<In, Clock>,
+    /// Reset.
+    pub rst: Signal<In, Bit>,
+    /// A taxel's code.
+    pub s_axis_tdata: Wire<In>,
+    /// It is offered.
+    pub s_axis_tvalid: Signal<In, Bit>,
+    /// It is taken.
+    pub s_axis_tready: Signal<Out, Bit>,
+    /// It is the frame's last.
+    pub s_axis_tlast: Signal<In, Bit>,
+    /// A taxel's word.
+    pub m_axis_tdata: Wire<Out>,
+    /// It is offered.
+    pub m_axis_tvalid: Signal<Out, Bit>,
+    /// It is taken.
+    pub m_axis_tready: Signal<In, Bit>,
+    /// It is the last one.
+    pub m_axis_tlast: Signal<Out, Bit>,
+    /// Zero and gain.
+    pub calibrate: Calibrate,
+    average: Average,
+}
+
+impl Prepare {
+    /// The input options of `model`.
+    pub fn new(model: &Model) -> Self {
+        let (formats, taxels) = (&model.formats, model.scene.sensor.taxels());
+        let bits = formats.code_bits as usize;
+        Prepare {
+            clk: Default::default(),
+            rst: Default::default(),
+            s_axis_tdata: Wire::new(bits),
+            s_axis_tvalid: Default::default(),
+            s_axis_tready: Default::default(),
+            s_axis_tlast: Default::default(),
+            m_axis_tdata: Wire::new(formats.input_bits as usize),
+            m_axis_tvalid: Default::default(),
+            m_axis_tready: Default::default(),
+            m_axis_tlast: Default::default(),
+            calibrate: Calibrate::new(&model.prepare, taxels, bits),
+            average: Average::new(taxels, bits, model.prepare.average),
+        }
+    }
+}
+
+impl Logic for Prepare {
+    #[hdl_gen]
+    fn update(&mut self) {
+        self.calibrate.clk.next = self.clk.val();
+        self.calibrate.rst.next = self.rst.val();
+        self.average.clk.next = self.clk.val();
+        self.average.rst.next = self.rst.val();
+        self.calibrate.s_axis_tdata.next = self.s_axis_tdata.val();
+        self.calibrate.s_axis_tvalid.next = self.s_axis_tvalid.val();
+        self.calibrate.s_axis_tlast.next = self.s_axis_tlast.val();
+        self.s_axis_tready.next = self.calibrate.s_axis_tready.val();
+        self.average.s_axis_tdata.next = self.calibrate.m_axis_tdata.val();
+        self.average.s_axis_tvalid.next = self.calibrate.m_axis_tvalid.val();
+        self.average.s_axis_tlast.next = self.calibrate.m_axis_tlast.val();
+        self.calibrate.m_axis_tready.next = self.average.s_axis_tready.val();
+        self.m_axis_tdata.next = self.average.m_axis_tdata.val();
+        self.m_axis_tvalid.next = self.average.m_axis_tvalid.val();
+        self.m_axis_tlast.next = self.average.m_axis_tlast.val();
+        self.average.m_axis_tready.next = self.m_axis_tready.val();
+    }
+}
