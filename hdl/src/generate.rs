@@ -10,6 +10,7 @@ use serde_json::json;
 use thiserror::Error;
 
 use crate::device::Tap;
+use crate::explain::Explained;
 use crate::primitives::MEMORY_FILE;
 use crate::simulate::design;
 use crate::taps::taps;
@@ -17,6 +18,8 @@ use crate::usage::{stages, total, Usage};
 
 /// Version of the generated files' meaning; a reader refuses another one.
 const MANIFEST_VERSION: u32 = 1;
+/// Name of the manifest's file.
+const MANIFEST: &str = "manifest.json";
 
 /// Why a model has no hardware.
 #[derive(Debug, Error)]
@@ -50,6 +53,15 @@ pub struct Generated {
     pub usage: BTreeMap<String, Usage>,
 }
 
+impl Generated {
+    /// Adds what the scene has and leaves out to the manifest.
+    pub fn add_explained(&mut self, explained: &[Explained]) {
+        self.manifest["features"] = json!(explained);
+        let text = format!("{:#}\n", self.manifest);
+        self.files.iter_mut().filter(|file| file.name == MANIFEST).for_each(|file| file.text.clone_from(&text));
+    }
+}
+
 /// Generates the hardware of `model`. The same model always gives the same bytes.
 ///
 /// # Errors
@@ -65,7 +77,7 @@ pub fn generate(model: &Model) -> Result<Generated, HdlError> {
     let mut files = vec![
         file(format!("{top}.v"), verilog),
         file(format!("{top}.vlt"), include_str!("waivers.vlt").to_string()),
-        file("manifest.json".to_string(), format!("{manifest:#}\n")),
+        file(MANIFEST.to_string(), format!("{manifest:#}\n")),
     ];
     files.extend(engine.memory_files().into_iter().map(|(name, text)| file(name.to_string(), text)));
     Ok(Generated { top, files, taps: taps(model), manifest, usage })

@@ -16,6 +16,7 @@ macro_rules! comment {
 pub mod device;
 pub mod engine;
 pub mod estimate;
+pub mod explain;
 pub mod primitives;
 pub mod stages;
 pub mod unsearched;

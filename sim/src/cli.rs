@@ -19,6 +19,7 @@ use dermis_golden::partition::Case;
 use dermis_golden::quantise::full_scale;
 use dermis_golden::reconstruct::{Golden, Reconstruction};
 use dermis_golden::scene::{ObjectiveKind, Scene};
+use dermis_hdl::explain::explain;
 use dermis_hdl::generate;
 use dermis_hdl::HdlError;
 
@@ -26,7 +27,7 @@ use crate::compare::difference;
 use crate::fresh::Fresh;
 use crate::hardware::{Hardware, Simulator, Stuck};
 use crate::inputs::{resolve, resolve_one};
-use crate::needs::resources;
+use crate::needs::{features, resources};
 use crate::progress::Progress;
 use crate::report::{self, CosimReport, Format};
 use crate::tabulate::tabulate;
@@ -78,13 +79,17 @@ enum Command {
     },
     /// Generate the hardware of a scene.
     #[command(after_help = "Example:
-  dermis build sensor-1 --out rtl")]
+  dermis build sensor-1 --out rtl
+  dermis build sensor-4 --explain")]
     Build {
         /// Built-in name or path of a scene.
         scene: String,
         /// Folder for the files; without it <build-dir>/<scene>/rtl.
         #[arg(long, value_name = "DIR")]
         out: Option<PathBuf>,
+        /// Print what the scene needs, what is left out, and what that saves.
+        #[arg(long)]
+        explain: bool,
     },
     /// Compare simulated hardware with the bit-true model, stage by stage and cycle by cycle.
     #[command(after_help = "Examples:
@@ -233,10 +238,10 @@ fn run(arguments: &Arguments) -> Result<(String, bool)> {
             }
             Ok((text, true))
         }
-        Command::Build { scene, out } => {
+        Command::Build { scene, out, explain } => {
             let scene = Scene::load(scene)?;
             let out = out.clone().unwrap_or_else(|| build_dir.join(&scene.name).join("rtl"));
-            Ok((build(&scene, &out)?, true))
+            Ok((build(&scene, &out, *explain)?, true))
         }
         Command::Cosim { scene, frames, json, device } => {
             let (scene, frames) = resolve(scene.as_deref(), frames)?;
@@ -340,9 +345,11 @@ fn against_golden(scene: &Scene, frames: &[Frame], result: &Reconstruction) -> R
 }
 
 /// Writes the generated files, each complete or not at all, and lists them.
-fn build(scene: &Scene, out: &Path) -> Result<String> {
+fn build(scene: &Scene, out: &Path, with_features: bool) -> Result<String> {
     let model = Model::new(scene)?;
-    let generated = generate(&model)?;
+    let mut generated = generate(&model)?;
+    let explained = explain(&model)?;
+    generated.add_explained(&explained);
     std::fs::create_dir_all(out).map_err(|e| anyhow!("{}: {e}", out.display()))?;
     let mut text = String::new();
     for file in &generated.files {
@@ -354,6 +361,9 @@ fn build(scene: &Scene, out: &Path) -> Result<String> {
         text.push_str(&format!("{} ({} bytes)\n", path.display(), file.text.len()));
     }
     text.push_str(&resources(&model, &generated.usage));
+    if with_features {
+        text.push_str(&features(&explained));
+    }
     Ok(text)
 }
 

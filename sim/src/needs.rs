@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 
 use dermis_golden::fixed::cycles::lanes_busy;
 use dermis_golden::fixed::{Cycles, Model};
+use dermis_hdl::explain::Explained;
 use dermis_hdl::usage::{total, Usage};
 
 /// The stages in the order of the pipeline, by their names in the hardware.
@@ -41,5 +42,47 @@ pub fn resources(model: &Model, usage: &BTreeMap<String, Usage>) -> String {
         4 * model.formats.lanes_per_parity,
         100.0 * lanes_busy(model),
     ));
+    text
+}
+
+/// What the scene has, then a table of what it leaves out.
+pub fn features(explained: &[Explained]) -> String {
+    let mut text = "\nthe scene needs:\n".to_string();
+    let present = explained.iter().filter(|feature| feature.present);
+    present.for_each(|feature| text.push_str(&format!("  {}: {}\n", feature.feature, feature.setting)));
+    if explained.iter().all(|feature| !feature.present) {
+        text.push_str("  none of the features that hardware can do without\n");
+    }
+    text.push_str("\nleft out, and what that saves against the scene with it put back:\n");
+    let mut rows = vec![["left out", "put back as", "block RAMs", "multipliers", "flip-flops*", "LUTs*", "cycles"]
+        .map(str::to_string)];
+    rows.extend(explained.iter().filter_map(|feature| {
+        let saved = feature.saved?;
+        let numbers = [saved.block_rams, saved.multipliers, saved.flip_flops, saved.luts, saved.cycles];
+        let [rams, multipliers, flip_flops, luts, cycles] = numbers.map(|n| n.to_string());
+        let [name, setting] = [feature.feature.to_string(), feature.setting.clone()];
+        Some([name, setting, rams, multipliers, flip_flops, luts, cycles])
+    }));
+    let widths: [usize; 7] =
+        std::array::from_fn(|k| rows.iter().map(|row| row[k].chars().count()).max().unwrap_or_default());
+    for (index, row) in rows.iter().enumerate() {
+        let cells: [String; 7] = std::array::from_fn(|k| match k {
+            0 | 1 => format!("{:w$}", row[k], w = widths[k]),
+            _ => format!("{:>w$}", row[k], w = widths[k]),
+        });
+        text.push_str(&format!("| {} |\n", cells.join(" | ")));
+        if index == 0 {
+            let rule: [String; 7] = std::array::from_fn(|k| match k {
+                0 | 1 => "-".repeat(widths[k] + 2),
+                _ => "-".repeat(widths[k] + 1) + ":",
+            });
+            text.push_str(&format!("|{}|\n", rule.join("|")));
+        }
+    }
+    for feature in explained {
+        if let Some(reason) = &feature.impossible {
+            text.push_str(&format!("{} ({}) cannot be put back: {reason}\n", feature.feature, feature.setting));
+        }
+    }
     text
 }

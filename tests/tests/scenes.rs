@@ -14,7 +14,7 @@ use dermis_tests::build_dir;
 use proptest::prelude::*;
 
 /// Name, and what differs from an ordinary scene of 6×6 taxels.
-const SCENES: [(&str, &str); 8] = [
+const SCENES: [(&str, &str); 9] = [
     // Six subarrays in turn, odd rows.
     ("partition", "[sensor]\nrows = 10\ncols = 12\npitch_x_mm = 2.0\npitch_y_mm = 4.0\nthickness_mm = 3.0\n[partition]\nrows = 2\ncols = 3\n"),
     // Ax serves for Ay, and columns are left out.
@@ -23,6 +23,8 @@ const SCENES: [(&str, &str); 8] = [
     ("odd", "[sensor]\nrows = 5\ncols = 7\npitch_x_mm = 2.0\npitch_y_mm = 4.0\nthickness_mm = 3.0\n"),
     // Degree 1: a small r leaves seven of ten coefficients out.
     ("degree-1", "[search]\nmu_max = 0.05\n"),
+    // Sums of two frames, which overflow no word.
+    ("averaged", "[input]\naverage = 1\n"),
     // No search, in two subarrays.
     ("no-search", "[search]\nmu_max = 0\n[partition]\ncase = 2\n"),
     // No limbs, the smallest words.
@@ -53,7 +55,7 @@ fn frames(scene: &Scene) -> Vec<Frame> {
         });
         Frame::from_stress(&format!("{centre:?}"), sensor, stress.collect()).unwrap()
     };
-    vec![Frame::eq2(sensor), at([1.0, -2.0], 0.4), at([-4.0, 3.0], -2.0)]
+    vec![Frame::eq2(sensor), at([1.0, -2.0], 0.4), at([-4.0, 3.0], -2.0), at([2.0, 2.0], 0.0)]
 }
 
 #[test]
@@ -115,5 +117,56 @@ proptest! {
         let bench = Bench { name: "rust-hdl", device: device.as_mut(), taps: &hardware.tap_names() };
         let (findings, _) = run(bench, &vectors, Stimulus::FullSpeed);
         prop_assert!(findings.is_equal(), "{:?}", findings.kept.first().map(ToString::to_string));
+    }
+}
+
+/// Readings of a sensor with a zero and a gain per taxel, and the table and tare frame that belong to it.
+#[test]
+fn calibrated_readings_are_equal_and_give_the_forces_of_the_stress() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("scene.toml");
+    let (plain, stress) = (parse("plain", ""), frames(&parse("plain", "")));
+    let sensor = &plain.sensor;
+    let zero = |t: usize| 0.004 * ((t * 7 % 11) as f64 - 5.0);
+    let gain = |t: usize| if t == 3 { -0.8 } else { 0.5 + 0.1 * (t * 5 % 9) as f64 };
+    let line = |t: usize| format!("{},{},{},{}\n", t / sensor.cols, t % sensor.cols, zero(t), gain(t));
+    let table: String = (0..sensor.taxels()).map(line).collect();
+    std::fs::write(folder.path().join("table.csv"), format!("row,col,offset,gain\n{table}")).unwrap();
+    let row = |r: usize| {
+        let zeros = (0..sensor.cols).map(|c| (2.0 * zero(r * sensor.cols + c)).to_string());
+        zeros.collect::<Vec<_>>().join(",") + "\n"
+    };
+    std::fs::write(folder.path().join("tare.csv"), (0..sensor.rows).map(row).collect::<String>()).unwrap();
+
+    let reading = |frame: &Frame, zeros: f64, gains: bool| {
+        let of = |(t, b): (usize, &f64)| b / if gains { gain(t) } else { 1.0 } + zeros * zero(t);
+        let readings = frame.stress_MPa.iter().enumerate().map(of).collect();
+        Frame::from_stress(&frame.id, sensor, readings).unwrap()
+    };
+    let tests = [
+        ("table", "calibration = \"table.csv\"\n", 1.0, true),
+        ("tare", "tare = \"tare.csv\"\n", 2.0, false),
+        ("both", "calibration = \"table.csv\"\ntare = \"tare.csv\"\naverage = 1\n", 2.0, true),
+    ];
+    let exact = Model::for_frames(&plain, &stress).unwrap();
+    for (name, options, zeros, gains) in tests {
+        let text = format!(
+            "name = \"{name}\"\n[sensor]\nrows = 6\ncols = 6\npitch_x_mm = 3.0\npitch_y_mm = 4.0\nthickness_mm = 3.0\n\
+             [input]\n{options}"
+        );
+        let scene = Scene::parse(&text, path.to_str().unwrap()).unwrap();
+        let mut readings: Vec<Frame> = stress.iter().map(|frame| reading(frame, zeros, gains)).collect();
+        if scene.input.average > 0 {
+            readings = readings.into_iter().flat_map(|frame| [frame.clone(), frame]).collect();
+        }
+        let simulators = [Simulator::Verilator, Simulator::RustHdl];
+        let verified = verify(&scene, &readings, &simulators, &build_dir()).unwrap();
+        let first: Vec<String> = verified.findings.kept.iter().take(3).map(ToString::to_string).collect();
+        assert!(verified.findings.is_equal(), "{name}: {first:#?}");
+        // Rounding to codes of a scale up to a few times as coarse, through an inverse of condition 10².
+        for (row, frame) in verified.rows.iter().zip(&stress) {
+            let (own, wanted) = (&row.fixed.resultant_N, &exact.reconstruct(frame).unwrap().resultant_N);
+            assert!((own[2] - wanted[2]).abs() <= 1e-3 * wanted[2].abs().max(1e-3), "{name}: {own:?} {wanted:?}");
+        }
     }
 }

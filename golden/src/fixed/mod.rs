@@ -28,6 +28,8 @@ pub mod send;
 pub mod storage;
 pub mod unfold;
 
+pub mod omissions;
+
 mod model;
 mod subarray;
 

@@ -155,11 +155,17 @@ impl Model {
 
     /// The model of a scene that may be too large for its board.
     pub(super) fn unfitted(scene: &Scene) -> Result<Self, FixedError> {
+        Model::given(scene, Scale::new(scene)?, None)
+    }
+
+    /// The same with readings of another scale than the scene's files say, or another degree than its rule.
+    pub(super) fn given(scene: &Scene, scale: Scale, degree: Option<usize>) -> Result<Self, FixedError> {
         scene.require_supported()?;
         let board = Board::load(&scene.hardware.board)?;
         let parts = subarrays(scene.partition.case, &scene.sensor)?;
         let shape = parts[0].sensor(&scene.sensor);
-        let matrices = Matrices::new(&shape, scene.search.mu_max)?;
+        let mut matrices = Matrices::new(&shape, scene.search.mu_max)?;
+        matrices.degree = degree.unwrap_or(matrices.degree);
         let Design { formats, quantised, storage, resources } = derive(scene, &matrices, parts.len(), &board)?;
         let scaled = |field, value: f64, unit: &dyn Fn(f64) -> f64| match scene.input.full_scale_MPa {
             _ if value == 0.0 => Ok(0.0),
@@ -169,7 +175,7 @@ impl Model {
         if let (Some(field), None) = (scene.scaled_input(), scene.input.full_scale_MPa) {
             return Err(FixedError::NoFullScale { field, value: scene.field_value(field) });
         }
-        let prepare = Prepare::new(scene, Scale::new(scene)?, scene.input.full_scale_MPa.unwrap_or(1.0));
+        let prepare = Prepare::new(scene, scale, scene.input.full_scale_MPa.unwrap_or(1.0));
         let code_lsb = |full_scale: f64| full_scale / prepare.largest();
         let noise_floor = scaled("search.noise_floor_MPa", scene.search.noise_floor_MPa, &code_lsb)?;
         let force_lsb = |full_scale: f64| code_lsb(full_scale) * 2f64.powi(formats.force_exponent);
@@ -196,8 +202,10 @@ impl Model {
     /// As [`Model::new`].
     pub fn for_frames(scene: &Scene, frames: &[Frame]) -> Result<Self, FixedError> {
         let mut scene = scene.clone();
-        let needs =
-            scene.search.noise_floor_MPa > 0.0 || scene.threshold.min_force_N > 0.0 || scene.scaled_input().is_some();
+        let needs = scene.search.noise_floor_MPa > 0.0
+            || scene.threshold.min_force_N > 0.0
+            || scene.input.average > 0
+            || scene.scaled_input().is_some();
         if needs && scene.input.full_scale_MPa.is_none() {
             let gain = Scale::new(&scene)?.largest;
             let largest = gain * frames.iter().map(Frame::peak_MPa).fold(0.0, f64::max);

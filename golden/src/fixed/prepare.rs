@@ -50,6 +50,12 @@ pub(super) struct Scale {
 }
 
 impl Scale {
+    /// Readings with a tare frame, and with a table of gains or without, for resources alone.
+    pub(super) fn of_tare(taxels: usize, gains: bool) -> Scale {
+        let table = gains.then(|| Calibration::identity(taxels));
+        Scale { table, tare: Some(vec![0.0; taxels]), largest: 1.0 }
+    }
+
     /// Reads the files that the scene names.
     pub(super) fn new(scene: &Scene) -> Result<Scale, FixedError> {
         let spec = &scene.input;

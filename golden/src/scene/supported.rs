@@ -104,7 +104,6 @@ impl Scene {
     pub(crate) fn scaled_input(&self) -> Option<&'static str> {
         let input = &self.input;
         let asked = [
-            ("input.average", input.average > 0),
             ("input.calibration", input.calibration.is_some()),
             ("input.tare", input.tare.is_some()),
         ];
@@ -114,7 +113,6 @@ impl Scene {
     /// The value of one of those options, for messages.
     pub(crate) fn field_value(&self, field: &str) -> String {
         match field {
-            "input.average" => self.input.average.to_string(),
             "input.calibration" => path(&self.input.calibration),
             _ => path(&self.input.tare),
         }

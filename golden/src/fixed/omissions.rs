@@ -1,0 +1,84 @@
+//! What a scene leaves out of its hardware, and the scene with each of it put back, to see what that saves.
+//!
+//! The lanes stay those of the scene, so that only the feature makes the difference.
+
+use super::formats::MULTIPLIER_BITS;
+use super::model::{FixedError, Model};
+use super::prepare::Scale;
+use crate::matrices::MAX_DEGREE;
+use crate::partition::{subarrays, Case};
+use crate::scene::{Scene, SearchSpec};
+
+/// A feature that a scene has or leaves out.
+#[derive(Debug)]
+pub struct Feature {
+    /// What it is.
+    pub name: &'static str,
+    /// How the scene has it, or how it was put back.
+    pub setting: String,
+    /// The model with it put back, or why there is none; `None` where the scene has it.
+    pub put_back: Option<Result<Model, FixedError>>,
+}
+
+/// Every feature that hardware can do without, in pipeline order. A scene that would not fit its board with a feature put back has it
+/// counted all the same.
+pub fn features(model: &Model) -> Vec<Feature> {
+    let mut scene = model.scene.clone();
+    scene.fixed.lanes = Some(4 * model.formats.lanes_per_parity as u32);
+    let scene = &scene;
+    let taxels = scene.sensor.taxels();
+    let input = &scene.input;
+    let with = |change: &dyn Fn(&mut Scene)| {
+        let mut changed = scene.clone();
+        change(&mut changed);
+        changed
+    };
+    let plain = |scene: &Scene| Model::given(scene, Scale::new(scene)?, None);
+    let scaled = |scene: &Scene, gains| Model::given(scene, Scale::of_tare(taxels, gains), None);
+    let full_scale = input.full_scale_MPa.unwrap_or(1.0);
+
+    let mut all = Vec::new();
+    let mut add = |name, has: bool, setting: String, back: &dyn Fn() -> Result<Model, FixedError>| {
+        all.push(Feature { name, setting, put_back: (!has).then(back) });
+    };
+    let set = |has: bool, own: String, back: &str| if has { own } else { back.to_string() };
+
+    let (table, tare) = (input.calibration.is_some(), input.calibration.is_some() || input.tare.is_some());
+    add("tare frame", tare, set(tare, "a zero per taxel".into(), "a zero per taxel"), &|| {
+        scaled(&with(&|s| (s.input.tare, s.input.full_scale_MPa) = (Some("".into()), Some(full_scale))), false)
+    });
+    add("calibration table", table, format!("a zero and a gain of {MULTIPLIER_BITS} bits per taxel"), &|| {
+        scaled(&with(&|s| (s.input.calibration, s.input.full_scale_MPa) = (Some("".into()), Some(full_scale))), true)
+    });
+    let average = input.average > 0;
+    add("averaging", average, set(average, format!("{} frames", 1 << input.average), "2 frames"), &|| {
+        plain(&with(&|s| s.input.average = 1))
+    });
+    let parts = model.parts.len();
+    let quarters = Case::numbered(1).filter(|case| subarrays(*case, &scene.sensor).is_ok());
+    if let (1, Some(case)) = (parts, quarters) {
+        add("partition", false, "2×2 subarrays".into(), &|| plain(&with(&|s| s.partition.case = case)));
+    } else {
+        add("partition", true, format!("{parts} subarrays"), &|| plain(scene));
+    }
+    let degree = model.formats.degree;
+    let mu_max = SearchSpec::default().mu_max;
+    let own = format!("mu_max = {}", scene.search.mu_max);
+    add("search", degree > 0, set(degree > 0, own, &format!("mu_max = {mu_max}")), &|| {
+        plain(&with(&|s| s.search.mu_max = mu_max))
+    });
+    if degree > 0 {
+        let cubic = degree == MAX_DEGREE;
+        add("polynomial of degree 3", cubic, "degree 3".into(), &|| {
+            Model::given(scene, Scale::new(scene)?, Some(MAX_DEGREE))
+        });
+    }
+    let threshold = scene.threshold.min_force_N > 0.0;
+    let own = format!("{} N", scene.threshold.min_force_N);
+    add("threshold", threshold, set(threshold, own, "1 mN"), &|| {
+        let thresholded =
+            with(&|s| (s.threshold.min_force_N, s.input.full_scale_MPa) = (1e-3, Some(full_scale)));
+        plain(&thresholded)
+    });
+    all
+}

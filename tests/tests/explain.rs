@@ -1,0 +1,67 @@
+//! What is left out is not in the Verilog, and what that saves is the difference of two builds.
+
+use dermis_golden::fixed::Model;
+use dermis_golden::scene::Scene;
+use dermis_hdl::explain::explain;
+use dermis_hdl::generate;
+use dermis_hdl::usage::total;
+
+fn model(more: &str) -> Model {
+    let sensor = "[sensor]\nrows = 6\ncols = 6\npitch_x_mm = 3.0\npitch_y_mm = 4.0\nthickness_mm = 3.0\n";
+    Model::new(&Scene::parse(&format!("name = \"explained\"\n{sensor}{more}"), "explained").unwrap()).unwrap()
+}
+
+fn saved(more: &str, feature: &str) -> [i64; 3] {
+    let all = explain(&model(more)).unwrap();
+    let saved = all.iter().find(|e| e.feature == feature).unwrap().saved.unwrap();
+    [saved.block_rams, saved.multipliers, saved.flip_flops]
+}
+
+#[test]
+fn an_omission_saves_what_two_builds_differ_by() {
+    let bare = "[search]\nmu_max = 0\n[fixed]\nlanes = 36\n";
+    let usage = |more: &str| total(&generate(&model(more)).unwrap().usage);
+    let (without, with) = (usage(bare), usage("[search]\nmu_max = 0.6\n[fixed]\nlanes = 36\n"));
+    let less = |with: usize, without: usize| with as i64 - without as i64;
+    let difference = [
+        less(with.block_rams, without.block_rams),
+        less(with.multipliers, without.multipliers),
+        less(with.flip_flops, without.flip_flops),
+    ];
+    assert_eq!(saved(bare, "search"), difference);
+    assert!(difference[1] > 0 && difference[2] > 1000);
+    // Two products of 21 by 18 bits, one ROM: known without the model.
+    assert_eq!(saved(bare, "calibration table")[..2], [2, 2]);
+}
+
+#[test]
+fn what_the_scene_has_is_not_left_out() {
+    let all = explain(&model("[input]\naverage = 2\nfull_scale_MPa = 1.0\n[threshold]\nmin_force_N = 0.1\n")).unwrap();
+    let present: Vec<&str> = all.iter().filter(|e| e.present).map(|e| e.feature).collect();
+    assert_eq!(present, ["averaging", "search", "polynomial of degree 3", "threshold"]);
+}
+
+#[test]
+fn absent_stages_leave_no_logic() {
+    let verilog = |more: &str| generate(&model(more)).unwrap().files[0].text.clone();
+    let bare = verilog("[search]\nmu_max = 0\n");
+    for word in ["taylor", "candidates", "sums [", "entries [", "mu_xs", "magnitude < 33"] {
+        assert!(!bare.contains(word), "{word}");
+    }
+    let full = verilog("[input]\naverage = 2\nfull_scale_MPa = 1.0\n[threshold]\nmin_force_N = 0.1\n");
+    for word in ["taylor", "candidates", "sums [", "mu_xs", "magnitude < 33"] {
+        assert!(full.contains(word), "{word}");
+    }
+}
+
+#[test]
+fn a_scene_that_does_not_fit_is_told_what_does() {
+    let text = "name = \"wide\"\n[sensor]\nrows = 32\ncols = 32\npitch_x_mm = 2.0\npitch_y_mm = 4.0\nthickness_mm = 3.0\n";
+    let error = Model::new(&Scene::parse(text, "wide").unwrap()).unwrap_err().to_string();
+    assert!(error.contains("there are 208; it fits with any one of:"), "{error}");
+    // The remedy is one.
+    let remedy = error.lines().find_map(|line| line.trim().strip_prefix("partition.case = ")).unwrap();
+    let (case, needs) = remedy.split_once(": ").unwrap();
+    let model = Model::new(&Scene::parse(&format!("{text}[partition]\ncase = {case}\n"), "wide").unwrap()).unwrap();
+    assert!(needs.starts_with(&format!("{} block RAMs", model.resources.block_rams())), "{error}");
+}
