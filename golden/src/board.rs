@@ -9,7 +9,7 @@
 //! | `clock_MHz` | MHz | the engine's clock: a design target until place and route has measured it |
 //! | `multipliers`, `multiplier_bits` | , bits | signed multipliers and the width of their operands |
 //! | `block_rams`, `block_ram_shapes` | , [words, bits] | block RAMs and what one of them can be |
-//! | `distributed_words` | words | memories of at most so many words go into distributed RAM: always; where block RAM is short |
+//! | `distributed_words` | words | distributed RAM takes memories up to these: always; where block RAM is short |
 //! | `luts`, `flip_flops` | | logic cells, for the estimates' shares |
 
 use include_dir::{include_dir, Dir};

@@ -15,7 +15,7 @@ use dermis_golden::scene::Condition;
 use rust_hdl::prelude::*;
 
 use super::Search;
-use crate::primitives::{count_bits, BitDelay, Counter, Keep, CYCLE_BITS};
+use crate::primitives::{count_bits, BitDelay, Counter, Keep, Resultants, CYCLE_BITS};
 use crate::stages::{Fold, Force, Normalise, Pass, Prepare, Receive, Rescale, Send, Unfold};
 use crate::wire::Wire;
 
@@ -63,6 +63,7 @@ pub struct Engine {
     pub(crate) search: Search,
     pub(crate) forces: Force,
     send: Send,
+    resultants: Resultants,
     computing: DFF<Bit>,
     first: DFF<Bit>,
     filled: DFF<Bit>,
@@ -120,6 +121,7 @@ impl Engine {
             search: Search::new(formats, layout, count > 1),
             forces: force,
             send: Send::new(layout, parts),
+            resultants: Resultants::new(model.wants_resultants(), &model.scene.sensor, parts),
             computing: Default::default(),
             first: Default::default(),
             filled: Default::default(),
@@ -197,6 +199,8 @@ impl Logic for Engine {
         self.search.rst.next = self.rst.val();
         self.forces.rst.next = self.rst.val();
         self.send.rst.next = self.rst.val();
+        self.resultants.clk.next = self.clk.val();
+        self.resultants.rst.next = self.rst.val();
 
         comment!("A frame begins when it is whole and the last one computed");
         self.begin_frame.next = self.receive.full.val()
@@ -329,9 +333,13 @@ impl Logic for Engine {
         self.forces.lane.next = self.send.lane.val();
         self.send.m_axis_tvalid.next = self.forces.m_axis_tvalid.val();
         self.send.m_axis_tlast.next = self.forces.m_axis_tlast.val();
-        self.send.m_axis_tready.next = self.m_axis_tready.val();
-        self.m_axis_tdata.next = self.forces.m_axis_tdata.val();
-        self.m_axis_tvalid.next = self.forces.m_axis_tvalid.val();
-        self.m_axis_tlast.next = self.forces.m_axis_tlast.val();
+        self.send.m_axis_tready.next = self.resultants.s_axis_tready.val();
+        self.resultants.s_axis_tdata.next = self.forces.m_axis_tdata.val();
+        self.resultants.s_axis_tvalid.next = self.forces.m_axis_tvalid.val();
+        self.resultants.s_axis_tlast.next = self.forces.m_axis_tlast.val();
+        self.resultants.m_axis_tready.next = self.m_axis_tready.val();
+        self.m_axis_tdata.next = self.resultants.m_axis_tdata.val();
+        self.m_axis_tvalid.next = self.resultants.m_axis_tvalid.val();
+        self.m_axis_tlast.next = self.resultants.m_axis_tlast.val();
     }
 }

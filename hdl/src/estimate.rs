@@ -1,8 +1,8 @@
 //! Flip-flops and look-up tables of generated Verilog, estimated from its text.
 //!
-//! Registers are counted bit by bit where a clocked block assigns them; logic by operators, each per bit of what it is assigned to.
-//! Loops of generate blocks count as often as they unroll. Synthesis shares and removes some of it: the tests say how
-//! far the estimate is from Yosys.
+//! Registers are counted bit by bit where a clocked block assigns them; logic by operators, each per bit of what it is
+//! assigned to. Loops of generate blocks count as often as they unroll. Synthesis shares and removes some of it: the
+//! tests say how far the estimate is from Yosys.
 //!
 //! | operator | LUTs per bit |
 //! |---|---|

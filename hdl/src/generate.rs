@@ -136,14 +136,17 @@ fn header(model: &Model, top: &str) -> String {
 //
 //   clk, rst         clock; synchronous reset, active high
 //   s_axis_tdata     [{input_end}:0], a taxel's code, signed; row-major, tlast on a frame's last
-//   m_axis_tdata     [95:0], {{fz, fy, fx}} of 32 bits signed; {taxels} forces row-major, then {status} status beats
+//   m_axis_tdata     [95:0], {{fz, fy, fx}} of 32 bits signed; {forces}, then {status} status beats
 //
 // {lanes} MAC lanes, degree {degree}; coefficients in {MEMORY_FILE}, one line per word of the lanes' memory.
 ",
         sensor = scene.sensor,
         name = scene.name,
         input_end = f.code_bits - 1,
-        taxels = scene.sensor.taxels(),
+        forces = match model.wants_resultants() {
+            false => format!("{} forces row-major", model.force_beats()),
+            true => format!("{} beats of sums", model.force_beats()),
+        },
         status = model.status_beats(),
         lanes = 4 * f.lanes_per_parity,
         degree = f.degree,
@@ -169,7 +172,8 @@ fn manifest(model: &Model, top: &str, usage: &BTreeMap<String, Usage>) -> serde_
             "noise_floor_codes": model.noise_floor,
         },
         "output": {
-            "force_beats": scene.sensor.taxels(),
+            "force_beats": model.force_beats(),
+            "resultants": model.wants_resultants(),
             "status_beats": model.status_beats(),
             // Without a full scale a force word means this many N for each MPa of the largest code.
             "force_lsb_N": full_scale.map(|full_scale| model.force_lsb_N(full_scale)),

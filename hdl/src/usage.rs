@@ -1,4 +1,5 @@
-//! What a generated design takes of its device, stage by stage: block RAMs and multipliers exactly, logic as an estimate.
+//! What a generated design takes of its device, stage by stage: block RAMs and multipliers exactly, logic as an
+//! estimate.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -65,7 +66,8 @@ pub fn total(stages: &BTreeMap<String, Usage>) -> Usage {
 }
 
 fn model_stage(name: &str) -> bool {
-    ["prepare", "receive", "normalise", "fold", "pass", "rescale", "unfold", "search", "forces", "send"].contains(&name)
+    ["prepare", "receive", "normalise", "fold", "pass", "rescale", "unfold", "search", "forces", "send", "resultants"]
+        .contains(&name)
 }
 
 fn distributed_luts(memory: &Memory) -> usize {

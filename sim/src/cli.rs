@@ -23,7 +23,7 @@ use dermis_hdl::explain::explain;
 use dermis_hdl::generate;
 use dermis_hdl::HdlError;
 
-use crate::compare::difference;
+use crate::compare::{compared, difference};
 use crate::fresh::Fresh;
 use crate::hardware::{Hardware, Simulator, Stuck};
 use crate::inputs::{resolve, resolve_one};
@@ -341,7 +341,7 @@ fn against_golden(scene: &Scene, frames: &[Frame], result: &Reconstruction) -> R
     let golden = Golden::new(scene)?.run_averaged(frames)?;
     let model = Model::for_frames(scene, frames)?;
     let lsb_N = model.force_lsb_N(full_scale(&model.scene, &model.stress(frames)?));
-    Ok(report::difference(&difference(&golden.forces_N, &result.forces_N, lsb_N)))
+    Ok(report::difference(&difference(&compared(&golden), &compared(result), lsb_N)))
 }
 
 /// Writes the generated files, each complete or not at all, and lists them.

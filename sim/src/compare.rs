@@ -9,6 +9,7 @@
 //! | out: [`Difference`] | LSB, fraction | ≥ 0; fractions 0 where the reference has no force |
 
 use dermis_golden::frame::Forces;
+use dermis_golden::reconstruct::Reconstruction;
 use serde::Serialize;
 
 /// How far two force fields are apart.
@@ -22,6 +23,17 @@ pub struct Difference {
     pub max_share: f64,
     /// Root mean square over the reference's largest component.
     pub rms_share: f64,
+}
+
+/// What two results are compared by: their forces, or their resultants where these take their place.
+pub fn compared(result: &Reconstruction) -> Forces {
+    match &result.extra.resultants {
+        None => result.forces_N.clone(),
+        Some(all) => {
+            let axis = |k: usize| all.iter().map(|resultant| resultant.force_N[k]).collect();
+            Forces { fx: axis(0), fy: axis(1), fz: axis(2) }
+        }
+    }
 }
 
 /// Compares `other` with `reference`; `lsb_N` > 0 is the force of one LSB.

@@ -139,7 +139,8 @@ impl Judge<'_> {
             return;
         }
         // The streams whose words are taxels in the array's order; other stages may have as many words by chance.
-        let per_taxel = ["receive", "forces"].contains(&stage) && expected.is_some();
+        let forces = stage == "forces" && self.vector.expected.beats.len() == self.vector.taxels;
+        let per_taxel = (stage == "receive" || forces) && expected.is_some();
         let cols = self.vector.cols;
         let taxel = per_taxel.then(|| [index / cols, index % cols]);
         self.add(|run, frame| Mismatch {

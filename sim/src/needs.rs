@@ -8,13 +8,25 @@ use dermis_hdl::explain::Explained;
 use dermis_hdl::usage::{total, Usage};
 
 /// The stages in the order of the pipeline, by their names in the hardware.
-const STAGES: [&str; 11] =
-    ["prepare", "receive", "normalise", "fold", "pass", "rescale", "unfold", "search", "forces", "send", "engine"];
+const STAGES: [&str; 12] = [
+    "prepare",
+    "receive",
+    "normalise",
+    "fold",
+    "pass",
+    "rescale",
+    "unfold",
+    "search",
+    "forces",
+    "send",
+    "resultants",
+    "engine",
+];
 
 /// A table of the stages, the board's share, lanes and cycles.
 pub fn resources(model: &Model, usage: &BTreeMap<String, Usage>) -> String {
     let board = &model.board;
-    let row = |name: &str, cells: [String; 4]| format!("| {name:9} | {} |\n", cells.join(" | "));
+    let row = |name: &str, cells: [String; 4]| format!("| {name:10} | {} |\n", cells.join(" | "));
     let line = |name: &str, u: &Usage| {
         let counts = [u.block_rams, u.multipliers, u.flip_flops, u.luts];
         row(name, std::array::from_fn(|k| format!("{:>w$}", counts[k], w = WIDTHS[k])))
@@ -22,7 +34,7 @@ pub fn resources(model: &Model, usage: &BTreeMap<String, Usage>) -> String {
     const HEADS: [&str; 4] = ["block RAMs", "multipliers", "flip-flops*", "LUTs*"];
     const WIDTHS: [usize; 4] = [10, 11, 11, 6];
     let mut text = row("stage", std::array::from_fn(|k| format!("{:>w$}", HEADS[k], w = WIDTHS[k])));
-    text.push_str(&format!("|-----------|{}|\n", WIDTHS.map(|w| "-".repeat(w + 1) + ":").join("|")));
+    text.push_str(&format!("|------------|{}|\n", WIDTHS.map(|w| "-".repeat(w + 1) + ":").join("|")));
     let present = STAGES.iter().filter_map(|stage| usage.get(*stage).map(|usage| (stage, usage)));
     present.for_each(|(stage, usage)| text.push_str(&line(stage, usage)));
     let all = total(usage);
@@ -37,7 +49,8 @@ pub fn resources(model: &Model, usage: &BTreeMap<String, Usage>) -> String {
     text.push_str(&row("of board", std::array::from_fn(|k| format!("{:>w$}", shares[k], w = WIDTHS[k]))));
     let latency = Cycles::of(model, &vec![true; model.parts.len()]).latency;
     text.push_str(&format!(
-        "* estimated\n{}: {} lanes, {:.0} % busy during the passes; {latency} cycles from last input to last output beat\n",
+        "* estimated\n{}: {} lanes, {:.0} % busy during the passes; {latency} cycles from last input to last output \
+         beat\n",
         board.name,
         4 * model.formats.lanes_per_parity,
         100.0 * lanes_busy(model),
@@ -54,8 +67,9 @@ pub fn features(explained: &[Explained]) -> String {
         text.push_str("  none of the features that hardware can do without\n");
     }
     text.push_str("\nleft out, and what that saves against the scene with it put back:\n");
-    let mut rows = vec![["left out", "put back as", "block RAMs", "multipliers", "flip-flops*", "LUTs*", "cycles"]
-        .map(str::to_string)];
+    let mut rows =
+        vec![["left out", "put back as", "block RAMs", "multipliers", "flip-flops*", "LUTs*", "cycles"]
+            .map(str::to_string)];
     rows.extend(explained.iter().filter_map(|feature| {
         let saved = feature.saved?;
         let numbers = [saved.block_rams, saved.multipliers, saved.flip_flops, saved.luts, saved.cycles];

@@ -18,7 +18,7 @@ use dermis_golden::quantise::full_scale;
 use dermis_golden::reconstruct::{Golden, Reconstruction};
 use dermis_golden::scene::Scene;
 
-use crate::compare::{difference, Difference};
+use crate::compare::{compared, difference, Difference};
 use crate::cosim::{run, Bench, Findings, Vector};
 use crate::drive::{Stimulus, Times};
 use crate::hardware::{Hardware, Simulator};
@@ -101,7 +101,7 @@ pub fn verify(scene: &Scene, frames: &[Frame], simulators: &[Simulator], build: 
         verified.rows.push(Row {
             frame: frame.id.clone(),
             full_scale_MPa,
-            difference: difference(&golden.forces_N, &fixed.forces_N, lsb_N),
+            difference: difference(&compared(&golden), &compared(&fixed), lsb_N),
             golden,
             fixed,
             equal: !verified.findings.unequal.contains(&index),

@@ -1,5 +1,6 @@
-//! Accuracy on the shipped half-space frames: the golden model against the truth, the bit-true model (which the hardware equals)
-//! against the golden model on the same quantised input, at 20 bits and at the 16 of a common converter.
+//! Accuracy on the shipped half-space frames: the golden model against the truth, the bit-true model (which the
+//! hardware equals) against the golden model on the same quantised input, at 20 bits and at the 16 of a common
+//! converter.
 //!
 //! `cargo test --release -p dermis-tests --test accuracy -- --nocapture` prints the table.
 

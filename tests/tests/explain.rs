@@ -56,7 +56,8 @@ fn absent_stages_leave_no_logic() {
 
 #[test]
 fn a_scene_that_does_not_fit_is_told_what_does() {
-    let text = "name = \"wide\"\n[sensor]\nrows = 32\ncols = 32\npitch_x_mm = 2.0\npitch_y_mm = 4.0\nthickness_mm = 3.0\n";
+    let text =
+        "name = \"wide\"\n[sensor]\nrows = 32\ncols = 32\npitch_x_mm = 2.0\npitch_y_mm = 4.0\nthickness_mm = 3.0\n";
     let error = Model::new(&Scene::parse(text, "wide").unwrap()).unwrap_err().to_string();
     assert!(error.contains("there are 208; it fits with any one of:"), "{error}");
     // The remedy is one.

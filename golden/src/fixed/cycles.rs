@@ -83,8 +83,9 @@ impl Cycles {
         }
         // Out of a search the last subarray's values leave while they come.
         let early = if model.searches() { quads } else { 0 };
-        let first_output = model.prepare.latency() + ACCEPT + searched_at - early + SEND;
-        let latency = first_output + taxels + model.status_beats() as u64 - 1;
+        // Sums leave once the last force is in them.
+        let first_output = model.prepare.latency() + ACCEPT + searched_at - early + SEND + model.resultants_later();
+        let latency = first_output + (model.force_beats() + model.status_beats()) as u64 - 1;
         Cycles { first_output, latency, total: (taxels << model.prepare.average) + latency }
     }
 }

@@ -1,13 +1,14 @@
 //! Every width and scale of the pipeline, derived from the scene and its matrices.
 //!
 //! Widths are bounds, not guesses: the largest input, times the ∞-norm of what it is multiplied with, gives the largest
-//! output of each stage, so that nothing before `rescale` can overflow. `rescale` brings v_00 to a full word with one measured exponent per subarray and saturates (and
-//! counts) what does not fit; where the norms of the scaled A stay below one, nothing ever does.
+//! output of each stage, so that nothing before `rescale` can overflow. `rescale` brings v_00 to a full word with one
+//! measured exponent per subarray and saturates (and counts) what does not fit; where the norms of the scaled A stay
+//! below one, nothing ever does.
 //!
 //! | word | bits | default | LSB |
 //! |---|---|---|---|
 //! | code | `code_bits` | 20 | full scale / (2^(code_bits − 1) − 1) |
-//! | word of the frame buffer | `input_bits` = `code_bits` + `input.average` | 20 | that / 2^average, times 2^−normalise |
+//! | frame buffer's word | `input_bits` = `code_bits` + average | 20 | that / 2^average, times 2^−normalise |
 //! | parity of the input | `fold_bits` = `input_bits` + 2 | 22 | as the code |
 //! | Cz⁺ | `inverse_bits` | 24 | 2^−`inverse_exponent` N/MPa |
 //! | Ax, Ay | `coef_bits` | 18 | 2^−`a_exponent` |
@@ -25,7 +26,7 @@ use serde::Serialize;
 use super::arith::{bit_length, signed_bits};
 use super::coefficients::{parity_blocks, quantise, Blocks, FLIP_X, FLIP_Y};
 use super::quads::Quads;
-use super::resources::{force_multipliers, Fit, Resources};
+use super::resources::{Fit, Resources};
 use super::schedule::{products, vectors, Matrix, EXPONENTS};
 use super::storage::{stored, Storage};
 use super::FixedError;
@@ -142,8 +143,8 @@ pub struct Design {
     pub resources: Resources,
 }
 
-/// Quantises the matrices of a scene's subarray, derives all formats, lays out the coefficient memory and counts what all
-/// `parts` subarrays need of `board`, whether it has that or not.
+/// Quantises the matrices of a scene's subarray, derives all formats, lays out the coefficient memory and counts what
+/// all `parts` subarrays need of `board`, whether it has that or not.
 ///
 /// # Errors
 /// [`FixedError::Format`] when a word would leave the 48-bit accumulator or a norm of A asks for more headroom than
@@ -177,7 +178,8 @@ pub fn derive(scene: &Scene, matrices: &Matrices, parts: usize, board: &Board) -
     let limb_align = input_low_bits.max(inverse_low_bits);
     let raw_shift = input_low_bits.min(inverse_low_bits);
 
-    // v_00 in units of 2^raw_shift: the folded input reaches 2^(fold_bits − 1); one unit more for each dropped low·low product.
+    // v_00 in units of 2^raw_shift: the folded input reaches 2^(fold_bits − 1); one unit more for each dropped low·low
+    // product.
     let raw_bound =
         ((u128::from(quantised.inverse.norm(count)) << (fold_bits - 1)) >> raw_shift) as u64 + 2 * count as u64;
     let a_norm = quantised.ax.norm(count) + quantised.ay.norm(count);
@@ -258,8 +260,8 @@ pub fn derive(scene: &Scene, matrices: &Matrices, parts: usize, board: &Board) -
     Ok(Design { formats, quantised, storage, resources })
 }
 
-/// Chooses lanes and memories: the lanes that the scene says, else the most for which everything fits with room for the router, else
-/// the most for which it fits at all; block RAMs rather than distributed ones where there is the choice.
+/// Chooses lanes and memories: the lanes that the scene says, else the most for which everything fits with room for the
+/// router, else the most for which it fits at all; block RAMs rather than distributed ones where there is the choice.
 fn fit(
     formats: Formats,
     matrices: &[Matrix],
@@ -285,7 +287,10 @@ fn fit(
         (formats, storage, resources)
     };
     let product = board.multipliers_for(MULTIPLIER_BITS, MULTIPLIER_BITS);
-    let left = (board.multipliers as usize).saturating_sub(force_multipliers(&formats, board));
+    // What the other blocks take does not depend on the lanes.
+    let all = with(1);
+    let others = all.2.multipliers() - 4 * all.0.lanes_per_parity * product;
+    let left = (board.multipliers as usize).saturating_sub(others);
     let least = LEAST_LANES.min(quads);
     let per_parity = match scene.fixed.lanes {
         Some(lanes) => (lanes as usize / 4).clamp(1, quads)..=(lanes as usize / 4).clamp(1, quads),

@@ -22,6 +22,7 @@ pub mod receive;
 pub mod remedy;
 pub mod rescale;
 pub mod resources;
+pub mod resultants;
 pub mod schedule;
 pub mod search;
 pub mod send;

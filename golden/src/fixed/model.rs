@@ -9,11 +9,13 @@ use super::prepare::{Prepare, Scale};
 use super::quads::Quads;
 use super::remedy::{remedies, Shortage};
 use super::resources::Resources;
+use super::resultants::{self, sums};
 use super::search::Best;
 use super::send::{Status, FLAG_CONDITION, FLAG_FOUND, FLAG_NO_CONTACT, STATUS_BEATS};
 use super::storage::Storage;
 use super::subarray::Solved;
 use crate::board::{Board, BoardError};
+use crate::errors::Errors;
 use crate::flags::{frame_flags, Flag};
 use crate::float::receive::receive as judge;
 use crate::frame::{Forces, Frame, FrameError};
@@ -21,8 +23,8 @@ use crate::input::{Input, InputError};
 use crate::matrices::{Matrices, MatricesError};
 use crate::partition::{subarrays, Grid, PartitionError, Subarray};
 use crate::quantise::{full_scale, noise_floor_codes, quantise, Codes};
-use crate::reconstruct::{assemble, Reconstruction, SubarrayResult};
-use crate::scene::{Scene, SceneError};
+use crate::reconstruct::{assemble, Reconstruction, Resultant, SubarrayResult};
+use crate::scene::{ForceOutput, Scene, SceneError};
 
 /// Why a scene has no bit-true model, or a frame no result.
 #[derive(Debug, Error)]
@@ -101,7 +103,7 @@ pub struct Stage {
 /// Everything the hardware does with one frame.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Trace {
-    /// Forces `[fx, fy, fz]` in LSBs, row-major.
+    /// Forces `[fx, fy, fz]` in LSBs, row-major, or the subarrays' sums.
     pub beats: Vec<[i32; 3]>,
     /// Status beats, packed alike.
     pub status: Vec<[i32; 3]>,
@@ -291,7 +293,7 @@ impl Model {
                 normalise: s.normalise,
                 rescale_saturations: s.saturations,
                 force_saturations,
-                cycles: (cycles.first_output - self.prepare.latency()) as u32,
+                cycles: (cycles.first_output - self.prepare.latency() - self.resultants_later()) as u32,
             };
             status.beats()
         });
@@ -303,7 +305,10 @@ impl Model {
         let sweeps = solved.iter().flat_map(|s| &s.found.sweeps);
         let judged = |b: &Best| vec![i64::from(b.position[0]), i64::from(b.position[1]), b.score, i64::from(b.taken)];
         Trace {
-            beats: forces.iter().map(|f| f.words).collect(),
+            beats: match self.wants_resultants() {
+                false => forces.iter().map(|f| f.words).collect(),
+                true => self.parts.iter().flat_map(|part| resultants::beats(&sums(sensor, part, &forces))).collect(),
+            },
             status,
             stages: vec![
                 Stage { name: "receive", words: codes.iter().map(|&code| vec![i64::from(code)]).collect() },
@@ -348,9 +353,8 @@ impl Model {
         status: &[[i32; 3]],
     ) -> Result<Reconstruction, FixedError> {
         let codes = self.codes(frame)?;
-        let taxels = self.scene.sensor.taxels();
-        if beats.len() != taxels {
-            return Err(FixedError::Beats { what: "forces", got: beats.len(), expected: taxels });
+        if beats.len() != self.force_beats() {
+            return Err(FixedError::Beats { what: "forces", got: beats.len(), expected: self.force_beats() });
         }
         let expected = self.status_beats();
         if status.len() != expected {
@@ -358,9 +362,15 @@ impl Model {
         }
         let lsb = self.force_lsb_N(codes.full_scale_MPa);
         let axis = |axis: usize| beats.iter().map(|beat| f64::from(beat[axis]) * lsb).collect();
-        let forces = Forces { fx: axis(0), fy: axis(1), fz: axis(2) };
+        let forces = match self.wants_resultants() {
+            false => Forces { fx: axis(0), fy: axis(1), fz: axis(2) },
+            true => Forces::default(),
+        };
+        let resultants = self.wants_resultants().then(|| self.resultants(beats, lsb));
+        let sum = |all: &Vec<Resultant>| [0, 1, 2].map(|k| all.iter().map(|r| r.force_N[k]).sum::<f64>());
+        let resultant_N = resultants.as_ref().map_or_else(|| forces.resultant(), sum);
 
-        if !forces.resultant().iter().all(|sum| sum.is_finite()) {
+        if !resultant_N.iter().all(|sum| sum.is_finite()) {
             return Err(FixedError::TooStrong { frame: frame.id.clone(), peak_MPa: frame.peak_MPa() });
         }
         let step = self.scene.search.mu_max / MU_STEPS as f64;
@@ -392,7 +402,49 @@ impl Model {
                 objective_value: found.then(|| -f64::from(status.score) / f64::from(1u32 << LOG_FRACTION)),
             });
         }
-        Ok(assemble(&self.scene, frame, engine, subarrays, forces, flags))
+        let mut result = assemble(&self.scene, frame, engine, subarrays, forces, flags);
+        if self.wants_resultants() {
+            // Without forces per taxel only the device knows of a contact.
+            let none = status.iter().step_by(STATUS_BEATS).all(|beat| beat[2] as u32 & FLAG_NO_CONTACT != 0);
+            result.flags.retain(|flag| none || *flag != Flag::NoContact);
+            result.resultant_N = resultant_N;
+            result.error = frame.resultant_N.map(|truth| Errors::new(truth, resultant_N));
+            result.extra.resultants = resultants;
+        }
+        Ok(result)
+    }
+
+    /// The resultants of a device's beats, for force words of `lsb_N`.
+    fn resultants(&self, beats: &[[i32; 3]], lsb_N: f64) -> Vec<Resultant> {
+        let sensor = &self.scene.sensor;
+        let half_pitch = [sensor.pitch_x_mm / 2.0, sensor.pitch_y_mm / 2.0];
+        let resultant = |beats: &[[i32; 3]]| {
+            let [fx, fy, fz, pressed, x, y] = resultants::of_beats(beats).unwrap_or_default().map(|sum| sum as f64);
+            let centre = [x * half_pitch[0] / pressed, y * half_pitch[1] / pressed];
+            Resultant { force_N: [fx, fy, fz].map(|f| f * lsb_N), centre_mm: (pressed > 0.0).then_some(centre) }
+        };
+        beats.chunks(resultants::BEATS).map(resultant).collect()
+    }
+
+    /// Whether sums leave in the place of forces.
+    pub fn wants_resultants(&self) -> bool {
+        self.scene.output.forces == ForceOutput::Resultants
+    }
+
+    /// Beats of a frame before its status.
+    pub fn force_beats(&self) -> usize {
+        match self.wants_resultants() {
+            false => self.scene.sensor.taxels(),
+            true => resultants::BEATS * self.parts.len(),
+        }
+    }
+
+    /// How much later than the first force the first beat leaves.
+    pub(super) fn resultants_later(&self) -> u64 {
+        match self.wants_resultants() {
+            false => 0,
+            true => self.scene.sensor.taxels() as u64 - 1 + resultants::LATENCY,
+        }
     }
 
     /// Status beats of a frame: [`STATUS_BEATS`] per subarray, in order.

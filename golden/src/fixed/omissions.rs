@@ -7,7 +7,7 @@ use super::model::{FixedError, Model};
 use super::prepare::Scale;
 use crate::matrices::MAX_DEGREE;
 use crate::partition::{subarrays, Case};
-use crate::scene::{Scene, SearchSpec};
+use crate::scene::{ForceOutput, Scene, SearchSpec};
 
 /// A feature that a scene has or leaves out.
 #[derive(Debug)]
@@ -20,8 +20,8 @@ pub struct Feature {
     pub put_back: Option<Result<Model, FixedError>>,
 }
 
-/// Every feature that hardware can do without, in pipeline order. A scene that would not fit its board with a feature put back has it
-/// counted all the same.
+/// Every feature that hardware can do without, in pipeline order. A scene that would not fit its board with a feature
+/// put back has it counted all the same.
 pub fn features(model: &Model) -> Vec<Feature> {
     let mut scene = model.scene.clone();
     scene.fixed.lanes = Some(4 * model.formats.lanes_per_parity as u32);
@@ -76,9 +76,12 @@ pub fn features(model: &Model) -> Vec<Feature> {
     let threshold = scene.threshold.min_force_N > 0.0;
     let own = format!("{} N", scene.threshold.min_force_N);
     add("threshold", threshold, set(threshold, own, "1 mN"), &|| {
-        let thresholded =
-            with(&|s| (s.threshold.min_force_N, s.input.full_scale_MPa) = (1e-3, Some(full_scale)));
+        let thresholded = with(&|s| (s.threshold.min_force_N, s.input.full_scale_MPa) = (1e-3, Some(full_scale)));
         plain(&thresholded)
+    });
+    let resultants = model.wants_resultants();
+    add("resultants", resultants, "a force and its moments per subarray".into(), &|| {
+        plain(&with(&|s| s.output.forces = ForceOutput::Resultants))
     });
     all
 }

@@ -1,8 +1,8 @@
 //! Memories and multipliers of the hardware, counted as the synthesiser counts them.
 //!
-//! Every memory of more than one word is listed by its name in the Verilog, which carries the choice as an attribute: block RAM, of the
-//! board's shape that takes the fewest, or distributed RAM where it has few words. Both counts are exact; the tests
-//! compare them with Yosys.
+//! Every memory of more than one word is listed by its name in the Verilog, which carries the choice as an attribute:
+//! block RAM, of the board's shape that takes the fewest, or distributed RAM where it has few words. Both counts are
+//! exact; the tests compare them with Yosys.
 //!
 //! | stage | memory | words × bits |
 //! |---|---|---|
@@ -19,12 +19,13 @@
 use serde::Serialize;
 
 use super::arith::{bit_length, signed_bits};
-use super::formats::{Formats, HALVINGS, MULTIPLIER_BITS};
+use super::formats::{Formats, FORCE_BITS, HALVINGS, MULTIPLIER_BITS};
 use super::prepare::GAIN_BITS;
+use super::resultants::PLACE_BITS;
 use super::schedule::vectors;
 use super::storage::{word_bits, Storage};
 use crate::board::Board;
-use crate::scene::Scene;
+use crate::scene::{ForceOutput, Scene};
 
 /// Share of a board's block RAMs that a design takes where it has the choice: the router needs the rest.
 const ROUTABLE: f64 = 0.8;
@@ -83,7 +84,8 @@ pub fn operand_vectors(degree: usize) -> usize {
 }
 
 impl Resources {
-    /// What `formats` and `storage` need for `parts` subarrays on `board`; memories of at most `shallow` words go into distributed RAM.
+    /// What `formats` and `storage` need for `parts` subarrays on `board`; memories of at most `shallow` words go into
+    /// distributed RAM.
     pub fn new(
         formats: &Formats,
         storage: &Storage,
@@ -140,6 +142,7 @@ impl Resources {
             ("prepare$calibrate", calibrate),
             ("pass$lanes", 4 * f.lanes_per_parity * board.multipliers_for(MULTIPLIER_BITS, MULTIPLIER_BITS)),
             ("forces$unit", force_multipliers(f, board)),
+            ("resultants", resultant_multipliers(scene, board)),
         ];
         Resources { memories, multipliers }
     }
@@ -170,6 +173,14 @@ impl Resources {
             rams if rams <= board.block_rams as usize => Fit::Tight,
             _ => Fit::Not,
         }
+    }
+}
+
+/// Multipliers of the resultants: X fz⁺ and Y fz⁺.
+pub fn resultant_multipliers(scene: &Scene, board: &Board) -> usize {
+    match scene.output.forces {
+        ForceOutput::Taxels => 0,
+        ForceOutput::Resultants => 2 * board.multipliers_for(FORCE_BITS, PLACE_BITS + 1),
     }
 }
 

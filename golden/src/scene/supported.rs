@@ -7,12 +7,16 @@
 //! | `search.objective` | all; on a bonded layer "sparse" and "compressive"; with "adaptive" and "contacts" "sparse" | "sparse" |
 //! | `search.form` | all, "orthogonal" for subarrays of few taxels ([`crate::float::orthogonal::MAX_TAXELS`]) | "oblique" |
 //! | `input.dead`, `input.unipolar` | all; with "orthogonal" none | none |
-//! | `output.forces` | all | "taxels" |
+//!
+//! Dead taxels in hardware: filling b at k dead taxels with a fixed combination of the others gives the golden model's
+//! v_00, but not its v_ij. There Π stands before Ax and Ay as well ([`crate::matrices::Matrices::without`]), so that
+//! what is filled in depends on μ: an exact equivalent takes k products of n after every pass. Until then the hardware
+//! refuses them.
 //!
 //! Fields not listed are the same for both. Rules are asked in the order of the table, so that a scene with several
 //! refused choices always names the same one.
 
-use super::{ForceOutput, Form, Medium, ObjectiveKind, Scene, SceneError};
+use super::{Form, Medium, ObjectiveKind, Scene, SceneError};
 
 /// A choice that may not be had.
 struct Rule {
@@ -47,7 +51,6 @@ impl Scene {
             rule(search.form != Form::Oblique, "search.form", "orthogonal".to_string(), "oblique"),
             rule(!input.dead.is_empty(), "input.dead", self.dead(), "none"),
             rule(input.unipolar, "input.unipolar", "true".to_string(), "false"),
-            rule(self.output.forces != ForceOutput::Taxels, "output.forces", "resultants".to_string(), "taxels"),
         ])
     }
 
@@ -103,10 +106,7 @@ impl Scene {
     /// The input option that needs `input.full_scale_MPa` in hardware, if there is one: its words are relative to it.
     pub(crate) fn scaled_input(&self) -> Option<&'static str> {
         let input = &self.input;
-        let asked = [
-            ("input.calibration", input.calibration.is_some()),
-            ("input.tare", input.tare.is_some()),
-        ];
+        let asked = [("input.calibration", input.calibration.is_some()), ("input.tare", input.tare.is_some())];
         asked.into_iter().find(|(_, asked)| *asked).map(|(field, _)| field)
     }
 

@@ -185,11 +185,8 @@ fn choices_not_built_yet_say_so() {
         ("[medium]\nkind = \"bonded-layer\"", "medium.kind = bonded-layer, poisson 0.48; available: half-space"),
         ("[partition]\ncase = \"contacts\"", "partition.case = contacts; available: 0, 1, 2, 3, rows and cols"),
         ("[partition]\ncase = \"adaptive\"", "partition.case = adaptive"),
-        ("[input]\naverage = 1", "input.average = 1; available: 0"),
-        ("[input]\ncalibration = \"t.csv\"", "input.calibration"),
         ("[input]\ndead = [[0, 1]]", "input.dead"),
         ("[input]\nunipolar = true", "input.unipolar"),
-        ("[output]\nforces = \"resultants\"", "output.forces = resultants; available: taxels"),
         ("[search]\nobjective = \"auto\"", "search.objective = auto; available: sparse"),
         ("[search]\nform = \"orthogonal\"", "search.form = orthogonal; available: oblique"),
     ];

@@ -8,9 +8,9 @@ use crate::wire::{Wire, Word};
 /// ```text
 /// s_axis --> read sum, hold word --> add --> memory, or in the last frame m_axis
 /// ```
-/// The sums have a memory of their own, so that frames come in while the frame buffer is still read. An early `tlast` in any of the
-/// frames starts over; it leaves as a beat of its own, for `receive` to drop and to flag. A missing one is missing on the
-/// sum's last beat as well. With k = 0 the stream passes through.
+/// The sums have a memory of their own, so that frames come in while the frame buffer is still read. An early `tlast`
+/// in any of the frames starts over; it leaves as a beat of its own, for `receive` to drop and to flag. A missing one
+/// is missing on the sum's last beat as well. With k = 0 the stream passes through.
 #[derive(LogicBlock)]
 pub struct Average {
     /// Clock.

@@ -9,8 +9,8 @@ use crate::wire::{Wire, Word};
 /// ```text
 /// s_axis --> read table, hold code --> difference --> product --> round, saturate --> m_axis
 /// ```
-/// All steps move together while the output is free. Without a table of gains the difference is the result; without any the stream
-/// passes through. The taxel count starts over at a `tlast`, as that of `receive` does.
+/// All steps move together while the output is free. Without a table of gains the difference is the result; without any
+/// the stream passes through. The taxel count starts over at a `tlast`, as that of `receive` does.
 #[derive(LogicBlock)]
 pub struct Calibrate {
     /// Clock.

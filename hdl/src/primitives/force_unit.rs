@@ -13,9 +13,9 @@ use super::sweep::position_bits;
 use crate::wire::{Wire, Word};
 
 /// A pipeline of five steps that moves while `advance` is high: lane, products, shift, rounding with saturation and
-/// threshold, output. `beat` 0 is a force from `quad`, 1 … 3 are the status beats; the answer stands on `beat_data` five steps after
-/// `offer`. `start` keeps μ, the shift and the status of subarray `part`, settled three cycles later; `begin_frame` clears the
-/// frame's counts.
+/// threshold, output. `beat` 0 is a force from `quad`, 1 … 3 are the status beats; the answer stands on `beat_data`
+/// five steps after `offer`. `start` keeps μ, the shift and the status of subarray `part`, settled three cycles later;
+/// `begin_frame` clears the frame's counts.
 #[derive(LogicBlock)]
 pub struct ForceUnit {
     /// Clock.
@@ -184,7 +184,8 @@ impl ForceUnit {
         }
     }
 
-    /// Verilog of what shear needs: the μ words of each subarray, then their products with p. None of it without a search.
+    /// Verilog of what shear needs: the μ words of each subarray, then their products with p. None of it without a
+    /// search.
     fn shear(&self) -> (String, String) {
         let f = &self._formats;
         let (p, mu) = (position_bits(), 18);
