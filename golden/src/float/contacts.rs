@@ -22,8 +22,9 @@
 //!
 //! Cells larger than the depth smear a contact's rim, which shifts μ, and what one contact is off by is taken for shear
 //! of its neighbours. Where elliptic contacts explain the stress (the misfit is what noise and quadrature leave, as in
-//! `auto`) they are free of both: `objective::several` fits them together, from the regions found above and from those
-//! of narrower smoothing, and each contact's μ, load and cells are its ellipse's. Anything else stays as it was found.
+//! `auto`) they are free of both: `objective::several` fits them together, from regions of several widths, before
+//! anything is searched; each contact's μ, load and cells are its ellipse's. Where they do not, the regions of the
+//! nearest ellipses are one more drawing to search in.
 //!
 //! | | shape | unit |
 //! |---|---|---|
@@ -114,24 +115,40 @@ impl Solver<'_> {
         let p = family.eval(found.mu);
         let segments = Segments::whole(p.len());
         let start = Contacts { segments, found: vec![Some(found)], p, sweeps: 0, converged: true };
+        let fit = self.fit(&start);
+        if let Some(fitted) = fit.as_ref().and_then(|fit| self.explained(fit, &start)) {
+            return fitted;
+        }
         let mut best = (found.objective, start.clone());
-        for width in WIDTHS {
-            let state = self.drawn(width, &start);
+        let mut keep = |state: Contacts| {
             let cost = REGION_COST * (state.segments.count - 1) as f64;
             if let Some(score) = self.objective.score(&state.p).filter(|score| score - cost > best.0) {
                 best = (score - cost, state);
             }
+        };
+        for width in WIDTHS {
+            keep(self.drawn(&|p| segment(&self.matrices.sensor, p, width), &start));
         }
-        self.fitted(&best.1).unwrap_or(best.1)
+        if let Some(fit) = &fit {
+            let segments = Segments::numbered(&fit.labels(&self.matrices.sensor));
+            keep(self.drawn(&|_| segments.clone(), &start));
+        }
+        let best = best.1;
+        // As many ellipses as were fitted already come to the same.
+        if fit.is_some_and(|fit| fit.patches.len() == best.segments.count) || best.segments.count == 1 {
+            return best;
+        }
+        self.fit(&best).and_then(|fit| self.explained(&fit, &best)).unwrap_or(best)
     }
 
-    /// Solves for regions drawn with one width of smoothing.
-    fn drawn(&self, width: f64, start: &Contacts) -> Contacts {
-        let mut state = self.redrawn(start, width);
+    /// Solves for regions drawn from p, again and again as p gets better.
+    fn drawn(&self, draw: &dyn Fn(&[f64]) -> Segments, start: &Contacts) -> Contacts {
+        let mut state = self.redrawn(start, draw(&start.p));
         if state.segments.count == 1 {
             return start.clone();
         }
         for _ in 0..ROUNDS {
+            let before = state.segments.clone();
             self.sweep(&mut state);
             while let Some((a, b)) = self.alike(&state) {
                 state.found[a] = state.found[a].or(state.found[b]);
@@ -142,19 +159,18 @@ impl Solver<'_> {
                 }
                 self.sweep(&mut state);
             }
-            let drawn = self.redrawn(&state, width);
-            if drawn.segments == state.segments {
+            let segments = draw(&state.p);
+            if segments == state.segments || segments == before {
                 return state;
             }
-            state = Contacts { converged: false, ..drawn };
+            state = Contacts { converged: false, ..self.redrawn(&state, segments) };
         }
         self.sweep(&mut state);
         state
     }
 
-    /// The regions of the state's p, each with the μ that its strongest taxel had.
-    fn redrawn(&self, state: &Contacts, width: f64) -> Contacts {
-        let segments = segment(&self.matrices.sensor, &state.p, width);
+    /// New regions, each with the μ that its strongest taxel had.
+    fn redrawn(&self, state: &Contacts, segments: Segments) -> Contacts {
         let strongest = |region: usize| {
             let own = (0..state.p.len()).filter(|&k| segments.labels[k] == region);
             own.max_by(|&a, &b| state.p[a].total_cmp(&state.p[b]))

@@ -21,8 +21,8 @@ const FIT_WIDTHS: [f64; 3] = [WIDTH, 0.6, 0.4];
 const BEYOND: f64 = 0.05;
 
 impl Solver<'_> {
-    /// Ellipses in place of the regions, where they explain the stress.
-    pub(super) fn fitted(&self, state: &Contacts) -> Option<Contacts> {
+    /// The ellipses that come nearest to the stress, started from the state's regions; `None` where none may be fitted.
+    pub(super) fn fit(&self, state: &Contacts) -> Option<Explanation> {
         let (b, noise_MPa) = self.stress?;
         let sensor = &self.matrices.sensor;
         // What differs is the number of regions; the rest the fit finds by itself.
@@ -36,12 +36,16 @@ impl Solver<'_> {
             new
         });
         let starts: Vec<Vec<f64>> = drawings.into_iter().map(|segments| starts(sensor, &state.p, segments)).collect();
-        let enough = explained(b, noise_MPa);
-        let explanation = explain(sensor, b, &starts, enough)?;
-        if explanation.misfit > enough || explanation.patches.len() == 1 {
-            return None;
+        explain(sensor, b, &starts, explained(b, noise_MPa))
+    }
+
+    /// The contacts of ellipses that explain the stress: `state`, the plain method, where it is a single one.
+    pub(super) fn explained(&self, explanation: &Explanation, state: &Contacts) -> Option<Contacts> {
+        match explanation.patches.len() {
+            _ if !explanation.enough() => None,
+            1 => (state.segments.count == 1).then(|| state.clone()),
+            _ => self.of_ellipses(explanation, state),
         }
-        self.of_ellipses(&explanation, state)
     }
 
     /// The regions of ellipses, each with its ellipse's forces; `None` where a region has none, is not to be searched
@@ -49,7 +53,7 @@ impl Solver<'_> {
     fn of_ellipses(&self, explanation: &Explanation, state: &Contacts) -> Option<Contacts> {
         let sensor = &self.matrices.sensor;
         let cells = explanation.cells(sensor);
-        let labels = explanation.labels(sensor, &cells);
+        let labels = explanation.labels(sensor);
         let segments = Segments::numbered(&labels);
         let mut p: Vec<f64> = (0..labels.len()).map(|k| cells.iter().map(|cells| cells[k]).sum()).collect();
         let mut found = vec![None; segments.count];

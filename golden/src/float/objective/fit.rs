@@ -14,10 +14,22 @@
 
 use nalgebra::{DMatrix, DVector};
 
-/// Steps at most; a fit that goes well takes 6 to 15.
-const MAX_STEPS: usize = 40;
-/// A step that lowers the misfit by a smaller share ends the fit.
-const ENOUGH: f64 = 1e-7;
+/// How long a fit goes on.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Effort {
+    /// Steps at most; a fit that goes well takes 6 to 15.
+    pub steps: usize,
+    /// A step that lowers the misfit by a smaller share ends the fit.
+    pub gain: f64,
+}
+
+/// To the end.
+pub(super) const THOROUGH: Effort = Effort { steps: 40, gain: 1e-7 };
+/// As long as it goes on well.
+pub(super) const STEADY: Effort = Effort { steps: 20, gain: 0.01 };
+/// As long as it goes fast: to tell starts that lead somewhere from those that do not.
+pub(super) const QUICK: Effort = Effort { steps: 20, gain: 0.05 };
+
 /// λ beyond which no step helps any more.
 const STUCK: f64 = 1e8;
 /// Added to the normal equations' diagonal, relative, so that loads that cannot be told apart stay finite.
@@ -83,12 +95,12 @@ pub(super) fn misfit(model: &mut dyn Model, b: &DVector<f64>, theta: &[f64]) -> 
 }
 
 /// Fits from a start; `None` where the model has no finite loads there.
-pub(super) fn fit(model: &mut dyn Model, b: &DVector<f64>, start: &[f64]) -> Option<Fit> {
+pub(super) fn fit(model: &mut dyn Model, b: &DVector<f64>, start: &[f64], effort: Effort) -> Option<Fit> {
     let mut theta = start.to_vec();
     model.confine(&mut theta);
     let mut best = Projection::new(model.columns(&theta), b)?;
     let (mut evaluations, mut lambda) = (1, 1e-3);
-    for _ in 0..MAX_STEPS {
+    for _ in 0..effort.steps {
         let slopes = best.project(model.slopes(&theta, &best.loads));
         let (curvature, downhill) = (slopes.tr_mul(&slopes), slopes.tr_mul(&best.rest));
         let before = best.misfit();
@@ -113,7 +125,7 @@ pub(super) fn fit(model: &mut dyn Model, b: &DVector<f64>, start: &[f64]) -> Opt
                 None => lambda *= 10.0,
             }
         }
-        if before - best.misfit() <= ENOUGH * before {
+        if before - best.misfit() <= effort.gain * before {
             break;
         }
     }

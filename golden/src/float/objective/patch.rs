@@ -19,7 +19,7 @@
 //! Found first with few nodes, then a few steps with many. For one contact per subarray on a half-space.
 
 use super::disc::{Disc, Taxels};
-use super::fit::{fit, misfit, Fit, Model};
+use super::fit::{fit, misfit, Fit, Model, THOROUGH};
 use super::{Estimate, Objective, Subject};
 use nalgebra::{DMatrix, DVector};
 
@@ -143,8 +143,8 @@ impl Patch {
         };
         let starts: Vec<_> = START_RADII.iter().filter_map(start).collect();
         let (theta, _) = starts.iter().min_by(|a, b| a.1.total_cmp(&b.1))?;
-        let coarse = fit(&mut model, b, theta)?;
-        let fine = fit(&mut Ellipse { taxels, disc: &self.fine }, b, &coarse.theta)?;
+        let coarse = fit(&mut model, b, theta, THOROUGH)?;
+        let fine = fit(&mut Ellipse { taxels, disc: &self.fine }, b, &coarse.theta, THOROUGH)?;
         Some(Fit { evaluations: START_RADII.len() + coarse.evaluations + fine.evaluations, ..fine })
     }
 }

@@ -15,7 +15,7 @@
 //! is largest, or its ellipse cut in two, twice at most and as long as that helps. On a half-space.
 
 use super::disc::{Disc, Taxels};
-use super::fit::{fit, Fit, Model};
+use super::fit::{fit, Effort, Fit, Model, QUICK, STEADY};
 use super::patch::{place, Ellipse, COARSE, FINE, PARAMETERS};
 use crate::float::segment::Segments;
 use crate::sensor::Sensor;
@@ -27,8 +27,12 @@ const MOST: usize = 8;
 const WORK: usize = 10_000;
 /// A further ellipse must bring the squared misfit below this share.
 const WORTH: f64 = 0.5;
-/// Coarse misfit over the one asked for beyond which many nodes do not help.
-const HOPELESS: f64 = 1e5;
+/// Rings and angles while starts are tried.
+const ROUGH: [usize; 2] = [4, 9];
+/// Rough misfit over the one asked for up to which a fit is taken to its end.
+const HOPE: f64 = 1e5;
+/// Misfit over the one asked for from which no other start is tried, and many nodes help.
+const PROMISING: f64 = 1e3;
 /// Ellipses that may be added.
 const ADDED: usize = 2;
 /// Rings and angles for the shares of the cells.
@@ -55,6 +59,8 @@ pub(crate) struct Explanation {
     pub patches: Vec<Patched>,
     /// ‖b − Σ K F‖² in MPa².
     pub misfit: f64,
+    /// Up to which misfit the stress counts as explained, in MPa².
+    enough: f64,
     /// Sets of columns computed, over all fits.
     pub evaluations: usize,
 }
@@ -132,34 +138,56 @@ pub(crate) fn starts(sensor: &Sensor, p: &[f64], segments: &Segments) -> Vec<f64
     (0..segments.count).filter_map(start).flatten().collect()
 }
 
-/// Fits from each start in turn until the squared misfit is at most `enough`; the best fit in which every contact
-/// presses, `None` where there is none.
-pub(crate) fn explain(sensor: &Sensor, b: &[f64], starts: &[Vec<f64>], enough: f64) -> Option<Explanation> {
-    let (taxels, b) = (Taxels::new(sensor), DVector::from_column_slice(b));
-    let discs = [COARSE, FINE].map(|[rings, angles]| Disc::new(rings, angles));
-    let [mut coarse, mut fine] = [0, 1].map(|k| Several { taxels: &taxels, disc: &discs[k] });
-    let mut evaluations = 0;
-    let mut both = |theta: &[f64]| -> Option<Fit> {
-        let first = fit(&mut coarse, &b, theta)?;
-        evaluations += first.evaluations;
-        let mut found = first;
-        if found.misfit <= HOPELESS * enough {
-            found = fit(&mut fine, &b, &found.theta)?;
-            evaluations += found.evaluations;
-        }
+/// Fits to one frame.
+struct Trial<'a> {
+    taxels: &'a Taxels,
+    /// Quadratures, the coarsest first.
+    discs: &'a [Disc; 3],
+    b: &'a DVector<f64>,
+    /// Squared misfit of a fit that explains b.
+    enough: f64,
+    evaluations: usize,
+}
+
+impl Trial<'_> {
+    fn fit(&mut self, disc: usize, theta: &[f64], effort: Effort) -> Option<Fit> {
+        let found = fit(&mut Several { taxels: self.taxels, disc: &self.discs[disc] }, self.b, theta, effort)?;
+        self.evaluations += found.evaluations;
         let presses = |force: &[f64]| force[2] > 0.0 && force.iter().all(|f| f.is_finite());
         Some(found).filter(|found| found.loads.as_slice().chunks(3).all(presses))
-    };
-    let less = |a: &Fit, b: &Fit| a.misfit.total_cmp(&b.misfit);
-    let most = MOST.min(WORK / taxels.count().max(1)) * PARAMETERS;
-    let mut best: Option<Fit> = None;
-    for start in starts.iter().filter(|start| !start.is_empty() && start.len() <= most) {
-        best = best.into_iter().chain(both(start)).min_by(less);
-        if best.as_ref().is_some_and(|best| best.misfit <= enough) {
-            break;
-        }
     }
-    let mut best = best?;
+
+    /// The best fit from several starts, taken further where it may explain b.
+    fn best(&mut self, starts: &[&[f64]]) -> Option<Fit> {
+        let mut best: Option<Fit> = None;
+        for start in starts {
+            let found = self.fit(0, start, QUICK);
+            best = best.into_iter().chain(found).min_by(|a, b| a.misfit.total_cmp(&b.misfit));
+            if best.as_ref().is_some_and(|best| best.misfit <= PROMISING * self.enough) {
+                break;
+            }
+        }
+        let mut best = best?;
+        for (disc, hope) in [(1, HOPE), (2, PROMISING)] {
+            if best.misfit > hope * self.enough {
+                break;
+            }
+            best = self.fit(disc, &best.theta, STEADY).unwrap_or(best);
+        }
+        Some(best)
+    }
+}
+
+/// Fits from each start as far as it goes fast, then the best to the end where it may explain b, then with ellipses
+/// added; the best fit in which every contact presses, `None` where there is none.
+pub(crate) fn explain(sensor: &Sensor, b: &[f64], starts: &[Vec<f64>], enough: f64) -> Option<Explanation> {
+    let (taxels, b) = (Taxels::new(sensor), DVector::from_column_slice(b));
+    let most = MOST.min(WORK / taxels.count().max(1)) * PARAMETERS;
+    let discs = [ROUGH, COARSE, FINE].map(|[rings, angles]| Disc::new(rings, angles));
+    let mut trial = Trial { taxels: &taxels, discs: &discs, b: &b, enough, evaluations: 0 };
+    let starts: Vec<&[f64]> =
+        starts.iter().map(Vec::as_slice).filter(|start| !start.is_empty() && start.len() <= most).collect();
+    let mut best = trial.best(&starts)?;
     for _ in 0..ADDED {
         if best.misfit <= enough || best.theta.len() >= most {
             break;
@@ -167,7 +195,7 @@ pub(crate) fn explain(sensor: &Sensor, b: &[f64], starts: &[Vec<f64>], enough: f
         let rest = Several { taxels: &taxels, disc: &discs[1] }.rest(&b, &best);
         let worst = rest.iamax();
         let further = further(&best.theta, [taxels.x[worst], taxels.y[worst]], taxels.depth);
-        let better = further.iter().filter_map(|theta| both(theta)).min_by(less);
+        let better = trial.best(&further.each_ref().map(Vec::as_slice));
         match better.filter(|found| found.misfit < WORTH * best.misfit) {
             Some(better) => best = better,
             None => break,
@@ -179,7 +207,7 @@ pub(crate) fn explain(sensor: &Sensor, b: &[f64], starts: &[Vec<f64>], enough: f
         Patched { theta: own, force: [force[0], force[1], force[2]] }
     };
     let patches: Vec<Patched> = best.theta.chunks(PARAMETERS).zip(best.loads.as_slice().chunks(3)).map(patch).collect();
-    Some(Explanation { patches, misfit: best.misfit, evaluations })
+    Some(Explanation { patches, misfit: best.misfit, enough, evaluations: trial.evaluations })
 }
 
 /// Two ways to one ellipse more: at the place of the largest misfit, or the ellipse that it lies in, or nearest to, cut
@@ -205,6 +233,11 @@ fn further(theta: &[f64], [x, y]: [f64; 2], depth: f64) -> [Vec<f64>; 2] {
 }
 
 impl Explanation {
+    /// Whether the ellipses explain the stress.
+    pub fn enough(&self) -> bool {
+        self.misfit <= self.enough
+    }
+
     /// Normal force of each ellipse on each cell, in N.
     pub fn cells(&self, sensor: &Sensor) -> Vec<Vec<f64>> {
         let disc = Disc::new(CELLS[0], CELLS[1]);
@@ -227,7 +260,8 @@ impl Explanation {
     }
 
     /// The ellipse each taxel belongs to: of the largest force on its cell, else the one whose rim is nearest.
-    pub fn labels(&self, sensor: &Sensor, cells: &[Vec<f64>]) -> Vec<usize> {
+    pub fn labels(&self, sensor: &Sensor) -> Vec<usize> {
+        let cells = self.cells(sensor);
         let label = |k: usize| {
             let [x, y] = sensor.position_mm(k / sensor.cols, k % sensor.cols);
             let beyond = |patch: &Patched| {

@@ -24,7 +24,7 @@
 //! | out: load | scalar | N | above 0 |
 
 use super::disc::{Disc, Taxels};
-use super::fit::{fit, Fit, Model};
+use super::fit::{fit, Fit, Model, THOROUGH};
 use super::patch::{confine_ellipse, place};
 use super::{Estimate, Objective, Subject};
 use crate::float::search::search;
@@ -103,7 +103,7 @@ impl Symmetric {
             let [x, y, mu_x, mu_y] = start;
             let radius = support * self.taxels.depth;
             let theta = [x, y, radius, radius, 0.0, mu_x, mu_y];
-            let Some(fit) = fit(&mut model, &b, &theta) else { continue };
+            let Some(fit) = fit(&mut model, &b, &theta, THOROUGH) else { continue };
             evaluations += fit.evaluations;
             if best.as_ref().is_none_or(|best| fit.misfit < best.misfit) && model.load(&fit.loads) > 0.0 {
                 best = Some(Fit { loads: DVector::from_element(1, model.load(&fit.loads)), ..fit });
