@@ -41,6 +41,8 @@ pub const SERIES_TOLERANCE: f64 = 0.035;
 pub const CUBIC_FROM: f64 = 0.2;
 /// Highest degree the pipeline is built for.
 pub const MAX_DEGREE: usize = 3;
+/// Highest degree of the floating-point model: enough for square taxels half as far apart as they are deep.
+pub const MAX_FLOAT_DEGREE: usize = 8;
 /// From this r on no degree helps.
 pub const MAX_RADIUS: f64 = 0.9;
 
@@ -120,7 +122,7 @@ pub enum MatricesError {
     },
     /// The series in μ converges too slowly or not at all.
     #[error(
-        "{sensor}: r = {radius:.3} at mu_max = {mu_max} needs more than degree {MAX_DEGREE}; \
+        "{sensor}: r = {radius:.3} at mu_max = {mu_max} needs more than degree {most}; \
          a smaller mu_max, or taxels further apart against the thickness, lower r"
     )]
     SlowSeries {
@@ -130,23 +132,31 @@ pub enum MatricesError {
         radius: f64,
         /// The scene's mu_max.
         mu_max: f64,
+        /// Highest degree there is.
+        most: usize,
     },
 }
 
 impl Matrices {
-    /// Computes the matrices of a (sub)array on a half-space for shear ratios up to `mu_max` (0 to 2).
+    /// Computes the matrices of a (sub)array on a half-space for shear ratios up to `mu_max` (0 to 2), of a degree that
+    /// the pipeline has.
     ///
     /// # Errors
     /// [`MatricesError`]; the size is checked before anything is allocated.
     pub fn new(sensor: &Sensor, mu_max: f64) -> Result<Matrices, MatricesError> {
-        Matrices::through(sensor, Medium::HalfSpace, mu_max)
+        Matrices::up_to(sensor, Medium::HalfSpace, mu_max, MAX_DEGREE)
     }
 
-    /// Computes the matrices of a (sub)array under any medium for shear ratios up to `mu_max` (0 to 2).
+    /// Computes the matrices of a (sub)array under any medium for shear ratios up to `mu_max` (0 to 2), of a degree that
+    /// the floating-point model has.
     ///
     /// # Errors
     /// As [`Matrices::new`].
     pub fn through(sensor: &Sensor, medium: Medium, mu_max: f64) -> Result<Matrices, MatricesError> {
+        Matrices::up_to(sensor, medium, mu_max, MAX_FLOAT_DEGREE)
+    }
+
+    fn up_to(sensor: &Sensor, medium: Medium, mu_max: f64, most: usize) -> Result<Matrices, MatricesError> {
         sensor.check()?;
         let boxed = || Box::new(sensor.clone());
         let n = sensor.taxels();
@@ -168,10 +178,11 @@ impl Matrices {
         let (ax, ay) = (chain(&cz_pinv, &folded_cx), chain(&cz_pinv, &folded_cy));
         let shear = mu_max > 0.0;
         let spectral_radius = if shear { mu_max * inverse.largest_radius(&folded_cx, &folded_cy) } else { 0.0 };
-        let degree = degree(spectral_radius, mu_max).ok_or_else(|| MatricesError::SlowSeries {
+        let degree = degree(spectral_radius, mu_max, most).ok_or_else(|| MatricesError::SlowSeries {
             sensor: boxed(),
             radius: spectral_radius,
             mu_max,
+            most,
         })?;
         Ok(Matrices {
             sensor: sensor.clone(),
@@ -189,12 +200,12 @@ impl Matrices {
     }
 }
 
-/// The degree a series of radius `r` needs, `None` when it is more than [`MAX_DEGREE`].
-fn degree(r: f64, mu_max: f64) -> Option<usize> {
+/// The degree a series of radius `r` needs, `None` when it is more than `most`.
+fn degree(r: f64, mu_max: f64, most: usize) -> Option<usize> {
     if mu_max == 0.0 {
         return Some(0);
     }
     let least = if r > CUBIC_FROM { 3 } else { 1 };
     let enough = |d: &usize| r.powi(*d as i32 + 1) <= SERIES_TOLERANCE;
-    (least..=MAX_DEGREE).find(enough).filter(|_| r < MAX_RADIUS)
+    (least..=most).find(enough).filter(|_| r < MAX_RADIUS)
 }

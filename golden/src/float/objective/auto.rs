@@ -5,7 +5,7 @@
 //! its misfit is what the stated noise σ and the quadrature's error leave,
 //!
 //! ```text
-//! misfit ≤ n (σ² + (10⁻⁴ max|b|)²) (1 + 4 √(2/n))
+//! misfit ≤ n (σ² + (1.5·10⁻⁴ max|b|)²) (1 + 4 √(2/n))
 //! ```
 //!
 //! | order | taken when |
@@ -23,7 +23,7 @@ use crate::float::search::Found;
 use crate::sensor::Sensor;
 
 /// Error of the fits' own over the peak: their quadrature's, and that of frames made by another.
-const OWN_ERROR: f64 = 1e-4;
+const OWN_ERROR: f64 = 1.5e-4;
 /// Deviations of χ² beyond which a misfit is no accident.
 const DEVIATIONS: f64 = 4.0;
 
