@@ -36,6 +36,7 @@
 
 mod ellipses;
 
+use super::objective::taxels::Taxels;
 use super::objective::Objective;
 use super::pass::{place, Polynomial};
 use super::search::{search, Found};
@@ -74,6 +75,17 @@ pub struct Contacts {
     pub converged: bool,
 }
 
+/// A frame as ellipses see it.
+#[derive(Clone, Copy)]
+pub(crate) struct Stress<'a> {
+    /// Where it was read.
+    pub taxels: &'a Taxels,
+    /// b in MPa.
+    pub b: &'a [f64],
+    /// Its noise.
+    pub noise_MPa: f64,
+}
+
 /// The solver of one frame.
 pub struct Solver<'a> {
     /// The array's matrices.
@@ -84,8 +96,8 @@ pub struct Solver<'a> {
     pub objective: &'a dyn Objective,
     /// p₀ = Cz⁺ b in N.
     pub p0: &'a [f64],
-    /// Stress in MPa and its noise, where ellipses may be fitted to it: on a half-space, every taxel read.
-    pub stress: Option<(&'a [f64], f64)>,
+    /// What ellipses are fitted to, where every taxel is read.
+    pub(crate) stress: Option<Stress<'a>>,
     /// Whether the region of these labels with this number is to be searched.
     pub searched: &'a dyn Fn(&Segments, usize) -> bool,
 }

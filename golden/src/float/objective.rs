@@ -20,9 +20,11 @@ mod compressive;
 pub(crate) mod disc;
 mod fit;
 pub(crate) mod patch;
+mod radial;
 pub(crate) mod several;
 mod subject;
 mod symmetric;
+pub(crate) mod taxels;
 
 pub(crate) use auto::explained;
 pub use auto::Auto;
@@ -32,7 +34,7 @@ pub use subject::{Estimate, Subject};
 pub use symmetric::Symmetric;
 
 use super::search::search;
-use crate::scene::ObjectiveKind;
+use crate::scene::{Medium, ObjectiveKind};
 use crate::sensor::Sensor;
 
 /// A measure of candidates; the search takes the largest.
@@ -61,14 +63,14 @@ impl<T: Objective + ?Sized> Objective for ByScore<'_, T> {
     }
 }
 
-/// The objective of a scene for subarrays shaped like `sensor`.
-pub fn of_kind(kind: ObjectiveKind, sensor: &Sensor) -> Box<dyn Objective + Send + Sync> {
+/// The objective of a scene for subarrays shaped like `sensor` under a medium.
+pub fn of_kind(kind: ObjectiveKind, sensor: &Sensor, medium: Medium) -> Box<dyn Objective + Send + Sync> {
     match kind {
         ObjectiveKind::Sparse => Box::new(Sparse::default()),
         ObjectiveKind::Compressive => Box::new(Compressive),
-        ObjectiveKind::Symmetric => Box::new(Symmetric::new(sensor)),
-        ObjectiveKind::Patch => Box::new(Patch::default()),
-        ObjectiveKind::Auto => Box::new(Auto::new(sensor)),
+        ObjectiveKind::Symmetric => Box::new(Symmetric::new(sensor, medium)),
+        ObjectiveKind::Patch => Box::new(Patch::new(sensor, medium)),
+        ObjectiveKind::Auto => Box::new(Auto::new(sensor, medium)),
     }
 }
 

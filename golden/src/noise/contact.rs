@@ -9,9 +9,11 @@
 //! | place | the ellipse's longer radius inside the taxels' outermost lines |
 //! | shear over load | 0.1 … 0.5, any direction |
 
-use crate::float::objective::disc::{Disc, Taxels};
+use crate::float::objective::disc::Disc;
 use crate::float::objective::patch::Ellipse;
+use crate::float::objective::taxels::Taxels;
 use crate::random::Random;
+use crate::scene::Medium;
 use crate::sensor::Sensor;
 use std::f64::consts::{PI, TAU};
 
@@ -70,9 +72,9 @@ pub struct Truth {
 }
 
 impl Truth {
-    /// For one array.
-    pub fn new(sensor: &Sensor) -> Truth {
-        Truth { taxels: Taxels::new(sensor), disc: Disc::new(NODES[0], NODES[1]) }
+    /// For one array under a medium.
+    pub fn new(sensor: &Sensor, medium: Medium) -> Truth {
+        Truth { taxels: Taxels::new(sensor, medium), disc: Disc::new(NODES[0], NODES[1]) }
     }
 
     /// Stress under each taxel in MPa.

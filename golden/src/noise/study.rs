@@ -174,7 +174,7 @@ fn check(study: &Study) -> Result<(), StudyError> {
 
 /// The contacts; one whose unknowns cannot be told apart is drawn again.
 fn draws(scene: &Scene, study: &Study) -> Vec<Draw> {
-    let truth = Truth::new(&scene.sensor);
+    let truth = Truth::new(&scene.sensor, scene.medium);
     let mut random = Random::new(study.seed);
     let mut draws = Vec::with_capacity(study.draws);
     // Bounded, so that an array that never shows its contact ends too.

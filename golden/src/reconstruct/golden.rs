@@ -10,8 +10,9 @@ use super::adaptive::{distance, extents, farther, objection};
 use super::extra::{regions, Refused, Taken};
 use super::{assemble, Reconstruction, SubarrayResult};
 use crate::flags::{frame_flags, Flag};
-use crate::float::contacts::{Contacts, Solver};
+use crate::float::contacts::{Contacts, Solver, Stress};
 use crate::float::force::{force, threshold};
+use crate::float::objective::taxels::Taxels;
 use crate::float::objective::{of_kind, Estimate, Objective, Sparse, Subject};
 use crate::float::orthogonal::{truncation, Orthogonal, OrthogonalError};
 use crate::float::pass::Polynomial;
@@ -23,7 +24,7 @@ use crate::input::{Input as InputOptions, InputError};
 use crate::matrices::{Matrices, MatricesError};
 use crate::partition::{subarrays, Case, PartitionError, Subarray};
 use crate::quantise::{full_scale, noise_floor_codes, quantise};
-use crate::scene::{Condition, Form, Medium, Scene, SceneError};
+use crate::scene::{Condition, Form, Scene, SceneError};
 use thiserror::Error;
 
 /// A scene made ready for frames.
@@ -33,6 +34,8 @@ pub struct Golden {
     pub(super) input: InputOptions,
     /// The case; of `adaptive` all cases that divide the array, the finest first, the whole last.
     cuts: Vec<Cut>,
+    /// Where ellipses may be fitted: `adaptive` and `contacts`, every taxel read, shear wanted.
+    taxels: Option<Taxels>,
 }
 
 /// A case with its matrices.
@@ -126,7 +129,7 @@ impl Golden {
             let shared = Matrices::through(&shape, scene.medium, scene.search.mu_max)?;
             let literal = scene.search.form == Form::Orthogonal;
             let orthogonal = literal.then(|| Orthogonal::new(&shared)).transpose()?;
-            let objective = of_kind(scene.search.objective, &shape);
+            let objective = of_kind(scene.search.objective, &shape, scene.medium);
             Ok(Cut { case, parts, shared, masked: Vec::new(), orthogonal, objective }.mask(&scene.input.dead)?)
         };
         let cases = match scene.partition.case {
@@ -138,7 +141,10 @@ impl Golden {
             grid @ Case::Grid(_) => vec![grid],
         };
         let cuts = cases.into_iter().map(cut).collect::<Result<_, _>>()?;
-        Ok(Golden { scene: scene.clone(), input: InputOptions::new(scene)?, cuts })
+        let by_contact = scene.partition.case.grid().is_none();
+        let fits = by_contact && scene.input.dead.is_empty() && scene.search.mu_max > 0.0;
+        let taxels = fits.then(|| Taxels::new(&scene.sensor, scene.medium));
+        Ok(Golden { scene: scene.clone(), input: InputOptions::new(scene)?, cuts, taxels })
     }
 
     /// The matrices of a subarray; of `adaptive` those of the whole array.
@@ -237,8 +243,8 @@ impl Golden {
         let family = Polynomial::new(matrices, input.stress_MPa);
         let found = search(&family, scene.search.mu_max, &Sparse::default())?;
         let (mu_max, p0) = (scene.search.mu_max, family.v(0, 0));
-        let fits = scene.medium == Medium::HalfSpace && self.whole().masked.is_empty() && mu_max > 0.0;
-        let stress = fits.then_some((input.stress_MPa, input.noise_MPa));
+        let (b, noise_MPa) = (input.stress_MPa, input.noise_MPa);
+        let stress = self.taxels.as_ref().map(|taxels| Stress { taxels, b, noise_MPa });
         let searched = |segments: &Segments, region: usize| self.met(input, segments, region);
         let solver = Solver { matrices, mu_max, objective: &Sparse::default(), p0, stress, searched: &searched };
         Some(solver.solve(&family, found))

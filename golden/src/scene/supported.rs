@@ -4,7 +4,7 @@
 //! |---|---|---|
 //! | `medium.kind` | all | "half-space" |
 //! | `partition.case` | all | 0 … 3 and rows × cols, where the device holds it |
-//! | `search.objective` | all; on a bonded layer "sparse" and "compressive"; with "adaptive" and "contacts" "sparse" | "sparse" |
+//! | `search.objective` | all; with "adaptive" and "contacts" "sparse" | "sparse" |
 //! | `search.form` | all, "orthogonal" for subarrays of few taxels ([`crate::float::orthogonal::MAX_TAXELS`]) | "oblique" |
 //! | `input.dead`, `input.unipolar` | all; with "orthogonal" none | none |
 //!
@@ -61,18 +61,10 @@ impl Scene {
     pub fn require_golden(&self) -> Result<(), SceneError> {
         let objective = self.search.objective;
         let literal = self.search.form == Form::Orthogonal;
-        // The fits, and `auto` that chooses between them, know the half-space's kernel alone.
-        let by_score = matches!(objective, ObjectiveKind::Sparse | ObjectiveKind::Compressive);
         // Regions and the choice of a case are judged by the sparse objective.
         let by_contact = self.partition.case.grid().is_none();
         let rule = |refused, field, value, available| Rule { refused, field, value, available };
         self.require([
-            rule(
-                self.medium != Medium::HalfSpace && !by_score,
-                "search.objective",
-                objective.name().to_string(),
-                "sparse and compressive, on a bonded layer",
-            ),
             rule(
                 by_contact && objective != ObjectiveKind::Sparse,
                 "search.objective",

@@ -201,7 +201,6 @@ fn the_golden_model_refuses_what_does_not_go_together() {
     let orthogonal = "[search]\nform = \"orthogonal\"\n";
     let patch = "[search]\nobjective = \"patch\"\n";
     let cases = [
-        (format!("[medium]\nkind = \"bonded-layer\"\n{patch}"), "search.objective = patch; available: sparse and comp"),
         (format!("[partition]\ncase = \"adaptive\"\n{patch}"), "search.objective = patch; available: sparse, with"),
         (format!("{orthogonal}[input]\ndead = [[0, 1]]"), "input.dead = [[0, 1]]; available: none, with"),
         (format!("{orthogonal}[input]\ndead = [[0, 1], [2, 3]]"), "input.dead = [[0, 1], …]; available: none, with"),

@@ -9,21 +9,19 @@
 //! A single ellipse changes nothing: one contact is the plain method. A region's forces are its ellipse's pressure over each cell, scaled to its load; a cell under two belongs to the one
 //! that presses it more.
 
-use super::{Contacts, Solver};
+use super::{Contacts, Solver, Stress};
 use crate::float::objective::explained;
-use crate::float::objective::several::{explain, starts, Explanation};
+use crate::float::objective::several::{explain, starts, Explanation, FIT_WIDTHS};
 use crate::float::search::{Found, RADIUS};
-use crate::float::segment::{segment, Segments, WIDTH};
+use crate::float::segment::{segment, Segments};
 
-/// Widths that fits start from besides.
-const FIT_WIDTHS: [f64; 3] = [WIDTH, 0.6, 0.4];
 /// Share by which an ellipse's |μ| may exceed mu_max, to which it is cut.
 const BEYOND: f64 = 0.05;
 
 impl Solver<'_> {
     /// The ellipses that come nearest to the stress, started from the state's regions; `None` where none may be fitted.
     pub(super) fn fit(&self, state: &Contacts) -> Option<Explanation> {
-        let (b, noise_MPa) = self.stress?;
+        let Stress { taxels, b, noise_MPa } = self.stress?;
         let sensor = &self.matrices.sensor;
         // What differs is the number of regions; the rest the fit finds by itself.
         let drawn = FIT_WIDTHS.map(|width| segment(sensor, &state.p, width));
@@ -36,7 +34,7 @@ impl Solver<'_> {
             new
         });
         let starts: Vec<Vec<f64>> = drawings.into_iter().map(|segments| starts(sensor, &state.p, segments)).collect();
-        explain(sensor, b, &starts, explained(b, noise_MPa))
+        explain(taxels, b, &starts, explained(b, noise_MPa))
     }
 
     /// The contacts of ellipses that explain the stress: `state`, the plain method, where it is a single one.

@@ -36,8 +36,9 @@ fn solve(matrices: &Matrices, b: &[f64], searched: &dyn Fn(&Segments, usize) -> 
     let family = Polynomial::new(matrices, b);
     let objective = &Sparse::default();
     let found = search(&family, 0.6, objective).unwrap();
-    Solver { matrices, mu_max: 0.6, objective, p0: family.v(0, 0), stress: Some((b, 0.0)), searched }
-        .solve(&family, found)
+    let taxels = Taxels::new(&matrices.sensor, Medium::HalfSpace);
+    let stress = Some(Stress { taxels: &taxels, b, noise_MPa: 0.0 });
+    Solver { matrices, mu_max: 0.6, objective, p0: family.v(0, 0), stress, searched }.solve(&family, found)
 }
 
 #[test]

@@ -20,6 +20,7 @@
 use super::{Estimate, Objective, Patch, Sparse, Subject, Symmetric};
 use crate::flags::SPARSE_NOISE_LIMIT;
 use crate::float::search::Found;
+use crate::scene::Medium;
 use crate::sensor::Sensor;
 
 /// Error of the fits' own over the peak: their quadrature's, and that of frames made by another.
@@ -44,9 +45,10 @@ pub struct Auto {
 }
 
 impl Auto {
-    /// For subarrays of one shape.
-    pub fn new(sensor: &Sensor) -> Auto {
-        Auto { sparse: Sparse::default(), symmetric: Symmetric::new(sensor), patch: Patch::default() }
+    /// For subarrays of one shape under a medium.
+    pub fn new(sensor: &Sensor, medium: Medium) -> Auto {
+        let (symmetric, patch) = (Symmetric::new(sensor, medium), Patch::new(sensor, medium));
+        Auto { sparse: Sparse::default(), symmetric, patch }
     }
 }
 
@@ -109,10 +111,10 @@ mod tests {
         let sensor = &frame.sensor;
         let subject = Subject { sensor, b, family: &family, mu_max: 0.6, noise_MPa: noise * frame.peak_MPa() };
         Four {
-            auto: Auto::new(sensor).find(&subject),
-            patch: Patch::default().find(&subject),
+            auto: Auto::new(sensor, Medium::HalfSpace).find(&subject),
+            patch: Patch::new(sensor, Medium::HalfSpace).find(&subject),
             sparse: Sparse::default().find(&subject),
-            symmetric: Symmetric::new(sensor).find(&subject),
+            symmetric: Symmetric::new(sensor, Medium::HalfSpace).find(&subject),
         }
     }
 
@@ -156,10 +158,11 @@ mod tests {
         // Beyond the limit of `sparse`, too little to explain what a wrong shape leaves.
         let noise = 2.0 * SPARSE_NOISE_LIMIT;
         let (mut symmetric, mut patch) = (0, 0);
+        let ring = named(&frames, "S2-hs-ring");
         for frame in &frames {
-            // Twice: as it is, and with a second contact that neither fits.
+            // Twice: as it is, and with a ring besides, which neither fits.
             let mut two = frame.clone();
-            two.stress_MPa.iter_mut().zip(frame.stress_MPa.iter().rev()).for_each(|(b, other)| *b += 0.5 * other);
+            two.stress_MPa.iter_mut().zip(ring.stress_MPa.iter().rev()).for_each(|(b, other)| *b += 0.5 * other);
             for frame in [frame, &two] {
                 let found = four(&matrices, frame, noise);
                 let objective = |estimate: Option<Estimate>| estimate.map_or(f64::NEG_INFINITY, |e| e.found.objective);
@@ -194,6 +197,6 @@ mod tests {
     fn it_scores_as_sparse_does() {
         let (_, frames) = frames();
         let p = [0.5, 2.0, -0.1, 1.0];
-        assert_eq!(Auto::new(&frames[0].sensor).score(&p), Sparse::default().score(&p));
+        assert_eq!(Auto::new(&frames[0].sensor, Medium::HalfSpace).score(&p), Sparse::default().score(&p));
     }
 }

@@ -1,4 +1,4 @@
-//! Disc: nodes and weights on the unit disc, and the stress of point forces placed at mapped nodes.
+//! Disc: nodes and weights on the unit disc.
 //!
 //! A pressure ∝ (1 − r²)^g on the disc has, with t = √(1 − r²), the integral
 //! ∫∫ f (1 − r²)^g dA = ∫ dφ ∫₀¹ f t^(2g + 1) dt. Gauss–Legendre in t, equal angles in φ, each ring turned by half an
@@ -11,9 +11,8 @@
 //! | out: nodes | rings·angles | – | inside the unit disc |
 //! | out: weights | rings·angles | – | positive, their sum is 1 |
 //!
-//! Feeds `patch` and `symmetric`. The kernel is that of a point force on a half-space.
+//! Feeds `patch` and `symmetric`, which put point forces at mapped nodes.
 
-use crate::sensor::Sensor;
 use std::f64::consts::{PI, TAU};
 
 /// Quadrature on the unit disc.
@@ -76,66 +75,6 @@ impl Disc {
     }
 }
 
-/// Positions of the taxels in mm from the array's centre.
-#[derive(Clone, Debug)]
-pub struct Taxels {
-    /// Along the columns.
-    pub x: Vec<f64>,
-    /// Along the rows.
-    pub y: Vec<f64>,
-    /// Depth under the surface.
-    pub depth: f64,
-}
-
-impl Taxels {
-    /// The taxels of an array.
-    pub fn new(sensor: &Sensor) -> Taxels {
-        let place = |index: usize| sensor.position_mm(index / sensor.cols, index % sensor.cols);
-        let (x, y) = (0..sensor.taxels()).map(place).map(|[x, y]| (x, y)).unzip();
-        Taxels { x, y, depth: sensor.thickness_mm }
-    }
-
-    /// Number of taxels.
-    pub fn count(&self) -> usize {
-        self.x.len()
-    }
-
-    /// Adds the stress of unit forces along x, y and z at `place`, times `weight`, to three columns.
-    pub fn add_unit_forces(&self, place: [f64; 2], weight: f64, columns: &mut [Vec<f64>; 3]) {
-        let h = self.depth;
-        let scale = weight * 3.0 * h * h / TAU;
-        let [cx, cy, cz] = columns;
-        let taxels = self.x.iter().zip(&self.y);
-        for ((((x, y), cx), cy), cz) in taxels.zip(cx).zip(cy).zip(cz) {
-            let (dx, dy) = (x - place[0], y - place[1]);
-            let inverse = 1.0 / (dx * dx + dy * dy + h * h);
-            let s = scale * inverse * inverse * inverse.sqrt();
-            *cx += s * dx;
-            *cy += s * dy;
-            *cz += s * h;
-        }
-    }
-
-    /// Stress of `force` (x, y, z) at `place`, and its derivatives with respect to that place, into three vectors.
-    pub fn field(&self, place: [f64; 2], force: [f64; 3], out: &mut [Vec<f64>; 3]) {
-        let h = self.depth;
-        let scale = 3.0 * h * h / TAU;
-        let [fx, fy, fz] = force.map(|f| f * scale);
-        let [value, along_x, along_y] = out;
-        let taxels = self.x.iter().zip(&self.y);
-        for ((((x, y), value), along_x), along_y) in taxels.zip(value).zip(along_x).zip(along_y) {
-            let (dx, dy) = (x - place[0], y - place[1]);
-            let inverse = 1.0 / (dx * dx + dy * dy + h * h);
-            let s = inverse * inverse * inverse.sqrt();
-            let load = s * (fx * dx + fy * dy + fz * h);
-            let steep = 5.0 * load * inverse;
-            *value = load;
-            *along_x = steep * dx - s * fx;
-            *along_y = steep * dy - s * fy;
-        }
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -161,29 +100,6 @@ mod tests {
         let (above, below) = (disc.weights(g + d).0, disc.weights(g - d).0);
         for ((slope, a), b) in slopes.iter().zip(above).zip(below) {
             assert!((slope - (a - b) / (2.0 * d)).abs() < 1e-8);
-        }
-    }
-
-    #[test]
-    fn fields_agree_with_columns_and_their_differences() {
-        let sensor = Sensor { rows: 2, cols: 3, pitch_x_mm: 2.0, pitch_y_mm: 4.0, thickness_mm: 3.0 };
-        let taxels = Taxels::new(&sensor);
-        let empty = || [vec![0.0; 6], vec![0.0; 6], vec![0.0; 6]];
-        let force = [0.3, -0.7, 2.0];
-        let at = |place: [f64; 2]| {
-            let mut columns = empty();
-            taxels.add_unit_forces(place, 1.0, &mut columns);
-            (0..6).map(|i| (0..3).map(|k| force[k] * columns[k][i]).sum::<f64>()).collect::<Vec<_>>()
-        };
-        let (x, y, d) = (0.4, -1.1, 1e-5);
-        let mut field = empty();
-        taxels.field([x, y], force, &mut field);
-        let [value, along_x, along_y] = field;
-        let ([right, left], [up, down]) = ([at([x + d, y]), at([x - d, y])], [at([x, y + d]), at([x, y - d])]);
-        for (i, at) in at([x, y]).into_iter().enumerate() {
-            assert!((value[i] - at).abs() < 1e-15);
-            assert!((along_x[i] - (right[i] - left[i]) / (2.0 * d)).abs() < 1e-9);
-            assert!((along_y[i] - (up[i] - down[i]) / (2.0 * d)).abs() < 1e-9);
         }
     }
 }

@@ -12,15 +12,18 @@
 //! | out: squared misfit | scalar | MPa² |
 //!
 //! Started from several drawings of the regions. Where none explains b, an ellipse is added where the misfit of the best
-//! is largest, or its ellipse cut in two, twice at most and as long as that helps. On a half-space.
+//! is largest, or its ellipse cut in two, twice at most and as long as that helps.
 
-use super::disc::{Disc, Taxels};
+use super::disc::Disc;
 use super::fit::{fit, Effort, Fit, Model, QUICK, STEADY};
 use super::patch::{place, Ellipse, COARSE, FINE, PARAMETERS};
-use crate::float::segment::Segments;
+use super::taxels::Taxels;
+use crate::float::segment::{Segments, WIDTH};
 use crate::sensor::Sensor;
 use nalgebra::{DMatrix, DVector};
 
+/// Widths of smoothing of the regions that fits start from.
+pub(crate) const FIT_WIDTHS: [f64; 3] = [WIDTH, 0.6, 0.4];
 /// Most ellipses.
 const MOST: usize = 8;
 /// Most ellipses times taxels: beyond, a fit takes longer than it is worth.
@@ -180,11 +183,11 @@ impl Trial<'_> {
 
 /// Fits from each start as far as it goes fast, then the best to the end where it may explain b, then with ellipses
 /// added; the best fit in which every contact presses, `None` where there is none.
-pub(crate) fn explain(sensor: &Sensor, b: &[f64], starts: &[Vec<f64>], enough: f64) -> Option<Explanation> {
-    let (taxels, b) = (Taxels::new(sensor), DVector::from_column_slice(b));
+pub(crate) fn explain(taxels: &Taxels, b: &[f64], starts: &[Vec<f64>], enough: f64) -> Option<Explanation> {
+    let b = DVector::from_column_slice(b);
     let most = MOST.min(WORK / taxels.count().max(1)) * PARAMETERS;
     let discs = [ROUGH, COARSE, FINE].map(|[rings, angles]| Disc::new(rings, angles));
-    let mut trial = Trial { taxels: &taxels, discs: &discs, b: &b, enough, evaluations: 0 };
+    let mut trial = Trial { taxels, discs: &discs, b: &b, enough, evaluations: 0 };
     let starts: Vec<&[f64]> =
         starts.iter().map(Vec::as_slice).filter(|start| !start.is_empty() && start.len() <= most).collect();
     let mut best = trial.best(&starts)?;
@@ -192,7 +195,7 @@ pub(crate) fn explain(sensor: &Sensor, b: &[f64], starts: &[Vec<f64>], enough: f
         if best.misfit <= enough || best.theta.len() >= most {
             break;
         }
-        let rest = Several { taxels: &taxels, disc: &discs[1] }.rest(&b, &best);
+        let rest = Several { taxels, disc: &discs[1] }.rest(&b, &best);
         let worst = rest.iamax();
         let further = further(&best.theta, [taxels.x[worst], taxels.y[worst]], taxels.depth);
         let better = trial.best(&further.each_ref().map(Vec::as_slice));
@@ -236,6 +239,11 @@ impl Explanation {
     /// Whether the ellipses explain the stress.
     pub fn enough(&self) -> bool {
         self.misfit <= self.enough
+    }
+
+    /// Sum of the forces in N, [x, y, normal].
+    pub fn force_N(&self) -> [f64; 3] {
+        [0, 1, 2].map(|axis| self.patches.iter().map(|patch| patch.force[axis]).sum())
     }
 
     /// Normal force of each ellipse on each cell, in N.

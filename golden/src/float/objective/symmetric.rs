@@ -23,11 +23,13 @@
 //! | out: μ | 2 | – | |μ| ≤ mu_max |
 //! | out: load | scalar | N | above 0 |
 
-use super::disc::{Disc, Taxels};
+use super::disc::Disc;
 use super::fit::{fit, Fit, Model, THOROUGH};
 use super::patch::{confine_ellipse, place};
+use super::taxels::Taxels;
 use super::{Estimate, Objective, Subject};
 use crate::float::search::search;
+use crate::scene::Medium;
 use crate::sensor::Sensor;
 use nalgebra::{DMatrix, DVector};
 
@@ -50,9 +52,9 @@ pub struct Symmetric {
 }
 
 impl Symmetric {
-    /// For subarrays of one shape.
-    pub fn new(sensor: &Sensor) -> Symmetric {
-        Symmetric { taxels: Taxels::new(sensor), disc: Disc::new(NODES[0], NODES[1]) }
+    /// For subarrays of one shape under a medium.
+    pub fn new(sensor: &Sensor, medium: Medium) -> Symmetric {
+        Symmetric { taxels: Taxels::new(sensor, medium), disc: Disc::new(NODES[0], NODES[1]) }
     }
 
     /// Derivatives of q at a place, in units of the width: orders 0, 1 (2), 2 (3), 3 (4).
@@ -238,7 +240,7 @@ mod tests {
         let sensor = Sensor { rows: 1, cols: 1, pitch_x_mm: 1.0, pitch_y_mm: 1.0, thickness_mm: 2.0 };
         // One force of 3 N at the origin, seen one width to the right: u = 1, v = 0.
         let width = WIDTH * sensor.thickness_mm;
-        let seen = Symmetric::new(&sensor).derivatives(&[3.0], [width, 0.0]);
+        let seen = Symmetric::new(&sensor, Medium::HalfSpace).derivatives(&[3.0], [width, 0.0]);
         let q = 3.0 * (-0.5f64).exp();
         // q, q_x = −u q, q_y, q_xx = (u² − 1) q, q_xy, q_yy = (v² − 1) q, q_xxx = (3u − u³) q, q_xxy, q_xyy = u q, q_yyy.
         let wanted = [1.0, -1.0, 0.0, 0.0, 0.0, -1.0, 2.0, 0.0, 1.0, 0.0];
@@ -249,7 +251,7 @@ mod tests {
 
     #[test]
     fn symmetric_pressure_beats_uneven_pressure_at_any_scale() {
-        let objective = Symmetric::new(&sensor());
+        let objective = Symmetric::new(&sensor(), Medium::HalfSpace);
         let bell = |x: f64, y: f64| (-(x * x + 2.0 * y * y) / 18.0).exp();
         let even = objective.score(&pressure(bell)).unwrap();
         assert!((-1e-20..=0.0).contains(&even), "{even}");
@@ -262,7 +264,7 @@ mod tests {
 
     #[test]
     fn pulling_and_broken_pressure_has_no_score() {
-        let objective = Symmetric::new(&sensor());
+        let objective = Symmetric::new(&sensor(), Medium::HalfSpace);
         for value in [0.0, -1.0, f64::NAN, f64::INFINITY] {
             assert_eq!(objective.score(&vec![value; sensor().taxels()]), None, "{value}");
         }
@@ -270,7 +272,7 @@ mod tests {
 
     #[test]
     fn slopes_are_those_of_the_columns() {
-        let (taxels, disc) = (Taxels::new(&sensor()), Disc::new(NODES[0], NODES[1]));
+        let (taxels, disc) = (Taxels::new(&sensor(), Medium::HalfSpace), Disc::new(NODES[0], NODES[1]));
         let mut model = Even::new(&taxels, &disc, 0.6);
         let theta = [0.7, -1.1, 3.0, 4.0, 0.5, 0.2, -0.1];
         let loads = DVector::from_vec(vec![5.0, -1.0, 0.4, 0.8]);
@@ -298,7 +300,9 @@ mod tests {
             let matrices = Matrices::new(&scene.sensor, mu_max).unwrap();
             let family = Polynomial::new(&matrices, &frame.stress_MPa);
             let (sensor, b) = (&scene.sensor, frame.stress_MPa.as_slice());
-            Symmetric::new(sensor).find(&Subject { sensor, b, family: &family, mu_max, noise_MPa: 0.0 }).unwrap()
+            Symmetric::new(sensor, Medium::HalfSpace)
+                .find(&Subject { sensor, b, family: &family, mu_max, noise_MPa: 0.0 })
+                .unwrap()
         };
         let free = find(0.6);
         let (x, y) = (free.found.mu[0] - tx / load, free.found.mu[1] - ty / load);
