@@ -6,7 +6,7 @@
 //! fold     Q + 5                                from the last input beat to the first product
 //! pass     the kept columns of each product, at most Q, waiting until a step's operand has been finished
 //! rescale  v_00 is replayed once its exponent is known: Q more
-//! search   7 coarse sweeps of Q, at least 15; the eighth and 7 halvings of Q + 15; one of Q + 4
+//! search   7 coarse sweeps of Q, at least 18; the eighth and 7 halvings of Q + 18; one of Q + 7
 //!          (the last alone when nothing is searched)
 //! next     1 from a subarray's search to the passes of the one after it, which go on at the same time
 //! send     begins with the last subarray's first value: 6 to the first beat, then one beat a cycle
@@ -35,14 +35,14 @@ const REPLAY: u64 = 2;
 const UNFOLD: u64 = 5;
 /// From the search's start to its first sweep.
 const BEGIN: u64 = 1;
-/// A sweep that the next one waits for, beyond its Q quads: memory 1, Taylor 2, candidates 2, score 6, judge 4.
-const SWEEP: u64 = 15;
+/// A sweep that the next one waits for, beyond its Q quads: memory 2, Taylor 4, candidates 2, score 6, judge 4.
+const SWEEP: u64 = 18;
 /// Quads that a judged sweep lasts at least: its sums are weighed meanwhile.
 pub const SHORTEST_SWEEP: u64 = 4;
 /// From a coarse sweep to the next at least: a sweep is judged before the next but one, which may write over its source.
 pub const COARSE_PERIOD: u64 = SWEEP;
 /// The last sweep beyond its Q quads.
-const LAST_SWEEP: u64 = 4;
+const LAST_SWEEP: u64 = 7;
 /// From a subarray's values to their sending, where nothing is searched.
 const UNSEARCHED: u64 = 1;
 /// From the start of a subarray's search to that of the next one's passes.

@@ -21,6 +21,9 @@ pub struct Candidates {
     _between: Word,
 }
 
+/// Cycles from a polynomial to its values.
+pub const LATENCY: usize = 2;
+
 impl Candidates {
     /// Polynomials in `layout`.
     pub fn new(layout: PolynomialWord) -> Self {

@@ -8,7 +8,8 @@ use super::sweep::{BUFFERS, BUFFER_BITS, START};
 use crate::wire::{Wire, Word};
 
 /// Buffers of quads of polynomials. `fill` writes one coefficient of a quad into buffer [`START`]; `write` a whole quad
-/// into one of the others; the read register follows the address by one cycle.
+/// into one of the others; the read register follows the
+/// address by two cycles: block RAM is slow to answer, so nothing but a register follows it.
 ///
 /// Where one subarray is filled while another is searched, `START` is a memory of its own. Otherwise it is another name
 /// of buffer 0, and `fill` and `write` never coincide.
@@ -36,13 +37,17 @@ pub struct Store {
     pub read_buffer: Wire<In>,
     /// Which quad.
     pub read_address: Wire<In>,
-    /// A quad of polynomials, one cycle later.
+    /// A quad of polynomials, two cycles later.
     pub read_data: Wire<Out>,
     _layout: PolynomialWord,
     _quads: usize,
     _apart: bool,
     _memory: Vec<Vec<Word>>,
+    _read: Word,
 }
+
+/// Cycles from an address to its quad.
+pub const LATENCY: usize = 2;
 
 impl Store {
     /// `quads` quads of polynomials in `layout`, filled with coefficients of `fill_bits` bits; `apart` says whether
@@ -65,6 +70,7 @@ impl Store {
             _quads: quads,
             _apart: apart,
             _memory: vec![vec![Word::default(); quads]; BUFFERS + usize::from(apart)],
+            _read: Word::default(),
             _layout: layout,
         }
     }
@@ -81,7 +87,8 @@ impl Logic for Store {
         if self.clk.pos_edge() {
             let (read_buffer, read_address) = (self.read_buffer.val(), self.read_address.val().number() as usize);
             let read = self.memory(read_buffer).get(read_address).copied();
-            self.read_data.next = read.unwrap_or_default();
+            self.read_data.next = self._read;
+            self._read = read.unwrap_or_default();
             if self.write.val() {
                 let (buffer, data) = (self.write_buffer.val(), self.write_data.val());
                 let address = self.write_address.val().number() as usize;
@@ -154,8 +161,8 @@ always @(posedge clk) begin
   if (fill && fill_index == {index_bits}'d{k}) start{k}[fill_address] <= {{{filled}}};
   read{k} <= memory{k}[read_from];
   read_start{k} <= start{k}[read_address];
+  read_data[{low} +: {all}] <= from_start ? read_start{k} : read{k};
 end
-always @(*) read_data[{low} +: {all}] = from_start ? read_start{k} : read{k};
 ",
                         end = all - 1,
                         last = self._quads - 1,
@@ -163,11 +170,13 @@ always @(*) read_data[{low} +: {all}] = from_start ? read_start{k} : read{k};
                 } else {
                     format!(
                         "\
-{declare}wire write{k} = fill ? fill_index == {index_bits}'d{k} : write;
+{declare}reg [{end}:0] read{k};
+wire write{k} = fill ? fill_index == {index_bits}'d{k} : write;
 wire [{end}:0] data{k} = fill ? {{{filled}}} : write_data[{low} +: {all}];
 always @(posedge clk) begin
   if (write{k}) memory{k}[write_to] <= data{k};
-  read_data[{low} +: {all}] <= memory{k}[read_from];
+  read{k} <= memory{k}[read_from];
+  read_data[{low} +: {all}] <= read{k};
 end
 ",
                         end = all - 1,

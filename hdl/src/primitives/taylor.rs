@@ -7,8 +7,8 @@ use rust_hdl::prelude::*;
 use super::polynomial_word::{resize, PolynomialWord};
 use crate::wire::{Wire, Word};
 
-/// A word of polynomials in with its `step`, moved and halved if asked two cycles later: x in the first cycle, y and
-/// the halving in the second.
+/// A word of polynomials in with its `step`, moved and halved if asked four cycles later: two for x, two for y and the
+/// halving. Of the two the first adds up what the step is multiplied with, the second adds or subtracts it.
 #[derive(LogicBlock)]
 pub struct Taylor {
     /// Clock.
@@ -20,9 +20,11 @@ pub struct Taylor {
     /// The same about the new centre.
     pub moved: Wire<Out>,
     _layout: PolynomialWord,
-    _between: Word,
-    _step: Word,
+    _pipe: Vec<(Word, Word)>,
 }
+
+/// Cycles from a word to the word moved.
+pub const LATENCY: usize = 4;
 
 impl Taylor {
     /// Polynomials in `layout`.
@@ -33,8 +35,7 @@ impl Taylor {
             word: Wire::new(layout.bits()),
             moved: Wire::new(layout.bits()),
             _layout: layout,
-            _between: Word::default(),
-            _step: Word::default(),
+            _pipe: vec![(Word::default(), Word::default()); LATENCY - 1],
         }
     }
 
@@ -50,18 +51,17 @@ impl Taylor {
 impl Logic for Taylor {
     fn update(&mut self) {
         if self.clk.pos_edge() {
-            let (dx, dy) = (self.step.val().signed(0, 2), self._step.signed(1, 2));
-            let halving = self._step.field(4, 1) == 1;
-            self.moved.next = self.each(self._between, |w| {
-                let moved = taylor_shift(w, 0, dy);
+            self._pipe.push((self.word.val(), self.step.val()));
+            let (word, step) = self._pipe.remove(0);
+            let (dx, dy, halving) = (step.signed(0, 2), step.signed(1, 2), step.field(4, 1) == 1);
+            self.moved.next = self.each(word, |w| {
+                let moved = taylor_shift(w, dx, dy);
                 if halving {
                     halve(&moved)
                 } else {
                     moved
                 }
             });
-            self._between = self.each(self.word.val(), |w| taylor_shift(w, dx, 0));
-            self._step = self.step.val();
         }
     }
 
@@ -70,24 +70,17 @@ impl Logic for Taylor {
     }
 
     fn hdl(&self) -> Verilog {
-        let along_x = self.shift("x", "dx", |(i, j), by| (i + by, j));
-        let along_y = self.shift("y", "dy", |(i, j), by| (i, j + by));
         let widths = &self._layout.widths;
         let mut body = String::new();
         for (k, &w) in widths.iter().enumerate() {
-            let end = w - 1;
-            body += &format!(
-                "    reg [{end}:0] y{k};\n    wire [{end}:0] x{k} = {};\n",
-                self._layout.select("word", k, "l")
-            );
+            let select = self._layout.select("word", k, "l");
+            body += &format!("    wire [{}:0] x{k} = {select};\n", w - 1);
         }
-        body += &along_x;
-        body += "    always @(posedge clk) begin\n";
-        for k in 0..widths.len() {
-            body += &format!("      y{k} <= x{k}_moved;\n");
+        body += &self.shift("x", "dx", |(i, j), by| (i + by, j));
+        for (k, &w) in widths.iter().enumerate() {
+            body += &format!("    reg [{}:0] y{k};\n    always @(posedge clk) y{k} <= x{k}_moved;\n", w - 1);
         }
-        body += "    end\n";
-        body += &along_y;
+        body += &self.shift("y", "dy", |(i, j), by| (i, j + by));
         body += "    always @(posedge clk) begin\n";
         for (k, &w) in widths.iter().enumerate() {
             let degree = (EXPONENTS[k].0 + EXPONENTS[k].1) as usize;
@@ -105,10 +98,14 @@ impl Logic for Taylor {
         body += "    end\n";
         Verilog::Custom(format!(
             "\
-wire [1:0] dx = step[1:0];
-reg [1:0] dy;
-reg halving;
-always @(posedge clk) {{halving, dy}} <= step[4:2];
+// The step goes along: x is moved in the second cycle, y in the fourth.
+reg [1:0] dx, dy, dy1, dy2;
+reg halving, halving1, halving2;
+always @(posedge clk) begin
+  {{halving1, dy1, dx}} <= step;
+  {{halving2, dy2}} <= {{halving1, dy1}};
+  {{halving, dy}} <= {{halving2, dy2}};
+end
 genvar l;
 generate
   for (l = 0; l < {lanes}; l = l + 1) begin : lane
@@ -120,7 +117,8 @@ endgenerate",
 }
 
 impl Taylor {
-    /// Verilog of a move along one axis: wires `<axis>k_moved` from `<axis>k`.
+    /// Verilog of a move along one axis: registers of what the step is multiplied with, then wires `<axis>k_moved` from
+    /// `<axis>k`.
     ///
     /// c0' = c0 + d (c1 + c3) + d² c2,  c1' = c1 + 2d c2 + 3d² c3,  c2' = c2 + 3d c3: d is −1, 0 or 1, so that
     /// d² only says whether there is a move and d·c is c, −c or 0.
@@ -145,17 +143,26 @@ impl Taylor {
                 _ => 1,
             };
             let term = |by: u32| above(by).map(|value| times(&value, choose(order, by)));
+            let mut register = |name: &str, value: &str| {
+                text += &format!(
+                    "    reg [{}:0] {axis}{k}_{name};\n    always @(posedge clk) {axis}{k}_{name} <= {value};\n",
+                    w - 1
+                );
+            };
             let odd: Vec<String> = [term(1), term(3)].into_iter().flatten().collect();
-            let mut sum = format!("{axis}{k}");
+            register("own", &format!("{axis}{k}"));
+            let mut sum = format!("{axis}{k}_own");
             if !odd.is_empty() {
-                text += &format!("    wire [{end}:0] {axis}{k}_odd = {};\n", odd.join(" + "), end = w - 1);
-                sum += &format!(" + ({step}[1] ? -{axis}{k}_odd : {step}[0] ? {axis}{k}_odd : {w}'d0)");
+                register("odd", &odd.join(" + "));
+                sum = format!(
+                    "({step}[1] ? {axis}{k}_own - {axis}{k}_odd : {step}[0] ? {axis}{k}_own + {axis}{k}_odd : {sum})"
+                );
             }
             if let Some(even) = term(2) {
-                text += &format!("    wire [{end}:0] {axis}{k}_even = {even};\n", end = w - 1);
+                register("even", &even);
                 sum += &format!(" + ({step}[0] ? {axis}{k}_even : {w}'d0)");
             }
-            text += &format!("    wire [{end}:0] {axis}{k}_moved = {sum};\n", end = w - 1);
+            text += &format!("    wire [{}:0] {axis}{k}_moved = {sum};\n", w - 1);
         }
         text
     }

@@ -1,7 +1,7 @@
 //! Stage `search`: the μ search over the polynomials of all taxels, sweep by sweep.
 //!
-//! `walk` sets up a sweep; one quad per cycle runs through memory (1 cycle), Taylor shift (2) and back into memory,
-//! candidates (2), score (6). The sum polynomial takes the same way beside the first quad and stays, so that Σp stands
+//! `walk` sets up a sweep; one quad per cycle runs through memory (2 cycles), Taylor shift (4) and back into
+//! memory, candidates (2), score (6). The sum polynomial takes the same way beside the first quad and stays, so that Σp stands
 //! when the first taxel is scored; `weigh` makes of it what the totals are compared with, and `judge` compares (4). Coarse
 //! sweeps follow one another without a gap; a halving is set up when the sweep before it has been judged. The last sweep
 //! only moves to the winner: its constant coefficients are p(μ*).
@@ -14,9 +14,12 @@ use rust_hdl::prelude::*;
 
 use crate::primitives::{
     count_bits, position_bits, BitDelay, Candidates, Counter, Counts, Delay, Judge, PolynomialWord, Score, Slice,
-    Store, Sum, Taylor, Walk, Weigh, BUFFER_BITS, SCORE_LATENCY,
+    Store, Sum, Taylor, Walk, Weigh, BUFFER_BITS, CANDIDATES_LATENCY, SCORE_LATENCY, STORE_LATENCY, TAYLOR_LATENCY,
 };
 use crate::wire::Wire;
+
+/// Cycles from a quad's address to the quad moved.
+const MOVED: usize = STORE_LATENCY + TAYLOR_LATENCY;
 
 /// Polynomials in by coefficient, p(μ*) out by quad.
 #[derive(LogicBlock)]
@@ -77,6 +80,7 @@ pub struct Search {
     counting: DFF<Bit>,
     began: BitDelay,
     go: BitDelay,
+    sum_go: BitDelay,
     moved: BitDelay,
     sum_moved: BitDelay,
     scored: BitDelay,
@@ -141,18 +145,19 @@ impl Search {
             counting: Default::default(),
             began: BitDelay::new(1),
             go: BitDelay::new(1),
-            moved: BitDelay::new(3),
-            sum_moved: BitDelay::new(3),
-            scored: BitDelay::new(2),
+            sum_go: BitDelay::new(STORE_LATENCY - 1),
+            moved: BitDelay::new(MOVED),
+            sum_moved: BitDelay::new(MOVED),
+            scored: BitDelay::new(CANDIDATES_LATENCY),
+            first: BitDelay::new(MOVED + CANDIDATES_LATENCY),
             // A cycle after the first quad's candidates, so that a sweep is judged before the next is weighed.
-            first: BitDelay::new(5),
-            weighs: BitDelay::new(6),
-            totals: BitDelay::new(5 + SCORE_LATENCY + padding),
-            finish: BitDelay::new(4),
-            step: Delay::new(5, 1),
-            target: Delay::new(BUFFER_BITS, 3),
-            moved_address: Delay::new(address, 3),
-            scored_address: Delay::new(address, 2),
+            weighs: BitDelay::new(MOVED + CANDIDATES_LATENCY + 1),
+            totals: BitDelay::new(MOVED + CANDIDATES_LATENCY + SCORE_LATENCY + padding),
+            finish: BitDelay::new(MOVED + 1),
+            step: Delay::new(5, STORE_LATENCY - 1),
+            target: Delay::new(BUFFER_BITS, MOVED),
+            moved_address: Delay::new(address, MOVED),
+            scored_address: Delay::new(address, CANDIDATES_LATENCY),
             set_up: Default::default(),
             quad_end: Default::default(),
         }
@@ -181,6 +186,7 @@ impl Logic for Search {
         self.counting.clock.next = self.clk.val();
         self.began.clk.next = self.clk.val();
         self.go.clk.next = self.clk.val();
+        self.sum_go.clk.next = self.clk.val();
         self.moved.clk.next = self.clk.val();
         self.sum_moved.clk.next = self.clk.val();
         self.scored.clk.next = self.clk.val();
@@ -195,6 +201,7 @@ impl Logic for Search {
         self.weighs.rst.next = self.rst.val();
         self.began.rst.next = self.rst.val();
         self.go.rst.next = self.rst.val();
+        self.sum_go.rst.next = self.rst.val();
         self.moved.rst.next = self.rst.val();
         self.sum_moved.rst.next = self.rst.val();
         self.scored.rst.next = self.rst.val();
@@ -252,7 +259,8 @@ impl Logic for Search {
         self.candidates.word.next = self.taylor.moved.val();
 
         comment!("and so does their sum");
-        self.sum.read.next = self.go.then.val();
+        self.sum_go.now.next = self.go.then.val();
+        self.sum.read.next = self.sum_go.then.val();
         self.sum.read_buffer.next = self.walk.source.val();
         self.sum_taylor.word.next = self.sum.word.val();
         self.sum_taylor.step.next = self.step.then.val();
