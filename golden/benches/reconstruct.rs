@@ -12,9 +12,11 @@ use dermis_golden::float::objective::{Objective, Sparse};
 use dermis_golden::float::orthogonal::Orthogonal;
 use dermis_golden::float::pass::Polynomial;
 use dermis_golden::frame::{Forces, Frame};
+use dermis_golden::generator::{generate, random_contacts, Draw, Shapes};
 use dermis_golden::matrices::Matrices;
+use dermis_golden::partition::Case;
 use dermis_golden::reconstruct::Golden;
-use dermis_golden::scene::Scene;
+use dermis_golden::scene::{ObjectiveKind, Scene};
 use std::hint::black_box;
 
 /// Cost outside the disc and where nothing presses: above every score's negative.
@@ -74,6 +76,24 @@ fn reconstruct(criterion: &mut Criterion) {
     }
 }
 
+/// What takes longer than the plain method: contacts on a frame of several, the fit of an ellipse.
+fn beyond(criterion: &mut Criterion) {
+    for (name, case, objective) in
+        [("sensor-3", Case::Contacts, ObjectiveKind::Sparse), ("sensor-1", Case::WHOLE, ObjectiveKind::Patch)]
+    {
+        let mut scene = Scene::builtin(name).expect("the scene is built in");
+        (scene.partition.case, scene.search.objective) = (case, objective);
+        let golden = Golden::new(&scene).expect("the scene has matrices");
+        for shapes in [Shapes::Elliptic, Shapes::Other] {
+            let count = if case == Case::Contacts { 3 } else { 1 };
+            let contacts = random_contacts(&scene.sensor, Draw { count, shapes, touching: false, seed: 1 });
+            let frame = generate("drawn", &scene.sensor, scene.medium, &contacts).expect("drawn contacts are sound");
+            let id = format!("golden frame {name}, case {case}, {}, {shapes:?}", objective.name());
+            criterion.bench_function(&id, |bencher| bencher.iter(|| golden.run(black_box(&frame))));
+        }
+    }
+}
+
 fn baseline(criterion: &mut Criterion) {
     for name in ["sensor-1", "sensor-3"] {
         let scene = Scene::builtin(name).expect("the scene is built in");
@@ -93,6 +113,6 @@ fn baseline(criterion: &mut Criterion) {
 criterion_group! {
     name = benches;
     config = Criterion::default().sample_size(10);
-    targets = reconstruct, baseline
+    targets = reconstruct, beyond, baseline
 }
 criterion_main!(benches);

@@ -23,7 +23,7 @@
 //! |---|---|
 //! | `none` | none; the tangential load must be zero |
 //! | `full-sliding` (default), `proportional` | \|T\|/N times the pressure |
-//! | `partial-slip` | Cattaneo–Mindlin, Hertz shapes: friction · (p over a − c/a · p over c), c/a = (1 − \|T\|/(friction N))^⅓ |
+//! | `partial-slip` | Cattaneo–Mindlin, Hertz shapes: friction (p over a − c/a p over c), c/a = (1 − \|T\|/friction N)^⅓ |
 
 mod cells;
 pub mod converter;

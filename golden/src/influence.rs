@@ -9,7 +9,7 @@
 //! ```
 //!
 //! Far from the cell the four corners cancel to a billionth of their size, and the closed form keeps 8 digits of 16.
-//! There the mean of the point kernel 3h²(dx, dy, h)/(2πρ⁵) over the cell is taken by Gauss–Legendre quadrature instead:
+//! There the mean of the point kernel 3h²(dx, dy, h)/(2πρ⁵) over the cell is taken by Gauss quadrature instead:
 //! its terms do not cancel. The kernel is analytic up to ρ = 0, so that with N nodes the error falls as E^(−2N), where
 //! E is the sum of the half-axes of the ellipse around the cell's side through the nearest singularity. The quadrature
 //! is used where E^(−2N) is below the rounding in both directions, the closed form elsewhere, that is close to cells
@@ -104,7 +104,7 @@ fn mean(dx: f64, dy: f64, a: f64, b: f64, f: impl Fn(f64, f64) -> f64) -> f64 {
     sum / 4.0
 }
 
-/// Stress per unit force along x, y, z at each distance in rows and columns, row-major: equal offsets have equal entries.
+/// Stress per unit force along x, y, z at each distance in rows and columns, row-major: equal offsets, equal entries.
 /// cx is odd in the columns' direction, cy in the rows'.
 pub fn table(sensor: &Sensor, medium: Medium) -> Vec<[f64; 3]> {
     let Sensor { cols, pitch_x_mm: a, pitch_y_mm: b, thickness_mm: h, .. } = *sensor;

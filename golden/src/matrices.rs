@@ -17,8 +17,8 @@
 //! | out: Cz⁺ | n × n | mm² (N per MPa) |
 //! | out: Ax, Ay | n × n | – |
 //!
-//! Everything is computed in the basis of mirror parities ([`crate::folded`]), a sixteenth of the work; the mirror symmetry
-//! of the array holds to the bit in every matrix, so that folding them again is exact.
+//! Everything is computed in the basis of mirror parities ([`crate::folded`]), a sixteenth of the work; the mirror
+//! symmetry of the array holds to the bit in every matrix, so that folding them again is exact.
 
 mod inverse;
 mod masked;
@@ -147,8 +147,8 @@ impl Matrices {
         Matrices::up_to(sensor, Medium::HalfSpace, mu_max, MAX_DEGREE)
     }
 
-    /// Computes the matrices of a (sub)array under any medium for shear ratios up to `mu_max` (0 to 2), of a degree that
-    /// the floating-point model has.
+    /// Computes the matrices of a (sub)array under any medium for shear ratios up to `mu_max` (0 to 2), of a degree
+    /// that the floating-point model has.
     ///
     /// # Errors
     /// As [`Matrices::new`].

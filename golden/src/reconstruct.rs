@@ -13,6 +13,7 @@
 mod adaptive;
 #[cfg(test)]
 mod bonded_tests;
+mod contacts;
 mod extra;
 mod front;
 mod golden;

@@ -16,7 +16,8 @@
 //! | `[fixed]` | `input_bits` (20; 8 … 24), `data_bits` (18; 12 … 18), `coef_bits` (18; 8 … 18) |
 //! | | `inverse_bits` (24; `coef_bits` … 32), `prune_bits` (20; 8 … 31), `lanes` (what the board allows; 4, 8 … 1024) |
 //! | `[hardware]` | `board` ("ulx3s-85f") |
-//! | `[input]` | `full_scale_MPa` (the frame's peak), `average` (0 … 12), `calibration`, `tare` (files), `dead` (\[row, col\] each), `unipolar` (false) |
+//! | `[input]` | `full_scale_MPa` (the frame's peak), `average` (0 … 12), `calibration`, `tare` (files), `dead` |
+//! | | (\[row, col\] each), `unipolar` (false) |
 //! | `[output]` | `forces` ("taxels"; "resultants") |
 
 mod error;

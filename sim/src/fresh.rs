@@ -4,7 +4,7 @@
 //! numbers; sensor and medium are the scene's.
 
 use anyhow::Result;
-use clap::{Args, ValueEnum};
+use clap::{value_parser, Args, ValueEnum};
 use dermis_golden::frame::Frame;
 use dermis_golden::generator::{self, generate, random_contacts, Draw};
 use dermis_golden::scene::Scene;
@@ -13,10 +13,10 @@ use dermis_golden::scene::Scene;
 #[derive(Args, Clone, Debug)]
 pub struct Fresh {
     /// Draw N frames per scene in place of the shipped ones.
-    #[arg(long = "fresh", value_name = "N", default_value_t = 0, value_parser = clap::value_parser!(u32).range(0..=100_000))]
+    #[arg(long = "fresh", value_name = "N", default_value_t = 0, value_parser = value_parser!(u32).range(0..=100_000))]
     pub frames: u32,
     /// Contacts on a drawn frame; repeated, frames take them in turn.
-    #[arg(long = "contacts", value_name = "K", default_value = "1", value_parser = clap::value_parser!(u8).range(1..=8))]
+    #[arg(long = "contacts", value_name = "K", default_value = "1", value_parser = value_parser!(u8).range(1..=8))]
     pub contacts: Vec<u8>,
     /// Shapes of drawn contacts.
     #[arg(long, value_enum, default_value = "elliptic")]

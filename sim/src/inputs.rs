@@ -41,7 +41,8 @@ pub fn resolve(scene: Option<&str>, frames: &[String]) -> Result<(Scene, Vec<Fra
     Ok((scene, frames))
 }
 
-/// Finds the scene and the frames of one reconstruction, 2^k of them; without `--frame` and averaging the first shipped.
+/// Finds the scene and the frames of one reconstruction, 2^k of them; without `--frame` and averaging the first
+/// shipped.
 ///
 /// # Errors
 /// As [`resolve`]; another number of frames than the scene averages.
@@ -54,7 +55,10 @@ pub fn resolve_one(scene: Option<&str>, files: &[String]) -> Result<(Scene, Vec<
         frames.truncate(1);
     } else if files.len() != wanted {
         let (origin, got) = (named.unwrap_or(&scene.name), files.len());
-        bail!("{origin}: input.average = {average}: the number of --frame options must be 2^{average} = {wanted}, got {got}");
+        bail!(
+            "{origin}: input.average = {average}: the number of --frame options must be 2^{average} = {wanted}, \
+               got {got}"
+        );
     }
     Ok((scene, frames))
 }

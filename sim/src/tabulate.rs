@@ -12,8 +12,8 @@
 //! | difference | LSB of the force word, share of the largest force |
 //!
 //! ℓ2 = ‖f − f_ref‖/‖f_ref‖ over all taxels and components. Of several contacts, whose shears may cancel, the error of
-//! the whole shear is also given over Σ|t_k|, and of case `contacts` each contact's own shear, ‖T_k − t_k‖/|t_k|, T_k of
-//! the region whose centre is nearest. The bit-true columns are empty where the hardware does not have the case.
+//! the whole shear is also given over Σ|t_k|, and of case `contacts` each contact's own shear, ‖T_k − t_k‖/|t_k|,
+//! T_k of the region whose centre is nearest. The bit-true columns are empty where the hardware does not have the case.
 
 use anyhow::Result;
 use dermis_golden::errors::Errors;
@@ -227,7 +227,7 @@ mod tests {
         assert_eq!((lines.len(), done), (7, 7));
         assert_eq!(lines.iter().map(|line| line.subarrays.len()).collect::<Vec<_>>(), [1, 4, 2, 2, 10, 1, 1]);
         // Every case of rectangles has its bit-true model.
-        assert!(lines.iter().all(|line| line.fixed.is_some() == !["adaptive", "contacts"].contains(&&*line.case)));
+        assert!(lines.iter().all(|line| line.fixed.is_some() != ["adaptive", "contacts"].contains(&&*line.case)));
         assert_eq!(lines[5].taken.as_deref(), Some("0"));
         assert_eq!(lines.iter().map(|line| line.own.len()).collect::<Vec<_>>(), [0, 0, 0, 0, 0, 0, 1]);
         assert!(lines[6].own[0] < 0.05 && lines[0].error_case_0.is_none());

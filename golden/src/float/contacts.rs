@@ -13,8 +13,8 @@
 //! ```
 //!
 //! and μ_k is what `search` finds for this family. A sweep visits all regions; it is repeated until no μ moves by more
-//! than 1/400 of mu_max, at most [`SWEEPS`] times. Then neighbours whose μ came out alike are joined, and the regions are
-//! drawn again from the better p, until neither changes them.
+//! than 1/400 of mu_max, at most [`SWEEPS`] times. Then neighbours whose μ came out alike are joined, and the regions
+//! are drawn again from the better p, until neither changes them.
 //!
 //! All this is done once for each width of smoothing in `segment`: contacts that touch need a narrow one, rings a wide
 //! one. Of the results, one μ for all among them, the one whose p scores best over the whole array is taken, less a

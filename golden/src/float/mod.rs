@@ -8,7 +8,8 @@
 //! | [`search`] | v_ij, objective | μ |
 //! | [`force`] | p(μ), μ | fx, fy, fz |
 //!
-//! With `partition.case = "contacts"` two more: [`segment`] draws a region for each contact, [`contacts`] finds their μ.
+//! With `partition.case = "contacts"` two more: [`segment`] draws a region for each contact, [`contacts`] finds
+//! their μ.
 //! With `search.form = "orthogonal"` the forces come from [`orthogonal`], Eq. 1 as printed.
 //!
 //! The hardware's `normalise`, `fold` and `unfold` change no value here: floating point carries its exponent along, and

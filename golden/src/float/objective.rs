@@ -2,7 +2,7 @@
 //!
 //! | name | Π, maximised | right for |
 //! |---|---|---|
-//! | [`Sparse`] | −Σ log2(ε + \|p_i\|/Σp): force on few taxels, next to nothing elsewhere | any shape, next to no noise |
+//! | [`Sparse`] | −Σ log2(ε + \|p_i\|/Σp): force on few taxels, nothing elsewhere | any shape, next to no noise |
 //! | [`Compressive`] | −Σ min(p, 0)²/(Σp)²: the paper's constraint i) alone | a baseline |
 //! | [`Symmetric`] | pressure symmetric about its centre | noise, shapes that are symmetric |
 //! | [`Patch`] | likelihood of one elliptic contact | noise, one contact per subarray |
@@ -18,6 +18,7 @@
 mod auto;
 mod compressive;
 pub(crate) mod disc;
+mod even;
 mod fit;
 pub(crate) mod patch;
 mod radial;

@@ -11,8 +11,8 @@
 //! | in: b | n | MPa |
 //! | out: v_ij | (d + 1)(d + 2)/2 of n | N |
 //!
-//! 1 + d(d + 1) products, of n²/4 in the basis of mirror parities ([`crate::folded`]). The remainder of the series is of the order r^(d+1) ([`crate::matrices`]). Feeds
-//! `search` and `force`.
+//! 1 + d(d + 1) products, of n²/4 in the basis of mirror parities ([`crate::folded`]). The remainder of the series is of
+//! the order r^(d+1) ([`crate::matrices`]). Feeds `search` and `force`.
 
 #[cfg(test)]
 mod tests;

@@ -1,7 +1,7 @@
 //! Segment: which contact a taxel belongs to, from the normal forces alone.
 //!
-//! q is p, compressive part only, smoothed by a Gaussian of σ = width · h (width 0.8, h at least 0.75 pitches). Every taxel climbs to its steepest neighbour until
-//! a maximum is reached; the taxels of one maximum are a basin. Two basins meet at their saddle, the largest
+//! q is p, compressive part only, smoothed by a Gaussian of σ = width · h (width 0.8, h at least 0.75 pitches). Every
+//! taxel climbs to its steepest neighbour until a maximum is reached; the taxels of one maximum are a basin. Two basins meet at their saddle, the largest
 //! min(q_i, q_j) over neighbours i, j of the two. Basins are joined, one pair at a time:
 //!
 //! 1. where the load of one is below 3 % of all, it joins the neighbour of the highest saddle;

@@ -6,7 +6,7 @@
 //!
 //! ```text
 //! ellipse  Q(x, y) = A x² + 2 B x y + C y² ≤ 1:  1 − Q = m − A (x − x0)²,  m = 1 − (C − B²/A) y²,  x0 = −B y/A
-//! Hertz    ∫ √(1 − Q) dx from the chord's start to τ half chords beside its middle = m/√A ½ (τ √(1 − τ²) + asin τ + π/2)
+//! Hertz    ∫ √(1 − Q) dx from the chord's start to τ half chords past its middle = m/√A ½ (τ √(1 − τ²) + asin τ + π/2)
 //! uniform  ∫ dx = √(m/A) (τ + 1)
 //! ```
 

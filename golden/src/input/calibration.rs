@@ -1,6 +1,6 @@
 //! Calibration: offset and gain of every taxel, from a CSV file.
 //!
-//! First line `row,col,offset,gain`, then one line per taxel in any order: b = gain · (reading − offset). Lines that are
+//! First line `row,col,offset,gain`, then a line per taxel in any order: b = gain · (reading − offset). Lines that are
 //! blank or start with `#` are passed over.
 //!
 //! | | shape | unit | range |

@@ -8,7 +8,7 @@
 //! | 6: centre, size, force | Hertz pressure, the ellipse's shape and direction are given |
 //! | 9: and two more of the ellipse, the exponent g | what `patch` fits |
 //!
-//! The 6-parameter bound is the smaller. J comes from the kernel's derivatives, its integrals by the truth's quadrature.
+//! The 6-parameter bound is the smaller. J comes from the kernel's derivatives, integrals by the truth's quadrature.
 
 use super::contact::{Contact, Truth};
 use nalgebra::{DMatrix, Matrix2};

@@ -1,10 +1,10 @@
-//! Adaptive: of the paper's cases that leave no loaded subarray unmet and cut no contact, the one that comes nearest to the
-//! contacts.
+//! Adaptive: of the paper's cases that leave no loaded subarray unmet and cut no contact, the one that comes nearest
+//! to the contacts.
 //!
 //! Cases 1, 2, 3 and 0 are tried in this order, as far as they divide the array. The contacts are those of
-//! `float::contacts`. A contact's cells are those that carry at least 5 % of its largest force; a boundary cuts the contact
-//! when it runs between them. What a contact presses is seen up to 1.5 h beyond its rim, and a subarray cannot tell it
-//! from a load of its own: a contact that is alone, which case 0 solves best, keeps that distance. Between several no
+//! `float::contacts`. A contact's cells are those that carry at least 5 % of its largest force; a boundary cuts the
+//! contact when it runs between them. What a contact presses is seen up to 1.5 h beyond its rim, and a subarray cannot
+//! tell it from a load of its own: a contact that is alone, which case 0 solves best, keeps that distance. Between several no
 //! distance is asked for. Case 0 has no boundary and is always possible.
 //!
 //! More subarrays are not always better: each is a smaller array that sees its neighbours' load without knowing of it.
@@ -14,7 +14,9 @@
 //! |T_case − T_contacts|        T: shear over the whole array
 //! ```
 //!
-//! and of equals the finest.
+//! and of equals the finest. On 120 fresh frames of two to four contacts (`dermis table sensor-3 --fresh 120 --contacts 2
+//! --contacts 3 --contacts 4 --case adaptive`, and 0 to 3) its median e_t is 32 %, that of the best single case 40 %. The
+//! finest admissible one in its place came to 43 %, more than 2 points above the best case.
 //!
 //! | | shape | unit |
 //! |---|---|---|
@@ -22,10 +24,14 @@
 //! | in: per case, receipts of its subarrays | parts | – |
 //! | out: what stands against the case | text | – |
 
+use super::extra::{Refused, Taken};
+use super::golden::{Input, Outcome};
+use super::{Golden, Reconstruction};
+use crate::float::contacts::Contacts;
 use crate::float::receive::Receipt;
-use crate::float::segment::Segments;
-use crate::frame::Forces;
-use crate::partition::Subarray;
+use crate::float::segment::{segment, Segments, WIDTH};
+use crate::frame::{Forces, Frame};
+use crate::partition::{Case, Subarray};
 use crate::sensor::Sensor;
 
 /// Share of a contact's largest force from which a cell is part of it.
@@ -35,7 +41,7 @@ const LONE_CLEARANCE: f64 = 1.5;
 
 /// The cells of one contact as a rectangle.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Extent {
+struct Extent {
     /// Left and right end in mm from the array's centre.
     pub x: [f64; 2],
     /// Upper and lower end in mm.
@@ -43,7 +49,7 @@ pub struct Extent {
 }
 
 /// The rectangles around the contacts.
-pub fn extents(sensor: &Sensor, p: &[f64], segments: &Segments) -> Vec<Extent> {
+fn extents(sensor: &Sensor, p: &[f64], segments: &Segments) -> Vec<Extent> {
     let extent = |region: usize| {
         let own = || (0..p.len()).filter(|&k| segments.labels[k] == region);
         let largest = own().map(|k| p[k]).fold(0.0, f64::max);
@@ -59,7 +65,7 @@ pub fn extents(sensor: &Sensor, p: &[f64], segments: &Segments) -> Vec<Extent> {
 }
 
 /// What stands against a case, `None` when nothing does.
-pub fn objection(sensor: &Sensor, parts: &[Subarray], receipts: &[Receipt], contacts: &[Extent]) -> Option<String> {
+fn objection(sensor: &Sensor, parts: &[Subarray], receipts: &[Receipt], contacts: &[Extent]) -> Option<String> {
     if let [_] = parts {
         return None;
     }
@@ -80,7 +86,8 @@ pub fn objection(sensor: &Sensor, parts: &[Subarray], receipts: &[Receipt], cont
             for (name, edge, [low, high]) in [("x", x, contact.x), ("y", y, contact.y)] {
                 if let Some(edge) = edge.filter(|edge| low - clearance < *edge && *edge < high + clearance) {
                     return Some(format!(
-                        "the boundary {name} = {edge} mm cuts contact {k}, from {low} to {high} mm, or comes closer than {clearance} mm"
+                        "the boundary {name} = {edge} mm cuts contact {k}, from {low} to {high} mm, or comes closer than \
+                         {clearance} mm"
 ));
                 }
             }
@@ -90,21 +97,65 @@ pub fn objection(sensor: &Sensor, parts: &[Subarray], receipts: &[Receipt], cont
 }
 
 /// How far the shear of two sets of forces is apart, in N.
-pub fn distance(a: &Forces, b: &Forces) -> f64 {
+fn distance(a: &Forces, b: &Forces) -> f64 {
     let ([ax, ay, _], [bx, by, _]) = (a.resultant(), b.resultant());
     (ax - bx).hypot(ay - by)
 }
 
 /// Why a case was not the nearest.
-pub fn farther(off: f64) -> String {
+fn farther(off: f64) -> String {
     format!("its shear is {off:.3} N from that of the contacts: another case is nearer, or finer and as near")
+}
+
+impl Golden {
+    /// Of the cases that are possible the one whose shear is nearest to that of the contacts.
+    pub(super) fn adaptive(&self, frame: &Frame, input: &Input) -> Reconstruction {
+        let sensor = &self.scene.sensor;
+        let whole = self.subarrays(input, self.whole());
+        let solved = self.solved(input);
+        let target = solved.as_ref().map(Contacts::forces);
+        let contacts = match &solved {
+            Some(contacts) if contacts.segments.count > 1 => extents(sensor, &contacts.p, &contacts.segments),
+            _ => extents(sensor, &whole.forces.fz, &segment(sensor, &whole.forces.fz, WIDTH)),
+        };
+        let off = |outcome: &Outcome| target.as_ref().map_or(0.0, |target| distance(target, &outcome.forces));
+        let nothing = "nothing finer is as near to the contacts".to_string();
+        let mut refused: Vec<(Case, String)> = Vec::new();
+        let mut best = (off(&whole), Case::WHOLE, whole, nothing);
+        for cut in self.cuts.iter().rev().filter(|cut| cut.case != Case::WHOLE) {
+            let receipts: Vec<Receipt> = cut.parts.iter().map(|part| self.receive(input, part)).collect();
+            if let Some(reason) = objection(sensor, &cut.parts, &receipts, &contacts) {
+                refused.push((cut.case, reason));
+                continue;
+            }
+            let outcome = self.subarrays(input, cut);
+            let own = off(&outcome);
+            if own <= best.0 {
+                let reason = "no boundary cuts a contact and nothing is nearer to them".to_string();
+                let (off, case, ..) = std::mem::replace(&mut best, (own, cut.case, outcome, reason));
+                refused.push((case, farther(off)));
+            } else {
+                refused.push((cut.case, farther(own)));
+            }
+        }
+        let (_, case, outcome, reason) = best;
+        // The finer ones, in their order.
+        let finer = self.cuts.iter().take_while(|cut| cut.case != case);
+        let refused = finer
+            .filter_map(|cut| refused.iter().find(|(other, _)| *other == cut.case))
+            .map(|(case, reason)| Refused { case: case.to_string(), reason: reason.clone() })
+            .collect();
+        let mut result = self.finish(frame, outcome);
+        result.extra.taken = Some(Taken { case: case.to_string(), reason, refused });
+        result
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::float::receive::receive;
-    use crate::partition::{subarrays, Case};
+    use crate::partition::subarrays;
     use crate::scene::Condition;
 
     fn sensor() -> Sensor {

@@ -6,25 +6,20 @@
 //! | adaptive | the whole array first, to see the contacts; then the case that `adaptive` allows |
 //! | contacts | the whole array first; then its regions, one μ each |
 
-use super::adaptive::{distance, extents, farther, objection};
-use super::extra::{regions, Refused, Taken};
 use super::{assemble, Reconstruction, SubarrayResult};
 use crate::flags::{frame_flags, Flag};
-use crate::float::contacts::{Contacts, Solver, Stress};
 use crate::float::force::{force, threshold};
 use crate::float::objective::taxels::Taxels;
-use crate::float::objective::{of_kind, Estimate, Objective, Sparse, Subject};
+use crate::float::objective::{of_kind, Estimate, Objective, Subject};
 use crate::float::orthogonal::{truncation, Orthogonal, OrthogonalError};
 use crate::float::pass::Polynomial;
 use crate::float::receive::{receive, Receipt};
-use crate::float::search::search;
-use crate::float::segment::{segment, Segments, WIDTH};
 use crate::frame::{Forces, Frame, FrameError};
 use crate::input::{Input as InputOptions, InputError};
 use crate::matrices::{Matrices, MatricesError};
 use crate::partition::{subarrays, Case, PartitionError, Subarray};
 use crate::quantise::{full_scale, noise_floor_codes, quantise};
-use crate::scene::{Condition, Form, Scene, SceneError};
+use crate::scene::{Form, Scene, SceneError};
 use thiserror::Error;
 
 /// A scene made ready for frames.
@@ -33,15 +28,15 @@ pub struct Golden {
     /// The scene's input options.
     pub(super) input: InputOptions,
     /// The case; of `adaptive` all cases that divide the array, the finest first, the whole last.
-    cuts: Vec<Cut>,
+    pub(super) cuts: Vec<Cut>,
     /// Where ellipses may be fitted: `adaptive` and `contacts`, every taxel read, shear wanted.
-    taxels: Option<Taxels>,
+    pub(super) taxels: Option<Taxels>,
 }
 
 /// A case with its matrices.
-struct Cut {
-    case: Case,
-    parts: Vec<Subarray>,
+pub(super) struct Cut {
+    pub case: Case,
+    pub parts: Vec<Subarray>,
     /// Shared by all subarrays: a partition's rectangles are equal.
     shared: Matrices,
     /// One for each subarray where taxels are masked.
@@ -68,21 +63,21 @@ impl Cut {
 }
 
 /// A frame with what all subarrays ask of it.
-struct Input<'a> {
-    stress_MPa: &'a [f64],
-    codes: &'a [i32],
-    floor: i32,
+pub(super) struct Input<'a> {
+    pub stress_MPa: &'a [f64],
+    pub codes: &'a [i32],
+    pub floor: i32,
     /// Standard deviation of the stress, for objectives that ask.
-    noise_MPa: f64,
+    pub noise_MPa: f64,
 }
 
 /// What the subarrays of a case came to.
-struct Outcome {
-    subarrays: Vec<SubarrayResult>,
-    forces: Forces,
-    flags: Vec<Flag>,
+pub(super) struct Outcome {
+    pub subarrays: Vec<SubarrayResult>,
+    pub forces: Forces,
+    pub flags: Vec<Flag>,
     /// Of each subarray, with the orthogonal form.
-    truncation: Vec<f64>,
+    pub truncation: Vec<f64>,
 }
 
 /// A scene or frame that cannot be reconstructed.
@@ -153,7 +148,7 @@ impl Golden {
     }
 
     /// The coarsest case.
-    fn whole(&self) -> &Cut {
+    pub(super) fn whole(&self) -> &Cut {
         &self.cuts[self.cuts.len() - 1]
     }
 
@@ -188,105 +183,20 @@ impl Golden {
         Ok(result)
     }
 
-    fn finish(&self, frame: &Frame, outcome: Outcome) -> Reconstruction {
+    pub(super) fn finish(&self, frame: &Frame, outcome: Outcome) -> Reconstruction {
         let Outcome { subarrays, forces, flags, truncation } = outcome;
         let mut result = assemble(&self.scene, frame, "golden", subarrays, forces, flags);
         result.extra.truncation = Some(truncation).filter(|truncation| !truncation.is_empty());
         result
     }
 
-    /// Of the cases that are possible the one whose shear is nearest to that of the contacts.
-    fn adaptive(&self, frame: &Frame, input: &Input) -> Reconstruction {
-        let sensor = &self.scene.sensor;
-        let whole = self.subarrays(input, self.whole());
-        let solved = self.solved(input);
-        let target = solved.as_ref().map(Contacts::forces);
-        let contacts = match &solved {
-            Some(contacts) if contacts.segments.count > 1 => extents(sensor, &contacts.p, &contacts.segments),
-            _ => extents(sensor, &whole.forces.fz, &segment(sensor, &whole.forces.fz, WIDTH)),
-        };
-        let off = |outcome: &Outcome| target.as_ref().map_or(0.0, |target| distance(target, &outcome.forces));
-        let nothing = "nothing finer is as near to the contacts".to_string();
-        let mut refused: Vec<(Case, String)> = Vec::new();
-        let mut best = (off(&whole), Case::WHOLE, whole, nothing);
-        for cut in self.cuts.iter().rev().filter(|cut| cut.case != Case::WHOLE) {
-            let receipts: Vec<Receipt> = cut.parts.iter().map(|part| self.receive(input, part)).collect();
-            if let Some(reason) = objection(sensor, &cut.parts, &receipts, &contacts) {
-                refused.push((cut.case, reason));
-                continue;
-            }
-            let outcome = self.subarrays(input, cut);
-            let own = off(&outcome);
-            if own <= best.0 {
-                let reason = "no boundary cuts a contact and nothing is nearer to them".to_string();
-                let (off, case, ..) = std::mem::replace(&mut best, (own, cut.case, outcome, reason));
-                refused.push((case, farther(off)));
-            } else {
-                refused.push((cut.case, farther(own)));
-            }
-        }
-        let (_, case, outcome, reason) = best;
-        // The finer ones, in their order.
-        let finer = self.cuts.iter().take_while(|cut| cut.case != case);
-        let refused = finer
-            .filter_map(|cut| refused.iter().find(|(other, _)| *other == cut.case))
-            .map(|(case, reason)| Refused { case: case.to_string(), reason: reason.clone() })
-            .collect();
-        let mut result = self.finish(frame, outcome);
-        result.extra.taken = Some(Taken { case: case.to_string(), reason, refused });
-        result
-    }
-
-    /// The regions of the contacts and their μ, `None` when no candidate presses.
-    fn solved(&self, input: &Input) -> Option<Contacts> {
-        let (scene, matrices) = (&self.scene, self.matrices());
-        let family = Polynomial::new(matrices, input.stress_MPa);
-        let found = search(&family, scene.search.mu_max, &Sparse::default())?;
-        let (mu_max, p0) = (scene.search.mu_max, family.v(0, 0));
-        let (b, noise_MPa) = (input.stress_MPa, input.noise_MPa);
-        let stress = self.taxels.as_ref().map(|taxels| Stress { taxels, b, noise_MPa });
-        let searched = |segments: &Segments, region: usize| self.met(input, segments, region);
-        let solver = Solver { matrices, mu_max, objective: &Sparse::default(), p0, stress, searched: &searched };
-        Some(solver.solve(&family, found))
-    }
-
-    /// Whether the taxels of a region meet the scene's condition.
-    fn met(&self, input: &Input, segments: &Segments, region: usize) -> bool {
-        let own = || (0..input.codes.len()).filter(move |&k| segments.labels[k] == region).map(|k| input.codes[k]);
-        let (above, below) = (own().any(|code| code > input.floor), own().any(|code| code < -input.floor));
-        match self.scene.partition.condition {
-            Condition::Loaded => above || below,
-            Condition::BothSigns => above && below,
-        }
-    }
-
-    /// One region per contact.
-    fn contacts(&self, frame: &Frame, input: &Input) -> Reconstruction {
-        let scene = &self.scene;
-        let mut outcome = self.subarrays(input, self.whole());
-        let Some(contacts) = self.solved(input) else {
-            return self.finish(frame, outcome);
-        };
-        let (x, truncation) = self.whole().meet(input.stress_MPa, contacts.forces());
-        outcome.truncation = truncation.into_iter().collect();
-        let forces = threshold(x, scene.threshold.min_force_N);
-        let met: Vec<bool> = (0..contacts.segments.count).map(|k| self.met(input, &contacts.segments, k)).collect();
-        let own = regions(&scene.sensor, &contacts, &met, &forces);
-        outcome.forces = forces;
-        let mut result = self.finish(frame, outcome);
-        result.extra.regions = Some(own);
-        result.extra.sweeps = Some(contacts.sweeps);
-        result.extra.converged = Some(contacts.converged);
-        result
-    }
-
-    fn receive(&self, input: &Input, part: &Subarray) -> Receipt {
+    pub(super) fn receive(&self, input: &Input, part: &Subarray) -> Receipt {
         let codes = part.gather(&self.scene.sensor, input.codes);
         receive(&self.scene.sensor, part, &codes, input.floor, self.scene.partition.condition)
     }
 
     /// Every subarray of a case for itself.
-    fn subarrays(&self, input: &Input, cut: &Cut) -> Outcome {
+    pub(super) fn subarrays(&self, input: &Input, cut: &Cut) -> Outcome {
         let sensor = &self.scene.sensor;
         let forces = Forces::zeros(sensor.taxels());
         let mut outcome = Outcome { subarrays: Vec::new(), forces, flags: Vec::new(), truncation: Vec::new() };
@@ -345,7 +255,7 @@ impl Golden {
 
 impl Cut {
     /// The forces of Eq. 1 for w: w itself, or with the orthogonal form the nearest that meet b, and how far they are.
-    fn meet(&self, b: &[f64], w: Forces) -> (Forces, Option<f64>) {
+    pub(super) fn meet(&self, b: &[f64], w: Forces) -> (Forces, Option<f64>) {
         match &self.orthogonal {
             None => (w, None),
             Some(orthogonal) => {

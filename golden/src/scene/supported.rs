@@ -5,7 +5,7 @@
 //! | `medium.kind` | all | "half-space" |
 //! | `partition.case` | all | 0 … 3 and rows × cols, where the device holds it |
 //! | `search.objective` | all; with "adaptive" and "contacts" "sparse" | "sparse" |
-//! | `search.form` | all, "orthogonal" for subarrays of few taxels ([`crate::float::orthogonal::MAX_TAXELS`]) | "oblique" |
+//! | `search.form` | all, "orthogonal" up to [`crate::float::orthogonal::MAX_TAXELS`] taxels | "oblique" |
 //! | `input.dead`, `input.unipolar` | all; with "orthogonal" none | none |
 //!
 //! Dead taxels in hardware: filling b at k dead taxels with a fixed combination of the others gives the golden model's

@@ -164,8 +164,8 @@ fn text(lines: &[Line]) -> String {
         row
     });
     format!(
-        "{}\nMedians over the frames, and what nine of ten do not exceed; several: frames of several contacts, and with \
-         case contacts each contact's own shear. The paper's sensors 3 and 4 are against case 0.\n\n{}",
+        "{}\nMedians over the frames, and what nine of ten do not exceed; several: frames of several contacts, and \
+         with case contacts each contact's own shear. The paper's sensors 3 and 4 are against case 0.\n\n{}",
         markdown(&head, rows.collect()),
         markdown(
             &head_of_medians.map(|name| name.replace('|', "\\|")).each_ref().map(String::as_str),

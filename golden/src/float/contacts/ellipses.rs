@@ -6,8 +6,8 @@
 //! | in: stress, noise | n, scalar | MPa |
 //! | out: p, regions, μ of each | n, n, count × 2 | N, –, – |
 //!
-//! A single ellipse changes nothing: one contact is the plain method. A region's forces are its ellipse's pressure over each cell, scaled to its load; a cell under two belongs to the one
-//! that presses it more.
+//! A single ellipse changes nothing: one contact is the plain method. A region's forces are its ellipse's pressure over
+//! each cell, scaled to its load; a cell under two belongs to the one that presses it more.
 
 use super::{Contacts, Solver, Stress};
 use crate::float::objective::explained;

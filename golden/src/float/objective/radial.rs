@@ -1,7 +1,7 @@
 //! Radial: the kernels of a bonded layer for many evaluations, by cubic pieces.
 //!
-//! gn, gs and their slopes are tabulated every 1/64 of h; between, Hermite's cubic. Its error is step⁴/384 of the fourth
-//! derivative, which is some 200 peaks per h⁴: 3e-8 of the peak, a thousand times below what a fit can tell.
+//! gn, gs and their slopes are tabulated every 1/64 of h; between, Hermite's cubic. Its error is step⁴/384 of the
+//! fourth derivative, which is some 200 peaks per h⁴: 3e-8 of the peak, a thousand times below what a fit can tell.
 //!
 //! | | shape | unit |
 //! |---|---|---|

@@ -11,8 +11,8 @@
 //! | out: ellipses and their forces | 6 + 3 per contact | as in `patch`, N |
 //! | out: squared misfit | scalar | MPa² |
 //!
-//! Started from several drawings of the regions. Where none explains b, an ellipse is added where the misfit of the best
-//! is largest, or its ellipse cut in two, twice at most and as long as that helps.
+//! Started from several drawings of the regions. Where none explains b, an ellipse is added where the misfit of the
+//! best is largest, or its ellipse cut in two, twice at most and as long as that helps.
 
 use super::disc::Disc;
 use super::fit::{fit, Effort, Fit, Model, QUICK, STEADY};

@@ -24,14 +24,14 @@
 //! | out: load | scalar | N | above 0 |
 
 use super::disc::Disc;
-use super::fit::{fit, Fit, Model, THOROUGH};
-use super::patch::{confine_ellipse, place};
+use super::even::Even;
+use super::fit::{fit, Fit, THOROUGH};
 use super::taxels::Taxels;
 use super::{Estimate, Objective, Subject};
 use crate::float::search::search;
 use crate::scene::Medium;
 use crate::sensor::Sensor;
-use nalgebra::{DMatrix, DVector};
+use nalgebra::DVector;
 
 /// Width of the smoothing over the depth.
 const WIDTH: f64 = 2.0;
@@ -138,81 +138,6 @@ impl Objective for Symmetric {
     }
 }
 
-/// Coefficients of e: 1, u², uv, v². Fourth powers would show shear and shape to be alike: they double the error with noise.
-const TERMS: [(i32, i32); 4] = [(0, 0), (2, 0), (1, 1), (0, 2)];
-
-/// Stress of an even pressure; θ = x₀, y₀, L₁₁, L₂₂, L₁₂, μ1, μ2.
-struct Even<'a> {
-    taxels: &'a Taxels,
-    disc: &'a Disc,
-    mu_max: f64,
-    /// Load of each node under each coefficient: nodes × 9.
-    basis: DMatrix<f64>,
-}
-
-impl<'a> Even<'a> {
-    fn new(taxels: &'a Taxels, disc: &'a Disc, mu_max: f64) -> Even<'a> {
-        let (weights, _) = disc.weights(0.5);
-        let basis = DMatrix::from_fn(weights.len(), TERMS.len(), |node, term| {
-            let ([u, v], (i, j)) = (disc.nodes[node], TERMS[term]);
-            weights[node] * u.powi(i) * v.powi(j)
-        });
-        Even { taxels, disc, mu_max, basis }
-    }
-
-    /// Σ of the pressure.
-    fn load(&self, coefficients: &DVector<f64>) -> f64 {
-        (&self.basis * coefficients).sum()
-    }
-}
-
-impl Model for Even<'_> {
-    fn columns(&mut self, theta: &[f64]) -> DMatrix<f64> {
-        let n = self.taxels.count();
-        let mut nodes = DMatrix::zeros(n, self.disc.nodes.len());
-        let mut field = [(); 3].map(|()| vec![0.0; n]);
-        for (&node, mut column) in self.disc.nodes.iter().zip(nodes.column_iter_mut()) {
-            self.taxels.field(place(theta, node), [theta[5], theta[6], 1.0], &mut field);
-            column.copy_from_slice(&field[0]);
-        }
-        nodes * &self.basis
-    }
-
-    fn slopes(&mut self, theta: &[f64], loads: &DVector<f64>) -> DMatrix<f64> {
-        let n = self.taxels.count();
-        let weights = &self.basis * loads;
-        let mut slopes = DMatrix::zeros(n, 7);
-        let mut field = [(); 3].map(|()| vec![0.0; n]);
-        let mut units = [(); 3].map(|()| vec![0.0; n]);
-        for (&node, &weight) in self.disc.nodes.iter().zip(&weights) {
-            let place = place(theta, node);
-            self.taxels.field(place, [theta[5] * weight, theta[6] * weight, weight], &mut field);
-            let [u, v] = node;
-            for i in 0..n {
-                let (x, y) = (field[1][i], field[2][i]);
-                slopes[(i, 0)] += x;
-                slopes[(i, 1)] += y;
-                slopes[(i, 2)] += x * u;
-                slopes[(i, 3)] += y * v;
-                slopes[(i, 4)] += x * v + y * u;
-            }
-            self.taxels.add_unit_forces(place, weight, &mut units);
-        }
-        slopes.column_mut(5).copy_from_slice(&units[0]);
-        slopes.column_mut(6).copy_from_slice(&units[1]);
-        slopes
-    }
-
-    fn confine(&self, theta: &mut [f64]) {
-        confine_ellipse(self.taxels, theta);
-        let ratio = theta[5].hypot(theta[6]);
-        if ratio > self.mu_max {
-            theta[5] *= self.mu_max / ratio;
-            theta[6] *= self.mu_max / ratio;
-        }
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -220,9 +145,6 @@ mod tests {
     use crate::frame::Frame;
     use crate::matrices::Matrices;
     use crate::scene::Scene;
-
-    /// Central differences of step 10⁻⁴ mm: truncation (10⁻⁴/h)² ≈ 10⁻⁹ and rounding 10⁻¹⁶/10⁻⁴, with a margin of 10³.
-    const SLOPE_TOLERANCE: f64 = 1e-6;
 
     fn sensor() -> Sensor {
         Scene::builtin("sensor-1").unwrap().sensor
@@ -242,7 +164,8 @@ mod tests {
         let width = WIDTH * sensor.thickness_mm;
         let seen = Symmetric::new(&sensor, Medium::HalfSpace).derivatives(&[3.0], [width, 0.0]);
         let q = 3.0 * (-0.5f64).exp();
-        // q, q_x = −u q, q_y, q_xx = (u² − 1) q, q_xy, q_yy = (v² − 1) q, q_xxx = (3u − u³) q, q_xxy, q_xyy = u q, q_yyy.
+        // q, q_x = −u q, q_y, q_xx = (u² − 1) q, q_xy, q_yy = (v² − 1) q,
+        // q_xxx = (3u − u³) q, q_xxy, q_xyy = u q, q_yyy.
         let wanted = [1.0, -1.0, 0.0, 0.0, 0.0, -1.0, 2.0, 0.0, 1.0, 0.0];
         for (seen, wanted) in seen.iter().zip(wanted) {
             assert!((seen - wanted * q).abs() < 1e-14, "{seen} {wanted}");
@@ -267,27 +190,6 @@ mod tests {
         let objective = Symmetric::new(&sensor(), Medium::HalfSpace);
         for value in [0.0, -1.0, f64::NAN, f64::INFINITY] {
             assert_eq!(objective.score(&vec![value; sensor().taxels()]), None, "{value}");
-        }
-    }
-
-    #[test]
-    fn slopes_are_those_of_the_columns() {
-        let (taxels, disc) = (Taxels::new(&sensor(), Medium::HalfSpace), Disc::new(NODES[0], NODES[1]));
-        let mut model = Even::new(&taxels, &disc, 0.6);
-        let theta = [0.7, -1.1, 3.0, 4.0, 0.5, 0.2, -0.1];
-        let loads = DVector::from_vec(vec![5.0, -1.0, 0.4, 0.8]);
-        let slopes = model.slopes(&theta, &loads);
-        let largest = slopes.amax();
-        for index in 0..theta.len() {
-            let mut at = |by: f64| {
-                let mut theta = theta;
-                theta[index] += by;
-                model.columns(&theta) * &loads
-            };
-            let step = 1e-4;
-            let difference = (at(step) - at(-step)) / (2.0 * step);
-            let off = (slopes.column(index) - difference).amax();
-            assert!(off <= SLOPE_TOLERANCE * largest, "θ{index}: {off:e} of {largest:e}");
         }
     }
 

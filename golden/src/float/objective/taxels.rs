@@ -1,6 +1,6 @@
 //! Taxels: where the array reads, and the stress there of point forces on the body above.
 //!
-//! With d from the force to the taxel, on a half-space and on a bonded layer of thickness h ([`crate::bonded::kernel`]):
+//! With d from force to taxel, on a half-space and on a bonded layer of thickness h ([`crate::bonded::kernel`]):
 //!
 //! ```text
 //! b = 3 h² (Fx dx + Fy dy + Fz h)/(2π ρ⁵),  ρ² = |d|² + h²        b h² = Fz gn(r) + (F·d/h) gs(r),  r = |d|/h
