@@ -5,6 +5,8 @@
 //! | `equality` | generated Verilog = rust-hdl's simulation = bit-true model, on every shipped frame; cycle budgets |
 //! | `accuracy` | golden against the truth, bit-true against golden |
 //! | `flipped_bit` | one wrong bit in a coefficient, a vector or the expected output is found |
+//! | `resources` | block RAMs and multipliers as Yosys counts them, flip-flops and LUTs near |
+//! | `explain` | what is left out is not in the Verilog, and what that saves; refusals name what fits |
 //! | `framing` | early and missing `tlast`: what is dropped, what is flagged, and equality right after |
 //! | `synthesis` | Yosys reads the Verilog without latch or undriven signal |
 //! | `scenes` | the same equality for scenes of other shapes, degrees, words and conditions |

@@ -44,7 +44,7 @@ pub fn features(model: &Model) -> Vec<Feature> {
     let set = |has: bool, own: String, back: &str| if has { own } else { back.to_string() };
 
     let (table, tare) = (input.calibration.is_some(), input.calibration.is_some() || input.tare.is_some());
-    add("tare frame", tare, set(tare, "a zero per taxel".into(), "a zero per taxel"), &|| {
+    add("tare frame", tare, "a zero per taxel".into(), &|| {
         scaled(&with(&|s| (s.input.tare, s.input.full_scale_MPa) = (Some("".into()), Some(full_scale))), false)
     });
     add("calibration table", table, format!("a zero and a gain of {MULTIPLIER_BITS} bits per taxel"), &|| {
@@ -56,10 +56,10 @@ pub fn features(model: &Model) -> Vec<Feature> {
     });
     let parts = model.parts.len();
     let quarters = Case::numbered(1).filter(|case| subarrays(*case, &scene.sensor).is_ok());
-    if let (1, Some(case)) = (parts, quarters) {
-        add("partition", false, "2×2 subarrays".into(), &|| plain(&with(&|s| s.partition.case = case)));
-    } else {
+    if parts > 1 {
         add("partition", true, format!("{parts} subarrays"), &|| plain(scene));
+    } else if let Some(case) = quarters {
+        add("partition", false, "2×2 subarrays".into(), &|| plain(&with(&|s| s.partition.case = case)));
     }
     let degree = model.formats.degree;
     let mu_max = SearchSpec::default().mu_max;
