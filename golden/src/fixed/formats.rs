@@ -298,19 +298,22 @@ fn fit(
     };
     let mut groups: Vec<usize> = per_parity.rev().map(|lanes| quads.div_ceil(lanes)).collect();
     groups.dedup();
+    // Of those that fit equally well the most lanes win; of those that do not fit, the fewest block RAMs.
+    let rank = |(_, _, resources): &(Formats, Storage, Resources)| match resources.fit(board) {
+        Fit::Not => (Fit::Not, resources.block_rams()),
+        fit => (fit, 0),
+    };
     let mut best: Option<(Formats, Storage, Resources)> = None;
     for groups in groups {
         let design = with(groups);
-        let kept = best.as_ref().map(|(_, _, resources)| resources.fit(board));
-        // Of those that do not fit, the last comes closest.
-        if kept.is_none_or(|kept| design.2.fit(board) < kept || kept == Fit::Not) {
+        if best.as_ref().is_none_or(|kept| rank(&design) < rank(kept)) {
             best = Some(design);
         }
-        if best.as_ref().is_some_and(|(_, _, resources)| resources.fit(board) == Fit::WithRoom) {
+        if best.as_ref().is_some_and(|kept| rank(kept).0 == Fit::WithRoom) {
             break;
         }
     }
-    best.unwrap_or_else(|| with(1))
+    best.unwrap_or(all)
 }
 
 /// The right shift of the force stage for a subarray normalised by `normalise` and rescaled by `rescale`: the μ word's
