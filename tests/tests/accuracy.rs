@@ -1,6 +1,5 @@
-//! Accuracy on the shipped half-space frames: the golden model against the truth, the bit-true model (which the
-//! hardware equals) against the golden model on the same quantised input, at 20 bits and at the 16 of a common
-//! converter.
+//! Accuracy: the golden model against the truth, the bit-true model (which the hardware equals) against the golden model
+//! on the same quantised input, at 20 bits and at the 16 of a common converter, on drawn frames of one contact each.
 //!
 //! `cargo test --release -p dermis-tests --test accuracy -- --nocapture` prints the table.
 
@@ -10,12 +9,15 @@ use dermis_golden::quantise::{full_scale, quantise};
 use dermis_golden::reconstruct::{Golden, Reconstruction};
 use dermis_golden::scene::Scene;
 use dermis_sim::compare::median;
+use dermis_sim::fresh::{Fresh, Shapes};
 use dermis_tests::scene;
 
 /// Largest median tangential error of the golden model on sensor 1: twice what a study in f64 found (1.4 %).
 const GOLDEN_TANGENTIAL: f64 = 0.03;
 /// Largest normal error of the golden model on sensor 1, each frame.
 const GOLDEN_NORMAL: f64 = 0.015;
+/// Drawn frames of each sensor.
+const FRAMES: u32 = 100;
 /// How much the bit-true model may add to the median of a sensor at 20 bits.
 const FIXED_ADDS: f64 = 0.02;
 
@@ -33,7 +35,9 @@ fn quantised(scene: &Scene, frame: &Frame) -> Frame {
 
 /// Medians of e_t: float, float on codes of `bits` bits, fixed on the same codes.
 fn medians(name: &str, bits: u32) -> [f64; 3] {
-    let (mut scene, frames) = scene(name);
+    let (mut scene, _) = scene(name);
+    let draw = Fresh { frames: FRAMES, contacts: vec![1], shapes: Shapes::Elliptic, touching: false, seed: 1 };
+    let frames = draw.draw(&scene).unwrap();
     scene.fixed.input_bits = bits;
     let golden = Golden::new(&scene).unwrap();
     let model = Model::new(&scene).unwrap();
@@ -46,12 +50,16 @@ fn medians(name: &str, bits: u32) -> [f64; 3] {
 #[test]
 fn fixed_adds_little_to_every_sensor() {
     println!("| scene | input | float | float, same codes | fixed |\n|---|---:|---:|---:|---:|");
-    for name in ["sensor-1", "sensor-2", "sensor-3", "eight-by-eight"] {
+    for name in ["sensor-1", "sensor-2", "sensor-3", "eight-by-eight", "sensor-4"] {
         for bits in [20, 16] {
             let [float, codes, fixed] = medians(name, bits);
             let percent = [float, codes, fixed].map(|e| format!("{:.2} %", 100.0 * e)).join(" | ");
             println!("| {name} | {bits} bits | {percent} |");
-            assert!(bits < 20 || fixed <= float + FIXED_ADDS, "{name}: fixed {fixed}, float {float}");
+            // Sensor 4 is reported: its cells are too wide against the cover, whatever computes.
+            assert!(
+                bits < 20 || name == "sensor-4" || fixed <= float + FIXED_ADDS,
+                "{name}: fixed {fixed}, float {float}"
+            );
         }
     }
 }

@@ -57,7 +57,13 @@ fn random_frames(scene: &Scene, frames: u64) {
             .map(|k| {
                 let codes = codes(&mut random, scene);
                 let expected = hardware.model.run(&codes);
-                Vector { frame: format!("random {}", CHUNK * seed + k), cols: scene.sensor.cols, codes, expected }
+                Vector {
+                    frame: format!("random {}", CHUNK * seed + k),
+                    cols: scene.sensor.cols,
+                    taxels: codes.len(),
+                    codes,
+                    expected,
+                }
             })
             .collect();
         let bench = Bench { name: "verilator", device: device.as_mut(), taps: &taps };
