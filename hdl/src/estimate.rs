@@ -10,7 +10,7 @@
 //! | `?` | 1 |
 //! | `&`, `|`, `^`, `!` and comparisons | 1/4 |
 //! | shift by a signal | 3 |
-//! | a table logarithm | 7 per bit of the argument, 6 for the table |
+//! | a table logarithm | 2 per bit of the argument, 40 for its last bits and the table |
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -243,7 +243,7 @@ fn cost(value: &str) -> f64 {
 /// LUTs of the logarithm's functions.
 fn calls(value: &str, widths: &BTreeMap<String, usize>) -> f64 {
     let argument = |name: &str| value.split_once(name).and_then(|(_, rest)| rest.split(')').next());
-    let locate = argument("locate(").map_or(0.0, |x| 7.0 * widths.get(x).copied().unwrap_or(1) as f64);
-    let table = argument("fraction(").map_or(0.0, |_| 6.0);
+    let locate = argument("locate(").map_or(0.0, |x| 2.0 * widths.get(x).copied().unwrap_or(1) as f64);
+    let table = argument("logarithm(").map_or(0.0, |_| 40.0);
     locate + table
 }

@@ -1,4 +1,8 @@
 //! Verilog of the table logarithm, shared by the two blocks that need one.
+//!
+//! The leading one is found by halves: is the upper half empty, the lower one takes its place. Whether it was not is a bit of
+//! the leading one's position, and what is left in the end begins with the leading one. Two functions, a register
+//! between them: 64 or 32 bits are too many halves for one cycle.
 
 use dermis_golden::fixed::formats::{LOG_FRACTION, LOG_TABLE_BITS};
 use dermis_golden::fixed::search::log_table;
@@ -7,56 +11,85 @@ use dermis_golden::fixed::search::log_table;
 pub const LENGTH_BITS: usize = 6;
 /// Bits of a logarithm.
 pub const LOG_BITS: usize = LENGTH_BITS + LOG_FRACTION as usize;
+/// Halves that the second function looks at: of 8, 4 and 2 bits.
+const LAST: [usize; 3] = [4, 2, 1];
+/// Bits that the second function needs: the leading one at any of 8 places, and a slot behind it.
+const REST_BITS: usize = 8 + LOG_TABLE_BITS as usize;
 
-/// A function `name` from a vector of `bits` bits to {length − 1, slot}: the position of its leading one and the bits behind it.
-/// Zero gives zero, as one does.
-pub fn locate(name: &str, bits: usize) -> String {
-    let slot = LOG_TABLE_BITS as usize;
-    let cases: String = (0..bits)
-        .map(|top| {
-            // The slot's bits stand right below the leading one; short arguments are filled with zeros.
-            let behind = match top.checked_sub(slot) {
-                Some(low) => format!("x[{}:{low}]", top - 1),
-                None if top == 0 => format!("{slot}'d0"),
-                None => format!("{{x[{}:0], {}'d0}}", top - 1, slot - top),
-            };
-            format!("    if (x[{top}]) {name} = {{{LENGTH_BITS}'d{top}, {behind}}};\n")
+/// The halves that the first function looks at, for arguments of `bits` bits.
+fn first_halves(bits: usize) -> Vec<usize> {
+    let width = bits.next_power_of_two().max(16);
+    (3..LENGTH_BITS).rev().map(|k| 1 << k).filter(|half| 2 * half <= width).collect()
+}
+
+/// Bits between the two functions, for arguments of `bits` bits.
+pub fn located_bits(bits: usize) -> usize {
+    first_halves(bits).len() + REST_BITS
+}
+
+/// Verilog functions `locate`, from a vector of `bits` bits to what stands between, and `logarithm` from there. Zero gives
+/// what one gives.
+pub fn functions(bits: usize) -> String {
+    let halves = first_halves(bits);
+    let width = 2 * halves[0];
+    let located = located_bits(bits);
+    // One step: remember whether the upper half of `half` bits holds anything; if not, move the lower one up.
+    let step = |name: &str, bit: usize, high: usize, half: usize| {
+        format!("    {name}[{bit}] = |y[{high}:{}];\n    if (!{name}[{bit}]) y = y << {half};\n", high + 1 - half)
+    };
+    let head: String =
+        halves.iter().enumerate().map(|(k, &half)| step("locate", located - 1 - k, width - 1, half)).collect();
+    let tail: String =
+        LAST.iter().enumerate().map(|(k, &half)| step("place", LAST.len() - 1 - k, REST_BITS - 1, half)).collect();
+    let cases: String = log_table()
+        .iter()
+        .enumerate()
+        .map(|(m, value)| {
+            format!(
+                "      {LOG_TABLE_BITS}'d{m}: logarithm = {{{{{above}position}}, {LOG_FRACTION}'d{value}}};\n",
+                above = match LENGTH_BITS - halves.len() - LAST.len() {
+                    0 => String::new(),
+                    more => format!("{more}'d0, "),
+                }
+            )
         })
         .collect();
     format!(
         "\
-function [{end}:0] {name};
+function [{located_end}:0] locate;
   input [{x_end}:0] x;
+  reg [{y_end}:0] y;
   begin
-    {name} = {all}'d0;
-{cases}  end
+    y = {padded};
+{head}    locate[{rest_end}:0] = y[{y_end}:{y_rest}];
+  end
 endfunction
-",
-        end = LENGTH_BITS + slot - 1,
-        all = LENGTH_BITS + slot,
-        x_end = bits - 1,
-    )
-}
-
-/// A function `name` from a slot to the fraction of the logarithm.
-pub fn table(name: &str) -> String {
-    let (slot, fraction) = (LOG_TABLE_BITS, LOG_FRACTION);
-    let cases: String = log_table()
-        .iter()
-        .enumerate()
-        .map(|(m, value)| format!("      {slot}'d{m}: {name} = {fraction}'d{value};\n"))
-        .collect();
-    format!(
-        "\
-function [{end}:0] {name};
-  input [{slot_end}:0] slot;
+function [{log_end}:0] logarithm;
+  input [{located_end}:0] located;
+  reg [{rest_end}:0] y;
+  reg [2:0] place;
+  reg [{position_end}:0] position;
   begin
-    case (slot)
+    y = located[{rest_end}:0];
+{tail}    position = {{located[{located_end}:{rest}], place}};
+    case (y[{slot_high}:{slot_low}])
 {cases}    endcase
   end
 endfunction
 ",
-        end = fraction - 1,
-        slot_end = slot - 1,
+        located_end = located - 1,
+        x_end = bits - 1,
+        y_end = width - 1,
+        padded = match width - bits {
+            0 => "x".to_string(),
+            more => format!("{{{more}'d0, x}}"),
+        },
+        rest = REST_BITS,
+        rest_end = REST_BITS - 1,
+        y_rest = width - REST_BITS,
+        log_end = LOG_BITS - 1,
+        position_end = halves.len() + LAST.len() - 1,
+        slot_high = REST_BITS - 2,
+        slot_low = REST_BITS - 1 - LOG_TABLE_BITS as usize,
     )
 }

@@ -6,9 +6,10 @@ use dermis_golden::fixed::rescale;
 use rust_hdl::prelude::*;
 
 use super::counter::count_bits;
+use super::leading_one::by_leading_one;
 use crate::wire::{Wire, Word};
 
-/// ORs the magnitudes of raw quads; `shift` follows one cycle after the last of them.
+/// ORs the magnitudes of raw quads; `shift` follows two cycles after the last of them.
 #[derive(LogicBlock)]
 pub struct RawLength {
     /// Clock.
@@ -19,7 +20,7 @@ pub struct RawLength {
     pub accept: Signal<In, Bit>,
     /// Four accumulators.
     pub quad: Wire<In>,
-    /// The right shift; combinational from what was taken.
+    /// The right shift.
     pub shift: Wire<Out>,
     _seen: u64,
     _formats: Formats,
@@ -48,6 +49,7 @@ impl RawLength {
 impl Logic for RawLength {
     fn update(&mut self) {
         if self.clk.pos_edge() {
+            self.shift.next = Word::from(u64::from(rescale::shift(&self._formats, bit_length(self._seen))));
             let bits = self._formats.acc_bits as usize;
             let magnitude = (0..4).fold(0, |m, lane| m | magnitude_bits(self.quad.val().signed(lane, bits)));
             if self.clear.val() {
@@ -55,7 +57,6 @@ impl Logic for RawLength {
             } else if self.accept.val() {
                 self._seen |= magnitude;
             }
-            self.shift.next = Word::from(u64::from(rescale::shift(&self._formats, bit_length(self._seen))));
         }
     }
 
@@ -78,20 +79,15 @@ impl Logic for RawLength {
                 )
             })
             .collect();
-        // The highest set bit comes last and wins.
-        let lengths: String = (full..bits - 1)
-            .map(|bit| format!("  if (seen[{bit}]) shift = {shift_bits}'d{};\n", bit + 1 - full))
-            .collect();
+        let shift = by_leading_one("seen", full..bits - 1, bits - 2, shift_bits, |bit| bit + 1 - full);
         Verilog::Custom(format!(
             "\
 reg [{end}:0] seen;
 {magnitudes}always @(posedge clk) begin
   if (clear) seen <= {less}'d0;
   else if (accept) seen <= seen | m0 | m1 | m2 | m3;
-end
-always @(*) begin
-  shift = {shift_bits}'d0;
-{lengths}end",
+  shift <= {shift};
+end",
             end = bits - 2,
             less = bits - 1,
         ))

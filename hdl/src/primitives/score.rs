@@ -1,17 +1,17 @@
 //! The sparse objective over one sweep: Σ log2(|p| + ⌊Σp / 2^20⌋) for nine candidates at once.
 
-use dermis_golden::fixed::formats::{Formats, EPSILON_SHIFT, LOG_TABLE_BITS};
+use dermis_golden::fixed::formats::{Formats, EPSILON_SHIFT};
 use dermis_golden::fixed::search::log2;
 use rust_hdl::prelude::*;
 
-use super::logarithm::{locate, table, LENGTH_BITS, LOG_BITS};
+use super::logarithm::{functions, located_bits, LOG_BITS};
 use crate::wire::{Wire, Word};
 
 /// Values of a quad's four taxels and of the sum in, `totals` of all valid quads since the `first`, [`LATENCY`] cycles
 /// later.
 ///
-/// Stages: magnitude; plus ε Σp (0 for Σp < 0, such a candidate is never taken); leading one; table; sum of the
-/// four lanes that count; accumulation.
+/// Stages: magnitude; plus ε Σp (0 for Σp < 0, such a candidate is never taken); leading one, first half; second half and
+/// table; sum of the four lanes that count; accumulation.
 #[derive(LogicBlock)]
 pub struct Score {
     /// Clock.
@@ -86,7 +86,6 @@ impl Logic for Score {
         let shift = EPSILON_SHIFT as usize;
         let e = s - 1 - shift;
         let x = v.max(e) + 1;
-        let slot = LOG_TABLE_BITS as usize;
         let lane_sum = LOG_BITS + 2;
         let pad = |bits: usize| match bits {
             0 => String::new(),
@@ -94,7 +93,7 @@ impl Logic for Score {
         };
         Verilog::Custom(format!(
             "\
-{locate}{table}reg [4:0] valids, firsts;
+{functions}reg [4:0] valids, firsts;
 reg [15:0] masks;
 always @(posedge clk) begin
   valids <= {{valids[3:0], valid}};
@@ -113,13 +112,13 @@ generate
       wire [{v_end}:0] value = values[(9 * l + k) * {v} +: {v}];
       reg [{v_end}:0] magnitude;
       reg [{x_end}:0] argument;
-      reg [{found_end}:0] found;
+      reg [{located_end}:0] located;
       reg [{log_end}:0] log;
       always @(posedge clk) begin
         magnitude <= value[{v_end}] ? -value : value;
         argument <= {{{pad_v}magnitude}} + {{{pad_e}epsilon}};
-        found <= locate(argument);
-        log <= {{found[{found_end}:{slot}], fraction(found[{slot_end}:0])}};
+        located <= locate(argument);
+        log <= logarithm(located);
       end
       assign logs[l * {log_bits} +: {log_bits}] = masks[12 + l] ? log : {log_bits}'d0;
     end
@@ -131,15 +130,13 @@ generate
     end
   end
 endgenerate",
-            locate = locate("locate", x),
-            table = table("fraction"),
+            functions = functions(x),
             e_end = e - 1,
             logs_end = 4 * LOG_BITS - 1,
             lane_sum_end = lane_sum - 1,
             v_end = v - 1,
             x_end = x - 1,
-            found_end = LENGTH_BITS + slot - 1,
-            slot_end = slot - 1,
+            located_end = located_bits(x) - 1,
             log_end = LOG_BITS - 1,
             log_bits = LOG_BITS,
             log2 = 2 * LOG_BITS,

@@ -1,10 +1,10 @@
 //! What a candidate's total is compared with: n·log2 Σp, and whether it may be taken at all.
 
-use dermis_golden::fixed::formats::{Formats, LOG_TABLE_BITS};
+use dermis_golden::fixed::formats::Formats;
 use dermis_golden::fixed::search::log2;
 use rust_hdl::prelude::*;
 
-use super::logarithm::{locate, table, LENGTH_BITS, LOG_BITS};
+use super::logarithm::{functions, located_bits, LOG_BITS};
 use super::sweep::{position_bits, square_bits, sweep_bits, unpack, Sweep};
 use crate::wire::{Wire, Word};
 
@@ -111,7 +111,6 @@ impl Logic for Weigh {
         let s = self.sums.width() / 9;
         let w = self.weights.width() / 9;
         let (p, q) = (position_bits(), square_bits());
-        let slot = LOG_TABLE_BITS as usize;
         // n·log2 Σp without a multiplier: one term for each bit of n.
         let terms: Vec<String> = (0..64)
             .filter(|bit| self._taxels >> bit & 1 == 1)
@@ -127,7 +126,7 @@ impl Logic for Weigh {
             .collect();
         Verilog::Custom(format!(
             "\
-{locate}{table}reg [{sweep_end}:0] held;
+{functions}reg [{sweep_end}:0] held;
 reg [{q_end}:0] held_radius;
 reg [1:0] row, row2, row3, row4;
 reg running;
@@ -162,29 +161,27 @@ generate
     wire [{s_end}:0] sum = row == 2'd0 ? sums[c * {s} +: {s}] : row == 2'd1 ? sums[(3 + c) * {s} +: {s}]
       : sums[(6 + c) * {s} +: {s}];
     reg [{s_end}:0] sum1;
-    reg [{found_end}:0] found2;
+    reg [{located_end}:0] located;
     reg [{log_end}:0] log;
     reg fits1, fits2, fits3;
     wire [{w_end}:0] product = {terms};
     always @(posedge clk) begin
       sum1 <= sum;
       fits1 <= !sum[{s_end}] && sum != {s}'d0 && distance[c * {q} +: {q}] <= held_radius;
-      found2 <= locate(sum1);
-      log <= {{found2[{found_end}:{slot}], fraction(found2[{slot_end}:0])}};
+      located <= locate(sum1);
+      log <= logarithm(located);
       {{fits3, fits2}} <= {{fits2, fits1}};
       if (valid[2]) begin
 {rows}      end
     end
   end
 endgenerate",
-            locate = locate("locate", s),
-            table = table("fraction"),
+            functions = functions(s),
             fields = unpack("held", "held_"),
             sweep_end = sweep_bits() - 1,
             s_end = s - 1,
             w_end = w - 1,
-            found_end = LENGTH_BITS + slot - 1,
-            slot_end = slot - 1,
+            located_end = located_bits(s) - 1,
             log_end = LOG_BITS - 1,
             p_end = p - 1,
             q_end = q - 1,

@@ -3,7 +3,7 @@
 use dermis_golden::fixed::normalise;
 use rust_hdl::prelude::*;
 
-use crate::primitives::count_bits;
+use crate::primitives::{by_leading_one, count_bits};
 use crate::wire::{Wire, Word};
 
 /// `start` takes the shift from `magnitude`; then one quad per cycle is shifted (`shifted`, one cycle later).
@@ -62,18 +62,14 @@ impl Logic for Normalise {
         let shifts: String = (0..4)
             .map(|lane| format!("  shifted[{lane} * {bits} +: {bits}] <= quad[{lane} * {bits} +: {bits}] << shift;\n"))
             .collect();
-        // The highest set bit comes last and wins.
-        let lengths: String = (0..bits - 1)
-            .map(|bit| format!("  if (magnitude[{bit}]) left = {shift_bits}'d{};\n", bits - 2 - bit))
-            .collect();
+        let left = by_leading_one("magnitude", 0..bits - 1, bits - 2, shift_bits, |bit| bits - 2 - bit);
         Verilog::Custom(format!(
             "\
-reg [{shift_end}:0] left;
-always @(*) begin
-  left = {shift_bits}'d{most};
-{lengths}end
+// Zeros stay zero, whatever the shift: as if the first place behind them were set.
+wire [{shift_end}:0] none = {{{shift_bits}{{!(|magnitude)}}}} & {shift_bits}'d{most};
+wire [{shift_end}:0] left = {left};
 always @(posedge clk) begin
-  if (start) shift <= left;
+  if (start) shift <= left | none;
 {shifts}end",
             shift_end = shift_bits - 1,
             most = bits - 1,
