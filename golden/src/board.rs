@@ -7,6 +7,7 @@
 //! | `device`, `package`, `speed_grade` | | as the place and route tool names them |
 //! | `input_clock_MHz` | MHz | oscillator on the board |
 //! | `clock_MHz` | MHz | the engine's clock: a design target until place and route has measured it |
+//! | `uart_baud` | bit/s | bit rate of the UART behind which the engine sits |
 //! | `multipliers`, `multiplier_bits` | , bits | signed multipliers and the width of their operands |
 //! | `block_rams`, `block_ram_shapes` | , [words, bits] | block RAMs and what one of them can be |
 //! | `distributed_words` | words | distributed RAM takes memories up to these: always; where block RAM is short |
@@ -38,6 +39,8 @@ pub struct Board {
     pub input_clock_MHz: f64,
     /// Clock of the engine, MHz, > 0.
     pub clock_MHz: f64,
+    /// Bit rate of the UART, bit/s, > 0.
+    pub uart_baud: u32,
     /// Multipliers.
     pub multipliers: u32,
     /// Width of a multiplier's signed operands.
@@ -104,6 +107,9 @@ impl Board {
         }
         if board.block_ram_shapes.is_empty() || board.block_ram_shapes.iter().flatten().any(|&size| size == 0) {
             return Err(invalid(format!("block_ram_shapes = {:?}: must be [words, bits]", board.block_ram_shapes)));
+        }
+        if board.uart_baud == 0 {
+            return Err(invalid("uart_baud = 0: must be positive".to_string()));
         }
         if board.multiplier_bits < 2 {
             return Err(invalid(format!("multiplier_bits = {}: must be at least 2", board.multiplier_bits)));

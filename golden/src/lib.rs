@@ -31,6 +31,7 @@ pub mod gauss;
 pub mod generator;
 pub mod influence;
 pub mod input;
+pub mod link;
 pub mod matrices;
 pub mod noise;
 pub mod paper;

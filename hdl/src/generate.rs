@@ -6,6 +6,7 @@ use dermis_golden::fixed::resources::Memory;
 use dermis_golden::fixed::send::{FLAG_CONDITION, FLAG_FOUND, FLAG_FRAMING, FLAG_NO_CONTACT};
 use dermis_golden::fixed::storage::word_bits;
 use dermis_golden::fixed::{Cycles, Model};
+use dermis_golden::link::c_header;
 use serde_json::json;
 use thiserror::Error;
 
@@ -43,7 +44,7 @@ pub struct GeneratedFile {
 pub struct Generated {
     /// Name of the top module.
     pub top: String,
-    /// `<top>.v`, memory files, `<top>.vlt`, `manifest.json`.
+    /// `<top>.v`, memory files, `<top>.vlt`, `manifest.json`, `dermis_link.h`.
     pub files: Vec<GeneratedFile>,
     /// The stages' streams.
     pub taps: Vec<Tap>,
@@ -78,6 +79,7 @@ pub fn generate(model: &Model) -> Result<Generated, HdlError> {
         file(format!("{top}.v"), verilog),
         file(format!("{top}.vlt"), include_str!("waivers.vlt").to_string()),
         file(MANIFEST.to_string(), format!("{manifest:#}\n")),
+        file("dermis_link.h".to_string(), c_header()),
     ];
     files.extend(engine.memory_files().into_iter().map(|(name, text)| file(name.to_string(), text)));
     Ok(Generated { top, files, taps: taps(model), manifest, usage })

@@ -1,0 +1,95 @@
+//! The link between a host and the engine on a board: what goes over the wire, byte by byte.
+//!
+//! It depends on no hardware: the host tool, the hardware description and the C header are made from the same
+//! definitions ([`payload`], [`Kind`]).
+//!
+#![doc = include_str!("link/format.md")]
+
+mod codes;
+mod format;
+mod header;
+mod identity;
+mod packet;
+mod payload;
+pub mod slip;
+mod sums;
+#[cfg(test)]
+mod tests;
+
+pub use codes::{beats_of_bytes, code_bytes, codes_of_bytes, codes_to_bytes, BEAT_BYTES};
+pub use format::markdown;
+pub use header::c_header;
+pub use identity::{scene_hash, LinkError};
+pub use packet::{Decoder, Packet, PacketError};
+pub use payload::{Beat, Counters, Field, Header, Identity, Sums};
+
+/// Version of the packets' meaning; a host refuses another one.
+pub const VERSION: u16 = 1;
+/// Bytes of a packet that are not payload: [`Header`] and CRC.
+pub const OVERHEAD: usize = Header::BYTES + CRC_BYTES;
+/// Bytes of the CRC-32 behind the payload.
+pub const CRC_BYTES: usize = 4;
+/// Set in the type of an answer, which is otherwise its request's.
+pub const ANSWER: u8 = 0x80;
+/// What a CRC-32 (reflected polynomial 0xEDB88320) over a packet and its own CRC always leaves, before the final inversion.
+pub const CRC_RESIDUE: u32 = 0xdebb_20e3;
+
+/// A packet's type.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(u8)]
+pub enum Kind {
+    /// Asks who the board is.
+    Identify = 0x01,
+    /// Asks for the counts of packets.
+    ReadCounters = 0x02,
+    /// A frame whose resultants are asked for.
+    FrameForResultants = 0x03,
+    /// A frame whose forces are asked for.
+    FrameForForces = 0x04,
+    /// Answers `Identify`.
+    Identity = 0x81,
+    /// Answers `ReadCounters`.
+    Counters = 0x82,
+    /// Answers `FrameForResultants`.
+    Resultants = 0x83,
+    /// Answers `FrameForForces`.
+    Forces = 0x84,
+}
+
+impl Kind {
+    /// All types, requests first.
+    pub const ALL: [Kind; 8] = [
+        Kind::Identify,
+        Kind::ReadCounters,
+        Kind::FrameForResultants,
+        Kind::FrameForForces,
+        Kind::Identity,
+        Kind::Counters,
+        Kind::Resultants,
+        Kind::Forces,
+    ];
+
+    /// The type of this number, if there is one.
+    pub fn of(number: u8) -> Option<Kind> {
+        Kind::ALL.into_iter().find(|kind| *kind as u8 == number)
+    }
+
+    /// The answer to a request; an answer stays itself.
+    pub fn answer(self) -> Kind {
+        Kind::of(self as u8 | ANSWER).unwrap_or(self)
+    }
+
+    /// Name as in the documentation and the C header.
+    pub fn name(self) -> &'static str {
+        match self {
+            Kind::Identify => "identify",
+            Kind::ReadCounters => "read_counters",
+            Kind::FrameForResultants => "frame_for_resultants",
+            Kind::FrameForForces => "frame_for_forces",
+            Kind::Identity => "identity",
+            Kind::Counters => "counters",
+            Kind::Resultants => "resultants",
+            Kind::Forces => "forces",
+        }
+    }
+}

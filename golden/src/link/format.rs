@@ -1,0 +1,79 @@
+//! The packets as a page of documentation, `format.md`; a test keeps the committed page equal.
+
+use std::fmt::Write as _;
+
+use super::payload::{Beat, Counters, Field, Header, Identity, Sums};
+use super::{slip, Kind, CRC_BYTES, VERSION};
+
+/// What a packet's payload is made of.
+pub(super) fn contents(kind: Kind) -> &'static str {
+    match kind {
+        Kind::Identify | Kind::ReadCounters => "nothing",
+        Kind::FrameForResultants | Kind::FrameForForces => {
+            "one code per taxel, row-major: little-endian two's complement in the fewest whole bytes that hold \
+             `input_bits`; the board ignores the bits above"
+        }
+        Kind::Identity => "identity",
+        Kind::Counters => "counters",
+        Kind::Resultants => "sums, then one beat per status beat",
+        Kind::Forces => "one beat per taxel, row-major, then one beat per status beat",
+    }
+}
+
+/// The page, in Markdown.
+pub fn markdown() -> String {
+    let mut text = format!(
+        "\
+# Packets, version {VERSION}
+
+All numbers are little-endian. On the wire a packet stands between two bytes 0x{end:02x} (SLIP, RFC 1055); in it 0x{end:02x} is
+0x{esc:02x} 0x{esc_end:02x} and 0x{esc:02x} is 0x{esc:02x} 0x{esc_esc:02x}. The UART has 8 data bits, no parity, one stop bit.
+
+| byte | size | packet |
+|---:|---:|---|
+",
+        end = slip::END,
+        esc = slip::ESC,
+        esc_end = slip::ESC_END,
+        esc_esc = slip::ESC_ESC,
+    );
+    let mut at = 0;
+    for field in Header::FIELDS {
+        row(&mut text, at, field);
+        at += field.bytes;
+    }
+    // Writing to a String cannot fail.
+    let _ = write!(
+        text,
+        "\
+| {at} | n | payload |
+| {at} + n | {CRC_BYTES} | CRC-32 of all before it: polynomial 0x04c11db7 reflected, start and final inversion 0xffffffff, as zlib's |
+
+The host asks, the board answers each request that it takes, frames in the order in which they came; an answer has its
+request's sequence number. A request that is damaged is dropped, counted and not answered. Up to three frames may be on their
+way at a time.
+
+| type | from | packet | payload |
+|---:|---|---|---|
+"
+    );
+    for kind in Kind::ALL {
+        let from = if kind.answer() == kind { "board" } else { "host" };
+        let _ = writeln!(text, "| 0x{:02x} | {from} | {} | {} |", kind as u8, kind.name(), contents(kind));
+    }
+    for (name, fields) in
+        [("identity", Identity::FIELDS), ("counters", Counters::FIELDS), ("sums", Sums::FIELDS), ("beat", Beat::FIELDS)]
+    {
+        let _ = write!(text, "\n| byte | size | {name} |\n|---:|---:|---|\n");
+        let mut at = 0;
+        for field in fields {
+            row(&mut text, at, field);
+            at += field.bytes;
+        }
+    }
+    text + "\nThe status beats are described with stage [`send`](crate::fixed::send).\n"
+}
+
+fn row(text: &mut String, at: usize, field: &Field) {
+    let _ = writeln!(text, "| {at} | {} | `{}`, {}: {} |", field.bytes, field.name, field.kind, field.about.trim());
+}

@@ -1,0 +1,109 @@
+//! Which scene a bitstream was made for.
+
+use serde_json::json;
+use thiserror::Error;
+
+use super::payload::{Identity, Sums};
+use super::{code_bytes, BEAT_BYTES, VERSION};
+use crate::fixed::coefficients::Blocks;
+use crate::fixed::send::STATUS_BEATS;
+use crate::fixed::Model;
+use crate::scene::Condition;
+
+/// Fewest clock cycles per bit: the receiver votes over three of them.
+const LEAST_CYCLES_PER_BIT: f64 = 8.0;
+
+/// Why a scene has no link.
+#[derive(Clone, Debug, PartialEq, Error)]
+pub enum LinkError {
+    /// A payload longer than its length field can say.
+    #[error("scene {scene}: {what} of {taxels} taxels take {bytes} bytes, a packet holds 65535")]
+    TooLong {
+        /// The scene's name.
+        scene: String,
+        /// What the payload is.
+        what: &'static str,
+        /// Taxels.
+        taxels: usize,
+        /// Bytes.
+        bytes: usize,
+    },
+    /// A bit rate that the board's clock cannot sample.
+    #[error("constraints/{board}.toml: uart_baud = {baud}: the clock of {clock_MHz} MHz takes at most {most:.0}")]
+    TooFast {
+        /// The board's name.
+        board: String,
+        /// Its bit rate.
+        baud: u32,
+        /// Its clock.
+        clock_MHz: f64,
+        /// The highest bit rate.
+        most: f64,
+    },
+}
+
+impl Identity {
+    /// The identity of the hardware of `model`.
+    ///
+    /// # Errors
+    /// An array whose packets would be too long, a bit rate too high for the clock.
+    pub fn of(model: &Model) -> Result<Identity, LinkError> {
+        let (sensor, board) = (&model.scene.sensor, &model.board);
+        let taxels = sensor.taxels();
+        let status = model.status_beats() * BEAT_BYTES;
+        let input_bits = model.formats.input_bits;
+        let payloads = [
+            ("codes", code_bytes(input_bits) * taxels),
+            ("forces", BEAT_BYTES * taxels + status),
+            ("resultants", Sums::BYTES + status),
+        ];
+        if let Some((what, bytes)) = payloads.into_iter().find(|(_, bytes)| *bytes > usize::from(u16::MAX)) {
+            return Err(LinkError::TooLong { scene: model.scene.name.clone(), what, taxels, bytes });
+        }
+        let most = board.clock_MHz * 1e6 / LEAST_CYCLES_PER_BIT;
+        if f64::from(board.uart_baud) > most {
+            let (name, clock_MHz) = (board.name.clone(), board.clock_MHz);
+            return Err(LinkError::TooFast { board: name, baud: board.uart_baud, clock_MHz, most });
+        }
+        // Rows, columns and subarrays are below the taxels, which are few enough for a packet.
+        Ok(Identity {
+            version: VERSION,
+            rows: sensor.rows as u16,
+            cols: sensor.cols as u16,
+            input_bits: input_bits as u8,
+            status_beats: STATUS_BEATS as u8,
+            scene: scene_hash(model),
+            clock_hz: (board.clock_MHz * 1e6).round() as u32,
+            baud: board.uart_baud,
+            subarrays: model.parts.len() as u16,
+            reserved: 0,
+        })
+    }
+}
+
+/// CRC-32 over everything that decides the bits of the answers: this program's version, array, subarrays, formats,
+/// condition, noise floor and threshold in codes, and the quantised matrices with the columns kept. The names of scene
+/// and board, and the clock, are not in it.
+pub fn scene_hash(model: &Model) -> u32 {
+    let sensor = &model.scene.sensor;
+    let text = json!({
+        "version": env!("CARGO_PKG_VERSION"),
+        "array": [sensor.rows, sensor.cols],
+        "subarrays": model.grid(),
+        "formats": model.formats,
+        "both_signs": model.scene.partition.condition == Condition::BothSigns,
+        "noise_floor": model.noise_floor,
+        "threshold": model.threshold,
+        "columns": model.storage.columns,
+    });
+    let mut hash = crc32fast::Hasher::new();
+    hash.update(text.to_string().as_bytes());
+    let quantised = &model.quantised;
+    let coefficients = |blocks: &Blocks, hash: &mut crc32fast::Hasher| {
+        blocks.parity.iter().flatten().for_each(|coefficient| hash.update(&coefficient.to_le_bytes()));
+    };
+    for blocks in [&quantised.inverse, &quantised.ax, &quantised.ay] {
+        coefficients(blocks, &mut hash);
+    }
+    hash.finalize()
+}
