@@ -6,7 +6,7 @@ use dermis_golden::fixed::resources::Memory;
 use dermis_golden::fixed::send::{FLAG_CONDITION, FLAG_FOUND, FLAG_FRAMING, FLAG_NO_CONTACT};
 use dermis_golden::fixed::storage::word_bits;
 use dermis_golden::fixed::{Cycles, Model};
-use dermis_golden::link::c_header;
+use dermis_golden::link::{c_header, LinkError};
 use serde_json::json;
 use thiserror::Error;
 
@@ -25,6 +25,19 @@ const MANIFEST: &str = "manifest.json";
 /// Why a model has no hardware.
 #[derive(Debug, Error)]
 pub enum HdlError {
+    /// The scene asks for less than a board's top can leave out.
+    #[error("{field} = {value}: a board without {what} is not available yet")]
+    Unsupported {
+        /// The scene's field.
+        field: &'static str,
+        /// Its value.
+        value: String,
+        /// What would be left out.
+        what: &'static str,
+    },
+    /// The scene has no link.
+    #[error(transparent)]
+    Link(#[from] LinkError),
     /// rust-hdl's checks of the description failed; a defect of this crate.
     #[error("internal: the hardware description does not pass its checks: {0}")]
     Check(String),
@@ -63,6 +76,18 @@ impl Generated {
     }
 }
 
+/// Whether the model has a board's top.
+pub(crate) fn check(model: &Model) -> Result<(), HdlError> {
+    if !model.searches() {
+        return Err(HdlError::Unsupported {
+            field: "search.mu_max",
+            value: model.scene.search.mu_max.to_string(),
+            what: "a μ search",
+        });
+    }
+    Ok(())
+}
+
 /// Generates the hardware of `model`. The same model always gives the same bytes.
 ///
 /// # Errors
@@ -71,7 +96,7 @@ pub fn generate(model: &Model) -> Result<Generated, HdlError> {
     let engine = design(model)?;
     let top = top_name(&model.scene.name);
     let file = |name: String, text: String| GeneratedFile { name, text };
-    let verilog = place(&engine.verilog(), model)?;
+    let verilog = place(&engine.verilog(), model, "")?;
     let usage = stages(model, &verilog);
     let manifest = manifest(model, &top, &usage);
     let verilog = header(model, &top) + &rename(&verilog, &top);
@@ -85,14 +110,15 @@ pub fn generate(model: &Model) -> Result<Generated, HdlError> {
     Ok(Generated { top, files, taps: taps(model), manifest, usage })
 }
 
-/// Marks every memory of the model with where the synthesiser is to put it.
-fn place(verilog: &str, model: &Model) -> Result<String, HdlError> {
+/// Marks every memory of the model with where the synthesiser is to put it; the engine's modules begin with `engine`.
+pub(crate) fn place(verilog: &str, model: &Model, engine: &str) -> Result<String, HdlError> {
     let mut placed = String::with_capacity(verilog.len());
     let mut module = "";
     let mut marked = 0;
     for line in verilog.lines() {
         if let Some(rest) = line.strip_prefix("module top$") {
-            module = rest.split('(').next().unwrap_or_default();
+            let name = rest.split('(').next().unwrap_or_default();
+            module = name.strip_prefix(engine).unwrap_or_default();
         }
         let own = model.resources.memories.iter().filter(|memory| memory.block == module);
         let declares = |memory: &&Memory| {
@@ -114,13 +140,13 @@ fn place(verilog: &str, model: &Model) -> Result<String, HdlError> {
 }
 
 /// `dermis_` and the scene's name, with everything but letters and digits as underscores.
-fn top_name(scene: &str) -> String {
+pub(crate) fn top_name(scene: &str) -> String {
     let tame = |c: char| if c.is_ascii_alphanumeric() { c } else { '_' };
     format!("dermis_{}", scene.chars().map(tame).collect::<String>())
 }
 
 /// rust-hdl calls every top module `top` and all others `top$…`.
-fn rename(verilog: &str, top: &str) -> String {
+pub(crate) fn rename(verilog: &str, top: &str) -> String {
     let trimmed: String = verilog.lines().map(|line| line.trim_end().to_string() + "\n").collect();
     trimmed
         .replace("top$", &format!("{top}$"))

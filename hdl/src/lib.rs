@@ -17,6 +17,7 @@ pub mod device;
 pub mod engine;
 pub mod estimate;
 pub mod explain;
+pub mod link;
 pub mod primitives;
 pub mod stages;
 pub mod unsearched;

@@ -11,7 +11,7 @@ use crate::wire::Word;
 use crate::{engine, unsearched};
 
 /// Update rounds after which signals that still change are taken for a combinational loop.
-const SETTLE_ROUNDS: usize = 200;
+pub(crate) const SETTLE_ROUNDS: usize = 200;
 
 /// What every engine does in a simulation and in generation, whatever its stages.
 pub(crate) trait Design: Block {

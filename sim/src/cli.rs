@@ -20,8 +20,8 @@ use dermis_golden::quantise::full_scale;
 use dermis_golden::reconstruct::{Golden, Reconstruction};
 use dermis_golden::scene::{ObjectiveKind, Scene};
 use dermis_hdl::explain::explain;
-use dermis_hdl::generate;
-use dermis_hdl::HdlError;
+use dermis_hdl::link::generate_board;
+use dermis_hdl::{generate, HdlError};
 
 use crate::compare::{compared, difference};
 use crate::fresh::Fresh;
@@ -78,9 +78,10 @@ enum Command {
         json: bool,
     },
     /// Generate the hardware of a scene.
-    #[command(after_help = "Example:
+    #[command(after_help = "Examples:
   dermis build sensor-1 --out rtl
-  dermis build sensor-4 --explain")]
+  dermis build sensor-4 --explain
+  dermis build sensor-1 --board                      with UART and packets, ready for place and route")]
     Build {
         /// Built-in name or path of a scene.
         scene: String,
@@ -90,6 +91,9 @@ enum Command {
         /// Print what the scene needs, what is left out, and what that saves.
         #[arg(long)]
         explain: bool,
+        /// The whole board, the engine behind its UART, in place of the engine alone.
+        #[arg(long)]
+        board: bool,
     },
     /// Compare simulated hardware with the bit-true model, stage by stage and cycle by cycle.
     #[command(after_help = "Examples:
@@ -238,10 +242,11 @@ fn run(arguments: &Arguments) -> Result<(String, bool)> {
             }
             Ok((text, true))
         }
-        Command::Build { scene, out, explain } => {
+        Command::Build { scene, out, explain, board } => {
             let scene = Scene::load(scene)?;
-            let out = out.clone().unwrap_or_else(|| build_dir.join(&scene.name).join("rtl"));
-            Ok((build(&scene, &out, *explain)?, true))
+            let folder = if *board { "board" } else { "rtl" };
+            let out = out.clone().unwrap_or_else(|| build_dir.join(&scene.name).join(folder));
+            Ok((build(&scene, &out, *board, *explain)?, true))
         }
         Command::Cosim { scene, frames, json, device } => {
             let (scene, frames) = resolve(scene.as_deref(), frames)?;
@@ -345,9 +350,9 @@ fn against_golden(scene: &Scene, frames: &[Frame], result: &Reconstruction) -> R
 }
 
 /// Writes the generated files, each complete or not at all, and lists them.
-fn build(scene: &Scene, out: &Path, with_features: bool) -> Result<String> {
+fn build(scene: &Scene, out: &Path, board: bool, with_features: bool) -> Result<String> {
     let model = Model::new(scene)?;
-    let mut generated = generate(&model)?;
+    let mut generated = if board { generate_board(&model)? } else { generate(&model)? };
     let explained = explain(&model)?;
     generated.add_explained(&explained);
     std::fs::create_dir_all(out).map_err(|e| anyhow!("{}: {e}", out.display()))?;

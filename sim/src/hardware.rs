@@ -12,9 +12,11 @@ use dermis_golden::fixed::Model;
 use dermis_golden::frame::Frame;
 use dermis_golden::reconstruct::Reconstruction;
 use dermis_hdl::device::Device;
+use dermis_hdl::link::{board_simulator, generate_board, BoardDevice};
 use dermis_hdl::{generate, simulator, Generated};
 use thiserror::Error;
 
+use crate::board::VerilatedBoard;
 use crate::cosim::Vector;
 use crate::drive::{record, Play, Stimulus};
 use crate::verilator::{Design, Verilated, VerilatorError};
@@ -93,6 +95,17 @@ impl Hardware {
             input_bits: self.model.formats.code_bits,
         };
         Verilated::new(&design, &self.cache)
+    }
+
+    /// Starts a simulation of the whole board.
+    ///
+    /// # Errors
+    /// As [`Hardware::device`]; a scene whose board has no link.
+    pub fn board(&self, simulator: Simulator) -> Result<Box<dyn BoardDevice>> {
+        Ok(match simulator {
+            Simulator::Verilator => Box::new(VerilatedBoard::new(&generate_board(&self.model)?, &self.cache)?),
+            Simulator::RustHdl => board_simulator(&self.model)?,
+        })
     }
 
     /// Stage names of the taps, in the order of a device's outputs.

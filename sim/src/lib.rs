@@ -15,6 +15,7 @@
 //! | [`cosim`] | compares a recording with the bit-true model |
 //! | [`fresh`] | frames of drawn contacts for `dermis table --fresh` |
 //! | [`mod@generate`] | `dermis generate`: frames with known forces from described contacts |
+//! | [`board`] | a board's UART, simulated, on a pseudo-terminal |
 //! | [`hardware`] | a scene's generated hardware and its simulators |
 //! | [`compare`] | how far two force fields are apart |
 //! | [`verify`] | one scene's frames through all three models |
@@ -26,6 +27,7 @@
 #![allow(non_snake_case)]
 
 pub mod bench;
+pub mod board;
 pub mod cli;
 pub mod compare;
 pub mod cosim;

@@ -83,9 +83,8 @@ pub struct Design<'a> {
     pub input_bits: u32,
 }
 
-/// A running verilated design.
-pub struct Verilated {
-    layout: Layout,
+/// A running verilated design, its pins still packed into two vectors.
+pub(crate) struct Bench {
     handle: *mut c_void,
     cycle: unsafe extern "C" fn(*mut c_void, u64, *mut u32),
     free: unsafe extern "C" fn(*mut c_void),
@@ -94,14 +93,13 @@ pub struct Verilated {
     _library: Library,
 }
 
-impl Verilated {
-    /// Builds `design`, or takes it from `cache` (usually `build/verilator`), and starts it.
-    ///
-    /// # Errors
-    /// [`VerilatorError`]: no Verilator, a design it refuses, or files that cannot be written.
-    pub fn new(design: &Design, cache: &Path) -> Result<Self, VerilatorError> {
-        let layout = Layout::new(design.input_bits, design.taps);
-        let path = library(design, &layout, cache)?;
+// SAFETY: nothing else has the handle, and the library keeps no state of a running model outside it.
+unsafe impl Send for Bench {}
+
+impl Bench {
+    /// Builds the design in its `bench` (Verilog text), or takes it from `cache`, and starts it; `out` has `words` words.
+    pub(crate) fn new(design: &Design, bench: &str, words: usize, cache: &Path) -> Result<Self, VerilatorError> {
+        let path = library(design, bench, cache)?;
         let fail = |reason: String| VerilatorError::Library { path: path.clone(), reason };
         // SAFETY: the library was built from this module's shim, whose symbols have these types and
         // whose constructors have no side effects; the layout is checked before the first cycle.
@@ -113,30 +111,52 @@ impl Verilated {
                 *library.get::<extern "C" fn(*const c_char, i32) -> *mut c_void>(b"dermis_new").map_err(symbol)?;
             let cycle = *library.get(b"dermis_cycle").map_err(symbol)?;
             let free = *library.get(b"dermis_free").map_err(symbol)?;
-            if bytes() as usize != 4 * layout.out_words() {
-                return Err(fail(format!("{} output bytes, {} expected", bytes(), 4 * layout.out_words())));
+            if bytes() as usize != 4 * words {
+                return Err(fail(format!("{} output bytes, {} expected", bytes(), 4 * words)));
             }
             let memories = memory_folder(design)?;
             let folder = CString::new(memories.path().to_string_lossy().as_bytes()).map_err(|e| fail(e.to_string()))?;
             let handle = start(folder.as_ptr(), RESET_SEED);
-            let words = vec![0; layout.out_words()];
-            Ok(Verilated { layout, handle, cycle, free, words, _library: library })
+            Ok(Bench { handle, cycle, free, words: vec![0; words], _library: library })
         }
+    }
+
+    /// One clock cycle: `in` applied, `out` sampled before the rising edge.
+    pub(crate) fn cycle(&mut self, inputs: u64) -> &[u32] {
+        // SAFETY: `handle` lives until drop, `words` has the length checked in `new`.
+        unsafe { (self.cycle)(self.handle, inputs, self.words.as_mut_ptr()) };
+        &self.words
+    }
+}
+
+impl Drop for Bench {
+    fn drop(&mut self) {
+        // SAFETY: the only call, with the handle that `dermis_new` returned.
+        unsafe { (self.free)(self.handle) };
+    }
+}
+
+/// A running verilated engine.
+pub struct Verilated {
+    layout: Layout,
+    bench: Bench,
+}
+
+impl Verilated {
+    /// Builds `design`, or takes it from `cache` (usually `build/verilator`), and starts it.
+    ///
+    /// # Errors
+    /// [`VerilatorError`]: no Verilator, a design it refuses, or files that cannot be written.
+    pub fn new(design: &Design, cache: &Path) -> Result<Self, VerilatorError> {
+        let layout = Layout::new(design.input_bits, design.taps);
+        let bench = Bench::new(design, &layout.verilog(design.top), layout.out_words(), cache)?;
+        Ok(Verilated { layout, bench })
     }
 }
 
 impl Device for Verilated {
     fn cycle(&mut self, inputs: &Inputs) -> Outputs {
-        // SAFETY: `handle` lives until drop, `words` has the length checked in `new`.
-        unsafe { (self.cycle)(self.handle, self.layout.pack(inputs), self.words.as_mut_ptr()) };
-        self.layout.unpack(&self.words)
-    }
-}
-
-impl Drop for Verilated {
-    fn drop(&mut self) {
-        // SAFETY: the only call, with the handle that `dermis_new` returned.
-        unsafe { (self.free)(self.handle) };
+        self.layout.unpack(self.bench.cycle(self.layout.pack(inputs)))
     }
 }
 
@@ -167,12 +187,11 @@ fn is_source(name: &str) -> bool {
 static BUILDING: Mutex<()> = Mutex::new(());
 
 /// Path of the design's library, built when the cache does not hold it.
-fn library(design: &Design, layout: &Layout, cache: &Path) -> Result<PathBuf, VerilatorError> {
+fn library(design: &Design, bench: &str, cache: &Path) -> Result<PathBuf, VerilatorError> {
     let mut sources: Vec<(&str, &str)> = design.files.iter().filter(|(name, _)| is_source(name)).copied().collect();
-    let bench = layout.verilog(design.top);
     // Verilator applies a waiver only to what it reads afterwards.
     sources.sort_by_key(|(name, _)| !name.ends_with(".vlt"));
-    sources.extend([("bench.v", bench.as_str()), ("shim.cpp", SHIM)]);
+    sources.extend([("bench.v", bench), ("shim.cpp", SHIM)]);
     let folder = cache.join(fingerprint(&sources, &version()?));
     let ready = folder.join("libbench.so");
     let _one = BUILDING.lock().unwrap_or_else(std::sync::PoisonError::into_inner);

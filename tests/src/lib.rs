@@ -8,6 +8,7 @@
 //! | `resources` | block RAMs and multipliers as Yosys counts them, flip-flops and LUTs near |
 //! | `explain` | what is left out is not in the Verilog, and what that saves; refusals name what fits |
 //! | `framing` | early and missing `tlast`: what is dropped, what is flagged, and equality right after |
+//! | `link` | the board's UART: answers, counters, recovery; Verilator = rust-hdl, pin by pin |
 //! | `synthesis` | Yosys reads the Verilog without latch or undriven signal |
 //! | `scenes` | the same equality for scenes of other shapes, degrees, words and conditions |
 //! | `scale` | the largest array, and a thousand random frames with stalls on both streams |

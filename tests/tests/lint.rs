@@ -5,6 +5,7 @@ use std::path::Path;
 use std::process::Command;
 
 use dermis_golden::fixed::Model;
+use dermis_hdl::link::generate_board;
 use dermis_hdl::{generate, Generated};
 use dermis_tests::{scene, SCENES};
 
@@ -44,5 +45,14 @@ fn generated_verilog_is_clean_and_needs_each_waiver() {
             generated.files[index].text = without.collect::<Vec<_>>().join("\n") + "\n";
             assert!(lint(folder.path(), &generated).is_err(), "{name}: nothing needs: {line}");
         }
+    }
+}
+
+#[test]
+fn a_board_is_clean_with_the_engines_waivers() {
+    for (name, _) in SCENES {
+        let generated = generate_board(&Model::new(&scene(name).0).unwrap()).unwrap();
+        let folder = tempfile::tempdir().unwrap();
+        lint(folder.path(), &generated).unwrap_or_else(|log| panic!("{name}: {log}"));
     }
 }

@@ -3,13 +3,12 @@
 use std::process::Command;
 
 use dermis_golden::fixed::Model;
-use dermis_hdl::generate;
+use dermis_hdl::link::generate_board;
+use dermis_hdl::{generate, Generated};
 use dermis_tests::scene;
 
-#[test]
-fn yosys_finds_clean_hardware() {
-    let (scene, _) = scene("eight-by-eight");
-    let generated = generate(&Model::new(&scene).unwrap()).unwrap();
+/// Reads the Verilog, with every part of the design flattened into one module.
+fn read(generated: &Generated) {
     let folder = tempfile::tempdir().unwrap();
     for file in &generated.files {
         std::fs::write(folder.path().join(&file.name), &file.text).unwrap();
@@ -25,6 +24,13 @@ fn yosys_finds_clean_hardware() {
         .output()
         .expect("yosys is installed (make setup)");
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+}
+
+#[test]
+fn yosys_finds_clean_hardware() {
+    let model = Model::new(&scene("eight-by-eight").0).unwrap();
+    read(&generate(&model).unwrap());
+    read(&generate_board(&model).unwrap());
 }
 
 #[test]

@@ -1,0 +1,98 @@
+//! What a person sees.
+
+use rust_hdl::prelude::*;
+
+/// `alive` changes with the clock, about once a second; `busy` and `error` stay lit for a sixteenth of that after what
+/// they show.
+#[derive(LogicBlock)]
+pub struct Lamps {
+    /// Clock.
+    pub clk: Signal<In, Clock>,
+    /// Reset.
+    pub rst: Signal<In, Bit>,
+    /// A packet comes or is being answered.
+    pub activity: Signal<In, Bit>,
+    /// A packet was dropped.
+    pub dropped: Signal<In, Bit>,
+    /// The clock runs.
+    pub alive: Signal<Out, Bit>,
+    /// There is something to do.
+    pub busy: Signal<Out, Bit>,
+    /// Something went wrong.
+    pub error: Signal<Out, Bit>,
+    _bits: u32,
+    _count: u32,
+    _lit: [u32; 2],
+}
+
+/// A light's time is this power of two shorter than the blinking.
+const SHORTER: u32 = 4;
+
+impl Lamps {
+    /// For a clock of `clock_hz`.
+    pub fn new(clock_hz: u32) -> Self {
+        Lamps {
+            clk: Default::default(),
+            rst: Default::default(),
+            activity: Default::default(),
+            dropped: Default::default(),
+            alive: Default::default(),
+            busy: Default::default(),
+            error: Default::default(),
+            _bits: clock_hz.ilog2().max(SHORTER + 2),
+            _count: 0,
+            _lit: [0; 2],
+        }
+    }
+}
+
+impl Logic for Lamps {
+    fn update(&mut self) {
+        if self.clk.pos_edge() {
+            self._count = (self._count + 1) & ((1 << self._bits) - 1);
+            let all = (1 << (self._bits - SHORTER)) - 1;
+            for (lit, event) in self._lit.iter_mut().zip([self.activity.val(), self.dropped.val()]) {
+                *lit = if event { all } else { lit.saturating_sub(1) };
+            }
+            if self.rst.val() {
+                (self._count, self._lit) = (0, [0; 2]);
+            }
+        }
+        self.alive.next = self._count >> (self._bits - 1) == 1;
+        self.busy.next = self._lit[0] != 0;
+        self.error.next = self._lit[1] != 0;
+    }
+
+    fn connect(&mut self) {
+        self.alive.connect();
+        self.busy.connect();
+        self.error.connect();
+    }
+
+    fn hdl(&self) -> Verilog {
+        let (bits, lit) = (self._bits, self._bits - SHORTER);
+        let light = |name: &str, event: &str| {
+            format!(
+                "  if (rst) {name}_left <= {lit}'d0;\n  else if ({event}) {name}_left <= {{{lit}{{1'b1}}}};\n  \
+                 else if ({name}) {name}_left <= {name}_left - {lit}'d1;\n"
+            )
+        };
+        Verilog::Custom(format!(
+            "\
+reg [{end}:0] count;
+reg [{lit_end}:0] busy_left, error_left;
+always @(*) begin
+  alive = count[{end}];
+  busy = busy_left != {lit}'d0;
+  error = error_left != {lit}'d0;
+end
+always @(posedge clk) begin
+  count <= rst ? {bits}'d0 : count + {bits}'d1;
+{busy}{error}end",
+            end = bits - 1,
+            lit_end = lit - 1,
+            busy = light("busy", "activity"),
+            error = light("error", "dropped"),
+        ))
+    }
+}

@@ -1,0 +1,82 @@
+//! The engine behind a link: what a host on the other end of a wire talks to.
+//!
+//! ```text
+//!              .------------------------- packet_link ---------------------------.
+//! uart_rx ---> uart_receiver -> slip_decoder -> parser -> feeder ----------> s_axis |
+//!              |                                  '-> requests                engine
+//! uart_tx <--- uart_transmitter <- slip_encoder <- packer <- sources <- resultants <- m_axis
+//! ```
+//! The packets are those of [`dermis_golden::link`]. Whatever carries bytes both ways can stand where the UART stands.
+
+mod board_top;
+mod crc;
+mod feeder;
+mod generate;
+mod lamps;
+mod packer;
+mod packet_link;
+mod parser;
+mod phase;
+mod power_on;
+mod requests;
+mod resultants;
+mod simulate;
+mod slip_decoder;
+mod slip_encoder;
+mod sources;
+mod tally;
+mod uart_receiver;
+mod uart_transmitter;
+
+pub use board_top::BoardTop;
+pub use feeder::Feeder;
+pub use generate::generate_board;
+pub use lamps::Lamps;
+pub use packer::Packer;
+pub use packet_link::PacketLink;
+pub use parser::Parser;
+pub use power_on::PowerOn;
+pub use requests::Requests;
+pub use resultants::Resultants;
+pub use simulate::{board_simulator, BoardDevice, BoardOutputs};
+pub use slip_decoder::SlipDecoder;
+pub use slip_encoder::SlipEncoder;
+pub use sources::Sources;
+pub use tally::Tally;
+pub use uart_receiver::UartReceiver;
+pub use uart_transmitter::UartTransmitter;
+
+use dermis_golden::fixed::Model;
+
+/// What the packets of a scene need to know of it.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Shape {
+    /// Rows of the array.
+    pub rows: usize,
+    /// Columns of the array.
+    pub cols: usize,
+    /// Bits of a code.
+    pub input_bits: u32,
+    /// Status beats of a frame.
+    pub status_beats: usize,
+}
+
+impl Shape {
+    /// The shape of a scene.
+    pub fn of(model: &Model) -> Self {
+        let sensor = &model.scene.sensor;
+        let (input_bits, status_beats) = (model.formats.input_bits, model.status_beats());
+        Shape { rows: sensor.rows, cols: sensor.cols, input_bits, status_beats }
+    }
+}
+
+/// Source of an answer: the identity. Sources are numbered as the requests' types, from 0.
+const IDENTITY: usize = 0;
+/// The counters.
+const COUNTERS: usize = 1;
+/// The engine, summed up.
+const RESULTANTS: usize = 2;
+/// The engine, all forces.
+const FORCES: usize = 3;
+/// Words of twelve bytes in the identity.
+const IDENTITY_WORDS: usize = 2;

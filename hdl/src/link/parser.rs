@@ -1,0 +1,222 @@
+//! From the bytes of packets to requests: header, length, CRC.
+
+use dermis_golden::link::{Kind, CRC_RESIDUE, OVERHEAD};
+use rust_hdl::prelude::*;
+
+use super::crc::{step, FUNCTION, START};
+use crate::wire::{Wire, Word};
+
+/// Judges each packet when it ends. `good` or `bad` is high for one cycle, one cycle after the end; `kind` and `number`
+/// stand until the next packet's header. Nothing between two ends is no packet.
+///
+/// A frame's payload goes on while it comes: `begin` when its header is complete and right, then `payload` with each
+/// byte, in the same cycle.
+#[derive(LogicBlock)]
+pub struct Parser {
+    /// Clock.
+    pub clk: Signal<In, Clock>,
+    /// Reset.
+    pub rst: Signal<In, Bit>,
+    /// A byte of a packet.
+    pub content: Wire<In>,
+    /// It came in this cycle.
+    pub content_valid: Signal<In, Bit>,
+    /// The packet is over.
+    pub packet_end: Signal<In, Bit>,
+    /// The packet has lost a byte.
+    pub spoiled: Signal<In, Bit>,
+    /// A frame of the right length begins.
+    pub frame_begin: Signal<Out, Bit>,
+    /// The byte is one of its payload.
+    pub payload: Signal<Out, Bit>,
+    /// The packet may be taken.
+    pub good: Signal<Out, Bit>,
+    /// The packet is dropped.
+    pub bad: Signal<Out, Bit>,
+    /// Why, one bit each: framing, CRC, unknown type, length; with `bad`.
+    pub fault: Wire<Out>,
+    /// The packet's type.
+    pub kind: Wire<Out>,
+    /// The packet's sequence number.
+    pub number: Wire<Out>,
+    _frame_bytes: u32,
+    _state: State,
+}
+
+#[derive(Clone, Copy, Debug)]
+struct State {
+    count: u32,
+    crc: u32,
+    kind: u8,
+    number: u8,
+    length: u32,
+    spoiled: bool,
+    streaming: bool,
+    good: bool,
+    fault: u32,
+}
+
+/// Width of the count of bytes; it stays at its largest value.
+const COUNT_BITS: u32 = 17;
+const MOST: u32 = (1 << COUNT_BITS) - 1;
+const FRAME_KINDS: [u8; 2] = [Kind::FrameForResultants as u8, Kind::FrameForForces as u8];
+const PLAIN_KINDS: [u8; 2] = [Kind::Identify as u8, Kind::ReadCounters as u8];
+
+impl Parser {
+    /// For frames whose payload has `frame_bytes` bytes, at most 65535.
+    pub fn new(frame_bytes: usize) -> Self {
+        let blank = State {
+            count: 0,
+            crc: START,
+            kind: 0,
+            number: 0,
+            length: 0,
+            spoiled: false,
+            streaming: false,
+            good: false,
+            fault: 0,
+        };
+        Parser {
+            clk: Default::default(),
+            rst: Default::default(),
+            content: Wire::new(8),
+            content_valid: Default::default(),
+            packet_end: Default::default(),
+            spoiled: Default::default(),
+            frame_begin: Default::default(),
+            payload: Default::default(),
+            good: Default::default(),
+            bad: Default::default(),
+            fault: Wire::new(4),
+            kind: Wire::new(8),
+            number: Wire::new(8),
+            _frame_bytes: frame_bytes as u32,
+            _state: blank,
+        }
+    }
+
+    /// Whether the packet may be taken, and else what is wrong with it; neither where there is none.
+    fn judge(&self) -> (bool, u32) {
+        let s = self._state;
+        let frame = FRAME_KINDS.contains(&s.kind);
+        if s.spoiled {
+            (false, 0b0001)
+        } else if s.count == 0 {
+            (false, 0)
+        } else if s.count < OVERHEAD as u32 || s.crc != CRC_RESIDUE {
+            (false, 0b0010)
+        } else if !frame && !PLAIN_KINDS.contains(&s.kind) {
+            (false, 0b0100)
+        } else if s.count != s.length + OVERHEAD as u32 || s.length != if frame { self._frame_bytes } else { 0 } {
+            (false, 0b1000)
+        } else {
+            (true, 0)
+        }
+    }
+
+    /// A frame's header is complete with the byte of this cycle.
+    fn begins(&self) -> bool {
+        let s = self._state;
+        let length = s.length | (self.content.val().number() as u32) << 8;
+        let whole = self.content_valid.val() && s.count == 3;
+        whole && FRAME_KINDS.contains(&s.kind) && length == self._frame_bytes
+    }
+
+    fn next(&self) -> State {
+        let mut s = State { good: false, fault: 0, ..self._state };
+        let data = self.content.val().number() as u8;
+        s.spoiled |= self.spoiled.val();
+        if self.packet_end.val() {
+            (s.good, s.fault) = self.judge();
+            (s.count, s.crc, s.spoiled, s.streaming) = (0, START, false, false);
+        } else if self.content_valid.val() {
+            match s.count {
+                0 => s.kind = data,
+                1 => s.number = data,
+                2 => s.length = u32::from(data),
+                3 => s.length |= u32::from(data) << 8,
+                _ => (),
+            }
+            s.streaming |= self.begins();
+            s.crc = step(s.crc, data);
+            s.count = (s.count + 1).min(MOST);
+        }
+        if self.rst.val() {
+            (s.count, s.crc, s.spoiled, s.streaming, s.good, s.fault) = (0, START, false, false, false, 0);
+        }
+        s
+    }
+}
+
+impl Logic for Parser {
+    fn update(&mut self) {
+        if self.clk.pos_edge() {
+            self._state = self.next();
+        }
+        let s = &self._state;
+        self.frame_begin.next = self.begins();
+        self.payload.next = self.content_valid.val() && s.streaming && s.count < self._frame_bytes + 4;
+        self.good.next = s.good;
+        self.bad.next = s.fault != 0;
+        self.fault.next = Word::from(u64::from(s.fault));
+        self.kind.next = Word::from(u64::from(s.kind));
+        self.number.next = Word::from(u64::from(s.number));
+    }
+
+    fn connect(&mut self) {
+        for bit in [&mut self.frame_begin, &mut self.payload, &mut self.good, &mut self.bad] {
+            bit.connect();
+        }
+        for wire in [&mut self.fault, &mut self.kind, &mut self.number] {
+            wire.connect();
+        }
+    }
+
+    fn hdl(&self) -> Verilog {
+        let [frame_0, frame_1] = FRAME_KINDS;
+        let [plain_0, plain_1] = PLAIN_KINDS;
+        Verilog::Custom(format!(
+            "\
+{FUNCTION}reg [{c_end}:0] count;
+reg [31:0] crc;
+reg [15:0] length;
+reg lost, streaming;
+wire frame = kind == 8'd{frame_0} || kind == 8'd{frame_1};
+wire plain = kind == 8'd{plain_0} || kind == 8'd{plain_1};
+wire wrong_crc = count < {c}'d{OVERHEAD} || crc != 32'h{CRC_RESIDUE:x};
+wire wrong_length = count != {{1'b0, length}} + {c}'d{OVERHEAD} || length != (frame ? 16'd{bytes} : 16'd0);
+wire empty = count == {c}'d0 && !lost;
+always @(*) begin
+  frame_begin = content_valid && count == {c}'d3 && frame && {{content, length[7:0]}} == 16'd{bytes};
+  payload = content_valid && streaming && count < {c}'d{payload_end};
+  bad = fault != 4'd0;
+end
+always @(posedge clk) begin
+  good <= !rst && packet_end && !empty && !lost && !wrong_crc && (frame || plain) && !wrong_length;
+  fault <= rst || !packet_end || empty ? 4'd0 : lost ? 4'd1 : wrong_crc ? 4'd2 : !frame && !plain ? 4'd4
+    : wrong_length ? 4'd8 : 4'd0;
+  if (rst || packet_end) begin
+    count <= {c}'d0;
+    crc <= 32'h{START:x};
+    lost <= 1'b0;
+    streaming <= 1'b0;
+  end else begin
+    if (spoiled) lost <= 1'b1;
+    if (content_valid) begin
+      if (count == {c}'d0) kind <= content;
+      if (count == {c}'d1) number <= content;
+      if (count == {c}'d2) length <= {{8'd0, content}};
+      if (count == {c}'d3) length[15:8] <= content;
+      if (frame_begin) streaming <= 1'b1;
+      crc <= step(crc, content);
+      if (count != {c}'d{MOST}) count <= count + {c}'d1;
+    end
+  end
+end",
+            c = COUNT_BITS,
+            c_end = COUNT_BITS - 1,
+            bytes = self._frame_bytes,
+            payload_end = self._frame_bytes + 4,
+        ))
+    }
+}

@@ -1,0 +1,258 @@
+//! From the engine's beats to a packet's words: all of them, or sums and status.
+
+use rust_hdl::prelude::*;
+
+use super::super::primitives::count_bits;
+use super::Shape;
+use crate::wire::{Wire, Word};
+use dermis_golden::link::Sums;
+
+/// While `run`, beats pass as words; with `summarise`, the forces are added up as they pass, and the sums go out as four
+/// words before the status. No multiplier: where Σ column · fz is asked for, the sum of what lies left of each taxel is
+/// subtracted, and at the end Σ fz is added columns − 1 times, one per cycle; rows alike.
+#[derive(LogicBlock)]
+pub struct Resultants {
+    /// Clock.
+    pub clk: Signal<In, Clock>,
+    /// Reset.
+    pub rst: Signal<In, Bit>,
+    /// An answer to a frame is being sent, and its next word awaited.
+    pub run: Signal<In, Bit>,
+    /// The answer is the sums; as long as the answer takes.
+    pub summarise: Signal<In, Bit>,
+    /// A beat of the engine.
+    pub beat: Wire<In>,
+    /// It is offered.
+    pub beat_valid: Signal<In, Bit>,
+    /// It is its frame's last.
+    pub beat_last: Signal<In, Bit>,
+    /// It is taken.
+    pub beat_ready: Signal<Out, Bit>,
+    /// A word of the payload.
+    pub word: Wire<Out>,
+    /// It stands; taken in the same cycle.
+    pub word_valid: Signal<Out, Bit>,
+    /// It is the payload's last.
+    pub word_last: Signal<Out, Bit>,
+    _shape: Shape,
+    _bits: usize,
+    _state: State,
+}
+
+#[derive(Clone, Copy, Debug, Default)]
+struct State {
+    stage: usize,
+    row: usize,
+    col: usize,
+    more: usize,
+    out: usize,
+    line: i64,
+    sums: Sums,
+}
+
+const ADD: usize = 0;
+const FINISH: usize = 1;
+const OUT: usize = 2;
+const STATUS: usize = 3;
+/// Words of the sums.
+const WORDS: usize = 4;
+/// Sums.
+const COUNT: usize = 6;
+
+impl Resultants {
+    /// For arrays of `shape`.
+    pub fn new(shape: &Shape) -> Self {
+        Resultants {
+            clk: Default::default(),
+            rst: Default::default(),
+            run: Default::default(),
+            summarise: Default::default(),
+            beat: Wire::new(96),
+            beat_valid: Default::default(),
+            beat_last: Default::default(),
+            beat_ready: Default::default(),
+            word: Wire::new(96),
+            word_valid: Default::default(),
+            word_last: Default::default(),
+            // Every intermediate sum is at most the largest force word times taxels times the longer side.
+            _bits: 32 + count_bits(shape.rows * shape.cols + 1) + count_bits(shape.rows.max(shape.cols)),
+            _shape: shape.clone(),
+            _state: State::default(),
+        }
+    }
+
+    fn adds(&self) -> bool {
+        self.summarise.val() && self._state.stage == ADD
+    }
+
+    fn passes(&self) -> bool {
+        !self.summarise.val() || self._state.stage == STATUS
+    }
+
+    fn add(&mut self) {
+        let [fx, fy, fz] = [0, 1, 2].map(|axis| self.beat.val().signed(axis, 32));
+        let (rows, cols) = (self._shape.rows, self._shape.cols);
+        let s = &mut self._state;
+        if s.row == 0 && s.col == 0 {
+            s.sums = Sums::default();
+        }
+        if s.col == 0 {
+            s.sums.moment_y -= s.sums.fz;
+            s.line = fz;
+        } else {
+            s.sums.moment_x -= s.line;
+            s.line += fz;
+        }
+        s.sums.fx += fx;
+        s.sums.fy += fy;
+        s.sums.fz += fz;
+        s.sums.loaded += u64::from(fz != 0);
+        s.more = 0;
+        s.out = 0;
+        s.col += 1;
+        if s.col == cols {
+            (s.col, s.row) = (0, s.row + 1);
+        }
+        if s.row == rows {
+            (s.row, s.stage) = (0, FINISH);
+        }
+    }
+
+    fn advance(&mut self) {
+        let (rows, cols) = (self._shape.rows, self._shape.cols);
+        let takes = self.beat_ready.val() && self.beat_valid.val();
+        if self.adds() && takes {
+            self.add();
+        } else if self._state.stage == FINISH {
+            let s = &mut self._state;
+            s.sums.moment_x += if s.more + 1 < cols { s.sums.fz } else { 0 };
+            s.sums.moment_y += if s.more + 1 < rows { s.sums.fz } else { 0 };
+            s.more += 1;
+            if s.more == rows.max(cols) {
+                s.stage = OUT;
+            }
+        } else if self._state.stage == OUT && self.run.val() {
+            self._state.out += 1;
+            if self._state.out == WORDS {
+                self._state.stage = STATUS;
+            }
+        } else if self.passes() && takes && self.beat_last.val() {
+            self._state.stage = ADD;
+        }
+        if self.rst.val() {
+            (self._state.stage, self._state.row, self._state.col) = (ADD, 0, 0);
+        }
+    }
+}
+
+impl Logic for Resultants {
+    fn update(&mut self) {
+        if self.clk.pos_edge() {
+            self.advance();
+        }
+        let s = self._state;
+        self.beat_ready.next = self.run.val() && (self.adds() || self.passes());
+        self.word_valid.next = self.run.val() && if self.passes() { self.beat_valid.val() } else { s.stage == OUT };
+        self.word_last.next = self.passes() && self.beat_last.val();
+        self.word.next = if self.passes() {
+            self.beat.val()
+        } else {
+            let mut all = Word::default();
+            for (index, bytes) in s.sums.to_bytes().chunks(8).enumerate() {
+                let sum = bytes.iter().rev().fold(0, |sum, &byte| sum << 8 | u64::from(byte));
+                all.set(64 * index, 64, sum);
+            }
+            let mut word = Word::default();
+            word.set(0, 48, all.field(96 * s.out.min(WORDS - 1), 48));
+            word.set(48, 48, all.field(96 * s.out.min(WORDS - 1) + 48, 48));
+            word
+        };
+    }
+
+    fn connect(&mut self) {
+        for bit in [&mut self.beat_ready, &mut self.word_valid, &mut self.word_last] {
+            bit.connect();
+        }
+        self.word.connect();
+    }
+
+    fn hdl(&self) -> Verilog {
+        let (rows, cols, bits) = (self._shape.rows, self._shape.cols, self._bits);
+        let (r, c, m) = (count_bits(rows), count_bits(cols), count_bits(rows.max(cols)));
+        let l = count_bits(rows * cols + 1);
+        let sums: Vec<String> = ["moment_y", "moment_x", "sum_z", "sum_y", "sum_x"]
+            .iter()
+            .map(|sum| format!("{{{{{}{{{sum}[{}]}}}}, {sum}}}", 64 - bits, bits - 1))
+            .collect();
+        Verilog::Custom(format!(
+            "\
+reg [1:0] stage, out;
+reg [{r_end}:0] row;
+reg [{c_end}:0] col;
+reg [{m_end}:0] more;
+reg [{end}:0] sum_x, sum_y, sum_z, moment_x, moment_y, line;
+reg [{l_end}:0] loaded;
+wire [{end}:0] x = {{{{{wider}{{beat[31]}}}}, beat[31:0]}};
+wire [{end}:0] y = {{{{{wider}{{beat[63]}}}}, beat[63:32]}};
+wire [{end}:0] z = {{{{{wider}{{beat[95]}}}}, beat[95:64]}};
+wire [{all_end}:0] all = {{{l_more}'d0, loaded, {sums}}};
+wire passes = !summarise || stage == 2'd{STATUS};
+wire line_end = col == {c}'d{last_col};
+wire first = row == {r}'d0 && col == {c}'d0;
+always @(*) begin
+  beat_ready = run && (passes || stage == 2'd{ADD});
+  word_valid = run && (passes ? beat_valid : stage == 2'd{OUT});
+  word_last = passes && beat_last;
+  word = passes ? beat : all[out * 96 +: 96];
+end
+wire adds = run && summarise && stage == 2'd{ADD} && beat_valid;
+always @(posedge clk) begin
+  if (adds) begin
+    sum_x <= first ? x : sum_x + x;
+    sum_y <= first ? y : sum_y + y;
+    sum_z <= first ? z : sum_z + z;
+    loaded <= (first ? {l}'d0 : loaded) + {{{l_less}'d0, beat[95:64] != 32'd0}};
+    line <= col == {c}'d0 ? z : line + z;
+    moment_x <= first ? {bits}'d0 : col == {c}'d0 ? moment_x : moment_x - line;
+    moment_y <= first ? {bits}'d0 : col == {c}'d0 ? moment_y - sum_z : moment_y;
+    more <= {m}'d0;
+    out <= 2'd0;
+  end
+  if (stage == 2'd{FINISH}) begin
+    if (more < {m}'d{last_col}) moment_x <= moment_x + sum_z;
+    if (more < {m}'d{last_row}) moment_y <= moment_y + sum_z;
+    more <= more + {m}'d1;
+  end
+  if (stage == 2'd{OUT} && run) out <= out + 2'd1;
+  if (rst) begin
+    stage <= 2'd{ADD};
+    row <= {r}'d0;
+    col <= {c}'d0;
+  end else begin
+    if (adds) begin
+      col <= line_end ? {c}'d0 : col + {c}'d1;
+      if (line_end) row <= row == {r}'d{last_row} ? {r}'d0 : row + {r}'d1;
+      if (line_end && row == {r}'d{last_row}) stage <= 2'd{FINISH};
+    end else if (stage == 2'd{FINISH}) begin
+      if (more == {m}'d{last_more}) stage <= 2'd{OUT};
+    end else if (stage == 2'd{OUT} && run) begin
+      if (out == 2'd3) stage <= 2'd{STATUS};
+    end else if (run && passes && beat_valid && beat_last) stage <= 2'd{ADD};
+  end
+end",
+            r_end = r - 1,
+            c_end = c - 1,
+            m_end = m - 1,
+            end = bits - 1,
+            l_end = l - 1,
+            wider = bits - 32,
+            all_end = 64 * COUNT - 1,
+            l_more = 64 - l,
+            l_less = l - 1,
+            sums = sums.join(", "),
+            last_col = cols - 1,
+            last_row = rows - 1,
+            last_more = rows.max(cols) - 1,
+        ))
+    }
+}

@@ -1,0 +1,105 @@
+//! From the bytes of the wire to the bytes of packets.
+
+use dermis_golden::link::slip::{END, ESC, ESC_END, ESC_ESC};
+use rust_hdl::prelude::*;
+
+use crate::wire::{Wire, Word};
+
+/// Undoes SLIP's escapes, in the same cycle.
+#[derive(LogicBlock)]
+pub struct SlipDecoder {
+    /// Clock.
+    pub clk: Signal<In, Clock>,
+    /// Reset.
+    pub rst: Signal<In, Bit>,
+    /// A byte from the wire.
+    pub data: Wire<In>,
+    /// It came in this cycle.
+    pub valid: Signal<In, Bit>,
+    /// A byte came that cannot be read.
+    pub broken: Signal<In, Bit>,
+    /// A byte of a packet.
+    pub content: Wire<Out>,
+    /// It came in this cycle.
+    pub content_valid: Signal<Out, Bit>,
+    /// The packet is over.
+    pub packet_end: Signal<Out, Bit>,
+    /// The packet has lost a byte.
+    pub spoiled: Signal<Out, Bit>,
+    _escaped: bool,
+}
+
+impl Default for SlipDecoder {
+    fn default() -> Self {
+        SlipDecoder {
+            clk: Default::default(),
+            rst: Default::default(),
+            data: Wire::new(8),
+            valid: Default::default(),
+            broken: Default::default(),
+            content: Wire::new(8),
+            content_valid: Default::default(),
+            packet_end: Default::default(),
+            spoiled: Default::default(),
+            _escaped: false,
+        }
+    }
+}
+
+impl Logic for SlipDecoder {
+    fn update(&mut self) {
+        let data = self.data.val().number() as u8;
+        if self.clk.pos_edge() {
+            if self.rst.val() {
+                self._escaped = false;
+            } else if self.valid.val() {
+                self._escaped = data == ESC && !self._escaped;
+            }
+        }
+        let end = data == END;
+        let stands_for = match data {
+            ESC_END => Some(END),
+            ESC_ESC => Some(ESC),
+            _ => None,
+        };
+        let unread = self._escaped && stands_for.is_none() && !end;
+        let content = if self._escaped { stands_for } else { Some(data).filter(|&data| data != ESC) };
+        self.content.next = Word::from(u64::from(if self._escaped && data == ESC_END {
+            END
+        } else if self._escaped {
+            ESC
+        } else {
+            data
+        }));
+        self.content_valid.next = self.valid.val() && !end && content.is_some();
+        self.packet_end.next = self.valid.val() && end;
+        self.spoiled.next = self.broken.val() || (self.valid.val() && unread);
+    }
+
+    fn connect(&mut self) {
+        self.content.connect();
+        self.content_valid.connect();
+        self.packet_end.connect();
+        self.spoiled.connect();
+    }
+
+    fn hdl(&self) -> Verilog {
+        Verilog::Custom(format!(
+            "\
+reg escaped;
+wire is_end = data == 8'd{END};
+wire is_escape = data == 8'd{ESC};
+wire stands = data == 8'd{ESC_END} || data == 8'd{ESC_ESC};
+always @(*) begin
+  content = !escaped ? data : data == 8'd{ESC_END} ? 8'd{END} : 8'd{ESC};
+  content_valid = valid && !is_end && (escaped ? stands : !is_escape);
+  packet_end = valid && is_end;
+  spoiled = broken || (valid && escaped && !stands && !is_end);
+end
+always @(posedge clk) begin
+  if (rst) escaped <= 1'b0;
+  else if (valid) escaped <= is_escape && !escaped;
+end"
+        ))
+    }
+}

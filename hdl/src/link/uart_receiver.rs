@@ -1,0 +1,143 @@
+//! From the UART's line to bytes.
+
+use rust_hdl::prelude::*;
+
+use super::phase::{increment, FRACTION, HALF};
+use crate::wire::{Wire, Word};
+
+/// Two registers against metastability, then the majority of three samples. From a falling edge on, ten bits are
+/// sampled in their middle: half a bit later the start bit, which must still stand, eight data bits, and the stop bit.
+/// A byte without stop bit is `broken`; the next one begins only after the line was idle again.
+///
+/// `valid` and `broken` are pulses; `data` stands until the next byte's first data bit.
+#[derive(LogicBlock)]
+pub struct UartReceiver {
+    /// Clock.
+    pub clk: Signal<In, Clock>,
+    /// Reset.
+    pub rst: Signal<In, Bit>,
+    /// The line, high when idle.
+    pub line: Signal<In, Bit>,
+    /// The byte received last.
+    pub data: Wire<Out>,
+    /// It came in this cycle.
+    pub valid: Signal<Out, Bit>,
+    /// A byte without stop bit came in this cycle.
+    pub broken: Signal<Out, Bit>,
+    _increment: u32,
+    _state: State,
+}
+
+#[derive(Clone, Copy, Debug, Default)]
+struct State {
+    samples: u32,
+    armed: bool,
+    left: u32,
+    phase: u32,
+    data: u32,
+    valid: bool,
+    broken: bool,
+}
+
+/// Bits from start bit to stop bit.
+const BITS: u32 = 10;
+
+impl UartReceiver {
+    /// For `baud` bit/s at a clock of `clock_hz`.
+    pub fn new(baud: u32, clock_hz: u32) -> Self {
+        UartReceiver {
+            clk: Default::default(),
+            rst: Default::default(),
+            line: Default::default(),
+            data: Wire::new(8),
+            valid: Default::default(),
+            broken: Default::default(),
+            _increment: increment(baud, clock_hz),
+            _state: State::default(),
+        }
+    }
+
+    fn next(&self) -> State {
+        let s = self._state;
+        let level = (s.samples >> 2).count_ones() >= 2;
+        let mut next =
+            State { samples: (s.samples << 1 | u32::from(self.line.val())) & 0x1f, valid: false, broken: false, ..s };
+        if s.left == 0 {
+            next.armed = level;
+            if s.armed && !level {
+                next.left = BITS;
+                next.phase = HALF;
+            }
+        } else {
+            let sum = s.phase + self._increment;
+            next.phase = sum & (2 * HALF - 1);
+            if sum >= 2 * HALF {
+                next.left = s.left - 1;
+                match s.left {
+                    // Too short for a start bit.
+                    BITS if level => next.left = 0,
+                    BITS => (),
+                    1 => (next.valid, next.broken) = (level, !level),
+                    _ => next.data = u32::from(level) << 7 | s.data >> 1,
+                }
+            }
+        }
+        if self.rst.val() {
+            (next.left, next.armed, next.valid, next.broken) = (0, false, false, false);
+        }
+        next
+    }
+}
+
+impl Logic for UartReceiver {
+    fn update(&mut self) {
+        if self.clk.pos_edge() {
+            self._state = self.next();
+            self.data.next = Word::from(u64::from(self._state.data));
+            self.valid.next = self._state.valid;
+            self.broken.next = self._state.broken;
+        }
+    }
+
+    fn connect(&mut self) {
+        self.data.connect();
+        self.valid.connect();
+        self.broken.connect();
+    }
+
+    fn hdl(&self) -> Verilog {
+        Verilog::Custom(format!(
+            "\
+reg [4:0] samples;
+reg armed;
+reg [3:0] left;
+reg [{end}:0] phase;
+wire level = (samples[4] & samples[3]) | (samples[4] & samples[2]) | (samples[3] & samples[2]);
+wire [{FRACTION}:0] sum = {{1'b0, phase}} + {width}'d{increment};
+wire tick = left != 4'd0 && sum[{FRACTION}];
+wire false_start = left == 4'd{BITS} && level;
+always @(posedge clk) begin
+  samples <= {{samples[3:0], line}};
+  if (left == 4'd0) phase <= {FRACTION}'d{HALF};
+  else phase <= sum[{end}:0];
+  if (tick && left != 4'd{BITS} && left != 4'd1) data <= {{level, data[7:1]}};
+  if (rst) begin
+    left <= 4'd0;
+    armed <= 1'b0;
+    valid <= 1'b0;
+    broken <= 1'b0;
+  end else begin
+    if (left == 4'd0) begin
+      armed <= level;
+      if (armed && !level) left <= 4'd{BITS};
+    end else if (tick) left <= false_start ? 4'd0 : left - 4'd1;
+    valid <= tick && left == 4'd1 && level;
+    broken <= tick && left == 4'd1 && !level;
+  end
+end",
+            end = FRACTION - 1,
+            width = FRACTION + 1,
+            increment = self._increment,
+        ))
+    }
+}

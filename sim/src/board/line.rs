@@ -1,0 +1,141 @@
+//! The other end of a simulated board's UART.
+
+use std::collections::VecDeque;
+
+use dermis_hdl::link::{BoardDevice, BoardOutputs};
+
+/// Bits of a byte on the line, start and stop bit among them.
+const BITS: u64 = 10;
+
+/// What goes out on the line.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Sent {
+    /// A byte.
+    Byte(u8),
+    /// A byte whose stop bit is missing.
+    NoStop(u8),
+    /// The line stays idle for so many bytes' time.
+    Pause(u32),
+}
+
+/// A UART of exact bit times, clocked together with the board.
+pub struct UartLine {
+    device: Box<dyn BoardDevice>,
+    /// Bits per clock cycle as a fraction: baud / clock.
+    baud: u64,
+    clock_hz: u64,
+    cycle: u64,
+    queue: VecDeque<Sent>,
+    /// What is being sent, and the cycle it began in.
+    sending: Option<(Sent, u64)>,
+    /// The cycle of a start bit's edge, and the bits since.
+    receiving: Option<(u64, u64, u32)>,
+    received: Vec<u8>,
+    pins: BoardOutputs,
+    /// The last cycle in which anything was on the line.
+    moved: u64,
+}
+
+impl UartLine {
+    /// The line of a board that sends `baud` bit/s at a clock of `clock_hz`.
+    pub fn new(device: Box<dyn BoardDevice>, baud: u32, clock_hz: u32) -> Self {
+        UartLine {
+            device,
+            baud: baud.into(),
+            clock_hz: clock_hz.into(),
+            cycle: 0,
+            queue: VecDeque::new(),
+            sending: None,
+            receiving: None,
+            received: Vec::new(),
+            pins: BoardOutputs { uart_tx: true, ..BoardOutputs::default() },
+            moved: 0,
+        }
+    }
+
+    /// Puts something into the queue for the line.
+    pub fn send(&mut self, what: Sent) {
+        self.queue.push_back(what);
+        self.moved = self.cycle;
+    }
+
+    /// The bytes that have come since the last call.
+    pub fn received(&mut self) -> Vec<u8> {
+        std::mem::take(&mut self.received)
+    }
+
+    /// Clock cycles since the line last moved.
+    pub fn quiet(&self) -> u64 {
+        self.cycle - self.moved
+    }
+
+    /// Clock cycles so far.
+    pub fn cycles(&self) -> u64 {
+        self.cycle
+    }
+
+    /// The board's pins in the last cycle.
+    pub fn pins(&self) -> BoardOutputs {
+        self.pins
+    }
+
+    /// One clock cycle.
+    pub fn cycle(&mut self) {
+        let level = self.level();
+        self.pins = self.device.cycle(level);
+        self.listen();
+        if !self.queue.is_empty() || self.sending.is_some() || self.receiving.is_some() {
+            self.moved = self.cycle;
+        }
+        self.cycle += 1;
+    }
+
+    /// Whole bits since cycle `from`.
+    fn bits_since(&self, from: u64) -> u64 {
+        (self.cycle - from) * self.baud / self.clock_hz
+    }
+
+    /// The level that the board sees.
+    fn level(&mut self) -> bool {
+        if let Some((what, from)) = self.sending {
+            let bytes = if let Sent::Pause(bytes) = what { u64::from(bytes) } else { 1 };
+            if self.bits_since(from) >= BITS * bytes {
+                self.sending = None;
+            }
+        }
+        if self.sending.is_none() {
+            self.sending = self.queue.pop_front().map(|what| (what, self.cycle));
+        }
+        let Some((what, from)) = self.sending else { return true };
+        let (data, stop) = match what {
+            Sent::Byte(data) => (data, true),
+            Sent::NoStop(data) => (data, false),
+            Sent::Pause(_) => return true,
+        };
+        match self.bits_since(from) {
+            0 => false,
+            bit @ 1..=8 => data >> (bit - 1) & 1 == 1,
+            _ => stop,
+        }
+    }
+
+    /// Samples the board's line in the middle of each bit.
+    fn listen(&mut self) {
+        let level = self.pins.uart_tx;
+        match self.receiving {
+            None if !level => self.receiving = Some((self.cycle, 0, 0)),
+            None => (),
+            Some((from, done, data)) => {
+                let halves = 2 * (self.cycle - from) * self.baud / self.clock_hz;
+                if halves < 2 * done + 1 {
+                    return;
+                }
+                let data = data | u32::from(level) << done;
+                self.receiving = (done + 1 < BITS).then_some((from, done + 1, data));
+                if done + 1 == BITS && level {
+                    self.received.push((data >> 1) as u8);
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,124 @@
+//! A simulated board on a pseudo-terminal, where a host finds it like one on a serial port.
+
+use std::fs::File;
+use std::io::{self, ErrorKind, Read, Write};
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::Arc;
+use std::thread::JoinHandle;
+
+use rustix::event::{poll, PollFd, PollFlags, Timespec};
+use rustix::fs::{fcntl_setfl, OFlags};
+use rustix::pty::{grantpt, openpt, ptsname, unlockpt, OpenptFlags};
+use rustix::termios::{tcgetattr, tcsetattr, OptionalActions};
+
+use super::{Sent, UartLine, Wire};
+
+/// Clock cycles between looks at the pseudo-terminal.
+const SLICE: u64 = 200;
+/// Quiet cycles after which the board waits for bytes in place of being clocked; longer than any frame is computed.
+const QUIET: u64 = 100_000;
+/// Longest wait, so that a request to stop is seen, ns.
+const WAIT_NS: i64 = 20_000_000;
+
+/// A running board; stops when dropped.
+pub struct Terminal {
+    path: PathBuf,
+    stop: Arc<AtomicBool>,
+    thread: Option<JoinHandle<io::Result<UartLine>>>,
+}
+
+impl Terminal {
+    /// Runs the board behind `line` in a thread of its own, its bytes going through these wires.
+    ///
+    /// # Errors
+    /// No pseudo-terminal.
+    pub fn start(line: UartLine, to_board: Wire, to_host: Wire) -> io::Result<Self> {
+        let master = openpt(OpenptFlags::RDWR | OpenptFlags::NOCTTY)?;
+        grantpt(&master)?;
+        unlockpt(&master)?;
+        let path = PathBuf::from(ptsname(&master, Vec::new())?.to_string_lossy().into_owned());
+        // A side that stays open here keeps the terminal alive between two hosts, and raw from the start.
+        let slave = File::options().read(true).write(true).open(&path)?;
+        let mut settings = tcgetattr(&slave)?;
+        settings.make_raw();
+        tcsetattr(&slave, OptionalActions::Now, &settings)?;
+        fcntl_setfl(&master, OFlags::NONBLOCK)?;
+        let stop = Arc::new(AtomicBool::new(false));
+        let seen = Arc::clone(&stop);
+        let thread = std::thread::spawn(move || {
+            let _slave = slave;
+            run(line, File::from(master), to_board, to_host, &seen)
+        });
+        Ok(Terminal { path, stop, thread: Some(thread) })
+    }
+
+    /// The port for the host.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// Runs until the pseudo-terminal fails.
+    ///
+    /// # Errors
+    /// The failure.
+    pub fn wait(mut self) -> io::Result<()> {
+        self.thread.take().map_or(Ok(()), |thread| match thread.join() {
+            Ok(outcome) => outcome.map(drop),
+            Err(panic) => std::panic::resume_unwind(panic),
+        })
+    }
+}
+
+impl Drop for Terminal {
+    fn drop(&mut self) {
+        self.stop.store(true, Ordering::Relaxed);
+        if let Some(thread) = self.thread.take() {
+            // What the thread ends with concerns nobody any more.
+            let _ = thread.join();
+        }
+    }
+}
+
+fn run(
+    mut line: UartLine,
+    mut master: File,
+    mut to_board: Wire,
+    mut to_host: Wire,
+    stop: &AtomicBool,
+) -> io::Result<UartLine> {
+    let mut buffer = [0; 4096];
+    while !stop.load(Ordering::Relaxed) {
+        match master.read(&mut buffer) {
+            Ok(count) => buffer[..count].iter().flat_map(|&byte| to_board.carry(byte)).for_each(|what| line.send(what)),
+            Err(error) if error.kind() == ErrorKind::WouldBlock => (),
+            Err(error) => return Err(error),
+        }
+        if line.quiet() > QUIET {
+            let wait = Timespec { tv_sec: 0, tv_nsec: WAIT_NS };
+            poll(&mut [PollFd::new(&master, PollFlags::IN)], Some(&wait))?;
+            continue;
+        }
+        (0..SLICE).for_each(|_| line.cycle());
+        let bytes = line.received().into_iter().flat_map(|byte| to_host.carry(byte));
+        let bytes: Vec<u8> =
+            bytes.filter_map(|what| if let Sent::Byte(byte) = what { Some(byte) } else { None }).collect();
+        write(&mut master, &bytes, stop)?;
+    }
+    Ok(line)
+}
+
+/// Writes everything; a host that does not read makes the board wait, as no real one would, but loses nothing.
+fn write(master: &mut File, mut bytes: &[u8], stop: &AtomicBool) -> io::Result<()> {
+    while !bytes.is_empty() && !stop.load(Ordering::Relaxed) {
+        match master.write(bytes) {
+            Ok(count) => bytes = &bytes[count..],
+            Err(error) if error.kind() == ErrorKind::WouldBlock => {
+                let wait = Timespec { tv_sec: 0, tv_nsec: WAIT_NS };
+                poll(&mut [PollFd::new(master, PollFlags::OUT)], Some(&wait))?;
+            }
+            Err(error) => return Err(error),
+        }
+    }
+    Ok(())
+}

@@ -1,0 +1,190 @@
+//! The board's link: whatever comes over the UART, the board top answers alike under Verilator and in rust-hdl's
+//! simulation, pin by pin and cycle by cycle; its answers are those of the bit-true model; and its counters name every
+//! packet that it dropped.
+
+use dermis_golden::fixed::send::FLAG_FRAMING;
+use dermis_golden::fixed::Model;
+use dermis_golden::link::{
+    beats_of_bytes, codes_to_bytes, slip, Counters, Decoder, Header, Identity, Kind, Packet, Sums,
+};
+use dermis_hdl::link::{BoardDevice, BoardOutputs};
+use dermis_sim::board::{Sent, UartLine};
+use dermis_sim::hardware::{Hardware, Simulator};
+use dermis_tests::{build_dir, scene};
+
+/// Eight clock cycles per bit, the most that the link takes: everything else of it runs as fast as ever.
+const BAUD: u32 = 12_500_000;
+
+/// Cycles after which a board is out of reset: before, Verilator's registers hold anything.
+const RESET: u64 = 20;
+
+/// Two simulators in step.
+struct Both([Box<dyn BoardDevice>; 2], u64);
+
+impl BoardDevice for Both {
+    fn cycle(&mut self, uart_rx: bool) -> BoardOutputs {
+        let [a, b] = self.0.each_mut().map(|device| device.cycle(uart_rx));
+        self.1 += 1;
+        assert!(self.1 < RESET || a == b, "cycle {}: Verilator {a:?}, rust-hdl {b:?}", self.1);
+        b
+    }
+}
+
+struct Board {
+    line: UartLine,
+    decoder: Decoder,
+    model: Model,
+    codes: Vec<Vec<i32>>,
+}
+
+impl Board {
+    fn new(simulators: &[Simulator]) -> Board {
+        let (scene, frames) = scene("eight-by-eight");
+        let mut model = Model::new(&scene).unwrap();
+        model.board.uart_baud = BAUD;
+        let codes = frames.iter().map(|frame| model.codes(frame).unwrap().codes).collect();
+        let clock_hz = Identity::of(&model).unwrap().clock_hz;
+        let hardware = Hardware::new(model.clone(), &build_dir()).unwrap();
+        let mut devices: Vec<_> = simulators.iter().map(|simulator| hardware.board(*simulator).unwrap()).collect();
+        let device = match devices.len() {
+            1 => devices.remove(0),
+            _ => Box::new(Both(devices.try_into().ok().unwrap(), 0)),
+        };
+        Board { line: UartLine::new(device, BAUD, clock_hz), decoder: Decoder::default(), model, codes }
+    }
+
+    fn send(&mut self, wire: &[u8]) {
+        wire.iter().for_each(|&byte| self.line.send(Sent::Byte(byte)));
+    }
+
+    /// All packets that come until nothing has come for longer than a frame takes.
+    fn receive(&mut self) -> Vec<Packet> {
+        while self.line.quiet() < 3_000 {
+            self.line.cycle();
+        }
+        let bytes = self.line.received();
+        let packets = bytes.iter().filter_map(|&byte| self.decoder.next(byte));
+        packets.collect::<Result<_, _>>().unwrap()
+    }
+
+    fn frame(&self, index: usize, kind: Kind, sequence: u8) -> Packet {
+        Packet { kind, sequence, payload: codes_to_bytes(&self.codes[index], self.model.formats.input_bits) }
+    }
+
+    /// The model's answer to a frame.
+    fn answer(&self, index: usize, kind: Kind, sequence: u8, framing: bool) -> Packet {
+        let trace = self.model.run(&self.codes[index]);
+        let mut status = trace.status.clone();
+        if framing {
+            status[0][2] |= FLAG_FRAMING as i32;
+        }
+        let bytes = |beats: &[[i32; 3]]| -> Vec<u8> { beats.iter().flatten().flat_map(|w| w.to_le_bytes()).collect() };
+        let front = match kind {
+            Kind::FrameForForces => bytes(&trace.beats),
+            _ => Sums::of(&trace.beats, self.model.scene.sensor.cols).to_bytes(),
+        };
+        Packet { kind: kind.answer(), sequence, payload: [front, bytes(&status)].concat() }
+    }
+
+    /// The counters, this reading among them.
+    fn counters(&mut self) -> Counters {
+        self.send(&Packet::request(Kind::ReadCounters, 9).to_wire());
+        let packets = self.receive();
+        assert_eq!(packets.len(), 1);
+        Counters::of_bytes(&packets[0].payload).unwrap()
+    }
+}
+
+/// A packet with a right CRC around anything.
+fn sealed(kind: u8, length: u16, payload: &[u8]) -> Vec<u8> {
+    let mut bytes = [Header { kind, sequence: 1, length }.to_bytes(), payload.to_vec()].concat();
+    bytes.extend(crc32fast::hash(&bytes).to_le_bytes());
+    slip::encode(&bytes)
+}
+
+#[test]
+fn both_simulations_answer_as_the_model() {
+    let mut board = Board::new(&[Simulator::Verilator, Simulator::RustHdl]);
+    board.send(&Packet::request(Kind::Identify, 200).to_wire());
+    let identity = Identity::of(&board.model).unwrap().to_bytes();
+    assert_eq!(board.receive(), [Packet { kind: Kind::Identity, sequence: 200, payload: identity }]);
+    for (index, kind) in [(0, Kind::FrameForResultants), (1, Kind::FrameForForces)] {
+        board.send(&board.frame(index, kind, 0xc0 + index as u8).to_wire());
+        let wanted = board.answer(index, kind, 0xc0 + index as u8, false);
+        assert!(board.receive() == [wanted], "frame {index}");
+    }
+    // A frame cut short, one damaged in its last code, and a whole one right behind them.
+    let frame = board.frame(0, Kind::FrameForResultants, 7).to_wire();
+    let mut damaged = frame.clone();
+    damaged[190] ^= 1;
+    board.send(&frame[..100]);
+    board.send(&damaged);
+    board.send(&frame);
+    assert!(board.receive() == [board.answer(0, Kind::FrameForResultants, 7, true)]);
+    assert_eq!(board.counters(), Counters { taken: 5, crc: 2, ..Counters::default() });
+}
+
+#[test]
+fn every_packet_dropped_is_counted_once_under_its_cause() {
+    let mut board = Board::new(&[Simulator::Verilator]);
+    let frame = board.frame(0, Kind::FrameForResultants, 1).to_wire();
+    let codes = &board.frame(0, Kind::FrameForResultants, 1).payload;
+    let bytes = codes.len() as u16;
+    let cases: [(Vec<u8>, fn(&mut Counters) -> &mut u16); 11] = [
+        (vec![1, 2, 3, slip::END], |c| &mut c.crc),
+        (vec![slip::ESC, 7, slip::END], |c| &mut c.framing),
+        // Cut short: the END of the next packet ends it.
+        ([&frame[..frame.len() / 2], &[slip::END]].concat(), |c| &mut c.crc),
+        (sealed(0x05, 0, &[]), |c| &mut c.unknown_type),
+        (sealed(0x00, 0, &[]), |c| &mut c.unknown_type),
+        (sealed(0x83, 0, &[]), |c| &mut c.unknown_type),
+        (sealed(0x01, 1, &[0]), |c| &mut c.length),
+        (sealed(0x01, 0, &[0]), |c| &mut c.length),
+        (sealed(0x03, bytes - 1, &codes[1..]), |c| &mut c.length),
+        (sealed(0x04, bytes, &codes[1..]), |c| &mut c.length),
+        (sealed(0x04, bytes, &[codes.as_slice(), &[0]].concat()), |c| &mut c.length),
+    ];
+    let mut wanted = board.counters();
+    assert_eq!(wanted, Counters { taken: 1, ..Counters::default() });
+    for (wire, cause) in cases {
+        board.send(&wire);
+        assert_eq!(board.receive(), [], "{wire:?}");
+        wanted.taken += 1;
+        *cause(&mut wanted) += 1;
+        assert_eq!(board.counters(), wanted, "{wire:?}");
+    }
+    // A byte without stop bit spoils its packet and no other.
+    board.send(&frame[..50]);
+    board.line.send(Sent::NoStop(frame[50]));
+    board.send(&frame[51..]);
+    assert_eq!(board.receive(), []);
+    board.send(&frame);
+    assert!(board.receive() == [board.answer(0, Kind::FrameForResultants, 1, true)]);
+    wanted.framing += 1;
+    wanted.taken += 2;
+    assert_eq!(board.counters(), wanted);
+}
+
+#[test]
+fn requests_that_come_too_fast_are_overruns_and_the_rest_is_answered_in_order() {
+    let mut board = Board::new(&[Simulator::Verilator]);
+    // All forces take four times as long to send as a frame takes to come.
+    let sequences: Vec<u8> = (0..12).collect();
+    let wire: Vec<u8> = sequences.iter().flat_map(|&s| board.frame(1, Kind::FrameForForces, s).to_wire()).collect();
+    board.send(&wire);
+    let packets = board.receive();
+    assert!(packets.len() >= 3, "{}", packets.len());
+    let answered: Vec<u8> = packets.iter().map(|packet| packet.sequence).collect();
+    assert!(answered.is_sorted() && answered.starts_with(&[0, 1, 2]), "{answered:?}");
+    let plain = board.answer(1, Kind::FrameForForces, 0, false).payload;
+    for packet in &packets {
+        let (beats, wanted) = (beats_of_bytes(&packet.payload).unwrap(), beats_of_bytes(&plain).unwrap());
+        assert!(beats[..board.codes[1].len()] == wanted[..board.codes[1].len()], "{}", packet.sequence);
+    }
+    let (taken, all) = (packets.len() as u16, sequences.len() as u16);
+    // Reading the counters counts as well.
+    assert_eq!(board.counters(), Counters { taken: taken + 1, overrun: all - taken, ..Counters::default() });
+    // Afterwards everything is as before.
+    board.send(&board.frame(0, Kind::FrameForResultants, 77).to_wire());
+    assert_eq!(board.receive().len(), 1);
+}
