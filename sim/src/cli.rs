@@ -26,6 +26,7 @@ use dermis_hdl::{generate, HdlError};
 use crate::compare::{compared, difference};
 use crate::fresh::Fresh;
 use crate::hardware::{Hardware, Simulator, Stuck};
+use crate::host::HostError;
 use crate::inputs::{resolve, resolve_one};
 use crate::needs::{features, resources};
 use crate::progress::Progress;
@@ -50,6 +51,7 @@ const EXAMPLES: &str = "Examples:
   dermis reconstruct --frame press.json --json       scene from the sensor in the frame file
   dermis reconstruct sensor-1 --engine rtl           the same in the Verilated hardware
   dermis build eight-by-eight --out rtl              Verilog, memory files, manifest.json
+  dermis host --port /dev/ttyUSB0 press.json         a frame to a board, its resultants back
   dermis cosim sensor-1                              all shipped frames, model against hardware
   dermis table                                       errors of all scenes, beside the paper's
   dermis noise sensor-1                              errors under noise, beside the Cramér–Rao bound
@@ -94,6 +96,15 @@ enum Command {
         /// The whole board, the engine behind its UART, in place of the engine alone.
         #[arg(long)]
         board: bool,
+    },
+    /// Send frames to a board and receive forces.
+    Host(crate::host::Arguments),
+    /// Simulate a board on a pseudo-terminal, for a host that has none.
+    #[command(after_help = "Example:
+  dermis board eight-by-eight       prints the port for `dermis host --port`, and runs until interrupted")]
+    Board {
+        /// Built-in name or path of a scene.
+        scene: String,
     },
     /// Compare simulated hardware with the bit-true model, stage by stage and cycle by cycle.
     #[command(after_help = "Examples:
@@ -219,7 +230,8 @@ fn exit_code(error: &anyhow::Error) -> u8 {
     );
     let hardware = error.is::<Stuck>() || matches!(error.downcast_ref::<HdlError>(), Some(HdlError::Check(_)));
     let model = matches!(error.downcast_ref::<FixedError>(), Some(FixedError::Internal(_) | FixedError::Beats { .. }));
-    if tool || hardware || model {
+    let board = matches!(error.downcast_ref::<HostError>(), Some(HostError::Answer { .. }));
+    if tool || hardware || model || board {
         1
     } else {
         2
@@ -257,6 +269,13 @@ fn run(arguments: &Arguments) -> Result<(String, bool)> {
                 report::cosim(&verified)
             };
             Ok((text, verified.findings.is_equal()))
+        }
+        Command::Host(arguments) => crate::host::run(arguments),
+        Command::Board { scene } => {
+            let terminal = Hardware::new(Model::new(&Scene::load(scene)?)?, build_dir)?.terminal()?;
+            print(&format!("{}\n", terminal.path().display()))?;
+            terminal.wait()?;
+            Ok((String::new(), true))
         }
         Command::Generate(arguments) => Ok((crate::generate::run(arguments)?, true)),
         Command::Table { scenes, cases, fresh, format, cosim: false } => {

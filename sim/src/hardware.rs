@@ -10,13 +10,14 @@ use std::path::{Path, PathBuf};
 use anyhow::Result;
 use dermis_golden::fixed::Model;
 use dermis_golden::frame::Frame;
+use dermis_golden::link::Identity;
 use dermis_golden::reconstruct::Reconstruction;
 use dermis_hdl::device::Device;
 use dermis_hdl::link::{board_simulator, generate_board, BoardDevice};
 use dermis_hdl::{generate, simulator, Generated};
 use thiserror::Error;
 
-use crate::board::VerilatedBoard;
+use crate::board::{Faults, Terminal, UartLine, VerilatedBoard, Wire};
 use crate::cosim::Vector;
 use crate::drive::{record, Play, Stimulus};
 use crate::verilator::{Design, Verilated, VerilatorError};
@@ -106,6 +107,25 @@ impl Hardware {
             Simulator::Verilator => Box::new(VerilatedBoard::new(&generate_board(&self.model)?, &self.cache)?),
             Simulator::RustHdl => board_simulator(&self.model)?,
         })
+    }
+
+    /// Starts the whole board under Verilator on a pseudo-terminal, behind wires that lose nothing.
+    ///
+    /// # Errors
+    /// As [`Hardware::board`]; no pseudo-terminal.
+    pub fn terminal(&self) -> Result<Terminal> {
+        let perfect = || Wire::new(Faults::default());
+        self.terminal_behind(perfect(), perfect())
+    }
+
+    /// The same behind these wires.
+    ///
+    /// # Errors
+    /// As [`Hardware::terminal`].
+    pub fn terminal_behind(&self, to_board: Wire, to_host: Wire) -> Result<Terminal> {
+        let identity = Identity::of(&self.model)?;
+        let line = UartLine::new(self.board(Simulator::Verilator)?, identity.baud, identity.clock_hz);
+        Ok(Terminal::start(line, to_board, to_host)?)
     }
 
     /// Stage names of the taps, in the order of a device's outputs.

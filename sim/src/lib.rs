@@ -20,6 +20,7 @@
 //! | [`compare`] | how far two force fields are apart |
 //! | [`verify`] | one scene's frames through all three models |
 //! | [`report`] | tables and the JSON contract |
+//! | [`host`] | frames to a board over a serial port, forces back |
 //! | [`inputs`] | scene and frames from what the command line names |
 //! | [`cli`] | arguments, commands, exit codes |
 #![deny(missing_docs)]
@@ -35,6 +36,7 @@ pub mod drive;
 pub mod fresh;
 pub mod generate;
 pub mod hardware;
+pub mod host;
 pub mod inputs;
 pub mod needs;
 mod progress;

@@ -4,6 +4,7 @@
 //! what they leave of [`BUDGET_US`].
 
 mod errors;
+mod host;
 mod noise;
 #[cfg(test)]
 mod read;
@@ -11,6 +12,7 @@ mod result;
 mod table;
 
 pub use errors::errors;
+pub use host::{equality, resultants};
 pub use noise::noise;
 pub use result::{difference, reconstruction};
 pub use table::{cosim, scenes};

@@ -22,14 +22,12 @@ pub struct Faults {
 pub struct Wire {
     faults: Faults,
     random: fastrand::Rng,
-    /// Bytes lost, flipped or broken so far.
-    pub damaged: usize,
 }
 
 impl Wire {
     /// A wire with these faults.
     pub fn new(faults: Faults) -> Self {
-        Wire { faults, random: fastrand::Rng::with_seed(faults.seed), damaged: 0 }
+        Wire { faults, random: fastrand::Rng::with_seed(faults.seed) }
     }
 
     fn happens(&mut self, once_in: u32) -> bool {
@@ -45,7 +43,6 @@ impl Wire {
         }
         let (lost, flipped, no_stop) =
             (self.happens(faults.lost), self.happens(faults.flipped), self.happens(faults.no_stop));
-        self.damaged += usize::from(lost || flipped || no_stop);
         let byte = if flipped { byte ^ 1 << self.random.u32(..8) } else { byte };
         match (lost, no_stop) {
             (true, _) => (),

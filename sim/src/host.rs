@@ -1,0 +1,223 @@
+//! `dermis host`: frames to a board over a serial port, forces back.
+//!
+//! ```text
+//! frame file, or a line of JSON -> tare -> codes -> packet -> port -> board
+//!                     report, or a line of JSON <- forces, status <- packet <-'
+//! ```
+//! The board is asked who it is first. A request that stays unanswered, or whose answer is damaged, is sent again under
+//! a new sequence number; how often that happened is reported.
+
+mod answer;
+mod client;
+mod error;
+mod stream;
+
+pub use answer::{Answer, Line};
+pub use client::{Client, Lost};
+pub use error::HostError;
+
+use std::path::PathBuf;
+use std::time::{Duration, Instant};
+
+use anyhow::{bail, Result};
+use clap::Args;
+use dermis_golden::fixed::Model;
+use dermis_golden::frame::Frame;
+use dermis_golden::link::{Counters, Identity};
+use dermis_golden::quantise::full_scale;
+use dermis_golden::scene::Scene;
+use serialport::SerialPort;
+
+use crate::inputs::resolve;
+use crate::progress::Progress;
+use crate::report;
+
+/// How long a read of the port waits for a byte.
+const READ: Duration = Duration::from_millis(10);
+
+/// What to ask a board.
+#[derive(Args, Debug)]
+#[command(after_help = EXAMPLES)]
+pub struct Arguments {
+    /// Frame files (.json, .csv); without any all shipped frames of the scene.
+    #[arg(value_name = "FILE", conflicts_with = "stream")]
+    frames: Vec<String>,
+    /// Serial port of the board.
+    #[arg(long, value_name = "PATH")]
+    port: String,
+    /// Built-in name or path of a scene; may be left out when the first frame holds its sensor.
+    #[arg(long, required_if_eq("stream", "true"))]
+    scene: Option<String>,
+    /// Bit rate; without it that of the scene's board.
+    #[arg(long, value_name = "BIT/S")]
+    baud: Option<u32>,
+    /// Ask for the force on every taxel; without it for the resultants, which take a fraction of the time on the wire.
+    #[arg(long)]
+    forces: bool,
+    /// Compare every answer with the bit-true model.
+    #[arg(long)]
+    check: bool,
+    /// A frame read without contact, whose stress is subtracted from every frame's.
+    #[arg(long, value_name = "FILE")]
+    tare: Option<PathBuf>,
+    /// Frames from standard input, answers to standard output, one JSON object per line.
+    #[arg(long)]
+    stream: bool,
+    /// Silence in ms after which a request is sent again.
+    #[arg(long, value_name = "MS", default_value_t = 1000)]
+    timeout: u64,
+}
+
+const EXAMPLES: &str = "Examples:
+  dermis host --port /dev/ttyUSB0 --scene sensor-1            all shipped frames, resultants
+  dermis host --port /dev/ttyUSB0 --forces --check press.json
+  dermis host --port /dev/ttyUSB0 --scene sensor-1 --tare zero.json --stream <frames >answers
+
+A line in: {\"id\": 7, \"stress_MPa\": [0.1, ...]}, row-major
+A line out: {\"id\": 7, \"sent_s\": ..., \"answered_s\": ..., \"resultant_N\": [x, y, normal], \"centre_mm\": [x, y], ...}";
+
+/// A board that was asked who it is, with the model of its scene.
+pub struct Session<P> {
+    /// The board.
+    pub client: Client<P>,
+    /// The bit-true model.
+    pub model: Model,
+    /// Who the board says it is.
+    pub identity: Identity,
+    tare_MPa: Option<Vec<f64>>,
+    forces: bool,
+    check: bool,
+}
+
+impl<P: std::io::Read + std::io::Write> Session<P> {
+    /// Asks the board who it is.
+    ///
+    /// # Errors
+    /// No answer, another version of the packets, another scene.
+    pub fn new(mut client: Client<P>, model: Model, tare: Option<&Frame>, forces: bool, check: bool) -> Result<Self> {
+        let identity = client.identify(&model)?;
+        let tare_MPa = tare.map(|frame| frame.stress_MPa.clone());
+        Ok(Session { client, model, identity, tare_MPa, forces, check })
+    }
+
+    /// The frame without what the sensor reads when nothing touches it.
+    fn tared(&self, frame: &Frame) -> Frame {
+        let mut frame = frame.clone();
+        for (stress, zero) in frame.stress_MPa.iter_mut().zip(self.tare_MPa.iter().flatten()) {
+            *stress -= zero;
+        }
+        frame
+    }
+
+    /// Sends a frame; the answer, and what differs from the model where that was asked for.
+    ///
+    /// # Errors
+    /// A frame of another sensor, no answer.
+    pub fn ask(&mut self, frame: &Frame) -> Result<(Frame, Answer)> {
+        let frame = self.tared(frame);
+        let codes = self.model.codes(&frame)?.codes;
+        let mut answer = self.client.frame(&self.model, &codes, self.forces)?;
+        if self.check {
+            answer.difference = Some(answer.against(&self.model, &codes));
+        }
+        Ok((frame, answer))
+    }
+}
+
+/// Opens a serial port at `baud` bit/s; after `timeout` of silence a request is sent again.
+///
+/// # Errors
+/// A port that does not exist, is taken, or does not know the bit rate.
+pub fn open(port: &str, baud: u32, timeout: Duration) -> Result<Client<Box<dyn SerialPort>>, HostError> {
+    let opened = serialport::new(port, baud).timeout(READ).open();
+    let opened = opened.map_err(|error| HostError::Port { port: port.to_owned(), reason: error.to_string() })?;
+    Ok(Client::new(opened, port, timeout))
+}
+
+/// Runs the command; the text for standard output, and whether everything that was compared is equal.
+///
+/// # Errors
+/// Wrong input, a port that cannot be opened, a board of another scene, no answer.
+pub fn run(arguments: &Arguments) -> Result<(String, bool)> {
+    let (scene, frames) = match arguments.stream {
+        true => (Scene::load(arguments.scene.as_deref().unwrap_or_default())?, Vec::new()),
+        false => resolve(arguments.scene.as_deref(), &arguments.frames)?,
+    };
+    let model = Model::new(&scene)?;
+    let tare = arguments.tare.as_ref().map(|path| Frame::load(path, Some(&scene))).transpose()?;
+    tare.as_ref().map_or(Ok(()), |tare| tare.check(&scene))?;
+    let baud = arguments.baud.unwrap_or(model.board.uart_baud);
+    let client = open(&arguments.port, baud, Duration::from_millis(arguments.timeout))?;
+    let mut session = Session::new(client, model, tare.as_ref(), arguments.forces, arguments.check)?;
+    let before = session.client.counters()?;
+    let begun = Instant::now();
+    let played = match arguments.stream {
+        true => stream::run(&mut session, &mut std::io::stdin().lock(), &mut std::io::stdout().lock())?,
+        false => play(&mut session, &frames)?,
+    };
+    let rate = played.answered as f64 / begun.elapsed().as_secs_f64();
+    let after = session.client.counters()?;
+    let summary = summary(&session.identity, played.answered, rate, session.client.lost, &before, &after);
+    if arguments.stream {
+        eprint!("{summary}");
+    }
+    match (arguments.stream, played.refused) {
+        (true, 0) => Ok((String::new(), played.equal)),
+        (true, refused) => bail!("standard input: {refused} of {} lines were refused", refused + played.answered),
+        (false, _) => Ok((played.text + &summary, played.equal)),
+    }
+}
+
+/// What became of all frames.
+struct Played {
+    /// For standard output, where the frames came from files.
+    text: String,
+    /// All that was compared is equal to the model.
+    equal: bool,
+    /// Frames answered.
+    answered: usize,
+    /// Lines that are no frame.
+    refused: usize,
+}
+
+/// Sends the frames one after the other.
+fn play<P: std::io::Read + std::io::Write>(session: &mut Session<P>, frames: &[Frame]) -> Result<Played> {
+    let bar = Progress::steps(&format!("{}: frames", session.model.scene.name), frames.len() as u64);
+    let (mut text, mut equal) = (String::new(), true);
+    for (index, frame) in frames.iter().enumerate() {
+        let (frame, answer) = session.ask(frame)?;
+        if let Some(beats) = &answer.beats {
+            let result = session.model.decode(&frame, "board", beats, &answer.status)?;
+            let sensor = &session.model.scene.sensor;
+            text.push_str(&report::reconstruction(&result, sensor, full_scale(&session.model.scene, &frame)));
+            text.push_str(&report::equality(&answer));
+        } else {
+            text.push_str(&report::resultants(&frame.id, &Line::new(&session.model, &frame, &answer)?, &answer));
+        }
+        equal &= !matches!(answer.difference, Some(Some(_)));
+        bar.at(index as u64 + 1);
+    }
+    Ok(Played { text, equal, answered: frames.len(), refused: 0 })
+}
+
+fn summary(identity: &Identity, count: usize, rate: f64, lost: Lost, before: &Counters, after: &Counters) -> String {
+    let since = |field: fn(&Counters) -> u16| field(after).wrapping_sub(field(before));
+    format!(
+        "board           {}×{} taxels, {} bit codes, {} MHz, scene {:08x}\n\
+         frames          {count}, {rate:.1} per second\n\
+         host            {} requests sent again, {} answers damaged\n\
+         board dropped   {} framing, {} CRC, {} unknown type, {} length, {} overrun\n",
+        identity.rows,
+        identity.cols,
+        identity.input_bits,
+        f64::from(identity.clock_hz) / 1e6,
+        identity.scene,
+        lost.repeated,
+        lost.damaged,
+        since(|c| c.framing),
+        since(|c| c.crc),
+        since(|c| c.unknown_type),
+        since(|c| c.length),
+        since(|c| c.overrun),
+    )
+}

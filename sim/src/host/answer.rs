@@ -1,0 +1,136 @@
+//! What a board answers to a frame, in integers and in physical units.
+
+use std::collections::BTreeSet;
+use std::time::SystemTime;
+
+use anyhow::Result;
+use dermis_golden::fixed::send::{Status, FLAG_CONDITION, FLAG_FOUND, FLAG_FRAMING, FLAG_NO_CONTACT, STATUS_BEATS};
+use dermis_golden::fixed::Model;
+use dermis_golden::flags::{frame_flags, Flag};
+use dermis_golden::frame::{Forces, Frame};
+use dermis_golden::link::{beats_of_bytes, Sums, BEAT_BYTES};
+use serde::Serialize;
+
+/// A board's answer to a frame, in LSBs.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Answer {
+    /// Sums over all taxels.
+    pub sums: Sums,
+    /// All forces `[fx, fy, fz]`, row-major, where they were asked for.
+    pub beats: Option<Vec<[i32; 3]>>,
+    /// Status beats.
+    pub status: Vec<[i32; 3]>,
+    /// Where it was compared with the bit-true model: the first difference, if there is one.
+    pub difference: Option<Option<String>>,
+    /// When it came.
+    pub came: SystemTime,
+}
+
+impl Answer {
+    /// Reads the payload of forces or resultants; `None` when its length is wrong.
+    pub fn of_bytes(model: &Model, bytes: &[u8], forces: bool) -> Option<Answer> {
+        let (front, status) = bytes.split_at_checked(bytes.len().checked_sub(model.status_beats() * BEAT_BYTES)?)?;
+        let status = beats_of_bytes(status)?;
+        let sensor = &model.scene.sensor;
+        let beats = if forces { Some(beats_of_bytes(front)?) } else { None };
+        let sums = match &beats {
+            Some(beats) if beats.len() != sensor.taxels() => return None,
+            Some(beats) => Sums::of(beats, sensor.cols),
+            None => Sums::of_bytes(front)?,
+        };
+        Some(Answer { sums, beats, status, difference: None, came: SystemTime::now() })
+    }
+
+    /// The first difference from what the bit-true model makes of `codes`. Whether a packet was dropped before the frame
+    /// is no business of the model's.
+    pub fn against(&self, model: &Model, codes: &[i32]) -> Option<String> {
+        let trace = model.run(codes);
+        let cols = model.scene.sensor.cols;
+        let pairs = self.beats.iter().flatten().zip(&trace.beats).enumerate();
+        let mut differing = pairs.filter(|(_, (has, wants))| has != wants);
+        if let Some((index, (has, wants))) = differing.next() {
+            return Some(format!("row {}, column {}: force {has:?}, model {wants:?}", index / cols, index % cols));
+        }
+        let wants = Sums::of(&trace.beats, cols);
+        if self.sums != wants {
+            return Some(format!("sums {:?}, model {wants:?}", self.sums));
+        }
+        let mut status = self.status.clone();
+        status.iter_mut().step_by(STATUS_BEATS).for_each(|beat| beat[2] &= !(FLAG_FRAMING as i32));
+        (status != trace.status).then(|| format!("status {status:?}, model {:?}", trace.status))
+    }
+
+    fn statuses(&self) -> impl Iterator<Item = Status> + '_ {
+        self.status.chunks(STATUS_BEATS).filter_map(Status::of_beats)
+    }
+
+    /// Whether the board dropped a packet of a frame since the last answer.
+    pub fn dropped_before(&self) -> bool {
+        self.statuses().any(|status| status.flags & FLAG_FRAMING != 0)
+    }
+
+    /// The remarks on the result, as a reconstruction has them.
+    fn flags(&self, model: &Model, frame: &Frame) -> Result<Vec<Flag>> {
+        let mut flags: BTreeSet<Flag> = frame_flags(&model.scene, frame, &model.codes(frame)?).into_iter().collect();
+        for status in self.statuses() {
+            let has = |bit: u32| status.flags & bit != 0;
+            let saturated = status.rescale_saturations + status.force_saturations > 0;
+            let all = [
+                (has(FLAG_NO_CONTACT), Flag::NoContact),
+                (!has(FLAG_CONDITION), Flag::ConditionUnmet),
+                (has(FLAG_CONDITION) && !has(FLAG_FOUND), Flag::NoCompression),
+                (saturated, Flag::Saturated),
+            ];
+            flags.extend(all.into_iter().filter(|(set, _)| *set).map(|(_, flag)| flag));
+        }
+        Ok(flags.into_iter().collect())
+    }
+}
+
+/// An answer in physical units, a line of `--stream`.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Line {
+    /// The sum of the forces, [x, y, normal].
+    pub resultant_N: [f64; 3],
+    /// Centre of the normal forces from the array's centre, tension counted negative; none where they add up to
+    /// nothing.
+    pub centre_mm: Option<[f64; 2]>,
+    /// Taxels with a normal force.
+    pub loaded: u64,
+    /// Remarks, sorted.
+    pub flags: Vec<Flag>,
+    /// The board has dropped a frame's packet since its last answer.
+    pub dropped_before: bool,
+    /// One force vector per taxel, where they were asked for.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub forces_N: Option<Forces>,
+    /// Whether the answer is the bit-true model's, where that was asked for.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub equal: Option<bool>,
+}
+
+impl Line {
+    /// The answer to `frame` in physical units.
+    ///
+    /// # Errors
+    /// A frame of another sensor.
+    pub fn new(model: &Model, frame: &Frame, answer: &Answer) -> Result<Line> {
+        let lsb_N = model.force_lsb_N(model.codes(frame)?.full_scale_MPa);
+        let sensor = &model.scene.sensor;
+        let sums = &answer.sums;
+        let [x0, y0] = sensor.position_mm(0, 0);
+        let centre = sums.centre();
+        let centre_mm = centre.map(|[col, row]| [x0 + col * sensor.pitch_x_mm, y0 + row * sensor.pitch_y_mm]);
+        let axis = |beats: &[[i32; 3]], axis: usize| beats.iter().map(|beat| f64::from(beat[axis]) * lsb_N).collect();
+        let forces = |beats: &Vec<[i32; 3]>| Forces { fx: axis(beats, 0), fy: axis(beats, 1), fz: axis(beats, 2) };
+        Ok(Line {
+            resultant_N: [sums.fx, sums.fy, sums.fz].map(|sum| sum as f64 * lsb_N),
+            centre_mm,
+            loaded: sums.loaded,
+            flags: answer.flags(model, frame)?,
+            dropped_before: answer.dropped_before(),
+            forces_N: answer.beats.as_ref().map(forces),
+            equal: answer.difference.as_ref().map(Option::is_none),
+        })
+    }
+}

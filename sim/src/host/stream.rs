@@ -1,0 +1,96 @@
+//! Frames and answers as lines of JSON.
+
+use std::io::{BufRead, ErrorKind, Read, Write};
+use std::time::{SystemTime, UNIX_EPOCH};
+
+use anyhow::{anyhow, Result};
+use dermis_golden::frame::Frame;
+use serde::{Deserialize, Serialize};
+use serde_json::Value;
+
+use super::{HostError, Line, Played, Session};
+
+/// A line that comes in.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Request {
+    #[serde(default)]
+    id: Value,
+    stress_MPa: Vec<f64>,
+}
+
+/// A line that goes out.
+#[derive(Serialize)]
+struct Reply {
+    id: Value,
+    /// Seconds since 1970 when the frame was sent, and when its answer was complete.
+    sent_s: f64,
+    answered_s: f64,
+    #[serde(flatten)]
+    line: Line,
+}
+
+/// A line that goes out in place of an answer.
+#[derive(Serialize)]
+struct Refusal {
+    id: Value,
+    line: usize,
+    error: String,
+}
+
+/// Answers every line of `input`; a wrong one is answered with its error, and the next one is read.
+///
+/// # Errors
+/// A board that does not answer, streams that fail.
+pub(super) fn run<P: Read + Write>(
+    session: &mut Session<P>,
+    input: &mut dyn BufRead,
+    output: &mut dyn Write,
+) -> Result<Played> {
+    let mut played = Played { text: String::new(), equal: true, answered: 0, refused: 0 };
+    for (index, line) in input.lines().enumerate() {
+        let line = line.map_err(|error| anyhow!("standard input, line {}: {error}", index + 1))?;
+        if line.trim().is_empty() {
+            continue;
+        }
+        let text = match answer(session, &line) {
+            Ok(reply) => {
+                played.equal &= reply.line.equal != Some(false);
+                played.answered += 1;
+                serde_json::to_string(&reply)?
+            }
+            // Without a board there is nothing to go on with.
+            Err((_, error)) if error.is::<HostError>() => return Err(error),
+            Err((id, error)) => {
+                played.refused += 1;
+                serde_json::to_string(&Refusal { id, line: index + 1, error: error.to_string() })?
+            }
+        };
+        match writeln!(output, "{text}").and_then(|()| output.flush()) {
+            Err(error) if error.kind() == ErrorKind::BrokenPipe => break,
+            Err(error) => return Err(anyhow!("standard output: {error}")),
+            Ok(()) => (),
+        }
+    }
+    Ok(played)
+}
+
+fn seconds(time: SystemTime) -> f64 {
+    time.duration_since(UNIX_EPOCH).map_or(0.0, |since| since.as_secs_f64())
+}
+
+/// The answer to one line, or what is wrong with it under the id it has.
+fn answer<P: Read + Write>(session: &mut Session<P>, line: &str) -> Result<Reply, (Value, anyhow::Error)> {
+    let request: Request = serde_json::from_str(line).map_err(|error| (Value::Null, error.into()))?;
+    let id = request.id.clone();
+    let name = id.as_str().map_or_else(|| id.to_string(), str::to_owned);
+    let frame = Frame::from_stress(&name, &session.model.scene.sensor, request.stress_MPa);
+    frame.map_err(anyhow::Error::from).and_then(|frame| reply(session, &id, &frame)).map_err(|error| (id, error))
+}
+
+fn reply<P: Read + Write>(session: &mut Session<P>, id: &Value, frame: &Frame) -> Result<Reply> {
+    let sent_s = seconds(SystemTime::now());
+    let (frame, answer) = session.ask(frame)?;
+    let line = Line::new(&session.model, &frame, &answer)?;
+    Ok(Reply { id: id.clone(), sent_s, answered_s: seconds(answer.came), line })
+}

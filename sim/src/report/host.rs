@@ -1,0 +1,32 @@
+//! A board's answers for people.
+
+use super::table::figures;
+use crate::host::{Answer, Line};
+
+/// One frame's resultants.
+pub fn resultants(frame: &str, line: &Line, answer: &Answer) -> String {
+    let largest = line.resultant_N.iter().fold(0.0, |m: f64, x| m.max(x.abs()));
+    let sign = |x: f64| if x.is_sign_negative() { "" } else { "+" };
+    let [x, y, normal] = line.resultant_N.map(|force| sign(force).to_owned() + &figures(force, largest));
+    let centre = line.centre_mm.map_or("-".to_owned(), |[x, y]| format!("({x:+.2}, {y:+.2}) mm"));
+    let flags: Vec<String> =
+        line.flags.iter().filter_map(|f| serde_json::to_value(f).ok()?.as_str().map(str::to_owned)).collect();
+    format!(
+        "{frame}: N x {x}   y {y}   normal {normal}   centre {centre}   taxels {}   flags {}\n{}",
+        line.loaded,
+        if flags.is_empty() { "none".to_owned() } else { flags.join(", ") },
+        equality(answer),
+    )
+}
+
+/// Whether an answer is the bit-true model's, where that was asked for, and whether packets were dropped before it.
+pub fn equality(answer: &Answer) -> String {
+    let checked = match &answer.difference {
+        None => String::new(),
+        Some(None) => "against model   equal, every bit\n".to_owned(),
+        Some(Some(difference)) => format!("against model   DIFFERS: {difference}\n"),
+    };
+    let dropped =
+        if answer.dropped_before() { "board           dropped a packet of this or an earlier frame\n" } else { "" };
+    checked + dropped
+}

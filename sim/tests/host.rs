@@ -1,0 +1,122 @@
+//! The host tool and a whole board without a board: the Verilated board top's UART on a pseudo-terminal, opened like any
+//! serial port; good wires and bad ones.
+
+use std::io::Write;
+use std::path::PathBuf;
+use std::process::{Command, Output, Stdio};
+use std::time::Duration;
+
+use dermis_golden::fixed::Model;
+use dermis_golden::frame::Frame;
+use dermis_golden::scene::Scene;
+use dermis_sim::board::{Faults, Terminal, Wire};
+use dermis_sim::hardware::Hardware;
+use dermis_sim::host::{open, Session};
+
+/// Eight clock cycles per bit: as many frames as possible in the time of a test.
+const BAUD: u32 = 12_500_000;
+
+fn model() -> Model {
+    let mut model = Model::new(&Scene::builtin("eight-by-eight").unwrap()).unwrap();
+    model.board.uart_baud = BAUD;
+    model
+}
+
+fn board(to_board: Faults, to_host: Faults) -> Terminal {
+    let build = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../build");
+    Hardware::new(model(), &build).unwrap().terminal_behind(Wire::new(to_board), Wire::new(to_host)).unwrap()
+}
+
+#[test]
+fn over_a_bad_wire_every_frame_is_answered_right_and_every_loss_is_counted() {
+    let to_board = Faults { lost: 900, flipped: 900, late: 200, no_stop: 1500, seed: 1 };
+    let to_host = Faults { lost: 600, flipped: 600, seed: 2, ..Faults::default() };
+    let terminal = board(to_board, to_host);
+    let client = open(&terminal.path().to_string_lossy(), BAUD, Duration::from_millis(400)).unwrap();
+    let model = model();
+    let frames = Frame::shipped(&model.scene);
+    let mut session = Session::new(client, model, None, false, true).unwrap();
+    let mut dropped = 0;
+    for round in 0..4 {
+        for frame in &frames {
+            let (_, answer) = session.ask(frame).unwrap();
+            assert_eq!(answer.difference, Some(None), "{}, round {round}", frame.id);
+            dropped += usize::from(answer.dropped_before());
+        }
+    }
+    let counters = session.client.counters().unwrap();
+    let lost = session.client.lost;
+    // One byte of 300 is damaged on the way to the board, one of 300 on the way back; twenty frames have 4000 and 2000.
+    assert!(counters.crc > 0 && counters.framing > 0, "{counters:?}");
+    assert!(lost.damaged > 0, "{lost:?}");
+    // Nothing is sent again without a reason, and no frame is dropped without its successor saying so.
+    let reasons = u64::from(counters.crc + counters.framing + counters.length + counters.unknown_type) + lost.damaged;
+    assert!(lost.repeated > 0 && lost.repeated <= reasons, "{lost:?}, {counters:?}");
+    assert!(dropped > 0, "{counters:?}");
+    assert_eq!(counters.overrun, 0);
+}
+
+fn host(terminal: &Terminal, scene: &str, more: &[&str], input: &str) -> Output {
+    let mut child = Command::new(env!("CARGO_BIN_EXE_dermis"))
+        .args(["host", "--port", &terminal.path().to_string_lossy(), "--scene", scene, "--timeout", "3000"])
+        .args(more)
+        .stdin(Stdio::piped())
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    // A program that refuses its arguments reads nothing.
+    let _ = child.stdin.take().unwrap().write_all(input.as_bytes());
+    child.wait_with_output().unwrap()
+}
+
+fn text(bytes: &[u8]) -> String {
+    String::from_utf8(bytes.to_vec()).unwrap()
+}
+
+#[test]
+fn the_program_sends_checks_tares_and_streams() {
+    let terminal = board(Faults::default(), Faults::default());
+    let scene = "eight-by-eight";
+
+    let all = host(&terminal, scene, &["--check"], "");
+    assert_eq!(all.status.code(), Some(0), "{}", text(&all.stderr));
+    let shown = text(&all.stdout);
+    assert_eq!(shown.matches("against model   equal, every bit\n").count(), 5, "{shown}");
+    assert!(shown.contains("board dropped   0 framing, 0 CRC, 0 unknown type, 0 length, 0 overrun\n"), "{shown}");
+
+    let folder = tempfile::tempdir().unwrap();
+    let frame = folder.path().join("press.csv");
+    let stress: Vec<f64> = (0..64).map(|taxel| f64::from(taxel % 9) / 100.0).collect();
+    let rows: Vec<String> =
+        stress.chunks(8).map(|row| row.iter().map(f64::to_string).collect::<Vec<_>>().join(",")).collect();
+    std::fs::write(&frame, rows.join("\n")).unwrap();
+    let frame = frame.to_string_lossy();
+    let forces = host(&terminal, scene, &["--check", "--forces", &frame], "");
+    assert_eq!(forces.status.code(), Some(0), "{}", text(&forces.stderr));
+    assert!(text(&forces.stdout).contains("engine board\n"), "{}", text(&forces.stdout));
+
+    // A frame that is its own tare has nothing left.
+    let nothing = host(&terminal, scene, &["--tare", &frame, &frame], "");
+    assert!(text(&nothing.stdout).contains("no-contact"), "{}", text(&nothing.stdout));
+
+    let line = format!("{{\"id\": [7], \"stress_MPa\": {stress:?}}}\n");
+    let wrong = "{\"id\": 8, \"stress_MPa\": [1]}\n";
+    let streamed = host(&terminal, scene, &["--stream", "--check", "--forces"], &[&line, wrong, &line].concat());
+    assert_eq!(streamed.status.code(), Some(2));
+    let lines: Vec<serde_json::Value> =
+        text(&streamed.stdout).lines().map(|line| serde_json::from_str(line).unwrap()).collect();
+    assert_eq!(lines.len(), 3);
+    for answer in [&lines[0], &lines[2]] {
+        assert_eq!((&answer["id"][0], &answer["equal"]), (&7.into(), &true.into()), "{answer}");
+        assert!(answer["answered_s"].as_f64() > answer["sent_s"].as_f64(), "{answer}");
+        assert_eq!(answer["forces_N"]["fz"].as_array().unwrap().len(), 64);
+    }
+    assert_eq!(lines[1]["error"], "8: stress_MPa has 1 values, wanted 64");
+    assert_eq!(text(&streamed.stderr).lines().last(), Some("error: standard input: 1 of 3 lines were refused"));
+
+    let other = host(&terminal, "sensor-1", &[], "");
+    assert_eq!(other.status.code(), Some(2));
+    let message = text(&other.stderr);
+    assert!(message.contains("the board was made for another scene: 8×8 taxels"), "{message}");
+}
