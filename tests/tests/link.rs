@@ -95,6 +95,9 @@ impl Board {
     }
 }
 
+/// The counter of a cause.
+type Cause = fn(&mut Counters) -> &mut u16;
+
 /// A packet with a right CRC around anything.
 fn sealed(kind: u8, length: u16, payload: &[u8]) -> Vec<u8> {
     let mut bytes = [Header { kind, sequence: 1, length }.to_bytes(), payload.to_vec()].concat();
@@ -130,7 +133,7 @@ fn every_packet_dropped_is_counted_once_under_its_cause() {
     let frame = board.frame(0, Kind::FrameForResultants, 1).to_wire();
     let codes = &board.frame(0, Kind::FrameForResultants, 1).payload;
     let bytes = codes.len() as u16;
-    let cases: [(Vec<u8>, fn(&mut Counters) -> &mut u16); 11] = [
+    let cases: [(Vec<u8>, Cause); 11] = [
         (vec![1, 2, 3, slip::END], |c| &mut c.crc),
         (vec![slip::ESC, 7, slip::END], |c| &mut c.framing),
         // Cut short: the END of the next packet ends it.
