@@ -19,7 +19,7 @@ mod tests;
 pub use codes::{beats_of_bytes, code_bytes, codes_of_bytes, codes_to_bytes, BEAT_BYTES};
 pub use format::markdown;
 pub use header::c_header;
-pub use identity::{scene_hash, LinkError};
+pub use identity::{payloads, scene_hash, wire_ms, LinkError};
 pub use packet::{Decoder, Packet, PacketError};
 pub use payload::{Beat, Counters, Field, Header, Identity, Sums};
 
@@ -31,7 +31,8 @@ pub const OVERHEAD: usize = Header::BYTES + CRC_BYTES;
 pub const CRC_BYTES: usize = 4;
 /// Set in the type of an answer, which is otherwise its request's.
 pub const ANSWER: u8 = 0x80;
-/// What a CRC-32 (reflected polynomial 0xEDB88320) over a packet and its own CRC always leaves, before the final inversion.
+/// What a CRC-32 (reflected polynomial 0xEDB88320) over a packet and its own CRC always leaves, before the final
+/// inversion.
 pub const CRC_RESIDUE: u32 = 0xdebb_20e3;
 
 /// A packet's type.

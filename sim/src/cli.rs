@@ -385,6 +385,9 @@ fn build(scene: &Scene, out: &Path, board: bool, with_features: bool) -> Result<
         text.push_str(&format!("{} ({} bytes)\n", path.display(), file.text.len()));
     }
     text.push_str(&resources(&model, &generated.usage));
+    if board {
+        text.push_str(&report::wire_times(&model));
+    }
     if with_features {
         text.push_str(&features(&explained));
     }

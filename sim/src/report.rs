@@ -12,7 +12,7 @@ mod result;
 mod table;
 
 pub use errors::errors;
-pub use host::{equality, resultants};
+pub use host::{equality, resultants, wire_times};
 pub use noise::noise;
 pub use result::{difference, reconstruction};
 pub use table::{cosim, scenes};

@@ -97,7 +97,8 @@ pub(crate) struct Bench {
 unsafe impl Send for Bench {}
 
 impl Bench {
-    /// Builds the design in its `bench` (Verilog text), or takes it from `cache`, and starts it; `out` has `words` words.
+    /// Builds the design in its `bench` (Verilog text), or takes it from `cache`, and starts it; `out` has `words`
+    /// words.
     pub(crate) fn new(design: &Design, bench: &str, words: usize, cache: &Path) -> Result<Self, VerilatorError> {
         let path = library(design, bench, cache)?;
         let fail = |reason: String| VerilatorError::Library { path: path.clone(), reason };

@@ -1,5 +1,5 @@
-//! The host tool and a whole board without a board: the Verilated board top's UART on a pseudo-terminal, opened like any
-//! serial port; good wires and bad ones.
+//! The host tool and a whole board without a board: the Verilated board top's UART on a pseudo-terminal, opened like
+//! any serial port; good wires and bad ones.
 
 use std::io::Write;
 use std::path::PathBuf;

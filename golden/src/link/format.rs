@@ -10,8 +10,7 @@ pub(super) fn contents(kind: Kind) -> &'static str {
     match kind {
         Kind::Identify | Kind::ReadCounters => "nothing",
         Kind::FrameForResultants | Kind::FrameForForces => {
-            "one code per taxel, row-major: little-endian two's complement in the fewest whole bytes that hold \
-             `input_bits`; the board ignores the bits above"
+            "one code per taxel, row-major: two's complement in the fewest bytes for `input_bits`"
         }
         Kind::Identity => "identity",
         Kind::Counters => "counters",
@@ -26,8 +25,8 @@ pub fn markdown() -> String {
         "\
 # Packets, version {VERSION}
 
-All numbers are little-endian. On the wire a packet stands between two bytes 0x{end:02x} (SLIP, RFC 1055); in it 0x{end:02x} is
-0x{esc:02x} 0x{esc_end:02x} and 0x{esc:02x} is 0x{esc:02x} 0x{esc_esc:02x}. The UART has 8 data bits, no parity, one stop bit.
+All numbers are little-endian. On the wire a packet stands between two bytes 0x{end:02x} (SLIP, RFC 1055); in it
+0x{end:02x} is 0x{esc:02x} 0x{esc_end:02x} and 0x{esc:02x} is 0x{esc:02x} 0x{esc_esc:02x}. The UART has 8 data bits, no parity, one stop bit.
 
 | byte | size | packet |
 |---:|---:|---|
@@ -47,11 +46,11 @@ All numbers are little-endian. On the wire a packet stands between two bytes 0x{
         text,
         "\
 | {at} | n | payload |
-| {at} + n | {CRC_BYTES} | CRC-32 of all before it: polynomial 0x04c11db7 reflected, start and final inversion 0xffffffff, as zlib's |
+| {at} + n | {CRC_BYTES} | CRC-32 of all before it: 0x04c11db7 reflected, start and final inversion 0xffffffff, as zlib |
 
 The host asks, the board answers each request that it takes, frames in the order in which they came; an answer has its
-request's sequence number. A request that is damaged is dropped, counted and not answered. Up to three frames may be on their
-way at a time.
+request's sequence number. A request that is damaged is dropped, counted and not answered. Up to three frames may be on
+their way at a time.
 
 | type | from | packet | payload |
 |---:|---|---|---|
@@ -71,7 +70,7 @@ way at a time.
             at += field.bytes;
         }
     }
-    text + "\nThe status beats are described with stage [`send`](crate::fixed::send).\n"
+    text + "\nThe board ignores the bits of a code above `input_bits`. The status beats are described with stage [`send`](crate::fixed::send).\n"
 }
 
 fn row(text: &mut String, at: usize, field: &Field) {

@@ -4,7 +4,7 @@ use serde_json::json;
 use thiserror::Error;
 
 use super::payload::{Identity, Sums};
-use super::{code_bytes, BEAT_BYTES, VERSION};
+use super::{code_bytes, BEAT_BYTES, OVERHEAD, VERSION};
 use crate::fixed::coefficients::Blocks;
 use crate::fixed::send::STATUS_BEATS;
 use crate::fixed::Model;
@@ -49,16 +49,9 @@ impl Identity {
     /// An array whose packets would be too long, a bit rate too high for the clock.
     pub fn of(model: &Model) -> Result<Identity, LinkError> {
         let (sensor, board) = (&model.scene.sensor, &model.board);
-        let taxels = sensor.taxels();
-        let status = model.status_beats() * BEAT_BYTES;
-        let input_bits = model.formats.input_bits;
-        let payloads = [
-            ("codes", code_bytes(input_bits) * taxels),
-            ("forces", BEAT_BYTES * taxels + status),
-            ("resultants", Sums::BYTES + status),
-        ];
+        let payloads = payloads(model);
         if let Some((what, bytes)) = payloads.into_iter().find(|(_, bytes)| *bytes > usize::from(u16::MAX)) {
-            return Err(LinkError::TooLong { scene: model.scene.name.clone(), what, taxels, bytes });
+            return Err(LinkError::TooLong { scene: model.scene.name.clone(), what, taxels: sensor.taxels(), bytes });
         }
         let most = board.clock_MHz * 1e6 / LEAST_CYCLES_PER_BIT;
         if f64::from(board.uart_baud) > most {
@@ -70,7 +63,7 @@ impl Identity {
             version: VERSION,
             rows: sensor.rows as u16,
             cols: sensor.cols as u16,
-            input_bits: input_bits as u8,
+            input_bits: model.formats.input_bits as u8,
             status_beats: STATUS_BEATS as u8,
             scene: scene_hash(model),
             clock_hz: (board.clock_MHz * 1e6).round() as u32,
@@ -79,6 +72,23 @@ impl Identity {
             reserved: 0,
         })
     }
+}
+
+/// Bytes of a frame's codes, of its resultants and of its forces, each with a name.
+pub fn payloads(model: &Model) -> [(&'static str, usize); 3] {
+    let taxels = model.scene.sensor.taxels();
+    let status = model.status_beats() * BEAT_BYTES;
+    [
+        ("codes", code_bytes(model.formats.input_bits) * taxels),
+        ("resultants", Sums::BYTES + status),
+        ("forces", BEAT_BYTES * taxels + status),
+    ]
+}
+
+/// Time of a packet of `payload` bytes on the board's UART, ten bits to the byte, in ms; every byte that needs an escape
+/// adds another.
+pub fn wire_ms(payload: usize, baud: u32) -> f64 {
+    (payload + OVERHEAD + 2) as f64 * 10.0 / f64::from(baud) * 1e3
 }
 
 /// CRC-32 over everything that decides the bits of the answers: this program's version, array, subarrays, formats,

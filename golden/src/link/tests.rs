@@ -92,6 +92,14 @@ fn the_hash_tells_scenes_apart_and_clocks_not() {
 }
 
 #[test]
+fn time_on_the_wire_by_hand() {
+    let model = crate::fixed::Model::new(&Scene::builtin("eight-by-eight").unwrap()).unwrap();
+    assert_eq!(payloads(&model), [("codes", 192), ("resultants", 48 + 36), ("forces", 768 + 36)]);
+    // 290 payload bytes and 10 more at 300 000 bytes a second.
+    assert_eq!(wire_ms(290, 3_000_000), 1.0);
+}
+
+#[test]
 fn the_committed_page_is_the_generated_one() {
     let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("src/link/format.md");
     if std::env::var_os("DERMIS_ACCEPT").is_some() {

@@ -14,11 +14,11 @@ pub(super) fn board_top(model: &Model) -> Result<BoardTop, HdlError> {
     Ok(top)
 }
 
-/// Generates the hardware of `model` behind its board's UART: what [`crate::generate`] gives, with the board's top module
-/// in place of the engine's, and no stream to observe.
+/// Generates the hardware of `model` behind its board's UART: what [`crate::generate()`] gives, with the board's top
+/// module in place of the engine's, and no stream to observe.
 ///
 /// # Errors
-/// As [`crate::generate`]; packets that would be too long, a bit rate that the clock cannot sample.
+/// As [`crate::generate()`]; packets that would be too long, a bit rate that the clock cannot sample.
 pub fn generate_board(model: &Model) -> Result<Generated, HdlError> {
     let board = board_top(model)?;
     let engine = crate::generate(model)?;

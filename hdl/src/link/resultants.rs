@@ -7,8 +7,8 @@ use super::Shape;
 use crate::wire::{Wire, Word};
 use dermis_golden::link::Sums;
 
-/// While `run`, beats pass as words; with `summarise`, the forces are added up as they pass, and the sums go out as four
-/// words before the status. No multiplier: where Σ column · fz is asked for, the sum of what lies left of each taxel is
+/// While `run`, beats pass as words; with `summarise`, the forces are added up as they pass, and the sums go out as
+/// four words before the status. No multiplier: where Σ column · fz is asked for, the sum of what lies left of each taxel is
 /// subtracted, and at the end Σ fz is added columns − 1 times, one per cycle; rows alike.
 #[derive(LogicBlock)]
 pub struct Resultants {
@@ -203,7 +203,7 @@ always @(*) begin
   beat_ready = run && (passes || stage == 2'd{ADD});
   word_valid = run && (passes ? beat_valid : stage == 2'd{OUT});
   word_last = passes && beat_last;
-  word = passes ? beat : all[out * 96 +: 96];
+  word = passes ? beat : out[1] ? (out[0] ? all[383:288] : all[287:192]) : (out[0] ? all[191:96] : all[95:0]);
 end
 wire adds = run && summarise && stage == 2'd{ADD} && beat_valid;
 always @(posedge clk) begin

@@ -11,7 +11,7 @@ use crate::wire::{Wire, Word};
 /// Score = total − weight for all nine at once, then a tree of comparisons by the search's rules of ties: row-major in
 /// the coarse grid; in a halving the centre, then row-major.
 ///
-/// `start` with totals, weights and sweep; `done` [`LATENCY`] cycles later, `improved` with it. `begin_frame`
+/// `start` with totals, weights and sweep; `done` `LATENCY` cycles later, `improved` with it. `begin_frame`
 /// forgets the frame, `halve` doubles the position for the next level.
 #[derive(LogicBlock)]
 pub struct Judge {

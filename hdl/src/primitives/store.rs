@@ -7,9 +7,9 @@ use super::polynomial_word::{resize, PolynomialWord};
 use super::sweep::{BUFFERS, BUFFER_BITS, START};
 use crate::wire::{Wire, Word};
 
-/// Buffers of quads of polynomials. `fill` writes one coefficient of a quad into buffer [`START`]; `write` a whole quad
-/// into one of the others; the read register follows the
-/// address by two cycles: block RAM is slow to answer, so nothing but a register follows it.
+/// Buffers of quads of polynomials. `fill` writes one coefficient of a quad into buffer `START`; `write` a whole quad
+/// into one of the others; the read register follows the address by two cycles: block RAM is slow to answer, so nothing
+/// but a register follows it.
 ///
 /// Where one subarray is filled while another is searched, `START` is a memory of its own. Otherwise it is another name
 /// of buffer 0, and `fill` and `write` never coincide.

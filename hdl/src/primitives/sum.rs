@@ -7,7 +7,7 @@ use super::polynomial_word::{resize, PolynomialWord};
 use super::sweep::{BUFFERS, BUFFER_BITS, START};
 use crate::wire::{Wire, Word};
 
-/// Adds up the counted lanes of each `fill` into buffer [`START`] (quad 0 starts a coefficient anew); `read` holds a
+/// Adds up the counted lanes of each `fill` into buffer `START` (quad 0 starts a coefficient anew); `read` holds a
 /// buffer's sum on `word`; `write` replaces a buffer's sum. As in the search memory, `START` is buffer 0 unless one
 /// subarray is filled while another is searched.
 #[derive(LogicBlock)]

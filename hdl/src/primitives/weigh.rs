@@ -10,7 +10,7 @@ use crate::wire::{Wire, Word};
 
 /// Three candidates per cycle, a row of equal y each: Σp selected and the disc tested, leading one, table, times n.
 ///
-/// `start` with the sweep's sums, which stand three cycles more; its answers [`LATENCY`] cycles later, with the sweep
+/// `start` with the sweep's sums, which stand three cycles more; its answers `LATENCY` cycles later, with the sweep
 /// they belong to, until those of the next sweep come.
 #[derive(LogicBlock)]
 pub struct Weigh {

@@ -41,8 +41,8 @@ impl Answer {
         Some(Answer { sums, beats, status, difference: None, came: SystemTime::now() })
     }
 
-    /// The first difference from what the bit-true model makes of `codes`. Whether a packet was dropped before the frame
-    /// is no business of the model's.
+    /// The first difference from what the bit-true model makes of `codes`. Whether a packet was dropped before the
+    /// frame is no business of the model's.
     pub fn against(&self, model: &Model, codes: &[i32]) -> Option<String> {
         let trace = model.run(codes);
         let cols = model.scene.sensor.cols;

@@ -1,5 +1,8 @@
 //! A board's answers for people.
 
+use dermis_golden::fixed::Model;
+use dermis_golden::link::{payloads, wire_ms};
+
 use super::table::figures;
 use crate::host::{Answer, Line};
 
@@ -29,4 +32,11 @@ pub fn equality(answer: &Answer) -> String {
     let dropped =
         if answer.dropped_before() { "board           dropped a packet of this or an earlier frame\n" } else { "" };
     checked + dropped
+}
+
+/// How long a frame's packets take on the board's UART.
+pub fn wire_times(model: &Model) -> String {
+    let baud = model.board.uart_baud;
+    let times = payloads(model).map(|(what, bytes)| format!("{what} {:.2} ms", wire_ms(bytes, baud)));
+    format!("UART at {baud} bit/s: {}\n", times.join(", "))
 }
