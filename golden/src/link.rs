@@ -1,7 +1,7 @@
 //! The link between a host and the engine on a board: what goes over the wire, byte by byte.
 //!
 //! It depends on no hardware: the host tool, the hardware description and the C header are made from the same
-//! definitions ([`payload`], [`Kind`]).
+//! definitions ([`Kind`], [`Header`] and the payloads).
 //!
 #![doc = include_str!("link/format.md")]
 

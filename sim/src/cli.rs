@@ -411,20 +411,24 @@ mod tests {
     fn own_faults_exit_with_1_and_what_the_caller_can_mend_with_2() {
         let io = |kind| VerilatorError::Io { path: "build".into(), source: ErrorKind::into(kind) };
         let stuck = Stuck { frame: "press".into(), cycle: 7, rule: "nothing moved".into() };
-        let own: [anyhow::Error; 6] = [
+        let answer = HostError::Answer { port: "p".into(), what: "forces", bytes: 7 };
+        let own: [anyhow::Error; 7] = [
             VerilatorError::Build { design: "d".into(), folder: "f".into(), log: "l".into() }.into(),
             VerilatorError::Library { path: "l".into(), reason: "r".into() }.into(),
             HdlError::Check("loop".into()).into(),
             FixedError::Internal("limbs").into(),
             FixedError::Beats { what: "forces", got: 1, expected: 2 }.into(),
             stuck.into(),
+            answer.into(),
         ];
-        let callers: [anyhow::Error; 6] = [
+        let version = HostError::Version { port: "p".into(), has: 2, wants: 1 };
+        let callers: [anyhow::Error; 7] = [
             VerilatorError::Missing.into(),
             VerilatorError::MissingTool { program: "make" }.into(),
             io(ErrorKind::PermissionDenied).into(),
             FixedError::Board(Board::load("none").unwrap_err()).into(),
             FixedError::NoFullScale { field: "threshold.min_force_N", value: "1".into() }.into(),
+            version.into(),
             anyhow!("rtl: File exists"),
         ];
         for (errors, code) in [(own, 1), (callers, 2)] {

@@ -7,6 +7,7 @@ use dermis_golden::fixed::Model;
 use dermis_golden::link::{
     beats_of_bytes, codes_to_bytes, slip, Counters, Decoder, Header, Identity, Kind, Packet, Sums,
 };
+use dermis_golden::scene::Scene;
 use dermis_hdl::link::{BoardDevice, BoardOutputs};
 use dermis_sim::board::{Sent, UartLine};
 use dermis_sim::hardware::{Hardware, Simulator};
@@ -40,9 +41,13 @@ struct Board {
 impl Board {
     fn new(simulators: &[Simulator]) -> Board {
         let (scene, frames) = scene("eight-by-eight");
-        let mut model = Model::new(&scene).unwrap();
-        model.board.uart_baud = BAUD;
+        let model = Model::new(&scene).unwrap();
         let codes = frames.iter().map(|frame| model.codes(frame).unwrap().codes).collect();
+        Board::of(model, codes, simulators)
+    }
+
+    fn of(mut model: Model, codes: Vec<Vec<i32>>, simulators: &[Simulator]) -> Board {
+        model.board.uart_baud = BAUD;
         let clock_hz = Identity::of(&model).unwrap().clock_hz;
         let hardware = Hardware::new(model.clone(), &build_dir()).unwrap();
         let mut devices: Vec<_> = simulators.iter().map(|simulator| hardware.board(*simulator).unwrap()).collect();
@@ -169,6 +174,16 @@ fn every_packet_dropped_is_counted_once_under_its_cause() {
 }
 
 #[test]
+fn a_host_whose_bit_rate_is_two_percent_off_is_understood() {
+    for baud in [BAUD / 100 * 98, BAUD / 100 * 102] {
+        let mut board = Board::new(&[Simulator::Verilator]);
+        board.line.set_baud(baud);
+        board.send(&board.frame(0, Kind::FrameForForces, 3).to_wire());
+        assert!(board.receive() == [board.answer(0, Kind::FrameForForces, 3, false)], "{baud} bit/s");
+    }
+}
+
+#[test]
 fn requests_that_come_too_fast_are_overruns_and_the_rest_is_answered_in_order() {
     let mut board = Board::new(&[Simulator::Verilator]);
     // All forces take four times as long to send as a frame takes to come.
@@ -190,4 +205,35 @@ fn requests_that_come_too_fast_are_overruns_and_the_rest_is_answered_in_order() 
     // Afterwards everything is as before.
     board.send(&board.frame(0, Kind::FrameForResultants, 77).to_wire());
     assert_eq!(board.receive().len(), 1);
+}
+
+#[test]
+fn other_arrays_codes_of_one_and_two_bytes_and_the_largest_sums_are_answered() {
+    // 5×6 taxels in two subarrays, and 2×3 taxels whose code is a single byte.
+    let scenes = [
+        "rows = 5\ncols = 6\n[partition]\nrows = 1\ncols = 2\n[fixed]\ninput_bits = 16\n",
+        "rows = 2\ncols = 3\n[fixed]\ninput_bits = 8\ndata_bits = 12\ncoef_bits = 8\ninverse_bits = 8\n",
+    ];
+    for text in scenes {
+        // A small mu_max makes a small search.
+        let lengths = "pitch_x_mm = 3.0\npitch_y_mm = 4.0\nthickness_mm = 3.0\n";
+        let text = format!("[search]\nmu_max = 0.05\n[sensor]\n{lengths}{text}");
+        let model = Model::new(&Scene::parse(&text, "small").unwrap()).unwrap();
+        let (taxels, bits) = (model.scene.sensor.taxels(), model.formats.input_bits);
+        let largest = (1i32 << (bits - 1)) - 1;
+        let codes = vec![
+            vec![largest; taxels],
+            vec![-largest - 1; taxels],
+            (0..taxels as i32).map(|taxel| if taxel % 3 == 0 { -largest } else { largest / (taxel + 1) }).collect(),
+        ];
+        let mut board = Board::of(model, codes, &[Simulator::Verilator, Simulator::RustHdl]);
+        for index in 0..3 {
+            for kind in [Kind::FrameForResultants, Kind::FrameForForces] {
+                board.send(&board.frame(index, kind, 5).to_wire());
+                let (answers, wanted) = (board.receive(), board.answer(index, kind, 5, false));
+                assert!(answers == [wanted], "{text}: frame {index}, {kind:?}");
+            }
+        }
+        assert_eq!(board.counters(), Counters { taken: 7, ..Counters::default() });
+    }
 }

@@ -53,6 +53,11 @@ impl UartLine {
         }
     }
 
+    /// From now on sends and listens at `baud` bit/s, whatever the board does.
+    pub fn set_baud(&mut self, baud: u32) {
+        self.baud = baud.into();
+    }
+
     /// Puts something into the queue for the line.
     pub fn send(&mut self, what: Sent) {
         self.queue.push_back(what);
