@@ -8,7 +8,7 @@ use super::{code_bytes, BEAT_BYTES, OVERHEAD, VERSION};
 use crate::fixed::coefficients::Blocks;
 use crate::fixed::send::STATUS_BEATS;
 use crate::fixed::Model;
-use crate::scene::Condition;
+use crate::scene::{Condition, ForceOutput};
 
 /// Fewest clock cycles per bit: the receiver votes over three of them.
 const LEAST_CYCLES_PER_BIT: f64 = 8.0;
@@ -16,6 +16,16 @@ const LEAST_CYCLES_PER_BIT: f64 = 8.0;
 /// Why a scene has no link.
 #[derive(Clone, Debug, PartialEq, Error)]
 pub enum LinkError {
+    /// A scene whose engine does not send one force per taxel for each frame.
+    #[error(
+        "{field} = {value}: a board's link takes one frame for each answer, and one force per taxel from the engine"
+    )]
+    Unsupported {
+        /// The scene's field.
+        field: &'static str,
+        /// Its value.
+        value: String,
+    },
     /// A payload longer than its length field can say.
     #[error("scene {scene}: {what} of {taxels} taxels take {bytes} bytes, a packet holds 65535")]
     TooLong {
@@ -46,9 +56,18 @@ impl Identity {
     /// The identity of the hardware of `model`.
     ///
     /// # Errors
-    /// An array whose packets would be too long, a bit rate too high for the clock.
+    /// A scene that averages or sends resultants only, an array whose packets would be too long, a bit rate too high for
+    /// the clock.
     pub fn of(model: &Model) -> Result<Identity, LinkError> {
         let (sensor, board) = (&model.scene.sensor, &model.board);
+        let scene = &model.scene;
+        let refuse = |field, value: String| Err(LinkError::Unsupported { field, value });
+        if scene.input.average > 0 {
+            return refuse("input.average", scene.input.average.to_string());
+        }
+        if scene.output.forces != ForceOutput::Taxels {
+            return refuse("output.forces", "\"resultants\"".to_owned());
+        }
         let payloads = payloads(model);
         if let Some((what, bytes)) = payloads.into_iter().find(|(_, bytes)| *bytes > usize::from(u16::MAX)) {
             return Err(LinkError::TooLong { scene: model.scene.name.clone(), what, taxels: sensor.taxels(), bytes });

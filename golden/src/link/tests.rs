@@ -92,6 +92,21 @@ fn the_hash_tells_scenes_apart_and_clocks_not() {
 }
 
 #[test]
+fn scenes_that_the_link_does_not_fit_are_refused_by_field() {
+    let plain = crate::fixed::Model::new(&Scene::builtin("eight-by-eight").unwrap()).unwrap();
+    let refused = |change: &dyn Fn(&mut Scene)| {
+        let mut model = plain.clone();
+        change(&mut model.scene);
+        Identity::of(&model).unwrap_err().to_string()
+    };
+    assert!(refused(&|scene| scene.input.average = 2).starts_with("input.average = 2: "));
+    let resultants = refused(&|scene| scene.output.forces = crate::scene::ForceOutput::Resultants);
+    assert!(resultants.starts_with("output.forces = \"resultants\": "), "{resultants}");
+    let long = refused(&|scene| scene.sensor.rows = 800);
+    assert_eq!(long, "scene eight-by-eight: forces of 6400 taxels take 76836 bytes, a packet holds 65535");
+}
+
+#[test]
 fn time_on_the_wire_by_hand() {
     let model = crate::fixed::Model::new(&Scene::builtin("eight-by-eight").unwrap()).unwrap();
     assert_eq!(payloads(&model), [("codes", 192), ("resultants", 48 + 36), ("forces", 768 + 36)]);
