@@ -84,7 +84,8 @@ impl Logic for Score {
     fn hdl(&self) -> Verilog {
         let (v, s, t) = self.widths();
         let shift = EPSILON_SHIFT as usize;
-        let e = s - 1 - shift;
+        // Of small arrays and short words ε Σp is 0.
+        let e = (s - 1).saturating_sub(shift).max(1);
         let x = v.max(e) + 1;
         let lane_sum = LOG_BITS + 2;
         let pad = |bits: usize| match bits {
@@ -104,8 +105,8 @@ genvar k, l;
 generate
   for (k = 0; k < 9; k = k + 1) begin : candidate
     reg [{e_end}:0] epsilon;
-    always @(posedge clk) epsilon <= sums[(k + 1) * {s} - 1] ? {e}'d0 : sums[k * {s} + {shift} +: {e}];
-    wire unused = &{{1'b0, sums[k * {s} +: {shift}]}};
+    always @(posedge clk) epsilon <= {epsilon};
+    wire unused = &{{1'b0, sums[k * {s} +: {below}]}};
     wire [{logs_end}:0] logs;
     reg [{lane_sum_end}:0] together;
     for (l = 0; l < 4; l = l + 1) begin : lane
@@ -131,6 +132,11 @@ generate
   end
 endgenerate",
             functions = functions(x),
+            epsilon = match s - 1 > shift {
+                true => format!("sums[(k + 1) * {s} - 1] ? {e}'d0 : sums[k * {s} + {shift} +: {e}]"),
+                false => "1'd0".to_string(),
+            },
+            below = if s - 1 > shift { shift } else { s },
             e_end = e - 1,
             logs_end = 4 * LOG_BITS - 1,
             lane_sum_end = lane_sum - 1,

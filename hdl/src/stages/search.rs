@@ -154,7 +154,7 @@ impl Search {
             weighs: BitDelay::new(MOVED + CANDIDATES_LATENCY + 1),
             totals: BitDelay::new(MOVED + CANDIDATES_LATENCY + SCORE_LATENCY + padding),
             finish: BitDelay::new(MOVED + 1),
-            step: Delay::new(5, STORE_LATENCY - 1),
+            step: Delay::new(5, STORE_LATENCY),
             target: Delay::new(BUFFER_BITS, MOVED),
             moved_address: Delay::new(address, MOVED),
             scored_address: Delay::new(address, CANDIDATES_LATENCY),
