@@ -135,10 +135,12 @@ reg [2:0] valid;
 // |c + u|² = |c|² + 2 (ux cx + uy cy) + |ux| + |uy|: the disc needs no multiplier. Row by row uy is −1, 0, 1.
 wire [{q_end}:0] twice_x = {{{{{q_more}{{held_centre_x[{p_end}]}}}}, held_centre_x, 1'b0}};
 wire [{q_end}:0] twice_y = {{{{{q_more}{{held_centre_y[{p_end}]}}}}, held_centre_y, 1'b0}};
-wire [{q_end}:0] along_y = row == 2'd0 ? {q}'d1 - twice_y : row == 2'd2 ? {q}'d1 + twice_y : {q}'d0;
-wire [{q_end}:0] in_row = held_square + along_y;
-wire [{distances_end}:0] distance = {{in_row + twice_x + {q}'d1, in_row, in_row - twice_x + {q}'d1}};
+// One addition with carry a cycle, and the comparison in a third.
+reg [{q_end}:0] in_row;
+reg [{distances_end}:0] distance;
 always @(posedge clk) begin
+  in_row <= row == 2'd0 ? held_square - twice_y + {q}'d1 : row == 2'd2 ? held_square + twice_y + {q}'d1 : held_square;
+  distance <= {{in_row + twice_x + {q}'d1, in_row, in_row - twice_x + {q}'d1}};
   if (rst) begin
     running <= 1'b0;
     valid <= 3'd0;
@@ -163,14 +165,15 @@ generate
     reg [{s_end}:0] sum1;
     reg [{located_end}:0] located;
     reg [{log_end}:0] log;
-    reg fits1, fits2, fits3;
+    reg presses1, presses2, fits3;
     wire [{w_end}:0] product = {terms};
     always @(posedge clk) begin
       sum1 <= sum;
-      fits1 <= !sum[{s_end}] && sum != {s}'d0 && distance[c * {q} +: {q}] <= held_radius;
+      presses1 <= !sum[{s_end}] && sum != {s}'d0;
+      presses2 <= presses1;
+      fits3 <= presses2 && distance[c * {q} +: {q}] <= held_radius;
       located <= locate(sum1);
       log <= logarithm(located);
-      {{fits3, fits2}} <= {{fits2, fits1}};
       if (valid[2]) begin
 {rows}      end
     end
