@@ -370,10 +370,13 @@ fn against_golden(scene: &Scene, frames: &[Frame], result: &Reconstruction) -> R
 
 /// Writes the generated files, each complete or not at all, and lists them.
 fn build(scene: &Scene, out: &Path, board: bool, with_features: bool) -> Result<String> {
+    // Seconds where the matrices are large, more where remedies are tried.
+    let progress = Progress::start(&format!("{}: model and Verilog", scene.name));
     let model = Model::new(scene)?;
     let mut generated = if board { generate_board(&model)? } else { generate(&model)? };
     let explained = explain(&model)?;
     generated.add_explained(&explained);
+    drop(progress);
     std::fs::create_dir_all(out).map_err(|e| anyhow!("{}: {e}", out.display()))?;
     let mut text = String::new();
     for file in &generated.files {
