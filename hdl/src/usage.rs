@@ -12,6 +12,22 @@ use crate::estimate::modules;
 /// Words, bits and LUTs of a distributed RAM cell of the ECP5.
 const CELL: [usize; 3] = [16, 4, 6];
 
+/// The stages in the order of the pipeline, by their names in the hardware; what belongs to none is the engine's.
+pub const STAGES: [&str; 12] = [
+    "prepare",
+    "receive",
+    "normalise",
+    "fold",
+    "pass",
+    "rescale",
+    "unfold",
+    "search",
+    "forces",
+    "send",
+    "resultants",
+    "engine",
+];
+
 /// Resources of a part of the design.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct Usage {
@@ -38,8 +54,7 @@ impl std::ops::AddAssign for Usage {
 pub fn stages(model: &Model, verilog: &str) -> BTreeMap<String, Usage> {
     let mut all: BTreeMap<String, Usage> = BTreeMap::new();
     let mut add = |block: &str, usage: Usage| {
-        let stage = block.split('$').next().filter(|stage| !stage.is_empty()).unwrap_or("engine");
-        let stage = if model_stage(stage) { stage } else { "engine" };
+        let stage = block.split('$').next().filter(|stage| STAGES.contains(stage)).unwrap_or("engine");
         *all.entry(stage.to_string()).or_default() += usage;
     };
     let memories = &model.resources.memories;
@@ -63,11 +78,6 @@ pub fn total(stages: &BTreeMap<String, Usage>) -> Usage {
     let mut sum = Usage::default();
     stages.values().for_each(|&usage| sum += usage);
     sum
-}
-
-fn model_stage(name: &str) -> bool {
-    ["prepare", "receive", "normalise", "fold", "pass", "rescale", "unfold", "search", "forces", "send", "resultants"]
-        .contains(&name)
 }
 
 fn distributed_luts(memory: &Memory) -> usize {

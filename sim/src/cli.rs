@@ -28,7 +28,6 @@ use crate::fresh::Fresh;
 use crate::hardware::{Hardware, Simulator, Stuck};
 use crate::host::HostError;
 use crate::inputs::{resolve, resolve_one};
-use crate::needs::{features, resources};
 use crate::progress::Progress;
 use crate::report::{self, CosimReport, Format};
 use crate::tabulate::tabulate;
@@ -387,12 +386,12 @@ fn build(scene: &Scene, out: &Path, board: bool, with_features: bool) -> Result<
             .map_err(|e| anyhow!("{}: {e}", path.display()))?;
         text.push_str(&format!("{} ({} bytes)\n", path.display(), file.text.len()));
     }
-    text.push_str(&resources(&model, &generated.usage));
+    text.push_str(&report::resources(&model, &generated.usage));
     if board {
         text.push_str(&report::wire_times(&model));
     }
     if with_features {
-        text.push_str(&features(&explained));
+        text.push_str(&report::features(&explained));
     }
     Ok(text)
 }

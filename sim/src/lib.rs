@@ -38,7 +38,6 @@ pub mod generate;
 pub mod hardware;
 pub mod host;
 pub mod inputs;
-pub mod needs;
 mod progress;
 pub mod report;
 pub mod tabulate;

@@ -5,6 +5,7 @@
 
 mod errors;
 mod host;
+mod needs;
 mod noise;
 #[cfg(test)]
 mod read;
@@ -13,6 +14,7 @@ mod table;
 
 pub use errors::errors;
 pub use host::{equality, resultants, wire_times};
+pub use needs::{features, resources};
 pub use noise::noise;
 pub use result::{difference, reconstruction};
 pub use table::{cosim, scenes};

@@ -157,6 +157,11 @@ pub(super) fn figures(value: f64, largest: f64) -> String {
 
 /// A Markdown table with columns padded to the same width; the first column is left-aligned.
 pub(super) fn markdown(head: &[&str], rows: Vec<Vec<String>>) -> String {
+    aligned(1, head, rows)
+}
+
+/// The same with the first `texts` columns left-aligned.
+pub(super) fn aligned(texts: usize, head: &[&str], rows: Vec<Vec<String>>) -> String {
     let head: Vec<String> = head.iter().map(|&h| h.to_owned()).collect();
     let width = |column: usize| {
         let cells = rows.iter().chain([&head]).map(|row| row[column].chars().count());
@@ -166,7 +171,7 @@ pub(super) fn markdown(head: &[&str], rows: Vec<Vec<String>>) -> String {
     let line = |row: &Vec<String>| {
         let cells = row.iter().zip(&widths).enumerate().map(|(column, (cell, &width))| {
             let pad = " ".repeat(width - cell.chars().count());
-            if column == 0 {
+            if column < texts {
                 format!("{cell}{pad}")
             } else {
                 format!("{pad}{cell}")
@@ -175,7 +180,7 @@ pub(super) fn markdown(head: &[&str], rows: Vec<Vec<String>>) -> String {
         format!("| {} |\n", cells.collect::<Vec<_>>().join(" | "))
     };
     let rule = widths.iter().enumerate().map(|(column, &width)| {
-        if column == 0 {
+        if column < texts {
             "-".repeat(width + 2)
         } else {
             format!("{}:", "-".repeat(width + 1))

@@ -1,0 +1,60 @@
+//! What a built design takes of its board, as text.
+
+use std::collections::BTreeMap;
+
+use dermis_golden::fixed::cycles::lanes_busy;
+use dermis_golden::fixed::{Cycles, Model};
+use dermis_hdl::explain::Explained;
+use dermis_hdl::usage::{total, Usage, STAGES};
+
+use super::table::{aligned, markdown};
+
+/// A table of the stages, the board's share, lanes and cycles.
+pub fn resources(model: &Model, usage: &BTreeMap<String, Usage>) -> String {
+    let board = &model.board;
+    let counts = |u: &Usage| [u.block_rams, u.multipliers, u.flip_flops, u.luts];
+    let row = |name: &str, cells: [String; 4]| [vec![name.to_string()], cells.to_vec()].concat();
+    let line = |name: &str, u: &Usage| row(name, counts(u).map(|count| count.to_string()));
+    let all = total(usage);
+    let present = STAGES.iter().filter_map(|stage| usage.get(*stage).map(|usage| line(stage, usage)));
+    let mut rows: Vec<Vec<String>> = present.collect();
+    rows.push(line("all", &all));
+    let has = [board.block_rams, board.multipliers, board.flip_flops, board.luts];
+    let share = |k: usize| format!("{:.0} %", 100.0 * counts(&all)[k] as f64 / f64::from(has[k]));
+    rows.push(row("of board", std::array::from_fn(share)));
+    let mut text = markdown(&["stage", "block RAMs", "multipliers", "flip-flops*", "LUTs*"], rows);
+    let latency = Cycles::of(model, &vec![true; model.parts.len()]).latency;
+    text.push_str(&format!(
+        "* estimated\n{}: {} lanes, {:.0} % busy during the passes; {latency} cycles from last input to last output \
+         beat\n",
+        board.name,
+        4 * model.formats.lanes_per_parity,
+        100.0 * lanes_busy(model),
+    ));
+    text
+}
+
+/// What the scene has, then a table of what it leaves out.
+pub fn features(explained: &[Explained]) -> String {
+    let mut text = "\nthe scene needs:\n".to_string();
+    let present = explained.iter().filter(|feature| feature.present);
+    present.for_each(|feature| text.push_str(&format!("  {}: {}\n", feature.feature, feature.setting)));
+    if explained.iter().all(|feature| !feature.present) {
+        text.push_str("  none of the features that hardware can do without\n");
+    }
+    text.push_str("\nleft out, and what that saves against the scene with it put back:\n");
+    let rows = explained.iter().filter_map(|feature| {
+        let saved = feature.saved?;
+        let numbers = [saved.block_rams, saved.multipliers, saved.flip_flops, saved.luts, saved.cycles];
+        let names = vec![feature.feature.to_string(), feature.setting.clone()];
+        Some([names, numbers.map(|n| n.to_string()).to_vec()].concat())
+    });
+    let head = ["left out", "put back as", "block RAMs", "multipliers", "flip-flops*", "LUTs*", "cycles"];
+    text.push_str(&aligned(2, &head, rows.collect()));
+    for feature in explained {
+        if let Some(reason) = &feature.impossible {
+            text.push_str(&format!("{} ({}) cannot be put back: {reason}\n", feature.feature, feature.setting));
+        }
+    }
+    text
+}
