@@ -201,9 +201,7 @@ fn assignment(text: &str) -> Option<(&str, &str)> {
         true => target.rfind('{')?,
         false => {
             let name_end = target.find('[').filter(|_| target.ends_with(']')).unwrap_or(target.len());
-            let last_open =
-                if target.ends_with(']') { target.rfind(" [").map_or(name_end, |_| name_end) } else { name_end };
-            target[..last_open].trim_end().rfind(' ').map_or(0, |space| space + 1)
+            target[..name_end].trim_end().rfind(' ').map_or(0, |space| space + 1)
         }
     };
     Some((&target[start..], value))

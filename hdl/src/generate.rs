@@ -76,18 +76,6 @@ impl Generated {
     }
 }
 
-/// Whether the model has a board's top.
-pub(crate) fn check(model: &Model) -> Result<(), HdlError> {
-    if !model.searches() {
-        return Err(HdlError::Unsupported {
-            field: "search.mu_max",
-            value: model.scene.search.mu_max.to_string(),
-            what: "a μ search",
-        });
-    }
-    Ok(())
-}
-
 /// Generates the hardware of `model`. The same model always gives the same bytes.
 ///
 /// # Errors

@@ -4,11 +4,17 @@ use dermis_golden::fixed::Model;
 use rust_hdl::prelude::*;
 
 use super::BoardTop;
-use crate::generate::{check, place, rename, top_name, Generated, GeneratedFile, HdlError};
+use crate::generate::{place, rename, top_name, Generated, GeneratedFile, HdlError};
 
 /// The board of `model`, checked.
 pub(super) fn board_top(model: &Model) -> Result<BoardTop, HdlError> {
-    check(model)?;
+    if !model.searches() {
+        return Err(HdlError::Unsupported {
+            field: "search.mu_max",
+            value: model.scene.search.mu_max.to_string(),
+            what: "a μ search",
+        });
+    }
     let top = BoardTop::new(model)?;
     check_all(&top).map_err(|error| HdlError::Check(format!("{error:?}")))?;
     Ok(top)

@@ -3,6 +3,7 @@
 use rust_hdl::prelude::*;
 
 use super::counter::count_bits;
+use super::pass_through::pass_through;
 use crate::wire::{Wire, Word};
 
 /// ```text
@@ -141,18 +142,7 @@ impl Logic for Average {
 
     fn hdl(&self) -> Verilog {
         if self._power == 0 {
-            return Verilog::Custom(
-                "\
-// A frame is one frame.
-wire unused = &{1'b0, clk, rst};
-always @(*) begin
-  m_axis_tdata = s_axis_tdata;
-  m_axis_tvalid = s_axis_tvalid;
-  m_axis_tlast = s_axis_tlast;
-  s_axis_tready = m_axis_tready;
-end"
-                .to_string(),
-            );
+            return pass_through("A frame is one frame.");
         }
         let (k, bits, taxel) = (self._power as usize, self.s_axis_tdata.width(), count_bits(self._sums.len()));
         Verilog::Custom(format!(

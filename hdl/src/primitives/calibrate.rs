@@ -4,6 +4,7 @@ use dermis_golden::fixed::prepare::{Prepare, GAIN_BITS, GAIN_FRACTION};
 use rust_hdl::prelude::*;
 
 use super::counter::count_bits;
+use super::pass_through::pass_through;
 use crate::wire::{Wire, Word};
 
 /// ```text
@@ -127,18 +128,7 @@ impl Logic for Calibrate {
         let bits = self.s_axis_tdata.width();
         let steps = self._pipe.len();
         if steps == 0 {
-            return Verilog::Custom(
-                "\
-// Codes are stress already.
-wire unused = &{1'b0, clk, rst};
-always @(*) begin
-  m_axis_tdata = s_axis_tdata;
-  m_axis_tvalid = s_axis_tvalid;
-  m_axis_tlast = s_axis_tlast;
-  s_axis_tready = m_axis_tready;
-end"
-                .to_string(),
-            );
+            return pass_through("Codes are stress already.");
         }
         let gain = if self._prepare.gain.is_some() { GAIN_BITS as usize } else { 0 };
         let taxel = count_bits(self._taxels);

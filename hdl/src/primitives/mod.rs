@@ -24,6 +24,7 @@ mod leading_one;
 mod logarithm;
 mod mirror;
 mod operand_select;
+mod pass_through;
 mod placer;
 mod polynomial_word;
 mod ram;

@@ -7,6 +7,7 @@ use dermis_golden::sensor::Sensor;
 use rust_hdl::prelude::*;
 
 use super::counter::count_bits;
+use super::pass_through::pass_through;
 use crate::wire::{Wire, Word};
 
 /// ```text
@@ -146,18 +147,7 @@ impl Logic for Resultants {
 
     fn hdl(&self) -> Verilog {
         if !self._wanted {
-            return Verilog::Custom(
-                "\
-// A force per taxel.
-wire unused = &{1'b0, clk, rst};
-always @(*) begin
-  m_axis_tdata = s_axis_tdata;
-  m_axis_tvalid = s_axis_tvalid;
-  m_axis_tlast = s_axis_tlast;
-  s_axis_tready = m_axis_tready;
-end"
-                .to_string(),
-            );
+            return pass_through("A force per taxel.");
         }
         let (sensor, parts) = (&self._sensor, self._parts);
         let count = parts.rows * parts.cols;
