@@ -82,7 +82,7 @@ impl Identity {
             version: VERSION,
             rows: sensor.rows as u16,
             cols: sensor.cols as u16,
-            input_bits: model.formats.input_bits as u8,
+            input_bits: model.formats.code_bits as u8,
             status_beats: STATUS_BEATS as u8,
             scene: scene_hash(model),
             clock_hz: (board.clock_MHz * 1e6).round() as u32,
@@ -98,7 +98,7 @@ pub fn payloads(model: &Model) -> [(&'static str, usize); 3] {
     let taxels = model.scene.sensor.taxels();
     let status = model.status_beats() * BEAT_BYTES;
     [
-        ("codes", code_bytes(model.formats.input_bits) * taxels),
+        ("codes", code_bytes(model.formats.code_bits) * taxels),
         ("resultants", Sums::BYTES + status),
         ("forces", BEAT_BYTES * taxels + status),
     ]
@@ -111,8 +111,8 @@ pub fn wire_ms(payload: usize, baud: u32) -> f64 {
 }
 
 /// CRC-32 over everything that decides the bits of the answers: this program's version, array, subarrays, formats,
-/// condition, noise floor and threshold in codes, and the quantised matrices with the columns kept. The names of scene
-/// and board, and the clock, are not in it.
+/// condition, noise floor and threshold in codes, zeros and gains of the taxels, and the quantised matrices with the columns
+/// kept. The names of scene and board, and the clock, are not in it.
 pub fn scene_hash(model: &Model) -> u32 {
     let sensor = &model.scene.sensor;
     let text = json!({
@@ -124,6 +124,8 @@ pub fn scene_hash(model: &Model) -> u32 {
         "noise_floor": model.noise_floor,
         "threshold": model.threshold,
         "columns": model.storage.columns,
+        "zero": model.prepare.zero,
+        "gain": model.prepare.gain,
     });
     let mut hash = crc32fast::Hasher::new();
     hash.update(text.to_string().as_bytes());

@@ -85,6 +85,14 @@ fn the_hash_tells_scenes_apart_and_clocks_not() {
     assert_eq!(scene_hash(&plain), scene_hash(&faster));
     let others = [model(&|scene| scene.search.mu_max = 0.5), model(&|scene| scene.sensor.thickness_mm *= 1.01)];
     assert!(others.iter().all(|other| scene_hash(other) != scene_hash(&plain)));
+    // Another calibration of the same sensor is another bitstream.
+    let calibrated = |zero: i32, gain: i32| {
+        let mut other = plain.clone();
+        (other.prepare.zero, other.prepare.gain) = (Some(vec![zero; 64]), Some(vec![gain; 64]));
+        scene_hash(&other)
+    };
+    let hashes = [scene_hash(&plain), calibrated(0, 1 << 16), calibrated(1, 1 << 16), calibrated(0, 1 << 15)];
+    assert!((1..4).all(|k| !hashes[..k].contains(&hashes[k])), "{hashes:?}");
     faster.board.uart_baud = 10_000_000;
     let error = Identity::of(&faster).unwrap_err().to_string();
     let wanted = "constraints/ulx3s-85f.toml: uart_baud = 10000000: the clock of 50 MHz takes at most 6250000";

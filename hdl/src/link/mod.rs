@@ -65,7 +65,7 @@ impl Shape {
     /// The shape of a scene.
     pub fn of(model: &Model) -> Self {
         let sensor = &model.scene.sensor;
-        let (input_bits, status_beats) = (model.formats.input_bits, model.status_beats());
+        let (input_bits, status_beats) = (model.formats.code_bits, model.status_beats());
         Shape { rows: sensor.rows, cols: sensor.cols, input_bits, status_beats }
     }
 }
