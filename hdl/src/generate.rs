@@ -10,6 +10,7 @@ use dermis_golden::link::{c_header, LinkError};
 use serde_json::json;
 use thiserror::Error;
 
+use crate::core_file::core_file;
 use crate::device::Tap;
 use crate::explain::Explained;
 use crate::primitives::MEMORY_FILE;
@@ -57,7 +58,7 @@ pub struct GeneratedFile {
 pub struct Generated {
     /// Name of the top module.
     pub top: String,
-    /// `<top>.v`, memory files, `<top>.vlt`, `manifest.json`, `dermis_link.h`.
+    /// `<top>.v`, memory files, `<top>.vlt`, `<top>.core`, `manifest.json`, `dermis_link.h`.
     pub files: Vec<GeneratedFile>,
     /// The stages' streams.
     pub taps: Vec<Tap>,
@@ -95,6 +96,9 @@ pub fn generate(model: &Model) -> Result<Generated, HdlError> {
         file("dermis_link.h".to_string(), c_header()),
     ];
     files.extend(engine.memory_files().into_iter().map(|(name, text)| file(name.to_string(), text)));
+    let names: Vec<&str> = files.iter().map(|file| file.name.as_str()).collect();
+    let core = core_file(&top, &model.scene.name, &names);
+    files.push(file(format!("{top}.core"), core));
     Ok(Generated { top, files, taps: taps(model), manifest, usage })
 }
 
