@@ -1,17 +1,19 @@
 # Targets for Debian 12 with a Rust toolchain; `make help` lists them. Logic belongs to the `dermis` command.
 
 SCENE     ?= sensor-1
+BOARD     ?=
 SCENES    ?= sensor-1 eight-by-eight
 BUILD     ?= build
+TOOLS      = $(BUILD)/tools
 CARGO     ?= cargo
 VERILATOR ?= verilator
 # Cargo's own variable, so that a folder elsewhere is found too.
 CARGO_TARGET_DIR ?= target
 DERMIS     = $(CARGO_TARGET_DIR)/release/dermis
-PACKAGES   = verilator yosys g++ make
+PACKAGES   = verilator yosys g++ make python3-venv
 
 .DEFAULT_GOAL := help
-.PHONY: help setup program run test fmt clippy unit lint docs bench build cosim clean
+.PHONY: help setup tools program run test fmt clippy unit lint docs bench build cosim bitstream clean
 
 help: ## list the targets
 	@sed -n 's/^\([a-z]*\):.*## /\1	/p' $(MAKEFILE_LIST) | expand -t 10
@@ -21,6 +23,10 @@ setup: ## install the Debian packages that are missing
 	if [ -z "$$missing" ]; then exit 0; fi; \
 	if [ "$$(id -u)" = 0 ]; then sudo=; else sudo=sudo; fi; \
 	$$sudo apt-get update -q && $$sudo apt-get install -y --no-install-recommends $(PACKAGES)
+
+tools: setup ## install place and route, in the versions of constraints/tools.txt
+	@test -x $(TOOLS)/bin/pip || python3 -m venv $(TOOLS)
+	@$(TOOLS)/bin/pip install -q --disable-pip-version-check -r constraints/tools.txt
 
 program: setup
 	$(CARGO) build --release --bins
@@ -62,6 +68,9 @@ build: program ## generate the hardware of SCENE
 
 cosim: program ## co-simulate SCENE on its shipped frames
 	$(DERMIS) --build-dir $(BUILD) cosim $(SCENE)
+
+bitstream: program tools ## make the bitstream of SCENE for BOARD or its own one (minutes to an hour)
+	PATH="$(abspath $(TOOLS))/bin:$$PATH" $(DERMIS) --build-dir $(BUILD) bitstream $(SCENE) $(if $(BOARD),--board $(BOARD))
 
 clean: ## remove everything built
 	$(CARGO) clean

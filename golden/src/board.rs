@@ -4,7 +4,7 @@
 //!
 //! | field | unit | meaning |
 //! |---|---|---|
-//! | `device`, `package`, `speed_grade` | | as the place and route tool names them |
+//! | `device`, `family`, `size`, `package`, `speed_grade` | | as the place and route tool names them |
 //! | `input_clock_MHz` | MHz | oscillator on the board |
 //! | `clock_MHz` | MHz | the engine's clock: a design target until place and route has measured it |
 //! | `uart_baud` | bit/s | bit rate of the UART behind which the engine sits |
@@ -12,6 +12,10 @@
 //! | `block_rams`, `block_ram_shapes` | , [words, bits] | block RAMs and what one of them can be |
 //! | `distributed_words` | words | distributed RAM takes memories up to these: always; where block RAM is short |
 //! | `luts`, `flip_flops` | | logic cells, for the estimates' shares |
+//! | `seeds`, `placers` | | place and route is tried with these seeds, 1 …, and with each placer until one converges |
+//! | `place_minutes` | min | a try is given up after this long |
+//!
+//! Beside it, of the same name, stand the board's Verilog (`.v`: pins and PLL around the top module) and its pins.
 
 use include_dir::{include_dir, Dir};
 use serde::{Deserialize, Serialize};
@@ -31,6 +35,10 @@ pub struct Board {
     pub description: String,
     /// Ordering code of the device.
     pub device: String,
+    /// Which of the supported families the device is of.
+    pub family: Family,
+    /// Size within the family, `85k`.
+    pub size: String,
     /// Package name.
     pub package: String,
     /// Speed grade.
@@ -55,6 +63,29 @@ pub struct Board {
     pub luts: u32,
     /// Flip-flops.
     pub flip_flops: u32,
+    /// Seeds of place and route, 1 … seeds, > 0.
+    pub seeds: u32,
+    /// Placers in the order of trial, at least one.
+    pub placers: Vec<String>,
+    /// Time after which a try of place and route is given up, min, > 0.
+    pub place_minutes: u32,
+}
+
+/// A family of devices that share their tools.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Family {
+    /// Lattice ECP5.
+    Ecp5,
+}
+
+impl Family {
+    /// Ending of a board's pin file.
+    pub fn pins(self) -> &'static str {
+        match self {
+            Family::Ecp5 => "lpf",
+        }
+    }
 }
 
 /// Why a board cannot be used.
@@ -89,6 +120,20 @@ impl Board {
         Board::parse(name, file.contents_utf8().unwrap_or_default())
     }
 
+    /// The board's Verilog and its pins, as file names and texts.
+    ///
+    /// # Errors
+    /// [`BoardError::Invalid`] names the file that is missing.
+    pub fn files(&self) -> Result<[(String, &'static str); 2], BoardError> {
+        let file = |ending: &str| {
+            let name = format!("{}.{ending}", self.name);
+            let missing = || BoardError::Invalid { name: self.name.clone(), reason: format!("needs {name} beside it") };
+            let text = FILES.get_file(&name).and_then(|file| file.contents_utf8()).ok_or_else(missing)?;
+            Ok((name, text))
+        };
+        Ok([file("v")?, file(self.family.pins())?])
+    }
+
     /// Names of all boards, sorted.
     pub fn names() -> Vec<&'static str> {
         let stems = FILES.files().filter(|f| f.path().extension().is_some_and(|e| e == "toml"));
@@ -108,8 +153,14 @@ impl Board {
         if board.block_ram_shapes.is_empty() || board.block_ram_shapes.iter().flatten().any(|&size| size == 0) {
             return Err(invalid(format!("block_ram_shapes = {:?}: must be [words, bits]", board.block_ram_shapes)));
         }
-        if board.uart_baud == 0 {
-            return Err(invalid("uart_baud = 0: must be positive".to_string()));
+        let counts = [
+            ("uart_baud", board.uart_baud),
+            ("seeds", board.seeds),
+            ("place_minutes", board.place_minutes),
+            ("placers", board.placers.len() as u32),
+        ];
+        if let Some((field, _)) = counts.iter().find(|(_, count)| *count == 0) {
+            return Err(invalid(format!("{field} = 0: must be positive")));
         }
         if board.multiplier_bits < 2 {
             return Err(invalid(format!("multiplier_bits = {}: must be at least 2", board.multiplier_bits)));
@@ -142,7 +193,9 @@ mod tests {
     fn every_shipped_board_loads() {
         assert!(Board::names().contains(&"ulx3s-85f"));
         for name in Board::names() {
-            assert_eq!(Board::load(name).unwrap().name, name);
+            let board = Board::load(name).unwrap();
+            assert_eq!(board.name, name);
+            assert!(board.files().unwrap().iter().all(|(_, text)| !text.is_empty()));
         }
         // 100 MHz: one cycle is 10 ns.
         let board = Board::load("ulx3s-85f").unwrap();

@@ -23,6 +23,7 @@ use dermis_hdl::explain::explain;
 use dermis_hdl::link::generate_board;
 use dermis_hdl::{generate, HdlError};
 
+use crate::bitstream::tools::ToolError;
 use crate::compare::{compared, difference};
 use crate::fresh::Fresh;
 use crate::hardware::{Hardware, Simulator, Stuck};
@@ -50,6 +51,7 @@ const EXAMPLES: &str = "Examples:
   dermis reconstruct --frame press.json --json       scene from the sensor in the frame file
   dermis reconstruct sensor-1 --engine rtl           the same in the Verilated hardware
   dermis build eight-by-eight --out rtl              Verilog, memory files, manifest.json
+  dermis bitstream eight-by-eight                    the same placed and routed for its board
   dermis host --port /dev/ttyUSB0 press.json         a frame to a board, its resultants back
   dermis cosim sensor-1                              all shipped frames, model against hardware
   dermis table                                       errors of all scenes, beside the paper's
@@ -96,6 +98,8 @@ enum Command {
         #[arg(long)]
         board: bool,
     },
+    /// Make the bitstream of a scene for its board, with open tools.
+    Bitstream(crate::bitstream::Arguments),
     /// Send frames to a board and receive forces.
     Host(crate::host::Arguments),
     /// Simulate a board on a pseudo-terminal, for a host that has none.
@@ -109,7 +113,8 @@ enum Command {
     #[command(after_help = "Examples:
   dermis cosim sensor-1
   dermis cosim sensor-1 --frame a.json --frame b.csv --json
-  dermis cosim eight-by-eight --device rust-hdl")]
+  dermis cosim eight-by-eight --device rust-hdl
+  dermis cosim eight-by-eight --device netlist       what synthesis makes of it, minutes")]
     Cosim {
         /// Built-in name or path of a scene; may be left out when the first frame holds its sensor.
         scene: Option<String>,
@@ -192,8 +197,10 @@ enum DeviceChoice {
     Verilator,
     /// rust-hdl's own simulation.
     RustHdl,
-    /// One after the other.
+    /// Verilog and rust-hdl, one after the other.
     Both,
+    /// What synthesis for the board makes of the Verilog: beats and cycles, no stages. Minutes.
+    Netlist,
 }
 
 impl DeviceChoice {
@@ -202,6 +209,7 @@ impl DeviceChoice {
             DeviceChoice::Verilator => &[Simulator::Verilator],
             DeviceChoice::RustHdl => &[Simulator::RustHdl],
             DeviceChoice::Both => &[Simulator::Verilator, Simulator::RustHdl],
+            DeviceChoice::Netlist => &[Simulator::Netlist],
         }
     }
 }
@@ -230,7 +238,11 @@ fn exit_code(error: &anyhow::Error) -> u8 {
     let hardware = error.is::<Stuck>() || matches!(error.downcast_ref::<HdlError>(), Some(HdlError::Check(_)));
     let model = matches!(error.downcast_ref::<FixedError>(), Some(FixedError::Internal(_) | FixedError::Beats { .. }));
     let board = matches!(error.downcast_ref::<HostError>(), Some(HostError::Answer { .. }));
-    if tool || hardware || model || board {
+    let flow = matches!(
+        error.downcast_ref::<ToolError>(),
+        Some(ToolError::Failed { .. } | ToolError::Late { .. } | ToolError::Output { .. })
+    );
+    if tool || hardware || model || board || flow {
         1
     } else {
         2
@@ -269,6 +281,7 @@ fn run(arguments: &Arguments) -> Result<(String, bool)> {
             };
             Ok((text, verified.findings.is_equal()))
         }
+        Command::Bitstream(arguments) => crate::bitstream::run(arguments, build_dir),
         Command::Host(arguments) => crate::host::run(arguments),
         Command::Board { scene } => {
             let terminal = Hardware::new(Model::new(&Scene::load(scene)?)?, build_dir)?.terminal()?;

@@ -20,6 +20,7 @@ use thiserror::Error;
 use crate::board::{Faults, Terminal, UartLine, VerilatedBoard, Wire};
 use crate::cosim::Vector;
 use crate::drive::{record, Play, Stimulus};
+use crate::netlist::netlist;
 use crate::verilator::{Design, Verilated, VerilatorError};
 
 /// Cycles without a transfer after which a reconstruction is given up; far beyond any scene's pause.
@@ -44,6 +45,8 @@ pub enum Simulator {
     Verilator,
     /// The same design in rust-hdl's own simulation.
     RustHdl,
+    /// What synthesis for the scene's board makes of the Verilog, under Verilator.
+    Netlist,
 }
 
 impl Simulator {
@@ -52,6 +55,7 @@ impl Simulator {
         match self {
             Simulator::Verilator => "verilator",
             Simulator::RustHdl => "rust-hdl",
+            Simulator::Netlist => "netlist",
         }
     }
 }
@@ -82,30 +86,34 @@ impl Hardware {
     /// No Verilator, a design that a simulator refuses, or files that cannot be written.
     pub fn device(&self, simulator: Simulator) -> Result<Box<dyn Device>> {
         Ok(match simulator {
-            Simulator::Verilator => Box::new(self.verilated()?),
+            Simulator::Verilator => Box::new(self.verilated(&self.generated)?),
             Simulator::RustHdl => self::simulator(&self.model)?,
+            Simulator::Netlist => {
+                let netlist = netlist(&self.generated, self.model.board.family, &self.cache)?;
+                Box::new(self.verilated(&netlist)?)
+            }
         })
     }
 
-    fn verilated(&self) -> Result<Verilated, VerilatorError> {
-        let files = self.generated.files.iter().map(|f| (f.name.as_str(), f.text.as_str()));
+    fn verilated(&self, generated: &Generated) -> Result<Verilated, VerilatorError> {
+        let files = generated.files.iter().map(|f| (f.name.as_str(), f.text.as_str()));
         let design = Design {
-            top: &self.generated.top,
+            top: &generated.top,
             files: files.collect(),
-            taps: &self.generated.taps,
+            taps: &generated.taps,
             input_bits: self.model.formats.code_bits,
         };
         Verilated::new(&design, &self.cache)
     }
 
-    /// Starts a simulation of the whole board.
+    /// Starts a simulation of the whole board, of its Verilog where a netlist is asked for.
     ///
     /// # Errors
     /// As [`Hardware::device`]; a scene whose board has no link.
     pub fn board(&self, simulator: Simulator) -> Result<Box<dyn BoardDevice>> {
         Ok(match simulator {
-            Simulator::Verilator => Box::new(VerilatedBoard::new(&generate_board(&self.model)?, &self.cache)?),
             Simulator::RustHdl => board_simulator(&self.model)?,
+            _ => Box::new(VerilatedBoard::new(&generate_board(&self.model)?, &self.cache)?),
         })
     }
 
@@ -128,7 +136,7 @@ impl Hardware {
         Ok(Terminal::start(line, to_board, to_host)?)
     }
 
-    /// Stage names of the taps, in the order of a device's outputs.
+    /// Stage names of the taps, in the order of a device's outputs; a netlist's device has none.
     pub fn tap_names(&self) -> Vec<&'static str> {
         self.generated.taps.iter().map(|tap| tap.name).collect()
     }

@@ -11,6 +11,7 @@
 //! |---|---|
 //! | [`mod@bench`] | the Verilog wrapper that packs pins and taps into two vectors |
 //! | [`verilator`] | builds, caches and loads a verilated design as a [`Device`](dermis_hdl::device::Device) |
+//! | [`bitstream`] | a bitstream by open tools, its clock and cells against the committed ones |
 //! | [`drive`] | plays frames into a device and records every transfer with its cycle |
 //! | [`cosim`] | compares a recording with the bit-true model |
 //! | [`fresh`] | frames of drawn contacts for `dermis table --fresh` |
@@ -18,6 +19,7 @@
 //! | [`board`] | a board's UART, simulated, on a pseudo-terminal |
 //! | [`hardware`] | a scene's generated hardware and its simulators |
 //! | [`compare`] | how far two force fields are apart |
+//! | [`mod@netlist`] | the netlist after synthesis, simulated |
 //! | [`verify`] | one scene's frames through all three models |
 //! | [`report`] | tables and the JSON contract |
 //! | [`host`] | frames to a board over a serial port, forces back |
@@ -28,6 +30,7 @@
 #![allow(non_snake_case)]
 
 pub mod bench;
+pub mod bitstream;
 pub mod board;
 pub mod cli;
 pub mod compare;
@@ -38,6 +41,7 @@ pub mod generate;
 pub mod hardware;
 pub mod host;
 pub mod inputs;
+pub mod netlist;
 mod progress;
 pub mod report;
 pub mod tabulate;

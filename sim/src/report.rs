@@ -5,6 +5,7 @@
 
 mod errors;
 mod host;
+mod implemented;
 mod needs;
 mod noise;
 #[cfg(test)]
@@ -14,6 +15,7 @@ mod table;
 
 pub use errors::errors;
 pub use host::{equality, resultants, wire_times};
+pub use implemented::{implemented, Implemented};
 pub use needs::{features, resources};
 pub use noise::noise;
 pub use result::{difference, reconstruction};

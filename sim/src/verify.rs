@@ -6,6 +6,7 @@
 //!       -> bit-true model --> Trace, Reconstruction ---------------+--> Row
 //!       -> Verilator: full speed, then stalls --> Findings, Times -+
 //!       -> rust-hdl: full speed ----------------> Findings --------+
+//!       -> netlist, when asked for: full speed -> Findings --------+
 //! ```
 
 use std::path::Path;
@@ -120,10 +121,13 @@ fn simulate(
 ) -> Result<Vec<Times>> {
     let stimuli: &[Stimulus] = match simulator {
         Simulator::Verilator => &[Stimulus::FullSpeed, Stimulus::Stalls { seed: SEED }],
-        Simulator::RustHdl => &[Stimulus::FullSpeed],
+        Simulator::RustHdl | Simulator::Netlist => &[Stimulus::FullSpeed],
     };
     let mut device = hardware.device(simulator)?;
-    let taps = hardware.tap_names();
+    let taps = match simulator {
+        Simulator::Netlist => Vec::new(),
+        _ => hardware.tap_names(),
+    };
     let mut full_speed = Vec::new();
     for &stimulus in stimuli {
         let label = format!("{}, {stimulus}", simulator.name());

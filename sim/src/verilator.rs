@@ -252,7 +252,7 @@ fn write(path: &Path, text: &str) -> Result<(), VerilatorError> {
 }
 
 /// FNV-1a of all names, texts and the tool's version, 128 bits in hexadecimal.
-fn fingerprint(sources: &[(&str, &str)], version: &str) -> String {
+pub(crate) fn fingerprint(sources: &[(&str, &str)], version: &str) -> String {
     const OFFSET: u128 = 0x6c62_272e_07bb_0142_62b8_2175_6295_c58d;
     const PRIME: u128 = 0x0000_0000_0100_0000_0000_0000_0000_013b;
     let mut hash = OFFSET;

@@ -1,0 +1,269 @@
+//! Registers into the multipliers, which have room for them.
+//!
+//! An ECP5 multiplier has a register at each operand and one at its product. Yosys leaves them empty and puts flip-flops in
+//! the fabric, from where the way in costs as much time as the product itself. This moves them in: same clock, no
+//! enable, no reset, zero at the start.
+//!
+//! ```text
+//! flip-flops -> operand          all used bits, flip-flops or constant zeros; the flip-flops stay where others use them
+//! product    -> flip-flops       every used bit goes to one flip-flop and nowhere else
+//! ```
+//! Block RAMs keep theirs outside: which clock and enable their registers have in the 36-bit mode that Yosys chooses is not
+//! documented. That the netlist still computes the same bits is what the replay shows.
+
+use std::collections::{BTreeSet, HashMap};
+
+use serde_json::{json, Map, Value};
+
+/// Operand's bits of a multiplier, of MULT18X18D.
+const OPERAND: usize = 18;
+/// Its product's bits.
+const PRODUCT: usize = 36;
+
+/// A net's number in Yosys's JSON.
+type Net = u64;
+
+/// What was moved.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Absorbed {
+    /// Operands whose register is now in the multiplier.
+    pub operands: usize,
+    /// Products.
+    pub products: usize,
+    /// Flip-flops that are no longer needed.
+    pub flip_flops: usize,
+}
+
+/// A flip-flop without enable and reset that starts at zero.
+#[derive(Clone, Debug)]
+struct Register {
+    cell: String,
+    clock: Net,
+    data: Value,
+    output: Net,
+}
+
+/// Moves registers in the module `top` of Yosys's JSON.
+///
+/// Cells of other types and modules are left as they are. A netlist without that module has nothing to move.
+pub fn absorb(netlist: &mut Value, top: &str) -> Absorbed {
+    let Some(module) = netlist["modules"].get_mut(top) else { return Absorbed::default() };
+    let users = Users::of(module);
+    let Some(cells) = module["cells"].as_object_mut() else { return Absorbed::default() };
+    let by_output: HashMap<Net, Register> = registers(cells).map(|r| (r.output, r)).collect();
+    let by_data = by_output.values().filter_map(|r| Some((r.data.as_u64()?, r.clone()))).collect();
+    let mut design = Design { users, by_output, by_data, gone: BTreeSet::new() };
+    let mut absorbed = Absorbed::default();
+    for cell in cells.values_mut() {
+        if cell["type"] == "MULT18X18D" {
+            absorbed.operands += ["A", "B"].iter().filter(|side| design.operand(cell, side)).count();
+            absorbed.products += usize::from(design.product(cell).is_some());
+        }
+    }
+    let before = cells.len();
+    let Design { users, by_output, gone, .. } = design;
+    let unread = by_output.values().filter(|register| users.count(register.output) == 0);
+    let unneeded: BTreeSet<&String> = gone.iter().chain(unread.map(|register| &register.cell)).collect();
+    cells.retain(|name, _| !unneeded.contains(name));
+    absorbed.flip_flops = before - cells.len();
+    absorbed
+}
+
+/// How many inputs of cells and outputs of the module each net goes to.
+struct Users(HashMap<Net, usize>);
+
+impl Users {
+    fn of(module: &Value) -> Users {
+        let mut users = Users(HashMap::new());
+        let cells = module["cells"].as_object().into_iter().flatten();
+        for (_, cell) in cells {
+            for (pin, nets) in cell["connections"].as_object().into_iter().flatten() {
+                if cell["port_directions"][pin] != "output" {
+                    users.add(nets, 1);
+                }
+            }
+        }
+        for (_, port) in module["ports"].as_object().into_iter().flatten() {
+            if port["direction"] != "input" {
+                users.add(&port["bits"], 1);
+            }
+        }
+        users
+    }
+
+    fn add(&mut self, nets: &Value, more: isize) {
+        for net in nets.as_array().into_iter().flatten().filter_map(Value::as_u64) {
+            let count = self.0.entry(net).or_default();
+            *count = count.saturating_add_signed(more);
+        }
+    }
+
+    fn count(&self, net: Net) -> usize {
+        self.0.get(&net).copied().unwrap_or(0)
+    }
+}
+
+/// The flip-flops that may move.
+fn registers(cells: &Map<String, Value>) -> impl Iterator<Item = Register> + '_ {
+    cells.iter().filter_map(|(name, cell)| {
+        let parameter = |name: &str| cell["parameters"][name].as_str().map(str::trim);
+        let net = |pin: &str| cell["connections"][pin][0].as_u64();
+        let plain = cell["type"] == "TRELLIS_FF"
+            && parameter("CEMUX") == Some("1")
+            && parameter("CLKMUX") == Some("CLK")
+            && parameter("REGSET") == Some("RESET")
+            && cell["connections"]["LSR"][0] == "0";
+        let data = cell["connections"]["DI"][0].clone();
+        plain.then_some(Register { cell: name.clone(), clock: net("CLK")?, data, output: net("Q")? })
+    })
+}
+
+/// The nets and flip-flops around the cells.
+struct Design {
+    users: Users,
+    by_output: HashMap<Net, Register>,
+    by_data: HashMap<Net, Register>,
+    /// Flip-flops that a cell's output has taken.
+    gone: BTreeSet<String>,
+}
+
+impl Design {
+    /// Moves the registers of an operand in.
+    fn operand(&mut self, cell: &mut Value, side: &str) -> bool {
+        let pins: Vec<String> = (0..OPERAND).map(|bit| format!("{side}{bit}")).collect();
+        let mut clock = cell["connections"]["CLK0"][0].as_u64();
+        let mut data = Vec::with_capacity(OPERAND);
+        for pin in &pins {
+            let net = &cell["connections"][pin][0];
+            let Some(number) = net.as_u64() else {
+                if net != "0" {
+                    return false;
+                }
+                data.push(net.clone());
+                continue;
+            };
+            match self.by_output.get(&number).filter(|register| !self.gone.contains(&register.cell)) {
+                Some(register) if *clock.get_or_insert(register.clock) == register.clock => {
+                    data.push(register.data.clone());
+                }
+                _ => return false,
+            }
+        }
+        let (Some(clock), true) = (clock, data.iter().any(Value::is_u64)) else { return false };
+        for (pin, data) in pins.iter().zip(data) {
+            self.users.add(&cell["connections"][pin], -1);
+            cell["connections"][pin] = json!([data]);
+            self.users.add(&cell["connections"][pin], 1);
+        }
+        turn_on(cell, &format!("REG_INPUT{side}"), clock);
+        true
+    }
+
+    /// Moves the registers of a product in.
+    fn product(&mut self, cell: &mut Value) -> Option<()> {
+        let mut clock = cell["connections"]["CLK0"][0].as_u64();
+        let mut moved = Vec::new();
+        for pin in (0..PRODUCT).map(|bit| format!("P{bit}")) {
+            let net = cell["connections"][&pin][0].as_u64().filter(|&net| self.users.count(net) > 0);
+            let Some(net) = net else { continue };
+            let register = self.by_data.get(&net).filter(|_| self.users.count(net) == 1)?;
+            if *clock.get_or_insert(register.clock) != register.clock {
+                return None;
+            }
+            moved.push((pin, register));
+        }
+        for (pin, register) in &moved {
+            cell["connections"][pin] = json!([register.output]);
+            self.gone.insert(register.cell.clone());
+        }
+        turn_on(cell, "REG_OUTPUT", clock.filter(|_| !moved.is_empty())?);
+        Some(())
+    }
+}
+
+/// Turns a multiplier's register on: of this clock, always enabled and never reset.
+fn turn_on(cell: &mut Value, register: &str, clock: Net) {
+    for (name, value) in [("CLK", "CLK0"), ("CE", "CE0"), ("RST", "RST0")] {
+        cell["parameters"][format!("{register}_{name}")] = json!(value);
+    }
+    for (pin, net) in [("CLK0", json!(clock)), ("CE0", json!("1")), ("RST0", json!("0"))] {
+        cell["connections"][pin] = json!([net]);
+        cell["port_directions"][pin] = json!("input");
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Nets: 1 clock; 100 + bit operand's data, 200 + bit its register's output; 300 + bit product, 400 + bit its
+    /// register's output. Operand B is the constant 0 up to bit 17.
+    fn netlist(enable: &str, extra_user: bool) -> Value {
+        let mut cells = Map::new();
+        let mut flip_flop = |name: String, data: Net, output: Net, enable: &str| {
+            let cell = json!({
+                "type": "TRELLIS_FF",
+                "parameters": {"CEMUX": enable, "CLKMUX": "CLK", "REGSET": "RESET"},
+                "port_directions": {"CLK": "input", "DI": "input", "LSR": "input", "Q": "output"},
+                "connections": {"CLK": [1], "DI": [data], "LSR": ["0"], "Q": [output]},
+            });
+            cells.insert(name, cell);
+        };
+        for bit in 0..18 {
+            flip_flop(format!("a{bit}"), 100 + bit, 200 + bit, enable);
+        }
+        for bit in 0..36 {
+            flip_flop(format!("p{bit}"), 300 + bit, 400 + bit, "1 ");
+        }
+        let (mut pins, mut directions) = (Map::new(), Map::new());
+        let mut pin = |name: String, net: Value, direction: &str| {
+            directions.insert(name.clone(), json!(direction));
+            pins.insert(name, json!([net]));
+        };
+        for bit in 0..18 {
+            pin(format!("A{bit}"), json!(200 + bit), "input");
+            pin(format!("B{bit}"), json!("0"), "input");
+        }
+        for bit in 0..36 {
+            pin(format!("P{bit}"), json!(300 + bit), "output");
+        }
+        let multiplier =
+            json!({"type": "MULT18X18D", "parameters": {}, "port_directions": directions, "connections": pins});
+        cells.insert("m".into(), multiplier);
+        let mut outputs: Vec<u64> = (400..436).collect();
+        if extra_user {
+            outputs.push(300);
+            outputs.push(200);
+        }
+        let ports = json!({"y": {"direction": "output", "bits": outputs}});
+        json!({"modules": {"t": {"ports": ports, "cells": cells}}})
+    }
+
+    #[test]
+    fn both_registers_of_a_multiplier_move_in() {
+        let mut netlist = netlist("1 ", false);
+        let absorbed = absorb(&mut netlist, "t");
+        assert_eq!(absorbed, Absorbed { operands: 1, products: 1, flip_flops: 54 });
+        let multiplier = &netlist["modules"]["t"]["cells"]["m"];
+        assert_eq!(multiplier["connections"]["A5"], json!([105]));
+        assert_eq!(multiplier["connections"]["P35"], json!([435]));
+        assert_eq!(multiplier["connections"]["CLK0"], json!([1]));
+        assert_eq!(multiplier["parameters"]["REG_INPUTA_CLK"], "CLK0");
+        assert!(multiplier["parameters"]["REG_INPUTB_CLK"].is_null());
+        assert_eq!(netlist["modules"]["t"]["cells"].as_object().unwrap().len(), 1);
+    }
+
+    #[test]
+    fn a_flip_flop_that_others_read_stays_and_a_product_that_others_read_is_left() {
+        let mut netlist = netlist("1 ", true);
+        assert_eq!(absorb(&mut netlist, "t"), Absorbed { operands: 1, flip_flops: 17, ..Absorbed::default() });
+        assert!(netlist["modules"]["t"]["cells"]["a0"].is_object());
+    }
+
+    #[test]
+    fn a_flip_flop_with_an_enable_stays() {
+        let mut netlist = netlist("CE", false);
+        assert_eq!(absorb(&mut netlist, "t"), Absorbed { products: 1, flip_flops: 36, ..Absorbed::default() });
+        assert_eq!(netlist["modules"]["t"]["cells"]["m"]["connections"]["A0"], json!([200]));
+    }
+}

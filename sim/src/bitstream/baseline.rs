@@ -1,0 +1,142 @@
+//! What scenes took of their boards when somebody last looked: `constraints/baselines.toml`.
+//!
+//! `dermis bitstream --update-baselines` writes it; without that a bitstream that is slower or larger than its line says,
+//! beyond the tolerances here, fails.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use serde::{Deserialize, Serialize};
+
+use super::tools::ToolError;
+
+/// The file, from the repository's root.
+pub const FILE: &str = "constraints/baselines.toml";
+/// How much slower the best seed may be: place and route scatters by about this much.
+const SLOWER: f64 = 0.10;
+/// How many more look-up tables and flip-flops it may take; another version of the tools differs by less.
+const LARGER: f64 = 0.05;
+
+/// A scene on a board.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+#[allow(non_snake_case)]
+pub struct Baseline {
+    /// Look-up tables.
+    pub luts: u64,
+    /// Flip-flops.
+    pub flip_flops: u64,
+    /// Multipliers.
+    pub multipliers: u64,
+    /// Block RAMs.
+    pub block_rams: u64,
+    /// Highest clock of the seed that the bitstream is of, MHz.
+    pub best_MHz: f64,
+    /// Median of the seeds.
+    pub median_MHz: f64,
+    /// Slowest seed.
+    pub worst_MHz: f64,
+    /// Seeds that were placed and routed.
+    pub seeds: u32,
+}
+
+impl Baseline {
+    /// What `now` is worse in, each with both figures.
+    pub fn losses(&self, now: &Baseline) -> Vec<String> {
+        let mut losses = Vec::new();
+        if now.best_MHz < self.best_MHz * (1.0 - SLOWER) {
+            losses.push(format!("{:.1} MHz, was {:.1} MHz", now.best_MHz, self.best_MHz));
+        }
+        let cells = [
+            ("LUTs", now.luts, self.luts, LARGER),
+            ("flip-flops", now.flip_flops, self.flip_flops, LARGER),
+            ("multipliers", now.multipliers, self.multipliers, 0.0),
+            ("block RAMs", now.block_rams, self.block_rams, 0.0),
+        ];
+        for (what, now, was, tolerance) in cells {
+            if now as f64 > was as f64 * (1.0 + tolerance) {
+                losses.push(format!("{now} {what}, was {was}"));
+            }
+        }
+        losses
+    }
+}
+
+/// Baselines by board and scene.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(transparent)]
+pub struct Baselines(pub BTreeMap<String, BTreeMap<String, Baseline>>);
+
+impl Baselines {
+    /// Reads the file at `path`; none yet where there is no file.
+    ///
+    /// # Errors
+    /// [`ToolError::Io`]; [`ToolError::Output`] with line and field for what is none.
+    pub fn read(path: &Path) -> Result<Baselines, ToolError> {
+        if !path.exists() {
+            return Ok(Baselines::default());
+        }
+        let text = std::fs::read_to_string(path).map_err(ToolError::io(path))?;
+        toml::from_str(&text).map_err(|e| ToolError::Output { path: path.to_owned(), reason: e.to_string() })
+    }
+
+    /// Writes the file at `path`, whole or not at all.
+    ///
+    /// # Errors
+    /// [`ToolError::Io`].
+    pub fn write(&self, path: &Path) -> Result<(), ToolError> {
+        let text =
+            toml::to_string(self).map_err(|e| ToolError::Output { path: path.to_owned(), reason: e.to_string() })?;
+        let text = format!(
+            "# Written by `dermis bitstream SCENE --update-baselines`; MHz of place and route, cells.\n\n{text}"
+        );
+        let part = path.with_extension("part");
+        std::fs::write(&part, text).and_then(|()| std::fs::rename(&part, path)).map_err(ToolError::io(path))
+    }
+
+    /// The line of a scene.
+    pub fn get(&self, board: &str, scene: &str) -> Option<&Baseline> {
+        self.0.get(board)?.get(scene)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn baseline() -> Baseline {
+        Baseline {
+            luts: 40_000,
+            flip_flops: 30_000,
+            multipliers: 70,
+            block_rams: 60,
+            best_MHz: 110.0,
+            median_MHz: 105.0,
+            worst_MHz: 99.5,
+            seeds: 3,
+        }
+    }
+
+    #[test]
+    fn slower_and_larger_is_a_loss() {
+        let was = baseline();
+        let now = Baseline { best_MHz: 100.0, luts: 41_900, ..was.clone() };
+        assert_eq!(was.losses(&now), Vec::<String>::new());
+        let now = Baseline { best_MHz: 98.0, luts: 42_100, block_rams: 61, ..was.clone() };
+        assert_eq!(was.losses(&now), ["98.0 MHz, was 110.0 MHz", "42100 LUTs, was 40000", "61 block RAMs, was 60"]);
+    }
+
+    #[test]
+    fn the_file_reads_back_and_a_wrong_field_is_named() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("baselines.toml");
+        assert_eq!(Baselines::read(&path).unwrap(), Baselines::default());
+        let mut all = Baselines::default();
+        all.0.entry("ulx3s-85f".into()).or_default().insert("sensor-1".into(), baseline());
+        all.write(&path).unwrap();
+        assert_eq!(Baselines::read(&path).unwrap(), all);
+        let text = std::fs::read_to_string(&path).unwrap().replace("best_MHz", "fast_MHz");
+        std::fs::write(&path, text).unwrap();
+        assert!(Baselines::read(&path).unwrap_err().to_string().contains("fast_MHz"));
+    }
+}

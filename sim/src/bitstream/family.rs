@@ -1,0 +1,69 @@
+//! What the tools are asked for a family of devices: one place for all that differs between families.
+
+use dermis_golden::board::{Board, Family};
+
+use super::tools::Tool;
+
+/// Synthesis, for all families.
+pub const YOSYS: Tool = Tool { name: "yosys" };
+
+/// A family's tools and cells.
+pub struct Flow {
+    /// Place and route.
+    pub place: Tool,
+    /// Configuration to bitstream.
+    pub pack: Tool,
+    /// Yosys's command.
+    pub synthesis: &'static str,
+    /// What place and route calls a look-up table; a carry's halves and distributed RAM are among them.
+    pub lut: &'static str,
+    /// A flip-flop.
+    pub flip_flop: &'static str,
+    /// A multiplier.
+    pub multiplier: &'static str,
+    /// A block RAM.
+    pub block_ram: &'static str,
+    /// Ending of the bitstream.
+    pub bitstream: &'static str,
+}
+
+/// The flow of a family.
+pub fn flow(family: Family) -> Flow {
+    match family {
+        Family::Ecp5 => Flow {
+            place: Tool { name: "nextpnr-ecp5" },
+            pack: Tool { name: "ecppack" },
+            synthesis: "synth_ecp5",
+            lut: "TRELLIS_COMB",
+            flip_flop: "TRELLIS_FF",
+            multiplier: "MULT18X18D",
+            block_ram: "DP16KD",
+            bitstream: "bit",
+        },
+    }
+}
+
+/// Arguments of place and route for one try.
+pub fn place_arguments(board: &Board, netlist: &str, seed: u32, placer: &str, name: &str) -> Vec<String> {
+    let Board { size, package, speed_grade, .. } = board;
+    let seed = seed.to_string();
+    let pins = format!("{}.{}", board.name, board.family.pins());
+    let (report, configuration) = (format!("{name}.report.json"), format!("{name}.config"));
+    let arguments: Vec<&str> = match board.family {
+        Family::Ecp5 => vec!["--lpf", &pins, "--textcfg", &configuration],
+    };
+    let speed = speed_grade.to_string();
+    let of_device = match board.family {
+        Family::Ecp5 => vec![format!("--{size}"), "--package".into(), package.clone(), "--speed".into(), speed],
+    };
+    let common = ["--json", netlist, "--seed", &seed, "--placer", placer, "--report", &report, "--timing-allow-fail"];
+    of_device.into_iter().chain(arguments.into_iter().chain(common).map(str::to_owned)).collect()
+}
+
+/// Arguments of the packer.
+pub fn pack_arguments(family: Family, configuration: &str, bitstream: &str) -> Vec<String> {
+    let arguments = match family {
+        Family::Ecp5 => vec!["--compress", configuration, bitstream],
+    };
+    arguments.into_iter().map(str::to_owned).collect()
+}

@@ -1,0 +1,183 @@
+//! The open tools of synthesis, place and route: found under either of their names, run with a log and a time limit.
+
+use std::fs::File;
+use std::io;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+use std::thread::sleep;
+use std::time::{Duration, Instant};
+
+use thiserror::Error;
+
+/// Lines at the end of a failed tool's log that an error repeats.
+const LOG_LINES: usize = 12;
+/// How often a running tool is looked at.
+const POLL: Duration = Duration::from_millis(100);
+
+/// Why a tool did not do its work.
+#[derive(Debug, Error)]
+pub enum ToolError {
+    /// None of its names can be started.
+    #[error("{tool} is not installed; `make tools` installs it")]
+    Missing {
+        /// The tool.
+        tool: &'static str,
+    },
+    /// It ran and failed.
+    #[error("{tool} failed, {log}:\n{end}")]
+    Failed {
+        /// The tool.
+        tool: &'static str,
+        /// Its whole log.
+        log: PathBuf,
+        /// The log's end.
+        end: String,
+    },
+    /// It was stopped at its time limit.
+    #[error("{tool} took longer than {minutes} min, {log}")]
+    Late {
+        /// The tool.
+        tool: &'static str,
+        /// The limit.
+        minutes: u32,
+        /// Its log so far.
+        log: PathBuf,
+    },
+    /// What it wrote cannot be used.
+    #[error("{path}: {reason}")]
+    Output {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong with it.
+        reason: String,
+    },
+    /// A file could not be read or written.
+    #[error("{path}: {source}")]
+    Io {
+        /// The file.
+        path: PathBuf,
+        /// The system's reason.
+        source: io::Error,
+    },
+}
+
+impl ToolError {
+    /// For a file that `source` kept from being read or written.
+    pub fn io(path: &Path) -> impl FnOnce(io::Error) -> ToolError + '_ {
+        |source| ToolError::Io { path: path.to_owned(), source }
+    }
+}
+
+/// Where programs are looked for.
+fn folders() -> Vec<PathBuf> {
+    std::env::var_os("PATH").iter().flat_map(std::env::split_paths).collect()
+}
+
+/// A tool of the flow.
+#[derive(Clone, Copy, Debug)]
+pub struct Tool {
+    /// Its own name; packages from the Python index put `yowasp-` before it.
+    pub name: &'static str,
+}
+
+impl Tool {
+    /// The name under which it can be started.
+    fn program(self) -> Result<String, ToolError> {
+        let names = [self.name.to_owned(), format!("yowasp-{}", self.name)];
+        let there = |name: &String| folders().iter().any(|folder| folder.join(name).is_file());
+        names.into_iter().find(there).ok_or(ToolError::Missing { tool: self.name })
+    }
+
+    /// The folder of its own files, `<prefix>/share/<name>`.
+    ///
+    /// # Errors
+    /// [`ToolError::Missing`]; [`ToolError::Output`] where an installation of another shape has none.
+    pub fn share(self) -> Result<PathBuf, ToolError> {
+        let program = self.program()?;
+        let of = |folder: &Path| Some(folder.parent()?.join("share").join(self.name));
+        let shares = folders().into_iter().filter(|folder| folder.join(&program).is_file()).filter_map(|f| of(&f));
+        let reason = || format!("no share/{} beside the folder of {program}", self.name);
+        let path = PathBuf::from(&program);
+        shares.into_iter().find(|share| share.is_dir()).ok_or_else(|| ToolError::Output { path, reason: reason() })
+    }
+
+    /// What it says of its version, one line.
+    ///
+    /// # Errors
+    /// [`ToolError::Missing`].
+    pub fn version(self) -> Result<String, ToolError> {
+        let output = Command::new(self.program()?).arg("--version").output();
+        let output = output.map_err(|_| ToolError::Missing { tool: self.name })?;
+        let text = [output.stdout, output.stderr].concat();
+        let text = String::from_utf8_lossy(&text);
+        Ok(text.lines().find(|line| line.contains(|c: char| c.is_ascii_digit())).unwrap_or_default().trim().to_owned())
+    }
+
+    /// Runs it in `folder` with `arguments`; what it prints goes to `<log>` there. It is stopped after `minutes`.
+    ///
+    /// # Errors
+    /// As [`ToolError`] lists.
+    pub fn run(self, folder: &Path, arguments: &[String], log: &str, minutes: u32) -> Result<(), ToolError> {
+        let log = folder.join(log);
+        let file = File::create(&log).map_err(ToolError::io(&log))?;
+        let copy = file.try_clone().map_err(ToolError::io(&log))?;
+        let mut child = Command::new(self.program()?)
+            .current_dir(folder)
+            .args(arguments)
+            .stdin(Stdio::null())
+            .stdout(file)
+            .stderr(copy)
+            .spawn()
+            .map_err(|_| ToolError::Missing { tool: self.name })?;
+        let begun = Instant::now();
+        let limit = Duration::from_secs(60 * u64::from(minutes));
+        loop {
+            if let Some(status) = child.try_wait().map_err(ToolError::io(&log))? {
+                return if status.success() { Ok(()) } else { Err(self.failed(log)) };
+            }
+            if begun.elapsed() > limit {
+                child.kill().and_then(|()| child.wait()).map_err(ToolError::io(&log))?;
+                return Err(ToolError::Late { tool: self.name, minutes, log });
+            }
+            sleep(POLL);
+        }
+    }
+
+    fn failed(self, log: PathBuf) -> ToolError {
+        let text = std::fs::read(&log).unwrap_or_default();
+        let text = String::from_utf8_lossy(&text);
+        let lines: Vec<&str> = text.lines().collect();
+        let end = lines[lines.len().saturating_sub(LOG_LINES)..].join("\n");
+        ToolError::Failed { tool: self.name, log, end }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn run(script: &str, minutes: u32) -> ToolError {
+        let folder = tempfile::tempdir().unwrap();
+        let arguments = ["-c".to_owned(), script.to_owned()];
+        Tool { name: "sh" }.run(folder.path(), &arguments, "sh.log", minutes).unwrap_err()
+    }
+
+    #[test]
+    fn a_failure_repeats_the_end_of_the_log() {
+        let error = run("seq 1 30; echo wrong >&2; exit 3", 1).to_string();
+        assert!(error.contains("sh failed") && error.contains("\n20\n") && !error.contains("\n19\n"), "{error}");
+        assert!(error.ends_with("wrong"), "{error}");
+    }
+
+    #[test]
+    fn a_tool_is_stopped_at_its_limit() {
+        let error = run("sleep 50", 0).to_string();
+        assert!(error.starts_with("sh took longer than 0 min"), "{error}");
+    }
+
+    #[test]
+    fn a_missing_tool_says_how_to_get_it() {
+        let error = Tool { name: "no-such-tool" }.version().unwrap_err().to_string();
+        assert_eq!(error, "no-such-tool is not installed; `make tools` installs it");
+    }
+}

@@ -1,0 +1,107 @@
+//! The netlist after synthesis as a simulated device: the same vectors, the same bits, the same cycles.
+//!
+//! ```text
+//! Verilog --yosys--> cells of the family --absorb--> netlist.v + models of the cells --> Verilator
+//! ```
+//! It finds what a simulation of the Verilog cannot: constructs that the simulator reads differently from the
+//! synthesiser, and cells or registers that the flow itself has put wrong. The stages' streams are gone in a netlist; beats
+//! and cycle counts are what is compared.
+
+use std::fs;
+use std::path::Path;
+
+use dermis_golden::board::Family;
+use dermis_hdl::{Generated, GeneratedFile};
+
+use crate::bitstream::family::{flow, YOSYS};
+use crate::bitstream::tools::ToolError;
+use crate::bitstream::{absorb_file, NETLIST, SYNTHESIS_MINUTES};
+use crate::progress::Progress;
+use crate::verilator::fingerprint;
+
+/// Our models of ECP5 cells that Yosys has none for.
+const ECP5_CELLS: &str = include_str!("../cells/ecp5.v");
+/// The netlist as Verilog.
+const VERILOG: &str = "netlist.v";
+/// What Verilator says of files that tools have written: widths, loops through carry chains, memories of two clocks.
+const WAIVED: [&str; 8] =
+    ["CASEINCOMPLETE", "COMBDLY", "INITIALDLY", "MULTIDRIVEN", "PINMISSING", "UNOPTFLAT", "UNUSED", "WIDTH"];
+
+/// Synthesises `generated` for `family`, or takes the netlist from below `cache`; it comes with its cells' models, in the
+/// place of the Verilog.
+///
+/// # Errors
+/// [`ToolError`]: no Yosys or none that has its models beside it, or a design that it refuses.
+pub fn netlist(generated: &Generated, family: Family, cache: &Path) -> Result<Generated, ToolError> {
+    let own = generated.files.iter().map(|file| (file.name.as_str(), file.text.as_str()));
+    let folder = cache.join(format!("netlist-{}", fingerprint(&own.collect::<Vec<_>>(), &YOSYS.version()?)));
+    let path = folder.join(VERILOG);
+    if !path.is_file() {
+        synthesise(generated, family, &folder)?;
+    }
+    let text = fs::read_to_string(&path).map_err(ToolError::io(&path))?;
+    let waivers = WAIVED.map(|rule| format!("lint_off -rule {rule} -file \"*\"\n")).concat();
+    let file = |name: &str, text: String| GeneratedFile { name: name.to_owned(), text };
+    let waivers = format!("`verilator_config\n{waivers}");
+    Ok(Generated {
+        files: vec![file(VERILOG, text), file("cells.v", cells(family)?), file("netlist.vlt", waivers)],
+        taps: Vec::new(),
+        ..generated.clone()
+    })
+}
+
+/// Makes the netlist in a temporary folder beside `folder` and renames it into place.
+fn synthesise(generated: &Generated, family: Family, folder: &Path) -> Result<(), ToolError> {
+    let cache = folder.parent().unwrap_or(folder);
+    fs::create_dir_all(cache).map_err(ToolError::io(cache))?;
+    let work = tempfile::Builder::new().prefix("netlist-").tempdir_in(cache).map_err(ToolError::io(cache))?;
+    for file in &generated.files {
+        let path = work.path().join(&file.name);
+        fs::write(&path, &file.text).map_err(ToolError::io(&path))?;
+    }
+    let top = &generated.top;
+    let _progress = Progress::start(&format!("{top}: netlist"));
+    let run =
+        |script: String, log: &str| YOSYS.run(work.path(), &["-q".into(), "-p".into(), script], log, SYNTHESIS_MINUTES);
+    run(format!("read_verilog {top}.v; {} -top {top} -json {NETLIST}", flow(family).synthesis), "synthesis.log")?;
+    if family == Family::Ecp5 {
+        absorb_file(&work.path().join(NETLIST), top)?;
+    }
+    // Without the cells, which Yosys has as empty modules.
+    run(format!("read_json {NETLIST}; select {top}; write_verilog -noattr -selected {VERILOG}"), "verilog.log")?;
+    let made = work.keep();
+    match fs::rename(&made, folder) {
+        // Somebody else finished the same netlist first: theirs serves as well.
+        Err(_) if folder.join(VERILOG).is_file() => fs::remove_dir_all(&made).map_err(ToolError::io(&made)),
+        renamed => renamed.map_err(ToolError::io(folder)),
+    }
+}
+
+/// Models of the family's cells: Yosys's, and ours where it has none.
+fn cells(family: Family) -> Result<String, ToolError> {
+    let (folder, own) = match family {
+        Family::Ecp5 => ("ecp5", ECP5_CELLS),
+    };
+    let share = YOSYS.share()?.join(folder);
+    let path = share.join("cells_sim.v");
+    let text = fs::read_to_string(&path).map_err(ToolError::io(&path))?;
+    let mut models = own.to_owned();
+    let mut replaced = false;
+    for line in text.lines() {
+        let name = line.strip_prefix("module ").and_then(|rest| rest.split('(').next()).map(str::trim);
+        // Yosys has an empty module where ours is the model.
+        replaced |= name.is_some_and(|name| own.contains(&format!("\nmodule {name} (")));
+        // Files that it includes are pasted in: the compiled design is one set of texts.
+        match line.trim().strip_prefix("`include \"").and_then(|name| name.strip_suffix('"')) {
+            _ if replaced => {}
+            Some(name) => {
+                let path = share.join(name);
+                models.push_str(&fs::read_to_string(&path).map_err(ToolError::io(&path))?);
+            }
+            None => models.push_str(line),
+        }
+        models.push('\n');
+        replaced &= line.trim() != "endmodule";
+    }
+    Ok(models)
+}
