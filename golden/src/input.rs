@@ -10,7 +10,7 @@
 //! | `average = k` | 2^k frames are averaged into one; the extra bits stay |
 //! | `calibration = "table.csv"` | offset and gain of each taxel, [`calibration`] |
 //! | `tare = "zero.json"` | a frame read without contact, in the readings' unit |
-//! | `dead = [[row, col], …]` | taxels left out of the inverse, [`crate::matrices::Matrices::without`] |
+//! | `dead = [[row, col], …]` | taxels left out of the inverse, [`crate::matrices::Matrices::without`], whatever they read |
 //! | `unipolar = true` | a reading of zero or less says only that the stress is not above it, [`unipolar`] |
 //!
 //! Files are found beside the scene's. The truth of a frame is carried along unchanged.
@@ -21,7 +21,7 @@ mod tests;
 pub mod unipolar;
 
 use crate::frame::{Frame, FrameError};
-use crate::scene::Scene;
+use crate::scene::{InputSpec, Scene};
 use calibration::{Calibration, CalibrationError};
 use thiserror::Error;
 
@@ -31,6 +31,7 @@ pub struct Input {
     frames: usize,
     /// Zero and gain of each taxel, where the scene has a table or a tare frame.
     scale: Option<(Vec<f64>, Vec<f64>)>,
+    spec: InputSpec,
 }
 
 /// Input options or frames that cannot be used.
@@ -63,7 +64,7 @@ impl Input {
     /// A table or tare frame that cannot be read or does not fit the sensor.
     pub fn new(scene: &Scene) -> Result<Input, InputError> {
         let spec = &scene.input;
-        let frames = 1 << spec.average;
+        let (frames, spec) = (1 << spec.average, spec.clone());
         let table = spec.calibration.as_ref().map(|path| Calibration::load(path, &scene.sensor)).transpose()?;
         let tare = match &spec.tare {
             None => None,
@@ -74,10 +75,10 @@ impl Input {
             }
         };
         if table.is_none() && tare.is_none() {
-            return Ok(Input { frames, scale: None });
+            return Ok(Input { frames, scale: None, spec });
         }
         let Calibration { offset, gain } = table.unwrap_or_else(|| Calibration::identity(scene.sensor.taxels()));
-        Ok(Input { frames, scale: Some((tare.unwrap_or(offset), gain)) })
+        Ok(Input { frames, scale: Some((tare.unwrap_or(offset), gain)), spec })
     }
 
     /// Frames that make one, 2^k.
@@ -108,7 +109,7 @@ impl Input {
         InputError::Count { scene: scene.name.clone(), average, wanted: self.frames, got }
     }
 
-    /// Readings to stress; without table and tare frame they are the same.
+    /// Readings to stress; without table and tare frame they are the same. Dead taxels read 0.
     pub fn calibrate(&self, frame: &Frame) -> Frame {
         let mut frame = frame.clone();
         if let Some((zero, gain)) = &self.scale {
@@ -116,6 +117,6 @@ impl Input {
                 *b = gain * (*b - zero);
             }
         }
-        frame
+        self.spec.blank(frame)
     }
 }

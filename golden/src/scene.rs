@@ -30,6 +30,7 @@ mod tests;
 
 pub use error::SceneError;
 
+use crate::frame::Frame;
 use crate::partition::Case;
 use crate::sensor::Sensor;
 use serde::{Deserialize, Serialize};
@@ -221,6 +222,16 @@ impl InputSpec {
     /// Noise of the mean of 2^average frames over that of a single one, 2^(−average/2).
     pub fn noise_share(&self) -> f64 {
         2f64.powf(-f64::from(self.average) / 2.0)
+    }
+
+    /// The frame with 0 for what its dead taxels read: neither the peak nor the condition is to see it.
+    pub fn blank(&self, mut frame: Frame) -> Frame {
+        let cols = frame.sensor.cols;
+        for [row, col] in &self.dead {
+            // A frame of another sensor may lack the taxel; it is refused where it is used.
+            frame.stress_MPa.get_mut(row * cols + col).into_iter().for_each(|b| *b = 0.0);
+        }
+        frame
     }
 }
 

@@ -114,7 +114,7 @@ impl Engine {
             m_axis_tready: Default::default(),
             m_axis_tlast: Default::default(),
             prepare: Prepare::new(model),
-            receive: Receive::new(layout, parts, bits, model.noise_floor),
+            receive: Receive::new(layout, parts, bits, model.noise_floor, &model.dead),
             fold: Fold::new(formats.quads, count, bits),
             pass: Pass::new(model),
             unfold: Unfold::new(model),

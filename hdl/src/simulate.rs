@@ -49,7 +49,7 @@ macro_rules! design {
                     SEARCH_FIELD as usize,
                 );
                 let streams = [
-                    (self.receive.accept.val(), self.receive.s_axis_tdata.val()),
+                    (self.receive.accept.val(), self.receive.taken_word.val()),
                     (self.fold.normalised_valid.val(), self.normalise.shifted.val()),
                     (self.fold.folded_valid.val(), self.fold.folded.val()),
                     (self.pass.quad_valid.val(), self.pass.quad.val()),

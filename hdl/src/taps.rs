@@ -30,7 +30,7 @@ pub fn taps(model: &Model) -> Vec<Tap> {
         x = extended("best_x", position),
     );
     vec![
-        tap("receive", "receive$accept", "receive$s_axis_tdata", 1, f.input_bits),
+        tap("receive", "receive$accept", "receive$taken_word", 1, f.input_bits),
         tap("normalise", "fold$normalised_valid", "normalise$shifted", 4, f.input_bits),
         tap("fold", "fold$folded_valid", "fold$folded", 4, f.fold_bits),
         tap("pass", "pass$quad_valid", "pass$quad", 4, f.acc_bits),

@@ -8,6 +8,16 @@
 //! where p = p' for Cz⁺, p' with the column parity flipped for Ax, with the row parity flipped for Ay: a quarter of the
 //! coefficients and products of M, and exact. Rows and columns that lie on a middle line vanish in the odd parities.
 //!
+//! A matrix without some of its taxels ([`crate::matrices::Matrices::without`]) has lost the symmetry. In the parities it
+//! has all 16 blocks, four for each flip f = p XOR p', and is exact again:
+//! ```text
+//! y_{p'}(i) = Σ_f Σ_j B_{p',f}(i, j) f_{p' XOR f}(j)
+//! B_{p',f}(i, j) = mean over the distinct images k of i of (−1)^{p'·k}
+//!                  Σ over the distinct images n of j of (−1)^{p·n} M(image k of i, image n of j)
+//! ```
+//! Taxels that are missed in mirrored pairs leave one of the symmetries: a flip of which all coefficients round to zero is
+//! left out.
+//!
 //! | matrix | stored as | width | LSB |
 //! |---|---|---|---|
 //! | Cz⁺ | two limbs, high signed, low unsigned | `inverse_bits` | 2^−`inverse_exponent` N/MPa |
@@ -22,66 +32,94 @@ pub const FLIP_X: usize = 1;
 /// Row parity: Ay flips it.
 pub const FLIP_Y: usize = 2;
 
-/// One matrix, folded and quantised: four blocks of Q × Q, row-major, indexed by the target's parity.
+/// The blocks of a folded matrix that flip the parity in one way: Q × Q each, row-major, indexed by the target's parity.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Blocks {
-    /// Integer coefficients per target parity.
-    pub parity: [Vec<i64>; 4],
+pub struct Flipped<T> {
     /// Source parity = target parity XOR `flip`.
     pub flip: usize,
+    /// Coefficients per target parity.
+    pub parity: [Vec<T>; 4],
+}
+
+/// One matrix, folded and quantised.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Blocks {
+    /// Integer coefficients of each flip, that of the mirror symmetry first.
+    pub flips: Vec<Flipped<i64>>,
     /// LSB of the coefficients is 2^−`exponent`.
     pub exponent: i32,
 }
 
 impl Blocks {
-    /// Largest Σ_j |B(i, j)| over all rows and parities, in LSBs: the ∞-norm that bounds a pass.
+    /// Largest Σ |B(i, j)| over the columns of all flips, of all rows and parities, in LSBs: the ∞-norm that bounds a
+    /// pass.
     pub fn norm(&self, quads: usize) -> u64 {
-        self.parity
-            .iter()
-            .flat_map(|block| block.chunks(quads))
-            .map(|row| row.iter().map(|c| c.unsigned_abs()).sum())
-            .max()
-            .unwrap_or(0)
+        let row = |target: usize, i: usize| -> u64 {
+            let own = |flipped: &Flipped<i64>| -> u64 {
+                flipped.parity[target][i * quads..][..quads].iter().map(|c| c.unsigned_abs()).sum()
+            };
+            self.flips.iter().map(own).sum()
+        };
+        (0..4).flat_map(|target| (0..quads).map(move |i| row(target, i))).max().unwrap_or(0)
+    }
+
+    /// Every coefficient.
+    pub fn coefficients(&self) -> impl Iterator<Item = &i64> {
+        self.flips.iter().flat_map(|flipped| flipped.parity.iter().flatten())
+    }
+
+    /// Its flips.
+    pub fn flips(&self) -> Vec<usize> {
+        self.flips.iter().map(|flipped| flipped.flip).collect()
     }
 }
 
-/// Folds `matrix` (n × n over a subarray's row-major taxels), not yet quantised.
-pub fn parity_blocks(quads: Quads, matrix: &Mat<f64>, flip: usize) -> [Vec<f64>; 4] {
+/// Folds `matrix` (n × n over a subarray's row-major taxels) into the blocks of one flip, not yet quantised: all of a
+/// matrix with the mirror symmetry `flip`, a quarter of one without.
+pub fn parity_blocks(quads: Quads, matrix: &Mat<f64>, flip: usize) -> Flipped<f64> {
     let count = quads.len();
-    std::array::from_fn(|target| {
+    let parity = std::array::from_fn(|target| {
         let source = target ^ flip;
         let mut block = vec![0.0; count * count];
         for i in (0..count).filter(|&i| lives(quads, i, target)) {
             for j in (0..count).filter(|&j| lives(quads, j, source)) {
-                block[i * count + j] = (0..4)
-                    .filter(|lane| quads.counts(j) >> lane & 1 == 1)
-                    .map(|lane| sign(source, lane) * matrix[(quads.taxel(i, 0), quads.taxel(j, lane))])
-                    .sum();
+                // From the image `from` of row i; under the mirror symmetry the same sum, to the bit, from each.
+                let seen = |from: usize| -> f64 {
+                    let images = (0..4).filter(|lane| quads.counts(j) >> lane & 1 == 1).map(|lane| lane ^ from);
+                    images.map(|lane| sign(source, lane) * matrix[(quads.taxel(i, from), quads.taxel(j, lane))]).sum()
+                };
+                let images = (0..4).filter(|lane| quads.counts(i) >> lane & 1 == 1);
+                let sum: f64 = images.map(|from| sign(target, from) * seen(from)).sum();
+                block[i * count + j] = sum / f64::from(quads.counts(i).count_ones());
             }
         }
         block
-    })
+    });
+    Flipped { flip, parity }
 }
 
-/// Quantises folded matrices to `bits`-bit signed integers that share the largest exponent at which all fit.
-pub fn quantise(folded: &[(&[Vec<f64>; 4], usize)], bits: u32) -> Vec<Blocks> {
-    let largest = folded.iter().flat_map(|(blocks, _)| blocks.iter().flatten()).fold(0.0f64, |m, c| m.max(c.abs()));
+/// Quantises folded matrices, each in its flips, to `bits`-bit signed integers that share the largest exponent at which
+/// all fit. Of each the first flip stays; others stay where something is left of them.
+pub fn quantise(folded: &[Vec<Flipped<f64>>], bits: u32) -> Vec<Blocks> {
+    let all = folded.iter().flatten().flat_map(|flipped| flipped.parity.iter().flatten());
+    let largest = all.fold(0.0f64, |m, c| m.max(c.abs()));
     let limit = ((1i64 << (bits - 1)) - 1) as f64;
     let mut exponent = if largest > 0.0 { (limit / largest).log2().floor() as i32 } else { 0 };
     // The logarithm may round up across an integer; one step down is always enough.
     if (largest * 2f64.powi(exponent)).round() > limit {
         exponent -= 1;
     }
-    folded
-        .iter()
-        .map(|&(blocks, flip)| Blocks {
-            parity: std::array::from_fn(|p| {
-                blocks[p].iter().map(|c| (c * 2f64.powi(exponent)).round() as i64).collect()
-            }),
-            flip,
-            exponent,
-        })
-        .collect()
+    let integers = |Flipped { flip, parity }: &Flipped<f64>| Flipped {
+        flip: *flip,
+        parity: std::array::from_fn(|p| parity[p].iter().map(|c| (c * 2f64.powi(exponent)).round() as i64).collect()),
+    };
+    let kept =
+        |(index, flipped): &(usize, Flipped<i64>)| *index == 0 || flipped.parity.iter().flatten().any(|&c| c != 0);
+    let blocks = |flips: &Vec<Flipped<f64>>| {
+        let flips = flips.iter().map(integers).enumerate().filter(kept).map(|(_, flipped)| flipped).collect();
+        Blocks { flips, exponent }
+    };
+    folded.iter().map(blocks).collect()
 }
 
 /// Whether quad `index` has an entry of `parity`: odd parities vanish on the middle line they mirror.
@@ -118,7 +156,7 @@ mod tests {
             let x: Vec<i64> = (0..rows * cols).map(|t| ((t * t * 7 + 3 * t) % 41) as i64 - 20).collect();
             let folded = fold(&quads.pack(&x));
             for (matrix, flip) in [(&matrices.cz_pinv, 0), (&matrices.ax, FLIP_X), (&matrices.ay, FLIP_Y)] {
-                let blocks = parity_blocks(quads, matrix, flip);
+                let blocks = parity_blocks(quads, matrix, flip).parity;
                 for i in 0..quads.len() {
                     let y: Vec<f64> = (0..4)
                         .map(|target| {
@@ -137,12 +175,41 @@ mod tests {
         }
     }
 
+    /// A matrix without any symmetry takes all four flips, and is exact again.
+    #[test]
+    fn a_matrix_without_symmetry_is_the_sum_of_its_flips() {
+        for (rows, cols) in [(4, 4), (5, 4), (3, 5)] {
+            let n = rows * cols;
+            let quads = Quads { rows, cols };
+            let matrix = Mat::from_fn(n, n, |i, j| f64::from(((i * 31 + j * 17 + i * j) % 23) as u32) - 11.0);
+            let x: Vec<i64> = (0..n).map(|t| ((t * t * 7 + 3 * t) % 41) as i64 - 20).collect();
+            let folded = fold(&quads.pack(&x));
+            let flips: Vec<_> = (0..4).map(|flip| parity_blocks(quads, &matrix, flip)).collect();
+            for i in 0..quads.len() {
+                let y = |target: usize| -> f64 {
+                    let own = |f: &Flipped<f64>, j: usize| {
+                        f.parity[target][i * quads.len() + j] * folded[j][target ^ f.flip] as f64
+                    };
+                    flips.iter().flat_map(|f| (0..quads.len()).map(move |j| own(f, j))).sum()
+                };
+                for lane in 0..4 {
+                    let unfolded: f64 = (0..4).map(|p| sign(p, lane) * y(p)).sum::<f64>() / 4.0;
+                    let dense: f64 = (0..n).map(|t| matrix[(quads.taxel(i, lane), t)] * x[t] as f64).sum();
+                    assert!((unfolded - dense).abs() < 1e-9 * (1.0 + dense.abs()), "{rows}×{cols} {i} {lane}");
+                }
+            }
+        }
+    }
+
     #[test]
     fn quantised_coefficients_fill_their_word() {
-        let block = [vec![0.3], vec![-0.7], vec![0.0], vec![0.1]];
-        let blocks = &quantise(&[(&block, 0)], 8)[0];
+        let own = Flipped { flip: 0, parity: [vec![0.3], vec![-0.7], vec![0.0], vec![0.1]] };
+        let other = |flip, value: f64| Flipped { flip, parity: [vec![0.0], vec![value], vec![0.0], vec![0.0]] };
+        let blocks = &quantise(&[vec![own, other(1, 0.003), other(3, -0.02)]], 8)[0];
         assert_eq!(blocks.exponent, 7);
-        assert_eq!(blocks.parity[1], vec![-90]);
-        assert_eq!(blocks.norm(1), 90);
+        assert_eq!(blocks.flips[0].parity[1], vec![-90]);
+        // Flip 1 rounds to nothing.
+        assert_eq!(blocks.flips(), [0, 3]);
+        assert_eq!(blocks.norm(1), 93);
     }
 }

@@ -21,13 +21,14 @@
 //! | μ | 18 | | 2^−`mu_fraction` |
 //! | force | 32 | | `force_exponent` |
 
+use faer::Mat;
 use serde::Serialize;
 
 use super::arith::{bit_length, signed_bits};
-use super::coefficients::{parity_blocks, quantise, Blocks, FLIP_X, FLIP_Y};
+use super::coefficients::{parity_blocks, quantise, Blocks, Flipped, FLIP_X, FLIP_Y};
 use super::quads::Quads;
 use super::resources::{Fit, Resources};
-use super::schedule::{products, vectors, Matrix, EXPONENTS};
+use super::schedule::{products, vectors, Flips, Kind, Matrix, EXPONENTS};
 use super::storage::{stored, Storage};
 use super::FixedError;
 use crate::board::Board;
@@ -73,6 +74,9 @@ pub struct Formats {
     pub groups: usize,
     /// Ay is Ax transposed, and not stored.
     pub shared_a: bool,
+    /// Parity flips of the matrices; serialised where the mirror symmetry is broken.
+    #[serde(skip_serializing_if = "Flips::are_symmetric")]
+    pub flips: Flips,
     /// Width of a code on the input stream.
     pub code_bits: u32,
     /// Width of a word of the frame buffer: a code, or a sum of several.
@@ -154,18 +158,28 @@ pub fn derive(scene: &Scene, matrices: &Matrices, parts: usize, board: &Board) -
     let quads = Quads { rows: matrices.sensor.rows, cols: matrices.sensor.cols };
     let count = quads.len();
     let scale = -4.0 / 3.0 * scene.search.mu_max;
-    let scaled = |blocks: [Vec<f64>; 4]| blocks.map(|block| block.iter().map(|c| c * scale).collect::<Vec<_>>());
+    // The mirror symmetry is lost with a taxel: then every flip is looked at, the symmetry's first.
+    let symmetric = scene.input.dead.is_empty();
+    let folded = |matrix: &Mat<f64>, own: usize, scale: f64| -> Vec<Flipped<f64>> {
+        let flips = (0..if symmetric { 1 } else { 4 }).map(|other| own ^ other);
+        let scaled = |Flipped { flip, parity }| {
+            let parity: [Vec<f64>; 4] = parity;
+            Flipped { flip, parity: parity.map(|block| block.iter().map(|c| c * scale).collect()) }
+        };
+        flips.map(|flip| scaled(parity_blocks(quads, matrix, flip))).collect()
+    };
 
-    let inverse = parity_blocks(quads, &matrices.cz_pinv, 0);
-    let ax = scaled(parity_blocks(quads, &matrices.ax, FLIP_X));
-    let ay = scaled(parity_blocks(quads, &matrices.ay, FLIP_Y));
-    let [inverse] = <[Blocks; 1]>::try_from(quantise(&[(&inverse, 0)], spec.inverse_bits))
+    let inverse = folded(&matrices.cz_pinv, 0, 1.0);
+    let (ax, ay) = (folded(&matrices.ax, FLIP_X, scale), folded(&matrices.ay, FLIP_Y, scale));
+    let [inverse] = <[Blocks; 1]>::try_from(quantise(&[inverse], spec.inverse_bits))
         .map_err(|_| FixedError::Internal("one matrix in, one out"))?;
-    let [ax, ay] = <[Blocks; 2]>::try_from(quantise(&[(&ax, FLIP_X), (&ay, FLIP_Y)], spec.coef_bits))
+    let [ax, ay] = <[Blocks; 2]>::try_from(quantise(&[ax, ay], spec.coef_bits))
         .map_err(|_| FixedError::Internal("two matrices in, two out"))?;
+    let flips = Flips { inverse: inverse.flips(), ax: ax.flips(), ay: ay.flips() };
 
     let sensor = &matrices.sensor;
-    let shared_a = matrices.degree == 1 && sensor.rows == sensor.cols && sensor.pitch_x_mm == sensor.pitch_y_mm;
+    let square = sensor.rows == sensor.cols && sensor.pitch_x_mm == sensor.pitch_y_mm;
+    let shared_a = matrices.degree == 1 && square && symmetric;
     let mut quantised = Quantised { inverse, ax, ay };
 
     let input_bits = spec.input_bits + scene.input.average;
@@ -180,8 +194,8 @@ pub fn derive(scene: &Scene, matrices: &Matrices, parts: usize, board: &Board) -
 
     // v_00 in units of 2^raw_shift: the folded input reaches 2^(fold_bits − 1); one unit more for each dropped low·low
     // product.
-    let raw_bound =
-        ((u128::from(quantised.inverse.norm(count)) << (fold_bits - 1)) >> raw_shift) as u64 + 2 * count as u64;
+    let dropped = (count * flips.inverse.len()) as u64;
+    let raw_bound = ((u128::from(quantised.inverse.norm(count)) << (fold_bits - 1)) >> raw_shift) as u64 + 2 * dropped;
     let a_norm = quantised.ax.norm(count) + quantised.ay.norm(count);
     let a_bound = a_norm << (spec.data_bits - 1);
     let acc_bits = signed_bits(raw_bound.max(a_bound));
@@ -224,13 +238,14 @@ pub fn derive(scene: &Scene, matrices: &Matrices, parts: usize, board: &Board) -
     let rescale_max = raw_length_max.saturating_sub(vector_bits - 1);
     let headroom = FORCE_BITS - search_bits[0];
     let limbs = (input_low_bits > 0, inverse_low_bits > 0);
-    let order = stored(&products(matrices.degree, limbs, shared_a));
+    let order = stored(&products(matrices.degree, limbs, shared_a, &flips));
     let formats = Formats {
         degree: matrices.degree,
         quads: count,
         lanes_per_parity: count,
         groups: 1,
         shared_a,
+        flips,
         code_bits: spec.input_bits,
         input_bits,
         fold_bits,
@@ -271,11 +286,11 @@ fn fit(
     board: &Board,
 ) -> (Formats, Storage, Resources) {
     let (quads, prune_bits) = (formats.quads, scene.fixed.prune_bits);
-    let largest = quantised.inverse.parity.iter().flatten().map(|c| c.abs()).max().unwrap_or(0);
-    let threshold = |matrix| match matrix {
-        Matrix::InverseHigh | Matrix::InverseLow => largest >> prune_bits,
-        Matrix::Ax => 2f64.powi(quantised.ax.exponent - prune_bits as i32) as i64,
-        Matrix::Ay => 2f64.powi(quantised.ay.exponent - prune_bits as i32) as i64,
+    let largest = quantised.inverse.coefficients().map(|c| c.abs()).max().unwrap_or(0);
+    let threshold = |matrix: Matrix| match matrix.kind {
+        Kind::InverseHigh | Kind::InverseLow => largest >> prune_bits,
+        Kind::Ax => 2f64.powi(quantised.ax.exponent - prune_bits as i32) as i64,
+        Kind::Ay => 2f64.powi(quantised.ay.exponent - prune_bits as i32) as i64,
     };
     let with = |groups: usize| {
         let lanes_per_parity = quads.div_ceil(groups);

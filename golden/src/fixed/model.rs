@@ -7,6 +7,7 @@ use super::force::Force;
 use super::formats::{derive, Design, Formats, Quantised, LOG_FRACTION, MU_STEPS};
 use super::prepare::{Prepare, Scale};
 use super::quads::Quads;
+use super::receive::blank;
 use super::remedy::{remedies, Shortage};
 use super::resources::Resources;
 use super::resultants::{self, sums};
@@ -136,6 +137,8 @@ pub struct Model {
     pub board: Board,
     /// The subarrays, row-major.
     pub parts: Vec<Subarray>,
+    /// Dead taxels, row-major in the array, ascending.
+    pub dead: Vec<usize>,
     layout: Quads,
 }
 
@@ -166,7 +169,9 @@ impl Model {
         let board = Board::load(&scene.hardware.board)?;
         let parts = subarrays(scene.partition.case, &scene.sensor)?;
         let shape = parts[0].sensor(&scene.sensor);
-        let mut matrices = Matrices::new(&shape, scene.search.mu_max)?;
+        // With dead taxels there is one subarray.
+        let dead = parts[0].own(&scene.input.dead);
+        let mut matrices = Matrices::new(&shape, scene.search.mu_max)?.without(&dead)?;
         matrices.degree = degree.unwrap_or(matrices.degree);
         let Design { formats, quantised, storage, resources } = derive(scene, &matrices, parts.len(), &board)?;
         let scaled = |field, value: f64, unit: &dyn Fn(f64) -> f64| match scene.input.full_scale_MPa {
@@ -189,6 +194,7 @@ impl Model {
             prepare,
             layout: Quads { rows: shape.rows, cols: shape.cols },
             parts,
+            dead,
             formats,
             quantised,
             storage,
@@ -210,7 +216,8 @@ impl Model {
             || scene.scaled_input().is_some();
         if needs && scene.input.full_scale_MPa.is_none() {
             let gain = Scale::new(&scene)?.largest;
-            let largest = gain * frames.iter().map(Frame::peak_MPa).fold(0.0, f64::max);
+            let peak = |frame: &Frame| scene.input.blank(frame.clone()).peak_MPa();
+            let largest = gain * frames.iter().map(peak).fold(0.0, f64::max);
             // Frames of nothing but zeros leave any scale: the default of a single one.
             scene.input.full_scale_MPa = Some(if largest > 0.0 { largest } else { 1.0 });
         }
@@ -268,7 +275,7 @@ impl Model {
 
     /// Runs the `codes` of one reconstruction, row-major over the array, `code_bits` wide: 2^average frames of them.
     pub fn run(&self, codes: &[i32]) -> Trace {
-        let codes = &self.prepare.run(codes);
+        let codes = &blank(&self.prepare.run(codes), &self.dead);
         let sensor = &self.scene.sensor;
         let solved: Vec<Solved> =
             self.parts.iter().map(|part| Solved::new(self, &part.gather(sensor, codes))).collect();

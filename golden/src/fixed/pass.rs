@@ -11,7 +11,7 @@
 
 use super::formats::{Formats, Quantised};
 use super::quads::Quads;
-use super::schedule::{Matrix, Operand, Product};
+use super::schedule::{Kind, Matrix, Operand, Product};
 use super::storage::blocks;
 
 /// A folded input or v_ij as operands: parities per quad.
@@ -50,14 +50,13 @@ impl Operands {
     }
 }
 
-/// The coefficient of `matrix` that a lane of parity `target` multiplies for row `i`, column `j`: an 18-bit operand.
-pub fn coefficient(formats: &Formats, quantised: &Quantised, matrix: Matrix, target: usize, i: usize, j: usize) -> i64 {
-    let c = blocks(quantised, matrix).parity[target][i * formats.quads + j];
+/// What a lane multiplies of a coefficient `c` of `kind`: an 18-bit operand.
+pub fn coefficient(formats: &Formats, kind: Kind, c: i64) -> i64 {
     let low = formats.inverse_low_bits;
-    match matrix {
-        Matrix::InverseHigh => c >> low,
-        Matrix::InverseLow => (c & ((1 << low) - 1)) << (formats.limb_align - low),
-        Matrix::Ax | Matrix::Ay => c,
+    match kind {
+        Kind::InverseHigh => c >> low,
+        Kind::InverseLow => (c & ((1 << low) - 1)) << (formats.limb_align - low),
+        Kind::Ax | Kind::Ay => c,
     }
 }
 
@@ -76,12 +75,13 @@ pub fn pass(
     for product in products {
         let source = operands.get(product.operand);
         let align = if product.align { formats.limb_align } else { 0 };
-        let flip = blocks(quantised, product.matrix).flip;
+        let Matrix { kind, flip } = product.matrix;
+        let own = blocks(quantised, product.matrix);
         let source = if product.transposed { &transpose(layout, source) } else { source };
         for (i, row) in accumulators.iter_mut().enumerate() {
             for (target, acc) in row.iter_mut().enumerate() {
                 for (j, quad) in source.iter().enumerate() {
-                    let c = coefficient(formats, quantised, product.matrix, target, i, j);
+                    let c = coefficient(formats, kind, own.parity[target][i * quads + j]);
                     *acc += (c * quad[target ^ flip]) << align;
                 }
             }

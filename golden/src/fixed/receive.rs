@@ -4,6 +4,8 @@
 //! |---|---|
 //! | out | the OR of all magnitudes (for [`normalise`](super::normalise)), both sign conditions, the same codes as quads |
 //!
+//! The code of a dead taxel counts as 0, whatever it is: neither magnitude nor signs nor the passes see it.
+//!
 //! Signs are judged against the noise floor in codes: `c > floor`, `c < −floor`, as the golden model does on the
 //! same codes.
 
@@ -18,6 +20,11 @@ pub struct Received {
     pub positive: bool,
     /// Some code is below minus the noise floor.
     pub negative: bool,
+}
+
+/// The codes of an array without what its `dead` taxels (row-major) read.
+pub fn blank(codes: &[i32], dead: &[usize]) -> Vec<i32> {
+    codes.iter().enumerate().map(|(taxel, &code)| if dead.contains(&taxel) { 0 } else { code }).collect()
 }
 
 /// Gathers magnitude and signs of one subarray's `codes` against `floor` (codes, ≥ 0).
@@ -38,5 +45,6 @@ mod tests {
         assert_eq!(receive(&[5, -3, 0], 3), Received { magnitude: 7, positive: true, negative: false });
         assert_eq!(receive(&[0, 0], 0), Received::default());
         assert!(receive(&[-1], 0).negative);
+        assert_eq!(blank(&[7, -8, 9], &[1]), [7, 0, 9]);
     }
 }

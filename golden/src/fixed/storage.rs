@@ -8,10 +8,10 @@
 //! On a square subarray of square pitch, Ay is Ax with x and y exchanged. At degree 1, where no v_ij adds both, Ay is not stored:
 //! v_01 is Ax's pass over the transposed v_00, and comes out transposed.
 
-use super::coefficients::Blocks;
+use super::coefficients::Flipped;
 use super::formats::{Formats, Quantised, MULTIPLIER_BITS};
 use super::pass::coefficient;
-use super::schedule::{Matrix, Product};
+use super::schedule::{Kind, Matrix, Product};
 
 /// The kept columns, per matrix in order of storage and per group of rows.
 #[derive(Clone, Debug, PartialEq)]
@@ -112,7 +112,7 @@ impl Storage {
     pub fn drop_from(&self, quantised: &mut Quantised, quads: usize, per_parity: usize) {
         for (index, &matrix) in self.matrices.iter().enumerate() {
             for (group, kept) in self.columns[index].iter().enumerate() {
-                for block in &mut blocks_mut(quantised, matrix).parity {
+                for block in blocks_mut(quantised, matrix).into_iter().flat_map(|blocks| &mut blocks.parity) {
                     for i in rows(group, per_parity, quads) {
                         for j in (0..quads).filter(|j| kept.binary_search(j).is_err()) {
                             block[i * quads + j] = 0;
@@ -127,11 +127,12 @@ impl Storage {
     /// `group·lanes_per_parity + k`; rows past the last are zero.
     pub fn memory(&self, formats: &Formats, quantised: &Quantised) -> Vec<Vec<i64>> {
         let lanes = formats.lanes_per_parity;
-        let word = |matrix, group: usize, j: usize| -> Vec<i64> {
+        let word = |matrix: Matrix, group: usize, j: usize| -> Vec<i64> {
+            let own = blocks(quantised, matrix);
             (0..4)
                 .flat_map(|parity| (0..lanes).map(move |k| (parity, group * lanes + k)))
                 .map(|(parity, i)| match i < formats.quads {
-                    true => coefficient(formats, quantised, matrix, parity, i, j),
+                    true => coefficient(formats, matrix.kind, own.parity[parity][i * formats.quads + j]),
                     false => 0,
                 })
                 .collect()
@@ -147,20 +148,25 @@ impl Storage {
 }
 
 /// The blocks a stored matrix is made of; both limbs of Cz⁺ keep the same columns.
-pub fn blocks(quantised: &Quantised, matrix: Matrix) -> &Blocks {
-    match matrix {
-        Matrix::InverseHigh | Matrix::InverseLow => &quantised.inverse,
-        Matrix::Ax => &quantised.ax,
-        Matrix::Ay => &quantised.ay,
-    }
+///
+/// # Panics
+/// When the matrix has no such flip: schedules list those it has.
+pub fn blocks(quantised: &Quantised, matrix: Matrix) -> &Flipped<i64> {
+    let blocks = match matrix.kind {
+        Kind::InverseHigh | Kind::InverseLow => &quantised.inverse,
+        Kind::Ax => &quantised.ax,
+        Kind::Ay => &quantised.ay,
+    };
+    blocks.flips.iter().find(|own| own.flip == matrix.flip).expect("a flip of the schedule")
 }
 
-fn blocks_mut(quantised: &mut Quantised, matrix: Matrix) -> &mut Blocks {
-    match matrix {
-        Matrix::InverseHigh | Matrix::InverseLow => &mut quantised.inverse,
-        Matrix::Ax => &mut quantised.ax,
-        Matrix::Ay => &mut quantised.ay,
-    }
+fn blocks_mut(quantised: &mut Quantised, matrix: Matrix) -> Option<&mut Flipped<i64>> {
+    let blocks = match matrix.kind {
+        Kind::InverseHigh | Kind::InverseLow => &mut quantised.inverse,
+        Kind::Ax => &mut quantised.ax,
+        Kind::Ay => &mut quantised.ay,
+    };
+    blocks.flips.iter_mut().find(|own| own.flip == matrix.flip)
 }
 
 /// Bits of the coefficient memory's words.

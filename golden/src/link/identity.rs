@@ -111,8 +111,8 @@ pub fn wire_ms(payload: usize, baud: u32) -> f64 {
 }
 
 /// CRC-32 over everything that decides the bits of the answers: this program's version, array, subarrays, formats,
-/// condition, noise floor and threshold in codes, zeros and gains of the taxels, and the quantised matrices with the columns
-/// kept. The names of scene and board, and the clock, are not in it.
+/// condition, noise floor and threshold in codes, zeros and gains of the taxels, the dead ones, and the quantised matrices
+/// with the columns kept. The names of scene and board, and the clock, are not in it.
 pub fn scene_hash(model: &Model) -> u32 {
     let sensor = &model.scene.sensor;
     let text = json!({
@@ -129,9 +129,10 @@ pub fn scene_hash(model: &Model) -> u32 {
     });
     let mut hash = crc32fast::Hasher::new();
     hash.update(text.to_string().as_bytes());
+    model.dead.iter().for_each(|taxel| hash.update(&(*taxel as u64).to_le_bytes()));
     let quantised = &model.quantised;
     let coefficients = |blocks: &Blocks, hash: &mut crc32fast::Hasher| {
-        blocks.parity.iter().flatten().for_each(|coefficient| hash.update(&coefficient.to_le_bytes()));
+        blocks.coefficients().for_each(|coefficient| hash.update(&coefficient.to_le_bytes()));
     };
     for blocks in [&quantised.inverse, &quantised.ax, &quantised.ay] {
         coefficients(blocks, &mut hash);

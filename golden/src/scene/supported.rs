@@ -6,15 +6,18 @@
 //! | `partition.case` | all | 0 … 3 and rows × cols, where the device holds it |
 //! | `search.objective` | all; with "adaptive" and "contacts" "sparse" | "sparse" |
 //! | `search.form` | all, "orthogonal" up to [`crate::float::orthogonal::MAX_TAXELS`] taxels | "oblique" |
-//! | `input.dead`, `input.unipolar` | all; with "orthogonal" none | none |
+//! | `input.dead` | all; with "orthogonal" none | with one subarray |
+//! | `input.unipolar` | all; with "orthogonal" none | none |
 //!
-//! Dead taxels in hardware: filling b at k dead taxels with a fixed combination of the others gives the golden model's
-//! v_00, but not its v_ij. There Π stands before Ax and Ay as well ([`crate::matrices::Matrices::without`]), so that
-//! what is filled in depends on μ: an exact equivalent takes k products of n after every pass. Until then the hardware
-//! refuses them.
+//! Dead taxels in hardware: Π stands before Cz⁺, Ax and Ay ([`crate::matrices::Matrices::without`]), and what is left
+//! of the mirror symmetry decides how many products take the place of one, up to four
+//! ([`crate::fixed::coefficients`]). A subarray with a dead taxel has matrices of its own, while the subarrays of the
+//! engine share theirs: with several of them dead taxels are refused.
 //!
 //! Fields not listed are the same for both. Rules are asked in the order of the table, so that a scene with several
 //! refused choices always names the same one.
+
+use crate::partition::Case;
 
 use super::{Form, Medium, ObjectiveKind, Scene, SceneError};
 
@@ -49,7 +52,12 @@ impl Scene {
                 "sparse",
             ),
             rule(search.form != Form::Oblique, "search.form", "orthogonal".to_string(), "oblique"),
-            rule(!input.dead.is_empty(), "input.dead", self.dead(), "none"),
+            rule(
+                !input.dead.is_empty() && self.partition.case != Case::WHOLE,
+                "input.dead",
+                self.dead(),
+                "none, or partition.case = 0",
+            ),
             rule(input.unipolar, "input.unipolar", "true".to_string(), "false"),
         ])
     }

@@ -185,7 +185,10 @@ fn choices_not_built_yet_say_so() {
         ("[medium]\nkind = \"bonded-layer\"", "medium.kind = bonded-layer, poisson 0.48; available: half-space"),
         ("[partition]\ncase = \"contacts\"", "partition.case = contacts; available: 0, 1, 2, 3, rows and cols"),
         ("[partition]\ncase = \"adaptive\"", "partition.case = adaptive"),
-        ("[input]\ndead = [[0, 1]]", "input.dead"),
+        (
+            "[input]\ndead = [[0, 1]]\n[partition]\ncase = 1",
+            "input.dead = [[0, 1]]; available: none, or partition.case = 0",
+        ),
         ("[input]\nunipolar = true", "input.unipolar"),
         ("[search]\nobjective = \"auto\"", "search.objective = auto; available: sparse"),
         ("[search]\nform = \"orthogonal\"", "search.form = orthogonal; available: oblique"),

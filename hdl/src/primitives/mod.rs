@@ -7,6 +7,7 @@
 //! run against its printed Verilog in the co-simulation, stage by stage.
 
 mod average;
+mod blank;
 mod butterfly;
 mod calibrate;
 mod candidates;
@@ -46,6 +47,7 @@ mod walk;
 mod weigh;
 
 pub use average::Average;
+pub use blank::Blank;
 pub use butterfly::Butterfly;
 pub use calibrate::{Calibrate, CALIBRATION_FILE};
 pub use candidates::{Candidates, LATENCY as CANDIDATES_LATENCY};

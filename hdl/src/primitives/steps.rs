@@ -2,7 +2,6 @@
 
 use dermis_golden::fixed::resources::operand_vectors;
 use dermis_golden::fixed::schedule::{schedule, Operand};
-use dermis_golden::fixed::storage::blocks;
 use dermis_golden::fixed::Model;
 use rust_hdl::prelude::*;
 
@@ -51,7 +50,7 @@ pub fn unroll(model: &Model) -> Vec<Step> {
                     columns: storage.columns_of(product.matrix, group).len(),
                     operand,
                     kind,
-                    flip: blocks(&model.quantised, product.matrix).flip as u64,
+                    flip: product.matrix.flip as u64,
                     transposed: product.transposed,
                     align: product.align,
                     first: index == 0,

@@ -8,7 +8,7 @@ use dermis_golden::fixed::quads::Quads;
 use dermis_golden::partition::Grid;
 use rust_hdl::prelude::*;
 
-use crate::primitives::{count_bits, Gather, Ram, Scan, Spread};
+use crate::primitives::{count_bits, Blank, Gather, Ram, Scan, Spread};
 use crate::wire::Wire;
 
 /// ```text
@@ -32,6 +32,8 @@ pub struct Receive {
     pub s_axis_tlast: Signal<In, Bit>,
     /// A beat is accepted in this cycle.
     pub accept: Signal<Out, Bit>,
+    /// What it is taken for: 0 where the taxel is dead.
+    pub taken_word: Wire<Out>,
     /// The frame buffer holds a whole frame.
     pub full: Signal<Out, Bit>,
     /// The frame has been read.
@@ -53,6 +55,7 @@ pub struct Receive {
     /// `framing` has been reported.
     pub reported: Signal<In, Bit>,
     scan: Scan,
+    blank: Blank,
     spread: Spread,
     frame: Ram,
     gather: Gather,
@@ -63,9 +66,10 @@ pub struct Receive {
 }
 
 impl Receive {
-    /// Frames of `parts` subarrays in `layout`, codes of `bits` bits, noise floor in codes.
-    pub fn new(layout: Quads, parts: Grid, bits: usize, floor: i32) -> Self {
+    /// Frames of `parts` subarrays in `layout`, codes of `bits` bits, noise floor in codes, dead taxels row-major.
+    pub fn new(layout: Quads, parts: Grid, bits: usize, floor: i32, dead: &[usize]) -> Self {
         let count = parts.rows * parts.cols;
+        let taxels = count * layout.rows * layout.cols;
         let quads = count * layout.len();
         Receive {
             clk: Default::default(),
@@ -75,6 +79,7 @@ impl Receive {
             s_axis_tready: Default::default(),
             s_axis_tlast: Default::default(),
             accept: Default::default(),
+            taken_word: Wire::new(bits),
             full: Default::default(),
             free: Default::default(),
             quad_address: Wire::new(count_bits(quads)),
@@ -86,6 +91,7 @@ impl Receive {
             framing: Default::default(),
             reported: Default::default(),
             scan: Scan::new(layout, parts),
+            blank: Blank::new(bits, taxels, dead),
             spread: Spread::new(bits),
             frame: Ram::new(quads, 4, bits),
             gather: Gather::new(bits, floor, count),
@@ -101,6 +107,7 @@ impl Logic for Receive {
     #[hdl_gen]
     fn update(&mut self) {
         self.scan.clk.next = self.clk.val();
+        self.blank.clk.next = self.clk.val();
         self.frame.clk.next = self.clk.val();
         self.gather.clk.next = self.clk.val();
         self.whole.clock.next = self.clk.val();
@@ -113,7 +120,11 @@ impl Logic for Receive {
 
         self.scan.enable.next = self.taken.val();
         self.scan.clear.next = self.rst.val() | self.early.val();
-        self.spread.word.next = self.s_axis_tdata.val();
+        self.blank.enable.next = self.taken.val();
+        self.blank.clear.next = self.rst.val() | self.early.val();
+        self.blank.word.next = self.s_axis_tdata.val();
+        self.taken_word.next = self.blank.kept.val();
+        self.spread.word.next = self.blank.kept.val();
         self.frame.write_address.next = self.scan.address.val();
         self.frame.write_data.next = self.spread.quad.val();
         self.spread.mask.next = self.scan.mask.val();
@@ -127,7 +138,7 @@ impl Logic for Receive {
         self.gather.clear.next = self.rst.val() | self.free.val() | self.early.val();
         self.gather.part.next = self.scan.part.val();
         self.gather.select.next = self.part.val();
-        self.gather.code.next = self.s_axis_tdata.val();
+        self.gather.code.next = self.blank.kept.val();
         self.magnitude.next = self.gather.magnitude.val();
         self.positive.next = self.gather.positive.val();
         self.negative.next = self.gather.negative.val();
