@@ -20,11 +20,14 @@ pub struct Explained {
     pub present: bool,
     /// What leaving it out saves; `None` where the scene has it or cannot have it.
     pub saved: Option<Saved>,
+    /// What it costs against the scene without it, where that depends on how the scene has it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub costs: Option<Saved>,
     /// Why the scene cannot have it.
     pub impossible: Option<String>,
 }
 
-/// Differences; negative where the feature would have saved something itself.
+/// Differences, with a feature less without it; negative where it saves something itself.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 pub struct Saved {
     /// Block RAMs.
@@ -44,28 +47,33 @@ pub struct Saved {
 /// # Errors
 /// A feature put back that has a model and no hardware: a defect of this crate.
 pub fn explain(model: &Model) -> Result<Vec<Explained>, HdlError> {
-    let (own, own_cycles) = needs(model)?;
+    let own = needs(model)?;
     let explained = |feature: Feature| {
         let (mut saved, mut impossible) = (None, None);
         match &feature.put_back {
             None => {}
             Some(Err(error)) => impossible = Some(error.to_string()),
-            Some(Ok(other)) => {
-                let (usage, cycles) = needs(other)?;
-                let less = |with: usize, without: usize| with as i64 - without as i64;
-                saved = Some(Saved {
-                    block_rams: less(usage.block_rams, own.block_rams),
-                    multipliers: less(usage.multipliers, own.multipliers),
-                    flip_flops: less(usage.flip_flops, own.flip_flops),
-                    luts: less(usage.luts, own.luts),
-                    cycles: cycles as i64 - own_cycles as i64,
-                });
-            }
+            Some(Ok(other)) => saved = Some(difference(&needs(other)?, &own)),
         }
-        let Feature { name, setting, put_back } = feature;
-        Ok(Explained { feature: name, setting, present: put_back.is_none(), saved, impossible })
+        let costs = match &feature.taken_out {
+            None => None,
+            Some(other) => Some(difference(&own, &needs(other)?)),
+        };
+        let Feature { name, setting, put_back, .. } = feature;
+        Ok(Explained { feature: name, setting, present: put_back.is_none(), saved, costs, impossible })
     };
     features(model).into_iter().map(explained).collect()
+}
+
+fn difference((with, cycles_with): &(Usage, u64), (without, cycles_without): &(Usage, u64)) -> Saved {
+    let less = |with: usize, without: usize| with as i64 - without as i64;
+    Saved {
+        block_rams: less(with.block_rams, without.block_rams),
+        multipliers: less(with.multipliers, without.multipliers),
+        flip_flops: less(with.flip_flops, without.flip_flops),
+        luts: less(with.luts, without.luts),
+        cycles: *cycles_with as i64 - *cycles_without as i64,
+    }
 }
 
 fn needs(model: &Model) -> Result<(Usage, u64), HdlError> {

@@ -100,13 +100,13 @@ impl<P: std::io::Read + std::io::Write> Session<P> {
         Ok(Session { client, model, identity, tare_MPa, forces, check })
     }
 
-    /// The frame without what the sensor reads when nothing touches it.
+    /// The frame without what the sensor reads when nothing touches it; 0 where a taxel is dead.
     fn tared(&self, frame: &Frame) -> Frame {
         let mut frame = frame.clone();
         for (stress, zero) in frame.stress_MPa.iter_mut().zip(self.tare_MPa.iter().flatten()) {
             *stress -= zero;
         }
-        frame
+        self.model.scene.input.blank(frame)
     }
 
     /// Sends a frame; the answer, and what differs from the model where that was asked for.

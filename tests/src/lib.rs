@@ -4,6 +4,7 @@
 //! |---|---|
 //! | `equality` | generated Verilog = rust-hdl's simulation = bit-true model, on every shipped frame; cycle budgets |
 //! | `accuracy` | golden against the truth, bit-true against golden |
+//! | `dead` | dead taxels: the same equality, blind to what they read, near the golden model |
 //! | `flipped_bit` | one wrong bit in a coefficient, a vector or the expected output is found |
 //! | `resources` | block RAMs and multipliers as Yosys counts them, flip-flops and LUTs near |
 //! | `explain` | what is left out is not in the Verilog, and what that saves; refusals name what fits |

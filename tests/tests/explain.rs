@@ -1,6 +1,6 @@
 //! What is left out is not in the Verilog, and what that saves is the difference of two builds.
 
-use dermis_golden::fixed::Model;
+use dermis_golden::fixed::{Cycles, Model};
 use dermis_golden::scene::Scene;
 use dermis_hdl::explain::explain;
 use dermis_hdl::generate;
@@ -32,6 +32,20 @@ fn an_omission_saves_what_two_builds_differ_by() {
     assert!(difference[1] > 0 && difference[2] > 1000);
     // Two products of 21 by 18 bits, one ROM: known without the model.
     assert_eq!(saved(bare, "calibration table")[..2], [2, 2]);
+}
+
+#[test]
+fn dead_taxels_cost_what_two_builds_differ_by() {
+    let (alive, dead) = (model("[fixed]\nlanes = 36\n"), model("[fixed]\nlanes = 36\n[input]\ndead = [[1, 4]]\n"));
+    let explained = explain(&dead).unwrap();
+    let costs = explained.iter().find(|e| e.feature == "dead taxels").unwrap().costs.unwrap();
+    let [with, without] = [&dead, &alive].map(|model| total(&generate(model).unwrap().usage));
+    assert_eq!(costs.block_rams, with.block_rams as i64 - without.block_rams as i64);
+    assert_eq!(costs.flip_flops, with.flip_flops as i64 - without.flip_flops as i64);
+    let cycles = |model: &Model| Cycles::of(model, &[true]).latency as i64;
+    assert_eq!(costs.cycles, cycles(&dead) - cycles(&alive));
+    assert_eq!(dead.storage.words(), 4 * alive.storage.words());
+    assert!(saved("[fixed]\nlanes = 36\n", "dead taxels")[2] > 0);
 }
 
 #[test]

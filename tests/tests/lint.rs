@@ -49,6 +49,15 @@ fn generated_verilog_is_clean_and_needs_each_waiver() {
 }
 
 #[test]
+fn dead_taxels_are_clean_with_the_same_waivers() {
+    let (mut scene, _) = scene("eight-by-eight");
+    scene.input.dead = vec![[0, 0], [3, 4]];
+    let generated = generate(&Model::new(&scene).unwrap()).unwrap();
+    let folder = tempfile::tempdir().unwrap();
+    lint(folder.path(), &generated).unwrap_or_else(|log| panic!("{log}"));
+}
+
+#[test]
 fn a_board_is_clean_with_the_engines_waivers() {
     for (name, _) in SCENES {
         let generated = generate_board(&Model::new(&scene(name).0).unwrap()).unwrap();

@@ -18,6 +18,8 @@ pub struct Feature {
     pub setting: String,
     /// The model with it put back, or why there is none; `None` where the scene has it.
     pub put_back: Option<Result<Model, FixedError>>,
+    /// The model without it, where the scene has it and its cost depends on how.
+    pub taken_out: Option<Model>,
 }
 
 /// Every feature that hardware can do without, in pipeline order. A scene that would not fit its board with a feature
@@ -39,7 +41,7 @@ pub fn features(model: &Model) -> Vec<Feature> {
 
     let mut all = Vec::new();
     let mut add = |name, has: bool, setting: String, back: &dyn Fn() -> Result<Model, FixedError>| {
-        all.push(Feature { name, setting, put_back: (!has).then(back) });
+        all.push(Feature { name, setting, put_back: (!has).then(back), taken_out: None });
     };
     let set = |has: bool, own: String, back: &str| if has { own } else { back.to_string() };
 
@@ -79,9 +81,26 @@ pub fn features(model: &Model) -> Vec<Feature> {
         let thresholded = with(&|s| (s.threshold.min_force_N, s.input.full_scale_MPa) = (1e-3, Some(full_scale)));
         plain(&thresholded)
     });
+    let dead = input.dead.len();
+    let flips = &model.formats.flips;
+    let own = format!(
+        "{dead} {}; parity flips: {} of Cz⁺, {} of Ax, {} of Ay",
+        if dead == 1 { "taxel" } else { "taxels" },
+        flips.inverse.len(),
+        flips.ax.len(),
+        flips.ay.len()
+    );
+    // A corner breaks every symmetry.
+    add("dead taxels", dead > 0, set(dead > 0, own, "dead = [[0, 0]]"), &|| {
+        plain(&with(&|s| s.input.dead = vec![[0, 0]]))
+    });
     let resultants = model.wants_resultants();
     add("resultants", resultants, "a force and its moments per subarray".into(), &|| {
         plain(&with(&|s| s.output.forces = ForceOutput::Resultants))
     });
+    if dead > 0 {
+        let alive = plain(&with(&|s| s.input.dead.clear())).ok();
+        all.iter_mut().filter(|feature| feature.name == "dead taxels").for_each(|f| f.taken_out = alive.clone());
+    }
     all
 }

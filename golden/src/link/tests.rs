@@ -83,8 +83,16 @@ fn the_hash_tells_scenes_apart_and_clocks_not() {
     let mut faster = model(&|scene| scene.name = "other".into());
     faster.board.clock_MHz = 50.0;
     assert_eq!(scene_hash(&plain), scene_hash(&faster));
-    let others = [model(&|scene| scene.search.mu_max = 0.5), model(&|scene| scene.sensor.thickness_mm *= 1.01)];
+    let others = [
+        model(&|scene| scene.search.mu_max = 0.5),
+        model(&|scene| scene.sensor.thickness_mm *= 1.01),
+        model(&|scene| scene.input.dead = vec![[3, 4]]),
+    ];
     assert!(others.iter().all(|other| scene_hash(other) != scene_hash(&plain)));
+    // Which codes are blanked counts, even where the matrices were the same.
+    let mut blanked = plain.clone();
+    blanked.dead = vec![9];
+    assert_ne!(scene_hash(&blanked), scene_hash(&plain));
     // Another calibration of the same sensor is another bitstream.
     let calibrated = |zero: i32, gain: i32| {
         let mut other = plain.clone();

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use dermis_golden::fixed::cycles::lanes_busy;
 use dermis_golden::fixed::{Cycles, Model};
-use dermis_hdl::explain::Explained;
+use dermis_hdl::explain::{Explained, Saved};
 use dermis_hdl::usage::{total, Usage, STAGES};
 
 use super::table::{aligned, markdown};
@@ -38,7 +38,15 @@ pub fn resources(model: &Model, usage: &BTreeMap<String, Usage>) -> String {
 pub fn features(explained: &[Explained]) -> String {
     let mut text = "\nthe scene needs:\n".to_string();
     let present = explained.iter().filter(|feature| feature.present);
-    present.for_each(|feature| text.push_str(&format!("  {}: {}\n", feature.feature, feature.setting)));
+    for feature in present {
+        text.push_str(&format!("  {}: {}\n", feature.feature, feature.setting));
+        if let Some(Saved { block_rams, multipliers, flip_flops, luts, cycles }) = feature.costs {
+            text.push_str(&format!(
+                "    more than without: {block_rams} block RAMs, {multipliers} multipliers, {flip_flops} flip-flops*, \
+                 {luts} LUTs*, {cycles} cycles\n"
+            ));
+        }
+    }
     if explained.iter().all(|feature| !feature.present) {
         text.push_str("  none of the features that hardware can do without\n");
     }

@@ -1,0 +1,183 @@
+//! Dead taxels in hardware: equal to the bit, blind to what the dead taxels read, and near the golden model's answer
+//! for the array without them.
+//!
+//! `cargo test --release -p dermis-tests --test dead -- --nocapture` prints the table of errors.
+
+use dermis_golden::fixed::Model;
+use dermis_golden::frame::Frame;
+use dermis_golden::reconstruct::{Golden, Reconstruction};
+use dermis_golden::scene::Scene;
+use dermis_sim::compare::{difference, median};
+use dermis_sim::cosim::{run, Bench, Findings, Vector};
+use dermis_sim::drive::Stimulus;
+use dermis_sim::fresh::{Fresh, Shapes};
+use dermis_sim::hardware::{Hardware, Simulator};
+use dermis_sim::verify::verify;
+use dermis_tests::{build_dir, scene};
+
+/// Built-in scene and its dead taxels: one and several, in the middle, on the edge and in the corner.
+const SCENES: [(&str, &[[usize; 2]]); 4] = [
+    ("eight-by-eight", &[[3, 4]]),
+    ("eight-by-eight", &[[0, 0], [2, 5], [5, 5], [6, 1]]),
+    ("sensor-1", &[[4, 6]]),
+    ("sensor-1", &[[0, 3], [2, 3], [5, 5], [5, 6], [9, 9]]),
+];
+
+/// What the bit-true model may add to the golden model's median tangential error at 20 bits; as for whole arrays.
+const FIXED_ADDS: f64 = 0.02;
+/// Drawn frames of a table's line.
+const FRAMES: u32 = 100;
+
+fn masked(name: &str, dead: &[[usize; 2]]) -> Scene {
+    let (mut scene, _) = scene(name);
+    scene.input.dead = dead.to_vec();
+    // A name of its own: generated files carry it.
+    scene.name = format!("{name}-{}-dead", dead.len());
+    scene
+}
+
+/// Contacts drawn from a seed; every second frame has dead taxels stuck far beyond the peak.
+fn frames(scene: &Scene, count: u32) -> Vec<Frame> {
+    let draw = Fresh { frames: count, contacts: vec![1, 2], shapes: Shapes::Elliptic, touching: false, seed: 11 };
+    let mut frames = draw.draw(scene).unwrap();
+    frames.iter_mut().skip(1).step_by(2).for_each(|frame| stick(scene, frame));
+    frames
+}
+
+fn stick(scene: &Scene, frame: &mut Frame) {
+    for (k, [row, col]) in scene.input.dead.iter().enumerate() {
+        frame.stress_MPa[row * scene.sensor.cols + col] = if k % 2 == 0 { 50.0 } else { -50.0 };
+    }
+}
+
+#[test]
+fn drawn_frames_are_equal_on_every_simulator() {
+    for (name, dead) in SCENES {
+        let scene = masked(name, dead);
+        // Verilator takes its time to compile: one of each sensor, that with more dead taxels.
+        let simulators = [Simulator::RustHdl, Simulator::Verilator];
+        let simulators = if dead.len() > 1 { &simulators[..] } else { &simulators[..1] };
+        let verified = verify(&scene, &frames(&scene, 4), simulators, &build_dir()).unwrap();
+        let first: Vec<String> = verified.findings.kept.iter().take(3).map(ToString::to_string).collect();
+        assert!(verified.findings.is_equal(), "{}: {first:#?}", scene.name);
+    }
+}
+
+#[test]
+fn unlike_scenes_are_equal() {
+    let scenes = [
+        // Taxels on both middle lines and where they cross; groups of rows, columns left out.
+        ("odd", "rows = 7\ncols = 9", "[[3, 4], [3, 0], [6, 4]]\n[fixed]\nlanes = 24\nprune_bits = 10\n"),
+        ("no-search", "rows = 6\ncols = 4", "[[1, 2]]\n[search]\nmu_max = 0\n"),
+        ("averaged", "rows = 5\ncols = 4", "[[0, 0], [4, 3]]\naverage = 1\n[output]\nforces = \"resultants\"\n"),
+        // Square and of degree 1: without the dead taxel Ax would serve for Ay.
+        ("degree-1", "rows = 6\ncols = 6", "[[2, 3]]\n[search]\nmu_max = 0.05\n"),
+    ];
+    for (name, size, dead) in scenes {
+        let text = format!(
+            "name = \"{name}\"\n[sensor]\n{size}\npitch_x_mm = 4.0\npitch_y_mm = 4.0\nthickness_mm = 3.0\n\
+             [input]\ndead = {dead}"
+        );
+        let scene = Scene::parse(&text, name).unwrap();
+        let verified = verify(&scene, &frames(&scene, 4), &[Simulator::RustHdl], &build_dir()).unwrap();
+        let first: Vec<String> = verified.findings.kept.iter().take(3).map(ToString::to_string).collect();
+        assert!(verified.findings.is_equal(), "{name}: {first:#?}");
+    }
+}
+
+#[test]
+fn what_a_dead_taxel_reads_changes_no_bit() {
+    for (name, dead) in SCENES {
+        let scene = masked(name, dead);
+        let (model, golden) = (Model::new(&scene).unwrap(), Golden::new(&scene).unwrap());
+        let at = |[row, col]: [usize; 2]| row * scene.sensor.cols + col;
+        let most = (1 << (scene.fixed.input_bits - 1)) - 1;
+        for frame in frames(&scene, 3) {
+            let codes = model.readings(std::slice::from_ref(&frame)).unwrap();
+            let trace = model.run(&codes);
+            for stuck in [most, -most - 1, 1] {
+                let mut other = codes.clone();
+                dead.iter().for_each(|taxel| other[at(*taxel)] = stuck);
+                assert_eq!(model.run(&other), trace, "{}, {}", scene.name, frame.id);
+            }
+            // Any other taxel counts.
+            let mut other = codes.clone();
+            other[at([1, 1])] ^= 1;
+            assert_ne!(model.run(&other), trace);
+            // And in MPa, where the scale of the codes follows the frame's peak.
+            let mut other = frame.clone();
+            stick(&scene, &mut other);
+            assert_eq!(model.reconstruct(&other).unwrap(), model.reconstruct(&frame).unwrap());
+            assert_eq!(golden.run(&other).unwrap(), golden.run(&frame).unwrap());
+        }
+        // A frame of nothing but stuck taxels is no contact.
+        let mut silent = Frame::from_stress("silent", &scene.sensor, vec![0.0; scene.sensor.taxels()]).unwrap();
+        let quiet = model.reconstruct(&silent).unwrap();
+        stick(&scene, &mut silent);
+        assert_eq!(model.reconstruct(&silent).unwrap(), quiet);
+        assert!(!quiet.subarrays[0].centroid_condition);
+    }
+}
+
+#[test]
+fn fixed_is_near_golden() {
+    println!("| scene | dead | e_t golden | e_t fixed | fixed − golden, median | in nine of ten |");
+    println!("|---|---:|---:|---:|---:|---:|");
+    for (name, dead) in SCENES {
+        let scene = masked(name, dead);
+        let (model, golden) = (Model::new(&scene).unwrap(), Golden::new(&scene).unwrap());
+        let draw = Fresh { frames: FRAMES, contacts: vec![1], shapes: Shapes::Elliptic, touching: false, seed: 1 };
+        let frames = draw.draw(&scene).unwrap();
+        let float: Vec<Reconstruction> = frames.iter().map(|frame| golden.run(frame).unwrap()).collect();
+        let fixed: Vec<Reconstruction> = frames.iter().map(|frame| model.reconstruct(frame).unwrap()).collect();
+        let tangential = |results: &[Reconstruction]| {
+            median(results.iter().filter_map(|r| r.error.as_ref()?.tangential).collect()).unwrap()
+        };
+        let apart = |(a, b): (&Reconstruction, &Reconstruction)| difference(&a.forces_N, &b.forces_N, 1.0).max_share;
+        let mut shares: Vec<f64> = float.iter().zip(&fixed).map(apart).collect();
+        shares.sort_by(f64::total_cmp);
+        let (golden, fixed) = (tangential(&float), tangential(&fixed));
+        let [half, most] = [shares[shares.len() / 2], shares[shares.len() * 9 / 10]];
+        let percent = [golden, fixed, half, most].map(|e| format!("{:.2} %", 100.0 * e)).join(" | ");
+        println!("| {name} | {} | {percent} |", dead.len());
+        assert!(fixed <= golden + FIXED_ADDS, "{}: fixed {fixed}, golden {golden}", scene.name);
+        // A matrix taken without the taxels' forces, or with their readings, is off by tens of per cent.
+        assert!(half < FIXED_ADDS, "{}: {half}", scene.name);
+    }
+}
+
+#[test]
+fn mirrored_pairs_keep_a_symmetry() {
+    let flips = |dead: &[[usize; 2]]| {
+        let flips = Model::new(&masked("sensor-1", dead)).unwrap().formats.flips;
+        [flips.inverse.len(), flips.ax.len(), flips.ay.len()]
+    };
+    assert_eq!(flips(&[[4, 6]]), [4; 3]);
+    assert_eq!(flips(&[[4, 3], [4, 6]]), [2; 3]);
+    assert_eq!(flips(&[[4, 3], [4, 6], [5, 3], [5, 6]]), [1; 3]);
+    assert_eq!(flips(&[]), [1; 3]);
+}
+
+fn compare(hardware: &Hardware, vectors: &[Vector]) -> Findings {
+    let mut device = hardware.device(Simulator::Verilator).unwrap();
+    let bench = Bench { name: "verilator", device: device.as_mut(), taps: &hardware.tap_names() };
+    run(bench, vectors, Stimulus::FullSpeed).0
+}
+
+#[test]
+fn a_flipped_coefficient_of_a_broken_symmetry_is_found() {
+    let (name, dead) = SCENES[1];
+    let scene = masked(name, dead);
+    let mut hardware = Hardware::new(Model::new(&scene).unwrap(), &build_dir()).unwrap();
+    let vectors = [hardware.vector(&frames(&scene, 1)).unwrap()];
+    assert!(compare(&hardware, &vectors).is_equal());
+    // The memory holds, of each matrix, first the columns of its symmetry's flip: the next line is of another one.
+    let quads = hardware.model.formats.quads;
+    let index = hardware.generated.files.iter().position(|file| file.name == "coefficients.hex").unwrap();
+    let mut lines: Vec<String> = hardware.generated.files[index].text.lines().map(str::to_owned).collect();
+    let last = lines[quads].pop().and_then(|digit| digit.to_digit(16)).unwrap();
+    lines[quads].push(char::from_digit(last ^ 1, 16).unwrap());
+    hardware.generated.files[index].text = lines.join("\n") + "\n";
+    let findings = compare(&hardware, &vectors);
+    assert_eq!(findings.kept.first().map(|finding| finding.stage.as_str()), Some("pass"));
+}
