@@ -19,6 +19,7 @@
 // Names carry their unit as SI writes it: `stress_MPa`, `resultant_N`.
 #![allow(non_snake_case)]
 
+pub mod baseline;
 pub mod board;
 pub mod bonded;
 pub mod errors;

@@ -1,0 +1,149 @@
+//! Baseline: the paper's algorithm as it is printed, to measure the others against.
+//!
+//! For every candidate μ the dense C† and I − C†C are multiplied (Eq. 1), and the search is left to a general-purpose
+//! optimiser, Nelder–Mead's simplex in the place of Matlab's `fmincon`. Objective, family w(μ), disc and condition are
+//! those of the golden model, so that the times compare algorithms and the errors differ by the search alone.
+//!
+//! | | shape | unit |
+//! |---|---|---|
+//! | in: frame | n, case 0 to 3 or rows × columns | MPa |
+//! | out: forces | 3 × n | N |
+
+use crate::float::force::{force, threshold};
+use crate::float::objective::{Objective, Sparse};
+use crate::float::orthogonal::Orthogonal;
+use crate::float::pass::Polynomial;
+use crate::float::receive::receive;
+use crate::frame::{Forces, Frame};
+use crate::matrices::Matrices;
+use crate::partition::{subarrays, Subarray};
+use crate::quantise::{full_scale, noise_floor_codes, quantise};
+use crate::reconstruct::GoldenError;
+use crate::scene::Scene;
+use argmin::core::{CostFunction, Error, Executor};
+use argmin::solver::neldermead::NelderMead;
+
+/// Cost outside the disc and where nothing presses: above every score's negative.
+const REFUSED: f64 = 1e9;
+/// Spread of the simplex's costs, in bits, at which it has settled.
+const SETTLED: f64 = 1e-6;
+/// Most steps of the simplex.
+const STEPS: u64 = 200;
+
+/// The matrices of Eq. 1 for a scene.
+pub struct Baseline {
+    scene: Scene,
+    parts: Vec<Subarray>,
+    matrices: Matrices,
+    orthogonal: Orthogonal,
+}
+
+/// Eq. 1 for one frame of one subarray.
+struct Literal<'a> {
+    orthogonal: &'a Orthogonal,
+    family: &'a Polynomial,
+    b: &'a [f64],
+    mu_max: f64,
+}
+
+impl Literal<'_> {
+    fn forces(&self, mu: [f64; 2]) -> Forces {
+        self.orthogonal.apply(self.b, &force(&self.family.eval(mu), mu, 0.0))
+    }
+}
+
+impl CostFunction for Literal<'_> {
+    type Param = Vec<f64>;
+    type Output = f64;
+
+    fn cost(&self, mu: &Vec<f64>) -> Result<f64, Error> {
+        if mu[0].hypot(mu[1]) > self.mu_max {
+            return Ok(REFUSED);
+        }
+        Ok(Sparse::default().score(&self.forces([mu[0], mu[1]]).fz).map_or(REFUSED, |score| -score))
+    }
+}
+
+impl Baseline {
+    /// Computes C† and I − C†C; seconds for subarrays of 20 × 20.
+    ///
+    /// # Errors
+    /// Those of [`crate::reconstruct::Golden::new`]; `Orthogonal` where a subarray has more than
+    /// [`crate::float::orthogonal::MAX_TAXELS`] taxels; `Partition` where the case depends on the frame.
+    pub fn new(scene: &Scene) -> Result<Baseline, GoldenError> {
+        scene.require_golden()?;
+        let parts = subarrays(scene.partition.case, &scene.sensor)?;
+        let matrices = Matrices::through(&parts[0].sensor(&scene.sensor), scene.medium, scene.search.mu_max)?;
+        let orthogonal = Orthogonal::new(&matrices)?;
+        Ok(Baseline { scene: scene.clone(), parts, matrices, orthogonal })
+    }
+
+    /// Forces of one frame, row-major.
+    ///
+    /// # Errors
+    /// `Frame` when the frame is not the scene's.
+    pub fn run(&self, frame: &Frame) -> Result<Forces, GoldenError> {
+        let Scene { sensor, search, .. } = &self.scene;
+        frame.check(&self.scene)?;
+        let codes = quantise(&frame.stress_MPa, self.scene.fixed.input_bits, full_scale(&self.scene, frame));
+        let floor = noise_floor_codes(&self.scene, &codes);
+        let mut forces = Forces::zeros(sensor.taxels());
+        for part in &self.parts {
+            let own = part.gather(sensor, &codes.codes);
+            let searched = receive(sensor, part, &own, floor, self.scene.partition.condition).condition_met;
+            let x = self.subarray(&part.gather(sensor, &frame.stress_MPa), searched && search.mu_max > 0.0);
+            let x = threshold(x, self.scene.threshold.min_force_N);
+            part.scatter(sensor, &x.fx, &mut forces.fx);
+            part.scatter(sensor, &x.fy, &mut forces.fy);
+            part.scatter(sensor, &x.fz, &mut forces.fz);
+        }
+        Ok(forces)
+    }
+
+    fn subarray(&self, b: &[f64], searched: bool) -> Forces {
+        let mu_max = self.scene.search.mu_max;
+        let family = &Polynomial::new(&self.matrices, b);
+        let problem = || Literal { orthogonal: &self.orthogonal, family, b, mu_max };
+        let mu = if searched { simplex(problem(), mu_max) } else { [0.0; 2] };
+        problem().forces(mu)
+    }
+}
+
+/// The μ that the simplex settles on; without shear where it finds nothing that presses.
+fn simplex(problem: Literal, mu_max: f64) -> [f64; 2] {
+    let corners = vec![vec![0.0, 0.0], vec![mu_max / 3.0, 0.0], vec![0.0, mu_max / 3.0]];
+    let run = || -> Result<Option<Vec<f64>>, Error> {
+        let solver = NelderMead::new(corners).with_sd_tolerance(SETTLED)?;
+        Ok(Executor::new(problem, solver).configure(|state| state.max_iters(STEPS)).run()?.state.best_param)
+    };
+    run().ok().flatten().map_or([0.0; 2], |mu| [mu[0], mu[1]])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::errors::Errors;
+    use crate::partition::Case;
+    use crate::reconstruct::Golden;
+
+    #[test]
+    fn finds_what_the_golden_model_finds() {
+        let scene = Scene::builtin("sensor-1").unwrap();
+        let (baseline, golden) = (Baseline::new(&scene).unwrap(), Golden::new(&scene).unwrap());
+        let frame = &Frame::shipped(&scene)[1];
+        let (forces, result) = (baseline.run(frame).unwrap(), golden.run(frame).unwrap());
+        let error = Errors::new(result.resultant_N, forces.resultant());
+        // Half a step of the golden grid, 0.6/384, and the series' truncation of 2e-3, against μ around 0.3.
+        assert!(error.tangential.unwrap() < 0.02, "{error:?}");
+        assert!(error.normal.unwrap() < 0.002, "{error:?}");
+    }
+
+    #[test]
+    fn large_subarrays_and_cases_without_rectangles_are_refused() {
+        let mut scene = Scene::builtin("sensor-4").unwrap();
+        scene.partition.case = Case::WHOLE;
+        assert!(matches!(Baseline::new(&scene), Err(GoldenError::Orthogonal(_))));
+        scene.partition.case = Case::Contacts;
+        assert!(matches!(Baseline::new(&scene), Err(GoldenError::Partition(_))));
+    }
+}
