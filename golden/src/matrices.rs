@@ -22,6 +22,7 @@
 
 mod inverse;
 mod masked;
+pub mod store;
 #[cfg(test)]
 mod tests;
 
@@ -31,6 +32,7 @@ use crate::scene::Medium;
 use crate::sensor::{Sensor, SensorError};
 use faer::Mat;
 use inverse::{chain, Inverse};
+use store::{Kept, Place};
 use thiserror::Error;
 
 /// Most taxels in one subarray: the 48 × 48 of the largest sensor. A matrix then takes 42 MB.
@@ -170,14 +172,17 @@ impl Matrices {
             return Err(MatricesError::NotFinite { sensor: boxed() });
         }
         let basis = Basis::parities(sensor.rows, sensor.cols);
-        let folded = |flip: usize, m: &Mat<f64>| basis.fold_matrix(flip, |i, j| m[(i, j)]);
-        let (folded_cx, folded_cy) = (folded(ODD_X, &cx), folded(ODD_Y, &cy));
-        let inverse =
-            Inverse::new(&folded(EVEN, &cz)).ok_or_else(|| MatricesError::NotConverged { sensor: boxed() })?;
-        let cz_pinv = inverse.power(1);
-        let (ax, ay) = (chain(&cz_pinv, &folded_cx), chain(&cz_pinv, &folded_cy));
-        let shear = mu_max > 0.0;
-        let spectral_radius = if shear { mu_max * inverse.largest_radius(&folded_cx, &folded_cy) } else { 0.0 };
+        let place = Place::of(sensor, medium, mu_max);
+        let kept = match place.as_ref().and_then(Place::read) {
+            Some(kept) => kept,
+            None => {
+                let kept = compute(&basis, [&cx, &cy, &cz], mu_max)
+                    .ok_or_else(|| MatricesError::NotConverged { sensor: boxed() })?;
+                place.iter().for_each(|place| place.write(&kept));
+                kept
+            }
+        };
+        let Kept { condition, spectral_radius, operators: [cz_pinv, ax, ay] } = kept;
         let degree = degree(spectral_radius, mu_max, most).ok_or_else(|| MatricesError::SlowSeries {
             sensor: boxed(),
             radius: spectral_radius,
@@ -186,7 +191,7 @@ impl Matrices {
         })?;
         Ok(Matrices {
             sensor: sensor.clone(),
-            condition: inverse.condition,
+            condition,
             cz_pinv: basis.unfold_matrix(EVEN, &cz_pinv),
             ax: basis.unfold_matrix(ODD_X, &ax),
             ay: basis.unfold_matrix(ODD_Y, &ay),
@@ -198,6 +203,18 @@ impl Matrices {
             degree,
         })
     }
+}
+
+/// Cz⁺, Ax, Ay and r in the folded basis; `None` when the eigenvalues of Cz do not converge.
+fn compute(basis: &Basis, [cx, cy, cz]: [&Mat<f64>; 3], mu_max: f64) -> Option<Kept> {
+    let folded = |flip: usize, m: &Mat<f64>| basis.fold_matrix(flip, |i, j| m[(i, j)]);
+    let (folded_cx, folded_cy) = (folded(ODD_X, cx), folded(ODD_Y, cy));
+    let inverse = Inverse::new(&folded(EVEN, cz))?;
+    let cz_pinv = inverse.power(1);
+    let (ax, ay) = (chain(&cz_pinv, &folded_cx), chain(&cz_pinv, &folded_cy));
+    let shear = mu_max > 0.0;
+    let spectral_radius = if shear { mu_max * inverse.largest_radius(&folded_cx, &folded_cy) } else { 0.0 };
+    Some(Kept { condition: inverse.condition, spectral_radius, operators: [cz_pinv, ax, ay] })
 }
 
 /// The degree a series of radius `r` needs, `None` when it is more than `most`.

@@ -1,9 +1,38 @@
 //! Paper: the figures of its tables that results are set beside.
 //!
 //! Table 2: errors by Eq. 3 in % per sensor and case; sensors 1 and 2 against a finite-element model, 3 and 4 against
-//! case 0.
+//! case 0. Run times: Fig. 7 and section 4, with a later paper of the same authors.
 
 use crate::partition::Case;
+
+/// A published run time.
+#[derive(Clone, Debug, PartialEq)]
+pub struct RunTime {
+    /// What computed.
+    pub system: String,
+    /// The sensor as printed.
+    pub sensor: String,
+    /// The paper's case, `None` where the figure is no measurement of a case.
+    pub case: Option<Case>,
+    /// Time of a frame in s.
+    pub seconds: f64,
+    /// Where it stands.
+    pub source: String,
+}
+
+const RUN_TIMES: &str = include_str!("../data/paper/run_times.csv");
+
+/// All published run times, in the file's order.
+pub fn run_times() -> Vec<RunTime> {
+    let time = |line: &str| {
+        let mut fields = line.splitn(5, ',');
+        let mut text = || fields.next().map(|field| field.trim_matches('"').to_owned());
+        let (system, sensor, case, seconds, source) = (text()?, text()?, text()?, text()?, text()?);
+        let case = case.parse().ok().and_then(Case::numbered);
+        Some(RunTime { system, sensor, case, seconds: seconds.parse().ok()?, source })
+    };
+    RUN_TIMES.lines().skip(1).filter_map(time).collect()
+}
 
 const TABLE_2: &str = include_str!("../data/paper/table2_errors_percent.csv");
 
@@ -24,6 +53,15 @@ pub fn table_2(sensor: u32, case: Case) -> Option<[f64; 3]> {
 mod tests {
     use super::*;
     use crate::partition::Grid;
+
+    #[test]
+    fn run_times_of_the_file() {
+        let times = run_times();
+        assert_eq!(times.len(), RUN_TIMES.lines().count() - 1);
+        assert_eq!((times[0].seconds, times[0].case), (2705.33, Some(Case::WHOLE)));
+        assert_eq!((&*times[4].sensor, times[4].seconds), ("8x8", 16.43));
+        assert!(times[6].source.ends_with("maximum 14.7 %") && times[7].case.is_none());
+    }
 
     #[test]
     fn rows_of_the_table() {

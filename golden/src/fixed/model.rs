@@ -21,7 +21,7 @@ use crate::flags::{frame_flags, Flag};
 use crate::float::receive::receive as judge;
 use crate::frame::{Forces, Frame, FrameError};
 use crate::input::{Input, InputError};
-use crate::matrices::{Matrices, MatricesError};
+use crate::matrices::{Matrices, MatricesError, MAX_DEGREE};
 use crate::partition::{subarrays, Grid, PartitionError, Subarray};
 use crate::quantise::{full_scale, noise_floor_codes, quantise, Codes};
 use crate::reconstruct::{assemble, Reconstruction, Resultant, SubarrayResult};
@@ -156,6 +156,14 @@ impl Model {
         }
         let (board, scene) = (model.board.name.clone(), scene.name.clone());
         Err(FixedError::DoesNotFit(Box::new(Shortage { scene, board, short, remedies: remedies(&model) })))
+    }
+
+    /// The model with a polynomial of another degree, 1 to 3, than the scene's series needs.
+    ///
+    /// # Errors
+    /// As [`Model::new`], which see; what the board lacks is not looked at.
+    pub fn of_degree(scene: &Scene, degree: usize) -> Result<Self, FixedError> {
+        Model::given(scene, Scale::new(scene)?, Some(degree.clamp(1, MAX_DEGREE)))
     }
 
     /// The model of a scene that may be too large for its board.

@@ -1,0 +1,229 @@
+//! Store: folded matrices kept on disk between runs, so that large arrays start at once.
+//!
+//! Nothing is kept until [`keep_in`] names a folder; a program does that, never a test of the numbers. A file holds
+//!
+//! ```text
+//! magic  key length  key  condition  r  3 × (blocks  (row0  col0  rows  cols  entries column by column)…)  CRC-32
+//! ```
+//!
+//! all little-endian, 64 bits each but magic, key and CRC. The key is everything the matrices depend on, in words,
+//! [`VERSION`] and this crate's version with it; the file's name is its CRC-32 and length. A file with another key, cut short or
+//! damaged is as good as none: it is computed and written again. Files are written beside their place and renamed, so
+//! that neither an interruption nor a second process leaves half a file.
+
+use crate::folded::{Block, Operator};
+use crate::scene::Medium;
+use crate::sensor::Sensor;
+use faer::Mat;
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::sync::RwLock;
+
+/// Version of the layout and of the numbers: raised with either.
+const VERSION: u32 = 1;
+const MAGIC: &[u8; 8] = b"dermisA\n";
+/// Below so many taxels computing is as fast as reading.
+const LEAST_TAXELS: usize = 400;
+
+static FOLDER: RwLock<Option<PathBuf>> = RwLock::new(None);
+
+/// Keeps the matrices of this process's scenes in `folder` from now on, and takes them from there; `None`: no longer.
+pub fn keep_in(folder: Option<&Path>) {
+    *FOLDER.write().unwrap_or_else(std::sync::PoisonError::into_inner) = folder.map(Path::to_owned);
+}
+
+/// What is kept of a subarray's matrices.
+#[derive(Clone, Debug)]
+pub(super) struct Kept {
+    pub condition: f64,
+    pub spectral_radius: f64,
+    /// Cz⁺, Ax, Ay.
+    pub operators: [Operator; 3],
+}
+
+/// The place of one subarray's matrices.
+pub(super) struct Place {
+    path: PathBuf,
+    key: String,
+}
+
+impl Place {
+    /// Where the matrices would be, `None` where nothing is kept.
+    pub(super) fn of(sensor: &Sensor, medium: Medium, mu_max: f64) -> Option<Place> {
+        let folder = FOLDER.read().ok()?.clone()?;
+        (sensor.taxels() >= LEAST_TAXELS).then(|| Place::at(&folder, sensor, medium, mu_max))
+    }
+
+    fn at(folder: &Path, sensor: &Sensor, medium: Medium, mu_max: f64) -> Place {
+        // Debug prints the shortest text that reads back as the same number.
+        let version = env!("CARGO_PKG_VERSION");
+        let key = format!("{VERSION} {version} {sensor:?} {medium:?} {mu_max:?}");
+        let path = folder.join(format!("{:08x}-{}.matrices", crc32fast::hash(key.as_bytes()), key.len()));
+        Place { path, key }
+    }
+
+    /// What is kept there, `None` for anything but a whole file of this key.
+    pub(super) fn read(&self) -> Option<Kept> {
+        let bytes = fs::read(&self.path).ok()?;
+        let (content, crc) = bytes.split_at_checked(bytes.len().checked_sub(4)?)?;
+        let whole = crc32fast::hash(content).to_le_bytes() == crc;
+        let mut rest = Reader(content.strip_prefix(MAGIC).filter(|_| whole)?);
+        let length = rest.size()?;
+        if rest.take(length)? != self.key.as_bytes() {
+            return None;
+        }
+        let (condition, spectral_radius) = (rest.number()?, rest.number()?);
+        let operators = [rest.operator()?, rest.operator()?, rest.operator()?];
+        rest.0.is_empty().then_some(Kept { condition, spectral_radius, operators })
+    }
+
+    /// Keeps it. Where that fails the next run computes again, which is no error.
+    pub(super) fn write(&self, kept: &Kept) {
+        let mut bytes = MAGIC.to_vec();
+        let size = |bytes: &mut Vec<u8>, n: usize| bytes.extend((n as u64).to_le_bytes());
+        size(&mut bytes, self.key.len());
+        bytes.extend(self.key.as_bytes());
+        bytes.extend(kept.condition.to_le_bytes());
+        bytes.extend(kept.spectral_radius.to_le_bytes());
+        for operator in &kept.operators {
+            size(&mut bytes, operator.blocks.len());
+            for Block { row0, col0, entries } in &operator.blocks {
+                [*row0, *col0, entries.nrows(), entries.ncols()].into_iter().for_each(|n| size(&mut bytes, n));
+                entries.col_iter().for_each(|col| col.iter().for_each(|c| bytes.extend(c.to_le_bytes())));
+            }
+        }
+        bytes.extend(crc32fast::hash(&bytes).to_le_bytes());
+        // Of this process alone; of two threads with the same matrices either one's rename will do.
+        let part = self.path.with_extension(format!("{}-{:?}.part", std::process::id(), std::thread::current().id()));
+        let folder = self.path.parent().map_or(Ok(()), fs::create_dir_all);
+        let written = folder.and_then(|()| fs::write(&part, &bytes)).and_then(|()| fs::rename(&part, &self.path));
+        if written.is_err() {
+            // Nothing is left of a file that could not be finished; that it may never have been begun is as well.
+            let _ = fs::remove_file(&part);
+        }
+    }
+}
+
+/// What is left of a file.
+struct Reader<'a>(&'a [u8]);
+
+impl<'a> Reader<'a> {
+    fn take(&mut self, length: usize) -> Option<&'a [u8]> {
+        let (taken, rest) = self.0.split_at_checked(length)?;
+        self.0 = rest;
+        Some(taken)
+    }
+
+    fn word(&mut self) -> Option<[u8; 8]> {
+        self.take(8)?.try_into().ok()
+    }
+
+    fn size(&mut self) -> Option<usize> {
+        usize::try_from(u64::from_le_bytes(self.word()?)).ok()
+    }
+
+    fn number(&mut self) -> Option<f64> {
+        Some(f64::from_le_bytes(self.word()?))
+    }
+
+    fn operator(&mut self) -> Option<Operator> {
+        let count = self.size()?;
+        let block = |_| {
+            let [row0, col0, rows, cols] = [self.size()?, self.size()?, self.size()?, self.size()?];
+            let bytes = self.take(rows.checked_mul(cols)?.checked_mul(8)?)?;
+            let at = |k: usize| f64::from_le_bytes(std::array::from_fn(|byte| bytes[8 * k + byte]));
+            Some(Block { row0, col0, entries: Mat::from_fn(rows, cols, |i, j| at(j * rows + i)) })
+        };
+        Some(Operator { blocks: (0..count).map(block).collect::<Option<_>>()? })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn sensor() -> Sensor {
+        Sensor { rows: 20, cols: 20, pitch_x_mm: 2.0, pitch_y_mm: 4.0, thickness_mm: 3.0 }
+    }
+
+    fn kept() -> Kept {
+        let operator = |by: f64| Operator {
+            blocks: vec![
+                Block { row0: 0, col0: 2, entries: Mat::from_fn(2, 3, |i, j| by / (1 + i + 10 * j) as f64) },
+                Block { row0: 2, col0: 0, entries: Mat::from_fn(1, 2, |_, j| -by * j as f64) },
+            ],
+        };
+        Kept {
+            condition: 17.0,
+            spectral_radius: 0.1 + 0.2,
+            operators: [operator(1.0), operator(0.3), operator(1e-300)],
+        }
+    }
+
+    fn place(folder: &Path, mu_max: f64) -> Place {
+        Place::at(folder, &sensor(), Medium::HalfSpace, mu_max)
+    }
+
+    #[test]
+    fn comes_back_to_the_bit() {
+        let folder = tempfile::tempdir().unwrap();
+        let place = place(folder.path(), 0.6);
+        assert!(place.read().is_none());
+        place.write(&kept());
+        assert_eq!(format!("{:?}", place.read().unwrap()), format!("{:?}", kept()));
+        // Nothing but the file itself.
+        assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1);
+    }
+
+    #[test]
+    fn cut_short_damaged_or_of_another_scene_is_none() {
+        let folder = tempfile::tempdir().unwrap();
+        let first = place(folder.path(), 0.6);
+        first.write(&kept());
+        let whole = fs::read(&first.path).unwrap();
+        for length in [0, 3, 8, 20, whole.len() - 9, whole.len() - 1] {
+            fs::write(&first.path, &whole[..length]).unwrap();
+            assert!(first.read().is_none(), "{length} of {} bytes", whole.len());
+        }
+        for at in [0, 10, whole.len() / 2, whole.len() - 1] {
+            let mut damaged = whole.clone();
+            damaged[at] ^= 4;
+            fs::write(&first.path, damaged).unwrap();
+            assert!(first.read().is_none(), "byte {at}");
+        }
+        // The content of one scene under the name of another.
+        let second = place(folder.path(), 0.5);
+        fs::write(&second.path, &whole).unwrap();
+        assert!(second.read().is_none());
+        first.write(&kept());
+        assert!(first.read().is_some());
+    }
+
+    #[test]
+    fn threads_that_write_the_same_do_not_disturb_each_other() {
+        let folder = tempfile::tempdir().unwrap();
+        let wanted = format!("{:?}", kept());
+        std::thread::scope(|scope| {
+            for _ in 0..4 {
+                scope.spawn(|| {
+                    let place = place(folder.path(), 0.6);
+                    for _ in 0..50 {
+                        place.write(&kept());
+                        assert_eq!(format!("{:?}", place.read().unwrap()), wanted);
+                    }
+                });
+            }
+        });
+        assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1);
+    }
+
+    #[test]
+    fn where_nothing_can_be_written_nothing_is_kept() {
+        let folder = tempfile::tempdir().unwrap();
+        let file = folder.path().join("file");
+        fs::write(&file, "").unwrap();
+        let place = place(&file, 0.6);
+        place.write(&kept());
+        assert!(place.read().is_none());
+    }
+}
