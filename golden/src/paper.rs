@@ -34,6 +34,30 @@ pub fn run_times() -> Vec<RunTime> {
     RUN_TIMES.lines().skip(1).filter_map(time).collect()
 }
 
+/// What the paper concludes for a sensor.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Conclusion {
+    /// The sensor's number.
+    pub sensor: u32,
+    /// The case it calls best.
+    pub best: Case,
+    /// In which words, and where.
+    pub text: String,
+}
+
+const CONCLUSIONS: &str = include_str!("../data/paper/conclusions.csv");
+
+/// The paper's conclusions, by sensor.
+pub fn conclusions() -> Vec<Conclusion> {
+    let conclusion = |line: &str| {
+        let mut fields = line.splitn(3, ',');
+        let sensor = fields.next()?.parse().ok()?;
+        let best = Case::numbered(fields.next()?.parse().ok()?)?;
+        Some(Conclusion { sensor, best, text: fields.next()?.trim_matches('"').to_owned() })
+    };
+    CONCLUSIONS.lines().skip(1).filter_map(conclusion).collect()
+}
+
 const TABLE_2: &str = include_str!("../data/paper/table2_errors_percent.csv");
 
 /// The paper's errors of one sensor in one case, as fractions: X1, X2, X3; `None` where it prints none.
@@ -61,6 +85,12 @@ mod tests {
         assert_eq!((times[0].seconds, times[0].case), (2705.33, Some(Case::WHOLE)));
         assert_eq!((&*times[4].sensor, times[4].seconds), ("8x8", 16.43));
         assert!(times[6].source.ends_with("maximum 14.7 %") && times[7].case.is_none());
+    }
+
+    #[test]
+    fn a_conclusion_per_sensor() {
+        let best = conclusions().into_iter().map(|c| (c.sensor, c.best.to_string())).collect::<Vec<_>>();
+        assert_eq!(best, [(1, "0".into()), (2, "3".into()), (3, "2".into()), (4, "3".into())]);
     }
 
     #[test]
