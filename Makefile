@@ -10,10 +10,12 @@ VERILATOR ?= verilator
 # Cargo's own variable, so that a folder elsewhere is found too.
 CARGO_TARGET_DIR ?= target
 DERMIS     = $(CARGO_TARGET_DIR)/release/dermis
-PACKAGES   = verilator yosys g++ make python3-venv
+PACKAGES   = verilator yosys g++ make chromium python3-venv
+# The short report: make report QUICK=1
+QUICK     ?=
 
 .DEFAULT_GOAL := help
-.PHONY: help setup tools program run test fmt clippy unit lint docs bench build cosim bitstream clean
+.PHONY: help setup tools program run test fmt clippy unit lint docs bench build cosim bitstream report clean
 
 help: ## list the targets
 	@sed -n 's/^\([a-z]*\):.*## /\1	/p' $(MAKEFILE_LIST) | expand -t 10
@@ -71,6 +73,10 @@ cosim: program ## co-simulate SCENE on its shipped frames
 
 bitstream: program tools ## make the bitstream of SCENE for BOARD or its own one (minutes to an hour)
 	PATH="$(abspath $(TOOLS))/bin:$$PATH" $(DERMIS) --build-dir $(BUILD) bitstream $(SCENE) $(if $(BOARD),--board $(BOARD))
+
+report: program ## measure and draw: build/report/report.html and paper.html; QUICK=1 in two minutes
+	$(DERMIS) --build-dir $(BUILD) report $(if $(QUICK),--quick)
+	$(DERMIS) --build-dir $(BUILD) report --paper $(if $(QUICK),--quick)
 
 clean: ## remove everything built
 	$(CARGO) clean

@@ -5,6 +5,7 @@
 //! | 0 | done, and equal where something was compared |
 //! | 1 | hardware and model differ, a tool failed on generated files, or this program contradicts itself |
 //! | 2 | the input or the call is wrong, a file cannot be used, or a needed program is not installed |
+//! | 130 | interrupted |
 
 use std::io::{ErrorKind, Write};
 use std::path::{Path, PathBuf};
@@ -14,6 +15,7 @@ use anyhow::{anyhow, Result};
 use clap::{Parser, Subcommand, ValueEnum};
 use dermis_golden::fixed::{FixedError, Model};
 use dermis_golden::frame::Frame;
+use dermis_golden::matrices::store;
 use dermis_golden::noise::{study, Study};
 use dermis_golden::partition::Case;
 use dermis_golden::quantise::full_scale;
@@ -25,6 +27,7 @@ use dermis_hdl::{generate, HdlError};
 
 use crate::bitstream::tools::ToolError;
 use crate::compare::{compared, difference};
+use crate::files::write_whole;
 use crate::fresh::Fresh;
 use crate::hardware::{Hardware, Simulator, Stuck};
 use crate::host::HostError;
@@ -56,7 +59,8 @@ const EXAMPLES: &str = "Examples:
   dermis cosim sensor-1                              all shipped frames, model against hardware
   dermis table                                       errors of all scenes, beside the paper's
   dermis noise sensor-1                              errors under noise, beside the Cramér–Rao bound
-  dermis generate sensor-3 --random 2 --out two.json a frame with known forces";
+  dermis report                                      a page: which case and format to take, errors against time
+  dermis generate sensor-3 --random 2 --out two.json  a frame with known forces";
 
 #[derive(Subcommand, Debug)]
 enum Command {
@@ -128,6 +132,8 @@ enum Command {
         #[arg(long, value_enum, default_value = "both")]
         device: DeviceChoice,
     },
+    /// Measure errors and times of all engines, and write them as a page with pictures.
+    Report(report::Arguments),
     /// Make a frame with known forces from described contacts.
     Generate(crate::generate::Arguments),
     /// Print the errors of scenes in the paper's cases on their shipped frames, beside the paper's.
@@ -229,8 +235,11 @@ pub fn main() -> ExitCode {
 }
 
 /// 1 for what is this program's own fault, a tool that failed on generated files among it; 2 for what the caller can
-/// mend.
+/// mend; 130, as shells have it, where they interrupted.
 fn exit_code(error: &anyhow::Error) -> u8 {
+    if error.is::<report::Interrupted>() {
+        return 130;
+    }
     let tool = matches!(
         error.downcast_ref::<VerilatorError>(),
         Some(VerilatorError::Build { .. } | VerilatorError::Library { .. })
@@ -252,9 +261,12 @@ fn exit_code(error: &anyhow::Error) -> u8 {
 /// The text for stdout, and whether all that was compared is equal.
 fn run(arguments: &Arguments) -> Result<(String, bool)> {
     let build_dir = &arguments.build_dir;
+    store::keep_in(Some(&build_dir.join("matrices")));
     match &arguments.command {
         Command::Reconstruct { scene, frames, engine, json } => {
             let (scene, frames) = resolve_one(scene.as_deref(), frames)?;
+            // Seconds where the matrices are large.
+            let _progress = Progress::start(&format!("{}: reconstruction", scene.name));
             let (result, full_scale_MPa) = reconstruct(&scene, &frames, *engine, build_dir)?;
             if *json {
                 return Ok((serde_json::to_string(&result)? + "\n", true));
@@ -289,6 +301,7 @@ fn run(arguments: &Arguments) -> Result<(String, bool)> {
             terminal.wait()?;
             Ok((String::new(), true))
         }
+        Command::Report(arguments) => report::run(arguments, build_dir),
         Command::Generate(arguments) => Ok((crate::generate::run(arguments)?, true)),
         Command::Table { scenes, cases, fresh, format, cosim: false } => {
             Ok((table(scenes, cases, fresh, *format)?, true))
@@ -393,10 +406,7 @@ fn build(scene: &Scene, out: &Path, board: bool, with_features: bool) -> Result<
     let mut text = String::new();
     for file in &generated.files {
         let path = out.join(&file.name);
-        let part = out.join(format!(".{}.part", file.name));
-        std::fs::write(&part, &file.text)
-            .and_then(|()| std::fs::rename(&part, &path))
-            .map_err(|e| anyhow!("{}: {e}", path.display()))?;
+        write_whole(&path, &file.text)?;
         text.push_str(&format!("{} ({} bytes)\n", path.display(), file.text.len()));
     }
     text.push_str(&report::resources(&model, &generated.usage));

@@ -21,7 +21,7 @@
 //! | [`compare`] | how far two force fields are apart |
 //! | [`mod@netlist`] | the netlist after synthesis, simulated |
 //! | [`verify`] | one scene's frames through all three models |
-//! | [`report`] | tables and the JSON contract |
+//! | [`report`] | tables and the JSON contract; `dermis report`, measured and drawn |
 //! | [`host`] | frames to a board over a serial port, forces back |
 //! | [`inputs`] | scene and frames from what the command line names |
 //! | [`cli`] | arguments, commands, exit codes |
@@ -36,6 +36,7 @@ pub mod cli;
 pub mod compare;
 pub mod cosim;
 pub mod drive;
+mod files;
 pub mod fresh;
 pub mod generate;
 pub mod hardware;

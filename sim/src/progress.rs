@@ -1,8 +1,12 @@
 //! A progress line on stderr while something slow runs, only when stderr is a terminal.
 
+use std::sync::LazyLock;
 use std::time::Duration;
 
-use indicatif::{ProgressBar, ProgressStyle};
+use indicatif::{MultiProgress, ProgressBar, ProgressStyle};
+
+/// All lines of the process, one below the other where several threads have one.
+static LINES: LazyLock<MultiProgress> = LazyLock::new(MultiProgress::new);
 
 /// Shown from [`Progress::start`] until dropped.
 pub struct Progress(ProgressBar);
@@ -10,7 +14,7 @@ pub struct Progress(ProgressBar);
 impl Progress {
     /// Shows `message` with a moving mark and the elapsed time. Hidden when stderr is not a terminal.
     pub fn start(message: &str) -> Self {
-        let bar = ProgressBar::new_spinner();
+        let bar = LINES.add(ProgressBar::new_spinner());
         if let Ok(style) = ProgressStyle::with_template("{spinner} {msg} ({elapsed})") {
             bar.set_style(style);
         }
@@ -21,7 +25,7 @@ impl Progress {
 
     /// Shows `message` with a bar of `total` steps. Hidden when stderr is not a terminal.
     pub fn steps(message: &str, total: u64) -> Self {
-        let bar = ProgressBar::new(total);
+        let bar = LINES.add(ProgressBar::new(total));
         if let Ok(style) = ProgressStyle::with_template("{msg} [{bar:30}] {pos}/{len} ({elapsed}, {eta} left)") {
             bar.set_style(style);
         }

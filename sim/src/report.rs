@@ -1,24 +1,40 @@
-//! What the commands print: the JSON contract of `cosim` and the tables for people.
+//! What the commands print: the JSON contract of `cosim` and the tables for people; and the report.
+//!
+//! ```text
+//! run ─ measure ─ sections ─┬─ tables ───┬─ document ─┬─ html
+//!                           └─ pictures ─┘            └─ data: Markdown, CSV, JSON
+//! ```
 //!
 //! Times are total cycles (first input beat to last output beat) at the engine's clock; the margin is
 //! what they leave of [`BUDGET_US`].
 
+mod data;
+mod document;
 mod errors;
 mod host;
 mod implemented;
+mod html;
+mod measure;
 mod needs;
 mod noise;
+mod pictures;
 #[cfg(test)]
 mod read;
 mod result;
+mod run;
+mod save;
+mod sections;
+mod style;
 mod table;
 
 pub use errors::errors;
 pub use host::{equality, resultants, wire_times};
 pub use implemented::{implemented, Implemented};
+pub use measure::jobs::Interrupted;
 pub use needs::{features, resources};
 pub use noise::noise;
 pub use result::{difference, reconstruction};
+pub use run::{run, Arguments};
 pub use table::{cosim, scenes};
 
 use serde::Serialize;

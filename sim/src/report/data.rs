@@ -1,0 +1,123 @@
+//! A document as Markdown, its tables as CSV, and everything as JSON.
+
+use serde_json::{json, Value};
+
+use super::document::{Cell, Document, Item, Table};
+
+/// The document as Markdown; pictures are files beside it.
+pub fn text(document: &Document) -> String {
+    let mut text = format!("# {}\n\n", document.title);
+    document.intro.iter().for_each(|paragraph| text.push_str(&format!("{paragraph}\n\n")));
+    for section in &document.sections {
+        text.push_str(&format!("## {}\n\n", section.title));
+        for item in &section.items {
+            match item {
+                Item::Text(paragraph) => text.push_str(&format!("{paragraph}\n\n")),
+                Item::Table(table) => text.push_str(&format!("{}:\n\n{}\n", table.caption, markdown(table))),
+                Item::Pictures(all) => {
+                    for picture in all {
+                        let path = path_of_picture(document, &picture.id);
+                        text.push_str(&format!("![{}]({path})\n\n", picture.caption));
+                    }
+                }
+            }
+        }
+    }
+    text
+}
+
+/// Where a picture lies, from the document's folder.
+pub fn path_of_picture(document: &Document, id: &str) -> String {
+    format!("{}-pictures/{id}.svg", document.name)
+}
+
+/// Where a table lies, from the document's folder.
+pub fn path_of_table(document: &Document, id: &str) -> String {
+    format!("{}-tables/{id}.csv", document.name)
+}
+
+fn markdown(table: &Table) -> String {
+    let texts = (0..table.head.len()).take_while(|column| !table.is_number(*column)).count();
+    let rows = table.rows.iter().map(|row| row.iter().map(|cell| cell.shown.clone()).collect());
+    super::table::aligned(texts, &table.head, rows.collect())
+}
+
+/// A table for spreadsheets: numbers in full, fractions for percent, nothing for what is not there.
+pub fn csv(table: &Table) -> String {
+    let line = |fields: &mut dyn Iterator<Item = String>| fields.collect::<Vec<_>>().join(",") + "\n";
+    let mut text = line(&mut table.head.iter().map(|head| quoted(head)));
+    for row in &table.rows {
+        text.push_str(&line(&mut row.iter().map(|cell| match cell.number {
+            Some(number) => number.to_string(),
+            None if *cell == super::document::none() => String::new(),
+            None => quoted(&cell.shown),
+        })));
+    }
+    text
+}
+
+fn quoted(text: &str) -> String {
+    match text.contains([',', '"', '\n']) {
+        true => format!("\"{}\"", text.replace('"', "\"\"")),
+        false => text.to_owned(),
+    }
+}
+
+/// The document for programs.
+pub fn document(document: &Document) -> Value {
+    let cell = |cell: &Cell| match cell.number {
+        Some(number) => json!(number),
+        None if *cell == super::document::none() => Value::Null,
+        None => json!(cell.shown),
+    };
+    let table = |table: &Table| {
+        let rows: Vec<Vec<Value>> = table.rows.iter().map(|row| row.iter().map(cell).collect()).collect();
+        json!({ "table": table.id, "caption": table.caption, "head": table.head, "rows": rows })
+    };
+    let item = |item: &Item| match item {
+        Item::Text(text) => vec![json!({ "text": text })],
+        Item::Table(one) => vec![table(one)],
+        Item::Pictures(all) => {
+            let one = |p: &super::document::Picture| json!({ "picture": p.id, "caption": p.caption, "file": path_of_picture(document, &p.id) });
+            all.iter().map(one).collect()
+        }
+    };
+    let section = |section: &super::document::Section| {
+        let items: Vec<Value> = section.items.iter().flat_map(item).collect();
+        json!({ "id": section.id, "title": section.title, "items": items })
+    };
+    let sections: Vec<Value> = document.sections.iter().map(section).collect();
+    json!({ "title": document.title, "intro": document.intro, "sections": sections })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::document::{none, percent, words, Section};
+    use super::super::read;
+    use super::*;
+
+    fn one() -> Table {
+        Table::new(
+            "t",
+            "errors",
+            &["scene", "e_t"],
+            vec![vec![words("a, \"b\""), percent(Some(0.1 + 0.2))], vec![words("c"), none()]],
+        )
+    }
+
+    #[test]
+    fn csv_and_json_hold_the_number_in_full() {
+        let (head, rows) = read::csv(&csv(&one()));
+        assert_eq!(
+            (read::field(&head, &rows[0], "e_t"), read::field(&head, &rows[1], "e_t")),
+            ("0.30000000000000004", "")
+        );
+        assert!(csv(&one()).contains("\"a, \"\"b\"\"\""));
+        let section = Section { id: "s", title: "S".into(), items: vec![Item::Table(one())] };
+        let whole = Document { name: "report", title: "T".into(), intro: vec![], sections: vec![section] };
+        let value = document(&whole);
+        assert_eq!(value.pointer("/sections/0/items/0/rows/0/1"), Some(&json!(0.1 + 0.2)));
+        assert_eq!(value.pointer("/sections/0/items/0/rows/1/1"), Some(&Value::Null));
+        assert!(text(&whole).contains("| a, \"b\" | 30.0 % |"));
+    }
+}

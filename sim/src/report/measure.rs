@@ -1,0 +1,304 @@
+//! Measure: scenes in cases, all engines on the same frames, errors and times of one run.
+//!
+//! ```text
+//! scene × case ─┬─ literal baseline, CPU ─┐
+//!               ├─ golden, CPU ───────────┼─> errors, forces, time of a frame
+//!               ├─ bit-true, CPU ─────────┤
+//!               └─ hardware: co-simulation ── cycles / clock
+//! ```
+//!
+//! First everything is prepared and compared, several cases at a time; then the engines on the CPU are timed one after
+//! the other, with nothing beside them.
+
+mod clock;
+mod formats;
+pub mod jobs;
+mod machine;
+mod plane;
+mod stages;
+mod sweep;
+mod timing;
+
+pub use clock::{clock, Clock};
+pub use formats::{formats, FormatRow};
+pub use machine::machine;
+pub use plane::{plane, Plane};
+pub use stages::{stages, StageRow};
+pub use sweep::{sweep, SweepPoint};
+pub use timing::Timing;
+
+use std::collections::BTreeMap;
+use std::path::PathBuf;
+
+use anyhow::{anyhow, Result};
+use dermis_golden::baseline::Baseline;
+use dermis_golden::errors::Errors;
+use dermis_golden::fixed::{FixedError, Model, Trace};
+use dermis_golden::frame::{Forces, Frame};
+use dermis_golden::partition::{subarrays, Case};
+use dermis_golden::reconstruct::{Golden, Reconstruction};
+use dermis_golden::scene::{Condition, Scene};
+use dermis_hdl::generate;
+use dermis_hdl::usage::Usage;
+
+use crate::compare::median;
+use crate::hardware::Simulator;
+use crate::progress::Progress;
+use crate::verify::verify;
+use jobs::{parallel, Interrupt};
+
+/// Taxels of a subarray from which the quick variant leaves a case out.
+const QUICK_TAXELS: usize = 1200;
+
+/// What to measure.
+#[derive(Clone, Debug)]
+pub struct Options {
+    /// Two co-simulations, fewer drawn frames and sweeps, no case of more than 1200 taxels in a subarray.
+    pub quick: bool,
+    /// Cases prepared at a time.
+    pub jobs: usize,
+    /// Folder for everything built on the way.
+    pub build: PathBuf,
+    /// When a subarray is searched.
+    pub condition: Condition,
+    /// Whether hardware is co-simulated at all; the bit-true model's cycles take its place.
+    pub simulate: bool,
+    /// Set when the user has had enough.
+    pub interrupt: Interrupt,
+}
+
+/// What computes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Engine {
+    /// Eq. 1 with dense matrices and a simplex search, on the CPU.
+    Baseline,
+    /// Floating point, on the CPU.
+    Golden,
+    /// The bit-true model, on the CPU.
+    Fixed,
+    /// The generated hardware.
+    Hardware,
+}
+
+impl Engine {
+    /// All, in the order of tables.
+    pub const ALL: [Engine; 4] = [Engine::Baseline, Engine::Golden, Engine::Fixed, Engine::Hardware];
+
+    /// Name in tables and legends.
+    pub fn name(self) -> &'static str {
+        match self {
+            Engine::Baseline => "literal Eq. 1, CPU",
+            Engine::Golden => "golden, CPU",
+            Engine::Fixed => "bit-true, CPU",
+            Engine::Hardware => "hardware",
+        }
+    }
+}
+
+/// The bit-true side of a case.
+#[derive(Debug)]
+pub struct Integers {
+    /// The model.
+    pub model: Model,
+    /// Its result for every frame.
+    pub results: Vec<Reconstruction>,
+    /// What its stages passed on, for every frame.
+    pub traces: Vec<Trace>,
+    /// Whether the Verilated hardware equalled it in every bit and cycle; `None` where it was not simulated.
+    pub equal: Option<bool>,
+    /// From the first input beat to the last output beat, slowest frame: of the co-simulation, else of the model.
+    pub cycles: u64,
+    /// What the stages take of the board.
+    pub usage: BTreeMap<String, Usage>,
+}
+
+/// A scene in one case on its frames.
+pub struct Measured {
+    /// The scene, its case among its fields.
+    pub scene: Scene,
+    /// The frames, at least one.
+    pub frames: Vec<Frame>,
+    /// The floating-point model, for pictures that need its matrices.
+    pub engine: Golden,
+    /// Its result for every frame.
+    pub golden: Vec<Reconstruction>,
+    /// The bit-true model and the hardware, or why there is none.
+    pub integers: Result<Integers, String>,
+    /// The literal baseline's forces for every frame, or why there are none.
+    pub baseline: Result<Vec<Forces>, String>,
+    /// Times of a frame on the CPU.
+    pub times: BTreeMap<Engine, Timing>,
+    literal: Option<Baseline>,
+}
+
+/// How many contacts a frame has.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Kind {
+    /// One, or none that is described.
+    One,
+    /// Several, which may be sheared each its own way.
+    Several,
+}
+
+impl Kind {
+    /// Of a frame.
+    pub fn of(frame: &Frame) -> Kind {
+        if frame.contacts.len() > 1 {
+            Kind::Several
+        } else {
+            Kind::One
+        }
+    }
+
+    /// Name in tables.
+    pub fn name(self) -> &'static str {
+        match self {
+            Kind::One => "one",
+            Kind::Several => "several",
+        }
+    }
+}
+
+/// An engine's errors and time on one scene in one case.
+#[derive(Clone, Debug)]
+pub struct Point {
+    /// Scene name.
+    pub scene: String,
+    /// The case.
+    pub case: Case,
+    /// What computed.
+    pub engine: Engine,
+    /// Tangential error of the resultant, median over the frames.
+    pub tangential: Option<f64>,
+    /// Normal error of the resultant, median over the frames.
+    pub normal: Option<f64>,
+    /// Time of a frame in s.
+    pub seconds: f64,
+}
+
+impl Measured {
+    /// Errors of an engine's resultants.
+    pub fn errors(&self, engine: Engine) -> Vec<Option<Errors>> {
+        let own = |forces: &Vec<Forces>| {
+            let pairs = self.frames.iter().zip(forces);
+            pairs.map(|(frame, forces)| Some(Errors::new(frame.resultant_N?, forces.resultant()))).collect()
+        };
+        let of = |results: &[Reconstruction]| results.iter().map(|result| result.error).collect();
+        match engine {
+            Engine::Baseline => self.baseline.as_ref().map(own).unwrap_or_default(),
+            Engine::Golden => of(&self.golden),
+            Engine::Fixed | Engine::Hardware => self.integers.as_ref().map(|i| of(&i.results)).unwrap_or_default(),
+        }
+    }
+
+    /// The engine's point, `None` where it does not have the case.
+    pub fn point(&self, engine: Engine) -> Option<Point> {
+        self.point_over(engine, |_| true)
+    }
+
+    /// The same over some of the frames.
+    pub fn point_over(&self, engine: Engine, keep: impl Fn(&Frame) -> bool) -> Option<Point> {
+        let seconds = match engine {
+            Engine::Hardware => {
+                let integers = self.integers.as_ref().ok()?;
+                clock(&integers.model.board, &self.scene).seconds(integers.cycles)
+            }
+            cpu => self.times.get(&cpu)?.seconds(),
+        };
+        let kept = self.frames.iter().zip(self.errors(engine)).filter(|(frame, _)| keep(frame));
+        let errors: Vec<Option<Errors>> = kept.map(|(_, errors)| errors).collect();
+        let over = |value: fn(&Errors) -> Option<f64>| median(errors.iter().flatten().filter_map(value).collect());
+        Some(Point {
+            scene: self.scene.name.clone(),
+            case: self.scene.partition.case,
+            engine,
+            tangential: over(|e| e.tangential),
+            normal: over(|e| e.normal),
+            seconds,
+        })
+    }
+
+    /// Index of the frame called `id`, else 0.
+    pub fn frame(&self, id: &str) -> usize {
+        self.frames.iter().position(|frame| frame.id == id).unwrap_or(0)
+    }
+}
+
+/// Measures scenes in cases on their shipped frames, in the order given; a case that does not divide an array is left
+/// out.
+///
+/// # Errors
+/// A scene the golden model refuses or without shipped frames, no Verilator, an interruption.
+pub fn measure(scenes: &[Scene], cases: &[Case], options: &Options) -> Result<Vec<Measured>> {
+    let mut tasks = Vec::new();
+    for scene in scenes {
+        let frames = Frame::shipped(scene);
+        if frames.is_empty() {
+            return Err(anyhow!("scene {}: no frame is shipped for {}", scene.name, scene.sensor));
+        }
+        for &case in cases {
+            let mut scene = scene.clone();
+            (scene.partition.case, scene.partition.condition) = (case, options.condition);
+            let largest = match case {
+                // One μ per contact over the whole array; a single contact's is that of case 0.
+                Case::Contacts if !frames.iter().any(|frame| Kind::of(frame) == Kind::Several) => None,
+                Case::Contacts | Case::Adaptive => Some(scene.sensor.taxels()),
+                Case::Grid(_) => subarrays(case, &scene.sensor).ok().map(|parts| parts[0].rows * parts[0].cols),
+            };
+            if largest.is_some_and(|taxels| !(options.quick && taxels > QUICK_TAXELS)) {
+                tasks.push((scene, frames.clone()));
+            }
+        }
+    }
+    let mut all =
+        parallel("engines and co-simulations", tasks, options, |(scene, frames)| prepare(scene, frames, options))?;
+    let bar = Progress::steps("timing", all.len() as u64);
+    for (done, measured) in all.iter_mut().enumerate() {
+        options.interrupt.check()?;
+        measured.times = timing::time(measured)?;
+        bar.at(done as u64 + 1);
+    }
+    Ok(all)
+}
+
+fn prepare(scene: Scene, frames: Vec<Frame>, options: &Options) -> Result<Measured> {
+    let engine = Golden::new(&scene)?;
+    let golden = frames.iter().map(|frame| engine.run(frame)).collect::<Result<Vec<_>, _>>()?;
+    let integers = match Model::for_frames(&scene, &frames) {
+        Ok(model) => Ok(integers(model, &frames, options)?),
+        Err(error @ (FixedError::DoesNotFit(_) | FixedError::Scene(_) | FixedError::Format { .. })) => {
+            Err(error.to_string().lines().next().unwrap_or_default().to_owned())
+        }
+        Err(error) => return Err(error.into()),
+    };
+    let (literal, baseline) = match Baseline::new(&scene) {
+        Err(error) => (None, Err(error.to_string())),
+        Ok(literal) => {
+            let forces = frames.iter().map(|frame| literal.run(frame)).collect::<Result<Vec<_>, _>>()?;
+            (Some(literal), Ok(forces))
+        }
+    };
+    Ok(Measured { scene, frames, engine, golden, integers, baseline, times: BTreeMap::new(), literal })
+}
+
+fn integers(model: Model, frames: &[Frame], options: &Options) -> Result<Integers> {
+    let traces = frames.iter().map(|frame| Ok(model.run(&model.readings(std::slice::from_ref(frame))?)));
+    let traces: Vec<Trace> = traces.collect::<Result<_, FixedError>>()?;
+    let decoded = frames.iter().zip(&traces).map(|(frame, t)| model.decode(frame, "fixed", &t.beats, &t.status));
+    let results = decoded.collect::<Result<Vec<_>, _>>()?;
+    let usage = generate(&model)?.usage;
+    let slowest = traces.iter().map(|trace| trace.cycles.total).max().unwrap_or(0);
+    let mut integers = Integers { results, traces, equal: None, cycles: slowest, usage, model };
+    if is_simulated(&integers.model.scene, options) {
+        let verified = verify(&integers.model.scene, frames, &[Simulator::Verilator], &options.build)?;
+        integers.equal = Some(verified.findings.is_equal());
+        integers.cycles = verified.rows.iter().filter_map(|row| row.times.total()).max().unwrap_or(slowest);
+    }
+    Ok(integers)
+}
+
+/// The quick variant co-simulates the two scenes of `make run`.
+fn is_simulated(scene: &Scene, options: &Options) -> bool {
+    let first = scene.partition.case == Case::WHOLE && ["sensor-1", "eight-by-eight"].contains(&scene.name.as_str());
+    options.simulate && (!options.quick || first)
+}

@@ -1,0 +1,124 @@
+//! Tasks on several threads, in order of the list, until one fails or the user interrupts.
+
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::sync::{Arc, Mutex, PoisonError};
+
+use anyhow::Result;
+use signal_hook::consts::{SIGINT, SIGTERM};
+use signal_hook::flag;
+use thiserror::Error;
+
+use super::Options;
+use crate::progress::Progress;
+
+/// Exit code of a second interruption, which does not wait.
+const IMPATIENT: i32 = 130;
+
+/// The user has had enough.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Error)]
+#[error("interrupted; nothing was written")]
+pub struct Interrupted;
+
+/// Whether the user has had enough.
+#[derive(Clone, Debug, Default)]
+pub struct Interrupt(Arc<AtomicBool>);
+
+impl Interrupt {
+    /// Set by Ctrl-C or a request to terminate from now on; the second one ends the program at once.
+    ///
+    /// # Errors
+    /// The system has no signals to spare.
+    pub fn of_signals() -> Result<Interrupt> {
+        let interrupt = Interrupt::default();
+        for signal in [SIGINT, SIGTERM] {
+            // In this order: the first one finds the flag unset.
+            flag::register_conditional_shutdown(signal, IMPATIENT, interrupt.0.clone())?;
+            flag::register(signal, interrupt.0.clone())?;
+        }
+        Ok(interrupt)
+    }
+
+    /// # Errors
+    /// The user has had enough.
+    pub fn check(&self) -> Result<()> {
+        match self.0.load(Ordering::Relaxed) {
+            true => Err(Interrupted.into()),
+            false => Ok(()),
+        }
+    }
+}
+
+/// Does all tasks on `options.jobs` threads; results in the tasks' order.
+///
+/// # Errors
+/// The first task's that failed, by the list; an interruption.
+pub fn parallel<T: Send, R: Send>(
+    what: &str,
+    tasks: Vec<T>,
+    options: &Options,
+    work: impl Fn(T) -> Result<R> + Sync,
+) -> Result<Vec<R>> {
+    let bar = Progress::steps(what, tasks.len() as u64);
+    let tasks: Vec<Mutex<Option<T>>> = tasks.into_iter().map(|task| Mutex::new(Some(task))).collect();
+    let results: Vec<Mutex<Option<Result<R>>>> = tasks.iter().map(|_| Mutex::new(None)).collect();
+    let (next, done, failed) = (AtomicUsize::new(0), AtomicUsize::new(0), AtomicBool::new(false));
+    let take = |index: usize| tasks[index].lock().unwrap_or_else(PoisonError::into_inner).take();
+    let worker = || {
+        while !failed.load(Ordering::Relaxed) && options.interrupt.check().is_ok() {
+            let index = next.fetch_add(1, Ordering::Relaxed);
+            let Some(task) = tasks.get(index).and_then(|_| take(index)) else { break };
+            let result = work(task);
+            failed.fetch_or(result.is_err(), Ordering::Relaxed);
+            *results[index].lock().unwrap_or_else(PoisonError::into_inner) = Some(result);
+            bar.at(done.fetch_add(1, Ordering::Relaxed) as u64 + 1);
+        }
+    };
+    std::thread::scope(|scope| (0..options.jobs.max(1)).for_each(|_| drop(scope.spawn(worker))));
+    options.interrupt.check()?;
+    let results = results.into_iter().map(|result| result.into_inner().unwrap_or_else(PoisonError::into_inner));
+    // A task without a result comes after one that failed.
+    results.flatten().collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use anyhow::anyhow;
+    use dermis_golden::scene::Condition;
+
+    fn options(jobs: usize) -> Options {
+        Options {
+            quick: true,
+            jobs,
+            build: "build".into(),
+            condition: Condition::Loaded,
+            simulate: false,
+            interrupt: Interrupt::default(),
+        }
+    }
+
+    #[test]
+    fn results_in_order_whatever_the_threads() {
+        for jobs in [0, 1, 3] {
+            let squares = parallel("squares", (0..20u64).collect(), &options(jobs), |n| Ok(n * n)).unwrap();
+            assert_eq!(squares, (0..20).map(|n| n * n).collect::<Vec<_>>());
+        }
+    }
+
+    #[test]
+    fn a_failure_ends_it() {
+        let work = |n: u64| if n == 2 { Err(anyhow!("two")) } else { Ok(n) };
+        assert_eq!(parallel("n", (0..20).collect(), &options(2), work).unwrap_err().to_string(), "two");
+    }
+
+    #[test]
+    fn an_interruption_ends_it() {
+        let options = options(1);
+        let stop = |n: u64| {
+            options.interrupt.0.store(n == 3, Ordering::Relaxed);
+            Ok(n)
+        };
+        let error = parallel("n", (0..20).collect(), &options, stop).unwrap_err();
+        assert!(error.is::<Interrupted>(), "{error}");
+    }
+}

@@ -1,0 +1,13 @@
+//! What the report was measured on.
+
+use std::thread::available_parallelism;
+
+/// Processor, cores and versions in one sentence.
+pub fn machine() -> String {
+    let info = std::fs::read_to_string("/proc/cpuinfo").unwrap_or_default();
+    let name = info.lines().find_map(|line| line.strip_prefix("model name")?.split_once(": "));
+    let name = name.map_or("an unnamed processor", |(_, name)| name.trim());
+    let cores = available_parallelism().map_or(1, usize::from);
+    let verilator = crate::verilator::version().unwrap_or_else(|_| "no Verilator".into());
+    format!("Measured by dermis {} on {cores} cores of {name}; {verilator}.", env!("CARGO_PKG_VERSION"))
+}

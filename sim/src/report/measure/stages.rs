@@ -1,0 +1,313 @@
+//! Stages: how far the integers of each stage are from the same stage in floating point, in its own LSB.
+//!
+//! The floating-point side starts from the stress itself and has the matrices unrounded, but takes the block exponents
+//! of the integers, so that both count in the same unit. With s the left shift of `normalise` and r the right shift of
+//! `rescale` of a subarray:
+//!
+//! | stage | floating point | LSB |
+//! |---|---|---|
+//! | receive | b | full scale / largest code |
+//! | normalise, fold | b, its parities | that / 2^s = c |
+//! | pass | parities of Cz⁺b; of v_ij (4/3 mu_max)^(i+j) | c 2^(raw_shift − inverse_exponent) = a; a 2^(r + 4 − a_exponent) |
+//! | rescale | the same | a 2^r = w |
+//! | unfold | v_ij (mu_max/3)^(i+j) per taxel | w/4 |
+//! | search | the golden model's μ | mu_max/384 |
+//! | force | p at the integers' own μ | w/4 |
+//! | send | the golden model's forces | force word's |
+//!
+//! Shares are of the frame's largest value in physical units, so that a subarray with next to no load, whose block
+//! exponent makes rounding look large, weighs what it is worth.
+//!
+//! So `force` shows what the arithmetic costs, and `send` what it costs with the search's answer in it.
+
+use dermis_golden::fixed::arith::bit_length;
+use dermis_golden::fixed::formats::{Formats, MU_STEPS, SEARCH_EXTRA_BITS};
+use dermis_golden::fixed::quads::Quads;
+use dermis_golden::fixed::schedule::{is_transposed, schedule, EXPONENTS};
+use dermis_golden::fixed::send::{Status, STATUS_BEATS};
+use dermis_golden::float::pass::Polynomial;
+use dermis_golden::quantise::full_scale;
+
+use super::{Integers, Measured};
+
+/// One stage of one frame.
+#[derive(Clone, Debug, PartialEq)]
+pub struct StageRow {
+    /// Scene name.
+    pub scene: String,
+    /// The case, as scenes name it.
+    pub case: String,
+    /// Frame name.
+    pub frame: String,
+    /// Stage name, as everywhere.
+    pub stage: &'static str,
+    /// Largest difference, in LSB.
+    pub max_lsb: f64,
+    /// Root mean square difference, in LSB.
+    pub rms_lsb: f64,
+    /// Largest difference over the stage's largest value.
+    pub max_share: f64,
+    /// RMS difference over the stage's largest value.
+    pub rms_share: f64,
+    /// Bits that the largest word takes, sign included.
+    pub used_bits: u32,
+    /// Bits of the word.
+    pub has_bits: u32,
+    /// Words held at the end of their range.
+    pub saturations: u32,
+}
+
+/// Words with their floating-point counterparts in LSB, and what an LSB is worth.
+#[derive(Default)]
+struct Pairs {
+    words: Vec<i64>,
+    values: Vec<f64>,
+    lsb: Vec<f64>,
+}
+
+impl Pairs {
+    fn add(&mut self, words: impl IntoIterator<Item = i64>, values: impl IntoIterator<Item = f64>) {
+        self.words.extend(words);
+        self.values.extend(values);
+        self.lsb.resize(self.words.len(), 1.0);
+    }
+
+    /// A quad of words that count in the same LSB.
+    fn add_quad(&mut self, words: &[i64], (values, lsb): ([f64; 4], f64)) {
+        self.words.extend(words);
+        self.values.extend(values);
+        self.lsb.resize(self.words.len(), lsb);
+    }
+}
+
+/// All stages of a frame, in pipeline order; none where there is no bit-true model or the input is no plain stress.
+pub fn stages(measured: &Measured, index: usize) -> Vec<StageRow> {
+    let Ok(integers) = &measured.integers else { return Vec::new() };
+    let shadow = Shadow::new(measured, integers, index);
+    let f = &integers.model.formats;
+    let sum = |pick: fn(&Status) -> u32| shadow.status.iter().map(pick).sum::<u32>();
+    let bits = [
+        ("receive", f.code_bits, 0),
+        ("normalise", f.input_bits, 0),
+        ("fold", f.fold_bits, 0),
+        ("pass", f.acc_bits, 0),
+        ("rescale", f.vector_bits, sum(|status| status.rescale_saturations)),
+        ("unfold", f.vector_bits + 2, 0),
+        ("search", bit_length(MU_STEPS as u64) + 1, 0),
+        ("force", f.search_bits[0], 0),
+        ("send", 32, shadow.status.first().map_or(0, |status| status.force_saturations)),
+    ];
+    let row = |(stage, has_bits, saturations)| {
+        let pairs = shadow.pairs(stage);
+        let off = || pairs.words.iter().zip(&pairs.values).map(|(word, value)| (*word as f64 - value).abs());
+        let worth = || off().zip(&pairs.lsb).map(|(off, lsb)| off * lsb);
+        let peak =
+            pairs.values.iter().zip(&pairs.lsb).fold(0.0, |peak: f64, (value, lsb)| peak.max((value * lsb).abs()));
+        let share = |value: f64| if peak > 0.0 { value / peak } else { 0.0 };
+        let rms = |squares: f64| (squares / pairs.words.len().max(1) as f64).sqrt();
+        let used = pairs.words.iter().map(|word| bit_length((word ^ (word >> 63)) as u64) + 1).max();
+        StageRow {
+            scene: measured.scene.name.clone(),
+            case: measured.scene.partition.case.to_string(),
+            frame: measured.frames[index].id.clone(),
+            stage,
+            max_lsb: off().fold(0.0, f64::max),
+            rms_lsb: rms(off().map(|d| d * d).sum()),
+            max_share: share(worth().fold(0.0, f64::max)),
+            rms_share: share(rms(worth().map(|d| d * d).sum())),
+            used_bits: used.unwrap_or(0),
+            has_bits,
+            saturations,
+        }
+    };
+    bits.into_iter().map(row).filter(|row| row.used_bits > 0).collect()
+}
+
+/// A frame in floating point beside its integers.
+struct Shadow<'a> {
+    measured: &'a Measured,
+    integers: &'a Integers,
+    index: usize,
+    status: Vec<Status>,
+    /// Stress of a code's LSB.
+    code_MPa: f64,
+    /// Of each subarray.
+    families: Vec<Polynomial>,
+}
+
+impl<'a> Shadow<'a> {
+    fn new(measured: &'a Measured, integers: &'a Integers, index: usize) -> Self {
+        let (model, frame) = (&integers.model, &measured.frames[index]);
+        let beats = &integers.traces[index].status;
+        let stress = |part: &dermis_golden::partition::Subarray| part.gather(&model.scene.sensor, &frame.stress_MPa);
+        let family = |b: Vec<f64>| Polynomial::of_degree(measured.engine.matrices(), &b, model.formats.degree);
+        Shadow {
+            measured,
+            integers,
+            index,
+            status: beats.chunks(STATUS_BEATS).filter_map(Status::of_beats).collect(),
+            code_MPa: full_scale(&model.scene, frame) / model.prepare.largest(),
+            families: model.parts.iter().map(|part| family(stress(part))).collect(),
+        }
+    }
+
+    fn formats(&self) -> &Formats {
+        &self.integers.model.formats
+    }
+
+    /// The words of a stage of all subarrays, four to a quad.
+    fn words(&self, stage: &str) -> &[Vec<i64>] {
+        let stages = &self.integers.traces[self.index].stages;
+        stages.iter().find(|s| s.name == stage).map_or(&[], |s| &s.words)
+    }
+
+    fn pairs(&self, stage: &str) -> Pairs {
+        let mut pairs = Pairs::default();
+        match stage {
+            "receive" => {
+                let values = self.measured.frames[self.index].stress_MPa.iter().map(|b| b / self.code_MPa);
+                pairs.add(self.words(stage).iter().flatten().copied(), values);
+            }
+            "search" => self.search(&mut pairs),
+            "send" => self.send(&mut pairs),
+            _ => {
+                let words = self.words(stage);
+                let own = words.len() / self.status.len().max(1);
+                for (part, words) in words.chunks(own.max(1)).enumerate() {
+                    let values = self.quads(stage, part);
+                    words.iter().zip(values).for_each(|(words, values)| pairs.add_quad(words, values));
+                }
+            }
+        }
+        pairs
+    }
+
+    /// μ of every subarray that was searched.
+    fn search(&self, pairs: &mut Pairs) {
+        let step = self.measured.scene.search.mu_max / MU_STEPS as f64;
+        let golden = &self.measured.golden[self.index].subarrays;
+        for (status, golden) in self.status.iter().zip(golden).filter(|(_, golden)| golden.objective_value.is_some()) {
+            pairs.add(status.position.map(i64::from), golden.mu.map(|mu| mu / step));
+        }
+    }
+
+    /// The forces as they leave.
+    fn send(&self, pairs: &mut Pairs) {
+        let model = &self.integers.model;
+        if model.wants_resultants() {
+            return;
+        }
+        let lsb_N = model.force_lsb_N(self.code_MPa * model.prepare.largest());
+        let forces = &self.measured.golden[self.index].forces_N;
+        let beats = &self.integers.traces[self.index].beats;
+        for (k, axis) in [&forces.fx, &forces.fy, &forces.fz].into_iter().enumerate() {
+            pairs.add(beats.iter().map(|beat| i64::from(beat[k])), axis.iter().map(|f| f / lsb_N));
+        }
+    }
+
+    /// The values of a stage of one subarray in quads, in LSB, with the LSB in MPa or N.
+    fn quads(&self, stage: &str, part: usize) -> Vec<([f64; 4], f64)> {
+        let (f, model, status) = (self.formats(), &self.integers.model, &self.status[part]);
+        let layout = model.layout();
+        let scene = &self.measured.scene;
+        let code = self.code_MPa / 2f64.powi(status.normalise as i32);
+        let raw = code * 2f64.powi(f.raw_shift as i32 - f.inverse_exponent);
+        let word = raw * 2f64.powi(status.rescale as i32);
+        let stress = || {
+            let b = model.parts[part].gather(&scene.sensor, &self.measured.frames[self.index].stress_MPa);
+            quads_of(layout, &b).into_iter()
+        };
+        let family = &self.families[part];
+        match stage {
+            "normalise" => return stress().map(|quad| in_lsb(quad, code)).collect(),
+            "fold" => return stress().map(|quad| in_lsb(parities(quad), code)).collect(),
+            "force" => {
+                let step = scene.search.mu_max / MU_STEPS as f64;
+                let p = family.eval(status.position.map(|position| f64::from(position) * step));
+                return quads_of(layout, &p).into_iter().map(|quad| in_lsb(quad, word / 4.0)).collect();
+            }
+            _ => {}
+        }
+        let scale = 4.0 / 3.0 * scene.search.mu_max;
+        let mut all = Vec::new();
+        for (k, products) in schedule(f).iter().enumerate() {
+            let (i, j) = EXPONENTS[k];
+            let order = (i + j) as i32;
+            let v = family.v(i as usize, j as usize).iter().map(|v| v * scale.powi(order));
+            let quads = quads_of(layout, &v.collect::<Vec<_>>());
+            let swapped = is_transposed(products);
+            let moved = |address: usize| if swapped { quads[layout.transposed(address)] } else { quads[address] };
+            let lsb = match stage {
+                "pass" if k == 0 => raw,
+                "pass" => word * 2f64.powi(SEARCH_EXTRA_BITS as i32 - f.a_exponent),
+                "rescale" => word,
+                _ => word / 4.0 * 4f64.powi(order),
+            };
+            all.extend((0..quads.len()).map(moved).map(|quad| {
+                let quad = match (stage, swapped) {
+                    ("unfold", _) => quad,
+                    (_, true) => parities([quad[0], quad[2], quad[1], quad[3]]),
+                    (_, false) => parities(quad),
+                };
+                in_lsb(quad, lsb)
+            }));
+        }
+        all
+    }
+}
+
+/// Values per taxel of a subarray in quads, middle lines doubled.
+fn quads_of(layout: Quads, taxels: &[f64]) -> Vec<[f64; 4]> {
+    (0..layout.len()).map(|address| std::array::from_fn(|lane| taxels[layout.taxel(address, lane)])).collect()
+}
+
+/// A quad in LSB, with the LSB.
+fn in_lsb(quad: [f64; 4], lsb: f64) -> ([f64; 4], f64) {
+    (quad.map(|value| value / lsb), lsb)
+}
+
+/// The butterfly of `fold`.
+fn parities([a, b, c, d]: [f64; 4]) -> [f64; 4] {
+    [a + b + c + d, a - b + c - d, a + b - c - d, a - b - c + d]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::jobs::Interrupt;
+    use super::super::{measure, Options};
+    use super::*;
+    use dermis_golden::partition::Case;
+    use dermis_golden::scene::{Condition, Scene};
+
+    #[test]
+    fn every_stage_is_near_its_float_in_every_case() {
+        let options = Options {
+            quick: true,
+            jobs: 2,
+            build: "build".into(),
+            condition: Condition::Loaded,
+            simulate: false,
+            interrupt: Interrupt::default(),
+        };
+        let cases: Vec<Case> = [0, 1, 3].into_iter().filter_map(Case::numbered).collect();
+        let scenes = ["sensor-1", "eight-by-eight", "sensor-4"].map(|name| Scene::builtin(name).unwrap());
+        let measured = measure(&scenes, &cases, &options).unwrap();
+        // Sensor 4 fits in case 1, where Ay is Ax transposed.
+        let rows: Vec<StageRow> = measured.iter().flat_map(|measured| stages(measured, 0)).collect();
+        assert_eq!(rows.len(), 9 * 7);
+        for row in &rows {
+            let (stage, what) = (row.stage, format!("{row:?}"));
+            assert!(row.used_bits <= row.has_bits, "{what}");
+            match stage {
+                // Rounded once.
+                "receive" => assert!(row.max_lsb <= 0.5 + 1e-9, "{what}"),
+                "search" | "send" => {}
+                // 20-bit input, 18-bit operands, pruning at 2⁻¹⁷ and below: 2⁻¹² of the largest is far off.
+                _ => assert!(row.max_share < 2.4e-4, "{what}"),
+            }
+            // What counts in the wrong unit is off by half of itself at least.
+            assert!(stage == "search" || row.rms_share < 0.25, "{what}");
+        }
+        assert!(rows.iter().filter(|row| row.stage == "pass").all(|row| row.rms_lsb > 0.0));
+    }
+}

@@ -1,0 +1,111 @@
+//! Sweep: one field of a scene changed at a time, and what that does to error, cycles and board.
+
+use anyhow::Result;
+use dermis_golden::fixed::{Cycles, FixedError, Model};
+use dermis_golden::frame::Frame;
+use dermis_golden::partition::Case;
+use dermis_golden::scene::Scene;
+
+use super::jobs::parallel;
+use super::Options;
+use crate::compare::median;
+
+/// A setting and what it gives.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SweepPoint {
+    /// Scene name.
+    pub scene: String,
+    /// The case from which it starts, as scenes name it.
+    pub case: String,
+    /// What is swept, by its name in scenes.
+    pub field: &'static str,
+    /// Its value.
+    pub value: String,
+    /// Whether it is the scene's own.
+    pub own: bool,
+    /// Tangential error of the bit-true model, median over the frames.
+    pub tangential: Option<f64>,
+    /// Normal error, likewise.
+    pub normal: Option<f64>,
+    /// From the first input beat to the last output beat with every subarray searched.
+    pub cycles: u64,
+    /// Block RAMs.
+    pub block_rams: usize,
+    /// Multipliers.
+    pub multipliers: usize,
+    /// Whether the board has them.
+    pub fits: bool,
+}
+
+/// What a task needs.
+type Task = (&'static str, String, Box<dyn Fn(&mut Scene) + Send>, Option<usize>);
+
+/// All sweeps of a scene.
+///
+/// # Errors
+/// A frame that is not the scene's; an interruption.
+pub fn sweep(scene: &Scene, frames: &[Frame], options: &Options) -> Result<Vec<SweepPoint>> {
+    let tasks = tasks(scene);
+    let own = Model::new(scene)?;
+    let one = |(field, value, change, degree): Task| -> Result<Option<SweepPoint>> {
+        let mut changed = scene.clone();
+        change(&mut changed);
+        let model = match degree {
+            Some(degree) => Model::of_degree(&changed, degree),
+            None => Model::new(&changed),
+        };
+        match model {
+            Ok(model) => Ok(Some(point(&model, &own, field, value, frames)?)),
+            // A setting that the scene cannot have is no point.
+            Err(
+                FixedError::DoesNotFit(_) | FixedError::Scene(_) | FixedError::Format { .. } | FixedError::Partition(_),
+            ) => Ok(None),
+            Err(error) => Err(error.into()),
+        }
+    };
+    let what = format!("{}: sweeps", scene.name);
+    Ok(parallel(&what, tasks, options, one)?.into_iter().flatten().collect())
+}
+
+fn tasks(scene: &Scene) -> Vec<Task> {
+    let mut all: Vec<Task> = Vec::new();
+    let mut field = |name: &'static str, values: &[u32], set: fn(&mut Scene, u32)| {
+        for &value in values {
+            all.push((name, value.to_string(), Box::new(move |scene: &mut Scene| set(scene, value)), None));
+        }
+    };
+    field("input_bits", &[12, 14, 16, 18, 20, 22, 24], |s, v| s.fixed.input_bits = v);
+    field("data_bits", &[12, 14, 16, 18], |s, v| s.fixed.data_bits = v);
+    field("coef_bits", &[8, 10, 12, 14, 16, 18], |s, v| s.fixed.coef_bits = v);
+    field("inverse_bits", &[18, 20, 22, 24, 28], |s, v| s.fixed.inverse_bits = v);
+    field("prune_bits", &[8, 10, 12, 14, 17, 20], |s, v| s.fixed.prune_bits = v);
+    field("lanes", &[16, 20, 28, 36, 52, 100, 144], |s, v| s.fixed.lanes = Some(v));
+    for degree in 1..=dermis_golden::matrices::MAX_DEGREE {
+        all.push(("degree", degree.to_string(), Box::new(|_| {}), Some(degree)));
+    }
+    for case in (0..4).filter_map(Case::numbered) {
+        let change = move |scene: &mut Scene| scene.partition.case = case;
+        if dermis_golden::partition::subarrays(case, &scene.sensor).is_ok() {
+            all.push(("case", case.to_string(), Box::new(change), None));
+        }
+    }
+    all
+}
+
+fn point(model: &Model, own: &Model, field: &'static str, value: String, frames: &[Frame]) -> Result<SweepPoint> {
+    let results = frames.iter().map(|frame| model.reconstruct(frame)).collect::<Result<Vec<_>, _>>()?;
+    let errors: Vec<_> = results.iter().filter_map(|result| result.error).collect();
+    Ok(SweepPoint {
+        scene: own.scene.name.clone(),
+        case: own.scene.partition.case.to_string(),
+        field,
+        value,
+        own: model.scene == own.scene && model.formats == own.formats,
+        tangential: median(errors.iter().filter_map(|e| e.tangential).collect()),
+        normal: median(errors.iter().filter_map(|e| e.normal).collect()),
+        cycles: Cycles::of(model, &vec![model.searches(); model.parts.len()]).total,
+        block_rams: model.resources.block_rams(),
+        multipliers: model.resources.multipliers(),
+        fits: model.resources.shortages(&model.board).is_empty(),
+    })
+}

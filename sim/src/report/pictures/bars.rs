@@ -1,0 +1,85 @@
+//! Bars: groups of values side by side, upright or lying, on a common axis.
+
+use anyhow::Result;
+use plotters::prelude::*;
+use plotters::style::text_anchor::{HPos, VPos};
+
+use super::super::style::{GRID, INK, LIMIT};
+use super::{label, note, svg, WIDTH};
+
+/// Left edge of the bars, right of their names.
+const LEFT: i32 = 132;
+const RIGHT: i32 = 344;
+const TOP: i32 = 10;
+/// Height of a bar, and room between groups.
+const BAR: i32 = 14;
+const GAP: i32 = 7;
+
+/// What to draw: lying bars about zero.
+#[derive(Clone, Debug)]
+pub struct Bars {
+    /// Name and unit of the axis.
+    pub axis: String,
+    /// Name of a group, and its values in the order of `series`; `None` leaves the place empty.
+    pub groups: Vec<(String, Vec<Option<f64>>)>,
+    /// Names and colours.
+    pub series: Vec<(String, RGBColor)>,
+    /// Text of a value.
+    pub text: fn(f64) -> String,
+    /// A line across, for example a budget.
+    pub limit: Option<f64>,
+    /// Logarithmic, from a tenth of the smallest value.
+    pub log: bool,
+}
+
+/// Draws them.
+///
+/// # Errors
+/// A picture that cannot be written.
+pub fn bars(plot: &Bars) -> Result<String> {
+    let values = || plot.groups.iter().flat_map(|(_, values)| values.iter().flatten().copied()).chain(plot.limit);
+    let scale = |v: f64| if plot.log { v.log10() } else { v };
+    let (low, high) = match plot.log {
+        true => (
+            values().map(scale).fold(f64::INFINITY, f64::min) - 1.0,
+            values().map(scale).fold(f64::NEG_INFINITY, f64::max),
+        ),
+        false => (values().fold(0.0, f64::min), values().fold(0.0, f64::max)),
+    };
+    let span = if high > low { high - low } else { 1.0 };
+    let at = |v: f64| LEFT + ((scale(v) - low) / span * f64::from(RIGHT - LEFT)).round() as i32;
+    let zero = if plot.log { LEFT } else { at(0.0) };
+    let group = BAR * plot.series.len() as i32 + GAP;
+    let bottom = TOP + group * plot.groups.len() as i32;
+    svg((bottom + 30 + 20 * plot.series.len().div_ceil(2) as i32) as u32, |area| {
+        area.draw(&PathElement::new(vec![(zero, TOP - 4), (zero, bottom)], GRID.stroke_width(1)))?;
+        for (index, (name, values)) in plot.groups.iter().enumerate() {
+            let top = TOP + group * index as i32;
+            note(area, name, (LEFT - 6, top + (group - GAP) / 2), HPos::Right, VPos::Center)?;
+            for (k, (value, (_, colour))) in values.iter().zip(&plot.series).enumerate() {
+                let Some(value) = value else { continue };
+                let (y, end) = (top + BAR * k as i32, at(*value));
+                let corners = [(zero.min(end), y), (zero.max(end), y + BAR - 1)];
+                area.draw(&Rectangle::new(corners, colour.filled()))?;
+                let (h, x) =
+                    if *value < 0.0 && !plot.log { (HPos::Left, zero + 4) } else { (HPos::Left, end.max(zero) + 4) };
+                // Not across the limit.
+                let limit = plot.limit.map(at).filter(|limit| x <= *limit && *limit < x + 36);
+                let x = limit.map_or(x, |limit| limit + 4);
+                area.draw_text(&(plot.text)(*value), &label(14, &INK, h, VPos::Center), (x, y + BAR / 2))?;
+            }
+        }
+        if let Some(limit) = plot.limit {
+            let x = at(limit);
+            area.draw(&PathElement::new(vec![(x, TOP - 4), (x, bottom)], LIMIT.stroke_width(2)))?;
+        }
+        note(area, &plot.axis, ((LEFT + RIGHT) / 2, bottom + 10), HPos::Center, VPos::Center)?;
+        for (index, (name, colour)) in plot.series.iter().enumerate() {
+            let x = 16 + (index % 2) as i32 * (WIDTH as i32 / 2 - 6);
+            let y = bottom + 32 + 20 * (index / 2) as i32;
+            area.draw(&Rectangle::new([(x - 5, y - 5), (x + 5, y + 5)], colour.filled()))?;
+            note(area, name, (x + 12, y), HPos::Left, VPos::Center)?;
+        }
+        Ok(())
+    })
+}

@@ -1,0 +1,210 @@
+//! Maps of the array: stress by colour, forces by colour (normal) and arrows (tangential), with the subarrays.
+
+use anyhow::Result;
+use dermis_golden::frame::Forces;
+use dermis_golden::reconstruct::SubarrayResult;
+use dermis_golden::sensor::Sensor;
+use plotters::prelude::*;
+use plotters::style::text_anchor::{HPos, VPos};
+
+use super::super::style::{GRID, INK, MINUS, PLUS, SERIES};
+use super::{label, note, svg, Area, WIDTH};
+
+/// Longest side of the map.
+const SIDE: f64 = 290.0;
+/// Upper left corner of the map.
+const CORNER: (f64, f64) = (38.0, 24.0);
+/// Below this share of the largest value a cell is left blank.
+const BLANK: f64 = 0.004;
+/// Most arrows along a side; a finer array has one for each group of taxels, their sum.
+const ARROWS: usize = 24;
+/// Share of the longest arrow below which there is none.
+const LEAST_ARROW: f64 = 0.02;
+/// Shades of the colour bar.
+const SHADES: i32 = 24;
+
+/// What lies over a map: subarrays with their centroids.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Outline<'a> {
+    /// The subarrays.
+    pub subarrays: &'a [SubarrayResult],
+    /// Whether to show the centroids.
+    pub centroids: bool,
+}
+
+/// Places of a sensor on a map, row 0 on top as in the frame files.
+struct Map {
+    cell: (f64, f64),
+    size: (f64, f64),
+    /// Pixels per mm.
+    scale: f64,
+}
+
+impl Map {
+    fn new(sensor: &Sensor) -> Map {
+        let mm = (sensor.cols as f64 * sensor.pitch_x_mm, sensor.rows as f64 * sensor.pitch_y_mm);
+        let scale = SIDE / mm.0.max(mm.1);
+        Map { cell: (sensor.pitch_x_mm * scale, sensor.pitch_y_mm * scale), size: (mm.0 * scale, mm.1 * scale), scale }
+    }
+
+    /// Pixel of a place in taxels from the upper left corner.
+    fn at(&self, row: f64, col: f64) -> (i32, i32) {
+        ((CORNER.0 + col * self.cell.0).round() as i32, (CORNER.1 + row * self.cell.1).round() as i32)
+    }
+
+    /// Pixel of a place in mm from the centre.
+    fn of_mm(&self, [x, y]: [f64; 2]) -> (i32, i32) {
+        let at = (CORNER.0 + self.size.0 / 2.0 + x * self.scale, CORNER.1 + self.size.1 / 2.0 + y * self.scale);
+        (at.0.round() as i32, at.1.round() as i32)
+    }
+
+    fn height(&self) -> u32 {
+        (CORNER.1 + self.size.1 + 46.0) as u32
+    }
+}
+
+/// Stress in MPa: compression and tension by colour, centroids of both.
+///
+/// # Errors
+/// A picture that cannot be written.
+pub fn stress_map(sensor: &Sensor, stress_MPa: &[f64], outline: Outline) -> Result<String> {
+    let map = Map::new(sensor);
+    let peak = stress_MPa.iter().fold(0.0, |peak: f64, b| peak.max(b.abs()));
+    svg(map.height(), |area| {
+        cells(area, &map, sensor, stress_MPa, peak)?;
+        frame(area, &map, sensor, outline)?;
+        bar(area, &map, ["tension", "compression"], "kPa", &three(1e3 * peak))
+    })
+}
+
+/// Forces in N: normal by colour on a scale that ends at `peaks[0]`, tangential by arrows of which the longest stands
+/// for `peaks[1]`, so that several fields compare.
+///
+/// # Errors
+/// A picture that cannot be written.
+pub fn force_field(sensor: &Sensor, forces: &Forces, peaks: [f64; 2], outline: Outline) -> Result<String> {
+    let map = Map::new(sensor);
+    svg(map.height(), |area| {
+        cells(area, &map, sensor, &forces.fz, peaks[0])?;
+        frame(area, &map, sensor, outline)?;
+        arrows(area, &map, sensor, forces, peaks[1])?;
+        let (unit, factor) = if peaks[0] >= 1.0 { ("N", 1.0) } else { ("mN", 1e3) };
+        bar(area, &map, ["pull", "press"], &format!("{unit}, normal"), &three(factor * peaks[0]))?;
+        let at = (CORNER.0 as i32, 8);
+        note(area, &format!("longest arrow {} mN, tangential", three(1e3 * peaks[1])), at, HPos::Left, VPos::Center)
+    })
+}
+
+fn cells(area: &Area, map: &Map, sensor: &Sensor, values: &[f64], peak: f64) -> Result<()> {
+    for (index, value) in values.iter().enumerate() {
+        let share = if peak > 0.0 { value / peak } else { 0.0 };
+        if share.abs() < BLANK {
+            continue;
+        }
+        let (row, col) = ((index / sensor.cols) as f64, (index % sensor.cols) as f64);
+        area.draw(&Rectangle::new([map.at(row, col), map.at(row + 1.0, col + 1.0)], shade(share).filled()))?;
+    }
+    Ok(())
+}
+
+/// The colour of a share −1 … 1.
+fn shade(share: f64) -> RGBAColor {
+    // The square root shows what lies low, tension above all.
+    if share > 0.0 { PLUS } else { MINUS }.mix(share.abs().min(1.0).sqrt())
+}
+
+fn frame(area: &Area, map: &Map, sensor: &Sensor, outline: Outline) -> Result<()> {
+    let (rows, cols) = (sensor.rows as f64, sensor.cols as f64);
+    area.draw(&Rectangle::new([map.at(0.0, 0.0), map.at(rows, cols)], GRID.stroke_width(1)))?;
+    for part in outline.subarrays {
+        let (row, col) = (part.row0 as f64, part.col0 as f64);
+        let corners = [map.at(row, col), map.at(row + part.rows as f64, col + part.cols as f64)];
+        area.draw(&Rectangle::new(corners, INK.stroke_width(1)))?;
+        if outline.centroids {
+            for (centroid, sign) in [(part.compression_centroid_mm, "+"), (part.tension_centroid_mm, "−")] {
+                let Some(at) = centroid.map(|mm| map.of_mm(mm)) else { continue };
+                area.draw(&Circle::new(at, 7, SERIES[3].filled()))?;
+                area.draw_text(sign, &label(16, &INK, HPos::Center, VPos::Center), at)?;
+            }
+        }
+    }
+    // Ticks in mm: edges and centre.
+    let half = [cols * sensor.pitch_x_mm / 2.0, rows * sensor.pitch_y_mm / 2.0];
+    let bottom = map.at(rows, 0.0).1;
+    let place = |mm: f64| if mm < 0.0 { format!("−{}", -mm) } else { (mm + 0.0).to_string() };
+    for share in [-1.0, 0.0, 1.0] {
+        let x = map.of_mm([share * half[0], 0.0]).0;
+        note(area, &place(share * half[0]), (x, bottom + 4), HPos::Center, VPos::Top)?;
+        let y = map.of_mm([0.0, share * half[1]]).1;
+        note(area, &place(share * half[1]), (CORNER.0 as i32 - 4, y), HPos::Right, VPos::Center)?;
+    }
+    let middle = map.of_mm([0.0, 0.0]).0;
+    note(area, "x, y in mm", (middle, bottom + 22), HPos::Center, VPos::Top)
+}
+
+fn arrows(area: &Area, map: &Map, sensor: &Sensor, forces: &Forces, longest_N: f64) -> Result<()> {
+    let group = sensor.rows.max(sensor.cols).div_ceil(ARROWS);
+    let length = 1.8 * group as f64 * map.cell.0.max(map.cell.1).min(18.0);
+    for row in (0..sensor.rows).step_by(group) {
+        for col in (0..sensor.cols).step_by(group) {
+            let (rows, cols) = (row..(row + group).min(sensor.rows), col..(col + group).min(sensor.cols));
+            let all = rows.clone().flat_map(|r| cols.clone().map(move |c| r * sensor.cols + c));
+            let (x, y) = all.fold((0.0, 0.0), |(x, y), k| (x + forces.fx[k], y + forces.fy[k]));
+            let share = x.hypot(y) / (longest_N * (group * group) as f64);
+            // Nothing to divide by is no number.
+            if share.is_nan() || share < LEAST_ARROW {
+                continue;
+            }
+            let half = |a: usize, b: usize| (a + b) as f64 / 2.0;
+            let from = map.at(half(rows.start, rows.end), half(cols.start, cols.end));
+            let (ux, uy) = (x / x.hypot(y), y / x.hypot(y));
+            arrow(area, from, (ux, uy), length * share)?;
+        }
+    }
+    Ok(())
+}
+
+/// An arrow from a point along a unit vector.
+fn arrow(area: &Area, (x, y): (i32, i32), (ux, uy): (f64, f64), length: f64) -> Result<()> {
+    let at = |along: f64, aside: f64| {
+        (x + (along * ux - aside * uy).round() as i32, y + (along * uy + aside * ux).round() as i32)
+    };
+    let head = (0.4 * length).min(5.0);
+    area.draw(&PathElement::new(vec![at(0.0, 0.0), at(length, 0.0)], INK.stroke_width(1)))?;
+    let tip = vec![at(length - head, head / 2.0), at(length, 0.0), at(length - head, -head / 2.0)];
+    area.draw(&PathElement::new(tip, INK.stroke_width(1)))?;
+    Ok(())
+}
+
+/// Three significant digits.
+fn three(value: f64) -> String {
+    let decimals = (2.0 - value.abs().max(1e-9).log10().floor()).clamp(0.0, 9.0) as usize;
+    format!("{value:.decimals$}")
+}
+
+/// The colour bar at the right.
+fn bar(area: &Area, map: &Map, [minus, plus]: [&str; 2], unit: &str, peak: &str) -> Result<()> {
+    let left = (CORNER.0 + map.size.0) as i32 + 12;
+    let (top, bottom) = (CORNER.1 as i32 + 16, (CORNER.1 + map.size.1) as i32 - 16);
+    for k in 0..SHADES {
+        let y = |k: i32| top + (bottom - top) * k / SHADES;
+        let share = 1.0 - (2 * k + 1) as f64 / f64::from(SHADES);
+        area.draw(&Rectangle::new([(left, y(k)), (left + 10, y(k + 1))], shade(share).filled()))?;
+    }
+    let right = WIDTH as i32 - left - 14;
+    // A narrow array leaves room beside the bar; a wide one has the names above and below it.
+    let beside = right > 70;
+    let x = left + 14;
+    note(area, peak, (x, top), HPos::Left, VPos::Center)?;
+    note(area, "0", (x, (top + bottom) / 2), HPos::Left, VPos::Center)?;
+    note(area, &format!("−{peak}"), (x, bottom), HPos::Left, VPos::Center)?;
+    if beside {
+        note(area, unit, (x, top + 16), HPos::Left, VPos::Center)?;
+        note(area, plus, (x, top + 32), HPos::Left, VPos::Center)?;
+        note(area, minus, (x, bottom - 16), HPos::Left, VPos::Center)
+    } else {
+        let edge = WIDTH as i32 - 4;
+        note(area, &format!("{plus}, {unit}"), (edge, 8), HPos::Right, VPos::Center)?;
+        note(area, minus, (edge, bottom + 16), HPos::Right, VPos::Center)
+    }
+}

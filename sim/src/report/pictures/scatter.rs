@@ -1,0 +1,297 @@
+//! Points on two axes, each linear or logarithmic, with marks per series, a legend and guides.
+
+use anyhow::Result;
+use plotters::prelude::*;
+use plotters::style::text_anchor::{HPos, VPos};
+
+use super::super::style::{GRID, INK, LIMIT};
+use super::{label, note, svg, Area, SMALL, WIDTH};
+
+/// Height of the plot with its axes; legend lines come below.
+const HEIGHT: u32 = 300;
+/// Edges of the plot.
+const LEFT: i32 = 74;
+const RIGHT: i32 = 386;
+const TOP: i32 = 12;
+const BOTTOM: i32 = 250;
+/// Height of a legend line.
+const LINE: i32 = 20;
+
+/// Points that belong together.
+#[derive(Clone, Debug)]
+pub struct Series {
+    /// In the legend.
+    pub name: String,
+    /// Of its marks.
+    pub colour: RGBColor,
+    /// Shape of its marks: 0 disc, 1 square, 2 triangle, 3 diamond.
+    pub shape: usize,
+    /// x, y, what stands beside the mark.
+    pub points: Vec<(f64, f64, String)>,
+    /// Joined by a line.
+    pub joined: bool,
+}
+
+/// A line across the plot.
+#[derive(Clone, Debug)]
+pub enum Guide {
+    /// At an x, with a name.
+    X(f64, String),
+    /// Steps through points, left to right, with a name in the legend.
+    Front(Vec<(f64, f64)>, String),
+    /// A ring about a point, with a name in the legend.
+    Ring((f64, f64), String),
+}
+
+/// What to draw.
+#[derive(Clone, Debug)]
+pub struct Scatter {
+    /// Name and unit.
+    pub x: String,
+    /// Name and unit.
+    pub y: String,
+    /// Logarithmic axes, x and y.
+    pub log: [bool; 2],
+    /// Text of a tick.
+    pub ticks: [fn(f64) -> String; 2],
+    /// The points.
+    pub series: Vec<Series>,
+    /// Lines.
+    pub guides: Vec<Guide>,
+}
+
+/// One axis: values to pixels.
+struct Axis {
+    low: f64,
+    high: f64,
+    log: bool,
+    from: i32,
+    to: i32,
+}
+
+impl Axis {
+    /// An axis that holds all values with a little room.
+    fn new(values: impl Iterator<Item = f64>, log: bool, from: i32, to: i32) -> Axis {
+        let scale = |v: f64| if log { v.log10() } else { v };
+        let values: Vec<f64> = values.map(scale).filter(|v| v.is_finite()).collect();
+        let low = values.iter().copied().fold(f64::INFINITY, f64::min);
+        let high = values.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+        let (low, high) = if values.is_empty() { (0.0, 1.0) } else { (low, high) };
+        let room = if high > low { 0.06 * (high - low) } else { 0.5 * low.abs().max(if log { 1.0 } else { 1e-9 }) };
+        let low = if !log && low >= 0.0 { (low - room).max(0.0) } else { low - room };
+        Axis { low, high: high + room, log, from, to }
+    }
+
+    fn at(&self, value: f64) -> i32 {
+        let value = if self.log { value.log10() } else { value };
+        let share = ((value - self.low) / (self.high - self.low)).clamp(0.0, 1.0);
+        self.from + (share * f64::from(self.to - self.from)).round() as i32
+    }
+
+    /// Three to seven round values.
+    fn ticks(&self) -> Vec<f64> {
+        if self.log {
+            let decades = self.high - self.low;
+            let factors: &[f64] = if decades < 0.8 {
+                &[1.0, 1.5, 2.0, 3.0, 5.0, 7.0]
+            } else if decades < 2.5 {
+                &[1.0, 3.0]
+            } else {
+                &[1.0]
+            };
+            let every = (decades / 7.0).ceil().max(1.0) as i32;
+            let exponents = (self.low.floor() as i32..=self.high.ceil() as i32).filter(|e| e.rem_euclid(every) == 0);
+            let all = exponents.flat_map(|e| factors.iter().map(move |factor| factor * 10f64.powi(e)));
+            let all: Vec<f64> = all.filter(|v| (self.low..=self.high).contains(&v.log10())).collect();
+            if all.len() > 1 {
+                return all;
+            }
+            return linear(10f64.powf(self.low), 10f64.powf(self.high));
+        }
+        linear(self.low, self.high)
+    }
+}
+
+/// Three to seven round values between two.
+fn linear(low: f64, high: f64) -> Vec<f64> {
+    let rough = (high - low) / 5.0;
+    let decade = 10f64.powf(rough.log10().floor());
+    let step = [1.0, 2.0, 5.0, 10.0].into_iter().map(|f| f * decade).find(|step| *step >= rough).unwrap_or(rough);
+    let first = (low / step).ceil() as i64;
+    (first..).map(|k| k as f64 * step).take_while(|v| *v <= high).collect()
+}
+
+/// Draws it.
+///
+/// # Errors
+/// A picture that cannot be written, which text in memory always can.
+pub fn scatter(plot: &Scatter) -> Result<String> {
+    let points = || plot.series.iter().flat_map(|series| &series.points);
+    let at_x = plot.guides.iter().filter_map(|guide| if let Guide::X(x, _) = guide { Some(*x) } else { None });
+    let x = Axis::new(points().map(|point| point.0).chain(at_x), plot.log[0], LEFT, RIGHT);
+    let y = Axis::new(points().map(|point| point.1), plot.log[1], BOTTOM, TOP);
+    let named = plot.guides.iter().filter(|guide| matches!(guide, Guide::Front(..) | Guide::Ring(..))).count();
+    let entries = plot.series.len() + named;
+    svg(HEIGHT + (LINE as u32) * entries.div_ceil(2) as u32, |area| {
+        axes(area, plot, &x, &y)?;
+        for guide in &plot.guides {
+            draw_guide(area, guide, &x, &y)?;
+        }
+        let mut names = Names::default();
+        for series in &plot.series {
+            let at: Vec<(i32, i32)> = series.points.iter().map(|(px, py, _)| (x.at(*px), y.at(*py))).collect();
+            if series.joined {
+                line(area, at.clone(), &series.colour, 1)?;
+            }
+            at.iter().try_for_each(|at| mark(area, series, *at))?;
+            names.taken.extend(at.iter().map(|(x, y)| [x - 5, y - 5, x + 5, y + 5]));
+        }
+        for series in &plot.series {
+            for (px, py, name) in &series.points {
+                names.draw(area, name, &series.colour, (x.at(*px), y.at(*py)))?;
+            }
+        }
+        legend(area, plot)
+    })
+}
+
+fn line(area: &Area, points: Vec<(i32, i32)>, colour: &RGBColor, width: u32) -> Result<()> {
+    area.draw(&PathElement::new(points, colour.stroke_width(width)))?;
+    Ok(())
+}
+
+fn axes(area: &Area, plot: &Scatter, x: &Axis, y: &Axis) -> Result<()> {
+    for tick in x.ticks() {
+        let at = x.at(tick);
+        line(area, vec![(at, TOP), (at, BOTTOM)], &GRID, 1)?;
+        note(area, &plot.ticks[0](tick), (at, BOTTOM + 5), HPos::Center, VPos::Top)?;
+    }
+    for tick in y.ticks() {
+        let at = y.at(tick);
+        line(area, vec![(LEFT, at), (RIGHT, at)], &GRID, 1)?;
+        note(area, &plot.ticks[1](tick), (LEFT - 5, at), HPos::Right, VPos::Center)?;
+    }
+    line(area, vec![(LEFT, TOP), (LEFT, BOTTOM), (RIGHT, BOTTOM)], &INK, 1)?;
+    let middle = (LEFT + RIGHT) / 2;
+    area.draw_text(&plot.x, &label(SMALL + 1, &INK, HPos::Center, VPos::Top), (middle, BOTTOM + 24))?;
+    let upright = label(SMALL + 1, &INK, HPos::Center, VPos::Top).transform(FontTransform::Rotate270);
+    area.draw_text(&plot.y, &upright, (2, (TOP + BOTTOM) / 2))?;
+    Ok(())
+}
+
+fn draw_guide(area: &Area, guide: &Guide, x: &Axis, y: &Axis) -> Result<()> {
+    match guide {
+        Guide::X(value, name) => {
+            let at = x.at(*value);
+            line(area, vec![(at, TOP), (at, BOTTOM)], &LIMIT, 2)?;
+            // On the side that has room.
+            let (h, at) = if at > (LEFT + RIGHT) / 2 { (HPos::Right, at - 4) } else { (HPos::Left, at + 4) };
+            area.draw_text(name, &label(SMALL, &LIMIT, h, VPos::Top), (at, TOP))?;
+        }
+        Guide::Ring((px, py), _) => {
+            area.draw(&Circle::new((x.at(*px), y.at(*py)), 9, INK.stroke_width(2)))?;
+        }
+        Guide::Front(points, _) => {
+            let mut steps: Vec<(i32, i32)> = Vec::new();
+            for &(px, py) in points {
+                let at = (x.at(px), y.at(py));
+                steps.extend(steps.last().map(|last| (at.0, last.1)));
+                steps.push(at);
+            }
+            steps.extend(steps.last().map(|last| (RIGHT, last.1)));
+            line(area, steps, &INK, 2)?;
+        }
+    }
+    Ok(())
+}
+
+/// Names beside marks, each where there is room; where there is none it is left out.
+#[derive(Default)]
+struct Names {
+    /// Left, top, right, bottom of marks and names.
+    taken: Vec<[i32; 4]>,
+}
+
+impl Names {
+    fn draw(&mut self, area: &Area, name: &str, colour: &RGBColor, (x, y): (i32, i32)) -> Result<()> {
+        // Digits are about half as wide as they are high.
+        let (width, height) = (7 * name.chars().count() as i32, 13);
+        let corners = [(x + 6, y - 13), (x - 6 - width, y - 13), (x + 6, y + 1), (x - 6 - width, y + 1)];
+        let free = |(left, top): &(i32, i32)| {
+            let own = [*left, *top, left + width, top + height];
+            let apart =
+                |other: &[i32; 4]| own[2] <= other[0] || other[2] <= own[0] || own[3] <= other[1] || other[3] <= own[1];
+            own[0] > LEFT && own[2] < RIGHT + 10 && own[1] > 0 && own[3] < BOTTOM && self.taken.iter().all(apart)
+        };
+        let Some((left, top)) = corners.into_iter().find(free).filter(|_| !name.is_empty()) else { return Ok(()) };
+        self.taken.push([left, top, left + width, top + height]);
+        area.draw_text(name, &label(SMALL - 1, colour, HPos::Left, VPos::Top), (left, top))?;
+        Ok(())
+    }
+}
+
+fn mark(area: &Area, series: &Series, (x, y): (i32, i32)) -> Result<()> {
+    let fill = series.colour.filled();
+    let polygon = |points: Vec<(i32, i32)>| Polygon::new(points, fill);
+    match series.shape {
+        0 => area.draw(&Circle::new((x, y), 5, fill))?,
+        1 => area.draw(&Rectangle::new([(x - 4, y - 4), (x + 4, y + 4)], fill))?,
+        2 => area.draw(&polygon(vec![(x, y - 6), (x - 5, y + 4), (x + 5, y + 4)]))?,
+        _ => area.draw(&polygon(vec![(x, y - 6), (x - 6, y), (x, y + 6), (x + 6, y)]))?,
+    }
+    Ok(())
+}
+
+fn legend(area: &Area, plot: &Scatter) -> Result<()> {
+    let place = |index: usize| {
+        let column = (index % 2) as i32 * (WIDTH as i32 / 2 - 6);
+        (16 + column, HEIGHT as i32 + LINE * (index / 2) as i32 + 4)
+    };
+    for (index, series) in plot.series.iter().enumerate() {
+        let (x, y) = place(index);
+        mark(area, series, (x, y))?;
+        note(area, &series.name, (x + 12, y), HPos::Left, VPos::Center)?;
+    }
+    let named = plot.guides.iter().filter_map(|guide| match guide {
+        Guide::Front(_, name) => Some((name, false)),
+        Guide::Ring(_, name) => Some((name, true)),
+        Guide::X(..) => None,
+    });
+    for ((name, is_ring), index) in named.zip(plot.series.len()..) {
+        let (x, y) = place(index);
+        match is_ring {
+            true => area.draw(&Circle::new((x, y), 7, INK.stroke_width(2)))?,
+            false => line(area, vec![(x - 8, y), (x + 8, y)], &INK, 2)?,
+        }
+        note(area, name, (x + 12, y), HPos::Left, VPos::Center)?;
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn ticks_are_round_and_inside() {
+        let linear = Axis::new([0.0, 93.0].into_iter(), false, 0, 100);
+        assert_eq!(linear.ticks(), [0.0, 20.0, 40.0, 60.0, 80.0]);
+        let log = Axis::new([1e-5, 3.0].into_iter(), true, 0, 100);
+        let ticks: Vec<i32> = log.ticks().iter().map(|tick| tick.log10().round() as i32).collect();
+        assert_eq!(ticks, [-5, -4, -3, -2, -1, 0]);
+        assert_eq!((log.at(1e-9), log.at(1e9)), (0, 100));
+    }
+
+    #[test]
+    fn nothing_to_show_is_an_empty_plot() {
+        let plot = Scatter {
+            x: "t".into(),
+            y: "e".into(),
+            log: [true, true],
+            ticks: [|v| v.to_string(); 2],
+            series: vec![],
+            guides: vec![],
+        };
+        assert!(scatter(&plot).unwrap().contains("</svg>"));
+    }
+}

@@ -1,0 +1,149 @@
+//! `dermis report`: measures, puts the sections together, writes the files.
+
+use std::path::{Path, PathBuf};
+use std::thread::available_parallelism;
+
+use anyhow::Result;
+use clap::{value_parser, Args};
+use dermis_golden::partition::Case;
+use dermis_golden::scene::{Condition, Scene};
+
+use super::document::{Document, Section};
+use super::measure::jobs::Interrupt;
+use super::measure::{clock, machine, measure, sweep, Measured, Options, SweepPoint};
+use super::save::save;
+use super::sections::{
+    choice, choose, fields, frames, paper, published, ratios, resources, search, stages, sweeps, time, Choice,
+};
+
+/// Drawn frames of a sweep, beside the shipped ones; quick and full.
+const SWEEP_FRAMES: [u32; 2] = [0, 24];
+
+/// Arguments of `dermis report`.
+#[derive(Args, Debug)]
+#[command(after_help = "Examples:
+  dermis report                                      all built-in scenes, minutes
+  dermis report --quick                              fewer frames and co-simulations, under two minutes
+  dermis report sensor-1 eight-by-eight --quick --out target/small-report
+  dermis report --paper                              the paper's figures and tables by their numbers
+
+Writes report.html (one file, opens offline), report.md, report.json, report-tables/*.csv and report-pictures/*.svg;
+with --paper the same named paper.")]
+pub struct Arguments {
+    /// Built-in names or paths of scenes with shipped frames; without any all built-in ones.
+    scenes: Vec<String>,
+    /// Folder for the files; without it <build-dir>/report.
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
+    /// Fewer drawn frames, sweeps and co-simulations; leaves out subarrays of more than 1200 taxels.
+    #[arg(long)]
+    quick: bool,
+    /// The paper's figures by number, under its centroid condition, in place of the report.
+    #[arg(long)]
+    paper: bool,
+    /// Cases prepared at a time; without it as many as there are processors. Times are taken one after the other.
+    #[arg(long, value_name = "N", value_parser = value_parser!(u16).range(1..=64))]
+    jobs: Option<u16>,
+}
+
+/// Runs the command: the path of the page, and whether all hardware equalled its model.
+///
+/// # Errors
+/// A scene that cannot be loaded or measured, no Verilator, files that cannot be written, an interruption.
+pub fn run(arguments: &Arguments, build: &Path) -> Result<(String, bool)> {
+    let names: Vec<String> = match &arguments.scenes[..] {
+        [] => Scene::builtin_names().into_iter().map(str::to_owned).collect(),
+        named => named.to_vec(),
+    };
+    let scenes = names.iter().map(|name| Scene::load(name)).collect::<Result<Vec<_>, _>>()?;
+    let processors = available_parallelism().map_or(1, usize::from);
+    let options = Options {
+        quick: arguments.quick,
+        jobs: arguments.jobs.map_or(processors, usize::from),
+        build: build.to_owned(),
+        condition: if arguments.paper { Condition::BothSigns } else { Condition::default() },
+        simulate: !arguments.paper,
+        interrupt: Interrupt::of_signals()?,
+    };
+    let mut cases: Vec<Case> = (0..4).filter_map(Case::numbered).collect();
+    if !arguments.paper {
+        cases.push(Case::Contacts);
+    }
+    let measured = measure(&scenes, &cases, &options)?;
+    let document = match arguments.paper {
+        true => Document {
+            name: "paper",
+            title: "Dermis: the paper's figures by number".into(),
+            intro: intro(&measured, &options),
+            sections: paper(&measured, &options)?,
+        },
+        false => Document {
+            name: "report",
+            title: "Dermis: error against run time".into(),
+            intro: intro(&measured, &options),
+            sections: sections(&measured, &options)?,
+        },
+    };
+    options.interrupt.check()?;
+    let out = arguments.out.clone().unwrap_or_else(|| build.join("report"));
+    let page = save(&document, &out)?;
+    let verdicts = measured.iter().filter_map(|m| m.integers.as_ref().ok()?.equal);
+    Ok((format!("{}\n", page.display()), verdicts.clone().all(|equal| equal)))
+}
+
+fn sections(measured: &[Measured], options: &Options) -> Result<Vec<Section>> {
+    let choices = choose(measured, options)?;
+    Ok(vec![
+        choice(measured, &choices),
+        time(measured)?,
+        published(measured),
+        stages(measured, &choices)?,
+        fields(measured, &choices)?,
+        search(measured)?,
+        ratios(measured)?,
+        sweeps(&all_sweeps(measured, &choices, options)?)?,
+        resources(measured, &choices, options)?,
+    ])
+}
+
+/// The sweeps of the scenes that have hardware, each in its chosen case, with the number of frames.
+fn all_sweeps(measured: &[Measured], choices: &[Choice], options: &Options) -> Result<Vec<(Vec<SweepPoint>, usize)>> {
+    let kept = if options.quick { 1 } else { choices.len() };
+    let chosen = choices.iter().map(|choice| (&measured[choice.index].scene, choice.kind)).take(kept);
+    chosen
+        .map(|(scene, kind)| {
+            let frames = frames(scene, kind, SWEEP_FRAMES[usize::from(!options.quick)])?;
+            Ok((sweep(scene, &frames, options)?, frames.len()))
+        })
+        .collect()
+}
+
+/// Where the figures come from.
+fn intro(measured: &[Measured], options: &Options) -> Vec<String> {
+    let mut intro = vec![machine()];
+    if let Some((m, integers)) = measured.iter().find_map(|m| Some((m, m.integers.as_ref().ok()?))) {
+        let (board, clock) = (&integers.model.board, clock(&integers.model.board, &m.scene));
+        intro.push(format!(
+            "Hardware: cycles from the first input beat to the last output beat, over {} MHz ({} of {}).",
+            clock.MHz, clock.origin, board.description
+        ));
+    }
+    if options.quick {
+        intro.push(
+            "Quick variant: few drawn frames, hardware co-simulated for sensor-1 and eight-by-eight in case 0 (else the \
+             bit-true model's cycles), no subarrays above 1200 taxels, one sweep. The full one: dermis report."
+                .into(),
+        );
+    }
+    if !options.simulate {
+        intro.push(
+            "Hardware's cycles are the bit-true model's, which dermis cosim holds equal to the hardware's.".into(),
+        );
+    }
+    intro.push(
+        "Frames are those shipped in golden/data/frames, with known forces; every figure was measured in this run, but for \
+         the published ones, which stand in golden/data/paper."
+            .into(),
+    );
+    intro
+}

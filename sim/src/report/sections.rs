@@ -1,0 +1,53 @@
+//! Sections of the report, one file each, in the order of use to a reader.
+
+mod choice;
+mod fields;
+mod paper;
+mod published;
+mod ratios;
+mod resources;
+mod search;
+mod stages;
+mod sweeps;
+mod time;
+
+pub use choice::{choice, choose, frames, Choice};
+pub use fields::fields;
+pub use paper::paper;
+pub use published::published;
+pub use ratios::ratios;
+pub use resources::resources;
+pub use search::search;
+pub use stages::stages;
+pub use sweeps::sweeps;
+pub use time::time;
+
+use dermis_golden::frame::Frame;
+use dermis_golden::partition::Case;
+
+use super::measure::{Kind, Measured};
+
+/// The scenes measured, each once, in order.
+fn scenes(measured: &[Measured]) -> Vec<&str> {
+    let mut names: Vec<&str> = measured.iter().map(|m| m.scene.name.as_str()).collect();
+    names.dedup();
+    names
+}
+
+/// A scene in a case, where it was measured.
+fn find<'a>(measured: &'a [Measured], scene: &str, case: Case) -> Option<&'a Measured> {
+    measured.iter().find(|m| m.scene.name == scene && m.scene.partition.case == case)
+}
+
+/// A case with its grid, as readers know it: `1 (2×2)`.
+fn case_text(case: Case) -> String {
+    case.grid().map_or(case.to_string(), |grid| format!("{case} ({}×{})", grid.rows, grid.cols))
+}
+
+/// The frame of a scene that pictures of a kind show: the Hertz contact where there is one, else the first of the kind.
+fn shown(measured: &Measured, kind: Kind) -> usize {
+    let of_kind = |(_, frame): &(usize, &Frame)| Kind::of(frame) == kind;
+    let frames = || measured.frames.iter().enumerate().filter(of_kind);
+    let hertz = frames().find(|(_, frame)| frame.id.ends_with("hertz"));
+    hertz.or(frames().next()).map_or(0, |(index, _)| index)
+}

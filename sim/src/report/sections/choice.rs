@@ -1,0 +1,296 @@
+//! Which partition and which format to take for each sensor, and what that costs: derived from the measured figures,
+//! for frames of one contact and of several.
+//!
+//! Case: of those whose hardware fits the board within 1 ms, the smallest median shear error; of those within a tenth
+//! and 0.2 % of it, the fastest. Format: of the candidates in that case, the fewest block RAMs whose median shear error
+//! is within a quarter and 0.5 % of the best candidate's.
+
+use anyhow::Result;
+use dermis_golden::fixed::Model;
+use dermis_golden::frame::Frame;
+use dermis_golden::scene::Scene;
+use dermis_hdl::generate;
+use dermis_hdl::usage::{total, Usage};
+
+use super::super::document::{count, decimal, none, percent, seconds, words, Cell, Item, Section, Table};
+use super::super::measure::{clock, formats, jobs::parallel, Clock, Engine, FormatRow, Kind, Measured, Options};
+use super::super::BUDGET_US;
+use super::{case_text, scenes};
+use crate::fresh::{Fresh, Shapes};
+
+/// How much worse than the best a faster case may be: a share of the error, and a share of the force.
+const NEAR_CASE: [f64; 2] = [1.1, 0.002];
+/// How much worse than the best a cheaper format may be.
+const NEAR_FORMAT: [f64; 2] = [1.25, 0.005];
+/// Drawn frames on which formats are compared, beside the shipped ones; quick and full.
+const DRAWN: [u32; 2] = [4, 32];
+
+/// The choice for one scene and kind of frame.
+#[derive(Clone, Debug)]
+pub struct Choice {
+    /// Index of the scene in its case among the measured.
+    pub index: usize,
+    /// The frames it is for.
+    pub kind: Kind,
+    /// The format taken.
+    pub format: FormatRow,
+    /// All formats tried, the one taken among them.
+    pub formats: Vec<FormatRow>,
+    /// What the design takes of its board in that format.
+    pub usage: Usage,
+    /// The clock.
+    pub clock: Clock,
+    /// Whether these very cycles were co-simulated and equal to the model's.
+    pub simulated: bool,
+}
+
+/// Chooses for every scene and kind of frame for which some hardware fits.
+///
+/// # Errors
+/// An interruption; a frame that is not its scene's.
+pub fn choose(measured: &[Measured], options: &Options) -> Result<Vec<Choice>> {
+    let kinds = |scene| [Kind::One, Kind::Several].map(|kind| (scene, kind));
+    let best = scenes(measured).into_iter().flat_map(kinds);
+    let best = best.filter_map(|(scene, kind)| Some((best_case(measured, scene, kind)?, kind))).collect();
+    parallel("formats", best, options, |(index, kind)| choose_format(measured, index, kind, options))
+}
+
+/// The measured case of a scene to take.
+fn best_case(measured: &[Measured], scene: &str, kind: Kind) -> Option<usize> {
+    let own = measured.iter().enumerate().filter(|(_, m)| m.scene.name == scene);
+    let point = |(index, m): (usize, &Measured)| {
+        let point = m.point_over(Engine::Hardware, |frame| Kind::of(frame) == kind)?;
+        (point.seconds <= 1e-6 * BUDGET_US as f64).then_some((index, point.tangential?, point.seconds))
+    };
+    let all: Vec<(usize, f64, f64)> = own.filter_map(point).collect();
+    let least = all.iter().map(|(_, error, _)| *error).fold(f64::INFINITY, f64::min);
+    let near = all.into_iter().filter(|(_, error, _)| *error <= NEAR_CASE[0] * least + NEAR_CASE[1]);
+    near.min_by(|a, b| a.2.total_cmp(&b.2)).map(|(index, _, _)| index)
+}
+
+fn choose_format(measured: &[Measured], index: usize, kind: Kind, options: &Options) -> Result<Choice> {
+    let own = &measured[index];
+    let formats = formats(&own.scene, &frames(&own.scene, kind, DRAWN[usize::from(!options.quick)])?)?;
+    let format = cheapest(&formats).cloned();
+    let format = format.ok_or_else(|| anyhow::anyhow!("scene {}: no format fits its board", own.scene.name))?;
+    let model = Model::new(&with_format(&own.scene, format.bits))?;
+    let usage = total(&generate(&model)?.usage);
+    let simulated = model.scene == own.scene
+        && own.integers.as_ref().is_ok_and(|i| i.equal == Some(true) && i.cycles == format.cycles);
+    Ok(Choice { index, kind, clock: clock(&model.board, &model.scene), usage, formats, format, simulated })
+}
+
+/// The cheapest format near the best.
+fn cheapest(formats: &[FormatRow]) -> Option<&FormatRow> {
+    let error = |row: &FormatRow| row.tangential.unwrap_or(f64::INFINITY);
+    let least = formats.iter().map(error).fold(f64::INFINITY, f64::min);
+    let near = formats.iter().filter(|row| error(row) <= NEAR_FORMAT[0] * least + NEAR_FORMAT[1]);
+    // Of equals the finer one, which comes later.
+    near.rev().min_by_key(|row| row.block_rams)
+}
+
+/// The shipped frames of a kind and `drawn` ones beside them; none drawn where contacts of one to two thicknesses are no
+/// wider than a taxel.
+///
+/// # Errors
+/// A stress that is not finite.
+pub fn frames(scene: &Scene, kind: Kind, drawn: u32) -> Result<Vec<Frame>> {
+    let mut frames = Frame::shipped(scene);
+    frames.retain(|frame| Kind::of(frame) == kind);
+    let sensor = &scene.sensor;
+    if sensor.pitch_x_mm.max(sensor.pitch_y_mm) <= 2.0 * sensor.thickness_mm {
+        let contacts = if kind == Kind::One { vec![1] } else { vec![2, 3] };
+        let fresh = Fresh { frames: drawn, contacts, shapes: Shapes::Elliptic, touching: false, seed: 1 };
+        frames.extend(fresh.draw(scene)?);
+    }
+    Ok(frames)
+}
+
+fn with_format(scene: &Scene, bits: [u32; 4]) -> Scene {
+    let mut scene = scene.clone();
+    let fixed = &mut scene.fixed;
+    [fixed.input_bits, fixed.inverse_bits, fixed.data_bits, fixed.coef_bits] = bits;
+    scene
+}
+
+/// The section.
+pub fn choice(measured: &[Measured], choices: &[Choice]) -> Section {
+    let head = [
+        "sensor",
+        "array",
+        "contacts",
+        "take case",
+        "bits: input / Cz⁺ / data / A",
+        "shear error",
+        "normal error",
+        "cycles",
+        "µs",
+        "block RAMs",
+        "multipliers",
+        "LUTs, est.",
+        "cycles from",
+    ];
+    let mut rows: Vec<Vec<Cell>> = choices.iter().map(|choice| row(measured, choice)).collect();
+    let chosen = |name: &&str| choices.iter().any(|choice| measured[choice.index].scene.name == *name);
+    for name in scenes(measured).into_iter().filter(|name| !chosen(name)) {
+        let mut row = vec![words(name), none(), none(), words("no hardware fits")];
+        row.resize(head.len(), none());
+        rows.push(row);
+    }
+    let origin = choices.first().map_or("design clock", |choice| choice.clock.origin);
+    let caption = format!(
+        "What to take and what it costs, with the share of the board. Errors of the resultant: median over shipped and \
+         drawn frames; time: cycles over the {origin}"
+    );
+    let rule = "Case: smallest median shear error on the shipped frames among the cases whose hardware fits the board \
+                within 1 ms; among cases within a tenth (and 0.2 %) of it the fastest. Format: fewest block RAMs among \
+                the candidates within a quarter (and 0.5 %) of the best candidate. Write the case into [partition] case, \
+                the bits into [fixed] input_bits, inverse_bits, data_bits, coef_bits. Several contacts with different \
+                shear suit no rectangle: in software [partition] case = \"contacts\" gives each its own μ; its error and \
+                time on a CPU stand below where it was measured.";
+    let formats =
+        choices.iter().flat_map(|choice| choice.formats.iter().map(|row| format_row(choice.kind, row, &choice.format)));
+    let format_head = [
+        "sensor",
+        "contacts",
+        "case",
+        "input bits",
+        "Cz⁺ bits",
+        "data bits",
+        "A bits",
+        "shear error, median",
+        "nine of ten below",
+        "normal error, median",
+        "cycles",
+        "block RAMs",
+        "multipliers",
+        "taken",
+    ];
+    let formats =
+        Table::new("formats", "Formats tried in the chosen case, bit-true model", &format_head, formats.collect());
+    Section {
+        id: "choice",
+        title: "Which partition and format to take".into(),
+        items: vec![
+            Item::Table(Table::new("choice", caption, &head, rows)),
+            Item::Text(rule.into()),
+            Item::Table(compared(measured)),
+            Item::Table(formats.shut()),
+        ],
+    }
+}
+
+fn row(measured: &[Measured], choice: &Choice) -> Vec<Cell> {
+    let own = &measured[choice.index];
+    let (sensor, format, usage) = (&own.scene.sensor, &choice.format, &choice.usage);
+    let board = own.integers.as_ref().ok().map(|integers| &integers.model.board);
+    let share = |n: usize, of: Option<u32>| {
+        let share = of.map_or(String::new(), |of| format!(" ({:.0} %)", 100.0 * n as f64 / f64::from(of)));
+        Cell { shown: format!("{n}{share}"), number: Some(n as f64) }
+    };
+    let seconds = choice.clock.seconds(format.cycles);
+    let [input, inverse, data, coef] = format.bits;
+    vec![
+        words(own.scene.name.clone()),
+        words(format!("{}×{}", sensor.rows, sensor.cols)),
+        words(choice.kind.name()),
+        words(case_text(own.scene.partition.case)),
+        words(format!("{input} / {inverse} / {data} / {coef}")),
+        percent(format.tangential),
+        percent(format.normal),
+        count(format.cycles),
+        decimal(Some(1e6 * seconds), 2),
+        share(usage.block_rams, board.map(|board| board.block_rams)),
+        share(usage.multipliers, board.map(|board| board.multipliers)),
+        share(usage.luts, board.map(|board| board.luts)),
+        words(if choice.simulated { "co-simulation" } else { "bit-true model" }),
+    ]
+}
+
+/// Every case of a sensor beside the others, on the shipped frames of each kind.
+fn compared(measured: &[Measured]) -> Table {
+    let cases = ["0", "1", "2", "3", "contacts"];
+    let head = [
+        "sensor",
+        "contacts",
+        "0: shear error",
+        "time",
+        "1: shear error",
+        "time",
+        "2: shear error",
+        "time",
+        "3: shear error",
+        "time",
+        "case contacts, CPU: shear error",
+        "time",
+    ];
+    let mut rows = Vec::new();
+    for scene in scenes(measured) {
+        for kind in [Kind::One, Kind::Several] {
+            let own = || measured.iter().filter(|m| m.scene.name == scene);
+            if !own().any(|m| m.frames.iter().any(|frame| Kind::of(frame) == kind)) {
+                continue;
+            }
+            let mut row = vec![words(scene), words(kind.name())];
+            for case in cases {
+                let m = own().find(|m| m.scene.partition.case.to_string() == case);
+                let engine = if case == "contacts" { Engine::Golden } else { Engine::Hardware };
+                let point = m.and_then(|m| m.point_over(engine, |frame| Kind::of(frame) == kind));
+                let missing = if m.is_some() { "does not fit" } else { "–" };
+                row.extend(match point {
+                    Some(point) => [percent(point.tangential), seconds(Some(point.seconds))],
+                    None => [words(missing), none()],
+                });
+            }
+            rows.push(row);
+        }
+    }
+    let caption =
+        "The cases compared: median shear error on the shipped frames of hardware in cases 0 to 3, of the golden \
+                   model in case contacts, with the time of a frame";
+    Table::new("cases", caption, &head, rows)
+}
+
+fn format_row(kind: Kind, row: &FormatRow, taken: &FormatRow) -> Vec<Cell> {
+    let [input, inverse, data, coef] = row.bits.map(|bits| count(u64::from(bits)));
+    vec![
+        words(row.scene.clone()),
+        words(kind.name()),
+        words(row.case.clone()),
+        input,
+        inverse,
+        data,
+        coef,
+        percent(row.tangential),
+        percent(row.ninety),
+        percent(row.normal),
+        count(row.cycles),
+        count(row.block_rams as u64),
+        count(row.multipliers as u64),
+        words(if row.bits == taken.bits { "yes" } else { "" }),
+    ]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_cheapest_format_near_the_best() {
+        let row = |input: u32, error: f64, block_rams: usize| FormatRow {
+            scene: "s".into(),
+            case: "0".into(),
+            bits: [input, 24, 18, 18],
+            tangential: Some(error),
+            ninety: None,
+            normal: None,
+            cycles: 1,
+            block_rams,
+            multipliers: 1,
+        };
+        let taken = |rows: &[FormatRow]| cheapest(rows).map(|row| row.bits[0]);
+        assert_eq!(taken(&[row(16, 0.05, 10), row(18, 0.016, 20), row(20, 0.01, 30)]), Some(18));
+        assert_eq!(taken(&[row(16, 0.01, 30), row(20, 0.01, 30)]), Some(20));
+        assert_eq!(taken(&[]), None);
+    }
+}

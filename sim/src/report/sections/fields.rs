@@ -1,0 +1,65 @@
+//! Stress and forces of a frame: truth, golden and bit-true model side by side on one scale.
+
+use anyhow::Result;
+use dermis_golden::frame::Forces;
+
+use super::super::document::{Item, Picture, Section};
+use super::super::measure::Measured;
+use super::super::pictures::{force_field, stress_map, Outline};
+use super::{case_text, shown, Choice};
+
+/// The section.
+///
+/// # Errors
+/// A picture that cannot be written.
+pub fn fields(measured: &[Measured], choices: &[Choice]) -> Result<Section> {
+    let mut items = vec![Item::Text(
+        "Stress under the taxels with the centroids of compression (+) and tension (−) of each subarray, then forces per \
+         taxel: normal by colour, tangential by arrows; truth, golden and bit-true model on one scale. Row 0 is on top; x \
+         runs to the right, y down. Colours follow the square root of the value, so that tension shows."
+            .into(),
+    )];
+    for choice in choices {
+        let m = &measured[choice.index];
+        items.push(Item::Pictures(field_pictures(m, shown(m, choice.kind), &format!("field-{}", choice.kind.name()))?));
+    }
+    Ok(Section { id: "fields", title: "Stress and forces".into(), items })
+}
+
+/// The pictures of one frame: stress, truth where it is known, golden, bit-true where there is one.
+pub(super) fn field_pictures(m: &Measured, index: usize, prefix: &str) -> Result<Vec<Picture>> {
+    let (frame, golden) = (&m.frames[index], &m.golden[index]);
+    let sensor = &m.scene.sensor;
+    let fixed = m.integers.as_ref().ok().map(|integers| &integers.results[index].forces_N);
+    let fields: Vec<(&str, &Forces)> = [
+        frame.cell_forces_N.as_ref().map(|forces| ("truth", forces)),
+        Some(("golden", &golden.forces_N)),
+        fixed.map(|forces| ("bit-true", forces)),
+    ]
+    .into_iter()
+    .flatten()
+    .collect();
+    // One scale, of the truth where it is known: a result that is far off must not shrink the others.
+    let scale = fields[0].1;
+    let peaks = [
+        scale.fz.iter().fold(0.0, |peak: f64, f| peak.max(f.abs())),
+        scale.fx.iter().zip(&scale.fy).fold(0.0, |peak: f64, (x, y)| peak.max(x.hypot(*y))),
+    ];
+    let what = format!("{}, case {}, frame {}", m.scene.name, case_text(m.scene.partition.case), frame.id);
+    let id = |name: &str| format!("{prefix}-{}-case-{}-{name}", m.scene.name, m.scene.partition.case);
+    let outline = Outline { subarrays: &golden.subarrays, centroids: true };
+    let mut pictures = vec![Picture {
+        id: id("stress"),
+        caption: format!("{what}: stress"),
+        svg: stress_map(sensor, &frame.stress_MPa, outline)?,
+    }];
+    let outline = Outline { centroids: false, ..outline };
+    for (name, forces) in fields {
+        pictures.push(Picture {
+            id: id(name),
+            caption: format!("{what}: forces, {name}"),
+            svg: force_field(sensor, forces, peaks, outline)?,
+        });
+    }
+    Ok(pictures)
+}

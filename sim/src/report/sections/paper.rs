@@ -1,0 +1,279 @@
+//! The paper by number: Figs. 1 and 3 to 7, Table 2, the operation counts of its section 4, and whether its conclusions
+//! hold here.
+
+use std::time::Instant;
+
+use anyhow::Result;
+use dermis_golden::fixed::schedule::vectors;
+use dermis_golden::frame::Frame;
+use dermis_golden::matrices::store;
+use dermis_golden::paper::conclusions;
+use dermis_golden::partition::Case;
+use dermis_golden::reconstruct::Golden;
+
+use super::super::document::{count, none, percent, seconds, words, Cell, Item, Picture, Section, Table};
+use super::super::measure::{Engine, Measured, Options};
+use super::super::pictures::{bars, force_field, stress_map, Bars, Outline};
+use super::super::style::SERIES;
+use super::fields::field_pictures;
+use super::published::{table_two, times};
+use super::{case_text, find, ratios, scenes};
+use crate::compare::median;
+use crate::progress::Progress;
+
+/// Figures of forces: number, sensor, case, and the shipped frame that stands for the paper's.
+const FIELDS: [(&str, &str, i64, &str); 8] = [
+    ("Fig. 4a", "sensor-1", 2, "S1-hs-hertz"),
+    ("Fig. 4b", "sensor-2", 3, "S2-hs-ring"),
+    ("Fig. 5a", "sensor-3", 0, "S3-hs-three"),
+    ("Fig. 5b", "sensor-3", 1, "S3-hs-three"),
+    ("Fig. 6a", "sensor-4", 0, PLANTAR),
+    ("Fig. 6b", "sensor-4", 1, PLANTAR),
+    ("Fig. 6c", "sensor-4", 2, PLANTAR),
+    ("Fig. 6d", "sensor-4", 3, PLANTAR),
+];
+const PLANTAR: &str = "s4-plantar-two-feet";
+/// Repeats of each case, as in Fig. 7.
+const REPEATS: usize = 3;
+
+/// All sections.
+///
+/// # Errors
+/// A picture that cannot be written, a frame that cannot be reconstructed, an interruption.
+pub fn paper(measured: &[Measured], options: &Options) -> Result<Vec<Section>> {
+    let mut sections = vec![figure_1(measured)?, figure_3(measured)?];
+    for (id, title, from) in
+        [("fig-4", "Fig. 4", "Fig. 4"), ("fig-5", "Fig. 5", "Fig. 5"), ("fig-6", "Fig. 6", "Fig. 6")]
+    {
+        sections.push(figure_of_fields(measured, id, title, from)?);
+    }
+    sections.push(figure_7(measured, options)?);
+    let one = |id, title: &str, table| Section { id, title: title.into(), items: vec![Item::Table(table)] };
+    sections.push(one("table-2-section", "Table 2", table_two(measured)));
+    sections.push(one("published", "Run times of section 4", times(measured)));
+    sections.push(Section {
+        id: "operations",
+        title: "Operation counts of section 4".into(),
+        items: vec![
+            Item::Text(
+                "The paper counts (3 n)² operations for a subarray of n taxels. Eq. 1 as printed takes 3 n² for C†b and (3 n)² \
+                 for I − C†C, in every subarray and for every candidate μ. The series in μ takes its products once: folded by \
+                 the two mirror symmetries they are n² / 4 each, and candidates cost no matrix product at all."
+                    .into(),
+            ),
+            Item::Table(operations(measured)),
+        ],
+    });
+    sections.push(one("conclusions", "Do the paper's conclusions hold?", judged(measured)));
+    Ok(sections)
+}
+
+fn figure_1(measured: &[Measured]) -> Result<Section> {
+    let mut items = vec![Item::Text(
+        "The function S of Eq. 2 as stress on 10×10 taxels. From the corner at 4 × 2 mm it spans −16 145 to 36 000 N/m²; the \
+         paper prints −36 000 to 20 912, which no origin or sign tried here gives. It is no contact: there is no true force."
+            .into(),
+    )];
+    if let Some(m) = find(measured, "sensor-1", Case::WHOLE) {
+        let frame = Frame::eq2(&m.scene.sensor);
+        let result = m.engine.run(&frame)?;
+        let outline = Outline { subarrays: &result.subarrays, centroids: true };
+        let forces = &result.forces_N;
+        let peaks = [
+            forces.fz.iter().fold(0.0, |peak: f64, f| peak.max(f.abs())),
+            forces.fx.iter().zip(&forces.fy).fold(0.0, |peak: f64, (x, y)| peak.max(x.hypot(*y))),
+        ];
+        let picture =
+            |name: &str, svg| Picture { id: format!("fig-1-{name}"), caption: format!("Fig. 1: {name}"), svg };
+        items.push(Item::Pictures(vec![
+            picture("stress", stress_map(&m.scene.sensor, &frame.stress_MPa, outline)?),
+            picture("forces", force_field(&m.scene.sensor, forces, peaks, Outline { centroids: false, ..outline })?),
+        ]));
+    }
+    Ok(Section { id: "fig-1", title: "Fig. 1: Eq. 2 on sensor 1".into(), items })
+}
+
+/// The frame that stands for the paper's on a sensor.
+fn frame_of(m: &Measured) -> usize {
+    FIELDS.iter().find(|field| field.1 == m.scene.name).map_or(0, |field| m.frame(field.3))
+}
+
+fn figure_3(measured: &[Measured]) -> Result<Section> {
+    let mut pictures = Vec::new();
+    for scene in scenes(measured).into_iter().filter(|name| FIELDS.iter().any(|field| field.1 == *name)) {
+        let own: Vec<&Measured> = measured.iter().filter(|m| m.scene.name == scene).collect();
+        pictures.push(ratios::picture(scene, &own, frame_of, "fig-3")?);
+    }
+    let text = "Both bars at zero: the centroid condition is not met, as the paper has it.";
+    let items = vec![Item::Text(text.into()), Item::Pictures(pictures)];
+    Ok(Section { id: "fig-3", title: "Fig. 3: μ per subarray and case".into(), items })
+}
+
+fn figure_of_fields(measured: &[Measured], id: &'static str, title: &str, from: &str) -> Result<Section> {
+    let mut items = Vec::new();
+    for (number, scene, case, frame) in FIELDS.iter().filter(|field| field.0.starts_with(from)) {
+        let Some(m) = Case::numbered(*case).and_then(|case| find(measured, scene, case)) else {
+            items.push(Item::Text(format!("{number}: {scene}, case {case} was not measured in this run.")));
+            continue;
+        };
+        let mut pictures = field_pictures(m, m.frame(frame), &number.to_lowercase().replace(". ", "-"))?;
+        pictures.iter_mut().for_each(|picture| picture.caption = format!("{number}: {}", picture.caption));
+        items.push(Item::Pictures(pictures));
+    }
+    Ok(Section { id, title: format!("{title}: reconstructed forces"), items })
+}
+
+/// Three repeats of everything a case takes, matrices and one frame, as the paper's times do.
+fn figure_7(measured: &[Measured], options: &Options) -> Result<Section> {
+    let own: Vec<&Measured> = measured.iter().filter(|m| m.scene.name == "sensor-4").collect();
+    let bar = Progress::steps("Fig. 7", (REPEATS * own.len()) as u64);
+    // Matrices from an earlier run would not be a measurement.
+    store::keep_in(None);
+    let mut all: Vec<[f64; REPEATS]> = Vec::new();
+    for m in &own {
+        let mut repeats = [0.0; REPEATS];
+        for (k, repeat) in repeats.iter_mut().enumerate() {
+            options.interrupt.check()?;
+            let start = Instant::now();
+            Golden::new(&m.scene)?.run(&m.frames[m.frame(PLANTAR)])?;
+            *repeat = start.elapsed().as_secs_f64();
+            bar.at((REPEATS * all.len() + k + 1) as u64);
+        }
+        all.push(repeats);
+    }
+    let published = dermis_golden::paper::run_times();
+    let printed = |m: &Measured| {
+        let same =
+            |p: &&dermis_golden::paper::RunTime| p.sensor.contains("48x48") && p.case == Some(m.scene.partition.case);
+        published.iter().find(same).map(|p| p.seconds)
+    };
+    let group = |(m, repeats): (&&Measured, &[f64; REPEATS])| {
+        let values = [printed(m)].into_iter().chain(repeats.iter().map(|s| Some(*s))).collect();
+        (format!("case {}", m.scene.partition.case), values)
+    };
+    let names = ["the paper", "first repeat", "second", "third"];
+    let plot = Bars {
+        axis: "s, matrices and one frame, logarithmic".into(),
+        groups: own.iter().zip(&all).map(group).collect(),
+        series: names.iter().zip(&SERIES).map(|(name, colour)| ((*name).to_owned(), *colour)).collect(),
+        text: super::super::document::seconds_text,
+        limit: None,
+        log: true,
+    };
+    let picture = Picture {
+        id: "fig-7".into(),
+        caption: "Fig. 7: time of a 48×48 frame, golden model, matrices computed anew".into(),
+        svg: bars(&plot)?,
+    };
+    let middle = |repeats: &[f64; REPEATS]| median(repeats.to_vec());
+    let whole = own.iter().zip(&all).find(|(m, _)| m.scene.partition.case == Case::WHOLE);
+    let faster = |whole: Option<f64>, own: Option<f64>| match (whole, own) {
+        (Some(whole), Some(own)) => {
+            Cell { shown: format!("{} ×", super::time::short(whole / own)), number: Some(whole / own) }
+        }
+        _ => none(),
+    };
+    let rows = own.iter().zip(&all).map(|(m, repeats)| {
+        let mut row = vec![words(case_text(m.scene.partition.case)), seconds(printed(m))];
+        row.extend(repeats.map(|s| seconds(Some(s))));
+        row.push(faster(whole.and_then(|(m, _)| printed(m)), printed(m)));
+        row.push(faster(whole.and_then(|(_, repeats)| middle(repeats)), middle(repeats)));
+        let frame = |engine| m.point(engine).map(|point| point.seconds);
+        row.extend([seconds(frame(Engine::Golden)), seconds(frame(Engine::Hardware))]);
+        row
+    });
+    let head = [
+        "case",
+        "the paper",
+        "golden, repeat 1",
+        "repeat 2",
+        "repeat 3",
+        "the paper: faster than case 0",
+        "golden: faster than case 0",
+        "golden, a frame alone",
+        "hardware, a frame",
+    ];
+    let table = Table::new("fig-7-table", "Time of a 48×48 frame", &head, rows.collect());
+    let text = "The paper's conclusion that subarrays shorten the response is the column \"faster than case 0\": theirs and ours.";
+    let items = vec![Item::Pictures(vec![picture]), Item::Text(text.into()), Item::Table(table)];
+    Ok(Section { id: "fig-7-section", title: "Fig. 7: response time, three repeats".into(), items })
+}
+
+fn operations(measured: &[Measured]) -> Table {
+    let head = [
+        "case",
+        "subarrays",
+        "n per subarray",
+        "the paper's (3 n)²",
+        "Eq. 1 per candidate, all subarrays",
+        "degree of p(μ)",
+        "ours per frame, folded, all subarrays",
+        "Eq. 1 per candidate / ours per frame",
+    ];
+    let rows = measured.iter().filter(|m| m.scene.name == "sensor-4").map(|m| {
+        let matrices = m.engine.matrices();
+        let n = matrices.sensor.taxels() as u64;
+        let parts = m.scene.sensor.taxels() as u64 / n;
+        let literal = parts * (3 * n * n + 9 * n * n);
+        // Cz⁺ once; of each v_ij beyond, one product where i or j is 0, two elsewhere.
+        let products = |degree: usize| 1 + 2 * (vectors(degree) as u64 - 1) - 2 * degree as u64;
+        let ours = parts * products(matrices.degree) * n * n / 4;
+        vec![
+            words(case_text(m.scene.partition.case)),
+            count(parts),
+            count(n),
+            Cell { shown: format!("{}² = {}", 3 * n, 9 * n * n), number: Some((9 * n * n) as f64) },
+            count(literal),
+            count(matrices.degree as u64),
+            count(ours),
+            Cell {
+                shown: format!("{} ×", super::time::short(literal as f64 / ours as f64)),
+                number: Some(literal as f64 / ours as f64),
+            },
+        ]
+    });
+    Table::new("operations-table", "Multiplications for 48×48 taxels", &head, rows.collect())
+}
+
+/// The paper's best case per sensor beside ours.
+fn judged(measured: &[Measured]) -> Table {
+    let head = [
+        "sensor",
+        "the paper's best",
+        "shear error there",
+        "best here",
+        "shear error there",
+        "best of the cut cases here",
+        "shear error there",
+        "holds",
+        "the paper's words",
+    ];
+    let rows = conclusions().into_iter().map(|conclusion| {
+        let name = format!("sensor-{}", conclusion.sensor);
+        let own = measured.iter().filter(|m| m.scene.name == name);
+        let errors: Vec<(Case, f64)> =
+            own.filter_map(|m| Some((m.scene.partition.case, m.point(Engine::Golden)?.tangential?))).collect();
+        let least = |cut: bool| {
+            let all = errors.iter().filter(|(case, _)| !cut || *case != Case::WHOLE);
+            all.min_by(|a, b| a.1.total_cmp(&b.1)).copied()
+        };
+        let cells = |found: Option<(Case, f64)>| match found {
+            Some((case, error)) => [words(case_text(case)), percent(Some(error))],
+            None => [none(), none()],
+        };
+        let theirs = errors.iter().find(|(case, _)| *case == conclusion.best).copied();
+        // Where the paper calls a cut case best, it is compared with the other cut ones: its case 0 is the reference.
+        let cut = conclusion.best != Case::WHOLE;
+        let holds = least(cut).is_some_and(|(case, _)| case == conclusion.best);
+        let mut row = vec![words(name)];
+        row.extend([words(case_text(conclusion.best)), percent(theirs.map(|(_, error)| error))]);
+        row.extend(cells(least(false)));
+        row.extend(cells(least(true)));
+        row.extend([words(if holds { "yes" } else { "no" }), words(conclusion.text)]);
+        row
+    });
+    let caption =
+        "The case the paper calls best and the one with the smallest median shear error here, under its condition, \
+                   golden model, against the true contact";
+    Table::new("judged", caption, &head, rows.collect())
+}

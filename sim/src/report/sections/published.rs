@@ -1,0 +1,106 @@
+//! Beside the paper: Table 2 and the published run times, from the files in `golden/data/paper`.
+
+use dermis_golden::errors::Errors;
+use dermis_golden::paper::{run_times, table_2, RunTime};
+use dermis_golden::partition::Case;
+use dermis_golden::sensor::Sensor;
+
+use super::super::document::{median_percent, none, percent, seconds, words, Cell, Item, Section, Table};
+use super::super::measure::{Engine, Measured};
+use super::{case_text, find};
+
+type Axis = fn(&Errors) -> Option<f64>;
+const AXES: [Axis; 3] = [|e| e.x1, |e| e.x2, |e| e.x3];
+
+/// The section.
+pub fn published(measured: &[Measured]) -> Section {
+    Section {
+        id: "published",
+        title: "Beside the published figures".into(),
+        items: vec![Item::Table(table_two(measured)), Item::Table(times(measured))],
+    }
+}
+
+/// Table 2 with ours beside it: against truth and against case 0.
+pub(super) fn table_two(measured: &[Measured]) -> Table {
+    let head = [
+        "sensor",
+        "case",
+        "paper X1",
+        "paper X2",
+        "paper X3",
+        "|X1| to truth",
+        "|X2| to truth",
+        "|X3| to truth",
+        "|X1| to case 0",
+        "|X2| to case 0",
+        "|X3| to case 0",
+        "bit-true |X1|",
+        "bit-true |X2|",
+        "bit-true |X3|",
+    ];
+    let rows = measured.iter().filter_map(|m| {
+        let number = m.scene.name.strip_prefix("sensor-")?.parse().ok()?;
+        let paper = table_2(number, m.scene.partition.case)?;
+        let whole = find(measured, &m.scene.name, Case::WHOLE);
+        let to_whole: Vec<Option<Errors>> = match whole {
+            None => Vec::new(),
+            Some(whole) => {
+                let pairs = whole.golden.iter().zip(&m.golden);
+                pairs.map(|(whole, own)| Some(Errors::new(whole.resultant_N, own.resultant_N))).collect()
+            }
+        };
+        let mut row = vec![words(m.scene.name.clone()), words(case_text(m.scene.partition.case))];
+        row.extend(paper.map(|x| percent(Some(x))));
+        for errors in [m.errors(Engine::Golden), to_whole, m.errors(Engine::Fixed)] {
+            row.extend(AXES.map(|axis| median_percent(errors.iter().map(|e| axis(e.as_ref()?).map(f64::abs)))));
+        }
+        Some(row)
+    });
+    let caption =
+        "The paper's Table 2 (sensors 1, 2: against finite elements; 3, 4: against case 0; one frame) beside the \
+                   golden and the bit-true model, median of |X| over the frames";
+    Table::new("table-2", caption, &head, rows.collect())
+}
+
+/// The published run times with ours beside them.
+pub(super) fn times(measured: &[Measured]) -> Table {
+    let head = [
+        "published for",
+        "case",
+        "published by",
+        "published",
+        "literal Eq. 1, CPU",
+        "golden, CPU",
+        "bit-true, CPU",
+        "hardware",
+        "published / golden",
+        "published / hardware",
+        "source",
+    ];
+    let rows = run_times().into_iter().map(|published| {
+        let own = measured.iter().find(|m| fits(m, &published));
+        let time = |engine: Engine| own.and_then(|m| m.point(engine)).map(|point| point.seconds);
+        let ratio = |engine: Engine| match time(engine) {
+            None => none(),
+            Some(own) => {
+                let ratio = published.seconds / own;
+                Cell { shown: format!("{} ×", super::time::short(ratio)), number: Some(ratio) }
+            }
+        };
+        let case = published.case.map_or_else(none, |case| words(case_text(case)));
+        let mut row = vec![words(published.sensor.clone()), case, words(published.system.clone())];
+        row.push(seconds(Some(published.seconds)));
+        row.extend(Engine::ALL.map(|engine| seconds(time(engine))));
+        row.extend([ratio(Engine::Golden), ratio(Engine::Hardware), words(published.source.clone())]);
+        row
+    });
+    let caption = "Published run times beside those of this run, time of a frame";
+    Table::new("run-times", caption, &head, rows.collect())
+}
+
+/// Whether a published time is for an array of this shape in this case.
+fn fits(m: &Measured, published: &RunTime) -> bool {
+    let Sensor { rows, cols, .. } = m.scene.sensor;
+    published.sensor.contains(&format!("{rows}x{cols}")) && published.case == Some(m.scene.partition.case)
+}

@@ -1,0 +1,102 @@
+//! What the chosen designs take of their board, and what was left out of them.
+
+use anyhow::Result;
+use dermis_hdl::explain::explain;
+use dermis_hdl::usage::{total, Usage, STAGES};
+
+use super::super::document::{count, words, Cell, Item, Picture, Section, Table};
+use super::super::measure::{jobs::parallel, Integers, Measured, Options};
+use super::super::pictures::{bars, Bars};
+use super::super::style::SERIES;
+use super::{case_text, Choice};
+
+/// The section; the quick variant tells what was left out for the first scene alone.
+///
+/// # Errors
+/// A picture that cannot be written; a feature put back that has a model and no hardware; an interruption.
+pub fn resources(measured: &[Measured], choices: &[Choice], options: &Options) -> Result<Section> {
+    let chosen = || {
+        choices.iter().filter_map(|choice| {
+            let m = &measured[choice.index];
+            Some((m, m.integers.as_ref().ok()?))
+        })
+    };
+    let groups = chosen().map(|(m, integers)| {
+        (format!("{}, {}", m.scene.name, m.scene.partition.case), shares(integers).map(Some).to_vec())
+    });
+    let names = ["block RAMs", "multipliers", "flip-flops, estimated", "LUTs, estimated"];
+    let plot = Bars {
+        axis: "% of the board".into(),
+        groups: groups.collect(),
+        series: names.iter().zip(&SERIES[1..]).map(|(name, colour)| ((*name).to_owned(), *colour)).collect(),
+        text: |value| format!("{value:.0} %"),
+        limit: Some(100.0),
+        log: false,
+    };
+    let board = chosen().next().map_or("", |(_, integers)| integers.model.board.name.as_str());
+    let caption = format!(
+        "Share of the board ({board}) that each scene's hardware takes in the chosen case, which stands beside it"
+    );
+    let picture = Picture { id: "resources".into(), caption, svg: bars(&plot)? };
+    let head = ["sensor", "case", "stage", "block RAMs", "multipliers", "flip-flops, est.", "LUTs, est."];
+    let stages = chosen().flat_map(|(m, integers)| stage_rows(m, integers));
+    Ok(Section {
+        id: "resources",
+        title: "What the hardware takes, and what was left out".into(),
+        items: vec![
+            Item::Pictures(vec![picture]),
+            Item::Table(Table::new("resources", "By stage, in the scene's own format", &head, stages.collect()).shut()),
+            Item::Table(left_out(chosen().collect(), options)?),
+        ],
+    })
+}
+
+fn counts(usage: &Usage) -> [usize; 4] {
+    [usage.block_rams, usage.multipliers, usage.flip_flops, usage.luts]
+}
+
+fn shares(integers: &Integers) -> [f64; 4] {
+    let board = &integers.model.board;
+    let has = [board.block_rams, board.multipliers, board.flip_flops, board.luts];
+    let takes = counts(&total(&integers.usage));
+    std::array::from_fn(|k| 100.0 * takes[k] as f64 / f64::from(has[k]))
+}
+
+fn stage_rows(m: &Measured, integers: &Integers) -> Vec<Vec<Cell>> {
+    let row = |name: &str, usage: &Usage| {
+        let mut row = vec![words(m.scene.name.clone()), words(case_text(m.scene.partition.case)), words(name)];
+        row.extend(counts(usage).map(|n| count(n as u64)));
+        row
+    };
+    let present = STAGES.iter().filter_map(|stage| Some(row(stage, integers.usage.get(*stage)?)));
+    present.chain([row("all", &total(&integers.usage))]).collect()
+}
+
+fn left_out(chosen: Vec<(&Measured, &Integers)>, options: &Options) -> Result<Table> {
+    let kept = if options.quick { 1 } else { chosen.len() };
+    let chosen = chosen.into_iter().take(kept).collect();
+    let explained = parallel("what was left out", chosen, options, |(m, integers): (&Measured, &Integers)| {
+        Ok((m.scene.name.clone(), explain(&integers.model)?))
+    })?;
+    let rows = explained.iter().flat_map(|(scene, features)| {
+        features.iter().filter_map(move |feature| {
+            let saved = feature.saved?;
+            let numbers = [saved.block_rams, saved.multipliers, saved.flip_flops, saved.luts, saved.cycles];
+            let mut row = vec![words(scene.clone()), words(feature.feature), words(feature.setting.clone())];
+            row.extend(numbers.map(|n| Cell { shown: n.to_string(), number: Some(n as f64) }));
+            Some(row)
+        })
+    });
+    let head = [
+        "sensor",
+        "left out",
+        "put back as",
+        "block RAMs saved",
+        "multipliers",
+        "flip-flops, est.",
+        "LUTs, est.",
+        "cycles",
+    ];
+    let caption = "Left out of the hardware because the scene does not ask for it, and what that saves";
+    Ok(Table::new("left-out", caption, &head, rows.collect()))
+}

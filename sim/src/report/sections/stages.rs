@@ -1,0 +1,126 @@
+//! Fixed point against floating point, stage by stage, so that the stage that costs accuracy is seen at once.
+
+use anyhow::Result;
+
+use super::super::document::{count, decimal, percent, percent_text, words, Cell, Item, Picture, Section, Table};
+use super::super::measure::{stages as trace, Measured, StageRow};
+use super::super::pictures::{bars, Bars};
+use super::super::style::SERIES;
+use super::{scenes, Choice};
+
+/// The section.
+///
+/// # Errors
+/// A picture that cannot be written.
+pub fn stages(measured: &[Measured], choices: &[Choice]) -> Result<Section> {
+    let rows: Vec<StageRow> =
+        measured.iter().flat_map(|m| (0..m.frames.len()).flat_map(|index| trace(m, index))).collect();
+    let mut pictures = Vec::new();
+    for scene in scenes(measured) {
+        let Some(choice) = choices.iter().find(|choice| measured[choice.index].scene.name == scene) else { continue };
+        let case = measured[choice.index].scene.partition.case.to_string();
+        let own: Vec<&StageRow> = rows.iter().filter(|row| row.scene == scene && row.case == case).collect();
+        pictures.push(picture(scene, &case, &own)?);
+    }
+    let head = [
+        "sensor",
+        "case",
+        "stage",
+        "max, LSB",
+        "RMS, LSB",
+        "max, of the largest",
+        "RMS, of the largest",
+        "bits used",
+        "bits there",
+        "saturations",
+    ];
+    let one_head: Vec<&'static str> = [&head[..2], &["frame"], &head[2..]].concat();
+    let all = rows.iter().map(|row| {
+        let mut cells = line(std::slice::from_ref(row));
+        cells.insert(2, words(row.frame.clone()));
+        cells
+    });
+    Ok(Section {
+        id: "stages",
+        title: "Fixed point against floating point, stage by stage".into(),
+        items: vec![
+            Item::Text(
+                "Each stage's words beside the same stage in floating point, which starts from the stress itself with \
+                 matrices unrounded. Stage force is p at the integers' own μ: what the arithmetic costs. Stage search is how \
+                 far that μ is from the golden model's (LSB: mu_max/384), stage send what leaves: the arithmetic with the \
+                 search's answer in it. Shares are of the frame's largest value; LSBs are a subarray's own, large where one \
+                 has next to no load."
+                    .into(),
+            ),
+            Item::Pictures(pictures),
+            Item::Table(Table::new("stages", "Worst and RMS difference over the frames", &head, summed(&rows))),
+            Item::Table(Table::new("stages-frames", "The same, frame by frame", &one_head, all.collect()).shut()),
+        ],
+    })
+}
+
+/// Rows of one scene, case and stage put together, in the order of their first.
+fn summed(rows: &[StageRow]) -> Vec<Vec<Cell>> {
+    let mut groups: Vec<Vec<StageRow>> = Vec::new();
+    for row in rows {
+        let same = |group: &&mut Vec<StageRow>| {
+            (&group[0].scene, &group[0].case, group[0].stage) == (&row.scene, &row.case, row.stage)
+        };
+        match groups.iter_mut().find(same) {
+            Some(group) => group.push(row.clone()),
+            None => groups.push(vec![row.clone()]),
+        }
+    }
+    groups.iter().map(|group| line(group)).collect()
+}
+
+fn largest(rows: &[StageRow], value: fn(&StageRow) -> f64) -> f64 {
+    rows.iter().map(value).fold(0.0, f64::max)
+}
+
+fn rms(rows: &[StageRow], value: fn(&StageRow) -> f64) -> f64 {
+    (rows.iter().map(|row| value(row).powi(2)).sum::<f64>() / rows.len() as f64).sqrt()
+}
+
+fn line(rows: &[StageRow]) -> Vec<Cell> {
+    let first = &rows[0];
+    vec![
+        words(first.scene.clone()),
+        words(first.case.clone()),
+        words(first.stage),
+        decimal(Some(largest(rows, |row| row.max_lsb)), 1),
+        decimal(Some(rms(rows, |row| row.rms_lsb)), 2),
+        small(largest(rows, |row| row.max_share)),
+        small(rms(rows, |row| row.rms_share)),
+        count(rows.iter().map(|row| u64::from(row.used_bits)).max().unwrap_or(0)),
+        count(u64::from(first.has_bits)),
+        count(rows.iter().map(|row| u64::from(row.saturations)).sum()),
+    ]
+}
+
+/// A share that may be far below a percent.
+fn small(share: f64) -> Cell {
+    let shown = if share < 1e-3 { format!("{:.1e} %", 100.0 * share) } else { percent_text(share) };
+    Cell { shown, ..percent(Some(share)) }
+}
+
+fn picture(scene: &str, case: &str, own: &[&StageRow]) -> Result<Picture> {
+    let first = own.first().map_or("", |row| row.frame.as_str());
+    let names = own.iter().filter(|row| row.frame == first).map(|row| row.stage);
+    let groups = names.map(|stage| {
+        let rows: Vec<StageRow> = own.iter().filter(|row| row.stage == stage).map(|row| (*row).clone()).collect();
+        let values = [largest(&rows, |row| row.max_share), rms(&rows, |row| row.rms_share)];
+        // A logarithmic axis has no zero.
+        (stage.to_owned(), values.map(|value| Some(100.0 * value).filter(|value| *value > 0.0)).to_vec())
+    });
+    let plot = Bars {
+        axis: "difference, % of the stage's largest value".into(),
+        groups: groups.collect(),
+        series: vec![("max over the frames".into(), SERIES[2]), ("RMS".into(), SERIES[1])],
+        text: |value| if value < 0.1 { format!("{value:.0e}") } else { super::time::short(value) },
+        limit: None,
+        log: true,
+    };
+    let caption = format!("{scene}, case {case}: difference from floating point along the pipeline");
+    Ok(Picture { id: format!("stages-{scene}"), caption, svg: bars(&plot)? })
+}

@@ -1,0 +1,103 @@
+//! Sweeps: one field of a scene changed at a time; error against cycles and against block RAMs.
+
+use anyhow::Result;
+
+use super::super::document::{count, percent, words, Cell, Item, Picture, Section, Table};
+use super::super::measure::SweepPoint;
+use super::super::pictures::{scatter, Guide, Scatter, Series};
+use super::super::style::SERIES;
+use super::time::short;
+
+/// The section from the sweeps of each scene, with the number of frames of each.
+///
+/// # Errors
+/// A picture that cannot be written.
+pub fn sweeps(all: &[(Vec<SweepPoint>, usize)]) -> Result<Section> {
+    let mut pictures = Vec::new();
+    for (points, frames) in all {
+        let Some((scene, case)) = points.first().map(|point| (&point.scene, &point.case)) else { continue };
+        for (what, x) in
+            [("cycles", (|p| p.cycles as f64) as fn(&SweepPoint) -> f64), ("block RAMs", |p| p.block_rams as f64)]
+        {
+            pictures.push(Picture {
+                id: format!("sweep-{scene}-case-{case}-{}", what.replace(' ', "-")),
+                caption: format!(
+                    "{scene}: shear error of the bit-true model against {what}, median of {frames} frames"
+                ),
+                svg: scatter(&plot(points, what, x))?,
+            });
+        }
+    }
+    let head = [
+        "sensor",
+        "case",
+        "field",
+        "value",
+        "the scene's own",
+        "shear error, median",
+        "normal error, median",
+        "cycles, total",
+        "block RAMs",
+        "multipliers",
+        "fits the board",
+    ];
+    let rows = all.iter().flat_map(|(points, _)| points.iter().map(row));
+    Ok(Section {
+        id: "sweeps",
+        title: "What each setting costs".into(),
+        items: vec![
+            Item::Text(
+                "From each scene as it is, one field at a time; settings that the board has no room for are left out, but \
+                 those of degree. Cycles are the bit-true model's with every subarray searched, which co-simulation holds \
+                 equal to the hardware's."
+                    .into(),
+            ),
+            Item::Pictures(pictures),
+            Item::Table(Table::new("sweeps", "Every setting", &head, rows.collect()).shut()),
+        ],
+    })
+}
+
+fn row(p: &SweepPoint) -> Vec<Cell> {
+    let yes = |is: bool| words(if is { "yes" } else { "" });
+    vec![
+        words(p.scene.clone()),
+        words(p.case.clone()),
+        words(p.field),
+        words(p.value.clone()),
+        yes(p.own),
+        percent(p.tangential),
+        percent(p.normal),
+        count(p.cycles),
+        count(p.block_rams as u64),
+        count(p.multipliers as u64),
+        yes(p.fits),
+    ]
+}
+
+fn plot(points: &[SweepPoint], what: &str, x: fn(&SweepPoint) -> f64) -> Scatter {
+    let own = points.chunk_by(|a, b| a.field == b.field);
+    let series = own.zip(0..).map(|(group, index): (_, usize)| Series {
+        name: group[0].field.into(),
+        colour: SERIES[index % 8],
+        shape: index % 4,
+        points: group
+            .iter()
+            .filter_map(|p| Some((x(p), p.tangential.filter(|error| *error > 0.0)?, p.value.clone())))
+            .collect(),
+        // Settings have an order, cases have none.
+        joined: group[0].field != "case",
+    });
+    Scatter {
+        x: what.into(),
+        y: "shear error, median".into(),
+        log: [false, true],
+        ticks: [|x| format!("{x:.0}"), |error| format!("{} %", short(100.0 * error))],
+        series: series.collect(),
+        guides: points
+            .iter()
+            .find_map(|p| Some(Guide::Ring((x(p), p.tangential.filter(|_| p.own)?), "the scene as it is".into())))
+            .into_iter()
+            .collect(),
+    }
+}

@@ -1,0 +1,158 @@
+//! Error against run time: all engines in all cases, the Pareto front, the line at 1 ms.
+
+use anyhow::Result;
+
+use super::super::document::{count, none, percent, seconds, seconds_text, words, Cell, Item, Picture, Section, Table};
+use super::super::measure::{Engine, Measured, Point};
+use super::super::pictures::{scatter, Guide, Scatter, Series};
+use super::super::style::SERIES;
+use super::super::BUDGET_US;
+use super::{case_text, scenes};
+
+/// The section.
+///
+/// # Errors
+/// A picture that cannot be written.
+pub fn time(measured: &[Measured]) -> Result<Section> {
+    let points: Vec<Point> =
+        measured.iter().flat_map(|m| Engine::ALL.into_iter().filter_map(|engine| m.point(engine))).collect();
+    let mut items = Vec::new();
+    for scene in scenes(measured) {
+        let own: Vec<&Point> = points.iter().filter(|point| point.scene == scene).collect();
+        items.push(Item::Pictures(vec![
+            picture(scene, "shear", &own, |point| point.tangential)?,
+            picture(scene, "normal", &own, |point| point.normal)?,
+        ]));
+    }
+    let head = [
+        "sensor",
+        "case",
+        "engine",
+        "shear error, median",
+        "normal error, median",
+        "time of a frame",
+        "cycles",
+        "RTL = bit-true",
+        "why not",
+    ];
+    let rows = measured.iter().flat_map(|m| Engine::ALL.into_iter().map(move |engine| row(m, engine)));
+    items.insert(
+        0,
+        Item::Text(
+            "Each mark is an engine on a sensor in a case, which stands beside it. Errors of the resultant against the true \
+             contact, median over the shipped frames; times: a frame on the CPU, median over the frames and of three repeats, \
+             or the hardware's cycles over its clock. Below and left is better; nothing beats the front in both."
+                .into(),
+        ),
+    );
+    items.push(Item::Table(Table::new("time", "Every engine in every case", &head, rows.collect())));
+    Ok(Section { id: "time", title: "Error against run time".into(), items })
+}
+
+fn row(m: &Measured, engine: Engine) -> Vec<Cell> {
+    let mut row = vec![words(m.scene.name.clone()), words(case_text(m.scene.partition.case)), words(engine.name())];
+    let integers = m.integers.as_ref();
+    let Some(point) = m.point(engine) else {
+        let reason = match engine {
+            Engine::Baseline => m.baseline.as_ref().err(),
+            _ => integers.err(),
+        };
+        row.extend([none(), none(), none(), none(), none(), words(reason.map_or("", |reason| reason))]);
+        return row;
+    };
+    row.extend([percent(point.tangential), percent(point.normal), seconds(Some(point.seconds))]);
+    row.extend(match integers {
+        Ok(integers) if engine == Engine::Hardware => {
+            let verdict = match integers.equal {
+                Some(true) => "yes",
+                Some(false) => "NO",
+                None => "not simulated",
+            };
+            [count(integers.cycles), words(verdict)]
+        }
+        _ => [none(), none()],
+    });
+    row.push(words(""));
+    row
+}
+
+fn picture(scene: &str, what: &str, own: &[&Point], error: fn(&Point) -> Option<f64>) -> Result<Picture> {
+    let of = |engine: Engine| {
+        let points = own.iter().filter(|point| point.engine == engine);
+        // A logarithmic axis has no zero.
+        let points = points
+            .filter_map(|point| Some((point.seconds, error(point).filter(|e| *e > 0.0)?, point.case.to_string())));
+        let index = engine as usize;
+        Series {
+            name: engine.name().into(),
+            colour: SERIES[index],
+            shape: index,
+            points: points.collect(),
+            joined: false,
+        }
+    };
+    let series: Vec<Series> = Engine::ALL.into_iter().map(of).filter(|series| !series.points.is_empty()).collect();
+    let all = series.iter().flat_map(|series| &series.points).map(|(x, y, _)| (*x, *y)).collect();
+    let budget = 1e-6 * BUDGET_US as f64;
+    let plot = Scatter {
+        x: "time of a frame".into(),
+        y: format!("{what} error, median"),
+        log: [true, true],
+        ticks: [|s| tick(&seconds_text(s)), |e| format!("{} %", short(100.0 * e))],
+        series,
+        guides: vec![Guide::X(budget, "1 ms".into()), Guide::Front(front(all), "Pareto front".into())],
+    };
+    let caption = format!("{scene}: {what} error against time; marks are named by their case");
+    Ok(Picture { id: format!("time-{scene}-{what}"), caption, svg: scatter(&plot)? })
+}
+
+/// `1.00 ms` as `1 ms`.
+fn tick(text: &str) -> String {
+    match text.split_once(' ') {
+        Some((number, unit)) if number.contains('.') => {
+            format!("{} {unit}", number.trim_end_matches('0').trim_end_matches('.'))
+        }
+        _ => text.to_owned(),
+    }
+}
+
+/// Two significant digits without trailing zeros.
+pub(super) fn short(value: f64) -> String {
+    let decimals = (1.0 - value.abs().max(1e-12).log10().floor()).clamp(0.0, 9.0) as usize;
+    let text = format!("{value:.decimals$}");
+    if text.contains('.') {
+        text.trim_end_matches('0').trim_end_matches('.').to_owned()
+    } else {
+        text
+    }
+}
+
+/// The points that no other beats in both, from left to right.
+fn front(mut points: Vec<(f64, f64)>) -> Vec<(f64, f64)> {
+    points.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.total_cmp(&b.1)));
+    let mut front: Vec<(f64, f64)> = Vec::new();
+    for point in points {
+        if front.last().is_none_or(|last| point.1 < last.1) {
+            front.push(point);
+        }
+    }
+    front
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_front_by_hand() {
+        let points = vec![(3.0, 1.0), (1.0, 5.0), (2.0, 6.0), (2.5, 3.0), (4.0, 2.0), (1.0, 7.0)];
+        assert_eq!(front(points), [(1.0, 5.0), (2.5, 3.0), (3.0, 1.0)]);
+        assert_eq!(front(vec![]), []);
+    }
+
+    #[test]
+    fn ticks_are_short() {
+        assert_eq!(["1.00 ms", "30.0 µs", "300 s", "1.50 s"].map(tick), ["1 ms", "30 µs", "300 s", "1.5 s"]);
+        assert_eq!([100.0, 30.0, 3.0, 0.5, 0.015].map(short), ["100", "30", "3", "0.5", "0.015"]);
+    }
+}

@@ -1,0 +1,115 @@
+//! Style: roles of colour in pictures, and what they are on light and dark pages.
+//!
+//! A picture is drawn in stand-in colours, one per role. In a page they become CSS variables, which follow the
+//! reader's choice of light or dark; in a file of its own they become the light page's colours on white.
+
+use plotters::style::RGBColor;
+
+/// Text and axes.
+pub const INK: RGBColor = RGBColor(1, 1, 1);
+/// Lines that only guide the eye.
+pub const GRID: RGBColor = RGBColor(2, 2, 2);
+/// Positive values on maps: compression, normal force.
+pub const PLUS: RGBColor = RGBColor(3, 3, 3);
+/// Negative values on maps: tension.
+pub const MINUS: RGBColor = RGBColor(4, 4, 4);
+/// Limits and warnings.
+pub const LIMIT: RGBColor = RGBColor(5, 5, 5);
+/// Series, told apart by the colour-blind as well.
+pub const SERIES: [RGBColor; 8] = [
+    RGBColor(16, 0, 0),
+    RGBColor(17, 0, 0),
+    RGBColor(18, 0, 0),
+    RGBColor(19, 0, 0),
+    RGBColor(20, 0, 0),
+    RGBColor(21, 0, 0),
+    RGBColor(22, 0, 0),
+    RGBColor(23, 0, 0),
+];
+
+/// Each role's stand-in, CSS variable, light and dark colour.
+const ROLES: [(RGBColor, &str, &str, &str); 13] = [
+    (INK, "ink", "#1c2330", "#e6e9ef"),
+    (GRID, "grid", "#c9ced8", "#4a5364"),
+    (PLUS, "plus", "#c0392b", "#ff7b6b"),
+    (MINUS, "minus", "#1f6fb5", "#63b3ff"),
+    (LIMIT, "limit", "#b00020", "#ff6b81"),
+    (SERIES[0], "s0", "#7a7f8a", "#a3a9b5"),
+    (SERIES[1], "s1", "#0072b2", "#56b4e9"),
+    (SERIES[2], "s2", "#b35900", "#f0a04b"),
+    (SERIES[3], "s3", "#00795a", "#2fd0a5"),
+    (SERIES[4], "s4", "#8e44ad", "#cf9bea"),
+    (SERIES[5], "s5", "#a3123f", "#ff8fb0"),
+    (SERIES[6], "s6", "#5b6b00", "#c3d342"),
+    (SERIES[7], "s7", "#12637a", "#7fdbf0"),
+];
+
+fn stand_in(RGBColor(r, g, b): RGBColor) -> String {
+    format!("\"#{r:02X}{g:02X}{b:02X}\"")
+}
+
+/// The `:root` rules of a page.
+pub fn variables() -> String {
+    let rules = |pick: fn(&(RGBColor, &str, &'static str, &'static str)) -> &'static str| {
+        ROLES.iter().map(|role| format!("--{}:{};", role.1, pick(role))).collect::<String>()
+    };
+    format!(
+        ":root{{color-scheme:light dark;--page:#ffffff;--panel:#f5f6f8;{}}}\n\
+         @media (prefers-color-scheme:dark){{:root{{--page:#12161d;--panel:#1b212b;{}}}}}\n",
+        rules(|role| role.2),
+        rules(|role| role.3),
+    )
+}
+
+/// The picture for a page: CSS variables, as wide as its place, a description for screen readers.
+pub fn themed(svg: &str, caption: &str) -> String {
+    let mut svg = svg.to_owned();
+    for role in &ROLES {
+        svg = svg.replace(&stand_in(role.0), &format!("\"var(--{})\"", role.1));
+    }
+    let Some((head, body)) = svg.split_once('>') else { return svg };
+    let box_ = head.split("viewBox=").nth(1).unwrap_or("\"0 0 1 1\"");
+    let box_ = box_.split('"').nth(1).unwrap_or_default();
+    format!("<svg viewBox=\"{box_}\" role=\"img\" aria-label=\"{}\">{body}", escape(caption))
+}
+
+/// The picture as a file: light colours on white.
+pub fn standalone(svg: &str) -> String {
+    let mut svg = svg.to_owned();
+    for role in &ROLES {
+        svg = svg.replace(&stand_in(role.0), &format!("\"{}\"", role.2));
+    }
+    match svg.split_once('>') {
+        Some((head, body)) => format!("{head}>\n<rect width=\"100%\" height=\"100%\" fill=\"#ffffff\"/>{body}"),
+        None => svg,
+    }
+}
+
+/// Text between tags or in quotes.
+pub fn escape(text: &str) -> String {
+    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const SVG: &str = "<svg width=\"4\" height=\"2\" viewBox=\"0 0 4 2\" xmlns=\"x\">\n<rect fill=\"#010101\"/></svg>";
+
+    #[test]
+    fn roles_become_variables_or_light_colours() {
+        let page = themed(SVG, "a < b");
+        assert_eq!(
+            page,
+            "<svg viewBox=\"0 0 4 2\" role=\"img\" aria-label=\"a &lt; b\">\n<rect fill=\"var(--ink)\"/></svg>"
+        );
+        assert!(standalone(SVG).contains("<rect fill=\"#1c2330\"/>"));
+        assert!(variables().contains("--ink:#e6e9ef;"));
+    }
+
+    #[test]
+    fn stand_ins_differ() {
+        let all: std::collections::BTreeSet<String> = ROLES.iter().map(|role| stand_in(role.0)).collect();
+        assert_eq!(all.len(), ROLES.len());
+    }
+}

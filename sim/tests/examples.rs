@@ -1,0 +1,106 @@
+//! Every example of `--help` does what it says: each is run as printed, in a folder with the files it names, and must
+//! succeed. Those that take a board or minutes are listed with the reason; a listed one that is no example fails.
+
+use std::collections::BTreeSet;
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+/// Examples that are not run here.
+const NOT_RUN: [(&str, &str); 14] = [
+    ("dermis host --port /dev/ttyUSB0 press.json", BOARD),
+    ("dermis host --port /dev/ttyUSB0 --scene sensor-1", BOARD),
+    ("dermis host --port /dev/ttyUSB0 --forces --check press.json", BOARD),
+    ("dermis host --port /dev/ttyUSB0 --scene sensor-1 --tare zero.json --stream <frames >answers", BOARD),
+    ("dermis board eight-by-eight", "runs until interrupted; tests/link.rs talks to one"),
+    ("dermis table", "every scene: minutes"),
+    ("dermis table sensor-3 --case contacts --fresh 40 --contacts 2 --contacts 3 --shapes other", "a minute"),
+    ("dermis table sensor-1 eight-by-eight --cosim", "make run"),
+    ("dermis cosim sensor-1", "tests/equality.rs"),
+    ("dermis noise sensor-1", "200 draws of five objectives: minutes"),
+    ("dermis noise sensor-2 --objective patch --objective auto --draws 1000 --format csv", "minutes"),
+    ("dermis report", "every co-simulation: minutes; make report"),
+    ("dermis report --quick", "make report QUICK=1; the same for two scenes is run"),
+    ("dermis report --paper", "repeats of 48×48: minutes; make report"),
+];
+const BOARD: &str = "needs a board on a serial port";
+
+fn program() -> &'static Path {
+    Path::new(env!("CARGO_BIN_EXE_dermis"))
+}
+
+/// Builds are shared with the other tests.
+fn build_dir() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../build")
+}
+
+fn help(command: &[&str]) -> String {
+    let output = Command::new(program()).args(command).arg("--help").output().unwrap();
+    String::from_utf8(output.stdout).unwrap()
+}
+
+/// The command lines of a help text, without what is said about them.
+fn examples(text: &str) -> Vec<String> {
+    let joined = text.replace("\\\n", " ");
+    let lines = joined.lines().filter_map(|line| line.strip_prefix("  ")).filter(|line| line.starts_with("dermis "));
+    let command = |line: &str| {
+        // Where a line goes on after a backslash there are spaces too: a remark follows the last of them.
+        let mut parts: Vec<&str> = line.split("  ").map(str::trim).filter(|part| !part.is_empty()).collect();
+        parts.truncate(1 + parts[1..].iter().take_while(|part| part.starts_with("--")).count());
+        parts.join(" ")
+    };
+    lines.map(command).collect()
+}
+
+fn all_examples() -> BTreeSet<String> {
+    let overview = help(&[]);
+    let listed = overview.split("Commands:\n").nth(1).unwrap().split("\n\n").next().unwrap();
+    let commands = listed.lines().filter_map(|line| line.split_whitespace().next()).filter(|name| *name != "help");
+    let texts = commands.map(|name| help(&[name])).chain([overview.clone()]);
+    texts.flat_map(|text| examples(&text)).collect()
+}
+
+/// The files that examples name.
+fn prepare(work: &Path) {
+    let scene =
+        fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("../golden/scenes/sensor-1.toml")).unwrap();
+    fs::write(work.join("my-scene.toml"), &scene).unwrap();
+    fs::write(work.join("averaging.toml"), format!("{scene}\n[input]\naverage = 1\n")).unwrap();
+    let frame = |out: &str, seed: &str| {
+        let args = ["generate", "sensor-1", "--random", "1", "--seed", seed, "--out", out];
+        assert!(Command::new(program()).current_dir(work).args(args).status().unwrap().success());
+    };
+    frame("press.json", "1");
+    frame("a.json", "2");
+    let row =
+        |k: usize| (0..10).map(|c| format!("{}", (k * c % 7) as f64 / 100.0)).collect::<Vec<_>>().join(",") + "\n";
+    let csv: String = (0..10).map(row).collect();
+    for name in ["press.csv", "1.csv", "2.csv", "b.csv"] {
+        fs::write(work.join(name), &csv).unwrap();
+    }
+}
+
+#[test]
+fn every_example_works() {
+    let all = all_examples();
+    let not_run: BTreeSet<String> = NOT_RUN.iter().map(|(line, _)| (*line).to_owned()).collect();
+    assert!(not_run.is_subset(&all), "no examples: {:?}", not_run.difference(&all));
+    let work = tempfile::tempdir().unwrap();
+    prepare(work.path());
+    // Verilog libraries that other tests have built serve here too.
+    fs::create_dir_all(build_dir().join("verilator")).unwrap();
+    fs::create_dir(work.path().join("build")).unwrap();
+    std::os::unix::fs::symlink(build_dir().join("verilator"), work.path().join("build/verilator")).unwrap();
+    let path = format!("{}:{}", program().parent().unwrap().display(), std::env::var("PATH").unwrap());
+    let run: Vec<&String> = all.difference(&not_run).collect();
+    assert!(run.len() >= 15, "{run:?}");
+    let mut failures = String::new();
+    for line in run {
+        let output =
+            Command::new("sh").current_dir(work.path()).env("PATH", &path).args(["-c", line]).output().unwrap();
+        if !output.status.success() {
+            failures += &format!("{line}\n{}\n", String::from_utf8_lossy(&output.stderr));
+        }
+    }
+    assert!(failures.is_empty(), "{failures}");
+}

@@ -1,0 +1,138 @@
+//! The report in a browser: headless Chromium opens the page on a desk and on a phone, in light and in dark. No console
+//! message, every picture drawn, no label cut off, nothing wider than the window, and nothing asked of the network.
+//!
+//! The page itself has no script; a copy of it gets one that looks and writes what it finds into the document.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+
+use serde_json::Value;
+
+/// Looks at the page: windows, colours, pictures, labels.
+const LOOK: &str = r#"
+<script>
+const found = { errors: [], pictures: 0, drawn: 0, labels: 0, cut: [] };
+addEventListener("error", event => found.errors.push(String(event.message)));
+addEventListener("load", () => {
+  document.querySelectorAll("details").forEach(details => { details.open = true; });
+  for (const figure of document.querySelectorAll("figure")) {
+    found.pictures += 1;
+    const svg = figure.querySelector("svg"), box = svg.getBoundingClientRect();
+    if (box.width > 100 && box.height > 50 && svg.querySelectorAll("rect,circle,polyline,polygon").length > 3) {
+      found.drawn += 1;
+    }
+    for (const text of svg.querySelectorAll("text")) {
+      const own = text.getBoundingClientRect();
+      found.labels += 1;
+      if (own.left < box.left - 1 || own.right > box.right + 1 || own.top < box.top - 1 || own.bottom > box.bottom + 1) {
+        found.cut.push(figure.id + ": " + text.textContent.trim());
+      }
+    }
+  }
+  const style = getComputedStyle(document.body);
+  found.page = style.backgroundColor;
+  found.ink = style.color;
+  found.window = innerWidth;
+  found.width = document.documentElement.scrollWidth;
+  found.small = Math.min(...[...document.querySelectorAll("svg text")].map(text => text.getBoundingClientRect().height));
+  found.requests = performance.getEntriesByType("resource").map(entry => entry.name);
+  const out = document.createElement("pre");
+  out.id = "found";
+  out.textContent = JSON.stringify(found);
+  document.body.append(out);
+});
+</script>"#;
+
+/// Width of the window on a desk and of a phone held upright. Headless windows are no narrower than 500, so the phone is
+/// a frame in one.
+const DESK: u32 = 1280;
+const PHONE: u32 = 360;
+
+fn dermis(work: &Path, args: &[&str]) -> Output {
+    // Built libraries are shared with the other tests.
+    let build = Path::new(env!("CARGO_MANIFEST_DIR")).join("../build");
+    let mut command = Command::new(env!("CARGO_BIN_EXE_dermis"));
+    command.current_dir(work).args(args).arg("--build-dir").arg(build).output().unwrap()
+}
+
+/// What the look found in a copy of the page.
+fn look(work: &Path, page: &str, width: u32, dark: bool) -> Value {
+    let copy = work.join("copy.html");
+    fs::write(&copy, page.replacen("</head>", &format!("{LOOK}</head>"), 1)).unwrap();
+    let opened = match width {
+        PHONE => framed(work, &copy),
+        _ => copy,
+    };
+    let mut command = Command::new("chromium");
+    command.args([
+        "--headless",
+        "--no-sandbox",
+        "--disable-gpu",
+        "--enable-logging=stderr",
+        "--allow-file-access-from-files",
+    ]);
+    command.arg(format!("--user-data-dir={}", work.join("profile").display()));
+    command.args([format!("--window-size={DESK},900"), "--virtual-time-budget=10000".into(), "--dump-dom".into()]);
+    // 0 is dark, 1 is light.
+    command.arg(format!("--blink-settings=preferredColorScheme={}", u8::from(!dark)));
+    let output = command.arg(format!("file://{}", opened.display())).output();
+    let output = output.expect("chromium, which `make setup` installs");
+    let messages = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert!(!messages.contains("CONSOLE"), "{messages}");
+    let dom = String::from_utf8(output.stdout).unwrap();
+    let found = dom.split_once("<pre id=\"found\">").and_then(|(_, rest)| rest.split_once("</pre>"));
+    let found = found.unwrap_or_else(|| panic!("the page did not load: {messages}")).0;
+    serde_json::from_str(&found.replace("&lt;", "<").replace("&gt;", ">").replace("&amp;", "&")).unwrap()
+}
+
+/// A page that holds the copy in a frame as wide as a phone and takes over what was found there.
+fn framed(work: &Path, copy: &Path) -> PathBuf {
+    let page = work.join("phone.html");
+    let text = format!(
+        "<!doctype html><title>phone</title><link rel=\"icon\" href=\"data:,\">\n\
+         <iframe src=\"file://{}\" width=\"{PHONE}\" height=\"800\" style=\"border:0\"></iframe>\n\
+         <script>addEventListener('load', () => {{\n\
+         const inside = document.querySelector('iframe').contentDocument.getElementById('found');\n\
+         document.body.append(document.importNode(inside, true)); }});</script>",
+        copy.display()
+    );
+    fs::write(&page, text).unwrap();
+    page
+}
+
+#[test]
+fn the_page_opens_on_desk_and_phone_in_light_and_dark() {
+    let work = tempfile::tempdir().unwrap();
+    let report = dermis(work.path(), &["report", "eight-by-eight", "sensor-3", "--quick", "--out", "out"]);
+    assert!(report.status.success(), "{}", String::from_utf8_lossy(&report.stderr));
+    let page = fs::read_to_string(work.path().join("out/report.html")).unwrap();
+    assert!(!page.contains("http://") && !page.contains("https://"), "the page points elsewhere");
+    let pictures = fs::read_dir(work.path().join("out/report-pictures")).unwrap().count();
+    let mut backgrounds = Vec::new();
+    for (width, dark) in [(DESK, false), (DESK, true), (PHONE, false), (PHONE, true)] {
+        let found = look(work.path(), &page, width, dark);
+        let what = format!("{width} wide, dark {dark}: {found}");
+        assert_eq!(
+            (&found["errors"], &found["cut"]),
+            (&Value::from(Vec::<u8>::new()), &Value::from(Vec::<u8>::new())),
+            "{what}"
+        );
+        assert_eq!(
+            (found["pictures"].as_u64(), found["drawn"].as_u64()),
+            (Some(pictures as u64), Some(pictures as u64)),
+            "{what}"
+        );
+        assert_eq!(found["requests"], Value::from(Vec::<u8>::new()), "{what}");
+        assert!(found["labels"].as_u64().unwrap() > 100, "{what}");
+        // Tables scroll in their own place, the page does not.
+        assert!(found["width"].as_u64() <= found["window"].as_u64(), "{what}");
+        // Legible at arm's length.
+        assert!(found["small"].as_f64().unwrap() >= 8.0, "{what}");
+        assert_ne!(found["page"], found["ink"], "{what}");
+        backgrounds.push(found["page"].clone());
+        assert_eq!(found["window"].as_u64() == Some(u64::from(PHONE)), width == PHONE, "{what}");
+    }
+    assert_eq!((&backgrounds[0], &backgrounds[1]), (&backgrounds[2], &backgrounds[3]));
+    assert_ne!(backgrounds[0], backgrounds[1]);
+}

@@ -1,0 +1,121 @@
+//! The report's files: all forms say the same, times are cycles over the clock, and an interruption leaves what was there.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+use std::time::Duration;
+
+use serde_json::Value;
+
+fn dermis(work: &Path, args: &[&str]) -> Command {
+    // Built libraries are shared with the other tests.
+    let build = Path::new(env!("CARGO_MANIFEST_DIR")).join("../build");
+    let mut command = Command::new(env!("CARGO_BIN_EXE_dermis"));
+    command.current_dir(work).args(args).arg("--build-dir").arg(build);
+    command
+}
+
+/// The table of an id, as its head and rows.
+fn table<'a>(report: &'a Value, id: &str) -> (Vec<&'a str>, &'a Vec<Value>) {
+    let items = report["sections"].as_array().unwrap().iter().flat_map(|section| section["items"].as_array().unwrap());
+    let table = items.filter(|item| item["table"] == id).collect::<Vec<_>>();
+    assert_eq!(table.len(), 1, "{id}");
+    let head = table[0]["head"].as_array().unwrap().iter().map(|head| head.as_str().unwrap()).collect();
+    (head, table[0]["rows"].as_array().unwrap())
+}
+
+fn files(folder: &Path) -> Vec<PathBuf> {
+    let mut all: Vec<PathBuf> = fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path()).collect();
+    all.sort();
+    all
+}
+
+#[test]
+fn all_forms_say_the_same() {
+    let work = tempfile::tempdir().unwrap();
+    let out = work.path().join("out");
+    fs::create_dir_all(out.join("report-tables")).unwrap();
+    fs::write(out.join("report-tables/of-an-earlier-run.csv"), "").unwrap();
+    let output = dermis(work.path(), &["report", "eight-by-eight", "--quick", "--out", "out"]).output().unwrap();
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    assert_eq!(String::from_utf8(output.stdout).unwrap(), "out/report.html\n");
+    let report: Value = serde_json::from_str(&fs::read_to_string(out.join("report.json")).unwrap()).unwrap();
+    let markdown = fs::read_to_string(out.join("report.md")).unwrap();
+    let page = fs::read_to_string(out.join("report.html")).unwrap();
+
+    // One choice, case 0, with the cycles of the co-simulation.
+    let (head, rows) = table(&report, "choice");
+    let at = |name: &str| head.iter().position(|head| *head == name).unwrap();
+    assert_eq!((rows.len(), &rows[0][at("take case")]), (1, &Value::from("0 (1×1)")));
+    let (cycles, us) = (rows[0][at("cycles")].as_f64().unwrap(), rows[0][at("µs")].as_f64().unwrap());
+    assert_eq!((cycles, us), (884.0, 8.84));
+    assert_eq!(rows[0][at("cycles from")], "co-simulation");
+    // Every engine has its time; hardware's is cycles at 100 MHz, and equals its model.
+    let (head, rows) = table(&report, "time");
+    let at = |name: &str| head.iter().position(|head| *head == name).unwrap();
+    assert_eq!(rows.len(), 4 * 4);
+    for row in rows {
+        assert!(row[at("time of a frame")].as_f64().unwrap() > 0.0, "{row}");
+        if row[at("engine")] == "hardware" {
+            let seconds = row[at("cycles")].as_f64().unwrap() / 100e6;
+            assert!((row[at("time of a frame")].as_f64().unwrap() / seconds - 1.0).abs() < 1e-12, "{row}");
+        }
+    }
+    let simulated: Vec<&Value> = rows.iter().filter(|row| row[at("RTL = bit-true")] == "yes").collect();
+    assert_eq!(simulated.len(), 1);
+
+    // A file for each table and picture, and none of an earlier run.
+    let items = || report["sections"].as_array().unwrap().iter().flat_map(|s| s["items"].as_array().unwrap());
+    let tables = items().filter_map(|item| item["table"].as_str());
+    let mut wanted: Vec<PathBuf> = tables.map(|id| out.join(format!("report-tables/{id}.csv"))).collect();
+    wanted.sort();
+    assert_eq!(files(&out.join("report-tables")), wanted);
+    for item in items() {
+        if let Some(id) = item["table"].as_str() {
+            let csv = fs::read_to_string(out.join(format!("report-tables/{id}.csv"))).unwrap();
+            assert_eq!(csv.lines().count(), 1 + item["rows"].as_array().unwrap().len(), "{id}");
+            assert!(page.contains(&format!("<table id=\"{id}\">")), "{id}");
+        }
+        if let Some(file) = item["file"].as_str() {
+            assert!(fs::read_to_string(out.join(file)).unwrap().ends_with("</svg>\n"), "{file}");
+            assert!(markdown.contains(&format!("]({file})")), "{file}");
+        }
+    }
+    assert_eq!(page.matches("<figure ").count(), files(&out.join("report-pictures")).len());
+    assert_eq!(page.matches("<h2 ").count(), markdown.matches("\n## ").count());
+}
+
+#[test]
+fn the_paper_by_number() {
+    let work = tempfile::tempdir().unwrap();
+    let args = ["report", "sensor-1", "sensor-2", "--paper", "--quick", "--out", "out"];
+    let output = dermis(work.path(), &args).output().unwrap();
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let report: Value = serde_json::from_str(&fs::read_to_string(work.path().join("out/paper.json")).unwrap()).unwrap();
+    let (head, rows) = table(&report, "table-2");
+    assert_eq!((rows.len(), head[2], rows[0][2].as_f64()), (8, "paper X1", Some(0.1284)));
+    let (_, judged) = table(&report, "judged");
+    // The paper's finding on a single Hertzian contact is ours as well.
+    assert_eq!((judged.len(), &judged[0][1], &judged[0][7]), (4, &Value::from("0 (1×1)"), &Value::from("yes")));
+    assert!(work.path().join("out/paper-pictures/fig-1-forces.svg").is_file());
+    assert!(work.path().join("out/paper-pictures/fig-4a-sensor-1-case-2-golden.svg").is_file());
+}
+
+#[test]
+fn an_interruption_leaves_what_was_there() {
+    let work = tempfile::tempdir().unwrap();
+    let out = work.path().join("out");
+    fs::create_dir(&out).unwrap();
+    fs::write(out.join("report.html"), "of before").unwrap();
+    let mut command = dermis(work.path(), &["report", "--quick", "--out", "out"]);
+    let child = command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
+    // Long enough to have begun, far from the end.
+    std::thread::sleep(Duration::from_millis(700));
+    let pid = rustix::process::Pid::from_child(&child);
+    rustix::process::kill_process(pid, rustix::process::Signal::INT).unwrap();
+    let output = child.wait_with_output().unwrap();
+    let message = String::from_utf8(output.stderr).unwrap();
+    assert_eq!((output.status.code(), message.as_str()), (Some(130), "error: interrupted; nothing was written\n"));
+    assert_eq!(files(&out), [out.join("report.html")]);
+    assert_eq!(fs::read_to_string(out.join("report.html")).unwrap(), "of before");
+}
