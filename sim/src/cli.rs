@@ -118,7 +118,8 @@ enum Command {
   dermis cosim sensor-1
   dermis cosim sensor-1 --frame a.json --frame b.csv --json
   dermis cosim eight-by-eight --device rust-hdl
-  dermis cosim eight-by-eight --device netlist       what synthesis makes of it, minutes")]
+  dermis cosim eight-by-eight --device netlist       what synthesis makes of it, minutes
+  dermis cosim sensor-1 --device verilator --waves   and prints the GTKWave command")]
     Cosim {
         /// Built-in name or path of a scene; may be left out when the first frame holds its sensor.
         scene: Option<String>,
@@ -131,6 +132,9 @@ enum Command {
         /// What simulates the hardware.
         #[arg(long, value_enum, default_value = "both")]
         device: DeviceChoice,
+        /// Write the pins and stages of the run at full speed to <build-dir>/<scene>/waves, with a list for GTKWave.
+        #[arg(long, conflicts_with = "json")]
+        waves: bool,
     },
     /// Measure errors and times of all engines, and write them as a page with pictures.
     Report(report::Arguments),
@@ -283,14 +287,19 @@ fn run(arguments: &Arguments) -> Result<(String, bool)> {
             let out = out.clone().unwrap_or_else(|| build_dir.join(&scene.name).join(folder));
             Ok((build(&scene, &out, *board, *explain)?, true))
         }
-        Command::Cosim { scene, frames, json, device } => {
+        Command::Cosim { scene, frames, json, device, waves } => {
             let (scene, frames) = resolve(scene.as_deref(), frames)?;
             let verified = verify(&scene, &frames, device.simulators(), build_dir)?;
-            let text = if *json {
+            let mut text = if *json {
                 serde_json::to_string(&CosimReport::new(&verified))? + "\n"
             } else {
                 report::cosim(&verified)
             };
+            if *waves {
+                let folder = build_dir.join(&scene.name).join("waves");
+                let command = crate::waves::waves(&scene, &frames, device.simulators()[0], build_dir, &folder)?;
+                text.push_str(&format!("waveforms: {command}\n"));
+            }
             Ok((text, verified.findings.is_equal()))
         }
         Command::Bitstream(arguments) => crate::bitstream::run(arguments, build_dir),

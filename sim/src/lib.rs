@@ -24,6 +24,7 @@
 //! | [`report`] | tables and the JSON contract; `dermis report`, measured and drawn |
 //! | [`host`] | frames to a board over a serial port, forces back |
 //! | [`inputs`] | scene and frames from what the command line names |
+//! | [`mod@waves`] | a run as a waveform file |
 //! | [`cli`] | arguments, commands, exit codes |
 #![deny(missing_docs)]
 // Names carry their unit as SI writes it: `full_scale_MPa`.
@@ -48,3 +49,4 @@ pub mod report;
 pub mod tabulate;
 pub mod verify;
 pub mod verilator;
+pub mod waves;
