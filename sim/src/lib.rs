@@ -17,6 +17,7 @@
 //! | [`fresh`] | frames of drawn contacts for `dermis table --fresh` |
 //! | [`mod@generate`] | `dermis generate`: frames with known forces from described contacts |
 //! | [`board`] | a board's UART, simulated, on a pseudo-terminal |
+//! | [`mod@guide`] | pages: method, formats, architecture, adding a sensor or a board, the engine in a design, limits |
 //! | [`hardware`] | a scene's generated hardware and its simulators |
 //! | [`compare`] | how far two force fields are apart |
 //! | [`mod@netlist`] | the netlist after synthesis, simulated |
@@ -40,6 +41,7 @@ pub mod drive;
 mod files;
 pub mod fresh;
 pub mod generate;
+pub mod guide;
 pub mod hardware;
 pub mod host;
 pub mod inputs;
