@@ -56,7 +56,7 @@ pub struct Arguments {
     /// Tries at a time; each takes a core and about a gigabyte.
     #[arg(long, default_value_t = 2, value_parser = clap::value_parser!(u32).range(1..))]
     jobs: u32,
-    /// Write what was reached into constraints/baselines.toml in place of comparing with it.
+    /// Write what was reached into constraints/baselines.json in place of comparing with it.
     #[arg(long)]
     update_baselines: bool,
     /// Print the result as JSON and nothing else.

@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 
 /// Examples that are not run here.
-const NOT_RUN: [(&str, &str); 14] = [
+const NOT_RUN: [(&str, &str); 17] = [
     ("dermis host --port /dev/ttyUSB0 press.json", BOARD),
     ("dermis host --port /dev/ttyUSB0 --scene sensor-1", BOARD),
     ("dermis host --port /dev/ttyUSB0 --forces --check press.json", BOARD),
@@ -22,8 +22,12 @@ const NOT_RUN: [(&str, &str); 14] = [
     ("dermis report", "every co-simulation: minutes; make report"),
     ("dermis report --quick", "make report QUICK=1; the same for two scenes is run"),
     ("dermis report --paper", "repeats of 48×48: minutes; make report"),
+    ("dermis bitstream eight-by-eight", PLACED),
+    ("dermis bitstream sensor-1 --seeds 5 --jobs 2 --update-baselines", PLACED),
+    ("dermis cosim eight-by-eight --device netlist", "synthesis takes minutes; tests/netlist.rs"),
 ];
 const BOARD: &str = "needs a board on a serial port";
+const PLACED: &str = "place and route takes from minutes to an hour; make bitstream";
 
 fn program() -> &'static Path {
     Path::new(env!("CARGO_BIN_EXE_dermis"))

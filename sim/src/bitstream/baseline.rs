@@ -1,4 +1,4 @@
-//! What scenes took of their boards when somebody last looked: `constraints/baselines.toml`.
+//! What scenes took of their boards when somebody last looked: `constraints/baselines.json`.
 //!
 //! `dermis bitstream --update-baselines` writes it; without that a bitstream that is slower or larger than its line says,
 //! beyond the tolerances here, fails.
@@ -11,7 +11,9 @@ use serde::{Deserialize, Serialize};
 use super::tools::ToolError;
 
 /// The file, from the repository's root.
-pub const FILE: &str = "constraints/baselines.toml";
+pub const FILE: &str = "constraints/baselines.json";
+/// Its content when this program was built.
+const COMMITTED: &str = include_str!("../../../constraints/baselines.json");
 /// How much slower the best seed may be: place and route scatters by about this much.
 const SLOWER: f64 = 0.10;
 /// How many more look-up tables and flip-flops it may take; another version of the tools differs by less.
@@ -68,6 +70,11 @@ impl Baseline {
 pub struct Baselines(pub BTreeMap<String, BTreeMap<String, Baseline>>);
 
 impl Baselines {
+    /// What this program was built with; a file that is none counts as empty, [`Baselines::read`] says why it is none.
+    pub fn committed() -> Baselines {
+        serde_json::from_str(COMMITTED).unwrap_or_default()
+    }
+
     /// Reads the file at `path`; none yet where there is no file.
     ///
     /// # Errors
@@ -77,7 +84,7 @@ impl Baselines {
             return Ok(Baselines::default());
         }
         let text = std::fs::read_to_string(path).map_err(ToolError::io(path))?;
-        toml::from_str(&text).map_err(|e| ToolError::Output { path: path.to_owned(), reason: e.to_string() })
+        serde_json::from_str(&text).map_err(|e| ToolError::Output { path: path.to_owned(), reason: e.to_string() })
     }
 
     /// Writes the file at `path`, whole or not at all.
@@ -85,11 +92,8 @@ impl Baselines {
     /// # Errors
     /// [`ToolError::Io`].
     pub fn write(&self, path: &Path) -> Result<(), ToolError> {
-        let text =
-            toml::to_string(self).map_err(|e| ToolError::Output { path: path.to_owned(), reason: e.to_string() })?;
-        let text = format!(
-            "# Written by `dermis bitstream SCENE --update-baselines`; MHz of place and route, cells.\n\n{text}"
-        );
+        let wrong = |e: serde_json::Error| ToolError::Output { path: path.to_owned(), reason: e.to_string() };
+        let text = serde_json::to_string_pretty(self).map_err(wrong)? + "\n";
         let part = path.with_extension("part");
         std::fs::write(&part, text).and_then(|()| std::fs::rename(&part, path)).map_err(ToolError::io(path))
     }
@@ -118,6 +122,11 @@ mod tests {
     }
 
     #[test]
+    fn the_committed_file_is_whole() {
+        assert_eq!(serde_json::from_str::<Baselines>(COMMITTED).unwrap(), Baselines::committed());
+    }
+
+    #[test]
     fn slower_and_larger_is_a_loss() {
         let was = baseline();
         let now = Baseline { best_MHz: 100.0, luts: 41_900, ..was.clone() };
@@ -129,7 +138,7 @@ mod tests {
     #[test]
     fn the_file_reads_back_and_a_wrong_field_is_named() {
         let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join("baselines.toml");
+        let path = folder.path().join("baselines.json");
         assert_eq!(Baselines::read(&path).unwrap(), Baselines::default());
         let mut all = Baselines::default();
         all.0.entry("ulx3s-85f".into()).or_default().insert("sensor-1".into(), baseline());

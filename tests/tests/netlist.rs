@@ -1,0 +1,50 @@
+//! The netlist after synthesis computes the same bits in the same cycles, and the check finds a defect that the Verilog's
+//! simulation cannot: a constant whose sign two tools read differently.
+
+use dermis_golden::fixed::Model;
+use dermis_golden::scene::Scene;
+use dermis_sim::cosim::{run, Bench, Findings, Vector};
+use dermis_sim::drive::Stimulus;
+use dermis_sim::fresh::{Fresh, Shapes};
+use dermis_sim::hardware::{Hardware, Simulator};
+use dermis_tests::build_dir;
+
+/// Of degree 1, so that synthesis is done in a minute; the search is in it.
+const SCENE: &str = "name = \"netlist\"\n[sensor]\nrows = 4\ncols = 4\npitch_x_mm = 4.0\npitch_y_mm = 4.0\n\
+                     thickness_mm = 3.0\n[search]\nmu_max = 0.05\n[fixed]\nlanes = 4\n";
+
+fn findings(hardware: &Hardware, vectors: &[Vector], simulator: Simulator) -> Findings {
+    let mut device = hardware.device(simulator).unwrap();
+    let taps = if simulator == Simulator::Netlist { Vec::new() } else { hardware.tap_names() };
+    let bench = Bench { name: simulator.name(), device: device.as_mut(), taps: &taps };
+    run(bench, vectors, Stimulus::FullSpeed).0
+}
+
+#[test]
+fn the_netlist_equals_the_model_and_a_sign_that_tools_read_differently_is_found() {
+    let scene = Scene::parse(SCENE, "netlist").unwrap();
+    let frames = Fresh { frames: 4, contacts: vec![1], shapes: Shapes::Elliptic, touching: false, seed: 1 }
+        .draw(&scene)
+        .unwrap();
+    let mut hardware = Hardware::new(Model::for_frames(&scene, &frames).unwrap(), &build_dir()).unwrap();
+    let vectors: Vec<Vector> =
+        frames.iter().map(|frame| hardware.vector(std::slice::from_ref(frame)).unwrap()).collect();
+    let netlist = findings(&hardware, &vectors, Simulator::Netlist);
+    assert!(netlist.is_equal(), "{:?}", netlist.kept);
+
+    // A signed constant without a range, as rust-hdl prints one: −5 for Verilator, 251 for Yosys.
+    let file = hardware.generated.files.iter_mut().find(|file| file.name.ends_with(".v")).unwrap();
+    let seeded = [
+        (
+            "    output reg  [95:0] m_axis_tdata;\n",
+            "    localparam signed seeded = 8'hfb;\n    wire signed [7:0] zero = 8'd0;\n",
+        ),
+        ("        m_axis_tdata = resultants$m_axis_tdata;\n", "        if (seeded > zero) m_axis_tdata = 96'd0;\n"),
+    ];
+    for (line, more) in seeded {
+        assert!(file.text.contains(line), "the place of the seeded defect: {line}");
+        file.text = file.text.replacen(line, &format!("{line}{more}"), 1);
+    }
+    assert!(findings(&hardware, &vectors, Simulator::Verilator).is_equal());
+    assert!(!findings(&hardware, &vectors, Simulator::Netlist).is_equal());
+}
