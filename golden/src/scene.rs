@@ -9,6 +9,7 @@
 //! | `[sensor]` | `rows`, `cols` (2 … 256), `pitch_x_mm`, `pitch_y_mm`, `thickness_mm` (0 … 10⁶] |
 //! | `[medium]` | `kind` ("half-space"; "bonded-layer" with `poisson`, 0.48) |
 //! | `[partition]` | `case` (0; 1 … 3, "adaptive", "contacts") or `rows`, `cols` |
+//! | | `cases` (of "adaptive": 0 and others of 1 … 3, what hardware builds; without it all that fit together) |
 //! | | `condition` ("loaded"; "both-signs") |
 //! | `[search]` | `objective` ("sparse"; …), `mu_max` (0.6; 0, or 0.001 … 2), `noise_floor_MPa` (0) |
 //! | | `form` ("oblique"; "orthogonal") |
@@ -31,7 +32,7 @@ mod tests;
 pub use error::SceneError;
 
 use crate::frame::Frame;
-use crate::partition::Case;
+use crate::partition::{subarrays, Case};
 use crate::sensor::Sensor;
 use serde::{Deserialize, Serialize};
 use std::fmt;
@@ -136,6 +137,8 @@ pub enum Form {
 pub struct PartitionSpec {
     /// Which subarrays.
     pub case: Case,
+    /// Of [`Case::Adaptive`], the paper's cases to choose from, 0 among them; `None` where the scene lists none.
+    pub listed: Option<[bool; 4]>,
     /// When a subarray is searched.
     pub condition: Condition,
 }
@@ -218,6 +221,15 @@ pub struct OutputSpec {
     pub forces: ForceOutput,
 }
 
+impl PartitionSpec {
+    /// The paper's cases that [`Case::Adaptive`] chooses from, where they divide `sensor`.
+    pub fn choices(&self, sensor: &Sensor) -> Vec<Case> {
+        let listed = |number: &i64| self.listed.is_none_or(|listed| listed[*number as usize]);
+        let divides = |case: &Case| subarrays(*case, sensor).is_ok();
+        (0..4).filter(listed).filter_map(Case::numbered).filter(divides).collect()
+    }
+}
+
 impl InputSpec {
     /// Noise of the mean of 2^average frames over that of a single one, 2^(−average/2).
     pub fn noise_share(&self) -> f64 {
@@ -238,7 +250,7 @@ impl InputSpec {
 impl Default for PartitionSpec {
     fn default() -> Self {
         let condition = Condition::default();
-        PartitionSpec { case: Case::WHOLE, condition }
+        PartitionSpec { case: Case::WHOLE, listed: None, condition }
     }
 }
 

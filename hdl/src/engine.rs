@@ -7,16 +7,17 @@
 //! ```
 //! Three things go on at once: while one subarray is searched, the next one's v_ij are computed; while a frame is
 //! computed, the next is received into the frame buffer, which is free again as soon as `fold` has read it; while a frame
-//! is sent, the next one's first v_ij are computed, and wait until it is out. (Without a search there is no memory where they
-//! could wait: then a frame begins when the last one is out.)
+//! is sent, the next one's first v_ij are computed, and wait until it is out. Where the case is chosen per frame, the
+//! choice is made as the frame is received ([`choosing`](crate::choosing)). (Without a search there is no memory where
+//! v_ij could wait: then a frame begins when the last one is out.)
 
 use dermis_golden::fixed::Model;
 use dermis_golden::scene::Condition;
 use rust_hdl::prelude::*;
 
-use super::Search;
-use crate::primitives::{count_bits, BitDelay, Counter, Keep, Resultants, CYCLE_BITS};
-use crate::stages::{Fold, Force, Normalise, Pass, Prepare, Receive, Rescale, Send, Unfold};
+use super::{Receive, Search};
+use crate::primitives::{count_bits, largest, BitDelay, CaseCounter, Counter, Keep, Resultants, CYCLE_BITS};
+use crate::stages::{Fold, Force, Normalise, Pass, Prepare, Rescale, Send, Unfold};
 use crate::wire::Wire;
 
 /// ```text
@@ -74,17 +75,19 @@ pub struct Engine {
     searched_condition: DFF<Bit>,
     searched_last: DFF<Bit>,
     sent_framing: DFF<Bit>,
+    frame_case: Keep,
+    sent_case: Keep,
     searched_part: Keep,
     searched_normalise: Keep,
     searched_rescale: Keep,
     searched_saturations: Keep,
     cycles: Counter,
-    part: Counter,
+    part: CaseCounter,
     again: BitDelay,
     finish: BitDelay,
     both_signs: Constant<Bit>,
     ahead: Constant<Bit>,
-    begin_frame: Signal<Local, Bit>,
+    pub(crate) begin_frame: Signal<Local, Bit>,
     start: Signal<Local, Bit>,
     complete: Signal<Local, Bit>,
     behind: Signal<Local, Bit>,
@@ -96,12 +99,11 @@ impl Engine {
     /// The engine of a scene.
     pub fn new(model: &Model) -> Self {
         let formats = &model.formats;
-        let layout = model.layout();
         let bits = formats.input_bits as usize;
-        let parts = model.grid();
-        let count = model.parts.len();
-        let (normalise, rescale) = (Normalise::new(bits), Rescale::new(formats));
-        let force = Force::new(formats, count, model.threshold);
+        let counts: Vec<usize> = model.cases().iter().map(|case| case.parts.len()).collect();
+        let which = count_bits(counts.len());
+        let (normalise, rescale) = (Normalise::new(bits), Rescale::new(model));
+        let force = Force::new(model);
         let mut engine = Engine {
             clk: Default::default(),
             rst: Default::default(),
@@ -114,14 +116,14 @@ impl Engine {
             m_axis_tready: Default::default(),
             m_axis_tlast: Default::default(),
             prepare: Prepare::new(model),
-            receive: Receive::new(layout, parts, bits, model.noise_floor, &model.dead),
-            fold: Fold::new(formats.quads, count, bits),
+            receive: Receive::new(model),
+            fold: Fold::new(model),
             pass: Pass::new(model),
             unfold: Unfold::new(model),
-            search: Search::new(formats, layout, count > 1),
+            search: Search::new(model),
             forces: force,
-            send: Send::new(layout, parts),
-            resultants: Resultants::new(model.wants_resultants(), &model.scene.sensor, parts),
+            send: Send::new(model),
+            resultants: Resultants::new(model.wants_resultants(), &model.scene.sensor, model.grid()),
             computing: Default::default(),
             first: Default::default(),
             filled: Default::default(),
@@ -132,14 +134,16 @@ impl Engine {
             searched_condition: Default::default(),
             searched_last: Default::default(),
             sent_framing: Default::default(),
-            searched_part: Keep::new(count_bits(count)),
+            frame_case: Keep::new(which).constant(!model.chooses()),
+            sent_case: Keep::new(which).constant(!model.chooses()),
+            searched_part: Keep::new(count_bits(largest(&counts))),
             searched_normalise: Keep::new(normalise.shift.width()),
             searched_rescale: Keep::new(rescale.shift.width()),
             searched_saturations: Keep::new(rescale.saturations.width()),
             normalise,
             rescale,
             cycles: Counter::new(1 << CYCLE_BITS),
-            part: Counter::new(count),
+            part: CaseCounter::new(&counts),
             again: BitDelay::new(1),
             // The first beat, which takes the count of cycles, is out by then.
             finish: BitDelay::new(6),
@@ -187,6 +191,8 @@ impl Logic for Engine {
         self.searched_condition.clock.next = self.clk.val();
         self.searched_last.clock.next = self.clk.val();
         self.sent_framing.clock.next = self.clk.val();
+        self.frame_case.clk.next = self.clk.val();
+        self.sent_case.clk.next = self.clk.val();
         self.searched_part.clk.next = self.clk.val();
         self.searched_normalise.clk.next = self.clk.val();
         self.searched_rescale.clk.next = self.clk.val();
@@ -210,9 +216,23 @@ impl Logic for Engine {
         self.computing.d.next =
             (self.begin_frame.val() | (self.computing.q.val() & !self.finish.then.val())) & !self.rst.val();
 
+        comment!("Its case stands until the next one begins, or is sent");
+        self.frame_case.keep.next = self.begin_frame.val();
+        self.frame_case.word.next = self.receive.which.val();
+        self.fold.which.next = self.frame_case.kept.val();
+        self.pass.which.next = self.frame_case.kept.val();
+        self.rescale.which.next = self.frame_case.kept.val();
+        self.unfold.which.next = self.frame_case.kept.val();
+        self.search.which.next = self.frame_case.kept.val();
+        self.part.which.next = self.frame_case.kept.val();
+        self.forces.which.next = self.sent_case.kept.val();
+        self.send.which.next = self.sent_case.kept.val();
+
         comment!("A subarray is handed over to the search when that is free");
         comment!("and, a frame's first one, when the last frame is out");
         self.begin_send.next = self.search.values_begin.val() & self.searched_last.q.val();
+        self.sent_case.keep.next = self.begin_send.val();
+        self.sent_case.word.next = self.frame_case.kept.val();
         self.sending.d.next =
             (self.begin_send.val() | (self.sending.q.val() & !self.send.done.val())) & !self.rst.val();
         self.complete.next = self.filled.q.val() | self.unfold.done.val();

@@ -3,10 +3,12 @@
 use std::collections::BTreeMap;
 
 use dermis_golden::fixed::resources::Memory;
-use dermis_golden::fixed::send::{FLAG_CONDITION, FLAG_FOUND, FLAG_FRAMING, FLAG_NO_CONTACT};
+use dermis_golden::fixed::send::{CASE_SHIFT, FLAG_CONDITION, FLAG_FOUND, FLAG_FRAMING, FLAG_NO_CONTACT, STATUS_BEATS};
 use dermis_golden::fixed::storage::word_bits;
-use dermis_golden::fixed::{Cycles, Model};
+use dermis_golden::fixed::{Cycles, Dropped, Model};
 use dermis_golden::link::{c_header, LinkError};
+use dermis_golden::partition::Case;
+use serde::Serialize;
 use serde_json::json;
 use thiserror::Error;
 
@@ -66,6 +68,30 @@ pub struct Generated {
     pub manifest: serde_json::Value,
     /// What each stage takes of the device.
     pub usage: BTreeMap<String, Usage>,
+    /// The cases that were not built, of a scene that lists none.
+    pub dropped: Vec<Refused>,
+}
+
+/// A case that was not built, and what the device would have needed with it.
+#[derive(Clone, Debug, Serialize)]
+pub struct Refused {
+    /// The case.
+    pub case: u32,
+    /// The cases there would have been.
+    pub with: Vec<u32>,
+    /// What they would have needed.
+    pub needs: Usage,
+}
+
+/// What was not built of the cases of `model`.
+fn refused(model: &Model) -> Result<Vec<Refused>, HdlError> {
+    let refused = |dropped: &Dropped| {
+        let with: Vec<u32> = dropped.design.cases().iter().map(Model::number).collect();
+        let case = with.iter().copied().find(|number| Case::numbered(i64::from(*number)) == Some(dropped.case));
+        let needs = total(&stages(&dropped.design, &design(&dropped.design)?.verilog()));
+        Ok(Refused { case: case.unwrap_or_default(), with, needs })
+    };
+    model.dropped.iter().map(refused).collect()
 }
 
 impl Generated {
@@ -87,7 +113,8 @@ pub fn generate(model: &Model) -> Result<Generated, HdlError> {
     let file = |name: String, text: String| GeneratedFile { name, text };
     let verilog = place(&engine.verilog(), model, "")?;
     let usage = stages(model, &verilog);
-    let manifest = manifest(model, &top, &usage);
+    let dropped = refused(model)?;
+    let manifest = manifest(model, &top, &usage, &dropped);
     let verilog = header(model, &top) + &rename(&verilog, &top);
     let mut files = vec![
         file(format!("{top}.v"), verilog),
@@ -99,7 +126,7 @@ pub fn generate(model: &Model) -> Result<Generated, HdlError> {
     let names: Vec<&str> = files.iter().map(|file| file.name.as_str()).collect();
     let core = core_file(&top, &model.scene.name, &names);
     files.push(file(format!("{top}.core"), core));
-    Ok(Generated { top, files, taps: taps(model), manifest, usage })
+    Ok(Generated { top, files, taps: taps(model), manifest, usage, dropped })
 }
 
 /// Marks every memory of the model with where the synthesiser is to put it; the engine's modules begin with `engine`.
@@ -167,13 +194,35 @@ fn header(model: &Model, top: &str) -> String {
             false => format!("{} forces row-major", model.force_beats()),
             true => format!("{} beats of sums", model.force_beats()),
         },
-        status = model.status_beats(),
+        status = match model.chooses() {
+            false => model.status_beats().to_string(),
+            true => format!("{STATUS_BEATS} per subarray of the frame's case"),
+        },
         lanes = 4 * f.lanes_per_parity,
         degree = f.degree,
     )
 }
 
-fn manifest(model: &Model, top: &str, usage: &BTreeMap<String, Usage>) -> serde_json::Value {
+/// Cycles of a frame where all subarrays are searched, and where none is.
+fn cycles(model: &Model) -> serde_json::Value {
+    let of = |searched: bool| Cycles::of(model, &vec![searched; model.parts.len()]);
+    json!({ "searched": of(true), "not_searched": of(false) })
+}
+
+/// What a reader needs of one of several cases; the choice's [`LATENCY`](dermis_golden::fixed::choose::LATENCY) is not
+/// in its cycles.
+fn case(case: &Model) -> serde_json::Value {
+    json!({
+        "case": case.number(),
+        "subarrays": case.parts.len(),
+        "quads": case.formats.quads,
+        "status_beats": case.status_beats(),
+        "coefficient_words": case.storage.words(),
+        "cycles": cycles(case),
+    })
+}
+
+fn manifest(model: &Model, top: &str, usage: &BTreeMap<String, Usage>, dropped: &[Refused]) -> serde_json::Value {
     let (scene, f) = (&model.scene, &model.formats);
     let full_scale = scene.input.full_scale_MPa;
     json!({
@@ -204,13 +253,14 @@ fn manifest(model: &Model, top: &str, usage: &BTreeMap<String, Usage>) -> serde_
                 "found": FLAG_FOUND,
                 "no_contact": FLAG_NO_CONTACT,
                 "framing": FLAG_FRAMING,
+                "case_shift": model.chooses().then_some(CASE_SHIFT),
             },
         },
         "sizes": {
             "quads": f.quads,
             "lanes": 4 * f.lanes_per_parity,
-            "coefficient_words": model.storage.words(),
-            "columns_left_out": model.storage.is_pruned(f.quads),
+            "coefficient_words": model.cases().iter().map(|case| case.storage.words()).sum::<usize>(),
+            "columns_left_out": model.cases().iter().any(|case| case.storage.is_pruned(case.formats.quads)),
             "coefficient_word_bits": word_bits(f),
         },
         "resources": {
@@ -218,9 +268,8 @@ fn manifest(model: &Model, top: &str, usage: &BTreeMap<String, Usage>) -> serde_
             "stages": usage,
             "memories": model.resources.memories,
         },
-        "cycles": {
-            "searched": Cycles::of(model, &vec![true; model.parts.len()]),
-            "not_searched": Cycles::of(model, &vec![false; model.parts.len()]),
-        },
+        "cycles": cycles(model),
+        "cases": model.chooses().then(|| model.cases().iter().map(case).collect::<Vec<_>>()),
+        "dropped": model.chooses().then_some(dropped),
     })
 }

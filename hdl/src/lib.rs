@@ -13,6 +13,7 @@ macro_rules! comment {
     ($text:literal) => {};
 }
 
+pub mod choosing;
 pub mod device;
 pub mod engine;
 pub mod estimate;
@@ -32,8 +33,8 @@ mod generate;
 mod simulate;
 mod taps;
 
-// The search of [`engine`]; that of [`unsearched`] is another one.
-use stages::Search;
+// The first and the search of [`engine`]; those of [`choosing`] and [`unsearched`] are others.
+use stages::{Receive, Search};
 
-pub use generate::{generate, Generated, GeneratedFile, HdlError};
+pub use generate::{generate, Generated, GeneratedFile, HdlError, Refused};
 pub use simulate::simulator;

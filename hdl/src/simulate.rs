@@ -8,7 +8,7 @@ use crate::generate::HdlError;
 use crate::primitives::{position_bits, CALIBRATION_FILE, COLUMN_FILE, MEMORY_FILE};
 use crate::taps::{taps, SEARCH_FIELD};
 use crate::wire::Word;
-use crate::{engine, unsearched};
+use crate::{choosing, engine, unsearched};
 
 /// Update rounds after which signals that still change are taken for a combinational loop.
 pub(crate) const SETTLE_ROUNDS: usize = 200;
@@ -49,17 +49,20 @@ macro_rules! design {
                     SEARCH_FIELD as usize,
                 );
                 let streams = [
-                    (self.receive.accept.val(), self.receive.taken_word.val()),
-                    (self.fold.normalised_valid.val(), self.normalise.shifted.val()),
-                    (self.fold.folded_valid.val(), self.fold.folded.val()),
-                    (self.pass.quad_valid.val(), self.pass.quad.val()),
-                    (self.rescale.words_valid.val(), self.rescale.words.val()),
-                    (self.unfold.taxels_valid.val(), self.unfold.taxels.val()),
-                    (search.judged.val(), best),
-                    (search.values_valid.val(), search.values.val()),
+                    ("receive", self.receive.accept.val(), self.receive.taken_word.val()),
+                    ("choose", self.begin_frame.val(), self.receive.which.val()),
+                    ("normalise", self.fold.normalised_valid.val(), self.normalise.shifted.val()),
+                    ("fold", self.fold.folded_valid.val(), self.fold.folded.val()),
+                    ("pass", self.pass.quad_valid.val(), self.pass.quad.val()),
+                    ("rescale", self.rescale.words_valid.val(), self.rescale.words.val()),
+                    ("unfold", self.unfold.taxels_valid.val(), self.unfold.taxels.val()),
+                    ("search", search.judged.val(), best),
+                    ("force", search.values_valid.val(), search.values.val()),
                 ];
-                let sample = |((valid, word), tap): (&(bool, Word), &Tap)| {
-                    valid.then(|| (0..tap.fields).map(|field| word.signed(field, tap.field_bits as usize)).collect())
+                let sample = |tap: &Tap| {
+                    let (_, valid, word) = streams.iter().find(|(name, ..)| *name == tap.name)?;
+                    let field = |field| word.signed(field, tap.field_bits as usize);
+                    valid.then(|| (0..tap.fields).map(field).collect())
                 };
                 let data = self.m_axis_tdata.val();
                 Outputs {
@@ -67,7 +70,7 @@ macro_rules! design {
                     m_valid: self.m_axis_tvalid.val(),
                     m_data: [0, 1, 2].map(|word| data.signed(word, 32) as i32),
                     m_last: self.m_axis_tlast.val(),
-                    taps: streams.iter().zip(taps).map(sample).collect(),
+                    taps: taps.iter().map(sample).collect(),
                 }
             }
 
@@ -86,12 +89,14 @@ macro_rules! design {
 
 design!(engine::Engine);
 design!(unsearched::engine::Engine);
+design!(choosing::engine::Engine);
 
 /// The engine of `model`, checked.
 pub(crate) fn design(model: &Model) -> Result<Box<dyn Design>, HdlError> {
-    let design: Box<dyn Design> = match model.searches() {
-        true => checked(engine::Engine::new(model))?,
-        false => checked(unsearched::engine::Engine::new(model))?,
+    let design: Box<dyn Design> = match (model.searches(), model.chooses()) {
+        (true, false) => checked(engine::Engine::new(model))?,
+        (true, true) => checked(choosing::engine::Engine::new(model))?,
+        (false, _) => checked(unsearched::engine::Engine::new(model))?,
     };
     Ok(design)
 }

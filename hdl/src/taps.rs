@@ -3,10 +3,13 @@
 use dermis_golden::fixed::Model;
 
 use crate::device::Tap;
-use crate::primitives::position_bits;
+use crate::primitives::{count_bits, position_bits};
 
 /// Field width of the search's tap, whose fields have different widths in hardware.
 pub const SEARCH_FIELD: u32 = 32;
+
+/// Field width of the choice's tap: an index of a case, and a sign.
+const CHOICE_FIELD: u32 = 3;
 
 /// Names, Verilog expressions and shapes, in pipeline order.
 pub fn taps(model: &Model) -> Vec<Tap> {
@@ -29,7 +32,7 @@ pub fn taps(model: &Model) -> Vec<Tap> {
         y = extended("best_y", position),
         x = extended("best_x", position),
     );
-    vec![
+    let mut all = vec![
         tap("receive", "receive$accept", "receive$taken_word", 1, f.input_bits),
         tap("normalise", "fold$normalised_valid", "normalise$shifted", 4, f.input_bits),
         tap("fold", "fold$folded_valid", "fold$folded", 4, f.fold_bits),
@@ -38,5 +41,11 @@ pub fn taps(model: &Model) -> Vec<Tap> {
         tap("unfold", "unfold$taxels_valid", "unfold$taxels", 4, f.vector_bits + 2),
         Tap { name: "search", valid: "{}search$judged".into(), data: search, fields: 4, field_bits: SEARCH_FIELD },
         tap("force", "search$values_valid", "search$values", 4, f.search_bits[0]),
-    ]
+    ];
+    if model.chooses() {
+        let zeros = CHOICE_FIELD - count_bits(model.cases().len()) as u32;
+        let data = format!("{{{zeros}'d0, {{}}receive$which}}");
+        all.insert(1, Tap { name: "choose", valid: "{}begin_frame".into(), data, fields: 1, field_bits: CHOICE_FIELD });
+    }
+    all
 }

@@ -2,7 +2,7 @@
 //! place of the search. rust-hdl has no optional blocks, so the file is read twice; what it calls `Search` is the
 //! module's.
 
-use crate::stages::Unsearched as Search;
+use crate::stages::{Receive, Unsearched as Search};
 
 #[path = "engine.rs"]
 #[allow(clippy::duplicate_mod)]

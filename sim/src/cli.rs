@@ -419,6 +419,7 @@ fn build(scene: &Scene, out: &Path, board: bool, with_features: bool) -> Result<
         text.push_str(&format!("{} ({} bytes)\n", path.display(), file.text.len()));
     }
     text.push_str(&report::resources(&model, &generated.usage));
+    text.push_str(&report::cases(&model, &generated.dropped));
     if board {
         text.push_str(&report::wire_times(&model));
     }

@@ -8,6 +8,7 @@
 //! Times are total cycles (first input beat to last output beat) at the engine's clock; the margin is
 //! what they leave of [`BUDGET_US`].
 
+mod cases;
 mod data;
 mod document;
 mod errors;
@@ -27,6 +28,7 @@ mod sections;
 mod style;
 mod table;
 
+pub use cases::cases;
 pub use errors::errors;
 pub use host::{equality, resultants, wire_times};
 pub use implemented::{implemented, Implemented};

@@ -6,6 +6,7 @@
 //! | `accuracy` | golden against the truth, bit-true against golden |
 //! | `dead` | dead taxels: the same equality, blind to what they read, near the golden model |
 //! | `flipped_bit` | one wrong bit in a coefficient, a vector or the expected output is found |
+//! | `choice` | several cases in one design: equality in mixed order, wrong constants found, what the choice is worth |
 //! | `resources` | block RAMs and multipliers as Yosys counts them, flip-flops and LUTs near |
 //! | `explain` | what is left out is not in the Verilog, and what that saves; refusals name what fits |
 //! | `framing` | early and missing `tlast`: what is dropped, what is flagged, and equality right after |

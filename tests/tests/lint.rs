@@ -5,6 +5,8 @@ use std::path::Path;
 use std::process::Command;
 
 use dermis_golden::fixed::Model;
+use dermis_golden::partition::Case;
+use dermis_golden::scene::Condition;
 use dermis_hdl::link::generate_board;
 use dermis_hdl::{generate, Generated};
 use dermis_tests::{scene, SCENES};
@@ -55,6 +57,20 @@ fn dead_taxels_are_clean_with_the_same_waivers() {
     let generated = generate(&Model::new(&scene).unwrap()).unwrap();
     let folder = tempfile::tempdir().unwrap();
     lint(folder.path(), &generated).unwrap_or_else(|log| panic!("{log}"));
+}
+
+#[test]
+fn a_choice_of_cases_is_clean_with_the_engines_waivers() {
+    for (name, _) in SCENES {
+        let mut scene = scene(name).0;
+        for condition in [Condition::Loaded, Condition::BothSigns] {
+            scene.partition.case = Case::Adaptive;
+            scene.partition.condition = condition;
+            let generated = generate(&Model::new(&scene).unwrap()).unwrap();
+            let folder = tempfile::tempdir().unwrap();
+            lint(folder.path(), &generated).unwrap_or_else(|log| panic!("{name}: {log}"));
+        }
+    }
 }
 
 #[test]

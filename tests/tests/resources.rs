@@ -42,6 +42,8 @@ fn block_rams_and_multipliers_are_those_of_yosys() {
         small("partition", "[partition]\nrows = 2\ncols = 3\n[fixed]\nlanes = 16\nprune_bits = 10\n"),
         // Three flips more of every matrix, columns left out.
         small("dead", "[input]\ndead = [[4, 7], [0, 2]]\n[fixed]\nlanes = 16\nprune_bits = 10\n"),
+        // All of the paper's cases, chosen per frame.
+        small("cases", "[partition]\ncases = [0, 1, 2, 3]\n[search]\nmu_max = 0.1\n[fixed]\nlanes = 12\n"),
         // A word of the lanes that no block RAM divides evenly; deep coefficients.
         small("deep", "[search]\nmu_max = 0.1\n[fixed]\nlanes = 12\ninput_bits = 16\n"),
     ];

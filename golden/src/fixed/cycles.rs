@@ -9,11 +9,13 @@
 //! search   7 coarse sweeps of Q, at least 18; the eighth and 7 halvings of Q + 18; one of Q + 7
 //!          (the last alone when nothing is searched)
 //! next     1 from a subarray's search to the passes of the one after it, which go on at the same time
+//! choose   3, where the case is chosen per frame
 //! send     begins with the last subarray's first value: 6 to the first beat, then one beat a cycle
 //! ```
 
 use serde::Serialize;
 
+use super::choose;
 use super::formats::HALVINGS;
 use super::model::Model;
 use super::schedule::schedule;
@@ -62,7 +64,8 @@ pub struct Cycles {
 }
 
 impl Cycles {
-    /// The counts of a frame of `model`; `searched` says of each subarray whether it is searched.
+    /// The counts of a frame of `model`, of a scene of several cases a frame of case 0; `searched` says of each
+    /// subarray whether it is searched.
     pub fn of(model: &Model, searched: &[bool]) -> Self {
         let taxels = model.scene.sensor.taxels() as u64;
         let quads = model.formats.quads as u64;
@@ -84,7 +87,9 @@ impl Cycles {
         // Out of a search the last subarray's values leave while they come.
         let early = if model.searches() { quads } else { 0 };
         // Sums leave once the last force is in them.
-        let first_output = model.prepare.latency() + ACCEPT + searched_at - early + SEND + model.resultants_later();
+        let choice = if model.chooses() { choose::LATENCY } else { 0 };
+        let first_output =
+            choice + model.prepare.latency() + ACCEPT + searched_at - early + SEND + model.resultants_later();
         let latency = first_output + (model.force_beats() + model.status_beats()) as u64 - 1;
         Cycles { first_output, latency, total: (taxels << model.prepare.average) + latency }
     }
@@ -116,7 +121,7 @@ fn timeline(model: &Model) -> Timeline {
     let (formats, storage) = (&model.formats, &model.storage);
     let quads = formats.quads as u64;
     let last_rows = quads - (formats.groups as u64 - 1) * formats.lanes_per_parity as u64;
-    let lanes = LANES + if storage.is_listed(formats) { COLUMNS } else { 0 };
+    let lanes = LANES + if storage.listed { COLUMNS } else { 0 };
     let first_issue = quads + FOLD;
     let (mut now, mut products_done) = (first_issue, 0);
     let mut finished: Vec<u64> = Vec::new();

@@ -147,40 +147,47 @@ pub struct Design {
     pub resources: Resources,
 }
 
-/// Quantises the matrices of a scene's subarray, derives all formats, lays out the coefficient memory and counts what
-/// all `parts` subarrays need of `board`, whether it has that or not.
+/// A case's subarrays: the matrices they share, and how many there are.
+#[derive(Clone, Debug)]
+pub struct Shape {
+    /// Of one of them.
+    pub matrices: Matrices,
+    /// How many.
+    pub parts: usize,
+}
+
+impl Shape {
+    fn quads(&self) -> Quads {
+        Quads { rows: self.matrices.sensor.rows, cols: self.matrices.sensor.cols }
+    }
+}
+
+/// Quantises the matrices of a scene's cases, the whole array's first where there are several, derives all formats,
+/// lays out the coefficient memory and counts what all of it needs of `board`, whether it has that or not. Of several
+/// cases every word has the width and the scale that serves all of them: they run on the same hardware, and differ in
+/// `quads` and `groups` alone.
 ///
 /// # Errors
 /// [`FixedError::Format`] when a word would leave the 48-bit accumulator or a norm of A asks for more headroom than
 /// the data word has.
-pub fn derive(scene: &Scene, matrices: &Matrices, parts: usize, board: &Board) -> Result<Design, FixedError> {
+pub fn derive(scene: &Scene, shapes: &[Shape], board: &Board) -> Result<Vec<Design>, FixedError> {
     let spec = &scene.fixed;
-    let quads = Quads { rows: matrices.sensor.rows, cols: matrices.sensor.cols };
-    let count = quads.len();
-    let scale = -4.0 / 3.0 * scene.search.mu_max;
-    // The mirror symmetry is lost with a taxel: then every flip is looked at, the symmetry's first.
-    let symmetric = scene.input.dead.is_empty();
-    let folded = |matrix: &Mat<f64>, own: usize, scale: f64| -> Vec<Flipped<f64>> {
-        let flips = (0..if symmetric { 1 } else { 4 }).map(|other| own ^ other);
-        let scaled = |Flipped { flip, parity }| {
-            let parity: [Vec<f64>; 4] = parity;
-            Flipped { flip, parity: parity.map(|block| block.iter().map(|c| c * scale).collect()) }
-        };
-        flips.map(|flip| scaled(parity_blocks(quads, matrix, flip))).collect()
+    let largest = shapes.first().ok_or(FixedError::Internal("a scene has a case"))?;
+    let degree = shapes.iter().map(|shape| shape.matrices.degree).max().unwrap_or(0);
+    let mut quantised = quantised(scene, shapes)?;
+    // The largest of a bound over all cases.
+    let bound = |of: &dyn Fn(&Quantised, usize) -> u64| {
+        let each = quantised.iter().zip(shapes).map(|(quantised, shape)| of(quantised, shape.quads().len()));
+        each.max().unwrap_or(0)
     };
-
-    let inverse = folded(&matrices.cz_pinv, 0, 1.0);
-    let (ax, ay) = (folded(&matrices.ax, FLIP_X, scale), folded(&matrices.ay, FLIP_Y, scale));
-    let [inverse] = <[Blocks; 1]>::try_from(quantise(&[inverse], spec.inverse_bits))
-        .map_err(|_| FixedError::Internal("one matrix in, one out"))?;
-    let [ax, ay] = <[Blocks; 2]>::try_from(quantise(&[ax, ay], spec.coef_bits))
-        .map_err(|_| FixedError::Internal("two matrices in, two out"))?;
+    // The same in all cases: dead taxels, which break the symmetry, are a matter of one subarray.
+    let Quantised { inverse, ax, ay } = &quantised[0];
     let flips = Flips { inverse: inverse.flips(), ax: ax.flips(), ay: ay.flips() };
 
-    let sensor = &matrices.sensor;
+    let sensor = &largest.matrices.sensor;
+    // One matrix serves both axes where all subarrays are square.
     let square = sensor.rows == sensor.cols && sensor.pitch_x_mm == sensor.pitch_y_mm;
-    let shared_a = matrices.degree == 1 && square && symmetric;
-    let mut quantised = Quantised { inverse, ax, ay };
+    let shared_a = degree == 1 && square && shapes.len() == 1 && flips.are_symmetric();
 
     let input_bits = spec.input_bits + scene.input.average;
     let fold_bits = input_bits + 2;
@@ -194,35 +201,42 @@ pub fn derive(scene: &Scene, matrices: &Matrices, parts: usize, board: &Board) -
 
     // v_00 in units of 2^raw_shift: the folded input reaches 2^(fold_bits − 1); one unit more for each dropped low·low
     // product.
-    let dropped = (count * flips.inverse.len()) as u64;
-    let raw_bound = ((u128::from(quantised.inverse.norm(count)) << (fold_bits - 1)) >> raw_shift) as u64 + 2 * dropped;
-    let a_norm = quantised.ax.norm(count) + quantised.ay.norm(count);
-    let a_bound = a_norm << (spec.data_bits - 1);
+    let raw_bound = bound(&|quantised, count| {
+        let dropped = (count * flips.inverse.len()) as u64;
+        ((u128::from(quantised.inverse.norm(count)) << (fold_bits - 1)) >> raw_shift) as u64 + 2 * dropped
+    });
+    let a_bound =
+        bound(&|quantised, count| (quantised.ax.norm(count) + quantised.ay.norm(count)) << (spec.data_bits - 1));
     let acc_bits = signed_bits(raw_bound.max(a_bound));
     if acc_bits > 48 {
         return Err(FixedError::Format { what: "accumulator", needs: acc_bits, has: 48 });
     }
+    // Scales are the same in all cases.
+    let (inverse_exponent, a_exponent) = (quantised[0].inverse.exponent, quantised[0].ax.exponent);
     let vector_bits = spec.data_bits + SEARCH_EXTRA_BITS;
-    let a_shift = if matrices.degree == 0 { 0 } else { quantised.ax.exponent - SEARCH_EXTRA_BITS as i32 };
+    let a_shift = if degree == 0 { 0 } else { a_exponent - SEARCH_EXTRA_BITS as i32 };
     let a_shift = u32::try_from(a_shift).map_err(|_| FixedError::Format {
         what: "scaled A (mu_max too large for this sensor)",
         needs: SEARCH_EXTRA_BITS,
-        has: quantised.ax.exponent.max(0) as u32,
+        has: a_exponent.max(0) as u32,
     })?;
 
-    let growth = growth(&quantised.ax, &quantised.ay, count, EXPONENTS.len());
+    let each = quantised.iter().zip(shapes);
+    let growths: Vec<Vec<f64>> =
+        each.map(|(q, shape)| growth(&q.ax, &q.ay, shape.quads().len(), EXPONENTS.len())).collect();
+    let growth = |k: usize| growths.iter().map(|growth| growth[k]).fold(0.0, f64::max);
     let taxel_max = 1u64 << (vector_bits + 1);
-    let used = vectors(matrices.degree);
+    let used = vectors(degree);
     let coefficients: Vec<u64> = (0..used)
         .map(|k| {
             let (i, j) = EXPONENTS[k];
-            ((taxel_max as f64 * growth[k].min(1.0)) / 4f64.powi((i + j) as i32)).ceil() as u64 + 1
+            ((taxel_max as f64 * growth(k).min(1.0)) / 4f64.powi((i + j) as i32)).ceil() as u64 + 1
         })
         .collect();
     let shifted: Vec<u64> = (0..used).map(|k| reach(&coefficients, k)).collect();
-    let taxels = (quads.rows * quads.cols) as u64;
+    let taxels = (sensor.rows * sensor.cols) as u64;
     // Without a search v_00 stays as it is unfolded.
-    let search_bits: Vec<u32> = match matrices.degree {
+    let search_bits: Vec<u32> = match degree {
         0 => vec![vector_bits + 2],
         _ => shifted.iter().map(|&bound| signed_bits(bound)).collect(),
     };
@@ -238,9 +252,10 @@ pub fn derive(scene: &Scene, matrices: &Matrices, parts: usize, board: &Board) -
     let rescale_max = raw_length_max.saturating_sub(vector_bits - 1);
     let headroom = FORCE_BITS - search_bits[0];
     let limbs = (input_low_bits > 0, inverse_low_bits > 0);
-    let order = stored(&products(matrices.degree, limbs, shared_a, &flips));
+    let order = stored(&products(degree, limbs, shared_a, &flips));
+    let count = largest.quads().len();
     let formats = Formats {
-        degree: matrices.degree,
+        degree,
         quads: count,
         lanes_per_parity: count,
         groups: 1,
@@ -254,9 +269,9 @@ pub fn derive(scene: &Scene, matrices: &Matrices, parts: usize, board: &Board) -
         inverse_low_bits,
         limb_align,
         raw_shift,
-        inverse_exponent: quantised.inverse.exponent,
+        inverse_exponent,
         coef_bits: spec.coef_bits,
-        a_exponent: quantised.ax.exponent,
+        a_exponent,
         acc_bits,
         raw_length_max,
         data_bits: spec.data_bits,
@@ -268,43 +283,89 @@ pub fn derive(scene: &Scene, matrices: &Matrices, parts: usize, board: &Board) -
         mu_fraction,
         mu_step,
         // Taxels are in quarters of a vector's LSB; the largest rescale must still fit the force word.
-        force_exponent: raw_shift as i32 - quantised.inverse.exponent - 2 + rescale_max as i32 - headroom as i32,
+        force_exponent: raw_shift as i32 - inverse_exponent - 2 + rescale_max as i32 - headroom as i32,
     };
-    let (formats, storage, resources) = fit(formats, &order, &quantised, scene, parts, board);
-    storage.drop_from(&mut quantised, count, formats.lanes_per_parity);
-    Ok(Design { formats, quantised, storage, resources })
+    let (laid_out, resources) = fit(&formats, &order, &quantised, scene, shapes, board);
+    let design = |((laid_out, mut quantised), shape): ((LaidOut, Quantised), &Shape)| {
+        let LaidOut { formats, storage, .. } = laid_out;
+        storage.drop_from(&mut quantised, shape.quads().len(), formats.lanes_per_parity);
+        Design { formats, quantised, storage, resources: resources.clone() }
+    };
+    Ok(laid_out.into_iter().zip(quantised.drain(..)).zip(shapes).map(design).collect())
+}
+
+/// The matrices of all cases as stored, on one scale.
+fn quantised(scene: &Scene, shapes: &[Shape]) -> Result<Vec<Quantised>, FixedError> {
+    let spec = &scene.fixed;
+    let scale = -4.0 / 3.0 * scene.search.mu_max;
+    // The mirror symmetry is lost with a taxel: then every flip is looked at, the symmetry's first.
+    let looked_at = if scene.input.dead.is_empty() { 1 } else { 4 };
+    let folded = |shape: &Shape, matrix: &Mat<f64>, own: usize, scale: f64| -> Vec<Flipped<f64>> {
+        let scaled = |Flipped { flip, parity }| {
+            let parity: [Vec<f64>; 4] = parity;
+            Flipped { flip, parity: parity.map(|block| block.iter().map(|c| c * scale).collect()) }
+        };
+        (0..looked_at).map(|other| scaled(parity_blocks(shape.quads(), matrix, own ^ other))).collect()
+    };
+    let inverses: Vec<_> = shapes.iter().map(|shape| folded(shape, &shape.matrices.cz_pinv, 0, 1.0)).collect();
+    let pair = |shape: &Shape| {
+        [folded(shape, &shape.matrices.ax, FLIP_X, scale), folded(shape, &shape.matrices.ay, FLIP_Y, scale)]
+    };
+    let pairs: Vec<_> = shapes.iter().flat_map(pair).collect();
+    let mut inverses = quantise(&inverses, spec.inverse_bits).into_iter();
+    let mut pairs = quantise(&pairs, spec.coef_bits).into_iter();
+    let mut next = || Some(Quantised { inverse: inverses.next()?, ax: pairs.next()?, ay: pairs.next()? });
+    shapes.iter().map(|_| next().ok_or(FixedError::Internal("as many matrices out as in"))).collect()
+}
+
+/// A case with its lanes and its part of the coefficient memory.
+#[derive(Clone, Debug)]
+pub struct LaidOut {
+    /// Widths, groups of rows.
+    pub formats: Formats,
+    /// Columns kept.
+    pub storage: Storage,
+    /// Subarrays.
+    pub parts: usize,
 }
 
 /// Chooses lanes and memories: the lanes that the scene says, else the most for which everything fits with room for the
 /// router, else the most for which it fits at all; block RAMs rather than distributed ones where there is the choice.
 fn fit(
-    formats: Formats,
+    formats: &Formats,
     matrices: &[Matrix],
-    quantised: &Quantised,
+    quantised: &[Quantised],
     scene: &Scene,
-    parts: usize,
+    shapes: &[Shape],
     board: &Board,
-) -> (Formats, Storage, Resources) {
+) -> (Vec<LaidOut>, Resources) {
     let (quads, prune_bits) = (formats.quads, scene.fixed.prune_bits);
-    let largest = quantised.inverse.coefficients().map(|c| c.abs()).max().unwrap_or(0);
-    let threshold = |matrix: Matrix| match matrix.kind {
-        Kind::InverseHigh | Kind::InverseLow => largest >> prune_bits,
+    let largest = |quantised: &Quantised| quantised.inverse.coefficients().map(|c| c.abs()).max().unwrap_or(0);
+    let threshold = |quantised: &Quantised, matrix: Matrix| match matrix.kind {
+        Kind::InverseHigh | Kind::InverseLow => largest(quantised) >> prune_bits,
         Kind::Ax => 2f64.powi(quantised.ax.exponent - prune_bits as i32) as i64,
         Kind::Ay => 2f64.powi(quantised.ay.exponent - prune_bits as i32) as i64,
     };
     let with = |groups: usize| {
         let lanes_per_parity = quads.div_ceil(groups);
-        let formats = Formats { lanes_per_parity, groups: quads.div_ceil(lanes_per_parity), ..formats.clone() };
-        let storage = Storage::new(matrices.to_vec(), quantised, quads, lanes_per_parity, threshold);
-        let [first, second] =
-            board.distributed_words.map(|shallow| Resources::new(&formats, &storage, parts, scene, board, shallow));
+        let lay_out = |(quantised, shape): (&Quantised, &Shape)| {
+            let quads = shape.quads().len();
+            let formats =
+                Formats { quads, lanes_per_parity, groups: quads.div_ceil(lanes_per_parity), ..formats.clone() };
+            let limits = matrices.iter().map(|&matrix| (matrix, threshold(quantised, matrix))).collect();
+            let storage = Storage::new(limits, quantised, quads, lanes_per_parity);
+            LaidOut { formats, storage, parts: shape.parts }
+        };
+        let mut laid_out: Vec<LaidOut> = quantised.iter().zip(shapes).map(lay_out).collect();
+        Storage::share(laid_out.iter_mut().map(|case| (&mut case.storage, case.formats.clone())));
+        let [first, second] = board.distributed_words.map(|shallow| Resources::new(&laid_out, scene, board, shallow));
         let resources = if first.fit(board) == Fit::WithRoom { first } else { second };
-        (formats, storage, resources)
+        (laid_out, resources)
     };
     let product = board.multipliers_for(MULTIPLIER_BITS, MULTIPLIER_BITS);
     // What the other blocks take does not depend on the lanes.
     let all = with(1);
-    let others = all.2.multipliers() - 4 * all.0.lanes_per_parity * product;
+    let others = all.1.multipliers() - 4 * quads * product;
     let left = (board.multipliers as usize).saturating_sub(others);
     let least = LEAST_LANES.min(quads);
     let per_parity = match scene.fixed.lanes {
@@ -314,11 +375,11 @@ fn fit(
     let mut groups: Vec<usize> = per_parity.rev().map(|lanes| quads.div_ceil(lanes)).collect();
     groups.dedup();
     // Of those that fit equally well the most lanes win; of those that do not fit, the fewest block RAMs.
-    let rank = |(_, _, resources): &(Formats, Storage, Resources)| match resources.fit(board) {
+    let rank = |(_, resources): &(Vec<LaidOut>, Resources)| match resources.fit(board) {
         Fit::Not => (Fit::Not, resources.block_rams()),
         fit => (fit, 0),
     };
-    let mut best: Option<(Formats, Storage, Resources)> = None;
+    let mut best: Option<(Vec<LaidOut>, Resources)> = None;
     for groups in groups {
         let design = with(groups);
         if best.as_ref().is_none_or(|kept| rank(&design) < rank(kept)) {

@@ -9,6 +9,7 @@
 //! result is from the floating-point model is measured, never assumed: see the tests that span the crates.
 
 pub mod arith;
+pub mod choose;
 pub mod coefficients;
 pub mod cycles;
 pub mod fold;
@@ -29,10 +30,12 @@ pub mod send;
 pub mod storage;
 pub mod unfold;
 
+mod cases;
 pub mod omissions;
 
 mod model;
 mod subarray;
 
+pub use cases::Dropped;
 pub use cycles::Cycles;
 pub use model::{FixedError, Model, Stage, Trace};

@@ -2,9 +2,10 @@
 
 use thiserror::Error;
 
-use super::cycles::Cycles;
+use super::cases::{shape, Dropped};
+use super::cycles::{Cycles, SHORTEST_SWEEP};
 use super::force::Force;
-use super::formats::{derive, Design, Formats, Quantised, LOG_FRACTION, MU_STEPS};
+use super::formats::{Design, Formats, Quantised, LOG_FRACTION, MU_STEPS};
 use super::prepare::{Prepare, Scale};
 use super::quads::Quads;
 use super::receive::blank;
@@ -21,8 +22,8 @@ use crate::flags::{frame_flags, Flag};
 use crate::float::receive::receive as judge;
 use crate::frame::{Forces, Frame, FrameError};
 use crate::input::{Input, InputError};
-use crate::matrices::{Matrices, MatricesError, MAX_DEGREE};
-use crate::partition::{subarrays, Grid, PartitionError, Subarray};
+use crate::matrices::{MatricesError, MAX_DEGREE};
+use crate::partition::{subarrays, Case, Grid, PartitionError, Subarray};
 use crate::quantise::{full_scale, noise_floor_codes, quantise, Codes};
 use crate::reconstruct::{assemble, Reconstruction, Resultant, SubarrayResult};
 use crate::scene::{ForceOutput, Scene, SceneError};
@@ -42,6 +43,16 @@ pub enum FixedError {
     /// The partition does not fit the array.
     #[error(transparent)]
     Partition(#[from] PartitionError),
+    /// A case whose subarrays are too small to share the hardware of another.
+    #[error(
+        "case {case} has subarrays of {quads} quads; several cases in one hardware need at least {SHORTEST_SWEEP}"
+    )]
+    SmallCase {
+        /// The case.
+        case: Case,
+        /// Quads of a subarray.
+        quads: usize,
+    },
     /// The board has too little of something.
     #[error("{0}")]
     DoesNotFit(Box<Shortage>),
@@ -135,11 +146,15 @@ pub struct Model {
     pub resources: Resources,
     /// The board.
     pub board: Board,
-    /// The subarrays, row-major.
+    /// The subarrays, row-major; of a scene of several cases those of case 0, as all that differs between them.
     pub parts: Vec<Subarray>,
     /// Dead taxels, row-major in the array, ascending.
     pub dead: Vec<usize>,
-    layout: Quads,
+    /// The cases that divide the array and were not built, of a scene that lists none.
+    pub dropped: Vec<Dropped>,
+    /// One model for each of several cases, case 0 first; none of a scene of one.
+    pub(super) built: Vec<Model>,
+    pub(super) layout: Quads,
 }
 
 impl Model {
@@ -175,13 +190,19 @@ impl Model {
     pub(super) fn given(scene: &Scene, scale: Scale, degree: Option<usize>) -> Result<Self, FixedError> {
         scene.require_supported()?;
         let board = Board::load(&scene.hardware.board)?;
+        match scene.partition.case {
+            Case::Adaptive => Model::of_choices(scene, &scale, degree, &board),
+            case => Model::of_shapes(scene, &scale, &board, vec![(case, shape(scene, case, degree)?)]),
+        }
+    }
+
+    /// The model of a scene of one case.
+    pub(super) fn of_design(scene: &Scene, scale: &Scale, design: Design, board: &Board) -> Result<Self, FixedError> {
+        let Design { formats, quantised, storage, resources } = design;
         let parts = subarrays(scene.partition.case, &scene.sensor)?;
         let shape = parts[0].sensor(&scene.sensor);
         // With dead taxels there is one subarray.
         let dead = parts[0].own(&scene.input.dead);
-        let mut matrices = Matrices::new(&shape, scene.search.mu_max)?.without(&dead)?;
-        matrices.degree = degree.unwrap_or(matrices.degree);
-        let Design { formats, quantised, storage, resources } = derive(scene, &matrices, parts.len(), &board)?;
         let scaled = |field, value: f64, unit: &dyn Fn(f64) -> f64| match scene.input.full_scale_MPa {
             _ if value == 0.0 => Ok(0.0),
             Some(full_scale) => Ok(value / unit(full_scale)),
@@ -190,7 +211,7 @@ impl Model {
         if let (Some(field), None) = (scene.scaled_input(), scene.input.full_scale_MPa) {
             return Err(FixedError::NoFullScale { field, value: scene.field_value(field) });
         }
-        let prepare = Prepare::new(scene, scale, scene.input.full_scale_MPa.unwrap_or(1.0));
+        let prepare = Prepare::new(scene, scale.clone(), scene.input.full_scale_MPa.unwrap_or(1.0));
         let code_lsb = |full_scale: f64| full_scale / prepare.largest();
         let noise_floor = scaled("search.noise_floor_MPa", scene.search.noise_floor_MPa, &code_lsb)?;
         let force_lsb = |full_scale: f64| code_lsb(full_scale) * 2f64.powi(formats.force_exponent);
@@ -207,7 +228,9 @@ impl Model {
             quantised,
             storage,
             resources,
-            board,
+            board: board.clone(),
+            built: Vec::new(),
+            dropped: Vec::new(),
         })
     }
 
@@ -283,6 +306,9 @@ impl Model {
 
     /// Runs the `codes` of one reconstruction, row-major over the array, `code_bits` wide: 2^average frames of them.
     pub fn run(&self, codes: &[i32]) -> Trace {
+        if self.chooses() {
+            return self.run_chosen(codes);
+        }
         let codes = &blank(&self.prepare.run(codes), &self.dead);
         let sensor = &self.scene.sensor;
         let solved: Vec<Solved> =
@@ -367,6 +393,9 @@ impl Model {
         beats: &[[i32; 3]],
         status: &[[i32; 3]],
     ) -> Result<Reconstruction, FixedError> {
+        if self.chooses() {
+            return self.decode_chosen(frame, engine, beats, status);
+        }
         let codes = self.codes(frame)?;
         if beats.len() != self.force_beats() {
             return Err(FixedError::Beats { what: "forces", got: beats.len(), expected: self.force_beats() });

@@ -27,6 +27,10 @@ pub struct Feature {
 pub fn features(model: &Model) -> Vec<Feature> {
     let mut scene = model.scene.clone();
     scene.fixed.lanes = Some(4 * model.formats.lanes_per_parity as u32);
+    if model.chooses() {
+        let built: Vec<u32> = model.cases().iter().map(Model::number).collect();
+        scene.partition.listed = Some([0, 1, 2, 3].map(|number| built.contains(&number)));
+    }
     let scene = &scene;
     let taxels = scene.sensor.taxels();
     let input = &scene.input;
@@ -58,7 +62,11 @@ pub fn features(model: &Model) -> Vec<Feature> {
     });
     let parts = model.parts.len();
     let quarters = Case::numbered(1).filter(|case| subarrays(*case, &scene.sensor).is_ok());
-    if parts > 1 {
+    if model.chooses() {
+        // What was built stays, whatever else would fit.
+        let cases: Vec<String> = model.cases().iter().map(|case| case.scene.partition.case.to_string()).collect();
+        add("choice of the case", true, format!("cases {} per frame", cases.join(", ")), &|| plain(scene));
+    } else if parts > 1 {
         add("partition", true, format!("{parts} subarrays"), &|| plain(scene));
     } else if let Some(case) = quarters {
         add("partition", false, "2×2 subarrays".into(), &|| plain(&with(&|s| s.partition.case = case)));

@@ -42,6 +42,7 @@ pub struct Prepare {
 }
 
 /// A scene's readings to MPa, before words are known.
+#[derive(Clone)]
 pub(super) struct Scale {
     table: Option<Calibration>,
     tare: Option<Vec<f64>>,

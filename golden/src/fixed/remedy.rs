@@ -3,6 +3,7 @@
 //! | change | tried |
 //! |---|---|
 //! | `fixed.lanes` left out | where the scene sets it: as many as fit are taken then |
+//! | `partition.cases` | one fewer, where the scene lists three or four |
 //! | `partition` | finer ones that divide the array, the coarsest first, the paper's cases before all |
 //! | `search.mu_max` | the largest of three digits that a polynomial of lower degree serves, then 0 |
 //! | `fixed.prune_bits` | ever fewer |
@@ -68,6 +69,7 @@ pub(super) fn remedies(model: &Model) -> Vec<Remedy> {
     let scene = &model.scene;
     let kinds = [
         lanes(scene).into_iter().find_map(fitting),
+        fewer(scene).into_iter().find_map(fitting),
         partitions(scene).into_iter().find_map(fitting),
         degrees(model).into_iter().find_map(fitting),
         pruned(scene).find_map(fitting),
@@ -100,16 +102,32 @@ fn lanes(scene: &Scene) -> Option<Change> {
     scene.fixed.lanes.map(|_| ("fixed.lanes left out".to_string(), changed(scene, |s| s.fixed.lanes = None)))
 }
 
+/// Lists of one case fewer, the finest kept the longest.
+fn fewer(scene: &Scene) -> Vec<Change> {
+    let Some(listed) = scene.partition.listed.filter(|listed| listed.iter().filter(|case| **case).count() > 2) else {
+        return Vec::new();
+    };
+    let without = |number: usize| {
+        let mut listed = listed;
+        listed[number] = false;
+        let left: Vec<String> = (0..4).filter(|&number| listed[number]).map(|number| number.to_string()).collect();
+        let text = format!("partition.cases = [{}]", left.join(", "));
+        (text, changed(scene, |s| s.partition.listed = Some(listed)))
+    };
+    (1..4).rev().filter(|&number| listed[number]).map(without).collect()
+}
+
 fn partitions(scene: &Scene) -> Vec<Change> {
     let sensor = &scene.sensor;
-    let now = scene.partition.case.grid().map_or(1, |grid| grid.rows * grid.cols);
+    // One case is less than several, even the coarsest.
+    let now = scene.partition.case.grid().map_or(0, |grid| grid.rows * grid.cols);
     let divides = |lines: usize, parts: &usize| lines.is_multiple_of(*parts) && lines / parts >= MIN_LINES;
     let mut grids: Vec<Grid> = (1..=sensor.rows)
         .filter(|rows| divides(sensor.rows, rows))
         .flat_map(|rows| (1..=sensor.cols).map(move |cols| Grid { rows, cols }))
         .filter(|grid| divides(sensor.cols, &grid.cols) && grid.rows * grid.cols > now)
         .collect();
-    let numbered = |grid: Grid| (1..=3).find(|&number| Case::numbered(number) == Some(Case::Grid(grid)));
+    let numbered = |grid: Grid| (0..=3).find(|&number| Case::numbered(number) == Some(Case::Grid(grid)));
     // Of equally many subarrays the squarest have the widest view.
     grids.sort_by_key(|&g| (numbered(g).is_none(), g.rows * g.cols, g.rows.abs_diff(g.cols)));
     let change = |grid: Grid| {

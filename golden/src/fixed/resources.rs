@@ -7,7 +7,7 @@
 //! | stage | memory | words × bits |
 //! |---|---|---|
 //! | prepare | zero and gain; sums of several frames | taxels × `code_bits` and 18; taxels × `input_bits` |
-//! | receive | frame buffer, four lanes | subarrays · Q × `input_bits` |
+//! | receive | frame buffer of each case, four lanes | subarrays · Q × `input_bits` |
 //! | fold | input of the passes | Q × 4 · `fold_bits` |
 //! | pass | v_ij as operands, but those of the highest degree | so many · Q × 4 · `data_bits` |
 //! | pass | coefficients; list of their columns | words × 18 · lanes; words × 2 addresses |
@@ -19,16 +19,20 @@
 use serde::Serialize;
 
 use super::arith::{bit_length, signed_bits};
-use super::formats::{Formats, FORCE_BITS, HALVINGS, MULTIPLIER_BITS};
+use super::formats::{Formats, LaidOut, FORCE_BITS, HALVINGS, MULTIPLIER_BITS};
 use super::prepare::GAIN_BITS;
 use super::resultants::PLACE_BITS;
 use super::schedule::vectors;
-use super::storage::{word_bits, Storage};
+use super::storage::word_bits;
 use crate::board::Board;
 use crate::scene::{ForceOutput, Scene};
 
 /// Share of a board's block RAMs that a design takes where it has the choice: the router needs the rest.
 const ROUTABLE: f64 = 0.8;
+
+/// The frame buffers of several cases.
+const BANKS: [&str; 4] =
+    ["receive$banks$0$frame", "receive$banks$1$frame", "receive$banks$2$frame", "receive$banks$3$frame"];
 
 /// Buffers that the sweeps of the search write.
 pub const SEARCH_BUFFERS: usize = 3;
@@ -84,17 +88,16 @@ pub fn operand_vectors(degree: usize) -> usize {
 }
 
 impl Resources {
-    /// What `formats` and `storage` need for `parts` subarrays on `board`; memories of at most `shallow` words go into
-    /// distributed RAM.
-    pub fn new(
-        formats: &Formats,
-        storage: &Storage,
-        parts: usize,
-        scene: &Scene,
-        board: &Board,
-        shallow: usize,
-    ) -> Self {
-        let (f, quads) = (formats, formats.quads);
+    /// What a scene's cases need on `board`, the whole array's first where there are several; memories of at most
+    /// `shallow` words go into distributed RAM.
+    pub fn new(cases: &[LaidOut], scene: &Scene, board: &Board, shallow: usize) -> Self {
+        let f = &cases[0].formats;
+        // What all cases share is as large as the largest asks for; the coefficients add up.
+        let quads = f.quads;
+        let words = cases.iter().map(|case| case.storage.words()).sum();
+        let listed = cases.iter().any(|case| case.storage.listed);
+        let frame_quads = |case: &LaidOut| case.parts * case.formats.quads;
+        let several = cases.iter().any(|case| case.parts > 1);
         let quad = |bits: u32| 4 * bits as usize;
         let memory = |block, array: &str, words: usize, bits: usize, rom: bool| Memory {
             block,
@@ -113,27 +116,27 @@ impl Resources {
         if input.average > 0 {
             memories.push(memory("prepare$average", "sums", taxels, f.input_bits as usize, false));
         }
-        memories.extend(
-            (0..4).map(|lane| {
-                memory("receive$frame", &format!("field{lane}"), parts * quads, f.input_bits as usize, false)
-            }),
-        );
+        for (number, case) in cases.iter().enumerate() {
+            let block = if cases.len() == 1 { "receive$frame" } else { BANKS[number] };
+            let lane = |lane| memory(block, &format!("field{lane}"), frame_quads(case), f.input_bits as usize, false);
+            memories.extend((0..4).map(lane));
+        }
         memories.push(ram("fold$memory", quads, quad(f.fold_bits)));
         if f.degree > 0 {
             memories.push(ram("pass$vectors", operand_vectors(f.degree) * quads, quad(f.data_bits)));
         }
-        memories.push(memory("pass$lanes", "memory", storage.words(), word_bits(f), true));
-        if storage.is_listed(f) {
-            memories.push(memory("pass$steps", "columns", storage.words(), 2 * count_bits(quads), true));
+        memories.push(memory("pass$lanes", "memory", words, word_bits(f), true));
+        if listed {
+            memories.push(memory("pass$steps", "columns", words, 2 * count_bits(quads), true));
         }
         memories.push(ram("rescale$raw", quads, quad(f.acc_bits)));
         for (k, &bits) in f.search_bits.iter().enumerate().filter(|_| f.degree > 0) {
             memories.push(memory("search$store", &format!("memory{k}"), SEARCH_BUFFERS * quads, quad(bits), false));
-            if parts > 1 {
+            if several {
                 memories.push(memory("search$store", &format!("start{k}"), quads, quad(bits), false));
             }
         }
-        memories.push(ram("forces$store", parts * quads, quad(f.search_bits[0])));
+        memories.push(ram("forces$store", cases.iter().map(frame_quads).max().unwrap_or(0), quad(f.search_bits[0])));
         let calibrate = match input.calibration {
             Some(_) => board.multipliers_for(f.code_bits + 1, GAIN_BITS),
             None => 0,

@@ -1,7 +1,8 @@
 //! Stage `send`: what follows the forces on the output stream.
 //!
-//! Forces leave row-major over the array, one beat per taxel, `{fz, fy, fx}`; then [`STATUS_BEATS`] beats for each subarray, row-major.
-//! Saturations of `force`, the contact flag and the cycles are the frame's and the same in all of them:
+//! Forces leave row-major over the array, one beat per taxel, `{fz, fy, fx}`; then [`STATUS_BEATS`] beats for each
+//! subarray of the case taken, row-major. Saturations of `force`, the contact flag and the cycles are the frame's and
+//! the same in all of them:
 //!
 //! | beat | fx word | fy word | fz word |
 //! |---|---|---|---|
@@ -22,13 +23,16 @@ pub const FLAG_FOUND: u32 = 1 << 1;
 pub const FLAG_NO_CONTACT: u32 = 1 << 2;
 /// Flag bit: `tlast` came early or was missing since the last frame sent; the frame it cut short was dropped.
 pub const FLAG_FRAMING: u32 = 1 << 3;
+/// Place of the paper's case number, 2 bits, among the flags; 0 where a scene has one case.
+pub const CASE_SHIFT: u32 = 8;
 
 /// The decoded status of a frame.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct Status {
     /// μ* in units of mu_max / 384.
     pub position: [i32; 2],
-    /// OR of the `FLAG_*` bits.
+    /// OR of the `FLAG_*` bits; of a scene of several cases, the paper's number of the one taken from [`CASE_SHIFT`]
+    /// on.
     pub flags: u32,
     /// Score of the winner, 0 without one.
     pub score: i32,

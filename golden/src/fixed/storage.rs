@@ -20,6 +20,11 @@ pub struct Storage {
     pub matrices: Vec<Matrix>,
     /// `columns[matrix][group]`: kept columns, ascending.
     pub columns: Vec<Vec<Vec<usize>>>,
+    /// First word in the memory, which several cases share.
+    pub base: usize,
+    /// A list of columns stands beside the coefficients: some are left out, in this case or another, or some are read
+    /// transposed.
+    pub listed: bool,
 }
 
 /// Rows of one group: which of them a lane has.
@@ -39,17 +44,11 @@ pub fn stored(schedule: &[Vec<Product>]) -> Vec<Matrix> {
 }
 
 impl Storage {
-    /// Chooses the columns for `per_parity` lanes per parity; coefficients below `threshold(matrix)` LSBs count as nothing.
-    pub fn new(
-        matrices: Vec<Matrix>,
-        quantised: &Quantised,
-        quads: usize,
-        per_parity: usize,
-        threshold: impl Fn(Matrix) -> i64,
-    ) -> Self {
-        let kept = |matrix, group| {
+    /// Chooses the columns for `per_parity` lanes per parity; of each matrix, coefficients below so many LSBs count as
+    /// nothing.
+    pub fn new(limits: Vec<(Matrix, i64)>, quantised: &Quantised, quads: usize, per_parity: usize) -> Self {
+        let kept = |matrix, limit, group| {
             let blocks = blocks(quantised, matrix);
-            let limit = threshold(matrix);
             let matters = |&j: &usize| {
                 blocks
                     .parity
@@ -65,8 +64,21 @@ impl Storage {
             }
         };
         let groups = quads.div_ceil(per_parity);
-        let columns = matrices.iter().map(|&matrix| (0..groups).map(|group| kept(matrix, group)).collect()).collect();
-        Storage { matrices, columns }
+        let of = |&(matrix, limit): &(Matrix, i64)| (0..groups).map(|group| kept(matrix, limit, group)).collect();
+        let columns = limits.iter().map(of).collect();
+        let matrices = limits.into_iter().map(|(matrix, _)| matrix).collect();
+        Storage { matrices, columns, base: 0, listed: false }
+    }
+
+    /// Puts the cases of a scene into one memory, one behind the other, with a list of columns where one needs it.
+    pub fn share<'a>(cases: impl Iterator<Item = (&'a mut Storage, Formats)>) {
+        let mut cases: Vec<(&mut Storage, Formats)> = cases.collect();
+        let listed = cases.iter().any(|(storage, formats)| formats.shared_a || storage.is_pruned(formats.quads));
+        let mut base = 0;
+        for (storage, _) in &mut cases {
+            (storage.base, storage.listed) = (base, listed);
+            base += storage.words();
+        }
     }
 
     /// The kept columns of a stored matrix for a group of rows.
@@ -76,7 +88,7 @@ impl Storage {
 
     /// Address of the first word of (matrix, group); the words follow by column.
     pub fn address_of(&self, matrix: Matrix, group: usize) -> usize {
-        let mut address = 0;
+        let mut address = self.base;
         for (index, groups) in self.columns.iter().enumerate() {
             for (g, columns) in groups.iter().enumerate() {
                 if (self.matrices[index], g) == (matrix, group) {
@@ -88,7 +100,7 @@ impl Storage {
         address
     }
 
-    /// Words of the memory.
+    /// Words of the case.
     pub fn words(&self) -> usize {
         self.columns.iter().flatten().map(Vec::len).sum()
     }
@@ -98,12 +110,7 @@ impl Storage {
         self.columns.iter().flatten().any(|columns| columns.len() < quads)
     }
 
-    /// Whether a list of columns stands beside the coefficients: some are left out, or some are read transposed.
-    pub fn is_listed(&self, formats: &Formats) -> bool {
-        formats.shared_a || self.is_pruned(formats.quads)
-    }
-
-    /// The columns of the memory's words, one after the other.
+    /// The columns of the case's words, one after the other.
     pub fn column_list(&self) -> Vec<usize> {
         self.columns.iter().flatten().flatten().copied().collect()
     }
@@ -123,7 +130,7 @@ impl Storage {
         }
     }
 
-    /// The memory's words: one coefficient per lane, lane `parity·lanes_per_parity + k` for row
+    /// The case's words: one coefficient per lane, lane `parity·lanes_per_parity + k` for row
     /// `group·lanes_per_parity + k`; rows past the last are zero.
     pub fn memory(&self, formats: &Formats, quantised: &Quantised) -> Vec<Vec<i64>> {
         let lanes = formats.lanes_per_parity;

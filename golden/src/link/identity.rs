@@ -16,9 +16,10 @@ const LEAST_CYCLES_PER_BIT: f64 = 8.0;
 /// Why a scene has no link.
 #[derive(Clone, Debug, PartialEq, Error)]
 pub enum LinkError {
-    /// A scene whose engine does not send one force per taxel for each frame.
+    /// A scene whose engine does not send one force per taxel, and as many status beats, for each frame.
     #[error(
-        "{field} = {value}: a board's link takes one frame for each answer, and one force per taxel from the engine"
+        "{field} = {value}: a board's link takes one frame for each answer, and one force per taxel and the status of \
+         always the same subarrays from the engine"
     )]
     Unsupported {
         /// The scene's field.
@@ -56,8 +57,8 @@ impl Identity {
     /// The identity of the hardware of `model`.
     ///
     /// # Errors
-    /// A scene that averages or sends resultants only, an array whose packets would be too long, a bit rate too high for
-    /// the clock.
+    /// A scene that averages, sends resultants only or chooses its case per frame, an array whose packets would be too
+    /// long, a bit rate too high for the clock.
     pub fn of(model: &Model) -> Result<Identity, LinkError> {
         let (sensor, board) = (&model.scene.sensor, &model.board);
         let scene = &model.scene;
@@ -67,6 +68,9 @@ impl Identity {
         }
         if scene.output.forces != ForceOutput::Taxels {
             return refuse("output.forces", "\"resultants\"".to_owned());
+        }
+        if model.chooses() {
+            return refuse("partition.case", scene.partition.case.to_string());
         }
         let payloads = payloads(model);
         if let Some((what, bytes)) = payloads.into_iter().find(|(_, bytes)| *bytes > usize::from(u16::MAX)) {

@@ -1,11 +1,11 @@
 //! Adaptive: of the paper's cases that leave no loaded subarray unmet and cut no contact, the one that comes nearest
 //! to the contacts.
 //!
-//! Cases 1, 2, 3 and 0 are tried in this order, as far as they divide the array. The contacts are those of
-//! `float::contacts`. A contact's cells are those that carry at least 5 % of its largest force; a boundary cuts the
-//! contact when it runs between them. What a contact presses is seen up to 1.5 h beyond its rim, and a subarray cannot
-//! tell it from a load of its own: a contact that is alone, which case 0 solves best, keeps that distance. Between several no
-//! distance is asked for. Case 0 has no boundary and is always possible.
+//! Cases 1, 2, 3 and 0 are tried in this order, as far as they divide the array and the scene lists them. The contacts
+//! are those of `float::contacts`. A contact's cells are those that carry at least 5 % of its largest force; a boundary
+//! cuts the contact when it runs between them. What a contact presses is seen up to 1.5 h beyond its rim, and a
+//! subarray cannot tell it from a load of its own: a contact that is alone, which case 0 solves best, keeps that
+//! distance. Between several no distance is asked for. Case 0 has no boundary and is always possible.
 //!
 //! More subarrays are not always better: each is a smaller array that sees its neighbours' load without knowing of it.
 //! Taken is the case with the least

@@ -128,9 +128,11 @@ impl Golden {
             Ok(Cut { case, parts, shared, masked: Vec::new(), orthogonal, objective }.mask(&scene.input.dead)?)
         };
         let cases = match scene.partition.case {
+            // The finest first, the whole last.
             Case::Adaptive => {
-                let cases = [1, 2, 3, 0].into_iter().filter_map(Case::numbered);
-                cases.filter(|case| subarrays(*case, &scene.sensor).is_ok()).collect()
+                let mut cases = scene.partition.choices(&scene.sensor);
+                cases.rotate_left(1);
+                cases
             }
             Case::Contacts => vec![Case::WHOLE],
             grid @ Case::Grid(_) => vec![grid],

@@ -17,7 +17,7 @@ const SCHEMA: [(&str, &[&str]); 10] = [
     ("", &["name"]),
     ("sensor", &["rows", "cols", "pitch_x_mm", "pitch_y_mm", "thickness_mm"]),
     ("medium", &["kind", "poisson"]),
-    ("partition", &["case", "condition", "rows", "cols"]),
+    ("partition", &["case", "cases", "condition", "rows", "cols"]),
     ("search", &["objective", "mu_max", "noise_floor_MPa", "form"]),
     ("threshold", &["min_force_N"]),
     ("fixed", &["input_bits", "data_bits", "coef_bits", "inverse_bits", "prune_bits", "lanes"]),
@@ -135,6 +135,10 @@ fn partition(reader: &Reader, sensor: &Sensor) -> Result<PartitionSpec, SceneErr
     let names = [("loaded", Condition::Loaded), ("both-signs", Condition::BothSigns)];
     let condition = reader.choice("partition.condition", &names)?;
     let own = ["partition.rows", "partition.cols"].map(|path| reader.value(path));
+    if let Some(value) = reader.value("partition.cases") {
+        let listed = Some(listed_cases(reader, value, sensor)?);
+        return Ok(PartitionSpec { case: Case::Adaptive, listed, condition });
+    }
     let (field, case) = match (reader.value("partition.case"), own) {
         (None, [None, None]) => return Ok(PartitionSpec { condition, ..Default::default() }),
         (Some(value), [None, None]) => ("partition.case", named_case(reader, value)?),
@@ -154,7 +158,34 @@ fn partition(reader: &Reader, sensor: &Sensor) -> Result<PartitionSpec, SceneErr
             reader.wrong(field, value, format!("a partition of {sensor} ({error})"))
         })?;
     }
-    Ok(PartitionSpec { case, condition })
+    Ok(PartitionSpec { case, listed: None, condition })
+}
+
+/// What `partition.cases` lists, of 0 to 3.
+fn listed_cases(reader: &Reader, value: &Value, sensor: &Sensor) -> Result<[bool; 4], SceneError> {
+    let path = "partition.cases";
+    let adaptive = |case: &Value| case.as_str() == Some("adaptive");
+    if ["rows", "cols"].iter().any(|field| reader.value(&format!("partition.{field}")).is_some())
+        || reader.value("partition.case").is_some_and(|case| !adaptive(case))
+    {
+        return Err(reader.wrong(path, value, "left out beside rows, cols and any case but \"adaptive\""));
+    }
+    let wrong = || reader.wrong(path, value, "a list of 0 and others of 1, 2 and 3, each once");
+    let mut listed = [false; 4];
+    for entry in value.as_array().ok_or_else(wrong)? {
+        let number = entry.as_integer().filter(|number| (0..4).contains(number)).ok_or_else(wrong)?;
+        // In range, so that the cast keeps the value.
+        if std::mem::replace(&mut listed[number as usize], true) {
+            return Err(wrong());
+        }
+        let case = Case::numbered(number).ok_or_else(wrong)?;
+        let refused = |error| reader.wrong(path, value, format!("partitions of {sensor} ({error})"));
+        subarrays(case, sensor).map_err(refused)?;
+    }
+    match listed {
+        [true, rest @ ..] if rest.contains(&true) => Ok(listed),
+        _ => Err(wrong()),
+    }
 }
 
 fn named_case(reader: &Reader, value: &Value) -> Result<Case, SceneError> {

@@ -3,7 +3,8 @@
 //! | field | golden model | hardware, bit-true model |
 //! |---|---|---|
 //! | `medium.kind` | all | "half-space" |
-//! | `partition.case` | all | 0 … 3 and rows × cols, where the device holds it |
+//! | `partition.case` | all | 0 … 3, rows × cols, "adaptive" of two or more, where the device holds them |
+//! | `search.mu_max`, `output.forces` | all | with "adaptive" above 0 and "taxels" |
 //! | `search.objective` | all; with "adaptive" and "contacts" "sparse" | "sparse" |
 //! | `search.form` | all, "orthogonal" up to [`crate::float::orthogonal::MAX_TAXELS`] taxels | "oblique" |
 //! | `input.dead` | all; with "orthogonal" none | with one subarray |
@@ -17,9 +18,8 @@
 //! Fields not listed are the same for both. Rules are asked in the order of the table, so that a scene with several
 //! refused choices always names the same one.
 
+use super::{ForceOutput, Form, Medium, ObjectiveKind, Scene, SceneError};
 use crate::partition::Case;
-
-use super::{Form, Medium, ObjectiveKind, Scene, SceneError};
 
 /// A choice that may not be had.
 struct Rule {
@@ -36,14 +36,28 @@ impl Scene {
     /// [`SceneError::NotAvailable`] naming the first choice that is valid but not built.
     pub fn require_supported(&self) -> Result<(), SceneError> {
         let (search, input) = (&self.search, &self.input);
+        let several = self.partition.case == Case::Adaptive;
         let rule = |refused, field, value, available| Rule { refused, field, value, available };
         self.require([
             rule(self.medium != Medium::HalfSpace, "medium.kind", self.medium.to_string(), "half-space"),
             rule(
-                self.partition.case.grid().is_none(),
+                self.partition.case == Case::Contacts,
                 "partition.case",
                 self.partition.case.to_string(),
-                "0, 1, 2, 3, rows and cols",
+                "0, 1, 2, 3, adaptive, rows and cols",
+            ),
+            rule(
+                several && self.partition.choices(&self.sensor).len() < 2,
+                "partition.case",
+                self.partition.case.to_string(),
+                "0: no other of the paper's cases divides the array",
+            ),
+            rule(several && search.mu_max == 0.0, "search.mu_max", "0".to_string(), "above 0, with adaptive"),
+            rule(
+                several && self.output.forces == ForceOutput::Resultants,
+                "output.forces",
+                "resultants".to_string(),
+                "taxels, with adaptive",
             ),
             rule(
                 search.objective != ObjectiveKind::Sparse,

@@ -139,6 +139,13 @@ fn wrong_values_name_what_is_allowed() {
         ("[partition]\nrows = 3\ncols = 1", "3 subarrays do not divide 10 rows"),
         ("[partition]\nrows = 2", "partition.cols is missing"),
         ("[partition]\ncase = 0\nrows = 2", "left out beside rows and cols"),
+        ("[partition]\ncases = [1, 2]", "partition.cases = [1, 2] is not allowed; it must be a list of 0 and others"),
+        ("[partition]\ncases = [0]", "partition.cases = [0] is not allowed; it must be a list of 0 and others"),
+        ("[partition]\ncases = [0, 1, 1]", "a list of 0 and others of 1, 2 and 3, each once"),
+        ("[partition]\ncases = [0, 4]", "a list of 0 and others of 1, 2 and 3, each once"),
+        ("[partition]\ncases = 1", "partition.cases = 1 is not allowed; it must be a list of 0 and others"),
+        ("[partition]\ncases = [0, 1]\ncase = 1", "left out beside rows, cols and any case but \"adaptive\""),
+        ("[partition]\ncases = [0, 1]\nrows = 2", "left out beside rows, cols and any case but \"adaptive\""),
         ("[medium]\npoisson = 0.3", "left out unless"),
         ("[medium]\nkind = \"bonded-layer\"\npoisson = 0.5", "medium.poisson = 0.5"),
     ];
@@ -180,15 +187,43 @@ fn names_can_stand_in_paths_and_comments() {
 }
 
 #[test]
+fn cases_are_listed_or_all_that_divide() {
+    let choices = |more: &str| {
+        let scene = with(more).unwrap();
+        assert_eq!(scene.partition.case, Case::Adaptive);
+        assert!(scene.require_supported().is_ok() && scene.require_golden().is_ok());
+        scene.partition.choices(&scene.sensor).iter().map(Case::to_string).collect::<String>()
+    };
+    assert_eq!(choices("[partition]\ncase = \"adaptive\""), "0123");
+    assert_eq!(choices("[partition]\ncases = [3, 0]"), "03");
+    assert_eq!(choices("[partition]\ncase = \"adaptive\"\ncases = [0, 1, 2]"), "012");
+    let odd = SENSOR.replace("rows = 10", "rows = 9");
+    let error = Scene::parse(&format!("{odd}[partition]\ncases = [0, 1]"), "my.toml").unwrap_err().to_string();
+    assert!(
+        error.contains("partition.cases = [0, 1]") && error.contains("2 subarrays do not divide 9 rows"),
+        "{error}"
+    );
+    let neither = odd.replace("cols = 10", "cols = 9");
+    let scene = Scene::parse(&format!("{neither}[partition]\ncase = \"adaptive\""), "my.toml").unwrap();
+    let error = scene.require_supported().unwrap_err().to_string();
+    assert!(error.contains("no other of the paper's cases divides the array"), "{error}");
+}
+
+#[test]
 fn choices_not_built_yet_say_so() {
     let cases = [
         ("[medium]\nkind = \"bonded-layer\"", "medium.kind = bonded-layer, poisson 0.48; available: half-space"),
-        ("[partition]\ncase = \"contacts\"", "partition.case = contacts; available: 0, 1, 2, 3, rows and cols"),
-        ("[partition]\ncase = \"adaptive\"", "partition.case = adaptive"),
+        ("[partition]\ncase = \"contacts\"", "partition.case = contacts; available: 0, 1, 2, 3, adaptive, rows and"),
+        ("[partition]\ncase = \"adaptive\"\n[search]\nmu_max = 0", "search.mu_max = 0; available: above 0, with"),
+        (
+            "[partition]\ncases = [0, 1]\n[output]\nforces = \"resultants\"",
+            "output.forces = resultants; available: taxels",
+        ),
         (
             "[input]\ndead = [[0, 1]]\n[partition]\ncase = 1",
             "input.dead = [[0, 1]]; available: none, or partition.case = 0",
         ),
+        ("[input]\ndead = [[0, 1]]\n[partition]\ncases = [0, 1]", "input.dead = [[0, 1]]; available: none, or"),
         ("[input]\nunipolar = true", "input.unipolar"),
         ("[search]\nobjective = \"auto\"", "search.objective = auto; available: sparse"),
         ("[search]\nform = \"orthogonal\"", "search.form = orthogonal; available: oblique"),

@@ -51,10 +51,10 @@ pub fn generate_board(model: &Model) -> Result<Generated, HdlError> {
     let engine_file = format!("{}.v", engine.top);
     let waivers = format!("{}.vlt", engine.top);
     let core_file = format!("{}.core", engine.top);
-    let files = engine.files.into_iter().filter(|file| file.name != core_file).map(|file| match file {
+    let files = engine.files.iter().filter(|file| file.name != core_file).cloned().map(|file| match file {
         file if file.name == engine_file => GeneratedFile { name: format!("{top}.v"), text: text.clone() },
         file if file.name == waivers => GeneratedFile { name: format!("{top}.vlt"), ..file },
         file => file,
     });
-    Ok(Generated { files: files.collect(), top, taps: Vec::new(), manifest: engine.manifest, usage: engine.usage })
+    Ok(Generated { files: files.collect(), top, taps: Vec::new(), ..engine })
 }

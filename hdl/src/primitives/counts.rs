@@ -6,27 +6,37 @@ use rust_hdl::prelude::*;
 use super::counter::count_bits;
 use crate::wire::{Wire, Word};
 
-/// Quad address to the lanes that count: all four, but one of each pair of copies on a middle line. Combinational.
+/// Case and quad address to the lanes that count: all four, but one of each pair of copies on a middle line.
+/// Combinational.
 #[derive(LogicBlock)]
 pub struct Counts {
+    /// Which case.
+    pub which: Wire<In>,
     /// Quad address.
     pub address: Wire<In>,
     /// One bit per lane.
     pub mask: Wire<Out>,
-    _layout: Quads,
+    _layouts: Vec<Quads>,
 }
 
 impl Counts {
-    /// For subarrays of `layout`.
-    pub fn new(layout: Quads) -> Self {
-        Counts { address: Wire::new(count_bits(layout.len())), mask: Wire::new(4), _layout: layout }
+    /// For subarrays of the layout of each case.
+    pub fn new(layouts: &[Quads]) -> Self {
+        let quads = layouts.iter().map(Quads::len).max().unwrap_or(1);
+        Counts {
+            which: Wire::new(count_bits(layouts.len())),
+            address: Wire::new(count_bits(quads)),
+            mask: Wire::new(4),
+            _layouts: layouts.to_vec(),
+        }
     }
 }
 
 impl Logic for Counts {
     fn update(&mut self) {
         let address = self.address.val().number() as usize;
-        let mask = if address < self._layout.len() { self._layout.counts(address) } else { 0b1111 };
+        let layout = self._layouts.get(self.which.val().number() as usize).filter(|layout| address < layout.len());
+        let mask = layout.map_or(0b1111, |layout| layout.counts(address));
         self.mask.next = Word::from(u64::from(mask));
     }
 
@@ -36,17 +46,26 @@ impl Logic for Counts {
 
     fn hdl(&self) -> Verilog {
         let bits = self.address.width();
-        let cases: String = (0..self._layout.len())
-            .map(|address| (address, self._layout.counts(address)))
+        let (selector, selector_bits) = match self._layouts.len() {
+            1 => ("address", bits),
+            _ => ("{which, address}", self.which.width() + bits),
+        };
+        let all = self._layouts.iter().enumerate().flat_map(|(case, layout)| {
+            (0..layout.len()).map(move |address| (case << bits | address, layout.counts(address)))
+        });
+        let cases: String = all
             .filter(|&(_, mask)| mask != 0b1111)
-            .map(|(address, mask)| format!("    {bits}'d{address}: mask = 4'b{mask:04b};\n"))
+            .map(|(index, mask)| format!("    {selector_bits}'d{index}: mask = 4'b{mask:04b};\n"))
             .collect();
         Verilog::Custom(if cases.is_empty() {
             "// Even row and column counts: every lane is a taxel.\n\
-             wire unused = &{1'b0, address};\nalways @(*) mask = 4'b1111;"
+             wire unused = &{1'b0, which, address};\nalways @(*) mask = 4'b1111;"
                 .to_string()
         } else {
-            format!("always @(*) begin\n  case (address)\n{cases}    default: mask = 4'b1111;\n  endcase\nend")
+            format!(
+                "wire unused_which = &{{1'b0, which}};\n\
+                 always @(*) begin\n  case ({selector})\n{cases}    default: mask = 4'b1111;\n  endcase\nend"
+            )
         })
     }
 }

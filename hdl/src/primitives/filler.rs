@@ -2,6 +2,7 @@
 
 use rust_hdl::prelude::*;
 
+use super::case_counter::{largest, number_by_case};
 use super::counter::count_bits;
 use crate::wire::{Wire, Word};
 
@@ -11,6 +12,8 @@ use crate::wire::{Wire, Word};
 pub struct Filler {
     /// Clock.
     pub clk: Signal<In, Clock>,
+    /// Which case.
+    pub which: Wire<In>,
     /// New frame.
     pub clear: Signal<In, Bit>,
     /// A quad arrives.
@@ -21,22 +24,23 @@ pub struct Filler {
     pub keep: Signal<Out, Bit>,
     /// Complete operand vectors.
     pub finished: Wire<Out>,
-    _quads: usize,
+    _quads: Vec<usize>,
     _vectors: usize,
     _seen: usize,
 }
 
 impl Filler {
-    /// `vectors` operand vectors of `quads` quads.
-    pub fn new(vectors: usize, quads: usize) -> Self {
+    /// `vectors` operand vectors of so many `quads` in each case.
+    pub fn new(vectors: usize, quads: &[usize]) -> Self {
         Filler {
             clk: Default::default(),
+            which: Wire::new(count_bits(quads.len())),
             clear: Default::default(),
             valid: Default::default(),
-            address: Wire::new(count_bits(vectors.max(1) * quads)),
+            address: Wire::new(count_bits(vectors.max(1) * largest(quads))),
             keep: Default::default(),
             finished: Wire::new(count_bits(vectors + 1)),
-            _quads: quads,
+            _quads: quads.to_vec(),
             _vectors: vectors,
             _seen: 0,
         }
@@ -52,9 +56,10 @@ impl Logic for Filler {
                 self._seen += 1;
             }
         }
-        let all = self._vectors * self._quads;
+        let quads = self._quads[(self.which.val().number() as usize).min(self._quads.len() - 1)];
+        let all = self._vectors * quads;
         self.address.next = Word::from(self._seen.min(all.saturating_sub(1)) as u64);
-        self.finished.next = Word::from((self._seen / self._quads) as u64);
+        self.finished.next = Word::from((self._seen / quads) as u64);
         self.keep.next = self.valid.val() && self._seen < all;
     }
 
@@ -66,10 +71,10 @@ impl Logic for Filler {
 
     fn hdl(&self) -> Verilog {
         let (a, f) = (self.address.width(), self.finished.width());
-        let q = count_bits(self._quads);
+        let q = count_bits(largest(&self._quads));
         if self._vectors == 0 {
             return Verilog::Custom(format!(
-                "// No v_ij is an operand.\nwire unused = &{{1'b0, clk, clear, valid}};\n\
+                "// No v_ij is an operand.\nwire unused = &{{1'b0, clk, which, clear, valid}};\n\
                  always @(*) {{keep, address, finished}} = {}'d0;",
                 1 + a + f
             ));
@@ -77,7 +82,8 @@ impl Logic for Filler {
         Verilog::Custom(format!(
             "\
 reg [{q_end}:0] quad;
-wire last_quad = quad == {q}'d{last};
+wire unused_which = &{{1'b0, which}};
+wire last_quad = quad == {last};
 always @(*) keep = valid && finished != {f}'d{vectors};
 always @(posedge clk) begin
   if (clear) begin
@@ -91,9 +97,9 @@ always @(posedge clk) begin
   end
 end",
             q_end = q - 1,
-            last = self._quads - 1,
+            last = number_by_case(self._quads.iter().map(|quads| quads - 1), q),
             vectors = self._vectors,
-            end = self._vectors * self._quads - 1,
+            end = self._vectors * largest(&self._quads) - 1,
         ))
     }
 }

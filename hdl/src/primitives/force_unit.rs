@@ -2,9 +2,11 @@
 
 use dermis_golden::fixed::force::{force, mu_word};
 use dermis_golden::fixed::formats::{force_shift, Formats, FORCE_BITS, FORCE_SHIFT_MAX, MU_ROUND};
-use dermis_golden::fixed::send::{FLAG_CONDITION, FLAG_FOUND, FLAG_FRAMING, FLAG_NO_CONTACT};
+use dermis_golden::fixed::send::{CASE_SHIFT, FLAG_CONDITION, FLAG_FOUND, FLAG_FRAMING, FLAG_NO_CONTACT};
+use dermis_golden::fixed::Model;
 use rust_hdl::prelude::*;
 
+use super::case_counter::{largest, number_by_case};
 use super::counter::count_bits;
 use super::polynomial_word::resize;
 use super::raw_length::shift_bits;
@@ -22,6 +24,8 @@ pub struct ForceUnit {
     pub clk: Signal<In, Clock>,
     /// Reset of the control pipeline.
     pub rst: Signal<In, Bit>,
+    /// Which case the beats that leave belong to.
+    pub which: Wire<In>,
     /// New frame: counts back to 0.
     pub begin_frame: Signal<In, Bit>,
     /// Keep what is known of subarray `part`.
@@ -71,6 +75,8 @@ pub struct ForceUnit {
     _pipe: Vec<Option<Entry>>,
     _frame: Frame,
     _parts: Vec<Part>,
+    _counts: Vec<usize>,
+    _numbers: Vec<u32>,
 }
 
 /// Steps from `offer` to the output.
@@ -108,11 +114,15 @@ struct Frame {
 }
 
 impl ForceUnit {
-    /// Widths of `formats`, `parts` subarrays, threshold in force LSBs.
-    pub fn new(formats: &Formats, parts: usize, threshold: i64) -> Self {
+    /// Widths of `model`, subarrays and numbers of its cases.
+    pub fn new(model: &Model) -> Self {
+        let formats = &model.formats;
+        let counts: Vec<usize> = model.cases().iter().map(|case| case.parts.len()).collect();
+        let parts = largest(&counts);
         ForceUnit {
             clk: Default::default(),
             rst: Default::default(),
+            which: Wire::new(count_bits(counts.len())),
             begin_frame: Default::default(),
             start: Default::default(),
             part: Wire::new(count_bits(parts)),
@@ -136,11 +146,18 @@ impl ForceUnit {
             last: Default::default(),
             beat_data: Wire::new(3 * FORCE_BITS as usize),
             _formats: formats.clone(),
-            _threshold: threshold,
+            _threshold: model.threshold,
             _pipe: vec![None; STEPS - 1],
             _frame: Frame::default(),
             _parts: vec![Part::default(); parts],
+            _counts: counts,
+            // The case is told where it is chosen.
+            _numbers: model.cases().iter().map(|case| if model.chooses() { case.number() } else { 0 }).collect(),
         }
+    }
+
+    fn case(&self) -> usize {
+        (self.which.val().number() as usize).min(self._counts.len() - 1)
     }
 
     fn keep(&mut self) {
@@ -160,6 +177,7 @@ impl ForceUnit {
     }
 
     fn answer(&mut self, entry: &Entry) -> [i32; 3] {
+        let case = self.case();
         let frame = &mut self._frame;
         let part = self._parts.get(entry.part).copied().unwrap_or_default();
         match entry.beat {
@@ -176,7 +194,8 @@ impl ForceUnit {
                 let flags = flag(part.condition, FLAG_CONDITION)
                     | flag(part.found, FLAG_FOUND)
                     | flag(!frame.contact, FLAG_NO_CONTACT)
-                    | flag(self.framing.val(), FLAG_FRAMING);
+                    | flag(self.framing.val(), FLAG_FRAMING)
+                    | self._numbers[case] << CASE_SHIFT;
                 [part.position[0], part.position[1], flags as i32]
             }
             2 => [part.score, part.rescale as i32, part.normalise as i32],
@@ -281,7 +300,8 @@ impl Logic for ForceUnit {
                     self.beat_data.next = Word::of_fields(&words.map(i64::from), FORCE_BITS as usize);
                 }
                 self.valid.next = leaving.is_some();
-                self.last.next = leaving.is_some_and(|entry| entry.beat == 3 && entry.part + 1 == self._parts.len());
+                let parts = self._counts[self.case()];
+                self.last.next = leaving.is_some_and(|entry| entry.beat == 3 && entry.part + 1 == parts);
                 if let Some(Some(entry)) = self._pipe.last_mut() {
                     entry.value = self.quad.val().signed(entry.lane, self.quad.width() / 4);
                 }
@@ -330,6 +350,15 @@ impl Logic for ForceUnit {
         };
         let searched = f.degree > 0;
         let (mu_words, shear) = if searched { self.shear() } else { self.no_shear() };
+        // From bit 4 on.
+        let above = word - CASE_SHIFT as usize;
+        let case_word = match self._numbers.iter().any(|&number| number > 0) {
+            false => format!("{}'d0", word - 4),
+            true => {
+                let number = number_by_case(self._numbers.iter().map(|&number| number as usize), above);
+                format!("{number}, {}'d0", CASE_SHIFT - 4)
+            }
+        };
         let magnitude = if self._threshold == 0 {
             String::new()
         } else {
@@ -337,6 +366,7 @@ impl Logic for ForceUnit {
         };
         Verilog::Custom(format!(
             "\
+wire unused_which = &{{1'b0, which}};
 reg [{n_end}:0] normalise_held;
 reg [{r_end}:0] rescale_held;
 reg [{part_end}:0] part1, part2;
@@ -403,7 +433,7 @@ wire [{cap}:0] count = {{1'b0, force_saturations}} + {{{cap_less}'d0, clipped[0]
 reg [{all_end}:0] status;
 always @(*) begin
   case (beat4)
-    2'd1: status = {{28'd0, framing, !contact, founds[at4], conditions[at4], {y_word}, {x_word}}};
+    2'd1: status = {{{case_word}, framing, !contact, founds[at4], conditions[at4], {y_word}, {x_word}}};
     2'd2: status = {{{n_word}'d0, normalises[at4], {r_word}'d0, rescales[at4], scores[at4]}};
     default: status = {{{c_word}'d0, cycles_held, {cap_word}'d0, force_saturations, {cap_word}'d0, rescale_saturations[at4]}};
   endcase
@@ -417,7 +447,7 @@ always @(posedge clk) begin
   end else if (advance) begin
     offers <= {{offers[2:0], offer}};
     valid <= offers[3];
-    last <= offers[3] && beat4 == 2'd3 && at4 == {part_bits}'d{last_part};
+    last <= offers[3] && beat4 == 2'd3 && at4 == {final_part};
   end
   if (advance) begin
     {{beat4, beat3, beat2, beat1}} <= {{beat3, beat2, beat1, beat}};
@@ -440,7 +470,8 @@ always @(posedge clk) begin
     if (force_leaves) force_saturations <= count[{cap}] ? {{{cap}{{1'b1}}}} : count[{cap_end}:0];
   end
 end",
-            part_bits = self.part.width(),
+            final_part = number_by_case(self._counts.iter().map(|count| count - 1), self.part.width()),
+            case_word = case_word,
             part_end = self.part.width() - 1,
             last_part = self._parts.len() - 1,
             n_end = n_bits - 1,

@@ -16,6 +16,7 @@ pub struct Keep {
     /// The word kept.
     pub kept: Wire<Out>,
     _value: Word,
+    _constant: bool,
 }
 
 impl Keep {
@@ -27,7 +28,14 @@ impl Keep {
             word: Wire::new(bits),
             kept: Wire::new(bits),
             _value: Word::default(),
+            _constant: false,
         }
+    }
+
+    /// The same without a register, for a word that never changes.
+    pub fn constant(mut self, constant: bool) -> Self {
+        self._constant = constant;
+        self
     }
 }
 
@@ -39,6 +47,9 @@ impl Logic for Keep {
             }
             self.kept.next = self._value;
         }
+        if self._constant {
+            self.kept.next = self.word.val();
+        }
     }
 
     fn connect(&mut self) {
@@ -46,6 +57,10 @@ impl Logic for Keep {
     }
 
     fn hdl(&self) -> Verilog {
-        Verilog::Custom("always @(posedge clk) if (keep) kept <= word;".to_string())
+        let text = match self._constant {
+            false => "always @(posedge clk) if (keep) kept <= word;",
+            true => "wire unused = &{1'b0, clk, keep};\nalways @(*) kept = word;",
+        };
+        Verilog::Custom(text.to_string())
     }
 }

@@ -1,8 +1,10 @@
 //! The MAC lanes with their coefficient memory and shift-out chains.
 
 use dermis_golden::fixed::formats::{Formats, MULTIPLIER_BITS};
+use dermis_golden::fixed::Model;
 use rust_hdl::prelude::*;
 
+use super::case_counter::{largest, number_by_case};
 use super::counter::count_bits;
 use super::polynomial_word::resize;
 use crate::wire::{Wire, Word};
@@ -23,6 +25,8 @@ pub struct Lanes {
     pub clk: Signal<In, Clock>,
     /// Reset of the control pipeline.
     pub rst: Signal<In, Bit>,
+    /// Which case.
+    pub which: Wire<In>,
     /// Address in the coefficient memory.
     pub address: Wire<In>,
     /// Four operands, one per parity.
@@ -36,6 +40,8 @@ pub struct Lanes {
     /// `quad` is a row.
     pub quad_valid: Signal<Out, Bit>,
     _shape: Shape,
+    _groups: Vec<usize>,
+    _last_rows: Vec<usize>,
     _memory: Vec<Vec<i64>>,
     _pipe: Vec<Beat>,
     _coefficients: [usize; 2],
@@ -51,8 +57,6 @@ pub const MEMORY_FILE: &str = "coefficients.hex";
 #[derive(Clone, Copy, Debug)]
 struct Shape {
     per_parity: usize,
-    groups: usize,
-    last_rows: usize,
     acc_bits: usize,
     align: usize,
 }
@@ -68,19 +72,17 @@ struct Beat {
 }
 
 impl Lanes {
-    /// Lanes of `formats` with coefficient words `memory`.
-    pub fn new(formats: &Formats, memory: Vec<Vec<i64>>) -> Self {
+    /// The lanes of `model`, with the coefficients of all its cases.
+    pub fn new(model: &Model) -> Self {
+        let (formats, cases) = (&model.formats, model.cases());
+        let words = |case: &Model| case.storage.memory(&case.formats, &case.quantised);
+        let memory: Vec<Vec<i64>> = cases.iter().flat_map(words).collect();
         let per_parity = formats.lanes_per_parity;
-        let shape = Shape {
-            per_parity,
-            groups: formats.groups,
-            last_rows: formats.quads - (formats.groups - 1) * per_parity,
-            acc_bits: formats.acc_bits as usize,
-            align: formats.limb_align as usize,
-        };
+        let shape = Shape { per_parity, acc_bits: formats.acc_bits as usize, align: formats.limb_align as usize };
         Lanes {
             clk: Default::default(),
             rst: Default::default(),
+            which: Wire::new(count_bits(cases.len())),
             address: Wire::new(count_bits(memory.len())),
             operands: Wire::new(4 * M),
             valid: Default::default(),
@@ -94,6 +96,8 @@ impl Lanes {
             _left: 0,
             _group: 0,
             _shape: shape,
+            _groups: cases.iter().map(|case| case.formats.groups).collect(),
+            _last_rows: cases.iter().map(|case| last_rows(&case.formats)).collect(),
             _memory: memory,
         }
     }
@@ -126,6 +130,11 @@ impl Lanes {
     }
 }
 
+/// Rows of the last group.
+fn last_rows(formats: &Formats) -> usize {
+    formats.quads - (formats.groups - 1) * formats.lanes_per_parity
+}
+
 impl Logic for Lanes {
     fn update(&mut self) {
         if self.clk.pos_edge() {
@@ -140,8 +149,9 @@ impl Logic for Lanes {
             let captured = self._pipe[0];
             if captured.valid && captured.last {
                 self._chain.clone_from(&self._accumulators);
-                self._group = (self._group + 1) % self._shape.groups;
-                self._left = if self._group == 0 { self._shape.last_rows } else { per_parity };
+                let case = (self.which.val().number() as usize).min(self._groups.len() - 1);
+                self._group = (self._group + 1) % self._groups[case];
+                self._left = if self._group == 0 { self._last_rows[case] } else { per_parity };
             }
             let done = self._pipe[1];
             if done.valid {
@@ -176,7 +186,8 @@ impl Logic for Lanes {
     }
 
     fn hdl(&self) -> Verilog {
-        let Shape { per_parity, groups, last_rows, acc_bits, align } = self._shape;
+        let Shape { per_parity, acc_bits, align } = self._shape;
+        let groups = largest(&self._groups);
         let (lanes, words) = (4 * per_parity, self._memory.len());
         let row_bits = count_bits(per_parity + 1);
         let group_bits = count_bits(groups);
@@ -191,10 +202,11 @@ impl Logic for Lanes {
             ),
         };
         let aligned = resize("shifted", wide, acc_bits);
-        let rows = if groups == 1 {
-            format!("{row_bits}'d{last_rows}")
-        } else {
-            format!("group == {group_bits}'d{} ? {row_bits}'d{last_rows} : {row_bits}'d{per_parity}", groups - 1)
+        let last_rows = number_by_case(self._last_rows.iter().copied(), row_bits);
+        let last_group = number_by_case(self._groups.iter().map(|groups| groups - 1), group_bits);
+        let rows = match groups {
+            1 => last_rows,
+            _ => format!("group == {last_group} ? {last_rows} : {row_bits}'d{per_parity}"),
         };
         let count_group = if groups == 1 {
             String::new()
@@ -203,16 +215,16 @@ impl Logic for Lanes {
                 "reg [{end}:0] group;
 always @(posedge clk) begin
   if (rst) group <= {group_bits}'d0;
-  else if (valid4 && last4) group <= group == {group_bits}'d{last} ? {group_bits}'d0 : group + {group_bits}'d1;
+  else if (valid4 && last4) group <= group == {last_group} ? {group_bits}'d0 : group + {group_bits}'d1;
 end
 ",
                 end = group_bits - 1,
-                last = groups - 1
             )
         };
         Verilog::Custom(format!(
             "\
 // One word: a coefficient of {M} bits for each of the {lanes} lanes.
+wire unused_which = &{{1'b0, which}};
 reg [{word_end}:0] memory [0:{words_end}];
 initial $readmemh(\"{MEMORY_FILE}\", memory);
 reg [{word_end}:0] word, coefficients;

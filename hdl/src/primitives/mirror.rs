@@ -1,17 +1,22 @@
 //! Where a taxel lives among the quads.
 
 use dermis_golden::fixed::quads::Quads;
+use dermis_golden::fixed::Model;
 use dermis_golden::partition::Grid;
 use rust_hdl::prelude::*;
 
+use super::case_counter::{by_case, largest};
 use super::constant_product::times;
 use super::counter::count_bits;
 use crate::wire::{Wire, Word};
 
-/// Row and column of a taxel in its subarray, and the subarray's in the array, to quad address, lane, and the lanes to write
-/// (several on a middle line); combinational. Subarrays follow each other row-major, each with all its quads.
+/// In a case, row and column of a taxel in its subarray, and the subarray's in the array, to quad address, lane, and
+/// the lanes to write (several on a middle line); combinational. Subarrays follow each other row-major, each with all
+/// its quads.
 #[derive(LogicBlock)]
 pub struct Mirror {
+    /// Which case.
+    pub which: Wire<In>,
     /// Row in the subarray.
     pub row: Wire<In>,
     /// Column in the subarray.
@@ -28,36 +33,43 @@ pub struct Mirror {
     pub lane: Wire<Out>,
     /// Lanes the taxel is written to.
     pub mask: Wire<Out>,
-    _layout: Quads,
-    _parts: Grid,
+    _cases: Vec<(Quads, Grid)>,
 }
 
 impl Mirror {
-    /// For `parts` subarrays of `layout`.
-    pub fn new(layout: Quads, parts: Grid) -> Self {
-        let count = parts.rows * parts.cols;
+    /// For the subarrays of each of `cases`.
+    pub fn new(cases: &[Model]) -> Self {
+        let wire =
+            |of: &dyn Fn(&Model) -> usize| Wire::new(count_bits(largest(&cases.iter().map(of).collect::<Vec<_>>())));
         Mirror {
-            part_row: Wire::new(count_bits(parts.rows)),
-            part_col: Wire::new(count_bits(parts.cols)),
-            part: Wire::new(count_bits(count)),
-            row: Wire::new(count_bits(layout.rows)),
-            col: Wire::new(count_bits(layout.cols)),
-            address: Wire::new(count_bits(count * layout.len())),
+            which: Wire::new(count_bits(cases.len())),
+            part_row: wire(&|case| case.grid().rows),
+            part_col: wire(&|case| case.grid().cols),
+            part: Wire::new(count_bits(largest(&cases.iter().map(|case| case.parts.len()).collect::<Vec<_>>()))),
+            row: wire(&|case| case.layout().rows),
+            col: wire(&|case| case.layout().cols),
+            address: Wire::new(count_bits(frame_quads(cases))),
             lane: Wire::new(2),
             mask: Wire::new(4),
-            _layout: layout,
-            _parts: parts,
+            _cases: cases.iter().map(|case| (case.layout(), case.grid())).collect(),
         }
     }
+}
+
+/// Quads of a frame, in the case that has most.
+pub fn frame_quads(cases: &[Model]) -> usize {
+    largest(&cases.iter().map(|case| case.parts.len() * case.formats.quads).collect::<Vec<_>>())
 }
 
 impl Logic for Mirror {
     fn update(&mut self) {
         let (row, col) = (self.row.val().number() as usize, self.col.val().number() as usize);
-        if row < self._layout.rows && col < self._layout.cols {
-            let place = self._layout.place(row, col);
-            let part = self.part_row.val().number() as usize * self._parts.cols + self.part_col.val().number() as usize;
-            self.address.next = Word::from((part * self._layout.len() + place.address) as u64);
+        let case = self._cases.get(self.which.val().number() as usize);
+        let inside = |(layout, _): &&(Quads, Grid)| row < layout.rows && col < layout.cols;
+        if let Some((layout, parts)) = case.filter(inside) {
+            let place = layout.place(row, col);
+            let part = self.part_row.val().number() as usize * parts.cols + self.part_col.val().number() as usize;
+            self.address.next = Word::from((part * layout.len() + place.address) as u64);
             self.part.next = Word::from(part as u64);
             self.lane.next = Word::from(place.lane as u64);
             self.mask.next = Word::from(u64::from(place.mask));
@@ -72,39 +84,25 @@ impl Logic for Mirror {
     }
 
     fn hdl(&self) -> Verilog {
-        let (rows, cols) = (self._layout.rows, self._layout.cols);
-        let (row_bits, col_bits, bits) = (self.row.width(), self.col.width(), self.address.width());
-        let (part_row_bits, part_col_bits, part_bits) =
-            (self.part_row.width(), self.part_col.width(), self.part.width());
-        let wide =
-            [bits, row_bits, col_bits, part_bits, part_row_bits, part_col_bits].into_iter().max().unwrap_or(bits);
-        let extend = |name: &str, from: usize| match wide - from {
-            0 => name.to_string(),
-            more => format!("{{{more}'d0, {name}}}"),
-        };
-        // The middle line of an odd count is its own image: written to both lanes.
-        let middle_row = if rows % 2 == 1 { format!("row == {row_bits}'d{}", rows / 2) } else { "1'b0".into() };
-        let middle_col = if cols % 2 == 1 { format!("col == {col_bits}'d{}", cols / 2) } else { "1'b0".into() };
-        let cut = |bits: usize| if wide == bits { String::new() } else { format!("[{}:0]", bits - 1) };
-        let single = self._parts.rows * self._parts.cols == 1;
-        let number = if single {
-            format!("{} | {}", extend("part_row", part_row_bits), extend("part_col", part_col_bits))
-        } else {
-            let row = extend("part_row", part_row_bits);
-            format!("{} + {}", times(&row, self._parts.cols), extend("part_col", part_col_bits))
+        let cases: String = (0..self._cases.len()).map(|case| self.place(case)).collect();
+        let all = |name: &str| {
+            let each: Vec<String> = (0..self._cases.len()).map(|case| format!("{name}{case}")).collect();
+            by_case(&each)
         };
         // What is wider than its target never carries anything there.
+        let cut = |bits: usize| match self.wide() == bits {
+            true => String::new(),
+            false => format!("[{}:0]", bits - 1),
+        };
         Verilog::Custom(format!(
             "\
-wire unused = &{{1'b0, place, number}};
-wire lower = row > {row_bits}'d{row_half};
-wire right = col > {col_bits}'d{col_half};
-wire [{row_end}:0] near_row = lower ? {row_bits}'d{row_last} - row : row;
-wire [{col_end}:0] near_col = right ? {col_bits}'d{col_last} - col : col;
-wire [{wide_end}:0] number = {number};
-wire [{wide_end}:0] place = {base}{row_place} + {col_wide};
-wire both_rows = {middle_row};
-wire both_cols = {middle_col};
+{cases}wire [{end}:0] place = {place};
+wire [{end}:0] number = {number};
+wire lower = {lower};
+wire right = {right};
+wire both_rows = {both_rows};
+wire both_cols = {both_cols};
+wire unused = &{{1'b0, which, place, number}};
 always @(*) begin
   address = place{address_cut};
   part = number{part_cut};
@@ -114,18 +112,70 @@ always @(*) begin
   mask[2] = (lower || both_rows) && (!right || both_cols);
   mask[3] = (lower || both_rows) && (right || both_cols);
 end",
-            base = if single { String::new() } else { format!("{} + ", times("number", self._layout.len())) },
-            address_cut = cut(bits),
-            part_cut = cut(part_bits),
+            end = self.wide() - 1,
+            place = all("place"),
+            number = all("number"),
+            lower = all("lower"),
+            right = all("right"),
+            both_rows = all("both_rows"),
+            both_cols = all("both_cols"),
+            address_cut = cut(self.address.width()),
+            part_cut = cut(self.part.width()),
+        ))
+    }
+}
+
+impl Mirror {
+    /// Bits of the numbers that are computed with.
+    fn wide(&self) -> usize {
+        let widths = [
+            self.address.width(),
+            self.row.width(),
+            self.col.width(),
+            self.part.width(),
+            self.part_row.width(),
+            self.part_col.width(),
+        ];
+        widths.into_iter().max().unwrap_or(1)
+    }
+
+    /// Verilog of a taxel's place in one case.
+    fn place(&self, case: usize) -> String {
+        let (layout, parts) = self._cases[case];
+        let (rows, cols) = (layout.rows, layout.cols);
+        let (row_bits, col_bits, wide) = (self.row.width(), self.col.width(), self.wide());
+        let extend = |name: &str, from: usize| match wide - from {
+            0 => name.to_string(),
+            more => format!("{{{more}'d0, {name}}}"),
+        };
+        // The middle line of an odd count is its own image: written to both lanes.
+        let middle_row = if rows % 2 == 1 { format!("row == {row_bits}'d{}", rows / 2) } else { "1'b0".into() };
+        let middle_col = if cols % 2 == 1 { format!("col == {col_bits}'d{}", cols / 2) } else { "1'b0".into() };
+        let single = parts.rows * parts.cols == 1;
+        let row = extend("part_row", self.part_row.width());
+        let col = extend("part_col", self.part_col.width());
+        let number = if single { format!("{row} | {col}") } else { format!("{} + {col}", times(&row, parts.cols)) };
+        let base = if single { String::new() } else { format!("{} + ", times(&format!("number{case}"), layout.len())) };
+        format!(
+            "\
+wire lower{case} = row > {row_bits}'d{row_half};
+wire right{case} = col > {col_bits}'d{col_half};
+wire [{row_end}:0] near_row{case} = lower{case} ? {row_bits}'d{row_last} - row : row;
+wire [{col_end}:0] near_col{case} = right{case} ? {col_bits}'d{col_last} - col : col;
+wire [{end}:0] number{case} = {number};
+wire [{end}:0] place{case} = {base}{row_place} + {col_wide};
+wire both_rows{case} = {middle_row};
+wire both_cols{case} = {middle_col};
+",
             row_half = (rows - 1) / 2,
             col_half = (cols - 1) / 2,
             row_last = rows - 1,
             col_last = cols - 1,
             row_end = row_bits - 1,
             col_end = col_bits - 1,
-            wide_end = wide - 1,
-            row_place = times(&extend("near_row", row_bits), self._layout.quad_cols()),
-            col_wide = extend("near_col", col_bits),
-        ))
+            end = wide - 1,
+            row_place = times(&extend(&format!("near_row{case}"), row_bits), layout.quad_cols()),
+            col_wide = extend(&format!("near_col{case}"), col_bits),
+        )
     }
 }

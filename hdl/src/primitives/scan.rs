@@ -1,11 +1,10 @@
 //! The array, row by row, and where each taxel lives.
 
-use dermis_golden::fixed::quads::Quads;
-use dermis_golden::partition::Grid;
+use dermis_golden::fixed::Model;
 use rust_hdl::prelude::*;
 
 use super::counter::count_bits;
-use super::{Counter, Mirror};
+use super::{CaseCounter, Mirror};
 use crate::wire::Wire;
 
 /// Counts the taxels of the whole array row-major, one per `enable`, across all subarrays; `last` at the array's last taxel.
@@ -13,6 +12,8 @@ use crate::wire::Wire;
 pub struct Scan {
     /// Clock.
     pub clk: Signal<In, Clock>,
+    /// Which case.
+    pub which: Wire<In>,
     /// Back to the first taxel.
     pub clear: Signal<In, Bit>,
     /// Next taxel.
@@ -27,33 +28,35 @@ pub struct Scan {
     pub lane: Wire<Out>,
     /// The lanes it is written to.
     pub mask: Wire<Out>,
-    col: Counter,
-    part_col: Counter,
-    row: Counter,
-    part_row: Counter,
+    col: CaseCounter,
+    part_col: CaseCounter,
+    row: CaseCounter,
+    part_row: CaseCounter,
     mirror: Mirror,
     line_end: Signal<Local, Bit>,
     part_end: Signal<Local, Bit>,
 }
 
 impl Scan {
-    /// An array of `parts` subarrays of `layout`.
-    pub fn new(layout: Quads, parts: Grid) -> Self {
-        let count = parts.rows * parts.cols;
+    /// The array as each of `cases` cuts it.
+    pub fn new(cases: &[Model]) -> Self {
+        let each = |of: &dyn Fn(&Model) -> usize| CaseCounter::new(&cases.iter().map(of).collect::<Vec<_>>());
+        let mirror = Mirror::new(cases);
         Scan {
             clk: Default::default(),
+            which: Wire::new(count_bits(cases.len())),
             clear: Default::default(),
             enable: Default::default(),
             last: Default::default(),
-            address: Wire::new(count_bits(count * layout.len())),
-            part: Wire::new(count_bits(count)),
+            address: Wire::new(mirror.address.width()),
+            part: Wire::new(mirror.part.width()),
             lane: Wire::new(2),
             mask: Wire::new(4),
-            col: Counter::new(layout.cols),
-            part_col: Counter::new(parts.cols),
-            row: Counter::new(layout.rows),
-            part_row: Counter::new(parts.rows),
-            mirror: Mirror::new(layout, parts),
+            col: each(&|case| case.layout().cols),
+            part_col: each(&|case| case.grid().cols),
+            row: each(&|case| case.layout().rows),
+            part_row: each(&|case| case.grid().rows),
+            mirror,
             line_end: Default::default(),
             part_end: Default::default(),
         }
@@ -72,6 +75,11 @@ impl Logic for Scan {
         self.row.clear.next = self.clear.val();
         self.part_row.clear.next = self.clear.val();
 
+        self.col.which.next = self.which.val();
+        self.part_col.which.next = self.which.val();
+        self.row.which.next = self.which.val();
+        self.part_row.which.next = self.which.val();
+        self.mirror.which.next = self.which.val();
         self.line_end.next = self.enable.val() & self.col.last.val() & self.part_col.last.val();
         self.part_end.next = self.line_end.val() & self.row.last.val();
         self.col.enable.next = self.enable.val();

@@ -70,6 +70,8 @@ pub fn unroll(model: &Model) -> Vec<Step> {
 pub struct Steps {
     /// Clock.
     pub clk: Signal<In, Clock>,
+    /// Which case.
+    pub which: Wire<In>,
     /// Index of the step.
     pub step: Wire<In>,
     /// Position in the step's columns.
@@ -88,7 +90,7 @@ pub struct Steps {
     pub source: Wire<Out>,
     /// `align`, `first product of an accumulation`, `last product`, from bit 0.
     pub control: Wire<Out>,
-    _steps: Vec<Step>,
+    _steps: Vec<Vec<Step>>,
     _list: Vec<[usize; 2]>,
     _pipe: Vec<(Step, usize)>,
 }
@@ -101,23 +103,24 @@ pub const SOURCE_BITS: usize = 5;
 impl Steps {
     /// The schedule of `model`.
     pub fn new(model: &Model) -> Self {
-        let (formats, storage, layout) = (&model.formats, &model.storage, model.layout());
-        let steps = unroll(model);
+        let (formats, cases) = (&model.formats, model.cases());
+        let steps: Vec<Vec<Step>> = cases.iter().map(unroll).collect();
+        let words = cases.iter().map(|case| case.storage.words()).sum();
         // Straight and transposed address of each word's column.
-        let list: Vec<[usize; 2]> = match storage.is_listed(formats) {
-            true if formats.shared_a => storage.column_list().iter().map(|&j| [j, layout.transposed(j)]).collect(),
-            true => storage.column_list().iter().map(|&j| [j, j]).collect(),
-            false => Vec::new(),
-        };
+        let pair = |case: &Model, j| [j, if formats.shared_a { case.layout().transposed(j) } else { j }];
+        let pairs = |case: &Model| case.storage.column_list().iter().map(|&j| pair(case, j)).collect::<Vec<_>>();
+        let listed = cases.iter().filter(|case| case.storage.listed);
+        let list: Vec<[usize; 2]> = listed.flat_map(pairs).collect();
         let vectors = operand_vectors(formats.degree);
         Steps {
             clk: Default::default(),
-            step: Wire::new(count_bits(steps.len())),
+            which: Wire::new(count_bits(cases.len())),
+            step: Wire::new(count_bits(steps.iter().map(Vec::len).max().unwrap_or(1))),
             column: Wire::new(count_bits(formats.quads)),
             finished: Wire::new(count_bits(vectors + 1)),
             ready: Default::default(),
             last: Default::default(),
-            coefficient_address: Wire::new(count_bits(storage.words())),
+            coefficient_address: Wire::new(count_bits(words)),
             operand_address: Wire::new(count_bits(vectors.max(1) * formats.quads)),
             source: Wire::new(SOURCE_BITS),
             control: Wire::new(3),
@@ -127,9 +130,9 @@ impl Steps {
         }
     }
 
-    /// Number of steps.
-    pub fn count(&self) -> usize {
-        self._steps.len()
+    /// Number of steps of each case.
+    pub fn counts(&self) -> Vec<usize> {
+        self._steps.iter().map(Vec::len).collect()
     }
 
     /// Cycles from step and position to the addresses.
@@ -165,7 +168,8 @@ impl Steps {
 
 impl Logic for Steps {
     fn update(&mut self) {
-        let Some(step) = self._steps.get(self.step.val().number() as usize).copied() else { return };
+        let case = self._steps.get(self.which.val().number() as usize);
+        let Some(step) = case.and_then(|steps| steps.get(self.step.val().number() as usize)).copied() else { return };
         let column = self.column.val().number() as usize;
         self.ready.next = self.finished.val().number() as usize >= step.needs;
         self.last.next = column + 1 == step.columns;
@@ -193,13 +197,18 @@ impl Logic for Steps {
         let needs_bits = self.finished.width();
         let (c_bits, o_bits) = (self.coefficient_address.width(), self.operand_address.width());
         let bit = |b: bool| u8::from(b);
-        let cases: String = self
-            ._steps
-            .iter()
-            .enumerate()
+        // The case in front of the step, where there are several.
+        let (selector, selector_bits) = match self._steps.len() {
+            1 => ("step", step_bits),
+            _ => ("{which, step}", self.which.width() + step_bits),
+        };
+        let indexed = self._steps.iter().enumerate().flat_map(|(case, steps)| {
+            steps.iter().enumerate().map(move |(index, step)| (case << step_bits | index, step))
+        });
+        let cases: String = indexed
             .map(|(index, s)| {
                 format!(
-                    "    {step_bits}'d{index}: begin c_base = {c_bits}'d{}; o_base = {o_bits}'d{}; needs = {needs_bits}'d{}; \
+                    "    {selector_bits}'d{index}: begin c_base = {c_bits}'d{}; o_base = {o_bits}'d{}; needs = {needs_bits}'d{}; \
                      final_column = {column_bits}'d{}; fixed = 8'b{}{:02b}{:02b}{}{}{}; end\n",
                     s.coefficients,
                     s.operand,
@@ -217,6 +226,7 @@ impl Logic for Steps {
         let to_c = widen("column", column_bits, c_bits);
         let declare = format!(
             "\
+wire unused_which = &{{1'b0, which}};
 reg [{c_end}:0] c_base;
 reg [{o_end}:0] o_base;
 reg [{n_end}:0] needs;
@@ -225,7 +235,7 @@ reg [7:0] fixed;  // transposed, flip, kind, last, first, align
 always @(*) begin
   // A few words that change with the scene: no block RAM.
   (* rom_style = \"logic\" *)
-  case (step)
+  case ({selector})
 {cases}    default: begin
       c_base = {c_bits}'d0; o_base = {o_bits}'d0; needs = {needs_bits}'d0; final_column = {column_bits}'d0; fixed = 8'd0;
     end

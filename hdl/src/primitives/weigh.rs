@@ -4,6 +4,8 @@ use dermis_golden::fixed::formats::Formats;
 use dermis_golden::fixed::search::log2;
 use rust_hdl::prelude::*;
 
+use super::case_counter::{by_case, largest};
+use super::counter::count_bits;
 use super::logarithm::{functions, located_bits, LOG_BITS};
 use super::sweep::{position_bits, square_bits, sweep_bits, unpack, Sweep};
 use crate::wire::{Wire, Word};
@@ -18,6 +20,8 @@ pub struct Weigh {
     pub clk: Signal<In, Clock>,
     /// Reset.
     pub rst: Signal<In, Bit>,
+    /// Which case.
+    pub which: Wire<In>,
     /// Weigh the nine.
     pub start: Signal<In, Bit>,
     /// The sweep, with `start`.
@@ -32,7 +36,7 @@ pub struct Weigh {
     pub eligible: Wire<Out>,
     /// The sweep weighed.
     pub weighed: Wire<Out>,
-    _taxels: i64,
+    _taxels: Vec<i64>,
     _left: usize,
     _next: (Word, Word, Word),
 }
@@ -50,19 +54,21 @@ fn count(taxels: i64) -> usize {
 }
 
 impl Weigh {
-    /// Widths of `formats`, for subarrays of `taxels` taxels.
-    pub fn new(formats: &Formats, taxels: usize) -> Self {
+    /// Widths of `formats`, for subarrays of so many `taxels` in each case.
+    pub fn new(formats: &Formats, taxels: &[usize]) -> Self {
+        let weight = weight_bits(largest(taxels));
         Weigh {
             clk: Default::default(),
             rst: Default::default(),
+            which: Wire::new(count_bits(taxels.len())),
             start: Default::default(),
             sweep: Wire::new(sweep_bits()),
             radius: Wire::new(square_bits()),
             sums: Wire::new(9 * formats.sum_bits[0] as usize),
-            weights: Wire::new(9 * weight_bits(taxels)),
+            weights: Wire::new(9 * weight),
             eligible: Wire::new(9),
             weighed: Wire::new(sweep_bits()),
-            _taxels: taxels as i64,
+            _taxels: taxels.iter().map(|&taxels| taxels as i64).collect(),
             _left: 0,
             _next: Default::default(),
         }
@@ -79,7 +85,8 @@ impl Weigh {
             sums[k] > 0 && square <= radius
         });
         let eligible: u64 = eligible.map(|k| 1 << k).sum();
-        let weights = sums.map(|sum| self._taxels * log2(sum));
+        let taxels = self._taxels[(self.which.val().number() as usize).min(self._taxels.len() - 1)];
+        let weights = sums.map(|sum| taxels * log2(sum));
         (Word::of_fields(&weights, self.weights.width() / 9), Word::from(eligible), self.sweep.val())
     }
 }
@@ -112,10 +119,12 @@ impl Logic for Weigh {
         let w = self.weights.width() / 9;
         let (p, q) = (position_bits(), square_bits());
         // n·log2 Σp without a multiplier: one term for each bit of n.
-        let terms: Vec<String> = (0..64)
-            .filter(|bit| self._taxels >> bit & 1 == 1)
-            .map(|bit| format!("({{{}'d0, log}} << {bit})", w - LOG_BITS))
-            .collect();
+        let terms = |taxels: &i64| -> String {
+            let bits = (0..64).filter(|bit| taxels >> bit & 1 == 1);
+            let terms: Vec<String> = bits.map(|bit| format!("({{{}'d0, log}} << {bit})", w - LOG_BITS)).collect();
+            terms.join(" + ")
+        };
+        let terms = by_case(&self._taxels.iter().map(terms).collect::<Vec<_>>());
         let rows: String = (0..3)
             .map(|row| {
                 format!(
@@ -126,7 +135,8 @@ impl Logic for Weigh {
             .collect();
         Verilog::Custom(format!(
             "\
-{functions}reg [{sweep_end}:0] held;
+{functions}wire unused_which = &{{1'b0, which}};
+reg [{sweep_end}:0] held;
 reg [{q_end}:0] held_radius;
 reg [1:0] row, row2, row3, row4;
 reg running;
@@ -190,7 +200,6 @@ endgenerate",
             q_end = q - 1,
             q_more = q - p - 1,
             distances_end = 3 * q - 1,
-            terms = terms.join(" + "),
         ))
     }
 }

@@ -2,9 +2,10 @@
 //!
 //! One quad per cycle: frame buffer (1 cycle), `normalise` (1), butterfly (1), memory.
 
+use dermis_golden::fixed::Model;
 use rust_hdl::prelude::*;
 
-use crate::primitives::{count_bits, BitDelay, Butterfly, Counter, Delay, Ram};
+use crate::primitives::{count_bits, frame_quads, largest, BitDelay, Butterfly, CaseCounter, Counter, Delay, Ram};
 use crate::wire::Wire;
 
 /// Quads pass `normalise` and the butterfly on their way from frame buffer to input memory.
@@ -14,6 +15,8 @@ pub struct Fold {
     pub clk: Signal<In, Clock>,
     /// Reset.
     pub rst: Signal<In, Bit>,
+    /// Which case.
+    pub which: Wire<In>,
     /// The frame's first quad comes next.
     pub begin_frame: Signal<In, Bit>,
     /// Fold the next subarray.
@@ -38,7 +41,7 @@ pub struct Fold {
     pub read_address: Wire<In>,
     /// Its parities, one cycle later.
     pub read_quad: Wire<Out>,
-    quads: Counter,
+    quads: CaseCounter,
     frame_quads: Counter,
     running: DFF<Bit>,
     two_later: BitDelay,
@@ -51,16 +54,21 @@ pub struct Fold {
 }
 
 impl Fold {
-    /// `parts` subarrays of `quads` quads of codes of `bits` bits.
-    pub fn new(quads: usize, parts: usize, bits: usize) -> Self {
+    /// Widths of `model`.
+    pub fn new(model: &Model) -> Self {
+        let bits = model.formats.input_bits as usize;
+        let limits: Vec<usize> = model.cases().iter().map(|case| case.formats.quads).collect();
+        let frame_quads = frame_quads(model.cases());
+        let quads = largest(&limits);
         let address = count_bits(quads);
         Fold {
             clk: Default::default(),
             rst: Default::default(),
+            which: Wire::new(count_bits(limits.len())),
             begin_frame: Default::default(),
             start: Default::default(),
             last_part: Default::default(),
-            quad_address: Wire::new(count_bits(parts * quads)),
+            quad_address: Wire::new(count_bits(frame_quads)),
             free: Default::default(),
             normalised: Wire::new(4 * bits),
             normalised_valid: Default::default(),
@@ -69,8 +77,8 @@ impl Fold {
             done: Default::default(),
             read_address: Wire::new(address),
             read_quad: Wire::new(4 * (bits + 2)),
-            quads: Counter::new(quads),
-            frame_quads: Counter::new(parts * quads),
+            quads: CaseCounter::new(&limits),
+            frame_quads: Counter::new(frame_quads),
             running: Default::default(),
             two_later: BitDelay::new(2),
             three_later: BitDelay::new(1),
@@ -99,6 +107,7 @@ impl Logic for Fold {
         self.three_later.rst.next = self.rst.val();
         self.finish.rst.next = self.rst.val();
 
+        self.quads.which.next = self.which.val();
         self.quads.clear.next = self.start.val();
         self.quads.enable.next = self.running.q.val();
         self.ending.next = self.running.q.val() & self.quads.last.val();

@@ -1,9 +1,11 @@
 //! Stage `force`: p(μ*) by quad into a memory, out of it force words by taxel.
 
-use dermis_golden::fixed::formats::Formats;
+use dermis_golden::fixed::Model;
 use rust_hdl::prelude::*;
 
-use crate::primitives::{count_bits, position_bits, shift_bits, Counter, ForceUnit, Ram, CYCLE_BITS, SATURATION_BITS};
+use crate::primitives::{
+    count_bits, frame_quads, position_bits, shift_bits, Counter, ForceUnit, Ram, CYCLE_BITS, SATURATION_BITS,
+};
 use crate::wire::Wire;
 
 /// Values in by quad; beats out in the order `send` asks for them.
@@ -13,6 +15,8 @@ pub struct Force {
     pub clk: Signal<In, Clock>,
     /// Reset.
     pub rst: Signal<In, Bit>,
+    /// Which case is sent.
+    pub which: Wire<In>,
     /// Four taxels' p(μ*).
     pub values: Wire<In>,
     /// `values` are a quad.
@@ -67,20 +71,22 @@ pub struct Force {
 }
 
 impl Force {
-    /// Widths of `formats`, `parts` subarrays, threshold in force LSBs.
-    pub fn new(formats: &Formats, parts: usize, threshold: i64) -> Self {
-        let quads = parts * formats.quads;
+    /// Widths of `model`.
+    pub fn new(model: &Model) -> Self {
+        let formats = &model.formats;
+        let quads = frame_quads(model.cases());
         let (address, value) = (count_bits(quads), 4 * formats.search_bits[0] as usize);
-        let unit = ForceUnit::new(formats, parts, threshold);
+        let unit = ForceUnit::new(model);
         Force {
             clk: Default::default(),
             rst: Default::default(),
+            which: Wire::new(unit.which.width()),
             values: Wire::new(value),
             values_valid: Default::default(),
             begin_frame: Default::default(),
             start: Default::default(),
-            part: Wire::new(count_bits(parts)),
-            beat_part: Wire::new(count_bits(parts)),
+            part: Wire::new(unit.part.width()),
+            beat_part: Wire::new(unit.part.width()),
             advance: Default::default(),
             offer: Default::default(),
             beat: Wire::new(2),
@@ -121,6 +127,7 @@ impl Logic for Force {
         self.store.read.next = self.advance.val();
         self.store.read_address.next = self.address.val();
 
+        self.unit.which.next = self.which.val();
         self.unit.begin_frame.next = self.begin_frame.val();
         self.unit.part.next = self.part.val();
         self.unit.beat_part.next = self.beat_part.val();

@@ -3,6 +3,8 @@
 //! Every stage is a `#[hdl_gen]` kernel: single-bit control and wiring between the
 //! [primitives](crate::primitives). A stage begins on the `done` pulse of the one before.
 
+mod banks;
+mod choose;
 mod fold;
 mod force;
 mod normalise;
@@ -15,6 +17,8 @@ mod send;
 mod unfold;
 mod unsearched;
 
+pub use banks::Banks;
+pub use choose::Choose;
 pub use fold::Fold;
 pub use force::Force;
 pub use normalise::Normalise;

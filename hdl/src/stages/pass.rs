@@ -9,7 +9,7 @@ use dermis_golden::fixed::Model;
 use rust_hdl::prelude::*;
 
 use crate::primitives::{
-    count_bits, BitDelay, Counter, Delay, Filler, Lanes, OperandSelect, Ram, Slice, Steps, SOURCE_BITS,
+    count_bits, BitDelay, CaseCounter, Counter, Delay, Filler, Lanes, OperandSelect, Ram, Slice, Steps, SOURCE_BITS,
 };
 use crate::wire::Wire;
 
@@ -20,6 +20,8 @@ pub struct Pass {
     pub clk: Signal<In, Clock>,
     /// Reset.
     pub rst: Signal<In, Bit>,
+    /// Which case.
+    pub which: Wire<In>,
     /// The input memory holds a frame.
     pub start: Signal<In, Bit>,
     /// Quad of the input memory to read.
@@ -34,7 +36,7 @@ pub struct Pass {
     pub quad: Wire<Out>,
     /// `quad` is a row.
     pub quad_valid: Signal<Out, Bit>,
-    step: Counter,
+    step: CaseCounter,
     column: Counter,
     running: DFF<Bit>,
     /// The schedule.
@@ -58,13 +60,14 @@ impl Pass {
         let formats = &model.formats;
         let quads = formats.quads;
         let steps = Steps::new(model);
-        let lanes = Lanes::new(formats, model.storage.memory(formats, &model.quantised));
+        let lanes = Lanes::new(model);
         let operands = operand_vectors(formats.degree);
         let vectors = |memory: Ram| if operands == 0 { memory.left_out() } else { memory };
         let parity_bits = 4 * formats.data_bits as usize;
         Pass {
             clk: Default::default(),
             rst: Default::default(),
+            which: Wire::new(count_bits(model.cases().len())),
             start: Default::default(),
             input_address: Wire::new(count_bits(quads)),
             input_quad: Wire::new(4 * formats.fold_bits as usize),
@@ -72,12 +75,12 @@ impl Pass {
             vector_valid: Default::default(),
             quad: Wire::new(4 * formats.acc_bits as usize),
             quad_valid: Default::default(),
-            step: Counter::new(steps.count()),
+            step: CaseCounter::new(&steps.counts()),
             column: Counter::new(quads),
             running: Default::default(),
             low_address: Slice::new(steps.operand_address.width(), count_bits(quads)),
             vectors: vectors(Ram::new(operands.max(1) * quads, 1, parity_bits)),
-            filler: Filler::new(operands, quads),
+            filler: Filler::new(operands, &model.cases().iter().map(|case| case.formats.quads).collect::<Vec<_>>()),
             source: Delay::new(SOURCE_BITS, 1),
             control: Delay::new(3, 2),
             valid: BitDelay::new(2 + steps.latency()),
@@ -107,6 +110,10 @@ impl Logic for Pass {
         self.valid.rst.next = self.rst.val();
         self.lanes.rst.next = self.rst.val();
 
+        self.step.which.next = self.which.val();
+        self.steps.which.next = self.which.val();
+        self.filler.which.next = self.which.val();
+        self.lanes.which.next = self.which.val();
         self.issue.next = self.running.q.val() & self.steps.ready.val();
         self.column_end.next = self.issue.val() & self.steps.last.val();
         self.running.d.next = (self.start.val()

@@ -4,8 +4,7 @@
 //! comes early drops the frame it cut short and starts over with the next beat; a missing one is
 //! only remembered. Both raise `framing` until `reported`.
 
-use dermis_golden::fixed::quads::Quads;
-use dermis_golden::partition::Grid;
+use dermis_golden::fixed::Model;
 use rust_hdl::prelude::*;
 
 use crate::primitives::{count_bits, Blank, Gather, Ram, Scan, Spread};
@@ -38,6 +37,8 @@ pub struct Receive {
     pub full: Signal<Out, Bit>,
     /// The frame has been read.
     pub free: Signal<In, Bit>,
+    /// There is one case: 0.
+    pub which: Wire<Out>,
     /// Which quad to read.
     pub quad_address: Wire<In>,
     /// The quad, one cycle later.
@@ -66,11 +67,12 @@ pub struct Receive {
 }
 
 impl Receive {
-    /// Frames of `parts` subarrays in `layout`, codes of `bits` bits, noise floor in codes, dead taxels row-major.
-    pub fn new(layout: Quads, parts: Grid, bits: usize, floor: i32, dead: &[usize]) -> Self {
-        let count = parts.rows * parts.cols;
-        let taxels = count * layout.rows * layout.cols;
-        let quads = count * layout.len();
+    /// Frames of one case's `model`.
+    pub fn new(model: &Model) -> Self {
+        let bits = model.formats.input_bits as usize;
+        let count = model.parts.len();
+        let quads = count * model.formats.quads;
+        let taxels = model.scene.sensor.taxels();
         Receive {
             clk: Default::default(),
             rst: Default::default(),
@@ -82,6 +84,7 @@ impl Receive {
             taken_word: Wire::new(bits),
             full: Default::default(),
             free: Default::default(),
+            which: Wire::new(1),
             quad_address: Wire::new(count_bits(quads)),
             part: Wire::new(count_bits(count)),
             quad: Wire::new(4 * bits),
@@ -90,11 +93,11 @@ impl Receive {
             negative: Default::default(),
             framing: Default::default(),
             reported: Default::default(),
-            scan: Scan::new(layout, parts),
-            blank: Blank::new(bits, taxels, dead),
+            scan: Scan::new(std::slice::from_ref(model)),
+            blank: Blank::new(bits, taxels, &model.dead),
             spread: Spread::new(bits),
             frame: Ram::new(quads, 4, bits),
-            gather: Gather::new(bits, floor, count),
+            gather: Gather::new(bits, model.noise_floor, count),
             whole: Default::default(),
             broken: Default::default(),
             taken: Default::default(),
@@ -118,6 +121,8 @@ impl Logic for Receive {
         self.early.next = self.taken.val() & self.s_axis_tlast.val() & !self.scan.last.val();
         self.accept.next = self.taken.val();
 
+        self.which.next = false.into();
+        self.scan.which.next = false.into();
         self.scan.enable.next = self.taken.val();
         self.scan.clear.next = self.rst.val() | self.early.val();
         self.blank.enable.next = self.taken.val();

@@ -4,10 +4,12 @@
 //! with the measured shift. All later rows go through directly with the constant shift of an A pass; the schedule
 //! keeps the two apart, because no A pass starts before v_00 is complete.
 
-use dermis_golden::fixed::formats::Formats;
+use dermis_golden::fixed::Model;
 use rust_hdl::prelude::*;
 
-use crate::primitives::{shift_bits, BitDelay, Counter, Ram, RawLength, Rescaler, SATURATION_BITS};
+use crate::primitives::{
+    count_bits, largest, shift_bits, BitDelay, CaseCounter, Ram, RawLength, Rescaler, SATURATION_BITS,
+};
 use crate::wire::Wire;
 
 /// Rows of accumulators in; words two cycles after the rescaler got them, operands three.
@@ -17,6 +19,8 @@ pub struct Rescale {
     pub clk: Signal<In, Clock>,
     /// Reset.
     pub rst: Signal<In, Bit>,
+    /// Which case.
+    pub which: Wire<In>,
     /// New frame.
     pub start: Signal<In, Bit>,
     /// Accumulators of one row.
@@ -37,8 +41,8 @@ pub struct Rescale {
     pub saturations: Wire<Out>,
     collecting: DFF<Bit>,
     replaying: DFF<Bit>,
-    rows: Counter,
-    replay: Counter,
+    rows: CaseCounter,
+    replay: CaseCounter,
     raw: Ram,
     length: RawLength,
     rescaler: Rescaler,
@@ -50,12 +54,15 @@ pub struct Rescale {
 }
 
 impl Rescale {
-    /// Widths of `formats`.
-    pub fn new(formats: &Formats) -> Self {
+    /// Widths of `model`.
+    pub fn new(model: &Model) -> Self {
+        let formats = &model.formats;
+        let quads: Vec<usize> = model.cases().iter().map(|case| case.formats.quads).collect();
         let acc = 4 * formats.acc_bits as usize;
         Rescale {
             clk: Default::default(),
             rst: Default::default(),
+            which: Wire::new(count_bits(quads.len())),
             start: Default::default(),
             quad: Wire::new(acc),
             quad_valid: Default::default(),
@@ -67,9 +74,9 @@ impl Rescale {
             saturations: Wire::new(SATURATION_BITS),
             collecting: Default::default(),
             replaying: Default::default(),
-            rows: Counter::new(formats.quads),
-            replay: Counter::new(formats.quads),
-            raw: Ram::new(formats.quads, 1, acc),
+            rows: CaseCounter::new(&quads),
+            replay: CaseCounter::new(&quads),
+            raw: Ram::new(largest(&quads), 1, acc),
             length: RawLength::new(formats),
             rescaler: Rescaler::new(formats),
             read: BitDelay::new(1),
@@ -102,6 +109,8 @@ impl Logic for Rescale {
         self.collecting.d.next = (self.start.val()
             | (self.collecting.q.val() & !(self.quad_valid.val() & self.rows.last.val())))
             & !self.rst.val();
+        self.rows.which.next = self.which.val();
+        self.replay.which.next = self.which.val();
         self.rows.clear.next = self.start.val();
         self.rows.enable.next = self.collected.val();
         self.raw.write.next = self.collected.val().into();

@@ -7,14 +7,15 @@
 //! only moves to the winner: its constant coefficients are p(μ*).
 
 use dermis_golden::fixed::cycles::{COARSE_PERIOD, SHORTEST_SWEEP};
-use dermis_golden::fixed::formats::Formats;
 use dermis_golden::fixed::quads::Quads;
 use dermis_golden::fixed::schedule::vectors;
+use dermis_golden::fixed::Model;
 use rust_hdl::prelude::*;
 
 use crate::primitives::{
-    count_bits, position_bits, BitDelay, Candidates, Counter, Counts, Delay, Judge, PolynomialWord, Score, Slice,
-    Store, Sum, Taylor, Walk, Weigh, BUFFER_BITS, CANDIDATES_LATENCY, SCORE_LATENCY, STORE_LATENCY, TAYLOR_LATENCY,
+    count_bits, largest, position_bits, BitDelay, Candidates, CaseCounter, Counts, Delay, Judge, PolynomialWord, Score,
+    Slice, Store, Sum, Taylor, Walk, Weigh, BUFFER_BITS, CANDIDATES_LATENCY, SCORE_LATENCY, STORE_LATENCY,
+    TAYLOR_LATENCY,
 };
 use crate::wire::Wire;
 
@@ -28,6 +29,8 @@ pub struct Search {
     pub clk: Signal<In, Clock>,
     /// Reset.
     pub rst: Signal<In, Bit>,
+    /// Which case.
+    pub which: Wire<In>,
     /// Four taxels' coefficient.
     pub fill_quad: Wire<In>,
     /// `fill_quad` is one.
@@ -75,8 +78,8 @@ pub struct Search {
     sum_candidates: Candidates,
     fill_counts: Counts,
     constants: Slice,
-    quads: Counter,
-    period: Counter,
+    quads: CaseCounter,
+    period: CaseCounter,
     counting: DFF<Bit>,
     began: BitDelay,
     go: BitDelay,
@@ -97,10 +100,17 @@ pub struct Search {
 }
 
 impl Search {
-    /// Widths of `formats` for subarrays in `layout`; `apart` says whether one is filled while another is searched.
-    pub fn new(formats: &Formats, layout: Quads, apart: bool) -> Self {
+    /// Widths of `model`.
+    pub fn new(model: &Model) -> Self {
+        let formats = &model.formats;
         let quads = formats.quads;
-        let taxel_count = layout.rows * layout.cols;
+        let layouts: Vec<Quads> = model.cases().iter().map(Model::layout).collect();
+        let limits: Vec<usize> = layouts.iter().map(Quads::len).collect();
+        let periods: Vec<usize> = limits.iter().map(|&quads| quads.max(COARSE_PERIOD as usize)).collect();
+        let taxel_counts: Vec<usize> = layouts.iter().map(|layout| layout.rows * layout.cols).collect();
+        // One subarray is filled while another is searched.
+        let apart = model.cases().iter().any(|case| case.parts.len() > 1);
+        // Where there are several cases none is so small.
         let padding = (SHORTEST_SWEEP as usize).saturating_sub(quads);
         let address = count_bits(quads);
         let fill_bits = formats.vector_bits as usize + 2;
@@ -110,6 +120,7 @@ impl Search {
         Search {
             clk: Default::default(),
             rst: Default::default(),
+            which: Wire::new(count_bits(layouts.len())),
             fill_quad: Wire::new(4 * fill_bits),
             fill: Default::default(),
             fill_index: Wire::new(count_bits(vectors(formats.degree))),
@@ -128,20 +139,20 @@ impl Search {
             judged: Default::default(),
             taken: Default::default(),
             walk: Default::default(),
-            weigh: Weigh::new(formats, taxel_count),
-            judge: Judge::new(formats, taxel_count),
+            weigh: Weigh::new(formats, &taxel_counts),
+            judge: Judge::new(formats, largest(&taxel_counts)),
             constants: Slice::new(taxels.bits(), value),
             store: Store::new(taxels.clone(), quads, fill_bits, apart),
             taylor: Taylor::new(taxels.clone()),
             candidates: Candidates::new(taxels),
             scores: Score::new(formats),
-            counts: Counts::new(layout),
+            counts: Counts::new(&layouts),
             sum: Sum::new(sums.clone(), quads, fill_bits, apart),
             sum_taylor: Taylor::new(sums.clone()),
             sum_candidates: Candidates::new(sums),
-            fill_counts: Counts::new(layout),
-            quads: Counter::new(quads),
-            period: Counter::new(quads.max(COARSE_PERIOD as usize)),
+            fill_counts: Counts::new(&layouts),
+            quads: CaseCounter::new(&limits),
+            period: CaseCounter::new(&periods),
             counting: Default::default(),
             began: BitDelay::new(1),
             go: BitDelay::new(1),
@@ -207,6 +218,12 @@ impl Logic for Search {
         self.scored.rst.next = self.rst.val();
         self.totals.rst.next = self.rst.val();
         self.finish.rst.next = self.rst.val();
+
+        self.weigh.which.next = self.which.val();
+        self.counts.which.next = self.which.val();
+        self.fill_counts.which.next = self.which.val();
+        self.quads.which.next = self.which.val();
+        self.period.which.next = self.which.val();
 
         comment!("Coefficients come in");
         self.store.fill.next = self.fill.val();

@@ -1,11 +1,10 @@
 //! Stage `send`: asks for the forces row-major, then for each subarray's status, at the receiver's pace.
 
-use dermis_golden::fixed::quads::Quads;
 use dermis_golden::fixed::send::STATUS_BEATS;
-use dermis_golden::partition::Grid;
+use dermis_golden::fixed::Model;
 use rust_hdl::prelude::*;
 
-use crate::primitives::{count_bits, Counter, Scan, StatusCode};
+use crate::primitives::{count_bits, largest, CaseCounter, Counter, Scan, StatusCode};
 use crate::wire::Wire;
 
 /// From `start` one beat is offered per moving cycle: all taxels, then the status beats.
@@ -15,6 +14,8 @@ pub struct Send {
     pub clk: Signal<In, Clock>,
     /// Reset.
     pub rst: Signal<In, Bit>,
+    /// Which case.
+    pub which: Wire<In>,
     /// All values are in.
     pub start: Signal<In, Bit>,
     /// A beat stands on the output.
@@ -39,7 +40,7 @@ pub struct Send {
     pub done: Signal<Out, Bit>,
     scan: Scan,
     words: Counter,
-    parts: Counter,
+    parts: CaseCounter,
     code: StatusCode,
     sending: DFF<Bit>,
     status: DFF<Bit>,
@@ -50,12 +51,15 @@ pub struct Send {
 }
 
 impl Send {
-    /// Frames of `parts` subarrays in `layout`.
-    pub fn new(layout: Quads, parts: Grid) -> Self {
-        let count = parts.rows * parts.cols;
+    /// Frames of `model`.
+    pub fn new(model: &Model) -> Self {
+        let counts: Vec<usize> = model.cases().iter().map(|case| case.parts.len()).collect();
+        let count = largest(&counts);
+        let scan = Scan::new(model.cases());
         Send {
             clk: Default::default(),
             rst: Default::default(),
+            which: Wire::new(count_bits(counts.len())),
             start: Default::default(),
             m_axis_tvalid: Default::default(),
             m_axis_tready: Default::default(),
@@ -64,12 +68,12 @@ impl Send {
             offer: Default::default(),
             beat: Wire::new(2),
             part: Wire::new(count_bits(count)),
-            address: Wire::new(count_bits(count * layout.len())),
+            address: Wire::new(scan.address.width()),
             lane: Wire::new(2),
             done: Default::default(),
-            scan: Scan::new(layout, parts),
+            scan,
             words: Counter::new(STATUS_BEATS),
-            parts: Counter::new(count),
+            parts: CaseCounter::new(&counts),
             code: StatusCode::new(count_bits(STATUS_BEATS), count_bits(count)),
             sending: Default::default(),
             status: Default::default(),
@@ -90,6 +94,8 @@ impl Logic for Send {
         self.sending.clock.next = self.clk.val();
         self.status.clock.next = self.clk.val();
 
+        self.scan.which.next = self.which.val();
+        self.parts.which.next = self.which.val();
         self.moves.next = !self.m_axis_tvalid.val() | self.m_axis_tready.val();
         self.step.next = self.sending.q.val() & self.moves.val();
         self.at_end.next = self.step.val() & !self.status.q.val() & self.scan.last.val();

@@ -4,7 +4,7 @@ use dermis_golden::fixed::schedule::{is_transposed, schedule, vectors};
 use dermis_golden::fixed::Model;
 use rust_hdl::prelude::*;
 
-use crate::primitives::{count_bits, BitDelay, Counter, Delay, Placer, Unfolder};
+use crate::primitives::{count_bits, BitDelay, CaseCounter, Counter, Delay, Placer, Unfolder};
 use crate::wire::Wire;
 
 /// Quads of v_ij in order; two cycles later four taxels with coefficient index and quad address.
@@ -14,6 +14,8 @@ pub struct Unfold {
     pub clk: Signal<In, Clock>,
     /// Reset.
     pub rst: Signal<In, Bit>,
+    /// Which case.
+    pub which: Wire<In>,
     /// New frame.
     pub start: Signal<In, Bit>,
     /// Four parities of a v_ij.
@@ -30,7 +32,7 @@ pub struct Unfold {
     pub address: Wire<Out>,
     /// All coefficients of the frame are out.
     pub done: Signal<Out, Bit>,
-    quads: Counter,
+    quads: CaseCounter,
     vectors: Counter,
     unfolder: Unfolder,
     placer: Placer,
@@ -47,12 +49,14 @@ impl Unfold {
     pub fn new(model: &Model) -> Self {
         let formats = &model.formats;
         let across = schedule(formats).iter().enumerate().filter(|(_, p)| is_transposed(p)).map(|(k, _)| k).collect();
+        let quads: Vec<usize> = model.cases().iter().map(|case| case.formats.quads).collect();
         let bits = formats.vector_bits as usize;
         let count = vectors(formats.degree);
         let (index, address) = (count_bits(count), count_bits(formats.quads));
         Unfold {
             clk: Default::default(),
             rst: Default::default(),
+            which: Wire::new(count_bits(quads.len())),
             start: Default::default(),
             words: Wire::new(4 * bits),
             words_valid: Default::default(),
@@ -61,7 +65,7 @@ impl Unfold {
             index: Wire::new(index),
             address: Wire::new(address),
             done: Default::default(),
-            quads: Counter::new(formats.quads),
+            quads: CaseCounter::new(&quads),
             vectors: Counter::new(count),
             unfolder: Unfolder::new(bits, count),
             placer: Placer::new(model.layout(), bits + 2, count, across),
@@ -90,6 +94,7 @@ impl Logic for Unfold {
         self.finish.rst.next = self.rst.val();
 
         self.quad_end.next = self.words_valid.val() & self.quads.last.val();
+        self.quads.which.next = self.which.val();
         self.quads.clear.next = self.start.val();
         self.quads.enable.next = self.words_valid.val();
         self.vectors.clear.next = self.start.val();

@@ -3,8 +3,7 @@
 //! The coefficients that `unfold` sends are p itself: they are the values as they come, and stand when `start` says so. So the
 //! force memory is written while the passes go on, and a frame is not computed before the last one is out.
 
-use dermis_golden::fixed::formats::Formats;
-use dermis_golden::fixed::quads::Quads;
+use dermis_golden::fixed::Model;
 use rust_hdl::prelude::*;
 
 use crate::primitives::{count_bits, position_bits};
@@ -17,6 +16,8 @@ pub struct Unsearched {
     pub clk: Signal<In, Clock>,
     /// Reset.
     pub rst: Signal<In, Bit>,
+    /// There is one case.
+    pub which: Wire<In>,
     /// Four taxels' p.
     pub fill_quad: Wire<In>,
     /// `fill_quad` is one.
@@ -54,12 +55,14 @@ pub struct Unsearched {
 }
 
 impl Unsearched {
-    /// Widths of `formats` for subarrays in `layout`.
-    pub fn new(formats: &Formats, _layout: Quads, _apart: bool) -> Self {
+    /// Widths of `model`.
+    pub fn new(model: &Model) -> Self {
+        let formats = &model.formats;
         let quad = 4 * (formats.vector_bits as usize + 2);
         Unsearched {
             clk: Default::default(),
             rst: Default::default(),
+            which: Wire::new(1),
             fill_quad: Wire::new(quad),
             fill: Default::default(),
             fill_index: Wire::new(1),
@@ -109,7 +112,7 @@ impl Logic for Unsearched {
         let (position, score) = (self.best_x.width(), self.score.width());
         Verilog::Custom(format!(
             "\
-wire unused = &{{1'b0, fill_index, fill_address, enabled}};
+wire unused = &{{1'b0, which, fill_index, fill_address, enabled}};
 always @(posedge clk) {{settled, values_begin, done}} <= {{3{{start && !rst}}}};
 always @(*) begin
   values = fill_quad;

@@ -1,0 +1,216 @@
+//! A scene of several cases: one [`Model`] for each, on the same hardware, and the choice between them per frame.
+//!
+//! All cases run on the lanes, the search and the force unit of case 0: a case is a set of counter limits and
+//! addresses, coefficients in the same memory, and a frame buffer of its own. What a frame becomes is exactly what the
+//! taken case's model makes of it; [`choose`](super::choose) says which that is.
+//!
+//! Where the scene lists no cases, those are built that fit the board together: the most of them, and of equally many
+//! the finest. What was dropped is kept with the figures of the design that would have it ([`Dropped`]).
+
+use super::choose::{self, Seen};
+use super::cycles::SHORTEST_SWEEP;
+use super::formats::{derive, Shape};
+use super::model::{FixedError, Model, Stage, Trace};
+use super::prepare::Scale;
+use super::quads::Quads;
+use super::send::CASE_SHIFT;
+use crate::board::Board;
+use crate::frame::Frame;
+use crate::matrices::Matrices;
+use crate::partition::{subarrays, Case, Grid, Subarray};
+use crate::reconstruct::{Reconstruction, Taken};
+use crate::scene::Scene;
+
+/// A case that divides the array and was not built.
+#[derive(Clone, Debug)]
+pub struct Dropped {
+    /// The case.
+    pub case: Case,
+    /// The design that would have it beside those that were built, too large for the board.
+    pub design: Model,
+}
+
+impl Model {
+    /// The model of a scene of the cases that it lists, or of as many as fit.
+    pub(super) fn of_choices(
+        scene: &Scene,
+        scale: &Scale,
+        degree: Option<usize>,
+        board: &Board,
+    ) -> Result<Model, FixedError> {
+        let listed = scene.partition.listed.is_some();
+        let mut choices = scene.partition.choices(&scene.sensor);
+        // What is too small is an error where it is asked for by name, or where nothing else is left.
+        let large: Vec<Case> = choices.iter().copied().filter(|&case| is_large(scene, case)).collect();
+        if !listed && large.len() > 1 {
+            choices = large;
+        }
+        let shapes = choices.iter().map(|&case| shape(scene, case, degree)).collect::<Result<Vec<_>, _>>()?;
+        let all: Vec<usize> = (0..choices.len()).collect();
+        let of = |subset: &[usize]| -> Result<Model, FixedError> {
+            let pick = |&at: &usize| (choices[at], shapes[at].clone());
+            Model::of_shapes(scene, scale, board, subset.iter().map(pick).collect())
+        };
+        if listed {
+            return of(&all);
+        }
+        let short = |model: &Model| model.resources.shortages(&model.board);
+        // Where case 0 alone is too large, so is every design that has it: one of them stands for all.
+        if !short(&of(&[0])?).is_empty() {
+            return of(&[0, 1]);
+        }
+        let mut model = None;
+        for subset in subsets(choices.len()) {
+            let built = of(&subset)?;
+            let fits = short(&built).is_empty();
+            model = Some((built, subset));
+            if fits {
+                break;
+            }
+        }
+        let (mut model, subset) = model.ok_or(FixedError::Internal("a scene of several cases has two"))?;
+        // Of a scene of which not even two fit, the last two tried stand for it; nothing was dropped.
+        if short(&model).is_empty() {
+            for &at in all.iter().filter(|at| !subset.contains(at)) {
+                let with: Vec<usize> = all.iter().copied().filter(|k| subset.contains(k) || *k == at).collect();
+                model.dropped.push(Dropped { case: choices[at], design: of(&with)? });
+            }
+        }
+        Ok(model)
+    }
+
+    /// The model of these cases, case 0 first where there are several.
+    pub(super) fn of_shapes(
+        scene: &Scene,
+        scale: &Scale,
+        board: &Board,
+        cases: Vec<(Case, Shape)>,
+    ) -> Result<Model, FixedError> {
+        let (cases, shapes): (Vec<Case>, Vec<Shape>) = cases.into_iter().unzip();
+        let own = |case: Case| {
+            let mut scene = scene.clone();
+            scene.partition.case = case;
+            scene
+        };
+        let designs = derive(scene, &shapes, board)?;
+        let several = designs.len() > 1;
+        let mut models = Vec::with_capacity(designs.len());
+        for (&case, design) in cases.iter().zip(designs) {
+            if several && !is_large(scene, case) {
+                return Err(FixedError::SmallCase { case, quads: design.formats.quads });
+            }
+            models.push(Model::of_design(&own(case), scale, design, board)?);
+        }
+        if !several {
+            return models.pop().ok_or(FixedError::Internal("a scene has a case"));
+        }
+        let whole = models[0].clone();
+        Ok(Model { scene: scene.clone(), built: models, ..whole })
+    }
+
+    /// The cases that the hardware has, each with its model; of a scene of one case that model itself.
+    pub fn cases(&self) -> &[Model] {
+        match self.built.is_empty() {
+            true => std::slice::from_ref(self),
+            false => &self.built,
+        }
+    }
+
+    /// Whether the hardware chooses the case per frame.
+    pub fn chooses(&self) -> bool {
+        !self.built.is_empty()
+    }
+
+    /// The paper's number of the case, 0 where it has none.
+    pub fn number(&self) -> u32 {
+        (0..4).find(|&number| Case::numbered(number) == Some(self.scene.partition.case)).unwrap_or(0) as u32
+    }
+
+    /// The grids of the cases built.
+    pub fn grids(&self) -> Vec<Grid> {
+        self.cases().iter().map(Model::grid).collect()
+    }
+
+    /// The index of the case that a frame of these codes, `input_bits` wide, is solved in.
+    pub fn choose(&self, codes: &[i32]) -> usize {
+        let mut seen = Seen::default();
+        for (index, &code) in codes.iter().enumerate() {
+            seen.take(&self.scene.sensor, index, code, self.noise_floor);
+        }
+        seen.choose(&self.grids(), self.scene.partition.condition, self.noise_floor)
+    }
+
+    /// [`Model::run`] of a scene of several cases.
+    pub(super) fn run_chosen(&self, codes: &[i32]) -> Trace {
+        let chosen = self.choose(&self.prepare.run(codes));
+        let case = &self.built[chosen];
+        let mut trace = case.run(codes);
+        let words = vec![vec![chosen as i64]];
+        trace.stages.insert(1, Stage { name: "choose", words });
+        for beat in trace.status.iter_mut().step_by(super::send::STATUS_BEATS) {
+            beat[2] |= (case.number() << CASE_SHIFT) as i32;
+        }
+        let cycles = &mut trace.cycles;
+        for count in [&mut cycles.first_output, &mut cycles.latency, &mut cycles.total] {
+            *count += choose::LATENCY;
+        }
+        trace
+    }
+
+    /// [`Model::decode`] of a scene of several cases.
+    pub(super) fn decode_chosen(
+        &self,
+        frame: &Frame,
+        engine: &str,
+        beats: &[[i32; 3]],
+        status: &[[i32; 3]],
+    ) -> Result<Reconstruction, FixedError> {
+        let number = status.first().map_or(0, |beat| beat[2] as u32 >> CASE_SHIFT & 3);
+        let case = self.built.iter().find(|case| case.number() == number);
+        let case = case.ok_or(FixedError::Internal("the status names a case that was not built"))?;
+        let mut result = case.decode(frame, engine, beats, status)?;
+        let reason = "the finest whose boundaries cut nothing, by the hardware's rule".to_string();
+        let case = case.scene.partition.case.to_string();
+        result.extra.taken = Some(Taken { case, reason, refused: Vec::new() });
+        Ok(result)
+    }
+}
+
+/// A case's subarrays and their matrices, for a polynomial of `degree` or what the scene's rule says.
+pub(super) fn shape(scene: &Scene, case: Case, degree: Option<usize>) -> Result<Shape, FixedError> {
+    let parts = subarrays(case, &scene.sensor)?;
+    // With dead taxels there is one subarray.
+    let dead = parts[0].own(&scene.input.dead);
+    let mut matrices = Matrices::new(&parts[0].sensor(&scene.sensor), scene.search.mu_max)?.without(&dead)?;
+    matrices.degree = degree.unwrap_or(matrices.degree);
+    Ok(Shape { matrices, parts: parts.len() })
+}
+
+/// Whether a case's subarrays have enough quads for the search of several cases.
+fn is_large(scene: &Scene, case: Case) -> bool {
+    let quads = |part: &Subarray| Quads { rows: part.rows, cols: part.cols }.len() as u64;
+    subarrays(case, &scene.sensor).is_ok_and(|parts| parts.iter().all(|part| quads(part) >= SHORTEST_SWEEP))
+}
+
+/// Indices of case 0 and at least one other of `count` cases, the largest subsets first, of equally large ones those
+/// with the finest cases.
+fn subsets(count: usize) -> Vec<Vec<usize>> {
+    let of = |bits: usize| std::iter::once(0).chain((1..count).filter(move |k| bits >> k & 1 == 1));
+    let mut all: Vec<Vec<usize>> = (2..1usize << count).step_by(2).map(|bits| of(bits).collect()).collect();
+    all.sort_by(|a, b| b.len().cmp(&a.len()).then(a.cmp(b)));
+    all
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_largest_subsets_come_first() {
+        assert_eq!(subsets(2), [vec![0, 1]]);
+        let four = subsets(4);
+        assert_eq!(four.len(), 7);
+        assert_eq!(four[..3], [vec![0, 1, 2, 3], vec![0, 1, 2], vec![0, 1, 3]]);
+        assert_eq!(four[6], [0, 3]);
+    }
+}

@@ -1,0 +1,157 @@
+//! Stage `choose`: which of the built cases solves a frame, decided while the frame is received.
+//!
+//! A boundary between subarrays cuts a contact where the stress beside it is more than a quarter of the frame's
+//! largest. Of the cases whose boundaries cut nothing, and whose subarrays all meet the condition where they are
+//! loaded, the finest is taken, in the order 1, 2, 3; else case 0, the whole array, which is always possible:
+//! ```text
+//! cut(case) = max |c| beside its boundaries > max(max |c| >> CUT_SHIFT, noise floor)
+//! ```
+//! "Beside" is two rows on each side of the boundary of cases 1 and 3, two columns on each side of that of cases 1
+//! and 2; |c| is the ones' complement magnitude of [`magnitude_bits`].
+//!
+//! This is the hardware's rule. [`adaptive`](crate::reconstruct) of the golden model finds the contacts first, solves
+//! every case and takes the one nearest to them: nothing that hardware could do before it has solved the frame. Median
+//! e_t of 60 drawn frames, the floating-point model solving (`cargo test --release -p dermis-tests --test choice --
+//! --nocapture the_choice`, which has the other shares as well):
+//!
+//! | scene | contacts | case 0 | 1 | 2 | 3 | hardware's rule | golden `adaptive` |
+//! |---|---|---:|---:|---:|---:|---:|---:|
+//! | eight-by-eight | 1 | 1.5 % | 97 % | 35 % | 33 % | 1.5 % | 1.5 % |
+//! | sensor-1 | 1 | 1.2 % | 100 % | 52 % | 18 % | 1.6 % | 1.2 % |
+//! | sensor-1 | 2, 3 | 75 % | 121 % | 126 % | 58 % | 73 % | 65 % |
+//! | sensor-3, 20 frames | 1 | 0.6 % | 21 % | 6.1 % | 1.9 % | 0.7 % | 0.6 % |
+//! | sensor-3 | 2 to 4 | 75 % | 47 % | 71 % | 46 % | 49 % | 34 % |
+//!
+//! So where one contact is expected, case 0 alone is as good and smaller; the choice is for an array that sees one
+//! contact as well as several. A smaller share (a larger shift) takes case 0 more often: better by up to 0.4 points for
+//! one contact, worse by 6 points and more for several; a larger one gains 1 point for several and loses as much.
+//!
+//! | in | codes after `prepare`, row-major, `input_bits` signed |
+//! |---|---|
+//! | out | index of the case in the order built, case 0 first |
+
+use super::arith::magnitude_bits;
+use crate::partition::Grid;
+use crate::scene::Condition;
+use crate::sensor::Sensor;
+
+/// The share of the frame's largest code that counts as a contact beside a boundary, as a right shift.
+pub const CUT_SHIFT: u32 = 2;
+/// Taxel lines on each side of a boundary that are looked at.
+pub const BESIDE: usize = 2;
+/// From the frame's last code to the choice: place and magnitude, maxima, comparison.
+pub const LATENCY: u64 = 3;
+
+/// What is gathered of a frame while it is received.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Seen {
+    /// Largest magnitude.
+    pub peak: u64,
+    /// The same on the rows beside the middle.
+    pub middle_rows: u64,
+    /// The same on the columns beside the middle.
+    pub middle_cols: u64,
+    /// Upper left, upper right, lower left and lower right quarter: a code above the noise floor, one below its
+    /// negative.
+    pub signs: [[bool; 2]; 4],
+}
+
+/// Whether `line` of `lines` is beside the boundary in the middle.
+pub fn is_beside(line: usize, lines: usize) -> bool {
+    (2 * line + 1).abs_diff(lines) < 2 * BESIDE
+}
+
+impl Seen {
+    /// Adds the code of the taxel at `index`, against a noise floor in codes.
+    pub fn take(&mut self, sensor: &Sensor, index: usize, code: i32, floor: i32) {
+        let (row, col) = (index / sensor.cols, index % sensor.cols);
+        let magnitude = magnitude_bits(i64::from(code));
+        self.peak = self.peak.max(magnitude);
+        if is_beside(row, sensor.rows) {
+            self.middle_rows = self.middle_rows.max(magnitude);
+        }
+        if is_beside(col, sensor.cols) {
+            self.middle_cols = self.middle_cols.max(magnitude);
+        }
+        let quarter = 2 * usize::from(2 * row >= sensor.rows) + usize::from(2 * col >= sensor.cols);
+        self.signs[quarter][0] |= code > floor;
+        self.signs[quarter][1] |= code < -floor;
+    }
+
+    /// Whether a case may be taken.
+    fn admits(&self, grid: Grid, condition: Condition, floor: i32, shift: u32) -> bool {
+        let limit = (self.peak >> shift).max(floor.max(0) as u64);
+        let cut = (grid.rows > 1 && self.middle_rows > limit) || (grid.cols > 1 && self.middle_cols > limit);
+        let unmet = quarters(grid).into_iter().any(|part| {
+            let [positive, negative] = [0, 1].map(|sign| part.iter().any(|&quarter| self.signs[quarter][sign]));
+            positive != negative
+        });
+        !(cut || condition == Condition::BothSigns && unmet)
+    }
+
+    /// Index of the case to take, of `grids` of which the first is the whole array.
+    pub fn choose(&self, grids: &[Grid], condition: Condition, floor: i32) -> usize {
+        self.choose_at(CUT_SHIFT, grids, condition, floor)
+    }
+
+    /// The same with another share than [`CUT_SHIFT`], to measure what it does.
+    pub fn choose_at(&self, shift: u32, grids: &[Grid], condition: Condition, floor: i32) -> usize {
+        (1..grids.len()).find(|&case| self.admits(grids[case], condition, floor, shift)).unwrap_or(0)
+    }
+}
+
+/// The quarters that each subarray of a case is made of.
+pub fn quarters(grid: Grid) -> Vec<Vec<usize>> {
+    match (grid.rows, grid.cols) {
+        (2, 2) => vec![vec![0], vec![1], vec![2], vec![3]],
+        (1, 2) => vec![vec![0, 2], vec![1, 3]],
+        (2, 1) => vec![vec![0, 1], vec![2, 3]],
+        _ => vec![vec![0, 1, 2, 3]],
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const GRIDS: [Grid; 4] =
+        [Grid { rows: 1, cols: 1 }, Grid { rows: 2, cols: 2 }, Grid { rows: 1, cols: 2 }, Grid { rows: 2, cols: 1 }];
+
+    fn chosen(codes: &[(usize, i32)], condition: Condition, floor: i32) -> usize {
+        let sensor = Sensor { rows: 8, cols: 12, pitch_x_mm: 2.0, pitch_y_mm: 2.0, thickness_mm: 1.0 };
+        let mut seen = Seen::default();
+        codes.iter().for_each(|&(index, code)| seen.take(&sensor, index, code, floor));
+        seen.choose(&GRIDS, condition, floor)
+    }
+
+    #[test]
+    fn beside_the_middle_are_two_lines_on_each_side() {
+        let lines = |count| (0..count).filter(|&line| is_beside(line, count)).collect::<Vec<_>>();
+        assert_eq!([lines(8), lines(4)], [vec![2, 3, 4, 5], vec![0, 1, 2, 3]]);
+    }
+
+    #[test]
+    fn what_a_contact_allows() {
+        let loaded = Condition::Loaded;
+        let at = |row: usize, col: usize| 12 * row + col;
+        // A corner; beside the middle columns; beside the middle rows; beside both.
+        assert_eq!(chosen(&[(at(0, 0), 1000)], loaded, 0), 1);
+        assert_eq!(chosen(&[(at(0, 7), -1000)], loaded, 0), 3);
+        assert_eq!(chosen(&[(at(5, 0), 1000)], loaded, 0), 2);
+        assert_eq!(chosen(&[(at(3, 4), 1000)], loaded, 0), 0);
+        // A quarter of the peak does not count, a code more does; nor does what the noise floor hides.
+        assert_eq!(chosen(&[(at(0, 0), 400), (at(3, 4), 100)], loaded, 0), 1);
+        assert_eq!(chosen(&[(at(0, 0), 400), (at(3, 4), 101)], loaded, 0), 0);
+        assert_eq!(chosen(&[(at(0, 0), 400), (at(3, 4), 101)], loaded, 101), 1);
+    }
+
+    #[test]
+    fn a_subarray_of_one_sign_is_not_cut_out() {
+        let at = |row: usize, col: usize| 12 * row + col;
+        // Compression left, tension right, both in the upper half.
+        let codes = [(at(0, 0), 1000), (at(0, 11), -900)];
+        assert_eq!(chosen(&codes, Condition::Loaded, 0), 1);
+        assert_eq!(chosen(&codes, Condition::BothSigns, 0), 3);
+        assert_eq!(chosen(&codes[..1], Condition::BothSigns, 0), 0);
+    }
+}
