@@ -6,10 +6,10 @@
 //! magic  key length  key  condition  r  3 × (blocks  (row0  col0  rows  cols  entries column by column)…)  CRC-32
 //! ```
 //!
-//! all little-endian, 64 bits each but magic, key and CRC. The key is everything the matrices depend on, in words,
-//! [`VERSION`] and this crate's version with it; the file's name is its CRC-32 and length. A file with another key, cut short or
-//! damaged is as good as none: it is computed and written again. Files are written beside their place and renamed, so
-//! that neither an interruption nor a second process leaves half a file.
+//! all little-endian, 64 bits each but magic, key and CRC. The key is everything the matrices depend on, in words, with
+//! the layout's and this crate's version; the file's name is its CRC-32 and length. A file with another key, cut short
+//! or damaged is as good as none: it is computed and written again. Files are written beside their place and renamed,
+//! so that neither an interruption nor a second process leaves half a file.
 
 use crate::folded::{Block, Operator};
 use crate::scene::Medium;
