@@ -32,7 +32,7 @@ with --paper the same named paper.")]
 pub struct Arguments {
     /// Built-in names or paths of scenes with shipped frames; without any all built-in ones.
     scenes: Vec<String>,
-    /// Folder for the files; without it <build-dir>/report.
+    /// Folder for the files; without it `report` in the build folder.
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
     /// Fewer drawn frames, sweeps and co-simulations; leaves out subarrays of more than 1200 taxels.
