@@ -2,7 +2,7 @@
 
 use serde_json::{json, Value};
 
-use super::document::{Cell, Document, Item, Table};
+use super::document::{Cell, Document, Item, Picture, Section, Table};
 
 /// The document as Markdown; pictures are files beside it.
 pub fn text(document: &Document) -> String {
@@ -78,11 +78,14 @@ pub fn document(document: &Document) -> Value {
         Item::Text(text) => vec![json!({ "text": text })],
         Item::Table(one) => vec![table(one)],
         Item::Pictures(all) => {
-            let one = |p: &super::document::Picture| json!({ "picture": p.id, "caption": p.caption, "file": path_of_picture(document, &p.id) });
+            let one = |p: &Picture| {
+                let file = path_of_picture(document, &p.id);
+                json!({ "picture": p.id, "caption": p.caption, "file": file })
+            };
             all.iter().map(one).collect()
         }
     };
-    let section = |section: &super::document::Section| {
+    let section = |section: &Section| {
         let items: Vec<Value> = section.items.iter().flat_map(item).collect();
         json!({ "id": section.id, "title": section.title, "items": items })
     };
@@ -92,7 +95,7 @@ pub fn document(document: &Document) -> Value {
 
 #[cfg(test)]
 mod tests {
-    use super::super::document::{none, percent, words, Section};
+    use super::super::document::{none, percent, words};
     use super::super::read;
     use super::*;
 

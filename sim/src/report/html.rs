@@ -23,8 +23,8 @@ th{white-space:normal}\n\
 .caption,figcaption,summary{font-size:.85rem;opacity:.85}\n\
 summary{cursor:pointer;margin:.5rem 0}\n\
 .pictures{display:grid;grid-template-columns:repeat(auto-fill,minmax(min(100%,22rem),1fr));gap:1rem;margin:1rem 0}\n\
-.pictures.four{grid-template-columns:repeat(auto-fill,minmax(min(100%,16rem),1fr))}\n\
-.pictures.two{grid-template-columns:repeat(auto-fill,minmax(min(100%,26rem),1fr))}\n\
+.pictures.four{grid-template-columns:repeat(auto-fit,minmax(min(100%,16rem),1fr))}\n\
+.pictures.two{grid-template-columns:repeat(auto-fit,minmax(min(100%,26rem),1fr))}\n\
 figure{margin:0;padding:.5rem;background:var(--panel);border-radius:.5rem}\n\
 svg{display:block;width:100%;height:auto;font-family:system-ui,'Segoe UI','DejaVu Sans',sans-serif}\n\
 @media(max-width:30rem){body{padding:.6rem}figure{padding:.2rem}}\n\
@@ -38,7 +38,8 @@ pub fn html(document: &Document) -> String {
     let mut text = format!(
         "<!doctype html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n\
          <meta name=\"viewport\" content=\"width=device-width,initial-scale=1\">\n\
-         <link rel=\"icon\" href=\"data:,\">\n<title>{}</title>\n<style>\n{}{RULES}</style>\n</head>\n<body>\n<h1>{}</h1>\n",
+         <link rel=\"icon\" href=\"data:,\">\n<title>{}</title>\n<style>\n{}{RULES}</style>\n</head>\n\
+         <body>\n<h1>{}</h1>\n",
         escape(&document.title),
         variables(),
         escape(&document.title),

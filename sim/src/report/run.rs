@@ -10,7 +10,7 @@ use dermis_golden::scene::{Condition, Scene};
 
 use super::document::{Document, Section};
 use super::measure::jobs::Interrupt;
-use super::measure::{clock, machine, measure, sweep, Measured, Options, SweepPoint};
+use super::measure::{clock, machine, measure, sweep, Kind, Measured, Options, SweepPoint};
 use super::save::save;
 use super::sections::{
     choice, choose, fields, frames, paper, published, ratios, resources, search, stages, sweeps, time, Choice,
@@ -106,14 +106,18 @@ fn sections(measured: &[Measured], options: &Options) -> Result<Vec<Section>> {
     ])
 }
 
-/// The sweeps of the scenes that have hardware, each in its chosen case, with the number of frames.
-fn all_sweeps(measured: &[Measured], choices: &[Choice], options: &Options) -> Result<Vec<(Vec<SweepPoint>, usize)>> {
+/// The sweeps of the scenes that have hardware, each in its chosen case, with the kind and the number of frames.
+fn all_sweeps(
+    measured: &[Measured],
+    choices: &[Choice],
+    options: &Options,
+) -> Result<Vec<(Vec<SweepPoint>, Kind, usize)>> {
     let kept = if options.quick { 1 } else { choices.len() };
     let chosen = choices.iter().map(|choice| (&measured[choice.index].scene, choice.kind)).take(kept);
     chosen
         .map(|(scene, kind)| {
             let frames = frames(scene, kind, SWEEP_FRAMES[usize::from(!options.quick)])?;
-            Ok((sweep(scene, &frames, options)?, frames.len()))
+            Ok((sweep(scene, &frames, options)?, kind, frames.len()))
         })
         .collect()
 }
@@ -130,8 +134,8 @@ fn intro(measured: &[Measured], options: &Options) -> Vec<String> {
     }
     if options.quick {
         intro.push(
-            "Quick variant: few drawn frames, hardware co-simulated for sensor-1 and eight-by-eight in case 0 (else the \
-             bit-true model's cycles), no subarrays above 1200 taxels, one sweep. The full one: dermis report."
+            "Quick variant: few drawn frames, hardware co-simulated for sensor-1 and eight-by-eight in case 0 (else \
+             the bit-true model's cycles), no subarrays above 1200 taxels, one sweep. The full one: dermis report."
                 .into(),
         );
     }
@@ -141,8 +145,8 @@ fn intro(measured: &[Measured], options: &Options) -> Vec<String> {
         );
     }
     intro.push(
-        "Frames are those shipped in golden/data/frames, with known forces; every figure was measured in this run, but for \
-         the published ones, which stand in golden/data/paper."
+        "Frames are those shipped in golden/data/frames, with known forces; every figure was measured in this run, \
+         but for the published ones, which stand in golden/data/paper."
             .into(),
     );
     intro

@@ -160,16 +160,21 @@ fn line(area: &Area, points: Vec<(i32, i32)>, colour: &RGBColor, width: u32) -> 
     Ok(())
 }
 
+/// Pixels and texts of an axis's ticks; of those with one text, too near each other for it, the first.
+fn named(axis: &Axis, text: fn(f64) -> String) -> Vec<(i32, String)> {
+    let mut all: Vec<(i32, String)> = axis.ticks().into_iter().map(|tick| (axis.at(tick), text(tick))).collect();
+    all.dedup_by(|a, b| a.1 == b.1);
+    all
+}
+
 fn axes(area: &Area, plot: &Scatter, x: &Axis, y: &Axis) -> Result<()> {
-    for tick in x.ticks() {
-        let at = x.at(tick);
+    for (at, text) in named(x, plot.ticks[0]) {
         line(area, vec![(at, TOP), (at, BOTTOM)], &GRID, 1)?;
-        note(area, &plot.ticks[0](tick), (at, BOTTOM + 5), HPos::Center, VPos::Top)?;
+        note(area, &text, (at, BOTTOM + 5), HPos::Center, VPos::Top)?;
     }
-    for tick in y.ticks() {
-        let at = y.at(tick);
+    for (at, text) in named(y, plot.ticks[1]) {
         line(area, vec![(LEFT, at), (RIGHT, at)], &GRID, 1)?;
-        note(area, &plot.ticks[1](tick), (LEFT - 5, at), HPos::Right, VPos::Center)?;
+        note(area, &text, (LEFT - 5, at), HPos::Right, VPos::Center)?;
     }
     line(area, vec![(LEFT, TOP), (LEFT, BOTTOM), (RIGHT, BOTTOM)], &INK, 1)?;
     let middle = (LEFT + RIGHT) / 2;
@@ -280,6 +285,10 @@ mod tests {
         let ticks: Vec<i32> = log.ticks().iter().map(|tick| tick.log10().round() as i32).collect();
         assert_eq!(ticks, [-5, -4, -3, -2, -1, 0]);
         assert_eq!((log.at(1e-9), log.at(1e9)), (0, 100));
+        // Less than a factor apart: round in between, and no text twice.
+        let near = Axis::new([0.0015, 0.0017].into_iter(), true, 0, 100);
+        assert!(near.ticks().len() > 2);
+        assert_eq!(named(&near, |tick| format!("{tick:.2}")).len(), 1);
     }
 
     #[test]

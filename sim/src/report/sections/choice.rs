@@ -89,8 +89,8 @@ fn cheapest(formats: &[FormatRow]) -> Option<&FormatRow> {
     near.rev().min_by_key(|row| row.block_rams)
 }
 
-/// The shipped frames of a kind and `drawn` ones beside them; none drawn where contacts of one to two thicknesses are no
-/// wider than a taxel.
+/// The shipped frames of a kind and `drawn` ones beside them; none drawn where contacts of one to two thicknesses are
+/// no wider than a taxel.
 ///
 /// # Errors
 /// A stress that is not finite.
@@ -142,12 +142,12 @@ pub fn choice(measured: &[Measured], choices: &[Choice]) -> Section {
         "What to take and what it costs, with the share of the board. Errors of the resultant: median over shipped and \
          drawn frames; time: cycles over the {origin}"
     );
-    let rule = "Case: smallest median shear error on the shipped frames among the cases whose hardware fits the board \
-                within 1 ms; among cases within a tenth (and 0.2 %) of it the fastest. Format: fewest block RAMs among \
-                the candidates within a quarter (and 0.5 %) of the best candidate. Write the case into [partition] case, \
-                the bits into [fixed] input_bits, inverse_bits, data_bits, coef_bits. Several contacts with different \
-                shear suit no rectangle: in software [partition] case = \"contacts\" gives each its own μ; its error and \
-                time on a CPU stand below where it was measured.";
+    let rule = "Case: smallest median shear error on the shipped frames among the cases whose hardware fits the \
+                board within 1 ms; among cases within a tenth (and 0.2 %) of it the fastest. Format: fewest block \
+                RAMs among the candidates within a quarter (and 0.5 %) of the best candidate. Write the case into \
+                [partition] case, the bits into [fixed] input_bits, inverse_bits, data_bits, coef_bits. Several \
+                contacts with different shear suit no rectangle: in software [partition] case = \"contacts\" gives \
+                each its own μ; its error and time on a CPU stand below where it was measured.";
     let formats =
         choices.iter().flat_map(|choice| choice.formats.iter().map(|row| format_row(choice.kind, row, &choice.format)));
     let format_head = [

@@ -14,9 +14,9 @@ use super::{case_text, shown, Choice};
 /// A picture that cannot be written.
 pub fn fields(measured: &[Measured], choices: &[Choice]) -> Result<Section> {
     let mut items = vec![Item::Text(
-        "Stress under the taxels with the centroids of compression (+) and tension (−) of each subarray, then forces per \
-         taxel: normal by colour, tangential by arrows; truth, golden and bit-true model on one scale. Row 0 is on top; x \
-         runs to the right, y down. Colours follow the square root of the value, so that tension shows."
+        "Stress under the taxels with the centroids of compression (+) and tension (−) of each subarray, then forces \
+         per taxel: normal by colour, tangential by arrows; truth, golden and bit-true model on one scale. Row 0 is \
+         on top; x runs to the right, y down. Colours follow the square root of the value, so that tension shows."
             .into(),
     )];
     for choice in choices {

@@ -56,9 +56,10 @@ pub fn paper(measured: &[Measured], options: &Options) -> Result<Vec<Section>> {
         title: "Operation counts of section 4".into(),
         items: vec![
             Item::Text(
-                "The paper counts (3 n)² operations for a subarray of n taxels. Eq. 1 as printed takes 3 n² for C†b and (3 n)² \
-                 for I − C†C, in every subarray and for every candidate μ. The series in μ takes its products once: folded by \
-                 the two mirror symmetries they are n² / 4 each, and candidates cost no matrix product at all."
+                "The paper counts (3 n)² operations for a subarray of n taxels. Eq. 1 as printed takes 3 n² for C†b \
+                 and (3 n)² for I − C†C, in every subarray and for every candidate μ. The series in μ takes its \
+                 products once: folded by the two mirror symmetries they are n² / 4 each, and candidates cost no \
+                 matrix product at all."
                     .into(),
             ),
             Item::Table(operations(measured)),
@@ -70,8 +71,9 @@ pub fn paper(measured: &[Measured], options: &Options) -> Result<Vec<Section>> {
 
 fn figure_1(measured: &[Measured]) -> Result<Section> {
     let mut items = vec![Item::Text(
-        "The function S of Eq. 2 as stress on 10×10 taxels. From the corner at 4 × 2 mm it spans −16 145 to 36 000 N/m²; the \
-         paper prints −36 000 to 20 912, which no origin or sign tried here gives. It is no contact: there is no true force."
+        "The function S of Eq. 2 as stress on 10×10 taxels. From the corner at 4 × 2 mm it spans −16 145 to 36 000 \
+         N/m²; the paper prints −36 000 to 20 912, which no origin or sign tried here gives. It is no contact: there \
+         is no true force."
             .into(),
     )];
     if let Some(m) = find(measured, "sensor-1", Case::WHOLE) {
@@ -194,7 +196,9 @@ fn figure_7(measured: &[Measured], options: &Options) -> Result<Section> {
         "hardware, a frame",
     ];
     let table = Table::new("fig-7-table", "Time of a 48×48 frame", &head, rows.collect());
-    let text = "The paper's conclusion that subarrays shorten the response is the column \"faster than case 0\": theirs and ours.";
+    let text =
+        "The paper's conclusion that subarrays shorten the response is in the columns \"faster than case 0\": theirs \
+                and ours.";
     let items = vec![Item::Pictures(vec![picture]), Item::Text(text.into()), Item::Table(table)];
     Ok(Section { id: "fig-7-section", title: "Fig. 7: response time, three repeats".into(), items })
 }

@@ -95,7 +95,9 @@ pub(super) fn times(measured: &[Measured]) -> Table {
         row.extend([ratio(Engine::Golden), ratio(Engine::Hardware), words(published.source.clone())]);
         row
     });
-    let caption = "Published run times beside those of this run, time of a frame";
+    let caption =
+        "Published run times beside those of this run: ours are of a frame, with the matrices computed before (dermis \
+                   report --paper, Fig. 7, has them with the matrices)";
     Table::new("run-times", caption, &head, rows.collect())
 }
 

@@ -34,9 +34,10 @@ pub fn search(measured: &[Measured]) -> Result<Section> {
         title: "The search for μ and how sure it is".into(),
         items: vec![
             Item::Text(
-                "Π is the sparse objective: how few taxels carry the force, in bits. The margin is what its maximum is above \
-                 the best μ at least mu_max/8 away: a large margin means that no other answer fits the frame as well, a small \
-                 one that shear and an uneven pressure look alike in it, one below zero that the search has missed the maximum."
+                "Π is the sparse objective: how few taxels carry the force, in bits. The margin is what its maximum \
+                 is above the best μ at least mu_max/8 away: a large margin means that no other answer fits the \
+                 frame as well, a small one that shear and an uneven pressure look alike in it, one below zero that \
+                 the search has missed the maximum."
                     .into(),
             ),
             Item::Pictures(pictures),

@@ -45,11 +45,11 @@ pub fn stages(measured: &[Measured], choices: &[Choice]) -> Result<Section> {
         title: "Fixed point against floating point, stage by stage".into(),
         items: vec![
             Item::Text(
-                "Each stage's words beside the same stage in floating point, which starts from the stress itself with \
-                 matrices unrounded. Stage force is p at the integers' own μ: what the arithmetic costs. Stage search is how \
-                 far that μ is from the golden model's (LSB: mu_max/384), stage send what leaves: the arithmetic with the \
-                 search's answer in it. Shares are of the frame's largest value; LSBs are a subarray's own, large where one \
-                 has next to no load."
+                "Each stage's words beside the same stage in floating point, which starts from the stress itself \
+                 with matrices unrounded. Stage force is p at the integers' own μ: what the arithmetic costs. Stage \
+                 search is how far that μ is from the golden model's (LSB: mu_max/384), stage send what leaves: the \
+                 arithmetic with the search's answer in it. Shares are of the frame's largest value; LSBs are a \
+                 subarray's own, large where one has next to no load."
                     .into(),
             ),
             Item::Pictures(pictures),

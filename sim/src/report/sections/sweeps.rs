@@ -3,26 +3,28 @@
 use anyhow::Result;
 
 use super::super::document::{count, percent, words, Cell, Item, Picture, Section, Table};
-use super::super::measure::SweepPoint;
+use super::super::measure::{Kind, SweepPoint};
 use super::super::pictures::{scatter, Guide, Scatter, Series};
 use super::super::style::SERIES;
 use super::time::short;
 
-/// The section from the sweeps of each scene, with the number of frames of each.
+/// The section from the sweeps of each scene, with the kind and the number of their frames.
 ///
 /// # Errors
 /// A picture that cannot be written.
-pub fn sweeps(all: &[(Vec<SweepPoint>, usize)]) -> Result<Section> {
+pub fn sweeps(all: &[(Vec<SweepPoint>, Kind, usize)]) -> Result<Section> {
     let mut pictures = Vec::new();
-    for (points, frames) in all {
+    for (points, kind, frames) in all {
         let Some((scene, case)) = points.first().map(|point| (&point.scene, &point.case)) else { continue };
         for (what, x) in
             [("cycles", (|p| p.cycles as f64) as fn(&SweepPoint) -> f64), ("block RAMs", |p| p.block_rams as f64)]
         {
             pictures.push(Picture {
-                id: format!("sweep-{scene}-case-{case}-{}", what.replace(' ', "-")),
+                id: format!("sweep-{scene}-{}-{}", kind.name(), what.replace(' ', "-")),
                 caption: format!(
-                    "{scene}: shear error of the bit-true model against {what}, median of {frames} frames"
+                    "{scene} from case {case}, contacts: {}: shear error of the bit-true model against {what}, median \
+                     of {frames} frames",
+                    kind.name()
                 ),
                 svg: scatter(&plot(points, what, x))?,
             });
@@ -41,15 +43,15 @@ pub fn sweeps(all: &[(Vec<SweepPoint>, usize)]) -> Result<Section> {
         "multipliers",
         "fits the board",
     ];
-    let rows = all.iter().flat_map(|(points, _)| points.iter().map(row));
+    let rows = all.iter().flat_map(|(points, ..)| points.iter().map(row));
     Ok(Section {
         id: "sweeps",
         title: "What each setting costs".into(),
         items: vec![
             Item::Text(
-                "From each scene as it is, one field at a time; settings that the board has no room for are left out, but \
-                 those of degree. Cycles are the bit-true model's with every subarray searched, which co-simulation holds \
-                 equal to the hardware's."
+                "From each scene as it is, one field at a time; settings that the board has no room for are left \
+                 out, but those of degree. Cycles are the bit-true model's with every subarray searched, which \
+                 co-simulation holds equal to the hardware's."
                     .into(),
             ),
             Item::Pictures(pictures),

@@ -39,9 +39,10 @@ pub fn time(measured: &[Measured]) -> Result<Section> {
     items.insert(
         0,
         Item::Text(
-            "Each mark is an engine on a sensor in a case, which stands beside it. Errors of the resultant against the true \
-             contact, median over the shipped frames; times: a frame on the CPU, median over the frames and of three repeats, \
-             or the hardware's cycles over its clock. Below and left is better; nothing beats the front in both."
+            "Each mark is an engine on a sensor in a case, which stands beside it. Errors of the resultant against \
+             the true contact, median over the shipped frames; times: a frame on the CPU, median over the frames and \
+             of three repeats, or the hardware's cycles over its clock. Below and left is better; nothing beats the \
+             front in both."
                 .into(),
         ),
     );
