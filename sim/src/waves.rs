@@ -10,7 +10,9 @@
 //! A stage's fields keep their last word while its `valid` is low. Values stand from the rising edge of one cycle to that
 //! of the next, sampled before it; a cycle lasts as long as the board's clock.
 
+use std::fs::Permissions;
 use std::io::{BufWriter, Write};
+use std::os::unix::fs::PermissionsExt;
 use std::path::{Path, PathBuf};
 
 use anyhow::{anyhow, Result};
@@ -178,7 +180,10 @@ pub fn waves(scene: &Scene, frames: &[Frame], simulator: Simulator, build: &Path
     let taps = &hardware.generated.taps;
     let _progress = Progress::start(&format!("{}: waveforms", scene.name));
     // Gone with an error or an interruption that unwinds.
-    let part = tempfile::Builder::new().prefix(".waves-").tempfile_in(folder).map_err(|e| at(folder, e))?;
+    let mut part = tempfile::Builder::new();
+    // A temporary file is its owner's alone otherwise, and so would the waveforms be.
+    part.prefix(".waves-").permissions(Permissions::from_mode(0o644));
+    let part = part.tempfile_in(folder).map_err(|e| at(folder, e))?;
     let mut out = BufWriter::new(part.reopen().map_err(|e| at(part.path(), e))?);
     let device = hardware.device(simulator)?;
     let clock_MHz = hardware.model.board.clock_MHz;
@@ -266,6 +271,7 @@ mod tests {
         let command = waves(&scene, frames, Simulator::RustHdl, work.path(), &folder).unwrap();
         let (vcd, list) = (folder.join("eight-by-eight.vcd"), folder.join("eight-by-eight.gtkw"));
         assert_eq!(command, format!("gtkwave {} {}", vcd.display(), list.display()));
+        assert_eq!(std::fs::metadata(&vcd).unwrap().permissions().mode() & 0o777, 0o644);
         // Nothing else is left.
         assert_eq!(std::fs::read_dir(&folder).unwrap().count(), 2);
         let (widths, values) = read(&vcd);
