@@ -289,9 +289,10 @@ mod tests {
             simulate: false,
             interrupt: Interrupt::default(),
         };
-        let cases: Vec<Case> = [0, 1, 3].into_iter().filter_map(Case::numbered).collect();
-        let scenes = ["sensor-1", "eight-by-eight", "sensor-4"].map(|name| Scene::builtin(name).unwrap());
-        let measured = measure(&scenes, &cases, &options).unwrap();
+        let cases = |numbers: &[i64]| numbers.iter().filter_map(|n| Case::numbered(*n)).collect::<Vec<_>>();
+        let scenes = |names: &[&str]| names.iter().map(|name| Scene::builtin(name).unwrap()).collect::<Vec<_>>();
+        let mut measured = measure(&scenes(&["sensor-1", "eight-by-eight"]), &cases(&[0, 1, 3]), &options).unwrap();
+        measured.extend(measure(&scenes(&["sensor-4"]), &cases(&[1]), &options).unwrap());
         // Sensor 4 fits in case 1, where Ay is Ax transposed.
         let rows: Vec<StageRow> = measured.iter().flat_map(|measured| stages(measured, 0)).collect();
         assert_eq!(rows.len(), 9 * 7);
