@@ -1,8 +1,8 @@
 //! Matrices: everything about a subarray that does not depend on the frame.
 //!
 //! Cz⁺ is the pseudo-inverse, Ax = Cz⁺Cx, Ay = Cz⁺Cy. Cz is symmetric (the stress under cell j from cell i is that
-//! under i from j), so its singular values are the sizes of its eigenvalues λ and Cz⁺ = U diag(1/λ) Uᵀ, leaving out
-//! |λ| ≤ n ε max|λ|.
+//! under i from j), so its singular values are the sizes of its eigenvalues λ and Cz⁺ = U diag(f(λ)) Uᵀ, f(λ) = 1/λ
+//! where the readings can tell ([`crate::scene::inverse`]).
 //!
 //! r = mu_max · max over θ of ρ(cos θ Ax + sin θ Ay) says how fast the series in μ converges. Cx and Cy are
 //! antisymmetric; with S = |Cz⁺|^½ the eigenvalues of cos θ Ax + sin θ Ay are those of the antisymmetric S (cos θ Cx +
@@ -28,7 +28,7 @@ mod tests;
 
 use crate::folded::{Basis, Operator, EVEN, ODD_X, ODD_Y};
 use crate::influence::Influence;
-use crate::scene::Medium;
+use crate::scene::{Inversion, Medium, Scene};
 use crate::sensor::{Sensor, SensorError};
 use faer::Mat;
 use inverse::{chain, Inverse};
@@ -67,6 +67,12 @@ pub struct Matrices {
     pub cy: Mat<f64>,
     /// Largest over smallest singular value of Cz; infinite when the smallest is 0.
     pub condition: f64,
+    /// How Cz was inverted.
+    pub inversion: Inversion,
+    /// Effective rank Σ λ f(λ): singular values kept, each by the share that damping leaves of it.
+    pub rank: f64,
+    /// Noise gain ‖Cz⁺‖₂ in N/MPa: the largest error of p₀, in the 2-norm, per error of b.
+    pub gain: f64,
     /// r at the scene's mu_max.
     pub spectral_radius: f64,
     /// Degree of the polynomial in μ.
@@ -124,8 +130,8 @@ pub enum MatricesError {
     },
     /// The series in μ converges too slowly or not at all.
     #[error(
-        "{sensor}: r = {radius:.3} at mu_max = {mu_max} needs more than degree {most}; \
-         a smaller mu_max, or taxels further apart against the thickness, lower r"
+        "{sensor}: r = {radius:.3} at mu_max = {mu_max} needs more than degree {most}; search.mu_max = {remedy} has a \
+         series that converges, as have taxels further apart against the thickness"
     )]
     SlowSeries {
         /// The subarray.
@@ -136,6 +142,8 @@ pub enum MatricesError {
         mu_max: f64,
         /// Highest degree there is.
         most: usize,
+        /// The largest mu_max of three digits that it serves.
+        remedy: f64,
     },
 }
 
@@ -146,7 +154,7 @@ impl Matrices {
     /// # Errors
     /// [`MatricesError`]; the size is checked before anything is allocated.
     pub fn new(sensor: &Sensor, mu_max: f64) -> Result<Matrices, MatricesError> {
-        Matrices::up_to(sensor, Medium::HalfSpace, mu_max, MAX_DEGREE)
+        Matrices::up_to(sensor, Medium::HalfSpace, mu_max, Inversion::EXACT, MAX_DEGREE)
     }
 
     /// Computes the matrices of a (sub)array under any medium for shear ratios up to `mu_max` (0 to 2), of a degree
@@ -155,10 +163,24 @@ impl Matrices {
     /// # Errors
     /// As [`Matrices::new`].
     pub fn through(sensor: &Sensor, medium: Medium, mu_max: f64) -> Result<Matrices, MatricesError> {
-        Matrices::up_to(sensor, medium, mu_max, MAX_FLOAT_DEGREE)
+        Matrices::up_to(sensor, medium, mu_max, Inversion::EXACT, MAX_FLOAT_DEGREE)
     }
 
-    fn up_to(sensor: &Sensor, medium: Medium, mu_max: f64, most: usize) -> Result<Matrices, MatricesError> {
+    /// Computes the matrices of a subarray as its scene wants them, of a degree of at most `most`.
+    ///
+    /// # Errors
+    /// As [`Matrices::new`].
+    pub fn of(scene: &Scene, subarray: &Sensor, most: usize) -> Result<Matrices, MatricesError> {
+        Matrices::up_to(subarray, scene.medium, scene.search.mu_max, scene.inversion(), most)
+    }
+
+    fn up_to(
+        sensor: &Sensor,
+        medium: Medium,
+        mu_max: f64,
+        inversion: Inversion,
+        most: usize,
+    ) -> Result<Matrices, MatricesError> {
         sensor.check()?;
         let boxed = || Box::new(sensor.clone());
         let n = sensor.taxels();
@@ -172,26 +194,30 @@ impl Matrices {
             return Err(MatricesError::NotFinite { sensor: boxed() });
         }
         let basis = Basis::parities(sensor.rows, sensor.cols);
-        let place = Place::of(sensor, medium, mu_max);
+        let place = Place::of(sensor, medium, mu_max, inversion);
         let kept = match place.as_ref().and_then(Place::read) {
             Some(kept) => kept,
             None => {
-                let kept = compute(&basis, [&cx, &cy, &cz], mu_max)
+                let kept = compute(&basis, [&cx, &cy, &cz], mu_max, inversion)
                     .ok_or_else(|| MatricesError::NotConverged { sensor: boxed() })?;
                 place.iter().for_each(|place| place.write(&kept));
                 kept
             }
         };
-        let Kept { condition, spectral_radius, operators: [cz_pinv, ax, ay] } = kept;
+        let Kept { numbers: [condition, rank, gain, spectral_radius], operators: [cz_pinv, ax, ay] } = kept;
         let degree = degree(spectral_radius, mu_max, most).ok_or_else(|| MatricesError::SlowSeries {
             sensor: boxed(),
             radius: spectral_radius,
             mu_max,
             most,
+            remedy: largest_mu_max(spectral_radius / mu_max, most),
         })?;
         Ok(Matrices {
             sensor: sensor.clone(),
             condition,
+            inversion,
+            rank,
+            gain,
             cz_pinv: basis.unfold_matrix(EVEN, &cz_pinv),
             ax: basis.unfold_matrix(ODD_X, &ax),
             ay: basis.unfold_matrix(ODD_Y, &ay),
@@ -206,15 +232,16 @@ impl Matrices {
 }
 
 /// Cz⁺, Ax, Ay and r in the folded basis; `None` when the eigenvalues of Cz do not converge.
-fn compute(basis: &Basis, [cx, cy, cz]: [&Mat<f64>; 3], mu_max: f64) -> Option<Kept> {
+fn compute(basis: &Basis, [cx, cy, cz]: [&Mat<f64>; 3], mu_max: f64, inversion: Inversion) -> Option<Kept> {
     let folded = |flip: usize, m: &Mat<f64>| basis.fold_matrix(flip, |i, j| m[(i, j)]);
     let (folded_cx, folded_cy) = (folded(ODD_X, cx), folded(ODD_Y, cy));
-    let inverse = Inverse::new(&folded(EVEN, cz))?;
+    let inverse = Inverse::new(&folded(EVEN, cz), inversion)?;
     let cz_pinv = inverse.power(1);
     let (ax, ay) = (chain(&cz_pinv, &folded_cx), chain(&cz_pinv, &folded_cy));
     let shear = mu_max > 0.0;
     let spectral_radius = if shear { mu_max * inverse.largest_radius(&folded_cx, &folded_cy) } else { 0.0 };
-    Some(Kept { condition: inverse.condition, spectral_radius, operators: [cz_pinv, ax, ay] })
+    let numbers = [inverse.condition, inverse.rank, inverse.gain, spectral_radius];
+    Some(Kept { numbers, operators: [cz_pinv, ax, ay] })
 }
 
 /// The degree a series of radius `r` needs, `None` when it is more than `most`.
@@ -225,4 +252,16 @@ fn degree(r: f64, mu_max: f64, most: usize) -> Option<usize> {
     let least = if r > CUBIC_FROM { 3 } else { 1 };
     let enough = |d: &usize| r.powi(*d as i32 + 1) <= SERIES_TOLERANCE;
     (least..=most).find(enough).filter(|_| r < MAX_RADIUS)
+}
+
+/// The largest mu_max of three digits whose series needs no more than degree `most`, for a radius per unit of mu_max.
+fn largest_mu_max(per_mu: f64, most: usize) -> f64 {
+    let radius = SERIES_TOLERANCE.powf(1.0 / (most as f64 + 1.0)).min(MAX_RADIUS);
+    let mu_max = (1e3 * radius / per_mu).floor() / 1e3;
+    // A radius that is no number serves none.
+    if mu_max.is_finite() {
+        mu_max
+    } else {
+        0.0
+    }
 }

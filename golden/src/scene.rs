@@ -13,6 +13,7 @@
 //! | | `condition` ("loaded"; "both-signs") |
 //! | `[search]` | `objective` ("sparse"; …), `mu_max` (0.6; 0, or 0.001 … 2), `noise_floor_MPa` (0) |
 //! | | `form` ("oblique"; "orthogonal") |
+//! | `[inverse]` | `kind` ("tsvd"; "tikhonov", "exact"), `level` (floor of format and noise; 0 … 1, both excluded) |
 //! | `[threshold]` | `min_force_N` (0) |
 //! | `[fixed]` | `input_bits` (20; 8 … 24), `data_bits` (18; 12 … 18), `coef_bits` (18; 8 … 18) |
 //! | | `inverse_bits` (24; `coef_bits` … 32), `prune_bits` (20; 8 … 31), `lanes` (what the board allows; 4, 8 … 1024) |
@@ -22,6 +23,7 @@
 //! | `[output]` | `forces` ("taxels"; "resultants") |
 
 mod error;
+pub mod inverse;
 mod load;
 mod parse;
 mod reader;
@@ -30,6 +32,7 @@ mod supported;
 mod tests;
 
 pub use error::SceneError;
+pub use inverse::{InverseKind, InverseSpec, Inversion};
 
 use crate::frame::Frame;
 use crate::partition::{subarrays, Case};
@@ -51,6 +54,8 @@ pub struct Scene {
     pub partition: PartitionSpec,
     /// Objective and range of the μ search.
     pub search: SearchSpec,
+    /// Which singular values are inverted.
+    pub inverse: InverseSpec,
     /// Forces too small to report.
     pub threshold: ThresholdSpec,
     /// Widths of the fixed-point pipeline.
@@ -304,6 +309,7 @@ impl Scene {
             medium: Medium::default(),
             partition: PartitionSpec::default(),
             search: SearchSpec::default(),
+            inverse: InverseSpec::default(),
             threshold: ThresholdSpec::default(),
             fixed: FixedSpec::default(),
             hardware: HardwareSpec::default(),

@@ -16,7 +16,7 @@ use super::quads::Quads;
 use super::send::CASE_SHIFT;
 use crate::board::Board;
 use crate::frame::Frame;
-use crate::matrices::Matrices;
+use crate::matrices::{Matrices, MAX_DEGREE};
 use crate::partition::{subarrays, Case, Grid, Subarray};
 use crate::reconstruct::{Reconstruction, Taken};
 use crate::scene::Scene;
@@ -181,7 +181,7 @@ pub(super) fn shape(scene: &Scene, case: Case, degree: Option<usize>) -> Result<
     let parts = subarrays(case, &scene.sensor)?;
     // With dead taxels there is one subarray.
     let dead = parts[0].own(&scene.input.dead);
-    let mut matrices = Matrices::new(&parts[0].sensor(&scene.sensor), scene.search.mu_max)?.without(&dead)?;
+    let mut matrices = Matrices::of(scene, &parts[0].sensor(&scene.sensor), MAX_DEGREE)?.without(&dead)?;
     matrices.degree = degree.unwrap_or(matrices.degree);
     Ok(Shape { matrices, parts: parts.len() })
 }

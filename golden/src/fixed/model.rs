@@ -182,7 +182,7 @@ impl Model {
     }
 
     /// The model of a scene that may be too large for its board.
-    pub(super) fn unfitted(scene: &Scene) -> Result<Self, FixedError> {
+    pub(crate) fn unfitted(scene: &Scene) -> Result<Self, FixedError> {
         Model::given(scene, Scale::new(scene)?, None)
     }
 

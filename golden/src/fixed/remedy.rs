@@ -12,7 +12,7 @@ use std::fmt;
 
 use super::cycles::Cycles;
 use super::model::Model;
-use crate::matrices::{Matrices, CUBIC_FROM, SERIES_TOLERANCE};
+use crate::matrices::{Matrices, CUBIC_FROM, MAX_DEGREE, SERIES_TOLERANCE};
 use crate::partition::{Case, Grid};
 use crate::scene::Scene;
 use crate::sensor::MIN_LINES;
@@ -143,7 +143,7 @@ fn partitions(scene: &Scene) -> Vec<Change> {
 
 fn degrees(model: &Model) -> Vec<Change> {
     let scene = &model.scene;
-    let Ok(matrices) = Matrices::new(&model.parts[0].sensor(&scene.sensor), scene.search.mu_max) else {
+    let Ok(matrices) = Matrices::of(scene, &model.parts[0].sensor(&scene.sensor), MAX_DEGREE) else {
         return Vec::new();
     };
     let radii = [CUBIC_FROM.min(SERIES_TOLERANCE.cbrt()), SERIES_TOLERANCE.sqrt()];

@@ -64,7 +64,7 @@ pub fn influence(matrices: &Matrices) -> Mat<f64> {
 }
 
 impl Orthogonal {
-    /// Computes C† from the singular values of C; those below 3n ε of the largest count as zero.
+    /// Computes C† from the singular values of C by the rule that Cz⁺ was made with.
     ///
     /// # Errors
     /// [`OrthogonalError`]; the size is checked before anything is allocated.
@@ -77,8 +77,8 @@ impl Orthogonal {
         let c = influence(matrices);
         let svd = c.thin_svd().map_err(|_| OrthogonalError::NotConverged { sensor: sensor() })?;
         let values: Vec<f64> = svd.S().column_vector().iter().copied().collect();
-        let least = (3 * taxels) as f64 * f64::EPSILON * values.iter().fold(0.0, |largest: f64, v| largest.max(*v));
-        let invert = |v: f64| if v <= least { 0.0 } else { 1.0 / v };
+        let largest = values.iter().fold(0.0, |largest: f64, v| largest.max(*v));
+        let invert = |v: f64| matrices.inversion.invert(v, largest, 3 * taxels);
         let scaled = Mat::from_fn(3 * taxels, taxels, |i, k| svd.V()[(i, k)] * invert(values[k]));
         let pinv = &scaled * svd.U().transpose();
         let projector = Mat::<f64>::identity(3 * taxels, 3 * taxels) - &pinv * &c;

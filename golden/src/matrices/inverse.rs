@@ -1,9 +1,10 @@
 //! Inverse: powers of the pseudo-inverse of the symmetric Cz, and the radius of the series in μ.
 //!
-//! Cz = U diag(λ) Uᵀ, block by block of the folded basis; f(Cz)⁺ = U diag(f) Uᵀ without the λ that are rounding only,
-//! |λ| ≤ n ε max|λ|.
+//! Cz = U diag(λ) Uᵀ, block by block of the folded basis; Cz⁺ = U diag(f(λ)) Uᵀ with the scene's f
+//! ([`crate::scene::inverse`]).
 
 use crate::folded::{Block, Operator};
+use crate::scene::Inversion;
 use faer::linalg::matmul::matmul;
 use faer::{Accum, Mat, Par, Side};
 use std::f64::consts::FRAC_PI_2;
@@ -32,16 +33,20 @@ pub(super) fn chain(a: &Operator, b: &Operator) -> Operator {
     Operator { blocks: pairs.map(multiply).collect() }
 }
 
-/// Eigenvectors and inverted eigenvalues of each block of Cz, zero for those left out.
+/// Eigenvectors and f(λ) of each block of Cz, zero for those left out.
 pub(super) struct Inverse {
     blocks: Vec<(usize, Mat<f64>, Vec<f64>)>,
     /// Largest over smallest |λ|.
     pub(super) condition: f64,
+    /// Σ λ f(λ).
+    pub(super) rank: f64,
+    /// Largest |f(λ)|.
+    pub(super) gain: f64,
 }
 
 impl Inverse {
     /// Decomposes the folded Cz, `None` when the eigenvalues do not converge.
-    pub(super) fn new(cz: &Operator) -> Option<Inverse> {
+    pub(super) fn new(cz: &Operator, rule: Inversion) -> Option<Inverse> {
         let mut blocks = Vec::with_capacity(cz.blocks.len());
         for block in &cz.blocks {
             let eigen = block.entries.self_adjoint_eigen(Side::Lower).ok()?;
@@ -50,14 +55,18 @@ impl Inverse {
         }
         let all = || blocks.iter().flat_map(|(_, _, values)| values.iter().map(|v| v.abs()));
         let (largest, smallest) = (all().fold(0.0, f64::max), all().fold(f64::INFINITY, f64::min));
-        let least = all().count() as f64 * f64::EPSILON * largest;
+        let count = all().count();
+        let (mut rank, mut gain) = (0.0, 0.0f64);
         for value in blocks.iter_mut().flat_map(|(_, _, values)| values) {
-            *value = if value.abs() <= least { 0.0 } else { 1.0 / *value };
+            let inverted = rule.invert(*value, largest, count);
+            rank += *value * inverted;
+            gain = gain.max(inverted.abs());
+            *value = inverted;
         }
-        Some(Inverse { blocks, condition: largest / smallest })
+        Some(Inverse { blocks, condition: largest / smallest, rank, gain })
     }
 
-    /// U diag(f) Uᵀ with f = 1/λ (`root` 1), or |1/λ|^½ (`root` 2).
+    /// U diag(f) Uᵀ with f = f(λ) (`root` 1), or |f(λ)|^½ (`root` 2).
     pub(super) fn power(&self, root: u32) -> Operator {
         let power = |(start, vectors, values): &(usize, Mat<f64>, Vec<f64>)| {
             let factor = |k: usize| match root {

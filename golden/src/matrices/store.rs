@@ -3,7 +3,7 @@
 //! Nothing is kept until [`keep_in`] names a folder; a program does that, never a test of the numbers. A file holds
 //!
 //! ```text
-//! magic  key length  key  condition  r  3 × (blocks  (row0  col0  rows  cols  entries column by column)…)  CRC-32
+//! magic  key length  key  4 numbers  3 × (blocks  (row0  col0  rows  cols  entries column by column)…)  CRC-32
 //! ```
 //!
 //! all little-endian, 64 bits each but magic, key and CRC. The key is everything the matrices depend on, in words, with
@@ -12,7 +12,7 @@
 //! so that neither an interruption nor a second process leaves half a file.
 
 use crate::folded::{Block, Operator};
-use crate::scene::Medium;
+use crate::scene::{Inversion, Medium};
 use crate::sensor::Sensor;
 use faer::Mat;
 use std::fs;
@@ -20,7 +20,7 @@ use std::path::{Path, PathBuf};
 use std::sync::RwLock;
 
 /// Version of the layout and of the numbers: raised with either.
-const VERSION: u32 = 1;
+const VERSION: u32 = 2;
 const MAGIC: &[u8; 8] = b"dermisA\n";
 /// Below so many taxels computing is as fast as reading.
 const LEAST_TAXELS: usize = 400;
@@ -35,8 +35,8 @@ pub fn keep_in(folder: Option<&Path>) {
 /// What is kept of a subarray's matrices.
 #[derive(Clone, Debug)]
 pub(super) struct Kept {
-    pub condition: f64,
-    pub spectral_radius: f64,
+    /// Condition, rank, gain and r of the series.
+    pub numbers: [f64; 4],
     /// Cz⁺, Ax, Ay.
     pub operators: [Operator; 3],
 }
@@ -49,15 +49,15 @@ pub(super) struct Place {
 
 impl Place {
     /// Where the matrices would be, `None` where nothing is kept.
-    pub(super) fn of(sensor: &Sensor, medium: Medium, mu_max: f64) -> Option<Place> {
+    pub(super) fn of(sensor: &Sensor, medium: Medium, mu_max: f64, inversion: Inversion) -> Option<Place> {
         let folder = FOLDER.read().ok()?.clone()?;
-        (sensor.taxels() >= LEAST_TAXELS).then(|| Place::at(&folder, sensor, medium, mu_max))
+        (sensor.taxels() >= LEAST_TAXELS).then(|| Place::at(&folder, sensor, medium, mu_max, inversion))
     }
 
-    fn at(folder: &Path, sensor: &Sensor, medium: Medium, mu_max: f64) -> Place {
+    fn at(folder: &Path, sensor: &Sensor, medium: Medium, mu_max: f64, inversion: Inversion) -> Place {
         // Debug prints the shortest text that reads back as the same number.
         let version = env!("CARGO_PKG_VERSION");
-        let key = format!("{VERSION} {version} {sensor:?} {medium:?} {mu_max:?}");
+        let key = format!("{VERSION} {version} {sensor:?} {medium:?} {mu_max:?} {inversion:?}");
         let path = folder.join(format!("{:08x}-{}.matrices", crc32fast::hash(key.as_bytes()), key.len()));
         Place { path, key }
     }
@@ -72,9 +72,9 @@ impl Place {
         if rest.take(length)? != self.key.as_bytes() {
             return None;
         }
-        let (condition, spectral_radius) = (rest.number()?, rest.number()?);
+        let numbers = [rest.number()?, rest.number()?, rest.number()?, rest.number()?];
         let operators = [rest.operator()?, rest.operator()?, rest.operator()?];
-        rest.0.is_empty().then_some(Kept { condition, spectral_radius, operators })
+        rest.0.is_empty().then_some(Kept { numbers, operators })
     }
 
     /// Keeps it. Where that fails the next run computes again, which is no error.
@@ -83,8 +83,7 @@ impl Place {
         let size = |bytes: &mut Vec<u8>, n: usize| bytes.extend((n as u64).to_le_bytes());
         size(&mut bytes, self.key.len());
         bytes.extend(self.key.as_bytes());
-        bytes.extend(kept.condition.to_le_bytes());
-        bytes.extend(kept.spectral_radius.to_le_bytes());
+        kept.numbers.iter().for_each(|number| bytes.extend(number.to_le_bytes()));
         for operator in &kept.operators {
             size(&mut bytes, operator.blocks.len());
             for Block { row0, col0, entries } in &operator.blocks {
@@ -153,15 +152,11 @@ mod tests {
                 Block { row0: 2, col0: 0, entries: Mat::from_fn(1, 2, |_, j| -by * j as f64) },
             ],
         };
-        Kept {
-            condition: 17.0,
-            spectral_radius: 0.1 + 0.2,
-            operators: [operator(1.0), operator(0.3), operator(1e-300)],
-        }
+        Kept { numbers: [17.0, 400.0, 1e12, 0.1 + 0.2], operators: [operator(1.0), operator(0.3), operator(1e-300)] }
     }
 
     fn place(folder: &Path, mu_max: f64) -> Place {
-        Place::at(folder, &sensor(), Medium::HalfSpace, mu_max)
+        Place::at(folder, &sensor(), Medium::HalfSpace, mu_max, Inversion::EXACT)
     }
 
     #[test]

@@ -35,6 +35,21 @@ fn builtin_sensors_have_the_known_radius_and_degree() {
     }
 }
 
+/// The default level takes nothing from the built-in scenes.
+#[test]
+fn the_level_leaves_the_builtin_scenes_as_they_are() {
+    for name in Scene::builtin_names() {
+        let mut scene = Scene::builtin(name).unwrap();
+        let shape = Sensor { rows: scene.sensor.rows.min(12), cols: scene.sensor.cols.min(12), ..scene.sensor.clone() };
+        let level = Matrices::of(&scene, &shape, MAX_DEGREE).unwrap();
+        assert!(level.inversion.level > 0.0);
+        scene.inverse.kind = crate::scene::InverseKind::Exact;
+        let exact = Matrices::of(&scene, &shape, MAX_DEGREE).unwrap();
+        assert_eq!((&level.cz_pinv, &level.ax, &level.ay), (&exact.cz_pinv, &exact.ax, &exact.ay), "{name}");
+        assert_eq!(level.rank.round(), shape.taxels() as f64);
+    }
+}
+
 #[test]
 fn a_thin_cover_needs_degree_one() {
     let m = Matrices::new(&sensor(12, 12, [8.0, 8.0], 0.91), 0.6).unwrap();
@@ -75,6 +90,9 @@ fn degree_rule_at_its_edges() {
 fn refusals_name_their_reason() {
     let stiff = Matrices::new(&sensor(8, 8, [1.0, 1.0], 5.0), 0.6).unwrap_err();
     assert!(stiff.to_string().contains("r = 0.549"), "{stiff}");
+    // 0.6 · 0.035^(1/4) / 0.549
+    assert!(stiff.to_string().contains("search.mu_max = 0.472 has"), "{stiff}");
+    assert!(Matrices::new(&sensor(8, 8, [1.0, 1.0], 5.0), 0.472).is_ok());
     let large = Matrices::new(&sensor(256, 256, [1.0, 1.0], 1.0), 0.6).unwrap_err();
     assert!(matches!(large, MatricesError::TooLarge { taxels: 65536, .. }));
     let flat = Matrices::new(&sensor(4, 4, [1e-200, 1e-200], 1e-200), 0.6).unwrap_err();

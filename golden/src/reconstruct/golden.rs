@@ -16,7 +16,7 @@ use crate::float::pass::Polynomial;
 use crate::float::receive::{receive, Receipt};
 use crate::frame::{Forces, Frame, FrameError};
 use crate::input::{Input as InputOptions, InputError};
-use crate::matrices::{Matrices, MatricesError};
+use crate::matrices::{Matrices, MatricesError, MAX_FLOAT_DEGREE};
 use crate::partition::{subarrays, Case, PartitionError, Subarray};
 use crate::quantise::{full_scale, noise_floor_codes, quantise};
 use crate::scene::{Form, Scene, SceneError};
@@ -121,7 +121,7 @@ impl Golden {
         let cut = |case: Case| -> Result<Cut, GoldenError> {
             let parts = subarrays(case, &scene.sensor)?;
             let shape = parts[0].sensor(&scene.sensor);
-            let shared = Matrices::through(&shape, scene.medium, scene.search.mu_max)?;
+            let shared = Matrices::of(scene, &shape, MAX_FLOAT_DEGREE)?;
             let literal = scene.search.form == Form::Orthogonal;
             let orthogonal = literal.then(|| Orthogonal::new(&shared)).transpose()?;
             let objective = of_kind(scene.search.objective, &shape, scene.medium);

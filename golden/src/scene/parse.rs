@@ -2,8 +2,8 @@
 
 use super::reader::Reader;
 use super::{
-    Condition, FixedSpec, ForceOutput, Form, HardwareSpec, InputSpec, Medium, ObjectiveKind, OutputSpec, PartitionSpec,
-    Scene, SceneError, SearchSpec, ThresholdSpec,
+    Condition, FixedSpec, ForceOutput, Form, HardwareSpec, InputSpec, InverseKind, InverseSpec, Medium, ObjectiveKind,
+    OutputSpec, PartitionSpec, Scene, SceneError, SearchSpec, ThresholdSpec,
 };
 use crate::board::Board;
 use crate::partition::{subarrays, Case, Grid};
@@ -13,12 +13,13 @@ use std::path::Path;
 use toml::{Table, Value};
 
 /// Tables and their fields; "" is the top level.
-const SCHEMA: [(&str, &[&str]); 10] = [
+const SCHEMA: [(&str, &[&str]); 11] = [
     ("", &["name"]),
     ("sensor", &["rows", "cols", "pitch_x_mm", "pitch_y_mm", "thickness_mm"]),
     ("medium", &["kind", "poisson"]),
     ("partition", &["case", "cases", "condition", "rows", "cols"]),
     ("search", &["objective", "mu_max", "noise_floor_MPa", "form"]),
+    ("inverse", &["kind", "level"]),
     ("threshold", &["min_force_N"]),
     ("fixed", &["input_bits", "data_bits", "coef_bits", "inverse_bits", "prune_bits", "lanes"]),
     ("hardware", &["board"]),
@@ -49,6 +50,7 @@ impl Scene {
             medium: medium(&reader)?,
             partition: partition(&reader, &sensor)?,
             search: search(&reader)?,
+            inverse: inverse(&reader)?,
             threshold: threshold(&reader)?,
             fixed: fixed(&reader)?,
             hardware: hardware(&reader)?,
@@ -210,6 +212,17 @@ fn search(reader: &Reader) -> Result<SearchSpec, SceneError> {
         noise_floor_MPa: floor.unwrap_or(default.noise_floor_MPa),
         form: reader.choice("search.form", &[("oblique", Form::Oblique), ("orthogonal", Form::Orthogonal)])?,
     })
+}
+
+fn inverse(reader: &Reader) -> Result<InverseSpec, SceneError> {
+    let kind = reader.choice("inverse.kind", &InverseKind::NAMES)?;
+    let level = reader.number("inverse.level", |level| level > 0.0 && level < 1.0, "a number above 0 and below 1")?;
+    match (kind, reader.value("inverse.level")) {
+        (InverseKind::Exact, Some(value)) => {
+            Err(reader.wrong("inverse.level", value, "left out with inverse.kind = \"exact\""))
+        }
+        _ => Ok(InverseSpec { kind, level }),
+    }
 }
 
 fn threshold(reader: &Reader) -> Result<ThresholdSpec, SceneError> {

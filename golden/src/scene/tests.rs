@@ -42,6 +42,9 @@ fn every_field_is_read() {
         mu_max = 1
         noise_floor_MPa = 0.001
         form = "orthogonal"
+        [inverse]
+        kind = "tikhonov"
+        level = 1e-4
         [threshold]
         min_force_N = 0.01
         [fixed]
@@ -67,6 +70,7 @@ fn every_field_is_read() {
     assert_eq!(scene.search.objective, ObjectiveKind::Patch);
     assert_eq!((scene.search.mu_max, scene.search.noise_floor_MPa), (1.0, 0.001));
     assert_eq!(scene.search.form, Form::Orthogonal);
+    assert_eq!(scene.inverse, InverseSpec { kind: InverseKind::Tikhonov, level: Some(1e-4) });
     assert_eq!(scene.threshold.min_force_N, 0.01);
     assert_eq!(
         scene.fixed,
@@ -122,6 +126,9 @@ fn wrong_values_name_what_is_allowed() {
         ("[search]\nmu_max = -0.1", "search.mu_max = -0.1 is not allowed"),
         ("[search]\nnoise_floor_MPa = inf", "search.noise_floor_MPa = inf"),
         ("[search]\nobjective = \"spares\"", "\"sparse\" or \"compressive\""),
+        ("[inverse]\nkind = \"svd\"", "it must be \"tsvd\" or \"tikhonov\" or \"exact\""),
+        ("[inverse]\nlevel = 1", "inverse.level = 1 is not allowed; it must be a number above 0 and below 1"),
+        ("[inverse]\nkind = \"exact\"\nlevel = 0.1", "left out with inverse.kind = \"exact\""),
         ("[threshold]\nmin_force_N = -1", "threshold.min_force_N = -1"),
         ("[fixed]\ndata_bits = 0", "fixed.data_bits = 0 is not allowed; it must be a whole number from 12 to 18"),
         ("[fixed]\ndata_bits = 63", "fixed.data_bits = 63"),

@@ -1,0 +1,156 @@
+//! Inverse: which singular values of Cz the pseudo-inverse trusts.
+//!
+//! ```text
+//! exact      f(λ) = 1/λ             where |λ| > α, else 0          α = n ε max|λ|, rounding
+//! tsvd       f(λ) = 1/λ             where |λ| > α, else 0          α = level · max|λ|, at least rounding
+//! tikhonov   f(λ) = λ/(λ² + α²)                                    α as for tsvd
+//! ```
+//!
+//! An error e of the readings, relative to the peak, reaches the forces as e/λ: what lies below e cannot be told from
+//! it. A coefficient's rounding reaches them as 2^−inverse_bits of the largest one, 1/α, in every direction. So the
+//! level, where the scene states none, is the largest of three floors, the first two relative to full scale:
+//!
+//! ```text
+//! input          2^(−average/2) / ((2^(input_bits − 1) − 1) √12)     rounding of a code, averaged
+//! noise          2^(−average/2) noise_floor_MPa / full_scale_MPa     where the scene has both
+//! coefficients   2^(7 − inverse_bits)                                their rounding stays below 1 % of the forces
+//! ```
+//!
+//! With the default, `tsvd` at that level, a scene whose condition stays below 1/level loses nothing: its matrices are
+//! those of `exact` to the bit. At 20 and 24 bits that is a condition of 1.3·10⁵, a square pitch of a quarter of the
+//! thickness.
+//!
+//! | | unit | range |
+//! |---|---|---|
+//! | in: level | share of the largest singular value | above 0, below 1 |
+//! | out: f(λ) | 1/λ | at most 1/α, with `tikhonov` 1/(2α) |
+
+use super::Scene;
+use crate::quantise::largest_code;
+
+/// Coefficients' rounding is kept below 2^−`COEFFICIENTS_SHARE` of the forces.
+const COEFFICIENTS_SHARE: i32 = 7;
+
+/// Kinds of pseudo-inverse.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum InverseKind {
+    /// Everything above rounding.
+    Exact,
+    /// Singular values above the level.
+    #[default]
+    Tsvd,
+    /// All, damped around and below the level.
+    Tikhonov,
+}
+
+impl InverseKind {
+    /// Every kind with its name in a scene file.
+    pub const NAMES: [(&'static str, InverseKind); 3] =
+        [("tsvd", InverseKind::Tsvd), ("tikhonov", InverseKind::Tikhonov), ("exact", InverseKind::Exact)];
+
+    /// Name in a scene file.
+    pub fn name(self) -> &'static str {
+        match self {
+            InverseKind::Exact => "exact",
+            InverseKind::Tsvd => "tsvd",
+            InverseKind::Tikhonov => "tikhonov",
+        }
+    }
+}
+
+/// Table `[inverse]`.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct InverseSpec {
+    /// How singular values are inverted.
+    pub kind: InverseKind,
+    /// Relative to the largest, above 0 and below 1; `None` takes the floor of format and noise.
+    pub level: Option<f64>,
+}
+
+/// A kind with its level: the rule that turns λ into f(λ).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Inversion {
+    /// How singular values are inverted.
+    pub kind: InverseKind,
+    /// Relative to the largest; 0 with `exact`.
+    pub level: f64,
+}
+
+impl Inversion {
+    /// Everything above rounding.
+    pub const EXACT: Inversion = Inversion { kind: InverseKind::Exact, level: 0.0 };
+
+    /// f(λ) for one of `count` singular values or eigenvalues, the largest of which has the size `largest`.
+    pub fn invert(&self, value: f64, largest: f64, count: usize) -> f64 {
+        // What is below rounding is told by no reading.
+        let alpha = (count as f64 * f64::EPSILON).max(self.level) * largest;
+        match self.kind {
+            // Divided by λ first: λ² of a tiny λ is no number.
+            InverseKind::Tikhonov if value != 0.0 => 1.0 / (value + alpha * (alpha / value)),
+            _ if value.abs() <= alpha => 0.0,
+            _ => 1.0 / value,
+        }
+    }
+}
+
+impl Scene {
+    /// The rule of the scene's pseudo-inverse, its level known.
+    pub fn inversion(&self) -> Inversion {
+        let InverseSpec { kind, level } = self.inverse;
+        match kind {
+            InverseKind::Exact => Inversion::EXACT,
+            kind => Inversion { kind, level: level.unwrap_or_else(|| self.floor()) },
+        }
+    }
+
+    /// The largest of the floors of input, noise and coefficients.
+    fn floor(&self) -> f64 {
+        let input = 1.0 / (f64::from(largest_code(self.fixed.input_bits)) * 12f64.sqrt());
+        let noise = self.input.full_scale_MPa.map_or(0.0, |full_scale| self.search.noise_floor_MPa / full_scale);
+        let coefficients = 2f64.powi(COEFFICIENTS_SHARE - self.fixed.inverse_bits as i32);
+        // Noise beyond full scale leaves nothing to invert; the largest singular value stays.
+        (self.input.noise_share() * input.max(noise)).max(coefficients).min(0.5)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn values_by_hand() {
+        let rule = |kind| Inversion { kind, level: 0.1 };
+        let of = |kind, value| rule(kind).invert(value, 2.0, 4);
+        assert_eq!(
+            [of(InverseKind::Tsvd, 0.25), of(InverseKind::Tsvd, 0.2), of(InverseKind::Tsvd, -0.5)],
+            [4.0, 0.0, -2.0]
+        );
+        // α = 0.2: 0.2/(0.04 + 0.04), and 0 for 0.
+        assert_eq!([of(InverseKind::Tikhonov, 0.2), of(InverseKind::Tikhonov, 0.0)], [2.5, 0.0]);
+        assert!(of(InverseKind::Tikhonov, 1e-300) < 1e-298);
+        assert_eq!(Inversion::EXACT.invert(1e-10, 2.0, 4), 1e10);
+        assert_eq!(Inversion::EXACT.invert(4.0 * f64::EPSILON, 2.0, 4), 0.0);
+    }
+
+    #[test]
+    fn the_level_follows_format_and_noise() {
+        let mut scene = Scene::builtin("sensor-1").unwrap();
+        let near = |scene: &Scene, wanted: f64| (scene.inversion().level / wanted - 1.0).abs() < 1e-12;
+        assert!(near(&scene, 2f64.powi(-17)));
+        scene.fixed.inverse_bits = 32;
+        let lsb = 1.0 / 524_287.0;
+        assert!(near(&scene, lsb / 12f64.sqrt()));
+        scene.search.noise_floor_MPa = 1e-3;
+        assert!(near(&scene, lsb / 12f64.sqrt()), "a noise in MPa says nothing without full scale");
+        scene.input.full_scale_MPa = Some(0.1);
+        assert!(near(&scene, 0.01));
+        scene.input.average = 4;
+        assert!(near(&scene, 0.0025));
+        scene.search.noise_floor_MPa = 1.0;
+        assert!(near(&scene, 0.5), "noise beyond full scale");
+        scene.inverse.level = Some(0.3);
+        assert!(near(&scene, 0.3));
+        scene.inverse.kind = InverseKind::Exact;
+        assert_eq!(scene.inversion(), Inversion::EXACT);
+    }
+}
