@@ -41,6 +41,7 @@ pub mod quantise;
 pub mod reconstruct;
 pub mod scene;
 pub mod sensor;
+pub mod stability;
 
 mod random;
 #[cfg(test)]

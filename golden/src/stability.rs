@@ -1,0 +1,205 @@
+//! Stability: what each number format keeps of a scene, from the condition of its Cz to the error of its forces.
+//!
+//! Two frames of known forces, a Hertz pressure p of 1 N, their stress in extended precision ([`extended`]): b₀ without
+//! shear, b with the shear μ p. Nothing but the inverse and the arithmetic stands between them and the truth.
+//!
+//! ```text
+//! forward     ‖Cz⁺b₀ − p‖/‖p‖              in double, single, fixed point
+//! residual    ‖b − C x‖/‖b‖                x the forces found, with the searched μ
+//! normal      |Σx_z − Σp|/Σp               tangential alike
+//! rank, gain  Σ λ f(λ), max |f(λ)|         [`crate::scene::inverse`]
+//! bits        least input_bits with forward ≤ double's + 0.01; Cz⁺ four bits wider, level as it is
+//! ```
+//!
+//! | | |
+//! |---|---|
+//! | in | a scene with a partition into equal rectangles; one of them is measured |
+//! | out | [`Row`]; errors are fractions, gain in N/MPa |
+
+pub mod extended;
+pub mod extreme;
+mod settings;
+mod single;
+#[cfg(test)]
+mod tests;
+mod truth;
+
+pub use settings::{settings, Setting, MU_MAX};
+
+use crate::fixed::Model;
+use crate::float::force::force;
+use crate::float::objective::{of_kind, Subject};
+use crate::float::pass::Polynomial;
+use crate::frame::Forces;
+use crate::matrices::Matrices;
+use crate::partition::{subarrays, Case};
+use crate::reconstruct::{Golden, GoldenError};
+use crate::scene::{Medium, Scene};
+use crate::sensor::Sensor;
+use serde::Serialize;
+use truth::Truth;
+
+/// How much of ‖p‖ the fixed model may add to the forward error of double.
+const BITS_ADD: f64 = 0.01;
+/// Input bits that a scene may have.
+const BITS: [u32; 2] = [8, 24];
+/// Cz⁺ has so many bits more than the input; the defaults are 20 and 24.
+const INVERSE_MORE: u32 = 4;
+
+/// Errors of one number format.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Figures {
+    /// ‖Cz⁺b₀ − p‖/‖p‖.
+    pub forward: f64,
+    /// ‖b − C x‖/‖b‖.
+    pub residual: f64,
+    /// Normal error of the resultant.
+    pub normal: Option<f64>,
+    /// Tangential error of the resultant.
+    pub tangential: Option<f64>,
+}
+
+/// What a scene's matrices are like.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Spectrum {
+    /// Largest over smallest singular value of Cz.
+    pub condition: f64,
+    /// Effective rank.
+    pub rank: f64,
+    /// ‖Cz⁺‖₂ in N/MPa.
+    pub gain: f64,
+    /// Largest spectral radius of μ·A; the series converges below 1.
+    pub radius: f64,
+    /// Degree of the series.
+    pub degree: usize,
+}
+
+/// One line of the table.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Row {
+    /// What is varied, or the scene's name.
+    pub group: String,
+    /// The measured subarray.
+    pub sensor: Sensor,
+    /// The body over it.
+    pub medium: Medium,
+    /// Kind of inverse.
+    pub inverse: &'static str,
+    /// Level of the inverse.
+    pub level: f64,
+    /// Of the golden model's matrices; `None` where it refuses the scene.
+    pub spectrum: Option<Spectrum>,
+    /// The golden model.
+    pub double: Option<Figures>,
+    /// The golden model's frame part in single precision.
+    pub single: Option<Figures>,
+    /// The bit-true model.
+    pub fixed: Option<Figures>,
+    /// Input bits that the bit-true model needs; `None` where none up to 24 are enough.
+    pub bits: Option<u32>,
+    /// Why there is no golden result.
+    pub refused: Option<String>,
+    /// Why there is no fixed result.
+    pub fixed_refused: Option<String>,
+}
+
+/// Measures one rectangle of a scene's partition; refusals are part of the row.
+///
+/// # Errors
+/// A partition that does not divide the array, or has no equal rectangles.
+pub fn measure(group: &str, scene: &Scene) -> Result<Row, GoldenError> {
+    let case = Some(scene.partition.case).filter(|case| case.grid().is_some()).unwrap_or(Case::WHOLE);
+    let shape = subarrays(case, &scene.sensor)?[0].sensor(&scene.sensor);
+    let mut scene = scene.clone();
+    (scene.sensor, scene.partition.case) = (shape, Case::WHOLE);
+    // What a frame's own peak sets, and what would cut the known forces.
+    (scene.input, scene.threshold.min_force_N) = (Default::default(), 0.0);
+    let rule = scene.inversion();
+    let mut row = Row {
+        group: group.to_string(),
+        sensor: scene.sensor.clone(),
+        medium: scene.medium,
+        inverse: rule.kind.name(),
+        level: rule.level,
+        spectrum: None,
+        double: None,
+        single: None,
+        fixed: None,
+        bits: None,
+        refused: None,
+        fixed_refused: None,
+    };
+    match Golden::new(&scene) {
+        Ok(golden) => fill(&mut row, &scene, &golden)?,
+        Err(error) => row.refused = Some(error.to_string()),
+    }
+    Ok(row)
+}
+
+/// The row of a scene that the golden model takes.
+fn fill(row: &mut Row, scene: &Scene, golden: &Golden) -> Result<(), GoldenError> {
+    let matrices = golden.matrices();
+    let Matrices { condition, rank, gain, spectral_radius: radius, degree, .. } = *matrices;
+    row.spectrum = Some(Spectrum { condition, rank, gain, radius, degree });
+    let truth = Truth::new(scene);
+    let normal_only = Polynomial::of_degree(matrices, &truth.unsheared.stress_MPa, 0);
+    let forces = golden.run(&truth.sheared)?.forces_N;
+    let forward = truth.forward(normal_only.v(0, 0));
+    row.double = Some(truth.figures(matrices, forward, &forces));
+    row.single = Some(truth.figures(
+        matrices,
+        truth.forward(single::family(matrices, &truth.unsheared.stress_MPa, 0).v(0, 0)),
+        &in_single(scene, matrices, &truth.sheared.stress_MPa),
+    ));
+    match Model::unfitted(scene).and_then(|model| model.reconstruct(&truth.sheared)) {
+        Ok(result) => {
+            let own = fixed_forward(scene, &truth, scene.fixed.input_bits);
+            row.fixed = own.map(|forward| truth.figures(matrices, forward, &result.forces_N));
+            row.bits = bits(scene, &truth, forward + BITS_ADD);
+        }
+        Err(error) => row.fixed_refused = Some(error.to_string()),
+    }
+    Ok(())
+}
+
+/// The forces that single precision finds.
+fn in_single(scene: &Scene, matrices: &Matrices, b: &[f64]) -> Forces {
+    let family = single::family(matrices, b, matrices.degree);
+    let (sensor, mu_max) = (&scene.sensor, scene.search.mu_max);
+    let objective = of_kind(scene.search.objective, sensor, scene.medium);
+    let found = objective.find(&Subject { sensor, b, family: &family, mu_max, noise_MPa: 0.0 });
+    let mu = found.map_or([0.0; 2], |estimate| estimate.found.mu);
+    force(&found.map_or_else(|| family.eval(mu), |estimate| estimate.pressure(&family)), mu, 0.0)
+}
+
+/// ‖Cz⁺b₀ − p‖/‖p‖ of the bit-true model without search, for codes of `bits` bits and the scene's own inverse.
+fn fixed_forward(scene: &Scene, truth: &Truth, bits: u32) -> Option<f64> {
+    let mut scene = scene.clone();
+    // The level stays: how many bits the same matrices need.
+    scene.inverse.level = Some(scene.inversion().level).filter(|level| *level > 0.0);
+    scene.search.mu_max = 0.0;
+    if bits != scene.fixed.input_bits {
+        scene.fixed.input_bits = bits;
+        scene.fixed.inverse_bits = (bits + INVERSE_MORE).max(scene.fixed.coef_bits);
+    }
+    let result = Model::unfitted(&scene).ok()?.reconstruct(&truth.unsheared).ok()?;
+    Some(truth.forward(&result.forces_N.fz))
+}
+
+/// Least input bits with a forward error of at most `most`, found by halving.
+fn bits(scene: &Scene, truth: &Truth, most: f64) -> Option<u32> {
+    let enough = |bits: u32| fixed_forward(scene, truth, bits).is_some_and(|forward| forward <= most);
+    let [mut low, mut high] = BITS;
+    if !enough(high) {
+        return None;
+    }
+    while low < high {
+        let middle = (low + high) / 2;
+        if enough(middle) {
+            high = middle;
+        } else {
+            low = middle + 1;
+        }
+    }
+    Some(high)
+}

@@ -1,0 +1,93 @@
+//! Truth: known forces of a scene, their stress, and how far found ones are from them.
+//!
+//! ```text
+//! p ∝ √(1 − ρ²) on an ellipse, Σp = 1 N          b₀ = Cz p          b = (μ1 Cx + μ2 Cy + Cz) p
+//! ```
+//!
+//! | | shape | unit |
+//! |---|---|---|
+//! | in: scene | sensor, medium, mu_max | mm |
+//! | out: two frames | taxels | MPa, forces in N |
+
+use super::{extended, Figures};
+use crate::errors::Errors;
+use crate::float::force::force;
+use crate::folded::accumulate;
+use crate::frame::{Forces, Frame};
+use crate::matrices::Matrices;
+use crate::scene::Scene;
+
+/// Shear of the frames over their load, as shares of mu_max.
+const SHEAR: [f64; 2] = [0.6, -0.35];
+/// Half-axes of the pressure's ellipse over the array's width, and its place from the middle.
+const HALF_AXIS: f64 = 0.38;
+const PLACE: [f64; 2] = [0.05, -0.04];
+/// Known forces and their stress.
+pub(super) struct Truth {
+    p: Vec<f64>,
+    /// With the shear μ p.
+    pub(super) sheared: Frame,
+    /// Without.
+    pub(super) unsheared: Frame,
+}
+
+impl Truth {
+    /// The frames of a scene.
+    pub(super) fn new(scene: &Scene) -> Truth {
+        let sensor = &scene.sensor;
+        let along =
+            |steps: usize, count: usize, place: f64| ((steps as f64 + 0.5) / count as f64 - 0.5 - place) / HALF_AXIS;
+        let at = |taxel: usize| {
+            let x = along(taxel % sensor.cols, sensor.cols, PLACE[0]);
+            let y = along(taxel / sensor.cols, sensor.rows, PLACE[1]);
+            (1.0 - x * x - y * y).max(0.0).sqrt()
+        };
+        let raw: Vec<f64> = (0..sensor.taxels()).map(at).collect();
+        let sum: f64 = raw.iter().sum();
+        let p: Vec<f64> = raw.iter().map(|p| p / sum).collect();
+        let mu = SHEAR.map(|share| share * scene.search.mu_max);
+        let frame = |id: &str, mu: [f64; 2]| {
+            let forces = force(&p, mu, 0.0);
+            let stress_MPa = extended::stress_MPa(sensor, scene.medium, &p, mu);
+            Frame {
+                id: id.to_string(),
+                medium: Some(scene.medium),
+                source: Some("cell model, extended precision".to_string()),
+                sensor: sensor.clone(),
+                contacts: Vec::new(),
+                resultant_N: Some(forces.resultant()),
+                cell_forces_N: Some(forces),
+                stress_MPa,
+                notes: None,
+            }
+        };
+        let (sheared, unsheared) = (frame("sheared", mu), frame("normal", [0.0; 2]));
+        Truth { p, sheared, unsheared }
+    }
+
+    /// ‖p̂ − p‖/‖p‖ of found forces p̂.
+    pub(super) fn forward(&self, p: &[f64]) -> f64 {
+        let off: Vec<f64> = p.iter().zip(&self.p).map(|(p, q)| p - q).collect();
+        norm(&off) / norm(&self.p)
+    }
+
+    /// The errors of the forces found in the sheared frame, beside a forward error.
+    pub(super) fn figures(&self, matrices: &Matrices, forward: f64, forces: &Forces) -> Figures {
+        let b = &self.sheared.stress_MPa;
+        let mut rest = b.clone();
+        for (c, f) in [(&matrices.cx, &forces.fx), (&matrices.cy, &forces.fy), (&matrices.cz, &forces.fz)] {
+            accumulate(c, f, -1.0, &mut rest);
+        }
+        let errors = self.sheared.resultant_N.map(|truth| Errors::new(truth, forces.resultant()));
+        Figures {
+            forward,
+            residual: norm(&rest) / norm(b),
+            normal: errors.and_then(|errors| errors.normal),
+            tangential: errors.and_then(|errors| errors.tangential),
+        }
+    }
+}
+
+fn norm(v: &[f64]) -> f64 {
+    v.iter().map(|v| v * v).sum::<f64>().sqrt()
+}
