@@ -27,7 +27,6 @@ use dermis_hdl::{generate, HdlError};
 
 use crate::bitstream::tools::ToolError;
 use crate::compare::{compared, difference};
-use crate::files::write_whole;
 use crate::fresh::Fresh;
 use crate::hardware::{Hardware, Simulator, Stuck};
 use crate::host::HostError;
@@ -37,6 +36,7 @@ use crate::report::{self, CosimReport, Format};
 use crate::tabulate::tabulate;
 use crate::verify::{verify, Verified};
 use crate::verilator::VerilatorError;
+use crate::write::write;
 
 /// Normal stress under a tactile array in, a force vector per taxel out, in hardware within 1 ms.
 #[derive(Parser, Debug)]
@@ -60,7 +60,8 @@ const EXAMPLES: &str = "Examples:
   dermis table                                       errors of all scenes, beside the paper's
   dermis noise sensor-1                              errors under noise, beside the Cramér–Rao bound
   dermis report                                      a page: which case and format to take, errors against time
-  dermis generate sensor-3 --random 2 --out two.json  a frame with known forces";
+  dermis generate sensor-3 --random 2 --out two.json  a frame with known forces
+  dermis stability --plot stability.svg              errors against a scene's condition";
 
 #[derive(Subcommand, Debug)]
 enum Command {
@@ -140,6 +141,8 @@ enum Command {
     Report(report::Arguments),
     /// Make a frame with known forces from described contacts.
     Generate(crate::generate::Arguments),
+    /// Measure errors of double, single and fixed point against a scene's condition, or on extreme frames.
+    Stability(crate::stability::Arguments),
     /// Print the errors of scenes in the paper's cases on their shipped frames, beside the paper's.
     #[command(after_help = "Examples:
   dermis table                                       every built-in scene, cases 0 to 3
@@ -312,6 +315,7 @@ fn run(arguments: &Arguments) -> Result<(String, bool)> {
         }
         Command::Report(arguments) => report::run(arguments, build_dir),
         Command::Generate(arguments) => Ok((crate::generate::run(arguments)?, true)),
+        Command::Stability(arguments) => Ok((crate::stability::run(arguments)?, true)),
         Command::Table { scenes, cases, fresh, format, cosim: false } => {
             Ok((table(scenes, cases, fresh, *format)?, true))
         }
@@ -415,7 +419,7 @@ fn build(scene: &Scene, out: &Path, board: bool, with_features: bool) -> Result<
     let mut text = String::new();
     for file in &generated.files {
         let path = out.join(&file.name);
-        write_whole(&path, &file.text)?;
+        write(&path, file.text.as_bytes())?;
         text.push_str(&format!("{} ({} bytes)\n", path.display(), file.text.len()));
     }
     text.push_str(&report::resources(&model, &generated.usage));

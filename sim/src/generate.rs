@@ -16,6 +16,7 @@ use dermis_golden::generator::{generate, random_contacts, Draw};
 use dermis_golden::scene::Scene;
 
 use crate::fresh::Shapes;
+use crate::write::write;
 
 /// What to generate.
 #[derive(Args, Debug)]
@@ -107,7 +108,7 @@ pub fn run(arguments: &Arguments) -> Result<String> {
     match &arguments.out {
         None => Ok(text),
         Some(path) => {
-            std::fs::write(path, &text).map_err(|e| anyhow!("{}: {e}", path.display()))?;
+            write(path, text.as_bytes())?;
             Ok(format!("{} ({} bytes)\n", path.display(), text.len()))
         }
     }

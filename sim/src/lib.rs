@@ -24,6 +24,8 @@
 //! | [`verify`] | one scene's frames through all three models |
 //! | [`report`] | tables and the JSON contract; `dermis report`, measured and drawn |
 //! | [`host`] | frames to a board over a serial port, forces back |
+//! | [`stability`] | `dermis stability`: errors against condition, extreme frames |
+//! | [`mod@write`] | files whole or not at all |
 //! | [`inputs`] | scene and frames from what the command line names |
 //! | [`mod@waves`] | a run as a waveform file |
 //! | [`cli`] | arguments, commands, exit codes |
@@ -38,7 +40,6 @@ pub mod cli;
 pub mod compare;
 pub mod cosim;
 pub mod drive;
-mod files;
 pub mod fresh;
 pub mod generate;
 pub mod guide;
@@ -48,7 +49,9 @@ pub mod inputs;
 pub mod netlist;
 mod progress;
 pub mod report;
+pub mod stability;
 pub mod tabulate;
 pub mod verify;
 pub mod verilator;
 pub mod waves;
+pub mod write;

@@ -248,7 +248,8 @@ fn is_installed(program: &str) -> bool {
 }
 
 fn write(path: &Path, text: &str) -> Result<(), VerilatorError> {
-    fs::write(path, text).map_err(|source| VerilatorError::Io { path: path.to_owned(), source })
+    crate::write::write(path, text.as_bytes())
+        .map_err(|error| VerilatorError::Io { path: error.path, source: error.source })
 }
 
 /// FNV-1a of all names, texts and the tool's version, 128 bits in hexadecimal.

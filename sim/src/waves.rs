@@ -24,7 +24,7 @@ use vcd::{IdCode, SimulationCommand, TimescaleUnit, Value, Writer};
 
 use crate::cosim::{run, Bench};
 use crate::drive::Stimulus;
-use crate::files::write_whole;
+use crate::write::write;
 use crate::hardware::{Hardware, Simulator};
 use crate::progress::Progress;
 
@@ -195,7 +195,7 @@ pub fn waves(scene: &Scene, frames: &[Frame], simulator: Simulator, build: &Path
     let vcd = folder.join(format!("{}.vcd", scene.name));
     part.persist(&vcd).map_err(|e| at(&vcd, e.error))?;
     let list = folder.join(format!("{}.gtkw", scene.name));
-    write_whole(&list, &signal_list(&vcd, taps))?;
+    write(&list, signal_list(&vcd, taps).as_bytes())?;
     Ok(format!("gtkwave {} {}", vcd.display(), list.display()))
 }
 

@@ -10,7 +10,7 @@ use super::data::{csv, document as json, path_of_picture, path_of_table, text};
 use super::document::{Document, Item};
 use super::html::html;
 use super::style::standalone;
-use crate::files::write_whole;
+use crate::write::write;
 
 /// Writes all files below `folder`, each complete or not at all, and takes away what an earlier report left in its own
 /// folders. The page comes last: what it stands for is then there. Returns its path.
@@ -36,7 +36,7 @@ pub fn save(document: &Document, folder: &Path) -> Result<PathBuf> {
         let path = folder.join(path);
         let parent = path.parent().unwrap_or(folder);
         fs::create_dir_all(parent).map_err(|e| anyhow!("{}: {e}", parent.display()))?;
-        write_whole(&path, text)?;
+        write(&path, text.as_bytes())?;
     }
     let folders: BTreeSet<&Path> = own.iter().filter_map(|path| path.parent()).collect();
     for entry in folders.into_iter().filter_map(|folder| fs::read_dir(folder).ok()).flatten().flatten() {

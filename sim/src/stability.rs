@@ -1,0 +1,86 @@
+//! `dermis stability`: errors of double, single and fixed point against the condition of a scene, and extreme frames.
+//!
+//! | call | prints |
+//! |---|---|
+//! | without scenes | the table of [`dermis_golden::stability::settings`] |
+//! | with scenes | one line for each |
+//! | `--extreme` | the extreme frames of each scene, by default sensor-1 |
+//! | `--plot FILE` | besides, condition against error as SVG |
+
+mod plot;
+
+use std::path::PathBuf;
+
+use anyhow::Result;
+use clap::Args;
+use dermis_golden::scene::Scene;
+use dermis_golden::stability::extreme::{frames, outcome};
+use dermis_golden::stability::{measure, settings, Setting};
+
+use crate::progress::Progress;
+use crate::report::{self, Format};
+use crate::write::write;
+
+/// What to measure.
+#[derive(Args, Debug)]
+#[command(after_help = EXAMPLES)]
+pub struct Arguments {
+    /// Built-in names or paths of scenes; without any the table from well conditioned to hopeless.
+    scenes: Vec<String>,
+    /// Extreme frames in place of conditions, of sensor-1 where no scene is named.
+    #[arg(long, conflicts_with = "plot")]
+    extreme: bool,
+    /// Draw condition against error into an SVG file.
+    #[arg(long, value_name = "FILE")]
+    plot: Option<PathBuf>,
+    /// Form of the table.
+    #[arg(long, value_enum, default_value = "markdown")]
+    format: Format,
+}
+
+const EXAMPLES: &str = "Examples:
+  dermis stability                                   thickness/pitch 0.1 to 10, Poisson ratios, sizes, pitches
+  dermis stability my-scene.toml --format json
+  dermis stability --plot stability.svg
+  dermis stability --extreme eight-by-eight          zero, saturated, 1e-9 to 1e9 of full scale, …";
+
+/// The table's text; a picture is written beside.
+///
+/// # Errors
+/// An unknown scene, one that the golden model refuses with `--extreme`, or a file that cannot be written.
+pub fn run(arguments: &Arguments) -> Result<String> {
+    if arguments.extreme {
+        return extreme(arguments);
+    }
+    let wanted = match arguments.scenes.as_slice() {
+        [] => settings(),
+        names => names
+            .iter()
+            .map(|name| Ok(Setting { group: name.clone(), scene: Scene::load(name)? }))
+            .collect::<Result<_>>()?,
+    };
+    let bar = Progress::steps("stability", wanted.len() as u64);
+    let mut rows = Vec::with_capacity(wanted.len());
+    for Setting { group, scene } in &wanted {
+        rows.push(measure(group, scene)?);
+        bar.at(rows.len() as u64);
+    }
+    drop(bar);
+    if let Some(path) = &arguments.plot {
+        write(path, plot::svg(&rows)?.as_bytes())?;
+    }
+    report::stability(&rows, arguments.format)
+}
+
+fn extreme(arguments: &Arguments) -> Result<String> {
+    let default = ["sensor-1".to_owned()];
+    let names = if arguments.scenes.is_empty() { &default[..] } else { &arguments.scenes };
+    let mut all = Vec::new();
+    for name in names {
+        let scene = Scene::load(name)?;
+        let _progress = Progress::start(&format!("{name}: extreme frames"));
+        let rows = frames(&scene)?.iter().map(outcome).collect::<Result<Vec<_>, _>>()?;
+        all.push((scene.name, rows));
+    }
+    report::extremes(&all, arguments.format)
+}

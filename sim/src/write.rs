@@ -1,0 +1,126 @@
+//! Write: a file appears whole or not at all.
+//!
+//! The bytes go into a new file beside the target, which takes the target's name only when all of them are on disk. A full
+//! disk, a signal or a loss of power leaves what was there before; at worst a stray `.dermis-…` file stays behind.
+//!
+//! | | |
+//! |---|---|
+//! | in: path | a file that is, or is not, there; its folder exists; links are followed |
+//! | in: bytes | everything the file is to hold |
+//! | errors | [`WriteError`] with the path and the system's reason |
+//!
+//! What is no regular file, as a pipe or `/dev/stdout`, is written as it is: there is no old content to keep.
+
+use std::fs::{self, File, OpenOptions};
+use std::io::{Error, ErrorKind, Write};
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+use thiserror::Error;
+
+/// A file that could not be written; what was there before still is.
+#[derive(Debug, Error)]
+#[error("{}: {source}", path.display())]
+pub struct WriteError {
+    /// The file.
+    pub path: PathBuf,
+    /// The system's reason.
+    pub source: Error,
+}
+
+/// Writes a file, whole or not at all.
+///
+/// # Errors
+/// [`WriteError`].
+pub fn write(path: &Path, bytes: &[u8]) -> Result<(), WriteError> {
+    replace(path, bytes).map_err(|source| WriteError { path: path.to_owned(), source })
+}
+
+fn replace(path: &Path, bytes: &[u8]) -> Result<(), Error> {
+    // A link stays one.
+    let target = fs::canonicalize(path).unwrap_or_else(|_| path.to_owned());
+    if fs::metadata(&target).is_ok_and(|found| !found.is_file() && !found.is_dir()) {
+        return fs::write(&target, bytes);
+    }
+    let folder = match target.parent() {
+        Some(folder) if !folder.as_os_str().is_empty() => folder,
+        _ => Path::new("."),
+    };
+    let (mut file, part) = new_file(folder)?;
+    let whole = file.write_all(bytes).and_then(|()| match fs::metadata(&target) {
+        Ok(found) => file.set_permissions(found.permissions()),
+        Err(_) => Ok(()),
+    });
+    let done = whole.and_then(|()| file.sync_all()).and_then(|()| fs::rename(&part, &target));
+    if done.is_err() {
+        // Where even this fails, the first reason is the one to tell.
+        let _ = fs::remove_file(&part);
+    }
+    done
+}
+
+/// A file that was not there before.
+fn new_file(folder: &Path) -> Result<(File, PathBuf), Error> {
+    static NUMBER: AtomicUsize = AtomicUsize::new(0);
+    loop {
+        let number = NUMBER.fetch_add(1, Ordering::Relaxed);
+        let part = folder.join(format!(".dermis-{}-{number}", std::process::id()));
+        match OpenOptions::new().write(true).create_new(true).open(&part) {
+            // Left behind by an earlier process of the same number.
+            Err(error) if error.kind() == ErrorKind::AlreadyExists => continue,
+            opened => return Ok((opened?, part)),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::fs::Permissions;
+    use std::os::unix::fs::PermissionsExt;
+
+    fn names(folder: &Path) -> Vec<String> {
+        let mut names: Vec<String> =
+            fs::read_dir(folder).unwrap().map(|e| e.unwrap().file_name().to_string_lossy().into_owned()).collect();
+        names.sort();
+        names
+    }
+
+    #[test]
+    fn files_are_new_replaced_and_alone() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("f.txt");
+        for text in ["first", "second, longer", "3"] {
+            write(&path, text.as_bytes()).unwrap();
+            assert_eq!(fs::read_to_string(&path).unwrap(), text);
+        }
+        assert_eq!(names(folder.path()), ["f.txt"]);
+    }
+
+    #[test]
+    fn links_are_followed_and_permissions_kept() {
+        let folder = tempfile::tempdir().unwrap();
+        let [path, link] = ["f.txt", "link"].map(|name| folder.path().join(name));
+        fs::write(&path, "old").unwrap();
+        fs::set_permissions(&path, Permissions::from_mode(0o640)).unwrap();
+        std::os::unix::fs::symlink(&path, &link).unwrap();
+        write(&link, b"new").unwrap();
+        assert_eq!(fs::read_to_string(&path).unwrap(), "new");
+        assert!(fs::symlink_metadata(&link).unwrap().is_symlink());
+        assert_eq!(fs::metadata(&path).unwrap().permissions().mode() & 0o777, 0o640);
+    }
+
+    #[test]
+    fn what_cannot_be_written_is_named_and_leaves_nothing() {
+        let folder = tempfile::tempdir().unwrap();
+        let absent = folder.path().join("absent/f.txt");
+        assert!(write(&absent, b"x").unwrap_err().to_string().contains("absent/f.txt: No such file"));
+        // A folder of the same name.
+        let taken = folder.path().join("taken");
+        fs::create_dir(&taken).unwrap();
+        assert!(write(&taken, b"x").is_err());
+        assert_eq!(names(folder.path()), ["taken"]);
+        let full = write(Path::new("/dev/full"), b"x").unwrap_err().to_string();
+        assert!(full.starts_with("/dev/full: No space left on device"), "{full}");
+    }
+}
