@@ -15,15 +15,16 @@ use thiserror::Error;
 use crate::core_file::core_file;
 use crate::device::Tap;
 use crate::explain::Explained;
+use crate::manifest::seal;
 use crate::primitives::MEMORY_FILE;
 use crate::simulate::design;
 use crate::taps::taps;
 use crate::usage::{stages, total, Usage};
 
 /// Version of the generated files' meaning; a reader refuses another one.
-const MANIFEST_VERSION: u32 = 1;
+pub(crate) const MANIFEST_VERSION: u32 = 1;
 /// Name of the manifest's file.
-const MANIFEST: &str = "manifest.json";
+pub(crate) const MANIFEST: &str = "manifest.json";
 
 /// Why a model has no hardware.
 #[derive(Debug, Error)]
@@ -98,7 +99,12 @@ impl Generated {
     /// Adds what the scene has and leaves out to the manifest.
     pub fn add_explained(&mut self, explained: &[Explained]) {
         self.manifest["features"] = json!(explained);
-        let text = format!("{:#}\n", self.manifest);
+        self.seal();
+    }
+
+    /// Brings sizes and checksums of the manifest up to date with the files ([`crate::manifest`]).
+    fn seal(&mut self) {
+        let text = seal(&mut self.manifest, &self.files);
         self.files.iter_mut().filter(|file| file.name == MANIFEST).for_each(|file| file.text.clone_from(&text));
     }
 }

@@ -19,6 +19,7 @@ pub mod engine;
 pub mod estimate;
 pub mod explain;
 pub mod link;
+pub mod manifest;
 pub mod primitives;
 pub mod stages;
 pub mod unsearched;

@@ -23,7 +23,7 @@ use dermis_golden::reconstruct::{Golden, Reconstruction};
 use dermis_golden::scene::{ObjectiveKind, Scene};
 use dermis_hdl::explain::explain;
 use dermis_hdl::link::generate_board;
-use dermis_hdl::{generate, HdlError};
+use dermis_hdl::{generate, manifest, HdlError};
 
 use crate::bitstream::tools::ToolError;
 use crate::compare::{compared, difference};
@@ -105,6 +105,13 @@ enum Command {
     },
     /// Make the bitstream of a scene for its board, with open tools.
     Bitstream(crate::bitstream::Arguments),
+    /// Check that a generated folder is whole: every file against manifest.json, and that against its checksum.
+    #[command(after_help = "Example:
+  dermis check build/sensor-1/rtl")]
+    Check {
+        /// Folder that `dermis build` wrote.
+        folder: PathBuf,
+    },
     /// Send frames to a board and receive forces.
     Host(crate::host::Arguments),
     /// Simulate a board on a pseudo-terminal, for a host that has none.
@@ -306,6 +313,10 @@ fn run(arguments: &Arguments) -> Result<(String, bool)> {
             Ok((text, verified.findings.is_equal()))
         }
         Command::Bitstream(arguments) => crate::bitstream::run(arguments, build_dir),
+        Command::Check { folder } => {
+            let files = manifest::check(folder)?;
+            Ok((format!("{}: {files} files, whole\n", folder.display()), true))
+        }
         Command::Host(arguments) => crate::host::run(arguments),
         Command::Board { scene } => {
             let terminal = Hardware::new(Model::new(&Scene::load(scene)?)?, build_dir)?.terminal()?;

@@ -1,0 +1,167 @@
+//! Manifest: `manifest.json` names every generated file with its size and CRC-32, and has a CRC-32 of its own, so that
+//! a reader knows that all of it is there and nothing is cut short.
+//!
+//! | field | holds |
+//! |---|---|
+//! | `manifest_version` | of the fields' meaning; a reader refuses another one |
+//! | `files` | name to `bytes` and `crc32`, the manifest itself left out |
+//! | `checksum` | CRC-32 of the manifest without this field, as JSON with sorted keys, two spaces and a line end |
+
+use std::collections::BTreeMap;
+use std::io::{Error, ErrorKind, Read};
+use std::path::Path;
+
+use serde::{Deserialize, Serialize};
+use serde_json::{json, Value};
+use thiserror::Error;
+
+use crate::generate::{GeneratedFile, MANIFEST, MANIFEST_VERSION};
+
+/// Largest manifest in bytes; the largest scene's takes 30 kB.
+const LARGEST: u64 = 4 << 20;
+/// Largest generated file in bytes; the largest scene's Verilog takes 2 MB.
+const LARGEST_FILE: u64 = 256 << 20;
+
+/// A generated file as the manifest knows it.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct FileSum {
+    /// Its size.
+    pub bytes: u64,
+    /// CRC-32 of its content.
+    pub crc32: u32,
+}
+
+/// A manifest that cannot be trusted, or files that are not what it says.
+#[derive(Debug, Error)]
+pub enum ManifestError {
+    /// The system cannot read a file.
+    #[error("{file}: cannot be read: {source}")]
+    Unreadable {
+        /// The file.
+        file: String,
+        /// The system's reason.
+        source: Error,
+    },
+    /// Not JSON, or not an object.
+    #[error("{file}: no manifest: {reason}")]
+    Syntax {
+        /// The file.
+        file: String,
+        /// What is wrong.
+        reason: String,
+    },
+    /// Written by another version.
+    #[error(
+        "{file}: manifest_version = {version} is not allowed; it must be {MANIFEST_VERSION}: build the scene again"
+    )]
+    Version {
+        /// The file.
+        file: String,
+        /// The value found.
+        version: Value,
+    },
+    /// Cut short or changed.
+    #[error("{file}: {field} = {says}, its content has {has}: it is damaged; build the scene again")]
+    Damaged {
+        /// The file.
+        file: String,
+        /// What differs.
+        field: &'static str,
+        /// What the manifest says.
+        says: u64,
+        /// What is there.
+        has: u64,
+    },
+}
+
+/// Adds the sums of all other files, and the manifest's own, to `manifest`; returns its text.
+pub(crate) fn seal(manifest: &mut Value, files: &[GeneratedFile]) -> String {
+    let others = files.iter().filter(|file| file.name != MANIFEST);
+    let sums: BTreeMap<&str, FileSum> = others.map(|file| (file.name.as_str(), sum(file.text.as_bytes()))).collect();
+    manifest["files"] = json!(sums);
+    manifest["checksum"] = json!(own_sum(manifest));
+    text(manifest)
+}
+
+/// Reads a manifest's text and checks version and checksum; `file` names it in errors.
+///
+/// # Errors
+/// Every [`ManifestError`] but `Unreadable`.
+pub fn parse(text: &str, file: &str) -> Result<Value, ManifestError> {
+    let syntax = |reason: String| ManifestError::Syntax { file: file.to_owned(), reason };
+    if !text.ends_with('\n') {
+        return Err(syntax("cut short: the last line has no end".to_owned()));
+    }
+    let manifest: Value = serde_json::from_str(text).map_err(|error| syntax(error.to_string()))?;
+    if !manifest.is_object() {
+        return Err(syntax("not an object".to_owned()));
+    }
+    if manifest["manifest_version"] != json!(MANIFEST_VERSION) {
+        return Err(ManifestError::Version { file: file.to_owned(), version: manifest["manifest_version"].clone() });
+    }
+    let says = manifest["checksum"].as_u64().ok_or_else(|| syntax("checksum is missing".to_owned()))?;
+    match u64::from(own_sum(&manifest)) {
+        has if has == says => Ok(manifest),
+        has => Err(ManifestError::Damaged { file: file.to_owned(), field: "checksum", says, has }),
+    }
+}
+
+/// Reads the manifest of a folder and checks it and every file it names; returns how many these are.
+///
+/// # Errors
+/// [`ManifestError`]; the first file that is missing or differs.
+pub fn check(folder: &Path) -> Result<usize, ManifestError> {
+    let path = folder.join(MANIFEST);
+    let file = path.display().to_string();
+    let bytes = read(&path, LARGEST)?;
+    let invalid = |error| Error::new(ErrorKind::InvalidData, error);
+    let content = String::from_utf8(bytes)
+        .map_err(|error| ManifestError::Unreadable { file: file.clone(), source: invalid(error) })?;
+    let manifest = parse(&content, &file)?;
+    let files: BTreeMap<String, FileSum> = serde_json::from_value(manifest["files"].clone())
+        .map_err(|error| ManifestError::Syntax { file: file.clone(), reason: format!("files: {error}") })?;
+    for (name, says) in &files {
+        // Nothing outside the folder is read, whoever wrote the manifest.
+        if Path::new(name).file_name() != Some(name.as_ref()) {
+            return Err(ManifestError::Syntax { file, reason: format!("files: {name:?} is not the name of a file") });
+        }
+        let path = folder.join(name);
+        let has = sum(&read(&path, says.bytes.saturating_add(1).min(LARGEST_FILE))?);
+        let file = path.display().to_string();
+        if has.bytes != says.bytes {
+            return Err(ManifestError::Damaged { file, field: "bytes", says: says.bytes, has: has.bytes });
+        }
+        if has.crc32 != says.crc32 {
+            let (says, has) = (u64::from(says.crc32), u64::from(has.crc32));
+            return Err(ManifestError::Damaged { file, field: "crc32", says, has });
+        }
+    }
+    Ok(files.len())
+}
+
+/// A file's first `most` bytes: no file takes more memory than the manifest says.
+fn read(path: &Path, most: u64) -> Result<Vec<u8>, ManifestError> {
+    let mut bytes = Vec::new();
+    let read = std::fs::File::open(path).and_then(|file| file.take(most).read_to_end(&mut bytes));
+    match read {
+        Ok(_) => Ok(bytes),
+        Err(source) => Err(ManifestError::Unreadable { file: path.display().to_string(), source }),
+    }
+}
+
+fn sum(bytes: &[u8]) -> FileSum {
+    FileSum { bytes: bytes.len() as u64, crc32: crc32fast::hash(bytes) }
+}
+
+/// CRC-32 of everything but the checksum.
+fn own_sum(manifest: &Value) -> u32 {
+    let mut rest = manifest.clone();
+    if let Some(fields) = rest.as_object_mut() {
+        fields.remove("checksum");
+    }
+    crc32fast::hash(text(&rest).as_bytes())
+}
+
+fn text(manifest: &Value) -> String {
+    format!("{manifest:#}\n")
+}
