@@ -1,0 +1,65 @@
+//! Extreme frames in hardware: the codes of every one of [`dermis_golden::stability::extreme::frames`], through the generated
+//! Verilog (full speed and with stalls) and rust-hdl's simulation, against the bit-true model, to the bit and the cycle.
+
+use dermis_golden::fixed::Model;
+use dermis_golden::partition::Case;
+use dermis_golden::scene::Scene;
+use dermis_golden::stability::extreme::frames;
+use dermis_sim::cosim::{run, Bench, Vector};
+use dermis_sim::drive::Stimulus;
+use dermis_sim::hardware::{Hardware, Simulator};
+use dermis_tests::build_dir;
+
+/// The frames whose subarrays are the scene's, as codes of their own full scales.
+fn vectors(scene: &Scene, hardware: &Hardware) -> Vec<Vector> {
+    let all = frames(scene).unwrap().into_iter();
+    let own = all.filter(|e| e.scene.partition.case == scene.partition.case && e.scene.require_supported().is_ok());
+    own.map(|extreme| {
+        let frame = std::slice::from_ref(&extreme.frame);
+        let codes = Model::for_frames(&extreme.scene, frame).unwrap().readings(frame).unwrap();
+        Vector {
+            frame: extreme.frame.id.clone(),
+            cols: scene.sensor.cols,
+            taxels: codes.len(),
+            expected: hardware.model.run(&codes),
+            codes,
+        }
+    })
+    .collect()
+}
+
+fn check(scene: &Scene, least: usize) {
+    let hardware = Hardware::new(Model::new(scene).unwrap(), &build_dir()).unwrap();
+    let vectors = vectors(scene, &hardware);
+    assert!(vectors.len() >= least, "{} frames", vectors.len());
+    let taps = hardware.tap_names();
+    let runs = [
+        (Simulator::Verilator, Stimulus::FullSpeed),
+        (Simulator::Verilator, Stimulus::Stalls { seed: 5 }),
+        (Simulator::RustHdl, Stimulus::FullSpeed),
+    ];
+    for (simulator, stimulus) in runs {
+        let mut device = hardware.device(simulator).unwrap();
+        let bench = Bench { name: simulator.name(), device: device.as_mut(), taps: &taps };
+        let (findings, _) = run(bench, &vectors, stimulus);
+        let first: Vec<String> = findings.kept.iter().take(3).map(ToString::to_string).collect();
+        assert!(findings.is_equal(), "{}, {}: {first:#?}", scene.name, simulator.name());
+    }
+}
+
+#[test]
+fn extreme_frames_of_sensor_1_are_equal() {
+    check(&Scene::builtin("sensor-1").unwrap(), 24);
+}
+
+#[test]
+fn extreme_frames_of_eight_by_eight_are_equal() {
+    check(&Scene::builtin("eight-by-eight").unwrap(), 24);
+}
+
+#[test]
+fn extreme_frames_of_a_cut_array_are_equal() {
+    let mut scene = Scene::builtin("eight-by-eight").unwrap();
+    scene.partition.case = Case::numbered(1).unwrap();
+    check(&scene, 24);
+}
