@@ -81,7 +81,8 @@ pub(super) fn confine_ellipse(taxels: &Taxels, theta: &mut [f64]) {
     theta[3] = theta[3].clamp(radii[0], radii[1].max(radii[0]));
     // Positive definite, with the shorter radius at least a tenth of the longer.
     let most = 0.9 * (theta[2] * theta[3]).sqrt();
-    theta[4] = theta[4].clamp(-most, most);
+    // Not clamp: a fit that has left the numbers has no bounds, and is judged by its misfit.
+    theta[4] = theta[4].max(-most).min(most);
 }
 
 impl Ellipse<'_> {

@@ -132,7 +132,8 @@ pub(crate) fn starts(sensor: &Sensor, p: &[f64], segments: &Segments) -> Vec<f64
         let xy = SPREAD * mean(&|at| (at[0] - x) * (at[1] - y));
         let (xx, yy) = (xx.max(least), yy.max(least));
         let most = 0.8 * (xx * yy).sqrt();
-        let xy = xy.clamp(-most, most);
+        // Not clamp: sums that overflow leave no bounds, and the fit is judged by its misfit.
+        let xy = xy.max(-most).min(most);
         // The square root of a symmetric 2 × 2 matrix.
         let root = (xx * yy - xy * xy).sqrt();
         let trace = (xx + yy + 2.0 * root).sqrt();
