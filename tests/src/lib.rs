@@ -9,6 +9,7 @@
 //! | `choice` | several cases in one design: equality in mixed order, wrong constants found, what the choice is worth |
 //! | `resources` | block RAMs and multipliers as Yosys counts them, flip-flops and LUTs near |
 //! | `extreme` | zero, saturated, 1e±9 of full scale, at edges and corners: equal in hardware |
+//! | `fuzz` | readers, and the whole way from a scene to forces, on mutated and random input |
 //! | `explain` | what is left out is not in the Verilog, and what that saves; refusals name what fits |
 //! | `framing` | early and missing `tlast`: what is dropped, what is flagged, and equality right after |
 //! | `link` | the board's UART: answers, counters, recovery; Verilator = rust-hdl, pin by pin |

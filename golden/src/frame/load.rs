@@ -18,17 +18,37 @@ impl Frame {
     pub fn load(path: impl AsRef<Path>, scene: Option<&Scene>) -> Result<Frame, FrameError> {
         let path = path.as_ref();
         let file = path.display().to_string();
-        let extension = path.extension().map(|extension| extension.to_ascii_lowercase());
-        let parse = match extension.as_ref().and_then(|extension| extension.to_str()) {
-            Some("json") => json::parse,
-            Some("csv") => csv::parse,
-            _ => return Err(FrameError::UnknownKind { file }),
-        };
+        let parser = parser(path)?;
+        Frame::parsed(parser, &read(path, &file)?, path, scene)
+    }
+
+    /// Reads a frame from the text of a `.json` or `.csv` file called `name`, as [`Frame::load`] does.
+    ///
+    /// # Errors
+    /// As [`Frame::load`], but for those of the file system.
+    pub fn parse(name: impl AsRef<Path>, text: &str, scene: Option<&Scene>) -> Result<Frame, FrameError> {
+        let name = name.as_ref();
+        Frame::parsed(parser(name)?, text, name, scene)
+    }
+
+    fn parsed(parser: Parser, text: &str, path: &Path, scene: Option<&Scene>) -> Result<Frame, FrameError> {
         let stem = path.file_stem().map(|stem| stem.to_string_lossy().into_owned());
-        let text = read(path, &file)?;
         // Spreadsheets mark UTF-8 with U+FEFF, which belongs to no value.
-        let text = text.strip_prefix('\u{feff}').unwrap_or(&text);
-        parse(text, &file, &stem.unwrap_or_default(), scene)
+        let text = text.strip_prefix('\u{feff}').unwrap_or(text);
+        parser(text, &path.display().to_string(), &stem.unwrap_or_default(), scene)
+    }
+}
+
+/// Text, file, its stem, scene.
+type Parser = fn(&str, &str, &str, Option<&Scene>) -> Result<Frame, FrameError>;
+
+/// The parser for a file's kind, by its extension.
+fn parser(path: &Path) -> Result<Parser, FrameError> {
+    let extension = path.extension().map(|extension| extension.to_ascii_lowercase());
+    match extension.as_ref().and_then(|extension| extension.to_str()) {
+        Some("json") => Ok(json::parse),
+        Some("csv") => Ok(csv::parse),
+        _ => Err(FrameError::UnknownKind { file: path.display().to_string() }),
     }
 }
 

@@ -10,6 +10,9 @@ use serde_json::Value;
 
 use super::{HostError, Line, Played, Session};
 
+/// Longest line in bytes; 65536 taxels of 25 characters take 1.6 MB.
+const LONGEST_LINE: u64 = 4 << 20;
+
 /// A line that comes in.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -48,10 +51,17 @@ pub(super) fn run<P: Read + Write>(
     output: &mut dyn Write,
 ) -> Result<Played> {
     let mut played = Played { text: String::new(), equal: true, answered: 0, refused: 0 };
-    for (index, line) in input.lines().enumerate() {
-        let line = line.map_err(|error| anyhow!("standard input, line {}: {error}", index + 1))?;
-        if line.trim().is_empty() {
-            continue;
+    for index in 0.. {
+        let mut line = String::new();
+        // A line without end must not fill the memory.
+        let read = (&mut *input).take(LONGEST_LINE + 1).read_line(&mut line);
+        match read.map_err(|error| anyhow!("standard input, line {}: {error}", index + 1))? {
+            0 => break,
+            bytes if bytes as u64 > LONGEST_LINE => {
+                return Err(anyhow!("standard input, line {}: over {LONGEST_LINE} bytes", index + 1))
+            }
+            _ if line.trim().is_empty() => continue,
+            _ => (),
         }
         let text = match answer(session, &line) {
             Ok(reply) => {
