@@ -10,7 +10,7 @@
 //! | receive | frame buffer of each case, four lanes | subarrays · Q × `input_bits` |
 //! | fold | input of the passes | Q × 4 · `fold_bits` |
 //! | pass | v_ij as operands, but those of the highest degree | so many · Q × 4 · `data_bits` |
-//! | pass | coefficients; list of their columns | words × 18 · lanes; words × 2 addresses |
+//! | pass | coefficients; list of their columns | words × 18 · lanes; words × address, twice where Ax serves for Ay |
 //! | rescale | raw v_00 | Q × 4 · `acc_bits` |
 //! | search | polynomials, one memory per coefficient | 3 buffers of Q × 4 · `search_bits` |
 //! | search | the next subarray's, where there are several | Q × 4 · `search_bits` |
@@ -127,7 +127,9 @@ impl Resources {
         }
         memories.push(memory("pass$lanes", "memory", words, word_bits(f), true));
         if listed {
-            memories.push(memory("pass$steps", "columns", words, 2 * count_bits(quads), true));
+            // The transposed address beside the straight one, where it is read.
+            let addresses = if f.shared_a { 2 } else { 1 };
+            memories.push(memory("pass$steps", "columns", words, addresses * count_bits(quads), true));
         }
         memories.push(ram("rescale$raw", quads, quad(f.acc_bits)));
         for (k, &bits) in f.search_bits.iter().enumerate().filter(|_| f.degree > 0) {

@@ -92,6 +92,8 @@ pub struct Steps {
     pub control: Wire<Out>,
     _steps: Vec<Vec<Step>>,
     _list: Vec<[usize; 2]>,
+    /// Some step reads its operand transposed.
+    _across: bool,
     _pipe: Vec<(Step, usize)>,
 }
 
@@ -126,6 +128,7 @@ impl Steps {
             control: Wire::new(3),
             _pipe: Vec::new(),
             _list: list,
+            _across: formats.shared_a,
             _steps: steps,
         }
     }
@@ -144,10 +147,13 @@ impl Steps {
         }
     }
 
-    /// The column list as hex lines for `$readmemh`, straight address in the low half; `None` without a list.
+    /// The column list as hex lines for `$readmemh`, the straight address in the low bits; `None` without a list.
     pub fn column_file(&self) -> Option<String> {
         let bits = self.column.width();
-        let word = |&[straight, transposed]: &[usize; 2]| format!("{:x}\n", transposed << bits | straight);
+        let word = |&[straight, transposed]: &[usize; 2]| match self._across {
+            true => format!("{:x}\n", transposed << bits | straight),
+            false => format!("{straight:x}\n"),
+        };
         (!self._list.is_empty()).then(|| self._list.iter().map(word).collect())
     }
 
@@ -262,9 +268,16 @@ end",
                 to_o = widen("column", column_bits, o_bits)
             )
         } else {
+            let (addresses, kept) = match self._across {
+                true => (
+                    2,
+                    format!("source2[4] ? pair[{}:{column_bits}] : pair[{}:0]", 2 * column_bits - 1, column_bits - 1),
+                ),
+                false => (1, "pair".to_string()),
+            };
             format!(
                 "\
-// The column of each coefficient word, straight and transposed.
+// The column of each coefficient word, and transposed where that is read.
 reg [{pair_end}:0] columns [0:{list_end}];
 initial $readmemh(\"{COLUMN_FILE}\", columns);
 reg [{pair_end}:0] pair;
@@ -272,7 +285,7 @@ reg [{c_end}:0] c_address1, c_address2;
 reg [{o_end}:0] o_base1, o_base2;
 reg [4:0] source1, source2;
 reg [2:0] control1, control2;
-wire [{column_end}:0] kept = source2[4] ? pair[{pair_end}:{column_bits}] : pair[{column_end}:0];
+wire [{column_end}:0] kept = {kept};
 always @(posedge clk) begin
   c_address1 <= c_base + {to_c};
   o_base1 <= o_base;
@@ -288,7 +301,7 @@ always @(posedge clk) begin
   source <= source2;
   control <= control2;
 end",
-                pair_end = 2 * column_bits - 1,
+                pair_end = addresses * column_bits - 1,
                 list_end = self._list.len() - 1,
                 c_end = c_bits - 1,
                 o_end = o_bits - 1,
