@@ -12,6 +12,7 @@
 //! | `fuzz` | readers, and the whole way from a scene to forces, on mutated and random input |
 //! | `explain` | what is left out is not in the Verilog, and what that saves; refusals name what fits |
 //! | `framing` | early and missing `tlast`: what is dropped, what is flagged, and equality right after |
+//! | `proofs` | the handshake's blocks lose, invent and change nothing, for any stall and reset: proved, not tried |
 //! | `link` | the board's UART: answers, counters, recovery; Verilator = rust-hdl, pin by pin |
 //! | `synthesis` | Yosys reads the Verilog without latch or undriven signal |
 //! | `scenes` | the same equality for scenes of other shapes, degrees, words and conditions |

@@ -1,0 +1,32 @@
+// Of two frames as many sums leave as there are taxels, tlast on the last; none leaves before its second word came.
+module proof(
+  input clk, input again, input [@BITS@-1:0] s_data, input s_valid, input m_ready
+);
+  reg started = 1'b0;
+  always @(posedge clk) started <= 1'b1;
+  wire rst = again || !started;
+  wire s_ready, m_valid, m_last;
+  wire [@BITS@:0] m_data;
+  reg [2:0] taxel, given;
+  reg [1:0] inside;
+  reg second;
+  wire takes = s_valid && s_ready && second;
+  wire gives = m_valid && m_ready;
+  wire s_last = taxel == 3'd@LAST@;
+  @TOP@$prepare$average block(
+    .clk(clk), .rst(rst),
+    .s_axis_tdata(s_data), .s_axis_tvalid(s_valid), .s_axis_tready(s_ready), .s_axis_tlast(s_last),
+    .m_axis_tdata(m_data), .m_axis_tvalid(m_valid), .m_axis_tready(m_ready), .m_axis_tlast(m_last)
+  );
+  always @(posedge clk) begin
+    if (rst) {taxel, given, inside, second} <= 9'd0;
+    else begin
+      if (s_valid && s_ready) taxel <= s_last ? 3'd0 : taxel + 3'd1;
+      if (m_valid) assert (m_last == (given == 3'd@LAST@));
+      if (s_valid && s_ready && s_last) second <= !second;
+      assert (inside <= 2'd2 && (inside != 2'd0 || !m_valid) && (inside != 2'd2 || m_valid));
+      inside <= inside + takes - gives;
+      if (gives) given <= m_last ? 3'd0 : given + 3'd1;
+    end
+  end
+endmodule

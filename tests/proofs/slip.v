@@ -1,0 +1,35 @@
+// Each byte of a packet goes out once, as itself or as two that are no END, and what is offered stays.
+module proof(input clk, input again, input [7:0] content, input border, input offered, input ready);
+  reg started = 1'b0;
+  always @(posedge clk) started <= 1'b1;
+  wire rst = again || !started;
+  wire [7:0] data;
+  wire valid, content_ready;
+  @BLOCK@ block(
+    .clk(clk), .rst(rst), .content(content), .border(border), .content_valid(offered), .content_ready(content_ready),
+    .data(data), .valid(valid), .ready(ready)
+  );
+  reg followed = 1'b0, content_waits, waits, border_before, escaped;
+  reg [7:0] content_before, before;
+  always @(posedge clk) begin
+    followed <= !rst;
+    content_waits <= offered && !content_ready;
+    waits <= valid && !ready;
+    {content_before, border_before, before} <= {content, border, data};
+    if (followed && !rst) begin
+      if (content_waits) assume (offered && content == content_before && border == border_before);
+      if (waits) assert (valid && data == before);
+    end
+    // What a receiver makes of it.
+    if (rst) escaped <= 1'b0;
+    else begin
+      if (valid && border) assert (data == 8'hC0 && !escaped);
+      if (valid && !border) assert (data != 8'hC0);
+      if (valid && ready) escaped <= !border && data == 8'hDB;
+      if (offered && content_ready && !border)
+        assert (content == (!escaped ? data : data == 8'hDC ? 8'hC0 : data == 8'hDD ? 8'hDB : 8'h00));
+      if (offered && content_ready) assert (valid && ready);
+      if (valid && ready && !content_ready) assert (data == 8'hDB && !escaped);
+    end
+  end
+endmodule

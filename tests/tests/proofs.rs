@@ -1,0 +1,202 @@
+//! Proofs about the small blocks that carry the handshake, for any input, any stall, a reset at any cycle, and any number
+//! of cycles: Yosys turns the generated Verilog with a property of `tests/proofs` into a circuit of and-gates, and the
+//! model checker ABC, which comes with it, finds an inductive invariant (property directed reachability).
+//!
+//! | property | blocks |
+//! |---|---|
+//! | `stream.v`: what is offered stays and stays the same | `prepare`, `resultants` |
+//! | `calibrate.v`: each beat leaves once, in order, saturated | `calibrate` |
+//! | `average.v`: as many sums as taxels, tlast on the last | `average` |
+//! | `receive.v`: a frame stands whole where it belongs; tlast is judged; dead taxels count as 0 | `receive` |
+//! | `send.v`: a frame has all its beats, none leaves outside a frame, what is offered stays | `send`, `force` |
+//! | `counter.v`: below its limit | counters |
+//! | `slip.v`: each byte goes out once and reads back | the link's encoder |
+//!
+//! Each proof has a seeded defect with which it fails: a proof that cannot fail says nothing.
+
+use std::path::Path;
+use std::process::Command;
+
+use dermis_golden::fixed::quads::Quads;
+use dermis_golden::fixed::resources::count_bits;
+use dermis_golden::fixed::send::STATUS_BEATS;
+use dermis_golden::fixed::Model;
+use dermis_golden::scene::Scene;
+use dermis_hdl::link::generate_board;
+use dermis_hdl::{generate, Generated};
+
+const ROWS: usize = 2;
+const COLS: usize = 3;
+/// The array's one dead taxel, row-major.
+const DEAD: usize = 4;
+/// Zeros of the taxels in codes of 8 bits, for a full scale of 127.
+const ZEROS: [i32; ROWS * COLS] = [13, -25, 38, 0, 114, -114];
+
+/// Small words and a small array: the blocks' control does not depend on them.
+fn model(more: &str) -> Model {
+    let text = format!(
+        "name = \"proofs\"\n[sensor]\nrows = {ROWS}\ncols = {COLS}\npitch_x_mm = 4.0\npitch_y_mm = 4.0\n\
+         thickness_mm = 3.0\n[fixed]\ninput_bits = 8\ndata_bits = 12\ncoef_bits = 8\ninverse_bits = 8\n\
+         [search]\nmu_max = 0.05\n{more}"
+    );
+    let folder = tempfile::tempdir().unwrap();
+    let line = |row: &[i32]| row.iter().map(i32::to_string).collect::<Vec<_>>().join(",") + "\n";
+    std::fs::write(folder.path().join("tare.csv"), ZEROS.chunks(COLS).map(line).collect::<String>()).unwrap();
+    Model::new(&Scene::parse(&text, folder.path().join("proofs.toml").to_str().unwrap()).unwrap()).unwrap()
+}
+
+fn prepared() -> Model {
+    model("[input]\naverage = 1\nfull_scale_MPa = 127.0\ntare = \"tare.csv\"\ndead = [[1, 1]]\n")
+}
+
+/// A property, what it is asked of, and a defect that breaks it.
+struct Proof<'a> {
+    generated: &'a Generated,
+    property: &'a str,
+    /// Placeholders of the property file and what stands for them.
+    given: Vec<(&'a str, String)>,
+    defect: (&'a str, &'a str),
+    /// Products may be anything: no property is about them.
+    open_products: bool,
+}
+
+/// Whether the property is proved; a proof that does not end is none.
+fn proved(folder: &Path, top: &str, open_products: bool) -> bool {
+    let cut = if open_products { "cutpoint t:$mul; " } else { "" };
+    let to_gates = format!(
+        "read_verilog {top}.v; read_verilog -formal -sv proof.v; hierarchy -top proof; {cut}\
+         prep -flatten -nordff -top proof; setundef -undriven -anyseq; setattr -unset keep; delete -output; opt -full; \
+         techmap; opt -fast; memory_map; simplemap; dffunmap; abc -g AND -fast; opt_clean; \
+         write_aiger -I -B -zinit -no-startoffset proof.aig"
+    );
+    let output = Command::new("yosys").current_dir(folder).args(["-q", "-p", &to_gates]).output();
+    let output = output.expect("yosys is installed (make setup)");
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let check = "read_aiger proof.aig; fold; strash; pdr -T 120";
+    let output = Command::new("yosys-abc").current_dir(folder).args(["-c", check]).output();
+    let text = String::from_utf8_lossy(&output.expect("yosys-abc comes with yosys").stdout).into_owned();
+    let (proved, broken) = (text.contains("Property proved."), text.contains("was asserted in frame"));
+    assert!(proved != broken, "neither proved nor refuted: {text}");
+    proved
+}
+
+impl Proof<'_> {
+    fn run(&self) {
+        let folder = tempfile::tempdir().unwrap();
+        let Generated { top, files, .. } = self.generated;
+        files.iter().for_each(|file| std::fs::write(folder.path().join(&file.name), &file.text).unwrap());
+        let property = Path::new(env!("CARGO_MANIFEST_DIR")).join("proofs").join(self.property);
+        let mut text = std::fs::read_to_string(&property).unwrap();
+        for (name, value) in &self.given {
+            text = text.replace(&format!("@{name}@"), value);
+        }
+        std::fs::write(folder.path().join("proof.v"), text.replace("@TOP@", top)).unwrap();
+        assert!(proved(folder.path(), top, self.open_products), "{} {:?}", self.property, self.given);
+
+        let verilog = folder.path().join(format!("{top}.v"));
+        let sound = std::fs::read_to_string(&verilog).unwrap();
+        let (from, to) = self.defect;
+        assert!(sound.contains(from), "nothing to break: {from}");
+        std::fs::write(&verilog, sound.replace(from, to)).unwrap();
+        assert!(!proved(folder.path(), top, self.open_products), "{}: {from} → {to} went unnoticed", self.property);
+    }
+}
+
+fn number(value: usize) -> String {
+    value.to_string()
+}
+
+#[test]
+fn streams_keep_what_they_offer() {
+    let prepared = generate(&prepared()).unwrap();
+    let given = |block: &str, taken: usize, offered: usize| {
+        vec![("BLOCK", format!("@TOP@${block}")), ("IN", number(taken)), ("OUT", number(offered))]
+    };
+    let defect = ("wire moves = !m_axis_tvalid || m_axis_tready;", "wire moves = 1'b1;");
+    Proof { generated: &prepared, property: "stream.v", given: given("prepare", 8, 9), defect, open_products: false }
+        .run();
+    let sums = generate(&model("[output]\nforces = \"resultants\"\n")).unwrap();
+    let defect = ("wire sent = sending && m_axis_tready;", "wire sent = sending;");
+    Proof { generated: &sums, property: "stream.v", given: given("resultants", 96, 96), defect, open_products: true }
+        .run();
+}
+
+#[test]
+fn calibrate_loses_nothing_and_saturates() {
+    let generated = &generate(&prepared()).unwrap();
+    let sign = |zero: i32| if zero < 0 { "-" } else { "" };
+    let zero = |(taxel, zero): (usize, &i32)| format!("      3'd{taxel}: zero = {}16'sd{};\n", sign(*zero), zero.abs());
+    let zeros: String = ZEROS.iter().enumerate().map(zero).collect();
+    for defect in [
+        ("wire moves = !valids[1] || m_axis_tready;", "wire moves = 1'b1;"),
+        ("wire clipped = sign != {2{difference[8]}};", "wire clipped = 1'b0;"),
+    ] {
+        let given = vec![
+            ("ZEROS", zeros.clone()),
+            ("BITS", number(8)),
+            ("MOST", number(127)),
+            ("LAST", number(ZEROS.len() - 1)),
+        ];
+        Proof { generated, property: "calibrate.v", given, defect, open_products: false }.run();
+    }
+}
+
+#[test]
+fn average_gives_as_many_sums_as_taxels() {
+    let given = vec![("BITS", number(8)), ("LAST", number(ROWS * COLS - 1))];
+    let defect = ("m_axis_tvalid <= held && held_leaves;", "m_axis_tvalid <= held;");
+    Proof { generated: &generate(&prepared()).unwrap(), property: "average.v", given, defect, open_products: false }
+        .run();
+}
+
+#[test]
+fn receive_holds_whole_frames() {
+    let quads = Quads { rows: ROWS, cols: COLS };
+    let bits = count_bits(quads.len());
+    let place = |k: usize| format!("      {}'d{k}: own = 8'd{};\n", bits + 2, quads.taxel(k / 4, k % 4));
+    let generated = &generate(&prepared()).unwrap();
+    for defect in [("dead ? 9'd0 : word", "word"), ("frame$write = spread$write;", "frame$write = scan$mask;")] {
+        let given = vec![
+            ("PLACES", (0..4 * quads.len()).map(place).collect()),
+            ("DEAD", format!("count == 8'd{DEAD}")),
+            ("BITS", number(9)),
+            ("LAST", number(ROWS * COLS - 1)),
+            ("ADDRESS", number(bits)),
+        ];
+        Proof { generated, property: "receive.v", given, defect, open_products: false }.run();
+    }
+}
+
+#[test]
+fn send_gives_whole_frames() {
+    let model = prepared();
+    let given = vec![
+        ("VALUES", number(4 * model.formats.search_bits[0] as usize)),
+        ("ADDRESS", number(count_bits(model.formats.quads))),
+        ("LAST", number(ROWS * COLS + STATUS_BEATS - 1)),
+    ];
+    let defect = ("last <= offers[3] && beat4 == 2'd3", "last <= offers[3] && beat4 == 2'd2");
+    Proof { generated: &generate(&model).unwrap(), property: "send.v", given, defect, open_products: true }.run();
+}
+
+#[test]
+fn counters_stay_below_their_limits() {
+    let generated = &generate(&prepared()).unwrap();
+    for (block, limit) in [("receive$scan$col", COLS), ("send$scan$col", COLS), ("send$words", STATUS_BEATS)] {
+        let (bits, end) = (count_bits(limit), limit - 1);
+        let given = vec![("BLOCK", format!("@TOP@${block}")), ("BITS", number(bits)), ("LIMIT", number(limit))];
+        let (from, to) = (format!("last = value == {bits}'d{end};"), format!("last = value == {bits}'d{limit};"));
+        Proof { generated, property: "counter.v", given, defect: (&from, &to), open_products: false }.run();
+    }
+}
+
+#[test]
+fn bytes_of_the_link_read_back() {
+    let generated = &generate_board(&model("")).unwrap();
+    let verilog = generated.files.iter().find(|file| file.name.ends_with(".v")).unwrap();
+    let is_encoder = |line: &&str| line.contains("(clk,rst,content,border,content_valid,");
+    let module = verilog.text.lines().find(is_encoder).and_then(|line| line.strip_prefix("module ")).unwrap();
+    let block = module.split('(').next().unwrap().to_string();
+    let defect = ("second <= special && !second;", "second <= special;");
+    Proof { generated, property: "slip.v", given: vec![("BLOCK", block)], defect, open_products: false }.run();
+}
