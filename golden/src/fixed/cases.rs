@@ -31,7 +31,7 @@ pub struct Dropped {
 }
 
 impl Model {
-    /// The model of a scene of the cases that it lists, or of as many as fit.
+    /// The model of a scene of the cases that it lists, or of as many as fit; that of case 0 where not even this does.
     pub(super) fn of_choices(
         scene: &Scene,
         scale: &Scale,
@@ -45,7 +45,19 @@ impl Model {
         if !listed && large.len() > 1 {
             choices = large;
         }
-        let shapes = choices.iter().map(|&case| shape(scene, case, degree)).collect::<Result<Vec<_>, _>>()?;
+        let short = |model: &Model| model.resources.shortages(&model.board);
+        // Where case 0 alone is too large, so is every design that has it.
+        let whole = shape(scene, Case::WHOLE, degree)?;
+        if !listed {
+            let alone = Model::of_shapes(scene, scale, board, vec![(Case::WHOLE, whole.clone())])?;
+            if !short(&alone).is_empty() {
+                return Ok(alone);
+            }
+        }
+        let mut shapes = vec![whole];
+        for &case in &choices[1..] {
+            shapes.push(shape(scene, case, degree)?);
+        }
         let all: Vec<usize> = (0..choices.len()).collect();
         let of = |subset: &[usize]| -> Result<Model, FixedError> {
             let pick = |&at: &usize| (choices[at], shapes[at].clone());
@@ -53,11 +65,6 @@ impl Model {
         };
         if listed {
             return of(&all);
-        }
-        let short = |model: &Model| model.resources.shortages(&model.board);
-        // Where case 0 alone is too large, so is every design that has it: one of them stands for all.
-        if !short(&of(&[0])?).is_empty() {
-            return of(&[0, 1]);
         }
         let mut model = None;
         for subset in subsets(choices.len()) {
