@@ -138,7 +138,7 @@ pub fn drawn_stress(random: &mut Rng, taxels: usize) -> Vec<f64> {
         1 => size * f64::from(u8::from(taxel == one)),
         2 => size,
         3 => -size * random.f64(),
-        4 => size * if taxel % 2 == 0 { 1.0 } else { -1.0 },
+        4 => size * if taxel.is_multiple_of(2) { 1.0 } else { -1.0 },
         5 => size * (-((taxel as f64 - one as f64) / 2.0).powi(2)).exp(),
         _ => size * (2.0 * random.f64() - 1.0),
     };
