@@ -26,9 +26,6 @@ pub mod unsearched;
 pub mod usage;
 pub mod wire;
 
-#[doc = include_str!("using.md")]
-pub mod using {}
-
 mod core_file;
 mod generate;
 mod simulate;

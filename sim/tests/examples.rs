@@ -95,6 +95,9 @@ fn every_example_works() {
     fs::create_dir_all(build_dir().join("verilator")).unwrap();
     fs::create_dir(work.path().join("build")).unwrap();
     std::os::unix::fs::symlink(build_dir().join("verilator"), work.path().join("build/verilator")).unwrap();
+    // The folder that `dermis check` is asked about.
+    let built = Command::new(program()).current_dir(work.path()).args(["build", "sensor-1"]).output().unwrap();
+    assert!(built.status.success(), "{}", String::from_utf8_lossy(&built.stderr));
     let path = format!("{}:{}", program().parent().unwrap().display(), std::env::var("PATH").unwrap());
     let run: Vec<&String> = all.difference(&not_run).collect();
     assert!(run.len() >= 15, "{run:?}");
