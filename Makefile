@@ -15,7 +15,7 @@ PACKAGES   = verilator yosys g++ make chromium python3-venv
 QUICK     ?=
 
 .DEFAULT_GOAL := help
-.PHONY: help setup tools program run test fmt clippy unit lint docs bench build cosim bitstream report fuzz clean
+.PHONY: help setup tools program run test fmt clippy unit lint quick docs bench build cosim bitstream report fuzz clean
 
 help: ## list the targets
 	@sed -n 's/^\([a-z]*\):.*## /\1	/p' $(MAKEFILE_LIST) | expand -t 10
@@ -36,7 +36,7 @@ program: setup
 run: program ## co-simulate both scenes on real frames and print the table
 	$(DERMIS) --build-dir $(BUILD) table --cosim $(SCENES)
 
-test: setup fmt clippy unit lint docs ## all checks; what .ci/run calls
+test: setup fmt clippy unit lint quick docs ## all checks; what .ci/run calls
 
 fmt: ## check the formatting
 	@echo '== fmt'
@@ -57,6 +57,10 @@ lint: setup ## lint the generated Verilog with its waivers
 	  (cd $(BUILD)/$$scene/rtl && $(VERILATOR) --lint-only -Wall *.vlt *.v); \
 	  echo "$$scene: verilator --lint-only -Wall is clean"; \
 	done
+
+quick: setup ## measure and draw the short report into build/report-quick
+	@echo '== quick report'
+	$(CARGO) run --quiet --bin dermis -- --build-dir $(BUILD) report --quick --out $(BUILD)/report-quick
 
 docs: ## build the documentation, warnings are errors
 	@echo '== docs'

@@ -168,9 +168,10 @@ impl Board {
         Ok(Board { name: name.to_owned(), ..board })
     }
 
-    /// Block RAMs for a memory of `words` words of `bits` bits: of the shape that takes the fewest.
+    /// Block RAMs for a memory of `words` words of `bits` bits: of the shape that takes the fewest. A memory deeper than a
+    /// shape is cut into parts that lie side by side, as Yosys does: several parts may share a block RAM's word.
     pub fn block_rams_for(&self, words: usize, bits: usize) -> usize {
-        let of = |&[w, b]: &[usize; 2]| words.div_ceil(w) * bits.div_ceil(b);
+        let of = |&[w, b]: &[usize; 2]| (words.div_ceil(w) * bits).div_ceil(b);
         self.block_ram_shapes.iter().map(of).min().unwrap_or(0)
     }
 
@@ -204,6 +205,11 @@ mod tests {
         assert_eq!(
             [(512, 36), (513, 36), (1025, 72), (2048, 9)].map(|(w, b)| board.block_rams_for(w, b)),
             [1, 2, 6, 1]
+        );
+        // Three parts of 6 bits share a word of 18; Yosys 0.23 takes as many for each of these.
+        assert_eq!(
+            [(2853, 6), (1500, 20), (5000, 3), (1100, 54)].map(|(w, b)| board.block_rams_for(w, b)),
+            [1, 2, 1, 5]
         );
         assert_eq!([board.multipliers_for(27, 18), board.multipliers_for(18, 18)], [2, 1]);
     }

@@ -60,7 +60,7 @@ pub struct Verified {
     pub findings: Findings,
     /// Every run, for example `verilator, full speed`.
     pub runs: Vec<String>,
-    /// Whether a run was one of the generated Verilog.
+    /// Whether a run was one of the generated Verilog or of its netlist.
     pub verilog: bool,
 }
 
@@ -82,7 +82,7 @@ pub fn verify(scene: &Scene, frames: &[Frame], simulators: &[Simulator], build: 
         rows: Vec::new(),
         findings: Findings::default(),
         runs: Vec::new(),
-        verilog: simulators.contains(&Simulator::Verilator),
+        verilog: simulators.iter().any(|&simulator| simulator != Simulator::RustHdl),
     };
     let mut times: Vec<Times> = Vec::new();
     for &simulator in simulators {
@@ -124,9 +124,9 @@ fn simulate(
         Simulator::RustHdl | Simulator::Netlist => &[Stimulus::FullSpeed],
     };
     let mut device = hardware.device(simulator)?;
-    let taps = match simulator {
-        Simulator::Netlist => Vec::new(),
-        _ => hardware.tap_names(),
+    let (taps, vectors) = match simulator {
+        Simulator::Netlist => (Vec::new(), &vectors.iter().map(Vector::without_stages).collect::<Vec<_>>()[..]),
+        _ => (hardware.tap_names(), vectors),
     };
     let mut full_speed = Vec::new();
     for &stimulus in stimuli {

@@ -24,9 +24,9 @@ use vcd::{IdCode, SimulationCommand, TimescaleUnit, Value, Writer};
 
 use crate::cosim::{run, Bench};
 use crate::drive::Stimulus;
-use crate::write::write;
 use crate::hardware::{Hardware, Simulator};
 use crate::progress::Progress;
+use crate::write::write;
 
 /// Taxels of a quad, by their place in the subarray's halves.
 const TAXELS: [&str; 4] = ["upper_left", "upper_right", "lower_left", "lower_right"];
