@@ -15,7 +15,7 @@ PACKAGES   = verilator yosys g++ make chromium python3-venv
 QUICK     ?=
 
 .DEFAULT_GOAL := help
-.PHONY: help setup tools program run test fmt clippy unit lint quick docs bench build cosim bitstream report fuzz clean
+.PHONY: help setup tools program run test fmt clippy unit lint quick docs bench build cosim bitstream report netlist fuzz clean
 
 help: ## list the targets
 	@sed -n 's/^\([a-z]*\):.*## /\1	/p' $(MAKEFILE_LIST) | expand -t 10
@@ -81,6 +81,9 @@ bitstream: program tools ## make the bitstream of SCENE for BOARD or its own one
 report: program ## measure and draw: build/report/report.html and paper.html; QUICK=1 in two minutes
 	$(DERMIS) --build-dir $(BUILD) report $(if $(QUICK),--quick)
 	$(DERMIS) --build-dir $(BUILD) report --paper $(if $(QUICK),--quick)
+
+netlist: setup ## compare the netlist of a small scene with a search, several minutes
+	$(CARGO) test --release -p dermis-tests --test netlist -- --include-ignored
 
 fuzz: ## 10^7 inputs over the readers, 10^5 frames through both models
 	DERMIS_FUZZ_INPUTS=10000000 DERMIS_FUZZ_RUNS=100000 $(CARGO) test --release -p dermis-tests --test fuzz -- --nocapture
