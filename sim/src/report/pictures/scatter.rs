@@ -167,10 +167,17 @@ fn named(axis: &Axis, text: fn(f64) -> String) -> Vec<(i32, String)> {
     all
 }
 
+/// Pixels that a text takes at most: digits and most letters are about half as wide as they are high.
+fn text_width(text: &str) -> i32 {
+    7 * text.chars().count() as i32
+}
+
 fn axes(area: &Area, plot: &Scatter, x: &Axis, y: &Axis) -> Result<()> {
     for (at, text) in named(x, plot.ticks[0]) {
         line(area, vec![(at, TOP), (at, BOTTOM)], &GRID, 1)?;
-        note(area, &text, (at, BOTTOM + 5), HPos::Center, VPos::Top)?;
+        // Moved in where the picture ends: a tick may stand at the very end of the axis.
+        let middle = at.min(WIDTH as i32 - text_width(&text) / 2);
+        note(area, &text, (middle, BOTTOM + 5), HPos::Center, VPos::Top)?;
     }
     for (at, text) in named(y, plot.ticks[1]) {
         line(area, vec![(LEFT, at), (RIGHT, at)], &GRID, 1)?;
@@ -219,8 +226,7 @@ struct Names {
 
 impl Names {
     fn draw(&mut self, area: &Area, name: &str, colour: &RGBColor, (x, y): (i32, i32)) -> Result<()> {
-        // Digits are about half as wide as they are high.
-        let (width, height) = (7 * name.chars().count() as i32, 13);
+        let (width, height) = (text_width(name), 13);
         let corners = [(x + 6, y - 13), (x - 6 - width, y - 13), (x + 6, y + 1), (x - 6 - width, y + 1)];
         let free = |(left, top): &(i32, i32)| {
             let own = [*left, *top, left + width, top + height];
@@ -289,6 +295,29 @@ mod tests {
         let near = Axis::new([0.0015, 0.0017].into_iter(), true, 0, 100);
         assert!(near.ticks().len() > 2);
         assert_eq!(named(&near, |tick| format!("{tick:.2}")).len(), 1);
+    }
+
+    #[test]
+    fn a_tick_at_the_end_of_the_axis_keeps_its_text_inside() {
+        let series = Series {
+            name: "s".into(),
+            colour: INK,
+            shape: 0,
+            points: vec![(0.0008, 1.0, String::new()), (0.08, 1.0, String::new())],
+            joined: false,
+        };
+        let plot = Scatter {
+            x: "t".into(),
+            y: "e".into(),
+            log: [true, false],
+            ticks: [|v| format!("{:.0} ms", 1e3 * v), |v| v.to_string()],
+            series: vec![series],
+            guides: vec![],
+        };
+        let drawn = scatter(&plot).unwrap();
+        let before = drawn.split("100 ms").next().unwrap().rsplit("<text x=\"").next().unwrap();
+        let middle: i32 = before.split('"').next().unwrap().parse().unwrap();
+        assert!(middle + text_width("100 ms") / 2 <= WIDTH as i32, "{middle}");
     }
 
     #[test]
