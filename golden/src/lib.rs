@@ -42,6 +42,7 @@ pub mod reconstruct;
 pub mod scene;
 pub mod sensor;
 pub mod stability;
+pub mod write;
 
 mod random;
 #[cfg(test)]

@@ -10,34 +10,33 @@
 pub mod absorb;
 pub mod baseline;
 pub mod family;
+pub mod synthesis;
 pub mod timing;
 pub mod tools;
 
 use std::path::Path;
-use std::sync::Mutex;
 
 use anyhow::{anyhow, Result};
 use clap::Args;
-use dermis_golden::board::{Board, Family};
+use dermis_golden::board::Board;
 use dermis_golden::fixed::Model;
 use dermis_golden::scene::Scene;
+use dermis_golden::write::write;
 use dermis_hdl::link::generate_board;
-use serde_json::Value;
 
+use crate::compare::median;
+use crate::jobs::{parallel, Interrupt};
 use crate::progress::Progress;
 use crate::report::{self, Implemented};
-use absorb::{absorb, Absorbed};
+use absorb::Absorbed;
 use baseline::{Baseline, Baselines, FILE};
 use family::{flow, pack_arguments, place_arguments, Flow, YOSYS};
+use synthesis::NETLIST;
 use timing::Placed;
 use tools::ToolError;
 
 /// Name of the board's own module, around the board top.
 const TOP: &str = "board";
-/// The netlist that is placed.
-pub(crate) const NETLIST: &str = "netlist.json";
-/// Time after which synthesis is given up, min.
-pub(crate) const SYNTHESIS_MINUTES: u32 = 60;
 
 /// What `dermis bitstream` is asked for.
 #[derive(Args, Debug)]
@@ -80,33 +79,28 @@ pub fn run(arguments: &Arguments, build_dir: &Path) -> Result<(String, bool)> {
         tool.version()?;
     }
     let folder = build_dir.join(&scene.name).join(&board.name);
-    let absorbed = synthesise(&model, &flow, &folder)?;
+    let absorbed = synthesise(&model, &folder)?;
     let seeds = arguments.seeds.unwrap_or(board.seeds);
     let placed = place(board, &flow, &folder, seeds, arguments.jobs)?;
-    let (name, best) = placed.iter().max_by(|(_, a), (_, b)| a.fmax_MHz.total_cmp(&b.fmax_MHz)).ok_or_else(|| {
-        anyhow!("{}: no seed of {seeds} could be placed and routed; logs in {}", scene.name, folder.display())
-    })?;
+    let (best_seed, best) =
+        placed.iter().max_by(|(_, a), (_, b)| a.fmax_MHz.total_cmp(&b.fmax_MHz)).ok_or_else(|| {
+            anyhow!("{}: no seed of {seeds} could be placed and routed; logs in {}", scene.name, folder.display())
+        })?;
     if (best.clock_MHz / board.clock_MHz - 1.0).abs() > 1e-3 {
         let (file, has, wants) = (&board.name, best.clock_MHz, board.clock_MHz);
         return Err(anyhow!("constraints/{file}.v: its PLL gives {has} MHz, {file}.toml says clock_MHz = {wants}"));
     }
-    let bitstream = folder.join(format!("{}.{}", scene.name, flow.bitstream));
+    let product = format!("{}.{}", scene.name, flow.bitstream);
     let reached = reached(&flow, &placed, best);
     let mut lost = Vec::new();
     if best.is_met() {
-        let packed = format!("{}.{}", scene.name, flow.bitstream);
-        let configuration = format!("{name}.config");
-        flow.pack.run(
-            &folder,
-            &pack_arguments(board.family, &configuration, &packed),
-            "pack.log",
-            SYNTHESIS_MINUTES,
-        )?;
+        let arguments = pack_arguments(board.family, &format!("{}.config", try_name(*best_seed)), &product);
+        flow.pack.run(&folder, &arguments, "pack.log", synthesis::MINUTES)?;
     } else {
         lost.push(format!("{:.1} MHz, the board's clock is {} MHz", best.fmax_MHz, best.clock_MHz));
     }
     lost.extend(baselines(arguments.update_baselines, board, &scene, &reached)?);
-    let implemented = Implemented::new(&model, reached, absorbed, best.is_met().then_some(bitstream), lost);
+    let implemented = Implemented::new(&model, reached, absorbed, best.is_met().then(|| folder.join(product)), lost);
     let good = implemented.is_good();
     Ok((
         if arguments.json { serde_json::to_string(&implemented)? + "\n" } else { report::implemented(&implemented) },
@@ -115,7 +109,7 @@ pub fn run(arguments: &Arguments, build_dir: &Path) -> Result<(String, bool)> {
 }
 
 /// Verilog to the netlist that is placed.
-fn synthesise(model: &Model, flow: &Flow, folder: &Path) -> Result<Absorbed> {
+fn synthesise(model: &Model, folder: &Path) -> Result<Absorbed> {
     let _progress = Progress::start(&format!("{}: synthesis", model.scene.name));
     let generated = generate_board(model)?;
     let board_files = model.board.files()?;
@@ -123,65 +117,32 @@ fn synthesise(model: &Model, flow: &Flow, folder: &Path) -> Result<Absorbed> {
     let own = generated.files.iter().map(|file| (&file.name, file.text.as_str()));
     for (name, text) in own.chain(board_files.iter().map(|(name, text)| (name, *text))) {
         let path = folder.join(name);
-        std::fs::write(&path, text).map_err(ToolError::io(&path))?;
+        write(&path, text.as_bytes())?;
     }
-    let script = format!(
-        "read_verilog -D DERMIS_TOP={top} {board}.v {top}.v; {synthesis} -top {TOP} -json {NETLIST}",
-        top = generated.top,
-        board = model.board.name,
-        synthesis = flow.synthesis,
-    );
-    YOSYS.run(folder, &["-q".to_owned(), "-p".to_owned(), script], "synthesis.log", SYNTHESIS_MINUTES)?;
-    match model.board.family {
-        Family::Ecp5 => Ok(absorb_file(&folder.join(NETLIST), TOP)?),
-    }
+    let read = format!("-D DERMIS_TOP={top} {board}.v {top}.v", top = generated.top, board = model.board.name);
+    Ok(synthesis::synthesise(folder, model.board.family, &read, TOP)?)
 }
 
-/// Absorbs registers in module `top` of the netlist at `path`.
-pub(crate) fn absorb_file(path: &Path, top: &str) -> Result<Absorbed, ToolError> {
-    let wrong = |error: serde_json::Error| ToolError::Output { path: path.to_owned(), reason: error.to_string() };
-    let text = std::fs::read(path).map_err(ToolError::io(path))?;
-    let mut netlist: Value = serde_json::from_slice(&text).map_err(wrong)?;
-    let absorbed = absorb(&mut netlist, top);
-    std::fs::write(path, serde_json::to_vec(&netlist).map_err(wrong)?).map_err(ToolError::io(path))?;
-    Ok(absorbed)
+/// Places and routes with seeds 1 … `seeds`, `jobs` at a time; those that came to an end.
+fn place(board: &Board, flow: &Flow, folder: &Path, seeds: u32, jobs: u32) -> Result<Vec<(u32, Placed)>> {
+    let what = format!("{}: place and route", board.name);
+    let place = |seed| match place_seed(board, flow, folder, seed) {
+        // What a seed does not converge to is no error of the call.
+        Err(ToolError::Late { .. } | ToolError::Failed { .. }) if seeds > 1 => Ok(None),
+        placed => Ok(Some((seed, placed?))),
+    };
+    let placed = parallel(&what, (1..=seeds).collect(), jobs as usize, &Interrupt::default(), place)?;
+    Ok(placed.into_iter().flatten().collect())
 }
 
-/// Places and routes with seeds 1 … `seeds`, `jobs` at a time; those that came to an end, by name.
-fn place(board: &Board, flow: &Flow, folder: &Path, seeds: u32, jobs: u32) -> Result<Vec<(String, Placed)>> {
-    let bar = Progress::steps(&format!("{}: place and route", board.name), u64::from(seeds));
-    let (next, done) = (Mutex::new(1..=seeds), Mutex::new(Vec::new()));
-    let next_seed = || next.lock().ok().and_then(|mut seeds| seeds.next());
-    std::thread::scope(|scope| {
-        for _ in 0..jobs.min(seeds) {
-            scope.spawn(|| {
-                while let Some(seed) = next_seed() {
-                    let outcome = place_seed(board, flow, folder, seed);
-                    if let Ok(mut done) = done.lock() {
-                        done.push((seed, outcome));
-                        bar.at(done.len() as u64);
-                    }
-                }
-            });
-        }
-    });
-    let mut done = done.into_inner().map_err(|_| anyhow!("a try of place and route panicked"))?;
-    done.sort_by_key(|(seed, _)| *seed);
-    let mut placed = Vec::new();
-    for (seed, outcome) in done {
-        match outcome {
-            Ok(one) => placed.push((format!("seed{seed}"), one)),
-            // What a seed does not converge to is no error of the call.
-            Err(ToolError::Late { .. } | ToolError::Failed { .. }) if seeds > 1 => {}
-            Err(error) => return Err(error.into()),
-        }
-    }
-    Ok(placed)
+/// What a seed's files begin with.
+fn try_name(seed: u32) -> String {
+    format!("seed{seed}")
 }
 
 /// One seed, by the first placer that converges.
 fn place_seed(board: &Board, flow: &Flow, folder: &Path, seed: u32) -> Result<Placed, ToolError> {
-    let name = format!("seed{seed}");
+    let name = try_name(seed);
     let mut last = Err(ToolError::Missing { tool: flow.place.name });
     for placer in &board.placers {
         let arguments = place_arguments(board, NETLIST, seed, placer, &name);
@@ -195,10 +156,8 @@ fn place_seed(board: &Board, flow: &Flow, folder: &Path, seed: u32) -> Result<Pl
 }
 
 /// The figures of all seeds; cells of the `best`.
-fn reached(flow: &Flow, placed: &[(String, Placed)], best: &Placed) -> Baseline {
-    let mut clocks: Vec<f64> = placed.iter().map(|(_, placed)| placed.fmax_MHz).collect();
-    clocks.sort_by(f64::total_cmp);
-    let median = (clocks[(clocks.len() - 1) / 2] + clocks[clocks.len() / 2]) / 2.0;
+fn reached(flow: &Flow, placed: &[(u32, Placed)], best: &Placed) -> Baseline {
+    let clocks = || placed.iter().map(|(_, placed)| placed.fmax_MHz);
     let rounded = |clock: f64| (clock * 10.0).round() / 10.0;
     Baseline {
         luts: best.count(flow.lut),
@@ -206,8 +165,8 @@ fn reached(flow: &Flow, placed: &[(String, Placed)], best: &Placed) -> Baseline 
         multipliers: best.count(flow.multiplier),
         block_rams: best.count(flow.block_ram),
         best_MHz: rounded(best.fmax_MHz),
-        median_MHz: rounded(median),
-        worst_MHz: rounded(clocks[0]),
+        median_MHz: rounded(median(clocks().collect()).unwrap_or(best.fmax_MHz)),
+        worst_MHz: rounded(clocks().fold(best.fmax_MHz, f64::min)),
         seeds: placed.len() as u32,
     }
 }

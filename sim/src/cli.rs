@@ -36,7 +36,7 @@ use crate::report::{self, CosimReport, Format};
 use crate::tabulate::tabulate;
 use crate::verify::{verify, Verified};
 use crate::verilator::VerilatorError;
-use crate::write::write;
+use dermis_golden::write::write;
 
 /// Normal stress under a tactile array in, a force vector per taxel out, in hardware within 1 ms.
 #[derive(Parser, Debug)]
@@ -456,10 +456,11 @@ fn print(text: &str) -> Result<()> {
 mod tests {
     use super::*;
     use dermis_golden::board::Board;
+    use dermis_golden::write::FileError;
 
     #[test]
     fn own_faults_exit_with_1_and_what_the_caller_can_mend_with_2() {
-        let io = |kind| VerilatorError::Io { path: "build".into(), source: ErrorKind::into(kind) };
+        let io = |kind| VerilatorError::File(FileError { path: "build".into(), source: ErrorKind::into(kind) });
         let stuck = Stuck { frame: "press".into(), cycle: 7, rule: "nothing moved".into() };
         let answer = HostError::Answer { port: "p".into(), what: "forces", bytes: 7 };
         let own: [anyhow::Error; 7] = [

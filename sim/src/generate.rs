@@ -16,7 +16,7 @@ use dermis_golden::generator::{generate, random_contacts, Draw};
 use dermis_golden::scene::Scene;
 
 use crate::fresh::Shapes;
-use crate::write::write;
+use dermis_golden::write::write;
 
 /// What to generate.
 #[derive(Args, Debug)]

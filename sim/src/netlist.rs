@@ -11,11 +11,13 @@ use std::fs;
 use std::path::Path;
 
 use dermis_golden::board::Family;
+use dermis_golden::write::write;
 use dermis_hdl::{Generated, GeneratedFile};
 
-use crate::bitstream::family::{flow, YOSYS};
+use crate::bitstream::family::YOSYS;
+use crate::bitstream::synthesis::{run, synthesise, NETLIST};
 use crate::bitstream::tools::ToolError;
-use crate::bitstream::{absorb_file, NETLIST, SYNTHESIS_MINUTES};
+use crate::place;
 use crate::progress::Progress;
 use crate::verilator::fingerprint;
 
@@ -33,11 +35,14 @@ const WAIVED: [&str; 8] =
 /// # Errors
 /// [`ToolError`]: no Yosys or none that has its models beside it, or a design that it refuses.
 pub fn netlist(generated: &Generated, family: Family, cache: &Path) -> Result<Generated, ToolError> {
-    let own = generated.files.iter().map(|file| (file.name.as_str(), file.text.as_str()));
-    let folder = cache.join(format!("netlist-{}", fingerprint(&own.collect::<Vec<_>>(), &YOSYS.version()?)));
+    // What Yosys reads; the other files may change without a change of the netlist.
+    let read: Vec<&GeneratedFile> = generated.files.iter().filter(|file| is_read(&file.name)).collect();
+    let texts: Vec<(&str, &str)> = read.iter().map(|file| (file.name.as_str(), file.text.as_str())).collect();
+    let version = format!("{family:?} {}", YOSYS.version()?);
+    let folder = cache.join(format!("netlist-{}", fingerprint(&texts, &version)));
     let path = folder.join(VERILOG);
     if !path.is_file() {
-        synthesise(generated, family, &folder)?;
+        make(&read, &generated.top, family, &folder)?;
     }
     let text = fs::read_to_string(&path).map_err(ToolError::io(&path))?;
     let waivers = WAIVED.map(|rule| format!("lint_off -rule {rule} -file \"*\"\n")).concat();
@@ -50,31 +55,23 @@ pub fn netlist(generated: &Generated, family: Family, cache: &Path) -> Result<Ge
     })
 }
 
-/// Makes the netlist in a temporary folder beside `folder` and renames it into place.
-fn synthesise(generated: &Generated, family: Family, folder: &Path) -> Result<(), ToolError> {
-    let cache = folder.parent().unwrap_or(folder);
-    fs::create_dir_all(cache).map_err(ToolError::io(cache))?;
-    let work = tempfile::Builder::new().prefix("netlist-").tempdir_in(cache).map_err(ToolError::io(cache))?;
-    for file in &generated.files {
-        let path = work.path().join(&file.name);
-        fs::write(&path, &file.text).map_err(ToolError::io(&path))?;
+/// Whether Yosys reads a file of that name: Verilog, and the memories it names.
+fn is_read(name: &str) -> bool {
+    name.ends_with(".v") || name.ends_with(".hex")
+}
+
+/// Makes the netlist of `files` that `folder` is to hold.
+fn make(files: &[&GeneratedFile], top: &str, family: Family, folder: &Path) -> Result<(), ToolError> {
+    let work = place::begin(folder)?;
+    for file in files {
+        write(&work.path().join(&file.name), file.text.as_bytes())?;
     }
-    let top = &generated.top;
     let _progress = Progress::start(&format!("{top}: netlist"));
-    let run =
-        |script: String, log: &str| YOSYS.run(work.path(), &["-q".into(), "-p".into(), script], log, SYNTHESIS_MINUTES);
-    run(format!("read_verilog {top}.v; {} -top {top} -json {NETLIST}", flow(family).synthesis), "synthesis.log")?;
-    if family == Family::Ecp5 {
-        absorb_file(&work.path().join(NETLIST), top)?;
-    }
+    synthesise(work.path(), family, &format!("{top}.v"), top)?;
     // Without the cells, which Yosys has as empty modules.
-    run(format!("read_json {NETLIST}; select {top}; write_verilog -noattr -selected {VERILOG}"), "verilog.log")?;
-    let made = work.keep();
-    match fs::rename(&made, folder) {
-        // Somebody else finished the same netlist first: theirs serves as well.
-        Err(_) if folder.join(VERILOG).is_file() => fs::remove_dir_all(&made).map_err(ToolError::io(&made)),
-        renamed => renamed.map_err(ToolError::io(folder)),
-    }
+    let script = format!("read_json {NETLIST}; select {top}; write_verilog -noattr -selected {VERILOG}");
+    run(work.path(), script, "verilog.log")?;
+    Ok(place::finish(work, folder, VERILOG)?)
 }
 
 /// Models of the family's cells: Yosys's, and ours where it has none.

@@ -30,12 +30,12 @@ mod stability;
 mod style;
 mod table;
 
+pub use crate::jobs::Interrupted;
 pub use cases::cases;
 pub use errors::errors;
 pub use extremes::extremes;
 pub use host::{equality, resultants, wire_times};
 pub use implemented::{implemented, Implemented};
-pub use measure::jobs::Interrupted;
 pub use needs::{features, resources};
 pub use noise::noise;
 pub use result::{difference, reconstruction};

@@ -19,7 +19,7 @@ use dermis_golden::stability::{measure, settings, Setting};
 
 use crate::progress::Progress;
 use crate::report::{self, Format};
-use crate::write::write;
+use dermis_golden::write::write;
 
 /// What to measure.
 #[derive(Args, Debug)]

@@ -11,18 +11,21 @@
 
 use std::ffi::{c_char, c_void, CString};
 use std::fs;
-use std::io;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::sync::Mutex;
 
+use dermis_golden::write::{write, FileError};
 use dermis_hdl::device::{Device, Inputs, Outputs, Tap};
 use libloading::Library;
 use thiserror::Error;
 
 use crate::bench::Layout;
+use crate::place;
 use crate::progress::Progress;
 
+/// What a built folder is for.
+const LIBRARY: &str = "libbench.so";
 /// The C++ side, compiled into every library.
 const SHIM: &str = include_str!("../shim/shim.cpp");
 /// Start value of registers without an initial value; any number shows a missing reset.
@@ -53,13 +56,8 @@ pub enum VerilatorError {
         log: String,
     },
     /// A file or folder could not be used.
-    #[error("{path}: {source}")]
-    Io {
-        /// The file or folder.
-        path: PathBuf,
-        /// The system's reason.
-        source: io::Error,
-    },
+    #[error(transparent)]
+    File(#[from] FileError),
     /// The built library does not load or does not fit its bench.
     #[error("{path}: {reason}")]
     Library {
@@ -172,9 +170,9 @@ pub fn version() -> Result<String, VerilatorError> {
 
 /// Writes the design's memory files where `$readmemh` will look for them.
 fn memory_folder(design: &Design) -> Result<tempfile::TempDir, VerilatorError> {
-    let folder = tempfile::tempdir().map_err(|source| VerilatorError::Io { path: std::env::temp_dir(), source })?;
+    let folder = tempfile::tempdir().map_err(FileError::at(&std::env::temp_dir()))?;
     for (name, text) in design.files.iter().filter(|(name, _)| !is_source(name)) {
-        write(&folder.path().join(name), text)?;
+        write(&folder.path().join(name), text.as_bytes())?;
     }
     Ok(folder)
 }
@@ -194,31 +192,27 @@ fn library(design: &Design, bench: &str, cache: &Path) -> Result<PathBuf, Verila
     sources.sort_by_key(|(name, _)| !name.ends_with(".vlt"));
     sources.extend([("bench.v", bench), ("shim.cpp", SHIM)]);
     let folder = cache.join(fingerprint(&sources, &version()?));
-    let ready = folder.join("libbench.so");
+    let ready = folder.join(LIBRARY);
     let _one = BUILDING.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
     if !ready.is_file() {
-        build(design.top, &sources, &folder, cache)?;
+        build(design.top, &sources, &folder)?;
     }
-    ready.canonicalize().map_err(|source| VerilatorError::Io { path: ready, source })
+    Ok(ready.canonicalize().map_err(FileError::at(&ready))?)
 }
 
-/// Builds in a temporary folder beside `folder` and renames it into place.
-fn build(top: &str, sources: &[(&str, &str)], folder: &Path, cache: &Path) -> Result<(), VerilatorError> {
-    let io_at = |path: &Path| {
-        let path = path.to_owned();
-        move |source| VerilatorError::Io { path, source }
-    };
-    fs::create_dir_all(cache).map_err(io_at(cache))?;
-    let work = tempfile::Builder::new().prefix("building-").tempdir_in(cache).map_err(io_at(cache))?;
+/// Builds what `folder` is to hold.
+fn build(top: &str, sources: &[(&str, &str)], folder: &Path) -> Result<(), VerilatorError> {
+    let work = place::begin(folder)?;
     for (name, text) in sources {
-        write(&work.path().join(name), text)?;
+        write(&work.path().join(name), text.as_bytes())?;
     }
     let _progress = Progress::start(&format!("verilating {top}"));
     let output = Command::new("verilator")
         .current_dir(work.path())
         .args(["--cc", "--exe", "--build", "-j", "2", "--top-module", "bench", "--prefix", "Vbench"])
         .args(["--x-initial", "unique", "--x-assign", "unique", "-O3"])
-        .args(["-CFLAGS", "-fPIC -O1", "-LDFLAGS", "-shared -Wl,--wrap=fopen", "-o", "../libbench.so"])
+        .args(["-CFLAGS", "-fPIC -O1", "-LDFLAGS", "-shared -Wl,--wrap=fopen", "-o"])
+        .arg(Path::new("..").join(LIBRARY))
         .args(sources.iter().map(|(name, _)| *name))
         .output()
         .map_err(|_| VerilatorError::Missing)?;
@@ -233,23 +227,13 @@ fn build(top: &str, sources: &[(&str, &str)], folder: &Path, cache: &Path) -> Re
         return Err(VerilatorError::Build { design: top.into(), folder: work.keep(), log: log.join("\n") });
     }
     // Only the library and its sources stay; the object files are ten times as large.
-    fs::remove_dir_all(work.path().join("obj_dir")).map_err(io_at(work.path()))?;
-    let built = work.keep();
-    match fs::rename(&built, folder) {
-        Ok(()) => Ok(()),
-        // Somebody else finished the same build first: theirs serves as well.
-        Err(_) if folder.join("libbench.so").is_file() => fs::remove_dir_all(&built).map_err(io_at(&built)),
-        Err(source) => Err(VerilatorError::Io { path: folder.to_owned(), source }),
-    }
+    let objects = work.path().join("obj_dir");
+    fs::remove_dir_all(&objects).map_err(FileError::at(&objects))?;
+    Ok(place::finish(work, folder, LIBRARY)?)
 }
 
 fn is_installed(program: &str) -> bool {
     Command::new(program).arg("--version").output().is_ok()
-}
-
-fn write(path: &Path, text: &str) -> Result<(), VerilatorError> {
-    crate::write::write(path, text.as_bytes())
-        .map_err(|error| VerilatorError::Io { path: error.path, source: error.source })
 }
 
 /// FNV-1a of all names, texts and the tool's version, 128 bits in hexadecimal.

@@ -8,12 +8,12 @@
 //!
 //! all little-endian, 64 bits each but magic, key and CRC. The key is everything the matrices depend on, in words, with
 //! the layout's and this crate's version; the file's name is its CRC-32 and length. A file with another key, cut short
-//! or damaged is as good as none: it is computed and written again. Files are written beside their place and renamed,
-//! so that neither an interruption nor a second process leaves half a file.
+//! or damaged is as good as none: it is computed and written again.
 
 use crate::folded::{Block, Operator};
 use crate::scene::{Inversion, Medium};
 use crate::sensor::Sensor;
+use crate::write::write;
 use faer::Mat;
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -92,14 +92,8 @@ impl Place {
             }
         }
         bytes.extend(crc32fast::hash(&bytes).to_le_bytes());
-        // Of this process alone; of two threads with the same matrices either one's rename will do.
-        let part = self.path.with_extension(format!("{}-{:?}.part", std::process::id(), std::thread::current().id()));
         let folder = self.path.parent().map_or(Ok(()), fs::create_dir_all);
-        let written = folder.and_then(|()| fs::write(&part, &bytes)).and_then(|()| fs::rename(&part, &self.path));
-        if written.is_err() {
-            // Nothing is left of a file that could not be finished; that it may never have been begun is as well.
-            let _ = fs::remove_file(&part);
-        }
+        let _ = folder.is_ok() && write(&self.path, &bytes).is_ok();
     }
 }
 

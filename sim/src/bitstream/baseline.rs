@@ -9,6 +9,7 @@ use std::path::Path;
 use serde::{Deserialize, Serialize};
 
 use super::tools::ToolError;
+use dermis_golden::write::write;
 
 /// The file, from the repository's root.
 pub const FILE: &str = "constraints/baselines.json";
@@ -78,7 +79,7 @@ impl Baselines {
     /// Reads the file at `path`; none yet where there is no file.
     ///
     /// # Errors
-    /// [`ToolError::Io`]; [`ToolError::Output`] with line and field for what is none.
+    /// [`ToolError::File`]; [`ToolError::Output`] with line and field for what is none.
     pub fn read(path: &Path) -> Result<Baselines, ToolError> {
         if !path.exists() {
             return Ok(Baselines::default());
@@ -90,12 +91,11 @@ impl Baselines {
     /// Writes the file at `path`, whole or not at all.
     ///
     /// # Errors
-    /// [`ToolError::Io`].
+    /// [`ToolError::File`].
     pub fn write(&self, path: &Path) -> Result<(), ToolError> {
         let wrong = |e: serde_json::Error| ToolError::Output { path: path.to_owned(), reason: e.to_string() };
         let text = serde_json::to_string_pretty(self).map_err(wrong)? + "\n";
-        let part = path.with_extension("part");
-        std::fs::write(&part, text).and_then(|()| std::fs::rename(&part, path)).map_err(ToolError::io(path))
+        Ok(write(path, text.as_bytes())?)
     }
 
     /// The line of a scene.

@@ -49,15 +49,15 @@ pub fn place_arguments(board: &Board, netlist: &str, seed: u32, placer: &str, na
     let seed = seed.to_string();
     let pins = format!("{}.{}", board.name, board.family.pins());
     let (report, configuration) = (format!("{name}.report.json"), format!("{name}.config"));
-    let arguments: Vec<&str> = match board.family {
-        Family::Ecp5 => vec!["--lpf", &pins, "--textcfg", &configuration],
+    let (size, speed) = (format!("--{size}"), speed_grade.to_string());
+    let mut arguments = match board.family {
+        Family::Ecp5 => {
+            vec![&size, "--package", package, "--speed", &speed, "--lpf", &pins, "--textcfg", &configuration]
+        }
     };
-    let speed = speed_grade.to_string();
-    let of_device = match board.family {
-        Family::Ecp5 => vec![format!("--{size}"), "--package".into(), package.clone(), "--speed".into(), speed],
-    };
-    let common = ["--json", netlist, "--seed", &seed, "--placer", placer, "--report", &report, "--timing-allow-fail"];
-    of_device.into_iter().chain(arguments.into_iter().chain(common).map(str::to_owned)).collect()
+    arguments.extend(["--json", netlist, "--seed", &seed, "--placer", placer, "--report", &report]);
+    arguments.push("--timing-allow-fail");
+    arguments.into_iter().map(str::to_owned).collect()
 }
 
 /// Arguments of the packer.

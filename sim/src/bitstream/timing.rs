@@ -41,7 +41,7 @@ impl Placed {
     /// Reads the report of one try. The engine's clock is that with the least slack: a board has no other that counts.
     ///
     /// # Errors
-    /// [`ToolError::Io`], [`ToolError::Output`] for what is no report.
+    /// [`ToolError::File`], [`ToolError::Output`] for what is no report.
     pub fn read(path: &Path) -> Result<Placed, ToolError> {
         let text = std::fs::read_to_string(path).map_err(ToolError::io(path))?;
         let wrong = |reason: String| ToolError::Output { path: path.to_owned(), reason };

@@ -7,6 +7,7 @@ use std::process::{Command, Stdio};
 use std::thread::sleep;
 use std::time::{Duration, Instant};
 
+use dermis_golden::write::FileError;
 use thiserror::Error;
 
 /// Lines at the end of a failed tool's log that an error repeats.
@@ -52,19 +53,14 @@ pub enum ToolError {
         reason: String,
     },
     /// A file could not be read or written.
-    #[error("{path}: {source}")]
-    Io {
-        /// The file.
-        path: PathBuf,
-        /// The system's reason.
-        source: io::Error,
-    },
+    #[error(transparent)]
+    File(#[from] FileError),
 }
 
 impl ToolError {
     /// For a file that `source` kept from being read or written.
     pub fn io(path: &Path) -> impl FnOnce(io::Error) -> ToolError + '_ {
-        |source| ToolError::Io { path: path.to_owned(), source }
+        |source| FileError::at(path)(source).into()
     }
 }
 

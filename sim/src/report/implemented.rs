@@ -45,7 +45,7 @@ impl Implemented {
         bitstream: Option<PathBuf>,
         lost: Vec<String>,
     ) -> Self {
-        let cycles = Cycles::of(model, &vec![true; model.parts.len()]).total;
+        let cycles = Cycles::longest(model).total;
         let time_us = model.board.microseconds(cycles);
         Implemented {
             scene: model.scene.name.clone(),

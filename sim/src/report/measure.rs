@@ -12,7 +12,6 @@
 
 mod clock;
 mod formats;
-pub mod jobs;
 mod machine;
 mod plane;
 mod stages;
@@ -43,9 +42,9 @@ use dermis_hdl::usage::Usage;
 
 use crate::compare::median;
 use crate::hardware::Simulator;
+use crate::jobs::{parallel, Interrupt};
 use crate::progress::Progress;
 use crate::verify::verify;
-use jobs::{parallel, Interrupt};
 
 /// Taxels of a subarray from which the quick variant leaves a case out.
 const QUICK_TAXELS: usize = 1200;
@@ -254,7 +253,9 @@ pub fn measure(scenes: &[Scene], cases: &[Case], options: &Options) -> Result<Ve
         }
     }
     let mut all =
-        parallel("engines and co-simulations", tasks, options, |(scene, frames)| prepare(scene, frames, options))?;
+        parallel("engines and co-simulations", tasks, options.jobs, &options.interrupt, |(scene, frames)| {
+            prepare(scene, frames, options)
+        })?;
     let bar = Progress::steps("timing", all.len() as u64);
     for (done, measured) in all.iter_mut().enumerate() {
         options.interrupt.check()?;

@@ -9,12 +9,12 @@ use dermis_golden::partition::Case;
 use dermis_golden::scene::{Condition, Scene};
 
 use super::document::{Document, Section};
-use super::measure::jobs::Interrupt;
 use super::measure::{clock, machine, measure, sweep, Kind, Measured, Options, SweepPoint};
 use super::save::save;
 use super::sections::{
     choice, choose, fields, frames, paper, published, ratios, resources, search, stages, sweeps, time, Choice,
 };
+use crate::jobs::Interrupt;
 
 /// Drawn frames of a sweep, beside the shipped ones; quick and full.
 const SWEEP_FRAMES: [u32; 2] = [0, 24];

@@ -10,7 +10,7 @@ use super::data::{csv, document as json, path_of_picture, path_of_table, text};
 use super::document::{Document, Item};
 use super::html::html;
 use super::style::standalone;
-use crate::write::write;
+use dermis_golden::write::write;
 
 /// Writes all files below `folder`, each complete or not at all, and takes away what an earlier report left in its own
 /// folders. The page comes last: what it stands for is then there. Returns its path.

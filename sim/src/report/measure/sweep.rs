@@ -6,9 +6,9 @@ use dermis_golden::frame::Frame;
 use dermis_golden::partition::Case;
 use dermis_golden::scene::Scene;
 
-use super::jobs::parallel;
 use super::Options;
 use crate::compare::median;
+use crate::jobs::parallel;
 
 /// A setting and what it gives.
 #[derive(Clone, Debug, PartialEq)]
@@ -64,7 +64,7 @@ pub fn sweep(scene: &Scene, frames: &[Frame], options: &Options) -> Result<Vec<S
         }
     };
     let what = format!("{}: sweeps", scene.name);
-    Ok(parallel(&what, tasks, options, one)?.into_iter().flatten().collect())
+    Ok(parallel(&what, tasks, options.jobs, &options.interrupt, one)?.into_iter().flatten().collect())
 }
 
 fn tasks(scene: &Scene) -> Vec<Task> {
@@ -103,7 +103,7 @@ fn point(model: &Model, own: &Model, field: &'static str, value: String, frames:
         own: model.scene == own.scene && model.formats == own.formats,
         tangential: median(errors.iter().filter_map(|e| e.tangential).collect()),
         normal: median(errors.iter().filter_map(|e| e.normal).collect()),
-        cycles: Cycles::of(model, &vec![model.searches(); model.parts.len()]).total,
+        cycles: Cycles::longest(model).total,
         block_rams: model.resources.block_rams(),
         multipliers: model.resources.multipliers(),
         fits: model.resources.shortages(&model.board).is_empty(),

@@ -13,10 +13,11 @@ use dermis_hdl::generate;
 use dermis_hdl::usage::{total, Usage};
 
 use super::super::document::{count, decimal, none, percent, seconds, words, Cell, Item, Section, Table};
-use super::super::measure::{clock, formats, jobs::parallel, Clock, Engine, FormatRow, Kind, Measured, Options};
+use super::super::measure::{clock, formats, Clock, Engine, FormatRow, Kind, Measured, Options};
 use super::super::BUDGET_US;
 use super::{case_text, scenes};
 use crate::fresh::{Fresh, Shapes};
+use crate::jobs::parallel;
 
 /// How much worse than the best a faster case may be: a share of the error, and a share of the force.
 const NEAR_CASE: [f64; 2] = [1.1, 0.002];
@@ -52,7 +53,9 @@ pub fn choose(measured: &[Measured], options: &Options) -> Result<Vec<Choice>> {
     let kinds = |scene| [Kind::One, Kind::Several].map(|kind| (scene, kind));
     let best = scenes(measured).into_iter().flat_map(kinds);
     let best = best.filter_map(|(scene, kind)| Some((best_case(measured, scene, kind)?, kind))).collect();
-    parallel("formats", best, options, |(index, kind)| choose_format(measured, index, kind, options))
+    parallel("formats", best, options.jobs, &options.interrupt, |(index, kind)| {
+        choose_format(measured, index, kind, options)
+    })
 }
 
 /// The measured case of a scene to take.

@@ -8,7 +8,6 @@ use signal_hook::consts::{SIGINT, SIGTERM};
 use signal_hook::flag;
 use thiserror::Error;
 
-use super::Options;
 use crate::progress::Progress;
 
 /// Exit code of a second interruption, which does not wait.
@@ -48,14 +47,15 @@ impl Interrupt {
     }
 }
 
-/// Does all tasks on `options.jobs` threads; results in the tasks' order.
+/// Does all tasks on `jobs` threads, at least one; results in the tasks' order.
 ///
 /// # Errors
 /// The first task's that failed, by the list; an interruption.
 pub fn parallel<T: Send, R: Send>(
     what: &str,
     tasks: Vec<T>,
-    options: &Options,
+    jobs: usize,
+    interrupt: &Interrupt,
     work: impl Fn(T) -> Result<R> + Sync,
 ) -> Result<Vec<R>> {
     let bar = Progress::steps(what, tasks.len() as u64);
@@ -64,7 +64,7 @@ pub fn parallel<T: Send, R: Send>(
     let (next, done, failed) = (AtomicUsize::new(0), AtomicUsize::new(0), AtomicBool::new(false));
     let take = |index: usize| tasks[index].lock().unwrap_or_else(PoisonError::into_inner).take();
     let worker = || {
-        while !failed.load(Ordering::Relaxed) && options.interrupt.check().is_ok() {
+        while !failed.load(Ordering::Relaxed) && interrupt.check().is_ok() {
             let index = next.fetch_add(1, Ordering::Relaxed);
             let Some(task) = tasks.get(index).and_then(|_| take(index)) else { break };
             let result = work(task);
@@ -73,8 +73,8 @@ pub fn parallel<T: Send, R: Send>(
             bar.at(done.fetch_add(1, Ordering::Relaxed) as u64 + 1);
         }
     };
-    std::thread::scope(|scope| (0..options.jobs.max(1)).for_each(|_| drop(scope.spawn(worker))));
-    options.interrupt.check()?;
+    std::thread::scope(|scope| (0..jobs.max(1)).for_each(|_| drop(scope.spawn(worker))));
+    interrupt.check()?;
     let results = results.into_iter().map(|result| result.into_inner().unwrap_or_else(PoisonError::into_inner));
     // A task without a result comes after one that failed.
     results.flatten().collect()
@@ -84,23 +84,12 @@ pub fn parallel<T: Send, R: Send>(
 mod tests {
     use super::*;
     use anyhow::anyhow;
-    use dermis_golden::scene::Condition;
-
-    fn options(jobs: usize) -> Options {
-        Options {
-            quick: true,
-            jobs,
-            build: "build".into(),
-            condition: Condition::Loaded,
-            simulate: false,
-            interrupt: Interrupt::default(),
-        }
-    }
 
     #[test]
     fn results_in_order_whatever_the_threads() {
         for jobs in [0, 1, 3] {
-            let squares = parallel("squares", (0..20u64).collect(), &options(jobs), |n| Ok(n * n)).unwrap();
+            let squares =
+                parallel("squares", (0..20u64).collect(), jobs, &Interrupt::default(), |n| Ok(n * n)).unwrap();
             assert_eq!(squares, (0..20).map(|n| n * n).collect::<Vec<_>>());
         }
     }
@@ -108,17 +97,17 @@ mod tests {
     #[test]
     fn a_failure_ends_it() {
         let work = |n: u64| if n == 2 { Err(anyhow!("two")) } else { Ok(n) };
-        assert_eq!(parallel("n", (0..20).collect(), &options(2), work).unwrap_err().to_string(), "two");
+        assert_eq!(parallel("n", (0..20).collect(), 2, &Interrupt::default(), work).unwrap_err().to_string(), "two");
     }
 
     #[test]
     fn an_interruption_ends_it() {
-        let options = options(1);
+        let interrupt = Interrupt::default();
         let stop = |n: u64| {
-            options.interrupt.0.store(n == 3, Ordering::Relaxed);
+            interrupt.0.store(n == 3, Ordering::Relaxed);
             Ok(n)
         };
-        let error = parallel("n", (0..20).collect(), &options, stop).unwrap_err();
+        let error = parallel("n", (0..20).collect(), 1, &interrupt, stop).unwrap_err();
         assert!(error.is::<Interrupted>(), "{error}");
     }
 }

@@ -7,7 +7,7 @@
 //! |---|---|
 //! | in: path | a file that is, or is not, there; its folder exists; links are followed |
 //! | in: bytes | everything the file is to hold |
-//! | errors | [`WriteError`] with the path and the system's reason |
+//! | errors | [`FileError`] with the path and the system's reason |
 //!
 //! What is no regular file, as a pipe or `/dev/stdout`, is written as it is: there is no old content to keep.
 
@@ -18,22 +18,29 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 
 use thiserror::Error;
 
-/// A file that could not be written; what was there before still is.
+/// A file or folder that could not be used; of one that was to be written, what was there before still is.
 #[derive(Debug, Error)]
 #[error("{}: {source}", path.display())]
-pub struct WriteError {
+pub struct FileError {
     /// The file.
     pub path: PathBuf,
     /// The system's reason.
     pub source: Error,
 }
 
+impl FileError {
+    /// For the file at `path` and what the system says of it.
+    pub fn at(path: &Path) -> impl FnOnce(Error) -> FileError + '_ {
+        |source| FileError { path: path.to_owned(), source }
+    }
+}
+
 /// Writes a file, whole or not at all.
 ///
 /// # Errors
-/// [`WriteError`].
-pub fn write(path: &Path, bytes: &[u8]) -> Result<(), WriteError> {
-    replace(path, bytes).map_err(|source| WriteError { path: path.to_owned(), source })
+/// [`FileError`].
+pub fn write(path: &Path, bytes: &[u8]) -> Result<(), FileError> {
+    replace(path, bytes).map_err(FileError::at(path))
 }
 
 fn replace(path: &Path, bytes: &[u8]) -> Result<(), Error> {

@@ -1,0 +1,47 @@
+//! Synthesis: Verilog in a folder to the netlist that is placed, and that is replayed.
+
+use std::fs;
+use std::path::Path;
+
+use dermis_golden::board::Family;
+use dermis_golden::write::write;
+use serde_json::Value;
+
+use super::absorb::{absorb, Absorbed};
+use super::family::{flow, YOSYS};
+use super::tools::ToolError;
+
+/// Name of the netlist in Yosys's JSON.
+pub const NETLIST: &str = "netlist.json";
+/// Time after which Yosys is given up, min.
+pub const MINUTES: u32 = 60;
+
+/// Makes [`NETLIST`] of what `read` names, arguments of Yosys's `read_verilog`, for module `top`.
+///
+/// # Errors
+/// [`ToolError`]: no Yosys, a design that it refuses, files that cannot be used.
+pub fn synthesise(folder: &Path, family: Family, read: &str, top: &str) -> Result<Absorbed, ToolError> {
+    let script = format!("read_verilog {read}; {} -top {top} -json {NETLIST}", flow(family).synthesis);
+    run(folder, script, "synthesis.log")?;
+    match family {
+        Family::Ecp5 => absorb_file(&folder.join(NETLIST), top),
+    }
+}
+
+/// Runs a script of Yosys's; what it says goes to `log`.
+///
+/// # Errors
+/// As [`super::tools::Tool::run`].
+pub fn run(folder: &Path, script: String, log: &str) -> Result<(), ToolError> {
+    YOSYS.run(folder, &["-q".to_owned(), "-p".to_owned(), script], log, MINUTES)
+}
+
+/// Absorbs registers in module `top` of the netlist at `path`.
+fn absorb_file(path: &Path, top: &str) -> Result<Absorbed, ToolError> {
+    let wrong = |error: serde_json::Error| ToolError::Output { path: path.to_owned(), reason: error.to_string() };
+    let text = fs::read(path).map_err(ToolError::io(path))?;
+    let mut netlist: Value = serde_json::from_slice(&text).map_err(wrong)?;
+    let absorbed = absorb(&mut netlist, top);
+    write(path, &serde_json::to_vec(&netlist).map_err(wrong)?)?;
+    Ok(absorbed)
+}
