@@ -4,9 +4,9 @@
 ///
 /// Memory files are copied beside the tool's own files, where `$readmemh` looks for them; `lint` runs Verilator's.
 pub(crate) fn core_file(top: &str, scene: &str, files: &[&str]) -> String {
-    let of = |ending: &str, kind: &str| {
+    let of = |ending: &str, kind: fn(&str) -> String| {
         let chosen = files.iter().filter(|name| name.ends_with(ending));
-        chosen.map(|name| format!("      - {name}: {{{kind}}}\n").replace("{NAME}", name)).collect::<String>()
+        chosen.map(|name| format!("      - {name}: {{{}}}\n", kind(name))).collect::<String>()
     };
     format!(
         "\
@@ -32,9 +32,9 @@ filesets:
       verilator_options: [-Wall]
 ",
         version = env!("CARGO_PKG_VERSION"),
-        verilog = of(".v", "file_type: verilogSource"),
-        memories = of(".hex", "file_type: user, copyto: {NAME}"),
-        waivers = of(".vlt", "file_type: vlt"),
+        verilog = of(".v", |_| "file_type: verilogSource".to_owned()),
+        memories = of(".hex", |name| format!("file_type: user, copyto: {name}")),
+        waivers = of(".vlt", |_| "file_type: vlt".to_owned()),
     )
 }
 

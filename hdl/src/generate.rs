@@ -103,7 +103,7 @@ impl Generated {
     }
 
     /// Brings sizes and checksums of the manifest up to date with the files ([`crate::manifest`]).
-    fn seal(&mut self) {
+    pub(crate) fn seal(&mut self) {
         let text = seal(&mut self.manifest, &self.files);
         self.files.iter_mut().filter(|file| file.name == MANIFEST).for_each(|file| file.text.clone_from(&text));
     }
@@ -132,7 +132,9 @@ pub fn generate(model: &Model) -> Result<Generated, HdlError> {
     let names: Vec<&str> = files.iter().map(|file| file.name.as_str()).collect();
     let core = core_file(&top, &model.scene.name, &names);
     files.push(file(format!("{top}.core"), core));
-    Ok(Generated { top, files, taps: taps(model), manifest, usage, dropped })
+    let mut generated = Generated { top, files, taps: taps(model), manifest, usage, dropped };
+    generated.seal();
+    Ok(generated)
 }
 
 /// Marks every memory of the model with where the synthesiser is to put it; the engine's modules begin with `engine`.

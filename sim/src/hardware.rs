@@ -12,7 +12,7 @@ use dermis_golden::fixed::Model;
 use dermis_golden::frame::Frame;
 use dermis_golden::link::Identity;
 use dermis_golden::reconstruct::Reconstruction;
-use dermis_hdl::device::Device;
+use dermis_hdl::device::{Device, Tap};
 use dermis_hdl::link::{board_simulator, generate_board, BoardDevice};
 use dermis_hdl::{generate, simulator, Generated};
 use thiserror::Error;
@@ -136,7 +136,15 @@ impl Hardware {
         Ok(Terminal::start(line, to_board, to_host)?)
     }
 
-    /// Stage names of the taps, in the order of a device's outputs; a netlist's device has none.
+    /// The stages' streams that a device of this simulator shows; in a netlist there are none left.
+    pub fn taps(&self, simulator: Simulator) -> &[Tap] {
+        match simulator {
+            Simulator::Netlist => &[],
+            Simulator::Verilator | Simulator::RustHdl => &self.generated.taps,
+        }
+    }
+
+    /// Stage names of the Verilog's and rust-hdl's taps, in the order of a device's outputs.
     pub fn tap_names(&self) -> Vec<&'static str> {
         self.generated.taps.iter().map(|tap| tap.name).collect()
     }

@@ -7,7 +7,7 @@
 //! dermis.input.{valid, ready, last, code}        dermis.output.{valid, ready, last, fx, fy, fz}
 //! dermis.fold.{valid, even_even, …}              dermis.search.{valid, x, y, score, taken}
 //! ```
-//! A stage's fields keep their last word while its `valid` is low. Values stand from the rising edge of one cycle to that
+//! The stages of a netlist are gone: of it only the pins are written. A stage's fields keep their last word while its `valid` is low. Values stand from the rising edge of one cycle to that
 //! of the next, sampled before it; a cycle lasts as long as the board's clock.
 
 use std::fs::Permissions;
@@ -26,7 +26,7 @@ use crate::cosim::{run, Bench};
 use crate::drive::Stimulus;
 use crate::hardware::{Hardware, Simulator};
 use crate::progress::Progress;
-use crate::write::write;
+use dermis_golden::write::write;
 
 /// Taxels of a quad, by their place in the subarray's halves.
 const TAXELS: [&str; 4] = ["upper_left", "upper_right", "lower_left", "lower_right"];
@@ -37,6 +37,7 @@ const PARITIES: [&str; 4] = ["even_even", "even_odd", "odd_even", "odd_odd"];
 fn fields(stage: &str) -> &'static [&'static str] {
     match stage {
         "receive" => &["code"],
+        "choose" => &["case"],
         "normalise" | "unfold" | "force" => &TAXELS,
         "search" => &["x", "y", "score", "taken"],
         _ => &PARITIES,
@@ -177,7 +178,8 @@ pub fn waves(scene: &Scene, frames: &[Frame], simulator: Simulator, build: &Path
     std::fs::create_dir_all(folder).map_err(|e| at(folder, e))?;
     let vectors = frames.chunks(1 << scene.input.average).map(|frames| hardware.vector(frames));
     let vectors = vectors.collect::<Result<Vec<_>>>()?;
-    let taps = &hardware.generated.taps;
+    let taps = hardware.taps(simulator);
+    let names: Vec<&str> = taps.iter().map(|tap| tap.name).collect();
     let _progress = Progress::start(&format!("{}: waveforms", scene.name));
     // Gone with an error or an interruption that unwinds.
     let mut part = tempfile::Builder::new();
@@ -188,7 +190,7 @@ pub fn waves(scene: &Scene, frames: &[Frame], simulator: Simulator, build: &Path
     let device = hardware.device(simulator)?;
     let clock_MHz = hardware.model.board.clock_MHz;
     let mut device = Waves::new(device, taps, clock_MHz, &mut out).map_err(|e| at(part.path(), e))?;
-    let bench = Bench { name: simulator.name(), device: &mut device, taps: &hardware.tap_names() };
+    let bench = Bench { name: simulator.name(), device: &mut device, taps: &names };
     run(bench, &vectors, Stimulus::FullSpeed);
     let failed = device.failed.take();
     failed.map_or_else(|| out.flush(), Err).map_err(|e| at(part.path(), e))?;

@@ -2,6 +2,7 @@
 
 use dermis_golden::fixed::Model;
 use rust_hdl::prelude::*;
+use serde_json::json;
 
 use super::BoardTop;
 use crate::generate::{place, rename, top_name, Generated, GeneratedFile, HdlError};
@@ -56,5 +57,9 @@ pub fn generate_board(model: &Model) -> Result<Generated, HdlError> {
         file if file.name == waivers => GeneratedFile { name: format!("{top}.vlt"), ..file },
         file => file,
     });
-    Ok(Generated { files: files.collect(), top, taps: Vec::new(), ..engine })
+    let mut manifest = engine.manifest.clone();
+    manifest["top"] = json!(top);
+    let mut board = Generated { files: files.collect(), top, taps: Vec::new(), manifest, ..engine };
+    board.seal();
+    Ok(board)
 }
