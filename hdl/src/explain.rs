@@ -78,5 +78,5 @@ fn difference((with, cycles_with): &(Usage, u64), (without, cycles_without): &(U
 
 fn needs(model: &Model) -> Result<(Usage, u64), HdlError> {
     let usage = total(&stages(model, &design(model)?.verilog()));
-    Ok((usage, Cycles::of(model, &vec![true; model.parts.len()]).latency))
+    Ok((usage, Cycles::longest(model).latency))
 }

@@ -3,6 +3,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
+use dermis_golden::board::Board;
 use dermis_golden::fixed::resources::Memory;
 use dermis_golden::fixed::Model;
 use serde::Serialize;
@@ -39,6 +40,20 @@ pub struct Usage {
     pub flip_flops: usize,
     /// Look-up tables with four inputs, those of carry chains and distributed RAM included, estimated.
     pub luts: usize,
+}
+
+impl Usage {
+    /// Block RAMs, multipliers, flip-flops and LUTs, in the order of tables.
+    pub fn counts(&self) -> [usize; 4] {
+        [self.block_rams, self.multipliers, self.flip_flops, self.luts]
+    }
+
+    /// The same over what a board has, in %.
+    pub fn shares(&self, board: &Board) -> [f64; 4] {
+        let has = [board.block_rams, board.multipliers, board.flip_flops, board.luts];
+        let counts = self.counts();
+        std::array::from_fn(|k| 100.0 * counts[k] as f64 / f64::from(has[k]))
+    }
 }
 
 impl std::ops::AddAssign for Usage {

@@ -4,6 +4,8 @@
 //! well: the widest one, an accumulator, has 48 bits). Rounding is *half up*, `⌊x / 2ˢ + 1/2⌋`: one adder
 //! in hardware, and its bias of at most half a unit at exact ties is below every error bound used here.
 
+use std::ops::{Add, Sub};
+
 /// Number of bits of a signed word that holds every integer of magnitude `bound` or less.
 ///
 /// `bound = 2ᵏ` needs the sign bit and `k + 1` more, because `+2ᵏ` must fit as well.
@@ -48,7 +50,7 @@ pub fn bit_length(x: u64) -> u32 {
 ///
 /// Index `2·(row bit) + (column bit)` on both sides: images of a taxel under the two mirrors going in, parities
 /// coming out. It is its own inverse but for a factor of four, which [`unfold`](super::unfold) accounts for.
-pub fn hadamard(x: [i64; 4]) -> [i64; 4] {
+pub fn hadamard<T: Copy + Add<Output = T> + Sub<Output = T>>(x: [T; 4]) -> [T; 4] {
     let [a, b, c, d] = x;
     [a + b + c + d, a - b + c - d, a + b - c - d, a - b - c + d]
 }

@@ -64,6 +64,11 @@ pub struct Cycles {
 }
 
 impl Cycles {
+    /// The counts of a frame of `model` with every subarray searched, the longest there are.
+    pub fn longest(model: &Model) -> Self {
+        Cycles::of(model, &vec![true; model.parts.len()])
+    }
+
     /// The counts of a frame of `model`, of a scene of several cases a frame of case 0; `searched` says of each
     /// subarray whether it is searched.
     pub fn of(model: &Model, searched: &[bool]) -> Self {

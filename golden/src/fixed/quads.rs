@@ -89,7 +89,7 @@ impl Quads {
     }
 
     /// Packs a row-major vector into quads, middle lines duplicated.
-    pub fn pack(&self, taxels: &[i64]) -> Vec<[i64; 4]> {
+    pub fn pack<T: Copy>(&self, taxels: &[T]) -> Vec<[T; 4]> {
         (0..self.len()).map(|address| std::array::from_fn(|lane| taxels[self.taxel(address, lane)])).collect()
     }
 

@@ -88,7 +88,7 @@ fn fitting((change, scene): Change) -> Option<Remedy> {
         lanes: 4 * model.formats.lanes_per_parity,
         block_rams: model.resources.block_rams(),
         multipliers: model.resources.multipliers(),
-        cycles: Cycles::of(&model, &vec![true; model.parts.len()]).latency,
+        cycles: Cycles::longest(&model).latency,
     })
 }
 

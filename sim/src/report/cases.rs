@@ -12,7 +12,7 @@ pub fn cases(model: &Model, refused: &[Refused]) -> String {
         return String::new();
     }
     let row = |case: &Model| {
-        let latency = Cycles::of(case, &vec![true; case.parts.len()]).latency + LATENCY;
+        let latency = Cycles::longest(case).latency + LATENCY;
         let cells = [case.parts.len(), case.formats.quads, case.storage.words(), case.status_beats(), latency as usize];
         [vec![case.number().to_string()], cells.map(|cell| cell.to_string()).to_vec()].concat()
     };

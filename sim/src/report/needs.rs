@@ -12,18 +12,15 @@ use super::table::{aligned, markdown};
 /// A table of the stages, the board's share, lanes and cycles.
 pub fn resources(model: &Model, usage: &BTreeMap<String, Usage>) -> String {
     let board = &model.board;
-    let counts = |u: &Usage| [u.block_rams, u.multipliers, u.flip_flops, u.luts];
     let row = |name: &str, cells: [String; 4]| [vec![name.to_string()], cells.to_vec()].concat();
-    let line = |name: &str, u: &Usage| row(name, counts(u).map(|count| count.to_string()));
+    let line = |name: &str, u: &Usage| row(name, u.counts().map(|count| count.to_string()));
     let all = total(usage);
     let present = STAGES.iter().filter_map(|stage| usage.get(*stage).map(|usage| line(stage, usage)));
     let mut rows: Vec<Vec<String>> = present.collect();
     rows.push(line("all", &all));
-    let has = [board.block_rams, board.multipliers, board.flip_flops, board.luts];
-    let share = |k: usize| format!("{:.0} %", 100.0 * counts(&all)[k] as f64 / f64::from(has[k]));
-    rows.push(row("of board", std::array::from_fn(share)));
+    rows.push(row("of board", all.shares(board).map(|share| format!("{share:.0} %"))));
     let mut text = markdown(&["stage", "block RAMs", "multipliers", "flip-flops*", "LUTs*"], rows);
-    let latency = Cycles::of(model, &vec![true; model.parts.len()]).latency;
+    let latency = Cycles::longest(model).latency;
     text.push_str(&format!(
         "* estimated\n{}: {} lanes, {:.0} % busy during the passes; {latency} cycles from last input to last output \
          beat\n",

@@ -54,7 +54,7 @@ pub fn formats(scene: &Scene, frames: &[Frame]) -> Result<Vec<FormatRow>> {
             ninety: quantile(shear.clone(), 0.9),
             tangential: median(shear),
             normal: median(results.iter().filter_map(|result| result.error?.normal).collect()),
-            cycles: Cycles::of(&model, &vec![model.searches(); model.parts.len()]).total,
+            cycles: Cycles::longest(&model).total,
             block_rams: model.resources.block_rams(),
             multipliers: model.resources.multipliers(),
         });

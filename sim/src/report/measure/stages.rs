@@ -20,9 +20,8 @@
 //!
 //! So `force` shows what the arithmetic costs, and `send` what it costs with the search's answer in it.
 
-use dermis_golden::fixed::arith::bit_length;
+use dermis_golden::fixed::arith::{bit_length, hadamard};
 use dermis_golden::fixed::formats::{Formats, MU_STEPS, SEARCH_EXTRA_BITS};
-use dermis_golden::fixed::quads::Quads;
 use dermis_golden::fixed::schedule::{is_transposed, schedule, EXPONENTS};
 use dermis_golden::fixed::send::{Status, STATUS_BEATS};
 use dermis_golden::float::pass::Polynomial;
@@ -215,16 +214,16 @@ impl<'a> Shadow<'a> {
         let word = raw * 2f64.powi(status.rescale as i32);
         let stress = || {
             let b = model.parts[part].gather(&scene.sensor, &self.measured.frames[self.index].stress_MPa);
-            quads_of(layout, &b).into_iter()
+            layout.pack(&b).into_iter()
         };
         let family = &self.families[part];
         match stage {
             "normalise" => return stress().map(|quad| in_lsb(quad, code)).collect(),
-            "fold" => return stress().map(|quad| in_lsb(parities(quad), code)).collect(),
+            "fold" => return stress().map(|quad| in_lsb(hadamard(quad), code)).collect(),
             "force" => {
                 let step = scene.search.mu_max / MU_STEPS as f64;
                 let p = family.eval(status.position.map(|position| f64::from(position) * step));
-                return quads_of(layout, &p).into_iter().map(|quad| in_lsb(quad, word / 4.0)).collect();
+                return layout.pack(&p).into_iter().map(|quad| in_lsb(quad, word / 4.0)).collect();
             }
             _ => {}
         }
@@ -234,7 +233,7 @@ impl<'a> Shadow<'a> {
             let (i, j) = EXPONENTS[k];
             let order = (i + j) as i32;
             let v = family.v(i as usize, j as usize).iter().map(|v| v * scale.powi(order));
-            let quads = quads_of(layout, &v.collect::<Vec<_>>());
+            let quads = layout.pack(&v.collect::<Vec<_>>());
             let swapped = is_transposed(products);
             let moved = |address: usize| if swapped { quads[layout.transposed(address)] } else { quads[address] };
             let lsb = match stage {
@@ -246,8 +245,8 @@ impl<'a> Shadow<'a> {
             all.extend((0..quads.len()).map(moved).map(|quad| {
                 let quad = match (stage, swapped) {
                     ("unfold", _) => quad,
-                    (_, true) => parities([quad[0], quad[2], quad[1], quad[3]]),
-                    (_, false) => parities(quad),
+                    (_, true) => hadamard([quad[0], quad[2], quad[1], quad[3]]),
+                    (_, false) => hadamard(quad),
                 };
                 in_lsb(quad, lsb)
             }));
@@ -256,26 +255,16 @@ impl<'a> Shadow<'a> {
     }
 }
 
-/// Values per taxel of a subarray in quads, middle lines doubled.
-fn quads_of(layout: Quads, taxels: &[f64]) -> Vec<[f64; 4]> {
-    (0..layout.len()).map(|address| std::array::from_fn(|lane| taxels[layout.taxel(address, lane)])).collect()
-}
-
 /// A quad in LSB, with the LSB.
 fn in_lsb(quad: [f64; 4], lsb: f64) -> ([f64; 4], f64) {
     (quad.map(|value| value / lsb), lsb)
 }
 
-/// The butterfly of `fold`.
-fn parities([a, b, c, d]: [f64; 4]) -> [f64; 4] {
-    [a + b + c + d, a - b + c - d, a + b - c - d, a - b - c + d]
-}
-
 #[cfg(test)]
 mod tests {
-    use super::super::jobs::Interrupt;
     use super::super::{measure, Options};
     use super::*;
+    use crate::jobs::Interrupt;
     use dermis_golden::partition::Case;
     use dermis_golden::scene::{Condition, Scene};
 

@@ -5,10 +5,11 @@ use dermis_hdl::explain::explain;
 use dermis_hdl::usage::{total, Usage, STAGES};
 
 use super::super::document::{count, words, Cell, Item, Picture, Section, Table};
-use super::super::measure::{jobs::parallel, Integers, Measured, Options};
+use super::super::measure::{Integers, Measured, Options};
 use super::super::pictures::{bars, Bars};
 use super::super::style::SERIES;
 use super::{case_text, Choice};
+use crate::jobs::parallel;
 
 /// The section; the quick variant tells what was left out for the first scene alone.
 ///
@@ -22,7 +23,8 @@ pub fn resources(measured: &[Measured], choices: &[Choice], options: &Options) -
         })
     };
     let groups = chosen().map(|(m, integers)| {
-        (format!("{}, {}", m.scene.name, m.scene.partition.case), shares(integers).map(Some).to_vec())
+        let shares = total(&integers.usage).shares(&integers.model.board);
+        (format!("{}, {}", m.scene.name, m.scene.partition.case), shares.map(Some).to_vec())
     });
     let names = ["block RAMs", "multipliers", "flip-flops, estimated", "LUTs, estimated"];
     let plot = Bars {
@@ -51,21 +53,10 @@ pub fn resources(measured: &[Measured], choices: &[Choice], options: &Options) -
     })
 }
 
-fn counts(usage: &Usage) -> [usize; 4] {
-    [usage.block_rams, usage.multipliers, usage.flip_flops, usage.luts]
-}
-
-fn shares(integers: &Integers) -> [f64; 4] {
-    let board = &integers.model.board;
-    let has = [board.block_rams, board.multipliers, board.flip_flops, board.luts];
-    let takes = counts(&total(&integers.usage));
-    std::array::from_fn(|k| 100.0 * takes[k] as f64 / f64::from(has[k]))
-}
-
 fn stage_rows(m: &Measured, integers: &Integers) -> Vec<Vec<Cell>> {
     let row = |name: &str, usage: &Usage| {
         let mut row = vec![words(m.scene.name.clone()), words(case_text(m.scene.partition.case)), words(name)];
-        row.extend(counts(usage).map(|n| count(n as u64)));
+        row.extend(usage.counts().map(|n| count(n as u64)));
         row
     };
     let present = STAGES.iter().filter_map(|stage| Some(row(stage, integers.usage.get(*stage)?)));
@@ -75,9 +66,13 @@ fn stage_rows(m: &Measured, integers: &Integers) -> Vec<Vec<Cell>> {
 fn left_out(chosen: Vec<(&Measured, &Integers)>, options: &Options) -> Result<Table> {
     let kept = if options.quick { 1 } else { chosen.len() };
     let chosen = chosen.into_iter().take(kept).collect();
-    let explained = parallel("what was left out", chosen, options, |(m, integers): (&Measured, &Integers)| {
-        Ok((m.scene.name.clone(), explain(&integers.model)?))
-    })?;
+    let explained = parallel(
+        "what was left out",
+        chosen,
+        options.jobs,
+        &options.interrupt,
+        |(m, integers): (&Measured, &Integers)| Ok((m.scene.name.clone(), explain(&integers.model)?)),
+    )?;
     let rows = explained.iter().flat_map(|(scene, features)| {
         features.iter().filter_map(move |feature| {
             let saved = feature.saved?;
