@@ -6,7 +6,7 @@
 //! fold     Q + 5                                from the last input beat to the first product
 //! pass     the kept columns of each product, at most Q, waiting until a step's operand has been finished
 //! rescale  v_00 is replayed once its exponent is known: Q more
-//! search   7 coarse sweeps of Q, at least 18; the eighth and 7 halvings of Q + 18; one of Q + 7
+//! search   7 coarse sweeps of Q, at least Q/2 + 10; the eighth and 7 halvings of Q + 20; one of Q + 7
 //!          (the last alone when nothing is searched)
 //! next     1 from a subarray's search to the passes of the one after it, which go on at the same time
 //! choose   3, where the case is chosen per frame
@@ -37,12 +37,10 @@ const REPLAY: u64 = 2;
 const UNFOLD: u64 = 5;
 /// From the search's start to its first sweep.
 const BEGIN: u64 = 1;
-/// A sweep that the next one waits for, beyond its Q quads: memory 2, Taylor 4, candidates 2, score 6, judge 4.
-const SWEEP: u64 = 18;
+/// A sweep that the next one waits for, beyond its Q quads: memory 2, Taylor 4, candidates 2, score 6, judge 5, set-up 1.
+const SWEEP: u64 = 20;
 /// Quads that a judged sweep lasts at least: its sums are weighed meanwhile.
 pub const SHORTEST_SWEEP: u64 = 4;
-/// From a coarse sweep to the next at least: a sweep is judged before the next but one, which may write over its source.
-pub const COARSE_PERIOD: u64 = SWEEP;
 /// The last sweep beyond its Q quads.
 const LAST_SWEEP: u64 = 7;
 /// From a subarray's values to their sending, where nothing is searched.
@@ -63,6 +61,12 @@ pub struct Cycles {
     pub total: u64,
 }
 
+/// From a coarse sweep of so many quads to the next: a sweep is judged before the next but one, which may write over its
+/// source.
+pub fn coarse_period(quads: u64) -> u64 {
+    quads.max((quads + SWEEP).div_ceil(2))
+}
+
 impl Cycles {
     /// The counts of a frame of `model` with every subarray searched, the longest there are.
     pub fn longest(model: &Model) -> Self {
@@ -76,7 +80,7 @@ impl Cycles {
         let quads = model.formats.quads as u64;
         let chained = COARSE_CENTRES.len() as u64 - 1;
         let awaited = 1 + u64::from(HALVINGS);
-        let sweeps = chained * quads.max(COARSE_PERIOD) + awaited * (quads.max(SHORTEST_SWEEP) + SWEEP);
+        let sweeps = chained * coarse_period(quads) + awaited * (quads.max(SHORTEST_SWEEP) + SWEEP);
         let search = |&searching: &bool| match model.searches() {
             true => BEGIN + if searching { sweeps } else { 0 } + quads + LAST_SWEEP,
             false => UNSEARCHED,

@@ -9,7 +9,7 @@ use super::weigh::weight_bits;
 use crate::wire::{Wire, Word};
 
 /// Score = total − weight for all nine at once, then a tree of comparisons by the search's rules of ties: row-major in
-/// the coarse grid; in a halving the centre, then row-major.
+/// the coarse grid; in a halving the centre, then row-major. The winner of the nine is compared with the best so far.
 ///
 /// `start` with totals, weights and sweep; `done` `LATENCY` cycles later, `improved` with it. `begin_frame`
 /// forgets the frame, `halve` doubles the position for the next level.
@@ -58,7 +58,7 @@ pub struct Judge {
 }
 
 /// Cycles from `start` to `done`.
-pub const LATENCY: usize = 4;
+pub const LATENCY: usize = 5;
 /// Order of the candidates: the centre first in a halving, row-major in the coarse grid.
 const ORDERS: [[usize; 9]; 2] = [[4, 0, 1, 2, 3, 5, 6, 7, 8], [0, 1, 2, 3, 4, 5, 6, 7, 8]];
 
@@ -197,10 +197,8 @@ impl Logic for Judge {
             .iter()
             .map(|n| {
                 format!(
-                    "wire signed [{end}:0] x_{n} = held_centre_x + along(column(k_{n}));\n\
-                     wire signed [{end}:0] y_{n} = held_centre_y + along(row(k_{n}));\n\
-                     wire better_{n} = !taken || s_{n} < s_best || (s_{n} == s_best && held_coarse\n  \
-                     && (y_{n} < by || (y_{n} == by && x_{n} < bx)));\n",
+                    "wire [{end}:0] x_{n} = held_centre_x + along(column(k_{n}));\n\
+                     wire [{end}:0] y_{n} = held_centre_y + along(row(k_{n}));\n",
                     end = p - 1
                 )
             })
@@ -226,7 +224,7 @@ endfunction
 reg [{scores_end}:0] scores;
 reg [8:0] fits;
 reg [{sweep_end}:0] held;
-reg [2:0] valid;
+reg [3:0] valid;
 {declared}{leaves}genvar k;
 generate
   for (k = 0; k < 9; k = k + 1) begin : candidate
@@ -245,21 +243,31 @@ end
 // The first to come wins ties; in a halving that is the centre.
 wire centre_wins = ok_centre && (!ok_before || s_centre < s_before || (!held_coarse && s_centre == s_before));
 wire after_wins = ok_after && (!ok_before || s_after < s_before) && (!ok_centre || s_after < s_centre);
+{positions}reg ok;
+reg signed [{t_end}:0] s;
+reg signed [{p_end}:0] x, y;
+always @(posedge clk) begin
+  ok <= ok_before || ok_centre || ok_after;
+  s <= after_wins ? s_after : centre_wins ? s_centre : s_before;
+  x <= after_wins ? x_after : centre_wins ? x_centre : x_before;
+  y <= after_wins ? y_after : centre_wins ? y_centre : y_before;
+end
 wire signed [{t_end}:0] s_best = score;
 wire signed [{p_end}:0] bx = best_x;
 wire signed [{p_end}:0] by = best_y;
-{positions}wire better = after_wins ? better_after : centre_wins ? better_centre : ok_before && better_before;
-wire take = valid[2] && better && (held_coarse || found);
+wire earlier = held_coarse && (y < by || (y == by && x < bx));
+wire better = ok && (!taken || s < s_best || (s == s_best && earlier));
+wire take = valid[3] && better && (held_coarse || found);
 always @(posedge clk) begin
   if (rst) begin
-    valid <= 3'd0;
+    valid <= 4'd0;
     done <= 1'b0;
   end else begin
-    valid <= {{valid[1:0], start}};
-    done <= valid[2];
+    valid <= {{valid[2:0], start}};
+    done <= valid[3];
   end
   improved <= take;
-  if (valid[2]) begin
+  if (valid[3]) begin
     closes <= held_closes;
     judged <= held;
   end
@@ -274,9 +282,9 @@ always @(posedge clk) begin
     best_y <= best_y << 1;
     taken <= 1'b0;
   end else if (take) begin
-    best_x <= after_wins ? x_after : centre_wins ? x_centre : x_before;
-    best_y <= after_wins ? y_after : centre_wins ? y_centre : y_before;
-    score <= after_wins ? s_after : centre_wins ? s_centre : s_before;
+    best_x <= x;
+    best_y <= y;
+    score <= s;
     taken <= 1'b1;
     if (held_coarse) found <= 1'b1;
   end

@@ -9,7 +9,7 @@ use crate::wire::{Wire, Word};
 
 /// Sweeps over the coarse tiles, then the halvings, then one that only moves to the winner.
 ///
-/// `set_up`, which may come with `judged`, begins a sweep, whose move, word and buffers stand from the next cycle until
+/// `set_up`, which may come with `judged` where the sweeps are coarse, begins a sweep, whose move, word and buffers stand from the next cycle until
 /// the following `set_up`. Coarse sweeps follow one another without waiting for their judgement (`chains`): each reads
 /// what the one before has written, and writes the buffer that is neither that nor the best so far. So three buffers
 /// are enough as long as a sweep is judged before the next but one is set up. Halvings work in place. `judged` with
@@ -194,14 +194,14 @@ wire is_coarse = count < {SWEEP_BITS}'d{coarse};
 wire is_halving = !is_coarse && count < {SWEEP_BITS}'d{JUDGED};
 wire closing = !is_coarse || count == {SWEEP_BITS}'d{final_coarse};
 always @(*) next_halves = is_halving;
-// A judgement takes effect for a sweep that is set up with it.
+// A judgement takes effect for the buffers of a coarse sweep that is set up with it; a halving comes after it.
 {judged_fields}wire [{w_end}:0] best = judged && improved && judged_coarse ? judged_sweep : kept;
-{best_fields}wire [{w_end}:0] from = is_coarse ? sweep : best;
+{best_fields}wire [{w_end}:0] from = is_coarse ? sweep : kept;
 {from_fields}wire unused = &{{1'b0, best_square, best_coarse, best_closes, from_coarse, from_closes, best_x, best_y,
   best_centre_x, best_centre_y, judged_centre_x, judged_centre_y, judged_square, judged_buffer, judged_closes}};
 // The best is at most one step away from the centre of its polynomial.
-wire [1:0] step_x = is_coarse ? table_x : best_x[1:0] - best_centre_x[1:0];
-wire [1:0] step_y = is_coarse ? table_y : best_y[1:0] - best_centre_y[1:0];
+wire [1:0] step_x = is_coarse ? table_x : best_x[1:0] - from_centre_x[1:0];
+wire [1:0] step_y = is_coarse ? table_y : best_y[1:0] - from_centre_y[1:0];
 wire [{q_end}:0] twice_x = {{{{{q_more}{{from_centre_x[{p_end}]}}}}, from_centre_x, 1'b0}};
 wire [{q_end}:0] twice_y = {{{{{q_more}{{from_centre_y[{p_end}]}}}}, from_centre_y, 1'b0}};
 wire [{q_end}:0] along_x = step_x[1] ? {q}'d1 - twice_x : step_x[0] ? {q}'d1 + twice_x : {q}'d0;
@@ -212,7 +212,7 @@ wire [{p_end}:0] to_y = from_centre_y + {{{{{p_more}{{step_y[1]}}}}, step_y}};
 // The first of 1, 2, 0 that is neither read nor the best.
 wire [1:0] free_buffer = from_buffer != 2'd1 && best_buffer != 2'd1 ? 2'd1
   : from_buffer != 2'd2 && best_buffer != 2'd2 ? 2'd2 : 2'd0;
-wire [1:0] to_buffer = is_coarse ? free_buffer : best_buffer;
+wire [1:0] to_buffer = is_coarse ? free_buffer : from_buffer;
 wire [{w_end}:0] next_sweep = {{closing, is_coarse, to_buffer, is_halving ? to_square << 2 : to_square,
   is_halving ? to_y << 1 : to_y, is_halving ? to_x << 1 : to_x}};
 always @(posedge clk) begin

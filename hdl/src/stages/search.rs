@@ -2,11 +2,11 @@
 //!
 //! `walk` sets up a sweep; one quad per cycle runs through memory (2 cycles), Taylor shift (4) and back into
 //! memory, candidates (2), score (6). The sum polynomial takes the same way beside the first quad and stays, so that Σp stands
-//! when the first taxel is scored; `weigh` makes of it what the totals are compared with, and `judge` compares (4). Coarse
+//! when the first taxel is scored; `weigh` makes of it what the totals are compared with, and `judge` compares (5). Coarse
 //! sweeps follow one another without a gap; a halving is set up when the sweep before it has been judged. The last sweep
 //! only moves to the winner: its constant coefficients are p(μ*).
 
-use dermis_golden::fixed::cycles::{COARSE_PERIOD, SHORTEST_SWEEP};
+use dermis_golden::fixed::cycles::{coarse_period, SHORTEST_SWEEP};
 use dermis_golden::fixed::quads::Quads;
 use dermis_golden::fixed::schedule::vectors;
 use dermis_golden::fixed::Model;
@@ -82,6 +82,7 @@ pub struct Search {
     period: CaseCounter,
     counting: DFF<Bit>,
     began: BitDelay,
+    judged_then: BitDelay,
     go: BitDelay,
     sum_go: BitDelay,
     moved: BitDelay,
@@ -106,7 +107,7 @@ impl Search {
         let quads = formats.quads;
         let layouts: Vec<Quads> = model.cases().iter().map(Model::layout).collect();
         let limits: Vec<usize> = layouts.iter().map(Quads::len).collect();
-        let periods: Vec<usize> = limits.iter().map(|&quads| quads.max(COARSE_PERIOD as usize)).collect();
+        let periods: Vec<usize> = limits.iter().map(|&quads| coarse_period(quads as u64) as usize).collect();
         let taxel_counts: Vec<usize> = layouts.iter().map(|layout| layout.rows * layout.cols).collect();
         // One subarray is filled while another is searched.
         let apart = model.cases().iter().any(|case| case.parts.len() > 1);
@@ -155,6 +156,8 @@ impl Search {
             period: CaseCounter::new(&periods),
             counting: Default::default(),
             began: BitDelay::new(1),
+            // What was judged stands in registers before the next sweep is made of it.
+            judged_then: BitDelay::new(1),
             go: BitDelay::new(1),
             sum_go: BitDelay::new(STORE_LATENCY - 1),
             moved: BitDelay::new(MOVED),
@@ -196,6 +199,7 @@ impl Logic for Search {
         self.quads.clk.next = self.clk.val();
         self.counting.clock.next = self.clk.val();
         self.began.clk.next = self.clk.val();
+        self.judged_then.clk.next = self.clk.val();
         self.go.clk.next = self.clk.val();
         self.sum_go.clk.next = self.clk.val();
         self.moved.clk.next = self.clk.val();
@@ -211,6 +215,7 @@ impl Logic for Search {
         self.first.rst.next = self.rst.val();
         self.weighs.rst.next = self.rst.val();
         self.began.rst.next = self.rst.val();
+        self.judged_then.rst.next = self.rst.val();
         self.go.rst.next = self.rst.val();
         self.sum_go.rst.next = self.rst.val();
         self.moved.rst.next = self.rst.val();
@@ -242,9 +247,9 @@ impl Logic for Search {
         self.walk.enabled.next = self.enabled.val();
         self.judge.begin_frame.next = self.start.val();
         self.began.now.next = self.start.val();
-        self.set_up.next = self.began.then.val()
-            | (self.judge.done.val() & self.judge.closes.val())
-            | (self.walk.chains.val() & self.period.last.val());
+        self.set_up.next =
+            self.began.then.val() | self.judged_then.then.val() | (self.walk.chains.val() & self.period.last.val());
+        self.judged_then.now.next = self.judge.done.val() & self.judge.closes.val();
         self.period.clear.next = self.set_up.val();
         self.period.enable.next = true;
         self.walk.set_up.next = self.set_up.val();

@@ -5,7 +5,7 @@
 //! enable, no reset, zero at the start.
 //!
 //! ```text
-//! flip-flops -> operand          all used bits, flip-flops or constant zeros; the flip-flops stay where others use them
+//! flip-flops -> both operands    all bits, flip-flops or constant zeros; the flip-flops stay where others use them
 //! product    -> flip-flops       every used bit goes to one flip-flop and nowhere else
 //! ```
 //! Block RAMs keep theirs outside: which clock and enable their registers have in the 36-bit mode that Yosys chooses is not
@@ -17,6 +17,8 @@ use serde_json::{json, Map, Value};
 
 /// Operand's bits of a multiplier, of MULT18X18D.
 const OPERAND: usize = 18;
+/// Names of its operands.
+const SIDES: [&str; 2] = ["A", "B"];
 /// Its product's bits.
 const PRODUCT: usize = 36;
 
@@ -56,7 +58,7 @@ pub fn absorb(netlist: &mut Value, top: &str) -> Absorbed {
     let mut absorbed = Absorbed::default();
     for cell in cells.values_mut() {
         if cell["type"] == "MULT18X18D" {
-            absorbed.operands += ["A", "B"].iter().filter(|side| design.operand(cell, side)).count();
+            absorbed.operands += design.operands(cell);
             absorbed.products += usize::from(design.product(cell).is_some());
         }
     }
@@ -118,6 +120,17 @@ fn registers(cells: &Map<String, Value>) -> impl Iterator<Item = Register> + '_ 
     })
 }
 
+/// An operand's bits before its registers; no clock where all of them are constants.
+struct Operand {
+    clock: Option<Net>,
+    data: Vec<Value>,
+}
+
+/// Names of an operand's pins.
+fn pins(side: &str) -> impl Iterator<Item = String> + '_ {
+    (0..OPERAND).map(move |bit| format!("{side}{bit}"))
+}
+
 /// The nets and flip-flops around the cells.
 struct Design {
     users: Users,
@@ -128,35 +141,46 @@ struct Design {
 }
 
 impl Design {
-    /// Moves the registers of an operand in.
-    fn operand(&mut self, cell: &mut Value, side: &str) -> bool {
-        let pins: Vec<String> = (0..OPERAND).map(|bit| format!("{side}{bit}")).collect();
-        let mut clock = cell["connections"]["CLK0"][0].as_u64();
-        let mut data = Vec::with_capacity(OPERAND);
-        for pin in &pins {
+    /// Moves the registers of both operands in, or of none: place and route knows no timing of a multiplier that has one
+    /// of the two. A constant operand may be registered as well: until it stands there, the other one is zero.
+    fn operands(&mut self, cell: &mut Value) -> usize {
+        let [a, b] = SIDES.map(|side| self.data(cell, side));
+        let (Some(a), Some(b)) = (a, b) else { return 0 };
+        let (clock, moved) = match (a.clock, b.clock) {
+            (Some(a), Some(b)) if a != b => return 0,
+            (Some(clock), other) | (other, Some(clock)) => (clock, 1 + usize::from(other.is_some())),
+            (None, None) => return 0,
+        };
+        for (side, operand) in SIDES.into_iter().zip([a, b]) {
+            for (pin, data) in pins(side).zip(operand.data) {
+                self.users.add(&cell["connections"][&pin], -1);
+                cell["connections"][&pin] = json!([data]);
+                self.users.add(&cell["connections"][&pin], 1);
+            }
+            turn_on(cell, &format!("REG_INPUT{side}"), clock);
+        }
+        moved
+    }
+
+    /// What an operand's registers take in; `None` where not every bit comes from one, or from a constant.
+    fn data(&self, cell: &Value, side: &str) -> Option<Operand> {
+        let mut operand = Operand { clock: None, data: Vec::with_capacity(OPERAND) };
+        let mut ones = false;
+        for pin in pins(side) {
             let net = &cell["connections"][pin][0];
             let Some(number) = net.as_u64() else {
-                if net != "0" {
-                    return false;
-                }
-                data.push(net.clone());
+                ones |= net != "0";
+                operand.data.push(net.clone());
                 continue;
             };
-            match self.by_output.get(&number).filter(|register| !self.gone.contains(&register.cell)) {
-                Some(register) if *clock.get_or_insert(register.clock) == register.clock => {
-                    data.push(register.data.clone());
-                }
-                _ => return false,
+            let register = self.by_output.get(&number).filter(|register| !self.gone.contains(&register.cell))?;
+            if *operand.clock.get_or_insert(register.clock) != register.clock {
+                return None;
             }
+            operand.data.push(register.data.clone());
         }
-        let (Some(clock), true) = (clock, data.iter().any(Value::is_u64)) else { return false };
-        for (pin, data) in pins.iter().zip(data) {
-            self.users.add(&cell["connections"][pin], -1);
-            cell["connections"][pin] = json!([data]);
-            self.users.add(&cell["connections"][pin], 1);
-        }
-        turn_on(cell, &format!("REG_INPUT{side}"), clock);
-        true
+        // At the start a register is zero, a constant beside it is not.
+        (operand.clock.is_none() || !ones).then_some(operand)
     }
 
     /// Moves the registers of a product in.
@@ -249,7 +273,7 @@ mod tests {
         assert_eq!(multiplier["connections"]["P35"], json!([435]));
         assert_eq!(multiplier["connections"]["CLK0"], json!([1]));
         assert_eq!(multiplier["parameters"]["REG_INPUTA_CLK"], "CLK0");
-        assert!(multiplier["parameters"]["REG_INPUTB_CLK"].is_null());
+        assert_eq!(multiplier["parameters"]["REG_INPUTB_CLK"], "CLK0");
         assert_eq!(netlist["modules"]["t"]["cells"].as_object().unwrap().len(), 1);
     }
 
@@ -258,6 +282,15 @@ mod tests {
         let mut netlist = netlist("1 ", true);
         assert_eq!(absorb(&mut netlist, "t"), Absorbed { operands: 1, flip_flops: 17, ..Absorbed::default() });
         assert!(netlist["modules"]["t"]["cells"]["a0"].is_object());
+    }
+
+    #[test]
+    fn both_operands_move_or_none() {
+        let mut netlist = netlist("1 ", false);
+        // B's lowest bit comes straight from outside.
+        netlist["modules"]["t"]["cells"]["m"]["connections"]["B0"] = json!([500]);
+        assert_eq!(absorb(&mut netlist, "t"), Absorbed { products: 1, flip_flops: 36, ..Absorbed::default() });
+        assert!(netlist["modules"]["t"]["cells"]["m"]["parameters"]["REG_INPUTA_CLK"].is_null());
     }
 
     #[test]
