@@ -229,7 +229,7 @@ reg [{word_end}:0] memory [0:{words_end}];
 initial $readmemh(\"{MEMORY_FILE}\", memory);
 reg [{word_end}:0] word, coefficients;
 reg valid1, valid2, valid3, valid4;
-reg first1, first2, first3;
+reg first1, first2;
 reg last1, last2, last3, last4;
 reg [{row_end}:0] left;
 wire [{acc_word_end}:0] chain_head;
@@ -240,7 +240,7 @@ always @(posedge clk) begin
   valid2 <= !rst && valid1;
   valid3 <= !rst && valid2;
   valid4 <= !rst && valid3;
-  {{first3, first2, first1}} <= {{first2, first1, control[1]}};
+  {{first2, first1}} <= {{first1, control[1]}};
   {{last4, last3, last2, last1}} <= {{last3, last2, last1, control[2]}};
 end
 {align_registers}{count_group}always @(posedge clk) begin
@@ -260,6 +260,13 @@ generate
       reg signed [{m_end}:0] a, b;
       reg signed [{product_end}:0] product;
       reg [{acc_end}:0] aligned, accumulator, chain;
+      // Of its own: one register cannot drive the words of all lanes in a cycle. Synthesis is not to merge them.
+      reg adds, begins, leaves;
+      (* keep *) always @(posedge clk) begin
+        adds <= valid2;
+        begins <= first2;
+        leaves <= valid3 && last3;
+      end
       wire [{wide_end}:0] shifted = {shifted};
       wire unused = &{{1'b0, shifted}};
       assign chain_in[k * {acc_bits} +: {acc_bits}] = chain;
@@ -268,8 +275,8 @@ generate
         b <= operands[p * {M} +: {M}];
         product <= a * b;
         aligned <= {aligned};
-        if (valid3) accumulator <= first3 ? aligned : accumulator + aligned;
-        chain <= valid4 && last4 ? accumulator : chain_in[(k + 1) * {acc_bits} +: {acc_bits}];
+        if (adds) accumulator <= begins ? aligned : accumulator + aligned;
+        chain <= leaves ? accumulator : chain_in[(k + 1) * {acc_bits} +: {acc_bits}];
       end
     end
   end
