@@ -157,15 +157,6 @@ impl Matrices {
         Matrices::up_to(sensor, Medium::HalfSpace, mu_max, Inversion::EXACT, MAX_DEGREE)
     }
 
-    /// Computes the matrices of a (sub)array under any medium for shear ratios up to `mu_max` (0 to 2), of a degree
-    /// that the floating-point model has.
-    ///
-    /// # Errors
-    /// As [`Matrices::new`].
-    pub fn through(sensor: &Sensor, medium: Medium, mu_max: f64) -> Result<Matrices, MatricesError> {
-        Matrices::up_to(sensor, medium, mu_max, Inversion::EXACT, MAX_FLOAT_DEGREE)
-    }
-
     /// Computes the matrices of a subarray as its scene wants them, of a degree of at most `most`.
     ///
     /// # Errors

@@ -195,19 +195,22 @@ mod tests {
     use super::*;
     use crate::float::pass::Polynomial;
     use crate::generator::{generate, random_contacts, Draw, Shapes};
-    use crate::matrices::Matrices;
+    use crate::matrices::{Matrices, MAX_FLOAT_DEGREE};
     use crate::scene::Scene;
 
     #[test]
     fn several_ellipses_add_up_on_any_body() {
-        let sensor = Scene::builtin("sensor-3").unwrap().sensor;
+        let mut scene = Scene::builtin("sensor-3").unwrap();
+        let sensor = scene.sensor.clone();
         let draw = Draw { count: 2, shapes: Shapes::Elliptic, touching: false, seed: 3 };
         let contacts = random_contacts(&sensor, draw);
         for medium in [Medium::HalfSpace, Medium::BondedLayer { poisson: 0.48 }] {
             let frame = generate("two", &sensor, medium, &contacts).unwrap();
-            let (matrices, b) = (Matrices::through(&sensor, medium, 0.6).unwrap(), frame.stress_MPa.as_slice());
+            scene.medium = medium;
+            let matrices = Matrices::of(&scene, &sensor, MAX_FLOAT_DEGREE).unwrap();
+            let (b, mu_max) = (frame.stress_MPa.as_slice(), scene.search.mu_max);
             let family = Polynomial::new(&matrices, b);
-            let subject = Subject { sensor: &sensor, b, family: &family, mu_max: 0.6, noise_MPa: 0.0 };
+            let subject = Subject { sensor: &sensor, b, family: &family, mu_max, noise_MPa: 0.0 };
             let found = Patch::new(&sensor, medium).find(&subject).unwrap();
             let [tx, ty, load] = frame.resultant_N.unwrap();
             let off = (found.found.mu[0] - tx / load).hypot(found.found.mu[1] - ty / load);
