@@ -51,6 +51,11 @@ impl Errors {
             normal: axis(2).map(f64::abs),
         }
     }
+
+    /// X1, X2, X3 of Eq. 3.
+    pub fn axes(&self) -> [Option<f64>; 3] {
+        [self.x1, self.x2, self.x3]
+    }
 }
 
 #[cfg(test)]

@@ -9,6 +9,7 @@
 //! what they leave of [`BUDGET_US`].
 
 mod cases;
+mod csv;
 mod data;
 mod document;
 mod errors;

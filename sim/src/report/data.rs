@@ -2,6 +2,7 @@
 
 use serde_json::{json, Value};
 
+use super::csv::quoted;
 use super::document::{Cell, Document, Item, Picture, Section, Table};
 
 /// The document as Markdown; pictures are files beside it.
@@ -54,13 +55,6 @@ pub fn csv(table: &Table) -> String {
         })));
     }
     text
-}
-
-fn quoted(text: &str) -> String {
-    match text.contains([',', '"', '\n']) {
-        true => format!("\"{}\"", text.replace('"', "\"\"")),
-        false => text.to_owned(),
-    }
 }
 
 /// The document for programs.

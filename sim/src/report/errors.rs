@@ -4,6 +4,7 @@ use anyhow::Result;
 use dermis_golden::errors::Errors;
 use serde::Serialize;
 
+use super::csv::quoted;
 use super::table::{markdown, percent};
 use super::Format;
 use crate::compare::{median, quantile};
@@ -47,11 +48,8 @@ struct Medians {
     paper: Option<[f64; 3]>,
 }
 
-type Axis = fn(&Errors) -> Option<f64>;
-const AXES: [Axis; 3] = [|e| e.x1, |e| e.x2, |e| e.x3];
-
 fn axes(errors: Option<&Errors>) -> [Option<f64>; 3] {
-    AXES.map(|axis| errors.and_then(axis))
+    errors.map_or([None; 3], Errors::axes)
 }
 
 fn medians(lines: &[Line]) -> Vec<Medians> {
@@ -66,8 +64,8 @@ fn medians(lines: &[Line]) -> Vec<Medians> {
             scene: group[0].scene.clone(),
             case: group[0].case.clone(),
             frames: group.len(),
-            axes: AXES.map(|axis| over(&|line| Some(axis(line.error.as_ref()?)?.abs()))),
-            axes_case_0: AXES.map(|axis| over(&|line| Some(axis(line.error_case_0.as_ref()?)?.abs()))),
+            axes: [0, 1, 2].map(|k| over(&|line| Some(axes(line.error.as_ref())[k]?.abs()))),
+            axes_case_0: [0, 1, 2].map(|k| over(&|line| Some(axes(line.error_case_0.as_ref())[k]?.abs()))),
             tangential: over(&tangential),
             tangential_ninety: ninety(&tangential),
             normal: over(&normal),
@@ -210,15 +208,6 @@ fn csv(lines: &[Line]) -> String {
         text.push_str(&format!("{scene},{case},{taken},{frame},{numbers},{both},{condition},{mus},{own}\n"));
     }
     text
-}
-
-/// A name as a CSV field.
-fn quoted(name: &str) -> String {
-    if name.contains([',', '"', '\n', '\r']) {
-        format!("\"{}\"", name.replace('"', "\"\""))
-    } else {
-        name.to_owned()
-    }
 }
 
 #[cfg(test)]

@@ -5,7 +5,7 @@ use dermis_golden::flags::Flag;
 use dermis_golden::stability::extreme::{Outcome, Row};
 use serde_json::json;
 
-use super::stability::quoted;
+use super::csv::quoted;
 use super::table::{aligned, percent};
 use super::Format;
 

@@ -4,6 +4,7 @@ use anyhow::Result;
 use dermis_golden::scene::Medium;
 use dermis_golden::stability::{Figures, Row};
 
+use super::csv::quoted;
 use super::table::{aligned, percent};
 use super::Format;
 
@@ -145,11 +146,6 @@ fn csv(rows: &[Row]) -> String {
         text.push_str(&(fields.join(",") + "\n"));
     }
     text
-}
-
-/// A field of a CSV line that may hold commas.
-pub(super) fn quoted(text: &str) -> String {
-    format!("\"{}\"", text.replace('"', "\"\""))
 }
 
 #[cfg(test)]

@@ -9,9 +9,6 @@ use super::super::document::{median_percent, none, percent, seconds, words, Cell
 use super::super::measure::{Engine, Measured};
 use super::{case_text, find};
 
-type Axis = fn(&Errors) -> Option<f64>;
-const AXES: [Axis; 3] = [|e| e.x1, |e| e.x2, |e| e.x3];
-
 /// The section.
 pub fn published(measured: &[Measured]) -> Section {
     Section {
@@ -53,7 +50,7 @@ pub(super) fn table_two(measured: &[Measured]) -> Table {
         let mut row = vec![words(m.scene.name.clone()), words(case_text(m.scene.partition.case))];
         row.extend(paper.map(|x| percent(Some(x))));
         for errors in [m.errors(Engine::Golden), to_whole, m.errors(Engine::Fixed)] {
-            row.extend(AXES.map(|axis| median_percent(errors.iter().map(|e| axis(e.as_ref()?).map(f64::abs)))));
+            row.extend((0..3).map(|k| median_percent(errors.iter().map(|e| e.as_ref()?.axes()[k].map(f64::abs)))));
         }
         Some(row)
     });
