@@ -1,7 +1,8 @@
 //! Stability: what each number format keeps of a scene, from the condition of its Cz to the error of its forces.
 //!
 //! Two frames of known forces, a Hertz pressure p of 1 N, their stress in extended precision ([`extended`]): b₀ without
-//! shear, b with the shear μ p. Nothing but the inverse and the arithmetic stands between them and the truth.
+//! shear, b with the shear μ p. Nothing but the inverse and the arithmetic stands between them and the truth. The table's
+//! last lines take p, μ and b from [`references`], computed elsewhere with 50 digits; their b₀ is [`extended`]'s.
 //!
 //! ```text
 //! forward     ‖Cz⁺b₀ − p‖/‖p‖              in double, single, fixed point
@@ -24,7 +25,7 @@ mod single;
 mod tests;
 mod truth;
 
-pub use settings::{settings, Setting, MU_MAX};
+pub use settings::{references, settings, Setting, MU_MAX};
 
 use crate::fixed::Model;
 use crate::float::force::force;
@@ -106,8 +107,9 @@ pub struct Row {
 /// Measures one rectangle of a scene's partition; refusals are part of the row.
 ///
 /// # Errors
-/// A partition that does not divide the array, or has no equal rectangles.
-pub fn measure(group: &str, scene: &Scene) -> Result<Row, GoldenError> {
+/// A partition that does not divide the array, or has no equal rectangles; a frame that is not the scene's.
+pub fn measure(setting: &Setting) -> Result<Row, GoldenError> {
+    let Setting { group, scene, frame } = setting;
     let case = Some(scene.partition.case).filter(|case| case.grid().is_some()).unwrap_or(Case::WHOLE);
     let shape = subarrays(case, &scene.sensor)?[0].sensor(&scene.sensor);
     let mut scene = scene.clone();
@@ -116,7 +118,7 @@ pub fn measure(group: &str, scene: &Scene) -> Result<Row, GoldenError> {
     (scene.input, scene.threshold.min_force_N) = (Default::default(), 0.0);
     let rule = scene.inversion();
     let mut row = Row {
-        group: group.to_string(),
+        group: group.clone(),
         sensor: scene.sensor.clone(),
         medium: scene.medium,
         inverse: rule.kind.name(),
@@ -130,18 +132,17 @@ pub fn measure(group: &str, scene: &Scene) -> Result<Row, GoldenError> {
         fixed_refused: None,
     };
     match Golden::new(&scene) {
-        Ok(golden) => fill(&mut row, &scene, &golden)?,
+        Ok(golden) => fill(&mut row, &scene, &golden, &Truth::of(&scene, frame.as_ref()))?,
         Err(error) => row.refused = Some(error.to_string()),
     }
     Ok(row)
 }
 
 /// The row of a scene that the golden model takes.
-fn fill(row: &mut Row, scene: &Scene, golden: &Golden) -> Result<(), GoldenError> {
+fn fill(row: &mut Row, scene: &Scene, golden: &Golden, truth: &Truth) -> Result<(), GoldenError> {
     let matrices = golden.matrices();
     let Matrices { condition, rank, gain, spectral_radius: radius, degree, .. } = *matrices;
     row.spectrum = Some(Spectrum { condition, rank, gain, radius, degree });
-    let truth = Truth::new(scene);
     let normal_only = Polynomial::of_degree(matrices, &truth.unsheared.stress_MPa, 0);
     let forces = golden.run(&truth.sheared)?.forces_N;
     let forward = truth.forward(normal_only.v(0, 0));
@@ -153,9 +154,9 @@ fn fill(row: &mut Row, scene: &Scene, golden: &Golden) -> Result<(), GoldenError
     ));
     match Model::unfitted(scene).and_then(|model| model.reconstruct(&truth.sheared)) {
         Ok(result) => {
-            let own = fixed_forward(scene, &truth, scene.fixed.input_bits);
+            let own = fixed_forward(scene, truth, scene.fixed.input_bits);
             row.fixed = own.map(|forward| truth.figures(matrices, forward, &result.forces_N));
-            row.bits = bits(scene, &truth, forward + BITS_ADD);
+            row.bits = bits(scene, truth, forward + BITS_ADD);
         }
         Err(error) => row.fixed_refused = Some(error.to_string()),
     }

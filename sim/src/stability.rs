@@ -56,13 +56,13 @@ pub fn run(arguments: &Arguments) -> Result<String> {
         [] => settings(),
         names => names
             .iter()
-            .map(|name| Ok(Setting { group: name.clone(), scene: Scene::load(name)? }))
+            .map(|name| Ok(Setting::new(name, Scene::load(name)?)))
             .collect::<Result<_>>()?,
     };
     let bar = Progress::steps("stability", wanted.len() as u64);
     let mut rows = Vec::with_capacity(wanted.len());
-    for Setting { group, scene } in &wanted {
-        rows.push(measure(group, scene)?);
+    for setting in &wanted {
+        rows.push(measure(setting)?);
         bar.at(rows.len() as u64);
     }
     drop(bar);

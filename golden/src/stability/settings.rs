@@ -6,14 +6,24 @@
 //! | `poisson` | 8×8 | 1×1 mm | 1, 3 mm | bonded layer, ν 0.3 … 0.4999 |
 //! | `size` | 2×2 … 48×48 | 1×1 mm | 2 mm | |
 //! | `pitches` | 8×8 | 1:100 … 100:1 | 2 mm | |
+//! | `50 digits` | 8×8 | 1×1 mm | 1, 3, 5, 10 mm | stress computed elsewhere with 50 digits, `data/reference` |
 //!
 //! mu_max is [`MU_MAX`], for which every series converges within the hardware's degree; all else is a scene's default.
 
+use crate::frame::Frame;
 use crate::scene::{InverseKind, Medium, Scene};
 use crate::sensor::Sensor;
 
 /// Search range of the table's scenes.
 pub const MU_MAX: f64 = 0.4;
+
+/// Frames of known forces and shear whose stress was computed elsewhere with 50 digits.
+const REFERENCES: [(&str, &str); 4] = [
+    ("stiff-8x8-h1.json", include_str!("../../data/reference/stiff-8x8-h1.json")),
+    ("stiff-8x8-h3.json", include_str!("../../data/reference/stiff-8x8-h3.json")),
+    ("stiff-8x8-h5.json", include_str!("../../data/reference/stiff-8x8-h5.json")),
+    ("stiff-8x8-h10.json", include_str!("../../data/reference/stiff-8x8-h10.json")),
+];
 
 /// One scene of the table.
 #[derive(Clone, Debug)]
@@ -22,6 +32,15 @@ pub struct Setting {
     pub group: String,
     /// The scene.
     pub scene: Scene,
+    /// Known forces with their stress under one shear; without them the Hertz pressure of the table's own truth.
+    pub frame: Option<Frame>,
+}
+
+impl Setting {
+    /// A scene on the table's own pressure.
+    pub fn new(group: impl Into<String>, scene: Scene) -> Setting {
+        Setting { group: group.into(), scene, frame: None }
+    }
 }
 
 /// All scenes of the table, in its order.
@@ -34,7 +53,7 @@ pub fn settings() -> Vec<Setting> {
         scene.search.mu_max = MU_MAX;
         scene.medium = medium;
         scene.inverse.kind = kind;
-        all.push(Setting { group: group.to_string(), scene });
+        all.push(Setting::new(group, scene));
     };
     let (half_space, tsvd) = (Medium::HalfSpace, InverseKind::Tsvd);
     for h in [0.1, 0.2, 0.5, 1.0, 2.0, 3.0, 5.0, 7.0, 10.0] {
@@ -55,5 +74,16 @@ pub fn settings() -> Vec<Setting> {
     for pitch in [[10.0, 1.0], [1.0, 10.0], [100.0, 1.0], [1.0, 100.0], [0.2, 5.0], [5.0, 0.2]] {
         add("pitches", [8, 8], pitch, 2.0, half_space, tsvd);
     }
+    all.extend(references().into_iter().map(|frame| {
+        let mut scene = Scene::of_sensor(&frame.sensor, "50 digits");
+        scene.search.mu_max = MU_MAX;
+        Setting { frame: Some(frame), ..Setting::new("50 digits", scene) }
+    }));
     all
+}
+
+/// The frames of [`REFERENCES`].
+pub fn references() -> Vec<Frame> {
+    let read = |(name, text)| Frame::parse(name, text, None).expect("a file of this crate");
+    REFERENCES.into_iter().map(read).collect()
 }

@@ -7,6 +7,7 @@
 //! | | shape | unit |
 //! |---|---|---|
 //! | in: scene | sensor, medium, mu_max | mm |
+//! | in: frame | known forces and their stress under one shear, if made elsewhere | N, MPa |
 //! | out: two frames | taxels | MPa, forces in N |
 
 use super::{extended, Figures};
@@ -32,8 +33,15 @@ pub(super) struct Truth {
 }
 
 impl Truth {
-    /// The frames of a scene.
-    pub(super) fn new(scene: &Scene) -> Truth {
+    /// The frames of a setting: its own known forces, else the Hertz pressure.
+    pub(super) fn of(scene: &Scene, known: Option<&Frame>) -> Truth {
+        let forces = known.and_then(|frame| Some((frame, frame.cell_forces_N.as_ref()?)));
+        let Some((frame, forces)) = forces else { return Truth::hertz(scene) };
+        let p = forces.fz.clone();
+        Truth { unsheared: made(scene, "normal", &p, [0.0; 2]), sheared: frame.clone(), p }
+    }
+
+    fn hertz(scene: &Scene) -> Truth {
         let sensor = &scene.sensor;
         let along =
             |steps: usize, count: usize, place: f64| ((steps as f64 + 0.5) / count as f64 - 0.5 - place) / HALF_AXIS;
@@ -46,23 +54,7 @@ impl Truth {
         let sum: f64 = raw.iter().sum();
         let p: Vec<f64> = raw.iter().map(|p| p / sum).collect();
         let mu = SHEAR.map(|share| share * scene.search.mu_max);
-        let frame = |id: &str, mu: [f64; 2]| {
-            let forces = force(&p, mu, 0.0);
-            let stress_MPa = extended::stress_MPa(sensor, scene.medium, &p, mu);
-            Frame {
-                id: id.to_string(),
-                medium: Some(scene.medium),
-                source: Some("cell model, extended precision".to_string()),
-                sensor: sensor.clone(),
-                contacts: Vec::new(),
-                resultant_N: Some(forces.resultant()),
-                cell_forces_N: Some(forces),
-                stress_MPa,
-                notes: None,
-            }
-        };
-        let (sheared, unsheared) = (frame("sheared", mu), frame("normal", [0.0; 2]));
-        Truth { p, sheared, unsheared }
+        Truth { sheared: made(scene, "sheared", &p, mu), unsheared: made(scene, "normal", &p, [0.0; 2]), p }
     }
 
     /// ‖p̂ − p‖/‖p‖ of found forces p̂.
@@ -85,6 +77,22 @@ impl Truth {
             normal: errors.and_then(|errors| errors.normal),
             tangential: errors.and_then(|errors| errors.tangential),
         }
+    }
+}
+
+/// The frame of known forces.
+fn made(scene: &Scene, id: &str, p: &[f64], mu: [f64; 2]) -> Frame {
+    let forces = force(p, mu, 0.0);
+    Frame {
+        id: id.to_string(),
+        medium: Some(scene.medium),
+        source: Some("cell model, extended precision".to_string()),
+        sensor: scene.sensor.clone(),
+        contacts: Vec::new(),
+        resultant_N: Some(forces.resultant()),
+        cell_forces_N: Some(forces),
+        stress_MPa: extended::stress_MPa(&scene.sensor, scene.medium, p, mu),
+        notes: None,
     }
 }
 

@@ -153,14 +153,14 @@ mod tests {
     use super::super::read;
     use super::*;
     use dermis_golden::scene::Scene;
-    use dermis_golden::stability::measure;
+    use dermis_golden::stability::{measure, Setting};
 
     fn rows() -> Vec<Row> {
         let scene = Scene::builtin("eight-by-eight").unwrap();
         let mut wide = scene.clone();
         wide.sensor.thickness_mm = 40.0;
         wide.search.mu_max = 2.0;
-        vec![measure("a, \"b\"", &scene).unwrap(), measure("wide", &wide).unwrap()]
+        [("a, \"b\"", scene), ("wide", wide)].map(|(group, scene)| measure(&Setting::new(group, scene)).unwrap()).to_vec()
     }
 
     #[test]

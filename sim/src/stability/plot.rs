@@ -69,11 +69,11 @@ fn draw(rows: &[Row], largest: f64, text: &mut String) -> Result<(), Box<dyn std
 mod tests {
     use super::*;
     use dermis_golden::scene::Scene;
-    use dermis_golden::stability::measure;
+    use dermis_golden::stability::{measure, Setting};
 
     #[test]
     fn every_format_has_its_marks() {
-        let rows = [measure("s", &Scene::builtin("eight-by-eight").unwrap()).unwrap()];
+        let rows = [measure(&Setting::new("s", Scene::builtin("eight-by-eight").unwrap())).unwrap()];
         let text = svg(&rows).unwrap();
         assert!(text.starts_with("<svg") && text.trim_end().ends_with("</svg>"));
         for (_, RGBColor(r, g, b), _) in FORMATS {
