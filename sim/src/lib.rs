@@ -25,6 +25,7 @@
 //! | [`report`] | tables and the JSON contract; `dermis report`, measured and drawn |
 //! | [`host`] | frames to a board over a serial port, forces back |
 //! | [`stability`] | `dermis stability`: errors against condition, extreme frames |
+//! | [`mod@tried`] | what long runs have tried, kept for the report |
 //! | [`mod@write`] | files whole or not at all |
 //! | [`inputs`] | scene and frames from what the command line names |
 //! | [`mod@waves`] | a run as a waveform file |
@@ -53,6 +54,7 @@ mod progress;
 pub mod report;
 pub mod stability;
 pub mod tabulate;
+pub mod tried;
 pub mod verify;
 pub mod verilator;
 pub mod waves;

@@ -41,6 +41,7 @@ pub use needs::{features, resources};
 pub use noise::noise;
 pub use result::{difference, reconstruction};
 pub use run::{run, Arguments};
+pub use sections::stability_picture;
 pub use stability::stability;
 pub use table::{cosim, scenes};
 

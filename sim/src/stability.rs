@@ -7,8 +7,6 @@
 //! | `--extreme` | the extreme frames of each scene, by default sensor-1 |
 //! | `--plot FILE` | besides, condition against error as SVG |
 
-mod plot;
-
 use std::path::PathBuf;
 
 use anyhow::Result;
@@ -54,10 +52,7 @@ pub fn run(arguments: &Arguments) -> Result<String> {
     }
     let wanted = match arguments.scenes.as_slice() {
         [] => settings(),
-        names => names
-            .iter()
-            .map(|name| Ok(Setting::new(name, Scene::load(name)?)))
-            .collect::<Result<_>>()?,
+        names => names.iter().map(|name| Ok(Setting::new(name, Scene::load(name)?))).collect::<Result<_>>()?,
     };
     let bar = Progress::steps("stability", wanted.len() as u64);
     let mut rows = Vec::with_capacity(wanted.len());
@@ -67,7 +62,7 @@ pub fn run(arguments: &Arguments) -> Result<String> {
     }
     drop(bar);
     if let Some(path) = &arguments.plot {
-        write(path, plot::svg(&rows)?.as_bytes())?;
+        write(path, report::stability_picture(&rows)?.as_bytes())?;
     }
     report::stability(&rows, arguments.format)
 }

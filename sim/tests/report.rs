@@ -64,6 +64,26 @@ fn all_forms_say_the_same() {
     let simulated: Vec<&Value> = rows.iter().filter(|row| row[at("RTL = bit-true")] == "yes").collect();
     assert_eq!(simulated.len(), 1);
 
+    // Condition against error: the normal error stays within 1 % up to a condition of 10⁶, within 5 % beyond.
+    let (head, rows) = table(&report, "stability");
+    let at = |name: &str| head.iter().position(|head| *head == name).unwrap();
+    assert_eq!(rows.iter().filter(|row| row[at("varied")] == "50 digits").count(), 4);
+    for row in rows {
+        let most = if row[at("condition")].as_f64().unwrap() <= 1e6 { 0.01 } else { 0.05 };
+        for column in [at("e_n f64"), at("e_n f64") + 1, at("e_n f64") + 2] {
+            assert!(row[column].as_f64().unwrap() <= most, "{row}");
+        }
+    }
+    // Extreme frames with what both models and the status words say of them.
+    let (head, rows) = table(&report, "extremes-eight-by-eight");
+    let at = |name: &str| head.iter().position(|head| *head == name).unwrap();
+    let zero = rows.iter().find(|row| row[at("frame")] == "zero").unwrap();
+    assert_eq!(
+        (&zero[at("flags")], &zero[at("status")]),
+        (&"no-contact, condition-unmet".into(), &"no-contact".into())
+    );
+    assert!(rows.len() >= 24);
+
     // A file for each table and picture, and none of an earlier run.
     let items = || report["sections"].as_array().unwrap().iter().flat_map(|s| s["items"].as_array().unwrap());
     let tables = items().filter_map(|item| item["table"].as_str());

@@ -37,7 +37,8 @@ pub fn path_of_table(document: &Document, id: &str) -> String {
     format!("{}-tables/{id}.csv", document.name)
 }
 
-fn markdown(table: &Table) -> String {
+/// A table as Markdown, numbers to the right.
+pub fn markdown(table: &Table) -> String {
     let texts = (0..table.head.len()).take_while(|column| !table.is_number(*column)).count();
     let rows = table.rows.iter().map(|row| row.iter().map(|cell| cell.shown.clone()).collect());
     super::table::aligned(texts, &table.head, rows.collect())

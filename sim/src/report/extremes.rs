@@ -1,4 +1,4 @@
-//! The extreme frames of `dermis stability --extreme` as Markdown, CSV and JSON.
+//! The extreme frames of `dermis stability --extreme` as Markdown, CSV and JSON, and for the report.
 
 use anyhow::Result;
 use dermis_golden::flags::Flag;
@@ -6,12 +6,17 @@ use dermis_golden::stability::extreme::{Outcome, Row};
 use serde_json::json;
 
 use super::csv::quoted;
-use super::table::{aligned, percent};
+use super::data::markdown;
+use super::document::{percent, words, Table};
 use super::Format;
 
 /// First line of the CSV.
 const HEAD: &str = "scene,frame,golden_x,golden_y,golden_n,golden_flags,fixed_x,fixed_y,fixed_n,fixed_flags,status,\
                     refused\n";
+
+/// What the columns are.
+const LEGEND: &str =
+    "Forces in N, x, y, normal; e_t, e_n: against the whole load; status: the flags of the hardware's own status words";
 
 /// The extreme frames of scenes, one table each.
 ///
@@ -39,17 +44,16 @@ pub fn extremes(all: &[(String, Vec<Row>)], format: Format) -> Result<String> {
         }
         Format::Markdown => {
             for (scene, rows) in all {
-                text.push_str(&format!("{scene}\n\n{}", extreme_text(rows)));
+                text.push_str(&format!("{scene}\n\n{}", markdown(&extremes_table(scene, rows))));
             }
-            text.push_str(
-                "\nforces in N, [x, y, normal]; e_t, e_n: against the whole load; status: the hardware's own flags\n",
-            );
+            text.push_str(&format!("\n{LEGEND}\n"));
         }
     }
     Ok(text)
 }
 
-fn extreme_text(rows: &[Row]) -> String {
+/// The extreme frames of one scene.
+pub(super) fn extremes_table(scene: &str, rows: &[Row]) -> Table {
     let head = [
         "frame",
         "golden, N",
@@ -62,25 +66,25 @@ fn extreme_text(rows: &[Row]) -> String {
         "e_n golden",
         "e_n fixed",
     ];
-    let force = |o: &Outcome| o.resultant_N.map(|f| format!("{f:.3e}")).join(", ");
+    let force = |o: &Outcome| words(o.resultant_N.map(|f| format!("{f:.3e}")).join(", "));
     let lines = rows.iter().map(|row| {
         let fixed = row.fixed.as_ref();
         let error = |outcome: Option<&Outcome>, k: usize| percent(outcome.and_then(|outcome| outcome.errors[k]));
         let golden = Some(&row.golden);
         vec![
-            row.frame.clone(),
+            words(row.frame.clone()),
             force(&row.golden),
-            names(&row.golden.flags),
-            fixed.map_or_else(|| "refused".into(), force),
-            fixed.map_or_else(|| row.refused.clone().unwrap_or_default(), |fixed| names(&fixed.flags)),
-            row.status.clone(),
+            words(names(&row.golden.flags)),
+            fixed.map_or_else(|| words("refused"), force),
+            words(fixed.map_or_else(|| row.refused.clone().unwrap_or_default(), |fixed| names(&fixed.flags))),
+            words(row.status.clone()),
             error(golden, 0),
             error(fixed, 0),
             error(golden, 1),
             error(fixed, 1),
         ]
     });
-    aligned(6, &head, lines.collect())
+    Table::new(format!("extremes-{scene}"), format!("{scene}. {LEGEND}"), &head, lines.collect())
 }
 
 /// Flags as in JSON, separated by commas.

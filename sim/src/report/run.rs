@@ -9,12 +9,14 @@ use dermis_golden::partition::Case;
 use dermis_golden::scene::{Condition, Scene};
 
 use super::document::{Document, Section};
-use super::measure::{clock, machine, measure, sweep, Kind, Measured, Options, SweepPoint};
+use super::measure::{self, clock, machine, measure, sweep, Kind, Measured, Options, SweepPoint};
 use super::save::save;
 use super::sections::{
-    choice, choose, fields, frames, paper, published, ratios, resources, search, stages, sweeps, time, Choice,
+    choice, choose, extremes, fields, frames, paper, published, ratios, resources, search, stability, stages, sweeps,
+    time, tried, Choice,
 };
 use crate::jobs::Interrupt;
+use crate::tried::Tried;
 
 /// Drawn frames of a sweep, beside the shipped ones; quick and full.
 const SWEEP_FRAMES: [u32; 2] = [0, 24];
@@ -102,7 +104,10 @@ fn sections(measured: &[Measured], options: &Options) -> Result<Vec<Section>> {
         search(measured)?,
         ratios(measured)?,
         sweeps(&all_sweeps(measured, &choices, options)?)?,
+        stability(&measure::conditions(options)?)?,
+        extremes(&measure::extremes(measured, options)?),
         resources(measured, &choices, options)?,
+        tried(&Tried::all(&options.build)?),
     ])
 }
 
@@ -147,7 +152,8 @@ fn intro(measured: &[Measured], options: &Options) -> Vec<String> {
     }
     intro.push(
         "Frames are those shipped in golden/data/frames, with known forces; every figure was measured in this run, \
-         but for the published ones, which stand in golden/data/paper."
+         but for the published ones, which stand in golden/data/paper, and the counts of inputs tried, which long runs \
+         have left in the build folder."
             .into(),
     );
     intro

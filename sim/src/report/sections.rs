@@ -7,9 +7,11 @@ mod published;
 mod ratios;
 mod resources;
 mod search;
+mod stability;
 mod stages;
 mod sweeps;
 mod time;
+mod tried;
 
 pub use choice::{choice, choose, frames, Choice};
 pub use fields::fields;
@@ -18,9 +20,11 @@ pub use published::published;
 pub use ratios::ratios;
 pub use resources::resources;
 pub use search::search;
+pub use stability::{extremes, stability, stability_picture};
 pub use stages::stages;
 pub use sweeps::sweeps;
 pub use time::time;
+pub use tried::tried;
 
 use dermis_golden::frame::Frame;
 use dermis_golden::partition::Case;

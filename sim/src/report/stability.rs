@@ -1,11 +1,12 @@
-//! The table of `dermis stability` as Markdown, CSV and JSON.
+//! The table of `dermis stability` as Markdown, CSV and JSON, and for the report.
 
 use anyhow::Result;
 use dermis_golden::scene::Medium;
-use dermis_golden::stability::{Figures, Row};
+use dermis_golden::stability::{Figures, Row, Spectrum};
 
 use super::csv::quoted;
-use super::table::{aligned, percent};
+use super::data::markdown;
+use super::document::{decimal, none, percent, words, Cell, Table};
 use super::Format;
 
 /// Condition against error, one line per scene. Fractions in CSV and JSON, percent in Markdown.
@@ -20,19 +21,30 @@ pub fn stability(rows: &[Row], format: Format) -> Result<String> {
     })
 }
 
-/// A figure for people: a power of ten with two digits.
-fn short(value: Option<f64>) -> String {
-    value.map_or("-".into(), |value| format!("{value:.1e}"))
-}
-
-fn medium(medium: Medium) -> String {
-    match medium {
-        Medium::HalfSpace => "half-space".into(),
-        Medium::BondedLayer { poisson } => format!("layer, ν {poisson}"),
-    }
-}
+/// What the columns are.
+const LEGEND: &str = "rank: Σ λ f(λ); gain: ‖Cz⁺‖ in N/MPa; r: spectral radius at mu_max; forward: ‖Cz⁺b − p‖/‖p‖ \
+                      without shear; residual: ‖b − C x‖/‖b‖; e_n, e_t: errors of the resultant with shear; bits: least \
+                      input bits for a forward error within 1 % of f64's; –: refused, or none";
 
 fn text(rows: &[Row]) -> String {
+    let mut text = format!("{}\n{LEGEND}\n", markdown(&stability_table(rows)));
+    refusals(rows).iter().for_each(|reason| text.push_str(&format!("- {reason}\n")));
+    text
+}
+
+/// Why there are no figures, each reason once.
+pub(super) fn refusals(rows: &[Row]) -> Vec<&String> {
+    let mut reasons: Vec<&String> = Vec::new();
+    for reason in rows.iter().flat_map(|row| row.refused.iter().chain(&row.fixed_refused)) {
+        if !reasons.contains(&reason) {
+            reasons.push(reason);
+        }
+    }
+    reasons
+}
+
+/// Condition against error, one line per scene.
+pub(super) fn stability_table(rows: &[Row]) -> Table {
     let head = [
         "varied",
         "taxels",
@@ -57,53 +69,50 @@ fn text(rows: &[Row]) -> String {
         "fixed",
         "bits",
     ];
-    let mut notes: Vec<&String> = Vec::new();
-    let lines = rows.iter().map(|row| {
-        for note in row.refused.iter().chain(&row.fixed_refused) {
-            if !notes.contains(&note) {
-                notes.push(note);
-            }
-        }
-        let sensor = &row.sensor;
-        let of = |figures: Option<Figures>, pick: fn(&Figures) -> f64| short(figures.as_ref().map(pick));
-        let error =
-            |figures: Option<Figures>, pick: fn(&Figures) -> Option<f64>| percent(figures.as_ref().and_then(pick));
-        let spectrum = |pick: &dyn Fn(&dermis_golden::stability::Spectrum) -> String| {
-            row.spectrum.as_ref().map_or("-".into(), pick)
-        };
-        vec![
-            row.group.clone(),
-            format!("{}×{}", sensor.rows, sensor.cols),
-            format!("{}×{}", sensor.pitch_x_mm, sensor.pitch_y_mm),
-            sensor.thickness_mm.to_string(),
-            medium(row.medium),
-            row.inverse.to_owned(),
-            spectrum(&|s| format!("{:.1e}", s.condition)),
-            spectrum(&|s| format!("{:.0}", s.rank)),
-            spectrum(&|s| format!("{:.1e}", s.gain)),
-            spectrum(&|s| format!("{:.3}", s.radius)),
-            spectrum(&|s| s.degree.to_string()),
-            of(row.double, |f| f.forward),
-            of(row.single, |f| f.forward),
-            of(row.fixed, |f| f.forward),
-            of(row.double, |f| f.residual),
-            of(row.fixed, |f| f.residual),
-            error(row.double, |f| f.normal),
-            error(row.single, |f| f.normal),
-            error(row.fixed, |f| f.normal),
-            error(row.double, |f| f.tangential),
-            error(row.fixed, |f| f.tangential),
-            row.bits.map_or("-".into(), |bits| bits.to_string()),
-        ]
-    });
-    let mut text = aligned(6, &head, lines.collect());
-    text.push_str(
-        "\nrank: Σ λ f(λ); gain: ‖Cz⁺‖ in N/MPa; r: spectral radius at mu_max; forward: ‖Cz⁺b − p‖/‖p‖ without shear; \
-         residual: ‖b − C x‖/‖b‖;\ne_n, e_t: errors of the resultant with shear; bits: least input bits for a forward \
-         error within 1 % of f64's; -: refused, or none\n",
-    );
-    notes.iter().for_each(|note| text.push_str(&format!("- {note}\n")));
-    text
+    Table::new("stability", format!("Every scene. {LEGEND}"), &head, rows.iter().map(line).collect())
+}
+
+fn line(row: &Row) -> Vec<Cell> {
+    let sensor = &row.sensor;
+    let of = |figures: Option<Figures>, pick: fn(&Figures) -> f64| short(figures.as_ref().map(pick));
+    let error = |figures: Option<Figures>, pick: fn(&Figures) -> Option<f64>| percent(figures.as_ref().and_then(pick));
+    let spectrum = |pick: fn(&Spectrum) -> f64| row.spectrum.as_ref().map(pick);
+    vec![
+        words(row.group.clone()),
+        words(format!("{}×{}", sensor.rows, sensor.cols)),
+        words(format!("{}×{}", sensor.pitch_x_mm, sensor.pitch_y_mm)),
+        words(sensor.thickness_mm.to_string()),
+        words(medium(row.medium)),
+        words(row.inverse),
+        short(spectrum(|s| s.condition)),
+        decimal(spectrum(|s| s.rank), 0),
+        short(spectrum(|s| s.gain)),
+        decimal(spectrum(|s| s.radius), 3),
+        decimal(spectrum(|s| s.degree as f64), 0),
+        of(row.double, |f| f.forward),
+        of(row.single, |f| f.forward),
+        of(row.fixed, |f| f.forward),
+        of(row.double, |f| f.residual),
+        of(row.fixed, |f| f.residual),
+        error(row.double, |f| f.normal),
+        error(row.single, |f| f.normal),
+        error(row.fixed, |f| f.normal),
+        error(row.double, |f| f.tangential),
+        error(row.fixed, |f| f.tangential),
+        decimal(row.bits.map(f64::from), 0),
+    ]
+}
+
+/// A power of ten with two digits.
+fn short(value: Option<f64>) -> Cell {
+    value.map_or_else(none, |value| Cell { shown: format!("{value:.1e}"), number: Some(value) })
+}
+
+fn medium(medium: Medium) -> String {
+    match medium {
+        Medium::HalfSpace => "half-space".into(),
+        Medium::BondedLayer { poisson } => format!("layer, ν {poisson}"),
+    }
 }
 
 fn csv(rows: &[Row]) -> String {
@@ -160,7 +169,9 @@ mod tests {
         let mut wide = scene.clone();
         wide.sensor.thickness_mm = 40.0;
         wide.search.mu_max = 2.0;
-        [("a, \"b\"", scene), ("wide", wide)].map(|(group, scene)| measure(&Setting::new(group, scene)).unwrap()).to_vec()
+        [("a, \"b\"", scene), ("wide", wide)]
+            .map(|(group, scene)| measure(&Setting::new(group, scene)).unwrap())
+            .to_vec()
     }
 
     #[test]

@@ -1,0 +1,37 @@
+//! Stability: the table's scenes and the extreme frames, for the report.
+
+use anyhow::Result;
+use dermis_golden::partition::Case;
+use dermis_golden::scene::InverseKind;
+use dermis_golden::stability::{self, extreme, settings, Setting};
+
+use super::jobs::parallel;
+use super::{Measured, Options};
+
+/// Most taxels of a scene whose extreme frames are shown: each frame has a model of its own.
+const EXTREME_TAXELS: usize = 100;
+
+/// Condition against error; the quick variant keeps the thicknesses with the default inverse and the 50 digits.
+///
+/// # Errors
+/// An interruption.
+pub fn conditions(options: &Options) -> Result<Vec<stability::Row>> {
+    let short = |setting: &Setting| {
+        setting.frame.is_some() || setting.group == "thickness" && setting.scene.inverse.kind == InverseKind::default()
+    };
+    let wanted = settings().into_iter().filter(|setting| !options.quick || short(setting)).collect();
+    parallel("stability", wanted, options, |setting| Ok(stability::measure(&setting)?))
+}
+
+/// What both models make of the extreme frames of the small scenes, by name; the quick variant takes the first.
+///
+/// # Errors
+/// A scene that the golden model refuses, an interruption.
+pub fn extremes(measured: &[Measured], options: &Options) -> Result<Vec<(String, Vec<extreme::Row>)>> {
+    let small = |m: &&Measured| m.scene.partition.case == Case::WHOLE && m.scene.sensor.taxels() <= EXTREME_TAXELS;
+    let wanted: Vec<_> = measured.iter().filter(small).take(if options.quick { 1 } else { usize::MAX }).collect();
+    parallel("extreme frames", wanted, options, |m| {
+        let rows = extreme::frames(&m.scene)?.iter().map(extreme::outcome).collect::<Result<_, _>>()?;
+        Ok((m.scene.name.clone(), rows))
+    })
+}

@@ -1,0 +1,125 @@
+//! Tried: how much a long run has tried and what it found, kept in the build folder for the report.
+//!
+//! ```text
+//! make fuzz ─> build/tried/<name>.json ─> dermis report, section "Inputs tried"
+//! ```
+//!
+//! | field | |
+//! |---|---|
+//! | `command` | what makes the counts again |
+//! | `lines` | per target: how many of which unit, how many had which outcome, seconds |
+//!
+//! A run takes the place of an earlier one of the same name.
+
+use std::collections::BTreeMap;
+use std::fmt;
+use std::fs;
+use std::path::Path;
+
+use anyhow::{anyhow, Context, Result};
+use serde::{Deserialize, Serialize};
+
+use crate::write::write;
+
+/// Folder in the build folder.
+const FOLDER: &str = "tried";
+
+/// One run.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Tried {
+    /// The command that makes these counts.
+    pub command: String,
+    /// What was tried, in order.
+    pub lines: Vec<Line>,
+}
+
+/// One target of a run.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Line {
+    /// The target.
+    pub what: String,
+    /// What is counted: inputs, frames, cycles, …
+    pub unit: String,
+    /// How many.
+    pub tried: u64,
+    /// Outcomes by name, failures among them even where there are none.
+    pub outcomes: BTreeMap<String, u64>,
+    /// Time in s.
+    pub seconds: f64,
+}
+
+impl fmt::Display for Line {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        let Line { what, unit, tried, seconds, .. } = self;
+        write!(f, "{what}: {tried} {unit}: {}; {seconds:.1} s", self.outcome())
+    }
+}
+
+impl Line {
+    /// Outcomes with their counts.
+    pub fn outcome(&self) -> String {
+        self.outcomes.iter().map(|(name, count)| format!("{count} {name}")).collect::<Vec<_>>().join(", ")
+    }
+}
+
+impl Tried {
+    /// A run without lines yet.
+    pub fn new(command: &str) -> Tried {
+        Tried { command: command.to_owned(), lines: Vec::new() }
+    }
+
+    /// Keeps the run under a name, whole or not at all.
+    ///
+    /// # Errors
+    /// A folder or file that cannot be written.
+    pub fn keep(&self, build: &Path, name: &str) -> Result<()> {
+        let folder = build.join(FOLDER);
+        fs::create_dir_all(&folder).map_err(|error| anyhow!("{}: {error}", folder.display()))?;
+        let text = serde_json::to_string_pretty(self)? + "\n";
+        Ok(write(&folder.join(format!("{name}.json")), text.as_bytes())?)
+    }
+
+    /// All runs that were kept, by name; none where there is no folder.
+    ///
+    /// # Errors
+    /// A file that cannot be read or is no run, with its path.
+    pub fn all(build: &Path) -> Result<Vec<Tried>> {
+        let Ok(entries) = fs::read_dir(build.join(FOLDER)) else { return Ok(Vec::new()) };
+        let mut paths: Vec<_> = entries.filter_map(|entry| Some(entry.ok()?.path())).collect();
+        // What a killed writer left behind is no run.
+        paths.retain(|path| path.extension().is_some_and(|extension| extension == "json"));
+        paths.sort();
+        let read = |path: &std::path::PathBuf| -> Result<Tried> {
+            let text = fs::read_to_string(path).with_context(|| path.display().to_string())?;
+            serde_json::from_str(&text).with_context(|| path.display().to_string())
+        };
+        paths.iter().map(read).collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_kept_comes_back() {
+        let build = tempfile::tempdir().unwrap();
+        assert_eq!(Tried::all(build.path()).unwrap(), []);
+        let mut run = Tried::new("make fuzz");
+        run.lines.push(Line {
+            what: "scene".into(),
+            unit: "inputs".into(),
+            tried: 3,
+            outcomes: [("taken".to_owned(), 1), ("refused".to_owned(), 2)].into(),
+            seconds: 0.25,
+        });
+        run.keep(build.path(), "b").unwrap();
+        Tried::new("other").keep(build.path(), "a").unwrap();
+        assert_eq!(Tried::all(build.path()).unwrap(), [Tried::new("other"), run.clone()]);
+        assert_eq!(run.lines[0].to_string(), "scene: 3 inputs: 2 refused, 1 taken; 0.2 s");
+        fs::write(build.path().join("tried/c.json"), "{}").unwrap();
+        assert!(format!("{:#}", Tried::all(build.path()).unwrap_err()).contains("c.json: missing field"));
+    }
+}
