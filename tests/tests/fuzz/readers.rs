@@ -1,0 +1,108 @@
+//! The readers of files and packets, and the seeds of each.
+
+use std::path::Path;
+
+use dermis_golden::frame::Frame;
+use dermis_golden::input::calibration::Calibration;
+use dermis_golden::link::Decoder;
+use dermis_golden::scene::Scene;
+use dermis_golden::sensor::Sensor;
+use dermis_hdl::manifest;
+
+/// The folder of a reader's seeds, and the reader: whether it took the bytes.
+type Target = (&'static str, fn(&[u8]) -> bool);
+/// All readers.
+pub const TARGETS: [Target; 6] = [
+    ("scene", scene),
+    ("frame.json", json),
+    ("frame.csv", csv),
+    ("calibration", calibration),
+    ("manifest", manifests),
+    ("packets", packets),
+];
+
+/// The seeds of a target, in the order of their names.
+pub fn corpus(target: &str) -> Vec<Vec<u8>> {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("corpus").join(target);
+    let mut files: Vec<_> = std::fs::read_dir(&folder).unwrap().map(|entry| entry.unwrap().path()).collect();
+    files.sort();
+    assert!(!files.is_empty(), "{target} has no seeds");
+    files.iter().map(|path| std::fs::read(path).unwrap()).collect()
+}
+
+fn sensor() -> Sensor {
+    Sensor { rows: 3, cols: 4, pitch_x_mm: 2.0, pitch_y_mm: 3.0, thickness_mm: 2.5 }
+}
+
+fn scene(bytes: &[u8]) -> bool {
+    let text = String::from_utf8_lossy(bytes);
+    match Scene::parse(&text, "fuzz.toml") {
+        Ok(scene) => {
+            assert!(scene.sensor.check().is_ok() && !scene.name.is_empty() && !scene.name.contains(['/', '\n']));
+            let level = scene.inversion().level;
+            assert!((0.0..1.0).contains(&level), "{level}");
+            true
+        }
+        Err(error) => {
+            assert!(error.to_string().starts_with("fuzz.toml"), "{error}");
+            false
+        }
+    }
+}
+
+fn frame(name: &str, bytes: &[u8]) -> Option<Frame> {
+    let text = String::from_utf8_lossy(bytes);
+    let own = Scene::of_sensor(&sensor(), "own");
+    match Frame::parse(name, &text, Some(&own)) {
+        Ok(frame) => {
+            assert_eq!(frame.stress_MPa.len(), frame.sensor.taxels());
+            assert!(frame.stress_MPa.iter().all(|b| b.is_finite()));
+            Some(frame)
+        }
+        Err(error) => {
+            assert!(error.to_string().contains(name), "{error}");
+            None
+        }
+    }
+}
+
+fn json(bytes: &[u8]) -> bool {
+    let Some(read) = frame("fuzz.json", bytes) else { return false };
+    assert_eq!(Frame::parse("fuzz.json", &read.to_json(), None).unwrap(), read);
+    true
+}
+
+fn csv(bytes: &[u8]) -> bool {
+    frame("fuzz.csv", bytes).is_some()
+}
+
+fn calibration(bytes: &[u8]) -> bool {
+    match Calibration::parse(&String::from_utf8_lossy(bytes), "fuzz.csv", &sensor()) {
+        Ok(table) => {
+            assert!(table.gain.iter().all(|gain| *gain != 0.0 && gain.is_finite()));
+            true
+        }
+        Err(error) => {
+            assert!(error.to_string().starts_with("fuzz.csv"), "{error}");
+            false
+        }
+    }
+}
+
+fn manifests(bytes: &[u8]) -> bool {
+    let read = manifest::parse(&String::from_utf8_lossy(bytes), "manifest.json");
+    assert!(read.as_ref().err().is_none_or(|error| error.to_string().starts_with("manifest.json")), "{read:?}");
+    read.is_ok()
+}
+
+fn packets(bytes: &[u8]) -> bool {
+    let mut decoder = Decoder::default();
+    let mut any = false;
+    for packet in bytes.iter().filter_map(|byte| decoder.next(*byte)).flatten() {
+        let mut again = Decoder::default();
+        let found: Vec<_> = packet.to_wire().iter().filter_map(|byte| again.next(*byte)).collect();
+        assert_eq!(found, [Ok(packet)]);
+        any = true;
+    }
+    any
+}

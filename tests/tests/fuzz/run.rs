@@ -1,0 +1,135 @@
+//! Running inputs: on all processors, each one survived or written down, with counts for the report.
+
+use std::fmt::Write;
+use std::panic::{catch_unwind, AssertUnwindSafe};
+use std::path::Path;
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::Mutex;
+use std::thread::{available_parallelism, scope};
+use std::time::{Duration, Instant};
+
+use dermis_sim::tried::{Line, Tried};
+use dermis_tests::build_dir;
+
+use super::counting::{mark, most_since};
+
+/// Failing inputs that are printed in full.
+const PRINTED: usize = 20;
+
+/// How many inputs: the variable's, or a short part.
+pub fn wanted(variable: &str, short: usize) -> usize {
+    std::env::var(variable).map_or(short, |text| text.parse().expect("a number of inputs"))
+}
+
+/// What became of some inputs.
+#[derive(Default)]
+pub struct Outcome {
+    /// How many there were.
+    pub tried: usize,
+    /// How many of them had an outcome of a name.
+    pub counts: Vec<(&'static str, usize)>,
+    /// What failed, with its input.
+    pub failures: Vec<String>,
+    /// The most bytes that one took.
+    pub most_bytes: usize,
+    /// The longest time that one took.
+    pub slowest: Duration,
+    /// Time of all.
+    pub elapsed: Duration,
+}
+
+impl Outcome {
+    /// Runs one input. A panic or a long time is a failure; else the value is given back with the bytes it took.
+    pub fn survive<T>(
+        &mut self,
+        what: &str,
+        input: &dyn Fn() -> String,
+        longest: Duration,
+        run: impl FnOnce() -> T,
+    ) -> Option<(T, usize)> {
+        let (before, start) = (mark(), Instant::now());
+        let value = catch_unwind(AssertUnwindSafe(run));
+        let (bytes, took) = (most_since(before), start.elapsed());
+        (self.most_bytes, self.slowest) = (self.most_bytes.max(bytes), self.slowest.max(took));
+        if took > longest {
+            self.failures.push(format!("{took:?} for {what}: {}", input()));
+        }
+        match value {
+            Ok(value) => Some((value, bytes)),
+            Err(_) => {
+                self.failures.push(format!("panic on {what}: {}", input()));
+                None
+            }
+        }
+    }
+
+    /// Another of a name.
+    pub fn count(&mut self, name: &'static str, more: usize) {
+        match self.counts.iter_mut().find(|(own, _)| *own == name) {
+            Some((_, count)) => *count += more,
+            None => self.counts.push((name, more)),
+        }
+    }
+
+    /// How many of a name.
+    pub fn counted(&self, name: &str) -> usize {
+        self.counts.iter().find(|(own, _)| *own == name).map_or(0, |(_, count)| *count)
+    }
+
+    /// Both together; time is the sum.
+    pub fn add(&mut self, other: Outcome) {
+        other.counts.iter().for_each(|(name, count)| self.count(name, *count));
+        self.failures.extend(other.failures);
+        self.tried += other.tried;
+        self.most_bytes = self.most_bytes.max(other.most_bytes);
+        self.slowest = self.slowest.max(other.slowest);
+        self.elapsed += other.elapsed;
+    }
+}
+
+/// Does tasks 0 … `count` − 1 on all processors; results in their order.
+pub fn on_all_processors<R: Send>(count: usize, work: impl Fn(usize) -> R + Sync) -> Vec<R> {
+    let (next, done) = (AtomicUsize::new(0), Mutex::new(Vec::with_capacity(count)));
+    let worker = || loop {
+        let task = next.fetch_add(1, Ordering::Relaxed);
+        if task >= count {
+            break;
+        }
+        let result = work(task);
+        done.lock().unwrap().push((task, result));
+    };
+    scope(|scope| {
+        for _ in 0..available_parallelism().map_or(1, usize::from) {
+            scope.spawn(worker);
+        }
+    });
+    let mut done = done.into_inner().unwrap();
+    done.sort_by_key(|(task, _)| *task);
+    done.into_iter().map(|(_, result)| result).collect()
+}
+
+/// Prints a line per target, keeps the counts of a long run for the report, and fails where anything failed.
+pub fn conclude(name: &str, unit: &str, long: bool, outcomes: Vec<(&str, Outcome)>) {
+    let mut run = Tried::new("make fuzz");
+    let mut failures = String::new();
+    for (what, outcome) in outcomes {
+        let counts = outcome.counts.iter().copied().chain([("failed", outcome.failures.len())]);
+        let line = Line {
+            what: what.to_owned(),
+            unit: unit.to_owned(),
+            tried: outcome.tried as u64,
+            outcomes: counts.map(|(name, count)| (name.to_owned(), count as u64)).collect(),
+            seconds: outcome.elapsed.as_secs_f64(),
+        };
+        println!("{line}; one at most {} bytes, {:.1?}", outcome.most_bytes, outcome.slowest);
+        run.lines.push(line);
+        for failure in outcome.failures.iter().take(PRINTED) {
+            writeln!(failures, "{failure}").unwrap();
+        }
+    }
+    if long {
+        run.keep(&build_dir(), name).unwrap();
+        println!("kept in {}", Path::new("build/tried").join(name).with_extension("json").display());
+    }
+    assert!(failures.is_empty(), "{failures}");
+}
