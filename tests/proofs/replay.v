@@ -1,0 +1,56 @@
+// The rows of v_00 wait until the last of them is measured, then each comes out once, in order, by the measured shift; later
+// rows go through by the constant one. No row is lost, and none stays behind.
+module proof(input clk, input again, input begin_it, input offered, input sample);
+  // One bit stands for all that go the same way.
+  wire [4*@ACC@-1:0] quad = {4*@ACC@{sample}};
+  localparam ROWS = 8'd@ROWS@;
+  reg started = 1'b0;
+  always @(posedge clk) started <= 1'b1;
+  wire rst = again || !started;
+  // Any row of a frame.
+  (* anyconst *) reg [7:0] row;
+  reg within;
+  reg [7:0] came, went, since;
+  // What the engine keeps to: no frame begins before the last one's rows are out, no later row comes before v_00 is out.
+  wire start = begin_it && came == went;
+  wire quad_valid = offered && within && !start && (came < ROWS || (went >= ROWS && came < ROWS + 8'd3));
+  wire [4*@WORD@-1:0] words;
+  wire words_valid, operands_valid;
+  wire [4*@DATA@-1:0] operands;
+  wire [@SHIFTS@-1:0] shift;
+  wire [15:0] saturations;
+  @TOP@$rescale block(
+    .clk(clk), .rst(rst), .which(1'b0), .start(start && !rst), .quad(quad), .quad_valid(quad_valid && !rst),
+    .words(words), .words_valid(words_valid), .operands(operands), .operands_valid(operands_valid), .shift(shift),
+    .saturations(saturations)
+  );
+  reg kept;
+  reg words_before;
+  always @(posedge clk) begin
+    words_before <= words_valid && !rst;
+    if (rst) {within, came, went, since} <= 25'd0;
+    else begin
+      assert (went <= came && (came != went || !words_valid));
+      assert (operands_valid == words_before);
+      // Rows of v_00 wait for the last of them, no longer.
+      assert (came == went || (came < ROWS && went == 8'd0) || since <= ROWS + 8'd4);
+      if (words_valid && went == row) assert (words == {4*@WORD@{kept}});
+      if (quad_valid && came == row) kept <= sample;
+      since <= quad_valid ? 8'd0 : since == 8'd255 ? since : since + 8'd1;
+      if (start) {within, came, went} <= {1'b1, 16'd0};
+      else begin
+        came <= came + quad_valid;
+        went <= went + words_valid;
+      end
+    end
+  end
+endmodule
+
+// In the place of the arithmetic, which has its own proof: the accumulators themselves, as late as their words.
+module @TOP@$rescale$rescaler(
+  input clk, input clear, input valid, input measured, input [@SHIFTS@-1:0] shift, input [4*@ACC@-1:0] quad,
+  output reg [4*@WORD@-1:0] words, output [4*@DATA@-1:0] operands, output [15:0] saturations
+);
+  reg [4*@WORD@-1:0] moved;
+  always @(posedge clk) {words, moved} <= {moved, quad[4*@WORD@-1:0]};
+endmodule

@@ -1,0 +1,51 @@
+// A word is its accumulator over 2^shift, rounded half up and held to its range; an operand the same of its word; and the
+// words held are counted, up to the counter's end.
+module proof(input clk, input clear, input valid, input measured, input [@SHIFTS@-1:0] shift, input [4*@ACC@-1:0] quad);
+  wire [4*@WORD@-1:0] words;
+  wire [4*@DATA@-1:0] operands;
+  wire [15:0] saturations;
+  @TOP@$rescale$rescaler block(
+    .clk(clk), .clear(clear), .valid(valid), .measured(measured), .shift(shift), .quad(quad),
+    .words(words), .operands(operands), .saturations(saturations)
+  );
+  localparam signed [@ACC@+1:0] MOST = (1 << (@WORD@ - 1)) - 1;
+  localparam signed [@WORD@+1:0] MOST_OPERAND = (1 << (@DATA@ - 1)) - 1;
+  wire [@SHIFTS@-1:0] amount = measured ? shift : @SHIFTS@'d@A_SHIFT@;
+  reg [1:0] age = 2'd0;
+  always @(posedge clk) if (age != 2'd3) age <= age + 2'd1;
+  reg counts, known = 1'b0;
+  reg [15:0] count;
+  wire [3:0] held;
+  genvar l;
+  generate
+    for (l = 0; l < 4; l = l + 1) begin : lane
+      wire signed [@ACC@:0] acc = {quad[l * @ACC@ + @ACC@ - 1], quad[l * @ACC@ +: @ACC@]};
+      // The quotient rounded down, and the bit that says whether a half or more was left.
+      wire signed [@ACC@:0] floor = acc >>> amount;
+      wire [@ACC@:0] below = acc >>> (amount - 1);
+      reg signed [@ACC@+1:0] rounded;
+      wire above = rounded > MOST;
+      wire under = rounded < -MOST - 1;
+      assign held[l] = above || under;
+      reg signed [@WORD@+1:0] word;
+      wire signed [@WORD@+1:0] nearest = (word >>> @LESS@) + $signed({1'b0, word[@LESS@-1]});
+      reg signed [@WORD@+1:0] operand;
+      wire signed [@WORD@-1:0] got_word = words[l * @WORD@ +: @WORD@];
+      wire signed [@DATA@-1:0] got_operand = operands[l * @DATA@ +: @DATA@];
+      always @(posedge clk) begin
+        rounded <= floor + $signed({1'b0, amount != 0 && below[0]});
+        word <= above ? MOST : under ? -MOST - 1 : rounded;
+        operand <= nearest > MOST_OPERAND ? MOST_OPERAND : nearest;
+        if (age >= 2'd2) assert (got_word == word);
+        if (age >= 2'd3) assert (got_operand == operand);
+      end
+    end
+  endgenerate
+  wire [16:0] sum = {1'b0, count} + held[0] + held[1] + held[2] + held[3];
+  always @(posedge clk) begin
+    counts <= valid;
+    if (clear) {known, count} <= {1'b1, 16'd0};
+    else if (counts) count <= sum[16] ? 16'hFFFF : sum[15:0];
+    if (known) assert (saturations == count);
+  end
+endmodule

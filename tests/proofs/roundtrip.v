@@ -1,0 +1,30 @@
+// What the encoder makes of bytes and borders, the decoder makes bytes and ends of again, one for one, and calls nothing
+// spoiled.
+module proof(input clk, input again, input [7:0] content, input border, input offered, input ready, input pauses);
+  reg started = 1'b0;
+  always @(posedge clk) started <= 1'b1;
+  wire rst = again || !started;
+  wire [7:0] data, read;
+  wire valid, content_ready, read_valid, packet_end, spoiled;
+  @ENCODER@ encoder(
+    .clk(clk), .rst(rst), .content(content), .border(border), .content_valid(offered), .content_ready(content_ready),
+    .data(data), .valid(valid), .ready(ready)
+  );
+  @DECODER@ decoder(
+    .clk(clk), .rst(rst), .data(data), .valid(valid && ready), .broken(1'b0), .content(read), .content_valid(read_valid),
+    .packet_end(packet_end), .spoiled(spoiled)
+  );
+  reg waits = 1'b0, border_before;
+  reg [7:0] before;
+  always @(posedge clk) begin
+    waits <= offered && !content_ready && !rst;
+    {before, border_before} <= {content, border};
+    if (waits) assume (offered && content == before && border == border_before);
+    if (!rst) begin
+      assert (read_valid == (offered && content_ready && !border));
+      assert (packet_end == (offered && content_ready && border));
+      assert (!read_valid || read == content);
+      assert (!spoiled);
+    end
+  end
+endmodule

@@ -1,0 +1,83 @@
+//! The prover: a property of `tests/proofs` and the Verilog it is about, to Yosys, to ABC.
+
+use std::path::Path;
+use std::process::Command;
+
+use dermis_hdl::Generated;
+
+/// A property, what it is asked of, and a defect that breaks it.
+pub struct Proof<'a> {
+    /// The Verilog.
+    pub generated: &'a Generated,
+    /// File in `tests/proofs`. A module of the design that it brings itself takes the design's place.
+    pub property: &'a str,
+    /// Placeholders of the property file and what stands for them.
+    pub given: Vec<(&'a str, String)>,
+    /// Text in the Verilog, and the text that takes its place.
+    pub defect: (&'a str, &'a str),
+    /// Products may be anything: no property is about them.
+    pub open_products: bool,
+}
+
+/// Modules of the design `top` that a property brings itself.
+fn replaced(top: &str, property: &str) -> String {
+    let own = property.lines().filter_map(|line| line.strip_prefix("module ")?.strip_prefix(top));
+    own.map(|rest| format!("delete {top}{}; ", rest.split('(').next().unwrap_or_default())).collect()
+}
+
+/// Whether the property is proved; a proof that does not end is none.
+fn proved(folder: &Path, top: &str, open_products: bool) -> bool {
+    let cut = if open_products { "cutpoint t:$mul; " } else { "" };
+    let own = replaced(top, &std::fs::read_to_string(folder.join("proof.v")).unwrap());
+    let to_gates = format!(
+        "read_verilog {top}.v; {own}read_verilog -formal -sv proof.v; hierarchy -top proof; {cut}\
+         prep -flatten -nordff -top proof; setundef -undriven -anyseq; setattr -unset keep; delete -output; opt -full; \
+         techmap; opt -fast; memory_map; simplemap; dffunmap; abc -g AND -fast; opt_clean; \
+         write_aiger -I -B -zinit -no-startoffset proof.aig"
+    );
+    let output = Command::new("yosys").current_dir(folder).args(["-q", "-p", &to_gates]).output();
+    let output = output.expect("yosys is installed (make setup)");
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    // Signals that are always equal become one first: what is left is smaller by a third.
+    let check = "read_aiger proof.aig; fold; strash; scorr; dc2; scorr; pdr -T 120";
+    let output = Command::new("yosys-abc").current_dir(folder).args(["-c", check]).output();
+    let text = String::from_utf8_lossy(&output.expect("yosys-abc comes with yosys").stdout).into_owned();
+    let (proved, broken) = (text.contains("Property proved."), text.contains("was asserted in frame"));
+    assert!(proved != broken, "neither proved nor refuted: {text}");
+    proved
+}
+
+impl Proof<'_> {
+    /// Proves the property, then refutes it of the design with the defect.
+    pub fn run(&self) {
+        self.fails_with(&[self.defect]);
+    }
+
+    /// The same with several defects, one at a time.
+    pub fn fails_with(&self, defects: &[(&str, &str)]) {
+        let folder = tempfile::tempdir().unwrap();
+        let Generated { top, files, .. } = self.generated;
+        files.iter().for_each(|file| std::fs::write(folder.path().join(&file.name), &file.text).unwrap());
+        let property = Path::new(env!("CARGO_MANIFEST_DIR")).join("proofs").join(self.property);
+        let mut text = std::fs::read_to_string(&property).unwrap();
+        for (name, value) in &self.given {
+            text = text.replace(&format!("@{name}@"), value);
+        }
+        std::fs::write(folder.path().join("proof.v"), text.replace("@TOP@", top)).unwrap();
+        assert!(proved(folder.path(), top, self.open_products), "{} {:?}", self.property, self.given);
+
+        let verilog = folder.path().join(format!("{top}.v"));
+        let sound = std::fs::read_to_string(&verilog).unwrap();
+        for (from, to) in defects {
+            assert!(sound.contains(from), "nothing to break: {from}");
+            std::fs::write(&verilog, sound.replace(from, to)).unwrap();
+            let noticed = !proved(folder.path(), top, self.open_products);
+            assert!(noticed, "{}: {from} → {to} went unnoticed", self.property);
+        }
+    }
+}
+
+/// A number as a property file takes it.
+pub fn number(value: usize) -> String {
+    value.to_string()
+}

@@ -1,0 +1,95 @@
+//! Proofs of what stands between the streams: the rescaler's arithmetic, queues, and the link's way out.
+
+use dermis_golden::fixed::formats::SEARCH_EXTRA_BITS;
+use dermis_golden::fixed::resources::{count_bits, operand_vectors};
+use dermis_golden::fixed::send::STATUS_BEATS;
+use dermis_hdl::link::generate_board;
+use dermis_hdl::{generate, Generated};
+
+use super::prover::{number, Proof};
+use super::{block_with, model, COLS, ROWS};
+
+/// Widths of the rescaler's words.
+fn widths() -> (Generated, Vec<(&'static str, String)>, usize) {
+    let model = model("");
+    let f = &model.formats;
+    let given = vec![
+        ("SHIFTS", number(count_bits(f.acc_bits as usize))),
+        ("ACC", number(f.acc_bits as usize)),
+        ("WORD", number(f.vector_bits as usize)),
+        ("DATA", number(f.data_bits as usize)),
+        ("A_SHIFT", number(f.a_shift as usize)),
+        ("LESS", number(SEARCH_EXTRA_BITS as usize)),
+        ("ROWS", number(f.quads)),
+    ];
+    (generate(&model).unwrap(), given, f.acc_bits as usize)
+}
+
+#[test]
+fn rescaled_words_are_rounded_and_held_to_their_range() {
+    let (generated, given, acc) = widths();
+    let (half, none) = (format!("+ {}'d1;\n", acc + 2), format!("+ {}'d0;\n", acc + 2));
+    let defects = [
+        ("clipped[l] ? ", "1'b0 ? "),
+        ("overflow ? ", "1'b0 ? "),
+        (half.as_str(), none.as_str()),
+        ("else if (valid1) saturations", "else saturations"),
+    ];
+    Proof { generated: &generated, property: "rescale.v", given, defect: defects[0], open_products: false }
+        .fails_with(&defects);
+}
+
+#[test]
+fn rows_that_wait_for_their_shift_come_out_in_order() {
+    let (generated, given, _) = widths();
+    let defects = [
+        ("replay$enable = replaying$q;", "replay$enable = 1'b0;"),
+        ("raw$write_address = rows$value;", "raw$write_address = ~rows$value;"),
+        ("enters = read$then | (quad_valid & ~collecting$q);", "enters = read$then | quad_valid;"),
+    ];
+    Proof { generated: &generated, property: "replay.v", given, defect: defects[0], open_products: false }
+        .fails_with(&defects);
+}
+
+#[test]
+fn operand_vectors_stay_inside_their_memory() {
+    let model = model("");
+    let (vectors, quads) = (operand_vectors(model.formats.degree), model.formats.quads);
+    let finished = count_bits(vectors + 1);
+    let given = vec![
+        ("ADDRESS", number(count_bits(vectors * quads))),
+        ("FINISHED", number(finished)),
+        ("VECTORS", number(vectors)),
+        ("QUADS", number(quads)),
+    ];
+    let limit = format!("keep = valid && finished != {finished}'d{vectors};");
+    let defect = (limit.as_str(), "keep = valid;");
+    Proof { generated: &generate(&model).unwrap(), property: "filler.v", given, defect, open_products: false }.run();
+}
+
+#[test]
+fn the_link_takes_and_gives_each_byte_once() {
+    let generated = &generate_board(&model("")).unwrap();
+    let packer = vec![("BLOCK", block_with(generated, "(clk,rst,offer,header,offered_source,"))];
+    let defect = ("left <= 4'd12;", "left <= 4'd11;");
+    Proof { generated, property: "packer.v", given: packer, defect, open_products: false }.run();
+    let both = vec![
+        ("ENCODER", block_with(generated, "(clk,rst,content,border,content_valid,")),
+        ("DECODER", block_with(generated, "(clk,rst,data,valid,broken,content,")),
+    ];
+    let defect = ("content = !escaped ? data : data == 8'd220", "content = !escaped ? data : data == 8'd221");
+    Proof { generated, property: "roundtrip.v", given: both, defect, open_products: false }.run();
+}
+
+#[test]
+fn sums_come_before_the_status() {
+    let generated = &generate_board(&model("")).unwrap();
+    let given = vec![
+        ("BLOCK", block_with(generated, "(clk,rst,run,summarise,beat,")),
+        ("TAXELS", number(ROWS * COLS)),
+        ("LAST", number(ROWS * COLS + STATUS_BEATS - 1)),
+        ("MOST", number(ROWS.max(COLS) + 1)),
+    ];
+    let defect = ("if (out == 2'd3) stage <= 2'd3;", "if (out == 2'd2) stage <= 2'd3;");
+    Proof { generated, property: "sums.v", given, defect, open_products: false }.run();
+}
