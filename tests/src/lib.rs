@@ -9,10 +9,10 @@
 //! | `choice` | several cases in one design: equality in mixed order, wrong constants found, what the choice is worth |
 //! | `resources` | block RAMs and multipliers as Yosys counts them, flip-flops and LUTs near |
 //! | `extreme` | zero, saturated, 1e±9 of full scale, at edges and corners: equal in hardware |
-//! | `fuzz` | readers, and the whole way from a scene to forces, on mutated and random input |
+//! | `fuzz` | readers, and the whole way from a scene to forces, on mutated and random input; counts for the report |
 //! | `explain` | what is left out is not in the Verilog, and what that saves; refusals name what fits |
 //! | `framing` | early and missing `tlast`: what is dropped, what is flagged, and equality right after |
-//! | `proofs` | the handshake's blocks lose, invent and change nothing, for any stall and reset: proved, not tried |
+//! | `proofs` | handshakes and queues lose, invent and change nothing, words are held to their range: proved, not tried |
 //! | `link` | the board's UART: answers, counters, recovery; Verilator = rust-hdl, pin by pin |
 //! | `synthesis` | Yosys reads the Verilog without latch or undriven signal |
 //! | `scenes` | the same equality for scenes of other shapes, degrees, words and conditions |

@@ -51,13 +51,13 @@ use crate::verify::verify;
 /// Taxels of a subarray from which the quick variant leaves a case out.
 const QUICK_TAXELS: usize = 1200;
 /// Taxels of a subarray from which the quick variant leaves the literal baseline out: seconds a frame.
-const QUICK_LITERAL: usize = 400;
+const QUICK_LITERAL: usize = 200;
 
 /// What to measure.
 #[derive(Clone, Debug)]
 pub struct Options {
     /// Two co-simulations, fewer drawn frames and sweeps, no case of more than 1200 taxels in a subarray, the literal
-    /// baseline up to 400.
+    /// baseline up to 200.
     pub quick: bool,
     /// Cases prepared at a time.
     pub jobs: usize,

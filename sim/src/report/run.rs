@@ -140,7 +140,7 @@ fn intro(measured: &[Measured], options: &Options) -> Vec<String> {
     if options.quick {
         intro.push(
             "Quick variant: few drawn frames, hardware co-simulated for sensor-1 and eight-by-eight in case 0 (else \
-             the bit-true model's cycles), no subarrays above 1200 taxels, literal Eq. 1 up to 400, one sweep. The \
+             the bit-true model's cycles), no subarrays above 1200 taxels, literal Eq. 1 up to 200, one sweep. The \
              full one: dermis report."
                 .into(),
         );
