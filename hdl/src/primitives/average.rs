@@ -125,7 +125,7 @@ impl Logic for Average {
                 (self._held, self._out, self._taxel, self._frame, self._missed) = (None, None, 0, 0, false);
             }
         }
-        self.s_axis_tready.next = self._out.is_none() || self.m_axis_tready.val();
+        self.s_axis_tready.next = (self._out.is_none() || self.m_axis_tready.val()) && !self.rst.val();
         self.m_axis_tvalid.next = self._out.is_some();
         if let Some((sum, last)) = self._out {
             self.m_axis_tdata.next = Word::of_fields(&[sum], self.m_axis_tdata.width());
@@ -159,7 +159,7 @@ wire final_frame = frame == {{{k}{{1'b1}}}};
 wire early = s_axis_tlast && !at_end;
 wire [{sum_end}:0] sum = {{{{{k}{{word[{end}]}}}}, word}} + (held_first ? {sum_bits}'d0 : sofar);
 wire moves = !m_axis_tvalid || m_axis_tready;
-always @(*) s_axis_tready = moves;
+always @(*) s_axis_tready = moves && !rst;
 always @(posedge clk) begin
   if (rst) begin
     held <= 1'b0;

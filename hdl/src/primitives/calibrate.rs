@@ -110,7 +110,7 @@ impl Logic for Calibrate {
             }
         }
         let leaving = self._pipe[0];
-        self.s_axis_tready.next = leaving.is_none() || self.m_axis_tready.val();
+        self.s_axis_tready.next = (leaving.is_none() || self.m_axis_tready.val()) && !self.rst.val();
         self.m_axis_tvalid.next = leaving.is_some();
         let (stress, last) = leaving.unwrap_or((self.m_axis_tdata.val().signed(0, bits), self.m_axis_tlast.val()));
         self.m_axis_tdata.next = Word::of_fields(&[stress], bits);
@@ -171,7 +171,7 @@ wire signed [{bits}:0] difference = code - zero;
 {declare}wire [{over}:0] sign = {result}[{wide_end}:{end}];
 wire clipped = sign != {{{over1}{{{result}[{wide_end}]}}}};
 wire moves = !valids[{steps_end}] || m_axis_tready;
-always @(*) s_axis_tready = moves;
+always @(*) s_axis_tready = moves && !rst;
 always @(*) m_axis_tvalid = valids[{steps_end}];
 always @(*) m_axis_tlast = lasts[{steps_end}];
 always @(posedge clk) begin
