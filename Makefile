@@ -15,7 +15,7 @@ PACKAGES   = verilator yosys g++ make chromium python3-venv
 QUICK     ?=
 
 .DEFAULT_GOAL := help
-.PHONY: help setup tools program run test fmt clippy unit lint quick docs bench build cosim bitstream report netlist fuzz clean
+.PHONY: help setup tools program run test fmt clippy unit lint quick docs bench build cosim bitstream report netlist fuzz stress clean
 
 help: ## list the targets
 	@sed -n 's/^\([a-z]*\):.*## /\1	/p' $(MAKEFILE_LIST) | expand -t 10
@@ -87,6 +87,9 @@ netlist: setup ## compare the netlist of a small scene with a search, several mi
 
 fuzz: ## 10^7 inputs over the readers, 10^5 frames through both models
 	DERMIS_FUZZ_INPUTS=10000000 DERMIS_FUZZ_RUNS=100000 $(CARGO) test --release -p dermis-tests --test fuzz -- --nocapture
+
+stress: ## 3*10^6 cycles of each experiment on the streams: stalls, wrong tlast, resets
+	DERMIS_STRESS_CYCLES=3000000 $(CARGO) test --release -p dermis-tests --test streams -- --nocapture
 
 clean: ## remove everything built
 	$(CARGO) clean

@@ -61,7 +61,8 @@ const EXAMPLES: &str = "Examples:
   dermis noise sensor-1                              errors under noise, beside the Cramér–Rao bound
   dermis report                                      a page: which case and format to take, errors against time
   dermis generate sensor-3 --random 2 --out two.json  a frame with known forces
-  dermis stability --plot stability.svg              errors against a scene's condition";
+  dermis stability --plot stability.svg              errors against a scene's condition
+  dermis stress                                      gaps, wrong tlast and resets, sensor-1";
 
 #[derive(Subcommand, Debug)]
 enum Command {
@@ -150,6 +151,8 @@ enum Command {
     Generate(crate::generate::Arguments),
     /// Measure errors of double, single and fixed point against a scene's condition, or on extreme frames.
     Stability(crate::stability::Arguments),
+    /// Try the simulated hardware's streams under gaps, back-pressure, wrong tlast and resets.
+    Stress(crate::stress::Arguments),
     /// Print the errors of scenes in the paper's cases on their shipped frames, beside the paper's.
     #[command(after_help = "Examples:
   dermis table                                       every built-in scene, cases 0 to 3
@@ -327,6 +330,7 @@ fn run(arguments: &Arguments) -> Result<(String, bool)> {
         Command::Report(arguments) => report::run(arguments, build_dir),
         Command::Generate(arguments) => Ok((crate::generate::run(arguments)?, true)),
         Command::Stability(arguments) => Ok((crate::stability::run(arguments)?, true)),
+        Command::Stress(arguments) => crate::stress::run(arguments, build_dir),
         Command::Table { scenes, cases, fresh, format, cosim: false } => {
             Ok((table(scenes, cases, fresh, *format)?, true))
         }

@@ -26,7 +26,8 @@
 //! | [`host`] | frames to a board over a serial port, forces back |
 //! | [`stability`] | `dermis stability`: errors against condition, extreme frames |
 //! | [`mod@tried`] | what long runs have tried, kept for the report |
-//! | [`mod@write`] | files whole or not at all |
+//! | [`mod@stress`] | `dermis stress`: both streams under gaps, wrong `tlast` and resets |
+//! | [`jobs`] | tasks on several threads, until one fails or the user interrupts |
 //! | [`inputs`] | scene and frames from what the command line names |
 //! | [`mod@waves`] | a run as a waveform file |
 //! | [`cli`] | arguments, commands, exit codes |
@@ -53,6 +54,7 @@ mod place;
 mod progress;
 pub mod report;
 pub mod stability;
+pub mod stress;
 pub mod tabulate;
 pub mod tried;
 pub mod verify;

@@ -28,6 +28,7 @@ mod run;
 mod save;
 mod sections;
 mod stability;
+mod stress;
 mod style;
 mod table;
 
@@ -43,6 +44,7 @@ pub use result::{difference, reconstruction};
 pub use run::{run, Arguments};
 pub use sections::stability_picture;
 pub use stability::stability;
+pub use stress::stress;
 pub use table::{cosim, scenes};
 
 use serde::Serialize;

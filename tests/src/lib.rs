@@ -12,6 +12,7 @@
 //! | `fuzz` | readers, and the whole way from a scene to forces, on mutated and random input; counts for the report |
 //! | `explain` | what is left out is not in the Verilog, and what that saves; refusals name what fits |
 //! | `framing` | early and missing `tlast`: what is dropped, what is flagged, and equality right after |
+//! | `streams` | gaps, back-pressure, wrong `tlast`, a reset at every cycle: nothing lost or invented, right after |
 //! | `proofs` | handshakes and queues lose, invent and change nothing, words are held to their range: proved, not tried |
 //! | `link` | the board's UART: answers, counters, recovery; Verilator = rust-hdl, pin by pin |
 //! | `synthesis` | Yosys reads the Verilog without latch or undriven signal |

@@ -5,8 +5,8 @@ use dermis_golden::partition::Case;
 use dermis_golden::scene::InverseKind;
 use dermis_golden::stability::{self, extreme, settings, Setting};
 
-use super::jobs::parallel;
 use super::{Measured, Options};
+use crate::jobs::parallel;
 
 /// Most taxels of a scene whose extreme frames are shown: each frame has a model of its own.
 const EXTREME_TAXELS: usize = 100;
@@ -20,7 +20,7 @@ pub fn conditions(options: &Options) -> Result<Vec<stability::Row>> {
         setting.frame.is_some() || setting.group == "thickness" && setting.scene.inverse.kind == InverseKind::default()
     };
     let wanted = settings().into_iter().filter(|setting| !options.quick || short(setting)).collect();
-    parallel("stability", wanted, options, |setting| Ok(stability::measure(&setting)?))
+    parallel("stability", wanted, options.jobs, &options.interrupt, |setting| Ok(stability::measure(&setting)?))
 }
 
 /// What both models make of the extreme frames of the small scenes, by name; the quick variant takes the first.
@@ -30,7 +30,7 @@ pub fn conditions(options: &Options) -> Result<Vec<stability::Row>> {
 pub fn extremes(measured: &[Measured], options: &Options) -> Result<Vec<(String, Vec<extreme::Row>)>> {
     let small = |m: &&Measured| m.scene.partition.case == Case::WHOLE && m.scene.sensor.taxels() <= EXTREME_TAXELS;
     let wanted: Vec<_> = measured.iter().filter(small).take(if options.quick { 1 } else { usize::MAX }).collect();
-    parallel("extreme frames", wanted, options, |m| {
+    parallel("extreme frames", wanted, options.jobs, &options.interrupt, |m| {
         let rows = extreme::frames(&m.scene)?.iter().map(extreme::outcome).collect::<Result<_, _>>()?;
         Ok((m.scene.name.clone(), rows))
     })

@@ -1,0 +1,169 @@
+//! `dermis stress`: the generated Verilog's two streams under gaps, back-pressure, wrong `tlast` and resets.
+//!
+//! | experiment | what happens | what must hold |
+//! |---|---|---|
+//! | `stalls` | frames back to back, both sides paced in many ways, now and then one at full speed alone | every whole frame leaves once, in order, equal to the bit-true model; alone, every beat in its promised cycle |
+//! | `tlast` | every other frame's `tlast` is early, missing, doubled or late, at random pace | what a wrong one cuts is dropped, the next frame that leaves carries the flag, once |
+//! | `reset` | a reset at a cycle of a frame, held from one cycle to as long as a frame takes | nothing leaves of what was inside; the next frame is right, unflagged and in time |
+//!
+//! Each experiment takes about the asked number of cycles; resets end earlier, with one at each cycle of a frame. What a
+//! wrong `tlast` does is `stress/scoreboard.rs`'s to say.
+
+mod line;
+mod pace;
+mod pool;
+mod resets;
+mod scoreboard;
+
+use std::path::Path;
+
+use anyhow::Result;
+use clap::Args;
+use dermis_golden::fixed::Model;
+use dermis_golden::frame::Frame;
+use dermis_golden::scene::Scene;
+use serde::Serialize;
+
+use pool::{drawn, own, Sample};
+pub use scoreboard::Violation;
+
+use crate::hardware::{Hardware, Simulator};
+use crate::progress::Progress;
+use crate::report;
+use line::{Burst, Line, RESET_CYCLES};
+use pace::Pace;
+
+/// What to try.
+#[derive(Args, Debug)]
+#[command(after_help = EXAMPLES)]
+pub struct Arguments {
+    /// Built-in names or paths of scenes.
+    #[arg(default_value = "sensor-1")]
+    scenes: Vec<String>,
+    /// Cycles of each experiment.
+    #[arg(long, value_name = "N", default_value_t = 1_000_000)]
+    cycles: u64,
+    /// Of pace, codes, errors and resets.
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+    /// Print the outcomes as JSON and nothing else.
+    #[arg(long)]
+    json: bool,
+}
+
+const EXAMPLES: &str = "Examples:
+  dermis stress                                      gaps, wrong tlast and resets, sensor-1
+  dermis stress eight-by-eight --cycles 50000 --seed 7 --json";
+
+/// What one experiment did and found.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize)]
+pub struct Outcome {
+    /// The scene.
+    pub scene: String,
+    /// `stalls`, `tlast` or `reset`.
+    pub experiment: &'static str,
+    /// Clock cycles run.
+    pub cycles: u64,
+    /// Cycles in which nothing was offered to a device that was ready, or a beat of the device was kept waiting.
+    pub stalled: u64,
+    /// Whole frames that the device took and that no reset swept away.
+    pub frames_in: u64,
+    /// Frames that left, each of them right where there is no violation.
+    pub frames_out: u64,
+    /// Of these, frames alone at full speed, whose every beat was asked for its cycle.
+    pub timed: u64,
+    /// Beats whose `tlast` was wrong.
+    pub wrong_tlast: u64,
+    /// Frames cut short, which leave nothing.
+    pub cut: u64,
+    /// Frames out with the framing flag, as they must.
+    pub flagged: u64,
+    /// Resets.
+    pub resets: u64,
+    /// Cycles of a frame at full speed, where a reset may fall.
+    pub reset_places: u64,
+    /// Longest reset in cycles.
+    pub longest_reset: u64,
+    /// How often something was other than it must.
+    pub violations: u64,
+    /// The first of them.
+    pub first: Vec<Violation>,
+}
+
+/// Runs all experiments on the hardware's Verilog, with the codes of `frames` and drawn ones.
+///
+/// # Errors
+/// No Verilator, a design that it refuses, or frames of another sensor.
+pub fn stress(hardware: &Hardware, frames: &[Frame], cycles: u64, seed: u64) -> Result<Vec<Outcome>> {
+    let mut random = fastrand::Rng::with_seed(seed);
+    let mut pool = own(&hardware.model, frames)?;
+    pool.extend(drawn(&hardware.model, &mut random));
+    let mut device = hardware.device(Simulator::Verilator)?;
+    let mut outcomes = Vec::new();
+    for experiment in ["stalls", "tlast", "reset"] {
+        let mut line = Line::new(device.as_mut(), &pool);
+        line.reset(RESET_CYCLES, &mut random);
+        match experiment {
+            "stalls" => stalls(&mut line, &mut random, cycles),
+            "tlast" => tlast(&mut line, &mut random, cycles),
+            _ => resets::resets(&mut line, &mut random, cycles),
+        }
+        let scene = hardware.model.scene.name.clone();
+        outcomes.push(Outcome { scene, experiment, ..line.finish() });
+    }
+    Ok(outcomes)
+}
+
+/// Frames back to back; the pace changes every few frames.
+fn stalls(line: &mut Line, random: &mut fastrand::Rng, cycles: u64) {
+    while line.runs() && line.cycle() < cycles {
+        let mut pace = Pace::drawn(random);
+        for _ in 0..1 + random.usize(..6) {
+            let sample = random.usize(..line.samples());
+            line.send(&Burst::whole(line.sample(sample), sample), &mut pace);
+        }
+        if random.u32(..8) == 0 {
+            let sample = random.usize(..line.samples());
+            line.send_alone(&Burst::whole(line.sample(sample), sample));
+        }
+    }
+    line.drain(&mut Pace::full_speed());
+}
+
+/// Every other frame has a wrong `tlast`.
+fn tlast(line: &mut Line, random: &mut fastrand::Rng, cycles: u64) {
+    while line.runs() && line.cycle() < cycles {
+        let mut pace = Pace::drawn(random);
+        for _ in 0..1 + random.usize(..6) {
+            let sample = random.usize(..line.samples());
+            let codes = line.sample(sample);
+            let burst = match random.u32(..8) {
+                0 => Burst::cut(codes, sample, 1 + random.usize(..codes.codes.len() - 1)),
+                1 => Burst::missing(codes, sample),
+                2 => Burst::doubled(codes, sample),
+                3 => Burst::late(codes, sample),
+                _ => Burst::whole(codes, sample),
+            };
+            line.send(&burst, &mut pace);
+        }
+    }
+    line.drain(&mut Pace::full_speed());
+}
+
+/// The outcomes as text, and whether nothing was violated.
+///
+/// # Errors
+/// An unknown scene, one without hardware, no Verilator.
+pub fn run(arguments: &Arguments, build: &Path) -> Result<(String, bool)> {
+    let mut outcomes = Vec::new();
+    for name in &arguments.scenes {
+        let scene = Scene::load(name)?;
+        let frames = Frame::shipped(&scene);
+        let hardware = Hardware::new(Model::for_frames(&scene, &frames)?, build)?;
+        let _progress = Progress::start(&format!("{}: stress", scene.name));
+        outcomes.extend(stress(&hardware, &frames, arguments.cycles, arguments.seed)?);
+    }
+    let good = outcomes.iter().all(|outcome| outcome.violations == 0);
+    let text = if arguments.json { serde_json::to_string(&outcomes)? + "\n" } else { report::stress(&outcomes) };
+    Ok((text, good))
+}

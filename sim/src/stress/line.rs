@@ -1,0 +1,204 @@
+//! A device between a sender and a receiver, watched in every cycle.
+
+use dermis_hdl::device::{Device, Inputs};
+
+use super::pace::Pace;
+use super::scoreboard::Scoreboard;
+use super::{Outcome, Sample};
+
+/// Cycles of the reset before an experiment.
+pub(crate) const RESET_CYCLES: u64 = 4;
+/// Cycles without a transfer after which a device hangs, beyond a frame's own.
+const PATIENCE: u64 = 20_000;
+/// Cycles after the last beat in which nothing may come.
+const QUIET_CYCLES: u64 = 16;
+
+/// Codes in a row, and where `tlast` stands.
+pub(crate) struct Burst {
+    sample: usize,
+    codes: Vec<(i32, bool)>,
+}
+
+impl Burst {
+    /// A frame as it must be.
+    pub(crate) fn whole(of: &Sample, sample: usize) -> Burst {
+        let end = |index: usize| (index + 1).is_multiple_of(of.taxels);
+        Burst { sample, codes: of.codes.iter().enumerate().map(|(index, &code)| (code, end(index))).collect() }
+    }
+
+    /// Only the first codes, at most `count`, `tlast` on the last of them, where none is due.
+    pub(super) fn cut(of: &Sample, sample: usize, count: usize) -> Burst {
+        let count = if count.is_multiple_of(of.taxels) { count - 1 } else { count };
+        let mut burst = Burst::whole(of, sample);
+        burst.codes.truncate(count);
+        burst.codes[count - 1].1 = true;
+        burst
+    }
+
+    /// A frame without `tlast`.
+    pub(super) fn missing(of: &Sample, sample: usize) -> Burst {
+        Burst { sample, codes: of.codes.iter().map(|&code| (code, false)).collect() }
+    }
+
+    /// `tlast` on the last code and on the one before, which makes two frames cut short.
+    pub(super) fn doubled(of: &Sample, sample: usize) -> Burst {
+        let mut burst = Burst::whole(of, sample);
+        let count = burst.codes.len();
+        burst.codes[count - 2].1 = true;
+        burst
+    }
+
+    /// `tlast` one beat late: a frame without, and one cut after a single code.
+    pub(super) fn late(of: &Sample, sample: usize) -> Burst {
+        let mut burst = Burst::missing(of, sample);
+        burst.codes.push((of.codes[0], true));
+        burst
+    }
+}
+
+/// A device whose every transfer is judged.
+pub(crate) struct Line<'a> {
+    device: &'a mut dyn Device,
+    pool: &'a [Sample],
+    scoreboard: Scoreboard<'a>,
+    cycle: u64,
+    /// Cycles since the last transfer.
+    idle: u64,
+    patience: u64,
+    /// A beat that was offered and not taken.
+    held: Option<([i32; 3], bool)>,
+    hangs: bool,
+}
+
+impl<'a> Line<'a> {
+    pub(crate) fn new(device: &'a mut dyn Device, pool: &'a [Sample]) -> Self {
+        let longest = pool.iter().map(|sample| sample.cycles.total).max().unwrap_or(0);
+        let scoreboard = Scoreboard::new(pool);
+        let patience = PATIENCE + 4 * longest;
+        Line { device, pool, scoreboard, cycle: 0, idle: 0, patience, held: None, hangs: false }
+    }
+
+    pub(super) fn samples(&self) -> usize {
+        self.pool.len()
+    }
+
+    pub(super) fn sample(&self, index: usize) -> &'a Sample {
+        &self.pool[index]
+    }
+
+    pub(crate) fn cycle(&self) -> u64 {
+        self.cycle
+    }
+
+    /// Whether it makes sense to go on.
+    pub(super) fn runs(&self) -> bool {
+        !self.hangs && !self.scoreboard.is_hopeless()
+    }
+
+    pub(super) fn finish(self) -> Outcome {
+        Outcome { cycles: self.cycle, ..self.scoreboard.outcome }
+    }
+
+    pub(super) fn outcome(&mut self) -> &mut Outcome {
+        &mut self.scoreboard.outcome
+    }
+
+    /// Sends a burst, unless the device hangs.
+    pub(crate) fn send(&mut self, burst: &Burst, pace: &mut Pace) {
+        self.offer(burst, pace, false);
+    }
+
+    /// Sends a frame at full speed when everything before it is out, and waits until it is: it must be in time.
+    pub(crate) fn send_alone(&mut self, burst: &Burst) {
+        let mut pace = Pace::full_speed();
+        self.drain(&mut pace);
+        self.offer(burst, &mut pace, true);
+        self.drain(&mut pace);
+    }
+
+    fn offer(&mut self, burst: &Burst, pace: &mut Pace, alone: bool) {
+        for &(code, last) in &burst.codes {
+            // An offered beat stays until it is taken.
+            let mut offering = false;
+            loop {
+                offering |= pace.send();
+                let offer = offering.then_some((code, last));
+                if self.step(offer, pace.receive()) {
+                    self.scoreboard.taken(self.cycle - 1, burst.sample, last, alone);
+                    break;
+                }
+                if !self.runs() {
+                    return;
+                }
+            }
+        }
+    }
+
+    /// Sends a burst at full speed for as long as there are cycles left until `end`; whether the whole burst was taken.
+    pub(super) fn send_until(&mut self, burst: &Burst, end: u64) -> bool {
+        let alone = self.scoreboard.is_empty();
+        for &(code, last) in &burst.codes {
+            while self.cycle == end || !self.step(Some((code, last)), true) {
+                if self.cycle >= end || !self.runs() {
+                    return false;
+                }
+            }
+            self.scoreboard.taken(self.cycle - 1, burst.sample, last, alone);
+        }
+        true
+    }
+
+    /// Waits until everything is out, and whether nothing else comes.
+    pub(crate) fn drain(&mut self, pace: &mut Pace) {
+        while self.runs() && !self.scoreboard.is_empty() {
+            self.step(None, pace.receive());
+        }
+        for _ in 0..QUIET_CYCLES {
+            self.step(None, true);
+        }
+    }
+
+    /// Holds the reset for some cycles, with both sides as they like.
+    pub(crate) fn reset(&mut self, cycles: u64, random: &mut fastrand::Rng) {
+        self.scoreboard.reset();
+        for held in 0..cycles {
+            let (s_valid, m_ready, s_data) = (random.bool(), random.bool(), random.i32(..));
+            let inputs = Inputs { rst: true, s_valid, s_data, s_last: random.bool(), m_ready };
+            let outputs = self.device.cycle(&inputs);
+            if outputs.s_ready {
+                self.scoreboard.violate(self.cycle, "s_axis_tready in reset".to_owned());
+            }
+            // In the first cycle the registers are still what they were.
+            if outputs.m_valid && held > 0 {
+                self.scoreboard.violate(self.cycle, "m_axis_tvalid in reset".to_owned());
+            }
+            self.cycle += 1;
+        }
+        (self.held, self.idle) = (None, 0);
+    }
+
+    /// One cycle; whether the offered code was taken.
+    fn step(&mut self, offer: Option<(i32, bool)>, m_ready: bool) -> bool {
+        let (s_data, s_last) = offer.unwrap_or_default();
+        let outputs = self.device.cycle(&Inputs { rst: false, s_valid: offer.is_some(), s_data, s_last, m_ready });
+        let offered = outputs.m_valid.then_some((outputs.m_data, outputs.m_last));
+        if self.held.is_some() && offered != self.held {
+            self.scoreboard.violate(self.cycle, "an offered beat must stay until it is taken".to_owned());
+        }
+        self.held = offered.filter(|_| !m_ready);
+        if let Some((data, last)) = offered.filter(|_| m_ready) {
+            self.scoreboard.given(self.cycle, data, last);
+        }
+        let taken = offer.is_some() && outputs.s_ready;
+        let waits = (offer.is_none() && outputs.s_ready) || (offered.is_some() && !m_ready);
+        self.scoreboard.outcome.stalled += u64::from(waits);
+        let moved = taken || (offered.is_some() && m_ready);
+        self.idle = if moved { 0 } else { self.idle + 1 };
+        if self.idle == self.patience && (offer.is_some() || !self.scoreboard.is_empty()) {
+            self.scoreboard.violate(self.cycle, format!("nothing moved for {} cycles", self.patience));
+            self.hangs = true;
+        }
+        self.cycle += 1;
+        taken
+    }
+}

@@ -1,0 +1,52 @@
+//! The frames that are played: a scene's own, and some that no sensor would give.
+
+use anyhow::Result;
+use dermis_golden::fixed::{Cycles, Model};
+use dermis_golden::frame::Frame;
+
+/// A scene's own frames that are taken.
+const OWN: usize = 4;
+
+/// The codes of one reconstruction and what the bit-true model makes of them.
+#[derive(Clone, Debug)]
+pub(crate) struct Sample {
+    /// Codes, row-major, of one frame after the other.
+    pub codes: Vec<i32>,
+    /// Taxels, after which `tlast` is due.
+    pub taxels: usize,
+    /// Forces and status.
+    pub beats: Vec<[i32; 3]>,
+    /// Of these, the ones before the status.
+    pub forces: usize,
+    /// Promised at full speed.
+    pub cycles: Cycles,
+}
+
+impl Sample {
+    fn new(model: &Model, codes: Vec<i32>) -> Sample {
+        let trace = model.run(&codes);
+        let forces = trace.beats.len();
+        let beats = [trace.beats, trace.status].concat();
+        Sample { codes, taxels: model.scene.sensor.taxels(), beats, forces, cycles: trace.cycles }
+    }
+}
+
+/// The first of a scene's own frames.
+///
+/// # Errors
+/// A frame of another sensor.
+pub(crate) fn own(model: &Model, frames: &[Frame]) -> Result<Vec<Sample>> {
+    let whole = frames.chunks_exact(1 << model.scene.input.average).take(OWN);
+    whole.map(|frames| Ok(Sample::new(model, model.readings(frames)?))).collect()
+}
+
+/// Zeros, all codes at an end of their range, one taxel alone, and noise of two sizes.
+pub(crate) fn drawn(model: &Model, random: &mut fastrand::Rng) -> Vec<Sample> {
+    let taxels = model.scene.sensor.taxels();
+    let count = taxels << model.scene.input.average;
+    let most = (1i32 << (model.formats.code_bits - 1)) - 1;
+    let mut noise = |most: i32| (0..count).map(|_| random.i32(-most - 1..=most)).collect::<Vec<_>>();
+    let alone = (0..count).map(|index| if index % taxels == taxels / 2 { most / 3 } else { 0 }).collect();
+    let all = [vec![0; count], vec![most; count], vec![-most - 1; count], noise(most), noise(7), alone];
+    all.into_iter().map(|codes| Sample::new(model, codes)).collect()
+}

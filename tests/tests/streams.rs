@@ -1,0 +1,107 @@
+//! The engine's streams under stress, on the Verilated engine: gaps and back-pressure, wrong `tlast`, resets. Nothing is
+//! lost, nothing invented, and the frame after whatever went wrong is right. Longer with `DERMIS_STRESS_CYCLES`
+//! (`make stress`).
+
+use dermis_golden::fixed::Model;
+use dermis_golden::frame::Frame;
+use dermis_golden::scene::Scene;
+use dermis_sim::hardware::Hardware;
+use dermis_sim::report;
+use dermis_sim::stress::{stress, Outcome};
+use dermis_tests::{build_dir, scene};
+
+/// Cycles of each experiment; the three of sensor-1 take a second.
+fn cycles(short: u64) -> u64 {
+    std::env::var("DERMIS_STRESS_CYCLES").map_or(short, |text| text.parse().expect("DERMIS_STRESS_CYCLES: a number"))
+}
+
+/// A few taxels, so that a reset at every cycle of a frame takes a second.
+fn small(rows: usize, cols: usize, more: &str) -> Scene {
+    let text = format!(
+        "name = \"streams\"\n[sensor]\nrows = {rows}\ncols = {cols}\npitch_x_mm = 3.0\npitch_y_mm = 4.0\n\
+         thickness_mm = 3.0\n{more}"
+    );
+    Scene::parse(&text, "streams").unwrap()
+}
+
+fn hardware(scene: &Scene) -> Hardware {
+    Hardware::new(Model::new(scene).unwrap(), &build_dir()).unwrap()
+}
+
+fn check(scene: &Scene, frames: &[Frame], short: u64) -> Vec<Outcome> {
+    let outcomes = stress(&hardware(scene), frames, cycles(short), 1).unwrap();
+    println!("{}", report::stress(&outcomes));
+    for outcome in &outcomes {
+        assert_eq!(outcome.violations, 0, "{:?}: {outcome:#?}", scene.partition);
+        assert_eq!(outcome.frames_in, outcome.frames_out, "{:?}: {outcome:#?}", scene.partition);
+        assert!(outcome.frames_out > 20 && outcome.stalled > 0, "{outcome:#?}");
+        match outcome.experiment {
+            "stalls" => assert!(outcome.timed > 0 && outcome.flagged == 0, "{outcome:#?}"),
+            "tlast" => assert!(outcome.cut.min(outcome.flagged) > 10, "{outcome:#?}"),
+            _ => assert!(outcome.resets == outcome.timed && outcome.flagged == 0, "{outcome:#?}"),
+        }
+    }
+    outcomes
+}
+
+#[test]
+fn the_shipped_scenes_lose_and_invent_nothing() {
+    for name in ["sensor-1", "eight-by-eight"] {
+        let (scene, frames) = scene(name);
+        check(&scene, &frames, 250_000);
+    }
+}
+
+#[test]
+fn several_subarrays_recover_from_a_reset_at_every_cycle() {
+    let outcomes = check(&small(4, 6, "[partition]\ncase = 3\n[search]\nmu_max = 0.05\n"), &[], 1_000_000);
+    let resets = outcomes.last().unwrap();
+    assert_eq!((resets.resets, resets.experiment), (resets.reset_places, "reset"));
+}
+
+#[test]
+fn a_choice_of_cases_recovers() {
+    let (eight, frames) = scene("eight-by-eight");
+    let sensor = &eight.sensor;
+    let lengths = [sensor.pitch_x_mm, sensor.pitch_y_mm, sensor.thickness_mm];
+    let [x, y, h] = lengths;
+    // The same text as in choice.rs, hence the same library.
+    let text = format!(
+        "name = \"choosing-eight-by-eight\"\n[sensor]\nrows = 8\ncols = 8\npitch_x_mm = {x}\npitch_y_mm = {y}\n\
+         thickness_mm = {h}\n[partition]\ncase = \"adaptive\"\n"
+    );
+    check(&Scene::parse(&text, "choosing").unwrap(), &frames, 150_000);
+}
+
+#[test]
+fn sums_without_a_search_and_averaged_frames_recover() {
+    let averaged = "[search]\nmu_max = 0.0\n[input]\naverage = 1\n";
+    check(&small(4, 4, averaged), &[], 100_000);
+    let sums = check(&unsearched(), &[], 200_000);
+    assert_eq!(sums[2].resets, sums[2].reset_places);
+}
+
+fn unsearched() -> Scene {
+    small(4, 4, "[search]\nmu_max = 0.0\n[output]\nforces = \"resultants\"\n")
+}
+
+/// Each experiment finds what it is there to find.
+#[test]
+fn a_defect_is_found() {
+    let mut hardware = hardware(&unsearched());
+    let good = hardware.generated.files[0].text.clone();
+    let defects = [
+        // A frame is taken while the last one is not read yet; an early tlast does not start over; a reset leaves a
+        // frame in the buffer.
+        ("stalls", "s_axis_tready = ~whole$q & ~rst", "s_axis_tready = ~rst"),
+        ("tlast", "scan$clear = rst | early", "scan$clear = rst"),
+        ("reset", "(taken & scan$last)) & ~free & ~rst", "(taken & scan$last)) & ~free"),
+    ];
+    for (experiment, right, wrong) in defects {
+        assert!(good.contains(right), "{right} is not in the Verilog");
+        hardware.generated.files[0].text = good.replace(right, wrong);
+        let outcomes = stress(&hardware, &[], 20_000, 1).unwrap();
+        let found = outcomes.iter().find(|outcome| outcome.experiment == experiment).unwrap();
+        assert!(found.violations > 0, "{wrong} went unnoticed: {outcomes:#?}");
+    }
+}
