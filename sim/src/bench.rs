@@ -15,6 +15,8 @@ use std::fmt::Write as _;
 
 use dermis_hdl::device::{Inputs, Outputs, Tap};
 
+/// The design's instance in the bench.
+pub(crate) const INSTANCE: &str = "bench.dut";
 /// Words of `out` before the first tap.
 const PIN_WORDS: usize = 4;
 

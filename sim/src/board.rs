@@ -41,7 +41,7 @@ impl VerilatedBoard {
              .error(out[3]));\nendmodule\n"
         );
         let files = generated.files.iter().map(|f| (f.name.as_str(), f.text.as_str())).collect();
-        let design = Design { top, files, taps: &[], input_bits: 1 };
+        let design = Design { top, files, taps: &[], input_bits: 1, writable: false };
         Bench::new(&design, &bench, OUT_WORDS, cache).map(VerilatedBoard)
     }
 }

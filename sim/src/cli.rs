@@ -62,7 +62,8 @@ const EXAMPLES: &str = "Examples:
   dermis report                                      a page: which case and format to take, errors against time
   dermis generate sensor-3 --random 2 --out two.json  a frame with known forces
   dermis stability --plot stability.svg              errors against a scene's condition
-  dermis stress                                      gaps, wrong tlast and resets, sensor-1";
+  dermis stress                                      gaps, wrong tlast and resets, sensor-1
+  dermis faults                                      1000 flipped bits in ROM, RAM and registers, sensor-1";
 
 #[derive(Subcommand, Debug)]
 enum Command {
@@ -153,6 +154,8 @@ enum Command {
     Stability(crate::stability::Arguments),
     /// Try the simulated hardware's streams under gaps, back-pressure, wrong tlast and resets.
     Stress(crate::stress::Arguments),
+    /// Flip single bits of the simulated hardware and tell what is detected, harmless or silent.
+    Faults(crate::faults::Arguments),
     /// Print the errors of scenes in the paper's cases on their shipped frames, beside the paper's.
     #[command(after_help = "Examples:
   dermis table                                       every built-in scene, cases 0 to 3
@@ -330,6 +333,7 @@ fn run(arguments: &Arguments) -> Result<(String, bool)> {
         Command::Report(arguments) => report::run(arguments, build_dir),
         Command::Generate(arguments) => Ok((crate::generate::run(arguments)?, true)),
         Command::Stability(arguments) => Ok((crate::stability::run(arguments)?, true)),
+        Command::Faults(arguments) => crate::faults::run(arguments, build_dir),
         Command::Stress(arguments) => crate::stress::run(arguments, build_dir),
         Command::Table { scenes, cases, fresh, format, cosim: false } => {
             Ok((table(scenes, cases, fresh, *format)?, true))

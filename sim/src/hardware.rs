@@ -86,22 +86,31 @@ impl Hardware {
     /// No Verilator, a design that a simulator refuses, or files that cannot be written.
     pub fn device(&self, simulator: Simulator) -> Result<Box<dyn Device>> {
         Ok(match simulator {
-            Simulator::Verilator => Box::new(self.verilated(&self.generated)?),
+            Simulator::Verilator => Box::new(self.verilated(&self.generated, false)?),
             Simulator::RustHdl => self::simulator(&self.model)?,
             Simulator::Netlist => {
                 let netlist = netlist(&self.generated, self.model.board.family, &self.cache)?;
-                Box::new(self.verilated(&netlist)?)
+                Box::new(self.verilated(&netlist, false)?)
             }
         })
     }
 
-    fn verilated(&self, generated: &Generated) -> Result<Verilated, VerilatorError> {
+    /// Starts a simulation of the Verilog of which any bit that it keeps can be flipped.
+    ///
+    /// # Errors
+    /// As [`Hardware::device`].
+    pub fn writable(&self) -> Result<Verilated, VerilatorError> {
+        self.verilated(&self.generated, true)
+    }
+
+    fn verilated(&self, generated: &Generated, writable: bool) -> Result<Verilated, VerilatorError> {
         let files = generated.files.iter().map(|f| (f.name.as_str(), f.text.as_str()));
         let design = Design {
             top: &generated.top,
             files: files.collect(),
             taps: &generated.taps,
             input_bits: self.model.formats.code_bits,
+            writable,
         };
         Verilated::new(&design, &self.cache)
     }

@@ -14,6 +14,7 @@
 //! | [`bitstream`] | a bitstream by open tools, its clock and cells against the committed ones |
 //! | [`drive`] | plays frames into a device and records every transfer with its cycle |
 //! | [`cosim`] | compares a recording with the bit-true model |
+//! | [`mod@faults`] | `dermis faults`: single bits flipped, and what comes of it |
 //! | [`fresh`] | frames of drawn contacts for `dermis table --fresh` |
 //! | [`mod@generate`] | `dermis generate`: frames with known forces from described contacts |
 //! | [`board`] | a board's UART, simulated, on a pseudo-terminal |
@@ -42,6 +43,7 @@ pub mod cli;
 pub mod compare;
 pub mod cosim;
 pub mod drive;
+pub mod faults;
 pub mod fresh;
 pub mod generate;
 pub mod guide;

@@ -24,7 +24,7 @@ use dermis_golden::frame::Frame;
 use dermis_golden::scene::Scene;
 use serde::Serialize;
 
-use pool::{drawn, own, Sample};
+pub(crate) use pool::{drawn, own, Sample};
 pub use scoreboard::Violation;
 
 use crate::hardware::{Hardware, Simulator};

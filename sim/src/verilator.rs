@@ -20,7 +20,7 @@ use dermis_hdl::device::{Device, Inputs, Outputs, Tap};
 use libloading::Library;
 use thiserror::Error;
 
-use crate::bench::Layout;
+use crate::bench::{Layout, INSTANCE};
 use crate::place;
 use crate::progress::Progress;
 
@@ -28,6 +28,10 @@ use crate::progress::Progress;
 const LIBRARY: &str = "libbench.so";
 /// The C++ side, compiled into every library.
 const SHIM: &str = include_str!("../shim/shim.cpp");
+/// Its addition for libraries whose state may be changed from outside.
+const FAULTS: &str = include_str!("../shim/faults.cpp");
+/// Verilator's listing of such a design, beside the library.
+const LISTING: &str = "listing.xml";
 /// Start value of registers without an initial value; any number shows a missing reset.
 const RESET_SEED: i32 = 20_240_501;
 /// Lines of a failed tool's output that an error repeats.
@@ -79,14 +83,21 @@ pub struct Design<'a> {
     pub taps: &'a [Tap],
     /// Width of `s_axis_tdata`, 1..=32.
     pub input_bits: u32,
+    /// Whether bits of its state can be flipped; slower.
+    pub writable: bool,
 }
+
+/// Scope, signal, word, bit; 0 where there is none such.
+type Flip = unsafe extern "C" fn(*mut c_void, *const c_char, *const c_char, u64, u64) -> i32;
 
 /// A running verilated design, its pins still packed into two vectors.
 pub(crate) struct Bench {
     handle: *mut c_void,
     cycle: unsafe extern "C" fn(*mut c_void, u64, *mut u32),
     free: unsafe extern "C" fn(*mut c_void),
+    flip: Option<Flip>,
     words: Vec<u32>,
+    path: PathBuf,
     /// Keeps the code behind the pointers above loaded; dropped after `drop` has freed the model.
     _library: Library,
 }
@@ -110,13 +121,14 @@ impl Bench {
                 *library.get::<extern "C" fn(*const c_char, i32) -> *mut c_void>(b"dermis_new").map_err(symbol)?;
             let cycle = *library.get(b"dermis_cycle").map_err(symbol)?;
             let free = *library.get(b"dermis_free").map_err(symbol)?;
+            let flip = if design.writable { Some(*library.get(b"dermis_flip").map_err(symbol)?) } else { None };
             if bytes() as usize != 4 * words {
                 return Err(fail(format!("{} output bytes, {} expected", bytes(), 4 * words)));
             }
             let memories = memory_folder(design)?;
             let folder = CString::new(memories.path().to_string_lossy().as_bytes()).map_err(|e| fail(e.to_string()))?;
             let handle = start(folder.as_ptr(), RESET_SEED);
-            Ok(Bench { handle, cycle, free, words: vec![0; words], _library: library })
+            Ok(Bench { handle, cycle, free, flip, words: vec![0; words], path: path.clone(), _library: library })
         }
     }
 
@@ -125,6 +137,16 @@ impl Bench {
         // SAFETY: `handle` lives until drop, `words` has the length checked in `new`.
         unsafe { (self.cycle)(self.handle, inputs, self.words.as_mut_ptr()) };
         &self.words
+    }
+}
+
+impl Bench {
+    /// Flips a bit; whether there is such a one.
+    fn flip(&mut self, scope: &str, signal: &str, word: usize, bit: usize) -> bool {
+        let names = [scope, signal].map(|name| CString::new(name).ok());
+        let (Some(flip), [Some(scope), Some(signal)]) = (self.flip, &names) else { return false };
+        // SAFETY: `handle` lives until drop; the library checks the names, the word and the bit.
+        unsafe { flip(self.handle, scope.as_ptr(), signal.as_ptr(), word as u64, bit as u64) != 0 }
     }
 }
 
@@ -150,6 +172,23 @@ impl Verilated {
         let layout = Layout::new(design.input_bits, design.taps);
         let bench = Bench::new(design, &layout.verilog(design.top), layout.out_words(), cache)?;
         Ok(Verilated { layout, bench })
+    }
+
+    /// Flips a bit of a word of a register or memory, before the next cycle; whether there is such a one in this
+    /// `writable` design. `scope` are the instances from its top down, separated by dots.
+    pub fn flip(&mut self, scope: &str, signal: &str, word: usize, bit: usize) -> bool {
+        // The shim's model has the name of the bench too.
+        let path = format!("bench.{INSTANCE}{}{scope}", if scope.is_empty() { "" } else { "." });
+        self.bench.flip(&path, signal, word, bit)
+    }
+
+    /// What Verilator lists of a `writable` design: modules, variables, assignments.
+    ///
+    /// # Errors
+    /// [`VerilatorError::Io`] when there is none.
+    pub fn listing(&self) -> Result<String, VerilatorError> {
+        let path = self.bench.path.with_file_name(LISTING);
+        fs::read_to_string(&path).map_err(|source| VerilatorError::Io { path, source })
     }
 }
 
@@ -190,32 +229,48 @@ fn library(design: &Design, bench: &str, cache: &Path) -> Result<PathBuf, Verila
     let mut sources: Vec<(&str, &str)> = design.files.iter().filter(|(name, _)| is_source(name)).copied().collect();
     // Verilator applies a waiver only to what it reads afterwards.
     sources.sort_by_key(|(name, _)| !name.ends_with(".vlt"));
-    sources.extend([("bench.v", bench), ("shim.cpp", SHIM)]);
+    let shim = if design.writable { [SHIM, FAULTS].concat() } else { SHIM.to_owned() };
+    sources.extend([("bench.v", bench), ("shim.cpp", &shim)]);
     let folder = cache.join(fingerprint(&sources, &version()?));
     let ready = folder.join(LIBRARY);
     let _one = BUILDING.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
     if !ready.is_file() {
-        build(design.top, &sources, &folder)?;
+        build(design, &sources, &folder)?;
     }
     Ok(ready.canonicalize().map_err(FileError::at(&ready))?)
 }
 
 /// Builds what `folder` is to hold.
-fn build(top: &str, sources: &[(&str, &str)], folder: &Path) -> Result<(), VerilatorError> {
+fn build(design: &Design, sources: &[(&str, &str)], folder: &Path) -> Result<(), VerilatorError> {
     let work = place::begin(folder)?;
     for (name, text) in sources {
         write(&work.path().join(name), text.as_bytes())?;
     }
-    let _progress = Progress::start(&format!("verilating {top}"));
-    let output = Command::new("verilator")
-        .current_dir(work.path())
-        .args(["--cc", "--exe", "--build", "-j", "2", "--top-module", "bench", "--prefix", "Vbench"])
-        .args(["--x-initial", "unique", "--x-assign", "unique", "-O3"])
-        .args(["-CFLAGS", "-fPIC -O1", "-LDFLAGS", "-shared -Wl,--wrap=fopen", "-o"])
-        .arg(Path::new("..").join(LIBRARY))
-        .args(sources.iter().map(|(name, _)| *name))
-        .output()
-        .map_err(|_| VerilatorError::Missing)?;
+    let _progress = Progress::start(&format!("verilating {}", design.top));
+    let verilate = |arguments: &[&str], sources: &[(&str, &str)]| {
+        Command::new("verilator")
+            .current_dir(work.path())
+            .args(["--top-module", "bench"])
+            .args(arguments)
+            .args(sources.iter().map(|(name, _)| *name))
+            .output()
+            .map_err(|_| VerilatorError::Missing)
+    };
+    let product = format!("../{LIBRARY}");
+    let mut library = [
+        &["--cc", "--exe", "--build", "-j", "2", "--prefix", "Vbench", "--x-initial", "unique", "--x-assign"][..],
+        &["unique", "-O3", "-CFLAGS", "-fPIC -O1", "-LDFLAGS", "-shared -Wl,--wrap=fopen", "-o", &product],
+    ]
+    .concat();
+    let mut output = None;
+    if design.writable {
+        library.push("--public-flat-rw");
+        output = Some(verilate(&["--xml-only", "--xml-output", LISTING], &sources[..sources.len() - 1])?);
+    }
+    let output = match output {
+        Some(listed) if !listed.status.success() => listed,
+        _ => verilate(&library, sources)?,
+    };
     if !output.status.success() {
         if let Some(program) = ["make", "g++"].into_iter().find(|program| !is_installed(program)) {
             return Err(VerilatorError::MissingTool { program });
@@ -224,7 +279,7 @@ fn build(top: &str, sources: &[(&str, &str)], folder: &Path) -> Result<(), Veril
         let text = String::from_utf8_lossy(&text);
         let log: Vec<&str> = text.lines().take(LOG_LINES).collect();
         // Kept, so that the named folder can be looked at.
-        return Err(VerilatorError::Build { design: top.into(), folder: work.keep(), log: log.join("\n") });
+        return Err(VerilatorError::Build { design: design.top.into(), folder: work.keep(), log: log.join("\n") });
     }
     // Only the library and its sources stay; the object files are ten times as large.
     let objects = work.path().join("obj_dir");

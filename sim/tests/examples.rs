@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 
 /// Examples that are not run here.
-const NOT_RUN: [(&str, &str); 17] = [
+const NOT_RUN: [(&str, &str); 18] = [
     ("dermis host --port /dev/ttyUSB0 press.json", BOARD),
     ("dermis host --port /dev/ttyUSB0 --scene sensor-1", BOARD),
     ("dermis host --port /dev/ttyUSB0 --forces --check press.json", BOARD),
@@ -16,6 +16,7 @@ const NOT_RUN: [(&str, &str); 17] = [
     ("dermis table", "every scene: minutes"),
     ("dermis table sensor-3 --case contacts --fresh 40 --contacts 2 --contacts 3 --shapes other", "a minute"),
     ("dermis table sensor-1 eight-by-eight --cosim", "make run"),
+    ("dermis faults", "a minute or two; the same for eight-by-eight is run"),
     ("dermis cosim sensor-1", "tests/equality.rs"),
     ("dermis noise sensor-1", "200 draws of five objectives: minutes"),
     ("dermis noise sensor-2 --objective patch --objective auto --draws 1000 --format csv", "minutes"),

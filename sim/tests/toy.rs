@@ -34,7 +34,7 @@ fn cache() -> PathBuf {
 
 fn toy_with(verilog: &str, gain: &str) -> Result<Verilated, VerilatorError> {
     let files = vec![("toy.v", verilog), ("gain.hex", gain)];
-    Verilated::new(&Design { top: "toy", files, taps: &taps(), input_bits: 12 }, &cache())
+    Verilated::new(&Design { top: "toy", files, taps: &taps(), input_bits: 12, writable: false }, &cache())
 }
 
 fn toy() -> Verilated {

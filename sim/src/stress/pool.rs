@@ -29,6 +29,11 @@ impl Sample {
         let beats = [trace.beats, trace.status].concat();
         Sample { codes, taxels: model.scene.sensor.taxels(), beats, forces, cycles: trace.cycles }
     }
+
+    /// Whether there is a force.
+    pub(crate) fn presses(&self) -> bool {
+        self.beats[..self.forces].iter().any(|beat| *beat != [0; 3])
+    }
 }
 
 /// The first of a scene's own frames.

@@ -1,0 +1,256 @@
+//! `dermis faults`: single bits flipped in the simulated hardware, and what comes of it.
+//!
+//! Each run plays two frames at full speed through the Verilated engine; at a random cycle of the first one, one bit of
+//! a ROM, a RAM or a register is flipped, a third of the runs each; the stages take turns, so that small ones are hit as
+//! well, and of a stage every bit is alike likely. A flipped ROM bit stays; what is written anew heals. Then the ROM is
+//! restored, and after a reset a frame must be right.
+//!
+//! | outcome | when |
+//! |---|---|
+//! | harmless | all beats of both frames are right |
+//! | detected | a beat is wrong and the device tells: a `tlast` in the wrong place, or, where the model has none, the framing |
+//! | | flag, saturations, or a search without result |
+//! | hang | a frame's last beat does not come, until the reset |
+//! | silent | a beat is wrong and nothing tells; with the largest error of a force against the frame's largest force |
+
+mod judge;
+pub mod places;
+mod strike;
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::Path;
+
+use anyhow::{bail, Result};
+use clap::Args;
+use dermis_golden::fixed::Model;
+use dermis_golden::frame::Frame;
+use dermis_golden::scene::Scene;
+use dermis_hdl::usage::STAGES;
+use serde::Serialize;
+
+use crate::bench::INSTANCE;
+use crate::drive::{record, Play, Stimulus};
+use crate::hardware::Hardware;
+use crate::progress::Progress;
+use crate::report;
+use crate::stress::{drawn, own, Sample};
+use judge::{judge, Verdict};
+use places::{places, Class, Place, CLASSES};
+use strike::Struck;
+
+/// What to try.
+#[derive(Args, Debug)]
+#[command(after_help = EXAMPLES)]
+pub struct Arguments {
+    /// Built-in name or path of a scene.
+    #[arg(default_value = "sensor-1")]
+    scene: String,
+    /// Faults, one per run.
+    #[arg(long, value_name = "N", default_value_t = 1000)]
+    count: usize,
+    /// Of places, cycles and frames.
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+    /// Print the outcomes as JSON and nothing else.
+    #[arg(long)]
+    json: bool,
+}
+
+const EXAMPLES: &str = "Examples:
+  dermis faults                                      1000 flipped bits in ROM, RAM and registers, sensor-1
+  dermis faults eight-by-eight --count 60 --json";
+
+/// A relative force error from which a silent fault counts as large.
+pub const LARGE: f64 = 0.01;
+
+/// What faults in one class of places of one stage did.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Row {
+    /// ROM, RAM or registers.
+    pub class: Class,
+    /// The stage.
+    pub stage: String,
+    /// Registers and memories.
+    pub signals: usize,
+    /// Their bits.
+    pub places: usize,
+    /// Faults.
+    pub tried: usize,
+    /// Different bits among them.
+    pub hit: usize,
+    /// Nothing came of it.
+    pub harmless: usize,
+    /// The device told.
+    pub detected: usize,
+    /// No answer until the reset.
+    pub hang: usize,
+    /// Wrong, and nothing told.
+    pub silent: usize,
+    /// Silent, with a force error above [`LARGE`].
+    pub large: usize,
+    /// Largest force error of a silent fault against the frame's largest force.
+    pub largest_error: f64,
+    /// Faults after which a reset did not bring the next frame right.
+    pub not_recovered: usize,
+}
+
+/// Flips `count` bits of a scene's Verilog, one per run.
+///
+/// # Errors
+/// No Verilator, a design that it refuses, or frames of another sensor.
+pub fn faults(hardware: &Hardware, frames: &[Frame], count: usize, seed: u64) -> Result<Vec<Row>> {
+    let mut random = fastrand::Rng::with_seed(seed);
+    let mut pool = own(&hardware.model, frames)?;
+    if !pool.iter().any(Sample::presses) {
+        pool = drawn(&hardware.model, &mut random);
+    }
+    pool.retain(Sample::presses);
+    let mut device = hardware.writable()?;
+    let memories = &hardware.model.resources.memories;
+    let places = places(&device.listing()?, INSTANCE, memories, &STAGES)?;
+    let longest = pool.iter().map(|sample| sample.cycles.total).max().unwrap_or(0);
+    let mut rows: BTreeMap<(Class, String), Row> = BTreeMap::new();
+    for place in &places {
+        // There and back again: every place can be hit.
+        if ![(); 2].iter().all(|()| device.flip(&place.scope, &place.signal, place.words - 1, place.bits - 1)) {
+            bail!(
+                "{}.{}, word {}, bit {} cannot be flipped",
+                place.scope,
+                place.signal,
+                place.words - 1,
+                place.bits - 1
+            );
+        }
+        let row = rows.entry((place.class, place.stage.clone())).or_insert_with(|| Row::new(place));
+        (row.signals, row.places) = (row.signals + 1, row.places + place.words * place.bits);
+    }
+    let mut hit = BTreeSet::new();
+    let bar = Progress::steps("faults", count as u64);
+    for run in 0..count {
+        bar.at(run as u64);
+        let Some((index, word, bit)) = draw(&places, run, &mut random) else { continue };
+        let place = &places[index];
+        let [first, second, after] = [(); 3].map(|()| &pool[random.usize(..pool.len())]);
+        let at = random.u64(..first.cycles.total);
+        let mut struck = Struck::new(&mut device, (place, word, bit), at);
+        let played = [first, second].map(play);
+        let recording = record(&mut struck, 0, &played, Stimulus::FullSpeed, 4 * longest);
+        let verdict = judge(&recording, &[first, second]);
+        if place.class == Class::Rom {
+            struck.strike();
+        }
+        let again = record(&mut device, 0, &[play(after)], Stimulus::FullSpeed, 4 * longest);
+        let recovered = judge(&again, &[after]) == Verdict::Harmless;
+        if let Some(row) = rows.get_mut(&(place.class, place.stage.clone())) {
+            row.add(verdict, recovered, hit.insert((index, word, bit)));
+        }
+    }
+    Ok(rows.into_values().collect())
+}
+
+/// The class's stages take turns; of a stage every bit is alike likely: place, word, bit.
+fn draw(places: &[Place], run: usize, random: &mut fastrand::Rng) -> Option<(usize, usize, usize)> {
+    let class = CLASSES[run % CLASSES.len()];
+    let stages: BTreeSet<&str> =
+        places.iter().filter(|place| place.class == class).map(|place| place.stage.as_str()).collect();
+    let stage = stages.iter().nth(run / CLASSES.len() % stages.len().max(1))?;
+    let own = || places.iter().enumerate().filter(|(_, place)| (place.class, place.stage.as_str()) == (class, *stage));
+    let mut left = random.usize(..own().map(|(_, place)| place.words * place.bits).sum::<usize>());
+    for (index, place) in own() {
+        if left < place.words * place.bits {
+            return Some((index, left / place.bits, left % place.bits));
+        }
+        left -= place.words * place.bits;
+    }
+    None
+}
+
+fn play(sample: &Sample) -> Play<'_> {
+    Play { codes: &sample.codes, taxels: sample.taxels, beats: sample.beats.len() }
+}
+
+impl Row {
+    fn new(place: &Place) -> Row {
+        Row {
+            class: place.class,
+            stage: place.stage.clone(),
+            signals: 0,
+            places: 0,
+            tried: 0,
+            hit: 0,
+            harmless: 0,
+            detected: 0,
+            hang: 0,
+            silent: 0,
+            large: 0,
+            largest_error: 0.0,
+            not_recovered: 0,
+        }
+    }
+
+    fn add(&mut self, verdict: Verdict, recovered: bool, new: bool) {
+        self.tried += 1;
+        self.hit += usize::from(new);
+        self.not_recovered += usize::from(!recovered);
+        match verdict {
+            Verdict::Harmless => self.harmless += 1,
+            Verdict::Detected => self.detected += 1,
+            Verdict::Hang => self.hang += 1,
+            Verdict::Silent(error) => {
+                self.silent += 1;
+                self.large += usize::from(error > LARGE);
+                self.largest_error = self.largest_error.max(error);
+            }
+        }
+    }
+}
+
+/// Shares of the outcomes of a fault in any bit of a class.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+pub struct Shares {
+    /// Bits of the class.
+    pub bits: usize,
+    /// Nothing comes of it.
+    pub harmless: f64,
+    /// The device tells.
+    pub detected: f64,
+    /// No answer until the reset.
+    pub hang: f64,
+    /// Wrong, and nothing tells.
+    pub silent: f64,
+    /// Silent, with a force error above [`LARGE`].
+    pub large: f64,
+}
+
+impl Shares {
+    /// Each stage's shares, weighted by its bits; `None` where there is no such bit or none was flipped.
+    pub fn of(rows: &[Row], class: Class) -> Option<Shares> {
+        let own = || rows.iter().filter(move |row| row.class == class && row.tried > 0);
+        let bits: usize = own().map(|row| row.places).sum();
+        let share = |count: fn(&Row) -> usize| {
+            own().map(|row| row.places as f64 * count(row) as f64 / row.tried as f64).sum::<f64>() / bits as f64
+        };
+        (bits > 0).then(|| Shares {
+            bits,
+            harmless: share(|row| row.harmless),
+            detected: share(|row| row.detected),
+            hang: share(|row| row.hang),
+            silent: share(|row| row.silent),
+            large: share(|row| row.large),
+        })
+    }
+}
+
+/// The outcomes as text, and whether a reset always helped.
+///
+/// # Errors
+/// An unknown scene, one without hardware, no Verilator.
+pub fn run(arguments: &Arguments, build: &Path) -> Result<(String, bool)> {
+    let scene = Scene::load(&arguments.scene)?;
+    let frames = Frame::shipped(&scene);
+    let hardware = Hardware::new(Model::for_frames(&scene, &frames)?, build)?;
+    let rows = faults(&hardware, &frames, arguments.count, arguments.seed)?;
+    let good = rows.iter().all(|row| row.not_recovered == 0);
+    let text = if arguments.json { serde_json::to_string(&rows)? + "\n" } else { report::faults(&rows) };
+    Ok((text, good))
+}

@@ -1,0 +1,77 @@
+//! What a reader of the output stream could have noticed.
+
+use dermis_golden::fixed::send::{Status, FLAG_CONDITION, FLAG_FOUND, FLAG_FRAMING, STATUS_BEATS};
+
+use crate::drive::{Beat, Recording};
+use crate::stress::Sample;
+
+/// What came of a fault.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Verdict {
+    /// Every beat is right.
+    Harmless,
+    /// Something is wrong and the device tells.
+    Detected,
+    /// No end of a frame.
+    Hang,
+    /// Something is wrong and nothing tells: the largest force error against the frame's largest force.
+    Silent(f64),
+}
+
+/// Judges what left for these frames.
+pub(super) fn judge(recording: &Recording, samples: &[&Sample]) -> Verdict {
+    let beats = &recording.beats;
+    let ends: Vec<usize> = samples
+        .iter()
+        .scan(0, |end, sample| {
+            *end += sample.beats.len();
+            Some(*end)
+        })
+        .collect();
+    let all = ends.last().copied().unwrap_or(0);
+    let wrong_last = beats.iter().enumerate().any(|(index, beat)| beat.last != ends.contains(&(index + 1)));
+    match (wrong_last || beats.len() > all, beats.len() < all) {
+        // A frame of another length than it must be: whoever counts beats sees it.
+        (true, _) => return Verdict::Detected,
+        (false, true) => return Verdict::Hang,
+        (false, false) => {}
+    }
+    let mut rest = &beats[..];
+    let (mut equal, mut told, mut error) = (recording.breaches.is_empty(), false, 0.0f64);
+    for sample in samples {
+        let (own, after) = rest.split_at(sample.beats.len());
+        rest = after;
+        equal &= own.iter().map(|beat| beat.data).eq(sample.beats.iter().copied());
+        error = error.max(force_error(&own[..sample.forces], &sample.beats[..sample.forces]));
+        told |= tells(&own[sample.forces..], &sample.beats[sample.forces..]);
+    }
+    match (equal, told) {
+        (true, _) => Verdict::Harmless,
+        (false, true) => Verdict::Detected,
+        (false, false) => Verdict::Silent(error),
+    }
+}
+
+/// Largest difference of a component against the frame's largest component.
+fn force_error(got: &[Beat], wanted: &[[i32; 3]]) -> f64 {
+    let difference = |(got, wanted): (i32, i32)| (f64::from(got) - f64::from(wanted)).abs();
+    let pairs = got.iter().zip(wanted).flat_map(|(got, wanted)| got.data.into_iter().zip(*wanted));
+    let largest = wanted.iter().flatten().fold(0.0f64, |most, &word| most.max(f64::from(word).abs()));
+    pairs.map(difference).fold(0.0, f64::max) / largest.max(1.0)
+}
+
+/// Whether a status says that its frame is not to be trusted, where the model's does not.
+fn tells(got: &[Beat], wanted: &[[i32; 3]]) -> bool {
+    let got: Vec<[i32; 3]> = got.iter().map(|beat| beat.data).collect();
+    got.chunks(STATUS_BEATS).zip(wanted.chunks(STATUS_BEATS)).any(|(got, wanted)| {
+        let doubts = |beats| Status::of_beats(beats).map_or([false; 3], |status| doubts(&status));
+        doubts(got).into_iter().zip(doubts(wanted)).any(|(got, wanted)| got && !wanted)
+    })
+}
+
+/// The framing flag, saturations, a search without result.
+fn doubts(status: &Status) -> [bool; 3] {
+    let flag = |bit: u32| status.flags & bit != 0;
+    let saturated = status.rescale_saturations + status.force_saturations > 0;
+    [flag(FLAG_FRAMING), saturated, flag(FLAG_CONDITION) && !flag(FLAG_FOUND)]
+}

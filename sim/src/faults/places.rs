@@ -1,0 +1,178 @@
+//! Every bit that a design keeps from one clock cycle to the next, read from Verilator's own listing of it.
+//!
+//! A register is what a non-blocking assignment writes; memories are those that the model lists, ROM where nothing
+//! writes them. Nothing is listed by hand: a register that a stage gets tomorrow is hit tomorrow.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use anyhow::{anyhow, Result};
+use dermis_golden::fixed::resources::Memory;
+use roxmltree::{Document, Node};
+use serde::Serialize;
+
+/// What kind of memory holds a bit.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Class {
+    /// Coefficients, lists of columns, calibration: never written.
+    Rom,
+    /// Buffers and operand memories.
+    Ram,
+    /// Everything else.
+    Register,
+}
+
+/// Classes in the order of the table.
+pub const CLASSES: [Class; 3] = [Class::Rom, Class::Ram, Class::Register];
+
+impl Class {
+    /// Name in the table.
+    pub fn name(self) -> &'static str {
+        match self {
+            Class::Rom => "ROM",
+            Class::Ram => "RAM",
+            Class::Register => "register",
+        }
+    }
+}
+
+/// A register or a memory.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Place {
+    /// Which kind.
+    pub class: Class,
+    /// The pipeline's stage, by its name in the hardware; what belongs to none is the engine's.
+    pub stage: String,
+    /// Instances from the design's top down, separated by dots; empty at the top.
+    pub scope: String,
+    /// Its name there.
+    pub signal: String,
+    /// Words.
+    pub words: usize,
+    /// Bits of a word.
+    pub bits: usize,
+}
+
+/// Reads the listing of `dut`, the instance of the design in its bench.
+///
+/// # Errors
+/// A listing of another form than Verilator's.
+pub fn places(listing: &str, dut: &str, memories: &[Memory], stages: &[&str]) -> Result<Vec<Place>> {
+    let document = Document::parse(listing).map_err(|error| anyhow!("Verilator's listing: {error}"))?;
+    let modules: BTreeMap<&str, Node> = document
+        .descendants()
+        .filter(|node| node.has_tag_name("module"))
+        // The name as cells have it, its dollars spelt out.
+        .filter_map(|node| Some((node.attribute("origName")?, node)))
+        .collect();
+    let widths = Widths::new(&document);
+    let mut all = Vec::new();
+    for cell in document.descendants().filter(|node| node.has_tag_name("cell")) {
+        let (Some(path), Some(module)) = (cell.attribute("hier"), cell.attribute("submodname")) else { continue };
+        let Some(own) = path.strip_prefix(dut).filter(|rest| rest.is_empty() || rest.starts_with('.')) else {
+            continue;
+        };
+        let (own, Some(module)) = (own.trim_start_matches('.'), modules.get(module)) else { continue };
+        let block = own.replace('.', "$");
+        let stage = own.split('.').next().filter(|stage| stages.contains(stage)).unwrap_or("engine");
+        let mut scan = Scan::default();
+        scan.walk(*module, own);
+        for ((scope, signal), kind) in &scan.declared {
+            let listed = memories.iter().any(|memory| memory.block == block && memory.array == *signal);
+            let class = match (listed, scan.assigned.contains(&(scope.clone(), signal.clone()))) {
+                (true, false) => Class::Rom,
+                (true, true) => Class::Ram,
+                (false, true) => Class::Register,
+                (false, false) => continue,
+            };
+            let [words, bits] = widths.of(kind).ok_or_else(|| anyhow!("no width of {scope}.{signal}"))?;
+            let (stage, scope, signal) = (stage.to_owned(), scope.clone(), signal.clone());
+            all.push(Place { class, stage, scope, signal, words, bits });
+        }
+    }
+    let found = all.iter().filter(|place| place.class != Class::Register).count();
+    match found == memories.len() {
+        true => Ok(all),
+        false => Err(anyhow!("{found} of {} memories are in Verilator's listing", memories.len())),
+    }
+}
+
+/// Variables of a module and which of them a clock writes, by scope and name.
+#[derive(Default)]
+struct Scan {
+    declared: BTreeMap<(String, String), String>,
+    assigned: BTreeSet<(String, String)>,
+}
+
+impl Scan {
+    fn walk(&mut self, node: Node, scope: &str) {
+        for child in node.children().filter(Node::is_element) {
+            let name = child.attribute("name").unwrap_or_default();
+            match child.tag_name().name() {
+                "var" => {
+                    let kind = child.attribute("dtype_id").unwrap_or_default().to_owned();
+                    self.declared.insert((scope.to_owned(), name.to_owned()), kind);
+                }
+                // The blocks of a loop that is unrolled have names.
+                "begin" if !name.is_empty() => {
+                    self.walk(child, &[scope, name].into_iter().filter(|s| !s.is_empty()).collect::<Vec<_>>().join("."))
+                }
+                "assigndly" => {
+                    child.children().filter(Node::is_element).last().iter().for_each(|to| self.to(*to, scope))
+                }
+                _ => self.walk(child, scope),
+            }
+        }
+    }
+
+    /// The target of an assignment: a variable, a part of one, or several side by side.
+    fn to(&mut self, target: Node, scope: &str) {
+        let mut parts = target.children().filter(Node::is_element);
+        match target.tag_name().name() {
+            "varref" => {
+                let name = target.attribute("name").unwrap_or_default().to_owned();
+                // Declared here or further out.
+                let mut scopes = std::iter::successors(Some(scope), |s| s.rsplit_once('.').map(|(outer, _)| outer));
+                let own = scopes.find(|s| self.declared.contains_key(&((*s).to_owned(), name.clone())));
+                self.assigned.insert((own.unwrap_or_default().to_owned(), name));
+            }
+            "concat" => parts.for_each(|part| self.to(part, scope)),
+            // What is selected from comes first, then where.
+            _ => parts.next().iter().for_each(|part| self.to(*part, scope)),
+        }
+    }
+}
+
+/// Words and bits of the listing's types.
+struct Widths<'a>(BTreeMap<&'a str, Node<'a, 'a>>);
+
+impl<'a> Widths<'a> {
+    fn new(document: &'a Document) -> Self {
+        let table = document.descendants().filter(|node| node.has_tag_name("typetable"));
+        let types = table.flat_map(|table| table.children()).filter(Node::is_element);
+        Widths(types.filter_map(|node| Some((node.attribute("id")?, node))).collect())
+    }
+
+    fn of(&self, id: &str) -> Option<[usize; 2]> {
+        let node = self.0.get(id)?;
+        let length = |[a, b]: [usize; 2]| a.abs_diff(b) + 1;
+        match node.tag_name().name() {
+            "basicdtype" => {
+                let end = |name| node.attribute(name).unwrap_or("0").parse().ok();
+                Some([1, length([end("left")?, end("right")?])])
+            }
+            "unpackarraydtype" => {
+                let ends = node.descendants().filter(|node| node.has_tag_name("const"));
+                let ends: Vec<usize> = ends.filter_map(|end| number(end.attribute("name")?)).collect();
+                let [words, bits] = self.of(node.attribute("sub_dtype_id")?)?;
+                Some([words * length(ends.try_into().ok()?), bits])
+            }
+            _ => self.of(node.attribute("sub_dtype_id")?),
+        }
+    }
+}
+
+/// A Verilog number as Verilator lists it: `32'sh1f`.
+fn number(text: &str) -> Option<usize> {
+    usize::from_str_radix(text.rsplit_once('h')?.1, 16).ok()
+}

@@ -1,0 +1,48 @@
+//! The table of `dermis faults`.
+
+use super::table::{aligned, percent};
+use crate::faults::places::CLASSES;
+use crate::faults::{Row, Shares, LARGE};
+
+/// One line per class and stage; then the classes' shares, in which each stage counts by its bits.
+pub fn faults(rows: &[Row]) -> String {
+    let head = [
+        "class",
+        "stage",
+        "signals",
+        "bits",
+        "flipped",
+        "different",
+        "harmless",
+        "detected",
+        "hang",
+        "silent",
+        "silent above",
+        "largest error",
+        "not recovered",
+    ];
+    let line = |row: &Row| {
+        let counts =
+            [row.signals, row.places, row.tried, row.hit, row.harmless, row.detected, row.hang, row.silent, row.large];
+        let mut cells = vec![row.class.name().to_owned(), row.stage.clone()];
+        cells.extend(counts.iter().map(usize::to_string));
+        cells.extend([percent((row.silent > 0).then_some(row.largest_error)), row.not_recovered.to_string()]);
+        cells
+    };
+    let mut text = aligned(2, &head, rows.iter().map(line).collect());
+    text.push_str(&format!(
+        "silent above: with a force error above {} of the frame's largest force; hang: no answer until the reset;\n\
+         not recovered: the frame after the reset is wrong\n\n",
+        percent(Some(LARGE))
+    ));
+    let head = ["of all bits of", "bits", "harmless", "detected", "hang", "silent", "silent above"];
+    let of = |class| {
+        let all = Shares::of(rows, class)?;
+        let shares = [all.harmless, all.detected, all.hang, all.silent, all.large];
+        let mut cells = vec![class.name().to_owned(), all.bits.to_string()];
+        cells.extend(shares.map(|share| percent(Some(share))));
+        Some(cells)
+    };
+    text.push_str(&aligned(1, &head, CLASSES.into_iter().filter_map(of).collect()));
+    text
+}
