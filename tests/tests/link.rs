@@ -207,26 +207,51 @@ fn requests_that_come_too_fast_are_overruns_and_the_rest_is_answered_in_order() 
     assert_eq!(board.receive().len(), 1);
 }
 
+/// A small array on both simulators; a small mu_max makes a small search.
+fn small(text: &str) -> Board {
+    let lengths = "pitch_x_mm = 3.0\npitch_y_mm = 4.0\nthickness_mm = 3.0\n";
+    let text = format!("[search]\nmu_max = 0.05\n[sensor]\n{lengths}{text}");
+    let model = Model::new(&Scene::parse(&text, "small").unwrap()).unwrap();
+    let (taxels, bits) = (model.scene.sensor.taxels(), model.formats.input_bits);
+    let largest = (1i32 << (bits - 1)) - 1;
+    let codes = vec![
+        vec![largest; taxels],
+        vec![-largest - 1; taxels],
+        (0..taxels as i32).map(|taxel| if taxel % 3 == 0 { -largest } else { largest / (taxel + 1) }).collect(),
+    ];
+    Board::of(model, codes, &[Simulator::Verilator, Simulator::RustHdl])
+}
+
+/// 2×3 taxels whose code is a single byte.
+const SINGLE_BYTE: &str =
+    "rows = 2\ncols = 3\n[fixed]\ninput_bits = 8\ndata_bits = 12\ncoef_bits = 8\ninverse_bits = 8\n";
+
+#[test]
+fn a_code_on_offer_when_its_packet_turns_out_bad_is_taken_and_its_frame_dropped() {
+    let mut board = small(SINGLE_BYTE);
+    // All forces take longer to send than a frame to come: while the first frame's leave, the second waits behind them, the
+    // third in the engine's buffer, and the fourth's first code in front of it until after the packet's end.
+    let kind = Kind::FrameForForces;
+    for sequence in 0..3 {
+        board.send(&board.frame(2, kind, sequence).to_wire());
+    }
+    board.send(&[&board.frame(0, kind, 9).to_wire()[..8], &[slip::END]].concat());
+    let answers = board.receive();
+    assert!(answers == [0, 1, 2].map(|sequence| board.answer(2, kind, sequence, false)), "{}", answers.len());
+    // The engine saw some codes and an early tlast, and says so once.
+    for framing in [true, false] {
+        board.send(&board.frame(0, kind, 10).to_wire());
+        assert!(board.receive() == [board.answer(0, kind, 10, framing)], "framing {framing}");
+    }
+    assert_eq!(board.counters(), Counters { taken: 6, crc: 1, ..Counters::default() });
+}
+
 #[test]
 fn other_arrays_codes_of_one_and_two_bytes_and_the_largest_sums_are_answered() {
-    // 5×6 taxels in two subarrays, and 2×3 taxels whose code is a single byte.
-    let scenes = [
-        "rows = 5\ncols = 6\n[partition]\nrows = 1\ncols = 2\n[fixed]\ninput_bits = 16\n",
-        "rows = 2\ncols = 3\n[fixed]\ninput_bits = 8\ndata_bits = 12\ncoef_bits = 8\ninverse_bits = 8\n",
-    ];
+    // 5×6 taxels in two subarrays, and 2×3 taxels.
+    let scenes = ["rows = 5\ncols = 6\n[partition]\nrows = 1\ncols = 2\n[fixed]\ninput_bits = 16\n", SINGLE_BYTE];
     for text in scenes {
-        // A small mu_max makes a small search.
-        let lengths = "pitch_x_mm = 3.0\npitch_y_mm = 4.0\nthickness_mm = 3.0\n";
-        let text = format!("[search]\nmu_max = 0.05\n[sensor]\n{lengths}{text}");
-        let model = Model::new(&Scene::parse(&text, "small").unwrap()).unwrap();
-        let (taxels, bits) = (model.scene.sensor.taxels(), model.formats.input_bits);
-        let largest = (1i32 << (bits - 1)) - 1;
-        let codes = vec![
-            vec![largest; taxels],
-            vec![-largest - 1; taxels],
-            (0..taxels as i32).map(|taxel| if taxel % 3 == 0 { -largest } else { largest / (taxel + 1) }).collect(),
-        ];
-        let mut board = Board::of(model, codes, &[Simulator::Verilator, Simulator::RustHdl]);
+        let mut board = small(text);
         for index in 0..3 {
             for kind in [Kind::FrameForResultants, Kind::FrameForForces] {
                 board.send(&board.frame(index, kind, 5).to_wire());

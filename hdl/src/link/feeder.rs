@@ -8,7 +8,8 @@ use crate::wire::{Wire, Word};
 
 /// Codes go to the engine as they come; the last two wait until the packet has been judged. A good packet lets them go,
 /// `tlast` on the last. A bad one ends with an early `tlast`, which the engine answers by dropping the frame: that takes
-/// two held codes, because after all codes but one any beat would complete the frame.
+/// two held codes, because after all codes but one any beat would complete the frame. A code that stands offered when
+/// its packet turns out bad is held until it is taken, as every beat of a stream; the early `tlast` follows it.
 ///
 /// The engine takes no code while its buffer is full. A frame that loses a code to that, or begins while the last one
 /// waits, is dropped as well, and is an `overrun` if its packet is good.
@@ -94,11 +95,17 @@ impl Feeder {
         s.aborting || (s.fill > 0 && (s.released || s.delivered < self.lag()))
     }
 
+    /// The beat on offer is the early `tlast`.
+    fn ends_early(&self) -> bool {
+        self._state.aborting && self._state.fill == 0
+    }
+
     fn next(&self) -> State {
         let mut s = self._state;
         let old = s;
         let moves = self.offers() && self.ready.val();
-        if moves && old.aborting {
+        let waits = self.offers() && !self.ready.val();
+        if moves && self.ends_early() {
             (s.aborting, s.delivered) = (false, 0);
         } else if moves {
             s.held[0] = old.held[1];
@@ -120,8 +127,8 @@ impl Feeder {
         }
         let drop = old.within_frame && !old.deaf && (self.bad.val() || (self.good.val() && old.lost));
         if drop {
-            s.fill = 0;
-            s.aborting = s.delivered > 0;
+            s.fill = usize::from(waits);
+            s.aborting = waits || s.delivered > 0;
         } else if old.within_frame && !old.deaf && self.good.val() {
             s.released = true;
         }
@@ -150,7 +157,7 @@ impl Logic for Feeder {
         self.overrun.next = self.good.val() && s.within_frame && refused;
         self.code.next = Word::of_fields(&[i64::from(s.held[0])], self.code.width());
         self.valid.next = self.offers();
-        self.last.next = s.aborting || s.delivered + 1 == self._taxels;
+        self.last.next = self.ends_early() || s.delivered + 1 == self._taxels;
     }
 
     fn connect(&mut self) {
@@ -185,13 +192,15 @@ reg [{d_end}:0] delivered;
 reg within_frame, deaf, lost, released, aborting;
 wire refused = deaf || lost;
 wire at_last = delivered == {d}'d{end};
+wire early = aborting && fill == 2'd0;
 always @(*) begin
   taken = good && within_frame && !refused;
   overrun = good && within_frame && refused;
   valid = aborting || (fill != 2'd0 && (released || delivered < {d}'d{lag}));
-  last = aborting || at_last;
+  last = early || at_last;
 end
-wire moves = valid && ready && !aborting;
+wire moves = valid && ready && !early;
+wire waits = valid && !ready;
 wire complete = payload && !deaf && byte_index == {b}'d{last_byte};
 wire [1:0] left = fill - {{1'b0, moves}};
 wire push = complete && left != 2'd{HELD};
@@ -204,12 +213,12 @@ always @(posedge clk) begin
   if (push && left == 2'd0) code <= arrived;
   else if (moves) code <= second;
   if (push && left != 2'd0) second <= arrived;
-  fill <= drop ? 2'd0 : push ? left + 2'd1 : left;
-  delivered <= aborting && ready ? {d}'d0 : after;
+  fill <= drop ? {{1'b0, waits}} : push ? left + 2'd1 : left;
+  delivered <= early && ready ? {d}'d0 : after;
   if (taken) released <= 1'b1;
   else if (moves && at_last) released <= 1'b0;
-  if (drop) aborting <= after != {d}'d0;
-  else if (ready) aborting <= 1'b0;
+  if (drop) aborting <= waits || after != {d}'d0;
+  else if (early && ready) aborting <= 1'b0;
   if (complete && left == 2'd{HELD}) lost <= 1'b1;
   if (good || bad) within_frame <= 1'b0;
   if (frame_begin) begin

@@ -10,6 +10,7 @@
 //! | `receive.v`: a frame stands whole where it belongs; tlast is judged; dead taxels count as 0 | `receive` |
 //! | `send.v`: a frame has all its beats, none leaves outside a frame, what is offered stays | `send`, `force` |
 //! | `counter.v`: below its limit | counters |
+//! | `feeder.v`: what is offered stays; a whole frame for each packet taken and no other | the link's feeder |
 //! | `slip.v`: each byte goes out once and reads back | the link's encoder |
 //! | `rescale.v`: half up, held to the word's range, clips counted | `rescaler` |
 //! | `replay.v`: rows wait for their shift, then come out once, in order | `rescale` and its memory |
@@ -150,4 +151,27 @@ fn bytes_of_the_link_read_back() {
     let block = block_with(generated, "(clk,rst,content,border,content_valid,");
     let defect = ("second <= special && !second;", "second <= special;");
     Proof { generated, property: "slip.v", given: vec![("BLOCK", block)], defect, open_products: false }.run();
+}
+
+#[test]
+fn the_feeder_keeps_what_it_offers_and_gives_the_engine_good_frames_only() {
+    let generated = &generate_board(&model("")).unwrap();
+    let verilog = generated.files.iter().find(|file| file.name.ends_with(".v")).unwrap();
+    let modules = verilog.text.lines().filter_map(|line| line.strip_prefix("module ")?.split('(').next());
+    let block = modules.into_iter().find(|name| name.ends_with("$feeder")).unwrap().to_string();
+    let taxels = ROWS * COLS;
+    let defects = [
+        // What stands offered is dropped with its packet; one code is held back in the place of two.
+        ("fill <= drop ? {1'b0, waits} :", "fill <= drop ? 2'd0 :"),
+        ("released || delivered < 3'd4", "released || delivered < 3'd5"),
+    ];
+    for defect in defects {
+        let given = vec![
+            ("BLOCK", block.clone()),
+            ("BITS", number(8)),
+            ("BYTES", number(taxels)),
+            ("LAST", number(taxels - 1)),
+        ];
+        Proof { generated, property: "feeder.v", given, defect, open_products: false }.run();
+    }
 }
