@@ -8,6 +8,7 @@
 //! | `saturated` | an input code was clipped, or the engine's arithmetic saturated | [`frame_flags`], the engine |
 //! | `load-outside` | part of the contact lies over the array's edge | `frame_flags` |
 //! | `medium-mismatch` | the frame names another medium than the scene | `frame_flags` |
+//! | `coefficients-damaged` | the hardware's coefficient memory is not what it must be | the engine |
 //! | `shear-unreliable` | noise floor or LSB/√12 above 5·10⁻⁵ of the peak, with `sparse` | `frame_flags` |
 
 use crate::frame::Frame;
@@ -33,6 +34,8 @@ pub enum Flag {
     MediumMismatch,
     /// Noise or quantisation is too large for the objective.
     ShearUnreliable,
+    /// The hardware's coefficient memory is not what it must be.
+    CoefficientsDamaged,
 }
 
 /// Share of the true normal load below which the cells do not hold all of it.
@@ -111,6 +114,7 @@ mod tests {
             Flag::LoadOutside,
             Flag::MediumMismatch,
             Flag::ShearUnreliable,
+            Flag::CoefficientsDamaged,
         ];
         let text = serde_json::to_string(&all).unwrap();
         let wanted = [
@@ -121,6 +125,7 @@ mod tests {
             "load-outside",
             "medium-mismatch",
             "shear-unreliable",
+            "coefficients-damaged",
         ];
         assert_eq!(text, serde_json::to_string(&wanted).unwrap());
     }

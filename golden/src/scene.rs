@@ -17,7 +17,7 @@
 //! | `[threshold]` | `min_force_N` (0) |
 //! | `[fixed]` | `input_bits` (20; 8 … 24), `data_bits` (18; 12 … 18), `coef_bits` (18; 8 … 18) |
 //! | | `inverse_bits` (24; `coef_bits` … 32), `prune_bits` (20; 8 … 31), `lanes` (what the board allows; 4, 8 … 1024) |
-//! | `[hardware]` | `board` ("ulx3s-85f") |
+//! | `[hardware]` | `board` ("ulx3s-85f"), `coefficient_check` ("none"; "signature") |
 //! | `[input]` | `full_scale_MPa` (the frame's peak), `average` (0 … 12), `calibration`, `tare` (files), `dead` |
 //! | | (\[row, col\] each), `unipolar` (false) |
 //! | `[output]` | `forces` ("taxels"; "resultants") |
@@ -185,11 +185,23 @@ pub struct FixedSpec {
     pub lanes: Option<u32>,
 }
 
+/// Whether the hardware watches its coefficient memory.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum CoefficientCheck {
+    /// It does not.
+    #[default]
+    None,
+    /// Each subarray's status tells when a word that was read is not what it was, see [`crate::fixed::check`].
+    Signature,
+}
+
 /// Table `[hardware]`.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct HardwareSpec {
     /// One of [`crate::board::Board::names`].
     pub board: String,
+    /// Whether the coefficient memory is watched.
+    pub coefficient_check: CoefficientCheck,
 }
 
 /// Table `[input]`; its meaning is in [`crate::input`].
@@ -279,7 +291,7 @@ impl Default for FixedSpec {
 
 impl Default for HardwareSpec {
     fn default() -> Self {
-        HardwareSpec { board: "ulx3s-85f".to_string() }
+        HardwareSpec { board: "ulx3s-85f".to_string(), coefficient_check: CoefficientCheck::None }
     }
 }
 

@@ -81,6 +81,7 @@ pub struct Engine {
     searched_normalise: Keep,
     searched_rescale: Keep,
     searched_saturations: Keep,
+    searched_damaged: Keep,
     cycles: Counter,
     part: CaseCounter,
     again: BitDelay,
@@ -140,6 +141,7 @@ impl Engine {
             searched_normalise: Keep::new(normalise.shift.width()),
             searched_rescale: Keep::new(rescale.shift.width()),
             searched_saturations: Keep::new(rescale.saturations.width()),
+            searched_damaged: Keep::new(1).constant(!model.checks()),
             normalise,
             rescale,
             cycles: Counter::new(1 << CYCLE_BITS),
@@ -197,6 +199,7 @@ impl Logic for Engine {
         self.searched_normalise.clk.next = self.clk.val();
         self.searched_rescale.clk.next = self.clk.val();
         self.searched_saturations.clk.next = self.clk.val();
+        self.searched_damaged.clk.next = self.clk.val();
         self.receive.rst.next = self.rst.val();
         self.fold.rst.next = self.rst.val();
         self.pass.rst.next = self.rst.val();
@@ -262,6 +265,8 @@ impl Logic for Engine {
         self.searched_rescale.word.next = self.rescale.shift.val();
         self.searched_saturations.keep.next = self.hand_over.val();
         self.searched_saturations.word.next = self.rescale.saturations.val();
+        self.searched_damaged.keep.next = self.hand_over.val();
+        self.searched_damaged.word.next = self.pass.damaged.val();
 
         comment!("Then the next one begins");
         self.part.clear.next = self.rst.val();
@@ -341,6 +346,7 @@ impl Logic for Engine {
         self.forces.normalise.next = self.searched_normalise.kept.val();
         self.forces.rescale.next = self.searched_rescale.kept.val();
         self.forces.saturations.next = self.searched_saturations.kept.val();
+        self.forces.damaged.next = self.searched_damaged.kept.val();
         self.forces.condition.next = self.searched_condition.q.val();
         self.forces.framing.next = self.sent_framing.q.val();
         self.forces.cycles.next = self.cycles.value.val();

@@ -10,6 +10,7 @@
 //! | `?` | 1 |
 //! | `&`, `|`, `^`, `!` and comparisons | 1/4 |
 //! | shift by a signal | 3 |
+//! | parity of a part select | a third of the bits selected |
 //! | a table logarithm | 2 per bit of the argument, 40 for its last bits and the table |
 
 use std::collections::{BTreeMap, BTreeSet};
@@ -223,7 +224,7 @@ fn cost(value: &str) -> f64 {
             plain.push(c);
         }
     }
-    let mut sum = 0.0;
+    let mut sum = reduced(value);
     let tokens: Vec<&str> = plain.split_whitespace().collect();
     for (index, token) in tokens.iter().enumerate() {
         let next = tokens.get(index + 1).copied().unwrap_or_default();
@@ -236,6 +237,12 @@ fn cost(value: &str) -> f64 {
         };
     }
     sum
+}
+
+/// LUTs of the parities of part selects: each takes three bits away.
+fn reduced(value: &str) -> f64 {
+    let selects = value.split('^').skip(1).filter_map(|rest| rest.split(']').next()?.rsplit_once("+: "));
+    selects.filter_map(|(_, bits)| bits.parse::<f64>().ok()).map(|bits| ((bits - 1.0) / 3.0).ceil()).sum()
 }
 
 /// LUTs of the logarithm's functions.

@@ -3,7 +3,9 @@
 use std::collections::BTreeMap;
 
 use dermis_golden::fixed::resources::Memory;
-use dermis_golden::fixed::send::{CASE_SHIFT, FLAG_CONDITION, FLAG_FOUND, FLAG_FRAMING, FLAG_NO_CONTACT, STATUS_BEATS};
+use dermis_golden::fixed::send::{
+    CASE_SHIFT, FLAG_COEFFICIENTS, FLAG_CONDITION, FLAG_FOUND, FLAG_FRAMING, FLAG_NO_CONTACT, STATUS_BEATS,
+};
 use dermis_golden::fixed::storage::word_bits;
 use dermis_golden::fixed::{Cycles, Dropped, Model};
 use dermis_golden::link::{c_header, LinkError};
@@ -261,6 +263,7 @@ fn manifest(model: &Model, top: &str, usage: &BTreeMap<String, Usage>, dropped: 
                 "found": FLAG_FOUND,
                 "no_contact": FLAG_NO_CONTACT,
                 "framing": FLAG_FRAMING,
+                "coefficients": model.checks().then_some(FLAG_COEFFICIENTS),
                 "case_shift": model.chooses().then_some(CASE_SHIFT),
             },
         },

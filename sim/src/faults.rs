@@ -8,8 +8,8 @@
 //! | outcome | when |
 //! |---|---|
 //! | harmless | all beats of both frames are right |
-//! | detected | a beat is wrong and the device tells: a `tlast` in the wrong place, or, where the model has none, the framing |
-//! | | flag, saturations, or a search without result |
+//! | detected | a beat is wrong and the device tells: a `tlast` in the wrong place, or, where the model has none, a flag of |
+//! | | framing or coefficients, saturations, or a search without result |
 //! | hang | a frame's last beat does not come, until the reset |
 //! | silent | a beat is wrong and nothing tells; with the largest error of a force against the frame's largest force |
 

@@ -13,6 +13,7 @@
 //! | `explain` | what is left out is not in the Verilog, and what that saves; refusals name what fits |
 //! | `framing` | early and missing `tlast`: what is dropped, what is flagged, and equality right after |
 //! | `streams` | gaps, back-pressure, wrong `tlast`, a reset at every cycle: nothing lost or invented, right after |
+//! | `coefficients` | the coefficient check: no false alarm, every tried flip told, left out by default |
 //! | `faults` | flipped bits in ROM, RAM and registers: all of them are found, outcomes add up, a reset helps |
 //! | `proofs` | handshakes and queues lose, invent and change nothing, words are held to their range: proved, not tried |
 //! | `link` | the board's UART: answers, counters, recovery; Verilator = rust-hdl, pin by pin |

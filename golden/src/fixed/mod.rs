@@ -9,6 +9,7 @@
 //! result is from the floating-point model is measured, never assumed: see the tests that span the crates.
 
 pub mod arith;
+pub mod check;
 pub mod choose;
 pub mod coefficients;
 pub mod cycles;

@@ -13,7 +13,7 @@ use super::remedy::{remedies, Shortage};
 use super::resources::Resources;
 use super::resultants::{self, sums};
 use super::search::Best;
-use super::send::{Status, FLAG_CONDITION, FLAG_FOUND, FLAG_NO_CONTACT, STATUS_BEATS};
+use super::send::{Status, FLAG_COEFFICIENTS, FLAG_CONDITION, FLAG_FOUND, FLAG_NO_CONTACT, STATUS_BEATS};
 use super::storage::Storage;
 use super::subarray::Solved;
 use crate::board::{Board, BoardError};
@@ -433,6 +433,9 @@ impl Model {
             }
             if status.rescale_saturations + status.force_saturations > 0 {
                 flags.push(Flag::Saturated);
+            }
+            if status.flags & FLAG_COEFFICIENTS != 0 {
+                flags.push(Flag::CoefficientsDamaged);
             }
             subarrays.push(SubarrayResult {
                 row0: part.row0,

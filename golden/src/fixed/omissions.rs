@@ -7,7 +7,7 @@ use super::model::{FixedError, Model};
 use super::prepare::Scale;
 use crate::matrices::MAX_DEGREE;
 use crate::partition::{subarrays, Case};
-use crate::scene::{ForceOutput, Scene, SearchSpec};
+use crate::scene::{CoefficientCheck, ForceOutput, Scene, SearchSpec};
 
 /// A feature that a scene has or leaves out.
 #[derive(Debug)]
@@ -101,6 +101,9 @@ pub fn features(model: &Model) -> Vec<Feature> {
     // A corner breaks every symmetry.
     add("dead taxels", dead > 0, set(dead > 0, own, "dead = [[0, 0]]"), &|| {
         plain(&with(&|s| s.input.dead = vec![[0, 0]]))
+    });
+    add("coefficient check", model.checks(), "a signature of the words read".into(), &|| {
+        plain(&with(&|s| s.hardware.coefficient_check = CoefficientCheck::Signature))
     });
     let resultants = model.wants_resultants();
     add("resultants", resultants, "a force and its moments per subarray".into(), &|| {

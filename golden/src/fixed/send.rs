@@ -23,6 +23,9 @@ pub const FLAG_FOUND: u32 = 1 << 1;
 pub const FLAG_NO_CONTACT: u32 = 1 << 2;
 /// Flag bit: `tlast` came early or was missing since the last frame sent; the frame it cut short was dropped.
 pub const FLAG_FRAMING: u32 = 1 << 3;
+/// Flag bit: the coefficient memory does not hold what it must; of a scene with
+/// `hardware.coefficient_check = "signature"` ([`super::check`]).
+pub const FLAG_COEFFICIENTS: u32 = 1 << 4;
 /// Place of the paper's case number, 2 bits, among the flags; 0 where a scene has one case.
 pub const CASE_SHIFT: u32 = 8;
 

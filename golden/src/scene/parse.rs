@@ -2,8 +2,8 @@
 
 use super::reader::Reader;
 use super::{
-    Condition, FixedSpec, ForceOutput, Form, HardwareSpec, InputSpec, InverseKind, InverseSpec, Medium, ObjectiveKind,
-    OutputSpec, PartitionSpec, Scene, SceneError, SearchSpec, ThresholdSpec,
+    CoefficientCheck, Condition, FixedSpec, ForceOutput, Form, HardwareSpec, InputSpec, InverseKind, InverseSpec,
+    Medium, ObjectiveKind, OutputSpec, PartitionSpec, Scene, SceneError, SearchSpec, ThresholdSpec,
 };
 use crate::board::Board;
 use crate::partition::{subarrays, Case, Grid};
@@ -22,7 +22,7 @@ const SCHEMA: [(&str, &[&str]); 11] = [
     ("inverse", &["kind", "level"]),
     ("threshold", &["min_force_N"]),
     ("fixed", &["input_bits", "data_bits", "coef_bits", "inverse_bits", "prune_bits", "lanes"]),
-    ("hardware", &["board"]),
+    ("hardware", &["board", "coefficient_check"]),
     ("input", &["full_scale_MPa", "average", "calibration", "tare", "dead", "unipolar"]),
     ("output", &["forces"]),
 ];
@@ -258,7 +258,9 @@ fn lanes(reader: &Reader) -> Result<Option<u32>, SceneError> {
 fn hardware(reader: &Reader) -> Result<HardwareSpec, SceneError> {
     let boards: Vec<_> = Board::names().into_iter().map(|board| (board, Some(board))).collect();
     let board = reader.choice("hardware.board", &boards)?;
-    Ok(board.map_or_else(HardwareSpec::default, |board| HardwareSpec { board: board.to_string() }))
+    let board = board.map_or_else(|| HardwareSpec::default().board, str::to_string);
+    let checks = [("none", CoefficientCheck::None), ("signature", CoefficientCheck::Signature)];
+    Ok(HardwareSpec { board, coefficient_check: reader.choice("hardware.coefficient_check", &checks)? })
 }
 
 fn input(reader: &Reader, origin: &str, sensor: &Sensor) -> Result<InputSpec, SceneError> {

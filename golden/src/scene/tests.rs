@@ -54,6 +54,7 @@ fn every_field_is_read() {
         inverse_bits = 18
         [hardware]
         board = "ulx3s-85f"
+        coefficient_check = "signature"
         [input]
         full_scale_MPa = 0.25
         average = 6
@@ -67,6 +68,7 @@ fn every_field_is_read() {
     assert_eq!(scene.medium, Medium::BondedLayer { poisson: 0.4 });
     assert_eq!(scene.partition.case, Case::Grid(Grid { rows: 2, cols: 5 }));
     assert_eq!(scene.partition.condition, Condition::BothSigns);
+    assert_eq!(scene.hardware.coefficient_check, CoefficientCheck::Signature);
     assert_eq!(scene.search.objective, ObjectiveKind::Patch);
     assert_eq!((scene.search.mu_max, scene.search.noise_floor_MPa), (1.0, 0.001));
     assert_eq!(scene.search.form, Form::Orthogonal);
@@ -135,6 +137,7 @@ fn wrong_values_name_what_is_allowed() {
         ("[fixed]\ncoef_bits = 16\ninverse_bits = 15", "from 16 to 32"),
         ("[fixed]\ninput_bits = \"20\"", "fixed.input_bits = \"20\""),
         ("[hardware]\nboard = \"icebreaker\"", "\"ulx3s-85f\""),
+        ("[hardware]\ncoefficient_check = \"parity\"", "\"none\" or \"signature\""),
         ("[input]\nfull_scale_MPa = 0", "above 0"),
         ("[input]\naverage = 13", "from 0 to 12"),
         ("[input]\ndead = [[0, 10]]", "a list of [row, col], row 0 to 9, col 0 to 9"),

@@ -2,7 +2,9 @@
 
 use dermis_golden::fixed::force::{force, mu_word};
 use dermis_golden::fixed::formats::{force_shift, Formats, FORCE_BITS, FORCE_SHIFT_MAX, MU_ROUND};
-use dermis_golden::fixed::send::{CASE_SHIFT, FLAG_CONDITION, FLAG_FOUND, FLAG_FRAMING, FLAG_NO_CONTACT};
+use dermis_golden::fixed::send::{
+    CASE_SHIFT, FLAG_COEFFICIENTS, FLAG_CONDITION, FLAG_FOUND, FLAG_FRAMING, FLAG_NO_CONTACT,
+};
 use dermis_golden::fixed::Model;
 use rust_hdl::prelude::*;
 
@@ -58,6 +60,8 @@ pub struct ForceUnit {
     pub found: Signal<In, Bit>,
     /// `tlast` was early or missing.
     pub framing: Signal<In, Bit>,
+    /// The subarray's coefficients were not what they must be.
+    pub damaged: Wire<In>,
     /// Score of the winner.
     pub score: Wire<In>,
     /// Words that `rescale` saturated.
@@ -77,6 +81,7 @@ pub struct ForceUnit {
     _parts: Vec<Part>,
     _counts: Vec<usize>,
     _numbers: Vec<u32>,
+    _checks: bool,
 }
 
 /// Steps from `offer` to the output.
@@ -100,6 +105,7 @@ struct Part {
     rescale: u32,
     condition: bool,
     found: bool,
+    damaged: bool,
     score: i32,
     saturations: u32,
 }
@@ -139,6 +145,7 @@ impl ForceUnit {
             condition: Default::default(),
             found: Default::default(),
             framing: Default::default(),
+            damaged: Wire::new(1),
             score: Wire::new(formats.score_bits as usize),
             saturations: Wire::new(SATURATION_BITS),
             cycles: Wire::new(CYCLE_BITS),
@@ -146,6 +153,7 @@ impl ForceUnit {
             last: Default::default(),
             beat_data: Wire::new(3 * FORCE_BITS as usize),
             _formats: formats.clone(),
+            _checks: model.checks(),
             _threshold: model.threshold,
             _pipe: vec![None; STEPS - 1],
             _frame: Frame::default(),
@@ -168,6 +176,7 @@ impl ForceUnit {
             rescale: self.rescale.val().number() as u32,
             condition: self.condition.val(),
             found: self.found.val(),
+            damaged: self.damaged.val().number() == 1,
             score: if self.found.val() { self.score.val().signed(0, self.score.width()) as i32 } else { 0 },
             saturations: self.saturations.val().number() as u32,
         };
@@ -195,6 +204,7 @@ impl ForceUnit {
                     | flag(part.found, FLAG_FOUND)
                     | flag(!frame.contact, FLAG_NO_CONTACT)
                     | flag(self.framing.val(), FLAG_FRAMING)
+                    | flag(part.damaged, FLAG_COEFFICIENTS)
                     | self._numbers[case] << CASE_SHIFT;
                 [part.position[0], part.position[1], flags as i32]
             }
@@ -350,14 +360,22 @@ impl Logic for ForceUnit {
         };
         let searched = f.degree > 0;
         let (mu_words, shear) = if searched { self.shear() } else { self.no_shear() };
-        // From bit 4 on.
+        // From bit 4 on, or 5 where that tells of the coefficients.
+        let (from, damaged) = if self._checks { (5, ", damages[at4]") } else { (4, "") };
         let above = word - CASE_SHIFT as usize;
         let case_word = match self._numbers.iter().any(|&number| number > 0) {
-            false => format!("{}'d0", word - 4),
+            false => format!("{}'d0{damaged}", word - from),
             true => {
                 let number = number_by_case(self._numbers.iter().map(|&number| number as usize), above);
-                format!("{number}, {}'d0", CASE_SHIFT - 4)
+                format!("{number}, {}'d0{damaged}", CASE_SHIFT as usize - from)
             }
+        };
+        let damages = match self._checks {
+            true => format!(
+                "reg [{}:0] damages;\nalways @(posedge clk) if (start) damages[part] <= damaged;\n",
+                self._parts.len() - 1
+            ),
+            false => "wire unused_damaged = &{1'b0, damaged};\n".to_string(),
         };
         let magnitude = if self._threshold == 0 {
             String::new()
@@ -367,7 +385,7 @@ impl Logic for ForceUnit {
         Verilog::Custom(format!(
             "\
 wire unused_which = &{{1'b0, which}};
-reg [{n_end}:0] normalise_held;
+{damages}reg [{n_end}:0] normalise_held;
 reg [{r_end}:0] rescale_held;
 reg [{part_end}:0] part1, part2;
 reg start1, start2;

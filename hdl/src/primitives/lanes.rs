@@ -1,12 +1,14 @@
 //! The MAC lanes with their coefficient memory and shift-out chains.
 
+use dermis_golden::fixed::check::{parity, signature, step, POLYNOMIAL, START};
 use dermis_golden::fixed::formats::{Formats, MULTIPLIER_BITS};
 use dermis_golden::fixed::Model;
 use rust_hdl::prelude::*;
 
-use super::case_counter::{largest, number_by_case};
+use super::case_counter::{by_case, largest, number_by_case};
 use super::counter::count_bits;
 use super::polynomial_word::resize;
+use super::steps::control_bits;
 use crate::wire::{Wire, Word};
 
 const M: usize = MULTIPLIER_BITS as usize;
@@ -33,12 +35,15 @@ pub struct Lanes {
     pub operands: Wire<In>,
     /// `operands` are a product to accumulate.
     pub valid: Signal<In, Bit>,
-    /// Align, first, last.
+    /// Align, first, last; of a subarray the first.
     pub control: Wire<In>,
     /// Accumulators of one row, four parities.
     pub quad: Wire<Out>,
     /// `quad` is a row.
     pub quad_valid: Signal<Out, Bit>,
+    /// What was read since a subarray's first product is not what it must be; settled four cycles after its last. Zero
+    /// where the coefficients are not checked.
+    pub damaged: Wire<Out>,
     _shape: Shape,
     _groups: Vec<usize>,
     _last_rows: Vec<usize>,
@@ -49,6 +54,8 @@ pub struct Lanes {
     _chain: Vec<i64>,
     _left: usize,
     _group: usize,
+    /// The signature, and what it must be for each case.
+    _check: Option<(u32, Vec<u32>)>,
 }
 
 /// Name of the coefficient memory's file.
@@ -67,6 +74,7 @@ struct Beat {
     align: bool,
     first: bool,
     last: bool,
+    opens: bool,
     word: usize,
     operands: Word,
 }
@@ -86,9 +94,11 @@ impl Lanes {
             address: Wire::new(count_bits(memory.len())),
             operands: Wire::new(4 * M),
             valid: Default::default(),
-            control: Wire::new(3),
+            control: Wire::new(control_bits(model)),
             quad: Wire::new(4 * shape.acc_bits),
             quad_valid: Default::default(),
+            damaged: Wire::new(1),
+            _check: model.checks().then(|| (START, cases.iter().map(signature).collect())),
             _pipe: vec![Beat::default(); 4],
             _coefficients: [0; 2],
             _accumulators: vec![0; 4 * per_parity],
@@ -120,8 +130,46 @@ impl Lanes {
             .collect()
     }
 
+    /// Verilog of the signature; a lane's parity first, then four lanes', then all.
+    fn check(&self) -> String {
+        let Some((_, wanted)) = &self._check else { return "always @(*) damaged = 1'b0;\n".to_string() };
+        let wanted: Vec<String> = wanted.iter().map(|signature| format!("32'h{signature:08x}")).collect();
+        let fours = self._shape.per_parity;
+        format!(
+            "\
+// Whether the coefficients that were read are those that were written.
+reg [{lanes_end}:0] odd_lanes;
+reg [{fours_end}:0] odd_fours;
+reg [31:0] signature;
+reg opens1, opens2;
+wire [31:0] sofar = opens2 ? 32'h{START:08x} : signature;
+always @(posedge clk) begin
+  {{opens2, opens1}} <= {{opens1, control[3]}};
+  if (valid2) signature <= {{sofar[30:0], ^odd_fours}} ^ (sofar[31] ? 32'h{POLYNOMIAL:08x} : 32'd0);
+end
+always @(*) damaged = signature != {wanted};
+genvar o;
+generate
+  for (o = 0; o < {lanes}; o = o + 1) begin : odd_lane
+    always @(posedge clk) odd_lanes[o] <= ^coefficients[o * {M} +: {M}];
+  end
+  for (o = 0; o < {fours}; o = o + 1) begin : odd_four
+    always @(posedge clk) odd_fours[o] <= ^odd_lanes[o * 4 +: 4];
+  end
+endgenerate
+",
+            lanes = 4 * fours,
+            lanes_end = 4 * fours - 1,
+            fours_end = fours - 1,
+            wanted = by_case(&wanted),
+        )
+    }
+
     fn accumulate(&mut self, beat: &Beat) {
         let word = &self._memory[beat.word];
+        if let Some((signature, _)) = &mut self._check {
+            *signature = step(if beat.opens { START } else { *signature }, parity(word));
+        }
         for (lane, acc) in self._accumulators.iter_mut().enumerate() {
             let operand = beat.operands.signed(lane / self._shape.per_parity, M);
             let product = (word[lane] * operand) << if beat.align { self._shape.align } else { 0 };
@@ -164,6 +212,7 @@ impl Logic for Lanes {
                 align: control & 1 == 1,
                 first: control & 2 == 2,
                 last: control & 4 == 4,
+                opens: control & 8 == 8,
                 word: self._coefficients[1],
                 operands: self.operands.val(),
             });
@@ -178,11 +227,16 @@ impl Logic for Lanes {
             self.quad.next = Word::of_fields(&heads, self._shape.acc_bits);
             self.quad_valid.next = self._left > 0;
         }
+        if let Some((signature, wanted)) = &self._check {
+            let case = (self.which.val().number() as usize).min(wanted.len() - 1);
+            self.damaged.next = (*signature != wanted[case]).into();
+        }
     }
 
     fn connect(&mut self) {
         self.quad.connect();
         self.quad_valid.connect();
+        self.damaged.connect();
     }
 
     fn hdl(&self) -> Verilog {
@@ -243,7 +297,7 @@ always @(posedge clk) begin
   {{first2, first1}} <= {{first1, control[1]}};
   {{last4, last3, last2, last1}} <= {{last3, last2, last1, control[2]}};
 end
-{align_registers}{count_group}always @(posedge clk) begin
+{align_registers}{count_group}{check}always @(posedge clk) begin
   if (rst) left <= {row_bits}'d0;
   else if (valid4 && last4) left <= {rows};
   else if (left != {row_bits}'d0) left <= left - {row_bits}'d1;
@@ -281,6 +335,7 @@ generate
     end
   end
 endgenerate",
+            check = self.check(),
             word_end = lanes * M - 1,
             words_end = words - 1,
             row_end = row_bits - 1,

@@ -76,7 +76,7 @@ pub use score::{Score, LATENCY as SCORE_LATENCY};
 pub use slice::Slice;
 pub use spread::Spread;
 pub use status_code::StatusCode;
-pub use steps::{Steps, COLUMN_FILE, SOURCE_BITS};
+pub use steps::{control_bits, Steps, COLUMN_FILE, SOURCE_BITS};
 pub use store::{Store, LATENCY as STORE_LATENCY};
 pub use sum::Sum;
 pub use sweep::{position_bits, BUFFER_BITS};

@@ -29,6 +29,8 @@ pub struct Step {
     pub first: bool,
     /// Ends it.
     pub last: bool,
+    /// Begins a subarray.
+    pub opens: bool,
     /// Vectors that must be finished before.
     pub needs: usize,
 }
@@ -55,6 +57,7 @@ pub fn unroll(model: &Model) -> Vec<Step> {
                     align: product.align,
                     first: index == 0,
                     last: index + 1 == products.len(),
+                    opens: steps.is_empty(),
                     needs,
                 });
             }
@@ -88,7 +91,8 @@ pub struct Steps {
     pub operand_address: Wire<Out>,
     /// Kind of operand, 2 bits; parity flip, 2 bits; exchange of the mirrors: from bit 0.
     pub source: Wire<Out>,
-    /// `align`, `first product of an accumulation`, `last product`, from bit 0.
+    /// `align`, `first product of an accumulation`, `last product`, from bit 0; then, where the coefficients are checked,
+    /// `first product of a subarray`.
     pub control: Wire<Out>,
     _steps: Vec<Vec<Step>>,
     _list: Vec<[usize; 2]>,
@@ -99,6 +103,14 @@ pub struct Steps {
 
 /// Name of the column list's file.
 pub const COLUMN_FILE: &str = "columns.hex";
+/// Bits of `control`.
+pub fn control_bits(model: &Model) -> usize {
+    if model.checks() {
+        4
+    } else {
+        3
+    }
+}
 /// Bits of `source`.
 pub const SOURCE_BITS: usize = 5;
 
@@ -125,7 +137,7 @@ impl Steps {
             coefficient_address: Wire::new(count_bits(words)),
             operand_address: Wire::new(count_bits(vectors.max(1) * formats.quads)),
             source: Wire::new(SOURCE_BITS),
-            control: Wire::new(3),
+            control: Wire::new(control_bits(model)),
             _pipe: Vec::new(),
             _list: list,
             _across: formats.shared_a,
@@ -168,7 +180,9 @@ impl Steps {
         self.source.next = Word::from(step.kind | step.flip << 2 | u64::from(step.transposed) << 4);
         let first = step.first && column == 0;
         let last = step.last && column + 1 == step.columns;
-        self.control.next = Word::from(u64::from(step.align) | u64::from(first) << 1 | u64::from(last) << 2);
+        let opens = step.opens && column == 0 && self.control.width() == 4;
+        let bits = [step.align, first, last, opens];
+        self.control.next = Word::from(bits.iter().rev().fold(0, |word, &bit| word << 1 | u64::from(bit)));
     }
 }
 
@@ -201,6 +215,7 @@ impl Logic for Steps {
         let step_bits = self.step.width();
         let column_bits = self.column.width();
         let needs_bits = self.finished.width();
+        let control = self.control.width();
         let (c_bits, o_bits) = (self.coefficient_address.width(), self.operand_address.width());
         let bit = |b: bool| u8::from(b);
         // The case in front of the step, where there are several.
@@ -249,12 +264,17 @@ always @(*) begin
 end
 always @(*) ready = finished >= needs;
 always @(*) last = column == final_column;
-wire [2:0] flags = {{fixed[2] && last, fixed[1] && column == {column_bits}'d0, fixed[0]}};
+wire [{control_end}:0] flags = {{{opens}fixed[2] && last, fixed[1] && column == {column_bits}'d0, fixed[0]}};
 ",
             c_end = c_bits - 1,
             o_end = o_bits - 1,
             n_end = needs_bits - 1,
             column_end = column_bits - 1,
+            control_end = control - 1,
+            opens = match control {
+                4 => format!("step == {step_bits}'d0 && column == {column_bits}'d0, "),
+                _ => String::new(),
+            },
         );
         let body = if self._list.is_empty() {
             format!(
@@ -284,7 +304,7 @@ reg [{pair_end}:0] pair;
 reg [{c_end}:0] c_address1, c_address2;
 reg [{o_end}:0] o_base1, o_base2;
 reg [4:0] source1, source2;
-reg [2:0] control1, control2;
+reg [{control_end}:0] control1, control2;
 wire [{column_end}:0] kept = {kept};
 always @(posedge clk) begin
   c_address1 <= c_base + {to_c};
@@ -301,6 +321,7 @@ always @(posedge clk) begin
   source <= source2;
   control <= control2;
 end",
+                control_end = control - 1,
                 pair_end = addresses * column_bits - 1,
                 list_end = self._list.len() - 1,
                 c_end = c_bits - 1,

@@ -53,6 +53,8 @@ pub struct Force {
     pub found: Signal<In, Bit>,
     /// `tlast` was early or missing.
     pub framing: Signal<In, Bit>,
+    /// The subarray's coefficients were not what they must be.
+    pub damaged: Wire<In>,
     /// Score of the winner.
     pub score: Wire<In>,
     /// Words that `rescale` saturated.
@@ -99,6 +101,7 @@ impl Force {
             condition: Default::default(),
             found: Default::default(),
             framing: Default::default(),
+            damaged: Wire::new(1),
             score: Wire::new(formats.score_bits as usize),
             saturations: Wire::new(SATURATION_BITS),
             cycles: Wire::new(CYCLE_BITS),
@@ -144,6 +147,7 @@ impl Logic for Force {
         self.unit.condition.next = self.condition.val();
         self.unit.found.next = self.found.val();
         self.unit.framing.next = self.framing.val();
+        self.unit.damaged.next = self.damaged.val();
         self.unit.score.next = self.score.val();
         self.unit.saturations.next = self.saturations.val();
         self.unit.cycles.next = self.cycles.val();

@@ -9,7 +9,8 @@ use dermis_golden::fixed::Model;
 use rust_hdl::prelude::*;
 
 use crate::primitives::{
-    count_bits, BitDelay, CaseCounter, Counter, Delay, Filler, Lanes, OperandSelect, Ram, Slice, Steps, SOURCE_BITS,
+    control_bits, count_bits, BitDelay, CaseCounter, Counter, Delay, Filler, Lanes, OperandSelect, Ram, Slice, Steps,
+    SOURCE_BITS,
 };
 use crate::wire::Wire;
 
@@ -36,6 +37,8 @@ pub struct Pass {
     pub quad: Wire<Out>,
     /// `quad` is a row.
     pub quad_valid: Signal<Out, Bit>,
+    /// The last subarray's coefficients were not what they must be; settled with its last row.
+    pub damaged: Wire<Out>,
     step: CaseCounter,
     column: Counter,
     running: DFF<Bit>,
@@ -75,6 +78,7 @@ impl Pass {
             vector_valid: Default::default(),
             quad: Wire::new(4 * formats.acc_bits as usize),
             quad_valid: Default::default(),
+            damaged: Wire::new(1),
             step: CaseCounter::new(&steps.counts()),
             column: Counter::new(quads),
             running: Default::default(),
@@ -82,7 +86,7 @@ impl Pass {
             vectors: vectors(Ram::new(operands.max(1) * quads, 1, parity_bits)),
             filler: Filler::new(operands, &model.cases().iter().map(|case| case.formats.quads).collect::<Vec<_>>()),
             source: Delay::new(SOURCE_BITS, 1),
-            control: Delay::new(3, 2),
+            control: Delay::new(control_bits(model), 2),
             valid: BitDelay::new(2 + steps.latency()),
             select: OperandSelect::new(formats),
             steps,
@@ -150,5 +154,6 @@ impl Logic for Pass {
         self.lanes.control.next = self.control.then.val();
         self.quad.next = self.lanes.quad.val();
         self.quad_valid.next = self.lanes.quad_valid.val();
+        self.damaged.next = self.lanes.damaged.val();
     }
 }

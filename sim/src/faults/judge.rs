@@ -1,6 +1,6 @@
 //! What a reader of the output stream could have noticed.
 
-use dermis_golden::fixed::send::{Status, FLAG_CONDITION, FLAG_FOUND, FLAG_FRAMING, STATUS_BEATS};
+use dermis_golden::fixed::send::{Status, FLAG_COEFFICIENTS, FLAG_CONDITION, FLAG_FOUND, FLAG_FRAMING, STATUS_BEATS};
 
 use crate::drive::{Beat, Recording};
 use crate::stress::Sample;
@@ -64,14 +64,14 @@ fn force_error(got: &[Beat], wanted: &[[i32; 3]]) -> f64 {
 fn tells(got: &[Beat], wanted: &[[i32; 3]]) -> bool {
     let got: Vec<[i32; 3]> = got.iter().map(|beat| beat.data).collect();
     got.chunks(STATUS_BEATS).zip(wanted.chunks(STATUS_BEATS)).any(|(got, wanted)| {
-        let doubts = |beats| Status::of_beats(beats).map_or([false; 3], |status| doubts(&status));
+        let doubts = |beats| Status::of_beats(beats).map_or([false; 4], |status| doubts(&status));
         doubts(got).into_iter().zip(doubts(wanted)).any(|(got, wanted)| got && !wanted)
     })
 }
 
-/// The framing flag, saturations, a search without result.
-fn doubts(status: &Status) -> [bool; 3] {
+/// The flags of framing and coefficients, saturations, a search without result.
+fn doubts(status: &Status) -> [bool; 4] {
     let flag = |bit: u32| status.flags & bit != 0;
     let saturated = status.rescale_saturations + status.force_saturations > 0;
-    [flag(FLAG_FRAMING), saturated, flag(FLAG_CONDITION) && !flag(FLAG_FOUND)]
+    [flag(FLAG_FRAMING), flag(FLAG_COEFFICIENTS), saturated, flag(FLAG_CONDITION) && !flag(FLAG_FOUND)]
 }

@@ -1,0 +1,106 @@
+//! The coefficient check, `hardware.coefficient_check = "signature"`: whether the coefficient memory still holds what the
+//! generator put there.
+//!
+//! Of each word that a subarray's passes read, as wide as all lanes, the parity of its bits steps a signature of 32 bits
+//! ```text
+//! s ← (2 s mod 2³²) ⊕ (POLYNOMIAL where s ≥ 2³¹) ⊕ parity         from START at the subarray's first word
+//! ```
+//! Where it is not the generator's after the last word, the subarray's status has
+//! [`FLAG_COEFFICIENTS`](super::send::FLAG_COEFFICIENTS). The forces leave all the same.
+//!
+//! Why a signature: a coefficient fills the 18 bits of a block RAM's word, so that a parity bit beside each word of the
+//! lanes would take one more block RAM, or LUTs that grow with the words. A signature takes no memory, whatever the
+//! lanes and the words, no cycle, and it also tells a word that is right but was read in the wrong place.
+//!
+//! A flipped bit turns the parity whenever its word is read, at the reads t of T, and with it the signature by
+//! Σ x^(T−t) modulo the polynomial. Once or twice read, that is never zero; read more often it could be, with a chance of
+//! 2⁻³²: [`unseen`] lists such words. The list of columns and the schedule are not covered.
+
+use super::formats::MULTIPLIER_BITS;
+use super::model::Model;
+use super::schedule::schedule;
+use crate::scene::CoefficientCheck;
+
+/// That of CRC-32, without its highest power.
+pub const POLYNOMIAL: u32 = 0x04c1_1db7;
+/// Not zero, so that missing words of even parity are noticed.
+pub const START: u32 = u32::MAX;
+
+/// The signature one word later.
+pub fn step(signature: u32, parity: bool) -> u32 {
+    signature << 1 ^ if signature >> 31 == 1 { POLYNOMIAL } else { 0 } ^ u32::from(parity)
+}
+
+/// Whether a word of the lanes has an odd number of ones.
+pub fn parity(word: &[i64]) -> bool {
+    let ones = |coefficient: &i64| (coefficient & ((1 << MULTIPLIER_BITS) - 1)).count_ones();
+    word.iter().map(ones).sum::<u32>() % 2 == 1
+}
+
+/// Addresses in the coefficient memory in the order in which the passes of a subarray of one case read them.
+pub fn reads(model: &Model) -> Vec<usize> {
+    let (formats, storage) = (&model.formats, &model.storage);
+    let of = |matrix, group| {
+        let first = storage.address_of(matrix, group);
+        first..first + storage.columns_of(matrix, group).len()
+    };
+    let steps = schedule(formats).into_iter().flat_map(|products| {
+        (0..formats.groups).flat_map(move |group| products.clone().into_iter().map(move |p| (p.matrix, group)))
+    });
+    steps.flat_map(|(matrix, group)| of(matrix, group)).collect()
+}
+
+/// What a subarray of one case leaves behind.
+pub fn signature(model: &Model) -> u32 {
+    let words = model.storage.memory(&model.formats, &model.quantised);
+    let parities: Vec<bool> = words.iter().map(|word| parity(word)).collect();
+    reads(model).into_iter().fold(START, |s, address| step(s, parities[address - model.storage.base]))
+}
+
+/// Addresses of one case whose flipped bit would leave the signature as it is: never read, or in bad luck.
+pub fn unseen(model: &Model) -> Vec<usize> {
+    let mut changes = vec![0u32; model.storage.words()];
+    // What a parity that was turned so many words ago has become.
+    let mut change = 1;
+    for address in reads(model).into_iter().rev() {
+        changes[address - model.storage.base] ^= change;
+        change = step(change, false);
+    }
+    (0..changes.len()).filter(|&index| changes[index] == 0).map(|index| index + model.storage.base).collect()
+}
+
+impl Model {
+    /// Whether the hardware watches its coefficient memory.
+    pub fn checks(&self) -> bool {
+        self.scene.hardware.coefficient_check == CoefficientCheck::Signature
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::Scene;
+
+    #[test]
+    fn by_hand() {
+        assert_eq!((step(0, true), step(1, false), step(1 << 31, false)), (1, 2, POLYNOMIAL));
+        assert_eq!((parity(&[1, 2]), parity(&[1, -1, 0]), parity(&[-1, 0])), (false, true, false));
+    }
+
+    #[test]
+    fn no_word_of_the_shipped_scenes_is_unseen() {
+        for name in ["sensor-1", "sensor-2", "sensor-3", "eight-by-eight"] {
+            let model = Model::new(&Scene::builtin(name).unwrap()).unwrap();
+            assert_eq!(unseen(&model), [0; 0], "{name}");
+        }
+    }
+
+    #[test]
+    fn a_flip_changes_the_signature_as_foretold() {
+        let mut model = Model::new(&Scene::builtin("eight-by-eight").unwrap()).unwrap();
+        let right = signature(&model);
+        assert_eq!(signature(&model), right);
+        model.quantised.ax.flips[0].parity[2][5] ^= 4;
+        assert_ne!(signature(&model), right);
+    }
+}

@@ -1,0 +1,116 @@
+//! The coefficient check: no false alarm over the shipped frames, every tried single flip in the coefficient memory told,
+//! no block RAM, multiplier or cycle; left out by default.
+
+use dermis_golden::fixed::check::reads;
+use dermis_golden::fixed::send::{FLAG_COEFFICIENTS, STATUS_BEATS};
+use dermis_golden::fixed::{Cycles, Model};
+use dermis_golden::flags::Flag;
+use dermis_golden::frame::Frame;
+use dermis_golden::scene::{CoefficientCheck, Scene};
+use dermis_hdl::{generate, usage::total};
+use dermis_sim::cosim::Vector;
+use dermis_sim::drive::{record, Play, Stimulus};
+use dermis_sim::hardware::{Hardware, Simulator};
+use dermis_sim::verify::verify;
+use dermis_tests::{build_dir, scene, SCENES};
+
+/// Flips tried in each scene.
+const FLIPS: usize = 100;
+
+fn checked(name: &str) -> (Scene, Vec<Frame>) {
+    let (mut scene, frames) = scene(name);
+    scene.hardware.coefficient_check = CoefficientCheck::Signature;
+    (scene, frames)
+}
+
+fn small(more: &str) -> Scene {
+    let text = format!(
+        "name = \"checked\"\n[hardware]\ncoefficient_check = \"signature\"\n[sensor]\nrows = 8\ncols = 8\n\
+         pitch_x_mm = 3.0\npitch_y_mm = 4.0\nthickness_mm = 3.0\n[search]\nmu_max = 0.05\n{more}"
+    );
+    Scene::parse(&text, "checked").unwrap()
+}
+
+fn assert_equal(scene: &Scene, frames: &[Frame]) {
+    let verified = verify(scene, frames, &[Simulator::Verilator, Simulator::RustHdl], &build_dir()).unwrap();
+    let first: Vec<String> = verified.findings.kept.iter().take(3).map(ToString::to_string).collect();
+    assert!(verified.findings.is_equal(), "{}: {first:#?}", scene.name);
+    // Nothing differs from the model, which never raises the flag.
+    assert!(verified.rows.iter().all(|row| !row.fixed.flags.contains(&Flag::CoefficientsDamaged)));
+}
+
+#[test]
+fn no_false_alarm() {
+    for (name, _) in SCENES {
+        let (scene, frames) = checked(name);
+        assert_equal(&scene, &frames);
+    }
+    // Several subarrays and groups of rows, a list of columns; several cases, each with a signature of its own.
+    let frames = Frame::shipped(&small(""));
+    let eq2 = Frame::eq2(&small("").sensor);
+    let frames = [&frames[..], &[eq2]].concat();
+    for more in ["[partition]\ncase = 3\n[fixed]\nlanes = 12\nprune_bits = 8\n", "[partition]\ncases = [0, 1]\n"] {
+        assert_equal(&small(more), &frames);
+    }
+}
+
+/// A bit of a lane's coefficient in the memory file.
+fn flip(text: &str, word: usize, bit: usize) -> String {
+    let mut lines: Vec<Vec<u8>> = text.lines().map(|line| line.as_bytes().to_vec()).collect();
+    let digit = lines[word].len() - 1 - bit / 4;
+    let value = (lines[word][digit] as char).to_digit(16).unwrap() ^ (1 << (bit % 4));
+    lines[word][digit] = char::from_digit(value, 16).unwrap() as u8;
+    lines.into_iter().map(|line| String::from_utf8(line).unwrap() + "\n").collect()
+}
+
+/// Whether each subarray's status tells of its coefficients.
+fn tells(hardware: &Hardware, vector: &Vector) -> bool {
+    let mut device = hardware.device(Simulator::Verilator).unwrap();
+    let forces = vector.expected.beats.len();
+    let beats = forces + vector.expected.status.len();
+    let play = Play { codes: &vector.codes, taxels: vector.taxels, beats };
+    let recording = record(device.as_mut(), 0, &[play], Stimulus::FullSpeed, 100_000);
+    assert_eq!(recording.beats.len(), beats);
+    recording.beats[forces..].iter().step_by(STATUS_BEATS).all(|beat| beat.data[2] as u32 & FLAG_COEFFICIENTS != 0)
+}
+
+#[test]
+fn every_tried_flip_is_told() {
+    for (name, _) in SCENES {
+        let (scene, frames) = checked(name);
+        let mut hardware = Hardware::new(Model::for_frames(&scene, &frames).unwrap(), &build_dir()).unwrap();
+        let vector = hardware.vector(&frames[..1]).unwrap();
+        assert!(!tells(&hardware, &vector), "{name}: a false alarm");
+        let read = reads(&hardware.model);
+        let words = hardware.model.storage.words();
+        assert!((0..words).all(|word| read.contains(&word)), "{name}: words that are never read");
+        let file = hardware.generated.files.iter().position(|file| file.name == "coefficients.hex").unwrap();
+        let good = hardware.generated.files[file].text.clone();
+        let bits = 4 * hardware.model.formats.lanes_per_parity * 18;
+        let mut random = fastrand::Rng::with_seed(1);
+        for _ in 0..FLIPS {
+            let (word, bit) = (random.usize(..words), random.usize(..bits));
+            hardware.generated.files[file].text = flip(&good, word, bit);
+            assert!(tells(&hardware, &vector), "{name}: bit {bit} of word {word} went unnoticed");
+        }
+    }
+}
+
+#[test]
+fn it_costs_some_logic_and_nothing_else() {
+    let [with, without] = [checked("sensor-1").0, scene("sensor-1").0].map(|scene| Model::new(&scene).unwrap());
+    let of = |model: &Model| (total(&generate(model).unwrap().usage), Cycles::of(model, &[true]));
+    let ((with, cycles_with), (without, cycles_without)) = (of(&with), of(&without));
+    println!("{} flip-flops, {} LUTs", with.flip_flops - without.flip_flops, with.luts - without.luts);
+    assert_eq!((with.block_rams, with.multipliers), (without.block_rams, without.multipliers));
+    assert_eq!(cycles_with, cycles_without);
+    assert!(with.flip_flops > without.flip_flops && with.luts > without.luts);
+}
+
+#[test]
+fn it_is_left_out_by_default() {
+    let text = |scene: &Scene| generate(&Model::new(scene).unwrap()).unwrap().files[0].text.clone();
+    let logic = ["signature", "odd_lanes", "damages"];
+    let (with, without) = (text(&checked("eight-by-eight").0), text(&scene("eight-by-eight").0));
+    assert!(logic.iter().all(|name| with.contains(name)) && !logic.iter().any(|name| without.contains(name)));
+}
