@@ -19,7 +19,7 @@ use std::path::Path;
 use anyhow::{anyhow, Context, Result};
 use serde::{Deserialize, Serialize};
 
-use crate::write::write;
+use dermis_golden::write::write;
 
 /// Folder in the build folder.
 const FOLDER: &str = "tried";

@@ -185,10 +185,10 @@ impl Verilated {
     /// What Verilator lists of a `writable` design: modules, variables, assignments.
     ///
     /// # Errors
-    /// [`VerilatorError::Io`] when there is none.
+    /// [`VerilatorError::File`] when there is none.
     pub fn listing(&self) -> Result<String, VerilatorError> {
         let path = self.bench.path.with_file_name(LISTING);
-        fs::read_to_string(&path).map_err(|source| VerilatorError::Io { path, source })
+        Ok(fs::read_to_string(&path).map_err(FileError::at(&path))?)
     }
 }
 

@@ -118,7 +118,7 @@ impl Scan {
                     self.walk(child, &[scope, name].into_iter().filter(|s| !s.is_empty()).collect::<Vec<_>>().join("."))
                 }
                 "assigndly" => {
-                    child.children().filter(Node::is_element).last().iter().for_each(|to| self.to(*to, scope))
+                    child.children().rfind(Node::is_element).iter().for_each(|to| self.to(*to, scope))
                 }
                 _ => self.walk(child, scope),
             }
