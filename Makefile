@@ -88,8 +88,8 @@ netlist: setup ## compare the netlist of a small scene with a search, several mi
 fuzz: ## 10^7 inputs over the readers, 10^5 frames through both models
 	DERMIS_FUZZ_INPUTS=10000000 DERMIS_FUZZ_RUNS=100000 $(CARGO) test --release -p dermis-tests --test fuzz -- --nocapture
 
-stress: ## 3*10^6 cycles of each experiment on the streams: stalls, wrong tlast, resets
-	DERMIS_STRESS_CYCLES=3000000 $(CARGO) test --release -p dermis-tests --test streams -- --nocapture
+stress: ## 4*10^6 cycles of each experiment on the streams: stalls, wrong tlast, resets
+	DERMIS_STRESS_CYCLES=4000000 $(CARGO) test --release -p dermis-tests --test streams -- --nocapture
 
 clean: ## remove everything built
 	$(CARGO) clean
