@@ -17,7 +17,7 @@ use crate::sensor::Sensor;
 /// Search range of the table's scenes.
 pub const MU_MAX: f64 = 0.4;
 
-/// Frames of known forces and shear whose stress was computed elsewhere with 50 digits.
+/// Files of `data/reference` with their text.
 const REFERENCES: [(&str, &str); 4] = [
     ("stiff-8x8-h1.json", include_str!("../../data/reference/stiff-8x8-h1.json")),
     ("stiff-8x8-h3.json", include_str!("../../data/reference/stiff-8x8-h3.json")),
@@ -82,7 +82,7 @@ pub fn settings() -> Vec<Setting> {
     all
 }
 
-/// The frames of [`REFERENCES`].
+/// Frames of known forces and shear whose stress was computed elsewhere with 50 digits.
 pub fn references() -> Vec<Frame> {
     let read = |(name, text)| Frame::parse(name, text, None).expect("a file of this crate");
     REFERENCES.into_iter().map(read).collect()
