@@ -117,9 +117,7 @@ impl Scan {
                 "begin" if !name.is_empty() => {
                     self.walk(child, &[scope, name].into_iter().filter(|s| !s.is_empty()).collect::<Vec<_>>().join("."))
                 }
-                "assigndly" => {
-                    child.children().rfind(Node::is_element).iter().for_each(|to| self.to(*to, scope))
-                }
+                "assigndly" => child.children().rfind(Node::is_element).iter().for_each(|to| self.to(*to, scope)),
                 _ => self.walk(child, scope),
             }
         }
