@@ -1,8 +1,8 @@
 //! Stability: what each number format keeps of a scene, from the condition of its Cz to the error of its forces.
 //!
 //! Two frames of known forces, a Hertz pressure p of 1 N, their stress in extended precision ([`extended`]): b₀ without
-//! shear, b with the shear μ p. Nothing but the inverse and the arithmetic stands between them and the truth. The table's
-//! last lines take p, μ and b from [`references`], computed elsewhere with 50 digits; their b₀ is [`extended`]'s.
+//! shear, b with the shear μ p. Nothing but the inverse and the arithmetic stands between them and the truth. The
+//! table's last lines take p, μ and b from [`references`], computed elsewhere with 50 digits; their b₀ is [`extended`]'s.
 //!
 //! ```text
 //! forward     ‖Cz⁺b₀ − p‖/‖p‖              in double, single, fixed point

@@ -1,8 +1,8 @@
 // A packet is a border, the header's four bytes, twelve bytes of each word taken, four more, a border;
 // what is offered stays; a word is taken only where one is wanted.
 module proof(
-  input clk, input again, input offer, input [3:0] header_bits, input [1:0] from, input [11:0] word_bits, input word_valid,
-  input word_last, input ready
+  input clk, input again, input offer, input [3:0] header_bits, input [1:0] from, input [11:0] word_bits,
+  input word_valid, input word_last, input ready
 );
   reg started = 1'b0;
   always @(posedge clk) started <= 1'b1;

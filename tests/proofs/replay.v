@@ -1,5 +1,5 @@
-// The rows of v_00 wait until the last of them is measured, then each comes out once, in order, by the measured shift; later
-// rows go through by the constant one. No row is lost, and none stays behind.
+// The rows of v_00 wait until the last of them is measured, then each comes out once, in order, by the measured shift;
+// later rows go through by the constant one. No row is lost, and none stays behind.
 module proof(input clk, input again, input begin_it, input offered, input sample);
   // One bit stands for all that go the same way.
   wire [4*@ACC@-1:0] quad = {4*@ACC@{sample}};
@@ -11,7 +11,7 @@ module proof(input clk, input again, input begin_it, input offered, input sample
   (* anyconst *) reg [7:0] row;
   reg within;
   reg [7:0] came, went, since;
-  // What the engine keeps to: no frame begins before the last one's rows are out, no later row comes before v_00 is out.
+  // What the engine keeps to: no frame begins before the last one's rows are out, no later row comes before v_00 is.
   wire start = begin_it && came == went;
   wire quad_valid = offered && within && !start && (came < ROWS || (went >= ROWS && came < ROWS + 8'd3));
   wire [4*@WORD@-1:0] words;

@@ -1,5 +1,5 @@
-// A word is its accumulator over 2^shift, rounded half up and held to its range; an operand the same of its word; and the
-// words held are counted, up to the counter's end.
+// A word is its accumulator over 2^shift, rounded half up and held to its range; an operand the same of its word; and
+// the words held are counted, up to the counter's end.
 module proof(input clk, input clear, input valid, input measured, input [@SHIFTS@-1:0] shift, input [4*@ACC@-1:0] quad);
   wire [4*@WORD@-1:0] words;
   wire [4*@DATA@-1:0] operands;

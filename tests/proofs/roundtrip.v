@@ -1,5 +1,5 @@
-// What the encoder makes of bytes and borders, the decoder makes bytes and ends of again, one for one, and calls nothing
-// spoiled.
+// What the encoder makes of bytes and borders, the decoder makes bytes and ends of again, one for one, and calls
+// nothing spoiled.
 module proof(input clk, input again, input [7:0] content, input border, input offered, input ready, input pauses);
   reg started = 1'b0;
   always @(posedge clk) started <= 1'b1;
@@ -11,8 +11,8 @@ module proof(input clk, input again, input [7:0] content, input border, input of
     .data(data), .valid(valid), .ready(ready)
   );
   @DECODER@ decoder(
-    .clk(clk), .rst(rst), .data(data), .valid(valid && ready), .broken(1'b0), .content(read), .content_valid(read_valid),
-    .packet_end(packet_end), .spoiled(spoiled)
+    .clk(clk), .rst(rst), .data(data), .valid(valid && ready), .broken(1'b0), .content(read),
+    .content_valid(read_valid), .packet_end(packet_end), .spoiled(spoiled)
   );
   reg waits = 1'b0, border_before;
   reg [7:0] before;

@@ -1,5 +1,5 @@
-// Beats of the engine pass as words, each once and as it is; where sums are asked for, the forces' beats are taken first, then
-// come four words, then the status passes.
+// Beats of the engine pass as words, each once and as it is; where sums are asked for, the forces' beats are taken
+// first, then come four words, then the status passes.
 module proof(input clk, input again, input run, input offered, input sample);
   reg started = 1'b0;
   always @(posedge clk) started <= 1'b1;

@@ -23,8 +23,8 @@ pub fn stability(rows: &[Row], format: Format) -> Result<String> {
 
 /// What the columns are.
 const LEGEND: &str = "rank: Σ λ f(λ); gain: ‖Cz⁺‖ in N/MPa; r: spectral radius at mu_max; forward: ‖Cz⁺b − p‖/‖p‖ \
-                      without shear; residual: ‖b − C x‖/‖b‖; e_n, e_t: errors of the resultant with shear; bits: least \
-                      input bits for a forward error within 1 % of f64's; –: refused, or none";
+                      without shear; residual: ‖b − C x‖/‖b‖; e_n, e_t: errors of the resultant with shear; bits: \
+                      least input bits for a forward error within 1 % of f64's; –: refused, or none";
 
 fn text(rows: &[Row]) -> String {
     let mut text = format!("{}\n{LEGEND}\n", markdown(&stability_table(rows)));

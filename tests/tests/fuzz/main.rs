@@ -12,8 +12,8 @@
 //! of text and [`BYTES`]. Inputs are drawn from a seed and repeat; failing ones are counted and printed, to be added to
 //! `corpus/`, all of which is read first.
 //!
-//! `make fuzz` runs 10⁷ inputs over the readers and 10⁵ over the whole way, and keeps the counts in `build/tried` for the
-//! report; without its variables a short part of both.
+//! `make fuzz` runs 10⁷ inputs over the readers and 10⁵ over the whole way, and keeps the counts in `build/tried` for
+//! the report; without its variables a short part of both.
 
 use std::time::{Duration, Instant};
 

@@ -19,8 +19,8 @@
 //! | `roundtrip.v`: what is encoded is decoded, byte by byte | the link's encoder and decoder |
 //! | `sums.v`: forces are taken, four words given, the status passed on | the link's resultants |
 //!
-//! Without a proof, held by co-simulation alone: the UART's shift registers, the link's parser, counters and request queue,
-//! which have no back-pressure; the banks of an adaptive scene, several `receive` in step; the force unit's rounding.
+//! Without a proof, held by co-simulation alone: the UART's shift registers, the link's parser, counters and request
+//! queue, which have no back-pressure; the banks of an adaptive scene, several `receive` in step; the force unit's rounding.
 //!
 //! Each proof has a seeded defect with which it fails: a proof that cannot fail says nothing.
 
