@@ -19,6 +19,7 @@ mod strike;
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
+use std::time::Instant;
 
 use anyhow::{bail, Result};
 use clap::Args;
@@ -34,6 +35,7 @@ use crate::hardware::Hardware;
 use crate::progress::Progress;
 use crate::report;
 use crate::stress::{drawn, own, Sample};
+use crate::tried::{self, Tried};
 use judge::{judge, Verdict};
 use places::{places, Class, Place, CLASSES};
 use strike::Struck;
@@ -241,7 +243,27 @@ impl Shares {
     }
 }
 
-/// The outcomes as text, and whether a reset always helped.
+/// What the report keeps of a class.
+fn kept(scene: &str, class: Class, rows: &[Row], seconds: f64) -> tried::Line {
+    let own = || rows.iter().filter(move |row| row.class == class);
+    let sum = |count: fn(&Row) -> usize| own().map(count).sum::<usize>() as u64;
+    let counts = [
+        ("harmless", sum(|row| row.harmless)),
+        ("detected", sum(|row| row.detected)),
+        ("hang until reset", sum(|row| row.hang)),
+        ("silent", sum(|row| row.silent)),
+        ("not recovered", sum(|row| row.not_recovered)),
+    ];
+    tried::Line {
+        what: format!("{scene}, {}", class.name()),
+        unit: "bits flipped".to_owned(),
+        tried: sum(|row| row.tried),
+        outcomes: counts.map(|(name, count)| (name.to_owned(), count)).into(),
+        seconds,
+    }
+}
+
+/// The outcomes as text, and whether a reset always helped; the counts stay in the build folder for the report.
 ///
 /// # Errors
 /// An unknown scene, one without hardware, no Verilator.
@@ -249,7 +271,13 @@ pub fn run(arguments: &Arguments, build: &Path) -> Result<(String, bool)> {
     let scene = Scene::load(&arguments.scene)?;
     let frames = Frame::shipped(&scene);
     let hardware = Hardware::new(Model::for_frames(&scene, &frames)?, build)?;
+    let begun = Instant::now();
     let rows = faults(&hardware, &frames, arguments.count, arguments.seed)?;
+    let mut tried = Tried::new(&format!("dermis faults {}", arguments.scene));
+    // The classes take turns, a third of the time each.
+    let seconds = begun.elapsed().as_secs_f64() / CLASSES.len() as f64;
+    tried.lines.extend(CLASSES.map(|class| kept(&scene.name, class, &rows, seconds)));
+    tried.keep(build, "faults")?;
     let good = rows.iter().all(|row| row.not_recovered == 0);
     let text = if arguments.json { serde_json::to_string(&rows)? + "\n" } else { report::faults(&rows) };
     Ok((text, good))

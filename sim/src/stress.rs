@@ -16,6 +16,7 @@ mod resets;
 mod scoreboard;
 
 use std::path::Path;
+use std::time::Instant;
 
 use anyhow::Result;
 use clap::Args;
@@ -30,6 +31,7 @@ pub use scoreboard::Violation;
 use crate::hardware::{Hardware, Simulator};
 use crate::progress::Progress;
 use crate::report;
+use crate::tried::{self, Tried};
 use line::{Burst, Line, RESET_CYCLES};
 use pace::Pace;
 
@@ -150,19 +152,46 @@ fn tlast(line: &mut Line, random: &mut fastrand::Rng, cycles: u64) {
     line.drain(&mut Pace::full_speed());
 }
 
-/// The outcomes as text, and whether nothing was violated.
+/// What the report keeps of an experiment.
+fn kept(outcome: &Outcome, seconds: f64) -> tried::Line {
+    let counts = [
+        ("frames out", outcome.frames_out),
+        ("wrong tlast", outcome.wrong_tlast),
+        ("frames cut short", outcome.cut),
+        ("frames flagged", outcome.flagged),
+        ("resets", outcome.resets),
+        ("violations", outcome.violations),
+    ];
+    tried::Line {
+        what: format!("{}, {}", outcome.scene, outcome.experiment),
+        unit: "cycles".to_owned(),
+        tried: outcome.cycles,
+        outcomes: counts.map(|(name, count)| (name.to_owned(), count)).into(),
+        seconds,
+    }
+}
+
+/// The outcomes as text, and whether nothing was violated; the counts stay in the build folder for the report.
 ///
 /// # Errors
 /// An unknown scene, one without hardware, no Verilator.
 pub fn run(arguments: &Arguments, build: &Path) -> Result<(String, bool)> {
     let mut outcomes = Vec::new();
+    let mut tried = Tried::new(&format!("dermis stress {}", arguments.scenes.join(" ")));
     for name in &arguments.scenes {
         let scene = Scene::load(name)?;
         let frames = Frame::shipped(&scene);
         let hardware = Hardware::new(Model::for_frames(&scene, &frames)?, build)?;
         let _progress = Progress::start(&format!("{}: stress", scene.name));
-        outcomes.extend(stress(&hardware, &frames, arguments.cycles, arguments.seed)?);
+        let begun = Instant::now();
+        let own = stress(&hardware, &frames, arguments.cycles, arguments.seed)?;
+        let cycles: u64 = own.iter().map(|outcome| outcome.cycles).sum();
+        // Of the time together each experiment has its share by its cycles.
+        let per_cycle = begun.elapsed().as_secs_f64() / cycles.max(1) as f64;
+        tried.lines.extend(own.iter().map(|outcome| kept(outcome, per_cycle * outcome.cycles as f64)));
+        outcomes.extend(own);
     }
+    tried.keep(build, "stress")?;
     let good = outcomes.iter().all(|outcome| outcome.violations == 0);
     let text = if arguments.json { serde_json::to_string(&outcomes)? + "\n" } else { report::stress(&outcomes) };
     Ok((text, good))

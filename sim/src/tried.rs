@@ -1,7 +1,7 @@
 //! Tried: how much a long run has tried and what it found, kept in the build folder for the report.
 //!
 //! ```text
-//! make fuzz ─> build/tried/<name>.json ─> dermis report, section "Inputs tried"
+//! make fuzz, dermis stress, dermis faults ─> build/tried/<name>.json ─> dermis report, section "Inputs tried"
 //! ```
 //!
 //! | field | |

@@ -6,7 +6,11 @@ use crate::tried::{Line, Tried};
 /// The section.
 pub fn tried(all: &[Tried]) -> Section {
     let item = match all {
-        [] => Item::Text("No long run has left its counts in the build folder yet; `make fuzz` does.".into()),
+        [] => Item::Text(
+            "No long run has left its counts in the build folder yet; `make fuzz`, `dermis stress` and
+                          `dermis faults` do."
+                .into(),
+        ),
         all => {
             let head = ["command", "what", "unit", "tried", "time", "outcomes"];
             let rows = all.iter().flat_map(|run| run.lines.iter().map(move |line| row(run, line)));
