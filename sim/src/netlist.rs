@@ -41,7 +41,7 @@ pub fn netlist(generated: &Generated, family: Family, cache: &Path) -> Result<Ge
     let version = format!("{family:?} {}", YOSYS.version()?);
     let folder = cache.join(format!("netlist-{}", fingerprint(&texts, &version)));
     let path = folder.join(VERILOG);
-    if !path.is_file() {
+    if !place::is_whole(&folder, VERILOG) {
         make(&read, &generated.top, family, &folder)?;
     }
     let text = fs::read_to_string(&path).map_err(ToolError::io(&path))?;

@@ -1,12 +1,14 @@
 //! Place: a folder of built files appears whole or not at all.
 //!
 //! It is filled beside its place and takes its name only when all is in it, so that neither an interruption nor a second
-//! process that builds the same leaves half a folder.
+//! process that builds the same leaves half a folder. Beside its product stands the product's CRC-32: what a disk has
+//! damaged since is as good as none, and built again.
 
 use std::fs;
-use std::path::Path;
+use std::io;
+use std::path::{Path, PathBuf};
 
-use dermis_golden::write::FileError;
+use dermis_golden::write::{write, FileError};
 use tempfile::TempDir;
 
 /// A folder to fill, gone when it is dropped; it lies where `folder` is to be.
@@ -19,16 +21,36 @@ pub(crate) fn begin(folder: &Path) -> Result<TempDir, FileError> {
     tempfile::Builder::new().prefix("building-").tempdir_in(cache).map_err(FileError::at(cache))
 }
 
-/// Gives the filled folder its name. Where somebody else was first, which `product` in it shows, theirs serves as well.
+/// Gives the filled folder its name. Where somebody else was first and `product` is whole there, theirs serves as well.
 ///
 /// # Errors
 /// [`FileError`].
 pub(crate) fn finish(filled: TempDir, folder: &Path, product: &str) -> Result<(), FileError> {
+    let path = filled.path().join(product);
+    let sum = sum(&path).map_err(FileError::at(&path))?;
+    write(&sum_of(filled.path(), product), sum.as_bytes())?;
+    if folder.exists() && !is_whole(folder, product) {
+        fs::remove_dir_all(folder).map_err(FileError::at(folder))?;
+    }
     let built = filled.keep();
     match fs::rename(&built, folder) {
-        Err(_) if folder.join(product).is_file() => fs::remove_dir_all(&built).map_err(FileError::at(&built)),
+        Err(_) if is_whole(folder, product) => fs::remove_dir_all(&built).map_err(FileError::at(&built)),
         renamed => renamed.map_err(FileError::at(folder)),
     }
+}
+
+/// Whether `product` is in `folder` as it was built.
+pub(crate) fn is_whole(folder: &Path, product: &str) -> bool {
+    let says = fs::read_to_string(sum_of(folder, product));
+    matches!((says, sum(&folder.join(product))), (Ok(says), Ok(has)) if says == has)
+}
+
+fn sum_of(folder: &Path, product: &str) -> PathBuf {
+    folder.join(format!("{product}.crc32"))
+}
+
+fn sum(path: &Path) -> io::Result<String> {
+    Ok(format!("{:08x}\n", crc32fast::hash(&fs::read(path)?)))
 }
 
 #[cfg(test)]
@@ -50,6 +72,22 @@ mod tests {
             assert_eq!(fs::read_to_string(folder.join("product")).unwrap(), "first");
         }
         assert_eq!(fs::read_dir(cache.path().join("a")).unwrap().count(), 1);
+    }
+
+    #[test]
+    fn what_was_damaged_is_built_again() {
+        let cache = tempfile::tempdir().unwrap();
+        let folder = cache.path().join("b");
+        assert!(!is_whole(&folder, "product"));
+        fill(&folder, "first").unwrap();
+        assert!(is_whole(&folder, "product"));
+        for damaged in ["firsT", "fir", ""] {
+            fs::write(folder.join("product"), damaged).unwrap();
+            assert!(!is_whole(&folder, "product"), "{damaged:?}");
+        }
+        fill(&folder, "second").unwrap();
+        assert_eq!(fs::read_to_string(folder.join("product")).unwrap(), "second");
+        assert!(is_whole(&folder, "product"));
     }
 
     #[test]

@@ -234,7 +234,7 @@ fn library(design: &Design, bench: &str, cache: &Path) -> Result<PathBuf, Verila
     let folder = cache.join(fingerprint(&sources, &version()?));
     let ready = folder.join(LIBRARY);
     let _one = BUILDING.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
-    if !ready.is_file() {
+    if !place::is_whole(&folder, LIBRARY) {
         build(design, &sources, &folder)?;
     }
     Ok(ready.canonicalize().map_err(FileError::at(&ready))?)
