@@ -14,7 +14,9 @@ use dermis_tests::build_dir;
 use proptest::prelude::*;
 
 /// Name, and what differs from an ordinary scene of 6×6 taxels.
-const SCENES: [(&str, &str); 10] = [
+const SCENES: [(&str, &str); 11] = [
+    // Two quads: sweeps shorter than what follows them.
+    ("2x3", "[sensor]\nrows = 2\ncols = 3\npitch_x_mm = 4.0\npitch_y_mm = 4.0\nthickness_mm = 3.0\n"),
     // Six subarrays in turn, odd rows.
     ("partition", "[sensor]\nrows = 10\ncols = 12\npitch_x_mm = 2.0\npitch_y_mm = 4.0\nthickness_mm = 3.0\n[partition]\nrows = 2\ncols = 3\n"),
     // Ax serves for Ay, and columns are left out.

@@ -64,6 +64,7 @@ pub struct Cycles {
 /// From a coarse sweep of so many quads to the next: a sweep is judged before the next but one, which may write over its
 /// source.
 pub fn coarse_period(quads: u64) -> u64 {
+    let quads = quads.max(SHORTEST_SWEEP);
     quads.max((quads + SWEEP).div_ceil(2))
 }
 
