@@ -271,9 +271,10 @@ pub fn run(arguments: &Arguments, build: &Path) -> Result<(String, bool)> {
     let scene = Scene::load(&arguments.scene)?;
     let frames = Frame::shipped(&scene);
     let hardware = Hardware::new(Model::for_frames(&scene, &frames)?, build)?;
+    let Arguments { scene: name, count, seed, .. } = arguments;
     let begun = Instant::now();
-    let rows = faults(&hardware, &frames, arguments.count, arguments.seed)?;
-    let mut tried = Tried::new(&format!("dermis faults {}", arguments.scene));
+    let rows = faults(&hardware, &frames, *count, *seed)?;
+    let mut tried = Tried::new(&format!("dermis faults {name} --count {count} --seed {seed}"));
     // The classes take turns, a third of the time each.
     let seconds = begun.elapsed().as_secs_f64() / CLASSES.len() as f64;
     tried.lines.extend(CLASSES.map(|class| kept(&scene.name, class, &rows, seconds)));

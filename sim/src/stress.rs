@@ -177,14 +177,15 @@ fn kept(outcome: &Outcome, seconds: f64) -> tried::Line {
 /// An unknown scene, one without hardware, no Verilator.
 pub fn run(arguments: &Arguments, build: &Path) -> Result<(String, bool)> {
     let mut outcomes = Vec::new();
-    let mut tried = Tried::new(&format!("dermis stress {}", arguments.scenes.join(" ")));
-    for name in &arguments.scenes {
+    let Arguments { scenes, cycles, seed, .. } = arguments;
+    let mut tried = Tried::new(&format!("dermis stress {} --cycles {cycles} --seed {seed}", scenes.join(" ")));
+    for name in scenes {
         let scene = Scene::load(name)?;
         let frames = Frame::shipped(&scene);
         let hardware = Hardware::new(Model::for_frames(&scene, &frames)?, build)?;
         let _progress = Progress::start(&format!("{}: stress", scene.name));
         let begun = Instant::now();
-        let own = stress(&hardware, &frames, arguments.cycles, arguments.seed)?;
+        let own = stress(&hardware, &frames, *cycles, *seed)?;
         let cycles: u64 = own.iter().map(|outcome| outcome.cycles).sum();
         // Of the time together each experiment has its share by its cycles.
         let per_cycle = begun.elapsed().as_secs_f64() / cycles.max(1) as f64;
