@@ -65,12 +65,16 @@ impl std::ops::AddAssign for Usage {
     }
 }
 
+/// The stage that a block belongs to, whose name's parts are separated by `$`.
+pub fn stage(block: &str) -> &str {
+    block.split('$').next().filter(|stage| STAGES.contains(stage)).unwrap_or("engine")
+}
+
 /// Usage of each stage by its name in the hardware, what belongs to none under `engine`.
 pub fn stages(model: &Model, verilog: &str) -> BTreeMap<String, Usage> {
     let mut all: BTreeMap<String, Usage> = BTreeMap::new();
     let mut add = |block: &str, usage: Usage| {
-        let stage = block.split('$').next().filter(|stage| STAGES.contains(stage)).unwrap_or("engine");
-        *all.entry(stage.to_string()).or_default() += usage;
+        *all.entry(stage(block).to_string()).or_default() += usage;
     };
     let memories = &model.resources.memories;
     let placed: BTreeSet<(String, String)> =

@@ -10,10 +10,12 @@
 //! in which valid and ready are both set. latency = cycle of the last output beat − cycle of the last
 //! input beat; total = cycle of the last output beat − cycle of the first input beat + 1.
 
+mod held;
 mod receiver;
 mod recording;
 mod sender;
 
+pub(crate) use held::{Held, RULE};
 pub use recording::{Beat, Breach, Play, Recording, TapWord, Times};
 
 use dermis_hdl::device::{Device, Inputs};

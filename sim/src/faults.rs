@@ -26,7 +26,6 @@ use clap::Args;
 use dermis_golden::fixed::Model;
 use dermis_golden::frame::Frame;
 use dermis_golden::scene::Scene;
-use dermis_hdl::usage::STAGES;
 use serde::Serialize;
 
 use crate::bench::INSTANCE;
@@ -109,7 +108,7 @@ pub fn faults(hardware: &Hardware, frames: &[Frame], count: usize, seed: u64) ->
     pool.retain(Sample::presses);
     let mut device = hardware.writable()?;
     let memories = &hardware.model.resources.memories;
-    let places = places(&device.listing()?, INSTANCE, memories, &STAGES)?;
+    let places = places(&device.listing()?, INSTANCE, memories)?;
     let longest = pool.iter().map(|sample| sample.cycles.total).max().unwrap_or(0);
     let mut rows: BTreeMap<(Class, String), Row> = BTreeMap::new();
     for place in &places {
@@ -254,13 +253,8 @@ fn kept(scene: &str, class: Class, rows: &[Row], seconds: f64) -> tried::Line {
         ("silent", sum(|row| row.silent)),
         ("not recovered", sum(|row| row.not_recovered)),
     ];
-    tried::Line {
-        what: format!("{scene}, {}", class.name()),
-        unit: "bits flipped".to_owned(),
-        tried: sum(|row| row.tried),
-        outcomes: counts.map(|(name, count)| (name.to_owned(), count)).into(),
-        seconds,
-    }
+    let tried = sum(|row| row.tried);
+    tried::Line::new(format!("{scene}, {}", class.name()), "bits flipped", tried, counts, seconds)
 }
 
 /// The outcomes as text, and whether a reset always helped; the counts stay in the build folder for the report.

@@ -5,6 +5,7 @@
 //! | bit-true [`Model`] | Verilog, taps and manifest ([`Generated`]) |
 //! | which simulator | a [`Device`] |
 
+use std::borrow::Cow;
 use std::path::{Path, PathBuf};
 
 use anyhow::Result;
@@ -151,6 +152,16 @@ impl Hardware {
             Simulator::Netlist => &[],
             Simulator::Verilator | Simulator::RustHdl => &self.generated.taps,
         }
+    }
+
+    /// The names of the streams that a device of this simulator shows, and `vectors` without the stages that it does not.
+    pub fn shown<'a>(&self, simulator: Simulator, vectors: &'a [Vector]) -> (Vec<&'static str>, Cow<'a, [Vector]>) {
+        let taps = self.taps(simulator);
+        let vectors = match taps {
+            [] => vectors.iter().map(Vector::without_stages).collect(),
+            _ => Cow::Borrowed(vectors),
+        };
+        (taps.iter().map(|tap| tap.name).collect(), vectors)
     }
 
     /// Stage names of the Verilog's and rust-hdl's taps, in the order of a device's outputs.

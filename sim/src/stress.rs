@@ -162,13 +162,7 @@ fn kept(outcome: &Outcome, seconds: f64) -> tried::Line {
         ("resets", outcome.resets),
         ("violations", outcome.violations),
     ];
-    tried::Line {
-        what: format!("{}, {}", outcome.scene, outcome.experiment),
-        unit: "cycles".to_owned(),
-        tried: outcome.cycles,
-        outcomes: counts.map(|(name, count)| (name.to_owned(), count)).into(),
-        seconds,
-    }
+    tried::Line::new(format!("{}, {}", outcome.scene, outcome.experiment), "cycles", outcome.cycles, counts, seconds)
 }
 
 /// The outcomes as text, and whether nothing was violated; the counts stay in the build folder for the report.

@@ -58,6 +58,18 @@ impl fmt::Display for Line {
 }
 
 impl Line {
+    /// So many of a unit, with what came of them by name.
+    pub fn new(
+        what: impl Into<String>,
+        unit: &str,
+        tried: u64,
+        outcomes: impl IntoIterator<Item = (&'static str, u64)>,
+        seconds: f64,
+    ) -> Line {
+        let outcomes = outcomes.into_iter().map(|(name, count)| (name.to_owned(), count)).collect();
+        Line { what: what.into(), unit: unit.to_owned(), tried, outcomes, seconds }
+    }
+
     /// Outcomes with their counts.
     pub fn outcome(&self) -> String {
         self.outcomes.iter().map(|(name, count)| format!("{count} {name}")).collect::<Vec<_>>().join(", ")

@@ -124,16 +124,13 @@ fn simulate(
         Simulator::RustHdl | Simulator::Netlist => &[Stimulus::FullSpeed],
     };
     let mut device = hardware.device(simulator)?;
-    let (taps, vectors) = match simulator {
-        Simulator::Netlist => (Vec::new(), &vectors.iter().map(Vector::without_stages).collect::<Vec<_>>()[..]),
-        _ => (hardware.tap_names(), vectors),
-    };
+    let (taps, vectors) = hardware.shown(simulator, vectors);
     let mut full_speed = Vec::new();
     for &stimulus in stimuli {
         let label = format!("{}, {stimulus}", simulator.name());
         let _progress = Progress::start(&format!("{}: {label}", verified.scene.name));
         let bench = Bench { name: simulator.name(), device: device.as_mut(), taps: &taps };
-        let (findings, times) = run(bench, vectors, stimulus);
+        let (findings, times) = run(bench, &vectors, stimulus);
         verified.findings.extend(findings);
         verified.runs.push(label);
         if stimulus == Stimulus::FullSpeed {

@@ -179,7 +179,7 @@ pub fn waves(scene: &Scene, frames: &[Frame], simulator: Simulator, build: &Path
     let vectors = frames.chunks(1 << scene.input.average).map(|frames| hardware.vector(frames));
     let vectors = vectors.collect::<Result<Vec<_>>>()?;
     let taps = hardware.taps(simulator);
-    let names: Vec<&str> = taps.iter().map(|tap| tap.name).collect();
+    let (names, vectors) = hardware.shown(simulator, &vectors);
     let _progress = Progress::start(&format!("{}: waveforms", scene.name));
     // Gone with an error or an interruption that unwinds.
     let mut part = tempfile::Builder::new();

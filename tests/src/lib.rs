@@ -46,3 +46,11 @@ pub fn scene(name: &str) -> (Scene, Vec<Frame>) {
 pub fn build_dir() -> PathBuf {
     PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../build")
 }
+
+/// How much a test tries: what the environment's variable says, else the short part that every run has.
+///
+/// # Panics
+/// When the variable is no number.
+pub fn wanted(variable: &str, short: u64) -> u64 {
+    std::env::var(variable).map_or(short, |text| text.parse().unwrap_or_else(|_| panic!("{variable}: a number")))
+}

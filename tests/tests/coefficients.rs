@@ -3,6 +3,7 @@
 
 use dermis_golden::fixed::check::unseen;
 use dermis_golden::fixed::send::{FLAG_COEFFICIENTS, STATUS_BEATS};
+use dermis_golden::fixed::storage::word_bits;
 use dermis_golden::fixed::{Cycles, Model};
 use dermis_golden::flags::Flag;
 use dermis_golden::frame::Frame;
@@ -86,7 +87,7 @@ fn every_tried_flip_is_told() {
         assert_eq!(unseen(&hardware.model), [0; 0], "{name}");
         let file = hardware.generated.files.iter().position(|file| file.name == "coefficients.hex").unwrap();
         let good = hardware.generated.files[file].text.clone();
-        let bits = 4 * hardware.model.formats.lanes_per_parity * 18;
+        let bits = word_bits(&hardware.model.formats);
         let mut random = fastrand::Rng::with_seed(1);
         for _ in 0..FLIPS {
             let (word, bit) = (random.usize(..words), random.usize(..bits));

@@ -22,7 +22,7 @@ fn every_bit_is_found() {
     let hardware = hardware();
     let listing = hardware.writable().unwrap().listing().unwrap();
     let memories = &hardware.model.resources.memories;
-    let all = places(&listing, "bench.dut", memories, &dermis_hdl::usage::STAGES).unwrap();
+    let all = places(&listing, "bench.dut", memories).unwrap();
     let bits = |wanted: &dyn Fn(Class) -> bool| -> usize {
         all.iter().filter(|place| wanted(place.class)).map(|place| place.words * place.bits).sum()
     };

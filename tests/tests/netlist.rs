@@ -26,10 +26,8 @@ fn setup(mu_max: &str) -> (Hardware, Vec<Frame>) {
 fn findings(hardware: &Hardware, frames: &[Frame], simulator: Simulator) -> Findings {
     let mut device = hardware.device(simulator).unwrap();
     let vectors = frames.iter().map(|frame| hardware.vector(std::slice::from_ref(frame)).unwrap());
-    let (taps, vectors): (_, Vec<Vector>) = match simulator {
-        Simulator::Netlist => (Vec::new(), vectors.map(|vector| vector.without_stages()).collect()),
-        _ => (hardware.tap_names(), vectors.collect()),
-    };
+    let vectors: Vec<Vector> = vectors.collect();
+    let (taps, vectors) = hardware.shown(simulator, &vectors);
     let bench = Bench { name: simulator.name(), device: device.as_mut(), taps: &taps };
     run(bench, &vectors, Stimulus::FullSpeed).0
 }

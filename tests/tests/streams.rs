@@ -8,12 +8,7 @@ use dermis_golden::scene::Scene;
 use dermis_sim::hardware::Hardware;
 use dermis_sim::report;
 use dermis_sim::stress::{stress, Outcome};
-use dermis_tests::{build_dir, scene};
-
-/// Cycles of each experiment; the three of sensor-1 take a second.
-fn cycles(short: u64) -> u64 {
-    std::env::var("DERMIS_STRESS_CYCLES").map_or(short, |text| text.parse().expect("DERMIS_STRESS_CYCLES: a number"))
-}
+use dermis_tests::{build_dir, scene, wanted};
 
 /// A few taxels, so that a reset at every cycle of a frame takes a second.
 fn small(rows: usize, cols: usize, more: &str) -> Scene {
@@ -29,7 +24,7 @@ fn hardware(scene: &Scene) -> Hardware {
 }
 
 fn check(scene: &Scene, frames: &[Frame], short: u64) -> Vec<Outcome> {
-    let outcomes = stress(&hardware(scene), frames, cycles(short), 1).unwrap();
+    let outcomes = stress(&hardware(scene), frames, wanted("DERMIS_STRESS_CYCLES", short), 1).unwrap();
     println!("{}", report::stress(&outcomes));
     for outcome in &outcomes {
         assert_eq!(outcome.violations, 0, "{:?}: {outcome:#?}", scene.partition);

@@ -92,8 +92,9 @@ impl Place {
             }
         }
         bytes.extend(crc32fast::hash(&bytes).to_le_bytes());
-        let folder = self.path.parent().map_or(Ok(()), fs::create_dir_all);
-        let _ = folder.is_ok() && write(&self.path, &bytes).is_ok();
+        if self.path.parent().is_none_or(|folder| fs::create_dir_all(folder).is_ok()) {
+            let _ = write(&self.path, &bytes);
+        }
     }
 }
 

@@ -105,11 +105,7 @@ pub struct Steps {
 pub const COLUMN_FILE: &str = "columns.hex";
 /// Bits of `control`.
 pub fn control_bits(model: &Model) -> usize {
-    if model.checks() {
-        4
-    } else {
-        3
-    }
+    3 + usize::from(model.checks())
 }
 /// Bits of `source`.
 pub const SOURCE_BITS: usize = 5;

@@ -2,6 +2,7 @@
 
 use dermis_hdl::device::{Inputs, Outputs};
 
+use super::held::{Held, RULE};
 use super::recording::{Beat, Breach, Play, Recording, TapWord, Times};
 use super::sender::Sender;
 
@@ -13,8 +14,7 @@ pub(super) struct Receiver {
     ends: Vec<usize>,
     /// Frames whose beats are all out.
     pub(super) frame: usize,
-    /// A beat that was offered and not taken in the cycle before.
-    held: Option<([i32; 3], bool)>,
+    held: Held,
 }
 
 impl Receiver {
@@ -28,7 +28,7 @@ impl Receiver {
             times: vec![Times::default(); frames.len()],
             ..Recording::default()
         };
-        Receiver { recording, ends: ends.collect(), frame: 0, held: None }
+        Receiver { recording, ends: ends.collect(), frame: 0, held: Held::default() }
     }
 
     fn breach(&mut self, cycle: u64, rule: String) {
@@ -38,19 +38,16 @@ impl Receiver {
 
     /// Whether a beat was transferred.
     pub(super) fn observe(&mut self, cycle: u64, inputs: &Inputs, outputs: Outputs) -> bool {
+        let (given, kept) = self.held.observe(&outputs, inputs.m_ready);
+        if !kept {
+            self.breach(cycle, RULE.into());
+        }
         for (stream, word) in self.recording.taps.iter_mut().zip(outputs.taps) {
             if let Some(fields) = word {
                 stream.push(TapWord { cycle, fields });
             }
         }
-        let offered = outputs.m_valid.then_some((outputs.m_data, outputs.m_last));
-        if let Some(held) = self.held {
-            if offered != Some(held) {
-                self.breach(cycle, "an offered beat must stay until it is taken".into());
-            }
-        }
-        self.held = offered.filter(|_| !inputs.m_ready);
-        let Some((data, last)) = offered.filter(|_| inputs.m_ready) else {
+        let Some((data, last)) = given else {
             return false;
         };
         match self.recording.times.get(self.frame).map(|t| t.last_in) {

@@ -7,6 +7,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use anyhow::{anyhow, Result};
 use dermis_golden::fixed::resources::Memory;
+use dermis_hdl::usage::stage;
 use roxmltree::{Document, Node};
 use serde::Serialize;
 
@@ -57,7 +58,7 @@ pub struct Place {
 ///
 /// # Errors
 /// A listing of another form than Verilator's.
-pub fn places(listing: &str, dut: &str, memories: &[Memory], stages: &[&str]) -> Result<Vec<Place>> {
+pub fn places(listing: &str, dut: &str, memories: &[Memory]) -> Result<Vec<Place>> {
     let document = Document::parse(listing).map_err(|error| anyhow!("Verilator's listing: {error}"))?;
     let modules: BTreeMap<&str, Node> = document
         .descendants()
@@ -74,7 +75,7 @@ pub fn places(listing: &str, dut: &str, memories: &[Memory], stages: &[&str]) ->
         };
         let (own, Some(module)) = (own.trim_start_matches('.'), modules.get(module)) else { continue };
         let block = own.replace('.', "$");
-        let stage = own.split('.').next().filter(|stage| stages.contains(stage)).unwrap_or("engine");
+        let stage = stage(&block);
         let mut scan = Scan::default();
         scan.walk(*module, own);
         for ((scope, signal), kind) in &scan.declared {

@@ -5,6 +5,7 @@ use dermis_hdl::device::{Device, Inputs};
 use super::pace::Pace;
 use super::scoreboard::Scoreboard;
 use super::{Outcome, Sample};
+use crate::drive::{Held, RULE};
 
 /// Cycles of the reset before an experiment.
 pub(crate) const RESET_CYCLES: u64 = 4;
@@ -65,8 +66,7 @@ pub(crate) struct Line<'a> {
     /// Cycles since the last transfer.
     idle: u64,
     patience: u64,
-    /// A beat that was offered and not taken.
-    held: Option<([i32; 3], bool)>,
+    held: Held,
     hangs: bool,
 }
 
@@ -75,7 +75,7 @@ impl<'a> Line<'a> {
         let longest = pool.iter().map(|sample| sample.cycles.total).max().unwrap_or(0);
         let scoreboard = Scoreboard::new(pool);
         let patience = PATIENCE + 4 * longest;
-        Line { device, pool, scoreboard, cycle: 0, idle: 0, patience, held: None, hangs: false }
+        Line { device, pool, scoreboard, cycle: 0, idle: 0, patience, held: Held::default(), hangs: false }
     }
 
     pub(super) fn samples(&self) -> usize {
@@ -174,25 +174,24 @@ impl<'a> Line<'a> {
             }
             self.cycle += 1;
         }
-        (self.held, self.idle) = (None, 0);
+        (self.held, self.idle) = (Held::default(), 0);
     }
 
     /// One cycle; whether the offered code was taken.
     fn step(&mut self, offer: Option<(i32, bool)>, m_ready: bool) -> bool {
         let (s_data, s_last) = offer.unwrap_or_default();
         let outputs = self.device.cycle(&Inputs { rst: false, s_valid: offer.is_some(), s_data, s_last, m_ready });
-        let offered = outputs.m_valid.then_some((outputs.m_data, outputs.m_last));
-        if self.held.is_some() && offered != self.held {
-            self.scoreboard.violate(self.cycle, "an offered beat must stay until it is taken".to_owned());
+        let (given, kept) = self.held.observe(&outputs, m_ready);
+        if !kept {
+            self.scoreboard.violate(self.cycle, RULE.to_owned());
         }
-        self.held = offered.filter(|_| !m_ready);
-        if let Some((data, last)) = offered.filter(|_| m_ready) {
+        if let Some((data, last)) = given {
             self.scoreboard.given(self.cycle, data, last);
         }
         let taken = offer.is_some() && outputs.s_ready;
-        let waits = (offer.is_none() && outputs.s_ready) || (offered.is_some() && !m_ready);
+        let waits = (offer.is_none() && outputs.s_ready) || self.held.waits();
         self.scoreboard.outcome.stalled += u64::from(waits);
-        let moved = taken || (offered.is_some() && m_ready);
+        let moved = taken || given.is_some();
         self.idle = if moved { 0 } else { self.idle + 1 };
         if self.idle == self.patience && (offer.is_some() || !self.scoreboard.is_empty()) {
             self.scoreboard.violate(self.cycle, format!("nothing moved for {} cycles", self.patience));

@@ -17,6 +17,7 @@
 
 use std::time::{Duration, Instant};
 
+use dermis_tests::wanted;
 use fastrand::Rng;
 
 mod counting;
@@ -28,7 +29,7 @@ mod whole;
 use counting::Counting;
 use draw::mutated;
 use readers::{corpus, TARGETS};
-use run::{conclude, on_all_processors, wanted, Outcome};
+use run::{conclude, on_all_processors, Outcome};
 
 /// Longest time for one input of a reader.
 const LONGEST: Duration = Duration::from_secs(2);
@@ -43,7 +44,7 @@ static COUNTING: Counting = Counting;
 #[test]
 fn readers_take_anything() {
     const SHORT: usize = 30_000;
-    let inputs = wanted("DERMIS_FUZZ_INPUTS", SHORT);
+    let inputs = wanted("DERMIS_FUZZ_INPUTS", SHORT as u64) as usize;
     let done = on_all_processors(TARGETS.len(), |number| reader(number, inputs.div_ceil(TARGETS.len())));
     for (name, outcome) in &done {
         // The draw reaches both sides of the reader.
@@ -74,7 +75,7 @@ fn reader(number: usize, changed: usize) -> (&'static str, Outcome) {
 #[test]
 fn the_whole_way_takes_anything() {
     const SHORT: usize = 600;
-    let runs = wanted("DERMIS_FUZZ_RUNS", SHORT);
+    let runs = wanted("DERMIS_FUZZ_RUNS", SHORT as u64) as usize;
     let start = Instant::now();
     let mut all = Outcome::default();
     on_all_processors(runs.div_ceil(whole::FRAMES), |seed| whole::drawn(seed as u64))

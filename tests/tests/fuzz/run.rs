@@ -3,11 +3,10 @@
 use std::fmt::Write;
 use std::panic::{catch_unwind, AssertUnwindSafe};
 use std::path::Path;
-use std::sync::atomic::{AtomicUsize, Ordering};
-use std::sync::Mutex;
-use std::thread::{available_parallelism, scope};
+use std::thread::available_parallelism;
 use std::time::{Duration, Instant};
 
+use dermis_sim::jobs::{parallel, Interrupt};
 use dermis_sim::tried::{Line, Tried};
 use dermis_tests::build_dir;
 
@@ -15,11 +14,6 @@ use super::counting::{mark, most_since};
 
 /// Failing inputs that are printed in full.
 const PRINTED: usize = 20;
-
-/// How many inputs: the variable's, or a short part.
-pub fn wanted(variable: &str, short: usize) -> usize {
-    std::env::var(variable).map_or(short, |text| text.parse().expect("a number of inputs"))
-}
 
 /// What became of some inputs.
 #[derive(Default)]
@@ -89,23 +83,8 @@ impl Outcome {
 
 /// Does tasks 0 … `count` − 1 on all processors; results in their order.
 pub fn on_all_processors<R: Send>(count: usize, work: impl Fn(usize) -> R + Sync) -> Vec<R> {
-    let (next, done) = (AtomicUsize::new(0), Mutex::new(Vec::with_capacity(count)));
-    let worker = || loop {
-        let task = next.fetch_add(1, Ordering::Relaxed);
-        if task >= count {
-            break;
-        }
-        let result = work(task);
-        done.lock().unwrap().push((task, result));
-    };
-    scope(|scope| {
-        for _ in 0..available_parallelism().map_or(1, usize::from) {
-            scope.spawn(worker);
-        }
-    });
-    let mut done = done.into_inner().unwrap();
-    done.sort_by_key(|(task, _)| *task);
-    done.into_iter().map(|(_, result)| result).collect()
+    let jobs = available_parallelism().map_or(1, usize::from);
+    parallel("inputs", (0..count).collect(), jobs, &Interrupt::default(), |task| Ok(work(task))).unwrap()
 }
 
 /// Prints a line per target, keeps the counts of a long run for the report, and fails where anything failed.
@@ -114,13 +93,8 @@ pub fn conclude(name: &str, unit: &str, long: bool, outcomes: Vec<(&str, Outcome
     let mut failures = String::new();
     for (what, outcome) in outcomes {
         let counts = outcome.counts.iter().copied().chain([("failed", outcome.failures.len())]);
-        let line = Line {
-            what: what.to_owned(),
-            unit: unit.to_owned(),
-            tried: outcome.tried as u64,
-            outcomes: counts.map(|(name, count)| (name.to_owned(), count as u64)).collect(),
-            seconds: outcome.elapsed.as_secs_f64(),
-        };
+        let counts = counts.map(|(name, count)| (name, count as u64));
+        let line = Line::new(what, unit, outcome.tried as u64, counts, outcome.elapsed.as_secs_f64());
         println!("{line}; one at most {} bytes, {:.1?}", outcome.most_bytes, outcome.slowest);
         run.lines.push(line);
         for failure in outcome.failures.iter().take(PRINTED) {
