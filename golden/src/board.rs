@@ -4,6 +4,7 @@
 //!
 //! | field | unit | meaning |
 //! |---|---|---|
+//! | `engine` | | `"parallel"` (default) or `"serial"`: [`EngineKind`] |
 //! | `device`, `family`, `size`, `package`, `speed_grade` | | as the place and route tool names them |
 //! | `input_clock_MHz` | MHz | oscillator on the board |
 //! | `clock_MHz` | MHz | the engine's clock: a design target until place and route has measured it |
@@ -11,6 +12,7 @@
 //! | `multipliers`, `multiplier_bits` | , bits | signed multipliers and the width of their operands |
 //! | `block_rams`, `block_ram_shapes` | , [words, bits] | block RAMs and what one of them can be |
 //! | `distributed_words` | words | distributed RAM takes memories up to these: always; where block RAM is short |
+//! | `large_rams`, `large_ram_shape` | , [words, bits] | single-port RAMs, 0 where left out |
 //! | `luts`, `flip_flops` | | logic cells, for the estimates' shares |
 //! | `seeds`, `placers` | | place and route is tried with these seeds, 1 …, and with each placer until one converges |
 //! | `place_minutes` | min | a try is given up after this long |
@@ -23,6 +25,17 @@ use thiserror::Error;
 
 static FILES: Dir = include_dir!("$CARGO_MANIFEST_DIR/../constraints");
 
+/// Which of the two engines a board gets: the same arithmetic on another schedule.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum EngineKind {
+    /// As many lanes as fit, stages side by side.
+    #[default]
+    Parallel,
+    /// Four lanes, one taxel after the other: for devices of a few thousand logic cells.
+    Serial,
+}
+
 /// A board and its device.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -33,6 +46,9 @@ pub struct Board {
     pub name: String,
     /// One line for people.
     pub description: String,
+    /// The engine it gets.
+    #[serde(default)]
+    pub engine: EngineKind,
     /// Ordering code of the device.
     pub device: String,
     /// Which of the supported families the device is of.
@@ -59,6 +75,12 @@ pub struct Board {
     pub block_ram_shapes: Vec<[usize; 2]>,
     /// Memories of at most so many words go into distributed RAM: always, and where block RAM is short.
     pub distributed_words: [usize; 2],
+    /// Single-port RAMs.
+    #[serde(default)]
+    pub large_rams: u32,
+    /// What one of them is: [words, bits].
+    #[serde(default)]
+    pub large_ram_shape: [usize; 2],
     /// Four-input look-up tables.
     pub luts: u32,
     /// Flip-flops.
@@ -77,6 +99,8 @@ pub struct Board {
 pub enum Family {
     /// Lattice ECP5.
     Ecp5,
+    /// Lattice iCE40.
+    Ice40,
 }
 
 impl Family {
@@ -84,6 +108,7 @@ impl Family {
     pub fn pins(self) -> &'static str {
         match self {
             Family::Ecp5 => "lpf",
+            Family::Ice40 => "pcf",
         }
     }
 }
@@ -153,6 +178,9 @@ impl Board {
         if board.block_ram_shapes.is_empty() || board.block_ram_shapes.iter().flatten().any(|&size| size == 0) {
             return Err(invalid(format!("block_ram_shapes = {:?}: must be [words, bits]", board.block_ram_shapes)));
         }
+        if board.large_rams > 0 && board.large_ram_shape.contains(&0) {
+            return Err(invalid(format!("large_ram_shape = {:?}: must be [words, bits]", board.large_ram_shape)));
+        }
         let counts = [
             ("uart_baud", board.uart_baud),
             ("seeds", board.seeds),
@@ -173,6 +201,12 @@ impl Board {
     pub fn block_rams_for(&self, words: usize, bits: usize) -> usize {
         let of = |&[w, b]: &[usize; 2]| (words.div_ceil(w) * bits).div_ceil(b);
         self.block_ram_shapes.iter().map(of).min().unwrap_or(0)
+    }
+
+    /// Single-port RAMs for a memory of `words` words of `bits` bits.
+    pub fn large_rams_for(&self, words: usize, bits: usize) -> usize {
+        let [most_words, most_bits] = self.large_ram_shape.map(|size| size.max(1));
+        words.div_ceil(most_words) * bits.div_ceil(most_bits)
     }
 
     /// Multipliers for a product of signed operands of `a` and `b` bits, each cut into as few pieces as it takes.

@@ -19,7 +19,7 @@ mod tests;
 pub use codes::{beats_of_bytes, code_bytes, codes_of_bytes, codes_to_bytes, BEAT_BYTES};
 pub use format::markdown;
 pub use header::c_header;
-pub use identity::{payloads, scene_hash, wire_ms, LinkError};
+pub use identity::{payloads, scene_hash, takes, wire_ms, LinkError};
 pub use packet::{Decoder, Packet, PacketError};
 pub use payload::{Beat, Counters, Field, Header, Identity, Sums};
 

@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 
+use dermis_golden::board::EngineKind;
 use dermis_golden::fixed::resources::Memory;
 use dermis_golden::fixed::send::{
     CASE_SHIFT, FLAG_COEFFICIENTS, FLAG_CONDITION, FLAG_FOUND, FLAG_FRAMING, FLAG_NO_CONTACT, STATUS_BEATS,
@@ -126,7 +127,7 @@ pub fn generate(model: &Model) -> Result<Generated, HdlError> {
     let verilog = header(model, &top) + &rename(&verilog, &top);
     let mut files = vec![
         file(format!("{top}.v"), verilog),
-        file(format!("{top}.vlt"), include_str!("waivers.vlt").to_string()),
+        file(format!("{top}.vlt"), waivers(model).to_string()),
         file(MANIFEST.to_string(), format!("{manifest:#}\n")),
         file("dermis_link.h".to_string(), c_header()),
     ];
@@ -155,8 +156,14 @@ pub(crate) fn place(verilog: &str, model: &Model, engine: &str) -> Result<String
             line.trim_start().strip_prefix("reg ") == Some(&end)
         };
         if let Some(memory) = own.into_iter().find(declares) {
-            let style = if memory.block_rams > 0 { "block" } else { "distributed" };
-            placed.push_str(&format!("(* ram_style = \"{style}\" *)\n"));
+            let style = match (memory.large_rams, memory.block_rams) {
+                (0, 0) => "distributed",
+                (0, _) => "block",
+                _ => "huge",
+            };
+            // The serial engine never reads a word in the cycle that writes it: no logic is needed for that.
+            let check = if model.board.engine == EngineKind::Serial { ", no_rw_check" } else { "" };
+            placed.push_str(&format!("(* ram_style = \"{style}\"{check} *)\n"));
             marked += 1;
         }
         placed.push_str(line);
@@ -181,6 +188,14 @@ pub(crate) fn rename(verilog: &str, top: &str) -> String {
         .replace("top$", &format!("{top}$"))
         .replace("module top(", &format!("module {top}("))
         .replace("endmodule // top\n", &format!("endmodule // {top}\n"))
+}
+
+/// What Verilator need not warn of.
+fn waivers(model: &Model) -> &'static str {
+    match model.board.engine {
+        EngineKind::Parallel => include_str!("waivers.vlt"),
+        EngineKind::Serial => include_str!("serial/waivers.vlt"),
+    }
 }
 
 fn header(model: &Model, top: &str) -> String {

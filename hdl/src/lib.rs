@@ -21,6 +21,7 @@ pub mod explain;
 pub mod link;
 pub mod manifest;
 pub mod primitives;
+pub mod serial;
 pub mod stages;
 pub mod unsearched;
 pub mod usage;

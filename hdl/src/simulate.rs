@@ -1,5 +1,6 @@
 //! rust-hdl's own simulation of the engine as a [`Device`].
 
+use dermis_golden::board::EngineKind;
 use dermis_golden::fixed::Model;
 use rust_hdl::prelude::*;
 
@@ -8,7 +9,7 @@ use crate::generate::HdlError;
 use crate::primitives::{position_bits, CALIBRATION_FILE, COLUMN_FILE, MEMORY_FILE};
 use crate::taps::{taps, SEARCH_FIELD};
 use crate::wire::Word;
-use crate::{choosing, engine, unsearched};
+use crate::{choosing, engine, serial, unsearched};
 
 /// Update rounds after which signals that still change are taken for a combinational loop.
 pub(crate) const SETTLE_ROUNDS: usize = 200;
@@ -26,7 +27,7 @@ pub(crate) trait Design: Block {
 }
 
 macro_rules! design {
-    ($engine:ty) => {
+    ($engine:ty, $streams:expr, $files:expr) => {
         impl Design for $engine {
             fn drive(&mut self, inputs: &Inputs, clock: bool) {
                 self.rst.next = inputs.rst;
@@ -38,29 +39,9 @@ macro_rules! design {
             }
 
             fn observe(&self, taps: &[Tap]) -> Outputs {
-                let search = &self.search;
-                let best = Word::of_fields(
-                    &[
-                        search.best_x.val().signed(0, position_bits()),
-                        search.best_y.val().signed(0, position_bits()),
-                        search.score.val().signed(0, search.score.width()),
-                        i64::from(search.taken.val()),
-                    ],
-                    SEARCH_FIELD as usize,
-                );
-                let streams = [
-                    ("receive", self.receive.accept.val(), self.receive.taken_word.val()),
-                    ("choose", self.begin_frame.val(), self.receive.which.val()),
-                    ("normalise", self.fold.normalised_valid.val(), self.normalise.shifted.val()),
-                    ("fold", self.fold.folded_valid.val(), self.fold.folded.val()),
-                    ("pass", self.pass.quad_valid.val(), self.pass.quad.val()),
-                    ("rescale", self.rescale.words_valid.val(), self.rescale.words.val()),
-                    ("unfold", self.unfold.taxels_valid.val(), self.unfold.taxels.val()),
-                    ("search", search.judged.val(), best),
-                    ("force", search.values_valid.val(), search.values.val()),
-                ];
+                let streams = $streams(self);
                 let sample = |tap: &Tap| {
-                    let (_, valid, word) = streams.iter().find(|(name, ..)| *name == tap.name)?;
+                    let (_, valid, word): &(&str, bool, Word) = streams.iter().find(|(name, ..)| *name == tap.name)?;
                     let field = |field| word.signed(field, tap.field_bits as usize);
                     valid.then(|| (0..tap.fields).map(field).collect())
                 };
@@ -79,21 +60,75 @@ macro_rules! design {
             }
 
             fn memory_files(&self) -> Vec<(&'static str, String)> {
-                let columns = self.pass.steps.column_file().map(|text| (COLUMN_FILE, text));
-                let table = self.prepare.calibrate.table_file().map(|text| (CALIBRATION_FILE, text));
-                [(MEMORY_FILE, self.pass.lanes.memory_file())].into_iter().chain(columns).chain(table).collect()
+                $files(self)
             }
         }
     };
 }
 
-design!(engine::Engine);
-design!(unsearched::engine::Engine);
-design!(choosing::engine::Engine);
+/// The outputs of a search as its tap shows them.
+macro_rules! best {
+    ($search:expr) => {
+        Word::of_fields(
+            &[
+                $search.best_x.val().signed(0, position_bits()),
+                $search.best_y.val().signed(0, position_bits()),
+                $search.score.val().signed(0, $search.score.width()),
+                i64::from($search.taken.val()),
+            ],
+            SEARCH_FIELD as usize,
+        )
+    };
+}
+
+/// The streams and the files of an engine whose stages stand side by side.
+macro_rules! side_by_side {
+    ($engine:ty) => {
+        design!(
+            $engine,
+            |engine: &$engine| [
+                ("receive", engine.receive.accept.val(), engine.receive.taken_word.val()),
+                ("choose", engine.begin_frame.val(), engine.receive.which.val()),
+                ("normalise", engine.fold.normalised_valid.val(), engine.normalise.shifted.val()),
+                ("fold", engine.fold.folded_valid.val(), engine.fold.folded.val()),
+                ("pass", engine.pass.quad_valid.val(), engine.pass.quad.val()),
+                ("rescale", engine.rescale.words_valid.val(), engine.rescale.words.val()),
+                ("unfold", engine.unfold.taxels_valid.val(), engine.unfold.taxels.val()),
+                ("search", engine.search.judged.val(), best!(engine.search)),
+                ("force", engine.search.values_valid.val(), engine.search.values.val()),
+            ],
+            |engine: &$engine| {
+                let columns = engine.pass.steps.column_file().map(|text| (COLUMN_FILE, text));
+                let table = engine.prepare.calibrate.table_file().map(|text| (CALIBRATION_FILE, text));
+                [(MEMORY_FILE, engine.pass.lanes.memory_file())].into_iter().chain(columns).chain(table).collect()
+            }
+        );
+    };
+}
+
+side_by_side!(engine::Engine);
+side_by_side!(unsearched::engine::Engine);
+side_by_side!(choosing::engine::Engine);
+
+design!(
+    serial::Engine,
+    |engine: &serial::Engine| [
+        ("receive", engine.receive.accept.val(), engine.receive.s_axis_tdata.val()),
+        ("normalise", engine.leader.normalised_valid.val(), engine.rounder.rounded.val()),
+        ("fold", engine.mixer.quad_valid.val() && engine.leader.folding.val(), engine.mixer.quad.val()),
+        ("pass", engine.pass.quad_valid.val(), engine.pass.quad.val()),
+        ("rescale", engine.leader.rescaled_valid.val(), engine.rounder.rounded.val()),
+        ("unfold", engine.unfold.taxel_valid.val(), engine.unfold.taxel.val()),
+        ("search", engine.walk.judged.val(), best!(engine.walk)),
+        ("force", engine.walk.value_valid.val(), engine.halve.value.val()),
+    ],
+    |engine: &serial::Engine| engine.pass.memory_files()
+);
 
 /// The engine of `model`, checked.
 pub(crate) fn design(model: &Model) -> Result<Box<dyn Design>, HdlError> {
     let design: Box<dyn Design> = match (model.searches(), model.chooses()) {
+        _ if model.board.engine == EngineKind::Serial => checked(serial::Engine::new(model))?,
         (true, false) => checked(engine::Engine::new(model))?,
         (true, true) => checked(choosing::engine::Engine::new(model))?,
         (false, _) => checked(unsearched::engine::Engine::new(model))?,

@@ -14,7 +14,7 @@ use crate::estimate::modules;
 const CELL: [usize; 3] = [16, 4, 6];
 
 /// The stages in the order of the pipeline, by their names in the hardware; what belongs to none is the engine's.
-pub const STAGES: [&str; 12] = [
+pub const STAGES: [&str; 27] = [
     "prepare",
     "receive",
     "normalise",
@@ -26,6 +26,21 @@ pub const STAGES: [&str; 12] = [
     "forces",
     "send",
     "resultants",
+    "order",
+    "leader",
+    "rounder",
+    "mixer",
+    "raw",
+    "banks",
+    "walk",
+    "along_x",
+    "turned",
+    "along_y",
+    "halve",
+    "nine",
+    "score",
+    "floors",
+    "totals",
     "engine",
 ];
 
@@ -101,8 +116,8 @@ pub fn total(stages: &BTreeMap<String, Usage>) -> Usage {
 
 fn distributed_luts(memory: &Memory) -> usize {
     let [words, bits, luts] = CELL;
-    match memory.block_rams {
-        0 => memory.words.div_ceil(words) * memory.bits.div_ceil(bits) * luts,
+    match (memory.block_rams, memory.large_rams) {
+        (0, 0) => memory.words.div_ceil(words) * memory.bits.div_ceil(bits) * luts,
         _ => 0,
     }
 }

@@ -45,6 +45,9 @@ struct Arguments {
     /// Folder for everything built on the way.
     #[arg(long, global = true, value_name = "DIR", default_value = "build")]
     build_dir: PathBuf,
+    /// Board in the place of the scene's own, for reconstruct, build and cosim.
+    #[arg(long, global = true, value_name = "NAME")]
+    target_board: Option<String>,
     #[command(subcommand)]
     command: Command,
 }
@@ -91,7 +94,8 @@ enum Command {
     #[command(after_help = "Examples:
   dermis build sensor-1 --out rtl
   dermis build sensor-4 --explain
-  dermis build sensor-1 --board                      with UART and packets, ready for place and route")]
+  dermis build sensor-1 --board                      with UART and packets, ready for place and route
+  dermis build eight-by-eight --target-board icebreaker     the serial engine of a small device")]
     Build {
         /// Built-in name or path of a scene.
         scene: String,
@@ -282,9 +286,14 @@ fn exit_code(error: &anyhow::Error) -> u8 {
 fn run(arguments: &Arguments) -> Result<(String, bool)> {
     let build_dir = &arguments.build_dir;
     store::keep_in(Some(&build_dir.join("matrices")));
+    let on_board = |mut scene: Scene| {
+        scene.hardware.board = arguments.target_board.clone().unwrap_or(scene.hardware.board);
+        scene
+    };
     match &arguments.command {
         Command::Reconstruct { scene, frames, engine, json } => {
             let (scene, frames) = resolve_one(scene.as_deref(), frames)?;
+            let scene = on_board(scene);
             // Seconds where the matrices are large.
             let _progress = Progress::start(&format!("{}: reconstruction", scene.name));
             let (result, full_scale_MPa) = reconstruct(&scene, &frames, *engine, build_dir)?;
@@ -298,13 +307,14 @@ fn run(arguments: &Arguments) -> Result<(String, bool)> {
             Ok((text, true))
         }
         Command::Build { scene, out, explain, board } => {
-            let scene = Scene::load(scene)?;
+            let scene = on_board(Scene::load(scene)?);
             let folder = if *board { "board" } else { "rtl" };
             let out = out.clone().unwrap_or_else(|| build_dir.join(&scene.name).join(folder));
             Ok((build(&scene, &out, *board, *explain)?, true))
         }
         Command::Cosim { scene, frames, json, device, waves } => {
             let (scene, frames) = resolve(scene.as_deref(), frames)?;
+            let scene = on_board(scene);
             let verified = verify(&scene, &frames, device.simulators(), build_dir)?;
             let mut text = if *json {
                 serde_json::to_string(&CosimReport::new(&verified))? + "\n"

@@ -2,7 +2,7 @@
 //!
 //! Equal means equal: every tap's stream, every force beat, every status beat, the handshake in
 //! every cycle, and at full speed the two cycle counts and the cycle of every output beat: beat k leaves
-//! `first_output + k` cycles after the last input beat. The first differing stage in hardware order comes first
+//! `first_output + k·interval` cycles after the last input beat. The first differing stage in hardware order comes first
 //! in the list.
 //!
 //! | in | out |
@@ -191,13 +191,13 @@ impl Judge<'_> {
         }
     }
 
-    /// The cycle of every output beat: beat k of the frame at last input + `first_output` + k.
+    /// The cycle of every output beat: beat k of the frame at last input + `first_output` + k·`interval`.
     fn beat_cycles(&mut self, promised: Cycles, times: &Times, beats: &[Beat]) {
         let Some(last_in) = times.last_in else {
             return;
         };
         for (index, beat) in beats.iter().enumerate() {
-            let due = last_in + promised.first_output + index as u64;
+            let due = last_in + promised.first_output + index as u64 * promised.interval;
             if beat.cycle != due {
                 self.rule("cycles", index, Some(beat.cycle), format!("output beat {index} was due in cycle {due}"));
             }

@@ -23,6 +23,8 @@ use crate::verilator::fingerprint;
 
 /// Our models of ECP5 cells that Yosys has none for.
 const ECP5_CELLS: &str = include_str!("../cells/ecp5.v");
+/// Yosys's models of iCE40 cells give unconnected inputs their values by defaults, which Verilator has not.
+const ICE40_DEFINES: &str = "`define NO_ICE40_DEFAULT_ASSIGNMENTS\n";
 /// The netlist as Verilog.
 const VERILOG: &str = "netlist.v";
 /// What Verilator says of files that tools have written: widths, loops through carry chains, memories of two clocks.
@@ -78,6 +80,7 @@ fn make(files: &[&GeneratedFile], top: &str, family: Family, folder: &Path) -> R
 fn cells(family: Family) -> Result<String, ToolError> {
     let (folder, own) = match family {
         Family::Ecp5 => ("ecp5", ECP5_CELLS),
+        Family::Ice40 => ("ice40", ICE40_DEFINES),
     };
     let share = YOSYS.share()?.join(folder);
     let path = share.join("cells_sim.v");

@@ -30,8 +30,11 @@ fn lint(folder: &Path, generated: &Generated) -> Result<(), String> {
 
 #[test]
 fn generated_verilog_is_clean_and_needs_each_waiver() {
-    for (name, _) in SCENES {
-        let mut generated = generate(&Model::new(&scene(name).0).unwrap()).unwrap();
+    let own = SCENES.map(|(name, _)| (name, None));
+    for (name, board) in own.into_iter().chain([("eight-by-eight", Some("icebreaker"))]) {
+        let mut scene = scene(name).0;
+        scene.hardware.board = board.map_or(scene.hardware.board, str::to_string);
+        let mut generated = generate(&Model::new(&scene).unwrap()).unwrap();
         let folder = tempfile::tempdir().unwrap();
         lint(folder.path(), &generated).unwrap_or_else(|log| panic!("{name}: {log}"));
         let Some(index) = generated.files.iter().position(|f| f.name.ends_with(".vlt")) else {

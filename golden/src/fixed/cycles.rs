@@ -1,4 +1,4 @@
-//! Cycle counts of the engine at full speed: input one beat a cycle, output always ready.
+//! Cycle counts of the parallel engine (the serial one's are in [`serial`]) at full speed: input one beat a cycle, output always ready.
 //!
 //! The hardware's schedule replayed on paper: each stage's latency is a named constant here and a pipeline there, and the co-simulation
 //! asserts that both agree to the cycle. With Q quads, G groups of rows, K rows in the last group:
@@ -20,6 +20,8 @@ use super::formats::HALVINGS;
 use super::model::Model;
 use super::schedule::schedule;
 use super::search::COARSE_CENTRES;
+use super::serial;
+use crate::board::EngineKind;
 
 /// From the last input beat to the cycle in which the frame starts.
 const ACCEPT: u64 = 1;
@@ -59,6 +61,8 @@ pub struct Cycles {
     pub latency: u64,
     /// From the first input beat to the last output beat, both included.
     pub total: u64,
+    /// From one output beat to the next.
+    pub interval: u64,
 }
 
 /// From a coarse sweep of so many quads to the next: a sweep is judged before the next but one, which may write over its
@@ -77,6 +81,9 @@ impl Cycles {
     /// The counts of a frame of `model`, of a scene of several cases a frame of case 0; `searched` says of each
     /// subarray whether it is searched.
     pub fn of(model: &Model, searched: &[bool]) -> Self {
+        if model.board.engine == EngineKind::Serial {
+            return serial::cycles(model, searched.contains(&true));
+        }
         let taxels = model.scene.sensor.taxels() as u64;
         let quads = model.formats.quads as u64;
         let chained = COARSE_CENTRES.len() as u64 - 1;
@@ -101,7 +108,7 @@ impl Cycles {
         let first_output =
             choice + model.prepare.latency() + ACCEPT + searched_at - early + SEND + model.resultants_later();
         let latency = first_output + (model.force_beats() + model.status_beats()) as u64 - 1;
-        Cycles { first_output, latency, total: (taxels << model.prepare.average) + latency }
+        Cycles { first_output, latency, total: (taxels << model.prepare.average) + latency, interval: 1 }
     }
 }
 
@@ -112,6 +119,9 @@ fn passes(model: &Model) -> u64 {
 
 /// Share of the multiplications that the lanes do of those they could, from a subarray's first product to its last.
 pub fn lanes_busy(model: &Model) -> f64 {
+    if model.board.engine == EngineKind::Serial {
+        return serial::lanes_busy(model);
+    }
     let Timeline { first_issue, last_issue, products, .. } = timeline(model);
     let lanes = 4 * model.formats.lanes_per_parity as u64;
     products as f64 / ((last_issue + 1 - first_issue) * lanes) as f64

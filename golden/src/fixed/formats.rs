@@ -29,13 +29,14 @@ use super::coefficients::{parity_blocks, quantise, Blocks, Flipped, FLIP_X, FLIP
 use super::quads::Quads;
 use super::resources::{Fit, Resources};
 use super::schedule::{products, vectors, Flips, Kind, Matrix, EXPONENTS};
+use super::serial;
 use super::storage::{stored, Storage};
 use super::FixedError;
-use crate::board::Board;
+use crate::board::{Board, EngineKind};
 use crate::matrices::Matrices;
 use crate::scene::Scene;
 
-/// Operand width of the multipliers.
+/// Operand width of the multipliers; a board with narrower ones has its own.
 pub const MULTIPLIER_BITS: u32 = 18;
 /// v_ij carry this many bits more than the passes' operands, for the search.
 pub const SEARCH_EXTRA_BITS: u32 = 4;
@@ -174,7 +175,10 @@ pub fn derive(scene: &Scene, shapes: &[Shape], board: &Board) -> Result<Vec<Desi
     let spec = &scene.fixed;
     let largest = shapes.first().ok_or(FixedError::Internal("a scene has a case"))?;
     let degree = shapes.iter().map(|shape| shape.matrices.degree).max().unwrap_or(0);
-    let mut quantised = quantised(scene, shapes)?;
+    // A narrower multiplier narrows its operands; what the inverse and the input have more goes into low limbs.
+    let operand_bits = MULTIPLIER_BITS.min(board.multiplier_bits);
+    let (data_bits, coef_bits) = (spec.data_bits.min(operand_bits), spec.coef_bits.min(operand_bits));
+    let mut quantised = quantised(scene, shapes, coef_bits)?;
     // The largest of a bound over all cases.
     let bound = |of: &dyn Fn(&Quantised, usize) -> u64| {
         let each = quantised.iter().zip(shapes).map(|(quantised, shape)| of(quantised, shape.quads().len()));
@@ -187,15 +191,16 @@ pub fn derive(scene: &Scene, shapes: &[Shape], board: &Board) -> Result<Vec<Desi
     let sensor = &largest.matrices.sensor;
     // One matrix serves both axes where all subarrays are square.
     let square = sensor.rows == sensor.cols && sensor.pitch_x_mm == sensor.pitch_y_mm;
-    let shared_a = degree == 1 && square && shapes.len() == 1 && flips.are_symmetric();
+    let serial = board.engine == EngineKind::Serial;
+    let shared_a = !serial && degree == 1 && square && shapes.len() == 1 && flips.are_symmetric();
 
     let input_bits = spec.input_bits + scene.input.average;
     let fold_bits = input_bits + 2;
-    let input_low_bits = fold_bits.saturating_sub(MULTIPLIER_BITS);
-    if input_low_bits >= MULTIPLIER_BITS {
-        return Err(FixedError::Format { what: "folded input", needs: fold_bits, has: 2 * MULTIPLIER_BITS - 1 });
+    let input_low_bits = fold_bits.saturating_sub(operand_bits);
+    if input_low_bits >= operand_bits {
+        return Err(FixedError::Format { what: "folded input", needs: fold_bits, has: 2 * operand_bits - 1 });
     }
-    let inverse_low_bits = spec.inverse_bits.saturating_sub(MULTIPLIER_BITS);
+    let inverse_low_bits = spec.inverse_bits.saturating_sub(operand_bits);
     let limb_align = input_low_bits.max(inverse_low_bits);
     let raw_shift = input_low_bits.min(inverse_low_bits);
 
@@ -205,15 +210,14 @@ pub fn derive(scene: &Scene, shapes: &[Shape], board: &Board) -> Result<Vec<Desi
         let dropped = (count * flips.inverse.len()) as u64;
         ((u128::from(quantised.inverse.norm(count)) << (fold_bits - 1)) >> raw_shift) as u64 + 2 * dropped
     });
-    let a_bound =
-        bound(&|quantised, count| (quantised.ax.norm(count) + quantised.ay.norm(count)) << (spec.data_bits - 1));
+    let a_bound = bound(&|quantised, count| (quantised.ax.norm(count) + quantised.ay.norm(count)) << (data_bits - 1));
     let acc_bits = signed_bits(raw_bound.max(a_bound));
     if acc_bits > 48 {
         return Err(FixedError::Format { what: "accumulator", needs: acc_bits, has: 48 });
     }
     // Scales are the same in all cases.
     let (inverse_exponent, a_exponent) = (quantised[0].inverse.exponent, quantised[0].ax.exponent);
-    let vector_bits = spec.data_bits + SEARCH_EXTRA_BITS;
+    let vector_bits = data_bits + SEARCH_EXTRA_BITS;
     let a_shift = if degree == 0 { 0 } else { a_exponent - SEARCH_EXTRA_BITS as i32 };
     let a_shift = u32::try_from(a_shift).map_err(|_| FixedError::Format {
         what: "scaled A (mu_max too large for this sensor)",
@@ -270,11 +274,11 @@ pub fn derive(scene: &Scene, shapes: &[Shape], board: &Board) -> Result<Vec<Desi
         limb_align,
         raw_shift,
         inverse_exponent,
-        coef_bits: spec.coef_bits,
+        coef_bits,
         a_exponent,
         acc_bits,
         raw_length_max,
-        data_bits: spec.data_bits,
+        data_bits,
         vector_bits,
         a_shift,
         search_bits,
@@ -285,7 +289,10 @@ pub fn derive(scene: &Scene, shapes: &[Shape], board: &Board) -> Result<Vec<Desi
         // Taxels are in quarters of a vector's LSB; the largest rescale must still fit the force word.
         force_exponent: raw_shift as i32 - inverse_exponent - 2 + rescale_max as i32 - headroom as i32,
     };
-    let (laid_out, resources) = fit(&formats, &order, &quantised, scene, shapes, board);
+    let (laid_out, resources) = match serial {
+        true => serial::fit(&formats, &order, &quantised[0], board),
+        false => fit(&formats, &order, &quantised, scene, shapes, board),
+    };
     let design = |((laid_out, mut quantised), shape): ((LaidOut, Quantised), &Shape)| {
         let LaidOut { formats, storage, .. } = laid_out;
         storage.drop_from(&mut quantised, shape.quads().len(), formats.lanes_per_parity);
@@ -295,7 +302,7 @@ pub fn derive(scene: &Scene, shapes: &[Shape], board: &Board) -> Result<Vec<Desi
 }
 
 /// The matrices of all cases as stored, on one scale.
-fn quantised(scene: &Scene, shapes: &[Shape]) -> Result<Vec<Quantised>, FixedError> {
+fn quantised(scene: &Scene, shapes: &[Shape], coef_bits: u32) -> Result<Vec<Quantised>, FixedError> {
     let spec = &scene.fixed;
     let scale = -4.0 / 3.0 * scene.search.mu_max;
     // The mirror symmetry is lost with a taxel: then every flip is looked at, the symmetry's first.
@@ -313,7 +320,7 @@ fn quantised(scene: &Scene, shapes: &[Shape]) -> Result<Vec<Quantised>, FixedErr
     };
     let pairs: Vec<_> = shapes.iter().flat_map(pair).collect();
     let mut inverses = quantise(&inverses, spec.inverse_bits).into_iter();
-    let mut pairs = quantise(&pairs, spec.coef_bits).into_iter();
+    let mut pairs = quantise(&pairs, coef_bits).into_iter();
     let mut next = || Some(Quantised { inverse: inverses.next()?, ax: pairs.next()?, ay: pairs.next()? });
     shapes.iter().map(|_| next().ok_or(FixedError::Internal("as many matrices out as in"))).collect()
 }

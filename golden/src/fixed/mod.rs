@@ -28,6 +28,7 @@ pub mod resultants;
 pub mod schedule;
 pub mod search;
 pub mod send;
+pub mod serial;
 pub mod storage;
 pub mod unfold;
 

@@ -16,7 +16,7 @@ use super::search::Best;
 use super::send::{Status, FLAG_COEFFICIENTS, FLAG_CONDITION, FLAG_FOUND, FLAG_NO_CONTACT, STATUS_BEATS};
 use super::storage::Storage;
 use super::subarray::Solved;
-use crate::board::{Board, BoardError};
+use crate::board::{Board, BoardError, EngineKind};
 use crate::errors::Errors;
 use crate::flags::{frame_flags, Flag};
 use crate::float::receive::receive as judge;
@@ -125,6 +125,9 @@ pub struct Trace {
     pub cycles: Cycles,
 }
 
+/// Stages of which the serial engine passes on one word after the other.
+const SINGLE_WORDS: [&str; 4] = ["normalise", "rescale", "unfold", "force"];
+
 /// The bit-true model of one scene.
 #[derive(Clone, Debug)]
 pub struct Model {
@@ -190,6 +193,9 @@ impl Model {
     pub(super) fn given(scene: &Scene, scale: Scale, degree: Option<usize>) -> Result<Self, FixedError> {
         scene.require_supported()?;
         let board = Board::load(&scene.hardware.board)?;
+        if board.engine == EngineKind::Serial {
+            scene.require_serial()?;
+        }
         match scene.partition.case {
             Case::Adaptive => Model::of_choices(scene, &scale, degree, &board),
             case => Model::of_shapes(scene, &scale, &board, vec![(case, shape(scene, case, degree)?)]),
@@ -351,7 +357,7 @@ impl Model {
                 true => self.parts.iter().flat_map(|part| resultants::beats(&sums(sensor, part, &forces))).collect(),
             },
             status,
-            stages: vec![
+            stages: self.taken_turns(vec![
                 Stage { name: "receive", words: codes.iter().map(|&code| vec![i64::from(code)]).collect() },
                 quads("normalise", |s| &s.normalised),
                 quads("fold", |s| &s.folded),
@@ -360,9 +366,20 @@ impl Model {
                 quads("unfold", |s| &s.unfolded),
                 Stage { name: "search", words: sweeps.map(judged).collect() },
                 quads("force", |s| &s.found.values),
-            ],
+            ]),
             cycles,
         }
+    }
+
+    /// The stages as the board's engine passes them on: the serial one has a single shifter, which passes on words, not
+    /// quads.
+    fn taken_turns(&self, mut stages: Vec<Stage>) -> Vec<Stage> {
+        if self.board.engine == EngineKind::Serial {
+            for stage in stages.iter_mut().filter(|stage| SINGLE_WORDS.contains(&stage.name)) {
+                stage.words = stage.words.iter().flatten().map(|&word| vec![word]).collect();
+            }
+        }
+        stages
     }
 
     /// Reconstructs one frame of a scene that averages none.

@@ -50,6 +50,13 @@ pub struct Memory {
     pub bits: usize,
     /// Block RAMs; none for distributed RAM.
     pub block_rams: usize,
+    /// Single-port RAMs.
+    #[serde(skip_serializing_if = "is_zero")]
+    pub large_rams: usize,
+}
+
+fn is_zero(count: &usize) -> bool {
+    *count == 0
 }
 
 /// What a design needs of its device.
@@ -105,6 +112,7 @@ impl Resources {
             words,
             bits,
             block_rams: if rom || words > shallow { board.block_rams_for(words, bits) } else { 0 },
+            large_rams: 0,
         };
         let ram = |block, words, bits| memory(block, "field0", words, bits, false);
         let (input, taxels) = (&scene.input, scene.sensor.taxels());
@@ -157,6 +165,11 @@ impl Resources {
         self.memories.iter().map(|memory| memory.block_rams).sum()
     }
 
+    /// Single-port RAMs of all memories.
+    pub fn large_rams(&self) -> usize {
+        self.memories.iter().map(|memory| memory.large_rams).sum()
+    }
+
     /// Multipliers of all blocks.
     pub fn multipliers(&self) -> usize {
         self.multipliers.iter().map(|(_, count)| count).sum()
@@ -166,6 +179,7 @@ impl Resources {
     pub fn shortages(&self, board: &Board) -> Vec<(&'static str, usize, usize)> {
         let all = [
             ("block RAMs", self.block_rams(), board.block_rams as usize),
+            ("single-port RAMs", self.large_rams(), board.large_rams as usize),
             ("multipliers", self.multipliers(), board.multipliers as usize),
         ];
         all.into_iter().filter(|(_, needs, has)| needs > has).collect()

@@ -4,7 +4,8 @@ use serde_json::json;
 use thiserror::Error;
 
 use super::payload::{Identity, Sums};
-use super::{code_bytes, BEAT_BYTES, OVERHEAD, VERSION};
+use super::{code_bytes, Kind, BEAT_BYTES, OVERHEAD, VERSION};
+use crate::board::EngineKind;
 use crate::fixed::coefficients::Blocks;
 use crate::fixed::send::STATUS_BEATS;
 use crate::fixed::Model;
@@ -12,6 +13,10 @@ use crate::scene::{Condition, ForceOutput};
 
 /// Fewest clock cycles per bit: the receiver votes over three of them.
 const LEAST_CYCLES_PER_BIT: f64 = 8.0;
+
+/// The requests.
+const REQUESTS: [Kind; 4] =
+    [Kind::Identify, Kind::ReadCounters, Kind::FrameForResultants, Kind::FrameForForces];
 
 /// Why a scene has no link.
 #[derive(Clone, Debug, PartialEq, Error)]
@@ -92,9 +97,24 @@ impl Identity {
             clock_hz: (board.clock_MHz * 1e6).round() as u32,
             baud: board.uart_baud,
             subarrays: model.parts.len() as u16,
-            reserved: 0,
+            left_out: REQUESTS.into_iter().filter(|&kind| !takes(board.engine, kind)).map(bit).sum(),
         })
     }
+
+    /// Whether the board takes requests of this type.
+    pub fn takes(&self, kind: Kind) -> bool {
+        self.left_out & bit(kind) == 0
+    }
+}
+
+/// Whether a board with this engine takes requests of this type: where logic cells are few, the host adds the forces up.
+pub fn takes(engine: EngineKind, kind: Kind) -> bool {
+    engine == EngineKind::Parallel || kind != Kind::FrameForResultants
+}
+
+/// The bit of a request in [`Identity::left_out`].
+fn bit(kind: Kind) -> u16 {
+    1 << (kind as u8 - 1)
 }
 
 /// Bytes of a frame's codes, of its resultants and of its forces, each with a name.

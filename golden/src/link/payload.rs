@@ -85,8 +85,8 @@ payload! {
         baud: u32,
         /// Subarrays.
         subarrays: u16,
-        /// 0.
-        reserved: u16,
+        /// Requests that the board leaves out and counts as of unknown type: bit k − 1 for type k.
+        left_out: u16,
     }
 }
 

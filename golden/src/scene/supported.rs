@@ -76,6 +76,49 @@ impl Scene {
         ])
     }
 
+    /// Checks that the serial engine has what the scene asks for: less than the parallel one.
+    ///
+    /// # Errors
+    /// [`SceneError::NotAvailable`] naming the first choice that is valid but not built.
+    pub fn require_serial(&self) -> Result<(), SceneError> {
+        let (sensor, input) = (&self.sensor, &self.input);
+        let rule = |refused, field, value, available| Rule { refused, field, value, available };
+        let even = "an even number on a board with the serial engine";
+        let none = "none on a board with the serial engine";
+        self.require([
+            rule(sensor.rows % 2 != 0, "sensor.rows", sensor.rows.to_string(), even),
+            rule(sensor.cols % 2 != 0, "sensor.cols", sensor.cols.to_string(), even),
+            rule(
+                self.partition.case.grid().is_none_or(|grid| grid.rows * grid.cols > 1),
+                "partition.case",
+                self.partition.case.to_string(),
+                "0 on a board with the serial engine",
+            ),
+            rule(
+                self.search.mu_max == 0.0,
+                "search.mu_max",
+                "0".to_string(),
+                "above 0 on a board with the serial engine",
+            ),
+            rule(!input.dead.is_empty(), "input.dead", self.dead(), none),
+            rule(input.average > 0, "input.average", input.average.to_string(), "0 on a board with the serial engine"),
+            rule(input.calibration.is_some(), "input.calibration", path(&input.calibration), none),
+            rule(input.tare.is_some(), "input.tare", path(&input.tare), none),
+            rule(
+                self.output.forces == ForceOutput::Resultants,
+                "output.forces",
+                "resultants".to_string(),
+                "taxels on a board with the serial engine",
+            ),
+            rule(
+                self.fixed.lanes.is_some_and(|lanes| lanes != 4),
+                "fixed.lanes",
+                self.fixed.lanes.unwrap_or_default().to_string(),
+                "4 on a board with the serial engine",
+            ),
+        ])
+    }
+
     /// Checks that the golden model has what the scene asks for: more than the hardware.
     ///
     /// # Errors

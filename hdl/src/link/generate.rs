@@ -1,14 +1,15 @@
 //! A board's top module as files.
 
+use dermis_golden::board::EngineKind;
 use dermis_golden::fixed::Model;
 use rust_hdl::prelude::*;
 use serde_json::json;
 
-use super::BoardTop;
+use super::{Board, BoardTop, SerialBoardTop};
 use crate::generate::{place, rename, top_name, Generated, GeneratedFile, HdlError};
 
 /// The board of `model`, checked.
-pub(super) fn board_top(model: &Model) -> Result<BoardTop, HdlError> {
+pub(super) fn board_top(model: &Model) -> Result<Box<dyn Board>, HdlError> {
     if !model.searches() {
         return Err(HdlError::Unsupported {
             field: "search.mu_max",
@@ -16,9 +17,15 @@ pub(super) fn board_top(model: &Model) -> Result<BoardTop, HdlError> {
             what: "a μ search",
         });
     }
-    let top = BoardTop::new(model)?;
+    match model.board.engine {
+        EngineKind::Parallel => checked(BoardTop::new(model)?),
+        EngineKind::Serial => checked(SerialBoardTop::new(model)?),
+    }
+}
+
+fn checked<B: Board + 'static>(top: B) -> Result<Box<dyn Board>, HdlError> {
     check_all(&top).map_err(|error| HdlError::Check(format!("{error:?}")))?;
-    Ok(top)
+    Ok(Box::new(top))
 }
 
 /// Generates the hardware of `model` behind its board's UART: what [`crate::generate()`] gives, with the board's top
@@ -30,7 +37,7 @@ pub fn generate_board(model: &Model) -> Result<Generated, HdlError> {
     let board = board_top(model)?;
     let engine = crate::generate(model)?;
     let top = format!("{}_board", top_name(&model.scene.name));
-    let verilog = rename(&place(&generate_verilog_unchecked(&board), model, "engine$")?, &top);
+    let verilog = rename(&place(&board.verilog(), model, "engine$")?, &top);
     let text = format!(
         "\
 // {top}: {engine_top} behind a UART, {sensor}.

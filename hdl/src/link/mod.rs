@@ -28,7 +28,7 @@ mod tally;
 mod uart_receiver;
 mod uart_transmitter;
 
-pub use board_top::BoardTop;
+pub use board_top::{BoardTop, SerialBoardTop};
 pub use feeder::Feeder;
 pub use generate::generate_board;
 pub use lamps::Lamps;
@@ -38,7 +38,7 @@ pub use parser::Parser;
 pub use power_on::PowerOn;
 pub use requests::Requests;
 pub use resultants::Resultants;
-pub use simulate::{board_simulator, BoardDevice, BoardOutputs};
+pub use simulate::{board_simulator, Board, BoardDevice, BoardOutputs};
 pub use slip_decoder::SlipDecoder;
 pub use slip_encoder::SlipEncoder;
 pub use sources::Sources;

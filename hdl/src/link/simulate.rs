@@ -4,7 +4,6 @@ use dermis_golden::fixed::Model;
 use rust_hdl::prelude::*;
 
 use super::generate::board_top;
-use super::BoardTop;
 use crate::generate::HdlError;
 use crate::simulate::SETTLE_ROUNDS;
 
@@ -27,7 +26,17 @@ pub trait BoardDevice: Send {
     fn cycle(&mut self, uart_rx: bool) -> BoardOutputs;
 }
 
-struct Simulator(BoardTop);
+/// What every board's top does in a simulation and in generation, whatever its engine.
+pub trait Board: Block + Send {
+    /// Puts the line from the host and the clock on the pins.
+    fn drive(&mut self, uart_rx: bool, clock: bool);
+    /// The output pins.
+    fn outputs(&self) -> BoardOutputs;
+    /// The Verilog.
+    fn verilog(&self) -> String;
+}
+
+struct Simulator(Box<dyn Board>);
 
 /// The board of `model` in rust-hdl's simulation, clocked directly.
 ///
@@ -38,25 +47,21 @@ pub fn board_simulator(model: &Model) -> Result<Box<dyn BoardDevice>, HdlError> 
 }
 
 impl Simulator {
-    fn settle(&mut self, clock: bool) {
-        self.0.clk.next = clock.into();
-        let settled = simulate(&mut self.0, SETTLE_ROUNDS);
+    fn settle(&mut self, uart_rx: bool, clock: bool) {
+        self.0.drive(uart_rx, clock);
+        let settled = (0..SETTLE_ROUNDS).any(|_| {
+            self.0.update_all();
+            !self.0.has_changed()
+        });
         assert!(settled, "the board has a combinational loop: a defect of this crate");
     }
 }
 
 impl BoardDevice for Simulator {
     fn cycle(&mut self, uart_rx: bool) -> BoardOutputs {
-        self.0.uart_rx.next = uart_rx;
-        self.settle(false);
-        let top = &self.0;
-        let outputs = BoardOutputs {
-            uart_tx: top.uart_tx.val(),
-            alive: top.alive.val(),
-            busy: top.busy.val(),
-            error: top.error.val(),
-        };
-        self.settle(true);
+        self.settle(uart_rx, false);
+        let outputs = self.0.outputs();
+        self.settle(uart_rx, true);
         outputs
     }
 }

@@ -40,6 +40,17 @@ pub fn flow(family: Family) -> Flow {
             block_ram: "DP16KD",
             bitstream: "bit",
         },
+        Family::Ice40 => Flow {
+            place: Tool { name: "nextpnr-ice40" },
+            pack: Tool { name: "icepack" },
+            synthesis: "synth_ice40 -dsp -abc2",
+            // One cell holds a look-up table, a carry and a flip-flop; the report counts cells only.
+            lut: "ICESTORM_LC",
+            flip_flop: "ICESTORM_LC",
+            multiplier: "ICESTORM_DSP",
+            block_ram: "ICESTORM_RAM",
+            bitstream: "bin",
+        },
     }
 }
 
@@ -54,6 +65,7 @@ pub fn place_arguments(board: &Board, netlist: &str, seed: u32, placer: &str, na
         Family::Ecp5 => {
             vec![&size, "--package", package, "--speed", &speed, "--lpf", &pins, "--textcfg", &configuration]
         }
+        Family::Ice40 => vec![&size, "--package", package, "--pcf", &pins, "--asc", &configuration],
     };
     arguments.extend(["--json", netlist, "--seed", &seed, "--placer", placer, "--report", &report]);
     arguments.push("--timing-allow-fail");
@@ -64,6 +76,7 @@ pub fn place_arguments(board: &Board, netlist: &str, seed: u32, placer: &str, na
 pub fn pack_arguments(family: Family, configuration: &str, bitstream: &str) -> Vec<String> {
     let arguments = match family {
         Family::Ecp5 => vec!["--compress", configuration, bitstream],
+        Family::Ice40 => vec![configuration, bitstream],
     };
     arguments.into_iter().map(str::to_owned).collect()
 }

@@ -1,0 +1,148 @@
+//! The serial engine: equal to the bit-true model in every stage, beat and cycle, in rust-hdl and under Verilator, and
+//! refused by field where it has not what a scene asks for.
+
+use std::process::Command;
+
+use dermis_golden::fixed::{Cycles, Model};
+use dermis_golden::frame::Frame;
+use dermis_golden::scene::Scene;
+use dermis_hdl::generate;
+use dermis_sim::fresh::{Fresh, Shapes};
+use dermis_sim::hardware::Simulator;
+use dermis_sim::verify::verify;
+use dermis_tests::{build_dir, scene};
+
+const BOARD: &str = "icebreaker";
+const BOTH: &[Simulator] = &[Simulator::Verilator, Simulator::RustHdl];
+
+fn on_board(mut scene: Scene) -> Scene {
+    scene.hardware.board = BOARD.to_string();
+    scene
+}
+
+fn check(scene: &Scene, frames: &[Frame], simulators: &[Simulator]) {
+    let verified = verify(scene, frames, simulators, &build_dir()).unwrap();
+    let first: Vec<String> = verified.findings.kept.iter().take(3).map(ToString::to_string).collect();
+    assert!(verified.findings.is_equal(), "{}: {first:#?}", scene.name);
+}
+
+fn sensor(rows: usize, cols: usize, more: &str) -> Scene {
+    let text = format!(
+        "name = \"serial-{rows}x{cols}\"\n[hardware]\nboard = \"{BOARD}\"\n[sensor]\nrows = {rows}\ncols = {cols}\n\
+         pitch_x_mm = 4.0\npitch_y_mm = 3.0\nthickness_mm = 3.0\n{more}"
+    );
+    Scene::parse(&text, "serial").unwrap()
+}
+
+fn drawn(scene: &Scene, frames: u32) -> Vec<Frame> {
+    let draw = Fresh { frames, contacts: vec![1], shapes: Shapes::Elliptic, touching: false, seed: 1 };
+    draw.draw(scene).unwrap()
+}
+
+#[test]
+fn eight_by_eight_is_equal_on_shipped_and_drawn_frames_within_a_millisecond() {
+    let (scene, mut frames) = scene("eight-by-eight");
+    let scene = on_board(scene);
+    frames.extend(drawn(&scene, 5));
+    check(&scene, &frames, BOTH);
+    let model = Model::new(&scene).unwrap();
+    assert!(model.board.microseconds(Cycles::of(&model, &[true]).total) < 1000.0);
+}
+
+#[test]
+fn degenerate_frames_are_equal() {
+    let (scene, frames) = scene("eight-by-eight");
+    let scene = on_board(scene);
+    let with = |id: &str, stress: Vec<f64>| Frame { id: id.into(), stress_MPa: stress, ..frames[0].clone() };
+    let taxels = scene.sensor.taxels();
+    let mut corner = vec![0.0; taxels];
+    corner[0] = -0.1;
+    let checks = (0..taxels).map(|i| if (i / 8 + i) % 2 == 0 { 0.2 } else { -0.2 }).collect();
+    let tension = frames[0].stress_MPa.iter().map(|b| -b).collect();
+    let frames = [
+        with("zeros", vec![0.0; taxels]),
+        with("one corner in tension", corner),
+        with("all at full scale", vec![0.3; taxels]),
+        with("checkerboard", checks),
+        with("all in tension", tension),
+    ];
+    check(&scene, &frames, BOTH);
+}
+
+#[test]
+fn other_arrays_degrees_widths_and_options_are_equal() {
+    let scenes = [
+        // Quads that are no power of two; a rectangle.
+        sensor(6, 10, ""),
+        // Degree 1; neither input nor inverse has a low limb.
+        sensor(
+            6,
+            6,
+            "[search]\nmu_max = 0.05\n[fixed]\ninput_bits = 12\ninverse_bits = 16\ndata_bits = 14\ncoef_bits = 14\n",
+        ),
+        // Degree 2; a condition that not every frame meets, a threshold.
+        sensor(
+            4,
+            8,
+            "[search]\nmu_max = 0.25\n[partition]\ncondition = \"both-signs\"\n[input]\nfull_scale_MPa = 0.2\n\
+             [threshold]\nmin_force_N = 0.01\n",
+        ),
+    ];
+    for scene in scenes {
+        check(&scene, &drawn(&scene, 3), BOTH);
+    }
+}
+
+#[test]
+fn memories_and_multipliers_are_those_of_yosys() {
+    let (scene, _) = scene("eight-by-eight");
+    let model = Model::new(&on_board(scene)).unwrap();
+    let generated = generate(&model).unwrap();
+    let folder = tempfile::tempdir().unwrap();
+    for file in &generated.files {
+        std::fs::write(folder.path().join(&file.name), &file.text).unwrap();
+    }
+    let top = &generated.top;
+    let script =
+        format!("read_verilog {top}.v; synth_ice40 -dsp -top {top} -run begin:map_ffram; tee -o stat.json stat -json");
+    let output = Command::new("yosys").current_dir(folder.path()).args(["-q", "-p", &script]).output().unwrap();
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let text = std::fs::read_to_string(folder.path().join("stat.json")).unwrap();
+    let stat: serde_json::Value = serde_json::from_str(&text).unwrap();
+    let cells = ["SB_RAM40_4K", "SB_SPRAM256KA", "SB_MAC16"]
+        .map(|cell| stat["design"]["num_cells_by_type"][cell].as_u64().unwrap_or(0) as usize);
+    let resources = &model.resources;
+    assert_eq!(cells, [resources.block_rams(), resources.large_rams(), resources.multipliers()]);
+}
+
+#[test]
+fn a_wrong_coefficient_is_found() {
+    let (scene, _) = scene("eight-by-eight");
+    let right = Model::new(&on_board(scene)).unwrap();
+    let mut wrong = right.clone();
+    wrong.quantised.ax.flips[0].parity[2][5] ^= 1;
+    let file = |model: &Model| {
+        generate(model).unwrap().files.iter().find(|f| f.name == "coefficients.hex").unwrap().text.clone()
+    };
+    let (right, wrong) = (file(&right), file(&wrong));
+    assert_eq!(right.lines().zip(wrong.lines()).filter(|(a, b)| a != b).count(), 1);
+}
+
+#[test]
+fn what_it_has_not_is_refused_by_field() {
+    let refused = |scene: Scene| Model::new(&scene).unwrap_err().to_string();
+    for (scene, names) in [
+        (sensor(7, 8, ""), ["sensor.rows", "7"]),
+        (sensor(8, 5, ""), ["sensor.cols", "5"]),
+        (sensor(8, 8, "[search]\nmu_max = 0\n"), ["search.mu_max", "0"]),
+        (sensor(8, 8, "[partition]\nrows = 2\ncols = 2\n"), ["partition.case", "1"]),
+        (sensor(8, 8, "[input]\naverage = 2\n"), ["input.average", "2"]),
+        (sensor(8, 8, "[output]\nforces = \"resultants\"\n"), ["output.forces", "resultants"]),
+        (sensor(8, 8, "[fixed]\nlanes = 8\n"), ["fixed.lanes", "8"]),
+        // 25 quads have more coefficients than there are block RAMs.
+        (on_board(Scene::builtin("sensor-1").unwrap()), ["block RAMs", BOARD]),
+    ] {
+        let error = refused(scene);
+        assert!(names.iter().all(|name| error.contains(name)), "{error}");
+    }
+}
