@@ -30,7 +30,7 @@ use crate::compare::{compared, difference};
 use crate::fresh::Fresh;
 use crate::hardware::{Hardware, Simulator, Stuck};
 use crate::host::HostError;
-use crate::inputs::{resolve, resolve_one};
+use crate::inputs::{resolve, resolve_one, OnBoard};
 use crate::progress::Progress;
 use crate::report::{self, CosimReport, Format};
 use crate::tabulate::tabulate;
@@ -45,9 +45,6 @@ struct Arguments {
     /// Folder for everything built on the way.
     #[arg(long, global = true, value_name = "DIR", default_value = "build")]
     build_dir: PathBuf,
-    /// Board in the place of the scene's own, for reconstruct, build and cosim.
-    #[arg(long, global = true, value_name = "NAME")]
-    target_board: Option<String>,
     #[command(subcommand)]
     command: Command,
 }
@@ -89,6 +86,8 @@ enum Command {
         /// Print the result as JSON and nothing else.
         #[arg(long)]
         json: bool,
+        #[command(flatten)]
+        target: OnBoard,
     },
     /// Generate the hardware of a scene.
     #[command(after_help = "Examples:
@@ -108,6 +107,8 @@ enum Command {
         /// The whole board, the engine behind its UART, in place of the engine alone.
         #[arg(long)]
         board: bool,
+        #[command(flatten)]
+        target: OnBoard,
     },
     /// Make the bitstream of a scene for its board, with open tools.
     Bitstream(crate::bitstream::Arguments),
@@ -126,6 +127,8 @@ enum Command {
     Board {
         /// Built-in name or path of a scene.
         scene: String,
+        #[command(flatten)]
+        target: OnBoard,
     },
     /// Compare simulated hardware with the bit-true model, stage by stage and cycle by cycle.
     #[command(after_help = "Examples:
@@ -133,6 +136,7 @@ enum Command {
   dermis cosim sensor-1 --frame a.json --frame b.csv --json
   dermis cosim eight-by-eight --device rust-hdl
   dermis cosim eight-by-eight --device netlist       what synthesis makes of it, minutes
+  dermis cosim eight-by-eight --target-board icebreaker     the serial engine of a small device
   dermis cosim sensor-1 --device verilator --waves   and prints the GTKWave command")]
     Cosim {
         /// Built-in name or path of a scene; may be left out when the first frame holds its sensor.
@@ -149,6 +153,8 @@ enum Command {
         /// Write the pins and stages of the run at full speed to <build-dir>/<scene>/waves, with a list for GTKWave.
         #[arg(long, conflicts_with = "json")]
         waves: bool,
+        #[command(flatten)]
+        target: OnBoard,
     },
     /// Measure errors and times of all engines, and write them as a page with pictures.
     Report(report::Arguments),
@@ -286,14 +292,10 @@ fn exit_code(error: &anyhow::Error) -> u8 {
 fn run(arguments: &Arguments) -> Result<(String, bool)> {
     let build_dir = &arguments.build_dir;
     store::keep_in(Some(&build_dir.join("matrices")));
-    let on_board = |mut scene: Scene| {
-        scene.hardware.board = arguments.target_board.clone().unwrap_or(scene.hardware.board);
-        scene
-    };
     match &arguments.command {
-        Command::Reconstruct { scene, frames, engine, json } => {
+        Command::Reconstruct { scene, frames, engine, json, target } => {
             let (scene, frames) = resolve_one(scene.as_deref(), frames)?;
-            let scene = on_board(scene);
+            let scene = target.put(scene);
             // Seconds where the matrices are large.
             let _progress = Progress::start(&format!("{}: reconstruction", scene.name));
             let (result, full_scale_MPa) = reconstruct(&scene, &frames, *engine, build_dir)?;
@@ -306,15 +308,15 @@ fn run(arguments: &Arguments) -> Result<(String, bool)> {
             }
             Ok((text, true))
         }
-        Command::Build { scene, out, explain, board } => {
-            let scene = on_board(Scene::load(scene)?);
+        Command::Build { scene, out, explain, board, target } => {
+            let scene = target.put(Scene::load(scene)?);
             let folder = if *board { "board" } else { "rtl" };
             let out = out.clone().unwrap_or_else(|| build_dir.join(&scene.name).join(folder));
             Ok((build(&scene, &out, *board, *explain)?, true))
         }
-        Command::Cosim { scene, frames, json, device, waves } => {
+        Command::Cosim { scene, frames, json, device, waves, target } => {
             let (scene, frames) = resolve(scene.as_deref(), frames)?;
-            let scene = on_board(scene);
+            let scene = target.put(scene);
             let verified = verify(&scene, &frames, device.simulators(), build_dir)?;
             let mut text = if *json {
                 serde_json::to_string(&CosimReport::new(&verified))? + "\n"
@@ -334,8 +336,9 @@ fn run(arguments: &Arguments) -> Result<(String, bool)> {
             Ok((format!("{}: {files} files, whole\n", folder.display()), true))
         }
         Command::Host(arguments) => crate::host::run(arguments),
-        Command::Board { scene } => {
-            let terminal = Hardware::new(Model::new(&Scene::load(scene)?)?, build_dir)?.terminal()?;
+        Command::Board { scene, target } => {
+            let scene = target.put(Scene::load(scene)?);
+            let terminal = Hardware::new(Model::new(&scene)?, build_dir)?.terminal()?;
             print(&format!("{}\n", terminal.path().display()))?;
             terminal.wait()?;
             Ok((String::new(), true))

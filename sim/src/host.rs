@@ -23,12 +23,12 @@ use anyhow::{bail, Result};
 use clap::Args;
 use dermis_golden::fixed::Model;
 use dermis_golden::frame::Frame;
-use dermis_golden::link::{Counters, Identity};
+use dermis_golden::link::{Counters, Identity, Kind};
 use dermis_golden::quantise::full_scale;
 use dermis_golden::scene::Scene;
 use serialport::SerialPort;
 
-use crate::inputs::resolve;
+use crate::inputs::{resolve, OnBoard};
 use crate::progress::Progress;
 use crate::report;
 
@@ -51,7 +51,8 @@ pub struct Arguments {
     /// Bit rate; without it that of the scene's board.
     #[arg(long, value_name = "BIT/S")]
     baud: Option<u32>,
-    /// Ask for the force on every taxel; without it for the resultants, which take a fraction of the time on the wire.
+    /// Give the force on every taxel; without it the resultants, which take a fraction of the time on the wire where the
+    /// board adds up.
     #[arg(long)]
     forces: bool,
     /// Compare every answer with the bit-true model.
@@ -66,11 +67,14 @@ pub struct Arguments {
     /// Silence in ms after which a request is sent again.
     #[arg(long, value_name = "MS", default_value_t = 1000)]
     timeout: u64,
+    #[command(flatten)]
+    target: OnBoard,
 }
 
 const EXAMPLES: &str = "Examples:
   dermis host --port /dev/ttyUSB0 --scene sensor-1            all shipped frames, resultants
   dermis host --port /dev/ttyUSB0 --forces --check press.json
+  dermis host --port /dev/ttyUSB1 --scene eight-by-eight --target-board icebreaker
   dermis host --port /dev/ttyUSB0 --scene sensor-1 --tare zero.json --stream <frames >answers
 
 A line in: {\"id\": 7, \"stress_MPa\": [0.1, ...]}, row-major
@@ -116,10 +120,13 @@ impl<P: std::io::Read + std::io::Write> Session<P> {
     pub fn ask(&mut self, frame: &Frame) -> Result<(Frame, Answer)> {
         let frame = self.tared(frame);
         let codes = self.model.codes(&frame)?.codes;
-        let mut answer = self.client.frame(&self.model, &codes, self.forces)?;
+        // A board that adds nothing up sends all forces, and the host does.
+        let forces = self.forces || !self.identity.takes(Kind::FrameForResultants);
+        let mut answer = self.client.frame(&self.model, &codes, forces)?;
         if self.check {
             answer.difference = Some(answer.against(&self.model, &codes));
         }
+        answer.beats = answer.beats.filter(|_| self.forces);
         Ok((frame, answer))
     }
 }
@@ -143,6 +150,7 @@ pub fn run(arguments: &Arguments) -> Result<(String, bool)> {
         true => (Scene::load(arguments.scene.as_deref().unwrap_or_default())?, Vec::new()),
         false => resolve(arguments.scene.as_deref(), &arguments.frames)?,
     };
+    let scene = arguments.target.put(scene);
     let model = Model::new(&scene)?;
     let tare = arguments.tare.as_ref().map(|path| Frame::load(path, Some(&scene))).transpose()?;
     tare.as_ref().map_or(Ok(()), |tare| tare.check(&scene))?;
@@ -203,7 +211,7 @@ fn play<P: std::io::Read + std::io::Write>(session: &mut Session<P>, frames: &[F
 fn summary(identity: &Identity, count: usize, rate: f64, lost: Lost, before: &Counters, after: &Counters) -> String {
     let since = |field: fn(&Counters) -> u16| field(after).wrapping_sub(field(before));
     format!(
-        "board           {}×{} taxels, {} bit codes, {} MHz, scene {:08x}\n\
+        "board           {}×{} taxels, {} bit codes, {} MHz, scene {:08x}{}\n\
          frames          {count}, {rate:.1} per second\n\
          host            {} requests sent again, {} answers damaged\n\
          board dropped   {} framing, {} CRC, {} unknown type, {} length, {} overrun\n",
@@ -212,6 +220,7 @@ fn summary(identity: &Identity, count: usize, rate: f64, lost: Lost, before: &Co
         identity.input_bits,
         f64::from(identity.clock_hz) / 1e6,
         identity.scene,
+        if identity.takes(Kind::FrameForResultants) { "" } else { ", sends forces for the host to add up" },
         lost.repeated,
         lost.damaged,
         since(|c| c.framing),

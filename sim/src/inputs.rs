@@ -9,11 +9,28 @@
 //! One reconstruction takes 2^k frames, k the scene's `input.average`.
 
 use anyhow::{bail, Result};
+use clap::Args;
 use dermis_golden::frame::Frame;
 use dermis_golden::scene::Scene;
 
 /// `--frame` value that stands for the paper's Eq. 2.
 pub const EQ2: &str = "eq2";
+
+/// Another board than a scene's own.
+#[derive(Args, Clone, Debug, Default)]
+pub struct OnBoard {
+    /// Board in place of the scene's own, a file's name in constraints.
+    #[arg(long, value_name = "NAME")]
+    target_board: Option<String>,
+}
+
+impl OnBoard {
+    /// The scene on that board.
+    pub fn put(&self, mut scene: Scene) -> Scene {
+        scene.hardware.board = self.target_board.clone().unwrap_or(scene.hardware.board);
+        scene
+    }
+}
 
 /// Finds the scene and its frames, at least one.
 ///

@@ -7,23 +7,26 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 
 /// Examples that are not run here.
-const NOT_RUN: [(&str, &str); 18] = [
+const NOT_RUN: [(&str, &str); 21] = [
     ("dermis host --port /dev/ttyUSB0 press.json", BOARD),
     ("dermis host --port /dev/ttyUSB0 --scene sensor-1", BOARD),
     ("dermis host --port /dev/ttyUSB0 --forces --check press.json", BOARD),
     ("dermis host --port /dev/ttyUSB0 --scene sensor-1 --tare zero.json --stream <frames >answers", BOARD),
+    ("dermis host --port /dev/ttyUSB1 --scene eight-by-eight --target-board icebreaker", BOARD),
     ("dermis board eight-by-eight", "runs until interrupted; tests/link.rs talks to one"),
     ("dermis table", "every scene: minutes"),
     ("dermis table sensor-3 --case contacts --fresh 40 --contacts 2 --contacts 3 --shapes other", "a minute"),
     ("dermis table sensor-1 eight-by-eight --cosim", "make run"),
     ("dermis faults", "a minute or two; the same for eight-by-eight is run"),
     ("dermis cosim sensor-1", "tests/equality.rs"),
+    ("dermis cosim eight-by-eight --target-board icebreaker", "tests/serial.rs"),
     ("dermis noise sensor-1", "200 draws of five objectives: minutes"),
     ("dermis noise sensor-2 --objective patch --objective auto --draws 1000 --format csv", "minutes"),
     ("dermis report", "every co-simulation: minutes; make report"),
     ("dermis report --quick", "make report QUICK=1; the same for two scenes is run"),
     ("dermis report --paper", "repeats of 48×48: minutes; make report"),
     ("dermis bitstream eight-by-eight", PLACED),
+    ("dermis bitstream eight-by-eight --board icebreaker", PLACED),
     ("dermis bitstream sensor-1 --seeds 5 --jobs 2 --update-baselines", PLACED),
     ("dermis cosim eight-by-eight --device netlist", "synthesis takes minutes; tests/netlist.rs"),
 ];

@@ -121,3 +121,18 @@ fn the_program_sends_checks_tares_and_streams() {
     let message = text(&other.stderr);
     assert!(message.contains("the board was made for another scene: 8×8 taxels"), "{message}");
 }
+
+#[test]
+fn a_board_that_adds_nothing_up_sends_all_forces_and_the_host_adds() {
+    let mut scene = Scene::builtin("eight-by-eight").unwrap();
+    scene.hardware.board = "icebreaker".to_string();
+    let model = Model::new(&scene).unwrap();
+    let build = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../build");
+    let terminal = Hardware::new(model.clone(), &build).unwrap().terminal().unwrap();
+    let baud = model.board.uart_baud;
+    let client = open(&terminal.path().to_string_lossy(), baud, Duration::from_millis(5000)).unwrap();
+    let mut session = Session::new(client, model, None, false, true).unwrap();
+    let (_, answer) = session.ask(&Frame::shipped(&scene)[0]).unwrap();
+    assert_eq!((answer.difference, answer.beats), (Some(None), None));
+    assert_ne!(answer.sums.fz, 0);
+}

@@ -3,7 +3,7 @@
 //! packet that it dropped.
 
 use dermis_golden::fixed::send::FLAG_FRAMING;
-use dermis_golden::fixed::Model;
+use dermis_golden::fixed::{Cycles, Model};
 use dermis_golden::link::{
     beats_of_bytes, codes_to_bytes, slip, Counters, Decoder, Header, Identity, Kind, Packet, Sums,
 };
@@ -13,8 +13,10 @@ use dermis_sim::board::{Sent, UartLine};
 use dermis_sim::hardware::{Hardware, Simulator};
 use dermis_tests::{build_dir, scene};
 
-/// Eight clock cycles per bit, the most that the link takes: everything else of it runs as fast as ever.
-const BAUD: u32 = 12_500_000;
+/// Clock cycles per bit, the fewest that the link takes: everything else of it runs as fast as ever.
+const CYCLES_PER_BIT: u32 = 8;
+/// That bit rate at 100 MHz.
+const BAUD: u32 = 100_000_000 / CYCLES_PER_BIT;
 
 /// Cycles after which a board is out of reset: before, Verilator's registers hold anything.
 const RESET: u64 = 20;
@@ -36,6 +38,8 @@ struct Board {
     decoder: Decoder,
     model: Model,
     codes: Vec<Vec<i32>>,
+    /// Longer than a frame takes, in cycles.
+    silence: u64,
 }
 
 impl Board {
@@ -47,7 +51,9 @@ impl Board {
     }
 
     fn of(mut model: Model, codes: Vec<Vec<i32>>, simulators: &[Simulator]) -> Board {
-        model.board.uart_baud = BAUD;
+        let baud = (model.board.clock_MHz * 1e6) as u32 / CYCLES_PER_BIT;
+        model.board.uart_baud = baud;
+        let silence = Cycles::longest(&model).total + 1_000;
         let clock_hz = Identity::of(&model).unwrap().clock_hz;
         let hardware = Hardware::new(model.clone(), &build_dir()).unwrap();
         let mut devices: Vec<_> = simulators.iter().map(|simulator| hardware.board(*simulator).unwrap()).collect();
@@ -55,7 +61,7 @@ impl Board {
             1 => devices.remove(0),
             _ => Box::new(Both(devices.try_into().ok().unwrap(), 0)),
         };
-        Board { line: UartLine::new(device, BAUD, clock_hz), decoder: Decoder::default(), model, codes }
+        Board { line: UartLine::new(device, baud, clock_hz), decoder: Decoder::default(), model, codes, silence }
     }
 
     fn send(&mut self, wire: &[u8]) {
@@ -64,7 +70,7 @@ impl Board {
 
     /// All packets that come until nothing has come for longer than a frame takes.
     fn receive(&mut self) -> Vec<Packet> {
-        while self.line.quiet() < 3_000 {
+        while self.line.quiet() < self.silence {
             self.line.cycle();
         }
         let bytes = self.line.received();
@@ -130,6 +136,27 @@ fn both_simulations_answer_as_the_model() {
     board.send(&frame);
     assert!(board.receive() == [board.answer(0, Kind::FrameForResultants, 7, true)]);
     assert_eq!(board.counters(), Counters { taken: 5, crc: 2, ..Counters::default() });
+}
+
+#[test]
+fn a_board_with_the_serial_engine_sends_forces_and_says_that_it_adds_nothing_up() {
+    let (mut scene, frames) = scene("eight-by-eight");
+    scene.hardware.board = "icebreaker".to_string();
+    let model = Model::new(&scene).unwrap();
+    let codes = frames.iter().map(|frame| model.codes(frame).unwrap().codes).collect();
+    let mut board = Board::of(model, codes, &[Simulator::Verilator, Simulator::RustHdl]);
+    board.send(&Packet::request(Kind::Identify, 3).to_wire());
+    let packets = board.receive();
+    let identity = Identity::of_bytes(&packets[0].payload).unwrap();
+    assert_eq!(identity, Identity::of(&board.model).unwrap());
+    assert!(identity.takes(Kind::FrameForForces) && !identity.takes(Kind::FrameForResultants));
+    for index in 0..2 {
+        board.send(&board.frame(index, Kind::FrameForForces, 0xdb).to_wire());
+        assert!(board.receive() == [board.answer(index, Kind::FrameForForces, 0xdb, false)], "frame {index}");
+    }
+    board.send(&board.frame(0, Kind::FrameForResultants, 4).to_wire());
+    assert_eq!(board.receive(), []);
+    assert_eq!(board.counters(), Counters { taken: 4, unknown_type: 1, ..Counters::default() });
 }
 
 #[test]

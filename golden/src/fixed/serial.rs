@@ -140,7 +140,7 @@ fn resources(f: &Formats, board: &Board) -> Resources {
         large_rams: board.large_rams_for(words, bits),
         ..memory(block, array, words, bits)
     };
-    // Each twice: for the lane of its own parity, and for that of the other parities.
+    // Each stands twice: for the lane of its own parity, and for that of the other parities.
     let operands = 2 << (count_bits(first_vector(f) + operand_vectors(f.degree)) + count_bits(f.quads));
     let bank = 2 << (count_bits(polynomials(f)) + 4);
     let mut memories = vec![

@@ -15,8 +15,7 @@ use crate::scene::{Condition, ForceOutput};
 const LEAST_CYCLES_PER_BIT: f64 = 8.0;
 
 /// The requests.
-const REQUESTS: [Kind; 4] =
-    [Kind::Identify, Kind::ReadCounters, Kind::FrameForResultants, Kind::FrameForForces];
+const REQUESTS: [Kind; 4] = [Kind::Identify, Kind::ReadCounters, Kind::FrameForResultants, Kind::FrameForForces];
 
 /// Why a scene has no link.
 #[derive(Clone, Debug, PartialEq, Error)]

@@ -1,36 +1,141 @@
-//! CRC-32, one byte a cycle: the same step for what comes and for what goes.
+//! CRC-32, a bit a cycle: bytes on a wire are further apart, and a few logic cells are enough.
+
+use dermis_golden::link::CRC_RESIDUE;
+use rust_hdl::prelude::*;
+
+use crate::wire::{Wire, Word};
 
 /// Start of a CRC.
-pub const START: u32 = u32::MAX;
+const START: u32 = u32::MAX;
+/// The reflected polynomial.
+const POLYNOMIAL: u32 = 0xedb8_8320;
+/// Cycles that a byte takes after the one in which it comes.
+const BITS: u32 = 8;
 
-/// The CRC register after one more byte; the CRC itself is its inverse.
-pub fn step(crc: u32, data: u8) -> u32 {
-    let shift = |crc: u32, _| if crc & 1 == 1 { crc >> 1 ^ 0xedb8_8320 } else { crc >> 1 };
-    (0..8).fold(crc ^ u32::from(data), shift)
+/// The CRC of what comes, or of what goes.
+///
+/// A byte is added to the register's low end and worked in during the next eight cycles. The register's own low byte added
+/// to it leaves only the shift: so the CRC goes out.
+#[derive(LogicBlock)]
+pub struct Crc {
+    /// Clock.
+    pub clk: Signal<In, Clock>,
+    /// A packet begins.
+    pub restart: Signal<In, Bit>,
+    /// A byte.
+    pub octet: Wire<In>,
+    /// It came in this cycle, not while `busy`.
+    pub load: Signal<In, Bit>,
+    /// The lowest byte of the CRC so far.
+    pub low: Wire<Out>,
+    /// The bytes so far end with their own CRC.
+    pub right: Signal<Out, Bit>,
+    /// A byte is worked in.
+    pub busy: Signal<Out, Bit>,
+    _crc: u32,
+    _left: u32,
 }
 
-/// The same as a Verilog function `step`.
-pub const FUNCTION: &str = "\
-function [31:0] step(input [31:0] crc, input [7:0] octet);
-  integer i;
-  begin
-    step = crc ^ {24'd0, octet};
-    for (i = 0; i < 8; i = i + 1) step = step[0] ? {1'b0, step[31:1]} ^ 32'hedb88320 : {1'b0, step[31:1]};
+impl Default for Crc {
+    fn default() -> Self {
+        Crc {
+            clk: Default::default(),
+            restart: Default::default(),
+            octet: Wire::new(8),
+            load: Default::default(),
+            low: Wire::new(8),
+            right: Default::default(),
+            busy: Default::default(),
+            _crc: START,
+            _left: 0,
+        }
+    }
+}
+
+impl Logic for Crc {
+    fn update(&mut self) {
+        if self.clk.pos_edge() {
+            if self.restart.val() {
+                (self._crc, self._left) = (START, 0);
+            } else if self.load.val() {
+                self._crc ^= self.octet.val().number() as u32;
+                self._left = BITS;
+            } else if self._left > 0 {
+                let feedback = if self._crc & 1 == 1 { POLYNOMIAL } else { 0 };
+                self._crc = self._crc >> 1 ^ feedback;
+                self._left -= 1;
+            }
+        }
+        self.low.next = Word::from(u64::from(!self._crc & 0xff));
+        self.right.next = self._crc == CRC_RESIDUE;
+        self.busy.next = self._left > 0;
+    }
+
+    fn connect(&mut self) {
+        self.low.connect();
+        self.right.connect();
+        self.busy.connect();
+    }
+
+    fn hdl(&self) -> Verilog {
+        Verilog::Custom(format!(
+            "\
+reg [31:0] crc;
+reg [3:0] left;
+always @(*) begin
+  low = ~crc[7:0];
+  right = crc == 32'h{CRC_RESIDUE:x};
+  busy = left != 4'd0;
+end
+always @(posedge clk) begin
+  if (restart) begin
+    crc <= 32'h{START:x};
+    left <= 4'd0;
+  end else if (load) begin
+    crc[7:0] <= crc[7:0] ^ octet;
+    left <= 4'd{BITS};
+  end else if (busy) begin
+    crc <= {{1'b0, crc[31:1]}} ^ (crc[0] ? 32'h{POLYNOMIAL:x} : 32'd0);
+    left <= left - 4'd1;
   end
-endfunction
-";
+end"
+        ))
+    }
+}
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use dermis_golden::link::CRC_RESIDUE;
+
+    fn add(crc: &mut Crc, octet: u8) {
+        for cycle in 0..=BITS {
+            crc.octet.next = Word::from(u64::from(octet));
+            crc.load.next = cycle == 0;
+            for clock in [false, true] {
+                crc.clk.next = clock.into();
+                while {
+                    crc.update_all();
+                    crc.has_changed()
+                } {}
+            }
+        }
+    }
 
     #[test]
     fn the_published_check_value_and_the_residue() {
+        let mut crc = Crc::default();
+        crc.connect_all();
+        b"123456789".iter().for_each(|&octet| add(&mut crc, octet));
         // CRC-32/ISO-HDLC of "123456789".
-        let crc = !b"123456789".iter().fold(START, |crc, &data| step(crc, data));
-        assert_eq!(crc, 0xcbf4_3926);
-        let all = [b"123456789".as_slice(), &crc.to_le_bytes()].concat();
-        assert_eq!(all.iter().fold(START, |crc, &data| step(crc, data)), CRC_RESIDUE);
+        assert_eq!(!crc._crc, 0xcbf4_3926);
+        // The CRC goes out by its own low bytes, and leaves nothing.
+        let mut out = Crc { _crc: crc._crc, ..Crc::default() };
+        out.connect_all();
+        for octet in 0xcbf4_3926u32.to_le_bytes() {
+            assert_eq!(out._crc as u8, !octet);
+            add(&mut out, !octet);
+            add(&mut crc, octet);
+        }
+        assert_eq!((out._crc, crc._crc), (0, CRC_RESIDUE));
     }
 }

@@ -2,8 +2,8 @@
 
 use rust_hdl::prelude::*;
 
-/// `alive` changes with the clock, about once a second; `busy` and `error` stay lit for a sixteenth of that after what
-/// they show.
+/// `alive` changes with the clock, about once a second; `busy` and `error` stay lit for a sixteenth of that, or
+/// up to twice as long, after what they show.
 #[derive(LogicBlock)]
 pub struct Lamps {
     /// Clock.
@@ -49,10 +49,10 @@ impl Lamps {
 impl Logic for Lamps {
     fn update(&mut self) {
         if self.clk.pos_edge() {
+            let tick = (self._count + 1).trailing_zeros() >= self._bits - SHORTER;
             self._count = (self._count + 1) & ((1 << self._bits) - 1);
-            let all = (1 << (self._bits - SHORTER)) - 1;
             for (lit, event) in self._lit.iter_mut().zip([self.activity.val(), self.dropped.val()]) {
-                *lit = if event { all } else { lit.saturating_sub(1) };
+                *lit = if event { 2 } else { lit.saturating_sub(u32::from(tick)) };
             }
             if self.rst.val() {
                 (self._count, self._lit) = (0, [0; 2]);
@@ -73,18 +73,19 @@ impl Logic for Lamps {
         let (bits, lit) = (self._bits, self._bits - SHORTER);
         let light = |name: &str, event: &str| {
             format!(
-                "  if (rst) {name}_left <= {lit}'d0;\n  else if ({event}) {name}_left <= {{{lit}{{1'b1}}}};\n  \
-                 else if ({name}) {name}_left <= {name}_left - {lit}'d1;\n"
+                "  if (rst) {name}_left <= 2'd0;\n  else if ({event}) {name}_left <= 2'd2;\n  \
+                 else if (tick) {name}_left <= {{1'b0, {name}_left[1]}};\n"
             )
         };
         Verilog::Custom(format!(
             "\
 reg [{end}:0] count;
-reg [{lit_end}:0] busy_left, error_left;
+reg [1:0] busy_left, error_left;
+wire tick = &count[{lit_end}:0];
 always @(*) begin
   alive = count[{end}];
-  busy = busy_left != {lit}'d0;
-  error = error_left != {lit}'d0;
+  busy = busy_left != 2'd0;
+  error = error_left != 2'd0;
 end
 always @(posedge clk) begin
   count <= rst ? {bits}'d0 : count + {bits}'d1;

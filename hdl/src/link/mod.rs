@@ -13,6 +13,7 @@ mod crc;
 mod feeder;
 mod generate;
 mod lamps;
+mod ledger;
 mod packer;
 mod packet_link;
 mod parser;
@@ -24,14 +25,15 @@ mod simulate;
 mod slip_decoder;
 mod slip_encoder;
 mod sources;
-mod tally;
 mod uart_receiver;
 mod uart_transmitter;
 
 pub use board_top::{BoardTop, SerialBoardTop};
+pub use crc::Crc;
 pub use feeder::Feeder;
 pub use generate::generate_board;
 pub use lamps::Lamps;
+pub use ledger::Ledger;
 pub use packer::Packer;
 pub use packet_link::PacketLink;
 pub use parser::Parser;
@@ -42,11 +44,12 @@ pub use simulate::{board_simulator, Board, BoardDevice, BoardOutputs};
 pub use slip_decoder::SlipDecoder;
 pub use slip_encoder::SlipEncoder;
 pub use sources::Sources;
-pub use tally::Tally;
 pub use uart_receiver::UartReceiver;
 pub use uart_transmitter::UartTransmitter;
 
+use dermis_golden::board::EngineKind;
 use dermis_golden::fixed::Model;
+use dermis_golden::link::{takes, Counters, Identity, Kind, Sums, BEAT_BYTES};
 
 /// What the packets of a scene need to know of it.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -59,6 +62,10 @@ pub struct Shape {
     pub input_bits: u32,
     /// Status beats of a frame.
     pub status_beats: usize,
+    /// Resultants are answered, too.
+    pub resultants: bool,
+    /// Frames that wait for their answers at most, or more: a power of two.
+    pub frames: usize,
 }
 
 impl Shape {
@@ -66,7 +73,23 @@ impl Shape {
     pub fn of(model: &Model) -> Self {
         let sensor = &model.scene.sensor;
         let (input_bits, status_beats) = (model.formats.code_bits, model.status_beats());
-        Shape { rows: sensor.rows, cols: sensor.cols, input_bits, status_beats }
+        let resultants = takes(model.board.engine, Kind::FrameForResultants);
+        let frames = match model.board.engine {
+            EngineKind::Parallel => 4,
+            EngineKind::Serial => 2,
+        };
+        Shape { rows: sensor.rows, cols: sensor.cols, input_bits, status_beats, resultants, frames }
+    }
+
+    /// Bytes of an answer's payload, by source.
+    fn payloads(&self) -> [usize; 4] {
+        let status = self.status_beats * BEAT_BYTES;
+        let mut bytes = [0; 4];
+        bytes[IDENTITY] = Identity::BYTES;
+        bytes[COUNTERS] = Counters::BYTES;
+        bytes[RESULTANTS] = Sums::BYTES + status;
+        bytes[FORCES] = self.rows * self.cols * BEAT_BYTES + status;
+        bytes
     }
 }
 
@@ -78,5 +101,3 @@ const COUNTERS: usize = 1;
 const RESULTANTS: usize = 2;
 /// The engine, all forces.
 const FORCES: usize = 3;
-/// Words of twelve bytes in the identity.
-const IDENTITY_WORDS: usize = 2;

@@ -1,17 +1,17 @@
 //! Between a wire's bytes and the engine's streams.
 
-use dermis_golden::link::{code_bytes, Identity};
+use dermis_golden::link::Identity;
 use rust_hdl::prelude::*;
 
-use super::{Feeder, Packer, Parser, Requests, Resultants, Shape, SlipDecoder, SlipEncoder, Sources, Tally};
+use super::{Crc, Feeder, Ledger, Packer, Parser, Requests, Resultants, Shape, SlipDecoder, SlipEncoder, Sources};
 use crate::wire::Wire;
 
 /// ```text
 /// bytes in  -> slip_decoder -> parser -> feeder -> s_axis
 ///                                 '-> requests -> packer -> slip_encoder -> bytes out
-///                m_axis -> resultants -> sources ---^
+///        m_axis -> resultants, ledger -> sources ---^
 /// ```
-/// Bytes come at any time and are never held up; bytes go when `send_ready`.
+/// Bytes come at any time, sixteen cycles apart at least, and are never held up; bytes go when `send_ready`.
 #[derive(LogicBlock)]
 pub struct PacketLink {
     /// Clock.
@@ -58,13 +58,14 @@ pub struct PacketLink {
     sources: Sources,
     packer: Packer,
     encoder: SlipEncoder,
-    tally: Tally,
+    ledger: Ledger,
+    arriving: Crc,
+    leaving: Crc,
 }
 
 impl PacketLink {
     /// For the scene of `shape`, which answers as `identity`.
     pub fn new(shape: &Shape, identity: &Identity) -> Self {
-        let taxels = shape.rows * shape.cols;
         PacketLink {
             clk: Default::default(),
             rst: Default::default(),
@@ -85,14 +86,16 @@ impl PacketLink {
             activity: Default::default(),
             dropped: Default::default(),
             decoder: SlipDecoder::default(),
-            parser: Parser::new(taxels * code_bytes(shape.input_bits)),
-            feeder: Feeder::new(taxels, shape.input_bits),
-            requests: Requests::new(shape),
+            parser: Parser::new(shape),
+            feeder: Feeder::new(shape.rows * shape.cols, shape.input_bits),
+            requests: Requests::new(shape.frames),
             resultants: Resultants::new(shape),
-            sources: Sources::new(identity),
-            packer: Packer::default(),
+            sources: Sources::default(),
+            packer: Packer::new(shape.payloads()),
             encoder: SlipEncoder::default(),
-            tally: Tally::default(),
+            ledger: Ledger::new(identity),
+            arriving: Crc::default(),
+            leaving: Crc::default(),
         }
     }
 }
@@ -108,7 +111,9 @@ impl Logic for PacketLink {
         self.sources.clk.next = self.clk.val();
         self.packer.clk.next = self.clk.val();
         self.encoder.clk.next = self.clk.val();
-        self.tally.clk.next = self.clk.val();
+        self.ledger.clk.next = self.clk.val();
+        self.arriving.clk.next = self.clk.val();
+        self.leaving.clk.next = self.clk.val();
         self.decoder.rst.next = self.rst.val();
         self.parser.rst.next = self.rst.val();
         self.feeder.rst.next = self.rst.val();
@@ -116,7 +121,7 @@ impl Logic for PacketLink {
         self.resultants.rst.next = self.rst.val();
         self.packer.rst.next = self.rst.val();
         self.encoder.rst.next = self.rst.val();
-        self.tally.rst.next = self.rst.val();
+        self.ledger.rst.next = self.rst.val();
 
         comment!("Wire to packet");
         self.decoder.data.next = self.receive_data.val();
@@ -126,6 +131,10 @@ impl Logic for PacketLink {
         self.parser.content_valid.next = self.decoder.content_valid.val();
         self.parser.packet_end.next = self.decoder.packet_end.val();
         self.parser.spoiled.next = self.decoder.spoiled.val();
+        self.parser.crc_right.next = self.arriving.right.val();
+        self.arriving.restart.next = self.rst.val() | self.decoder.packet_end.val();
+        self.arriving.octet.next = self.decoder.content.val();
+        self.arriving.load.next = self.decoder.content_valid.val();
 
         comment!("Packet to engine");
         self.feeder.frame_begin.next = self.parser.frame_begin.val();
@@ -145,13 +154,14 @@ impl Logic for PacketLink {
         self.requests.taken.next = self.feeder.taken.val();
         self.requests.answered.next = self.m_axis_tvalid.val();
         self.requests.begun.next = self.packer.begun.val();
-        self.tally.taken.next = self.feeder.taken.val() | self.requests.noted.val();
-        self.tally.fault.next = self.parser.fault.val();
-        self.tally.overrun.next = self.feeder.overrun.val() | self.requests.overrun.val();
+        self.ledger.taken.next = self.feeder.taken.val() | self.requests.noted.val();
+        self.ledger.fault.next = self.parser.fault.val();
+        self.ledger.overrun.next = self.feeder.overrun.val() | self.requests.overrun.val();
 
         comment!("Engine to packet");
         self.resultants.run.next = self.sources.answer_wanted.val();
         self.resultants.summarise.next = self.sources.summarise.val();
+        self.resultants.taken.next = self.packer.taken.val() & self.sources.answer_wanted.val();
         self.resultants.beat.next = self.m_axis_tdata.val();
         self.resultants.beat_valid.next = self.m_axis_tvalid.val();
         self.resultants.beat_last.next = self.m_axis_tlast.val();
@@ -159,16 +169,26 @@ impl Logic for PacketLink {
         self.sources.source.next = self.packer.source.val();
         self.sources.begun.next = self.packer.begun.val();
         self.sources.wanted.next = self.packer.wanted.val();
-        self.sources.counters.next = self.tally.counts.val();
+        self.sources.index.next = self.packer.index.val();
+        self.sources.taken.next = self.packer.taken.val();
+        self.ledger.address.next = self.sources.address.val();
+        self.ledger.hold.next = self.packer.halfway.val();
+        self.sources.entry.next = self.ledger.entry.val();
+        self.sources.entry_valid.next = self.ledger.entry_valid.val();
         self.sources.answer.next = self.resultants.word.val();
         self.sources.answer_valid.next = self.resultants.word_valid.val();
         self.sources.answer_last.next = self.resultants.word_last.val();
         self.packer.offer.next = self.requests.offer.val();
-        self.packer.header.next = self.requests.header.val();
+        self.packer.number.next = self.requests.answer_number.val();
         self.packer.offered_source.next = self.requests.source.val();
-        self.packer.word.next = self.sources.word.val();
+        self.packer.octet.next = self.sources.octet.val();
         self.packer.word_valid.next = self.sources.word_valid.val();
         self.packer.word_last.next = self.sources.word_last.val();
+        self.leaving.restart.next = self.packer.crc_restart.val();
+        self.leaving.octet.next = self.packer.crc_octet.val();
+        self.leaving.load.next = self.packer.crc_load.val();
+        self.packer.crc_low.next = self.leaving.low.val();
+        self.packer.crc_busy.next = self.leaving.busy.val();
 
         comment!("Packet to wire");
         self.encoder.content.next = self.packer.content.val();

@@ -1,9 +1,10 @@
 //! From the bytes of packets to requests: header, length, CRC.
 
-use dermis_golden::link::{Kind, CRC_RESIDUE, OVERHEAD};
+use dermis_golden::link::{code_bytes, Kind, OVERHEAD};
 use rust_hdl::prelude::*;
 
-use super::crc::{step, FUNCTION, START};
+use super::Shape;
+use crate::primitives::count_bits;
 use crate::wire::{Wire, Word};
 
 /// Judges each packet when it ends. `good` or `bad` is high for one cycle, one cycle after the end; `kind` and `number`
@@ -25,6 +26,8 @@ pub struct Parser {
     pub packet_end: Signal<In, Bit>,
     /// The packet has lost a byte.
     pub spoiled: Signal<In, Bit>,
+    /// The packet's bytes so far end with their CRC.
+    pub crc_right: Signal<In, Bit>,
     /// A frame of the right length begins.
     pub frame_begin: Signal<Out, Bit>,
     /// The byte is one of its payload.
@@ -40,13 +43,13 @@ pub struct Parser {
     /// The packet's sequence number.
     pub number: Wire<Out>,
     _frame_bytes: u32,
+    _frame_kinds: Vec<u8>,
     _state: State,
 }
 
 #[derive(Clone, Copy, Debug)]
 struct State {
     count: u32,
-    crc: u32,
     kind: u8,
     number: u8,
     length: u32,
@@ -56,26 +59,14 @@ struct State {
     fault: u32,
 }
 
-/// Width of the count of bytes; it stays at its largest value.
-const COUNT_BITS: u32 = 17;
-const MOST: u32 = (1 << COUNT_BITS) - 1;
-const FRAME_KINDS: [u8; 2] = [Kind::FrameForResultants as u8, Kind::FrameForForces as u8];
 const PLAIN_KINDS: [u8; 2] = [Kind::Identify as u8, Kind::ReadCounters as u8];
 
 impl Parser {
-    /// For frames whose payload has `frame_bytes` bytes, at most 65535.
-    pub fn new(frame_bytes: usize) -> Self {
-        let blank = State {
-            count: 0,
-            crc: START,
-            kind: 0,
-            number: 0,
-            length: 0,
-            spoiled: false,
-            streaming: false,
-            good: false,
-            fault: 0,
-        };
+    /// For frames of `shape`, whose payload has at most 65535 bytes.
+    pub fn new(shape: &Shape) -> Self {
+        let resultants = shape.resultants.then_some(Kind::FrameForResultants as u8);
+        let blank =
+            State { count: 0, kind: 0, number: 0, length: 0, spoiled: false, streaming: false, good: false, fault: 0 };
         Parser {
             clk: Default::default(),
             rst: Default::default(),
@@ -83,6 +74,7 @@ impl Parser {
             content_valid: Default::default(),
             packet_end: Default::default(),
             spoiled: Default::default(),
+            crc_right: Default::default(),
             frame_begin: Default::default(),
             payload: Default::default(),
             good: Default::default(),
@@ -90,20 +82,26 @@ impl Parser {
             fault: Wire::new(4),
             kind: Wire::new(8),
             number: Wire::new(8),
-            _frame_bytes: frame_bytes as u32,
+            _frame_bytes: (shape.rows * shape.cols * code_bytes(shape.input_bits)) as u32,
+            _frame_kinds: resultants.into_iter().chain([Kind::FrameForForces as u8]).collect(),
             _state: blank,
         }
+    }
+
+    /// Most bytes that are counted: one more than a frame's packet has.
+    fn most(&self) -> u32 {
+        self._frame_bytes + OVERHEAD as u32 + 1
     }
 
     /// Whether the packet may be taken, and else what is wrong with it; neither where there is none.
     fn judge(&self) -> (bool, u32) {
         let s = self._state;
-        let frame = FRAME_KINDS.contains(&s.kind);
+        let frame = self._frame_kinds.contains(&s.kind);
         if s.spoiled {
             (false, 0b0001)
         } else if s.count == 0 {
             (false, 0)
-        } else if s.count < OVERHEAD as u32 || s.crc != CRC_RESIDUE {
+        } else if s.count < OVERHEAD as u32 || !self.crc_right.val() {
             (false, 0b0010)
         } else if !frame && !PLAIN_KINDS.contains(&s.kind) {
             (false, 0b0100)
@@ -119,7 +117,7 @@ impl Parser {
         let s = self._state;
         let length = s.length | (self.content.val().number() as u32) << 8;
         let whole = self.content_valid.val() && s.count == 3;
-        whole && FRAME_KINDS.contains(&s.kind) && length == self._frame_bytes
+        whole && self._frame_kinds.contains(&s.kind) && length == self._frame_bytes
     }
 
     fn next(&self) -> State {
@@ -128,7 +126,7 @@ impl Parser {
         s.spoiled |= self.spoiled.val();
         if self.packet_end.val() {
             (s.good, s.fault) = self.judge();
-            (s.count, s.crc, s.spoiled, s.streaming) = (0, START, false, false);
+            (s.count, s.spoiled, s.streaming) = (0, false, false);
         } else if self.content_valid.val() {
             match s.count {
                 0 => s.kind = data,
@@ -138,11 +136,10 @@ impl Parser {
                 _ => (),
             }
             s.streaming |= self.begins();
-            s.crc = step(s.crc, data);
-            s.count = (s.count + 1).min(MOST);
+            s.count = (s.count + 1).min(self.most());
         }
         if self.rst.val() {
-            (s.count, s.crc, s.spoiled, s.streaming, s.good, s.fault) = (0, START, false, false, false, 0);
+            (s.count, s.spoiled, s.streaming, s.good, s.fault) = (0, false, false, false, 0);
         }
         s
     }
@@ -173,21 +170,22 @@ impl Logic for Parser {
     }
 
     fn hdl(&self) -> Verilog {
-        let [frame_0, frame_1] = FRAME_KINDS;
+        let c = count_bits(self.most() as usize + 1);
+        let frames: Vec<String> = self._frame_kinds.iter().map(|kind| format!("kind == 8'd{kind}")).collect();
         let [plain_0, plain_1] = PLAIN_KINDS;
         Verilog::Custom(format!(
             "\
-{FUNCTION}reg [{c_end}:0] count;
-reg [31:0] crc;
-reg [15:0] length;
+reg [{c_end}:0] count;
+// The length is so far a frame's, or zero.
+reg frame_length, no_length;
 reg lost, streaming;
-wire frame = kind == 8'd{frame_0} || kind == 8'd{frame_1};
+wire frame = {frame};
 wire plain = kind == 8'd{plain_0} || kind == 8'd{plain_1};
-wire wrong_crc = count < {c}'d{OVERHEAD} || crc != 32'h{CRC_RESIDUE:x};
-wire wrong_length = count != {{1'b0, length}} + {c}'d{OVERHEAD} || length != (frame ? 16'd{bytes} : 16'd0);
+wire wrong_crc = count < {c}'d{OVERHEAD} || !crc_right;
+wire wrong_length = frame ? count != {c}'d{frame_end} || !frame_length : count != {c}'d{OVERHEAD} || !no_length;
 wire empty = count == {c}'d0 && !lost;
 always @(*) begin
-  frame_begin = content_valid && count == {c}'d3 && frame && {{content, length[7:0]}} == 16'd{bytes};
+  frame_begin = content_valid && count == {c}'d3 && frame && frame_length && content == 8'd{high};
   payload = content_valid && streaming && count < {c}'d{payload_end};
   bad = fault != 4'd0;
 end
@@ -197,7 +195,6 @@ always @(posedge clk) begin
     : wrong_length ? 4'd8 : 4'd0;
   if (rst || packet_end) begin
     count <= {c}'d0;
-    crc <= 32'h{START:x};
     lost <= 1'b0;
     streaming <= 1'b0;
   end else begin
@@ -205,17 +202,21 @@ always @(posedge clk) begin
     if (content_valid) begin
       if (count == {c}'d0) kind <= content;
       if (count == {c}'d1) number <= content;
-      if (count == {c}'d2) length <= {{8'd0, content}};
-      if (count == {c}'d3) length[15:8] <= content;
+      if (count == {c}'d2 || count == {c}'d3) begin
+        frame_length <= count[0] ? frame_length && content == 8'd{high} : content == 8'd{low};
+        no_length <= (no_length || !count[0]) && content == 8'd0;
+      end
       if (frame_begin) streaming <= 1'b1;
-      crc <= step(crc, content);
-      if (count != {c}'d{MOST}) count <= count + {c}'d1;
+      if (count != {c}'d{most}) count <= count + {c}'d1;
     end
   end
 end",
-            c = COUNT_BITS,
-            c_end = COUNT_BITS - 1,
-            bytes = self._frame_bytes,
+            c_end = c - 1,
+            frame = frames.join(" || "),
+            frame_end = self._frame_bytes + OVERHEAD as u32,
+            most = self.most(),
+            high = self._frame_bytes >> 8,
+            low = self._frame_bytes & 0xff,
             payload_end = self._frame_bytes + 4,
         ))
     }

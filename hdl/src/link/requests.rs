@@ -1,16 +1,17 @@
 //! What the board owes the host.
 
-use dermis_golden::link::{Kind, Sums, ANSWER, BEAT_BYTES};
+use dermis_golden::link::Kind;
 use rust_hdl::prelude::*;
 
-use super::{Shape, COUNTERS, FORCES, IDENTITY, IDENTITY_WORDS, RESULTANTS};
+use super::{COUNTERS, FORCES, IDENTITY, RESULTANTS};
+use crate::primitives::count_bits;
 use crate::wire::{Wire, Word};
 
 /// Keeps the requests taken until they are answered: one identification, one reading of the counters, and the frames
-/// in the engine, in order. `offer` when one can be answered, with the answer's header and source; `begun` takes it.
+/// in the engine, in order. `offer` when one can be answered, with the request's number and the answer's source; `begun` takes it.
 ///
-/// The engine holds three frames at most (one being sent, one computed, one received), so that a queue of four
-/// never overflows.
+/// The parallel engine holds three frames at most (one being sent, one computed, one received), so that a queue of four
+/// never overflows; the serial one holds two.
 #[derive(LogicBlock)]
 pub struct Requests {
     /// Clock.
@@ -35,13 +36,13 @@ pub struct Requests {
     pub offer: Signal<Out, Bit>,
     /// It begins.
     pub begun: Signal<In, Bit>,
-    /// Its packet's header.
-    pub header: Wire<Out>,
+    /// Its request's sequence number.
+    pub answer_number: Wire<Out>,
     /// Where its payload comes from.
     pub source: Wire<Out>,
     /// Frames are in the engine.
     pub waiting: Signal<Out, Bit>,
-    _lengths: [usize; 4],
+    _depth: usize,
     _state: State,
 }
 
@@ -53,19 +54,11 @@ struct State {
     frames: Vec<(u8, bool)>,
 }
 
-/// Frames in the queue.
-const DEPTH: usize = 4;
 const PLAIN: [u8; 2] = [Kind::Identify as u8, Kind::ReadCounters as u8];
 
 impl Requests {
-    /// For the packets of `shape`.
-    pub fn new(shape: &Shape) -> Self {
-        let status = shape.status_beats * BEAT_BYTES;
-        let mut lengths = [0; 4];
-        lengths[IDENTITY] = IDENTITY_WORDS * BEAT_BYTES;
-        lengths[COUNTERS] = BEAT_BYTES;
-        lengths[RESULTANTS] = Sums::BYTES + status;
-        lengths[FORCES] = shape.rows * shape.cols * BEAT_BYTES + status;
+    /// With a queue of `depth` frames, a power of two.
+    pub fn new(depth: usize) -> Self {
         Requests {
             clk: Default::default(),
             rst: Default::default(),
@@ -78,10 +71,10 @@ impl Requests {
             answered: Default::default(),
             offer: Default::default(),
             begun: Default::default(),
-            header: Wire::new(32),
+            answer_number: Wire::new(8),
             source: Wire::new(2),
             waiting: Default::default(),
-            _lengths: lengths,
+            _depth: depth,
             _state: State::default(),
         }
     }
@@ -139,8 +132,7 @@ impl Logic for Requests {
         self.overrun.next = plain == Some(false);
         let waiting = !s.frames.is_empty();
         self.offer.next = s.plain.iter().any(Option::is_some) || (waiting && self.answered.val());
-        let kind = u64::from(ANSWER) + source as u64 + 1;
-        self.header.next = Word::from((self._lengths[source] as u64) << 16 | u64::from(number) << 8 | kind);
+        self.answer_number.next = Word::from(u64::from(number));
         self.source.next = Word::from(source as u64);
         self.waiting.next = waiting;
     }
@@ -149,34 +141,29 @@ impl Logic for Requests {
         for bit in [&mut self.noted, &mut self.overrun, &mut self.offer, &mut self.waiting] {
             bit.connect();
         }
-        self.header.connect();
+        self.answer_number.connect();
         self.source.connect();
     }
 
     fn hdl(&self) -> Verilog {
-        let [identity, counters, resultants, forces] = self._lengths;
+        let at = count_bits(self._depth);
         Verilog::Custom(format!(
             "\
 reg [7:0] identity_number, counters_number;
 reg identity, counters;
 reg [8:0] frames [0:{depth_end}];
-reg [1:0] head, tail;
-reg [2:0] fill;
+reg [{at_end}:0] head, tail;
+reg [{at}:0] fill;
 wire [8:0] frame = frames[head];
 wire asks_identity = good && kind == 8'd{ask_identity};
 wire asks_counters = good && kind == 8'd{ask_counters};
 always @(*) begin
-  waiting = fill != 3'd0;
+  waiting = |fill;
   noted = (asks_identity && !identity) || (asks_counters && !counters);
   overrun = (asks_identity && identity) || (asks_counters && counters);
   offer = identity || counters || (waiting && answered);
   source = identity ? 2'd{IDENTITY} : counters ? 2'd{COUNTERS} : waiting && frame[8] ? 2'd{FORCES} : 2'd{RESULTANTS};
-  case (source)
-    2'd{IDENTITY}: header = {{16'd{identity}, identity_number, 8'd{identity_kind}}};
-    2'd{COUNTERS}: header = {{16'd{counters}, counters_number, 8'd{counters_kind}}};
-    2'd{RESULTANTS}: header = {{16'd{resultants}, frame[7:0], 8'd{resultants_kind}}};
-    default: header = {{16'd{forces}, frame[7:0], 8'd{forces_kind}}};
-  endcase
+  answer_number = identity ? identity_number : counters ? counters_number : frame[7:0];
 end
 wire pop = begun && !identity && !counters;
 always @(posedge clk) begin
@@ -186,25 +173,23 @@ always @(posedge clk) begin
   if (rst) begin
     identity <= 1'b0;
     counters <= 1'b0;
-    head <= 2'd0;
-    tail <= 2'd0;
-    fill <= 3'd0;
+    head <= {at}'d0;
+    tail <= {at}'d0;
+    fill <= {wide}'d0;
   end else begin
     identity <= identity ? !begun : asks_identity;
     counters <= counters ? !begun || identity : asks_counters;
-    head <= head + {{1'b0, pop}};
-    tail <= tail + {{1'b0, taken}};
-    fill <= fill + {{2'd0, taken}} - {{2'd0, pop}};
+    if (pop) head <= head + {at}'d1;
+    if (taken) tail <= tail + {at}'d1;
+    if (taken != pop) fill <= taken ? fill + {wide}'d1 : fill - {wide}'d1;
   end
 end",
-            depth_end = DEPTH - 1,
+            depth_end = self._depth - 1,
+            at_end = at - 1,
+            wide = at + 1,
             ask_identity = Kind::Identify as u8,
             ask_counters = Kind::ReadCounters as u8,
             ask_forces = Kind::FrameForForces as u8,
-            identity_kind = Kind::Identity as u8,
-            counters_kind = Kind::Counters as u8,
-            resultants_kind = Kind::Resultants as u8,
-            forces_kind = Kind::Forces as u8,
         ))
     }
 }

@@ -7,17 +7,20 @@ use super::Shape;
 use crate::wire::{Wire, Word};
 use dermis_golden::link::Sums;
 
-/// While `run`, beats pass as words; with `summarise`, the forces are added up as they pass, and the sums go out as
-/// four words before the status. No multiplier: where Σ column · fz is asked for, the sum of what lies left of each taxel is
-/// subtracted, and at the end Σ fz is added columns − 1 times, one per cycle; rows alike.
+/// While `run`, beats pass as words; that is all where the `shape` has no resultants. Else, with `summarise`, the forces are
+/// added up as they pass, and the sums go out as four words before the status. No multiplier: where Σ column · fz is asked
+/// for, the sum of what lies left of each taxel is subtracted, and at the end Σ fz is added columns − 1 times, one per cycle;
+/// rows alike.
 #[derive(LogicBlock)]
 pub struct Resultants {
     /// Clock.
     pub clk: Signal<In, Clock>,
     /// Reset.
     pub rst: Signal<In, Bit>,
-    /// An answer to a frame is being sent, and its next word awaited.
+    /// An answer to a frame is being sent.
     pub run: Signal<In, Bit>,
+    /// Its word is out.
+    pub taken: Signal<In, Bit>,
     /// The answer is the sums; as long as the answer takes.
     pub summarise: Signal<In, Bit>,
     /// A beat of the engine.
@@ -30,7 +33,7 @@ pub struct Resultants {
     pub beat_ready: Signal<Out, Bit>,
     /// A word of the payload.
     pub word: Wire<Out>,
-    /// It stands; taken in the same cycle.
+    /// It stands until it is `taken`.
     pub word_valid: Signal<Out, Bit>,
     /// It is the payload's last.
     pub word_last: Signal<Out, Bit>,
@@ -66,6 +69,7 @@ impl Resultants {
             clk: Default::default(),
             rst: Default::default(),
             run: Default::default(),
+            taken: Default::default(),
             summarise: Default::default(),
             beat: Wire::new(96),
             beat_valid: Default::default(),
@@ -82,11 +86,11 @@ impl Resultants {
     }
 
     fn adds(&self) -> bool {
-        self.summarise.val() && self._state.stage == ADD
+        !self.passes() && self._state.stage == ADD
     }
 
     fn passes(&self) -> bool {
-        !self.summarise.val() || self._state.stage == STATUS
+        !self._shape.resultants || !self.summarise.val() || self._state.stage == STATUS
     }
 
     fn add(&mut self) {
@@ -131,7 +135,7 @@ impl Resultants {
             if s.more == rows.max(cols) {
                 s.stage = OUT;
             }
-        } else if self._state.stage == OUT && self.run.val() {
+        } else if self._state.stage == OUT && self.taken.val() {
             self._state.out += 1;
             if self._state.out == WORDS {
                 self._state.stage = STATUS;
@@ -151,7 +155,7 @@ impl Logic for Resultants {
             self.advance();
         }
         let s = self._state;
-        self.beat_ready.next = self.run.val() && (self.adds() || self.passes());
+        self.beat_ready.next = self.run.val() && (self.adds() || (self.passes() && self.taken.val()));
         self.word_valid.next = self.run.val() && if self.passes() { self.beat_valid.val() } else { s.stage == OUT };
         self.word_last.next = self.passes() && self.beat_last.val();
         self.word.next = if self.passes() {
@@ -177,6 +181,19 @@ impl Logic for Resultants {
     }
 
     fn hdl(&self) -> Verilog {
+        if !self._shape.resultants {
+            return Verilog::Custom(
+                "\
+wire unused = &{1'b0, clk, rst, summarise};
+always @(*) begin
+  beat_ready = run && taken;
+  word_valid = run && beat_valid;
+  word_last = beat_last;
+  word = beat;
+end"
+                .to_string(),
+            );
+        }
         let (rows, cols, bits) = (self._shape.rows, self._shape.cols, self._bits);
         let (r, c, m) = (count_bits(rows), count_bits(cols), count_bits(rows.max(cols)));
         let l = count_bits(rows * cols + 1);
@@ -200,7 +217,7 @@ wire passes = !summarise || stage == 2'd{STATUS};
 wire line_end = col == {c}'d{last_col};
 wire first = row == {r}'d0 && col == {c}'d0;
 always @(*) begin
-  beat_ready = run && (passes || stage == 2'd{ADD});
+  beat_ready = run && (passes ? taken : stage == 2'd{ADD});
   word_valid = run && (passes ? beat_valid : stage == 2'd{OUT});
   word_last = passes && beat_last;
   word = passes ? beat : out[1] ? (out[0] ? all[383:288] : all[287:192]) : (out[0] ? all[191:96] : all[95:0]);
@@ -223,7 +240,7 @@ always @(posedge clk) begin
     if (more < {m}'d{last_row}) moment_y <= moment_y + sum_z;
     more <= more + {m}'d1;
   end
-  if (stage == 2'd{OUT} && run) out <= out + 2'd1;
+  if (stage == 2'd{OUT} && taken) out <= out + 2'd1;
   if (rst) begin
     stage <= 2'd{ADD};
     row <= {r}'d0;
@@ -235,9 +252,9 @@ always @(posedge clk) begin
       if (line_end && row == {r}'d{last_row}) stage <= 2'd{FINISH};
     end else if (stage == 2'd{FINISH}) begin
       if (more == {m}'d{last_more}) stage <= 2'd{OUT};
-    end else if (stage == 2'd{OUT} && run) begin
+    end else if (stage == 2'd{OUT} && taken) begin
       if (out == 2'd3) stage <= 2'd{STATUS};
-    end else if (run && passes && beat_valid && beat_last) stage <= 2'd{ADD};
+    end else if (run && passes && taken && beat_last) stage <= 2'd{ADD};
   end
 end",
             r_end = r - 1,

@@ -1,12 +1,11 @@
 //! Where an answer's words come from.
 
-use dermis_golden::link::Identity;
 use rust_hdl::prelude::*;
 
-use super::{COUNTERS, IDENTITY, IDENTITY_WORDS};
+use super::{COUNTERS, IDENTITY};
 use crate::wire::{Wire, Word};
 
-/// Chooses between the identity, which it holds, the counters, and the engine's answer.
+/// Chooses between the ledger, which holds identity and counters, and the engine's answer, a byte at a time.
 #[derive(LogicBlock)]
 pub struct Sources {
     /// Clock.
@@ -15,10 +14,18 @@ pub struct Sources {
     pub source: Wire<In>,
     /// An answer begins.
     pub begun: Signal<In, Bit>,
-    /// The next word is awaited.
+    /// Words are awaited.
     pub wanted: Signal<In, Bit>,
-    /// The counters.
-    pub counters: Wire<In>,
+    /// Which byte of one.
+    pub index: Wire<In>,
+    /// All bytes of one are out.
+    pub taken: Signal<In, Bit>,
+    /// Place in the ledger.
+    pub address: Wire<Out>,
+    /// Two bytes of the ledger.
+    pub entry: Wire<In>,
+    /// They are those of the place.
+    pub entry_valid: Signal<In, Bit>,
     /// A word of the engine's answer.
     pub answer: Wire<In>,
     /// It stands.
@@ -29,41 +36,35 @@ pub struct Sources {
     pub answer_wanted: Signal<Out, Bit>,
     /// The engine's answer is summed up.
     pub summarise: Signal<Out, Bit>,
-    /// The next word.
-    pub word: Wire<Out>,
-    /// It stands.
+    /// The byte.
+    pub octet: Wire<Out>,
+    /// Its word stands.
     pub word_valid: Signal<Out, Bit>,
     /// It is the last.
     pub word_last: Signal<Out, Bit>,
-    _identity: [Word; IDENTITY_WORDS],
     _second: bool,
 }
 
-impl Sources {
-    /// With `identity` as the answer to whoever asks.
-    pub fn new(identity: &Identity) -> Self {
-        let bytes = identity.to_bytes();
-        let word = |index: usize| {
-            let mut word = Word::default();
-            let own = &bytes[12 * index..12 * (index + 1)];
-            own.iter().enumerate().for_each(|(at, &byte)| word.set(8 * at, 8, u64::from(byte)));
-            word
-        };
+impl Default for Sources {
+    fn default() -> Self {
         Sources {
             clk: Default::default(),
             source: Wire::new(2),
             begun: Default::default(),
             wanted: Default::default(),
-            counters: Wire::new(96),
+            index: Wire::new(4),
+            taken: Default::default(),
+            address: Wire::new(5),
+            entry: Wire::new(16),
+            entry_valid: Default::default(),
             answer: Wire::new(96),
             answer_valid: Default::default(),
             answer_last: Default::default(),
             answer_wanted: Default::default(),
             summarise: Default::default(),
-            word: Wire::new(96),
+            octet: Wire::new(8),
             word_valid: Default::default(),
             word_last: Default::default(),
-            _identity: [word(0), word(1)],
             _second: false,
         }
     }
@@ -73,40 +74,49 @@ impl Logic for Sources {
     fn update(&mut self) {
         let source = self.source.val().number() as usize;
         let own = source == IDENTITY || source == COUNTERS;
+        let index = self.index.val().number() as usize;
         if self.clk.pos_edge() {
-            self._second = !self.begun.val() && (self._second || self.wanted.val());
+            self._second = !self.begun.val() && (self._second || self.taken.val());
         }
+        let counters = source & 1 == 1;
+        self.address.next = Word::from(u64::from(counters) << 4 | u64::from(self._second) << 3 | (index as u64) >> 1);
         self.answer_wanted.next = self.wanted.val() && !own;
-        self.summarise.next = source & 1 == 0;
-        self.word_valid.next = own || self.answer_valid.val();
-        (self.word.next, self.word_last.next) = match source {
-            IDENTITY => (self._identity[usize::from(self._second)], self._second),
-            COUNTERS => (self.counters.val(), true),
-            _ => (self.answer.val(), self.answer_last.val()),
+        self.summarise.next = !counters;
+        (self.word_valid.next, self.word_last.next) = match own {
+            true => (self.entry_valid.val(), counters || self._second),
+            false => (self.answer_valid.val(), self.answer_last.val()),
         };
+        self.octet.next = Word::from(match own {
+            true => self.entry.val().field(8 * (index & 1), 8),
+            false => self.answer.val().field(8 * index.min(11), 8),
+        });
     }
 
     fn connect(&mut self) {
         for bit in [&mut self.answer_wanted, &mut self.summarise, &mut self.word_valid, &mut self.word_last] {
             bit.connect();
         }
-        self.word.connect();
+        self.address.connect();
+        self.octet.connect();
     }
 
     fn hdl(&self) -> Verilog {
-        let literal = |word: &Word| format!("96'h{:08x}{:016x}", word.field(64, 32), word.field(0, 64));
-        let [first, second] = self._identity.each_ref().map(literal);
-        Verilog::Custom(format!(
+        Verilog::Custom(
             "\
 reg second;
+wire [31:0] answer_word = index[3] ? answer[95:64] : index[2] ? answer[63:32] : answer[31:0];
+wire [15:0] answer_half = index[1] ? answer_word[31:16] : answer_word[15:0];
+wire [15:0] both = source[1] ? answer_half : entry;
 always @(*) begin
+  address = {source[0], second, index[3:1]};
   answer_wanted = wanted && source[1];
   summarise = !source[0];
-  word_valid = !source[1] || answer_valid;
-  word = source[1] ? answer : source[0] ? counters : second ? {second} : {first};
+  word_valid = source[1] ? answer_valid : entry_valid;
   word_last = source[1] ? answer_last : source[0] || second;
+  octet = index[0] ? both[15:8] : both[7:0];
 end
-always @(posedge clk) second <= !begun && (second || wanted);"
-        ))
+always @(posedge clk) second <= !begun && (second || taken);"
+                .to_string(),
+        )
     }
 }

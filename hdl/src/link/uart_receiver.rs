@@ -2,7 +2,7 @@
 
 use rust_hdl::prelude::*;
 
-use super::phase::{increment, FRACTION, HALF};
+use super::phase::Phase;
 use crate::wire::{Wire, Word};
 
 /// Two registers against metastability, then the majority of three samples. From a falling edge on, ten bits are
@@ -24,7 +24,7 @@ pub struct UartReceiver {
     pub valid: Signal<Out, Bit>,
     /// A byte without stop bit came in this cycle.
     pub broken: Signal<Out, Bit>,
-    _increment: u32,
+    _phase: Phase,
     _state: State,
 }
 
@@ -52,7 +52,7 @@ impl UartReceiver {
             data: Wire::new(8),
             valid: Default::default(),
             broken: Default::default(),
-            _increment: increment(baud, clock_hz),
+            _phase: Phase::new(baud, clock_hz),
             _state: State::default(),
         }
     }
@@ -66,12 +66,12 @@ impl UartReceiver {
             next.armed = level;
             if s.armed && !level {
                 next.left = BITS;
-                next.phase = HALF;
+                next.phase = self._phase.half;
             }
         } else {
-            let sum = s.phase + self._increment;
-            next.phase = sum & (2 * HALF - 1);
-            if sum >= 2 * HALF {
+            let sum = s.phase + self._phase.increment;
+            next.phase = sum & (2 * self._phase.half - 1);
+            if sum >= 2 * self._phase.half {
                 next.left = s.left - 1;
                 match s.left {
                     // Too short for a start bit.
@@ -106,6 +106,7 @@ impl Logic for UartReceiver {
     }
 
     fn hdl(&self) -> Verilog {
+        let Phase { fraction, half, increment } = self._phase;
         Verilog::Custom(format!(
             "\
 reg [4:0] samples;
@@ -113,12 +114,12 @@ reg armed;
 reg [3:0] left;
 reg [{end}:0] phase;
 wire level = (samples[4] & samples[3]) | (samples[4] & samples[2]) | (samples[3] & samples[2]);
-wire [{FRACTION}:0] sum = {{1'b0, phase}} + {width}'d{increment};
-wire tick = left != 4'd0 && sum[{FRACTION}];
+wire [{fraction}:0] sum = {{1'b0, phase}} + {width}'d{increment};
+wire tick = left != 4'd0 && sum[{fraction}];
 wire false_start = left == 4'd{BITS} && level;
 always @(posedge clk) begin
   samples <= {{samples[3:0], line}};
-  if (left == 4'd0) phase <= {FRACTION}'d{HALF};
+  if (left == 4'd0) phase <= {fraction}'d{half};
   else phase <= sum[{end}:0];
   if (tick && left != 4'd{BITS} && left != 4'd1) data <= {{level, data[7:1]}};
   if (rst) begin
@@ -135,9 +136,8 @@ always @(posedge clk) begin
     broken <= tick && left == 4'd1 && !level;
   end
 end",
-            end = FRACTION - 1,
-            width = FRACTION + 1,
-            increment = self._increment,
+            end = fraction - 1,
+            width = fraction + 1,
         ))
     }
 }

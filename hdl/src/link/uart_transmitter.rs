@@ -2,7 +2,7 @@
 
 use rust_hdl::prelude::*;
 
-use super::phase::{increment, FRACTION, HALF};
+use super::phase::Phase;
 use crate::wire::Wire;
 
 /// Start bit, eight data bits, stop bit. A byte is taken when `valid` and `ready` are both high.
@@ -20,7 +20,7 @@ pub struct UartTransmitter {
     pub ready: Signal<Out, Bit>,
     /// The line, high when idle.
     pub line: Signal<Out, Bit>,
-    _increment: u32,
+    _phase: Phase,
     _state: State,
 }
 
@@ -45,7 +45,7 @@ impl UartTransmitter {
             valid: Default::default(),
             ready: Default::default(),
             line: Default::default(),
-            _increment: increment(baud, clock_hz),
+            _phase: Phase::new(baud, clock_hz),
             _state: State { left: 0, phase: 0, shift: 0, line: true },
         }
     }
@@ -60,9 +60,9 @@ impl UartTransmitter {
                 next.shift = 1 << (BITS - 1) | (self.data.val().number() as u32) << 1;
             }
         } else {
-            let sum = s.phase + self._increment;
-            next.phase = sum & (2 * HALF - 1);
-            if sum >= 2 * HALF {
+            let sum = s.phase + self._phase.increment;
+            next.phase = sum & (2 * self._phase.half - 1);
+            if sum >= 2 * self._phase.half {
                 next.left = s.left - 1;
                 next.shift = s.shift >> 1;
             }
@@ -89,32 +89,32 @@ impl Logic for UartTransmitter {
     }
 
     fn hdl(&self) -> Verilog {
+        let Phase { fraction, increment, .. } = self._phase;
         Verilog::Custom(format!(
             "\
 reg [3:0] left;
 reg [{end}:0] phase;
 reg [{bits_end}:0] shift;
-wire [{FRACTION}:0] sum = {{1'b0, phase}} + {width}'d{increment};
+wire [{fraction}:0] sum = {{1'b0, phase}} + {width}'d{increment};
 // Idle from the start: a low line would be a start bit.
 initial line = 1'b1;
 always @(*) ready = left == 4'd0;
 always @(posedge clk) begin
-  phase <= ready ? {FRACTION}'d0 : sum[{end}:0];
+  phase <= ready ? {fraction}'d0 : sum[{end}:0];
   if (ready) shift <= {{1'b1, data, 1'b0}};
-  else if (sum[{FRACTION}]) shift <= {{1'b1, shift[{bits_end}:1]}};
+  else if (sum[{fraction}]) shift <= {{1'b1, shift[{bits_end}:1]}};
   if (rst) begin
     left <= 4'd0;
     line <= 1'b1;
   end else begin
     line <= ready || shift[0];
     if (ready) left <= valid ? 4'd{BITS} : 4'd0;
-    else if (sum[{FRACTION}]) left <= left - 4'd1;
+    else if (sum[{fraction}]) left <= left - 4'd1;
   end
 end",
-            end = FRACTION - 1,
-            width = FRACTION + 1,
+            end = fraction - 1,
+            width = fraction + 1,
             bits_end = BITS - 1,
-            increment = self._increment,
         ))
     }
 }

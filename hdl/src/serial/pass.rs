@@ -1,8 +1,10 @@
 //! Stage `pass`: one lane per parity, with coefficients and operands in memories of its own.
 //!
 //! ```text
-//! address, operand_address --> memories | flip | operands | product | accumulate --> quad; word, one after the other
+//! address, operand_address --> memories | select | operands | product | accumulate --> quad; word, one after the other
 //! ```
+//! An operand is written twice, for its own lane and for the lane of the other parities, so that to `flip` is an address.
+//!
 //! A product issued in cycle t is in its accumulator in cycle t + 4. The accumulators leave from the fourth cycle after the
 //! `last` product on, one a cycle, and are cleared with the fourth; the next row's first product comes five cycles after the
 //! last one's at the earliest.
@@ -87,7 +89,6 @@ struct Control {
     last: bool,
     low: bool,
     align: bool,
-    flip: bool,
 }
 
 impl Pass {
@@ -120,7 +121,7 @@ impl Pass {
             _low: if low_bits > 0 { table(Kind::InverseLow) } else { Vec::new() },
             _low_bits: low_bits,
             _align: f.limb_align as usize,
-            _operands: vec![[0; 4]; vectors << bits],
+            _operands: vec![[0; 4]; 2 << (count_bits(vectors) + bits)],
             _state: State::default(),
         }
     }
@@ -146,22 +147,22 @@ impl Pass {
         let low_address = row % self._low.len().max(1);
         next.coefficient = self._wide.get(row).copied().unwrap_or_default();
         next.low = self._low.get(low_address).copied().unwrap_or_default();
-        next.operand = self._operands.get(self.operand_address.val().number() as usize).copied().unwrap_or_default();
+        let half = self._operands.len() / 2;
+        let at = self.operand_address.val().number() as usize + if self.flip.val() { half } else { 0 };
+        next.operand = self._operands.get(at).copied().unwrap_or_default();
         next.control = [
             Control {
                 valid: self.valid.val() && !self.rst.val(),
                 last: self.last.val(),
                 low: self.low.val(),
                 align: self.align.val(),
-                flip: self.flip.val(),
             },
             Control { valid: state.control[0].valid && !self.rst.val(), ..state.control[0] },
             Control { valid: state.control[1].valid && !self.rst.val(), ..state.control[1] },
         ];
         let control = state.control[0];
         let coefficient = if control.low { state.low } else { state.coefficient };
-        next.factors =
-            std::array::from_fn(|lane| [coefficient[lane], state.operand[if control.flip { 3 - lane } else { lane }]]);
+        next.factors = std::array::from_fn(|lane| [coefficient[lane], state.operand[lane]]);
         next.products = state.factors.map(|[c, x]| c * x);
         let arriving = state.control[2];
         let ends = state.reading && state.read == 3;
@@ -177,8 +178,12 @@ impl Pass {
         next.read = if state.reading && !self.rst.val() { (state.read + 1) % 4 } else { 0 };
         self._state = next;
         if self.write.val() {
-            if let Some(word) = self._operands.get_mut(self.write_address.val().number() as usize) {
-                word[self.write_lane.val().number() as usize] = self.write_data.val().signed(0, OPERAND);
+            let at = self.write_address.val().number() as usize;
+            let lane = self.write_lane.val().number() as usize;
+            for (at, lane) in [(at, lane), (at + half, 3 - lane)] {
+                if let Some(word) = self._operands.get_mut(at) {
+                    word[lane] = self.write_data.val().signed(0, OPERAND);
+                }
             }
         }
     }
@@ -265,16 +270,17 @@ reg signed [31:0] product{lane};
 reg [{acc_end}:0] accumulator{lane};
 {unused}wire [{acc_end}:0] aligned{lane} = {align};
 always @(posedge clk) begin
-  if (write && write_lane == 2'd{lane}) operands{lane}[write_address] <= write_data;
-  operand{lane} <= operands{lane}[operand_address];
+  if (write && {own} (write_lane[0] ^ write_lane[1])) operands{lane}[{{{other}write_lane[0], write_address}}] <= write_data;
+  operand{lane} <= operands{lane}[{{flip, operand_address}}];
   coefficient{lane} <= {coefficient};
-  factor{lane} <= flipped ? operand{other} : operand{lane};
+  factor{lane} <= operand{lane};
   product{lane} <= coefficient{lane} * factor{lane};
   if (rst || (reading && read == 2'd3)) accumulator{lane} <= {acc}'d0;
   else if (control2[2]) accumulator{lane} <= accumulator{lane} + aligned{lane};
 end
 ",
-                    other = 3 - lane,
+                    own = if lane == 0 || lane == 3 { "!" } else { "" },
+                    other = if lane % 2 == 1 { "!" } else { "" },
                 )
             })
             .collect();
@@ -284,13 +290,11 @@ reg [{wide_end}:0] wide_word;
 reg [{wide_end}:0] wide [0:{wide_last}];
 initial $readmemh(\"{WIDE_FILE}\", wide);
 always @(posedge clk) wide_word <= wide[address];
-{low_memory}reg flipped;
-// valid, last, align
+{low_memory}// valid, last, align
 reg [2:0] control0, control1, control2;
 reg reading;
 reg [1:0] read;
 always @(posedge clk) begin
-  flipped <= flip;
   control0 <= {{valid && !rst, last, align}};
   control1 <= {{control0[2] && !rst, control0[1:0]}};
   control2 <= {{control1[2] && !rst, control1[1:0]}};

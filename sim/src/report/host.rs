@@ -1,7 +1,7 @@
 //! A board's answers for people.
 
 use dermis_golden::fixed::Model;
-use dermis_golden::link::{payloads, wire_ms};
+use dermis_golden::link::{payloads, takes, wire_ms, Kind};
 
 use super::table::figures;
 use crate::host::{Answer, Line};
@@ -37,6 +37,8 @@ pub fn equality(answer: &Answer) -> String {
 /// How long a frame's packets take on the board's UART.
 pub fn wire_times(model: &Model) -> String {
     let baud = model.board.uart_baud;
-    let times = payloads(model).map(|(what, bytes)| format!("{what} {:.2} ms", wire_ms(bytes, baud)));
+    let sums = takes(model.board.engine, Kind::FrameForResultants);
+    let sent = payloads(model).into_iter().filter(|(what, _)| sums || *what != Kind::Resultants.name());
+    let times: Vec<String> = sent.map(|(what, bytes)| format!("{what} {:.2} ms", wire_ms(bytes, baud))).collect();
     format!("UART at {baud} bit/s: {}\n", times.join(", "))
 }
