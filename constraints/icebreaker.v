@@ -11,11 +11,11 @@ module board (
 );
   wire clk, locked, alive, error;
 
-  // 12 MHz to 24 MHz, the board file's clock_MHz; the oscillator of the PLL runs at 768 MHz (533 to 1066 are allowed).
+  // 12 MHz to 25.5 MHz, the board file's clock_MHz; the oscillator of the PLL runs at 816 MHz (533 to 1066 are allowed).
   SB_PLL40_PAD #(
     .FEEDBACK_PATH("SIMPLE"),
     .DIVR(4'd0),
-    .DIVF(7'd63),
+    .DIVF(7'd67),
     .DIVQ(3'd5),
     .FILTER_RANGE(3'd1)
   ) pll (

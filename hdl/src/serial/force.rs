@@ -107,6 +107,7 @@ struct State {
     contact: bool,
     cycles: u64,
     valid: bool,
+    shift: i64,
 }
 
 impl Force {
@@ -193,7 +194,9 @@ impl Force {
                 4 => next.factors[1] = 1 << self._mu_fraction,
                 8..=10 => {
                     let word = s.phase as usize - 8;
-                    next.words[word] = if s.status { i64::from(self.status(s.beat)[word]) } else { rounded };
+                    let captured = if s.status { i64::from(self.status(s.beat)[word]) } else { rounded };
+                    // All come in at z: one register behind the choice.
+                    next.words = [s.words[1], s.words[2], captured];
                     next.saturations += u64::from(self.clipped.val() && forces);
                 }
                 11 => {
@@ -230,6 +233,8 @@ impl Force {
         if self.rst.val() {
             next = State::default();
         }
+        // Long settled when it is used.
+        next.shift = self.shift();
         self._state = next;
     }
 
@@ -273,7 +278,7 @@ impl Logic for Force {
         self.index.next = Word::from(s.ahead & ((1 << self.index.width()) - 1));
         self.wanted.next = Word::from(self.place.val().number() + 1);
         self.product.next = Word::of_fields(&[s.product], self.product.width());
-        let shift = if s.scaling { i64::from(MU_ROUND) } else { self.shift() };
+        let shift = if s.scaling { i64::from(MU_ROUND) } else { s.shift };
         self.round_shift.next = Word::from(shift as u64);
         self.m_axis_tdata.next = Word::of_fields(&s.words, WORD);
         self.m_axis_tvalid.next = s.valid;
@@ -332,7 +337,9 @@ wire [{word_end}:0] status_y = beat[1:0] == 2'd0 ? {y_word} : beat[1:0] == 2'd1 
 wire [{word_end}:0] status_z = beat[1:0] == 2'd0 ? {{28'd0, framing, !contact, found, condition}}
   : beat[1:0] == 2'd1 ? {{26'd0, normalise}} : {cycles_word};
 wire [{word_end}:0] captured = !status ? rounded : phase[1] ? status_z : phase[0] ? status_y : status_x;
+reg [5:0] settled_shift;
 always @(posedge clk) begin
+  settled_shift <= shift[9] ? 6'd0 : |shift[8:6] || shift[5:0] > 6'd{shift_max} ? 6'd{shift_max} : shift[5:0];
   result <= factor_a * factor_b;
   if (scaling) begin
     phase <= phase == 4'd{scaled} ? 4'd0 : phase + 4'd1;
@@ -352,9 +359,11 @@ always @(posedge clk) begin
     if (take_value) ahead <= ahead + {places}'d1;
     if (phase == 4'd3) factor_b <= mu_y;
     if (phase == 4'd4) factor_b <= {factor}'sd{one};
-    if (phase == 4'd8) fx <= captured;
-    if (phase == 4'd9) fy <= captured;
-    if (phase == 4'd10) fz <= captured;
+    if (phase == 4'd8 || phase == 4'd9 || phase == 4'd10) begin
+      fx <= fy;
+      fy <= fz;
+      fz <= captured;
+    end
     if (clipped && !status && phase >= 4'd8 && phase <= 4'd10) force_saturations <= force_saturations + 16'd1;
     if (phase == 4'd11) begin
       if (too_small && !status) begin
@@ -394,7 +403,7 @@ always @(*) begin
   index = ahead;
   wanted = {wanted_place} + {wanted}'d1;
   product = {result};
-  round_shift = scaling ? 6'd{mu_round} : shift < 10'sd0 ? 6'd0 : shift > 10'sd{shift_max} ? 6'd{shift_max} : shift[5:0];
+  round_shift = scaling ? 6'd{mu_round} : settled_shift;
   m_axis_tdata = {{fz, fy, fx}};
   m_axis_tvalid = valid;
   m_axis_tlast = valid && last_beat;
