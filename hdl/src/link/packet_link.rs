@@ -61,6 +61,8 @@ pub struct PacketLink {
     ledger: Ledger,
     arriving: Crc,
     leaving: Crc,
+    unused: Signal<Local, Bit>,
+    unused_low: Wire<Local>,
 }
 
 impl PacketLink {
@@ -96,6 +98,8 @@ impl PacketLink {
             ledger: Ledger::new(identity),
             arriving: Crc::default(),
             leaving: Crc::default(),
+            unused: Default::default(),
+            unused_low: Wire::new(8),
         }
     }
 }
@@ -189,6 +193,10 @@ impl Logic for PacketLink {
         self.leaving.load.next = self.packer.crc_load.val();
         self.packer.crc_low.next = self.leaving.low.val();
         self.packer.crc_busy.next = self.leaving.busy.val();
+
+        comment!("What only the other direction needs");
+        self.unused.next = self.arriving.busy.val() | self.leaving.right.val();
+        self.unused_low.next = self.arriving.low.val();
 
         comment!("Packet to wire");
         self.encoder.content.next = self.packer.content.val();
