@@ -10,7 +10,7 @@ VERILATOR ?= verilator
 # Cargo's own variable, so that a folder elsewhere is found too.
 CARGO_TARGET_DIR ?= target
 DERMIS     = $(CARGO_TARGET_DIR)/release/dermis
-PACKAGES   = verilator yosys g++ make chromium python3-venv
+PACKAGES   = verilator yosys nextpnr-ice40 fpga-icestorm g++ make chromium python3-venv
 # The short report: make report QUICK=1
 QUICK     ?=
 
@@ -26,7 +26,7 @@ setup: ## install the Debian packages that are missing
 	if [ "$$(id -u)" = 0 ]; then sudo=; else sudo=sudo; fi; \
 	$$sudo apt-get update -q && $$sudo apt-get install -y --no-install-recommends $(PACKAGES)
 
-tools: setup ## install place and route, in the versions of constraints/tools.txt
+tools: setup ## install place and route: iCE40 by setup, ECP5 in the versions of constraints/tools.txt
 	@test -x $(TOOLS)/bin/pip || python3 -m venv $(TOOLS)
 	@$(TOOLS)/bin/pip install -q --disable-pip-version-check -r constraints/tools.txt
 

@@ -42,6 +42,7 @@ const TOP: &str = "board";
 #[derive(Args, Debug)]
 #[command(after_help = "Examples:
   dermis bitstream eight-by-eight
+  dermis bitstream eight-by-eight --board icebreaker
   dermis bitstream sensor-1 --seeds 5 --jobs 2 --update-baselines")]
 pub struct Arguments {
     /// Built-in name or path of a scene.
@@ -152,7 +153,7 @@ fn place_seed(board: &Board, flow: &Flow, folder: &Path, seed: u32) -> Result<Pl
         }
     }
     last?;
-    Placed::read(&folder.join(format!("{name}.report.json")))
+    Placed::read(&folder.join(format!("{name}.report.json")), synthesis::cells(folder, TOP)?)
 }
 
 /// The figures of all seeds; cells of the `best`.

@@ -1,5 +1,6 @@
 //! Synthesis: Verilog in a folder to the netlist that is placed, and that is replayed.
 
+use std::collections::BTreeMap;
 use std::fs;
 use std::path::Path;
 
@@ -38,11 +39,28 @@ pub fn run(folder: &Path, script: String, log: &str) -> Result<(), ToolError> {
     YOSYS.run(folder, &["-q".to_owned(), "-p".to_owned(), script], log, MINUTES)
 }
 
+/// Cells of module `top` of the netlist in `folder`, by type.
+///
+/// # Errors
+/// [`ToolError`]: a file that cannot be read, or is no netlist.
+pub fn cells(folder: &Path, top: &str) -> Result<BTreeMap<String, u64>, ToolError> {
+    let netlist = read(&folder.join(NETLIST))?;
+    let mut counts = BTreeMap::new();
+    for cell in netlist["modules"][top]["cells"].as_object().into_iter().flat_map(|cells| cells.values()) {
+        *counts.entry(cell["type"].as_str().unwrap_or_default().to_owned()).or_default() += 1;
+    }
+    Ok(counts)
+}
+
+fn read(path: &Path) -> Result<Value, ToolError> {
+    let wrong = |error: serde_json::Error| ToolError::Output { path: path.to_owned(), reason: error.to_string() };
+    serde_json::from_slice(&fs::read(path).map_err(ToolError::io(path))?).map_err(wrong)
+}
+
 /// Absorbs registers in module `top` of the netlist at `path`.
 fn absorb_file(path: &Path, top: &str) -> Result<Absorbed, ToolError> {
     let wrong = |error: serde_json::Error| ToolError::Output { path: path.to_owned(), reason: error.to_string() };
-    let text = fs::read(path).map_err(ToolError::io(path))?;
-    let mut netlist: Value = serde_json::from_slice(&text).map_err(wrong)?;
+    let mut netlist = read(path)?;
     let absorbed = absorb(&mut netlist, top);
     write(path, &serde_json::to_vec(&netlist).map_err(wrong)?)?;
     Ok(absorbed)
