@@ -16,8 +16,9 @@ const SCENE: &str = "name = \"netlist\"\n[sensor]\nrows = 4\ncols = 4\npitch_x_m
                      thickness_mm = 3.0\n[fixed]\nlanes = 4\ninput_bits = 18\ndata_bits = 12\ncoef_bits = 12\n\
                      inverse_bits = 20\n[search]\n";
 
-fn setup(mu_max: &str) -> (Hardware, Vec<Frame>) {
-    let scene = Scene::parse(&format!("{SCENE}mu_max = {mu_max}\n"), "netlist").unwrap();
+fn setup(board: &str, mu_max: &str) -> (Hardware, Vec<Frame>) {
+    let text = format!("{SCENE}mu_max = {mu_max}\n[hardware]\nboard = \"{board}\"\n");
+    let scene = Scene::parse(&text, "netlist").unwrap();
     let frames = Fresh { frames: 4, contacts: vec![1], shapes: Shapes::Elliptic, touching: false, seed: 1 };
     let frames = frames.draw(&scene).unwrap();
     (Hardware::new(Model::for_frames(&scene, &frames).unwrap(), &build_dir()).unwrap(), frames)
@@ -35,25 +36,36 @@ fn findings(hardware: &Hardware, frames: &[Frame], simulator: Simulator) -> Find
 #[test]
 #[ignore = "several minutes: make netlist"]
 fn the_netlist_of_a_search_equals_the_model() {
-    let (hardware, frames) = setup("0.05");
+    let (hardware, frames) = setup("ulx3s-85f", "0.05");
     let netlist = findings(&hardware, &frames, Simulator::Netlist);
     assert!(netlist.is_equal(), "{:?}", netlist.kept);
 }
 
 #[test]
 fn the_netlist_equals_the_model_and_a_sign_that_tools_read_differently_is_found() {
-    let (mut hardware, frames) = setup("0");
+    netlist_and_defect("ulx3s-85f", "0", "resultants");
+}
+
+#[test]
+fn the_netlist_of_the_serial_engine_equals_the_model_and_a_sign_that_tools_read_differently_is_found() {
+    netlist_and_defect("icebreaker", "0.05", "forces");
+}
+
+/// The output comes from block `last`.
+fn netlist_and_defect(board: &str, mu_max: &str, last: &str) {
+    let (mut hardware, frames) = setup(board, mu_max);
     let netlist = findings(&hardware, &frames, Simulator::Netlist);
     assert!(netlist.is_equal(), "{:?}", netlist.kept);
 
     // A signed constant without a range, as rust-hdl prints one: −5 for Verilator, 251 for Yosys.
     let file = hardware.generated.files.iter_mut().find(|file| file.name.ends_with(".v")).unwrap();
+    let end = format!("        m_axis_tdata = {last}$m_axis_tdata;\n");
     let seeded = [
         (
             "    output reg  [95:0] m_axis_tdata;\n",
             "    localparam signed seeded = 8'hfb;\n    wire signed [7:0] zero = 8'd0;\n",
         ),
-        ("        m_axis_tdata = resultants$m_axis_tdata;\n", "        if (seeded > zero) m_axis_tdata = 96'd0;\n"),
+        (end.as_str(), "        if (seeded > zero) m_axis_tdata = 96'd0;\n"),
     ];
     for (line, more) in seeded {
         assert!(file.text.contains(line), "the place of the seeded defect: {line}");
