@@ -18,7 +18,7 @@
 //! Fields not listed are the same for both. Rules are asked in the order of the table, so that a scene with several
 //! refused choices always names the same one.
 
-use super::{ForceOutput, Form, Medium, ObjectiveKind, Scene, SceneError};
+use super::{CoefficientCheck, ForceOutput, Form, Medium, ObjectiveKind, Scene, SceneError};
 use crate::partition::Case;
 
 /// A choice that may not be had.
@@ -109,6 +109,12 @@ impl Scene {
                 "output.forces",
                 "resultants".to_string(),
                 "taxels on a board with the serial engine",
+            ),
+            rule(
+                self.hardware.coefficient_check == CoefficientCheck::Signature,
+                "hardware.coefficient_check",
+                "signature".to_string(),
+                none,
             ),
             rule(
                 self.fixed.lanes.is_some_and(|lanes| lanes != 4),
