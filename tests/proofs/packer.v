@@ -1,66 +1,62 @@
-// A packet is a border, the header's four bytes, twelve bytes of each word taken, four more, a border;
-// what is offered stays; a word is taken only where one is wanted.
+// A packet is a border, the header's four bytes, twelve bytes of each word taken, four of the CRC, a border; each is
+// offered as soon as it can be, and what is offered stays; a word's bytes go in order, and it is taken with the last.
 module proof(
-  input clk, input again, input offer, input [3:0] header_bits, input [1:0] from, input [11:0] word_bits,
-  input word_valid, input word_last, input ready
+  input clk, input again, input offer, input [7:0] number, input [1:0] from, input [11:0] word_bits,
+  input word_valid, input word_last, input [7:0] crc_low, input crc_busy, input ready
 );
   reg started = 1'b0;
   always @(posedge clk) started <= 1'b1;
   wire rst = again || !started;
-  // One bit stands for the eight of its byte, which go the same way.
-  wire [31:0] header;
-  wire [95:0] word;
-  genvar k;
-  generate
-    for (k = 0; k < 4; k = k + 1) assign header[8 * k +: 8] = {8{header_bits[k]}};
-    for (k = 0; k < 12; k = k + 1) assign word[8 * k +: 8] = {8{word_bits[k]}};
-  endgenerate
-  wire begun, wanted, border, valid;
+  wire begun, wanted, taken, halfway, crc_restart, crc_load, border, valid;
   wire [1:0] source;
-  wire [7:0] content;
+  wire [3:0] index;
+  wire [7:0] crc_octet, content;
+  // The word that stands until it is taken; one bit stands for the eight of its byte, which go the same way.
+  reg [11:0] word;
+  reg last;
+  always @(posedge clk) if (rst || begun || taken) {word, last} <= {word_bits, word_last};
   @BLOCK@ block(
-    .clk(clk), .rst(rst), .offer(offer), .header(header), .offered_source(from), .begun(begun), .source(source),
-    .wanted(wanted), .word(word), .word_valid(word_valid), .word_last(word_last), .content(content), .border(border),
-    .valid(valid), .ready(ready)
+    .clk(clk), .rst(rst), .offer(offer), .number(number), .offered_source(from), .begun(begun), .source(source),
+    .wanted(wanted), .index(index), .octet({8{word[index]}}), .word_valid(word_valid), .word_last(last), .taken(taken),
+    .halfway(halfway), .crc_restart(crc_restart), .crc_octet(crc_octet), .crc_load(crc_load), .crc_low(crc_low),
+    .crc_busy(crc_busy), .content(content), .border(border), .valid(valid), .ready(ready)
   );
-  // What a receiver expects: bytes left of this part, and the parts in their order.
-  localparam NONE = 3'd0, OPEN = 3'd1, BYTES = 3'd2, WORD = 3'd3, CHECK = 3'd4, CLOSE = 3'd5;
+  // What a receiver expects: the parts in their order, and which byte of this one.
+  localparam NONE = 3'd0, OPEN = 3'd1, HEADER = 3'd2, WORD = 3'd3, CHECK = 3'd4, CLOSE = 3'd5;
   reg [2:0] part;
-  reg [3:0] left;
-  reg [11:0] rest;
+  reg [3:0] at;
+  reg [31:0] header;
   reg [1:0] own;
-  reg last, waits, border_before;
-  reg [7:0] before;
+  reg offered, waits, border_before;
+  reg [7:0] before, low_before;
+  wire [15:0] length = from == 2'd0 ? 16'd@IDENTITY@ : from == 2'd1 ? 16'd@COUNTERS@
+    : from == 2'd2 ? 16'd@RESULTANTS@ : 16'd@FORCES@;
+  wire between = part == OPEN || part == CLOSE;
+  wire goes = valid && ready;
+  wire ends = at == (part == WORD ? 4'd11 : 4'd3);
   always @(posedge clk) begin
+    offered <= !rst && (valid ? !ready : between || (part != NONE && !crc_busy && (part != WORD || word_valid)));
     waits <= valid && !ready && !rst;
     {before, border_before} <= {content, border};
-    if (rst) {part, waits} <= 4'd0;
+    if (!valid) low_before <= crc_low;
+    if (rst) {part, at} <= 7'd0;
     else begin
-      if (waits) assert (valid && border == border_before && (border || content == before));
-      assert (begun == (part == NONE && offer));
-      assert (wanted == (part == WORD));
-      if (part != NONE) assert (source == own);
-      if (valid) begin
-        assert (border == (part == OPEN || part == CLOSE));
-        if (part == BYTES) assert (content == {8{rest[0]}});
-        assert (part != NONE && part != WORD);
+      assert (valid == offered && border == between);
+      if (waits) assert (border == border_before && (border || content == before));
+      assert (begun == (part == NONE && offer) && (part == NONE || source == own));
+      assert (wanted == (part == WORD) && index == at && halfway == (!valid && at[0]));
+      assert (taken == (goes && part == WORD && at == 4'd11));
+      assert (crc_restart == (part == OPEN) && crc_load == (goes && !between));
+      if (valid && part == HEADER) assert (content == header[7:0] && crc_octet == content);
+      if (valid && part == WORD) assert (content == {8{word[at]}} && crc_octet == content);
+      if (valid && part == CHECK) assert (content == low_before && crc_octet == ~content);
+      if (begun) {part, own, header} <= {OPEN, from, length, number, 8'd@FIRST@ + {6'd0, from}};
+      else if (goes) begin
+        at <= between || ends ? 4'd0 : at + 4'd1;
+        if (part == HEADER) header <= header >> 8;
+        if (part == CLOSE) part <= NONE;
+        else if (between || (ends && (part != WORD || last))) part <= part + 3'd1;
       end
-      case (part)
-        NONE: if (offer) {part, rest, last, own} <= {OPEN, 8'd0, header_bits, 1'b0, from};
-        OPEN: if (valid && ready) {part, left} <= {BYTES, 4'd4};
-        BYTES: if (valid && ready) begin
-          rest <= rest >> 1;
-          left <= left - 4'd1;
-          if (left == 4'd1) part <= last ? CHECK : WORD;
-          if (left == 4'd1 && last) left <= 4'd4;
-        end
-        WORD: if (word_valid) {part, left, rest, last} <= {BYTES, 4'd12, word_bits, word_last};
-        CHECK: if (valid && ready) begin
-          left <= left - 4'd1;
-          if (left == 4'd1) part <= CLOSE;
-        end
-        default: if (valid && ready) part <= NONE;
-      endcase
     end
   end
 endmodule

@@ -15,7 +15,7 @@
 //! | `rescale.v`: half up, held to the word's range, clips counted | `rescaler` |
 //! | `replay.v`: rows wait for their shift, then come out once, in order | `rescale` and its memory |
 //! | `filler.v`: inside the operand memory, complete when complete | `pass`'s filler |
-//! | `packer.v`: header, words, sum between two borders; what is offered stays | the link's packer |
+//! | `packer.v`: header, words, CRC between two borders; what is offered stays | the link's packer |
 //! | `roundtrip.v`: what is encoded is decoded, byte by byte | the link's encoder and decoder |
 //! | `sums.v`: forces are taken, four words given, the status passed on | the link's resultants |
 //!
