@@ -83,7 +83,7 @@ pub struct Solve {
     pub low: Signal<Out, Bit>,
     /// Vector, column.
     pub operand_address: Wire<Out>,
-    /// Both parities are the other ones; see [`Instruction`].
+    /// Both parities are the other ones; see `Instruction`.
     pub flip: Signal<Out, Bit>,
     /// Of two high limbs.
     pub align: Signal<Out, Bit>,
