@@ -85,6 +85,8 @@ pub struct Engine {
     cycles: Counter,
     part: CaseCounter,
     again: BitDelay,
+    handed: BitDelay,
+    opens: BitDelay,
     finish: BitDelay,
     both_signs: Constant<Bit>,
     ahead: Constant<Bit>,
@@ -147,8 +149,10 @@ impl Engine {
             cycles: Counter::new(1 << CYCLE_BITS),
             part: CaseCounter::new(&counts),
             again: BitDelay::new(1),
+            handed: BitDelay::new(1),
+            opens: BitDelay::new(1),
             // The first beat, which takes the count of cycles, is out by then.
-            finish: BitDelay::new(6),
+            finish: BitDelay::new(8),
             both_signs: Constant::new(model.scene.partition.condition == Condition::BothSigns),
             ahead: Constant::new(model.searches()),
             begin_frame: Default::default(),
@@ -181,6 +185,10 @@ impl Logic for Engine {
         self.part.clk.next = self.clk.val();
         self.again.clk.next = self.clk.val();
         self.again.rst.next = self.rst.val();
+        self.handed.clk.next = self.clk.val();
+        self.handed.rst.next = self.rst.val();
+        self.opens.clk.next = self.clk.val();
+        self.opens.rst.next = self.rst.val();
         self.finish.clk.next = self.clk.val();
         self.finish.rst.next = self.rst.val();
         self.computing.clock.next = self.clk.val();
@@ -214,8 +222,7 @@ impl Logic for Engine {
         comment!("A frame begins when it is whole and the last one computed");
         self.begin_frame.next = self.receive.full.val()
             & !self.computing.q.val()
-            & (!self.sending.q.val() | self.ahead.val())
-            & !self.rst.val();
+            & (!self.sending.q.val() | self.ahead.val());
         self.computing.d.next =
             (self.begin_frame.val() | (self.computing.q.val() & !self.finish.then.val())) & !self.rst.val();
 
@@ -242,8 +249,9 @@ impl Logic for Engine {
         self.behind.next = self.first.q.val() & self.sending.q.val() & !self.send.done.val();
         self.hand_over.next = self.complete.val()
             & !self.behind.val()
-            & (!self.searching.q.val() | self.search.done.val())
-            & !self.rst.val();
+            & (!self.searching.q.val() | self.search.done.val());
+        self.handed.now.next = self.hand_over.val();
+        self.opens.now.next = self.hand_over.val() & self.first.q.val();
         self.filled.d.next = self.complete.val() & !self.hand_over.val() & !self.rst.val();
         self.searching.d.next =
             (self.hand_over.val() | (self.searching.q.val() & !self.search.done.val())) & !self.rst.val();
@@ -327,15 +335,15 @@ impl Logic for Engine {
         self.search.fill.next = self.unfold.taxels_valid.val();
         self.search.fill_index.next = self.unfold.index.val();
         self.search.fill_address.next = self.unfold.address.val();
-        self.search.start.next = self.hand_over.val();
-        self.search.enabled.next = self.condition.q.val();
+        self.search.start.next = self.handed.then.val();
+        self.search.enabled.next = self.searched_condition.q.val();
 
         comment!("search -> force -> send");
         self.forces.values.next = self.search.values.val();
         self.forces.values_valid.next = self.search.values_valid.val();
         self.forces.begin_frame.next = self.begin_frame.val();
         if self.ahead.val() {
-            self.forces.begin_frame.next = self.hand_over.val() & self.first.q.val();
+            self.forces.begin_frame.next = self.opens.then.val();
         }
         self.forces.start.next = self.search.settled.val();
         self.forces.part.next = self.searched_part.kept.val();

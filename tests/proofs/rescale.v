@@ -14,6 +14,7 @@ module proof(input clk, input clear, input valid, input measured, input [@SHIFTS
   reg [1:0] age = 2'd0;
   always @(posedge clk) if (age != 2'd3) age <= age + 2'd1;
   reg counts, known = 1'b0;
+  reg [2:0] held_then;
   reg [15:0] count;
   wire [3:0] held;
   genvar l;
@@ -41,11 +42,12 @@ module proof(input clk, input clear, input valid, input measured, input [@SHIFTS
       end
     end
   endgenerate
-  wire [16:0] sum = {1'b0, count} + held[0] + held[1] + held[2] + held[3];
+  wire [16:0] sum = {1'b0, count} + held_then;
   always @(posedge clk) begin
     counts <= valid;
-    if (clear) {known, count} <= {1'b1, 16'd0};
-    else if (counts) count <= sum[16] ? 16'hFFFF : sum[15:0];
+    held_then <= counts ? {2'd0, held[0]} + held[1] + held[2] + held[3] : 3'd0;
+    if (clear) {known, count} <= {age >= 2'd2, 16'd0};
+    else count <= sum[16] ? 16'hFFFF : sum[15:0];
     if (known) assert (saturations == count);
   end
 endmodule

@@ -1,6 +1,6 @@
-// Beats of the engine pass as words, each once and as it is, taken when its word is; where sums are asked for, the
+// Beats of the engine pass as words, each once and as it is, taken a cycle after its word is; where sums are asked for, the
 // forces' beats are taken first, then come four words, each of which stands until it is taken, then the status passes.
-module proof(input clk, input again, input run, input offered, input sample, input takes);
+module proof(input clk, input again, input run, input offer, input sample, input takes);
   reg started = 1'b0;
   always @(posedge clk) started <= 1'b1;
   wire rst = again || !started;
@@ -12,21 +12,31 @@ module proof(input clk, input again, input run, input offered, input sample, inp
   wire summing = summarise && taken < 8'd@TAXELS@;
   wire gives = summarise && taken == 8'd@TAXELS@ && words < 8'd4;
   wire ready, word_valid, word_last;
+  // The engine keeps what it offers until it is taken.
+  reg holds, held;
+  wire offered = holds || offer;
+  wire level = holds ? held : sample;
+  // What `ready` must be.
+  reg granted;
   wire [95:0] word;
   reg [95:0] before;
   wire moves = word_valid && takes;
   @BLOCK@ block(
-    .clk(clk), .rst(rst), .run(run), .taken(moves), .summarise(summarise), .beat({96{sample}}), .beat_valid(offered),
+    .clk(clk), .rst(rst), .run(run), .taken(moves), .summarise(summarise), .beat({96{level}}), .beat_valid(offered),
     .beat_last(last), .beat_ready(ready), .word(word), .word_valid(word_valid), .word_last(word_last)
   );
   always @(posedge clk) begin
     stands <= gives && word_valid && !takes && !rst;
     before <= word;
+    holds <= offered && !ready && !rst;
+    held <= level;
+    granted <= !rst && (summing ? run && !(offered && ready && taken == 8'd@TAXELS@ - 8'd1) : !gives && moves);
     if (rst) {taken, words, since} <= 24'd0;
     else begin
-      if (summing) assert (ready == run && !word_valid);
+      assert (ready == granted);
+      if (summing) assert (!word_valid);
       else if (gives) assert (!ready && !word_last && (word_valid || !run || since < 8'd@MOST@));
-      else assert (ready == moves && word_valid == (run && offered) && word == {96{sample}} && word_last == last);
+      else assert (word_valid == (run && offered && !ready) && word == {96{level}} && word_last == last);
       if (stands) assert (word == before);
       if (offered && ready) {taken, words} <= {last ? 8'd0 : taken + 8'd1, last ? 8'd0 : words};
       if (gives && moves) words <= words + 8'd1;

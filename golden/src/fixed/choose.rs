@@ -39,8 +39,9 @@ use crate::sensor::Sensor;
 pub const CUT_SHIFT: u32 = 2;
 /// Taxel lines on each side of a boundary that are looked at.
 pub const BESIDE: usize = 2;
-/// From the frame's last code to the choice: place and magnitude, maxima, comparison.
-pub const LATENCY: u64 = 3;
+/// From the frame's last code to the choice (place and magnitude, maxima, comparison, choice), beyond what a frame waits
+/// for without one.
+pub const LATENCY: u64 = 2;
 
 /// What is gathered of a frame while it is received.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

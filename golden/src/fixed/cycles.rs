@@ -3,14 +3,14 @@
 //! The hardware's schedule replayed on paper: each stage's latency is a named constant here and a pipeline there, and the co-simulation
 //! asserts that both agree to the cycle. With Q quads, G groups of rows, K rows in the last group:
 //! ```text
-//! fold     Q + 5                                from the last input beat to the first product
+//! fold     Q + 6                                from the last input beat to the first product
 //! pass     the kept columns of each product, at most Q, waiting until a step's operand has been finished
 //! rescale  v_00 is replayed once its exponent is known: Q more
-//! search   7 coarse sweeps of Q, at least Q/2 + 10; the eighth and 7 halvings of Q + 20; one of Q + 7
+//! search   7 coarse sweeps of Q, at least (Q + 19)/2; the eighth and 7 halvings of Q + 21; one of Q + 7
 //!          (the last alone when nothing is searched)
 //! next     1 from a subarray's search to the passes of the one after it, which go on at the same time
-//! choose   3, where the case is chosen per frame
-//! send     begins with the last subarray's first value: 6 to the first beat, then one beat a cycle
+//! choose   2, where the case is chosen per frame
+//! send     begins with the last subarray's first value: 8 to the first beat, then one beat a cycle
 //! ```
 
 use serde::Serialize;
@@ -24,33 +24,35 @@ use super::serial;
 use crate::board::EngineKind;
 
 /// From the last input beat to the cycle in which the frame starts.
-const ACCEPT: u64 = 1;
+const ACCEPT: u64 = 2;
 /// `fold` beyond its Q quads: start, frame buffer, normalise, butterfly, memory.
-const FOLD: u64 = 5;
-/// From a product's issue to the first row of its accumulators: addresses, memories, selection, five steps of the lanes.
-const LANES: u64 = 8;
+const FOLD: u64 = 6;
+/// From a product's issue to the first row of its accumulators: addresses 1, memories 2, selection 1, lanes 5.
+const LANES: u64 = 9;
 /// More of them where columns are left out: the list of columns is a memory of its own.
 const COLUMNS: u64 = 2;
 /// From a row to its operand being readable: rescaler, operand memory.
 const OPERAND: u64 = 4;
 /// From the last raw row of v_00 to its first replayed row.
-const REPLAY: u64 = 2;
+const REPLAY: u64 = 3;
 /// From the last row to the search's start: rescaler, unfold, memory.
 const UNFOLD: u64 = 5;
-/// From the search's start to its first sweep.
-const BEGIN: u64 = 1;
-/// A sweep that the next one waits for, beyond its Q quads: memory 2, Taylor 4, candidates 2, score 6, judge 5, set-up 1.
-const SWEEP: u64 = 20;
+/// From a sweep's beginning to its judgement, beyond its Q quads: memory 2, Taylor 4, candidates 2, score 6, judge 5.
+const JUDGED: u64 = 19;
+/// From a subarray's completion to the start of its search.
+const HAND_OVER: u64 = 1;
+/// From the search's start, or a judgement that is waited for, to the next sweep: the move, then the sweep.
+pub const SET_UP: u64 = 2;
 /// Quads that a judged sweep lasts at least: its sums are weighed meanwhile.
 pub const SHORTEST_SWEEP: u64 = 4;
 /// The last sweep beyond its Q quads.
 const LAST_SWEEP: u64 = 7;
 /// From a subarray's values to their sending, where nothing is searched.
-const UNSEARCHED: u64 = 1;
+const UNSEARCHED: u64 = 2;
 /// From the start of a subarray's search to that of the next one's passes.
 const NEXT: u64 = 1;
 /// From the last subarray's first value, which stands Q cycles before their end, to the first beat on the output.
-const SEND: u64 = 6;
+const SEND: u64 = 8;
 
 /// How long a frame takes, in clock cycles.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
@@ -69,7 +71,7 @@ pub struct Cycles {
 /// source.
 pub fn coarse_period(quads: u64) -> u64 {
     let quads = quads.max(SHORTEST_SWEEP);
-    quads.max((quads + SWEEP).div_ceil(2))
+    quads.max((quads + JUDGED).div_ceil(2))
 }
 
 impl Cycles {
@@ -88,9 +90,9 @@ impl Cycles {
         let quads = model.formats.quads as u64;
         let chained = COARSE_CENTRES.len() as u64 - 1;
         let awaited = 1 + u64::from(HALVINGS);
-        let sweeps = chained * coarse_period(quads) + awaited * (quads.max(SHORTEST_SWEEP) + SWEEP);
+        let sweeps = chained * coarse_period(quads) + awaited * (quads.max(SHORTEST_SWEEP) + JUDGED + SET_UP);
         let search = |&searching: &bool| match model.searches() {
-            true => BEGIN + if searching { sweeps } else { 0 } + quads + LAST_SWEEP,
+            true => HAND_OVER + SET_UP + if searching { sweeps } else { 0 } + quads + LAST_SWEEP,
             false => UNSEARCHED,
         };
         // A subarray is handed over when it is complete and the one before has been searched.

@@ -39,6 +39,8 @@ macro_rules! board_top {
             /// Lit for a moment when a packet is dropped.
             pub error: Signal<Out, Bit>,
             power_on: PowerOn,
+            // The engine is large: its reset has a register of its own, which may lie far from the button.
+            engine_rst: DFF<Bit>,
             receiver: UartReceiver,
             transmitter: UartTransmitter,
             link: PacketLink,
@@ -62,6 +64,7 @@ macro_rules! board_top {
                     busy: Default::default(),
                     error: Default::default(),
                     power_on: PowerOn::default(),
+                    engine_rst: Default::default(),
                     receiver: UartReceiver::new(identity.baud, identity.clock_hz),
                     transmitter: UartTransmitter::new(identity.baud, identity.clock_hz),
                     link: PacketLink::new(&Shape::of(model), &identity),
@@ -77,6 +80,7 @@ macro_rules! board_top {
             #[hdl_gen]
             fn update(&mut self) {
                 self.power_on.clk.next = self.clk.val();
+                self.engine_rst.clock.next = self.clk.val();
                 self.receiver.clk.next = self.clk.val();
                 self.transmitter.clk.next = self.clk.val();
                 self.link.clk.next = self.clk.val();
@@ -86,7 +90,8 @@ macro_rules! board_top {
                 self.receiver.rst.next = self.power_on.rst.val();
                 self.transmitter.rst.next = self.power_on.rst.val();
                 self.link.rst.next = self.power_on.rst.val();
-                self.engine.rst.next = self.power_on.rst.val();
+                self.engine_rst.d.next = self.power_on.rst.val();
+                self.engine.rst.next = self.engine_rst.q.val();
                 self.lamps.rst.next = self.power_on.rst.val();
 
                 self.receiver.line.next = self.uart_rx.val();

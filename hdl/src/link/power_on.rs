@@ -2,7 +2,7 @@
 
 use rust_hdl::prelude::*;
 
-/// `rst` for sixteen cycles after the device is configured, and as long as the button is held. Relies on
+/// `rst` for seventeen cycles after the device is configured, and as long as the button is held. Relies on
 /// the value that a register has after configuration.
 #[derive(LogicBlock, Default)]
 pub struct PowerOn {
@@ -14,6 +14,7 @@ pub struct PowerOn {
     pub rst: Signal<Out, Bit>,
     _held: [bool; 2],
     _count: u32,
+    _over: bool,
 }
 
 /// Cycles of reset, without the last.
@@ -22,10 +23,11 @@ const LAST: u32 = 15;
 impl Logic for PowerOn {
     fn update(&mut self) {
         if self.clk.pos_edge() {
+            self._over = self._count == LAST;
             self._count = if self._held[1] { 0 } else { (self._count + 1).min(LAST) };
             self._held = [self.button.val(), self._held[0]];
         }
-        self.rst.next = self._count != LAST;
+        self.rst.next = !self._over;
     }
 
     fn connect(&mut self) {
@@ -37,11 +39,13 @@ impl Logic for PowerOn {
             "\
 reg [1:0] held = 2'd0;
 reg [3:0] count = 4'd0;
-always @(*) rst = count != 4'd{LAST};
+// From a register: it goes everywhere.
+initial rst = 1'b1;
 always @(posedge clk) begin
+  rst <= count != 4'd{LAST};
   held <= {{held[0], button}};
   if (held[1]) count <= 4'd0;
-  else if (rst) count <= count + 4'd1;
+  else if (count != 4'd{LAST}) count <= count + 4'd1;
 end"
         ))
     }

@@ -29,7 +29,8 @@ pub struct Resultants {
     pub beat_valid: Signal<In, Bit>,
     /// It is its frame's last.
     pub beat_last: Signal<In, Bit>,
-    /// It is taken.
+    /// It is taken: from a register, so that the engine's pipeline does not wait for the packer's logic. A beat that is
+    /// a word stays for the cycle after that in which the word was taken.
     pub beat_ready: Signal<Out, Bit>,
     /// A word of the payload.
     pub word: Wire<Out>,
@@ -51,6 +52,7 @@ struct State {
     out: usize,
     line: i64,
     sums: Sums,
+    ready: bool,
 }
 
 const ADD: usize = 0;
@@ -124,7 +126,10 @@ impl Resultants {
 
     fn advance(&mut self) {
         let (rows, cols) = (self._shape.rows, self._shape.cols);
-        let takes = self.beat_ready.val() && self.beat_valid.val();
+        let takes = self._state.ready && self.beat_valid.val();
+        let at_end = self._state.row + 1 == rows && self._state.col + 1 == cols;
+        let more = if self.passes() { self.taken.val() } else { self.adds() && !(takes && at_end) };
+        self._state.ready = self.run.val() && more && !self.rst.val();
         if self.adds() && takes {
             self.add();
         } else if self._state.stage == FINISH {
@@ -155,8 +160,9 @@ impl Logic for Resultants {
             self.advance();
         }
         let s = self._state;
-        self.beat_ready.next = self.run.val() && (self.adds() || (self.passes() && self.taken.val()));
-        self.word_valid.next = self.run.val() && if self.passes() { self.beat_valid.val() } else { s.stage == OUT };
+        self.beat_ready.next = s.ready;
+        let stands = if self.passes() { self.beat_valid.val() && !s.ready } else { s.stage == OUT };
+        self.word_valid.next = self.run.val() && stands;
         self.word_last.next = self.passes() && self.beat_last.val();
         self.word.next = if self.passes() {
             self.beat.val()
@@ -184,10 +190,10 @@ impl Logic for Resultants {
         if !self._shape.resultants {
             return Verilog::Custom(
                 "\
-wire unused = &{1'b0, clk, rst, summarise};
+wire unused = &{1'b0, summarise};
+always @(posedge clk) beat_ready <= run && taken && !rst;
 always @(*) begin
-  beat_ready = run && taken;
-  word_valid = run && beat_valid;
+  word_valid = run && beat_valid && !beat_ready;
   word_last = beat_last;
   word = beat;
 end"
@@ -217,13 +223,14 @@ wire passes = !summarise || stage == 2'd{STATUS};
 wire line_end = col == {c}'d{last_col};
 wire first = row == {r}'d0 && col == {c}'d0;
 always @(*) begin
-  beat_ready = run && (passes ? taken : stage == 2'd{ADD});
-  word_valid = run && (passes ? beat_valid : stage == 2'd{OUT});
+  word_valid = run && (passes ? beat_valid && !beat_ready : stage == 2'd{OUT});
   word_last = passes && beat_last;
   word = passes ? beat : out[1] ? (out[0] ? all[383:288] : all[287:192]) : (out[0] ? all[191:96] : all[95:0]);
 end
-wire adds = run && summarise && stage == 2'd{ADD} && beat_valid;
+wire adds = beat_ready && beat_valid && !passes && stage == 2'd{ADD};
+wire at_end = line_end && row == {r}'d{last_row};
 always @(posedge clk) begin
+  beat_ready <= !rst && run && (passes ? taken : stage == 2'd{ADD} && !(adds && at_end));
   if (adds) begin
     sum_x <= first ? x : sum_x + x;
     sum_y <= first ? y : sum_y + y;
@@ -248,13 +255,13 @@ always @(posedge clk) begin
   end else begin
     if (adds) begin
       col <= line_end ? {c}'d0 : col + {c}'d1;
-      if (line_end) row <= row == {r}'d{last_row} ? {r}'d0 : row + {r}'d1;
-      if (line_end && row == {r}'d{last_row}) stage <= 2'd{FINISH};
+      if (line_end) row <= at_end ? {r}'d0 : row + {r}'d1;
+      if (at_end) stage <= 2'd{FINISH};
     end else if (stage == 2'd{FINISH}) begin
       if (more == {m}'d{last_more}) stage <= 2'd{OUT};
     end else if (stage == 2'd{OUT} && taken) begin
       if (out == 2'd3) stage <= 2'd{STATUS};
-    end else if (run && passes && taken && beat_last) stage <= 2'd{ADD};
+    end else if (passes && beat_ready && beat_valid && beat_last) stage <= 2'd{ADD};
   end
 end",
             r_end = r - 1,

@@ -16,9 +16,9 @@ use super::rescaler::SATURATION_BITS;
 use super::sweep::position_bits;
 use crate::wire::{Wire, Word};
 
-/// A pipeline of five steps that moves while `advance` is high: lane, products, shift, rounding with saturation and
-/// threshold, output. `beat` 0 is a force from `quad`, 1 … 3 are the status beats; the answer stands on `beat_data`
-/// five steps after `offer`. `start` keeps μ, the shift and the status of subarray `part`, settled three cycles later;
+/// A pipeline that moves while `advance` is high: memory (2 steps), lane, products, shift, rounding with saturation,
+/// threshold and output. `beat` 0 is a force from `quad`, 1 … 3 are the status beats; the answer stands on `beat_data`
+/// seven steps after `offer`. `start` keeps μ, the shift and the status of subarray `part`, settled three cycles later;
 /// `begin_frame` clears the frame's counts.
 #[derive(LogicBlock)]
 pub struct ForceUnit {
@@ -44,7 +44,7 @@ pub struct ForceUnit {
     pub beat_part: Wire<In>,
     /// The quad's lane, with `offer`.
     pub lane: Wire<In>,
-    /// Four values of p, one step after `offer`.
+    /// Four values of p, two steps after `offer`.
     pub quad: Wire<In>,
     /// μ1 as a position.
     pub position_x: Wire<In>,
@@ -85,7 +85,9 @@ pub struct ForceUnit {
 }
 
 /// Steps from `offer` to the output.
-pub const STEPS: usize = 5;
+pub const STEPS: usize = 7;
+/// Steps of them from `offer` to `quad`.
+const READ_STEPS: usize = 2;
 /// Width of the cycle counter.
 pub const CYCLE_BITS: usize = 24;
 
@@ -262,16 +264,17 @@ end
         );
         let products = format!(
             "\
-wire signed [{mu_end}:0] mu_x = mu_xs[at2];
-wire signed [{mu_end}:0] mu_y = mu_ys[at2];
+reg signed [{mu_end}:0] mu_x, mu_y;
 reg signed [{product_end}:0] product_x, product_y;
 wire signed [{product}:0] doubled_x = {{product_x, 1'b0}};
 wire signed [{product}:0] doubled_y = {{product_y, 1'b0}};
 reg signed [{product}:0] moved_x, moved_y;
-wire [{p_end}:0] status_x = xs[at4];
-wire [{p_end}:0] status_y = ys[at4];
+wire [{p_end}:0] status_x = xs[at6];
+wire [{p_end}:0] status_y = ys[at6];
 always @(posedge clk) begin
   if (advance) begin
+    mu_x <= mu_xs[at2];
+    mu_y <= mu_ys[at2];
     product_x <= value * mu_x;
     product_y <= value * mu_y;
     moved_x <= doubled_x >>> shift;
@@ -289,7 +292,7 @@ end
     /// Verilog in their place: fx and fy are zero.
     fn no_shear(&self) -> (String, String) {
         let unused = "wire unused_mu = &{1'b0, position_x, position_y};\n";
-        let zero = "assign words[63:0] = 64'd0;\nassign clipped[1:0] = 2'd0;\n";
+        let zero = "assign rounded[63:0] = 64'd0;\nassign clips[1:0] = 2'd0;\n";
         (unused.to_string(), zero.to_string())
     }
 }
@@ -301,9 +304,9 @@ impl Logic for ForceUnit {
                 let leaving = self._pipe.remove(0);
                 if let Some(entry) = leaving {
                     if self._frame.counting {
-                        // The counter is 0 two cycles after the last input beat, and the first output beat stands from
+                        // The counter is 0 three cycles after the last input beat, and the first output beat stands from
                         // the next cycle on.
-                        self._frame.cycles = self.cycles.val().number() as u32 + 3;
+                        self._frame.cycles = self.cycles.val().number() as u32 + 4;
                         self._frame.counting = false;
                     }
                     let words = self.answer(&entry);
@@ -312,7 +315,8 @@ impl Logic for ForceUnit {
                 self.valid.next = leaving.is_some();
                 let parts = self._counts[self.case()];
                 self.last.next = leaving.is_some_and(|entry| entry.beat == 3 && entry.part + 1 == parts);
-                if let Some(Some(entry)) = self._pipe.last_mut() {
+                let read = self._pipe.len() - READ_STEPS;
+                if let Some(Some(entry)) = self._pipe.get_mut(read) {
                     entry.value = self.quad.val().signed(entry.lane, self.quad.width() / 4);
                 }
                 self._pipe.push(self.offer.val().then(|| Entry {
@@ -361,7 +365,7 @@ impl Logic for ForceUnit {
         let searched = f.degree > 0;
         let (mu_words, shear) = if searched { self.shear() } else { self.no_shear() };
         // From bit 4 on, or 5 where that tells of the coefficients.
-        let (from, damaged) = if self._checks { (5, ", damages[at4]") } else { (4, "") };
+        let (from, damaged) = if self._checks { (5, ", damages[at6]") } else { (4, "") };
         let above = word - CASE_SHIFT as usize;
         let case_word = match self._numbers.iter().any(|&number| number > 0) {
             false => format!("{}'d0{damaged}", word - from),
@@ -372,7 +376,7 @@ impl Logic for ForceUnit {
         };
         let damages = match self._checks {
             true => format!(
-                "reg [{}:0] damages;\nalways @(posedge clk) if (start) damages[part] <= damaged;\n",
+                "reg damages [0:{}];\nalways @(posedge clk) if (start) damages[part] <= damaged;\n",
                 self._parts.len() - 1
             ),
             false => "wire unused_damaged = &{1'b0, damaged};\n".to_string(),
@@ -395,7 +399,8 @@ reg [{n_end}:0] normalises [0:{last_part}];
 reg [{r_end}:0] rescales [0:{last_part}];
 reg [{word_end}:0] scores [0:{last_part}];
 reg [{cap_end}:0] rescale_saturations [0:{last_part}];
-reg [{last_part}:0] conditions, founds;
+reg conditions [0:{last_part}];
+reg founds [0:{last_part}];
 reg contact, counting;
 reg [{cap_end}:0] force_saturations;
 reg [{c_end}:0] cycles_held;
@@ -421,27 +426,29 @@ wire [7:0] raw_shift = 8'd{base} + {{{n_more}'d0, normalise_held}} - {{{r_more}'
     shifts[part2] <= shift_now;
   end
 end
-reg [3:0] offers;
-reg [1:0] beat1, beat2, beat3, beat4;
-reg [1:0] lane1;
-reg [{part_end}:0] at1, at2, at3, at4;
-wire [5:0] shift = shifts[at3];
+reg [5:0] offers;
+reg [1:0] beat1, beat2, beat3, beat4, beat5, beat6;
+reg [1:0] lane1, lane2;
+reg [{part_end}:0] at1, at2, at3, at4, at5, at6;
+reg [5:0] shift;
 reg signed [{v_end}:0] value;
-reg [{v_end}:0] value3;
-wire signed [{product}:0] doubled_z = {{{{{z_more}{{value3[{v_end}]}}}}, value3, {fraction_one}'d0}};
+reg [{v_end}:0] value4;
+wire signed [{product}:0] doubled_z = {{{{{z_more}{{value4[{v_end}]}}}}, value4, {fraction_one}'d0}};
 reg signed [{product}:0] moved_z;
-wire [{all_end}:0] words;
-wire [2:0] clipped;
+wire [{all_end}:0] rounded;
+wire [2:0] clips;
+reg [{all_end}:0] words;
+reg [2:0] clipped;
 {shear}genvar axis;
 generate
   for (axis = {first_axis}; axis < 3; axis = axis + 1) begin : component
     wire [{product}:0] moved = {moved};
     wire [{product1}:0] half_up = {{moved[{product}], moved}} + {product2}'d1;
-    wire [{product}:0] rounded = half_up[{product1}:1];
-    wire [{over}:0] sign = rounded[{product}:{word_end}];
-    assign clipped[axis] = sign != {{{over1}{{rounded[{product}]}}}};
-    assign words[axis * {word} +: {word}] =
-      clipped[axis] ? {{rounded[{product}], {{{word_end}{{!rounded[{product}]}}}}}} : rounded[{word_end}:0];
+    wire [{product}:0] whole = half_up[{product1}:1];
+    wire [{over}:0] sign = whole[{product}:{word_end}];
+    assign clips[axis] = sign != {{{over1}{{whole[{product}]}}}};
+    assign rounded[axis * {word} +: {word}] =
+      clips[axis] ? {{whole[{product}], {{{word_end}{{!whole[{product}]}}}}}} : whole[{word_end}:0];
     wire unused = &{{1'b0, half_up[0]}};
   end
 endgenerate
@@ -450,39 +457,42 @@ wire [{cap}:0] count = {{1'b0, force_saturations}} + {{{cap_less}'d0, clipped[0]
   + {{{cap_less}'d0, clipped[2]}};
 reg [{all_end}:0] status;
 always @(*) begin
-  case (beat4)
-    2'd1: status = {{{case_word}, framing, !contact, founds[at4], conditions[at4], {y_word}, {x_word}}};
-    2'd2: status = {{{n_word}'d0, normalises[at4], {r_word}'d0, rescales[at4], scores[at4]}};
-    default: status = {{{c_word}'d0, cycles_held, {cap_word}'d0, force_saturations, {cap_word}'d0, rescale_saturations[at4]}};
+  case (beat6)
+    2'd1: status = {{{case_word}, framing, !contact, founds[at6], conditions[at6], {y_word}, {x_word}}};
+    2'd2: status = {{{n_word}'d0, normalises[at6], {r_word}'d0, rescales[at6], scores[at6]}};
+    default: status = {{{c_word}'d0, cycles_held, {cap_word}'d0, force_saturations, {cap_word}'d0, rescale_saturations[at6]}};
   endcase
 end
-wire force_leaves = advance && offers[3] && beat4 == 2'd0;
+wire force_leaves = advance && offers[5] && beat6 == 2'd0;
 always @(posedge clk) begin
   if (rst) begin
-    offers <= 4'd0;
+    offers <= 6'd0;
     valid <= 1'b0;
     last <= 1'b0;
   end else if (advance) begin
-    offers <= {{offers[2:0], offer}};
-    valid <= offers[3];
-    last <= offers[3] && beat4 == 2'd3 && at4 == {final_part};
+    offers <= {{offers[4:0], offer}};
+    valid <= offers[5];
+    last <= offers[5] && beat6 == 2'd3 && at6 == {final_part};
   end
   if (advance) begin
-    {{beat4, beat3, beat2, beat1}} <= {{beat3, beat2, beat1, beat}};
-    {{at4, at3, at2, at1}} <= {{at3, at2, at1, beat_part}};
-    lane1 <= lane;
-    value <= lane1[1] ? (lane1[0] ? quad[{v3} +: {v}] : quad[{v2} +: {v}])
-      : (lane1[0] ? quad[{v} +: {v}] : quad[0 +: {v}]);
-    value3 <= value;
+    {{beat6, beat5, beat4, beat3, beat2, beat1}} <= {{beat5, beat4, beat3, beat2, beat1, beat}};
+    {{at6, at5, at4, at3, at2, at1}} <= {{at5, at4, at3, at2, at1, beat_part}};
+    {{lane2, lane1}} <= {{lane1, lane}};
+    value <= lane2[1] ? (lane2[0] ? quad[{v3} +: {v}] : quad[{v2} +: {v}])
+      : (lane2[0] ? quad[{v} +: {v}] : quad[0 +: {v}]);
+    value4 <= value;
+    shift <= shifts[at3];
     moved_z <= doubled_z >>> shift;
-    if (offers[3]) beat_data <= beat4 != 2'd0 ? status : below ? {all}'d0 : words;
+    words <= rounded;
+    clipped <= clips;
+    if (offers[5]) beat_data <= beat6 != 2'd0 ? status : below ? {all}'d0 : words;
   end
   if (begin_frame) begin
     counting <= 1'b1;
     contact <= 1'b0;
     force_saturations <= {cap}'d0;
-  end else if (advance && offers[3]) begin
-    if (counting) cycles_held <= cycles + {c}'d3;
+  end else if (advance && offers[5]) begin
+    if (counting) cycles_held <= cycles + {c}'d4;
     counting <= 1'b0;
     if (force_leaves && !below && words[95:64] != 32'd0) contact <= 1'b1;
     if (force_leaves) force_saturations <= count[{cap}] ? {{{cap}{{1'b1}}}} : count[{cap_end}:0];

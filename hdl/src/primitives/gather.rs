@@ -87,13 +87,16 @@ impl Logic for Gather {
 wire signed [{end}:0] value = code;
 wire signed [{end}:0] floor_code = {bits}'sd{floor};
 reg [{less_end}:0] magnitudes [0:{last}];
-reg [{last}:0] positives, negatives;
+reg positives [0:{last}];
+reg negatives [0:{last}];
 integer i;
 always @(posedge clk) begin
   if (clear) begin
-    for (i = 0; i <= {last}; i = i + 1) magnitudes[i] <= {less}'d0;
-    positives <= {parts}'d0;
-    negatives <= {parts}'d0;
+    for (i = 0; i <= {last}; i = i + 1) begin
+      magnitudes[i] <= {less}'d0;
+      positives[i] <= 1'b0;
+      negatives[i] <= 1'b0;
+    end
   end else if (accept) begin
     magnitudes[part] <= magnitudes[part] | (code[{less_end}:0] ^ {{{less}{{code[{end}]}}}});
     positives[part] <= positives[part] || value > floor_code;
@@ -106,7 +109,6 @@ always @(*) begin
   negative = negatives[select];
 end",
             last = self._parts.len() - 1,
-            parts = self._parts.len(),
             end = bits - 1,
             less = bits - 1,
             less_end = bits - 2,

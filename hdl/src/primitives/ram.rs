@@ -1,4 +1,4 @@
-//! A simple dual-port memory: one write port with a mask per field, one registered read port.
+//! A simple dual-port memory: one write port with a mask per field, one read port with one register or two.
 
 use rust_hdl::prelude::*;
 
@@ -6,9 +6,9 @@ use super::counter::count_bits;
 use crate::wire::{Wire, Word};
 
 /// ```text
-/// write (one bit per field), write_address, write_data --> memory --> read_data one cycle after read_address
+/// write (one bit per field), write_address, write_data --> memory --> read_data one or two cycles after read_address
 /// ```
-/// The read register moves only while `read` is high. Reading a word in the cycle that writes it gives the old one; the
+/// The read registers move only while `read` is high. Reading a word in the cycle that writes it gives the old one; the
 /// content is undefined until written.
 #[derive(LogicBlock)]
 pub struct Ram {
@@ -27,6 +27,9 @@ pub struct Ram {
     /// What was read.
     pub read_data: Wire<Out>,
     _memory: Vec<Word>,
+    /// The register behind the memory's own.
+    _behind: bool,
+    _read: Word,
 }
 
 impl Ram {
@@ -41,7 +44,16 @@ impl Ram {
             read_address: Wire::new(count_bits(depth)),
             read_data: Wire::new(fields * bits),
             _memory: vec![Word::default(); depth],
+            _behind: false,
+            _read: Word::default(),
         }
+    }
+
+    /// The same with `read_data` two cycles after `read_address`: block RAM is slow to answer, so that at a high clock
+    /// nothing but a register follows it.
+    pub fn registered(mut self) -> Self {
+        self._behind = true;
+        self
     }
 
     /// The same without the memory, for scenes that never read it: it reads as zero.
@@ -56,7 +68,9 @@ impl Logic for Ram {
         if self.clk.pos_edge() {
             if self.read.val() {
                 let address = self.read_address.val().number() as usize;
-                self.read_data.next = self._memory.get(address).copied().unwrap_or_default();
+                let read = self._memory.get(address).copied().unwrap_or_default();
+                self.read_data.next = if self._behind { self._read } else { read };
+                self._read = read;
             }
             let bits = self.write_data.width() / self.write.width();
             if let Some(word) = self._memory.get_mut(self.write_address.val().number() as usize) {
@@ -92,12 +106,20 @@ impl Logic for Ram {
             (0..fields)
                 .map(|field| {
                     let enable = if fields == 1 { "write".to_string() } else { format!("write[{field}]") };
+                    let place = format!("read_data[{field} * {bits} +: {bits}]");
+                    let (declared, read) = match self._behind {
+                        true => (
+                            format!("reg [{}:0] read{field};\n", bits - 1),
+                            format!("begin\n    read{field} <= field{field}[read_address];\n    {place} <= read{field};\n  end"),
+                        ),
+                        false => (String::new(), format!("{place} <= field{field}[read_address];")),
+                    };
                     format!(
                         "\
 reg [{end}:0] field{field} [0:{depth}];
-always @(posedge clk) begin
+{declared}always @(posedge clk) begin
   if ({enable}) field{field}[write_address] <= write_data[{field} * {bits} +: {bits}];
-  if (read) read_data[{field} * {bits} +: {bits}] <= field{field}[read_address];
+  if (read) {read}
 end
 ",
                         end = bits - 1,

@@ -9,8 +9,8 @@ use crate::wire::{Wire, Word};
 
 /// A quad of accumulators, shifted right by `shift` when `measured`, by the constant of an A pass otherwise.
 ///
-/// `words` follow two cycles later, `operands` (the same, shortened to `data_bits`) three; `saturations` counts the clipped words of valid
-/// quads since `clear`.
+/// `words` follow two cycles later, `operands` (the same, shortened to `data_bits`) three; `saturations` counts the
+/// clipped words of valid quads since `clear`, a cycle after they stand.
 #[derive(LogicBlock)]
 pub struct Rescaler {
     /// Clock.
@@ -34,6 +34,7 @@ pub struct Rescaler {
     _formats: Formats,
     _shifted: [i64; 4],
     _valid: bool,
+    _clips: u64,
 }
 
 /// Width of a saturation counter.
@@ -55,6 +56,7 @@ impl Rescaler {
             _formats: formats.clone(),
             _shifted: [0; 4],
             _valid: false,
+            _clips: 0,
         }
     }
 }
@@ -70,12 +72,13 @@ impl Logic for Rescaler {
             self.operands.next = Word::of_fields(&[0, 1, 2, 3].map(operand), f.data_bits as usize);
             let rounded = self._shifted.map(|value| saturate(value, f.vector_bits));
             self.words.next = Word::of_fields(&rounded.map(|(word, _)| word), f.vector_bits as usize);
-            let clipped = rounded.iter().filter(|(_, clipped)| *clipped).count() as u64;
-            let count = self.saturations.val().number() + if self._valid { clipped } else { 0 };
+            let count = self.saturations.val().number() + self._clips;
             self.saturations.next = Word::from(match self.clear.val() {
                 true => 0,
                 false => count.min((1 << SATURATION_BITS) - 1),
             });
+            let clipped = rounded.iter().filter(|(_, clipped)| *clipped).count() as u64;
+            self._clips = if self._valid { clipped } else { 0 };
             let shift = if self.measured.val() { self.shift.val().number() as u32 } else { f.a_shift };
             self._shifted =
                 std::array::from_fn(|lane| round_shift(self.quad.val().signed(lane, f.acc_bits as usize), shift));
@@ -93,7 +96,7 @@ impl Logic for Rescaler {
         let f = &self._formats;
         let (acc, r, d) = (f.acc_bits as usize, f.vector_bits as usize, f.data_bits as usize);
         let extra = SEARCH_EXTRA_BITS as usize;
-        let over = acc + 1 - r;
+        let over = acc - r;
         let shift_bits = self.shift.width();
         let cap = SATURATION_BITS;
         Verilog::Custom(format!(
@@ -101,12 +104,13 @@ impl Logic for Rescaler {
 wire [{shift_end}:0] amount = measured ? shift : {shift_bits}'d{a_shift};
 reg valid1;
 wire [3:0] clipped;
-wire [2:0] clips = {{2'd0, clipped[0]}} + {{2'd0, clipped[1]}} + {{2'd0, clipped[2]}} + {{2'd0, clipped[3]}};
+reg [2:0] clips;
 wire [{cap}:0] count = {{1'b0, saturations}} + {{{count_more}'d0, clips}};
 always @(posedge clk) begin
   valid1 <= valid;
+  clips <= valid1 ? {{2'd0, clipped[0]}} + {{2'd0, clipped[1]}} + {{2'd0, clipped[2]}} + {{2'd0, clipped[3]}} : 3'd0;
   if (clear) saturations <= {cap}'d0;
-  else if (valid1) saturations <= count[{cap}] ? {{{cap}{{1'b1}}}} : count[{cap_end}:0];
+  else saturations <= count[{cap}] ? {{{cap}{{1'b1}}}} : count[{cap_end}:0];
 end
 genvar l;
 generate
@@ -114,17 +118,19 @@ generate
     // One bit below the LSB is kept, so that adding one and dropping it rounds half up.
     reg signed [{acc}:0] moved;
     wire signed [{acc}:0] doubled = {{quad[l * {acc} +: {acc}], 1'b0}};
-    wire [{acc1}:0] half_up = {{moved[{acc}], moved}} + {acc2}'d1;
-    wire [{acc}:0] rounded = half_up[{acc1}:1];
-    wire [{over}:0] sign = rounded[{acc}:{r_end}];
-    assign clipped[l] = sign != {{{over1}{{rounded[{acc}]}}}};
+    wire [{r}:0] half_up = moved[{r}:0] + {r_more}'d1;
+    // Whether the rounded word fits is told beside the rounding, not after it: what is above must be sign bits once the
+    // carry out of the low bits has come in.
+    wire carry = &moved[{r_end}:0];
+    wire [{over}:0] above = moved[{acc}:{r}];
+    assign clipped[l] = carry ? !(&above[{over}:1]) : (|above && !(&above));
     wire [{r_end}:0] now = words[l * {r} +: {r}];
     wire [{short_end}:0] operand = {{now[{r_end}], now[{r_end}:{extra_low}]}} + {short}'d1;
     wire overflow = operand[{short_end}] != operand[{short_less}];
     wire unused = &{{1'b0, operand[0], now, half_up[0]}};
     always @(posedge clk) begin
       moved <= doubled >>> amount;
-      words[l * {r} +: {r}] <= clipped[l] ? {{rounded[{acc}], {{{r_less}{{!rounded[{acc}]}}}}}} : rounded[{r_end}:0];
+      words[l * {r} +: {r}] <= clipped[l] ? {{moved[{acc}], {{{r_less}{{!moved[{acc}]}}}}}} : half_up[{r}:1];
       operands[l * {d} +: {d}] <= overflow ? {{1'b0, {{{d_less}{{1'b1}}}}}} : operand[{d}:1];
     end
   end
@@ -133,9 +139,7 @@ endgenerate",
             a_shift = f.a_shift,
             count_more = cap + 1 - 3,
             cap_end = cap - 1,
-            acc1 = acc + 1,
-            acc2 = acc + 2,
-            over1 = over + 1,
+            r_more = r + 1,
             r_end = r - 1,
             r_less = r - 1,
             extra_low = extra - 1,

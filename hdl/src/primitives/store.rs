@@ -35,6 +35,8 @@ pub struct Store {
     pub write_data: Wire<In>,
     /// Buffer to read.
     pub read_buffer: Wire<In>,
+    /// Where that begins in the memory.
+    pub read_base: Wire<In>,
     /// Which quad.
     pub read_address: Wire<In>,
     /// A quad of polynomials, two cycles later.
@@ -48,6 +50,16 @@ pub struct Store {
 
 /// Cycles from an address to its quad.
 pub const LATENCY: usize = 2;
+
+/// Where buffer `buffer` begins in a memory of buffers of `quads` quads, which lie one behind the other, without gaps.
+pub fn base(buffer: usize, quads: usize) -> usize {
+    (buffer % BUFFERS) * quads
+}
+
+/// Bits of a place in such a memory.
+pub fn base_bits(quads: usize) -> usize {
+    count_bits(BUFFERS * quads)
+}
 
 impl Store {
     /// `quads` quads of polynomials in `layout`, filled with coefficients of `fill_bits` bits; `apart` says whether
@@ -65,6 +77,7 @@ impl Store {
             write_address: Wire::new(address),
             write_data: Wire::new(layout.bits()),
             read_buffer: Wire::new(BUFFER_BITS),
+            read_base: Wire::new(base_bits(quads)),
             read_address: Wire::new(address),
             read_data: Wire::new(layout.bits()),
             _quads: quads,
@@ -122,25 +135,24 @@ impl Logic for Store {
             .map(|lane| format!("wire [{}:0] t{lane} = fill_quad[{} +: {bits}];\n", bits - 1, lane * bits))
             .collect();
         let depth = BUFFERS * self._quads;
-        let address_bits = count_bits(depth);
+        let address_bits = base_bits(self._quads);
         let pad = match address_bits - self.read_address.width() {
             0 => String::new(),
             more => format!("{more}'d0, "),
         };
-        // Buffers lie one behind the other, without gaps.
-        let place = |name: &str, buffer: &str, address: &str| {
+        let place = |name: &str| {
             format!(
-                "wire [{end}:0] {name} = {{{pad}{address}}} + ({buffer} == 2'd1 ? {address_bits}'d{one} : \
-                 {buffer} == 2'd2 ? {address_bits}'d{two} : {address_bits}'d0);\n",
+                "wire [{end}:0] {name} = {{{pad}write_address}} + (write_buffer == 2'd1 ? {address_bits}'d{one} : \
+                 write_buffer == 2'd2 ? {address_bits}'d{two} : {address_bits}'d0);\n",
                 end = address_bits - 1,
-                one = self._quads,
-                two = 2 * self._quads,
+                one = base(1, self._quads),
+                two = base(2, self._quads),
             )
         };
         let write_to = match self._apart {
-            true => place("write_to", "write_buffer", "write_address"),
+            true => place("write_to"),
             false => {
-                place("to_buffer", "write_buffer", "write_address")
+                place("to_buffer")
                     + &format!("wire [{}:0] write_to = fill ? {{{pad}fill_address}} : to_buffer;\n", address_bits - 1)
             }
         };
@@ -190,7 +202,7 @@ end
         };
         Verilog::Custom(format!(
             "{lanes}{write_to}{read_from}{from_start}{memories}",
-            read_from = place("read_from", "read_buffer", "read_address"),
+            read_from = format_args!("wire [{}:0] read_from = read_base + {{{pad}read_address}};\n", address_bits - 1),
         ))
     }
 }

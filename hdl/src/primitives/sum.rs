@@ -7,7 +7,7 @@ use super::polynomial_word::{resize, PolynomialWord};
 use super::sweep::{BUFFERS, BUFFER_BITS, START};
 use crate::wire::{Wire, Word};
 
-/// Adds up the counted lanes of each `fill` into buffer `START` (quad 0 starts a coefficient anew); `read` holds a
+/// Adds up the counted lanes of each `fill` into buffer `START` (quad 0 starts a coefficient anew), two cycles later; `read` holds a
 /// buffer's sum on `word`; `write` replaces a buffer's sum. As in the search memory, `START` is buffer 0 unless one
 /// subarray is filled while another is searched.
 #[derive(LogicBlock)]
@@ -39,6 +39,15 @@ pub struct Sum {
     _layout: PolynomialWord,
     _apart: bool,
     _buffers: [Word; BUFFERS + 1],
+    _added: Option<Added>,
+}
+
+/// What a `fill` adds to a coefficient.
+#[derive(Clone, Copy, Debug)]
+struct Added {
+    index: usize,
+    first: bool,
+    sum: i64,
 }
 
 impl Sum {
@@ -61,6 +70,7 @@ impl Sum {
             _layout: layout,
             _apart: apart,
             _buffers: Default::default(),
+            _added: None,
         }
     }
 }
@@ -86,15 +96,20 @@ impl Logic for Sum {
                 let buffer = self.buffer(self.write_buffer.val().number() as usize);
                 self._buffers[buffer] = self.write_data.val();
             }
-            let k = self.fill_index.val().number() as usize;
-            if let Some(&width) = self._layout.widths.get(k).filter(|_| self.fill.val()) {
+            if let Some(Added { index, first, sum: added }) = self._added.take() {
+                if let Some(&width) = self._layout.widths.get(index) {
+                    let start = self.buffer(START);
+                    let before = self._layout.get(&self._buffers[start], 0)[index];
+                    let sum = added + if first { 0 } else { before };
+                    self._buffers[start].set(self._layout.offset(index), width, sum as u64);
+                }
+            }
+            if self.fill.val() {
                 let bits = self.fill_quad.width() / 4;
                 let counted = |lane: &usize| self.fill_mask.val().field(*lane, 1) == 1;
-                let added: i64 = (0..4).filter(counted).map(|lane| self.fill_quad.val().signed(lane, bits)).sum();
-                let start = self.buffer(START);
-                let mut sum = self._layout.get(&self._buffers[start], 0);
-                sum[k] = added + if self.fill_address.val().number() == 0 { 0 } else { sum[k] };
-                self._buffers[start].set(self._layout.offset(k), width, sum[k] as u64);
+                let sum = (0..4).filter(counted).map(|lane| self.fill_quad.val().signed(lane, bits)).sum();
+                let index = self.fill_index.val().number() as usize;
+                self._added = Some(Added { index, first: self.fill_address.val().number() == 0, sum });
             }
         }
     }
@@ -125,7 +140,7 @@ impl Logic for Sum {
                 let low = self._layout.offset(k);
                 format!(
                     "\
-  if (fill && fill_index == {index_bits}'d{k})
+  if (adds && index == {index_bits}'d{k})
     buffer{start}[{low} +: {width}] <= {added} + (first ? {width}'d0 : buffer{start}[{low} +: {width}]);
 ",
                     start = self.buffer(START),
@@ -139,10 +154,15 @@ impl Logic for Sum {
             .collect();
         Verilog::Custom(format!(
             "\
-{lanes}wire first = fill_address == {address_bits}'d0;
-wire [{wide_end}:0] added = {terms};
+{lanes}reg adds, first;
+reg [{index_end}:0] index;
+reg [{wide_end}:0] added;
 reg [{end}:0] {names};
 always @(posedge clk) begin
+  adds <= fill;
+  index <= fill_index;
+  first <= fill_address == {address_bits}'d0;
+  added <= {terms};
   if (read) begin
     case (read_buffer)
       2'd1: word <= buffer1;
@@ -152,6 +172,7 @@ always @(posedge clk) begin
   end
 {writes}{sums}end",
             wide_end = wide - 1,
+            index_end = index_bits - 1,
             end = self._layout.bits() - 1,
             address_bits = self.fill_address.width(),
             terms = terms.join(" + "),

@@ -4,13 +4,14 @@ use dermis_golden::fixed::formats::HALVINGS;
 use dermis_golden::fixed::search::COARSE_CENTRES;
 use rust_hdl::prelude::*;
 
+use super::store::{base, base_bits};
 use super::sweep::{position_bits, square_bits, sweep_bits, unpack, Sweep, BUFFERS, BUFFER_BITS, START};
 use crate::wire::{Wire, Word};
 
 /// Sweeps over the coarse tiles, then the halvings, then one that only moves to the winner.
 ///
-/// `set_up`, which may come with `judged` where the sweeps are coarse, begins a sweep, whose move, word and buffers stand from the next cycle until
-/// the following `set_up`. Coarse sweeps follow one another without waiting for their judgement (`chains`): each reads
+/// `set_up`, which may come with `judged` where the sweeps are coarse and otherwise comes two cycles after it or after
+/// `begin_frame`, begins a sweep, whose move, word and buffers stand from the next cycle until the following `set_up`. Coarse sweeps follow one another without waiting for their judgement (`chains`): each reads
 /// what the one before has written, and writes the buffer that is neither that nor the best so far. So three buffers
 /// are enough as long as a sweep is judged before the next but one is set up. Halvings work in place. `judged` with
 /// `improved` makes the buffer of a coarse sweep the best.
@@ -46,12 +47,15 @@ pub struct Walk {
     pub chains: Signal<Out, Bit>,
     /// Buffer to read.
     pub source: Wire<Out>,
+    /// Where that begins in the search memory.
+    pub source_base: Wire<Out>,
     /// Buffer to write.
     pub target: Wire<Out>,
     /// The sweep.
     pub sweep: Wire<Out>,
     /// Squared radius of the disc.
     pub radius: Wire<Out>,
+    _quads: usize,
     _state: State,
 }
 
@@ -67,8 +71,9 @@ struct State {
     radius: i64,
 }
 
-impl Default for Walk {
-    fn default() -> Self {
+impl Walk {
+    /// Over a search memory of buffers of `quads` quads.
+    pub fn new(quads: usize) -> Self {
         let p = position_bits();
         Walk {
             clk: Default::default(),
@@ -86,9 +91,11 @@ impl Default for Walk {
             next_halves: Default::default(),
             chains: Default::default(),
             source: Wire::new(BUFFER_BITS),
+            source_base: Wire::new(base_bits(quads)),
             target: Wire::new(BUFFER_BITS),
             sweep: Wire::new(sweep_bits()),
             radius: Wire::new(square_bits()),
+            _quads: quads,
             _state: State::default(),
         }
     }
@@ -130,6 +137,7 @@ impl Walk {
         }
         s.count += 1;
         self.source.next = Word::from(from.buffer as u64);
+        self.source_base.next = Word::from(base(from.buffer, self._quads) as u64);
         self.target.next = Word::from(buffer as u64);
         self.step.next = Word::of_fields(&[by[0], by[1], i64::from(halving)], 2);
         self.last.next = !coarse && !halving;
@@ -163,7 +171,7 @@ impl Logic for Walk {
     }
 
     fn connect(&mut self) {
-        for wire in [&mut self.step, &mut self.source, &mut self.target, &mut self.sweep, &mut self.radius] {
+        for wire in [&mut self.step, &mut self.source, &mut self.source_base, &mut self.target, &mut self.sweep, &mut self.radius] {
             wire.connect();
         }
         for bit in [&mut self.last, &mut self.next_halves, &mut self.chains] {
@@ -209,12 +217,23 @@ wire [{q_end}:0] along_y = step_y[1] ? {q}'d1 - twice_y : step_y[0] ? {q}'d1 + t
 wire [{q_end}:0] to_square = from_square + along_x + along_y;
 wire [{p_end}:0] to_x = from_centre_x + {{{{{p_more}{{step_x[1]}}}}, step_x}};
 wire [{p_end}:0] to_y = from_centre_y + {{{{{p_more}{{step_y[1]}}}}, step_y}};
+// Where the sweep goes has been known for a cycle when it is set up.
+reg [1:0] go_x, go_y;
+reg [{p_end}:0] at_x, at_y;
+reg [{q_end}:0] at_square;
+always @(posedge clk) begin
+  go_x <= step_x;
+  go_y <= step_y;
+  at_x <= to_x;
+  at_y <= to_y;
+  at_square <= to_square;
+end
 // The first of 1, 2, 0 that is neither read nor the best.
 wire [1:0] free_buffer = from_buffer != 2'd1 && best_buffer != 2'd1 ? 2'd1
   : from_buffer != 2'd2 && best_buffer != 2'd2 ? 2'd2 : 2'd0;
 wire [1:0] to_buffer = is_coarse ? free_buffer : from_buffer;
-wire [{w_end}:0] next_sweep = {{closing, is_coarse, to_buffer, is_halving ? to_square << 2 : to_square,
-  is_halving ? to_y << 1 : to_y, is_halving ? to_x << 1 : to_x}};
+wire [{w_end}:0] next_sweep = {{closing, is_coarse, to_buffer, is_halving ? at_square << 2 : at_square,
+  is_halving ? at_y << 1 : at_y, is_halving ? at_x << 1 : at_x}};
 always @(posedge clk) begin
   if (begin_frame) begin
     count <= enabled ? {SWEEP_BITS}'d0 : {SWEEP_BITS}'d{JUDGED};
@@ -226,9 +245,10 @@ always @(posedge clk) begin
     if (set_up) begin
       count <= count + {SWEEP_BITS}'d1;
       sweep <= next_sweep;
-      step <= {{is_halving, step_y, step_x}};
+      step <= {{is_halving, go_y, go_x}};
       last <= !is_coarse && !is_halving;
       source <= from_buffer;
+      source_base <= from_buffer == 2'd1 ? {base}'d{one} : from_buffer == 2'd2 ? {base}'d{two} : {base}'d0;
       target <= to_buffer;
       if (is_halving) radius <= radius << 2;
     end
@@ -240,6 +260,9 @@ end",
             w_end = w - 1,
             p_end = p - 1,
             q_end = q - 1,
+            base = base_bits(self._quads),
+            one = base(1, self._quads),
+            two = base(2, self._quads),
             q_more = q - p - 1,
             p_more = p - 2,
             coarse = COARSE_CENTRES.len(),

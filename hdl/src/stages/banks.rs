@@ -37,7 +37,7 @@ pub struct Banks {
     pub which: Wire<Out>,
     /// Which quad to read.
     pub quad_address: Wire<In>,
-    /// The quad, one cycle later.
+    /// The quad, two cycles later.
     pub quad: Wire<Out>,
     /// The subarray that magnitude and signs are asked of.
     pub part: Wire<In>,

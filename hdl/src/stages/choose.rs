@@ -42,7 +42,7 @@ pub struct Choose {
 }
 
 /// Cycles from the last code to `settled`.
-const LATENCY: usize = dermis_golden::fixed::choose::LATENCY as usize + 1;
+const LATENCY: usize = dermis_golden::fixed::choose::LATENCY as usize + 2;
 
 impl Choose {
     /// Between the cases of `model`.

@@ -1,6 +1,6 @@
 //! Stage `fold`: the frame's normalised quads to parities, into the input memory of the passes.
 //!
-//! One quad per cycle: frame buffer (1 cycle), `normalise` (1), butterfly (1), memory.
+//! One quad per cycle: frame buffer (2 cycles), `normalise` (1), butterfly (1), memory.
 
 use dermis_golden::fixed::Model;
 use rust_hdl::prelude::*;
@@ -27,7 +27,7 @@ pub struct Fold {
     pub quad_address: Wire<Out>,
     /// The frame's last quad is being read.
     pub free: Signal<Out, Bit>,
-    /// The quad of two cycles ago, normalised.
+    /// The quad of three cycles ago, normalised.
     pub normalised: Wire<In>,
     /// `normalised` is a quad.
     pub normalised_valid: Signal<Out, Bit>,
@@ -39,13 +39,13 @@ pub struct Fold {
     pub done: Signal<Out, Bit>,
     /// Quad of the input memory to read.
     pub read_address: Wire<In>,
-    /// Its parities, one cycle later.
+    /// Its parities, two cycles later.
     pub read_quad: Wire<Out>,
     quads: CaseCounter,
     frame_quads: Counter,
     running: DFF<Bit>,
-    two_later: BitDelay,
-    three_later: BitDelay,
+    normalised_later: BitDelay,
+    folded_later: BitDelay,
     finish: BitDelay,
     address: Delay,
     butterfly: Butterfly,
@@ -80,12 +80,12 @@ impl Fold {
             quads: CaseCounter::new(&limits),
             frame_quads: Counter::new(frame_quads),
             running: Default::default(),
-            two_later: BitDelay::new(2),
-            three_later: BitDelay::new(1),
-            finish: BitDelay::new(4),
-            address: Delay::new(address, 3),
+            normalised_later: BitDelay::new(3),
+            folded_later: BitDelay::new(1),
+            finish: BitDelay::new(5),
+            address: Delay::new(address, 4),
             butterfly: Butterfly::new(bits),
-            memory: Ram::new(quads, 1, 4 * (bits + 2)),
+            memory: Ram::new(quads, 1, 4 * (bits + 2)).registered(),
             ending: Default::default(),
         }
     }
@@ -97,14 +97,14 @@ impl Logic for Fold {
         self.quads.clk.next = self.clk.val();
         self.frame_quads.clk.next = self.clk.val();
         self.running.clock.next = self.clk.val();
-        self.two_later.clk.next = self.clk.val();
-        self.three_later.clk.next = self.clk.val();
+        self.normalised_later.clk.next = self.clk.val();
+        self.folded_later.clk.next = self.clk.val();
         self.finish.clk.next = self.clk.val();
         self.address.clk.next = self.clk.val();
         self.butterfly.clk.next = self.clk.val();
         self.memory.clk.next = self.clk.val();
-        self.two_later.rst.next = self.rst.val();
-        self.three_later.rst.next = self.rst.val();
+        self.normalised_later.rst.next = self.rst.val();
+        self.folded_later.rst.next = self.rst.val();
         self.finish.rst.next = self.rst.val();
 
         self.quads.which.next = self.which.val();
@@ -117,15 +117,15 @@ impl Logic for Fold {
         self.quad_address.next = self.frame_quads.value.val();
         self.free.next = self.ending.val() & self.last_part.val();
 
-        self.two_later.now.next = self.running.q.val();
-        self.three_later.now.next = self.two_later.then.val();
-        self.normalised_valid.next = self.two_later.then.val();
+        self.normalised_later.now.next = self.running.q.val();
+        self.folded_later.now.next = self.normalised_later.then.val();
+        self.normalised_valid.next = self.normalised_later.then.val();
         self.butterfly.quad.next = self.normalised.val();
         self.folded.next = self.butterfly.sums.val();
-        self.folded_valid.next = self.three_later.then.val();
+        self.folded_valid.next = self.folded_later.then.val();
 
         self.address.now.next = self.quads.value.val();
-        self.memory.write.next = self.three_later.then.val().into();
+        self.memory.write.next = self.folded_later.then.val().into();
         self.memory.write_address.next = self.address.then.val();
         self.memory.write_data.next = self.butterfly.sums.val();
         self.memory.read.next = true;

@@ -109,7 +109,7 @@ impl Force {
             m_axis_tlast: Default::default(),
             m_axis_tdata: Wire::new(unit.beat_data.width()),
             quads: Counter::new(quads),
-            store: Ram::new(quads, 1, value),
+            store: Ram::new(quads, 1, value).registered(),
             unit,
         }
     }

@@ -1,7 +1,7 @@
 //! Stage `pass`: the matrix-vector products of a subarray, one after the other on the MAC lanes.
 //!
 //! The schedule runs through its steps, one column per cycle, and waits only where a step's operand is not finished yet. From
-//! issue to operands: addresses (1 cycle, 3 through a list of columns), memories (1), limb and parity selection (1); then
+//! issue to operands: addresses (1 cycle, 3 through a list of columns), memories (2), limb and parity selection (1); then
 //! the lanes.
 
 use dermis_golden::fixed::resources::operand_vectors;
@@ -27,7 +27,7 @@ pub struct Pass {
     pub start: Signal<In, Bit>,
     /// Quad of the input memory to read.
     pub input_address: Wire<Out>,
-    /// Its parities, one cycle later.
+    /// Its parities, two cycles later.
     pub input_quad: Wire<In>,
     /// A finished quad of a v_ij, in order.
     pub vector_quad: Wire<In>,
@@ -49,6 +49,7 @@ pub struct Pass {
     source: Delay,
     control: Delay,
     valid: BitDelay,
+    address: Delay,
     select: OperandSelect,
     /// The MAC lanes.
     pub lanes: Lanes,
@@ -83,11 +84,12 @@ impl Pass {
             column: Counter::new(quads),
             running: Default::default(),
             low_address: Slice::new(steps.operand_address.width(), count_bits(quads)),
-            vectors: vectors(Ram::new(operands.max(1) * quads, 1, parity_bits)),
+            vectors: vectors(Ram::new(operands.max(1) * quads, 1, parity_bits)).registered(),
             filler: Filler::new(operands, &model.cases().iter().map(|case| case.formats.quads).collect::<Vec<_>>()),
-            source: Delay::new(SOURCE_BITS, 1),
-            control: Delay::new(control_bits(model), 2),
-            valid: BitDelay::new(2 + steps.latency()),
+            source: Delay::new(SOURCE_BITS, 2),
+            control: Delay::new(control_bits(model), 3),
+            valid: BitDelay::new(3 + steps.latency()),
+            address: Delay::new(steps.coefficient_address.width(), 1),
             select: OperandSelect::new(formats),
             steps,
             lanes,
@@ -109,6 +111,7 @@ impl Logic for Pass {
         self.source.clk.next = self.clk.val();
         self.control.clk.next = self.clk.val();
         self.valid.clk.next = self.clk.val();
+        self.address.clk.next = self.clk.val();
         self.select.clk.next = self.clk.val();
         self.lanes.clk.next = self.clk.val();
         self.valid.rst.next = self.rst.val();
@@ -148,7 +151,8 @@ impl Logic for Pass {
         self.control.now.next = self.steps.control.val();
         self.valid.now.next = self.issue.val();
 
-        self.lanes.address.next = self.steps.coefficient_address.val();
+        self.address.now.next = self.steps.coefficient_address.val();
+        self.lanes.address.next = self.address.then.val();
         self.lanes.operands.next = self.select.operands.val();
         self.lanes.valid.next = self.valid.then.val();
         self.lanes.control.next = self.control.then.val();

@@ -7,14 +7,14 @@
 use dermis_golden::fixed::Model;
 use rust_hdl::prelude::*;
 
-use crate::primitives::{count_bits, Blank, Gather, Ram, Scan, Spread};
+use crate::primitives::{count_bits, BitDelay, Blank, Delay, Gather, Ram, Scan, Spread};
 use crate::wire::Wire;
 
 /// ```text
 /// s_axis --> frame buffer --> quad (one cycle after quad_address)
 ///       \--> magnitude, positive, negative
 /// ```
-/// `full` from the frame's last beat until `free`; the gathered values stand as long.
+/// `full` from two cycles after the frame's last beat until `free`; the gathered values stand as long.
 #[derive(LogicBlock)]
 pub struct Receive {
     /// Clock.
@@ -41,7 +41,7 @@ pub struct Receive {
     pub which: Wire<Out>,
     /// Which quad to read.
     pub quad_address: Wire<In>,
-    /// The quad, one cycle later.
+    /// The quad, two cycles later.
     pub quad: Wire<Out>,
     /// The subarray that magnitude and signs are asked of.
     pub part: Wire<In>,
@@ -60,7 +60,11 @@ pub struct Receive {
     spread: Spread,
     frame: Ram,
     gather: Gather,
+    gathers: BitDelay,
+    gathered_part: Delay,
+    gathered_code: Delay,
     whole: DFF<Bit>,
+    complete: DFF<Bit>,
     broken: DFF<Bit>,
     taken: Signal<Local, Bit>,
     early: Signal<Local, Bit>,
@@ -96,9 +100,13 @@ impl Receive {
             scan: Scan::new(std::slice::from_ref(model)),
             blank: Blank::new(bits, taxels, &model.dead),
             spread: Spread::new(bits),
-            frame: Ram::new(quads, 4, bits),
+            frame: Ram::new(quads, 4, bits).registered(),
             gather: Gather::new(bits, model.noise_floor, count),
+            gathers: BitDelay::new(1),
+            gathered_part: Delay::new(count_bits(count), 1),
+            gathered_code: Delay::new(bits, 1),
             whole: Default::default(),
+            complete: Default::default(),
             broken: Default::default(),
             taken: Default::default(),
             early: Default::default(),
@@ -113,7 +121,12 @@ impl Logic for Receive {
         self.blank.clk.next = self.clk.val();
         self.frame.clk.next = self.clk.val();
         self.gather.clk.next = self.clk.val();
+        self.gathers.clk.next = self.clk.val();
+        self.gathers.rst.next = self.rst.val();
+        self.gathered_part.clk.next = self.clk.val();
+        self.gathered_code.clk.next = self.clk.val();
         self.whole.clock.next = self.clk.val();
+        self.complete.clock.next = self.clk.val();
         self.broken.clock.next = self.clk.val();
 
         self.s_axis_tready.next = !self.whole.q.val() & !self.rst.val();
@@ -139,16 +152,20 @@ impl Logic for Receive {
         self.frame.read_address.next = self.quad_address.val();
         self.quad.next = self.frame.read_data.val();
 
-        self.gather.accept.next = self.taken.val();
+        self.gathers.now.next = self.taken.val() & !self.early.val();
+        self.gathered_part.now.next = self.scan.part.val();
+        self.gathered_code.now.next = self.blank.kept.val();
+        self.gather.accept.next = self.gathers.then.val();
         self.gather.clear.next = self.rst.val() | self.free.val() | self.early.val();
-        self.gather.part.next = self.scan.part.val();
+        self.gather.part.next = self.gathered_part.then.val();
         self.gather.select.next = self.part.val();
-        self.gather.code.next = self.blank.kept.val();
+        self.gather.code.next = self.gathered_code.then.val();
         self.magnitude.next = self.gather.magnitude.val();
         self.positive.next = self.gather.positive.val();
         self.negative.next = self.gather.negative.val();
 
-        self.full.next = self.whole.q.val();
+        self.full.next = self.complete.q.val();
+        self.complete.d.next = self.whole.q.val() & !self.free.val() & !self.rst.val();
         self.whole.d.next =
             (self.whole.q.val() | (self.taken.val() & self.scan.last.val())) & !self.free.val() & !self.rst.val();
         self.framing.next = self.broken.q.val();

@@ -6,7 +6,7 @@
 //! sweeps follow one another without a gap; a halving is set up when the sweep before it has been judged. The last sweep
 //! only moves to the winner: its constant coefficients are p(μ*).
 
-use dermis_golden::fixed::cycles::{coarse_period, SHORTEST_SWEEP};
+use dermis_golden::fixed::cycles::{coarse_period, SET_UP, SHORTEST_SWEEP};
 use dermis_golden::fixed::quads::Quads;
 use dermis_golden::fixed::schedule::vectors;
 use dermis_golden::fixed::Model;
@@ -139,7 +139,7 @@ impl Search {
             found: Default::default(),
             judged: Default::default(),
             taken: Default::default(),
-            walk: Default::default(),
+            walk: Walk::new(quads),
             weigh: Weigh::new(formats, &taxel_counts),
             judge: Judge::new(formats, largest(&taxel_counts)),
             constants: Slice::new(taxels.bits(), value),
@@ -155,9 +155,9 @@ impl Search {
             quads: CaseCounter::new(&limits),
             period: CaseCounter::new(&periods),
             counting: Default::default(),
-            began: BitDelay::new(1),
-            // What was judged stands in registers before the next sweep is made of it.
-            judged_then: BitDelay::new(1),
+            // What was judged stands in registers, and so does the move that is made of it, before a sweep is set up.
+            began: BitDelay::new(SET_UP as usize),
+            judged_then: BitDelay::new(SET_UP as usize),
             go: BitDelay::new(1),
             sum_go: BitDelay::new(STORE_LATENCY - 1),
             moved: BitDelay::new(MOVED),
@@ -269,6 +269,7 @@ impl Logic for Search {
         self.step.now.next = self.walk.step.val();
         self.target.now.next = self.walk.target.val();
         self.store.read_buffer.next = self.walk.source.val();
+        self.store.read_base.next = self.walk.source_base.val();
         self.store.read_address.next = self.quads.value.val();
         self.taylor.word.next = self.store.read_data.val();
         self.taylor.step.next = self.step.then.val();

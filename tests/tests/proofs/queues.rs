@@ -23,18 +23,19 @@ fn widths() -> (Generated, Vec<(&'static str, String)>, usize) {
         ("LESS", number(SEARCH_EXTRA_BITS as usize)),
         ("ROWS", number(f.quads)),
     ];
-    (generate(&model).unwrap(), given, f.acc_bits as usize)
+    (generate(&model).unwrap(), given, f.vector_bits as usize)
 }
 
 #[test]
 fn rescaled_words_are_rounded_and_held_to_their_range() {
-    let (generated, given, acc) = widths();
-    let (half, none) = (format!("+ {}'d1;\n", acc + 2), format!("+ {}'d0;\n", acc + 2));
+    let (generated, given, word) = widths();
+    let (half, none) = (format!("+ {}'d1;\n", word + 1), format!("+ {}'d0;\n", word + 1));
     let defects = [
         ("clipped[l] ? ", "1'b0 ? "),
         ("overflow ? ", "1'b0 ? "),
         (half.as_str(), none.as_str()),
-        ("else if (valid1) saturations", "else saturations"),
+        ("carry ? ", "1'b0 ? "),
+        ("clips <= valid1 ? ", "clips <= 1'b1 ? "),
     ];
     Proof { generated: &generated, property: "rescale.v", given, defect: defects[0], open_products: false }
         .fails_with(&defects);
