@@ -190,13 +190,15 @@ reg [{c_end}:0] second;
 reg [1:0] fill;
 reg [{d_end}:0] delivered;
 reg within_frame, deaf, lost, released, aborting;
+// Fewer than the codes that go before the packet's end are delivered.
+reg ahead;
 wire refused = deaf || lost;
 wire at_last = delivered == {d}'d{end};
 wire early = aborting && fill == 2'd0;
 always @(*) begin
   taken = good && within_frame && !refused;
   overrun = good && within_frame && refused;
-  valid = aborting || (fill != 2'd0 && (released || delivered < {d}'d{lag}));
+  valid = aborting || (fill != 2'd0 && (released || ahead));
   last = early || at_last;
 end
 wire moves = valid && ready && !early;
@@ -215,9 +217,11 @@ always @(posedge clk) begin
   if (push && left != 2'd0) second <= arrived;
   fill <= drop ? {{1'b0, waits}} : push ? left + 2'd1 : left;
   delivered <= early && ready ? {d}'d0 : after;
+  if (early && ready) ahead <= {ahead};
+  else if (moves) ahead <= at_last ? {ahead} : ahead && delivered != {d}'d{last_ahead};
   if (taken) released <= 1'b1;
   else if (moves && at_last) released <= 1'b0;
-  if (drop) aborting <= waits || after != {d}'d0;
+  if (drop) aborting <= waits || (moves ? !at_last : delivered != {d}'d0);
   else if (early && ready) aborting <= 1'b0;
   if (complete && left == 2'd{HELD}) lost <= 1'b1;
   if (good || bad) within_frame <= 1'b0;
@@ -231,6 +235,7 @@ always @(posedge clk) begin
     byte_index <= {b}'d0;
     fill <= 2'd0;
     delivered <= {d}'d0;
+    ahead <= {ahead};
     within_frame <= 1'b0;
     deaf <= 1'b0;
     lost <= 1'b0;
@@ -243,7 +248,8 @@ end",
             b_end = b - 1,
             d_end = d - 1,
             end = self._taxels - 1,
-            lag = self.lag(),
+            ahead = format_args!("1'b{}", u8::from(self.lag() > 0)),
+            last_ahead = self.lag().saturating_sub(1),
             last_byte = bytes - 1,
         ))
     }

@@ -8,8 +8,9 @@ use crate::wire::{Wire, Word};
 /// Two bytes per entry: the identity's first twelve from entry 0 on, its others from 8, the counters, in order of
 /// [`Counters`], from 16.
 ///
-/// A packet's event is counted in the two cycles that follow it, later where `hold` is high: then the two bytes of a counter
-/// are being read. Each counter wraps. Reset clears one counter a cycle, and so lasts for eight at least.
+/// A packet's event is counted in the three cycles that follow it (read, add, write), later where `hold` is high: then the
+/// two bytes of a counter are being read. Nothing is to be read meanwhile, nor what was read while it was written. Each
+/// counter wraps. Reset clears one counter a cycle, and so lasts for eight at least.
 #[derive(LogicBlock)]
 pub struct Ledger {
     /// Clock.
@@ -28,7 +29,7 @@ pub struct Ledger {
     pub address: Wire<In>,
     /// The entry of the cycle before.
     pub entry: Wire<Out>,
-    /// It is that of `address`; otherwise one that is being counted.
+    /// It is that of `address`, and no counter is changing.
     pub entry_valid: Signal<Out, Bit>,
     _identity: Vec<u8>,
     _memory: [u16; ENTRIES],
@@ -39,8 +40,10 @@ pub struct Ledger {
 struct State {
     which: usize,
     due: bool,
-    counted: bool,
+    /// Being added to, written, and just written.
+    counted: [bool; 3],
     entry: u16,
+    raised: u16,
 }
 
 const ENTRIES: usize = 32;
@@ -84,10 +87,11 @@ impl Ledger {
         self._state.entry = self._memory[address];
         if self.rst.val() {
             self._memory[COUNTS + s.which] = 0;
-        } else if s.counted {
-            self._memory[COUNTS + s.which] = s.entry.wrapping_add(1);
+        } else if s.counted[1] {
+            self._memory[COUNTS + s.which] = s.raised;
         }
-        self._state.counted = counts && !self.rst.val();
+        self._state.raised = s.entry.wrapping_add(1);
+        self._state.counted = [counts && !self.rst.val(), s.counted[0] && !self.rst.val(), s.counted[1]];
         self._state.due = (events != 0 || (s.due && !counts)) && !self.rst.val();
         if self.rst.val() {
             self._state.which = (s.which + 1) % KINDS;
@@ -103,7 +107,7 @@ impl Logic for Ledger {
             self.clocked();
         }
         self.entry.next = Word::from(u64::from(self._state.entry));
-        self.entry_valid.next = !self._state.counted;
+        self.entry_valid.next = self._state.counted == [false; 3];
     }
 
     fn connect(&mut self) {
@@ -127,15 +131,19 @@ reg [15:0] memory [0:{entries_end}];
 initial begin
 {identity}end
 reg [2:0] which;
-reg due, counted;
+reg due;
+// Being added to, written, and just written.
+reg [2:0] counted;
+reg [15:0] raised;
 wire [{end}:0] events = {{overrun, fault, taken}};
 wire counts = due && !hold;
 wire [4:0] read_address = counts ? {{2'd2, which}} : address;
-always @(*) entry_valid = !counted;
+always @(*) entry_valid = counted == 3'd0;
 always @(posedge clk) begin
   entry <= memory[read_address];
-  if (rst || counted) memory[{{2'd2, which}}] <= rst ? 16'd0 : entry + 16'd1;
-  counted <= counts && !rst;
+  raised <= entry + 16'd1;
+  if (rst || counted[1]) memory[{{2'd2, which}}] <= rst ? 16'd0 : raised;
+  counted <= {{counted[1], counted[0] && !rst, counts && !rst}};
   due <= (|events || (due && !counts)) && !rst;
   if (rst) which <= which + 3'd1;
   else if (|events) which <= {{{high}, {middle}, {low}}};

@@ -356,7 +356,7 @@ impl Logic for ForceUnit {
         // force_shift = base + normalise − rescale, held between 0 and the largest useful shift.
         let base = force_shift(f, 0, 0) as usize;
         let (word, cap) = (FORCE_BITS as usize, SATURATION_BITS);
-        let over = product + 1 - word;
+        let over = product - word;
         let score = resize("score", self.score.width(), word);
         let threshold = match self._threshold {
             0 => "1'b0".to_string(),
@@ -443,12 +443,13 @@ reg [2:0] clipped;
 generate
   for (axis = {first_axis}; axis < 3; axis = axis + 1) begin : component
     wire [{product}:0] moved = {moved};
-    wire [{product1}:0] half_up = {{moved[{product}], moved}} + {product2}'d1;
-    wire [{product}:0] whole = half_up[{product1}:1];
-    wire [{over}:0] sign = whole[{product}:{word_end}];
-    assign clips[axis] = sign != {{{over1}{{whole[{product}]}}}};
+    wire [{word}:0] half_up = moved[{word}:0] + {word_more}'d1;
+    // As in the rescaler: whether the rounded word fits is told beside the rounding.
+    wire carry = &moved[{word_end}:0];
+    wire [{over}:0] above = moved[{product}:{word}];
+    assign clips[axis] = carry ? !(&above[{over}:1]) : (|above && !(&above));
     assign rounded[axis * {word} +: {word}] =
-      clips[axis] ? {{whole[{product}], {{{word_end}{{!whole[{product}]}}}}}} : whole[{word_end}:0];
+      clips[axis] ? {{moved[{product}], {{{word_end}{{!moved[{product}]}}}}}} : half_up[{word}:1];
     wire unused = &{{1'b0, half_up[0]}};
   end
 endgenerate
@@ -521,9 +522,7 @@ end",
             v_end = v - 1,
             v2 = 2 * v,
             v3 = 3 * v,
-            product1 = product + 1,
-            product2 = product + 2,
-            over1 = over + 1,
+            word_more = word + 1,
             z_more = product - v - fraction,
             fraction_one = fraction + 1,
             first_axis = if searched { 0 } else { 2 },
