@@ -52,7 +52,9 @@ struct State {
     out: usize,
     line: i64,
     sums: Sums,
-    ready: bool,
+    /// `beat_ready`, by what it is for.
+    adding: bool,
+    passing: bool,
 }
 
 const ADD: usize = 0;
@@ -85,10 +87,6 @@ impl Resultants {
             _shape: shape.clone(),
             _state: State::default(),
         }
-    }
-
-    fn adds(&self) -> bool {
-        !self.passes() && self._state.stage == ADD
     }
 
     fn passes(&self) -> bool {
@@ -126,11 +124,13 @@ impl Resultants {
 
     fn advance(&mut self) {
         let (rows, cols) = (self._shape.rows, self._shape.cols);
-        let takes = self._state.ready && self.beat_valid.val();
-        let at_end = self._state.row + 1 == rows && self._state.col + 1 == cols;
-        let more = if self.passes() { self.taken.val() } else { self.adds() && !(takes && at_end) };
-        self._state.ready = self.run.val() && more && !self.rst.val();
-        if self.adds() && takes {
+        let old = self._state;
+        let adds = old.adding && self.beat_valid.val();
+        let at_end = old.row + 1 == rows && old.col + 1 == cols;
+        let run = self.run.val() && !self.rst.val();
+        self._state.adding = run && !self.passes() && old.stage == ADD && !(adds && at_end);
+        self._state.passing = run && self.passes() && self.taken.val();
+        if adds {
             self.add();
         } else if self._state.stage == FINISH {
             let s = &mut self._state;
@@ -145,7 +145,7 @@ impl Resultants {
             if self._state.out == WORDS {
                 self._state.stage = STATUS;
             }
-        } else if self.passes() && takes && self.beat_last.val() {
+        } else if old.passing && self.beat_valid.val() && self.beat_last.val() {
             self._state.stage = ADD;
         }
         if self.rst.val() {
@@ -160,8 +160,8 @@ impl Logic for Resultants {
             self.advance();
         }
         let s = self._state;
-        self.beat_ready.next = s.ready;
-        let stands = if self.passes() { self.beat_valid.val() && !s.ready } else { s.stage == OUT };
+        self.beat_ready.next = s.adding || s.passing;
+        let stands = if self.passes() { self.beat_valid.val() && !s.passing } else { s.stage == OUT };
         self.word_valid.next = self.run.val() && stands;
         self.word_last.next = self.passes() && self.beat_last.val();
         self.word.next = if self.passes() {
@@ -210,6 +210,8 @@ end"
         Verilog::Custom(format!(
             "\
 reg [1:0] stage, out;
+// `beat_ready`, by what it is for.
+reg adding, passing;
 reg [{r_end}:0] row;
 reg [{c_end}:0] col;
 reg [{m_end}:0] more;
@@ -223,14 +225,16 @@ wire passes = !summarise || stage == 2'd{STATUS};
 wire line_end = col == {c}'d{last_col};
 wire first = row == {r}'d0 && col == {c}'d0;
 always @(*) begin
-  word_valid = run && (passes ? beat_valid && !beat_ready : stage == 2'd{OUT});
+  beat_ready = adding || passing;
+  word_valid = run && (passes ? beat_valid && !passing : stage == 2'd{OUT});
   word_last = passes && beat_last;
   word = passes ? beat : out[1] ? (out[0] ? all[383:288] : all[287:192]) : (out[0] ? all[191:96] : all[95:0]);
 end
-wire adds = beat_ready && beat_valid && !passes && stage == 2'd{ADD};
+wire adds = adding && beat_valid;
 wire at_end = line_end && row == {r}'d{last_row};
 always @(posedge clk) begin
-  beat_ready <= !rst && run && (passes ? taken : stage == 2'd{ADD} && !(adds && at_end));
+  adding <= !rst && run && !passes && stage == 2'd{ADD} && !(adds && at_end);
+  passing <= !rst && run && passes && taken;
   if (adds) begin
     sum_x <= first ? x : sum_x + x;
     sum_y <= first ? y : sum_y + y;
@@ -261,7 +265,7 @@ always @(posedge clk) begin
       if (more == {m}'d{last_more}) stage <= 2'd{OUT};
     end else if (stage == 2'd{OUT} && taken) begin
       if (out == 2'd3) stage <= 2'd{STATUS};
-    end else if (passes && beat_ready && beat_valid && beat_last) stage <= 2'd{ADD};
+    end else if (passing && beat_valid && beat_last) stage <= 2'd{ADD};
   end
 end",
             r_end = r - 1,

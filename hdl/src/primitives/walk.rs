@@ -198,8 +198,7 @@ always @(*) begin
 {cases}    default: {{table_y, table_x}} = 4'd0;
   endcase
 end
-wire is_coarse = count < {SWEEP_BITS}'d{coarse};
-wire is_halving = !is_coarse && count < {SWEEP_BITS}'d{JUDGED};
+reg is_coarse, is_halving;
 wire closing = !is_coarse || count == {SWEEP_BITS}'d{final_coarse};
 always @(*) next_halves = is_halving;
 // A judgement takes effect for the buffers of a coarse sweep that is set up with it; a halving comes after it.
@@ -237,6 +236,8 @@ wire [{w_end}:0] next_sweep = {{closing, is_coarse, to_buffer, is_halving ? at_s
 always @(posedge clk) begin
   if (begin_frame) begin
     count <= enabled ? {SWEEP_BITS}'d0 : {SWEEP_BITS}'d{JUDGED};
+    is_coarse <= enabled;
+    is_halving <= 1'b0;
     sweep <= {start};
     kept <= {start};
     radius <= {q}'d9;
@@ -244,6 +245,8 @@ always @(posedge clk) begin
     kept <= set_up && (!is_coarse || count == {SWEEP_BITS}'d0) ? next_sweep : best;
     if (set_up) begin
       count <= count + {SWEEP_BITS}'d1;
+      if (count == {SWEEP_BITS}'d{final_coarse}) is_coarse <= 1'b0;
+      is_halving <= (is_halving || count == {SWEEP_BITS}'d{final_coarse}) && count != {SWEEP_BITS}'d{final_halving};
       sweep <= next_sweep;
       step <= {{is_halving, go_y, go_x}};
       last <= !is_coarse && !is_halving;
@@ -265,8 +268,8 @@ end",
             two = base(2, self._quads),
             q_more = q - p - 1,
             p_more = p - 2,
-            coarse = COARSE_CENTRES.len(),
             final_coarse = COARSE_CENTRES.len() - 1,
+            final_halving = JUDGED - 1,
             start = format_args!("{{2'd0, 2'd{START}, {}'d0}}", q + 2 * p),
             judged_fields = unpack("judged_sweep", "judged_"),
             best_fields = unpack("best", "best_"),

@@ -96,7 +96,7 @@ pub struct Search {
     target: Delay,
     moved_address: Delay,
     scored_address: Delay,
-    set_up: Signal<Local, Bit>,
+    set_up: DFF<Bit>,
     quad_end: Signal<Local, Bit>,
 }
 
@@ -107,7 +107,7 @@ impl Search {
         let quads = formats.quads;
         let layouts: Vec<Quads> = model.cases().iter().map(Model::layout).collect();
         let limits: Vec<usize> = layouts.iter().map(Quads::len).collect();
-        let periods: Vec<usize> = limits.iter().map(|&quads| coarse_period(quads as u64) as usize).collect();
+        let periods: Vec<usize> = limits.iter().map(|&quads| coarse_period(quads as u64) as usize - 1).collect();
         let taxel_counts: Vec<usize> = layouts.iter().map(|layout| layout.rows * layout.cols).collect();
         // One subarray is filled while another is searched.
         let apart = model.cases().iter().any(|case| case.parts.len() > 1);
@@ -155,9 +155,10 @@ impl Search {
             quads: CaseCounter::new(&limits),
             period: CaseCounter::new(&periods),
             counting: Default::default(),
-            // What was judged stands in registers, and so does the move that is made of it, before a sweep is set up.
-            began: BitDelay::new(SET_UP as usize),
-            judged_then: BitDelay::new(SET_UP as usize),
+            // What was judged stands in registers, and so does the move that is made of it, before a sweep is set up. That
+            // is itself a register: it goes to all of the search.
+            began: BitDelay::new(SET_UP as usize - 1),
+            judged_then: BitDelay::new(SET_UP as usize - 1),
             go: BitDelay::new(1),
             sum_go: BitDelay::new(STORE_LATENCY - 1),
             moved: BitDelay::new(MOVED),
@@ -198,6 +199,7 @@ impl Logic for Search {
         self.sum_candidates.clk.next = self.clk.val();
         self.quads.clk.next = self.clk.val();
         self.counting.clock.next = self.clk.val();
+        self.set_up.clock.next = self.clk.val();
         self.began.clk.next = self.clk.val();
         self.judged_then.clk.next = self.clk.val();
         self.go.clk.next = self.clk.val();
@@ -247,24 +249,25 @@ impl Logic for Search {
         self.walk.enabled.next = self.enabled.val();
         self.judge.begin_frame.next = self.start.val();
         self.began.now.next = self.start.val();
-        self.set_up.next =
-            self.began.then.val() | self.judged_then.then.val() | (self.walk.chains.val() & self.period.last.val());
+        self.set_up.d.next =
+            (self.began.then.val() | self.judged_then.then.val() | (self.walk.chains.val() & self.period.last.val()))
+                & !self.rst.val();
         self.judged_then.now.next = self.judge.done.val() & self.judge.closes.val();
-        self.period.clear.next = self.set_up.val();
+        self.period.clear.next = self.set_up.q.val();
         self.period.enable.next = true;
-        self.walk.set_up.next = self.set_up.val();
+        self.walk.set_up.next = self.set_up.q.val();
         self.walk.judged.next = self.judge.done.val();
         self.walk.improved.next = self.judge.improved.val();
         self.walk.judged_sweep.next = self.judge.judged.val();
         self.walk.best_x.next = self.judge.best_x.val();
         self.walk.best_y.next = self.judge.best_y.val();
-        self.judge.halve.next = self.set_up.val() & self.walk.next_halves.val();
-        self.go.now.next = self.set_up.val();
+        self.judge.halve.next = self.set_up.q.val() & self.walk.next_halves.val();
+        self.go.now.next = self.set_up.q.val();
 
         comment!("Quads run through memory, shift and candidates");
         self.quad_end.next = self.counting.q.val() & self.quads.last.val();
-        self.counting.d.next = (self.set_up.val() | (self.counting.q.val() & !self.quads.last.val())) & !self.rst.val();
-        self.quads.clear.next = self.set_up.val();
+        self.counting.d.next = (self.set_up.q.val() | (self.counting.q.val() & !self.quads.last.val())) & !self.rst.val();
+        self.quads.clear.next = self.set_up.q.val();
         self.quads.enable.next = self.counting.q.val();
         self.step.now.next = self.walk.step.val();
         self.target.now.next = self.walk.target.val();
