@@ -24,7 +24,7 @@ pub use packet::{Decoder, Packet, PacketError};
 pub use payload::{Beat, Counters, Field, Header, Identity, Sums};
 
 /// Version of the packets' meaning; a host refuses another one.
-pub const VERSION: u16 = 1;
+pub const VERSION: u16 = 2;
 /// Bytes of a packet that are not payload: [`Header`] and CRC.
 pub const OVERHEAD: usize = Header::BYTES + CRC_BYTES;
 /// Bytes of the CRC-32 behind the payload.

@@ -1,9 +1,10 @@
 // What the encoder makes of bytes and borders, the decoder makes bytes and ends of again, one for one, and calls
-// nothing spoiled.
-module proof(input clk, input again, input [7:0] content, input border, input offered, input ready, input pauses);
+// nothing spoiled, whatever IDLE bytes come in between.
+module proof(input clk, input again, input [7:0] content, input border, input offered, input taken, input idle);
   reg started = 1'b0;
   always @(posedge clk) started <= 1'b1;
   wire rst = again || !started;
+  wire ready = taken && !idle;
   wire [7:0] data, read;
   wire valid, content_ready, read_valid, packet_end, spoiled;
   @ENCODER@ encoder(
@@ -11,7 +12,7 @@ module proof(input clk, input again, input [7:0] content, input border, input of
     .data(data), .valid(valid), .ready(ready)
   );
   @DECODER@ decoder(
-    .clk(clk), .rst(rst), .data(data), .valid(valid && ready), .broken(1'b0), .content(read),
+    .clk(clk), .rst(rst), .data(idle ? 8'hDE : data), .valid(idle || (valid && ready)), .broken(1'b0), .content(read),
     .content_valid(read_valid), .packet_end(packet_end), .spoiled(spoiled)
   );
   reg waits = 1'b0, border_before;

@@ -1,4 +1,4 @@
-// Each byte of a packet goes out once, as itself or as two that are no END, and what is offered stays.
+// Each byte of a packet goes out once, as itself or as two that are neither END nor IDLE, and what is offered stays.
 module proof(input clk, input again, input [7:0] content, input border, input offered, input ready);
   reg started = 1'b0;
   always @(posedge clk) started <= 1'b1;
@@ -25,9 +25,10 @@ module proof(input clk, input again, input [7:0] content, input border, input of
     else begin
       if (valid && border) assert (data == 8'hC0 && !escaped);
       if (valid && !border) assert (data != 8'hC0);
+      if (valid) assert (data != 8'hDE);
       if (valid && ready) escaped <= !border && data == 8'hDB;
       if (offered && content_ready && !border)
-        assert (content == (!escaped ? data : data == 8'hDC ? 8'hC0 : data == 8'hDD ? 8'hDB : 8'h00));
+        assert (content == (!escaped ? data : data == 8'hDC ? 8'hC0 : data == 8'hDD ? 8'hDB : data == 8'hDF ? 8'hDE : 8'h00));
       if (offered && content_ready) assert (valid && ready);
       if (valid && ready && !content_ready) assert (data == 8'hDB && !escaped);
     end

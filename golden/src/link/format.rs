@@ -25,16 +25,17 @@ pub fn markdown() -> String {
         "\
 # Packets, version {VERSION}
 
-All numbers are little-endian. On the wire a packet stands between two bytes 0x{end:02x} (SLIP, RFC 1055); in it
-0x{end:02x} is 0x{esc:02x} 0x{esc_end:02x} and 0x{esc:02x} is 0x{esc:02x} 0x{esc_esc:02x}. The UART has 8 data bits, no parity, one stop bit.
+All numbers are little-endian. On the wire a packet stands between two bytes 0x{end:02x} (SLIP, RFC 1055). A byte 0x{idle:02x} says
+nothing and is skipped wherever it comes: a link that always moves bytes sends it where there is nothing to send. In a
+packet {special}.
+The UART has 8 data bits, no parity, one stop bit.
 
 | byte | size | packet |
 |---:|---:|---|
 ",
         end = slip::END,
-        esc = slip::ESC,
-        esc_end = slip::ESC_END,
-        esc_esc = slip::ESC_ESC,
+        idle = slip::IDLE,
+        special = slip::SPECIAL.map(|(byte, after)| format!("0x{byte:02x} is 0x{:02x} 0x{after:02x}", slip::ESC)).join(", "),
     );
     let mut at = 0;
     for field in Header::FIELDS {

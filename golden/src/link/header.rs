@@ -19,16 +19,19 @@ static inline uint32_t dermis_crc32(const uint8_t *data, size_t size)
     return ~crc;
 }
 
-/* Escapes a byte; returns how many bytes it has written to `wire`, 1 or 2. */
+/* Escapes a byte; returns how many of the two bytes that it writes to `wire` count. */
 static inline size_t dermis_slip(uint8_t byte, uint8_t *wire)
 {
-    if (byte != DERMIS_SLIP_END && byte != DERMIS_SLIP_ESC) {
-        wire[0] = byte;
-        return 1;
-    }
-    wire[0] = DERMIS_SLIP_ESC;
-    wire[1] = byte == DERMIS_SLIP_END ? DERMIS_SLIP_ESC_END : DERMIS_SLIP_ESC_ESC;
-    return 2;
+    uint8_t after = 0;
+    if (byte == DERMIS_SLIP_END)
+        after = DERMIS_SLIP_ESC_END;
+    else if (byte == DERMIS_SLIP_ESC)
+        after = DERMIS_SLIP_ESC_ESC;
+    else if (byte == DERMIS_SLIP_IDLE)
+        after = DERMIS_SLIP_ESC_IDLE;
+    wire[0] = after ? DERMIS_SLIP_ESC : byte;
+    wire[1] = after;
+    return after ? 2 : 1;
 }
 
 /* Writes a packet to `wire`, which has room for 2 * (size + 8) + 2 bytes; returns the bytes written. */
@@ -75,7 +78,14 @@ pub fn c_header() -> String {
     };
     define("LINK_VERSION", VERSION.to_string());
     define("CRC_BYTES", CRC_BYTES.to_string());
-    let slip = [("END", slip::END), ("ESC", slip::ESC), ("ESC_END", slip::ESC_END), ("ESC_ESC", slip::ESC_ESC)];
+    let slip = [
+        ("END", slip::END),
+        ("ESC", slip::ESC),
+        ("IDLE", slip::IDLE),
+        ("ESC_END", slip::ESC_END),
+        ("ESC_ESC", slip::ESC_ESC),
+        ("ESC_IDLE", slip::ESC_IDLE),
+    ];
     for (name, value) in slip {
         define(&format!("SLIP_{name}"), format!("0x{value:02x}u"));
     }

@@ -22,6 +22,18 @@ proptest! {
     }
 
     #[test]
+    fn idle_bytes_are_skipped_wherever_they_come_and_are_in_no_packet(
+        payload in prop::collection::vec(prop_oneof![any::<u8>(), 0xdbu8..0xe0, Just(slip::END)], 0..100),
+        places in prop::collection::vec(any::<prop::sample::Index>(), 0..40),
+    ) {
+        let packet = Packet { kind: Kind::Forces, sequence: slip::IDLE, payload };
+        let mut wire = packet.to_wire();
+        prop_assert!(!wire.contains(&slip::IDLE));
+        places.iter().for_each(|place| wire.insert(place.index(wire.len() + 1), slip::IDLE));
+        prop_assert_eq!(decode(&wire), [Ok(packet)]);
+    }
+
+    #[test]
     fn one_flipped_bit_never_passes(
         payload in prop::collection::vec(any::<u8>(), 0..60), at in any::<prop::sample::Index>(), bit in 0u8..8,
     ) {
@@ -143,8 +155,8 @@ fn the_committed_page_is_the_generated_one() {
 fn the_c_header_builds_the_same_packet() {
     let folder = tempfile::tempdir().unwrap();
     let main = "#include <stdio.h>\n#include \"dermis_link.h\"\nint main(void) {\n  \
-                const uint8_t payload[] = {0xc0, 1, 0xdb, 2};\n  uint8_t wire[64];\n  \
-                size_t size = dermis_packet(DERMIS_FRAME_FOR_FORCES, 219, payload, 4, wire);\n  \
+                const uint8_t payload[] = {0xc0, 1, 0xdb, 2, 0xde, 3};\n  uint8_t wire[64];\n  \
+                size_t size = dermis_packet(DERMIS_FRAME_FOR_FORCES, 222, payload, 6, wire);\n  \
                 fwrite(wire, 1, size, stdout);\n  \
                 printf(\"%08x %zu %zu %zu %zu %zu\", dermis_crc32((const uint8_t *)\"123456789\", 9),\n    \
                 sizeof(dermis_header), sizeof(dermis_identity), sizeof(dermis_counters), sizeof(dermis_sums),\n    \
@@ -158,7 +170,7 @@ fn the_c_header_builds_the_same_packet() {
         .expect("gcc is installed (make setup)");
     assert!(build.status.success(), "{}", String::from_utf8_lossy(&build.stderr));
     let output = std::process::Command::new(folder.path().join("main")).output().unwrap().stdout;
-    let packet = Packet { kind: Kind::FrameForForces, sequence: 219, payload: vec![0xc0, 1, 0xdb, 2] };
+    let packet = Packet { kind: Kind::FrameForForces, sequence: 222, payload: vec![0xc0, 1, 0xdb, 2, 0xde, 3] };
     let sizes = [Header::BYTES, Identity::BYTES, Counters::BYTES, Sums::BYTES, Beat::BYTES].map(|n| n.to_string());
     let wanted = [packet.to_wire(), format!("cbf43926 {}", sizes.join(" ")).into_bytes()].concat();
     assert!(output == wanted, "{output:?}");

@@ -1,11 +1,11 @@
 //! From the bytes of the wire to the bytes of packets.
 
-use dermis_golden::link::slip::{END, ESC, ESC_END, ESC_ESC};
+use dermis_golden::link::slip::{unescape, END, ESC, ESC_END, ESC_ESC, ESC_IDLE, IDLE};
 use rust_hdl::prelude::*;
 
 use crate::wire::{Wire, Word};
 
-/// Undoes SLIP's escapes, in the same cycle.
+/// Undoes SLIP's escapes, in the same cycle; IDLE is as if nothing had come.
 #[derive(LogicBlock)]
 pub struct SlipDecoder {
     /// Clock.
@@ -52,26 +52,18 @@ impl Logic for SlipDecoder {
         if self.clk.pos_edge() {
             if self.rst.val() {
                 self._escaped = false;
-            } else if self.valid.val() {
+            } else if self.valid.val() && data != IDLE {
                 self._escaped = data == ESC && !self._escaped;
             }
         }
-        let end = data == END;
-        let stands_for = match data {
-            ESC_END => Some(END),
-            ESC_ESC => Some(ESC),
-            _ => None,
-        };
-        let unread = self._escaped && stands_for.is_none() && !end;
+        let (end, idle) = (data == END, data == IDLE);
+        let stands_for = unescape(data);
+        let unread = self._escaped && stands_for.is_none() && !end && !idle;
         let content = if self._escaped { stands_for } else { Some(data).filter(|&data| data != ESC) };
-        self.content.next = Word::from(u64::from(if self._escaped && data == ESC_END {
-            END
-        } else if self._escaped {
-            ESC
-        } else {
-            data
-        }));
-        self.content_valid.next = self.valid.val() && !end && content.is_some();
+        // What cannot follow an escape is not valid, and reads as the last of those that can.
+        let shown = if self._escaped { stands_for.unwrap_or(IDLE) } else { data };
+        self.content.next = Word::from(u64::from(shown));
+        self.content_valid.next = self.valid.val() && !end && !idle && content.is_some();
         self.packet_end.next = self.valid.val() && end;
         self.spoiled.next = self.broken.val() || (self.valid.val() && unread);
     }
@@ -89,16 +81,17 @@ impl Logic for SlipDecoder {
 reg escaped;
 wire is_end = data == 8'd{END};
 wire is_escape = data == 8'd{ESC};
-wire stands = data == 8'd{ESC_END} || data == 8'd{ESC_ESC};
+wire is_idle = data == 8'd{IDLE};
+wire stands = data == 8'd{ESC_END} || data == 8'd{ESC_ESC} || data == 8'd{ESC_IDLE};
 always @(*) begin
-  content = !escaped ? data : data == 8'd{ESC_END} ? 8'd{END} : 8'd{ESC};
-  content_valid = valid && !is_end && (escaped ? stands : !is_escape);
+  content = !escaped ? data : data == 8'd{ESC_END} ? 8'd{END} : data == 8'd{ESC_ESC} ? 8'd{ESC} : 8'd{IDLE};
+  content_valid = valid && !is_end && !is_idle && (escaped ? stands : !is_escape);
   packet_end = valid && is_end;
-  spoiled = broken || (valid && escaped && !stands && !is_end);
+  spoiled = broken || (valid && escaped && !stands && !is_end && !is_idle);
 end
 always @(posedge clk) begin
   if (rst) escaped <= 1'b0;
-  else if (valid) escaped <= is_escape && !escaped;
+  else if (valid && !is_idle) escaped <= is_escape && !escaped;
 end"
         ))
     }

@@ -1,6 +1,6 @@
 //! From the bytes of packets to the bytes of the wire.
 
-use dermis_golden::link::slip::{END, ESC, ESC_END, ESC_ESC};
+use dermis_golden::link::slip::{escape, END, ESC, ESC_END, ESC_ESC, ESC_IDLE, IDLE};
 use rust_hdl::prelude::*;
 
 use crate::wire::{Wire, Word};
@@ -49,7 +49,8 @@ impl Default for SlipEncoder {
 impl Logic for SlipEncoder {
     fn update(&mut self) {
         let content = self.content.val().number() as u8;
-        let special = !self.border.val() && (content == END || content == ESC);
+        let after = escape(content).filter(|_| !self.border.val());
+        let special = after.is_some();
         if self.clk.pos_edge() {
             if self.rst.val() {
                 self._second = false;
@@ -57,12 +58,11 @@ impl Logic for SlipEncoder {
                 self._second = special && !self._second;
             }
         }
-        let data = match (self.border.val(), special, self._second) {
-            (true, ..) => END,
-            (false, true, false) => ESC,
-            (false, true, true) if content == END => ESC_END,
-            (false, true, true) => ESC_ESC,
-            (false, false, _) => content,
+        let data = match after {
+            _ if self.border.val() => END,
+            Some(after) if self._second => after,
+            Some(_) => ESC,
+            None => content,
         };
         self.data.next = Word::from(u64::from(data));
         self.valid.next = self.content_valid.val();
@@ -80,9 +80,11 @@ impl Logic for SlipEncoder {
             "\
 reg second;
 wire is_end = content == 8'd{END};
-wire special = !border && (is_end || content == 8'd{ESC});
+wire is_escape = content == 8'd{ESC};
+wire special = !border && (is_end || is_escape || content == 8'd{IDLE});
 always @(*) begin
-  data = border ? 8'd{END} : !special ? content : !second ? 8'd{ESC} : is_end ? 8'd{ESC_END} : 8'd{ESC_ESC};
+  data = border ? 8'd{END} : !special ? content : !second ? 8'd{ESC}
+    : is_end ? 8'd{ESC_END} : is_escape ? 8'd{ESC_ESC} : 8'd{ESC_IDLE};
   valid = content_valid;
   content_ready = ready && (!special || second);
 end

@@ -16,7 +16,7 @@
 //! | `replay.v`: rows wait for their shift, then come out once, in order | `rescale` and its memory |
 //! | `filler.v`: inside the operand memory, complete when complete | `pass`'s filler |
 //! | `packer.v`: header, words, CRC between two borders; what is offered stays | the link's packer |
-//! | `roundtrip.v`: what is encoded is decoded, byte by byte | the link's encoder and decoder |
+//! | `roundtrip.v`: what is encoded is decoded, byte by byte, IDLE bytes in between or not | the link's encoder and decoder |
 //! | `sums.v`: forces are taken, four words given, the status passed on | the link's resultants |
 //!
 //! Without a proof, held by co-simulation alone: the UART's shift registers, the link's parser, counters and request
