@@ -1,4 +1,4 @@
-//! CRC-32, a bit a cycle: bytes on a wire are further apart, and a few logic cells are enough.
+//! CRC-32, two bits a cycle: bytes on a wire are further apart, and a few logic cells are enough.
 
 use dermis_golden::link::CRC_RESIDUE;
 use rust_hdl::prelude::*;
@@ -9,12 +9,14 @@ use crate::wire::{Wire, Word};
 const START: u32 = u32::MAX;
 /// The reflected polynomial.
 const POLYNOMIAL: u32 = 0xedb8_8320;
+/// The reflected polynomial after the first of two bits: its own lowest bit is 0, so that the second bit is as it was.
+const BEFORE: u32 = POLYNOMIAL >> 1;
 /// Cycles that a byte takes after the one in which it comes.
-const BITS: u32 = 8;
+pub const CYCLES: u32 = 4;
 
 /// The CRC of what comes, or of what goes.
 ///
-/// A byte is added to the register's low end and worked in during the next eight cycles. The register's own low byte added
+/// A byte is added to the register's low end and worked in during the next four cycles. The register's own low byte added
 /// to it leaves only the shift: so the CRC goes out.
 #[derive(LogicBlock)]
 pub struct Crc {
@@ -59,10 +61,12 @@ impl Logic for Crc {
                 (self._crc, self._left) = (START, 0);
             } else if self.load.val() {
                 self._crc ^= self.octet.val().number() as u32;
-                self._left = BITS;
+                self._left = CYCLES;
             } else if self._left > 0 {
-                let feedback = if self._crc & 1 == 1 { POLYNOMIAL } else { 0 };
-                self._crc = self._crc >> 1 ^ feedback;
+                for _ in 0..8 / CYCLES {
+                    let feedback = if self._crc & 1 == 1 { POLYNOMIAL } else { 0 };
+                    self._crc = self._crc >> 1 ^ feedback;
+                }
                 self._left -= 1;
             }
         }
@@ -81,22 +85,22 @@ impl Logic for Crc {
         Verilog::Custom(format!(
             "\
 reg [31:0] crc;
-reg [3:0] left;
+reg [2:0] left;
 always @(*) begin
   low = ~crc[7:0];
   right = crc == 32'h{CRC_RESIDUE:x};
-  busy = left != 4'd0;
+  busy = left != 3'd0;
 end
 always @(posedge clk) begin
   if (restart) begin
     crc <= 32'h{START:x};
-    left <= 4'd0;
+    left <= 3'd0;
   end else if (load) begin
     crc[7:0] <= crc[7:0] ^ octet;
-    left <= 4'd{BITS};
+    left <= 3'd{CYCLES};
   end else if (busy) begin
-    crc <= {{1'b0, crc[31:1]}} ^ (crc[0] ? 32'h{POLYNOMIAL:x} : 32'd0);
-    left <= left - 4'd1;
+    crc <= {{2'd0, crc[31:2]}} ^ (crc[0] ? 32'h{BEFORE:x} : 32'd0) ^ (crc[1] ? 32'h{POLYNOMIAL:x} : 32'd0);
+    left <= left - 3'd1;
   end
 end"
         ))
@@ -108,7 +112,7 @@ mod tests {
     use super::*;
 
     fn add(crc: &mut Crc, octet: u8) {
-        for cycle in 0..=BITS {
+        for cycle in 0..=CYCLES {
             crc.octet.next = Word::from(u64::from(octet));
             crc.load.next = cycle == 0;
             for clock in [false, true] {

@@ -25,6 +25,7 @@ mod simulate;
 mod slip_decoder;
 mod slip_encoder;
 mod sources;
+mod spi_slave;
 mod uart_receiver;
 mod uart_transmitter;
 
@@ -44,6 +45,7 @@ pub use simulate::{board_simulator, Board, BoardDevice, BoardOutputs};
 pub use slip_decoder::SlipDecoder;
 pub use slip_encoder::SlipEncoder;
 pub use sources::Sources;
+pub use spi_slave::SpiSlave;
 pub use uart_receiver::UartReceiver;
 pub use uart_transmitter::UartTransmitter;
 

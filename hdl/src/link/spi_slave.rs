@@ -1,0 +1,331 @@
+//! Between the bytes of the link and an SPI controller, whose clock is a domain of its own.
+
+use dermis_golden::link::slip::IDLE;
+use rust_hdl::prelude::*;
+
+use crate::wire::{Wire, Word};
+
+/// Mode 0, most significant bit first, bytes in both directions at once. Registers `sclk_…` are the controller's:
+///
+/// ```text
+///  mosi -> sclk_mosi -> sclk_shift -> sclk_received --(sclk_toggle, 2 registers)--> data, valid
+///  miso <-----------------'   ^------ sclk_kept <--(offer, 2 registers)------------ offered <- send_data
+///                                          '-------(sclk_taken, 2 registers)------> send_ready
+/// ```
+/// In: the eighth rising edge puts the byte into a register and flips a toggle. `clk` takes it at its third edge after that
+/// at the latest; the register stays as it is for eight periods of `sclk`. A byte cut short is dropped.
+///
+/// Out: the bits change on falling edges. At the eighth rising edge of a byte the next one is kept if `clk` offers one, and
+/// acknowledged; the falling edge then loads it, or IDLE. What is kept is given up only when the controller has sampled all
+/// eight of its bits: a transaction that ends before is as if the byte had not begun, and the next one brings it. The first
+/// byte of a transaction is IDLE.
+///
+/// While `cs_n` is high edges of `sclk` do nothing: they are another slave's.
+#[derive(LogicBlock)]
+pub struct SpiSlave {
+    /// Clock.
+    pub clk: Signal<In, Clock>,
+    /// The controller's clock.
+    pub spi_sclk: Signal<In, Bit>,
+    /// Low in a transaction.
+    pub spi_cs_n: Signal<In, Bit>,
+    /// From the controller.
+    pub spi_mosi: Signal<In, Bit>,
+    /// To the controller.
+    pub spi_miso: Signal<Out, Bit>,
+    /// The byte received last.
+    pub data: Wire<Out>,
+    /// It came in this cycle.
+    pub valid: Signal<Out, Bit>,
+    /// A byte for the controller.
+    pub send_data: Wire<In>,
+    /// It is offered.
+    pub send_valid: Signal<In, Bit>,
+    /// It is taken.
+    pub send_ready: Signal<Out, Bit>,
+    _level: bool,
+    _sclk: Sclk,
+    _state: State,
+}
+
+/// The controller's domain.
+#[derive(Clone, Copy, Debug, Default)]
+struct Sclk {
+    bit: u32,
+    shift: u8,
+    carries: bool,
+    mosi: bool,
+    received: u8,
+    toggle: bool,
+    kept: u8,
+    full: bool,
+    taken: bool,
+    offered: [bool; 2],
+}
+
+/// The clock's domain.
+#[derive(Clone, Copy, Debug, Default)]
+struct State {
+    received: [bool; 3],
+    taken: [bool; 2],
+    offer: bool,
+    offered: u8,
+}
+
+/// The last bit of a byte.
+const LAST: u32 = 7;
+
+impl Default for SpiSlave {
+    fn default() -> Self {
+        SpiSlave {
+            clk: Default::default(),
+            spi_sclk: Default::default(),
+            spi_cs_n: Default::default(),
+            spi_mosi: Default::default(),
+            spi_miso: Default::default(),
+            data: Wire::new(8),
+            valid: Default::default(),
+            send_data: Wire::new(8),
+            send_valid: Default::default(),
+            send_ready: Default::default(),
+            _level: false,
+            _sclk: Sclk::default(),
+            _state: State::default(),
+        }
+    }
+}
+
+impl SpiSlave {
+    fn rises(&mut self) {
+        let (s, mosi) = (self._sclk, self.spi_mosi.val());
+        let next = &mut self._sclk;
+        next.mosi = mosi;
+        next.offered = [self._state.offer, s.offered[0]];
+        if s.bit == LAST {
+            next.received = s.shift << 1 | u8::from(mosi);
+            next.toggle = !s.toggle;
+            if s.carries || !s.full {
+                next.full = s.offered[1] != s.taken;
+                next.taken = s.offered[1];
+                next.kept = self._state.offered;
+            }
+        }
+    }
+
+    fn falls(&mut self) {
+        let s = self._sclk;
+        let next = &mut self._sclk;
+        next.bit = (s.bit + 1) % (LAST + 1);
+        next.shift = match s.bit {
+            LAST if s.full => s.kept,
+            LAST => IDLE,
+            _ => s.shift << 1 | u8::from(s.mosi),
+        };
+        if s.bit == LAST {
+            next.carries = s.full;
+        }
+    }
+
+    fn clocked(&mut self) {
+        let s = self._state;
+        let next = &mut self._state;
+        next.received = [self._sclk.toggle, s.received[0], s.received[1]];
+        next.taken = [self._sclk.taken, s.taken[0]];
+        if self.send_valid.val() && s.taken[1] == s.offer {
+            next.offer = !s.offer;
+            next.offered = self.send_data.val().number() as u8;
+        }
+    }
+}
+
+impl Logic for SpiSlave {
+    fn update(&mut self) {
+        // The two clocks never change in the same round: whoever drives them settles in between.
+        if self.clk.pos_edge() {
+            self.clocked();
+        }
+        match (self._level, self.spi_sclk.val()) {
+            (false, true) => self.rises(),
+            (true, false) => self.falls(),
+            _ => (),
+        }
+        self._level = self.spi_sclk.val();
+        if self.spi_cs_n.val() {
+            (self._sclk.bit, self._sclk.shift, self._sclk.carries) = (0, IDLE, false);
+        }
+        let s = &self._state;
+        self.spi_miso.next = self._sclk.shift >> 7 == 1;
+        self.data.next = Word::from(u64::from(self._sclk.received));
+        self.valid.next = s.received[1] != s.received[2];
+        self.send_ready.next = s.taken[1] == s.offer;
+    }
+
+    fn connect(&mut self) {
+        self.spi_miso.connect();
+        self.data.connect();
+        self.valid.connect();
+        self.send_ready.connect();
+    }
+
+    fn hdl(&self) -> Verilog {
+        Verilog::Custom(format!(
+            "\
+// The controller's domain: falling edges, set back between transactions.
+reg [2:0] sclk_bit;
+reg [7:0] sclk_shift;
+reg sclk_carries;
+// Its rising edges. A transaction sets nothing back: what two domains agree on holds across transactions.
+reg sclk_mosi;
+reg [7:0] sclk_received, sclk_kept;
+reg [1:0] sclk_offered = 2'd0;
+reg sclk_toggle = 1'b0;
+reg sclk_full = 1'b0;
+reg sclk_taken = 1'b0;
+// The clock's domain.
+reg [2:0] received = 3'd0;
+reg [1:0] taken = 2'd0;
+reg offer = 1'b0;
+reg [7:0] offered;
+wire sclk_last = sclk_bit == 3'd{LAST};
+always @(*) begin
+  spi_miso = sclk_shift[7];
+  data = sclk_received;
+  valid = received[1] != received[2];
+  send_ready = taken[1] == offer;
+end
+always @(posedge spi_sclk) begin
+  sclk_mosi <= spi_mosi;
+  sclk_offered <= {{sclk_offered[0], offer}};
+  if (sclk_last) begin
+    sclk_received <= {{sclk_shift[6:0], spi_mosi}};
+    sclk_toggle <= !sclk_toggle;
+    if (sclk_carries || !sclk_full) begin
+      sclk_full <= sclk_offered[1] != sclk_taken;
+      sclk_taken <= sclk_offered[1];
+      sclk_kept <= offered;
+    end
+  end
+end
+always @(negedge spi_sclk or posedge spi_cs_n) begin
+  if (spi_cs_n) begin
+    sclk_bit <= 3'd0;
+    sclk_shift <= 8'd{IDLE};
+    sclk_carries <= 1'b0;
+  end else begin
+    sclk_bit <= sclk_bit + 3'd1;
+    sclk_shift <= !sclk_last ? {{sclk_shift[6:0], sclk_mosi}} : sclk_full ? sclk_kept : 8'd{IDLE};
+    if (sclk_last) sclk_carries <= sclk_full;
+  end
+end
+always @(posedge clk) begin
+  received <= {{received[1:0], sclk_toggle}};
+  taken <= {{taken[0], sclk_taken}};
+  if (send_valid && send_ready) begin
+    offer <= !offer;
+    offered <= send_data;
+  end
+end"
+        ))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The block, what the link's side has received, and what that side has yet to send.
+    struct Bench {
+        block: SpiSlave,
+        received: Vec<u8>,
+        sending: Vec<u8>,
+        clock: bool,
+    }
+
+    impl Bench {
+        fn new(sending: &[u8]) -> Bench {
+            let mut block = SpiSlave::default();
+            block.connect_all();
+            block.spi_cs_n.next = true;
+            let mut bench = Bench { block, received: Vec::new(), sending: sending.to_vec(), clock: false };
+            bench.settle();
+            bench
+        }
+
+        fn settle(&mut self) {
+            while {
+                self.block.update_all();
+                self.block.has_changed()
+            } {}
+        }
+
+        /// Half a clock cycle; before a rising edge the link's side looks.
+        fn half(&mut self) {
+            let block = &mut self.block;
+            if !self.clock {
+                if block.valid.val() {
+                    self.received.push(block.data.val().number() as u8);
+                }
+                block.send_valid.next = !self.sending.is_empty();
+                block.send_data.next = Word::from(u64::from(self.sending.first().copied().unwrap_or(0)));
+                self.settle();
+                if !self.sending.is_empty() && self.block.send_ready.val() {
+                    self.sending.remove(0);
+                }
+            }
+            self.clock = !self.clock;
+            self.block.clk.next = self.clock.into();
+            self.settle();
+        }
+
+        /// A transaction of so many edges of the controller's clock, each `halves` of the other after the last; the whole
+        /// bytes that the controller has seen.
+        fn transaction(&mut self, bytes: &[u8], edges: usize, halves: usize) -> Vec<u8> {
+            self.block.spi_cs_n.next = false;
+            let (mut seen, mut whole) = (0u32, Vec::new());
+            for edge in 0..edges {
+                let bit = edge / 2;
+                if edge % 2 == 0 {
+                    self.block.spi_mosi.next = bytes[bit / 8] >> (7 - bit % 8) & 1 == 1;
+                    self.settle();
+                    seen = seen << 1 | u32::from(self.block.spi_miso.val());
+                    whole.extend((bit % 8 == 7).then_some(seen as u8));
+                }
+                self.block.spi_sclk.next = edge % 2 == 0;
+                self.settle();
+                (0..halves).for_each(|_| self.half());
+            }
+            self.block.spi_cs_n.next = true;
+            self.settle();
+            self.block.spi_sclk.next = false;
+            self.settle();
+            (0..halves).for_each(|_| self.half());
+            whole
+        }
+    }
+
+    #[test]
+    fn bytes_pass_both_ways_at_once_and_none_is_lost_where_a_transaction_ends() {
+        let (there, back): (Vec<u8>, Vec<u8>) = ((0..200).collect(), (100..200).collect());
+        for halves in [2, 3, 8] {
+            for edges in 1..=64 {
+                let mut bench = Bench::new(&back);
+                let (mut sent, mut seen) = (0, Vec::new());
+                while seen.len() < back.len() && sent + 8 < there.len() {
+                    // Seven bytes, then the one that is cut short, in turn.
+                    for edges in [7 * 16, edges] {
+                        let bytes = &there[sent..];
+                        let whole = bench.transaction(bytes, edges, halves);
+                        assert!(whole.first().is_none_or(|first| *first == IDLE), "{edges} edges");
+                        // A byte is there once its eighth rising edge was.
+                        sent += (edges + 1) / 16;
+                        seen.extend(whole.into_iter().filter(|byte| *byte != IDLE));
+                    }
+                }
+                (0..6).for_each(|_| bench.half());
+                assert_eq!(bench.received, there[..sent], "{edges} edges");
+                let wanted: Vec<u8> = back.iter().copied().take(seen.len()).collect();
+                assert!(seen == wanted && seen.len() > 80, "{edges} edges: {seen:?}");
+            }
+        }
+    }
+}
