@@ -8,7 +8,8 @@
 //! | `device`, `family`, `size`, `package`, `speed_grade` | | as the place and route tool names them |
 //! | `input_clock_MHz` | MHz | oscillator on the board |
 //! | `clock_MHz` | MHz | the engine's clock: a design target until place and route has measured it |
-//! | `uart_baud` | bit/s | bit rate of the UART behind which the engine sits |
+//! | `uart_baud` | bit/s | bit rate of the UART, where a scene puts the engine behind that |
+//! | `spi_MHz` | MHz | highest clock of the SPI, which place and route must meet; left out where there are no pins for it |
 //! | `multipliers`, `multiplier_bits` | , bits | signed multipliers and the width of their operands |
 //! | `block_rams`, `block_ram_shapes` | , [words, bits] | block RAMs and what one of them can be |
 //! | `distributed_words` | words | distributed RAM takes memories up to these: always; where block RAM is short |
@@ -65,6 +66,8 @@ pub struct Board {
     pub clock_MHz: f64,
     /// Bit rate of the UART, bit/s, > 0.
     pub uart_baud: u32,
+    /// Highest clock of the SPI, MHz, > 0; `None` where the board has no pins for it.
+    pub spi_MHz: Option<f64>,
     /// Multipliers.
     pub multipliers: u32,
     /// Width of a multiplier's signed operands.
@@ -170,7 +173,8 @@ impl Board {
     fn parse(name: &str, text: &str) -> Result<Board, BoardError> {
         let invalid = |reason: String| BoardError::Invalid { name: name.to_owned(), reason };
         let board: Board = toml::from_str(text).map_err(|e| invalid(e.to_string()))?;
-        for (field, value) in [("input_clock_MHz", board.input_clock_MHz), ("clock_MHz", board.clock_MHz)] {
+        let clocks = [("input_clock_MHz", board.input_clock_MHz), ("clock_MHz", board.clock_MHz)];
+        for (field, value) in clocks.into_iter().chain(board.spi_MHz.map(|rate| ("spi_MHz", rate))) {
             if !(value.is_finite() && value > 0.0) {
                 return Err(invalid(format!("{field} = {value}: must be positive")));
             }

@@ -17,7 +17,7 @@
 //! | `[threshold]` | `min_force_N` (0) |
 //! | `[fixed]` | `input_bits` (20; 8 … 24), `data_bits` (18; 12 … 18), `coef_bits` (18; 8 … 18) |
 //! | | `inverse_bits` (24; `coef_bits` … 32), `prune_bits` (20; 8 … 31), `lanes` (what the board allows; 4, 8 … 1024) |
-//! | `[hardware]` | `board` ("ulx3s-85f"), `coefficient_check` ("none"; "signature") |
+//! | `[hardware]` | `board` ("ulx3s-85f"), `link` ("uart"; "spi"), `coefficient_check` ("none"; "signature") |
 //! | `[input]` | `full_scale_MPa` (the frame's peak), `average` (0 … 12), `calibration`, `tare` (files), `dead` |
 //! | | (\[row, col\] each), `unipolar` (false) |
 //! | `[output]` | `forces` ("taxels"; "resultants") |
@@ -35,6 +35,7 @@ pub use error::SceneError;
 pub use inverse::{InverseKind, InverseSpec, Inversion};
 
 use crate::frame::Frame;
+use crate::link::LinkKind;
 use crate::partition::{subarrays, Case};
 use crate::sensor::Sensor;
 use serde::{Deserialize, Serialize};
@@ -200,6 +201,8 @@ pub enum CoefficientCheck {
 pub struct HardwareSpec {
     /// One of [`crate::board::Board::names`].
     pub board: String,
+    /// What stands between the board and its host.
+    pub link: LinkKind,
     /// Whether the coefficient memory is watched.
     pub coefficient_check: CoefficientCheck,
 }
@@ -291,7 +294,7 @@ impl Default for FixedSpec {
 
 impl Default for HardwareSpec {
     fn default() -> Self {
-        HardwareSpec { board: "ulx3s-85f".to_string(), coefficient_check: CoefficientCheck::None }
+        HardwareSpec { board: "ulx3s-85f".to_string(), link: LinkKind::Uart, coefficient_check: CoefficientCheck::None }
     }
 }
 

@@ -21,6 +21,7 @@ use thiserror::Error;
 use crate::board::{Faults, Terminal, UartLine, VerilatedBoard, Wire};
 use crate::cosim::Vector;
 use crate::drive::{record, Play, Stimulus};
+use crate::inputs::require_uart;
 use crate::netlist::netlist;
 use crate::verilator::{Design, Verilated, VerilatorError};
 
@@ -123,14 +124,17 @@ impl Hardware {
     pub fn board(&self, simulator: Simulator) -> Result<Box<dyn BoardDevice>> {
         Ok(match simulator {
             Simulator::RustHdl => board_simulator(&self.model)?,
-            _ => Box::new(VerilatedBoard::new(&generate_board(&self.model)?, &self.cache)?),
+            _ => {
+                let link = self.model.scene.hardware.link;
+                Box::new(VerilatedBoard::new(&generate_board(&self.model)?, link, &self.cache)?)
+            }
         })
     }
 
     /// Starts the whole board under Verilator on a pseudo-terminal, behind wires that lose nothing.
     ///
     /// # Errors
-    /// As [`Hardware::board`]; no pseudo-terminal.
+    /// As [`Hardware::board`]; no pseudo-terminal, a link that is no UART.
     pub fn terminal(&self) -> Result<Terminal> {
         let perfect = || Wire::new(Faults::default());
         self.terminal_behind(perfect(), perfect())
@@ -141,8 +145,9 @@ impl Hardware {
     /// # Errors
     /// As [`Hardware::terminal`].
     pub fn terminal_behind(&self, to_board: Wire, to_host: Wire) -> Result<Terminal> {
+        require_uart(&self.model.scene, "board")?;
         let identity = Identity::of(&self.model)?;
-        let line = UartLine::new(self.board(Simulator::Verilator)?, identity.baud, identity.clock_hz);
+        let line = UartLine::new(self.board(Simulator::Verilator)?, identity.bit_rate, identity.clock_hz);
         Ok(Terminal::start(line, to_board, to_host)?)
     }
 

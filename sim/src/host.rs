@@ -28,7 +28,7 @@ use dermis_golden::quantise::full_scale;
 use dermis_golden::scene::Scene;
 use serialport::SerialPort;
 
-use crate::inputs::{resolve, OnBoard};
+use crate::inputs::{require_uart, resolve, OnBoard};
 use crate::progress::Progress;
 use crate::report;
 
@@ -151,6 +151,7 @@ pub fn run(arguments: &Arguments) -> Result<(String, bool)> {
         false => resolve(arguments.scene.as_deref(), &arguments.frames)?,
     };
     let scene = arguments.target.put(scene);
+    require_uart(&scene, "host")?;
     let model = Model::new(&scene)?;
     let tare = arguments.tare.as_ref().map(|path| Frame::load(path, Some(&scene))).transpose()?;
     tare.as_ref().map_or(Ok(()), |tare| tare.check(&scene))?;

@@ -8,9 +8,10 @@
 //!
 //! One reconstruction takes 2^k frames, k the scene's `input.average`.
 
-use anyhow::{bail, Result};
+use anyhow::{bail, ensure, Result};
 use clap::Args;
 use dermis_golden::frame::Frame;
+use dermis_golden::link::LinkKind;
 use dermis_golden::scene::Scene;
 
 /// `--frame` value that stands for the paper's Eq. 2.
@@ -30,6 +31,21 @@ impl OnBoard {
         scene.hardware.board = self.target_board.clone().unwrap_or(scene.hardware.board);
         scene
     }
+}
+
+/// Refuses a scene for `dermis <command>`, which knows serial ports only.
+///
+/// # Errors
+/// Another link than a UART.
+pub fn require_uart(scene: &Scene, command: &str) -> Result<()> {
+    let (name, link) = (&scene.name, scene.hardware.link);
+    ensure!(
+        link == LinkKind::Uart,
+        "dermis {command}: scene {name}: hardware.link = {:?} is not a serial port; it must be {:?} here",
+        link.name(),
+        LinkKind::Uart.name(),
+    );
+    Ok(())
 }
 
 /// Finds the scene and its frames, at least one.

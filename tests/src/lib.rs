@@ -16,7 +16,7 @@
 //! | `coefficients` | the coefficient check: no false alarm, every tried flip told, left out by default |
 //! | `faults` | flipped bits in ROM, RAM and registers: all of them are found, outcomes add up, a reset helps |
 //! | `proofs` | handshakes and queues lose, invent and change nothing, words are held to their range: proved, not tried |
-//! | `link` | the board's UART: answers, counters, recovery; Verilator = rust-hdl, pin by pin |
+//! | `link` | the board's UART and SPI: answers, counters, recovery; Verilator = rust-hdl, pin by pin |
 //! | `synthesis` | Yosys reads the Verilog without latch or undriven signal |
 //! | `scenes` | the same equality for scenes of other shapes, degrees, words and conditions |
 //! | `scale` | the largest array, and a thousand random frames with stalls on both streams |

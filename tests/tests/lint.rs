@@ -5,6 +5,7 @@ use std::path::Path;
 use std::process::Command;
 
 use dermis_golden::fixed::Model;
+use dermis_golden::link::LinkKind;
 use dermis_golden::partition::Case;
 use dermis_golden::scene::Condition;
 use dermis_hdl::link::generate_board;
@@ -79,8 +80,12 @@ fn a_choice_of_cases_is_clean_with_the_engines_waivers() {
 #[test]
 fn a_board_is_clean_with_the_engines_waivers() {
     for (name, _) in SCENES {
-        let generated = generate_board(&Model::new(&scene(name).0).unwrap()).unwrap();
-        let folder = tempfile::tempdir().unwrap();
-        lint(folder.path(), &generated).unwrap_or_else(|log| panic!("{name}: {log}"));
+        for (_, link) in LinkKind::NAMES {
+            let mut scene = scene(name).0;
+            scene.hardware.link = link;
+            let generated = generate_board(&Model::new(&scene).unwrap()).unwrap();
+            let folder = tempfile::tempdir().unwrap();
+            lint(folder.path(), &generated).unwrap_or_else(|log| panic!("{name}, {link:?}: {log}"));
+        }
     }
 }

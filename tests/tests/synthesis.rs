@@ -3,6 +3,7 @@
 use std::process::Command;
 
 use dermis_golden::fixed::Model;
+use dermis_golden::link::LinkKind;
 use dermis_hdl::link::generate_board;
 use dermis_hdl::{generate, Generated};
 use dermis_tests::scene;
@@ -30,7 +31,11 @@ fn read(generated: &Generated) {
 fn yosys_finds_clean_hardware() {
     let model = Model::new(&scene("eight-by-eight").0).unwrap();
     read(&generate(&model).unwrap());
-    read(&generate_board(&model).unwrap());
+    for (_, link) in LinkKind::NAMES {
+        let mut model = model.clone();
+        model.scene.hardware.link = link;
+        read(&generate_board(&model).unwrap());
+    }
 }
 
 #[test]

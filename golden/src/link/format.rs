@@ -25,17 +25,18 @@ pub fn markdown() -> String {
         "\
 # Packets, version {VERSION}
 
-All numbers are little-endian. On the wire a packet stands between two bytes 0x{end:02x} (SLIP, RFC 1055). A byte 0x{idle:02x} says
-nothing and is skipped wherever it comes: a link that always moves bytes sends it where there is nothing to send. In a
-packet {special}.
-The UART has 8 data bits, no parity, one stop bit.
+All numbers are little-endian. On the wire a packet stands between two bytes 0x{end:02x} (SLIP, RFC 1055). A byte 0x{idle:02x}
+says nothing and is skipped wherever it comes: an SPI, which always moves bytes both ways, has it where there is nothing to
+send. In a packet {special}.
+
+The UART has 8 data bits, no parity, one stop bit. The SPI's slave is the board: mode 0, most significant bit first.
 
 | byte | size | packet |
 |---:|---:|---|
 ",
         end = slip::END,
         idle = slip::IDLE,
-        special = slip::SPECIAL.map(|(byte, after)| format!("0x{byte:02x} is 0x{:02x} 0x{after:02x}", slip::ESC)).join(", "),
+        special = slip::SPECIAL.map(escaped).join(", "),
     );
     let mut at = 0;
     for field in Header::FIELDS {
@@ -72,6 +73,11 @@ their way at a time.
         }
     }
     text + "\nThe board ignores the bits of a code above `input_bits`. The status beats are described with stage [`send`](crate::fixed::send).\n"
+}
+
+/// How a special byte stands in a packet.
+fn escaped((byte, after): (u8, u8)) -> String {
+    format!("0x{byte:02x} is 0x{:02x} 0x{after:02x}", slip::ESC)
 }
 
 fn row(text: &mut String, at: usize, field: &Field) {

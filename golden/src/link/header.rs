@@ -63,6 +63,10 @@ pub fn c_header() -> String {
 /* Packets between a host and a Dermis board, written by `dermis build`; do not edit.
  *
  * All numbers are little-endian; the structures have no gaps, so a little-endian host may copy payloads into them.
+ *
+ * Over SPI (mode 0, most significant bit first) the board is the slave. What it sends comes while the controller sends:
+ * move a packet, then bytes DERMIS_SLIP_IDLE until the answer's second END has come. A transaction may end after any
+ * byte and another one go on. Skip each DERMIS_SLIP_IDLE that comes, inside a packet, too.
  */
 #ifndef DERMIS_LINK_H
 #define DERMIS_LINK_H

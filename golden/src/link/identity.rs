@@ -4,15 +4,12 @@ use serde_json::json;
 use thiserror::Error;
 
 use super::payload::{Identity, Sums};
-use super::{code_bytes, Kind, BEAT_BYTES, OVERHEAD, VERSION};
+use super::{code_bytes, Kind, BEAT_BYTES, VERSION};
 use crate::board::EngineKind;
 use crate::fixed::coefficients::Blocks;
 use crate::fixed::send::STATUS_BEATS;
 use crate::fixed::Model;
 use crate::scene::{Condition, ForceOutput};
-
-/// Fewest clock cycles per bit: the receiver votes over three of them.
-const LEAST_CYCLES_PER_BIT: f64 = 8.0;
 
 /// The requests.
 const REQUESTS: [Kind; 4] = [Kind::Identify, Kind::ReadCounters, Kind::FrameForResultants, Kind::FrameForForces];
@@ -43,17 +40,27 @@ pub enum LinkError {
         /// Bytes.
         bytes: usize,
     },
-    /// A bit rate that the board's clock cannot sample.
-    #[error("constraints/{board}.toml: uart_baud = {baud}: the clock of {clock_MHz} MHz takes at most {most:.0}")]
+    /// A bit rate that the board's clock cannot follow.
+    #[error("constraints/{board}.toml: {field} = {value}: the clock of {clock_MHz} MHz takes at most {most}")]
     TooFast {
         /// The board's name.
         board: String,
-        /// Its bit rate.
-        baud: u32,
+        /// Field of its file.
+        field: &'static str,
+        /// Its bit rate, in the field's unit.
+        value: f64,
         /// Its clock.
         clock_MHz: f64,
         /// The highest bit rate.
         most: f64,
+    },
+    /// An SPI on a board without pins for it.
+    #[error(
+        "hardware.link = \"spi\": board {board} has no pins for it (no spi_MHz in constraints/{board}.toml); it has \"uart\""
+    )]
+    NoPins {
+        /// The board's name.
+        board: String,
     },
 }
 
@@ -62,7 +69,7 @@ impl Identity {
     ///
     /// # Errors
     /// A scene that averages, sends resultants only or chooses its case per frame, an array whose packets would be too
-    /// long, a bit rate too high for the clock.
+    /// long, a link that the board does not have, a bit rate too high for the clock.
     pub fn of(model: &Model) -> Result<Identity, LinkError> {
         let (sensor, board) = (&model.scene.sensor, &model.board);
         let scene = &model.scene;
@@ -80,11 +87,6 @@ impl Identity {
         if let Some((what, bytes)) = payloads.into_iter().find(|(_, bytes)| *bytes > usize::from(u16::MAX)) {
             return Err(LinkError::TooLong { scene: model.scene.name.clone(), what, taxels: sensor.taxels(), bytes });
         }
-        let most = board.clock_MHz * 1e6 / LEAST_CYCLES_PER_BIT;
-        if f64::from(board.uart_baud) > most {
-            let (name, clock_MHz) = (board.name.clone(), board.clock_MHz);
-            return Err(LinkError::TooFast { board: name, baud: board.uart_baud, clock_MHz, most });
-        }
         // Rows, columns and subarrays are below the taxels, which are few enough for a packet.
         Ok(Identity {
             version: VERSION,
@@ -94,7 +96,7 @@ impl Identity {
             status_beats: STATUS_BEATS as u8,
             scene: scene_hash(model),
             clock_hz: (board.clock_MHz * 1e6).round() as u32,
-            baud: board.uart_baud,
+            bit_rate: scene.hardware.link.bit_rate(board)?,
             subarrays: model.parts.len() as u16,
             left_out: REQUESTS.into_iter().filter(|&kind| !takes(board.engine, kind)).map(bit).sum(),
         })
@@ -125,12 +127,6 @@ pub fn payloads(model: &Model) -> [(&'static str, usize); 3] {
         ("resultants", Sums::BYTES + status),
         ("forces", BEAT_BYTES * taxels + status),
     ]
-}
-
-/// Time of a packet of `payload` bytes on the board's UART, ten bits to the byte, in ms; every byte that needs an escape
-/// adds another.
-pub fn wire_ms(payload: usize, baud: u32) -> f64 {
-    (payload + OVERHEAD + 2) as f64 * 10.0 / f64::from(baud) * 1e3
 }
 
 /// CRC-32 over everything that decides the bits of the answers: this program's version, array, subarrays, formats,

@@ -81,8 +81,8 @@ payload! {
         scene: u32,
         /// The engine's clock, Hz.
         clock_hz: u32,
-        /// Bit rate of the UART, bit/s.
-        baud: u32,
+        /// Bit rate of the link, bit/s: the UART's, or the highest of the SPI's clock.
+        bit_rate: u32,
         /// Subarrays.
         subarrays: u16,
         /// Requests that the board leaves out and counts as of unknown type: bit k − 1 for type k.
@@ -95,7 +95,7 @@ payload! {
     Counters {
         /// Taken.
         taken: u16,
-        /// Dropped: a byte without stop bit, or a SLIP escape before any other byte than the two allowed.
+        /// Dropped: a byte without stop bit on a UART, or a SLIP escape before any other byte than the two allowed.
         framing: u16,
         /// Dropped: the CRC is wrong, or there is none.
         crc: u16,

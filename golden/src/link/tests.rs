@@ -120,6 +120,24 @@ fn the_hash_tells_scenes_apart_and_clocks_not() {
 }
 
 #[test]
+fn the_boards_clock_and_pins_limit_the_spi() {
+    let mut scene = Scene::builtin("eight-by-eight").unwrap();
+    scene.hardware.link = LinkKind::Spi;
+    let mut model = crate::fixed::Model::new(&scene).unwrap();
+    assert_eq!(Identity::of(&model).unwrap().bit_rate, 25_000_000);
+    let mut of = |spi_MHz| {
+        model.board.spi_MHz = spi_MHz;
+        Identity::of(&model).map(|identity| identity.bit_rate).map_err(|error| error.to_string())
+    };
+    assert_eq!(of(Some(160.0)), Ok(160_000_000));
+    let wanted = "constraints/ulx3s-85f.toml: spi_MHz = 160.1: the clock of 100 MHz takes at most 160";
+    assert_eq!(of(Some(160.1)), Err(wanted.to_string()));
+    let wanted = "hardware.link = \"spi\": board ulx3s-85f has no pins for it (no spi_MHz in \
+                  constraints/ulx3s-85f.toml); it has \"uart\"";
+    assert_eq!(of(None), Err(wanted.to_string()));
+}
+
+#[test]
 fn scenes_that_the_link_does_not_fit_are_refused_by_field() {
     let plain = crate::fixed::Model::new(&Scene::builtin("eight-by-eight").unwrap()).unwrap();
     let refused = |change: &dyn Fn(&mut Scene)| {
@@ -138,8 +156,9 @@ fn scenes_that_the_link_does_not_fit_are_refused_by_field() {
 fn time_on_the_wire_by_hand() {
     let model = crate::fixed::Model::new(&Scene::builtin("eight-by-eight").unwrap()).unwrap();
     assert_eq!(payloads(&model), [("codes", 192), ("resultants", 48 + 36), ("forces", 768 + 36)]);
-    // 290 payload bytes and 10 more at 300 000 bytes a second.
-    assert_eq!(wire_ms(290, 3_000_000), 1.0);
+    // 290 payload bytes and 10 more, at 300 000 and 3 125 000 bytes a second.
+    assert_eq!(LinkKind::Uart.wire_ms(290, 3_000_000), 1.0);
+    assert_eq!(LinkKind::Spi.wire_ms(290, 25_000_000), 0.096);
 }
 
 #[test]

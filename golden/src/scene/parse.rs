@@ -6,6 +6,7 @@ use super::{
     Medium, ObjectiveKind, OutputSpec, PartitionSpec, Scene, SceneError, SearchSpec, ThresholdSpec,
 };
 use crate::board::Board;
+use crate::link::LinkKind;
 use crate::partition::{subarrays, Case, Grid};
 use crate::sensor::{Sensor, MAX_LENGTH_MM, MAX_LINES, MIN_LINES};
 use std::ops::RangeInclusive;
@@ -22,7 +23,7 @@ const SCHEMA: [(&str, &[&str]); 11] = [
     ("inverse", &["kind", "level"]),
     ("threshold", &["min_force_N"]),
     ("fixed", &["input_bits", "data_bits", "coef_bits", "inverse_bits", "prune_bits", "lanes"]),
-    ("hardware", &["board", "coefficient_check"]),
+    ("hardware", &["board", "link", "coefficient_check"]),
     ("input", &["full_scale_MPa", "average", "calibration", "tare", "dead", "unipolar"]),
     ("output", &["forces"]),
 ];
@@ -260,7 +261,11 @@ fn hardware(reader: &Reader) -> Result<HardwareSpec, SceneError> {
     let board = reader.choice("hardware.board", &boards)?;
     let board = board.map_or_else(|| HardwareSpec::default().board, str::to_string);
     let checks = [("none", CoefficientCheck::None), ("signature", CoefficientCheck::Signature)];
-    Ok(HardwareSpec { board, coefficient_check: reader.choice("hardware.coefficient_check", &checks)? })
+    Ok(HardwareSpec {
+        board,
+        link: reader.choice("hardware.link", &LinkKind::NAMES)?,
+        coefficient_check: reader.choice("hardware.coefficient_check", &checks)?,
+    })
 }
 
 fn input(reader: &Reader, origin: &str, sensor: &Sensor) -> Result<InputSpec, SceneError> {

@@ -54,6 +54,7 @@ fn every_field_is_read() {
         inverse_bits = 18
         [hardware]
         board = "ulx3s-85f"
+        link = "spi"
         coefficient_check = "signature"
         [input]
         full_scale_MPa = 0.25
@@ -69,6 +70,7 @@ fn every_field_is_read() {
     assert_eq!(scene.partition.case, Case::Grid(Grid { rows: 2, cols: 5 }));
     assert_eq!(scene.partition.condition, Condition::BothSigns);
     assert_eq!(scene.hardware.coefficient_check, CoefficientCheck::Signature);
+    assert_eq!(scene.hardware.link.name(), "spi");
     assert_eq!(scene.search.objective, ObjectiveKind::Patch);
     assert_eq!((scene.search.mu_max, scene.search.noise_floor_MPa), (1.0, 0.001));
     assert_eq!(scene.search.form, Form::Orthogonal);
@@ -136,6 +138,7 @@ fn wrong_values_name_what_is_allowed() {
         ("[fixed]\ndata_bits = 63", "fixed.data_bits = 63"),
         ("[fixed]\ncoef_bits = 16\ninverse_bits = 15", "from 16 to 32"),
         ("[fixed]\ninput_bits = \"20\"", "fixed.input_bits = \"20\""),
+        ("[hardware]\nlink = \"i2c\"", "\"uart\" or \"spi\""),
         ("[hardware]\ncoefficient_check = \"parity\"", "\"none\" or \"signature\""),
         ("[hardware]\nboard = \"ulx4m\"", "\"icebreaker\" or \"ulx3s-85f\""),
         ("[input]\nfull_scale_MPa = 0", "above 0"),

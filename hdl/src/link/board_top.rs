@@ -1,26 +1,27 @@
-//! A board: an engine behind a UART.
+//! A board: an engine behind its link.
 
 use dermis_golden::fixed::Model;
 use dermis_golden::link::{Identity, LinkError};
 use rust_hdl::prelude::*;
 
-use super::{Board, BoardOutputs, Lamps, PacketLink, PowerOn, Shape, UartReceiver, UartTransmitter};
+use super::{Board, BoardOutputs, Lamps, PacketLink, PowerOn, Shape, SpiSlave, Uart};
 use crate::{engine, serial};
 
-/// The board of an engine: rust-hdl connects blocks by their fields, so that a type parameter cannot stand for it.
+/// The board of an engine and of a link's block, which `$line` makes for an identity: rust-hdl connects blocks by their
+/// fields, so that type parameters cannot stand for them. The pins have the names that they have in the link's block.
 macro_rules! board_top {
-    ($name:ident, $engine:ty) => {
+    ($name:ident, $engine:ty, $block:ty, $line:expr, [$($input:ident),+] -> $output:ident) => {
         /// ```text
-        ///             +-----------+
-        ///  uart_rx -->| board top |--> uart_tx
-        ///  button  -->|  engine   |--> alive, busy, error
-        ///     clk  -->+-----------+
+        ///               +-----------+
+        ///  link's pins <->  board   |
+        ///     button -->|  engine   |--> alive, busy, error
+        ///        clk -->+-----------+
         /// ```
         /// | port | meaning |
         /// |---|---|
         /// | `clk` | the engine's clock |
         /// | `button` | reset as long as it is high; needs no debouncing |
-        /// | `uart_rx`, `uart_tx` | the board's side of the UART |
+        #[doc = concat!("| ", $("`", stringify!($input), "`, ",)+ "`", stringify!($output), "` | pins of the link |")]
         /// | `alive`, `busy`, `error` | lamps |
         #[derive(LogicBlock)]
         pub struct $name {
@@ -28,10 +29,12 @@ macro_rules! board_top {
             pub clk: Signal<In, Clock>,
             /// Reset, asynchronous to the clock.
             pub button: Signal<In, Bit>,
-            /// From the host, asynchronous to the clock.
-            pub uart_rx: Signal<In, Bit>,
+            $(
+                /// From the host, asynchronous to the clock.
+                pub $input: Signal<In, Bit>,
+            )+
             /// To the host.
-            pub uart_tx: Signal<Out, Bit>,
+            pub $output: Signal<Out, Bit>,
             /// Blinks while the clock runs.
             pub alive: Signal<Out, Bit>,
             /// Lit while something comes, is computed or goes.
@@ -41,8 +44,7 @@ macro_rules! board_top {
             power_on: PowerOn,
             // The engine is large: its reset has a register of its own, which may lie far from the button.
             engine_rst: DFF<Bit>,
-            receiver: UartReceiver,
-            transmitter: UartTransmitter,
+            line: $block,
             link: PacketLink,
             engine: $engine,
             lamps: Lamps,
@@ -55,18 +57,18 @@ macro_rules! board_top {
             /// As [`Identity::of`].
             pub fn new(model: &Model) -> Result<Self, LinkError> {
                 let identity = Identity::of(model)?;
+                let line: fn(&Identity) -> $block = $line;
                 let mut top = $name {
                     clk: Default::default(),
                     button: Default::default(),
-                    uart_rx: Default::default(),
-                    uart_tx: Default::default(),
+                    $($input: Default::default(),)+
+                    $output: Default::default(),
                     alive: Default::default(),
                     busy: Default::default(),
                     error: Default::default(),
                     power_on: PowerOn::default(),
                     engine_rst: Default::default(),
-                    receiver: UartReceiver::new(identity.baud, identity.clock_hz),
-                    transmitter: UartTransmitter::new(identity.baud, identity.clock_hz),
+                    line: line(&identity),
                     link: PacketLink::new(&Shape::of(model), &identity),
                     engine: <$engine>::new(model),
                     lamps: Lamps::new(identity.clock_hz),
@@ -81,27 +83,25 @@ macro_rules! board_top {
             fn update(&mut self) {
                 self.power_on.clk.next = self.clk.val();
                 self.engine_rst.clock.next = self.clk.val();
-                self.receiver.clk.next = self.clk.val();
-                self.transmitter.clk.next = self.clk.val();
+                self.line.clk.next = self.clk.val();
                 self.link.clk.next = self.clk.val();
                 self.engine.clk.next = self.clk.val();
                 self.lamps.clk.next = self.clk.val();
                 self.power_on.button.next = self.button.val();
-                self.receiver.rst.next = self.power_on.rst.val();
-                self.transmitter.rst.next = self.power_on.rst.val();
+                self.line.rst.next = self.power_on.rst.val();
                 self.link.rst.next = self.power_on.rst.val();
                 self.engine_rst.d.next = self.power_on.rst.val();
                 self.engine.rst.next = self.engine_rst.q.val();
                 self.lamps.rst.next = self.power_on.rst.val();
 
-                self.receiver.line.next = self.uart_rx.val();
-                self.link.receive_data.next = self.receiver.data.val();
-                self.link.receive_valid.next = self.receiver.valid.val();
-                self.link.receive_broken.next = self.receiver.broken.val();
-                self.transmitter.data.next = self.link.send_data.val();
-                self.transmitter.valid.next = self.link.send_valid.val();
-                self.link.send_ready.next = self.transmitter.ready.val();
-                self.uart_tx.next = self.transmitter.line.val();
+                $(self.line.$input.next = self.$input.val();)+
+                self.$output.next = self.line.$output.val();
+                self.link.receive_data.next = self.line.data.val();
+                self.link.receive_valid.next = self.line.valid.val();
+                self.link.receive_broken.next = self.line.broken.val();
+                self.line.send_data.next = self.link.send_data.val();
+                self.line.send_valid.next = self.link.send_valid.val();
+                self.link.send_ready.next = self.line.send_ready.val();
 
                 self.engine.s_axis_tdata.next = self.link.s_axis_tdata.val();
                 self.engine.s_axis_tvalid.next = self.link.s_axis_tvalid.val();
@@ -121,14 +121,15 @@ macro_rules! board_top {
         }
 
         impl Board for $name {
-            fn drive(&mut self, uart_rx: bool, clock: bool) {
-                self.uart_rx.next = uart_rx;
+            fn drive(&mut self, inputs: u64, clock: bool) {
+                let pins = [$(&mut self.$input),+];
+                pins.into_iter().enumerate().for_each(|(at, pin)| pin.next = inputs >> at & 1 == 1);
                 self.clk.next = clock.into();
             }
 
             fn outputs(&self) -> BoardOutputs {
                 BoardOutputs {
-                    uart_tx: self.uart_tx.val(),
+                    to_host: self.$output.val(),
                     alive: self.alive.val(),
                     busy: self.busy.val(),
                     error: self.error.val(),
@@ -142,5 +143,13 @@ macro_rules! board_top {
     };
 }
 
-board_top!(BoardTop, engine::Engine);
-board_top!(SerialBoardTop, serial::Engine);
+/// The four boards: two engines, two links.
+macro_rules! boards {
+    ($uart:ident, $spi:ident, $engine:ty) => {
+        board_top!($uart, $engine, Uart, Uart::new, [uart_rx] -> uart_tx);
+        board_top!($spi, $engine, SpiSlave, |_| SpiSlave::default(), [spi_sclk, spi_cs_n, spi_mosi] -> spi_miso);
+    };
+}
+
+boards!(BoardTop, SpiBoardTop, engine::Engine);
+boards!(SerialBoardTop, SerialSpiBoardTop, serial::Engine);

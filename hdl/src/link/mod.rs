@@ -1,12 +1,13 @@
 //! The engine behind a link: what a host on the other end of a wire talks to.
 //!
 //! ```text
-//!              .------------------------- packet_link ---------------------------.
-//! uart_rx ---> uart_receiver -> slip_decoder -> parser -> feeder ----------> s_axis |
-//!              |                                  '-> requests                engine
-//! uart_tx <--- uart_transmitter <- slip_encoder <- packer <- sources <- resultants <- m_axis
+//!                        .------------------------- packet_link ---------------------------.
+//! pins ---> line: uart, -> slip_decoder -> parser -> feeder ----------------------> s_axis |
+//!           or spi_slave |                     '-> requests                            engine
+//! pins <--- of the link <- slip_encoder <- packer <- sources <- resultants, ledger <- m_axis
 //! ```
-//! The packets are those of [`dermis_golden::link`]. Whatever carries bytes both ways can stand where the UART stands.
+//! The packets are those of [`dermis_golden::link`]. Whatever carries bytes both ways can stand where the UART and the SPI
+//! slave stand; a board has one of them.
 
 mod board_top;
 mod crc;
@@ -26,10 +27,11 @@ mod slip_decoder;
 mod slip_encoder;
 mod sources;
 mod spi_slave;
+mod uart;
 mod uart_receiver;
 mod uart_transmitter;
 
-pub use board_top::{BoardTop, SerialBoardTop};
+pub use board_top::{BoardTop, SerialBoardTop, SerialSpiBoardTop, SpiBoardTop};
 pub use crc::Crc;
 pub use feeder::Feeder;
 pub use generate::generate_board;
@@ -46,6 +48,7 @@ pub use slip_decoder::SlipDecoder;
 pub use slip_encoder::SlipEncoder;
 pub use sources::Sources;
 pub use spi_slave::SpiSlave;
+pub use uart::Uart;
 pub use uart_receiver::UartReceiver;
 pub use uart_transmitter::UartTransmitter;
 

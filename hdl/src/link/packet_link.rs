@@ -11,7 +11,7 @@ use crate::wire::Wire;
 ///                                 '-> requests -> packer -> slip_encoder -> bytes out
 ///        m_axis -> resultants, ledger -> sources ---^
 /// ```
-/// Bytes come at any time, sixteen cycles apart at least, and are never held up; bytes go when `send_ready`.
+/// Bytes come at any time, five cycles apart at least, and are never held up; bytes go when `send_ready`.
 #[derive(LogicBlock)]
 pub struct PacketLink {
     /// Clock.

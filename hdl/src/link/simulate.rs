@@ -1,17 +1,19 @@
 //! A board's pins, whatever simulates it.
 
 use dermis_golden::fixed::Model;
+#[cfg(doc)]
+use dermis_golden::link::LinkKind;
 use rust_hdl::prelude::*;
 
 use super::generate::board_top;
 use crate::generate::HdlError;
 use crate::simulate::SETTLE_ROUNDS;
 
-/// A board's output pins in one clock cycle, sampled just before the rising edge.
+/// A board's output pins.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct BoardOutputs {
-    /// To the host.
-    pub uart_tx: bool,
+    /// The link's pin to the host, [`LinkKind::output`].
+    pub to_host: bool,
     /// Blinks.
     pub alive: bool,
     /// There is something to do.
@@ -20,16 +22,24 @@ pub struct BoardOutputs {
     pub error: bool,
 }
 
-/// Something that computes one clock cycle of a board.
+/// A board that is computed. Its link's input pins are bits, from bit 0 on in the order of [`LinkKind::inputs`].
 pub trait BoardDevice: Send {
-    /// Applies the line from the host, samples the outputs as they stand before the rising edge, then clocks.
-    fn cycle(&mut self, uart_rx: bool) -> BoardOutputs;
+    /// Puts the link's inputs and the clock on the pins and lets everything settle; the outputs then. Two clocks that
+    /// change in the same call have no order.
+    fn settle(&mut self, inputs: u64, clock: bool) -> BoardOutputs;
+
+    /// One clock cycle: the inputs, then the rising edge; the outputs as they stand before that.
+    fn cycle(&mut self, inputs: u64) -> BoardOutputs {
+        let outputs = self.settle(inputs, false);
+        self.settle(inputs, true);
+        outputs
+    }
 }
 
-/// What every board's top does in a simulation and in generation, whatever its engine.
+/// What every board's top does in a simulation and in generation, whatever its engine and its link.
 pub trait Board: Block + Send {
-    /// Puts the line from the host and the clock on the pins.
-    fn drive(&mut self, uart_rx: bool, clock: bool);
+    /// Puts the link's inputs and the clock on the pins.
+    fn drive(&mut self, inputs: u64, clock: bool);
     /// The output pins.
     fn outputs(&self) -> BoardOutputs;
     /// The Verilog.
@@ -46,22 +56,14 @@ pub fn board_simulator(model: &Model) -> Result<Box<dyn BoardDevice>, HdlError> 
     Ok(Box::new(Simulator(board_top(model)?)))
 }
 
-impl Simulator {
-    fn settle(&mut self, uart_rx: bool, clock: bool) {
-        self.0.drive(uart_rx, clock);
+impl BoardDevice for Simulator {
+    fn settle(&mut self, inputs: u64, clock: bool) -> BoardOutputs {
+        self.0.drive(inputs, clock);
         let settled = (0..SETTLE_ROUNDS).any(|_| {
             self.0.update_all();
             !self.0.has_changed()
         });
         assert!(settled, "the board has a combinational loop: a defect of this crate");
-    }
-}
-
-impl BoardDevice for Simulator {
-    fn cycle(&mut self, uart_rx: bool) -> BoardOutputs {
-        self.settle(uart_rx, false);
-        let outputs = self.0.outputs();
-        self.settle(uart_rx, true);
-        outputs
+        self.0.outputs()
     }
 }

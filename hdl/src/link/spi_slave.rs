@@ -25,6 +25,8 @@ use crate::wire::{Wire, Word};
 pub struct SpiSlave {
     /// Clock.
     pub clk: Signal<In, Clock>,
+    /// Reset: nothing is taken that goes out.
+    pub rst: Signal<In, Bit>,
     /// The controller's clock.
     pub spi_sclk: Signal<In, Bit>,
     /// Low in a transaction.
@@ -37,6 +39,8 @@ pub struct SpiSlave {
     pub data: Wire<Out>,
     /// It came in this cycle.
     pub valid: Signal<Out, Bit>,
+    /// Never: every eight bits are a byte.
+    pub broken: Signal<Out, Bit>,
     /// A byte for the controller.
     pub send_data: Wire<In>,
     /// It is offered.
@@ -79,12 +83,14 @@ impl Default for SpiSlave {
     fn default() -> Self {
         SpiSlave {
             clk: Default::default(),
+            rst: Default::default(),
             spi_sclk: Default::default(),
             spi_cs_n: Default::default(),
             spi_mosi: Default::default(),
             spi_miso: Default::default(),
             data: Wire::new(8),
             valid: Default::default(),
+            broken: Default::default(),
             send_data: Wire::new(8),
             send_valid: Default::default(),
             send_ready: Default::default(),
@@ -131,7 +137,7 @@ impl SpiSlave {
         let next = &mut self._state;
         next.received = [self._sclk.toggle, s.received[0], s.received[1]];
         next.taken = [self._sclk.taken, s.taken[0]];
-        if self.send_valid.val() && s.taken[1] == s.offer {
+        if self.send_valid.val() && s.taken[1] == s.offer && !self.rst.val() {
             next.offer = !s.offer;
             next.offered = self.send_data.val().number() as u8;
         }
@@ -157,6 +163,7 @@ impl Logic for SpiSlave {
         self.spi_miso.next = self._sclk.shift >> 7 == 1;
         self.data.next = Word::from(u64::from(self._sclk.received));
         self.valid.next = s.received[1] != s.received[2];
+        self.broken.next = false;
         self.send_ready.next = s.taken[1] == s.offer;
     }
 
@@ -164,6 +171,7 @@ impl Logic for SpiSlave {
         self.spi_miso.connect();
         self.data.connect();
         self.valid.connect();
+        self.broken.connect();
         self.send_ready.connect();
     }
 
@@ -191,6 +199,7 @@ always @(*) begin
   spi_miso = sclk_shift[7];
   data = sclk_received;
   valid = received[1] != received[2];
+  broken = 1'b0;
   send_ready = taken[1] == offer;
 end
 always @(posedge spi_sclk) begin
@@ -220,7 +229,7 @@ end
 always @(posedge clk) begin
   received <= {{received[1:0], sclk_toggle}};
   taken <= {{taken[0], sclk_taken}};
-  if (send_valid && send_ready) begin
+  if (send_valid && send_ready && !rst) begin
     offer <= !offer;
     offered <= send_data;
   end

@@ -48,7 +48,7 @@ impl UartLine {
             sending: None,
             receiving: None,
             received: Vec::new(),
-            pins: BoardOutputs { uart_tx: true, ..BoardOutputs::default() },
+            pins: BoardOutputs { to_host: true, ..BoardOutputs::default() },
             moved: 0,
         }
     }
@@ -87,7 +87,7 @@ impl UartLine {
     /// One clock cycle.
     pub fn cycle(&mut self) {
         let level = self.level();
-        self.pins = self.device.cycle(level);
+        self.pins = self.device.cycle(level.into());
         self.listen();
         if !self.queue.is_empty() || self.sending.is_some() || self.receiving.is_some() {
             self.moved = self.cycle;
@@ -126,7 +126,7 @@ impl UartLine {
 
     /// Samples the board's line in the middle of each bit.
     fn listen(&mut self) {
-        let level = self.pins.uart_tx;
+        let level = self.pins.to_host;
         match self.receiving {
             None if !level => self.receiving = Some((self.cycle, 0, 0)),
             None => (),

@@ -1,7 +1,7 @@
 //! A board's answers for people.
 
 use dermis_golden::fixed::Model;
-use dermis_golden::link::{payloads, takes, wire_ms, Kind};
+use dermis_golden::link::{payloads, takes, Kind, LinkKind};
 
 use super::table::figures;
 use crate::host::{Answer, Line};
@@ -34,11 +34,15 @@ pub fn equality(answer: &Answer) -> String {
     checked + dropped
 }
 
-/// How long a frame's packets take on the board's UART.
+/// How long a frame's packets take on each of the links that the board has.
 pub fn wire_times(model: &Model) -> String {
-    let baud = model.board.uart_baud;
     let sums = takes(model.board.engine, Kind::FrameForResultants);
-    let sent = payloads(model).into_iter().filter(|(what, _)| sums || *what != Kind::Resultants.name());
-    let times: Vec<String> = sent.map(|(what, bytes)| format!("{what} {:.2} ms", wire_ms(bytes, baud))).collect();
-    format!("UART at {baud} bit/s: {}\n", times.join(", "))
+    let sent = || payloads(model).into_iter().filter(|(what, _)| sums || *what != Kind::Resultants.name());
+    let of = |(name, link): (&str, LinkKind)| {
+        let rate = link.bit_rate(&model.board).ok()?;
+        let time = |(what, bytes)| format!("{what} {:.3} ms", link.wire_ms(bytes, rate));
+        let times: Vec<String> = sent().map(time).collect();
+        Some(format!("{} at {rate} bit/s: {}\n", name.to_uppercase(), times.join(", ")))
+    };
+    LinkKind::NAMES.into_iter().filter_map(of).collect()
 }

@@ -1,9 +1,12 @@
-//! The board's link: whatever comes over the UART, the board top answers alike under Verilator and in rust-hdl's
-//! simulation, pin by pin and cycle by cycle; its answers are those of the bit-true model; and its counters name every
-//! packet that it dropped.
+//! The board's link: whatever comes over the UART, or over the SPI (`spi`), the board top answers alike under Verilator and in
+//! rust-hdl's simulation, pin by pin and half cycle by half cycle; its answers are those of the bit-true model; and its
+//! counters name every packet that it dropped.
+
+use std::ops::Deref;
 
 use dermis_golden::fixed::send::FLAG_FRAMING;
 use dermis_golden::fixed::{Cycles, Model};
+use dermis_golden::frame::Frame;
 use dermis_golden::link::{
     beats_of_bytes, codes_to_bytes, slip, Counters, Decoder, Header, Identity, Kind, Packet, Sums,
 };
@@ -13,71 +16,45 @@ use dermis_sim::board::{Sent, UartLine};
 use dermis_sim::hardware::{Hardware, Simulator};
 use dermis_tests::{build_dir, scene};
 
+mod spi;
+
 /// Clock cycles per bit, the fewest that the link takes: everything else of it runs as fast as ever.
 const CYCLES_PER_BIT: u32 = 8;
 /// That bit rate at 100 MHz.
 const BAUD: u32 = 100_000_000 / CYCLES_PER_BIT;
 
-/// Cycles after which a board is out of reset: before, Verilator's registers hold anything.
-const RESET: u64 = 20;
+/// Changes of pins after which a board is out of reset: before, Verilator's registers hold anything.
+const RESET: u64 = 40;
 
 /// Two simulators in step.
 struct Both([Box<dyn BoardDevice>; 2], u64);
 
 impl BoardDevice for Both {
-    fn cycle(&mut self, uart_rx: bool) -> BoardOutputs {
-        let [a, b] = self.0.each_mut().map(|device| device.cycle(uart_rx));
+    fn settle(&mut self, inputs: u64, clock: bool) -> BoardOutputs {
+        let [a, b] = self.0.each_mut().map(|device| device.settle(inputs, clock));
         self.1 += 1;
-        assert!(self.1 < RESET || a == b, "cycle {}: Verilator {a:?}, rust-hdl {b:?}", self.1);
+        assert!(self.1 < RESET || a == b, "change {}: Verilator {a:?}, rust-hdl {b:?}", self.1);
         b
     }
 }
 
-struct Board {
-    line: UartLine,
-    decoder: Decoder,
-    model: Model,
-    codes: Vec<Vec<i32>>,
-    /// Longer than a frame takes, in cycles.
-    silence: u64,
+/// The board of `model` on one simulator or on two in step.
+fn device(model: &Model, simulators: &[Simulator]) -> Box<dyn BoardDevice> {
+    let hardware = Hardware::new(model.clone(), &build_dir()).unwrap();
+    let mut devices: Vec<_> = simulators.iter().map(|simulator| hardware.board(*simulator).unwrap()).collect();
+    match devices.len() {
+        1 => devices.remove(0),
+        _ => Box::new(Both(devices.try_into().ok().unwrap(), 0)),
+    }
 }
 
-impl Board {
-    fn new(simulators: &[Simulator]) -> Board {
-        let (scene, frames) = scene("eight-by-eight");
-        let model = Model::new(&scene).unwrap();
-        let codes = frames.iter().map(|frame| model.codes(frame).unwrap().codes).collect();
-        Board::of(model, codes, simulators)
-    }
+/// Frames for a board, and what it must answer.
+struct Questions {
+    model: Model,
+    codes: Vec<Vec<i32>>,
+}
 
-    fn of(mut model: Model, codes: Vec<Vec<i32>>, simulators: &[Simulator]) -> Board {
-        let baud = (model.board.clock_MHz * 1e6) as u32 / CYCLES_PER_BIT;
-        model.board.uart_baud = baud;
-        let silence = Cycles::longest(&model).total + 1_000;
-        let clock_hz = Identity::of(&model).unwrap().clock_hz;
-        let hardware = Hardware::new(model.clone(), &build_dir()).unwrap();
-        let mut devices: Vec<_> = simulators.iter().map(|simulator| hardware.board(*simulator).unwrap()).collect();
-        let device = match devices.len() {
-            1 => devices.remove(0),
-            _ => Box::new(Both(devices.try_into().ok().unwrap(), 0)),
-        };
-        Board { line: UartLine::new(device, baud, clock_hz), decoder: Decoder::default(), model, codes, silence }
-    }
-
-    fn send(&mut self, wire: &[u8]) {
-        wire.iter().for_each(|&byte| self.line.send(Sent::Byte(byte)));
-    }
-
-    /// All packets that come until nothing has come for longer than a frame takes.
-    fn receive(&mut self) -> Vec<Packet> {
-        while self.line.quiet() < self.silence {
-            self.line.cycle();
-        }
-        let bytes = self.line.received();
-        let packets = bytes.iter().filter_map(|&byte| self.decoder.next(byte));
-        packets.collect::<Result<_, _>>().unwrap()
-    }
-
+impl Questions {
     fn frame(&self, index: usize, kind: Kind, sequence: u8) -> Packet {
         Packet { kind, sequence, payload: codes_to_bytes(&self.codes[index], self.model.formats.input_bits) }
     }
@@ -95,6 +72,52 @@ impl Board {
             _ => Sums::of(&trace.beats, self.model.scene.sensor.cols).to_bytes(),
         };
         Packet { kind: kind.answer(), sequence, payload: [front, bytes(&status)].concat() }
+    }
+}
+
+struct Board {
+    line: UartLine,
+    decoder: Decoder,
+    questions: Questions,
+    /// Longer than a frame takes, in cycles.
+    silence: u64,
+}
+
+impl Deref for Board {
+    type Target = Questions;
+
+    fn deref(&self) -> &Questions {
+        &self.questions
+    }
+}
+
+impl Board {
+    fn new(simulators: &[Simulator]) -> Board {
+        Board::of(shipped(&scene("eight-by-eight").0), simulators)
+    }
+
+    fn of(mut questions: Questions, simulators: &[Simulator]) -> Board {
+        let model = &mut questions.model;
+        let baud = (model.board.clock_MHz * 1e6) as u32 / CYCLES_PER_BIT;
+        model.board.uart_baud = baud;
+        let silence = Cycles::longest(model).total + 1_000;
+        let clock_hz = Identity::of(model).unwrap().clock_hz;
+        let line = UartLine::new(device(model, simulators), baud, clock_hz);
+        Board { line, decoder: Decoder::default(), questions, silence }
+    }
+
+    fn send(&mut self, wire: &[u8]) {
+        wire.iter().for_each(|&byte| self.line.send(Sent::Byte(byte)));
+    }
+
+    /// All packets that come until nothing has come for longer than a frame takes.
+    fn receive(&mut self) -> Vec<Packet> {
+        while self.line.quiet() < self.silence {
+            self.line.cycle();
+        }
+        let bytes = self.line.received();
+        let packets = bytes.iter().filter_map(|&byte| self.decoder.next(byte));
+        packets.collect::<Result<_, _>>().unwrap()
     }
 
     /// The counters, this reading among them.
@@ -140,11 +163,9 @@ fn both_simulations_answer_as_the_model() {
 
 #[test]
 fn a_board_with_the_serial_engine_sends_forces_and_says_that_it_adds_nothing_up() {
-    let (mut scene, frames) = scene("eight-by-eight");
+    let (mut scene, _) = scene("eight-by-eight");
     scene.hardware.board = "icebreaker".to_string();
-    let model = Model::new(&scene).unwrap();
-    let codes = frames.iter().map(|frame| model.codes(frame).unwrap().codes).collect();
-    let mut board = Board::of(model, codes, &[Simulator::Verilator, Simulator::RustHdl]);
+    let mut board = Board::of(shipped(&scene), &[Simulator::Verilator, Simulator::RustHdl]);
     board.send(&Packet::request(Kind::Identify, 3).to_wire());
     let packets = board.receive();
     let identity = Identity::of_bytes(&packets[0].payload).unwrap();
@@ -234,8 +255,15 @@ fn requests_that_come_too_fast_are_overruns_and_the_rest_is_answered_in_order() 
     assert_eq!(board.receive().len(), 1);
 }
 
-/// A small array on both simulators; a small mu_max makes a small search.
-fn small(text: &str) -> Board {
+/// The shipped frames of a scene.
+fn shipped(scene: &Scene) -> Questions {
+    let model = Model::new(scene).unwrap();
+    let codes = Frame::shipped(scene).iter().map(|frame| model.codes(frame).unwrap().codes).collect();
+    Questions { model, codes }
+}
+
+/// A small array; a small mu_max makes a small search.
+fn small(text: &str) -> Questions {
     let lengths = "pitch_x_mm = 3.0\npitch_y_mm = 4.0\nthickness_mm = 3.0\n";
     let text = format!("[search]\nmu_max = 0.05\n[sensor]\n{lengths}{text}");
     let model = Model::new(&Scene::parse(&text, "small").unwrap()).unwrap();
@@ -246,16 +274,18 @@ fn small(text: &str) -> Board {
         vec![-largest - 1; taxels],
         (0..taxels as i32).map(|taxel| if taxel % 3 == 0 { -largest } else { largest / (taxel + 1) }).collect(),
     ];
-    Board::of(model, codes, &[Simulator::Verilator, Simulator::RustHdl])
+    Questions { model, codes }
 }
 
+/// 5×6 taxels in two subarrays, whose code is two bytes.
+const TWO_SUBARRAYS: &str = "rows = 5\ncols = 6\n[partition]\nrows = 1\ncols = 2\n[fixed]\ninput_bits = 16\n";
 /// 2×3 taxels whose code is a single byte.
 const SINGLE_BYTE: &str =
     "rows = 2\ncols = 3\n[fixed]\ninput_bits = 8\ndata_bits = 12\ncoef_bits = 8\ninverse_bits = 8\n";
 
 #[test]
 fn a_code_on_offer_when_its_packet_turns_out_bad_is_taken_and_its_frame_dropped() {
-    let mut board = small(SINGLE_BYTE);
+    let mut board = Board::of(small(SINGLE_BYTE), &[Simulator::Verilator, Simulator::RustHdl]);
     // All forces take longer to send than a frame to come: while the first frame's leave, the second waits behind them, the
     // third in the engine's buffer, and the fourth's first code in front of it until after the packet's end.
     let kind = Kind::FrameForForces;
@@ -275,10 +305,8 @@ fn a_code_on_offer_when_its_packet_turns_out_bad_is_taken_and_its_frame_dropped(
 
 #[test]
 fn other_arrays_codes_of_one_and_two_bytes_and_the_largest_sums_are_answered() {
-    // 5×6 taxels in two subarrays, and 2×3 taxels.
-    let scenes = ["rows = 5\ncols = 6\n[partition]\nrows = 1\ncols = 2\n[fixed]\ninput_bits = 16\n", SINGLE_BYTE];
-    for text in scenes {
-        let mut board = small(text);
+    for text in [TWO_SUBARRAYS, SINGLE_BYTE] {
+        let mut board = Board::of(small(text), &[Simulator::Verilator, Simulator::RustHdl]);
         for index in 0..3 {
             for kind in [Kind::FrameForResultants, Kind::FrameForForces] {
                 board.send(&board.frame(index, kind, 5).to_wire());

@@ -1,0 +1,72 @@
+//! Between the bytes of the link and a UART's two lines.
+
+use dermis_golden::link::Identity;
+use rust_hdl::prelude::*;
+
+use super::{UartReceiver, UartTransmitter};
+use crate::wire::Wire;
+
+/// [`UartReceiver`] and [`UartTransmitter`] side by side.
+#[derive(LogicBlock)]
+pub struct Uart {
+    /// Clock.
+    pub clk: Signal<In, Clock>,
+    /// Reset.
+    pub rst: Signal<In, Bit>,
+    /// From the host.
+    pub uart_rx: Signal<In, Bit>,
+    /// To the host.
+    pub uart_tx: Signal<Out, Bit>,
+    /// The byte received last.
+    pub data: Wire<Out>,
+    /// It came in this cycle.
+    pub valid: Signal<Out, Bit>,
+    /// A byte without stop bit came in this cycle.
+    pub broken: Signal<Out, Bit>,
+    /// A byte for the host.
+    pub send_data: Wire<In>,
+    /// It is offered.
+    pub send_valid: Signal<In, Bit>,
+    /// It is taken.
+    pub send_ready: Signal<Out, Bit>,
+    receiver: UartReceiver,
+    transmitter: UartTransmitter,
+}
+
+impl Uart {
+    /// For the bit rate and the clock of `identity`.
+    pub fn new(identity: &Identity) -> Self {
+        Uart {
+            clk: Default::default(),
+            rst: Default::default(),
+            uart_rx: Default::default(),
+            uart_tx: Default::default(),
+            data: Wire::new(8),
+            valid: Default::default(),
+            broken: Default::default(),
+            send_data: Wire::new(8),
+            send_valid: Default::default(),
+            send_ready: Default::default(),
+            receiver: UartReceiver::new(identity.bit_rate, identity.clock_hz),
+            transmitter: UartTransmitter::new(identity.bit_rate, identity.clock_hz),
+        }
+    }
+}
+
+impl Logic for Uart {
+    #[hdl_gen]
+    fn update(&mut self) {
+        self.receiver.clk.next = self.clk.val();
+        self.transmitter.clk.next = self.clk.val();
+        self.receiver.rst.next = self.rst.val();
+        self.transmitter.rst.next = self.rst.val();
+        self.receiver.line.next = self.uart_rx.val();
+        self.data.next = self.receiver.data.val();
+        self.valid.next = self.receiver.valid.val();
+        self.broken.next = self.receiver.broken.val();
+        self.transmitter.data.next = self.send_data.val();
+        self.transmitter.valid.next = self.send_valid.val();
+        self.send_ready.next = self.transmitter.ready.val();
+        self.uart_tx.next = self.transmitter.line.val();
+    }
+}

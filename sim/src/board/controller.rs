@@ -1,0 +1,103 @@
+//! The other end of a simulated board's SPI.
+
+use dermis_golden::link::slip::IDLE;
+use dermis_hdl::link::{BoardDevice, BoardOutputs};
+
+/// Bits of [`BoardDevice`]'s inputs.
+const SCLK: u64 = 1;
+const CS_N: u64 = 2;
+const MOSI: u64 = 4;
+
+/// An SPI controller, mode 0, with exact half periods of its clock against the board's, neither of which waits for the
+/// other.
+///
+/// Time is counted in parts of which both half periods have a whole number: the board's clock changes every `sclk_hz` of
+/// them and the controller's every `clock_hz`.
+pub struct SpiController {
+    device: Box<dyn BoardDevice>,
+    clock_hz: u64,
+    sclk_hz: u64,
+    now: u64,
+    /// When the board's clock changes next.
+    edge: u64,
+    clock: bool,
+    inputs: u64,
+    pins: BoardOutputs,
+}
+
+impl SpiController {
+    /// The controller of a board with a clock of `clock_hz`, at `sclk_hz`; its clock begins so many cycles of the board's
+    /// after that, 0 … 1.
+    pub fn new(device: Box<dyn BoardDevice>, clock_hz: u32, sclk_hz: u32, phase: f64) -> Self {
+        let (clock_hz, sclk_hz) = (u64::from(clock_hz), u64::from(sclk_hz));
+        let pins = BoardOutputs::default();
+        let mut controller =
+            SpiController { device, clock_hz, sclk_hz, now: 0, edge: sclk_hz, clock: false, inputs: CS_N, pins };
+        controller.put(CS_N, true);
+        controller.pass((phase * 2.0 * sclk_hz as f64) as u64);
+        controller
+    }
+
+    /// The board's pins as they are.
+    pub fn pins(&self) -> BoardOutputs {
+        self.pins
+    }
+
+    /// Lets so many cycles of the board's clock pass between transactions.
+    pub fn wait(&mut self, cycles: u64) {
+        self.pass(2 * cycles * self.sclk_hz);
+    }
+
+    /// One transaction; the bytes that come back.
+    pub fn transfer(&mut self, bytes: &[u8]) -> Vec<u8> {
+        self.cut(bytes, 16 * bytes.len())
+    }
+
+    /// One transaction that ends after so many edges of its clock, 16 to a byte; the whole bytes that come back. Beyond
+    /// `bytes` the controller sends IDLE.
+    pub fn cut(&mut self, bytes: &[u8], edges: usize) -> Vec<u8> {
+        let mut received = Vec::new();
+        let mut bits = 0u32;
+        self.put(CS_N, false);
+        for bit in 0..edges.div_ceil(2) {
+            let byte = bytes.get(bit / 8).copied().unwrap_or(IDLE);
+            self.put(MOSI, byte >> (7 - bit % 8) & 1 == 1);
+            self.half();
+            bits = bits << 1 | u32::from(self.pins.to_host);
+            self.put(SCLK, true);
+            if bit % 8 == 7 {
+                received.push(bits as u8);
+            }
+            if 2 * bit + 1 < edges {
+                self.half();
+                self.put(SCLK, false);
+            }
+        }
+        self.half();
+        self.put(CS_N, true);
+        // Where the transaction ends while the clock is high, that falls when nobody listens.
+        self.put(SCLK, false);
+        self.half();
+        received
+    }
+
+    fn half(&mut self) {
+        self.pass(self.clock_hz);
+    }
+
+    /// Lets time pass.
+    fn pass(&mut self, time: u64) {
+        let until = self.now + time;
+        while self.edge <= until {
+            self.clock = !self.clock;
+            self.pins = self.device.settle(self.inputs, self.clock);
+            self.edge += self.sclk_hz;
+        }
+        self.now = until;
+    }
+
+    fn put(&mut self, pin: u64, level: bool) {
+        self.inputs = if level { self.inputs | pin } else { self.inputs & !pin };
+        self.pins = self.device.settle(self.inputs, self.clock);
+    }
+}

@@ -1,0 +1,208 @@
+//! The link over SPI: an exact controller at rates from 1 MHz to the highest allowed, transactions that end anywhere.
+
+use dermis_golden::fixed::{Cycles, Model};
+use dermis_golden::link::slip::{END, IDLE};
+use dermis_golden::link::{Counters, Decoder, Identity, Kind, LinkKind, Packet, PacketError};
+use dermis_golden::scene::Scene;
+use dermis_hdl::link::{generate_board, BoardDevice};
+use dermis_sim::board::{SpiController, VerilatedBoard};
+use dermis_sim::hardware::Simulator;
+use dermis_tests::{build_dir, scene};
+
+use super::{device, shipped, small, Questions, RESET, SINGLE_BYTE, TWO_SUBARRAYS};
+
+/// Edges of the controller's clock in a byte.
+const EDGES: usize = 16;
+/// Bytes after which an answer is given up; longer than any frame takes.
+const PATIENCE: usize = 20_000;
+/// What the boards' files allow, Hz.
+const RATE: u32 = 25_000_000;
+
+/// A board with an SPI and its controller.
+struct Board {
+    controller: SpiController,
+    decoder: Decoder,
+    questions: Questions,
+}
+
+/// The questions for a board with an SPI of `rate`.
+fn over_spi(mut questions: Questions, rate: u32) -> Questions {
+    questions.model.scene.hardware.link = LinkKind::Spi;
+    let slowest = questions.model.board.spi_MHz.unwrap();
+    questions.model.board.spi_MHz = Some(slowest.max(f64::from(rate) / 1e6));
+    questions
+}
+
+impl Board {
+    fn new(questions: Questions, rate: u32, phase: f64, simulators: &[Simulator]) -> Board {
+        let questions = over_spi(questions, rate);
+        let device = device(&questions.model, simulators);
+        Board::with(device, questions, rate, phase)
+    }
+
+    fn with(device: Box<dyn BoardDevice>, questions: Questions, rate: u32, phase: f64) -> Board {
+        let clock_hz = Identity::of(&questions.model).unwrap().clock_hz;
+        let mut controller = SpiController::new(device, clock_hz, rate, phase);
+        controller.wait(RESET);
+        Board { controller, decoder: Decoder::default(), questions }
+    }
+
+    fn read(&mut self, bytes: Vec<u8>) -> Vec<Result<Packet, PacketError>> {
+        bytes.into_iter().filter_map(|byte| self.decoder.next(byte)).collect()
+    }
+
+    /// Sends bytes in one transaction and reads in others until so many packets have come.
+    fn ask(&mut self, wire: &[u8], answers: usize) -> Vec<Packet> {
+        let bytes = self.controller.transfer(wire);
+        let mut packets = self.read(bytes);
+        for _ in 0..PATIENCE / 50 {
+            if packets.len() >= answers {
+                break;
+            }
+            let bytes = self.controller.transfer(&[IDLE; 50]);
+            packets.extend(self.read(bytes));
+        }
+        packets.into_iter().collect::<Result<_, _>>().unwrap()
+    }
+
+    fn counters(&mut self) -> Counters {
+        let packets = self.ask(&Packet::request(Kind::ReadCounters, 9).to_wire(), 1);
+        Counters::of_bytes(&packets[0].payload).unwrap()
+    }
+
+    /// Who the board is, and its answers to the first frame.
+    fn answers_as_the_model(&mut self, kinds: &[Kind]) {
+        let identity = Identity::of(&self.questions.model).unwrap();
+        let packets = self.ask(&Packet::request(Kind::Identify, 200).to_wire(), 1);
+        assert_eq!(packets, [Packet { kind: Kind::Identity, sequence: 200, payload: identity.to_bytes() }]);
+        for &kind in kinds {
+            let wanted = self.questions.answer(0, kind, IDLE, false);
+            assert!(self.ask(&self.questions.frame(0, kind, IDLE).to_wire(), 1) == [wanted], "{kind:?}");
+        }
+        let taken = kinds.len() as u16 + 2;
+        assert_eq!(self.counters(), Counters { taken, ..Counters::default() });
+    }
+}
+
+const BOTH: [Simulator; 2] = [Simulator::Verilator, Simulator::RustHdl];
+
+#[test]
+fn both_simulations_answer_as_the_model() {
+    let mut board = Board::new(shipped(&scene("eight-by-eight").0), RATE, 0.3, &BOTH);
+    board.answers_as_the_model(&[Kind::FrameForResultants]);
+}
+
+#[test]
+fn the_serial_engines_board_answers_at_a_rate_near_its_clock_without_a_gap() {
+    let (mut scene, _) = scene("eight-by-eight");
+    scene.hardware.board = "icebreaker".to_string();
+    let mut board = Board::new(shipped(&scene), RATE, 0.7, &BOTH);
+    board.answers_as_the_model(&[]);
+    // A transaction for the frame, and, after the time it takes, one for the answer.
+    let kind = Kind::FrameForForces;
+    let request = board.questions.frame(1, kind, 7).to_wire();
+    board.controller.transfer(&request);
+    board.controller.wait(Cycles::longest(&board.questions.model).total);
+    let answer = board.questions.answer(1, kind, 7, false);
+    let bytes = board.controller.transfer(&vec![IDLE; answer.to_wire().len() + 1]);
+    assert!(bytes == [vec![IDLE], answer.to_wire()].concat());
+}
+
+#[test]
+fn every_rate_and_phase_is_understood() {
+    let kinds = [Kind::FrameForResultants, Kind::FrameForForces];
+    // The highest at 100 MHz, and rates that have no common period with the clock.
+    let rates = [(160_000_000, 0.5), (99_999_999, 0.1), (33_333_333, 0.9), (RATE, 0.0)];
+    for (rate, phase) in rates {
+        Board::new(small(SINGLE_BYTE), rate, phase, &BOTH).answers_as_the_model(&kinds);
+    }
+    Board::new(small(TWO_SUBARRAYS), rates[0].0, 0.8, &BOTH).answers_as_the_model(&kinds);
+    for phase in [0.0, 0.4] {
+        Board::new(small(SINGLE_BYTE), 1_000_000, phase, &[Simulator::Verilator]).answers_as_the_model(&kinds);
+    }
+}
+
+#[test]
+fn idle_reads_bring_idle_and_garbage_is_counted_and_forgotten() {
+    let mut board = Board::new(small(SINGLE_BYTE), RATE, 0.2, &BOTH);
+    assert_eq!(board.controller.transfer(&[IDLE; 30]), [IDLE; 30]);
+    let garbage: Vec<u8> = (0..60).map(|byte| byte * 7 + 1).filter(|byte| *byte != END).collect();
+    let frame = board.questions.frame(0, Kind::FrameForForces, 1).to_wire();
+    // A frame with IDLE bytes anywhere in it, behind what belongs to no packet.
+    let spread: Vec<u8> = frame.iter().flat_map(|&byte| [IDLE, byte, IDLE]).collect();
+    let answer = board.questions.answer(0, Kind::FrameForForces, 1, false);
+    assert!(board.ask(&[garbage, spread].concat(), 1) == [answer]);
+    assert_eq!(board.counters(), Counters { taken: 2, crc: 1, ..Counters::default() });
+}
+
+/// Whether frames and answers come through, both ways, when transactions end after each of these numbers of edges in turn.
+fn is_whole(board: &mut Board, cuts: [usize; 2]) -> bool {
+    let kind = Kind::FrameForForces;
+    let frames = [0, 1, 2].map(|index| board.questions.frame(index, kind, index as u8).to_wire()).concat();
+    let (mut sent, mut packets) = (0, Vec::new());
+    for &edges in cuts.iter().cycle().take(PATIENCE / 10) {
+        let bytes = board.controller.cut(&frames[sent.min(frames.len())..], edges);
+        // The board has a byte when its last bit's rising edge was.
+        sent += (edges + 1) / EDGES;
+        packets.extend(board.read(bytes));
+        if packets.len() == 3 {
+            break;
+        }
+    }
+    let wanted = [0, 1, 2].map(|index| Ok(board.questions.answer(index, kind, index as u8, false)));
+    packets == wanted
+}
+
+/// A small board under Verilator, with `to` in the place of `from` in its Verilog.
+fn small_board_with(from: &str, to: &str) -> Board {
+    let questions = over_spi(small(SINGLE_BYTE), RATE);
+    let mut generated = generate_board(&questions.model).unwrap();
+    let verilog = generated.files.iter_mut().find(|file| file.name.ends_with(".v")).unwrap();
+    assert_eq!(verilog.text.matches(from).count(), 1, "{from}");
+    verilog.text = verilog.text.replace(from, to);
+    let device = VerilatedBoard::new(&generated, LinkKind::Spi, &build_dir().join("verilator")).unwrap();
+    Board::with(Box::new(device), questions, RATE, 0.6)
+}
+
+/// The first number of edges after which a transaction may not end, the other ones being of four bytes: the first of a
+/// transaction brings nothing back.
+fn broken(board: &mut Board) -> Option<usize> {
+    (1..=3 * EDGES).find(|&edges| !is_whole(board, [edges, 4 * EDGES]))
+}
+
+#[test]
+fn transactions_may_end_after_any_edge() {
+    let mut board = Board::new(small(SINGLE_BYTE), RATE, 0.6, &[Simulator::Verilator]);
+    assert_eq!(broken(&mut board), None);
+    // Many transactions as short as may be.
+    assert!(is_whole(&mut board, [2 * EDGES; 2]));
+    let taken = 3 * (3 * EDGES as u16 + 1) + 1;
+    assert_eq!(board.counters(), Counters { taken, ..Counters::default() });
+}
+
+#[test]
+fn a_byte_given_up_too_early_or_too_late_is_found() {
+    let defects = [
+        // Given up when the next is there, whether or not its bits have been read; or at the end of a transaction.
+        ("if (sclk_carries || !sclk_full)", "if (1'b1)"),
+        ("sclk_carries <= 1'b0;", "sclk_carries <= sclk_carries;"),
+        // Kept twice; acknowledged twice.
+        ("sclk_full <= sclk_offered[1] != sclk_taken;", "sclk_full <= 1'b1;"),
+        ("sclk_taken <= sclk_offered[1];", "sclk_taken <= !sclk_taken;"),
+    ];
+    for (from, to) in defects {
+        assert_ne!(broken(&mut small_board_with(from, to)), None, "{from} → {to} went unnoticed");
+    }
+}
+
+#[test]
+fn a_scene_names_its_link_and_the_verilog_has_no_other() {
+    let text = "[hardware]\nlink = \"spi\"\n[sensor]\nrows = 2\ncols = 2\npitch_x_mm = 4.0\npitch_y_mm = 4.0\n\
+                thickness_mm = 3.0\n[search]\nmu_max = 0.05\n";
+    for (text, own, other) in [(text, "spi", "uart"), (&text.replace("spi", "uart"), "uart", "spi")] {
+        let model = Model::new(&Scene::parse(text, "link").unwrap()).unwrap();
+        let generated = generate_board(&model).unwrap();
+        let verilog = &generated.files.iter().find(|file| file.name.ends_with("_board.v")).unwrap().text;
+        assert!(verilog.contains(&format!("{own}_")) && !verilog.contains(&format!("{other}_")), "{own}");
+    }
+}
