@@ -1,10 +1,17 @@
-// iCEBreaker: pins and clock around the board top DERMIS_TOP, whose name the flow defines.
-// Pins are in icebreaker.pcf; their names are those of the board's schematic.
+// iCEBreaker: pins and clock around the board top DERMIS_TOP, whose name the flow defines, and DERMIS_SPI or DERMIS_UART, its
+// link. Pins are in icebreaker.pcf; their names are those of the board's schematic, or of the link.
 module board (
   input wire clk_12mhz,
   input wire btn_n,
+`ifdef DERMIS_SPI
+  input wire spi_sclk,
+  input wire spi_cs_n,
+  input wire spi_mosi,
+  output wire spi_miso,
+`else
   input wire rx,
   output wire tx,
+`endif
   output wire ledg_n,
   output wire ledr_n,
   output wire led1
@@ -29,11 +36,27 @@ module board (
   assign ledg_n = !alive;
   assign ledr_n = !error;
 
+`ifdef DERMIS_SPI
+  // The pin's own way to a global buffer: through the fabric the clock would come late, and MISO after it.
+  wire spi_sclk_global;
+  SB_GB_IO #(.PIN_TYPE(6'b000001)) sclk_pin (.PACKAGE_PIN(spi_sclk), .GLOBAL_BUFFER_OUTPUT(spi_sclk_global));
+  // Other slaves may share the line.
+  wire miso;
+  assign spi_miso = spi_cs_n ? 1'bz : miso;
+`endif
+
   `DERMIS_TOP dermis (
     .clk(clk),
     .button(!btn_n | !locked),
+`ifdef DERMIS_SPI
+    .spi_sclk(spi_sclk_global),
+    .spi_cs_n(spi_cs_n),
+    .spi_mosi(spi_mosi),
+    .spi_miso(miso),
+`else
     .uart_rx(rx),
     .uart_tx(tx),
+`endif
     .alive(alive),
     .busy(led1),
     .error(error)

@@ -1,10 +1,17 @@
-// ULX3S: pins and clock around the board top DERMIS_TOP, whose name the flow defines.
-// Pins are in ulx3s-85f.lpf; their names are those of the board's manual.
+// ULX3S: pins and clock around the board top DERMIS_TOP, whose name the flow defines, and DERMIS_SPI or DERMIS_UART, its link.
+// Pins are in ulx3s-85f.lpf; their names are those of the board's manual, or of the link.
 module board (
   input wire clk_25mhz,
   input wire fire1,
+`ifdef DERMIS_SPI
+  input wire spi_sclk,
+  input wire spi_cs_n,
+  input wire spi_mosi,
+  output wire spi_miso,
+`else
   input wire ftdi_txd,
   output wire ftdi_rxd,
+`endif
   output wire [7:0] led,
   output wire wifi_gpio0
 );
@@ -45,11 +52,24 @@ module board (
   assign wifi_gpio0 = 1'b1;
   assign led[7:3] = 5'd0;
 
+`ifdef DERMIS_SPI
+  // Other slaves may share the line.
+  wire miso;
+  assign spi_miso = spi_cs_n ? 1'bz : miso;
+`endif
+
   `DERMIS_TOP dermis (
     .clk(clk),
     .button(fire1 | !locked),
+`ifdef DERMIS_SPI
+    .spi_sclk(spi_sclk),
+    .spi_cs_n(spi_cs_n),
+    .spi_mosi(spi_mosi),
+    .spi_miso(miso),
+`else
     .uart_rx(ftdi_txd),
     .uart_tx(ftdi_rxd),
+`endif
     .alive(led[0]),
     .busy(led[1]),
     .error(led[2])

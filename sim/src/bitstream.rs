@@ -32,7 +32,7 @@ use absorb::Absorbed;
 use baseline::{Baseline, Baselines, FILE};
 use family::{flow, pack_arguments, place_arguments, Flow, YOSYS};
 use synthesis::NETLIST;
-use timing::Placed;
+use timing::{Fmax, Placed};
 use tools::ToolError;
 
 /// Name of the board's own module, around the board top.
@@ -82,15 +82,13 @@ pub fn run(arguments: &Arguments, build_dir: &Path) -> Result<(String, bool)> {
     let folder = build_dir.join(&scene.name).join(&board.name);
     let absorbed = synthesise(&model, &folder)?;
     let seeds = arguments.seeds.unwrap_or(board.seeds);
-    let placed = place(board, &flow, &folder, seeds, arguments.jobs)?;
-    let (best_seed, best) =
-        placed.iter().max_by(|(_, a), (_, b)| a.fmax_MHz.total_cmp(&b.fmax_MHz)).ok_or_else(|| {
-            anyhow!("{}: no seed of {seeds} could be placed and routed; logs in {}", scene.name, folder.display())
-        })?;
-    if (best.clock_MHz / board.clock_MHz - 1.0).abs() > 1e-3 {
-        let (file, has, wants) = (&board.name, best.clock_MHz, board.clock_MHz);
-        return Err(anyhow!("constraints/{file}.v: its PLL gives {has} MHz, {file}.toml says clock_MHz = {wants}"));
-    }
+    let placed = place(&model, &flow, &folder, seeds, arguments.jobs)?;
+    let better =
+        |a: &Placed, b: &Placed| a.is_met().cmp(&b.is_met()).then(a.engine.achieved.total_cmp(&b.engine.achieved));
+    let (best_seed, best) = placed.iter().max_by(|(_, a), (_, b)| better(a, b)).ok_or_else(|| {
+        anyhow!("{}: no seed of {seeds} could be placed and routed; logs in {}", scene.name, folder.display())
+    })?;
+    check_constraints(board, best)?;
     let product = format!("{}.{}", scene.name, flow.bitstream);
     let reached = reached(&flow, &placed, best);
     let mut lost = Vec::new();
@@ -98,15 +96,34 @@ pub fn run(arguments: &Arguments, build_dir: &Path) -> Result<(String, bool)> {
         let arguments = pack_arguments(board.family, &format!("{}.config", try_name(*best_seed)), &product);
         flow.pack.run(&folder, &arguments, "pack.log", synthesis::MINUTES)?;
     } else {
-        lost.push(format!("{:.1} MHz, the board's clock is {} MHz", best.fmax_MHz, best.clock_MHz));
+        let of = |(name, clock): (&str, Fmax)| format!("{name} {:.1} MHz of {} MHz", clock.achieved, clock.constraint);
+        lost.extend(best.clocks().filter(|(_, clock)| !clock.is_met()).map(of));
     }
     lost.extend(baselines(arguments.update_baselines, board, &scene, &reached)?);
-    let implemented = Implemented::new(&model, reached, absorbed, best.is_met().then(|| folder.join(product)), lost);
+    let bitstream = best.is_met().then(|| folder.join(product));
+    let implemented = Implemented::new(&model, reached, absorbed, best.link, bitstream, lost);
     let good = implemented.is_good();
     Ok((
         if arguments.json { serde_json::to_string(&implemented)? + "\n" } else { report::implemented(&implemented) },
         good,
     ))
+}
+
+/// Compares the clocks that place and route was told with those of the board's file.
+fn check_constraints(board: &Board, placed: &Placed) -> Result<()> {
+    let differs = |has: f64, wants: f64| (has / wants - 1.0).abs() > 1e-3;
+    let (file, has, wants) = (&board.name, placed.engine.constraint, board.clock_MHz);
+    if differs(has, wants) {
+        return Err(anyhow!("constraints/{file}.v: its PLL gives {has} MHz, {file}.toml says clock_MHz = {wants}"));
+    }
+    if let (Some((pin, clock)), Some(wants)) = (placed.link, board.spi_MHz) {
+        let (pins, has) = (board.family.pins(), clock.constraint);
+        if differs(has, wants) {
+            let pins = format!("constraints/{file}.{pins}: {pin} is meant for {has} MHz");
+            return Err(anyhow!("{pins}, {file}.toml says spi_MHz = {wants}"));
+        }
+    }
+    Ok(())
 }
 
 /// Verilog to the netlist that is placed.
@@ -120,14 +137,16 @@ fn synthesise(model: &Model, folder: &Path) -> Result<Absorbed> {
         let path = folder.join(name);
         write(&path, text.as_bytes())?;
     }
-    let read = format!("-D DERMIS_TOP={top} {board}.v {top}.v", top = generated.top, board = model.board.name);
+    let link = model.scene.hardware.link.name().to_uppercase();
+    let (top, board) = (&generated.top, &model.board.name);
+    let read = format!("-D DERMIS_TOP={top} -D DERMIS_{link} {board}.v {top}.v");
     Ok(synthesis::synthesise(folder, model.board.family, &read, TOP)?)
 }
 
 /// Places and routes with seeds 1 … `seeds`, `jobs` at a time; those that came to an end.
-fn place(board: &Board, flow: &Flow, folder: &Path, seeds: u32, jobs: u32) -> Result<Vec<(u32, Placed)>> {
-    let what = format!("{}: place and route", board.name);
-    let place = |seed| match place_seed(board, flow, folder, seed) {
+fn place(model: &Model, flow: &Flow, folder: &Path, seeds: u32, jobs: u32) -> Result<Vec<(u32, Placed)>> {
+    let what = format!("{}: place and route", model.board.name);
+    let place = |seed| match place_seed(model, flow, folder, seed) {
         // What a seed does not converge to is no error of the call.
         Err(ToolError::Late { .. } | ToolError::Failed { .. }) if seeds > 1 => Ok(None),
         placed => Ok(Some((seed, placed?))),
@@ -142,7 +161,8 @@ fn try_name(seed: u32) -> String {
 }
 
 /// One seed, by the first placer that converges.
-fn place_seed(board: &Board, flow: &Flow, folder: &Path, seed: u32) -> Result<Placed, ToolError> {
+fn place_seed(model: &Model, flow: &Flow, folder: &Path, seed: u32) -> Result<Placed, ToolError> {
+    let board = &model.board;
     let name = try_name(seed);
     let mut last = Err(ToolError::Missing { tool: flow.place.name });
     for placer in &board.placers {
@@ -153,21 +173,22 @@ fn place_seed(board: &Board, flow: &Flow, folder: &Path, seed: u32) -> Result<Pl
         }
     }
     last?;
-    Placed::read(&folder.join(format!("{name}.report.json")), synthesis::cells(folder, TOP)?)
+    let report = folder.join(format!("{name}.report.json"));
+    Placed::read(&report, synthesis::cells(folder, TOP)?, model.scene.hardware.link.clock())
 }
 
 /// The figures of all seeds; cells of the `best`.
 fn reached(flow: &Flow, placed: &[(u32, Placed)], best: &Placed) -> Baseline {
-    let clocks = || placed.iter().map(|(_, placed)| placed.fmax_MHz);
+    let clocks = || placed.iter().map(|(_, placed)| placed.engine.achieved);
     let rounded = |clock: f64| (clock * 10.0).round() / 10.0;
     Baseline {
         luts: best.count(flow.lut),
         flip_flops: best.count(flow.flip_flop),
         multipliers: best.count(flow.multiplier),
         block_rams: best.count(flow.block_ram),
-        best_MHz: rounded(best.fmax_MHz),
-        median_MHz: rounded(median(clocks().collect()).unwrap_or(best.fmax_MHz)),
-        worst_MHz: rounded(clocks().fold(best.fmax_MHz, f64::min)),
+        best_MHz: rounded(best.engine.achieved),
+        median_MHz: rounded(median(clocks().collect()).unwrap_or(best.engine.achieved)),
+        worst_MHz: rounded(clocks().fold(best.engine.achieved, f64::min)),
         seeds: placed.len() as u32,
     }
 }
@@ -182,4 +203,25 @@ fn baselines(update: bool, board: &Board, scene: &Scene, reached: &Baseline) -> 
         return Ok(Vec::new());
     }
     Ok(all.get(&board.name, &scene.name).map_or_else(Vec::new, |was| was.losses(reached)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_clock_that_place_and_route_was_not_told_is_named() {
+        let board = Board::load("icebreaker").unwrap();
+        let told = |engine: f64, link: f64| {
+            let clock = |constraint| Fmax { achieved: 99.0, constraint };
+            let link = Some(("spi_sclk", clock(link)));
+            let placed = Placed { engine: clock(engine), link, cells: std::collections::BTreeMap::new() };
+            check_constraints(&board, &placed).map_err(|error| error.to_string())
+        };
+        assert_eq!(told(25.505, 25.0), Ok(()));
+        let wanted = "constraints/icebreaker.v: its PLL gives 12 MHz, icebreaker.toml says clock_MHz = 25.5";
+        assert_eq!(told(12.0, 25.0), Err(wanted.to_string()));
+        let wanted = "constraints/icebreaker.pcf: spi_sclk is meant for 12 MHz, icebreaker.toml says spi_MHz = 25";
+        assert_eq!(told(25.5, 12.0), Err(wanted.to_string()));
+    }
 }

@@ -5,6 +5,9 @@ use rust_hdl::prelude::*;
 
 use crate::wire::{Wire, Word};
 
+/// What follows an escape is told apart by its last two bits; whether it may follow one at all, by `spoiled`.
+const _: () = assert!(matches!([ESC_END % 4, ESC_ESC % 4, ESC_IDLE % 4], [0, 1, 2..=3]));
+
 /// Undoes SLIP's escapes, in the same cycle; IDLE is as if nothing had come.
 #[derive(LogicBlock)]
 pub struct SlipDecoder {
@@ -60,8 +63,12 @@ impl Logic for SlipDecoder {
         let stands_for = unescape(data);
         let unread = self._escaped && stands_for.is_none() && !end && !idle;
         let content = if self._escaped { stands_for } else { Some(data).filter(|&data| data != ESC) };
-        // What cannot follow an escape is not valid, and reads as the last of those that can.
-        let shown = if self._escaped { stands_for.unwrap_or(IDLE) } else { data };
+        let shown = match data % 4 {
+            _ if !self._escaped => data,
+            0 => END,
+            1 => ESC,
+            _ => IDLE,
+        };
         self.content.next = Word::from(u64::from(shown));
         self.content_valid.next = self.valid.val() && !end && !idle && content.is_some();
         self.packet_end.next = self.valid.val() && end;
@@ -84,7 +91,7 @@ wire is_escape = data == 8'd{ESC};
 wire is_idle = data == 8'd{IDLE};
 wire stands = data == 8'd{ESC_END} || data == 8'd{ESC_ESC} || data == 8'd{ESC_IDLE};
 always @(*) begin
-  content = !escaped ? data : data == 8'd{ESC_END} ? 8'd{END} : data == 8'd{ESC_ESC} ? 8'd{ESC} : 8'd{IDLE};
+  content = !escaped ? data : data[1] ? 8'd{IDLE} : data[0] ? 8'd{ESC} : 8'd{END};
   content_valid = valid && !is_end && !is_idle && (escaped ? stands : !is_escape);
   packet_end = valid && is_end;
   spoiled = broken || (valid && escaped && !stands && !is_end && !is_idle);

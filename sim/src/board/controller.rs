@@ -38,11 +38,6 @@ impl SpiController {
         controller
     }
 
-    /// The board's pins as they are.
-    pub fn pins(&self) -> BoardOutputs {
-        self.pins
-    }
-
     /// Lets so many cycles of the board's clock pass between transactions.
     pub fn wait(&mut self, cycles: u64) {
         self.pass(2 * cycles * self.sclk_hz);

@@ -9,6 +9,7 @@ use super::table::markdown;
 use super::BUDGET_US;
 use crate::bitstream::absorb::Absorbed;
 use crate::bitstream::baseline::Baseline;
+use crate::bitstream::timing::Fmax;
 
 /// What `dermis bitstream` reached.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -30,7 +31,9 @@ pub struct Implemented {
     pub margin_us: f64,
     /// Registers that went into multipliers: operands, products.
     pub absorbed: [usize; 2],
-    /// The bitstream; none when its clock is missed.
+    /// The clock that comes with the link, and its pin, where there is one.
+    pub link_clock: Option<(&'static str, Fmax)>,
+    /// The bitstream; none when a clock is missed.
     pub bitstream: Option<PathBuf>,
     /// What is missed or worse than the baseline.
     pub lost: Vec<String>,
@@ -42,6 +45,7 @@ impl Implemented {
         model: &Model,
         reached: Baseline,
         absorbed: Absorbed,
+        link_clock: Option<(&'static str, Fmax)>,
         bitstream: Option<PathBuf>,
         lost: Vec<String>,
     ) -> Self {
@@ -56,6 +60,7 @@ impl Implemented {
             time_us,
             margin_us: BUDGET_US as f64 - time_us,
             absorbed: [absorbed.operands, absorbed.products],
+            link_clock,
             bitstream,
             lost,
         }
@@ -105,9 +110,12 @@ pub fn implemented(one: &Implemented) -> String {
     let mut text = markdown(&head, vec![row]);
     let [operands, products] = one.absorbed;
     text.push_str(&format!("registers moved into multipliers: {operands} operands, {products} products\n"));
+    if let Some((pin, clock)) = &one.link_clock {
+        text.push_str(&format!("{pin}: {:.1} MHz, meant for {} MHz\n", clock.achieved, clock.constraint));
+    }
     match &one.bitstream {
         Some(path) => text.push_str(&format!("{}\n", path.display())),
-        None => text.push_str("no bitstream: the board's clock is missed\n"),
+        None => text.push_str("no bitstream: a clock is missed\n"),
     }
     for lost in &one.lost {
         text.push_str(&format!("worse: {lost}\n"));

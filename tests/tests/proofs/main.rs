@@ -16,11 +16,12 @@
 //! | `replay.v`: rows wait for their shift, then come out once, in order | `rescale` and its memory |
 //! | `filler.v`: inside the operand memory, complete when complete | `pass`'s filler |
 //! | `packer.v`: header, words, CRC between two borders; what is offered stays | the link's packer |
-//! | `roundtrip.v`: what is encoded is decoded, byte by byte, IDLE bytes in between or not | the link's encoder and decoder |
+//! | `roundtrip.v`: what is encoded is decoded, with IDLE bytes in between or without | the link's encoder and decoder |
 //! | `sums.v`: forces are taken, four words given, the status passed on | the link's resultants |
 //!
-//! Without a proof, held by co-simulation alone: the UART's shift registers, the link's parser, counters and request
-//! queue, which have no back-pressure; the banks of an adaptive scene, several `receive` in step; the force unit's rounding.
+//! Without a proof, held by co-simulation alone: the UART's shift registers, the SPI slave's two clocks, the link's parser,
+//! counters and request queue, which have no back-pressure; the banks of an adaptive scene, several `receive` in step; the
+//! force unit's rounding.
 //!
 //! Each proof has a seeded defect with which it fails: a proof that cannot fail says nothing.
 
