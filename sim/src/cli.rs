@@ -93,7 +93,7 @@ enum Command {
     #[command(after_help = "Examples:
   dermis build sensor-1 --out rtl
   dermis build sensor-4 --explain
-  dermis build sensor-1 --board                      with UART and packets, ready for place and route
+  dermis build sensor-1 --board                      with its link and packets, ready for place and route
   dermis build eight-by-eight --target-board icebreaker     the serial engine of a small device")]
     Build {
         /// Built-in name or path of a scene.
@@ -104,7 +104,7 @@ enum Command {
         /// Print what the scene needs, what is left out, and what that saves.
         #[arg(long)]
         explain: bool,
-        /// The whole board, the engine behind its UART, in place of the engine alone.
+        /// The whole board, the engine behind its link, in place of the engine alone.
         #[arg(long)]
         board: bool,
         #[command(flatten)]

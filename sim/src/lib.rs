@@ -17,7 +17,7 @@
 //! | [`mod@faults`] | `dermis faults`: single bits flipped, and what comes of it |
 //! | [`fresh`] | frames of drawn contacts for `dermis table --fresh` |
 //! | [`mod@generate`] | `dermis generate`: frames with known forces from described contacts |
-//! | [`board`] | a board's UART, simulated, on a pseudo-terminal |
+//! | [`board`] | a simulated board, its UART on a pseudo-terminal or its SPI under a controller |
 //! | [`mod@guide`] | pages: method, formats, architecture, adding a sensor or a board, the engine in a design, limits |
 //! | [`hardware`] | a scene's generated hardware and its simulators |
 //! | [`compare`] | how far two force fields are apart |
