@@ -8,7 +8,7 @@ use crate::wire::{Wire, Word};
 /// What follows an escape is told apart by its last two bits; whether it may follow one at all, by `spoiled`.
 const _: () = assert!(matches!([ESC_END % 4, ESC_ESC % 4, ESC_IDLE % 4], [0, 1, 2..=3]));
 
-/// Undoes SLIP's escapes, in the same cycle; IDLE is as if nothing had come.
+/// Undoes SLIP's escapes, a cycle later; IDLE is as if nothing had come.
 #[derive(LogicBlock)]
 pub struct SlipDecoder {
     /// Clock.
@@ -49,16 +49,9 @@ impl Default for SlipDecoder {
     }
 }
 
-impl Logic for SlipDecoder {
-    fn update(&mut self) {
-        let data = self.data.val().number() as u8;
-        if self.clk.pos_edge() {
-            if self.rst.val() {
-                self._escaped = false;
-            } else if self.valid.val() && data != IDLE {
-                self._escaped = data == ESC && !self._escaped;
-            }
-        }
+impl SlipDecoder {
+    fn clocked(&mut self) {
+        let (data, run) = (self.data.val().number() as u8, !self.rst.val());
         let (end, idle) = (data == END, data == IDLE);
         let stands_for = unescape(data);
         let unread = self._escaped && stands_for.is_none() && !end && !idle;
@@ -70,9 +63,22 @@ impl Logic for SlipDecoder {
             _ => IDLE,
         };
         self.content.next = Word::from(u64::from(shown));
-        self.content_valid.next = self.valid.val() && !end && !idle && content.is_some();
-        self.packet_end.next = self.valid.val() && end;
-        self.spoiled.next = self.broken.val() || (self.valid.val() && unread);
+        self.content_valid.next = run && self.valid.val() && !end && !idle && content.is_some();
+        self.packet_end.next = run && self.valid.val() && end;
+        self.spoiled.next = run && (self.broken.val() || (self.valid.val() && unread));
+        if !run {
+            self._escaped = false;
+        } else if self.valid.val() && !idle {
+            self._escaped = data == ESC && !self._escaped;
+        }
+    }
+}
+
+impl Logic for SlipDecoder {
+    fn update(&mut self) {
+        if self.clk.pos_edge() {
+            self.clocked();
+        }
     }
 
     fn connect(&mut self) {
@@ -90,13 +96,11 @@ wire is_end = data == 8'd{END};
 wire is_escape = data == 8'd{ESC};
 wire is_idle = data == 8'd{IDLE};
 wire stands = data == 8'd{ESC_END} || data == 8'd{ESC_ESC} || data == 8'd{ESC_IDLE};
-always @(*) begin
-  content = !escaped ? data : data[1] ? 8'd{IDLE} : data[0] ? 8'd{ESC} : 8'd{END};
-  content_valid = valid && !is_end && !is_idle && (escaped ? stands : !is_escape);
-  packet_end = valid && is_end;
-  spoiled = broken || (valid && escaped && !stands && !is_end && !is_idle);
-end
 always @(posedge clk) begin
+  content <= !escaped ? data : data[1] ? 8'd{IDLE} : data[0] ? 8'd{ESC} : 8'd{END};
+  content_valid <= !rst && valid && !is_end && !is_idle && (escaped ? stands : !is_escape);
+  packet_end <= !rst && valid && is_end;
+  spoiled <= !rst && (broken || (valid && escaped && !stands && !is_end && !is_idle));
   if (rst) escaped <= 1'b0;
   else if (valid && !is_idle) escaped <= is_escape && !escaped;
 end"
