@@ -220,9 +220,8 @@ impl Logic for Engine {
         self.resultants.rst.next = self.rst.val();
 
         comment!("A frame begins when it is whole and the last one computed");
-        self.begin_frame.next = self.receive.full.val()
-            & !self.computing.q.val()
-            & (!self.sending.q.val() | self.ahead.val());
+        self.begin_frame.next =
+            self.receive.full.val() & !self.computing.q.val() & (!self.sending.q.val() | self.ahead.val());
         self.computing.d.next =
             (self.begin_frame.val() | (self.computing.q.val() & !self.finish.then.val())) & !self.rst.val();
 
@@ -247,9 +246,8 @@ impl Logic for Engine {
             (self.begin_send.val() | (self.sending.q.val() & !self.send.done.val())) & !self.rst.val();
         self.complete.next = self.filled.q.val() | self.unfold.done.val();
         self.behind.next = self.first.q.val() & self.sending.q.val() & !self.send.done.val();
-        self.hand_over.next = self.complete.val()
-            & !self.behind.val()
-            & (!self.searching.q.val() | self.search.done.val());
+        self.hand_over.next =
+            self.complete.val() & !self.behind.val() & (!self.searching.q.val() | self.search.done.val());
         self.handed.now.next = self.hand_over.val();
         self.opens.now.next = self.hand_over.val() & self.first.q.val();
         self.filled.d.next = self.complete.val() & !self.hand_over.val() & !self.rst.val();

@@ -171,7 +171,14 @@ impl Logic for Walk {
     }
 
     fn connect(&mut self) {
-        for wire in [&mut self.step, &mut self.source, &mut self.source_base, &mut self.target, &mut self.sweep, &mut self.radius] {
+        for wire in [
+            &mut self.step,
+            &mut self.source,
+            &mut self.source_base,
+            &mut self.target,
+            &mut self.sweep,
+            &mut self.radius,
+        ] {
             wire.connect();
         }
         for bit in [&mut self.last, &mut self.next_halves, &mut self.chains] {

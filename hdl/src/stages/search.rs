@@ -266,7 +266,8 @@ impl Logic for Search {
 
         comment!("Quads run through memory, shift and candidates");
         self.quad_end.next = self.counting.q.val() & self.quads.last.val();
-        self.counting.d.next = (self.set_up.q.val() | (self.counting.q.val() & !self.quads.last.val())) & !self.rst.val();
+        self.counting.d.next =
+            (self.set_up.q.val() | (self.counting.q.val() & !self.quads.last.val())) & !self.rst.val();
         self.quads.clear.next = self.set_up.q.val();
         self.quads.enable.next = self.counting.q.val();
         self.step.now.next = self.walk.step.val();
