@@ -152,7 +152,7 @@ impl Engine {
             handed: BitDelay::new(1),
             opens: BitDelay::new(1),
             // The first beat, which takes the count of cycles, is out by then.
-            finish: BitDelay::new(8),
+            finish: BitDelay::new(9),
             both_signs: Constant::new(model.scene.partition.condition == Condition::BothSigns),
             ahead: Constant::new(model.searches()),
             begin_frame: Default::default(),

@@ -33,7 +33,7 @@ module proof(input clk, input again, input begin_it, input offered, input sample
       assert (went <= came && (came != went || !words_valid));
       assert (operands_valid == words_before);
       // Rows of v_00 wait for the last of them, no longer.
-      assert (came == went || (came < ROWS && went == 8'd0) || since <= ROWS + 8'd4);
+      assert (came == went || (came < ROWS && went == 8'd0) || since <= ROWS + 8'd6);
       if (words_valid && went == row) assert (words == {4*@WORD@{kept}});
       if (quad_valid && came == row) kept <= sample;
       since <= quad_valid ? 8'd0 : since == 8'd255 ? since : since + 8'd1;
@@ -51,6 +51,6 @@ module @TOP@$rescale$rescaler(
   input clk, input clear, input valid, input measured, input [@SHIFTS@-1:0] shift, input [4*@ACC@-1:0] quad,
   output reg [4*@WORD@-1:0] words, output [4*@DATA@-1:0] operands, output [15:0] saturations
 );
-  reg [4*@WORD@-1:0] moved;
-  always @(posedge clk) {words, moved} <= {moved, quad[4*@WORD@-1:0]};
+  reg [4*@WORD@-1:0] taken, moved;
+  always @(posedge clk) {words, moved, taken} <= {moved, taken, quad[4*@WORD@-1:0]};
 endmodule

@@ -10,9 +10,13 @@ module proof(input clk, input clear, input valid, input measured, input [@SHIFTS
   );
   localparam signed [@ACC@+1:0] MOST = (1 << (@WORD@ - 1)) - 1;
   localparam signed [@WORD@+1:0] MOST_OPERAND = (1 << (@DATA@ - 1)) - 1;
-  wire [@SHIFTS@-1:0] amount = measured ? shift : @SHIFTS@'d@A_SHIFT@;
-  reg [1:0] age = 2'd0;
-  always @(posedge clk) if (age != 2'd3) age <= age + 2'd1;
+  // What came in a cycle before.
+  reg [@SHIFTS@-1:0] amount;
+  reg [4*@ACC@-1:0] came;
+  reg comes;
+  always @(posedge clk) {amount, came, comes} <= {measured ? shift : @SHIFTS@'d@A_SHIFT@, quad, valid};
+  reg [2:0] age = 3'd0;
+  always @(posedge clk) if (age != 3'd4) age <= age + 3'd1;
   reg counts, known = 1'b0;
   reg [2:0] held_then;
   reg [15:0] count;
@@ -20,7 +24,7 @@ module proof(input clk, input clear, input valid, input measured, input [@SHIFTS
   genvar l;
   generate
     for (l = 0; l < 4; l = l + 1) begin : lane
-      wire signed [@ACC@:0] acc = {quad[l * @ACC@ + @ACC@ - 1], quad[l * @ACC@ +: @ACC@]};
+      wire signed [@ACC@:0] acc = {came[l * @ACC@ + @ACC@ - 1], came[l * @ACC@ +: @ACC@]};
       // The quotient rounded down, and the bit that says whether a half or more was left.
       wire signed [@ACC@:0] floor = acc >>> amount;
       wire [@ACC@:0] below = acc >>> (amount - 1);
@@ -37,16 +41,16 @@ module proof(input clk, input clear, input valid, input measured, input [@SHIFTS
         rounded <= floor + $signed({1'b0, amount != 0 && below[0]});
         word <= above ? MOST : under ? -MOST - 1 : rounded;
         operand <= nearest > MOST_OPERAND ? MOST_OPERAND : nearest;
-        if (age >= 2'd2) assert (got_word == word);
-        if (age >= 2'd3) assert (got_operand == operand);
+        if (age >= 3'd3) assert (got_word == word);
+        if (age >= 3'd4) assert (got_operand == operand);
       end
     end
   endgenerate
   wire [16:0] sum = {1'b0, count} + held_then;
   always @(posedge clk) begin
-    counts <= valid;
+    counts <= comes;
     held_then <= counts ? {2'd0, held[0]} + held[1] + held[2] + held[3] : 3'd0;
-    if (clear) {known, count} <= {age >= 2'd2, 16'd0};
+    if (clear) {known, count} <= {age >= 3'd3, 16'd0};
     else count <= sum[16] ? 16'hFFFF : sum[15:0];
     if (known) assert (saturations == count);
   end

@@ -6,11 +6,11 @@
 //! fold     Q + 6                                from the last input beat to the first product
 //! pass     the kept columns of each product, at most Q, waiting until a step's operand has been finished
 //! rescale  v_00 is replayed once its exponent is known: Q more
-//! search   7 coarse sweeps of Q, at least (Q + 19)/2; the eighth and 7 halvings of Q + 21; one of Q + 7
+//! search   7 coarse sweeps of Q, at least (Q + 19)/2; the eighth and 7 halvings of Q + 22; one of Q + 7
 //!          (the last alone when nothing is searched)
 //! next     1 from a subarray's search to the passes of the one after it, which go on at the same time
 //! choose   2, where the case is chosen per frame
-//! send     begins with the last subarray's first value: 8 to the first beat, then one beat a cycle
+//! send     begins with the last subarray's first value: 9 to the first beat, then one beat a cycle
 //! ```
 
 use serde::Serialize;
@@ -32,17 +32,17 @@ const LANES: u64 = 9;
 /// More of them where columns are left out: the list of columns is a memory of its own.
 const COLUMNS: u64 = 2;
 /// From a row to its operand being readable: rescaler, operand memory.
-const OPERAND: u64 = 4;
+const OPERAND: u64 = 5;
 /// From the last raw row of v_00 to its first replayed row.
 const REPLAY: u64 = 3;
 /// From the last row to the search's start: rescaler, unfold, memory.
-const UNFOLD: u64 = 5;
+const UNFOLD: u64 = 6;
 /// From a sweep's beginning to its judgement, beyond its Q quads: memory 2, Taylor 4, candidates 2, score 6, judge 5.
 const JUDGED: u64 = 19;
 /// From a subarray's completion to the start of its search.
 const HAND_OVER: u64 = 1;
-/// From the search's start, or a judgement that is waited for, to the next sweep: the move, then the sweep.
-pub const SET_UP: u64 = 2;
+/// From the search's start, or a judgement that is waited for, to the next sweep: the move, where it leads, the sweep.
+pub const SET_UP: u64 = 3;
 /// Quads that a judged sweep lasts at least: its sums are weighed meanwhile.
 pub const SHORTEST_SWEEP: u64 = 4;
 /// The last sweep beyond its Q quads.
@@ -52,7 +52,7 @@ const UNSEARCHED: u64 = 2;
 /// From the start of a subarray's search to that of the next one's passes.
 const NEXT: u64 = 1;
 /// From the last subarray's first value, which stands Q cycles before their end, to the first beat on the output.
-const SEND: u64 = 8;
+const SEND: u64 = 9;
 
 /// How long a frame takes, in clock cycles.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]

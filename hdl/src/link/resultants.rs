@@ -29,8 +29,8 @@ pub struct Resultants {
     pub beat_valid: Signal<In, Bit>,
     /// It is its frame's last.
     pub beat_last: Signal<In, Bit>,
-    /// It is taken: from a register, so that the engine's pipeline does not wait for the packer's logic. A beat that is
-    /// a word stays for the cycle after that in which the word was taken.
+    /// It is taken. Where sums are made from a register, so that a fast engine's pipeline does not wait for the packer's
+    /// logic: a beat that is a word then stays for the cycle after that in which the word was taken.
     pub beat_ready: Signal<Out, Bit>,
     /// A word of the payload.
     pub word: Wire<Out>,
@@ -55,6 +55,8 @@ struct State {
     /// `beat_ready`, by what it is for.
     adding: bool,
     passing: bool,
+    /// A beat is being added: the hardware keeps it for a cycle.
+    late: bool,
 }
 
 const ADD: usize = 0;
@@ -129,10 +131,11 @@ impl Resultants {
         let at_end = old.row + 1 == rows && old.col + 1 == cols;
         let run = self.run.val() && !self.rst.val();
         self._state.adding = run && !self.passes() && old.stage == ADD && !(adds && at_end);
+        self._state.late = adds;
         self._state.passing = run && self.passes() && self.taken.val();
         if adds {
             self.add();
-        } else if self._state.stage == FINISH {
+        } else if self._state.stage == FINISH && !old.late {
             let s = &mut self._state;
             s.sums.moment_x += if s.more + 1 < cols { s.sums.fz } else { 0 };
             s.sums.moment_y += if s.more + 1 < rows { s.sums.fz } else { 0 };
@@ -160,9 +163,14 @@ impl Logic for Resultants {
             self.advance();
         }
         let s = self._state;
-        self.beat_ready.next = s.adding || s.passing;
-        let stands = if self.passes() { self.beat_valid.val() && !s.passing } else { s.stage == OUT };
-        self.word_valid.next = self.run.val() && stands;
+        let stands = if self.passes() { self.beat_valid.val() } else { s.stage == OUT };
+        if self._shape.resultants {
+            self.beat_ready.next = s.adding || s.passing;
+            self.word_valid.next = self.run.val() && stands && !s.passing;
+        } else {
+            self.beat_ready.next = self.run.val() && self.taken.val();
+            self.word_valid.next = self.run.val() && stands;
+        }
         self.word_last.next = self.passes() && self.beat_last.val();
         self.word.next = if self.passes() {
             self.beat.val()
@@ -190,10 +198,10 @@ impl Logic for Resultants {
         if !self._shape.resultants {
             return Verilog::Custom(
                 "\
-wire unused = &{1'b0, summarise};
-always @(posedge clk) beat_ready <= run && taken && !rst;
+wire unused = &{1'b0, clk, rst, summarise};
 always @(*) begin
-  word_valid = run && beat_valid && !beat_ready;
+  beat_ready = run && taken;
+  word_valid = run && beat_valid;
   word_last = beat_last;
   word = beat;
 end"
@@ -212,18 +220,20 @@ end"
 reg [1:0] stage, out;
 // `beat_ready`, by what it is for.
 reg adding, passing;
+// A beat is added a cycle after it is taken, with its place.
+reg late, first, opens;
+reg [95:0] kept;
 reg [{r_end}:0] row;
 reg [{c_end}:0] col;
 reg [{m_end}:0] more;
 reg [{end}:0] sum_x, sum_y, sum_z, moment_x, moment_y, line;
 reg [{l_end}:0] loaded;
-wire [{end}:0] x = {{{{{wider}{{beat[31]}}}}, beat[31:0]}};
-wire [{end}:0] y = {{{{{wider}{{beat[63]}}}}, beat[63:32]}};
-wire [{end}:0] z = {{{{{wider}{{beat[95]}}}}, beat[95:64]}};
+wire [{end}:0] x = {{{{{wider}{{kept[31]}}}}, kept[31:0]}};
+wire [{end}:0] y = {{{{{wider}{{kept[63]}}}}, kept[63:32]}};
+wire [{end}:0] z = {{{{{wider}{{kept[95]}}}}, kept[95:64]}};
 wire [{all_end}:0] all = {{{l_more}'d0, loaded, {sums}}};
 wire passes = !summarise || stage == 2'd{STATUS};
 wire line_end = col == {c}'d{last_col};
-wire first = row == {r}'d0 && col == {c}'d0;
 always @(*) begin
   beat_ready = adding || passing;
   word_valid = run && (passes ? beat_valid && !passing : stage == 2'd{OUT});
@@ -235,18 +245,22 @@ wire at_end = line_end && row == {r}'d{last_row};
 always @(posedge clk) begin
   adding <= !rst && run && !passes && stage == 2'd{ADD} && !(adds && at_end);
   passing <= !rst && run && passes && taken;
-  if (adds) begin
+  late <= adds;
+  first <= row == {r}'d0 && col == {c}'d0;
+  opens <= col == {c}'d0;
+  kept <= beat;
+  if (late) begin
     sum_x <= first ? x : sum_x + x;
     sum_y <= first ? y : sum_y + y;
     sum_z <= first ? z : sum_z + z;
-    loaded <= (first ? {l}'d0 : loaded) + {{{l_less}'d0, beat[95:64] != 32'd0}};
-    line <= col == {c}'d0 ? z : line + z;
-    moment_x <= first ? {bits}'d0 : col == {c}'d0 ? moment_x : moment_x - line;
-    moment_y <= first ? {bits}'d0 : col == {c}'d0 ? moment_y - sum_z : moment_y;
+    loaded <= (first ? {l}'d0 : loaded) + {{{l_less}'d0, kept[95:64] != 32'd0}};
+    line <= opens ? z : line + z;
+    moment_x <= first ? {bits}'d0 : opens ? moment_x : moment_x - line;
+    moment_y <= first ? {bits}'d0 : opens ? moment_y - sum_z : moment_y;
     more <= {m}'d0;
     out <= 2'd0;
   end
-  if (stage == 2'd{FINISH}) begin
+  if (stage == 2'd{FINISH} && !late) begin
     if (more < {m}'d{last_col}) moment_x <= moment_x + sum_z;
     if (more < {m}'d{last_row}) moment_y <= moment_y + sum_z;
     more <= more + {m}'d1;
@@ -262,7 +276,7 @@ always @(posedge clk) begin
       if (line_end) row <= at_end ? {r}'d0 : row + {r}'d1;
       if (at_end) stage <= 2'd{FINISH};
     end else if (stage == 2'd{FINISH}) begin
-      if (more == {m}'d{last_more}) stage <= 2'd{OUT};
+      if (!late && more == {m}'d{last_more}) stage <= 2'd{OUT};
     end else if (stage == 2'd{OUT} && taken) begin
       if (out == 2'd3) stage <= 2'd{STATUS};
     end else if (passing && beat_valid && beat_last) stage <= 2'd{ADD};

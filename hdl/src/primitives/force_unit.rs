@@ -16,9 +16,9 @@ use super::rescaler::SATURATION_BITS;
 use super::sweep::position_bits;
 use crate::wire::{Wire, Word};
 
-/// A pipeline that moves while `advance` is high: memory (2 steps), lane, products, shift, rounding with saturation,
+/// A pipeline that moves while `advance` is high: memory (3 steps), lane, products, shift, rounding with saturation,
 /// threshold and output. `beat` 0 is a force from `quad`, 1 … 3 are the status beats; the answer stands on `beat_data`
-/// seven steps after `offer`. `start` keeps μ, the shift and the status of subarray `part`, settled three cycles later;
+/// eight steps after `offer`. `start` keeps μ, the shift and the status of subarray `part`, settled three cycles later;
 /// `begin_frame` clears the frame's counts.
 #[derive(LogicBlock)]
 pub struct ForceUnit {
@@ -44,7 +44,7 @@ pub struct ForceUnit {
     pub beat_part: Wire<In>,
     /// The quad's lane, with `offer`.
     pub lane: Wire<In>,
-    /// Four values of p, two steps after `offer`.
+    /// Four values of p, three steps after `offer`.
     pub quad: Wire<In>,
     /// μ1 as a position.
     pub position_x: Wire<In>,
@@ -85,9 +85,9 @@ pub struct ForceUnit {
 }
 
 /// Steps from `offer` to the output.
-pub const STEPS: usize = 7;
+pub const STEPS: usize = 8;
 /// Steps of them from `offer` to `quad`.
-const READ_STEPS: usize = 2;
+const READ_STEPS: usize = 3;
 /// Width of the cycle counter.
 pub const CYCLE_BITS: usize = 24;
 
@@ -269,12 +269,12 @@ reg signed [{product_end}:0] product_x, product_y;
 wire signed [{product}:0] doubled_x = {{product_x, 1'b0}};
 wire signed [{product}:0] doubled_y = {{product_y, 1'b0}};
 reg signed [{product}:0] moved_x, moved_y;
-wire [{p_end}:0] status_x = xs[at6];
-wire [{p_end}:0] status_y = ys[at6];
+wire [{p_end}:0] status_x = xs[at7];
+wire [{p_end}:0] status_y = ys[at7];
 always @(posedge clk) begin
   if (advance) begin
-    mu_x <= mu_xs[at2];
-    mu_y <= mu_ys[at2];
+    mu_x <= mu_xs[at3];
+    mu_y <= mu_ys[at3];
     product_x <= value * mu_x;
     product_y <= value * mu_y;
     moved_x <= doubled_x >>> shift;
@@ -365,7 +365,7 @@ impl Logic for ForceUnit {
         let searched = f.degree > 0;
         let (mu_words, shear) = if searched { self.shear() } else { self.no_shear() };
         // From bit 4 on, or 5 where that tells of the coefficients.
-        let (from, damaged) = if self._checks { (5, ", damages[at6]") } else { (4, "") };
+        let (from, damaged) = if self._checks { (5, ", damages[at7]") } else { (4, "") };
         let above = word - CASE_SHIFT as usize;
         let case_word = match self._numbers.iter().any(|&number| number > 0) {
             false => format!("{}'d0{damaged}", word - from),
@@ -426,14 +426,14 @@ wire [7:0] raw_shift = 8'd{base} + {{{n_more}'d0, normalise_held}} - {{{r_more}'
     shifts[part2] <= shift_now;
   end
 end
-reg [5:0] offers;
-reg [1:0] beat1, beat2, beat3, beat4, beat5, beat6;
-reg [1:0] lane1, lane2;
-reg [{part_end}:0] at1, at2, at3, at4, at5, at6;
+reg [6:0] offers;
+reg [1:0] beat1, beat2, beat3, beat4, beat5, beat6, beat7;
+reg [1:0] lane1, lane2, lane3;
+reg [{part_end}:0] at1, at2, at3, at4, at5, at6, at7;
 reg [5:0] shift;
 reg signed [{v_end}:0] value;
-reg [{v_end}:0] value4;
-wire signed [{product}:0] doubled_z = {{{{{z_more}{{value4[{v_end}]}}}}, value4, {fraction_one}'d0}};
+reg [{v_end}:0] value5;
+wire signed [{product}:0] doubled_z = {{{{{z_more}{{value5[{v_end}]}}}}, value5, {fraction_one}'d0}};
 reg signed [{product}:0] moved_z;
 wire [{all_end}:0] rounded;
 wire [2:0] clips;
@@ -458,41 +458,41 @@ wire [{cap}:0] count = {{1'b0, force_saturations}} + {{{cap_less}'d0, clipped[0]
   + {{{cap_less}'d0, clipped[2]}};
 reg [{all_end}:0] status;
 always @(*) begin
-  case (beat6)
-    2'd1: status = {{{case_word}, framing, !contact, founds[at6], conditions[at6], {y_word}, {x_word}}};
-    2'd2: status = {{{n_word}'d0, normalises[at6], {r_word}'d0, rescales[at6], scores[at6]}};
-    default: status = {{{c_word}'d0, cycles_held, {cap_word}'d0, force_saturations, {cap_word}'d0, rescale_saturations[at6]}};
+  case (beat7)
+    2'd1: status = {{{case_word}, framing, !contact, founds[at7], conditions[at7], {y_word}, {x_word}}};
+    2'd2: status = {{{n_word}'d0, normalises[at7], {r_word}'d0, rescales[at7], scores[at7]}};
+    default: status = {{{c_word}'d0, cycles_held, {cap_word}'d0, force_saturations, {cap_word}'d0, rescale_saturations[at7]}};
   endcase
 end
-wire force_leaves = advance && offers[5] && beat6 == 2'd0;
+wire force_leaves = advance && offers[6] && beat7 == 2'd0;
 always @(posedge clk) begin
   if (rst) begin
-    offers <= 6'd0;
+    offers <= 7'd0;
     valid <= 1'b0;
     last <= 1'b0;
   end else if (advance) begin
-    offers <= {{offers[4:0], offer}};
-    valid <= offers[5];
-    last <= offers[5] && beat6 == 2'd3 && at6 == {final_part};
+    offers <= {{offers[5:0], offer}};
+    valid <= offers[6];
+    last <= offers[6] && beat7 == 2'd3 && at7 == {final_part};
   end
   if (advance) begin
-    {{beat6, beat5, beat4, beat3, beat2, beat1}} <= {{beat5, beat4, beat3, beat2, beat1, beat}};
-    {{at6, at5, at4, at3, at2, at1}} <= {{at5, at4, at3, at2, at1, beat_part}};
-    {{lane2, lane1}} <= {{lane1, lane}};
-    value <= lane2[1] ? (lane2[0] ? quad[{v3} +: {v}] : quad[{v2} +: {v}])
-      : (lane2[0] ? quad[{v} +: {v}] : quad[0 +: {v}]);
-    value4 <= value;
-    shift <= shifts[at3];
+    {{beat7, beat6, beat5, beat4, beat3, beat2, beat1}} <= {{beat6, beat5, beat4, beat3, beat2, beat1, beat}};
+    {{at7, at6, at5, at4, at3, at2, at1}} <= {{at6, at5, at4, at3, at2, at1, beat_part}};
+    {{lane3, lane2, lane1}} <= {{lane2, lane1, lane}};
+    value <= lane3[1] ? (lane3[0] ? quad[{v3} +: {v}] : quad[{v2} +: {v}])
+      : (lane3[0] ? quad[{v} +: {v}] : quad[0 +: {v}]);
+    value5 <= value;
+    shift <= shifts[at4];
     moved_z <= doubled_z >>> shift;
     words <= rounded;
     clipped <= clips;
-    if (offers[5]) beat_data <= beat6 != 2'd0 ? status : below ? {all}'d0 : words;
+    if (offers[6]) beat_data <= beat7 != 2'd0 ? status : below ? {all}'d0 : words;
   end
   if (begin_frame) begin
     counting <= 1'b1;
     contact <= 1'b0;
     force_saturations <= {cap}'d0;
-  end else if (advance && offers[5]) begin
+  end else if (advance && offers[6]) begin
     if (counting) cycles_held <= cycles + {c}'d4;
     counting <= 1'b0;
     if (force_leaves && !below && words[95:64] != 32'd0) contact <= 1'b1;

@@ -9,7 +9,7 @@ use crate::wire::{Wire, Word};
 
 /// A quad of accumulators, shifted right by `shift` when `measured`, by the constant of an A pass otherwise.
 ///
-/// `words` follow two cycles later, `operands` (the same, shortened to `data_bits`) three; `saturations` counts the
+/// `words` follow three cycles later, `operands` (the same, shortened to `data_bits`) four; `saturations` counts the
 /// clipped words of valid quads since `clear`, a cycle after they stand.
 #[derive(LogicBlock)]
 pub struct Rescaler {
@@ -25,13 +25,14 @@ pub struct Rescaler {
     pub shift: Wire<In>,
     /// Four accumulators.
     pub quad: Wire<In>,
-    /// Four v_ij, two cycles later.
+    /// Four v_ij, three cycles later.
     pub words: Wire<Out>,
-    /// Four operands, three cycles later.
+    /// Four operands, four cycles later.
     pub operands: Wire<Out>,
     /// Words saturated, 16 bits, stops at the largest count.
     pub saturations: Wire<Out>,
     _formats: Formats,
+    _taken: (Word, u32, bool),
     _shifted: [i64; 4],
     _valid: bool,
     _clips: u64,
@@ -54,6 +55,7 @@ impl Rescaler {
             operands: Wire::new(4 * formats.data_bits as usize),
             saturations: Wire::new(SATURATION_BITS),
             _formats: formats.clone(),
+            _taken: (Word::default(), 0, false),
             _shifted: [0; 4],
             _valid: false,
             _clips: 0,
@@ -79,10 +81,11 @@ impl Logic for Rescaler {
             });
             let clipped = rounded.iter().filter(|(_, clipped)| *clipped).count() as u64;
             self._clips = if self._valid { clipped } else { 0 };
+            let (quad, shift, valid) = self._taken;
+            self._shifted = std::array::from_fn(|lane| round_shift(quad.signed(lane, f.acc_bits as usize), shift));
+            self._valid = valid;
             let shift = if self.measured.val() { self.shift.val().number() as u32 } else { f.a_shift };
-            self._shifted =
-                std::array::from_fn(|lane| round_shift(self.quad.val().signed(lane, f.acc_bits as usize), shift));
-            self._valid = self.valid.val();
+            self._taken = (self.quad.val(), shift, self.valid.val());
         }
     }
 
@@ -101,14 +104,18 @@ impl Logic for Rescaler {
         let cap = SATURATION_BITS;
         Verilog::Custom(format!(
             "\
-wire [{shift_end}:0] amount = measured ? shift : {shift_bits}'d{a_shift};
-reg valid1;
+reg [{shift_end}:0] amount;
+reg [{quad_end}:0] taken;
+reg valid1, valid2;
 wire [3:0] clipped;
 reg [2:0] clips;
 wire [{cap}:0] count = {{1'b0, saturations}} + {{{count_more}'d0, clips}};
 always @(posedge clk) begin
+  amount <= measured ? shift : {shift_bits}'d{a_shift};
+  taken <= quad;
   valid1 <= valid;
-  clips <= valid1 ? {{2'd0, clipped[0]}} + {{2'd0, clipped[1]}} + {{2'd0, clipped[2]}} + {{2'd0, clipped[3]}} : 3'd0;
+  valid2 <= valid1;
+  clips <= valid2 ? {{2'd0, clipped[0]}} + {{2'd0, clipped[1]}} + {{2'd0, clipped[2]}} + {{2'd0, clipped[3]}} : 3'd0;
   if (clear) saturations <= {cap}'d0;
   else saturations <= count[{cap}] ? {{{cap}{{1'b1}}}} : count[{cap_end}:0];
 end
@@ -117,7 +124,7 @@ generate
   for (l = 0; l < 4; l = l + 1) begin : lane
     // One bit below the LSB is kept, so that adding one and dropping it rounds half up.
     reg signed [{acc}:0] moved;
-    wire signed [{acc}:0] doubled = {{quad[l * {acc} +: {acc}], 1'b0}};
+    wire signed [{acc}:0] doubled = {{taken[l * {acc} +: {acc}], 1'b0}};
     wire [{r}:0] half_up = moved[{r}:0] + {r_more}'d1;
     // Whether the rounded word fits is told beside the rounding, not after it: what is above must be sign bits once the
     // carry out of the low bits has come in.
@@ -136,6 +143,7 @@ generate
   end
 endgenerate",
             shift_end = shift_bits - 1,
+            quad_end = 4 * acc - 1,
             a_shift = f.a_shift,
             count_more = cap + 1 - 3,
             cap_end = cap - 1,

@@ -10,7 +10,7 @@ use crate::wire::{Wire, Word};
 
 /// Sweeps over the coarse tiles, then the halvings, then one that only moves to the winner.
 ///
-/// `set_up`, which may come with `judged` where the sweeps are coarse and otherwise comes two cycles after it or after
+/// `set_up`, which may come with `judged` where the sweeps are coarse and otherwise comes three cycles after it or after
 /// `begin_frame`, begins a sweep, whose move, word and buffers stand from the next cycle until the following `set_up`. Coarse sweeps follow one another without waiting for their judgement (`chains`): each reads
 /// what the one before has written, and writes the buffer that is neither that nor the best so far. So three buffers
 /// are enough as long as a sweep is judged before the next but one is set up. Halvings work in place. `judged` with
@@ -214,17 +214,17 @@ always @(*) next_halves = is_halving;
 {from_fields}wire unused = &{{1'b0, best_square, best_coarse, best_closes, from_coarse, from_closes, best_x, best_y,
   best_centre_x, best_centre_y, judged_centre_x, judged_centre_y, judged_square, judged_buffer, judged_closes}};
 // The best is at most one step away from the centre of its polynomial.
+// The move stands in registers, and so does where it leads, before the sweep is set up.
+reg [1:0] go_x, go_y;
 wire [1:0] step_x = is_coarse ? table_x : best_x[1:0] - from_centre_x[1:0];
 wire [1:0] step_y = is_coarse ? table_y : best_y[1:0] - from_centre_y[1:0];
 wire [{q_end}:0] twice_x = {{{{{q_more}{{from_centre_x[{p_end}]}}}}, from_centre_x, 1'b0}};
 wire [{q_end}:0] twice_y = {{{{{q_more}{{from_centre_y[{p_end}]}}}}, from_centre_y, 1'b0}};
-wire [{q_end}:0] along_x = step_x[1] ? {q}'d1 - twice_x : step_x[0] ? {q}'d1 + twice_x : {q}'d0;
-wire [{q_end}:0] along_y = step_y[1] ? {q}'d1 - twice_y : step_y[0] ? {q}'d1 + twice_y : {q}'d0;
+wire [{q_end}:0] along_x = go_x[1] ? {q}'d1 - twice_x : go_x[0] ? {q}'d1 + twice_x : {q}'d0;
+wire [{q_end}:0] along_y = go_y[1] ? {q}'d1 - twice_y : go_y[0] ? {q}'d1 + twice_y : {q}'d0;
 wire [{q_end}:0] to_square = from_square + along_x + along_y;
-wire [{p_end}:0] to_x = from_centre_x + {{{{{p_more}{{step_x[1]}}}}, step_x}};
-wire [{p_end}:0] to_y = from_centre_y + {{{{{p_more}{{step_y[1]}}}}, step_y}};
-// Where the sweep goes has been known for a cycle when it is set up.
-reg [1:0] go_x, go_y;
+wire [{p_end}:0] to_x = from_centre_x + {{{{{p_more}{{go_x[1]}}}}, go_x}};
+wire [{p_end}:0] to_y = from_centre_y + {{{{{p_more}{{go_y[1]}}}}, go_y}};
 reg [{p_end}:0] at_x, at_y;
 reg [{q_end}:0] at_square;
 always @(posedge clk) begin

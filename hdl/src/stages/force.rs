@@ -4,7 +4,7 @@ use dermis_golden::fixed::Model;
 use rust_hdl::prelude::*;
 
 use crate::primitives::{
-    count_bits, frame_quads, position_bits, shift_bits, Counter, ForceUnit, Ram, CYCLE_BITS, SATURATION_BITS,
+    count_bits, frame_quads, position_bits, shift_bits, Counter, ForceUnit, Keep, Ram, CYCLE_BITS, SATURATION_BITS,
 };
 use crate::wire::Wire;
 
@@ -68,6 +68,7 @@ pub struct Force {
     /// `{fz, fy, fx}`.
     pub m_axis_tdata: Wire<Out>,
     quads: Counter,
+    asked: Keep,
     store: Ram,
     unit: ForceUnit,
 }
@@ -109,6 +110,7 @@ impl Force {
             m_axis_tlast: Default::default(),
             m_axis_tdata: Wire::new(unit.beat_data.width()),
             quads: Counter::new(quads),
+            asked: Keep::new(address),
             store: Ram::new(quads, 1, value).registered(),
             unit,
         }
@@ -119,6 +121,7 @@ impl Logic for Force {
     #[hdl_gen]
     fn update(&mut self) {
         self.quads.clk.next = self.clk.val();
+        self.asked.clk.next = self.clk.val();
         self.store.clk.next = self.clk.val();
         self.unit.clk.next = self.clk.val();
         self.unit.rst.next = self.rst.val();
@@ -128,7 +131,9 @@ impl Logic for Force {
         self.store.write_address.next = self.quads.value.val();
         self.store.write_data.next = self.values.val();
         self.store.read.next = self.advance.val();
-        self.store.read_address.next = self.address.val();
+        self.asked.keep.next = self.advance.val();
+        self.asked.word.next = self.address.val();
+        self.store.read_address.next = self.asked.kept.val();
 
         self.unit.which.next = self.which.val();
         self.unit.begin_frame.next = self.begin_frame.val();

@@ -12,7 +12,7 @@ use crate::primitives::{
 };
 use crate::wire::Wire;
 
-/// Rows of accumulators in; words two cycles after the rescaler got them, operands three.
+/// Rows of accumulators in; words three cycles after the rescaler got them, operands four.
 #[derive(LogicBlock)]
 pub struct Rescale {
     /// Clock.
@@ -80,7 +80,7 @@ impl Rescale {
             length: RawLength::new(formats),
             rescaler: Rescaler::new(formats),
             read: BitDelay::new(2),
-            words_later: BitDelay::new(2),
+            words_later: BitDelay::new(3),
             operands_later: BitDelay::new(1),
             collected: Default::default(),
             enters: Default::default(),

@@ -35,7 +35,7 @@ fn rescaled_words_are_rounded_and_held_to_their_range() {
         ("overflow ? ", "1'b0 ? "),
         (half.as_str(), none.as_str()),
         ("carry ? ", "1'b0 ? "),
-        ("clips <= valid1 ? ", "clips <= 1'b1 ? "),
+        ("clips <= valid2 ? ", "clips <= 1'b1 ? "),
     ];
     Proof { generated: &generated, property: "rescale.v", given, defect: defects[0], open_products: false }
         .fails_with(&defects);
@@ -110,7 +110,7 @@ fn sums_come_before_the_status() {
         ("BLOCK", block_with(generated, "(clk,rst,run,taken,summarise,beat,")),
         ("TAXELS", number(ROWS * COLS)),
         ("LAST", number(ROWS * COLS + STATUS_BEATS - 1)),
-        ("MOST", number(ROWS.max(COLS) + 1)),
+        ("MOST", number(ROWS.max(COLS) + 2)),
     ];
     let defect = ("if (out == 2'd3) stage <= 2'd3;", "if (out == 2'd2) stage <= 2'd3;");
     Proof { generated, property: "sums.v", given, defect, open_products: false }.run();
