@@ -55,8 +55,6 @@ struct State {
     /// `beat_ready`, by what it is for.
     adding: bool,
     passing: bool,
-    /// A beat is being added: the hardware keeps it for a cycle.
-    late: bool,
 }
 
 const ADD: usize = 0;
@@ -131,11 +129,10 @@ impl Resultants {
         let at_end = old.row + 1 == rows && old.col + 1 == cols;
         let run = self.run.val() && !self.rst.val();
         self._state.adding = run && !self.passes() && old.stage == ADD && !(adds && at_end);
-        self._state.late = adds;
         self._state.passing = run && self.passes() && self.taken.val();
         if adds {
             self.add();
-        } else if self._state.stage == FINISH && !old.late {
+        } else if self._state.stage == FINISH {
             let s = &mut self._state;
             s.sums.moment_x += if s.more + 1 < cols { s.sums.fz } else { 0 };
             s.sums.moment_y += if s.more + 1 < rows { s.sums.fz } else { 0 };
@@ -220,20 +217,18 @@ end"
 reg [1:0] stage, out;
 // `beat_ready`, by what it is for.
 reg adding, passing;
-// A beat is added a cycle after it is taken, with its place.
-reg late, first, opens;
-reg [95:0] kept;
 reg [{r_end}:0] row;
 reg [{c_end}:0] col;
 reg [{m_end}:0] more;
 reg [{end}:0] sum_x, sum_y, sum_z, moment_x, moment_y, line;
 reg [{l_end}:0] loaded;
-wire [{end}:0] x = {{{{{wider}{{kept[31]}}}}, kept[31:0]}};
-wire [{end}:0] y = {{{{{wider}{{kept[63]}}}}, kept[63:32]}};
-wire [{end}:0] z = {{{{{wider}{{kept[95]}}}}, kept[95:64]}};
+wire [{end}:0] x = {{{{{wider}{{beat[31]}}}}, beat[31:0]}};
+wire [{end}:0] y = {{{{{wider}{{beat[63]}}}}, beat[63:32]}};
+wire [{end}:0] z = {{{{{wider}{{beat[95]}}}}, beat[95:64]}};
 wire [{all_end}:0] all = {{{l_more}'d0, loaded, {sums}}};
 wire passes = !summarise || stage == 2'd{STATUS};
 wire line_end = col == {c}'d{last_col};
+wire first = row == {r}'d0 && col == {c}'d0;
 always @(*) begin
   beat_ready = adding || passing;
   word_valid = run && (passes ? beat_valid && !passing : stage == 2'd{OUT});
@@ -245,22 +240,18 @@ wire at_end = line_end && row == {r}'d{last_row};
 always @(posedge clk) begin
   adding <= !rst && run && !passes && stage == 2'd{ADD} && !(adds && at_end);
   passing <= !rst && run && passes && taken;
-  late <= adds;
-  first <= row == {r}'d0 && col == {c}'d0;
-  opens <= col == {c}'d0;
-  kept <= beat;
-  if (late) begin
+  if (adds) begin
     sum_x <= first ? x : sum_x + x;
     sum_y <= first ? y : sum_y + y;
     sum_z <= first ? z : sum_z + z;
-    loaded <= (first ? {l}'d0 : loaded) + {{{l_less}'d0, kept[95:64] != 32'd0}};
-    line <= opens ? z : line + z;
-    moment_x <= first ? {bits}'d0 : opens ? moment_x : moment_x - line;
-    moment_y <= first ? {bits}'d0 : opens ? moment_y - sum_z : moment_y;
+    loaded <= (first ? {l}'d0 : loaded) + {{{l_less}'d0, beat[95:64] != 32'd0}};
+    line <= col == {c}'d0 ? z : line + z;
+    moment_x <= first ? {bits}'d0 : col == {c}'d0 ? moment_x : moment_x - line;
+    moment_y <= first ? {bits}'d0 : col == {c}'d0 ? moment_y - sum_z : moment_y;
     more <= {m}'d0;
     out <= 2'd0;
   end
-  if (stage == 2'd{FINISH} && !late) begin
+  if (stage == 2'd{FINISH}) begin
     if (more < {m}'d{last_col}) moment_x <= moment_x + sum_z;
     if (more < {m}'d{last_row}) moment_y <= moment_y + sum_z;
     more <= more + {m}'d1;
@@ -276,7 +267,7 @@ always @(posedge clk) begin
       if (line_end) row <= at_end ? {r}'d0 : row + {r}'d1;
       if (at_end) stage <= 2'd{FINISH};
     end else if (stage == 2'd{FINISH}) begin
-      if (!late && more == {m}'d{last_more}) stage <= 2'd{OUT};
+      if (more == {m}'d{last_more}) stage <= 2'd{OUT};
     end else if (stage == 2'd{OUT} && taken) begin
       if (out == 2'd3) stage <= 2'd{STATUS};
     end else if (passing && beat_valid && beat_last) stage <= 2'd{ADD};
