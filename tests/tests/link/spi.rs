@@ -143,7 +143,8 @@ fn every_rate_and_phase_is_understood() {
 fn idle_reads_bring_idle_and_garbage_is_counted_and_forgotten() {
     let mut board = Board::new(small(SINGLE_BYTE), RATE, 0.2, &BOTH);
     assert_eq!(board.controller.transfer(&[IDLE; 30]), [IDLE; 30]);
-    let garbage: Vec<u8> = (0..60).map(|byte| byte * 7 + 1).filter(|byte| *byte != END).collect();
+    let garbage: Vec<u8> =
+        (0u8..60).map(|byte| byte.wrapping_mul(7).wrapping_add(1)).filter(|byte| *byte != END).collect();
     let frame = board.questions.frame(0, Kind::FrameForForces, 1).to_wire();
     // A frame with IDLE bytes anywhere in it, behind what belongs to no packet.
     let spread: Vec<u8> = frame.iter().flat_map(|&byte| [IDLE, byte, IDLE]).collect();
