@@ -198,7 +198,7 @@ end
             .collect();
         let from_start = match self._apart {
             true => format!("reg from_start;\nalways @(posedge clk) from_start <= read_buffer == 2'd{START};\n"),
-            false => String::new(),
+            false => "wire unused_buffer = &{1'b0, read_buffer};\n".to_string(),
         };
         Verilog::Custom(format!(
             "{lanes}{write_to}{read_from}{from_start}{memories}",
