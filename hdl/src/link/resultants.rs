@@ -129,7 +129,7 @@ impl Resultants {
         let at_end = old.row + 1 == rows && old.col + 1 == cols;
         let run = self.run.val() && !self.rst.val();
         self._state.adding = run && !self.passes() && old.stage == ADD && !(adds && at_end);
-        self._state.passing = run && self.passes() && self.taken.val();
+        self._state.passing = self._shape.resultants && run && self.passes() && self.taken.val();
         if adds {
             self.add();
         } else if self._state.stage == FINISH {
@@ -161,13 +161,11 @@ impl Logic for Resultants {
         }
         let s = self._state;
         let stands = if self.passes() { self.beat_valid.val() } else { s.stage == OUT };
-        if self._shape.resultants {
-            self.beat_ready.next = s.adding || s.passing;
-            self.word_valid.next = self.run.val() && stands && !s.passing;
-        } else {
-            self.beat_ready.next = self.run.val() && self.taken.val();
-            self.word_valid.next = self.run.val() && stands;
-        }
+        self.word_valid.next = self.run.val() && stands && !s.passing;
+        self.beat_ready.next = match self._shape.resultants {
+            true => s.adding || s.passing,
+            false => self.run.val() && self.taken.val(),
+        };
         self.word_last.next = self.passes() && self.beat_last.val();
         self.word.next = if self.passes() {
             self.beat.val()

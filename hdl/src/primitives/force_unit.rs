@@ -10,6 +10,7 @@ use rust_hdl::prelude::*;
 
 use super::case_counter::{largest, number_by_case};
 use super::counter::count_bits;
+use super::half_up::half_up;
 use super::polynomial_word::resize;
 use super::raw_length::shift_bits;
 use super::rescaler::SATURATION_BITS;
@@ -356,7 +357,6 @@ impl Logic for ForceUnit {
         // force_shift = base + normalise − rescale, held between 0 and the largest useful shift.
         let base = force_shift(f, 0, 0) as usize;
         let (word, cap) = (FORCE_BITS as usize, SATURATION_BITS);
-        let over = product - word;
         let score = resize("score", self.score.width(), word);
         let threshold = match self._threshold {
             0 => "1'b0".to_string(),
@@ -443,12 +443,7 @@ reg [2:0] clipped;
 generate
   for (axis = {first_axis}; axis < 3; axis = axis + 1) begin : component
     wire [{product}:0] moved = {moved};
-    wire [{word}:0] half_up = moved[{word}:0] + {word_more}'d1;
-    // As in the rescaler: whether the rounded word fits is told beside the rounding.
-    wire carry = &moved[{word_end}:0];
-    wire [{over}:0] above = moved[{product}:{word}];
-    assign clips[axis] = carry ? !(&above[{over}:1]) : (|above && !(&above));
-    assign rounded[axis * {word} +: {word}] =
+{rounding}    assign rounded[axis * {word} +: {word}] =
       clips[axis] ? {{moved[{product}], {{{word_end}{{!moved[{product}]}}}}}} : half_up[{word}:1];
     wire unused = &{{1'b0, half_up[0]}};
   end
@@ -522,7 +517,7 @@ end",
             v_end = v - 1,
             v2 = 2 * v,
             v3 = 3 * v,
-            word_more = word + 1,
+            rounding = half_up(product + 1, word, "clips[axis]"),
             z_more = product - v - fraction,
             fraction_one = fraction + 1,
             first_axis = if searched { 0 } else { 2 },

@@ -19,6 +19,7 @@ mod delay;
 mod filler;
 mod force_unit;
 mod gather;
+mod half_up;
 mod judge;
 mod keep;
 mod lanes;

@@ -4,6 +4,7 @@ use dermis_golden::fixed::arith::{round_shift, saturate};
 use dermis_golden::fixed::formats::{Formats, SEARCH_EXTRA_BITS};
 use rust_hdl::prelude::*;
 
+use super::half_up::half_up;
 use super::raw_length::shift_bits;
 use crate::wire::{Wire, Word};
 
@@ -99,7 +100,6 @@ impl Logic for Rescaler {
         let f = &self._formats;
         let (acc, r, d) = (f.acc_bits as usize, f.vector_bits as usize, f.data_bits as usize);
         let extra = SEARCH_EXTRA_BITS as usize;
-        let over = acc - r;
         let shift_bits = self.shift.width();
         let cap = SATURATION_BITS;
         Verilog::Custom(format!(
@@ -125,13 +125,7 @@ generate
     // One bit below the LSB is kept, so that adding one and dropping it rounds half up.
     reg signed [{acc}:0] moved;
     wire signed [{acc}:0] doubled = {{taken[l * {acc} +: {acc}], 1'b0}};
-    wire [{r}:0] half_up = moved[{r}:0] + {r_more}'d1;
-    // Whether the rounded word fits is told beside the rounding, not after it: what is above must be sign bits once the
-    // carry out of the low bits has come in.
-    wire carry = &moved[{r_end}:0];
-    wire [{over}:0] above = moved[{acc}:{r}];
-    assign clipped[l] = carry ? !(&above[{over}:1]) : (|above && !(&above));
-    wire [{r_end}:0] now = words[l * {r} +: {r}];
+{rounding}    wire [{r_end}:0] now = words[l * {r} +: {r}];
     wire [{short_end}:0] operand = {{now[{r_end}], now[{r_end}:{extra_low}]}} + {short}'d1;
     wire overflow = operand[{short_end}] != operand[{short_less}];
     wire unused = &{{1'b0, operand[0], now, half_up[0]}};
@@ -147,7 +141,7 @@ endgenerate",
             a_shift = f.a_shift,
             count_more = cap + 1 - 3,
             cap_end = cap - 1,
-            r_more = r + 1,
+            rounding = half_up(acc + 1, r, "clipped[l]"),
             r_end = r - 1,
             r_less = r - 1,
             extra_low = extra - 1,

@@ -11,7 +11,7 @@ use crate::primitives::{count_bits, BitDelay, Blank, Delay, Gather, Ram, Scan, S
 use crate::wire::Wire;
 
 /// ```text
-/// s_axis --> frame buffer --> quad (one cycle after quad_address)
+/// s_axis --> frame buffer --> quad (two cycles after quad_address)
 ///       \--> magnitude, positive, negative
 /// ```
 /// `full` from two cycles after the frame's last beat until `free`; the gathered values stand as long.
