@@ -93,6 +93,11 @@ impl Parser {
         self._frame_bytes + OVERHEAD as u32 + 1
     }
 
+    /// Position behind a frame's payload.
+    fn payload_end(&self) -> u32 {
+        self._frame_bytes + 4
+    }
+
     /// Whether the packet may be taken, and else what is wrong with it; neither where there is none.
     fn judge(&self) -> (bool, u32) {
         let s = self._state;
@@ -135,7 +140,7 @@ impl Parser {
                 3 => s.length |= u32::from(data) << 8,
                 _ => (),
             }
-            s.streaming |= self.begins();
+            s.streaming = s.streaming && s.count + 1 != self.payload_end() || self.begins();
             s.count = (s.count + 1).min(self.most());
         }
         if self.rst.val() {
@@ -152,7 +157,7 @@ impl Logic for Parser {
         }
         let s = &self._state;
         self.frame_begin.next = self.begins();
-        self.payload.next = self.content_valid.val() && s.streaming && s.count < self._frame_bytes + 4;
+        self.payload.next = self.content_valid.val() && s.streaming;
         self.good.next = s.good;
         self.bad.next = s.fault != 0;
         self.fault.next = Word::from(u64::from(s.fault));
@@ -186,7 +191,7 @@ wire wrong_length = frame ? count != {c}'d{frame_end} || !frame_length : count !
 wire empty = count == {c}'d0 && !lost;
 always @(*) begin
   frame_begin = content_valid && count == {c}'d3 && frame && frame_length && content == 8'd{high};
-  payload = content_valid && streaming && count < {c}'d{payload_end};
+  payload = content_valid && streaming;
   bad = fault != 4'd0;
 end
 always @(posedge clk) begin
@@ -207,6 +212,7 @@ always @(posedge clk) begin
         no_length <= (no_length || !count[0]) && content == 8'd0;
       end
       if (frame_begin) streaming <= 1'b1;
+      else if (count == {c}'d{payload_last}) streaming <= 1'b0;
       if (count != {c}'d{most}) count <= count + {c}'d1;
     end
   end
@@ -217,7 +223,7 @@ end",
             most = self.most(),
             high = self._frame_bytes >> 8,
             low = self._frame_bytes & 0xff,
-            payload_end = self._frame_bytes + 4,
+            payload_last = self.payload_end() - 1,
         ))
     }
 }

@@ -248,11 +248,12 @@ impl Logic for Lanes {
         let product = 2 * M;
         let wide = product + align;
         // Only products of two high limbs are shifted; without limbs there is nothing to choose.
-        let (align_registers, shifted) = match align {
-            0 => (String::new(), "product".to_string()),
+        let (align_register, aligns, shifted) = match align {
+            0 => (String::new(), String::new(), "product".to_string()),
             _ => (
-                "reg align1, align2;\nalways @(posedge clk) {align2, align1} <= {align1, control[0]};\n".to_string(),
-                format!("align2 ? {{product, {align}'d0}} : {{{{{align}{{product[{}]}}}}, product}}", product - 1),
+                "reg align1;\nalways @(posedge clk) align1 <= control[0];\n".to_string(),
+                "      reg aligns;\n      (* keep *) always @(posedge clk) aligns <= align1;\n".to_string(),
+                format!("aligns ? {{product, {align}'d0}} : {{{{{align}{{product[{}]}}}}, product}}", product - 1),
             ),
         };
         let aligned = resize("shifted", wide, acc_bits);
@@ -297,7 +298,7 @@ always @(posedge clk) begin
   {{first2, first1}} <= {{first1, control[1]}};
   {{last4, last3, last2, last1}} <= {{last3, last2, last1, control[2]}};
 end
-{align_registers}{count_group}{check}always @(posedge clk) begin
+{align_register}{count_group}{check}always @(posedge clk) begin
   if (rst) left <= {row_bits}'d0;
   else if (valid4 && last4) left <= {rows};
   else if (left != {row_bits}'d0) left <= left - {row_bits}'d1;
@@ -321,7 +322,7 @@ generate
         begins <= first2;
         leaves <= valid3 && last3;
       end
-      wire [{wide_end}:0] shifted = {shifted};
+{aligns}      wire [{wide_end}:0] shifted = {shifted};
       wire unused = &{{1'b0, shifted}};
       assign chain_in[k * {acc_bits} +: {acc_bits}] = chain;
       always @(posedge clk) begin

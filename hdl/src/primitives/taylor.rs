@@ -99,16 +99,22 @@ impl Logic for Taylor {
         Verilog::Custom(format!(
             "\
 // The step goes along: x is moved in the second cycle, y in the fourth.
-reg [1:0] dx, dy, dy1, dy2;
-reg halving, halving1, halving2;
+reg [1:0] dy1, dy2;
+reg halving1, halving2;
 always @(posedge clk) begin
-  {{halving1, dy1, dx}} <= step;
+  {{halving1, dy1}} <= step[4:2];
   {{halving2, dy2}} <= {{halving1, dy1}};
-  {{halving, dy}} <= {{halving2, dy2}};
 end
 genvar l;
 generate
   for (l = 0; l < {lanes}; l = l + 1) begin : lane
+    // Of its own: it steers every bit of the lane. Synthesis is not to merge them.
+    reg [1:0] dx, dy;
+    reg halving;
+    (* keep *) always @(posedge clk) begin
+      dx <= step[1:0];
+      {{halving, dy}} <= {{halving2, dy2}};
+    end
 {body}  end
 endgenerate",
             lanes = self._layout.lanes
