@@ -65,6 +65,7 @@ pub struct Engine {
     pub(crate) forces: Force,
     send: Send,
     resultants: Resultants,
+    begins: DFF<Bit>,
     computing: DFF<Bit>,
     first: DFF<Bit>,
     filled: DFF<Bit>,
@@ -127,6 +128,7 @@ impl Engine {
             forces: force,
             send: Send::new(model),
             resultants: Resultants::new(model.wants_resultants(), &model.scene.sensor, model.grid()),
+            begins: Default::default(),
             computing: Default::default(),
             first: Default::default(),
             filled: Default::default(),
@@ -191,6 +193,7 @@ impl Logic for Engine {
         self.opens.rst.next = self.rst.val();
         self.finish.clk.next = self.clk.val();
         self.finish.rst.next = self.rst.val();
+        self.begins.clock.next = self.clk.val();
         self.computing.clock.next = self.clk.val();
         self.first.clock.next = self.clk.val();
         self.filled.clock.next = self.clk.val();
@@ -220,8 +223,12 @@ impl Logic for Engine {
         self.resultants.rst.next = self.rst.val();
 
         comment!("A frame begins when it is whole and the last one computed");
-        self.begin_frame.next =
-            self.receive.full.val() & !self.computing.q.val() & (!self.sending.q.val() | self.ahead.val());
+        self.begins.d.next = self.receive.full.val()
+            & !self.begins.q.val()
+            & !self.computing.q.val()
+            & (!self.sending.q.val() | self.ahead.val())
+            & !self.rst.val();
+        self.begin_frame.next = self.begins.q.val();
         self.computing.d.next =
             (self.begin_frame.val() | (self.computing.q.val() & !self.finish.then.val())) & !self.rst.val();
 

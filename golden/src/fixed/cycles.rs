@@ -24,7 +24,7 @@ use super::serial;
 use crate::board::EngineKind;
 
 /// From the last input beat to the cycle in which the frame starts.
-const ACCEPT: u64 = 2;
+const ACCEPT: u64 = 3;
 /// `fold` beyond its Q quads: start, frame buffer, normalise, butterfly, memory.
 const FOLD: u64 = 6;
 /// From a product's issue to the first row of its accumulators: addresses 1, memories 2, selection 1, lanes 5.
@@ -37,14 +37,14 @@ const OPERAND: u64 = 5;
 const REPLAY: u64 = 3;
 /// From the last row to the search's start: rescaler, unfold, memory.
 const UNFOLD: u64 = 6;
-/// From a sweep's beginning to its judgement, beyond its Q quads: memory 2, Taylor 4, candidates 2, score 6, judge 5.
-const JUDGED: u64 = 19;
+/// From a sweep's beginning to its judgement, beyond its Q quads: memory 2, Taylor 4, candidates 2, score 6, judge 6.
+const JUDGED: u64 = 20;
 /// From a subarray's completion to the start of its search.
 const HAND_OVER: u64 = 1;
 /// From the search's start, or a judgement that is waited for, to the next sweep: the move, where it leads, the sweep.
 pub const SET_UP: u64 = 3;
 /// Quads that a judged sweep lasts at least: its sums are weighed meanwhile.
-pub const SHORTEST_SWEEP: u64 = 4;
+pub const SHORTEST_SWEEP: u64 = 5;
 /// The last sweep beyond its Q quads.
 const LAST_SWEEP: u64 = 7;
 /// From a subarray's values to their sending, where nothing is searched.
@@ -52,7 +52,7 @@ const UNSEARCHED: u64 = 2;
 /// From the start of a subarray's search to that of the next one's passes.
 const NEXT: u64 = 1;
 /// From the last subarray's first value, which stands Q cycles before their end, to the first beat on the output.
-const SEND: u64 = 9;
+const SEND: u64 = 11;
 
 /// How long a frame takes, in clock cycles.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]

@@ -36,7 +36,7 @@ pub struct Sources {
     pub answer_wanted: Signal<Out, Bit>,
     /// The engine's answer is summed up.
     pub summarise: Signal<Out, Bit>,
-    /// The byte.
+    /// The byte, like the two below from a register: the packer looks at it five cycles after `index` at the soonest.
     pub octet: Wire<Out>,
     /// Its word stands.
     pub word_valid: Signal<Out, Bit>,
@@ -75,21 +75,21 @@ impl Logic for Sources {
         let source = self.source.val().number() as usize;
         let own = source == IDENTITY || source == COUNTERS;
         let index = self.index.val().number() as usize;
+        let counters = source & 1 == 1;
         if self.clk.pos_edge() {
+            (self.word_valid.next, self.word_last.next) = match own {
+                true => (self.entry_valid.val(), counters || self._second),
+                false => (self.answer_valid.val(), self.answer_last.val()),
+            };
+            self.octet.next = Word::from(match own {
+                true => self.entry.val().field(8 * (index & 1), 8),
+                false => self.answer.val().field(8 * index.min(11), 8),
+            });
             self._second = !self.begun.val() && (self._second || self.taken.val());
         }
-        let counters = source & 1 == 1;
         self.address.next = Word::from(u64::from(counters) << 4 | u64::from(self._second) << 3 | (index as u64) >> 1);
         self.answer_wanted.next = self.wanted.val() && !own;
         self.summarise.next = !counters;
-        (self.word_valid.next, self.word_last.next) = match own {
-            true => (self.entry_valid.val(), counters || self._second),
-            false => (self.answer_valid.val(), self.answer_last.val()),
-        };
-        self.octet.next = Word::from(match own {
-            true => self.entry.val().field(8 * (index & 1), 8),
-            false => self.answer.val().field(8 * index.min(11), 8),
-        });
     }
 
     fn connect(&mut self) {
@@ -111,12 +111,14 @@ always @(*) begin
   address = {source[0], second, index[3:1]};
   answer_wanted = wanted && source[1];
   summarise = !source[0];
-  word_valid = source[1] ? answer_valid : entry_valid;
-  word_last = source[1] ? answer_last : source[0] || second;
-  octet = index[0] ? both[15:8] : both[7:0];
 end
-always @(posedge clk) second <= !begun && (second || taken);"
-                .to_string(),
+always @(posedge clk) begin
+  second <= !begun && (second || taken);
+  word_valid <= source[1] ? answer_valid : entry_valid;
+  word_last <= source[1] ? answer_last : source[0] || second;
+  octet <= index[0] ? both[15:8] : both[7:0];
+end"
+            .to_string(),
         )
     }
 }

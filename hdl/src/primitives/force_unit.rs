@@ -1,7 +1,7 @@
 //! p to force words, and the output beats with their status.
 
 use dermis_golden::fixed::force::{force, mu_word};
-use dermis_golden::fixed::formats::{force_shift, Formats, FORCE_BITS, FORCE_SHIFT_MAX, MU_ROUND};
+use dermis_golden::fixed::formats::{force_shift, Formats, FORCE_BITS, FORCE_SHIFT_MAX, MULTIPLIER_BITS, MU_ROUND};
 use dermis_golden::fixed::send::{
     CASE_SHIFT, FLAG_COEFFICIENTS, FLAG_CONDITION, FLAG_FOUND, FLAG_FRAMING, FLAG_NO_CONTACT,
 };
@@ -17,9 +17,9 @@ use super::rescaler::SATURATION_BITS;
 use super::sweep::position_bits;
 use crate::wire::{Wire, Word};
 
-/// A pipeline that moves while `advance` is high: memory (3 steps), lane, products, shift, rounding with saturation,
-/// threshold and output. `beat` 0 is a force from `quad`, 1 … 3 are the status beats; the answer stands on `beat_data`
-/// eight steps after `offer`. `start` keeps μ, the shift and the status of subarray `part`, settled three cycles later;
+/// A pipeline that moves while `advance` is high: memory (3 steps), lane, products (2), shift, rounding with saturation,
+/// threshold, output. `beat` 0 is a force from `quad`, 1 … 3 are the status beats; the answer stands on `beat_data`
+/// ten steps after `offer`. `start` keeps μ, the shift and the status of subarray `part`, settled three cycles later;
 /// `begin_frame` clears the frame's counts.
 #[derive(LogicBlock)]
 pub struct ForceUnit {
@@ -86,9 +86,11 @@ pub struct ForceUnit {
 }
 
 /// Steps from `offer` to the output.
-pub const STEPS: usize = 8;
+pub const STEPS: usize = 10;
 /// Steps of them from `offer` to `quad`.
 const READ_STEPS: usize = 3;
+/// Bits of p that a multiplier takes beside a sign.
+const LOW: usize = MULTIPLIER_BITS as usize - 1;
 /// Width of the cycle counter.
 pub const CYCLE_BITS: usize = 24;
 
@@ -221,7 +223,8 @@ impl ForceUnit {
     fn shear(&self) -> (String, String) {
         let f = &self._formats;
         let (p, mu) = (position_bits(), 18);
-        let product = f.search_bits[0] as usize + mu;
+        let v = f.search_bits[0] as usize;
+        let product = v + mu;
         let words = format!(
             "\
 reg [{p_end}:0] x, y;
@@ -267,17 +270,26 @@ end
             "\
 reg signed [{mu_end}:0] mu_x, mu_y;
 reg signed [{product_end}:0] product_x, product_y;
+// What a multiplier takes of p, as a number without a sign, and the rest: their products are added up a step later.
+wire signed [{mu_end}:0] low = {{1'b0, value[{low_end}:0]}};
+wire signed [{high_end}:0] high = value[{v_end}:{low_bits}];
+reg signed [{low_product_end}:0] low_x, low_y;
+reg signed [{high_product_end}:0] high_x, high_y;
 wire signed [{product}:0] doubled_x = {{product_x, 1'b0}};
 wire signed [{product}:0] doubled_y = {{product_y, 1'b0}};
 reg signed [{product}:0] moved_x, moved_y;
-wire [{p_end}:0] status_x = xs[at7];
-wire [{p_end}:0] status_y = ys[at7];
+wire [{p_end}:0] status_x = xs[at9];
+wire [{p_end}:0] status_y = ys[at9];
 always @(posedge clk) begin
   if (advance) begin
     mu_x <= mu_xs[at3];
     mu_y <= mu_ys[at3];
-    product_x <= value * mu_x;
-    product_y <= value * mu_y;
+    low_x <= low * mu_x;
+    low_y <= low * mu_y;
+    high_x <= high * mu_x;
+    high_y <= high * mu_y;
+    product_x <= {{high_x, {low_bits}'d0}} + {{{{{sign}{{low_x[{low_product_end}]}}}}, low_x}};
+    product_y <= {{high_y, {low_bits}'d0}} + {{{{{sign}{{low_y[{low_product_end}]}}}}, low_y}};
     moved_x <= doubled_x >>> shift;
     moved_y <= doubled_y >>> shift;
   end
@@ -286,6 +298,13 @@ end
             mu_end = mu - 1,
             product_end = product - 1,
             p_end = p - 1,
+            v_end = v - 1,
+            low_bits = LOW,
+            low_end = LOW - 1,
+            high_end = v - LOW - 1,
+            low_product_end = 2 * mu - 1,
+            high_product_end = v - LOW + mu - 1,
+            sign = product - 2 * mu,
         );
         (words, products)
     }
@@ -305,9 +324,9 @@ impl Logic for ForceUnit {
                 let leaving = self._pipe.remove(0);
                 if let Some(entry) = leaving {
                     if self._frame.counting {
-                        // The counter is 0 three cycles after the last input beat, and the first output beat stands from
+                        // The counter is 0 four cycles after the last input beat, and the first output beat stands from
                         // the next cycle on.
-                        self._frame.cycles = self.cycles.val().number() as u32 + 4;
+                        self._frame.cycles = self.cycles.val().number() as u32 + 5;
                         self._frame.counting = false;
                     }
                     let words = self.answer(&entry);
@@ -365,7 +384,7 @@ impl Logic for ForceUnit {
         let searched = f.degree > 0;
         let (mu_words, shear) = if searched { self.shear() } else { self.no_shear() };
         // From bit 4 on, or 5 where that tells of the coefficients.
-        let (from, damaged) = if self._checks { (5, ", damages[at7]") } else { (4, "") };
+        let (from, damaged) = if self._checks { (5, ", damages[at9]") } else { (4, "") };
         let above = word - CASE_SHIFT as usize;
         let case_word = match self._numbers.iter().any(|&number| number > 0) {
             false => format!("{}'d0{damaged}", word - from),
@@ -426,14 +445,14 @@ wire [7:0] raw_shift = 8'd{base} + {{{n_more}'d0, normalise_held}} - {{{r_more}'
     shifts[part2] <= shift_now;
   end
 end
-reg [6:0] offers;
-reg [1:0] beat1, beat2, beat3, beat4, beat5, beat6, beat7;
+reg [8:0] offers;
+reg [1:0] beat1, beat2, beat3, beat4, beat5, beat6, beat7, beat8, beat9;
 reg [1:0] lane1, lane2, lane3;
-reg [{part_end}:0] at1, at2, at3, at4, at5, at6, at7;
+reg [{part_end}:0] at1, at2, at3, at4, at5, at6, at7, at8, at9;
 reg [5:0] shift;
 reg signed [{v_end}:0] value;
-reg [{v_end}:0] value5;
-wire signed [{product}:0] doubled_z = {{{{{z_more}{{value5[{v_end}]}}}}, value5, {fraction_one}'d0}};
+reg [{v_end}:0] value5, value6;
+wire signed [{product}:0] doubled_z = {{{{{z_more}{{value6[{v_end}]}}}}, value6, {fraction_one}'d0}};
 reg signed [{product}:0] moved_z;
 wire [{all_end}:0] rounded;
 wire [2:0] clips;
@@ -448,49 +467,56 @@ generate
     wire unused = &{{1'b0, half_up[0]}};
   end
 endgenerate
-{magnitude}wire below = {threshold};
-wire [{cap}:0] count = {{1'b0, force_saturations}} + {{{cap_less}'d0, clipped[0]}} + {{{cap_less}'d0, clipped[1]}}
-  + {{{cap_less}'d0, clipped[2]}};
+{magnitude}// What the threshold says goes along with the words.
+reg [{all_end}:0] force_words;
+reg below, presses;
+reg [2:0] force_clips;
+wire [{cap}:0] count = {{1'b0, force_saturations}} + {{{cap_less}'d0, force_clips[0]}} + {{{cap_less}'d0, force_clips[1]}}
+  + {{{cap_less}'d0, force_clips[2]}};
 reg [{all_end}:0] status;
 always @(*) begin
-  case (beat7)
-    2'd1: status = {{{case_word}, framing, !contact, founds[at7], conditions[at7], {y_word}, {x_word}}};
-    2'd2: status = {{{n_word}'d0, normalises[at7], {r_word}'d0, rescales[at7], scores[at7]}};
-    default: status = {{{c_word}'d0, cycles_held, {cap_word}'d0, force_saturations, {cap_word}'d0, rescale_saturations[at7]}};
+  case (beat9)
+    2'd1: status = {{{case_word}, framing, !contact, founds[at9], conditions[at9], {y_word}, {x_word}}};
+    2'd2: status = {{{n_word}'d0, normalises[at9], {r_word}'d0, rescales[at9], scores[at9]}};
+    default: status = {{{c_word}'d0, cycles_held, {cap_word}'d0, force_saturations, {cap_word}'d0, rescale_saturations[at9]}};
   endcase
 end
-wire force_leaves = advance && offers[6] && beat7 == 2'd0;
+wire force_leaves = advance && offers[8] && beat9 == 2'd0;
 always @(posedge clk) begin
   if (rst) begin
-    offers <= 7'd0;
+    offers <= 9'd0;
     valid <= 1'b0;
     last <= 1'b0;
   end else if (advance) begin
-    offers <= {{offers[5:0], offer}};
-    valid <= offers[6];
-    last <= offers[6] && beat7 == 2'd3 && at7 == {final_part};
+    offers <= {{offers[7:0], offer}};
+    valid <= offers[8];
+    last <= offers[8] && beat9 == 2'd3 && at9 == {final_part};
   end
   if (advance) begin
-    {{beat7, beat6, beat5, beat4, beat3, beat2, beat1}} <= {{beat6, beat5, beat4, beat3, beat2, beat1, beat}};
-    {{at7, at6, at5, at4, at3, at2, at1}} <= {{at6, at5, at4, at3, at2, at1, beat_part}};
+    {{beat9, beat8, beat7, beat6, beat5, beat4, beat3, beat2, beat1}} <= {{beat8, beat7, beat6, beat5, beat4, beat3, beat2, beat1, beat}};
+    {{at9, at8, at7, at6, at5, at4, at3, at2, at1}} <= {{at8, at7, at6, at5, at4, at3, at2, at1, beat_part}};
     {{lane3, lane2, lane1}} <= {{lane2, lane1, lane}};
     value <= lane3[1] ? (lane3[0] ? quad[{v3} +: {v}] : quad[{v2} +: {v}])
       : (lane3[0] ? quad[{v} +: {v}] : quad[0 +: {v}]);
-    value5 <= value;
-    shift <= shifts[at4];
+    {{value6, value5}} <= {{value5, value}};
+    shift <= shifts[at5];
     moved_z <= doubled_z >>> shift;
     words <= rounded;
     clipped <= clips;
-    if (offers[6]) beat_data <= beat7 != 2'd0 ? status : below ? {all}'d0 : words;
+    force_words <= words;
+    force_clips <= clipped;
+    below <= {threshold};
+    presses <= words[95:64] != 32'd0;
+    if (offers[8]) beat_data <= beat9 != 2'd0 ? status : below ? {all}'d0 : force_words;
   end
   if (begin_frame) begin
     counting <= 1'b1;
     contact <= 1'b0;
     force_saturations <= {cap}'d0;
-  end else if (advance && offers[6]) begin
-    if (counting) cycles_held <= cycles + {c}'d4;
+  end else if (advance && offers[8]) begin
+    if (counting) cycles_held <= cycles + {c}'d5;
     counting <= 1'b0;
-    if (force_leaves && !below && words[95:64] != 32'd0) contact <= 1'b1;
+    if (force_leaves && !below && presses) contact <= 1'b1;
     if (force_leaves) force_saturations <= count[{cap}] ? {{{cap}{{1'b1}}}} : count[{cap_end}:0];
   end
 end",

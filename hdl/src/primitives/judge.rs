@@ -58,7 +58,7 @@ pub struct Judge {
 }
 
 /// Cycles from `start` to `done`.
-pub const LATENCY: usize = 5;
+pub const LATENCY: usize = 6;
 /// Order of the candidates: the centre first in a halving, row-major in the coarse grid.
 const ORDERS: [[usize; 9]; 2] = [[4, 0, 1, 2, 3, 5, 6, 7, 8], [0, 1, 2, 3, 4, 5, 6, 7, 8]];
 
@@ -193,16 +193,29 @@ impl Logic for Judge {
         // The eight about the centre keep their order: four pairs, then those before and those after the centre.
         let pairs = duel("0", "1", "a") + &duel("2", "3", "b") + &duel("5", "6", "c") + &duel("7", "8", "d");
         let halves = duel("a", "b", "before") + &duel("c", "d", "after");
-        let positions: String = ["before", "centre", "after"]
-            .iter()
-            .map(|n| {
-                format!(
-                    "wire [{end}:0] x_{n} = held_centre_x + along(column(k_{n}));\n\
-                     wire [{end}:0] y_{n} = held_centre_y + along(row(k_{n}));\n",
-                    end = p - 1
-                )
-            })
-            .collect();
+        let last = ["before", "centre", "after"];
+        let each = |text: &dyn Fn(&str) -> String| -> String { last.iter().map(|n| text(n)).collect() };
+        let positions = each(&|n| {
+            format!(
+                "wire signed [{end}:0] x_{n} = held_centre_x + along(column(k_{n}));\n\
+                 wire signed [{end}:0] y_{n} = held_centre_y + along(row(k_{n}));\n",
+                end = p - 1
+            )
+        });
+        let compared = each(&|n| {
+            format!(
+                "reg lower_{n}, tie_{n};\nreg [{}:0] score_{n};\nreg [{end}:0] at_x_{n}, at_y_{n};\n",
+                t - 1,
+                end = p - 1
+            )
+        });
+        let compare = each(&|n| {
+            format!(
+                "  lower_{n} <= s_{n} < s_best;\n  \
+                 tie_{n} <= s_{n} == s_best && (y_{n} < by || (y_{n} == by && x_{n} < bx));\n  \
+                 score_{n} <= s_{n};\n  at_x_{n} <= x_{n};\n  at_y_{n} <= y_{n};\n"
+            )
+        });
         Verilog::Custom(format!(
             "\
 function [1:0] column;
@@ -224,7 +237,7 @@ endfunction
 reg [{scores_end}:0] scores;
 reg [8:0] fits;
 reg [{sweep_end}:0] held;
-reg [3:0] valid;
+reg [4:0] valid;
 {declared}{leaves}genvar k;
 generate
   for (k = 0; k < 9; k = k + 1) begin : candidate
@@ -243,31 +256,38 @@ end
 // The first to come wins ties; in a halving that is the centre.
 wire centre_wins = ok_centre && (!ok_before || s_centre < s_before || (!held_coarse && s_centre == s_before));
 wire after_wins = ok_after && (!ok_before || s_after < s_before) && (!ok_centre || s_after < s_centre);
-{positions}reg ok;
-reg signed [{t_end}:0] s;
-reg signed [{p_end}:0] x, y;
-always @(posedge clk) begin
-  ok <= ok_before || ok_centre || ok_after;
-  s <= after_wins ? s_after : centre_wins ? s_centre : s_before;
-  x <= after_wins ? x_after : centre_wins ? x_centre : x_before;
-  y <= after_wins ? y_after : centre_wins ? y_centre : y_before;
-end
+// All three are compared with the best so far while it is found which of them wins.
 wire signed [{t_end}:0] s_best = score;
 wire signed [{p_end}:0] bx = best_x;
 wire signed [{p_end}:0] by = best_y;
-wire earlier = held_coarse && (y < by || (y == by && x < bx));
-wire better = ok && (!taken || s < s_best || (s == s_best && earlier));
-wire take = valid[3] && better && (held_coarse || found);
+{positions}reg some, takes_centre, takes_after;
+{compared}always @(posedge clk) begin
+  some <= ok_before || ok_centre || ok_after;
+  takes_centre <= centre_wins;
+  takes_after <= after_wins;
+{compare}end
+reg fit, lower, tie;
+reg [{t_end}:0] s;
+reg [{p_end}:0] x, y;
+always @(posedge clk) begin
+  fit <= some && (held_coarse || found);
+  lower <= !taken || (takes_after ? lower_after : takes_centre ? lower_centre : lower_before);
+  tie <= held_coarse && (takes_after ? tie_after : takes_centre ? tie_centre : tie_before);
+  s <= takes_after ? score_after : takes_centre ? score_centre : score_before;
+  x <= takes_after ? at_x_after : takes_centre ? at_x_centre : at_x_before;
+  y <= takes_after ? at_y_after : takes_centre ? at_y_centre : at_y_before;
+end
+wire take = valid[4] && fit && (lower || tie);
 always @(posedge clk) begin
   if (rst) begin
-    valid <= 4'd0;
+    valid <= 5'd0;
     done <= 1'b0;
   end else begin
-    valid <= {{valid[2:0], start}};
-    done <= valid[3];
+    valid <= {{valid[3:0], start}};
+    done <= valid[4];
   end
   improved <= take;
-  if (valid[3]) begin
+  if (valid[4]) begin
     closes <= held_closes;
     judged <= held;
   end

@@ -5,7 +5,7 @@ use dermis_golden::fixed::search::COARSE_CENTRES;
 use rust_hdl::prelude::*;
 
 use super::store::{base, base_bits};
-use super::sweep::{position_bits, square_bits, sweep_bits, unpack, Sweep, BUFFERS, BUFFER_BITS, START};
+use super::sweep::{offsets, position_bits, square_bits, sweep_bits, unpack, Sweep, BUFFERS, BUFFER_BITS, START};
 use crate::wire::{Wire, Word};
 
 /// Sweeps over the coarse tiles, then the halvings, then one that only moves to the winner.
@@ -209,10 +209,12 @@ reg is_coarse, is_halving;
 wire closing = !is_coarse || count == {SWEEP_BITS}'d{final_coarse};
 always @(*) next_halves = is_halving;
 // A judgement takes effect for the buffers of a coarse sweep that is set up with it; a halving comes after it.
-{judged_fields}wire [{w_end}:0] best = judged && improved && judged_coarse ? judged_sweep : kept;
-{best_fields}wire [{w_end}:0] from = is_coarse ? sweep : kept;
-{from_fields}wire unused = &{{1'b0, best_square, best_coarse, best_closes, from_coarse, from_closes, best_x, best_y,
-  best_centre_x, best_centre_y, judged_centre_x, judged_centre_y, judged_square, judged_buffer, judged_closes}};
+{judged_fields}wire keeps = judged && improved && judged_coarse;
+wire [1:0] sweep_buffer = sweep[{buffer} +: 2];
+wire [1:0] kept_buffer = kept[{buffer} +: 2];
+wire [{w_end}:0] from = is_coarse ? sweep : kept;
+{from_fields}wire unused = &{{1'b0, from_coarse, from_closes, best_x, best_y, judged_centre_x, judged_centre_y, judged_square,
+  judged_closes}};
 // The best is at most one step away from the centre of its polynomial.
 // The move stands in registers, and so does where it leads, before the sweep is set up.
 reg [1:0] go_x, go_y;
@@ -234,10 +236,13 @@ always @(posedge clk) begin
   at_y <= to_y;
   at_square <= to_square;
 end
-// The first of 1, 2, 0 that is neither read nor the best.
-wire [1:0] free_buffer = from_buffer != 2'd1 && best_buffer != 2'd1 ? 2'd1
-  : from_buffer != 2'd2 && best_buffer != 2'd2 ? 2'd2 : 2'd0;
-wire [1:0] to_buffer = is_coarse ? free_buffer : from_buffer;
+// A coarse sweep writes the first of 1, 2, 0 that is neither read nor the best's. Which that is, is chosen last: whether
+// the judgement improved comes late.
+wire [1:0] free_of_kept = sweep_buffer != 2'd1 && kept_buffer != 2'd1 ? 2'd1
+  : sweep_buffer != 2'd2 && kept_buffer != 2'd2 ? 2'd2 : 2'd0;
+wire [1:0] free_of_judged = sweep_buffer != 2'd1 && judged_buffer != 2'd1 ? 2'd1
+  : sweep_buffer != 2'd2 && judged_buffer != 2'd2 ? 2'd2 : 2'd0;
+wire [1:0] to_buffer = !is_coarse ? kept_buffer : keeps ? free_of_judged : free_of_kept;
 wire [{w_end}:0] next_sweep = {{closing, is_coarse, to_buffer, is_halving ? at_square << 2 : at_square,
   is_halving ? at_y << 1 : at_y, is_halving ? at_x << 1 : at_x}};
 always @(posedge clk) begin
@@ -249,7 +254,7 @@ always @(posedge clk) begin
     kept <= {start};
     radius <= {q}'d9;
   end else begin
-    kept <= set_up && (!is_coarse || count == {SWEEP_BITS}'d0) ? next_sweep : best;
+    kept <= set_up && (!is_coarse || count == {SWEEP_BITS}'d0) ? next_sweep : keeps ? judged_sweep : kept;
     if (set_up) begin
       count <= count + {SWEEP_BITS}'d1;
       if (count == {SWEEP_BITS}'d{final_coarse}) is_coarse <= 1'b0;
@@ -279,7 +284,7 @@ end",
             final_halving = JUDGED - 1,
             start = format_args!("{{2'd0, 2'd{START}, {}'d0}}", q + 2 * p),
             judged_fields = unpack("judged_sweep", "judged_"),
-            best_fields = unpack("best", "best_"),
+            buffer = offsets()[3],
             from_fields = unpack("from", "from_"),
         ))
     }

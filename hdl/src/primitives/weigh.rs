@@ -42,7 +42,7 @@ pub struct Weigh {
 }
 
 /// Cycles from `start` to the answers.
-pub const LATENCY: usize = 7;
+pub const LATENCY: usize = 8;
 
 /// Bits of n·log2 Σp for subarrays of `taxels` taxels.
 pub fn weight_bits(taxels: usize) -> usize {
@@ -128,8 +128,8 @@ impl Logic for Weigh {
         let rows: String = (0..3)
             .map(|row| {
                 format!(
-                    "      if (row4 == 2'd{row}) begin\n        weights[({row} * 3 + c) * {w} +: {w}] <= product;\n        \
-                     eligible[{row} * 3 + c] <= fits3;\n      end\n"
+                    "      if (row5 == 2'd{row}) begin\n        weights[({row} * 3 + c) * {w} +: {w}] <= product;\n        \
+                     eligible[{row} * 3 + c] <= fits4;\n      end\n"
                 )
             })
             .collect();
@@ -138,9 +138,9 @@ impl Logic for Weigh {
 {functions}wire unused_which = &{{1'b0, which}};
 reg [{sweep_end}:0] held;
 reg [{q_end}:0] held_radius;
-reg [1:0] row, row2, row3, row4;
+reg [1:0] row, row2, row3, row4, row5;
 reg running;
-reg [2:0] valid;
+reg [3:0] valid;
 {fields}wire unused = &{{1'b0, held_buffer, held_coarse, held_closes}};
 // |c + u|² = |c|² + 2 (ux cx + uy cy) + |ux| + |uy|: the disc needs no multiplier. Row by row uy is −1, 0, 1.
 wire [{q_end}:0] twice_x = {{{{{q_more}{{held_centre_x[{p_end}]}}}}, held_centre_x, 1'b0}};
@@ -153,19 +153,19 @@ always @(posedge clk) begin
   distance <= {{in_row + twice_x + {q}'d1, in_row, in_row - twice_x + {q}'d1}};
   if (rst) begin
     running <= 1'b0;
-    valid <= 3'd0;
+    valid <= 4'd0;
   end else begin
     if (start) running <= 1'b1;
     else if (row == 2'd2) running <= 1'b0;
-    valid <= {{valid[1:0], running}};
+    valid <= {{valid[2:0], running}};
   end
   if (start) begin
     held <= sweep;
     held_radius <= radius;
   end
   row <= start ? 2'd0 : row + 2'd1;
-  {{row4, row3, row2}} <= {{row3, row2, row}};
-  if (valid[2] && row4 == 2'd2) weighed <= held;
+  {{row5, row4, row3, row2}} <= {{row4, row3, row2, row}};
+  if (valid[3] && row5 == 2'd2) weighed <= held;
 end
 genvar c;
 generate
@@ -175,16 +175,17 @@ generate
     reg [{s_end}:0] sum1;
     reg [{located_end}:0] located;
     reg [{log_end}:0] log;
-    reg presses1, presses2, fits3;
-    wire [{w_end}:0] product = {terms};
+    reg presses2, fits3, fits4;
+    reg [{w_end}:0] product;
     always @(posedge clk) begin
       sum1 <= sum;
-      presses1 <= !sum[{s_end}] && sum != {s}'d0;
-      presses2 <= presses1;
+      presses2 <= !sum1[{s_end}] && sum1 != {s}'d0;
       fits3 <= presses2 && distance[c * {q} +: {q}] <= held_radius;
+      fits4 <= fits3;
       located <= locate(sum1);
       log <= logarithm(located);
-      if (valid[2]) begin
+      product <= {terms};
+      if (valid[3]) begin
 {rows}      end
     end
   end
