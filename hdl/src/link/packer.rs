@@ -124,9 +124,10 @@ impl Packer {
     fn next(&self) -> State {
         let s = self._state;
         let mut next = s;
-        if s.stage == IDLE && self.offer.val() {
-            (next.stage, next.source) = (OPEN, self.offered_source.val().number() as usize);
+        if s.stage == IDLE {
+            next.source = self.offered_source.val().number() as usize;
             next.number = self.number.val().number();
+            next.stage = if self.offer.val() { OPEN } else { IDLE };
         }
         if !s.offered {
             let length = self._lengths[s.source] as u64;
@@ -224,7 +225,8 @@ always @(*) begin
   crc_load = goes && !border;
 end
 always @(posedge clk) begin
-  if (begun) begin
+  // Whether there is an offer comes late.
+  if (stage == 3'd{IDLE}) begin
     source <= offered_source;
     kept <= number;
   end

@@ -92,7 +92,7 @@ impl PacketLink {
             feeder: Feeder::new(shape.rows * shape.cols, shape.input_bits),
             requests: Requests::new(shape.frames),
             resultants: Resultants::new(shape),
-            sources: Sources::default(),
+            sources: Sources::new(shape.resultants),
             packer: Packer::new(shape.payloads()),
             encoder: SlipEncoder::default(),
             ledger: Ledger::new(identity),

@@ -6,6 +6,9 @@ use super::{COUNTERS, IDENTITY};
 use crate::wire::{Wire, Word};
 
 /// Chooses between the ledger, which holds identity and counters, and the engine's answer, a byte at a time.
+///
+/// Behind an engine with many lanes the choice ends in a register: the packer looks at a byte five cycles after it asks for
+/// it at the soonest. A link whose line is hardly slower than its clock has no cycle to spare, and a smaller choice.
 #[derive(LogicBlock)]
 pub struct Sources {
     /// Clock.
@@ -36,17 +39,19 @@ pub struct Sources {
     pub answer_wanted: Signal<Out, Bit>,
     /// The engine's answer is summed up.
     pub summarise: Signal<Out, Bit>,
-    /// The byte, like the two below from a register: the packer looks at it five cycles after `index` at the soonest.
+    /// The byte.
     pub octet: Wire<Out>,
     /// Its word stands.
     pub word_valid: Signal<Out, Bit>,
     /// It is the last.
     pub word_last: Signal<Out, Bit>,
+    _registered: bool,
     _second: bool,
 }
 
-impl Default for Sources {
-    fn default() -> Self {
+impl Sources {
+    /// With or without a register behind the choice.
+    pub fn new(registered: bool) -> Self {
         Sources {
             clk: Default::default(),
             source: Wire::new(2),
@@ -65,6 +70,7 @@ impl Default for Sources {
             octet: Wire::new(8),
             word_valid: Default::default(),
             word_last: Default::default(),
+            _registered: registered,
             _second: false,
         }
     }
@@ -76,16 +82,21 @@ impl Logic for Sources {
         let own = source == IDENTITY || source == COUNTERS;
         let index = self.index.val().number() as usize;
         let counters = source & 1 == 1;
-        if self.clk.pos_edge() {
+        let edge = self.clk.pos_edge();
+        let before = self._second;
+        if edge {
+            self._second = !self.begun.val() && (before || self.taken.val());
+        }
+        if edge || !self._registered {
+            let second = if self._registered { before } else { self._second };
             (self.word_valid.next, self.word_last.next) = match own {
-                true => (self.entry_valid.val(), counters || self._second),
+                true => (self.entry_valid.val(), counters || second),
                 false => (self.answer_valid.val(), self.answer_last.val()),
             };
             self.octet.next = Word::from(match own {
                 true => self.entry.val().field(8 * (index & 1), 8),
                 false => self.answer.val().field(8 * index.min(11), 8),
             });
-            self._second = !self.begun.val() && (self._second || self.taken.val());
         }
         self.address.next = Word::from(u64::from(counters) << 4 | u64::from(self._second) << 3 | (index as u64) >> 1);
         self.answer_wanted.next = self.wanted.val() && !own;
@@ -101,24 +112,24 @@ impl Logic for Sources {
     }
 
     fn hdl(&self) -> Verilog {
-        Verilog::Custom(
+        let (when, to) = if self._registered { ("always @(posedge clk)", "<=") } else { ("always @(*)", "=") };
+        Verilog::Custom(format!(
             "\
 reg second;
 wire [31:0] answer_word = index[3] ? answer[95:64] : index[2] ? answer[63:32] : answer[31:0];
 wire [15:0] answer_half = index[1] ? answer_word[31:16] : answer_word[15:0];
 wire [15:0] both = source[1] ? answer_half : entry;
 always @(*) begin
-  address = {source[0], second, index[3:1]};
+  address = {{source[0], second, index[3:1]}};
   answer_wanted = wanted && source[1];
   summarise = !source[0];
 end
-always @(posedge clk) begin
-  second <= !begun && (second || taken);
-  word_valid <= source[1] ? answer_valid : entry_valid;
-  word_last <= source[1] ? answer_last : source[0] || second;
-  octet <= index[0] ? both[15:8] : both[7:0];
+always @(posedge clk) second <= !begun && (second || taken);
+{when} begin
+  word_valid {to} source[1] ? answer_valid : entry_valid;
+  word_last {to} source[1] ? answer_last : source[0] || second;
+  octet {to} index[0] ? both[15:8] : both[7:0];
 end"
-            .to_string(),
-        )
+        ))
     }
 }
