@@ -94,7 +94,7 @@ impl PacketLink {
             resultants: Resultants::new(shape),
             sources: Sources::new(shape.resultants),
             packer: Packer::new(shape.payloads()),
-            encoder: SlipEncoder::default(),
+            encoder: SlipEncoder::new(shape.resultants),
             ledger: Ledger::new(identity),
             arriving: Crc::default(),
             leaving: Crc::default(),

@@ -6,6 +6,8 @@ use rust_hdl::prelude::*;
 use crate::wire::{Wire, Word};
 
 /// Escapes what SLIP needs escaped; an END goes out as it is where `border` says that it stands between packets.
+///
+/// Behind an engine with many lanes whether a byte is escaped comes from a register, a cycle after the byte.
 #[derive(LogicBlock)]
 pub struct SlipEncoder {
     /// Clock.
@@ -26,11 +28,14 @@ pub struct SlipEncoder {
     pub valid: Signal<Out, Bit>,
     /// It is taken.
     pub ready: Signal<In, Bit>,
+    _registered: bool,
     _second: bool,
+    _seen: bool,
 }
 
-impl Default for SlipEncoder {
-    fn default() -> Self {
+impl SlipEncoder {
+    /// With or without that register.
+    pub fn new(registered: bool) -> Self {
         SlipEncoder {
             clk: Default::default(),
             rst: Default::default(),
@@ -41,7 +46,19 @@ impl Default for SlipEncoder {
             data: Wire::new(8),
             valid: Default::default(),
             ready: Default::default(),
+            _registered: registered,
             _second: false,
+            _seen: false,
+        }
+    }
+}
+
+impl SlipEncoder {
+    /// A byte stands, and whether it is escaped is known.
+    fn stands(&self) -> bool {
+        match self._registered {
+            true => self._seen,
+            false => self.content_valid.val(),
         }
     }
 }
@@ -52,11 +69,10 @@ impl Logic for SlipEncoder {
         let after = escape(content).filter(|_| !self.border.val());
         let special = after.is_some();
         if self.clk.pos_edge() {
-            if self.rst.val() {
-                self._second = false;
-            } else if self.content_valid.val() && self.ready.val() {
-                self._second = special && !self._second;
-            }
+            let goes = self.stands() && self.ready.val();
+            let taken = goes && (!special || self._second);
+            self._second = !self.rst.val() && (self._second ^ (goes && special));
+            self._seen = !self.rst.val() && self.content_valid.val() && !taken;
         }
         let data = match after {
             _ if self.border.val() => END,
@@ -65,8 +81,8 @@ impl Logic for SlipEncoder {
             None => content,
         };
         self.data.next = Word::from(u64::from(data));
-        self.valid.next = self.content_valid.val();
-        self.content_ready.next = self.ready.val() && (!special || self._second);
+        self.valid.next = self.stands();
+        self.content_ready.next = self.stands() && self.ready.val() && (!special || self._second);
     }
 
     fn connect(&mut self) {
@@ -76,21 +92,28 @@ impl Logic for SlipEncoder {
     }
 
     fn hdl(&self) -> Verilog {
+        let escapes = match self._registered {
+            false => "wire stands = content_valid;\nwire special = found;\n",
+            true => {
+                "reg stands, special;\nalways @(posedge clk) begin\n  special <= found;\n  \
+                 stands <= !rst && content_valid && !content_ready;\nend\n"
+            }
+        };
         Verilog::Custom(format!(
             "\
 reg second;
 wire is_end = content == 8'd{END};
 wire is_escape = content == 8'd{ESC};
-wire special = !border && (is_end || is_escape || content == 8'd{IDLE});
-always @(*) begin
+wire found = !border && (is_end || is_escape || content == 8'd{IDLE});
+{escapes}always @(*) begin
   data = border ? 8'd{END} : !special ? content : !second ? 8'd{ESC}
     : is_end ? 8'd{ESC_END} : is_escape ? 8'd{ESC_ESC} : 8'd{ESC_IDLE};
-  valid = content_valid;
-  content_ready = ready && (!special || second);
+  valid = stands;
+  content_ready = stands && ready && (!special || second);
 end
 always @(posedge clk) begin
   if (rst) second <= 1'b0;
-  else if (content_valid && ready) second <= special && !second;
+  else if (stands && ready) second <= special && !second;
 end"
         ))
     }

@@ -7,7 +7,7 @@ use crate::wire::{Wire, Word};
 
 /// Chooses between the ledger, which holds identity and counters, and the engine's answer, a byte at a time.
 ///
-/// Behind an engine with many lanes the choice ends in a register: the packer looks at a byte five cycles after it asks for
+/// Behind an engine with many lanes the choice takes two registers: the packer looks at a byte five cycles after it asks for
 /// it at the soonest. A link whose line is hardly slower than its clock has no cycle to spare, and a smaller choice.
 #[derive(LogicBlock)]
 pub struct Sources {
@@ -47,10 +47,14 @@ pub struct Sources {
     pub word_last: Signal<Out, Bit>,
     _registered: bool,
     _second: bool,
+    _half: Half,
 }
 
+/// What the first register keeps: two bytes, whether their word stands, whether it is the last.
+type Half = (u64, bool, bool);
+
 impl Sources {
-    /// With or without a register behind the choice.
+    /// With or without registers in the choice.
     pub fn new(registered: bool) -> Self {
         Sources {
             clk: Default::default(),
@@ -72,6 +76,7 @@ impl Sources {
             word_last: Default::default(),
             _registered: registered,
             _second: false,
+            _half: Half::default(),
         }
     }
 }
@@ -87,20 +92,23 @@ impl Logic for Sources {
         if edge {
             self._second = !self.begun.val() && (before || self.taken.val());
         }
+        let second = if self._registered { before } else { self._second };
+        let half = match own {
+            true => (self.entry.val().field(0, 16), self.entry_valid.val(), counters || second),
+            false => {
+                let low = 16 * (index / 2).min(5);
+                (self.answer.val().field(low, 16), self.answer_valid.val(), self.answer_last.val())
+            }
+        };
         if edge || !self._registered {
-            let second = if self._registered { before } else { self._second };
-            (self.word_valid.next, self.word_last.next) = match own {
-                true => (self.entry_valid.val(), counters || second),
-                false => (self.answer_valid.val(), self.answer_last.val()),
-            };
-            self.octet.next = Word::from(match own {
-                true => self.entry.val().field(8 * (index & 1), 8),
-                false => self.answer.val().field(8 * index.min(11), 8),
-            });
+            let (both, valid, last) = if self._registered { self._half } else { half };
+            self.octet.next = Word::from(both >> (8 * (index & 1)) & 0xff);
+            (self.word_valid.next, self.word_last.next) = (valid, last);
+            self.summarise.next = !counters;
+            self._half = half;
         }
         self.address.next = Word::from(u64::from(counters) << 4 | u64::from(self._second) << 3 | (index as u64) >> 1);
         self.answer_wanted.next = self.wanted.val() && !own;
-        self.summarise.next = !counters;
     }
 
     fn connect(&mut self) {
@@ -115,20 +123,25 @@ impl Logic for Sources {
         let (when, to) = if self._registered { ("always @(posedge clk)", "<=") } else { ("always @(*)", "=") };
         Verilog::Custom(format!(
             "\
-reg second;
+reg second, valid, last;
+reg [15:0] both;
 wire [31:0] answer_word = index[3] ? answer[95:64] : index[2] ? answer[63:32] : answer[31:0];
 wire [15:0] answer_half = index[1] ? answer_word[31:16] : answer_word[15:0];
-wire [15:0] both = source[1] ? answer_half : entry;
 always @(*) begin
   address = {{source[0], second, index[3:1]}};
   answer_wanted = wanted && source[1];
-  summarise = !source[0];
 end
 always @(posedge clk) second <= !begun && (second || taken);
 {when} begin
-  word_valid {to} source[1] ? answer_valid : entry_valid;
-  word_last {to} source[1] ? answer_last : source[0] || second;
+  both {to} source[1] ? answer_half : entry;
+  valid {to} source[1] ? answer_valid : entry_valid;
+  last {to} source[1] ? answer_last : source[0] || second;
+end
+{when} begin
   octet {to} index[0] ? both[15:8] : both[7:0];
+  word_valid {to} valid;
+  word_last {to} last;
+  summarise {to} !source[0];
 end"
         ))
     }

@@ -63,6 +63,9 @@ pub struct Receive {
     gathers: BitDelay,
     gathered_part: Delay,
     gathered_code: Delay,
+    gathered_address: Delay,
+    gathered_mask: Delay,
+    clears: BitDelay,
     whole: DFF<Bit>,
     complete: DFF<Bit>,
     broken: DFF<Bit>,
@@ -105,6 +108,9 @@ impl Receive {
             gathers: BitDelay::new(1),
             gathered_part: Delay::new(count_bits(count), 1),
             gathered_code: Delay::new(bits, 1),
+            gathered_address: Delay::new(count_bits(quads), 1),
+            gathered_mask: Delay::new(4, 1),
+            clears: BitDelay::new(1),
             whole: Default::default(),
             complete: Default::default(),
             broken: Default::default(),
@@ -125,6 +131,10 @@ impl Logic for Receive {
         self.gathers.rst.next = self.rst.val();
         self.gathered_part.clk.next = self.clk.val();
         self.gathered_code.clk.next = self.clk.val();
+        self.gathered_address.clk.next = self.clk.val();
+        self.gathered_mask.clk.next = self.clk.val();
+        self.clears.clk.next = self.clk.val();
+        self.clears.rst.next = self.rst.val();
         self.whole.clock.next = self.clk.val();
         self.complete.clock.next = self.clk.val();
         self.broken.clock.next = self.clk.val();
@@ -142,11 +152,14 @@ impl Logic for Receive {
         self.blank.clear.next = self.rst.val() | self.early.val();
         self.blank.word.next = self.s_axis_tdata.val();
         self.taken_word.next = self.blank.kept.val();
-        self.spread.word.next = self.blank.kept.val();
-        self.frame.write_address.next = self.scan.address.val();
+        self.gathered_code.now.next = self.blank.kept.val();
+        self.gathered_mask.now.next = self.scan.mask.val();
+        self.gathered_address.now.next = self.scan.address.val();
+        self.spread.word.next = self.gathered_code.then.val();
+        self.spread.mask.next = self.gathered_mask.then.val();
+        self.spread.enable.next = self.gathers.then.val();
+        self.frame.write_address.next = self.gathered_address.then.val();
         self.frame.write_data.next = self.spread.quad.val();
-        self.spread.mask.next = self.scan.mask.val();
-        self.spread.enable.next = self.taken.val();
         self.frame.write.next = self.spread.write.val();
         self.frame.read.next = true;
         self.frame.read_address.next = self.quad_address.val();
@@ -154,9 +167,9 @@ impl Logic for Receive {
 
         self.gathers.now.next = self.taken.val() & !self.early.val();
         self.gathered_part.now.next = self.scan.part.val();
-        self.gathered_code.now.next = self.blank.kept.val();
         self.gather.accept.next = self.gathers.then.val();
-        self.gather.clear.next = self.rst.val() | self.free.val() | self.early.val();
+        self.clears.now.next = self.free.val() | self.early.val();
+        self.gather.clear.next = self.clears.then.val();
         self.gather.part.next = self.gathered_part.then.val();
         self.gather.select.next = self.part.val();
         self.gather.code.next = self.gathered_code.then.val();
