@@ -65,7 +65,7 @@ pub struct Receive {
     gathered_code: Delay,
     gathered_address: Delay,
     gathered_mask: Delay,
-    clears: BitDelay,
+    clears: DFF<Bit>,
     whole: DFF<Bit>,
     complete: DFF<Bit>,
     broken: DFF<Bit>,
@@ -110,7 +110,7 @@ impl Receive {
             gathered_code: Delay::new(bits, 1),
             gathered_address: Delay::new(count_bits(quads), 1),
             gathered_mask: Delay::new(4, 1),
-            clears: BitDelay::new(1),
+            clears: Default::default(),
             whole: Default::default(),
             complete: Default::default(),
             broken: Default::default(),
@@ -133,8 +133,7 @@ impl Logic for Receive {
         self.gathered_code.clk.next = self.clk.val();
         self.gathered_address.clk.next = self.clk.val();
         self.gathered_mask.clk.next = self.clk.val();
-        self.clears.clk.next = self.clk.val();
-        self.clears.rst.next = self.rst.val();
+        self.clears.clock.next = self.clk.val();
         self.whole.clock.next = self.clk.val();
         self.complete.clock.next = self.clk.val();
         self.broken.clock.next = self.clk.val();
@@ -168,8 +167,8 @@ impl Logic for Receive {
         self.gathers.now.next = self.taken.val() & !self.early.val();
         self.gathered_part.now.next = self.scan.part.val();
         self.gather.accept.next = self.gathers.then.val();
-        self.clears.now.next = self.free.val() | self.early.val();
-        self.gather.clear.next = self.clears.then.val();
+        self.clears.d.next = self.rst.val() | self.free.val() | self.early.val();
+        self.gather.clear.next = self.clears.q.val();
         self.gather.part.next = self.gathered_part.then.val();
         self.gather.select.next = self.part.val();
         self.gather.code.next = self.gathered_code.then.val();
