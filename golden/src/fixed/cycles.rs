@@ -44,7 +44,7 @@ const HAND_OVER: u64 = 1;
 /// From the search's start, or a judgement that is waited for, to the next sweep: the move, where it leads, the sweep.
 pub const SET_UP: u64 = 3;
 /// Quads that a judged sweep lasts at least: its sums are weighed meanwhile.
-pub const SHORTEST_SWEEP: u64 = 5;
+pub const SHORTEST_SWEEP: u64 = 4;
 /// The last sweep beyond its Q quads.
 const LAST_SWEEP: u64 = 7;
 /// From a subarray's values to their sending, where nothing is searched.
