@@ -27,17 +27,19 @@ module proof(
   );
   reg [7:0] count;
   reg [@BITS@-1:0] kept;
-  reg whole, whole_before, whole_earlier, broken;
+  reg whole, whole_before, whole_earlier, whole_earliest, broken;
   wire takes = s_valid && s_ready;
   wire at_end = count == 8'd@LAST@;
   always @(posedge clk) begin
     whole_before <= whole && !rst;
     whole_earlier <= whole_before && !rst;
+    whole_earliest <= whole_earlier && !rst;
     if (rst) {count, whole, broken} <= 10'd0;
     else begin
       assert (s_ready == !whole && full == (whole && whole_before) && accept == takes && framing == broken);
       assert (count <= 8'd@LAST@);
-      if (whole && whole_before && whole_earlier) assert (own == 8'd255 || quad[lane * @BITS@ +: @BITS@] == kept);
+      // A code is written a cycle after it was taken.
+      if (whole && whole_before && whole_earlier && whole_earliest) assert (own == 8'd255 || quad[lane * @BITS@ +: @BITS@] == kept);
       // Only what stands in the buffer is counted as loaded.
       if (full && own != 8'd255 && $signed(kept) > 0) assert (positive);
       if (full && own != 8'd255 && $signed(kept) < 0) assert (negative);

@@ -131,7 +131,7 @@ fn send_gives_whole_frames() {
         ("ADDRESS", number(count_bits(model.formats.quads))),
         ("LAST", number(ROWS * COLS + STATUS_BEATS - 1)),
     ];
-    let defect = ("last <= offers[6] && beat7 == 2'd3", "last <= offers[6] && beat7 == 2'd2");
+    let defect = ("last <= offers[8] && beat9 == 2'd3", "last <= offers[8] && beat9 == 2'd2");
     Proof { generated: &generate(&model).unwrap(), property: "send.v", given, defect, open_products: true }.run();
 }
 
