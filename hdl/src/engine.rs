@@ -65,7 +65,7 @@ pub struct Engine {
     pub(crate) forces: Force,
     send: Send,
     resultants: Resultants,
-    begins: DFF<Bit>,
+    begins: BitDelay,
     computing: DFF<Bit>,
     first: DFF<Bit>,
     filled: DFF<Bit>,
@@ -128,7 +128,7 @@ impl Engine {
             forces: force,
             send: Send::new(model),
             resultants: Resultants::new(model.wants_resultants(), &model.scene.sensor, model.grid()),
-            begins: Default::default(),
+            begins: BitDelay::new(1),
             computing: Default::default(),
             first: Default::default(),
             filled: Default::default(),
@@ -193,7 +193,8 @@ impl Logic for Engine {
         self.opens.rst.next = self.rst.val();
         self.finish.clk.next = self.clk.val();
         self.finish.rst.next = self.rst.val();
-        self.begins.clock.next = self.clk.val();
+        self.begins.clk.next = self.clk.val();
+        self.begins.rst.next = self.rst.val();
         self.computing.clock.next = self.clk.val();
         self.first.clock.next = self.clk.val();
         self.filled.clock.next = self.clk.val();
@@ -223,12 +224,11 @@ impl Logic for Engine {
         self.resultants.rst.next = self.rst.val();
 
         comment!("A frame begins when it is whole and the last one computed");
-        self.begins.d.next = self.receive.full.val()
-            & !self.begins.q.val()
+        self.begins.now.next = self.receive.full.val()
+            & !self.begins.then.val()
             & !self.computing.q.val()
-            & (!self.sending.q.val() | self.ahead.val())
-            & !self.rst.val();
-        self.begin_frame.next = self.begins.q.val();
+            & (!self.sending.q.val() | self.ahead.val());
+        self.begin_frame.next = self.begins.then.val();
         self.computing.d.next =
             (self.begin_frame.val() | (self.computing.q.val() & !self.finish.then.val())) & !self.rst.val();
 

@@ -39,7 +39,8 @@ module proof(
       assert (s_ready == !whole && full == (whole && whole_before) && accept == takes && framing == broken);
       assert (count <= 8'd@LAST@);
       // A code is written a cycle after it was taken.
-      if (whole && whole_before && whole_earlier && whole_earliest) assert (own == 8'd255 || quad[lane * @BITS@ +: @BITS@] == kept);
+      if (whole && whole_before && whole_earlier && whole_earliest)
+        assert (own == 8'd255 || quad[lane * @BITS@ +: @BITS@] == kept);
       // Only what stands in the buffer is counted as loaded.
       if (full && own != 8'd255 && $signed(kept) > 0) assert (positive);
       if (full && own != 8'd255 && $signed(kept) < 0) assert (negative);

@@ -24,7 +24,7 @@ use super::serial;
 use crate::board::EngineKind;
 
 /// From the last input beat to the cycle in which the frame starts.
-const ACCEPT: u64 = 3;
+pub const ACCEPT: u64 = 3;
 /// `fold` beyond its Q quads: start, frame buffer, normalise, butterfly, memory.
 const FOLD: u64 = 6;
 /// From a product's issue to the first row of its accumulators: addresses 1, memories 2, selection 1, lanes 5.

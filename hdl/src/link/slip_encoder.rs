@@ -51,9 +51,7 @@ impl SlipEncoder {
             _seen: false,
         }
     }
-}
 
-impl SlipEncoder {
     /// A byte stands, and whether it is escaped is known.
     fn stands(&self) -> bool {
         match self._registered {

@@ -1,5 +1,6 @@
 //! p to force words, and the output beats with their status.
 
+use dermis_golden::fixed::cycles::ACCEPT;
 use dermis_golden::fixed::force::{force, mu_word};
 use dermis_golden::fixed::formats::{force_shift, Formats, FORCE_BITS, FORCE_SHIFT_MAX, MULTIPLIER_BITS, MU_ROUND};
 use dermis_golden::fixed::send::{
@@ -91,6 +92,9 @@ pub const STEPS: usize = 10;
 const READ_STEPS: usize = 3;
 /// Bits of p that a multiplier takes beside a sign.
 const LOW: usize = MULTIPLIER_BITS as usize - 1;
+/// Cycles of a frame that its counter does not see: it is 0 a cycle after the frame starts, and the first output beat stands
+/// from the next cycle on.
+const UNCOUNTED: u32 = ACCEPT as u32 + 2;
 /// Width of the cycle counter.
 pub const CYCLE_BITS: usize = 24;
 
@@ -324,9 +328,7 @@ impl Logic for ForceUnit {
                 let leaving = self._pipe.remove(0);
                 if let Some(entry) = leaving {
                     if self._frame.counting {
-                        // The counter is 0 four cycles after the last input beat, and the first output beat stands from
-                        // the next cycle on.
-                        self._frame.cycles = self.cycles.val().number() as u32 + 5;
+                        self._frame.cycles = self.cycles.val().number() as u32 + UNCOUNTED;
                         self._frame.counting = false;
                     }
                     let words = self.answer(&entry);
@@ -514,7 +516,7 @@ always @(posedge clk) begin
     contact <= 1'b0;
     force_saturations <= {cap}'d0;
   end else if (advance && offers[8]) begin
-    if (counting) cycles_held <= cycles + {c}'d5;
+    if (counting) cycles_held <= cycles + {c}'d{UNCOUNTED};
     counting <= 1'b0;
     if (force_leaves && !below && presses) contact <= 1'b1;
     if (force_leaves) force_saturations <= count[{cap}] ? {{{cap}{{1'b1}}}} : count[{cap_end}:0];

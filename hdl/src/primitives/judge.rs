@@ -9,7 +9,8 @@ use super::weigh::weight_bits;
 use crate::wire::{Wire, Word};
 
 /// Score = total − weight for all nine at once, then a tree of comparisons by the search's rules of ties: row-major in
-/// the coarse grid; in a halving the centre, then row-major. The winner of the nine is compared with the best so far.
+/// the coarse grid; in a halving the centre, then row-major. The last three are compared with the best so far while the winner
+/// is found among them.
 ///
 /// `start` with totals, weights and sweep; `done` `LATENCY` cycles later, `improved` with it. `begin_frame`
 /// forgets the frame, `halve` doubles the position for the next level.
@@ -216,6 +217,8 @@ impl Logic for Judge {
                  score_{n} <= s_{n};\n  at_x_{n} <= x_{n};\n  at_y_{n} <= y_{n};\n"
             )
         });
+        // Of the last three the winner's.
+        let winner = |what: &str| format!("takes_after ? {what}_after : takes_centre ? {what}_centre : {what}_before");
         Verilog::Custom(format!(
             "\
 function [1:0] column;
@@ -271,11 +274,11 @@ reg [{t_end}:0] s;
 reg [{p_end}:0] x, y;
 always @(posedge clk) begin
   fit <= some && (held_coarse || found);
-  lower <= !taken || (takes_after ? lower_after : takes_centre ? lower_centre : lower_before);
-  tie <= held_coarse && (takes_after ? tie_after : takes_centre ? tie_centre : tie_before);
-  s <= takes_after ? score_after : takes_centre ? score_centre : score_before;
-  x <= takes_after ? at_x_after : takes_centre ? at_x_centre : at_x_before;
-  y <= takes_after ? at_y_after : takes_centre ? at_y_centre : at_y_before;
+  lower <= !taken || ({lower});
+  tie <= held_coarse && ({tie});
+  s <= {score};
+  x <= {at_x};
+  y <= {at_y};
 end
 wire take = valid[4] && fit && (lower || tie);
 always @(posedge clk) begin
@@ -309,6 +312,11 @@ always @(posedge clk) begin
     if (held_coarse) found <= 1'b1;
   end
 end",
+            lower = winner("lower"),
+            tie = winner("tie"),
+            score = winner("score"),
+            at_x = winner("at_x"),
+            at_y = winner("at_y"),
             p_end = p - 1,
             p_more = p - 2,
             t_end = t - 1,

@@ -188,6 +188,7 @@ impl Logic for Walk {
 
     fn hdl(&self) -> Verilog {
         let (p, q, w) = (position_bits(), square_bits(), sweep_bits());
+        let [_, _, _, buffer, ..] = offsets();
         let cases: String = coarse_moves()
             .iter()
             .enumerate()
@@ -236,13 +237,14 @@ always @(posedge clk) begin
   at_y <= to_y;
   at_square <= to_square;
 end
-// A coarse sweep writes the first of 1, 2, 0 that is neither read nor the best's. Which that is, is chosen last: whether
+// A coarse sweep writes the first of 1, 2, 0 that is neither read nor the best's. Whose that is, is chosen last: whether
 // the judgement improved comes late.
-wire [1:0] free_of_kept = sweep_buffer != 2'd1 && kept_buffer != 2'd1 ? 2'd1
-  : sweep_buffer != 2'd2 && kept_buffer != 2'd2 ? 2'd2 : 2'd0;
-wire [1:0] free_of_judged = sweep_buffer != 2'd1 && judged_buffer != 2'd1 ? 2'd1
-  : sweep_buffer != 2'd2 && judged_buffer != 2'd2 ? 2'd2 : 2'd0;
-wire [1:0] to_buffer = !is_coarse ? kept_buffer : keeps ? free_of_judged : free_of_kept;
+function [1:0] free_of;
+  input [1:0] read, best;
+  free_of = read != 2'd1 && best != 2'd1 ? 2'd1 : read != 2'd2 && best != 2'd2 ? 2'd2 : 2'd0;
+endfunction
+wire [1:0] to_buffer = !is_coarse ? kept_buffer
+  : keeps ? free_of(sweep_buffer, judged_buffer) : free_of(sweep_buffer, kept_buffer);
 wire [{w_end}:0] next_sweep = {{closing, is_coarse, to_buffer, is_halving ? at_square << 2 : at_square,
   is_halving ? at_y << 1 : at_y, is_halving ? at_x << 1 : at_x}};
 always @(posedge clk) begin
@@ -284,7 +286,6 @@ end",
             final_halving = JUDGED - 1,
             start = format_args!("{{2'd0, 2'd{START}, {}'d0}}", q + 2 * p),
             judged_fields = unpack("judged_sweep", "judged_"),
-            buffer = offsets()[3],
             from_fields = unpack("from", "from_"),
         ))
     }

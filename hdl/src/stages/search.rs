@@ -87,10 +87,10 @@ pub struct Search {
     sum_go: BitDelay,
     moved: BitDelay,
     sum_moved: BitDelay,
-    trial: DFF<Bit>,
-    outcome: DFF<Bit>,
-    sum_trial: DFF<Bit>,
-    sum_outcome: DFF<Bit>,
+    trial: BitDelay,
+    outcome: BitDelay,
+    sum_trial: BitDelay,
+    sum_outcome: BitDelay,
     scored: BitDelay,
     first: BitDelay,
     weighs: BitDelay,
@@ -167,10 +167,10 @@ impl Search {
             sum_go: BitDelay::new(STORE_LATENCY - 1),
             moved: BitDelay::new(MOVED - 1),
             sum_moved: BitDelay::new(MOVED - 1),
-            trial: Default::default(),
-            outcome: Default::default(),
-            sum_trial: Default::default(),
-            sum_outcome: Default::default(),
+            trial: BitDelay::new(1),
+            outcome: BitDelay::new(1),
+            sum_trial: BitDelay::new(1),
+            sum_outcome: BitDelay::new(1),
             scored: BitDelay::new(CANDIDATES_LATENCY),
             first: BitDelay::new(MOVED + CANDIDATES_LATENCY),
             // A cycle after the first quad's candidates, so that a sweep is judged before the next is weighed.
@@ -208,10 +208,14 @@ impl Logic for Search {
         self.quads.clk.next = self.clk.val();
         self.counting.clock.next = self.clk.val();
         self.set_up.clock.next = self.clk.val();
-        self.trial.clock.next = self.clk.val();
-        self.outcome.clock.next = self.clk.val();
-        self.sum_trial.clock.next = self.clk.val();
-        self.sum_outcome.clock.next = self.clk.val();
+        self.trial.clk.next = self.clk.val();
+        self.trial.rst.next = self.rst.val();
+        self.outcome.clk.next = self.clk.val();
+        self.outcome.rst.next = self.rst.val();
+        self.sum_trial.clk.next = self.clk.val();
+        self.sum_trial.rst.next = self.rst.val();
+        self.sum_outcome.clk.next = self.clk.val();
+        self.sum_outcome.rst.next = self.rst.val();
         self.began.clk.next = self.clk.val();
         self.judged_then.clk.next = self.clk.val();
         self.go.clk.next = self.clk.val();
@@ -290,10 +294,10 @@ impl Logic for Search {
         self.taylor.word.next = self.store.read_data.val();
         self.taylor.step.next = self.step.then.val();
         self.moved.now.next = self.counting.q.val();
-        self.trial.d.next = self.moved.then.val() & !self.walk.last.val() & !self.rst.val();
-        self.outcome.d.next = self.moved.then.val() & self.walk.last.val() & !self.rst.val();
+        self.trial.now.next = self.moved.then.val() & !self.walk.last.val();
+        self.outcome.now.next = self.moved.then.val() & self.walk.last.val();
         self.moved_address.now.next = self.quads.value.val();
-        self.store.write.next = self.trial.q.val();
+        self.store.write.next = self.trial.then.val();
         self.store.write_buffer.next = self.target.then.val();
         self.store.write_address.next = self.moved_address.then.val();
         self.store.write_data.next = self.taylor.moved.val();
@@ -306,15 +310,15 @@ impl Logic for Search {
         self.sum_taylor.word.next = self.sum.word.val();
         self.sum_taylor.step.next = self.step.then.val();
         self.sum_moved.now.next = self.go.then.val();
-        self.sum_trial.d.next = self.sum_moved.then.val() & !self.walk.last.val() & !self.rst.val();
-        self.sum_outcome.d.next = self.sum_moved.then.val() & self.walk.last.val() & !self.rst.val();
-        self.sum.write.next = self.sum_trial.q.val();
+        self.sum_trial.now.next = self.sum_moved.then.val() & !self.walk.last.val();
+        self.sum_outcome.now.next = self.sum_moved.then.val() & self.walk.last.val();
+        self.sum.write.next = self.sum_trial.then.val();
         self.sum.write_buffer.next = self.target.then.val();
         self.sum.write_data.next = self.sum_taylor.moved.val();
         self.sum_candidates.word.next = self.sum_taylor.moved.val();
 
         comment!("Scores, and the judgement");
-        self.scored.now.next = self.trial.q.val();
+        self.scored.now.next = self.trial.then.val();
         self.scored_address.now.next = self.moved_address.then.val();
         self.counts.address.next = self.scored_address.then.val();
         self.first.now.next = self.go.then.val();
@@ -338,9 +342,9 @@ impl Logic for Search {
         comment!("The last sweep's constants are the values");
         self.constants.word.next = self.taylor.moved.val();
         self.values.next = self.constants.low.val();
-        self.values_valid.next = self.outcome.q.val();
+        self.values_valid.next = self.outcome.then.val();
         self.settled.next = self.go.then.val() & self.walk.last.val();
-        self.values_begin.next = self.sum_outcome.q.val();
+        self.values_begin.next = self.sum_outcome.then.val();
         self.finish.now.next = self.quad_end.val() & self.walk.last.val();
         self.done.next = self.finish.then.val();
         self.best_x.next = self.judge.best_x.val();
