@@ -27,7 +27,7 @@ pub struct Store {
     pub fill_quad: Wire<In>,
     /// Write `write_data`.
     pub write: Signal<In, Bit>,
-    /// Buffer to write.
+    /// Buffer to write, a cycle before `write`.
     pub write_buffer: Wire<In>,
     /// Which quad.
     pub write_address: Wire<In>,
@@ -46,6 +46,7 @@ pub struct Store {
     _apart: bool,
     _memory: Vec<Vec<Word>>,
     _read: Word,
+    _write_buffer: Word,
 }
 
 /// Cycles from an address to its quad.
@@ -84,6 +85,7 @@ impl Store {
             _apart: apart,
             _memory: vec![vec![Word::default(); quads]; BUFFERS + usize::from(apart)],
             _read: Word::default(),
+            _write_buffer: Word::default(),
             _layout: layout,
         }
     }
@@ -103,12 +105,13 @@ impl Logic for Store {
             self.read_data.next = self._read;
             self._read = read.unwrap_or_default();
             if self.write.val() {
-                let (buffer, data) = (self.write_buffer.val(), self.write_data.val());
+                let (buffer, data) = (self._write_buffer, self.write_data.val());
                 let address = self.write_address.val().number() as usize;
                 if let Some(word) = self.memory(buffer).get_mut(address) {
                     *word = data;
                 }
             }
+            self._write_buffer = self.write_buffer.val();
             if self.fill.val() {
                 let k = self.fill_index.val().number() as usize;
                 let bits = self.fill_quad.width() / 4;
@@ -140,21 +143,20 @@ impl Logic for Store {
             0 => String::new(),
             more => format!("{more}'d0, "),
         };
-        let place = |name: &str| {
-            format!(
-                "wire [{end}:0] {name} = {{{pad}write_address}} + (write_buffer == 2'd1 ? {address_bits}'d{one} : \
-                 write_buffer == 2'd2 ? {address_bits}'d{two} : {address_bits}'d0);\n",
-                end = address_bits - 1,
-                one = base(1, self._quads),
-                two = base(2, self._quads),
-            )
-        };
+        let end = address_bits - 1;
+        let to_buffer = format!(
+            "\
+reg [{end}:0] write_base;
+always @(posedge clk)
+  write_base <= write_buffer == 2'd1 ? {address_bits}'d{one} : write_buffer == 2'd2 ? {address_bits}'d{two} : {address_bits}'d0;
+wire [{end}:0] to_buffer = write_base + {{{pad}write_address}};
+",
+            one = base(1, self._quads),
+            two = base(2, self._quads),
+        );
         let write_to = match self._apart {
-            true => place("write_to"),
-            false => {
-                place("to_buffer")
-                    + &format!("wire [{}:0] write_to = fill ? {{{pad}fill_address}} : to_buffer;\n", address_bits - 1)
-            }
+            true => "to_buffer".to_string(),
+            false => format!("fill ? {{{pad}fill_address}} : to_buffer"),
         };
         let memories: String = (0..self._layout.widths.len())
             .map(|k| {
@@ -201,8 +203,9 @@ end
             false => "wire unused_buffer = &{1'b0, read_buffer};\n".to_string(),
         };
         Verilog::Custom(format!(
-            "{lanes}{write_to}{read_from}{from_start}{memories}",
-            read_from = format_args!("wire [{}:0] read_from = read_base + {{{pad}read_address}};\n", address_bits - 1),
+            "{lanes}{to_buffer}wire [{end}:0] write_to = {write_to};
+wire [{end}:0] read_from = read_base + {{{pad}read_address}};
+{from_start}{memories}",
         ))
     }
 }

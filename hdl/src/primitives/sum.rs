@@ -7,8 +7,9 @@ use super::polynomial_word::{resize, PolynomialWord};
 use super::sweep::{BUFFERS, BUFFER_BITS, START};
 use crate::wire::{Wire, Word};
 
-/// Adds up the counted lanes of each `fill` into buffer `START` (quad 0 starts a coefficient anew), two cycles later; `read` holds a
-/// buffer's sum on `word`; `write` replaces a buffer's sum. As in the search memory, `START` is buffer 0 unless one
+/// Adds up the counted lanes of each `fill` into buffer `START` (quad 0 starts a coefficient anew), two cycles later; `read`
+/// puts a buffer's sum on `word` as many cycles later as the search memory takes, where it stays; `write` replaces a
+/// buffer's sum by what stands on `write_data` a cycle later. As in the search memory, `START` is buffer 0 unless one
 /// subarray is filled while another is searched.
 #[derive(LogicBlock)]
 pub struct Sum {
@@ -34,12 +35,14 @@ pub struct Sum {
     pub write: Signal<In, Bit>,
     /// Buffer to write.
     pub write_buffer: Wire<In>,
-    /// The new sum.
+    /// The new sum, a cycle later.
     pub write_data: Wire<In>,
     _layout: PolynomialWord,
     _apart: bool,
     _buffers: [Word; BUFFERS + 1],
     _added: Option<Added>,
+    _reads: Option<usize>,
+    _writes: Option<usize>,
 }
 
 /// What a `fill` adds to a coefficient.
@@ -71,6 +74,8 @@ impl Sum {
             _apart: apart,
             _buffers: Default::default(),
             _added: None,
+            _reads: None,
+            _writes: None,
         }
     }
 }
@@ -89,13 +94,16 @@ impl Sum {
 impl Logic for Sum {
     fn update(&mut self) {
         if self.clk.pos_edge() {
-            if self.read.val() {
-                self.word.next = self._buffers[self.buffer(self.read_buffer.val().number() as usize)];
+            if let Some(buffer) = self._reads.take() {
+                self.word.next = self._buffers[buffer];
             }
-            if self.write.val() {
-                let buffer = self.buffer(self.write_buffer.val().number() as usize);
+            if let Some(buffer) = self._writes.take() {
                 self._buffers[buffer] = self.write_data.val();
             }
+            let named = |wire: &Wire<In>| self.buffer(wire.val().number() as usize);
+            let (reads, writes) = (named(&self.read_buffer), named(&self.write_buffer));
+            self._reads = self.read.val().then_some(reads);
+            self._writes = self.write.val().then_some(writes);
             if let Some(Added { index, first, sum: added }) = self._added.take() {
                 if let Some(&width) = self._layout.widths.get(index) {
                     let start = self.buffer(START);
@@ -131,26 +139,47 @@ impl Logic for Sum {
         let lanes: String = (0..4)
             .map(|lane| format!("wire [{}:0] t{lane} = fill_quad[{} +: {bits}];\n", bits - 1, lane * bits))
             .collect();
-        let sums: String = self
+        let buffers = BUFFERS + usize::from(self._apart);
+        let names: Vec<String> = (0..buffers).map(|b| format!("buffer{b}")).collect();
+        let decoded: Vec<String> = (0..BUFFERS).rev().map(|b| format!("write && write_buffer == 2'd{b}")).collect();
+        let decoded = decoded.join(", ");
+        let coefficients: String = self
             ._layout
             .widths
             .iter()
             .enumerate()
             .map(|(k, &width)| {
-                let low = self._layout.offset(k);
+                let field = format!("[{} +: {width}]", self._layout.offset(k));
+                let choices: String =
+                    (1..buffers).map(|b| format!("      2'd{b}: word{field} <= buffer{b}{field};\n")).collect();
+                let writes: String = (0..BUFFERS)
+                    .map(|b| format!("  if (writes{k}[{b}]) buffer{b}{field} <= write_data{field};\n"))
+                    .collect();
                 format!(
                     "\
-  if (adds && index == {index_bits}'d{k})
-    buffer{start}[{low} +: {width}] <= {added} + (first ? {width}'d0 : buffer{start}[{low} +: {width}]);
+reg reads{k};
+reg [1:0] from{k};
+reg [{last}:0] writes{k};
+(* keep *) always @(posedge clk) begin
+  reads{k} <= read;
+  from{k} <= read_buffer;
+  writes{k} <= {{{decoded}}};
+end
+always @(posedge clk) begin
+  if (reads{k}) begin
+    case (from{k})
+{choices}      default: word{field} <= buffer0{field};
+    endcase
+  end
+{writes}  if (adds && index == {index_bits}'d{k})
+    buffer{start}{field} <= {added} + (first ? {width}'d0 : buffer{start}{field});
+end
 ",
+                    last = BUFFERS - 1,
                     start = self.buffer(START),
                     added = resize("added", wide, width),
                 )
             })
-            .collect();
-        let names: Vec<String> = (0..BUFFERS + usize::from(self._apart)).map(|b| format!("buffer{b}")).collect();
-        let writes: String = (0..BUFFERS)
-            .map(|b| format!("  if (write && write_buffer == 2'd{b}) buffer{b} <= write_data;\n"))
             .collect();
         Verilog::Custom(format!(
             "\
@@ -163,21 +192,15 @@ always @(posedge clk) begin
   index <= fill_index;
   first <= fill_address == {address_bits}'d0;
   added <= {terms};
-  if (read) begin
-    case (read_buffer)
-      2'd1: word <= buffer1;
-      2'd2: word <= buffer2;
-{from_start}      default: word <= buffer0;
-    endcase
-  end
-{writes}{sums}end",
+end
+// What steers a coefficient is a register of its own, for it goes to all its bits. Synthesis is not to merge them.
+{coefficients}",
             wide_end = wide - 1,
             index_end = index_bits - 1,
             end = self._layout.bits() - 1,
             address_bits = self.fill_address.width(),
             terms = terms.join(" + "),
             names = names.join(", "),
-            from_start = if self._apart { "      2'd3: word <= buffer3;\n" } else { "" },
         ))
     }
 }

@@ -11,10 +11,11 @@ use crate::wire::{Wire, Word};
 /// Sweeps over the coarse tiles, then the halvings, then one that only moves to the winner.
 ///
 /// `set_up`, which may come with `judged` where the sweeps are coarse and otherwise comes three cycles after it or after
-/// `begin_frame`, begins a sweep, whose move, word and buffers stand from the next cycle until the following `set_up`. Coarse sweeps follow one another without waiting for their judgement (`chains`): each reads
-/// what the one before has written, and writes the buffer that is neither that nor the best so far. So three buffers
-/// are enough as long as a sweep is judged before the next but one is set up. Halvings work in place. `judged` with
-/// `improved` makes the buffer of a coarse sweep the best.
+/// `begin_frame`, begins a sweep, whose move, word and buffer to read stand from the next cycle until the following
+/// `set_up`; the buffer to write, in the word too, a cycle later. Coarse sweeps follow one another without waiting for their
+/// judgement (`chains`): each reads what the one before has written, and writes the buffer that is neither that nor the
+/// best so far. So three buffers are enough as long as a sweep is judged before the next but one is set up. Halvings work
+/// in place. `judged` with `improved` makes the buffer of a coarse sweep the best.
 #[derive(LogicBlock)]
 pub struct Walk {
     /// Clock.
@@ -49,7 +50,7 @@ pub struct Walk {
     pub source: Wire<Out>,
     /// Where that begins in the search memory.
     pub source_base: Wire<Out>,
-    /// Buffer to write.
+    /// Buffer to write, a cycle after the others.
     pub target: Wire<Out>,
     /// The sweep.
     pub sweep: Wire<Out>,
@@ -69,6 +70,10 @@ struct State {
     sweep: Sweep,
     kept: Sweep,
     radius: i64,
+    /// The sweep's buffer is told in this cycle.
+    chosen: bool,
+    /// The one told last.
+    target: usize,
 }
 
 impl Walk {
@@ -138,7 +143,7 @@ impl Walk {
         s.count += 1;
         self.source.next = Word::from(from.buffer as u64);
         self.source_base.next = Word::from(base(from.buffer, self._quads) as u64);
-        self.target.next = Word::from(buffer as u64);
+        s.chosen = true;
         self.step.next = Word::of_fields(&[by[0], by[1], i64::from(halving)], 2);
         self.last.next = !coarse && !halving;
         self.chains.next = !closes;
@@ -151,7 +156,10 @@ impl Logic for Walk {
             if self.begin_frame.val() {
                 let start = Sweep { buffer: START, ..Sweep::default() };
                 let count = if self.enabled.val() { 0 } else { JUDGED };
-                self._state = State { count, radius: 9, sweep: start, kept: start };
+                self._state = State { count, radius: 9, sweep: start, kept: start, chosen: false, target: START };
+            }
+            if std::mem::take(&mut self._state.chosen) {
+                self._state.target = self._state.sweep.buffer;
             }
             let judged = Sweep::of_word(&self.judged_sweep.val());
             if self.judged.val() && self.improved.val() && judged.coarse {
@@ -164,7 +172,8 @@ impl Logic for Walk {
                 self.chains.next = false;
             }
             let s = &self._state;
-            self.sweep.next = s.sweep.word();
+            self.sweep.next = Sweep { buffer: s.target, ..s.sweep }.word();
+            self.target.next = Word::from(s.target as u64);
             self.radius.next = Word::from(s.radius as u64);
             self.next_halves.next = (COARSE_CENTRES.len()..JUDGED).contains(&s.count);
         }
@@ -189,6 +198,7 @@ impl Logic for Walk {
     fn hdl(&self) -> Verilog {
         let (p, q, w) = (position_bits(), square_bits(), sweep_bits());
         let [_, _, _, buffer, ..] = offsets();
+        let low = buffer - 1;
         let cases: String = coarse_moves()
             .iter()
             .enumerate()
@@ -211,70 +221,77 @@ wire closing = !is_coarse || count == {SWEEP_BITS}'d{final_coarse};
 always @(*) next_halves = is_halving;
 // A judgement takes effect for the buffers of a coarse sweep that is set up with it; a halving comes after it.
 {judged_fields}wire keeps = judged && improved && judged_coarse;
-wire [1:0] sweep_buffer = sweep[{buffer} +: 2];
 wire [1:0] kept_buffer = kept[{buffer} +: 2];
 wire [{w_end}:0] from = is_coarse ? sweep : kept;
 {from_fields}wire unused = &{{1'b0, from_coarse, from_closes, best_x, best_y, judged_centre_x, judged_centre_y, judged_square,
   judged_closes}};
 // The best is at most one step away from the centre of its polynomial.
-// The move stands in registers, and so does where it leads, before the sweep is set up.
+// The move stands in registers with what it starts from, and so does where it leads, before the sweep is set up.
 reg [1:0] go_x, go_y;
+reg [{p_end}:0] base_x, base_y;
+reg [{q_end}:0] base_square;
 wire [1:0] step_x = is_coarse ? table_x : best_x[1:0] - from_centre_x[1:0];
 wire [1:0] step_y = is_coarse ? table_y : best_y[1:0] - from_centre_y[1:0];
-wire [{q_end}:0] twice_x = {{{{{q_more}{{from_centre_x[{p_end}]}}}}, from_centre_x, 1'b0}};
-wire [{q_end}:0] twice_y = {{{{{q_more}{{from_centre_y[{p_end}]}}}}, from_centre_y, 1'b0}};
+wire [{q_end}:0] twice_x = {{{{{q_more}{{base_x[{p_end}]}}}}, base_x, 1'b0}};
+wire [{q_end}:0] twice_y = {{{{{q_more}{{base_y[{p_end}]}}}}, base_y, 1'b0}};
 wire [{q_end}:0] along_x = go_x[1] ? {q}'d1 - twice_x : go_x[0] ? {q}'d1 + twice_x : {q}'d0;
 wire [{q_end}:0] along_y = go_y[1] ? {q}'d1 - twice_y : go_y[0] ? {q}'d1 + twice_y : {q}'d0;
-wire [{q_end}:0] to_square = from_square + along_x + along_y;
-wire [{p_end}:0] to_x = from_centre_x + {{{{{p_more}{{go_x[1]}}}}, go_x}};
-wire [{p_end}:0] to_y = from_centre_y + {{{{{p_more}{{go_y[1]}}}}, go_y}};
+wire [{q_end}:0] to_square = base_square + along_x + along_y;
+wire [{p_end}:0] to_x = base_x + {{{{{p_more}{{go_x[1]}}}}, go_x}};
+wire [{p_end}:0] to_y = base_y + {{{{{p_more}{{go_y[1]}}}}, go_y}};
 reg [{p_end}:0] at_x, at_y;
 reg [{q_end}:0] at_square;
 always @(posedge clk) begin
   go_x <= step_x;
   go_y <= step_y;
+  base_x <= from_centre_x;
+  base_y <= from_centre_y;
+  base_square <= from_square;
   at_x <= to_x;
   at_y <= to_y;
   at_square <= to_square;
 end
-// A coarse sweep writes the first of 1, 2, 0 that is neither read nor the best's. Whose that is, is chosen last: whether
-// the judgement improved comes late.
-function [1:0] free_of;
-  input [1:0] read, best;
-  free_of = read != 2'd1 && best != 2'd1 ? 2'd1 : read != 2'd2 && best != 2'd2 ? 2'd2 : 2'd0;
-endfunction
-wire [1:0] to_buffer = !is_coarse ? kept_buffer
-  : keeps ? free_of(sweep_buffer, judged_buffer) : free_of(sweep_buffer, kept_buffer);
-wire [{w_end}:0] next_sweep = {{closing, is_coarse, to_buffer, is_halving ? at_square << 2 : at_square,
-  is_halving ? at_y << 1 : at_y, is_halving ? at_x << 1 : at_x}};
+wire [{low}:0] next = {{is_halving ? at_square << 2 : at_square, is_halving ? at_y << 1 : at_y, is_halving ? at_x << 1 : at_x}};
+// A coarse sweep writes the first of 1, 2, 0 that is neither read nor the best's, chosen when a judgement that came with the
+// set-up has taken effect: the first, which reads what came in, writes 1. Others write what they read.
+reg set_up1, coarse1, taken_closes, taken_coarse;
+reg [{low}:0] place;
+wire [1:0] free = source == 2'd{START} || (source != 2'd1 && kept_buffer != 2'd1) ? 2'd1
+  : source != 2'd2 && kept_buffer != 2'd2 ? 2'd2 : 2'd0;
+always @(*) sweep = {{taken_closes, taken_coarse, target, place}};
 always @(posedge clk) begin
   if (begin_frame) begin
     count <= enabled ? {SWEEP_BITS}'d0 : {SWEEP_BITS}'d{JUDGED};
     is_coarse <= enabled;
     is_halving <= 1'b0;
-    sweep <= {start};
+    {{taken_closes, taken_coarse, place}} <= {w_less}'d0;
+    target <= 2'd{START};
     kept <= {start};
     radius <= {q}'d9;
   end else begin
-    kept <= set_up && (!is_coarse || count == {SWEEP_BITS}'d0) ? next_sweep : keeps ? judged_sweep : kept;
+    kept <= set_up && (!is_coarse || count == {SWEEP_BITS}'d0)
+      ? {{closing, is_coarse, is_coarse ? 2'd1 : kept_buffer, next}} : keeps ? judged_sweep : kept;
+    if (set_up1) target <= coarse1 ? free : source;
     if (set_up) begin
       count <= count + {SWEEP_BITS}'d1;
       if (count == {SWEEP_BITS}'d{final_coarse}) is_coarse <= 1'b0;
       is_halving <= (is_halving || count == {SWEEP_BITS}'d{final_coarse}) && count != {SWEEP_BITS}'d{final_halving};
-      sweep <= next_sweep;
+      {{taken_closes, taken_coarse, place}} <= {{closing, is_coarse, next}};
       step <= {{is_halving, go_y, go_x}};
       last <= !is_coarse && !is_halving;
       source <= from_buffer;
       source_base <= from_buffer == 2'd1 ? {base}'d{one} : from_buffer == 2'd2 ? {base}'d{two} : {base}'d0;
-      target <= to_buffer;
       if (is_halving) radius <= radius << 2;
     end
   end
+  set_up1 <= set_up;
+  coarse1 <= is_coarse;
   if (rst) chains <= 1'b0;
   else if (set_up) chains <= !closing;
 end",
             s_end = SWEEP_BITS - 1,
             w_end = w - 1,
+            w_less = w - 2,
             p_end = p - 1,
             q_end = q - 1,
             base = base_bits(self._quads),

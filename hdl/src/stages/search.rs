@@ -84,12 +84,10 @@ pub struct Search {
     began: BitDelay,
     judged_then: BitDelay,
     go: BitDelay,
-    sum_go: BitDelay,
     moved: BitDelay,
     sum_moved: BitDelay,
     trial: BitDelay,
     outcome: BitDelay,
-    sum_trial: BitDelay,
     sum_outcome: BitDelay,
     scored: BitDelay,
     first: BitDelay,
@@ -164,12 +162,10 @@ impl Search {
             began: BitDelay::new(SET_UP as usize - 1),
             judged_then: BitDelay::new(SET_UP as usize - 1),
             go: BitDelay::new(1),
-            sum_go: BitDelay::new(STORE_LATENCY - 1),
             moved: BitDelay::new(MOVED - 1),
             sum_moved: BitDelay::new(MOVED - 1),
             trial: BitDelay::new(1),
             outcome: BitDelay::new(1),
-            sum_trial: BitDelay::new(1),
             sum_outcome: BitDelay::new(1),
             scored: BitDelay::new(CANDIDATES_LATENCY),
             first: BitDelay::new(MOVED + CANDIDATES_LATENCY),
@@ -178,7 +174,8 @@ impl Search {
             totals: BitDelay::new(MOVED + CANDIDATES_LATENCY + SCORE_LATENCY + padding),
             finish: BitDelay::new(MOVED + 1),
             step: Delay::new(5, STORE_LATENCY),
-            target: Delay::new(BUFFER_BITS, MOVED),
+            // The buffer is chosen a cycle after the set-up, and asked for a cycle before it is written.
+            target: Delay::new(BUFFER_BITS, MOVED - 2),
             moved_address: Delay::new(address, MOVED),
             scored_address: Delay::new(address, CANDIDATES_LATENCY),
             set_up: Default::default(),
@@ -212,14 +209,11 @@ impl Logic for Search {
         self.trial.rst.next = self.rst.val();
         self.outcome.clk.next = self.clk.val();
         self.outcome.rst.next = self.rst.val();
-        self.sum_trial.clk.next = self.clk.val();
-        self.sum_trial.rst.next = self.rst.val();
         self.sum_outcome.clk.next = self.clk.val();
         self.sum_outcome.rst.next = self.rst.val();
         self.began.clk.next = self.clk.val();
         self.judged_then.clk.next = self.clk.val();
         self.go.clk.next = self.clk.val();
-        self.sum_go.clk.next = self.clk.val();
         self.moved.clk.next = self.clk.val();
         self.sum_moved.clk.next = self.clk.val();
         self.scored.clk.next = self.clk.val();
@@ -235,7 +229,6 @@ impl Logic for Search {
         self.began.rst.next = self.rst.val();
         self.judged_then.rst.next = self.rst.val();
         self.go.rst.next = self.rst.val();
-        self.sum_go.rst.next = self.rst.val();
         self.moved.rst.next = self.rst.val();
         self.sum_moved.rst.next = self.rst.val();
         self.scored.rst.next = self.rst.val();
@@ -304,15 +297,13 @@ impl Logic for Search {
         self.candidates.word.next = self.taylor.moved.val();
 
         comment!("and so does their sum");
-        self.sum_go.now.next = self.go.then.val();
-        self.sum.read.next = self.sum_go.then.val();
+        self.sum.read.next = self.go.then.val();
         self.sum.read_buffer.next = self.walk.source.val();
         self.sum_taylor.word.next = self.sum.word.val();
         self.sum_taylor.step.next = self.step.then.val();
         self.sum_moved.now.next = self.go.then.val();
-        self.sum_trial.now.next = self.sum_moved.then.val() & !self.walk.last.val();
         self.sum_outcome.now.next = self.sum_moved.then.val() & self.walk.last.val();
-        self.sum.write.next = self.sum_trial.then.val();
+        self.sum.write.next = self.sum_moved.then.val() & !self.walk.last.val();
         self.sum.write_buffer.next = self.target.then.val();
         self.sum.write_data.next = self.sum_taylor.moved.val();
         self.sum_candidates.word.next = self.sum_taylor.moved.val();

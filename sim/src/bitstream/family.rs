@@ -34,7 +34,7 @@ pub fn flow(family: Family) -> Flow {
         Family::Ecp5 => Flow {
             place: Tool { name: "nextpnr-ecp5" },
             pack: Tool { name: "ecppack" },
-            synthesis: "synth_ecp5",
+            synthesis: "synth_ecp5 -nowidelut",
             lut: "TRELLIS_COMB",
             flip_flop: "TRELLIS_FF",
             multiplier: "MULT18X18D",
