@@ -364,7 +364,7 @@ impl Logic for Engine {
         self.forces.framing.next = self.sent_framing.q.val();
         self.forces.cycles.next = self.cycles.value.val();
         self.send.start.next = self.begin_send.val();
-        self.forces.advance.next = self.send.advance.val();
+        self.send.room.next = self.forces.room.val();
         self.forces.offer.next = self.send.offer.val();
         self.forces.beat.next = self.send.beat.val();
         self.forces.beat_part.next = self.send.part.val();
@@ -373,6 +373,7 @@ impl Logic for Engine {
         self.send.m_axis_tvalid.next = self.forces.m_axis_tvalid.val();
         self.send.m_axis_tlast.next = self.forces.m_axis_tlast.val();
         self.send.m_axis_tready.next = self.resultants.s_axis_tready.val();
+        self.forces.m_axis_tready.next = self.resultants.s_axis_tready.val();
         self.resultants.s_axis_tdata.next = self.forces.m_axis_tdata.val();
         self.resultants.s_axis_tvalid.next = self.forces.m_axis_tvalid.val();
         self.resultants.s_axis_tlast.next = self.forces.m_axis_tlast.val();

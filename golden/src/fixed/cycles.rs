@@ -52,7 +52,7 @@ const UNSEARCHED: u64 = 2;
 /// From the start of a subarray's search to that of the next one's passes.
 const NEXT: u64 = 1;
 /// From the last subarray's first value, which stands Q cycles before their end, to the first beat on the output.
-const SEND: u64 = 11;
+const SEND: u64 = 13;
 
 /// How long a frame takes, in clock cycles.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]

@@ -13,14 +13,15 @@ use super::case_counter::{largest, number_by_case};
 use super::counter::count_bits;
 use super::half_up::half_up;
 use super::polynomial_word::resize;
+use super::queue::LATENCY as LEAVING;
 use super::raw_length::shift_bits;
 use super::rescaler::SATURATION_BITS;
 use super::sweep::position_bits;
 use crate::wire::{Wire, Word};
 
-/// A pipeline that moves while `advance` is high: memory (3 steps), lane, products (2), shift, rounding with saturation,
-/// threshold, output. `beat` 0 is a force from `quad`, 1 … 3 are the status beats; the answer stands on `beat_data`
-/// ten steps after `offer`. `start` keeps μ, the shift and the status of subarray `part`, settled three cycles later;
+/// A pipeline that never waits: memory (3 steps), lane, products (2), shift, rounding with saturation, threshold, output.
+/// `beat` 0 is a force from `quad`, 1 … 3 are the status beats; the answer stands on `beat_data` for one cycle, ten after
+/// `offer`. `start` keeps μ, the shift and the status of subarray `part`, settled three cycles later;
 /// `begin_frame` clears the frame's counts.
 #[derive(LogicBlock)]
 pub struct ForceUnit {
@@ -36,8 +37,6 @@ pub struct ForceUnit {
     pub start: Signal<In, Bit>,
     /// Which subarray.
     pub part: Wire<In>,
-    /// The pipeline moves.
-    pub advance: Signal<In, Bit>,
     /// A beat enters.
     pub offer: Signal<In, Bit>,
     /// Which beat, 2 bits.
@@ -93,8 +92,8 @@ const READ_STEPS: usize = 3;
 /// Bits of p that a multiplier takes beside a sign.
 const LOW: usize = MULTIPLIER_BITS as usize - 1;
 /// Cycles of a frame that its counter does not see: it is 0 a cycle after the frame starts, and the first output beat stands
-/// from the next cycle on.
-const UNCOUNTED: u32 = ACCEPT as u32 + 2;
+/// when it has gone through the queue.
+const UNCOUNTED: u32 = ACCEPT as u32 + 2 + LEAVING as u32;
 /// Width of the cycle counter.
 pub const CYCLE_BITS: usize = 24;
 
@@ -142,7 +141,6 @@ impl ForceUnit {
             start: Default::default(),
             part: Wire::new(count_bits(parts)),
             beat_part: Wire::new(count_bits(parts)),
-            advance: Default::default(),
             offer: Default::default(),
             beat: Wire::new(2),
             lane: Wire::new(2),
@@ -285,18 +283,16 @@ reg signed [{product}:0] moved_x, moved_y;
 wire [{p_end}:0] status_x = xs[at9];
 wire [{p_end}:0] status_y = ys[at9];
 always @(posedge clk) begin
-  if (advance) begin
-    mu_x <= mu_xs[at3];
-    mu_y <= mu_ys[at3];
-    low_x <= low * mu_x;
-    low_y <= low * mu_y;
-    high_x <= high * mu_x;
-    high_y <= high * mu_y;
-    product_x <= {{high_x, {low_bits}'d0}} + {{{{{sign}{{low_x[{low_product_end}]}}}}, low_x}};
-    product_y <= {{high_y, {low_bits}'d0}} + {{{{{sign}{{low_y[{low_product_end}]}}}}, low_y}};
-    moved_x <= doubled_x >>> shift;
-    moved_y <= doubled_y >>> shift;
-  end
+  mu_x <= mu_xs[at3];
+  mu_y <= mu_ys[at3];
+  low_x <= low * mu_x;
+  low_y <= low * mu_y;
+  high_x <= high * mu_x;
+  high_y <= high * mu_y;
+  product_x <= {{high_x, {low_bits}'d0}} + {{{{{sign}{{low_x[{low_product_end}]}}}}, low_x}};
+  product_y <= {{high_y, {low_bits}'d0}} + {{{{{sign}{{low_y[{low_product_end}]}}}}, low_y}};
+  moved_x <= doubled_x >>> shift;
+  moved_y <= doubled_y >>> shift;
 end
 ",
             mu_end = mu - 1,
@@ -324,30 +320,28 @@ end
 impl Logic for ForceUnit {
     fn update(&mut self) {
         if self.clk.pos_edge() {
-            if self.advance.val() {
-                let leaving = self._pipe.remove(0);
-                if let Some(entry) = leaving {
-                    if self._frame.counting {
-                        self._frame.cycles = self.cycles.val().number() as u32 + UNCOUNTED;
-                        self._frame.counting = false;
-                    }
-                    let words = self.answer(&entry);
-                    self.beat_data.next = Word::of_fields(&words.map(i64::from), FORCE_BITS as usize);
+            let leaving = self._pipe.remove(0);
+            if let Some(entry) = leaving {
+                if self._frame.counting {
+                    self._frame.cycles = self.cycles.val().number() as u32 + UNCOUNTED;
+                    self._frame.counting = false;
                 }
-                self.valid.next = leaving.is_some();
-                let parts = self._counts[self.case()];
-                self.last.next = leaving.is_some_and(|entry| entry.beat == 3 && entry.part + 1 == parts);
-                let read = self._pipe.len() - READ_STEPS;
-                if let Some(Some(entry)) = self._pipe.get_mut(read) {
-                    entry.value = self.quad.val().signed(entry.lane, self.quad.width() / 4);
-                }
-                self._pipe.push(self.offer.val().then(|| Entry {
-                    beat: self.beat.val().number(),
-                    part: self.beat_part.val().number() as usize,
-                    lane: self.lane.val().number() as usize,
-                    value: 0,
-                }));
+                let words = self.answer(&entry);
+                self.beat_data.next = Word::of_fields(&words.map(i64::from), FORCE_BITS as usize);
             }
+            self.valid.next = leaving.is_some();
+            let parts = self._counts[self.case()];
+            self.last.next = leaving.is_some_and(|entry| entry.beat == 3 && entry.part + 1 == parts);
+            let read = self._pipe.len() - READ_STEPS;
+            if let Some(Some(entry)) = self._pipe.get_mut(read) {
+                entry.value = self.quad.val().signed(entry.lane, self.quad.width() / 4);
+            }
+            self._pipe.push(self.offer.val().then(|| Entry {
+                beat: self.beat.val().number(),
+                part: self.beat_part.val().number() as usize,
+                lane: self.lane.val().number() as usize,
+                value: 0,
+            }));
             if self.begin_frame.val() {
                 self._frame = Frame { counting: true, ..Frame::default() };
             }
@@ -483,39 +477,37 @@ always @(*) begin
     default: status = {{{c_word}'d0, cycles_held, {cap_word}'d0, force_saturations, {cap_word}'d0, rescale_saturations[at9]}};
   endcase
 end
-wire force_leaves = advance && offers[8] && beat9 == 2'd0;
+wire force_leaves = offers[8] && beat9 == 2'd0;
 always @(posedge clk) begin
   if (rst) begin
     offers <= 9'd0;
     valid <= 1'b0;
     last <= 1'b0;
-  end else if (advance) begin
+  end else begin
     offers <= {{offers[7:0], offer}};
     valid <= offers[8];
     last <= offers[8] && beat9 == 2'd3 && at9 == {final_part};
   end
-  if (advance) begin
-    {{beat9, beat8, beat7, beat6, beat5, beat4, beat3, beat2, beat1}} <= {{beat8, beat7, beat6, beat5, beat4, beat3, beat2, beat1, beat}};
-    {{at9, at8, at7, at6, at5, at4, at3, at2, at1}} <= {{at8, at7, at6, at5, at4, at3, at2, at1, beat_part}};
-    {{lane3, lane2, lane1}} <= {{lane2, lane1, lane}};
-    value <= lane3[1] ? (lane3[0] ? quad[{v3} +: {v}] : quad[{v2} +: {v}])
-      : (lane3[0] ? quad[{v} +: {v}] : quad[0 +: {v}]);
-    {{value6, value5}} <= {{value5, value}};
-    shift <= shifts[at5];
-    moved_z <= doubled_z >>> shift;
-    words <= rounded;
-    clipped <= clips;
-    force_words <= words;
-    force_clips <= clipped;
-    below <= {threshold};
-    presses <= words[95:64] != 32'd0;
-    if (offers[8]) beat_data <= beat9 != 2'd0 ? status : below ? {all}'d0 : force_words;
-  end
+  {{beat9, beat8, beat7, beat6, beat5, beat4, beat3, beat2, beat1}} <= {{beat8, beat7, beat6, beat5, beat4, beat3, beat2, beat1, beat}};
+  {{at9, at8, at7, at6, at5, at4, at3, at2, at1}} <= {{at8, at7, at6, at5, at4, at3, at2, at1, beat_part}};
+  {{lane3, lane2, lane1}} <= {{lane2, lane1, lane}};
+  value <= lane3[1] ? (lane3[0] ? quad[{v3} +: {v}] : quad[{v2} +: {v}])
+    : (lane3[0] ? quad[{v} +: {v}] : quad[0 +: {v}]);
+  {{value6, value5}} <= {{value5, value}};
+  shift <= shifts[at5];
+  moved_z <= doubled_z >>> shift;
+  words <= rounded;
+  clipped <= clips;
+  force_words <= words;
+  force_clips <= clipped;
+  below <= {threshold};
+  presses <= words[95:64] != 32'd0;
+  beat_data <= beat9 != 2'd0 ? status : below ? {all}'d0 : force_words;
   if (begin_frame) begin
     counting <= 1'b1;
     contact <= 1'b0;
     force_saturations <= {cap}'d0;
-  end else if (advance && offers[8]) begin
+  end else if (offers[8]) begin
     if (counting) cycles_held <= cycles + {c}'d{UNCOUNTED};
     counting <= 1'b0;
     if (force_leaves && !below && presses) contact <= 1'b1;

@@ -1,10 +1,11 @@
-//! Stage `force`: p(μ*) by quad into a memory, out of it force words by taxel.
+//! Stage `force`: p(μ*) by quad into a memory, out of it force words by taxel, which wait in a queue for the receiver.
 
 use dermis_golden::fixed::Model;
 use rust_hdl::prelude::*;
 
 use crate::primitives::{
-    count_bits, frame_quads, position_bits, shift_bits, Counter, ForceUnit, Keep, Ram, CYCLE_BITS, SATURATION_BITS,
+    count_bits, frame_quads, position_bits, shift_bits, Counter, Delay, ForceUnit, Queue, Ram, CYCLE_BITS,
+    SATURATION_BITS,
 };
 use crate::wire::Wire;
 
@@ -27,8 +28,8 @@ pub struct Force {
     pub start: Signal<In, Bit>,
     /// Which subarray.
     pub part: Wire<In>,
-    /// The pipeline moves.
-    pub advance: Signal<In, Bit>,
+    /// A beat may be asked for.
+    pub room: Signal<Out, Bit>,
     /// A beat is asked for.
     pub offer: Signal<In, Bit>,
     /// Which beat: 0 a force, 1 … 3 the status.
@@ -63,14 +64,17 @@ pub struct Force {
     pub cycles: Wire<In>,
     /// A beat stands on the output.
     pub m_axis_tvalid: Signal<Out, Bit>,
+    /// The receiver takes it.
+    pub m_axis_tready: Signal<In, Bit>,
     /// It is the frame's last.
     pub m_axis_tlast: Signal<Out, Bit>,
     /// `{fz, fy, fx}`.
     pub m_axis_tdata: Wire<Out>,
     quads: Counter,
-    asked: Keep,
+    asked: Delay,
     store: Ram,
     unit: ForceUnit,
+    leaving: Queue,
 }
 
 impl Force {
@@ -90,7 +94,7 @@ impl Force {
             start: Default::default(),
             part: Wire::new(unit.part.width()),
             beat_part: Wire::new(unit.part.width()),
-            advance: Default::default(),
+            room: Default::default(),
             offer: Default::default(),
             beat: Wire::new(2),
             address: Wire::new(address),
@@ -107,11 +111,13 @@ impl Force {
             saturations: Wire::new(SATURATION_BITS),
             cycles: Wire::new(CYCLE_BITS),
             m_axis_tvalid: Default::default(),
+            m_axis_tready: Default::default(),
             m_axis_tlast: Default::default(),
             m_axis_tdata: Wire::new(unit.beat_data.width()),
             quads: Counter::new(quads),
-            asked: Keep::new(address),
+            asked: Delay::new(address, 1),
             store: Ram::new(quads, 1, value).registered(),
+            leaving: Queue::new(unit.beat_data.width()),
             unit,
         }
     }
@@ -125,22 +131,22 @@ impl Logic for Force {
         self.store.clk.next = self.clk.val();
         self.unit.clk.next = self.clk.val();
         self.unit.rst.next = self.rst.val();
+        self.leaving.clk.next = self.clk.val();
+        self.leaving.rst.next = self.rst.val();
         self.store.write.next = self.values_valid.val().into();
         self.quads.clear.next = self.begin_frame.val();
         self.quads.enable.next = self.values_valid.val();
         self.store.write_address.next = self.quads.value.val();
         self.store.write_data.next = self.values.val();
-        self.store.read.next = self.advance.val();
-        self.asked.keep.next = self.advance.val();
-        self.asked.word.next = self.address.val();
-        self.store.read_address.next = self.asked.kept.val();
+        self.store.read.next = true;
+        self.asked.now.next = self.address.val();
+        self.store.read_address.next = self.asked.then.val();
 
         self.unit.which.next = self.which.val();
         self.unit.begin_frame.next = self.begin_frame.val();
         self.unit.part.next = self.part.val();
         self.unit.beat_part.next = self.beat_part.val();
         self.unit.start.next = self.start.val();
-        self.unit.advance.next = self.advance.val();
         self.unit.offer.next = self.offer.val();
         self.unit.beat.next = self.beat.val();
         self.unit.lane.next = self.lane.val();
@@ -156,8 +162,15 @@ impl Logic for Force {
         self.unit.score.next = self.score.val();
         self.unit.saturations.next = self.saturations.val();
         self.unit.cycles.next = self.cycles.val();
-        self.m_axis_tvalid.next = self.unit.valid.val();
-        self.m_axis_tlast.next = self.unit.last.val();
-        self.m_axis_tdata.next = self.unit.beat_data.val();
+
+        self.leaving.reserve.next = self.offer.val();
+        self.room.next = self.leaving.room.val();
+        self.leaving.write.next = self.unit.valid.val();
+        self.leaving.last.next = self.unit.last.val();
+        self.leaving.word.next = self.unit.beat_data.val();
+        self.leaving.m_axis_tready.next = self.m_axis_tready.val();
+        self.m_axis_tvalid.next = self.leaving.m_axis_tvalid.val();
+        self.m_axis_tlast.next = self.leaving.m_axis_tlast.val();
+        self.m_axis_tdata.next = self.leaving.m_axis_tdata.val();
     }
 }

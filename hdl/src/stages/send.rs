@@ -7,7 +7,7 @@ use rust_hdl::prelude::*;
 use crate::primitives::{count_bits, largest, CaseCounter, Counter, Scan, StatusCode};
 use crate::wire::Wire;
 
-/// From `start` one beat is offered per moving cycle: all taxels, then the status beats.
+/// From `start` one beat is asked for in each cycle that has `room` for it: all taxels, then the status beats.
 #[derive(LogicBlock)]
 pub struct Send {
     /// Clock.
@@ -24,8 +24,8 @@ pub struct Send {
     pub m_axis_tready: Signal<In, Bit>,
     /// It is the frame's last.
     pub m_axis_tlast: Signal<In, Bit>,
-    /// The pipeline to the output moves.
-    pub advance: Signal<Out, Bit>,
+    /// A beat may be asked for.
+    pub room: Signal<In, Bit>,
     /// A beat is asked for.
     pub offer: Signal<Out, Bit>,
     /// Which beat: 0 a force, 1 … 3 the status.
@@ -44,7 +44,6 @@ pub struct Send {
     code: StatusCode,
     sending: DFF<Bit>,
     status: DFF<Bit>,
-    moves: Signal<Local, Bit>,
     step: Signal<Local, Bit>,
     at_end: Signal<Local, Bit>,
     finish: Signal<Local, Bit>,
@@ -64,7 +63,7 @@ impl Send {
             m_axis_tvalid: Default::default(),
             m_axis_tready: Default::default(),
             m_axis_tlast: Default::default(),
-            advance: Default::default(),
+            room: Default::default(),
             offer: Default::default(),
             beat: Wire::new(2),
             part: Wire::new(count_bits(count)),
@@ -77,7 +76,6 @@ impl Send {
             code: StatusCode::new(count_bits(STATUS_BEATS), count_bits(count)),
             sending: Default::default(),
             status: Default::default(),
-            moves: Default::default(),
             step: Default::default(),
             at_end: Default::default(),
             finish: Default::default(),
@@ -96,12 +94,10 @@ impl Logic for Send {
 
         self.scan.which.next = self.which.val();
         self.parts.which.next = self.which.val();
-        self.moves.next = !self.m_axis_tvalid.val() | self.m_axis_tready.val();
-        self.step.next = self.sending.q.val() & self.moves.val();
+        self.step.next = self.sending.q.val() & self.room.val();
         self.at_end.next = self.step.val() & !self.status.q.val() & self.scan.last.val();
         self.finish.next = self.step.val() & self.status.q.val() & self.words.last.val() & self.parts.last.val();
-        self.advance.next = self.moves.val();
-        self.offer.next = self.sending.q.val();
+        self.offer.next = self.step.val();
 
         self.scan.clear.next = self.start.val();
         self.scan.enable.next = self.step.val() & !self.status.q.val();
