@@ -1,13 +1,23 @@
-// From its start to its tlast a frame has all its forces and status beats, no beat leaves outside a frame, and what is
-// offered stays. What the force unit multiplies is left open.
+// From its start to its tlast a frame has all its forces and status beats, each promised to the queue where there is room,
+// and none comes outside a frame. What the force unit multiplies is left open.
+module @TOP@$forces$leaving(
+  input clk, input rst, input reserve, output room, input write, input last, input [95:0] word,
+  output reg m_axis_tvalid, input m_axis_tready, output reg m_axis_tlast, output [95:0] m_axis_tdata
+);
+  // In place of the queue: there is room whenever it pleases the prover, and a beat leaves at once.
+  assign room = m_axis_tready;
+  assign m_axis_tdata = word;
+  always @(posedge clk) {m_axis_tvalid, m_axis_tlast} <= rst ? 2'd0 : {write, write && last};
+endmodule
+
 module proof(
-  input clk, input again, input start_it, input m_ready,
+  input clk, input again, input start_it, input room,
   input [@VALUES@-1:0] values, input values_valid, input settled, input [15:0] saturations
 );
   reg started = 1'b0;
   always @(posedge clk) started <= 1'b1;
   wire rst = again || !started;
-  wire advance, offer, part, done, m_valid, m_last;
+  wire may, offer, part, done, m_valid, m_last;
   wire [1:0] beat, lane;
   wire [@ADDRESS@-1:0] address;
   wire [95:0] m_data;
@@ -15,30 +25,29 @@ module proof(
   // The engine starts a frame when the last one is out.
   wire begins = start_it && !within;
   @TOP@$send send(
-    .clk(clk), .rst(rst), .start(begins), .m_axis_tvalid(m_valid), .m_axis_tready(m_ready), .m_axis_tlast(m_last),
-    .advance(advance), .offer(offer), .beat(beat), .part(part), .address(address), .lane(lane), .done(done)
+    .clk(clk), .rst(rst), .start(begins), .room(may), .m_axis_tvalid(m_valid), .m_axis_tready(1'b1),
+    .m_axis_tlast(m_last), .offer(offer), .beat(beat), .part(part), .address(address), .lane(lane), .done(done)
   );
   @TOP@$forces forces(
     .clk(clk), .rst(rst), .values(values), .values_valid(values_valid), .begin_frame(begins), .start(settled),
-    .part(1'b0), .advance(advance), .offer(offer), .beat(beat), .beat_part(part), .address(address), .lane(lane),
-    .saturations(saturations), .m_axis_tvalid(m_valid), .m_axis_tlast(m_last), .m_axis_tdata(m_data)
+    .part(1'b0), .room(may), .offer(offer), .beat(beat), .beat_part(part), .address(address), .lane(lane),
+    .saturations(saturations), .m_axis_tvalid(m_valid), .m_axis_tready(room), .m_axis_tlast(m_last), .m_axis_tdata(m_data)
   );
-  reg followed = 1'b0, waits, last_before;
-  reg [95:0] before;
-  reg [7:0] given;
-  wire takes = m_valid && m_ready;
+  reg [7:0] given, asked;
+  // Whether a beat was asked for, in the cycles since.
+  reg [@STEPS@:0] asked_before;
   always @(posedge clk) begin
-    followed <= !rst;
-    waits <= m_valid && !m_ready;
-    {before, last_before} <= {m_data, m_last};
-    if (rst) {within, given} <= 9'd0;
+    asked_before <= rst ? @STEPS_MORE@'d0 : {asked_before[@STEPS@-1:0], offer};
+    if (rst) {within, given, asked} <= 17'd0;
     else begin
-      if (followed && waits) assert (m_valid && m_data == before && m_last == last_before);
+      if (offer) assert (room && within && asked <= 8'd@LAST@);
+      assert (m_valid == asked_before[@STEPS@]);
       if (m_valid) assert (within && m_last == (given == 8'd@LAST@));
-      assert (done == (takes && m_last));
+      assert (done == (m_valid && m_last));
       if (begins) within <= 1'b1;
-      if (takes) given <= given + 8'd1;
-      if (done) {within, given} <= 9'd0;
+      if (offer) asked <= asked + 8'd1;
+      if (m_valid) given <= given + 8'd1;
+      if (done) {within, given, asked} <= 17'd0;
     end
   end
 endmodule

@@ -205,7 +205,8 @@ impl Logic for Judge {
         });
         let compared = each(&|n| {
             format!(
-                "reg lower_{n}, tie_{n};\nreg [{}:0] score_{n};\nreg [{end}:0] at_x_{n}, at_y_{n};\n",
+                "reg lower_{n}, same_{n}, above_{n}, level_{n}, left_{n};\n\
+                 wire tie_{n} = same_{n} && (above_{n} || (level_{n} && left_{n}));\nreg [{}:0] score_{n};\nreg [{end}:0] at_x_{n}, at_y_{n};\n",
                 t - 1,
                 end = p - 1
             )
@@ -213,7 +214,8 @@ impl Logic for Judge {
         let compare = each(&|n| {
             format!(
                 "  lower_{n} <= s_{n} < s_best;\n  \
-                 tie_{n} <= s_{n} == s_best && (y_{n} < by || (y_{n} == by && x_{n} < bx));\n  \
+                 same_{n} <= s_{n} == s_best;\n  \
+                 above_{n} <= y_{n} < by;\n  level_{n} <= y_{n} == by;\n  left_{n} <= x_{n} < bx;\n  \
                  score_{n} <= s_{n};\n  at_x_{n} <= x_{n};\n  at_y_{n} <= y_{n};\n"
             )
         });

@@ -42,7 +42,7 @@ pub struct Queue {
 }
 
 /// Places; a distributed memory has so many.
-const PLACES: usize = 16;
+pub const PLACES: usize = 16;
 const PLACE_BITS: usize = 4;
 /// From `write` to the output, in cycles.
 pub const LATENCY: usize = 2;

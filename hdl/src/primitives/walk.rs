@@ -228,6 +228,8 @@ wire [{w_end}:0] from = is_coarse ? sweep : kept;
 // The best is at most one step away from the centre of its polynomial.
 // The move stands in registers with what it starts from, and so does where it leads, before the sweep is set up.
 reg [1:0] go_x, go_y;
+reg [1:0] base_buffer;
+reg [{base_end}:0] buffer_base;
 reg [{p_end}:0] base_x, base_y;
 reg [{q_end}:0] base_square;
 wire [1:0] step_x = is_coarse ? table_x : best_x[1:0] - from_centre_x[1:0];
@@ -244,6 +246,8 @@ reg [{q_end}:0] at_square;
 always @(posedge clk) begin
   go_x <= step_x;
   go_y <= step_y;
+  base_buffer <= from_buffer;
+  buffer_base <= from_buffer == 2'd1 ? {base}'d{one} : from_buffer == 2'd2 ? {base}'d{two} : {base}'d0;
   base_x <= from_centre_x;
   base_y <= from_centre_y;
   base_square <= from_square;
@@ -279,8 +283,8 @@ always @(posedge clk) begin
       {{taken_closes, taken_coarse, place}} <= {{closing, is_coarse, next}};
       step <= {{is_halving, go_y, go_x}};
       last <= !is_coarse && !is_halving;
-      source <= from_buffer;
-      source_base <= from_buffer == 2'd1 ? {base}'d{one} : from_buffer == 2'd2 ? {base}'d{two} : {base}'d0;
+      source <= base_buffer;
+      source_base <= buffer_base;
       if (is_halving) radius <= radius << 2;
     end
   end
@@ -295,6 +299,7 @@ end",
             p_end = p - 1,
             q_end = q - 1,
             base = base_bits(self._quads),
+            base_end = base_bits(self._quads) - 1,
             one = base(1, self._quads),
             two = base(2, self._quads),
             q_more = q - p - 1,

@@ -118,17 +118,19 @@ impl Logic for Weigh {
         let s = self.sums.width() / 9;
         let w = self.weights.width() / 9;
         let (p, q) = (position_bits(), square_bits());
-        // n·log2 Σp without a multiplier: one term for each bit of n.
-        let terms = |taxels: &i64| -> String {
+        // n·log2 Σp without a multiplier: one term for each bit of n, half of them added up in a step of its own.
+        let halves = |taxels: &i64| -> [String; 2] {
             let bits = (0..64).filter(|bit| taxels >> bit & 1 == 1);
             let terms: Vec<String> = bits.map(|bit| format!("({{{}'d0, log}} << {bit})", w - LOG_BITS)).collect();
-            terms.join(" + ")
+            let (first, rest) = terms.split_at(terms.len().div_ceil(2));
+            [first.join(" + "), if rest.is_empty() { format!("{w}'d0") } else { rest.join(" + ") }]
         };
-        let terms = by_case(&self._taxels.iter().map(terms).collect::<Vec<_>>());
+        let halves: Vec<[String; 2]> = self._taxels.iter().map(halves).collect();
+        let [first, rest] = [0, 1].map(|half| by_case(&halves.iter().map(|of| of[half].clone()).collect::<Vec<_>>()));
         let rows: String = (0..3)
             .map(|row| {
                 format!(
-                    "      if (row5 == 2'd{row}) begin\n        weights[({row} * 3 + c) * {w} +: {w}] <= product;\n        \
+                    "      if (row5 == 2'd{row}) begin\n        weights[({row} * 3 + c) * {w} +: {w}] <= first + rest;\n        \
                      eligible[{row} * 3 + c] <= fits4;\n      end\n"
                 )
             })
@@ -176,7 +178,7 @@ generate
     reg [{located_end}:0] located;
     reg [{log_end}:0] log;
     reg presses2, fits3, fits4;
-    reg [{w_end}:0] product;
+    reg [{w_end}:0] first, rest;
     always @(posedge clk) begin
       sum1 <= sum;
       presses2 <= !sum1[{s_end}] && sum1 != {s}'d0;
@@ -184,7 +186,8 @@ generate
       fits4 <= fits3;
       located <= locate(sum1);
       log <= logarithm(located);
-      product <= {terms};
+      first <= {first};
+      rest <= {rest};
       if (valid[3]) begin
 {rows}      end
     end

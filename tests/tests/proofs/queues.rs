@@ -5,6 +5,7 @@ use dermis_golden::fixed::resources::{count_bits, operand_vectors};
 use dermis_golden::fixed::send::STATUS_BEATS;
 use dermis_golden::link::{payloads, Counters, Identity, ANSWER};
 use dermis_hdl::link::generate_board;
+use dermis_hdl::primitives::QUEUE_PLACES;
 use dermis_hdl::{generate, Generated};
 
 use super::prover::{number, Proof};
@@ -51,6 +52,24 @@ fn rows_that_wait_for_their_shift_come_out_in_order() {
     ];
     Proof { generated: &generated, property: "replay.v", given, defect: defects[0], open_products: false }
         .fails_with(&defects);
+}
+
+#[test]
+fn forces_that_wait_leave_in_order() {
+    let given = vec![("PLACES", number(QUEUE_PLACES))];
+    let defects = [
+        ("now_reserved != 5'd16", "now_reserved != 5'd17"),
+        ("if (moves && waits) {m_axis_tlast, m_axis_tdata} <=", "if (waits) {m_axis_tlast, m_axis_tdata} <="),
+        ("if (write) places[written[3:0]] <=", "places[written[3:0]] <="),
+    ];
+    Proof {
+        generated: &generate(&model("")).unwrap(),
+        property: "queue.v",
+        given,
+        defect: defects[0],
+        open_products: false,
+    }
+    .fails_with(&defects);
 }
 
 #[test]
