@@ -1,46 +1,47 @@
 // Beats that are reserved where there is room leave once each, two cycles after they are written or when those before them
-// have left, in their order and as they are, and stay until they are taken. What has left makes room.
+// have left, in their order and as they are, and stay until they are taken. What has left makes room. Bit @BIT@ stands for
+// the others.
 module proof(input clk, input again, input wants, input comes, input sample, input takes, input pick);
   reg started = 1'b0;
   always @(posedge clk) started <= 1'b1;
   wire rst = again || !started;
   wire room, m_valid, m_last;
   wire [95:0] m_data;
-  // Reserved and not yet written; written and not yet taken.
-  reg [5:0] promised, inside;
+  // Beats reserved and not taken, those of them not yet written; beats written, and put on the output.
+  reg [4:0] reserved, promised, written, put;
   wire reserve = wants && room;
-  wire write = comes && promised != 6'd0;
+  wire write = comes && promised != 5'd0;
   wire taken = m_valid && takes;
+  wire [4:0] waiting = written - put;
+  wire puts = (!m_valid || takes) && waiting != 5'd0;
   @TOP@$forces$leaving queue(
     .clk(clk), .rst(rst), .reserve(reserve), .room(room), .write(write), .last(!sample), .word({96{sample}}),
     .m_axis_tvalid(m_valid), .m_axis_tready(takes), .m_axis_tlast(m_last), .m_axis_tdata(m_data)
   );
-  // A beat that is followed on its way, its level, and how many are before it.
-  reg follows, over, level;
-  reg [5:0] before;
-  reg waits, comes_next, last_before;
-  reg [95:0] data_before;
+  // Any one beat is followed on its way: it waits, it stands on the output, it is gone.
+  reg waits, stands, gone, level;
+  reg [4:0] number;
+  wire [4:0] before = number - put;
+  reg must_stand;
   always @(posedge clk) begin
-    waits <= m_valid && !takes && !rst;
-    comes_next <= inside != 6'd0 && !m_valid && !rst;
-    {data_before, last_before} <= {m_data, m_last};
-    if (rst) {promised, inside, follows, over, before} <= 20'd0;
+    must_stand <= !rst && (puts || (m_valid && !takes));
+    if (rst) {reserved, promised, written, put, waits, stands, gone} <= 23'd0;
     else begin
-      promised <= promised + {5'd0, reserve} - {5'd0, write};
-      inside <= inside + {5'd0, write} - {5'd0, taken};
-      assert (room == (promised + inside < 6'd@PLACES@));
-      if (m_valid) assert (inside != 6'd0 && m_data == {96{!m_last}});
-      if (waits) assert (m_valid && m_data == data_before && m_last == last_before);
-      if (comes_next) assert (m_valid);
-      if (write && pick && !follows && !over) begin
-        {follows, level} <= {1'b1, sample};
-        before <= inside - {5'd0, taken};
+      reserved <= reserved + {4'd0, reserve} - {4'd0, taken};
+      promised <= promised + {4'd0, reserve} - {4'd0, write};
+      written <= written + {4'd0, write};
+      put <= put + {4'd0, puts};
+      assert (reserved <= 5'd@PLACES@ && room == (reserved != 5'd@PLACES@));
+      assert (promised <= reserved && reserved - promised == waiting + {4'd0, m_valid});
+      assert (m_valid == must_stand);
+      if (write && pick && !waits && !stands && !gone) begin
+        {waits, level} <= {1'b1, sample};
+        number <= written;
       end
-      if (follows && taken) begin
-        before <= before - 6'd1;
-        if (before == 6'd0) {follows, over} <= 2'b01;
-        if (before == 6'd0) assert (m_last == !level);
-      end
+      if (waits) assert (before < waiting);
+      if (waits && puts && before == 5'd0) {waits, stands} <= 2'b01;
+      if (stands) assert (m_data[@BIT@] == level && m_last == !level);
+      if (stands && takes) {stands, gone} <= 2'b01;
     end
   end
 endmodule

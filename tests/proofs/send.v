@@ -33,21 +33,24 @@ module proof(
     .part(1'b0), .room(may), .offer(offer), .beat(beat), .beat_part(part), .address(address), .lane(lane),
     .saturations(saturations), .m_axis_tvalid(m_valid), .m_axis_tready(room), .m_axis_tlast(m_last), .m_axis_tdata(m_data)
   );
-  reg [7:0] given, asked;
-  // Whether a beat was asked for, in the cycles since.
-  reg [@STEPS@:0] asked_before;
+  // How many beats were asked for; whether one was in the cycles before, and which.
+  reg [7:0] asked;
+  reg [@STEPS@:0] asks;
+  reg [7:0] which [0:@STEPS@];
+  integer i;
   always @(posedge clk) begin
-    asked_before <= rst ? @STEPS_MORE@'d0 : {asked_before[@STEPS@-1:0], offer};
-    if (rst) {within, given, asked} <= 17'd0;
+    which[0] <= asked;
+    for (i = 1; i <= @STEPS@; i = i + 1) which[i] <= which[i - 1];
+    if (rst) {within, asks, asked} <= @WIDTH@'d0;
     else begin
+      asks <= {asks[@STEPS@-1:0], offer};
       if (offer) assert (room && within && asked <= 8'd@LAST@);
-      assert (m_valid == asked_before[@STEPS@]);
-      if (m_valid) assert (within && m_last == (given == 8'd@LAST@));
+      assert (m_valid == asks[@STEPS@]);
+      if (m_valid) assert (within && m_last == (which[@STEPS@] == 8'd@LAST@));
       assert (done == (m_valid && m_last));
       if (begins) within <= 1'b1;
       if (offer) asked <= asked + 8'd1;
-      if (m_valid) given <= given + 8'd1;
-      if (done) {within, given, asked} <= 17'd0;
+      if (done) {within, asked} <= 9'd0;
     end
   end
 endmodule

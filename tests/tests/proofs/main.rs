@@ -133,7 +133,7 @@ fn send_gives_whole_frames() {
         ("ADDRESS", number(count_bits(model.formats.quads))),
         ("LAST", number(ROWS * COLS + STATUS_BEATS - 1)),
         ("STEPS", number(FORCE_STEPS)),
-        ("STEPS_MORE", number(FORCE_STEPS + 1)),
+        ("WIDTH", number(FORCE_STEPS + 10)),
     ];
     let defects = [
         ("last <= offers[8] && beat9 == 2'd3", "last <= offers[8] && beat9 == 2'd2"),

@@ -56,20 +56,19 @@ fn rows_that_wait_for_their_shift_come_out_in_order() {
 
 #[test]
 fn forces_that_wait_leave_in_order() {
-    let given = vec![("PLACES", number(QUEUE_PLACES))];
+    let generated = &generate(&model("")).unwrap();
+    let places = format!("now_reserved != 5'd{QUEUE_PLACES}");
+    let more = format!("now_reserved != 5'd{}", QUEUE_PLACES + 1);
     let defects = [
-        ("now_reserved != 5'd16", "now_reserved != 5'd17"),
+        (places.as_str(), more.as_str()),
         ("if (moves && waits) {m_axis_tlast, m_axis_tdata} <=", "if (waits) {m_axis_tlast, m_axis_tdata} <="),
-        ("if (write) places[written[3:0]] <=", "places[written[3:0]] <="),
+        ("<= places[read[3:0]]", "<= places[~read[3:0]]"),
     ];
-    Proof {
-        generated: &generate(&model("")).unwrap(),
-        property: "queue.v",
-        given,
-        defect: defects[0],
-        open_products: false,
+    for bit in [0, 95] {
+        let given = vec![("PLACES", number(QUEUE_PLACES)), ("BIT", number(bit))];
+        let proof = Proof { generated, property: "queue.v", given, defect: defects[0], open_products: false };
+        proof.fails_with(&defects);
     }
-    .fails_with(&defects);
 }
 
 #[test]
