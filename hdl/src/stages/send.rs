@@ -1,4 +1,4 @@
-//! Stage `send`: asks for the forces row-major, then for each subarray's status, at the receiver's pace.
+//! Stage `send`: asks for the forces row-major, then for each subarray's status, as fast as the queue has room.
 
 use dermis_golden::fixed::send::STATUS_BEATS;
 use dermis_golden::fixed::Model;
