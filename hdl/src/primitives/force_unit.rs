@@ -89,6 +89,10 @@ pub struct ForceUnit {
 pub const STEPS: usize = 10;
 /// Steps of them from `offer` to `quad`.
 const READ_STEPS: usize = 3;
+/// And from a value to its products.
+const PRODUCT_STEPS: usize = 2;
+/// Steps in which what was asked for goes along.
+const ASKED: usize = STEPS - 1;
 /// Bits of p that a multiplier takes beside a sign.
 const LOW: usize = MULTIPLIER_BITS as usize - 1;
 /// Cycles of a frame that its counter does not see: it is 0 a cycle after the frame starts, and the first output beat stands
@@ -162,7 +166,7 @@ impl ForceUnit {
             _formats: formats.clone(),
             _checks: model.checks(),
             _threshold: model.threshold,
-            _pipe: vec![None; STEPS - 1],
+            _pipe: vec![None; ASKED],
             _frame: Frame::default(),
             _parts: vec![Part::default(); parts],
             _counts: counts,
@@ -280,11 +284,11 @@ reg signed [{high_product_end}:0] high_x, high_y;
 wire signed [{product}:0] doubled_x = {{product_x, 1'b0}};
 wire signed [{product}:0] doubled_y = {{product_y, 1'b0}};
 reg signed [{product}:0] moved_x, moved_y;
-wire [{p_end}:0] status_x = xs[at9];
-wire [{p_end}:0] status_y = ys[at9];
+wire [{p_end}:0] status_x = xs[at_out];
+wire [{p_end}:0] status_y = ys[at_out];
 always @(posedge clk) begin
-  mu_x <= mu_xs[at3];
-  mu_y <= mu_ys[at3];
+  mu_x <= mu_xs[at_value];
+  mu_y <= mu_ys[at_value];
   low_x <= low * mu_x;
   low_y <= low * mu_y;
   high_x <= high * mu_x;
@@ -368,6 +372,7 @@ impl Logic for ForceUnit {
         let (mu, fraction) = (18, f.mu_fraction as usize);
         let product = v + mu;
         let p = position_bits();
+        let part = self.part.width();
         let (n_bits, r_bits) = (self.normalise.width(), self.rescale.width());
         // force_shift = base + normalise − rescale, held between 0 and the largest useful shift.
         let base = force_shift(f, 0, 0) as usize;
@@ -380,7 +385,7 @@ impl Logic for ForceUnit {
         let searched = f.degree > 0;
         let (mu_words, shear) = if searched { self.shear() } else { self.no_shear() };
         // From bit 4 on, or 5 where that tells of the coefficients.
-        let (from, damaged) = if self._checks { (5, ", damages[at9]") } else { (4, "") };
+        let (from, damaged) = if self._checks { (5, ", damages[at_out]") } else { (4, "") };
         let above = word - CASE_SHIFT as usize;
         let case_word = match self._numbers.iter().any(|&number| number > 0) {
             false => format!("{}'d0{damaged}", word - from),
@@ -441,14 +446,21 @@ wire [7:0] raw_shift = 8'd{base} + {{{n_more}'d0, normalise_held}} - {{{r_more}'
     shifts[part2] <= shift_now;
   end
 end
-reg [8:0] offers;
-reg [1:0] beat1, beat2, beat3, beat4, beat5, beat6, beat7, beat8, beat9;
-reg [1:0] lane1, lane2, lane3;
-reg [{part_end}:0] at1, at2, at3, at4, at5, at6, at7, at8, at9;
+// What was asked for goes along: to the lane's choice, to the shift, to the output.
+reg [{asked_end}:0] offers;
+reg [{beats_end}:0] beats;
+reg [{lanes_end}:0] lanes;
+reg [{ats_end}:0] ats;
+wire leaves = offers[{asked_end}];
+wire [1:0] beat_out = beats[{beats_end} -: 2];
+wire [1:0] lane_value = lanes[{lanes_end} -: 2];
+wire [{part_end}:0] at_value = ats[{at_value} +: {part}];
+wire [{part_end}:0] at_shift = ats[{at_shift} +: {part}];
+wire [{part_end}:0] at_out = ats[{ats_end} -: {part}];
 reg [5:0] shift;
 reg signed [{v_end}:0] value;
-reg [{v_end}:0] value5, value6;
-wire signed [{product}:0] doubled_z = {{{{{z_more}{{value6[{v_end}]}}}}, value6, {fraction_one}'d0}};
+reg [{v_end}:0] value1, value2;
+wire signed [{product}:0] doubled_z = {{{{{z_more}{{value2[{v_end}]}}}}, value2, {fraction_one}'d0}};
 reg signed [{product}:0] moved_z;
 wire [{all_end}:0] rounded;
 wire [2:0] clips;
@@ -471,30 +483,30 @@ wire [{cap}:0] count = {{1'b0, force_saturations}} + {{{cap_less}'d0, force_clip
   + {{{cap_less}'d0, force_clips[2]}};
 reg [{all_end}:0] status;
 always @(*) begin
-  case (beat9)
-    2'd1: status = {{{case_word}, framing, !contact, founds[at9], conditions[at9], {y_word}, {x_word}}};
-    2'd2: status = {{{n_word}'d0, normalises[at9], {r_word}'d0, rescales[at9], scores[at9]}};
-    default: status = {{{c_word}'d0, cycles_held, {cap_word}'d0, force_saturations, {cap_word}'d0, rescale_saturations[at9]}};
+  case (beat_out)
+    2'd1: status = {{{case_word}, framing, !contact, founds[at_out], conditions[at_out], {y_word}, {x_word}}};
+    2'd2: status = {{{n_word}'d0, normalises[at_out], {r_word}'d0, rescales[at_out], scores[at_out]}};
+    default: status = {{{c_word}'d0, cycles_held, {cap_word}'d0, force_saturations, {cap_word}'d0, rescale_saturations[at_out]}};
   endcase
 end
-wire force_leaves = offers[8] && beat9 == 2'd0;
+wire force_leaves = leaves && beat_out == 2'd0;
 always @(posedge clk) begin
   if (rst) begin
-    offers <= 9'd0;
+    offers <= {asked}'d0;
     valid <= 1'b0;
     last <= 1'b0;
   end else begin
-    offers <= {{offers[7:0], offer}};
-    valid <= offers[8];
-    last <= offers[8] && beat9 == 2'd3 && at9 == {final_part};
+    offers <= {{offers[{asked_less}:0], offer}};
+    valid <= leaves;
+    last <= leaves && beat_out == 2'd3 && at_out == {final_part};
   end
-  {{beat9, beat8, beat7, beat6, beat5, beat4, beat3, beat2, beat1}} <= {{beat8, beat7, beat6, beat5, beat4, beat3, beat2, beat1, beat}};
-  {{at9, at8, at7, at6, at5, at4, at3, at2, at1}} <= {{at8, at7, at6, at5, at4, at3, at2, at1, beat_part}};
-  {{lane3, lane2, lane1}} <= {{lane2, lane1, lane}};
-  value <= lane3[1] ? (lane3[0] ? quad[{v3} +: {v}] : quad[{v2} +: {v}])
-    : (lane3[0] ? quad[{v} +: {v}] : quad[0 +: {v}]);
-  {{value6, value5}} <= {{value5, value}};
-  shift <= shifts[at5];
+  beats <= {{beats[{beats_less}:0], beat}};
+  ats <= {{ats[{ats_less}:0], beat_part}};
+  lanes <= {{lanes[{lanes_less}:0], lane}};
+  value <= lane_value[1] ? (lane_value[0] ? quad[{v3} +: {v}] : quad[{v2} +: {v}])
+    : (lane_value[0] ? quad[{v} +: {v}] : quad[0 +: {v}]);
+  {{value2, value1}} <= {{value1, value}};
+  shift <= shifts[at_shift];
   moved_z <= doubled_z >>> shift;
   words <= rounded;
   clipped <= clips;
@@ -502,12 +514,12 @@ always @(posedge clk) begin
   force_clips <= clipped;
   below <= {threshold};
   presses <= words[95:64] != 32'd0;
-  beat_data <= beat9 != 2'd0 ? status : below ? {all}'d0 : force_words;
+  beat_data <= beat_out != 2'd0 ? status : below ? {all}'d0 : force_words;
   if (begin_frame) begin
     counting <= 1'b1;
     contact <= 1'b0;
     force_saturations <= {cap}'d0;
-  end else if (offers[8]) begin
+  end else if (leaves) begin
     if (counting) cycles_held <= cycles + {c}'d{UNCOUNTED};
     counting <= 1'b0;
     if (force_leaves && !below && presses) contact <= 1'b1;
@@ -516,7 +528,19 @@ always @(posedge clk) begin
 end",
             final_part = number_by_case(self._counts.iter().map(|count| count - 1), self.part.width()),
             case_word = case_word,
-            part_end = self.part.width() - 1,
+            part = part,
+            part_end = part - 1,
+            asked = ASKED,
+            asked_end = ASKED - 1,
+            asked_less = ASKED - 2,
+            beats_end = 2 * ASKED - 1,
+            beats_less = 2 * ASKED - 3,
+            ats_end = part * ASKED - 1,
+            ats_less = part * (ASKED - 1) - 1,
+            lanes_end = 2 * READ_STEPS - 1,
+            lanes_less = 2 * READ_STEPS - 3,
+            at_value = part * (READ_STEPS - 1),
+            at_shift = part * (READ_STEPS + PRODUCT_STEPS - 1),
             last_part = self._parts.len() - 1,
             n_end = n_bits - 1,
             r_end = r_bits - 1,

@@ -136,7 +136,7 @@ fn send_gives_whole_frames() {
         ("WIDTH", number(FORCE_STEPS + 10)),
     ];
     let defects = [
-        ("last <= offers[8] && beat9 == 2'd3", "last <= offers[8] && beat9 == 2'd2"),
+        ("last <= leaves && beat_out == 2'd3", "last <= leaves && beat_out == 2'd2"),
         ("step = sending$q & room;", "step = sending$q;"),
     ];
     Proof { generated: &generate(&model).unwrap(), property: "send.v", given, defect: defects[0], open_products: true }
