@@ -224,7 +224,7 @@ always @(*) next_halves = is_halving;
 wire [1:0] kept_buffer = kept[{buffer} +: 2];
 wire [{w_end}:0] from = is_coarse ? sweep : kept;
 {from_fields}wire unused = &{{1'b0, from_coarse, from_closes, best_x, best_y, judged_centre_x, judged_centre_y, judged_square,
-  judged_closes}};
+  judged_buffer, judged_closes}};
 // The best is at most one step away from the centre of its polynomial.
 // The move stands in registers with what it starts from, and so does where it leads, before the sweep is set up.
 reg [1:0] go_x, go_y;
