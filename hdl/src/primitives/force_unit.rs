@@ -526,7 +526,7 @@ always @(posedge clk) begin
     if (force_leaves) force_saturations <= count[{cap}] ? {{{cap}{{1'b1}}}} : count[{cap_end}:0];
   end
 end",
-            final_part = number_by_case(self._counts.iter().map(|count| count - 1), self.part.width()),
+            final_part = number_by_case(self._counts.iter().map(|count| count - 1), part),
             case_word = case_word,
             part = part,
             part_end = part - 1,

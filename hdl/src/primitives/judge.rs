@@ -206,7 +206,8 @@ impl Logic for Judge {
         let compared = each(&|n| {
             format!(
                 "reg lower_{n}, same_{n}, above_{n}, level_{n}, left_{n};\n\
-                 wire tie_{n} = same_{n} && (above_{n} || (level_{n} && left_{n}));\nreg [{}:0] score_{n};\nreg [{end}:0] at_x_{n}, at_y_{n};\n",
+                 wire tie_{n} = same_{n} && (above_{n} || (level_{n} && left_{n}));\n\
+                 reg [{}:0] score_{n};\nreg [{end}:0] at_x_{n}, at_y_{n};\n",
                 t - 1,
                 end = p - 1
             )

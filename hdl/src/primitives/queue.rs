@@ -41,9 +41,9 @@ pub struct Queue {
     _standing: bool,
 }
 
-/// Places; a distributed memory has so many.
-pub const PLACES: usize = 16;
 const PLACE_BITS: usize = 4;
+/// Places; a cell of distributed RAM has so many.
+pub const PLACES: usize = 1 << PLACE_BITS;
 /// From `write` to the output, in cycles.
 pub const LATENCY: usize = 2;
 

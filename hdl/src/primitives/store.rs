@@ -57,6 +57,13 @@ pub fn base(buffer: usize, quads: usize) -> usize {
     (buffer % BUFFERS) * quads
 }
 
+/// The same in Verilog, for the buffer whose number is called `buffer`.
+pub fn base_of(buffer: &str, quads: usize) -> String {
+    let bits = base_bits(quads);
+    let choices: String = (1..BUFFERS).map(|b| format!("{buffer} == 2'd{b} ? {bits}'d{} : ", base(b, quads))).collect();
+    format!("{choices}{bits}'d0")
+}
+
 /// Bits of a place in such a memory.
 pub fn base_bits(quads: usize) -> usize {
     count_bits(BUFFERS * quads)
@@ -147,12 +154,10 @@ impl Logic for Store {
         let to_buffer = format!(
             "\
 reg [{end}:0] write_base;
-always @(posedge clk)
-  write_base <= write_buffer == 2'd1 ? {address_bits}'d{one} : write_buffer == 2'd2 ? {address_bits}'d{two} : {address_bits}'d0;
+always @(posedge clk) write_base <= {write_base};
 wire [{end}:0] to_buffer = write_base + {{{pad}write_address}};
 ",
-            one = base(1, self._quads),
-            two = base(2, self._quads),
+            write_base = base_of("write_buffer", self._quads),
         );
         let write_to = match self._apart {
             true => "to_buffer".to_string(),

@@ -4,7 +4,7 @@ use dermis_golden::fixed::formats::HALVINGS;
 use dermis_golden::fixed::search::COARSE_CENTRES;
 use rust_hdl::prelude::*;
 
-use super::store::{base, base_bits};
+use super::store::{base, base_bits, base_of};
 use super::sweep::{offsets, position_bits, square_bits, sweep_bits, unpack, Sweep, BUFFERS, BUFFER_BITS, START};
 use crate::wire::{Wire, Word};
 
@@ -247,7 +247,7 @@ always @(posedge clk) begin
   go_x <= step_x;
   go_y <= step_y;
   base_buffer <= from_buffer;
-  buffer_base <= from_buffer == 2'd1 ? {base}'d{one} : from_buffer == 2'd2 ? {base}'d{two} : {base}'d0;
+  buffer_base <= {buffer_base};
   base_x <= from_centre_x;
   base_y <= from_centre_y;
   base_square <= from_square;
@@ -255,7 +255,8 @@ always @(posedge clk) begin
   at_y <= to_y;
   at_square <= to_square;
 end
-wire [{low}:0] next = {{is_halving ? at_square << 2 : at_square, is_halving ? at_y << 1 : at_y, is_halving ? at_x << 1 : at_x}};
+wire [{low}:0] next = {{is_halving ? at_square << 2 : at_square, is_halving ? at_y << 1 : at_y,
+  is_halving ? at_x << 1 : at_x}};
 // A coarse sweep writes the first of 1, 2, 0 that is neither read nor the best's, chosen when a judgement that came with the
 // set-up has taken effect: the first, which reads what came in, writes 1. Others write what they read.
 reg set_up1, coarse1, taken_closes, taken_coarse;
@@ -298,10 +299,8 @@ end",
             w_less = w - 2,
             p_end = p - 1,
             q_end = q - 1,
-            base = base_bits(self._quads),
             base_end = base_bits(self._quads) - 1,
-            one = base(1, self._quads),
-            two = base(2, self._quads),
+            buffer_base = base_of("from_buffer", self._quads),
             q_more = q - p - 1,
             p_more = p - 2,
             final_coarse = COARSE_CENTRES.len() - 1,

@@ -34,8 +34,8 @@ pub fn flow(family: Family) -> Flow {
         Family::Ecp5 => Flow {
             place: Tool { name: "nextpnr-ecp5" },
             pack: Tool { name: "ecppack" },
-            // Tables joined by a slice's multiplexers move as one in placement, often far from what they belong to, and
-            // the engine takes fewer tables without them.
+            // Tables joined by a slice's multiplexers move as one in placement; single ones find a place nearer to what
+            // they belong to.
             synthesis: "synth_ecp5 -nowidelut",
             lut: "TRELLIS_COMB",
             flip_flop: "TRELLIS_FF",
