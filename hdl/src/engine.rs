@@ -66,6 +66,8 @@ pub struct Engine {
     send: Send,
     resultants: Resultants,
     begins: BitDelay,
+    begun: BitDelay,
+    waits: BitDelay,
     computing: DFF<Bit>,
     first: DFF<Bit>,
     filled: DFF<Bit>,
@@ -129,6 +131,8 @@ impl Engine {
             send: Send::new(model),
             resultants: Resultants::new(model.wants_resultants(), &model.scene.sensor, model.grid()),
             begins: BitDelay::new(1),
+            begun: BitDelay::new(1),
+            waits: BitDelay::new(1),
             computing: Default::default(),
             first: Default::default(),
             filled: Default::default(),
@@ -195,6 +199,10 @@ impl Logic for Engine {
         self.finish.rst.next = self.rst.val();
         self.begins.clk.next = self.clk.val();
         self.begins.rst.next = self.rst.val();
+        self.begun.clk.next = self.clk.val();
+        self.begun.rst.next = self.rst.val();
+        self.waits.clk.next = self.clk.val();
+        self.waits.rst.next = self.rst.val();
         self.computing.clock.next = self.clk.val();
         self.first.clock.next = self.clk.val();
         self.filled.clock.next = self.clk.val();
@@ -272,13 +280,14 @@ impl Logic for Engine {
         }
         self.searched_part.keep.next = self.hand_over.val();
         self.searched_part.word.next = self.part.value.val();
-        self.searched_normalise.keep.next = self.hand_over.val();
+        comment!("Not before a cycle later do these begin anew");
+        self.searched_normalise.keep.next = self.handed.then.val();
         self.searched_normalise.word.next = self.normalise.shift.val();
-        self.searched_rescale.keep.next = self.hand_over.val();
+        self.searched_rescale.keep.next = self.handed.then.val();
         self.searched_rescale.word.next = self.rescale.shift.val();
-        self.searched_saturations.keep.next = self.hand_over.val();
+        self.searched_saturations.keep.next = self.handed.then.val();
         self.searched_saturations.word.next = self.rescale.saturations.val();
-        self.searched_damaged.keep.next = self.hand_over.val();
+        self.searched_damaged.keep.next = self.handed.then.val();
         self.searched_damaged.word.next = self.pass.damaged.val();
 
         comment!("Then the next one begins");
@@ -287,8 +296,11 @@ impl Logic for Engine {
         self.again.now.next = self.hand_over.val() & !self.part.last.val();
         self.start.next = self.begin_frame.val() | self.again.then.val();
         comment!("Waiting for the last frame does not count");
-        self.cycles.clear.next = self.begin_frame.val();
-        self.cycles.enable.next = !(self.complete.val() & self.behind.val());
+        comment!("The counter is far away, so all this is a cycle late");
+        self.begun.now.next = self.begin_frame.val();
+        self.waits.now.next = self.complete.val() & self.behind.val();
+        self.cycles.clear.next = self.begun.then.val();
+        self.cycles.enable.next = !self.waits.then.val();
         self.condition.d.next = self.condition.q.val();
         self.framing.d.next = self.framing.q.val();
         if self.start.val() {

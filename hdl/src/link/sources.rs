@@ -46,6 +46,7 @@ pub struct Sources {
     /// It is the last.
     pub word_last: Signal<Out, Bit>,
     _registered: bool,
+    _taken: bool,
     _second: bool,
     _half: Half,
 }
@@ -75,6 +76,7 @@ impl Sources {
             word_valid: Default::default(),
             word_last: Default::default(),
             _registered: registered,
+            _taken: false,
             _second: false,
             _half: Half::default(),
         }
@@ -90,7 +92,9 @@ impl Logic for Sources {
         let edge = self.clk.pos_edge();
         let before = self._second;
         if edge {
-            self._second = !self.begun.val() && (before || self.taken.val());
+            let taken = if self._registered { self._taken } else { self.taken.val() };
+            self._second = !self.begun.val() && (before || taken);
+            self._taken = self.taken.val();
         }
         let second = if self._registered { before } else { self._second };
         let half = match own {
@@ -121,6 +125,10 @@ impl Logic for Sources {
 
     fn hdl(&self) -> Verilog {
         let (when, to) = if self._registered { ("always @(posedge clk)", "<=") } else { ("always @(*)", "=") };
+        let taken = match self._registered {
+            true => "reg was_taken;\nalways @(posedge clk) was_taken <= taken;\n",
+            false => "wire was_taken = taken;\n",
+        };
         Verilog::Custom(format!(
             "\
 reg second, valid, last;
@@ -131,7 +139,7 @@ always @(*) begin
   address = {{source[0], second, index[3:1]}};
   answer_wanted = wanted && source[1];
 end
-always @(posedge clk) second <= !begun && (second || taken);
+{taken}always @(posedge clk) second <= !begun && (second || was_taken);
 {when} begin
   both {to} source[1] ? answer_half : entry;
   valid {to} source[1] ? answer_valid : entry_valid;

@@ -95,9 +95,9 @@ const PRODUCT_STEPS: usize = 2;
 const ASKED: usize = STEPS - 1;
 /// Bits of p that a multiplier takes beside a sign.
 const LOW: usize = MULTIPLIER_BITS as usize - 1;
-/// Cycles of a frame that its counter does not see: it is 0 a cycle after the frame starts, and the first output beat stands
-/// when it has gone through the queue.
-const UNCOUNTED: u32 = ACCEPT as u32 + 2 + LEAVING as u32;
+/// Cycles of a frame that its counter does not see: it is 0 two cycles after the frame starts, and the first output beat
+/// stands when it has gone through the queue.
+const UNCOUNTED: u32 = ACCEPT as u32 + 3 + LEAVING as u32;
 /// Width of the cycle counter.
 pub const CYCLE_BITS: usize = 24;
 

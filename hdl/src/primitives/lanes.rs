@@ -309,6 +309,9 @@ genvar p, k;
 generate
   for (p = 0; p < 4; p = p + 1) begin : parity
     wire [{chain_end}:0] chain_in;
+    // Of its own for each parity: it goes to a quarter of the lanes.
+    reg leaves3;
+    (* keep *) always @(posedge clk) leaves3 <= !rst && valid2 && last2;
     assign chain_in[{chain_end} -: {acc_bits}] = {acc_bits}'d0;
     assign chain_head[p * {acc_bits} +: {acc_bits}] = chain_in[{acc_end}:0];
     for (k = 0; k < {per_parity}; k = k + 1) begin : lane
@@ -320,7 +323,7 @@ generate
       (* keep *) always @(posedge clk) begin
         adds <= valid2;
         begins <= first2;
-        leaves <= valid3 && last3;
+        leaves <= leaves3;
       end
 {aligns}      wire [{wide_end}:0] shifted = {shifted};
       wire unused = &{{1'b0, shifted}};

@@ -11,7 +11,7 @@ use crate::wire::{Wire, Word};
 /// A quad of accumulators, shifted right by `shift` when `measured`, by the constant of an A pass otherwise.
 ///
 /// `words` follow three cycles later, `operands` (the same, shortened to `data_bits`) four; `saturations` counts the
-/// clipped words of valid quads since `clear`, a cycle after they stand.
+/// clipped words of valid quads since `clear`, two cycles after they stand.
 #[derive(LogicBlock)]
 pub struct Rescaler {
     /// Clock.
@@ -36,6 +36,7 @@ pub struct Rescaler {
     _taken: (Word, u32, bool),
     _shifted: [i64; 4],
     _valid: bool,
+    _clipped: u64,
     _clips: u64,
 }
 
@@ -59,6 +60,7 @@ impl Rescaler {
             _taken: (Word::default(), 0, false),
             _shifted: [0; 4],
             _valid: false,
+            _clipped: 0,
             _clips: 0,
         }
     }
@@ -81,7 +83,8 @@ impl Logic for Rescaler {
                 false => count.min((1 << SATURATION_BITS) - 1),
             });
             let clipped = rounded.iter().filter(|(_, clipped)| *clipped).count() as u64;
-            self._clips = if self._valid { clipped } else { 0 };
+            self._clips = self._clipped;
+            self._clipped = if self._valid { clipped } else { 0 };
             let (quad, shift, valid) = self._taken;
             self._shifted = std::array::from_fn(|lane| round_shift(quad.signed(lane, f.acc_bits as usize), shift));
             self._valid = valid;
@@ -108,6 +111,7 @@ reg [{shift_end}:0] amount;
 reg [{quad_end}:0] taken;
 reg valid1, valid2;
 wire [3:0] clipped;
+reg [3:0] clipped3;
 reg [2:0] clips;
 wire [{cap}:0] count = {{1'b0, saturations}} + {{{count_more}'d0, clips}};
 always @(posedge clk) begin
@@ -115,7 +119,8 @@ always @(posedge clk) begin
   taken <= quad;
   valid1 <= valid;
   valid2 <= valid1;
-  clips <= valid2 ? {{2'd0, clipped[0]}} + {{2'd0, clipped[1]}} + {{2'd0, clipped[2]}} + {{2'd0, clipped[3]}} : 3'd0;
+  clipped3 <= valid2 ? clipped : 4'd0;
+  clips <= {{2'd0, clipped3[0]}} + {{2'd0, clipped3[1]}} + {{2'd0, clipped3[2]}} + {{2'd0, clipped3[3]}};
   if (clear) saturations <= {cap}'d0;
   else saturations <= count[{cap}] ? {{{cap}{{1'b1}}}} : count[{cap_end}:0];
 end

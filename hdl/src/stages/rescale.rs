@@ -46,6 +46,7 @@ pub struct Rescale {
     raw: Ram,
     length: RawLength,
     rescaler: Rescaler,
+    started: BitDelay,
     read: BitDelay,
     words_later: BitDelay,
     operands_later: BitDelay,
@@ -79,6 +80,7 @@ impl Rescale {
             raw: Ram::new(largest(&quads), 1, acc).registered(),
             length: RawLength::new(formats),
             rescaler: Rescaler::new(formats),
+            started: BitDelay::new(1),
             read: BitDelay::new(2),
             words_later: BitDelay::new(3),
             operands_later: BitDelay::new(1),
@@ -101,36 +103,40 @@ impl Logic for Rescale {
         self.read.clk.next = self.clk.val();
         self.words_later.clk.next = self.clk.val();
         self.operands_later.clk.next = self.clk.val();
+        self.started.clk.next = self.clk.val();
+        self.started.rst.next = self.rst.val();
         self.read.rst.next = self.rst.val();
         self.words_later.rst.next = self.rst.val();
         self.operands_later.rst.next = self.rst.val();
 
+        comment!("The first row comes much later");
+        self.started.now.next = self.start.val();
         self.collected.next = self.collecting.q.val() & self.quad_valid.val();
-        self.collecting.d.next = (self.start.val()
+        self.collecting.d.next = (self.started.then.val()
             | (self.collecting.q.val() & !(self.quad_valid.val() & self.rows.last.val())))
             & !self.rst.val();
         self.rows.which.next = self.which.val();
         self.replay.which.next = self.which.val();
-        self.rows.clear.next = self.start.val();
+        self.rows.clear.next = self.started.then.val();
         self.rows.enable.next = self.collected.val();
         self.raw.write.next = self.collected.val().into();
         self.raw.write_address.next = self.rows.value.val();
         self.raw.write_data.next = self.quad.val();
-        self.length.clear.next = self.start.val();
+        self.length.clear.next = self.started.then.val();
         self.length.accept.next = self.collected.val();
         self.length.quad.next = self.quad.val();
 
         self.replaying.d.next = ((self.collected.val() & self.rows.last.val())
             | (self.replaying.q.val() & !self.replay.last.val()))
             & !self.rst.val();
-        self.replay.clear.next = self.start.val();
+        self.replay.clear.next = self.started.then.val();
         self.replay.enable.next = self.replaying.q.val();
         self.raw.read.next = true;
         self.raw.read_address.next = self.replay.value.val();
         self.read.now.next = self.replaying.q.val();
 
         self.enters.next = self.read.then.val() | (self.quad_valid.val() & !self.collecting.q.val());
-        self.rescaler.clear.next = self.start.val();
+        self.rescaler.clear.next = self.started.then.val();
         self.rescaler.valid.next = self.enters.val();
         self.rescaler.measured.next = self.read.then.val();
         self.rescaler.shift.next = self.length.shift.val();

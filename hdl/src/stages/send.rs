@@ -4,7 +4,7 @@ use dermis_golden::fixed::send::STATUS_BEATS;
 use dermis_golden::fixed::Model;
 use rust_hdl::prelude::*;
 
-use crate::primitives::{count_bits, largest, CaseCounter, Counter, Scan, StatusCode};
+use crate::primitives::{count_bits, largest, BitDelay, CaseCounter, Counter, Scan, StatusCode};
 use crate::wire::Wire;
 
 /// From `start` one beat is asked for in each cycle that has `room` for it: all taxels, then the status beats.
@@ -36,7 +36,7 @@ pub struct Send {
     pub address: Wire<Out>,
     /// The taxel's lane.
     pub lane: Wire<Out>,
-    /// The frame's last beat is taken.
+    /// The frame's last beat was taken.
     pub done: Signal<Out, Bit>,
     scan: Scan,
     words: Counter,
@@ -44,6 +44,7 @@ pub struct Send {
     code: StatusCode,
     sending: DFF<Bit>,
     status: DFF<Bit>,
+    out: BitDelay,
     step: Signal<Local, Bit>,
     at_end: Signal<Local, Bit>,
     finish: Signal<Local, Bit>,
@@ -76,6 +77,7 @@ impl Send {
             code: StatusCode::new(count_bits(STATUS_BEATS), count_bits(count)),
             sending: Default::default(),
             status: Default::default(),
+            out: BitDelay::new(1),
             step: Default::default(),
             at_end: Default::default(),
             finish: Default::default(),
@@ -116,6 +118,10 @@ impl Logic for Send {
 
         self.sending.d.next = (self.start.val() | (self.sending.q.val() & !self.finish.val())) & !self.rst.val();
         self.status.d.next = (self.at_end.val() | (self.status.q.val() & !self.finish.val())) & !self.rst.val();
-        self.done.next = self.m_axis_tvalid.val() & self.m_axis_tready.val() & self.m_axis_tlast.val();
+        comment!("From a register: who takes the beats may be far away");
+        self.out.clk.next = self.clk.val();
+        self.out.rst.next = self.rst.val();
+        self.out.now.next = self.m_axis_tvalid.val() & self.m_axis_tready.val() & self.m_axis_tlast.val();
+        self.done.next = self.out.then.val();
     }
 }

@@ -22,7 +22,9 @@ pub const MINUTES: u32 = 60;
 /// # Errors
 /// [`ToolError`]: no Yosys, a design that it refuses, files that cannot be used.
 pub fn synthesise(folder: &Path, family: Family, read: &str, top: &str) -> Result<Absorbed, ToolError> {
-    let script = format!("read_verilog {read}; {} -top {top} -json {NETLIST}", flow(family).synthesis);
+    let [first, others @ ..] = flow(family).synthesis else { unreachable!("a family without a command") };
+    let commands: String = others.iter().map(|command| format!("; {command}")).collect();
+    let script = format!("read_verilog {read}; {first} -top {top}{commands} -json {NETLIST}");
     run(folder, script, "synthesis.log")?;
     match family {
         Family::Ecp5 => absorb_file(&folder.join(NETLIST), top),
