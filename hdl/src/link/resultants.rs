@@ -29,8 +29,8 @@ pub struct Resultants {
     pub beat_valid: Signal<In, Bit>,
     /// It is its frame's last.
     pub beat_last: Signal<In, Bit>,
-    /// It is taken. Where sums are made from a register, so that a fast engine's pipeline does not wait for the packer's
-    /// logic: a beat that is a word then stays for the cycle after that in which the word was taken.
+    /// It is taken. Where sums are made from registers, so that a fast engine's pipeline does not wait for the packer's
+    /// logic: a beat that is a word then stays for two cycles after that in which the word was taken.
     pub beat_ready: Signal<Out, Bit>,
     /// A word of the payload.
     pub word: Wire<Out>,
@@ -55,6 +55,7 @@ struct State {
     /// `beat_ready`, by what it is for.
     adding: bool,
     passing: bool,
+    taken: bool,
 }
 
 const ADD: usize = 0;
@@ -129,7 +130,8 @@ impl Resultants {
         let at_end = old.row + 1 == rows && old.col + 1 == cols;
         let run = self.run.val() && !self.rst.val();
         self._state.adding = run && !self.passes() && old.stage == ADD && !(adds && at_end);
-        self._state.passing = self._shape.resultants && run && self.passes() && self.taken.val();
+        self._state.passing = self._shape.resultants && !self.rst.val() && self.passes() && old.taken;
+        self._state.taken = self.taken.val() && !self.rst.val();
         if adds {
             self.add();
         } else if self._state.stage == FINISH {
@@ -140,7 +142,7 @@ impl Resultants {
             if s.more == rows.max(cols) {
                 s.stage = OUT;
             }
-        } else if self._state.stage == OUT && self.taken.val() {
+        } else if self._state.stage == OUT && old.taken {
             self._state.out += 1;
             if self._state.out == WORDS {
                 self._state.stage = STATUS;
@@ -215,6 +217,8 @@ end"
 reg [1:0] stage, out;
 // `beat_ready`, by what it is for.
 reg adding, passing;
+// The packer may be far away. The CRC takes in the word's last byte meanwhile.
+reg was_taken;
 reg [{r_end}:0] row;
 reg [{c_end}:0] col;
 reg [{m_end}:0] more;
@@ -237,7 +241,8 @@ wire adds = adding && beat_valid;
 wire at_end = line_end && row == {r}'d{last_row};
 always @(posedge clk) begin
   adding <= !rst && run && !passes && stage == 2'd{ADD} && !(adds && at_end);
-  passing <= !rst && run && passes && taken;
+  passing <= !rst && passes && was_taken;
+  was_taken <= !rst && taken;
   if (adds) begin
     sum_x <= first ? x : sum_x + x;
     sum_y <= first ? y : sum_y + y;
@@ -254,7 +259,7 @@ always @(posedge clk) begin
     if (more < {m}'d{last_row}) moment_y <= moment_y + sum_z;
     more <= more + {m}'d1;
   end
-  if (stage == 2'd{OUT} && taken) out <= out + 2'd1;
+  if (stage == 2'd{OUT} && was_taken) out <= out + 2'd1;
   if (rst) begin
     stage <= 2'd{ADD};
     row <= {r}'d0;
@@ -266,7 +271,7 @@ always @(posedge clk) begin
       if (at_end) stage <= 2'd{FINISH};
     end else if (stage == 2'd{FINISH}) begin
       if (more == {m}'d{last_more}) stage <= 2'd{OUT};
-    end else if (stage == 2'd{OUT} && taken) begin
+    end else if (stage == 2'd{OUT} && was_taken) begin
       if (out == 2'd3) stage <= 2'd{STATUS};
     end else if (passing && beat_valid && beat_last) stage <= 2'd{ADD};
   end
