@@ -89,6 +89,7 @@ pub struct Engine {
     part: CaseCounter,
     again: BitDelay,
     handed: BitDelay,
+    seeks: BitDelay,
     opens: BitDelay,
     finish: BitDelay,
     both_signs: Constant<Bit>,
@@ -156,6 +157,7 @@ impl Engine {
             part: CaseCounter::new(&counts),
             again: BitDelay::new(1),
             handed: BitDelay::new(1),
+            seeks: BitDelay::new(1),
             opens: BitDelay::new(1),
             // The first beat, which takes the count of cycles, is out by then.
             finish: BitDelay::new(9),
@@ -193,6 +195,8 @@ impl Logic for Engine {
         self.again.rst.next = self.rst.val();
         self.handed.clk.next = self.clk.val();
         self.handed.rst.next = self.rst.val();
+        self.seeks.clk.next = self.clk.val();
+        self.seeks.rst.next = self.rst.val();
         self.opens.clk.next = self.clk.val();
         self.opens.rst.next = self.rst.val();
         self.finish.clk.next = self.clk.val();
@@ -352,7 +356,8 @@ impl Logic for Engine {
         self.search.fill.next = self.unfold.taxels_valid.val();
         self.search.fill_index.next = self.unfold.index.val();
         self.search.fill_address.next = self.unfold.address.val();
-        self.search.start.next = self.handed.then.val();
+        self.seeks.now.next = self.handed.then.val();
+        self.search.start.next = self.seeks.then.val();
         self.search.enabled.next = self.searched_condition.q.val();
 
         comment!("search -> force -> send");

@@ -40,7 +40,7 @@ const UNFOLD: u64 = 6;
 /// From a sweep's beginning to its judgement, beyond its Q quads: memory 2, Taylor 4, candidates 2, score 6, judge 6.
 const JUDGED: u64 = 20;
 /// From a subarray's completion to the start of its search.
-const HAND_OVER: u64 = 1;
+const HAND_OVER: u64 = 2;
 /// From the search's start, or a judgement that is waited for, to the next sweep: the move, where it leads, the sweep.
 pub const SET_UP: u64 = 3;
 /// Quads that a judged sweep lasts at least: its sums are weighed meanwhile.
@@ -48,7 +48,7 @@ pub const SHORTEST_SWEEP: u64 = 4;
 /// The last sweep beyond its Q quads.
 const LAST_SWEEP: u64 = 7;
 /// From a subarray's values to their sending, where nothing is searched.
-const UNSEARCHED: u64 = 2;
+const UNSEARCHED: u64 = 3;
 /// From the start of a subarray's search to that of the next one's passes.
 const NEXT: u64 = 1;
 /// From the last subarray's first value, which stands Q cycles before their end, to the first beat on the output.

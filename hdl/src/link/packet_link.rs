@@ -4,13 +4,15 @@ use dermis_golden::link::Identity;
 use rust_hdl::prelude::*;
 
 use super::{Crc, Feeder, Ledger, Packer, Parser, Requests, Resultants, Shape, SlipDecoder, SlipEncoder, Sources};
+use crate::primitives::Relay;
 use crate::wire::Wire;
 
 /// ```text
-/// bytes in  -> slip_decoder -> parser -> feeder -> s_axis
+/// bytes in  -> slip_decoder -> parser -> feeder -> towards -> s_axis
 ///                                 '-> requests -> packer -> slip_encoder -> bytes out
-///        m_axis -> resultants, ledger -> sources ---^
+/// m_axis -> back -> resultants, ledger -> sources ---^
 /// ```
+/// `towards` and `back` are registers where the engine is a large one, far from the link's pins.
 /// Bytes come at any time, five cycles apart at least, and are never held up; bytes go when `send_ready`.
 #[derive(LogicBlock)]
 pub struct PacketLink {
@@ -53,6 +55,8 @@ pub struct PacketLink {
     decoder: SlipDecoder,
     parser: Parser,
     feeder: Feeder,
+    towards: Relay,
+    back: Relay,
     requests: Requests,
     resultants: Resultants,
     sources: Sources,
@@ -90,6 +94,8 @@ impl PacketLink {
             decoder: SlipDecoder::default(),
             parser: Parser::new(shape),
             feeder: Feeder::new(shape.rows * shape.cols, shape.input_bits),
+            towards: Relay::new(shape.input_bits as usize, shape.resultants),
+            back: Relay::new(96, shape.resultants),
             requests: Requests::new(shape.frames),
             resultants: Resultants::new(shape),
             sources: Sources::new(shape.resultants),
@@ -110,6 +116,8 @@ impl Logic for PacketLink {
         self.decoder.clk.next = self.clk.val();
         self.parser.clk.next = self.clk.val();
         self.feeder.clk.next = self.clk.val();
+        self.towards.clk.next = self.clk.val();
+        self.back.clk.next = self.clk.val();
         self.requests.clk.next = self.clk.val();
         self.resultants.clk.next = self.clk.val();
         self.sources.clk.next = self.clk.val();
@@ -121,6 +129,8 @@ impl Logic for PacketLink {
         self.decoder.rst.next = self.rst.val();
         self.parser.rst.next = self.rst.val();
         self.feeder.rst.next = self.rst.val();
+        self.towards.rst.next = self.rst.val();
+        self.back.rst.next = self.rst.val();
         self.requests.rst.next = self.rst.val();
         self.resultants.rst.next = self.rst.val();
         self.packer.rst.next = self.rst.val();
@@ -146,17 +156,21 @@ impl Logic for PacketLink {
         self.feeder.content.next = self.decoder.content.val();
         self.feeder.good.next = self.parser.good.val();
         self.feeder.bad.next = self.parser.bad.val();
-        self.feeder.ready.next = self.s_axis_tready.val();
-        self.s_axis_tdata.next = self.feeder.code.val();
-        self.s_axis_tvalid.next = self.feeder.valid.val();
-        self.s_axis_tlast.next = self.feeder.last.val();
+        self.feeder.ready.next = self.towards.s_axis_tready.val();
+        self.towards.s_axis_tdata.next = self.feeder.code.val();
+        self.towards.s_axis_tvalid.next = self.feeder.valid.val();
+        self.towards.s_axis_tlast.next = self.feeder.last.val();
+        self.towards.m_axis_tready.next = self.s_axis_tready.val();
+        self.s_axis_tdata.next = self.towards.m_axis_tdata.val();
+        self.s_axis_tvalid.next = self.towards.m_axis_tvalid.val();
+        self.s_axis_tlast.next = self.towards.m_axis_tlast.val();
 
         comment!("What is to be answered");
         self.requests.good.next = self.parser.good.val();
         self.requests.kind.next = self.parser.kind.val();
         self.requests.number.next = self.parser.number.val();
         self.requests.taken.next = self.feeder.taken.val();
-        self.requests.answered.next = self.m_axis_tvalid.val();
+        self.requests.answered.next = self.back.m_axis_tvalid.val();
         self.requests.begun.next = self.packer.begun.val();
         self.ledger.taken.next = self.feeder.taken.val() | self.requests.noted.val();
         self.ledger.fault.next = self.parser.fault.val();
@@ -166,10 +180,14 @@ impl Logic for PacketLink {
         self.resultants.run.next = self.sources.answer_wanted.val();
         self.resultants.summarise.next = self.sources.summarise.val();
         self.resultants.taken.next = self.packer.taken.val() & self.sources.answer_wanted.val();
-        self.resultants.beat.next = self.m_axis_tdata.val();
-        self.resultants.beat_valid.next = self.m_axis_tvalid.val();
-        self.resultants.beat_last.next = self.m_axis_tlast.val();
-        self.m_axis_tready.next = self.resultants.beat_ready.val();
+        self.back.s_axis_tdata.next = self.m_axis_tdata.val();
+        self.back.s_axis_tvalid.next = self.m_axis_tvalid.val();
+        self.back.s_axis_tlast.next = self.m_axis_tlast.val();
+        self.m_axis_tready.next = self.back.s_axis_tready.val();
+        self.resultants.beat.next = self.back.m_axis_tdata.val();
+        self.resultants.beat_valid.next = self.back.m_axis_tvalid.val();
+        self.resultants.beat_last.next = self.back.m_axis_tlast.val();
+        self.back.m_axis_tready.next = self.resultants.beat_ready.val();
         self.sources.source.next = self.packer.source.val();
         self.sources.begun.next = self.packer.begun.val();
         self.sources.wanted.next = self.packer.wanted.val();

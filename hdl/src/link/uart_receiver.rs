@@ -92,10 +92,12 @@ impl UartReceiver {
 impl Logic for UartReceiver {
     fn update(&mut self) {
         if self.clk.pos_edge() {
+            // What a sample means goes through a register.
+            let State { data, valid, broken, .. } = self._state;
             self._state = self.next();
-            self.data.next = Word::from(u64::from(self._state.data));
-            self.valid.next = self._state.valid;
-            self.broken.next = self._state.broken;
+            self.data.next = Word::from(u64::from(data));
+            self.valid.next = valid && !self.rst.val();
+            self.broken.next = broken && !self.rst.val();
         }
     }
 
@@ -111,6 +113,8 @@ impl Logic for UartReceiver {
             "\
 reg [4:0] samples;
 reg armed;
+// The bits and the byte's end are told a cycle late: what they go to may be far away.
+reg sampled, shifts, stops;
 reg [3:0] left;
 reg [{end}:0] phase;
 wire level = (samples[4] & samples[3]) | (samples[4] & samples[2]) | (samples[3] & samples[2]);
@@ -121,19 +125,20 @@ always @(posedge clk) begin
   samples <= {{samples[3:0], line}};
   if (left == 4'd0) phase <= {fraction}'d{half};
   else phase <= sum[{end}:0];
-  if (tick && left != 4'd{BITS} && left != 4'd1) data <= {{level, data[7:1]}};
+  sampled <= level;
+  shifts <= tick && left != 4'd{BITS} && left != 4'd1;
+  stops <= !rst && tick && left == 4'd1;
+  if (shifts) data <= {{sampled, data[7:1]}};
+  valid <= !rst && stops && sampled;
+  broken <= !rst && stops && !sampled;
   if (rst) begin
     left <= 4'd0;
     armed <= 1'b0;
-    valid <= 1'b0;
-    broken <= 1'b0;
   end else begin
     if (left == 4'd0) begin
       armed <= level;
       if (armed && !level) left <= 4'd{BITS};
     end else if (tick) left <= false_start ? 4'd0 : left - 4'd1;
-    valid <= tick && left == 4'd1 && level;
-    broken <= tick && left == 4'd1 && !level;
   end
 end",
             end = fraction - 1,

@@ -35,10 +35,14 @@ pub struct Store {
     pub write_data: Wire<In>,
     /// Buffer to read.
     pub read_buffer: Wire<In>,
-    /// Where that begins in the memory.
-    pub read_base: Wire<In>,
-    /// Which quad.
+    /// Which quad: 0 a cycle after `begins`, one more a cycle after each that `counts`.
     pub read_address: Wire<In>,
+    /// A buffer will be read from the next cycle on.
+    pub begins: Signal<In, Bit>,
+    /// The next quad comes.
+    pub counts: Signal<In, Bit>,
+    /// With `begins`: where that buffer begins in the memory.
+    pub next_base: Wire<In>,
     /// A quad of polynomials, two cycles later.
     pub read_data: Wire<Out>,
     _layout: PolynomialWord,
@@ -85,8 +89,10 @@ impl Store {
             write_address: Wire::new(address),
             write_data: Wire::new(layout.bits()),
             read_buffer: Wire::new(BUFFER_BITS),
-            read_base: Wire::new(base_bits(quads)),
             read_address: Wire::new(address),
+            begins: Default::default(),
+            counts: Default::default(),
+            next_base: Wire::new(base_bits(quads)),
             read_data: Wire::new(layout.bits()),
             _quads: quads,
             _apart: apart,
@@ -169,7 +175,18 @@ wire [{end}:0] to_buffer = write_base + {{{pad}write_address}};
                 let all = 4 * width;
                 let filled: Vec<String> = (0..4).rev().map(|lane| resize(&format!("t{lane}"), bits, width)).collect();
                 let filled = filled.join(", ");
-                let declare = format!("reg [{}:0] memory{k} [0:{}];\n", all - 1, depth - 1);
+                let declare = format!(
+                    "\
+reg [{all_end}:0] memory{k} [0:{depth_end}];
+reg [{end}:0] from{k};
+(* keep *) always @(posedge clk) begin
+  if (begins) from{k} <= next_base;
+  else if (counts) from{k} <= from{k} + {address_bits}'d1;
+end
+",
+                    all_end = all - 1,
+                    depth_end = depth - 1,
+                );
                 if self._apart {
                     format!(
                         "\
@@ -178,7 +195,7 @@ reg [{end}:0] read{k}, read_start{k};
 always @(posedge clk) begin
   if (write) memory{k}[write_to] <= write_data[{low} +: {all}];
   if (fill && fill_index == {index_bits}'d{k}) start{k}[fill_address] <= {{{filled}}};
-  read{k} <= memory{k}[read_from];
+  read{k} <= memory{k}[from{k}];
   read_start{k} <= start{k}[read_address];
   read_data[{low} +: {all}] <= from_start ? read_start{k} : read{k};
 end
@@ -194,7 +211,7 @@ wire write{k} = fill ? fill_index == {index_bits}'d{k} : write;
 wire [{end}:0] data{k} = fill ? {{{filled}}} : write_data[{low} +: {all}];
 always @(posedge clk) begin
   if (write{k}) memory{k}[write_to] <= data{k};
-  read{k} <= memory{k}[read_from];
+  read{k} <= memory{k}[from{k}];
   read_data[{low} +: {all}] <= read{k};
 end
 ",
@@ -205,11 +222,11 @@ end
             .collect();
         let from_start = match self._apart {
             true => format!("reg from_start;\nalways @(posedge clk) from_start <= read_buffer == 2'd{START};\n"),
-            false => "wire unused_buffer = &{1'b0, read_buffer};\n".to_string(),
+            false => "wire unused_read = &{1'b0, read_buffer, read_address};\n".to_string(),
         };
         Verilog::Custom(format!(
             "{lanes}{to_buffer}wire [{end}:0] write_to = {write_to};
-wire [{end}:0] read_from = read_base + {{{pad}read_address}};
+// Where to read is a register of each coefficient: the memories lie far apart. Synthesis is not to merge them.
 {from_start}{memories}",
         ))
     }

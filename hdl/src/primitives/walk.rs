@@ -48,8 +48,8 @@ pub struct Walk {
     pub chains: Signal<Out, Bit>,
     /// Buffer to read.
     pub source: Wire<Out>,
-    /// Where that begins in the search memory.
-    pub source_base: Wire<Out>,
+    /// Where the buffer that the next sweep reads begins in the search memory, a cycle after it is known which one.
+    pub next_base: Wire<Out>,
     /// Buffer to write, a cycle after the others.
     pub target: Wire<Out>,
     /// The sweep.
@@ -96,7 +96,7 @@ impl Walk {
             next_halves: Default::default(),
             chains: Default::default(),
             source: Wire::new(BUFFER_BITS),
-            source_base: Wire::new(base_bits(quads)),
+            next_base: Wire::new(base_bits(quads)),
             target: Wire::new(BUFFER_BITS),
             sweep: Wire::new(sweep_bits()),
             radius: Wire::new(square_bits()),
@@ -142,7 +142,6 @@ impl Walk {
         }
         s.count += 1;
         self.source.next = Word::from(from.buffer as u64);
-        self.source_base.next = Word::from(base(from.buffer, self._quads) as u64);
         s.chosen = true;
         self.step.next = Word::of_fields(&[by[0], by[1], i64::from(halving)], 2);
         self.last.next = !coarse && !halving;
@@ -153,6 +152,9 @@ impl Walk {
 impl Logic for Walk {
     fn update(&mut self) {
         if self.clk.pos_edge() {
+            let s = &self._state;
+            let next = if s.count < COARSE_CENTRES.len() { s.target } else { s.kept.buffer };
+            self.next_base.next = Word::from(base(next, self._quads) as u64);
             if self.begin_frame.val() {
                 let start = Sweep { buffer: START, ..Sweep::default() };
                 let count = if self.enabled.val() { 0 } else { JUDGED };
@@ -180,14 +182,9 @@ impl Logic for Walk {
     }
 
     fn connect(&mut self) {
-        for wire in [
-            &mut self.step,
-            &mut self.source,
-            &mut self.source_base,
-            &mut self.target,
-            &mut self.sweep,
-            &mut self.radius,
-        ] {
+        for wire in
+            [&mut self.step, &mut self.source, &mut self.next_base, &mut self.target, &mut self.sweep, &mut self.radius]
+        {
             wire.connect();
         }
         for bit in [&mut self.last, &mut self.next_halves, &mut self.chains] {
@@ -229,7 +226,6 @@ wire [{w_end}:0] from = is_coarse ? sweep : kept;
 // The move stands in registers with what it starts from, and so does where it leads, before the sweep is set up.
 reg [1:0] go_x, go_y;
 reg [1:0] base_buffer;
-reg [{base_end}:0] buffer_base;
 reg [{p_end}:0] base_x, base_y;
 reg [{q_end}:0] base_square;
 wire [1:0] step_x = is_coarse ? table_x : best_x[1:0] - from_centre_x[1:0];
@@ -247,7 +243,7 @@ always @(posedge clk) begin
   go_x <= step_x;
   go_y <= step_y;
   base_buffer <= from_buffer;
-  buffer_base <= {buffer_base};
+  next_base <= {next_base};
   base_x <= from_centre_x;
   base_y <= from_centre_y;
   base_square <= from_square;
@@ -285,7 +281,6 @@ always @(posedge clk) begin
       step <= {{is_halving, go_y, go_x}};
       last <= !is_coarse && !is_halving;
       source <= base_buffer;
-      source_base <= buffer_base;
       if (is_halving) radius <= radius << 2;
     end
   end
@@ -299,8 +294,7 @@ end",
             w_less = w - 2,
             p_end = p - 1,
             q_end = q - 1,
-            base_end = base_bits(self._quads) - 1,
-            buffer_base = base_of("from_buffer", self._quads),
+            next_base = base_of("from_buffer", self._quads),
             q_more = q - p - 1,
             p_more = p - 2,
             final_coarse = COARSE_CENTRES.len() - 1,

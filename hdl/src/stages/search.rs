@@ -282,7 +282,9 @@ impl Logic for Search {
         self.step.now.next = self.walk.step.val();
         self.target.now.next = self.walk.target.val();
         self.store.read_buffer.next = self.walk.source.val();
-        self.store.read_base.next = self.walk.source_base.val();
+        self.store.begins.next = self.set_up.q.val();
+        self.store.counts.next = self.counting.q.val();
+        self.store.next_base.next = self.walk.next_base.val();
         self.store.read_address.next = self.quads.value.val();
         self.taylor.word.next = self.store.read_data.val();
         self.taylor.step.next = self.step.then.val();
