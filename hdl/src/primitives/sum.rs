@@ -7,7 +7,7 @@ use super::polynomial_word::{resize, PolynomialWord};
 use super::sweep::{BUFFERS, BUFFER_BITS, START};
 use crate::wire::{Wire, Word};
 
-/// Adds up the counted lanes of each `fill` into buffer `START` (quad 0 starts a coefficient anew), two cycles later; `read`
+/// Adds up the counted lanes of each `fill` into buffer `START` (quad 0 starts a coefficient anew), three cycles later; `read`
 /// puts a buffer's sum on `word` as many cycles later as the search memory takes, where it stays; `write` replaces a
 /// buffer's sum by what stands on `write_data` a cycle later. As in the search memory, `START` is buffer 0 unless one
 /// subarray is filled while another is searched.
@@ -40,6 +40,7 @@ pub struct Sum {
     _layout: PolynomialWord,
     _apart: bool,
     _buffers: [Word; BUFFERS + 1],
+    _filled: Option<Added>,
     _added: Option<Added>,
     _reads: Option<usize>,
     _writes: Option<usize>,
@@ -73,6 +74,7 @@ impl Sum {
             _layout: layout,
             _apart: apart,
             _buffers: Default::default(),
+            _filled: None,
             _added: None,
             _reads: None,
             _writes: None,
@@ -104,7 +106,8 @@ impl Logic for Sum {
             let (reads, writes) = (named(&self.read_buffer), named(&self.write_buffer));
             self._reads = self.read.val().then_some(reads);
             self._writes = self.write.val().then_some(writes);
-            if let Some(Added { index, first, sum: added }) = self._added.take() {
+            let filled = self._filled.take();
+            if let Some(Added { index, first, sum: added }) = std::mem::replace(&mut self._added, filled) {
                 if let Some(&width) = self._layout.widths.get(index) {
                     let start = self.buffer(START);
                     let before = self._layout.get(&self._buffers[start], 0)[index];
@@ -117,7 +120,7 @@ impl Logic for Sum {
                 let counted = |lane: &usize| self.fill_mask.val().field(*lane, 1) == 1;
                 let sum = (0..4).filter(counted).map(|lane| self.fill_quad.val().signed(lane, bits)).sum();
                 let index = self.fill_index.val().number() as usize;
-                self._added = Some(Added { index, first: self.fill_address.val().number() == 0, sum });
+                self._filled = Some(Added { index, first: self.fill_address.val().number() == 0, sum });
             }
         }
     }
@@ -133,11 +136,20 @@ impl Logic for Sum {
         let terms: Vec<String> = (0..4)
             .map(|lane| {
                 let field = format!("t{lane}");
-                format!("(fill_mask[{lane}] ? {} : {wide}'d0)", resize(&field, bits, wide))
+                resize(&field, bits, wide)
             })
             .collect();
         let lanes: String = (0..4)
-            .map(|lane| format!("wire [{}:0] t{lane} = fill_quad[{} +: {bits}];\n", bits - 1, lane * bits))
+            .map(|lane| {
+                format!(
+                    "\
+reg [{end}:0] t{lane};
+always @(posedge clk) t{lane} <= fill_mask[{lane}] ? fill_quad[{low} +: {bits}] : {bits}'d0;
+",
+                    end = bits - 1,
+                    low = lane * bits,
+                )
+            })
             .collect();
         let buffers = BUFFERS + usize::from(self._apart);
         let names: Vec<String> = (0..buffers).map(|b| format!("buffer{b}")).collect();
@@ -183,14 +195,17 @@ end
             .collect();
         Verilog::Custom(format!(
             "\
-{lanes}reg adds, first;
-reg [{index_end}:0] index;
+{lanes}reg filled, adds, first1, first;
+reg [{index_end}:0] index1, index;
 reg [{wide_end}:0] added;
 reg [{end}:0] {names};
 always @(posedge clk) begin
-  adds <= fill;
-  index <= fill_index;
-  first <= fill_address == {address_bits}'d0;
+  filled <= fill;
+  adds <= filled;
+  index1 <= fill_index;
+  index <= index1;
+  first1 <= fill_address == {address_bits}'d0;
+  first <= first1;
   added <= {terms};
 end
 // What steers a coefficient is a register of its own, for it goes to all its bits. Synthesis is not to merge them.
