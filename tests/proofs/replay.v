@@ -9,11 +9,12 @@ module proof(input clk, input again, input begin_it, input offered, input sample
   wire rst = again || !started;
   // Any row of a frame.
   (* anyconst *) reg [7:0] row;
-  reg within;
+  reg within, began;
   reg [7:0] came, went, since;
-  // What the engine keeps to: no frame begins before the last one's rows are out, no later row comes before v_00 is.
+  // What the engine keeps to: no frame begins before the last one's rows are out, no row comes as early as a cycle after
+  // that, no later row before v_00 is out.
   wire start = begin_it && came == went;
-  wire quad_valid = offered && within && !start && (came < ROWS || (went >= ROWS && came < ROWS + 8'd3));
+  wire quad_valid = offered && within && !start && !began && (came < ROWS || (went >= ROWS && came < ROWS + 8'd3));
   wire [4*@WORD@-1:0] words;
   wire words_valid, operands_valid;
   wire [4*@DATA@-1:0] operands;
@@ -28,6 +29,7 @@ module proof(input clk, input again, input begin_it, input offered, input sample
   reg words_before;
   always @(posedge clk) begin
     words_before <= words_valid && !rst;
+    began <= start && !rst;
     if (rst) {within, came, went, since} <= 25'd0;
     else begin
       assert (went <= came && (came != went || !words_valid));

@@ -18,6 +18,7 @@ module proof(input clk, input clear, input valid, input measured, input [@SHIFTS
   reg [2:0] age = 3'd0;
   always @(posedge clk) if (age != 3'd4) age <= age + 3'd1;
   reg counts, known = 1'b0;
+  reg [3:0] held_before;
   reg [2:0] held_then;
   reg [15:0] count;
   wire [3:0] held;
@@ -49,8 +50,9 @@ module proof(input clk, input clear, input valid, input measured, input [@SHIFTS
   wire [16:0] sum = {1'b0, count} + held_then;
   always @(posedge clk) begin
     counts <= comes;
-    held_then <= counts ? {2'd0, held[0]} + held[1] + held[2] + held[3] : 3'd0;
-    if (clear) {known, count} <= {age >= 3'd3, 16'd0};
+    held_before <= counts ? held : 4'd0;
+    held_then <= {2'd0, held_before[0]} + held_before[1] + held_before[2] + held_before[3];
+    if (clear) {known, count} <= {age >= 3'd4, 16'd0};
     else count <= sum[16] ? 16'hFFFF : sum[15:0];
     if (known) assert (saturations == count);
   end

@@ -21,7 +21,7 @@ module proof(
   wire [1:0] beat, lane;
   wire [@ADDRESS@-1:0] address;
   wire [95:0] m_data;
-  reg within;
+  reg within, ended;
   // The engine starts a frame when the last one is out.
   wire begins = start_it && !within;
   @TOP@$send send(
@@ -41,13 +41,14 @@ module proof(
   always @(posedge clk) begin
     which[0] <= asked;
     for (i = 1; i <= @STEPS@; i = i + 1) which[i] <= which[i - 1];
+    ended <= m_valid && m_last && !rst;
     if (rst) {within, asks, asked} <= @WIDTH@'d0;
     else begin
       asks <= {asks[@STEPS@-1:0], offer};
       if (offer) assert (room && within && asked <= 8'd@LAST@);
       assert (m_valid == asks[@STEPS@]);
       if (m_valid) assert (within && m_last == (which[@STEPS@] == 8'd@LAST@));
-      assert (done == (m_valid && m_last));
+      assert (done == ended);
       if (begins) within <= 1'b1;
       if (offer) asked <= asked + 8'd1;
       if (done) {within, asked} <= 9'd0;

@@ -1,5 +1,5 @@
-// Beats of the engine pass as words, each once and as it is, taken a cycle after its word is; where sums are asked for, the
-// forces' beats are taken first, then come four words, each of which stands until it is taken, then the status passes.
+// Beats of the engine pass as words, each once and as it is, taken two cycles after its word is; where sums are asked for,
+// the forces' beats are taken first, then come four words, each of which stands until it is taken, then the status passes.
 module proof(input clk, input again, input run, input offer, input sample, input takes);
   reg started = 1'b0;
   always @(posedge clk) started <= 1'b1;
@@ -20,17 +20,20 @@ module proof(input clk, input again, input run, input offer, input sample, input
   reg granted;
   wire [95:0] word;
   reg [95:0] before;
-  wire moves = word_valid && takes;
+  // The packer, which gives the word's last byte to the CRC, takes no word a cycle after the last one.
+  reg moved;
+  wire moves = word_valid && takes && !moved;
   @BLOCK@ block(
     .clk(clk), .rst(rst), .run(run), .taken(moves), .summarise(summarise), .beat({96{level}}), .beat_valid(offered),
     .beat_last(last), .beat_ready(ready), .word(word), .word_valid(word_valid), .word_last(word_last)
   );
   always @(posedge clk) begin
-    stands <= gives && word_valid && !takes && !rst;
+    moved <= moves && !rst;
+    stands <= gives && word_valid && !moves && !moved && !rst;
     before <= word;
     holds <= offered && !ready && !rst;
     held <= level;
-    granted <= !rst && (summing ? run && !(offered && ready && taken == 8'd@TAXELS@ - 8'd1) : !gives && moves);
+    granted <= !rst && (summing ? run && !(offered && ready && taken == 8'd@TAXELS@ - 8'd1) : !gives && moved);
     if (rst) {taken, words, since} <= 24'd0;
     else begin
       assert (ready == granted);
@@ -39,7 +42,7 @@ module proof(input clk, input again, input run, input offer, input sample, input
       else assert (word_valid == (run && offered && !ready) && word == {96{level}} && word_last == last);
       if (stands) assert (word == before);
       if (offered && ready) {taken, words} <= {last ? 8'd0 : taken + 8'd1, last ? 8'd0 : words};
-      if (gives && moves) words <= words + 8'd1;
+      if (gives && moved) words <= words + 8'd1;
       since <= gives ? since + (since != 8'd255) : 8'd0;
     end
   end

@@ -36,7 +36,7 @@ fn rescaled_words_are_rounded_and_held_to_their_range() {
         ("overflow ? ", "1'b0 ? "),
         (half.as_str(), none.as_str()),
         ("carry ? ", "1'b0 ? "),
-        ("clips <= valid2 ? ", "clips <= 1'b1 ? "),
+        ("clipped3 <= valid2 ? ", "clipped3 <= 1'b1 ? "),
     ];
     Proof { generated: &generated, property: "rescale.v", given, defect: defects[0], open_products: false }
         .fails_with(&defects);
