@@ -4,7 +4,7 @@
 //!
 //! | property | blocks |
 //! |---|---|
-//! | `stream.v`: what is offered stays and stays the same | `prepare`, `resultants` |
+//! | `stream.v`: what is offered stays and stays the same | `prepare`, `resultants`, the link's relay |
 //! | `calibrate.v`: each beat leaves once, in order, saturated | `calibrate` |
 //! | `average.v`: as many sums as taxels, tlast on the last | `average` |
 //! | `receive.v`: a frame stands whole where it belongs; tlast is judged; dead taxels count as 0 | `receive` |
@@ -83,6 +83,10 @@ fn streams_keep_what_they_offer() {
     let sums = generate(&model("[output]\nforces = \"resultants\"\n")).unwrap();
     let defect = ("wire sent = sending && m_axis_tready;", "wire sent = sending;");
     Proof { generated: &sums, property: "stream.v", given: given("resultants", 96, 96), defect, open_products: true }
+        .run();
+    let board = generate_board(&model("")).unwrap();
+    let defect = ("if (!m_axis_tvalid) {m_axis_tlast, m_axis_tdata} <=", "{m_axis_tlast, m_axis_tdata} <=");
+    Proof { generated: &board, property: "stream.v", given: given("link$back", 96, 96), defect, open_products: true }
         .run();
 }
 
