@@ -13,8 +13,8 @@ pub struct Flow {
     pub place: Tool,
     /// Configuration to bitstream.
     pub pack: Tool,
-    /// Yosys's commands, without the first one's module and the last one's file.
-    pub synthesis: &'static [&'static str],
+    /// Yosys's commands; `{top}` stands for the module and `{netlist}` for the file that is written.
+    pub synthesis: &'static str,
     /// What the names of look-up tables begin with, in the report of place and route or else in the netlist; a carry's
     /// halves and distributed RAM are among them.
     pub lut: &'static str,
@@ -28,11 +28,6 @@ pub struct Flow {
     pub bitstream: &'static str,
 }
 
-/// The flip-flops that `synth_ecp5` maps to, with a reset or an enable only where that many share it.
-const ECP5_FLIP_FLOPS: &str =
-    "dfflegalize -minsrst 16 -mince 16 -cell $_DFF_?_ 01 -cell $_DFF_?P?_ r -cell $_SDFF_?P?_ r \
-    -cell $_DFFE_??_ 01 -cell $_DFFE_?P??_ r -cell $_SDFFE_?P??_ r";
-
 /// The flow of a family.
 pub fn flow(family: Family) -> Flow {
     match family {
@@ -41,12 +36,11 @@ pub fn flow(family: Family) -> Flow {
             pack: Tool { name: "ecppack" },
             // Tables joined by a slice's multiplexers move as one in placement; single ones find a place nearer to what
             // they belong to. For the same reason a reset or an enable of a few flip-flops goes into their tables: a tile
-            // has two of each, and hundreds of them, for one flip-flop each, leave the legaliser few places to choose from.
-            synthesis: &[
-                "synth_ecp5 -nowidelut -run begin:map_ffs",
-                ECP5_FLIP_FLOPS,
-                "synth_ecp5 -nowidelut -run map_ffs:",
-            ],
+            // has few of each, and hundreds of them, for a flip-flop or two each, leave little choice of places.
+            synthesis: "synth_ecp5 -nowidelut -run begin:map_ffs -top {top}; \
+                dfflegalize -minsrst 16 -mince 16 -cell $_DFF_?_ 01 -cell $_DFF_?P?_ r -cell $_SDFF_?P?_ r \
+                -cell $_DFFE_??_ 01 -cell $_DFFE_?P??_ r -cell $_SDFFE_?P??_ r; \
+                synth_ecp5 -nowidelut -run map_ffs: -json {netlist}",
             lut: "TRELLIS_COMB",
             flip_flop: "TRELLIS_FF",
             multiplier: "MULT18X18D",
@@ -57,7 +51,7 @@ pub fn flow(family: Family) -> Flow {
             place: Tool { name: "nextpnr-ice40" },
             pack: Tool { name: "icepack" },
             // Each of these saves half a percent of the cells.
-            synthesis: &["synth_ice40 -dsp -abc2 -dff"],
+            synthesis: "synth_ice40 -dsp -abc2 -dff -top {top} -json {netlist}",
             // A logic cell holds a look-up table, a carry and a flip-flop: what counts is how many cells are taken.
             lut: "ICESTORM_LC",
             flip_flop: "SB_DFF",

@@ -22,10 +22,8 @@ pub const MINUTES: u32 = 60;
 /// # Errors
 /// [`ToolError`]: no Yosys, a design that it refuses, files that cannot be used.
 pub fn synthesise(folder: &Path, family: Family, read: &str, top: &str) -> Result<Absorbed, ToolError> {
-    let [first, others @ ..] = flow(family).synthesis else { unreachable!("a family without a command") };
-    let commands: String = others.iter().map(|command| format!("; {command}")).collect();
-    let script = format!("read_verilog {read}; {first} -top {top}{commands} -json {NETLIST}");
-    run(folder, script, "synthesis.log")?;
+    let commands = flow(family).synthesis.replace("{top}", top).replace("{netlist}", NETLIST);
+    run(folder, format!("read_verilog {read}; {commands}"), "synthesis.log")?;
     match family {
         Family::Ecp5 => absorb_file(&folder.join(NETLIST), top),
         // Yosys itself moves registers into SB_MAC16.
