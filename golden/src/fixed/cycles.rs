@@ -8,7 +8,7 @@
 //! rescale  v_00 is replayed once its exponent is known: Q more
 //! search   7 coarse sweeps of Q, at least (Q + 19)/2; the eighth and 7 halvings of Q + 22; one of Q + 7
 //!          (the last alone when nothing is searched)
-//! next     1 from a subarray's search to the passes of the one after it, which go on at the same time
+//! next     1 from a subarray's completion to the passes of the one after it, which go on while it is searched
 //! choose   2, where the case is chosen per frame
 //! send     begins with the last subarray's first value: 9 to the first beat, then one beat a cycle
 //! ```
@@ -49,7 +49,7 @@ pub const SHORTEST_SWEEP: u64 = 4;
 const LAST_SWEEP: u64 = 7;
 /// From a subarray's values to their sending, where nothing is searched.
 const UNSEARCHED: u64 = 3;
-/// From the start of a subarray's search to that of the next one's passes.
+/// From a subarray's completion, once the search is free, to the start of the next one's passes.
 const NEXT: u64 = 1;
 /// From the last subarray's first value, which stands Q cycles before their end, to the first beat on the output.
 const SEND: u64 = 13;

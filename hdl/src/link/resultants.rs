@@ -55,6 +55,7 @@ struct State {
     /// `beat_ready`, by what it is for.
     adding: bool,
     passing: bool,
+    /// The word was taken in the cycle before.
     taken: bool,
 }
 

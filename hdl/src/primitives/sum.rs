@@ -133,12 +133,7 @@ impl Logic for Sum {
         let bits = self.fill_quad.width() / 4;
         let wide = bits + 2;
         let index_bits = self.fill_index.width();
-        let terms: Vec<String> = (0..4)
-            .map(|lane| {
-                let field = format!("t{lane}");
-                resize(&field, bits, wide)
-            })
-            .collect();
+        let terms: Vec<String> = (0..4).map(|lane| resize(&format!("t{lane}"), bits, wide)).collect();
         let lanes: String = (0..4)
             .map(|lane| {
                 format!(
