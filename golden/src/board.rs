@@ -11,6 +11,7 @@
 //! | `uart_baud` | bit/s | bit rate of the UART, where a scene puts the engine behind that |
 //! | `spi_MHz` | MHz | highest clock of the SPI, which place and route must meet; left out where there are no pins for it |
 //! | `multipliers`, `multiplier_bits` | , bits | signed multipliers and the width of their operands |
+//! | `multiplier_blocks` | tiles | where they are: [`MultiplierBlocks`]; left out, the placer chooses among them |
 //! | `block_rams`, `block_ram_shapes` | , [words, bits] | block RAMs and what one of them can be |
 //! | `distributed_words` | words | distributed RAM takes memories up to these: always; where block RAM is short |
 //! | `large_rams`, `large_ram_shape` | , [words, bits] | single-port RAMs, 0 where left out |
@@ -72,6 +73,8 @@ pub struct Board {
     pub multipliers: u32,
     /// Width of a multiplier's signed operands.
     pub multiplier_bits: u32,
+    /// Where the multipliers are; `None` leaves the lanes' to the placer.
+    pub multiplier_blocks: Option<MultiplierBlocks>,
     /// Block RAMs.
     pub block_rams: u32,
     /// What one block RAM with a read and a write port can be: [words, bits].
@@ -94,6 +97,26 @@ pub struct Board {
     pub placers: Vec<String>,
     /// Time after which a try of place and route is given up, min, > 0.
     pub place_minutes: u32,
+}
+
+/// Where an ECP5 has its multipliers: a block of four in each of these rows of each of these columns.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct MultiplierBlocks {
+    /// Columns of the blocks' first multipliers, tiles as nextpnr counts them.
+    pub columns: Vec<u32>,
+    /// Rows, tiles.
+    pub rows: Vec<u32>,
+}
+
+impl MultiplierBlocks {
+    /// Multipliers in a block.
+    pub const SIZE: usize = 4;
+
+    /// How many multipliers there are.
+    pub fn multipliers(&self) -> usize {
+        Self::SIZE * self.columns.len() * self.rows.len()
+    }
 }
 
 /// A family of devices that share their tools.
@@ -194,6 +217,11 @@ impl Board {
         if let Some((field, _)) = counts.iter().find(|(_, count)| *count == 0) {
             return Err(invalid(format!("{field} = 0: must be positive")));
         }
+        let placed = board.multiplier_blocks.as_ref().map(MultiplierBlocks::multipliers);
+        if let Some(placed) = placed.filter(|&placed| placed != board.multipliers as usize) {
+            let has = board.multipliers;
+            return Err(invalid(format!("multiplier_blocks: has {placed} multipliers, multipliers = {has}")));
+        }
         if board.multiplier_bits < 2 {
             return Err(invalid(format!("multiplier_bits = {}: must be at least 2", board.multiplier_bits)));
         }
@@ -263,5 +291,12 @@ mod tests {
         let text = FILES.get_file("ulx3s-85f.toml").unwrap().contents_utf8().unwrap();
         let error = Board::parse("x", &text.replace("clock_MHz = 100.0", "clock_MHz = 0.0")).unwrap_err();
         assert_eq!(error.to_string(), "constraints/x.toml: clock_MHz = 0: must be positive");
+    }
+
+    #[test]
+    fn blocks_that_hold_another_number_of_multipliers_are_refused() {
+        let text = FILES.get_file("ulx3s-85f.toml").unwrap().contents_utf8().unwrap();
+        let error = Board::parse("x", &text.replace("rows = [10, 34, 58]", "rows = [10, 34]")).unwrap_err();
+        assert_eq!(error.to_string(), "constraints/x.toml: multiplier_blocks: has 104 multipliers, multipliers = 156");
     }
 }

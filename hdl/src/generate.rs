@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use dermis_golden::board::EngineKind;
-use dermis_golden::fixed::resources::Memory;
+use dermis_golden::fixed::resources::{Memory, SEARCH_MEMORY};
 use dermis_golden::fixed::send::{
     CASE_SHIFT, FLAG_COEFFICIENTS, FLAG_CONDITION, FLAG_FOUND, FLAG_FRAMING, FLAG_NO_CONTACT, STATUS_BEATS,
 };
@@ -161,8 +161,10 @@ pub(crate) fn place(verilog: &str, model: &Model, engine: &str) -> Result<String
                 (0, _) => "block",
                 _ => "huge",
             };
-            // The serial engine never reads a word in the cycle that writes it: no logic is needed for that.
-            let check = if model.board.engine == EngineKind::Serial { ", no_rw_check" } else { "" };
+            // The serial engine never reads a word in the cycle that writes it, and what the search memory reads of one is
+            // not used: no logic is needed for that.
+            let unchecked = model.board.engine == EngineKind::Serial || memory.block == SEARCH_MEMORY;
+            let check = if unchecked { ", no_rw_check" } else { "" };
             placed.push_str(&format!("(* ram_style = \"{style}\"{check} *)\n"));
             marked += 1;
         }

@@ -75,6 +75,16 @@ impl Word {
         }
     }
 
+    /// The low `bits` bits the other way round.
+    pub fn complement(&self, bits: usize) -> Self {
+        let mut word = *self;
+        for offset in (0..bits).step_by(64) {
+            let some = (bits - offset).min(64);
+            word.set(offset, some, !self.field(offset, some));
+        }
+        word
+    }
+
     /// A word of signed fields, field 0 in the least significant bits, each cut to `bits` bits.
     pub fn of_fields(fields: &[i64], bits: usize) -> Self {
         let mut word = Word::default();

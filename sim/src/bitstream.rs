@@ -1,15 +1,16 @@
 //! `dermis bitstream`: a scene as a bitstream for its board, by open tools.
 //!
 //! ```text
-//! scene -> board top (Verilog) --yosys--> netlist --absorb--> netlist --nextpnr, several seeds--> best --pack--> bitstream
-//!          pins, PLL of constraints ---^                                                          |
-//!                                                                   cells, clocks -> table, baselines
+//! scene -> board top (Verilog) --yosys--> netlist --absorb, floor plan--> netlist --nextpnr, several seeds--> best --pack--> bitstream
+//!          pins, PLL of constraints ---^                                                                      |
+//!                                                                               cells, clocks -> table, baselines
 //! ```
 //! Everything stands in `<build-dir>/<scene>/<board>/`, with a log per tool.
 
 pub mod absorb;
 pub mod baseline;
 pub mod family;
+pub mod floor_plan;
 pub mod synthesis;
 pub mod timing;
 pub mod tools;
@@ -140,7 +141,11 @@ fn synthesise(model: &Model, folder: &Path) -> Result<Absorbed> {
     let link = model.scene.hardware.link.name().to_uppercase();
     let (top, board) = (&generated.top, &model.board.name);
     let read = format!("-D DERMIS_TOP={top} -D DERMIS_{link} {board}.v {top}.v");
-    Ok(synthesis::synthesise(folder, model.board.family, &read, TOP)?)
+    let absorbed = synthesis::synthesise(folder, model.board.family, &read, TOP)?;
+    if let Some(blocks) = &model.board.multiplier_blocks {
+        synthesis::edit(folder, |netlist| floor_plan::plan(netlist, TOP, blocks))?;
+    }
+    Ok(absorbed)
 }
 
 /// Places and routes with seeds 1 … `seeds`, `jobs` at a time; those that came to an end.

@@ -27,6 +27,9 @@ use super::storage::word_bits;
 use crate::board::Board;
 use crate::scene::{ForceOutput, Scene};
 
+/// [`Memory::block`] of the search memory.
+pub const SEARCH_MEMORY: &str = "search$store";
+
 /// Share of a board's block RAMs that a design takes where it has the choice: the router needs the rest.
 const ROUTABLE: f64 = 0.8;
 
@@ -141,9 +144,9 @@ impl Resources {
         }
         memories.push(ram("rescale$raw", quads, quad(f.acc_bits)));
         for (k, &bits) in f.search_bits.iter().enumerate().filter(|_| f.degree > 0) {
-            memories.push(memory("search$store", &format!("memory{k}"), SEARCH_BUFFERS * quads, quad(bits), false));
+            memories.push(memory(SEARCH_MEMORY, &format!("memory{k}"), SEARCH_BUFFERS * quads, quad(bits), false));
             if several {
-                memories.push(memory("search$store", &format!("start{k}"), quads, quad(bits), false));
+                memories.push(memory(SEARCH_MEMORY, &format!("start{k}"), quads, quad(bits), false));
             }
         }
         memories.push(ram("forces$store", cases.iter().map(frame_quads).max().unwrap_or(0), quad(f.search_bits[0])));

@@ -198,8 +198,8 @@ impl Logic for Judge {
         let each = |text: &dyn Fn(&str) -> String| -> String { last.iter().map(|n| text(n)).collect() };
         let positions = each(&|n| {
             format!(
-                "wire signed [{end}:0] x_{n} = held_centre_x + along(column(k_{n}));\n\
-                 wire signed [{end}:0] y_{n} = held_centre_y + along(row(k_{n}));\n",
+                "wire [{end}:0] x_{n} = held_centre_x + along(column(k_{n}));\n\
+                 wire [{end}:0] y_{n} = held_centre_y + along(row(k_{n}));\n",
                 end = p - 1
             )
         });
@@ -216,7 +216,8 @@ impl Logic for Judge {
             format!(
                 "  lower_{n} <= s_{n} < s_best;\n  \
                  same_{n} <= s_{n} == s_best;\n  \
-                 above_{n} <= y_{n} < by;\n  level_{n} <= y_{n} == by;\n  left_{n} <= x_{n} < bx;\n  \
+                 above_{n} <= beyond(ahead_y, row(k_{n}));\n  level_{n} <= in_line(ahead_y, row(k_{n}));\n  \
+                 left_{n} <= beyond(ahead_x, column(k_{n}));\n  \
                  score_{n} <= s_{n};\n  at_x_{n} <= x_{n};\n  at_y_{n} <= y_{n};\n"
             )
         });
@@ -239,6 +240,17 @@ endfunction
 function [{p_end}:0] along;
   input [1:0] step;
   along = {{{{{p_more}{{step[1]}}}}, step}};
+endfunction
+// Whether the best so far lies beyond the candidate a step from the centre, or in line with it.
+function beyond;
+  input [{p}:0] ahead;
+  input [1:0] step;
+  beyond = !ahead[{p}] && (step[1] || (step[0] ? ahead[{p}:1] != {p}'d0 : ahead != {p_wide}'d0));
+endfunction
+function in_line;
+  input [{p}:0] ahead;
+  input [1:0] step;
+  in_line = ahead == {{{{{p_end}{{step[1]}}}}, step}};
 endfunction
 reg [{scores_end}:0] scores;
 reg [8:0] fits;
@@ -264,8 +276,12 @@ wire centre_wins = ok_centre && (!ok_before || s_centre < s_before || (!held_coa
 wire after_wins = ok_after && (!ok_before || s_after < s_before) && (!ok_centre || s_after < s_centre);
 // All three are compared with the best so far while it is found which of them wins.
 wire signed [{t_end}:0] s_best = score;
-wire signed [{p_end}:0] bx = best_x;
-wire signed [{p_end}:0] by = best_y;
+// How far it lies from the centre, a cycle before that.
+reg [{p}:0] ahead_x, ahead_y;
+always @(posedge clk) begin
+  ahead_x <= {{best_x[{p_end}], best_x}} - {{held_centre_x[{p_end}], held_centre_x}};
+  ahead_y <= {{best_y[{p_end}], best_y}} - {{held_centre_y[{p_end}], held_centre_y}};
+end
 {positions}reg some, takes_centre, takes_after;
 {compared}always @(posedge clk) begin
   some <= ok_before || ok_centre || ok_after;
@@ -322,6 +338,7 @@ end",
             at_y = winner("at_y"),
             p_end = p - 1,
             p_more = p - 2,
+            p_wide = p + 1,
             t_end = t - 1,
             scores_end = 9 * t - 1,
             sweep_end = sweep_bits() - 1,

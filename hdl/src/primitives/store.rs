@@ -13,6 +13,10 @@ use crate::wire::{Wire, Word};
 ///
 /// Where one subarray is filled while another is searched, `START` is a memory of its own. Otherwise it is another name
 /// of buffer 0, and `fill` and `write` never coincide.
+///
+/// What is read of a quad in the cycle in which it is written is nobody's: a sweep writes what it has read cycles ago, or
+/// a buffer that nobody reads. So block RAM need not keep an order there, which would take a register and a table for
+/// each bit. In simulation such a read gives the complement of what was written before, for a use of it to show.
 #[derive(LogicBlock)]
 pub struct Store {
     /// Clock.
@@ -114,12 +118,13 @@ impl Logic for Store {
     fn update(&mut self) {
         if self.clk.pos_edge() {
             let (read_buffer, read_address) = (self.read_buffer.val(), self.read_address.val().number() as usize);
-            let read = self.memory(read_buffer).get(read_address).copied();
+            let read = self.memory(read_buffer).get(read_address).copied().unwrap_or_default();
+            let (buffer, address) = (self._write_buffer, self.write_address.val().number() as usize);
+            let collides = self.write.val() && (buffer, address) == (read_buffer, read_address);
             self.read_data.next = self._read;
-            self._read = read.unwrap_or_default();
+            self._read = if collides { read.complement(self._layout.bits()) } else { read };
             if self.write.val() {
-                let (buffer, data) = (self._write_buffer, self.write_data.val());
-                let address = self.write_address.val().number() as usize;
+                let data = self.write_data.val();
                 if let Some(word) = self.memory(buffer).get_mut(address) {
                     *word = data;
                 }

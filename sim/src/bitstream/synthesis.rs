@@ -25,7 +25,7 @@ pub fn synthesise(folder: &Path, family: Family, read: &str, top: &str) -> Resul
     let commands = flow(family).synthesis.replace("{top}", top).replace("{netlist}", NETLIST);
     run(folder, format!("read_verilog {read}; {commands}"), "synthesis.log")?;
     match family {
-        Family::Ecp5 => absorb_file(&folder.join(NETLIST), top),
+        Family::Ecp5 => edit(folder, |netlist| absorb(netlist, top)),
         // Yosys itself moves registers into SB_MAC16.
         Family::Ice40 => Ok(Absorbed::default()),
     }
@@ -57,11 +57,15 @@ fn read(path: &Path) -> Result<Value, ToolError> {
     serde_json::from_slice(&fs::read(path).map_err(ToolError::io(path))?).map_err(wrong)
 }
 
-/// Absorbs registers in module `top` of the netlist at `path`.
-fn absorb_file(path: &Path, top: &str) -> Result<Absorbed, ToolError> {
-    let wrong = |error: serde_json::Error| ToolError::Output { path: path.to_owned(), reason: error.to_string() };
-    let mut netlist = read(path)?;
-    let absorbed = absorb(&mut netlist, top);
-    write(path, &serde_json::to_vec(&netlist).map_err(wrong)?)?;
-    Ok(absorbed)
+/// Lets `edit` work on the netlist in `folder`.
+///
+/// # Errors
+/// [`ToolError`]: a file that cannot be read or written, or is no netlist.
+pub fn edit<T>(folder: &Path, edit: impl FnOnce(&mut Value) -> T) -> Result<T, ToolError> {
+    let path = folder.join(NETLIST);
+    let wrong = |error: serde_json::Error| ToolError::Output { path: path.clone(), reason: error.to_string() };
+    let mut netlist = read(&path)?;
+    let done = edit(&mut netlist);
+    write(&path, &serde_json::to_vec(&netlist).map_err(wrong)?)?;
+    Ok(done)
 }

@@ -1,0 +1,113 @@
+//! Where the lanes' multipliers go.
+//!
+//! A device has its multipliers in a few rows. Left to a placer, the logic of the lanes is drawn together and the multipliers
+//! are what is left in those rows: the 36 wires of a product cross half the device, those of all lanes meet in the middle, and
+//! routing takes hours or does not end. Here the lanes take sites one beside the other, and their logic comes to them.
+//!
+//! ```text
+//! row 0   1 2 3 4 \   / 21 ...    a block of four sites in each row of each column; from the first lane of the first
+//! row 1   5 6 7 8 |   | 17 ...    parity to the last of the fourth down one column and up the next, in as many columns
+//! row 2   9 ...   \__/  13 ...    in the middle as it takes
+//! ```
+
+use dermis_golden::board::MultiplierBlocks;
+use serde_json::{json, Value};
+
+/// Sites of a block: how far each is from the block's column, which is its number in the block as well.
+const IN_BLOCK: [u32; MultiplierBlocks::SIZE] = [0, 1, 4, 5];
+
+/// Gives the lanes' multipliers in the module `top` of Yosys's JSON their sites; how many.
+///
+/// Other multipliers are left to the placer, and so are all of them where the lanes take more than there are.
+pub fn plan(netlist: &mut Value, top: &str, blocks: &MultiplierBlocks) -> usize {
+    let Some(cells) = netlist["modules"][top]["cells"].as_object_mut() else { return 0 };
+    let mut lanes: Vec<((u32, u32), &mut Value)> = cells
+        .iter_mut()
+        .filter(|(_, cell)| is_multiplier(cell))
+        .filter_map(|(n, cell)| Some((lane(n)?, cell)))
+        .collect();
+    lanes.sort_unstable_by_key(|(lane, _)| *lane);
+    let sites = sites(blocks, lanes.len());
+    if sites.len() < lanes.len() {
+        return 0;
+    }
+    for ((_, cell), site) in lanes.iter_mut().zip(sites) {
+        cell["attributes"]["BEL"] = json!(site);
+    }
+    lanes.len()
+}
+
+fn is_multiplier(cell: &Value) -> bool {
+    cell["type"] == "MULT18X18D"
+}
+
+/// Parity and number of the lane that a cell belongs to: what `Lanes` calls `parity[p].lane[k]`.
+fn lane(name: &str) -> Option<(u32, u32)> {
+    let (_, name) = name.split_once(".parity[")?;
+    let (parity, name) = name.split_once("].lane[")?;
+    let (lane, _) = name.split_once(']')?;
+    Some((parity.parse().ok()?, lane.parse().ok()?))
+}
+
+/// Sites for `count` multipliers or some more, in the order of the lanes; fewer where there are not so many.
+fn sites(blocks: &MultiplierBlocks, count: usize) -> Vec<String> {
+    let MultiplierBlocks { columns, rows } = blocks;
+    let needed = count.div_ceil(rows.len() * IN_BLOCK.len()).min(columns.len());
+    let first = (columns.len() - needed) / 2;
+    let blocks = columns[first..first + needed].iter().enumerate().flat_map(|(k, column)| {
+        let mut blocks: Vec<(u32, u32)> = rows.iter().map(|row| (*column, *row)).collect();
+        if k % 2 == 1 {
+            blocks.reverse();
+        }
+        blocks
+    });
+    blocks.flat_map(|(x, y)| IN_BLOCK.map(|k| format!("X{}/Y{y}/MULT18_{k}", x + k))).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn blocks() -> MultiplierBlocks {
+        MultiplierBlocks { columns: vec![4, 13, 22], rows: vec![10, 34] }
+    }
+
+    #[test]
+    fn lanes_take_neighbouring_sites_in_the_middle_and_no_site_twice() {
+        assert_eq!(
+            sites(&blocks(), 3)[..5],
+            ["X13/Y10/MULT18_0", "X14/Y10/MULT18_1", "X17/Y10/MULT18_4", "X18/Y10/MULT18_5", "X13/Y34/MULT18_0"]
+        );
+        let all = sites(&blocks(), 24);
+        // The second column goes up.
+        assert_eq!(all[8], "X13/Y34/MULT18_0");
+        assert_eq!(all.iter().collect::<std::collections::BTreeSet<_>>().len(), 24);
+    }
+
+    #[test]
+    fn a_lane_s_multiplier_gets_its_site_and_another_none() {
+        let names =
+            ["a.lanes.parity[1].lane[0].a_MULT", "a.lanes.parity[0].lane[10].a_MULT", "a.lanes.parity[0].lane[9].x"];
+        let mut cells: serde_json::Map<String, Value> =
+            names.iter().map(|name| (name.to_string(), json!({"type": "MULT18X18D"}))).collect();
+        cells.insert("unit.x_MULT".into(), json!({"type": "MULT18X18D"}));
+        cells.insert("a.lanes.parity[0].lane[1].q".into(), json!({"type": "TRELLIS_FF"}));
+        let mut netlist = json!({"modules": {"t": {"cells": cells}}});
+        assert_eq!(plan(&mut netlist, "t", &blocks()), 3);
+        let site = |name: &str| netlist["modules"]["t"]["cells"][name]["attributes"]["BEL"].clone();
+        // By parity and number, not by the letters of the name.
+        assert_eq!(
+            [names[2], names[1], names[0]].map(site),
+            [json!("X13/Y10/MULT18_0"), json!("X14/Y10/MULT18_1"), json!("X17/Y10/MULT18_4")]
+        );
+        assert!(site("unit.x_MULT").is_null() && site("a.lanes.parity[0].lane[1].q").is_null());
+    }
+
+    #[test]
+    fn more_lanes_than_sites_are_left_to_the_placer() {
+        let cells: serde_json::Map<String, Value> =
+            (0..25).map(|k| (format!("lanes.parity[0].lane[{k}].a"), json!({"type": "MULT18X18D"}))).collect();
+        let mut netlist = json!({"modules": {"t": {"cells": cells}}});
+        assert_eq!(plan(&mut netlist, "t", &blocks()), 0);
+    }
+}
