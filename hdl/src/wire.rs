@@ -211,6 +211,17 @@ mod tests {
     use super::*;
 
     #[test]
+    fn a_complement_turns_its_bits_and_no_other() {
+        let word = Word::of_fields(&[-3, 5, 0], 40);
+        let turned = word.complement(100);
+        assert_eq!(
+            (0..120).filter(|&at| turned.field(at, 1) == word.field(at, 1)).collect::<Vec<_>>(),
+            (100..120).collect::<Vec<_>>()
+        );
+        assert_eq!(turned.complement(100), word);
+    }
+
+    #[test]
     fn fields_straddle_limbs() {
         let fields: Vec<i64> = (0..40).map(|i| (i * 977 - 15_000) % (1 << 25)).collect();
         let word = Word::of_fields(&fields, 27);

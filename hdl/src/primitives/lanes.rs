@@ -302,8 +302,9 @@ end
   if (rst) left <= {row_bits}'d0;
   else if (valid4 && last4) left <= {rows};
   else if (left != {row_bits}'d0) left <= left - {row_bits}'d1;
+  // Whether rows are left, from a register: it has far to go.
+  quad_valid <= !rst && (valid4 && last4 || left > {row_bits}'d1);
 end
-always @(*) quad_valid = left != {row_bits}'d0;
 always @(*) quad = chain_head;
 genvar p, k;
 generate

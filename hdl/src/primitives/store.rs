@@ -8,8 +8,8 @@ use super::sweep::{BUFFERS, BUFFER_BITS, START};
 use crate::wire::{Wire, Word};
 
 /// Buffers of quads of polynomials. `fill` writes one coefficient of a quad into buffer `START`; `write` a whole quad
-/// into one of the others; the read register follows the address by two cycles: block RAM is slow to answer, so nothing
-/// but a register follows it.
+/// into one of the others; both land a cycle later, from registers beside the memory. The read register follows the
+/// address by two cycles: block RAM is slow to answer, so nothing but a register follows it.
 ///
 /// Where one subarray is filled while another is searched, `START` is a memory of its own. Otherwise it is another name
 /// of buffer 0, and `fill` and `write` never coincide.
@@ -55,6 +55,16 @@ pub struct Store {
     _memory: Vec<Vec<Word>>,
     _read: Word,
     _write_buffer: Word,
+    _asked: Option<Write>,
+}
+
+/// What is to be written: one coefficient of four taxels, or all of them.
+#[derive(Clone, Copy, Debug)]
+struct Write {
+    /// Memory and quad.
+    place: (usize, usize),
+    coefficient: Option<usize>,
+    data: Word,
 }
 
 /// Cycles from an address to its quad.
@@ -103,43 +113,59 @@ impl Store {
             _memory: vec![vec![Word::default(); quads]; BUFFERS + usize::from(apart)],
             _read: Word::default(),
             _write_buffer: Word::default(),
+            _asked: None,
             _layout: layout,
         }
     }
 
     /// Index of a buffer's memory.
-    fn memory(&mut self, buffer: Word) -> &mut Vec<Word> {
+    fn memory(&self, buffer: Word) -> usize {
         let buffer = buffer.number() as usize;
-        &mut self._memory[if buffer == START && !self._apart { 0 } else { buffer }]
+        if buffer == START && !self._apart {
+            0
+        } else {
+            buffer
+        }
+    }
+
+    fn put(&mut self, Write { place, coefficient, data }: Write) {
+        let Some(word) = self._memory[place.0].get_mut(place.1) else { return };
+        let Some(k) = coefficient else {
+            *word = data;
+            return;
+        };
+        let bits = self.fill_quad.width() / 4;
+        if let Some(&width) = self._layout.widths.get(k) {
+            for lane in 0..4 {
+                word.set(self._layout.offset(k) + lane * width, width, data.signed(lane, bits) as u64);
+            }
+        }
     }
 }
 
 impl Logic for Store {
     fn update(&mut self) {
         if self.clk.pos_edge() {
-            let (read_buffer, read_address) = (self.read_buffer.val(), self.read_address.val().number() as usize);
-            let read = self.memory(read_buffer).get(read_address).copied().unwrap_or_default();
-            let (buffer, address) = (self._write_buffer, self.write_address.val().number() as usize);
-            let collides = self.write.val() && (buffer, address) == (read_buffer, read_address);
+            let (read_buffer, read_address) = (self.memory(self.read_buffer.val()), self.read_address.val());
+            let place = (read_buffer, read_address.number() as usize);
+            let read = self._memory[place.0].get(place.1).copied().unwrap_or_default();
+            let asked = self._asked.take();
+            let collides = asked.is_some_and(|write| write.place == place);
             self.read_data.next = self._read;
             self._read = if collides { read.complement(self._layout.bits()) } else { read };
+            asked.into_iter().for_each(|write| self.put(write));
             if self.write.val() {
-                let data = self.write_data.val();
-                if let Some(word) = self.memory(buffer).get_mut(address) {
-                    *word = data;
-                }
+                let place = (self.memory(self._write_buffer), self.write_address.val().number() as usize);
+                self._asked = Some(Write { place, coefficient: None, data: self.write_data.val() });
             }
             self._write_buffer = self.write_buffer.val();
             if self.fill.val() {
-                let k = self.fill_index.val().number() as usize;
-                let bits = self.fill_quad.width() / 4;
-                let address = self.fill_address.val().number() as usize;
-                let (layout, quad) = (self._layout.clone(), self.fill_quad.val());
-                let word = self.memory(Word::from(START as u64)).get_mut(address);
-                if let (Some(word), Some(&width)) = (word, layout.widths.get(k)) {
-                    for lane in 0..4 {
-                        word.set(layout.offset(k) + lane * width, width, quad.signed(lane, bits) as u64);
-                    }
+                let place = (self.memory(Word::from(START as u64)), self.fill_address.val().number() as usize);
+                let coefficient = Some(self.fill_index.val().number() as usize);
+                let fill = Write { place, coefficient, data: self.fill_quad.val() };
+                match self._apart {
+                    true => self.put(fill),
+                    false => self._asked = Some(fill),
                 }
             }
         }
@@ -192,37 +218,50 @@ end
                     all_end = all - 1,
                     depth_end = depth - 1,
                 );
-                if self._apart {
-                    format!(
-                        "\
-{declare}reg [{end}:0] start{k} [0:{last}];
-reg [{end}:0] read{k}, read_start{k};
+                let (asks, data) = match self._apart {
+                    true => ("write".to_string(), format!("write_data[{low} +: {all}]")),
+                    false => (
+                        format!("fill ? fill_index == {index_bits}'d{k} : write"),
+                        format!("fill ? {{{filled}}} : write_data[{low} +: {all}]"),
+                    ),
+                };
+                let (start, read) = match self._apart {
+                    true => (
+                        format!(
+                            "\
+reg [{end}:0] start{k} [0:{last}];
+reg [{end}:0] read_start{k};
 always @(posedge clk) begin
-  if (write) memory{k}[write_to] <= write_data[{low} +: {all}];
   if (fill && fill_index == {index_bits}'d{k}) start{k}[fill_address] <= {{{filled}}};
-  read{k} <= memory{k}[from{k}];
   read_start{k} <= start{k}[read_address];
-  read_data[{low} +: {all}] <= from_start ? read_start{k} : read{k};
 end
 ",
-                        end = all - 1,
-                        last = self._quads - 1,
-                    )
-                } else {
-                    format!(
-                        "\
-{declare}reg [{end}:0] read{k};
-wire write{k} = fill ? fill_index == {index_bits}'d{k} : write;
-wire [{end}:0] data{k} = fill ? {{{filled}}} : write_data[{low} +: {all}];
+                            end = all - 1,
+                            last = self._quads - 1,
+                        ),
+                        format!("from_start ? read_start{k} : read{k}"),
+                    ),
+                    false => (String::new(), format!("read{k}")),
+                };
+                format!(
+                    "\
+{declare}{start}reg write{k};
+reg [{place_end}:0] to{k};
+reg [{end}:0] data{k}, read{k};
+(* keep *) always @(posedge clk) begin
+  write{k} <= {asks};
+  to{k} <= write_to;
+end
 always @(posedge clk) begin
-  if (write{k}) memory{k}[write_to] <= data{k};
+  data{k} <= {data};
+  if (write{k}) memory{k}[to{k}] <= data{k};
   read{k} <= memory{k}[from{k}];
-  read_data[{low} +: {all}] <= read{k};
+  read_data[{low} +: {all}] <= {read};
 end
 ",
-                        end = all - 1,
-                    )
-                }
+                    place_end = address_bits - 1,
+                    end = all - 1,
+                )
             })
             .collect();
         let from_start = match self._apart {
@@ -231,7 +270,8 @@ end
         };
         Verilog::Custom(format!(
             "{lanes}{to_buffer}wire [{end}:0] write_to = {write_to};
-// Where to read is a register of each coefficient: the memories lie far apart. Synthesis is not to merge them.
+// Where to read and to write is a register of each coefficient: the memories lie far apart. Synthesis is not to
+// merge them.
 {from_start}{memories}",
         ))
     }
