@@ -1,9 +1,9 @@
 //! `dermis bitstream`: a scene as a bitstream for its board, by open tools.
 //!
 //! ```text
-//! scene -> board top (Verilog) --yosys--> netlist --absorb, floor plan--> netlist --nextpnr, several seeds--> best --pack--> bitstream
-//!          pins, PLL of constraints ---^                                                                      |
-//!                                                                               cells, clocks -> table, baselines
+//! scene -> board top (Verilog) --yosys--> netlist --absorb, floor plan--> netlist
+//!     netlist --nextpnr, several seeds--> best --pack--> bitstream
+//!             ^-- pins, PLL of constraints     |--> cells, clocks -> table, baselines
 //! ```
 //! Everything stands in `<build-dir>/<scene>/<board>/`, with a log per tool.
 

@@ -127,7 +127,8 @@ impl Taylor {
     /// `<axis>k`.
     ///
     /// c0' = c0 + d (c1 + c3) + d² c2,  c1' = c1 + 2d c2 + 3d² c3,  c2' = c2 + 3d c3: d is −1, 0 or 1, so that
-    /// d² only says whether there is a move and d·c is c, −c or 0.
+    /// d² only says whether there is a move and d·c is c, −c or 0; −c is the complement and one more. All of it is one
+    /// sum, for which synthesis needs a table for each bit and a single carry chain.
     fn shift(&self, axis: &str, step: &str, up: impl Fn((u32, u32), u32) -> (u32, u32)) -> String {
         let widths = &self._layout.widths;
         let mut text = String::new();
@@ -160,13 +161,14 @@ impl Taylor {
             let mut sum = format!("{axis}{k}_own");
             if !odd.is_empty() {
                 register("odd", &odd.join(" + "));
-                sum = format!(
-                    "({step}[1] ? {axis}{k}_own - {axis}{k}_odd : {step}[0] ? {axis}{k}_own + {axis}{k}_odd : {sum})"
+                sum += &format!(
+                    " + (({axis}{k}_odd & {{{w}{{{step}[0]}}}}) ^ {{{w}{{{step}[1]}}}}) + {{{more}'d0, {step}[1]}}",
+                    more = w - 1
                 );
             }
             if let Some(even) = term(2) {
                 register("even", &even);
-                sum += &format!(" + ({step}[0] ? {axis}{k}_even : {w}'d0)");
+                sum += &format!(" + ({axis}{k}_even & {{{w}{{{step}[0]}}}})");
             }
             text += &format!("    wire [{}:0] {axis}{k}_moved = {sum};\n", w - 1);
         }
