@@ -302,8 +302,8 @@ end
   if (rst) left <= {row_bits}'d0;
   else if (valid4 && last4) left <= {rows};
   else if (left != {row_bits}'d0) left <= left - {row_bits}'d1;
-  // Whether rows are left, from a register: it has far to go.
-  quad_valid <= !rst && (valid4 && last4 || left > {row_bits}'d1);
+  // Whether rows are left, from a register: it has far to go. With one row, `left > 1` compares with what one bit cannot hold.
+  quad_valid <= !rst && (valid4 && last4 || left != {row_bits}'d0 && left != {row_bits}'d1);
 end
 always @(*) quad = chain_head;
 genvar p, k;
