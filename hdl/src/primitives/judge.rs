@@ -177,7 +177,7 @@ impl Logic for Judge {
         // The winner of two, the first on a tie, one cycle later.
         let duel = |a: &str, b: &str, to: &str| {
             format!(
-                "  ok_{to} <= ok_{a} || ok_{b};\n  if (ok_{b} && (!ok_{a} || s_{b} < s_{a})) begin\n    s_{to} <= s_{b};\n    \
+                "  ok_{to} <= ok_{a} || ok_{b};\n  if (ok_{b} && (!ok_{a} || less(s_{b}, s_{a}))) begin\n    s_{to} <= s_{b};\n    \
                  k_{to} <= k_{b};\n  end else begin\n    s_{to} <= s_{a};\n    k_{to} <= k_{a};\n  end\n"
             )
         };
@@ -214,7 +214,7 @@ impl Logic for Judge {
         });
         let compare = each(&|n| {
             format!(
-                "  lower_{n} <= s_{n} < s_best;\n  \
+                "  lower_{n} <= less(s_{n}, s_best);\n  \
                  same_{n} <= s_{n} == s_best;\n  \
                  above_{n} <= beyond(ahead_y, row(k_{n}));\n  level_{n} <= in_line(ahead_y, row(k_{n}));\n  \
                  left_{n} <= beyond(ahead_x, column(k_{n}));\n  \
@@ -252,6 +252,12 @@ function in_line;
   input [1:0] step;
   in_line = ahead == {{{{{p_end}{{step[1]}}}}, step}};
 endfunction
+// a < b, both signed. With the signs exchanged it is a comparison without signs, which is the end of one carry chain: that of
+// signed numbers takes a bit out of the middle as well.
+function less;
+  input [{t_end}:0] a, b;
+  less = {{b[{t_end}], a[{t_less}:0]}} < {{a[{t_end}], b[{t_less}:0]}};
+endfunction
 reg [{scores_end}:0] scores;
 reg [8:0] fits;
 reg [{sweep_end}:0] held;
@@ -272,8 +278,8 @@ always @(posedge clk) begin
 end
 {fields}wire unused = &{{1'b0, held_square, held_buffer}};
 // The first to come wins ties; in a halving that is the centre.
-wire centre_wins = ok_centre && (!ok_before || s_centre < s_before || (!held_coarse && s_centre == s_before));
-wire after_wins = ok_after && (!ok_before || s_after < s_before) && (!ok_centre || s_after < s_centre);
+wire centre_wins = ok_centre && (!ok_before || less(s_centre, s_before) || (!held_coarse && s_centre == s_before));
+wire after_wins = ok_after && (!ok_before || less(s_after, s_before)) && (!ok_centre || less(s_after, s_centre));
 // All three are compared with the best so far while it is found which of them wins.
 wire signed [{t_end}:0] s_best = score;
 // How far it lies from the centre, a cycle before that.
@@ -340,6 +346,7 @@ end",
             p_more = p - 2,
             p_wide = p + 1,
             t_end = t - 1,
+            t_less = t - 2,
             scores_end = 9 * t - 1,
             sweep_end = sweep_bits() - 1,
             declared = declare("reg", &candidates)

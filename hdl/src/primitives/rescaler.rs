@@ -107,7 +107,6 @@ impl Logic for Rescaler {
         let cap = SATURATION_BITS;
         Verilog::Custom(format!(
             "\
-reg [{shift_end}:0] amount;
 reg [{quad_end}:0] taken;
 reg valid1, valid2;
 wire [3:0] clipped;
@@ -115,7 +114,6 @@ reg [3:0] clipped3;
 reg [2:0] clips;
 wire [{cap}:0] count = {{1'b0, saturations}} + {{{count_more}'d0, clips}};
 always @(posedge clk) begin
-  amount <= measured ? shift : {shift_bits}'d{a_shift};
   taken <= quad;
   valid1 <= valid;
   valid2 <= valid1;
@@ -127,6 +125,9 @@ end
 genvar l;
 generate
   for (l = 0; l < 4; l = l + 1) begin : lane
+    // Of its own: the lanes stand far apart, where their rows come from.
+    reg [{shift_end}:0] amount;
+    (* keep *) always @(posedge clk) amount <= measured ? shift : {shift_bits}'d{a_shift};
     // One bit below the LSB is kept, so that adding one and dropping it rounds half up.
     reg signed [{acc}:0] moved;
     wire signed [{acc}:0] doubled = {{taken[l * {acc} +: {acc}], 1'b0}};
