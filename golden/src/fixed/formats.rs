@@ -27,7 +27,7 @@ use serde::Serialize;
 use super::arith::{bit_length, signed_bits};
 use super::coefficients::{parity_blocks, quantise, Blocks, Flipped, FLIP_X, FLIP_Y};
 use super::quads::Quads;
-use super::resources::{Fit, Resources};
+use super::resources::Resources;
 use super::schedule::{products, vectors, Flips, Kind, Matrix, EXPONENTS};
 use super::serial;
 use super::storage::{stored, Storage};
@@ -336,8 +336,8 @@ pub struct LaidOut {
     pub parts: usize,
 }
 
-/// Chooses lanes and memories: the lanes that the scene says, else the most for which everything fits with room for the
-/// router, else the most for which it fits at all; block RAMs rather than distributed ones where there is the choice.
+/// Chooses lanes and memories: the lanes that the scene says, else the most for which there is block RAM; block RAMs rather
+/// than distributed ones where there is the choice, since a deep distributed one is the longest path of its design.
 fn fit(
     formats: &Formats,
     matrices: &[Matrix],
@@ -366,7 +366,7 @@ fn fit(
         let mut laid_out: Vec<LaidOut> = quantised.iter().zip(shapes).map(lay_out).collect();
         Storage::share(laid_out.iter_mut().map(|case| (&mut case.storage, case.formats.clone())));
         let [first, second] = board.distributed_words.map(|shallow| Resources::new(&laid_out, scene, board, shallow));
-        let resources = if first.fit(board) == Fit::WithRoom { first } else { second };
+        let resources = if first.fits(board) { first } else { second };
         (laid_out, resources)
     };
     let product = board.multipliers_for(MULTIPLIER_BITS, MULTIPLIER_BITS);
@@ -381,22 +381,18 @@ fn fit(
     };
     let mut groups: Vec<usize> = per_parity.rev().map(|lanes| quads.div_ceil(lanes)).collect();
     groups.dedup();
-    // Of those that fit equally well the most lanes win; of those that do not fit, the fewest block RAMs.
-    let rank = |(_, resources): &(Vec<LaidOut>, Resources)| match resources.fit(board) {
-        Fit::Not => (Fit::Not, resources.block_rams()),
-        fit => (fit, 0),
-    };
-    let mut best: Option<(Vec<LaidOut>, Resources)> = None;
+    // Where nothing fits, what asks for the fewest block RAMs.
+    let mut least: Option<(Vec<LaidOut>, Resources)> = None;
     for groups in groups {
         let design = with(groups);
-        if best.as_ref().is_none_or(|kept| rank(&design) < rank(kept)) {
-            best = Some(design);
+        if design.1.fits(board) {
+            return design;
         }
-        if best.as_ref().is_some_and(|kept| rank(kept).0 == Fit::WithRoom) {
-            break;
+        if least.as_ref().is_none_or(|least| design.1.block_rams() < least.1.block_rams()) {
+            least = Some(design);
         }
     }
-    best.unwrap_or(all)
+    least.unwrap_or(all)
 }
 
 /// The right shift of the force stage for a subarray normalised by `normalise` and rescaled by `rescale`: the μ word's

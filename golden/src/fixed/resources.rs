@@ -30,9 +30,6 @@ use crate::scene::{ForceOutput, Scene};
 /// [`Memory::block`] of the search memory.
 pub const SEARCH_MEMORY: &str = "search$store";
 
-/// Share of a board's block RAMs that a design takes where it has the choice: the router needs the rest.
-const ROUTABLE: f64 = 0.8;
-
 /// The frame buffers of several cases.
 const BANKS: [&str; 4] =
     ["receive$banks$0$frame", "receive$banks$1$frame", "receive$banks$2$frame", "receive$banks$3$frame"];
@@ -69,17 +66,6 @@ pub struct Resources {
     pub memories: Vec<Memory>,
     /// Multipliers of each block that has some.
     pub multipliers: Vec<(&'static str, usize)>,
-}
-
-/// How block RAMs fit a board; the better, the smaller.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub enum Fit {
-    /// At most 80 % are taken.
-    WithRoom,
-    /// All fit.
-    Tight,
-    /// There are too few.
-    Not,
 }
 
 /// Bits of a count below `limit`, at least one.
@@ -188,13 +174,9 @@ impl Resources {
         all.into_iter().filter(|(_, needs, has)| needs > has).collect()
     }
 
-    /// How well the block RAMs fit: with room for the router, at all, or not.
-    pub fn fit(&self, board: &Board) -> Fit {
-        match self.block_rams() {
-            rams if rams as f64 <= ROUTABLE * f64::from(board.block_rams) => Fit::WithRoom,
-            rams if rams <= board.block_rams as usize => Fit::Tight,
-            _ => Fit::Not,
-        }
+    /// Whether `board` has the block RAMs and one more, in which the link counts its packets.
+    pub fn fits(&self, board: &Board) -> bool {
+        self.block_rams() < board.block_rams as usize
     }
 }
 
