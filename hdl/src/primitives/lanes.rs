@@ -310,9 +310,12 @@ genvar p, k;
 generate
   for (p = 0; p < 4; p = p + 1) begin : parity
     wire [{chain_end}:0] chain_in;
-    // Of its own for each parity: it goes to a quarter of the lanes.
-    reg leaves3;
-    (* keep *) always @(posedge clk) leaves3 <= !rst && valid2 && last2;
+    // Of its own for each parity: it goes to a quarter of the lanes, which may be the far ones.
+    reg leaves2, leaves3;
+    (* keep *) always @(posedge clk) begin
+      leaves2 <= !rst && valid1 && last1;
+      leaves3 <= !rst && leaves2;
+    end
     assign chain_in[{chain_end} -: {acc_bits}] = {acc_bits}'d0;
     assign chain_head[p * {acc_bits} +: {acc_bits}] = chain_in[{acc_end}:0];
     for (k = 0; k < {per_parity}; k = k + 1) begin : lane

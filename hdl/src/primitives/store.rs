@@ -55,7 +55,7 @@ pub struct Store {
     _memory: Vec<Vec<Word>>,
     _read: Word,
     _write_buffer: Word,
-    _asked: Option<Write>,
+    _asked: [Option<Write>; 2],
 }
 
 /// What is to be written: one coefficient of four taxels, or all of them.
@@ -113,7 +113,7 @@ impl Store {
             _memory: vec![vec![Word::default(); quads]; BUFFERS + usize::from(apart)],
             _read: Word::default(),
             _write_buffer: Word::default(),
-            _asked: None,
+            _asked: [None; 2],
             _layout: layout,
         }
     }
@@ -149,24 +149,20 @@ impl Logic for Store {
             let (read_buffer, read_address) = (self.memory(self.read_buffer.val()), self.read_address.val());
             let place = (read_buffer, read_address.number() as usize);
             let read = self._memory[place.0].get(place.1).copied().unwrap_or_default();
-            let asked = self._asked.take();
-            let collides = asked.is_some_and(|write| write.place == place);
+            let asked = std::mem::take(&mut self._asked);
+            let collides = asked.iter().flatten().any(|write| write.place == place);
             self.read_data.next = self._read;
             self._read = if collides { read.complement(self._layout.bits()) } else { read };
-            asked.into_iter().for_each(|write| self.put(write));
+            asked.into_iter().flatten().for_each(|write| self.put(write));
             if self.write.val() {
                 let place = (self.memory(self._write_buffer), self.write_address.val().number() as usize);
-                self._asked = Some(Write { place, coefficient: None, data: self.write_data.val() });
+                self._asked[0] = Some(Write { place, coefficient: None, data: self.write_data.val() });
             }
             self._write_buffer = self.write_buffer.val();
             if self.fill.val() {
                 let place = (self.memory(Word::from(START as u64)), self.fill_address.val().number() as usize);
                 let coefficient = Some(self.fill_index.val().number() as usize);
-                let fill = Write { place, coefficient, data: self.fill_quad.val() };
-                match self._apart {
-                    true => self.put(fill),
-                    false => self._asked = Some(fill),
-                }
+                self._asked[1] = Some(Write { place, coefficient, data: self.fill_quad.val() });
             }
         }
     }
@@ -230,14 +226,22 @@ end
                         format!(
                             "\
 reg [{end}:0] start{k} [0:{last}];
-reg [{end}:0] read_start{k};
+reg [{end}:0] fill_data{k}, read_start{k};
+reg fill{k};
+reg [{fill_end}:0] fill_to{k};
+(* keep *) always @(posedge clk) begin
+  fill{k} <= fill && fill_index == {index_bits}'d{k};
+  fill_to{k} <= fill_address;
+end
 always @(posedge clk) begin
-  if (fill && fill_index == {index_bits}'d{k}) start{k}[fill_address] <= {{{filled}}};
+  fill_data{k} <= {{{filled}}};
+  if (fill{k}) start{k}[fill_to{k}] <= fill_data{k};
   read_start{k} <= start{k}[read_address];
 end
 ",
                             end = all - 1,
                             last = self._quads - 1,
+                            fill_end = self.fill_address.width() - 1,
                         ),
                         format!("from_start ? read_start{k} : read{k}"),
                     ),

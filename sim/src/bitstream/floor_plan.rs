@@ -7,7 +7,7 @@
 //! ```text
 //! row 0   1 2 3 4 \   / 21 ...    a block of four sites in each row of each column; from the first lane of the first
 //! row 1   5 6 7 8 |   | 17 ...    parity to the last of the fourth down one column and up the next, in as many columns
-//! row 2   9 ...   \__/  13 ...    in the middle as it takes
+//! row 2   9 ...   \__/  13 ...    in the middle as it takes, or all but the middle one
 //! ```
 
 use dermis_golden::board::MultiplierBlocks;
@@ -53,8 +53,13 @@ fn lane(name: &str) -> Option<(u32, u32)> {
 fn sites(blocks: &MultiplierBlocks, count: usize) -> Vec<String> {
     let MultiplierBlocks { columns, rows } = blocks;
     let needed = count.div_ceil(rows.len() * IN_BLOCK.len()).min(columns.len());
-    let first = (columns.len() - needed) / 2;
-    let blocks = columns[first..first + needed].iter().enumerate().flat_map(|(k, column)| {
+    let mut taken = columns.clone();
+    match columns.len() - needed {
+        // The only one left is for all other multipliers: at the edge it would be far from what they multiply.
+        1 => drop(taken.remove(columns.len() / 2)),
+        left => taken = columns[left / 2..][..needed].to_vec(),
+    }
+    let blocks = taken.iter().enumerate().flat_map(|(k, column)| {
         let mut blocks: Vec<(u32, u32)> = rows.iter().map(|row| (*column, *row)).collect();
         if k % 2 == 1 {
             blocks.reverse();
@@ -82,6 +87,13 @@ mod tests {
         // The second column goes up.
         assert_eq!(all[8], "X13/Y34/MULT18_0");
         assert_eq!(all.iter().collect::<std::collections::BTreeSet<_>>().len(), 24);
+    }
+
+    #[test]
+    fn a_single_column_that_is_left_is_that_in_the_middle() {
+        let sites = sites(&blocks(), 16);
+        assert_eq!(sites.len(), 16);
+        assert!(sites.iter().all(|site| !site.starts_with("X13/") && !site.starts_with("X14/")), "{sites:?}");
     }
 
     #[test]
