@@ -9,10 +9,12 @@ module proof(input clk, input again, input [7:0] content, input border, input of
     .clk(clk), .rst(rst), .content(content), .border(border), .content_valid(offered), .content_ready(content_ready),
     .data(data), .valid(valid), .ready(ready)
   );
-  reg followed = 1'b0, content_waits, waits, border_before, escaped;
+  reg followed = 1'b0, content_waits, waits, border_before, escaped, whole_before;
   reg [7:0] content_before, before;
+  wire whole = valid && ready && (border || escaped || data != 8'hDB);
   always @(posedge clk) begin
     followed <= !rst;
+    whole_before <= whole;
     content_waits <= offered && !content_ready;
     waits <= valid && !ready;
     {content_before, border_before, before} <= {content, border, data};
@@ -27,10 +29,11 @@ module proof(input clk, input again, input [7:0] content, input border, input of
       if (valid && !border) assert (data != 8'hC0);
       if (valid) assert (data != 8'hDE);
       if (valid && ready) escaped <= !border && data == 8'hDB;
-      if (offered && content_ready && !border)
+      if (whole && !border)
         assert (content == (!escaped ? data : data == 8'hDC ? 8'hC0 : data == 8'hDD ? 8'hDB : data == 8'hDF ? 8'hDE : 8'h00));
-      if (offered && content_ready) assert (valid && ready);
-      if (valid && ready && !content_ready) assert (data == 8'hDB && !escaped);
+      // It is taken a cycle later, and not offered to the wire meanwhile.
+      if (followed) assert (content_ready == whole_before);
+      if (followed && whole_before) assert (!valid);
     end
   end
 endmodule

@@ -7,7 +7,8 @@ use crate::wire::{Wire, Word};
 
 /// Escapes what SLIP needs escaped; an END goes out as it is where `border` says that it stands between packets.
 ///
-/// Behind an engine with many lanes whether a byte is escaped comes from a register, a cycle after the byte.
+/// Behind an engine with many lanes whether a byte is escaped comes from a register, a cycle after the byte, and so does that
+/// it is taken, a cycle after the wire took it: the wire's pins may be far from the packets.
 #[derive(LogicBlock)]
 pub struct SlipEncoder {
     /// Clock.
@@ -31,10 +32,11 @@ pub struct SlipEncoder {
     _registered: bool,
     _second: bool,
     _seen: bool,
+    _gone: bool,
 }
 
 impl SlipEncoder {
-    /// With or without that register.
+    /// With or without those registers.
     pub fn new(registered: bool) -> Self {
         SlipEncoder {
             clk: Default::default(),
@@ -49,6 +51,7 @@ impl SlipEncoder {
             _registered: registered,
             _second: false,
             _seen: false,
+            _gone: false,
         }
     }
 
@@ -70,7 +73,8 @@ impl Logic for SlipEncoder {
             let goes = self.stands() && self.ready.val();
             let taken = goes && (!special || self._second);
             self._second = !self.rst.val() && (self._second ^ (goes && special));
-            self._seen = !self.rst.val() && self.content_valid.val() && !taken;
+            self._seen = !self.rst.val() && self.content_valid.val() && !taken && !self._gone;
+            self._gone = !self.rst.val() && taken;
         }
         let data = match after {
             _ if self.border.val() => END,
@@ -80,7 +84,10 @@ impl Logic for SlipEncoder {
         };
         self.data.next = Word::from(u64::from(data));
         self.valid.next = self.stands();
-        self.content_ready.next = self.stands() && self.ready.val() && (!special || self._second);
+        self.content_ready.next = match self._registered {
+            true => self._gone,
+            false => self.stands() && self.ready.val() && (!special || self._second),
+        };
     }
 
     fn connect(&mut self) {
@@ -90,12 +97,13 @@ impl Logic for SlipEncoder {
     }
 
     fn hdl(&self) -> Verilog {
-        let escapes = match self._registered {
-            false => "wire stands = content_valid;\nwire special = found;\n",
-            true => {
-                "reg stands, special;\nalways @(posedge clk) begin\n  special <= found;\n  \
-                 stands <= !rst && content_valid && !content_ready;\nend\n"
-            }
+        let (known, told) = match self._registered {
+            false => ("wire stands = content_valid;\nwire special = found;\n", "always @(*) content_ready = taken;\n"),
+            true => (
+                "reg stands, special;\n",
+                "always @(posedge clk) begin\n  special <= found;\n  \
+                 stands <= !rst && content_valid && !taken && !content_ready;\n  content_ready <= !rst && taken;\nend\n",
+            ),
         };
         Verilog::Custom(format!(
             "\
@@ -103,11 +111,11 @@ reg second;
 wire is_end = content == 8'd{END};
 wire is_escape = content == 8'd{ESC};
 wire found = !border && (is_end || is_escape || content == 8'd{IDLE});
-{escapes}always @(*) begin
+{known}wire taken = stands && ready && (!special || second);
+{told}always @(*) begin
   data = border ? 8'd{END} : !special ? content : !second ? 8'd{ESC}
     : is_end ? 8'd{ESC_END} : is_escape ? 8'd{ESC_ESC} : 8'd{ESC_IDLE};
   valid = stands;
-  content_ready = stands && ready && (!special || second);
 end
 always @(posedge clk) begin
   if (rst) second <= 1'b0;
