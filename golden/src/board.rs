@@ -218,7 +218,7 @@ impl Board {
             return Err(invalid(format!("{field} = 0: must be positive")));
         }
         let placed = board.multiplier_blocks.as_ref().map(MultiplierBlocks::multipliers);
-        if let Some(placed) = placed.filter(|&placed| placed != board.multipliers as usize) {
+        if let Some(placed) = placed.filter(|&placed| placed == 0 || placed != board.multipliers as usize) {
             let has = board.multipliers;
             return Err(invalid(format!("multiplier_blocks: has {placed} multipliers, multipliers = {has}")));
         }

@@ -382,17 +382,17 @@ fn fit(
     let mut groups: Vec<usize> = per_parity.rev().map(|lanes| quads.div_ceil(lanes)).collect();
     groups.dedup();
     // Where nothing fits, what asks for the fewest block RAMs.
-    let mut least: Option<(Vec<LaidOut>, Resources)> = None;
+    let mut leanest: Option<(Vec<LaidOut>, Resources)> = None;
     for groups in groups {
         let design = with(groups);
         if design.1.fits(board) {
             return design;
         }
-        if least.as_ref().is_none_or(|least| design.1.block_rams() < least.1.block_rams()) {
-            least = Some(design);
+        if leanest.as_ref().is_none_or(|leanest| design.1.block_rams() < leanest.1.block_rams()) {
+            leanest = Some(design);
         }
     }
-    least.unwrap_or(all)
+    leanest.unwrap_or(all)
 }
 
 /// The right shift of the force stage for a subarray normalised by `normalise` and rescaled by `rescale`: the μ word's

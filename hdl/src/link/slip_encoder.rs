@@ -62,6 +62,11 @@ impl SlipEncoder {
             false => self.content_valid.val(),
         }
     }
+
+    /// The wire takes the last of what stands.
+    fn takes(&self, special: bool) -> bool {
+        self.stands() && self.ready.val() && (!special || self._second)
+    }
 }
 
 impl Logic for SlipEncoder {
@@ -71,7 +76,7 @@ impl Logic for SlipEncoder {
         let special = after.is_some();
         if self.clk.pos_edge() {
             let goes = self.stands() && self.ready.val();
-            let taken = goes && (!special || self._second);
+            let taken = self.takes(special);
             self._second = !self.rst.val() && (self._second ^ (goes && special));
             self._seen = !self.rst.val() && self.content_valid.val() && !taken && !self._gone;
             self._gone = !self.rst.val() && taken;
@@ -86,7 +91,7 @@ impl Logic for SlipEncoder {
         self.valid.next = self.stands();
         self.content_ready.next = match self._registered {
             true => self._gone,
-            false => self.stands() && self.ready.val() && (!special || self._second),
+            false => self.takes(special),
         };
     }
 

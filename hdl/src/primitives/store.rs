@@ -214,56 +214,39 @@ end
                     all_end = all - 1,
                     depth_end = depth - 1,
                 );
-                let (asks, data) = match self._apart {
-                    true => ("write".to_string(), format!("write_data[{low} +: {all}]")),
-                    false => (
-                        format!("fill ? fill_index == {index_bits}'d{k} : write"),
-                        format!("fill ? {{{filled}}} : write_data[{low} +: {all}]"),
-                    ),
-                };
-                let (start, read) = match self._apart {
-                    true => (
-                        format!(
+                let fills = format!("fill_index == {index_bits}'d{k}");
+                let whole = format!("write_data[{low} +: {all}]");
+                let (asks, data, start, read) = match self._apart {
+                    true => {
+                        let fill = [&format!("fill && {fills}"), "fill_address", &format!("{{{filled}}}")];
+                        let start = format!(
                             "\
 reg [{end}:0] start{k} [0:{last}];
-reg [{end}:0] fill_data{k}, read_start{k};
-reg fill{k};
-reg [{fill_end}:0] fill_to{k};
-(* keep *) always @(posedge clk) begin
-  fill{k} <= fill && fill_index == {index_bits}'d{k};
-  fill_to{k} <= fill_address;
-end
-always @(posedge clk) begin
-  fill_data{k} <= {{{filled}}};
-  if (fill{k}) start{k}[fill_to{k}] <= fill_data{k};
-  read_start{k} <= start{k}[read_address];
-end
+reg [{end}:0] read_start{k};
+{port}always @(posedge clk) read_start{k} <= start{k}[read_address];
 ",
                             end = all - 1,
                             last = self._quads - 1,
-                            fill_end = self.fill_address.width() - 1,
-                        ),
-                        format!("from_start ? read_start{k} : read{k}"),
+                            port = write_port(&format!("start{k}"), fill, [self.fill_address.width(), all]),
+                        );
+                        ("write".to_string(), whole, start, format!("from_start ? read_start{k} : read{k}"))
+                    }
+                    false => (
+                        format!("fill ? {fills} : write"),
+                        format!("fill ? {{{filled}}} : {whole}"),
+                        String::new(),
+                        format!("read{k}"),
                     ),
-                    false => (String::new(), format!("read{k}")),
                 };
+                let port = write_port(&format!("memory{k}"), [&asks, "write_to", &data], [address_bits, all]);
                 format!(
                     "\
-{declare}{start}reg write{k};
-reg [{place_end}:0] to{k};
-reg [{end}:0] data{k}, read{k};
-(* keep *) always @(posedge clk) begin
-  write{k} <= {asks};
-  to{k} <= write_to;
-end
+{declare}{start}{port}reg [{end}:0] read{k};
 always @(posedge clk) begin
-  data{k} <= {data};
-  if (write{k}) memory{k}[to{k}] <= data{k};
   read{k} <= memory{k}[from{k}];
   read_data[{low} +: {all}] <= {read};
 end
 ",
-                    place_end = address_bits - 1,
                     end = all - 1,
                 )
             })
@@ -279,4 +262,25 @@ end
 {from_start}{memories}",
         ))
     }
+}
+
+/// A port that writes `data` at `to` of `memory` a cycle after `asks`, from registers of its own; widths of `to` and `data`.
+fn write_port(memory: &str, [asks, to, data]: [&str; 3], [to_bits, data_bits]: [usize; 2]) -> String {
+    format!(
+        "\
+reg {memory}_writes;
+reg [{to_end}:0] {memory}_to;
+reg [{data_end}:0] {memory}_data;
+(* keep *) always @(posedge clk) begin
+  {memory}_writes <= {asks};
+  {memory}_to <= {to};
+end
+always @(posedge clk) begin
+  {memory}_data <= {data};
+  if ({memory}_writes) {memory}[{memory}_to] <= {memory}_data;
+end
+",
+        to_end = to_bits - 1,
+        data_end = data_bits - 1,
+    )
 }
