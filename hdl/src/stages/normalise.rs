@@ -6,7 +6,8 @@ use rust_hdl::prelude::*;
 use crate::primitives::{by_leading_one, count_bits};
 use crate::wire::{Wire, Word};
 
-/// `start` takes the shift from `magnitude`; then one quad per cycle is shifted (`shifted`, one cycle later).
+/// `start` takes the shift from `magnitude`, which stands two cycles later: the first quad comes after that. Then one quad
+/// per cycle is shifted (`shifted`, one cycle later).
 #[derive(LogicBlock)]
 pub struct Normalise {
     /// Clock.
@@ -21,6 +22,8 @@ pub struct Normalise {
     pub shifted: Wire<Out>,
     /// The left shift, held until the next start.
     pub shift: Wire<Out>,
+    _left: u32,
+    _started: bool,
 }
 
 impl Normalise {
@@ -33,6 +36,8 @@ impl Normalise {
             quad: Wire::new(4 * bits),
             shifted: Wire::new(4 * bits),
             shift: Wire::new(count_bits(bits)),
+            _left: 0,
+            _started: false,
         }
     }
 }
@@ -41,10 +46,11 @@ impl Logic for Normalise {
     fn update(&mut self) {
         if self.clk.pos_edge() {
             let bits = self.quad.width() / 4;
-            if self.start.val() {
-                let shift = normalise::shift(self.magnitude.val().number(), bits as u32);
-                self.shift.next = Word::from(u64::from(shift));
+            if self._started {
+                self.shift.next = Word::from(u64::from(self._left));
             }
+            self._left = normalise::shift(self.magnitude.val().number(), bits as u32);
+            self._started = self.start.val();
             let shift = self.shift.val().number();
             let shifted: [i64; 4] = std::array::from_fn(|lane| self.quad.val().signed(lane, bits) << shift);
             self.shifted.next = Word::of_fields(&shifted, bits);
@@ -62,14 +68,17 @@ impl Logic for Normalise {
         let shifts: String = (0..4)
             .map(|lane| format!("  shifted[{lane} * {bits} +: {bits}] <= quad[{lane} * {bits} +: {bits}] << shift;\n"))
             .collect();
-        let left = by_leading_one("magnitude", 0..bits - 1, bits - 2, shift_bits, |bit| bits - 2 - bit);
+        let first = by_leading_one("magnitude", 0..bits - 1, bits - 2, shift_bits, |bit| bits - 2 - bit);
         Verilog::Custom(format!(
             "\
 // Zeros stay zero, whatever the shift: as if the first place behind them were set.
 wire [{shift_end}:0] none = {{{shift_bits}{{!(|magnitude)}}}} & {shift_bits}'d{most};
-wire [{shift_end}:0] left = {left};
+reg [{shift_end}:0] left;
+reg started;
 always @(posedge clk) begin
-  if (start) shift <= left | none;
+  left <= none | {first};
+  started <= start;
+  if (started) shift <= left;
 {shifts}end",
             shift_end = shift_bits - 1,
             most = bits - 1,

@@ -8,6 +8,10 @@
 //! flip-flops -> both operands    all bits, flip-flops or constant zeros; the flip-flops stay where others use them
 //! product    -> flip-flops       every used bit goes to one flip-flop and nowhere else
 //! ```
+//! Their reset is zero for ever, which the device has no wire for: the zero is a net from a look-up table. One for all
+//! multipliers goes across the device and into every block by a wire that the block's multipliers share, and routing lays
+//! one of its arcs over the other without end. So every multiplier has a look-up table of its own.
+//!
 //! Block RAMs keep theirs outside: which clock and enable their registers have in the 36-bit mode that Yosys chooses is not
 //! documented. That the netlist still computes the same bits is what the replay shows.
 
@@ -15,12 +19,16 @@ use std::collections::{BTreeSet, HashMap};
 
 use serde_json::{json, Map, Value};
 
-/// Operand's bits of a multiplier, of MULT18X18D.
+/// Yosys's cell of an ECP5 multiplier.
+pub const MULTIPLIER: &str = "MULT18X18D";
+/// Operand's bits of a multiplier.
 const OPERAND: usize = 18;
 /// Names of its operands.
 const SIDES: [&str; 2] = ["A", "B"];
 /// Its product's bits.
 const PRODUCT: usize = 36;
+/// The reset of its registers.
+const RESET: &str = "RST0";
 
 /// A net's number in Yosys's JSON.
 type Net = u64;
@@ -57,7 +65,7 @@ pub fn absorb(netlist: &mut Value, top: &str) -> Absorbed {
     let mut design = Design { users, by_output, by_data, gone: BTreeSet::new() };
     let mut absorbed = Absorbed::default();
     for cell in cells.values_mut() {
-        if cell["type"] == "MULT18X18D" {
+        if cell["type"] == MULTIPLIER {
             absorbed.operands += design.operands(cell);
             absorbed.products += usize::from(design.product(cell).is_some());
         }
@@ -68,7 +76,54 @@ pub fn absorb(netlist: &mut Value, top: &str) -> Absorbed {
     let unneeded: BTreeSet<&String> = gone.iter().chain(unread.map(|register| &register.cell)).collect();
     cells.retain(|name, _| !unneeded.contains(name));
     absorbed.flip_flops = before - cells.len();
+    drive_resets(module);
     absorbed
+}
+
+/// A look-up table of zeros for the reset of each multiplier that has registers.
+fn drive_resets(module: &mut Value) {
+    let mut last = last_net(module);
+    let Some(cells) = module["cells"].as_object_mut() else { return };
+    let mut drivers = Vec::new();
+    for (name, cell) in cells.iter_mut().filter(|(_, cell)| cell["connections"][RESET][0] == "0") {
+        if cell["type"] == MULTIPLIER {
+            last += 1;
+            cell["connections"][RESET] = json!([last]);
+            drivers.push((format!("{name}$never"), zero(last)));
+        }
+    }
+    cells.extend(drivers);
+}
+
+/// The greatest number of a net in a module.
+fn last_net(module: &Value) -> Net {
+    let of = |kind: &str| module[kind].as_object().into_iter().flatten().map(|(_, value)| value);
+    let cells =
+        of("cells").flat_map(|cell| cell["connections"].as_object().into_iter().flatten()).map(|(_, nets)| nets);
+    let named = of("ports").chain(of("netnames")).map(|named| &named["bits"]);
+    cells
+        .chain(named)
+        .flat_map(|nets| nets.as_array().into_iter().flatten())
+        .filter_map(Value::as_u64)
+        .max()
+        .unwrap_or(0)
+}
+
+/// A look-up table that drives `net` with zero.
+fn zero(net: Net) -> Value {
+    let mut directions = json!({"Z": "output"});
+    let mut connections = json!({"Z": [net]});
+    for pin in ["A", "B", "C", "D"] {
+        directions[pin] = json!("input");
+        connections[pin] = json!(["0"]);
+    }
+    json!({
+        "type": "LUT4",
+        "parameters": {"INIT": "0".repeat(16)},
+        "attributes": {},
+        "port_directions": directions,
+        "connections": connections,
+    })
 }
 
 /// How many inputs of cells and outputs of the module each net goes to.
@@ -207,10 +262,10 @@ impl Design {
 
 /// Turns a multiplier's register on: of this clock, always enabled and never reset.
 fn turn_on(cell: &mut Value, register: &str, clock: Net) {
-    for (name, value) in [("CLK", "CLK0"), ("CE", "CE0"), ("RST", "RST0")] {
+    for (name, value) in [("CLK", "CLK0"), ("CE", "CE0"), ("RST", RESET)] {
         cell["parameters"][format!("{register}_{name}")] = json!(value);
     }
-    for (pin, net) in [("CLK0", json!(clock)), ("CE0", json!("1")), ("RST0", json!("0"))] {
+    for (pin, net) in [("CLK0", json!(clock)), ("CE0", json!("1")), (RESET, json!("0"))] {
         cell["connections"][pin] = json!([net]);
         cell["port_directions"][pin] = json!("input");
     }
@@ -274,7 +329,18 @@ mod tests {
         assert_eq!(multiplier["connections"]["CLK0"], json!([1]));
         assert_eq!(multiplier["parameters"]["REG_INPUTA_CLK"], "CLK0");
         assert_eq!(multiplier["parameters"]["REG_INPUTB_CLK"], "CLK0");
-        assert_eq!(netlist["modules"]["t"]["cells"].as_object().unwrap().len(), 1);
+    }
+
+    #[test]
+    fn the_reset_has_a_zero_of_its_own() {
+        let mut netlist = netlist("1 ", false);
+        absorb(&mut netlist, "t");
+        let cells = netlist["modules"]["t"]["cells"].as_object().unwrap();
+        assert_eq!(cells.len(), 2);
+        // The greatest number in the netlist is 435.
+        assert_eq!(cells["m"]["connections"]["RST0"], json!([436]));
+        assert_eq!(cells["m$never"]["connections"]["Z"], json!([436]));
+        assert_eq!(cells["m$never"]["parameters"]["INIT"], "0000000000000000");
     }
 
     #[test]

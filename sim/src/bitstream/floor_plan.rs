@@ -13,6 +13,8 @@
 use dermis_golden::board::MultiplierBlocks;
 use serde_json::{json, Value};
 
+use super::absorb::MULTIPLIER;
+
 /// Sites of a block: how far each is from the block's column, which is its number in the block as well.
 const IN_BLOCK: [u32; MultiplierBlocks::SIZE] = [0, 1, 4, 5];
 
@@ -23,7 +25,7 @@ pub fn plan(netlist: &mut Value, top: &str, blocks: &MultiplierBlocks) -> usize 
     let Some(cells) = netlist["modules"][top]["cells"].as_object_mut() else { return 0 };
     let mut lanes: Vec<((u32, u32), &mut Value)> = cells
         .iter_mut()
-        .filter(|(_, cell)| is_multiplier(cell))
+        .filter(|(_, cell)| cell["type"] == MULTIPLIER)
         .filter_map(|(n, cell)| Some((lane(n)?, cell)))
         .collect();
     lanes.sort_unstable_by_key(|(lane, _)| *lane);
@@ -35,10 +37,6 @@ pub fn plan(netlist: &mut Value, top: &str, blocks: &MultiplierBlocks) -> usize 
         cell["attributes"]["BEL"] = json!(site);
     }
     lanes.len()
-}
-
-fn is_multiplier(cell: &Value) -> bool {
-    cell["type"] == "MULT18X18D"
 }
 
 /// Parity and number of the lane that a cell belongs to: what `Lanes` calls `parity[p].lane[k]`.
