@@ -2,7 +2,8 @@
 //!
 //! The leading one is found by halves: is the upper half empty, the lower one takes its place. Whether it was not is a bit of
 //! the leading one's position, and what is left in the end begins with the leading one. Two functions, a register
-//! between them: 64 or 32 bits are too many halves for one cycle.
+//! between them: 64 or 32 bits are too many halves for one cycle. The first asks which nibbles hold anything before it moves
+//! one, so that a question does not wait for the move before it.
 
 use dermis_golden::fixed::formats::{LOG_FRACTION, LOG_TABLE_BITS};
 use dermis_golden::fixed::search::log_table;
@@ -11,15 +12,17 @@ use dermis_golden::fixed::search::log_table;
 pub const LENGTH_BITS: usize = 6;
 /// Bits of a logarithm.
 pub const LOG_BITS: usize = LENGTH_BITS + LOG_FRACTION as usize;
-/// Halves that the second function looks at: of 8, 4 and 2 bits.
-const LAST: [usize; 3] = [4, 2, 1];
-/// Bits that the second function needs: the leading one at any of 8 places, and a slot behind it.
-const REST_BITS: usize = 8 + LOG_TABLE_BITS as usize;
+/// Halves that the second function looks at: of 4 and 2 bits.
+const LAST: [usize; 2] = [2, 1];
+/// Bits of the parts whose emptiness the first function asks for: its last half.
+const NIBBLE: usize = 2 * LAST[0];
+/// Bits that the second function needs: the leading one at any place of a nibble, and a slot behind it.
+const REST_BITS: usize = NIBBLE + LOG_TABLE_BITS as usize;
 
 /// The halves that the first function looks at, for arguments of `bits` bits.
 fn first_halves(bits: usize) -> Vec<usize> {
-    let width = bits.next_power_of_two().max(16);
-    (3..LENGTH_BITS).rev().map(|k| 1 << k).filter(|half| 2 * half <= width).collect()
+    let width = bits.next_power_of_two().max(2 * NIBBLE);
+    (LAST.len()..LENGTH_BITS).rev().map(|k| 1 << k).filter(|half| 2 * half <= width).collect()
 }
 
 /// Bits between the two functions, for arguments of `bits` bits.
@@ -33,14 +36,32 @@ pub fn functions(bits: usize) -> String {
     let halves = first_halves(bits);
     let width = 2 * halves[0];
     let located = located_bits(bits);
-    // One step: remember whether the upper half of `half` bits holds anything; if not, move the lower one up.
-    let step = |name: &str, bit: usize, high: usize, half: usize| {
-        format!("    {name}[{bit}] = |y[{high}:{}];\n    if (!{name}[{bit}]) y = y << {half};\n", high + 1 - half)
-    };
-    let head: String =
-        halves.iter().enumerate().map(|(k, &half)| step("locate", located - 1 - k, width - 1, half)).collect();
-    let tail: String =
-        LAST.iter().enumerate().map(|(k, &half)| step("place", LAST.len() - 1 - k, REST_BITS - 1, half)).collect();
+    let nibbles = width / NIBBLE;
+    let used: String =
+        (0..nibbles).map(|n| format!("    used[{n}] = |y[{}:{}];\n", (n + 1) * NIBBLE - 1, n * NIBBLE)).collect();
+    // One step: remember whether the upper half holds anything; if not, move the lower one up.
+    let head: String = halves
+        .iter()
+        .enumerate()
+        .map(|(k, &half)| {
+            let (bit, moved) = (located - 1 - k, half / NIBBLE);
+            format!(
+                "    locate[{bit}] = |used[{}:{}];\n    if (!locate[{bit}]) begin\n      used = used << {moved};\n      \
+                 y = y << {half};\n    end\n",
+                nibbles - 1,
+                nibbles - moved,
+            )
+        })
+        .collect();
+    let tail: String = LAST
+        .iter()
+        .enumerate()
+        .map(|(k, &half)| {
+            let bit = LAST.len() - 1 - k;
+            let (high, low) = (REST_BITS - 1, REST_BITS - half);
+            format!("    place[{bit}] = |y[{high}:{low}];\n    if (!place[{bit}]) y = y << {half};\n")
+        })
+        .collect();
     let cases: String = log_table()
         .iter()
         .enumerate()
@@ -59,15 +80,16 @@ pub fn functions(bits: usize) -> String {
 function [{located_end}:0] locate;
   input [{x_end}:0] x;
   reg [{y_end}:0] y;
+  reg [{used_end}:0] used;
   begin
     y = {padded};
-{head}    locate[{rest_end}:0] = y[{y_end}:{y_rest}];
+{used}{head}    locate[{rest_end}:0] = y[{y_end}:{y_rest}];
   end
 endfunction
 function [{log_end}:0] logarithm;
   input [{located_end}:0] located;
   reg [{rest_end}:0] y;
-  reg [2:0] place;
+  reg [{place_end}:0] place;
   reg [{position_end}:0] position;
   begin
     y = located[{rest_end}:0];
@@ -80,6 +102,8 @@ endfunction
         located_end = located - 1,
         x_end = bits - 1,
         y_end = width - 1,
+        used_end = nibbles - 1,
+        place_end = LAST.len() - 1,
         padded = match width - bits {
             0 => "x".to_string(),
             more => format!("{{{more}'d0, x}}"),
