@@ -63,9 +63,14 @@ impl SlipEncoder {
         }
     }
 
+    /// The wire takes a byte.
+    fn goes(&self) -> bool {
+        self.stands() && self.ready.val()
+    }
+
     /// The wire takes the last of what stands.
     fn takes(&self, special: bool) -> bool {
-        self.stands() && self.ready.val() && (!special || self._second)
+        self.goes() && (!special || self._second)
     }
 }
 
@@ -75,9 +80,8 @@ impl Logic for SlipEncoder {
         let after = escape(content).filter(|_| !self.border.val());
         let special = after.is_some();
         if self.clk.pos_edge() {
-            let goes = self.stands() && self.ready.val();
             let taken = self.takes(special);
-            self._second = !self.rst.val() && (self._second ^ (goes && special));
+            self._second = !self.rst.val() && (self._second ^ (self.goes() && special));
             self._seen = !self.rst.val() && self.content_valid.val() && !taken && !self._gone;
             self._gone = !self.rst.val() && taken;
         }
