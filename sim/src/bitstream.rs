@@ -184,7 +184,8 @@ fn place_seed(model: &Model, flow: &Flow, folder: &Path, seed: u32) -> Result<Pl
 
 /// The figures of all seeds; cells of the `best`.
 fn reached(flow: &Flow, placed: &[(u32, Placed)], best: &Placed) -> Baseline {
-    let clocks = || placed.iter().map(|(_, placed)| placed.engine.achieved);
+    // Of an even number of seeds the slower of the two in the middle: the median's larger one, of periods.
+    let periods = || placed.iter().map(|(_, placed)| 1.0 / placed.engine.achieved);
     let rounded = |clock: f64| (clock * 10.0).round() / 10.0;
     Baseline {
         luts: best.count(flow.lut),
@@ -192,8 +193,8 @@ fn reached(flow: &Flow, placed: &[(u32, Placed)], best: &Placed) -> Baseline {
         multipliers: best.count(flow.multiplier),
         block_rams: best.count(flow.block_ram),
         best_MHz: rounded(best.engine.achieved),
-        median_MHz: rounded(median(clocks().collect()).unwrap_or(best.engine.achieved)),
-        worst_MHz: rounded(clocks().fold(best.engine.achieved, f64::min)),
+        median_MHz: rounded(median(periods().collect()).map_or(best.engine.achieved, |period| 1.0 / period)),
+        worst_MHz: rounded(1.0 / periods().fold(0.0, f64::max)),
         seeds: placed.len() as u32,
     }
 }
@@ -213,6 +214,22 @@ fn baselines(update: bool, board: &Board, scene: &Scene, reached: &Baseline) -> 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::collections::BTreeMap;
+
+    fn placed(achieved: f64) -> Placed {
+        Placed { engine: Fmax { achieved, constraint: 100.0 }, link: None, cells: BTreeMap::new() }
+    }
+
+    #[test]
+    fn the_median_of_two_seeds_is_the_slower_one() {
+        let seeds = [(1, placed(94.52)), (2, placed(107.2)), (3, placed(101.0))];
+        let clocks = |seeds: &[(u32, Placed)]| {
+            let reached = reached(&flow(dermis_golden::board::Family::Ecp5), seeds, &seeds[1].1);
+            [reached.best_MHz, reached.median_MHz, reached.worst_MHz]
+        };
+        assert_eq!(clocks(&seeds), [107.2, 101.0, 94.5]);
+        assert_eq!(clocks(&seeds[..2]), [107.2, 94.5, 94.5]);
+    }
 
     #[test]
     fn a_clock_that_place_and_route_was_not_told_is_named() {
@@ -220,7 +237,7 @@ mod tests {
         let told = |engine: f64, link: f64| {
             let clock = |constraint| Fmax { achieved: 99.0, constraint };
             let link = Some(("spi_sclk", clock(link)));
-            let placed = Placed { engine: clock(engine), link, cells: std::collections::BTreeMap::new() };
+            let placed = Placed { engine: clock(engine), link, cells: BTreeMap::new() };
             check_constraints(&board, &placed).map_err(|error| error.to_string())
         };
         assert_eq!(told(25.505, 25.0), Ok(()));

@@ -85,12 +85,11 @@ fn drive_resets(module: &mut Value) {
     let mut last = last_net(module);
     let Some(cells) = module["cells"].as_object_mut() else { return };
     let mut drivers = Vec::new();
-    for (name, cell) in cells.iter_mut().filter(|(_, cell)| cell["connections"][RESET][0] == "0") {
-        if cell["type"] == MULTIPLIER {
-            last += 1;
-            cell["connections"][RESET] = json!([last]);
-            drivers.push((format!("{name}$never"), zero(last)));
-        }
+    let registered = |cell: &Value| cell["type"] == MULTIPLIER && cell["connections"][RESET][0] == "0";
+    for (name, cell) in cells.iter_mut().filter(|(_, cell)| registered(cell)) {
+        last += 1;
+        cell["connections"][RESET] = json!([last]);
+        drivers.push((format!("{name}$never"), zero(last)));
     }
     cells.extend(drivers);
 }
