@@ -39,29 +39,21 @@ pub fn functions(bits: usize) -> String {
     let nibbles = width / NIBBLE;
     let used: String =
         (0..nibbles).map(|n| format!("    used[{n}] = |y[{}:{}];\n", (n + 1) * NIBBLE - 1, n * NIBBLE)).collect();
-    // One step: remember whether the upper half holds anything; if not, move the lower one up.
-    let head: String = halves
+    // One step: remember whether the upper `half` of `bits` bits of `asked` holds anything; if not, move the lower one up.
+    let step = |name: &str, bit: usize, asked: &str, bits: usize, half: usize, moves: String| {
+        let (high, low) = (bits - 1, bits - half);
+        format!("    {name}[{bit}] = |{asked}[{high}:{low}];\n    if (!{name}[{bit}]) {moves}\n")
+    };
+    let head = halves.iter().enumerate().map(|(k, &half)| {
+        let moved = half / NIBBLE;
+        let moves = format!("begin\n      used = used << {moved};\n      y = y << {half};\n    end");
+        step("locate", located - 1 - k, "used", nibbles, moved, moves)
+    });
+    let tail = LAST
         .iter()
         .enumerate()
-        .map(|(k, &half)| {
-            let (bit, moved) = (located - 1 - k, half / NIBBLE);
-            format!(
-                "    locate[{bit}] = |used[{}:{}];\n    if (!locate[{bit}]) begin\n      used = used << {moved};\n      \
-                 y = y << {half};\n    end\n",
-                nibbles - 1,
-                nibbles - moved,
-            )
-        })
-        .collect();
-    let tail: String = LAST
-        .iter()
-        .enumerate()
-        .map(|(k, &half)| {
-            let bit = LAST.len() - 1 - k;
-            let (high, low) = (REST_BITS - 1, REST_BITS - half);
-            format!("    place[{bit}] = |y[{high}:{low}];\n    if (!place[{bit}]) y = y << {half};\n")
-        })
-        .collect();
+        .map(|(k, &half)| step("place", LAST.len() - 1 - k, "y", REST_BITS, half, format!("y = y << {half};")));
+    let (head, tail): (String, String) = (head.collect(), tail.collect());
     let cases: String = log_table()
         .iter()
         .enumerate()
