@@ -66,17 +66,24 @@ pub fn unroll(model: &Model) -> Vec<Step> {
     steps
 }
 
-/// Step and position in its columns in; addresses and control out, one cycle later, or three where a list of columns is read.
+/// Position in a step's columns in; addresses and control out, one cycle later, or three where a list of columns is read.
 ///
-/// `ready` (the step's operand is finished) and `last` (its last column) are combinational.
+/// `start` begins with the first step of case `which`, `advance` goes on to the next one, both at the clock edge. `ready` (the
+/// step's operand is finished), `last` (its last column) and `ends` (it is the case's last step, before its first one) are
+/// combinational.
+///
+/// The step's word stands in a register. The memory is asked for the word after it all the time: whether it is taken is known
+/// late in a cycle.
 #[derive(LogicBlock)]
 pub struct Steps {
     /// Clock.
     pub clk: Signal<In, Clock>,
     /// Which case.
     pub which: Wire<In>,
-    /// Index of the step.
-    pub step: Wire<In>,
+    /// The first step is next.
+    pub start: Signal<In, Bit>,
+    /// The step after this one is next.
+    pub advance: Signal<In, Bit>,
     /// Position in the step's columns.
     pub column: Wire<In>,
     /// Finished vectors of this subarray.
@@ -85,6 +92,8 @@ pub struct Steps {
     pub ready: Signal<Out, Bit>,
     /// The position is the step's last.
     pub last: Signal<Out, Bit>,
+    /// The step is the case's last.
+    pub ends: Signal<Out, Bit>,
     /// Address in the coefficient memory.
     pub coefficient_address: Wire<Out>,
     /// Address in the operand memories.
@@ -98,6 +107,7 @@ pub struct Steps {
     _list: Vec<[usize; 2]>,
     /// Some step reads its operand transposed.
     _across: bool,
+    _step: usize,
     _pipe: Vec<(Step, usize)>,
 }
 
@@ -125,25 +135,23 @@ impl Steps {
         Steps {
             clk: Default::default(),
             which: Wire::new(count_bits(cases.len())),
-            step: Wire::new(count_bits(steps.iter().map(Vec::len).max().unwrap_or(1))),
+            start: Default::default(),
+            advance: Default::default(),
             column: Wire::new(count_bits(formats.quads)),
             finished: Wire::new(count_bits(vectors + 1)),
             ready: Default::default(),
             last: Default::default(),
+            ends: Default::default(),
             coefficient_address: Wire::new(count_bits(words)),
             operand_address: Wire::new(count_bits(vectors.max(1) * formats.quads)),
             source: Wire::new(SOURCE_BITS),
             control: Wire::new(control_bits(model)),
+            _step: 0,
             _pipe: Vec::new(),
             _list: list,
             _across: formats.shared_a,
             _steps: steps,
         }
-    }
-
-    /// Number of steps of each case.
-    pub fn counts(&self) -> Vec<usize> {
-        self._steps.iter().map(Vec::len).collect()
     }
 
     /// Cycles from step and position to the addresses.
@@ -165,6 +173,15 @@ impl Steps {
         (!self._list.is_empty()).then(|| self._list.iter().map(word).collect())
     }
 
+    /// Those of the case; of the first one while the index is of none.
+    fn steps(&self) -> &[Step] {
+        self._steps.get(self.which.val().number() as usize).unwrap_or(&self._steps[0])
+    }
+
+    fn now(&self) -> Step {
+        self.steps()[self._step.min(self.steps().len() - 1)]
+    }
+
     fn put(&mut self, step: &Step, column: usize) {
         let address = step.coefficients + column;
         let quad = match self._list.get(address) {
@@ -184,23 +201,29 @@ impl Steps {
 
 impl Logic for Steps {
     fn update(&mut self) {
-        let case = self._steps.get(self.which.val().number() as usize);
-        let Some(step) = case.and_then(|steps| steps.get(self.step.val().number() as usize)).copied() else { return };
         let column = self.column.val().number() as usize;
-        self.ready.next = self.finished.val().number() as usize >= step.needs;
-        self.last.next = column + 1 == step.columns;
         if self.clk.pos_edge() {
-            self._pipe.push((step, column));
+            self._pipe.push((self.now(), column));
             if self._pipe.len() == self.latency() {
                 let (step, column) = self._pipe.remove(0);
                 self.put(&step, column);
             }
+            self._step = match (self.start.val(), self.advance.val()) {
+                (true, _) => 0,
+                (false, true) => (self._step + 1) % self.steps().len(),
+                (false, false) => self._step,
+            };
         }
+        let step = self.now();
+        self.ready.next = self.finished.val().number() as usize >= step.needs;
+        self.last.next = column + 1 == step.columns;
+        self.ends.next = self._step + 1 == self.steps().len();
     }
 
     fn connect(&mut self) {
         self.ready.connect();
         self.last.connect();
+        self.ends.connect();
         self.coefficient_address.connect();
         self.operand_address.connect();
         self.source.connect();
@@ -208,29 +231,32 @@ impl Logic for Steps {
     }
 
     fn hdl(&self) -> Verilog {
-        let step_bits = self.step.width();
+        let step_bits = count_bits(self._steps.iter().map(Vec::len).max().unwrap_or(1));
         let column_bits = self.column.width();
         let needs_bits = self.finished.width();
         let control = self.control.width();
         let (c_bits, o_bits) = (self.coefficient_address.width(), self.operand_address.width());
+        let word_bits = c_bits + o_bits + needs_bits + column_bits + 9;
         let bit = |b: bool| u8::from(b);
         // The case in front of the step, where there are several.
         let (selector, selector_bits) = match self._steps.len() {
-            1 => ("step", step_bits),
-            _ => ("{which, step}", self.which.width() + step_bits),
+            1 => ("asked", step_bits),
+            _ => ("{which, asked}", self.which.width() + step_bits),
         };
         let indexed = self._steps.iter().enumerate().flat_map(|(case, steps)| {
-            steps.iter().enumerate().map(move |(index, step)| (case << step_bits | index, step))
+            let ends = move |index| index + 1 == steps.len();
+            steps.iter().enumerate().map(move |(index, step)| (case << step_bits | index, step, ends(index)))
         });
         let cases: String = indexed
-            .map(|(index, s)| {
+            .map(|(index, s, ends)| {
                 format!(
-                    "    {selector_bits}'d{index}: begin c_base = {c_bits}'d{}; o_base = {o_bits}'d{}; needs = {needs_bits}'d{}; \
-                     final_column = {column_bits}'d{}; fixed = 8'b{}{:02b}{:02b}{}{}{}; end\n",
+                    "    {selector_bits}'d{index}: word = {{{c_bits}'d{}, {o_bits}'d{}, {needs_bits}'d{}, {column_bits}'d{}, \
+                     9'b{}{}{:02b}{:02b}{}{}{}}};\n",
                     s.coefficients,
                     s.operand,
                     s.needs,
                     s.columns - 1,
+                    bit(ends),
                     bit(s.transposed),
                     s.flip,
                     s.kind,
@@ -244,24 +270,32 @@ impl Logic for Steps {
         let declare = format!(
             "\
 wire unused_which = &{{1'b0, which}};
+reg [{step_end}:0] step;
 reg [{c_end}:0] c_base;
 reg [{o_end}:0] o_base;
 reg [{n_end}:0] needs;
 reg [{column_end}:0] final_column;
 reg [7:0] fixed;  // transposed, flip, kind, last, first, align
+wire [{step_end}:0] asked = start || ends ? {step_bits}'d0 : step + {step_bits}'d1;
+reg [{word_end}:0] word;
 always @(*) begin
   // A few words that change with the scene: no block RAM.
   (* rom_style = \"logic\" *)
   case ({selector})
-{cases}    default: begin
-      c_base = {c_bits}'d0; o_base = {o_bits}'d0; needs = {needs_bits}'d0; final_column = {column_bits}'d0; fixed = 8'd0;
-    end
+{cases}    default: word = {word_bits}'d0;
   endcase
 end
+always @(posedge clk)
+  if (start || advance) begin
+    step <= asked;
+    {{c_base, o_base, needs, final_column, ends, fixed}} <= word;
+  end
 always @(*) ready = finished >= needs;
 always @(*) last = column == final_column;
 wire [{control_end}:0] flags = {{{opens}fixed[2] && last, fixed[1] && column == {column_bits}'d0, fixed[0]}};
 ",
+            step_end = step_bits - 1,
+            word_end = word_bits - 1,
             c_end = c_bits - 1,
             o_end = o_bits - 1,
             n_end = needs_bits - 1,

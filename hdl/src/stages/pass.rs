@@ -9,8 +9,7 @@ use dermis_golden::fixed::Model;
 use rust_hdl::prelude::*;
 
 use crate::primitives::{
-    control_bits, count_bits, BitDelay, CaseCounter, Counter, Delay, Filler, Lanes, OperandSelect, Ram, Slice, Steps,
-    SOURCE_BITS,
+    control_bits, count_bits, BitDelay, Counter, Delay, Filler, Lanes, OperandSelect, Ram, Slice, Steps, SOURCE_BITS,
 };
 use crate::wire::Wire;
 
@@ -39,7 +38,6 @@ pub struct Pass {
     pub quad_valid: Signal<Out, Bit>,
     /// The last subarray's coefficients were not what they must be; settled with its last row.
     pub damaged: Wire<Out>,
-    step: CaseCounter,
     column: Counter,
     running: DFF<Bit>,
     /// The schedule.
@@ -80,7 +78,6 @@ impl Pass {
             quad: Wire::new(4 * formats.acc_bits as usize),
             quad_valid: Default::default(),
             damaged: Wire::new(1),
-            step: CaseCounter::new(&steps.counts()),
             column: Counter::new(quads),
             running: Default::default(),
             low_address: Slice::new(steps.operand_address.width(), count_bits(quads)),
@@ -102,7 +99,6 @@ impl Pass {
 impl Logic for Pass {
     #[hdl_gen]
     fn update(&mut self) {
-        self.step.clk.next = self.clk.val();
         self.column.clk.next = self.clk.val();
         self.running.clock.next = self.clk.val();
         self.steps.clk.next = self.clk.val();
@@ -117,20 +113,18 @@ impl Logic for Pass {
         self.valid.rst.next = self.rst.val();
         self.lanes.rst.next = self.rst.val();
 
-        self.step.which.next = self.which.val();
         self.steps.which.next = self.which.val();
         self.filler.which.next = self.which.val();
         self.lanes.which.next = self.which.val();
         self.issue.next = self.running.q.val() & self.steps.ready.val();
         self.column_end.next = self.issue.val() & self.steps.last.val();
         self.running.d.next = (self.start.val()
-            | (self.running.q.val() & !(self.column_end.val() & self.step.last.val())))
+            | (self.running.q.val() & !(self.column_end.val() & self.steps.ends.val())))
             & !self.rst.val();
         self.column.clear.next = self.start.val() | self.column_end.val();
         self.column.enable.next = self.issue.val();
-        self.step.clear.next = self.start.val();
-        self.step.enable.next = self.column_end.val();
-        self.steps.step.next = self.step.value.val();
+        self.steps.start.next = self.start.val();
+        self.steps.advance.next = self.column_end.val();
         self.steps.column.next = self.column.value.val();
         self.steps.finished.next = self.filler.finished.val();
 
