@@ -5,7 +5,7 @@ use std::process::Command;
 
 use dermis_hdl::Generated;
 
-/// A property, what it is asked of, and a defect that breaks it.
+/// A property, what it is asked of, and defects that break it.
 pub struct Proof<'a> {
     /// The Verilog.
     pub generated: &'a Generated,
@@ -13,8 +13,8 @@ pub struct Proof<'a> {
     pub property: &'a str,
     /// Placeholders of the property file and what stands for them.
     pub given: Vec<(&'a str, String)>,
-    /// Text in the Verilog, and the text that takes its place.
-    pub defect: (&'a str, &'a str),
+    /// Each a text in the Verilog, and the text that takes its place.
+    pub defects: &'a [(&'a str, &'a str)],
     /// Products may be anything: no property is about them.
     pub open_products: bool,
 }
@@ -48,13 +48,8 @@ fn proved(folder: &Path, top: &str, open_products: bool) -> bool {
 }
 
 impl Proof<'_> {
-    /// Proves the property, then refutes it of the design with the defect.
+    /// Proves the property, then refutes it of the design with each of the defects.
     pub fn run(&self) {
-        self.fails_with(&[self.defect]);
-    }
-
-    /// The same with several defects, one at a time.
-    pub fn fails_with(&self, defects: &[(&str, &str)]) {
         let folder = tempfile::tempdir().unwrap();
         let Generated { top, files, .. } = self.generated;
         files.iter().for_each(|file| std::fs::write(folder.path().join(&file.name), &file.text).unwrap());
@@ -68,7 +63,7 @@ impl Proof<'_> {
 
         let verilog = folder.path().join(format!("{top}.v"));
         let sound = std::fs::read_to_string(&verilog).unwrap();
-        for (from, to) in defects {
+        for (from, to) in self.defects {
             assert!(sound.contains(from), "nothing to break: {from}");
             std::fs::write(&verilog, sound.replace(from, to)).unwrap();
             let noticed = !proved(folder.path(), top, self.open_products);
