@@ -284,3 +284,49 @@ end
         data_end = data_bits - 1,
     )
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const BITS: usize = 5;
+
+    fn store() -> Store {
+        let mut store = Store::new(PolynomialWord { lanes: 4, widths: vec![BITS] }, 3, BITS, false);
+        store.connect_all();
+        store
+    }
+
+    fn clock(store: &mut Store) {
+        for level in [false, true] {
+            store.clk.next = level.into();
+            while {
+                store.update_all();
+                store.has_changed()
+            } {}
+        }
+    }
+
+    /// Writes `data` into quad 1 of buffer 0 and reads the quad `at`, `late` cycles after the write is asked for.
+    fn read(store: &mut Store, data: u64, at: u64, late: usize) -> u64 {
+        store.write_data.next = Word::from(data);
+        store.write_address.next = Word::from(1);
+        for cycle in 0..late + LATENCY {
+            store.write.next = cycle == 0;
+            // Far from the write, but in the cycle that is asked about.
+            store.read_address.next = Word::from(if cycle == late { at } else { 2 });
+            clock(store);
+        }
+        store.read_data.val().field(0, 4 * BITS)
+    }
+
+    #[test]
+    fn what_is_read_where_and_when_it_is_written_is_the_complement() {
+        let mut store = store();
+        assert_eq!(read(&mut store, 0x12345, 1, 2), 0x12345);
+        // The write lands a cycle after it is asked for.
+        assert_eq!(read(&mut store, 0xabcde, 1, 1), !0x12345 & 0xfffff);
+        assert_eq!(read(&mut store, 0x00001, 1, 0), 0xabcde);
+        assert_eq!(read(&mut store, 0x00002, 0, 1), 0);
+    }
+}
