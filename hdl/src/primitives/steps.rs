@@ -69,7 +69,7 @@ pub fn unroll(model: &Model) -> Vec<Step> {
 /// Position in a step's columns in; addresses and control out, one cycle later, or three where a list of columns is read.
 ///
 /// `start` begins with the first step of case `which`, `advance` goes on to the next one, both at the clock edge. `ready` (the
-/// step's operand is finished), `last` (its last column) and `ends` (it is the case's last step, before its first one) are
+/// step's operand is finished), `last` (its last column) and `ends` (the case's last step; its first one follows) are
 /// combinational.
 ///
 /// The step's word stands in a register. The memory is asked for the word after it all the time: whether it is taken is known
