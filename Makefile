@@ -75,7 +75,7 @@ build: program ## generate the hardware of SCENE
 cosim: program ## co-simulate SCENE on its shipped frames
 	$(DERMIS) --build-dir $(BUILD) cosim $(SCENE)
 
-bitstream: program tools ## make the bitstream of SCENE for BOARD or its own one (minutes to an hour)
+bitstream: program tools ## make the bitstream of SCENE for BOARD or its own one (minutes to hours)
 	PATH="$(abspath $(TOOLS))/bin:$$PATH" $(DERMIS) --build-dir $(BUILD) bitstream $(SCENE) $(if $(BOARD),--board $(BOARD))
 
 report: program ## measure and draw: build/report/report.html and paper.html; QUICK=1 in two minutes

@@ -57,7 +57,7 @@ pub struct Arguments {
     /// Tries at a time; each takes a core and about a gigabyte.
     #[arg(long, default_value_t = 2, value_parser = clap::value_parser!(u32).range(1..))]
     jobs: u32,
-    /// Write what was reached into constraints/baselines.json in place of comparing with it.
+    /// Write what was reached into constraints/baselines.json in place of comparing with it, if the clock is met.
     #[arg(long)]
     update_baselines: bool,
     /// Print the result as JSON and nothing else.
@@ -100,7 +100,7 @@ pub fn run(arguments: &Arguments, build_dir: &Path) -> Result<(String, bool)> {
         let of = |(name, clock): (&str, Fmax)| format!("{name} {:.1} MHz of {} MHz", clock.achieved, clock.constraint);
         lost.extend(best.clocks().filter(|(_, clock)| !clock.is_met()).map(of));
     }
-    lost.extend(baselines(arguments.update_baselines, board, &scene, &reached)?);
+    lost.extend(baselines(arguments.update_baselines && best.is_met(), board, &scene, &reached)?);
     let bitstream = best.is_met().then(|| folder.join(product));
     let implemented = Implemented::new(&model, reached, absorbed, best.link, bitstream, lost);
     let good = implemented.is_good();

@@ -1,6 +1,8 @@
 //! A small scene from its file to the bitstream, by the tools, and no worse than its committed line. Large ones take minutes to
 //! hours: `make bitstream`.
 
+use std::fs;
+use std::os::unix::fs::PermissionsExt;
 use std::path::Path;
 use std::process::Command;
 
@@ -23,7 +25,7 @@ fn becomes_a_bitstream_no_worse_than_its_baseline(name: &str) {
     assert!(output.status.success(), "{texts:?}");
     assert_eq!(texts[0].contains("spi_sclk: "), name.ends_with("spi"), "{texts:?}");
     assert!(Baselines::committed().get("icebreaker", name).is_some(), "constraints/baselines.json");
-    let bitstream = std::fs::read(build.path().join(format!("{name}/icebreaker/{name}.bin"))).unwrap();
+    let bitstream = fs::read(build.path().join(format!("{name}/icebreaker/{name}.bin"))).unwrap();
     assert!(bitstream.windows(PREAMBLE.len()).any(|window| window == PREAMBLE));
 }
 
@@ -35,4 +37,39 @@ fn a_small_scene_behind_a_uart() {
 #[test]
 fn a_small_scene_behind_an_spi() {
     becomes_a_bitstream_no_worse_than_its_baseline("tiny-spi");
+}
+
+/// A router that reaches half of the clock.
+const SLOW: &str = r#"#!/bin/sh
+[ "$1" = --version ] && echo 'nextpnr 0.0' && exit
+while [ $# -gt 0 ]; do
+  [ "$1" = --report ] && report=$2
+  shift
+done
+echo '{"fmax": {"clk": {"achieved": 12.75, "constraint": 25.5}}, "utilization": {}}' > "$report"
+"#;
+
+#[test]
+fn a_missed_clock_fails_and_leaves_neither_bitstream_nor_baseline() {
+    let folder = tempfile::tempdir().unwrap();
+    let (tools, baselines) = (folder.path().join("tools"), folder.path().join("constraints"));
+    [&tools, &baselines].into_iter().for_each(|folder| fs::create_dir(folder).unwrap());
+    let router = tools.join("nextpnr-ice40");
+    fs::write(&router, SLOW).unwrap();
+    fs::set_permissions(&router, fs::Permissions::from_mode(0o755)).unwrap();
+    let path = std::env::join_paths([tools].into_iter().chain(std::env::split_paths(&std::env::var("PATH").unwrap())));
+    let output = Command::new(env!("CARGO_BIN_EXE_dermis"))
+        .current_dir(&folder)
+        .env("PATH", path.unwrap())
+        .arg("bitstream")
+        .arg(Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/scenes/tiny.toml"))
+        .args(["--seeds", "1", "--update-baselines"])
+        .output()
+        .unwrap();
+    let texts = [output.stdout, output.stderr].map(|text| String::from_utf8(text).unwrap());
+    assert_eq!(output.status.code(), Some(1), "{texts:?}");
+    assert!(texts[0].contains("clk 12.8 MHz of 25.5 MHz"), "{texts:?}");
+    assert!(folder.path().join("build/tiny/icebreaker/seed1.report.json").exists());
+    assert!(!folder.path().join("build/tiny/icebreaker/tiny.bin").exists());
+    assert_eq!(fs::read_dir(baselines).unwrap().count(), 0);
 }

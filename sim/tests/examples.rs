@@ -31,7 +31,7 @@ const NOT_RUN: [(&str, &str); 21] = [
     ("dermis cosim eight-by-eight --device netlist", "synthesis takes minutes; tests/netlist.rs"),
 ];
 const BOARD: &str = "needs a board on a serial port";
-const PLACED: &str = "place and route takes from minutes to an hour; make bitstream";
+const PLACED: &str = "place and route takes from minutes to hours; make bitstream";
 
 fn program() -> &'static Path {
     Path::new(env!("CARGO_BIN_EXE_dermis"))
