@@ -12,7 +12,15 @@ use crate::wire::Word;
 use crate::{choosing, engine, serial, unsearched};
 
 /// Update rounds after which signals that still change are taken for a combinational loop.
-pub(crate) const SETTLE_ROUNDS: usize = 200;
+const SETTLE_ROUNDS: usize = 200;
+
+/// Updates a block until no signal changes; whether that comes to an end.
+pub(crate) fn settles(block: &mut (impl Block + ?Sized)) -> bool {
+    (0..SETTLE_ROUNDS).any(|_| {
+        block.update_all();
+        !block.has_changed()
+    })
+}
 
 /// What every engine does in a simulation and in generation, whatever its stages.
 pub(crate) trait Design: Block {
@@ -157,11 +165,7 @@ pub fn simulator(model: &Model) -> Result<Box<dyn Device>, HdlError> {
 impl Simulator {
     fn settle(&mut self, inputs: &Inputs, clock: bool) {
         self.engine.drive(inputs, clock);
-        let settled = (0..SETTLE_ROUNDS).any(|_| {
-            self.engine.update_all();
-            !self.engine.has_changed()
-        });
-        assert!(settled, "the engine has a combinational loop: a defect of this crate");
+        assert!(settles(&mut *self.engine), "the engine has a combinational loop: a defect of this crate");
     }
 }
 

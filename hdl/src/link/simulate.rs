@@ -7,7 +7,7 @@ use rust_hdl::prelude::*;
 
 use super::generate::board_top;
 use crate::generate::HdlError;
-use crate::simulate::SETTLE_ROUNDS;
+use crate::simulate::settles;
 
 /// A board's output pins.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -59,11 +59,7 @@ pub fn board_simulator(model: &Model) -> Result<Box<dyn BoardDevice>, HdlError> 
 impl BoardDevice for Simulator {
     fn settle(&mut self, inputs: u64, clock: bool) -> BoardOutputs {
         self.0.drive(inputs, clock);
-        let settled = (0..SETTLE_ROUNDS).any(|_| {
-            self.0.update_all();
-            !self.0.has_changed()
-        });
-        assert!(settled, "the board has a combinational loop: a defect of this crate");
+        assert!(settles(&mut *self.0), "the board has a combinational loop: a defect of this crate");
         self.0.outputs()
     }
 }

@@ -9,7 +9,7 @@ use super::counter::count_bits;
 use crate::wire::{Wire, Word};
 
 /// One pass over the columns of one group of rows.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Step {
     /// First word in the coefficient memory.
     pub coefficients: usize,
@@ -31,6 +31,8 @@ pub struct Step {
     pub last: bool,
     /// Begins a subarray.
     pub opens: bool,
+    /// Ends it.
+    pub ends: bool,
     /// Vectors that must be finished before.
     pub needs: usize,
 }
@@ -58,10 +60,14 @@ pub fn unroll(model: &Model) -> Vec<Step> {
                     first: index == 0,
                     last: index + 1 == products.len(),
                     opens: steps.is_empty(),
+                    ends: false,
                     needs,
                 });
             }
         }
+    }
+    if let Some(step) = steps.last_mut() {
+        step.ends = true;
     }
     steps
 }
@@ -107,7 +113,8 @@ pub struct Steps {
     _list: Vec<[usize; 2]>,
     /// Some step reads its operand transposed.
     _across: bool,
-    _step: usize,
+    /// The step whose word stands in the register, and its index in the case.
+    _now: (Step, usize),
     _pipe: Vec<(Step, usize)>,
 }
 
@@ -146,7 +153,7 @@ impl Steps {
             operand_address: Wire::new(count_bits(vectors.max(1) * formats.quads)),
             source: Wire::new(SOURCE_BITS),
             control: Wire::new(control_bits(model)),
-            _step: 0,
+            _now: Default::default(),
             _pipe: Vec::new(),
             _list: list,
             _across: formats.shared_a,
@@ -173,15 +180,6 @@ impl Steps {
         (!self._list.is_empty()).then(|| self._list.iter().map(word).collect())
     }
 
-    /// Those of the case; of the first one while the index is of none.
-    fn steps(&self) -> &[Step] {
-        self._steps.get(self.which.val().number() as usize).unwrap_or(&self._steps[0])
-    }
-
-    fn now(&self) -> Step {
-        self.steps()[self._step.min(self.steps().len() - 1)]
-    }
-
     fn put(&mut self, step: &Step, column: usize) {
         let address = step.coefficients + column;
         let quad = match self._list.get(address) {
@@ -203,21 +201,23 @@ impl Logic for Steps {
     fn update(&mut self) {
         let column = self.column.val().number() as usize;
         if self.clk.pos_edge() {
-            self._pipe.push((self.now(), column));
+            let (step, index) = self._now;
+            self._pipe.push((step, column));
             if self._pipe.len() == self.latency() {
                 let (step, column) = self._pipe.remove(0);
                 self.put(&step, column);
             }
-            self._step = match (self.start.val(), self.advance.val()) {
-                (true, _) => 0,
-                (false, true) => (self._step + 1) % self.steps().len(),
-                (false, false) => self._step,
-            };
+            if self.start.val() || self.advance.val() {
+                let asked = if self.start.val() || step.ends { 0 } else { index + 1 };
+                let case = self._steps.get(self.which.val().number() as usize);
+                let word = case.and_then(|steps| steps.get(asked)).copied().unwrap_or_default();
+                self._now = (word, asked);
+            }
         }
-        let step = self.now();
+        let (step, _) = self._now;
         self.ready.next = self.finished.val().number() as usize >= step.needs;
         self.last.next = column + 1 == step.columns;
-        self.ends.next = self._step + 1 == self.steps().len();
+        self.ends.next = step.ends;
     }
 
     fn connect(&mut self) {
@@ -244,11 +244,10 @@ impl Logic for Steps {
             _ => ("{which, asked}", self.which.width() + step_bits),
         };
         let indexed = self._steps.iter().enumerate().flat_map(|(case, steps)| {
-            let ends = move |index| index + 1 == steps.len();
-            steps.iter().enumerate().map(move |(index, step)| (case << step_bits | index, step, ends(index)))
+            steps.iter().enumerate().map(move |(index, step)| (case << step_bits | index, step))
         });
         let cases: String = indexed
-            .map(|(index, s, ends)| {
+            .map(|(index, s)| {
                 format!(
                     "    {selector_bits}'d{index}: word = {{{c_bits}'d{}, {o_bits}'d{}, {needs_bits}'d{}, {column_bits}'d{}, \
                      9'b{}{}{:02b}{:02b}{}{}{}}};\n",
@@ -256,7 +255,7 @@ impl Logic for Steps {
                     s.operand,
                     s.needs,
                     s.columns - 1,
-                    bit(ends),
+                    bit(s.ends),
                     bit(s.transposed),
                     s.flip,
                     s.kind,
