@@ -92,16 +92,15 @@ pub fn run(arguments: &Arguments, build_dir: &Path) -> Result<(String, bool)> {
     check_constraints(board, best)?;
     let product = format!("{}.{}", scene.name, flow.bitstream);
     let reached = reached(&flow, &placed, best);
-    let mut lost = Vec::new();
-    if best.is_met() {
+    let of = |(name, clock): (&str, Fmax)| format!("{name} {:.1} MHz of {} MHz", clock.achieved, clock.constraint);
+    let mut lost: Vec<String> = best.clocks().filter(|(_, clock)| !clock.is_met()).map(of).collect();
+    let met = lost.is_empty();
+    if met {
         let arguments = pack_arguments(board.family, &format!("{}.config", try_name(*best_seed)), &product);
         flow.pack.run(&folder, &arguments, "pack.log", synthesis::MINUTES)?;
-    } else {
-        let of = |(name, clock): (&str, Fmax)| format!("{name} {:.1} MHz of {} MHz", clock.achieved, clock.constraint);
-        lost.extend(best.clocks().filter(|(_, clock)| !clock.is_met()).map(of));
     }
-    lost.extend(baselines(arguments.update_baselines && best.is_met(), board, &scene, &reached)?);
-    let bitstream = best.is_met().then(|| folder.join(product));
+    lost.extend(baselines(arguments.update_baselines && met, board, &scene, &reached)?);
+    let bitstream = met.then(|| folder.join(product));
     let implemented = Implemented::new(&model, reached, absorbed, best.link, bitstream, lost);
     let good = implemented.is_good();
     Ok((

@@ -12,6 +12,8 @@
 //! ```
 //! `DERMIS_ACCEPT=1 cargo test -p dermis-sim --test cli` rewrites the expected stderr of all cases.
 
+mod fake;
+
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
@@ -113,9 +115,8 @@ fn without_verilator_the_message_says_how_to_get_it() {
 fn without_a_compiler_the_message_says_what_is_missing() {
     let work = tempfile::tempdir().unwrap();
     // A Verilator that is there and cannot build; nothing else is on the path.
-    let fake = work.path().join("verilator");
-    fs::write(&fake, "#!/bin/sh\n[ \"$1\" = --version ] && echo Verilator 0 && exit 0\nexit 127\n").unwrap();
-    fs::set_permissions(&fake, std::os::unix::fs::PermissionsExt::from_mode(0o755)).unwrap();
+    let script = "#!/bin/sh\n[ \"$1\" = --version ] && echo Verilator 0 && exit 0\nexit 127\n";
+    fake::program(work.path(), "verilator", script);
     let wanted = "error: verilator needs make, which is not installed; on Debian: sudo apt-get install g++ make\n";
     assert_eq!(rtl_in(work.path()), (Some(2), wanted.to_owned()));
 }

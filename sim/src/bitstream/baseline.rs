@@ -1,7 +1,7 @@
 //! What scenes took of their boards when somebody last looked: `constraints/baselines.json`.
 //!
-//! `dermis bitstream --update-baselines` writes it; without that a bitstream that is slower or larger than its line says,
-//! beyond the tolerances here, fails.
+//! `dermis bitstream --update-baselines` writes it where the clock is met; without that a bitstream that is slower or larger
+//! than its line says, beyond the tolerances here, fails.
 
 use std::collections::BTreeMap;
 use std::path::Path;
