@@ -39,20 +39,20 @@ pub struct Baseline {
 }
 
 /// Eq. 1 for one frame of one subarray.
-struct Literal<'a> {
+struct Eq1Cost<'a> {
     orthogonal: &'a Orthogonal,
     family: &'a Polynomial,
     b: &'a [f64],
     mu_max: f64,
 }
 
-impl Literal<'_> {
+impl Eq1Cost<'_> {
     fn forces(&self, mu: [f64; 2]) -> Forces {
         self.orthogonal.apply(self.b, &force(&self.family.eval(mu), mu, 0.0))
     }
 }
 
-impl CostFunction for Literal<'_> {
+impl CostFunction for Eq1Cost<'_> {
     type Param = Vec<f64>;
     type Output = f64;
 
@@ -103,14 +103,14 @@ impl Baseline {
     fn subarray(&self, b: &[f64], searched: bool) -> Forces {
         let mu_max = self.scene.search.mu_max;
         let family = &Polynomial::new(&self.matrices, b);
-        let problem = || Literal { orthogonal: &self.orthogonal, family, b, mu_max };
+        let problem = || Eq1Cost { orthogonal: &self.orthogonal, family, b, mu_max };
         let mu = if searched { simplex(problem(), mu_max) } else { [0.0; 2] };
         problem().forces(mu)
     }
 }
 
 /// The μ that the simplex settles on; without shear where it finds nothing that presses.
-fn simplex(problem: Literal, mu_max: f64) -> [f64; 2] {
+fn simplex(problem: Eq1Cost, mu_max: f64) -> [f64; 2] {
     let corners = vec![vec![0.0, 0.0], vec![mu_max / 3.0, 0.0], vec![0.0, mu_max / 3.0]];
     let run = || -> Result<Option<Vec<f64>>, Error> {
         let solver = NelderMead::new(corners).with_sd_tolerance(SETTLED)?;

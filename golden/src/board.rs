@@ -131,7 +131,7 @@ pub enum Family {
 
 impl Family {
     /// Ending of a board's pin file.
-    pub fn pins(self) -> &'static str {
+    pub fn pin_file_extension(self) -> &'static str {
         match self {
             Family::Ecp5 => "lpf",
             Family::Ice40 => "pcf",
@@ -182,7 +182,7 @@ impl Board {
             let text = FILES.get_file(&name).and_then(|file| file.contents_utf8()).ok_or_else(missing)?;
             Ok((name, text))
         };
-        Ok([file("v")?, file(self.family.pins())?])
+        Ok([file("v")?, file(self.family.pin_file_extension())?])
     }
 
     /// Names of all boards, sorted.

@@ -18,7 +18,7 @@
 //!
 //! A matrix without the symmetry, as one without some of its taxels, is one block in the basis of the taxels.
 
-use crate::fixed::coefficients::{lives, sign, FLIP_X, FLIP_Y};
+use crate::fixed::coefficients::{has_entry, sign, FLIP_X, FLIP_Y};
 use crate::fixed::quads::Quads;
 use faer::linalg::matmul::matmul;
 use faer::{Accum, ColMut, ColRef, Mat, Par};
@@ -92,8 +92,8 @@ impl Basis {
     pub fn parities(rows: usize, cols: usize) -> Basis {
         let quads = Quads { rows, cols };
         let entries = std::array::from_fn(|parity| {
-            let entry = |quad| Entry { quad, images: f64::from(quads.counts(quad).count_ones()) };
-            (0..quads.len()).filter(|&quad| lives(quads, quad, parity)).map(entry).collect()
+            let entry = |quad| Entry { quad, images: f64::from(quads.lane_mask(quad).count_ones()) };
+            (0..quads.len()).filter(|&quad| has_entry(quads, quad, parity)).map(entry).collect()
         });
         Basis { quads, entries }
     }
@@ -134,7 +134,7 @@ impl Basis {
         for parity in 0..4 {
             for (entry, f) in self.entries[parity].iter().zip(&f[self.range(parity)]) {
                 let share = f / entry.images.sqrt();
-                for lane in (0..4).filter(|lane| self.counts(entry.quad, *lane)) {
+                for lane in (0..4).filter(|lane| self.is_distinct(entry.quad, *lane)) {
                     x[self.quads.taxel(entry.quad, lane)] += sign(parity, lane) * share;
                 }
             }
@@ -173,8 +173,8 @@ impl Basis {
                 for (i, row) in rows.iter().enumerate() {
                     // The same sum for each image of the pair, up to its sign.
                     let share = entries[(i, j)] / (row.images * col.images).sqrt();
-                    for k in (0..4).filter(|lane| self.counts(row.quad, *lane)) {
-                        for l in (0..4).filter(|lane| self.counts(col.quad, *lane)) {
+                    for k in (0..4).filter(|lane| self.is_distinct(row.quad, *lane)) {
+                        for l in (0..4).filter(|lane| self.is_distinct(col.quad, *lane)) {
                             let sign = sign(target, k) * sign(target ^ flip, l);
                             m[(self.quads.taxel(row.quad, k), self.quads.taxel(col.quad, l))] += sign * share;
                         }
@@ -187,13 +187,13 @@ impl Basis {
 
     /// Σ over the images of a quad, signed by the parity.
     fn sum(&self, quad: usize, parity: usize, value: impl Fn(usize) -> f64) -> f64 {
-        let own = (0..4).filter(|lane| self.counts(quad, *lane));
+        let own = (0..4).filter(|lane| self.is_distinct(quad, *lane));
         own.map(|lane| sign(parity, lane) * value(self.quads.taxel(quad, lane))).sum()
     }
 
     /// Whether a lane is a taxel of its own, not a second copy.
-    fn counts(&self, quad: usize, lane: usize) -> bool {
-        self.quads.counts(quad) >> lane & 1 == 1
+    fn is_distinct(&self, quad: usize, lane: usize) -> bool {
+        self.quads.lane_mask(quad) >> lane & 1 == 1
     }
 }
 

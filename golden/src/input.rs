@@ -117,6 +117,6 @@ impl Input {
                 *b = gain * (*b - zero);
             }
         }
-        self.spec.blank(frame)
+        self.spec.mask_dead(frame)
     }
 }

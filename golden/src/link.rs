@@ -9,21 +9,21 @@ mod codes;
 mod format;
 mod header;
 mod identity;
+mod link_kind;
 mod packet;
 mod payload;
 pub mod slip;
 mod sums;
 #[cfg(test)]
 mod tests;
-mod wire;
 
 pub use codes::{beats_of_bytes, code_bytes, codes_of_bytes, codes_to_bytes, BEAT_BYTES};
 pub use format::markdown;
 pub use header::c_header;
-pub use identity::{payloads, scene_hash, takes, LinkError};
+pub use identity::{payloads, scene_hash, supports, LinkError};
+pub use link_kind::LinkKind;
 pub use packet::{Decoder, Packet, PacketError};
 pub use payload::{Beat, Counters, Field, Header, Identity, Sums};
-pub use wire::LinkKind;
 
 /// Version of the packets' meaning; a host refuses another one.
 pub const VERSION: u16 = 2;

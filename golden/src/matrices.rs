@@ -20,9 +20,9 @@
 //! Everything is computed in the basis of mirror parities ([`crate::folded`]), a sixteenth of the work; the mirror
 //! symmetry of the array holds to the bit in every matrix, so that folding them again is exact.
 
+pub mod cache;
 mod inverse;
 mod masked;
-pub mod store;
 #[cfg(test)]
 mod tests;
 
@@ -30,9 +30,9 @@ use crate::folded::{Basis, Operator, EVEN, ODD_X, ODD_Y};
 use crate::influence::Influence;
 use crate::scene::{Inversion, Medium, Scene};
 use crate::sensor::{Sensor, SensorError};
+use cache::{CacheFile, CachedMatrices};
 use faer::Mat;
 use inverse::{chain, Inverse};
-use store::{Kept, Place};
 use thiserror::Error;
 
 /// Most taxels in one subarray: the 48 × 48 of the largest sensor. A matrix then takes 42 MB.
@@ -78,12 +78,12 @@ pub struct Matrices {
     /// Degree of the polynomial in μ.
     pub degree: usize,
     /// Cz⁺, Ax and Ay again, folded, for fast products.
-    pub passes: Passes,
+    pub folded: FoldedMatrices,
 }
 
 /// The matrices a frame is multiplied by, in the basis of the mirror parities or, without symmetry, of the taxels.
 #[derive(Clone, Debug)]
-pub struct Passes {
+pub struct FoldedMatrices {
     /// The basis of the three matrices.
     pub basis: Basis,
     /// Cz⁺.
@@ -130,7 +130,7 @@ pub enum MatricesError {
     },
     /// The series in μ converges too slowly or not at all.
     #[error(
-        "{sensor}: r = {radius:.3} at mu_max = {mu_max} needs more than degree {most}; search.mu_max = {remedy} has a \
+        "{sensor}: r = {radius:.3} at mu_max = {mu_max} needs more than degree {most}; search.mu_max = {suggested} has a \
          series that converges, as have taxels further apart against the thickness"
     )]
     SlowSeries {
@@ -143,7 +143,7 @@ pub enum MatricesError {
         /// Highest degree there is.
         most: usize,
         /// The largest mu_max of three digits that it serves.
-        remedy: f64,
+        suggested: f64,
     },
 }
 
@@ -185,23 +185,23 @@ impl Matrices {
             return Err(MatricesError::NotFinite { sensor: boxed() });
         }
         let basis = Basis::parities(sensor.rows, sensor.cols);
-        let place = Place::of(sensor, medium, mu_max, inversion);
-        let kept = match place.as_ref().and_then(Place::read) {
-            Some(kept) => kept,
+        let file = CacheFile::of(sensor, medium, mu_max, inversion);
+        let cached = match file.as_ref().and_then(CacheFile::read) {
+            Some(cached) => cached,
             None => {
-                let kept = compute(&basis, [&cx, &cy, &cz], mu_max, inversion)
+                let cached = compute(&basis, [&cx, &cy, &cz], mu_max, inversion)
                     .ok_or_else(|| MatricesError::NotConverged { sensor: boxed() })?;
-                place.iter().for_each(|place| place.write(&kept));
-                kept
+                file.iter().for_each(|file| file.write(&cached));
+                cached
             }
         };
-        let Kept { numbers: [condition, rank, gain, spectral_radius], operators: [cz_pinv, ax, ay] } = kept;
+        let CachedMatrices { numbers: [condition, rank, gain, spectral_radius], operators: [cz_pinv, ax, ay] } = cached;
         let degree = degree(spectral_radius, mu_max, most).ok_or_else(|| MatricesError::SlowSeries {
             sensor: boxed(),
             radius: spectral_radius,
             mu_max,
             most,
-            remedy: largest_mu_max(spectral_radius / mu_max, most),
+            suggested: largest_mu_max(spectral_radius / mu_max, most),
         })?;
         Ok(Matrices {
             sensor: sensor.clone(),
@@ -215,7 +215,7 @@ impl Matrices {
             cz,
             cx,
             cy,
-            passes: Passes { basis, cz_pinv, ax, ay },
+            folded: FoldedMatrices { basis, cz_pinv, ax, ay },
             spectral_radius,
             degree,
         })
@@ -223,7 +223,7 @@ impl Matrices {
 }
 
 /// Cz⁺, Ax, Ay and r in the folded basis; `None` when the eigenvalues of Cz do not converge.
-fn compute(basis: &Basis, [cx, cy, cz]: [&Mat<f64>; 3], mu_max: f64, inversion: Inversion) -> Option<Kept> {
+fn compute(basis: &Basis, [cx, cy, cz]: [&Mat<f64>; 3], mu_max: f64, inversion: Inversion) -> Option<CachedMatrices> {
     let folded = |flip: usize, m: &Mat<f64>| basis.fold_matrix(flip, |i, j| m[(i, j)]);
     let (folded_cx, folded_cy) = (folded(ODD_X, cx), folded(ODD_Y, cy));
     let inverse = Inverse::new(&folded(EVEN, cz), inversion)?;
@@ -232,7 +232,7 @@ fn compute(basis: &Basis, [cx, cy, cz]: [&Mat<f64>; 3], mu_max: f64, inversion: 
     let shear = mu_max > 0.0;
     let spectral_radius = if shear { mu_max * inverse.largest_radius(&folded_cx, &folded_cy) } else { 0.0 };
     let numbers = [inverse.condition, inverse.rank, inverse.gain, spectral_radius];
-    Some(Kept { numbers, operators: [cz_pinv, ax, ay] })
+    Some(CachedMatrices { numbers, operators: [cz_pinv, ax, ay] })
 }
 
 /// The degree a series of radius `r` needs, `None` when it is more than `most`.

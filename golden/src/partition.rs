@@ -7,7 +7,7 @@
 //! | case 0, 1, 2, 3 | 1×1, 2×2, 1×2, 2×1 | subarrays along the rows × along the columns, as in the paper |
 //! | gather | rows·cols of the array → of the subarray | row-major in both |
 
-use crate::sensor::{Sensor, MIN_LINES};
+use crate::sensor::{Sensor, MIN_SIDE};
 use serde::{Deserialize, Serialize};
 use std::fmt;
 use std::str::FromStr;
@@ -140,7 +140,7 @@ pub fn subarrays(case: Case, sensor: &Sensor) -> Result<Vec<Subarray>, Partition
 
 /// Lines per part, when the division is exact.
 fn part(direction: &'static str, lines: usize, parts: usize) -> Result<usize, PartitionError> {
-    if parts == 0 || !lines.is_multiple_of(parts) || lines / parts < MIN_LINES {
+    if parts == 0 || !lines.is_multiple_of(parts) || lines / parts < MIN_SIDE {
         return Err(PartitionError::NotDividing { direction, lines, parts });
     }
     Ok(lines / parts)
@@ -160,7 +160,7 @@ impl Subarray {
     }
 
     /// Indices in the subarray of those of the array's taxels, [row, col], that it holds.
-    pub fn own(&self, taxels: &[[usize; 2]]) -> Vec<usize> {
+    pub fn local_indices(&self, taxels: &[[usize; 2]]) -> Vec<usize> {
         let place = |[row, col]: [usize; 2]| {
             let (row, col) = (row.checked_sub(self.row0)?, col.checked_sub(self.col0)?);
             (row < self.rows && col < self.cols).then_some(row * self.cols + col)

@@ -15,13 +15,13 @@ mod adaptive;
 mod bonded_tests;
 mod contacts;
 mod extra;
-mod front;
 mod golden;
 mod output;
+mod run;
 #[cfg(test)]
 mod tests;
 
-pub use extra::{Extra, Refused, Region, Taken};
+pub use extra::{CaseChoice, Extra, Region, RejectedCase};
 pub use golden::{Golden, GoldenError};
 pub use output::Resultant;
 

@@ -257,7 +257,7 @@ impl InputSpec {
     }
 
     /// The frame with 0 for what its dead taxels read: neither the peak nor the condition is to see it.
-    pub fn blank(&self, mut frame: Frame) -> Frame {
+    pub fn mask_dead(&self, mut frame: Frame) -> Frame {
         let cols = frame.sensor.cols;
         for [row, col] in &self.dead {
             // A frame of another sensor may lack the taxel; it is refused where it is used.

@@ -13,9 +13,9 @@ use std::fmt;
 use thiserror::Error;
 
 /// Fewest rows or columns: one line of taxels cannot tell shear across it.
-pub const MIN_LINES: usize = 2;
+pub const MIN_SIDE: usize = 2;
 /// Most rows or columns; checked before anything of the array's size is allocated.
-pub const MAX_LINES: usize = 256;
+pub const MAX_SIDE: usize = 256;
 /// Largest pitch or thickness in mm.
 pub const MAX_LENGTH_MM: f64 = 1e6;
 
@@ -64,8 +64,8 @@ impl Sensor {
     /// The first field out of range, in the order of the struct.
     pub fn check(&self) -> Result<(), SensorError> {
         for (field, value) in [("rows", self.rows), ("cols", self.cols)] {
-            if !(MIN_LINES..=MAX_LINES).contains(&value) {
-                let allowed = format!("a whole number from {MIN_LINES} to {MAX_LINES}");
+            if !(MIN_SIDE..=MAX_SIDE).contains(&value) {
+                let allowed = format!("a whole number from {MIN_SIDE} to {MAX_SIDE}");
                 let value = value as f64;
                 return Err(SensorError { field, value, allowed });
             }

@@ -29,7 +29,7 @@ pub use settings::{references, settings, Setting, MU_MAX};
 
 use crate::fixed::Model;
 use crate::float::force::force;
-use crate::float::objective::{of_kind, Subject};
+use crate::float::objective::{of_kind, SearchInput};
 use crate::float::pass::Polynomial;
 use crate::frame::Forces;
 use crate::matrices::Matrices;
@@ -49,7 +49,7 @@ const INVERSE_MORE: u32 = 4;
 
 /// Errors of one number format.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-pub struct Figures {
+pub struct FormatErrors {
     /// ‖Cz⁺b₀ − p‖/‖p‖.
     pub forward: f64,
     /// ‖b − C x‖/‖b‖.
@@ -91,11 +91,11 @@ pub struct Row {
     /// Of the golden model's matrices; `None` where it refuses the scene.
     pub spectrum: Option<Spectrum>,
     /// The golden model.
-    pub double: Option<Figures>,
+    pub double: Option<FormatErrors>,
     /// The golden model's frame part in single precision.
-    pub single: Option<Figures>,
+    pub single: Option<FormatErrors>,
     /// The bit-true model.
-    pub fixed: Option<Figures>,
+    pub fixed: Option<FormatErrors>,
     /// Input bits that the bit-true model needs; `None` where none up to 24 are enough.
     pub bits: Option<u32>,
     /// Why there is no golden result.
@@ -152,7 +152,7 @@ fn fill(row: &mut Row, scene: &Scene, golden: &Golden, truth: &Truth) -> Result<
         truth.forward(single::family(matrices, &truth.unsheared.stress_MPa, 0).v(0, 0)),
         &in_single(scene, matrices, &truth.sheared.stress_MPa),
     ));
-    match Model::unfitted(scene).and_then(|model| model.reconstruct(&truth.sheared)) {
+    match Model::without_fit_check(scene).and_then(|model| model.reconstruct(&truth.sheared)) {
         Ok(result) => {
             let own = fixed_forward(scene, truth, scene.fixed.input_bits);
             row.fixed = own.map(|forward| truth.figures(matrices, forward, &result.forces_N));
@@ -168,7 +168,7 @@ fn in_single(scene: &Scene, matrices: &Matrices, b: &[f64]) -> Forces {
     let family = single::family(matrices, b, matrices.degree);
     let (sensor, mu_max) = (&scene.sensor, scene.search.mu_max);
     let objective = of_kind(scene.search.objective, sensor, scene.medium);
-    let found = objective.find(&Subject { sensor, b, family: &family, mu_max, noise_MPa: 0.0 });
+    let found = objective.find(&SearchInput { sensor, b, family: &family, mu_max, noise_MPa: 0.0 });
     let mu = found.map_or([0.0; 2], |estimate| estimate.found.mu);
     force(&found.map_or_else(|| family.eval(mu), |estimate| estimate.pressure(&family)), mu, 0.0)
 }
@@ -183,7 +183,7 @@ fn fixed_forward(scene: &Scene, truth: &Truth, bits: u32) -> Option<f64> {
         scene.fixed.input_bits = bits;
         scene.fixed.inverse_bits = (bits + INVERSE_MORE).max(scene.fixed.coef_bits);
     }
-    let result = Model::unfitted(&scene).ok()?.reconstruct(&truth.unsheared).ok()?;
+    let result = Model::without_fit_check(&scene).ok()?.reconstruct(&truth.unsheared).ok()?;
     Some(truth.forward(&result.forces_N.fz))
 }
 

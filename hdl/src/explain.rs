@@ -1,7 +1,7 @@
 //! What a scene's hardware has and what it leaves out, with what each omission saves: the model of the scene with that
 //! feature put back, less the model of the scene.
 
-use dermis_golden::fixed::omissions::{features, Feature};
+use dermis_golden::fixed::feature_costs::{features, Feature};
 use dermis_golden::fixed::{Cycles, Model};
 use serde::Serialize;
 
@@ -50,17 +50,17 @@ pub fn explain(model: &Model) -> Result<Vec<Explained>, HdlError> {
     let own = needs(model)?;
     let explained = |feature: Feature| {
         let (mut saved, mut impossible) = (None, None);
-        match &feature.put_back {
+        match &feature.with_feature {
             None => {}
             Some(Err(error)) => impossible = Some(error.to_string()),
             Some(Ok(other)) => saved = Some(difference(&needs(other)?, &own)),
         }
-        let costs = match &feature.taken_out {
+        let costs = match &feature.without_feature {
             None => None,
             Some(other) => Some(difference(&own, &needs(other)?)),
         };
-        let Feature { name, setting, put_back, .. } = feature;
-        Ok(Explained { feature: name, setting, present: put_back.is_none(), saved, costs, impossible })
+        let Feature { name, setting, with_feature, .. } = feature;
+        Ok(Explained { feature: name, setting, present: with_feature.is_none(), saved, costs, impossible })
     };
     features(model).into_iter().map(explained).collect()
 }

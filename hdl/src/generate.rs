@@ -217,7 +217,7 @@ fn header(model: &Model, top: &str) -> String {
         sensor = scene.sensor,
         name = scene.name,
         input_end = f.code_bits - 1,
-        forces = match model.wants_resultants() {
+        forces = match model.sends_resultants() {
             false => format!("{} forces row-major", model.force_beats()),
             true => format!("{} beats of sums", model.force_beats()),
         },
@@ -269,7 +269,7 @@ fn manifest(model: &Model, top: &str, usage: &BTreeMap<String, Usage>, dropped: 
         },
         "output": {
             "force_beats": model.force_beats(),
-            "resultants": model.wants_resultants(),
+            "resultants": model.sends_resultants(),
             "status_beats": model.status_beats(),
             // Without a full scale a force word means this many N for each MPa of the largest code.
             "force_lsb_N": full_scale.map(|full_scale| model.force_lsb_N(full_scale)),
@@ -280,7 +280,7 @@ fn manifest(model: &Model, top: &str, usage: &BTreeMap<String, Usage>, dropped: 
                 "found": FLAG_FOUND,
                 "no_contact": FLAG_NO_CONTACT,
                 "framing": FLAG_FRAMING,
-                "coefficients": model.checks().then_some(FLAG_COEFFICIENTS),
+                "coefficients": model.has_coefficient_check().then_some(FLAG_COEFFICIENTS),
                 "case_shift": model.chooses().then_some(CASE_SHIFT),
             },
         },

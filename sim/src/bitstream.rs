@@ -117,7 +117,7 @@ fn check_constraints(board: &Board, placed: &Placed) -> Result<()> {
         return Err(anyhow!("constraints/{file}.v: its PLL gives {has} MHz, {file}.toml says clock_MHz = {wants}"));
     }
     if let (Some((pin, clock)), Some(wants)) = (placed.link, board.spi_MHz) {
-        let (pins, has) = (board.family.pins(), clock.constraint);
+        let (pins, has) = (board.family.pin_file_extension(), clock.constraint);
         if differs(has, wants) {
             let pins = format!("constraints/{file}.{pins}: {pin} is meant for {has} MHz");
             return Err(anyhow!("{pins}, {file}.toml says spi_MHz = {wants}"));

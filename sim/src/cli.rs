@@ -15,7 +15,7 @@ use anyhow::{anyhow, Result};
 use clap::{Parser, Subcommand, ValueEnum};
 use dermis_golden::fixed::{FixedError, Model};
 use dermis_golden::frame::Frame;
-use dermis_golden::matrices::store;
+use dermis_golden::matrices::cache;
 use dermis_golden::noise::{study, Study};
 use dermis_golden::partition::Case;
 use dermis_golden::quantise::full_scale;
@@ -291,7 +291,7 @@ fn exit_code(error: &anyhow::Error) -> u8 {
 /// The text for stdout, and whether all that was compared is equal.
 fn run(arguments: &Arguments) -> Result<(String, bool)> {
     let build_dir = &arguments.build_dir;
-    store::keep_in(Some(&build_dir.join("matrices")));
+    cache::set_folder(Some(&build_dir.join("matrices")));
     match &arguments.command {
         Command::Reconstruct { scene, frames, engine, json, target } => {
             let (scene, frames) = resolve_one(scene.as_deref(), frames)?;

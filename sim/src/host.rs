@@ -110,7 +110,7 @@ impl<P: std::io::Read + std::io::Write> Session<P> {
         for (stress, zero) in frame.stress_MPa.iter_mut().zip(self.tare_MPa.iter().flatten()) {
             *stress -= zero;
         }
-        self.model.scene.input.blank(frame)
+        self.model.scene.input.mask_dead(frame)
     }
 
     /// Sends a frame; the answer, and what differs from the model where that was asked for.
@@ -121,7 +121,7 @@ impl<P: std::io::Read + std::io::Write> Session<P> {
         let frame = self.tared(frame);
         let codes = self.model.codes(&frame)?.codes;
         // A board that adds nothing up sends all forces, and the host does.
-        let forces = self.forces || !self.identity.takes(Kind::FrameForResultants);
+        let forces = self.forces || !self.identity.supports(Kind::FrameForResultants);
         let mut answer = self.client.frame(&self.model, &codes, forces)?;
         if self.check {
             answer.difference = Some(answer.against(&self.model, &codes));
@@ -221,7 +221,7 @@ fn summary(identity: &Identity, count: usize, rate: f64, lost: Lost, before: &Co
         identity.input_bits,
         f64::from(identity.clock_hz) / 1e6,
         identity.scene,
-        if identity.takes(Kind::FrameForResultants) { "" } else { ", sends forces for the host to add up" },
+        if identity.supports(Kind::FrameForResultants) { "" } else { ", sends forces for the host to add up" },
         lost.repeated,
         lost.damaged,
         since(|c| c.framing),

@@ -3,7 +3,7 @@
 
 use std::collections::BTreeSet;
 
-use dermis_golden::fixed::choose::{Seen, CUT_SHIFT};
+use dermis_golden::fixed::choose::{FrameStats, CUT_SHIFT};
 use dermis_golden::fixed::Model;
 use dermis_golden::partition::{Case, Grid};
 use dermis_golden::quantise::quantise;
@@ -184,9 +184,9 @@ fn the_choice_is_measured() {
             let error = |model: &Golden| model.run(&frame).unwrap().error.and_then(|error| error.tangential);
             let errors: Vec<f64> = models.iter().filter_map(error).collect();
             let Some(own) = error(&adaptive).filter(|_| errors.len() == 4) else { continue };
-            let mut seen = Seen::default();
+            let mut seen = FrameStats::default();
             let codes = quantise(&frame.stress_MPa, scene.fixed.input_bits, frame.peak_MPa()).codes;
-            codes.iter().enumerate().for_each(|(index, &code)| seen.take(&scene.sensor, index, code, 0));
+            codes.iter().enumerate().for_each(|(index, &code)| seen.add(&scene.sensor, index, code, 0));
             for (all, &error) in by_case.iter_mut().zip(&errors) {
                 all.push(error);
             }

@@ -1,7 +1,7 @@
 //! The coefficient check: no false alarm over the shipped frames, every tried single flip in the coefficient memory told,
 //! no block RAM, multiplier or cycle; left out by default.
 
-use dermis_golden::fixed::check::unseen;
+use dermis_golden::fixed::check::undetected;
 use dermis_golden::fixed::send::{FLAG_COEFFICIENTS, STATUS_BEATS};
 use dermis_golden::fixed::storage::word_bits;
 use dermis_golden::fixed::{Cycles, Model};
@@ -84,7 +84,7 @@ fn every_tried_flip_is_told() {
         assert!(!tells(&hardware, &vector), "{name}: a false alarm");
         // Every word is read, and no flip cancels itself.
         let words = hardware.model.storage.words();
-        assert_eq!(unseen(&hardware.model), [0; 0], "{name}");
+        assert_eq!(undetected(&hardware.model), [0; 0], "{name}");
         let file = hardware.generated.files.iter().position(|file| file.name == "coefficients.hex").unwrap();
         let good = hardware.generated.files[file].text.clone();
         let bits = word_bits(&hardware.model.formats);

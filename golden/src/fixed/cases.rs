@@ -7,7 +7,7 @@
 //! Where the scene lists no cases, those are built that fit the board together: the most of them, and of equally many
 //! the finest. What was dropped is kept with the figures of the design that would have it ([`Dropped`]).
 
-use super::choose::{self, Seen};
+use super::choose::{self, FrameStats};
 use super::cycles::SHORTEST_SWEEP;
 use super::formats::{derive, Shape};
 use super::model::{FixedError, Model, Stage, Trace};
@@ -18,7 +18,7 @@ use crate::board::Board;
 use crate::frame::Frame;
 use crate::matrices::{Matrices, MAX_DEGREE};
 use crate::partition::{subarrays, Case, Grid, Subarray};
-use crate::reconstruct::{Reconstruction, Taken};
+use crate::reconstruct::{CaseChoice, Reconstruction};
 use crate::scene::Scene;
 
 /// A case that divides the array and was not built.
@@ -140,9 +140,9 @@ impl Model {
 
     /// The index of the case that a frame of these codes, `input_bits` wide, is solved in.
     pub fn choose(&self, codes: &[i32]) -> usize {
-        let mut seen = Seen::default();
+        let mut seen = FrameStats::default();
         for (index, &code) in codes.iter().enumerate() {
-            seen.take(&self.scene.sensor, index, code, self.noise_floor);
+            seen.add(&self.scene.sensor, index, code, self.noise_floor);
         }
         seen.choose(&self.grids(), self.scene.partition.condition, self.noise_floor)
     }
@@ -178,7 +178,7 @@ impl Model {
         let mut result = case.decode(frame, engine, beats, status)?;
         let reason = "the finest whose boundaries cut nothing, by the hardware's rule".to_string();
         let case = case.scene.partition.case.to_string();
-        result.extra.taken = Some(Taken { case, reason, refused: Vec::new() });
+        result.extra.taken = Some(CaseChoice { case, reason, refused: Vec::new() });
         Ok(result)
     }
 }
@@ -187,7 +187,7 @@ impl Model {
 pub(super) fn shape(scene: &Scene, case: Case, degree: Option<usize>) -> Result<Shape, FixedError> {
     let parts = subarrays(case, &scene.sensor)?;
     // With dead taxels there is one subarray.
-    let dead = parts[0].own(&scene.input.dead);
+    let dead = parts[0].local_indices(&scene.input.dead);
     let mut matrices = Matrices::of(scene, &parts[0].sensor(&scene.sensor), MAX_DEGREE)?.without(&dead)?;
     matrices.degree = degree.unwrap_or(matrices.degree);
     Ok(Shape { matrices, parts: parts.len() })

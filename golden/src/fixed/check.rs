@@ -14,7 +14,7 @@
 //!
 //! A flipped bit turns the parity whenever its word is read, at the reads t of T, and with it the signature by
 //! Σ x^(T−t) modulo the polynomial. Once or twice read, that is never zero; read more often it could be, with a chance of
-//! 2⁻³²: [`unseen`] lists such words. The list of columns and the schedule are not covered.
+//! 2⁻³²: [`undetected`] lists such words. The list of columns and the schedule are not covered.
 
 use super::formats::MULTIPLIER_BITS;
 use super::model::Model;
@@ -38,7 +38,7 @@ pub fn parity(word: &[i64]) -> bool {
 }
 
 /// Addresses in the coefficient memory in the order in which the passes of a subarray of one case read them.
-pub fn reads(model: &Model) -> Vec<usize> {
+pub fn read_addresses(model: &Model) -> Vec<usize> {
     let (formats, storage) = (&model.formats, &model.storage);
     let of = |matrix, group| {
         let first = storage.address_of(matrix, group);
@@ -54,15 +54,15 @@ pub fn reads(model: &Model) -> Vec<usize> {
 pub fn signature(model: &Model) -> u32 {
     let words = model.storage.memory(&model.formats, &model.quantised);
     let parities: Vec<bool> = words.iter().map(|word| parity(word)).collect();
-    reads(model).into_iter().fold(START, |s, address| step(s, parities[address - model.storage.base]))
+    read_addresses(model).into_iter().fold(START, |s, address| step(s, parities[address - model.storage.base]))
 }
 
 /// Addresses of one case whose flipped bit would leave the signature as it is: never read, or in bad luck.
-pub fn unseen(model: &Model) -> Vec<usize> {
+pub fn undetected(model: &Model) -> Vec<usize> {
     let mut changes = vec![0u32; model.storage.words()];
     // What a parity that was turned so many words ago has become.
     let mut change = 1;
-    for address in reads(model).into_iter().rev() {
+    for address in read_addresses(model).into_iter().rev() {
         changes[address - model.storage.base] ^= change;
         change = step(change, false);
     }
@@ -71,7 +71,7 @@ pub fn unseen(model: &Model) -> Vec<usize> {
 
 impl Model {
     /// Whether the hardware watches its coefficient memory.
-    pub fn checks(&self) -> bool {
+    pub fn has_coefficient_check(&self) -> bool {
         self.scene.hardware.coefficient_check == CoefficientCheck::Signature
     }
 }
@@ -91,7 +91,7 @@ mod tests {
     fn no_word_of_the_shipped_scenes_is_unseen() {
         for name in ["sensor-1", "sensor-2", "sensor-3", "eight-by-eight"] {
             let model = Model::new(&Scene::builtin(name).unwrap()).unwrap();
-            assert_eq!(unseen(&model), [0; 0], "{name}");
+            assert_eq!(undetected(&model), [0; 0], "{name}");
         }
     }
 

@@ -38,14 +38,14 @@ use crate::sensor::Sensor;
 /// The share of the frame's largest code that counts as a contact beside a boundary, as a right shift.
 pub const CUT_SHIFT: u32 = 2;
 /// Taxel lines on each side of a boundary that are looked at.
-pub const BESIDE: usize = 2;
+pub const BOUNDARY_LINES: usize = 2;
 /// From the frame's last code to the choice (place and magnitude, maxima, comparison, choice), beyond what a frame waits
 /// for without one.
 pub const LATENCY: u64 = 2;
 
 /// What is gathered of a frame while it is received.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Seen {
+pub struct FrameStats {
     /// Largest magnitude.
     pub peak: u64,
     /// The same on the rows beside the middle.
@@ -58,20 +58,20 @@ pub struct Seen {
 }
 
 /// Whether `line` of `lines` is beside the boundary in the middle.
-pub fn is_beside(line: usize, lines: usize) -> bool {
-    (2 * line + 1).abs_diff(lines) < 2 * BESIDE
+pub fn is_beside_boundary(line: usize, lines: usize) -> bool {
+    (2 * line + 1).abs_diff(lines) < 2 * BOUNDARY_LINES
 }
 
-impl Seen {
+impl FrameStats {
     /// Adds the code of the taxel at `index`, against a noise floor in codes.
-    pub fn take(&mut self, sensor: &Sensor, index: usize, code: i32, floor: i32) {
+    pub fn add(&mut self, sensor: &Sensor, index: usize, code: i32, floor: i32) {
         let (row, col) = (index / sensor.cols, index % sensor.cols);
         let magnitude = magnitude_bits(i64::from(code));
         self.peak = self.peak.max(magnitude);
-        if is_beside(row, sensor.rows) {
+        if is_beside_boundary(row, sensor.rows) {
             self.middle_rows = self.middle_rows.max(magnitude);
         }
-        if is_beside(col, sensor.cols) {
+        if is_beside_boundary(col, sensor.cols) {
             self.middle_cols = self.middle_cols.max(magnitude);
         }
         let quarter = 2 * usize::from(2 * row >= sensor.rows) + usize::from(2 * col >= sensor.cols);
@@ -80,7 +80,7 @@ impl Seen {
     }
 
     /// Whether a case may be taken.
-    fn admits(&self, grid: Grid, condition: Condition, floor: i32, shift: u32) -> bool {
+    fn is_admissible(&self, grid: Grid, condition: Condition, floor: i32, shift: u32) -> bool {
         let limit = (self.peak >> shift).max(floor.max(0) as u64);
         let cut = (grid.rows > 1 && self.middle_rows > limit) || (grid.cols > 1 && self.middle_cols > limit);
         let unmet = quarters(grid).into_iter().any(|part| {
@@ -97,7 +97,7 @@ impl Seen {
 
     /// The same with another share than [`CUT_SHIFT`], to measure what it does.
     pub fn choose_at(&self, shift: u32, grids: &[Grid], condition: Condition, floor: i32) -> usize {
-        (1..grids.len()).find(|&case| self.admits(grids[case], condition, floor, shift)).unwrap_or(0)
+        (1..grids.len()).find(|&case| self.is_admissible(grids[case], condition, floor, shift)).unwrap_or(0)
     }
 }
 
@@ -120,14 +120,14 @@ mod tests {
 
     fn chosen(codes: &[(usize, i32)], condition: Condition, floor: i32) -> usize {
         let sensor = Sensor { rows: 8, cols: 12, pitch_x_mm: 2.0, pitch_y_mm: 2.0, thickness_mm: 1.0 };
-        let mut seen = Seen::default();
-        codes.iter().for_each(|&(index, code)| seen.take(&sensor, index, code, floor));
+        let mut seen = FrameStats::default();
+        codes.iter().for_each(|&(index, code)| seen.add(&sensor, index, code, floor));
         seen.choose(&GRIDS, condition, floor)
     }
 
     #[test]
     fn beside_the_middle_are_two_lines_on_each_side() {
-        let lines = |count| (0..count).filter(|&line| is_beside(line, count)).collect::<Vec<_>>();
+        let lines = |count| (0..count).filter(|&line| is_beside_boundary(line, count)).collect::<Vec<_>>();
         assert_eq!([lines(8), lines(4)], [vec![2, 3, 4, 5], vec![0, 1, 2, 3]]);
     }
 

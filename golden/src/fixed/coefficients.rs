@@ -81,16 +81,16 @@ pub fn parity_blocks(quads: Quads, matrix: &Mat<f64>, flip: usize) -> Flipped<f6
     let parity = std::array::from_fn(|target| {
         let source = target ^ flip;
         let mut block = vec![0.0; count * count];
-        for i in (0..count).filter(|&i| lives(quads, i, target)) {
-            for j in (0..count).filter(|&j| lives(quads, j, source)) {
+        for i in (0..count).filter(|&i| has_entry(quads, i, target)) {
+            for j in (0..count).filter(|&j| has_entry(quads, j, source)) {
                 // From the image `from` of row i; under the mirror symmetry the same sum, to the bit, from each.
                 let seen = |from: usize| -> f64 {
-                    let images = (0..4).filter(|lane| quads.counts(j) >> lane & 1 == 1).map(|lane| lane ^ from);
+                    let images = (0..4).filter(|lane| quads.lane_mask(j) >> lane & 1 == 1).map(|lane| lane ^ from);
                     images.map(|lane| sign(source, lane) * matrix[(quads.taxel(i, from), quads.taxel(j, lane))]).sum()
                 };
-                let images = (0..4).filter(|lane| quads.counts(i) >> lane & 1 == 1);
+                let images = (0..4).filter(|lane| quads.lane_mask(i) >> lane & 1 == 1);
                 let sum: f64 = images.map(|from| sign(target, from) * seen(from)).sum();
-                block[i * count + j] = sum / f64::from(quads.counts(i).count_ones());
+                block[i * count + j] = sum / f64::from(quads.lane_mask(i).count_ones());
             }
         }
         block
@@ -123,8 +123,8 @@ pub fn quantise(folded: &[Vec<Flipped<f64>>], bits: u32) -> Vec<Blocks> {
 }
 
 /// Whether quad `index` has an entry of `parity`: odd parities vanish on the middle line they mirror.
-pub fn lives(quads: Quads, index: usize, parity: usize) -> bool {
-    let counts = quads.counts(index);
+pub fn has_entry(quads: Quads, index: usize, parity: usize) -> bool {
+    let counts = quads.lane_mask(index);
     let own_column = counts & 0b0010 != 0;
     let own_row = counts & 0b0100 != 0;
     (own_column || parity & FLIP_X == 0) && (own_row || parity & FLIP_Y == 0)

@@ -38,7 +38,7 @@ const REPLAY: u64 = 3;
 /// From the last row to the search's start: rescaler, unfold, memory.
 const UNFOLD: u64 = 6;
 /// From a sweep's beginning to its judgement, beyond its Q quads: memory 2, Taylor 4, candidates 2, score 6, judge 6.
-const JUDGED: u64 = 20;
+const SELECTION_LATENCY: u64 = 20;
 /// From a subarray's completion to the start of its search.
 const HAND_OVER: u64 = 2;
 /// From the search's start, or a judgement that is waited for, to the next sweep: the move, where it leads, the sweep.
@@ -71,7 +71,7 @@ pub struct Cycles {
 /// source.
 pub fn coarse_period(quads: u64) -> u64 {
     let quads = quads.max(SHORTEST_SWEEP);
-    quads.max((quads + JUDGED).div_ceil(2))
+    quads.max((quads + SELECTION_LATENCY).div_ceil(2))
 }
 
 impl Cycles {
@@ -90,7 +90,8 @@ impl Cycles {
         let quads = model.formats.quads as u64;
         let chained = COARSE_CENTRES.len() as u64 - 1;
         let awaited = 1 + u64::from(HALVINGS);
-        let sweeps = chained * coarse_period(quads) + awaited * (quads.max(SHORTEST_SWEEP) + JUDGED + SET_UP);
+        let sweeps =
+            chained * coarse_period(quads) + awaited * (quads.max(SHORTEST_SWEEP) + SELECTION_LATENCY + SET_UP);
         let search = |&searching: &bool| match model.searches() {
             true => HAND_OVER + SET_UP + if searching { sweeps } else { 0 } + quads + LAST_SWEEP,
             false => UNSEARCHED,
@@ -108,7 +109,7 @@ impl Cycles {
         // Sums leave once the last force is in them.
         let choice = if model.chooses() { choose::LATENCY } else { 0 };
         let first_output =
-            choice + model.prepare.latency() + ACCEPT + searched_at - early + SEND + model.resultants_later();
+            choice + model.prepare.latency() + ACCEPT + searched_at - early + SEND + model.resultants_delay();
         let latency = first_output + (model.force_beats() + model.status_beats()) as u64 - 1;
         Cycles { first_output, latency, total: (taxels << model.prepare.average) + latency, interval: 1 }
     }
@@ -120,9 +121,9 @@ fn passes(model: &Model) -> u64 {
 }
 
 /// Share of the multiplications that the lanes do of those they could, from a subarray's first product to its last.
-pub fn lanes_busy(model: &Model) -> f64 {
+pub fn lane_utilisation(model: &Model) -> f64 {
     if model.board.engine == EngineKind::Serial {
-        return serial::lanes_busy(model);
+        return serial::lane_utilisation(model);
     }
     let Timeline { first_issue, last_issue, products, .. } = timeline(model);
     let lanes = 4 * model.formats.lanes_per_parity as u64;

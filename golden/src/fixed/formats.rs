@@ -30,7 +30,7 @@ use super::quads::Quads;
 use super::resources::Resources;
 use super::schedule::{products, vectors, Flips, Kind, Matrix, EXPONENTS};
 use super::serial;
-use super::storage::{stored, Storage};
+use super::storage::{storage_order, Storage};
 use super::FixedError;
 use crate::board::{Board, EngineKind};
 use crate::matrices::Matrices;
@@ -58,7 +58,7 @@ pub const FORCE_BITS: u32 = 32;
 /// Largest right shift of the force stage: more leaves nothing of any product.
 pub const FORCE_SHIFT_MAX: u32 = 62;
 /// Least rows per group worth computing side by side; below, the lanes would wait for the shift-out.
-const LEAST_LANES: usize = 4;
+const MIN_LANES: usize = 4;
 /// Coarse tiles and candidates beyond the disc reach grid coordinate ±4.
 const REACH: u64 = 4;
 
@@ -256,7 +256,7 @@ pub fn derive(scene: &Scene, shapes: &[Shape], board: &Board) -> Result<Vec<Desi
     let rescale_max = raw_length_max.saturating_sub(vector_bits - 1);
     let headroom = FORCE_BITS - search_bits[0];
     let limbs = (input_low_bits > 0, inverse_low_bits > 0);
-    let order = stored(&products(degree, limbs, shared_a, &flips));
+    let order = storage_order(&products(degree, limbs, shared_a, &flips));
     let count = largest.quads().len();
     let formats = Formats {
         degree,
@@ -295,7 +295,7 @@ pub fn derive(scene: &Scene, shapes: &[Shape], board: &Board) -> Result<Vec<Desi
     };
     let design = |((laid_out, mut quantised), shape): ((LaidOut, Quantised), &Shape)| {
         let LaidOut { formats, storage, .. } = laid_out;
-        storage.drop_from(&mut quantised, shape.quads().len(), formats.lanes_per_parity);
+        storage.zero_pruned(&mut quantised, shape.quads().len(), formats.lanes_per_parity);
         Design { formats, quantised, storage, resources: resources.clone() }
     };
     Ok(laid_out.into_iter().zip(quantised.drain(..)).zip(shapes).map(design).collect())
@@ -374,7 +374,7 @@ fn fit(
     let all = with(1);
     let others = all.1.multipliers() - 4 * quads * product;
     let left = (board.multipliers as usize).saturating_sub(others);
-    let least = LEAST_LANES.min(quads);
+    let least = MIN_LANES.min(quads);
     let per_parity = match scene.fixed.lanes {
         Some(lanes) => (lanes as usize / 4).clamp(1, quads)..=(lanes as usize / 4).clamp(1, quads),
         None => least..=(left / (4 * product)).clamp(least, quads),

@@ -13,6 +13,7 @@ pub mod check;
 pub mod choose;
 pub mod coefficients;
 pub mod cycles;
+pub mod fit_suggestions;
 pub mod fold;
 pub mod force;
 pub mod formats;
@@ -21,7 +22,6 @@ pub mod pass;
 pub mod prepare;
 pub mod quads;
 pub mod receive;
-pub mod remedy;
 pub mod rescale;
 pub mod resources;
 pub mod resultants;
@@ -33,7 +33,7 @@ pub mod storage;
 pub mod unfold;
 
 mod cases;
-pub mod omissions;
+pub mod feature_costs;
 
 mod model;
 mod subarray;

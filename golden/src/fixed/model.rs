@@ -4,22 +4,22 @@ use thiserror::Error;
 
 use super::cases::{shape, Dropped};
 use super::cycles::{Cycles, SHORTEST_SWEEP};
+use super::fit_suggestions::{fit_suggestions, Shortage};
 use super::force::Force;
 use super::formats::{Design, Formats, Quantised, LOG_FRACTION, MU_STEPS};
 use super::prepare::{Prepare, Scale};
 use super::quads::Quads;
-use super::receive::blank;
-use super::remedy::{remedies, Shortage};
+use super::receive::mask_dead;
 use super::resources::Resources;
 use super::resultants::{self, sums};
 use super::search::Best;
 use super::send::{Status, FLAG_COEFFICIENTS, FLAG_CONDITION, FLAG_FOUND, FLAG_NO_CONTACT, STATUS_BEATS};
 use super::storage::Storage;
-use super::subarray::Solved;
+use super::subarray::SubarrayTrace;
 use crate::board::{Board, BoardError, EngineKind};
 use crate::errors::Errors;
 use crate::flags::{frame_flags, Flag};
-use crate::float::receive::receive as judge;
+use crate::float::receive::receive as receive_codes;
 use crate::frame::{Forces, Frame, FrameError};
 use crate::input::{Input, InputError};
 use crate::matrices::{MatricesError, MAX_DEGREE};
@@ -167,13 +167,13 @@ impl Model {
     /// What the scene asks for is not available, its matrices or formats do not exist, or a threshold or noise floor
     /// lacks its full scale. [`FixedError::DoesNotFit`] says what of the board is too small and what would fit.
     pub fn new(scene: &Scene) -> Result<Self, FixedError> {
-        let model = Model::unfitted(scene)?;
-        let short = model.resources.shortages(&model.board);
-        if short.is_empty() {
+        let model = Model::without_fit_check(scene)?;
+        let lacking = model.resources.shortages(&model.board);
+        if lacking.is_empty() {
             return Ok(model);
         }
         let (board, scene) = (model.board.name.clone(), scene.name.clone());
-        Err(FixedError::DoesNotFit(Box::new(Shortage { scene, board, short, remedies: remedies(&model) })))
+        Err(FixedError::DoesNotFit(Box::new(Shortage { scene, board, lacking, suggestions: fit_suggestions(&model) })))
     }
 
     /// The model with a polynomial of another degree, 1 to 3, than the scene's series needs.
@@ -181,16 +181,16 @@ impl Model {
     /// # Errors
     /// As [`Model::new`], which see; what the board lacks is not looked at.
     pub fn of_degree(scene: &Scene, degree: usize) -> Result<Self, FixedError> {
-        Model::given(scene, Scale::new(scene)?, Some(degree.clamp(1, MAX_DEGREE)))
+        Model::with_scale(scene, Scale::new(scene)?, Some(degree.clamp(1, MAX_DEGREE)))
     }
 
     /// The model of a scene that may be too large for its board.
-    pub(crate) fn unfitted(scene: &Scene) -> Result<Self, FixedError> {
-        Model::given(scene, Scale::new(scene)?, None)
+    pub(crate) fn without_fit_check(scene: &Scene) -> Result<Self, FixedError> {
+        Model::with_scale(scene, Scale::new(scene)?, None)
     }
 
     /// The same with readings of another scale than the scene's files say, or another degree than its rule.
-    pub(super) fn given(scene: &Scene, scale: Scale, degree: Option<usize>) -> Result<Self, FixedError> {
+    pub(super) fn with_scale(scene: &Scene, scale: Scale, degree: Option<usize>) -> Result<Self, FixedError> {
         scene.require_supported()?;
         let board = Board::load(&scene.hardware.board)?;
         if board.engine == EngineKind::Serial {
@@ -208,7 +208,7 @@ impl Model {
         let parts = subarrays(scene.partition.case, &scene.sensor)?;
         let shape = parts[0].sensor(&scene.sensor);
         // With dead taxels there is one subarray.
-        let dead = parts[0].own(&scene.input.dead);
+        let dead = parts[0].local_indices(&scene.input.dead);
         let scaled = |field, value: f64, unit: &dyn Fn(f64) -> f64| match scene.input.full_scale_MPa {
             _ if value == 0.0 => Ok(0.0),
             Some(full_scale) => Ok(value / unit(full_scale)),
@@ -253,7 +253,7 @@ impl Model {
             || scene.scaled_input().is_some();
         if needs && scene.input.full_scale_MPa.is_none() {
             let gain = Scale::new(&scene)?.largest;
-            let peak = |frame: &Frame| scene.input.blank(frame.clone()).peak_MPa();
+            let peak = |frame: &Frame| scene.input.mask_dead(frame.clone()).peak_MPa();
             let largest = gain * frames.iter().map(peak).fold(0.0, f64::max);
             // Frames of nothing but zeros leave any scale: the default of a single one.
             scene.input.full_scale_MPa = Some(if largest > 0.0 { largest } else { 1.0 });
@@ -315,10 +315,10 @@ impl Model {
         if self.chooses() {
             return self.run_chosen(codes);
         }
-        let codes = &blank(&self.prepare.run(codes), &self.dead);
+        let codes = &mask_dead(&self.prepare.run(codes), &self.dead);
         let sensor = &self.scene.sensor;
-        let solved: Vec<Solved> =
-            self.parts.iter().map(|part| Solved::new(self, &part.gather(sensor, codes))).collect();
+        let solved: Vec<SubarrayTrace> =
+            self.parts.iter().map(|part| SubarrayTrace::new(self, &part.gather(sensor, codes))).collect();
         let searched: Vec<bool> = solved.iter().map(|s| s.condition && self.searches()).collect();
         let cycles = Cycles::of(self, &searched);
 
@@ -340,31 +340,32 @@ impl Model {
                 normalise: s.normalise,
                 rescale_saturations: s.saturations,
                 force_saturations,
-                cycles: (cycles.first_output - self.prepare.latency() - self.resultants_later()) as u32,
+                cycles: (cycles.first_output - self.prepare.latency() - self.resultants_delay()) as u32,
             };
             status.beats()
         });
         let status = status.collect();
-        let quads = |name, stream: fn(&Solved) -> &[[i64; 4]]| Stage {
+        let quads = |name, stream: fn(&SubarrayTrace) -> &[[i64; 4]]| Stage {
             name,
             words: solved.iter().flat_map(stream).map(|quad| quad.to_vec()).collect(),
         };
         let sweeps = solved.iter().flat_map(|s| &s.found.sweeps);
-        let judged = |b: &Best| vec![i64::from(b.position[0]), i64::from(b.position[1]), b.score, i64::from(b.taken)];
+        let candidate =
+            |b: &Best| vec![i64::from(b.position[0]), i64::from(b.position[1]), b.score, i64::from(b.taken)];
         Trace {
-            beats: match self.wants_resultants() {
+            beats: match self.sends_resultants() {
                 false => forces.iter().map(|f| f.words).collect(),
                 true => self.parts.iter().flat_map(|part| resultants::beats(&sums(sensor, part, &forces))).collect(),
             },
             status,
-            stages: self.taken_turns(vec![
+            stages: self.as_engine_streams(vec![
                 Stage { name: "receive", words: codes.iter().map(|&code| vec![i64::from(code)]).collect() },
                 quads("normalise", |s| &s.normalised),
                 quads("fold", |s| &s.folded),
                 quads("pass", |s| &s.passed),
                 quads("rescale", |s| &s.rescaled),
                 quads("unfold", |s| &s.unfolded),
-                Stage { name: "search", words: sweeps.map(judged).collect() },
+                Stage { name: "search", words: sweeps.map(candidate).collect() },
                 quads("force", |s| &s.found.values),
             ]),
             cycles,
@@ -373,7 +374,7 @@ impl Model {
 
     /// The stages as the board's engine passes them on: the serial one has a single shifter, which passes on words, not
     /// quads.
-    fn taken_turns(&self, mut stages: Vec<Stage>) -> Vec<Stage> {
+    fn as_engine_streams(&self, mut stages: Vec<Stage>) -> Vec<Stage> {
         if self.board.engine == EngineKind::Serial {
             for stage in stages.iter_mut().filter(|stage| SINGLE_WORDS.contains(&stage.name)) {
                 stage.words = stage.words.iter().flatten().map(|&word| vec![word]).collect();
@@ -423,11 +424,11 @@ impl Model {
         }
         let lsb = self.force_lsb_N(codes.full_scale_MPa);
         let axis = |axis: usize| beats.iter().map(|beat| f64::from(beat[axis]) * lsb).collect();
-        let forces = match self.wants_resultants() {
+        let forces = match self.sends_resultants() {
             false => Forces { fx: axis(0), fy: axis(1), fz: axis(2) },
             true => Forces::default(),
         };
-        let resultants = self.wants_resultants().then(|| self.resultants(beats, lsb));
+        let resultants = self.sends_resultants().then(|| self.resultants(beats, lsb));
         let sum = |all: &Vec<Resultant>| [0, 1, 2].map(|k| all.iter().map(|r| r.force_N[k]).sum::<f64>());
         let resultant_N = resultants.as_ref().map_or_else(|| forces.resultant(), sum);
 
@@ -442,7 +443,7 @@ impl Model {
             let Some(status) = Status::of_beats(beats) else { continue };
             let own = part.gather(sensor, &codes.codes);
             let floor = noise_floor_codes(&self.scene, &codes);
-            let receipt = judge(sensor, part, &own, floor, self.scene.partition.condition);
+            let received = receive_codes(sensor, part, &own, floor, self.scene.partition.condition);
             let met = status.flags & FLAG_CONDITION != 0;
             let found = status.flags & FLAG_FOUND != 0;
             if met && self.searches() && !found {
@@ -460,14 +461,14 @@ impl Model {
                 rows: part.rows,
                 cols: part.cols,
                 centroid_condition: met,
-                compression_centroid_mm: receipt.compression_centroid_mm,
-                tension_centroid_mm: receipt.tension_centroid_mm,
+                compression_centroid_mm: received.compression_centroid_mm,
+                tension_centroid_mm: received.tension_centroid_mm,
                 mu: status.position.map(|x| f64::from(x) * step),
                 objective_value: found.then(|| -f64::from(status.score) / f64::from(1u32 << LOG_FRACTION)),
             });
         }
         let mut result = assemble(&self.scene, frame, engine, subarrays, forces, flags);
-        if self.wants_resultants() {
+        if self.sends_resultants() {
             // Without forces per taxel only the device knows of a contact.
             let none = status.iter().step_by(STATUS_BEATS).all(|beat| beat[2] as u32 & FLAG_NO_CONTACT != 0);
             result.flags.retain(|flag| none || *flag != Flag::NoContact);
@@ -491,21 +492,21 @@ impl Model {
     }
 
     /// Whether sums leave in the place of forces.
-    pub fn wants_resultants(&self) -> bool {
+    pub fn sends_resultants(&self) -> bool {
         self.scene.output.forces == ForceOutput::Resultants
     }
 
     /// Beats of a frame before its status.
     pub fn force_beats(&self) -> usize {
-        match self.wants_resultants() {
+        match self.sends_resultants() {
             false => self.scene.sensor.taxels(),
             true => resultants::BEATS * self.parts.len(),
         }
     }
 
     /// How much later than the first force the first beat leaves.
-    pub(super) fn resultants_later(&self) -> u64 {
-        match self.wants_resultants() {
+    pub(super) fn resultants_delay(&self) -> u64 {
+        match self.sends_resultants() {
             false => 0,
             true => self.scene.sensor.taxels() as u64 - 1 + resultants::LATENCY,
         }

@@ -4,7 +4,7 @@
 //! and its images (r, C−1−c), (R−1−r, c), (R−1−r, C−1−c) share a word, so that fold and unfold are butterflies at
 //! the memory port. An odd row or column count leaves a middle line whose images coincide: its
 //! sample is written to every coinciding lane, which makes the odd parities vanish there and keeps unfold free of
-//! special cases; [`Quads::counts`] says which lanes to count once.
+//! special cases; [`Quads::lane_mask`] says which lanes to count once.
 
 /// The quad layout of a subarray of `rows` × `cols` taxels.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -17,7 +17,7 @@ pub struct Quads {
 
 /// Where one taxel lives.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Place {
+pub struct QuadLocation {
     /// Quad address, row-major over the upper left quarter.
     pub address: usize,
     /// Lane `2·(lower half) + (right half)` the taxel is read from.
@@ -48,7 +48,7 @@ impl Quads {
     }
 
     /// Where taxel (`row`, `col`) of the subarray lives.
-    pub fn place(&self, row: usize, col: usize) -> Place {
+    pub fn locate(&self, row: usize, col: usize) -> QuadLocation {
         let (mirror_row, mirror_col) = (self.rows - 1 - row, self.cols - 1 - col);
         let address = row.min(mirror_row) * self.quad_cols() + col.min(mirror_col);
         let lane = 2 * usize::from(row > mirror_row) + usize::from(col > mirror_col);
@@ -59,7 +59,7 @@ impl Quads {
         if col == mirror_col {
             mask |= mask << 1;
         }
-        Place { address, lane, mask }
+        QuadLocation { address, lane, mask }
     }
 
     /// Taxel index (row-major in the subarray) of `lane` at quad `address`.
@@ -76,7 +76,7 @@ impl Quads {
     }
 
     /// Which lanes of quad `address` are taxels of their own (bit l = lane l), not a second copy.
-    pub fn counts(&self, address: usize) -> u8 {
+    pub fn lane_mask(&self, address: usize) -> u8 {
         let (row, col) = (address / self.quad_cols(), address % self.quad_cols());
         let middle_row = 2 * row + 1 == self.rows;
         let middle_col = 2 * col + 1 == self.cols;
@@ -116,16 +116,16 @@ mod tests {
             let mut counted = vec![0; rows * cols];
             for row in 0..rows {
                 for col in 0..cols {
-                    let place = quads.place(row, col);
+                    let location = quads.locate(row, col);
                     for lane in 0..4 {
-                        let here = quads.taxel(place.address, lane) == row * cols + col;
-                        assert_eq!(here, place.mask >> lane & 1 == 1, "{rows}×{cols} ({row}, {col}) lane {lane}");
+                        let here = quads.taxel(location.address, lane) == row * cols + col;
+                        assert_eq!(here, location.mask >> lane & 1 == 1, "{rows}×{cols} ({row}, {col}) lane {lane}");
                     }
                 }
             }
             for address in 0..quads.len() {
                 for lane in 0..4 {
-                    counted[quads.taxel(address, lane)] += usize::from(quads.counts(address) >> lane & 1 == 1);
+                    counted[quads.taxel(address, lane)] += usize::from(quads.lane_mask(address) >> lane & 1 == 1);
                 }
             }
             assert!(counted.iter().all(|&n| n == 1), "{rows}×{cols}");

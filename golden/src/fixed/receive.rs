@@ -23,7 +23,7 @@ pub struct Received {
 }
 
 /// The codes of an array without what its `dead` taxels (row-major) read.
-pub fn blank(codes: &[i32], dead: &[usize]) -> Vec<i32> {
+pub fn mask_dead(codes: &[i32], dead: &[usize]) -> Vec<i32> {
     codes.iter().enumerate().map(|(taxel, &code)| if dead.contains(&taxel) { 0 } else { code }).collect()
 }
 
@@ -45,6 +45,6 @@ mod tests {
         assert_eq!(receive(&[5, -3, 0], 3), Received { magnitude: 7, positive: true, negative: false });
         assert_eq!(receive(&[0, 0], 0), Received::default());
         assert!(receive(&[-1], 0).negative);
-        assert_eq!(blank(&[7, -8, 9], &[1]), [7, 0, 9]);
+        assert_eq!(mask_dead(&[7, -8, 9], &[1]), [7, 0, 9]);
     }
 }

@@ -21,7 +21,7 @@ use serde::Serialize;
 use super::arith::{bit_length, signed_bits};
 use super::formats::{Formats, LaidOut, FORCE_BITS, HALVINGS, MULTIPLIER_BITS};
 use super::prepare::GAIN_BITS;
-use super::resultants::PLACE_BITS;
+use super::resultants::POSITION_BITS;
 use super::schedule::vectors;
 use super::storage::word_bits;
 use crate::board::Board;
@@ -184,7 +184,7 @@ impl Resources {
 pub fn resultant_multipliers(scene: &Scene, board: &Board) -> usize {
     match scene.output.forces {
         ForceOutput::Taxels => 0,
-        ForceOutput::Resultants => 2 * board.multipliers_for(FORCE_BITS, PLACE_BITS + 1),
+        ForceOutput::Resultants => 2 * board.multipliers_for(FORCE_BITS, POSITION_BITS + 1),
     }
 }
 

@@ -17,9 +17,9 @@ pub const SUMS: usize = 6;
 /// Beats of a subarray.
 pub const BEATS: usize = 2 * SUMS / 3;
 /// Width of X and Y: |2·255 − 255| and a sign.
-pub const PLACE_BITS: u32 = 9;
+pub const POSITION_BITS: u32 = 9;
 /// Width of a sum: a force word, 2^16 taxels, and X or Y.
-pub const SUM_BITS: u32 = 32 + 16 + PLACE_BITS;
+pub const SUM_BITS: u32 = 32 + 16 + POSITION_BITS;
 /// Cycles from the last force to the first beat.
 pub const LATENCY: u64 = 4;
 
@@ -27,7 +27,7 @@ pub const LATENCY: u64 = 4;
 pub fn sums(sensor: &Sensor, part: &Subarray, forces: &[Force]) -> [i64; SUMS] {
     let mut sums = [0; SUMS];
     for index in part.indices(sensor) {
-        let [x, y] = place(sensor, index);
+        let [x, y] = half_pitches(sensor, index);
         let [fx, fy, fz] = forces[index].words.map(i64::from);
         let pressed = fz.max(0);
         for (sum, value) in sums.iter_mut().zip([fx, fy, fz, pressed, x * pressed, y * pressed]) {
@@ -38,7 +38,7 @@ pub fn sums(sensor: &Sensor, part: &Subarray, forces: &[Force]) -> [i64; SUMS] {
 }
 
 /// X and Y of a taxel of the array.
-pub fn place(sensor: &Sensor, index: usize) -> [i64; 2] {
+pub fn half_pitches(sensor: &Sensor, index: usize) -> [i64; 2] {
     let from_centre = |at: usize, count: usize| 2 * at as i64 - (count as i64 - 1);
     [from_centre(index % sensor.cols, sensor.cols), from_centre(index / sensor.cols, sensor.rows)]
 }

@@ -40,7 +40,7 @@ pub struct Best {
 
 /// Outcome of the search in one subarray.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Found {
+pub struct SearchResult {
     /// The state after each sweep; none when the search was skipped.
     pub sweeps: Vec<Best>,
     /// μ* in units of mu_max / (3·2^7).
@@ -66,7 +66,7 @@ impl Block {
         let mut sum = [0; 10];
         for (address, quad) in taxels.iter().enumerate() {
             for (lane, w) in quad.iter().enumerate() {
-                if layout.counts(address) >> lane & 1 == 1 {
+                if layout.lane_mask(address) >> lane & 1 == 1 {
                     sum.iter_mut().zip(w).for_each(|(s, w)| *s += w);
                 }
             }
@@ -90,7 +90,7 @@ impl Block {
         let mut totals = [0; 9];
         for (address, quad) in self.taxels.iter().enumerate() {
             for (lane, w) in quad.iter().enumerate() {
-                if layout.counts(address) >> lane & 1 == 1 {
+                if layout.lane_mask(address) >> lane & 1 == 1 {
                     let values = candidates(w);
                     for k in 0..9 {
                         totals[k] += log2(values[k].abs() + (sums[k].max(0) >> EPSILON_SHIFT));
@@ -163,7 +163,7 @@ pub fn in_disc(p: [i32; 2], level: u32) -> bool {
 }
 
 /// Searches `start`, whose centre is μ = 0; with `enabled` false p(0) is passed on.
-pub fn search(layout: Quads, start: Block, enabled: bool) -> Found {
+pub fn search(layout: Quads, start: Block, enabled: bool) -> SearchResult {
     let mut best = Best::default();
     let mut kept = start.clone();
     let mut kept_centre = [0, 0];
@@ -193,7 +193,7 @@ pub fn search(layout: Quads, start: Block, enabled: bool) -> Found {
         }
     }
     kept.step(difference(best.position, kept_centre), false);
-    Found {
+    SearchResult {
         sweeps,
         position: best.position,
         score: found.then_some(best.score),

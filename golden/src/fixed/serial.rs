@@ -36,7 +36,7 @@ pub const ROW_GAP: u64 = 4;
 /// A sweep beyond its slots: memories, chains, candidates, score.
 pub const SWEEP_TAIL: u64 = 33;
 /// Nine candidates are judged, one every two cycles, in five cycles each.
-pub const JUDGEMENT: u64 = 2 * 8 + 5;
+pub const SELECTION: u64 = 2 * 8 + 5;
 /// Cycles per beat on the output.
 pub const BEAT: u64 = 10;
 /// Cycles to the first beat.
@@ -173,7 +173,7 @@ pub(super) fn cycles(model: &Model, searched: bool) -> Cycles {
     let passes = passes(model);
     let sweep = 1 + polynomials(formats) as u64 * SLOT + SWEEP_TAIL;
     let sweeps = if searched { COARSE_CENTRES.len() as u64 + u64::from(HALVINGS) } else { 0 };
-    let search = sweeps * (sweep + JUDGEMENT) + sweep;
+    let search = sweeps * (sweep + SELECTION) + sweep;
     let first_output = START + fold + passes + search + MU_WORDS + FIRST_BEAT;
     let beats = (model.scene.sensor.taxels() + STATUS_BEATS) as u64;
     let latency = first_output + (beats - 1) * BEAT;
@@ -189,7 +189,7 @@ fn passes(model: &Model) -> u64 {
 }
 
 /// Share of the cycles of the passes in which the lanes multiply.
-pub(super) fn lanes_busy(model: &Model) -> f64 {
+pub(super) fn lane_utilisation(model: &Model) -> f64 {
     let quads = model.formats.quads as u64;
     let products: usize = schedule(&model.formats).iter().map(Vec::len).sum();
     (products as u64 * quads * quads) as f64 / passes(model) as f64

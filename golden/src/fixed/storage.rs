@@ -33,7 +33,7 @@ fn rows(group: usize, per_parity: usize, quads: usize) -> std::ops::Range<usize>
 }
 
 /// Matrices in the order in which a schedule first needs them.
-pub fn stored(schedule: &[Vec<Product>]) -> Vec<Matrix> {
+pub fn storage_order(schedule: &[Vec<Product>]) -> Vec<Matrix> {
     let mut order = Vec::new();
     for product in schedule.iter().flatten() {
         if !order.contains(&product.matrix) {
@@ -116,7 +116,7 @@ impl Storage {
     }
 
     /// Zeroes what the memory does not hold, so that the model multiplies with what the hardware has.
-    pub fn drop_from(&self, quantised: &mut Quantised, quads: usize, per_parity: usize) {
+    pub fn zero_pruned(&self, quantised: &mut Quantised, quads: usize, per_parity: usize) {
         for (index, &matrix) in self.matrices.iter().enumerate() {
             for (group, kept) in self.columns[index].iter().enumerate() {
                 for block in blocks_mut(quantised, matrix).into_iter().flat_map(|blocks| &mut blocks.parity) {

@@ -5,16 +5,16 @@ use super::model::Model;
 use super::pass::{pass, swap, Operands};
 use super::receive::Received;
 use super::schedule::{is_transposed, schedule, EXPONENTS};
-use super::search::{search, Block, Found};
+use super::search::{search, Block, SearchResult};
 use super::{fold, force, normalise, receive, rescale, unfold};
 use crate::scene::Condition;
 
 /// A vector of quads that a stage passed on.
-type Quads = Vec<[i64; 4]>;
+type QuadStream = Vec<[i64; 4]>;
 
 /// What became of a subarray, and what each stage passed on.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Solved {
+pub struct SubarrayTrace {
     /// The scene's condition is met.
     pub condition: bool,
     /// Left shift of `normalise`.
@@ -24,20 +24,20 @@ pub struct Solved {
     /// Words that `rescale` saturated.
     pub saturations: u32,
     /// The search's outcome, with p(μ*).
-    pub found: Found,
+    pub found: SearchResult,
     /// Stream of `normalise`.
-    pub normalised: Quads,
+    pub normalised: QuadStream,
     /// Stream of `fold`.
-    pub folded: Quads,
+    pub folded: QuadStream,
     /// Stream of `pass`.
-    pub passed: Quads,
+    pub passed: QuadStream,
     /// Stream of `rescale`.
-    pub rescaled: Quads,
+    pub rescaled: QuadStream,
     /// Stream of `unfold`.
-    pub unfolded: Quads,
+    pub unfolded: QuadStream,
 }
 
-impl Solved {
+impl SubarrayTrace {
     /// Solves the subarray with these `codes`, row-major in it.
     pub fn new(model: &Model, codes: &[i32]) -> Self {
         let formats = &model.formats;
@@ -80,7 +80,7 @@ impl Solved {
         }
         let searching = condition && model.searches();
         let found = search(layout, Block::new(layout, polynomials), searching);
-        Solved {
+        SubarrayTrace {
             condition,
             normalise: left,
             rescale: right,

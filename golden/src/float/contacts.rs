@@ -22,7 +22,7 @@
 //!
 //! Cells larger than the depth smear a contact's rim, which shifts μ, and what one contact is off by is taken for shear
 //! of its neighbours. Where elliptic contacts explain the stress (the misfit is what noise and quadrature leave, as in
-//! `auto`) they are free of both: `objective::several` fits them together, from regions of several widths, before
+//! `auto`) they are free of both: `objective::multi_ellipse` fits them together, from regions of several widths, before
 //! anything is searched; each contact's μ, load and cells are its ellipse's. Where they do not, the regions of the
 //! nearest ellipses are one more drawing to search in.
 //!
@@ -38,25 +38,25 @@ mod ellipses;
 
 use super::objective::taxels::Taxels;
 use super::objective::Objective;
-use super::pass::{place, Polynomial};
-use super::search::{search, Found};
+use super::pass::{term_index, Polynomial};
+use super::search::{search, SearchResult};
 use super::segment::{neighbours, segment, Segments, WIDTH};
 use crate::frame::Forces;
-use crate::matrices::{Matrices, Passes};
+use crate::matrices::{FoldedMatrices, Matrices};
 
 /// Most sweeps over one set of regions.
 pub const SWEEPS: usize = 6;
 /// Most times regions are drawn.
 pub const ROUNDS: usize = 4;
 /// Movement of μ that counts as none, and distance of two μ that are one, over mu_max.
-const STILL: f64 = 1.0 / 400.0;
-const ALIKE: f64 = 0.05;
+const MU_TOLERANCE: f64 = 1.0 / 400.0;
+const MU_MERGE_DISTANCE: f64 = 0.05;
 /// Widths of smoothing tried, over h.
 const WIDTHS: [f64; 2] = [WIDTH, 0.6];
 /// What a further region must add to the score, in bits.
 const REGION_COST: f64 = 5.0;
 /// Change of p that counts as none, relative to its largest entry.
-const SETTLED: f64 = 1e-9;
+const P_TOLERANCE: f64 = 1e-9;
 /// Most relaxations of p for given μ; each takes the error down by r or better.
 const RELAXATIONS: usize = 60;
 
@@ -66,7 +66,7 @@ pub struct Contacts {
     /// Region of each taxel.
     pub segments: Segments,
     /// What the last search in each region found, `None` where it was not searched or found nothing.
-    pub found: Vec<Option<Found>>,
+    pub found: Vec<Option<SearchResult>>,
     /// Normal forces in N.
     pub p: Vec<f64>,
     /// Sweeps over all regions.
@@ -77,7 +77,7 @@ pub struct Contacts {
 
 /// A frame as ellipses see it.
 #[derive(Clone, Copy)]
-pub(crate) struct Stress<'a> {
+pub(crate) struct MeasuredStress<'a> {
     /// Where it was read.
     pub taxels: &'a Taxels,
     /// b in MPa.
@@ -97,7 +97,7 @@ pub struct Solver<'a> {
     /// p₀ = Cz⁺ b in N.
     pub p0: &'a [f64],
     /// What ellipses are fitted to, where every taxel is read.
-    pub(crate) stress: Option<Stress<'a>>,
+    pub(crate) stress: Option<MeasuredStress<'a>>,
     /// Whether the region of these labels with this number is to be searched.
     pub searched: &'a dyn Fn(&Segments, usize) -> bool,
 }
@@ -117,18 +117,18 @@ impl Contacts {
     }
 }
 
-fn mu_of(found: &Option<Found>) -> [f64; 2] {
+fn mu_of(found: &Option<SearchResult>) -> [f64; 2] {
     found.map_or([0.0; 2], |found| found.mu)
 }
 
 impl Solver<'_> {
     /// Finds the contacts, starting from the family of one μ and what was found in it.
-    pub fn solve(&self, family: &Polynomial, found: Found) -> Contacts {
+    pub fn solve(&self, family: &Polynomial, found: SearchResult) -> Contacts {
         let p = family.eval(found.mu);
         let segments = Segments::whole(p.len());
         let start = Contacts { segments, found: vec![Some(found)], p, sweeps: 0, converged: true };
         let fit = self.fit(&start);
-        if let Some(fitted) = fit.as_ref().and_then(|fit| self.explained(fit, &start)) {
+        if let Some(fitted) = fit.as_ref().and_then(|fit| self.from_ellipses(fit, &start)) {
             return fitted;
         }
         let mut best = (found.objective, start.clone());
@@ -139,30 +139,30 @@ impl Solver<'_> {
             }
         };
         for width in WIDTHS {
-            keep(self.drawn(&|p| segment(&self.matrices.sensor, p, width), &start));
+            keep(self.solve_regions(&|p| segment(&self.matrices.sensor, p, width), &start));
         }
         if let Some(fit) = &fit {
             let segments = Segments::numbered(&fit.labels(&self.matrices.sensor));
-            keep(self.drawn(&|_| segments.clone(), &start));
+            keep(self.solve_regions(&|_| segments.clone(), &start));
         }
         let best = best.1;
         // As many ellipses as were fitted already come to the same.
         if fit.is_some_and(|fit| fit.patches.len() == best.segments.count) || best.segments.count == 1 {
             return best;
         }
-        self.fit(&best).and_then(|fit| self.explained(&fit, &best)).unwrap_or(best)
+        self.fit(&best).and_then(|fit| self.from_ellipses(&fit, &best)).unwrap_or(best)
     }
 
     /// Solves for regions drawn from p, again and again as p gets better.
-    fn drawn(&self, draw: &dyn Fn(&[f64]) -> Segments, start: &Contacts) -> Contacts {
-        let mut state = self.redrawn(start, draw(&start.p));
+    fn solve_regions(&self, draw: &dyn Fn(&[f64]) -> Segments, start: &Contacts) -> Contacts {
+        let mut state = self.with_regions(start, draw(&start.p));
         if state.segments.count == 1 {
             return start.clone();
         }
         for _ in 0..ROUNDS {
             let before = state.segments.clone();
             self.sweep(&mut state);
-            while let Some((a, b)) = self.alike(&state) {
+            while let Some((a, b)) = self.similar_pair(&state) {
                 state.found[a] = state.found[a].or(state.found[b]);
                 state.found.remove(b);
                 state.segments = state.segments.joined(a, b);
@@ -175,14 +175,14 @@ impl Solver<'_> {
             if segments == state.segments || segments == before {
                 return state;
             }
-            state = Contacts { converged: false, ..self.redrawn(&state, segments) };
+            state = Contacts { converged: false, ..self.with_regions(&state, segments) };
         }
         self.sweep(&mut state);
         state
     }
 
     /// New regions, each with the μ that its strongest taxel had.
-    fn redrawn(&self, state: &Contacts, segments: Segments) -> Contacts {
+    fn with_regions(&self, state: &Contacts, segments: Segments) -> Contacts {
         let strongest = |region: usize| {
             let own = (0..state.p.len()).filter(|&k| segments.labels[k] == region);
             own.max_by(|&a, &b| state.p[a].total_cmp(&state.p[b]))
@@ -211,7 +211,7 @@ impl Solver<'_> {
                 self.relax(state);
             }
             state.sweeps += 1;
-            state.converged = moved <= STILL * self.mu_max;
+            state.converged = moved <= MU_TOLERANCE * self.mu_max;
             if state.converged {
                 break;
             }
@@ -221,11 +221,11 @@ impl Solver<'_> {
     /// The family of one region, the others held.
     fn family(&self, state: &Contacts, region: usize) -> Polynomial {
         let inside = |k: usize| state.segments.labels[k] == region;
-        let held: Vec<[f64; 2]> =
+        let other_mu: Vec<[f64; 2]> =
             (0..state.p.len()).map(|k| if inside(k) { [0.0; 2] } else { state.mu(state.segments.labels[k]) }).collect();
-        let mut coefficients = vec![self.answer(&state.p, &held)];
+        let mut coefficients = vec![self.iterate(&state.p, &other_mu)];
         let masked = |v: &[f64]| -> Vec<f64> { (0..v.len()).map(|k| if inside(k) { v[k] } else { 0.0 }).collect() };
-        let Passes { basis, ax, ay, .. } = &self.matrices.passes;
+        let FoldedMatrices { basis, ax, ay, .. } = &self.matrices.folded;
         let degree = self.matrices.degree;
         let mut last = vec![basis.fold(&masked(&coefficients[0]))];
         for order in 1..=degree {
@@ -238,7 +238,7 @@ impl Solver<'_> {
                 if j > 0 {
                     ay.accumulate(&last[j - 1], -1.0, &mut v);
                 }
-                debug_assert_eq!(coefficients.len(), place(order - j, j));
+                debug_assert_eq!(coefficients.len(), term_index(order - j, j));
                 coefficients.push(basis.unfold(&v));
                 folded.push(basis.fold(&masked(&coefficients[coefficients.len() - 1])));
             }
@@ -248,34 +248,34 @@ impl Solver<'_> {
     }
 
     /// p₀ − Ax(m1∘p) − Ay(m2∘p)
-    fn answer(&self, p: &[f64], mu: &[[f64; 2]]) -> Vec<f64> {
-        let Passes { basis, ax, ay, .. } = &self.matrices.passes;
-        let mut answer = vec![0.0; p.len()];
+    fn iterate(&self, p: &[f64], mu: &[[f64; 2]]) -> Vec<f64> {
+        let FoldedMatrices { basis, ax, ay, .. } = &self.matrices.folded;
+        let mut next = vec![0.0; p.len()];
         for (axis, a) in [ax, ay].into_iter().enumerate() {
             let shear: Vec<f64> = p.iter().zip(mu).map(|(p, mu)| mu[axis] * p).collect();
-            a.accumulate(&basis.fold(&shear), -1.0, &mut answer);
+            a.accumulate(&basis.fold(&shear), -1.0, &mut next);
         }
-        let mut answer = basis.unfold(&answer);
-        answer.iter_mut().zip(self.p0).for_each(|(p, p0)| *p += p0);
-        answer
+        let mut next = basis.unfold(&next);
+        next.iter_mut().zip(self.p0).for_each(|(p, p0)| *p += p0);
+        next
     }
 
     /// Iterates p = p₀ − Ax(m1∘p) − Ay(m2∘p) for the state's μ until it stands still.
     fn relax(&self, state: &mut Contacts) {
         let mu: Vec<[f64; 2]> = state.segments.labels.iter().map(|&region| state.mu(region)).collect();
         for _ in 0..RELAXATIONS {
-            let next = self.answer(&state.p, &mu);
+            let next = self.iterate(&state.p, &mu);
             let size = next.iter().fold(0.0f64, |size, p| p.abs().max(size));
             let moved = next.iter().zip(&state.p).fold(0.0f64, |moved, (a, b)| (a - b).abs().max(moved));
             state.p = next;
-            if moved <= SETTLED * size {
+            if moved <= P_TOLERANCE * size {
                 return;
             }
         }
     }
 
     /// Two neighbours whose μ came out alike.
-    fn alike(&self, state: &Contacts) -> Option<(usize, usize)> {
+    fn similar_pair(&self, state: &Contacts) -> Option<(usize, usize)> {
         let labels = &state.segments.labels;
         let sensor = &self.matrices.sensor;
         let pairs = (0..labels.len()).flat_map(|k| neighbours(sensor, k).map(move |other| (labels[k], labels[other])));
@@ -285,7 +285,7 @@ impl Solver<'_> {
         };
         pairs
             .filter(|(a, b)| a < b)
-            .filter(|pair| distance(pair) <= ALIKE * self.mu_max)
+            .filter(|pair| distance(pair) <= MU_MERGE_DISTANCE * self.mu_max)
             .min_by(|a, b| distance(a).total_cmp(&distance(b)))
     }
 }

@@ -18,20 +18,20 @@
 mod auto;
 mod compressive;
 pub(crate) mod disc;
-mod even;
+mod estimate;
 mod fit;
+pub(crate) mod multi_ellipse;
 pub(crate) mod patch;
 mod radial;
-pub(crate) mod several;
-mod subject;
 mod symmetric;
+mod symmetric_pressure;
 pub(crate) mod taxels;
 
-pub(crate) use auto::explained;
+pub(crate) use auto::misfit_limit;
 pub use auto::Auto;
 pub use compressive::Compressive;
+pub use estimate::{Estimate, SearchInput};
 pub use patch::Patch;
-pub use subject::{Estimate, Subject};
 pub use symmetric::Symmetric;
 
 use super::search::search;
@@ -45,8 +45,8 @@ pub trait Objective {
 
     /// The best μ of a subarray, `None` when no candidate presses: the shared search over the scores, unless the
     /// objective has a way of its own.
-    fn find(&self, subject: &Subject) -> Option<Estimate> {
-        let found = search(subject.family, subject.mu_max, &ByScore(self))?;
+    fn find(&self, input: &SearchInput) -> Option<Estimate> {
+        let found = search(input.family, input.mu_max, &ByScore(self))?;
         Some(Estimate { found, load_N: None })
     }
 }
@@ -59,8 +59,8 @@ impl<T: Objective + ?Sized> Objective for ByScore<'_, T> {
         self.0.score(p)
     }
 
-    fn find(&self, subject: &Subject) -> Option<Estimate> {
-        self.0.find(subject)
+    fn find(&self, input: &SearchInput) -> Option<Estimate> {
+        self.0.find(input)
     }
 }
 

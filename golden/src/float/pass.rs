@@ -17,7 +17,7 @@
 #[cfg(test)]
 mod tests;
 
-use crate::matrices::{Matrices, Passes};
+use crate::matrices::{FoldedMatrices, Matrices};
 use faer::linalg::solvers::Solve;
 use faer::{Col, ColRef, Mat};
 
@@ -31,7 +31,7 @@ pub struct Polynomial {
 }
 
 /// Place of v_ij in [`Polynomial::coefficients`].
-pub fn place(i: usize, j: usize) -> usize {
+pub fn term_index(i: usize, j: usize) -> usize {
     let order = i + j;
     order * (order + 1) / 2 + j
 }
@@ -44,7 +44,7 @@ impl Polynomial {
 
     /// The family cut off at a degree; 0 is p₀ alone, for a subarray that is not searched.
     pub fn of_degree(matrices: &Matrices, b: &[f64], degree: usize) -> Polynomial {
-        let Passes { basis, cz_pinv, ax, ay } = &matrices.passes;
+        let FoldedMatrices { basis, cz_pinv, ax, ay } = &matrices.folded;
         let n = b.len();
         let mut first = vec![0.0; n];
         cz_pinv.accumulate(&basis.fold(b), 1.0, &mut first);
@@ -54,10 +54,10 @@ impl Polynomial {
                 let i = order - j;
                 let mut v = vec![0.0; n];
                 if i > 0 {
-                    ax.accumulate(&folded[place(i - 1, j)], -1.0, &mut v);
+                    ax.accumulate(&folded[term_index(i - 1, j)], -1.0, &mut v);
                 }
                 if j > 0 {
-                    ay.accumulate(&folded[place(i, j - 1)], -1.0, &mut v);
+                    ay.accumulate(&folded[term_index(i, j - 1)], -1.0, &mut v);
                 }
                 folded.push(v);
             }
@@ -68,7 +68,7 @@ impl Polynomial {
 
     /// v_ij, i + j up to the degree.
     pub fn v(&self, i: usize, j: usize) -> &[f64] {
-        &self.coefficients[place(i, j)]
+        &self.coefficients[term_index(i, j)]
     }
 
     /// p(μ) in N.

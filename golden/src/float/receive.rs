@@ -17,7 +17,7 @@ use crate::sensor::Sensor;
 
 /// What is known of a subarray when its last code has arrived.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Receipt {
+pub struct Received {
     /// Largest |code|.
     pub max_code: i32,
     /// Some code is above the floor.
@@ -51,7 +51,7 @@ impl Moments {
 }
 
 /// Judges the codes of the subarray `part` of `sensor`.
-pub fn receive(sensor: &Sensor, part: &Subarray, codes: &[i32], floor: i32, condition: Condition) -> Receipt {
+pub fn receive(sensor: &Sensor, part: &Subarray, codes: &[i32], floor: i32, condition: Condition) -> Received {
     let (mut compression, mut tension) = (Moments::default(), Moments::default());
     let mut max_code = 0;
     let half_pitches = |index: usize, count: usize| 2 * index as i64 - (count as i64 - 1);
@@ -69,7 +69,7 @@ pub fn receive(sensor: &Sensor, part: &Subarray, codes: &[i32], floor: i32, cond
     }
     let (positive, negative) = (compression.weight != 0, tension.weight != 0);
     let loaded = max_code > floor;
-    Receipt {
+    Received {
         max_code,
         positive,
         negative,
@@ -97,37 +97,37 @@ mod tests {
 
     #[test]
     fn by_hand() {
-        let receipt = receive(&sensor(), &RIGHT, &[30, 10, -5, -15], 4, Condition::BothSigns);
-        assert_eq!(receipt.max_code, 30);
-        assert_eq!(receipt.compression_centroid_mm, Some([1.5, -2.0]));
-        assert_eq!(receipt.tension_centroid_mm, Some([2.5, 2.0]));
-        assert!(receipt.condition_met && receipt.loaded);
+        let received = receive(&sensor(), &RIGHT, &[30, 10, -5, -15], 4, Condition::BothSigns);
+        assert_eq!(received.max_code, 30);
+        assert_eq!(received.compression_centroid_mm, Some([1.5, -2.0]));
+        assert_eq!(received.tension_centroid_mm, Some([2.5, 2.0]));
+        assert!(received.condition_met && received.loaded);
     }
 
     #[test]
     fn the_floor_itself_does_not_count() {
-        let judge = |codes: &[i32], condition| receive(&sensor(), &RIGHT, codes, 5, condition);
-        let quiet = judge(&[5, -5, 0, 0], Condition::Loaded);
+        let run = |codes: &[i32], condition| receive(&sensor(), &RIGHT, codes, 5, condition);
+        let quiet = run(&[5, -5, 0, 0], Condition::Loaded);
         assert!(!quiet.loaded && !quiet.condition_met && !quiet.positive && !quiet.negative);
         assert_eq!(quiet.compression_centroid_mm, None);
         let pressed = [6, -5, 0, 0];
-        assert!(judge(&pressed, Condition::Loaded).condition_met);
-        assert!(!judge(&pressed, Condition::BothSigns).condition_met);
-        assert_eq!(judge(&pressed, Condition::Loaded).tension_centroid_mm, None);
+        assert!(run(&pressed, Condition::Loaded).condition_met);
+        assert!(!run(&pressed, Condition::BothSigns).condition_met);
+        assert_eq!(run(&pressed, Condition::Loaded).tension_centroid_mm, None);
     }
 
     #[test]
     fn a_floor_beyond_every_code_is_quiet() {
         let codes = [i32::MAX, -i32::MAX, 1, 0];
-        let receipt = receive(&sensor(), &RIGHT, &codes, i32::MAX, Condition::Loaded);
-        assert!(!receipt.loaded && !receipt.positive && !receipt.negative);
+        let received = receive(&sensor(), &RIGHT, &codes, i32::MAX, Condition::Loaded);
+        assert!(!received.loaded && !received.positive && !received.negative);
     }
 
     proptest! {
         #[test]
         fn centroids_lie_inside(codes in proptest::collection::vec(-8_388_607i32..=8_388_607, 4)) {
-            let receipt = receive(&sensor(), &RIGHT, &codes, 0, Condition::Loaded);
-            for [x, y] in receipt.compression_centroid_mm.into_iter().chain(receipt.tension_centroid_mm) {
+            let received = receive(&sensor(), &RIGHT, &codes, 0, Condition::Loaded);
+            for [x, y] in received.compression_centroid_mm.into_iter().chain(received.tension_centroid_mm) {
                 prop_assert!((1.0..=3.0).contains(&x) && (-2.0..=2.0).contains(&y));
             }
         }

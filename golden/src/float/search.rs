@@ -24,7 +24,7 @@ pub const RADIUS: i32 = GRID << HALVINGS;
 
 /// The best candidate.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Found {
+pub struct SearchResult {
     /// Ratio of shear to normal force, [x, y].
     pub mu: [f64; 2],
     /// μ in units of mu_max/[`RADIUS`].
@@ -36,36 +36,42 @@ pub struct Found {
 }
 
 /// Finds the best μ with |μ| ≤ `mu_max`, `None` when every candidate of the grid has Σp ≤ 0.
-pub fn search(family: &Polynomial, mu_max: f64, objective: &dyn Objective) -> Option<Found> {
-    let mut walk =
-        Walk { family, mu_max, objective, p: vec![0.0; family.coefficients[0].len()], evaluations: 0, best: None };
+pub fn search(family: &Polynomial, mu_max: f64, objective: &dyn Objective) -> Option<SearchResult> {
+    let mut grid = GridSearch {
+        family,
+        mu_max,
+        objective,
+        p: vec![0.0; family.coefficients[0].len()],
+        evaluations: 0,
+        best: None,
+    };
     if mu_max == 0.0 {
         // Every candidate is the centre.
-        walk.try_position([0, 0]);
-        return walk.found();
+        grid.try_position([0, 0]);
+        return grid.found();
     }
     let step = RADIUS / GRID;
     for j in -GRID..=GRID {
         for i in -GRID..=GRID {
-            walk.try_position([i * step, j * step]);
+            grid.try_position([i * step, j * step]);
         }
     }
     for level in 1..=HALVINGS {
-        let (centre, _) = walk.best?;
+        let (centre, _) = grid.best?;
         let step = step >> level;
         for j in -1..=1 {
             for i in -1..=1 {
                 if (i, j) != (0, 0) {
-                    walk.try_position([centre[0] + i * step, centre[1] + j * step]);
+                    grid.try_position([centre[0] + i * step, centre[1] + j * step]);
                 }
             }
         }
     }
-    walk.found()
+    grid.found()
 }
 
 /// A search under way.
-struct Walk<'a> {
+struct GridSearch<'a> {
     family: &'a Polynomial,
     mu_max: f64,
     objective: &'a dyn Objective,
@@ -75,7 +81,7 @@ struct Walk<'a> {
     best: Option<([i32; 2], f64)>,
 }
 
-impl Walk<'_> {
+impl GridSearch<'_> {
     fn mu(&self, position: [i32; 2]) -> [f64; 2] {
         position.map(|units| f64::from(units) * self.mu_max / f64::from(RADIUS))
     }
@@ -96,8 +102,8 @@ impl Walk<'_> {
         }
     }
 
-    fn found(&self) -> Option<Found> {
-        self.best.map(|(position, objective)| Found {
+    fn found(&self) -> Option<SearchResult> {
+        self.best.map(|(position, objective)| SearchResult {
             mu: self.mu(position),
             position,
             objective,
@@ -123,7 +129,7 @@ mod tests {
         }
     }
 
-    fn run(mu_max: f64, score: impl Fn(f64, f64) -> Option<f64>) -> Option<Found> {
+    fn run(mu_max: f64, score: impl Fn(f64, f64) -> Option<f64>) -> Option<SearchResult> {
         search(&mu_itself(), mu_max, &Score(score))
     }
 
@@ -162,7 +168,7 @@ mod tests {
     #[test]
     fn no_shear_asked_for() {
         let found = run(0.0, |_, _| Some(2.0)).unwrap();
-        let expected = Found { mu: [0.0; 2], position: [0; 2], objective: 2.0, evaluations: 1 };
+        let expected = SearchResult { mu: [0.0; 2], position: [0; 2], objective: 2.0, evaluations: 1 };
         assert_eq!(found, expected);
     }
 }

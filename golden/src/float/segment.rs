@@ -20,11 +20,11 @@ use crate::sensor::Sensor;
 /// Width of the smoothing, over h: structure that fine is not seen from the depth of the taxels.
 pub const WIDTH: f64 = 0.8;
 /// Where the taxels are far apart, h is taken to be at least this many pitches: a taxel alone is no structure.
-const LEAST_PITCHES: f64 = 0.75;
+const MIN_PITCHES: f64 = 0.75;
 /// Share of the load below which a basin is none of its own.
-const LEAST_LOAD: f64 = 0.03;
+const MIN_LOAD_SHARE: f64 = 0.03;
 /// Saddle over lower maximum from which two basins are one contact.
-const SHALLOW: f64 = 0.9;
+const JOIN_SADDLE: f64 = 0.9;
 
 /// A partition of the taxels into regions.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -75,7 +75,7 @@ pub fn segment(sensor: &Sensor, p: &[f64], width: f64) -> Segments {
 fn smooth(sensor: &Sensor, p: &[f64], width: f64) -> Vec<f64> {
     let (rows, cols) = (sensor.rows, sensor.cols);
     let weights = |pitch: f64, count: usize| -> Vec<f64> {
-        let sigma = width * sensor.thickness_mm.max(LEAST_PITCHES * pitch);
+        let sigma = width * sensor.thickness_mm.max(MIN_PITCHES * pitch);
         (0..count).map(|k| (-0.5 * (k as f64 * pitch / sigma).powi(2)).exp()).collect()
     };
     let (wx, wy) = (weights(sensor.pitch_x_mm, cols), weights(sensor.pitch_y_mm, rows));
@@ -135,7 +135,7 @@ fn pair_to_join(sensor: &Sensor, q: &[f64], segments: &Segments) -> Option<(usiz
             saddle[at] = saddle[at].max(q[taxel].min(q[other]));
         }
     }
-    let least = LEAST_LOAD * load.iter().sum::<f64>();
+    let least = MIN_LOAD_SHARE * load.iter().sum::<f64>();
     let small = (0..count).filter(|&k| load[k] <= least).min_by(|&a, &b| load[a].total_cmp(&load[b]));
     if let (Some(small), true) = (small, count > 1) {
         let others = (0..count).filter(|&k| k != small);
@@ -145,7 +145,7 @@ fn pair_to_join(sensor: &Sensor, q: &[f64], segments: &Segments) -> Option<(usiz
     }
     let pairs = (0..count).flat_map(|a| (0..a).map(move |b| (b, a)));
     let depth = |&(a, b): &(usize, usize)| saddle[a * count + b] / top[a].min(top[b]);
-    pairs.filter(|pair| depth(pair) >= SHALLOW).max_by(|a, b| depth(a).total_cmp(&depth(b)))
+    pairs.filter(|pair| depth(pair) >= JOIN_SADDLE).max_by(|a, b| depth(a).total_cmp(&depth(b)))
 }
 
 #[cfg(test)]

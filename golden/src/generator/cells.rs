@@ -10,7 +10,7 @@
 //! uniform  ∫ dx = √(m/A) (τ + 1)
 //! ```
 
-use super::traction::{Form, Piece};
+use super::traction::{Piece, PressureShape};
 use crate::frame::Forces;
 use crate::gauss::rule;
 use crate::sensor::Sensor;
@@ -75,16 +75,16 @@ impl Outline {
     fn new(piece: &Piece) -> Outline {
         let ([p, q], [cos, sin]) = (piece.half_mm, piece.turn);
         match piece.form {
-            Form::Hertz | Form::Disc => {
+            PressureShape::Hertz | PressureShape::Disc => {
                 let (p, q) = (1.0 / (p * p), 1.0 / (q * q));
                 Outline::Ellipse {
                     a: cos * cos * p + sin * sin * q,
                     b: cos * sin * (p - q),
                     c: sin * sin * p + cos * cos * q,
-                    hertz: piece.form == Form::Hertz,
+                    hertz: piece.form == PressureShape::Hertz,
                 }
             }
-            Form::Square => {
+            PressureShape::Square => {
                 let corner = |x: f64, y: f64| [x * p * cos - y * q * sin, x * p * sin + y * q * cos];
                 let corners = [corner(-1.0, -1.0), corner(1.0, -1.0), corner(1.0, 1.0), corner(-1.0, 1.0)];
                 Outline::Polygon { corners, area: 4.0 * p * q }
@@ -108,15 +108,15 @@ impl Outline {
     /// Shares of the load in the cells of one row of cells.
     fn strip(&self, [low, high]: [f64; 2], edges: &Edges, cols: Range<usize>) -> Vec<f64> {
         let reach = self.reach()[1];
-        let mut lines = vec![low, high, -reach, reach];
-        (cols.start..=cols.end).for_each(|edge| self.meet(edges.at(edge), &mut lines));
+        let mut breaks = vec![low, high, -reach, reach];
+        (cols.start..=cols.end).for_each(|edge| self.add_crossings(edges.at(edge), &mut breaks));
         if let Outline::Polygon { corners, .. } = self {
-            lines.extend(corners.map(|corner| corner[1]));
+            breaks.extend(corners.map(|corner| corner[1]));
         }
-        lines.iter_mut().for_each(|line| *line = line.clamp(low.max(-reach), high.min(reach).max(low.max(-reach))));
-        lines.sort_by(f64::total_cmp);
+        breaks.iter_mut().for_each(|y| *y = y.clamp(low.max(-reach), high.min(reach).max(low.max(-reach))));
+        breaks.sort_by(f64::total_cmp);
         let mut shares = vec![0.0; cols.len()];
-        for pair in lines.windows(2).filter(|pair| pair[1] > pair[0]) {
+        for pair in breaks.windows(2).filter(|pair| pair[1] > pair[0]) {
             let (middle, half) = ((pair[0] + pair[1]) / 2.0, (pair[1] - pair[0]) / 2.0);
             for &(t, weight) in rule(NODES) {
                 let angle = t * FRAC_PI_2;
@@ -134,19 +134,19 @@ impl Outline {
     }
 
     /// Adds the y where the outline meets the line at x.
-    fn meet(&self, x: f64, lines: &mut Vec<f64>) {
+    fn add_crossings(&self, x: f64, breaks: &mut Vec<f64>) {
         match self {
             Outline::Ellipse { a, b, c, .. } => {
                 let square = b * b * x * x - c * (a * x * x - 1.0);
                 if square > 0.0 {
-                    lines.extend([-1.0, 1.0].map(|sign| (-b * x + sign * square.sqrt()) / c));
+                    breaks.extend([-1.0, 1.0].map(|sign| (-b * x + sign * square.sqrt()) / c));
                 }
             }
             Outline::Polygon { corners, .. } => {
                 for k in 0..4 {
                     let ([x0, y0], [x1, y1]) = (corners[k], corners[(k + 1) % 4]);
                     if (x0 < x) != (x1 < x) {
-                        lines.push(y0 + (y1 - y0) * (x - x0) / (x1 - x0));
+                        breaks.push(y0 + (y1 - y0) * (x - x0) / (x1 - x0));
                     }
                 }
             }

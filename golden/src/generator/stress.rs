@@ -12,7 +12,7 @@
 //! With d = √(gap² + h²), the distance to the kernel's singularity, and half lengths of at most d/2, N nodes err by
 //! E^(−2N), E = 2 + √5: ten nodes by 3e-13 of the largest integrand. Squares far away take fewer.
 
-use super::traction::{Form, Piece};
+use super::traction::{Piece, PressureShape};
 use crate::bonded::kernel::{Kernel, REACH};
 use crate::gauss::rule;
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
@@ -67,21 +67,21 @@ impl Piece {
     fn patches(&self) -> Vec<Patch> {
         let quarters = (0..4).map(|k| [FRAC_PI_2 * (f64::from(k) + 0.5), FRAC_PI_2 / 2.0]);
         match self.form {
-            Form::Hertz => quarters.map(|v| Patch { u: [FRAC_PI_2 / 2.0; 2], v }).collect(),
-            Form::Disc => quarters.map(|v| Patch { u: [0.5; 2], v }).collect(),
-            Form::Square => vec![Patch { u: [0.0, 1.0], v: [0.0, 1.0] }],
+            PressureShape::Hertz => quarters.map(|v| Patch { u: [FRAC_PI_2 / 2.0; 2], v }).collect(),
+            PressureShape::Disc => quarters.map(|v| Patch { u: [0.5; 2], v }).collect(),
+            PressureShape::Square => vec![Patch { u: [0.0, 1.0], v: [0.0, 1.0] }],
         }
     }
 
     /// Place in mm and density times area element.
     fn map(&self, u: f64, v: f64) -> ([f64; 2], f64) {
         let (x, y, density) = match self.form {
-            Form::Hertz => {
+            PressureShape::Hertz => {
                 let (rho, cos) = u.sin_cos();
                 (rho * v.cos(), rho * v.sin(), 1.5 / PI * cos * cos * rho)
             }
-            Form::Disc => (u * v.cos(), u * v.sin(), u / PI),
-            Form::Square => (u, v, 0.25),
+            PressureShape::Disc => (u * v.cos(), u * v.sin(), u / PI),
+            PressureShape::Square => (u, v, 0.25),
         };
         let (x, y) = (x * self.half_mm[0], y * self.half_mm[1]);
         let [cos, sin] = self.turn;
@@ -94,9 +94,9 @@ impl Piece {
         let ([u, du], [_, dv]) = (patch.u, patch.v);
         match self.form {
             // The slope of sin φ is largest at the patch's inner end.
-            Form::Hertz => [longest * du * (u - du).cos(), longest * dv * (u + du).sin()],
-            Form::Disc => [longest * du, longest * dv * (u + du)],
-            Form::Square => [self.half_mm[0] * du, self.half_mm[1] * dv],
+            PressureShape::Hertz => [longest * du * (u - du).cos(), longest * dv * (u + du).sin()],
+            PressureShape::Disc => [longest * du, longest * dv * (u + du)],
+            PressureShape::Square => [self.half_mm[0] * du, self.half_mm[1] * dv],
         }
     }
 }
@@ -133,7 +133,7 @@ impl Body {
             return 0.0;
         }
         let nodes = |half: f64| match (piece.form, self) {
-            (Form::Square, Body::HalfSpace { .. }) => {
+            (PressureShape::Square, Body::HalfSpace { .. }) => {
                 let ratio = distance / half;
                 let log = (ratio + ratio.hypot(1.0)).ln();
                 rule(((-0.5 * LN_ERROR / log).ceil() as usize).clamp(1, NODES))

@@ -8,9 +8,9 @@ use super::GeneratorError;
 use crate::frame::Contact;
 use std::f64::consts::PI;
 
-/// Form of a piece, in coordinates that are ±1 at its half-axes.
+/// Pressure of a piece, in coordinates that are ±1 at its half-axes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Form {
+pub(super) enum PressureShape {
     /// √(1 − ρ²) on the disc.
     Hertz,
     /// Uniform on the disc.
@@ -23,7 +23,7 @@ pub(super) enum Form {
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Piece {
     /// Pressure and region.
-    pub(super) form: Form,
+    pub(super) form: PressureShape,
     /// Middle of the region.
     pub(super) centre_mm: [f64; 2],
     /// Half-axes.
@@ -100,12 +100,12 @@ pub(super) fn pieces(index: usize, contact: &Contact) -> Result<Vec<Piece>, Gene
     }
     let times = |factor: f64| force.map(|f| f * factor);
     Ok(match shape {
-        "hertz-circle" | "hertz-ellipse" => vec![piece(Form::Hertz, both(sizes), force)],
-        "flat-punch" => vec![piece(Form::Disc, both(sizes), force)],
-        "rectangle" => vec![piece(Form::Square, [sizes[0] / 2.0, sizes[1] / 2.0], force)],
+        "hertz-circle" | "hertz-ellipse" => vec![piece(PressureShape::Hertz, both(sizes), force)],
+        "flat-punch" => vec![piece(PressureShape::Disc, both(sizes), force)],
+        "rectangle" => vec![piece(PressureShape::Square, [sizes[0] / 2.0, sizes[1] / 2.0], force)],
         "ring" => {
             let [outer, inner] = [sizes[0], sizes[1]].map(|r| PI * r * r);
-            let disc = |radius, share| piece(Form::Disc, [radius; 2], times(share));
+            let disc = |radius, share| piece(PressureShape::Disc, [radius; 2], times(share));
             vec![disc(sizes[0], outer / (outer - inner)), disc(sizes[1], -inner / (outer - inner))]
         }
         _ => plantar::pixels(shape, sizes)
@@ -113,7 +113,7 @@ pub(super) fn pieces(index: usize, contact: &Contact) -> Result<Vec<Piece>, Gene
             .map(|pixel| {
                 let [x, y] = pixel.centre_mm;
                 let centre = [x * turn[0] - y * turn[1] + centre_mm[0], x * turn[1] + y * turn[0] + centre_mm[1]];
-                Piece { centre_mm: centre, ..piece(Form::Square, pixel.half_mm, times(pixel.share)) }
+                Piece { centre_mm: centre, ..piece(PressureShape::Square, pixel.half_mm, times(pixel.share)) }
             })
             .collect(),
     })
@@ -122,7 +122,7 @@ pub(super) fn pieces(index: usize, contact: &Contact) -> Result<Vec<Piece>, Gene
 /// Pressure with shear at the friction limit, less the shear of the part that sticks: c/a times a Hertz pressure of
 /// the same p0 on half-axes c/a times as long, which is (c/a)³ of the load.
 fn partial_slip(
-    piece: impl Fn(Form, [f64; 2], [f64; 3]) -> Piece,
+    piece: impl Fn(PressureShape, [f64; 2], [f64; 3]) -> Piece,
     half_mm: [f64; 2],
     force: [f64; 3],
     friction: f64,
@@ -130,14 +130,14 @@ fn partial_slip(
     let [tx, ty, normal] = force;
     let shear = tx.hypot(ty);
     if shear == 0.0 {
-        return vec![piece(Form::Hertz, half_mm, force)];
+        return vec![piece(PressureShape::Hertz, half_mm, force)];
     }
     let limit = friction * normal / shear;
     let stick = (1.0 - 1.0 / limit).cbrt();
     // −limit (c/a)³ of the load, (c/a)³ = 1 − 1/limit.
-    let held = 1.0 - limit;
+    let stick_share = 1.0 - limit;
     vec![
-        piece(Form::Hertz, half_mm, [tx * limit, ty * limit, normal]),
-        piece(Form::Hertz, half_mm.map(|a| a * stick), [tx * held, ty * held, 0.0]),
+        piece(PressureShape::Hertz, half_mm, [tx * limit, ty * limit, normal]),
+        piece(PressureShape::Hertz, half_mm.map(|a| a * stick), [tx * stick_share, ty * stick_share, 0.0]),
     ]
 }

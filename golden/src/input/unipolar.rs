@@ -15,7 +15,7 @@
 //! in the place of t, which may lie on a higher hill, then climb: the filled frame's own μ by `sparse` is the next
 //! candidate as long as Π rises. The frame with −t in the place of the clipped readings goes the way of any other.
 //!
-//! Each subarray is filled for itself, `adaptive` and `contacts` as a whole, with one μ. Of more than [`MOST`] clipped
+//! Each subarray is filled for itself, `adaptive` and `contacts` as a whole, with one μ. Of more than [`MAX_CLIPPED`] clipped
 //! taxels those with the largest Cz b are filled, the ones near the contacts; the rest stay zero. A frame of sensor 1
 //! takes 0.2 s at most, of sensor 3 0.7 s, of sensor 4 in 2×2 10 to 23 s.
 //!
@@ -52,11 +52,11 @@ use faer::{Accum, Col, Mat, Par, Side};
 use serde::{Deserialize, Serialize};
 
 /// Most clipped taxels of a subarray whose tension is sought; the work grows with the square.
-pub const MOST: usize = 256;
+pub const MAX_CLIPPED: usize = 256;
 /// Rounds of reweighting.
 const ROUNDS: i32 = 10;
 /// Share of Σp below which a force counts as none: in the first round and in the last.
-const SHARES: [f64; 2] = [1e-1, 1e-5];
+const SPARSE_SHARES: [f64; 2] = [1e-1, 1e-5];
 /// Added to the normal equations' unit diagonal: above their rounding, n ε.
 const RIDGE: f64 = 1e-13;
 
@@ -82,27 +82,28 @@ pub(crate) struct Filled {
 }
 
 /// Fills the readings `clipped` (indices in the subarray) of `b`, which has no tension.
-pub(crate) fn fill(matrices: &Matrices, b: Vec<f64>, mut clipped: Vec<usize>, mu_max: f64) -> Filled {
+pub(crate) fn fill_clipped(matrices: &Matrices, b: Vec<f64>, mut clipped: Vec<usize>, mu_max: f64) -> Filled {
     let n = b.len();
-    if clipped.len() > MOST {
+    if clipped.len() > MAX_CLIPPED {
         let mut reach = vec![0.0; n];
         accumulate(&matrices.cz, &b, 1.0, &mut reach);
         clipped.sort_by(|k, l| reach[*l].total_cmp(&reach[*k]));
-        clipped.truncate(MOST);
+        clipped.truncate(MAX_CLIPPED);
     }
     if clipped.is_empty() || b.iter().all(|b| *b <= 0.0) {
         return Filled { stress_MPa: b, evaluations: 0 };
     }
-    let (family, lost, sparse) = (stacked(matrices, &b, &clipped), Lost { n }, Sparse::default());
+    let (family, objective, sparse) = (stacked(matrices, &b, &clipped), TensionObjective { n }, Sparse::default());
     let by_sparse = |b: &[f64]| search(&Polynomial::new(matrices, b), mu_max, &sparse);
     let (mut best, mut evaluations) = (Filled { stress_MPa: b.clone(), evaluations: 0 }, 0);
     let mut highest = f64::NEG_INFINITY;
-    for start in [search(&family, mu_max, &lost), by_sparse(&b)] {
+    for start in [search(&family, mu_max, &objective), by_sparse(&b)] {
         let mut next = start;
         // Every round but the last scores higher, so that this ends.
         while let Some(found) = next {
             evaluations += found.evaluations;
-            let Some((score, tension)) = lost.judge(&family.eval(found.mu)).filter(|(score, _)| *score > highest)
+            let Some((score, tension)) =
+                objective.score_with_tension(&family.eval(found.mu)).filter(|(score, _)| *score > highest)
             else {
                 break;
             };
@@ -127,20 +128,20 @@ fn stacked(matrices: &Matrices, b: &[f64], clipped: &[usize]) -> Polynomial {
 }
 
 /// `sparse`, of the forces with the tension that suits it best.
-struct Lost {
+struct TensionObjective {
     /// Cells.
     n: usize,
 }
 
-impl Objective for Lost {
+impl Objective for TensionObjective {
     fn score(&self, stack: &[f64]) -> Option<f64> {
-        self.judge(stack).map(|(score, _)| score)
+        self.score_with_tension(stack).map(|(score, _)| score)
     }
 }
 
-impl Lost {
+impl TensionObjective {
     /// Π and t of a candidate, `None` where it pulls.
-    fn judge(&self, stack: &[f64]) -> Option<(f64, Vec<f64>)> {
+    fn score_with_tension(&self, stack: &[f64]) -> Option<(f64, Vec<f64>)> {
         let (p, tension) = self.solve(stack)?;
         Some((Sparse::default().score(&p)?, tension))
     }
@@ -152,9 +153,10 @@ impl Lost {
         let mut tension = Vec::new();
         for round in 0..ROUNDS {
             let sum = Some(p.iter().sum::<f64>()).filter(|sum| *sum > 0.0 && sum.is_finite())?;
-            let share = SHARES[0] * (SHARES[1] / SHARES[0]).powf(f64::from(round) / f64::from(ROUNDS - 1));
+            let share =
+                SPARSE_SHARES[0] * (SPARSE_SHARES[1] / SPARSE_SHARES[0]).powf(f64::from(round) / f64::from(ROUNDS - 1));
             let weights: Vec<f64> = p.iter().map(|p| (p / sum).hypot(share).recip()).collect();
-            tension = least(first, columns, &weights)?;
+            tension = nonnegative_least_squares(first, columns, &weights)?;
             p.copy_from_slice(first);
             for (column, t) in columns.chunks(self.n).zip(&tension).filter(|(_, t)| **t > 0.0) {
                 p.iter_mut().zip(column).for_each(|(p, g)| *p -= t * g);
@@ -165,7 +167,7 @@ impl Lost {
 }
 
 /// t ≥ 0 with the least ‖weights · (p − G t)‖, but for taxels once taken for zero; `None` when there is no solution.
-fn least(p: &[f64], columns: &[f64], weights: &[f64]) -> Option<Vec<f64>> {
+fn nonnegative_least_squares(p: &[f64], columns: &[f64], weights: &[f64]) -> Option<Vec<f64>> {
     let (n, count) = (p.len(), columns.len() / p.len());
     let mut g = Mat::from_fn(n, count, |i, k| weights[i] * columns[k * n + i]);
     // Columns of norm 1, so that the ridge means the same to each.
@@ -200,13 +202,13 @@ pub(crate) fn misfit(scene: &Scene, frame: &Frame, forces: &Forces) -> f64 {
     if known.is_empty() {
         return 0.0;
     }
-    let pressed = pressed(scene, forces);
-    let squares: f64 = known.iter().map(|&k| (pressed[k] - frame.stress_MPa[k]).powi(2)).sum();
+    let stress = pressing_stress(scene, forces);
+    let squares: f64 = known.iter().map(|&k| (stress[k] - frame.stress_MPa[k]).powi(2)).sum();
     (squares / known.len() as f64).sqrt() / peak
 }
 
 /// Stress of the cells that press.
-fn pressed(scene: &Scene, forces: &Forces) -> Vec<f64> {
+fn pressing_stress(scene: &Scene, forces: &Forces) -> Vec<f64> {
     let (cols, table) = (scene.sensor.cols, table(&scene.sensor, scene.medium));
     let mut stress = vec![0.0; table.len()];
     for (cell, fz) in forces.fz.iter().enumerate().filter(|(_, fz)| **fz > 0.0) {

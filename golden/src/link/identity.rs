@@ -98,18 +98,18 @@ impl Identity {
             clock_hz: (board.clock_MHz * 1e6).round() as u32,
             bit_rate: scene.hardware.link.bit_rate(board)?,
             subarrays: model.parts.len() as u16,
-            left_out: REQUESTS.into_iter().filter(|&kind| !takes(board.engine, kind)).map(bit).sum(),
+            left_out: REQUESTS.into_iter().filter(|&kind| !supports(board.engine, kind)).map(bit).sum(),
         })
     }
 
     /// Whether the board takes requests of this type.
-    pub fn takes(&self, kind: Kind) -> bool {
+    pub fn supports(&self, kind: Kind) -> bool {
         self.left_out & bit(kind) == 0
     }
 }
 
 /// Whether a board with this engine takes requests of this type: where logic cells are few, the host adds the forces up.
-pub fn takes(engine: EngineKind, kind: Kind) -> bool {
+pub fn supports(engine: EngineKind, kind: Kind) -> bool {
     engine == EngineKind::Parallel || kind != Kind::FrameForResultants
 }
 

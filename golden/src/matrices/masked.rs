@@ -18,7 +18,7 @@
 //! A rank-k update, k n² products; the mirror symmetry is lost, so that products take the basis of the taxels.
 
 use super::inverse::product;
-use super::{Matrices, MatricesError, Passes};
+use super::{FoldedMatrices, Matrices, MatricesError};
 use crate::folded::{Basis, Operator};
 use crate::sensor::Sensor;
 use faer::linalg::solvers::Solve;
@@ -48,7 +48,7 @@ impl Matrices {
         let [mut cz_pinv, ax, ay] = [&self.cz_pinv, &self.ax, &self.ay].map(project);
         // Zero but for rounding.
         dead.iter().for_each(|&k| (0..n).for_each(|i| cz_pinv[(i, k)] = 0.0));
-        masked.passes = Passes {
+        masked.folded = FoldedMatrices {
             basis: Basis::taxels(self.sensor.rows, self.sensor.cols),
             cz_pinv: Operator::dense(cz_pinv.clone()),
             ax: Operator::dense(ax.clone()),

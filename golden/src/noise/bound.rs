@@ -10,7 +10,7 @@
 //!
 //! The 6-parameter bound is the smaller. J comes from the kernel's derivatives, integrals by the truth's quadrature.
 
-use super::contact::{Contact, Truth};
+use super::contact::{ContactStress, HertzContact};
 use nalgebra::{DMatrix, Matrix2};
 
 /// Covariance of (Tx, Ty) in N² for σ = 1 MPa, with 6 and with 9 unknowns; `None` where they cannot be told apart.
@@ -24,7 +24,7 @@ pub struct Bound {
 
 impl Bound {
     /// The bound at one contact.
-    pub fn new(truth: &Truth, contact: &Contact) -> Option<Bound> {
+    pub fn new(truth: &ContactStress, contact: &HertzContact) -> Option<Bound> {
         let theta = contact.parameters();
         let ellipse = truth.ellipse();
         let loads = ellipse.unit_loads(&theta);

@@ -24,7 +24,7 @@ const HERTZ: f64 = 0.5;
 
 /// One contact; load 1 N.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Contact {
+pub struct HertzContact {
     /// Centre in mm from the array's centre.
     pub centre_mm: [f64; 2],
     /// Semi-axes in mm.
@@ -35,9 +35,9 @@ pub struct Contact {
     pub mu: [f64; 2],
 }
 
-impl Contact {
+impl HertzContact {
     /// A random contact that lies inside the array.
-    pub(super) fn draw(sensor: &Sensor, random: &mut Random) -> Contact {
+    pub(super) fn draw(sensor: &Sensor, random: &mut Random) -> HertzContact {
         let h = sensor.thickness_mm;
         let radii_mm = [random.between(h, 2.0 * h), random.between(h, 2.0 * h)];
         let angle = random.between(0.0, PI);
@@ -48,7 +48,7 @@ impl Contact {
         };
         let centre_mm = [within(sensor.cols, sensor.pitch_x_mm), within(sensor.rows, sensor.pitch_y_mm)];
         let (ratio, direction) = (random.between(0.1, 0.5), random.between(0.0, TAU));
-        Contact { centre_mm, radii_mm, angle, mu: [ratio * direction.cos(), ratio * direction.sin()] }
+        HertzContact { centre_mm, radii_mm, angle, mu: [ratio * direction.cos(), ratio * direction.sin()] }
     }
 
     /// The patch's parameters: x₀, y₀, L₁₁, L₂₂, L₁₂, g.
@@ -66,19 +66,19 @@ impl Contact {
 }
 
 /// Computes the stress of contacts on one array.
-pub struct Truth {
+pub struct ContactStress {
     taxels: Taxels,
     disc: Disc,
 }
 
-impl Truth {
+impl ContactStress {
     /// For one array under a medium.
-    pub fn new(sensor: &Sensor, medium: Medium) -> Truth {
-        Truth { taxels: Taxels::new(sensor, medium), disc: Disc::new(NODES[0], NODES[1]) }
+    pub fn new(sensor: &Sensor, medium: Medium) -> ContactStress {
+        ContactStress { taxels: Taxels::new(sensor, medium), disc: Disc::new(NODES[0], NODES[1]) }
     }
 
     /// Stress under each taxel in MPa.
-    pub fn stress_MPa(&self, contact: &Contact) -> Vec<f64> {
+    pub fn stress_MPa(&self, contact: &HertzContact) -> Vec<f64> {
         let [x, y, z] = self.ellipse().unit_loads(&contact.parameters());
         let [fx, fy, fz] = contact.force_N();
         x.iter().zip(&y).zip(&z).map(|((x, y), z)| fx * x + fy * y + fz * z).collect()

@@ -1,7 +1,7 @@
 //! The study: draws, noise, estimates, and their spread.
 
 use super::bound::Bound;
-use super::contact::{Contact, Truth};
+use super::contact::{ContactStress, HertzContact};
 use crate::frame::{Frame, FrameError};
 use crate::random::Random;
 use crate::reconstruct::{Golden, GoldenError};
@@ -98,15 +98,15 @@ impl Spread {
 }
 
 /// A contact, its stress and its bound.
-struct Draw {
-    contact: Contact,
+struct DrawnContact {
+    contact: HertzContact,
     stress_MPa: Vec<f64>,
     peak_MPa: f64,
     bound: Bound,
 }
 
 /// Largest number of draws and of frames.
-const MOST: usize = 100_000;
+const MAX_COUNT: usize = 100_000;
 /// Errors drawn from the bound's covariance for each contact.
 const BOUND_DRAWS: usize = 32;
 
@@ -160,10 +160,10 @@ pub fn study(scene: &Scene, study: &Study, progress: &mut dyn FnMut(usize, usize
 
 fn check(study: &Study) -> Result<(), StudyError> {
     let wrong = |field, value: String, allowed| Err(StudyError::Parameter { field, value, allowed });
-    if !(1..=MOST).contains(&study.draws) {
+    if !(1..=MAX_COUNT).contains(&study.draws) {
         return wrong("draws", study.draws.to_string(), "1 to 100000");
     }
-    if !(1..=MOST).contains(&study.frames) {
+    if !(1..=MAX_COUNT).contains(&study.frames) {
         return wrong("frames", study.frames.to_string(), "1 to 100000");
     }
     match study.levels.iter().find(|level| !(0.0..=1.0).contains(*level)) {
@@ -173,17 +173,17 @@ fn check(study: &Study) -> Result<(), StudyError> {
 }
 
 /// The contacts; one whose unknowns cannot be told apart is drawn again.
-fn draws(scene: &Scene, study: &Study) -> Vec<Draw> {
-    let truth = Truth::new(&scene.sensor, scene.medium);
+fn draws(scene: &Scene, study: &Study) -> Vec<DrawnContact> {
+    let truth = ContactStress::new(&scene.sensor, scene.medium);
     let mut random = Random::new(study.seed);
     let mut draws = Vec::with_capacity(study.draws);
     // Bounded, so that an array that never shows its contact ends too.
     for _ in 0..4 * study.draws {
-        let contact = Contact::draw(&scene.sensor, &mut random);
+        let contact = HertzContact::draw(&scene.sensor, &mut random);
         let Some(bound) = Bound::new(&truth, &contact) else { continue };
         let stress_MPa = truth.stress_MPa(&contact);
         let peak_MPa = stress_MPa.iter().fold(0.0f64, |peak, b| b.abs().max(peak));
-        draws.push(Draw { contact, stress_MPa, peak_MPa, bound });
+        draws.push(DrawnContact { contact, stress_MPa, peak_MPa, bound });
         if draws.len() == study.draws {
             break;
         }
@@ -192,9 +192,9 @@ fn draws(scene: &Scene, study: &Study) -> Vec<Draw> {
 }
 
 /// The stresses with noise, averaged over frames.
-fn noisy(draws: &[Draw], noise: f64, frames: usize, seed: u64) -> Vec<Vec<f64>> {
+fn noisy(draws: &[DrawnContact], noise: f64, frames: usize, seed: u64) -> Vec<Vec<f64>> {
     let mut random = Random::new(seed.wrapping_mul(0x9e37_79b9));
-    let mut one = |draw: &Draw| -> Vec<f64> {
+    let mut one = |draw: &DrawnContact| -> Vec<f64> {
         let sigma = noise * draw.peak_MPa;
         let mut mean = || (0..frames).map(|_| random.normal()).sum::<f64>() / frames as f64;
         draw.stress_MPa.iter().map(|b| if sigma > 0.0 { b + sigma * mean() } else { *b }).collect()
@@ -203,7 +203,7 @@ fn noisy(draws: &[Draw], noise: f64, frames: usize, seed: u64) -> Vec<Vec<f64>> 
 }
 
 /// e_t of errors drawn from a covariance.
-fn bound_errors(draws: &[Draw], share: f64, block: impl Fn(&Bound) -> nalgebra::Matrix2<f64>) -> Vec<f64> {
+fn bound_errors(draws: &[DrawnContact], share: f64, block: impl Fn(&Bound) -> nalgebra::Matrix2<f64>) -> Vec<f64> {
     let mut random = Random::new(0xb0_0d);
     let mut errors = Vec::with_capacity(draws.len() * BOUND_DRAWS);
     for draw in draws {
@@ -219,7 +219,13 @@ fn bound_errors(draws: &[Draw], share: f64, block: impl Fn(&Bound) -> nalgebra::
 }
 
 /// e_t of one reconstruction.
-fn error(engine: &Golden, scene: &Scene, draw: &Draw, stress: &[f64], noise_MPa: f64) -> Result<f64, StudyError> {
+fn error(
+    engine: &Golden,
+    scene: &Scene,
+    draw: &DrawnContact,
+    stress: &[f64],
+    noise_MPa: f64,
+) -> Result<f64, StudyError> {
     let mut frame = Frame::from_stress("draw", &scene.sensor, stress.to_vec())?;
     frame.resultant_N = Some(draw.contact.force_N());
     let result = engine.run_with_noise(&frame, noise_MPa)?;

@@ -21,14 +21,14 @@
 //! | | shape | unit |
 //! |---|---|---|
 //! | in: contacts and their forces | n, 3 × n | –, N |
-//! | in: per case, receipts of its subarrays | parts | – |
+//! | in: per case, what `receive` found in its subarrays | parts | – |
 //! | out: what stands against the case | text | – |
 
-use super::extra::{Refused, Taken};
-use super::golden::{Input, Outcome};
+use super::extra::{CaseChoice, RejectedCase};
+use super::golden::{CaseOutcome, EngineInput};
 use super::{Golden, Reconstruction};
 use crate::float::contacts::Contacts;
-use crate::float::receive::Receipt;
+use crate::float::receive::Received;
 use crate::float::segment::{segment, Segments, WIDTH};
 use crate::frame::{Forces, Frame};
 use crate::partition::{Case, Subarray};
@@ -53,8 +53,8 @@ fn extents(sensor: &Sensor, p: &[f64], segments: &Segments) -> Vec<Extent> {
     let extent = |region: usize| {
         let own = || (0..p.len()).filter(|&k| segments.labels[k] == region);
         let largest = own().map(|k| p[k]).fold(0.0, f64::max);
-        let nowhere = Extent { x: [f64::INFINITY, f64::NEG_INFINITY], y: [f64::INFINITY, f64::NEG_INFINITY] };
-        own().filter(|&k| largest > 0.0 && p[k] >= CELL_SHARE * largest).fold(nowhere, |extent, k| {
+        let empty = Extent { x: [f64::INFINITY, f64::NEG_INFINITY], y: [f64::INFINITY, f64::NEG_INFINITY] };
+        own().filter(|&k| largest > 0.0 && p[k] >= CELL_SHARE * largest).fold(empty, |extent, k| {
             let at = sensor.position_mm(k / sensor.cols, k % sensor.cols);
             let wider =
                 |[low, high]: [f64; 2], at: f64, pitch: f64| [low.min(at - pitch / 2.0), high.max(at + pitch / 2.0)];
@@ -65,12 +65,12 @@ fn extents(sensor: &Sensor, p: &[f64], segments: &Segments) -> Vec<Extent> {
 }
 
 /// What stands against a case, `None` when nothing does.
-fn objection(sensor: &Sensor, parts: &[Subarray], receipts: &[Receipt], contacts: &[Extent]) -> Option<String> {
+fn rejection_reason(sensor: &Sensor, parts: &[Subarray], received: &[Received], contacts: &[Extent]) -> Option<String> {
     if let [_] = parts {
         return None;
     }
-    for (part, receipt) in parts.iter().zip(receipts) {
-        if receipt.loaded && !receipt.condition_met {
+    for (part, received) in parts.iter().zip(received) {
+        if received.loaded && !received.condition_met {
             let Subarray { row0, col0, .. } = part;
             return Some(format!(
                 "the subarray at row {row0}, column {col0} is loaded and does not meet the condition"
@@ -97,56 +97,56 @@ fn objection(sensor: &Sensor, parts: &[Subarray], receipts: &[Receipt], contacts
 }
 
 /// How far the shear of two sets of forces is apart, in N.
-fn distance(a: &Forces, b: &Forces) -> f64 {
+fn shear_distance(a: &Forces, b: &Forces) -> f64 {
     let ([ax, ay, _], [bx, by, _]) = (a.resultant(), b.resultant());
     (ax - bx).hypot(ay - by)
 }
 
 /// Why a case was not the nearest.
-fn farther(off: f64) -> String {
+fn not_nearest_reason(off: f64) -> String {
     format!("its shear is {off:.3} N from that of the contacts: another case is nearer, or finer and as near")
 }
 
 impl Golden {
     /// Of the cases that are possible the one whose shear is nearest to that of the contacts.
-    pub(super) fn adaptive(&self, frame: &Frame, input: &Input) -> Reconstruction {
+    pub(super) fn adaptive(&self, frame: &Frame, input: &EngineInput) -> Reconstruction {
         let sensor = &self.scene.sensor;
         let whole = self.subarrays(input, self.whole());
-        let solved = self.solved(input);
+        let solved = self.find_contacts(input);
         let target = solved.as_ref().map(Contacts::forces);
         let contacts = match &solved {
             Some(contacts) if contacts.segments.count > 1 => extents(sensor, &contacts.p, &contacts.segments),
             _ => extents(sensor, &whole.forces.fz, &segment(sensor, &whole.forces.fz, WIDTH)),
         };
-        let off = |outcome: &Outcome| target.as_ref().map_or(0.0, |target| distance(target, &outcome.forces));
+        let off = |outcome: &CaseOutcome| target.as_ref().map_or(0.0, |target| shear_distance(target, &outcome.forces));
         let nothing = "nothing finer is as near to the contacts".to_string();
         let mut refused: Vec<(Case, String)> = Vec::new();
         let mut best = (off(&whole), Case::WHOLE, whole, nothing);
-        for cut in self.cuts.iter().rev().filter(|cut| cut.case != Case::WHOLE) {
-            let receipts: Vec<Receipt> = cut.parts.iter().map(|part| self.receive(input, part)).collect();
-            if let Some(reason) = objection(sensor, &cut.parts, &receipts, &contacts) {
-                refused.push((cut.case, reason));
+        for tiling in self.tilings.iter().rev().filter(|tiling| tiling.case != Case::WHOLE) {
+            let received: Vec<Received> = tiling.parts.iter().map(|part| self.receive(input, part)).collect();
+            if let Some(reason) = rejection_reason(sensor, &tiling.parts, &received, &contacts) {
+                refused.push((tiling.case, reason));
                 continue;
             }
-            let outcome = self.subarrays(input, cut);
+            let outcome = self.subarrays(input, tiling);
             let own = off(&outcome);
             if own <= best.0 {
                 let reason = "no boundary cuts a contact and nothing is nearer to them".to_string();
-                let (off, case, ..) = std::mem::replace(&mut best, (own, cut.case, outcome, reason));
-                refused.push((case, farther(off)));
+                let (off, case, ..) = std::mem::replace(&mut best, (own, tiling.case, outcome, reason));
+                refused.push((case, not_nearest_reason(off)));
             } else {
-                refused.push((cut.case, farther(own)));
+                refused.push((tiling.case, not_nearest_reason(own)));
             }
         }
         let (_, case, outcome, reason) = best;
         // The finer ones, in their order.
-        let finer = self.cuts.iter().take_while(|cut| cut.case != case);
+        let finer = self.tilings.iter().take_while(|tiling| tiling.case != case);
         let refused = finer
-            .filter_map(|cut| refused.iter().find(|(other, _)| *other == cut.case))
-            .map(|(case, reason)| Refused { case: case.to_string(), reason: reason.clone() })
+            .filter_map(|tiling| refused.iter().find(|(other, _)| *other == tiling.case))
+            .map(|(case, reason)| RejectedCase { case: case.to_string(), reason: reason.clone() })
             .collect();
         let mut result = self.finish(frame, outcome);
-        result.extra.taken = Some(Taken { case: case.to_string(), reason, refused });
+        result.extra.taken = Some(CaseChoice { case: case.to_string(), reason, refused });
         result
     }
 }
@@ -171,9 +171,9 @@ mod tests {
 
     fn against(case: i64, codes: &[i32], condition: Condition) -> Option<String> {
         let parts = subarrays(Case::numbered(case).unwrap(), &sensor()).unwrap();
-        let judge = |part: &Subarray| receive(&sensor(), part, &part.gather(&sensor(), codes), 0, condition);
-        let receipts: Vec<Receipt> = parts.iter().map(judge).collect();
-        objection(&sensor(), &parts, &receipts, &contact())
+        let received = |part: &Subarray| receive(&sensor(), part, &part.gather(&sensor(), codes), 0, condition);
+        let received: Vec<Received> = parts.iter().map(received).collect();
+        rejection_reason(&sensor(), &parts, &received, &contact())
     }
 
     #[test]
@@ -187,8 +187,8 @@ mod tests {
     fn a_near_boundary_is_named() {
         assert_eq!(against(0, &[1; 96], Condition::Loaded), None);
         assert_eq!(against(2, &[1; 96], Condition::Loaded), None);
-        let cut = against(3, &[1; 96], Condition::Loaded);
-        assert_eq!(cut, None);
+        let tiling = against(3, &[1; 96], Condition::Loaded);
+        assert_eq!(tiling, None);
     }
 
     #[test]

@@ -11,9 +11,9 @@
 //! | out: regions | μ, centre, load, taxels | –, mm, N |
 
 use super::extra::regions;
-use super::golden::Input;
+use super::golden::EngineInput;
 use super::{Golden, Reconstruction};
-use crate::float::contacts::{Contacts, Solver, Stress};
+use crate::float::contacts::{Contacts, MeasuredStress, Solver};
 use crate::float::force::threshold;
 use crate::float::objective::Sparse;
 use crate::float::pass::Polynomial;
@@ -24,20 +24,20 @@ use crate::scene::Condition;
 
 impl Golden {
     /// The regions of the contacts and their μ, `None` when no candidate presses.
-    pub(super) fn solved(&self, input: &Input) -> Option<Contacts> {
+    pub(super) fn find_contacts(&self, input: &EngineInput) -> Option<Contacts> {
         let (scene, matrices) = (&self.scene, self.matrices());
         let family = Polynomial::new(matrices, input.stress_MPa);
         let found = search(&family, scene.search.mu_max, &Sparse::default())?;
         let (mu_max, p0) = (scene.search.mu_max, family.v(0, 0));
         let (b, noise_MPa) = (input.stress_MPa, input.noise_MPa);
-        let stress = self.taxels.as_ref().map(|taxels| Stress { taxels, b, noise_MPa });
-        let searched = |segments: &Segments, region: usize| self.met(input, segments, region);
+        let stress = self.taxels.as_ref().map(|taxels| MeasuredStress { taxels, b, noise_MPa });
+        let searched = |segments: &Segments, region: usize| self.meets_condition(input, segments, region);
         let solver = Solver { matrices, mu_max, objective: &Sparse::default(), p0, stress, searched: &searched };
         Some(solver.solve(&family, found))
     }
 
     /// Whether the taxels of a region meet the scene's condition.
-    fn met(&self, input: &Input, segments: &Segments, region: usize) -> bool {
+    fn meets_condition(&self, input: &EngineInput, segments: &Segments, region: usize) -> bool {
         let own = || (0..input.codes.len()).filter(move |&k| segments.labels[k] == region).map(|k| input.codes[k]);
         let (above, below) = (own().any(|code| code > input.floor), own().any(|code| code < -input.floor));
         match self.scene.partition.condition {
@@ -47,16 +47,17 @@ impl Golden {
     }
 
     /// One region per contact.
-    pub(super) fn contacts(&self, frame: &Frame, input: &Input) -> Reconstruction {
+    pub(super) fn contacts(&self, frame: &Frame, input: &EngineInput) -> Reconstruction {
         let scene = &self.scene;
         let mut outcome = self.subarrays(input, self.whole());
-        let Some(contacts) = self.solved(input) else {
+        let Some(contacts) = self.find_contacts(input) else {
             return self.finish(frame, outcome);
         };
-        let (x, truncation) = self.whole().meet(input.stress_MPa, contacts.forces());
+        let (x, truncation) = self.whole().apply_form(input.stress_MPa, contacts.forces());
         outcome.truncation = truncation.into_iter().collect();
         let forces = threshold(x, scene.threshold.min_force_N);
-        let met: Vec<bool> = (0..contacts.segments.count).map(|k| self.met(input, &contacts.segments, k)).collect();
+        let met: Vec<bool> =
+            (0..contacts.segments.count).map(|k| self.meets_condition(input, &contacts.segments, k)).collect();
         let own = regions(&scene.sensor, &contacts, &met, &forces);
         outcome.forces = forces;
         let mut result = self.finish(frame, outcome);

@@ -22,7 +22,7 @@ use serde::{Deserialize, Serialize};
 pub struct Extra {
     /// The case that `adaptive` took.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub taken: Option<Taken>,
+    pub taken: Option<CaseChoice>,
     /// The contacts of `contacts`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub regions: Option<Vec<Region>>,
@@ -45,18 +45,18 @@ pub struct Extra {
 
 /// A choice of case.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Taken {
+pub struct CaseChoice {
     /// The case, as a scene names it.
     pub case: String,
     /// Why it was taken.
     pub reason: String,
     /// The finer cases and why they were not taken.
-    pub refused: Vec<Refused>,
+    pub refused: Vec<RejectedCase>,
 }
 
 /// A case that was not taken.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Refused {
+pub struct RejectedCase {
     /// The case, as a scene names it.
     pub case: String,
     /// What stands against it.

@@ -10,12 +10,12 @@ use super::{assemble, Reconstruction, SubarrayResult};
 use crate::flags::{frame_flags, Flag};
 use crate::float::force::{force, threshold};
 use crate::float::objective::taxels::Taxels;
-use crate::float::objective::{of_kind, Estimate, Objective, Subject};
+use crate::float::objective::{of_kind, Estimate, Objective, SearchInput};
 use crate::float::orthogonal::{truncation, Orthogonal, OrthogonalError};
 use crate::float::pass::Polynomial;
-use crate::float::receive::{receive, Receipt};
+use crate::float::receive::{receive, Received};
 use crate::frame::{Forces, Frame, FrameError};
-use crate::input::{Input as InputOptions, InputError};
+use crate::input::{Input, InputError};
 use crate::matrices::{Matrices, MatricesError, MAX_FLOAT_DEGREE};
 use crate::partition::{subarrays, Case, PartitionError, Subarray};
 use crate::quantise::{full_scale, noise_floor_codes, quantise};
@@ -26,15 +26,15 @@ use thiserror::Error;
 pub struct Golden {
     pub(super) scene: Scene,
     /// The scene's input options.
-    pub(super) input: InputOptions,
+    pub(super) input: Input,
     /// The case; of `adaptive` all cases that divide the array, the finest first, the whole last.
-    pub(super) cuts: Vec<Cut>,
+    pub(super) tilings: Vec<Tiling>,
     /// Where ellipses may be fitted: `adaptive` and `contacts`, every taxel read, shear wanted.
     pub(super) taxels: Option<Taxels>,
 }
 
 /// A case with its matrices.
-pub(super) struct Cut {
+pub(super) struct Tiling {
     pub case: Case,
     pub parts: Vec<Subarray>,
     /// Shared by all subarrays: a partition's rectangles are equal.
@@ -46,14 +46,14 @@ pub(super) struct Cut {
     objective: Box<dyn Objective + Send + Sync>,
 }
 
-impl Cut {
+impl Tiling {
     fn matrices(&self, part: usize) -> &Matrices {
         self.masked.get(part).unwrap_or(&self.shared)
     }
 
     /// Leaves the taxels `dead` out, and no others.
-    fn mask(mut self, dead: &[[usize; 2]]) -> Result<Cut, MatricesError> {
-        let own = |part: &Subarray| self.shared.without(&part.own(dead));
+    fn mask(mut self, dead: &[[usize; 2]]) -> Result<Tiling, MatricesError> {
+        let own = |part: &Subarray| self.shared.without(&part.local_indices(dead));
         self.masked = match dead {
             [] => Vec::new(),
             _ => self.parts.iter().map(own).collect::<Result<_, _>>()?,
@@ -63,7 +63,7 @@ impl Cut {
 }
 
 /// A frame with what all subarrays ask of it.
-pub(super) struct Input<'a> {
+pub(super) struct EngineInput<'a> {
     pub stress_MPa: &'a [f64],
     pub codes: &'a [i32],
     pub floor: i32,
@@ -72,7 +72,7 @@ pub(super) struct Input<'a> {
 }
 
 /// What the subarrays of a case came to.
-pub(super) struct Outcome {
+pub(super) struct CaseOutcome {
     pub subarrays: Vec<SubarrayResult>,
     pub forces: Forces,
     pub flags: Vec<Flag>,
@@ -118,14 +118,14 @@ impl Golden {
     /// [`GoldenError`] but `Frame` and `TooStrong`.
     pub fn new(scene: &Scene) -> Result<Golden, GoldenError> {
         scene.require_golden()?;
-        let cut = |case: Case| -> Result<Cut, GoldenError> {
+        let tiling = |case: Case| -> Result<Tiling, GoldenError> {
             let parts = subarrays(case, &scene.sensor)?;
             let shape = parts[0].sensor(&scene.sensor);
             let shared = Matrices::of(scene, &shape, MAX_FLOAT_DEGREE)?;
-            let literal = scene.search.form == Form::Orthogonal;
-            let orthogonal = literal.then(|| Orthogonal::new(&shared)).transpose()?;
+            let orthogonal_form = scene.search.form == Form::Orthogonal;
+            let orthogonal = orthogonal_form.then(|| Orthogonal::new(&shared)).transpose()?;
             let objective = of_kind(scene.search.objective, &shape, scene.medium);
-            Ok(Cut { case, parts, shared, masked: Vec::new(), orthogonal, objective }.mask(&scene.input.dead)?)
+            Ok(Tiling { case, parts, shared, masked: Vec::new(), orthogonal, objective }.mask(&scene.input.dead)?)
         };
         let cases = match scene.partition.case {
             // The finest first, the whole last.
@@ -137,11 +137,11 @@ impl Golden {
             Case::Contacts => vec![Case::WHOLE],
             grid @ Case::Grid(_) => vec![grid],
         };
-        let cuts = cases.into_iter().map(cut).collect::<Result<_, _>>()?;
+        let tilings = cases.into_iter().map(tiling).collect::<Result<_, _>>()?;
         let by_contact = scene.partition.case.grid().is_none();
         let fits = by_contact && scene.input.dead.is_empty() && scene.search.mu_max > 0.0;
         let taxels = fits.then(|| Taxels::new(&scene.sensor, scene.medium));
-        Ok(Golden { scene: scene.clone(), input: InputOptions::new(scene)?, cuts, taxels })
+        Ok(Golden { scene: scene.clone(), input: Input::new(scene)?, tilings, taxels })
     }
 
     /// The matrices of a subarray; of `adaptive` those of the whole array.
@@ -150,8 +150,8 @@ impl Golden {
     }
 
     /// The coarsest case.
-    pub(super) fn whole(&self) -> &Cut {
-        &self.cuts[self.cuts.len() - 1]
+    pub(super) fn whole(&self) -> &Tiling {
+        &self.tilings[self.tilings.len() - 1]
     }
 
     /// The subarrays of the coarsest case.
@@ -164,12 +164,12 @@ impl Golden {
     ///
     /// # Errors
     /// `Frame` when the frame is not the scene's, `TooStrong` when a force overflows.
-    pub(super) fn engine(&self, frame: &Frame, noise_MPa: f64) -> Result<Reconstruction, GoldenError> {
+    pub(super) fn reconstruct_stress(&self, frame: &Frame, noise_MPa: f64) -> Result<Reconstruction, GoldenError> {
         let scene = &self.scene;
         frame.check(scene)?;
         let codes = quantise(&frame.stress_MPa, scene.fixed.input_bits, full_scale(scene, frame));
         let floor = noise_floor_codes(scene, &codes);
-        let input = Input { stress_MPa: &frame.stress_MPa, codes: &codes.codes, floor, noise_MPa };
+        let input = EngineInput { stress_MPa: &frame.stress_MPa, codes: &codes.codes, floor, noise_MPa };
         let mut result = match scene.partition.case {
             Case::Grid(_) => self.finish(frame, self.subarrays(&input, self.whole())),
             Case::Adaptive => self.adaptive(frame, &input),
@@ -185,30 +185,30 @@ impl Golden {
         Ok(result)
     }
 
-    pub(super) fn finish(&self, frame: &Frame, outcome: Outcome) -> Reconstruction {
-        let Outcome { subarrays, forces, flags, truncation } = outcome;
+    pub(super) fn finish(&self, frame: &Frame, outcome: CaseOutcome) -> Reconstruction {
+        let CaseOutcome { subarrays, forces, flags, truncation } = outcome;
         let mut result = assemble(&self.scene, frame, "golden", subarrays, forces, flags);
         result.extra.truncation = Some(truncation).filter(|truncation| !truncation.is_empty());
         result
     }
 
-    pub(super) fn receive(&self, input: &Input, part: &Subarray) -> Receipt {
+    pub(super) fn receive(&self, input: &EngineInput, part: &Subarray) -> Received {
         let codes = part.gather(&self.scene.sensor, input.codes);
         receive(&self.scene.sensor, part, &codes, input.floor, self.scene.partition.condition)
     }
 
     /// Every subarray of a case for itself.
-    pub(super) fn subarrays(&self, input: &Input, cut: &Cut) -> Outcome {
+    pub(super) fn subarrays(&self, input: &EngineInput, tiling: &Tiling) -> CaseOutcome {
         let sensor = &self.scene.sensor;
         let forces = Forces::zeros(sensor.taxels());
-        let mut outcome = Outcome { subarrays: Vec::new(), forces, flags: Vec::new(), truncation: Vec::new() };
-        for (index, part) in cut.parts.iter().enumerate() {
-            let receipt = self.receive(input, part);
+        let mut outcome = CaseOutcome { subarrays: Vec::new(), forces, flags: Vec::new(), truncation: Vec::new() };
+        for (index, part) in tiling.parts.iter().enumerate() {
+            let received = self.receive(input, part);
             let b = part.gather(sensor, input.stress_MPa);
             // With mu_max = 0 there is nothing to search for: no score and no verdict on compression.
-            let searched = receipt.condition_met && self.scene.search.mu_max > 0.0;
-            let (estimate, w) = self.solve(cut, index, &b, searched, input.noise_MPa);
-            let (x, truncation) = cut.meet(&b, w);
+            let searched = received.condition_met && self.scene.search.mu_max > 0.0;
+            let (estimate, w) = self.solve(tiling, index, &b, searched, input.noise_MPa);
+            let (x, truncation) = tiling.apply_form(&b, w);
             outcome.truncation.extend(truncation);
             let own = threshold(x, self.scene.threshold.min_force_N);
             if searched && estimate.is_none() {
@@ -222,9 +222,9 @@ impl Golden {
                 col0: part.col0,
                 rows: part.rows,
                 cols: part.cols,
-                centroid_condition: receipt.condition_met,
-                compression_centroid_mm: receipt.compression_centroid_mm,
-                tension_centroid_mm: receipt.tension_centroid_mm,
+                centroid_condition: received.condition_met,
+                compression_centroid_mm: received.compression_centroid_mm,
+                tension_centroid_mm: received.tension_centroid_mm,
                 mu: estimate.map_or([0.0; 2], |estimate| estimate.found.mu),
                 objective_value: estimate.map(|estimate| estimate.found.objective),
             });
@@ -235,29 +235,29 @@ impl Golden {
     /// One subarray: the family, the search where the condition is met, the forces before the threshold.
     fn solve(
         &self,
-        cut: &Cut,
+        tiling: &Tiling,
         part: usize,
         b: &[f64],
         condition_met: bool,
         noise_MPa: f64,
     ) -> (Option<Estimate>, Forces) {
-        let matrices = cut.matrices(part);
+        let matrices = tiling.matrices(part);
         if !condition_met {
             let family = Polynomial::of_degree(matrices, b, 0);
             return (None, force(family.v(0, 0), [0.0; 2], 0.0));
         }
         let family = Polynomial::new(matrices, b);
         let (sensor, mu_max) = (&matrices.sensor, self.scene.search.mu_max);
-        let estimate = cut.objective.find(&Subject { sensor, b, family: &family, mu_max, noise_MPa });
+        let estimate = tiling.objective.find(&SearchInput { sensor, b, family: &family, mu_max, noise_MPa });
         let mu = estimate.map_or([0.0; 2], |estimate| estimate.found.mu);
         let p = estimate.map_or_else(|| family.eval(mu), |estimate| estimate.pressure(&family));
         (estimate, force(&p, mu, 0.0))
     }
 }
 
-impl Cut {
+impl Tiling {
     /// The forces of Eq. 1 for w: w itself, or with the orthogonal form the nearest that meet b, and how far they are.
-    pub(super) fn meet(&self, b: &[f64], w: Forces) -> (Forces, Option<f64>) {
+    pub(super) fn apply_form(&self, b: &[f64], w: Forces) -> (Forces, Option<f64>) {
         match &self.orthogonal {
             None => (w, None),
             Some(orthogonal) => {

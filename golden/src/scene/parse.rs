@@ -8,7 +8,7 @@ use super::{
 use crate::board::Board;
 use crate::link::LinkKind;
 use crate::partition::{subarrays, Case, Grid};
-use crate::sensor::{Sensor, MAX_LENGTH_MM, MAX_LINES, MIN_LINES};
+use crate::sensor::{Sensor, MAX_LENGTH_MM, MAX_SIDE, MIN_SIDE};
 use std::ops::RangeInclusive;
 use std::path::Path;
 use toml::{Table, Value};
@@ -102,7 +102,7 @@ fn is_name(name: &str) -> bool {
 
 fn sensor(reader: &Reader) -> Result<Sensor, SceneError> {
     let lines = |path| {
-        let range = MIN_LINES as i64..=MAX_LINES as i64;
+        let range = MIN_SIDE as i64..=MAX_SIDE as i64;
         // In range, so that the cast keeps the value.
         reader.integer(path, range, None).map(|lines| lines as usize)
     };
@@ -147,7 +147,7 @@ fn partition(reader: &Reader, sensor: &Sensor) -> Result<PartitionSpec, SceneErr
         (Some(value), [None, None]) => ("partition.case", named_case(reader, value)?),
         (None, _) => {
             let parts = |path| {
-                let parts = reader.integer(path, 1..=(MAX_LINES / MIN_LINES) as i64, None)?;
+                let parts = reader.integer(path, 1..=(MAX_SIDE / MIN_SIDE) as i64, None)?;
                 Ok::<_, SceneError>(parts as usize)
             };
             let (rows, cols) = (parts("partition.rows")?, parts("partition.cols")?);

@@ -8,7 +8,7 @@
 //! | in: matrices, b | n × n, n | mm², MPa |
 //! | out: family | (d + 1)(d + 2)/2 of n | N |
 
-use crate::float::pass::{place, Polynomial};
+use crate::float::pass::{term_index, Polynomial};
 use crate::matrices::Matrices;
 use faer::Mat;
 
@@ -25,10 +25,10 @@ pub fn family(matrices: &Matrices, b: &[f64], degree: usize) -> Polynomial {
                 v.iter_mut().zip(image).for_each(|(v, image)| *v -= image);
             };
             if i > 0 {
-                take(&matrices.ax, place(i - 1, j));
+                take(&matrices.ax, term_index(i - 1, j));
             }
             if j > 0 {
-                take(&matrices.ay, place(i, j - 1));
+                take(&matrices.ay, term_index(i, j - 1));
             }
             vectors.push(v);
         }

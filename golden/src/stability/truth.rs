@@ -10,7 +10,7 @@
 //! | in: frame | known forces and their stress under one shear, if made elsewhere | N, MPa |
 //! | out: two frames | taxels | MPa, forces in N |
 
-use super::{extended, Figures};
+use super::{extended, FormatErrors};
 use crate::errors::Errors;
 use crate::float::force::force;
 use crate::folded::accumulate;
@@ -64,14 +64,14 @@ impl Truth {
     }
 
     /// The errors of the forces found in the sheared frame, beside a forward error.
-    pub(super) fn figures(&self, matrices: &Matrices, forward: f64, forces: &Forces) -> Figures {
+    pub(super) fn figures(&self, matrices: &Matrices, forward: f64, forces: &Forces) -> FormatErrors {
         let b = &self.sheared.stress_MPa;
         let mut rest = b.clone();
         for (c, f) in [(&matrices.cx, &forces.fx), (&matrices.cy, &forces.fy), (&matrices.cz, &forces.fz)] {
             accumulate(c, f, -1.0, &mut rest);
         }
         let errors = self.sheared.resultant_N.map(|truth| Errors::new(truth, forces.resultant()));
-        Figures {
+        FormatErrors {
             forward,
             residual: norm(&rest) / norm(b),
             normal: errors.and_then(|errors| errors.normal),

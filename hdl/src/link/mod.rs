@@ -54,7 +54,7 @@ pub use uart_transmitter::UartTransmitter;
 
 use dermis_golden::board::EngineKind;
 use dermis_golden::fixed::Model;
-use dermis_golden::link::{takes, Counters, Identity, Kind, Sums, BEAT_BYTES};
+use dermis_golden::link::{supports, Counters, Identity, Kind, Sums, BEAT_BYTES};
 
 /// What the packets of a scene need to know of it.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -78,7 +78,7 @@ impl Shape {
     pub fn of(model: &Model) -> Self {
         let sensor = &model.scene.sensor;
         let (input_bits, status_beats) = (model.formats.code_bits, model.status_beats());
-        let resultants = takes(model.board.engine, Kind::FrameForResultants);
+        let resultants = supports(model.board.engine, Kind::FrameForResultants);
         let frames = match model.board.engine {
             EngineKind::Parallel => 4,
             EngineKind::Serial => 2,

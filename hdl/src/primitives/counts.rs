@@ -36,7 +36,7 @@ impl Logic for Counts {
     fn update(&mut self) {
         let address = self.address.val().number() as usize;
         let layout = self._layouts.get(self.which.val().number() as usize).filter(|layout| address < layout.len());
-        let mask = layout.map_or(0b1111, |layout| layout.counts(address));
+        let mask = layout.map_or(0b1111, |layout| layout.lane_mask(address));
         self.mask.next = Word::from(u64::from(mask));
     }
 
@@ -51,7 +51,7 @@ impl Logic for Counts {
             _ => ("{which, address}", self.which.width() + bits),
         };
         let all = self._layouts.iter().enumerate().flat_map(|(case, layout)| {
-            (0..layout.len()).map(move |address| (case << bits | address, layout.counts(address)))
+            (0..layout.len()).map(move |address| (case << bits | address, layout.lane_mask(address)))
         });
         let cases: String = all
             .filter(|&(_, mask)| mask != 0b1111)

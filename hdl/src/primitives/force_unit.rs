@@ -164,7 +164,7 @@ impl ForceUnit {
             last: Default::default(),
             beat_data: Wire::new(3 * FORCE_BITS as usize),
             _formats: formats.clone(),
-            _checks: model.checks(),
+            _checks: model.has_coefficient_check(),
             _threshold: model.threshold,
             _pipe: vec![None; ASKED],
             _frame: Frame::default(),

@@ -98,7 +98,7 @@ impl Lanes {
             quad: Wire::new(4 * shape.acc_bits),
             quad_valid: Default::default(),
             damaged: Wire::new(1),
-            _check: model.checks().then(|| (START, cases.iter().map(signature).collect())),
+            _check: model.has_coefficient_check().then(|| (START, cases.iter().map(signature).collect())),
             _pipe: vec![Beat::default(); 4],
             _coefficients: [0; 2],
             _accumulators: vec![0; 4 * per_parity],

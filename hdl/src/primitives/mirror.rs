@@ -67,7 +67,7 @@ impl Logic for Mirror {
         let case = self._cases.get(self.which.val().number() as usize);
         let inside = |(layout, _): &&(Quads, Grid)| row < layout.rows && col < layout.cols;
         if let Some((layout, parts)) = case.filter(inside) {
-            let place = layout.place(row, col);
+            let place = layout.locate(row, col);
             let part = self.part_row.val().number() as usize * parts.cols + self.part_col.val().number() as usize;
             self.address.next = Word::from((part * layout.len() + place.address) as u64);
             self.part.next = Word::from(part as u64);

@@ -1,7 +1,7 @@
 //! Sums per subarray in the place of forces per taxel.
 
 use dermis_golden::fixed::formats::FORCE_BITS;
-use dermis_golden::fixed::resultants::{beats, BEATS, PLACE_BITS, SUMS, SUM_BITS};
+use dermis_golden::fixed::resultants::{beats, BEATS, POSITION_BITS, SUMS, SUM_BITS};
 use dermis_golden::partition::Grid;
 use dermis_golden::sensor::Sensor;
 use rust_hdl::prelude::*;
@@ -91,7 +91,7 @@ impl Resultants {
         let (sensor, parts, taxel) = (&self._sensor, self._parts, self._state.taxel);
         let (row, col) = (taxel / sensor.cols, taxel % sensor.cols);
         let part = row / (sensor.rows / parts.rows) * parts.cols + col / (sensor.cols / parts.cols);
-        let [x, y] = dermis_golden::fixed::resultants::place(sensor, taxel);
+        let [x, y] = dermis_golden::fixed::resultants::half_pitches(sensor, taxel);
         let [fx, fy, fz] = [0, 1, 2].map(|k| self.s_axis_tdata.val().signed(k, FORCE_BITS as usize));
         let pressed = fz.max(0);
         let values = [fx, fy, fz, pressed, x * pressed, y * pressed];
@@ -153,7 +153,7 @@ impl Logic for Resultants {
         let count = parts.rows * parts.cols;
         let (rows, cols) = (sensor.rows / parts.rows, sensor.cols / parts.cols);
         let [r, c, pr, pc, p] = [rows, cols, parts.rows, parts.cols, count].map(count_bits);
-        let (place, sum) = (PLACE_BITS as usize + 1, SUM_BITS as usize);
+        let (place, sum) = (POSITION_BITS as usize + 1, SUM_BITS as usize);
         // 64 bits of each sum.
         let more = 64 - sum;
         let wide: Vec<String> =

@@ -122,7 +122,7 @@ pub struct Steps {
 pub const COLUMN_FILE: &str = "columns.hex";
 /// Bits of `control`.
 pub fn control_bits(model: &Model) -> usize {
-    3 + usize::from(model.checks())
+    3 + usize::from(model.has_coefficient_check())
 }
 /// Bits of `source`.
 pub const SOURCE_BITS: usize = 5;

@@ -13,7 +13,7 @@
 
 use dermis_golden::fixed::formats::{Formats, HALVINGS};
 use dermis_golden::fixed::search::{CENTRE, COARSE_CENTRES};
-use dermis_golden::fixed::serial::{polynomials, JUDGEMENT, SLOT, SWEEP_TAIL, TRANSPOSE};
+use dermis_golden::fixed::serial::{polynomials, SELECTION, SLOT, SWEEP_TAIL, TRANSPOSE};
 use rust_hdl::prelude::*;
 
 use crate::primitives::{count_bits, position_bits};
@@ -300,7 +300,7 @@ impl Walk {
             (next.best, next.score, next.taken) = (s.position, total, true);
             (next.offset, next.best_disc, next.improved) = (offset(s.turns[1]), s.settled, true);
         }
-        if s.count == JUDGEMENT - 1 {
+        if s.count == SELECTION - 1 {
             next.state = SET_UP;
             next.sweep = s.sweep + 1;
             next.current = s.target;
@@ -610,7 +610,7 @@ end",
             back = BACK,
             slot_end = tick - 2,
             polynomials = self._polynomials,
-            last_count = JUDGEMENT - 1,
+            last_count = SELECTION - 1,
             transpose = TRANSPOSE,
             along_y = ALONG_Y,
             leaves = LEAVES,

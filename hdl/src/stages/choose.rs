@@ -2,7 +2,7 @@
 //!
 //! Place and magnitude of a code (1 cycle), maxima (1), what counts as a contact (1), the choice (1).
 
-use dermis_golden::fixed::choose::{is_beside, quarters, Seen, CUT_SHIFT};
+use dermis_golden::fixed::choose::{is_beside_boundary, quarters, FrameStats, CUT_SHIFT};
 use dermis_golden::fixed::Model;
 use dermis_golden::partition::Grid;
 use dermis_golden::scene::Condition;
@@ -37,7 +37,7 @@ pub struct Choose {
     _condition: Condition,
     _floor: i32,
     _index: usize,
-    _seen: Seen,
+    _seen: FrameStats,
     _left: usize,
 }
 
@@ -64,7 +64,7 @@ impl Choose {
             // A floor beyond the code's range hides every code; so does the range's end, in the code's width.
             _floor: model.noise_floor.min((1 << (bits - 1)) - 1),
             _index: 0,
-            _seen: Seen::default(),
+            _seen: FrameStats::default(),
             _left: 0,
         }
     }
@@ -72,13 +72,13 @@ impl Choose {
     /// Takes an accepted code; whether it was the frame's last.
     fn take(&mut self) -> bool {
         let code = self.code.val().signed(0, self.code.width()) as i32;
-        self._seen.take(&self._sensor, self._index, code, self._floor);
+        self._seen.add(&self._sensor, self._index, code, self._floor);
         self._index += 1;
         let last = self._index == self._sensor.taxels();
         if last {
             self._index = 0;
         } else if self.tlast.val() {
-            (self._index, self._seen) = (0, Seen::default());
+            (self._index, self._seen) = (0, FrameStats::default());
         }
         last
     }
@@ -134,7 +134,7 @@ impl Logic for Choose {
             if self._left == 1 {
                 let case = self._seen.choose(&self._grids, self._condition, self._floor);
                 self.which.next = Word::from(case as u64);
-                self._seen = Seen::default();
+                self._seen = FrameStats::default();
             }
             self.settled.next = (self.settled.val() || self._left == 1) && !self.free.val() && !self.rst.val();
             self._left = self._left.saturating_sub(1);
@@ -142,7 +142,7 @@ impl Logic for Choose {
                 self._left = LATENCY - 1;
             }
             if self.rst.val() {
-                (self._index, self._seen, self._left) = (0, Seen::default(), 0);
+                (self._index, self._seen, self._left) = (0, FrameStats::default(), 0);
             }
         }
     }
@@ -158,7 +158,7 @@ impl Logic for Choose {
         let w = self.which.width();
         // The lines beside a boundary: the first and the last of them.
         let beside = |lines: usize| {
-            let mut all = (0..lines).filter(|&line| is_beside(line, lines));
+            let mut all = (0..lines).filter(|&line| is_beside_boundary(line, lines));
             let first = all.next().unwrap_or(0);
             (first, all.next_back().unwrap_or(first))
         };

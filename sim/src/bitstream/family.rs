@@ -66,7 +66,7 @@ pub fn flow(family: Family) -> Flow {
 pub fn place_arguments(board: &Board, netlist: &str, seed: u32, placer: &str, name: &str) -> Vec<String> {
     let Board { size, package, speed_grade, .. } = board;
     let seed = seed.to_string();
-    let pins = format!("{}.{}", board.name, board.family.pins());
+    let pins = format!("{}.{}", board.name, board.family.pin_file_extension());
     let (report, configuration) = (format!("{name}.report.json"), format!("{name}.config"));
     let (size, speed) = (format!("--{size}"), speed_grade.to_string());
     let mut arguments = match board.family {

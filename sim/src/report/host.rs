@@ -1,7 +1,7 @@
 //! A board's answers for people.
 
 use dermis_golden::fixed::Model;
-use dermis_golden::link::{payloads, takes, Kind, LinkKind};
+use dermis_golden::link::{payloads, supports, Kind, LinkKind};
 
 use super::table::figures;
 use crate::host::{Answer, Line};
@@ -36,7 +36,7 @@ pub fn equality(answer: &Answer) -> String {
 
 /// How long a frame's packets take on each of the links that the board has.
 pub fn wire_times(model: &Model) -> String {
-    let sums = takes(model.board.engine, Kind::FrameForResultants);
+    let sums = supports(model.board.engine, Kind::FrameForResultants);
     let sent = || payloads(model).into_iter().filter(|(what, _)| sums || *what != Kind::Resultants.name());
     let of = |(name, link): (&str, LinkKind)| {
         let rate = link.bit_rate(&model.board).ok()?;

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use dermis_golden::fixed::cycles::lanes_busy;
+use dermis_golden::fixed::cycles::lane_utilisation;
 use dermis_golden::fixed::{Cycles, Model};
 use dermis_hdl::explain::{Explained, Saved};
 use dermis_hdl::usage::{total, Usage, STAGES};
@@ -26,7 +26,7 @@ pub fn resources(model: &Model, usage: &BTreeMap<String, Usage>) -> String {
          beat\n",
         board.name,
         4 * model.formats.lanes_per_parity,
-        100.0 * lanes_busy(model),
+        100.0 * lane_utilisation(model),
     ));
     text
 }

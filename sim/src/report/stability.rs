@@ -2,7 +2,7 @@
 
 use anyhow::Result;
 use dermis_golden::scene::Medium;
-use dermis_golden::stability::{Figures, Row, Spectrum};
+use dermis_golden::stability::{FormatErrors, Row, Spectrum};
 
 use super::csv::quoted;
 use super::data::markdown;
@@ -74,8 +74,10 @@ pub(super) fn stability_table(rows: &[Row]) -> Table {
 
 fn line(row: &Row) -> Vec<Cell> {
     let sensor = &row.sensor;
-    let of = |figures: Option<Figures>, pick: fn(&Figures) -> f64| short(figures.as_ref().map(pick));
-    let error = |figures: Option<Figures>, pick: fn(&Figures) -> Option<f64>| percent(figures.as_ref().and_then(pick));
+    let of = |figures: Option<FormatErrors>, pick: fn(&FormatErrors) -> f64| short(figures.as_ref().map(pick));
+    let error = |figures: Option<FormatErrors>, pick: fn(&FormatErrors) -> Option<f64>| {
+        percent(figures.as_ref().and_then(pick))
+    };
     let spectrum = |pick: fn(&Spectrum) -> f64| row.spectrum.as_ref().map(pick);
     vec![
         words(row.group.clone()),

@@ -170,7 +170,7 @@ fn a_board_with_the_serial_engine_sends_forces_and_says_that_it_adds_nothing_up(
     let packets = board.receive();
     let identity = Identity::of_bytes(&packets[0].payload).unwrap();
     assert_eq!(identity, Identity::of(&board.model).unwrap());
-    assert!(identity.takes(Kind::FrameForForces) && !identity.takes(Kind::FrameForResultants));
+    assert!(identity.supports(Kind::FrameForForces) && !identity.supports(Kind::FrameForResultants));
     for index in 0..2 {
         board.send(&board.frame(index, Kind::FrameForForces, 0xdb).to_wire());
         assert!(board.receive() == [board.answer(index, Kind::FrameForForces, 0xdb, false)], "frame {index}");

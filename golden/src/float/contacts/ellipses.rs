@@ -9,19 +9,19 @@
 //! A single ellipse changes nothing: one contact is the plain method. A region's forces are its ellipse's pressure over
 //! each cell, scaled to its load; a cell under two belongs to the one that presses it more.
 
-use super::{Contacts, Solver, Stress};
-use crate::float::objective::explained;
-use crate::float::objective::several::{explain, starts, Explanation, FIT_WIDTHS};
-use crate::float::search::{Found, RADIUS};
+use super::{Contacts, MeasuredStress, Solver};
+use crate::float::objective::misfit_limit;
+use crate::float::objective::multi_ellipse::{fit_ellipses, start_parameters, EllipseFit, FIT_WIDTHS};
+use crate::float::search::{SearchResult, RADIUS};
 use crate::float::segment::{segment, Segments};
 
 /// Share by which an ellipse's |μ| may exceed mu_max, to which it is cut.
-const BEYOND: f64 = 0.05;
+const MU_TOLERANCE: f64 = 0.05;
 
 impl Solver<'_> {
     /// The ellipses that come nearest to the stress, started from the state's regions; `None` where none may be fitted.
-    pub(super) fn fit(&self, state: &Contacts) -> Option<Explanation> {
-        let Stress { taxels, b, noise_MPa } = self.stress?;
+    pub(super) fn fit(&self, state: &Contacts) -> Option<EllipseFit> {
+        let MeasuredStress { taxels, b, noise_MPa } = self.stress?;
         let sensor = &self.matrices.sensor;
         // What differs is the number of regions; the rest the fit finds by itself.
         let drawn = FIT_WIDTHS.map(|width| segment(sensor, &state.p, width));
@@ -33,47 +33,48 @@ impl Solver<'_> {
             counts.push(segments.count);
             new
         });
-        let starts: Vec<Vec<f64>> = drawings.into_iter().map(|segments| starts(sensor, &state.p, segments)).collect();
-        explain(taxels, b, &starts, explained(b, noise_MPa))
+        let starts: Vec<Vec<f64>> =
+            drawings.into_iter().map(|segments| start_parameters(sensor, &state.p, segments)).collect();
+        fit_ellipses(taxels, b, &starts, misfit_limit(b, noise_MPa))
     }
 
     /// The contacts of ellipses that explain the stress: `state`, the plain method, where it is a single one.
-    pub(super) fn explained(&self, explanation: &Explanation, state: &Contacts) -> Option<Contacts> {
-        match explanation.patches.len() {
-            _ if !explanation.enough() => None,
+    pub(super) fn from_ellipses(&self, fitted: &EllipseFit, state: &Contacts) -> Option<Contacts> {
+        match fitted.patches.len() {
+            _ if !fitted.explains_stress() => None,
             1 => (state.segments.count == 1).then(|| state.clone()),
-            _ => self.of_ellipses(explanation, state),
+            _ => self.ellipse_contacts(fitted, state),
         }
     }
 
     /// The regions of ellipses, each with its ellipse's forces; `None` where a region has none, is not to be searched
     /// or has more shear than there may be.
-    fn of_ellipses(&self, explanation: &Explanation, state: &Contacts) -> Option<Contacts> {
+    fn ellipse_contacts(&self, fitted: &EllipseFit, state: &Contacts) -> Option<Contacts> {
         let sensor = &self.matrices.sensor;
-        let cells = explanation.cells(sensor);
-        let labels = explanation.labels(sensor);
+        let cells = fitted.cells(sensor);
+        let labels = fitted.labels(sensor);
         let segments = Segments::numbered(&labels);
         let mut p: Vec<f64> = (0..labels.len()).map(|k| cells.iter().map(|cells| cells[k]).sum()).collect();
         let mut found = vec![None; segments.count];
-        let mut seen = 0;
-        for (ellipse, patch) in explanation.patches.iter().enumerate() {
+        let mut filled = 0;
+        for (ellipse, patch) in fitted.patches.iter().enumerate() {
             let first = labels.iter().position(|&label| label == ellipse)?;
             let region = segments.labels[first];
             let sum: f64 = (0..p.len()).filter(|&k| labels[k] == ellipse).map(|k| p[k]).sum();
             let [x, y, load] = patch.force;
             let ratio = (x / load).hypot(y / load);
-            if !(self.searched)(&segments, region) || sum <= 0.0 || ratio > (1.0 + BEYOND) * self.mu_max {
+            if !(self.searched)(&segments, region) || sum <= 0.0 || ratio > (1.0 + MU_TOLERANCE) * self.mu_max {
                 return None;
             }
             (0..p.len()).filter(|&k| labels[k] == ellipse).for_each(|k| p[k] *= load / sum);
             let cut = if ratio > self.mu_max { self.mu_max / ratio } else { 1.0 };
             let mu = [x, y].map(|f| f / load * cut);
             let position = mu.map(|mu| (mu * f64::from(RADIUS) / self.mu_max) as i32);
-            found[region] = Some(Found { mu, position, objective: 0.0, evaluations: explanation.evaluations });
-            seen += 1;
+            found[region] = Some(SearchResult { mu, position, objective: 0.0, evaluations: fitted.evaluations });
+            filled += 1;
         }
         let objective = self.objective.score(&p)?;
         found.iter_mut().flatten().for_each(|found| found.objective = objective);
-        (seen == segments.count).then_some(Contacts { segments, found, p, sweeps: state.sweeps, converged: true })
+        (filled == segments.count).then_some(Contacts { segments, found, p, sweeps: state.sweeps, converged: true })
     }
 }

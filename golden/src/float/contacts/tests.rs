@@ -37,7 +37,7 @@ fn solve(matrices: &Matrices, b: &[f64], searched: &dyn Fn(&Segments, usize) -> 
     let objective = &Sparse::default();
     let found = search(&family, 0.6, objective).unwrap();
     let taxels = Taxels::new(&matrices.sensor, Medium::HalfSpace);
-    let stress = Some(Stress { taxels: &taxels, b, noise_MPa: 0.0 });
+    let stress = Some(MeasuredStress { taxels: &taxels, b, noise_MPa: 0.0 });
     Solver { matrices, mu_max: 0.6, objective, p0: family.v(0, 0), stress, searched }.solve(&family, found)
 }
 

@@ -17,9 +17,9 @@
 //!
 //! σ is the noise after averaging. With σ stated too small a noisy frame looks like one of another shape.
 
-use super::{Estimate, Objective, Patch, Sparse, Subject, Symmetric};
+use super::{Estimate, Objective, Patch, SearchInput, Sparse, Symmetric};
 use crate::flags::SPARSE_NOISE_LIMIT;
-use crate::float::search::Found;
+use crate::float::search::SearchResult;
 use crate::scene::Medium;
 use crate::sensor::Sensor;
 
@@ -29,7 +29,7 @@ const OWN_ERROR: f64 = 1.5e-4;
 const DEVIATIONS: f64 = 4.0;
 
 /// Largest squared misfit in MPa² of a fit that explains b.
-pub(crate) fn explained(b: &[f64], noise_MPa: f64) -> f64 {
+pub(crate) fn misfit_limit(b: &[f64], noise_MPa: f64) -> f64 {
     let peak = b.iter().fold(0.0f64, |peak, b| b.abs().max(peak));
     let n = b.len() as f64;
     let variance = noise_MPa.powi(2) + (OWN_ERROR * peak).powi(2);
@@ -58,9 +58,9 @@ impl Objective for Auto {
         self.sparse.score(p)
     }
 
-    fn find(&self, subject: &Subject) -> Option<Estimate> {
-        let peak = subject.b.iter().fold(0.0f64, |peak, b| b.abs().max(peak));
-        let most = explained(subject.b, subject.noise_MPa);
+    fn find(&self, input: &SearchInput) -> Option<Estimate> {
+        let peak = input.b.iter().fold(0.0f64, |peak, b| b.abs().max(peak));
+        let most = misfit_limit(input.b, input.noise_MPa);
         // The objective of a fit is its negative misfit.
         let explains = |estimate: &Estimate| -estimate.found.objective <= most;
         let mut evaluations = 0;
@@ -71,17 +71,17 @@ impl Objective for Auto {
                 estimate
             })
         };
-        let patch = counted(self.patch.find(subject));
+        let patch = counted(self.patch.find(input));
         if patch.as_ref().is_some_and(explains) {
             return patch;
         }
-        if subject.noise_MPa <= SPARSE_NOISE_LIMIT * peak {
-            return counted(self.sparse.find(subject)).or(patch);
+        if input.noise_MPa <= SPARSE_NOISE_LIMIT * peak {
+            return counted(self.sparse.find(input)).or(patch);
         }
-        let symmetric = counted(self.symmetric.find(subject));
+        let symmetric = counted(self.symmetric.find(input));
         match (patch, symmetric) {
             (Some(patch), Some(symmetric)) if patch.found.objective > symmetric.found.objective => {
-                counted(Some(Estimate { found: Found { evaluations: 0, ..patch.found }, ..patch }))
+                counted(Some(Estimate { found: SearchResult { evaluations: 0, ..patch.found }, ..patch }))
             }
             (patch, symmetric) => symmetric.or(patch),
         }
@@ -109,12 +109,12 @@ mod tests {
         let b = frame.stress_MPa.as_slice();
         let family = Polynomial::new(matrices, b);
         let sensor = &frame.sensor;
-        let subject = Subject { sensor, b, family: &family, mu_max: 0.6, noise_MPa: noise * frame.peak_MPa() };
+        let input = SearchInput { sensor, b, family: &family, mu_max: 0.6, noise_MPa: noise * frame.peak_MPa() };
         Four {
-            auto: Auto::new(sensor, Medium::HalfSpace).find(&subject),
-            patch: Patch::new(sensor, Medium::HalfSpace).find(&subject),
-            sparse: Sparse::default().find(&subject),
-            symmetric: Symmetric::new(sensor, Medium::HalfSpace).find(&subject),
+            auto: Auto::new(sensor, Medium::HalfSpace).find(&input),
+            patch: Patch::new(sensor, Medium::HalfSpace).find(&input),
+            sparse: Sparse::default().find(&input),
+            symmetric: Symmetric::new(sensor, Medium::HalfSpace).find(&input),
         }
     }
 
@@ -124,7 +124,8 @@ mod tests {
 
     /// Whether two estimates are the same but for their count of evaluations.
     fn same(a: Option<Estimate>, b: Option<Estimate>) -> bool {
-        let bare = |estimate: Estimate| Estimate { found: Found { evaluations: 0, ..estimate.found }, ..estimate };
+        let bare =
+            |estimate: Estimate| Estimate { found: SearchResult { evaluations: 0, ..estimate.found }, ..estimate };
         a.map(bare) == b.map(bare)
     }
 

@@ -31,7 +31,7 @@ pub(super) const STEADY: Effort = Effort { steps: 20, gain: 0.01 };
 pub(super) const QUICK: Effort = Effort { steps: 20, gain: 0.05 };
 
 /// λ beyond which no step helps any more.
-const STUCK: f64 = 1e8;
+const MAX_LAMBDA: f64 = 1e8;
 /// Added to the normal equations' diagonal, relative, so that loads that cannot be told apart stay finite.
 const RIDGE: f64 = 1e-13;
 
@@ -104,7 +104,7 @@ pub(super) fn fit(model: &mut dyn Model, b: &DVector<f64>, start: &[f64], effort
         let slopes = best.project(model.slopes(&theta, &best.loads));
         let (curvature, downhill) = (slopes.tr_mul(&slopes), slopes.tr_mul(&best.rest));
         let before = best.misfit();
-        while lambda < STUCK {
+        while lambda < MAX_LAMBDA {
             let mut damped = curvature.clone();
             for k in 0..damped.nrows() {
                 damped[(k, k)] += lambda * curvature[(k, k)] + f64::MIN_POSITIVE;

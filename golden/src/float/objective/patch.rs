@@ -17,28 +17,28 @@
 //! | out: load | scalar | N | above 0 |
 //!
 //! Found first with few nodes, then a few steps with many. Where one contact does not explain the stress, but several
-//! ellipses do ([`super::several`]), their forces add up to that of the subarray.
+//! ellipses do ([`super::multi_ellipse`]), their forces add up to that of the subarray.
 
 use super::disc::Disc;
 use super::fit::{fit, misfit, Fit, Model, THOROUGH};
-use super::several::{explain, starts, Explanation, FIT_WIDTHS};
+use super::multi_ellipse::{fit_ellipses, start_parameters, EllipseFit, FIT_WIDTHS};
 use super::taxels::Taxels;
-use super::{explained, Estimate, Objective, Subject};
+use super::{misfit_limit, Estimate, Objective, SearchInput};
 use crate::float::segment::segment;
 use crate::scene::Medium;
 use crate::sensor::Sensor;
 use nalgebra::{DMatrix, DVector};
 
 /// Rings and angles of the first fit: 60 nodes.
-pub(super) const COARSE: [usize; 2] = [5, 12];
+pub(super) const COARSE_NODES: [usize; 2] = [5, 12];
 /// Rings and angles of the second.
-pub(super) const FINE: [usize; 2] = [8, 24];
+pub(super) const FINE_NODES: [usize; 2] = [8, 24];
 /// Starting radii over the depth.
 const START_RADII: [f64; 4] = [0.5, 1.0, 1.7, 2.7];
 /// Least and largest g.
-const EXPONENTS: [f64; 2] = [0.0, 2.0];
+const EXPONENT_RANGE: [f64; 2] = [0.0, 2.0];
 /// Smallest radius over the depth; below, a contact cannot be told from a point.
-const LEAST_RADIUS: f64 = 0.1;
+const MIN_RADIUS: f64 = 0.1;
 
 /// The objective.
 #[derive(Clone, Debug)]
@@ -51,7 +51,7 @@ pub struct Patch {
 impl Patch {
     /// For subarrays of one shape under a medium.
     pub fn new(sensor: &Sensor, medium: Medium) -> Patch {
-        let [coarse, fine] = [COARSE, FINE].map(|[rings, angles]| Disc::new(rings, angles));
+        let [coarse, fine] = [COARSE_NODES, FINE_NODES].map(|[rings, angles]| Disc::new(rings, angles));
         Patch { taxels: Taxels::new(sensor, medium), coarse, fine }
     }
 }
@@ -66,7 +66,7 @@ pub(crate) struct Ellipse<'a> {
 }
 
 /// The place of a node.
-pub(super) fn place(theta: &[f64], [u, v]: [f64; 2]) -> [f64; 2] {
+pub(super) fn node_position(theta: &[f64], [u, v]: [f64; 2]) -> [f64; 2] {
     [theta[0] + theta[2] * u + theta[4] * v, theta[1] + theta[4] * u + theta[3] * v]
 }
 
@@ -74,7 +74,7 @@ pub(super) fn place(theta: &[f64], [u, v]: [f64; 2]) -> [f64; 2] {
 pub(super) fn confine_ellipse(taxels: &Taxels, theta: &mut [f64]) {
     let reach = |positions: &[f64]| positions.iter().fold(0.0f64, |reach, x| x.abs().max(reach));
     let (x, y) = (reach(&taxels.x), reach(&taxels.y));
-    let radii = [LEAST_RADIUS * taxels.depth, 2.0 * x.max(y)];
+    let radii = [MIN_RADIUS * taxels.depth, 2.0 * x.max(y)];
     theta[0] = theta[0].clamp(-x, x);
     theta[1] = theta[1].clamp(-y, y);
     theta[2] = theta[2].clamp(radii[0], radii[1].max(radii[0]));
@@ -91,7 +91,7 @@ impl Ellipse<'_> {
         let mut columns = [(); 3].map(|()| vec![0.0; self.taxels.count()]);
         let (weights, _) = self.disc.weights(theta[5]);
         for (&node, weight) in self.disc.nodes.iter().zip(weights) {
-            self.taxels.add_unit_forces(place(theta, node), weight, &mut columns);
+            self.taxels.add_unit_forces(node_position(theta, node), weight, &mut columns);
         }
         columns
     }
@@ -103,7 +103,7 @@ impl Ellipse<'_> {
         let mut field = [(); 3].map(|()| vec![0.0; n]);
         let (weights, slopes) = self.disc.weights(theta[5]);
         for ((&[u, v], weight), slope) in self.disc.nodes.iter().zip(weights).zip(slopes) {
-            self.taxels.field(place(theta, [u, v]), force, &mut field);
+            self.taxels.field(node_position(theta, [u, v]), force, &mut field);
             let [o0, o1, o2, o3, o4, o5] = &mut out;
             let outs = o0.iter_mut().zip(o1).zip(o2).zip(o3).zip(o4).zip(o5);
             let fields = field[0].iter().zip(&field[1]).zip(&field[2]);
@@ -132,7 +132,7 @@ impl Model for Ellipse<'_> {
 
     fn confine(&self, theta: &mut [f64]) {
         confine_ellipse(self.taxels, theta);
-        theta[5] = theta[5].clamp(EXPONENTS[0], EXPONENTS[1]);
+        theta[5] = theta[5].clamp(EXPONENT_RANGE[0], EXPONENT_RANGE[1]);
     }
 }
 
@@ -166,25 +166,28 @@ impl Objective for Patch {
         None
     }
 
-    fn find(&self, subject: &Subject) -> Option<Estimate> {
-        let b = DVector::from_column_slice(subject.b);
-        let fit = self.fit(&b, subject.centre_mm())?;
+    fn find(&self, input: &SearchInput) -> Option<Estimate> {
+        let b = DVector::from_column_slice(input.b);
+        let fit = self.fit(&b, input.centre_mm())?;
         let one = |evaluations: usize| {
             let force = [fit.loads[0], fit.loads[1], fit.loads[2]];
-            Estimate::of_force(force, subject.mu_max, -fit.misfit, evaluations)
+            Estimate::of_force(force, input.mu_max, -fit.misfit, evaluations)
         };
-        let enough = explained(subject.b, subject.noise_MPa);
-        if fit.misfit <= enough {
+        let limit = misfit_limit(input.b, input.noise_MPa);
+        if fit.misfit <= limit {
             return one(fit.evaluations);
         }
-        let p = subject.family.v(0, 0);
-        let drawn = FIT_WIDTHS.map(|width| segment(subject.sensor, p, width));
-        let starts: Vec<Vec<f64>> =
-            drawn.iter().filter(|drawn| drawn.count > 1).map(|drawn| starts(subject.sensor, p, drawn)).collect();
-        let several = explain(&self.taxels, subject.b, &starts, enough);
+        let p = input.family.v(0, 0);
+        let drawn = FIT_WIDTHS.map(|width| segment(input.sensor, p, width));
+        let starts: Vec<Vec<f64>> = drawn
+            .iter()
+            .filter(|drawn| drawn.count > 1)
+            .map(|drawn| start_parameters(input.sensor, p, drawn))
+            .collect();
+        let several = fit_ellipses(&self.taxels, input.b, &starts, limit);
         let evaluations = fit.evaluations + several.as_ref().map_or(0, |several| several.evaluations);
-        match several.filter(Explanation::enough) {
-            Some(several) => Estimate::of_force(several.force_N(), subject.mu_max, -several.misfit, evaluations),
+        match several.filter(EllipseFit::explains_stress) {
+            Some(several) => Estimate::of_force(several.force_N(), input.mu_max, -several.misfit, evaluations),
             None => one(evaluations),
         }
     }
@@ -210,13 +213,13 @@ mod tests {
             let matrices = Matrices::of(&scene, &sensor, MAX_FLOAT_DEGREE).unwrap();
             let (b, mu_max) = (frame.stress_MPa.as_slice(), scene.search.mu_max);
             let family = Polynomial::new(&matrices, b);
-            let subject = Subject { sensor: &sensor, b, family: &family, mu_max, noise_MPa: 0.0 };
-            let found = Patch::new(&sensor, medium).find(&subject).unwrap();
+            let input = SearchInput { sensor: &sensor, b, family: &family, mu_max, noise_MPa: 0.0 };
+            let found = Patch::new(&sensor, medium).find(&input).unwrap();
             let [tx, ty, load] = frame.resultant_N.unwrap();
             let off = (found.found.mu[0] - tx / load).hypot(found.found.mu[1] - ty / load);
             // The quadrature of the fit is good to 1e-4 of the peak.
             assert!(off < 0.005 && (found.load_N.unwrap() / load - 1.0).abs() < 0.005, "{medium}: {found:?}");
-            assert!(-found.found.objective <= explained(b, 0.0));
+            assert!(-found.found.objective <= misfit_limit(b, 0.0));
         }
     }
 }

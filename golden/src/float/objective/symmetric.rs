@@ -24,10 +24,10 @@
 //! | out: load | scalar | N | above 0 |
 
 use super::disc::Disc;
-use super::even::Even;
 use super::fit::{fit, Fit, THOROUGH};
+use super::symmetric_pressure::SymmetricPressure;
 use super::taxels::Taxels;
-use super::{Estimate, Objective, Subject};
+use super::{Estimate, Objective, SearchInput};
 use crate::float::search::search;
 use crate::scene::Medium;
 use crate::sensor::Sensor;
@@ -97,11 +97,11 @@ impl Symmetric {
     }
 
     /// The second stage from a start, for the best support.
-    fn refine(&self, subject: &Subject, start: [f64; 4]) -> Option<Fit> {
-        let b = DVector::from_column_slice(subject.b);
+    fn refine(&self, input: &SearchInput, start: [f64; 4]) -> Option<Fit> {
+        let b = DVector::from_column_slice(input.b);
         let (mut best, mut evaluations): (Option<Fit>, usize) = (None, 0);
         for support in SUPPORTS {
-            let mut model = Even::new(&self.taxels, &self.disc, subject.mu_max);
+            let mut model = SymmetricPressure::new(&self.taxels, &self.disc, input.mu_max);
             let [x, y, mu_x, mu_y] = start;
             let radius = support * self.taxels.depth;
             let theta = [x, y, radius, radius, 0.0, mu_x, mu_y];
@@ -126,15 +126,15 @@ impl Objective for Symmetric {
         Some(-squares.iter().sum::<f64>()).filter(|score| score.is_finite())
     }
 
-    fn find(&self, subject: &Subject) -> Option<Estimate> {
-        let found = search(subject.family, subject.mu_max, self)?;
-        let [x, y] = self.peak(&subject.family.eval(found.mu));
-        let Some(fit) = self.refine(subject, [x, y, found.mu[0], found.mu[1]]) else {
+    fn find(&self, input: &SearchInput) -> Option<Estimate> {
+        let found = search(input.family, input.mu_max, self)?;
+        let [x, y] = self.peak(&input.family.eval(found.mu));
+        let Some(fit) = self.refine(input, [x, y, found.mu[0], found.mu[1]]) else {
             return Some(Estimate { found, load_N: None });
         };
         let load = fit.loads[0];
         let evaluations = found.evaluations + fit.evaluations;
-        Estimate::of_force([fit.theta[5] * load, fit.theta[6] * load, load], subject.mu_max, -fit.misfit, evaluations)
+        Estimate::of_force([fit.theta[5] * load, fit.theta[6] * load, load], input.mu_max, -fit.misfit, evaluations)
     }
 }
 
@@ -203,7 +203,7 @@ mod tests {
             let family = Polynomial::new(&matrices, &frame.stress_MPa);
             let (sensor, b) = (&scene.sensor, frame.stress_MPa.as_slice());
             Symmetric::new(sensor, Medium::HalfSpace)
-                .find(&Subject { sensor, b, family: &family, mu_max, noise_MPa: 0.0 })
+                .find(&SearchInput { sensor, b, family: &family, mu_max, noise_MPa: 0.0 })
                 .unwrap()
         };
         let free = find(0.6);

@@ -29,7 +29,7 @@ fn agree(got: &[f64], wanted: &[f64]) {
 fn places_are_in_order() {
     let order = [(0, 0), (1, 0), (0, 1), (2, 0), (1, 1), (0, 2), (3, 0), (2, 1)];
     for (k, (i, j)) in order.into_iter().enumerate() {
-        assert_eq!(place(i, j), k);
+        assert_eq!(term_index(i, j), k);
     }
 }
 

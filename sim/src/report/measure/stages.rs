@@ -193,7 +193,7 @@ impl<'a> Shadow<'a> {
     /// The forces as they leave.
     fn send(&self, pairs: &mut Pairs) {
         let model = &self.integers.model;
-        if model.wants_resultants() {
+        if model.sends_resultants() {
             return;
         }
         let lsb_N = model.force_lsb_N(self.code_MPa * model.prepare.largest());

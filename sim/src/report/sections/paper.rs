@@ -6,7 +6,7 @@ use std::time::Instant;
 use anyhow::Result;
 use dermis_golden::fixed::schedule::vectors;
 use dermis_golden::frame::Frame;
-use dermis_golden::matrices::store;
+use dermis_golden::matrices::cache;
 use dermis_golden::paper::conclusions;
 use dermis_golden::partition::Case;
 use dermis_golden::reconstruct::Golden;
@@ -130,7 +130,7 @@ fn figure_7(measured: &[Measured], options: &Options) -> Result<Section> {
     let own: Vec<&Measured> = measured.iter().filter(|m| m.scene.name == "sensor-4").collect();
     let bar = Progress::steps("Fig. 7", (REPEATS * own.len()) as u64);
     // Matrices from an earlier run would not be a measurement.
-    store::keep_in(None);
+    cache::set_folder(None);
     let mut all: Vec<[f64; REPEATS]> = Vec::new();
     for m in &own {
         let mut repeats = [0.0; REPEATS];

@@ -2,7 +2,7 @@
 
 use anyhow::{anyhow, Result};
 use dermis_golden::scene::InverseKind;
-use dermis_golden::stability::{extreme, Figures, Row};
+use dermis_golden::stability::{extreme, FormatErrors, Row};
 
 use super::super::document::{Item, Picture, Section};
 use super::super::extremes::extremes_table;
@@ -42,9 +42,9 @@ pub fn extremes(all: &[(String, Vec<extreme::Row>)]) -> Section {
     Section { id: "extremes", title: "Extreme frames".into(), items }
 }
 
-type Format = (&'static str, fn(&Row) -> Option<Figures>);
+type Format = (&'static str, fn(&Row) -> Option<FormatErrors>);
 const FORMATS: [Format; 3] = [("f64", |row| row.double), ("f32", |row| row.single), ("fixed", |row| row.fixed)];
-type Error = (&'static str, fn(&Figures) -> Option<f64>);
+type Error = (&'static str, fn(&FormatErrors) -> Option<f64>);
 const ERRORS: [Error; 2] = [("forward", |figures| Some(figures.forward)), ("e_n", |figures| figures.normal)];
 
 /// The picture as a file of its own.

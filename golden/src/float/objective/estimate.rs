@@ -7,12 +7,12 @@
 //! | out: load | scalar | N, where the objective knows it better than Σp |
 
 use crate::float::pass::Polynomial;
-use crate::float::search::{Found, RADIUS};
+use crate::float::search::{SearchResult, RADIUS};
 use crate::sensor::Sensor;
 
 /// One subarray in one frame.
 #[derive(Clone, Copy, Debug)]
-pub struct Subject<'a> {
+pub struct SearchInput<'a> {
     /// The subarray as a sensor; positions count from its own centre.
     pub sensor: &'a Sensor,
     /// Stress, row-major.
@@ -29,7 +29,7 @@ pub struct Subject<'a> {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Estimate {
     /// μ, score and evaluations.
-    pub found: Found,
+    pub found: SearchResult,
     /// Normal load, to which the forces are to be scaled.
     pub load_N: Option<f64>,
 }
@@ -39,7 +39,7 @@ const COUNTS_FROM: f64 = 0.3;
 /// Distance from the largest p₀ in depths (and one pitch) within which taxels count.
 const NEAR: f64 = 2.5;
 
-impl Subject<'_> {
+impl SearchInput<'_> {
     /// Centroid of the strong p₀ around its peak, in mm: where a contact's fit starts.
     pub fn centre_mm(&self) -> [f64; 2] {
         let p = self.family.v(0, 0);
@@ -89,6 +89,6 @@ impl Estimate {
         // The nearest place of the grid, for those who need whole numbers.
         let unit = f64::from(RADIUS) / mu_max.max(f64::MIN_POSITIVE);
         let position = mu.map(|mu| (mu * unit) as i32);
-        Some(Estimate { found: Found { mu, position, objective, evaluations }, load_N: Some(load) })
+        Some(Estimate { found: SearchResult { mu, position, objective, evaluations }, load_N: Some(load) })
     }
 }

@@ -1,6 +1,6 @@
 //! Store: folded matrices kept on disk between runs, so that large arrays start at once.
 //!
-//! Nothing is kept until [`keep_in`] names a folder; a program does that, never a test of the numbers. A file holds
+//! Nothing is kept until [`set_folder`] names a folder; a program does that, never a test of the numbers. A file holds
 //!
 //! ```text
 //! magic  key length  key  4 numbers  3 × (blocks  (row0  col0  rows  cols  entries column by column)…)  CRC-32
@@ -23,18 +23,18 @@ use std::sync::RwLock;
 const VERSION: u32 = 2;
 const MAGIC: &[u8; 8] = b"dermisA\n";
 /// Below so many taxels computing is as fast as reading.
-const LEAST_TAXELS: usize = 400;
+const MIN_TAXELS: usize = 400;
 
 static FOLDER: RwLock<Option<PathBuf>> = RwLock::new(None);
 
 /// Keeps the matrices of this process's scenes in `folder` from now on, and takes them from there; `None`: no longer.
-pub fn keep_in(folder: Option<&Path>) {
+pub fn set_folder(folder: Option<&Path>) {
     *FOLDER.write().unwrap_or_else(std::sync::PoisonError::into_inner) = folder.map(Path::to_owned);
 }
 
 /// What is kept of a subarray's matrices.
 #[derive(Clone, Debug)]
-pub(super) struct Kept {
+pub(super) struct CachedMatrices {
     /// Condition, rank, gain and r of the series.
     pub numbers: [f64; 4],
     /// Cz⁺, Ax, Ay.
@@ -42,28 +42,28 @@ pub(super) struct Kept {
 }
 
 /// The place of one subarray's matrices.
-pub(super) struct Place {
+pub(super) struct CacheFile {
     path: PathBuf,
     key: String,
 }
 
-impl Place {
+impl CacheFile {
     /// Where the matrices would be, `None` where nothing is kept.
-    pub(super) fn of(sensor: &Sensor, medium: Medium, mu_max: f64, inversion: Inversion) -> Option<Place> {
+    pub(super) fn of(sensor: &Sensor, medium: Medium, mu_max: f64, inversion: Inversion) -> Option<CacheFile> {
         let folder = FOLDER.read().ok()?.clone()?;
-        (sensor.taxels() >= LEAST_TAXELS).then(|| Place::at(&folder, sensor, medium, mu_max, inversion))
+        (sensor.taxels() >= MIN_TAXELS).then(|| CacheFile::at(&folder, sensor, medium, mu_max, inversion))
     }
 
-    fn at(folder: &Path, sensor: &Sensor, medium: Medium, mu_max: f64, inversion: Inversion) -> Place {
+    fn at(folder: &Path, sensor: &Sensor, medium: Medium, mu_max: f64, inversion: Inversion) -> CacheFile {
         // Debug prints the shortest text that reads back as the same number.
         let version = env!("CARGO_PKG_VERSION");
         let key = format!("{VERSION} {version} {sensor:?} {medium:?} {mu_max:?} {inversion:?}");
         let path = folder.join(format!("{:08x}-{}.matrices", crc32fast::hash(key.as_bytes()), key.len()));
-        Place { path, key }
+        CacheFile { path, key }
     }
 
     /// What is kept there, `None` for anything but a whole file of this key.
-    pub(super) fn read(&self) -> Option<Kept> {
+    pub(super) fn read(&self) -> Option<CachedMatrices> {
         let bytes = fs::read(&self.path).ok()?;
         let (content, crc) = bytes.split_at_checked(bytes.len().checked_sub(4)?)?;
         let whole = crc32fast::hash(content).to_le_bytes() == crc;
@@ -74,17 +74,17 @@ impl Place {
         }
         let numbers = [rest.number()?, rest.number()?, rest.number()?, rest.number()?];
         let operators = [rest.operator()?, rest.operator()?, rest.operator()?];
-        rest.0.is_empty().then_some(Kept { numbers, operators })
+        rest.0.is_empty().then_some(CachedMatrices { numbers, operators })
     }
 
     /// Keeps it. Where that fails the next run computes again, which is no error.
-    pub(super) fn write(&self, kept: &Kept) {
+    pub(super) fn write(&self, cached: &CachedMatrices) {
         let mut bytes = MAGIC.to_vec();
         let size = |bytes: &mut Vec<u8>, n: usize| bytes.extend((n as u64).to_le_bytes());
         size(&mut bytes, self.key.len());
         bytes.extend(self.key.as_bytes());
-        kept.numbers.iter().for_each(|number| bytes.extend(number.to_le_bytes()));
-        for operator in &kept.operators {
+        cached.numbers.iter().for_each(|number| bytes.extend(number.to_le_bytes()));
+        for operator in &cached.operators {
             size(&mut bytes, operator.blocks.len());
             for Block { row0, col0, entries } in &operator.blocks {
                 [*row0, *col0, entries.nrows(), entries.ncols()].into_iter().for_each(|n| size(&mut bytes, n));
@@ -140,27 +140,30 @@ mod tests {
         Sensor { rows: 20, cols: 20, pitch_x_mm: 2.0, pitch_y_mm: 4.0, thickness_mm: 3.0 }
     }
 
-    fn kept() -> Kept {
+    fn cached() -> CachedMatrices {
         let operator = |by: f64| Operator {
             blocks: vec![
                 Block { row0: 0, col0: 2, entries: Mat::from_fn(2, 3, |i, j| by / (1 + i + 10 * j) as f64) },
                 Block { row0: 2, col0: 0, entries: Mat::from_fn(1, 2, |_, j| -by * j as f64) },
             ],
         };
-        Kept { numbers: [17.0, 400.0, 1e12, 0.1 + 0.2], operators: [operator(1.0), operator(0.3), operator(1e-300)] }
+        CachedMatrices {
+            numbers: [17.0, 400.0, 1e12, 0.1 + 0.2],
+            operators: [operator(1.0), operator(0.3), operator(1e-300)],
+        }
     }
 
-    fn place(folder: &Path, mu_max: f64) -> Place {
-        Place::at(folder, &sensor(), Medium::HalfSpace, mu_max, Inversion::EXACT)
+    fn cache_file(folder: &Path, mu_max: f64) -> CacheFile {
+        CacheFile::at(folder, &sensor(), Medium::HalfSpace, mu_max, Inversion::EXACT)
     }
 
     #[test]
     fn comes_back_to_the_bit() {
         let folder = tempfile::tempdir().unwrap();
-        let place = place(folder.path(), 0.6);
-        assert!(place.read().is_none());
-        place.write(&kept());
-        assert_eq!(format!("{:?}", place.read().unwrap()), format!("{:?}", kept()));
+        let cache_file = cache_file(folder.path(), 0.6);
+        assert!(cache_file.read().is_none());
+        cache_file.write(&cached());
+        assert_eq!(format!("{:?}", cache_file.read().unwrap()), format!("{:?}", cached()));
         // Nothing but the file itself.
         assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1);
     }
@@ -168,8 +171,8 @@ mod tests {
     #[test]
     fn cut_short_damaged_or_of_another_scene_is_none() {
         let folder = tempfile::tempdir().unwrap();
-        let first = place(folder.path(), 0.6);
-        first.write(&kept());
+        let first = cache_file(folder.path(), 0.6);
+        first.write(&cached());
         let whole = fs::read(&first.path).unwrap();
         for length in [0, 3, 8, 20, whole.len() - 9, whole.len() - 1] {
             fs::write(&first.path, &whole[..length]).unwrap();
@@ -182,24 +185,24 @@ mod tests {
             assert!(first.read().is_none(), "byte {at}");
         }
         // The content of one scene under the name of another.
-        let second = place(folder.path(), 0.5);
+        let second = cache_file(folder.path(), 0.5);
         fs::write(&second.path, &whole).unwrap();
         assert!(second.read().is_none());
-        first.write(&kept());
+        first.write(&cached());
         assert!(first.read().is_some());
     }
 
     #[test]
     fn threads_that_write_the_same_do_not_disturb_each_other() {
         let folder = tempfile::tempdir().unwrap();
-        let wanted = format!("{:?}", kept());
+        let wanted = format!("{:?}", cached());
         std::thread::scope(|scope| {
             for _ in 0..4 {
                 scope.spawn(|| {
-                    let place = place(folder.path(), 0.6);
+                    let cache_file = cache_file(folder.path(), 0.6);
                     for _ in 0..50 {
-                        place.write(&kept());
-                        assert_eq!(format!("{:?}", place.read().unwrap()), wanted);
+                        cache_file.write(&cached());
+                        assert_eq!(format!("{:?}", cache_file.read().unwrap()), wanted);
                     }
                 });
             }
@@ -212,8 +215,8 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let file = folder.path().join("file");
         fs::write(&file, "").unwrap();
-        let place = place(&file, 0.6);
-        place.write(&kept());
-        assert!(place.read().is_none());
+        let cache_file = cache_file(&file, 0.6);
+        cache_file.write(&cached());
+        assert!(cache_file.read().is_none());
     }
 }

@@ -4,10 +4,10 @@ use super::{LinkError, OVERHEAD};
 use crate::board::Board;
 
 /// Fewest clock cycles per bit of the UART: the receiver votes over three of them.
-const LEAST_CYCLES_PER_BIT: f64 = 8.0;
+const MIN_CYCLES_PER_BIT: f64 = 8.0;
 /// Fewest clock cycles per byte of the SPI: the CRC takes four after the one in which a byte comes. The byte's register,
 /// which is read at the third clock edge at the latest, stands as long.
-const LEAST_CYCLES_PER_BYTE: f64 = 5.0;
+const MIN_CYCLES_PER_BYTE: f64 = 5.0;
 /// Bits of a byte of the SPI.
 const SPI_BITS: f64 = 8.0;
 /// Bits of a byte of the UART, start and stop bit among them.
@@ -64,8 +64,8 @@ impl LinkKind {
         let clock_hz = board.clock_MHz * 1e6;
         // Each value as the board's file has it, the most it may be, and Hz in a unit of both.
         let (field, value, most, unit) = match (self, board.spi_MHz) {
-            (LinkKind::Uart, _) => ("uart_baud", f64::from(board.uart_baud), clock_hz / LEAST_CYCLES_PER_BIT, 1.0),
-            (LinkKind::Spi, Some(rate)) => ("spi_MHz", rate, board.clock_MHz * SPI_BITS / LEAST_CYCLES_PER_BYTE, 1e6),
+            (LinkKind::Uart, _) => ("uart_baud", f64::from(board.uart_baud), clock_hz / MIN_CYCLES_PER_BIT, 1.0),
+            (LinkKind::Spi, Some(rate)) => ("spi_MHz", rate, board.clock_MHz * SPI_BITS / MIN_CYCLES_PER_BYTE, 1e6),
             (LinkKind::Spi, None) => return Err(LinkError::NoPins { board: board.name.clone() }),
         };
         if value > most {

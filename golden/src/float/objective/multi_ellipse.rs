@@ -16,7 +16,7 @@
 
 use super::disc::Disc;
 use super::fit::{fit, Effort, Fit, Model, QUICK, STEADY};
-use super::patch::{place, Ellipse, COARSE, FINE, PARAMETERS};
+use super::patch::{node_position, Ellipse, COARSE_NODES, FINE_NODES, PARAMETERS};
 use super::taxels::Taxels;
 use crate::float::segment::{Segments, WIDTH};
 use crate::sensor::Sensor;
@@ -25,21 +25,21 @@ use nalgebra::{DMatrix, DVector};
 /// Widths of smoothing of the regions that fits start from.
 pub(crate) const FIT_WIDTHS: [f64; 3] = [WIDTH, 0.6, 0.4];
 /// Most ellipses.
-const MOST: usize = 8;
+const MAX_ELLIPSES: usize = 8;
 /// Most ellipses times taxels: beyond, a fit takes longer than it is worth.
-const WORK: usize = 10_000;
+const MAX_ELLIPSE_TAXELS: usize = 10_000;
 /// A further ellipse must bring the squared misfit below this share.
-const WORTH: f64 = 0.5;
+const REQUIRED_SHARE: f64 = 0.5;
 /// Rings and angles while starts are tried.
-const ROUGH: [usize; 2] = [4, 9];
+const ROUGH_NODES: [usize; 2] = [4, 9];
 /// Rough misfit over the one asked for up to which a fit is taken to its end.
-const HOPE: f64 = 1e5;
+const REFINE_BELOW: f64 = 1e5;
 /// Misfit over the one asked for from which no other start is tried, and many nodes help.
-const PROMISING: f64 = 1e3;
+const FINE_BELOW: f64 = 1e3;
 /// Ellipses that may be added.
-const ADDED: usize = 2;
+const MAX_ADDED: usize = 2;
 /// Rings and angles for the shares of the cells.
-const CELLS: [usize; 2] = [32, 96];
+const CELL_NODES: [usize; 2] = [32, 96];
 /// Share of a region's largest force from which a cell counts for where its ellipse starts.
 const COUNTS_FROM: f64 = 0.15;
 /// g at the start, between Hertz's and a uniform pressure's.
@@ -49,7 +49,7 @@ const SPREAD: f64 = 4.5;
 
 /// One elliptic contact.
 #[derive(Clone, Debug)]
-pub(crate) struct Patched {
+pub(crate) struct FittedEllipse {
     theta: [f64; PARAMETERS],
     /// Its force in N, [x, y, normal].
     pub force: [f64; 3],
@@ -57,24 +57,24 @@ pub(crate) struct Patched {
 
 /// Ellipses and what they leave of b.
 #[derive(Clone, Debug)]
-pub(crate) struct Explanation {
+pub(crate) struct EllipseFit {
     /// At least one.
-    pub patches: Vec<Patched>,
+    pub patches: Vec<FittedEllipse>,
     /// ‖b − Σ K F‖² in MPa².
     pub misfit: f64,
     /// Up to which misfit the stress counts as explained, in MPa².
-    enough: f64,
+    misfit_limit: f64,
     /// Sets of columns computed, over all fits.
     pub evaluations: usize,
 }
 
 /// Stress of several ellipses.
-struct Several<'a> {
+struct MultiEllipse<'a> {
     taxels: &'a Taxels,
     disc: &'a Disc,
 }
 
-impl Several<'_> {
+impl MultiEllipse<'_> {
     fn one(&self) -> Ellipse<'_> {
         Ellipse { taxels: self.taxels, disc: self.disc }
     }
@@ -96,7 +96,7 @@ fn joined(n: usize, columns: Vec<Vec<f64>>) -> DMatrix<f64> {
     DMatrix::from_iterator(n, columns.len(), columns.into_iter().flatten())
 }
 
-impl Model for Several<'_> {
+impl Model for MultiEllipse<'_> {
     fn columns(&mut self, theta: &[f64]) -> DMatrix<f64> {
         let columns = theta.chunks(PARAMETERS).flat_map(|theta| self.one().unit_loads(theta)).collect();
         joined(self.taxels.count(), columns)
@@ -114,7 +114,7 @@ impl Model for Several<'_> {
 }
 
 /// Where the ellipses of drawn regions start: centroid and spread of their compressive forces.
-pub(crate) fn starts(sensor: &Sensor, p: &[f64], segments: &Segments) -> Vec<f64> {
+pub(crate) fn start_parameters(sensor: &Sensor, p: &[f64], segments: &Segments) -> Vec<f64> {
     let least = (0.5 * sensor.thickness_mm).powi(2);
     let start = |region: usize| -> Option<[f64; PARAMETERS]> {
         let own = || (0..p.len()).filter(|&k| segments.labels[k] == region);
@@ -149,13 +149,13 @@ struct Trial<'a> {
     discs: &'a [Disc; 3],
     b: &'a DVector<f64>,
     /// Squared misfit of a fit that explains b.
-    enough: f64,
+    misfit_limit: f64,
     evaluations: usize,
 }
 
 impl Trial<'_> {
     fn fit(&mut self, disc: usize, theta: &[f64], effort: Effort) -> Option<Fit> {
-        let found = fit(&mut Several { taxels: self.taxels, disc: &self.discs[disc] }, self.b, theta, effort)?;
+        let found = fit(&mut MultiEllipse { taxels: self.taxels, disc: &self.discs[disc] }, self.b, theta, effort)?;
         self.evaluations += found.evaluations;
         let presses = |force: &[f64]| force[2] > 0.0 && force.iter().all(|f| f.is_finite());
         Some(found).filter(|found| found.loads.as_slice().chunks(3).all(presses))
@@ -167,13 +167,13 @@ impl Trial<'_> {
         for start in starts {
             let found = self.fit(0, start, QUICK);
             best = best.into_iter().chain(found).min_by(|a, b| a.misfit.total_cmp(&b.misfit));
-            if best.as_ref().is_some_and(|best| best.misfit <= PROMISING * self.enough) {
+            if best.as_ref().is_some_and(|best| best.misfit <= FINE_BELOW * self.misfit_limit) {
                 break;
             }
         }
         let mut best = best?;
-        for (disc, hope) in [(1, HOPE), (2, PROMISING)] {
-            if best.misfit > hope * self.enough {
+        for (disc, limit) in [(1, REFINE_BELOW), (2, FINE_BELOW)] {
+            if best.misfit > limit * self.misfit_limit {
                 break;
             }
             best = self.fit(disc, &best.theta, STEADY).unwrap_or(best);
@@ -184,23 +184,23 @@ impl Trial<'_> {
 
 /// Fits from each start as far as it goes fast, then the best to the end where it may explain b, then with ellipses
 /// added; the best fit in which every contact presses, `None` where there is none.
-pub(crate) fn explain(taxels: &Taxels, b: &[f64], starts: &[Vec<f64>], enough: f64) -> Option<Explanation> {
+pub(crate) fn fit_ellipses(taxels: &Taxels, b: &[f64], starts: &[Vec<f64>], misfit_limit: f64) -> Option<EllipseFit> {
     let b = DVector::from_column_slice(b);
-    let most = MOST.min(WORK / taxels.count().max(1)) * PARAMETERS;
-    let discs = [ROUGH, COARSE, FINE].map(|[rings, angles]| Disc::new(rings, angles));
-    let mut trial = Trial { taxels, discs: &discs, b: &b, enough, evaluations: 0 };
+    let most = MAX_ELLIPSES.min(MAX_ELLIPSE_TAXELS / taxels.count().max(1)) * PARAMETERS;
+    let discs = [ROUGH_NODES, COARSE_NODES, FINE_NODES].map(|[rings, angles]| Disc::new(rings, angles));
+    let mut trial = Trial { taxels, discs: &discs, b: &b, misfit_limit, evaluations: 0 };
     let starts: Vec<&[f64]> =
         starts.iter().map(Vec::as_slice).filter(|start| !start.is_empty() && start.len() <= most).collect();
     let mut best = trial.best(&starts)?;
-    for _ in 0..ADDED {
-        if best.misfit <= enough || best.theta.len() >= most {
+    for _ in 0..MAX_ADDED {
+        if best.misfit <= misfit_limit || best.theta.len() >= most {
             break;
         }
-        let rest = Several { taxels, disc: &discs[1] }.rest(&b, &best);
+        let rest = MultiEllipse { taxels, disc: &discs[1] }.rest(&b, &best);
         let worst = rest.iamax();
-        let further = further(&best.theta, [taxels.x[worst], taxels.y[worst]], taxels.depth);
-        let better = trial.best(&further.each_ref().map(Vec::as_slice));
-        match better.filter(|found| found.misfit < WORTH * best.misfit) {
+        let candidates = add_ellipse(&best.theta, [taxels.x[worst], taxels.y[worst]], taxels.depth);
+        let better = trial.best(&candidates.each_ref().map(Vec::as_slice));
+        match better.filter(|found| found.misfit < REQUIRED_SHARE * best.misfit) {
             Some(better) => best = better,
             None => break,
         }
@@ -208,15 +208,16 @@ pub(crate) fn explain(taxels: &Taxels, b: &[f64], starts: &[Vec<f64>], enough: f
     let patch = |(theta, force): (&[f64], &[f64])| {
         let mut own = [0.0; PARAMETERS];
         own.copy_from_slice(theta);
-        Patched { theta: own, force: [force[0], force[1], force[2]] }
+        FittedEllipse { theta: own, force: [force[0], force[1], force[2]] }
     };
-    let patches: Vec<Patched> = best.theta.chunks(PARAMETERS).zip(best.loads.as_slice().chunks(3)).map(patch).collect();
-    Some(Explanation { patches, misfit: best.misfit, enough, evaluations: trial.evaluations })
+    let patches: Vec<FittedEllipse> =
+        best.theta.chunks(PARAMETERS).zip(best.loads.as_slice().chunks(3)).map(patch).collect();
+    Some(EllipseFit { patches, misfit: best.misfit, misfit_limit, evaluations: trial.evaluations })
 }
 
 /// Two ways to one ellipse more: at the place of the largest misfit, or the ellipse that it lies in, or nearest to, cut
 /// across its longer axis.
-fn further(theta: &[f64], [x, y]: [f64; 2], depth: f64) -> [Vec<f64>; 2] {
+fn add_ellipse(theta: &[f64], [x, y]: [f64; 2], depth: f64) -> [Vec<f64>; 2] {
     let mut added = theta.to_vec();
     added.extend([x, y, depth, depth, 0.0, START_EXPONENT]);
     let mut cut = theta.to_vec();
@@ -236,10 +237,10 @@ fn further(theta: &[f64], [x, y]: [f64; 2], depth: f64) -> [Vec<f64>; 2] {
     [added, cut]
 }
 
-impl Explanation {
+impl EllipseFit {
     /// Whether the ellipses explain the stress.
-    pub fn enough(&self) -> bool {
-        self.misfit <= self.enough
+    pub fn explains_stress(&self) -> bool {
+        self.misfit <= self.misfit_limit
     }
 
     /// Sum of the forces in N, [x, y, normal].
@@ -249,15 +250,15 @@ impl Explanation {
 
     /// Normal force of each ellipse on each cell, in N.
     pub fn cells(&self, sensor: &Sensor) -> Vec<Vec<f64>> {
-        let disc = Disc::new(CELLS[0], CELLS[1]);
+        let disc = Disc::new(CELL_NODES[0], CELL_NODES[1]);
         let index = |mm: f64, pitch: f64, count: usize| {
             let index = (mm / pitch + count as f64 / 2.0).floor();
             (index >= 0.0 && index < count as f64).then_some(index as usize)
         };
-        let cells = |patch: &Patched| {
+        let cells = |patch: &FittedEllipse| {
             let mut cells = vec![0.0; sensor.taxels()];
             for (node, weight) in disc.nodes.iter().zip(disc.weights(patch.theta[5]).0) {
-                let [x, y] = place(&patch.theta, *node);
+                let [x, y] = node_position(&patch.theta, *node);
                 let (col, row) = (index(x, sensor.pitch_x_mm, sensor.cols), index(y, sensor.pitch_y_mm, sensor.rows));
                 if let (Some(col), Some(row)) = (col, row) {
                     cells[row * sensor.cols + col] += weight * patch.force[2];
@@ -273,7 +274,7 @@ impl Explanation {
         let cells = self.cells(sensor);
         let label = |k: usize| {
             let [x, y] = sensor.position_mm(k / sensor.cols, k % sensor.cols);
-            let beyond = |patch: &Patched| {
+            let beyond = |patch: &FittedEllipse| {
                 let [x0, y0, a, b, c, _] = patch.theta;
                 let (dx, dy, det) = (x - x0, y - y0, a * b - c * c);
                 // |L⁻¹ d| is 1 on the rim.

@@ -15,11 +15,11 @@ use super::model::Model;
 use crate::matrices::{Matrices, CUBIC_FROM, MAX_DEGREE, SERIES_TOLERANCE};
 use crate::partition::{Case, Grid};
 use crate::scene::Scene;
-use crate::sensor::MIN_LINES;
+use crate::sensor::MIN_SIDE;
 
 /// A change to a scene, and what it needs then.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Remedy {
+pub struct FitSuggestion {
     /// The change as it stands in a scene file.
     pub change: String,
     /// Degree of the polynomial with it.
@@ -42,21 +42,21 @@ pub struct Shortage {
     /// The board's name.
     pub board: String,
     /// Name, needed, there.
-    pub short: Vec<(&'static str, usize, usize)>,
+    pub lacking: Vec<(&'static str, usize, usize)>,
     /// Single changes that make it fit.
-    pub remedies: Vec<Remedy>,
+    pub suggestions: Vec<FitSuggestion>,
 }
 
 impl fmt::Display for Shortage {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let short = self.short.iter().map(|(what, needs, has)| format!("{needs} {what}, there are {has}"));
+        let lacking = self.lacking.iter().map(|(what, needs, has)| format!("{needs} {what}, there are {has}"));
         write!(f, "scene {} does not fit {}: it needs ", self.scene, self.board)?;
-        write!(f, "{}", short.collect::<Vec<_>>().join("; "))?;
-        if self.remedies.is_empty() {
+        write!(f, "{}", lacking.collect::<Vec<_>>().join("; "))?;
+        if self.suggestions.is_empty() {
             return write!(f, "; no finer partition, lower degree, pruning or number of lanes makes it fit");
         }
         write!(f, "; it fits with any one of:")?;
-        for Remedy { change, degree, lanes, block_rams, multipliers, cycles } in &self.remedies {
+        for FitSuggestion { change, degree, lanes, block_rams, multipliers, cycles } in &self.suggestions {
             write!(f, "\n  {change}: {block_rams} block RAMs, {multipliers} multipliers, ")?;
             write!(f, "{lanes} lanes, degree {degree}, {cycles} cycles")?;
         }
@@ -65,14 +65,14 @@ impl fmt::Display for Shortage {
 }
 
 /// The single changes that make a scene fit, the first of each kind.
-pub(super) fn remedies(model: &Model) -> Vec<Remedy> {
+pub(super) fn fit_suggestions(model: &Model) -> Vec<FitSuggestion> {
     let scene = &model.scene;
     let kinds = [
-        lanes(scene).into_iter().find_map(fitting),
-        fewer(scene).into_iter().find_map(fitting),
-        partitions(scene).into_iter().find_map(fitting),
-        degrees(model).into_iter().find_map(fitting),
-        pruned(scene).find_map(fitting),
+        lanes(scene).into_iter().find_map(suggestion),
+        fewer_cases(scene).into_iter().find_map(suggestion),
+        partitions(scene).into_iter().find_map(suggestion),
+        degrees(model).into_iter().find_map(suggestion),
+        pruned(scene).find_map(suggestion),
     ];
     kinds.into_iter().flatten().collect()
 }
@@ -80,9 +80,9 @@ pub(super) fn remedies(model: &Model) -> Vec<Remedy> {
 /// A scene's text and the scene.
 type Change = (String, Scene);
 
-fn fitting((change, scene): Change) -> Option<Remedy> {
-    let model = Model::unfitted(&scene).ok()?;
-    model.resources.shortages(&model.board).is_empty().then(|| Remedy {
+fn suggestion((change, scene): Change) -> Option<FitSuggestion> {
+    let model = Model::without_fit_check(&scene).ok()?;
+    model.resources.shortages(&model.board).is_empty().then(|| FitSuggestion {
         change,
         degree: model.formats.degree,
         lanes: 4 * model.formats.lanes_per_parity,
@@ -103,7 +103,7 @@ fn lanes(scene: &Scene) -> Option<Change> {
 }
 
 /// Lists of one case fewer, the finest kept the longest.
-fn fewer(scene: &Scene) -> Vec<Change> {
+fn fewer_cases(scene: &Scene) -> Vec<Change> {
     let Some(listed) = scene.partition.listed.filter(|listed| listed.iter().filter(|case| **case).count() > 2) else {
         return Vec::new();
     };
@@ -121,7 +121,7 @@ fn partitions(scene: &Scene) -> Vec<Change> {
     let sensor = &scene.sensor;
     // One case is less than several, even the coarsest.
     let now = scene.partition.case.grid().map_or(0, |grid| grid.rows * grid.cols);
-    let divides = |lines: usize, parts: &usize| lines.is_multiple_of(*parts) && lines / parts >= MIN_LINES;
+    let divides = |lines: usize, parts: &usize| lines.is_multiple_of(*parts) && lines / parts >= MIN_SIDE;
     let mut grids: Vec<Grid> = (1..=sensor.rows)
         .filter(|rows| divides(sensor.rows, rows))
         .flat_map(|rows| (1..=sensor.cols).map(move |cols| Grid { rows, cols }))
@@ -157,10 +157,10 @@ fn degrees(model: &Model) -> Vec<Change> {
 }
 
 /// Least sensible `fixed.prune_bits`, as in the scene's schema.
-const LEAST_PRUNE_BITS: u32 = 8;
+const MIN_PRUNE_BITS: u32 = 8;
 
 fn pruned(scene: &Scene) -> impl Iterator<Item = Change> + '_ {
-    (LEAST_PRUNE_BITS..scene.fixed.prune_bits)
+    (MIN_PRUNE_BITS..scene.fixed.prune_bits)
         .rev()
         .map(|bits| (format!("fixed.prune_bits = {bits}"), changed(scene, |s| s.fixed.prune_bits = bits)))
 }

@@ -10,7 +10,7 @@
 use super::output::resultants;
 use super::{Golden, GoldenError, Reconstruction};
 use crate::frame::{Forces, Frame};
-use crate::input::unipolar::{fill, misfit, Unipolar};
+use crate::input::unipolar::{fill_clipped, misfit, Unipolar};
 use crate::scene::{ForceOutput, Scene};
 
 impl Golden {
@@ -31,12 +31,12 @@ impl Golden {
         let frame = self.input.calibrate(frame);
         let mut result = if self.scene.input.unipolar {
             let (filled, mut report) = self.filled(&frame);
-            let mut result = self.engine(&filled, noise_MPa)?;
+            let mut result = self.reconstruct_stress(&filled, noise_MPa)?;
             report.misfit = misfit(&self.scene, &frame, &result.forces_N);
             result.extra.unipolar = Some(report);
             result
         } else {
-            self.engine(&frame, noise_MPa)?
+            self.reconstruct_stress(&frame, noise_MPa)?
         };
         if self.scene.output.forces == ForceOutput::Resultants {
             result.extra.resultants = Some(resultants(&self.scene.sensor, &result));
@@ -53,10 +53,10 @@ impl Golden {
         let mut report = Unipolar { clipped: 0, pulled: 0, evaluations: 0, misfit: 0.0 };
         for (part, matrices) in self.parts() {
             let b = part.gather(sensor, &filled.stress_MPa);
-            let dead = part.own(&input.dead);
+            let dead = part.local_indices(&input.dead);
             let clipped: Vec<usize> = (0..b.len()).filter(|k| b[*k] == 0.0 && !dead.contains(k)).collect();
             report.clipped += clipped.len();
-            let own = fill(matrices, b, clipped, search.mu_max);
+            let own = fill_clipped(matrices, b, clipped, search.mu_max);
             report.pulled += own.stress_MPa.iter().filter(|b| **b < 0.0).count();
             report.evaluations += own.evaluations;
             part.scatter(sensor, &own.stress_MPa, &mut filled.stress_MPa);

@@ -9,7 +9,7 @@
 
 use super::disc::Disc;
 use super::fit::Model;
-use super::patch::{confine_ellipse, place};
+use super::patch::{confine_ellipse, node_position};
 use super::taxels::Taxels;
 use nalgebra::{DMatrix, DVector};
 
@@ -18,7 +18,7 @@ use nalgebra::{DMatrix, DVector};
 const TERMS: [(i32, i32); 4] = [(0, 0), (2, 0), (1, 1), (0, 2)];
 
 /// Stress of an even pressure; θ = x₀, y₀, L₁₁, L₂₂, L₁₂, μ1, μ2.
-pub(super) struct Even<'a> {
+pub(super) struct SymmetricPressure<'a> {
     taxels: &'a Taxels,
     disc: &'a Disc,
     mu_max: f64,
@@ -26,15 +26,15 @@ pub(super) struct Even<'a> {
     basis: DMatrix<f64>,
 }
 
-impl<'a> Even<'a> {
+impl<'a> SymmetricPressure<'a> {
     /// With a pressure on the nodes of `disc`.
-    pub fn new(taxels: &'a Taxels, disc: &'a Disc, mu_max: f64) -> Even<'a> {
+    pub fn new(taxels: &'a Taxels, disc: &'a Disc, mu_max: f64) -> SymmetricPressure<'a> {
         let (weights, _) = disc.weights(0.5);
         let basis = DMatrix::from_fn(weights.len(), TERMS.len(), |node, term| {
             let ([u, v], (i, j)) = (disc.nodes[node], TERMS[term]);
             weights[node] * u.powi(i) * v.powi(j)
         });
-        Even { taxels, disc, mu_max, basis }
+        SymmetricPressure { taxels, disc, mu_max, basis }
     }
 
     /// Σ of the pressure.
@@ -43,13 +43,13 @@ impl<'a> Even<'a> {
     }
 }
 
-impl Model for Even<'_> {
+impl Model for SymmetricPressure<'_> {
     fn columns(&mut self, theta: &[f64]) -> DMatrix<f64> {
         let n = self.taxels.count();
         let mut nodes = DMatrix::zeros(n, self.disc.nodes.len());
         let mut field = [(); 3].map(|()| vec![0.0; n]);
         for (&node, mut column) in self.disc.nodes.iter().zip(nodes.column_iter_mut()) {
-            self.taxels.field(place(theta, node), [theta[5], theta[6], 1.0], &mut field);
+            self.taxels.field(node_position(theta, node), [theta[5], theta[6], 1.0], &mut field);
             column.copy_from_slice(&field[0]);
         }
         nodes * &self.basis
@@ -62,8 +62,8 @@ impl Model for Even<'_> {
         let mut field = [(); 3].map(|()| vec![0.0; n]);
         let mut units = [(); 3].map(|()| vec![0.0; n]);
         for (&node, &weight) in self.disc.nodes.iter().zip(&weights) {
-            let place = place(theta, node);
-            self.taxels.field(place, [theta[5] * weight, theta[6] * weight, weight], &mut field);
+            let position = node_position(theta, node);
+            self.taxels.field(position, [theta[5] * weight, theta[6] * weight, weight], &mut field);
             let [u, v] = node;
             for i in 0..n {
                 let (x, y) = (field[1][i], field[2][i]);
@@ -73,7 +73,7 @@ impl Model for Even<'_> {
                 slopes[(i, 3)] += y * v;
                 slopes[(i, 4)] += x * v + y * u;
             }
-            self.taxels.add_unit_forces(place, weight, &mut units);
+            self.taxels.add_unit_forces(position, weight, &mut units);
         }
         slopes.column_mut(5).copy_from_slice(&units[0]);
         slopes.column_mut(6).copy_from_slice(&units[1]);
@@ -102,7 +102,7 @@ mod tests {
     fn slopes_are_those_of_the_columns() {
         let sensor = Scene::builtin("sensor-1").unwrap().sensor;
         let (taxels, disc) = (Taxels::new(&sensor, Medium::HalfSpace), Disc::new(5, 14));
-        let mut model = Even::new(&taxels, &disc, 0.6);
+        let mut model = SymmetricPressure::new(&taxels, &disc, 0.6);
         let theta = [0.7, -1.1, 3.0, 4.0, 0.5, 0.2, -0.1];
         let loads = DVector::from_vec(vec![5.0, -1.0, 0.4, 0.8]);
         let slopes = model.slopes(&theta, &loads);

@@ -17,9 +17,9 @@ pub struct Feature {
     /// How the scene has it, or how it was put back.
     pub setting: String,
     /// The model with it put back, or why there is none; `None` where the scene has it.
-    pub put_back: Option<Result<Model, FixedError>>,
+    pub with_feature: Option<Result<Model, FixedError>>,
     /// The model without it, where the scene has it and its cost depends on how.
-    pub taken_out: Option<Model>,
+    pub without_feature: Option<Model>,
 }
 
 /// Every feature that hardware can do without, in pipeline order. A scene that would not fit its board with a feature
@@ -39,13 +39,13 @@ pub fn features(model: &Model) -> Vec<Feature> {
         change(&mut changed);
         changed
     };
-    let plain = |scene: &Scene| Model::given(scene, Scale::new(scene)?, None);
-    let scaled = |scene: &Scene, gains| Model::given(scene, Scale::of_tare(taxels, gains), None);
+    let plain = |scene: &Scene| Model::with_scale(scene, Scale::new(scene)?, None);
+    let scaled = |scene: &Scene, gains| Model::with_scale(scene, Scale::of_tare(taxels, gains), None);
     let full_scale = input.full_scale_MPa.unwrap_or(1.0);
 
     let mut all = Vec::new();
     let mut add = |name, has: bool, setting: String, back: &dyn Fn() -> Result<Model, FixedError>| {
-        all.push(Feature { name, setting, put_back: (!has).then(back), taken_out: None });
+        all.push(Feature { name, setting, with_feature: (!has).then(back), without_feature: None });
     };
     let set = |has: bool, own: String, back: &str| if has { own } else { back.to_string() };
 
@@ -80,7 +80,7 @@ pub fn features(model: &Model) -> Vec<Feature> {
     if degree > 0 {
         let cubic = degree == MAX_DEGREE;
         add("polynomial of degree 3", cubic, "degree 3".into(), &|| {
-            Model::given(scene, Scale::new(scene)?, Some(MAX_DEGREE))
+            Model::with_scale(scene, Scale::new(scene)?, Some(MAX_DEGREE))
         });
     }
     let threshold = scene.threshold.min_force_N > 0.0;
@@ -102,16 +102,16 @@ pub fn features(model: &Model) -> Vec<Feature> {
     add("dead taxels", dead > 0, set(dead > 0, own, "dead = [[0, 0]]"), &|| {
         plain(&with(&|s| s.input.dead = vec![[0, 0]]))
     });
-    add("coefficient check", model.checks(), "a signature of the words read".into(), &|| {
+    add("coefficient check", model.has_coefficient_check(), "a signature of the words read".into(), &|| {
         plain(&with(&|s| s.hardware.coefficient_check = CoefficientCheck::Signature))
     });
-    let resultants = model.wants_resultants();
+    let resultants = model.sends_resultants();
     add("resultants", resultants, "a force and its moments per subarray".into(), &|| {
         plain(&with(&|s| s.output.forces = ForceOutput::Resultants))
     });
     if dead > 0 {
         let alive = plain(&with(&|s| s.input.dead.clear())).ok();
-        all.iter_mut().filter(|feature| feature.name == "dead taxels").for_each(|f| f.taken_out = alive.clone());
+        all.iter_mut().filter(|feature| feature.name == "dead taxels").for_each(|f| f.without_feature = alive.clone());
     }
     all
 }
