@@ -1,24 +1,24 @@
-//! Integer arithmetic of the bit-true model: every shift, rounding and saturation the hardware has.
+//! Integer arithmetic of the bit-true model: shifts, rounding and saturation as the hardware does them.
 //!
-//! All words are two's complement, held sign-extended in `i64` (products and accumulators in `i64` as
-//! well: the widest one, an accumulator, has 48 bits). Rounding is *half up*, `⌊x / 2ˢ + 1/2⌋`: one adder
-//! in hardware, and its bias of at most half a unit at exact ties is below every error bound used here.
+//! All words are two's complement, sign-extended in an `i64`; the widest, an accumulator, has 48 bits. Rounding is
+//! *half up*, `⌊x / 2ˢ + 1/2⌋`: one adder in hardware. At exact ties it is biased by half a unit, which is below every
+//! error bound used here.
 
 use std::ops::{Add, Sub};
 
-/// Number of bits of a signed word that holds every integer of magnitude `bound` or less.
+/// Width of the signed word that holds every integer of magnitude `bound` or less, in bits.
 ///
-/// `bound = 2ᵏ` needs the sign bit and `k + 1` more, because `+2ᵏ` must fit as well.
+/// `bound = 2ᵏ` needs k + 2 bits, because +2ᵏ must fit as well.
 pub fn signed_bits(bound: u64) -> u32 {
     64 - bound.leading_zeros() + 1
 }
 
-/// Smallest and largest value of a signed word of `bits` (1..=63) bits.
+/// Smallest and largest value of a signed word of `bits` bits, 1 to 63.
 pub fn range(bits: u32) -> (i64, i64) {
     (-(1i64 << (bits - 1)), (1i64 << (bits - 1)) - 1)
 }
 
-/// `x / 2^shift`, rounded half up; exact for `shift = 0`. `shift` up to 62.
+/// `x / 2^shift`, rounded half up; `shift` 0 to 62, exact for 0.
 pub fn round_shift(x: i64, shift: u32) -> i64 {
     if shift == 0 {
         x
@@ -27,29 +27,29 @@ pub fn round_shift(x: i64, shift: u32) -> i64 {
     }
 }
 
-/// Clamps `x` into `bits` bits; the flag tells that it had to.
+/// Clamps `x` to a signed word of `bits` bits; the flag is true if `x` was out of range.
 pub fn saturate(x: i64, bits: u32) -> (i64, bool) {
     let (low, high) = range(bits);
     (x.clamp(low, high), x < low || x > high)
 }
 
-/// The bits by which `x` differs from its own sign: `x` for `x ≥ 0`, `!x` below.
+/// The ones' complement magnitude of `x`: `x` for `x ≥ 0`, `!x` below.
 ///
-/// Its length is the number of magnitude bits `x` needs; the OR over many words therefore measures a whole
-/// block without a comparator, and counts `-2ᵏ` as `k` bits, which is what fits a signed word of `k + 1`.
+/// Its bit length is the number of magnitude bits that `x` needs. The OR of these words over a block therefore gives
+/// the length of its largest entry without a comparator. `-2ᵏ` counts as k bits, as it fits a signed word of k + 1.
 pub fn magnitude_bits(x: i64) -> u64 {
     (x ^ (x >> 63)) as u64
 }
 
-/// Position of the highest set bit plus one, 0 for 0: `64 − leading zeros`.
+/// Position of the highest set bit plus one, `64 − leading zeros`; 0 for 0.
 pub fn bit_length(x: u64) -> u32 {
     64 - x.leading_zeros()
 }
 
-/// The four-point Hadamard butterfly `f_p = Σ_l (−1)^{p·l} x_l`, unnormalised: two bits of growth.
+/// The four-point Hadamard butterfly `f_p = Σ_l (−1)^{p·l} x_l`, unnormalised: the words grow by two bits.
 ///
-/// Index `2·(row bit) + (column bit)` on both sides: images of a taxel under the two mirrors going in, parities
-/// coming out. It is its own inverse but for a factor of four, which [`unfold`](super::unfold) accounts for.
+/// Index `2·(row bit) + (column bit)`: on input the images of a taxel under the two mirrors, on output the parities.
+/// Applied twice it multiplies by four, which [`unfold`](super::unfold) takes into account.
 pub fn hadamard<T: Copy + Add<Output = T> + Sub<Output = T>>(x: [T; 4]) -> [T; 4] {
     let [a, b, c, d] = x;
     [a + b + c + d, a - b + c - d, a + b - c - d, a - b - c + d]
@@ -87,14 +87,14 @@ mod tests {
             prop_assert_eq!(round_shift(x, shift), rounded(x, shift));
         }
 
-        /// Ties are rare among random words: odd halves, at every shift.
+        /// Random words are rarely ties, so these are: odd halves, at every shift.
         #[test]
         fn ties_agree_with_fixed(odd in -(1i64 << 16)..(1i64 << 16), shift in 1u32..=46) {
             let x = (2 * odd + 1) << (shift - 1);
             prop_assert_eq!(round_shift(x, shift), rounded(x, shift));
         }
 
-        /// A stage's end, rounded and held to its word: 18 bits between the stages, 32 bits of force. The flag is set
+        /// The end of a stage: rounded and saturated to 18 bits between the stages or 32 bits of force. The flag is set
         /// exactly where a word that wraps would not hold the value.
         #[test]
         fn rounding_into_a_word_agrees_with_fixed(x in -(1i64 << 47)..(1i64 << 47), shift in 0u32..=46) {

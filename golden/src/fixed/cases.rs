@@ -1,11 +1,12 @@
-//! A scene of several cases: one [`Model`] for each, on the same hardware, and the choice between them per frame.
+//! Scenes with several partition cases: one [`Model`] per case on shared hardware, and the choice between them per
+//! frame.
 //!
-//! All cases run on the lanes, the search and the force unit of case 0: a case is a set of counter limits and
-//! addresses, coefficients in the same memory, and a frame buffer of its own. What a frame becomes is exactly what the
-//! taken case's model makes of it; [`choose`](super::choose) says which that is.
+//! All cases use the lanes, the search and the force unit of case 0. A case adds counter limits, addresses, its
+//! coefficients in the shared memory and a frame buffer. The result of a frame is to the bit that of the chosen case's
+//! model; [`choose`](super::choose) chooses it.
 //!
-//! Where the scene lists no cases, those are built that fit the board together: the most of them, and of equally many
-//! the finest. What was dropped is kept with the figures of the design that would have it ([`Dropped`]).
+//! Where the scene lists no cases, the largest set of cases that fits the board is built, and of equally large sets the
+//! one with the finest cases. A case left out is kept in [`Dropped`] with the resources of a design that includes it.
 
 use super::choose::{self, FrameStats};
 use super::cycles::SHORTEST_SWEEP;
@@ -21,17 +22,17 @@ use crate::partition::{subarrays, Case, Grid, Subarray};
 use crate::reconstruct::{CaseChoice, Reconstruction};
 use crate::scene::Scene;
 
-/// A case that divides the array and was not built.
+/// A case that divides the array but was left out, because a design with it exceeds the board.
 #[derive(Clone, Debug)]
 pub struct Dropped {
-    /// The case.
+    /// The case left out.
     pub case: Case,
-    /// The design that would have it beside those that were built, too large for the board.
+    /// The design of the cases built and this one.
     pub design: Model,
 }
 
 impl Model {
-    /// The model of a scene of the cases that it lists, or of as many as fit; that of case 0 where not even this does.
+    /// The model of the cases that the scene lists, else of as many cases as fit the board, else of case 0 alone.
     pub(super) fn of_choices(
         scene: &Scene,
         scale: &Scale,
@@ -40,13 +41,13 @@ impl Model {
     ) -> Result<Model, FixedError> {
         let listed = scene.partition.listed.is_some();
         let mut choices = scene.partition.choices(&scene.sensor);
-        // What is too small is an error where it is asked for by name, or where nothing else is left.
+        // A case with too few quads is an error only where the scene lists it or no other is left.
         let large: Vec<Case> = choices.iter().copied().filter(|&case| is_large(scene, case)).collect();
         if !listed && large.len() > 1 {
             choices = large;
         }
         let short = |model: &Model| model.resources.shortages(&model.board);
-        // Where case 0 alone is too large, so is every design that has it.
+        // If case 0 alone exceeds the board, so does every set of cases, since all contain it.
         let whole = shape(scene, Case::WHOLE, degree)?;
         if !listed {
             let alone = Model::of_shapes(scene, scale, board, vec![(Case::WHOLE, whole.clone())])?;
@@ -75,8 +76,8 @@ impl Model {
                 break;
             }
         }
-        let (mut model, subset) = model.ok_or(FixedError::Internal("a scene of several cases has two"))?;
-        // Of a scene of which not even two fit, the last two tried stand for it; nothing was dropped.
+        let (mut model, subset) = model.ok_or(FixedError::Internal("no set of two cases to build"))?;
+        // If no two cases fit, the last set tried is returned, and [`Model::new`] reports what the board lacks.
         if short(&model).is_empty() {
             for &at in all.iter().filter(|at| !subset.contains(at)) {
                 let with: Vec<usize> = all.iter().copied().filter(|k| subset.contains(k) || *k == at).collect();
@@ -86,7 +87,7 @@ impl Model {
         Ok(model)
     }
 
-    /// The model of these cases, case 0 first where there are several.
+    /// The model of `cases`; where there are several, case 0 is the first.
     pub(super) fn of_shapes(
         scene: &Scene,
         scale: &Scale,
@@ -109,13 +110,13 @@ impl Model {
             models.push(Model::of_design(&own(case), scale, design, board)?);
         }
         if !several {
-            return models.pop().ok_or(FixedError::Internal("a scene has a case"));
+            return models.pop().ok_or(FixedError::Internal("no case to build"));
         }
         let whole = models[0].clone();
         Ok(Model { scene: scene.clone(), built: models, ..whole })
     }
 
-    /// The cases that the hardware has, each with its model; of a scene of one case that model itself.
+    /// The models of the cases built, case 0 first; for a scene with one case, this model alone.
     pub fn cases(&self) -> &[Model] {
         match self.built.is_empty() {
             true => std::slice::from_ref(self),
@@ -123,22 +124,23 @@ impl Model {
         }
     }
 
-    /// Whether the hardware chooses the case per frame.
+    /// Whether the hardware has several cases and chooses one per frame.
     pub fn chooses(&self) -> bool {
         !self.built.is_empty()
     }
 
-    /// The paper's number of the case, 0 where it has none.
+    /// The paper's number of the case, 0 to 3; 0 for a partition that the paper does not number.
     pub fn number(&self) -> u32 {
         (0..4).find(|&number| Case::numbered(number) == Some(self.scene.partition.case)).unwrap_or(0) as u32
     }
 
-    /// The grids of the cases built.
+    /// Subarrays along rows and columns of each case built, in the order of [`Model::cases`].
     pub fn grids(&self) -> Vec<Grid> {
         self.cases().iter().map(Model::grid).collect()
     }
 
-    /// The index of the case that a frame of these codes, `input_bits` wide, is solved in.
+    /// Index in [`Model::cases`] of the case chosen for a frame of `codes`: one per taxel, row-major, `input_bits`
+    /// wide.
     pub fn choose(&self, codes: &[i32]) -> usize {
         let mut seen = FrameStats::default();
         for (index, &code) in codes.iter().enumerate() {
@@ -147,7 +149,7 @@ impl Model {
         seen.choose(&self.grids(), self.scene.partition.condition, self.noise_floor)
     }
 
-    /// [`Model::run`] of a scene of several cases.
+    /// [`Model::run`] for a scene with several cases.
     pub(super) fn run_chosen(&self, codes: &[i32]) -> Trace {
         let chosen = self.choose(&self.prepare.run(codes));
         let case = &self.built[chosen];
@@ -164,7 +166,7 @@ impl Model {
         trace
     }
 
-    /// [`Model::decode`] of a scene of several cases.
+    /// [`Model::decode`] for a scene with several cases.
     pub(super) fn decode_chosen(
         &self,
         frame: &Frame,
@@ -183,24 +185,25 @@ impl Model {
     }
 }
 
-/// A case's subarrays and their matrices, for a polynomial of `degree` or what the scene's rule says.
+/// The subarrays of a case and their matrices; the polynomial has `degree` if given, else the degree that the series
+/// needs.
 pub(super) fn shape(scene: &Scene, case: Case, degree: Option<usize>) -> Result<Shape, FixedError> {
     let parts = subarrays(case, &scene.sensor)?;
-    // With dead taxels there is one subarray.
+    // Scenes with dead taxels have a single subarray.
     let dead = parts[0].local_indices(&scene.input.dead);
     let mut matrices = Matrices::of(scene, &parts[0].sensor(&scene.sensor), MAX_DEGREE)?.without(&dead)?;
     matrices.degree = degree.unwrap_or(matrices.degree);
     Ok(Shape { matrices, parts: parts.len() })
 }
 
-/// Whether a case's subarrays have enough quads for the search of several cases.
+/// Whether every subarray has the [`SHORTEST_SWEEP`] quads that a search shared by several cases needs.
 fn is_large(scene: &Scene, case: Case) -> bool {
     let quads = |part: &Subarray| Quads { rows: part.rows, cols: part.cols }.len() as u64;
     subarrays(case, &scene.sensor).is_ok_and(|parts| parts.iter().all(|part| quads(part) >= SHORTEST_SWEEP))
 }
 
-/// Indices of case 0 and at least one other of `count` cases, the largest subsets first, of equally large ones those
-/// with the finest cases.
+/// All subsets of `count` cases with case 0 and at least one other, as indices: the largest first, then those with the
+/// finest cases.
 fn subsets(count: usize) -> Vec<Vec<usize>> {
     let of = |bits: usize| std::iter::once(0).chain((1..count).filter(move |k| bits >> k & 1 == 1));
     let mut all: Vec<Vec<usize>> = (2..1usize << count).step_by(2).map(|bits| of(bits).collect()).collect();

@@ -1,37 +1,38 @@
-//! The coefficient check, `hardware.coefficient_check = "signature"`: whether the coefficient memory still holds what the
-//! generator put there.
+//! The coefficient check, `hardware.coefficient_check = "signature"`: whether the coefficient memory still holds the
+//! generated coefficients.
 //!
-//! Of each word that a subarray's passes read, as wide as all lanes, the parity of its bits steps a signature of 32 bits
+//! For each word (all lanes wide) that the passes of a subarray read, the parity of the word's bits advances a 32-bit
+//! signature
 //! ```text
-//! s ← (2 s mod 2³²) ⊕ (POLYNOMIAL where s ≥ 2³¹) ⊕ parity         from START at the subarray's first word
+//! s ← (2 s mod 2³²) ⊕ (POLYNOMIAL where s ≥ 2³¹) ⊕ parity         START before the subarray's first word
 //! ```
-//! Where it is not the generator's after the last word, the subarray's status has
-//! [`FLAG_COEFFICIENTS`](super::send::FLAG_COEFFICIENTS). The forces leave all the same.
+//! If it differs from the generated value after the last word, the subarray's status has
+//! [`FLAG_COEFFICIENTS`](super::send::FLAG_COEFFICIENTS). The forces are sent all the same.
 //!
-//! Why a signature: a coefficient fills the 18 bits of a block RAM's word, so that a parity bit beside each word of the
-//! lanes would take one more block RAM, or LUTs that grow with the words. A signature takes no memory, whatever the
-//! lanes and the words, no cycle, and it also tells a word that is right but was read in the wrong place.
+//! Why a signature: a coefficient fills the 18 bits of a block RAM's word, so a parity bit per word of the lanes would
+//! cost another block RAM, or LUTs that grow with the number of words. A signature needs no memory and no cycle,
+//! whatever the number of lanes and words, and also detects a correct word read from a wrong address.
 //!
-//! A flipped bit turns the parity whenever its word is read, at the reads t of T, and with it the signature by
-//! Σ x^(T−t) modulo the polynomial. Once or twice read, that is never zero; read more often it could be, with a chance of
-//! 2⁻³²: [`undetected`] lists such words. The list of columns and the schedule are not covered.
+//! A flipped bit inverts the parity at each read t of its word out of T reads in total, and so changes the signature by
+//! Σ x^(T−t) modulo the polynomial. For a word read once or twice this is never zero; for more reads it can be, with a
+//! probability of 2⁻³²: [`undetected`] lists such words. The list of columns and the schedule are not covered.
 
 use super::formats::MULTIPLIER_BITS;
 use super::model::Model;
 use super::schedule::schedule;
 use crate::scene::CoefficientCheck;
 
-/// That of CRC-32, without its highest power.
+/// The polynomial of CRC-32 without its highest power, x³².
 pub const POLYNOMIAL: u32 = 0x04c1_1db7;
-/// Not zero, so that missing words of even parity are noticed.
+/// Initial signature; not zero, so that missing words of even parity are detected.
 pub const START: u32 = u32::MAX;
 
-/// The signature one word later.
+/// The signature after a word with this `parity`.
 pub fn step(signature: u32, parity: bool) -> u32 {
     signature << 1 ^ if signature >> 31 == 1 { POLYNOMIAL } else { 0 } ^ u32::from(parity)
 }
 
-/// Whether a word of the lanes has an odd number of ones.
+/// Whether a word, one 18-bit coefficient per lane, has an odd number of ones.
 pub fn parity(word: &[i64]) -> bool {
     let ones = |coefficient: &i64| (coefficient & ((1 << MULTIPLIER_BITS) - 1)).count_ones();
     word.iter().map(ones).sum::<u32>() % 2 == 1
@@ -50,17 +51,17 @@ pub fn read_addresses(model: &Model) -> Vec<usize> {
     steps.flat_map(|(matrix, group)| of(matrix, group)).collect()
 }
 
-/// What a subarray of one case leaves behind.
+/// The signature after all words that the passes of one subarray read.
 pub fn signature(model: &Model) -> u32 {
     let words = model.storage.memory(&model.formats, &model.quantised);
     let parities: Vec<bool> = words.iter().map(|word| parity(word)).collect();
     read_addresses(model).into_iter().fold(START, |s, address| step(s, parities[address - model.storage.base]))
 }
 
-/// Addresses of one case whose flipped bit would leave the signature as it is: never read, or in bad luck.
+/// Addresses of one case where a flipped bit would not change the signature: never read, or the changes cancel.
 pub fn undetected(model: &Model) -> Vec<usize> {
     let mut changes = vec![0u32; model.storage.words()];
-    // What a parity that was turned so many words ago has become.
+    // The change of the signature that an inverted parity at this read causes at the end.
     let mut change = 1;
     for address in read_addresses(model).into_iter().rev() {
         changes[address - model.storage.base] ^= change;
@@ -70,7 +71,7 @@ pub fn undetected(model: &Model) -> Vec<usize> {
 }
 
 impl Model {
-    /// Whether the hardware watches its coefficient memory.
+    /// Whether the scene asks for the coefficient check.
     pub fn has_coefficient_check(&self) -> bool {
         self.scene.hardware.coefficient_check == CoefficientCheck::Signature
     }
@@ -96,7 +97,7 @@ mod tests {
     }
 
     #[test]
-    fn a_flip_changes_the_signature_as_foretold() {
+    fn a_flipped_bit_changes_the_signature() {
         let mut model = Model::new(&Scene::builtin("eight-by-eight").unwrap()).unwrap();
         let right = signature(&model);
         assert_eq!(signature(&model), right);

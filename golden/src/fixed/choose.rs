@@ -1,18 +1,18 @@
-//! Stage `choose`: which of the built cases solves a frame, decided while the frame is received.
+//! Stage `choose`: the partition case for a frame, chosen among the cases built while the frame is received.
 //!
-//! A boundary between subarrays cuts a contact where the stress beside it is more than a quarter of the frame's
-//! largest. Of the cases whose boundaries cut nothing, and whose subarrays all meet the condition where they are
-//! loaded, the finest is taken, in the order 1, 2, 3; else case 0, the whole array, which is always possible:
+//! A boundary between subarrays cuts a contact where the stress beside it exceeds a quarter of the frame's largest. The
+//! finest case, in the order 1, 2, 3, whose boundaries cut nothing and whose loaded subarrays all meet the scene's
+//! condition is chosen; else case 0, the whole array, which is always possible:
 //! ```text
 //! cut(case) = max |c| beside its boundaries > max(max |c| >> CUT_SHIFT, noise floor)
 //! ```
-//! "Beside" is two rows on each side of the boundary of cases 1 and 3, two columns on each side of that of cases 1
-//! and 2; |c| is the ones' complement magnitude of [`magnitude_bits`].
+//! "Beside" means two rows on each side of the boundary of cases 1 and 3, two columns on each side of the boundary of
+//! cases 1 and 2; |c| is the ones' complement magnitude of [`magnitude_bits`].
 //!
-//! This is the hardware's rule. [`adaptive`](crate::reconstruct) of the golden model finds the contacts first, solves
-//! every case and takes the one nearest to them: nothing that hardware could do before it has solved the frame. Median
-//! e_t of 60 drawn frames, the floating-point model solving (`cargo test --release -p dermis-tests --test choice --
-//! --nocapture the_choice`, which has the other shares as well):
+//! This is the hardware's rule. The golden model's `adaptive` ([`crate::reconstruct`]) first finds the contacts, solves
+//! every case and takes the one nearest to them, which hardware cannot do before it has solved the frame. Median e_t of
+//! 60 drawn frames solved by the floating-point model (`cargo test --release -p dermis-tests --test choice --
+//! --nocapture the_choice`, which also prints the other shares):
 //!
 //! | scene | contacts | case 0 | 1 | 2 | 3 | hardware's rule | golden `adaptive` |
 //! |---|---|---:|---:|---:|---:|---:|---:|
@@ -22,9 +22,10 @@
 //! | sensor-3, 20 frames | 1 | 0.6 % | 21 % | 6.1 % | 1.9 % | 0.7 % | 0.6 % |
 //! | sensor-3 | 2 to 4 | 75 % | 47 % | 71 % | 46 % | 49 % | 34 % |
 //!
-//! So where one contact is expected, case 0 alone is as good and smaller; the choice is for an array that sees one
-//! contact as well as several. A smaller share (a larger shift) takes case 0 more often: better by up to 0.4 points for
-//! one contact, worse by 6 points and more for several; a larger one gains 1 point for several and loses as much.
+//! Where a single contact is expected, case 0 alone is as good and smaller; the choice is for arrays that see one
+//! contact or several. A smaller share (a larger shift) takes case 0 more often: better by up to 0.4 points for one
+//! contact, worse by 6 points and more for several. A larger share gains 1 point for several contacts and loses as much
+//! for one.
 //!
 //! | in | codes after `prepare`, row-major, `input_bits` signed |
 //! |---|---|
@@ -39,31 +40,31 @@ use crate::sensor::Sensor;
 pub const CUT_SHIFT: u32 = 2;
 /// Taxel lines on each side of a boundary that are looked at.
 pub const BOUNDARY_LINES: usize = 2;
-/// From the frame's last code to the choice (place and magnitude, maxima, comparison, choice), beyond what a frame waits
-/// for without one.
+/// Clock cycles that the choice adds between a frame's last code and its first product: position and magnitude, maxima,
+/// comparison, choice.
 pub const LATENCY: u64 = 2;
 
-/// What is gathered of a frame while it is received.
+/// Statistics of a frame, gathered while it is received.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct FrameStats {
-    /// Largest magnitude.
+    /// Largest magnitude of a code.
     pub peak: u64,
-    /// The same on the rows beside the middle.
+    /// Largest magnitude in the rows beside the horizontal boundary.
     pub middle_rows: u64,
-    /// The same on the columns beside the middle.
+    /// Largest magnitude in the columns beside the vertical boundary.
     pub middle_cols: u64,
-    /// Upper left, upper right, lower left and lower right quarter: a code above the noise floor, one below its
-    /// negative.
+    /// Per quarter of the array (upper left, upper right, lower left, lower right): some code is above the noise floor;
+    /// some code is below its negative.
     pub signs: [[bool; 2]; 4],
 }
 
-/// Whether `line` of `lines` is beside the boundary in the middle.
+/// Whether row (or column) `line` of `lines` is beside the boundary in the middle.
 pub fn is_beside_boundary(line: usize, lines: usize) -> bool {
     (2 * line + 1).abs_diff(lines) < 2 * BOUNDARY_LINES
 }
 
 impl FrameStats {
-    /// Adds the code of the taxel at `index`, against a noise floor in codes.
+    /// Adds the code of taxel `index` (row-major in the array); `floor` is the noise floor in codes.
     pub fn add(&mut self, sensor: &Sensor, index: usize, code: i32, floor: i32) {
         let (row, col) = (index / sensor.cols, index % sensor.cols);
         let magnitude = magnitude_bits(i64::from(code));
@@ -79,7 +80,7 @@ impl FrameStats {
         self.signs[quarter][1] |= code < -floor;
     }
 
-    /// Whether a case may be taken.
+    /// Whether no boundary of a case cuts a contact and its loaded subarrays meet the condition.
     fn is_admissible(&self, grid: Grid, condition: Condition, floor: i32, shift: u32) -> bool {
         let limit = (self.peak >> shift).max(floor.max(0) as u64);
         let cut = (grid.rows > 1 && self.middle_rows > limit) || (grid.cols > 1 && self.middle_cols > limit);
@@ -90,18 +91,18 @@ impl FrameStats {
         !(cut || condition == Condition::BothSigns && unmet)
     }
 
-    /// Index of the case to take, of `grids` of which the first is the whole array.
+    /// Index in `grids` of the case to solve; `grids[0]` is the whole array.
     pub fn choose(&self, grids: &[Grid], condition: Condition, floor: i32) -> usize {
         self.choose_at(CUT_SHIFT, grids, condition, floor)
     }
 
-    /// The same with another share than [`CUT_SHIFT`], to measure what it does.
+    /// [`FrameStats::choose`] with another share than [`CUT_SHIFT`], to measure its effect.
     pub fn choose_at(&self, shift: u32, grids: &[Grid], condition: Condition, floor: i32) -> usize {
         (1..grids.len()).find(|&case| self.is_admissible(grids[case], condition, floor, shift)).unwrap_or(0)
     }
 }
 
-/// The quarters that each subarray of a case is made of.
+/// Indices of the quarters that form each subarray of a case, subarrays row-major.
 pub fn quarters(grid: Grid) -> Vec<Vec<usize>> {
     match (grid.rows, grid.cols) {
         (2, 2) => vec![vec![0], vec![1], vec![2], vec![3]],
@@ -140,7 +141,7 @@ mod tests {
         assert_eq!(chosen(&[(at(0, 7), -1000)], loaded, 0), 3);
         assert_eq!(chosen(&[(at(5, 0), 1000)], loaded, 0), 2);
         assert_eq!(chosen(&[(at(3, 4), 1000)], loaded, 0), 0);
-        // A quarter of the peak does not count, a code more does; nor does what the noise floor hides.
+        // A quarter of the peak is no contact, one code more is; stress within the noise floor is none.
         assert_eq!(chosen(&[(at(0, 0), 400), (at(3, 4), 100)], loaded, 0), 1);
         assert_eq!(chosen(&[(at(0, 0), 400), (at(3, 4), 101)], loaded, 0), 0);
         assert_eq!(chosen(&[(at(0, 0), 400), (at(3, 4), 101)], loaded, 101), 1);

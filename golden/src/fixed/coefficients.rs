@@ -5,18 +5,19 @@
 //! ```text
 //! B_{p'}(i, j) = Σ over the distinct images n of j of (−1)^{p·n} M(i, image n of j)
 //! ```
-//! where p = p' for Cz⁺, p' with the column parity flipped for Ax, with the row parity flipped for Ay: a quarter of the
-//! coefficients and products of M, and exact. Rows and columns that lie on a middle line vanish in the odd parities.
+//! where p = p' for Cz⁺, p' with the column parity flipped for Ax, with the row parity flipped for Ay. This is exact
+//! and takes a quarter of the coefficients and products of M. Rows and columns that lie on a middle line vanish in the
+//! odd parities.
 //!
-//! A matrix without some of its taxels ([`crate::matrices::Matrices::without`]) has lost the symmetry. In the parities it
-//! has all 16 blocks, four for each flip f = p XOR p', and is exact again:
+//! A matrix without some of its taxels ([`crate::matrices::Matrices::without`]) has no mirror symmetry. In the basis of
+//! parities it has all 16 blocks, four for each flip f = p XOR p', and the transform is exact again:
 //! ```text
 //! y_{p'}(i) = Σ_f Σ_j B_{p',f}(i, j) f_{p' XOR f}(j)
 //! B_{p',f}(i, j) = mean over the distinct images k of i of (−1)^{p'·k}
 //!                  Σ over the distinct images n of j of (−1)^{p·n} M(image k of i, image n of j)
 //! ```
-//! Taxels that are missed in mirrored pairs leave one of the symmetries: a flip of which all coefficients round to zero is
-//! left out.
+//! If dead taxels come in mirrored pairs, one symmetry remains: a flip whose coefficients all round to zero is not
+//! stored.
 //!
 //! | matrix | stored as | width | LSB |
 //! |---|---|---|---|
@@ -27,12 +28,12 @@ use faer::Mat;
 
 use super::quads::Quads;
 
-/// Column parity: Ax flips it.
+/// Bit of the column parity, which Ax flips.
 pub const FLIP_X: usize = 1;
-/// Row parity: Ay flips it.
+/// Bit of the row parity, which Ay flips.
 pub const FLIP_Y: usize = 2;
 
-/// The blocks of a folded matrix that flip the parity in one way: Q × Q each, row-major, indexed by the target's parity.
+/// The four Q × Q blocks of a folded matrix that flip the parity by `flip`; row-major, indexed by the target parity.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Flipped<T> {
     /// Source parity = target parity XOR `flip`.
@@ -44,14 +45,14 @@ pub struct Flipped<T> {
 /// One matrix, folded and quantised.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Blocks {
-    /// Integer coefficients of each flip, that of the mirror symmetry first.
+    /// Coefficients of each flip in LSBs; the flip of the mirror symmetry is the first.
     pub flips: Vec<Flipped<i64>>,
     /// LSB of the coefficients is 2^−`exponent`.
     pub exponent: i32,
 }
 
 impl Blocks {
-    /// Largest Σ |B(i, j)| over the columns of all flips, of all rows and parities, in LSBs: the ∞-norm that bounds a
+    /// The ∞-norm in LSBs: largest Σ_j |B(i, j)| over all flips, of all rows i and parities. It bounds the growth of a
     /// pass.
     pub fn norm(&self, quads: usize) -> u64 {
         let row = |target: usize, i: usize| -> u64 {
@@ -63,19 +64,19 @@ impl Blocks {
         (0..4).flat_map(|target| (0..quads).map(move |i| row(target, i))).max().unwrap_or(0)
     }
 
-    /// Every coefficient.
+    /// All coefficients, flip by flip.
     pub fn coefficients(&self) -> impl Iterator<Item = &i64> {
         self.flips.iter().flat_map(|flipped| flipped.parity.iter().flatten())
     }
 
-    /// Its flips.
+    /// The parity flips that are stored.
     pub fn flips(&self) -> Vec<usize> {
         self.flips.iter().map(|flipped| flipped.flip).collect()
     }
 }
 
-/// Folds `matrix` (n × n over a subarray's row-major taxels) into the blocks of one flip, not yet quantised: all of a
-/// matrix with the mirror symmetry `flip`, a quarter of one without.
+/// Folds `matrix` (n × n over the row-major taxels of a subarray) into the blocks of one flip, unquantised. These are
+/// the whole matrix if it has the mirror symmetry `flip`, else a quarter of it.
 pub fn parity_blocks(quads: Quads, matrix: &Mat<f64>, flip: usize) -> Flipped<f64> {
     let count = quads.len();
     let parity = std::array::from_fn(|target| {
@@ -83,7 +84,8 @@ pub fn parity_blocks(quads: Quads, matrix: &Mat<f64>, flip: usize) -> Flipped<f6
         let mut block = vec![0.0; count * count];
         for i in (0..count).filter(|&i| has_entry(quads, i, target)) {
             for j in (0..count).filter(|&j| has_entry(quads, j, source)) {
-                // From the image `from` of row i; under the mirror symmetry the same sum, to the bit, from each.
+                // The row sum seen from image `from` of row i; with mirror symmetry it is the same for each image, to
+                // the bit.
                 let seen = |from: usize| -> f64 {
                     let images = (0..4).filter(|lane| quads.lane_mask(j) >> lane & 1 == 1).map(|lane| lane ^ from);
                     images.map(|lane| sign(source, lane) * matrix[(quads.taxel(i, from), quads.taxel(j, lane))]).sum()
@@ -98,14 +100,14 @@ pub fn parity_blocks(quads: Quads, matrix: &Mat<f64>, flip: usize) -> Flipped<f6
     Flipped { flip, parity }
 }
 
-/// Quantises folded matrices, each in its flips, to `bits`-bit signed integers that share the largest exponent at which
-/// all fit. Of each the first flip stays; others stay where something is left of them.
+/// Quantises folded matrices to signed integers of `bits` bits with one common exponent, the largest at which all fit.
+/// The first flip of a matrix is always kept, another flip only if a coefficient of it is not zero.
 pub fn quantise(folded: &[Vec<Flipped<f64>>], bits: u32) -> Vec<Blocks> {
     let all = folded.iter().flatten().flat_map(|flipped| flipped.parity.iter().flatten());
     let largest = all.fold(0.0f64, |m, c| m.max(c.abs()));
     let limit = ((1i64 << (bits - 1)) - 1) as f64;
     let mut exponent = if largest > 0.0 { (limit / largest).log2().floor() as i32 } else { 0 };
-    // The logarithm may round up across an integer; one step down is always enough.
+    // The logarithm may round up to the next integer; one step down is always enough.
     if (largest * 2f64.powi(exponent)).round() > limit {
         exponent -= 1;
     }
@@ -122,7 +124,7 @@ pub fn quantise(folded: &[Vec<Flipped<f64>>], bits: u32) -> Vec<Blocks> {
     folded.iter().map(blocks).collect()
 }
 
-/// Whether quad `index` has an entry of `parity`: odd parities vanish on the middle line they mirror.
+/// Whether quad `index` has an entry of `parity`: odd parities vanish on the middle line of their mirror.
 pub fn has_entry(quads: Quads, index: usize, parity: usize) -> bool {
     let counts = quads.lane_mask(index);
     let own_column = counts & 0b0010 != 0;
@@ -130,7 +132,7 @@ pub fn has_entry(quads: Quads, index: usize, parity: usize) -> bool {
     (own_column || parity & FLIP_X == 0) && (own_row || parity & FLIP_Y == 0)
 }
 
-/// Sign of the image `lane` under `parity`: (−1)^(parity·lane).
+/// Sign of image `lane` in `parity`: (−1)^(parity·lane).
 pub fn sign(parity: usize, lane: usize) -> f64 {
     if (parity & lane).count_ones().is_multiple_of(2) {
         1.0
@@ -208,7 +210,7 @@ mod tests {
         let blocks = &quantise(&[vec![own, other(1, 0.003), other(3, -0.02)]], 8)[0];
         assert_eq!(blocks.exponent, 7);
         assert_eq!(blocks.flips[0].parity[1], vec![-90]);
-        // Flip 1 rounds to nothing.
+        // All coefficients of flip 1 round to zero.
         assert_eq!(blocks.flips(), [0, 3]);
         assert_eq!(blocks.norm(1), 93);
     }

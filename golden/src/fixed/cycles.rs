@@ -1,7 +1,8 @@
-//! Cycle counts of the parallel engine (the serial one's are in [`serial`]) at full speed: input one beat a cycle, output always ready.
+//! Cycle counts of the parallel engine at full speed: one input beat per cycle, output always ready. The serial
+//! engine's are in [`serial`].
 //!
-//! The hardware's schedule replayed on paper: each stage's latency is a named constant here and a pipeline there, and the co-simulation
-//! asserts that both agree to the cycle. With Q quads, G groups of rows, K rows in the last group:
+//! The latency of each stage is a named constant here and a pipeline in the hardware; the co-simulation asserts that
+//! both agree to the cycle. With Q quads, G groups of rows, K rows in the last group:
 //! ```text
 //! fold     Q + 6                                from the last input beat to the first product
 //! pass     the kept columns of each product, at most Q, waiting until a step's operand has been finished
@@ -23,65 +24,67 @@ use super::search::COARSE_CENTRES;
 use super::serial;
 use crate::board::EngineKind;
 
-/// From the last input beat to the cycle in which the frame starts.
+/// Cycles from the last input beat to the start of the frame.
 pub const ACCEPT: u64 = 3;
-/// `fold` beyond its Q quads: start, frame buffer, normalise, butterfly, memory.
+/// Latency of `fold` beyond its Q quads: start, frame buffer, normalise, butterfly, memory.
 const FOLD: u64 = 6;
-/// From a product's issue to the first row of its accumulators: addresses 1, memories 2, selection 1, lanes 5.
+/// Cycles from the issue of a product to the first row of its accumulators: addresses 1, memories 2, selection 1, lanes
+/// 5.
 const LANES: u64 = 9;
-/// More of them where columns are left out: the list of columns is a memory of its own.
+/// Additional cycles where columns are left out: the list of columns is a memory of its own.
 const COLUMNS: u64 = 2;
-/// From a row to its operand being readable: rescaler, operand memory.
+/// Cycles from a row until it can be read as an operand: rescaler, operand memory.
 const OPERAND: u64 = 5;
-/// From the last raw row of v_00 to its first replayed row.
+/// Cycles from the last raw row of v_00 to its first replayed row.
 const REPLAY: u64 = 3;
-/// From the last row to the search's start: rescaler, unfold, memory.
+/// Cycles from the last row to the start of the search: rescaler, unfold, memory.
 const UNFOLD: u64 = 6;
-/// From a sweep's beginning to its judgement, beyond its Q quads: memory 2, Taylor 4, candidates 2, score 6, judge 6.
+/// Cycles from the start of a sweep to its best candidate, beyond its Q quads: memory 2, Taylor shift 4, candidates 2,
+/// score 6, comparison 6.
 const SELECTION_LATENCY: u64 = 20;
-/// From a subarray's completion to the start of its search.
+/// Cycles from the completion of a subarray's passes to the start of its search.
 const HAND_OVER: u64 = 2;
-/// From the search's start, or a judgement that is waited for, to the next sweep: the move, where it leads, the sweep.
+/// Cycles from the start of the search, or from a best candidate that the next sweep depends on, to the next sweep.
 pub const SET_UP: u64 = 3;
-/// Quads that a judged sweep lasts at least: its sums are weighed meanwhile.
+/// Shortest sweep that is scored, in quads: its score bias is computed meanwhile.
 pub const SHORTEST_SWEEP: u64 = 4;
-/// The last sweep beyond its Q quads.
+/// Latency of the last sweep beyond its Q quads.
 const LAST_SWEEP: u64 = 7;
-/// From a subarray's values to their sending, where nothing is searched.
+/// Cycles from a subarray's values to the sending of them, where nothing is searched.
 const UNSEARCHED: u64 = 3;
-/// From a subarray's completion, once the search is free, to the start of the next one's passes.
+/// Cycles from the hand-over of a subarray to the search until the passes of the next one start.
 const NEXT: u64 = 1;
-/// From the last subarray's first value, which stands Q cycles before their end, to the first beat on the output.
+/// Cycles from the last subarray's first value, Q cycles before the end of its values, to the first output beat.
 const SEND: u64 = 13;
 
-/// How long a frame takes, in clock cycles.
+/// Duration of a frame in clock cycles.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 pub struct Cycles {
-    /// From the last input beat to the first output beat.
+    /// Cycles from the last input beat to the first output beat.
     pub first_output: u64,
-    /// From the last input beat to the last output beat, status included.
+    /// Cycles from the last input beat to the last output beat, status included.
     pub latency: u64,
-    /// From the first input beat to the last output beat, both included.
+    /// Cycles from the first input beat to the last output beat, both included.
     pub total: u64,
-    /// From one output beat to the next.
+    /// Cycles from one output beat to the next.
     pub interval: u64,
 }
 
-/// From a coarse sweep of so many quads to the next: a sweep is judged before the next but one, which may write over its
-/// source.
+/// Cycles from the start of a coarse sweep over `quads` quads to the start of the next. The best candidate of a sweep
+/// is known before the sweep after the next, which may overwrite its source.
 pub fn coarse_period(quads: u64) -> u64 {
     let quads = quads.max(SHORTEST_SWEEP);
     quads.max((quads + SELECTION_LATENCY).div_ceil(2))
 }
 
 impl Cycles {
-    /// The counts of a frame of `model` with every subarray searched, the longest there are.
+    /// The counts of a frame of `model` whose subarrays are all searched: the largest counts.
     pub fn longest(model: &Model) -> Self {
         Cycles::of(model, &vec![true; model.parts.len()])
     }
 
-    /// The counts of a frame of `model`, of a scene of several cases a frame of case 0; `searched` says of each
-    /// subarray whether it is searched.
+    /// The counts of a frame of `model`; with several cases those of case 0. `searched[k]` says whether subarray k is
+    /// searched.
     pub fn of(model: &Model, searched: &[bool]) -> Self {
         if model.board.engine == EngineKind::Serial {
             return serial::cycles(model, searched.contains(&true));
@@ -96,7 +99,7 @@ impl Cycles {
             true => HAND_OVER + SET_UP + if searching { sweeps } else { 0 } + quads + LAST_SWEEP,
             false => UNSEARCHED,
         };
-        // A subarray is handed over when it is complete and the one before has been searched.
+        // A subarray is handed to the search when its passes are complete and the search of the one before has ended.
         let (mut complete, mut searched_at) = (0, 0);
         for searching in searched {
             complete += passes(model);
@@ -104,9 +107,9 @@ impl Cycles {
             searched_at = handed_over + search(searching);
             complete = handed_over + NEXT;
         }
-        // Out of a search the last subarray's values leave while they come.
+        // After a search the last subarray's values are sent while they are computed.
         let early = if model.searches() { quads } else { 0 };
-        // Sums leave once the last force is in them.
+        // Resultants are sent once the last force has been added.
         let choice = if model.chooses() { choose::LATENCY } else { 0 };
         let first_output =
             choice + model.prepare.latency() + ACCEPT + searched_at - early + SEND + model.resultants_delay();
@@ -115,12 +118,13 @@ impl Cycles {
     }
 }
 
-/// From a subarray's start to its last coefficient in the search memory.
+/// Cycles from a subarray's start to its last coefficient in the search memory.
 fn passes(model: &Model) -> u64 {
     timeline(model).last_row + UNFOLD
 }
 
-/// Share of the multiplications that the lanes do of those they could, from a subarray's first product to its last.
+/// Multiplications done by the lanes, as a fraction of those possible from a subarray's first product to its last; 0 to
+/// 1.
 pub fn lane_utilisation(model: &Model) -> f64 {
     if model.board.engine == EngineKind::Serial {
         return serial::lane_utilisation(model);
@@ -130,13 +134,13 @@ pub fn lane_utilisation(model: &Model) -> f64 {
     products as f64 / ((last_issue + 1 - first_issue) * lanes) as f64
 }
 
-/// When a subarray's products are issued, in cycles from its start.
+/// Timing of a subarray's products, in cycles from its start.
 struct Timeline {
     first_issue: u64,
     last_issue: u64,
-    /// Multiplications by a row of the subarray; the last group of rows may leave lanes without one.
+    /// Multiplications done; in the last group of rows some lanes may be idle.
     products: u64,
-    /// When the last row leaves the lanes.
+    /// Cycle in which the last row leaves the lanes.
     last_row: u64,
 }
 

@@ -1,6 +1,6 @@
-//! What a scene leaves out of its hardware, and the scene with each of it put back, to see what that saves.
+//! Cost of each optional feature: the scene's design with the feature added, or without it.
 //!
-//! The lanes stay those of the scene, so that only the feature makes the difference.
+//! The number of lanes stays that of the scene, so that only the feature makes the difference.
 
 use super::formats::MULTIPLIER_BITS;
 use super::model::{FixedError, Model};
@@ -9,21 +9,21 @@ use crate::matrices::MAX_DEGREE;
 use crate::partition::{subarrays, Case};
 use crate::scene::{CoefficientCheck, ForceOutput, Scene, SearchSpec};
 
-/// A feature that a scene has or leaves out.
+/// An optional feature of the hardware.
 #[derive(Debug)]
 pub struct Feature {
-    /// What it is.
+    /// Name of the feature.
     pub name: &'static str,
-    /// How the scene has it, or how it was put back.
+    /// The scene's setting, or the setting with which the feature was added.
     pub setting: String,
-    /// The model with it put back, or why there is none; `None` where the scene has it.
+    /// The model with the feature added, or why there is none; `None` if the scene has the feature.
     pub with_feature: Option<Result<Model, FixedError>>,
-    /// The model without it, where the scene has it and its cost depends on how.
+    /// The model without the feature, if the scene has it and its cost depends on the setting.
     pub without_feature: Option<Model>,
 }
 
-/// Every feature that hardware can do without, in pipeline order. A scene that would not fit its board with a feature
-/// put back has it counted all the same.
+/// All optional features in pipeline order. A scene that would exceed its board with a feature added is counted all the
+/// same.
 pub fn features(model: &Model) -> Vec<Feature> {
     let mut scene = model.scene.clone();
     scene.fixed.lanes = Some(4 * model.formats.lanes_per_parity as u32);
@@ -63,7 +63,7 @@ pub fn features(model: &Model) -> Vec<Feature> {
     let parts = model.parts.len();
     let quarters = Case::numbered(1).filter(|case| subarrays(*case, &scene.sensor).is_ok());
     if model.chooses() {
-        // What was built stays, whatever else would fit.
+        // The cases built stay the same, whatever else would fit.
         let cases: Vec<String> = model.cases().iter().map(|case| case.scene.partition.case.to_string()).collect();
         add("choice of the case", true, format!("cases {} per frame", cases.join(", ")), &|| plain(scene));
     } else if parts > 1 {
@@ -98,7 +98,7 @@ pub fn features(model: &Model) -> Vec<Feature> {
         flips.ax.len(),
         flips.ay.len()
     );
-    // A corner breaks every symmetry.
+    // A dead taxel in a corner breaks every symmetry.
     add("dead taxels", dead > 0, set(dead > 0, own, "dead = [[0, 0]]"), &|| {
         plain(&with(&|s| s.input.dead = vec![[0, 0]]))
     });

@@ -1,12 +1,12 @@
-//! What makes a scene fit its board: each change is tried with the model, none is guessed.
+//! Changes that make a scene fit its board; the model of each changed scene is built, none is estimated.
 //!
 //! | change | tried |
 //! |---|---|
-//! | `fixed.lanes` left out | where the scene sets it: as many as fit are taken then |
+//! | `fixed.lanes` left out | where the scene sets it: then as many as fit are used |
 //! | `partition.cases` | one fewer, where the scene lists three or four |
-//! | `partition` | finer ones that divide the array, the coarsest first, the paper's cases before all |
-//! | `search.mu_max` | the largest of three digits that a polynomial of lower degree serves, then 0 |
-//! | `fixed.prune_bits` | ever fewer |
+//! | `partition` | finer grids that divide the array, the coarsest first, the paper's cases before others |
+//! | `search.mu_max` | the largest value with three decimals for a polynomial of lower degree, then 0 |
+//! | `fixed.prune_bits` | one bit fewer at a time |
 
 use std::fmt;
 
@@ -17,33 +17,33 @@ use crate::partition::{Case, Grid};
 use crate::scene::Scene;
 use crate::sensor::MIN_SIDE;
 
-/// A change to a scene, and what it needs then.
+/// A change to a scene, and the resources of the changed scene.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FitSuggestion {
-    /// The change as it stands in a scene file.
+    /// The change as written in a scene file.
     pub change: String,
-    /// Degree of the polynomial with it.
+    /// Degree of the polynomial with the change.
     pub degree: usize,
-    /// Lanes with it.
+    /// Matrix lanes with the change.
     pub lanes: usize,
-    /// Block RAMs with it.
+    /// Block RAMs with the change.
     pub block_rams: usize,
-    /// Multipliers with it.
+    /// Multipliers with the change.
     pub multipliers: usize,
-    /// Cycles from the last input beat to the last output beat with it, everything searched.
+    /// Cycles from the last input beat to the last output beat with the change, all subarrays searched.
     pub cycles: u64,
 }
 
-/// How a scene exceeds its board.
+/// The resources by which a scene exceeds its board, and changes that make it fit.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Shortage {
     /// The scene's name.
     pub scene: String,
     /// The board's name.
     pub board: String,
-    /// Name, needed, there.
+    /// Resources the board lacks: (name, required, available).
     pub lacking: Vec<(&'static str, usize, usize)>,
-    /// Single changes that make it fit.
+    /// Changes of which each alone makes the scene fit; empty if none was found.
     pub suggestions: Vec<FitSuggestion>,
 }
 
@@ -64,7 +64,7 @@ impl fmt::Display for Shortage {
     }
 }
 
-/// The single changes that make a scene fit, the first of each kind.
+/// Of each kind of change, the first that alone makes the scene fit.
 pub(super) fn fit_suggestions(model: &Model) -> Vec<FitSuggestion> {
     let scene = &model.scene;
     let kinds = [
@@ -77,7 +77,7 @@ pub(super) fn fit_suggestions(model: &Model) -> Vec<FitSuggestion> {
     kinds.into_iter().flatten().collect()
 }
 
-/// A scene's text and the scene.
+/// The change as text and the changed scene.
 type Change = (String, Scene);
 
 fn suggestion((change, scene): Change) -> Option<FitSuggestion> {
@@ -102,7 +102,7 @@ fn lanes(scene: &Scene) -> Option<Change> {
     scene.fixed.lanes.map(|_| ("fixed.lanes left out".to_string(), changed(scene, |s| s.fixed.lanes = None)))
 }
 
-/// Lists of one case fewer, the finest kept the longest.
+/// The list of cases without one of them, the coarser ones removed first.
 fn fewer_cases(scene: &Scene) -> Vec<Change> {
     let Some(listed) = scene.partition.listed.filter(|listed| listed.iter().filter(|case| **case).count() > 2) else {
         return Vec::new();
@@ -119,7 +119,7 @@ fn fewer_cases(scene: &Scene) -> Vec<Change> {
 
 fn partitions(scene: &Scene) -> Vec<Change> {
     let sensor = &scene.sensor;
-    // One case is less than several, even the coarsest.
+    // A single case takes less than several, even the coarsest one.
     let now = scene.partition.case.grid().map_or(0, |grid| grid.rows * grid.cols);
     let divides = |lines: usize, parts: &usize| lines.is_multiple_of(*parts) && lines / parts >= MIN_SIDE;
     let mut grids: Vec<Grid> = (1..=sensor.rows)
@@ -128,7 +128,7 @@ fn partitions(scene: &Scene) -> Vec<Change> {
         .filter(|grid| divides(sensor.cols, &grid.cols) && grid.rows * grid.cols > now)
         .collect();
     let numbered = |grid: Grid| (0..=3).find(|&number| Case::numbered(number) == Some(Case::Grid(grid)));
-    // Of equally many subarrays the squarest have the widest view.
+    // Among grids of equally many subarrays the squarest first.
     grids.sort_by_key(|&g| (numbered(g).is_none(), g.rows * g.cols, g.rows.abs_diff(g.cols)));
     let change = |grid: Grid| {
         let case = Case::Grid(grid);
@@ -156,7 +156,7 @@ fn degrees(model: &Model) -> Vec<Change> {
         .collect()
 }
 
-/// Least sensible `fixed.prune_bits`, as in the scene's schema.
+/// Smallest `fixed.prune_bits` of the scene's schema.
 const MIN_PRUNE_BITS: u32 = 8;
 
 fn pruned(scene: &Scene) -> impl Iterator<Item = Change> + '_ {

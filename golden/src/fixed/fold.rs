@@ -1,12 +1,11 @@
 //! Stage `fold`: quads of mirror images to quads of parities.
 //!
-//! One butterfly per quad, unnormalised: `input_bits` in, `input_bits + 2` out. The two bits are exact growth:
-//! nothing rounds and nothing can overflow (the even-even sum is the only one that reaches −4·2^(input_bits − 1), which
-//! fits).
+//! One butterfly per quad, unnormalised: `input_bits` in, `input_bits + 2` out. The two bits are exact growth: nothing
+//! is rounded and nothing overflows. Only the even-even sum reaches −4·2^(input_bits − 1), which fits.
 
 use super::arith::hadamard;
 
-/// Folds normalised quads into parity quads.
+/// Folds quads of normalised codes, `input_bits` wide, into quads of parities, `input_bits + 2` wide.
 pub fn fold(quads: &[[i64; 4]]) -> Vec<[i64; 4]> {
     quads.iter().map(|&quad| hadamard(quad)).collect()
 }

@@ -1,9 +1,9 @@
-//! Every width and scale of the pipeline, derived from the scene and its matrices.
+//! Widths and scales of the whole pipeline, derived from the scene and its matrices.
 //!
-//! Widths are bounds, not guesses: the largest input, times the ∞-norm of what it is multiplied with, gives the largest
-//! output of each stage, so that nothing before `rescale` can overflow. `rescale` brings v_00 to a full word with one
-//! measured exponent per subarray and saturates (and counts) what does not fit; where the norms of the scaled A stay
-//! below one, nothing ever does.
+//! Widths are norm bounds: the largest input times the ∞-norm of the matrix it is multiplied by is the largest output
+//! of a stage, so nothing before `rescale` can overflow. `rescale` shifts v_00 to a full word by one measured exponent
+//! per subarray; what does not fit is saturated and counted. Where the norms of the scaled A are below one, nothing
+//! saturates.
 //!
 //! | word | bits | default | LSB |
 //! |---|---|---|---|
@@ -14,7 +14,7 @@
 //! | Ax, Ay | `coef_bits` | 18 | 2^−`a_exponent` |
 //! | accumulator | `acc_bits` | 42 | v_00: 2^`raw_shift` · code · Cz⁺ |
 //! | v_ij, parities | `vector_bits` = `data_bits` + 4 | 22 | accumulator · 2^rescale |
-//! | v_ij, operand of a pass | `data_bits` | 18 | 16 of the above |
+//! | v_ij, operand of a pass | `data_bits` | 18 | 16 LSBs of the above |
 //! | v_ij, taxels, in the search | `search_bits[k]` | 27 and less | a quarter of `vector_bits`' |
 //! | Σ over taxels of v_ij | `sum_bits[k]` | | the same |
 //! | log2 | `LOG_FRACTION` fraction bits | 6 | 2^−6 |
@@ -36,12 +36,12 @@ use crate::board::{Board, EngineKind};
 use crate::matrices::Matrices;
 use crate::scene::Scene;
 
-/// Operand width of the multipliers; a board with narrower ones has its own.
+/// Operand width of the multipliers in bits; a board with narrower multipliers has its own.
 pub const MULTIPLIER_BITS: u32 = 18;
-/// v_ij carry this many bits more than the passes' operands, for the search.
+/// Bits by which a v_ij in the search is wider than an operand of the passes.
 pub const SEARCH_EXTRA_BITS: u32 = 4;
-/// ε of the sparse objective is 2^−`EPSILON_SHIFT`. Of 17 to 21, on 200 drawn frames of each sensor, 20 comes nearest to the
-/// floating-point model.
+/// ε of the sparse objective is 2^−`EPSILON_SHIFT`. Of 17 to 21, 20 comes nearest to the floating-point model on 200
+/// drawn frames of each sensor.
 pub const EPSILON_SHIFT: u32 = 20;
 /// Fraction bits of a logarithm.
 pub const LOG_FRACTION: u32 = 6;
@@ -51,18 +51,18 @@ pub const LOG_TABLE_BITS: u32 = 4;
 pub const HALVINGS: u32 = 7;
 /// μ is counted in mu_max / (3·2^7): the grid's step after all halvings.
 pub const MU_STEPS: i64 = 3 << HALVINGS;
-/// Bits by which X·`mu_step` is rounded to a μ word.
+/// Right shift from X·`mu_step` to a μ word, X a search position.
 pub const MU_ROUND: u32 = 8;
 /// Width of a force word on the output stream.
 pub const FORCE_BITS: u32 = 32;
-/// Largest right shift of the force stage: more leaves nothing of any product.
+/// Largest right shift of the force stage; a larger one would shift out every product.
 pub const FORCE_SHIFT_MAX: u32 = 62;
-/// Least rows per group worth computing side by side; below, the lanes would wait for the shift-out.
+/// Fewest lanes per parity; with fewer, the lanes would wait for the accumulators to be shifted out.
 const MIN_LANES: usize = 4;
-/// Coarse tiles and candidates beyond the disc reach grid coordinate ±4.
+/// Largest grid coordinate that coarse tiles and candidates beyond the disc reach.
 const REACH: u64 = 4;
 
-/// Widths and scales of one scene's pipeline; see the module's table.
+/// Widths and scales of one scene's pipeline, widths in bits; see the table of the module.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Formats {
     /// Degree of p(μ).
@@ -73,7 +73,7 @@ pub struct Formats {
     pub lanes_per_parity: usize,
     /// Groups of `lanes_per_parity` rows that a pass computes one after the other.
     pub groups: usize,
-    /// Ay is Ax transposed, and not stored.
+    /// Ay is Ax with x and y exchanged and is not stored.
     pub shared_a: bool,
     /// Parity flips of the matrices; serialised where the mirror symmetry is broken.
     #[serde(skip_serializing_if = "Flips::are_symmetric")]
@@ -84,13 +84,13 @@ pub struct Formats {
     pub input_bits: u32,
     /// Width of a folded input.
     pub fold_bits: u32,
-    /// Low limb of the folded input, 0 when it fits one multiplier operand.
+    /// Width of the low limb of the folded input, 0 if the input fits one multiplier operand.
     pub input_low_bits: u32,
     /// Width of Cz⁺.
     pub inverse_bits: u32,
-    /// Low limb of Cz⁺, 0 when it fits one multiplier operand.
+    /// Width of the low limb of Cz⁺, 0 if Cz⁺ fits one multiplier operand.
     pub inverse_low_bits: u32,
-    /// The larger of the two low limbs: the alignment of the product of high limbs.
+    /// The larger of the two low limbs' widths: the left shift of the product of the high limbs.
     pub limb_align: u32,
     /// LSB of the raw v_00 is 2^`raw_shift` times the LSBs of its factors.
     pub raw_shift: u32,
@@ -102,11 +102,11 @@ pub struct Formats {
     pub a_exponent: i32,
     /// Width of an accumulator.
     pub acc_bits: u32,
-    /// Largest length of a raw v_00.
+    /// Largest bit length of a raw v_00.
     pub raw_length_max: u32,
     /// Width of an operand of the passes.
     pub data_bits: u32,
-    /// Width of a v_ij in parities.
+    /// Width of a v_ij in parities, after `rescale`.
     pub vector_bits: u32,
     /// Right shift from the accumulator of an A pass to a v_ij.
     pub a_shift: u32,
@@ -135,25 +135,25 @@ pub struct Quantised {
     pub ay: Blocks,
 }
 
-/// Everything that follows from a scene's matrices.
+/// What is derived from a scene's matrices for one case.
 #[derive(Clone, Debug)]
 pub struct Design {
     /// Widths and scales.
     pub formats: Formats,
-    /// Matrices as stored.
+    /// The matrices as stored.
     pub quantised: Quantised,
     /// The coefficient memory's layout.
     pub storage: Storage,
-    /// Memories and multipliers.
+    /// Memories and multipliers of the whole design.
     pub resources: Resources,
 }
 
-/// A case's subarrays: the matrices they share, and how many there are.
+/// The subarrays of a case: their common matrices and their number.
 #[derive(Clone, Debug)]
 pub struct Shape {
-    /// Of one of them.
+    /// Matrices of one subarray.
     pub matrices: Matrices,
-    /// How many.
+    /// Number of subarrays.
     pub parts: usize,
 }
 
@@ -163,19 +163,18 @@ impl Shape {
     }
 }
 
-/// Quantises the matrices of a scene's cases, the whole array's first where there are several, derives all formats,
-/// lays out the coefficient memory and counts what all of it needs of `board`, whether it has that or not. Of several
-/// cases every word has the width and the scale that serves all of them: they run on the same hardware, and differ in
-/// `quads` and `groups` alone.
+/// Quantises the matrices of a scene's cases, derives all formats, lays out the coefficient memory and counts the
+/// resources, whether `board` has them or not. Where there are several cases the whole array's is the first. They share
+/// the hardware: every word has the width and scale that serves all of them, and only `quads` and `groups` differ.
 ///
 /// # Errors
-/// [`FixedError::Format`] when a word would leave the 48-bit accumulator or a norm of A asks for more headroom than
-/// the data word has.
+/// [`FixedError::Format`] if a word needs more than the 48-bit accumulator, or a norm of A more headroom than the data
+/// word has.
 pub fn derive(scene: &Scene, shapes: &[Shape], board: &Board) -> Result<Vec<Design>, FixedError> {
     let spec = &scene.fixed;
     let largest = shapes.first().ok_or(FixedError::Internal("a scene has a case"))?;
     let degree = shapes.iter().map(|shape| shape.matrices.degree).max().unwrap_or(0);
-    // A narrower multiplier narrows its operands; what the inverse and the input have more goes into low limbs.
+    // Narrower multipliers have narrower operands; the remaining bits of inverse and input go into low limbs.
     let operand_bits = MULTIPLIER_BITS.min(board.multiplier_bits);
     let (data_bits, coef_bits) = (spec.data_bits.min(operand_bits), spec.coef_bits.min(operand_bits));
     let mut quantised = quantised(scene, shapes, coef_bits)?;
@@ -184,7 +183,7 @@ pub fn derive(scene: &Scene, shapes: &[Shape], board: &Board) -> Result<Vec<Desi
         let each = quantised.iter().zip(shapes).map(|(quantised, shape)| of(quantised, shape.quads().len()));
         each.max().unwrap_or(0)
     };
-    // The same in all cases: dead taxels, which break the symmetry, are a matter of one subarray.
+    // The same in all cases: a scene with dead taxels, which break the symmetry, has one case and one subarray.
     let Quantised { inverse, ax, ay } = &quantised[0];
     let flips = Flips { inverse: inverse.flips(), ax: ax.flips(), ay: ay.flips() };
 
@@ -305,7 +304,7 @@ pub fn derive(scene: &Scene, shapes: &[Shape], board: &Board) -> Result<Vec<Desi
 fn quantised(scene: &Scene, shapes: &[Shape], coef_bits: u32) -> Result<Vec<Quantised>, FixedError> {
     let spec = &scene.fixed;
     let scale = -4.0 / 3.0 * scene.search.mu_max;
-    // The mirror symmetry is lost with a taxel: then every flip is looked at, the symmetry's first.
+    // A dead taxel breaks the mirror symmetry: then every flip is tried, that of the symmetry first.
     let looked_at = if scene.input.dead.is_empty() { 1 } else { 4 };
     let folded = |shape: &Shape, matrix: &Mat<f64>, own: usize, scale: f64| -> Vec<Flipped<f64>> {
         let scaled = |Flipped { flip, parity }| {
@@ -328,16 +327,16 @@ fn quantised(scene: &Scene, shapes: &[Shape], coef_bits: u32) -> Result<Vec<Quan
 /// A case with its lanes and its part of the coefficient memory.
 #[derive(Clone, Debug)]
 pub struct LaidOut {
-    /// Widths, groups of rows.
+    /// Widths, lanes and groups of rows of the case.
     pub formats: Formats,
-    /// Columns kept.
+    /// The columns kept in the coefficient memory.
     pub storage: Storage,
-    /// Subarrays.
+    /// Number of subarrays.
     pub parts: usize,
 }
 
-/// Chooses lanes and memories: the lanes that the scene says, else the most for which there is block RAM; block RAMs rather
-/// than distributed ones where there is the choice, since a deep distributed one is the longest path of its design.
+/// Chooses lanes and memories: the scene's number of lanes, else the most for which there is block RAM. Block RAM is
+/// preferred to distributed RAM, since a deep distributed RAM is the longest path of its design.
 fn fit(
     formats: &Formats,
     matrices: &[Matrix],
@@ -370,7 +369,7 @@ fn fit(
         (laid_out, resources)
     };
     let product = board.multipliers_for(MULTIPLIER_BITS, MULTIPLIER_BITS);
-    // What the other blocks take does not depend on the lanes.
+    // The multipliers of the other blocks do not depend on the number of lanes.
     let all = with(1);
     let others = all.1.multipliers() - 4 * quads * product;
     let left = (board.multipliers as usize).saturating_sub(others);
@@ -381,7 +380,7 @@ fn fit(
     };
     let mut groups: Vec<usize> = per_parity.rev().map(|lanes| quads.div_ceil(lanes)).collect();
     groups.dedup();
-    // Where nothing fits, what asks for the fewest block RAMs.
+    // Where nothing fits, the design with the fewest block RAMs.
     let mut leanest: Option<(Vec<LaidOut>, Resources)> = None;
     for groups in groups {
         let design = with(groups);
@@ -395,8 +394,8 @@ fn fit(
     leanest.unwrap_or(all)
 }
 
-/// The right shift of the force stage for a subarray normalised by `normalise` and rescaled by `rescale`: the μ word's
-/// fraction, and the distance of this block's exponent from the force word's.
+/// The right shift of the force stage for a subarray shifted left by `normalise` and right by `rescale`: the fraction
+/// of the μ word plus the distance of the subarray's exponent from that of the force word.
 pub fn force_shift(formats: &Formats, normalise: u32, rescale: u32) -> u32 {
     let rescale_max = formats.raw_length_max.saturating_sub(formats.vector_bits - 1);
     let headroom = FORCE_BITS - formats.search_bits[0];
@@ -423,7 +422,8 @@ fn growth(ax: &Blocks, ay: &Blocks, quads: usize, count: usize) -> Vec<f64> {
     bounds
 }
 
-/// Bound of coefficient k after the centre moved anywhere within ±[`REACH`]: Σ |v_ij| C(i, k)C(j, l) REACH^(i−k+j−l).
+/// Bound of coefficient k after the centre has moved anywhere within ±[`REACH`]: Σ |v_ij| C(i, k) C(j, l)
+/// REACH^(i−k+j−l).
 fn reach(stored: &[u64], k: usize) -> u64 {
     let (ki, kj) = EXPONENTS[k];
     let choose = |n: u32, k: u32| (0..k).fold(1u64, |c, t| c * u64::from(n - t) / u64::from(t + 1));

@@ -4,9 +4,9 @@
 //! codes → receive → normalise → fold → pass → rescale → unfold → search → force → send → beats, status
 //!                                  ↑______________|  v_ij of the next degree
 //! ```
-//! Each stage is one file here and one file of the same name in the hardware description; what a stage passes on is kept in the
-//! [`Trace`] under that name and compared word for word with every simulation of the hardware. How far the
-//! result is from the floating-point model is measured, never assumed: see the tests that span the crates.
+//! Each stage is one file here and one file of the same name in the hardware description. The [`Trace`] keeps what
+//! every stage passes on under the stage's name; tests compare it word for word with every simulation of the hardware.
+//! The difference from the floating-point model is measured by tests, never assumed.
 
 pub mod arith;
 pub mod check;

@@ -1,4 +1,4 @@
-//! The bit-true model of one scene, all stages in a row.
+//! The bit-true model of one scene: construction, run over all stages, decoding of the device's words.
 
 use thiserror::Error;
 
@@ -28,10 +28,10 @@ use crate::quantise::{full_scale, noise_floor_codes, quantise, Codes};
 use crate::reconstruct::{assemble, Reconstruction, Resultant, SubarrayResult};
 use crate::scene::{ForceOutput, Scene, SceneError};
 
-/// Why a scene has no bit-true model, or a frame no result.
+/// A scene without a bit-true model, or a frame without a result.
 #[derive(Debug, Error)]
 pub enum FixedError {
-    /// The scene asks for something that is not there.
+    /// The scene asks for something this version does not build.
     #[error(transparent)]
     Scene(#[from] SceneError),
     /// The frame does not belong to the scene.
@@ -53,23 +53,23 @@ pub enum FixedError {
         /// Quads of a subarray.
         quads: usize,
     },
-    /// The board has too little of something.
+    /// The design needs resources that the board lacks.
     #[error("{0}")]
     DoesNotFit(Box<Shortage>),
-    /// The scene's board.
+    /// The scene's board is unknown or its file invalid.
     #[error(transparent)]
     Board(#[from] BoardError),
     /// A word would need more bits than the hardware has.
     #[error("{what} needs {needs} bits, the hardware has {has}: lower fixed.input_bits, input.average, fixed.inverse_bits or search.mu_max")]
     Format {
-        /// The word.
+        /// The word, in words.
         what: &'static str,
-        /// Bits it needs.
+        /// Width it needs in bits.
         needs: u32,
-        /// Bits there are.
+        /// Largest width in bits.
         has: u32,
     },
-    /// A threshold or noise floor in physical units, but no scale for the codes.
+    /// A field in physical units while `input.full_scale_MPa`, which relates codes to stress, is missing.
     #[error("{field} = {value} needs input.full_scale_MPa: without it the hardware does not know what a code means")]
     NoFullScale {
         /// The scene's field.
@@ -77,20 +77,20 @@ pub enum FixedError {
         /// Its value.
         value: String,
     },
-    /// A file the input options name, or frames that do not fit them.
+    /// A file named by the input options cannot be used, or the frames do not fit them.
     #[error(transparent)]
     Input(#[from] InputError),
-    /// A device sent another number of beats than the scene has.
+    /// A device sent a wrong number of beats for the scene.
     #[error("{what}: got {got} beats, expected {expected}")]
     Beats {
-        /// Which beats.
+        /// `forces` or `status`.
         what: &'static str,
-        /// How many came.
+        /// Number of beats received.
         got: usize,
-        /// How many belong there.
+        /// Number of beats the scene has.
         expected: usize,
     },
-    /// Stress so large that its forces are no finite numbers.
+    /// The stress is so large that its forces are not finite.
     #[error("frame {frame}: peak stress {peak_MPa:e} MPa gives forces beyond the range of numbers")]
     TooStrong {
         /// The frame's id.
@@ -98,34 +98,34 @@ pub enum FixedError {
         /// Its largest |b|.
         peak_MPa: f64,
     },
-    /// A derivation contradicts itself; a defect of this crate.
+    /// A broken invariant: a defect of this crate.
     #[error("internal: {0}")]
     Internal(&'static str),
 }
 
-/// What one stage passed on in a frame, in the hardware's order.
+/// The words that one stage passed on for a frame, in the hardware's order.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Stage {
-    /// The stage's name, equal to the hardware's tap.
+    /// The stage's name, that of the tap in the hardware.
     pub name: &'static str,
-    /// Words of signed fields.
+    /// Words, each a list of signed fields.
     pub words: Vec<Vec<i64>>,
 }
 
-/// Everything the hardware does with one frame.
+/// Everything the hardware computes for one frame.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Trace {
-    /// Forces `[fx, fy, fz]` in LSBs, row-major, or the subarrays' sums.
+    /// Forces `[fx, fy, fz]` in force LSBs, row-major; with `output.forces = "resultants"` the sums of each subarray.
     pub beats: Vec<[i32; 3]>,
-    /// Status beats, packed alike.
+    /// Status beats, three words each ([`super::send`]).
     pub status: Vec<[i32; 3]>,
-    /// The stages' streams.
+    /// The words of each stage, in pipeline order.
     pub stages: Vec<Stage>,
-    /// Cycle counts that the hardware keeps at full speed.
+    /// Cycle counts of the frame at full speed.
     pub cycles: Cycles,
 }
 
-/// Stages of which the serial engine passes on one word after the other.
+/// Stages that pass on single words, not quads, in the serial engine.
 const SINGLE_WORDS: [&str; 4] = ["normalise", "rescale", "unfold", "force"];
 
 /// The bit-true model of one scene.
@@ -137,11 +137,11 @@ pub struct Model {
     pub formats: Formats,
     /// Quantised matrices.
     pub quantised: Quantised,
-    /// Noise floor in words of the frame buffer.
+    /// Noise floor in LSBs of a frame buffer word, rounded down.
     pub noise_floor: i32,
-    /// The input options.
+    /// Calibration and averaging of the input.
     pub prepare: Prepare,
-    /// Threshold in force LSBs.
+    /// `threshold.min_force_N` in force LSBs, rounded up.
     pub threshold: i64,
     /// The coefficient memory's layout.
     pub storage: Storage,
@@ -149,13 +149,13 @@ pub struct Model {
     pub resources: Resources,
     /// The board.
     pub board: Board,
-    /// The subarrays, row-major; of a scene of several cases those of case 0, as all that differs between them.
+    /// The subarrays, row-major; with several cases, those of case 0, as every field that differs between cases.
     pub parts: Vec<Subarray>,
     /// Dead taxels, row-major in the array, ascending.
     pub dead: Vec<usize>,
-    /// The cases that divide the array and were not built, of a scene that lists none.
+    /// Cases that divide the array but were left out; empty if the scene lists its cases.
     pub dropped: Vec<Dropped>,
-    /// One model for each of several cases, case 0 first; none of a scene of one.
+    /// One model per case, case 0 first; empty for a scene with one case.
     pub(super) built: Vec<Model>,
     pub(super) layout: Quads,
 }
@@ -164,8 +164,9 @@ impl Model {
     /// Computes and quantises the scene's matrices and derives its formats.
     ///
     /// # Errors
-    /// What the scene asks for is not available, its matrices or formats do not exist, or a threshold or noise floor
-    /// lacks its full scale. [`FixedError::DoesNotFit`] says what of the board is too small and what would fit.
+    /// The scene asks for something unavailable, its matrices or formats do not exist, or a threshold or noise floor
+    /// lacks the full scale. [`FixedError::DoesNotFit`] lists the resources the board lacks and changes that make the
+    /// scene fit.
     pub fn new(scene: &Scene) -> Result<Self, FixedError> {
         let model = Model::without_fit_check(scene)?;
         let lacking = model.resources.shortages(&model.board);
@@ -176,20 +177,21 @@ impl Model {
         Err(FixedError::DoesNotFit(Box::new(Shortage { scene, board, lacking, suggestions: fit_suggestions(&model) })))
     }
 
-    /// The model with a polynomial of another degree, 1 to 3, than the scene's series needs.
+    /// The model with a polynomial of the given degree, 1 to 3, in place of the one the series needs.
     ///
     /// # Errors
-    /// As [`Model::new`], which see; what the board lacks is not looked at.
+    /// As [`Model::new`], but a board that is too small is no error.
     pub fn of_degree(scene: &Scene, degree: usize) -> Result<Self, FixedError> {
         Model::with_scale(scene, Scale::new(scene)?, Some(degree.clamp(1, MAX_DEGREE)))
     }
 
-    /// The model of a scene that may be too large for its board.
+    /// The model of a scene, whether it fits its board or not.
     pub(crate) fn without_fit_check(scene: &Scene) -> Result<Self, FixedError> {
         Model::with_scale(scene, Scale::new(scene)?, None)
     }
 
-    /// The same with readings of another scale than the scene's files say, or another degree than its rule.
+    /// The model with the given scale of the readings and, if given, degree of the polynomial; the board may be too
+    /// small.
     pub(super) fn with_scale(scene: &Scene, scale: Scale, degree: Option<usize>) -> Result<Self, FixedError> {
         scene.require_supported()?;
         let board = Board::load(&scene.hardware.board)?;
@@ -202,12 +204,12 @@ impl Model {
         }
     }
 
-    /// The model of a scene of one case.
+    /// The model of a single case.
     pub(super) fn of_design(scene: &Scene, scale: &Scale, design: Design, board: &Board) -> Result<Self, FixedError> {
         let Design { formats, quantised, storage, resources } = design;
         let parts = subarrays(scene.partition.case, &scene.sensor)?;
         let shape = parts[0].sensor(&scene.sensor);
-        // With dead taxels there is one subarray.
+        // Scenes with dead taxels have a single subarray.
         let dead = parts[0].local_indices(&scene.input.dead);
         let scaled = |field, value: f64, unit: &dyn Fn(f64) -> f64| match scene.input.full_scale_MPa {
             _ if value == 0.0 => Ok(0.0),
@@ -240,8 +242,8 @@ impl Model {
         })
     }
 
-    /// The model for `frames`: a scene without full scale whose threshold or noise floor
-    /// needs one takes the frames' largest |b|, one scale for all of them.
+    /// The model for `frames`: if the scene needs a full scale and has none, it takes the frames' largest |b|, one
+    /// scale for all of them.
     ///
     /// # Errors
     /// As [`Model::new`].
@@ -255,7 +257,7 @@ impl Model {
             let gain = Scale::new(&scene)?.largest;
             let peak = |frame: &Frame| scene.input.mask_dead(frame.clone()).peak_MPa();
             let largest = gain * frames.iter().map(peak).fold(0.0, f64::max);
-            // Frames of nothing but zeros leave any scale: the default of a single one.
+            // Frames of zeros fit any scale; 1 MPa is also the default of a single frame.
             scene.input.full_scale_MPa = Some(if largest > 0.0 { largest } else { 1.0 });
         }
         Model::new(&scene)
@@ -266,32 +268,32 @@ impl Model {
         self.layout
     }
 
-    /// Subarrays along the rows and along the columns.
+    /// Number of subarrays along the rows and along the columns.
     pub fn grid(&self) -> Grid {
         let shape = self.layout;
         Grid { rows: self.scene.sensor.rows / shape.rows, cols: self.scene.sensor.cols / shape.cols }
     }
 
-    /// Whether the hardware has a μ search.
+    /// Whether the hardware has a μ search, that is `search.mu_max` is above 0.
     pub fn searches(&self) -> bool {
         self.formats.degree > 0
     }
 
-    /// Force per LSB of the output words in N, for codes whose largest means `full_scale_MPa`.
+    /// N per LSB of a force word, for codes whose largest value means `full_scale_MPa`.
     pub fn force_lsb_N(&self, full_scale_MPa: f64) -> f64 {
         full_scale_MPa / self.prepare.largest() * 2f64.powi(self.formats.force_exponent)
     }
 
-    /// The stress that a reconstruction's frames stand for: their calibrated mean.
+    /// The stress that [`Model::reconstruct_averaged`] reconstructs: the calibrated mean of 2^average frames, in MPa.
     ///
     /// # Errors
-    /// [`InputError`] when they are not 2^k, or one is not the scene's.
+    /// [`InputError`] unless there are 2^average frames, all of the scene's sensor.
     pub fn stress(&self, frames: &[Frame]) -> Result<Frame, FixedError> {
         let input = Input::new(&self.scene)?;
         Ok(input.calibrate(&input.average(&self.scene, frames)?))
     }
 
-    /// What the converter makes of the frames of one reconstruction, one after the other.
+    /// The converter's codes for the frames of one reconstruction, frame after frame, row-major.
     ///
     /// # Errors
     /// As [`Model::stress`].
@@ -301,16 +303,16 @@ impl Model {
         Ok(frames.iter().flat_map(codes).collect())
     }
 
-    /// The codes of a frame of stress, as a converter without input options gives them.
+    /// The codes of a frame of stress, from a converter without input options.
     ///
     /// # Errors
-    /// [`FrameError`] when the frame's sensor is not the scene's.
+    /// [`FrameError`] if the frame's sensor is not the scene's.
     pub fn codes(&self, frame: &Frame) -> Result<Codes, FixedError> {
         frame.check(&self.scene)?;
         Ok(quantise(&frame.stress_MPa, self.formats.code_bits, full_scale(&self.scene, frame)))
     }
 
-    /// Runs the `codes` of one reconstruction, row-major over the array, `code_bits` wide: 2^average frames of them.
+    /// Computes one reconstruction from its `codes`, `code_bits` wide: 2^average frames, each row-major over the array.
     pub fn run(&self, codes: &[i32]) -> Trace {
         if self.chooses() {
             return self.run_chosen(codes);
@@ -372,8 +374,7 @@ impl Model {
         }
     }
 
-    /// The stages as the board's engine passes them on: the serial one has a single shifter, which passes on words, not
-    /// quads.
+    /// The stages as the board's engine passes them on: the serial engine's single shifter passes on words, not quads.
     fn as_engine_streams(&self, mut stages: Vec<Stage>) -> Vec<Stage> {
         if self.board.engine == EngineKind::Serial {
             for stage in stages.iter_mut().filter(|stage| SINGLE_WORDS.contains(&stage.name)) {
@@ -383,7 +384,7 @@ impl Model {
         stages
     }
 
-    /// Reconstructs one frame of a scene that averages none.
+    /// Reconstructs one frame; for scenes with `input.average = 0`.
     ///
     /// # Errors
     /// As [`Model::stress`].
@@ -391,7 +392,7 @@ impl Model {
         self.reconstruct_averaged(std::slice::from_ref(frame))
     }
 
-    /// Reconstructs the mean of 2^average frames with the bit-true model.
+    /// Reconstructs the mean of 2^average frames.
     ///
     /// # Errors
     /// As [`Model::stress`].
@@ -400,10 +401,11 @@ impl Model {
         self.decode(&self.stress(frames)?, "fixed", &trace.beats, &trace.status)
     }
 
-    /// Puts what a device sent for `frame`, the frames' [`Model::stress`], into physical units.
+    /// Converts the words that a device sent for `frame` (the [`Model::stress`] of the frames) to physical units;
+    /// `engine` names the device in the result.
     ///
     /// # Errors
-    /// [`FixedError::Beats`] when forces or status are not complete; the frame's errors as in [`Model::codes`].
+    /// [`FixedError::Beats`] if forces or status are incomplete; errors of the frame as in [`Model::codes`].
     pub fn decode(
         &self,
         frame: &Frame,
@@ -469,7 +471,7 @@ impl Model {
         }
         let mut result = assemble(&self.scene, frame, engine, subarrays, forces, flags);
         if self.sends_resultants() {
-            // Without forces per taxel only the device knows of a contact.
+            // Without forces per taxel only the device knows whether there is a contact.
             let none = status.iter().step_by(STATUS_BEATS).all(|beat| beat[2] as u32 & FLAG_NO_CONTACT != 0);
             result.flags.retain(|flag| none || *flag != Flag::NoContact);
             result.resultant_N = resultant_N;
@@ -479,7 +481,7 @@ impl Model {
         Ok(result)
     }
 
-    /// The resultants of a device's beats, for force words of `lsb_N`.
+    /// The resultants in a device's beats; one LSB of a force word is `lsb_N`.
     fn resultants(&self, beats: &[[i32; 3]], lsb_N: f64) -> Vec<Resultant> {
         let sensor = &self.scene.sensor;
         let half_pitch = [sensor.pitch_x_mm / 2.0, sensor.pitch_y_mm / 2.0];
@@ -491,12 +493,12 @@ impl Model {
         beats.chunks(resultants::BEATS).map(resultant).collect()
     }
 
-    /// Whether sums leave in the place of forces.
+    /// Whether the output is one resultant per subarray instead of a force per taxel.
     pub fn sends_resultants(&self) -> bool {
         self.scene.output.forces == ForceOutput::Resultants
     }
 
-    /// Beats of a frame before its status.
+    /// Number of output beats of a frame before its status.
     pub fn force_beats(&self) -> usize {
         match self.sends_resultants() {
             false => self.scene.sensor.taxels(),
@@ -504,7 +506,7 @@ impl Model {
         }
     }
 
-    /// How much later than the first force the first beat leaves.
+    /// Cycles by which the first beat of resultants is later than the first beat of forces would be.
     pub(super) fn resultants_delay(&self) -> u64 {
         match self.sends_resultants() {
             false => 0,
@@ -512,7 +514,7 @@ impl Model {
         }
     }
 
-    /// Status beats of a frame: [`STATUS_BEATS`] per subarray, in order.
+    /// Number of status beats of a frame: [`STATUS_BEATS`] per subarray, in the order of the subarrays.
     pub fn status_beats(&self) -> usize {
         STATUS_BEATS * self.parts.len()
     }

@@ -1,17 +1,18 @@
 //! Stage `normalise`: block floating point on the input.
 //!
 //! Every code of a subarray is shifted left by the same `s = input_bits − 1 − length(max |c|)`, so that the largest one
-//! uses the whole word. The shift is exact; the exponent is kept for [`force`](super::force). A subarray
-//! of zeros shifts by `input_bits − 1`, which leaves it zero.
+//! fills the word. The shift is exact; [`force`](super::force) takes the exponent back. For a subarray of zeros the
+//! shift is `input_bits − 1`, without effect.
 
 use super::arith::bit_length;
 
-/// The left shift for a subarray whose magnitudes' OR is `magnitude`; 0..=`input_bits − 1`.
+/// The left shift, 0 to `input_bits − 1`, for a subarray; `magnitude` is the OR of its codes'
+/// [`magnitude_bits`](super::arith::magnitude_bits).
 pub fn shift(magnitude: u64, input_bits: u32) -> u32 {
     input_bits - 1 - bit_length(magnitude)
 }
 
-/// Shifts every quad; the words keep `input_bits` bits.
+/// Shifts every code left by `shift`; the words stay `input_bits` wide.
 pub fn normalise(quads: &[[i64; 4]], shift: u32) -> Vec<[i64; 4]> {
     quads.iter().map(|quad| quad.map(|code| code << shift)).collect()
 }

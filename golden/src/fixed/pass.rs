@@ -1,28 +1,29 @@
 //! Stage `pass`: matrix-vector products on the MAC lanes.
 //!
-//! `4·lanes_per_parity` lanes multiply the four parities of one broadcast quad per cycle with the coefficients of one row each;
-//! rows beyond the lanes follow in groups. All products of a v_ij stay in the accumulator.
+//! `4·lanes_per_parity` lanes multiply the four parities of one broadcast quad per cycle by coefficients, each lane for
+//! one row; rows beyond the lanes follow in groups. All products of a v_ij are added up in the accumulator before it is
+//! rounded.
 //! ```text
 //! v_00:  acc = Σ_j 2^limb_align Ch fh + Ch (fl·2^a) + (Cl·2^c) fh       Cz⁺ = 2^kc Ch + Cl,  f = 2^kf fh + fl
 //! v_ij:  acc = Σ_j (−Ay')·v_{i,j−1} + (−Ax')·v_{i−1,j}                  A' = A·(4/3)·mu_max
 //! ```
-//! The product of the two low limbs is dropped: below 2^−22 of the largest result. The smaller low limb is stored shifted (a, c), so that
-//! both mixed products have one weight.
+//! The product of the two low limbs, below 2^−22 of the largest result, is left out. The smaller low limb is stored
+//! shifted left (a, c), so that both mixed products have the same weight.
 
 use super::formats::{Formats, Quantised};
 use super::quads::Quads;
 use super::schedule::{Kind, Matrix, Operand, Product};
 use super::storage::blocks;
 
-/// A folded input or v_ij as operands: parities per quad.
+/// A folded input or v_ij, four parities per quad.
 pub type Vector = Vec<[i64; 4]>;
 
-/// The vectors that passes read.
+/// The operands of the passes.
 #[derive(Clone, Debug, Default)]
 pub struct Operands {
     /// High limbs of the folded input.
     pub input_high: Vector,
-    /// Low limbs of the folded input, aligned.
+    /// Low limbs of the folded input, shifted left by `limb_align − input_low_bits`.
     pub input_low: Vector,
     /// Finished v_ij, `data_bits` wide.
     pub vectors: Vec<Vector>,
@@ -50,7 +51,7 @@ impl Operands {
     }
 }
 
-/// What a lane multiplies of a coefficient `c` of `kind`: an 18-bit operand.
+/// The 18-bit operand that a lane multiplies for coefficient `c` of a matrix of `kind`.
 pub fn coefficient(formats: &Formats, kind: Kind, c: i64) -> i64 {
     let low = formats.inverse_low_bits;
     match kind {
@@ -60,9 +61,9 @@ pub fn coefficient(formats: &Formats, kind: Kind, c: i64) -> i64 {
     }
 }
 
-/// Accumulates all `products` of one v_ij: accumulators per quad and parity, in row order.
+/// Accumulates all `products` of one v_ij: one accumulator per quad and parity, in row order.
 ///
-/// A transposed product takes its operand with x and y exchanged and gives its result so.
+/// A transposed product reads its operand with x and y exchanged, and so is its result.
 pub fn pass(
     formats: &Formats,
     quantised: &Quantised,
@@ -90,7 +91,7 @@ pub fn pass(
     accumulators
 }
 
-/// A quad vector with x and y exchanged: quad (r, c) from quad (c, r), fields 1 and 2 swapped. For square subarrays.
+/// A quad vector with x and y exchanged, of a square subarray: quad (r, c) from quad (c, r), lanes 1 and 2 swapped.
 pub fn transpose(layout: Quads, quads: &[[i64; 4]]) -> Vector {
     (0..quads.len()).map(|address| swap(quads[layout.transposed(address)])).collect()
 }

@@ -1,4 +1,4 @@
-//! Stage `prepare`: what stands before `receive` where the scene asks for it: calibration, then averaging.
+//! Stage `prepare`, before `receive`: calibration, then averaging, where the scene asks for them.
 //!
 //! ```text
 //! code ── calibrate ── average ── receive        s = ⌊gain·(code − zero) / 2^16 + 1/2⌋,  held to code_bits
@@ -12,7 +12,7 @@
 //! | s | `code_bits` | full scale / (2^(code_bits − 1) − 1) |
 //! | b | `input_bits` = `code_bits` + k | that over 2^k |
 //!
-//! Without a table no product is made: the gain is 1. Each sample is rounded once; the sum keeps all its bits.
+//! Without a table the gain is 1 and nothing is multiplied. Each sample is rounded once; the sum keeps all its bits.
 
 use super::arith::{round_shift, saturate};
 use super::FixedError;
@@ -27,21 +27,21 @@ pub const GAIN_FRACTION: u32 = 16;
 /// Width of a gain word: the largest is 1.0.
 pub const GAIN_BITS: u32 = GAIN_FRACTION + 2;
 
-/// The stage of one scene; without any option it passes codes on.
+/// The stage of one scene; without input options it passes the codes on.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Prepare {
-    /// Zero of each taxel in codes, where there is a tare frame or a table.
+    /// Zero of each taxel in codes, if the scene has a tare frame or a table.
     pub zero: Option<Vec<i32>>,
-    /// Gain word of each taxel, where there is a table.
+    /// Gain word of each taxel, 2^−16 per LSB, if the scene has a table.
     pub gain: Option<Vec<i32>>,
-    /// 2^average frames make one.
+    /// 2^average frames are added up.
     pub average: u32,
-    /// Reading of the largest code over the stress of the largest word.
+    /// Reading per MPa at the largest gain, in the readings' unit: 1 / (largest |gain|).
     pub reading_per_MPa: f64,
     code_bits: u32,
 }
 
-/// A scene's readings to MPa, before words are known.
+/// Conversion of a scene's readings to MPa, in floating point.
 #[derive(Clone)]
 pub(super) struct Scale {
     table: Option<Calibration>,
@@ -51,13 +51,13 @@ pub(super) struct Scale {
 }
 
 impl Scale {
-    /// Readings with a tare frame, and with a table of gains or without, for resources alone.
+    /// Readings with a tare frame of zeros and, with `gains`, a table of ones: to count resources without the files.
     pub(super) fn of_tare(taxels: usize, gains: bool) -> Scale {
         let table = gains.then(|| Calibration::identity(taxels));
         Scale { table, tare: Some(vec![0.0; taxels]), largest: 1.0 }
     }
 
-    /// Reads the files that the scene names.
+    /// Reads the calibration table and the tare frame that the scene names.
     pub(super) fn new(scene: &Scene) -> Result<Scale, FixedError> {
         let spec = &scene.input;
         let table = spec.calibration.as_ref().map(|path| Calibration::load(path, &scene.sensor)).transpose();
@@ -73,7 +73,7 @@ impl Scale {
 }
 
 impl Prepare {
-    /// The stage of a scene whose largest word means `full_scale_MPa`.
+    /// The stage of a scene; its largest word means `full_scale_MPa`.
     pub(super) fn new(scene: &Scene, scale: Scale, full_scale_MPa: f64) -> Prepare {
         let code_bits = scene.fixed.input_bits;
         let reading_per_MPa = 1.0 / scale.largest;
@@ -90,12 +90,12 @@ impl Prepare {
         }
     }
 
-    /// Largest code of a frame of stress, once its readings are summed.
+    /// Largest word of the frame buffer: the largest code times 2^average.
     pub fn largest(&self) -> f64 {
         f64::from(largest_code(self.code_bits)) * f64::from(1u32 << self.average)
     }
 
-    /// One sample of taxel `taxel`.
+    /// One calibrated sample of taxel `taxel`, saturated to `code_bits`.
     pub fn calibrate(&self, taxel: usize, code: i32) -> i64 {
         let zero = self.zero.as_ref().map_or(0, |zero| i64::from(zero[taxel]));
         let difference = i64::from(code) - zero;
@@ -106,7 +106,7 @@ impl Prepare {
         saturate(scaled, self.code_bits).0
     }
 
-    /// 2^k frames of codes, one after the other, to one frame of words.
+    /// Calibrates and adds up 2^average frames of codes, given frame after frame; the result is one row-major frame.
     pub fn run(&self, codes: &[i32]) -> Vec<i32> {
         let taxels = codes.len() >> self.average;
         let mut sums = vec![0; taxels];
@@ -116,7 +116,7 @@ impl Prepare {
         sums
     }
 
-    /// Cycles between the input stream and `receive`.
+    /// Latency in cycles between the input stream and `receive`.
     pub fn latency(&self) -> u64 {
         let calibrate = match (&self.zero, &self.gain) {
             (None, None) => 0,

@@ -1,10 +1,10 @@
 //! Quads: the four mirror images of a taxel kept in one memory word.
 //!
 //! A regular rectangle is its own mirror image left to right and top to bottom. Taxel (r, c) of the upper left quarter
-//! and its images (r, C−1−c), (R−1−r, c), (R−1−r, C−1−c) share a word, so that fold and unfold are butterflies at
-//! the memory port. An odd row or column count leaves a middle line whose images coincide: its
-//! sample is written to every coinciding lane, which makes the odd parities vanish there and keeps unfold free of
-//! special cases; [`Quads::lane_mask`] says which lanes to count once.
+//! and its images (r, C−1−c), (R−1−r, c), (R−1−r, C−1−c) share a word, so that fold and unfold are butterflies at the
+//! memory port. With an odd number of rows or columns, the images on the middle line coincide: its sample is written to
+//! every coinciding lane. The odd parities then vanish there and unfold needs no special case; [`Quads::lane_mask`]
+//! says which lanes are distinct taxels.
 
 /// The quad layout of a subarray of `rows` × `cols` taxels.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -15,14 +15,14 @@ pub struct Quads {
     pub cols: usize,
 }
 
-/// Where one taxel lives.
+/// Memory location of one taxel.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct QuadLocation {
     /// Quad address, row-major over the upper left quarter.
     pub address: usize,
-    /// Lane `2·(lower half) + (right half)` the taxel is read from.
+    /// Lane `2·(lower half) + (right half)` from which the taxel is read.
     pub lane: usize,
-    /// Lanes the taxel is written to (bit l = lane l): more than one on a middle line.
+    /// Lanes to which the taxel is written (bit l = lane l): more than one on a middle line.
     pub mask: u8,
 }
 
@@ -37,17 +37,17 @@ impl Quads {
         self.cols.div_ceil(2)
     }
 
-    /// Number of quads Q.
+    /// Number of quads, Q.
     pub fn len(&self) -> usize {
         self.quad_rows() * self.quad_cols()
     }
 
-    /// Whether there are none; a subarray has at least one.
+    /// Whether there are no quads; a subarray has at least one.
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }
 
-    /// Where taxel (`row`, `col`) of the subarray lives.
+    /// Memory location of taxel (`row`, `col`) of the subarray.
     pub fn locate(&self, row: usize, col: usize) -> QuadLocation {
         let (mirror_row, mirror_col) = (self.rows - 1 - row, self.cols - 1 - col);
         let address = row.min(mirror_row) * self.quad_cols() + col.min(mirror_col);
@@ -62,7 +62,7 @@ impl Quads {
         QuadLocation { address, lane, mask }
     }
 
-    /// Taxel index (row-major in the subarray) of `lane` at quad `address`.
+    /// Row-major index in the subarray of the taxel in `lane` of quad `address`.
     pub fn taxel(&self, address: usize, lane: usize) -> usize {
         let (row, col) = (address / self.quad_cols(), address % self.quad_cols());
         let row = if lane & 2 == 0 { row } else { self.rows - 1 - row };
@@ -75,7 +75,7 @@ impl Quads {
         address % self.quad_cols() * self.quad_rows() + address / self.quad_cols()
     }
 
-    /// Which lanes of quad `address` are taxels of their own (bit l = lane l), not a second copy.
+    /// Lanes of quad `address` that are distinct taxels, not copies (bit l = lane l).
     pub fn lane_mask(&self, address: usize) -> u8 {
         let (row, col) = (address / self.quad_cols(), address % self.quad_cols());
         let middle_row = 2 * row + 1 == self.rows;
@@ -88,7 +88,7 @@ impl Quads {
         }
     }
 
-    /// Packs a row-major vector into quads, middle lines duplicated.
+    /// Packs a row-major vector into quads; samples on a middle line are duplicated.
     pub fn pack<T: Copy>(&self, taxels: &[T]) -> Vec<[T; 4]> {
         (0..self.len()).map(|address| std::array::from_fn(|lane| taxels[self.taxel(address, lane)])).collect()
     }

@@ -1,17 +1,17 @@
-//! Stage `receive`: what is known of a subarray when its last taxel has arrived.
+//! Stage `receive`: magnitude and signs of a subarray's codes, gathered until its last taxel has arrived.
 //!
 //! | in | codes, row-major, `input_bits` signed |
 //! |---|---|
 //! | out | the OR of all magnitudes (for [`normalise`](super::normalise)), both sign conditions, the same codes as quads |
 //!
-//! The code of a dead taxel counts as 0, whatever it is: neither magnitude nor signs nor the passes see it.
+//! The code of a dead taxel is replaced by 0, for the magnitude, the signs and the passes.
 //!
-//! Signs are judged against the noise floor in codes: `c > floor`, `c < −floor`, as the golden model does on the
-//! same codes.
+//! Signs are compared with the noise floor in codes: `c > floor`, `c < −floor`, as in the golden model on the same
+//! codes.
 
 use super::arith::magnitude_bits;
 
-/// What `receive` gathers while samples arrive.
+/// Magnitude and signs of a subarray's codes.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Received {
     /// OR over all taxels of [`magnitude_bits`], `input_bits − 1` bits.
@@ -22,12 +22,12 @@ pub struct Received {
     pub negative: bool,
 }
 
-/// The codes of an array without what its `dead` taxels (row-major) read.
+/// The codes of an array with 0 for each of the `dead` taxels (row-major indices).
 pub fn mask_dead(codes: &[i32], dead: &[usize]) -> Vec<i32> {
     codes.iter().enumerate().map(|(taxel, &code)| if dead.contains(&taxel) { 0 } else { code }).collect()
 }
 
-/// Gathers magnitude and signs of one subarray's `codes` against `floor` (codes, ≥ 0).
+/// Magnitude and signs of one subarray's `codes`; the noise floor `floor` is in codes, ≥ 0.
 pub fn receive(codes: &[i32], floor: i32) -> Received {
     codes.iter().fold(Received::default(), |seen, &code| Received {
         magnitude: seen.magnitude | magnitude_bits(i64::from(code)),

@@ -1,16 +1,16 @@
 //! Memories and multipliers of the hardware, counted as the synthesiser counts them.
 //!
-//! Every memory of more than one word is listed by its name in the Verilog, which carries the choice as an attribute:
-//! block RAM, of the board's shape that takes the fewest, or distributed RAM where it has few words. Both counts are
-//! exact; the tests compare them with Yosys.
+//! Every memory of more than one word is listed by its name in the Verilog, where an attribute carries the choice:
+//! block RAM, of the board's shape that takes the fewest, or distributed RAM for few words. Both counts are exact;
+//! tests compare them with Yosys.
 //!
 //! | stage | memory | words × bits |
 //! |---|---|---|
 //! | prepare | zero and gain; sums of several frames | taxels × `code_bits` and 18; taxels × `input_bits` |
 //! | receive | frame buffer of each case, four lanes | subarrays · Q × `input_bits` |
 //! | fold | input of the passes | Q × 4 · `fold_bits` |
-//! | pass | v_ij as operands, but those of the highest degree | so many · Q × 4 · `data_bits` |
-//! | pass | coefficients; list of their columns | words × 18 · lanes; words × address, twice where Ax serves for Ay |
+//! | pass | v_ij as operands, except those of the highest degree | their number · Q × 4 · `data_bits` |
+//! | pass | coefficients; list of their columns | words × 18 · lanes; words × address, twice where Ax is used for Ay |
 //! | rescale | raw v_00 | Q × 4 · `acc_bits` |
 //! | search | polynomials, one memory per coefficient | 3 buffers of Q × 4 · `search_bits` |
 //! | search | the next subarray's, where there are several | Q × 4 · `search_bits` |
@@ -30,27 +30,27 @@ use crate::scene::{ForceOutput, Scene};
 /// [`Memory::block`] of the search memory.
 pub const SEARCH_MEMORY: &str = "search$store";
 
-/// The frame buffers of several cases.
+/// Frame buffers of designs with several cases.
 const BANKS: [&str; 4] =
     ["receive$banks$0$frame", "receive$banks$1$frame", "receive$banks$2$frame", "receive$banks$3$frame"];
 
-/// Buffers that the sweeps of the search write.
+/// Number of polynomial buffers between which the sweeps of the search alternate.
 pub const SEARCH_BUFFERS: usize = 3;
 
 /// A memory of the hardware.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct Memory {
-    /// Its block in the hardware, stages and primitives separated by `$`.
+    /// Path of its block in the hardware, levels separated by `$`.
     pub block: &'static str,
-    /// Its name in that block.
+    /// Its name in the block.
     pub array: String,
-    /// Words.
+    /// Number of words.
     pub words: usize,
-    /// Bits of a word.
+    /// Width of a word in bits.
     pub bits: usize,
-    /// Block RAMs; none for distributed RAM.
+    /// Number of block RAMs; 0 for distributed RAM.
     pub block_rams: usize,
-    /// Single-port RAMs.
+    /// Number of single-port RAMs.
     #[serde(skip_serializing_if = "is_zero")]
     pub large_rams: usize,
 }
@@ -59,36 +59,36 @@ fn is_zero(count: &usize) -> bool {
     *count == 0
 }
 
-/// What a design needs of its device.
+/// Memories and multipliers that a design needs.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct Resources {
     /// Every memory, in pipeline order.
     pub memories: Vec<Memory>,
-    /// Multipliers of each block that has some.
+    /// Multipliers of each block that can have some: (block, count).
     pub multipliers: Vec<(&'static str, usize)>,
 }
 
-/// Bits of a count below `limit`, at least one.
+/// Width in bits of a count below `limit`, at least one.
 pub fn count_bits(limit: usize) -> usize {
     bit_length(limit.saturating_sub(1) as u64).max(1) as usize
 }
 
-/// Bits of a position of the search: three grid steps and a candidate beyond, after all halvings.
+/// Width in bits of a search position: three grid steps and one candidate beyond, after all halvings.
 pub fn position_bits() -> usize {
     signed_bits(4 << HALVINGS) as usize
 }
 
-/// The v_ij that later passes read: all but those of the highest degree.
+/// Number of v_ij that later passes read: all but those of the highest degree.
 pub fn operand_vectors(degree: usize) -> usize {
     degree.checked_sub(1).map_or(0, vectors)
 }
 
 impl Resources {
-    /// What a scene's cases need on `board`, the whole array's first where there are several; memories of at most
-    /// `shallow` words go into distributed RAM.
+    /// The resources of a scene's cases on `board`; where there are several, the whole array's is the first. Memories
+    /// of at most `shallow` words go into distributed RAM.
     pub fn new(cases: &[LaidOut], scene: &Scene, board: &Board, shallow: usize) -> Self {
         let f = &cases[0].formats;
-        // What all cases share is as large as the largest asks for; the coefficients add up.
+        // Shared memories are sized for the largest case; the coefficients of all cases add up.
         let quads = f.quads;
         let words = cases.iter().map(|case| case.storage.words()).sum();
         let listed = cases.iter().any(|case| case.storage.listed);
@@ -149,22 +149,22 @@ impl Resources {
         Resources { memories, multipliers }
     }
 
-    /// Block RAMs of all memories.
+    /// Number of block RAMs of all memories.
     pub fn block_rams(&self) -> usize {
         self.memories.iter().map(|memory| memory.block_rams).sum()
     }
 
-    /// Single-port RAMs of all memories.
+    /// Number of single-port RAMs of all memories.
     pub fn large_rams(&self) -> usize {
         self.memories.iter().map(|memory| memory.large_rams).sum()
     }
 
-    /// Multipliers of all blocks.
+    /// Number of multipliers of all blocks.
     pub fn multipliers(&self) -> usize {
         self.multipliers.iter().map(|(_, count)| count).sum()
     }
 
-    /// What there is too little of: name, needed, there.
+    /// Resources the board lacks: (name, required, available).
     pub fn shortages(&self, board: &Board) -> Vec<(&'static str, usize, usize)> {
         let all = [
             ("block RAMs", self.block_rams(), board.block_rams as usize),
@@ -174,13 +174,13 @@ impl Resources {
         all.into_iter().filter(|(_, needs, has)| needs > has).collect()
     }
 
-    /// Whether `board` has the block RAMs and one more, in which the link counts its packets.
+    /// Whether `board` has the block RAMs and one more, for the packet counters of the link.
     pub fn fits(&self, board: &Board) -> bool {
         self.block_rams() < board.block_rams as usize
     }
 }
 
-/// Multipliers of the resultants: X fz⁺ and Y fz⁺.
+/// Number of multipliers of the resultants: X fz⁺ and Y fz⁺.
 pub fn resultant_multipliers(scene: &Scene, board: &Board) -> usize {
     match scene.output.forces {
         ForceOutput::Taxels => 0,
@@ -188,13 +188,13 @@ pub fn resultant_multipliers(scene: &Scene, board: &Board) -> usize {
     }
 }
 
-/// Multipliers of the force unit: μ1 and μ2 from their positions, and both times p; none without a search.
+/// Number of multipliers of the force unit: μ1 and μ2 from their positions, and both times p; none without a search.
 pub fn force_multipliers(formats: &Formats, board: &Board) -> usize {
     if formats.degree == 0 {
         return 0;
     }
     let step = signed_bits(formats.mu_step.unsigned_abs());
-    // A step that is a power of two is wiring.
+    // A multiplication by a power of two is wiring.
     let words = if formats.mu_step.count_ones() == 1 { 0 } else { board.multipliers_for(position_bits() as u32, step) };
     2 * words + 2 * board.multipliers_for(formats.search_bits[0], MULTIPLIER_BITS)
 }

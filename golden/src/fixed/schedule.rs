@@ -1,9 +1,9 @@
 //! The order of the matrix passes: which product feeds which v_ij.
 //!
-//! v_00 = Cz⁺ b comes first, in limbs; then v_ij = −(Ax v_{i−1,j} + Ay v_{i,j−1}) by rising degree, so that every operand
-//! is as old as it can be when it is needed. One accumulator per result: it takes all products of a v_ij
-//! before it is rounded once. A matrix without the mirror symmetry takes a product for each of its parity flips in the
-//! place of one. Hardware and bit-true model read the same list.
+//! v_00 = Cz⁺ b comes first, in limbs; then v_ij = −(Ax v_{i−1,j} + Ay v_{i,j−1}) by rising degree, so that every
+//! operand is finished as early as possible before it is needed. All products of a v_ij are added up in one
+//! accumulator, which is rounded once. A matrix without the mirror symmetry has one product for each of its parity
+//! flips. Hardware and bit-true model read the same list.
 
 use serde::Serialize;
 
@@ -19,7 +19,7 @@ pub fn vectors(degree: usize) -> usize {
     (degree + 1) * (degree + 2) / 2
 }
 
-/// What a matrix in the coefficient memory is.
+/// Contents of a matrix in the coefficient memory.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Kind {
     /// High limb of Cz⁺.
@@ -32,29 +32,29 @@ pub enum Kind {
     Ay,
 }
 
-/// A matrix in the coefficient memory: the blocks that flip the parity in one way.
+/// A matrix in the coefficient memory: the blocks of one parity flip.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Matrix {
-    /// What it is.
+    /// What the matrix contains.
     pub kind: Kind,
     /// Source parity = target parity XOR `flip`.
     pub flip: usize,
 }
 
-/// The parity flips of each matrix, the one of its mirror symmetry first: others are there only where the symmetry
-/// is broken.
+/// The parity flips of each matrix; that of its mirror symmetry is the first, others exist only where the symmetry is
+/// broken.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct Flips {
-    /// Of Cz⁺.
+    /// Flips of Cz⁺.
     pub inverse: Vec<usize>,
-    /// Of Ax.
+    /// Flips of Ax.
     pub ax: Vec<usize>,
-    /// Of Ay.
+    /// Flips of Ay.
     pub ay: Vec<usize>,
 }
 
 impl Flips {
-    /// Those of an array of which every taxel is read.
+    /// The flips of an array without dead taxels.
     pub fn symmetric() -> Flips {
         Flips { inverse: vec![0], ax: vec![FLIP_X], ay: vec![FLIP_Y] }
     }
@@ -79,13 +79,13 @@ pub enum Operand {
 /// One matrix-vector product.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Product {
-    /// What to multiply with.
+    /// The matrix.
     pub matrix: Matrix,
-    /// What to multiply.
+    /// The vector.
     pub operand: Operand,
-    /// Whether the product of two high limbs is aligned by `formats.limb_align` bits to the left.
+    /// Whether the product, one of two high limbs, is shifted left by `formats.limb_align` bits.
     pub align: bool,
-    /// The operand is transposed, and so is the result: x and y exchanged.
+    /// Whether operand and result have x and y exchanged.
     pub transposed: bool,
 }
 
@@ -95,8 +95,8 @@ pub fn schedule(formats: &Formats) -> Vec<Vec<Product>> {
     products(formats.degree, limbs, formats.shared_a, &formats.flips)
 }
 
-/// The same from its ingredients: the degree, whether input and Cz⁺ have a low limb, whether Ax serves for Ay, the
-/// matrices' flips.
+/// The products for a polynomial of `degree`; `limbs`: whether the input and Cz⁺ have a low limb; `shared_a`: whether
+/// Ax is used for Ay; `flips` of the matrices.
 pub fn products(degree: usize, limbs: (bool, bool), shared_a: bool, flips: &Flips) -> Vec<Vec<Product>> {
     let of = |kind, flips: &[usize], operand, align, transposed| -> Vec<Product> {
         let product = |&flip| Product { matrix: Matrix { kind, flip }, operand, align, transposed };
@@ -127,7 +127,7 @@ pub fn products(degree: usize, limbs: (bool, bool), shared_a: bool, flips: &Flip
     all
 }
 
-/// Whether the v_ij of these products comes out with x and y exchanged.
+/// Whether the result of these products has x and y exchanged.
 pub fn is_transposed(products: &[Product]) -> bool {
     products.iter().any(|product| product.transposed)
 }

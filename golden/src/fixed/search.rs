@@ -1,15 +1,15 @@
 //! Stage `search`: the (μ1, μ2) that maximise the sparse objective, without a multiplier.
 //!
-//! Grid coordinates count μ in thirds of mu_max, so the coarse grid is the integers of the disc x² + y² ≤ 9. The polynomial
-//! `p(x, y) = Σ w_ij x^i y^j` of every taxel is kept about a moving centre: a step of ±1 is a Taylor shift (additions only), a
-//! halving of the step divides w_ij by 2^(i+j), floored. One sweep over the taxels shifts, evaluates the nine candidates of the 3×3 about
-//! the new centre and adds up
+//! Grid coordinates count μ in thirds of mu_max, so the coarse grid is the integers of the disc x² + y² ≤ 9. The
+//! polynomial `p(x, y) = Σ w_ij x^i y^j` of every taxel is kept about a moving centre: a step of ±1 is a Taylor shift
+//! (additions only), halving the step divides w_ij by 2^(i+j), floored. One sweep over the taxels shifts, evaluates the
+//! nine candidates of the 3×3 about the new centre and adds up
 //! ```text
 //! score = Σ_taxels log2(|p| + ⌊Σp / 2^20⌋) − n log2 Σp        (−Π; the smallest wins)
 //! ```
-//! with Σp from the sum of the polynomials, shifted alongside. Eight sweeps walk the coarse tiles that cover the disc, seven
-//! halve the step. A candidate outside the disc or with Σp ≤ 0 is never taken. Ties: in the
-//! coarse grid the first in row-major order, in a halving the centre, then row-major order.
+//! with Σp from the sum of the polynomials, shifted alongside. Eight sweeps visit the coarse tiles that cover the disc,
+//! seven halve the step. Candidates outside the disc or with Σp ≤ 0 are never chosen. Of candidates with equal scores,
+//! the coarse grid chooses the first in row-major order, a halving the centre, then the first in row-major order.
 
 use std::sync::OnceLock;
 
@@ -21,10 +21,10 @@ use super::schedule::EXPONENTS;
 /// Centres of the coarse tiles: each a diagonal step from the one before, all 29 points of the disc within reach of ±1.
 pub const COARSE_CENTRES: [[i32; 2]; 8] = [[1, 1], [0, 2], [-1, 1], [-2, 0], [-1, -1], [0, -2], [1, -1], [2, 0]];
 
-/// Coefficients of one taxel's polynomial, in order of [`EXPONENTS`]; those beyond the degree are zero.
+/// Coefficients of one taxel's polynomial in LSBs, in the order of [`EXPONENTS`]; those beyond the degree are zero.
 pub type Polynomial = [i64; 10];
 
-/// The nine candidates about a centre, row-major: index `3·(y + 1) + (x + 1)`.
+/// Index of the centre among the nine candidates, which are row-major: `3·(y + 1) + (x + 1)`.
 pub const CENTRE: usize = 4;
 
 /// The best candidate so far.
@@ -32,36 +32,36 @@ pub const CENTRE: usize = 4;
 pub struct Best {
     /// Position in grid steps of the sweep's level, from μ = 0.
     pub position: [i32; 2],
-    /// Score, in 2^−`LOG_FRACTION`.
+    /// Score in LSBs of 2^−`LOG_FRACTION` bit.
     pub score: i64,
-    /// Whether a candidate has been taken, in the coarse grid or at this level.
+    /// Whether a candidate has been chosen, in the coarse grid or at this level.
     pub taken: bool,
 }
 
-/// Outcome of the search in one subarray.
+/// Result of the search in one subarray.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct SearchResult {
-    /// The state after each sweep; none when the search was skipped.
+    /// The best candidate after each sweep; empty if the search was skipped.
     pub sweeps: Vec<Best>,
     /// μ* in units of mu_max / (3·2^7).
     pub position: [i32; 2],
-    /// Score of the winner, `None` when nothing was searched or nothing could be taken.
+    /// Score at μ*, `None` if the search was skipped or no candidate was admissible.
     pub score: Option<i64>,
-    /// p(μ*) per quad.
+    /// p(μ*) of each quad, in search LSBs.
     pub values: Vec<[i64; 4]>,
 }
 
 /// The polynomials of a subarray about one centre.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Block {
-    /// Per quad and lane.
+    /// One polynomial per quad and lane.
     pub taxels: Vec<[Polynomial; 4]>,
-    /// Their sum, each taxel counted once.
+    /// Sum of the polynomials, each taxel counted once.
     pub sum: Polynomial,
 }
 
 impl Block {
-    /// Collects the polynomials of a subarray and sums them.
+    /// Sums the polynomials of a subarray; μ = 0 is their centre.
     pub fn new(layout: Quads, taxels: Vec<[Polynomial; 4]>) -> Self {
         let mut sum = [0; 10];
         for (address, quad) in taxels.iter().enumerate() {
@@ -74,7 +74,7 @@ impl Block {
         Block { taxels, sum }
     }
 
-    /// Moves the centre by `by` (each −1, 0 or 1), then halves the step if asked.
+    /// Moves the centre by `by` (each −1, 0 or 1), then halves the grid step if `halving`.
     fn step(&mut self, by: [i32; 2], halving: bool) {
         for w in self.taxels.iter_mut().flatten().chain([&mut self.sum]) {
             *w = taylor_shift(w, i64::from(by[0]), i64::from(by[1]));
@@ -104,7 +104,7 @@ impl Block {
 }
 
 /// log2 of `x` with [`LOG_FRACTION`] fraction bits: the position of the leading one, and a table over the next
-/// [`LOG_TABLE_BITS`] bits, each entry the logarithm at its cell's middle. 0 counts as 1.
+/// [`LOG_TABLE_BITS`] bits whose entries are the logarithms at the middle of their cells. 0 counts as 1.
 pub fn log2(x: i64) -> i64 {
     let x = x.max(1);
     let length = bit_length(x as u64);
@@ -113,7 +113,7 @@ pub fn log2(x: i64) -> i64 {
     (i64::from(length - 1) << LOG_FRACTION) + log_table()[cell]
 }
 
-/// The logarithm's table: `round(2^F log2(1 + (m + 1/2) / 2^T))`.
+/// Table of the logarithm: `round(2^F log2(1 + (m + 1/2) / 2^T))`.
 pub fn log_table() -> &'static [i64] {
     static TABLE: OnceLock<Vec<i64>> = OnceLock::new();
     TABLE.get_or_init(|| {
@@ -123,7 +123,7 @@ pub fn log_table() -> &'static [i64] {
     })
 }
 
-/// Moves the centre by (`dx`, `dy`), each −1, 0 or 1: exact, in additions.
+/// The polynomial about a centre moved by (`dx`, `dy`), each −1, 0 or 1: exact, additions only.
 pub fn taylor_shift(w: &Polynomial, dx: i64, dy: i64) -> Polynomial {
     let along = |c: [i64; 4], d: i64| {
         [c[0] + d * c[1] + d * d * c[2] + d * c[3], c[1] + 2 * d * c[2] + 3 * d * d * c[3], c[2] + 3 * d * c[3], c[3]]
@@ -139,12 +139,12 @@ pub fn taylor_shift(w: &Polynomial, dx: i64, dy: i64) -> Polynomial {
     [w00, w10, w01, w20, w11, w02, w30, w21, w12, w03]
 }
 
-/// Halves the grid step: w_ij / 2^(i+j), floored.
+/// The polynomial for half the grid step: w_ij / 2^(i+j), floored.
 pub fn halve(w: &Polynomial) -> Polynomial {
     std::array::from_fn(|k| w[k] >> (EXPONENTS[k].0 + EXPONENTS[k].1))
 }
 
-/// p at the nine candidates about the centre.
+/// p at the nine candidates about the centre, row-major.
 pub fn candidates(w: &Polynomial) -> [i64; 9] {
     let [w00, w10, w01, w20, w11, w02, w30, w21, w12, w03] = *w;
     std::array::from_fn(|k| {
@@ -162,7 +162,7 @@ pub fn in_disc(p: [i32; 2], level: u32) -> bool {
     i64::from(p[0]).pow(2) + i64::from(p[1]).pow(2) <= radius * radius
 }
 
-/// Searches `start`, whose centre is μ = 0; with `enabled` false p(0) is passed on.
+/// Searches for μ* from `start`, whose centre is μ = 0; without `enabled` only p(0) is returned.
 pub fn search(layout: Quads, start: Block, enabled: bool) -> SearchResult {
     let mut best = Best::default();
     let mut kept = start.clone();
@@ -205,10 +205,10 @@ fn difference(to: [i32; 2], from: [i32; 2]) -> [i32; 2] {
     [to[0] - from[0], to[1] - from[1]]
 }
 
-/// Takes the best of the nine candidates about `centre` if it beats `best`; tells whether it did.
+/// Replaces `best` by the best of the nine candidates about `centre` if that is better; returns whether it did.
 fn take(best: &mut Best, scores: [Option<i64>; 9], centre: [i32; 2], level: u32, coarse: bool) -> bool {
     let mut changed = false;
-    // A halving looks at its centre before the others: the incumbent wins ties.
+    // After a halving the centre is compared first, so that it wins ties.
     let order = if coarse { [0, 1, 2, 3, 4, 5, 6, 7, 8] } else { [4, 0, 1, 2, 3, 5, 6, 7, 8] };
     for k in order {
         let position = [centre[0] + k % 3 - 1, centre[1] + k / 3 - 1];
@@ -272,7 +272,8 @@ mod tests {
             }
         }
 
-        /// Halving floors each of the nine non-constant terms: p at ±1 about the centre is off by at most nine LSBs from p at ±1/2.
+        /// Halving floors each of the nine non-constant terms: p at ±1 about the centre differs by at most nine LSBs
+        /// from p at ±1/2.
         #[test]
         fn halving_is_within_its_guard(w in prop::array::uniform10(-(1i64 << 24)..(1i64 << 24)), x in -1i64..=1, y in -1i64..=1) {
             let exact: f64 = (0..10)

@@ -1,8 +1,8 @@
-//! Stage `send`: what follows the forces on the output stream.
+//! Stage `send`: forces, then status, on the output stream.
 //!
-//! Forces leave row-major over the array, one beat per taxel, `{fz, fy, fx}`; then [`STATUS_BEATS`] beats for each
-//! subarray of the case taken, row-major. Saturations of `force`, the contact flag and the cycles are the frame's and
-//! the same in all of them:
+//! Forces are sent row-major over the array, one beat per taxel, `{fz, fy, fx}`; then [`STATUS_BEATS`] beats for each
+//! subarray of the chosen case, row-major. Saturations of `force`, the contact flag and the cycles are those of the
+//! whole frame, the same for every subarray:
 //!
 //! | beat | fx word | fy word | fz word |
 //! |---|---|---|---|
@@ -12,43 +12,43 @@
 
 use serde::Serialize;
 
-/// Status beats after the forces.
+/// Status beats per subarray after the forces.
 pub const STATUS_BEATS: usize = 3;
 
 /// Flag bit: the centroid condition of the scene is met.
 pub const FLAG_CONDITION: u32 = 1;
 /// Flag bit: the search found a candidate with Σp > 0.
 pub const FLAG_FOUND: u32 = 1 << 1;
-/// Flag bit: no taxel's force reaches the threshold, or all are zero.
+/// Flag bit: no taxel's |fz| reaches the threshold, or all are zero.
 pub const FLAG_NO_CONTACT: u32 = 1 << 2;
-/// Flag bit: `tlast` came early or was missing since the last frame sent; the frame it cut short was dropped.
+/// Flag bit: since the last frame sent, `tlast` came early or was missing and the frame concerned was dropped.
 pub const FLAG_FRAMING: u32 = 1 << 3;
-/// Flag bit: the coefficient memory does not hold what it must; of a scene with
-/// `hardware.coefficient_check = "signature"` ([`super::check`]).
+/// Flag bit: the coefficient memory does not hold the generated coefficients; only with `hardware.coefficient_check =
+/// "signature"` ([`super::check`]).
 pub const FLAG_COEFFICIENTS: u32 = 1 << 4;
-/// Place of the paper's case number, 2 bits, among the flags; 0 where a scene has one case.
+/// Position of the paper's case number, 2 bits, among the flags; 0 where a scene has one case.
 pub const CASE_SHIFT: u32 = 8;
 
-/// The decoded status of a frame.
+/// The decoded status of a subarray in one frame.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct Status {
     /// μ* in units of mu_max / 384.
     pub position: [i32; 2],
-    /// OR of the `FLAG_*` bits; of a scene of several cases, the paper's number of the one taken from [`CASE_SHIFT`]
+    /// OR of the `FLAG_*` bits; with several cases, also the paper's number of the chosen case from bit [`CASE_SHIFT`]
     /// on.
     pub flags: u32,
-    /// Score of the winner, 0 without one.
+    /// Score at μ* in LSBs of 2^−6 bit, 0 if the search found nothing.
     pub score: i32,
     /// Right shift of `rescale`.
     pub rescale: u32,
     /// Left shift of `normalise`.
     pub normalise: u32,
-    /// Words saturated in `rescale`.
+    /// Number of words saturated in `rescale`.
     pub rescale_saturations: u32,
-    /// Force words saturated.
+    /// Number of force words saturated.
     pub force_saturations: u32,
-    /// Cycles to the first output beat: from the frame's last beat into `receive`, or, for a frame that waited in the buffer, from the
-    /// cycle before it was begun.
+    /// Cycles to the first output beat, from the frame's last beat into `receive`; for a frame that waited in the
+    /// buffer, from the cycle before its computation started.
     pub cycles: u32,
 }
 
@@ -62,7 +62,7 @@ impl Status {
         ]
     }
 
-    /// Reads a status back; `None` when the number of beats is wrong.
+    /// The status from its beats; `None` unless there are [`STATUS_BEATS`] of them.
     pub fn of_beats(beats: &[[i32; 3]]) -> Option<Self> {
         let &[[x, y, flags], [score, rescale, normalise], [rescale_saturations, force_saturations, cycles]] = beats
         else {

@@ -1,7 +1,8 @@
-//! The serial schedule: the same stages and the same arithmetic on four lanes, one taxel after the other.
+//! The serial engine: the same stages and arithmetic on four lanes, one taxel after the other.
 //!
-//! For devices of a few thousand logic cells ([`EngineKind::Serial`](crate::board::EngineKind)). The bit-true model is the one
-//! of the parallel engine; what differs is here: memories, multipliers and cycles. At 8×8 and degree 3 on an iCE40UP5K:
+//! For devices of a few thousand logic cells ([`EngineKind::Serial`](crate::board::EngineKind)). The bit-true model is
+//! that of the parallel engine; this file has what differs: memories, multipliers and cycles. At 8×8 and degree 3 on an
+//! iCE40UP5K:
 //!
 //! | part | how | cycles |
 //! |---|---|---:|
@@ -11,8 +12,8 @@
 //! | search | 16 cycles per polynomial and sweep: two Horner chains, nine candidates, one logarithm | 17 500 |
 //! | force, send | one multiplier, the same shifter: 10 cycles per beat | 680 |
 //!
-//! The polynomials lie in two single-port memories. A sweep reads one and writes the other, so that neither needs a second
-//! port; the polynomial about the best centre stays in a region of its own until a better one is found.
+//! The polynomials are stored in two single-port memories. A sweep reads one and writes the other, so neither needs a
+//! second port; the polynomial about the best centre stays in its own region until a better one is found.
 
 use super::cycles::Cycles;
 use super::formats::{Formats, LaidOut, Quantised, EPSILON_SHIFT, HALVINGS};
@@ -25,57 +26,57 @@ use super::send::STATUS_BEATS;
 use super::storage::Storage;
 use crate::board::Board;
 
-/// Cycles per polynomial and sweep: one for each v_ij with i, j ≤ 3, those beyond the degree included.
+/// Cycles per polynomial and sweep: one for each (i, j) with i, j ≤ 3, also beyond the degree.
 pub const SLOT: u64 = 16;
-/// From one quad into the butterfly to the next: four in, four out.
+/// Cycles from one quad into the butterfly to the next: four words in, four out.
 pub const QUAD: u64 = 8;
-/// After each part of the passes, until its last word has been written.
+/// Cycles after each part of the passes until its last word is written.
 pub const DRAIN: u64 = 16;
 /// Cycles between two rows, in which the four accumulators are read.
 pub const ROW_GAP: u64 = 4;
-/// A sweep beyond its slots: memories, chains, candidates, score.
+/// Latency of a sweep beyond its slots: memories, Horner chains, candidates, score.
 pub const SWEEP_TAIL: u64 = 33;
-/// Nine candidates are judged, one every two cycles, in five cycles each.
+/// Cycles to select the best of nine candidates: one starts every two cycles and takes five.
 pub const SELECTION: u64 = 2 * 8 + 5;
 /// Cycles per beat on the output.
 pub const BEAT: u64 = 10;
-/// Cycles to the first beat.
+/// Cycles from the μ words to the first output beat.
 pub const FIRST_BEAT: u64 = 13;
-/// Cycles for both μ words.
+/// Cycles to compute both μ words.
 pub const MU_WORDS: u64 = 8;
-/// Delay of the second Horner chain's reads against the first's.
+/// Cycles by which the second Horner chain reads later than the first.
 pub const TRANSPOSE: u64 = 18;
-/// Width of a factor of p(μ*): a μ word, or one.
+/// Width of the factor by which p(μ*) is multiplied, a μ word or one, in bits.
 pub const FACTOR_BITS: u32 = 19;
-/// Width of an operand that one multiplier takes.
+/// Operand width of the multipliers in bits.
 pub const OPERAND_BITS: u32 = 16;
 
-/// Width of a polynomial's coefficient in memory: taxels and their sum share it.
+/// Width of a polynomial's coefficient in memory in bits; the taxels and their sum have the same.
 pub fn word_bits(formats: &Formats) -> usize {
     formats.sum_bits.iter().copied().max().unwrap_or(1) as usize
 }
 
-/// Width of ⌊Σp / 2^20⌋, at least one.
+/// Width of ⌊Σp / 2^20⌋ in bits, at least one.
 pub fn floor_bits(formats: &Formats) -> usize {
     word_bits(formats).saturating_sub(EPSILON_SHIFT as usize).max(1)
 }
 
-/// Polynomials of a sweep: the taxels' and their sum.
+/// Number of polynomials of a sweep: one per taxel and their sum.
 pub fn polynomials(formats: &Formats) -> usize {
     4 * formats.quads + 1
 }
 
-/// Width of a product of the force stage's factors.
+/// Width of a product in the force stage in bits.
 pub fn product_bits(formats: &Formats) -> usize {
     (formats.search_bits[0] + FACTOR_BITS) as usize
 }
 
-/// Vectors in the operand memory: the limbs of the input first, then the v_ij.
+/// Index of v_00 in the operand memory: the limbs of the input stand before it.
 pub fn first_vector(formats: &Formats) -> usize {
     1 + usize::from(formats.input_low_bits > 0)
 }
 
-/// Place of an operand in the operand memory.
+/// Index of an operand in the operand memory.
 pub fn operand_index(formats: &Formats, operand: Operand) -> usize {
     match operand {
         Operand::InputHigh => 0,
@@ -84,10 +85,11 @@ pub fn operand_index(formats: &Formats, operand: Operand) -> usize {
     }
 }
 
-/// Matrices whose coefficients fill an operand, in order of storage; the low limb of Cz⁺ has a narrower memory.
+/// Matrices with full-width operands, in order of storage; the low limb of Cz⁺ has a narrower memory.
 pub const WIDE: [Kind; 3] = [Kind::InverseHigh, Kind::Ax, Kind::Ay];
 
-/// Four coefficients per word, one of each parity; word (row, column) of a matrix at row·2^b + column, b bits of a quad's address.
+/// The words of a matrix, four coefficients each, one per parity; word (row, column) is at row·2^b + column, b the
+/// width of a quad's address.
 pub fn coefficients(formats: &Formats, quantised: &Quantised, kind: Kind) -> Vec<[i64; 4]> {
     let side = 1 << count_bits(formats.quads);
     let blocks = match kind {
@@ -95,7 +97,7 @@ pub fn coefficients(formats: &Formats, quantised: &Quantised, kind: Kind) -> Vec
         Kind::Ax => &quantised.ax,
         Kind::Ay => &quantised.ay,
     };
-    // No taxel is dead here: the one flip is that of the mirror symmetry.
+    // The serial engine has no dead taxels: the only flip is that of the mirror symmetry.
     let own = &blocks.flips[0].parity;
     let word = |at: usize| {
         let (i, j) = (at / side, at % side);
@@ -111,7 +113,7 @@ pub fn coefficients(formats: &Formats, quantised: &Quantised, kind: Kind) -> Vec
     (0..side * side).map(word).collect()
 }
 
-/// The layout and resources of the serial engine: every column kept, one row at a time.
+/// Layout and resources of the serial engine: every column is kept, one row is computed at a time.
 pub(super) fn fit(
     formats: &Formats,
     order: &[Matrix],
@@ -140,7 +142,7 @@ fn resources(f: &Formats, board: &Board) -> Resources {
         large_rams: board.large_rams_for(words, bits),
         ..memory(block, array, words, bits)
     };
-    // Each stands twice: for the lane of its own parity, and for that of the other parities.
+    // Each is stored twice: for the lane of its own parity and for that of the flipped parity.
     let operands = 2 << (count_bits(first_vector(f) + operand_vectors(f.degree)) + count_bits(f.quads));
     let bank = 2 << (count_bits(polynomials(f)) + 4);
     let mut memories = vec![
@@ -164,7 +166,7 @@ fn resources(f: &Formats, board: &Board) -> Resources {
     Resources { memories, multipliers }
 }
 
-/// The serial engine's cycles for a frame that is `searched` or not.
+/// Cycle counts of the serial engine for a frame whose subarray is `searched` or not.
 pub(super) fn cycles(model: &Model, searched: bool) -> Cycles {
     let formats = &model.formats;
     let quads = formats.quads as u64;
@@ -180,20 +182,20 @@ pub(super) fn cycles(model: &Model, searched: bool) -> Cycles {
     Cycles { first_output, latency, total: model.scene.sensor.taxels() as u64 + latency, interval: BEAT }
 }
 
-/// From the first product to the end of the last v_ij.
+/// Cycles from the first product to the end of the last v_ij.
 fn passes(model: &Model) -> u64 {
     let quads = model.formats.quads as u64;
     let row = |products: &Vec<Product>| quads * (products.len() as u64 * quads + ROW_GAP);
-    // The replay of v_00 between the passes; a drain after v_00, after its replay, after the last v_ij.
+    // v_00 is replayed between the passes; there is a drain after v_00, after its replay and after the last v_ij.
     schedule(&model.formats).iter().map(row).sum::<u64>() + quads * QUAD + 3 * DRAIN
 }
 
-/// Share of the cycles of the passes in which the lanes multiply.
+/// Fraction of the cycles of the passes in which the lanes multiply; 0 to 1.
 pub(super) fn lane_utilisation(model: &Model) -> f64 {
     let quads = model.formats.quads as u64;
     let products: usize = schedule(&model.formats).iter().map(Vec::len).sum();
     (products as u64 * quads * quads) as f64 / passes(model) as f64
 }
 
-/// From the last input beat to the first quad, and from the last value to the forces.
+/// Cycles from the last input beat to the first quad, and from the last value to the forces.
 const START: u64 = 2;

@@ -1,38 +1,38 @@
-//! The coefficient memory: which columns of which matrix are kept for which group of rows, and in what order.
+//! The coefficient memory: which columns of which matrix are kept for each group of rows, and in which order.
 //!
-//! A lane holds one row of each group. Far from the diagonal the coefficients of a whole group fall below what matters, so a
-//! column is left out for a group when all its coefficients are below 2^−`prune_bits`: of the largest coefficient of
-//! Cz⁺, and of one for the scaled A (whose entries act on v_ij of the size of v_00). What is left out is zero in
-//! the bit-true model as well; a kept column keeps all its bits. Small arrays keep every column.
+//! A lane holds one row of each group. Far from the diagonal the coefficients of a whole group are negligible, so a
+//! column is left out (pruned) for a group if all its coefficients are below 2^−`prune_bits`: of the largest
+//! coefficient for Cz⁺, of one for the scaled A, whose entries multiply v_ij of the size of v_00. Pruned coefficients
+//! are zero in the bit-true model as well; a kept column keeps all its bits. Small arrays keep every column.
 //!
-//! On a square subarray of square pitch, Ay is Ax with x and y exchanged. At degree 1, where no v_ij adds both, Ay is not stored:
-//! v_01 is Ax's pass over the transposed v_00, and comes out transposed.
+//! On a square subarray of square pitch, Ay is Ax with x and y exchanged. At degree 1, where no v_ij adds both, Ay is
+//! not stored: v_01 is the Ax pass over the transposed v_00, and the result is transposed.
 
 use super::coefficients::Flipped;
 use super::formats::{Formats, Quantised, MULTIPLIER_BITS};
 use super::pass::coefficient;
 use super::schedule::{Kind, Matrix, Product};
 
-/// The kept columns, per matrix in order of storage and per group of rows.
+/// The kept columns, per matrix in storage order and per group of rows.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Storage {
-    /// The stored matrices.
+    /// The stored matrices, in storage order.
     pub matrices: Vec<Matrix>,
     /// `columns[matrix][group]`: kept columns, ascending.
     pub columns: Vec<Vec<Vec<usize>>>,
-    /// First word in the memory, which several cases share.
+    /// Address of the case's first word; several cases share one memory.
     pub base: usize,
-    /// A list of columns stands beside the coefficients: some are left out, in this case or another, or some are read
+    /// Whether the memory has a list of columns: columns are pruned, in this case or another, or some are read
     /// transposed.
     pub listed: bool,
 }
 
-/// Rows of one group: which of them a lane has.
+/// Row indices of one group.
 fn rows(group: usize, per_parity: usize, quads: usize) -> std::ops::Range<usize> {
     group * per_parity..((group + 1) * per_parity).min(quads)
 }
 
-/// Matrices in the order in which a schedule first needs them.
+/// The matrices of a schedule in the order of their first use.
 pub fn storage_order(schedule: &[Vec<Product>]) -> Vec<Matrix> {
     let mut order = Vec::new();
     for product in schedule.iter().flatten() {
@@ -44,8 +44,8 @@ pub fn storage_order(schedule: &[Vec<Product>]) -> Vec<Matrix> {
 }
 
 impl Storage {
-    /// Chooses the columns for `per_parity` lanes per parity; of each matrix, coefficients below so many LSBs count as
-    /// nothing.
+    /// Chooses the kept columns for `per_parity` lanes per parity; `limits` has for each matrix the size in LSBs below
+    /// which coefficients are negligible.
     pub fn new(limits: Vec<(Matrix, i64)>, quantised: &Quantised, quads: usize, per_parity: usize) -> Self {
         let kept = |matrix, limit, group| {
             let blocks = blocks(quantised, matrix);
@@ -55,7 +55,7 @@ impl Storage {
                     .iter()
                     .any(|block| rows(group, per_parity, quads).any(|i| block[i * quads + j].abs() >= limit))
             };
-            // A group of which nothing matters still needs a column to accumulate zeros.
+            // A group without kept columns still needs one, to accumulate zeros.
             let columns: Vec<usize> = (0..quads).filter(matters).collect();
             if columns.is_empty() {
                 vec![0]
@@ -70,7 +70,7 @@ impl Storage {
         Storage { matrices, columns, base: 0, listed: false }
     }
 
-    /// Puts the cases of a scene into one memory, one behind the other, with a list of columns where one needs it.
+    /// Puts the cases of a scene into one memory, one after the other, with a list of columns if one of them needs it.
     pub fn share<'a>(cases: impl Iterator<Item = (&'a mut Storage, Formats)>) {
         let mut cases: Vec<(&mut Storage, Formats)> = cases.collect();
         let listed = cases.iter().any(|(storage, formats)| formats.shared_a || storage.is_pruned(formats.quads));
@@ -81,12 +81,12 @@ impl Storage {
         }
     }
 
-    /// The kept columns of a stored matrix for a group of rows.
+    /// The kept columns of a matrix for a group of rows, ascending.
     pub fn columns_of(&self, matrix: Matrix, group: usize) -> &[usize] {
         self.matrices.iter().position(|&m| m == matrix).map_or(&[], |index| &self.columns[index][group])
     }
 
-    /// Address of the first word of (matrix, group); the words follow by column.
+    /// Address of the first word of (matrix, group); one word per kept column follows.
     pub fn address_of(&self, matrix: Matrix, group: usize) -> usize {
         let mut address = self.base;
         for (index, groups) in self.columns.iter().enumerate() {
@@ -100,22 +100,22 @@ impl Storage {
         address
     }
 
-    /// Words of the case.
+    /// Number of words of the case.
     pub fn words(&self) -> usize {
         self.columns.iter().flatten().map(Vec::len).sum()
     }
 
-    /// Whether any column was left out.
+    /// Whether any column was pruned; `quads` is the number of columns of a matrix.
     pub fn is_pruned(&self, quads: usize) -> bool {
         self.columns.iter().flatten().any(|columns| columns.len() < quads)
     }
 
-    /// The columns of the case's words, one after the other.
+    /// The column of each word of the case.
     pub fn column_list(&self) -> Vec<usize> {
         self.columns.iter().flatten().flatten().copied().collect()
     }
 
-    /// Zeroes what the memory does not hold, so that the model multiplies with what the hardware has.
+    /// Sets the pruned coefficients to zero, so that the model multiplies by what the memory holds.
     pub fn zero_pruned(&self, quantised: &mut Quantised, quads: usize, per_parity: usize) {
         for (index, &matrix) in self.matrices.iter().enumerate() {
             for (group, kept) in self.columns[index].iter().enumerate() {
@@ -130,7 +130,7 @@ impl Storage {
         }
     }
 
-    /// The case's words: one coefficient per lane, lane `parity·lanes_per_parity + k` for row
+    /// The words of the case: one coefficient per lane, lane `parity·lanes_per_parity + k` for row
     /// `group·lanes_per_parity + k`; rows past the last are zero.
     pub fn memory(&self, formats: &Formats, quantised: &Quantised) -> Vec<Vec<i64>> {
         let lanes = formats.lanes_per_parity;
@@ -154,10 +154,10 @@ impl Storage {
     }
 }
 
-/// The blocks a stored matrix is made of; both limbs of Cz⁺ keep the same columns.
+/// The blocks of a stored matrix; both limbs of Cz⁺ keep the same columns.
 ///
 /// # Panics
-/// When the matrix has no such flip: schedules list those it has.
+/// If the matrix has no such flip; a schedule lists only flips that exist.
 pub fn blocks(quantised: &Quantised, matrix: Matrix) -> &Flipped<i64> {
     let blocks = match matrix.kind {
         Kind::InverseHigh | Kind::InverseLow => &quantised.inverse,
@@ -176,7 +176,7 @@ fn blocks_mut(quantised: &mut Quantised, matrix: Matrix) -> Option<&mut Flipped<
     blocks.flips.iter_mut().find(|own| own.flip == matrix.flip)
 }
 
-/// Bits of the coefficient memory's words.
+/// Width of a word of the coefficient memory in bits.
 pub fn word_bits(formats: &Formats) -> usize {
     4 * formats.lanes_per_parity * MULTIPLIER_BITS as usize
 }

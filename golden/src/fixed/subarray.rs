@@ -1,4 +1,4 @@
-//! One subarray through the stages between frame buffer and force memory.
+//! One subarray: the stages from frame buffer to force memory.
 
 use super::formats::force_shift;
 use super::model::Model;
@@ -9,36 +9,36 @@ use super::search::{search, Block, SearchResult};
 use super::{fold, force, normalise, receive, rescale, unfold};
 use crate::scene::Condition;
 
-/// A vector of quads that a stage passed on.
+/// The quads that a stage passes on.
 type QuadStream = Vec<[i64; 4]>;
 
-/// What became of a subarray, and what each stage passed on.
+/// The result for a subarray and the words that each stage passed on.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct SubarrayTrace {
-    /// The scene's condition is met.
+    /// Whether the scene's condition is met.
     pub condition: bool,
     /// Left shift of `normalise`.
     pub normalise: u32,
     /// Right shift of `rescale`.
     pub rescale: u32,
-    /// Words that `rescale` saturated.
+    /// Number of words that `rescale` saturated.
     pub saturations: u32,
-    /// The search's outcome, with p(μ*).
+    /// Result of the search, with p(μ*).
     pub found: SearchResult,
-    /// Stream of `normalise`.
+    /// Output of `normalise`.
     pub normalised: QuadStream,
-    /// Stream of `fold`.
+    /// Output of `fold`.
     pub folded: QuadStream,
-    /// Stream of `pass`.
+    /// Output of `pass`.
     pub passed: QuadStream,
-    /// Stream of `rescale`.
+    /// Output of `rescale`.
     pub rescaled: QuadStream,
-    /// Stream of `unfold`.
+    /// Output of `unfold`.
     pub unfolded: QuadStream,
 }
 
 impl SubarrayTrace {
-    /// Solves the subarray with these `codes`, row-major in it.
+    /// Computes the subarray with these `codes`, row-major in it.
     pub fn new(model: &Model, codes: &[i32]) -> Self {
         let formats = &model.formats;
         let layout = model.layout();
@@ -62,7 +62,7 @@ impl SubarrayTrace {
             let (words, clipped) = rescale::rescale(formats, &accumulators, shift);
             saturations += clipped;
             operands.vectors.push(rescale::operand(formats, &words));
-            // A transposed result goes back on the way to the search memory.
+            // A transposed result is transposed back on its way to the search memory.
             let transposed = is_transposed(products);
             let mut taxels = unfold::unfold(&words, EXPONENTS[k].0 + EXPONENTS[k].1);
             if transposed {
@@ -94,7 +94,7 @@ impl SubarrayTrace {
         }
     }
 
-    /// The subarray's forces, row-major in it.
+    /// Forces of the subarray's taxels, row-major in it.
     pub fn forces(&self, model: &Model) -> Vec<force::Force> {
         let formats = &model.formats;
         let mu = self.found.position.map(|x| force::mu_word(formats, x));
