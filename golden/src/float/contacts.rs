@@ -1,4 +1,4 @@
-//! Contacts: one μ for each contact instead of one for each rectangle.
+//! Contacts: one μ per contact instead of one per rectangle.
 //!
 //! With μ constant on each region, m the μ of each taxel, the stress is met exactly when
 //!
@@ -6,33 +6,32 @@
 //! p = p₀ − Ax(m1∘p) − Ay(m2∘p)
 //! ```
 //!
-//! with the same matrices as for one μ. Region k in turn, M its mask, the others as they are:
+//! with the same matrices as for one μ. For each region k in turn, M its mask, the other regions held constant:
 //!
 //! ```text
 //! v_00 = p₀ − Ax((1−M)∘m1∘p) − Ay((1−M)∘m2∘p)      v_ij = −(Ax(M∘v_{i−1,j}) + Ay(M∘v_{i,j−1}))
 //! ```
 //!
-//! and μ_k is what `search` finds for this family. A sweep visits all regions; it is repeated until no μ moves by more
-//! than 1/400 of mu_max, at most [`SWEEPS`] times. Then neighbours whose μ came out alike are joined, and the regions
-//! are drawn again from the better p, until neither changes them.
+//! and μ_k is what `search` finds for this family. A sweep visits all regions; sweeps are repeated until no μ moves by
+//! more than 1/400 of mu_max, at most [`SWEEPS`] times. Then neighbouring regions with nearly equal μ are joined, and
+//! the regions are segmented anew from the better p, until neither changes them.
 //!
-//! All this is done once for each width of smoothing in `segment`: contacts that touch need a narrow one, rings a wide
-//! one. Of the results, one μ for all among them, the one whose p scores best over the whole array is taken, less a
-//! charge for each region beyond the first.
+//! All this is done for each width of smoothing in `segment`: contacts that touch need a narrow one, rings a wide one.
+//! Of the results, and the solution with one μ for all, the one whose p has the best score over the whole array is
+//! taken, less a penalty for each region beyond the first.
 //!
-//! Cells larger than the depth smear a contact's rim, which shifts μ, and what one contact is off by is taken for shear
-//! of its neighbours. Where elliptic contacts explain the stress (the misfit is what noise and quadrature leave, as in
-//! `auto`) they are free of both: `objective::multi_ellipse` fits them together, from regions of several widths, before
-//! anything is searched; each contact's μ, load and cells are its ellipse's. Where they do not, the regions of the
-//! nearest ellipses are one more drawing to search in.
-//!
+//! Cells larger than the depth smear a contact's rim, which shifts μ, and an error of one contact appears as shear of
+//! its neighbours. Fitted ellipses have neither error. Where elliptic contacts explain the stress (the misfit is no
+//! larger than noise and quadrature cause, as in `auto`), `objective::multi_ellipse` fits them together, from regions
+//! of several widths, before anything is searched; each contact's μ, load and cells are then those of its ellipse.
+//! Where they do not, the regions of the nearest ellipses are one more segmentation to search in.
 //! | | shape | unit |
 //! |---|---|---|
 //! | in: family of one μ and its μ | polynomial, 2 | N, – |
 //! | in: stress and noise, for the fit | n, scalar | MPa |
 //! | out: p, regions, μ of each | n, n, count × 2 | N, –, – |
 //!
-//! With one region it is the plain method, to the bit.
+//! With one region the result is that of one μ for the whole array, to the bit.
 
 mod ellipses;
 
@@ -44,71 +43,71 @@ use super::segment::{neighbours, segment, Segments, WIDTH};
 use crate::frame::Forces;
 use crate::matrices::{FoldedMatrices, Matrices};
 
-/// Most sweeps over one set of regions.
+/// Maximum number of sweeps over one set of regions.
 pub const SWEEPS: usize = 6;
-/// Most times regions are drawn.
+/// Maximum number of segmentations.
 pub const ROUNDS: usize = 4;
-/// Movement of μ that counts as none, and distance of two μ that are one, over mu_max.
+/// Convergence tolerance of μ, and distance below which two μ are joined, both in units of mu_max.
 const MU_TOLERANCE: f64 = 1.0 / 400.0;
 const MU_MERGE_DISTANCE: f64 = 0.05;
-/// Widths of smoothing tried, over h.
+/// Widths of smoothing that are tried, in units of h.
 const WIDTHS: [f64; 2] = [WIDTH, 0.6];
-/// What a further region must add to the score, in bits.
+/// Score in bits that each further region must add.
 const REGION_COST: f64 = 5.0;
-/// Change of p that counts as none, relative to its largest entry.
+/// Convergence tolerance of p, relative to its largest entry.
 const P_TOLERANCE: f64 = 1e-9;
-/// Most relaxations of p for given μ; each takes the error down by r or better.
+/// Maximum number of iterations of p for given μ; each reduces the error by the factor r or better.
 const RELAXATIONS: usize = 60;
 
-/// What was found for the contacts of one frame.
+/// The contacts found in one frame.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Contacts {
     /// Region of each taxel.
     pub segments: Segments,
-    /// What the last search in each region found, `None` where it was not searched or found nothing.
+    /// Result of the last search in each region, `None` where it was not searched or no candidate was admissible.
     pub found: Vec<Option<SearchResult>>,
-    /// Normal forces in N.
+    /// Normal force on each taxel in N, row-major.
     pub p: Vec<f64>,
-    /// Sweeps over all regions.
+    /// Number of sweeps over all regions.
     pub sweeps: usize,
     /// Whether the last sweep moved no μ and the regions stayed.
     pub converged: bool,
 }
 
-/// A frame as ellipses see it.
+/// The stress to which ellipses are fitted.
 #[derive(Clone, Copy)]
 pub(crate) struct MeasuredStress<'a> {
-    /// Where it was read.
+    /// Positions of the taxels.
     pub taxels: &'a Taxels,
-    /// b in MPa.
+    /// b in MPa, row-major.
     pub b: &'a [f64],
-    /// Its noise.
+    /// Standard deviation of the noise on b in MPa.
     pub noise_MPa: f64,
 }
 
-/// The solver of one frame.
+/// The contact solver for one frame.
 pub struct Solver<'a> {
     /// The array's matrices.
     pub matrices: &'a Matrices,
     /// Largest |μ|.
     pub mu_max: f64,
-    /// What a search maximises.
+    /// The objective of the searches.
     pub objective: &'a dyn Objective,
     /// p₀ = Cz⁺ b in N.
     pub p0: &'a [f64],
-    /// What ellipses are fitted to, where every taxel is read.
+    /// The stress to fit ellipses to; `None` where a taxel is dead or no shear is wanted.
     pub(crate) stress: Option<MeasuredStress<'a>>,
-    /// Whether the region of these labels with this number is to be searched.
+    /// Whether region `k` of these segments is to be searched.
     pub searched: &'a dyn Fn(&Segments, usize) -> bool,
 }
 
 impl Contacts {
-    /// Ratio of shear to normal force of a region.
+    /// Ratio of shear to normal force of a region, [x, y]; 0 where it was not searched.
     pub fn mu(&self, region: usize) -> [f64; 2] {
         mu_of(&self.found[region])
     }
 
-    /// The forces of all regions in N.
+    /// The force on each taxel in N, from p and the μ of its region.
     pub fn forces(&self) -> Forces {
         let along = |axis: usize| {
             self.p.iter().zip(&self.segments.labels).map(|(p, &region)| self.mu(region)[axis] * p).collect()
@@ -122,7 +121,7 @@ fn mu_of(found: &Option<SearchResult>) -> [f64; 2] {
 }
 
 impl Solver<'_> {
-    /// Finds the contacts, starting from the family of one μ and what was found in it.
+    /// Finds the contacts, starting from the polynomial of one μ for the whole array and the result of its search.
     pub fn solve(&self, family: &Polynomial, found: SearchResult) -> Contacts {
         let p = family.eval(found.mu);
         let segments = Segments::whole(p.len());
@@ -146,14 +145,14 @@ impl Solver<'_> {
             keep(self.solve_regions(&|_| segments.clone(), &start));
         }
         let best = best.1;
-        // As many ellipses as were fitted already come to the same.
+        // A fit that starts from as many ellipses as the first one would find the same.
         if fit.is_some_and(|fit| fit.patches.len() == best.segments.count) || best.segments.count == 1 {
             return best;
         }
         self.fit(&best).and_then(|fit| self.from_ellipses(&fit, &best)).unwrap_or(best)
     }
 
-    /// Solves for regions drawn from p, again and again as p gets better.
+    /// Solves for the regions of `draw(p)`, drawn anew from each better p.
     fn solve_regions(&self, draw: &dyn Fn(&[f64]) -> Segments, start: &Contacts) -> Contacts {
         let mut state = self.with_regions(start, draw(&start.p));
         if state.segments.count == 1 {
@@ -181,7 +180,7 @@ impl Solver<'_> {
         state
     }
 
-    /// New regions, each with the μ that its strongest taxel had.
+    /// The state with new regions, each with the μ that its strongest taxel had.
     fn with_regions(&self, state: &Contacts, segments: Segments) -> Contacts {
         let strongest = |region: usize| {
             let own = (0..state.p.len()).filter(|&k| segments.labels[k] == region);
@@ -218,7 +217,7 @@ impl Solver<'_> {
         }
     }
 
-    /// The family of one region, the others held.
+    /// The polynomial of one region's μ, the other regions held constant.
     fn family(&self, state: &Contacts, region: usize) -> Polynomial {
         let inside = |k: usize| state.segments.labels[k] == region;
         let other_mu: Vec<[f64; 2]> =
@@ -247,7 +246,7 @@ impl Solver<'_> {
         Polynomial { degree, coefficients }
     }
 
-    /// p₀ − Ax(m1∘p) − Ay(m2∘p)
+    /// One iteration p₀ − Ax(m1∘p) − Ay(m2∘p); `mu` is m, per taxel.
     fn iterate(&self, p: &[f64], mu: &[[f64; 2]]) -> Vec<f64> {
         let FoldedMatrices { basis, ax, ay, .. } = &self.matrices.folded;
         let mut next = vec![0.0; p.len()];
@@ -260,7 +259,7 @@ impl Solver<'_> {
         next
     }
 
-    /// Iterates p = p₀ − Ax(m1∘p) − Ay(m2∘p) for the state's μ until it stands still.
+    /// Iterates p = p₀ − Ax(m1∘p) − Ay(m2∘p) for the state's μ until it converges.
     fn relax(&self, state: &mut Contacts) {
         let mu: Vec<[f64; 2]> = state.segments.labels.iter().map(|&region| state.mu(region)).collect();
         for _ in 0..RELAXATIONS {
@@ -274,7 +273,7 @@ impl Solver<'_> {
         }
     }
 
-    /// Two neighbours whose μ came out alike.
+    /// The pair of neighbouring regions with the most similar μ, if it is within [`MU_MERGE_DISTANCE`].
     fn similar_pair(&self, state: &Contacts) -> Option<(usize, usize)> {
         let labels = &state.segments.labels;
         let sensor = &self.matrices.sensor;

@@ -1,6 +1,6 @@
 //! Force: from p and μ to one force vector per taxel, without those too small to report.
 //!
-//! fx = μ1 p, fy = μ2 p, fz = p; where |fz| < min_force all three are zero. A subarray whose largest |fz| is below
+//! fx = μ1 p, fy = μ2 p, fz = p; where |fz| < min_force all three are zero. A subarray whose |fz| are all below
 //! min_force, or zero, has no contact.
 //!
 //! | | shape | unit |
@@ -12,13 +12,14 @@
 
 use crate::frame::Forces;
 
-/// Forces of one subarray, row-major in it.
+/// Forces in N of one subarray, row-major in it, from normal forces `p` in N and `mu`; those with |fz| < `min_force_N`
+/// are zero.
 pub fn force(p: &[f64], mu: [f64; 2], min_force_N: f64) -> Forces {
     let along = |mu: f64| p.iter().map(|p| mu * p).collect();
     threshold(Forces { fx: along(mu[0]), fy: along(mu[1]), fz: p.to_vec() }, min_force_N)
 }
 
-/// Takes away the forces too small to report.
+/// Sets the forces on taxels with |fz| < `min_force_N` to zero.
 pub fn threshold(mut forces: Forces, min_force_N: f64) -> Forces {
     for k in 0..forces.fz.len() {
         if forces.fz[k].abs() < min_force_N {

@@ -1,4 +1,4 @@
-//! The floating-point golden model, stage by stage; the stages carry the hardware's names.
+//! The floating-point golden model, one file per stage; stages have the names of the hardware's.
 //!
 //! | stage | in | out |
 //! |---|---|---|
@@ -8,11 +8,11 @@
 //! | [`search`] | v_ij, objective | μ |
 //! | [`force`] | p(μ), μ | fx, fy, fz |
 //!
-//! With `partition.case = "contacts"` two more: [`segment`] draws a region for each contact, [`contacts`] finds
-//! their μ.
+//! With `partition.case = "contacts"` there are two more: [`segment`] assigns a region to each contact, [`contacts`]
+//! finds the μ of each region.
 //! With `search.form = "orthogonal"` the forces come from [`orthogonal`], Eq. 1 as printed.
 //!
-//! The hardware's `normalise`, `fold` and `unfold` change no value here: floating point carries its exponent along, and
+//! The hardware's `normalise`, `fold` and `unfold` have no counterpart here: floating point has its own exponents, and
 //! folding is an exact change of basis.
 
 pub mod contacts;

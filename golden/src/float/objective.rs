@@ -1,19 +1,19 @@
-//! Objective: how much a candidate p looks like real contact forces, and how its best μ is found.
+//! Objective: a score for how much a candidate p looks like real contact forces, and the search for the best μ.
 //!
 //! | name | Π, maximised | right for |
 //! |---|---|---|
-//! | [`Sparse`] | −Σ log2(ε + \|p_i\|/Σp): force on few taxels, nothing elsewhere | any shape, next to no noise |
+//! | [`Sparse`] | −Σ log2(ε + \|p_i\|/Σp): force on few taxels | any shape, hardly any noise |
 //! | [`Compressive`] | −Σ min(p, 0)²/(Σp)²: the paper's constraint i) alone | a baseline |
-//! | [`Symmetric`] | pressure symmetric about its centre | noise, shapes that are symmetric |
+//! | [`Symmetric`] | pressure symmetric about its centre | noise, symmetric shapes |
 //! | [`Patch`] | likelihood of one elliptic contact | noise, one contact per subarray |
-//! | [`Auto`] | chosen by frame and noise floor | – |
+//! | [`Auto`] | one of the above, chosen by frame and noise floor | – |
 //!
 //! | | shape | unit | range |
 //! |---|---|---|---|
 //! | in: p | n | N | finite |
 //! | out: Π | scalar | bits | at most −n log2 ε; none where Σp ≤ 0 |
 //!
-//! Any scale of p gives the same score. Used by `search`.
+//! The score does not depend on the scale of p. Used by `search`.
 
 mod auto;
 mod compressive;
@@ -38,20 +38,20 @@ use super::search::search;
 use crate::scene::{Medium, ObjectiveKind};
 use crate::sensor::Sensor;
 
-/// A measure of candidates; the search takes the largest.
+/// A score for candidates; the search takes the largest.
 pub trait Objective {
-    /// Score of the forces p in N, `None` when Σp is not above zero: such forces pull.
+    /// Score of the normal forces `p` in N; `None` unless Σp is above zero and finite.
     fn score(&self, p: &[f64]) -> Option<f64>;
 
-    /// The best μ of a subarray, `None` when no candidate presses: the shared search over the scores, unless the
-    /// objective has a way of its own.
+    /// The best μ of a subarray, `None` if no candidate has a score. By default the shared search over the scores; an
+    /// objective may have its own method.
     fn find(&self, input: &SearchInput) -> Option<Estimate> {
         let found = search(input.family, input.mu_max, &ByScore(self))?;
         Some(Estimate { found, load_N: None })
     }
 }
 
-/// An objective of which only the scores are used.
+/// Wraps an objective of unknown size for the search, which uses only its scores.
 struct ByScore<'a, T: ?Sized>(&'a T);
 
 impl<T: Objective + ?Sized> Objective for ByScore<'_, T> {
@@ -64,7 +64,7 @@ impl<T: Objective + ?Sized> Objective for ByScore<'_, T> {
     }
 }
 
-/// The objective of a scene for subarrays shaped like `sensor` under a medium.
+/// The objective of `kind` for subarrays of the shape of `sensor` under `medium`.
 pub fn of_kind(kind: ObjectiveKind, sensor: &Sensor, medium: Medium) -> Box<dyn Objective + Send + Sync> {
     match kind {
         ObjectiveKind::Sparse => Box::new(Sparse::default()),
@@ -75,17 +75,18 @@ pub fn of_kind(kind: ObjectiveKind, sensor: &Sensor, medium: Medium) -> Box<dyn 
     }
 }
 
-/// ε of the floating-point model. Nine of ten of 400 fresh frames of sensor 1 (`dermis table sensor-1 --case 0 --fresh
-/// 400`) are found to 8 % with 2⁻¹⁷, 6 % with 2⁻¹⁹, 5 % with 2⁻²⁰; from there on partial slip is found worse. The
-/// integers of the hardware resolve 2⁻¹⁷.
+/// ε of the floating-point model. Of 400 fresh frames of sensor 1 (`dermis table sensor-1 --case 0 --fresh 400`) nine
+/// of ten have an error of at most 8 % with 2⁻¹⁷, 6 % with 2⁻¹⁹, 5 % with 2⁻²⁰; with a smaller ε frames of partial slip
+/// become worse. The integers of the hardware resolve 2⁻¹⁷.
 pub const EPSILON: f64 = 1.0 / (1 << 19) as f64;
-/// Values multiplied before a logarithm is taken. With ε = 2⁻¹⁹ a product of 8 is at least 2⁻¹⁵², far from underflow.
+/// Number of values multiplied before a logarithm is taken. With ε = 2⁻¹⁹ a product of 8 is at least 2⁻¹⁵², far from
+/// underflow.
 const CHUNK: usize = 8;
 
-/// The default objective.
+/// The default objective: force on few taxels.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Sparse {
-    /// Share of Σp below which a force counts as none, above 0.
+    /// Fraction of Σp below which a force counts as none, above 0.
     pub epsilon: f64,
 }
 
@@ -103,7 +104,8 @@ impl Objective for Sparse {
         }
         let share = |p: &f64| self.epsilon + p.abs() / sum;
         let logs = p.chunks(CHUNK).map(|chunk| {
-            // log2 of the product is the sum of the logs; where the product leaves the normal range, the logs are.
+            // The logarithm of the product is the sum of the logarithms; outside the normal range these are taken one
+            // by one.
             let product: f64 = chunk.iter().map(share).product();
             if product.is_normal() {
                 product.log2()

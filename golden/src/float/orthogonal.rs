@@ -6,17 +6,16 @@
 //! x = C†b + (I − C†C) w          w(μ) = (μ1 p, μ2 p, p)
 //! ```
 //!
-//! with C† the Moore–Penrose inverse. With p the family's at μ, C w = b, so that x = w: this form and the oblique one
-//! (p = Cz⁺ b and its series in μ) are the same. With the series cut off at a degree, C w misses b by the terms left
-//! out; then x is the point nearest to w that meets b, and ‖x − w‖/‖w‖ is the truncation.
-//!
+//! with C† the Moore–Penrose inverse. If p is that of the exact series at μ, then C w = b and x = w: this form and the
+//! oblique one (p = Cz⁺ b and its series in μ) are the same. With the series cut off at a degree, C w misses b by the
+//! remainder; x is then the point nearest to w with C x = b, and ‖x − w‖/‖w‖ is the truncation error.
 //! | | shape | unit |
 //! |---|---|---|
 //! | in: b | n ≤ [`MAX_TAXELS`] | MPa |
 //! | in: w | 3 × n | N |
 //! | out: x | 3 × n | N |
 //!
-//! 3n² + 9n² products for one x, against n²/4 for one of the series' terms: kept to check against, not for speed.
+//! 3n² + 9n² multiplications for one x, against n²/4 for one term of the series: for verification, not for speed.
 
 use crate::folded::accumulate;
 use crate::frame::Forces;
@@ -25,7 +24,7 @@ use crate::sensor::Sensor;
 use faer::Mat;
 use thiserror::Error;
 
-/// Most taxels of a subarray: I − C†C of 24 × 24 taxels takes 24 MB.
+/// Maximum taxels of a subarray: I − C†C of 24 × 24 taxels takes 24 MB.
 pub const MAX_TAXELS: usize = 576;
 
 /// The matrices of Eq. 1.
@@ -37,26 +36,26 @@ pub struct Orthogonal {
     pub projector: Mat<f64>,
 }
 
-/// A subarray without the literal form.
+/// A subarray for which Eq. 1 cannot be set up as printed.
 #[derive(Clone, Debug, PartialEq, Error)]
 pub enum OrthogonalError {
-    /// More taxels than memory is meant for.
+    /// More than [`MAX_TAXELS`] taxels.
     #[error("search.form = orthogonal: a subarray of {taxels} taxels ({sensor}) is too large: at most {MAX_TAXELS}")]
     TooLarge {
-        /// The subarray.
+        /// The subarray as a sensor.
         sensor: Box<Sensor>,
-        /// Its size.
+        /// Its number of taxels.
         taxels: usize,
     },
-    /// The singular values did not converge.
+    /// The singular value decomposition did not converge.
     #[error("{sensor}: no singular values of C found")]
     NotConverged {
-        /// The subarray.
+        /// The subarray as a sensor.
         sensor: Box<Sensor>,
     },
 }
 
-/// C = [Cx Cy Cz], in MPa/N.
+/// C = [Cx Cy Cz], n × 3n, in MPa/N.
 pub fn influence(matrices: &Matrices) -> Mat<f64> {
     let Matrices { cx, cy, cz, .. } = matrices;
     let n = cz.nrows();
@@ -64,7 +63,7 @@ pub fn influence(matrices: &Matrices) -> Mat<f64> {
 }
 
 impl Orthogonal {
-    /// Computes C† from the singular values of C by the rule that Cz⁺ was made with.
+    /// Computes C† from the singular values of C, inverted by the same rule as for Cz⁺.
     ///
     /// # Errors
     /// [`OrthogonalError`]; the size is checked before anything is allocated.
@@ -85,7 +84,7 @@ impl Orthogonal {
         Ok(Orthogonal { pinv, projector })
     }
 
-    /// x = C†b + (I − C†C) w.
+    /// x = C†b + (I − C†C) w in N, for stress `b` in MPa and forces `w` in N.
     pub fn apply(&self, b: &[f64], w: &Forces) -> Forces {
         let n = b.len();
         let joined: Vec<f64> = [&w.fx, &w.fy, &w.fz].into_iter().flatten().copied().collect();
@@ -97,7 +96,7 @@ impl Orthogonal {
     }
 }
 
-/// ‖x − w‖/‖w‖, 0 where both are zero.
+/// Truncation error ‖x − w‖/‖w‖, a fraction; 0 where both are equal.
 pub fn truncation(x: &Forces, w: &Forces) -> f64 {
     let pairs = [(&x.fx, &w.fx), (&x.fy, &w.fy), (&x.fz, &w.fz)];
     let (mut off, mut size) = (0.0, 0.0);
@@ -120,7 +119,7 @@ mod tests {
     use crate::frame::Frame;
     use crate::scene::Scene;
 
-    /// Agreement of both forms that is asked for; rounding and condition leave 1e-13.
+    /// Required agreement of both forms; rounding and condition cause 1e-13.
     const AGREE: f64 = 1e-9;
     /// Rounding of products over 1200 terms with an inverse of condition 20: 1200 · 20 · 2⁻⁵² = 5e-12.
     const ROUNDING: f64 = 5e-12;
@@ -146,7 +145,7 @@ mod tests {
             let ratio = matrices.spectral_radius * mu[0].hypot(mu[1]) / 0.6;
             let bound = ratio.powi(matrices.degree as i32 + 1) / (1.0 - ratio) + AGREE;
             assert!(truncation(&x, &w) <= bound, "{sensor}, {mu:?}: {:e} {bound:e}", truncation(&x, &w));
-            // Whatever w, x meets the stress.
+            // For any w, C x = b.
             let mut rest: Vec<f64> = b.iter().map(|b| -b).collect();
             for (c, f) in [(&matrices.cx, &x.fx), (&matrices.cy, &x.fy), (&matrices.cz, &x.fz)] {
                 accumulate(c, f, 1.0, &mut rest);
@@ -178,7 +177,7 @@ mod tests {
             assert!(near(&(&right * &pinv), &pinv));
             assert!(near(&left.transpose().to_owned(), &left));
             assert!(near(&right.transpose().to_owned(), &right));
-            // I − C†C projects, onto what C does not see.
+            // I − C†C is a projection, onto the null space of C.
             assert!(near(&(&projector * &projector), &projector));
             assert!((&c * &projector).norm_max() <= ROUNDING * c.norm_max());
         }

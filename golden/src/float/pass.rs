@@ -1,4 +1,4 @@
-//! Pass: the matrix products, from stress to the consistent family p(μ).
+//! Pass: the matrix products, from stress to the consistent family p(μ), a polynomial in μ.
 //!
 //! (Cz + μ1 Cx + μ2 Cy) p = b, solved as a series p(μ) = Σ v_ij μ1^i μ2^j, i + j ≤ d:
 //!
@@ -11,8 +11,8 @@
 //! | in: b | n | MPa |
 //! | out: v_ij | (d + 1)(d + 2)/2 of n | N |
 //!
-//! 1 + d(d + 1) products, of n²/4 in the basis of mirror parities ([`crate::folded`]). The remainder of the series is of
-//! the order r^(d+1) ([`crate::matrices`]). Feeds `search` and `force`.
+//! 1 + d(d + 1) matrix-vector products of n²/4 multiplications in the basis of mirror parities ([`crate::folded`]). The
+//! remainder of the series is of the order r^(d+1) ([`crate::matrices`]). Feeds `search` and `force`.
 
 #[cfg(test)]
 mod tests;
@@ -21,28 +21,28 @@ use crate::matrices::{FoldedMatrices, Matrices};
 use faer::linalg::solvers::Solve;
 use faer::{Col, ColRef, Mat};
 
-/// The family p(μ) of one subarray and frame.
+/// The polynomial p(μ) of one subarray in one frame.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Polynomial {
     /// Largest i + j.
     pub degree: usize,
-    /// v_ij, row-major in the subarray, by rising i + j and within it by rising j: 00, 10, 01, 20, 11, 02, …
+    /// v_ij in N, each row-major in the subarray; sorted by rising i + j, then rising j: 00, 10, 01, 20, 11, 02, …
     pub coefficients: Vec<Vec<f64>>,
 }
 
-/// Place of v_ij in [`Polynomial::coefficients`].
+/// Index of v_ij in [`Polynomial::coefficients`].
 pub fn term_index(i: usize, j: usize) -> usize {
     let order = i + j;
     order * (order + 1) / 2 + j
 }
 
 impl Polynomial {
-    /// The family for stress `b` in MPa, of the matrices' degree.
+    /// The polynomial for stress `b` in MPa, row-major, of the matrices' degree.
     pub fn new(matrices: &Matrices, b: &[f64]) -> Polynomial {
         Polynomial::of_degree(matrices, b, matrices.degree)
     }
 
-    /// The family cut off at a degree; 0 is p₀ alone, for a subarray that is not searched.
+    /// The polynomial of a given degree; degree 0 is p₀ alone, for a subarray that is not searched.
     pub fn of_degree(matrices: &Matrices, b: &[f64], degree: usize) -> Polynomial {
         let FoldedMatrices { basis, cz_pinv, ax, ay } = &matrices.folded;
         let n = b.len();
@@ -66,7 +66,7 @@ impl Polynomial {
         Polynomial { degree, coefficients }
     }
 
-    /// v_ij, i + j up to the degree.
+    /// v_ij in N, row-major; i + j must not exceed the degree.
     pub fn v(&self, i: usize, j: usize) -> &[f64] {
         &self.coefficients[term_index(i, j)]
     }
@@ -78,7 +78,7 @@ impl Polynomial {
         p
     }
 
-    /// p(μ) in N, into a vector of n.
+    /// Writes p(μ) in N to `p`, which has n entries.
     pub fn eval_into(&self, mu: [f64; 2], p: &mut [f64]) {
         p.copy_from_slice(&self.coefficients[0]);
         // Powers of μ of one order: μ1^order, μ1^(order−1) μ2, …, μ2^order.
@@ -94,7 +94,8 @@ impl Polynomial {
     }
 }
 
-/// p(μ) without series, from (Cz + μ1 Cx + μ2 Cy) p = b by LU with row exchanges: n³/3 products, for checking.
+/// p(μ) in N without the series, from (Cz + μ1 Cx + μ2 Cy) p = b by LU decomposition with row exchanges: n³/3
+/// multiplications, for verification.
 pub fn solve_direct(matrices: &Matrices, b: &[f64], mu: [f64; 2]) -> Vec<f64> {
     let Matrices { cx, cy, cz, .. } = matrices;
     let sum = Mat::from_fn(cz.nrows(), cz.ncols(), |i, j| cz[(i, j)] + mu[0] * cx[(i, j)] + mu[1] * cy[(i, j)]);

@@ -1,4 +1,4 @@
-//! Receive: is a subarray loaded, does it meet the scene's condition, where are its centroids?
+//! Receive: whether a subarray is loaded and meets the scene's condition, and the centroids of compression and tension.
 //!
 //! c⁺ = Σ b⁺ r / Σ b⁺ over the codes above the noise floor, c⁻ = Σ b⁻ r / Σ b⁻ over those below its negative.
 //!
@@ -8,29 +8,29 @@
 //! | in: floor | scalar | LSB | at least 0; a code counts when strictly beyond it |
 //! | out: centroids | 2 | mm from the array's centre | inside the subarray |
 //!
-//! Judged on codes, in whole numbers, so that all models decide alike: positions count half pitches, sums stay below
-//! 2^23 · 2304 · 255 < 2^43. Feeds `search`, which runs only where the condition is met.
+//! Decided on codes, in integers, so that all models decide alike: positions count half pitches, sums stay below 2^23 ·
+//! 2304 · 255 < 2^43. Feeds `search`, which runs only where the condition is met.
 
 use crate::partition::Subarray;
 use crate::scene::Condition;
 use crate::sensor::Sensor;
 
-/// What is known of a subarray when its last code has arrived.
+/// Sign, condition and centroids of one subarray's codes.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Received {
-    /// Largest |code|.
+    /// Largest |code| in LSBs.
     pub max_code: i32,
     /// Some code is above the floor.
     pub positive: bool,
     /// Some code is below the floor's negative.
     pub negative: bool,
-    /// Centroid of the codes above the floor.
+    /// Centroid of the codes above the floor in mm from the array's centre; `None` if there are none.
     pub compression_centroid_mm: Option<[f64; 2]>,
-    /// Centroid of the codes below the floor's negative.
+    /// Centroid of the codes below the floor's negative in mm from the array's centre; `None` if there are none.
     pub tension_centroid_mm: Option<[f64; 2]>,
-    /// The scene's condition is met: μ is to be searched.
+    /// Whether the scene's condition for a search is met.
     pub condition_met: bool,
-    /// The largest |code| is beyond the floor.
+    /// Whether the largest |code| is beyond the floor.
     pub loaded: bool,
 }
 
@@ -50,7 +50,7 @@ impl Moments {
     }
 }
 
-/// Judges the codes of the subarray `part` of `sensor`.
+/// Evaluates the codes of subarray `part` of `sensor`; `floor` is the noise floor in codes, ≥ 0.
 pub fn receive(sensor: &Sensor, part: &Subarray, codes: &[i32], floor: i32, condition: Condition) -> Received {
     let (mut compression, mut tension) = (Moments::default(), Moments::default());
     let mut max_code = 0;

@@ -1,16 +1,15 @@
-//! Search: the μ whose forces score best, on a grid that is refined seven times.
+//! Search: the μ with the best score, on a grid that is refined seven times.
 //!
 //! Grid: μ = (i, j)·mu_max/3 with i, j in −3 … 3 and i² + j² ≤ 9, 29 candidates, row by row with μ2 the row, both
-//! rising. Then seven times: halve the step, try the eight neighbours of the best so far in the same order. A candidate
-//! takes the place of the best only by a larger score, so that the first found wins ties.
-//!
+//! rising. Then seven times: halve the step and try the eight neighbours of the best candidate in the same order. Only
+//! a larger score replaces the best candidate, so the first of equal candidates wins.
 //! | | shape | unit | range |
 //! |---|---|---|---|
 //! | in: p(μ) | polynomial | N | – |
 //! | out: position | 2 | mu_max/384 | x² + y² ≤ 384² |
 //! | out: μ | 2 | – | |μ| ≤ mu_max |
 //!
-//! Positions are whole numbers, so that every model judges the disc alike. At most 29 + 7·8 = 85 evaluations.
+//! Positions are integers, so that every model has the same disc. At most 29 + 7·8 = 85 evaluations.
 
 use super::objective::Objective;
 use super::pass::Polynomial;
@@ -29,13 +28,13 @@ pub struct SearchResult {
     pub mu: [f64; 2],
     /// μ in units of mu_max/[`RADIUS`].
     pub position: [i32; 2],
-    /// Its score.
+    /// Its score, in the units of the objective.
     pub objective: f64,
-    /// Candidates on the disc that were evaluated.
+    /// Number of candidates evaluated.
     pub evaluations: usize,
 }
 
-/// Finds the best μ with |μ| ≤ `mu_max`, `None` when every candidate of the grid has Σp ≤ 0.
+/// Finds the best μ with |μ| ≤ `mu_max`; `None` if no candidate of the grid has a score, that is Σp ≤ 0 for all.
 pub fn search(family: &Polynomial, mu_max: f64, objective: &dyn Objective) -> Option<SearchResult> {
     let mut grid = GridSearch {
         family,
@@ -70,12 +69,12 @@ pub fn search(family: &Polynomial, mu_max: f64, objective: &dyn Objective) -> Op
     grid.found()
 }
 
-/// A search under way.
+/// State of a search.
 struct GridSearch<'a> {
     family: &'a Polynomial,
     mu_max: f64,
     objective: &'a dyn Objective,
-    /// Forces of the candidate at hand.
+    /// Normal forces of the current candidate.
     p: Vec<f64>,
     evaluations: usize,
     best: Option<([i32; 2], f64)>,
@@ -86,7 +85,7 @@ impl GridSearch<'_> {
         position.map(|units| f64::from(units) * self.mu_max / f64::from(RADIUS))
     }
 
-    /// Scores a candidate and keeps it when it is the best; outside the disc it is not evaluated.
+    /// Scores a candidate and keeps it if it is the best; outside the disc it is not evaluated.
     fn try_position(&mut self, position: [i32; 2]) {
         let [x, y] = position;
         if x * x + y * y > RADIUS * RADIUS {

@@ -1,47 +1,48 @@
-//! Segment: which contact a taxel belongs to, from the normal forces alone.
+//! Segment: the contact to which each taxel belongs, from the normal forces alone.
 //!
-//! q is p, compressive part only, smoothed by a Gaussian of σ = width · h (width 0.8, h at least 0.75 pitches). Every
-//! taxel climbs to its steepest neighbour until a maximum is reached; the taxels of one maximum are a basin. Two basins meet at their saddle, the largest
-//! min(q_i, q_j) over neighbours i, j of the two. Basins are joined, one pair at a time:
+//! q is the compressive part of p, smoothed by a Gaussian of σ = width · h (width 0.8, h at least 0.75 pitches). Each
+//! taxel ascends to its steepest neighbour until a maximum is reached; the taxels of one maximum are a basin. The
+//! saddle of two basins is the largest min(q_i, q_j) over neighbours i, j, one in each. Basins are joined, one pair at
+//! a time:
 //!
-//! 1. where the load of one is below 3 % of all, it joins the neighbour of the highest saddle;
-//! 2. where the saddle is above a share of the lower maximum, both are one: a ring, a punch or a long contact has
-//!    several maxima with hardly a valley between them.
+//! 1. a basin with less than 3 % of the whole load joins the neighbour with the highest saddle;
+//! 2. two basins whose saddle is above 90 % of the lower maximum are one: a ring, a punch or a long contact has several
+//!    maxima with shallow valleys between them.
 //!
 //! | | shape | unit |
 //! |---|---|---|
 //! | in: p | n, row-major | N |
 //! | out: labels | n | region of each taxel, 0 …, in the order of the first taxel |
 //!
-//! Every taxel has a region, the unloaded ones too. Feeds `contacts` and the choice of `adaptive`.
+//! Every taxel has a region, unloaded ones included. Feeds `contacts` and the choice of `adaptive`.
 
 use crate::sensor::Sensor;
 
-/// Width of the smoothing, over h: structure that fine is not seen from the depth of the taxels.
+/// Width of the smoothing in units of h: finer structure is not visible from the depth of the taxels.
 pub const WIDTH: f64 = 0.8;
-/// Where the taxels are far apart, h is taken to be at least this many pitches: a taxel alone is no structure.
+/// Smallest h in pitches for the smoothing: the force on a single taxel is no structure.
 const MIN_PITCHES: f64 = 0.75;
-/// Share of the load below which a basin is none of its own.
+/// Fraction of the whole load below which a basin is joined to another.
 const MIN_LOAD_SHARE: f64 = 0.03;
-/// Saddle over lower maximum from which two basins are one contact.
+/// Ratio of saddle to lower maximum from which two basins are one contact.
 const JOIN_SADDLE: f64 = 0.9;
 
 /// A partition of the taxels into regions.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Segments {
-    /// Region of each taxel.
+    /// Region of each taxel, row-major; regions are numbered from 0 in the order of their first taxels.
     pub labels: Vec<usize>,
     /// Number of regions, at least 1.
     pub count: usize,
 }
 
 impl Segments {
-    /// The array as one region.
+    /// All taxels in one region.
     pub fn whole(taxels: usize) -> Segments {
         Segments { labels: vec![0; taxels], count: 1 }
     }
 
-    /// Numbers regions in the order of their first taxels; any labels do.
+    /// Renumbers arbitrary region labels, one per taxel, in the order of their first taxels.
     pub fn numbered(labels: &[usize]) -> Segments {
         let mut names: Vec<usize> = Vec::new();
         let number = |label: &usize| {
@@ -54,14 +55,14 @@ impl Segments {
         Segments { labels, count: names.len().max(1) }
     }
 
-    /// Two regions made one.
+    /// The segments with regions `a` and `b` joined.
     pub fn joined(&self, a: usize, b: usize) -> Segments {
         let labels: Vec<usize> = self.labels.iter().map(|&label| if label == b { a } else { label }).collect();
         Segments::numbered(&labels)
     }
 }
 
-/// Cuts the array into contacts; `width` is that of the smoothing over h, above 0.
+/// Segments the array into contacts; `p` in N, row-major; `width` of the smoothing in units of h, above 0.
 pub fn segment(sensor: &Sensor, p: &[f64], width: f64) -> Segments {
     let q = smooth(sensor, p, width);
     let mut segments = Segments::numbered(&climb(sensor, &q));
@@ -71,7 +72,7 @@ pub fn segment(sensor: &Sensor, p: &[f64], width: f64) -> Segments {
     segments
 }
 
-/// Compressive forces under a Gaussian window; at the edge the window is cut and its weight made up for.
+/// Compressive forces smoothed by a Gaussian window; at the edge the window is cut and normalised.
 fn smooth(sensor: &Sensor, p: &[f64], width: f64) -> Vec<f64> {
     let (rows, cols) = (sensor.rows, sensor.cols);
     let weights = |pitch: f64, count: usize| -> Vec<f64> {
@@ -91,7 +92,7 @@ fn smooth(sensor: &Sensor, p: &[f64], width: f64) -> Vec<f64> {
     (0..p.len()).map(|k| mean(&wy, k / cols, rows, &|r| along[r * cols + k % cols])).collect()
 }
 
-/// The taxels beside one, corners included.
+/// The up to eight neighbours of a taxel, diagonal ones included.
 pub fn neighbours(sensor: &Sensor, taxel: usize) -> impl Iterator<Item = usize> {
     let (rows, cols) = (sensor.rows, sensor.cols);
     let (row, col) = (taxel / cols, taxel % cols);
@@ -100,7 +101,7 @@ pub fn neighbours(sensor: &Sensor, taxel: usize) -> impl Iterator<Item = usize> 
     all.filter(move |&other| other != taxel)
 }
 
-/// Maximum each taxel climbs to, by its index.
+/// Index of the maximum to which each taxel ascends.
 fn climb(sensor: &Sensor, q: &[f64]) -> Vec<usize> {
     let distance = |a: usize, b: usize| {
         let (cols, x, y) = (sensor.cols, sensor.pitch_x_mm, sensor.pitch_y_mm);
@@ -113,7 +114,7 @@ fn climb(sensor: &Sensor, q: &[f64]) -> Vec<usize> {
     };
     let next: Vec<usize> = (0..q.len()).map(up).collect();
     let top = |mut taxel: usize| {
-        // q rises with every step, so that this ends.
+        // q rises with every step, so the loop ends.
         while next[taxel] != taxel {
             taxel = next[taxel];
         }
@@ -122,7 +123,7 @@ fn climb(sensor: &Sensor, q: &[f64]) -> Vec<usize> {
     (0..q.len()).map(top).collect()
 }
 
-/// The next two basins to join: the smallest that is too small, else the pair with the least valley.
+/// The next two basins to join: the smallest one below the load limit, else the pair with the shallowest valley.
 fn pair_to_join(sensor: &Sensor, q: &[f64], segments: &Segments) -> Option<(usize, usize)> {
     let count = segments.count;
     let (mut load, mut top) = (vec![0.0; count], vec![0.0f64; count]);

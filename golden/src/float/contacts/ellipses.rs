@@ -1,13 +1,14 @@
-//! Ellipses: elliptic contacts in the place of the regions, where they explain the stress.
+//! Ellipses: elliptic contacts instead of segmented regions, where they explain the stress.
 //!
 //! | | shape | unit |
 //! |---|---|---|
-//! | in: p and regions found without them | n | N, – |
+//! | in: p and segmented regions | n | N, – |
 //! | in: stress, noise | n, scalar | MPa |
 //! | out: p, regions, μ of each | n, n, count × 2 | N, –, – |
 //!
-//! A single ellipse changes nothing: one contact is the plain method. A region's forces are its ellipse's pressure over
-//! each cell, scaled to its load; a cell under two belongs to the one that presses it more.
+//! A single ellipse changes nothing: one contact has one μ for the whole array. The forces of a region are its
+//! ellipse's pressure over each cell, scaled to its load; a cell under two ellipses belongs to the one with the larger
+//! force on it.
 
 use super::{Contacts, MeasuredStress, Solver};
 use crate::float::objective::misfit_limit;
@@ -15,15 +16,16 @@ use crate::float::objective::multi_ellipse::{fit_ellipses, start_parameters, Ell
 use crate::float::search::{SearchResult, RADIUS};
 use crate::float::segment::{segment, Segments};
 
-/// Share by which an ellipse's |μ| may exceed mu_max, to which it is cut.
+/// Relative tolerance by which the |μ| of an ellipse may exceed mu_max; it is then reduced to mu_max.
 const MU_TOLERANCE: f64 = 0.05;
 
 impl Solver<'_> {
-    /// The ellipses that come nearest to the stress, started from the state's regions; `None` where none may be fitted.
+    /// The best fit of ellipses to the stress, started from the regions of `state`; `None` where no fit is wanted or
+    /// found.
     pub(super) fn fit(&self, state: &Contacts) -> Option<EllipseFit> {
         let MeasuredStress { taxels, b, noise_MPa } = self.stress?;
         let sensor = &self.matrices.sensor;
-        // What differs is the number of regions; the rest the fit finds by itself.
+        // Starts with equally many regions lead to the same fit.
         let drawn = FIT_WIDTHS.map(|width| segment(sensor, &state.p, width));
         let mut drawings = vec![&state.segments];
         drawings.extend(&drawn);
@@ -38,7 +40,7 @@ impl Solver<'_> {
         fit_ellipses(taxels, b, &starts, misfit_limit(b, noise_MPa))
     }
 
-    /// The contacts of ellipses that explain the stress: `state`, the plain method, where it is a single one.
+    /// The contacts of a fit that explains the stress; for a single ellipse `state`, if that has a single region too.
     pub(super) fn from_ellipses(&self, fitted: &EllipseFit, state: &Contacts) -> Option<Contacts> {
         match fitted.patches.len() {
             _ if !fitted.explains_stress() => None,
@@ -47,8 +49,8 @@ impl Solver<'_> {
         }
     }
 
-    /// The regions of ellipses, each with its ellipse's forces; `None` where a region has none, is not to be searched
-    /// or has more shear than there may be.
+    /// The regions of the ellipses, each with the forces of its ellipse; `None` where a region has no force, is not to
+    /// be searched or exceeds mu_max.
     fn ellipse_contacts(&self, fitted: &EllipseFit, state: &Contacts) -> Option<Contacts> {
         let sensor = &self.matrices.sensor;
         let cells = fitted.cells(sensor);

@@ -1,21 +1,21 @@
-//! Auto: the objective that fits the frame.
+//! Auto: the objective is chosen to fit the frame.
 //!
-//! Shear and an asymmetric pressure look alike in normal stress, so that with noise a prior on the shape must tell them
-//! apart, and without noise a wrong prior does harm. Which prior holds is asked of the frame: a fit explains it when
-//! its misfit is what the stated noise σ and the quadrature's error leave,
+//! Shear and an asymmetric pressure cause similar normal stress. With noise, only a prior on the shape can tell them
+//! apart; without noise, a wrong prior does harm. The frame decides which prior holds: a fit explains it if the misfit
+//! is no larger than the stated noise σ and the error of the quadrature cause,
 //!
 //! ```text
 //! misfit ≤ n (σ² + (1.5·10⁻⁴ max|b|)²) (1 + 4 √(2/n))
 //! ```
 //!
-//! | order | taken when |
+//! | order | used if |
 //! |---|---|
 //! | `patch` | it explains the frame |
 //! | `sparse` | σ ≤ 5·10⁻⁵ max\|b\|: any shape |
-//! | `symmetric` | it explains the frame, or its misfit is below `patch`'s |
-//! | `patch` | else |
+//! | `symmetric` | it explains the frame, or its misfit is below that of `patch` |
+//! | `patch` | otherwise |
 //!
-//! σ is the noise after averaging. With σ stated too small a noisy frame looks like one of another shape.
+//! σ is the noise after averaging. If the scene states too small a σ, a noisy frame is taken for one of another shape.
 
 use super::{Estimate, Objective, Patch, SearchInput, Sparse, Symmetric};
 use crate::flags::SPARSE_NOISE_LIMIT;
@@ -23,12 +23,12 @@ use crate::float::search::SearchResult;
 use crate::scene::Medium;
 use crate::sensor::Sensor;
 
-/// Error of the fits' own over the peak: their quadrature's, and that of frames made by another.
+/// Error of the quadratures of the fit and of simulated frames, relative to the peak.
 const OWN_ERROR: f64 = 1.5e-4;
-/// Deviations of χ² beyond which a misfit is no accident.
+/// Standard deviations of χ² up to which a misfit counts as noise.
 const DEVIATIONS: f64 = 4.0;
 
-/// Largest squared misfit in MPa² of a fit that explains b.
+/// Largest squared misfit in MPa² with which a fit explains b.
 pub(crate) fn misfit_limit(b: &[f64], noise_MPa: f64) -> f64 {
     let peak = b.iter().fold(0.0f64, |peak, b| b.abs().max(peak));
     let n = b.len() as f64;
@@ -36,7 +36,7 @@ pub(crate) fn misfit_limit(b: &[f64], noise_MPa: f64) -> f64 {
     n * variance * (1.0 + DEVIATIONS * (2.0 / n).sqrt())
 }
 
-/// The objective.
+/// The objective `auto`.
 #[derive(Clone, Debug)]
 pub struct Auto {
     sparse: Sparse,
@@ -45,7 +45,7 @@ pub struct Auto {
 }
 
 impl Auto {
-    /// For subarrays of one shape under a medium.
+    /// The objective for subarrays of the shape of `sensor` under `medium`.
     pub fn new(sensor: &Sensor, medium: Medium) -> Auto {
         let (symmetric, patch) = (Symmetric::new(sensor, medium), Patch::new(sensor, medium));
         Auto { sparse: Sparse::default(), symmetric, patch }
@@ -53,7 +53,7 @@ impl Auto {
 }
 
 impl Objective for Auto {
-    /// That of `sparse`.
+    /// The score of `sparse`.
     fn score(&self, p: &[f64]) -> Option<f64> {
         self.sparse.score(p)
     }
@@ -96,7 +96,7 @@ mod tests {
     use crate::matrices::Matrices;
     use crate::scene::Scene;
 
-    /// What `auto` takes, and what each of the three finds by itself.
+    /// The estimate of `auto` and those of the three objectives it chooses from.
     struct Four {
         auto: Option<Estimate>,
         patch: Option<Estimate>,
@@ -104,7 +104,7 @@ mod tests {
         symmetric: Option<Estimate>,
     }
 
-    /// All four on a frame of `sensor-2` whose noise is stated as a share of its peak.
+    /// All four estimates for a frame of `sensor-2`; `noise` is stated as a fraction of its peak.
     fn four(matrices: &Matrices, frame: &Frame, noise: f64) -> Four {
         let b = frame.stress_MPa.as_slice();
         let family = Polynomial::new(matrices, b);
@@ -122,7 +122,7 @@ mod tests {
         estimates.iter().flatten().map(|estimate| estimate.found.evaluations).sum()
     }
 
-    /// Whether two estimates are the same but for their count of evaluations.
+    /// Whether two estimates are equal except for their number of evaluations.
     fn same(a: Option<Estimate>, b: Option<Estimate>) -> bool {
         let bare =
             |estimate: Estimate| Estimate { found: SearchResult { evaluations: 0, ..estimate.found }, ..estimate };
@@ -156,12 +156,12 @@ mod tests {
     #[test]
     fn another_shape_with_noise_goes_to_the_smaller_misfit() {
         let (matrices, frames) = frames();
-        // Beyond the limit of `sparse`, too little to explain what a wrong shape leaves.
+        // Above the limit of `sparse`, but too small to explain the misfit of a wrong shape.
         let noise = 2.0 * SPARSE_NOISE_LIMIT;
         let (mut symmetric, mut patch) = (0, 0);
         let ring = named(&frames, "S2-hs-ring");
         for frame in &frames {
-            // Twice: as it is, and with a ring besides, which neither fits.
+            // Each frame as it is, and with a ring added, which neither fits.
             let mut two = frame.clone();
             two.stress_MPa.iter_mut().zip(ring.stress_MPa.iter().rev()).for_each(|(b, other)| *b += 0.5 * other);
             for frame in [frame, &two] {

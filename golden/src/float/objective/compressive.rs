@@ -1,17 +1,17 @@
 //! Compressive: the paper's constraint i) alone.
 //!
-//! Π = −Σ min(p, 0)²/(Σp)², at most 0. Flat around its top, so that it hardly sees the shear: a baseline.
+//! Π = −Σ min(p, 0)²/(Σp)², at most 0. It is flat around its maximum, so it hardly depends on the shear: a baseline.
 
 use super::Objective;
 
-/// The objective.
+/// The objective `compressive`.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Compressive;
 
 impl Objective for Compressive {
     fn score(&self, p: &[f64]) -> Option<f64> {
         let sum: f64 = p.iter().sum();
-        // Quotients are squared, not sums: squares of large forces overflow.
+        // Quotients are squared, not forces: squares of large forces overflow.
         let pulling = |p: &f64| (p.min(0.0) / sum).powi(2);
         (sum > 0.0 && sum.is_finite()).then(|| -p.iter().map(pulling).sum::<f64>())
     }

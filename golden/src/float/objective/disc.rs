@@ -1,9 +1,8 @@
-//! Disc: nodes and weights on the unit disc.
+//! Disc: quadrature nodes and weights on the unit disc.
 //!
-//! A pressure ∝ (1 − r²)^g on the disc has, with t = √(1 − r²), the integral
-//! ∫∫ f (1 − r²)^g dA = ∫ dφ ∫₀¹ f t^(2g + 1) dt. Gauss–Legendre in t, equal angles in φ, each ring turned by half an
-//! angle against the last. The nodes do not move with g, and t^(2g + 1) is smooth for g ≥ 0: that is what makes few
-//! nodes enough.
+//! A pressure ∝ (1 − r²)^g on the disc has, with t = √(1 − r²), the integral ∫∫ f (1 − r²)^g dA = ∫ dφ ∫₀¹ f t^(2g + 1)
+//! dt. Gauss–Legendre nodes in t, equal angles in φ, alternate rings turned by half an angle. Few nodes are enough
+//! because they do not depend on g and t^(2g + 1) is smooth for g ≥ 0.
 //!
 //! | | shape | unit | range |
 //! |---|---|---|---|
@@ -20,7 +19,7 @@ use std::f64::consts::{PI, TAU};
 pub struct Disc {
     /// Nodes, ring by ring.
     pub nodes: Vec<[f64; 2]>,
-    /// √(1 − r²) of each node.
+    /// t = √(1 − r²) of each node.
     heights: Vec<f64>,
     /// Gauss weight of each node's ring.
     gauss: Vec<f64>,
@@ -47,7 +46,7 @@ pub(crate) fn gauss_legendre(count: usize) -> Vec<[f64; 2]> {
 }
 
 impl Disc {
-    /// `rings` Gauss points in t, `angles` equal angles on each.
+    /// A quadrature of `rings` Gauss nodes in t with `angles` equal angles each; both at least 1.
     pub fn new(rings: usize, angles: usize) -> Disc {
         let mut disc = Disc { nodes: Vec::new(), heights: Vec::new(), gauss: Vec::new() };
         for (ring, [t, weight]) in gauss_legendre(rings).into_iter().enumerate() {

@@ -1,46 +1,47 @@
-//! Subject and estimate: what an objective is given of a subarray, and what it gives back.
+//! Estimate: input and result of an objective's search for μ in one subarray.
 //!
 //! | | shape | unit |
 //! |---|---|---|
 //! | in: subarray, b, family p(μ), largest \|μ\|, noise | –, n, –, –, scalar | mm, MPa, N, –, MPa |
 //! | out: μ, its objective, evaluations | 2, scalar, count | –, of the objective, – |
-//! | out: load | scalar | N, where the objective knows it better than Σp |
+//! | out: load | scalar | N, where the objective knows it more accurately than Σp |
 
 use crate::float::pass::Polynomial;
 use crate::float::search::{SearchResult, RADIUS};
 use crate::sensor::Sensor;
 
-/// One subarray in one frame.
+/// One subarray in one frame: the input of [`Objective::find`](super::Objective::find).
 #[derive(Clone, Copy, Debug)]
 pub struct SearchInput<'a> {
-    /// The subarray as a sensor; positions count from its own centre.
+    /// The subarray as a sensor; positions are relative to its own centre.
     pub sensor: &'a Sensor,
-    /// Stress, row-major.
+    /// Stress in MPa, row-major.
     pub b: &'a [f64],
-    /// Its consistent family.
+    /// The polynomial p(μ) of the stress.
     pub family: &'a Polynomial,
     /// Largest |μ|.
     pub mu_max: f64,
-    /// Standard deviation of the noise on b as the scene states it, 0 when unknown.
+    /// Standard deviation of the noise on b in MPa as the scene states it, 0 if unknown.
     pub noise_MPa: f64,
 }
 
-/// What was found.
+/// The best μ, and the load if the objective finds it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Estimate {
     /// μ, score and evaluations.
     pub found: SearchResult,
-    /// Normal load, to which the forces are to be scaled.
+    /// Normal load in N to which the forces are scaled; `None` leaves them as they are.
     pub load_N: Option<f64>,
 }
 
-/// Share of the largest p₀ a taxel must exceed to count for the centre.
+/// Fraction of the largest p₀ that a taxel must exceed to count for the centre.
 const COUNTS_FROM: f64 = 0.3;
-/// Distance from the largest p₀ in depths (and one pitch) within which taxels count.
+/// Distance from the largest p₀ within which taxels count, in depths; one pitch is added.
 const NEAR: f64 = 2.5;
 
 impl SearchInput<'_> {
-    /// Centroid of the strong p₀ around its peak, in mm: where a contact's fit starts.
+    /// Centroid of the large p₀ around its peak in mm from the subarray's centre: the initial centre of a contact's
+    /// fit.
     pub fn centre_mm(&self) -> [f64; 2] {
         let p = self.family.v(0, 0);
         let place = |index: usize| self.sensor.position_mm(index / self.sensor.cols, index % self.sensor.cols);
@@ -65,8 +66,8 @@ impl SearchInput<'_> {
 }
 
 impl Estimate {
-    /// p(μ) in N, scaled to the load where the objective knows it. The sum over cells is off by their coarseness, up to
-    /// 2 % where the pitch exceeds the depth.
+    /// p(μ) in N, scaled to the load if the objective finds it: the sum over cells is inaccurate by up to 2 % where the
+    /// pitch exceeds the depth.
     pub fn pressure(&self, family: &Polynomial) -> Vec<f64> {
         let mut p = family.eval(self.found.mu);
         let sum: f64 = p.iter().sum();
@@ -76,8 +77,8 @@ impl Estimate {
         p
     }
 
-    /// The estimate of an objective that finds the contact's force, `None` when it pulls. Shear beyond `mu_max` is cut
-    /// to it.
+    /// The estimate for a contact force in N, [x, y, normal]; `None` if it is not compressive. Shear beyond `mu_max` is
+    /// reduced to it.
     pub(super) fn of_force(force: [f64; 3], mu_max: f64, objective: f64, evaluations: usize) -> Option<Estimate> {
         let [x, y, load] = force;
         if !(load > 0.0 && force.iter().all(|f| f.is_finite())) {
@@ -86,7 +87,7 @@ impl Estimate {
         let ratio = (x / load).hypot(y / load);
         let cut = if ratio > mu_max { mu_max / ratio } else { 1.0 };
         let mu = [x, y].map(|f| f / load * cut);
-        // The nearest place of the grid, for those who need whole numbers.
+        // The position on the search grid, rounded towards 0.
         let unit = f64::from(RADIUS) / mu_max.max(f64::MIN_POSITIVE);
         let position = mu.map(|mu| (mu * unit) as i32);
         Some(Estimate { found: SearchResult { mu, position, objective, evaluations }, load_N: Some(load) })

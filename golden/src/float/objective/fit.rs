@@ -1,58 +1,58 @@
-//! Fit: Levenberg–Marquardt over a few parameters with linear loads inside (variable projection).
+//! Fit: Levenberg–Marquardt over a few parameters, the loads eliminated by linear least squares (variable projection).
 //!
-//! min over θ, c of ‖b − G(θ) c‖². For every θ the loads c follow by least squares; the step in θ is Kaufman's: with
+//! min over θ, c of ‖b − G(θ) c‖². For every θ the loads c follow from least squares; the step in θ is Kaufman's: with
 //! J = ∂(G c)/∂θ made orthogonal to the columns of G, (JᵀJ + λ diag JᵀJ) δ = Jᵀ(b − G c).
 //!
 //! | | shape | unit |
 //! |---|---|---|
 //! | in: b | n | MPa |
-//! | in: θ at the start | k, at most 8 | of the model |
+//! | in: initial θ | k, at most 8 | of the model |
 //! | out: θ, loads | k, m | of the model |
 //! | out: squared misfit | scalar | MPa² |
 //!
-//! λ falls tenfold after a step that helps and rises tenfold after one that does not.
+//! λ is divided by 10 after a step that reduces the misfit and multiplied by 10 after one that does not.
 
 use nalgebra::{DMatrix, DVector};
 
-/// How long a fit goes on.
+/// Stopping criteria of a fit.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Effort {
-    /// Steps at most; a fit that goes well takes 6 to 15.
+    /// Maximum number of steps; a good fit takes 6 to 15.
     pub steps: usize,
-    /// A step that lowers the misfit by a smaller share ends the fit.
+    /// The fit ends with a step that reduces the misfit by a smaller fraction.
     pub gain: f64,
 }
 
-/// To the end.
+/// Until convergence.
 pub(super) const THOROUGH: Effort = Effort { steps: 40, gain: 1e-7 };
-/// As long as it goes on well.
+/// As long as a step gains 1 %.
 pub(super) const STEADY: Effort = Effort { steps: 20, gain: 0.01 };
-/// As long as it goes fast: to tell starts that lead somewhere from those that do not.
+/// As long as a step gains 5 %: to sort out bad starts.
 pub(super) const QUICK: Effort = Effort { steps: 20, gain: 0.05 };
 
-/// λ beyond which no step helps any more.
+/// Largest λ; beyond it no step reduces the misfit.
 const MAX_LAMBDA: f64 = 1e8;
-/// Added to the normal equations' diagonal, relative, so that loads that cannot be told apart stay finite.
+/// Relative ridge on the diagonal of the normal equations, so that indistinguishable loads stay finite.
 const RIDGE: f64 = 1e-13;
 
-/// A model of stress, linear in its loads.
+/// A stress model that is linear in its loads.
 pub(super) trait Model {
     /// Stress of unit loads: m columns of n.
     fn columns(&mut self, theta: &[f64]) -> DMatrix<f64>;
-    /// Derivatives of the stress under loads c with respect to θ: k columns of n.
+    /// Derivatives of the stress under loads c by θ: k columns of n.
     fn slopes(&mut self, theta: &[f64], loads: &DVector<f64>) -> DMatrix<f64>;
-    /// Moves θ to the nearest admissible point.
+    /// Clamps θ to its admissible range.
     fn confine(&self, theta: &mut [f64]);
 }
 
-/// Outcome of a fit.
+/// Result of a fit.
 #[derive(Clone, Debug)]
 pub(super) struct Fit {
     pub theta: Vec<f64>,
     pub loads: DVector<f64>,
     /// ‖b − G c‖²
     pub misfit: f64,
-    /// Sets of columns computed.
+    /// Number of evaluations of the columns.
     pub evaluations: usize,
 }
 
@@ -80,7 +80,7 @@ impl Projection {
         self.rest.norm_squared()
     }
 
-    /// J without its part in the columns' span.
+    /// J made orthogonal to the columns.
     fn project(&self, mut slopes: DMatrix<f64>) -> DMatrix<f64> {
         let inside = self.normal.solve(&self.columns.tr_mul(&slopes));
         slopes -= &self.columns * inside;
@@ -88,13 +88,13 @@ impl Projection {
     }
 }
 
-/// Misfit of the best loads at one θ, `None` where the columns are degenerate.
+/// Squared misfit of the best loads at one θ; `None` where the columns are linearly dependent.
 pub(super) fn misfit(model: &mut dyn Model, b: &DVector<f64>, theta: &[f64]) -> Option<f64> {
     let projection = Projection::new(model.columns(theta), b)?;
     Some(projection.misfit()).filter(|misfit| misfit.is_finite())
 }
 
-/// Fits from a start; `None` where the model has no finite loads there.
+/// Fits θ from `start`; `None` where the model has no finite loads there.
 pub(super) fn fit(model: &mut dyn Model, b: &DVector<f64>, start: &[f64], effort: Effort) -> Option<Fit> {
     let mut theta = start.to_vec();
     model.confine(&mut theta);

@@ -1,4 +1,4 @@
-//! Several: least squares of several elliptic contacts at once, each with its own μ.
+//! Several ellipses: least squares fit of several elliptic contacts at once, each with its own μ.
 //!
 //! ```text
 //! min over θ_k, F_k of ‖b − Σ_k K(θ_k) F_k‖²        θ_k = centre, L, g as in `patch`;  F_k = (Fx, Fy, Fz)
@@ -7,12 +7,12 @@
 //! | | shape | unit |
 //! |---|---|---|
 //! | in: b | n | MPa |
-//! | in: where the fit starts | 6 per contact | as in `patch` |
+//! | in: initial θ | 6 per contact | as in `patch` |
 //! | out: ellipses and their forces | 6 + 3 per contact | as in `patch`, N |
 //! | out: squared misfit | scalar | MPa² |
 //!
-//! Started from several drawings of the regions. Where none explains b, an ellipse is added where the misfit of the
-//! best is largest, or its ellipse cut in two, twice at most and as long as that helps.
+//! The fit starts from several segmentations. If none explains b, an ellipse is added where the misfit of the best fit
+//! is largest, or the ellipse there is split in two; at most twice and as long as the misfit halves.
 
 use super::disc::Disc;
 use super::fit::{fit, Effort, Fit, Model, QUICK, STEADY};
@@ -22,53 +22,53 @@ use crate::float::segment::{Segments, WIDTH};
 use crate::sensor::Sensor;
 use nalgebra::{DMatrix, DVector};
 
-/// Widths of smoothing of the regions that fits start from.
+/// Widths of smoothing of the segmentations from which fits start, in units of h.
 pub(crate) const FIT_WIDTHS: [f64; 3] = [WIDTH, 0.6, 0.4];
-/// Most ellipses.
+/// Maximum number of ellipses.
 const MAX_ELLIPSES: usize = 8;
-/// Most ellipses times taxels: beyond, a fit takes longer than it is worth.
+/// Maximum of ellipses times taxels, which limits the time of a fit.
 const MAX_ELLIPSE_TAXELS: usize = 10_000;
-/// A further ellipse must bring the squared misfit below this share.
+/// A further ellipse must reduce the squared misfit below this fraction.
 const REQUIRED_SHARE: f64 = 0.5;
-/// Rings and angles while starts are tried.
+/// Rings and angles of the quadrature while starts are compared.
 const ROUGH_NODES: [usize; 2] = [4, 9];
-/// Rough misfit over the one asked for up to which a fit is taken to its end.
+/// Rough misfit, in units of the misfit limit, below which a fit is continued with more nodes.
 const REFINE_BELOW: f64 = 1e5;
-/// Misfit over the one asked for from which no other start is tried, and many nodes help.
+/// Misfit, in units of the misfit limit, below which no other start is tried and the finest quadrature is used.
 const FINE_BELOW: f64 = 1e3;
-/// Ellipses that may be added.
+/// Maximum number of ellipses added.
 const MAX_ADDED: usize = 2;
-/// Rings and angles for the shares of the cells.
+/// Rings and angles of the quadrature for the forces on cells.
 const CELL_NODES: [usize; 2] = [32, 96];
-/// Share of a region's largest force from which a cell counts for where its ellipse starts.
+/// Fraction of a region's largest force from which a cell counts for the start of its ellipse.
 const COUNTS_FROM: f64 = 0.15;
-/// g at the start, between Hertz's and a uniform pressure's.
+/// Initial g, between Hertz's and a uniform pressure's.
 const START_EXPONENT: f64 = 0.4;
-/// ⟨x²⟩ of Hertz's pressure is a²/5, of a uniform one a²/4: between the two.
+/// a²/⟨x²⟩, between 5 for Hertz's pressure and 4 for a uniform one.
 const SPREAD: f64 = 4.5;
 
-/// One elliptic contact.
+/// One fitted elliptic contact.
 #[derive(Clone, Debug)]
 pub(crate) struct FittedEllipse {
     theta: [f64; PARAMETERS],
-    /// Its force in N, [x, y, normal].
+    /// Force in N, [x, y, normal].
     pub force: [f64; 3],
 }
 
-/// Ellipses and what they leave of b.
+/// Fitted ellipses and their misfit.
 #[derive(Clone, Debug)]
 pub(crate) struct EllipseFit {
-    /// At least one.
+    /// The ellipses, at least one.
     pub patches: Vec<FittedEllipse>,
     /// ‖b − Σ K F‖² in MPa².
     pub misfit: f64,
-    /// Up to which misfit the stress counts as explained, in MPa².
+    /// Largest squared misfit with which the stress counts as explained, in MPa².
     misfit_limit: f64,
-    /// Sets of columns computed, over all fits.
+    /// Number of evaluations of the columns, over all fits.
     pub evaluations: usize,
 }
 
-/// Stress of several ellipses.
+/// Stress model of several ellipses.
 struct MultiEllipse<'a> {
     taxels: &'a Taxels,
     disc: &'a Disc,
@@ -113,7 +113,7 @@ impl Model for MultiEllipse<'_> {
     }
 }
 
-/// Where the ellipses of drawn regions start: centroid and spread of their compressive forces.
+/// Initial θ of one ellipse per region: centroid and spread of the region's compressive forces.
 pub(crate) fn start_parameters(sensor: &Sensor, p: &[f64], segments: &Segments) -> Vec<f64> {
     let least = (0.5 * sensor.thickness_mm).powi(2);
     let start = |region: usize| -> Option<[f64; PARAMETERS]> {
@@ -132,7 +132,7 @@ pub(crate) fn start_parameters(sensor: &Sensor, p: &[f64], segments: &Segments) 
         let xy = SPREAD * mean(&|at| (at[0] - x) * (at[1] - y));
         let (xx, yy) = (xx.max(least), yy.max(least));
         let most = 0.8 * (xx * yy).sqrt();
-        // Not clamp: sums that overflow leave no bounds, and the fit is judged by its misfit.
+        // Not `clamp`, which panics on NaN bounds: such a fit is rejected by its misfit.
         let xy = xy.max(-most).min(most);
         // The square root of a symmetric 2 × 2 matrix.
         let root = (xx * yy - xy * xy).sqrt();
@@ -142,13 +142,13 @@ pub(crate) fn start_parameters(sensor: &Sensor, p: &[f64], segments: &Segments) 
     (0..segments.count).filter_map(start).flatten().collect()
 }
 
-/// Fits to one frame.
+/// The fits to one frame.
 struct Trial<'a> {
     taxels: &'a Taxels,
-    /// Quadratures, the coarsest first.
+    /// The quadratures, from coarse to fine.
     discs: &'a [Disc; 3],
     b: &'a DVector<f64>,
-    /// Squared misfit of a fit that explains b.
+    /// Squared misfit up to which a fit explains b, in MPa².
     misfit_limit: f64,
     evaluations: usize,
 }
@@ -161,7 +161,7 @@ impl Trial<'_> {
         Some(found).filter(|found| found.loads.as_slice().chunks(3).all(presses))
     }
 
-    /// The best fit from several starts, taken further where it may explain b.
+    /// The best fit from several starts, continued with more nodes if it may explain b.
     fn best(&mut self, starts: &[&[f64]]) -> Option<Fit> {
         let mut best: Option<Fit> = None;
         for start in starts {
@@ -182,8 +182,8 @@ impl Trial<'_> {
     }
 }
 
-/// Fits from each start as far as it goes fast, then the best to the end where it may explain b, then with ellipses
-/// added; the best fit in which every contact presses, `None` where there is none.
+/// Fits ellipses to `b`: briefly from each of `starts`, then the best fit with more nodes if it may explain b, then
+/// with ellipses added. Returns the best fit in which every contact is compressive, `None` if there is none.
 pub(crate) fn fit_ellipses(taxels: &Taxels, b: &[f64], starts: &[Vec<f64>], misfit_limit: f64) -> Option<EllipseFit> {
     let b = DVector::from_column_slice(b);
     let most = MAX_ELLIPSES.min(MAX_ELLIPSE_TAXELS / taxels.count().max(1)) * PARAMETERS;
@@ -215,7 +215,7 @@ pub(crate) fn fit_ellipses(taxels: &Taxels, b: &[f64], starts: &[Vec<f64>], misf
     Some(EllipseFit { patches, misfit: best.misfit, misfit_limit, evaluations: trial.evaluations })
 }
 
-/// Two ways to one ellipse more: at the place of the largest misfit, or the ellipse that it lies in, or nearest to, cut
+/// Two starts with one more ellipse: a new one at the largest misfit, or the ellipse there (or nearest to it) split
 /// across its longer axis.
 fn add_ellipse(theta: &[f64], [x, y]: [f64; 2], depth: f64) -> [Vec<f64>; 2] {
     let mut added = theta.to_vec();
@@ -238,7 +238,7 @@ fn add_ellipse(theta: &[f64], [x, y]: [f64; 2], depth: f64) -> [Vec<f64>; 2] {
 }
 
 impl EllipseFit {
-    /// Whether the ellipses explain the stress.
+    /// Whether the misfit is within the limit, so that the ellipses explain the stress.
     pub fn explains_stress(&self) -> bool {
         self.misfit <= self.misfit_limit
     }
@@ -269,7 +269,7 @@ impl EllipseFit {
         self.patches.iter().map(cells).collect()
     }
 
-    /// The ellipse each taxel belongs to: of the largest force on its cell, else the one whose rim is nearest.
+    /// The ellipse of each taxel: the one with the largest force on its cell, else the one with the nearest rim.
     pub fn labels(&self, sensor: &Sensor) -> Vec<usize> {
         let cells = self.cells(sensor);
         let label = |k: usize| {

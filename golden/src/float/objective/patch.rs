@@ -7,17 +7,16 @@
 //! Π = −min over x₀, L, g, F of ‖b − K(x₀, L, g) F‖²        F = (Fx, Fy, Fz), μ = (Fx, Fy)/Fz
 //! ```
 //!
-//! x₀, the three entries of L and g by Levenberg–Marquardt, F linear inside it. L in place of two radii and an angle: a
-//! circle has no angle, and would stall the fit. 0 is the uniform pressure's g, ½ Hertz's.
-//!
+//! x₀, the three entries of L and g are fitted by Levenberg–Marquardt, F is linear. L replaces two radii and an angle,
+//! because the angle of a circle is undefined and would stall the fit. g = 0 is the uniform pressure, g = ½ Hertz's.
 //! | | shape | unit | range |
 //! |---|---|---|---|
 //! | in: b | n | MPa | finite |
 //! | out: μ | 2 | – | |μ| ≤ mu_max |
 //! | out: load | scalar | N | above 0 |
 //!
-//! Found first with few nodes, then a few steps with many. Where one contact does not explain the stress, but several
-//! ellipses do ([`super::multi_ellipse`]), their forces add up to that of the subarray.
+//! The fit first uses few nodes, then takes a few steps with many. Where one contact does not explain the stress but
+//! several ellipses do ([`super::multi_ellipse`]), their forces are added up.
 
 use super::disc::Disc;
 use super::fit::{fit, misfit, Fit, Model, THOROUGH};
@@ -33,14 +32,14 @@ use nalgebra::{DMatrix, DVector};
 pub(super) const COARSE_NODES: [usize; 2] = [5, 12];
 /// Rings and angles of the second.
 pub(super) const FINE_NODES: [usize; 2] = [8, 24];
-/// Starting radii over the depth.
+/// Initial radii in units of the depth.
 const START_RADII: [f64; 4] = [0.5, 1.0, 1.7, 2.7];
-/// Least and largest g.
+/// Smallest and largest g.
 const EXPONENT_RANGE: [f64; 2] = [0.0, 2.0];
-/// Smallest radius over the depth; below, a contact cannot be told from a point.
+/// Smallest radius in units of the depth; a smaller contact cannot be told from a point.
 const MIN_RADIUS: f64 = 0.1;
 
-/// The objective.
+/// The objective `patch`.
 #[derive(Clone, Debug)]
 pub struct Patch {
     taxels: Taxels,
@@ -49,28 +48,28 @@ pub struct Patch {
 }
 
 impl Patch {
-    /// For subarrays of one shape under a medium.
+    /// The objective for subarrays of the shape of `sensor` under `medium`.
     pub fn new(sensor: &Sensor, medium: Medium) -> Patch {
         let [coarse, fine] = [COARSE_NODES, FINE_NODES].map(|[rings, angles]| Disc::new(rings, angles));
         Patch { taxels: Taxels::new(sensor, medium), coarse, fine }
     }
 }
 
-/// θ = x₀, y₀, L₁₁, L₂₂, L₁₂, g in mm, mm, mm, mm, mm, –.
+/// Length of θ = x₀, y₀, L₁₁, L₂₂, L₁₂, g: five in mm, g without unit.
 pub(crate) const PARAMETERS: usize = 6;
 
-/// Stress of the patch.
+/// Stress model of one elliptic contact.
 pub(crate) struct Ellipse<'a> {
     pub taxels: &'a Taxels,
     pub disc: &'a Disc,
 }
 
-/// The place of a node.
+/// Position of a node of the unit disc on the ellipse, in mm.
 pub(super) fn node_position(theta: &[f64], [u, v]: [f64; 2]) -> [f64; 2] {
     [theta[0] + theta[2] * u + theta[4] * v, theta[1] + theta[4] * u + theta[3] * v]
 }
 
-/// Holds the centre inside the array and the ellipse to sizes that can be seen.
+/// Clamps the centre to the array and the radii to sizes that the taxels can resolve.
 pub(super) fn confine_ellipse(taxels: &Taxels, theta: &mut [f64]) {
     let reach = |positions: &[f64]| positions.iter().fold(0.0f64, |reach, x| x.abs().max(reach));
     let (x, y) = (reach(&taxels.x), reach(&taxels.y));
@@ -81,7 +80,7 @@ pub(super) fn confine_ellipse(taxels: &Taxels, theta: &mut [f64]) {
     theta[3] = theta[3].clamp(radii[0], radii[1].max(radii[0]));
     // Positive definite, with the shorter radius at least a tenth of the longer.
     let most = 0.9 * (theta[2] * theta[3]).sqrt();
-    // Not clamp: a fit that has left the numbers has no bounds, and is judged by its misfit.
+    // Not `clamp`, which panics on NaN bounds: such a fit is rejected by its misfit.
     theta[4] = theta[4].max(-most).min(most);
 }
 
@@ -96,7 +95,7 @@ impl Ellipse<'_> {
         columns
     }
 
-    /// Derivatives of the stress under a force with respect to θ.
+    /// Derivatives of the stress under a force by θ.
     pub fn derivatives(&self, theta: &[f64], force: [f64; 3]) -> [Vec<f64>; PARAMETERS] {
         let n = self.taxels.count();
         let mut out = [(); PARAMETERS].map(|()| vec![0.0; n]);
@@ -143,7 +142,7 @@ pub(super) fn matrix<const K: usize>(columns: [Vec<f64>; K]) -> DMatrix<f64> {
 }
 
 impl Patch {
-    /// The fitted contact, and the fit's evaluations of both stages together.
+    /// The fitted contact; the evaluations are those of both stages.
     fn fit(&self, b: &DVector<f64>, centre: [f64; 2]) -> Option<Fit> {
         let taxels = &self.taxels;
         let mut model = Ellipse { taxels, disc: &self.coarse };
@@ -161,7 +160,7 @@ impl Patch {
 }
 
 impl Objective for Patch {
-    /// `None`: a patch is judged against the stress, not by forces on taxels.
+    /// `None`: a patch is compared with the stress, not scored by forces on taxels.
     fn score(&self, _p: &[f64]) -> Option<f64> {
         None
     }
@@ -217,7 +216,7 @@ mod tests {
             let found = Patch::new(&sensor, medium).find(&input).unwrap();
             let [tx, ty, load] = frame.resultant_N.unwrap();
             let off = (found.found.mu[0] - tx / load).hypot(found.found.mu[1] - ty / load);
-            // The quadrature of the fit is good to 1e-4 of the peak.
+            // The quadrature of the fit is accurate to 1e-4 of the peak.
             assert!(off < 0.005 && (found.load_N.unwrap() / load - 1.0).abs() < 0.005, "{medium}: {found:?}");
             assert!(-found.found.objective <= misfit_limit(b, 0.0));
         }

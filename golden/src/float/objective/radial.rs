@@ -1,21 +1,21 @@
-//! Radial: the kernels of a bonded layer for many evaluations, by cubic pieces.
+//! Radial: the kernels of a bonded layer as a table of cubic pieces, for fast evaluation.
 //!
-//! gn, gs and their slopes are tabulated every 1/64 of h; between, Hermite's cubic. Its error is step⁴/384 of the
-//! fourth derivative, which is some 200 peaks per h⁴: 3e-8 of the peak, a thousand times below what a fit can tell.
+//! gn, gs and their derivatives are tabulated every h/64, with Hermite's cubic in between. Its error is step⁴/384 of
+//! the fourth derivative, which is about 200 peaks per h⁴: 3e-8 of the peak, a thousandth of what a fit can resolve.
 //!
 //! | | shape | unit |
 //! |---|---|---|
 //! | in: r | scalar | h |
-//! | out: gn, gs, their slopes | 2, 2 | per h², per h³, per h more |
+//! | out: gn, gs, their derivatives | 2, 2 | per h², per h³, per h more |
 
 use crate::bonded::kernel::{Kernel, REACH};
 
 /// Pieces per h.
 const PIECES: usize = 64;
-/// Step of the slopes' central differences, in h: truncation and rounding are both about 1e-10.
+/// Step of the central differences in h: truncation and rounding are both about 1e-10.
 const STEP: f64 = 1e-5;
 
-/// Values and slopes of both kernels at the ends of the pieces.
+/// Values and derivatives of both kernels at the ends of the pieces.
 #[derive(Clone, Debug)]
 pub(crate) struct Radial(Vec<[[f64; 2]; 2]>);
 
@@ -28,7 +28,7 @@ impl Radial {
             let value = kernel.at(r);
             [0, 1].map(|k| [value[k], (after[k] - before[k]) / (2.0 * STEP)])
         };
-        // One piece more, so that r = REACH has an end.
+        // One more piece, so that r = REACH has an end.
         Radial((0..=REACH as usize * PIECES + 1).map(end).collect())
     }
 
@@ -37,7 +37,7 @@ impl Radial {
         self.with_slopes(r).0
     }
 
-    /// gn and gs at r, and their slopes; zero out of reach.
+    /// gn and gs at r, and their derivatives; zero from [`REACH`] on.
     pub fn with_slopes(&self, r: f64) -> ([f64; 2], [f64; 2]) {
         if r.is_nan() || r >= REACH {
             return ([0.0; 2], [0.0; 2]);

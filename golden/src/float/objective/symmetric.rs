@@ -1,21 +1,22 @@
-//! Symmetric: a contact's pressure is the same on opposite sides of its centre.
+//! Symmetric: the pressure of a contact is assumed equal on opposite sides of its centre.
 //!
-//! Two stages. The shared search over μ, with q the Gaussian-smoothed p(μ) (width s) and x₀ its peak, scores by the
-//! odd derivatives of third order, in units of s:
+//! There are two stages. The first is the shared search over μ. With q the Gaussian-smoothed p(μ) (width s) and x₀ its
+//! peak, the score is made of the odd derivatives of third order, in units of s:
 //!
 //! ```text
 //! Π = −‖[q_xxx, 1.7 q_xxy, 1.7 q_xyy, q_yyy]/q‖²  at x₀
 //! ```
 //!
-//! Its p lives on cells; where the pitch exceeds the depth their coarseness looks like shear (aliasing). So the best μ
-//! is only a start. The second stage asks the same of the stress itself: the pressure is an even polynomial e(u) times
-//! (1 − |u|²)^½ on an ellipse x = x₀ + L u, seen by the taxels where they are,
+//! p is given on cells; where the pitch exceeds the depth, their coarseness looks like shear (aliasing), so the best μ
+//! is only a start. The second stage fits the stress itself: the pressure is an even polynomial e(u) times (1 − |u|²)^½
+//! on an ellipse x = x₀ + L u,
 //!
 //! ```text
 //! min over x₀, μ, L, e of ‖b − (μ1 Kx + μ2 Ky + Kz) e(u)(1 − |u|²)^½‖²
 //! ```
 //!
-//! with x₀, μ and the symmetric L by Levenberg–Marquardt and the coefficients of e linear inside (variable projection).
+//! with x₀, μ and the symmetric L by Levenberg–Marquardt and the coefficients of e by linear least squares (variable
+//! projection).
 //!
 //! | | shape | unit | range |
 //! |---|---|---|---|
@@ -33,18 +34,18 @@ use crate::scene::Medium;
 use crate::sensor::Sensor;
 use nalgebra::DVector;
 
-/// Width of the smoothing over the depth.
+/// Width of the smoothing in units of the depth.
 const WIDTH: f64 = 2.0;
 /// Weight of the mixed derivatives: √3, that of a rotation-invariant norm of third order.
 const MIXED: f64 = 1.732;
 /// Newton steps to the peak of q.
 const PEAK_STEPS: usize = 4;
-/// Starting radii of the support over the depth.
+/// Initial radii of the ellipse in units of the depth.
 const SUPPORTS: [f64; 2] = [1.2, 2.4];
 /// Rings and angles of the quadrature.
 const NODES: [usize; 2] = [5, 14];
 
-/// The objective.
+/// The objective `symmetric`.
 #[derive(Clone, Debug)]
 pub struct Symmetric {
     taxels: Taxels,
@@ -52,12 +53,13 @@ pub struct Symmetric {
 }
 
 impl Symmetric {
-    /// For subarrays of one shape under a medium.
+    /// The objective for subarrays of the shape of `sensor` under `medium`.
     pub fn new(sensor: &Sensor, medium: Medium) -> Symmetric {
         Symmetric { taxels: Taxels::new(sensor, medium), disc: Disc::new(NODES[0], NODES[1]) }
     }
 
-    /// Derivatives of q at a place, in units of the width: orders 0, 1 (2), 2 (3), 3 (4).
+    /// Derivatives of q at a position, in units of the width: order 0, two of order 1, three of order 2, four of order
+    /// 3.
     fn derivatives(&self, p: &[f64], place: [f64; 2]) -> [f64; 10] {
         let width = WIDTH * self.taxels.depth;
         let mut out = [0.0; 10];
@@ -75,7 +77,7 @@ impl Symmetric {
         out
     }
 
-    /// The peak of q near the centroid of the pressing p.
+    /// The peak of q near the centroid of the compressive p, in mm.
     fn peak(&self, p: &[f64]) -> [f64; 2] {
         let width = WIDTH * self.taxels.depth;
         let largest = p.iter().copied().fold(0.0, f64::max);
@@ -96,7 +98,7 @@ impl Symmetric {
         place
     }
 
-    /// The second stage from a start, for the best support.
+    /// The second stage, started from x₀ and μ; the better of two initial radii.
     fn refine(&self, input: &SearchInput, start: [f64; 4]) -> Option<Fit> {
         let b = DVector::from_column_slice(input.b);
         let (mut best, mut evaluations): (Option<Fit>, usize) = (None, 0);
@@ -150,7 +152,7 @@ mod tests {
         Scene::builtin("sensor-1").unwrap().sensor
     }
 
-    /// A pressure on every cell, from its place in mm.
+    /// The pressure on every cell as a function of its position in mm.
     fn pressure(value: impl Fn(f64, f64) -> f64) -> Vec<f64> {
         let sensor = sensor();
         let place = |k: usize| sensor.position_mm(k / sensor.cols, k % sensor.cols);
@@ -210,7 +212,7 @@ mod tests {
         let (x, y) = (free.found.mu[0] - tx / load, free.found.mu[1] - ty / load);
         assert!(x.hypot(y) <= 0.02 * (tx / load).hypot(ty / load), "{free:?}");
         assert!((free.load_N.unwrap() / load - 1.0).abs() < 0.01, "{free:?}");
-        // More than the search alone: the fit is counted too.
+        // The evaluations of the fit are added to those of the search.
         assert!(free.found.evaluations > 85 && free.found.objective <= 0.0, "{free:?}");
         let held = find(0.05);
         assert!(held.found.mu[0].hypot(held.found.mu[1]) <= 0.05 * (1.0 + 1e-12), "{held:?}");

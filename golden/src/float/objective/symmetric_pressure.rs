@@ -1,4 +1,4 @@
-//! Even: stress of an even pressure on an ellipse, what `symmetric` fits in its second stage.
+//! Symmetric pressure on an ellipse, and its stress: the second stage of `symmetric` fits it.
 //!
 //! Pressure e(u)(1 − |u|²)^½, e an even polynomial, on x = x₀ + L u; shear μ times the pressure.
 //!
@@ -13,21 +13,21 @@ use super::patch::{confine_ellipse, node_position};
 use super::taxels::Taxels;
 use nalgebra::{DMatrix, DVector};
 
-/// Coefficients of e: 1, u², uv, v². Fourth powers would show shear and shape to be alike: they double the error with
-/// noise.
+/// Powers (of u, of v) of e's terms: 1, u², uv, v². With fourth powers shear and shape are hard to tell apart, which
+/// doubles the error with noise.
 const TERMS: [(i32, i32); 4] = [(0, 0), (2, 0), (1, 1), (0, 2)];
 
-/// Stress of an even pressure; θ = x₀, y₀, L₁₁, L₂₂, L₁₂, μ1, μ2.
+/// Stress model of a symmetric pressure; θ = x₀, y₀, L₁₁, L₂₂, L₁₂, μ1, μ2.
 pub(super) struct SymmetricPressure<'a> {
     taxels: &'a Taxels,
     disc: &'a Disc,
     mu_max: f64,
-    /// Load of each node under each coefficient: nodes × 4.
+    /// Load of each node per unit coefficient: nodes × 4.
     basis: DMatrix<f64>,
 }
 
 impl<'a> SymmetricPressure<'a> {
-    /// With a pressure on the nodes of `disc`.
+    /// A model with its pressure on the nodes of `disc`; |μ| is limited to `mu_max`.
     pub fn new(taxels: &'a Taxels, disc: &'a Disc, mu_max: f64) -> SymmetricPressure<'a> {
         let (weights, _) = disc.weights(0.5);
         let basis = DMatrix::from_fn(weights.len(), TERMS.len(), |node, term| {
@@ -37,7 +37,7 @@ impl<'a> SymmetricPressure<'a> {
         SymmetricPressure { taxels, disc, mu_max, basis }
     }
 
-    /// Σ of the pressure.
+    /// Total load of the pressure with the given coefficients.
     pub fn load(&self, coefficients: &DVector<f64>) -> f64 {
         (&self.basis * coefficients).sum()
     }
@@ -95,7 +95,8 @@ mod tests {
     use super::*;
     use crate::scene::{Medium, Scene};
 
-    /// Central differences of step 10⁻⁴ mm: truncation (10⁻⁴/h)² ≈ 10⁻⁹ and rounding 10⁻¹⁶/10⁻⁴, with a margin of 10³.
+    /// Central differences with steps of 10⁻⁴ mm: truncation (10⁻⁴/h)² ≈ 10⁻⁹ and rounding 10⁻¹⁶/10⁻⁴, with a margin of
+    /// 10³.
     const SLOPE_TOLERANCE: f64 = 1e-6;
 
     #[test]

@@ -1,4 +1,4 @@
-//! Taxels: where the array reads, and the stress there of point forces on the body above.
+//! Taxels: their positions, and the stress there of point forces on the elastic body.
 //!
 //! With d from force to taxel, on a half-space and on a bonded layer of thickness h ([`crate::bonded::kernel`]):
 //!
@@ -8,8 +8,8 @@
 //!
 //! | | shape | unit |
 //! |---|---|---|
-//! | in: place, force | 2, 3 | mm, N |
-//! | out: b and its derivatives with respect to the place | 3 × n | MPa, MPa/mm |
+//! | in: position, force | 2, 3 | mm, N |
+//! | out: b and its derivatives by the position | 3 × n | MPa, MPa/mm |
 
 use super::radial::Radial;
 use crate::bonded::kernel::Kernel;
@@ -17,21 +17,21 @@ use crate::scene::Medium;
 use crate::sensor::Sensor;
 use std::f64::consts::TAU;
 
-/// Positions of the taxels in mm from the array's centre.
+/// Positions of the taxels, and the medium above them.
 #[derive(Clone, Debug)]
 pub struct Taxels {
-    /// Along the columns.
+    /// x of each taxel in mm from the array's centre, row-major.
     pub x: Vec<f64>,
-    /// Along the rows.
+    /// y of each taxel in mm from the array's centre, row-major.
     pub y: Vec<f64>,
-    /// Depth under the surface.
+    /// Depth of the taxels under the surface in mm.
     pub depth: f64,
-    /// Kernels of a bonded layer, none of a half-space.
+    /// Kernels of a bonded layer; `None` for a half-space.
     layer: Option<Radial>,
 }
 
 impl Taxels {
-    /// The taxels of an array under a body.
+    /// The taxels of `sensor` under `medium`.
     pub fn new(sensor: &Sensor, medium: Medium) -> Taxels {
         let place = |index: usize| sensor.position_mm(index / sensor.cols, index % sensor.cols);
         let (x, y) = (0..sensor.taxels()).map(place).map(|[x, y]| (x, y)).unzip();
@@ -47,7 +47,7 @@ impl Taxels {
         self.x.len()
     }
 
-    /// Adds the stress of unit forces along x, y and z at `place`, times `weight`, to three columns.
+    /// Adds the stress in MPa of forces of 1 N along x, y and z at `place` (mm), times `weight`, to three columns.
     pub fn add_unit_forces(&self, place: [f64; 2], weight: f64, columns: &mut [Vec<f64>; 3]) {
         let h = self.depth;
         let [cx, cy, cz] = columns;
@@ -77,7 +77,8 @@ impl Taxels {
         }
     }
 
-    /// Stress of `force` (x, y, z) at `place`, and its derivatives with respect to that place, into three vectors.
+    /// Writes the stress of `force` (x, y, z in N) at `place` (mm) and its derivatives by x and y of the position to
+    /// three vectors.
     pub fn field(&self, place: [f64; 2], force: [f64; 3], out: &mut [Vec<f64>; 3]) {
         let h = self.depth;
         let [value, along_x, along_y] = out;
