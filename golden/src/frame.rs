@@ -1,6 +1,7 @@
-//! Frame: one picture of stress, with what is known about the contact behind it.
+//! Frame: the stress on every taxel at one moment, with what is known about the contacts.
 //!
-//! Three sources: JSON files with truth, CSV files of rows × cols stresses, and the paper's Eq. 2.
+//! Frames come from JSON files with known forces, CSV files of rows × cols stresses, the generator and the paper's Eq.
+//! 2.
 //!
 //! | field | shape | unit | range |
 //! |---|---|---|---|
@@ -8,8 +9,8 @@
 //! | cell forces | 3 × taxels | N | finite, on the body |
 //! | resultant | 3 | N | finite, [x, y, normal] of the whole contact |
 //!
-//! A loaded frame is finite and has as many stresses as its sensor has taxels; whether its sensor is the scene's is
-//! asked by [`Frame::check`].
+//! A loaded frame is finite and has as many stresses as its sensor has taxels; [`Frame::check`] compares its sensor
+//! with the scene's.
 
 mod csv;
 mod error;
@@ -28,28 +29,28 @@ use serde::{Deserialize, Serialize};
 /// One force vector per taxel, row-major, in N.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Forces {
-    /// Along x, on the body.
+    /// Forces along x on the elastic body, N.
     pub fx: Vec<f64>,
-    /// Along y, on the body.
+    /// Forces along y on the elastic body, N.
     pub fy: Vec<f64>,
-    /// Normal, positive pressing in.
+    /// Normal forces, N; compression is positive.
     pub fz: Vec<f64>,
 }
 
 impl Forces {
-    /// No force on any of `taxels` taxels.
+    /// Zero force on each of `taxels` taxels.
     pub fn zeros(taxels: usize) -> Forces {
         let zero = || vec![0.0; taxels];
         Forces { fx: zero(), fy: zero(), fz: zero() }
     }
 
-    /// Sum over the taxels, [x, y, normal].
+    /// Sum over the taxels in N, [x, y, normal].
     pub fn resultant(&self) -> [f64; 3] {
         [&self.fx, &self.fy, &self.fz].map(|axis| axis.iter().sum())
     }
 }
 
-/// A contact as the frame's author describes it: input of [`crate::generator`], carried along everywhere else.
+/// A contact as the author of a frame describes it: input of [`crate::generator`], passed through by everything else.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct Contact {
@@ -57,50 +58,51 @@ pub struct Contact {
     pub shape: Option<String>,
     /// Centre in mm from the array's centre.
     pub centre_mm: Option<[f64; 2]>,
-    /// Sizes in mm, meaning by shape.
+    /// Sizes in mm; the shape defines their meaning, see [`crate::generator`].
     pub size_mm: Vec<f64>,
     /// Normal load in N.
     pub normal_N: Option<f64>,
     /// Tangential load in N.
     pub tangential_N: Option<[f64; 2]>,
-    /// How the shear is distributed.
+    /// Distribution of the shear, see [`crate::generator`].
     pub kind_of_slip: Option<String>,
-    /// Coefficient of friction, where the slip is partial.
+    /// Coefficient of friction, for partial slip.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub friction: Option<f64>,
-    /// Angle of the shape in radians, where it is not part of its sizes.
+    /// Angle of the shape in radians, if it is not part of its sizes.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub rotation_rad: Option<f64>,
 }
 
-/// Stress on every taxel at one moment.
+/// The stress on every taxel at one moment.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Frame {
     /// Name in reports.
     pub id: String,
-    /// Body the stress was computed for, where it is known.
+    /// Elastic body for which the stress was computed, if known.
     pub medium: Option<Medium>,
-    /// How the stress was obtained.
+    /// Origin of the stress, if known.
     pub source: Option<String>,
-    /// The array it was read with.
+    /// The taxel array that read the stress.
     pub sensor: Sensor,
-    /// The contacts, where they are known.
+    /// The contacts, if known.
     pub contacts: Vec<Contact>,
-    /// True force of the whole contact in N.
+    /// True resultant of all contacts in N, [x, y, normal], if known.
     pub resultant_N: Option<[f64; 3]>,
-    /// True force on each cell in N.
+    /// True force on each cell in N, if known.
     pub cell_forces_N: Option<Forces>,
-    /// Compression under each taxel in MPa, row-major.
+    /// Normal stress on each taxel in MPa, row-major; compression is positive.
     pub stress_MPa: Vec<f64>,
-    /// Remarks of the author.
+    /// Remarks of the frame's author.
     pub notes: Option<String>,
 }
 
 impl Frame {
-    /// A frame that is nothing but stress, e.g. from a running sensor.
+    /// A frame of stress alone, e.g. from a running sensor; `stress_MPa` is row-major, `id` the name in reports and
+    /// errors.
     ///
     /// # Errors
-    /// A wrong count or a value that is not finite; `id` stands for the file.
+    /// [`FrameError::WrongCount`] or [`FrameError::NotFinite`], with `id` in place of a file name.
     pub fn from_stress(id: &str, sensor: &Sensor, stress_MPa: Vec<f64>) -> Result<Frame, FrameError> {
         let frame = Frame {
             id: id.to_string(),
@@ -117,7 +119,8 @@ impl Frame {
         Ok(frame)
     }
 
-    /// The paper's Eq. 2: S(x, y) = 10⁶ (y sin 100x + x cos 100y) N/m², x and y in metres from the first taxel.
+    /// The stress of the paper's Eq. 2: S(x, y) = 10⁶ (y sin 100x + x cos 100y) N/m², x and y in metres from the first
+    /// taxel.
     pub fn eq2(sensor: &Sensor) -> Frame {
         const M_PER_MM: f64 = 1e-3;
         let stress = |index: usize| {
@@ -144,10 +147,11 @@ impl Frame {
         self.stress_MPa.iter().fold(0.0, |peak, b| b.abs().max(peak))
     }
 
-    /// Checks that the frame was read with the scene's sensor.
+    /// Checks that the frame's sensor is the scene's and that its values are finite and complete.
     ///
     /// # Errors
-    /// [`FrameError::SensorMismatch`], which prints both.
+    /// [`FrameError::SensorMismatch`], which prints both sensors; [`FrameError::WrongCount`],
+    /// [`FrameError::NotFinite`].
     pub fn check(&self, scene: &Scene) -> Result<(), FrameError> {
         if self.sensor != scene.sensor {
             return Err(FrameError::SensorMismatch {
@@ -160,7 +164,7 @@ impl Frame {
         self.check_values(&self.id)
     }
 
-    /// Checks counts and values, which the fields being public cannot promise.
+    /// Checks counts and values; the fields are public and may have been changed.
     fn check_values(&self, file: &str) -> Result<(), FrameError> {
         let forces = self.cell_forces_N.iter().flat_map(|forces| {
             [("cell_forces_N.fx", &forces.fx), ("cell_forces_N.fy", &forces.fy), ("cell_forces_N.fz", &forces.fz)]

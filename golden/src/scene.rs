@@ -1,6 +1,6 @@
-//! Scene: everything a run needs to know about sensor, method, number formats and hardware, from a TOML file.
+//! Scene: sensor, method, number formats and hardware of a run, read from a TOML file.
 //!
-//! Every table but `[sensor]` has defaults; an unknown field, a value out of range or a wrong type is an error that
+//! Every table except `[sensor]` has defaults. An unknown field, a value out of range or a wrong type is an error that
 //! names the file, the field and what is allowed. Sizes are checked here, before anything of their size is allocated.
 //!
 //! | table | fields (default) |
@@ -9,14 +9,14 @@
 //! | `[sensor]` | `rows`, `cols` (2 … 256), `pitch_x_mm`, `pitch_y_mm`, `thickness_mm` (0 … 10⁶] |
 //! | `[medium]` | `kind` ("half-space"; "bonded-layer" with `poisson`, 0.48) |
 //! | `[partition]` | `case` (0; 1 … 3, "adaptive", "contacts") or `rows`, `cols` |
-//! | | `cases` (of "adaptive": 0 and others of 1 … 3, what hardware builds; without it all that fit together) |
+//! | | `cases` (for "adaptive": 0 and others of 1 … 3 for the hardware; without it as many as fit together) |
 //! | | `condition` ("loaded"; "both-signs") |
 //! | `[search]` | `objective` ("sparse"; …), `mu_max` (0.6; 0, or 0.001 … 2), `noise_floor_MPa` (0) |
 //! | | `form` ("oblique"; "orthogonal") |
 //! | `[inverse]` | `kind` ("tsvd"; "tikhonov", "exact"), `level` (floor of format and noise; 0 … 1, both excluded) |
 //! | `[threshold]` | `min_force_N` (0) |
 //! | `[fixed]` | `input_bits` (20; 8 … 24), `data_bits` (18; 12 … 18), `coef_bits` (18; 8 … 18) |
-//! | | `inverse_bits` (24; `coef_bits` … 32), `prune_bits` (20; 8 … 31), `lanes` (what the board allows; 4, 8 … 1024) |
+//! | | `inverse_bits` (24; `coef_bits` … 32), `prune_bits` (20; 8 … 31), `lanes` (as many as fit; 4, 8 … 1024) |
 //! | `[hardware]` | `board` ("ulx3s-85f"), `link` ("uart"; "spi"), `coefficient_check` ("none"; "signature") |
 //! | `[input]` | `full_scale_MPa` (the frame's peak), `average` (0 … 12), `calibration`, `tare` (files), `dead` |
 //! | | (\[row, col\] each), `unipolar` (false) |
@@ -42,30 +42,30 @@ use serde::{Deserialize, Serialize};
 use std::fmt;
 use std::path::PathBuf;
 
-/// One complete set of choices.
+/// One scene, all fields checked and defaults filled in.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Scene {
     /// Name in reports.
     pub name: String,
     /// The taxel array.
     pub sensor: Sensor,
-    /// What lies between surface and taxels.
+    /// The elastic body between surface and taxels.
     pub medium: Medium,
-    /// How the array is cut and when a subarray is searched.
+    /// Partition of the array, and the condition under which a subarray is searched.
     pub partition: PartitionSpec,
     /// Objective and range of the μ search.
     pub search: SearchSpec,
-    /// Which singular values are inverted.
+    /// Kind and level of the pseudo-inverse.
     pub inverse: InverseSpec,
-    /// Forces too small to report.
+    /// Threshold below which forces are reported as zero.
     pub threshold: ThresholdSpec,
     /// Widths of the fixed-point pipeline.
     pub fixed: FixedSpec,
     /// Target of the generated hardware.
     pub hardware: HardwareSpec,
-    /// Meaning of the input codes.
+    /// Scale, calibration and averaging of the input.
     pub input: InputSpec,
-    /// What a result holds.
+    /// Contents of a result.
     pub output: OutputSpec,
 }
 
@@ -73,21 +73,21 @@ pub struct Scene {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "kind", rename_all = "kebab-case")]
 pub enum Medium {
-    /// Infinitely deep; the stress holds for any Poisson ratio.
+    /// Infinitely deep; the normal stress does not depend on the Poisson ratio.
     #[default]
     HalfSpace,
     /// A layer of the sensor's thickness on a rigid base.
     BondedLayer {
-        /// Poisson ratio, at least 0 and below 0.5.
+        /// Poisson ratio, above 0 and below 0.5.
         poisson: f64,
     },
 }
 
 impl Medium {
-    /// What [`Medium::allows_poisson`] accepts, for messages.
+    /// The range of [`Medium::allows_poisson`] in words, for messages.
     pub const POISSON_ALLOWED: &'static str = "a number above 0 and below 0.5";
 
-    /// Whether a bonded layer may have this Poisson ratio, in scenes and frames alike.
+    /// Whether a bonded layer may have this Poisson ratio, in scenes and in frames.
     pub fn allows_poisson(poisson: f64) -> bool {
         poisson > 0.0 && poisson < 0.5
     }
@@ -102,20 +102,20 @@ impl fmt::Display for Medium {
     }
 }
 
-/// When a subarray's μ is searched.
+/// The condition under which a subarray's μ is searched.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Condition {
-    /// Wherever the load exceeds the noise floor.
+    /// Some |stress| exceeds the noise floor.
     #[default]
     Loaded,
-    /// The paper's centroid condition: compression and tension both exceed it.
+    /// The paper's centroid condition: compression and tension both exceed the noise floor.
     BothSigns,
 }
 
-/// What the μ search maximises.
+/// The objective that the μ search maximises; see [`crate::float::objective`].
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum ObjectiveKind {
-    /// Forces on few taxels.
+    /// Force on few taxels.
     #[default]
     Sparse,
     /// No tensile forces.
@@ -131,32 +131,33 @@ pub enum ObjectiveKind {
 /// How Eq. 1 is computed.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Form {
-    /// p = Cz⁺ b and its series in μ, a quarter of the storage.
+    /// p = Cz⁺ b and its series in μ, with a quarter of the storage.
     #[default]
     Oblique,
-    /// C†b + (I − C†C) w, as printed.
+    /// C†b + (I − C†C) w, as the paper prints it.
     Orthogonal,
 }
 
 /// Table `[partition]`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PartitionSpec {
-    /// Which subarrays.
+    /// The partition into subarrays.
     pub case: Case,
-    /// Of [`Case::Adaptive`], the paper's cases to choose from, 0 among them; `None` where the scene lists none.
+    /// For [`Case::Adaptive`]: which of the paper's cases 0 to 3 may be chosen, 0 among them; `None` if the scene lists
+    /// none.
     pub listed: Option<[bool; 4]>,
-    /// When a subarray is searched.
+    /// The condition under which a subarray is searched.
     pub condition: Condition,
 }
 
 /// Table `[search]`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SearchSpec {
-    /// What is maximised.
+    /// The objective that is maximised.
     pub objective: ObjectiveKind,
-    /// Largest ratio of shear to normal force, 0.001 to 2; or 0, which asks for no shear and for no search.
+    /// Largest ratio of shear to normal force, 0.001 to 2; 0 means no shear and no search.
     pub mu_max: f64,
-    /// Stress in MPa that counts as none.
+    /// Stress in MPa up to which a reading counts as noise, ≥ 0.
     pub noise_floor_MPa: f64,
     /// How Eq. 1 is computed.
     pub form: Form,
@@ -165,34 +166,35 @@ pub struct SearchSpec {
 /// Table `[threshold]`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ThresholdSpec {
-    /// Smallest normal force in N that is reported.
+    /// Smallest normal force in N that is reported, ≥ 0.
     pub min_force_N: f64,
 }
 
 /// Table `[fixed]`: widths in bits, signs included.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct FixedSpec {
-    /// Converter codes.
+    /// Width of the converter's codes, 8 to 24.
     pub input_bits: u32,
-    /// Vectors between the stages.
+    /// Width of the vectors between the stages, 12 to 18.
     pub data_bits: u32,
-    /// Coefficients of Ax and Ay.
+    /// Width of the coefficients of Ax and Ay, 8 to 18.
     pub coef_bits: u32,
-    /// Coefficients of Cz⁺, taken in limbs.
+    /// Width of the coefficients of Cz⁺, `coef_bits` to 32; multiplied in two limbs.
     pub inverse_bits: u32,
-    /// Columns whose coefficients all stay below 2^−`prune_bits` are not stored; 8 to 31.
+    /// Columns whose coefficients are all below 2^−`prune_bits` of the largest are not stored; 8 to 31.
     pub prune_bits: u32,
-    /// Matrix lanes, a multiple of 4; `None` takes as many as the board's multipliers and block RAMs allow.
+    /// Matrix lanes, a multiple of 4 from 4 to 1024; `None` takes as many as the board's multipliers and block RAMs
+    /// allow.
     pub lanes: Option<u32>,
 }
 
-/// Whether the hardware watches its coefficient memory.
+/// Whether the hardware checks its coefficient memory.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum CoefficientCheck {
-    /// It does not.
+    /// No check.
     #[default]
     None,
-    /// Each subarray's status tells when a word that was read is not what it was, see [`crate::fixed::check`].
+    /// The status of each subarray flags a changed coefficient word, see [`crate::fixed::check`].
     Signature,
 }
 
@@ -201,48 +203,48 @@ pub enum CoefficientCheck {
 pub struct HardwareSpec {
     /// One of [`crate::board::Board::names`].
     pub board: String,
-    /// What stands between the board and its host.
+    /// The link between the board and its host.
     pub link: LinkKind,
-    /// Whether the coefficient memory is watched.
+    /// Whether the coefficient memory is checked.
     pub coefficient_check: CoefficientCheck,
 }
 
 /// Table `[input]`; its meaning is in [`crate::input`].
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct InputSpec {
-    /// Stress in MPa of the largest code; `None` takes each frame's peak.
+    /// Stress in MPa of the largest code, above 0; `None` takes each frame's peak.
     pub full_scale_MPa: Option<f64>,
-    /// 2^average frames are averaged, 0 to 12.
+    /// 2^average frames are averaged; 0 to 12.
     pub average: u32,
-    /// Table of offsets and gains, found from the working folder.
+    /// Path of the table of offsets and gains, relative to the working folder.
     pub calibration: Option<PathBuf>,
-    /// Frame read without contact, found from the working folder.
+    /// Path of a frame read without contact, relative to the working folder.
     pub tare: Option<PathBuf>,
-    /// Taxels left out of the inverse, [row, col], sorted, each once, fewer than all.
+    /// Dead taxels, left out of the inverse: [row, col], sorted, without duplicates, fewer than all.
     pub dead: Vec<[usize; 2]>,
-    /// The sensor reads tension as zero.
+    /// Whether the sensor reads tension as zero.
     pub unipolar: bool,
 }
 
-/// Forces in a result.
+/// The forces that a result holds.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum ForceOutput {
-    /// One vector per taxel.
+    /// One force vector per taxel.
     #[default]
     Taxels,
-    /// One per subarray or contact, with its centre of pressure.
+    /// One force vector per subarray or contact, with its centre of pressure.
     Resultants,
 }
 
 /// Table `[output]`.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct OutputSpec {
-    /// Taxels or resultants.
+    /// Forces per taxel or resultants.
     pub forces: ForceOutput,
 }
 
 impl PartitionSpec {
-    /// The paper's cases that [`Case::Adaptive`] chooses from, where they divide `sensor`.
+    /// The paper's cases that [`Case::Adaptive`] may choose: those listed, or all, that divide `sensor`.
     pub fn choices(&self, sensor: &Sensor) -> Vec<Case> {
         let listed = |number: &i64| self.listed.is_none_or(|listed| listed[*number as usize]);
         let divides = |case: &Case| subarrays(*case, sensor).is_ok();
@@ -251,16 +253,16 @@ impl PartitionSpec {
 }
 
 impl InputSpec {
-    /// Noise of the mean of 2^average frames over that of a single one, 2^(−average/2).
+    /// Noise of the mean of 2^average frames relative to that of a single frame: 2^(−average/2).
     pub fn noise_share(&self) -> f64 {
         2f64.powf(-f64::from(self.average) / 2.0)
     }
 
-    /// The frame with 0 for what its dead taxels read: neither the peak nor the condition is to see it.
+    /// The frame with 0 MPa on its dead taxels, so that they affect neither the peak nor the condition.
     pub fn mask_dead(&self, mut frame: Frame) -> Frame {
         let cols = frame.sensor.cols;
         for [row, col] in &self.dead {
-            // A frame of another sensor may lack the taxel; it is refused where it is used.
+            // A frame of another sensor may lack the taxel; the frame is checked where it is used.
             frame.stress_MPa.get_mut(row * cols + col).into_iter().for_each(|b| *b = 0.0);
         }
         frame
@@ -316,7 +318,7 @@ impl ObjectiveKind {
 }
 
 impl Scene {
-    /// The default choices for a sensor.
+    /// The scene of a sensor with defaults for everything else; `name` is used in reports.
     pub fn of_sensor(sensor: &Sensor, name: &str) -> Scene {
         Scene {
             name: name.to_string(),

@@ -4,7 +4,7 @@ use super::error::check_count;
 use super::{Frame, FrameError};
 use crate::scene::Scene;
 
-/// Reads a frame of the scene's sensor; blank lines are passed over.
+/// Reads a frame of the scene's sensor; blank lines are ignored.
 pub(super) fn parse(text: &str, file: &str, stem: &str, scene: Option<&Scene>) -> Result<Frame, FrameError> {
     let sensor = match scene {
         Some(scene) => &scene.sensor,

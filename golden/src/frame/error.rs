@@ -1,9 +1,9 @@
-//! What can be wrong with a frame, each with file, field and value.
+//! Errors of frames; each names file, field and value.
 
 use crate::sensor::{Sensor, SensorError};
 use thiserror::Error;
 
-/// A frame that cannot be used.
+/// A frame cannot be used.
 #[derive(Debug, Error)]
 pub enum FrameError {
     /// The file cannot be read as text.
@@ -11,10 +11,10 @@ pub enum FrameError {
     Unreadable {
         /// Path as given.
         file: String,
-        /// The system's reason.
+        /// Error of the operating system.
         source: std::io::Error,
     },
-    /// More than a frame can have; refused before it is read.
+    /// The file is larger than a frame may be; it is rejected before it is read.
     #[error("{file}: over {limit} bytes, too large for a frame")]
     TooLarge {
         /// Path as given.
@@ -22,13 +22,13 @@ pub enum FrameError {
         /// Largest size in bytes.
         limit: u64,
     },
-    /// Neither `.json` nor `.csv`.
+    /// The file name ends in neither `.json` nor `.csv`.
     #[error("{file}: a frame's file name ends in .json or .csv")]
     UnknownKind {
         /// Path as given.
         file: String,
     },
-    /// Not JSON, cut short, or a value of the wrong type.
+    /// The text is not valid JSON, is truncated, or a value has the wrong type.
     #[error("{file}, line {line}, column {column}{}: {message}", in_field(field))]
     Json {
         /// Path as given.
@@ -37,12 +37,12 @@ pub enum FrameError {
         line: usize,
         /// Column, from 1.
         column: usize,
-        /// Path of the field, where the reader was in one.
+        /// Path of the field, if known.
         field: Option<String>,
-        /// What is wrong there.
+        /// Error of the JSON reader.
         message: String,
     },
-    /// A value out of its range.
+    /// A value is out of range.
     #[error("{file}: {field} = {value} is not allowed; it must be {allowed}")]
     WrongValue {
         /// Path as given.
@@ -51,16 +51,16 @@ pub enum FrameError {
         field: &'static str,
         /// The value found.
         value: f64,
-        /// What the field may hold.
+        /// The allowed values, in words.
         allowed: &'static str,
     },
-    /// The frame does not say which sensor it was read with, and no scene does either.
+    /// The file has no sensor, and no scene was given to take one from.
     #[error("{file}: no sensor in the file; name a scene")]
     NoSensor {
         /// Path as given.
         file: String,
     },
-    /// The frame's sensor has a size out of range.
+    /// A size of the frame's sensor is out of range.
     #[error("{file}: sensor.{source}")]
     Sensor {
         /// Path as given.
@@ -68,19 +68,19 @@ pub enum FrameError {
         /// Field, value and what is allowed.
         source: SensorError,
     },
-    /// More or fewer values than taxels.
+    /// A field has more or fewer values than the sensor has taxels.
     #[error("{file}: {field} has {got} values, wanted {wanted}")]
     WrongCount {
         /// Path as given.
         file: String,
         /// The field.
         field: String,
-        /// Values found.
+        /// Number of values found.
         got: usize,
-        /// Values the sensor asks for.
+        /// Number of values expected.
         wanted: usize,
     },
-    /// NaN or infinity.
+    /// A value is NaN or infinite.
     #[error("{file}: {field}[{index}] = {value} is not a finite number")]
     NotFinite {
         /// Path as given.
@@ -92,7 +92,7 @@ pub enum FrameError {
         /// The value.
         value: f64,
     },
-    /// A CSV cell that is no finite number.
+    /// A CSV cell is not a finite number.
     #[error("{file}, line {line}, value {column}: {value:?} is not a finite number{hint}")]
     CsvValue {
         /// Path as given.
@@ -103,24 +103,24 @@ pub enum FrameError {
         column: usize,
         /// The text found.
         value: String,
-        /// A guess at the reason, or nothing.
+        /// A likely reason, or empty.
         hint: &'static str,
     },
-    /// A CSV line with more or fewer values than columns.
+    /// A CSV line has more or fewer values than the sensor has columns.
     #[error("{file}, line {line}: {got} values, wanted {wanted}{hint}")]
     CsvRagged {
         /// Path as given.
         file: String,
         /// Line, from 1.
         line: usize,
-        /// Values found.
+        /// Number of values found.
         got: usize,
-        /// The sensor's columns.
+        /// Number of columns of the sensor.
         wanted: usize,
-        /// A guess at the reason, or nothing.
+        /// A likely reason, or empty.
         hint: &'static str,
     },
-    /// The frame was read with another sensor than the scene's.
+    /// The frame's sensor is not the scene's.
     #[error(
         "frame {frame} and scene {scene} disagree: the frame's sensor is {frame_sensor}, the scene's is {scene_sensor}"
     )]
@@ -136,12 +136,12 @@ pub enum FrameError {
     },
 }
 
-/// The field's path as it follows a place.
+/// The field's path as it follows line and column.
 fn in_field(field: &Option<String>) -> String {
     field.as_ref().map_or(String::new(), |field| format!(", {field}"))
 }
 
-/// Compares a count with the one wanted.
+/// Checks a number of values.
 pub(super) fn check_count(file: &str, field: &str, got: usize, wanted: usize) -> Result<(), FrameError> {
     if got == wanted {
         return Ok(());
@@ -149,7 +149,7 @@ pub(super) fn check_count(file: &str, field: &str, got: usize, wanted: usize) ->
     Err(FrameError::WrongCount { file: file.to_string(), field: field.to_string(), got, wanted })
 }
 
-/// Finds the first value that is not finite.
+/// Checks that all values are finite; the error names the first that is not.
 pub(super) fn check_finite(file: &str, field: &str, values: &[f64]) -> Result<(), FrameError> {
     match values.iter().position(|value| !value.is_finite()) {
         None => Ok(()),

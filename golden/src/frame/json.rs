@@ -1,12 +1,11 @@
-//! Frames in JSON. Read: only `stress_MPa` must be there; fields this version does not know are passed over, at the top
-//! and in every object below.
+//! Frames in JSON. Only `stress_MPa` is required; unknown fields are ignored, at the top level and in every object.
 
 use super::{Contact, Forces, Frame, FrameError};
 use crate::scene::{Medium, Scene};
 use crate::sensor::Sensor;
 use serde::{Deserialize, Serialize};
 
-/// The file's fields as they come.
+/// The fields of a file as read.
 #[derive(Deserialize)]
 struct Raw {
     id: Option<String>,
@@ -20,7 +19,7 @@ struct Raw {
     notes: Option<String>,
 }
 
-/// The file's fields as they are written.
+/// The fields of a file as written.
 #[derive(Serialize)]
 struct Written<'a> {
     id: &'a str,
@@ -53,12 +52,12 @@ impl Frame {
             stress_MPa: &self.stress_MPa,
             notes: self.notes.as_deref(),
         };
-        // Numbers, texts and lists of them always have a JSON form.
+        // Numbers, texts and lists of them can always be written as JSON.
         serde_json::to_string(&written).unwrap_or_default()
     }
 }
 
-/// Reads a frame; `stem` is its id when the text has none, the scene's sensor its sensor.
+/// Reads a frame; `stem` is its id if the text has none, and the scene's sensor is taken if the text has none.
 pub(super) fn parse(text: &str, file: &str, stem: &str, scene: Option<&Scene>) -> Result<Frame, FrameError> {
     let mut reader = serde_json::Deserializer::from_str(text);
     let raw: Raw = serde_path_to_error::deserialize(&mut reader).map_err(|error| {
@@ -93,7 +92,7 @@ pub(super) fn parse(text: &str, file: &str, stem: &str, scene: Option<&Scene>) -
     Ok(frame)
 }
 
-/// Whether the medium's numbers are in range.
+/// Whether the medium's Poisson ratio is in range.
 fn is_possible(medium: &Medium) -> bool {
     match *medium {
         Medium::HalfSpace => true,
@@ -101,7 +100,7 @@ fn is_possible(medium: &Medium) -> bool {
     }
 }
 
-/// The reader's error with its place once, in the words of JSON.
+/// The reader's error with line and column stated once, in the terms of JSON.
 fn wrong(file: &str, field: Option<String>, error: &serde_json::Error) -> FrameError {
     let (line, column) = (error.line(), error.column());
     let text = error.to_string();
@@ -110,7 +109,7 @@ fn wrong(file: &str, field: Option<String>, error: &serde_json::Error) -> FrameE
     FrameError::Json { file: file.to_string(), line, column: column.max(1), field, message: in_json_words(message) }
 }
 
-/// Replaces the reader's names of types by what a JSON file holds.
+/// Replaces Rust type names in a message by JSON terms.
 fn in_json_words(message: &str) -> String {
     let Some((before, expected)) = message.split_once("expected ") else {
         return message.to_string();

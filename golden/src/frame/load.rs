@@ -10,11 +10,11 @@ use std::path::Path;
 pub const LARGEST_FILE: u64 = 64 << 20;
 
 impl Frame {
-    /// Reads a frame from a `.json` or `.csv` file. A CSV file has no sensor of its own and takes the scene's, a JSON
-    /// file without one as well; whether two sensors agree is asked by [`Frame::check`].
+    /// Reads a frame from a `.json` or `.csv` file. A CSV file, or a JSON file without a sensor, takes the scene's;
+    /// [`Frame::check`] compares the sensors if both exist.
     ///
     /// # Errors
-    /// Every [`FrameError`] but `SensorMismatch`.
+    /// Any [`FrameError`] except `SensorMismatch`.
     pub fn load(path: impl AsRef<Path>, scene: Option<&Scene>) -> Result<Frame, FrameError> {
         let path = path.as_ref();
         let file = path.display().to_string();
@@ -25,7 +25,7 @@ impl Frame {
     /// Reads a frame from the text of a `.json` or `.csv` file called `name`, as [`Frame::load`] does.
     ///
     /// # Errors
-    /// As [`Frame::load`], but for those of the file system.
+    /// As [`Frame::load`], except those of the file system.
     pub fn parse(name: impl AsRef<Path>, text: &str, scene: Option<&Scene>) -> Result<Frame, FrameError> {
         let name = name.as_ref();
         Frame::parsed(parser(name)?, text, name, scene)
@@ -52,7 +52,7 @@ fn parser(path: &Path) -> Result<Parser, FrameError> {
     }
 }
 
-/// The file's text. A file that states no size, such as a pipe, is cut off at the limit all the same.
+/// The file's text. Files without a stated size, such as pipes, are read up to the limit.
 fn read(path: &Path, file: &str) -> Result<String, FrameError> {
     let unreadable = |source: Error| {
         let file = file.to_string();

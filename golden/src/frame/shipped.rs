@@ -1,4 +1,4 @@
-//! The frames that come with the crate.
+//! The frames that are embedded in the crate.
 
 use super::{json, Frame};
 use crate::scene::Scene;
@@ -7,7 +7,7 @@ use include_dir::{include_dir, Dir};
 static FRAMES: Dir = include_dir!("$CARGO_MANIFEST_DIR/data/frames");
 
 impl Frame {
-    /// The shipped frames read with the scene's sensor through the scene's medium, sorted by id.
+    /// The embedded frames of the scene's sensor and medium, sorted by id; all have a known resultant.
     pub fn shipped(scene: &Scene) -> Vec<Frame> {
         let mut frames: Vec<Frame> = texts()
             .filter_map(|(file, text)| json::parse(text, &file, &file, None).ok())
@@ -27,7 +27,7 @@ fn texts() -> impl Iterator<Item = (String, &'static str)> {
     })
 }
 
-/// Whether no shipped file is left out for an error.
+/// Whether every shipped file can be parsed.
 #[cfg(test)]
 pub(super) fn all_parse() -> bool {
     texts().all(|(file, text)| json::parse(text, &file, &file, None).is_ok())

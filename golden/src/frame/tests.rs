@@ -1,4 +1,4 @@
-//! Frames read and refused; each message names file, field or line, and value.
+//! Frames that are read or rejected; each message names file, field or line, and value.
 
 use super::*;
 use std::path::PathBuf;

@@ -1,88 +1,88 @@
-//! What can be wrong with a scene, each with file, field and value.
+//! Errors of scenes; each names file, field and value.
 
 use thiserror::Error;
 
-/// A scene that cannot be used.
+/// A scene cannot be used.
 #[derive(Debug, Error)]
 pub enum SceneError {
-    /// Neither a built-in name nor a file.
+    /// The name is neither that of a built-in scene nor that of a file.
     #[error("no scene {name:?}: not a file, and not built in ({}); did you mean {nearest:?}?", builtins.join(", "))]
     NotFound {
-        /// What was asked for.
+        /// The name or path given.
         name: String,
         /// Every built-in name.
         builtins: Vec<&'static str>,
-        /// The built-in name most like it.
+        /// The most similar built-in name.
         nearest: &'static str,
     },
-    /// The file is there and cannot be read as text.
+    /// The file exists but cannot be read as text.
     #[error("{file}: cannot be read: {source}")]
     Unreadable {
         /// Path as given.
         file: String,
-        /// The system's reason.
+        /// Error of the operating system.
         source: std::io::Error,
     },
-    /// More text than a scene can have.
+    /// The file is larger than a scene may be.
     #[error("{file}: over {limit} bytes, too large for a scene")]
     TooLarge {
         /// Path as given.
         file: String,
-        /// Largest size in bytes.
+        /// Largest allowed size in bytes.
         limit: u64,
     },
-    /// Not TOML.
+    /// The text is not valid TOML.
     #[error("{file}, line {line}: {message}")]
     Syntax {
         /// Path or built-in name.
         file: String,
         /// Line, from 1.
         line: usize,
-        /// The TOML reader's reason.
+        /// Error of the TOML reader.
         message: String,
     },
-    /// A field the schema does not have.
+    /// The schema has no such field.
     #[error("{file}: unknown field {field}; the nearest valid field is {nearest}")]
     UnknownField {
         /// Path or built-in name.
         file: String,
-        /// The field with its table.
+        /// The field with its table, `table.field`.
         field: String,
-        /// The valid field most like it.
+        /// The most similar valid field.
         nearest: String,
     },
-    /// A field without default is missing.
+    /// A required field is missing.
     #[error("{file}: {field} is missing; it must be {allowed}")]
     Missing {
         /// Path or built-in name.
         file: String,
-        /// The field with its table.
+        /// The field with its table, `table.field`.
         field: String,
-        /// What the field may hold.
+        /// The allowed values, in words.
         allowed: String,
     },
-    /// A value of the wrong type or out of range.
+    /// A value has the wrong type or is out of range.
     #[error("{file}: {field} = {value} is not allowed; it must be {allowed}")]
     WrongValue {
         /// Path or built-in name.
         file: String,
-        /// The field with its table.
+        /// The field with its table, `table.field`.
         field: String,
         /// The value found.
         value: String,
-        /// What the field may hold.
+        /// The allowed values, in words.
         allowed: String,
     },
-    /// A valid choice that this version does not build.
+    /// A valid value that this version does not implement.
     #[error("scene {scene}: not available yet: {field} = {value}; available: {available}")]
     NotAvailable {
         /// The scene's name.
         scene: String,
-        /// The field with its table.
+        /// The field with its table, `table.field`.
         field: &'static str,
-        /// The choice.
+        /// The value.
         value: String,
-        /// What can be chosen instead.
+        /// The values implemented.
         available: &'static str,
     },
 }

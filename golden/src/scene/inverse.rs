@@ -1,4 +1,4 @@
-//! Inverse: which singular values of Cz the pseudo-inverse trusts.
+//! Inverse: how the singular values of Cz are inverted.
 //!
 //! ```text
 //! exact      f(λ) = 1/λ             where |λ| > α, else 0          α = n ε max|λ|, rounding
@@ -6,40 +6,39 @@
 //! tikhonov   f(λ) = λ/(λ² + α²)                                    α as for tsvd
 //! ```
 //!
-//! An error e of the readings, relative to the peak, reaches the forces as e/λ: what lies below e cannot be told from
-//! it. A coefficient's rounding reaches them as 2^−inverse_bits of the largest one, 1/α, in every direction. So the
-//! level, where the scene states none, is the largest of three floors, the first two relative to full scale:
-//!
+//! An error e of the readings, relative to the peak, changes the forces by e/λ: singular values below e carry no
+//! information. The rounding of a coefficient changes them by 2^−inverse_bits of the largest coefficient, 1/α, in every
+//! direction. Where the scene has no level, it is the largest of three floors, the first two relative to full scale:
 //! ```text
 //! input          2^(−average/2) / ((2^(input_bits − 1) − 1) √12)     rounding of a code, averaged
-//! noise          2^(−average/2) noise_floor_MPa / full_scale_MPa     where the scene has both
-//! coefficients   2^(7 − inverse_bits)                                their rounding stays below 1 % of the forces
+//! noise          2^(−average/2) noise_floor_MPa / full_scale_MPa     if the scene has both
+//! coefficients   2^(7 − inverse_bits)                                their rounding is below 1 % of the forces
 //! ```
 //!
-//! With the default, `tsvd` at that level, a scene whose condition stays below 1/level loses nothing: its matrices are
-//! those of `exact` to the bit. At 20 and 24 bits that is a condition of 1.3·10⁵, a square pitch of a quarter of the
-//! thickness.
+//! With the default, `tsvd` at that level, a scene whose condition is below 1/level loses nothing: its matrices are
+//! those of `exact`, to the bit. With codes of 20 and coefficients of 24 bits that is a condition of 1.3·10⁵, or a
+//! square pitch of a quarter of the thickness.
 //!
 //! | | unit | range |
 //! |---|---|---|
-//! | in: level | share of the largest singular value | above 0, below 1 |
+//! | in: level | fraction of the largest singular value | above 0, below 1 |
 //! | out: f(λ) | 1/λ | at most 1/α, with `tikhonov` 1/(2α) |
 
 use super::Scene;
 use crate::quantise::largest_code;
 
-/// Coefficients' rounding is kept below 2^−`COEFFICIENTS_SHARE` of the forces.
+/// Rounding of the coefficients is kept below 2^−`COEFFICIENTS_SHARE` of the forces.
 const COEFFICIENTS_SHARE: i32 = 7;
 
-/// Kinds of pseudo-inverse.
+/// Kind of pseudo-inverse.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum InverseKind {
-    /// Everything above rounding.
+    /// All singular values above rounding are inverted.
     Exact,
-    /// Singular values above the level.
+    /// Truncated: only singular values above the level are inverted.
     #[default]
     Tsvd,
-    /// All, damped around and below the level.
+    /// All singular values are inverted, damped around and below the level.
     Tikhonov,
 }
 
@@ -61,31 +60,31 @@ impl InverseKind {
 /// Table `[inverse]`.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct InverseSpec {
-    /// How singular values are inverted.
+    /// Kind of pseudo-inverse.
     pub kind: InverseKind,
-    /// Relative to the largest, above 0 and below 1; `None` takes the floor of format and noise.
+    /// Level relative to the largest singular value, above 0 and below 1; `None` takes the floor of format and noise.
     pub level: Option<f64>,
 }
 
-/// A kind with its level: the rule that turns λ into f(λ).
+/// A kind of pseudo-inverse with its level: the rule that maps λ to f(λ).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Inversion {
-    /// How singular values are inverted.
+    /// Kind of pseudo-inverse.
     pub kind: InverseKind,
-    /// Relative to the largest; 0 with `exact`.
+    /// Level relative to the largest singular value; 0 with `exact`.
     pub level: f64,
 }
 
 impl Inversion {
-    /// Everything above rounding.
+    /// All singular values above rounding are inverted.
     pub const EXACT: Inversion = Inversion { kind: InverseKind::Exact, level: 0.0 };
 
-    /// f(λ) for one of `count` singular values or eigenvalues, the largest of which has the size `largest`.
+    /// f(λ) of `value`, one of `count` singular values or eigenvalues with the largest magnitude `largest`; in 1/λ.
     pub fn invert(&self, value: f64, largest: f64, count: usize) -> f64 {
-        // What is below rounding is told by no reading.
+        // Values below rounding carry no information.
         let alpha = (count as f64 * f64::EPSILON).max(self.level) * largest;
         match self.kind {
-            // Divided by λ first: λ² of a tiny λ is no number.
+            // Divided by λ first, because λ² of a tiny λ underflows.
             InverseKind::Tikhonov if value != 0.0 => 1.0 / (value + alpha * (alpha / value)),
             _ if value.abs() <= alpha => 0.0,
             _ => 1.0 / value,
@@ -94,7 +93,7 @@ impl Inversion {
 }
 
 impl Scene {
-    /// The rule of the scene's pseudo-inverse, its level known.
+    /// The rule of the scene's pseudo-inverse, with its level.
     pub fn inversion(&self) -> Inversion {
         let InverseSpec { kind, level } = self.inverse;
         match kind {
@@ -103,12 +102,12 @@ impl Scene {
         }
     }
 
-    /// The largest of the floors of input, noise and coefficients.
+    /// The level if the scene has none: the largest of the floors of input, noise and coefficients.
     fn floor(&self) -> f64 {
         let input = 1.0 / (f64::from(largest_code(self.fixed.input_bits)) * 12f64.sqrt());
         let noise = self.input.full_scale_MPa.map_or(0.0, |full_scale| self.search.noise_floor_MPa / full_scale);
         let coefficients = 2f64.powi(COEFFICIENTS_SHARE - self.fixed.inverse_bits as i32);
-        // Noise beyond full scale leaves nothing to invert; the largest singular value stays.
+        // Noise beyond full scale would truncate everything; the largest singular value is always kept.
         (self.input.noise_share() * input.max(noise)).max(coefficients).min(0.5)
     }
 }

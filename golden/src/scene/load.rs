@@ -1,4 +1,4 @@
-//! Finding scenes: built in by name, or files by path.
+//! Loading scenes: built-in ones by name, others from files.
 
 use super::{Scene, SceneError};
 use std::io::Read;
@@ -6,7 +6,7 @@ use std::io::Read;
 /// Largest scene file in bytes.
 const LARGEST_FILE: u64 = 1 << 20;
 
-/// Scenes that can be named without a path.
+/// Built-in scenes: name and TOML text.
 const BUILTINS: [(&str, &str); 5] = [
     ("sensor-1", include_str!("../../scenes/sensor-1.toml")),
     ("sensor-2", include_str!("../../scenes/sensor-2.toml")),
@@ -21,10 +21,10 @@ impl Scene {
         BUILTINS.iter().map(|(name, _)| *name).collect()
     }
 
-    /// A built-in scene by its name.
+    /// The built-in scene called `name`; see [`Scene::builtin_names`].
     ///
     /// # Errors
-    /// [`SceneError::NotFound`] with the nearest name.
+    /// [`SceneError::NotFound`], which suggests the most similar name.
     pub fn builtin(name: &str) -> Result<Scene, SceneError> {
         match BUILTINS.iter().find(|(builtin, _)| *builtin == name) {
             Some((name, text)) => Scene::parse(text, name),
@@ -32,10 +32,10 @@ impl Scene {
         }
     }
 
-    /// A scene by built-in name or by path; a built-in name wins over a file of that name.
+    /// Loads a scene by built-in name or by path; a built-in name takes precedence over a file of that name.
     ///
     /// # Errors
-    /// Every [`SceneError`] but `NotAvailable`.
+    /// Any [`SceneError`] except `NotAvailable`.
     pub fn load(name_or_path: &str) -> Result<Scene, SceneError> {
         let builtin = BUILTINS.iter().any(|(name, _)| *name == name_or_path);
         if builtin || !std::path::Path::new(name_or_path).exists() {
@@ -53,7 +53,7 @@ impl Scene {
     }
 }
 
-/// The file's text, cut one byte beyond the limit so that its size can be judged.
+/// The file's text, read up to one byte beyond the limit so that the caller can tell it is too large.
 fn read(path: &str) -> std::io::Result<String> {
     let mut bytes = Vec::new();
     std::fs::File::open(path)?.take(LARGEST_FILE + 1).read_to_end(&mut bytes)?;

@@ -1,4 +1,4 @@
-//! Scene text to checked scene: the schema, and one function per table.
+//! Parsing and checking scene text: the schema, and one function per table.
 
 use super::reader::Reader;
 use super::{
@@ -27,20 +27,21 @@ const SCHEMA: [(&str, &[&str]); 11] = [
     ("input", &["full_scale_MPa", "average", "calibration", "tare", "dead", "unipolar"]),
     ("output", &["forces"]),
 ];
-/// Poisson ratio of soft rubber, where a bonded layer names none.
+/// Default Poisson ratio of a bonded layer: soft rubber.
 const DEFAULT_POISSON: f64 = 0.48;
-/// Least search range above none: with less, the family's powers of μ vanish in every word the hardware has.
+/// Smallest mu_max above 0: with a smaller one, the powers of μ vanish in the hardware's words.
 const LEAST_MU_MAX: f64 = 0.001;
-/// Largest search range; no elastic cover sticks better.
+/// Largest mu_max, above the friction of any elastic cover.
 const LARGEST_MU_MAX: f64 = 2.0;
-/// Longest scene name; it becomes part of file names and reports.
+/// Longest scene name in characters; the name becomes part of file names and reports.
 const LONGEST_NAME: usize = 64;
 
 impl Scene {
-    /// Reads a scene from TOML text; `origin` names the file in errors, and the scene when the text does not.
+    /// Reads a scene from TOML text. `origin` names the file in errors; its stem is the scene's name if the text has
+    /// none, and its folder the place of calibration and tare files.
     ///
     /// # Errors
-    /// Every [`SceneError`] but those of finding and reading a file.
+    /// Any [`SceneError`] except those of finding and reading a file.
     pub fn parse(text: &str, origin: &str) -> Result<Scene, SceneError> {
         let root: Table = toml::from_str(text).map_err(|error| syntax(text, origin, &error))?;
         let reader = Reader::new(origin, &root);
@@ -90,7 +91,7 @@ fn name(reader: &Reader, origin: &str) -> Result<String, SceneError> {
     }
 }
 
-/// Whether a name may stand in paths, reports and the comments of generated files.
+/// Whether a name is safe in paths, reports and comments of generated files.
 fn is_name(name: &str) -> bool {
     let tame = |c: char| c.is_alphanumeric() || "-_. ".contains(c);
     !name.is_empty()
@@ -164,7 +165,7 @@ fn partition(reader: &Reader, sensor: &Sensor) -> Result<PartitionSpec, SceneErr
     Ok(PartitionSpec { case, listed: None, condition })
 }
 
-/// What `partition.cases` lists, of 0 to 3.
+/// The cases 0 to 3 that `partition.cases` lists.
 fn listed_cases(reader: &Reader, value: &Value, sensor: &Sensor) -> Result<[bool; 4], SceneError> {
     let path = "partition.cases";
     let adaptive = |case: &Value| case.as_str() == Some("adaptive");
@@ -234,7 +235,7 @@ fn threshold(reader: &Reader) -> Result<ThresholdSpec, SceneError> {
 
 fn fixed(reader: &Reader) -> Result<FixedSpec, SceneError> {
     let default = FixedSpec::default();
-    // Every range lies within u32.
+    // All ranges are within u32.
     let bits = |path, range: RangeInclusive<i64>, default: u32| {
         let bits = reader.integer(path, range, Some(i64::from(default)))?;
         Ok::<_, SceneError>(bits as u32)
@@ -270,7 +271,7 @@ fn hardware(reader: &Reader) -> Result<HardwareSpec, SceneError> {
 
 fn input(reader: &Reader, origin: &str, sensor: &Sensor) -> Result<InputSpec, SceneError> {
     let full_scale_MPa = reader.number("input.full_scale_MPa", |mpa| mpa > 0.0, "a number above 0")?;
-    // Beside the scene's own file.
+    // Paths are relative to the folder of the scene's file.
     let file = |path| match reader.value(path) {
         None => Ok(None),
         Some(Value::String(name)) if !name.is_empty() => Ok(Some(Path::new(origin).with_file_name(name))),

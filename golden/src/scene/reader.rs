@@ -15,7 +15,7 @@ impl<'a> Reader<'a> {
         Reader { file, root }
     }
 
-    /// Refuses every field that is not in the schema (table name, its fields; "" is the top level).
+    /// Rejects every field that is not in the schema (table name, its fields; "" is the top level).
     pub(super) fn check_names(&self, schema: &[(&str, &[&str])]) -> Result<(), SceneError> {
         let paths = || {
             let path = |table: &&str, field: &&str| join(table, field);
@@ -43,7 +43,7 @@ impl<'a> Reader<'a> {
         Ok(())
     }
 
-    /// The value at `table.field`, if there is one.
+    /// The value at `table.field`, if present.
     pub(super) fn value(&self, path: &str) -> Option<&'a Value> {
         match path.split_once('.') {
             Some((table, field)) => self.root.get(table)?.as_table()?.get(field),
@@ -51,7 +51,7 @@ impl<'a> Reader<'a> {
         }
     }
 
-    /// A whole number in a range, or `default`.
+    /// An integer in a range, or `default`.
     pub(super) fn integer(
         &self,
         path: &str,
@@ -68,7 +68,7 @@ impl<'a> Reader<'a> {
         }
     }
 
-    /// A number for which `test` holds, `None` when the field is absent. Whole numbers are taken as well.
+    /// A finite number for which `test` holds; `None` if the field is absent. Integers are accepted as well.
     pub(super) fn number(
         &self,
         path: &str,
@@ -90,7 +90,7 @@ impl<'a> Reader<'a> {
         }
     }
 
-    /// A value of another type, read by `read`.
+    /// A value of any other type, converted by `read`; `None` if the field is absent.
     pub(super) fn typed<T>(
         &self,
         path: &str,
@@ -101,7 +101,7 @@ impl<'a> Reader<'a> {
         value.map(|value| read(value).ok_or_else(|| self.wrong(path, value, allowed))).transpose()
     }
 
-    /// One of the named choices, or the type's default.
+    /// One of the named choices, or the type's default if the field is absent.
     pub(super) fn choice<T: Copy + Default>(&self, path: &str, names: &[(&str, T)]) -> Result<T, SceneError> {
         let Some(value) = self.value(path) else {
             return Ok(T::default());
@@ -113,7 +113,7 @@ impl<'a> Reader<'a> {
         })
     }
 
-    /// The error for a value that is there and not allowed.
+    /// The error for a value that is not allowed.
     pub(super) fn wrong(&self, path: &str, value: &Value, allowed: impl Into<String>) -> SceneError {
         SceneError::WrongValue {
             file: self.file.to_string(),
@@ -123,13 +123,13 @@ impl<'a> Reader<'a> {
         }
     }
 
-    /// The error for a value that must be there.
+    /// The error for a missing field.
     pub(super) fn missing(&self, path: &str, allowed: impl Into<String>) -> SceneError {
         SceneError::Missing { file: self.file.to_string(), field: path.to_string(), allowed: allowed.into() }
     }
 }
 
-/// A value's text, cut to what fits a message.
+/// A value's text, shortened to fit a message.
 fn shorten(text: &str) -> String {
     const LONGEST: usize = 60;
     if text.chars().count() <= LONGEST {
@@ -147,8 +147,8 @@ fn join(table: &str, field: &str) -> String {
     }
 }
 
-/// The known path most like `path`. The field's own name decides, so that a field in the wrong table finds its place;
-/// the table breaks ties.
+/// The known path most similar to `path`. The field's own name counts most, so that a field in the wrong table is
+/// found; the table breaks ties.
 fn nearest_path(path: &str, known: impl Iterator<Item = String>) -> String {
     let last = |path: &str| path.rsplit('.').next().unwrap_or(path).to_string();
     let likeness =

@@ -1,27 +1,27 @@
-//! Supported: what of the schema the golden model has, and what the hardware and its bit-true model have.
+//! Supported: which values of the schema the golden model implements, and which the hardware and its bit-true model.
 //!
 //! | field | golden model | hardware, bit-true model |
 //! |---|---|---|
 //! | `medium.kind` | all | "half-space" |
-//! | `partition.case` | all | 0 … 3, rows × cols, "adaptive" of two or more, where the device holds them |
+//! | `partition.case` | all | 0 … 3, rows × cols, "adaptive" of two or more cases, if they fit the device |
 //! | `search.mu_max`, `output.forces` | all | with "adaptive" above 0 and "taxels" |
 //! | `search.objective` | all; with "adaptive" and "contacts" "sparse" | "sparse" |
 //! | `search.form` | all, "orthogonal" up to [`crate::float::orthogonal::MAX_TAXELS`] taxels | "oblique" |
 //! | `input.dead` | all; with "orthogonal" none | with one subarray |
 //! | `input.unipolar` | all; with "orthogonal" none | none |
 //!
-//! Dead taxels in hardware: Π stands before Cz⁺, Ax and Ay ([`crate::matrices::Matrices::without`]), and what is left
-//! of the mirror symmetry decides how many products take the place of one, up to four
-//! ([`crate::fixed::coefficients`]). A subarray with a dead taxel has matrices of its own, while the subarrays of the
-//! engine share theirs: with several of them dead taxels are refused.
+//! Dead taxels in hardware: Cz⁺, Ax and Ay are multiplied by Π ([`crate::matrices::Matrices::without`]). The broken
+//! mirror symmetry takes up to four products instead of one ([`crate::fixed::coefficients`]). A subarray with a dead
+//! taxel needs its own matrices, while the subarrays of the engine share theirs: with several subarrays, dead taxels
+//! are rejected.
 //!
-//! Fields not listed are the same for both. Rules are asked in the order of the table, so that a scene with several
-//! refused choices always names the same one.
+//! Fields not listed are the same for both. Rules are checked in the order of the table, so a scene with several
+//! rejected values always reports the same one.
 
 use super::{CoefficientCheck, ForceOutput, Form, Medium, ObjectiveKind, Scene, SceneError};
 use crate::partition::Case;
 
-/// A choice that may not be had.
+/// A value and whether it is rejected.
 struct Rule {
     refused: bool,
     field: &'static str,
@@ -30,10 +30,10 @@ struct Rule {
 }
 
 impl Scene {
-    /// Checks that the hardware has what the scene asks for.
+    /// Checks that the hardware implements every value of the scene.
     ///
     /// # Errors
-    /// [`SceneError::NotAvailable`] naming the first choice that is valid but not built.
+    /// [`SceneError::NotAvailable`] for the first value that is valid but not implemented.
     pub fn require_supported(&self) -> Result<(), SceneError> {
         let (search, input) = (&self.search, &self.input);
         let several = self.partition.case == Case::Adaptive;
@@ -76,10 +76,10 @@ impl Scene {
         ])
     }
 
-    /// Checks that the serial engine has what the scene asks for: less than the parallel one.
+    /// Checks that the serial engine, which implements less than the parallel one, implements every value of the scene.
     ///
     /// # Errors
-    /// [`SceneError::NotAvailable`] naming the first choice that is valid but not built.
+    /// [`SceneError::NotAvailable`] for the first value that is valid but not implemented.
     pub fn require_serial(&self) -> Result<(), SceneError> {
         let (sensor, input) = (&self.sensor, &self.input);
         let rule = |refused, field, value, available| Rule { refused, field, value, available };
@@ -125,14 +125,14 @@ impl Scene {
         ])
     }
 
-    /// Checks that the golden model has what the scene asks for: more than the hardware.
+    /// Checks that the golden model, which implements more than the hardware, implements every value of the scene.
     ///
     /// # Errors
-    /// [`SceneError::NotAvailable`] naming the first choice that is valid but not built.
+    /// [`SceneError::NotAvailable`] for the first value that is valid but not implemented.
     pub fn require_golden(&self) -> Result<(), SceneError> {
         let objective = self.search.objective;
         let literal = self.search.form == Form::Orthogonal;
-        // Regions and the choice of a case are judged by the sparse objective.
+        // Regions and the choice of a case are compared by the sparse objective.
         let by_contact = self.partition.case.grid().is_none();
         let rule = |refused, field, value, available| Rule { refused, field, value, available };
         self.require([
@@ -157,7 +157,7 @@ impl Scene {
         ])
     }
 
-    /// The first rule that refuses.
+    /// The error of the first rule that rejects its value.
     fn require<const N: usize>(&self, rules: [Rule; N]) -> Result<(), SceneError> {
         let refusal = |Rule { field, value, available, .. }| {
             let scene = self.name.clone();
@@ -166,14 +166,14 @@ impl Scene {
         rules.into_iter().find(|rule| rule.refused).map_or(Ok(()), |rule| Err(refusal(rule)))
     }
 
-    /// The input option that needs `input.full_scale_MPa` in hardware, if there is one: its words are relative to it.
+    /// The input option, if any, that needs `input.full_scale_MPa` in hardware because its words are relative to it.
     pub(crate) fn scaled_input(&self) -> Option<&'static str> {
         let input = &self.input;
         let asked = [("input.calibration", input.calibration.is_some()), ("input.tare", input.tare.is_some())];
         asked.into_iter().find(|(_, asked)| *asked).map(|(field, _)| field)
     }
 
-    /// The value of one of those options, for messages.
+    /// The value of that option, for messages.
     pub(crate) fn field_value(&self, field: &str) -> String {
         match field {
             "input.calibration" => path(&self.input.calibration),
@@ -181,7 +181,7 @@ impl Scene {
         }
     }
 
-    /// Dead taxels for a message: the first stands for all.
+    /// Dead taxels, for messages: the first one represents all.
     fn dead(&self) -> String {
         match self.input.dead.as_slice() {
             [] => "[]".to_string(),

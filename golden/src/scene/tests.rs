@@ -1,4 +1,4 @@
-//! Scenes read, defaulted and refused; each message names file, field and value.
+//! Scenes that are read, filled with defaults or rejected; each message names file, field and value.
 
 use super::*;
 use crate::partition::Grid;
@@ -194,7 +194,7 @@ fn names_can_stand_in_paths_and_comments() {
         let text = named(name).unwrap_err().to_string();
         assert!(text.starts_with("my.toml: name = ") && text.contains("1 to 64 letters"), "{text}");
     }
-    // A file without a name in it gives its own.
+    // A scene without a name takes that of its file.
     let text = Scene::parse(SENSOR, "folder/my (2).toml").unwrap_err().to_string();
     assert!(text.starts_with("folder/my (2).toml: name = \"my (2)\" is not allowed"), "{text}");
 }
@@ -248,7 +248,7 @@ fn choices_not_built_yet_say_so() {
 }
 
 #[test]
-fn the_golden_model_refuses_what_does_not_go_together() {
+fn the_golden_model_rejects_unsupported_combinations() {
     let orthogonal = "[search]\nform = \"orthogonal\"\n";
     let patch = "[search]\nobjective = \"patch\"\n";
     let cases = [
@@ -256,7 +256,7 @@ fn the_golden_model_refuses_what_does_not_go_together() {
         (format!("{orthogonal}[input]\ndead = [[0, 1]]"), "input.dead = [[0, 1]]; available: none, with"),
         (format!("{orthogonal}[input]\ndead = [[0, 1], [2, 3]]"), "input.dead = [[0, 1], …]; available: none, with"),
         (format!("{orthogonal}[input]\nunipolar = true"), "input.unipolar = true; available: false, with"),
-        // Of several the first in the order of the schema.
+        // Of several rejected values the first in the order of the schema is reported.
         (format!("{orthogonal}[input]\nunipolar = true\ndead = [[0, 1]]"), "input.dead"),
     ];
     for (more, wanted) in cases {
