@@ -1,8 +1,8 @@
-//! Baseline: the paper's algorithm as it is printed, to measure the others against.
+//! Baseline: the paper's algorithm as it is printed, as a reference for run time and accuracy.
 //!
-//! For every candidate μ the dense C† and I − C†C are multiplied (Eq. 1), and the search is left to a general-purpose
-//! optimiser, Nelder–Mead's simplex in the place of Matlab's `fmincon`. Objective, family w(μ), disc and condition are
-//! those of the golden model, so that the times compare algorithms and the errors differ by the search alone.
+//! For every candidate μ the dense C† and I − C†C are multiplied (Eq. 1), and a general-purpose optimiser searches for
+//! μ: the Nelder–Mead simplex instead of Matlab's `fmincon`. Objective, family w(μ), disc and condition are those of
+//! the golden model, so that the run times compare the algorithms and the errors differ by the search alone.
 //!
 //! | | shape | unit |
 //! |---|---|---|
@@ -23,14 +23,14 @@ use crate::scene::Scene;
 use argmin::core::{CostFunction, Error, Executor};
 use argmin::solver::neldermead::NelderMead;
 
-/// Cost outside the disc and where nothing presses: above every score's negative.
+/// Cost outside the disc and where Σp is not above zero: larger than any negative score.
 const REFUSED: f64 = 1e9;
-/// Spread of the simplex's costs, in bits, at which it has settled.
+/// Convergence tolerance: standard deviation of the simplex's costs in bits.
 const SETTLED: f64 = 1e-6;
-/// Most steps of the simplex.
+/// Maximum number of steps of the simplex.
 const STEPS: u64 = 200;
 
-/// The matrices of Eq. 1 for a scene.
+/// The paper's algorithm for a scene: its matrices.
 pub struct Baseline {
     scene: Scene,
     parts: Vec<Subarray>,
@@ -38,7 +38,7 @@ pub struct Baseline {
     orthogonal: Orthogonal,
 }
 
-/// Eq. 1 for one frame of one subarray.
+/// The cost function: Eq. 1 for one frame of one subarray.
 struct Eq1Cost<'a> {
     orthogonal: &'a Orthogonal,
     family: &'a Polynomial,
@@ -65,11 +65,11 @@ impl CostFunction for Eq1Cost<'_> {
 }
 
 impl Baseline {
-    /// Computes C† and I − C†C as the scene's `[inverse]` wants them; seconds for subarrays of 20 × 20.
+    /// Computes C† and I − C†C with the scene's `[inverse]`; takes seconds for subarrays of 20 × 20.
     ///
     /// # Errors
-    /// Those of [`crate::reconstruct::Golden::new`]; `Orthogonal` where a subarray has more than
-    /// [`crate::float::orthogonal::MAX_TAXELS`] taxels; `Partition` where the case depends on the frame.
+    /// As [`crate::reconstruct::Golden::new`]; [`GoldenError::Orthogonal`] if a subarray has more than
+    /// [`crate::float::orthogonal::MAX_TAXELS`] taxels; [`GoldenError::Partition`] if the case depends on the frame.
     pub fn new(scene: &Scene) -> Result<Baseline, GoldenError> {
         scene.require_golden()?;
         let parts = subarrays(scene.partition.case, &scene.sensor)?;
@@ -78,10 +78,10 @@ impl Baseline {
         Ok(Baseline { scene: scene.clone(), parts, matrices, orthogonal })
     }
 
-    /// Forces of one frame, row-major.
+    /// Forces of one frame in N, row-major.
     ///
     /// # Errors
-    /// `Frame` when the frame is not the scene's.
+    /// [`GoldenError::Frame`] if the frame is not of the scene's sensor.
     pub fn run(&self, frame: &Frame) -> Result<Forces, GoldenError> {
         let Scene { sensor, search, .. } = &self.scene;
         frame.check(&self.scene)?;
@@ -109,7 +109,7 @@ impl Baseline {
     }
 }
 
-/// The μ that the simplex settles on; without shear where it finds nothing that presses.
+/// The μ to which the simplex converges; no shear if it fails.
 fn simplex(problem: Eq1Cost, mu_max: f64) -> [f64; 2] {
     let corners = vec![vec![0.0, 0.0], vec![mu_max / 3.0, 0.0], vec![0.0, mu_max / 3.0]];
     let run = || -> Result<Option<Vec<f64>>, Error> {
@@ -129,7 +129,7 @@ mod tests {
     use crate::stability::settings;
 
     #[test]
-    fn finds_what_the_golden_model_finds() {
+    fn agrees_with_the_golden_model() {
         let scene = Scene::builtin("sensor-1").unwrap();
         let (baseline, golden) = (Baseline::new(&scene).unwrap(), Golden::new(&scene).unwrap());
         let frame = &Frame::shipped(&scene)[1];
@@ -140,8 +140,8 @@ mod tests {
         assert!(error.normal.unwrap() < 0.002, "{error:?}");
     }
 
-    /// What is left out of C† does not come back: on an ill-conditioned array an error of the readings that the exact
-    /// inverse hands on a thousand times larger stays small.
+    /// Truncated singular values of C† do not return: on an ill-conditioned array an error of the readings has an
+    /// effect a thousand times smaller than with the exact inverse.
     #[test]
     fn the_inverse_is_the_scenes() {
         let stiff = settings().into_iter().find(|s| s.scene.sensor.thickness_mm == 10.0).unwrap();
@@ -164,7 +164,7 @@ mod tests {
     }
 
     #[test]
-    fn large_subarrays_and_cases_without_rectangles_are_refused() {
+    fn large_subarrays_and_cases_without_rectangles_are_rejected() {
         let mut scene = Scene::builtin("sensor-4").unwrap();
         scene.partition.case = Case::WHOLE;
         assert!(matches!(Baseline::new(&scene), Err(GoldenError::Orthogonal(_))));

@@ -1,25 +1,26 @@
-//! Boards: the device a design is generated for, from `constraints/<board>.toml`.
+//! Boards: the device for which a design is generated, from `constraints/<board>.toml`.
 //!
-//! The files are embedded, so the program needs no folder beside it.
+//! The files are embedded in the program.
 //!
 //! | field | unit | meaning |
 //! |---|---|---|
 //! | `engine` | | `"parallel"` (default) or `"serial"`: [`EngineKind`] |
 //! | `device`, `family`, `size`, `package`, `speed_grade` | | as the place and route tool names them |
 //! | `input_clock_MHz` | MHz | oscillator on the board |
-//! | `clock_MHz` | MHz | the engine's clock: a design target until place and route has measured it |
-//! | `uart_baud` | bit/s | bit rate of the UART, where a scene puts the engine behind that |
-//! | `spi_MHz` | MHz | highest clock of the SPI, which place and route must meet; left out where there are no pins for it |
+//! | `clock_MHz` | MHz | clock of the engine: a design target until place and route has measured it |
+//! | `uart_baud` | bit/s | bit rate of the UART |
+//! | `spi_MHz` | MHz | highest clock of the SPI, which place and route must meet; absent if the board has no pins for it |
 //! | `multipliers`, `multiplier_bits` | , bits | signed multipliers and the width of their operands |
-//! | `multiplier_blocks` | tiles | where they are: [`MultiplierBlocks`]; left out, the placer chooses among them |
-//! | `block_rams`, `block_ram_shapes` | , [words, bits] | block RAMs and what one of them can be |
-//! | `distributed_words` | words | distributed RAM takes memories up to these: always; where block RAM is short |
-//! | `large_rams`, `large_ram_shape` | , [words, bits] | single-port RAMs, 0 where left out |
-//! | `luts`, `flip_flops` | | logic cells, for the estimates' shares |
-//! | `seeds`, `placers` | | place and route is tried with these seeds, 1 …, and with each placer until one converges |
-//! | `place_minutes` | min | a try is given up after this long |
+//! | `multiplier_blocks` | tiles | positions of the multipliers, [`MultiplierBlocks`]; if absent, the placer chooses them |
+//! | `block_rams`, `block_ram_shapes` | , [words, bits] | block RAMs and their configurations |
+//! | `distributed_words` | words | largest memory in distributed RAM: always; if block RAM is short |
+//! | `large_rams`, `large_ram_shape` | , [words, bits] | single-port RAMs, 0 if absent |
+//! | `luts`, `flip_flops` | | logic cells, for estimated utilisation |
+//! | `seeds`, `placers` | | place and route is tried with seeds 1, 2, … and each placer until one converges |
+//! | `place_minutes` | min | time limit of one try |
 //!
-//! Beside it, of the same name, stand the board's Verilog (`.v`: pins and PLL around the top module) and its pins.
+//! The files of the same name with another ending are the board's Verilog (`.v`: pins and PLL around the top module)
+//! and its pin constraints.
 
 use include_dir::{include_dir, Dir};
 use serde::{Deserialize, Serialize};
@@ -27,11 +28,11 @@ use thiserror::Error;
 
 static FILES: Dir = include_dir!("$CARGO_MANIFEST_DIR/../constraints");
 
-/// Which of the two engines a board gets: the same arithmetic on another schedule.
+/// The engine of a board; both do the same arithmetic with different schedules.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum EngineKind {
-    /// As many lanes as fit, stages side by side.
+    /// As many lanes as fit, stages in parallel.
     #[default]
     Parallel,
     /// Four lanes, one taxel after the other: for devices of a few thousand logic cells.
@@ -43,19 +44,19 @@ pub enum EngineKind {
 #[serde(deny_unknown_fields)]
 #[allow(non_snake_case)]
 pub struct Board {
-    /// Name of the file and of `[hardware] board` in a scene.
+    /// Name of the file, and of `hardware.board` in a scene.
     #[serde(skip_deserializing)]
     pub name: String,
-    /// One line for people.
+    /// Description in one line.
     pub description: String,
-    /// The engine it gets.
+    /// The engine for this board.
     #[serde(default)]
     pub engine: EngineKind,
     /// Ordering code of the device.
     pub device: String,
-    /// Which of the supported families the device is of.
+    /// Device family.
     pub family: Family,
-    /// Size within the family, `85k`.
+    /// Size within the family, e.g. `85k`.
     pub size: String,
     /// Package name.
     pub package: String,
@@ -69,43 +70,43 @@ pub struct Board {
     pub uart_baud: u32,
     /// Highest clock of the SPI, MHz, > 0; `None` where the board has no pins for it.
     pub spi_MHz: Option<f64>,
-    /// Multipliers.
+    /// Number of multipliers.
     pub multipliers: u32,
-    /// Width of a multiplier's signed operands.
+    /// Width of a multiplier's signed operands in bits.
     pub multiplier_bits: u32,
-    /// Where the multipliers are; `None` leaves the lanes' to the placer.
+    /// Positions of the multipliers; `None` leaves those of the lanes to the placer.
     pub multiplier_blocks: Option<MultiplierBlocks>,
-    /// Block RAMs.
+    /// Number of block RAMs.
     pub block_rams: u32,
-    /// What one block RAM with a read and a write port can be: [words, bits].
+    /// Configurations of a block RAM with a read and a write port: [words, bits].
     pub block_ram_shapes: Vec<[usize; 2]>,
-    /// Memories of at most so many words go into distributed RAM: always, and where block RAM is short.
+    /// Largest memory in words that goes into distributed RAM: always, and if block RAM is short.
     pub distributed_words: [usize; 2],
-    /// Single-port RAMs.
+    /// Number of single-port RAMs.
     #[serde(default)]
     pub large_rams: u32,
-    /// What one of them is: [words, bits].
+    /// Size of a single-port RAM: [words, bits].
     #[serde(default)]
     pub large_ram_shape: [usize; 2],
-    /// Four-input look-up tables.
+    /// Number of four-input look-up tables.
     pub luts: u32,
-    /// Flip-flops.
+    /// Number of flip-flops.
     pub flip_flops: u32,
     /// Seeds of place and route, 1 … seeds, > 0.
     pub seeds: u32,
-    /// Placers in the order of trial, at least one.
+    /// Placers in the order in which they are tried, at least one.
     pub placers: Vec<String>,
-    /// Time after which a try of place and route is given up, min, > 0.
+    /// Time limit of one try of place and route, min, > 0.
     pub place_minutes: u32,
 }
 
-/// Where an ECP5 has its multipliers: a block of four in each of these rows of each of these columns.
+/// Positions of the multipliers of an ECP5: a block of four in each of these rows of each of these columns.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct MultiplierBlocks {
-    /// Columns of the blocks' first multipliers, tiles as nextpnr counts them.
+    /// Columns of the blocks' first multipliers, in tiles as nextpnr counts them.
     pub columns: Vec<u32>,
-    /// Rows, tiles.
+    /// Rows, in tiles.
     pub rows: Vec<u32>,
 }
 
@@ -113,13 +114,13 @@ impl MultiplierBlocks {
     /// Multipliers in a block.
     pub const SIZE: usize = 4;
 
-    /// How many multipliers there are.
+    /// Number of multipliers.
     pub fn multipliers(&self) -> usize {
         Self::SIZE * self.columns.len() * self.rows.len()
     }
 }
 
-/// A family of devices that share their tools.
+/// A device family, whose members share their tools.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Family {
@@ -130,7 +131,7 @@ pub enum Family {
 }
 
 impl Family {
-    /// Ending of a board's pin file.
+    /// File name extension of the pin constraints.
     pub fn pin_file_extension(self) -> &'static str {
         match self {
             Family::Ecp5 => "lpf",
@@ -139,23 +140,23 @@ impl Family {
     }
 }
 
-/// Why a board cannot be used.
+/// A board cannot be used.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 pub enum BoardError {
-    /// No file of this name.
+    /// There is no board of this name.
     #[error("hardware.board = \"{name}\": unknown board; there are: {known}")]
     Unknown {
-        /// The name asked for.
+        /// The name given.
         name: String,
-        /// The names there are, separated by commas.
+        /// The known names, separated by commas.
         known: String,
     },
-    /// A file that is not a board.
+    /// The board's file is invalid or another file is missing.
     #[error("constraints/{name}.toml: {reason}")]
     Invalid {
         /// The board's name.
         name: String,
-        /// What is wrong.
+        /// The reason.
         reason: String,
     },
 }
@@ -164,17 +165,17 @@ impl Board {
     /// The board called `name`.
     ///
     /// # Errors
-    /// [`BoardError::Unknown`] lists the boards there are.
+    /// [`BoardError::Unknown`], which lists the known boards; [`BoardError::Invalid`] for an invalid file.
     pub fn load(name: &str) -> Result<Board, BoardError> {
         let unknown = || BoardError::Unknown { name: name.to_owned(), known: Board::names().join(", ") };
         let file = FILES.get_file(format!("{name}.toml")).ok_or_else(unknown)?;
         Board::parse(name, file.contents_utf8().unwrap_or_default())
     }
 
-    /// The board's Verilog and its pins, as file names and texts.
+    /// The board's Verilog and its pin constraints: file names and texts.
     ///
     /// # Errors
-    /// [`BoardError::Invalid`] names the file that is missing.
+    /// [`BoardError::Invalid`], which names the missing file.
     pub fn files(&self) -> Result<[(String, &'static str); 2], BoardError> {
         let file = |ending: &str| {
             let name = format!("{}.{ending}", self.name);
@@ -228,25 +229,27 @@ impl Board {
         Ok(Board { name: name.to_owned(), ..board })
     }
 
-    /// Block RAMs for a memory of `words` words of `bits` bits: of the shape that takes the fewest. A memory deeper than a
-    /// shape is cut into parts that lie side by side, as Yosys does: several parts may share a block RAM's word.
+    /// Number of block RAMs for a memory of `words` words of `bits` bits, in the configuration that takes the fewest. A
+    /// memory deeper than a configuration is split into parts side by side, as Yosys does: several parts may share the
+    /// word of a block RAM.
     pub fn block_rams_for(&self, words: usize, bits: usize) -> usize {
         let of = |&[w, b]: &[usize; 2]| (words.div_ceil(w) * bits).div_ceil(b);
         self.block_ram_shapes.iter().map(of).min().unwrap_or(0)
     }
 
-    /// Single-port RAMs for a memory of `words` words of `bits` bits.
+    /// Number of single-port RAMs for a memory of `words` words of `bits` bits.
     pub fn large_rams_for(&self, words: usize, bits: usize) -> usize {
         let [most_words, most_bits] = self.large_ram_shape.map(|size| size.max(1));
         words.div_ceil(most_words) * bits.div_ceil(most_bits)
     }
 
-    /// Multipliers for a product of signed operands of `a` and `b` bits, each cut into as few pieces as it takes.
+    /// Number of multipliers for a product of signed operands of `a` and `b` bits, each split into as few parts as
+    /// possible.
     pub fn multipliers_for(&self, a: u32, b: u32) -> usize {
         (a.div_ceil(self.multiplier_bits) * b.div_ceil(self.multiplier_bits)) as usize
     }
 
-    /// Time of `cycles` at the engine's clock, in µs.
+    /// Duration of `cycles` cycles of the engine's clock in µs.
     pub fn microseconds(&self, cycles: u64) -> f64 {
         cycles as f64 / self.clock_MHz
     }
@@ -267,7 +270,7 @@ mod tests {
         // 100 MHz: one cycle is 10 ns.
         let board = Board::load("ulx3s-85f").unwrap();
         assert_eq!(board.microseconds(100), 1.0);
-        // Two lanes share a RAM up to 512 words; 27 bits are two pieces of 18.
+        // Two lanes share a block RAM up to 512 words; 27 bits are split into two parts of 18.
         assert_eq!(
             [(512, 36), (513, 36), (1025, 72), (2048, 9)].map(|(w, b)| board.block_rams_for(w, b)),
             [1, 2, 6, 1]

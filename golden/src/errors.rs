@@ -1,4 +1,4 @@
-//! Errors: the resultant force against the reference, the paper's Eq. 3.
+//! Errors: the resultant force compared with a reference, by the paper's Eq. 3.
 //!
 //! e_x = (ref − value)/ref per axis, signed; tangential ‖T − T_ref‖/‖T_ref‖; normal |N − N_ref|/|N_ref|.
 //!
@@ -10,7 +10,7 @@
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
-/// Share of ‖ref‖ below which an axis or the shear has no meaningful relative error.
+/// Fraction of ‖ref‖ below which an axis or the shear has no meaningful relative error.
 pub const SMALLEST_SHARE: f64 = 0.01;
 
 /// Relative errors of the resultant as fractions.
@@ -22,20 +22,20 @@ pub struct Errors {
     pub x2: Option<f64>,
     /// Normal, signed as in Eq. 3.
     pub x3: Option<f64>,
-    /// Length of the shear's error over the shear's length.
+    /// ‖T − T_ref‖/‖T_ref‖ of the shear T = (x, y), ≥ 0.
     pub tangential: Option<f64>,
-    /// Size of the normal error.
+    /// |N − N_ref|/|N_ref| of the normal force, ≥ 0.
     pub normal: Option<f64>,
 }
 
 impl Errors {
-    /// Compares a resultant with its reference, both [x, y, normal] in N.
+    /// Compares a resultant with its reference; both are [x, y, normal] in N.
     pub fn new(reference: [f64; 3], value: [f64; 3]) -> Errors {
         let (reference, value) = (Vector3::from(reference), Vector3::from(value));
         let least = SMALLEST_SHARE * reference.norm();
-        // The second condition leaves out a reference of zero.
+        // The second condition excludes a reference of zero.
         let counts = |size: f64| size >= least && size > 0.0;
-        // Against the smallest numbers there are, a quotient can overflow: no meaningful error either.
+        // A quotient by a denormal number can overflow: it is no meaningful error either.
         let share = |off: f64, size: f64| Some(off / size).filter(|share| share.is_finite());
         let axis = |k: usize| {
             let off = reference[k] - value[k];

@@ -1,14 +1,14 @@
-//! Flags: what the reader of a result must know before trusting it.
+//! Flags: limitations of a result that a user must know before trusting it.
 //!
 //! | flag | raised when | by |
 //! |---|---|---|
 //! | `no-contact` | no taxel carries a force | [`crate::reconstruct::assemble`] |
 //! | `no-compression` | no candidate μ leaves Σp > 0 | the engine |
 //! | `condition-unmet` | a subarray does not meet the scene's condition and is not searched | `assemble` |
-//! | `saturated` | an input code was clipped, or the engine's arithmetic saturated | [`frame_flags`], the engine |
-//! | `load-outside` | part of the contact lies over the array's edge | `frame_flags` |
+//! | `saturated` | an input code was clipped, or a word of the engine saturated | [`frame_flags`], the engine |
+//! | `load-outside` | part of the contact is beyond the array's edge | `frame_flags` |
 //! | `medium-mismatch` | the frame names another medium than the scene | `frame_flags` |
-//! | `coefficients-damaged` | the hardware's coefficient memory is not what it must be | the engine |
+//! | `coefficients-damaged` | the hardware's coefficient memory has changed | the engine |
 //! | `shear-unreliable` | noise floor or LSB/√12 above 5·10⁻⁵ of the peak, with `sparse` | `frame_flags` |
 
 use crate::frame::Frame;
@@ -16,34 +16,34 @@ use crate::quantise::Codes;
 use crate::scene::{ObjectiveKind, Scene};
 use serde::{Deserialize, Serialize};
 
-/// A remark on a result.
+/// A limitation of a result.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Flag {
     /// No taxel carries a force.
     NoContact,
-    /// No candidate has a compressive resultant.
+    /// No candidate μ has a compressive resultant.
     NoCompression,
-    /// A subarray was not searched.
+    /// A subarray does not meet the scene's condition and was not searched.
     ConditionUnmet,
-    /// A value was held at the end of its range.
+    /// A value was clamped to the end of its range.
     Saturated,
-    /// The contact hangs over the edge.
+    /// The contact extends beyond the array's edge.
     LoadOutside,
     /// Frame and scene name different media.
     MediumMismatch,
-    /// Noise or quantisation is too large for the objective.
+    /// Noise or quantisation is too large for the objective to determine the shear.
     ShearUnreliable,
-    /// The hardware's coefficient memory is not what it must be.
+    /// The hardware's coefficient memory does not hold the generated coefficients.
     CoefficientsDamaged,
 }
 
-/// Share of the true normal load below which the cells do not hold all of it.
+/// Fraction of the true normal load that the cells must carry for it to count as inside.
 pub const SHARE_INSIDE: f64 = 0.995;
-/// Noise relative to the peak from which the sparse objective loses the shear.
+/// Noise relative to the peak above which the sparse objective cannot determine the shear.
 pub const SPARSE_NOISE_LIMIT: f64 = 5e-5;
 
-/// The flags that follow from the frame and its codes alone, in the order of [`Flag`].
+/// The flags that depend on the frame and its codes alone, in the order of [`Flag`].
 pub fn frame_flags(scene: &Scene, frame: &Frame, codes: &Codes) -> Vec<Flag> {
     let medium_differs = frame.medium.is_some_and(|medium| medium != scene.medium);
     [
@@ -57,15 +57,15 @@ pub fn frame_flags(scene: &Scene, frame: &Frame, codes: &Codes) -> Vec<Flag> {
     .collect()
 }
 
-/// With truth: the cells hold less than the load. Without: the largest |b| lies on the outermost ring of an array that
-/// has an interior.
+/// With known forces: the cells carry less than the load. Without: the largest |b| is in the outermost rows or columns
+/// of an array that has an interior.
 fn load_outside(frame: &Frame) -> bool {
     if let (Some(cells), Some(resultant)) = (&frame.cell_forces_N, frame.resultant_N) {
         return cells.fz.iter().sum::<f64>().abs() < SHARE_INSIDE * resultant[2].abs();
     }
     let (rows, cols) = (frame.sensor.rows, frame.sensor.cols);
     if rows < 3 || cols < 3 {
-        // All ring: that the peak lies on it says nothing.
+        // Without an interior the position of the peak tells nothing.
         return false;
     }
     let on_ring = |index: usize| {
@@ -77,7 +77,7 @@ fn load_outside(frame: &Frame) -> bool {
     ring_peak > 0.0 && ring_peak >= frame.peak_MPa()
 }
 
-/// Noise floor after averaging, or the standard deviation LSB/√12 of rounding, against the peak.
+/// Compares the noise floor after averaging, or the standard deviation LSB/√12 of rounding, with the peak.
 fn shear_unreliable(scene: &Scene, frame: &Frame, codes: &Codes) -> bool {
     let search = &scene.search;
     let searched = search.objective == ObjectiveKind::Sparse && search.mu_max > 0.0;
@@ -179,7 +179,7 @@ mod tests {
         assert_eq!(flags(&scene, &frame, 13, 1.0), [Flag::ShearUnreliable]);
         scene.search.noise_floor_MPa = 6e-5 * frame.peak_MPa();
         assert_eq!(flags(&scene, &frame, 20, 1.0), [Flag::ShearUnreliable]);
-        // The mean of two frames has less.
+        // The mean of two frames has less noise.
         scene.input.average = 1;
         assert_eq!(flags(&scene, &frame, 20, 1.0), []);
         scene.input.average = 0;

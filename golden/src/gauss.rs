@@ -10,10 +10,10 @@
 use std::f64::consts::PI;
 use std::sync::OnceLock;
 
-/// Most nodes of a rule.
+/// Maximum number of nodes.
 const MOST: usize = 64;
 
-/// The rule of `n` nodes, computed once; more than 64 are taken as 64.
+/// Nodes and weights (z, w) of the rule with `n` nodes, 1 to 64, computed once; other `n` are clamped.
 pub fn rule(n: usize) -> &'static [(f64, f64)] {
     static RULES: OnceLock<Vec<Vec<(f64, f64)>>> = OnceLock::new();
     let rules = RULES.get_or_init(|| (1..=MOST).map(nodes).collect());
@@ -23,7 +23,7 @@ pub fn rule(n: usize) -> &'static [(f64, f64)] {
 fn nodes(n: usize) -> Vec<(f64, f64)> {
     let node = |k: usize| {
         let mut z = (PI * (k as f64 + 0.75) / (n as f64 + 0.5)).cos();
-        // Newton's method from this start is at rounding after four steps; one more costs nothing.
+        // From this start Newton's method converges to rounding in four steps; the fifth is a margin.
         for _ in 0..5 {
             let (p, slope) = legendre(n, z);
             z -= p / slope;
@@ -34,7 +34,7 @@ fn nodes(n: usize) -> Vec<(f64, f64)> {
     (0..n).map(node).collect()
 }
 
-/// P_n(z) and its slope, by the three-term recurrence.
+/// P_n(z) and P_n′(z), by the three-term recurrence.
 fn legendre(n: usize, z: f64) -> (f64, f64) {
     let (mut before, mut p) = (1.0, z);
     for k in 2..=n {

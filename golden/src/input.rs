@@ -1,4 +1,4 @@
-//! Input: from the readings of a real sensor to the stress a frame stands for.
+//! Input: from the readings of a real sensor to stress.
 //!
 //! ```text
 //! 2^k frames ── average ── calibrate ── (unipolar: tension for clipped readings) ── stress ── engine ── forces
@@ -7,13 +7,13 @@
 //!
 //! | `[input]` | meaning |
 //! |---|---|
-//! | `average = k` | 2^k frames are averaged into one; the extra bits stay |
+//! | `average = k` | 2^k frames are averaged into one; the additional bits are kept |
 //! | `calibration = "table.csv"` | offset and gain of each taxel, [`calibration`] |
 //! | `tare = "zero.json"` | a frame read without contact, in the readings' unit |
-//! | `dead = [[row, col], …]` | taxels left out of the inverse, [`crate::matrices::Matrices::without`], whatever they read |
-//! | `unipolar = true` | a reading of zero or less says only that the stress is not above it, [`unipolar`] |
+//! | `dead = [[row, col], …]` | taxels left out of the inverse, whatever they read: [`crate::matrices::Matrices::without`] |
+//! | `unipolar = true` | a reading of zero or less is only an upper bound of the stress, [`unipolar`] |
 //!
-//! Files are found beside the scene's. The truth of a frame is carried along unchanged.
+//! Paths are relative to the scene's file. The known forces of a frame are passed through unchanged.
 
 pub mod calibration;
 #[cfg(test)]
@@ -25,25 +25,25 @@ use crate::scene::{InputSpec, Scene};
 use calibration::{Calibration, CalibrationError};
 use thiserror::Error;
 
-/// A scene's input options, ready for frames.
+/// A scene's input options with their files loaded.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Input {
     frames: usize,
-    /// Zero and gain of each taxel, where the scene has a table or a tare frame.
+    /// Zero and gain of each taxel, if the scene has a table or a tare frame.
     scale: Option<(Vec<f64>, Vec<f64>)>,
     spec: InputSpec,
 }
 
-/// Input options or frames that cannot be used.
+/// Input options or frames cannot be used.
 #[derive(Debug, Error)]
 pub enum InputError {
-    /// The calibration table.
+    /// The calibration table cannot be used.
     #[error(transparent)]
     Calibration(#[from] CalibrationError),
-    /// The tare frame, or a frame to average.
+    /// The tare frame, or a frame to average, cannot be used.
     #[error(transparent)]
     Frame(#[from] FrameError),
-    /// Not as many frames as are averaged.
+    /// The number of frames is not 2^k.
     #[error("scene {scene}: input.average = {average} takes {wanted} frames at a time, got {got}")]
     Count {
         /// The scene's name.
@@ -52,16 +52,16 @@ pub enum InputError {
         average: u32,
         /// 2^k.
         wanted: usize,
-        /// Frames given.
+        /// Number of frames given.
         got: usize,
     },
 }
 
 impl Input {
-    /// Reads the files the scene names.
+    /// Loads the calibration table and the tare frame that the scene names.
     ///
     /// # Errors
-    /// A table or tare frame that cannot be read or does not fit the sensor.
+    /// [`InputError`] if the table or tare frame cannot be read or does not fit the sensor.
     pub fn new(scene: &Scene) -> Result<Input, InputError> {
         let spec = &scene.input;
         let (frames, spec) = (1 << spec.average, spec.clone());
@@ -81,15 +81,15 @@ impl Input {
         Ok(Input { frames, scale: Some((tare.unwrap_or(offset), gain)), spec })
     }
 
-    /// Frames that make one, 2^k.
+    /// Number of frames that are averaged into one, 2^k.
     pub fn frames(&self) -> usize {
         self.frames
     }
 
-    /// The mean of frames, each checked against the scene; the first one's id and truth stay.
+    /// The mean of 2^k frames, each checked against the scene; id and known forces are those of the first.
     ///
     /// # Errors
-    /// [`InputError::Count`] unless there are 2^k of them, `Frame` when one is not the scene's.
+    /// [`InputError::Count`] unless there are 2^k frames, [`InputError::Frame`] if one is not of the scene's sensor.
     pub fn average(&self, scene: &Scene, frames: &[Frame]) -> Result<Frame, InputError> {
         let [first, ..] = frames else { return Err(self.miscounted(scene, 0)) };
         if frames.len() != self.frames {
@@ -98,7 +98,7 @@ impl Input {
         frames.iter().try_for_each(|frame| frame.check(scene))?;
         let mut mean = first.clone();
         for (index, b) in mean.stress_MPa.iter_mut().enumerate() {
-            // Divided first, so that the sum stays in range.
+            // Divided before adding, so that the sum does not overflow.
             *b = frames.iter().map(|frame| frame.stress_MPa[index] / frames.len() as f64).sum();
         }
         Ok(mean)
@@ -109,7 +109,8 @@ impl Input {
         InputError::Count { scene: scene.name.clone(), average, wanted: self.frames, got }
     }
 
-    /// Readings to stress; without table and tare frame they are the same. Dead taxels read 0.
+    /// Converts readings to stress in MPa: b = gain · (reading − zero), the readings themselves without table and tare
+    /// frame. Dead taxels become 0.
     pub fn calibrate(&self, frame: &Frame) -> Frame {
         let mut frame = frame.clone();
         if let Some((zero, gain)) = &self.scale {

@@ -1,22 +1,22 @@
-//! Paper: the figures of its tables that results are set beside.
+//! Paper: published results, for comparison.
 //!
-//! Table 2: errors by Eq. 3 in % per sensor and case; sensors 1 and 2 against a finite-element model, 3 and 4 against
-//! case 0. Run times: Fig. 7 and section 4, with a later paper of the same authors.
+//! Table 2: errors by Eq. 3 in % per sensor and case; the reference is a finite-element model for sensors 1 and 2, case
+//! 0 for 3 and 4. Run times: Fig. 7 and section 4, and a later paper of the same authors.
 
 use crate::partition::Case;
 
 /// A published run time.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RunTime {
-    /// What computed.
+    /// The system that computed the frame.
     pub system: String,
     /// The sensor as printed.
     pub sensor: String,
-    /// The paper's case, `None` where the figure is no measurement of a case.
+    /// The paper's case; `None` if the time is no measurement of a case.
     pub case: Option<Case>,
-    /// Time of a frame in s.
+    /// Time per frame in s.
     pub seconds: f64,
-    /// Where it stands.
+    /// Source of the figure.
     pub source: String,
 }
 
@@ -34,14 +34,14 @@ pub fn run_times() -> Vec<RunTime> {
     RUN_TIMES.lines().skip(1).filter_map(time).collect()
 }
 
-/// What the paper concludes for a sensor.
+/// A conclusion of the paper about a sensor.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Conclusion {
-    /// The sensor's number.
+    /// Number of the sensor, 1 to 4.
     pub sensor: u32,
-    /// The case it calls best.
+    /// The case that the paper calls best.
     pub best: Case,
-    /// In which words, and where.
+    /// Quotation and source.
     pub text: String,
 }
 
@@ -60,7 +60,7 @@ pub fn conclusions() -> Vec<Conclusion> {
 
 const TABLE_2: &str = include_str!("../data/paper/table2_errors_percent.csv");
 
-/// The paper's errors of one sensor in one case, as fractions: X1, X2, X3; `None` where it prints none.
+/// The errors X1, X2, X3 of Table 2 for sensor 1 to 4 and a case, as fractions; `None` if the table has no such row.
 pub fn table_2(sensor: u32, case: Case) -> Option<[f64; 3]> {
     TABLE_2.lines().skip(1).find_map(|line| {
         let mut fields = line.split(',');

@@ -1,4 +1,4 @@
-//! Partition: the array cut into equal rectangles, each with forces and a friction ratio of its own.
+//! Partition: the array divided into equal rectangles, each with its own forces and ratio of shear to normal force.
 //!
 //! Subarray (i, j) of an R × C partition covers rows i·rows/R … and columns j·cols/C …; both divisions must be exact.
 //!
@@ -16,18 +16,18 @@ use thiserror::Error;
 /// Subarrays along the rows and along the columns.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Grid {
-    /// Subarrays one below the other.
+    /// Number of rows of subarrays.
     pub rows: usize,
-    /// Subarrays side by side.
+    /// Number of columns of subarrays.
     pub cols: usize,
 }
 
-/// How the array is cut.
+/// How the array is divided.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Case {
-    /// Equal rectangles, known before the frame is.
+    /// Equal rectangles, the same for every frame.
     Grid(Grid),
-    /// The case nearest to the contacts, among those in which every loaded subarray meets the condition.
+    /// The best of the paper's cases, chosen per frame, among those in which every loaded subarray meets the condition.
     Adaptive,
     /// One region per contact.
     Contacts,
@@ -49,7 +49,7 @@ impl Case {
         Some(Case::Grid(Grid { rows, cols }))
     }
 
-    /// The rectangles' count, `None` where it depends on the frame.
+    /// Number of rectangles along rows and columns; `None` where it depends on the frame.
     pub fn grid(self) -> Option<Grid> {
         match self {
             Case::Grid(grid) => Some(grid),
@@ -92,20 +92,20 @@ impl fmt::Display for Case {
     }
 }
 
-/// A partition the array does not have.
+/// The array cannot be divided that way.
 #[derive(Clone, Debug, PartialEq, Error)]
 pub enum PartitionError {
-    /// A count of subarrays that does not divide the taxels, or leaves single lines.
+    /// The number of subarrays does not divide the rows or columns, or leaves subarrays of a single line.
     #[error("{parts} subarrays do not divide {lines} {direction} into equal parts of at least 2")]
     NotDividing {
         /// `rows` or `cols`.
         direction: &'static str,
-        /// Taxel lines of the array in that direction.
+        /// Number of rows or columns of the array.
         lines: usize,
-        /// Subarrays asked for.
+        /// Number of subarrays along them.
         parts: usize,
     },
-    /// A partition that depends on the frame has no rectangles to list.
+    /// The partition depends on the frame and has no fixed rectangles.
     #[error("partition {case} depends on the frame")]
     DependsOnFrame {
         /// The case asked for.
@@ -129,7 +129,7 @@ pub struct Subarray {
 /// The subarrays of a case, row-major.
 ///
 /// # Errors
-/// A count that does not divide the array, or a case without fixed rectangles.
+/// [`PartitionError`] if the counts do not divide the array or the case depends on the frame.
 pub fn subarrays(case: Case, sensor: &Sensor) -> Result<Vec<Subarray>, PartitionError> {
     let grid = case.grid().ok_or(PartitionError::DependsOnFrame { case })?;
     let rows = part("rows", sensor.rows, grid.rows)?;
@@ -138,7 +138,7 @@ pub fn subarrays(case: Case, sensor: &Sensor) -> Result<Vec<Subarray>, Partition
     Ok((0..grid.rows).flat_map(|i| (0..grid.cols).map(move |j| at(i, j))).collect())
 }
 
-/// Lines per part, when the division is exact.
+/// Rows or columns per subarray, if the division is exact.
 fn part(direction: &'static str, lines: usize, parts: usize) -> Result<usize, PartitionError> {
     if parts == 0 || !lines.is_multiple_of(parts) || lines / parts < MIN_SIDE {
         return Err(PartitionError::NotDividing { direction, lines, parts });
@@ -147,19 +147,19 @@ fn part(direction: &'static str, lines: usize, parts: usize) -> Result<usize, Pa
 }
 
 impl Subarray {
-    /// The subarray seen as a sensor of its own: same pitch, same thickness.
+    /// The subarray as a sensor of its own, with the pitch and thickness of the array.
     pub fn sensor(&self, whole: &Sensor) -> Sensor {
         Sensor { rows: self.rows, cols: self.cols, ..whole.clone() }
     }
 
-    /// Indices in the array of the subarray's taxels, in the subarray's row-major order.
+    /// Row-major indices in the array of the subarray's taxels, in the subarray's row-major order.
     pub fn indices(self, whole: &Sensor) -> impl Iterator<Item = usize> {
         let cols = whole.cols;
         (self.row0..self.row0 + self.rows)
             .flat_map(move |row| (self.col0..self.col0 + self.cols).map(move |col| row * cols + col))
     }
 
-    /// Indices in the subarray of those of the array's taxels, [row, col], that it holds.
+    /// Row-major indices in the subarray of those of `taxels` ([row, col] in the array) that lie in it.
     pub fn local_indices(&self, taxels: &[[usize; 2]]) -> Vec<usize> {
         let place = |[row, col]: [usize; 2]| {
             let (row, col) = (row.checked_sub(self.row0)?, col.checked_sub(self.col0)?);
@@ -168,12 +168,12 @@ impl Subarray {
         taxels.iter().filter_map(|taxel| place(*taxel)).collect()
     }
 
-    /// The subarray's values out of the array's.
+    /// The subarray's values, row-major in it, out of `values` of the array.
     pub fn gather<T: Copy>(&self, whole: &Sensor, values: &[T]) -> Vec<T> {
         self.indices(whole).map(|index| values[index]).collect()
     }
 
-    /// Writes the subarray's values to their places in the array.
+    /// Writes `part`, row-major in the subarray, to its positions in `values` of the array.
     pub fn scatter<T: Copy>(&self, whole: &Sensor, part: &[T], values: &mut [T]) {
         for (index, &value) in self.indices(whole).zip(part) {
             values[index] = value;
@@ -207,7 +207,7 @@ mod tests {
     }
 
     #[test]
-    fn refuses_uneven_cuts() {
+    fn rejects_uneven_divisions() {
         let uneven = subarrays(Case::Grid(Grid { rows: 2, cols: 1 }), &sensor(5, 4));
         let expected = PartitionError::NotDividing { direction: "rows", lines: 5, parts: 2 };
         assert_eq!(uneven, Err(expected));

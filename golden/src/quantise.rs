@@ -1,6 +1,6 @@
-//! Quantise: stress into the codes of a signed converter, as the hardware receives them.
+//! Quantise: from stress to the signed codes of a converter, as the hardware receives them.
 //!
-//! code = round(b / full_scale · M), M = 2^(bits − 1) − 1, halves away from zero, held to ±M; lsb = full_scale / M.
+//! code = round(b / full_scale · M), M = 2^(bits − 1) − 1, halves away from zero, clamped to ±M; lsb = full_scale / M.
 //!
 //! | | shape | unit | range |
 //! |---|---|---|---|
@@ -8,37 +8,37 @@
 //! | out: codes | taxels | LSB | −M … M, symmetric, so that no negation overflows |
 //! | out: clipped | taxels | flag | the rounded code was beyond ±M |
 //!
-//! Feeds `receive` of all three models. It does not check that the stress is finite: frames are checked when loaded.
+//! Feeds `receive` of all models. Finite stress is assumed; frames are checked when loaded.
 
 use crate::frame::Frame;
 use crate::scene::Scene;
 
-/// Stress as the converter sees it.
+/// The codes of one frame.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Codes {
-    /// One signed code per taxel, row-major.
+    /// One signed code per taxel, row-major, in LSBs.
     pub codes: Vec<i32>,
     /// Width of a code with its sign, 2 to 31.
     pub bits: u32,
-    /// Stress of the largest code.
+    /// Stress of the largest code in MPa.
     pub full_scale_MPa: f64,
-    /// Taxels beyond full scale.
+    /// Whether each taxel is beyond full scale and was clamped.
     pub clipped: Vec<bool>,
 }
 
-/// Largest code of a width: 2^(bits − 1) − 1.
+/// Largest code of `bits` bits: 2^(bits − 1) − 1; `bits` 2 to 32.
 pub fn largest_code(bits: u32) -> i32 {
     ((1i64 << (bits - 1)) - 1) as i32
 }
 
 impl Codes {
-    /// Stress of one code step in MPa.
+    /// Stress of one LSB in MPa.
     pub fn lsb_MPa(&self) -> f64 {
         self.full_scale_MPa / f64::from(largest_code(self.bits))
     }
 }
 
-/// Rounds stress in MPa to codes of `bits` bits (2 to 31) whose largest means `full_scale_MPa`.
+/// Rounds stress in MPa to codes of `bits` bits, 2 to 31, whose largest code means `full_scale_MPa`.
 pub fn quantise(stress_MPa: &[f64], bits: u32, full_scale_MPa: f64) -> Codes {
     let largest = f64::from(largest_code(bits));
     // f64::round takes halves away from zero.
@@ -51,7 +51,7 @@ pub fn quantise(stress_MPa: &[f64], bits: u32, full_scale_MPa: f64) -> Codes {
     }
 }
 
-/// What the largest code means: the scene's value, else the frame's largest |b|, else (all zero) 1 MPa.
+/// Full scale in MPa: the scene's, else the frame's largest |b|, else (all zero) 1 MPa.
 pub fn full_scale(scene: &Scene, frame: &Frame) -> f64 {
     scene.input.full_scale_MPa.unwrap_or_else(|| {
         let peak = frame.peak_MPa();
@@ -63,7 +63,7 @@ pub fn full_scale(scene: &Scene, frame: &Frame) -> f64 {
     })
 }
 
-/// The scene's noise floor in codes, rounded down; a code counts when it is strictly beyond it.
+/// The scene's noise floor in LSBs, rounded down; a code counts if its magnitude is strictly larger.
 pub fn noise_floor_codes(scene: &Scene, codes: &Codes) -> i32 {
     // The cast saturates.
     (scene.search.noise_floor_MPa / codes.lsb_MPa()).floor() as i32

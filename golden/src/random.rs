@@ -1,13 +1,13 @@
-//! Seeded random numbers: SplitMix64, and Box–Muller on top of it. The same everywhere, for ever.
+//! Seeded random numbers: SplitMix64 with Box–Muller; the same on every machine and in every version.
 
 use std::f64::consts::TAU;
 
-/// A stream of numbers.
+/// A random number generator.
 #[derive(Clone, Debug)]
 pub(crate) struct Random(u64);
 
 impl Random {
-    /// The stream of a seed.
+    /// The generator with a seed.
     pub(crate) fn new(seed: u64) -> Random {
         Random(seed)
     }
@@ -20,24 +20,24 @@ impl Random {
         z ^ (z >> 31)
     }
 
-    /// Uniform in low … high.
+    /// Uniform in `low` … `high`.
     pub(crate) fn between(&mut self, low: f64, high: f64) -> f64 {
         // 53 bits, every one of them exact.
         low + (high - low) * (self.bits() >> 11) as f64 / (1u64 << 53) as f64
     }
 
-    /// Heads or tails.
+    /// True or false, equally likely.
     pub(crate) fn coin(&mut self) -> bool {
         self.bits() >> 63 == 1
     }
 
-    /// One of several, all alike likely; `None` of none, which takes a number too.
+    /// One element, all equally likely; `None` if there are none, which draws a number as well.
     pub(crate) fn pick<'a, T>(&mut self, of: &'a [T]) -> Option<&'a T> {
         let at = self.between(0.0, of.len() as f64) as usize;
         of.get(at)
     }
 
-    /// Normal, mean 0, deviation 1.
+    /// Normally distributed with mean 0 and standard deviation 1.
     pub(crate) fn normal(&mut self) -> f64 {
         // 1 − u is above 0.
         let radius = (-2.0 * (1.0 - self.between(0.0, 1.0)).ln()).sqrt();
@@ -57,7 +57,7 @@ mod tests {
         let values: Vec<f64> = (0..20_000).map(|_| random.normal()).collect();
         let mean = values.iter().sum::<f64>() / 2e4;
         let square = values.iter().map(|v| v * v).sum::<f64>() / 2e4;
-        // Four deviations: 4/√20000 and 4 √(2/20000).
+        // Four standard deviations: 4/√20000 and 4 √(2/20000).
         assert!(mean.abs() < 0.029 && (square - 1.0).abs() < 0.04);
     }
 }

@@ -1,8 +1,8 @@
-//! Values computed elsewhere, for tests: `data/reference/values.json`.
+//! Reference values from independent programs, for tests: `data/reference/values.json`.
 
 use serde::Deserialize;
 
-/// The file.
+/// Contents of the file.
 #[derive(Deserialize)]
 pub struct Values {
     pub influence: Vec<Cell>,
@@ -22,7 +22,7 @@ pub struct Cell {
     pub cz: String,
 }
 
-/// The family of one shipped frame; vectors are cut to ten entries.
+/// The polynomial of one shipped frame; vectors have their first ten entries.
 #[derive(Deserialize)]
 pub struct Family {
     pub sensor: String,
@@ -35,7 +35,7 @@ pub struct Family {
     pub at: Vec<At>,
 }
 
-/// The exact solve at one μ.
+/// The exact solution at one μ.
 #[derive(Deserialize)]
 pub struct At {
     pub mu: [f64; 2],

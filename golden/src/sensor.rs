@@ -1,4 +1,4 @@
-//! The taxel array: how many taxels, how far apart, under how much rubber.
+//! Sensor: number, pitch and depth of the taxels of an array.
 //!
 //! Taxel (r, c) has index r·cols + c and lies at
 //! ((c − (cols − 1)/2)·pitch_x, (r − (rows − 1)/2)·pitch_y), at depth h = thickness.
@@ -12,9 +12,9 @@ use serde::{Deserialize, Serialize};
 use std::fmt;
 use thiserror::Error;
 
-/// Fewest rows or columns: one line of taxels cannot tell shear across it.
+/// Minimum rows or columns: a single line of taxels cannot resolve shear across it.
 pub const MIN_SIDE: usize = 2;
-/// Most rows or columns; checked before anything of the array's size is allocated.
+/// Maximum rows or columns; checked before anything of the array's size is allocated.
 pub const MAX_SIDE: usize = 256;
 /// Largest pitch or thickness in mm.
 pub const MAX_LENGTH_MM: f64 = 1e6;
@@ -22,9 +22,9 @@ pub const MAX_LENGTH_MM: f64 = 1e6;
 /// A regular rectangular array of taxels under an elastic cover.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Sensor {
-    /// Lines of taxels along y.
+    /// Number of rows, along y.
     pub rows: usize,
-    /// Taxels per line, along x.
+    /// Number of columns, along x.
     pub cols: usize,
     /// Distance of neighbouring columns in mm.
     pub pitch_x_mm: f64,
@@ -34,7 +34,7 @@ pub struct Sensor {
     pub thickness_mm: f64,
 }
 
-/// A size or length outside its range.
+/// A size or length is out of range.
 #[derive(Clone, Debug, PartialEq, Error)]
 #[error("{field} = {value} is not allowed: {allowed}")]
 pub struct SensorError {
@@ -42,7 +42,7 @@ pub struct SensorError {
     pub field: &'static str,
     /// The value found.
     pub value: f64,
-    /// What the field may hold.
+    /// The allowed values, in words.
     pub allowed: String,
 }
 
@@ -61,7 +61,7 @@ impl Sensor {
     /// Checks every field against its range.
     ///
     /// # Errors
-    /// The first field out of range, in the order of the struct.
+    /// [`SensorError`] for the first field out of range, in the order of the struct.
     pub fn check(&self) -> Result<(), SensorError> {
         for (field, value) in [("rows", self.rows), ("cols", self.cols)] {
             if !(MIN_SIDE..=MAX_SIDE).contains(&value) {
@@ -73,7 +73,7 @@ impl Sensor {
         let lengths =
             [("pitch_x_mm", self.pitch_x_mm), ("pitch_y_mm", self.pitch_y_mm), ("thickness_mm", self.thickness_mm)];
         for (field, value) in lengths {
-            // A NaN fails the comparison with zero.
+            // NaN fails the comparison, too.
             if !(value > 0.0 && value <= MAX_LENGTH_MM) {
                 let allowed = format!("above 0, at most {MAX_LENGTH_MM} mm");
                 return Err(SensorError { field, value, allowed });

@@ -1,15 +1,16 @@
-//! Write: a file appears whole or not at all.
+//! Write: files are replaced atomically.
 //!
-//! The bytes go into a new file beside the target, which takes the target's name only when all of them are on disk. A full
-//! disk, a signal or a loss of power leaves what was there before; at worst a stray `.dermis-…` file stays behind.
+//! The bytes are written to a new file in the same folder, which is renamed to the target once all of them are on disk.
+//! A full disk, a signal or a loss of power leaves the old file in place; at worst a `.dermis-…` file stays behind.
 //!
 //! | | |
 //! |---|---|
-//! | in: path | a file that is, or is not, there; its folder exists; links are followed |
-//! | in: bytes | everything the file is to hold |
-//! | errors | [`FileError`] with the path and the system's reason |
+//! | in: path | an existing or new file in an existing folder; links are followed |
+//! | in: bytes | the whole content of the file |
+//! | errors | [`FileError`] with the path and the error of the operating system |
 //!
-//! What is no regular file, as a pipe or `/dev/stdout`, is written as it is: there is no old content to keep.
+//! A path that is no regular file, such as a pipe or `/dev/stdout`, is written to directly: it has no old content to
+//! keep.
 
 use std::fs::{self, File, OpenOptions};
 use std::io::{Error, ErrorKind, Write};
@@ -18,33 +19,33 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 
 use thiserror::Error;
 
-/// A file or folder that could not be used; of one that was to be written, what was there before still is.
+/// A file or folder could not be read or written; a failed write leaves its old content.
 #[derive(Debug, Error)]
 #[error("{}: {source}", path.display())]
 pub struct FileError {
-    /// The file.
+    /// The file or folder.
     pub path: PathBuf,
-    /// The system's reason.
+    /// Error of the operating system.
     pub source: Error,
 }
 
 impl FileError {
-    /// For the file at `path` and what the system says of it.
+    /// Converts an error of the operating system on `path`, for `map_err`.
     pub fn at(path: &Path) -> impl FnOnce(Error) -> FileError + '_ {
         |source| FileError { path: path.to_owned(), source }
     }
 }
 
-/// Writes a file, whole or not at all.
+/// Replaces the file at `path` by `bytes`, atomically.
 ///
 /// # Errors
-/// [`FileError`].
+/// [`FileError`] if the file cannot be written.
 pub fn write(path: &Path, bytes: &[u8]) -> Result<(), FileError> {
     replace(path, bytes).map_err(FileError::at(path))
 }
 
 fn replace(path: &Path, bytes: &[u8]) -> Result<(), Error> {
-    // A link stays one.
+    // A symbolic link is kept and its target replaced.
     let target = fs::canonicalize(path).unwrap_or_else(|_| path.to_owned());
     if fs::metadata(&target).is_ok_and(|found| !found.is_file() && !found.is_dir()) {
         return fs::write(&target, bytes);
@@ -60,20 +61,20 @@ fn replace(path: &Path, bytes: &[u8]) -> Result<(), Error> {
     });
     let done = whole.and_then(|()| file.sync_all()).and_then(|()| fs::rename(&part, &target));
     if done.is_err() {
-        // Where even this fails, the first reason is the one to tell.
+        // If this fails as well, the first error is the one to report.
         let _ = fs::remove_file(&part);
     }
     done
 }
 
-/// A file that was not there before.
+/// Creates a new file with an unused name.
 fn new_file(folder: &Path) -> Result<(File, PathBuf), Error> {
     static NUMBER: AtomicUsize = AtomicUsize::new(0);
     loop {
         let number = NUMBER.fetch_add(1, Ordering::Relaxed);
         let part = folder.join(format!(".dermis-{}-{number}", std::process::id()));
         match OpenOptions::new().write(true).create_new(true).open(&part) {
-            // Left behind by an earlier process of the same number.
+            // Left behind by an earlier process with the same id.
             Err(error) if error.kind() == ErrorKind::AlreadyExists => continue,
             opened => return Ok((opened?, part)),
         }

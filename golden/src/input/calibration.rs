@@ -1,11 +1,11 @@
 //! Calibration: offset and gain of every taxel, from a CSV file.
 //!
-//! First line `row,col,offset,gain`, then a line per taxel in any order: b = gain · (reading − offset). Lines that are
-//! blank or start with `#` are passed over.
+//! The first line is `row,col,offset,gain`; then one line per taxel in any order: b = gain · (reading − offset). Blank
+//! lines and lines that start with `#` are ignored.
 //!
 //! | | shape | unit | range |
 //! |---|---|---|---|
-//! | offset | taxels | of the readings | finite |
+//! | offset | taxels | unit of the readings | finite |
 //! | gain | taxels | MPa per unit of the readings | finite, not zero |
 
 use crate::sensor::Sensor;
@@ -19,16 +19,16 @@ pub const HEADER: &str = "row,col,offset,gain";
 /// Largest file in bytes; 256 × 256 lines of 60 characters take 4 MB.
 const LARGEST_FILE: u64 = 16 << 20;
 
-/// One offset and gain per taxel, row-major.
+/// Offset and gain of each taxel, row-major.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Calibration {
-    /// Readings without contact.
+    /// Readings without contact, in their own unit.
     pub offset: Vec<f64>,
-    /// MPa per unit of the readings.
+    /// MPa per unit of the readings, not zero.
     pub gain: Vec<f64>,
 }
 
-/// A table that cannot be used.
+/// A calibration table cannot be used.
 #[derive(Debug, Error)]
 pub enum CalibrationError {
     /// The file cannot be read as text.
@@ -36,10 +36,10 @@ pub enum CalibrationError {
     Unreadable {
         /// Path as given.
         file: String,
-        /// The system's reason.
+        /// Error of the operating system.
         source: std::io::Error,
     },
-    /// More than a table can have.
+    /// The file is larger than a table may be.
     #[error("{file}: over {limit} bytes, too large for a calibration table")]
     TooLarge {
         /// Path as given.
@@ -47,7 +47,7 @@ pub enum CalibrationError {
         /// Largest size in bytes.
         limit: u64,
     },
-    /// A line that is not one of a table.
+    /// A line of the table is invalid.
     #[error("{file}, line {line}: {value:?} is not allowed; it must be {allowed}")]
     Line {
         /// Path as given.
@@ -56,35 +56,35 @@ pub enum CalibrationError {
         line: usize,
         /// The text found.
         value: String,
-        /// What may stand there.
+        /// The allowed values, in words.
         allowed: String,
     },
-    /// A taxel without a line.
+    /// Some taxels have no line.
     #[error("{file}: no line for taxel {row},{col}; {missing} of {taxels} taxels are missing")]
     Missing {
         /// Path as given.
         file: String,
-        /// Row of the first one.
+        /// Row of the first of them.
         row: usize,
-        /// Column of the first one.
+        /// Column of the first of them.
         col: usize,
-        /// How many are missing.
+        /// Number of taxels without a line.
         missing: usize,
-        /// Taxels of the sensor.
+        /// Number of taxels of the sensor.
         taxels: usize,
     },
 }
 
 impl Calibration {
-    /// Readings that are stress already.
+    /// The table for readings in MPa: offset 0, gain 1.
     pub fn identity(taxels: usize) -> Calibration {
         Calibration { offset: vec![0.0; taxels], gain: vec![1.0; taxels] }
     }
 
-    /// Reads a sensor's table from a file.
+    /// Reads the table of a sensor from a file.
     ///
     /// # Errors
-    /// [`CalibrationError`]
+    /// Any [`CalibrationError`].
     pub fn load(path: &Path, sensor: &Sensor) -> Result<Calibration, CalibrationError> {
         let file = path.display().to_string();
         let mut bytes = Vec::new();
@@ -101,7 +101,7 @@ impl Calibration {
         }
     }
 
-    /// Reads a sensor's table from text; `file` names it in errors.
+    /// Reads the table of a sensor from text; `file` names it in errors.
     ///
     /// # Errors
     /// [`CalibrationError::Line`] or [`CalibrationError::Missing`].

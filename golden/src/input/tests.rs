@@ -1,4 +1,4 @@
-//! Input options against frames with known forces, and the refusals of bad tables.
+//! Input options on frames with known forces, and invalid tables.
 
 use super::*;
 use crate::generator::converter::Converter;
@@ -33,7 +33,7 @@ fn a_dead_taxel_costs_little_and_its_reading_nothing() {
         scene.input.dead = vec![[peak / 10, peak % 10]];
         let golden = Golden::new(&scene).unwrap();
         let result = golden.run(&frame).unwrap();
-        // Masked, it may read anything: forces, condition, centroids and flags stay.
+        // A masked taxel may read anything: forces, condition, centroids and flags do not change.
         for share in [-0.5, 1e6] {
             let mut stuck = frame.clone();
             stuck.stress_MPa[peak] *= share;
@@ -90,7 +90,7 @@ fn table_and_tare_undo_what_the_sensor_did() {
         (0..3).all(|axis| (result.resultant_N[axis] - wanted[axis]).abs() < 1e-9)
     };
     assert!(near(run(&scene, &readings)));
-    // A tare frame takes the place of the offsets.
+    // A tare frame replaces the offsets.
     let zero = Frame::from_stress("zero", &scene.sensor, (0..100).map(|k| offset(k) + 0.3).collect()).unwrap();
     let path = folder.path().join("zero.json");
     std::fs::write(&path, zero.to_json()).unwrap();
@@ -142,7 +142,7 @@ fn averages_lower_the_noise_by_the_root_of_their_count() {
     assert!(input.average(&scene, &[]).is_err());
 }
 
-/// Median and largest.
+/// Median and largest error.
 fn spread(mut errors: Vec<f64>) -> [f64; 2] {
     errors.sort_by(f64::total_cmp);
     [(errors[(errors.len() - 1) / 2] + errors[errors.len() / 2]) / 2.0, errors[errors.len() - 1]]
@@ -166,7 +166,7 @@ fn filled_readings_beat_zeros_and_are_reported() {
             assert!(report.pulled <= count && report.misfit < 0.04, "{}: {report:?}", frame.id);
             let error = |result: &Reconstruction| result.error.unwrap();
             let normal = |result: &Reconstruction| error(result).normal.unwrap().abs();
-            // No worse than with every reading.
+            // No worse than with all readings.
             assert!(normal(&filled) <= normal(&zeros.run(&frame).unwrap()) + 0.002, "{}", frame.id);
             if count > 0 {
                 with.extend(error(&filled).tangential);

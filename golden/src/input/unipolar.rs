@@ -1,23 +1,24 @@
 //! Unipolar: sensors that read tension as zero, as force-sensitive resistors do.
 //!
-//! A reading of zero or less says b ≤ 0, not b = 0. The tension t ≥ 0 of the clipped taxels is an unknown beside μ, and
-//! both are chosen by what tells μ in any frame: the forces that meet every reading are to be few. With g_k(μ) the
-//! family of the stress 1 at taxel k alone,
+//! A reading of zero or less means b ≤ 0, not b = 0. The tension t ≥ 0 of the clipped taxels is unknown, as is μ. Both
+//! are chosen by the criterion that determines μ in any frame: few forces that cause all known readings. With g_k(μ)
+//! the family of a stress of 1 on taxel k alone,
 //!
 //! ```text
-//! p(μ, t) = p(μ) − Σ t_k g_k(μ),  t ≥ 0                           meets the known readings whatever t is
-//! t(μ):  ten times  min over t of Σ p_i² / (p̂_i² + ε²)            p̂ = p/Σp of the round before, ε from 0.1 to 1e-5
+//! p(μ, t) = p(μ) − Σ t_k g_k(μ),  t ≥ 0                           agrees with the known readings for any t
+//! t(μ):  ten times  min over t of Σ p_i² / (p̂_i² + ε²)            p̂ = p/Σp of the previous round, ε from 0.1 to 1e-5
 //! μ:     the shared search over Π(p(μ, t(μ))), Π of `sparse`
 //! ```
 //!
-//! The weighted sum stands for Σ log(p̂² + ε²), whose local minima a large ε smooths over at first. A t_k below zero is
-//! taken for zero and the others are solved for again, until none is. What the search finds, and the μ found with zeros
-//! in the place of t, which may lie on a higher hill, then climb: the filled frame's own μ by `sparse` is the next
-//! candidate as long as Π rises. The frame with −t in the place of the clipped readings goes the way of any other.
+//! The weighted sum replaces Σ log(p̂² + ε²); a large ε first smooths its local minima. A negative t_k is set to zero
+//! and the others are solved for again, until none is negative. Both the μ that this search finds and the μ found with
+//! t = 0, which may belong to a higher maximum, are then improved: the filled frame's own μ by `sparse` is the next
+//! candidate as long as Π rises. The frame with −t in place of the clipped readings is then reconstructed like any
+//! other.
 //!
-//! Each subarray is filled for itself, `adaptive` and `contacts` as a whole, with one μ. Of more than [`MAX_CLIPPED`] clipped
-//! taxels those with the largest Cz b are filled, the ones near the contacts; the rest stay zero. A frame of sensor 1
-//! takes 0.2 s at most, of sensor 3 0.7 s, of sensor 4 in 2×2 10 to 23 s.
+//! Each subarray is filled on its own; with `adaptive` and `contacts` the whole array is, with one μ. Of more than
+//! [`MAX_CLIPPED`] clipped taxels those with the largest Cz b, near the contacts, are filled; the rest stay zero. A
+//! frame of sensor 1 takes 0.2 s at most, of sensor 3 0.7 s, of sensor 4 in 2×2 10 to 23 s.
 //!
 //! Tangential and normal error with `sparse`, half-space frames with clipped taxels and one contact, median and worst:
 //!
@@ -27,16 +28,16 @@
 //! | sensor-2 (8) | 0.9 %, 7.1 % | 5.2 %, 44.5 % | 0.8 %, 5.4 % | 1.1 %, 1.7 % | 0.7 %, 1.7 % | 1.1 %, 1.7 % |
 //! | eight-by-eight (4) | 4.1 %, 4.3 % | 6.4 %, 50.9 % | 4.1 %, 16.5 % | 0.7 %, 0.8 % | 0.7 %, 0.8 % | 0.7 %, 0.8 % |
 //!
-//! Noise harms it as it harms `sparse`: with 1e-4 of the peak the median of sensor 1 is no longer better than with
-//! zeros, with 1e-3 those of sensors 1 and 2 are worse. With several contacts of different μ (sensor 3, `contacts`) it
-//! does no better than zeros. What the pressing forces alone (contacts do not pull) miss of the known readings is the
-//! misfit, by which a result can be judged.
+//! Noise affects it as it affects `sparse`: with 1e-4 of the peak the median of sensor 1 is no better than with zeros,
+//! with 1e-3 those of sensors 1 and 2 are worse. With several contacts of different μ (sensor 3, `contacts`) it is no
+//! better than zeros. The misfit indicates how far to trust a result: the part of the known readings that the
+//! compressive forces alone do not explain, since contacts do not pull.
 //!
 //! | | shape | unit |
 //! |---|---|---|
 //! | in: stress | taxels | MPa, clipped at 0 |
 //! | out: stress | taxels | MPa, at most 0 where it was clipped |
-//! | out: misfit | scalar | root mean square over the known readings, of the peak |
+//! | out: misfit | scalar | root mean square over the known readings, relative to the peak |
 
 use crate::float::objective::{Objective, Sparse};
 use crate::float::pass::Polynomial;
@@ -51,37 +52,39 @@ use faer::linalg::solvers::Solve;
 use faer::{Accum, Col, Mat, Par, Side};
 use serde::{Deserialize, Serialize};
 
-/// Most clipped taxels of a subarray whose tension is sought; the work grows with the square.
+/// Maximum number of clipped taxels of a subarray that are filled; the work grows with its square.
 pub const MAX_CLIPPED: usize = 256;
 /// Rounds of reweighting.
 const ROUNDS: i32 = 10;
-/// Share of Σp below which a force counts as none: in the first round and in the last.
+/// ε, the fraction of Σp below which a force counts as none: in the first round and in the last.
 const SPARSE_SHARES: [f64; 2] = [1e-1, 1e-5];
-/// Added to the normal equations' unit diagonal: above their rounding, n ε.
+/// Ridge added to the unit diagonal of the normal equations: above their rounding, n ε.
 const RIDGE: f64 = 1e-13;
 
-/// How the estimate went.
+/// Statistics of the estimated tension.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Unipolar {
-    /// Readings of zero or less.
+    /// Number of readings of zero or less.
     pub clipped: usize,
-    /// Clipped readings that were given tension.
+    /// Number of clipped readings for which tension was estimated.
     pub pulled: usize,
-    /// Candidates for μ, over all subarrays.
+    /// Number of candidates for μ, over all subarrays.
     pub evaluations: usize,
-    /// Root mean square of what the pressing forces miss of the known readings, over the peak.
+    /// Root mean square difference of the known readings and the stress of the compressive forces, relative to the
+    /// peak.
     pub misfit: f64,
 }
 
-/// A subarray's stress with tension in the place of its clipped readings.
+/// The stress of a subarray with tension in place of its clipped readings.
 pub(crate) struct Filled {
-    /// Row-major.
+    /// Stress in MPa, row-major in the subarray.
     pub stress_MPa: Vec<f64>,
-    /// Candidates for μ.
+    /// Number of candidates for μ.
     pub evaluations: usize,
 }
 
-/// Fills the readings `clipped` (indices in the subarray) of `b`, which has no tension.
+/// Estimates the tension of the readings `clipped` (indices in the subarray) of `b` in MPa, which has no negative
+/// values.
 pub(crate) fn fill_clipped(matrices: &Matrices, b: Vec<f64>, mut clipped: Vec<usize>, mu_max: f64) -> Filled {
     let n = b.len();
     if clipped.len() > MAX_CLIPPED {
@@ -99,7 +102,7 @@ pub(crate) fn fill_clipped(matrices: &Matrices, b: Vec<f64>, mut clipped: Vec<us
     let mut highest = f64::NEG_INFINITY;
     for start in [search(&family, mu_max, &objective), by_sparse(&b)] {
         let mut next = start;
-        // Every round but the last scores higher, so that this ends.
+        // Each iteration but the last has a higher score, so the loop ends.
         while let Some(found) = next {
             evaluations += found.evaluations;
             let Some((score, tension)) =
@@ -115,7 +118,7 @@ pub(crate) fn fill_clipped(matrices: &Matrices, b: Vec<f64>, mut clipped: Vec<us
     Filled { evaluations, ..best }
 }
 
-/// p(μ) and every g_k(μ), one behind the other.
+/// p(μ) and all g_k(μ), concatenated.
 fn stacked(matrices: &Matrices, b: &[f64], clipped: &[usize]) -> Polynomial {
     let mut stack = Polynomial::new(matrices, b);
     for &k in clipped {
@@ -127,9 +130,9 @@ fn stacked(matrices: &Matrices, b: &[f64], clipped: &[usize]) -> Polynomial {
     stack
 }
 
-/// `sparse`, of the forces with the tension that suits it best.
+/// The objective `sparse` for the forces with the best tension.
 struct TensionObjective {
-    /// Cells.
+    /// Number of cells.
     n: usize,
 }
 
@@ -140,13 +143,13 @@ impl Objective for TensionObjective {
 }
 
 impl TensionObjective {
-    /// Π and t of a candidate, `None` where it pulls.
+    /// Π and t of a candidate; `None` unless Σp is above zero.
     fn score_with_tension(&self, stack: &[f64]) -> Option<(f64, Vec<f64>)> {
         let (p, tension) = self.solve(stack)?;
         Some((Sparse::default().score(&p)?, tension))
     }
 
-    /// p and t of a candidate, `None` where it pulls.
+    /// p and t of a candidate; `None` unless Σp is above zero.
     fn solve(&self, stack: &[f64]) -> Option<(Vec<f64>, Vec<f64>)> {
         let (first, columns) = stack.split_at(self.n);
         let mut p = first.to_vec();
@@ -166,11 +169,12 @@ impl TensionObjective {
     }
 }
 
-/// t ≥ 0 with the least ‖weights · (p − G t)‖, but for taxels once taken for zero; `None` when there is no solution.
+/// The t ≥ 0 with the smallest ‖weights · (p − G t)‖, except that entries once set to zero stay zero; `None` without a
+/// solution.
 fn nonnegative_least_squares(p: &[f64], columns: &[f64], weights: &[f64]) -> Option<Vec<f64>> {
     let (n, count) = (p.len(), columns.len() / p.len());
     let mut g = Mat::from_fn(n, count, |i, k| weights[i] * columns[k * n + i]);
-    // Columns of norm 1, so that the ridge means the same to each.
+    // Columns are scaled to norm 1, so that the ridge has the same effect on each.
     let norms: Vec<f64> = g.col_iter().map(|col| col.norm_l2().max(f64::MIN_POSITIVE)).collect();
     g.col_iter_mut().zip(&norms).for_each(|(col, norm)| col.iter_mut().for_each(|g| *g /= norm));
     let mut gram = Mat::zeros(count, count);
@@ -178,7 +182,7 @@ fn nonnegative_least_squares(p: &[f64], columns: &[f64], weights: &[f64]) -> Opt
     let right = g.transpose() * Col::from_fn(n, |i| weights[i] * p[i]);
     let mut tension = vec![0.0; count];
     let mut free: Vec<usize> = (0..count).collect();
-    // Every round but the last takes a taxel out, so that this ends.
+    // Each iteration but the last removes a taxel, so the loop ends.
     while !free.is_empty() {
         let own =
             Mat::from_fn(free.len(), free.len(), |i, j| gram[(free[i], free[j])] + if i == j { RIDGE } else { 0.0 });
@@ -193,7 +197,8 @@ fn nonnegative_least_squares(p: &[f64], columns: &[f64], weights: &[f64]) -> Opt
     Some(tension)
 }
 
-/// Root mean square of what the pressing forces miss of the readings above zero, over the peak.
+/// Root mean square difference of the readings above zero and the stress of the compressive forces, relative to the
+/// peak.
 pub(crate) fn misfit(scene: &Scene, frame: &Frame, forces: &Forces) -> f64 {
     let peak = frame.peak_MPa();
     let known: Vec<usize> = (0..frame.stress_MPa.len()).filter(|&k| frame.stress_MPa[k] > 0.0).collect();
@@ -207,7 +212,7 @@ pub(crate) fn misfit(scene: &Scene, frame: &Frame, forces: &Forces) -> f64 {
     (squares / known.len() as f64).sqrt() / peak
 }
 
-/// Stress of the cells that press.
+/// Stress in MPa of the compressive forces on the cells.
 fn pressing_stress(scene: &Scene, forces: &Forces) -> Vec<f64> {
     let (cols, table) = (scene.sensor.cols, table(&scene.sensor, scene.medium));
     let mut stress = vec![0.0; table.len()];
