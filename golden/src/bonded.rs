@@ -1,6 +1,6 @@
-//! Bonded: an elastic layer of thickness h on a rigid base, as transfer functions.
+//! Bonded: transfer functions of an elastic layer of thickness h on a rigid base.
 //!
-//! With q = k h and Poisson ratio ν, the stress at the base in terms of pressure and of the shear along the wave,
+//! With q = k h and Poisson ratio ν, the stress at the base as a function of pressure and of the shear along the wave,
 //! b^ = Hn p^ − i Ht t^:
 //!
 //! ```text
@@ -8,19 +8,19 @@
 //! Ht = 2(1−ν) [(1−2ν) sinh q + q cosh q] / Δ
 //! ```
 //!
-//! Plane strain, u = 0 at the base. Numerator and denominator are multiplied by exp(−2q), so that nothing overflows.
+//! Plane strain, u = 0 at the base. Numerator and denominator are multiplied by exp(−2q) to avoid overflow.
 //!
 //! | | shape | unit | range |
 //! |---|---|---|---|
 //! | in: q, ν | scalars | – | q at least 0, ν from 0 to below 0.5 |
 //! | out: Hn, Ht | scalars | – | Hn 1 … 0, Ht 0 … 0.5 |
 //!
-//! [`kernel`] turns them into the stress under a point force, [`cell`] into that under a loaded cell.
+//! [`kernel`] derives the stress under a point force from them, [`cell`] that under a loaded cell.
 
 pub mod cell;
 pub mod kernel;
 
-/// Hn and Ht at q.
+/// Hn and Ht at `q` ≥ 0 for a Poisson ratio of 0 to below 0.5.
 pub fn transfer(q: f64, poisson: f64) -> [f64; 2] {
     let wide = 2.0 * (1.0 - poisson);
     let decay = (-q).exp();

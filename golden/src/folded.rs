@@ -1,4 +1,4 @@
-//! Folded: the basis of mirror parities, in which the matrices of a regular rectangle fall into four blocks.
+//! Folded: the basis of mirror parities, in which the matrices of a regular rectangle consist of four blocks.
 //!
 //! With m(a) distinct images l of the taxel of quad a, and s_t(l) = ±1 the sign of image l under parity t,
 //!
@@ -7,16 +7,16 @@
 //! B_t(a, c) = √(m(a)/m(c)) Σ_l s_s(l) M(a, image l of c)          s = t, or t with one parity flipped
 //! ```
 //!
-//! The basis is orthonormal, so that inverses, eigenvalues and norms of M are those of its blocks: a quarter of the
-//! multiplications of a product, a sixteenth of those of an inverse. Exact for Cz (no flip), Cx and Ax (x flipped), Cy
-//! and Ay (y flipped), and for everything made of them.
+//! The basis is orthonormal, so inverses, eigenvalues and norms of M are those of its blocks: a quarter of the
+//! multiplications of a product, a sixteenth of those of an inverse. This is exact for Cz (no flip), Cx and Ax (x
+//! flipped), Cy and Ay (y flipped), and for their products.
 //!
 //! | | shape |
 //! |---|---|
 //! | in: x | n, row-major in the subarray |
-//! | out: f | n: the parities one after the other; odd ones have no entry on the middle line they mirror |
+//! | out: f | n: one parity after the other; odd ones have no entry on the middle line of their mirror |
 //!
-//! A matrix without the symmetry, as one without some of its taxels, is one block in the basis of the taxels.
+//! A matrix without the symmetry, such as one with dead taxels, is one block in the basis of the taxels.
 
 use crate::fixed::coefficients::{has_entry, sign, FLIP_X, FLIP_Y};
 use crate::fixed::quads::Quads;
@@ -24,7 +24,7 @@ use faer::linalg::matmul::matmul;
 use faer::{Accum, ColMut, ColRef, Mat, Par};
 use std::ops::Range;
 
-/// Parity change under no mirror, of Cz and Cz⁺.
+/// Parity change of Cz and Cz⁺: none.
 pub const EVEN: usize = 0;
 /// Parity change of Cx and Ax.
 pub const ODD_X: usize = FLIP_X;
@@ -36,11 +36,11 @@ pub const ODD_Y: usize = FLIP_Y;
 struct Entry {
     /// Quad address.
     quad: usize,
-    /// m, as a number.
+    /// Number of distinct images m.
     images: f64,
 }
 
-/// The way into the folded basis and back.
+/// A basis for the vectors and matrices of a subarray: the mirror parities, or the taxels themselves.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Basis {
     quads: Quads,
@@ -62,7 +62,7 @@ pub struct Block {
 /// A matrix in a folded basis.
 #[derive(Clone, Debug)]
 pub struct Operator {
-    /// Everything that is not zero.
+    /// The blocks that are not zero.
     pub blocks: Vec<Block>,
 }
 
@@ -73,7 +73,7 @@ pub fn accumulate(m: &Mat<f64>, v: &[f64], factor: f64, out: &mut [f64]) {
 }
 
 impl Operator {
-    /// A matrix without symmetry, in the basis of the taxels.
+    /// A matrix without mirror symmetry, in the basis of the taxels.
     pub fn dense(entries: Mat<f64>) -> Operator {
         Operator { blocks: vec![Block { row0: 0, col0: 0, entries }] }
     }
@@ -98,7 +98,7 @@ impl Basis {
         Basis { quads, entries }
     }
 
-    /// The basis of the taxels: folding changes nothing.
+    /// The basis of the taxels, in which folding changes nothing.
     pub fn taxels(rows: usize, cols: usize) -> Basis {
         Basis { quads: Quads { rows, cols }, entries: Default::default() }
     }
@@ -107,13 +107,13 @@ impl Basis {
         self.entries.iter().all(Vec::is_empty)
     }
 
-    /// Places of a parity in a folded vector.
+    /// Indices of a parity in a folded vector.
     pub fn range(&self, parity: usize) -> Range<usize> {
         let start = self.entries[..parity].iter().map(Vec::len).sum();
         start..start + self.entries[parity].len()
     }
 
-    /// A vector in the folded basis.
+    /// Transforms a row-major vector to this basis.
     pub fn fold(&self, x: &[f64]) -> Vec<f64> {
         if self.is_taxels() {
             return x.to_vec();
@@ -125,7 +125,7 @@ impl Basis {
         (0..4).flat_map(own).collect()
     }
 
-    /// A folded vector back in the order of the taxels.
+    /// Transforms a vector in this basis back to row-major taxels.
     pub fn unfold(&self, f: &[f64]) -> Vec<f64> {
         if self.is_taxels() {
             return f.to_vec();
@@ -142,7 +142,7 @@ impl Basis {
         x
     }
 
-    /// A matrix with the mirror symmetry that `flip` names, in the folded basis; `m` gives its entry at two taxels.
+    /// Transforms a matrix with the mirror symmetry `flip` to this basis; `m` gives its entry for two row-major taxels.
     pub fn fold_matrix(&self, flip: usize, m: impl Fn(usize, usize) -> f64) -> Operator {
         if self.is_taxels() {
             let n = self.quads.rows * self.quads.cols;
@@ -160,7 +160,7 @@ impl Basis {
         Operator { blocks: (0..4).map(block).collect() }
     }
 
-    /// A folded matrix back in the order of the taxels; its symmetry holds to the bit.
+    /// Transforms a matrix in this basis back to row-major taxels; its symmetry holds to the bit.
     pub fn unfold_matrix(&self, flip: usize, operator: &Operator) -> Mat<f64> {
         if self.is_taxels() {
             return operator.blocks[0].entries.clone();
@@ -185,13 +185,13 @@ impl Basis {
         m
     }
 
-    /// Σ over the images of a quad, signed by the parity.
+    /// Σ over the distinct images of a quad, with the signs of the parity.
     fn sum(&self, quad: usize, parity: usize, value: impl Fn(usize) -> f64) -> f64 {
         let own = (0..4).filter(|lane| self.is_distinct(quad, *lane));
         own.map(|lane| sign(parity, lane) * value(self.quads.taxel(quad, lane))).sum()
     }
 
-    /// Whether a lane is a taxel of its own, not a second copy.
+    /// Whether a lane is a distinct taxel, not a copy.
     fn is_distinct(&self, quad: usize, lane: usize) -> bool {
         self.quads.lane_mask(quad) >> lane & 1 == 1
     }
@@ -203,7 +203,7 @@ mod tests {
     use crate::influence::Influence;
     use crate::sensor::Sensor;
 
-    /// Sums of up to 20 products of either sign, each rounded a few times.
+    /// Sums of up to 20 products of both signs, each rounded a few times.
     const ROUNDING: f64 = 1e-14;
 
     #[test]

@@ -1,12 +1,12 @@
-//! Generator: frames of stress from contacts described by shape, place, load and slip, with their exact forces.
+//! Generator: frames of stress from described contacts, with their exact forces.
 //!
 //! ```text
 //! contacts ── traction ─┬─ stress ── frame ── converter ── frame as a sensor gives it
 //!             pieces    └─ cells ──┘          noise, clipping, codes, dead and stuck taxels
 //! ```
 //!
-//! Stress is integrated over the continuous traction through the kernel of a point force, not over cells, so that the
-//! truth is not made with the model that is tested on it.
+//! Stress is the integral of the continuous traction with the kernel of a point force, not a sum over cells, so the
+//! reference does not share the cell model of the code under test.
 //!
 //! | shape | `size_mm` | pressure |
 //! |---|---|---|
@@ -44,10 +44,10 @@ use crate::scene::Medium;
 use crate::sensor::Sensor;
 use stress::Body;
 
-/// Computes the frame of contacts on a body: stress under each taxel, force on each cell, resultant.
-///
+/// Computes the frame of `contacts` on a `medium`: stress on each taxel in MPa, force on each cell in N, resultant in
+/// N.
 /// # Errors
-/// A sensor out of range, no contact, or a contact whose shape, sizes, loads or slip do not fit together.
+/// [`GeneratorError`]: a sensor out of range, no contact, or a contact with invalid shape, sizes, loads or slip.
 pub fn generate(id: &str, sensor: &Sensor, medium: Medium, contacts: &[Contact]) -> Result<Frame, GeneratorError> {
     sensor.check()?;
     if contacts.is_empty() {

@@ -1,4 +1,4 @@
-//! Influence: the stress one loaded cell causes under one taxel.
+//! Influence: the stress that one loaded cell causes on one taxel.
 //!
 //! A unit force spread evenly over an a × b cell (Love's rectangle), d = taxel − cell centre, corners X = dx ± a/2,
 //! Y = dy ± b/2 with sign s, R = √(X² + Y² + h²):
@@ -8,13 +8,12 @@
 //! cx = −h²/(2πab) Σ s Y/((X²+h²)R)                     cy: X and Y exchanged
 //! ```
 //!
-//! Far from the cell the four corners cancel to a billionth of their size, and the closed form keeps 8 digits of 16.
-//! There the mean of the point kernel 3h²(dx, dy, h)/(2πρ⁵) over the cell is taken by Gauss quadrature instead:
-//! its terms do not cancel. The kernel is analytic up to ρ = 0, so that with N nodes the error falls as E^(−2N), where
-//! E is the sum of the half-axes of the ellipse around the cell's side through the nearest singularity. The quadrature
-//! is used where E^(−2N) is below the rounding in both directions, the closed form elsewhere, that is close to cells
-//! much wider than h. On a bonded layer [`crate::bonded`] takes the place of both.
-//!
+//! Far from the cell the terms of the four corners cancel to a billionth of their size, and the closed form keeps 8 of
+//! 16 digits. There the mean of the point kernel 3h²(dx, dy, h)/(2πρ⁵) over the cell is computed by Gauss quadrature,
+//! whose terms do not cancel. The kernel is analytic up to ρ = 0, so the error with N nodes is E^(−2N), where E is the
+//! sum of the half-axes of the ellipse around the cell's side through the nearest singularity. The quadrature is used
+//! where E^(−2N) is below rounding in both directions, the closed form elsewhere, that is close to cells much wider
+//! than h. On a bonded layer [`crate::bonded`] replaces both.
 //! | | shape | unit |
 //! |---|---|---|
 //! | in: dx, dy, a, b, h | scalars | mm, a, b, h above 0 |
@@ -30,9 +29,9 @@ use std::f64::consts::TAU;
 /// Nodes of the quadrature along each side of a cell.
 const NODES: usize = 24;
 
-/// Stress along z per unit force along x.
+/// Normal stress in MPa per N along x; offset taxel − cell `dx`, `dy`, cell `a` × `b` and depth `h` in mm.
 pub fn cx(dx: f64, dy: f64, a: f64, b: f64, h: f64) -> f64 {
-    // Odd in dx: exactly zero in the middle, where rounding would leave a remainder.
+    // Odd in dx: exactly zero in the middle, where rounding could leave a remainder.
     if dx == 0.0 {
         return 0.0;
     }
@@ -43,12 +42,12 @@ pub fn cx(dx: f64, dy: f64, a: f64, b: f64, h: f64) -> f64 {
     -h * h / (TAU * a * b) * corners(dx, dy, a, b, corner)
 }
 
-/// Stress along z per unit force along y.
+/// Normal stress in MPa per N along y; arguments as for [`cx`].
 pub fn cy(dx: f64, dy: f64, a: f64, b: f64, h: f64) -> f64 {
     cx(dy, dx, b, a, h)
 }
 
-/// Stress along z per unit force along z.
+/// Normal stress in MPa per N along z; arguments as for [`cx`].
 pub fn cz(dx: f64, dy: f64, a: f64, b: f64, h: f64) -> f64 {
     if far(dx, dy, a, b, h) {
         return mean(dx, dy, a, b, |x, y| 3.0 * h * h * h / (TAU * rho5(x, y, h)));
@@ -77,7 +76,7 @@ fn corners(dx: f64, dy: f64, a: f64, b: f64, f: impl Fn(f64, f64) -> f64) -> f64
     f(x1, y1) - f(x0, y1) - f(x1, y0) + f(x0, y0)
 }
 
-/// Whether the quadrature is exact to rounding.
+/// Whether the quadrature is accurate to rounding.
 fn far(dx: f64, dy: f64, a: f64, b: f64, h: f64) -> bool {
     // E^(−2N) = ε
     let least = f64::EPSILON.powf(-0.5 / NODES as f64);
@@ -104,8 +103,8 @@ fn mean(dx: f64, dy: f64, a: f64, b: f64, f: impl Fn(f64, f64) -> f64) -> f64 {
     sum / 4.0
 }
 
-/// Stress per unit force along x, y, z at each distance in rows and columns, row-major: equal offsets, equal entries.
-/// cx is odd in the columns' direction, cy in the rows'.
+/// Stress in MPa per N along x, y, z for each distance in rows and columns, row-major. cx is odd along the columns, cy
+/// along the rows.
 pub fn table(sensor: &Sensor, medium: Medium) -> Vec<[f64; 3]> {
     let Sensor { cols, pitch_x_mm: a, pitch_y_mm: b, thickness_mm: h, .. } = *sensor;
     let offset = |index: usize| [(index % cols) as f64 * a, (index / cols) as f64 * b];
@@ -119,23 +118,23 @@ pub fn table(sensor: &Sensor, medium: Medium) -> Vec<[f64; 3]> {
     }
 }
 
-/// Influence matrices of an array, taxels × cells; row t, column f is the stress at taxel t per unit force on cell f.
+/// Influence matrices of an array, taxels × cells; row t, column f is the stress in MPa on taxel t per N on cell f.
 pub struct Influence {
-    /// Forces along x.
+    /// Stress per force along x, MPa/N.
     pub cx: Mat<f64>,
-    /// Forces along y.
+    /// Stress per force along y, MPa/N.
     pub cy: Mat<f64>,
-    /// Forces along z.
+    /// Stress per normal force, MPa/N.
     pub cz: Mat<f64>,
 }
 
 impl Influence {
-    /// The three matrices of a half-space; mirror symmetry of the array holds to the bit.
+    /// The matrices of an array on a half-space; the mirror symmetry of the array holds to the bit.
     pub fn new(sensor: &Sensor) -> Influence {
         Influence::through(sensor, Medium::HalfSpace)
     }
 
-    /// The three matrices of any medium; mirror symmetry of the array holds to the bit.
+    /// The matrices of an array on any medium; the mirror symmetry of the array holds to the bit.
     pub fn through(sensor: &Sensor, medium: Medium) -> Influence {
         let Sensor { rows, cols, .. } = *sensor;
         let table = table(sensor, medium);
@@ -194,7 +193,7 @@ mod tests {
     }
 
     proptest! {
-        /// Closed form and quadrature agree where both are good.
+        /// Closed form and quadrature agree where both are accurate.
         #[test]
         fn both_ways_agree(dx in -6.0f64..6.0, dy in -6.0f64..6.0, h in 2.0f64..4.0) {
             let (a, b) = (2.0, 2.5);

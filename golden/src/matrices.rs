@@ -1,15 +1,15 @@
-//! Matrices: everything about a subarray that does not depend on the frame.
+//! Matrices: the part of the computation for a subarray that does not depend on the frame.
 //!
 //! Cz⁺ is the pseudo-inverse, Ax = Cz⁺Cx, Ay = Cz⁺Cy. Cz is symmetric (the stress under cell j from cell i is that
-//! under i from j), so its singular values are the sizes of its eigenvalues λ and Cz⁺ = U diag(f(λ)) Uᵀ, f(λ) = 1/λ
-//! where the readings can tell ([`crate::scene::inverse`]).
+//! under i from j), so its singular values are the magnitudes of its eigenvalues λ and Cz⁺ = U diag(f(λ)) Uᵀ, f(λ) =
+//! 1/λ where the readings carry information ([`crate::scene::inverse`]).
 //!
-//! r = mu_max · max over θ of ρ(cos θ Ax + sin θ Ay) says how fast the series in μ converges. Cx and Cy are
+//! r = mu_max · max over θ of ρ(cos θ Ax + sin θ Ay) is the convergence rate of the series in μ. Cx and Cy are
 //! antisymmetric; with S = |Cz⁺|^½ the eigenvalues of cos θ Ax + sin θ Ay are those of the antisymmetric S (cos θ Cx +
 //! sin θ Cy) S where Cz is positive, and bounded by its 2-norm elsewhere. The norm is convex in (cos θ, sin θ) and even
 //! in both, so a few directions of one quadrant are enough: 9 miss at most 1 − cos(π/32) = 0.5 %.
 //!
-//! Degree d: smallest with r^(d+1) ≤ 0.035, at least 3 where r > 0.2, at least 1 where shear is wanted at all.
+//! Degree d: the smallest with r^(d+1) ≤ 0.035, at least 3 if r > 0.2, at least 1 if mu_max > 0.
 //!
 //! | | shape | unit |
 //! |---|---|---|
@@ -18,7 +18,7 @@
 //! | out: Ax, Ay | n × n | – |
 //!
 //! Everything is computed in the basis of mirror parities ([`crate::folded`]), a sixteenth of the work; the mirror
-//! symmetry of the array holds to the bit in every matrix, so that folding them again is exact.
+//! symmetry of the array holds to the bit in every matrix, so folding it again is exact.
 
 pub mod cache;
 mod inverse;
@@ -35,17 +35,17 @@ use faer::Mat;
 use inverse::{chain, Inverse};
 use thiserror::Error;
 
-/// Most taxels in one subarray: the 48 × 48 of the largest sensor. A matrix then takes 42 MB.
+/// Maximum taxels of a subarray: the 48 × 48 of the largest sensor. A matrix then takes 42 MB.
 pub const MAX_TAXELS: usize = 48 * 48;
-/// Largest remainder of the series, r^(d+1).
+/// Largest allowed remainder of the series, r^(d+1).
 pub const SERIES_TOLERANCE: f64 = 0.035;
-/// From this r on the degree is at least 3.
+/// r above which the degree is at least 3.
 pub const CUBIC_FROM: f64 = 0.2;
-/// Highest degree the pipeline is built for.
+/// Highest degree of the hardware and its bit-true model.
 pub const MAX_DEGREE: usize = 3;
-/// Highest degree of the floating-point model: enough for square taxels half as far apart as they are deep.
+/// Highest degree of the floating-point model: enough for square taxels with a pitch of half their depth.
 pub const MAX_FLOAT_DEGREE: usize = 8;
-/// From this r on no degree helps.
+/// r from which on no degree is enough.
 pub const MAX_RADIUS: f64 = 0.9;
 
 /// The precomputed matrices of one subarray shape.
@@ -53,11 +53,11 @@ pub const MAX_RADIUS: f64 = 0.9;
 pub struct Matrices {
     /// The subarray as a sensor.
     pub sensor: Sensor,
-    /// Pseudo-inverse of Cz.
+    /// Pseudo-inverse of Cz, N/MPa.
     pub cz_pinv: Mat<f64>,
-    /// Cz⁺ Cx.
+    /// Cz⁺ Cx, without unit.
     pub ax: Mat<f64>,
-    /// Cz⁺ Cy.
+    /// Cz⁺ Cy, without unit.
     pub ay: Mat<f64>,
     /// Stress per normal force, MPa/N.
     pub cz: Mat<f64>,
@@ -67,89 +67,89 @@ pub struct Matrices {
     pub cy: Mat<f64>,
     /// Largest over smallest singular value of Cz; infinite when the smallest is 0.
     pub condition: f64,
-    /// How Cz was inverted.
+    /// The rule by which Cz was inverted.
     pub inversion: Inversion,
-    /// Effective rank Σ λ f(λ): singular values kept, each by the share that damping leaves of it.
+    /// Effective rank Σ λ f(λ): the number of singular values kept, each weighted by its damping.
     pub rank: f64,
-    /// Noise gain ‖Cz⁺‖₂ in N/MPa: the largest error of p₀, in the 2-norm, per error of b.
+    /// Noise gain ‖Cz⁺‖₂ in N/MPa: the largest ratio of the errors of p₀ and b, both as 2-norms.
     pub gain: f64,
-    /// r at the scene's mu_max.
+    /// Convergence rate r of the series at the scene's mu_max.
     pub spectral_radius: f64,
     /// Degree of the polynomial in μ.
     pub degree: usize,
-    /// Cz⁺, Ax and Ay again, folded, for fast products.
+    /// Cz⁺, Ax and Ay in a folded basis, for fast products.
     pub folded: FoldedMatrices,
 }
 
-/// The matrices a frame is multiplied by, in the basis of the mirror parities or, without symmetry, of the taxels.
+/// The matrices that multiply a frame, in the basis of mirror parities, or of the taxels if there is no symmetry.
 #[derive(Clone, Debug)]
 pub struct FoldedMatrices {
-    /// The basis of the three matrices.
+    /// The common basis of the three matrices.
     pub basis: Basis,
     /// Cz⁺.
     pub cz_pinv: Operator,
-    /// Cz⁺ Cx.
+    /// Cz⁺ Cx, without unit.
     pub ax: Operator,
-    /// Cz⁺ Cy.
+    /// Cz⁺ Cy, without unit.
     pub ay: Operator,
 }
 
-/// A subarray without usable matrices.
+/// The matrices of a subarray cannot be computed or used.
 #[derive(Clone, Debug, PartialEq, Error)]
 pub enum MatricesError {
-    /// A size or length out of range.
+    /// A size of the sensor is out of range.
     #[error("sensor.{0}")]
     Sensor(#[from] SensorError),
-    /// More taxels than memory and time are meant for.
+    /// The subarray has more than [`MAX_TAXELS`] taxels.
     #[error("a subarray of {taxels} taxels ({sensor}) is too large: at most {MAX_TAXELS}; cut it by [partition]")]
     TooLarge {
-        /// The subarray.
+        /// The subarray as a sensor.
         sensor: Box<Sensor>,
-        /// Its size.
+        /// Its number of taxels.
         taxels: usize,
     },
-    /// The lengths are so far apart that the influence is not a finite number, or zero.
+    /// The lengths are so far apart that the influence of a cell is zero or not a finite number.
     #[error("{sensor}: the influence of a cell on its taxel is not representable")]
     NotFinite {
-        /// The subarray.
+        /// The subarray as a sensor.
         sensor: Box<Sensor>,
     },
     /// The eigenvalues did not converge.
     #[error("{sensor}: no eigenvalues of Cz found")]
     NotConverged {
-        /// The subarray.
+        /// The subarray as a sensor.
         sensor: Box<Sensor>,
     },
-    /// Too few taxels are left after masking.
+    /// Too few taxels remain without the dead ones.
     #[error("{sensor}: {dead} masked taxels leave too few readings")]
     TooManyDead {
-        /// The subarray.
+        /// The subarray as a sensor.
         sensor: Box<Sensor>,
-        /// Masked taxels in it.
+        /// Number of dead taxels in it.
         dead: usize,
     },
     /// The series in μ converges too slowly or not at all.
     #[error(
-        "{sensor}: r = {radius:.3} at mu_max = {mu_max} needs more than degree {most}; search.mu_max = {suggested} has a \
-         series that converges, as have taxels further apart against the thickness"
+        "{sensor}: r = {radius:.3} at mu_max = {mu_max} needs a series of more than \
+         degree {most}; use search.mu_max = {suggested} or less, or a larger pitch in relation to the thickness"
     )]
     SlowSeries {
-        /// The subarray.
+        /// The subarray as a sensor.
         sensor: Box<Sensor>,
-        /// r, unrounded.
+        /// Convergence rate r.
         radius: f64,
         /// The scene's mu_max.
         mu_max: f64,
-        /// Highest degree there is.
+        /// Highest degree available.
         most: usize,
-        /// The largest mu_max of three digits that it serves.
+        /// The largest mu_max with three decimals for which that degree is enough.
         suggested: f64,
     },
 }
 
 impl Matrices {
-    /// Computes the matrices of a (sub)array on a half-space for shear ratios up to `mu_max` (0 to 2), of a degree that
-    /// the pipeline has.
+    /// Computes the matrices of a (sub)array on a half-space with the exact inverse, for shear ratios up to `mu_max` (0
+    /// to 2); the degree is at most [`MAX_DEGREE`].
     ///
     /// # Errors
     /// [`MatricesError`]; the size is checked before anything is allocated.
@@ -157,7 +157,7 @@ impl Matrices {
         Matrices::up_to(sensor, Medium::HalfSpace, mu_max, Inversion::EXACT, MAX_DEGREE)
     }
 
-    /// Computes the matrices of a subarray as its scene wants them, of a degree of at most `most`.
+    /// Computes the matrices of a subarray with the scene's medium, mu_max and inverse; the degree is at most `most`.
     ///
     /// # Errors
     /// As [`Matrices::new`].
@@ -222,7 +222,7 @@ impl Matrices {
     }
 }
 
-/// Cz⁺, Ax, Ay and r in the folded basis; `None` when the eigenvalues of Cz do not converge.
+/// Cz⁺, Ax, Ay and r in the folded basis; `None` if the eigenvalues of Cz do not converge.
 fn compute(basis: &Basis, [cx, cy, cz]: [&Mat<f64>; 3], mu_max: f64, inversion: Inversion) -> Option<CachedMatrices> {
     let folded = |flip: usize, m: &Mat<f64>| basis.fold_matrix(flip, |i, j| m[(i, j)]);
     let (folded_cx, folded_cy) = (folded(ODD_X, cx), folded(ODD_Y, cy));
@@ -235,7 +235,7 @@ fn compute(basis: &Basis, [cx, cy, cz]: [&Mat<f64>; 3], mu_max: f64, inversion: 
     Some(CachedMatrices { numbers, operators: [cz_pinv, ax, ay] })
 }
 
-/// The degree a series of radius `r` needs, `None` when it is more than `most`.
+/// The degree that a series of convergence rate `r` needs; `None` if it exceeds `most`.
 fn degree(r: f64, mu_max: f64, most: usize) -> Option<usize> {
     if mu_max == 0.0 {
         return Some(0);
@@ -245,11 +245,11 @@ fn degree(r: f64, mu_max: f64, most: usize) -> Option<usize> {
     (least..=most).find(enough).filter(|_| r < MAX_RADIUS)
 }
 
-/// The largest mu_max of three digits whose series needs no more than degree `most`, for a radius per unit of mu_max.
+/// The largest mu_max with three decimals for which degree `most` is enough; `per_mu` is r / mu_max.
 fn largest_mu_max(per_mu: f64, most: usize) -> f64 {
     let radius = SERIES_TOLERANCE.powf(1.0 / (most as f64 + 1.0)).min(MAX_RADIUS);
     let mu_max = (1e3 * radius / per_mu).floor() / 1e3;
-    // A radius that is no number serves none.
+    // NaN or infinite rates allow no mu_max.
     if mu_max.is_finite() {
         mu_max
     } else {

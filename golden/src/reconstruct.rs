@@ -1,7 +1,7 @@
-//! Reconstruct: a result put together the same way for every engine, and the golden engine itself.
+//! Reconstruct: the result format that all engines share, and the golden engine.
 //!
 //! [`Reconstruction`] serialises to the JSON of `dermis reconstruct --json`; forces are row-major over the whole array,
-//! errors fractions with Eq. 3's sign, `null` where there is nothing.
+//! errors are fractions with the sign of Eq. 3, `null` where undefined.
 //!
 //! | | shape | unit |
 //! |---|---|---|
@@ -33,7 +33,7 @@ use crate::scene::Scene;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeSet;
 
-/// What was found in one subarray.
+/// Result of one subarray.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct SubarrayResult {
     /// First row in the array.
@@ -50,20 +50,20 @@ pub struct SubarrayResult {
     pub compression_centroid_mm: Option<[f64; 2]>,
     /// Centroid of the taxels in tension in mm from the array's centre.
     pub tension_centroid_mm: Option<[f64; 2]>,
-    /// Ratio of shear to normal force, [x, y].
+    /// Ratio of shear to normal force, [x, y]; 0 if not searched.
     pub mu: [f64; 2],
-    /// The objective at μ, `None` where no search was made or none succeeded.
+    /// The objective at μ; `None` if no search was made or no candidate was admissible.
     pub objective_value: Option<f64>,
 }
 
-/// Everything found in one frame.
+/// The result for one frame.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Reconstruction {
     /// The scene's name.
     pub scene: String,
     /// The frame's id.
     pub frame: String,
-    /// `golden`, `fixed` or `rtl`.
+    /// The engine: `golden`, `fixed` or `rtl`.
     pub engine: String,
     /// Subarrays along rows and columns.
     pub case: Grid,
@@ -71,19 +71,19 @@ pub struct Reconstruction {
     pub subarrays: Vec<SubarrayResult>,
     /// Sum of the forces in N, [x, y, normal].
     pub resultant_N: [f64; 3],
-    /// One force vector per taxel.
+    /// One force vector per taxel in N; empty with `output.forces = "resultants"`.
     pub forces_N: Forces,
-    /// Errors against the frame's resultant, where it has one.
+    /// Errors relative to the frame's known resultant; `None` if it has none.
     pub error: Option<Errors>,
-    /// Remarks, sorted, each once.
+    /// Limitations of the result, sorted, without duplicates.
     pub flags: Vec<Flag>,
-    /// What only some scenes ask for; its fields stand beside the others.
+    /// Fields that only some scenes have; in JSON they are at the same level as the others.
     #[serde(flatten)]
     pub extra: Extra,
 }
 
-/// Puts a result together: resultant, errors against the frame's truth, and the flags `no-contact` and
-/// `condition-unmet`, which follow from the result; all others come in `flags`.
+/// Assembles a result: adds the resultant, the errors relative to the frame's known resultant, and the flags
+/// `no-contact` and `condition-unmet`; `flags` are all others.
 pub fn assemble(
     scene: &Scene,
     frame: &Frame,
@@ -114,7 +114,7 @@ pub fn assemble(
     }
 }
 
-/// How many subarrays lie below and beside each other.
+/// Number of subarrays along rows and columns.
 fn grid(subarrays: &[SubarrayResult]) -> Grid {
     let rows: BTreeSet<usize> = subarrays.iter().map(|subarray| subarray.row0).collect();
     let cols: BTreeSet<usize> = subarrays.iter().map(|subarray| subarray.col0).collect();

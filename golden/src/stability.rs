@@ -1,20 +1,20 @@
-//! Stability: what each number format keeps of a scene, from the condition of its Cz to the error of its forces.
+//! Stability: the errors of a scene in each number format, from the condition of Cz to the error of the forces.
 //!
-//! Two frames of known forces, a Hertz pressure p of 1 N, their stress in extended precision ([`extended`]): b₀ without
-//! shear, b with the shear μ p. Nothing but the inverse and the arithmetic stands between them and the truth. The
-//! table's last lines take p, μ and b from [`references`], computed elsewhere with 50 digits; their b₀ is [`extended`]'s.
+//! Two frames of known forces, a Hertz pressure p of 1 N, with stress computed in extended precision ([`extended`]): b₀
+//! without shear, b with the shear μ p. All errors come from the inverse and the arithmetic. The last lines of the
+//! table take p, μ and b from [`references`], computed independently with 50 digits; their b₀ is from [`extended`].
 //!
 //! ```text
 //! forward     ‖Cz⁺b₀ − p‖/‖p‖              in double, single, fixed point
 //! residual    ‖b − C x‖/‖b‖                x the forces found, with the searched μ
 //! normal      |Σx_z − Σp|/Σp               tangential alike
 //! rank, gain  Σ λ f(λ), max |f(λ)|         [`crate::scene::inverse`]
-//! bits        least input_bits with forward ≤ double's + 0.01; Cz⁺ four bits wider, level as it is
+//! bits        smallest input_bits with forward ≤ double's + 0.01; Cz⁺ four bits wider, same level
 //! ```
 //!
 //! | | |
 //! |---|---|
-//! | in | a scene with a partition into equal rectangles; one of them is measured |
+//! | in | a scene with a partition into equal rectangles, of which one is measured |
 //! | out | [`Row`]; errors are fractions, gain in N/MPa |
 
 pub mod extended;
@@ -40,36 +40,36 @@ use crate::sensor::Sensor;
 use serde::Serialize;
 use truth::Truth;
 
-/// How much of ‖p‖ the fixed model may add to the forward error of double.
+/// Fraction of ‖p‖ by which the forward error in fixed point may exceed that in double.
 const BITS_ADD: f64 = 0.01;
-/// Input bits that a scene may have.
+/// Smallest and largest `fixed.input_bits`.
 const BITS: [u32; 2] = [8, 24];
-/// Cz⁺ has so many bits more than the input; the defaults are 20 and 24.
+/// Bits by which Cz⁺ is wider than the input; the defaults are 20 and 24.
 const INVERSE_MORE: u32 = 4;
 
 /// Errors of one number format.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct FormatErrors {
-    /// ‖Cz⁺b₀ − p‖/‖p‖.
+    /// Forward error ‖Cz⁺b₀ − p‖/‖p‖.
     pub forward: f64,
-    /// ‖b − C x‖/‖b‖.
+    /// Residual ‖b − C x‖/‖b‖.
     pub residual: f64,
-    /// Normal error of the resultant.
+    /// Normal error of the resultant; `None` if undefined.
     pub normal: Option<f64>,
-    /// Tangential error of the resultant.
+    /// Tangential error of the resultant; `None` if undefined.
     pub tangential: Option<f64>,
 }
 
-/// What a scene's matrices are like.
+/// Properties of a scene's matrices.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Spectrum {
     /// Largest over smallest singular value of Cz.
     pub condition: f64,
-    /// Effective rank.
+    /// Effective rank Σ λ f(λ).
     pub rank: f64,
-    /// ‖Cz⁺‖₂ in N/MPa.
+    /// Noise gain ‖Cz⁺‖₂ in N/MPa.
     pub gain: f64,
-    /// Largest spectral radius of μ·A; the series converges below 1.
+    /// Convergence rate r: the largest spectral radius of μ·A; the series converges below 1.
     pub radius: f64,
     /// Degree of the series.
     pub degree: usize,
@@ -78,43 +78,43 @@ pub struct Spectrum {
 /// One line of the table.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Row {
-    /// What is varied, or the scene's name.
+    /// The quantity varied, or the scene's name.
     pub group: String,
     /// The measured subarray.
     pub sensor: Sensor,
-    /// The body over it.
+    /// The medium above it.
     pub medium: Medium,
     /// Kind of inverse.
     pub inverse: &'static str,
-    /// Level of the inverse.
+    /// Level of the inverse relative to the largest singular value.
     pub level: f64,
-    /// Of the golden model's matrices; `None` where it refuses the scene.
+    /// Properties of the golden model's matrices; `None` if it rejects the scene.
     pub spectrum: Option<Spectrum>,
-    /// The golden model.
+    /// Errors of the golden model, in double precision.
     pub double: Option<FormatErrors>,
-    /// The golden model's frame part in single precision.
+    /// Errors of the golden model with single precision per frame.
     pub single: Option<FormatErrors>,
-    /// The bit-true model.
+    /// Errors of the bit-true model.
     pub fixed: Option<FormatErrors>,
-    /// Input bits that the bit-true model needs; `None` where none up to 24 are enough.
+    /// Input bits that the bit-true model needs; `None` if 24 are not enough.
     pub bits: Option<u32>,
-    /// Why there is no golden result.
+    /// Why there is no result of the golden model.
     pub refused: Option<String>,
-    /// Why there is no fixed result.
+    /// Why there is no result of the bit-true model.
     pub fixed_refused: Option<String>,
 }
 
-/// Measures one rectangle of a scene's partition; refusals are part of the row.
+/// Measures one rectangle of a scene's partition; scenes that a model rejects are reported in the row.
 ///
 /// # Errors
-/// A partition that does not divide the array, or has no equal rectangles; a frame that is not the scene's.
+/// [`GoldenError`]: a partition that does not divide the array, or a frame that does not fit the scene.
 pub fn measure(setting: &Setting) -> Result<Row, GoldenError> {
     let Setting { group, scene, frame } = setting;
     let case = Some(scene.partition.case).filter(|case| case.grid().is_some()).unwrap_or(Case::WHOLE);
     let shape = subarrays(case, &scene.sensor)?[0].sensor(&scene.sensor);
     let mut scene = scene.clone();
     (scene.sensor, scene.partition.case) = (shape, Case::WHOLE);
-    // What a frame's own peak sets, and what would cut the known forces.
+    // Input options and the threshold are reset: full scale is the frame's peak, no known force is dropped.
     (scene.input, scene.threshold.min_force_N) = (Default::default(), 0.0);
     let rule = scene.inversion();
     let mut row = Row {
@@ -138,7 +138,7 @@ pub fn measure(setting: &Setting) -> Result<Row, GoldenError> {
     Ok(row)
 }
 
-/// The row of a scene that the golden model takes.
+/// Fills the row of a scene that the golden model accepts.
 fn fill(row: &mut Row, scene: &Scene, golden: &Golden, truth: &Truth) -> Result<(), GoldenError> {
     let matrices = golden.matrices();
     let Matrices { condition, rank, gain, spectral_radius: radius, degree, .. } = *matrices;
@@ -163,7 +163,7 @@ fn fill(row: &mut Row, scene: &Scene, golden: &Golden, truth: &Truth) -> Result<
     Ok(())
 }
 
-/// The forces that single precision finds.
+/// The forces found in single precision.
 fn in_single(scene: &Scene, matrices: &Matrices, b: &[f64]) -> Forces {
     let family = single::family(matrices, b, matrices.degree);
     let (sensor, mu_max) = (&scene.sensor, scene.search.mu_max);
@@ -176,7 +176,7 @@ fn in_single(scene: &Scene, matrices: &Matrices, b: &[f64]) -> Forces {
 /// ‖Cz⁺b₀ − p‖/‖p‖ of the bit-true model without search, for codes of `bits` bits and the scene's own inverse.
 fn fixed_forward(scene: &Scene, truth: &Truth, bits: u32) -> Option<f64> {
     let mut scene = scene.clone();
-    // The level stays: how many bits the same matrices need.
+    // The level is kept: the question is how many bits the same matrices need.
     scene.inverse.level = Some(scene.inversion().level).filter(|level| *level > 0.0);
     scene.search.mu_max = 0.0;
     if bits != scene.fixed.input_bits {
@@ -187,7 +187,7 @@ fn fixed_forward(scene: &Scene, truth: &Truth, bits: u32) -> Option<f64> {
     Some(truth.forward(&result.forces_N.fz))
 }
 
-/// Least input bits with a forward error of at most `most`, found by halving.
+/// Smallest number of input bits with a forward error of at most `most`, by bisection.
 fn bits(scene: &Scene, truth: &Truth, most: f64) -> Option<u32> {
     let enough = |bits: u32| fixed_forward(scene, truth, bits).is_some_and(|forward| forward <= most);
     let [mut low, mut high] = BITS;

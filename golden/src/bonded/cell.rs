@@ -1,4 +1,4 @@
-//! Cell: the stress under one taxel from one evenly loaded cell on a bonded layer.
+//! Cell: the stress on one taxel from one uniformly loaded cell on a bonded layer.
 //!
 //! Mean of the point kernel over the a × b cell, d = taxel − cell centre, u over the cell:
 //!
@@ -6,8 +6,8 @@
 //! cz = mean gn(|d − u|/h)/h²        cx = mean (d − u)x gs(|d − u|/h)/h³
 //! ```
 //!
-//! The kernel is analytic within h, so that panels of at most h a side with 12 nodes each way integrate it to rounding
-//! (error E^(−24), E = 2 + √5). Where the cell is beyond the kernel's reach it is left out.
+//! The kernel is analytic within h, so panels of at most h a side with 12 nodes along each side integrate it to
+//! rounding (error E^(−24), E = 2 + √5). The part of a cell beyond the kernel's reach is omitted.
 //!
 //! | | shape | unit |
 //! |---|---|---|
@@ -20,7 +20,7 @@ use crate::gauss::rule;
 /// Nodes of a panel along each side.
 const NODES: usize = 12;
 
-/// Stress per unit force along x, y and z on the cell.
+/// Stress in MPa per N along x, y and z on the cell; offset taxel − cell, sides of the cell and `h` in mm.
 pub fn influence(kernel: &Kernel, [dx, dy]: [f64; 2], [a, b]: [f64; 2], h: f64) -> [f64; 3] {
     // Taxel − force, in units of h, over the part of the cell within reach.
     let (along_x, along_y) = (side(dx, a, h), side(dy, b, h));
@@ -34,7 +34,7 @@ pub fn influence(kernel: &Kernel, [dx, dy]: [f64; 2], [a, b]: [f64; 2], h: f64) 
             sums[2] += weight * normal;
         }
     }
-    // Odd in dx and dy: exactly zero in the middle, where rounding would leave a remainder.
+    // Odd in dx and dy: exactly zero in the middle, where rounding could leave a remainder.
     let [x, y, z] = sums.map(|sum| sum / (a * b));
     [if dx == 0.0 { 0.0 } else { x }, if dy == 0.0 { 0.0 } else { y }, z]
 }

@@ -6,12 +6,12 @@
 //! b h² = Fz gn(r) + (F·d) gs(r)        gn = 1/2π ∫ Hn(q) J0(qr) q dq        gs = 1/2π ∫ Ht(q) J1(qr)/r q dq
 //! ```
 //!
-//! Both are even in r and analytic but for singularities at r = ±i, ±3i, … (Hn and Ht decay as exp(−q)), so that
-//! Chebyshev series of 20 terms on short pieces carry them to rounding. They are tabulated up to r = 40; beyond, they
-//! have decayed as exp(−0.74 r) or faster to below 1e-13 of their peak and count as zero.
+//! Both are even in r and analytic except for singularities at r = ±i, ±3i, … (Hn and Ht decay as exp(−q)), so
+//! Chebyshev series of 20 terms on short pieces represent them to rounding. They are tabulated up to r = 40; beyond,
+//! they have decayed as exp(−0.74 r) or faster to below 1e-13 of their peak and are set to zero.
 //!
-//! The integrals are taken by Gauss–Legendre panels up to q = 44, where q² exp(−q) is below rounding; a panel is at
-//! most 2 wide, because Hn and Ht have their nearest poles at q = ±0.74i, and carries a phase qr of at most 20.
+//! The integrals are computed by Gauss–Legendre panels up to q = 44, where q² exp(−q) is below rounding; a panel is at
+//! most 2 wide, because the nearest poles of Hn and Ht are at q = ±0.74i, and spans a phase qr of at most 20.
 //!
 //! | | shape | unit | range |
 //! |---|---|---|---|
@@ -22,9 +22,9 @@ use super::transfer;
 use crate::gauss::rule;
 use std::f64::consts::{PI, TAU};
 
-/// r from which the kernels count as zero.
+/// r in units of h from which the kernels are zero.
 pub const REACH: f64 = 40.0;
-/// Up to here pieces are short: the singularity at r = ±i is near.
+/// r up to which pieces are short, because the singularity at r = ±i is near.
 const NEAR: f64 = 6.0;
 /// Length of a piece below and above `NEAR`.
 const PIECES: [f64; 2] = [0.5, 2.0];
@@ -45,7 +45,7 @@ pub struct Kernel {
 }
 
 impl Kernel {
-    /// Tabulates the kernels; about 0.05 s.
+    /// Tabulates the kernels for a Poisson ratio of 0 to below 0.5; takes about 0.05 s.
     pub fn new(poisson: f64) -> Kernel {
         let near = (NEAR / PIECES[0]) as usize;
         let far = ((REACH - NEAR) / PIECES[1]) as usize;
@@ -54,7 +54,7 @@ impl Kernel {
         Kernel { pieces: starts.map(|(start, length)| piece(start, length, poisson)).collect() }
     }
 
-    /// gn and gs at r, a distance in units of h.
+    /// gn (per h²) and gs (per h³) at `r` ≥ 0, a distance in units of h.
     pub fn at(&self, r: f64) -> [f64; 2] {
         let (index, place) = if r < NEAR {
             let pieces = r / PIECES[0];
@@ -111,7 +111,7 @@ fn hankel(r: f64, poisson: f64) -> [f64; 2] {
 
 /// J1(x)/x, 1/2 at 0.
 fn ratio(x: f64) -> f64 {
-    // Below, the next term of the series, x²/16, is under the rounding.
+    // Below this x, the next term of the series, x²/16, is less than rounding.
     if x < 1e-8 {
         0.5
     } else {
@@ -130,7 +130,7 @@ mod tests {
 
     #[test]
     fn known_shape() {
-        // gn(0) over the half-space's 3/2π, half-width of gn, largest gt and where; three to four digits.
+        // gn(0) relative to the half-space's 3/2π, half-width of gn, largest gt and its r; three to four digits.
         for (poisson, raised, half_width, largest, at) in [
             (0.40, 1.485, 0.515, 0.2249, 0.483),
             (0.48, 1.547, 0.503, 0.2340, 0.474),

@@ -1,8 +1,8 @@
-//! Cells: the traction integrated over each taxel's cell.
+//! Cells: the integral of the traction over the cell of each taxel.
 //!
-//! Along x the integral of a piece's pressure is a closed form of the chord's ends; along y it is taken by quadrature
-//! between the lines where the outline meets a cell boundary. Between those it is analytic but for square roots at the
-//! ends, which y = middle + half · sin removes.
+//! Along x the integral of a piece's pressure has a closed form; along y it is computed by quadrature between the
+//! positions where the outline crosses a cell boundary. In between it is analytic except for square roots at the ends,
+//! which the substitution y = middle + half · sin removes.
 //!
 //! ```text
 //! ellipse  Q(x, y) = A x² + 2 B x y + C y² ≤ 1:  1 − Q = m − A (x − x0)²,  m = 1 − (C − B²/A) y²,  x0 = −B y/A
@@ -17,7 +17,7 @@ use crate::sensor::Sensor;
 use std::f64::consts::{FRAC_PI_2, PI};
 use std::ops::Range;
 
-/// Nodes between two neighbouring lines.
+/// Nodes between two neighbouring crossings.
 const NODES: usize = 32;
 
 /// Force on each cell in N, row-major.
@@ -41,7 +41,7 @@ pub(super) fn forces(sensor: &Sensor, pieces: &[Piece]) -> Forces {
     forces
 }
 
-/// Boundaries of the cells in one direction, seen from a piece's centre.
+/// Boundaries of the cells along one axis, relative to a piece's centre.
 struct Edges {
     count: usize,
     pitch: f64,
@@ -53,7 +53,7 @@ impl Edges {
         (index as f64 - self.count as f64 / 2.0) * self.pitch - self.shift
     }
 
-    /// The cells that a piece of half length `reach` can touch.
+    /// The cells that a piece of half length `reach` can overlap.
     fn cells(&self, reach: f64) -> Range<usize> {
         let place = |mm: f64| (mm + self.shift) / self.pitch + self.count as f64 / 2.0;
         // The casts saturate at 0.
@@ -63,11 +63,11 @@ impl Edges {
     }
 }
 
-/// A piece's region around its centre.
+/// The region of a piece, relative to its centre.
 enum Outline {
-    /// A, B, C of the quadratic form, and whether the pressure is Hertz's.
+    /// A, B, C of the quadratic form; whether the pressure is Hertz's.
     Ellipse { a: f64, b: f64, c: f64, hertz: bool },
-    /// The corners in order, and the area.
+    /// The corners in order; the area.
     Polygon { corners: [[f64; 2]; 4], area: f64 },
 }
 
@@ -105,7 +105,7 @@ impl Outline {
         }
     }
 
-    /// Shares of the load in the cells of one row of cells.
+    /// Fractions of the load on the cells of one row.
     fn strip(&self, [low, high]: [f64; 2], edges: &Edges, cols: Range<usize>) -> Vec<f64> {
         let reach = self.reach()[1];
         let mut breaks = vec![low, high, -reach, reach];
@@ -133,7 +133,7 @@ impl Outline {
         shares
     }
 
-    /// Adds the y where the outline meets the line at x.
+    /// Adds the y at which the outline crosses the line at `x`.
     fn add_crossings(&self, x: f64, breaks: &mut Vec<f64>) {
         match self {
             Outline::Ellipse { a, b, c, .. } => {
@@ -182,7 +182,7 @@ impl Outline {
     }
 }
 
-/// A chord and the share of the load per mm of y up to a point of it.
+/// A chord, with the fraction of the load per mm of y from its start to a point.
 struct Chord {
     middle: f64,
     half: f64,

@@ -1,14 +1,14 @@
-//! Converter: what a real sensor makes of a frame.
+//! Converter: simulates the readings of a real sensor from a frame.
 //!
-//! In this order: Gaussian noise, tension clipped to zero (a unipolar sensor), rounding to codes, taxels that read
-//! nothing (dead) or always the same (stuck).
+//! Applied in this order: Gaussian noise, tension clipped to zero (a unipolar sensor), rounding to codes, dead taxels
+//! (read zero), stuck taxels (always read the same).
 //!
 //! | | shape | unit | range |
 //! |---|---|---|---|
-//! | in: noise | scalar | of max \|b\| | standard deviation, at least 0 |
+//! | in: noise | scalar | fraction of max \|b\| | standard deviation, at least 0 |
 //! | in: bits | scalar | bits | 2 … 24; full scale is the frame's own peak unless given |
 //! | in: dead, stuck | lists | \[row, col\], MPa | inside the array |
-//! | out: frame | taxels | MPa | the truth is carried along |
+//! | out: frame | taxels | MPa | known forces are passed through |
 
 use super::GeneratorError;
 use crate::frame::Frame;
@@ -16,30 +16,30 @@ use crate::quantise::quantise;
 use crate::random::Random;
 use crate::sensor::Sensor;
 
-/// Faults and limits of a sensor.
+/// Noise, quantisation and faults of a sensor.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Converter {
-    /// Standard deviation of the noise over the frame's largest |b|.
+    /// Standard deviation of the noise as a fraction of the frame's largest |b|, at least 0.
     pub noise: f64,
-    /// Tension reads as zero.
+    /// Whether tension reads as zero.
     pub unipolar: bool,
-    /// Width of the converter's codes.
+    /// Width of the converter's codes, 2 to 24; `None`: not quantised.
     pub bits: Option<u32>,
-    /// Stress of the largest code in MPa.
+    /// Stress of the largest code in MPa, above 0; `None` takes the frame's peak.
     pub full_scale_MPa: Option<f64>,
     /// Taxels that read zero, [row, col].
     pub dead: Vec<[usize; 2]>,
-    /// Taxels that read the same stress always, [row, col] and MPa.
+    /// Taxels that always read the same stress, [row, col] and MPa.
     pub stuck: Vec<([usize; 2], f64)>,
-    /// Start of the noise.
+    /// Seed of the noise.
     pub seed: u64,
 }
 
 impl Converter {
-    /// The frame as the sensor gives it; the same seed gives the same noise.
+    /// The frame as the sensor reads it; the same seed gives the same noise.
     ///
     /// # Errors
-    /// An option out of range or a taxel outside the array.
+    /// [`GeneratorError::Option`] for an option out of range, [`GeneratorError::Taxel`] for a taxel outside the array.
     pub fn convert(&self, frame: &Frame) -> Result<Frame, GeneratorError> {
         self.check()?;
         let mut frame = frame.clone();

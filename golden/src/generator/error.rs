@@ -1,18 +1,18 @@
-//! What can be wrong with a described contact, each with its place, field and value.
+//! Errors of described contacts and converters; each names contact, field and value.
 
 use crate::sensor::SensorError;
 use thiserror::Error;
 
-/// Contacts that make no frame.
+/// The contacts or options cannot be used.
 #[derive(Clone, Debug, PartialEq, Error)]
 pub enum GeneratorError {
-    /// A size or length out of range.
+    /// A size of the sensor is out of range.
     #[error("sensor.{0}")]
     Sensor(#[from] SensorError),
-    /// Nothing presses.
+    /// The list of contacts is empty.
     #[error("no contact given")]
     NoContact,
-    /// A contact's field is missing or does not fit the others.
+    /// A field of a contact is missing or does not fit the others.
     #[error("contact {index}: {field} = {value} is not allowed; it must be {allowed}")]
     Contact {
         /// Position in the list, from 0.
@@ -21,16 +21,16 @@ pub enum GeneratorError {
         field: &'static str,
         /// The value found.
         value: String,
-        /// What the field may hold.
+        /// The allowed values, in words.
         allowed: String,
     },
-    /// Loads and sizes so far apart that the stress is not a finite number.
+    /// Loads and sizes are so far apart that the stress is not a finite number.
     #[error("the stress under taxel {index} is not a finite number")]
     NotFinite {
         /// Row-major index of the taxel.
         index: usize,
     },
-    /// A taxel that the array does not have.
+    /// A taxel is outside the array.
     #[error("{field}: taxel {row},{col} is outside the array of {rows} rows and {cols} columns")]
     Taxel {
         /// The option that names it.
@@ -44,14 +44,14 @@ pub enum GeneratorError {
         /// The array's columns.
         cols: usize,
     },
-    /// A converter's option out of range.
+    /// An option of the converter is out of range.
     #[error("{field} = {value} is not allowed; it must be {allowed}")]
     Option {
         /// The option.
         field: &'static str,
         /// The value found.
         value: f64,
-        /// What it may be.
+        /// The allowed values, in words.
         allowed: &'static str,
     },
 }

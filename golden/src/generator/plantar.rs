@@ -1,11 +1,11 @@
 //! Plantar: measured foot pressure as squares of uniform pressure.
 //!
-//! The templates (`data/plantar`, MIT licence, Pataky et al. 2011) hold 63 × 27 pixels in arbitrary units; a pixel's
-//! share of the load is its value over the sum. Rows run along +y, columns along +x before the foot is turned.
+//! The templates (`data/plantar`, MIT licence, Pataky et al. 2011) have 63 × 27 pixels in arbitrary units; a pixel
+//! carries the fraction value / sum of the load. Before rotation, rows run along +y and columns along +x.
 
-/// Pixels of a template along the foot and across it.
+/// Pixels of a template: along the foot, across it.
 const PIXELS: [usize; 2] = [63, 27];
-/// A pixel's side where no size is given: a foot of 258 mm.
+/// Side of a pixel if no size is given: a foot of 258 mm.
 const PIXEL_MM: f64 = 4.1;
 
 /// A template.
@@ -13,16 +13,16 @@ pub(super) struct Foot(&'static str);
 
 /// One square of uniform pressure.
 pub(super) struct Pixel {
-    /// Middle, from the template's.
+    /// Centre relative to that of the template.
     pub(super) centre_mm: [f64; 2],
-    /// Half lengths.
+    /// Half of width and length.
     pub(super) half_mm: [f64; 2],
-    /// Share of the whole load.
+    /// Fraction of the whole load.
     pub(super) share: f64,
 }
 
 impl Foot {
-    /// The template a contact's shape names.
+    /// The template of a contact's shape.
     pub(super) fn named(shape: &str) -> Option<Foot> {
         match shape {
             "plantar-left" | "plantar-template-MUN104L" => Some(Foot(include_str!("../../data/plantar/MUN104L.csv"))),
@@ -37,7 +37,7 @@ impl Foot {
     }
 }
 
-/// The loaded pixels of the named template, over `size_mm` = [width, length] or at their natural size.
+/// The loaded pixels of the named template, scaled to `size_mm` = [width, length], else of natural size.
 pub(super) fn pixels(shape: &str, size_mm: &[f64]) -> Vec<Pixel> {
     let values = Foot::named(shape).map_or_else(Vec::new, |foot| foot.values());
     let [rows, cols] = PIXELS;

@@ -1,62 +1,62 @@
-//! Random: contacts drawn from a seed, for statistics over many frames.
+//! Random: seeded random contacts, for statistics over many frames.
 //!
 //! | drawn | range |
 //! |---|---|
-//! | first half-axis | h … 2 h, less where the array is small |
+//! | first half-axis | h … 2 h, less on a small array |
 //! | second half-axis | 0.7 … 1.35 of the first |
 //! | angle | 0 … 180° |
 //! | normal load | 1 … 12 N |
 //! | shear over load | 0.1 … 0.45, any direction |
-//! | place | the rim at least h/2 inside the array, as far as it has room, and 2 h from other contacts |
+//! | position | the rim at least h/2 inside the array, if possible, and 2 h from other contacts |
 //!
-//! Of touching contacts the circles around two of them touch.
+//! Contacts that touch: their circumscribed circles touch.
 //!
-//! Sizes, loads and friction ratios are spread as in the shipped frames `S?-hs-random-*` and `S3-hs-multi-*`.
+//! Sizes, loads and shear ratios have the distribution of the shipped frames `S?-hs-random-*` and `S3-hs-multi-*`.
 
 use crate::frame::Contact;
 use crate::random::Random;
 use crate::sensor::Sensor;
 use std::f64::consts::TAU;
 
-/// Draws of a place before contacts may lie closer.
+/// Draws of a position; the required gap shrinks with each.
 const TRIES: usize = 200;
-/// Longest half-axis in thicknesses: 2 · 1.35.
+/// Longest half-axis in units of the thickness: 2 · 1.35.
 const LONGEST: f64 = 2.7;
-/// Distance of two rims in thicknesses.
+/// Gap between two rims in units of the thickness.
 const GAP: f64 = 2.0;
-/// Distance of a rim from the array's edge, in thicknesses.
+/// Distance of a rim from the array's edge in units of the thickness.
 const INSIDE: f64 = 0.5;
 
-/// Which shapes are drawn.
+/// The shapes that are drawn.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Shapes {
-    /// Ellipses in full sliding, Hertz's pressure or a uniform one.
+    /// Ellipses in full sliding with Hertz's or a uniform pressure.
     #[default]
     Elliptic,
-    /// Rings, rectangles, uniform discs and Hertz circles in partial slip.
+    /// Rings, rectangles and uniform discs in full sliding, Hertz circles in partial slip.
     Other,
 }
 
-/// What is drawn; the same draw gives the same contacts.
+/// Parameters of a random draw; equal parameters give equal contacts.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Draw {
     /// Number of contacts.
     pub count: usize,
-    /// Their shapes.
+    /// The shapes of the contacts.
     pub shapes: Shapes,
     /// Whether every contact but the first touches another one.
     pub touching: bool,
-    /// Start of the random numbers.
+    /// Seed of the random numbers.
     pub seed: u64,
 }
 
-/// Draws contacts for an array.
+/// Draws random contacts for an array.
 pub fn random_contacts(sensor: &Sensor, draw: Draw) -> Vec<Contact> {
     let mut random = Random::new(draw.seed);
     let mut contacts: Vec<(Contact, [f64; 2], f64)> = Vec::with_capacity(draw.count);
     let half = [sensor.cols as f64 * sensor.pitch_x_mm / 2.0, sensor.rows as f64 * sensor.pitch_y_mm / 2.0];
     let h = sensor.thickness_mm;
-    // On a small array the contacts shrink with it.
+    // On a small array the contacts are smaller.
     let unit = h.min(half[0].min(half[1]) / (LONGEST + INSIDE));
     for _ in 0..draw.count {
         let first = random.between(unit, 2.0 * unit);
@@ -69,7 +69,7 @@ pub fn random_contacts(sensor: &Sensor, draw: Draw) -> Vec<Contact> {
             centre = match random.pick(&contacts).filter(|_| draw.touching) {
                 Some((_, [x, y], far)) => {
                     let towards = random.between(0.0, TAU);
-                    // Rounding must not take it for an overlap.
+                    // A margin, so that rounding does not cause an overlap.
                     let off = (far + reach) * (1.0 + 1e-12);
                     [x + off * towards.cos(), y + off * towards.sin()]
                 }
@@ -89,7 +89,7 @@ pub fn random_contacts(sensor: &Sensor, draw: Draw) -> Vec<Contact> {
     contacts.into_iter().map(|(contact, _, _)| contact).collect()
 }
 
-/// A contact of the drawn half-axes, with shape, load and slip but no place.
+/// A contact of the given half-axes with random shape, load and slip, without position.
 fn shaped(random: &mut Random, shapes: Shapes, [a, b]: [f64; 2]) -> Contact {
     let normal = random.between(1.0, 12.0);
     let (ratio, towards, angle) = (random.between(0.1, 0.45), random.between(0.0, TAU), random.between(0.0, 180.0));

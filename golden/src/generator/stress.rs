@@ -1,7 +1,7 @@
-//! Stress: the continuous traction of all pieces integrated through the kernel of a point force.
+//! Stress: the integral of the continuous traction of all pieces with the kernel of a point force.
 //!
-//! b(taxel) = ∫ density(s) [Fz gn(d) + (F·d) gs(d)] dA, d = taxel − s. A piece's domain is mapped from a rectangle on
-//! which the integrand is analytic, and cut until each patch is short against its distance from the taxel:
+//! b(taxel) = ∫ density(s) [Fz gn(d) + (F·d) gs(d)] dA, d = taxel − s. The domain of a piece is mapped from a rectangle
+//! on which the integrand is analytic, and split until each patch is small relative to its distance from the taxel:
 //!
 //! ```text
 //! Hertz:  ρ = sin φ   density dA = 3/2π cos² φ sin φ dφ dθ
@@ -9,40 +9,40 @@
 //! square:             density dA = 1/4 dX dY
 //! ```
 //!
-//! With d = √(gap² + h²), the distance to the kernel's singularity, and half lengths of at most d/2, N nodes err by
-//! E^(−2N), E = 2 + √5: ten nodes by 3e-13 of the largest integrand. Squares far away take fewer.
+//! With d = √(gap² + h²), the distance from the kernel's singularity, and half lengths of at most d/2, the error with N
+//! nodes is E^(−2N), E = 2 + √5: with ten nodes 3e-13 of the largest integrand. Squares far away take fewer nodes.
 
 use super::traction::{Piece, PressureShape};
 use crate::bonded::kernel::{Kernel, REACH};
 use crate::gauss::rule;
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
-/// Most nodes of a patch along each side.
+/// Maximum number of nodes of a patch along each side.
 const NODES: usize = 10;
-/// Longest half of a patch over its distance from the singularity.
+/// Largest half length of a patch relative to its distance from the singularity.
 const LONGEST: f64 = 0.5;
-/// Longest half of a patch on a layer, in h: far away the kernel still changes at the scale of h.
+/// Largest half length of a patch on a layer in units of h: even far away the kernel varies on the scale of h.
 const LONGEST_ON_LAYER: f64 = 1.5;
-/// Logarithm of the error allowed.
+/// Natural logarithm of the allowed error.
 const LN_ERROR: f64 = -30.0;
 
-/// The elastic body, with thickness or depth h in mm.
+/// The elastic body; h in mm.
 pub(super) enum Body {
     /// Infinitely deep.
     HalfSpace {
         /// Depth of the taxels.
         h: f64,
     },
-    /// On a rigid base.
+    /// A layer bonded to a rigid base.
     Layer {
         /// Thickness.
         h: f64,
-        /// Kernels of its Poisson ratio.
+        /// Kernels for its Poisson ratio.
         kernel: Kernel,
     },
 }
 
-/// A rectangle of a piece's parameters: middle and half length of each.
+/// A rectangle in the parameters of a piece: [middle, half length] of each.
 #[derive(Clone, Copy)]
 struct Patch {
     u: [f64; 2],
@@ -63,7 +63,7 @@ impl Patch {
 }
 
 impl Piece {
-    /// The whole domain, cut so that sines and cosines are smooth on each patch.
+    /// The whole domain, split so that sines and cosines are smooth on each patch.
     fn patches(&self) -> Vec<Patch> {
         let quarters = (0..4).map(|k| [FRAC_PI_2 * (f64::from(k) + 0.5), FRAC_PI_2 / 2.0]);
         match self.form {
@@ -73,7 +73,7 @@ impl Piece {
         }
     }
 
-    /// Place in mm and density times area element.
+    /// Position in mm, and density times area element.
     fn map(&self, u: f64, v: f64) -> ([f64; 2], f64) {
         let (x, y, density) = match self.form {
             PressureShape::Hertz => {
@@ -93,7 +93,7 @@ impl Piece {
         let longest = self.half_mm[0].max(self.half_mm[1]);
         let ([u, du], [_, dv]) = (patch.u, patch.v);
         match self.form {
-            // The slope of sin φ is largest at the patch's inner end.
+            // The derivative of sin φ is largest at the inner end of the patch.
             PressureShape::Hertz => [longest * du * (u - du).cos(), longest * dv * (u + du).sin()],
             PressureShape::Disc => [longest * du, longest * dv * (u + du)],
             PressureShape::Square => [self.half_mm[0] * du, self.half_mm[1] * dv],
@@ -102,7 +102,7 @@ impl Piece {
 }
 
 impl Body {
-    /// Stress at a taxel under all pieces.
+    /// Stress in MPa on a taxel at a position in mm, from all pieces.
     pub(super) fn stress_MPa(&self, taxel: [f64; 2], pieces: &[Piece]) -> f64 {
         let mut left = Vec::new();
         let mut sum = 0.0;
@@ -115,7 +115,7 @@ impl Body {
         sum
     }
 
-    /// The stress of a patch, or zero when it is cut and its halves are put off.
+    /// The stress of a patch; or 0 if the patch is split and its halves are added to `left`.
     fn patch(&self, taxel: [f64; 2], piece: &Piece, patch: Patch, left: &mut Vec<Patch>) -> f64 {
         let (middle, _) = piece.map(patch.u[0], patch.v[0]);
         let extent = piece.extent(patch);

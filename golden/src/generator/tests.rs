@@ -1,25 +1,25 @@
-//! The generator against the shipped frames, which were made elsewhere, and its refusals.
+//! The generator against the shipped frames, which come from other programs, and its errors.
 
 use super::*;
 use crate::scene::Scene;
 
-/// The frames are printed with 9 digits and their own quadrature is good to 8e-9 of the peak.
+/// The frames have 9 digits, and their own quadrature is accurate to 8e-9 of the peak.
 const PRINTED: f64 = 1e-8;
-/// Printed digits of a cell's force, over the largest.
+/// Rounding of the force on a cell in the file, relative to the largest.
 const PRINTED_CELLS: f64 = 1e-8;
-/// Finite elements against the exact layer, as the frames' notes state it: at most 1.1e-3.
+/// Finite elements against the exact layer, according to the frames' notes: at most 1.1e-3.
 const FINITE_ELEMENTS: f64 = 1.15e-3;
-/// Midpoint sums on a 0.1 mm grid, which cut an outline to 0.05 mm: of the stress at most this.
+/// Error of midpoint sums on a 0.1 mm grid, which resolve an outline to 0.05 mm, relative to the peak.
 const MIDPOINTS: f64 = 3e-3;
 
-/// Every shipped frame of a built-in sensor, read through its own medium.
+/// Every shipped frame of a built-in sensor, in its own medium.
 fn shipped(name: &str) -> Vec<Frame> {
     let media = [Medium::HalfSpace, Medium::BondedLayer { poisson: 0.40 }, Medium::BondedLayer { poisson: 0.48 }];
     let through = |medium| Frame::shipped(&Scene { medium, ..Scene::builtin(name).unwrap() });
     media.into_iter().flat_map(through).collect()
 }
 
-/// Largest difference over the reference's largest value, which counts as 1 when it is zero.
+/// Largest difference relative to the reference's largest value; absolute if that is zero.
 fn off(values: &[f64], reference: &[f64]) -> f64 {
     let largest = reference.iter().fold(0.0f64, |most, b| b.abs().max(most));
     let difference = values.iter().zip(reference).fold(0.0, |most: f64, (a, b)| most.max((a - b).abs()));
@@ -94,7 +94,7 @@ fn partial_slip_holds_its_load() {
     let make = |contact| generate("p", &sensor, Medium::HalfSpace, &[contact]).unwrap();
     let sum = make(contact.clone()).cell_forces_N.unwrap().resultant();
     assert!((0..3).all(|k| (sum[k] - [3.0, -1.0, 10.0][k]).abs() < 1e-12), "{sum:?}");
-    // At the limit of friction nothing sticks: full sliding.
+    // At the friction limit there is no stick area: full sliding.
     let sliding = make(Contact { kind_of_slip: None, ..contact.clone() });
     let limit = make(sticking(10f64.sqrt() / 10.0 * (1.0 + 1e-12)));
     assert!(off(&limit.stress_MPa, &sliding.stress_MPa) < 1e-9);

@@ -1,14 +1,14 @@
-//! Traction: a described contact as a sum of simple pieces.
+//! Traction: decomposition of a described contact into simple pieces.
 //!
-//! A piece is a region with a pressure of one form and a force along a fixed direction. Every contact is a sum of such:
-//! a ring is a disc less a disc, partial slip two Hertz pressures of different radius, a foot one square per pixel.
+//! A piece is a region with a pressure distribution and a force of fixed direction. A contact is a sum of pieces: a
+//! ring is a disc minus a disc, partial slip is two Hertz pressures of different radii, a foot is one square per pixel.
 
 use super::plantar::{self, Foot};
 use super::GeneratorError;
 use crate::frame::Contact;
 use std::f64::consts::PI;
 
-/// Pressure of a piece, in coordinates that are ±1 at its half-axes.
+/// Pressure distribution of a piece, in coordinates that are ±1 at its half-axes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum PressureShape {
     /// √(1 − ρ²) on the disc.
@@ -19,18 +19,18 @@ pub(super) enum PressureShape {
     Square,
 }
 
-/// A region of traction.
+/// A region with its traction.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Piece {
-    /// Pressure and region.
+    /// Pressure distribution and region.
     pub(super) form: PressureShape,
-    /// Middle of the region.
+    /// Centre of the region.
     pub(super) centre_mm: [f64; 2],
     /// Half-axes.
     pub(super) half_mm: [f64; 2],
     /// Cosine and sine of the angle from +x to the first half-axis.
     pub(super) turn: [f64; 2],
-    /// Force of the whole piece.
+    /// Force of the whole piece, [x, y, normal].
     pub(super) force_N: [f64; 3],
 }
 
@@ -119,8 +119,8 @@ pub(super) fn pieces(index: usize, contact: &Contact) -> Result<Vec<Piece>, Gene
     })
 }
 
-/// Pressure with shear at the friction limit, less the shear of the part that sticks: c/a times a Hertz pressure of
-/// the same p0 on half-axes c/a times as long, which is (c/a)³ of the load.
+/// The pressure with shear at the friction limit, minus the excess shear of the stick area: a Hertz pressure of c/a
+/// times the p0 on half-axes c/a times as long, which carries (c/a)³ of the load.
 fn partial_slip(
     piece: impl Fn(PressureShape, [f64; 2], [f64; 3]) -> Piece,
     half_mm: [f64; 2],

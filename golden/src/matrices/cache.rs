@@ -1,14 +1,14 @@
-//! Store: folded matrices kept on disk between runs, so that large arrays start at once.
+//! Cache: folded matrices stored on disk, so that large arrays need not compute them again.
 //!
-//! Nothing is kept until [`set_folder`] names a folder; a program does that, never a test of the numbers. A file holds
+//! Nothing is stored until [`set_folder`] names a folder, which a program does but no numerical test. A file holds
 //!
 //! ```text
 //! magic  key length  key  4 numbers  3 × (blocks  (row0  col0  rows  cols  entries column by column)…)  CRC-32
 //! ```
 //!
-//! all little-endian, 64 bits each but magic, key and CRC. The key is everything the matrices depend on, in words, with
-//! the layout's and this crate's version; the file's name is its CRC-32 and length. A file with another key, cut short
-//! or damaged is as good as none: it is computed and written again.
+//! all little-endian, 64 bits each except magic, key and CRC. The key is the text of everything the matrices depend on,
+//! with the versions of the layout and of this crate; the file's name is its CRC-32 and length. A file with another
+//! key, truncated or damaged is ignored: the matrices are computed and written again.
 
 use crate::folded::{Block, Operator};
 use crate::scene::{Inversion, Medium};
@@ -19,36 +19,36 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::sync::RwLock;
 
-/// Version of the layout and of the numbers: raised with either.
+/// Version of the file's layout and of the numbers; to be raised with either.
 const VERSION: u32 = 2;
 const MAGIC: &[u8; 8] = b"dermisA\n";
-/// Below so many taxels computing is as fast as reading.
+/// Fewest taxels that are cached; for fewer, computing is as fast as reading.
 const MIN_TAXELS: usize = 400;
 
 static FOLDER: RwLock<Option<PathBuf>> = RwLock::new(None);
 
-/// Keeps the matrices of this process's scenes in `folder` from now on, and takes them from there; `None`: no longer.
+/// Sets the cache folder of this process; `None` disables the cache, as at the start.
 pub fn set_folder(folder: Option<&Path>) {
     *FOLDER.write().unwrap_or_else(std::sync::PoisonError::into_inner) = folder.map(Path::to_owned);
 }
 
-/// What is kept of a subarray's matrices.
+/// The cached part of a subarray's matrices.
 #[derive(Clone, Debug)]
 pub(super) struct CachedMatrices {
-    /// Condition, rank, gain and r of the series.
+    /// Condition, rank, gain and convergence rate r.
     pub numbers: [f64; 4],
     /// Cz⁺, Ax, Ay.
     pub operators: [Operator; 3],
 }
 
-/// The place of one subarray's matrices.
+/// The cache file of one subarray.
 pub(super) struct CacheFile {
     path: PathBuf,
     key: String,
 }
 
 impl CacheFile {
-    /// Where the matrices would be, `None` where nothing is kept.
+    /// The file of these matrices; `None` if there is no folder or the subarray is too small.
     pub(super) fn of(sensor: &Sensor, medium: Medium, mu_max: f64, inversion: Inversion) -> Option<CacheFile> {
         let folder = FOLDER.read().ok()?.clone()?;
         (sensor.taxels() >= MIN_TAXELS).then(|| CacheFile::at(&folder, sensor, medium, mu_max, inversion))
@@ -62,7 +62,7 @@ impl CacheFile {
         CacheFile { path, key }
     }
 
-    /// What is kept there, `None` for anything but a whole file of this key.
+    /// The contents of the file; `None` unless it is complete and has this key.
     pub(super) fn read(&self) -> Option<CachedMatrices> {
         let bytes = fs::read(&self.path).ok()?;
         let (content, crc) = bytes.split_at_checked(bytes.len().checked_sub(4)?)?;
@@ -77,7 +77,7 @@ impl CacheFile {
         rest.0.is_empty().then_some(CachedMatrices { numbers, operators })
     }
 
-    /// Keeps it. Where that fails the next run computes again, which is no error.
+    /// Writes the file. A failure is no error: the next run computes the matrices again.
     pub(super) fn write(&self, cached: &CachedMatrices) {
         let mut bytes = MAGIC.to_vec();
         let size = |bytes: &mut Vec<u8>, n: usize| bytes.extend((n as u64).to_le_bytes());
@@ -98,7 +98,7 @@ impl CacheFile {
     }
 }
 
-/// What is left of a file.
+/// The rest of a file while it is read.
 struct Reader<'a>(&'a [u8]);
 
 impl<'a> Reader<'a> {
@@ -164,7 +164,7 @@ mod tests {
         assert!(cache_file.read().is_none());
         cache_file.write(&cached());
         assert_eq!(format!("{:?}", cache_file.read().unwrap()), format!("{:?}", cached()));
-        // Nothing but the file itself.
+        // No temporary file is left.
         assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1);
     }
 
@@ -184,7 +184,7 @@ mod tests {
             fs::write(&first.path, damaged).unwrap();
             assert!(first.read().is_none(), "byte {at}");
         }
-        // The content of one scene under the name of another.
+        // The content of one scene in the file of another.
         let second = cache_file(folder.path(), 0.5);
         fs::write(&second.path, &whole).unwrap();
         assert!(second.read().is_none());

@@ -1,6 +1,6 @@
-//! Inverse: powers of the pseudo-inverse of the symmetric Cz, and the radius of the series in μ.
+//! Inverse: the pseudo-inverse of the symmetric Cz, its square root, and the convergence rate of the series in μ.
 //!
-//! Cz = U diag(λ) Uᵀ, block by block of the folded basis; Cz⁺ = U diag(f(λ)) Uᵀ with the scene's f
+//! Cz = U diag(λ) Uᵀ for each block of the folded basis; Cz⁺ = U diag(f(λ)) Uᵀ with the scene's f
 //! ([`crate::scene::inverse`]).
 
 use crate::folded::{Block, Operator};
@@ -9,17 +9,17 @@ use faer::linalg::matmul::matmul;
 use faer::{Accum, Mat, Par, Side};
 use std::f64::consts::FRAC_PI_2;
 
-/// Directions of θ tried from 0 to π/2.
+/// Number of directions θ from 0 to π/2.
 const DIRECTIONS: usize = 9;
 
-/// A B, on all cores.
+/// The product A B, on all cores.
 pub(super) fn product(a: &Mat<f64>, b: &Mat<f64>) -> Mat<f64> {
     let mut c = Mat::zeros(a.nrows(), b.ncols());
     matmul(&mut c, Accum::Replace, a, b, 1.0, Par::rayon(0));
     c
 }
 
-/// A B in the folded basis.
+/// The product A B in the folded basis.
 pub(super) fn chain(a: &Operator, b: &Operator) -> Operator {
     let pairs = a.blocks.iter().flat_map(|left| {
         let fits = |right: &&Block| right.row0 == left.col0 && right.entries.nrows() == left.entries.ncols();
@@ -33,7 +33,7 @@ pub(super) fn chain(a: &Operator, b: &Operator) -> Operator {
     Operator { blocks: pairs.map(multiply).collect() }
 }
 
-/// Eigenvectors and f(λ) of each block of Cz, zero for those left out.
+/// Eigenvectors and f(λ) of each block of Cz; f(λ) is zero for those left out.
 pub(super) struct Inverse {
     blocks: Vec<(usize, Mat<f64>, Vec<f64>)>,
     /// Largest over smallest |λ|.
@@ -45,7 +45,7 @@ pub(super) struct Inverse {
 }
 
 impl Inverse {
-    /// Decomposes the folded Cz, `None` when the eigenvalues do not converge.
+    /// Decomposes the folded Cz; `None` if the eigenvalues do not converge.
     pub(super) fn new(cz: &Operator, rule: Inversion) -> Option<Inverse> {
         let mut blocks = Vec::with_capacity(cz.blocks.len());
         for block in &cz.blocks {
@@ -81,7 +81,7 @@ impl Inverse {
         Operator { blocks: self.blocks.iter().map(power).collect() }
     }
 
-    /// Largest ‖S (cos θ Cx + sin θ Cy) S‖ over the directions.
+    /// Largest ‖S (cos θ Cx + sin θ Cy) S‖₂ over the directions: r per unit of mu_max.
     pub(super) fn largest_radius(&self, cx: &Operator, cy: &Operator) -> f64 {
         let s = self.power(2);
         let [kx, ky] = [cx, cy].map(|c| chain(&chain(&s, c), &s));
@@ -98,13 +98,13 @@ impl Inverse {
     }
 }
 
-/// 2-norm of an antisymmetric K, given as `image += K v`, by Lanczos' method on KᵀK = −K², every new vector made
-/// orthogonal to all before. The largest eigenvalue of the tridiagonal matrix grows towards ‖K‖².
+/// 2-norm of an antisymmetric K, given as `image += K v`, by Lanczos' method on KᵀK = −K², each new vector
+/// orthogonalised against all before. The largest eigenvalue of the tridiagonal matrix converges to ‖K‖² from below.
 fn norm2(n: usize, apply: impl Fn(&[f64], &mut [f64])) -> f64 {
     const STEPS: usize = 60;
     const ENOUGH: f64 = 1e-7;
     let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
-    // A fixed start without symmetry, so that it has a part in every parity.
+    // A fixed start vector without symmetry, so that it has a component in every parity.
     let mut next: Vec<f64> = (0..n).map(|i| 1.0 + ((i * 37 + 11) % 64) as f64 / 64.0).collect();
     let mut vectors: Vec<Vec<f64>> = Vec::new();
     let (mut diagonal, mut beside): (Vec<f64>, Vec<f64>) = (Vec::new(), Vec::new());
@@ -138,8 +138,8 @@ fn norm2(n: usize, apply: impl Fn(&[f64], &mut [f64])) -> f64 {
     norm
 }
 
-/// Largest eigenvalue of a symmetric tridiagonal matrix, by halving an interval that holds it: x is above all of them
-/// when the pivots of T − x are all negative.
+/// Largest eigenvalue of a symmetric tridiagonal matrix T by bisection: x is above all of them if the pivots of T − x
+/// are all negative.
 fn largest_eigenvalue(diagonal: &[f64], beside: &[f64]) -> f64 {
     let edge = |k: usize| if k < beside.len() { beside[k].abs() } else { 0.0 };
     let bound = |k: usize| diagonal[k].abs() + edge(k) + if k > 0 { edge(k - 1) } else { 0.0 };

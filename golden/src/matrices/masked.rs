@@ -1,21 +1,23 @@
-//! Masked: the matrices of a subarray some of whose taxels are not to be trusted.
+//! Masked: the matrices of a subarray with dead taxels.
 //!
-//! The readings b_D of the taxels D are unknowns. Of all p = Cz⁺ b with the readings that are left, the smoothest is
-//! taken: ‖L p‖ is least, L the second differences of p over the cells. With G = Cz⁺ and its columns G_D,
+//! The readings b_D of the dead taxels D are unknown. Of all p = Cz⁺ b that agree with the other readings, the
+//! smoothest is taken: ‖L p‖ is minimal, L the second differences of p over the cells. With G = Cz⁺ and its columns
+//! G_D,
 //!
 //! ```text
 //! Π = I − G_D ((L G_D)ᵀ (L G_D))⁻¹ (L G_D)ᵀ L        Cz⁺ → Π Cz⁺        Ax → Π Ax        Ay → Π Ay
 //! ```
 //!
-//! Π G_D = 0: the columns of D vanish, whatever D reads. The family's equation then holds at every other taxel. With
-//! L = 1 this is the pseudo-inverse of Cz without the rows D, which pulls the cells over D towards zero.
+//! Π G_D = 0: the columns of D vanish, whatever D reads. The family then meets the stress on every other taxel. With L
+//! = 1 this would be the pseudo-inverse of Cz without the rows D, which pulls the forces over D towards zero.
 //!
 //! | | shape |
 //! |---|---|
 //! | in: D | k taxels of the subarray, each once, fewer than all |
 //! | out: matrices | n × n, columns D of Cz⁺ zero |
 //!
-//! A rank-k update, k n² products; the mirror symmetry is lost, so that products take the basis of the taxels.
+//! A rank-k update of k n² multiplications. The mirror symmetry is lost, so products are computed in the basis of the
+//! taxels.
 
 use super::inverse::product;
 use super::{FoldedMatrices, Matrices, MatricesError};
@@ -25,10 +27,10 @@ use faer::linalg::solvers::Solve;
 use faer::Mat;
 
 impl Matrices {
-    /// The matrices without the readings of the taxels `dead`.
+    /// The matrices without the readings of the taxels `dead`, row-major indices.
     ///
     /// # Errors
-    /// [`MatricesError::TooManyDead`] when no reading is left or those left do not determine the forces.
+    /// [`MatricesError::TooManyDead`] if no reading remains or the remaining ones do not determine the forces.
     pub fn without(&self, dead: &[usize]) -> Result<Matrices, MatricesError> {
         let mut masked = self.clone();
         if dead.is_empty() {
@@ -46,7 +48,7 @@ impl Matrices {
         }
         let project = |m: &Mat<f64>| m - product(&columns, &product(&weights, m));
         let [mut cz_pinv, ax, ay] = [&self.cz_pinv, &self.ax, &self.ay].map(project);
-        // Zero but for rounding.
+        // These entries are zero except for rounding.
         dead.iter().for_each(|&k| (0..n).for_each(|i| cz_pinv[(i, k)] = 0.0));
         masked.folded = FoldedMatrices {
             basis: Basis::taxels(self.sensor.rows, self.sensor.cols),
@@ -72,7 +74,7 @@ fn roughness(sensor: &Sensor, m: &Mat<f64>) -> Mat<f64> {
     let (x, y) = (x / (x + y), y / (x + y));
     Mat::from_fn(m.nrows(), m.ncols(), |i, k| {
         let (row, col) = (i / cols, i % cols);
-        // Beyond the edge there is no force.
+        // There is no force beyond the edge.
         let at = |inside: bool, index: usize| if inside { m[(index, k)] } else { 0.0 };
         let beside = at(col > 0, i.wrapping_sub(1)) + at(col + 1 < cols, i + 1);
         let above = at(row > 0, i.wrapping_sub(cols)) + at(row + 1 < rows, i + cols);

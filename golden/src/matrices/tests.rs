@@ -1,4 +1,4 @@
-//! Matrices against known figures, their rebuild property and their refusals.
+//! Matrices against known values, M · Cz = 1, and errors.
 
 use super::inverse::product;
 use super::*;
@@ -35,7 +35,7 @@ fn builtin_sensors_have_the_known_radius_and_degree() {
     }
 }
 
-/// The default level takes nothing from the built-in scenes.
+/// The default level truncates nothing in the built-in scenes.
 #[test]
 fn the_level_leaves_the_builtin_scenes_as_they_are() {
     for name in Scene::builtin_names() {
@@ -68,7 +68,7 @@ fn radius_equals_the_largest_eigenvalue() {
             largest = largest.max(value.norm());
         }
     }
-    // The directions tried miss 0.5 % at most, in both searches.
+    // The directions miss at most 0.5 %, in both searches.
     assert!((m.spectral_radius / (0.5 * largest) - 1.0).abs() < 0.006);
 }
 
@@ -87,11 +87,11 @@ fn degree_rule_at_its_edges() {
 }
 
 #[test]
-fn refusals_name_their_reason() {
+fn errors_name_their_reason() {
     let stiff = Matrices::new(&sensor(8, 8, [1.0, 1.0], 5.0), 0.6).unwrap_err();
     assert!(stiff.to_string().contains("r = 0.549"), "{stiff}");
     // 0.6 · 0.035^(1/4) / 0.549
-    assert!(stiff.to_string().contains("search.mu_max = 0.472 has"), "{stiff}");
+    assert!(stiff.to_string().contains("search.mu_max = 0.472 or less"), "{stiff}");
     assert!(Matrices::new(&sensor(8, 8, [1.0, 1.0], 5.0), 0.472).is_ok());
     let large = Matrices::new(&sensor(256, 256, [1.0, 1.0], 1.0), 0.6).unwrap_err();
     assert!(matches!(large, MatricesError::TooLarge { taxels: 65536, .. }));

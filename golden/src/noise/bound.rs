@@ -1,29 +1,29 @@
-//! Bound: the least covariance any unbiased estimate of the shear can have (Cramér–Rao).
+//! Bound: the smallest covariance of any unbiased estimate of the shear (Cramér–Rao).
 //!
 //! With noise of deviation σ on every taxel the Fisher information is JᵀJ/σ², J the derivatives of b by the unknowns;
 //! the bound of the shear is its 2 × 2 block of σ² (JᵀJ)⁻¹.
 //!
-//! | unknowns | who knows the rest |
+//! | unknowns | what is known |
 //! |---|---|
 //! | 6: centre, size, force | Hertz pressure, the ellipse's shape and direction are given |
-//! | 9: and two more of the ellipse, the exponent g | what `patch` fits |
+//! | 9: also two more of the ellipse, the exponent g | what `patch` assumes |
 //!
-//! The 6-parameter bound is the smaller. J comes from the kernel's derivatives, integrals by the truth's quadrature.
+//! The 6-parameter bound is the smaller one. J is made of the kernel's derivatives, with the quadrature of the stress.
 
 use super::contact::{ContactStress, HertzContact};
 use nalgebra::{DMatrix, Matrix2};
 
-/// Covariance of (Tx, Ty) in N² for σ = 1 MPa, with 6 and with 9 unknowns; `None` where they cannot be told apart.
+/// Covariance of (Tx, Ty) in N² for σ = 1 MPa, with 6 and with 9 unknowns.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Bound {
-    /// Centre, size and force.
+    /// With 6 unknowns: centre, size and force.
     pub six: Matrix2<f64>,
-    /// All that `patch` fits.
+    /// With 9 unknowns: all that `patch` fits.
     pub nine: Matrix2<f64>,
 }
 
 impl Bound {
-    /// The bound at one contact.
+    /// The bound for one contact; `None` if its unknowns cannot be distinguished.
     pub fn new(truth: &ContactStress, contact: &HertzContact) -> Option<Bound> {
         let theta = contact.parameters();
         let ellipse = truth.ellipse();
@@ -40,7 +40,7 @@ impl Bound {
 /// The first 2 × 2 block of (JᵀJ)⁻¹.
 fn shear_block(columns: &[&[f64]]) -> Option<Matrix2<f64>> {
     let jacobian = DMatrix::from_fn(columns[0].len(), columns.len(), |i, k| columns[k][i]);
-    // Columns of length 1 first: their units differ by orders of magnitude.
+    // Columns are first scaled to length 1: their units differ by orders of magnitude.
     let lengths: Vec<f64> = jacobian.column_iter().map(|column| column.norm()).collect();
     let scaled = DMatrix::from_fn(jacobian.nrows(), jacobian.ncols(), |i, k| jacobian[(i, k)] / lengths[k]);
     let covariance = scaled.tr_mul(&scaled).cholesky()?.inverse();

@@ -1,12 +1,13 @@
 //! Contact: an elliptic Hertz contact in full sliding, and the stress it causes.
 //!
-//! p ∝ (1 − r²)^½ on an ellipse, shear = μ p; b by 24 × 64 nodes on the disc, several times finer than any estimator's.
+//! p ∝ (1 − r²)^½ on an ellipse, shear = μ p; b by quadrature with 24 × 64 nodes, several times finer than any
+//! estimator's.
 //!
 //! | drawn | range |
 //! |---|---|
-//! | radii | h to 2 h, their ratio as it falls |
+//! | radii | h to 2 h, independently |
 //! | angle | 0 … π |
-//! | place | the ellipse's longer radius inside the taxels' outermost lines |
+//! | centre | at least the longer radius inside the outermost taxels |
 //! | shear over load | 0.1 … 0.5, any direction |
 
 use crate::float::objective::disc::Disc;
@@ -22,16 +23,16 @@ const NODES: [usize; 2] = [24, 64];
 /// Exponent of a Hertz pressure.
 const HERTZ: f64 = 0.5;
 
-/// One contact; load 1 N.
+/// One contact with a normal load of 1 N.
 #[derive(Clone, Debug, PartialEq)]
 pub struct HertzContact {
     /// Centre in mm from the array's centre.
     pub centre_mm: [f64; 2],
     /// Semi-axes in mm.
     pub radii_mm: [f64; 2],
-    /// Of the first axis from x towards y, in radians.
+    /// Angle of the first axis from x towards y in radians.
     pub angle: f64,
-    /// Shear over normal load.
+    /// Ratio of shear to normal load, [x, y].
     pub mu: [f64; 2],
 }
 
@@ -51,7 +52,7 @@ impl HertzContact {
         HertzContact { centre_mm, radii_mm, angle, mu: [ratio * direction.cos(), ratio * direction.sin()] }
     }
 
-    /// The patch's parameters: x₀, y₀, L₁₁, L₂₂, L₁₂, g.
+    /// The parameters of `patch`: x₀, y₀, L₁₁, L₂₂, L₁₂ in mm, g.
     pub fn parameters(&self) -> [f64; 6] {
         let (sin, cos) = self.angle.sin_cos();
         let [a, b] = self.radii_mm;
@@ -59,7 +60,7 @@ impl HertzContact {
         [x, y, a * cos * cos + b * sin * sin, a * sin * sin + b * cos * cos, (a - b) * sin * cos, HERTZ]
     }
 
-    /// [x, y, normal] in N.
+    /// The force in N, [x, y, normal].
     pub fn force_N(&self) -> [f64; 3] {
         [self.mu[0], self.mu[1], 1.0]
     }
@@ -72,7 +73,7 @@ pub struct ContactStress {
 }
 
 impl ContactStress {
-    /// For one array under a medium.
+    /// For the taxels of one array under `medium`.
     pub fn new(sensor: &Sensor, medium: Medium) -> ContactStress {
         ContactStress { taxels: Taxels::new(sensor, medium), disc: Disc::new(NODES[0], NODES[1]) }
     }

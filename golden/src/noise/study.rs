@@ -1,4 +1,4 @@
-//! The study: draws, noise, estimates, and their spread.
+//! The study: random contacts, noise, estimates and the spread of their errors.
 
 use super::bound::Bound;
 use super::contact::{ContactStress, HertzContact};
@@ -10,18 +10,18 @@ use nalgebra::Vector2;
 use serde::Serialize;
 use thiserror::Error;
 
-/// What to run.
+/// Parameters of a study.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Study {
-    /// σ over max|b|.
+    /// Noise levels σ / max|b|, 0 to 1.
     pub levels: Vec<f64>,
-    /// Contacts.
+    /// Number of contacts, 1 to 100 000.
     pub draws: usize,
-    /// Of contacts and noise.
+    /// Seed of contacts and noise.
     pub seed: u64,
     /// Objectives to compare.
     pub objectives: Vec<ObjectiveKind>,
-    /// Frames averaged in the second half of the table.
+    /// Number of frames averaged in the second half of the table, 1 to 100 000; 1 leaves out that half.
     pub frames: usize,
 }
 
@@ -32,15 +32,15 @@ impl Default for Study {
     }
 }
 
-/// How many frames were averaged.
+/// Number of frames averaged.
 pub type Averaging = usize;
 
-/// Quantiles of errors, as fractions.
+/// Statistics of errors, as fractions.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct Spread {
-    /// Middle.
+    /// Median.
     pub median: f64,
-    /// Nine of ten are below.
+    /// 90 % quantile.
     pub ninety: f64,
     /// Root mean square.
     pub rms: f64,
@@ -49,25 +49,25 @@ pub struct Spread {
 /// One line of the table.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Row {
-    /// σ over max|b| of a single frame.
+    /// Noise level σ / max|b| of a single frame.
     pub noise: f64,
-    /// Frames averaged.
+    /// Number of frames averaged.
     pub frames: Averaging,
-    /// Objective, by its name in scenes.
+    /// Name of the objective in scenes.
     pub objective: &'static str,
-    /// e_t found.
+    /// e_t of the reconstruction.
     pub found: Spread,
     /// e_t of the 6-parameter bound.
     pub bound_6: Spread,
     /// e_t of the 9-parameter bound.
     pub bound_9: Spread,
-    /// Median found over the 6-parameter bound's median, none without noise.
+    /// Median e_t over the 6-parameter bound's median; `None` without noise.
     pub ratio_6: Option<f64>,
-    /// Median found over the 9-parameter bound's median, none without noise.
+    /// Median e_t over the 9-parameter bound's median; `None` without noise.
     pub ratio_9: Option<f64>,
 }
 
-/// A study that cannot be run.
+/// A study cannot be run.
 #[derive(Debug, Error)]
 pub enum StudyError {
     /// The scene cannot be reconstructed.
@@ -77,13 +77,13 @@ pub enum StudyError {
     #[error(transparent)]
     Frame(#[from] FrameError),
     /// A parameter of the study is out of range.
-    #[error("{field} = {value}: {allowed}")]
+    #[error("{field} = {value} is not allowed; it must be {allowed}")]
     Parameter {
-        /// Which.
+        /// Name of the parameter.
         field: &'static str,
         /// Its value.
         value: String,
-        /// What is allowed.
+        /// The allowed values, in words.
         allowed: &'static str,
     },
 }
@@ -97,7 +97,7 @@ impl Spread {
     }
 }
 
-/// A contact, its stress and its bound.
+/// A random contact, its stress and its bound.
 struct DrawnContact {
     contact: HertzContact,
     stress_MPa: Vec<f64>,
@@ -105,15 +105,15 @@ struct DrawnContact {
     bound: Bound,
 }
 
-/// Largest number of draws and of frames.
+/// Largest number of contacts and of frames.
 const MAX_COUNT: usize = 100_000;
 /// Errors drawn from the bound's covariance for each contact.
 const BOUND_DRAWS: usize = 32;
 
-/// Runs a study; `progress` is called after every row with the rows done and all rows.
+/// Runs a study; `progress` is called after every row with the number of rows done and of all rows.
 ///
 /// # Errors
-/// A scene the golden model refuses, a parameter out of range.
+/// [`StudyError`]: a scene that the golden model cannot reconstruct, or a parameter out of range.
 pub fn study(scene: &Scene, study: &Study, progress: &mut dyn FnMut(usize, usize)) -> Result<Vec<Row>, StudyError> {
     check(study)?;
     let draws = draws(scene, study);
@@ -129,7 +129,7 @@ pub fn study(scene: &Scene, study: &Study, progress: &mut dyn FnMut(usize, usize
     for &frames in &averagings {
         for (level, &noise) in study.levels.iter().enumerate() {
             let single = (level * 2 + usize::from(frames > 1)) as u64;
-            // The same noise for every objective.
+            // Every objective gets the same noise.
             let noisy = noisy(&draws, noise, frames, study.seed.wrapping_add(0x1000 + single));
             let share = noise / (frames as f64).sqrt();
             let bounds = [|bound: &Bound| bound.six, |bound: &Bound| bound.nine];
@@ -161,23 +161,23 @@ pub fn study(scene: &Scene, study: &Study, progress: &mut dyn FnMut(usize, usize
 fn check(study: &Study) -> Result<(), StudyError> {
     let wrong = |field, value: String, allowed| Err(StudyError::Parameter { field, value, allowed });
     if !(1..=MAX_COUNT).contains(&study.draws) {
-        return wrong("draws", study.draws.to_string(), "1 to 100000");
+        return wrong("draws", study.draws.to_string(), "from 1 to 100000");
     }
     if !(1..=MAX_COUNT).contains(&study.frames) {
-        return wrong("frames", study.frames.to_string(), "1 to 100000");
+        return wrong("frames", study.frames.to_string(), "from 1 to 100000");
     }
     match study.levels.iter().find(|level| !(0.0..=1.0).contains(*level)) {
-        Some(level) => wrong("noise", level.to_string(), "a share of max |b|, 0 to 1"),
+        Some(level) => wrong("noise", level.to_string(), "a fraction of max |b| from 0 to 1"),
         None => Ok(()),
     }
 }
 
-/// The contacts; one whose unknowns cannot be told apart is drawn again.
+/// The contacts; one whose unknowns cannot be distinguished is drawn again.
 fn draws(scene: &Scene, study: &Study) -> Vec<DrawnContact> {
     let truth = ContactStress::new(&scene.sensor, scene.medium);
     let mut random = Random::new(study.seed);
     let mut draws = Vec::with_capacity(study.draws);
-    // Bounded, so that an array that never shows its contact ends too.
+    // Bounded, for arrays on which no contact can be resolved.
     for _ in 0..4 * study.draws {
         let contact = HertzContact::draw(&scene.sensor, &mut random);
         let Some(bound) = Bound::new(&truth, &contact) else { continue };
@@ -191,7 +191,7 @@ fn draws(scene: &Scene, study: &Study) -> Vec<DrawnContact> {
     draws
 }
 
-/// The stresses with noise, averaged over frames.
+/// The stress of each contact with noise, averaged over `frames` frames.
 fn noisy(draws: &[DrawnContact], noise: f64, frames: usize, seed: u64) -> Vec<Vec<f64>> {
     let mut random = Random::new(seed.wrapping_mul(0x9e37_79b9));
     let mut one = |draw: &DrawnContact| -> Vec<f64> {
@@ -202,7 +202,7 @@ fn noisy(draws: &[DrawnContact], noise: f64, frames: usize, seed: u64) -> Vec<Ve
     draws.iter().map(&mut one).collect()
 }
 
-/// e_t of errors drawn from a covariance.
+/// e_t of errors drawn from the bound's covariance; `share` is σ / max|b|.
 fn bound_errors(draws: &[DrawnContact], share: f64, block: impl Fn(&Bound) -> nalgebra::Matrix2<f64>) -> Vec<f64> {
     let mut random = Random::new(0xb0_0d);
     let mut errors = Vec::with_capacity(draws.len() * BOUND_DRAWS);

@@ -1,9 +1,9 @@
-//! The study on few draws: what must hold of bound and estimators.
+//! The study with few contacts: properties of the bound and the estimators.
 
 use super::*;
 use crate::scene::{ObjectiveKind, Scene};
 
-/// Medians of few draws scatter; the full study's ratios are below 1.3.
+/// Medians of few contacts scatter; the ratios of the full study are below 1.3.
 const RATIO: f64 = 1.5;
 
 fn rows(scene: &str, levels: Vec<f64>, objectives: Vec<ObjectiveKind>, frames: usize) -> Vec<Row> {

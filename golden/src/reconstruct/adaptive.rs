@@ -1,28 +1,28 @@
-//! Adaptive: of the paper's cases that leave no loaded subarray unmet and cut no contact, the one that comes nearest
-//! to the contacts.
+//! Adaptive: chooses the paper's case that comes nearest to the contacts, among those in which no boundary cuts a
+//! contact and every loaded subarray meets the condition.
 //!
 //! Cases 1, 2, 3 and 0 are tried in this order, as far as they divide the array and the scene lists them. The contacts
-//! are those of `float::contacts`. A contact's cells are those that carry at least 5 % of its largest force; a boundary
-//! cuts the contact when it runs between them. What a contact presses is seen up to 1.5 h beyond its rim, and a
-//! subarray cannot tell it from a load of its own: a contact that is alone, which case 0 solves best, keeps that
-//! distance. Between several no distance is asked for. Case 0 has no boundary and is always possible.
+//! are those of `float::contacts`. The cells of a contact are those with at least 5 % of its largest force; a boundary
+//! between them cuts the contact. The stress of a contact extends up to 1.5 h beyond its rim, and a neighbouring
+//! subarray would take it for a load of its own. A single contact, which case 0 solves best, therefore needs that
+//! distance from a boundary; several contacts do not. Case 0 has no boundary and is always possible.
 //!
-//! More subarrays are not always better: each is a smaller array that sees its neighbours' load without knowing of it.
-//! Taken is the case with the least
+//! More subarrays are not always better: each is a smaller array that sees the load of its neighbours as its own. The
+//! case with the smallest
 //!
 //! ```text
 //! |T_case − T_contacts|        T: shear over the whole array
 //! ```
 //!
-//! and of equals the finest. On 120 fresh frames of two to four contacts (`dermis table sensor-3 --fresh 120 --contacts 2
-//! --contacts 3 --contacts 4 --case adaptive`, and 0 to 3) its median e_t is 32 %, that of the best single case 40 %. The
-//! finest admissible one in its place came to 43 %, more than 2 points above the best case.
+//! is chosen, of equal ones the finest. On 120 fresh frames of two to four contacts (`dermis table sensor-3 --fresh 120
+//! --contacts 2 --contacts 3 --contacts 4 --case adaptive`, and 0 to 3) its median e_t is 32 %, that of the best single
+//! case 40 %. Choosing the finest admissible case instead gave 43 %.
 //!
 //! | | shape | unit |
 //! |---|---|---|
 //! | in: contacts and their forces | n, 3 × n | –, N |
-//! | in: per case, what `receive` found in its subarrays | parts | – |
-//! | out: what stands against the case | text | – |
+//! | in: per case, `receive` of its subarrays | parts | – |
+//! | out: reason for rejecting the case | text | – |
 
 use super::extra::{CaseChoice, RejectedCase};
 use super::golden::{CaseOutcome, EngineInput};
@@ -34,12 +34,12 @@ use crate::frame::{Forces, Frame};
 use crate::partition::{Case, Subarray};
 use crate::sensor::Sensor;
 
-/// Share of a contact's largest force from which a cell is part of it.
+/// Fraction of a contact's largest force from which a cell is part of it.
 const CELL_SHARE: f64 = 0.05;
-/// Least distance of a boundary from the cells of a lone contact, over the thickness.
+/// Smallest distance of a boundary from the cells of a single contact, in units of the thickness.
 const LONE_CLEARANCE: f64 = 1.5;
 
-/// The cells of one contact as a rectangle.
+/// Bounding rectangle of the cells of one contact.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Extent {
     /// Left and right end in mm from the array's centre.
@@ -48,7 +48,7 @@ struct Extent {
     pub y: [f64; 2],
 }
 
-/// The rectangles around the contacts.
+/// The bounding rectangles of all contacts.
 fn extents(sensor: &Sensor, p: &[f64], segments: &Segments) -> Vec<Extent> {
     let extent = |region: usize| {
         let own = || (0..p.len()).filter(|&k| segments.labels[k] == region);
@@ -64,7 +64,7 @@ fn extents(sensor: &Sensor, p: &[f64], segments: &Segments) -> Vec<Extent> {
     (0..segments.count).map(extent).collect()
 }
 
-/// What stands against a case, `None` when nothing does.
+/// The reason for rejecting a case; `None` if it is admissible.
 fn rejection_reason(sensor: &Sensor, parts: &[Subarray], received: &[Received], contacts: &[Extent]) -> Option<String> {
     if let [_] = parts {
         return None;
@@ -96,19 +96,19 @@ fn rejection_reason(sensor: &Sensor, parts: &[Subarray], received: &[Received], 
     None
 }
 
-/// How far the shear of two sets of forces is apart, in N.
+/// Distance between the shear resultants of two sets of forces, in N.
 fn shear_distance(a: &Forces, b: &Forces) -> f64 {
     let ([ax, ay, _], [bx, by, _]) = (a.resultant(), b.resultant());
     (ax - bx).hypot(ay - by)
 }
 
-/// Why a case was not the nearest.
+/// The reason for rejecting a case that is not the nearest to the contacts.
 fn not_nearest_reason(off: f64) -> String {
     format!("its shear is {off:.3} N from that of the contacts: another case is nearer, or finer and as near")
 }
 
 impl Golden {
-    /// Of the cases that are possible the one whose shear is nearest to that of the contacts.
+    /// Solves all admissible cases and returns the one whose shear is nearest to that of the contacts.
     pub(super) fn adaptive(&self, frame: &Frame, input: &EngineInput) -> Reconstruction {
         let sensor = &self.scene.sensor;
         let whole = self.subarrays(input, self.whole());
@@ -139,7 +139,7 @@ impl Golden {
             }
         }
         let (_, case, outcome, reason) = best;
-        // The finer ones, in their order.
+        // The finer cases, in their order.
         let finer = self.tilings.iter().take_while(|tiling| tiling.case != case);
         let refused = finer
             .filter_map(|tiling| refused.iter().find(|(other, _)| *other == tiling.case))

@@ -1,4 +1,4 @@
-//! The golden engine on frames of a bonded layer, made by finite elements and by Fourier transforms.
+//! The golden engine on frames of a bonded layer, computed by finite elements and by Fourier transforms.
 
 use crate::flags::Flag;
 use crate::frame::Frame;
@@ -9,7 +9,8 @@ use crate::scene::{Medium, Scene};
 const TANGENTIAL_MEDIAN: f64 = 0.08;
 const NORMAL_MEDIAN: f64 = 0.01;
 
-/// Frame, tangential and normal error of every shipped single contact inside the array, through the given media.
+/// Frame, tangential and normal error of every shipped single contact inside the array, reconstructed with the medium
+/// of `read_as`.
 fn errors(read_as: impl Fn(Medium) -> Medium) -> Vec<(String, Option<f64>, f64)> {
     let mut all = Vec::new();
     for name in ["sensor-1", "sensor-2", "eight-by-eight"] {
@@ -43,7 +44,7 @@ fn single_contacts_inside_the_array_meet_their_targets() {
     assert_eq!(all.len(), 8);
     assert!(median(all.iter().filter_map(|frame| frame.1)) <= TANGENTIAL_MEDIAN, "{all:?}");
     assert!(median(all.iter().map(|frame| frame.2)) <= NORMAL_MEDIAN, "{all:?}");
-    // A punch of 1.4 mm radius lies inside one cell of 4 mm, which spreads its force evenly: the only one above 1 %.
+    // The cell model spreads the force of a punch of 1.4 mm radius over a cell of 4 mm: the only error above 1 %.
     let above: Vec<_> = all.iter().filter(|frame| frame.2 > NORMAL_MEDIAN).map(|frame| &frame.0).collect();
     assert_eq!(above, ["S2-bl48-small"]);
 }

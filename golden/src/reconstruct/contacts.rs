@@ -23,7 +23,7 @@ use crate::frame::Frame;
 use crate::scene::Condition;
 
 impl Golden {
-    /// The regions of the contacts and their μ, `None` when no candidate presses.
+    /// The contacts of a frame with their μ; `None` if no candidate is compressive.
     pub(super) fn find_contacts(&self, input: &EngineInput) -> Option<Contacts> {
         let (scene, matrices) = (&self.scene, self.matrices());
         let family = Polynomial::new(matrices, input.stress_MPa);
@@ -46,7 +46,7 @@ impl Golden {
         }
     }
 
-    /// One region per contact.
+    /// Reconstructs a frame with one region per contact.
     pub(super) fn contacts(&self, frame: &Frame, input: &EngineInput) -> Reconstruction {
         let scene = &self.scene;
         let mut outcome = self.subarrays(input, self.whole());

@@ -1,13 +1,13 @@
-//! Extra: what a result holds beyond the contract's fields, left out of the JSON where there is nothing.
+//! Extra: optional fields of a result; absent ones are left out of the JSON.
 //!
 //! | field | present with | holds |
 //! |---|---|---|
-//! | `taken` | `partition.case = "adaptive"` | the case taken and why, and why the finer ones were not |
+//! | `taken` | `partition.case = "adaptive"` | the chosen case, the reason, and why finer ones were rejected |
 //! | `regions` | `partition.case = "contacts"` | μ, centre, load and taxels of each contact |
-//! | `truncation` | `search.form = "orthogonal"` | ‖x − w‖/‖w‖ of each subarray: what the series in μ leaves out |
-//! | `unipolar` | `input.unipolar = true` | clipped and pulled taxels, evaluations, misfit |
+//! | `truncation` | `search.form = "orthogonal"` | ‖x − w‖/‖w‖ of each subarray: truncation error of the series in μ |
+//! | `unipolar` | `input.unipolar = true` | clipped and filled taxels, evaluations, misfit |
 //! | `resultants` | `output.forces = "resultants"` | force and centre of pressure per subarray or contact |
-//! | `sweeps`, `converged` | `partition.case = "contacts"` | how the search over the regions went |
+//! | `sweeps`, `converged` | `partition.case = "contacts"` | convergence of the search over the regions |
 
 use super::output::Resultant;
 use crate::float::contacts::Contacts;
@@ -16,26 +16,26 @@ use crate::input::unipolar::Unipolar;
 use crate::sensor::Sensor;
 use serde::{Deserialize, Serialize};
 
-/// Additional fields of a result.
+/// Optional fields of a result.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct Extra {
-    /// The case that `adaptive` took.
+    /// The case that `adaptive` chose.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub taken: Option<CaseChoice>,
-    /// The contacts of `contacts`.
+    /// The regions of `contacts`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub regions: Option<Vec<Region>>,
-    /// Sweeps over all regions.
+    /// Number of sweeps over all regions.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub sweeps: Option<usize>,
-    /// Whether the last sweep moved no μ and no region.
+    /// Whether the last sweep changed no μ and no region.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub converged: Option<bool>,
-    /// ‖x − w‖/‖w‖ of each subarray.
+    /// Truncation error ‖x − w‖/‖w‖ of each subarray, a fraction.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub truncation: Option<Vec<f64>>,
-    /// How `input.unipolar` went.
+    /// Statistics of the tension estimated for `input.unipolar`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub unipolar: Option<Unipolar>,
     /// The forces of `output.forces = "resultants"`.
@@ -43,44 +43,45 @@ pub struct Extra {
     pub resultants: Option<Vec<Resultant>>,
 }
 
-/// A choice of case.
+/// The choice of a case for one frame.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct CaseChoice {
     /// The case, as a scene names it.
     pub case: String,
-    /// Why it was taken.
+    /// Why it was chosen.
     pub reason: String,
-    /// The finer cases and why they were not taken.
+    /// The finer cases and why they were rejected.
     pub refused: Vec<RejectedCase>,
 }
 
-/// A case that was not taken.
+/// A rejected case.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct RejectedCase {
     /// The case, as a scene names it.
     pub case: String,
-    /// What stands against it.
+    /// Why it was rejected.
     pub reason: String,
 }
 
-/// One contact.
+/// One contact and its region.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Region {
-    /// Whether the scene's condition for a search is met by the region's taxels.
+    /// Whether the region's taxels meet the scene's condition for a search.
     pub centroid_condition: bool,
-    /// Ratio of shear to normal force, [x, y].
+    /// Ratio of shear to normal force, [x, y]; 0 if not searched.
     pub mu: [f64; 2],
-    /// The objective at μ, over the whole array; `None` where no search was made or none succeeded.
+    /// The objective at μ over the whole array; `None` if no search was made or no candidate was admissible.
     pub objective_value: Option<f64>,
-    /// Centre of the reported compressive forces in mm from the array's centre; `None` where there are none.
+    /// Centre of the reported compressive forces in mm from the array's centre; `None` if there are none.
     pub centre_mm: Option<[f64; 2]>,
     /// Sum of the reported forces in N, [x, y, normal].
     pub load_N: [f64; 3],
-    /// Indices of the region's taxels in the array, rising.
+    /// Row-major indices in the array of the region's taxels, ascending.
     pub taxels: Vec<usize>,
 }
 
-/// The regions of a frame, out of the solved contacts and the forces reported for them.
+/// The regions of a frame, from the solved contacts and the reported forces; `met[k]`: whether region k meets the
+/// condition.
 pub fn regions(sensor: &Sensor, contacts: &Contacts, met: &[bool], forces: &Forces) -> Vec<Region> {
     let region = |k: usize| {
         let taxels: Vec<usize> = (0..sensor.taxels()).filter(|&t| contacts.segments.labels[t] == k).collect();

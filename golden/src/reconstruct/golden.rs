@@ -1,10 +1,10 @@
-//! The golden engine: `float`'s stages in order, one subarray after the other.
+//! The golden engine: the stages of [`crate::float`] in order, for each subarray of the scene's partition.
 //!
 //! | case | per frame |
 //! |---|---|
-//! | rows × columns | each subarray for itself |
-//! | adaptive | the whole array first, to see the contacts; then the case that `adaptive` allows |
-//! | contacts | the whole array first; then its regions, one μ each |
+//! | rows × columns | each subarray on its own |
+//! | adaptive | the whole array first, to find the contacts; then the case that `adaptive` chooses |
+//! | contacts | the whole array first; then its regions, each with its own μ |
 
 use super::{assemble, Reconstruction, SubarrayResult};
 use crate::flags::{frame_flags, Flag};
@@ -22,26 +22,26 @@ use crate::quantise::{full_scale, noise_floor_codes, quantise};
 use crate::scene::{Form, Scene, SceneError};
 use thiserror::Error;
 
-/// A scene made ready for frames.
+/// The golden engine of one scene, its matrices computed.
 pub struct Golden {
     pub(super) scene: Scene,
     /// The scene's input options.
     pub(super) input: Input,
-    /// The case; of `adaptive` all cases that divide the array, the finest first, the whole last.
+    /// The case; for `adaptive` all cases that divide the array, the finest first, the whole array last.
     pub(super) tilings: Vec<Tiling>,
-    /// Where ellipses may be fitted: `adaptive` and `contacts`, every taxel read, shear wanted.
+    /// For fits of ellipses: with `adaptive` and `contacts`, without dead taxels and with mu_max > 0.
     pub(super) taxels: Option<Taxels>,
 }
 
-/// A case with its matrices.
+/// A partition into equal rectangles with its matrices.
 pub(super) struct Tiling {
     pub case: Case,
     pub parts: Vec<Subarray>,
-    /// Shared by all subarrays: a partition's rectangles are equal.
+    /// The matrices of every subarray; all rectangles are equal.
     shared: Matrices,
-    /// One for each subarray where taxels are masked.
+    /// The matrices of each subarray if there are dead taxels, else empty.
     masked: Vec<Matrices>,
-    /// Where the scene asks for Eq. 1 as printed.
+    /// The matrices of Eq. 1 as printed, with `search.form = "orthogonal"`.
     orthogonal: Option<Orthogonal>,
     objective: Box<dyn Objective + Send + Sync>,
 }
@@ -51,7 +51,7 @@ impl Tiling {
         self.masked.get(part).unwrap_or(&self.shared)
     }
 
-    /// Leaves the taxels `dead` out, and no others.
+    /// Masks the taxels `dead`, [row, col] in the array.
     fn mask(mut self, dead: &[[usize; 2]]) -> Result<Tiling, MatricesError> {
         let own = |part: &Subarray| self.shared.without(&part.local_indices(dead));
         self.masked = match dead {
@@ -62,46 +62,46 @@ impl Tiling {
     }
 }
 
-/// A frame with what all subarrays ask of it.
+/// A frame in the forms that the stages need.
 pub(super) struct EngineInput<'a> {
     pub stress_MPa: &'a [f64],
     pub codes: &'a [i32],
     pub floor: i32,
-    /// Standard deviation of the stress, for objectives that ask.
+    /// Standard deviation of the noise on the stress, for objectives that use it.
     pub noise_MPa: f64,
 }
 
-/// What the subarrays of a case came to.
+/// Results of all subarrays of a case.
 pub(super) struct CaseOutcome {
     pub subarrays: Vec<SubarrayResult>,
     pub forces: Forces,
     pub flags: Vec<Flag>,
-    /// Of each subarray, with the orthogonal form.
+    /// Truncation error of each subarray, with the orthogonal form.
     pub truncation: Vec<f64>,
 }
 
-/// A scene or frame that cannot be reconstructed.
+/// A scene or frame cannot be reconstructed.
 #[derive(Debug, Error)]
 pub enum GoldenError {
-    /// The scene asks for something this version does not have.
+    /// The scene asks for something this version does not implement.
     #[error(transparent)]
     Scene(#[from] SceneError),
     /// The partition does not fit the array.
     #[error(transparent)]
     Partition(#[from] PartitionError),
-    /// The subarray has no usable matrices.
+    /// The matrices of a subarray cannot be computed or used.
     #[error(transparent)]
     Matrices(#[from] MatricesError),
-    /// The subarray has no literal form.
+    /// The matrices of Eq. 1 as printed cannot be computed.
     #[error(transparent)]
     Orthogonal(#[from] OrthogonalError),
-    /// The frame is not one of this scene.
+    /// The frame is not of the scene's sensor, or not finite.
     #[error(transparent)]
     Frame(#[from] FrameError),
-    /// A file the input options name, or frames that do not fit them.
+    /// A file named by the input options cannot be used, or the frames do not fit them.
     #[error(transparent)]
     Input(#[from] InputError),
-    /// Stress so large that its forces are no finite numbers.
+    /// The stress is so large that its forces are not finite.
     #[error("frame {frame}: peak stress {peak_MPa:e} MPa gives forces beyond the range of numbers")]
     TooStrong {
         /// The frame's id.
@@ -112,10 +112,10 @@ pub enum GoldenError {
 }
 
 impl Golden {
-    /// Computes the matrices a scene needs; milliseconds for 20 × 20, two seconds for the largest subarrays.
+    /// Computes the matrices of a scene: milliseconds for 20 × 20 taxels, two seconds for the largest subarrays.
     ///
     /// # Errors
-    /// [`GoldenError`] but `Frame` and `TooStrong`.
+    /// Any [`GoldenError`] except `Frame` and `TooStrong`.
     pub fn new(scene: &Scene) -> Result<Golden, GoldenError> {
         scene.require_golden()?;
         let tiling = |case: Case| -> Result<Tiling, GoldenError> {
@@ -128,7 +128,7 @@ impl Golden {
             Ok(Tiling { case, parts, shared, masked: Vec::new(), orthogonal, objective }.mask(&scene.input.dead)?)
         };
         let cases = match scene.partition.case {
-            // The finest first, the whole last.
+            // The finest case first, the whole array last.
             Case::Adaptive => {
                 let mut cases = scene.partition.choices(&scene.sensor);
                 cases.rotate_left(1);
@@ -144,26 +144,27 @@ impl Golden {
         Ok(Golden { scene: scene.clone(), input: Input::new(scene)?, tilings, taxels })
     }
 
-    /// The matrices of a subarray; of `adaptive` those of the whole array.
+    /// The matrices of the first subarray; with `adaptive` and `contacts` those of the whole array.
     pub fn matrices(&self) -> &Matrices {
         self.whole().matrices(0)
     }
 
-    /// The coarsest case.
+    /// The coarsest partition.
     pub(super) fn whole(&self) -> &Tiling {
         &self.tilings[self.tilings.len() - 1]
     }
 
-    /// The subarrays of the coarsest case.
+    /// The subarrays of the coarsest partition with their matrices.
     pub(super) fn parts(&self) -> impl Iterator<Item = (&Subarray, &Matrices)> {
         let whole = self.whole();
         whole.parts.iter().enumerate().map(|(index, part)| (part, whole.matrices(index)))
     }
 
-    /// Reconstructs calibrated stress. Forces come from the stress as it is, the condition from its codes.
+    /// Reconstructs calibrated stress. The forces come from the stress, the condition from its codes.
     ///
     /// # Errors
-    /// `Frame` when the frame is not the scene's, `TooStrong` when a force overflows.
+    /// [`GoldenError::Frame`] if the frame is not of the scene's sensor, [`GoldenError::TooStrong`] if a force is not
+    /// finite.
     pub(super) fn reconstruct_stress(&self, frame: &Frame, noise_MPa: f64) -> Result<Reconstruction, GoldenError> {
         let scene = &self.scene;
         frame.check(scene)?;
@@ -197,7 +198,7 @@ impl Golden {
         receive(&self.scene.sensor, part, &codes, input.floor, self.scene.partition.condition)
     }
 
-    /// Every subarray of a case for itself.
+    /// Solves every subarray of a partition on its own.
     pub(super) fn subarrays(&self, input: &EngineInput, tiling: &Tiling) -> CaseOutcome {
         let sensor = &self.scene.sensor;
         let forces = Forces::zeros(sensor.taxels());
@@ -205,7 +206,7 @@ impl Golden {
         for (index, part) in tiling.parts.iter().enumerate() {
             let received = self.receive(input, part);
             let b = part.gather(sensor, input.stress_MPa);
-            // With mu_max = 0 there is nothing to search for: no score and no verdict on compression.
+            // With mu_max = 0 nothing is searched: there is no score and no test for compression.
             let searched = received.condition_met && self.scene.search.mu_max > 0.0;
             let (estimate, w) = self.solve(tiling, index, &b, searched, input.noise_MPa);
             let (x, truncation) = tiling.apply_form(&b, w);
@@ -232,7 +233,7 @@ impl Golden {
         outcome
     }
 
-    /// One subarray: the family, the search where the condition is met, the forces before the threshold.
+    /// Solves one subarray: polynomial, search if the condition is met, forces before the threshold.
     fn solve(
         &self,
         tiling: &Tiling,
@@ -256,7 +257,8 @@ impl Golden {
 }
 
 impl Tiling {
-    /// The forces of Eq. 1 for w: w itself, or with the orthogonal form the nearest that meet b, and how far they are.
+    /// The forces of Eq. 1 for w: w itself in the oblique form; in the orthogonal form the nearest forces that cause b,
+    /// and the truncation error.
     pub(super) fn apply_form(&self, b: &[f64], w: Forces) -> (Forces, Option<f64>) {
         match &self.orthogonal {
             None => (w, None),

@@ -1,28 +1,28 @@
-//! Output: one force and its centre of pressure per subarray or contact, for robots that need no more.
+//! Output: one force and its centre of pressure per subarray or contact, with `output.forces = "resultants"`.
 //!
-//! F = Σ f, centre = Σ fz r / Σ fz over the taxels that press.
+//! F = Σ f, centre = Σ fz r / Σ fz over the taxels with compressive forces.
 //!
 //! | | shape | unit |
 //! |---|---|---|
 //! | in: forces | 3 × taxels | N |
 //! | out: force | 3 per subarray, or per region of `partition.case = "contacts"` | N |
-//! | out: centre | 2, none where nothing presses | mm from the array's centre |
+//! | out: centre | 2, `None` without compressive forces | mm from the array's centre |
 
 use super::Reconstruction;
 use crate::partition::Subarray;
 use crate::sensor::Sensor;
 use serde::{Deserialize, Serialize};
 
-/// The force on one subarray or contact.
+/// The resultant force on one subarray or contact.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Resultant {
-    /// Sum of the forces, [x, y, normal].
+    /// Sum of the forces in N, [x, y, normal].
     pub force_N: [f64; 3],
-    /// Centre of pressure from the array's centre.
+    /// Centre of pressure in mm from the array's centre; `None` without compressive forces.
     pub centre_mm: Option<[f64; 2]>,
 }
 
-/// The resultants of a result, in the order of its regions, else of its subarrays.
+/// The resultants of a result: one per region if it has regions, else one per subarray.
 pub(super) fn resultants(sensor: &Sensor, result: &Reconstruction) -> Vec<Resultant> {
     match &result.extra.regions {
         Some(regions) => {

@@ -1,11 +1,12 @@
-//! Front: what a user calls. Input options before the engine, output options after it.
+//! Run: the entry points of the golden engine. They apply the input options before the engine and the output options
+//! after it.
 //!
 //! | option | here |
 //! |---|---|
-//! | `input.average` | [`Golden::run_averaged`]; [`Golden::run`] takes a frame that is averaged already |
+//! | `input.average` | [`Golden::run_averaged`]; [`Golden::run`] takes an averaged frame |
 //! | `input.calibration`, `input.tare` | readings to stress |
-//! | `input.unipolar` | clipped taxels are given the tension that suits best, [`crate::input::unipolar`] |
-//! | `output.forces` | resultants in the place of forces per taxel |
+//! | `input.unipolar` | the tension of clipped taxels is estimated, [`crate::input::unipolar`] |
+//! | `output.forces` | resultants instead of forces per taxel |
 
 use super::output::resultants;
 use super::{Golden, GoldenError, Reconstruction};
@@ -14,15 +15,16 @@ use crate::input::unipolar::{fill_clipped, misfit, Unipolar};
 use crate::scene::{ForceOutput, Scene};
 
 impl Golden {
-    /// Reconstructs one frame of readings.
+    /// Reconstructs one frame; its values are readings if the scene has a calibration or tare file, else stress in MPa.
     ///
     /// # Errors
-    /// `Frame` when the frame is not the scene's, `TooStrong` when a force overflows.
+    /// [`GoldenError::Frame`] if the frame is not of the scene's sensor, [`GoldenError::TooStrong`] if a force is not
+    /// finite.
     pub fn run(&self, frame: &Frame) -> Result<Reconstruction, GoldenError> {
         self.run_with_noise(frame, self.scene.search.noise_floor_MPa * self.scene.input.noise_share())
     }
 
-    /// Reconstructs one frame whose noise the objective is told to have the deviation `noise_MPa`.
+    /// Reconstructs one frame with the given standard deviation of the noise in MPa instead of the scene's noise floor.
     ///
     /// # Errors
     /// As [`Golden::run`].
@@ -45,7 +47,7 @@ impl Golden {
         Ok(result)
     }
 
-    /// The frame with tension in the place of clipped readings; the misfit is still to come.
+    /// The frame with tension in place of clipped readings, and its report without the misfit.
     fn filled(&self, frame: &Frame) -> (Frame, Unipolar) {
         let Scene { sensor, input, search, .. } = &self.scene;
         let mut filled = frame.clone();
@@ -64,18 +66,19 @@ impl Golden {
         (filled, report)
     }
 
-    /// Averages 2^k frames, k the scene's `input.average`, and reconstructs their mean; the first one's truth stays.
+    /// Averages 2^k frames, k the scene's `input.average`, and reconstructs their mean; known forces are those of the
+    /// first.
     ///
     /// # Errors
-    /// As [`Golden::run`]; `Input` when there are not 2^k frames.
+    /// As [`Golden::run`]; [`GoldenError::Input`] unless there are 2^k frames.
     pub fn run_averaged(&self, frames: &[Frame]) -> Result<Reconstruction, GoldenError> {
         self.run(&self.input.average(&self.scene, frames)?)
     }
 
-    /// The stress that [`Golden::run_averaged`] reconstructs: the calibrated mean of 2^k frames.
+    /// The stress in MPa that [`Golden::run_averaged`] reconstructs: the calibrated mean of 2^k frames.
     ///
     /// # Errors
-    /// `Input` when there are not 2^k frames or one is not the scene's.
+    /// [`GoldenError::Input`] unless there are 2^k frames, all of the scene's sensor.
     pub fn stress(&self, frames: &[Frame]) -> Result<Frame, GoldenError> {
         Ok(self.input.calibrate(&self.input.average(&self.scene, frames)?))
     }

@@ -1,4 +1,4 @@
-//! The golden engine on shipped frames, the form of its result, and frames at the edge of what there is.
+//! The golden engine on shipped frames, the JSON of its result, and extreme frames.
 
 use super::*;
 use crate::partition::{Case, Subarray};
@@ -69,7 +69,7 @@ fn json_keeps_the_contract_and_comes_back() {
 
 #[test]
 fn shear_points_from_tension_to_compression() {
-    // Full sliding: b is positive ahead of the contact.
+    // In full sliding b is compressive ahead of the contact and tensile behind it.
     let result = run(&scene(), &hertz());
     let part = &result.subarrays[0];
     let (c, t) = (part.compression_centroid_mm.unwrap(), part.tension_centroid_mm.unwrap());
@@ -163,7 +163,7 @@ fn a_mu_max_of_zero_is_no_search_in_both_models() {
 
 #[test]
 fn extreme_stress_is_an_error_or_a_finite_result() {
-    // With `adaptive` and `contacts` ellipses are fitted, whose sums of squares leave the numbers first.
+    // With `adaptive` and `contacts` ellipses are fitted, whose sums of squares overflow first.
     for case in [Case::WHOLE, Case::Adaptive, Case::Contacts] {
         let mut scene = scene();
         scene.partition.case = case;
@@ -180,7 +180,7 @@ fn extreme_stress_is_an_error_or_a_finite_result() {
 }
 
 #[test]
-fn what_is_not_the_scenes_is_refused() {
+fn frames_of_another_sensor_are_rejected() {
     let eight = Scene::builtin("eight-by-eight").unwrap();
     let other = Golden::new(&eight).unwrap().run(&hertz());
     assert!(matches!(other, Err(GoldenError::Frame(_))));

@@ -1,12 +1,12 @@
-//! Extended: the stress of known forces on the cells, in numbers of twice the digits, rounded once to double.
+//! Extended: the stress of known forces on the cells in double-double arithmetic, rounded once to double.
 //!
 //! ```text
 //! b_t = Σ_f [μ1 cx(t − f) + μ2 cy(t − f) + cz(t − f)] p_f          Love's closed form, [`crate::influence`]
 //! ```
 //!
-//! Far from a cell the closed form loses up to ten digits of its 31; what a double is rounded from keeps 20. The entries
-//! of a bonded layer are integrals that are known to a double only: there the products and sums alone are extended, and
-//! the layer that the doubles describe is the truth.
+//! Far from a cell the closed form loses up to ten of its 31 digits; more than 20 remain for the rounding to double.
+//! The entries for a bonded layer are integrals known to double precision only: there only products and sums are
+//! extended, and the layer that these entries describe is the reference.
 //!
 //! | | shape | unit |
 //! |---|---|---|
@@ -19,7 +19,7 @@ use crate::scene::Medium;
 use crate::sensor::Sensor;
 use qd::Quad;
 
-/// Stress under normal forces `p` with the shear μ p.
+/// Stress in MPa, row-major, of normal forces `p` in N on the cells with the shear μ p.
 pub fn stress_MPa(sensor: &Sensor, medium: Medium, p: &[f64], mu: [f64; 2]) -> Vec<f64> {
     let (rows, cols) = (sensor.rows as isize, sensor.cols as isize);
     let entries = entries(sensor, medium);
@@ -40,13 +40,13 @@ pub fn stress_MPa(sensor: &Sensor, medium: Medium, p: &[f64], mu: [f64; 2]) -> V
             let (s, d) = (force as isize / cols, force as isize % cols);
             sum += kernel[((r - s + rows - 1) * wide + c - d + cols - 1) as usize] * two(*p);
         }
-        // The first part of a sum of two is the sum rounded.
+        // The leading part of a double-double number is its value rounded to double.
         sum.0
     };
     (0..sensor.taxels()).map(under).collect()
 }
 
-/// cx, cy, cz at each distance in rows and columns, row-major, the taxel right of and below the cell.
+/// cx, cy, cz for each distance in rows and columns, row-major, the taxel to the right of and below the cell.
 fn entries(sensor: &Sensor, medium: Medium) -> Vec<[Quad; 3]> {
     let Sensor { cols, pitch_x_mm: a, pitch_y_mm: b, thickness_mm: h, .. } = *sensor;
     match medium {
@@ -57,7 +57,7 @@ fn entries(sensor: &Sensor, medium: Medium) -> Vec<[Quad; 3]> {
     }
 }
 
-/// Stress per unit force along x, y, z, `steps` pitches away, for a cell of `sides`.
+/// Stress per unit force along x, y, z, `steps` pitches away from a cell with `sides` in mm.
 fn influence(steps: [f64; 2], sides: [f64; 2], h: f64) -> [Quad; 3] {
     let [a, b, h] = [sides[0], sides[1], h].map(two);
     let square = h * h;
@@ -80,7 +80,7 @@ fn influence(steps: [f64; 2], sides: [f64; 2], h: f64) -> [Quad; 3] {
     sums.map(|sum| sum / area)
 }
 
-/// atan to all digits: the angle halved until a short series serves.
+/// atan to all digits: the angle is halved until a short series is accurate.
 fn atan(mut x: Quad) -> Quad {
     const HALVINGS: i32 = 6;
     const TERMS: usize = 12;

@@ -1,28 +1,28 @@
-//! Extreme: frames at the ends of what a sensor can give, and what each model makes of them.
+//! Extreme: frames at the limits of a sensor, and the result of each model.
 //!
-//! [`frames`] makes them for any scene; [`outcome`] runs both models. "Status" is the hardware's own
-//! ([`crate::fixed::send`]), flags are the result's ([`crate::flags`]).
+//! [`frames`] generates them for any scene; [`outcome`] runs both models. "Status" is the hardware's own
+//! ([`crate::fixed::send`]), flags are those of the result ([`crate::flags`]).
 //!
 //! | frame | result | flags |
 //! |---|---|---|
 //! | zero | every force exactly zero | `no-contact`, `condition-unmet` |
 //! | spike, one taxel | p = Cz⁺'s column: a force of the spike's sign among smaller ones | |
 //! | one taxel saturated | golden: forces of the stress as it is; fixed: of the clipped one | `saturated` |
-//! | all saturated | the same; without a direction the first of equals | `saturated`, `load-outside` |
+//! | all saturated | the same; all directions are equal, the first is chosen | `saturated`, `load-outside` |
 //! | all clipped, unipolar | golden: every force zero; the hardware refuses `input.unipolar` | `no-contact`, … |
-//! | all tension | μ = 0, p = p₀: forces that pull | `no-compression` |
+//! | all tension | μ = 0, p = p₀: tensile forces | `no-compression` |
 //! | checkerboard, Eq. 2 | finite forces; the largest stress lies on the rim | `load-outside` |
-//! | μ at its bound, beyond | the search stays on its disc, \|μ\| ≤ mu_max | |
-//! | load 10^k of full scale | golden: scales with it; fixed: error of the codes left | ≤ 10⁻⁴ `shear-unreliable` |
+//! | μ at its bound, beyond | \|μ\| ≤ mu_max | |
+//! | load 10^k of full scale | golden: proportional to it; fixed: error of the remaining codes | ≤ 10⁻⁴ `shear-unreliable` |
 //! | … below half an LSB | golden: p₀, not searched; fixed: zero | `condition-unmet`, fixed `no-contact` |
 //! | … above full scale | as saturated | `saturated` |
-//! | load 2^k, own full scale | golden: scales exactly, bit by bit; fixed: the same codes, the same words | |
-//! | over the edge, in the corner, larger than the array | forces on the cells that there are | `load-outside` |
-//! | on a subarray boundary | each side for itself: a rectangle that cuts a contact loses part of it | |
-//! | smaller than a taxel | the load to a tenth, its place to a cell | |
+//! | load 2^k, own full scale | golden: proportional to it, to the bit; fixed: the same codes, the same words | |
+//! | over the edge, in the corner, larger than the array | forces on the existing cells | `load-outside` |
+//! | on a subarray boundary | each side on its own: a boundary through a contact loses part of it | |
+//! | smaller than a taxel | the load to 10 %, its position to a cell | |
 //!
-//! The flags `saturated`, `load-outside`, `shear-unreliable` follow from frame and codes on the host's side; the status
-//! words say what the engine alone can know: condition met, candidate found, no contact, saturations of its own
+//! The flags `saturated`, `load-outside`, `shear-unreliable` are derived on the host from frame and codes; the status
+//! words report what only the engine knows: condition met, candidate found, no contact, saturations of its own
 //! arithmetic, and the framing of its input.
 
 use crate::fixed::send::{Status, FLAG_CONDITION, FLAG_FOUND, FLAG_FRAMING, FLAG_NO_CONTACT, STATUS_BEATS};
@@ -37,45 +37,45 @@ use serde::Serialize;
 
 /// Normal load of the contacts in N.
 const LOAD_N: f64 = 5.0;
-/// Direction of the shear.
+/// Direction of the shear, a unit vector.
 const ALONG: [f64; 2] = [0.8, -0.6];
-/// Shear over load where nothing else is asked for, as a share of mu_max.
+/// Default ratio of shear to load, in units of mu_max.
 const SHEAR: f64 = 0.4;
-/// Stress of the frames that are no contact, in MPa.
+/// Stress of the frames without a contact, in MPa.
 const STRESS_MPA: f64 = 0.1;
-/// Powers of ten of the loads over full scale.
+/// Loads relative to full scale, as powers of ten.
 const DECADES: [i32; 9] = [-9, -6, -4, -2, -1, 0, 1, 3, 9];
-/// Powers of two of the loads with their own full scale: about 10^±9.
+/// Loads with their own full scale, as powers of two: about 10^±9.
 const OCTAVES: [i32; 2] = [-30, 30];
 
-/// One frame with its variant of the scene.
+/// An extreme frame with its variant of the scene.
 #[derive(Clone, Debug)]
 pub struct Extreme {
-    /// The scene, with the options that make the frame extreme.
+    /// The scene with the options that make the frame extreme.
     pub scene: Scene,
-    /// The frame; its id says what it is.
+    /// The frame; its id describes it.
     pub frame: Frame,
 }
 
-/// What one model made of it.
+/// The result of one model.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Outcome {
-    /// Sum of the forces, [x, y, normal].
+    /// Sum of the forces in N, [x, y, normal].
     pub resultant_N: [f64; 3],
-    /// Errors of the resultant: tangential, normal.
+    /// Errors of the resultant as fractions: tangential, normal; `None` if undefined.
     pub errors: [Option<f64>; 2],
-    /// Remarks.
+    /// Flags of the result.
     pub flags: Vec<Flag>,
 }
 
 /// One line of the table.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Row {
-    /// The frame.
+    /// Id of the frame.
     pub frame: String,
-    /// The floating-point model.
+    /// Result of the floating-point model.
     pub golden: Outcome,
-    /// The bit-true model.
+    /// Result of the bit-true model.
     pub fixed: Option<Outcome>,
     /// Flags and saturations in the hardware's status words, over all subarrays.
     pub status: String,
@@ -86,7 +86,7 @@ pub struct Row {
 /// The extreme frames of a scene.
 ///
 /// # Errors
-/// Contacts that the generator refuses.
+/// [`GeneratorError`] if a contact does not fit the sensor.
 pub fn frames(scene: &Scene) -> Result<Vec<Extreme>, GeneratorError> {
     let sensor = &scene.sensor;
     let (half_x, half_y) = (sensor.cols as f64 * sensor.pitch_x_mm / 2.0, sensor.rows as f64 * sensor.pitch_y_mm / 2.0);
@@ -115,7 +115,7 @@ pub fn frames(scene: &Scene) -> Result<Vec<Extreme>, GeneratorError> {
         }
         frame
     };
-    // Stress that no known force makes.
+    // Stress without known forces.
     let bare = |id: &str, b: &dyn Fn(usize, usize) -> f64| Frame {
         id: id.to_string(),
         resultant_N: None,
@@ -151,7 +151,7 @@ pub fn frames(scene: &Scene) -> Result<Vec<Extreme>, GeneratorError> {
     all.extend(OCTAVES.iter().map(|k| plain(scaled(format!("load 2^{k}, own full scale"), 2f64.powi(*k)))));
     all.push(plain(circle("over the edge", "hertz-circle", radius, [half_x, 0.0], mu)?));
     all.push(plain(circle("in the corner", "hertz-circle", radius, [-half_x, half_y], mu)?));
-    // The finest of the paper's cases that cuts the array through its middle.
+    // The first of the paper's cases 2 and 3 that divides the array through its middle.
     let cuts = [2, 3].into_iter().filter_map(Case::numbered).find(|case| subarrays(*case, sensor).is_ok());
     if let Some(case) = cuts {
         let mut cut = plain(circle("on a subarray boundary", "hertz-circle", radius, [0.0; 2], mu)?);
@@ -164,10 +164,10 @@ pub fn frames(scene: &Scene) -> Result<Vec<Extreme>, GeneratorError> {
     Ok(all)
 }
 
-/// What both models make of an extreme frame.
+/// Runs both models on an extreme frame.
 ///
 /// # Errors
-/// A scene or frame that the golden model refuses.
+/// [`GoldenError`] if the golden model rejects scene or frame.
 pub fn outcome(extreme: &Extreme) -> Result<Row, GoldenError> {
     let Extreme { scene, frame } = extreme;
     let golden = Golden::new(scene)?.run(frame)?;
@@ -188,7 +188,7 @@ fn of(result: &Reconstruction) -> Outcome {
     Outcome { resultant_N: result.resultant_N, errors, flags: result.flags.clone() }
 }
 
-/// The status words' flags by name, and their saturations where there are any.
+/// The names of the flags in the status words, and the number of saturations if any.
 fn status(beats: &[[i32; 3]]) -> String {
     let all: Vec<Status> = beats.chunks(STATUS_BEATS).filter_map(Status::of_beats).collect();
     let names = [
@@ -200,7 +200,7 @@ fn status(beats: &[[i32; 3]]) -> String {
     let raised = |bit: u32| all.iter().any(|status| status.flags & bit != 0);
     let mut words: Vec<String> =
         names.iter().filter(|(bit, _)| raised(*bit)).map(|(_, name)| name.to_string()).collect();
-    // The frame's force saturations stand in every status.
+    // Every status has the force saturations of the whole frame.
     let saturations = all.iter().map(|status| status.rescale_saturations).sum::<u32>()
         + all.first().map_or(0, |status| status.force_saturations);
     if saturations > 0 {

@@ -1,20 +1,21 @@
-//! Settings: the scenes of the stability table, from well conditioned to hopeless.
+//! Settings: the scenes of the stability table, from well to extremely ill conditioned.
 //!
-//! | group | array | pitch | thickness | else |
+//! | group | array | pitch | thickness | other |
 //! |---|---|---|---|---|
-//! | `thickness` | 8×8 | 1×1 mm | 0.1 … 10 mm | from 3 mm on each kind of inverse |
+//! | `thickness` | 8×8 | 1×1 mm | 0.1 … 10 mm | from 3 mm on with each kind of inverse |
 //! | `poisson` | 8×8 | 1×1 mm | 1, 3 mm | bonded layer, ν 0.3 … 0.4999 |
 //! | `size` | 2×2 … 48×48 | 1×1 mm | 2 mm | |
 //! | `pitches` | 8×8 | 1:100 … 100:1 | 2 mm | |
-//! | `50 digits` | 8×8 | 1×1 mm | 1, 3, 5, 10 mm | stress computed elsewhere with 50 digits, `data/reference` |
+//! | `50 digits` | 8×8 | 1×1 mm | 1, 3, 5, 10 mm | stress computed independently with 50 digits, `data/reference` |
 //!
-//! mu_max is [`MU_MAX`], for which every series converges within the hardware's degree; all else is a scene's default.
+//! mu_max is [`MU_MAX`], for which every series converges within the hardware's degree; other fields have their
+//! defaults.
 
 use crate::frame::Frame;
 use crate::scene::{InverseKind, Medium, Scene};
 use crate::sensor::Sensor;
 
-/// Search range of the table's scenes.
+/// mu_max of the table's scenes.
 pub const MU_MAX: f64 = 0.4;
 
 /// Files of `data/reference` with their text.
@@ -28,16 +29,16 @@ const REFERENCES: [(&str, &str); 4] = [
 /// One scene of the table.
 #[derive(Clone, Debug)]
 pub struct Setting {
-    /// What is varied.
+    /// The quantity varied.
     pub group: String,
     /// The scene.
     pub scene: Scene,
-    /// Known forces with their stress under one shear; without them the Hertz pressure of the table's own truth.
+    /// Known forces with their stress for one shear; if `None`, the table's own Hertz pressure is used.
     pub frame: Option<Frame>,
 }
 
 impl Setting {
-    /// A scene on the table's own pressure.
+    /// A scene with the table's own Hertz pressure.
     pub fn new(group: impl Into<String>, scene: Scene) -> Setting {
         Setting { group: group.into(), scene, frame: None }
     }
@@ -82,8 +83,8 @@ pub fn settings() -> Vec<Setting> {
     all
 }
 
-/// Frames of known forces and shear whose stress was computed elsewhere with 50 digits.
+/// Frames of known forces and shear with stress computed independently with 50 digits.
 pub fn references() -> Vec<Frame> {
-    // All four are read: the tests count them.
+    // A file that cannot be parsed would be missing here; a test counts them.
     REFERENCES.into_iter().filter_map(|(name, text)| Frame::parse(name, text, None).ok()).collect()
 }

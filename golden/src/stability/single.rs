@@ -1,7 +1,7 @@
-//! Single: the frame's part of the golden model in single precision, for comparison with double and fixed point.
+//! Single: the per-frame part of the golden model in single precision, for comparison with double and fixed point.
 //!
-//! The matrices are made in double and rounded once, as a processor without doubles would be given them; products, sums
-//! and the family p(μ) are single. The search is the shared one.
+//! The matrices are computed in double and rounded once, as for a processor without doubles; products, sums and the
+//! polynomial p(μ) are single. The search is the shared one.
 //!
 //! | | shape | unit |
 //! |---|---|---|
@@ -12,7 +12,7 @@ use crate::float::pass::{term_index, Polynomial};
 use crate::matrices::Matrices;
 use faer::Mat;
 
-/// The family for stress `b` of the given degree, computed in single precision.
+/// The polynomial p(μ) of the given degree for stress `b` in MPa, computed in single precision.
 pub fn family(matrices: &Matrices, b: &[f64], degree: usize) -> Polynomial {
     let b: Vec<f32> = b.iter().map(|b| *b as f32).collect();
     let mut vectors = vec![product(&matrices.cz_pinv, &b)];

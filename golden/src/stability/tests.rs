@@ -1,4 +1,4 @@
-//! The table's figures against its targets, and refusals in its rows.
+//! The values of the table against its targets, and rejected scenes in its rows.
 
 use super::extreme::{frames, outcome, Outcome, Row as ExtremeRow};
 use super::*;
@@ -16,7 +16,7 @@ fn row(h: f64, kind: InverseKind) -> Row {
     measure(&Setting::new("thickness", scene(h, kind))).unwrap()
 }
 
-/// Condition up to 10⁶: 1 % of normal error without noise; 10¹²: 5 %.
+/// Largest normal error without noise: 1 % up to a condition of 10⁷, 5 % at 10¹³.
 #[test]
 fn targets_hold_for_every_condition() {
     for (h, condition, most) in [(1.0, 1e1, 0.01), (3.0, 1e4, 0.01), (5.0, 1e7, 0.01), (10.0, 1e13, 0.05)] {
@@ -36,11 +36,11 @@ fn targets_hold_for_every_condition() {
 fn the_level_bounds_rank_and_gain() {
     let (exact, cut) = (row(10.0, InverseKind::Exact), row(10.0, InverseKind::Tsvd));
     let (exact_spectrum, spectrum) = (exact.spectrum.unwrap(), cut.spectrum.unwrap());
-    // σ_max of Cz by its norm: gain = condition / σ_max.
+    // The largest singular value of Cz: gain = condition / σ_max.
     let largest = exact_spectrum.condition / exact_spectrum.gain;
     assert!(spectrum.gain * largest <= 1.0 / cut.level);
     assert!(spectrum.rank.round() < 32.0 && exact_spectrum.rank.round() >= 63.0);
-    // Codes of 20 bits carry nothing that the exact inverse could use; the level keeps the fixed model sane.
+    // Codes of 20 bits carry no information for the exact inverse; the level keeps the fixed model accurate.
     assert!(exact.fixed.unwrap().forward > 100.0 * cut.fixed.unwrap().forward);
 }
 
@@ -59,15 +59,15 @@ fn stiffer_scenes_need_more_bits() {
 }
 
 #[test]
-fn refusals_carry_their_figure_and_what_to_do() {
+fn errors_name_a_value_that_works() {
     let mut wide = scene(5.0, InverseKind::Tsvd);
     wide.search.mu_max = 2.0;
     let refused = measure(&Setting::new("wide", wide.clone())).unwrap().refused.unwrap();
-    assert!(refused.contains("needs more than degree 8; search.mu_max = "), "{refused}");
-    // The remedy it names is one.
-    let remedy = refused.split("search.mu_max = ").nth(1).unwrap().split(' ').next().unwrap();
-    wide.search.mu_max = remedy.parse().unwrap();
-    assert!(Golden::new(&wide).is_ok(), "{remedy}");
+    assert!(refused.contains("needs a series of more than degree 8; use search.mu_max = "), "{refused}");
+    // The suggested value works.
+    let suggested = refused.split("search.mu_max = ").nth(1).unwrap().split(' ').next().unwrap();
+    wide.search.mu_max = suggested.parse().unwrap();
+    assert!(Golden::new(&wide).is_ok(), "{suggested}");
     let mut layer = scene(1.0, InverseKind::Tsvd);
     layer.medium = Medium::BondedLayer { poisson: 0.4999 };
     let row = measure(&Setting::new("layer", layer)).unwrap();
@@ -82,8 +82,8 @@ fn the_table_covers_what_it_says() {
     assert_eq!([of("thickness"), of("poisson"), of("size"), of("pitches"), of("50 digits")], [17, 10, 7, 6, 4]);
 }
 
-/// Stress made with 50 digits apart from this code: the same targets, and where nothing is left out of the inverse no
-/// error but rounding times condition.
+/// Stress computed independently with 50 digits: the same targets, and where the inverse truncates nothing the only
+/// error is rounding times condition.
 #[test]
 fn frames_of_50_digits_meet_the_targets() {
     let own = settings().into_iter().filter(|setting| setting.frame.is_some());
@@ -98,7 +98,7 @@ fn frames_of_50_digits_meet_the_targets() {
     }
 }
 
-/// Every line of the table of [`extreme`], for both models.
+/// Every line of the table in [`extreme`], for both models.
 #[test]
 fn extreme_frames_have_the_documented_outcomes() {
     for name in ["sensor-1", "eight-by-eight"] {
@@ -130,17 +130,17 @@ fn extreme_frames_have_the_documented_outcomes() {
                 assert!(outcome.flags.contains(&flag), "{name}, {frame}: {:?}", outcome.flags);
             }
         }
-        // Pulled, not sheared.
+        // Tensile forces without shear.
         for Outcome { resultant_N: [x, y, normal], .. } in both("all tension") {
             assert!(x == 0.0 && y == 0.0 && normal < 0.0);
         }
         let unipolar = of("all clipped, unipolar");
         assert_eq!(unipolar.golden.resultant_N, [0.0; 3]);
         assert!(unipolar.fixed.is_none() && unipolar.refused.as_ref().unwrap().contains("input.unipolar"));
-        // Below half an LSB there is nothing in integers.
+        // Stress below half an LSB is zero in integers.
         let [golden, fixed] = both("load 1e-9 of full scale");
         assert!(golden.resultant_N[2] > 0.0 && fixed.resultant_N == [0.0; 3] && fixed.flags.contains(&Flag::NoContact));
-        // The load scales the forces: by rounding of the stress with powers of ten, exactly with powers of two.
+        // Forces are proportional to the load: up to rounding for powers of ten, exactly for powers of two.
         let unit = &of("load 1e0 of full scale").golden;
         for k in [-6, -4, -2, -1, 1, 3, 9] {
             let scaled = &of(&format!("load 1e{k} of full scale")).golden;
@@ -151,7 +151,7 @@ fn extreme_frames_have_the_documented_outcomes() {
         for (small, large) in both("load 2^-30, own full scale").iter().zip(both("load 2^30, own full scale")) {
             assert_eq!(small.resultant_N.map(|f| f * factor), large.resultant_N, "{name}");
         }
-        // Two decades under full scale the normal force is still right, ten below its LSB's weight not.
+        // Two decades below full scale the normal force is still accurate, six decades below it is not.
         let normal = |frame: &str| of(frame).fixed.as_ref().unwrap().errors[1].unwrap();
         assert!(normal("load 1e-2 of full scale") < 0.02 && normal("load 1e-6 of full scale") > 0.1);
         for row in &rows {
@@ -159,7 +159,7 @@ fn extreme_frames_have_the_documented_outcomes() {
                 [Some(&row.golden), row.fixed.as_ref()].into_iter().flatten()
             {
                 assert!([x, y, normal].iter().all(|f| f.is_finite()));
-                // On the disc, whole arrays having one μ; force words round.
+                // Shear is within mu_max where the whole array has one μ, up to the rounding of force words.
                 let whole = row.frame != "on a subarray boundary" && *normal > 0.0;
                 assert!(!whole || x.hypot(*y) <= scene.search.mu_max * normal * 1.001, "{name}, {}", row.frame);
             }

@@ -1,4 +1,4 @@
-//! Truth: known forces of a scene, their stress, and how far found ones are from them.
+//! Truth: known forces of a scene, their stress, and the errors of reconstructed forces.
 //!
 //! ```text
 //! p ∝ √(1 − ρ²) on an ellipse, Σp = 1 N          b₀ = Cz p          b = (μ1 Cx + μ2 Cy + Cz) p
@@ -7,7 +7,7 @@
 //! | | shape | unit |
 //! |---|---|---|
 //! | in: scene | sensor, medium, mu_max | mm |
-//! | in: frame | known forces and their stress under one shear, if made elsewhere | N, MPa |
+//! | in: frame | known forces and their stress for one shear, if given | N, MPa |
 //! | out: two frames | taxels | MPa, forces in N |
 
 use super::{extended, FormatErrors};
@@ -18,22 +18,22 @@ use crate::frame::{Forces, Frame};
 use crate::matrices::Matrices;
 use crate::scene::Scene;
 
-/// Shear of the frames over their load, as shares of mu_max.
+/// Ratio of shear to load in units of mu_max, [x, y].
 const SHEAR: [f64; 2] = [0.6, -0.35];
-/// Half-axes of the pressure's ellipse over the array's width, and its place from the middle.
+/// Half-axes of the pressure's ellipse and its centre, relative to the array's width.
 const HALF_AXIS: f64 = 0.38;
 const PLACE: [f64; 2] = [0.05, -0.04];
 /// Known forces and their stress.
 pub(super) struct Truth {
     p: Vec<f64>,
-    /// With the shear μ p.
+    /// The frame with the shear μ p.
     pub(super) sheared: Frame,
-    /// Without.
+    /// The frame without shear.
     pub(super) unsheared: Frame,
 }
 
 impl Truth {
-    /// The frames of a setting: its own known forces, else the Hertz pressure.
+    /// The two frames: of the known forces if given, else of the Hertz pressure.
     pub(super) fn of(scene: &Scene, known: Option<&Frame>) -> Truth {
         let forces = known.and_then(|frame| Some((frame, frame.cell_forces_N.as_ref()?)));
         let Some((frame, forces)) = forces else { return Truth::hertz(scene) };
@@ -57,13 +57,13 @@ impl Truth {
         Truth { sheared: made(scene, "sheared", &p, mu), unsheared: made(scene, "normal", &p, [0.0; 2]), p }
     }
 
-    /// ‖p̂ − p‖/‖p‖ of found forces p̂.
+    /// Forward error ‖p̂ − p‖/‖p‖ of reconstructed normal forces p̂.
     pub(super) fn forward(&self, p: &[f64]) -> f64 {
         let off: Vec<f64> = p.iter().zip(&self.p).map(|(p, q)| p - q).collect();
         norm(&off) / norm(&self.p)
     }
 
-    /// The errors of the forces found in the sheared frame, beside a forward error.
+    /// The errors of the forces reconstructed from the sheared frame, with a given forward error.
     pub(super) fn figures(&self, matrices: &Matrices, forward: f64, forces: &Forces) -> FormatErrors {
         let b = &self.sheared.stress_MPa;
         let mut rest = b.clone();
