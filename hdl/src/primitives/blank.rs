@@ -61,7 +61,7 @@ impl Logic for Blank {
     fn hdl(&self) -> Verilog {
         if self._dead.is_empty() {
             return Verilog::Custom(
-                "// No dead taxels.\nwire unused = &{1'b0, clk, clear, enable};\nalways @(*) kept = word;"
+                "// No taxel is dead.\nwire unused = &{1'b0, clk, clear, enable};\nalways @(*) kept = word;"
                     .to_string(),
             );
         }

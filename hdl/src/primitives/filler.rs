@@ -74,7 +74,7 @@ impl Logic for Filler {
         let q = count_bits(largest(&self._quads));
         if self._vectors == 0 {
             return Verilog::Custom(format!(
-                "// No v_ij is an operand.\nwire unused = &{{1'b0, clk, which, clear, valid}};\n\
+                "// No v_ij is an operand of a later pass.\nwire unused = &{{1'b0, clk, which, clear, valid}};\n\
                  always @(*) {{keep, address, finished}} = {}'d0;",
                 1 + a + f
             ));

@@ -61,7 +61,7 @@ pub struct ForceUnit {
     pub condition: Signal<In, Bit>,
     /// The search found a candidate; valid with `start`.
     pub found: Signal<In, Bit>,
-    /// `tlast` was early or missing; sampled when status beat 1 leaves.
+    /// `tlast` was early or missing; sampled when the beat with the flags leaves.
     pub framing: Signal<In, Bit>,
     /// The coefficient signature is wrong, 1 bit; valid with `start`.
     pub damaged: Wire<In>,

@@ -20,7 +20,7 @@ const M: usize = MULTIPLIER_BITS as usize;
 /// ```
 /// A memory word holds one coefficient per lane. `operands`, `valid` and `control` belong to the address of two cycles
 /// earlier. After the last product of an accumulation its rows leave one per cycle: `lanes_per_parity` quads, fewer in
-/// the last group, the first of them five cycles after its `control`.
+/// the last group, the first of them five cycles after the `control` of that product.
 #[derive(LogicBlock)]
 pub struct Lanes {
     /// Clock; registers change on its rising edge.
@@ -303,7 +303,7 @@ end
   if (rst) left <= {row_bits}'d0;
   else if (valid4 && last4) left <= {rows};
   else if (left != {row_bits}'d0) left <= left - {row_bits}'d1;
-  // Registered to shorten a long route. Not written as left > 1: with one row, the constant 1 is the largest that fits.
+  // Registered to shorten a long route. Not written as left > 1, which is constant where left has one bit.
   quad_valid <= !rst && (valid4 && last4 || left != {row_bits}'d0 && left != {row_bits}'d1);
 end
 always @(*) quad = chain_head;

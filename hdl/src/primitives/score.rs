@@ -23,7 +23,7 @@ pub struct Score {
     pub mask: Wire<In>,
     /// Nine values per lane, `search_bits[0]` each, signed, field 9·lane + k; valid with `valid`.
     pub values: Wire<In>,
-    /// Σp of the nine candidates, `sum_bits[0]` each, signed.
+    /// Σp of the nine candidates, `sum_bits[0]` each, signed; valid with `valid`.
     pub sums: Wire<In>,
     /// Nine totals, `score_bits` each, 2^−6; constant until the next valid quad.
     pub totals: Wire<Out>,

@@ -13,8 +13,8 @@ use crate::wire::{Wire, Word};
 /// Three candidates per cycle, one row of equal y: Σp selected and the disc tested, first half of the logarithm, second
 /// half and table, times n.
 ///
-/// `start` with the sweep; its nine sums must be stable for the next three cycles. The results are valid [`LATENCY`]
-/// cycles after `start`, until those of the next sweep.
+/// `start` with the sweep and its nine sums, which stay stable for the next three cycles. The results are valid
+/// [`LATENCY`] cycles after `start`, until those of the next sweep.
 #[derive(LogicBlock)]
 pub struct Weigh {
     /// Clock; registers change on its rising edge.
@@ -29,7 +29,7 @@ pub struct Weigh {
     pub sweep: Wire<In>,
     /// Squared radius of the search disc; valid with `start`.
     pub radius: Wire<In>,
-    /// Nine Σp, `sum_bits[0]` each, signed; in the three cycles after `start`.
+    /// Nine Σp, `sum_bits[0]` each, signed; valid with `start` and for three more cycles.
     pub sums: Wire<In>,
     /// Nine n·log2 Σp, unsigned, 2^−6.
     pub weights: Wire<Out>,
