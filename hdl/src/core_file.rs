@@ -2,8 +2,8 @@
 
 /// `<top>.core` for the generated files named `files`.
 ///
-/// Memory files are copied into the tool's work folder, where `$readmemh` looks for them. Target `lint` runs Verilator with
-/// the generated waivers.
+/// Memory files are copied into the tool's work folder, where `$readmemh` looks for them. Target `lint` runs Verilator
+/// with the generated waivers.
 pub(crate) fn core_file(top: &str, scene: &str, files: &[&str]) -> String {
     let of = |ending: &str, kind: fn(&str) -> String| {
         let chosen = files.iter().filter(|name| name.ends_with(ending));

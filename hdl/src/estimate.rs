@@ -31,7 +31,8 @@ impl std::ops::AddAssign for Logic {
     }
 }
 
-/// Logic of every module of `verilog`, by name. The arrays `placed` (module, array) are RAM and do not count as registers.
+/// Logic of every module of `verilog`, by name. The arrays `placed` (module, array) are RAM and do not count as
+/// registers.
 pub fn modules<'a>(verilog: &'a str, placed: &BTreeSet<(String, String)>) -> BTreeMap<&'a str, Logic> {
     let mut found = BTreeMap::new();
     for text in verilog.split("\nmodule ").skip(1) {

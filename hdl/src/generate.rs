@@ -140,8 +140,8 @@ pub fn generate(model: &Model) -> Result<Generated, HdlError> {
     Ok(generated)
 }
 
-/// Adds a `ram_style` attribute to the array of every memory of the model; names of the engine's modules start with `engine`
-/// after `top$`.
+/// Adds a `ram_style` attribute to the array of every memory of the model; names of the engine's modules start with
+/// `engine` after `top$`.
 pub(crate) fn place(verilog: &str, model: &Model, engine: &str) -> Result<String, HdlError> {
     let mut placed = String::with_capacity(verilog.len());
     let mut module = "";
@@ -162,8 +162,8 @@ pub(crate) fn place(verilog: &str, model: &Model, engine: &str) -> Result<String
                 (0, _) => "block",
                 _ => "huge",
             };
-            // Read-during-write data is unused: the serial engine never reads a word in the cycle that writes it, and the
-            // search discards what it reads so. So no logic is needed to define it.
+            // Read-during-write data is unused: the serial engine never reads a word in the cycle that writes it, and
+            // the search discards what it reads so. So no logic is needed to define it.
             let unchecked = model.board.engine == EngineKind::Serial || memory.block == SEARCH_MEMORY;
             let check = if unchecked { ", no_rw_check" } else { "" };
             placed.push_str(&format!("(* ram_style = \"{style}\"{check} *)\n"));
@@ -237,8 +237,8 @@ fn cycles(model: &Model) -> serde_json::Value {
     json!({ "searched": of(true), "not_searched": of(false) })
 }
 
-/// Manifest entry of one of several cases; its cycles exclude the [`LATENCY`](dermis_golden::fixed::choose::LATENCY) of the
-/// choice.
+/// Manifest entry of one of several cases; its cycles exclude the [`LATENCY`](dermis_golden::fixed::choose::LATENCY) of
+/// the choice.
 fn case(case: &Model) -> serde_json::Value {
     json!({
         "case": case.number(),

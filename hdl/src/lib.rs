@@ -7,14 +7,16 @@
 //! puts either behind a UART or an SPI. All widths come from the formats of the bit-true model.
 //!
 //! What is derived from what:
-//! - Engines, most stages and the link's top levels are `#[hdl_gen]` kernels: rust-hdl simulates them and derives their Verilog
-//!   from the same Rust. They hold single-bit control and connections.
-//! - All other blocks, which hold the arithmetic, the memories and most state machines, are written twice: a Rust `update()` for
-//!   rust-hdl's simulation, and a hand-written Verilog text (`Verilog::Custom`) that is what gets synthesised. Co-simulation
-//!   compares both with the bit-true model: the streams between the stages word by word, the output beats, the cycle counts.
+//! - Engines, most stages and the link's top levels are `#[hdl_gen]` kernels: rust-hdl simulates them and derives their
+//!   Verilog from the same Rust. They hold single-bit control and connections.
+//! - All other blocks, which hold the arithmetic, the memories and most state machines, are written twice: a Rust
+//!   `update()` for rust-hdl's simulation, and a hand-written Verilog text (`Verilog::Custom`), which is synthesised.
+//!   Co-simulation compares both with the bit-true model: the streams between the stages word by word, the output
+//!   beats, the cycle counts.
 #![deny(missing_docs)]
 
-/// A comment that `#[hdl_gen]` copies into the Verilog; expands to nothing in Rust. One short line: rust-hdl breaks a long one.
+/// A comment that `#[hdl_gen]` copies into the Verilog; expands to nothing in Rust. One short line: rust-hdl breaks a
+/// long one.
 macro_rules! comment {
     ($text:literal) => {};
 }
@@ -38,7 +40,8 @@ mod generate;
 mod simulate;
 mod taps;
 
-// `receive` and `search` blocks of [`engine`]; [`choosing`] and [`unsearched`] import replacements under the same names.
+// `receive` and `search` blocks of [`engine`]; [`choosing`] and [`unsearched`] import replacements under the same
+// names.
 use stages::{Receive, Search};
 
 pub use generate::{generate, Generated, GeneratedFile, HdlError, Refused};

@@ -5,7 +5,7 @@
 //! |---|---|
 //! | `manifest_version` | version of the fields' meaning; a reader rejects any other |
 //! | `files` | name to `bytes` and `crc32`, for all files except the manifest |
-//! | `checksum` | CRC-32 of the manifest without this field, as JSON with sorted keys, two-space indent and a final newline |
+//! | `checksum` | CRC-32 of the manifest without it, as JSON with sorted keys, two-space indent and a final newline |
 
 use std::collections::BTreeMap;
 use std::io::{Error, ErrorKind, Read};

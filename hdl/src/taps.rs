@@ -7,7 +7,8 @@ use dermis_golden::fixed::Model;
 use crate::device::Tap;
 use crate::primitives::{count_bits, position_bits};
 
-/// Field width of the search's tap, in bits: its fields have different widths in hardware and are sign-extended to this.
+/// Field width of the search's tap, in bits: its fields have different widths in hardware and are sign-extended to
+/// this.
 pub const SEARCH_FIELD: u32 = 32;
 
 /// Field width of the tap of `choose`, in bits: the index of a case, and a sign bit.

@@ -97,8 +97,8 @@ const PRODUCT_STEPS: usize = 2;
 const ASKED: usize = STEPS - 1;
 /// Bits of the unsigned low part of p: a multiplier operand without its sign bit.
 const LOW: usize = MULTIPLIER_BITS as usize - 1;
-/// Cycles of a frame outside its counter: before the counter is cleared, two cycles after the frame starts, and from its sampling
-/// to the first beat behind the queue.
+/// Cycles of a frame outside its counter: before the counter is cleared, two cycles after the frame starts, and from
+/// its sampling to the first beat behind the queue.
 const UNCOUNTED: u32 = ACCEPT as u32 + 3 + LEAVING as u32;
 /// Width of the cycle counter, in bits.
 pub const CYCLE_BITS: usize = 24;
@@ -226,7 +226,8 @@ impl ForceUnit {
         }
     }
 
-    /// Verilog of the shear components: the μ words of each subarray, then their products with p. Used with a search only.
+    /// Verilog of the shear components: the μ words of each subarray, then their products with p. Used with a search
+    /// only.
     fn shear(&self) -> (String, String) {
         let f = &self._formats;
         let (p, mu) = (position_bits(), 18);

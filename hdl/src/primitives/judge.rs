@@ -252,8 +252,8 @@ function in_line;
   input [1:0] step;
   in_line = ahead == {{{{{p_end}{{step[1]}}}}, step}};
 endfunction
-// a < b, both signed. Exchanging the sign bits makes the comparison unsigned, which takes only the carry out of one chain; a
-// signed comparison also taps the chain below the sign bit.
+// a < b, both signed. Exchanging the sign bits makes the comparison unsigned, which takes only the carry out of one
+// chain; a signed comparison also taps the chain below the sign bit.
 function less;
   input [{t_end}:0] a, b;
   less = {{b[{t_end}], a[{t_less}:0]}} < {{a[{t_end}], b[{t_less}:0]}};

@@ -188,7 +188,8 @@ impl Logic for Lanes {
     fn update(&mut self) {
         if self.clk.pos_edge() {
             let per_parity = self._shape.per_parity;
-            // Last pipeline step first: a row leaves the chain, the accumulators move to the chain, a product is accumulated.
+            // Last pipeline step first: a row leaves the chain, the accumulators move to the chain, a product is
+            // accumulated.
             if self._left > 0 {
                 self._left -= 1;
                 for parity in 0..4 {

@@ -40,7 +40,8 @@ pub fn functions(bits: usize) -> String {
     let nibbles = width / NIBBLE;
     let used: String =
         (0..nibbles).map(|n| format!("    used[{n}] = |y[{}:{}];\n", (n + 1) * NIBBLE - 1, n * NIBBLE)).collect();
-    // One step: store whether the upper `half` of the `bits` bits of `asked` is non-zero; if it is zero, move the lower half up.
+    // One step: store whether the upper `half` of the `bits` bits of `asked` is non-zero; if it is zero, move the lower
+    // half up.
     let step = |name: &str, bit: usize, asked: &str, bits: usize, half: usize, moves: String| {
         let (high, low) = (bits - 1, bits - half);
         format!("    {name}[{bit}] = |{asked}[{high}:{low}];\n    if (!{name}[{bit}]) {moves}\n")

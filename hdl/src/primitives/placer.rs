@@ -25,8 +25,8 @@ pub struct Placer {
 }
 
 impl Placer {
-    /// For subarrays of `layout`, taxels of `bits` bits and `vectors` v_ij, of which those listed in `transposed` arrive with rows and
-    /// columns exchanged.
+    /// For subarrays of `layout`, taxels of `bits` bits and `vectors` v_ij, of which those listed in `transposed`
+    /// arrive with rows and columns exchanged.
     pub fn new(layout: Quads, bits: usize, vectors: usize, transposed: Vec<usize>) -> Self {
         Placer {
             index: Wire::new(count_bits(vectors)),

@@ -49,8 +49,8 @@ impl Ram {
         }
     }
 
-    /// Adds an output register: `read_data` follows two cycles after `read_address`. The clock-to-output time of a block RAM leaves
-    /// no room for logic behind it.
+    /// Adds an output register: `read_data` follows two cycles after `read_address`. The clock-to-output time of a
+    /// block RAM leaves no room for logic behind it.
     pub fn registered(mut self) -> Self {
         self._behind = true;
         self

@@ -257,15 +257,15 @@ end
         };
         Verilog::Custom(format!(
             "{lanes}{to_buffer}wire [{end}:0] write_to = {write_to};
-// Read and write addresses are registers of each coefficient, because the memories are placed far apart; the attribute keeps
-// synthesis from merging them.
+// Read and write addresses are registers of each coefficient, because the memories are placed far apart; the attribute
+// keeps synthesis from merging them.
 {from_start}{memories}",
         ))
     }
 }
 
-/// Verilog of a registered write port: `data` goes to address `to` of `memory` one cycle after `asks`. The last argument gives the
-/// widths of `to` and `data`.
+/// Verilog of a registered write port: `data` goes to address `to` of `memory` one cycle after `asks`. The last
+/// argument gives the widths of `to` and `data`.
 fn write_port(memory: &str, [asks, to, data]: [&str; 3], [to_bits, data_bits]: [usize; 2]) -> String {
     format!(
         "\

@@ -55,8 +55,8 @@ struct Added {
 }
 
 impl Sum {
-    /// Sums in `layout` (one lane) over `quads` quads, of coefficients of `fill_bits` bits; `apart` says whether one subarray is
-    /// filled while another is searched.
+    /// Sums in `layout` (one lane) over `quads` quads, of coefficients of `fill_bits` bits; `apart` says whether one
+    /// subarray is filled while another is searched.
     pub fn new(layout: PolynomialWord, quads: usize, fill_bits: usize, apart: bool) -> Self {
         Sum {
             clk: Default::default(),

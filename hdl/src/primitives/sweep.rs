@@ -32,7 +32,8 @@ pub struct Sweep {
     pub closes: bool,
 }
 
-/// Bit offset of each field in the word: centre x, centre y, square, buffer, coarse, closes; last the width of the word.
+/// Bit offset of each field in the word: centre x, centre y, square, buffer, coarse, closes; last the width of the
+/// word.
 pub fn offsets() -> [usize; 7] {
     let p = position_bits();
     let buffer = 2 * p + square_bits();
@@ -72,8 +73,8 @@ impl Sweep {
     }
 }
 
-/// Verilog wires for the fields of the sweep in signal `word`: `<prefix>centre_x`, `centre_y`, `square`, `buffer`, `coarse`,
-/// `closes`.
+/// Verilog wires for the fields of the sweep in signal `word`: `<prefix>centre_x`, `centre_y`, `square`, `buffer`,
+/// `coarse`, `closes`.
 pub fn unpack(word: &str, prefix: &str) -> String {
     let names = ["centre_x", "centre_y", "square", "buffer", "coarse", "closes"];
     let at = offsets();

@@ -125,12 +125,12 @@ endgenerate",
 }
 
 impl Taylor {
-    /// Verilog of a move along one axis: registers for the terms that the step multiplies, then wires `<axis>k_moved` computed
-    /// from `<axis>k`.
+    /// Verilog of a move along one axis: registers for the terms that the step multiplies, then wires `<axis>k_moved`
+    /// computed from `<axis>k`.
     ///
-    /// c0' = c0 + d (c1 + c3) + d² c2,  c1' = c1 + 2d c2 + 3d² c3,  c2' = c2 + 3d c3, with d one of −1, 0, 1. So d² is 1 if there
-    /// is a move, and d·c is c, −c or 0, where −c is the complement plus one. Written as one sum, which synthesis maps to one carry
-    /// chain.
+    /// c0' = c0 + d (c1 + c3) + d² c2,  c1' = c1 + 2d c2 + 3d² c3,  c2' = c2 + 3d c3, with d one of −1, 0, 1. So d² is
+    /// 1 if there is a move, and d·c is c, −c or 0, where −c is the complement plus one. Written as one sum, which
+    /// synthesis maps to one carry chain.
     fn shift(&self, axis: &str, step: &str, up: impl Fn((u32, u32), u32) -> (u32, u32)) -> String {
         let widths = &self._layout.widths;
         let mut text = String::new();
@@ -140,7 +140,8 @@ impl Taylor {
                 let found = EXPONENTS.iter().position(|&e| e == up(EXPONENTS[k], by));
                 found.filter(|&n| n < widths.len()).map(|n| resize(&format!("{axis}{n}"), widths[n], w))
             };
-            // Binomial factors of the higher terms: those an odd distance above change sign with the step, the others do not.
+            // Binomial factors of the higher terms: those an odd distance above change sign with the step, the others
+            // do not.
             let times = |value: &str, factor: u32| match factor {
                 2 => format!("({value} << 1)"),
                 3 => format!("({value} << 1) + {value}"),

@@ -218,7 +218,8 @@ end
 reg is_coarse, is_halving;
 wire closing = !is_coarse || count == {SWEEP_BITS}'d{final_coarse};
 always @(*) next_halves = is_halving;
-// A coarse sweep set up in the cycle of `judged` already uses its result for the choice of buffers; a halving is set up later.
+// A coarse sweep set up in the cycle of `judged` already uses its result for the choice of buffers; a halving is set up
+// later.
 {judged_fields}wire keeps = judged && improved && judged_coarse;
 wire [1:0] kept_buffer = kept[{buffer} +: 2];
 wire [{w_end}:0] from = is_coarse ? sweep : kept;
@@ -255,8 +256,9 @@ always @(posedge clk) begin
 end
 wire [{low}:0] next = {{is_halving ? at_square << 2 : at_square, is_halving ? at_y << 1 : at_y,
   is_halving ? at_x << 1 : at_x}};
-// A coarse sweep writes the first of buffers 1, 2, 0 that is neither read nor the best, chosen one cycle after the set-up, when a
-// `judged` in the cycle of the set-up has taken effect. The first, which reads START, writes 1. Other sweeps work in place.
+// A coarse sweep writes the first of buffers 1, 2, 0 that is neither read nor the best, chosen one cycle after the
+// set-up, when a `judged` in the cycle of the set-up has taken effect. The first, which reads START, writes 1. Other
+// sweeps work in place.
 reg set_up1, coarse1, taken_closes, taken_coarse;
 reg [{low}:0] place;
 wire [1:0] free = source == 2'd{START} || (source != 2'd1 && kept_buffer != 2'd1) ? 2'd1

@@ -119,7 +119,8 @@ impl Logic for Weigh {
         let s = self.sums.width() / 9;
         let w = self.weights.width() / 9;
         let (p, q) = (position_bits(), square_bits());
-        // n·log2 Σp without a multiplier: one term per set bit of n, added up in two halves, then their sum a cycle later.
+        // n·log2 Σp without a multiplier: one term per set bit of n, added up in two halves, then their sum a cycle
+        // later.
         let halves = |taxels: &i64| -> [String; 2] {
             let bits = (0..64).filter(|bit| taxels >> bit & 1 == 1);
             let terms: Vec<String> = bits.map(|bit| format!("({{{}'d0, log}} << {bit})", w - LOG_BITS)).collect();

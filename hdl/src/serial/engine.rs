@@ -67,7 +67,7 @@ impl Engine {
         let f = &model.formats;
         let word = word_bits(f);
         let code = f.input_bits as usize;
-        // `normalise` shifts codes left by the largest shift, then right by the difference.
+        // `normalise` shifts codes left by `input_bits` − 1, then right by the length of the magnitude.
         let unrounded = (f.acc_bits as usize).max(2 * code).max(product_bits(f));
         let rounded = f.input_bits.max(f.vector_bits) as usize;
         let force = Force::new(f, model.threshold, unrounded);

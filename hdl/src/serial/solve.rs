@@ -120,8 +120,8 @@ pub struct Solve {
     _state: State,
 }
 
-/// One product of the program. The operand memory holds the v_ij with their column parity inverted, as Ax needs them; for Ay both
-/// parity bits of the address are inverted.
+/// One product of the program. The operand memory holds the v_ij with their column parity inverted, as Ax needs them;
+/// for Ay both parity bits of the address are inverted.
 #[derive(Clone, Copy, Debug)]
 struct Instruction {
     matrix: usize,

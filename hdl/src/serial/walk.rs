@@ -28,7 +28,8 @@ const IDLE: u64 = 0;
 const SET_UP: u64 = 1;
 const RUN: u64 = 2;
 const JUDGE: u64 = 3;
-/// Ticks from a bank's address to the word entering the chain along y; then to the word leaving it, and to its write-back.
+/// Ticks from a bank's address to the word entering the chain along y; then to the word leaving it, and to its
+/// write-back.
 const ALONG_Y: u64 = TRANSPOSE + 1;
 const LEAVES: u64 = ALONG_Y + 4;
 const BACK: u64 = LEAVES + 1;
@@ -271,7 +272,8 @@ impl Walk {
         self._state = next;
     }
 
-    /// Compares a candidate every two cycles, five cycles each: index, disc by x, disc by y and position, decision, update.
+    /// Compares a candidate every two cycles, five cycles each: index, disc by x, disc by y and position, decision,
+    /// update.
     fn judge(&self, next: &mut State) {
         let s = self._state;
         let coarse = s.sweep < COARSE;

@@ -83,8 +83,8 @@ impl Choose {
         last
     }
 
-    /// Verilog that collects the signs in each quarter of the array; and for each case an expression that is true if a loaded
-    /// subarray does not meet the condition. With `Condition::Loaded` every loaded subarray does.
+    /// Verilog that collects the signs in each quarter of the array; and for each case an expression that is true if a
+    /// loaded subarray does not meet the condition. With `Condition::Loaded` every loaded subarray does.
     fn signs(&self) -> (String, Vec<String>) {
         let bits = self.code.width();
         if self._condition == Condition::Loaded {

@@ -1,10 +1,10 @@
 //! The stages of the pipeline, one file each, named as in the bit-true model. A stage starts on the `done` pulse of the
 //! one before.
 //!
-//! | stage | form |
-//! |---|---|
-//! | `prepare`, `receive`, `fold`, `pass`, `rescale`, `unfold`, `search`, `force`, `send` | `#[hdl_gen]` kernel: single-bit control and connections between [primitives](crate::primitives), its Verilog derived from the Rust |
-//! | `normalise`, `choose`, `banks`, `unsearched` | Rust `update()` for rust-hdl's simulation and hand-written Verilog, which co-simulation compares |
+//! `prepare`, `receive`, `fold`, `pass`, `rescale`, `unfold`, `search`, `force` and `send` are `#[hdl_gen]` kernels:
+//! single-bit control and connections between the [primitives](crate::primitives), with Verilog derived from the Rust.
+//! `normalise`, `choose`, `banks` and `unsearched` have a Rust `update()` for rust-hdl's simulation and hand-written
+//! Verilog, which co-simulation compares.
 //!
 //! `banks` (with `choose`) replaces `receive` where the case is chosen per frame; `unsearched` replaces `search` in a
 //! scene without one.

@@ -157,8 +157,8 @@ impl Search {
             quads: CaseCounter::new(&limits),
             period: CaseCounter::new(&periods),
             counting: Default::default(),
-            // The result of a comparison and the move computed from it are registered before a sweep is set up. `set_up` is a
-            // register too, because it drives the whole search.
+            // The result of a comparison and the move computed from it are registered before a sweep is set up.
+            // `set_up` is a register too, because it drives the whole search.
             began: BitDelay::new(SET_UP as usize - 1),
             judged_then: BitDelay::new(SET_UP as usize - 1),
             go: BitDelay::new(1),
