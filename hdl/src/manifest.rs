@@ -43,7 +43,7 @@ pub enum ManifestError {
         source: Error,
     },
     /// Not valid JSON, not an object, or a field is missing or of the wrong type.
-    #[error("{file}: no manifest: {reason}")]
+    #[error("{file}: not a valid manifest: {reason}")]
     Syntax {
         /// Path of the file.
         file: String,
@@ -90,7 +90,7 @@ pub(crate) fn seal(manifest: &mut Value, files: &[GeneratedFile]) -> String {
 pub fn parse(text: &str, file: &str) -> Result<Value, ManifestError> {
     let syntax = |reason: String| ManifestError::Syntax { file: file.to_owned(), reason };
     if !text.ends_with('\n') {
-        return Err(syntax("cut short: the last line has no end".to_owned()));
+        return Err(syntax("truncated: the last line has no end".to_owned()));
     }
     let manifest: Value = serde_json::from_str(text).map_err(|error| syntax(error.to_string()))?;
     if !manifest.is_object() {

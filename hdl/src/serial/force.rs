@@ -1,7 +1,8 @@
 //! Stages `force` and `send`: one product at a time, a beat every [`BEAT`](dermis_golden::fixed::serial::BEAT) cycles.
 //!
 //! ```text
-//! phase  0 order | 1 bank | 2 … 4 factors μ1, μ2, 1 | 3 … 5 products | 4 … 6 rounder | 8 … 10 forces | 11 threshold | 12 beat
+//! phase  0 order | 1 bank | 2 … 4 factors μ1, μ2, 1 | 3 … 5 products | 4 … 6 rounder | 8 … 10 forces
+//!        11 threshold | 12 beat
 //! ```
 //! The next taxel's value is read meanwhile and taken when the beat is accepted: from then on phases 3 to 12 repeat.
 //! Before the first beat both μ words are computed in the same way; after the last force the status words take the

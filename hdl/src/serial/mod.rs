@@ -5,8 +5,8 @@
 //! bench, link and host are the same.
 //!
 //! ```text
-//! receive --> rounder --> mixer --> pass --> raw --> rounder --> mixer --> unfold --> banks <--> walk, horner, nine, score
-//!             normalise   fold                       rescale     unfold                 '--> force --> rounder --> m_axis
+//! receive -> rounder -> mixer -> pass -> raw -> rounder -> mixer -> unfold -> banks <-> walk, horner, nine, score
+//!            normalise  fold                    rescale    unfold             '-> force -> rounder -> m_axis
 //! ```
 //! [`Solve`] sequences the blocks up to `unfold`, [`Walk`] the search, [`Force`] the output. [`Engine`] and [`Receive`]
 //! are `#[hdl_gen]` kernels; the other blocks have a Rust `update()` for rust-hdl's simulation and hand-written
