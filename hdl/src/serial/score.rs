@@ -185,7 +185,7 @@ reg [11:0] coarse;
 reg [1:0] place_high;
 reg [{log_end}:0] logarithm, late;
 reg [3:0] index0, index1, index2, index3, index4;
-// {valid, sum, positive} per pipeline step
+// valid, sum, positive of each pipeline step
 reg [2:0] kind0, kind1, kind2, kind3, kind4;
 wire negative = value[{end}] && !sum;
 wire [31:0] whole = {whole};
