@@ -1,6 +1,6 @@
-//! The engine of a scene whose case is chosen per frame: the same description, with [`Banks`](crate::stages::Banks) in
-//! the place of `receive`. rust-hdl has no optional blocks, so the file is read once more; what it calls `Receive` is
-//! the module's.
+//! The engine of a scene whose case is chosen per frame: [`engine`](crate::engine) with [`Banks`](crate::stages::Banks)
+//! in place of `Receive`. rust-hdl has no optional blocks, so the file `engine.rs` is compiled again with another
+//! import of that name.
 
 use crate::stages::{Banks as Receive, Search};
 

@@ -1,8 +1,9 @@
-//! The FuseSoC core file of generated hardware: others add it to their design by name.
+//! FuseSoC core file (CAPI 2) of generated hardware, through which other designs depend on it by name.
 
 /// `<top>.core` for the generated files named `files`.
 ///
-/// Memory files are copied beside the tool's own files, where `$readmemh` looks for them; `lint` runs Verilator's.
+/// Memory files are copied into the tool's work folder, where `$readmemh` looks for them. Target `lint` runs Verilator
+/// with the generated waivers.
 pub(crate) fn core_file(top: &str, scene: &str, files: &[&str]) -> String {
     let of = |ending: &str, kind: fn(&str) -> String| {
         let chosen = files.iter().filter(|name| name.ends_with(ending));

@@ -1,7 +1,7 @@
-//! A clocked device with the engine's ports, whatever simulates it.
+//! The engine's pins as a clocked device, independent of the simulator.
 //!
-//! rust-hdl's simulation, the Verilated RTL and the post-synthesis netlist all implement
-//! [`Device`], so one test bench drives them all.
+//! rust-hdl's simulation, the Verilated RTL and the post-synthesis netlist all implement [`Device`], so that one test
+//! bench drives them all.
 //!
 //! ```text
 //!            +-----------+
@@ -14,50 +14,50 @@
 pub struct Inputs {
     /// Synchronous reset, active high.
     pub rst: bool,
-    /// `s_axis_tvalid`: a taxel's code is offered.
+    /// `s_axis_tvalid`: `s_data` holds a code.
     pub s_valid: bool,
-    /// `s_axis_tdata`: the taxel's code, two's complement, `input_bits` wide.
+    /// `s_axis_tdata`: a taxel's code, two's complement, `code_bits` wide.
     pub s_data: i32,
-    /// `s_axis_tlast`: the frame's last taxel.
+    /// `s_axis_tlast`: the code is the frame's last.
     pub s_last: bool,
-    /// `m_axis_tready`: the receiver takes a beat.
+    /// `m_axis_tready`: the receiver accepts a beat in this cycle.
     pub m_ready: bool,
 }
 
 /// The engine's output pins in one clock cycle, sampled just before the rising edge.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Outputs {
-    /// `s_axis_tready`: an offered code is taken at this cycle's edge.
+    /// `s_axis_tready`: a code offered in this cycle is accepted at its rising edge.
     pub s_ready: bool,
-    /// `m_axis_tvalid`: a beat is offered.
+    /// `m_axis_tvalid`: `m_data` holds a beat.
     pub m_valid: bool,
     /// `m_axis_tdata` as `[fx, fy, fz]`, each a 32-bit signed word.
     pub m_data: [i32; 3],
-    /// `m_axis_tlast`: the last status beat of a frame.
+    /// `m_axis_tlast`: the beat is the last status beat of its frame.
     pub m_last: bool,
-    /// One entry per [`Tap`]: the word that stage passed on in this cycle, if any.
+    /// One entry per [`Tap`]: the fields of the word that passes in this cycle, `None` if there is none.
     pub taps: Vec<Option<Vec<i64>>>,
 }
 
-/// A stage's stream that the test bench observes.
+/// The stream between two stages, as the test bench observes it.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Tap {
-    /// Stage name, equal to the bit-true model's.
+    /// Stage name, as in the bit-true model.
     pub name: &'static str,
-    /// Verilog expression for "a word passes in this cycle", relative to the top instance: `{}` stands
-    /// for the instance's path and dot (`bench.dut.`).
+    /// Verilog expression, high in a cycle in which a word passes; `{}` stands for the path of the top instance and a
+    /// dot (`bench.dut.`).
     pub valid: String,
-    /// Verilog expression of the word, same convention; field 0 in the least significant bits.
+    /// Verilog expression of the word, with the same placeholder; field 0 in the least significant bits.
     pub data: String,
-    /// Signed fields in a word.
+    /// Number of signed fields in a word.
     pub fields: usize,
-    /// Width of each field, 1..=64 bits.
+    /// Width of each field in bits, 1..=64.
     pub field_bits: u32,
 }
 
-/// Something that computes one clock cycle of the engine.
+/// A simulated engine, advanced one clock cycle at a time.
 pub trait Device {
-    /// Applies `inputs`, samples the outputs as they stand before the rising edge, then clocks.
-    /// A beat is transferred in this cycle exactly when valid and ready are both set.
+    /// Applies `inputs`, samples the outputs before the rising edge, then clocks. A beat is transferred in this cycle
+    /// exactly when valid and ready are both set.
     fn cycle(&mut self, inputs: &Inputs) -> Outputs;
 }

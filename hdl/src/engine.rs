@@ -1,15 +1,17 @@
-//! The engine: all stages in a row, one subarray after the other with the same matrices.
+//! The parallel engine: all stages connected, one subarray after the other through the same matrices.
 //!
 //! ```text
 //! prepare -> receive -> normalise -> fold -> pass -> rescale -> unfold -> search -> force -> send
 //!  s_axis -->  |  frame buffer         |      ^________|  v_ij             |                  |--> m_axis
 //!              '--- magnitude, signs --'                                   '--- μ, score -----'
 //! ```
-//! Three things go on at once: while one subarray is searched, the next one's v_ij are computed; while a frame is
-//! computed, the next is received into the frame buffer, which is free again as soon as `fold` has read it; while a frame
-//! is sent, the next one's first v_ij are computed, and wait until it is out. Where the case is chosen per frame, the
-//! choice is made as the frame is received ([`choosing`](crate::choosing)). (Without a search there is no memory where
-//! v_ij could wait: then a frame begins when the last one is out.)
+//! Three overlaps shorten the frame interval:
+//! - While one subarray is searched, the v_ij of the next are computed.
+//! - While a frame is computed, the next is received; the frame buffer is free as soon as `fold` has read it.
+//! - While a frame is sent, the first v_ij of the next are computed; they wait until that frame has been sent.
+//!
+//! Without a search there is no memory in which v_ij could wait: then a frame starts when the previous one has been
+//! sent. Where the case is chosen per frame, it is chosen while the frame is received ([`choosing`](crate::choosing)).
 
 use dermis_golden::fixed::Model;
 use dermis_golden::scene::Condition;
@@ -20,6 +22,8 @@ use crate::primitives::{count_bits, largest, BitDelay, CaseCounter, Counter, Kee
 use crate::stages::{Fold, Force, Normalise, Pass, Prepare, Rescale, Send, Unfold};
 use crate::wire::Wire;
 
+/// The parallel engine, the top module of the generated hardware.
+///
 /// ```text
 ///                +---------+
 ///  s_axis_t* --> | engine  | --> m_axis_t*
@@ -27,32 +31,32 @@ use crate::wire::Wire;
 /// ```
 /// | port | direction | width | meaning |
 /// |---|---|---|---|
-/// | `s_axis_tdata` | in | `code_bits` | a taxel's code, signed; row-major, one frame after the other |
-/// | `m_axis_tdata` | out | 96 | `{fz, fy, fx}`, 32 bits signed each; then the status beats |
+/// | `s_axis_tdata` | in | `code_bits` | a taxel's code, two's complement; row-major, frame after frame |
+/// | `m_axis_tdata` | out | 96 | `{fz, fy, fx}`, 32 bits signed each, row-major; then the status beats |
 /// | `…tvalid`, `…tready`, `…tlast` | | 1 | AXI-Stream handshake; `tlast` on a frame's last beat |
 ///
-/// Reset is synchronous and clears all control, not the data.
+/// Reset is synchronous; it clears all control registers, not the data.
 #[derive(LogicBlock)]
 pub struct Engine {
-    /// Clock.
+    /// Clock; registers change on its rising edge.
     pub clk: Signal<In, Clock>,
-    /// Reset.
+    /// Synchronous reset, active high.
     pub rst: Signal<In, Bit>,
-    /// A taxel's code.
+    /// A taxel's code, `code_bits` wide, two's complement; valid with `s_axis_tvalid`.
     pub s_axis_tdata: Wire<In>,
-    /// It is offered.
+    /// A beat is offered on `s_axis_tdata`; the sender holds it until `s_axis_tready`.
     pub s_axis_tvalid: Signal<In, Bit>,
-    /// It is taken.
+    /// The block accepts a beat in this cycle.
     pub s_axis_tready: Signal<Out, Bit>,
-    /// It is the frame's last.
+    /// The beat is the last of its frame; valid with `s_axis_tvalid`.
     pub s_axis_tlast: Signal<In, Bit>,
-    /// `{fz, fy, fx}`.
+    /// `{fz, fy, fx}`, 32 bits signed each, or a status beat; valid with `m_axis_tvalid`.
     pub m_axis_tdata: Wire<Out>,
-    /// A beat is offered.
+    /// A beat is offered on `m_axis_tdata`; it is held until `m_axis_tready`.
     pub m_axis_tvalid: Signal<Out, Bit>,
-    /// It is taken.
+    /// The receiver accepts a beat in this cycle.
     pub m_axis_tready: Signal<In, Bit>,
-    /// It is the frame's last.
+    /// The beat is the last of its frame; valid with `m_axis_tvalid`.
     pub m_axis_tlast: Signal<Out, Bit>,
     pub(crate) prepare: Prepare,
     pub(crate) receive: Receive,
@@ -103,7 +107,7 @@ pub struct Engine {
 }
 
 impl Engine {
-    /// The engine of a scene.
+    /// The engine of `model`.
     pub fn new(model: &Model) -> Self {
         let formats = &model.formats;
         let bits = formats.input_bits as usize;
@@ -159,7 +163,7 @@ impl Engine {
             handed: BitDelay::new(1),
             seeks: BitDelay::new(1),
             opens: BitDelay::new(1),
-            // The first beat, which takes the count of cycles, is out by then.
+            // By then the first output beat has sampled `cycles`.
             finish: BitDelay::new(9),
             both_signs: Constant::new(model.scene.partition.condition == Condition::BothSigns),
             ahead: Constant::new(model.searches()),
@@ -235,7 +239,7 @@ impl Logic for Engine {
         self.resultants.clk.next = self.clk.val();
         self.resultants.rst.next = self.rst.val();
 
-        comment!("A frame begins when it is whole and the last one computed");
+        comment!("A frame starts when the buffer is full and the engine idle");
         self.begins.now.next = self.receive.full.val()
             & !self.begins.then.val()
             & !self.computing.q.val()
@@ -244,7 +248,7 @@ impl Logic for Engine {
         self.computing.d.next =
             (self.begin_frame.val() | (self.computing.q.val() & !self.finish.then.val())) & !self.rst.val();
 
-        comment!("Its case stands until the next one begins, or is sent");
+        comment!("Case of the frame being computed, case of the frame being sent");
         self.frame_case.keep.next = self.begin_frame.val();
         self.frame_case.word.next = self.receive.which.val();
         self.fold.which.next = self.frame_case.kept.val();
@@ -256,8 +260,8 @@ impl Logic for Engine {
         self.forces.which.next = self.sent_case.kept.val();
         self.send.which.next = self.sent_case.kept.val();
 
-        comment!("A subarray is handed over to the search when that is free");
-        comment!("and, a frame's first one, when the last frame is out");
+        comment!("A subarray goes to the search when the search is idle;");
+        comment!("the first of a frame also waits for the previous send");
         self.begin_send.next = self.search.values_begin.val() & self.searched_last.q.val();
         self.sent_case.keep.next = self.begin_send.val();
         self.sent_case.word.next = self.frame_case.kept.val();
@@ -284,7 +288,7 @@ impl Logic for Engine {
         }
         self.searched_part.keep.next = self.hand_over.val();
         self.searched_part.word.next = self.part.value.val();
-        comment!("Not before a cycle later do these begin anew");
+        comment!("Captured a cycle later, before the stages restart");
         self.searched_normalise.keep.next = self.handed.then.val();
         self.searched_normalise.word.next = self.normalise.shift.val();
         self.searched_rescale.keep.next = self.handed.then.val();
@@ -294,13 +298,13 @@ impl Logic for Engine {
         self.searched_damaged.keep.next = self.handed.then.val();
         self.searched_damaged.word.next = self.pass.damaged.val();
 
-        comment!("Then the next one begins");
+        comment!("Then the next subarray starts");
         self.part.clear.next = self.rst.val();
         self.part.enable.next = self.hand_over.val();
         self.again.now.next = self.hand_over.val() & !self.part.last.val();
         self.start.next = self.begin_frame.val() | self.again.then.val();
-        comment!("Waiting for the last frame does not count");
-        comment!("The counter is far away, so all this is a cycle late");
+        comment!("Stalls behind the previous frame are excluded");
+        comment!("Registered once to shorten the route to the counter");
         self.begun.now.next = self.begin_frame.val();
         self.waits.now.next = self.complete.val() & self.behind.val();
         self.cycles.clear.next = self.begun.then.val();

@@ -1,8 +1,8 @@
-//! Flip-flops and look-up tables of generated Verilog, estimated from its text.
+//! Estimate of flip-flops and LUTs from the text of the generated Verilog.
 //!
-//! Registers are counted bit by bit where a clocked block assigns them; logic by operators, each per bit of what it is
-//! assigned to. Loops of generate blocks count as often as they unroll. Synthesis shares and removes some of it: the
-//! tests say how far the estimate is from Yosys.
+//! A register counts bit by bit where a clocked block assigns it; logic counts by operator and by bit of the assigned
+//! target. A `for` loop of a generate block counts once per iteration. Synthesis shares and removes some of it; the
+//! tests state how far the estimate is from Yosys.
 //!
 //! | operator | LUTs per bit |
 //! |---|---|
@@ -11,16 +11,16 @@
 //! | `&`, `|`, `^`, `!` and comparisons | 1/4 |
 //! | shift by a signal | 3 |
 //! | parity of a part select | a third of the bits selected |
-//! | a table logarithm | 2 per bit of the argument, 40 for its last bits and the table |
+//! | a table logarithm | 2 per bit of the argument, and 40 for its second half and the table |
 
 use std::collections::{BTreeMap, BTreeSet};
 
-/// Logic of a block.
+/// Logic of a module.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Logic {
-    /// Bits of registers.
+    /// Register bits.
     pub flip_flops: usize,
-    /// Four-input look-up tables, rounded in the end.
+    /// Four-input LUTs; the caller rounds.
     pub luts: f64,
 }
 
@@ -31,7 +31,8 @@ impl std::ops::AddAssign for Logic {
     }
 }
 
-/// Logic of every module of `verilog` by name; memories of `placed` (module, array) are not registers.
+/// Logic of every module of `verilog`, by name. The arrays `placed` (module, array) are RAM and do not count as
+/// registers.
 pub fn modules<'a>(verilog: &'a str, placed: &BTreeSet<(String, String)>) -> BTreeMap<&'a str, Logic> {
     let mut found = BTreeMap::new();
     for text in verilog.split("\nmodule ").skip(1) {
@@ -43,14 +44,14 @@ pub fn modules<'a>(verilog: &'a str, placed: &BTreeSet<(String, String)>) -> BTr
     found
 }
 
-/// One module, statement by statement.
+/// State of the scan over one module, statement by statement.
 struct Scan {
     placed: BTreeSet<String>,
     widths: BTreeMap<String, usize>,
     words: BTreeMap<String, usize>,
-    /// How often each open block counts, and whether it is clocked.
+    /// For each open `begin`: how often its content counts, and whether it is clocked.
     open: Vec<(usize, bool)>,
-    /// A clocked block of a single statement.
+    /// The next statement is the body of a clocked block without `begin`.
     clocked: bool,
     assigned: BTreeSet<String>,
     logic: Logic,
@@ -95,7 +96,7 @@ impl Scan {
                 || line.ends_with(",") && line.contains("put ")
             {
                 let complete = std::mem::take(&mut statement);
-                // The head of a loop has semicolons of its own.
+                // The head of a loop contains semicolons that do not end a statement.
                 match complete.trim().strip_prefix("for (").and_then(|head| head.split_once(") ")) {
                     Some((_, body)) if !body.trim_start().starts_with("begin") => self.statement(body.trim()),
                     Some(_) => self.statement(complete.trim()),
@@ -177,10 +178,10 @@ impl Scan {
                 _ => whole,
             };
             width += bits;
-            // A memory's read register is its own.
+            // The read register of a block RAM is part of the RAM.
             let read = value.split_once('[').is_some_and(|(memory, _)| self.placed.contains(memory));
             if registered && !read && !self.placed.contains(name) && self.assigned.insert(part.to_string()) {
-                // An array is assigned word by word but lives whole.
+                // An array counts with all its words at the first assignment.
                 let first = words == 1 || self.assigned.insert(name.to_string());
                 self.logic.flip_flops += if first { words * bits * self.times() } else { 0 };
             }
@@ -190,14 +191,14 @@ impl Scan {
     }
 }
 
-/// Target and value of a statement that is an assignment.
+/// Target and value of a statement, if it is an assignment.
 fn assignment(text: &str) -> Option<(&str, &str)> {
     let text = text.strip_suffix(';')?;
     let (target, value) = match text.split_once(" <= ") {
         Some(pair) if !pair.0.contains(" = ") => pair,
         _ => text.split_once(" = ")?,
     };
-    // What stands before the target: conditions, case labels, declarations.
+    // Skips conditions, case labels and declarations before the target.
     let target = target.trim();
     let start = match target.ends_with('}') {
         true => target.rfind('{')?,
@@ -209,13 +210,13 @@ fn assignment(text: &str) -> Option<(&str, &str)> {
     Some((&target[start..], value))
 }
 
-/// How often a block counts: the bound of its loop.
+/// Iterations of the loop that `text` opens; 1 if it opens none.
 fn loop_count(text: &str) -> usize {
     let bound = text.strip_prefix("for (").and_then(|head| head.split("< ").nth(1));
     bound.and_then(|bound| bound.split(';').next()?.trim().parse().ok()).unwrap_or(1)
 }
 
-/// LUTs per bit of an expression, its indices left out.
+/// LUTs per bit of an expression, without the expressions inside its indices.
 fn cost(value: &str) -> f64 {
     let mut depth = 0;
     let mut plain = String::new();
@@ -240,13 +241,13 @@ fn cost(value: &str) -> f64 {
     sum
 }
 
-/// LUTs of the parities of part selects: each takes three bits away.
+/// LUTs of the parities of part selects: a LUT replaces four bits by one.
 fn reduced(value: &str) -> f64 {
     let selects = value.split('^').skip(1).filter_map(|rest| rest.split(']').next()?.rsplit_once("+: "));
     selects.filter_map(|(_, bits)| bits.parse::<f64>().ok()).map(|bits| ((bits - 1.0) / 3.0).ceil()).sum()
 }
 
-/// LUTs of the logarithm's functions.
+/// LUTs of the calls of the logarithm's functions.
 fn calls(value: &str, widths: &BTreeMap<String, usize>) -> f64 {
     let argument = |name: &str| value.split_once(name).and_then(|(_, rest)| rest.split(')').next());
     let locate = argument("locate(").map_or(0.0, |x| 2.0 * widths.get(x).copied().unwrap_or(1) as f64);

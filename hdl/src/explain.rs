@@ -1,5 +1,5 @@
-//! What a scene's hardware has and what it leaves out, with what each omission saves: the model of the scene with that
-//! feature put back, less the model of the scene.
+//! Which features a scene's hardware has, which it omits, and what each omission saves: the model of the scene with
+//! that feature added, minus the model of the scene.
 
 use dermis_golden::fixed::feature_costs::{features, Feature};
 use dermis_golden::fixed::{Cycles, Model};
@@ -12,22 +12,22 @@ use crate::usage::{stages, total, Usage};
 /// A feature of the hardware.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct Explained {
-    /// What it is.
+    /// Name of the feature.
     pub feature: &'static str,
-    /// How the scene has it, or how it was put back.
+    /// The scene's setting of it, or the setting with which it was added for comparison.
     pub setting: String,
-    /// Whether the scene has it.
+    /// The scene's hardware has the feature.
     pub present: bool,
-    /// What leaving it out saves; `None` where the scene has it or cannot have it.
+    /// What omitting it saves; `None` if the scene has the feature or cannot have it.
     pub saved: Option<Saved>,
-    /// What it costs against the scene without it, where that depends on how the scene has it.
+    /// What it costs compared with the scene without it, where the cost depends on the setting.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub costs: Option<Saved>,
-    /// Why the scene cannot have it.
+    /// Why the scene cannot have it; `None` if it can.
     pub impossible: Option<String>,
 }
 
-/// Differences, with a feature less without it; negative where it saves something itself.
+/// Resources and cycles with a feature minus without it; negative where the feature reduces them.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 pub struct Saved {
     /// Block RAMs.
@@ -38,14 +38,14 @@ pub struct Saved {
     pub flip_flops: i64,
     /// LUTs, estimated.
     pub luts: i64,
-    /// Cycles from the last input beat to the last output beat, everything searched.
+    /// Clock cycles from the last input beat to the last output beat, all subarrays searched.
     pub cycles: i64,
 }
 
-/// Every feature that hardware can do without.
+/// Every optional feature of the hardware, with its cost or saving in `model`.
 ///
 /// # Errors
-/// A feature put back that has a model and no hardware: a defect of this crate.
+/// [`HdlError`] if a feature was added that has a model and no hardware: a defect of this crate.
 pub fn explain(model: &Model) -> Result<Vec<Explained>, HdlError> {
     let own = needs(model)?;
     let explained = |feature: Feature| {

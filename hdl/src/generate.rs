@@ -1,4 +1,4 @@
-//! The engine as files: Verilog, memory files, lint waivers, manifest.
+//! Generation of the engine as files: Verilog, memory files, lint waivers, core file, manifest, C header.
 
 use std::collections::BTreeMap;
 
@@ -24,28 +24,28 @@ use crate::simulate::design;
 use crate::taps::taps;
 use crate::usage::{stages, total, Usage};
 
-/// Version of the generated files' meaning; a reader refuses another one.
+/// `manifest_version`: version of the generated files' meaning; a reader rejects any other.
 pub(crate) const MANIFEST_VERSION: u32 = 1;
-/// Name of the manifest's file.
+/// File name of the manifest.
 pub(crate) const MANIFEST: &str = "manifest.json";
 
-/// Why a model has no hardware.
+/// Why no hardware can be generated from a model.
 #[derive(Debug, Error)]
 pub enum HdlError {
-    /// The scene asks for less than a board's top can leave out.
+    /// The scene omits a feature that a board's top module always has.
     #[error("{field} = {value}: a board without {what} is not available yet")]
     Unsupported {
-        /// The scene's field.
+        /// Field of the scene.
         field: &'static str,
         /// Its value.
         value: String,
-        /// What would be left out.
+        /// The feature that would be omitted.
         what: &'static str,
     },
-    /// The scene has no link.
+    /// The scene's link cannot be built.
     #[error(transparent)]
     Link(#[from] LinkError),
-    /// rust-hdl's checks of the description failed; a defect of this crate.
+    /// The description fails rust-hdl's checks; a defect of this crate.
     #[error("internal: the hardware description does not pass its checks: {0}")]
     Check(String),
 }
@@ -53,7 +53,7 @@ pub enum HdlError {
 /// A file of the generated hardware.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct GeneratedFile {
-    /// Name without folder.
+    /// File name without folder.
     pub name: String,
     /// Content.
     pub text: String,
@@ -66,28 +66,28 @@ pub struct Generated {
     pub top: String,
     /// `<top>.v`, memory files, `<top>.vlt`, `<top>.core`, `manifest.json`, `dermis_link.h`.
     pub files: Vec<GeneratedFile>,
-    /// The stages' streams.
+    /// The observed streams between the stages; none for a board.
     pub taps: Vec<Tap>,
     /// Content of `manifest.json`.
     pub manifest: serde_json::Value,
-    /// What each stage takes of the device.
+    /// Resources by stage.
     pub usage: BTreeMap<String, Usage>,
-    /// The cases that were not built, of a scene that lists none.
+    /// The cases left out of a scene that does not list its cases.
     pub dropped: Vec<Refused>,
 }
 
-/// A case that was not built, and what the device would have needed with it.
+/// A case left out because the design with it does not fit the device.
 #[derive(Clone, Debug, Serialize)]
 pub struct Refused {
-    /// The case.
+    /// The paper's number of the case.
     pub case: u32,
-    /// The cases there would have been.
+    /// The paper's numbers of all cases of the design that did not fit, this one included.
     pub with: Vec<u32>,
-    /// What they would have needed.
+    /// The resources that design would need.
     pub needs: Usage,
 }
 
-/// What was not built of the cases of `model`.
+/// The cases left out of `model`, with the resources they would need.
 fn refused(model: &Model) -> Result<Vec<Refused>, HdlError> {
     let refused = |dropped: &Dropped| {
         let with: Vec<u32> = dropped.design.cases().iter().map(Model::number).collect();
@@ -99,13 +99,13 @@ fn refused(model: &Model) -> Result<Vec<Refused>, HdlError> {
 }
 
 impl Generated {
-    /// Adds what the scene has and leaves out to the manifest.
+    /// Adds the list of features to the manifest, and updates the checksums.
     pub fn add_explained(&mut self, explained: &[Explained]) {
         self.manifest["features"] = json!(explained);
         self.seal();
     }
 
-    /// Brings sizes and checksums of the manifest up to date with the files ([`crate::manifest`]).
+    /// Updates sizes and checksums in the manifest from the files ([`crate::manifest`]).
     pub(crate) fn seal(&mut self) {
         let text = seal(&mut self.manifest, &self.files);
         self.files.iter_mut().filter(|file| file.name == MANIFEST).for_each(|file| file.text.clone_from(&text));
@@ -115,7 +115,7 @@ impl Generated {
 /// Generates the hardware of `model`. The same model always gives the same bytes.
 ///
 /// # Errors
-/// [`HdlError`] when the scene leaves out what this engine always has.
+/// [`HdlError::Check`] if the description fails rust-hdl's checks: a defect of this crate.
 pub fn generate(model: &Model) -> Result<Generated, HdlError> {
     let engine = design(model)?;
     let top = top_name(&model.scene.name);
@@ -140,7 +140,8 @@ pub fn generate(model: &Model) -> Result<Generated, HdlError> {
     Ok(generated)
 }
 
-/// Marks every memory of the model with where the synthesiser is to put it; the engine's modules begin with `engine`.
+/// Adds a `ram_style` attribute to the array of every memory of the model; names of the engine's modules start with
+/// `engine` after `top$`.
 pub(crate) fn place(verilog: &str, model: &Model, engine: &str) -> Result<String, HdlError> {
     let mut placed = String::with_capacity(verilog.len());
     let mut module = "";
@@ -161,8 +162,8 @@ pub(crate) fn place(verilog: &str, model: &Model, engine: &str) -> Result<String
                 (0, _) => "block",
                 _ => "huge",
             };
-            // The serial engine never reads a word in the cycle that writes it, and what the search memory reads of one is
-            // not used: no logic is needed for that.
+            // Read-during-write data is unused: the serial engine never reads a word in the cycle that writes it, and
+            // the search discards what it reads so. So no logic is needed to define it.
             let unchecked = model.board.engine == EngineKind::Serial || memory.block == SEARCH_MEMORY;
             let check = if unchecked { ", no_rw_check" } else { "" };
             placed.push_str(&format!("(* ram_style = \"{style}\"{check} *)\n"));
@@ -177,13 +178,13 @@ pub(crate) fn place(verilog: &str, model: &Model, engine: &str) -> Result<String
     }
 }
 
-/// `dermis_` and the scene's name, with everything but letters and digits as underscores.
+/// `dermis_` and the scene's name, every character except ASCII letters and digits replaced by an underscore.
 pub(crate) fn top_name(scene: &str) -> String {
     let tame = |c: char| if c.is_ascii_alphanumeric() { c } else { '_' };
     format!("dermis_{}", scene.chars().map(tame).collect::<String>())
 }
 
-/// rust-hdl calls every top module `top` and all others `top$…`.
+/// Replaces the names that rust-hdl gives, `top` and `top$…`, by those of `top`.
 pub(crate) fn rename(verilog: &str, top: &str) -> String {
     let trimmed: String = verilog.lines().map(|line| line.trim_end().to_string() + "\n").collect();
     trimmed
@@ -192,7 +193,7 @@ pub(crate) fn rename(verilog: &str, top: &str) -> String {
         .replace("endmodule // top\n", &format!("endmodule // {top}\n"))
 }
 
-/// What Verilator need not warn of.
+/// Waivers of Verilator warnings.
 fn waivers(model: &Model) -> &'static str {
     match model.board.engine {
         EngineKind::Parallel => include_str!("waivers.vlt"),
@@ -209,7 +210,7 @@ fn header(model: &Model, top: &str) -> String {
 // Generated by `dermis build {name}`; do not edit, build it again.
 //
 //   clk, rst         clock; synchronous reset, active high
-//   s_axis_tdata     [{input_end}:0], a taxel's code, signed; row-major, tlast on a frame's last
+//   s_axis_tdata     [{input_end}:0], a taxel's code, signed; row-major, tlast on the last code of a frame
 //   m_axis_tdata     [95:0], {{fz, fy, fx}} of 32 bits signed; {forces}, then {status} status beats
 //
 // {lanes} MAC lanes, degree {degree}; coefficients in {MEMORY_FILE}, one line per word of the lanes' memory.
@@ -230,14 +231,14 @@ fn header(model: &Model, top: &str) -> String {
     )
 }
 
-/// Cycles of a frame where all subarrays are searched, and where none is.
+/// Cycles of a frame of which all subarrays are searched, and of one of which none is.
 fn cycles(model: &Model) -> serde_json::Value {
     let of = |searched: bool| Cycles::of(model, &vec![searched; model.parts.len()]);
     json!({ "searched": of(true), "not_searched": of(false) })
 }
 
-/// What a reader needs of one of several cases; the choice's [`LATENCY`](dermis_golden::fixed::choose::LATENCY) is not
-/// in its cycles.
+/// Manifest entry of one of several cases; its cycles exclude the [`LATENCY`](dermis_golden::fixed::choose::LATENCY) of
+/// the choice.
 fn case(case: &Model) -> serde_json::Value {
     json!({
         "case": case.number(),
@@ -271,7 +272,7 @@ fn manifest(model: &Model, top: &str, usage: &BTreeMap<String, Usage>, dropped: 
             "force_beats": model.force_beats(),
             "resultants": model.sends_resultants(),
             "status_beats": model.status_beats(),
-            // Without a full scale a force word means this many N for each MPa of the largest code.
+            // Without a full scale, a force LSB is this many N per MPa of the largest code.
             "force_lsb_N": full_scale.map(|full_scale| model.force_lsb_N(full_scale)),
             "force_lsb_N_per_MPa": model.force_lsb_N(1.0),
             "threshold_lsb": model.threshold,

@@ -1,14 +1,22 @@
-//! Dermis in hardware: the rust-hdl description of the fixed-point pipeline.
+//! Dermis in hardware: the fixed-point pipeline as a rust-hdl description, from which the Verilog is generated.
 //!
 //! ```text
-//! codes → receive → normalise → fold → pass → rescale → unfold → search → force → send → beats, status
+//! codes → prepare → receive → normalise → fold → pass → rescale → unfold → search → force → send → beats, status
 //! ```
-//! [`engine`] wires the [`stages`] together; a stage is control and wiring in a `#[hdl_gen]` kernel around the
-//! [`primitives`] that hold arithmetic and memory. All widths come from the formats of the bit-true model, which is also
-//! what every simulation is compared with.
+//! [`engine`] connects the [`stages`], built from [`primitives`]; [`serial`] is the engine for small devices; [`link`]
+//! puts either behind a UART or an SPI. All widths come from the formats of the bit-true model.
+//!
+//! What is derived from what:
+//! - Engines, most stages and the link's top levels are `#[hdl_gen]` kernels: rust-hdl simulates them and derives their
+//!   Verilog from the same Rust. They hold single-bit control and connections.
+//! - All other blocks, which hold the arithmetic, the memories and most state machines, are written twice: a Rust
+//!   `update()` for rust-hdl's simulation, and a hand-written Verilog text (`Verilog::Custom`), which is synthesised.
+//!   Co-simulation compares both with the bit-true model: the streams between the stages word by word, the output
+//!   beats, the cycle counts.
 #![deny(missing_docs)]
 
-/// A comment that `#[hdl_gen]` copies into the Verilog; nothing in Rust.
+/// A comment that `#[hdl_gen]` copies into the Verilog; expands to nothing in Rust. One short line: rust-hdl breaks a
+/// long one.
 macro_rules! comment {
     ($text:literal) => {};
 }
@@ -32,7 +40,8 @@ mod generate;
 mod simulate;
 mod taps;
 
-// The first and the search of [`engine`]; those of [`choosing`] and [`unsearched`] are others.
+// `receive` and `search` blocks of [`engine`]; [`choosing`] and [`unsearched`] import replacements under the same
+// names.
 use stages::{Receive, Search};
 
 pub use generate::{generate, Generated, GeneratedFile, HdlError, Refused};

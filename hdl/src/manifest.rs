@@ -1,11 +1,11 @@
-//! Manifest: `manifest.json` names every generated file with its size and CRC-32, and has a CRC-32 of its own, so that
-//! a reader knows that all of it is there and nothing is cut short.
+//! `manifest.json`: size and CRC-32 of every generated file, and a CRC-32 of its own, so that a reader detects missing,
+//! truncated and changed files.
 //!
 //! | field | holds |
 //! |---|---|
-//! | `manifest_version` | of the fields' meaning; a reader refuses another one |
-//! | `files` | name to `bytes` and `crc32`, the manifest itself left out |
-//! | `checksum` | CRC-32 of the manifest without this field, as JSON with sorted keys, two spaces and a line end |
+//! | `manifest_version` | version of the fields' meaning; a reader rejects any other |
+//! | `files` | name to `bytes` and `crc32`, for all files except the manifest |
+//! | `checksum` | CRC-32 of the manifest without it, as JSON with sorted keys, two-space indent and a final newline |
 
 use std::collections::BTreeMap;
 use std::io::{Error, ErrorKind, Read};
@@ -17,64 +17,64 @@ use thiserror::Error;
 
 use crate::generate::{GeneratedFile, MANIFEST, MANIFEST_VERSION};
 
-/// Largest manifest in bytes; the largest scene's takes 30 kB.
+/// Largest manifest that is read, in bytes; the largest scene's takes 30 kB.
 const LARGEST: u64 = 4 << 20;
-/// Largest generated file in bytes; the largest scene's Verilog takes 2 MB.
+/// Largest generated file that is read, in bytes; the largest scene's Verilog takes 2 MB.
 const LARGEST_FILE: u64 = 256 << 20;
 
-/// A generated file as the manifest knows it.
+/// Size and checksum of a generated file.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct FileSum {
-    /// Its size.
+    /// Size in bytes.
     pub bytes: u64,
-    /// CRC-32 of its content.
+    /// CRC-32 of the content.
     pub crc32: u32,
 }
 
-/// A manifest that cannot be trusted, or files that are not what it says.
+/// A manifest that cannot be read or is damaged, or files that differ from it.
 #[derive(Debug, Error)]
 pub enum ManifestError {
-    /// The system cannot read a file.
+    /// Reading a file failed.
     #[error("{file}: cannot be read: {source}")]
     Unreadable {
-        /// The file.
+        /// Path of the file.
         file: String,
-        /// The system's reason.
+        /// Error of the operating system.
         source: Error,
     },
-    /// Not JSON, or not an object.
-    #[error("{file}: no manifest: {reason}")]
+    /// Not valid JSON, not an object, or a field is missing or of the wrong type.
+    #[error("{file}: not a valid manifest: {reason}")]
     Syntax {
-        /// The file.
+        /// Path of the file.
         file: String,
-        /// What is wrong.
+        /// What is wrong with it.
         reason: String,
     },
-    /// Written by another version.
+    /// Its `manifest_version` is another one.
     #[error(
         "{file}: manifest_version = {version} is not allowed; it must be {MANIFEST_VERSION}: build the scene again"
     )]
     Version {
-        /// The file.
+        /// Path of the file.
         file: String,
         /// The value found.
         version: Value,
     },
-    /// Cut short or changed.
+    /// Truncated or changed.
     #[error("{file}: {field} = {says}, its content has {has}: it is damaged; build the scene again")]
     Damaged {
-        /// The file.
+        /// Path of the file.
         file: String,
-        /// What differs.
+        /// Field of the manifest that differs: `checksum`, `bytes` or `crc32`.
         field: &'static str,
-        /// What the manifest says.
+        /// Value in the manifest.
         says: u64,
-        /// What is there.
+        /// Value of the actual content.
         has: u64,
     },
 }
 
-/// Adds the sums of all other files, and the manifest's own, to `manifest`; returns its text.
+/// Adds `files` and `checksum` to `manifest`; returns its text.
 pub(crate) fn seal(manifest: &mut Value, files: &[GeneratedFile]) -> String {
     let others = files.iter().filter(|file| file.name != MANIFEST);
     let sums: BTreeMap<&str, FileSum> = others.map(|file| (file.name.as_str(), sum(file.text.as_bytes()))).collect();
@@ -83,14 +83,14 @@ pub(crate) fn seal(manifest: &mut Value, files: &[GeneratedFile]) -> String {
     text(manifest)
 }
 
-/// Reads a manifest's text and checks version and checksum; `file` names it in errors.
+/// Parses a manifest's text and checks version and checksum; `file` names it in errors.
 ///
 /// # Errors
-/// Every [`ManifestError`] but `Unreadable`.
+/// Every [`ManifestError`] except `Unreadable`.
 pub fn parse(text: &str, file: &str) -> Result<Value, ManifestError> {
     let syntax = |reason: String| ManifestError::Syntax { file: file.to_owned(), reason };
     if !text.ends_with('\n') {
-        return Err(syntax("cut short: the last line has no end".to_owned()));
+        return Err(syntax("truncated: the last line has no end".to_owned()));
     }
     let manifest: Value = serde_json::from_str(text).map_err(|error| syntax(error.to_string()))?;
     if !manifest.is_object() {
@@ -106,10 +106,10 @@ pub fn parse(text: &str, file: &str) -> Result<Value, ManifestError> {
     }
 }
 
-/// Reads the manifest of a folder and checks it and every file it names; returns how many these are.
+/// Checks the manifest in `folder` and every file it lists; returns the number of files.
 ///
 /// # Errors
-/// [`ManifestError`]; the first file that is missing or differs.
+/// [`ManifestError`] for the first file that is missing or differs.
 pub fn check(folder: &Path) -> Result<usize, ManifestError> {
     let path = folder.join(MANIFEST);
     let file = path.display().to_string();
@@ -121,7 +121,7 @@ pub fn check(folder: &Path) -> Result<usize, ManifestError> {
     let files: BTreeMap<String, FileSum> = serde_json::from_value(manifest["files"].clone())
         .map_err(|error| ManifestError::Syntax { file: file.clone(), reason: format!("files: {error}") })?;
     for (name, says) in &files {
-        // Nothing outside the folder is read, whoever wrote the manifest.
+        // A manifest from elsewhere must not name files outside the folder.
         if Path::new(name).file_name() != Some(name.as_ref()) {
             return Err(ManifestError::Syntax { file, reason: format!("files: {name:?} is not the name of a file") });
         }
@@ -139,7 +139,7 @@ pub fn check(folder: &Path) -> Result<usize, ManifestError> {
     Ok(files.len())
 }
 
-/// A file's first `most` bytes: no file takes more memory than the manifest says.
+/// The first `most` bytes of a file, so that a wrong file cannot exhaust the memory.
 fn read(path: &Path, most: u64) -> Result<Vec<u8>, ManifestError> {
     let mut bytes = Vec::new();
     let read = std::fs::File::open(path).and_then(|file| file.take(most).read_to_end(&mut bytes));
@@ -153,7 +153,7 @@ fn sum(bytes: &[u8]) -> FileSum {
     FileSum { bytes: bytes.len() as u64, crc32: crc32fast::hash(bytes) }
 }
 
-/// CRC-32 of everything but the checksum.
+/// CRC-32 of the manifest without its `checksum` field.
 fn own_sum(manifest: &Value) -> u32 {
     let mut rest = manifest.clone();
     if let Some(fields) = rest.as_object_mut() {

@@ -11,10 +11,10 @@ use crate::taps::{taps, SEARCH_FIELD};
 use crate::wire::Word;
 use crate::{choosing, engine, serial, unsearched};
 
-/// Update rounds after which signals that still change are taken for a combinational loop.
+/// Update rounds after which signals that still change count as a combinational loop.
 const SETTLE_ROUNDS: usize = 200;
 
-/// Updates a block until no signal changes; whether that comes to an end.
+/// Updates a block until no signal changes; `false` if it does not settle.
 pub(crate) fn settles(block: &mut (impl Block + ?Sized)) -> bool {
     (0..SETTLE_ROUNDS).any(|_| {
         block.update_all();
@@ -22,15 +22,15 @@ pub(crate) fn settles(block: &mut (impl Block + ?Sized)) -> bool {
     })
 }
 
-/// What every engine does in a simulation and in generation, whatever its stages.
+/// Operations on an engine that simulation and generation need, the same for all engines.
 pub(crate) trait Design: Block {
-    /// Puts the inputs and the clock on the pins.
+    /// Applies `inputs` and the clock level to the pins.
     fn drive(&mut self, inputs: &Inputs, clock: bool);
-    /// The outputs, and the stages' streams in the order of their taps.
+    /// Samples the output pins and the word of each of `taps`.
     fn observe(&self, taps: &[Tap]) -> Outputs;
-    /// The Verilog.
+    /// The Verilog of the engine, top module `top`.
     fn verilog(&self) -> String;
-    /// Memory files beside the Verilog: name and text.
+    /// Memory files read by the Verilog: name and text.
     fn memory_files(&self) -> Vec<(&'static str, String)>;
 }
 
@@ -74,7 +74,7 @@ macro_rules! design {
     };
 }
 
-/// The outputs of a search as its tap shows them.
+/// The word of the search's tap.
 macro_rules! best {
     ($search:expr) => {
         Word::of_fields(
@@ -89,7 +89,7 @@ macro_rules! best {
     };
 }
 
-/// The streams and the files of an engine whose stages stand side by side.
+/// Taps and memory files of a parallel engine.
 macro_rules! side_by_side {
     ($engine:ty) => {
         design!(
@@ -133,7 +133,7 @@ design!(
     |engine: &serial::Engine| engine.pass.memory_files()
 );
 
-/// The engine of `model`, checked.
+/// The engine of `model`, after rust-hdl's checks.
 pub(crate) fn design(model: &Model) -> Result<Box<dyn Design>, HdlError> {
     let design: Box<dyn Design> = match (model.searches(), model.chooses()) {
         _ if model.board.engine == EngineKind::Serial => checked(serial::Engine::new(model))?,
@@ -154,7 +154,7 @@ struct Simulator {
     taps: Vec<Tap>,
 }
 
-/// The engine of `model` in rust-hdl's simulation, clocked directly.
+/// The engine of `model` in rust-hdl's simulation; each cycle settles the signals with the clock low, then high.
 ///
 /// # Errors
 /// As [`crate::generate`].

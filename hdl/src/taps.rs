@@ -1,4 +1,4 @@
-//! The streams between the stages, as a test bench sees them.
+//! The observed streams between the stages: names, Verilog expressions and word formats.
 
 use dermis_golden::board::EngineKind;
 use dermis_golden::fixed::formats::FORCE_BITS;
@@ -7,13 +7,14 @@ use dermis_golden::fixed::Model;
 use crate::device::Tap;
 use crate::primitives::{count_bits, position_bits};
 
-/// Field width of the search's tap, whose fields have different widths in hardware.
+/// Field width of the search's tap, in bits: its fields have different widths in hardware and are sign-extended to
+/// this.
 pub const SEARCH_FIELD: u32 = 32;
 
-/// Field width of the choice's tap: an index of a case, and a sign.
+/// Field width of the tap of `choose`, in bits: the index of a case, and a sign bit.
 const CHOICE_FIELD: u32 = 3;
 
-/// Names, Verilog expressions and shapes, in pipeline order.
+/// The taps of the engine of `model`, in pipeline order.
 pub fn taps(model: &Model) -> Vec<Tap> {
     let serial = model.board.engine == EngineKind::Serial;
     let block = if serial { "walk" } else { "search" };

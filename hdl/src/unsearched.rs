@@ -1,6 +1,6 @@
-//! The engine of a scene without a search: the same description, with [`Unsearched`](crate::stages::Unsearched) in the
-//! place of the search. rust-hdl has no optional blocks, so the file is read twice; what it calls `Search` is the
-//! module's.
+//! The engine of a scene without a search: [`engine`](crate::engine) with [`Unsearched`](crate::stages::Unsearched) in
+//! place of `Search`. rust-hdl has no optional blocks, so the file `engine.rs` is compiled again with another import of
+//! that name.
 
 use crate::stages::{Receive, Unsearched as Search};
 

@@ -1,5 +1,4 @@
-//! What a generated design takes of its device, stage by stage: block RAMs and multipliers exactly, logic as an
-//! estimate.
+//! Resources of a generated design by stage: block RAMs and multipliers exact, flip-flops and LUTs estimated.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -10,10 +9,11 @@ use serde::Serialize;
 
 use crate::estimate::modules;
 
-/// Words, bits and LUTs of a distributed RAM cell of the ECP5.
+/// A distributed RAM cell of the ECP5: words, bits per word, LUTs.
 const CELL: [usize; 3] = [16, 4, 6];
 
-/// The stages in the order of the pipeline, by their names in the hardware; what belongs to none is the engine's.
+/// Instance names of the stages, in pipeline order: parallel engine, then serial engine. Blocks outside any stage count
+/// as `engine`.
 pub const STAGES: [&str; 27] = [
     "prepare",
     "receive",
@@ -53,17 +53,17 @@ pub struct Usage {
     pub multipliers: usize,
     /// Flip-flops, estimated.
     pub flip_flops: usize,
-    /// Look-up tables with four inputs, those of carry chains and distributed RAM included, estimated.
+    /// Four-input LUTs including carry chains and distributed RAM, estimated.
     pub luts: usize,
 }
 
 impl Usage {
-    /// Block RAMs, multipliers, flip-flops and LUTs, in the order of tables.
+    /// Block RAMs, multipliers, flip-flops, LUTs.
     pub fn counts(&self) -> [usize; 4] {
         [self.block_rams, self.multipliers, self.flip_flops, self.luts]
     }
 
-    /// The same over what a board has, in %.
+    /// The same counts as shares of what `board` has, in %.
     pub fn shares(&self, board: &Board) -> [f64; 4] {
         let has = [board.block_rams, board.multipliers, board.flip_flops, board.luts];
         let counts = self.counts();
@@ -80,12 +80,12 @@ impl std::ops::AddAssign for Usage {
     }
 }
 
-/// The stage that a block belongs to, whose name's parts are separated by `$`.
+/// The stage of the block with instance path `block`, separated by `$`; `engine` if it belongs to none.
 pub fn stage(block: &str) -> &str {
     block.split('$').next().filter(|stage| STAGES.contains(stage)).unwrap_or("engine")
 }
 
-/// Usage of each stage by its name in the hardware, what belongs to none under `engine`.
+/// Usage of each stage by its instance name; blocks outside any stage under `engine`.
 pub fn stages(model: &Model, verilog: &str) -> BTreeMap<String, Usage> {
     let mut all: BTreeMap<String, Usage> = BTreeMap::new();
     let mut add = |block: &str, usage: Usage| {

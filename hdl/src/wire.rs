@@ -1,9 +1,9 @@
 //! Signals whose width the scene decides.
 //!
-//! rust-hdl's `Signal<D, Bits<N>>` fixes N at compile time, but here a scene file read at run time
-//! decides every width. [`Wire`] is a rust-hdl atom like `Signal`, usable in `#[hdl_gen]` kernels, in
-//! the checks, in Verilog generation and in waveforms, that carries its width as a value. Its content is a
-//! [`Word`], a plain bit vector; signedness belongs to the primitives that compute with it.
+//! rust-hdl's `Signal<D, Bits<N>>` fixes N at compile time, but here a scene file read at run time decides every width.
+//! [`Wire`] is a rust-hdl atom like `Signal`, usable in `#[hdl_gen]` kernels, checks, Verilog generation and waveforms,
+//! that carries its width as a value. Its content is a [`Word`], a plain bit vector; the primitives decide whether it
+//! is signed.
 
 use std::marker::PhantomData;
 
@@ -12,7 +12,7 @@ use rust_hdl::prelude::*;
 /// 64-bit limbs in a [`Word`].
 const LIMBS: usize = 20;
 
-/// Widest wire: 1280 bits, a quad of cubic polynomials with room to spare.
+/// Widest wire: 1280 bits, more than a quad of cubic polynomials takes.
 pub const MAX_BITS: usize = 64 * LIMBS;
 
 /// A bit vector, least significant bit first. Bits beyond a wire's width are zero.
@@ -75,7 +75,7 @@ impl Word {
         }
     }
 
-    /// The low `bits` bits the other way round.
+    /// The word with its low `bits` bits inverted.
     pub fn complement(&self, bits: usize) -> Self {
         let mut word = *self;
         for offset in (0..bits).step_by(64) {
@@ -85,7 +85,7 @@ impl Word {
         word
     }
 
-    /// A word of signed fields, field 0 in the least significant bits, each cut to `bits` bits.
+    /// A word of signed fields, field 0 in the least significant bits, each truncated to `bits` bits.
     pub fn of_fields(fields: &[i64], bits: usize) -> Self {
         let mut word = Word::default();
         for (index, &field) in fields.iter().enumerate() {
@@ -94,7 +94,7 @@ impl Word {
         word
     }
 
-    /// The word's low 64 bits as a number.
+    /// The low 64 bits as an unsigned number.
     pub fn number(&self) -> u64 {
         self.0[0]
     }
@@ -114,7 +114,10 @@ pub struct Wire<D: Direction> {
 }
 
 impl<D: Direction> Wire<D> {
-    /// A wire of `bits` bits, at least one.
+    /// A wire of `bits` bits, 1..=[`MAX_BITS`].
+    ///
+    /// # Panics
+    /// If `bits` is outside this range: a defect of the caller.
     pub fn new(bits: usize) -> Self {
         assert!((1..=MAX_BITS).contains(&bits), "a wire of {bits} bits");
         Wire {
@@ -128,12 +131,12 @@ impl<D: Direction> Wire<D> {
         }
     }
 
-    /// The present value.
+    /// The current value.
     pub fn val(&self) -> Word {
         self.value
     }
 
-    /// The width.
+    /// The width in bits.
     pub fn width(&self) -> usize {
         self.bits
     }
@@ -187,7 +190,7 @@ impl<D: Direction> Atom for Wire<D> {
     }
 
     fn vcd(&self) -> VCDValue {
-        // Most significant bit first, as VCD wants it.
+        // VCD is most significant bit first.
         let bit = |at| if self.value.field(at, 1) == 1 { vcd::Value::V1 } else { vcd::Value::V0 };
         VCDValue::Vector((0..self.bits).rev().map(bit).collect())
     }
@@ -197,7 +200,7 @@ impl<D: Direction> Atom for Wire<D> {
     }
 
     fn verilog(&self) -> VerilogLiteral {
-        // Only constants print their value, and a wire never is one.
+        // rust-hdl prints this value for constants only; a wire is never constant.
         self.value.number().into()
     }
 

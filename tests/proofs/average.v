@@ -1,4 +1,5 @@
-// Of two frames as many sums leave as there are taxels, tlast on the last; none leaves before its second word came.
+// For two frames of input, one sum leaves per taxel, the last with tlast; none leaves before its second word was
+// accepted.
 module proof(
   input clk, input again, input [@BITS@-1:0] s_data, input s_valid, input m_ready
 );

@@ -1,4 +1,4 @@
-// Each beat that `calibrate` takes leaves once, in order, as code - zero held to its range.
+// Each beat that calibrate accepts leaves once, in order, as code - zero, saturated.
 module proof(
   input clk, input again, input [@BITS@-1:0] s_data, input s_valid, input s_last, input m_ready,
   input pick
@@ -13,7 +13,7 @@ module proof(
     .s_axis_tdata(s_data), .s_axis_tvalid(s_valid), .s_axis_tready(s_ready), .s_axis_tlast(s_last),
     .m_axis_tdata(m_data), .m_axis_tvalid(m_valid), .m_axis_tready(m_ready), .m_axis_tlast(m_last)
   );
-  // One beat, picked by whoever would break this, is followed: `ahead` others leave before it.
+  // Any one beat, selected by the free input pick, is tracked: ahead others leave before it.
   reg [1:0] inside, ahead;
   reg followed;
   reg [2:0] taxel;
@@ -33,7 +33,7 @@ module proof(
   always @(posedge clk) begin
     if (rst) {taxel, inside, ahead, followed} <= 8'd0;
     else begin
-      // Nothing is lost and nothing invented: as many leave as came.
+      // As many beats leave as were accepted.
       assert (inside <= 2'd2 && (inside != 2'd0 || !m_valid));
       assert (inside != 2'd2 || m_valid);
       inside <= inside + takes - gives;

@@ -1,4 +1,4 @@
-// A counter stays below its limit and tells its last value.
+// A counter stays below its limit, and last is high exactly at its last value.
 module proof(input clk, input clear, input enable);
   reg started = 1'b0;
   always @(posedge clk) started <= 1'b1;

@@ -1,12 +1,12 @@
-// What the feeder offers stays until it is taken and stays the same, also when its packet turns out bad; and the engine
-// gets a whole frame for each packet taken, and for no other.
+// A beat offered by the feeder stays, unchanged, until it is accepted, even if its packet turns out bad; the engine
+// gets a whole frame for each packet with taken, and for no other.
 module proof(
   input clk, input again, input begins, input pays, input [7:0] content, input ends, input sound, input ready
 );
   reg started = 1'b0;
   always @(posedge clk) started <= 1'b1;
   wire rst = again || !started;
-  // What the parser gives: of each packet at most a frame's bytes, and a good end only after all of them.
+  // Assumed of the parser: at most a frame's bytes per packet, and good only after all of them.
   reg within;
   reg [4:0] bytes;
   wire frame_begin = begins && !within;
@@ -22,7 +22,7 @@ module proof(
   );
   reg followed = 1'b0, waits, last_before;
   reg [@BITS@-1:0] before;
-  // Where the engine is in its frame, and whether a packet was taken whose frame it has not got yet.
+  // The engine's position in its frame, and whether it has still to get the whole frame of a packet with taken.
   reg [4:0] taxel;
   reg owed;
   wire ends_whole = taxel == 5'd@LAST@;

@@ -1,5 +1,5 @@
-// The quads of the operand vectors are kept at 0, 1, 2 … of their memory, none beyond its end, and as many vectors are
-// complete as have all their quads.
+// The quads of the operand vectors are written to addresses 0, 1, 2 … of their memory, none beyond its end, and
+// finished counts the vectors with all their quads.
 module proof(input clk, input again, input valid);
   reg started = 1'b0;
   always @(posedge clk) started <= 1'b1;

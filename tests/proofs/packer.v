@@ -1,5 +1,5 @@
-// A packet is a border, the header's four bytes, twelve bytes of each word taken, four of the CRC, a border; each is
-// offered as soon as it can be, and what is offered stays; a word's bytes go in order, and it is taken with the last.
+// A packet is an END, four bytes of header, twelve bytes of each word, four of CRC, an END. Each is offered as early as
+// possible and stays until it is accepted; the bytes of a word leave in order, and taken comes with the last.
 module proof(
   input clk, input again, input offer, input [7:0] number, input [1:0] from, input [11:0] word_bits,
   input word_valid, input word_last, input [7:0] crc_low, input crc_busy, input ready
@@ -11,7 +11,7 @@ module proof(
   wire [1:0] source;
   wire [3:0] index;
   wire [7:0] crc_octet, content;
-  // The word that stands until it is taken; one bit stands for the eight of its byte, which go the same way.
+  // The word, stable until taken; one bit represents the eight of its byte, which take the same path.
   reg [11:0] word;
   reg last;
   always @(posedge clk) if (rst || begun || taken) {word, last} <= {word_bits, word_last};
@@ -21,7 +21,7 @@ module proof(
     .halfway(halfway), .crc_restart(crc_restart), .crc_octet(crc_octet), .crc_load(crc_load), .crc_low(crc_low),
     .crc_busy(crc_busy), .content(content), .border(border), .valid(valid), .ready(ready)
   );
-  // What a receiver expects: the parts in their order, and which byte of this one.
+  // Expected by a receiver: the parts in order, and the byte of the current part.
   localparam NONE = 3'd0, OPEN = 3'd1, HEADER = 3'd2, WORD = 3'd3, CHECK = 3'd4, CLOSE = 3'd5;
   reg [2:0] part;
   reg [3:0] at;

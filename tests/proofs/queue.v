@@ -1,13 +1,12 @@
-// Beats that are reserved where there is room leave once each, two cycles after they are written or when those before them
-// have left, in their order and as they are, and stay until they are taken. What has left makes room. Bit @BIT@ stands for
-// the others.
+// Each beat reserved with room leaves once, two cycles after it was written or when those before it have left, in order
+// and unchanged, and stays until it is accepted; then its place is free again. Bit @BIT@ represents all data bits.
 module proof(input clk, input again, input wants, input comes, input sample, input takes, input pick);
   reg started = 1'b0;
   always @(posedge clk) started <= 1'b1;
   wire rst = again || !started;
   wire room, m_valid, m_last;
   wire [95:0] m_data;
-  // Beats reserved and not taken, those of them not yet written; beats written, and put on the output.
+  // Beats reserved and not accepted, those of them not yet written; beats written, and moved to the output.
   reg [4:0] reserved, promised, written, put;
   wire reserve = wants && room;
   wire write = comes && promised != 5'd0;
@@ -18,7 +17,7 @@ module proof(input clk, input again, input wants, input comes, input sample, inp
     .clk(clk), .rst(rst), .reserve(reserve), .room(room), .write(write), .last(!sample), .word({96{sample}}),
     .m_axis_tvalid(m_valid), .m_axis_tready(takes), .m_axis_tlast(m_last), .m_axis_tdata(m_data)
   );
-  // Any one beat is followed on its way: it waits, it stands on the output, it is gone.
+  // Any one beat is tracked: in the queue, on the output, accepted.
   reg waits, stands, gone, level;
   reg [4:0] number;
   wire [4:0] before = number - put;

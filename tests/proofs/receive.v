@@ -1,5 +1,5 @@
-// A frame is whole after as many beats as there are taxels, stands in the buffer where it belongs until it is freed, and
-// an early or missing tlast is told of.
+// A frame is complete after one beat per taxel, each code is at its address in the buffer until free, and an early or
+// missing tlast sets framing.
 module proof(
   input clk, input again, input [@BITS@-1:0] s_data, input s_valid, input s_last, input release_it, input reported
 );
@@ -10,7 +10,7 @@ module proof(
   wire [@BITS@-2:0] magnitude;
   wire [@BITS@-1:0] taken_word;
   wire [4*@BITS@-1:0] quad;
-  // Any place of the frame buffer, and the taxel that belongs there.
+  // Any address and lane of the frame buffer, and the taxel that belongs there.
   (* anyconst *) reg [@ADDRESS@-1:0] address;
   (* anyconst *) reg [1:0] lane;
   reg [7:0] own;
@@ -38,10 +38,10 @@ module proof(
     else begin
       assert (s_ready == !whole && full == (whole && whole_before) && accept == takes && framing == broken);
       assert (count <= 8'd@LAST@);
-      // A code is written a cycle after it was taken.
+      // A code is written one cycle after it was accepted.
       if (whole && whole_before && whole_earlier && whole_earliest)
         assert (own == 8'd255 || quad[lane * @BITS@ +: @BITS@] == kept);
-      // Only what stands in the buffer is counted as loaded.
+      // positive and negative reflect the codes in the buffer.
       if (full && own != 8'd255 && $signed(kept) > 0) assert (positive);
       if (full && own != 8'd255 && $signed(kept) < 0) assert (negative);
       if (whole && free) whole <= 1'b0;

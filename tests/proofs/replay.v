@@ -1,7 +1,7 @@
-// The rows of v_00 wait until the last of them is measured, then each comes out once, in order, by the measured shift;
-// later rows go through by the constant one. No row is lost, and none stays behind.
+// The rows of v_00 wait until the last of them has been measured, then each leaves once, in order, with the measured
+// shift; later rows leave with the constant one. No row is lost or delayed further.
 module proof(input clk, input again, input begin_it, input offered, input sample);
-  // One bit stands for all that go the same way.
+  // One bit represents all bits, which take the same path.
   wire [4*@ACC@-1:0] quad = {4*@ACC@{sample}};
   localparam ROWS = 8'd@ROWS@;
   reg started = 1'b0;
@@ -11,8 +11,8 @@ module proof(input clk, input again, input begin_it, input offered, input sample
   (* anyconst *) reg [7:0] row;
   reg within, began;
   reg [7:0] came, went, since;
-  // What the engine keeps to: no frame begins before the last one's rows are out, no row comes as early as a cycle after
-  // that, no later row before v_00 is out.
+  // Assumed of the engine: no frame starts before the previous one's rows have left, no row arrives in the cycle after
+  // the start, no later row before all of v_00 has left.
   wire start = begin_it && came == went;
   wire quad_valid = offered && within && !start && !began && (came < ROWS || (went >= ROWS && came < ROWS + 8'd3));
   wire [4*@WORD@-1:0] words;
@@ -34,7 +34,7 @@ module proof(input clk, input again, input begin_it, input offered, input sample
     else begin
       assert (went <= came && (came != went || !words_valid));
       assert (operands_valid == words_before);
-      // Rows of v_00 wait for the last of them, no longer.
+      // Rows of v_00 wait for the last of them and no longer.
       assert (came == went || (came < ROWS && went == 8'd0) || since <= ROWS + 8'd6);
       if (words_valid && went == row) assert (words == {4*@WORD@{kept}});
       if (quad_valid && came == row) kept <= sample;
@@ -48,7 +48,7 @@ module proof(input clk, input again, input begin_it, input offered, input sample
   end
 endmodule
 
-// In the place of the arithmetic, which has its own proof: the accumulators themselves, as late as their words.
+// Replaces the arithmetic, which has its own proof: passes the accumulators on with the latency of the words.
 module @TOP@$rescale$rescaler(
   input clk, input clear, input valid, input measured, input [@SHIFTS@-1:0] shift, input [4*@ACC@-1:0] quad,
   output reg [4*@WORD@-1:0] words, output [4*@DATA@-1:0] operands, output [15:0] saturations

@@ -1,5 +1,5 @@
-// A word is its accumulator over 2^shift, rounded half up and held to its range; an operand the same of its word; and
-// the words held are counted, up to the counter's end.
+// A word is its accumulator / 2^shift, rounded half up and saturated; an operand likewise of its word; saturated words
+// are counted, up to the counter's end.
 module proof(input clk, input clear, input valid, input measured, input [@SHIFTS@-1:0] shift, input [4*@ACC@-1:0] quad);
   wire [4*@WORD@-1:0] words;
   wire [4*@DATA@-1:0] operands;
@@ -10,7 +10,7 @@ module proof(input clk, input clear, input valid, input measured, input [@SHIFTS
   );
   localparam signed [@ACC@+1:0] MOST = (1 << (@WORD@ - 1)) - 1;
   localparam signed [@WORD@+1:0] MOST_OPERAND = (1 << (@DATA@ - 1)) - 1;
-  // What came in a cycle before.
+  // Inputs of the previous cycle.
   reg [@SHIFTS@-1:0] amount;
   reg [4*@ACC@-1:0] came;
   reg comes;
@@ -26,7 +26,7 @@ module proof(input clk, input clear, input valid, input measured, input [@SHIFTS
   generate
     for (l = 0; l < 4; l = l + 1) begin : lane
       wire signed [@ACC@:0] acc = {came[l * @ACC@ + @ACC@ - 1], came[l * @ACC@ +: @ACC@]};
-      // The quotient rounded down, and the bit that says whether a half or more was left.
+      // The quotient rounded down, and the bit that is set if the remainder is a half or more.
       wire signed [@ACC@:0] floor = acc >>> amount;
       wire [@ACC@:0] below = acc >>> (amount - 1);
       reg signed [@ACC@+1:0] rounded;

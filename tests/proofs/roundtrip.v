@@ -1,5 +1,5 @@
-// What the encoder makes of bytes and borders, the decoder makes bytes and ends of again, one for one, and calls
-// nothing spoiled, whatever IDLE bytes come in between.
+// The decoder returns every byte and every END that the encoder was given, one for one and without spoiled, with any
+// IDLE bytes in between.
 module proof(input clk, input again, input [7:0] content, input border, input offered, input taken, input idle);
   reg started = 1'b0;
   always @(posedge clk) started <= 1'b1;
@@ -22,7 +22,7 @@ module proof(input clk, input again, input [7:0] content, input border, input of
     {before, border_before} <= {content, border};
     if (waits) assume (offered && content == before && border == border_before);
     if (started) begin
-      // The encoder says that a byte is taken when the decoder has it.
+      // content_ready of the encoder coincides with the output of the decoder.
       assert (read_valid == (content_ready && !border));
       assert (packet_end == (content_ready && border));
       assert (!read_valid || read == content);

@@ -1,10 +1,10 @@
-// From its start to its tlast a frame has all its forces and status beats, each promised to the queue where there is room,
-// and none comes outside a frame. What the force unit multiplies is left open.
+// From its start to its tlast a frame has all its forces and status beats, each reserved in the queue with room, and no
+// beat leaves outside a frame. The products of the force unit are unconstrained.
 module @TOP@$forces$leaving(
   input clk, input rst, input reserve, output room, input write, input last, input [95:0] word,
   output reg m_axis_tvalid, input m_axis_tready, output reg m_axis_tlast, output [95:0] m_axis_tdata
 );
-  // In place of the queue: there is room whenever it pleases the prover, and a beat leaves at once.
+  // Replaces the queue: room is a free input of the prover, and a beat leaves at once.
   assign room = m_axis_tready;
   assign m_axis_tdata = word;
   always @(posedge clk) {m_axis_tvalid, m_axis_tlast} <= rst ? 2'd0 : {write, write && last};
@@ -22,7 +22,7 @@ module proof(
   wire [@ADDRESS@-1:0] address;
   wire [95:0] m_data;
   reg within, ended;
-  // The engine starts a frame when the last one is out.
+  // Assumed of the engine: a frame starts when the previous one has been sent.
   wire begins = start_it && !within;
   @TOP@$send send(
     .clk(clk), .rst(rst), .start(begins), .room(may), .m_axis_tvalid(m_valid), .m_axis_tready(1'b1),
@@ -33,7 +33,7 @@ module proof(
     .part(1'b0), .room(may), .offer(offer), .beat(beat), .beat_part(part), .address(address), .lane(lane),
     .saturations(saturations), .m_axis_tvalid(m_valid), .m_axis_tready(room), .m_axis_tlast(m_last), .m_axis_tdata(m_data)
   );
-  // How many beats were asked for; whether one was in the cycles before, and which.
+  // Number of beats requested; whether one was requested in each of the previous cycles, and which.
   reg [7:0] asked;
   reg [@STEPS@:0] asks;
   reg [7:0] which [0:@STEPS@];

@@ -1,4 +1,5 @@
-// Each byte of a packet goes out once, as itself or as two that are neither END nor IDLE, and what is offered stays.
+// Each byte of a packet is sent once, as itself or as two bytes that are neither END nor IDLE, and an offered byte
+// stays until it is accepted.
 module proof(input clk, input again, input [7:0] content, input border, input offered, input ready);
   reg started = 1'b0;
   always @(posedge clk) started <= 1'b1;
@@ -22,7 +23,7 @@ module proof(input clk, input again, input [7:0] content, input border, input of
       if (content_waits) assume (offered && content == content_before && border == border_before);
       if (waits) assert (valid && data == before);
     end
-    // What a receiver makes of it.
+    // Decoding, as a receiver does it.
     if (rst) escaped <= 1'b0;
     else begin
       if (valid && border) assert (data == 8'hC0 && !escaped);
@@ -31,7 +32,7 @@ module proof(input clk, input again, input [7:0] content, input border, input of
       if (valid && ready) escaped <= !border && data == 8'hDB;
       if (whole && !border)
         assert (content == (!escaped ? data : data == 8'hDC ? 8'hC0 : data == 8'hDD ? 8'hDB : data == 8'hDF ? 8'hDE : 8'h00));
-      // It is taken a cycle later, and not offered to the wire meanwhile.
+      // content_ready comes one cycle after the last byte, and no byte is offered in that cycle.
       if (followed) assert (content_ready == whole_before);
       if (followed && whole_before) assert (!valid);
     end

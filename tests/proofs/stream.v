@@ -1,4 +1,4 @@
-// A block between two streams: what it offers stays until it is taken, and stays the same.
+// A block between two streams: an offered beat stays, unchanged, until it is accepted.
 module proof(
   input clk, input again, input [@IN@-1:0] s_data, input s_valid, input s_last, input m_ready
 );
@@ -12,7 +12,7 @@ module proof(
     .s_axis_tdata(s_data), .s_axis_tvalid(s_valid), .s_axis_tready(s_ready), .s_axis_tlast(s_last),
     .m_axis_tdata(m_data), .m_axis_tvalid(m_valid), .m_axis_tready(m_ready), .m_axis_tlast(m_last)
   );
-  // The cycle before, as seen at the last clock edge.
+  // Values of the previous cycle.
   reg followed = 1'b0, s_waits, m_waits, s_last_before, m_last_before;
   reg [@IN@-1:0] s_before;
   reg [@OUT@-1:0] m_before;

@@ -1,26 +1,27 @@
-// Beats of the engine pass as words, each once and as it is, taken two cycles after its word is; where sums are asked for,
-// the forces' beats are taken first, then come four words, each of which stands until it is taken, then the status passes.
+// Beats of the engine pass as words, each once and unchanged, accepted two cycles after its word. With summarise, the
+// beats with forces are accepted first, then four words follow, each stable until it is accepted, then the status
+// passes.
 module proof(input clk, input again, input run, input offer, input sample, input takes);
   reg started = 1'b0;
   always @(posedge clk) started <= 1'b1;
   wire rst = again || !started;
   (* anyconst *) reg summarise;
-  // Beats of the frame that were taken, words of its sums that were, cycles since.
+  // Beats of the frame accepted, words of its sums accepted, cycles since then.
   reg [7:0] taken, words, since;
   reg stands;
   wire last = taken == 8'd@LAST@;
   wire summing = summarise && taken < 8'd@TAXELS@;
   wire gives = summarise && taken == 8'd@TAXELS@ && words < 8'd4;
   wire ready, word_valid, word_last;
-  // The engine keeps what it offers until it is taken.
+  // Assumed of the engine: an offered beat stays until it is accepted.
   reg holds, held;
   wire offered = holds || offer;
   wire level = holds ? held : sample;
-  // What `ready` must be.
+  // Expected value of ready.
   reg granted;
   wire [95:0] word;
   reg [95:0] before;
-  // The packer, which gives the word's last byte to the CRC, takes no word a cycle after the last one.
+  // Assumed of the packer: no word is accepted in the cycle after one, while the CRC processes its last byte.
   reg moved;
   wire moves = word_valid && takes && !moved;
   @BLOCK@ block(

@@ -1,4 +1,4 @@
-//! A board: an engine behind its link.
+//! A board's top module: an engine behind its link.
 
 use dermis_golden::fixed::Model;
 use dermis_golden::link::{Identity, LinkError};
@@ -7,8 +7,9 @@ use rust_hdl::prelude::*;
 use super::{Board, BoardOutputs, Lamps, PacketLink, PowerOn, Shape, SpiSlave, Uart};
 use crate::{engine, serial};
 
-/// The board of an engine and of a link's block, which `$line` makes for an identity: rust-hdl connects blocks by their
-/// fields, so that type parameters cannot stand for them. The pins have the names that they have in the link's block.
+/// Board top `$name` with engine `$engine` and link block `$block`, which `$line` builds from an identity. A macro,
+/// because rust-hdl connects blocks by their fields and does not support type parameters for them. The pins are named
+/// as in the link block.
 macro_rules! board_top {
     ($name:ident, $engine:ty, $block:ty, $line:expr, [$($input:ident),+] -> $output:ident) => {
         /// ```text
@@ -19,30 +20,30 @@ macro_rules! board_top {
         /// ```
         /// | port | meaning |
         /// |---|---|
-        /// | `clk` | the engine's clock |
-        /// | `button` | reset as long as it is high; needs no debouncing |
+        /// | `clk` | clock of link and engine |
+        /// | `button` | reset while high; needs no debouncing |
         #[doc = concat!("| ", $("`", stringify!($input), "`, ",)+ "`", stringify!($output), "` | pins of the link |")]
-        /// | `alive`, `busy`, `error` | lamps |
+        /// | `alive`, `busy`, `error` | status LEDs, high when lit |
         #[derive(LogicBlock)]
         pub struct $name {
-            /// Clock.
+            /// Clock of link and engine.
             pub clk: Signal<In, Clock>,
-            /// Reset, asynchronous to the clock.
+            /// Reset button, high when pressed; asynchronous to the clock.
             pub button: Signal<In, Bit>,
             $(
-                /// From the host, asynchronous to the clock.
+                /// Input pin of the link, asynchronous to the clock.
                 pub $input: Signal<In, Bit>,
             )+
-            /// To the host.
+            /// Output pin of the link.
             pub $output: Signal<Out, Bit>,
-            /// Blinks while the clock runs.
+            /// Status LED: blinks while the clock runs.
             pub alive: Signal<Out, Bit>,
-            /// Lit while something comes, is computed or goes.
+            /// Status LED: lit while a packet is received, computed or sent.
             pub busy: Signal<Out, Bit>,
-            /// Lit for a moment when a packet is dropped.
+            /// Status LED: lit briefly when a packet is dropped.
             pub error: Signal<Out, Bit>,
             power_on: PowerOn,
-            // The engine is large: its reset has a register of its own, which may lie far from the button.
+            // Registered once more, because the engine is large and its reset has a long route.
             engine_rst: DFF<Bit>,
             line: $block,
             link: PacketLink,
@@ -51,7 +52,7 @@ macro_rules! board_top {
         }
 
         impl $name {
-            /// The board of a scene.
+            /// The board of the scene of `model`.
             ///
             /// # Errors
             /// As [`Identity::of`].
@@ -143,7 +144,7 @@ macro_rules! board_top {
     };
 }
 
-/// The four boards: two engines, two links.
+/// Board tops for the two links of an engine.
 macro_rules! boards {
     ($uart:ident, $spi:ident, $engine:ty) => {
         board_top!($uart, $engine, Uart, Uart::new, [uart_rx] -> uart_tx);

@@ -1,38 +1,40 @@
-//! CRC-32, two bits a cycle: bytes on a wire are further apart, and a few logic cells are enough.
+//! CRC-32, two bits per cycle: bytes on a link are further apart, and this takes few logic cells.
 
 use dermis_golden::link::CRC_RESIDUE;
 use rust_hdl::prelude::*;
 
 use crate::wire::{Wire, Word};
 
-/// Start of a CRC.
+/// Initial value of the CRC register.
 const START: u32 = u32::MAX;
-/// The reflected polynomial.
+/// Polynomial of CRC-32, reflected.
 const POLYNOMIAL: u32 = 0xedb8_8320;
-/// The reflected polynomial after the first of two bits: its own lowest bit is 0, so that the second bit is as it was.
+/// The reflected polynomial shifted by one, for the first of two bits; its lowest bit is 0, so that it does not change
+/// the second.
 const BEFORE: u32 = POLYNOMIAL >> 1;
-/// Cycles that a byte takes after the one in which it comes.
+/// Cycles that a byte takes after the one with `load`.
 pub const CYCLES: u32 = 4;
 
-/// The CRC of what comes, or of what goes.
+/// CRC of the received or of the sent bytes of a packet.
 ///
-/// A byte is added to the register's low end and worked in during the next four cycles. The register's own low byte added
-/// to it leaves only the shift: so the CRC goes out.
+/// `load` XORs a byte into the low end of the register; the next four cycles process it. To send the CRC, the
+/// register's own low byte is loaded for each byte sent: the XOR clears it, which leaves only the shift to the next
+/// byte.
 #[derive(LogicBlock)]
 pub struct Crc {
-    /// Clock.
+    /// Clock; registers change on its rising edge.
     pub clk: Signal<In, Clock>,
-    /// A packet begins.
+    /// A packet starts: resets the CRC, with priority over `load`.
     pub restart: Signal<In, Bit>,
-    /// A byte.
+    /// A byte of the packet; valid with `load`.
     pub octet: Wire<In>,
-    /// It came in this cycle, not while `busy`.
+    /// Take `octet` in this cycle; not while `busy`.
     pub load: Signal<In, Bit>,
-    /// The lowest byte of the CRC so far.
+    /// Lowest byte of the inverted CRC register; valid while not `busy`.
     pub low: Wire<Out>,
-    /// The bytes so far end with their own CRC.
+    /// The bytes so far end with their correct CRC; valid while not `busy`.
     pub right: Signal<Out, Bit>,
-    /// A byte is worked in.
+    /// A byte is being processed.
     pub busy: Signal<Out, Bit>,
     _crc: u32,
     _left: u32,
@@ -130,7 +132,7 @@ mod tests {
         b"123456789".iter().for_each(|&octet| add(&mut crc, octet));
         // CRC-32/ISO-HDLC of "123456789".
         assert_eq!(!crc._crc, 0xcbf4_3926);
-        // The CRC goes out by its own low bytes, and leaves nothing.
+        // Sending the CRC by its own low bytes leaves zero in the register.
         let mut out = Crc { _crc: crc._crc, ..Crc::default() };
         out.connect_all();
         for octet in 0xcbf4_3926u32.to_le_bytes() {

@@ -1,4 +1,4 @@
-//! From a frame's bytes to the engine's input stream, while they come.
+//! Frame ingress: from the payload bytes of a frame's packet to the engine's input stream, while they arrive.
 
 use dermis_golden::link::code_bytes;
 use rust_hdl::prelude::*;
@@ -6,40 +6,41 @@ use rust_hdl::prelude::*;
 use super::super::primitives::count_bits;
 use crate::wire::{Wire, Word};
 
-/// Codes go to the engine as they come; the last two wait until the packet has been judged. A good packet lets them go,
-/// `tlast` on the last. A bad one ends with an early `tlast`, which the engine answers by dropping the frame: that takes
-/// two held codes, because after all codes but one any beat would complete the frame. A code that stands offered when
-/// its packet turns out bad is held until it is taken, as every beat of a stream; the early `tlast` follows it.
+/// Codes go to the engine as they arrive, except the last two, which are held until the packet has been checked. A good
+/// packet releases them, with `tlast` on the last. A bad one ends with an early `tlast`, at which the engine drops the
+/// frame. Two codes must be held: after all codes but one, any beat would complete the frame. A code that is already
+/// offered when its packet turns out bad stays until it is accepted, as AXI-Stream requires; the early `tlast` follows
+/// it.
 ///
-/// The engine takes no code while its buffer is full. A frame that loses a code to that, or begins while the last one
-/// waits, is dropped as well, and is an `overrun` if its packet is good.
+/// The engine accepts no code while its buffer is full. A frame that loses a code because of that, or that starts while
+/// the previous one is still held, is dropped too, and counts as an `overrun` if its packet is good.
 #[derive(LogicBlock)]
 pub struct Feeder {
-    /// Clock.
+    /// Clock; registers change on its rising edge.
     pub clk: Signal<In, Clock>,
-    /// Reset.
+    /// Synchronous reset, active high.
     pub rst: Signal<In, Bit>,
-    /// A frame begins.
+    /// The header of a frame's packet is complete; high for one cycle.
     pub frame_begin: Signal<In, Bit>,
-    /// A byte of its payload comes.
+    /// `content` is a byte of the payload.
     pub payload: Signal<In, Bit>,
-    /// The byte.
+    /// A byte of the packet, 8 bits.
     pub content: Wire<In>,
-    /// The frame's packet is good.
+    /// The frame's packet is complete and correct; high for one cycle.
     pub good: Signal<In, Bit>,
-    /// The packet is bad.
+    /// The packet is damaged; high for one cycle.
     pub bad: Signal<In, Bit>,
-    /// The frame is taken; with `good`.
+    /// The engine gets the whole frame; with `good`.
     pub taken: Signal<Out, Bit>,
-    /// The frame is dropped in spite of `good`.
+    /// The frame is dropped although its packet is good; with `good`.
     pub overrun: Signal<Out, Bit>,
-    /// A taxel's code.
+    /// A taxel's code, two's complement; valid with `valid`.
     pub code: Wire<Out>,
-    /// It is offered.
+    /// `code` is offered to the engine; held until `ready`.
     pub valid: Signal<Out, Bit>,
-    /// It is the last of its frame.
+    /// The beat has `tlast`; valid with `valid`.
     pub last: Signal<Out, Bit>,
-    /// It is taken.
+    /// The engine accepts the beat in this cycle.
     pub ready: Signal<In, Bit>,
     _taxels: usize,
     _bytes: usize,
@@ -60,11 +61,11 @@ struct State {
     aborting: bool,
 }
 
-/// Codes that wait for the packet's end.
+/// Codes that are held until the end of the packet.
 const HELD: usize = 2;
 
 impl Feeder {
-    /// For frames of `taxels` codes of `bits` bits.
+    /// For frames of `taxels` codes of `bits` bits each.
     pub fn new(taxels: usize, bits: u32) -> Self {
         Feeder {
             clk: Default::default(),
@@ -95,7 +96,7 @@ impl Feeder {
         s.aborting || (s.fill > 0 && (s.released || s.delivered < self.lag()))
     }
 
-    /// The beat on offer is the early `tlast`.
+    /// The offered beat is the early `tlast` of a dropped frame.
     fn ends_early(&self) -> bool {
         self._state.aborting && self._state.fill == 0
     }
@@ -170,7 +171,7 @@ impl Logic for Feeder {
     fn hdl(&self) -> Verilog {
         let (bits, bytes) = (self.code.width(), self._bytes);
         let (b, d) = (count_bits(bytes), count_bits(self._taxels));
-        // What comes before the last byte of a code waits here.
+        // Holds the bytes of a code before its last.
         let (assembled, wait) = match bytes {
             1 => ("content".to_string(), String::new()),
             _ => ("{content, raw}".to_string(), format!("reg [{}:0] raw;\n", 8 * bytes - 9)),
@@ -190,7 +191,7 @@ reg [{c_end}:0] second;
 reg [1:0] fill;
 reg [{d_end}:0] delivered;
 reg within_frame, deaf, lost, released, aborting;
-// Fewer than the codes that go before the packet's end are delivered.
+// Codes that may leave before the end of the packet are left.
 reg ahead;
 wire refused = deaf || lost;
 wire at_last = delivered == {d}'d{end};

@@ -1,35 +1,35 @@
-//! What a person sees.
+//! Status LEDs.
 
 use rust_hdl::prelude::*;
 
-/// `alive` changes with the clock, about once a second; `busy` and `error` stay lit for a sixteenth of that, or
-/// up to twice as long, after what they show.
+/// `alive` blinks about once a second; `busy` and `error` stay lit for a sixteenth to an eighth of that period after
+/// their event.
 #[derive(LogicBlock)]
 pub struct Lamps {
-    /// Clock.
+    /// Clock; registers change on its rising edge.
     pub clk: Signal<In, Clock>,
-    /// Reset.
+    /// Synchronous reset, active high.
     pub rst: Signal<In, Bit>,
-    /// A packet comes or is being answered.
+    /// A packet is received or being answered.
     pub activity: Signal<In, Bit>,
-    /// A packet was dropped.
+    /// A packet was dropped in this cycle.
     pub dropped: Signal<In, Bit>,
-    /// The clock runs.
+    /// LED: blinks while the clock runs.
     pub alive: Signal<Out, Bit>,
-    /// There is something to do.
+    /// LED: lit by `activity`.
     pub busy: Signal<Out, Bit>,
-    /// Something went wrong.
+    /// LED: lit by `dropped`.
     pub error: Signal<Out, Bit>,
     _bits: u32,
     _count: u32,
     _lit: [u32; 2],
 }
 
-/// A light's time is this power of two shorter than the blinking.
+/// The tick of the LED time is shorter than the period of `alive` by this power of two.
 const SHORTER: u32 = 4;
 
 impl Lamps {
-    /// For a clock of `clock_hz`.
+    /// For a clock of `clock_hz` Hz.
     pub fn new(clock_hz: u32) -> Self {
         Lamps {
             clk: Default::default(),

@@ -1,35 +1,35 @@
-//! Who the board is, and how many packets it took and dropped, in one memory.
+//! Identity of the board and counters of received and dropped packets, in one memory.
 
 use dermis_golden::link::{Counters, Identity};
 use rust_hdl::prelude::*;
 
 use crate::wire::{Wire, Word};
 
-/// Two bytes per entry: the identity's first twelve from entry 0 on, its others from 8, the counters, in order of
-/// [`Counters`], from 16.
+/// Memory of 32 entries of two bytes: the first twelve bytes of the identity from entry 0, the other twelve from 8, the
+/// counters, in the order of [`Counters`], from 16.
 ///
-/// A packet's event is counted in the three cycles that follow it (read, add, write), later where `hold` is high: then the
-/// two bytes of a counter are being read. Nothing is to be read meanwhile, nor what was read while it was written. Each
-/// counter wraps. Reset clears one counter a cycle, and so lasts for eight at least.
+/// An event of a packet is counted in the three cycles after it (read, add, write); while `hold` is high it waits,
+/// because the two bytes of a counter are being read. `entry` is not valid meanwhile. Counters wrap. Reset clears one
+/// counter per cycle and has to last at least eight cycles.
 #[derive(LogicBlock)]
 pub struct Ledger {
-    /// Clock.
+    /// Clock; registers change on its rising edge.
     pub clk: Signal<In, Clock>,
-    /// Reset.
+    /// Synchronous reset, active high for at least eight cycles.
     pub rst: Signal<In, Bit>,
-    /// A packet is taken.
+    /// A packet was accepted in this cycle.
     pub taken: Signal<In, Bit>,
-    /// One is dropped: framing, CRC, unknown type, length.
+    /// A packet was dropped in this cycle, one bit per cause: framing, CRC, unknown type, length.
     pub fault: Wire<In>,
-    /// One is dropped because others are not answered yet.
+    /// A packet was dropped in this cycle because earlier ones are not answered yet.
     pub overrun: Signal<In, Bit>,
-    /// Nothing may be counted.
+    /// Counting is postponed.
     pub hold: Signal<In, Bit>,
-    /// Which entry.
+    /// Entry to read, 5 bits.
     pub address: Wire<In>,
-    /// The entry of the cycle before.
+    /// The entry, 16 bits, one cycle after `address`.
     pub entry: Wire<Out>,
-    /// It is that of `address`, and no counter is changing.
+    /// `entry` is that of `address`, and no counter is changing.
     pub entry_valid: Signal<Out, Bit>,
     _identity: Vec<u8>,
     _memory: [u16; ENTRIES],
@@ -40,21 +40,21 @@ pub struct Ledger {
 struct State {
     which: usize,
     due: bool,
-    /// Being added to, written, and just written.
+    /// Pipeline of a count: adding, writing, just written.
     counted: [bool; 3],
     entry: u16,
     raised: u16,
 }
 
 const ENTRIES: usize = 32;
-/// First counter.
+/// Entry of the first counter.
 const COUNTS: usize = 16;
-/// Counters, and the two that no event has.
+/// Entries cleared by reset: the counters, and two unused ones.
 const KINDS: usize = 8;
 const EVENTS: usize = Counters::BYTES / 2;
 
 impl Ledger {
-    /// With `identity` as the answer to whoever asks.
+    /// Answers requests for the identity with `identity`.
     pub fn new(identity: &Identity) -> Self {
         let bytes = identity.to_bytes();
         let mut memory = [0; ENTRIES];
@@ -132,7 +132,7 @@ initial begin
 {identity}end
 reg [2:0] which;
 reg due;
-// Being added to, written, and just written.
+// Pipeline of a count: adding, writing, just written.
 reg [2:0] counted;
 reg [15:0] raised;
 wire [{end}:0] events = {{overrun, fault, taken}};

@@ -1,4 +1,4 @@
-//! The engine behind a link: what a host on the other end of a wire talks to.
+//! The engine behind a link, as a host on the other end of a wire uses it.
 //!
 //! ```text
 //!                        .------------------------- packet_link ---------------------------.
@@ -6,8 +6,11 @@
 //!           or spi_slave |                     '-> requests                            engine
 //! pins <--- of the link <- slip_encoder <- packer <- sources <- resultants, ledger <- m_axis
 //! ```
-//! The packets are those of [`dermis_golden::link`]. Whatever carries bytes both ways can stand where the UART and the SPI
-//! slave stand; a board has one of them.
+//! The packets are those of [`dermis_golden::link`]. Any block that carries bytes both ways can replace the UART or the
+//! SPI slave; a board has one of them.
+//!
+//! `board_top`, `packet_link` and `uart` are `#[hdl_gen]` kernels; the other blocks have a Rust `update()` for
+//! rust-hdl's simulation and hand-written Verilog, which co-simulation compares.
 
 mod board_top;
 mod crc;
@@ -56,25 +59,25 @@ use dermis_golden::board::EngineKind;
 use dermis_golden::fixed::Model;
 use dermis_golden::link::{supports, Counters, Identity, Kind, Sums, BEAT_BYTES};
 
-/// What the packets of a scene need to know of it.
+/// Properties of a scene on which its packets depend.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Shape {
     /// Rows of the array.
     pub rows: usize,
     /// Columns of the array.
     pub cols: usize,
-    /// Bits of a code.
+    /// Width of a code, in bits.
     pub input_bits: u32,
-    /// Status beats of a frame.
+    /// Status beats per frame.
     pub status_beats: usize,
-    /// Resultants are answered, too.
+    /// The board also answers requests for resultants.
     pub resultants: bool,
-    /// Frames that wait for their answers at most, or more: a power of two.
+    /// Depth of the queue of frames that wait for their answer: a power of two, at least the most that can wait.
     pub frames: usize,
 }
 
 impl Shape {
-    /// The shape of a scene.
+    /// The shape of the scene of `model`.
     pub fn of(model: &Model) -> Self {
         let sensor = &model.scene.sensor;
         let (input_bits, status_beats) = (model.formats.code_bits, model.status_beats());
@@ -86,7 +89,7 @@ impl Shape {
         Shape { rows: sensor.rows, cols: sensor.cols, input_bits, status_beats, resultants, frames }
     }
 
-    /// Bytes of an answer's payload, by source.
+    /// Bytes of the payload of an answer, by source.
     fn payloads(&self) -> [usize; 4] {
         let status = self.status_beats * BEAT_BYTES;
         let mut bytes = [0; 4];
@@ -98,11 +101,11 @@ impl Shape {
     }
 }
 
-/// Source of an answer: the identity. Sources are numbered as the requests' types, from 0.
+/// Source of an answer: the identity. Sources have the order of the request types, from 0.
 const IDENTITY: usize = 0;
-/// The counters.
+/// Source of an answer: the counters.
 const COUNTERS: usize = 1;
-/// The engine, summed up.
+/// Source of an answer: sums over the forces of the engine.
 const RESULTANTS: usize = 2;
-/// The engine, all forces.
+/// Source of an answer: all forces of the engine.
 const FORCES: usize = 3;

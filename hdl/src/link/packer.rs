@@ -1,62 +1,63 @@
-//! From an answer's words to the bytes of its packet.
+//! From the words of an answer to the bytes of its packet.
 
 use dermis_golden::link::ANSWER;
 use rust_hdl::prelude::*;
 
 use crate::wire::{Wire, Word};
 
-/// Border, header, words of twelve bytes until the last, CRC, border.
+/// Sends SLIP END, header, words of twelve bytes up to the last, CRC, SLIP END.
 ///
-/// An answer begins when one is offered and none is on its way; its source and number are kept. Each byte is chosen where it
-/// stands, so that words need no register here: `index` says which one of the word is awaited, and `taken` that the word is
-/// out. A byte that is offered stays; the next one waits until the CRC has taken it in.
+/// An answer starts when one is offered and none is being sent; its source and number are stored. The sources select
+/// each byte themselves, so that no word register is needed here: `index` is the byte of the word that is needed, and
+/// `taken` says that the word has been sent. An offered byte stays until it is accepted; the next one waits until the
+/// CRC has processed it.
 #[derive(LogicBlock)]
 pub struct Packer {
-    /// Clock.
+    /// Clock; registers change on its rising edge.
     pub clk: Signal<In, Clock>,
-    /// Reset.
+    /// Synchronous reset, active high.
     pub rst: Signal<In, Bit>,
-    /// An answer can begin.
+    /// An answer can start.
     pub offer: Signal<In, Bit>,
-    /// Sequence number of its request.
+    /// Sequence number of its request; valid with `offer`.
     pub number: Wire<In>,
-    /// Where its words come from.
+    /// Source of its payload, 2 bits; valid with `offer`.
     pub offered_source: Wire<In>,
-    /// It begins.
+    /// The offered answer starts in this cycle.
     pub begun: Signal<Out, Bit>,
-    /// The source of the answer on its way.
+    /// Source of the answer being sent.
     pub source: Wire<Out>,
-    /// Its words are awaited.
+    /// Words of the payload are needed.
     pub wanted: Signal<Out, Bit>,
-    /// Which byte of the word, or of header or CRC.
+    /// Byte of the word, of the header or of the CRC that is next.
     pub index: Wire<Out>,
-    /// The byte.
+    /// That byte of the word, from its source.
     pub octet: Wire<In>,
-    /// Its word stands.
+    /// The word is valid.
     pub word_valid: Signal<In, Bit>,
-    /// It is the last.
+    /// The word is the payload's last; valid with `word_valid`.
     pub word_last: Signal<In, Bit>,
-    /// All of its bytes are out.
+    /// The last byte of the word is accepted in this cycle.
     pub taken: Signal<Out, Bit>,
-    /// The second byte of two is not chosen yet, and the first one is out.
+    /// The first byte of two has been sent and the second one is still to be read.
     pub halfway: Signal<Out, Bit>,
-    /// The CRC begins.
+    /// Resets the CRC for a new packet.
     pub crc_restart: Signal<Out, Bit>,
-    /// A byte for it, or its own lowest one.
+    /// Byte for the CRC: of the packet, or its own lowest one; valid with `crc_load`.
     pub crc_octet: Wire<Out>,
-    /// There is one.
+    /// The CRC takes `crc_octet` in this cycle.
     pub crc_load: Signal<Out, Bit>,
-    /// The CRC's lowest byte.
+    /// Lowest byte of the CRC.
     pub crc_low: Wire<In>,
-    /// It works a byte in.
+    /// The CRC is processing a byte.
     pub crc_busy: Signal<In, Bit>,
-    /// A byte of the packet.
+    /// A byte of the packet; valid with `valid`, unless `border`.
     pub content: Wire<Out>,
-    /// A border between packets in its place.
+    /// SLIP END between packets, in place of a byte; valid with `valid`.
     pub border: Signal<Out, Bit>,
-    /// It is offered.
+    /// A byte or an END is offered; held until `ready`.
     pub valid: Signal<Out, Bit>,
-    /// It is taken.
+    /// The byte is accepted in this cycle.
     pub ready: Signal<In, Bit>,
     _lengths: [usize; 4],
     _state: State,
@@ -80,7 +81,7 @@ const SUM: u64 = 4;
 const CLOSE: u64 = 5;
 
 impl Packer {
-    /// For payloads of these `lengths` in bytes, by source.
+    /// `lengths` are the bytes of the payload, by source.
     pub fn new(lengths: [usize; 4]) -> Self {
         Packer {
             clk: Default::default(),
@@ -111,7 +112,7 @@ impl Packer {
         }
     }
 
-    /// Last index of the stage.
+    /// `index` is the last of the stage.
     fn at_end(&self) -> bool {
         let s = self._state;
         s.index == if s.stage == WORDS { 11 } else { 3 }
@@ -219,13 +220,13 @@ always @(*) begin
   crc_restart = stage == 3'd{OPEN};
   crc_octet = stage == 3'd{SUM} ? ~content : content;
 end
-// Apart from the others: what is `ready` follows from them.
+// In a block of their own: `ready` depends on the outputs above.
 always @(*) begin
   taken = goes && words && at_end;
   crc_load = goes && !border;
 end
 always @(posedge clk) begin
-  // Whether there is an offer comes late.
+  // Stored every cycle while idle: `offer` settles late.
   if (stage == 3'd{IDLE}) begin
     source <= offered_source;
     kept <= number;

@@ -1,4 +1,4 @@
-//! Between a wire's bytes and the engine's streams.
+//! Between the bytes of a link and the engine's streams.
 
 use dermis_golden::link::Identity;
 use rust_hdl::prelude::*;
@@ -12,45 +12,45 @@ use crate::wire::Wire;
 ///                                 '-> requests -> packer -> slip_encoder -> bytes out
 /// m_axis -> back -> resultants, ledger -> sources ---^
 /// ```
-/// `towards` and `back` are registers where the engine is a large one, far from the link's pins.
-/// Bytes come at any time, five cycles apart at least, and are never held up; bytes go when `send_ready`.
+/// `towards` and `back` are register slices where the engine is large and far from the link's pins. Received bytes
+/// arrive at any time, at least five cycles apart, without back-pressure; bytes are sent with `send_ready`.
 #[derive(LogicBlock)]
 pub struct PacketLink {
-    /// Clock.
+    /// Clock; registers change on its rising edge.
     pub clk: Signal<In, Clock>,
-    /// Reset.
+    /// Synchronous reset, active high.
     pub rst: Signal<In, Bit>,
-    /// A byte from the wire.
+    /// A received byte; valid with `receive_valid`.
     pub receive_data: Wire<In>,
-    /// It came in this cycle.
+    /// A byte was received in this cycle.
     pub receive_valid: Signal<In, Bit>,
-    /// A byte came that cannot be read.
+    /// A byte was received with an error in this cycle.
     pub receive_broken: Signal<In, Bit>,
-    /// A byte for the wire.
+    /// A byte to send; valid with `send_valid`.
     pub send_data: Wire<Out>,
-    /// It is offered.
+    /// `send_data` is offered; held until `send_ready`.
     pub send_valid: Signal<Out, Bit>,
-    /// It is taken.
+    /// The link accepts the byte in this cycle.
     pub send_ready: Signal<In, Bit>,
-    /// A taxel's code.
+    /// A taxel's code, `input_bits` wide; to the engine.
     pub s_axis_tdata: Wire<Out>,
-    /// It is offered.
+    /// `s_axis_tdata` is offered to the engine; held until `s_axis_tready`.
     pub s_axis_tvalid: Signal<Out, Bit>,
-    /// It is taken.
+    /// The engine accepts the beat in this cycle.
     pub s_axis_tready: Signal<In, Bit>,
-    /// It is the frame's last.
+    /// The code is the frame's last; valid with `s_axis_tvalid`.
     pub s_axis_tlast: Signal<Out, Bit>,
-    /// `{fz, fy, fx}`.
+    /// `{fz, fy, fx}`, 32 bits signed each, or a status beat; from the engine.
     pub m_axis_tdata: Wire<In>,
-    /// A beat is offered.
+    /// The engine offers a beat.
     pub m_axis_tvalid: Signal<In, Bit>,
-    /// It is taken.
+    /// The beat is accepted in this cycle.
     pub m_axis_tready: Signal<Out, Bit>,
-    /// It is the frame's last.
+    /// The beat is the frame's last; valid with `m_axis_tvalid`.
     pub m_axis_tlast: Signal<In, Bit>,
-    /// Something comes, is computed or goes.
+    /// A packet is being received, computed or sent.
     pub activity: Signal<Out, Bit>,
-    /// A packet is dropped.
+    /// A packet is dropped in this cycle.
     pub dropped: Signal<Out, Bit>,
     decoder: SlipDecoder,
     parser: Parser,
@@ -70,7 +70,7 @@ pub struct PacketLink {
 }
 
 impl PacketLink {
-    /// For the scene of `shape`, which answers as `identity`.
+    /// For the packets of `shape`; requests for the identity are answered with `identity`.
     pub fn new(shape: &Shape, identity: &Identity) -> Self {
         PacketLink {
             clk: Default::default(),
@@ -137,7 +137,7 @@ impl Logic for PacketLink {
         self.encoder.rst.next = self.rst.val();
         self.ledger.rst.next = self.rst.val();
 
-        comment!("Wire to packet");
+        comment!("Received bytes to packets");
         self.decoder.data.next = self.receive_data.val();
         self.decoder.valid.next = self.receive_valid.val();
         self.decoder.broken.next = self.receive_broken.val();
@@ -150,7 +150,7 @@ impl Logic for PacketLink {
         self.arriving.octet.next = self.decoder.content.val();
         self.arriving.load.next = self.decoder.content_valid.val();
 
-        comment!("Packet to engine");
+        comment!("Packets to the engine");
         self.feeder.frame_begin.next = self.parser.frame_begin.val();
         self.feeder.payload.next = self.parser.payload.val();
         self.feeder.content.next = self.decoder.content.val();
@@ -165,7 +165,7 @@ impl Logic for PacketLink {
         self.s_axis_tvalid.next = self.towards.m_axis_tvalid.val();
         self.s_axis_tlast.next = self.towards.m_axis_tlast.val();
 
-        comment!("What is to be answered");
+        comment!("Requests and counters");
         self.requests.good.next = self.parser.good.val();
         self.requests.kind.next = self.parser.kind.val();
         self.requests.number.next = self.parser.number.val();
@@ -176,7 +176,7 @@ impl Logic for PacketLink {
         self.ledger.fault.next = self.parser.fault.val();
         self.ledger.overrun.next = self.feeder.overrun.val() | self.requests.overrun.val();
 
-        comment!("Engine to packet");
+        comment!("Engine to packets");
         self.resultants.run.next = self.sources.answer_wanted.val();
         self.resultants.summarise.next = self.sources.summarise.val();
         self.resultants.taken.next = self.packer.taken.val() & self.sources.answer_wanted.val();
@@ -212,11 +212,11 @@ impl Logic for PacketLink {
         self.packer.crc_low.next = self.leaving.low.val();
         self.packer.crc_busy.next = self.leaving.busy.val();
 
-        comment!("What only the other direction needs");
+        comment!("Outputs used in the other direction only");
         self.unused.next = self.arriving.busy.val() | self.leaving.right.val();
         self.unused_low.next = self.arriving.low.val();
 
-        comment!("Packet to wire");
+        comment!("Packets to sent bytes");
         self.encoder.content.next = self.packer.content.val();
         self.encoder.border.next = self.packer.border.val();
         self.encoder.content_valid.next = self.packer.valid.val();

@@ -1,4 +1,4 @@
-//! From the bytes of packets to requests: header, length, CRC.
+//! From the bytes of packets to requests: checks header, length and CRC.
 
 use dermis_golden::link::{code_bytes, Kind, OVERHEAD};
 use rust_hdl::prelude::*;
@@ -7,40 +7,40 @@ use super::Shape;
 use crate::primitives::count_bits;
 use crate::wire::{Wire, Word};
 
-/// Judges each packet when it ends. `good` or `bad` is high for one cycle, one cycle after the end; `kind` and `number`
-/// stand until the next packet's header. Nothing between two ends is no packet.
+/// Checks each packet at its end: `good` or `bad` is high for one cycle, one cycle after `packet_end`; `kind` and
+/// `number` are valid until the header of the next packet. Two ENDs in a row enclose no packet.
 ///
-/// A frame's payload goes on while it comes: `begin` when its header is complete and right, then `payload` with each
-/// byte, in the same cycle.
+/// The payload of a frame is passed on while it arrives: `frame_begin` when its header is complete and correct, then
+/// `payload` with each byte, in the same cycle.
 #[derive(LogicBlock)]
 pub struct Parser {
-    /// Clock.
+    /// Clock; registers change on its rising edge.
     pub clk: Signal<In, Clock>,
-    /// Reset.
+    /// Synchronous reset, active high.
     pub rst: Signal<In, Bit>,
-    /// A byte of a packet.
+    /// A byte of a packet; valid with `content_valid`.
     pub content: Wire<In>,
-    /// It came in this cycle.
+    /// `content` holds a byte.
     pub content_valid: Signal<In, Bit>,
-    /// The packet is over.
+    /// END was received: the packet is complete.
     pub packet_end: Signal<In, Bit>,
-    /// The packet has lost a byte.
+    /// A byte of the packet was lost.
     pub spoiled: Signal<In, Bit>,
-    /// The packet's bytes so far end with their CRC.
+    /// The packet's bytes so far end with their correct CRC.
     pub crc_right: Signal<In, Bit>,
-    /// A frame of the right length begins.
+    /// The header of a frame with the right length is complete.
     pub frame_begin: Signal<Out, Bit>,
-    /// The byte is one of its payload.
+    /// `content` is a byte of the payload of a frame.
     pub payload: Signal<Out, Bit>,
-    /// The packet may be taken.
+    /// The packet is correct.
     pub good: Signal<Out, Bit>,
     /// The packet is dropped.
     pub bad: Signal<Out, Bit>,
-    /// Why, one bit each: framing, CRC, unknown type, length; with `bad`.
+    /// Cause, one bit each: framing, CRC, unknown type, length; valid with `bad`.
     pub fault: Wire<Out>,
-    /// The packet's type.
+    /// The packet's type; valid with `good`.
     pub kind: Wire<Out>,
-    /// The packet's sequence number.
+    /// The packet's sequence number; valid with `good`.
     pub number: Wire<Out>,
     _frame_bytes: u32,
     _frame_kinds: Vec<u8>,
@@ -62,7 +62,7 @@ struct State {
 const PLAIN_KINDS: [u8; 2] = [Kind::Identify as u8, Kind::ReadCounters as u8];
 
 impl Parser {
-    /// For frames of `shape`, whose payload has at most 65535 bytes.
+    /// For the frames of `shape`, whose payload has at most 65535 bytes.
     pub fn new(shape: &Shape) -> Self {
         let resultants = shape.resultants.then_some(Kind::FrameForResultants as u8);
         let blank =
@@ -88,17 +88,17 @@ impl Parser {
         }
     }
 
-    /// Most bytes that are counted: one more than a frame's packet has.
+    /// Limit of the byte count: one more than a frame's packet has.
     fn most(&self) -> u32 {
         self._frame_bytes + OVERHEAD as u32 + 1
     }
 
-    /// Position behind a frame's payload.
+    /// Index of the first byte after a frame's payload.
     fn payload_end(&self) -> u32 {
         self._frame_bytes + 4
     }
 
-    /// Whether the packet may be taken, and else what is wrong with it; neither where there is none.
+    /// Whether the packet is correct, otherwise the bits of `fault`; `(false, 0)` if there is no packet.
     fn judge(&self) -> (bool, u32) {
         let s = self._state;
         let frame = self._frame_kinds.contains(&s.kind);
@@ -117,7 +117,7 @@ impl Parser {
         }
     }
 
-    /// A frame's header is complete with the byte of this cycle.
+    /// The byte of this cycle completes the header of a frame.
     fn begins(&self) -> bool {
         let s = self._state;
         let length = s.length | (self.content.val().number() as u32) << 8;
@@ -181,7 +181,7 @@ impl Logic for Parser {
         Verilog::Custom(format!(
             "\
 reg [{c_end}:0] count;
-// The length is so far a frame's, or zero.
+// The length bytes so far match a frame's length, or zero.
 reg frame_length, no_length;
 reg lost, streaming;
 wire frame = {frame};

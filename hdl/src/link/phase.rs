@@ -1,21 +1,22 @@
-//! Bits on the line from a fraction of a bit per clock cycle, so that any bit rate fits any clock.
+//! Bit timing on the line: a fraction of a bit per clock cycle, so that any bit rate fits any clock.
 
-/// Most fraction bits of a bit's phase.
+/// Most fraction bits of the phase of a bit.
 const FRACTION: u32 = 16;
 
-/// A phase counts fractions of a bit, in as few bits as its steps need.
+/// Phase accumulator that counts fractions of a bit, with as few bits as its increment needs.
 #[derive(Clone, Copy, Debug)]
 pub struct Phase {
-    /// Fraction bits.
+    /// Fraction bits: one bit on the line is 2^`fraction`.
     pub fraction: u32,
     /// Half a bit.
     pub half: u32,
-    /// What a clock cycle adds.
+    /// Increment per clock cycle.
     pub increment: u32,
 }
 
 impl Phase {
-    /// For `baud` bit/s. At 3 Mbit/s and 100 MHz the increment is off by 4·10⁻⁵, a bit in 25 000.
+    /// For `baud` bit/s at a clock of `clock_hz` Hz. At 3 Mbit/s and 100 MHz the relative error of the bit rate is
+    /// 4·10⁻⁵.
     pub fn new(baud: u32, clock_hz: u32) -> Self {
         let increment = (f64::from(baud) / f64::from(clock_hz) * f64::from(1 << FRACTION)).round() as u32;
         let zeros = increment.trailing_zeros().min(FRACTION - 1);

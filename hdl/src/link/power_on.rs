@@ -2,22 +2,22 @@
 
 use rust_hdl::prelude::*;
 
-/// `rst` for eighteen cycles after the device is configured, and as long as the button is held. Relies on
-/// the value that a register has after configuration.
+/// `rst` is high for eighteen cycles after configuration, and while the button is held. Relies on the register values
+/// after configuration.
 #[derive(LogicBlock, Default)]
 pub struct PowerOn {
-    /// Clock.
+    /// Clock; registers change on its rising edge.
     pub clk: Signal<In, Clock>,
-    /// The button, high when held.
+    /// The button, high when held; asynchronous to the clock.
     pub button: Signal<In, Bit>,
-    /// Reset.
+    /// Reset, active high, registered.
     pub rst: Signal<Out, Bit>,
     _held: [bool; 2],
     _count: u32,
     _over: [bool; 2],
 }
 
-/// Where the count ends: cycles of reset, without the last three.
+/// Last value of the count; reset ends three cycles later.
 const LAST: u32 = 15;
 
 impl Logic for PowerOn {
@@ -39,7 +39,7 @@ impl Logic for PowerOn {
             "\
 reg [1:0] held = 2'd0;
 reg [3:0] count = 4'd0;
-// From a register of its own: it goes everywhere, the count stays by the button.
+// Registered once more: `rst` has long routes, the count is placed near the button.
 reg counting = 1'b1;
 initial rst = 1'b1;
 always @(posedge clk) begin

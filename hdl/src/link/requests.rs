@@ -1,4 +1,4 @@
-//! What the board owes the host.
+//! Queue of the requests that the board has accepted and not answered yet.
 
 use dermis_golden::link::Kind;
 use rust_hdl::prelude::*;
@@ -7,38 +7,39 @@ use super::{COUNTERS, FORCES, IDENTITY, RESULTANTS};
 use crate::primitives::count_bits;
 use crate::wire::{Wire, Word};
 
-/// Keeps the requests taken until they are answered: one identification, one reading of the counters, and the frames
-/// in the engine, in order. `offer` when one can be answered, with the request's number and the answer's source; `begun` takes it.
+/// Holds accepted requests until they are answered: one identification, one reading of the counters, and the frames in
+/// the engine, in order. `offer` is high when one can be answered, with the number of the request and the source of the
+/// answer; `begun` removes it.
 ///
-/// The parallel engine holds three frames at most (one being sent, one computed, one received), so that a queue of four
+/// The parallel engine holds at most three frames (one being sent, one computed, one received), so a queue of four
 /// never overflows; the serial one holds two.
 #[derive(LogicBlock)]
 pub struct Requests {
-    /// Clock.
+    /// Clock; registers change on its rising edge.
     pub clk: Signal<In, Clock>,
-    /// Reset.
+    /// Synchronous reset, active high.
     pub rst: Signal<In, Bit>,
-    /// A good packet.
+    /// A correct packet has been received; high for one cycle.
     pub good: Signal<In, Bit>,
-    /// Its type.
+    /// Its type; valid with `good`.
     pub kind: Wire<In>,
-    /// Its sequence number.
+    /// Its sequence number; valid with `good`.
     pub number: Wire<In>,
-    /// It is a frame, and the engine has it.
+    /// It is a frame, and the engine gets it; with `good`.
     pub taken: Signal<In, Bit>,
-    /// A good request without payload is taken.
+    /// A request without payload is accepted; with `good`.
     pub noted: Signal<Out, Bit>,
-    /// It is dropped, because its like is not answered yet.
+    /// A request without payload is dropped, because one of its type is not answered yet; with `good`.
     pub overrun: Signal<Out, Bit>,
-    /// The engine offers an answer.
+    /// The engine offers a beat of an answer.
     pub answered: Signal<In, Bit>,
-    /// An answer can begin.
+    /// An answer can start.
     pub offer: Signal<Out, Bit>,
-    /// It begins.
+    /// The offered answer starts in this cycle.
     pub begun: Signal<In, Bit>,
-    /// Its request's sequence number.
+    /// Sequence number of its request; valid with `offer`.
     pub answer_number: Wire<Out>,
-    /// Where its payload comes from.
+    /// Source of its payload, 2 bits; valid with `offer`.
     pub source: Wire<Out>,
     /// Frames are in the engine.
     pub waiting: Signal<Out, Bit>,
@@ -48,9 +49,9 @@ pub struct Requests {
 
 #[derive(Clone, Debug, Default)]
 struct State {
-    /// Sequence numbers of a pending identification and reading of counters.
+    /// Sequence numbers of a pending identification and of a pending reading of the counters.
     plain: [Option<u8>; 2],
-    /// Sequence numbers of the frames, and whether their forces are asked for.
+    /// Sequence numbers of the frames, and whether all forces (not resultants) are requested.
     frames: Vec<(u8, bool)>,
 }
 
@@ -79,7 +80,7 @@ impl Requests {
         }
     }
 
-    /// Which of the two requests without payload comes.
+    /// Which of the two requests without payload has been received in this cycle, if any.
     fn plain(&self) -> Option<usize> {
         let kind = self.kind.val().number() as u8;
         PLAIN.iter().position(|&plain| plain == kind).filter(|_| self.good.val())

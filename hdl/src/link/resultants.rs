@@ -1,4 +1,4 @@
-//! From the engine's beats to a packet's words: all of them, or sums and status.
+//! From the engine's beats to the words of an answer: all beats, or sums and status.
 
 use rust_hdl::prelude::*;
 
@@ -7,36 +7,36 @@ use super::Shape;
 use crate::wire::{Wire, Word};
 use dermis_golden::link::Sums;
 
-/// While `run`, beats pass as words; that is all where the `shape` has no resultants. Else, with `summarise`, the forces are
-/// added up as they pass, and the sums go out as four words before the status. No multiplier: where Σ column · fz is asked
-/// for, the sum of what lies left of each taxel is subtracted, and at the end Σ fz is added columns − 1 times, one per cycle;
-/// rows alike.
+/// While `run`, beats pass as words; without resultants in the `shape` that is all. With `summarise`, the forces are
+/// added up, and four words of sums go out before the status beats. No multiplier is needed: for Σ column · fz, the sum
+/// of the fz to the left of each taxel is subtracted, and at the end Σ fz is added columns − 1 times, once per cycle;
+/// likewise for rows.
 #[derive(LogicBlock)]
 pub struct Resultants {
-    /// Clock.
+    /// Clock; registers change on its rising edge.
     pub clk: Signal<In, Clock>,
-    /// Reset.
+    /// Synchronous reset, active high.
     pub rst: Signal<In, Bit>,
     /// An answer to a frame is being sent.
     pub run: Signal<In, Bit>,
-    /// Its word is out.
+    /// The word is accepted in this cycle.
     pub taken: Signal<In, Bit>,
-    /// The answer is the sums; as long as the answer takes.
+    /// The answer consists of sums and status; constant during an answer.
     pub summarise: Signal<In, Bit>,
-    /// A beat of the engine.
+    /// A beat of the engine, 96 bits; valid with `beat_valid`.
     pub beat: Wire<In>,
-    /// It is offered.
+    /// `beat` is offered; held until `beat_ready`.
     pub beat_valid: Signal<In, Bit>,
-    /// It is its frame's last.
+    /// The beat is its frame's last; valid with `beat_valid`.
     pub beat_last: Signal<In, Bit>,
-    /// It is taken. Where sums are made from registers, so that a fast engine's pipeline does not wait for the packer's
-    /// logic: a beat that is a word then stays for two cycles after that in which the word was taken.
+    /// The beat is accepted in this cycle. Registered where sums are computed, so that the packer's logic is not in the
+    /// path of a fast engine: a beat that is a word then stays for two cycles after its word was accepted.
     pub beat_ready: Signal<Out, Bit>,
-    /// A word of the payload.
+    /// A word of the payload, 96 bits; valid with `word_valid`.
     pub word: Wire<Out>,
-    /// It stands until it is `taken`.
+    /// `word` is offered; held until `taken`.
     pub word_valid: Signal<Out, Bit>,
-    /// It is the payload's last.
+    /// The word is the payload's last; valid with `word_valid`.
     pub word_last: Signal<Out, Bit>,
     _shape: Shape,
     _bits: usize,
@@ -52,10 +52,10 @@ struct State {
     out: usize,
     line: i64,
     sums: Sums,
-    /// `beat_ready`, by what it is for.
+    /// `beat_ready`, separately for beats that are added and beats that pass.
     adding: bool,
     passing: bool,
-    /// The word was taken in the cycle before.
+    /// The word was accepted in the previous cycle.
     taken: bool,
 }
 
@@ -63,13 +63,13 @@ const ADD: usize = 0;
 const FINISH: usize = 1;
 const OUT: usize = 2;
 const STATUS: usize = 3;
-/// Words of the sums.
+/// Number of words of the sums.
 const WORDS: usize = 4;
-/// Sums.
+/// Number of sums.
 const COUNT: usize = 6;
 
 impl Resultants {
-    /// For arrays of `shape`.
+    /// For the array of `shape`.
     pub fn new(shape: &Shape) -> Self {
         Resultants {
             clk: Default::default(),
@@ -216,9 +216,9 @@ end"
         Verilog::Custom(format!(
             "\
 reg [1:0] stage, out;
-// `beat_ready`, by what it is for.
+// beat_ready, separately for beats that are added and beats that pass.
 reg adding, passing;
-// The packer may be far away. The CRC takes in the word's last byte meanwhile.
+// Registered to shorten the route from the packer; meanwhile the CRC processes the last byte of the word.
 reg was_taken;
 reg [{r_end}:0] row;
 reg [{c_end}:0] col;

@@ -1,4 +1,4 @@
-//! A board's pins, whatever simulates it.
+//! A board's pins, independent of the simulator.
 
 use dermis_golden::fixed::Model;
 #[cfg(doc)]
@@ -12,23 +12,23 @@ use crate::simulate::settles;
 /// A board's output pins.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct BoardOutputs {
-    /// The link's pin to the host, [`LinkKind::output`].
+    /// Output pin of the link, [`LinkKind::output`].
     pub to_host: bool,
-    /// Blinks.
+    /// LED: blinks while the clock runs.
     pub alive: bool,
-    /// There is something to do.
+    /// LED: lit while packets are received, computed or sent.
     pub busy: bool,
-    /// A packet was dropped.
+    /// LED: lit after a packet was dropped.
     pub error: bool,
 }
 
-/// A board that is computed. Its link's input pins are bits, from bit 0 on in the order of [`LinkKind::inputs`].
+/// A simulated board. The input pins of its link are bits, from bit 0 in the order of [`LinkKind::inputs`].
 pub trait BoardDevice: Send {
-    /// Puts the link's inputs and the clock on the pins and lets everything settle; the outputs then. Two clocks that
-    /// change in the same call have no order.
+    /// Applies the link's inputs and the clock level, settles all signals and returns the outputs. The order of two
+    /// clocks that change in the same call is undefined.
     fn settle(&mut self, inputs: u64, clock: bool) -> BoardOutputs;
 
-    /// One clock cycle: the inputs, then the rising edge; the outputs as they stand before that.
+    /// One clock cycle: applies the inputs, samples the outputs, then the rising edge.
     fn cycle(&mut self, inputs: u64) -> BoardOutputs {
         let outputs = self.settle(inputs, false);
         self.settle(inputs, true);
@@ -36,19 +36,19 @@ pub trait BoardDevice: Send {
     }
 }
 
-/// What every board's top does in a simulation and in generation, whatever its engine and its link.
+/// Operations on a board top that simulation and generation need, the same for all engines and links.
 pub trait Board: Block + Send {
-    /// Puts the link's inputs and the clock on the pins.
+    /// Applies the link's inputs and the clock level to the pins.
     fn drive(&mut self, inputs: u64, clock: bool);
-    /// The output pins.
+    /// Samples the output pins.
     fn outputs(&self) -> BoardOutputs;
-    /// The Verilog.
+    /// The Verilog of the board, top module `top`.
     fn verilog(&self) -> String;
 }
 
 struct Simulator(Box<dyn Board>);
 
-/// The board of `model` in rust-hdl's simulation, clocked directly.
+/// The board of `model` in rust-hdl's simulation.
 ///
 /// # Errors
 /// As [`super::generate_board`].

@@ -1,33 +1,34 @@
-//! From the bytes of the wire to the bytes of packets.
+//! SLIP decoder: from the bytes of the link to the bytes of packets.
 
 use dermis_golden::link::slip::{unescape, END, ESC, ESC_END, ESC_ESC, ESC_IDLE, IDLE};
 use rust_hdl::prelude::*;
 
 use crate::wire::{Wire, Word};
 
-/// What follows an escape is told apart by its last two bits; whether it may follow one at all, by `spoiled`.
+/// The byte after an escape is decoded from its last two bits; `spoiled` reports bytes that must not follow an escape.
 const _: () = assert!(matches!([ESC_END % 4, ESC_ESC % 4, ESC_IDLE % 4], [0, 1, 2..=3]));
 
-/// Undoes SLIP's escapes, a cycle later; IDLE is as if nothing had come.
+/// Resolves SLIP escapes, with a latency of one cycle; IDLE bytes are skipped. A receiver resynchronises at the next
+/// END.
 #[derive(LogicBlock)]
 pub struct SlipDecoder {
-    /// Clock.
+    /// Clock; registers change on its rising edge.
     pub clk: Signal<In, Clock>,
-    /// Reset.
+    /// Synchronous reset, active high.
     pub rst: Signal<In, Bit>,
-    /// A byte from the wire.
+    /// A received byte; valid with `valid`.
     pub data: Wire<In>,
-    /// It came in this cycle.
+    /// A byte was received in this cycle.
     pub valid: Signal<In, Bit>,
-    /// A byte came that cannot be read.
+    /// A byte was received with an error in this cycle.
     pub broken: Signal<In, Bit>,
-    /// A byte of a packet.
+    /// A byte of a packet; valid with `content_valid`.
     pub content: Wire<Out>,
-    /// It came in this cycle.
+    /// `content` holds a byte.
     pub content_valid: Signal<Out, Bit>,
-    /// The packet is over.
+    /// END was received: the packet is complete; high for one cycle.
     pub packet_end: Signal<Out, Bit>,
-    /// The packet has lost a byte.
+    /// A byte of the packet was lost; high for one cycle.
     pub spoiled: Signal<Out, Bit>,
     _escaped: bool,
 }

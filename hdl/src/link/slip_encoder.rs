@@ -1,33 +1,33 @@
-//! From the bytes of packets to the bytes of the wire.
+//! SLIP encoder: from the bytes of packets to the bytes of the link.
 
 use dermis_golden::link::slip::{escape, END, ESC, ESC_END, ESC_ESC, ESC_IDLE, IDLE};
 use rust_hdl::prelude::*;
 
 use crate::wire::{Wire, Word};
 
-/// Escapes what SLIP needs escaped; an END goes out as it is where `border` says that it stands between packets.
+/// Escapes bytes as SLIP requires; with `border`, an END between packets is sent unescaped.
 ///
-/// Behind an engine with many lanes whether a byte is escaped comes from a register, a cycle after the byte, and so does that
-/// it is taken, a cycle after the wire took it: the wire's pins may be far from the packets.
+/// With many lanes the block has two extra registers, because the link's pins may be far from the packer: whether a
+/// byte is escaped is known one cycle after the byte, and `content_ready` comes one cycle after the link accepted it.
 #[derive(LogicBlock)]
 pub struct SlipEncoder {
-    /// Clock.
+    /// Clock; registers change on its rising edge.
     pub clk: Signal<In, Clock>,
-    /// Reset.
+    /// Synchronous reset, active high.
     pub rst: Signal<In, Bit>,
-    /// A byte of a packet.
+    /// A byte of a packet; valid with `content_valid`.
     pub content: Wire<In>,
-    /// An END between packets in its place.
+    /// Send an END in place of `content`; valid with `content_valid`.
     pub border: Signal<In, Bit>,
-    /// It is offered.
+    /// A byte or an END is offered; held until `content_ready`.
     pub content_valid: Signal<In, Bit>,
-    /// It is taken.
+    /// The byte is accepted; with registers, one cycle after the link took its last part.
     pub content_ready: Signal<Out, Bit>,
-    /// A byte for the wire.
+    /// A byte for the link; valid with `valid`.
     pub data: Wire<Out>,
-    /// It is offered.
+    /// `data` is offered; held until `ready`.
     pub valid: Signal<Out, Bit>,
-    /// It is taken.
+    /// The link accepts the byte in this cycle.
     pub ready: Signal<In, Bit>,
     _registered: bool,
     _second: bool,
@@ -36,7 +36,7 @@ pub struct SlipEncoder {
 }
 
 impl SlipEncoder {
-    /// With or without those registers.
+    /// With the two extra registers if `registered`.
     pub fn new(registered: bool) -> Self {
         SlipEncoder {
             clk: Default::default(),
@@ -55,7 +55,7 @@ impl SlipEncoder {
         }
     }
 
-    /// A byte stands, and whether it is escaped is known.
+    /// A byte is offered, and it is known whether it has to be escaped.
     fn stands(&self) -> bool {
         match self._registered {
             true => self._seen,
@@ -63,12 +63,12 @@ impl SlipEncoder {
         }
     }
 
-    /// The wire takes a byte.
+    /// The link accepts a byte.
     fn goes(&self) -> bool {
         self.stands() && self.ready.val()
     }
 
-    /// The wire takes the last of what stands.
+    /// The link accepts the last byte of `content`: the only one, or the second of an escape.
     fn takes(&self, special: bool) -> bool {
         self.goes() && (!special || self._second)
     }

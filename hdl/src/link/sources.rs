@@ -1,49 +1,49 @@
-//! Where an answer's words come from.
+//! Selects the bytes of an answer from its source.
 
 use rust_hdl::prelude::*;
 
 use super::{COUNTERS, IDENTITY};
 use crate::wire::{Wire, Word};
 
-/// Chooses between the ledger, which holds identity and counters, and the engine's answer, a byte at a time.
+/// Multiplexer, byte by byte, between the ledger, which holds identity and counters, and the engine's answer.
 ///
-/// Behind an engine with many lanes the choice takes two registers: the packer looks at a byte five cycles after it asks for
-/// it at the soonest. A link whose line is hardly slower than its clock has no cycle to spare, and a smaller choice.
+/// With many lanes it has two register stages: the packer uses a byte no sooner than five cycles after it asked for it.
+/// A link whose bit rate is close to the clock has no cycle to spare, but a smaller multiplexer.
 #[derive(LogicBlock)]
 pub struct Sources {
-    /// Clock.
+    /// Clock; registers change on its rising edge.
     pub clk: Signal<In, Clock>,
-    /// Which.
+    /// Source of the answer being sent, 2 bits.
     pub source: Wire<In>,
-    /// An answer begins.
+    /// An answer starts in this cycle.
     pub begun: Signal<In, Bit>,
-    /// Words are awaited.
+    /// Words of the payload are needed.
     pub wanted: Signal<In, Bit>,
-    /// Which byte of one.
+    /// Byte of the word that is needed.
     pub index: Wire<In>,
-    /// All bytes of one are out.
+    /// The last byte of a word is accepted in this cycle.
     pub taken: Signal<In, Bit>,
-    /// Place in the ledger.
+    /// Entry of the ledger to read.
     pub address: Wire<Out>,
-    /// Two bytes of the ledger.
+    /// The entry, two bytes.
     pub entry: Wire<In>,
-    /// They are those of the place.
+    /// `entry` is that of `address`.
     pub entry_valid: Signal<In, Bit>,
-    /// A word of the engine's answer.
+    /// A word of the engine's answer, 96 bits; valid with `answer_valid`.
     pub answer: Wire<In>,
-    /// It stands.
+    /// `answer` holds a word.
     pub answer_valid: Signal<In, Bit>,
-    /// It is the last.
+    /// The word is the last of the answer; valid with `answer_valid`.
     pub answer_last: Signal<In, Bit>,
-    /// The engine's answer is awaited.
+    /// The engine's answer is needed.
     pub answer_wanted: Signal<Out, Bit>,
-    /// The engine's answer is summed up.
+    /// The engine's answer consists of sums and status.
     pub summarise: Signal<Out, Bit>,
-    /// The byte.
+    /// The byte `index` of the word; valid with `word_valid`.
     pub octet: Wire<Out>,
-    /// Its word stands.
+    /// The word is valid.
     pub word_valid: Signal<Out, Bit>,
-    /// It is the last.
+    /// The word is the payload's last; valid with `word_valid`.
     pub word_last: Signal<Out, Bit>,
     _registered: bool,
     _taken: bool,
@@ -51,11 +51,11 @@ pub struct Sources {
     _half: Half,
 }
 
-/// What the first register keeps: two bytes, whether their word stands, whether it is the last.
+/// Content of the first register stage: two bytes, whether their word is valid, whether it is the last.
 type Half = (u64, bool, bool);
 
 impl Sources {
-    /// With or without registers in the choice.
+    /// With the two register stages if `registered`.
     pub fn new(registered: bool) -> Self {
         Sources {
             clk: Default::default(),

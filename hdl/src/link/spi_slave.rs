@@ -1,58 +1,59 @@
-//! Between the bytes of the link and an SPI controller, whose clock is a domain of its own.
+//! SPI slave: between the bytes of the link and an SPI controller, whose clock is a domain of its own.
 
 use dermis_golden::link::slip::IDLE;
 use rust_hdl::prelude::*;
 
 use crate::wire::{Wire, Word};
 
-/// Mode 0, most significant bit first, bytes in both directions at once. Registers `sclk_…` are the controller's:
+/// Mode 0, most significant bit first, bytes in both directions at once. Registers `sclk_…` are in the controller's
+/// clock domain:
 ///
 /// ```text
 ///  mosi -> sclk_mosi -> sclk_shift -> sclk_received --(sclk_toggle, 2 registers)--> data, valid
 ///  miso <-----------------'   ^------ sclk_kept <--(offer, 2 registers)------------ offered <- send_data
 ///                                          '-------(sclk_taken, 2 registers)------> send_ready
 /// ```
-/// In: the eighth rising edge puts the byte into a register and flips a toggle. `clk` takes it at its third edge after that
-/// at the latest; the register stays as it is for eight periods of `sclk`. A byte cut short is dropped.
+/// Receiving: the eighth rising edge stores the byte and flips a toggle. `clk` sees the toggle at its third edge after
+/// that at the latest; the byte stays unchanged for eight periods of `spi_sclk`. An incomplete byte is dropped.
 ///
-/// Out: the bits change on falling edges. At the eighth rising edge of a byte the next one is kept if `clk` offers one, and
-/// acknowledged; the falling edge then loads it, or IDLE. What is kept is given up only when the controller has sampled all
-/// eight of its bits: a transaction that ends before is as if the byte had not begun, and the next one brings it. The first
-/// byte of a transaction is IDLE.
+/// Sending: the bits change on falling edges. The eighth rising edge of a byte stores the next one if `clk` offers one,
+/// and acknowledges it; the falling edge then loads it, or IDLE. The stored byte is released only when the controller
+/// has sampled all eight of its bits: if a transaction ends earlier, the next one sends that byte again from its first
+/// bit. The first byte of a transaction is IDLE.
 ///
-/// While `cs_n` is high edges of `sclk` do nothing: they are another slave's.
+/// While `spi_cs_n` is high, edges of `spi_sclk` have no effect: they are for another slave.
 #[derive(LogicBlock)]
 pub struct SpiSlave {
-    /// Clock.
+    /// Clock; registers change on its rising edge.
     pub clk: Signal<In, Clock>,
-    /// Reset: nothing is taken that goes out.
+    /// Synchronous reset, active high: no byte to send is accepted.
     pub rst: Signal<In, Bit>,
     /// The controller's clock.
     pub spi_sclk: Signal<In, Bit>,
-    /// Low in a transaction.
+    /// Chip select, low during a transaction.
     pub spi_cs_n: Signal<In, Bit>,
-    /// From the controller.
+    /// Data from the controller, sampled on the rising edge of `spi_sclk`.
     pub spi_mosi: Signal<In, Bit>,
-    /// To the controller.
+    /// Data to the controller, changes on the falling edge of `spi_sclk`.
     pub spi_miso: Signal<Out, Bit>,
-    /// The byte received last.
+    /// The byte received last; valid with `valid`.
     pub data: Wire<Out>,
-    /// It came in this cycle.
+    /// A byte was received in this cycle.
     pub valid: Signal<Out, Bit>,
-    /// Never: every eight bits are a byte.
+    /// Constant 0: every eight bits are a byte.
     pub broken: Signal<Out, Bit>,
-    /// A byte for the controller.
+    /// A byte to send; valid with `send_valid`.
     pub send_data: Wire<In>,
-    /// It is offered.
+    /// `send_data` is offered; held until `send_ready`.
     pub send_valid: Signal<In, Bit>,
-    /// It is taken.
+    /// The byte is accepted in this cycle.
     pub send_ready: Signal<Out, Bit>,
     _level: bool,
     _sclk: Sclk,
     _state: State,
 }
 
-/// The controller's domain.
+/// Registers in the controller's clock domain.
 #[derive(Clone, Copy, Debug, Default)]
 struct Sclk {
     bit: u32,
@@ -67,7 +68,7 @@ struct Sclk {
     offered: [bool; 2],
 }
 
-/// The clock's domain.
+/// Registers in the domain of `clk`.
 #[derive(Clone, Copy, Debug, Default)]
 struct State {
     received: [bool; 3],
@@ -76,7 +77,7 @@ struct State {
     offered: u8,
 }
 
-/// The last bit of a byte.
+/// Index of the last bit of a byte.
 const LAST: u32 = 7;
 
 impl Default for SpiSlave {
@@ -146,7 +147,7 @@ impl SpiSlave {
 
 impl Logic for SpiSlave {
     fn update(&mut self) {
-        // The two clocks never change in the same round: whoever drives them settles in between.
+        // The two clocks never change in the same update round: callers settle in between.
         if self.clk.pos_edge() {
             self.clocked();
         }
@@ -178,18 +179,18 @@ impl Logic for SpiSlave {
     fn hdl(&self) -> Verilog {
         Verilog::Custom(format!(
             "\
-// The controller's domain: falling edges, set back between transactions.
+// Controller's clock domain, falling edges; reset between transactions.
 reg [2:0] sclk_bit;
 reg [7:0] sclk_shift;
 reg sclk_carries;
-// Its rising edges. A transaction sets nothing back: what two domains agree on holds across transactions.
+// Controller's clock domain, rising edges; not reset, so that the handshake with clk holds across transactions.
 reg sclk_mosi;
 reg [7:0] sclk_received, sclk_kept;
 reg [1:0] sclk_offered = 2'd0;
 reg sclk_toggle = 1'b0;
 reg sclk_full = 1'b0;
 reg sclk_taken = 1'b0;
-// The clock's domain.
+// Domain of clk.
 reg [2:0] received = 3'd0;
 reg [1:0] taken = 2'd0;
 reg offer = 1'b0;
@@ -243,7 +244,7 @@ mod tests {
     use super::*;
     use crate::simulate::settles;
 
-    /// The block, what the link's side has received, and what that side has yet to send.
+    /// The block, the bytes that the `clk` side has received, and the bytes it still has to send.
     struct Bench {
         block: SpiSlave,
         received: Vec<u8>,
@@ -265,7 +266,7 @@ mod tests {
             assert!(settles(&mut self.block));
         }
 
-        /// Half a clock cycle; before a rising edge the link's side looks.
+        /// Half a cycle of `clk`; the `clk` side reads and writes before a rising edge.
         fn half(&mut self) {
             let block = &mut self.block;
             if !self.clock {
@@ -284,8 +285,8 @@ mod tests {
             self.settle();
         }
 
-        /// A transaction of so many edges of the controller's clock, each `halves` of the other after the last; the whole
-        /// bytes that the controller has seen.
+        /// A transaction of `edges` edges of the controller's clock, `halves` half cycles of `clk` apart; returns the
+        /// complete bytes that the controller has received.
         fn transaction(&mut self, bytes: &[u8], edges: usize, halves: usize) -> Vec<u8> {
             self.block.spi_cs_n.next = false;
             let (mut seen, mut whole) = (0u32, Vec::new());
@@ -318,12 +319,12 @@ mod tests {
                 let mut bench = Bench::new(&back);
                 let (mut sent, mut seen) = (0, Vec::new());
                 while seen.len() < back.len() && sent + 8 < there.len() {
-                    // Seven bytes, then the one that is cut short, in turn.
+                    // Alternately seven whole bytes, and a transaction of `edges` edges.
                     for edges in [7 * 16, edges] {
                         let bytes = &there[sent..];
                         let whole = bench.transaction(bytes, edges, halves);
                         assert!(whole.first().is_none_or(|first| *first == IDLE), "{edges} edges");
-                        // A byte is there once its eighth rising edge was.
+                        // A byte is received at its eighth rising edge.
                         sent += (edges + 1) / 16;
                         seen.extend(whole.into_iter().filter(|byte| *byte != IDLE));
                     }

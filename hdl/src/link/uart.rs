@@ -1,4 +1,4 @@
-//! Between the bytes of the link and a UART's two lines.
+//! UART: between the bytes of the link and its two lines.
 
 use dermis_golden::link::Identity;
 use rust_hdl::prelude::*;
@@ -9,25 +9,25 @@ use crate::wire::Wire;
 /// [`UartReceiver`] and [`UartTransmitter`] side by side.
 #[derive(LogicBlock)]
 pub struct Uart {
-    /// Clock.
+    /// Clock; registers change on its rising edge.
     pub clk: Signal<In, Clock>,
-    /// Reset.
+    /// Synchronous reset, active high.
     pub rst: Signal<In, Bit>,
-    /// From the host.
+    /// Line from the host, high when idle; asynchronous to the clock.
     pub uart_rx: Signal<In, Bit>,
-    /// To the host.
+    /// Line to the host, high when idle.
     pub uart_tx: Signal<Out, Bit>,
-    /// The byte received last.
+    /// The byte received last; valid with `valid`.
     pub data: Wire<Out>,
-    /// It came in this cycle.
+    /// A byte was received in this cycle.
     pub valid: Signal<Out, Bit>,
-    /// A byte without stop bit came in this cycle.
+    /// A byte without stop bit was received in this cycle.
     pub broken: Signal<Out, Bit>,
-    /// A byte for the host.
+    /// A byte to send; valid with `send_valid`.
     pub send_data: Wire<In>,
-    /// It is offered.
+    /// `send_data` is offered; held until `send_ready`.
     pub send_valid: Signal<In, Bit>,
-    /// It is taken.
+    /// The byte is accepted in this cycle.
     pub send_ready: Signal<Out, Bit>,
     receiver: UartReceiver,
     transmitter: UartTransmitter,

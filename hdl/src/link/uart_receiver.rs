@@ -1,28 +1,28 @@
-//! From the UART's line to bytes.
+//! UART receiver: from the line to bytes.
 
 use rust_hdl::prelude::*;
 
 use super::phase::Phase;
 use crate::wire::{Wire, Word};
 
-/// Two registers against metastability, then the majority of three samples. From a falling edge on, ten bits are
-/// sampled in their middle: half a bit later the start bit, which must still stand, eight data bits, and the stop bit.
-/// A byte without stop bit is `broken`; the next one begins only after the line was idle again.
+/// Two registers against metastability, then the majority of three samples. After a falling edge, ten bits are sampled
+/// in their middle: the start bit half a bit later, which must still be low, eight data bits, and the stop bit. A byte
+/// without stop bit is `broken`; the next one starts only after the line has been idle again.
 ///
-/// `valid` and `broken` are pulses; `data` stands until the next byte's first data bit.
+/// `valid` and `broken` are pulses of one cycle; `data` is stable until the first data bit of the next byte.
 #[derive(LogicBlock)]
 pub struct UartReceiver {
-    /// Clock.
+    /// Clock; registers change on its rising edge.
     pub clk: Signal<In, Clock>,
-    /// Reset.
+    /// Synchronous reset, active high.
     pub rst: Signal<In, Bit>,
-    /// The line, high when idle.
+    /// The line, high when idle; asynchronous to the clock.
     pub line: Signal<In, Bit>,
-    /// The byte received last.
+    /// The byte received last; valid with `valid`.
     pub data: Wire<Out>,
-    /// It came in this cycle.
+    /// A byte was received in this cycle.
     pub valid: Signal<Out, Bit>,
-    /// A byte without stop bit came in this cycle.
+    /// A byte without stop bit was received in this cycle.
     pub broken: Signal<Out, Bit>,
     _phase: Phase,
     _state: State,
@@ -43,7 +43,7 @@ struct State {
 const BITS: u32 = 10;
 
 impl UartReceiver {
-    /// For `baud` bit/s at a clock of `clock_hz`.
+    /// For `baud` bit/s at a clock of `clock_hz` Hz.
     pub fn new(baud: u32, clock_hz: u32) -> Self {
         UartReceiver {
             clk: Default::default(),
@@ -74,7 +74,7 @@ impl UartReceiver {
             if sum >= 2 * self._phase.half {
                 next.left = s.left - 1;
                 match s.left {
-                    // Too short for a start bit.
+                    // A glitch, not a start bit.
                     BITS if level => next.left = 0,
                     BITS => (),
                     1 => (next.valid, next.broken) = (level, !level),
@@ -92,7 +92,7 @@ impl UartReceiver {
 impl Logic for UartReceiver {
     fn update(&mut self) {
         if self.clk.pos_edge() {
-            // What a sample means goes through a register.
+            // The outputs are one cycle later, as in the Verilog.
             let State { data, valid, broken, .. } = self._state;
             self._state = self.next();
             self.data.next = Word::from(u64::from(data));
@@ -113,7 +113,7 @@ impl Logic for UartReceiver {
             "\
 reg [4:0] samples;
 reg armed;
-// The bits and the byte's end are told a cycle late: what they go to may be far away.
+// Sampled bit, shift and stop are registered once to shorten the route to the data register.
 reg sampled, shifts, stops;
 reg [3:0] left;
 reg [{end}:0] phase;

@@ -1,22 +1,22 @@
-//! From bytes to the UART's line.
+//! UART transmitter: from bytes to the line.
 
 use rust_hdl::prelude::*;
 
 use super::phase::Phase;
 use crate::wire::Wire;
 
-/// Start bit, eight data bits, stop bit. A byte is taken when `valid` and `ready` are both high.
+/// Start bit, eight data bits, stop bit. A byte is accepted when `valid` and `ready` are both high.
 #[derive(LogicBlock)]
 pub struct UartTransmitter {
-    /// Clock.
+    /// Clock; registers change on its rising edge.
     pub clk: Signal<In, Clock>,
-    /// Reset.
+    /// Synchronous reset, active high.
     pub rst: Signal<In, Bit>,
-    /// The byte.
+    /// The byte; valid with `valid`.
     pub data: Wire<In>,
-    /// It is offered.
+    /// `data` is offered; held until `ready`.
     pub valid: Signal<In, Bit>,
-    /// It is taken.
+    /// The byte is accepted in this cycle.
     pub ready: Signal<Out, Bit>,
     /// The line, high when idle.
     pub line: Signal<Out, Bit>,
@@ -36,7 +36,7 @@ struct State {
 const BITS: u32 = 10;
 
 impl UartTransmitter {
-    /// For `baud` bit/s at a clock of `clock_hz`.
+    /// For `baud` bit/s at a clock of `clock_hz` Hz.
     pub fn new(baud: u32, clock_hz: u32) -> Self {
         UartTransmitter {
             clk: Default::default(),
@@ -96,7 +96,7 @@ reg [3:0] left;
 reg [{end}:0] phase;
 reg [{bits_end}:0] shift;
 wire [{fraction}:0] sum = {{1'b0, phase}} + {width}'d{increment};
-// Idle from the start: a low line would be a start bit.
+// Idle after configuration: a low line would be a start bit.
 initial line = 1'b1;
 always @(*) ready = left == 4'd0;
 always @(posedge clk) begin

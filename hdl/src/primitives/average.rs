@@ -7,32 +7,35 @@ use super::pass_through::pass_through;
 use crate::wire::{Wire, Word};
 
 /// ```text
-/// s_axis --> read sum, hold word --> add --> memory, or in the last frame m_axis
+/// s_axis --> read sum, hold word --> add --> memory; in the last of the 2^k frames also m_axis
 /// ```
-/// The sums have a memory of their own, so that frames come in while the frame buffer is still read. An early `tlast`
-/// in any of the frames starts over; it leaves as a beat of its own, for `receive` to drop and to flag. A missing one
-/// is missing on the sum's last beat as well. With k = 0 the stream passes through.
+/// The sums have their own memory, so that frames arrive while the frame buffer is still being read. An early `tlast`
+/// in any of the frames restarts the sum; its partial sum leaves as a beat with `tlast`, at which `receive` drops the
+/// frame and sets `framing`. If `tlast` is missing in any of the frames, it is missing on the sum's last beat too. With
+/// k = 0 the stream passes through.
+///
+/// Latency two cycles; all registers advance together while the output is free.
 #[derive(LogicBlock)]
 pub struct Average {
-    /// Clock.
+    /// Clock; registers change on its rising edge.
     pub clk: Signal<In, Clock>,
-    /// Reset.
+    /// Synchronous reset, active high.
     pub rst: Signal<In, Bit>,
-    /// A taxel's word.
+    /// A taxel's word, `bits` wide, two's complement; valid with `s_axis_tvalid`.
     pub s_axis_tdata: Wire<In>,
-    /// It is offered.
+    /// A beat is offered on `s_axis_tdata`; the sender holds it until `s_axis_tready`.
     pub s_axis_tvalid: Signal<In, Bit>,
-    /// It is taken.
+    /// The block accepts a beat in this cycle.
     pub s_axis_tready: Signal<Out, Bit>,
-    /// It is the frame's last.
+    /// The beat is the last of its frame; valid with `s_axis_tvalid`.
     pub s_axis_tlast: Signal<In, Bit>,
-    /// A taxel's sum.
+    /// A taxel's sum, `bits + power` wide, two's complement; valid with `m_axis_tvalid`.
     pub m_axis_tdata: Wire<Out>,
-    /// It is offered.
+    /// A beat is offered on `m_axis_tdata`; it is held until `m_axis_tready`.
     pub m_axis_tvalid: Signal<Out, Bit>,
-    /// It is taken.
+    /// The receiver accepts a beat in this cycle.
     pub m_axis_tready: Signal<In, Bit>,
-    /// It is the last of the sums.
+    /// The beat is the last of the sums; valid with `m_axis_tvalid`.
     pub m_axis_tlast: Signal<Out, Bit>,
     _sums: Vec<i64>,
     _power: u32,
@@ -43,7 +46,7 @@ pub struct Average {
     _out: Option<(i64, bool)>,
 }
 
-/// A word on its way to the sum.
+/// An accepted word and what becomes of its sum.
 #[derive(Clone, Copy, Debug)]
 struct Held {
     taxel: usize,
@@ -54,7 +57,7 @@ struct Held {
 }
 
 impl Average {
-    /// Words of `bits` bits of `taxels` taxels, 2^`power` frames.
+    /// Sums words of `bits` bits of `taxels` taxels over 2^`power` frames.
     pub fn new(taxels: usize, bits: usize, power: u32) -> Self {
         Average {
             clk: Default::default(),
@@ -142,7 +145,7 @@ impl Logic for Average {
 
     fn hdl(&self) -> Verilog {
         if self._power == 0 {
-            return pass_through("A frame is one frame.");
+            return pass_through("No averaging: the stream passes through.");
         }
         let (k, bits, taxel) = (self._power as usize, self.s_axis_tdata.width(), count_bits(self._sums.len()));
         Verilog::Custom(format!(

@@ -1,24 +1,23 @@
-//! Nothing in the place of what dead taxels read.
+//! Replaces the words of dead taxels by zero.
 
 use rust_hdl::prelude::*;
 
 use super::counter::count_bits;
 use crate::wire::{Wire, Word};
 
-/// Counts the taxels of a frame; `kept` is the word on `word`, or 0 where the taxel whose turn it is is dead.
-///
-/// Whether it is dead is known a cycle ahead, so that the comparisons are not in the way of the word.
+/// Counts the taxels of a frame; `kept` is `word`, or 0 if the current taxel is dead. Combinational from `word` to
+/// `kept`: the comparison with the list of dead taxels is registered a cycle ahead.
 #[derive(LogicBlock)]
 pub struct Blank {
-    /// Clock.
+    /// Clock; registers change on its rising edge.
     pub clk: Signal<In, Clock>,
-    /// Back to the frame's first taxel.
+    /// Restarts the count at the first taxel, with priority over `enable`.
     pub clear: Signal<In, Bit>,
-    /// The word is taken: next taxel.
+    /// `word` is accepted; the next taxel follows.
     pub enable: Signal<In, Bit>,
-    /// A taxel's word.
+    /// The current taxel's word, `bits` wide.
     pub word: Wire<In>,
-    /// What counts of it.
+    /// `word`, or 0 for a dead taxel; same cycle.
     pub kept: Wire<Out>,
     _dead: Vec<usize>,
     _taxels: usize,
@@ -26,7 +25,7 @@ pub struct Blank {
 }
 
 impl Blank {
-    /// Words of `bits` bits of `taxels` taxels, of which those of `dead` do not count.
+    /// Words of `bits` bits of a frame of `taxels` taxels; `dead` lists the row-major indices of the dead ones.
     pub fn new(bits: usize, taxels: usize, dead: &[usize]) -> Self {
         Blank {
             clk: Default::default(),
@@ -62,7 +61,7 @@ impl Logic for Blank {
     fn hdl(&self) -> Verilog {
         if self._dead.is_empty() {
             return Verilog::Custom(
-                "// Every taxel is read.\nwire unused = &{1'b0, clk, clear, enable};\nalways @(*) kept = word;"
+                "// No taxel is dead.\nwire unused = &{1'b0, clk, clear, enable};\nalways @(*) kept = word;"
                     .to_string(),
             );
         }

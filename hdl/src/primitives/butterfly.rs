@@ -5,14 +5,14 @@ use rust_hdl::prelude::*;
 
 use crate::wire::{Wire, Word};
 
-/// Four signed fields in, their four signed sums out one cycle later, two bits wider.
+/// Four signed fields in, their Hadamard transform one cycle later: four signed sums, two bits wider.
 #[derive(LogicBlock)]
 pub struct Butterfly {
-    /// Clock.
+    /// Clock; registers change on its rising edge.
     pub clk: Signal<In, Clock>,
-    /// Four fields.
+    /// Four signed fields of `bits` bits, one per taxel of the quad.
     pub quad: Wire<In>,
-    /// Four sums, one cycle later.
+    /// Four signed sums of `bits + 2` bits, field p = parity p; one cycle after `quad`.
     pub sums: Wire<Out>,
 }
 

@@ -1,4 +1,4 @@
-//! Codes to stress: zero and gain of each taxel, from a table in a memory file.
+//! Codes to stress: subtracts the zero and multiplies by the gain of each taxel, from a table in a memory file.
 
 use dermis_golden::fixed::prepare::{Prepare, GAIN_BITS, GAIN_FRACTION};
 use rust_hdl::prelude::*;
@@ -10,29 +10,29 @@ use crate::wire::{Wire, Word};
 /// ```text
 /// s_axis --> read table, hold code --> difference --> product --> round, saturate --> m_axis
 /// ```
-/// All steps move together while the output is free. Without a table of gains the difference is the result; without any
-/// the stream passes through. The taxel count starts over at a `tlast`, as that of `receive` does.
+/// All registers advance together while the output is free: latency 4 cycles with gains, 2 with zeros alone, 0 with no
+/// table, where the stream passes through. The taxel count restarts at `tlast`, as in `receive`.
 #[derive(LogicBlock)]
 pub struct Calibrate {
-    /// Clock.
+    /// Clock; registers change on its rising edge.
     pub clk: Signal<In, Clock>,
-    /// Reset.
+    /// Synchronous reset, active high.
     pub rst: Signal<In, Bit>,
-    /// A taxel's code.
+    /// A taxel's code, `bits` wide, two's complement; valid with `s_axis_tvalid`.
     pub s_axis_tdata: Wire<In>,
-    /// It is offered.
+    /// A beat is offered on `s_axis_tdata`; the sender holds it until `s_axis_tready`.
     pub s_axis_tvalid: Signal<In, Bit>,
-    /// It is taken.
+    /// The block accepts a beat in this cycle.
     pub s_axis_tready: Signal<Out, Bit>,
-    /// It is the frame's last.
+    /// The beat is the last of its frame; valid with `s_axis_tvalid`.
     pub s_axis_tlast: Signal<In, Bit>,
-    /// A taxel's stress.
+    /// A taxel's stress in codes, `bits` wide, two's complement, saturated; valid with `m_axis_tvalid`.
     pub m_axis_tdata: Wire<Out>,
-    /// It is offered.
+    /// A beat is offered on `m_axis_tdata`; it is held until `m_axis_tready`.
     pub m_axis_tvalid: Signal<Out, Bit>,
-    /// It is taken.
+    /// The receiver accepts a beat in this cycle.
     pub m_axis_tready: Signal<In, Bit>,
-    /// It is the frame's last.
+    /// The beat is the last of its frame; valid with `m_axis_tvalid`.
     pub m_axis_tlast: Signal<Out, Bit>,
     _prepare: Prepare,
     _taxels: usize,
@@ -40,11 +40,11 @@ pub struct Calibrate {
     _pipe: Vec<Option<(i64, bool)>>,
 }
 
-/// Name of the table's file.
+/// File of the table, one line per taxel: zero in the low bits, gain above.
 pub const CALIBRATION_FILE: &str = "calibration.hex";
 
 impl Calibrate {
-    /// Codes of `bits` bits of `taxels` taxels.
+    /// Calibrates codes of `bits` bits of `taxels` taxels with the tables of `prepare`.
     pub fn new(prepare: &Prepare, taxels: usize, bits: usize) -> Self {
         let steps = match (&prepare.zero, &prepare.gain) {
             (None, None) => 0,
@@ -69,7 +69,7 @@ impl Calibrate {
         }
     }
 
-    /// The table as hex lines for `$readmemh`, the zero in the low bits; `None` without one.
+    /// Content of [`CALIBRATION_FILE`] for `$readmemh`; `None` without a table.
     pub fn table_file(&self) -> Option<String> {
         let bits = self.s_axis_tdata.width();
         let zero = self._prepare.zero.as_ref()?;
@@ -128,11 +128,11 @@ impl Logic for Calibrate {
         let bits = self.s_axis_tdata.width();
         let steps = self._pipe.len();
         if steps == 0 {
-            return pass_through("Codes are stress already.");
+            return pass_through("No zero and no gain: the stream passes through.");
         }
         let gain = if self._prepare.gain.is_some() { GAIN_BITS as usize } else { 0 };
         let taxel = count_bits(self._taxels);
-        // The difference has one bit more; a product with a gain is rounded by its fraction and is no longer than that.
+        // The difference has one bit more; the product with a gain is shifted right by its fraction.
         let product = bits + 1 + gain;
         let (declare, clocked, result) = match gain {
             0 => (String::new(), String::new(), "difference".to_string()),

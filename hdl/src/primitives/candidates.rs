@@ -1,4 +1,4 @@
-//! p at the nine candidates about the centre.
+//! Values of p at the nine candidates of the 3×3 grid about the centre.
 
 use dermis_golden::fixed::schedule::EXPONENTS;
 use dermis_golden::fixed::search::candidates;
@@ -7,25 +7,26 @@ use rust_hdl::prelude::*;
 use super::polynomial_word::{resize, PolynomialWord};
 use crate::wire::{Wire, Word};
 
-/// Polynomials in; two cycles later nine values per lane, value k = 3·(y + 1) + (x + 1) of lane l in field 9·l + k,
-/// each as wide as the constant coefficient. Rows of equal y-exponent first, then their combination: 21 adders per lane.
+/// Polynomials in; nine values per lane two cycles later. Value k = 3·(y + 1) + (x + 1) of lane l is field 9·l + k, as
+/// wide as the constant coefficient. First cycle: for each power of y, the three values over x; second cycle: their
+/// combination over y. 21 adders per lane at degree 3.
 #[derive(LogicBlock)]
 pub struct Candidates {
-    /// Clock.
+    /// Clock; registers change on its rising edge.
     pub clk: Signal<In, Clock>,
-    /// Polynomials.
+    /// One polynomial per lane, in the layout given; a new word may come each cycle.
     pub word: Wire<In>,
-    /// Nine values per lane, two cycles later.
+    /// Nine signed values per lane, [`LATENCY`] cycles after `word`.
     pub values: Wire<Out>,
     _layout: PolynomialWord,
     _between: Word,
 }
 
-/// Cycles from a polynomial to its values.
+/// Cycles from `word` to `values`.
 pub const LATENCY: usize = 2;
 
 impl Candidates {
-    /// Polynomials in `layout`.
+    /// For polynomials in `layout`.
     pub fn new(layout: PolynomialWord) -> Self {
         Candidates {
             clk: Default::default(),
@@ -74,7 +75,7 @@ impl Logic for Candidates {
                 present.join(" + ")
             }
         };
-        // Row j: even part and odd part in x, then its value at x = −1, 0, 1.
+        // Terms of y^j: even and odd part in x, then their value at x = −1, 0, 1.
         let rows = (0..4).filter(|&j| coefficient(0, j).is_some()).collect::<Vec<u32>>();
         let mut registers = String::new();
         for &j in &rows {

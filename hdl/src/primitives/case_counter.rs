@@ -1,31 +1,31 @@
-//! A counter whose end depends on the case, and how what depends on the case is printed.
+//! A counter whose limit depends on the case, and Verilog expressions for values that depend on the case.
 
 use rust_hdl::prelude::*;
 
 use super::counter::count_bits;
 use crate::wire::{Wire, Word};
 
-/// As [`Counter`](super::Counter), from 0 to the limit of case `which`. The value is at most the limit when `which`
-/// changes, or cleared before it counts again.
+/// As [`Counter`](super::Counter), with the limit of case `which`. When `which` changes, the count must be below the
+/// new limit, or be cleared before it is enabled again.
 #[derive(LogicBlock)]
 pub struct CaseCounter {
-    /// Clock.
+    /// Clock; registers change on its rising edge.
     pub clk: Signal<In, Clock>,
-    /// Which case.
+    /// Index of the case.
     pub which: Wire<In>,
-    /// Back to 0.
+    /// Sets the count to 0 at the clock edge, with priority over `enable`.
     pub clear: Signal<In, Bit>,
-    /// One step.
+    /// Steps the count at the clock edge; from the last value to 0.
     pub enable: Signal<In, Bit>,
-    /// The count.
+    /// The count, unsigned.
     pub value: Wire<Out>,
-    /// The count is at its last value.
+    /// The count is at its last value, the limit of the case − 1; combinational.
     pub last: Signal<Out, Bit>,
     _ends: Vec<u64>,
 }
 
 impl CaseCounter {
-    /// Counts 0 .. a limit of at least 1 for each case.
+    /// `limits[case]` is the number of counts of each case; 0 is taken as 1.
     pub fn new(limits: &[usize]) -> Self {
         CaseCounter {
             clk: Default::default(),
@@ -39,12 +39,12 @@ impl CaseCounter {
     }
 }
 
-/// The largest of some limits.
+/// The largest of `limits`, 1 if there are none.
 pub fn largest(limits: &[usize]) -> usize {
     limits.iter().copied().max().unwrap_or(1)
 }
 
-/// Verilog for the one of `values` that belongs to case `which`; a constant where all are the same.
+/// Verilog expression that selects `values[which]`; `values[0]` without a selection where all are equal.
 pub fn by_case(values: &[String]) -> String {
     let which = count_bits(values.len());
     match values {
@@ -57,7 +57,7 @@ pub fn by_case(values: &[String]) -> String {
     }
 }
 
-/// [`by_case`] of numbers of `bits` bits.
+/// [`by_case`] of unsigned numbers of `bits` bits.
 pub fn number_by_case(values: impl Iterator<Item = usize>, bits: usize) -> String {
     by_case(&values.map(|value| format!("{bits}'d{value}")).collect::<Vec<_>>())
 }

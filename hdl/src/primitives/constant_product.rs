@@ -1,6 +1,6 @@
-//! Products with constants, from shifts and additions: multipliers are for the passes.
+//! Products with constants as sums of shifts, which take no multiplier: those are reserved for the passes.
 
-/// Verilog of `value · constant` for a vector expression and a constant of at least 1; as wide as the value.
+/// Verilog expression of `value · constant`, truncated to the width of `value`; `constant` is at least 1.
 pub fn times(value: &str, constant: usize) -> String {
     let terms: Vec<String> = (0..usize::BITS)
         .filter(|bit| constant >> bit & 1 == 1)

@@ -8,25 +8,25 @@ use crate::wire::{Wire, Word};
 /// ```text
 /// clear, enable --> value, last
 /// ```
-/// `enable` steps at the clock edge, from `limit − 1` back to 0; `clear` wins over it. `last` is high while the value
+/// `enable` steps at the clock edge, from `limit − 1` back to 0; `clear` has priority. `last` is high while the value
 /// is `limit − 1`.
 #[derive(LogicBlock)]
 pub struct Counter {
-    /// Clock.
+    /// Clock; registers change on its rising edge.
     pub clk: Signal<In, Clock>,
-    /// Back to 0.
+    /// Sets the count to 0 at the clock edge, with priority over `enable`.
     pub clear: Signal<In, Bit>,
-    /// One step.
+    /// Steps the count at the clock edge.
     pub enable: Signal<In, Bit>,
-    /// The count.
+    /// The count, 0..`limit`, unsigned.
     pub value: Wire<Out>,
-    /// The count is at its last value.
+    /// The count is `limit − 1`; combinational.
     pub last: Signal<Out, Bit>,
     _limit: u64,
 }
 
 impl Counter {
-    /// Counts 0 .. `limit`, `limit` at least 1.
+    /// Counts 0..`limit`; a `limit` of 0 is taken as 1.
     pub fn new(limit: usize) -> Self {
         Counter {
             clk: Default::default(),

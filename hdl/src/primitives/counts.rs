@@ -1,4 +1,4 @@
-//! Which lanes of a quad are taxels of their own.
+//! Lane mask of a quad: which lanes hold distinct taxels.
 
 use dermis_golden::fixed::quads::Quads;
 use rust_hdl::prelude::*;
@@ -6,21 +6,21 @@ use rust_hdl::prelude::*;
 use super::counter::count_bits;
 use crate::wire::{Wire, Word};
 
-/// Case and quad address to the lanes that count: all four, but one of each pair of copies on a middle line.
-/// Combinational.
+/// Quad address to lane mask; combinational. All four lanes count, except that of each pair of copies on the middle
+/// line of an odd row or column count only one does.
 #[derive(LogicBlock)]
 pub struct Counts {
-    /// Which case.
+    /// Index of the case.
     pub which: Wire<In>,
-    /// Quad address.
+    /// Quad address in the subarray.
     pub address: Wire<In>,
-    /// One bit per lane.
+    /// One bit per lane: the lane is counted.
     pub mask: Wire<Out>,
     _layouts: Vec<Quads>,
 }
 
 impl Counts {
-    /// For subarrays of the layout of each case.
+    /// `layouts[case]` is the quad layout of the subarrays of each case.
     pub fn new(layouts: &[Quads]) -> Self {
         let quads = layouts.iter().map(Quads::len).max().unwrap_or(1);
         Counts {

@@ -1,17 +1,17 @@
-//! Pipelines: a word or a control bit, some cycles later.
+//! Shift registers: a word or a control bit, delayed by a fixed number of cycles.
 
 use rust_hdl::prelude::*;
 
 use crate::wire::{Wire, Word};
 
-/// A word, `depth` cycles later. Data is not reset.
+/// A word delayed by `depth` cycles. Data, therefore without reset.
 #[derive(LogicBlock)]
 pub struct Delay {
-    /// Clock.
+    /// Clock; registers change on its rising edge.
     pub clk: Signal<In, Clock>,
-    /// The word now.
+    /// Input word.
     pub now: Wire<In>,
-    /// The word `depth` cycles ago.
+    /// The word that was on `now` `depth` cycles earlier.
     pub then: Wire<Out>,
     _pipe: Vec<Word>,
 }
@@ -59,16 +59,16 @@ end",
     }
 }
 
-/// A control bit, `depth` cycles later; reset clears the whole pipeline.
+/// A control bit delayed by `depth` cycles; reset clears the whole shift register.
 #[derive(LogicBlock)]
 pub struct BitDelay {
-    /// Clock.
+    /// Clock; registers change on its rising edge.
     pub clk: Signal<In, Clock>,
-    /// Reset.
+    /// Synchronous reset, active high.
     pub rst: Signal<In, Bit>,
-    /// The bit now.
+    /// Input bit.
     pub now: Signal<In, Bit>,
-    /// The bit `depth` cycles ago.
+    /// The bit that was on `now` `depth` cycles earlier.
     pub then: Signal<Out, Bit>,
     _pipe: Vec<bool>,
 }

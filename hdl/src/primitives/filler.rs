@@ -1,4 +1,4 @@
-//! Where finished vectors go in the operand memory.
+//! Write address of finished vectors in the operand memory.
 
 use rust_hdl::prelude::*;
 
@@ -6,23 +6,23 @@ use super::case_counter::{largest, number_by_case};
 use super::counter::count_bits;
 use crate::wire::{Wire, Word};
 
-/// Counts the quads of a frame's vectors as they arrive: the address of the present one, whether it is an operand of a
-/// later pass at all, and how many vectors are complete.
+/// Counts the quads of the v_ij as they arrive: the write address of the current quad, whether it is an operand of a
+/// later pass and has to be written, and how many vectors are complete.
 #[derive(LogicBlock)]
 pub struct Filler {
-    /// Clock.
+    /// Clock; registers change on its rising edge.
     pub clk: Signal<In, Clock>,
-    /// Which case.
+    /// Index of the case.
     pub which: Wire<In>,
-    /// New frame.
+    /// Restarts the counts for the next subarray, with priority over `valid`.
     pub clear: Signal<In, Bit>,
-    /// A quad arrives.
+    /// A quad of a v_ij arrives in this cycle.
     pub valid: Signal<In, Bit>,
-    /// Its address in the operand memory.
+    /// Write address of the quad; valid with `keep`.
     pub address: Wire<Out>,
-    /// Keep it.
+    /// Write enable: the quad is an operand of a later pass. Combinational from `valid`.
     pub keep: Signal<Out, Bit>,
-    /// Complete operand vectors.
+    /// Number of complete operand vectors of this subarray.
     pub finished: Wire<Out>,
     _quads: Vec<usize>,
     _vectors: usize,
@@ -30,7 +30,7 @@ pub struct Filler {
 }
 
 impl Filler {
-    /// `vectors` operand vectors of so many `quads` in each case.
+    /// `vectors` operand vectors per subarray, of `quads[case]` quads each.
     pub fn new(vectors: usize, quads: &[usize]) -> Self {
         Filler {
             clk: Default::default(),
@@ -74,7 +74,7 @@ impl Logic for Filler {
         let q = count_bits(largest(&self._quads));
         if self._vectors == 0 {
             return Verilog::Custom(format!(
-                "// No v_ij is an operand.\nwire unused = &{{1'b0, clk, which, clear, valid}};\n\
+                "// No v_ij is an operand of a later pass.\nwire unused = &{{1'b0, clk, which, clear, valid}};\n\
                  always @(*) {{keep, address, finished}} = {}'d0;",
                 1 + a + f
             ));

@@ -1,4 +1,4 @@
-//! p to force words, and the output beats with their status.
+//! Force arithmetic: p(μ*) to force words, and the output beats with their status.
 
 use dermis_golden::fixed::cycles::ACCEPT;
 use dermis_golden::fixed::force::{force, mu_word};
@@ -19,61 +19,63 @@ use super::rescaler::SATURATION_BITS;
 use super::sweep::position_bits;
 use crate::wire::{Wire, Word};
 
-/// A pipeline that never waits: memory (3 steps), lane, products (2), shift, rounding with saturation, threshold, output.
-/// `beat` 0 is a force from `quad`, 1 … 3 are the status beats; the answer stands on `beat_data` for one cycle, ten after
-/// `offer`. `start` keeps μ, the shift and the status of subarray `part`, settled three cycles later;
-/// `begin_frame` clears the frame's counts.
+/// A pipeline without stalls: memory (3 cycles), lane selection, products (2), shift, rounding and saturation,
+/// threshold, output.
+///
+/// `beat` 0 asks for a force from `quad`, 1 … 3 for a status beat; the beat is on `beat_data` for one cycle, [`STEPS`]
+/// cycles after `offer`. `start` stores μ, shift and status of subarray `part`, which are usable three cycles later;
+/// `begin_frame` clears the counts of the frame.
 #[derive(LogicBlock)]
 pub struct ForceUnit {
-    /// Clock.
+    /// Clock; registers change on its rising edge.
     pub clk: Signal<In, Clock>,
-    /// Reset of the control pipeline.
+    /// Synchronous reset, active high; clears the control pipeline only.
     pub rst: Signal<In, Bit>,
-    /// Which case the beats that leave belong to.
+    /// Index of the case of the frame being sent.
     pub which: Wire<In>,
-    /// New frame: counts back to 0.
+    /// A new frame: clears its counts, the contact flag and the saturations.
     pub begin_frame: Signal<In, Bit>,
-    /// Keep what is known of subarray `part`.
+    /// Stores position, exponents and status of subarray `part` in this cycle.
     pub start: Signal<In, Bit>,
-    /// Which subarray.
+    /// Index of the subarray; valid with `start`.
     pub part: Wire<In>,
-    /// A beat enters.
+    /// A beat is requested in this cycle.
     pub offer: Signal<In, Bit>,
-    /// Which beat, 2 bits.
+    /// 0: a force, 1 … 3: a status beat; valid with `offer`.
     pub beat: Wire<In>,
-    /// Its subarray.
+    /// Index of the beat's subarray; valid with `offer`.
     pub beat_part: Wire<In>,
-    /// The quad's lane, with `offer`.
+    /// Lane of the taxel in its quad; valid with `offer`.
     pub lane: Wire<In>,
-    /// Four values of p, three steps after `offer`.
+    /// Four values p(μ*), `search_bits[0]` each, signed; three cycles after `offer`.
     pub quad: Wire<In>,
-    /// μ1 as a position.
+    /// μ1 in grid steps of the last level, signed; valid with `start`.
     pub position_x: Wire<In>,
-    /// μ2 as a position.
+    /// μ2 in grid steps of the last level, signed; valid with `start`.
     pub position_y: Wire<In>,
-    /// Left shift of `normalise`.
+    /// Left shift of `normalise`; valid with `start`.
     pub normalise: Wire<In>,
-    /// Right shift of `rescale`.
+    /// Right shift of `rescale`; valid with `start`.
     pub rescale: Wire<In>,
-    /// The scene's condition is met.
+    /// The subarray meets the scene's condition; valid with `start`.
     pub condition: Signal<In, Bit>,
-    /// The search found a candidate.
+    /// The search found a candidate; valid with `start`.
     pub found: Signal<In, Bit>,
-    /// `tlast` was early or missing.
+    /// `tlast` was early or missing; sampled when the beat with the flags leaves.
     pub framing: Signal<In, Bit>,
-    /// The subarray's coefficients were not what they must be.
+    /// The coefficient signature is wrong, 1 bit; valid with `start`.
     pub damaged: Wire<In>,
-    /// Score of the winner.
+    /// Score of the best candidate, signed, 2^−6; valid with `start`.
     pub score: Wire<In>,
-    /// Words that `rescale` saturated.
+    /// Words saturated by `rescale`; valid with `start`.
     pub saturations: Wire<In>,
-    /// Cycles of the frame so far.
+    /// Cycle counter of the frame; sampled when the first beat leaves.
     pub cycles: Wire<In>,
-    /// A beat stands on the output.
+    /// `beat_data` holds a beat in this cycle.
     pub valid: Signal<Out, Bit>,
-    /// It is the frame's last.
+    /// The beat is the frame's last; valid with `valid`.
     pub last: Signal<Out, Bit>,
-    /// `{fz, fy, fx}`.
+    /// `{fz, fy, fx}`, 32 bits signed each, or three status words; valid with `valid`.
     pub beat_data: Wire<Out>,
     _formats: Formats,
     _threshold: i64,
@@ -85,20 +87,20 @@ pub struct ForceUnit {
     _checks: bool,
 }
 
-/// Steps from `offer` to the output.
+/// Cycles from `offer` to `valid`.
 pub const STEPS: usize = 10;
-/// Steps of them from `offer` to `quad`.
+/// Cycles from `offer` to `quad`.
 const READ_STEPS: usize = 3;
-/// And from a value to its products.
+/// Cycles from a value to its products.
 const PRODUCT_STEPS: usize = 2;
-/// Steps in which what was asked for goes along.
+/// Cycles for which a request travels along the pipeline.
 const ASKED: usize = STEPS - 1;
-/// Bits of p that a multiplier takes beside a sign.
+/// Bits of the unsigned low part of p: a multiplier operand without its sign bit.
 const LOW: usize = MULTIPLIER_BITS as usize - 1;
-/// Cycles of a frame that its counter does not see: it is 0 two cycles after the frame starts, and the first output beat
-/// stands when it has gone through the queue.
+/// Cycles of a frame outside its counter: before the counter is cleared, two cycles after the frame starts, and from
+/// its sampling to the first beat behind the queue.
 const UNCOUNTED: u32 = ACCEPT as u32 + 3 + LEAVING as u32;
-/// Width of the cycle counter.
+/// Width of the cycle counter, in bits.
 pub const CYCLE_BITS: usize = 24;
 
 #[derive(Clone, Copy, Debug, Default)]
@@ -109,7 +111,7 @@ struct Entry {
     value: i64,
 }
 
-/// What is kept of a subarray.
+/// Values stored per subarray.
 #[derive(Clone, Copy, Debug, Default)]
 struct Part {
     position: [i32; 2],
@@ -122,7 +124,7 @@ struct Part {
     saturations: u32,
 }
 
-/// What is kept of a frame.
+/// Values stored per frame.
 #[derive(Clone, Copy, Debug, Default)]
 struct Frame {
     cycles: u32,
@@ -132,7 +134,7 @@ struct Frame {
 }
 
 impl ForceUnit {
-    /// Widths of `model`, subarrays and numbers of its cases.
+    /// With the widths, subarrays and case numbers of `model`.
     pub fn new(model: &Model) -> Self {
         let formats = &model.formats;
         let counts: Vec<usize> = model.cases().iter().map(|case| case.parts.len()).collect();
@@ -170,7 +172,7 @@ impl ForceUnit {
             _frame: Frame::default(),
             _parts: vec![Part::default(); parts],
             _counts: counts,
-            // The case is told where it is chosen.
+            // The status names the case only where it is chosen per frame.
             _numbers: model.cases().iter().map(|case| if model.chooses() { case.number() } else { 0 }).collect(),
         }
     }
@@ -224,8 +226,8 @@ impl ForceUnit {
         }
     }
 
-    /// Verilog of what shear needs: the μ words of each subarray, then their products with p. None of it without a
-    /// search.
+    /// Verilog of the shear components: the μ words of each subarray, then their products with p. Used with a search
+    /// only.
     fn shear(&self) -> (String, String) {
         let f = &self._formats;
         let (p, mu) = (position_bits(), 18);
@@ -242,7 +244,7 @@ wire signed [{mp_end}:0] mu_step = {mp}'sd{mu_step};
 wire signed [{mp_end}:0] wide_x = {{{{{mp_more}{{x[{p_end}]}}}}, x}};
 wire signed [{mp_end}:0] wide_y = {{{{{mp_more}{{y[{p_end}]}}}}, y}};
 reg signed [{mp_end}:0] scaled_x, scaled_y;
-// Apart from the addition: an unsigned operand would make the shift logical.
+// Separate from the addition, whose unsigned operand would make the shift logical.
 wire signed [{mp_end}:0] before_x = scaled_x >>> {mu_round_less};
 wire signed [{mp_end}:0] before_y = scaled_y >>> {mu_round_less};
 wire [{mp_end}:0] half_x = before_x + {mp}'sd1;
@@ -276,7 +278,7 @@ end
             "\
 reg signed [{mu_end}:0] mu_x, mu_y;
 reg signed [{product_end}:0] product_x, product_y;
-// What a multiplier takes of p, as a number without a sign, and the rest: their products are added up a step later.
+// p as an unsigned low part that fits a multiplier and the signed rest; their products are added a cycle later.
 wire signed [{mu_end}:0] low = {{1'b0, value[{low_end}:0]}};
 wire signed [{high_end}:0] high = value[{v_end}:{low_bits}];
 reg signed [{low_product_end}:0] low_x, low_y;
@@ -313,7 +315,7 @@ end
         (words, products)
     }
 
-    /// Verilog in their place: fx and fy are zero.
+    /// The same without a search: fx and fy are zero.
     fn no_shear(&self) -> (String, String) {
         let unused = "wire unused_mu = &{1'b0, position_x, position_y};\n";
         let zero = "assign rounded[63:0] = 64'd0;\nassign clips[1:0] = 2'd0;\n";
@@ -374,7 +376,7 @@ impl Logic for ForceUnit {
         let p = position_bits();
         let part = self.part.width();
         let (n_bits, r_bits) = (self.normalise.width(), self.rescale.width());
-        // force_shift = base + normalise − rescale, held between 0 and the largest useful shift.
+        // force_shift = base + normalise − rescale, clamped to 0 and the largest useful shift.
         let base = force_shift(f, 0, 0) as usize;
         let (word, cap) = (FORCE_BITS as usize, SATURATION_BITS);
         let score = resize("score", self.score.width(), word);
@@ -384,7 +386,7 @@ impl Logic for ForceUnit {
         };
         let searched = f.degree > 0;
         let (mu_words, shear) = if searched { self.shear() } else { self.no_shear() };
-        // From bit 4 on, or 5 where that tells of the coefficients.
+        // Flag bit 4 is the coefficient check, if the scene has it.
         let (from, damaged) = if self._checks { (5, ", damages[at_out]") } else { (4, "") };
         let above = word - CASE_SHIFT as usize;
         let case_word = match self._numbers.iter().any(|&number| number > 0) {
@@ -413,7 +415,7 @@ wire unused_which = &{{1'b0, which}};
 reg [{r_end}:0] rescale_held;
 reg [{part_end}:0] part1, part2;
 reg start1, start2;
-// Kept per subarray: what the pipeline and the status beats need.
+// Stored per subarray, for the pipeline and the status beats.
 reg [5:0] shifts [0:{last_part}];
 reg [{n_end}:0] normalises [0:{last_part}];
 reg [{r_end}:0] rescales [0:{last_part}];
@@ -446,7 +448,7 @@ wire [7:0] raw_shift = 8'd{base} + {{{n_more}'d0, normalise_held}} - {{{r_more}'
     shifts[part2] <= shift_now;
   end
 end
-// What was asked for goes along: to the lane's choice, to the shift, to the output.
+// The request travels along the pipeline: to the lane selection, the shift, the output.
 reg [{asked_end}:0] offers;
 reg [{beats_end}:0] beats;
 reg [{lanes_end}:0] lanes;
@@ -475,7 +477,7 @@ generate
     wire unused = &{{1'b0, half_up[0]}};
   end
 endgenerate
-{magnitude}// What the threshold says goes along with the words.
+{magnitude}// The result of the threshold is registered beside the words.
 reg [{all_end}:0] force_words;
 reg below, presses;
 reg [2:0] force_clips;

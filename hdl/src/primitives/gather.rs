@@ -1,4 +1,4 @@
-//! Magnitude and signs of a frame while its samples arrive.
+//! Magnitude and signs of each subarray, gathered while the frame arrives.
 
 use dermis_golden::fixed::arith::magnitude_bits;
 use dermis_golden::fixed::receive::Received;
@@ -7,34 +7,34 @@ use rust_hdl::prelude::*;
 use super::counter::count_bits;
 use crate::wire::{Wire, Word};
 
-/// For every subarray, ORs the magnitudes of its accepted codes and remembers whether one lay above the noise floor or below its
-/// negative. `select` picks the subarray that the outputs tell of.
+/// For each subarray: the OR of the magnitudes of its accepted codes, and whether any code was above the noise floor or
+/// below its negative. `select` chooses the subarray whose values are on the outputs.
 #[derive(LogicBlock)]
 pub struct Gather {
-    /// Clock.
+    /// Clock; registers change on its rising edge.
     pub clk: Signal<In, Clock>,
-    /// Forget everything.
+    /// Clears the values of all subarrays, with priority over `accept`.
     pub clear: Signal<In, Bit>,
-    /// Take `code`.
+    /// `code` and `part` are valid and taken in.
     pub accept: Signal<In, Bit>,
-    /// A code.
+    /// A code, `bits` wide, two's complement.
     pub code: Wire<In>,
-    /// The code's subarray.
+    /// Index of the code's subarray.
     pub part: Wire<In>,
-    /// The subarray to tell of.
+    /// Index of the subarray on the outputs; combinational.
     pub select: Wire<In>,
-    /// OR of the magnitudes, one bit narrower than a code.
+    /// OR of the ones' complement magnitudes of subarray `select`, one bit narrower than a code.
     pub magnitude: Wire<Out>,
-    /// A code was above the floor.
+    /// A code of subarray `select` was above the noise floor.
     pub positive: Signal<Out, Bit>,
-    /// A code was below minus the floor.
+    /// A code of subarray `select` was below minus the noise floor.
     pub negative: Signal<Out, Bit>,
     _floor: i64,
     _parts: Vec<Received>,
 }
 
 impl Gather {
-    /// Codes of `bits` bits, `floor` in codes, `parts` subarrays.
+    /// For codes of `bits` bits, a noise floor of `floor` codes and `parts` subarrays.
     pub fn new(bits: usize, floor: i32, parts: usize) -> Self {
         Gather {
             clk: Default::default(),
@@ -46,7 +46,7 @@ impl Gather {
             magnitude: Wire::new(bits - 1),
             positive: Default::default(),
             negative: Default::default(),
-            // A floor beyond the code's range is never exceeded; the range's end says the same in the code's width.
+            // A floor beyond the code's range is clamped to its end, which no code exceeds either.
             _floor: i64::from(floor).min((1 << (bits - 1)) - 1),
             _parts: vec![Received::default(); parts],
         }

@@ -1,10 +1,11 @@
-//! Rounding of what a barrel shifter leaves, as Verilog.
+//! Verilog for rounding half up after a barrel shifter.
 
-/// Declares, of the signed `moved` of `bits` bits whose lowest is half an LSB, `half_up`, whose bits 1 … `word` are the
-/// value rounded half up in `word` bits, and assigns to `clips` whether it does not fit; the text is indented by four.
+/// Verilog that declares `half_up` and assigns `clips`. `moved` is signed, of `bits` bits, with half an LSB as its
+/// lowest bit; bits 1 … `word` of `half_up` are its value rounded half up, and `clips` is high if that does not fit
+/// `word` bits. Indented by four.
 ///
-/// Whether it fits is told beside the rounding, not after it: what is above the word must be sign bits once the carry out of
-/// the low bits has come in.
+/// The fit is tested in parallel with the rounding, not after it: the bits above the word must be sign bits once the
+/// carry from the low bits has been added.
 pub fn half_up(bits: usize, word: usize, clips: &str) -> String {
     format!(
         "    wire [{word}:0] half_up = moved[{word}:0] + {width}'d1;

@@ -1,4 +1,4 @@
-//! After a sweep: which of the nine candidates is the best so far.
+//! After a sweep: compares its nine candidates with each other and with the best so far.
 
 use dermis_golden::fixed::formats::Formats;
 use dermis_golden::fixed::search::Best;
@@ -8,49 +8,49 @@ use super::sweep::{position_bits, sweep_bits, unpack, Sweep};
 use super::weigh::weight_bits;
 use crate::wire::{Wire, Word};
 
-/// Score = total − weight for all nine at once, then a tree of comparisons by the search's rules of ties: row-major in
-/// the coarse grid; in a halving the centre, then row-major. The last three are compared with the best so far while the winner
-/// is found among them.
+/// Score = total − weight for all nine at once, then a tree of comparisons. Ties: in the coarse grid the first
+/// candidate in row-major order wins; in a halving the centre, then row-major order. The last three candidates are
+/// compared with the best so far in parallel with each other.
 ///
-/// `start` with totals, weights and sweep; `done` `LATENCY` cycles later, `improved` with it. `begin_frame`
-/// forgets the frame, `halve` doubles the position for the next level.
+/// `start` with totals, weights, eligibility and sweep; `done`, with `improved`, [`LATENCY`] cycles later.
+/// `begin_frame` clears the result for a new search, `halve` doubles the position for the next level.
 #[derive(LogicBlock)]
 pub struct Judge {
-    /// Clock.
+    /// Clock; registers change on its rising edge.
     pub clk: Signal<In, Clock>,
-    /// Reset.
+    /// Synchronous reset, active high; clears the control pipeline only.
     pub rst: Signal<In, Bit>,
-    /// New frame: μ = 0, nothing taken.
+    /// A new search: position 0, score 0, nothing taken.
     pub begin_frame: Signal<In, Bit>,
-    /// New level: the position doubles, nothing taken at it.
+    /// A new level: the position doubles and `taken` is cleared.
     pub halve: Signal<In, Bit>,
-    /// Judge the nine.
+    /// The nine candidates are valid; starts their comparison.
     pub start: Signal<In, Bit>,
-    /// Nine totals.
+    /// Nine totals Σ log2(…), `score_bits` each, signed; valid with `start`.
     pub totals: Wire<In>,
-    /// Nine n·log2 Σp.
+    /// Nine n·log2 Σp, unsigned; valid with `start`.
     pub weights: Wire<In>,
-    /// Nine bits: the candidate may be taken.
+    /// Nine bits, candidate k may be taken; valid with `start`.
     pub eligible: Wire<In>,
-    /// The sweep they belong to.
+    /// Word of the sweep ([`Sweep`]); valid with `start`.
     pub sweep: Wire<In>,
-    /// Judged; one cycle.
+    /// The comparison is complete; high for one cycle.
     pub done: Signal<Out, Bit>,
-    /// With `done`: it changed the best.
+    /// The best candidate changed; valid with `done`.
     pub improved: Signal<Out, Bit>,
-    /// With `done`: the next sweep waits for this.
+    /// The next sweep was waiting for this result; valid with `done`.
     pub closes: Signal<Out, Bit>,
-    /// The sweep just judged.
+    /// Word of the sweep just compared; valid with `done`.
     pub judged: Wire<Out>,
-    /// Best position, x.
+    /// Best position, x, in grid steps of the level, signed.
     pub best_x: Wire<Out>,
-    /// Best position, y.
+    /// Best position, y, in grid steps of the level, signed.
     pub best_y: Wire<Out>,
-    /// Its score.
+    /// Score of the best candidate, signed, 2^−6.
     pub score: Wire<Out>,
-    /// Something was taken at this level.
+    /// A candidate was taken at this level.
     pub taken: Signal<Out, Bit>,
-    /// Something was taken in the coarse grid.
+    /// A candidate was taken in the coarse grid.
     pub found: Signal<Out, Bit>,
     _left: usize,
     _next: (Word, Word, Word),
@@ -60,11 +60,11 @@ pub struct Judge {
 
 /// Cycles from `start` to `done`.
 pub const LATENCY: usize = 6;
-/// Order of the candidates: the centre first in a halving, row-major in the coarse grid.
+/// Order of comparison: index 0 in a halving, centre first; index 1 in the coarse grid, row-major.
 const ORDERS: [[usize; 9]; 2] = [[4, 0, 1, 2, 3, 5, 6, 7, 8], [0, 1, 2, 3, 4, 5, 6, 7, 8]];
 
 impl Judge {
-    /// Widths of `formats`, for subarrays of `taxels` taxels.
+    /// With the widths of `formats`, for subarrays of at most `taxels` taxels.
     pub fn new(formats: &Formats, taxels: usize) -> Self {
         Judge {
             clk: Default::default(),
@@ -92,7 +92,7 @@ impl Judge {
         }
     }
 
-    /// Judges all nine candidates one after the other.
+    /// Compares all nine candidates one after the other; whether the best changed.
     fn judge(&mut self, totals: Word, weights: Word, sweep: Sweep, eligible: u64) -> bool {
         let (t, w) = (self.totals.width() / 9, self.weights.width() / 9);
         let mut improved = false;
@@ -169,12 +169,12 @@ impl Logic for Judge {
             Some(more) => format!("{{{more}'d0, weights[k * {w} +: {w}]}}"),
             None => format!("weights[k * {w} +: {t}]"),
         };
-        // Declarations of a candidate: may it be taken, its score, its number.
+        // Declarations of a candidate: eligible, score, index.
         let declare = |kind: &str, names: &[&str]| -> String {
             let one = |n: &&str| format!("{kind} ok_{n};\n{kind} signed [{}:0] s_{n};\n{kind} [3:0] k_{n};\n", t - 1);
             names.iter().map(one).collect()
         };
-        // The winner of two, the first on a tie, one cycle later.
+        // The better of two, the first on a tie, one cycle later.
         let duel = |a: &str, b: &str, to: &str| {
             format!(
                 "  ok_{to} <= ok_{a} || ok_{b};\n  if (ok_{b} && (!ok_{a} || less(s_{b}, s_{a}))) begin\n    s_{to} <= s_{b};\n    \
@@ -191,7 +191,7 @@ impl Logic for Judge {
                 )
             })
             .collect();
-        // The eight about the centre keep their order: four pairs, then those before and those after the centre.
+        // The eight around the centre keep their order: four pairs, then the four before and the four after the centre.
         let pairs = duel("0", "1", "a") + &duel("2", "3", "b") + &duel("5", "6", "c") + &duel("7", "8", "d");
         let halves = duel("a", "b", "before") + &duel("c", "d", "after");
         let last = ["before", "centre", "after"];
@@ -221,7 +221,7 @@ impl Logic for Judge {
                  score_{n} <= s_{n};\n  at_x_{n} <= x_{n};\n  at_y_{n} <= y_{n};\n"
             )
         });
-        // Of the last three the winner's.
+        // The value of the best of the last three.
         let winner = |what: &str| format!("takes_after ? {what}_after : takes_centre ? {what}_centre : {what}_before");
         Verilog::Custom(format!(
             "\
@@ -241,7 +241,7 @@ function [{p_end}:0] along;
   input [1:0] step;
   along = {{{{{p_more}{{step[1]}}}}, step}};
 endfunction
-// Whether the best so far lies beyond the candidate a step from the centre, or in line with it.
+// Along one axis: whether the best so far is past the candidate at centre + step, or level with it.
 function beyond;
   input [{p}:0] ahead;
   input [1:0] step;
@@ -252,8 +252,8 @@ function in_line;
   input [1:0] step;
   in_line = ahead == {{{{{p_end}{{step[1]}}}}, step}};
 endfunction
-// a < b, both signed. With the signs exchanged it is a comparison without signs, which is the end of one carry chain: that of
-// signed numbers takes a bit out of the middle as well.
+// a < b, both signed. Exchanging the sign bits makes the comparison unsigned, which takes only the carry out of one
+// chain; a signed comparison also taps the chain below the sign bit.
 function less;
   input [{t_end}:0] a, b;
   less = {{b[{t_end}], a[{t_less}:0]}} < {{a[{t_end}], b[{t_less}:0]}};
@@ -277,12 +277,12 @@ always @(posedge clk) begin
 {halves}  {{ok_centre, s_centre, k_centre}} <= {{ok_middle, s_middle, k_middle}};
 end
 {fields}wire unused = &{{1'b0, held_square, held_buffer}};
-// The first to come wins ties; in a halving that is the centre.
+// The earlier one wins ties; in a halving that is the centre.
 wire centre_wins = ok_centre && (!ok_before || less(s_centre, s_before) || (!held_coarse && s_centre == s_before));
 wire after_wins = ok_after && (!ok_before || less(s_after, s_before)) && (!ok_centre || less(s_after, s_centre));
-// All three are compared with the best so far while it is found which of them wins.
+// All three are compared with the best so far in parallel with the choice among them.
 wire signed [{t_end}:0] s_best = score;
-// How far it lies from the centre, a cycle before that.
+// Distance of the best so far from the centre, registered a cycle earlier.
 reg [{p}:0] ahead_x, ahead_y;
 always @(posedge clk) begin
   ahead_x <= {{best_x[{p_end}], best_x}} - {{held_centre_x[{p_end}], held_centre_x}};

@@ -1,26 +1,26 @@
-//! A register that keeps a word.
+//! A register with enable.
 
 use rust_hdl::prelude::*;
 
 use crate::wire::{Wire, Word};
 
-/// `kept` is the word that stood on `word` when `keep` was last high, from the next cycle on.
+/// `kept` is the value of `word` at the last clock edge at which `keep` was high.
 #[derive(LogicBlock)]
 pub struct Keep {
-    /// Clock.
+    /// Clock; registers change on its rising edge.
     pub clk: Signal<In, Clock>,
-    /// Keep it.
+    /// Enable: store `word` at the clock edge.
     pub keep: Signal<In, Bit>,
-    /// The word.
+    /// Input word.
     pub word: Wire<In>,
-    /// The word kept.
+    /// Stored word, from the cycle after `keep`; undefined before the first.
     pub kept: Wire<Out>,
     _value: Word,
     _constant: bool,
 }
 
 impl Keep {
-    /// Keeps words of `bits` bits.
+    /// A register of `bits` bits.
     pub fn new(bits: usize) -> Self {
         Keep {
             clk: Default::default(),
@@ -32,7 +32,7 @@ impl Keep {
         }
     }
 
-    /// The same without a register, for a word that never changes.
+    /// With `constant`, wires in place of the register, for a word that never changes.
     pub fn constant(mut self, constant: bool) -> Self {
         self._constant = constant;
         self

@@ -18,31 +18,32 @@ const M: usize = MULTIPLIER_BITS as usize;
 ///                                        * --> product --> aligned --> accumulator --> chain --> quad
 /// operands -----------------------> b   /
 /// ```
-/// One memory word holds a coefficient for every lane. `operands` and `control` belong to the address of two cycles before; an
-/// accumulation's last product leaves the lanes as `lanes_per_parity` quads, row by row, the first of them five cycles
-/// after its `control`.
+/// A memory word holds one coefficient per lane. `operands`, `valid` and `control` belong to the address of two cycles
+/// earlier. After the last product of an accumulation its rows leave one per cycle: `lanes_per_parity` quads, fewer in
+/// the last group, the first of them five cycles after the `control` of that product.
 #[derive(LogicBlock)]
 pub struct Lanes {
-    /// Clock.
+    /// Clock; registers change on its rising edge.
     pub clk: Signal<In, Clock>,
-    /// Reset of the control pipeline.
+    /// Synchronous reset, active high; clears the control pipeline only.
     pub rst: Signal<In, Bit>,
-    /// Which case.
+    /// Index of the case.
     pub which: Wire<In>,
-    /// Address in the coefficient memory.
+    /// Address in the coefficient memory, two cycles before its operands.
     pub address: Wire<In>,
-    /// Four operands, one per parity.
+    /// Four operands, one per parity, 18 bits each, signed.
     pub operands: Wire<In>,
-    /// `operands` are a product to accumulate.
+    /// `operands` and `control` are valid: one product per lane to accumulate.
     pub valid: Signal<In, Bit>,
-    /// Align, first, last; of a subarray the first.
+    /// From bit 0: align, first product, last product of an accumulation; with the coefficient check also first product
+    /// of a subarray. Valid with `valid`.
     pub control: Wire<In>,
-    /// Accumulators of one row, four parities.
+    /// Accumulators of one row for the four parities, `acc_bits` each, signed.
     pub quad: Wire<Out>,
-    /// `quad` is a row.
+    /// `quad` holds a row.
     pub quad_valid: Signal<Out, Bit>,
-    /// What was read since a subarray's first product is not what it must be; settled four cycles after its last. Zero
-    /// where the coefficients are not checked.
+    /// The signature of the coefficients read since the subarray's first product is wrong, 1 bit; valid from four
+    /// cycles after its last product. Constant 0 without the check.
     pub damaged: Wire<Out>,
     _shape: Shape,
     _groups: Vec<usize>,
@@ -54,11 +55,11 @@ pub struct Lanes {
     _chain: Vec<i64>,
     _left: usize,
     _group: usize,
-    /// The signature, and what it must be for each case.
+    /// Current signature, and the expected one of each case.
     _check: Option<(u32, Vec<u32>)>,
 }
 
-/// Name of the coefficient memory's file.
+/// File of the coefficient memory, one line per word.
 pub const MEMORY_FILE: &str = "coefficients.hex";
 
 #[derive(Clone, Copy, Debug)]
@@ -80,7 +81,7 @@ struct Beat {
 }
 
 impl Lanes {
-    /// The lanes of `model`, with the coefficients of all its cases.
+    /// The lanes of `model`, with the coefficients of all its cases in one memory.
     pub fn new(model: &Model) -> Self {
         let (formats, cases) = (&model.formats, model.cases());
         let words = |case: &Model| case.storage.memory(&case.formats, &case.quantised);
@@ -112,7 +113,7 @@ impl Lanes {
         }
     }
 
-    /// The coefficient memory's words as hex lines for `$readmemh`, lane 0 in the least significant bits.
+    /// Content of [`MEMORY_FILE`] for `$readmemh`, lane 0 in the least significant bits.
     pub fn memory_file(&self) -> String {
         let digits = (4 * self._shape.per_parity * M).div_ceil(4);
         self._memory
@@ -130,14 +131,14 @@ impl Lanes {
             .collect()
     }
 
-    /// Verilog of the signature; a lane's parity first, then four lanes', then all.
+    /// Verilog of the signature: parity of each lane, of four lanes, of all lanes, one cycle each.
     fn check(&self) -> String {
         let Some((_, wanted)) = &self._check else { return "always @(*) damaged = 1'b0;\n".to_string() };
         let wanted: Vec<String> = wanted.iter().map(|signature| format!("32'h{signature:08x}")).collect();
         let fours = self._shape.per_parity;
         format!(
             "\
-// Whether the coefficients that were read are those that were written.
+// Signature of the coefficients read, compared with the expected one.
 reg [{lanes_end}:0] odd_lanes;
 reg [{fours_end}:0] odd_fours;
 reg [31:0] signature;
@@ -178,7 +179,7 @@ endgenerate
     }
 }
 
-/// Rows of the last group.
+/// Rows (quads) of the last group of a pass.
 fn last_rows(formats: &Formats) -> usize {
     formats.quads - (formats.groups - 1) * formats.lanes_per_parity
 }
@@ -187,7 +188,8 @@ impl Logic for Lanes {
     fn update(&mut self) {
         if self.clk.pos_edge() {
             let per_parity = self._shape.per_parity;
-            // Oldest first: a captured row leaves, then the accumulators move to the chain, then they accumulate.
+            // Last pipeline step first: a row leaves the chain, the accumulators move to the chain, a product is
+            // accumulated.
             if self._left > 0 {
                 self._left -= 1;
                 for parity in 0..4 {
@@ -247,7 +249,7 @@ impl Logic for Lanes {
         let group_bits = count_bits(groups);
         let product = 2 * M;
         let wide = product + align;
-        // Only products of two high limbs are shifted; without limbs there is nothing to choose.
+        // Only products of two high limbs are shifted; without limbs the multiplexer is omitted.
         let (align_register, aligns, shifted) = match align {
             0 => (String::new(), String::new(), "product".to_string()),
             _ => (
@@ -302,7 +304,7 @@ end
   if (rst) left <= {row_bits}'d0;
   else if (valid4 && last4) left <= {rows};
   else if (left != {row_bits}'d0) left <= left - {row_bits}'d1;
-  // Whether rows are left, from a register: it has far to go. With one row, `left > 1` compares with what one bit cannot hold.
+  // Registered to shorten a long route. Not written as left > 1, which is constant where left has one bit.
   quad_valid <= !rst && (valid4 && last4 || left != {row_bits}'d0 && left != {row_bits}'d1);
 end
 always @(*) quad = chain_head;
@@ -310,7 +312,7 @@ genvar p, k;
 generate
   for (p = 0; p < 4; p = p + 1) begin : parity
     wire [{chain_end}:0] chain_in;
-    // Of its own for each parity: it goes to a quarter of the lanes, which may be the far ones.
+    // One copy per parity, each for a quarter of the lanes, to limit fan-out and route length.
     reg leaves2, leaves3;
     (* keep *) always @(posedge clk) begin
       leaves2 <= !rst && valid1 && last1;
@@ -322,7 +324,7 @@ generate
       reg signed [{m_end}:0] a, b;
       reg signed [{product_end}:0] product;
       reg [{acc_end}:0] aligned, accumulator, chain;
-      // Of its own: one register cannot drive the words of all lanes in a cycle. Synthesis is not to merge them.
+      // One copy per lane, to limit fan-out; the attribute keeps synthesis from merging them.
       reg adds, begins, leaves;
       (* keep *) always @(posedge clk) begin
         adds <= valid2;

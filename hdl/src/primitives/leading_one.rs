@@ -1,7 +1,7 @@
-//! A constant chosen by the leading one of a vector, without a chain from bit to bit.
+//! Selects a constant by the position of the leading one of a vector, without a ripple from bit to bit.
 
-/// Verilog expression of `bits` bits: `value(k)` where bit k of `word`, `top` down, is the first that is set; 0 where none of
-/// `range` is. Each bit asks all above it at once.
+/// Verilog expression of `bits` bits: `value(k)` for the leading one at bit k of `word`, whose top bit is `top`; 0 if
+/// no bit of `range` is the leading one. Each bit is gated by the OR of all bits above it.
 pub fn by_leading_one(
     word: &str,
     range: std::ops::Range<usize>,

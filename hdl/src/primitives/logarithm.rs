@@ -1,37 +1,38 @@
 //! Verilog of the table logarithm, shared by the two blocks that need one.
 //!
-//! The leading one is found by halves: is the upper half empty, the lower one takes its place. Whether it was not is a bit of
-//! the leading one's position, and what is left in the end begins with the leading one. Two functions, a register
-//! between them: 64 or 32 bits are too many halves for one cycle. The first asks which nibbles hold anything before it moves
-//! one, so that a question does not wait for the move before it.
+//! A binary search finds the leading one: if the upper half of the word is zero, the lower half is moved up. Each
+//! decision is a bit of the leading one's position, and the remaining bits start with the leading one. The search is
+//! split into two functions with a register between them, because up to 64 bits need too many steps for one cycle. The
+//! first function computes which nibbles are non-zero before it moves any, so that a decision does not wait for the
+//! previous move.
 
 use dermis_golden::fixed::formats::{LOG_FRACTION, LOG_TABLE_BITS};
 use dermis_golden::fixed::search::log_table;
 
 /// Bits of the integer part of a logarithm of an argument below 2^64.
 pub const LENGTH_BITS: usize = 6;
-/// Bits of a logarithm.
+/// Bits of a logarithm, [`LOG_FRACTION`] of them the fraction.
 pub const LOG_BITS: usize = LENGTH_BITS + LOG_FRACTION as usize;
-/// Halves that the second function looks at: of 4 and 2 bits.
+/// Halves that the second function tests, in bits.
 const LAST: [usize; 2] = [2, 1];
-/// Bits of the parts whose emptiness the first function asks for: its last half.
+/// Bits of a nibble, the unit that the first function tests for zero.
 const NIBBLE: usize = 2 * LAST[0];
-/// Bits that the second function needs: the leading one at any place of a nibble, and a slot behind it.
+/// Bits that the second function needs: a nibble that holds the leading one, and the table index below it.
 const REST_BITS: usize = NIBBLE + LOG_TABLE_BITS as usize;
 
-/// The halves that the first function looks at, for arguments of `bits` bits.
+/// Halves that the first function tests, in bits, for arguments of `bits` bits.
 fn first_halves(bits: usize) -> Vec<usize> {
     let width = bits.next_power_of_two().max(2 * NIBBLE);
     (LAST.len()..LENGTH_BITS).rev().map(|k| 1 << k).filter(|half| 2 * half <= width).collect()
 }
 
-/// Bits between the two functions, for arguments of `bits` bits.
+/// Bits of the register between the two functions, for arguments of `bits` bits.
 pub fn located_bits(bits: usize) -> usize {
     first_halves(bits).len() + REST_BITS
 }
 
-/// Verilog functions `locate`, from a vector of `bits` bits to what stands between, and `logarithm` from there. Zero gives
-/// what one gives.
+/// Verilog functions `locate`, from an argument of `bits` bits to the word of [`located_bits`] in between, and
+/// `logarithm`, from that word to the logarithm of [`LOG_BITS`]. The logarithm of 0 is that of 1.
 pub fn functions(bits: usize) -> String {
     let halves = first_halves(bits);
     let width = 2 * halves[0];
@@ -39,7 +40,8 @@ pub fn functions(bits: usize) -> String {
     let nibbles = width / NIBBLE;
     let used: String =
         (0..nibbles).map(|n| format!("    used[{n}] = |y[{}:{}];\n", (n + 1) * NIBBLE - 1, n * NIBBLE)).collect();
-    // One step: remember whether the upper `half` of `bits` bits of `asked` holds anything; if not, move the lower one up.
+    // One step: store whether the upper `half` of the `bits` bits of `asked` is non-zero; if it is zero, move the lower
+    // half up.
     let step = |name: &str, bit: usize, asked: &str, bits: usize, half: usize, moves: String| {
         let (high, low) = (bits - 1, bits - half);
         format!("    {name}[{bit}] = |{asked}[{high}:{low}];\n    if (!{name}[{bit}]) {moves}\n")

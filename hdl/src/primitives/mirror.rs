@@ -1,4 +1,4 @@
-//! Where a taxel lives among the quads.
+//! Quad address and lane of a taxel.
 
 use dermis_golden::fixed::quads::Quads;
 use dermis_golden::fixed::Model;
@@ -10,34 +10,34 @@ use super::constant_product::times;
 use super::counter::count_bits;
 use crate::wire::{Wire, Word};
 
-/// In a case, row and column of a taxel in its subarray, and the subarray's in the array, to quad address, lane, and
-/// the lanes to write (several on a middle line); combinational. Subarrays follow each other row-major, each with all
-/// its quads.
+/// Row and column of a taxel in its subarray, and of the subarray in the array, to quad address, lane and write mask;
+/// combinational. Subarrays follow each other row-major, each with all its quads. A taxel on the middle line of an odd
+/// count is written to several lanes.
 #[derive(LogicBlock)]
 pub struct Mirror {
-    /// Which case.
+    /// Index of the case.
     pub which: Wire<In>,
-    /// Row in the subarray.
+    /// Row of the taxel in its subarray.
     pub row: Wire<In>,
-    /// Column in the subarray.
+    /// Column of the taxel in its subarray.
     pub col: Wire<In>,
-    /// Row of the subarray.
+    /// Row of the subarray in the grid of subarrays.
     pub part_row: Wire<In>,
-    /// Column of the subarray.
+    /// Column of the subarray in the grid.
     pub part_col: Wire<In>,
-    /// Quad address in the array.
+    /// Quad address in the frame buffer, over all subarrays.
     pub address: Wire<Out>,
-    /// Which subarray.
+    /// Index of the subarray, row-major.
     pub part: Wire<Out>,
-    /// Lane the taxel is read from, 2 bits.
+    /// Lane the taxel is read from: `{lower half, right half}`, 2 bits.
     pub lane: Wire<Out>,
-    /// Lanes the taxel is written to.
+    /// Lanes the taxel is written to, one bit each.
     pub mask: Wire<Out>,
     _cases: Vec<(Quads, Grid)>,
 }
 
 impl Mirror {
-    /// For the subarrays of each of `cases`.
+    /// For the layout and the grid of each of `cases`.
     pub fn new(cases: &[Model]) -> Self {
         let wire =
             |of: &dyn Fn(&Model) -> usize| Wire::new(count_bits(largest(&cases.iter().map(of).collect::<Vec<_>>())));
@@ -56,7 +56,7 @@ impl Mirror {
     }
 }
 
-/// Quads of a frame, in the case that has most.
+/// Quads of a frame over all subarrays, in the case that has most.
 pub fn frame_quads(cases: &[Model]) -> usize {
     largest(&cases.iter().map(|case| case.parts.len() * case.formats.quads).collect::<Vec<_>>())
 }
@@ -89,7 +89,7 @@ impl Logic for Mirror {
             let each: Vec<String> = (0..self._cases.len()).map(|case| format!("{name}{case}")).collect();
             by_case(&each)
         };
-        // What is wider than its target never carries anything there.
+        // Bits beyond the target width are always zero.
         let cut = |bits: usize| match self.wide() == bits {
             true => String::new(),
             false => format!("[{}:0]", bits - 1),
@@ -126,7 +126,7 @@ end",
 }
 
 impl Mirror {
-    /// Bits of the numbers that are computed with.
+    /// Width of the intermediate results.
     fn wide(&self) -> usize {
         let widths = [
             self.address.width(),
@@ -139,7 +139,7 @@ impl Mirror {
         widths.into_iter().max().unwrap_or(1)
     }
 
-    /// Verilog of a taxel's place in one case.
+    /// Verilog of a taxel's address and lane in case `case`.
     fn place(&self, case: usize) -> String {
         let (layout, parts) = self._cases[case];
         let (rows, cols) = (layout.rows, layout.cols);
@@ -148,7 +148,7 @@ impl Mirror {
             0 => name.to_string(),
             more => format!("{{{more}'d0, {name}}}"),
         };
-        // The middle line of an odd count is its own image: written to both lanes.
+        // The middle line of an odd count is its own mirror image: written to both lanes.
         let middle_row = if rows % 2 == 1 { format!("row == {row_bits}'d{}", rows / 2) } else { "1'b0".into() };
         let middle_col = if cols % 2 == 1 { format!("col == {col_bits}'d{}", cols / 2) } else { "1'b0".into() };
         let single = parts.rows * parts.cols == 1;

@@ -1,10 +1,14 @@
-//! The few blocks that hold arithmetic and memory.
+//! Arithmetic, memories, counters and queues, from which the [stages](crate::stages) are built.
 //!
-//! rust-hdl 0.46 reads some signed constructs differently from the Verilog it prints, and has no
-//! multiplication beyond 16×16. So everything signed or wide lives here: each primitive prints its own Verilog, with
-//! the scene's widths in it, and its `update` computes the same in integers with the bit-true model's functions. The
-//! stages around them are plain `#[hdl_gen]` kernels of single-bit control and wiring. Every primitive is
-//! run against its printed Verilog in the co-simulation, stage by stage.
+//! rust-hdl 0.46 reads some signed constructs differently from the Verilog it prints, and has no multiplication beyond
+//! 16×16. So every block here except `Scan` is written twice: `update` computes in integers, with functions of the
+//! bit-true model where there are any, for rust-hdl's simulation; `hdl` returns hand-written Verilog
+//! (`Verilog::Custom`) with the scene's widths, which is what gets synthesised. Co-simulation compares the two with the
+//! bit-true model, stage by stage, and proofs cover the blocks that carry a handshake. `Scan` is an `#[hdl_gen]`
+//! kernel: its Verilog is derived.
+//!
+//! The other modules hold Verilog text that several blocks share: `constant_product`, `half_up`, `leading_one`,
+//! `logarithm`, `pass_through`, `polynomial_word`, `sweep`.
 
 mod average;
 mod blank;

@@ -1,4 +1,4 @@
-//! What the lanes multiply: a limb of the input or a v_ij, its parities exchanged as the matrix asks.
+//! Operands of the MAC lanes: a limb of the input or a v_ij, its parities permuted as the matrix needs them.
 
 use dermis_golden::fixed::formats::{Formats, MULTIPLIER_BITS};
 use rust_hdl::prelude::*;
@@ -7,19 +7,19 @@ use super::polynomial_word::resize;
 use super::steps::SOURCE_BITS;
 use crate::wire::{Wire, Word};
 
-/// Memory words of the folded input and of a v_ij in, four multiplier operands out one cycle later.
+/// Words of the input memory and of a v_ij in, four multiplier operands out one cycle later.
 #[derive(LogicBlock)]
 pub struct OperandSelect {
-    /// Clock.
+    /// Clock; registers change on its rising edge.
     pub clk: Signal<In, Clock>,
-    /// Four folded inputs.
+    /// Four parities of the folded input, `fold_bits` each, signed.
     pub input_quad: Wire<In>,
-    /// Four parities of a v_ij.
+    /// Four parities of a v_ij, `data_bits` each, signed.
     pub vector_quad: Wire<In>,
-    /// Kind (0: v_ij, 1: high limb of the input, 2: low limb) in bits 0 and 1; flip in bits 2 and 3: lane group t gets parity
-    /// t XOR flip; in bit 4, the mirrors exchanged before that.
+    /// Selection, valid with the quads. Bits 1:0, kind: 0 = v_ij, 1 = high limb of the input, 2 = low limb. Bits 3:2,
+    /// flip: lane group t gets parity t XOR flip. Bit 4: parities 1 and 2 (x and y) are exchanged first.
     pub source: Wire<In>,
-    /// Operand of each lane group, one cycle later.
+    /// Operand of each lane group, four times 18 bits, signed; one cycle later.
     pub operands: Wire<Out>,
     _low: usize,
     _align: usize,
@@ -90,7 +90,7 @@ impl Logic for OperandSelect {
                 )
             })
             .collect();
-        // Exchange the mirrors if asked, then along the rows, then along the columns: parity t XOR flip.
+        // Exchange parities 1 and 2 if source[4]; then parity t XOR flip, bit 0 (s to r), then bit 1.
         Verilog::Custom(format!(
             "\
 {wires}wire [{end}:0] s1 = source[4] ? q2 : q1;

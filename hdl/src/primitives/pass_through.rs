@@ -1,8 +1,8 @@
-//! A stage that its scene leaves out: the stream goes through on wires.
+//! Verilog of a stage that the scene omits: its stream passes through on wires.
 
 use rust_hdl::prelude::Verilog;
 
-/// Verilog of a block whose `m_axis` is its `s_axis`; `why` says in a comment what is left out.
+/// Verilog that connects `m_axis` to `s_axis`; `why` is a comment that says what is omitted, on one line.
 pub fn pass_through(why: &str) -> Verilog {
     Verilog::Custom(format!(
         "\

@@ -1,4 +1,4 @@
-//! Where a quad of a v_ij belongs: transposed results back in their place.
+//! Quad address of a v_ij, with transposed results put back in place.
 
 use dermis_golden::fixed::quads::Quads;
 use rust_hdl::prelude::*;
@@ -6,25 +6,27 @@ use rust_hdl::prelude::*;
 use super::counter::count_bits;
 use crate::wire::{Wire, Word};
 
-/// Address and taxels of a quad, with x and y exchanged for the v_ij that were computed so; combinational.
+/// Address and taxels of a quad; rows and columns are exchanged for the v_ij that were computed transposed.
+/// Combinational.
 #[derive(LogicBlock)]
 pub struct Placer {
-    /// Which v_ij.
+    /// Index of the v_ij.
     pub index: Wire<In>,
     /// The quad's address as computed.
     pub address: Wire<In>,
-    /// Its taxels as computed.
+    /// Its four taxels as computed.
     pub quad: Wire<In>,
-    /// Its address in the subarray.
+    /// The quad's address in the subarray.
     pub placed: Wire<Out>,
-    /// Its taxels there.
+    /// Its four taxels in lane order.
     pub taxels: Wire<Out>,
     _layout: Quads,
     _transposed: Vec<usize>,
 }
 
 impl Placer {
-    /// For subarrays of `layout`, quads of taxels of `bits` bits; the v_ij of `transposed` come with x and y exchanged.
+    /// For subarrays of `layout`, taxels of `bits` bits and `vectors` v_ij, of which those listed in `transposed`
+    /// arrive with rows and columns exchanged.
     pub fn new(layout: Quads, bits: usize, vectors: usize, transposed: Vec<usize>) -> Self {
         Placer {
             index: Wire::new(count_bits(vectors)),

@@ -1,35 +1,35 @@
-//! How polynomials lie in a wire: coefficient by coefficient, each for all lanes.
+//! Layout of polynomials in a word: coefficient by coefficient, each for all lanes.
 
 use dermis_golden::fixed::search::Polynomial;
 
 use crate::wire::Word;
 
-/// The layout of `lanes` polynomials in one word. Coefficient k of lane l has `widths[k]` bits at `offset(k) + l·widths[k]`.
+/// Layout of `lanes` polynomials in one word: coefficient k of lane l is `widths[k]` bits at `offset(k) + l·widths[k]`.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct PolynomialWord {
-    /// Polynomials in the word.
+    /// Number of polynomials in the word.
     pub lanes: usize,
-    /// Width of each coefficient.
+    /// Width of each coefficient in bits, signed.
     pub widths: Vec<usize>,
 }
 
 impl PolynomialWord {
-    /// Layout with the coefficient widths of a format.
+    /// Layout of `lanes` polynomials with coefficients of `widths` bits.
     pub fn new(lanes: usize, widths: &[u32]) -> Self {
         PolynomialWord { lanes, widths: widths.iter().map(|&w| w as usize).collect() }
     }
 
-    /// Where coefficient `k` begins.
+    /// Bit offset of coefficient `k` of lane 0.
     pub fn offset(&self, k: usize) -> usize {
         self.widths[..k].iter().sum::<usize>() * self.lanes
     }
 
-    /// Bits of the whole word.
+    /// Width of the whole word.
     pub fn bits(&self) -> usize {
         self.offset(self.widths.len())
     }
 
-    /// Reads one lane's polynomial.
+    /// The polynomial of `lane` in `word`; coefficients beyond the degree are 0.
     pub fn get(&self, word: &Word, lane: usize) -> Polynomial {
         std::array::from_fn(|k| match self.widths.get(k) {
             Some(&bits) => {
@@ -40,7 +40,7 @@ impl PolynomialWord {
         })
     }
 
-    /// Writes one lane's polynomial.
+    /// Writes the polynomial of `lane` into `word`.
     pub fn put(&self, word: &mut Word, lane: usize, polynomial: &Polynomial) {
         for (k, &bits) in self.widths.iter().enumerate() {
             word.set(self.offset(k) + lane * bits, bits, polynomial[k] as u64);
@@ -53,7 +53,7 @@ impl PolynomialWord {
     }
 }
 
-/// Verilog that sign-extends or cuts the vector expression `value` of `from` bits to `to` bits.
+/// Verilog that sign-extends or truncates the signal `value` of `from` bits to `to` bits.
 pub fn resize(value: &str, from: usize, to: usize) -> String {
     match to.checked_sub(from) {
         Some(0) => value.to_string(),

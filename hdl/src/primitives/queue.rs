@@ -1,4 +1,4 @@
-//! Beats on their way out wait here for the receiver, so that what makes them never waits.
+//! Output queue, in which beats wait for the receiver, so that the pipeline before it never stalls.
 
 use std::collections::VecDeque;
 
@@ -8,33 +8,33 @@ use crate::wire::{Wire, Word};
 
 /// ```text
 /// reserve ... later write, word --> queue --> m_axis, two cycles after write
-/// room <-- places that are neither reserved nor taken
+/// room <-- places that are neither reserved nor occupied
 /// ```
-/// Each `reserve`, only where there is `room`, is followed by one `write` at any later time, in order. A place is free
-/// again a cycle after its beat was taken.
+/// `reserve` is allowed only with `room`; each is followed by one `write` at any later time, in order. A place is free
+/// again one cycle after its beat was accepted.
 #[derive(LogicBlock)]
 pub struct Queue {
-    /// Clock.
+    /// Clock; registers change on its rising edge.
     pub clk: Signal<In, Clock>,
-    /// Reset.
+    /// Synchronous reset, active high.
     pub rst: Signal<In, Bit>,
-    /// A beat will come.
+    /// Reserves a place for a beat to be written later; only with `room`.
     pub reserve: Signal<In, Bit>,
-    /// Another may be reserved.
+    /// A place can be reserved in this cycle.
     pub room: Signal<Out, Bit>,
-    /// A beat that was reserved.
+    /// Writes a reserved beat in this cycle.
     pub write: Signal<In, Bit>,
-    /// It is the frame's last.
+    /// The beat is the last of its frame; valid with `write`.
     pub last: Signal<In, Bit>,
-    /// Its data.
+    /// Data of the beat; valid with `write`.
     pub word: Wire<In>,
-    /// A beat stands on the output.
+    /// A beat is offered on `m_axis_tdata`; it is held until `m_axis_tready`.
     pub m_axis_tvalid: Signal<Out, Bit>,
-    /// The receiver takes it.
+    /// The receiver accepts a beat in this cycle.
     pub m_axis_tready: Signal<In, Bit>,
-    /// It is the frame's last.
+    /// The beat is the last of its frame; valid with `m_axis_tvalid`.
     pub m_axis_tlast: Signal<Out, Bit>,
-    /// Its data.
+    /// Data of the beat; valid with `m_axis_tvalid`.
     pub m_axis_tdata: Wire<Out>,
     _reserved: usize,
     _waiting: VecDeque<(Word, bool)>,
@@ -42,13 +42,13 @@ pub struct Queue {
 }
 
 const PLACE_BITS: usize = 4;
-/// Places; a cell of distributed RAM has so many.
+/// Places in the queue: the depth of one distributed RAM cell.
 pub const PLACES: usize = 1 << PLACE_BITS;
-/// From `write` to the output, in cycles.
+/// Cycles from `write` to `m_axis_tvalid`, if the queue is empty.
 pub const LATENCY: usize = 2;
 
 impl Queue {
-    /// Beats of `bits` bits.
+    /// A queue of beats of `bits` bits.
     pub fn new(bits: usize) -> Self {
         Queue {
             clk: Default::default(),

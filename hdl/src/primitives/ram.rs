@@ -1,4 +1,4 @@
-//! A simple dual-port memory: one write port with a mask per field, one read port with one register or two.
+//! Simple dual-port memory: one write port with an enable per field, one read port with one or two registers.
 
 use rust_hdl::prelude::*;
 
@@ -8,32 +8,32 @@ use crate::wire::{Wire, Word};
 /// ```text
 /// write (one bit per field), write_address, write_data --> memory --> read_data one or two cycles after read_address
 /// ```
-/// The read registers move only while `read` is high. Reading a word in the cycle that writes it gives the old one; the
-/// content is undefined until written.
+/// The read registers change only while `read` is high. Reading a word in the cycle that writes it returns the old one;
+/// the content is undefined until written.
 #[derive(LogicBlock)]
 pub struct Ram {
-    /// Clock.
+    /// Clock; registers change on its rising edge.
     pub clk: Signal<In, Clock>,
-    /// Write enable of each field.
+    /// Write enable, one bit per field.
     pub write: Wire<In>,
-    /// Where to write.
+    /// Address of the word to write; valid with `write`.
     pub write_address: Wire<In>,
-    /// What to write.
+    /// Fields to write; valid with `write`.
     pub write_data: Wire<In>,
-    /// Read enable.
+    /// Enable of the read registers.
     pub read: Signal<In, Bit>,
-    /// Where to read.
+    /// Address of the word to read.
     pub read_address: Wire<In>,
-    /// What was read.
+    /// The word read, one cycle after `read_address`, or two if [`registered`](Ram::registered).
     pub read_data: Wire<Out>,
     _memory: Vec<Word>,
-    /// The register behind the memory's own.
+    /// There is an output register behind the read register of the memory.
     _behind: bool,
     _read: Word,
 }
 
 impl Ram {
-    /// `depth` words of `fields` fields of `bits` bits.
+    /// A memory of `depth` words of `fields` fields of `bits` bits.
     pub fn new(depth: usize, fields: usize, bits: usize) -> Self {
         Ram {
             clk: Default::default(),
@@ -49,14 +49,14 @@ impl Ram {
         }
     }
 
-    /// The same with `read_data` two cycles after `read_address`: block RAM is slow to answer, so that at a high clock
-    /// nothing but a register follows it.
+    /// Adds an output register: `read_data` follows two cycles after `read_address`. The clock-to-output time of a
+    /// block RAM leaves no room for logic behind it.
     pub fn registered(mut self) -> Self {
         self._behind = true;
         self
     }
 
-    /// The same without the memory, for scenes that never read it: it reads as zero.
+    /// Omits the memory, for scenes that do not need it: `read_data` is zero.
     pub fn left_out(mut self) -> Self {
         self._memory.clear();
         self

@@ -1,4 +1,4 @@
-//! Block floating point on v_00: the shift that brings its largest accumulator to a full word.
+//! Block exponent of v_00: the right shift that brings its largest accumulator to a full word.
 
 use dermis_golden::fixed::arith::{bit_length, magnitude_bits};
 use dermis_golden::fixed::formats::Formats;
@@ -9,30 +9,30 @@ use super::counter::count_bits;
 use super::leading_one::by_leading_one;
 use crate::wire::{Wire, Word};
 
-/// ORs the magnitudes of raw quads; `shift` follows two cycles after the last of them.
+/// ORs the magnitudes of the raw quads; `shift` is valid two cycles after the last of them.
 #[derive(LogicBlock)]
 pub struct RawLength {
-    /// Clock.
+    /// Clock; registers change on its rising edge.
     pub clk: Signal<In, Clock>,
-    /// Forget everything.
+    /// Clears the OR for a new subarray, with priority over `accept`.
     pub clear: Signal<In, Bit>,
-    /// Take `quad`.
+    /// `quad` is valid and taken in.
     pub accept: Signal<In, Bit>,
-    /// Four accumulators.
+    /// Four accumulators, `acc_bits` each, signed.
     pub quad: Wire<In>,
-    /// The right shift.
+    /// Right shift for `rescale`, of the quads so far; two cycles later.
     pub shift: Wire<Out>,
     _seen: u64,
     _formats: Formats,
 }
 
-/// Bits of the right shift of `rescale`.
+/// Width of the right shift of `rescale`, in bits.
 pub fn shift_bits(formats: &Formats) -> usize {
     count_bits(formats.acc_bits as usize)
 }
 
 impl RawLength {
-    /// Widths of `formats`.
+    /// With the widths of `formats`.
     pub fn new(formats: &Formats) -> Self {
         RawLength {
             clk: Default::default(),

@@ -1,4 +1,4 @@
-//! A register on a stream's way.
+//! Register slice of a stream.
 
 use rust_hdl::prelude::*;
 
@@ -8,29 +8,29 @@ use crate::wire::{Wire, Word};
 /// ```text
 /// s_axis --> register --> m_axis
 /// ```
-/// All that goes from one side to the other goes through a register, so that the sides may lie far apart: a beat every two
-/// cycles. Where that is not wanted, wires.
+/// Data and handshake pass through registers in both directions, which lets sender and receiver be placed far apart, at
+/// the cost of one beat every two cycles. If not wanted, the stream passes through on wires.
 #[derive(LogicBlock)]
 pub struct Relay {
-    /// Clock.
+    /// Clock; registers change on its rising edge.
     pub clk: Signal<In, Clock>,
-    /// Reset.
+    /// Synchronous reset, active high.
     pub rst: Signal<In, Bit>,
-    /// Data.
+    /// Data of the beat; valid with `s_axis_tvalid`.
     pub s_axis_tdata: Wire<In>,
-    /// It is offered.
+    /// A beat is offered on `s_axis_tdata`; the sender holds it until `s_axis_tready`.
     pub s_axis_tvalid: Signal<In, Bit>,
-    /// It is taken.
+    /// The block accepts a beat in this cycle.
     pub s_axis_tready: Signal<Out, Bit>,
-    /// It is the frame's last.
+    /// The beat is the last of its frame; valid with `s_axis_tvalid`.
     pub s_axis_tlast: Signal<In, Bit>,
-    /// Data.
+    /// Data of the beat; valid with `m_axis_tvalid`.
     pub m_axis_tdata: Wire<Out>,
-    /// It is offered.
+    /// A beat is offered on `m_axis_tdata`; it is held until `m_axis_tready`.
     pub m_axis_tvalid: Signal<Out, Bit>,
-    /// It is taken.
+    /// The receiver accepts a beat in this cycle.
     pub m_axis_tready: Signal<In, Bit>,
-    /// It is the frame's last.
+    /// The beat is the last of its frame; valid with `m_axis_tvalid`.
     pub m_axis_tlast: Signal<Out, Bit>,
     _wanted: bool,
     _stands: bool,
@@ -38,7 +38,7 @@ pub struct Relay {
 }
 
 impl Relay {
-    /// For beats of `bits` bits; a register where it is `wanted`.
+    /// For beats of `bits` bits; a register if `wanted`, otherwise wires.
     pub fn new(bits: usize, wanted: bool) -> Self {
         Relay {
             clk: Default::default(),
@@ -87,7 +87,7 @@ impl Logic for Relay {
 
     fn hdl(&self) -> Verilog {
         if !self._wanted {
-            return pass_through("The sides are near.");
+            return pass_through("No register slice: sender and receiver are placed close together.");
         }
         Verilog::Custom(
             "\

@@ -1,4 +1,4 @@
-//! Accumulators to words: round, saturate, count.
+//! Accumulators to words: shift, round, saturate, count saturations.
 
 use dermis_golden::fixed::arith::{round_shift, saturate};
 use dermis_golden::fixed::formats::{Formats, SEARCH_EXTRA_BITS};
@@ -8,29 +8,29 @@ use super::half_up::half_up;
 use super::raw_length::shift_bits;
 use crate::wire::{Wire, Word};
 
-/// A quad of accumulators, shifted right by `shift` when `measured`, by the constant of an A pass otherwise.
+/// A quad of accumulators, shifted right by `shift` if `measured`, otherwise by the constant shift of an A pass.
 ///
-/// `words` follow three cycles later, `operands` (the same, shortened to `data_bits`) four; `saturations` counts the
-/// clipped words of valid quads since `clear`, two cycles after they stand.
+/// `words` follow three cycles later, `operands` (the same rounded and saturated to `data_bits`) four. `saturations`
+/// counts the saturated words of valid quads since `clear`; it includes a quad two cycles after its `words`.
 #[derive(LogicBlock)]
 pub struct Rescaler {
-    /// Clock.
+    /// Clock; registers change on its rising edge.
     pub clk: Signal<In, Clock>,
-    /// Saturations back to 0.
+    /// Sets `saturations` to 0.
     pub clear: Signal<In, Bit>,
-    /// `quad` is a row.
+    /// `quad` holds a row; otherwise its saturations are not counted.
     pub valid: Signal<In, Bit>,
-    /// Shift by `shift` instead of the constant.
+    /// Shift this quad by `shift`, not by the constant.
     pub measured: Signal<In, Bit>,
-    /// The measured shift.
+    /// Measured right shift; valid with `measured`.
     pub shift: Wire<In>,
-    /// Four accumulators.
+    /// Four accumulators, `acc_bits` each, signed.
     pub quad: Wire<In>,
-    /// Four v_ij, three cycles later.
+    /// Four v_ij, `vector_bits` each, signed; three cycles after `quad`.
     pub words: Wire<Out>,
-    /// Four operands, four cycles later.
+    /// Four operands, `data_bits` each, signed; four cycles after `quad`.
     pub operands: Wire<Out>,
-    /// Words saturated, 16 bits, stops at the largest count.
+    /// Number of saturated words, 16 bits; stays at the largest count.
     pub saturations: Wire<Out>,
     _formats: Formats,
     _taken: (Word, u32, bool),
@@ -40,11 +40,11 @@ pub struct Rescaler {
     _clips: u64,
 }
 
-/// Width of a saturation counter.
+/// Width of a saturation counter, in bits.
 pub const SATURATION_BITS: usize = 16;
 
 impl Rescaler {
-    /// Widths of `formats`.
+    /// With the widths of `formats`.
     pub fn new(formats: &Formats) -> Self {
         Rescaler {
             clk: Default::default(),
@@ -125,7 +125,7 @@ end
 genvar l;
 generate
   for (l = 0; l < 4; l = l + 1) begin : lane
-    // Of its own: the lanes stand far apart, where their rows come from.
+    // One copy per lane: the lanes are placed far apart, near the MAC lanes that feed them.
     reg [{shift_end}:0] amount;
     (* keep *) always @(posedge clk) amount <= measured ? shift : {shift_bits}'d{a_shift};
     // One bit below the LSB is kept, so that adding one and dropping it rounds half up.

@@ -1,4 +1,4 @@
-//! Sums per subarray in the place of forces per taxel.
+//! Sums per subarray in place of a force per taxel.
 
 use dermis_golden::fixed::formats::FORCE_BITS;
 use dermis_golden::fixed::resultants::{beats, BEATS, POSITION_BITS, SUMS, SUM_BITS};
@@ -13,29 +13,29 @@ use crate::wire::{Wire, Word};
 /// ```text
 /// s_axis (forces, row-major; status) --> X fz⁺, Y fz⁺ --> sums of each subarray --> m_axis (sums; status)
 /// ```
-/// Forces are taken one a cycle; two cycles after the last the sums are complete and leave, then the status passes
-/// through. Where the scene wants taxels, the stream passes through from the first beat on.
+/// One force is accepted per cycle. The sums start to leave four cycles after the last force, then the status beats
+/// pass through. If the scene asks for a force per taxel, the whole stream passes through on wires.
 #[derive(LogicBlock)]
 pub struct Resultants {
-    /// Clock.
+    /// Clock; registers change on its rising edge.
     pub clk: Signal<In, Clock>,
-    /// Reset.
+    /// Synchronous reset, active high.
     pub rst: Signal<In, Bit>,
-    /// `{fz, fy, fx}` of a taxel, or a status beat.
+    /// `{fz, fy, fx}` of a taxel, 32 bits signed each, or a status beat; valid with `s_axis_tvalid`.
     pub s_axis_tdata: Wire<In>,
-    /// It is offered.
+    /// A beat is offered on `s_axis_tdata`; the sender holds it until `s_axis_tready`.
     pub s_axis_tvalid: Signal<In, Bit>,
-    /// It is taken.
+    /// The block accepts a beat in this cycle.
     pub s_axis_tready: Signal<Out, Bit>,
-    /// It is the frame's last.
+    /// The beat is the last of its frame; valid with `s_axis_tvalid`.
     pub s_axis_tlast: Signal<In, Bit>,
-    /// Sums, or a status beat.
+    /// A beat of sums, or a status beat, 96 bits; valid with `m_axis_tvalid`.
     pub m_axis_tdata: Wire<Out>,
-    /// It is offered.
+    /// A beat is offered on `m_axis_tdata`; it is held until `m_axis_tready`.
     pub m_axis_tvalid: Signal<Out, Bit>,
-    /// It is taken.
+    /// The receiver accepts a beat in this cycle.
     pub m_axis_tready: Signal<In, Bit>,
-    /// It is the frame's last.
+    /// The beat is the last of its frame; valid with `m_axis_tvalid`.
     pub m_axis_tlast: Signal<Out, Bit>,
     _wanted: bool,
     _sensor: Sensor,
@@ -43,13 +43,13 @@ pub struct Resultants {
     _state: State,
 }
 
-/// Where in a frame the stream is.
+/// Position in the frame.
 #[derive(Clone, Debug, Default)]
 struct State {
     taxel: usize,
-    /// Cycles until the sums are complete.
+    /// Remaining cycles until the sums are complete.
     settling: usize,
-    /// The next beat of sums.
+    /// Index of the next beat of sums.
     beat: usize,
     sums: Vec<[i64; SUMS]>,
 }
@@ -58,7 +58,7 @@ struct State {
 const SETTLE: usize = 3;
 
 impl Resultants {
-    /// For an array cut into `parts`; where sums are not `wanted` a stream of wires.
+    /// For the array `sensor` divided into `parts`; if sums are not `wanted`, the stream passes through.
     pub fn new(wanted: bool, sensor: &Sensor, parts: Grid) -> Self {
         let beat = 3 * FORCE_BITS as usize;
         Resultants {
@@ -147,14 +147,14 @@ impl Logic for Resultants {
 
     fn hdl(&self) -> Verilog {
         if !self._wanted {
-            return pass_through("A force per taxel.");
+            return pass_through("A force per taxel: the stream passes through.");
         }
         let (sensor, parts) = (&self._sensor, self._parts);
         let count = parts.rows * parts.cols;
         let (rows, cols) = (sensor.rows / parts.rows, sensor.cols / parts.cols);
         let [r, c, pr, pc, p] = [rows, cols, parts.rows, parts.cols, count].map(count_bits);
         let (place, sum) = (POSITION_BITS as usize + 1, SUM_BITS as usize);
-        // 64 bits of each sum.
+        // Sign extension of each sum to 64 bits.
         let more = 64 - sum;
         let wide: Vec<String> =
             (0..SUMS).rev().map(|k| format!("{{{{{more}{{sum{k}[{e}]}}}}, sum{k}}}", e = sum - 1)).collect();
@@ -173,7 +173,7 @@ impl Logic for Resultants {
                 from - 1
             )
         });
-        // Rows of subarrays times subarrays in a row, without a multiplier.
+        // Index of the subarray as a table, in place of a product.
         let part = (0..count)
             .map(|k| {
                 let (i, j) = (k / parts.cols, k % parts.cols);

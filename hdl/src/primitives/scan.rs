@@ -1,4 +1,4 @@
-//! The array, row by row, and where each taxel lives.
+//! Counter over the taxels of the array, row by row, with quad address and lane of each.
 
 use dermis_golden::fixed::Model;
 use rust_hdl::prelude::*;
@@ -7,26 +7,27 @@ use super::counter::count_bits;
 use super::{CaseCounter, Mirror};
 use crate::wire::Wire;
 
-/// Counts the taxels of the whole array row-major, one per `enable`, across all subarrays; `last` at the array's last taxel.
+/// Counts the taxels of the whole array row-major, across all subarrays, one per `enable`. The outputs are
+/// combinational from the count.
 #[derive(LogicBlock)]
 pub struct Scan {
-    /// Clock.
+    /// Clock; registers change on its rising edge.
     pub clk: Signal<In, Clock>,
-    /// Which case.
+    /// Index of the case.
     pub which: Wire<In>,
-    /// Back to the first taxel.
+    /// Back to the first taxel, with priority over `enable`.
     pub clear: Signal<In, Bit>,
-    /// Next taxel.
+    /// Steps to the next taxel at the clock edge; after the last to the first.
     pub enable: Signal<In, Bit>,
-    /// The taxel is the array's last.
+    /// The current taxel is the array's last.
     pub last: Signal<Out, Bit>,
-    /// Its quad's address in the array.
+    /// Quad address of the current taxel, over all subarrays.
     pub address: Wire<Out>,
-    /// Its subarray.
+    /// Index of the current taxel's subarray.
     pub part: Wire<Out>,
-    /// The lane it is read from.
+    /// Lane the current taxel is read from, 2 bits.
     pub lane: Wire<Out>,
-    /// The lanes it is written to.
+    /// Lanes the current taxel is written to, one bit each.
     pub mask: Wire<Out>,
     col: CaseCounter,
     part_col: CaseCounter,
@@ -38,7 +39,7 @@ pub struct Scan {
 }
 
 impl Scan {
-    /// The array as each of `cases` cuts it.
+    /// For the subarrays of each of `cases`.
     pub fn new(cases: &[Model]) -> Self {
         let each = |of: &dyn Fn(&Model) -> usize| CaseCounter::new(&cases.iter().map(of).collect::<Vec<_>>());
         let mirror = Mirror::new(cases);

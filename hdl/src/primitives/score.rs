@@ -1,4 +1,4 @@
-//! The sparse objective over one sweep: Σ log2(|p| + ⌊Σp / 2^20⌋) for nine candidates at once.
+//! Sparse objective over one sweep: Σ log2(|p| + ⌊Σp / 2^20⌋) for nine candidates in parallel.
 
 use dermis_golden::fixed::formats::{Formats, EPSILON_SHIFT};
 use dermis_golden::fixed::search::log2;
@@ -7,26 +7,25 @@ use rust_hdl::prelude::*;
 use super::logarithm::{functions, located_bits, LOG_BITS};
 use crate::wire::{Wire, Word};
 
-/// Values of a quad's four taxels and of the sum in, `totals` of all valid quads since the `first`, [`LATENCY`] cycles
-/// later.
+/// Values of a quad's four taxels and Σp in; `totals` of all valid quads since the `first`, [`LATENCY`] cycles later.
 ///
-/// Stages: magnitude; plus ε Σp (0 for Σp < 0, such a candidate is never taken); leading one, first half; second half and
-/// table; sum of the four lanes that count; accumulation.
+/// One cycle each: magnitude; addition of ε Σp (0 for Σp < 0: such a candidate is not eligible); first half of the
+/// logarithm; second half and table; sum of the counted lanes; accumulation.
 #[derive(LogicBlock)]
 pub struct Score {
-    /// Clock.
+    /// Clock; registers change on its rising edge.
     pub clk: Signal<In, Clock>,
-    /// `values` are a quad.
+    /// `values`, `mask` and `sums` belong to a quad.
     pub valid: Signal<In, Bit>,
-    /// It is a sweep's first.
+    /// The quad is the sweep's first: the totals restart.
     pub first: Signal<In, Bit>,
-    /// Lanes that count.
+    /// Counted lanes, one bit each; valid with `valid`.
     pub mask: Wire<In>,
-    /// Nine values per lane.
+    /// Nine values per lane, `search_bits[0]` each, signed, field 9·lane + k; valid with `valid`.
     pub values: Wire<In>,
-    /// Σp of the nine candidates.
+    /// Σp of the nine candidates, `sum_bits[0]` each, signed; valid with `valid`.
     pub sums: Wire<In>,
-    /// The nine totals.
+    /// Nine totals, `score_bits` each, 2^−6; constant until the next valid quad.
     pub totals: Wire<Out>,
     _pipe: Vec<Option<(bool, [i64; 9])>>,
 }
@@ -35,7 +34,7 @@ pub struct Score {
 pub const LATENCY: usize = 6;
 
 impl Score {
-    /// Widths of `formats`.
+    /// With the widths of `formats`.
     pub fn new(formats: &Formats) -> Self {
         Score {
             clk: Default::default(),
@@ -84,7 +83,7 @@ impl Logic for Score {
     fn hdl(&self) -> Verilog {
         let (v, s, t) = self.widths();
         let shift = EPSILON_SHIFT as usize;
-        // Of small arrays and short words ε Σp is 0.
+        // With small arrays and short words ε Σp is always 0.
         let e = (s - 1).saturating_sub(shift).max(1);
         let x = v.max(e) + 1;
         let lane_sum = LOG_BITS + 2;

@@ -7,14 +7,14 @@ use crate::wire::{Wire, Word};
 /// The least significant bits of a wider word; combinational.
 #[derive(LogicBlock)]
 pub struct Slice {
-    /// The word.
+    /// Input word.
     pub word: Wire<In>,
     /// Its low bits.
     pub low: Wire<Out>,
 }
 
 impl Slice {
-    /// The low `low` bits of `bits`.
+    /// The low `low` bits of words of `bits` bits.
     pub fn new(bits: usize, low: usize) -> Self {
         Slice { word: Wire::new(bits), low: Wire::new(low) }
     }

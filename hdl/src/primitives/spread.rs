@@ -1,26 +1,26 @@
-//! One sample on all lanes of a quad, with the lanes to write.
+//! Copies a sample to all lanes of a quad, with the write enables of the lanes.
 
 use rust_hdl::prelude::*;
 
 use crate::wire::{Wire, Word};
 
-/// The sample four times, and the mask where enabled; combinational.
+/// The sample on all four lanes, and the mask gated by `enable`; combinational.
 #[derive(LogicBlock)]
 pub struct Spread {
-    /// A sample.
+    /// A sample of `bits` bits.
     pub word: Wire<In>,
-    /// Lanes it belongs to.
+    /// Lanes the sample is written to, one bit each.
     pub mask: Wire<In>,
-    /// It is to be written.
+    /// Write in this cycle.
     pub enable: Signal<In, Bit>,
-    /// The sample on every lane.
+    /// The sample on each of the four lanes.
     pub quad: Wire<Out>,
-    /// Lanes to write.
+    /// Write enable of each lane.
     pub write: Wire<Out>,
 }
 
 impl Spread {
-    /// Samples of `bits` bits.
+    /// For samples of `bits` bits.
     pub fn new(bits: usize) -> Self {
         Spread {
             word: Wire::new(bits),

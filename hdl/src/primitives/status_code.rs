@@ -1,28 +1,28 @@
-//! Which beat is asked for, and of which subarray.
+//! Kind and subarray of the beat that `send` requests.
 
 use rust_hdl::prelude::*;
 
 use crate::wire::{Wire, Word};
 
-/// Beat 0 of the scanned taxel's subarray, or beat `word + 1` of a status; combinational.
+/// Beat 0 with the subarray of the scanned taxel, or beat `word + 1` with the subarray of the status; combinational.
 #[derive(LogicBlock)]
 pub struct StatusCode {
-    /// Status beats are asked for.
+    /// Status beats are being requested, not forces.
     pub status: Signal<In, Bit>,
-    /// Word of the status.
+    /// Index of the status beat in its subarray, from 0.
     pub word: Wire<In>,
-    /// Subarray of the status.
+    /// Index of the subarray of the status beat.
     pub status_part: Wire<In>,
-    /// Subarray of the taxel.
+    /// Index of the subarray of the current taxel.
     pub scan_part: Wire<In>,
-    /// 0: a force; 1 … 3: a status beat.
+    /// 0: a force, 1 … 3: a status beat.
     pub beat: Wire<Out>,
-    /// The beat's subarray.
+    /// Index of the subarray of the beat.
     pub part: Wire<Out>,
 }
 
 impl StatusCode {
-    /// Words of `word_bits` bits, subarrays of `part_bits` bits.
+    /// For `word` of `word_bits` bits and subarray indices of `part_bits` bits.
     pub fn new(word_bits: usize, part_bits: usize) -> Self {
         StatusCode {
             status: Default::default(),

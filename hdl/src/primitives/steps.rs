@@ -1,4 +1,4 @@
-//! The schedule of the matrix passes, as a small memory.
+//! Schedule of the matrix passes as a table of instructions.
 
 use dermis_golden::fixed::resources::operand_vectors;
 use dermis_golden::fixed::schedule::{schedule, Operand};
@@ -8,36 +8,36 @@ use rust_hdl::prelude::*;
 use super::counter::count_bits;
 use crate::wire::{Wire, Word};
 
-/// One pass over the columns of one group of rows.
+/// One product over the columns of one group of rows: an instruction of the schedule.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Step {
-    /// First word in the coefficient memory.
+    /// First address in the coefficient memory.
     pub coefficients: usize,
-    /// Words of it: the columns that are kept.
+    /// Number of words there: the stored columns.
     pub columns: usize,
-    /// First word in the operand memory.
+    /// First address in the operand memory.
     pub operand: usize,
-    /// 0: a v_ij; 1: the input's high limb; 2: its low limb.
+    /// Operand: 0 = v_ij, 1 = high limb of the input, 2 = low limb.
     pub kind: u64,
-    /// Source parity = target parity XOR this.
+    /// Source parity = target parity XOR `flip`.
     pub flip: u64,
-    /// Read the operand with x and y exchanged.
+    /// The operand is read with x and y exchanged.
     pub transposed: bool,
-    /// Align the products of the two high limbs.
+    /// The product is of two high limbs and is shifted left.
     pub align: bool,
-    /// Begins a new accumulation.
+    /// First product of an accumulation.
     pub first: bool,
-    /// Ends it.
+    /// Last product of an accumulation.
     pub last: bool,
-    /// Begins a subarray.
+    /// First step of a subarray.
     pub opens: bool,
-    /// Ends it.
+    /// Last step of a subarray.
     pub ends: bool,
-    /// Vectors that must be finished before.
+    /// Number of operand vectors that must be complete before this step.
     pub needs: usize,
 }
 
-/// Unrolls a model's schedule: for each v_ij, for each group of rows, its products.
+/// The steps of one case's `model`: for each v_ij, for each group of rows, its products.
 pub fn unroll(model: &Model) -> Vec<Step> {
     let (formats, storage) = (&model.formats, &model.storage);
     let mut steps = Vec::new();
@@ -72,59 +72,61 @@ pub fn unroll(model: &Model) -> Vec<Step> {
     steps
 }
 
-/// Position in a step's columns in; addresses and control out, one cycle later, or three where a list of columns is read.
+/// Position in the step's columns in; addresses and control out, one cycle later, or three where a column list is read.
 ///
-/// `start` begins with the first step of case `which`, `advance` goes on to the next one, both at the clock edge. `ready` (the
-/// step's operand is finished), `last` (its last column) and `ends` (the case's last step; its first one follows) are
-/// combinational.
+/// `start` loads the first step of case `which`, `advance` the next one, both at the clock edge. `ready` (the step's
+/// operand is complete), `last` (its last column) and `ends` (the last step of the case, after which the first follows)
+/// are combinational.
 ///
-/// The step's word stands in a register. The memory is asked for the word after it all the time: whether it is taken is known
-/// late in a cycle.
+/// The current instruction is in a register. The table is always read at the next instruction, because `advance`
+/// settles late in the cycle.
 #[derive(LogicBlock)]
 pub struct Steps {
-    /// Clock.
+    /// Clock; registers change on its rising edge.
     pub clk: Signal<In, Clock>,
-    /// Which case.
+    /// Index of the case.
     pub which: Wire<In>,
-    /// The first step is next.
+    /// Load the first step at the clock edge.
     pub start: Signal<In, Bit>,
-    /// The step after this one is next.
+    /// Load the next step at the clock edge.
     pub advance: Signal<In, Bit>,
     /// Position in the step's columns.
     pub column: Wire<In>,
-    /// Finished vectors of this subarray.
+    /// Number of complete operand vectors of this subarray.
     pub finished: Wire<In>,
-    /// The step may run.
+    /// The step's operand is complete.
     pub ready: Signal<Out, Bit>,
-    /// The position is the step's last.
+    /// `column` is the step's last.
     pub last: Signal<Out, Bit>,
-    /// The step is the case's last.
+    /// The step is the last of its case.
     pub ends: Signal<Out, Bit>,
-    /// Address in the coefficient memory.
+    /// Address in the coefficient memory; [`latency`](Steps::latency) cycles after `column`.
     pub coefficient_address: Wire<Out>,
-    /// Address in the operand memories.
+    /// Address in the operand memory, and in its low bits in the input memory; [`latency`](Steps::latency) cycles after
+    /// `column`.
     pub operand_address: Wire<Out>,
-    /// Kind of operand, 2 bits; parity flip, 2 bits; exchange of the mirrors: from bit 0.
+    /// Operand selection as in [`OperandSelect`](super::OperandSelect): kind, flip, exchange, from bit 0; with the
+    /// addresses.
     pub source: Wire<Out>,
-    /// `align`, `first product of an accumulation`, `last product`, from bit 0; then, where the coefficients are checked,
-    /// `first product of a subarray`.
+    /// Control of [`Lanes`](super::Lanes) from bit 0: align, first, last product of an accumulation; with the
+    /// coefficient check also first product of a subarray; with the addresses.
     pub control: Wire<Out>,
     _steps: Vec<Vec<Step>>,
     _list: Vec<[usize; 2]>,
     /// Some step reads its operand transposed.
     _across: bool,
-    /// The step whose word stands in the register, and its index in the case.
+    /// The current step, and its index in the case.
     _now: (Step, usize),
     _pipe: Vec<(Step, usize)>,
 }
 
-/// Name of the column list's file.
+/// File of the column list, one line per word of the coefficient memory.
 pub const COLUMN_FILE: &str = "columns.hex";
-/// Bits of `control`.
+/// Width of `control`, in bits.
 pub fn control_bits(model: &Model) -> usize {
     3 + usize::from(model.has_coefficient_check())
 }
-/// Bits of `source`.
+/// Width of `source`, in bits.
 pub const SOURCE_BITS: usize = 5;
 
 impl Steps {
@@ -133,7 +135,7 @@ impl Steps {
         let (formats, cases) = (&model.formats, model.cases());
         let steps: Vec<Vec<Step>> = cases.iter().map(unroll).collect();
         let words = cases.iter().map(|case| case.storage.words()).sum();
-        // Straight and transposed address of each word's column.
+        // Address of each word's column, and its transposed address.
         let pair = |case: &Model, j| [j, if formats.shared_a { case.layout().transposed(j) } else { j }];
         let pairs = |case: &Model| case.storage.column_list().iter().map(|&j| pair(case, j)).collect::<Vec<_>>();
         let listed = cases.iter().filter(|case| case.storage.listed);
@@ -161,7 +163,7 @@ impl Steps {
         }
     }
 
-    /// Cycles from step and position to the addresses.
+    /// Cycles from `column` to the addresses: 1, or 3 with a column list.
     pub fn latency(&self) -> usize {
         if self._list.is_empty() {
             1
@@ -170,7 +172,7 @@ impl Steps {
         }
     }
 
-    /// The column list as hex lines for `$readmemh`, the straight address in the low bits; `None` without a list.
+    /// Content of [`COLUMN_FILE`] for `$readmemh`, the transposed address above the plain one; `None` without a list.
     pub fn column_file(&self) -> Option<String> {
         let bits = self.column.width();
         let word = |&[straight, transposed]: &[usize; 2]| match self._across {
@@ -238,7 +240,7 @@ impl Logic for Steps {
         let (c_bits, o_bits) = (self.coefficient_address.width(), self.operand_address.width());
         let word_bits = c_bits + o_bits + needs_bits + column_bits + 9;
         let bit = |b: bool| u8::from(b);
-        // The case in front of the step, where there are several.
+        // With several cases the table is indexed by case and step.
         let (selector, selector_bits) = match self._steps.len() {
             1 => ("asked", step_bits),
             _ => ("{which, asked}", self.which.width() + step_bits),
@@ -278,7 +280,7 @@ reg [7:0] fixed;  // transposed, flip, kind, last, first, align
 wire [{step_end}:0] asked = start || ends ? {step_bits}'d0 : step + {step_bits}'d1;
 reg [{word_end}:0] word;
 always @(*) begin
-  // A few words that change with the scene: no block RAM.
+  // A short table, kept out of block RAM.
   (* rom_style = \"logic\" *)
   case ({selector})
 {cases}    default: word = {word_bits}'d0;
@@ -326,7 +328,7 @@ end",
             };
             format!(
                 "\
-// The column of each coefficient word, and transposed where that is read.
+// Column of each coefficient word, and its transposed address above it if one is needed.
 reg [{pair_end}:0] columns [0:{list_end}];
 initial $readmemh(\"{COLUMN_FILE}\", columns);
 reg [{pair_end}:0] pair;
@@ -363,7 +365,7 @@ end",
     }
 }
 
-/// Verilog that puts zeros before `name` of `from` bits to make `to` of them.
+/// Verilog that zero-extends the signal `name` of `from` bits to `to` bits.
 fn widen(name: &str, from: usize, to: usize) -> String {
     match to - from {
         0 => name.to_string(),

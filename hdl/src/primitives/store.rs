@@ -1,4 +1,4 @@
-//! The search memory: every taxel's polynomial, about up to three centres.
+//! Search memory: every taxel's polynomial, about up to three centres.
 
 use rust_hdl::prelude::*;
 
@@ -7,47 +7,47 @@ use super::polynomial_word::{resize, PolynomialWord};
 use super::sweep::{BUFFERS, BUFFER_BITS, START};
 use crate::wire::{Wire, Word};
 
-/// Buffers of quads of polynomials. `fill` writes one coefficient of a quad into buffer `START`; `write` a whole quad
-/// into one of the others; both land a cycle later, from registers beside the memory. The read register follows the
-/// address by two cycles: block RAM is slow to answer, so nothing but a register follows it.
+/// Buffers of quads of polynomials. `fill` writes one coefficient of a quad into buffer `START`; `write` writes a whole
+/// quad into one of the others. Both take effect one cycle later, through registers beside the memory. `read_data`
+/// follows its address by two cycles: the read register of the memory and an output register.
 ///
-/// Where one subarray is filled while another is searched, `START` is a memory of its own. Otherwise it is another name
+/// Where one subarray is filled while another is searched, `START` is a memory of its own; otherwise it is another name
 /// of buffer 0, and `fill` and `write` never coincide.
 ///
-/// What is read of a quad in the cycle in which it is written is nobody's: a sweep writes what it has read cycles ago, or
-/// a buffer that nobody reads. So block RAM need not keep an order there, which would take a register and a table for
-/// each bit. In simulation such a read gives the complement of what was written before, for a use of it to show.
+/// Read-during-write data is undefined and unused: a sweep writes quads that it read several cycles earlier, or a
+/// buffer that is not being read. So block RAM needs no bypass. In simulation such a read returns the complement of the
+/// old content, so that using it would show as an error.
 #[derive(LogicBlock)]
 pub struct Store {
-    /// Clock.
+    /// Clock; registers change on its rising edge.
     pub clk: Signal<In, Clock>,
-    /// Write coefficient `fill_index` of quad `fill_address`.
+    /// Write coefficient `fill_index` of quad `fill_address` of buffer `START`.
     pub fill: Signal<In, Bit>,
-    /// Which coefficient.
+    /// Index of the coefficient; valid with `fill`.
     pub fill_index: Wire<In>,
-    /// Which quad.
+    /// Address of the quad; valid with `fill`.
     pub fill_address: Wire<In>,
-    /// Four taxels' coefficient.
+    /// The coefficient of four taxels, signed; valid with `fill`.
     pub fill_quad: Wire<In>,
-    /// Write `write_data`.
+    /// Write `write_data` to quad `write_address`.
     pub write: Signal<In, Bit>,
-    /// Buffer to write, a cycle before `write`.
+    /// Buffer to write; valid one cycle before `write`.
     pub write_buffer: Wire<In>,
-    /// Which quad.
+    /// Address of the quad; valid with `write`.
     pub write_address: Wire<In>,
-    /// A quad of polynomials.
+    /// A quad of polynomials; valid with `write`.
     pub write_data: Wire<In>,
-    /// Buffer to read.
+    /// Buffer to read; valid with `read_address`.
     pub read_buffer: Wire<In>,
-    /// Which quad: 0 a cycle after `begins`, one more a cycle after each that `counts`.
+    /// Address of the quad to read: 0 in the cycle after `begins`, then one more after each cycle with `counts`.
     pub read_address: Wire<In>,
-    /// A buffer will be read from the next cycle on.
+    /// A buffer is read from the next cycle on; loads `next_base` into the read addresses.
     pub begins: Signal<In, Bit>,
-    /// The next quad comes.
+    /// The read addresses step to the next quad.
     pub counts: Signal<In, Bit>,
-    /// With `begins`: where that buffer begins in the memory.
+    /// First address of that buffer in the memory ([`base`]); valid with `begins`.
     pub next_base: Wire<In>,
-    /// A quad of polynomials, two cycles later.
+    /// A quad of polynomials, [`LATENCY`] cycles after `read_address`.
     pub read_data: Wire<Out>,
     _layout: PolynomialWord,
     _quads: usize,
@@ -58,31 +58,31 @@ pub struct Store {
     _asked: [Option<Write>; 2],
 }
 
-/// What is to be written: one coefficient of four taxels, or all of them.
+/// A pending write: one coefficient of four taxels, or all of them.
 #[derive(Clone, Copy, Debug)]
 struct Write {
-    /// Memory and quad.
+    /// Index of the memory, address of the quad.
     place: (usize, usize),
     coefficient: Option<usize>,
     data: Word,
 }
 
-/// Cycles from an address to its quad.
+/// Cycles from `read_address` to `read_data`.
 pub const LATENCY: usize = 2;
 
-/// Where buffer `buffer` begins in a memory of buffers of `quads` quads, which lie one behind the other, without gaps.
+/// First address of `buffer` in the memory, where buffers of `quads` quads follow each other without gaps.
 pub fn base(buffer: usize, quads: usize) -> usize {
     (buffer % BUFFERS) * quads
 }
 
-/// The same in Verilog, for the buffer whose number is called `buffer`.
+/// Verilog expression of [`base`], where signal `buffer` holds the number of the buffer.
 pub fn base_of(buffer: &str, quads: usize) -> String {
     let bits = base_bits(quads);
     let choices: String = (1..BUFFERS).map(|b| format!("{buffer} == 2'd{b} ? {bits}'d{} : ", base(b, quads))).collect();
     format!("{choices}{bits}'d0")
 }
 
-/// Bits of a place in such a memory.
+/// Width of an address in that memory, in bits.
 pub fn base_bits(quads: usize) -> usize {
     count_bits(BUFFERS * quads)
 }
@@ -118,7 +118,7 @@ impl Store {
         }
     }
 
-    /// Index of a buffer's memory.
+    /// Index of the memory that holds `buffer`.
     fn memory(&self, buffer: Word) -> usize {
         let buffer = buffer.number() as usize;
         if buffer == START && !self._apart {
@@ -257,14 +257,15 @@ end
         };
         Verilog::Custom(format!(
             "{lanes}{to_buffer}wire [{end}:0] write_to = {write_to};
-// Where to read and to write is a register of each coefficient: the memories lie far apart. Synthesis is not to
-// merge them.
+// Read and write addresses are registers of each coefficient, because the memories are placed far apart; the attribute
+// keeps synthesis from merging them.
 {from_start}{memories}",
         ))
     }
 }
 
-/// A port that writes `data` at `to` of `memory` a cycle after `asks`, from registers of its own; widths of `to` and `data`.
+/// Verilog of a registered write port: `data` goes to address `to` of `memory` one cycle after `asks`. The last
+/// argument gives the widths of `to` and `data`.
 fn write_port(memory: &str, [asks, to, data]: [&str; 3], [to_bits, data_bits]: [usize; 2]) -> String {
     format!(
         "\
@@ -305,13 +306,13 @@ mod tests {
         }
     }
 
-    /// Writes `data` into quad 1 of buffer 0 and reads the quad `at`, `late` cycles after the write is asked for.
+    /// Writes `data` to quad 1 of buffer 0 and reads quad `at`, `late` cycles after `write`.
     fn read(store: &mut Store, data: u64, at: u64, late: usize) -> u64 {
         store.write_data.next = Word::from(data);
         store.write_address.next = Word::from(1);
         for cycle in 0..late + LATENCY {
             store.write.next = cycle == 0;
-            // Far from the write, but in the cycle that is asked about.
+            // Reads another quad in all cycles but the tested one.
             store.read_address.next = Word::from(if cycle == late { at } else { 2 });
             clock(store);
         }
@@ -322,7 +323,7 @@ mod tests {
     fn what_is_read_where_and_when_it_is_written_is_the_complement() {
         let mut store = store();
         assert_eq!(read(&mut store, 0x12345, 1, 2), 0x12345);
-        // The write lands a cycle after it is asked for.
+        // The write takes effect one cycle after `write`.
         assert_eq!(read(&mut store, 0xabcde, 1, 1), !0x12345 & 0xfffff);
         assert_eq!(read(&mut store, 0x00001, 1, 0), 0xabcde);
         assert_eq!(read(&mut store, 0x00002, 0, 1), 0);

@@ -1,4 +1,4 @@
-//! The sum of all taxels' polynomials, kept beside them.
+//! Sum of all taxels' polynomials of a subarray, one per search buffer.
 
 use rust_hdl::prelude::*;
 
@@ -7,35 +7,35 @@ use super::polynomial_word::{resize, PolynomialWord};
 use super::sweep::{BUFFERS, BUFFER_BITS, START};
 use crate::wire::{Wire, Word};
 
-/// Adds up the counted lanes of each `fill` into buffer `START` (quad 0 starts a coefficient anew), three cycles later; `read`
-/// puts a buffer's sum on `word` as many cycles later as the search memory takes, where it stays; `write` replaces a
-/// buffer's sum by what stands on `write_data` a cycle later. As in the search memory, `START` is buffer 0 unless one
-/// subarray is filled while another is searched.
+/// Adds the counted lanes of each `fill` to the sum of buffer `START`, three cycles later; quad 0 restarts a
+/// coefficient. `read` puts a buffer's sum on `word` after the same two cycles as the search memory, where it is held;
+/// `write` replaces a buffer's sum by the `write_data` of the next cycle. As in the search memory, `START` is buffer 0
+/// unless one subarray is filled while another is searched.
 #[derive(LogicBlock)]
 pub struct Sum {
-    /// Clock.
+    /// Clock; registers change on its rising edge.
     pub clk: Signal<In, Clock>,
     /// Add `fill_quad` to coefficient `fill_index`.
     pub fill: Signal<In, Bit>,
-    /// Which quad; the first starts the coefficient's sum.
+    /// Address of the quad; 0 restarts the coefficient. Valid with `fill`.
     pub fill_address: Wire<In>,
-    /// Which coefficient.
+    /// Index of the coefficient; valid with `fill`.
     pub fill_index: Wire<In>,
-    /// Lanes that count.
+    /// Counted lanes, one bit each; valid with `fill`.
     pub fill_mask: Wire<In>,
-    /// Four taxels' coefficient.
+    /// The coefficient of four taxels, signed; valid with `fill`.
     pub fill_quad: Wire<In>,
     /// Put the sum of `read_buffer` on `word`.
     pub read: Signal<In, Bit>,
-    /// Buffer to read.
+    /// Buffer to read; valid with `read`.
     pub read_buffer: Wire<In>,
-    /// The sum read last.
+    /// The sum read last, in the layout of the sums; two cycles after `read`.
     pub word: Wire<Out>,
     /// Replace the sum of `write_buffer`.
     pub write: Signal<In, Bit>,
-    /// Buffer to write.
+    /// Buffer to write; valid with `write`.
     pub write_buffer: Wire<In>,
-    /// The new sum, a cycle later.
+    /// The new sum; valid one cycle after `write`.
     pub write_data: Wire<In>,
     _layout: PolynomialWord,
     _apart: bool,
@@ -46,7 +46,7 @@ pub struct Sum {
     _writes: Option<usize>,
 }
 
-/// What a `fill` adds to a coefficient.
+/// A pending addition to a coefficient.
 #[derive(Clone, Copy, Debug)]
 struct Added {
     index: usize,
@@ -55,8 +55,8 @@ struct Added {
 }
 
 impl Sum {
-    /// Sums in `layout` (one lane) over `quads` quads, of coefficients of `fill_bits` bits; `apart` as in
-    /// the search memory.
+    /// Sums in `layout` (one lane) over `quads` quads, of coefficients of `fill_bits` bits; `apart` says whether one
+    /// subarray is filled while another is searched.
     pub fn new(layout: PolynomialWord, quads: usize, fill_bits: usize, apart: bool) -> Self {
         Sum {
             clk: Default::default(),
@@ -83,7 +83,7 @@ impl Sum {
 }
 
 impl Sum {
-    /// Index of a buffer's sum.
+    /// Index of the register that holds the sum of `buffer`.
     fn buffer(&self, buffer: usize) -> usize {
         if buffer == START && !self._apart {
             0
@@ -203,7 +203,7 @@ always @(posedge clk) begin
   first <= first1;
   added <= {terms};
 end
-// What steers a coefficient is a register of its own, for it goes to all its bits. Synthesis is not to merge them.
+// Each coefficient has its own control registers, to limit fan-out; the attribute keeps synthesis from merging them.
 {coefficients}",
             wide_end = wide - 1,
             index_end = index_bits - 1,

@@ -1,38 +1,39 @@
-//! What a sweep of the search is: the word that accompanies its totals to the judgement.
+//! Description of a sweep of the search: the word that travels beside its totals to their comparison.
 
 pub use dermis_golden::fixed::resources::position_bits;
 use dermis_golden::fixed::resources::SEARCH_BUFFERS;
 
 use crate::wire::Word;
 
-/// Bits of a squared distance in grid steps of the last level.
+/// Width of a squared distance in grid steps of the last level, in bits.
 pub fn square_bits() -> usize {
     2 * position_bits()
 }
 
-/// Bits of a search buffer's number.
+/// Width of the number of a search buffer, in bits.
 pub const BUFFER_BITS: usize = 2;
-/// The buffer that holds the polynomials about μ = 0, as they came in.
+/// Number of the buffer that holds the polynomials about μ = 0, as `unfold` delivers them.
 pub const START: usize = 3;
-/// Buffers that sweeps write.
+/// Number of buffers that sweeps write.
 pub const BUFFERS: usize = SEARCH_BUFFERS;
 
 /// One sweep.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Sweep {
-    /// Centre of the nine candidates, in grid steps.
+    /// Centre of the nine candidates, x and y in grid steps.
     pub centre: [i64; 2],
     /// |centre|².
     pub square: i64,
     /// Buffer that holds the polynomials about the centre.
     pub buffer: usize,
-    /// It belongs to the coarse grid.
+    /// The sweep belongs to the coarse grid.
     pub coarse: bool,
-    /// The next sweep is set up when this one has been judged.
+    /// The next sweep is set up only after the comparison of this one.
     pub closes: bool,
 }
 
-/// Offset of each field in the word, and the word's bits last: centre x, centre y, square, buffer, coarse, closes.
+/// Bit offset of each field in the word: centre x, centre y, square, buffer, coarse, closes; last the width of the
+/// word.
 pub fn offsets() -> [usize; 7] {
     let p = position_bits();
     let buffer = 2 * p + square_bits();
@@ -40,7 +41,7 @@ pub fn offsets() -> [usize; 7] {
     [0, p, 2 * p, buffer, coarse, coarse + 1, coarse + 2]
 }
 
-/// Bits of a sweep's word.
+/// Width of a sweep's word, in bits.
 pub fn sweep_bits() -> usize {
     offsets()[6]
 }
@@ -59,7 +60,7 @@ impl Sweep {
         word
     }
 
-    /// The sweep of a word.
+    /// The sweep that `word` describes.
     pub fn of_word(word: &Word) -> Self {
         let [_, _, square, buffer, coarse, closes, _] = offsets();
         Sweep {
@@ -72,7 +73,7 @@ impl Sweep {
     }
 }
 
-/// Verilog that names the fields of the sweep in vector `word`: `<prefix>centre_x`, `centre_y`, `square`, `buffer`,
+/// Verilog wires for the fields of the sweep in signal `word`: `<prefix>centre_x`, `centre_y`, `square`, `buffer`,
 /// `coarse`, `closes`.
 pub fn unpack(word: &str, prefix: &str) -> String {
     let names = ["centre_x", "centre_y", "square", "buffer", "coarse", "closes"];

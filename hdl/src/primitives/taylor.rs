@@ -1,4 +1,4 @@
-//! The polynomials' centre moved by a grid step, and the step halved: additions and shifts.
+//! Taylor shift: moves the polynomials' centre by a grid step and halves the step, with additions and shifts only.
 
 use dermis_golden::fixed::schedule::EXPONENTS;
 use dermis_golden::fixed::search::{halve, taylor_shift};
@@ -7,27 +7,29 @@ use rust_hdl::prelude::*;
 use super::polynomial_word::{resize, PolynomialWord};
 use crate::wire::{Wire, Word};
 
-/// A word of polynomials in with its `step`, moved and halved if asked four cycles later: two for x, two for y and the
-/// halving. Of the two the first adds up what the step is multiplied with, the second adds or subtracts it.
+/// Polynomials and their `step` in; the polynomials about the new centre [`LATENCY`] cycles later: two cycles for x,
+/// two for y and the halving. The first cycle of an axis adds up the terms to be multiplied by the step, the second
+/// adds or subtracts them.
 #[derive(LogicBlock)]
 pub struct Taylor {
-    /// Clock.
+    /// Clock; registers change on its rising edge.
     pub clk: Signal<In, Clock>,
-    /// Halve the grid step afterwards; move along y and along x, −1, 0 or 1 in two bits each.
+    /// Bits 1:0: move along x, −1, 0 or 1, signed; bits 3:2: along y; bit 4: halve the grid step afterwards. Valid with
+    /// `word`.
     pub step: Wire<In>,
-    /// Polynomials.
+    /// Polynomials, one per lane.
     pub word: Wire<In>,
-    /// The same about the new centre.
+    /// The polynomials about the new centre, four cycles later.
     pub moved: Wire<Out>,
     _layout: PolynomialWord,
     _pipe: Vec<(Word, Word)>,
 }
 
-/// Cycles from a word to the word moved.
+/// Cycles from `word` to `moved`.
 pub const LATENCY: usize = 4;
 
 impl Taylor {
-    /// Polynomials in `layout`.
+    /// For polynomials in `layout`.
     pub fn new(layout: PolynomialWord) -> Self {
         Taylor {
             clk: Default::default(),
@@ -98,7 +100,7 @@ impl Logic for Taylor {
         body += "    end\n";
         Verilog::Custom(format!(
             "\
-// The step goes along: x is moved in the second cycle, y in the fourth.
+// The step travels along the pipeline: x moves in the second cycle, y in the fourth.
 reg [1:0] dy1, dy2;
 reg halving1, halving2;
 always @(posedge clk) begin
@@ -108,7 +110,7 @@ end
 genvar l;
 generate
   for (l = 0; l < {lanes}; l = l + 1) begin : lane
-    // Of its own: it steers every bit of the lane. Synthesis is not to merge them.
+    // One copy per lane, to limit fan-out; the attribute keeps synthesis from merging them.
     reg [1:0] dx, dy;
     reg halving;
     (* keep *) always @(posedge clk) begin
@@ -123,12 +125,12 @@ endgenerate",
 }
 
 impl Taylor {
-    /// Verilog of a move along one axis: registers of what the step is multiplied with, then wires `<axis>k_moved` from
-    /// `<axis>k`.
+    /// Verilog of a move along one axis: registers for the terms that the step multiplies, then wires `<axis>k_moved`
+    /// computed from `<axis>k`.
     ///
-    /// c0' = c0 + d (c1 + c3) + d² c2,  c1' = c1 + 2d c2 + 3d² c3,  c2' = c2 + 3d c3: d is −1, 0 or 1, so that
-    /// d² only says whether there is a move and d·c is c, −c or 0; −c is the complement and one more. All of it is one
-    /// sum, for which synthesis needs a table for each bit and a single carry chain.
+    /// c0' = c0 + d (c1 + c3) + d² c2,  c1' = c1 + 2d c2 + 3d² c3,  c2' = c2 + 3d c3, with d one of −1, 0, 1. So d² is
+    /// 1 if there is a move, and d·c is c, −c or 0, where −c is the complement plus one. Written as one sum, which
+    /// synthesis maps to one carry chain.
     fn shift(&self, axis: &str, step: &str, up: impl Fn((u32, u32), u32) -> (u32, u32)) -> String {
         let widths = &self._layout.widths;
         let mut text = String::new();
@@ -138,7 +140,8 @@ impl Taylor {
                 let found = EXPONENTS.iter().position(|&e| e == up(EXPONENTS[k], by));
                 found.filter(|&n| n < widths.len()).map(|n| resize(&format!("{axis}{n}"), widths[n], w))
             };
-            // Binomials of the terms above: odd distances change sign with the step, even ones do not.
+            // Binomial factors of the higher terms: those an odd distance above change sign with the step, the others
+            // do not.
             let times = |value: &str, factor: u32| match factor {
                 2 => format!("({value} << 1)"),
                 3 => format!("({value} << 1) + {value}"),

@@ -1,4 +1,4 @@
-//! Parities of a v_ij back to taxels, in the units of the search.
+//! Parities of a v_ij back to taxels, scaled to the units of the search.
 
 use dermis_golden::fixed::arith::{hadamard, round_shift};
 use dermis_golden::fixed::schedule::EXPONENTS;
@@ -8,24 +8,23 @@ use super::butterfly::Butterfly;
 use super::counter::count_bits;
 use crate::wire::{Wire, Word};
 
-/// Butterfly, then v_ij / 4^(i+j) rounded half up: taxels two cycles after the parities; `index` (one cycle after them) says
-/// which v_ij it is.
+/// Butterfly, then v_ij / 4^(i+j), rounded half up: taxels two cycles after their parities.
 #[derive(LogicBlock)]
 pub struct Unfolder {
-    /// Clock.
+    /// Clock; registers change on its rising edge.
     pub clk: Signal<In, Clock>,
-    /// Four parities.
+    /// Four parities of a v_ij, signed.
     pub quad: Wire<In>,
-    /// Which v_ij, one cycle later than `quad`.
+    /// Index of the v_ij, one cycle after `quad`.
     pub index: Wire<In>,
-    /// Four taxels, two cycles after `quad`.
+    /// Four taxels, two bits wider, signed; two cycles after `quad`.
     pub taxels: Wire<Out>,
     _sums: [i64; 4],
     _vectors: usize,
 }
 
 impl Unfolder {
-    /// Parities of `bits` bits of `vectors` v_ij.
+    /// For parities of `bits` bits of `vectors` v_ij.
     pub fn new(bits: usize, vectors: usize) -> Self {
         Unfolder {
             clk: Default::default(),

@@ -1,4 +1,4 @@
-//! Where the search goes: the order of sweeps, centres and buffers.
+//! Search sequencer: the order of sweeps, centres and buffers.
 
 use dermis_golden::fixed::formats::HALVINGS;
 use dermis_golden::fixed::search::COARSE_CENTRES;
@@ -8,59 +8,61 @@ use super::store::{base, base_bits, base_of};
 use super::sweep::{offsets, position_bits, square_bits, sweep_bits, unpack, Sweep, BUFFERS, BUFFER_BITS, START};
 use crate::wire::{Wire, Word};
 
-/// Sweeps over the coarse tiles, then the halvings, then one that only moves to the winner.
+/// Sweeps over the coarse tiles, then the halvings, then a last sweep that only moves to the best position.
 ///
-/// `set_up`, which may come with `judged` where the sweeps are coarse and otherwise comes three cycles after it or after
-/// `begin_frame`, begins a sweep, whose move, word and buffer to read stand from the next cycle until the following
-/// `set_up`; the buffer to write, in the word too, a cycle later. Coarse sweeps follow one another without waiting for their
-/// judgement (`chains`): each reads what the one before has written, and writes the buffer that is neither that nor the
-/// best so far. So three buffers are enough as long as a sweep is judged before the next but one is set up. Halvings work
-/// in place. `judged` with `improved` makes the buffer of a coarse sweep the best.
+/// `set_up` starts a sweep. Its `step`, `sweep` and `source` are valid from the next cycle until the following
+/// `set_up`; `target`, also a field of `sweep`, one cycle later. In the coarse grid `set_up` may coincide with
+/// `judged`; otherwise it comes three cycles after `judged` or `begin_frame`.
+///
+/// Coarse sweeps follow one another without waiting for the comparison of their candidates (`chains`): each reads the
+/// buffer that the previous one wrote, and writes the one that is neither that nor the best so far. Three buffers are
+/// enough as long as a sweep is compared before the next but one is set up. Halvings work in place. `judged` with
+/// `improved` makes the buffer of a coarse sweep the best.
 #[derive(LogicBlock)]
 pub struct Walk {
-    /// Clock.
+    /// Clock; registers change on its rising edge.
     pub clk: Signal<In, Clock>,
-    /// Reset.
+    /// Synchronous reset, active high; clears `chains` only.
     pub rst: Signal<In, Bit>,
-    /// New frame.
+    /// A new search starts.
     pub begin_frame: Signal<In, Bit>,
-    /// Search it; otherwise only the last sweep follows.
+    /// Search; otherwise only the last sweep follows. Valid with `begin_frame`.
     pub enabled: Signal<In, Bit>,
     /// Set up the next sweep.
     pub set_up: Signal<In, Bit>,
-    /// A sweep has been judged.
+    /// The candidates of a sweep have been compared.
     pub judged: Signal<In, Bit>,
-    /// It changed the best.
+    /// The best candidate changed; valid with `judged`.
     pub improved: Signal<In, Bit>,
-    /// Which sweep it was.
+    /// Word of that sweep; valid with `judged`.
     pub judged_sweep: Wire<In>,
-    /// Best position, x.
+    /// Best position, x, in grid steps, signed.
     pub best_x: Wire<In>,
-    /// Best position, y.
+    /// Best position, y, in grid steps, signed.
     pub best_y: Wire<In>,
-    /// Halve after the move; move along y and along x, −1, 0 or 1 in two bits each.
+    /// Move of the sweep, as in [`Taylor`](super::Taylor): x in bits 1:0, y in bits 3:2, halving in bit 4.
     pub step: Wire<Out>,
-    /// The sweep is the last: move to the winner.
+    /// The sweep is the last: it only moves to the best position.
     pub last: Signal<Out, Bit>,
     /// The next sweep is a halving.
     pub next_halves: Signal<Out, Bit>,
-    /// The next sweep may follow at once.
+    /// The next sweep may be set up without waiting for the comparison of this one.
     pub chains: Signal<Out, Bit>,
     /// Buffer to read.
     pub source: Wire<Out>,
-    /// Where the buffer that the next sweep reads begins in the search memory, a cycle after it is known which one.
+    /// First address of the buffer that the next sweep reads, one cycle after that buffer is known.
     pub next_base: Wire<Out>,
-    /// Buffer to write, a cycle after the others.
+    /// Buffer to write, one cycle after the other outputs.
     pub target: Wire<Out>,
-    /// The sweep.
+    /// Word of the sweep ([`Sweep`]).
     pub sweep: Wire<Out>,
-    /// Squared radius of the disc.
+    /// Squared radius of the search disc in grid steps of the level.
     pub radius: Wire<Out>,
     _quads: usize,
     _state: State,
 }
 
-/// Number of sweeps that are judged.
+/// Number of sweeps whose candidates are compared.
 const JUDGED: usize = COARSE_CENTRES.len() + HALVINGS as usize;
 const SWEEP_BITS: usize = 4;
 
@@ -70,14 +72,14 @@ struct State {
     sweep: Sweep,
     kept: Sweep,
     radius: i64,
-    /// The sweep's buffer is told in this cycle.
+    /// The target buffer of the sweep is output in the next cycle.
     chosen: bool,
-    /// The one told last.
+    /// The target buffer on the output.
     target: usize,
 }
 
 impl Walk {
-    /// Over a search memory of buffers of `quads` quads.
+    /// For a search memory with buffers of `quads` quads.
     pub fn new(quads: usize) -> Self {
         let p = position_bits();
         Walk {
@@ -106,7 +108,7 @@ impl Walk {
     }
 }
 
-/// Moves of the coarse sweeps.
+/// Moves between the centres of the coarse sweeps, in order.
 fn coarse_moves() -> Vec<[i64; 2]> {
     let mut at = [0, 0];
     let step = |to: &[i32; 2]| {
@@ -136,7 +138,7 @@ impl Walk {
         let closes = !coarse || s.count + 1 == COARSE_CENTRES.len();
         s.sweep = Sweep { centre: moved.map(|c| c << double), square: square << (2 * double), buffer, coarse, closes };
         s.radius <<= 2 * double;
-        // The first coarse sweep takes the place of what came in, which is one step away from it.
+        // The first coarse sweep replaces START as the best so far; its centre is one step away from μ = 0.
         if !coarse || s.count == 0 {
             s.kept = s.sweep;
         }
@@ -216,14 +218,15 @@ end
 reg is_coarse, is_halving;
 wire closing = !is_coarse || count == {SWEEP_BITS}'d{final_coarse};
 always @(*) next_halves = is_halving;
-// A judgement takes effect for the buffers of a coarse sweep that is set up with it; a halving comes after it.
+// A coarse sweep set up in the cycle of `judged` already uses its result for the choice of buffers; a halving is set up
+// later.
 {judged_fields}wire keeps = judged && improved && judged_coarse;
 wire [1:0] kept_buffer = kept[{buffer} +: 2];
 wire [{w_end}:0] from = is_coarse ? sweep : kept;
 {from_fields}wire unused = &{{1'b0, from_coarse, from_closes, best_x, best_y, judged_centre_x, judged_centre_y, judged_square,
   judged_buffer, judged_closes}};
-// The best is at most one step away from the centre of its polynomial.
-// The move stands in registers with what it starts from, and so does where it leads, before the sweep is set up.
+// The best position is at most one step from the centre of its polynomials, so two bits of the difference are the move.
+// Move, starting point and destination are registered before the sweep is set up.
 reg [1:0] go_x, go_y;
 reg [1:0] base_buffer;
 reg [{p_end}:0] base_x, base_y;
@@ -253,8 +256,9 @@ always @(posedge clk) begin
 end
 wire [{low}:0] next = {{is_halving ? at_square << 2 : at_square, is_halving ? at_y << 1 : at_y,
   is_halving ? at_x << 1 : at_x}};
-// A coarse sweep writes the first of 1, 2, 0 that is neither read nor the best's, chosen when a judgement that came with the
-// set-up has taken effect: the first, which reads what came in, writes 1. Others write what they read.
+// A coarse sweep writes the first of buffers 1, 2, 0 that is neither read nor the best, chosen one cycle after the
+// set-up, when a `judged` in the cycle of the set-up has taken effect. The first, which reads START, writes 1. Other
+// sweeps work in place.
 reg set_up1, coarse1, taken_closes, taken_coarse;
 reg [{low}:0] place;
 wire [1:0] free = source == 2'd{START} || (source != 2'd1 && kept_buffer != 2'd1) ? 2'd1

@@ -1,4 +1,4 @@
-//! What a candidate's total is compared with: n·log2 Σp, and whether it may be taken at all.
+//! Bias of each candidate's score, n·log2 Σp, and whether the candidate is eligible.
 
 use dermis_golden::fixed::formats::Formats;
 use dermis_golden::fixed::search::log2;
@@ -10,41 +10,42 @@ use super::logarithm::{functions, located_bits, LOG_BITS};
 use super::sweep::{position_bits, square_bits, sweep_bits, unpack, Sweep};
 use crate::wire::{Wire, Word};
 
-/// Three candidates per cycle, a row of equal y each: Σp selected and the disc tested, leading one, table, times n.
+/// Three candidates per cycle, one row of equal y: Σp selected and the disc tested, first half of the logarithm, second
+/// half and table, times n.
 ///
-/// `start` with the sweep's sums, which stand three cycles more; its answers `LATENCY` cycles later, with the sweep
-/// they belong to, until those of the next sweep come.
+/// `start` with the sweep and its nine sums, which stay stable for the next three cycles. The results are valid
+/// [`LATENCY`] cycles after `start`, until those of the next sweep.
 #[derive(LogicBlock)]
 pub struct Weigh {
-    /// Clock.
+    /// Clock; registers change on its rising edge.
     pub clk: Signal<In, Clock>,
-    /// Reset.
+    /// Synchronous reset, active high; clears the control pipeline only.
     pub rst: Signal<In, Bit>,
-    /// Which case.
+    /// Index of the case.
     pub which: Wire<In>,
-    /// Weigh the nine.
+    /// Start with the nine candidates of `sweep`.
     pub start: Signal<In, Bit>,
-    /// The sweep, with `start`.
+    /// Word of the sweep ([`Sweep`]); valid with `start`.
     pub sweep: Wire<In>,
-    /// Squared radius of the disc, with `start`.
+    /// Squared radius of the search disc; valid with `start`.
     pub radius: Wire<In>,
-    /// Nine Σp.
+    /// Nine Σp, `sum_bits[0]` each, signed; valid with `start` and for three more cycles.
     pub sums: Wire<In>,
-    /// Nine n·log2 Σp.
+    /// Nine n·log2 Σp, unsigned, 2^−6.
     pub weights: Wire<Out>,
     /// Nine bits: Σp > 0 and inside the disc.
     pub eligible: Wire<Out>,
-    /// The sweep weighed.
+    /// Word of the sweep the results belong to.
     pub weighed: Wire<Out>,
     _taxels: Vec<i64>,
     _left: usize,
     _next: (Word, Word, Word),
 }
 
-/// Cycles from `start` to the answers.
+/// Cycles from `start` to the results.
 pub const LATENCY: usize = 8;
 
-/// Bits of n·log2 Σp for subarrays of `taxels` taxels.
+/// Width of n·log2 Σp for subarrays of `taxels` taxels, in bits.
 pub fn weight_bits(taxels: usize) -> usize {
     LOG_BITS + count(taxels as i64)
 }
@@ -54,7 +55,7 @@ fn count(taxels: i64) -> usize {
 }
 
 impl Weigh {
-    /// Widths of `formats`, for subarrays of so many `taxels` in each case.
+    /// With the widths of `formats`, for subarrays of `taxels[case]` taxels.
     pub fn new(formats: &Formats, taxels: &[usize]) -> Self {
         let weight = weight_bits(largest(taxels));
         Weigh {
@@ -118,7 +119,8 @@ impl Logic for Weigh {
         let s = self.sums.width() / 9;
         let w = self.weights.width() / 9;
         let (p, q) = (position_bits(), square_bits());
-        // n·log2 Σp without a multiplier: one term for each bit of n, half of them added up in a step of its own.
+        // n·log2 Σp without a multiplier: one term per set bit of n, added up in two halves, then their sum a cycle
+        // later.
         let halves = |taxels: &i64| -> [String; 2] {
             let bits = (0..64).filter(|bit| taxels >> bit & 1 == 1);
             let terms: Vec<String> = bits.map(|bit| format!("({{{}'d0, log}} << {bit})", w - LOG_BITS)).collect();
@@ -144,10 +146,10 @@ reg [1:0] row, row2, row3, row4, row5;
 reg running;
 reg [3:0] valid;
 {fields}wire unused = &{{1'b0, held_buffer, held_coarse, held_closes}};
-// |c + u|² = |c|² + 2 (ux cx + uy cy) + |ux| + |uy|: the disc needs no multiplier. Row by row uy is −1, 0, 1.
+// |c + u|² = |c|² + 2 (ux cx + uy cy) + |ux| + |uy|, so the disc needs no multiplier. Rows in order uy = −1, 0, 1.
 wire [{q_end}:0] twice_x = {{{{{q_more}{{held_centre_x[{p_end}]}}}}, held_centre_x, 1'b0}};
 wire [{q_end}:0] twice_y = {{{{{q_more}{{held_centre_y[{p_end}]}}}}, held_centre_y, 1'b0}};
-// One addition with carry a cycle, and the comparison in a third.
+// One carry chain per cycle, the comparison in a third cycle.
 reg [{q_end}:0] in_row;
 reg [{distances_end}:0] distance;
 always @(posedge clk) begin

@@ -1,4 +1,4 @@
-//! The polynomials' memories: two with a single port each; one is read while the other is written.
+//! Memories of the polynomials: two single-port banks, one read while the other is written.
 
 use dermis_golden::fixed::formats::Formats;
 use dermis_golden::fixed::serial::{polynomials, word_bits};
@@ -7,23 +7,23 @@ use rust_hdl::prelude::*;
 use crate::primitives::count_bits;
 use crate::wire::{Wire, Word};
 
-/// `odd` chooses the bank that is read, one cycle after its address; writes go to the other. An address is a region, a polynomial
-/// and a coefficient.
+/// `odd` selects the bank that is read; writes go to the other one. An address is `{region, polynomial, coefficient}`,
+/// of 1, n and 4 bits.
 #[derive(LogicBlock)]
 pub struct Banks {
-    /// Clock.
+    /// Clock; registers change on its rising edge.
     pub clk: Signal<In, Clock>,
-    /// Read the odd bank, write the even one.
+    /// Read the odd bank and write the even one; if low, the other way round.
     pub odd: Signal<In, Bit>,
-    /// Where to read.
+    /// Address to read.
     pub read_address: Wire<In>,
-    /// What was read.
+    /// The word read, one cycle after `read_address`.
     pub word: Wire<Out>,
-    /// Write.
+    /// Write `data` in this cycle.
     pub write: Signal<In, Bit>,
-    /// Where.
+    /// Address to write; valid with `write`.
     pub write_address: Wire<In>,
-    /// What.
+    /// Word to write; valid with `write`.
     pub data: Wire<In>,
     _banks: [Vec<Word>; 2],
     _words: [Word; 2],
@@ -31,7 +31,7 @@ pub struct Banks {
 }
 
 impl Banks {
-    /// For `formats`.
+    /// With the word width and the number of polynomials of `formats`.
     pub fn new(formats: &Formats) -> Self {
         let address = 1 + count_bits(polynomials(formats)) + 4;
         let bits = word_bits(formats);

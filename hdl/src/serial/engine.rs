@@ -1,6 +1,6 @@
-//! The serial engine: blocks that take turns.
+//! The serial engine: all blocks connected; rounder, mixer and memories are shared between steps.
 //!
-//! One frame at a time: while it is computed and sent, the next is received as soon as the frame buffer has been read.
+//! One frame at a time. While it is computed and sent, the next is received as soon as the frame buffer has been read.
 
 use dermis_golden::fixed::serial::{floor_bits, product_bits, word_bits, SLOT};
 use dermis_golden::fixed::Model;
@@ -11,28 +11,28 @@ use super::{Banks, Force, Halve, Horner, Mixer, Nine, Order, Pass, Receive, Roun
 use crate::primitives::{Ram, Slice};
 use crate::wire::Wire;
 
-/// The ports of the parallel [`Engine`](crate::engine::Engine).
+/// The serial engine, with the ports of the parallel [`Engine`](crate::engine::Engine).
 #[derive(LogicBlock)]
 pub struct Engine {
-    /// Clock.
+    /// Clock; registers change on its rising edge.
     pub clk: Signal<In, Clock>,
-    /// Reset.
+    /// Synchronous reset, active high.
     pub rst: Signal<In, Bit>,
-    /// A taxel's code.
+    /// A taxel's code, `code_bits` wide, two's complement; valid with `s_axis_tvalid`.
     pub s_axis_tdata: Wire<In>,
-    /// It is offered.
+    /// A beat is offered on `s_axis_tdata`; the sender holds it until `s_axis_tready`.
     pub s_axis_tvalid: Signal<In, Bit>,
-    /// It is taken.
+    /// The block accepts a beat in this cycle.
     pub s_axis_tready: Signal<Out, Bit>,
-    /// It is the frame's last.
+    /// The beat is the last of its frame; valid with `s_axis_tvalid`.
     pub s_axis_tlast: Signal<In, Bit>,
-    /// `{fz, fy, fx}`.
+    /// `{fz, fy, fx}`, 32 bits signed each, or a status beat; valid with `m_axis_tvalid`.
     pub m_axis_tdata: Wire<Out>,
-    /// A beat is offered.
+    /// A beat is offered on `m_axis_tdata`; it is held until `m_axis_tready`.
     pub m_axis_tvalid: Signal<Out, Bit>,
-    /// It is taken.
+    /// The receiver accepts a beat in this cycle.
     pub m_axis_tready: Signal<In, Bit>,
-    /// It is the frame's last.
+    /// The beat is the last of its frame; valid with `m_axis_tvalid`.
     pub m_axis_tlast: Signal<Out, Bit>,
     pub(crate) receive: Receive,
     order: Order,
@@ -62,12 +62,12 @@ pub struct Engine {
 }
 
 impl Engine {
-    /// The serial engine of a scene.
+    /// The serial engine of `model`.
     pub fn new(model: &Model) -> Self {
         let f = &model.formats;
         let word = word_bits(f);
         let code = f.input_bits as usize;
-        // Codes are shifted left as far as they go, and then right.
+        // `normalise` shifts codes left by `input_bits` − 1, then right by the length of the magnitude.
         let unrounded = (f.acc_bits as usize).max(2 * code).max(product_bits(f));
         let rounded = f.input_bits.max(f.vector_bits) as usize;
         let force = Force::new(f, model.threshold, unrounded);
@@ -147,7 +147,7 @@ impl Logic for Engine {
         self.score.rst.next = self.rst.val();
         self.forces.rst.next = self.rst.val();
 
-        comment!("A frame begins when it is whole and the last one out");
+        comment!("A frame starts when the buffer is full and the engine idle");
         self.begin_frame.next = self.receive.full.val() & !self.computing.q.val() & !self.rst.val();
         self.computing.d.next =
             (self.begin_frame.val() | (self.computing.q.val() & !self.forces.done.val())) & !self.rst.val();
@@ -167,7 +167,7 @@ impl Logic for Engine {
         self.receive.free.next = self.leader.free.val();
         self.receive.reported.next = self.begin_frame.val();
 
-        comment!("The order of the taxels");
+        comment!("Taxel order: row-major or by quads");
         self.order.back.next = !self.leader.busy.val();
         self.order.index.next = self.forces.index.val();
         if self.leader.busy.val() {
@@ -175,7 +175,7 @@ impl Logic for Engine {
         }
         self.receive.read_address.next = self.order.place.val();
 
-        comment!("The rounder: normalise, rescale, force");
+        comment!("Rounder, shared by normalise, rescale and force");
         self.leader.start.next = self.begin_frame.val();
         self.leader.magnitude.next = self.receive.magnitude.val();
         self.leader.code.next = self.receive.word.val();
@@ -192,13 +192,13 @@ impl Logic for Engine {
         self.leader.clipped.next = self.rounder.clipped.val();
         self.leader.round_done.next = self.rounder.done.val();
 
-        comment!("The mixer: fold, unfold");
+        comment!("Mixer, shared by fold and unfold");
         self.mixer.word.next = self.shifted.low.val();
         self.mixer.valid.next = self.leader.mix.val();
         self.leader.mixed.next = self.mixer.mixed.val();
         self.leader.mixed_valid.next = self.mixer.mixed_valid.val();
 
-        comment!("The passes");
+        comment!("Matrix passes");
         self.pass.valid.next = self.leader.issue.val();
         self.pass.last.next = self.leader.last.val();
         self.pass.address.next = self.leader.address.val();
@@ -219,7 +219,7 @@ impl Logic for Engine {
         self.raw.read_address.next = self.leader.raw_read_address.val();
         self.leader.raw_word.next = self.raw.read_data.val();
 
-        comment!("Polynomials");
+        comment!("Polynomials: unfold, search, banks");
         self.unfold.start.next = self.begin_frame.val();
         self.unfold.mixed.next = self.mixer.mixed.val();
         self.unfold.valid.next = self.mixer.mixed_valid.val() & self.leader.unfolding.val();
@@ -257,7 +257,7 @@ impl Logic for Engine {
         self.halve.word.next = self.along_y.moved.val();
         self.halve.halvings.next = self.walk.halvings.val();
 
-        comment!("Candidates, scores, judgement");
+        comment!("Candidates, scores and their comparison");
         self.nine.word.next = self.halve.halved.val();
         self.nine.cycle.next = self.walk.cycle.val();
         self.nine.present.next = self.walk.present.val();

@@ -1,10 +1,12 @@
-//! Stages `force` and `send`: one product after the other, a beat every [`BEAT`](dermis_golden::fixed::serial::BEAT) cycles.
+//! Stages `force` and `send`: one product at a time, a beat every [`BEAT`](dermis_golden::fixed::serial::BEAT) cycles.
 //!
 //! ```text
-//! phase  0 order | 1 bank | 2 … 4 factors μ1, μ2, 1 | 3 … 5 products | 4 … 6 rounder | 8 … 10 forces | 11 threshold | 12 beat
+//! phase  0 order | 1 bank | 2 … 4 factors μ1, μ2, 1 | 3 … 5 products | 4 … 6 rounder | 8 … 10 forces
+//!        11 threshold | 12 beat
 //! ```
-//! The next taxel's value is read meanwhile, and taken with the beat: from then on phases 3 to 12 repeat.
-//! Before the first beat both μ words are made in the same way; after the last force the status words take the forces' place.
+//! The next taxel's value is read meanwhile and taken when the beat is accepted: from then on phases 3 to 12 repeat.
+//! Before the first beat both μ words are computed in the same way; after the last force the status words take the
+//! place of the forces.
 
 use dermis_golden::fixed::formats::{Formats, FORCE_BITS, FORCE_SHIFT_MAX, MU_ROUND};
 use dermis_golden::fixed::send::{FLAG_CONDITION, FLAG_FOUND, FLAG_FRAMING, FLAG_NO_CONTACT, STATUS_BEATS};
@@ -18,68 +20,68 @@ use crate::wire::{Wire, Word};
 
 const WORD: usize = FORCE_BITS as usize;
 const FACTOR: usize = FACTOR_BITS as usize;
-/// The count stops where the first beat is made: what lies before the frame begins and after that.
+/// Start of the cycle count: cycles before `frame_begin` and after the count stops, at the first beat.
 const COUNTED_LATER: u64 = 2;
 const LAST_PHASE: u64 = FIRST_BEAT - 1;
-/// The first phase of a beat whose value has been read beforehand.
+/// First phase of a beat whose value has already been read.
 const AGAIN_PHASE: u64 = FIRST_BEAT - BEAT;
-/// Width of the count of cycles to the first beat.
+/// Width of the count of cycles to the first beat, in bits.
 const CYCLES: usize = 20;
 
-/// Values in, beats out; see the module.
+/// Values in, beats out; timing in the module docs.
 #[derive(LogicBlock)]
 pub struct Force {
-    /// Clock.
+    /// Clock; registers change on its rising edge.
     pub clk: Signal<In, Clock>,
-    /// Reset.
+    /// Synchronous reset, active high.
     pub rst: Signal<In, Bit>,
-    /// The values are in.
+    /// All values are in the bank: start sending.
     pub start: Signal<In, Bit>,
-    /// Which taxel, row-major.
+    /// Row-major index of the taxel to read.
     pub index: Wire<Out>,
-    /// Its place, a cycle later.
+    /// Place 4·quad + lane of that taxel, one cycle after `index`.
     pub place: Wire<In>,
-    /// Its polynomial.
+    /// Index of the taxel's polynomial, combinational from `place`.
     pub wanted: Wire<Out>,
-    /// The value, a cycle after that.
+    /// Value p(μ*) of the taxel, signed; one cycle after `wanted`.
     pub value: Wire<In>,
-    /// μ* in steps, x.
+    /// μ1 in grid steps of the last level, signed; stable while sending.
     pub best_x: Wire<In>,
-    /// μ* in steps, y.
+    /// μ2 in grid steps of the last level, signed; stable while sending.
     pub best_y: Wire<In>,
-    /// Its score.
+    /// Score of the best candidate, signed, 2^−6; stable while sending.
     pub score: Wire<In>,
-    /// A candidate was found.
+    /// The search found a candidate; stable while sending.
     pub found: Signal<In, Bit>,
-    /// The condition is met.
+    /// The frame meets the scene's condition; stable while sending.
     pub condition: Signal<In, Bit>,
-    /// `tlast` was early or missing.
+    /// `tlast` was early or missing; stable while sending.
     pub framing: Signal<In, Bit>,
-    /// Left shift of `normalise`.
+    /// Left shift of `normalise`; stable while sending.
     pub normalise: Wire<In>,
-    /// Right shift of `rescale`.
+    /// Right shift of `rescale`; stable while sending.
     pub rescale: Wire<In>,
-    /// Words that `rescale` saturated.
+    /// Words saturated by `rescale`; stable while sending.
     pub saturations: Wire<In>,
-    /// A frame begins: cycles are counted from here.
+    /// A frame starts: its cycle count restarts.
     pub frame_begin: Signal<In, Bit>,
-    /// To the rounder.
+    /// Product for the rounder, signed.
     pub product: Wire<Out>,
-    /// Right by how much.
+    /// Right shift for the rounder.
     pub round_shift: Wire<Out>,
-    /// From the rounder.
+    /// Word from the rounder, 32 bits signed; four cycles after `product`.
     pub rounded: Wire<In>,
-    /// It was saturated.
+    /// `rounded` was saturated.
     pub clipped: Signal<In, Bit>,
-    /// `{fz, fy, fx}`.
+    /// `{fz, fy, fx}`, 32 bits signed each, or a status beat; valid with `m_axis_tvalid`.
     pub m_axis_tdata: Wire<Out>,
-    /// A beat is offered.
+    /// A beat is offered on `m_axis_tdata`; it is held until `m_axis_tready`.
     pub m_axis_tvalid: Signal<Out, Bit>,
-    /// It is taken.
+    /// The receiver accepts a beat in this cycle.
     pub m_axis_tready: Signal<In, Bit>,
-    /// It is the frame's last.
+    /// The beat is the last of its frame; valid with `m_axis_tvalid`.
     pub m_axis_tlast: Signal<Out, Bit>,
-    /// The frame's last beat is taken.
+    /// The frame's last beat is accepted in this cycle.
     pub done: Signal<Out, Bit>,
     _value_bits: usize,
     _mu_step: i64,
@@ -111,7 +113,7 @@ struct State {
 }
 
 impl Force {
-    /// Widths of `formats`, `threshold` in force LSBs; the rounder takes words of `unrounded` bits.
+    /// With the widths of `formats`; `threshold` is in force LSBs, the rounder takes words of `unrounded` bits.
     pub fn new(formats: &Formats, threshold: i64, unrounded: usize) -> Self {
         let f = formats;
         let places = count_bits(4 * f.quads);
@@ -195,7 +197,7 @@ impl Force {
                 8..=10 => {
                     let word = s.phase as usize - 8;
                     let captured = if s.status { i64::from(self.status(s.beat)[word]) } else { rounded };
-                    // All come in at z: one register behind the choice.
+                    // All three enter at fz and shift down: only one register has the multiplexer.
                     next.words = [s.words[1], s.words[2], captured];
                     next.saturations += u64::from(self.clipped.val() && forces);
                 }
@@ -233,12 +235,12 @@ impl Force {
         if self.rst.val() {
             next = State::default();
         }
-        // Long settled when it is used.
+        // Registered: its inputs are stable long before it is used.
         next.shift = self.shift();
         self._state = next;
     }
 
-    /// The value that has been read becomes a factor, and the next one is read.
+    /// Takes the value that has been read as a factor, and addresses the next one.
     fn take_value(&self, next: &mut State) {
         let bits = self.value_bits();
         let value = Word::of_fields(&[self.value.val().signed(0, self.value.width())], bits).signed(0, bits);

@@ -1,26 +1,26 @@
-//! Halves a coefficient as often as its powers say.
+//! Divides a coefficient by a power of two when the grid step is halved.
 
 use rust_hdl::prelude::*;
 
 use crate::wire::{Wire, Word};
 
-/// `halved` is ⌊word / 2^halvings⌋, a cycle later.
+/// `halved` is ⌊word / 2^halvings⌋, one cycle later.
 #[derive(LogicBlock)]
 pub struct Halve {
-    /// Clock.
+    /// Clock; registers change on its rising edge.
     pub clk: Signal<In, Clock>,
-    /// A coefficient.
+    /// A coefficient, signed.
     pub word: Wire<In>,
-    /// How often.
+    /// Right shift, 2 bits.
     pub halvings: Wire<In>,
-    /// The quotient.
+    /// The shifted coefficient, signed; one cycle later.
     pub halved: Wire<Out>,
-    /// Its low bits: a taxel's value.
+    /// Low bits of `halved`: a taxel's value p(μ*), signed.
     pub value: Wire<Out>,
 }
 
 impl Halve {
-    /// Coefficients of `bits` bits, values of `value`.
+    /// For coefficients of `bits` bits and values of `value` bits.
     pub fn new(bits: usize, value: usize) -> Self {
         Halve {
             clk: Default::default(),

@@ -1,4 +1,5 @@
-//! Half a Taylor shift: polynomials of up to four coefficients about a centre moved by −1, 0 or 1, a coefficient a cycle.
+//! Taylor shift along one axis: polynomials of up to four coefficients about a centre moved by −1, 0 or 1, one
+//! coefficient per cycle.
 
 use rust_hdl::prelude::*;
 
@@ -7,30 +8,31 @@ use crate::wire::{Wire, Word};
 /// ```text
 /// word (c3, c2, c1, c0) --> s0 --> s1 --> s2 --> s3 --> moved (c0, c1, c2, c3 about the new centre)
 /// ```
-/// Horner's scheme, systolic: register k runs k cycles behind and adds what passes it, so that all four are ready when c0 has come
-/// in. They leave during the next four cycles, each before it begins anew. `element` counts a polynomial's cycles,
-/// `top` is its degree; coefficients beyond it are not looked at, and what leaves in their place means nothing.
+/// Horner's scheme as a systolic chain: register k runs k cycles behind and accumulates the values that pass it, so
+/// that all four are complete when c0 has arrived. They leave in the next four cycles, each before its register
+/// restarts. `element` counts the cycles of a polynomial, `top` is its degree; coefficients above the degree are
+/// ignored, and the outputs in their place are undefined.
 #[derive(LogicBlock)]
 pub struct Horner {
-    /// Clock.
+    /// Clock; registers change on its rising edge.
     pub clk: Signal<In, Clock>,
-    /// Coefficient 3 − element.
+    /// Coefficient 3 − `element` of the polynomial that enters, signed.
     pub word: Wire<In>,
-    /// The cycle.
+    /// Cycle of the polynomial, 0..=3.
     pub element: Wire<In>,
-    /// Degree of the polynomial that comes in.
+    /// Degree of the polynomial that enters.
     pub top: Wire<In>,
     /// The centre moves.
     pub moves: Signal<In, Bit>,
-    /// By −1.
+    /// By −1 instead of +1; valid with `moves`.
     pub down: Signal<In, Bit>,
-    /// Coefficient `element` of the polynomial before.
+    /// Coefficient `element` of the previous polynomial about the new centre, signed.
     pub moved: Wire<Out>,
     _stages: [i64; 4],
 }
 
 impl Horner {
-    /// Coefficients of `bits` bits.
+    /// For coefficients of `bits` bits.
     pub fn new(bits: usize) -> Self {
         Horner {
             clk: Default::default(),
@@ -57,7 +59,7 @@ impl Logic for Horner {
                 (true, true) => -1,
             };
             let [s0, s1, s2, _] = self._stages;
-            // Of the coefficients that reach register k in this cycle: 3 − element + k.
+            // Register k receives coefficient 3 − element + k in this cycle.
             let incoming = [self.word.val().signed(0, bits), s0, s1, s2];
             for (k, stage) in self._stages.iter_mut().enumerate().filter(|(k, _)| *k <= element) {
                 let begins = 3 + k - element == top || k == 3;
@@ -78,7 +80,7 @@ impl Logic for Horner {
         Verilog::Custom(format!(
             "\
 reg [{end}:0] s0, s1, s2, s3;
-// Zero where a polynomial begins, complement and carry where the centre moves down.
+// Zero at the start of a polynomial; complement, with a carry, where the centre moves by -1.
 wire [{end}:0] kept0 = (moves && element != 2'd3 - top) ? s0 ^ {{{bits}{{down}}}} : {bits}'d0;
 wire [{end}:0] kept1 = (moves && element != 2'd0 - top) ? s1 ^ {{{bits}{{down}}}} : {bits}'d0;
 wire [{end}:0] kept2 = (moves && element != 2'd1 - top) ? s2 ^ {{{bits}{{down}}}} : {bits}'d0;

@@ -1,4 +1,5 @@
-//! The one butterfly of the serial engine, for `fold` and `unfold`: a quad in four cycles in, in four cycles out.
+//! The Hadamard butterfly of the serial engine, for `fold` and `unfold`: a quad enters in four cycles and leaves in
+//! four.
 
 use rust_hdl::prelude::*;
 
@@ -7,25 +8,25 @@ use crate::wire::{Wire, Word};
 /// ```text
 /// word, valid (four of a quad) --> four accumulators --> mixed, one after the other
 /// ```
-/// Accumulator p adds (−1)^{p·l} times word l, as [`hadamard`](dermis_golden::fixed::arith::hadamard). The first of the four leaves in
-/// the cycle after the last word; the next quad may begin when the fourth has left.
+/// Accumulator p adds (−1)^{p·l} times word l, as [`hadamard`](dermis_golden::fixed::arith::hadamard). The first sum
+/// leaves in the cycle after the last word; the next quad may start when the fourth has left.
 #[derive(LogicBlock)]
 pub struct Mixer {
-    /// Clock.
+    /// Clock; registers change on its rising edge.
     pub clk: Signal<In, Clock>,
-    /// Reset.
+    /// Synchronous reset, active high.
     pub rst: Signal<In, Bit>,
-    /// A word of a quad.
+    /// A word of a quad, signed; lanes in order.
     pub word: Wire<In>,
-    /// There is one.
+    /// `word` is valid.
     pub valid: Signal<In, Bit>,
-    /// All four sums, when the first leaves.
+    /// All four sums; valid with `quad_valid`.
     pub quad: Wire<Out>,
-    /// The first leaves.
+    /// The first of the four sums leaves in this cycle.
     pub quad_valid: Signal<Out, Bit>,
-    /// One of the sums.
+    /// One sum, two bits wider than a word, signed.
     pub mixed: Wire<Out>,
-    /// There is one.
+    /// `mixed` is valid.
     pub mixed_valid: Signal<Out, Bit>,
     _sums: [i64; 4],
     _taken: u64,
@@ -34,7 +35,7 @@ pub struct Mixer {
 }
 
 impl Mixer {
-    /// Words of `bits` bits; sums have two more.
+    /// For words of `bits` bits; sums have two more.
     pub fn new(bits: usize) -> Self {
         Mixer {
             clk: Default::default(),

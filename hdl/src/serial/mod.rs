@@ -1,14 +1,16 @@
-//! The serial engine: the parallel engine's arithmetic for a device of a few thousand logic cells.
+//! The serial engine: the arithmetic of the parallel engine for a device of a few thousand logic cells.
 //!
-//! Schedule, cycles and memories are in [`dermis_golden::fixed::serial`]; what each block does in which cycle stands at its
-//! head. The ports are those of the parallel [`Engine`](crate::engine::Engine), so that bench, link and host know no
-//! difference.
+//! Schedule, cycle counts and memories are described in [`dermis_golden::fixed::serial`]; the docs of each block say
+//! what it does in which cycle. The ports are those of the parallel [`Engine`](crate::engine::Engine), so that test
+//! bench, link and host are the same.
 //!
 //! ```text
-//! receive --> rounder --> mixer --> pass --> raw --> rounder --> mixer --> unfold --> banks <--> walk, horner, nine, score
-//!             normalise   fold                       rescale     unfold                 '--> force --> rounder --> m_axis
+//! receive -> rounder -> mixer -> pass -> raw -> rounder -> mixer -> unfold -> banks <-> walk, horner, nine, score
+//!            normalise  fold                    rescale    unfold             '-> force -> rounder -> m_axis
 //! ```
-//! [`Solve`] leads the words of the upper line, [`Walk`] those of the search, [`Force`] those of the output.
+//! [`Solve`] sequences the blocks up to `unfold`, [`Walk`] the search, [`Force`] the output. [`Engine`] and [`Receive`]
+//! are `#[hdl_gen]` kernels; the other blocks have a Rust `update()` for rust-hdl's simulation and hand-written
+//! Verilog, which co-simulation compares.
 
 mod banks;
 mod engine;

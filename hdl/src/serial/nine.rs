@@ -1,12 +1,13 @@
-//! The nine candidates about a centre, from a polynomial's coefficients as they pass.
+//! The nine candidates about a centre, computed from the coefficients of a polynomial as they arrive.
 //!
-//! Coefficient (i, j) comes in cycle 4i + j. Even and odd powers of x are summed apart, for y = +1 and for y = −1:
+//! Coefficient (i, j) arrives in cycle 4i + j. Even and odd powers of x are summed separately, for y = +1 and for y =
+//! −1:
 //! ```text
 //! U, V = Σ over even i of (±1)^j w_ij        p(±1,  1) = U ± M        p(0,  1) = U before i = 2
 //! M, N = Σ over odd  i of (±1)^j w_ij        p(±1, −1) = V ± N        p(0, −1) = V before i = 2
 //! H = w00 + w20,  G = w10 + w30              p(±1,  0) = H ± G        p(0,  0) = U after w00
 //! ```
-//! One candidate leaves in each of the cycles 1, 4, 5, 13, 14, 15 and, of the polynomial before, 0, 2, 3.
+//! One candidate leaves in each of the cycles 1, 4, 5, 13, 14, 15 and, of the previous polynomial, 0, 2, 3.
 
 use dermis_golden::fixed::formats::Formats;
 use dermis_golden::fixed::serial::word_bits;
@@ -14,26 +15,26 @@ use rust_hdl::prelude::*;
 
 use crate::wire::{Wire, Word};
 
-/// See the module; `value` and `index` stand a cycle after the sums.
+/// Schedule in the module docs; `value` and `index` are registered, one cycle after the sums.
 #[derive(LogicBlock)]
 pub struct Nine {
-    /// Clock.
+    /// Clock; registers change on its rising edge.
     pub clk: Signal<In, Clock>,
-    /// A coefficient.
+    /// A coefficient, signed.
     pub word: Wire<In>,
-    /// The cycle, 4i + j.
+    /// Cycle of the polynomial, 4i + j.
     pub cycle: Wire<In>,
-    /// The polynomials that come in and that came before are of the sweep.
+    /// Bit 0: the polynomial that arrives is to be evaluated; bit 1: so was the previous one.
     pub present: Wire<In>,
-    /// They are the sum of the others.
+    /// Bit 0: the polynomial that arrives is the sum polynomial; bit 1: the previous one was.
     pub sums: Wire<In>,
-    /// A candidate's p.
+    /// A candidate's value p, signed.
     pub value: Wire<Out>,
-    /// Which: 3(y + 1) + x + 1.
+    /// Index of the candidate, 3(y + 1) + x + 1; valid with `valid`.
     pub index: Wire<Out>,
-    /// There is one.
+    /// `value` is valid.
     pub valid: Signal<Out, Bit>,
-    /// Of the sum.
+    /// `value` belongs to the sum polynomial; valid with `valid`.
     pub sum: Signal<Out, Bit>,
     _degree: usize,
     _sums: Sums,
@@ -50,7 +51,7 @@ struct Sums {
     g: i64,
 }
 
-/// By cycle: candidate, and whether it is the polynomial's before.
+/// By cycle: index of the candidate that leaves, and whether it belongs to the previous polynomial.
 const LEAVES: [Option<(u64, bool)>; 16] = {
     let mut leaves = [None; 16];
     leaves[1] = Some((4, false));
@@ -66,7 +67,7 @@ const LEAVES: [Option<(u64, bool)>; 16] = {
 };
 
 impl Nine {
-    /// For `formats`.
+    /// With the widths and the degree of `formats`.
     pub fn new(formats: &Formats) -> Self {
         let bits = word_bits(formats);
         Nine {
@@ -146,7 +147,7 @@ wire [2:0] power = {{1'b0, cycle[3:2]}} + {{1'b0, cycle[1:0]}};
 wire counts = power <= 3'd{most};
 wire even = !cycle[2];
 wire begins_even = cycle == 4'd0;
-// The alternating sums' term, in complement where j is odd.
+// Term of the alternating sums V and N: complemented where j is odd, with a carry.
 wire [{end}:0] term = word ^ {{{bits}{{cycle[0]}}}};
 wire [{end}:0] carry = {{{end}'d0, cycle[0]}};
 wire [{end}:0] base = (cycle == 4'd2 || cycle == 4'd3) ? h : (cycle == 4'd5 || cycle == 4'd15 || cycle == 4'd0) ? v : u;
@@ -157,7 +158,7 @@ wire [{end}:0] other = alone ? {bits}'d0 : part ^ {{{bits}{{negate}}}};
 wire from_before = cycle == 4'd0 || cycle == 4'd2 || cycle == 4'd3;
 wire leaves = from_before || alone || cycle >= 4'd13;
 always @(posedge clk) begin
-  // Cleared once the last candidate has left: no gate is needed where a polynomial begins.
+  // Cleared when the last candidate has left, so that the adder needs no gate at the start of a polynomial.
   if (cycle == 4'd15) u <= {bits}'d0;
   else if (even && counts) u <= u + word;
   if (even && counts) v <= (begins_even ? {bits}'d0 : v) + term + carry;

@@ -1,4 +1,4 @@
-//! The two orders of the taxels: row-major on the streams, quad by quad in the engine.
+//! Table between the two orders of the taxels: row-major on the streams, quad by quad in the engine.
 
 use dermis_golden::fixed::quads::Quads;
 use rust_hdl::prelude::*;
@@ -6,17 +6,17 @@ use rust_hdl::prelude::*;
 use crate::primitives::count_bits;
 use crate::wire::{Wire, Word};
 
-/// `place` one cycle after `index`: with `back` the place (4·quad + lane) of a row-major taxel, otherwise the row-major taxel at a
-/// place.
+/// `place` follows `index` by one cycle: with `back` the place (4·quad + lane) of a row-major taxel, otherwise the
+/// row-major taxel at a place.
 #[derive(LogicBlock)]
 pub struct Order {
-    /// Clock.
+    /// Clock; registers change on its rising edge.
     pub clk: Signal<In, Clock>,
-    /// From row-major to place.
+    /// From row-major to place; if low, from place to row-major.
     pub back: Signal<In, Bit>,
-    /// Which.
+    /// Row-major index, or place.
     pub index: Wire<In>,
-    /// Where that is.
+    /// Place, or row-major index; one cycle later.
     pub place: Wire<Out>,
     _places: Vec<u64>,
 }

@@ -1,13 +1,14 @@
-//! Stage `pass`: one lane per parity, with coefficients and operands in memories of its own.
+//! Stage `pass`: one lane per parity, each with its own coefficient and operand memory.
 //!
 //! ```text
 //! address, operand_address --> memories | select | operands | product | accumulate --> quad; word, one after the other
 //! ```
-//! An operand is written twice, for its own lane and for the lane of the other parities, so that to `flip` is an address.
+//! An operand is written twice, for its own lane and for the lane of the opposite parities, so that `flip` is an
+//! address bit.
 //!
-//! A product issued in cycle t is in its accumulator in cycle t + 4. The accumulators leave from the fourth cycle after the
-//! `last` product on, one a cycle, and are cleared with the fourth; the next row's first product comes five cycles after the
-//! last one's at the earliest.
+//! A product issued in cycle t is in its accumulator in cycle t + 4. The accumulators leave one per cycle from the
+//! fourth cycle after the `last` product, and are cleared with the fourth; the first product of the next row follows
+//! the last one by five cycles at the earliest.
 
 use dermis_golden::fixed::resources::operand_vectors;
 use dermis_golden::fixed::schedule::Kind;
@@ -18,48 +19,48 @@ use rust_hdl::prelude::*;
 use crate::primitives::count_bits;
 use crate::wire::{Wire, Word};
 
-/// File of the coefficients that fill an operand.
+/// File of the coefficients as wide as an operand.
 pub const WIDE_FILE: &str = "coefficients.hex";
 /// File of the low limb of Cz⁺.
 pub const LOW_FILE: &str = "coefficients_low.hex";
 const OPERAND: usize = OPERAND_BITS as usize;
 
-/// Four multiply-accumulate lanes; see the module.
+/// Four multiply-accumulate lanes; timing in the module docs.
 #[derive(LogicBlock)]
 pub struct Pass {
-    /// Clock.
+    /// Clock; registers change on its rising edge.
     pub clk: Signal<In, Clock>,
-    /// Reset.
+    /// Synchronous reset, active high.
     pub rst: Signal<In, Bit>,
-    /// A product is issued.
+    /// A product is issued in this cycle.
     pub valid: Signal<In, Bit>,
-    /// Its row's last.
+    /// The product is the last of its row; valid with `valid`.
     pub last: Signal<In, Bit>,
-    /// Which of the wide matrices, row and column.
+    /// Wide matrix, row and column of the coefficient; valid with `valid`.
     pub address: Wire<In>,
-    /// The low limb of Cz⁺ in its place.
+    /// Use the low limb of Cz⁺ in place of the wide matrix; valid with `valid`.
     pub low: Signal<In, Bit>,
-    /// Which vector and column.
+    /// Vector and column of the operand; valid with `valid`.
     pub operand_address: Wire<In>,
-    /// The source's parities are both the other ones.
+    /// Source parity = target parity with both bits inverted; valid with `valid`.
     pub flip: Signal<In, Bit>,
-    /// The product is of two high limbs.
+    /// The product is of two high limbs and is shifted left; valid with `valid`.
     pub align: Signal<In, Bit>,
-    /// Write an operand.
+    /// Write `write_data` to the operand memory.
     pub write: Signal<In, Bit>,
-    /// Vector and quad.
+    /// Vector and quad to write; valid with `write`.
     pub write_address: Wire<In>,
-    /// Parity.
+    /// Parity to write, 2 bits; valid with `write`.
     pub write_lane: Wire<In>,
-    /// The operand.
+    /// Operand of 16 bits, signed; valid with `write`.
     pub write_data: Wire<In>,
-    /// All four accumulators.
+    /// All four accumulators, `acc_bits` each, signed; valid with `quad_valid`.
     pub quad: Wire<Out>,
-    /// A row is in them.
+    /// The accumulators hold a row; the first leaves in this cycle.
     pub quad_valid: Signal<Out, Bit>,
-    /// One accumulator.
+    /// One accumulator, `acc_bits` wide, signed.
     pub word: Wire<Out>,
-    /// There is one.
+    /// `word` is valid.
     pub word_valid: Signal<Out, Bit>,
     _wide: Vec<[i64; 4]>,
     _low: Vec<[i64; 4]>,
@@ -82,7 +83,7 @@ struct State {
     read: u64,
 }
 
-/// What goes along with a product.
+/// Control bits that travel with a product.
 #[derive(Clone, Copy, Debug, Default)]
 struct Control {
     valid: bool,
@@ -126,7 +127,7 @@ impl Pass {
         }
     }
 
-    /// The memories' files: name and text.
+    /// Memory files: name and text.
     pub fn memory_files(&self) -> Vec<(&'static str, String)> {
         let text = |words: &[[i64; 4]], bits: usize| -> String {
             let digits = (4 * bits).div_ceil(4);
@@ -244,7 +245,7 @@ always @(posedge clk) low_selected <= low;
                         fields(lane, OPERAND)
                     ),
                 };
-                // The sums fit an accumulator, so that of a product no more bits matter.
+                // The sums fit an accumulator, so the higher bits of a product are not needed.
                 let shifted = |by: usize| {
                     let bits = (acc - by).min(32);
                     let fill = if by > 0 { format!(", {by}'d0") } else { String::new() };

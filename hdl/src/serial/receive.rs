@@ -1,6 +1,6 @@
-//! Stage `receive`: taxels row-major into the frame buffer, magnitude and signs on the way.
+//! Stage `receive`: taxels row-major into the frame buffer; magnitude and signs are gathered as they arrive.
 //!
-//! As the parallel engine's ([`crate::stages::Receive`]), with a buffer of single taxels in the place of quads.
+//! As in the parallel engine ([`crate::stages::Receive`]), with a buffer of single taxels in place of quads.
 
 use dermis_golden::fixed::formats::Formats;
 use rust_hdl::prelude::*;
@@ -12,41 +12,42 @@ use crate::wire::Wire;
 /// s_axis --> frame buffer --> word (one cycle after read_address)
 ///       \--> magnitude, positive, negative
 /// ```
-/// `full` from the frame's last beat until `free`; the gathered values stand as long. Framing as in the parallel engine:
-/// an early `tlast` drops the frame, a missing one is remembered, both raise `framing` until `reported`.
+/// `full` is high from the frame's last beat until `free`; the gathered values are valid for the same time. Framing as
+/// in the parallel engine: an early `tlast` drops the frame, a missing one is only recorded, both set `framing` until
+/// `reported`.
 #[derive(LogicBlock)]
 pub struct Receive {
-    /// Clock.
+    /// Clock; registers change on its rising edge.
     pub clk: Signal<In, Clock>,
-    /// Reset.
+    /// Synchronous reset, active high.
     pub rst: Signal<In, Bit>,
-    /// A taxel's code.
+    /// A taxel's code, `input_bits` wide, two's complement; valid with `s_axis_tvalid`.
     pub s_axis_tdata: Wire<In>,
-    /// It is offered.
+    /// A beat is offered on `s_axis_tdata`; the sender holds it until `s_axis_tready`.
     pub s_axis_tvalid: Signal<In, Bit>,
-    /// It is taken.
+    /// The block accepts a beat in this cycle.
     pub s_axis_tready: Signal<Out, Bit>,
-    /// It is the frame's last.
+    /// The beat is the last of its frame; valid with `s_axis_tvalid`.
     pub s_axis_tlast: Signal<In, Bit>,
     /// A beat is accepted in this cycle.
     pub accept: Signal<Out, Bit>,
-    /// The frame buffer holds a whole frame.
+    /// The frame buffer holds a whole frame; high until `free`.
     pub full: Signal<Out, Bit>,
-    /// The frame has been read.
+    /// The frame has been read: the buffer may be overwritten.
     pub free: Signal<In, Bit>,
-    /// Which taxel to read.
+    /// Row-major index of the taxel to read.
     pub read_address: Wire<In>,
-    /// Its code, one cycle later.
+    /// Its code, signed; one cycle after `read_address`.
     pub word: Wire<Out>,
-    /// OR of the codes' magnitudes.
+    /// OR of the codes' magnitudes, `input_bits` − 1 wide; valid while `full`.
     pub magnitude: Wire<Out>,
-    /// A code is above the noise floor.
+    /// A code is above the noise floor; valid while `full`.
     pub positive: Signal<Out, Bit>,
-    /// A code is below minus the noise floor.
+    /// A code is below minus the noise floor; valid while `full`.
     pub negative: Signal<Out, Bit>,
-    /// `tlast` was early or missing.
+    /// `tlast` was early or missing since the last `reported`.
     pub framing: Signal<Out, Bit>,
-    /// `framing` has been reported.
+    /// Clears `framing`.
     pub reported: Signal<In, Bit>,
     taxels: Counter,
     frame: Ram,
@@ -58,7 +59,7 @@ pub struct Receive {
 }
 
 impl Receive {
-    /// Frames of four times `formats.quads` taxels, noise floor in codes.
+    /// For frames of `4 · formats.quads` taxels and a noise floor of `floor` codes.
     pub fn new(formats: &Formats, floor: i32) -> Self {
         let (taxels, bits) = (4 * formats.quads, formats.input_bits as usize);
         Receive {

@@ -1,4 +1,4 @@
-//! The one shifter of the serial engine: a right shift, rounded half up, saturated.
+//! The barrel shifter of the serial engine: right shift, rounding half up, saturation.
 
 use dermis_golden::fixed::arith::{round_shift, saturate};
 use dermis_golden::fixed::formats::FORCE_BITS;
@@ -6,31 +6,32 @@ use rust_hdl::prelude::*;
 
 use crate::wire::{Wire, Word};
 
-/// Width of a shift.
+/// Width of a shift, in bits.
 pub const SHIFT_BITS: usize = 6;
 const WIDE: usize = FORCE_BITS as usize;
 
 /// ```text
 /// word, shift, valid --> shift by eights | by ones | round | saturate --> rounded, clipped, done
 /// ```
-/// Four cycles. `wide` saturates to a force word, otherwise to `narrow` bits; it stands still while words are under way.
+/// Latency four cycles. `wide` saturates to a force word, otherwise to `narrow` bits; it must not change while words
+/// are in the pipeline.
 #[derive(LogicBlock)]
 pub struct Rounder {
-    /// Clock.
+    /// Clock; registers change on its rising edge.
     pub clk: Signal<In, Clock>,
-    /// What to shift.
+    /// Word to shift, signed.
     pub word: Wire<In>,
-    /// Right by how much.
+    /// Right shift; valid with `word`.
     pub shift: Wire<In>,
-    /// There is a word.
+    /// `word` is valid.
     pub valid: Signal<In, Bit>,
-    /// Saturate to a force word.
+    /// Saturate to 32 bits, not to `narrow` bits.
     pub wide: Signal<In, Bit>,
-    /// The word, sign-extended to a force word.
+    /// The result, sign-extended to 32 bits; four cycles after `word`.
     pub rounded: Wire<Out>,
-    /// It was saturated.
+    /// `rounded` was saturated.
     pub clipped: Signal<Out, Bit>,
-    /// There is one.
+    /// `rounded` is valid.
     pub done: Signal<Out, Bit>,
     _narrow: usize,
     _stages: Stages,
@@ -46,7 +47,7 @@ struct Stages {
 }
 
 impl Rounder {
-    /// Words of `bits` bits, more than a force word's and at most 62.
+    /// For words of `bits` bits, 33..=62, saturated to `narrow` bits where `wide` is low.
     pub fn new(bits: usize, narrow: usize) -> Self {
         Rounder {
             clk: Default::default(),
@@ -74,7 +75,7 @@ impl Logic for Rounder {
             self.done.next = stages.valid[2];
             let shift = self.shift.val().number();
             self._stages = Stages {
-                // One bit more on the right holds what decides the rounding.
+                // An extra bit on the right keeps the half LSB for the rounding.
                 eights: (self.word.val().signed(0, self.word.width()) << 1) >> (shift & !7),
                 ones_shift: shift & 7,
                 ones: stages.eights >> stages.ones_shift,
@@ -95,7 +96,7 @@ impl Logic for Rounder {
         let narrow = self._narrow;
         Verilog::Custom(format!(
             "\
-// One bit more on the right holds what decides the rounding.
+// An extra bit on the right keeps the half LSB for the rounding.
 reg signed [{bits}:0] eights, ones;
 reg [{bits}:0] half;
 reg [2:0] ones_shift;

@@ -1,9 +1,10 @@
-//! The score of nine candidates, one value after the other: log2(|p| + ⌊Σp / 2^20⌋) into the candidate's total.
+//! Scores of the nine candidates, one value at a time: log2(|p| + ⌊Σp / 2^20⌋) is added to the candidate's total.
 //!
 //! ```text
 //! value --> magnitude --> + floor of the candidate --> leading one, by halves --> table --> total of the candidate
 //! ```
-//! Of the sum polynomial, which comes first, the value is Σp itself: its floor is kept, and −n log2 Σp begins the total.
+//! The sum polynomial comes first. Its value is Σp itself: ⌊Σp / 2^20⌋ is stored as the candidate's floor, and its
+//! total starts at −n log2 Σp.
 
 use dermis_golden::fixed::formats::{Formats, EPSILON_SHIFT, LOG_FRACTION};
 use dermis_golden::fixed::search::{log2, log_table};
@@ -13,42 +14,43 @@ use rust_hdl::prelude::*;
 use super::solve::padded;
 use crate::wire::{Wire, Word};
 
-/// Width of the leading one's place: words have at most 32 bits.
+/// Width of the leading one's position: words have at most 32 bits.
 const PLACE_BITS: usize = 5;
 const LOG_BITS: usize = PLACE_BITS + LOG_FRACTION as usize;
 
-/// See the module. A total is in its memory six cycles after its value came; a candidate's values come 16 cycles apart.
+/// Function in the module docs. A total is written to its memory six cycles after its value arrived; the values of a
+/// candidate are 16 cycles apart.
 #[derive(LogicBlock)]
 pub struct Score {
-    /// Clock.
+    /// Clock; registers change on its rising edge.
     pub clk: Signal<In, Clock>,
-    /// Reset.
+    /// Synchronous reset, active high.
     pub rst: Signal<In, Bit>,
-    /// A candidate's p.
+    /// A candidate's value p, signed.
     pub value: Wire<In>,
-    /// Which candidate.
+    /// Index of the candidate; valid with `valid`.
     pub index: Wire<In>,
-    /// There is one.
+    /// `value` is valid.
     pub valid: Signal<In, Bit>,
-    /// It is Σp.
+    /// `value` is Σp; valid with `valid`.
     pub sum: Signal<In, Bit>,
-    /// The candidate's floor, a cycle after `index`.
+    /// The candidate's floor ⌊Σp / 2^20⌋, one cycle after `index`.
     pub floor: Wire<In>,
-    /// Write a floor.
+    /// Write `floor_data`.
     pub floor_write: Signal<Out, Bit>,
-    /// Whose.
+    /// Index of the candidate whose floor is written; valid with `floor_write`.
     pub floor_index: Wire<Out>,
-    /// The floor.
+    /// Floor to write, 0 if Σp ≤ 0; valid with `floor_write`.
     pub floor_data: Wire<Out>,
-    /// Whose total to read.
+    /// Index of the candidate whose total is read.
     pub read_index: Wire<Out>,
-    /// Σp > 0 and total, a cycle later.
+    /// `{Σp > 0, total}`, total signed, 2^−6; one cycle after `read_index`.
     pub total: Wire<In>,
-    /// Write a total.
+    /// Write `write_data`.
     pub write: Signal<Out, Bit>,
-    /// Whose.
+    /// Index of the candidate whose total is written; valid with `write`.
     pub write_index: Wire<Out>,
-    /// Σp > 0 and total.
+    /// `{Σp > 0, total}` to write; valid with `write`.
     pub write_data: Wire<Out>,
     _taxels: i64,
     _state: [Stage; 5],
@@ -64,7 +66,7 @@ struct Stage {
 }
 
 impl Score {
-    /// For `formats`.
+    /// With the widths of `formats`.
     pub fn new(formats: &Formats) -> Self {
         let total = formats.score_bits as usize + 1;
         Score {
@@ -147,7 +149,7 @@ impl Logic for Score {
     fn hdl(&self) -> Verilog {
         let (bits, floor, total) = (self.value.width(), self.floor.width(), self.total.width() - 1);
         let end = bits - 1;
-        // Plain gates: a table would become a memory.
+        // As gates: synthesis would map a table to a memory.
         let table: Vec<String> = (0..LOG_FRACTION)
             .rev()
             .map(|bit| {
@@ -183,7 +185,7 @@ reg [11:0] coarse;
 reg [1:0] place_high;
 reg [{log_end}:0] logarithm, late;
 reg [3:0] index0, index1, index2, index3, index4;
-// valid, of the sum, positive
+// valid, sum, positive of each pipeline step
 reg [2:0] kind0, kind1, kind2, kind3, kind4;
 wire negative = value[{end}] && !sum;
 wire [31:0] whole = {whole};

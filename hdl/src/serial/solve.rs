@@ -1,4 +1,4 @@
-//! The order of things from frame buffer to polynomials: which word goes where in which cycle.
+//! Sequencer from the frame buffer to the polynomials: which word goes where in which cycle.
 //!
 //! ```text
 //! step 1, 2  frame --> rounder (normalise) --> mixer (fold) --> operands, high and low limbs
@@ -6,7 +6,7 @@
 //! step 4     raw memory --> rounder (rescale) --> operands; mixer --> unfold
 //! step 5     the other passes --> rounder --> operands; mixer --> unfold
 //! ```
-//! Each step ends with [`DRAIN`] cycles in which its last words reach their memory.
+//! Each step ends with [`DRAIN`] cycles, in which its last words reach their memory.
 
 use dermis_golden::fixed::arith::{bit_length, magnitude_bits, round_shift, saturate};
 use dermis_golden::fixed::coefficients::FLIP_X;
@@ -20,7 +20,7 @@ use super::rounder::SHIFT_BITS;
 use crate::primitives::count_bits;
 use crate::wire::{Wire, Word};
 
-/// Width of the count of saturated words.
+/// Width of the count of saturated words, in bits.
 pub const SATURATION_BITS: usize = 16;
 const FOLD_HIGH: u64 = 1;
 const FOLD_LOW: u64 = 2;
@@ -28,100 +28,100 @@ const FIRST: u64 = 3;
 const REPLAY: u64 = 4;
 const OTHERS: u64 = 5;
 
-/// The sequence and its counters; see the module.
+/// The sequencer and its counters; steps in the module docs.
 #[derive(LogicBlock)]
 pub struct Solve {
-    /// Clock.
+    /// Clock; registers change on its rising edge.
     pub clk: Signal<In, Clock>,
-    /// Reset.
+    /// Synchronous reset, active high; stops the sequence.
     pub rst: Signal<In, Bit>,
-    /// A frame is there.
+    /// The frame buffer holds a frame: start.
     pub start: Signal<In, Bit>,
-    /// OR of its magnitudes.
+    /// OR of the frame's magnitudes; valid with `start`.
     pub magnitude: Wire<In>,
     /// Place of the taxel to read.
     pub index: Wire<Out>,
-    /// The code, two cycles later.
+    /// Its code, signed; two cycles after `index`.
     pub code: Wire<In>,
-    /// An accumulator.
+    /// An accumulator of the passes, `acc_bits` wide, signed.
     pub row_word: Wire<In>,
-    /// There is one.
+    /// `row_word` is valid.
     pub row_valid: Signal<In, Bit>,
-    /// Keep it in the raw memory.
+    /// Write `row_word` to the raw memory.
     pub raw_write: Signal<Out, Bit>,
-    /// Where.
+    /// Address in the raw memory; valid with `raw_write`.
     pub raw_write_address: Wire<Out>,
-    /// What to read there.
+    /// Address of the raw word to read.
     pub raw_read_address: Wire<Out>,
-    /// The raw word, a cycle later.
+    /// The raw word, one cycle after `raw_read_address`.
     pub raw_word: Wire<In>,
-    /// To the rounder.
+    /// Word for the rounder, signed.
     pub unrounded: Wire<Out>,
-    /// Right by how much.
+    /// Right shift for the rounder; valid with `round`.
     pub round_shift: Wire<Out>,
-    /// There is a word for it.
+    /// `unrounded` is valid.
     pub round: Signal<Out, Bit>,
-    /// From the rounder.
+    /// Word from the rounder, signed.
     pub rounded: Wire<In>,
-    /// It was saturated.
+    /// `rounded` was saturated.
     pub clipped: Signal<In, Bit>,
-    /// There is one.
+    /// `rounded` is valid.
     pub round_done: Signal<In, Bit>,
-    /// To the mixer.
+    /// `rounded` goes to the mixer in this cycle.
     pub mix: Signal<Out, Bit>,
-    /// From the mixer.
+    /// Word from the mixer, signed.
     pub mixed: Wire<In>,
-    /// There is one.
+    /// `mixed` is valid.
     pub mixed_valid: Signal<In, Bit>,
-    /// A product is issued.
+    /// A product is issued to `pass` in this cycle.
     pub issue: Signal<Out, Bit>,
-    /// A row's last.
+    /// The product is the last of its row; valid with `issue`.
     pub last: Signal<Out, Bit>,
-    /// Wide matrix, row, column.
+    /// Wide matrix, row and column; valid with `issue`.
     pub address: Wire<Out>,
-    /// The low limb of Cz⁺.
+    /// Use the low limb of Cz⁺; valid with `issue`.
     pub low: Signal<Out, Bit>,
-    /// Vector, column.
+    /// Vector and column of the operand; valid with `issue`.
     pub operand_address: Wire<Out>,
-    /// Both parities are the other ones; see `Instruction`.
+    /// Read the operand with both parity bits inverted; valid with `issue`.
     pub flip: Signal<Out, Bit>,
-    /// Of two high limbs.
+    /// The product is of two high limbs; valid with `issue`.
     pub align: Signal<Out, Bit>,
-    /// An operand is to be written.
+    /// Write `write_data` to the operand memory.
     pub write: Signal<Out, Bit>,
-    /// Vector, quad.
+    /// Vector and quad to write; valid with `write`.
     pub write_address: Wire<Out>,
-    /// Parity.
+    /// Parity to write, 2 bits; valid with `write`.
     pub write_lane: Wire<Out>,
-    /// The operand.
+    /// Operand of 16 bits, signed; valid with `write`.
     pub write_data: Wire<Out>,
-    /// The rounder's word is normalised.
+    /// The rounder's word is a normalised code.
     pub normalised_valid: Signal<Out, Bit>,
-    /// The mixer's quad is folded, for the first time.
+    /// The mixer's quads are folded input, high limb.
     pub folding: Signal<Out, Bit>,
-    /// The rounder's word is rescaled.
+    /// The rounder's word is a rescaled v_ij.
     pub rescaled_valid: Signal<Out, Bit>,
-    /// The mixer's words are unfolded.
+    /// The mixer's words are taxels of a v_ij.
     pub unfolding: Signal<Out, Bit>,
-    /// The frame has been read.
+    /// The frame buffer has been read; high for one cycle.
     pub free: Signal<Out, Bit>,
-    /// Left shift of `normalise`.
+    /// Left shift of `normalise`; valid from step 2 or 3 until the next `start`.
     pub normalise: Wire<Out>,
-    /// Right shift of `rescale`.
+    /// Right shift of `rescale`; valid from step 4 until the next `start`.
     pub rescale: Wire<Out>,
-    /// Words that `rescale` saturated.
+    /// Number of words saturated by `rescale`, 16 bits.
     pub saturations: Wire<Out>,
-    /// The rounder and the mixer are in use.
+    /// The sequence is running; rounder and mixer are in use.
     pub busy: Signal<Out, Bit>,
-    /// The last cycle.
+    /// Last cycle of the sequence.
     pub done: Signal<Out, Bit>,
     _formats: Formats,
     _program: Vec<Instruction>,
     _state: State,
 }
 
-/// One product of the program. The v_ij stand in the operand memory with their column parity flipped, as Ax needs them: Ay then flips
-/// both.
+/// One product of the program. The operand memory holds the v_ij with their column parity inverted, as Ax needs them;
+/// for Ay both parity bits of the address are inverted.
 #[derive(Clone, Copy, Debug)]
 struct Instruction {
     matrix: usize,
@@ -156,7 +156,7 @@ struct State {
 }
 
 impl Solve {
-    /// For `formats`; the rounder takes words of `unrounded` bits and gives some of `rounded`.
+    /// With the schedule of `formats`; the rounder takes words of `unrounded` bits and returns words of `rounded` bits.
     pub fn new(formats: &Formats, unrounded: usize, rounded: usize) -> Self {
         let f = formats;
         let (quads, words) = (count_bits(f.quads), count_bits(4 * f.quads));
@@ -324,7 +324,7 @@ impl Solve {
         self.is_unfolding() && self.round_done.val()
     }
 
-    /// The operand that is written: a limb of a folded word, or a rescaled word without its extra bits.
+    /// The operand to write: a limb of a folded word, or a rescaled word rounded to `data_bits`.
     fn operand(&self) -> i64 {
         let f = &self._formats;
         let low = f.input_low_bits;
@@ -441,7 +441,7 @@ impl Logic for Solve {
         let count = self._program.len();
         let pc = count_bits(count + 1);
         let vectors = self.write_address.width() - quads;
-        // Plain gates: a table would become a memory.
+        // As gates: synthesis would map a table to a memory.
         let set = |bit: &dyn Fn(&Instruction) -> bool| {
             let terms: Vec<String> =
                 (0..count).filter(|&at| bit(&self._program[at])).map(|at| format!("product == {pc}'d{at}")).collect();
@@ -500,7 +500,7 @@ wire [{pe}:0] next_product = product + {pc}'d1;
 wire [{we}:0] place = {{quad, phase[1:0]}};
 wire folded = row_folding && mixed_valid;
 wire [{acc_less}:0] row_magnitude = row_word[{acc_less}:0] ^ {{{acc_end}{{row_word[{acc_end}]}}}};
-// The leading one by halves.
+// Binary search for the leading one.
 wire [63:0] whole = {{{seen_fill}'d0, seen}};
 wire [31:0] half = |whole[63:32] ? whole[63:32] : whole[31:0];
 wire [15:0] quarter = |half[31:16] ? half[31:16] : half[15:0];
@@ -575,7 +575,7 @@ always @(posedge clk) begin
     draining <= 1'b0;
   end
 end
-// Half an LSB of the operand added; only the positive end can leave the word.
+// Adds half an LSB of the operand; only the largest positive values can overflow.
 wire [{data_end}:0] nearest = (!rounded[{top}] && &rounded[{below}:{half}]) ? {{1'b0, {{{data_less}{{1'b1}}}}}}
   : rounded[{top}:{extra}] + {{{data_less}'d0, rounded[{half}]}};
 wire [{operand_end}:0] rescaled_operand = {extended_operand};
@@ -651,7 +651,7 @@ end",
     }
 }
 
-/// `signal` of `bits` bits with its sign repeated up to `wide` bits.
+/// Verilog that sign-extends `signal` of `bits` bits to `wide` bits.
 pub(super) fn extended(signal: &str, bits: usize, wide: usize) -> String {
     match wide - bits {
         0 => signal.to_string(),
@@ -659,7 +659,7 @@ pub(super) fn extended(signal: &str, bits: usize, wide: usize) -> String {
     }
 }
 
-/// `signal` of `bits` bits with zeros up to `wide` bits.
+/// Verilog that zero-extends `signal` of `bits` bits to `wide` bits.
 pub(super) fn padded(signal: &str, bits: usize, wide: usize) -> String {
     match wide - bits {
         0 => signal.to_string(),

@@ -1,4 +1,4 @@
-//! Blocks of the serial engine one by one, against the bit-true model on random words.
+//! Single blocks of the serial engine against the bit-true model on random words.
 
 use dermis_golden::fixed::arith::{hadamard, round_shift, saturate};
 use rust_hdl::prelude::*;
@@ -6,7 +6,7 @@ use rust_hdl::prelude::*;
 use super::{Horner, Mixer, Rounder};
 use crate::wire::Word;
 
-/// Settles with the clock at one level.
+/// Settles the block with the clock at one level.
 macro_rules! level {
     ($block:expr, $level:expr) => {
         $block.clk.next = $level.into();
@@ -79,7 +79,7 @@ fn horner_moves_the_centre_of_polynomials_back_to_back() {
             for element in 0..4 {
                 horner.element.next = Word::from(element as u64);
                 horner.top.next = Word::from(top as u64);
-                // Beyond the degree stands anything.
+                // Arbitrary words above the degree.
                 let word = if 3 - element <= top { c[3 - element] } else { 12345 };
                 horner.word.next = Word::of_fields(&[word], 30);
                 level!(horner, false);

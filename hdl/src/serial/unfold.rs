@@ -1,4 +1,4 @@
-//! Stage `unfold`: the mixer's words to the coefficients of the taxels' polynomials, and their sum.
+//! Stage `unfold`: words from the mixer to the coefficients of the taxels' polynomials, and their sum.
 
 use dermis_golden::fixed::arith::round_shift;
 use dermis_golden::fixed::formats::Formats;
@@ -10,29 +10,29 @@ use super::solve::extended;
 use crate::primitives::count_bits;
 use crate::wire::{Wire, Word};
 
-/// Words of v_ij, one vector after the other, to memory words: polynomial 0 is the sum, polynomial 1 + p the taxel at place p;
-/// coefficient v_ij of a polynomial at 4j + i.
+/// Words of v_ij, one vector after the other, to words of the polynomial memory. Polynomial 0 is the sum, polynomial 1
+/// + p the taxel at place p; coefficient v_ij of a polynomial is at 4j + i.
 #[derive(LogicBlock)]
 pub struct Unfold {
-    /// Clock.
+    /// Clock; registers change on its rising edge.
     pub clk: Signal<In, Clock>,
-    /// Reset.
+    /// Synchronous reset, active high.
     pub rst: Signal<In, Bit>,
     /// A new frame.
     pub start: Signal<In, Bit>,
-    /// A mixed word.
+    /// A word from the mixer, signed; places in order.
     pub mixed: Wire<In>,
-    /// There is one.
+    /// `mixed` is valid.
     pub valid: Signal<In, Bit>,
-    /// A taxel's coefficient.
+    /// A taxel's coefficient, `vector_bits` + 2 wide, signed.
     pub taxel: Wire<Out>,
-    /// There is one.
+    /// `taxel` is valid.
     pub taxel_valid: Signal<Out, Bit>,
-    /// A word is to be written.
+    /// Write `data` to the polynomial memory.
     pub write: Signal<Out, Bit>,
-    /// Lower region, polynomial and coefficient.
+    /// `{0, polynomial, coefficient}`: lower region; valid with `write`.
     pub address: Wire<Out>,
-    /// The word.
+    /// Coefficient of a taxel or of the sum, signed; valid with `write`.
     pub data: Wire<Out>,
     _taxels: u64,
     _vectors: usize,
@@ -50,7 +50,7 @@ struct State {
 }
 
 impl Unfold {
-    /// Mixed words of `mixed` bits.
+    /// With the widths of `formats`; words from the mixer have `mixed` bits.
     pub fn new(formats: &Formats, mixed: usize) -> Self {
         Unfold {
             clk: Default::default(),
@@ -70,7 +70,7 @@ impl Unfold {
     }
 }
 
-/// Place of a coefficient in its polynomial.
+/// Position 4j + i of coefficient v_ij in its polynomial.
 fn code(vector: usize) -> u64 {
     let (i, j) = EXPONENTS[vector % EXPONENTS.len()];
     u64::from(4 * j + i)
@@ -137,7 +137,7 @@ reg [{be}:0] vector;
 reg [{de}:0] sum;
 wire last = valid_then && polynomial == {place}'d{taxels};
 wire [1:0] degree = {{{degree1}, {degree0}}};
-// One bit more on the right holds what decides the rounding.
+// An extra bit on the right keeps the half LSB for the rounding.
 wire signed [{mixed}:0] doubled = {{mixed, 1'b0}};
 wire signed [{mixed}:0] shifted = doubled >>> {{degree, 1'b0}};
 wire [{mixed}:0] half = shifted + {{{mixed}'d0, 1'b1}};

@@ -1,15 +1,16 @@
-//! Stage `search`: sweep after sweep over the polynomials, and the judgement after each.
+//! Stage `search`: sequencer of the sweeps over the polynomials, and comparison of the candidates after each.
 //!
-//! A sweep takes 16 cycles per polynomial, the sum's first. `tick` counts them; what a word meets on its way follows at fixed distances:
+//! A sweep takes 16 cycles per polynomial, the sum polynomial first. `tick` counts them; a word is at each point a
+//! fixed number of ticks later:
 //! ```text
 //! tick      0     bank's address: coefficients by rows of equal j, highest i first
-//!           1     word into the chain along x; leaves from 5 on into the turning memory
+//!           1     word into the chain along x; leaves from 5 on into the transpose memory
 //!          18     out of it, by columns of equal i, highest j first
 //!          19     into the chain along y; leaves from 23 on, halved in a register
 //!          24     into the other bank, and to the candidates
 //! ```
-//! Whether a candidate lies in the disc is known without a product: x² + y² − r² is carried along, four times as large after a
-//! halving, and differs by ±2x + 1 from one candidate to the next.
+//! The disc test needs no product: x² + y² − r² is updated, times four at a halving, and by ±2x + 1 from one candidate
+//! to the next.
 
 use dermis_golden::fixed::formats::{Formats, HALVINGS};
 use dermis_golden::fixed::search::{CENTRE, COARSE_CENTRES};
@@ -19,7 +20,7 @@ use rust_hdl::prelude::*;
 use crate::primitives::{count_bits, position_bits};
 use crate::wire::{Wire, Word};
 
-/// Width of x² + y² − r².
+/// Width of x² + y² − r², in bits, signed.
 const DISC_BITS: usize = 21;
 const COARSE: u64 = COARSE_CENTRES.len() as u64;
 const LAST: u64 = COARSE + HALVINGS as u64;
@@ -27,90 +28,91 @@ const IDLE: u64 = 0;
 const SET_UP: u64 = 1;
 const RUN: u64 = 2;
 const JUDGE: u64 = 3;
-/// From a bank's address to the word into the second chain, to the word that leaves it, and to the word's way back.
+/// Ticks from a bank's address to the word entering the chain along y; then to the word leaving it, and to its
+/// write-back.
 const ALONG_Y: u64 = TRANSPOSE + 1;
 const LEAVES: u64 = ALONG_Y + 4;
 const BACK: u64 = LEAVES + 1;
 
-/// The sweeps' addresses and the best candidate; see the module.
+/// Addresses of the sweeps and the best candidate; timing in the module docs.
 #[derive(LogicBlock)]
 pub struct Walk {
-    /// Clock.
+    /// Clock; registers change on its rising edge.
     pub clk: Signal<In, Clock>,
-    /// Reset.
+    /// Synchronous reset, active high; stops the search.
     pub rst: Signal<In, Bit>,
-    /// Polynomials are being written.
+    /// The polynomials are being written: the odd bank is selected for reading, the even one for writing.
     pub filling: Signal<In, Bit>,
-    /// They are in.
+    /// All polynomials have been written: start the search.
     pub start: Signal<In, Bit>,
-    /// Search; otherwise p(0) is passed on.
+    /// Search; otherwise p(0) is the result. Valid with `start`.
     pub enabled: Signal<In, Bit>,
-    /// After the search: the polynomial whose value is read.
+    /// Index of the polynomial whose value is read when no sweep runs.
     pub wanted: Wire<In>,
-    /// The bank that is read.
+    /// The odd bank is read.
     pub odd: Signal<Out, Bit>,
-    /// Where.
+    /// `{region, polynomial, coefficient}` to read.
     pub read_address: Wire<Out>,
-    /// The chain along x: cycle.
+    /// Chain along x: cycle of the polynomial.
     pub x_element: Wire<Out>,
-    /// Degree in x.
+    /// Chain along x: degree in x.
     pub x_top: Wire<Out>,
-    /// It moves.
+    /// Chain along x: the centre moves.
     pub x_moves: Signal<Out, Bit>,
-    /// Down.
+    /// Chain along x: by −1.
     pub x_down: Signal<Out, Bit>,
-    /// Where its words are put.
+    /// Address in the transpose memory to write.
     pub turn_write: Wire<Out>,
-    /// Where they are taken from.
+    /// Address in the transpose memory to read.
     pub turn_read: Wire<Out>,
-    /// The chain along y: cycle.
+    /// Chain along y: cycle of the polynomial.
     pub y_element: Wire<Out>,
-    /// Degree in y.
+    /// Chain along y: degree in y.
     pub y_top: Wire<Out>,
-    /// It moves.
+    /// Chain along y: the centre moves.
     pub y_moves: Signal<Out, Bit>,
-    /// Down.
+    /// Chain along y: by −1.
     pub y_down: Signal<Out, Bit>,
-    /// Its words are divided by 2 to this.
+    /// Right shift i + j of the coefficient that leaves the chain along y, in a halving; otherwise 0.
     pub halvings: Wire<Out>,
-    /// They are written.
+    /// Write the shifted coefficient to the bank that is not read.
     pub write: Signal<Out, Bit>,
-    /// Where.
+    /// `{region, polynomial, coefficient}` to write; valid with `write`.
     pub write_address: Wire<Out>,
-    /// The candidates' cycle.
+    /// Cycle 4i + j of the coefficient that goes to the candidates.
     pub cycle: Wire<Out>,
-    /// See [`Nine`](super::Nine).
+    /// As `present` of [`Nine`](super::Nine).
     pub present: Wire<Out>,
-    /// See [`Nine`](super::Nine).
+    /// As `sums` of [`Nine`](super::Nine).
     pub sums: Wire<Out>,
-    /// The constant coefficient that is written is a value.
+    /// The coefficient written is a taxel's value p(μ*).
     pub value_valid: Signal<Out, Bit>,
-    /// Totals are read, not written.
+    /// The comparison reads the totals, so they are addressed by `candidate`.
     pub judging: Signal<Out, Bit>,
-    /// Whose.
+    /// Index of the candidate whose total is read; valid with `judging`.
     pub candidate: Wire<Out>,
-    /// Σp > 0 and total, a cycle later.
+    /// `{Σp > 0, total}`, one cycle after `candidate`.
     pub total: Wire<In>,
-    /// Best position, x.
+    /// Best position, x, in grid steps of the level, signed.
     pub best_x: Wire<Out>,
-    /// Best position, y.
+    /// Best position, y, in grid steps of the level, signed.
     pub best_y: Wire<Out>,
-    /// Its score.
+    /// Score of the best candidate, signed, 2^−6.
     pub score: Wire<Out>,
-    /// A candidate was found.
+    /// A candidate was found in the coarse grid.
     pub found: Signal<Out, Bit>,
-    /// Something was taken at this level.
+    /// A candidate was taken at this level.
     pub taken: Signal<Out, Bit>,
-    /// A sweep has been judged.
+    /// The candidates of a sweep have been compared; high for one cycle.
     pub judged: Signal<Out, Bit>,
-    /// All values are in the bank that is read now.
+    /// All values are in the bank that is now read; high for one cycle.
     pub done: Signal<Out, Bit>,
     _degree: u64,
     _polynomials: u64,
     _state: State,
 }
 
-/// A place of polynomials.
+/// Location of a set of polynomials: bank and region.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 struct Region {
     odd: bool,
@@ -145,20 +147,20 @@ struct State {
     improved: bool,
 }
 
-/// The step to the coarse centre of a sweep.
+/// Move to the coarse centre of `sweep` from the previous one.
 fn coarse_step(sweep: usize) -> [i64; 2] {
     let before = if sweep == 0 { [0, 0] } else { COARSE_CENTRES[sweep - 1] };
     [0, 1].map(|axis| i64::from(COARSE_CENTRES[sweep][axis] - before[axis]))
 }
 
-/// x² + y² − r² of a coarse centre.
+/// x² + y² − r² at the coarse centre of `sweep`, r = 3.
 fn coarse_disc(sweep: usize) -> i64 {
     let [x, y] = COARSE_CENTRES[sweep].map(i64::from);
     x * x + y * y - 9
 }
 
 impl Walk {
-    /// For `formats`.
+    /// With the widths and the degree of `formats`.
     pub fn new(formats: &Formats) -> Self {
         let polynomials = polynomials(formats);
         let bits = count_bits(polynomials);
@@ -208,7 +210,7 @@ impl Walk {
         self._state.state == RUN && self._state.tick == SLOT * self._polynomials + SWEEP_TAIL - 1
     }
 
-    /// The candidate in turn: a halving looks at its centre first.
+    /// Index of the candidate that is next: in a halving the centre comes first.
     fn in_turn(&self) -> u64 {
         let s = &self._state;
         match (s.sweep < COARSE, s.count / 2) {
@@ -270,7 +272,8 @@ impl Walk {
         self._state = next;
     }
 
-    /// A candidate every two cycles, five cycles each: turn, disc by x, disc by y and position, decision, update.
+    /// Compares a candidate every two cycles, five cycles each: index, disc by x, disc by y and position, decision,
+    /// update.
     fn judge(&self, next: &mut State) {
         let s = self._state;
         let coarse = s.sweep < COARSE;
@@ -424,9 +427,9 @@ reg [4:0] count;
 reg [3:0] sweep, turn, turn_then, turn_read_then;
 reg [{te}:0] tick;
 reg searching, improved, takes;
-// Moves and offsets: it moves, down.
+// Moves and offsets along an axis: bit 1 moves, bit 0 down.
 reg [1:0] move_x, move_y, offset_x, offset_y;
-// Places of polynomials: odd bank, upper region.
+// Locations of polynomials: bit 1 odd bank, bit 0 upper region.
 reg [1:0] source, target, current, kept;
 reg [{pe}:0] centre_x, centre_y;
 reg [{pe}:0] new_x, new_y;
@@ -453,7 +456,7 @@ wire [{pe}:0] centre_along = along_y ? centre_y : centre_x;
 wire backward = along_y ? above : left;
 wire sideways = along_y ? above || below : left || right;
 wire [{pe}:0] signed_centre = centre_along ^ {{{position}{{backward}}}};
-// ±2x + 1: of the complement, twice and one more, and two.
+// 2x + 1, or -2x + 1 as twice the complement, plus 1, plus 2.
 wire [{de}:0] further = {{{{{disc_fill}{{signed_centre[{pe}]}}}}, signed_centre, 1'b1}} + {{{disc_less}'d0, backward, 1'b0}};
 wire [{de}:0] disc_before = along_y ? disc : centre_disc;
 wire signed [{pe}:0] best_y_now = best_y, best_x_now = best_x, new_x_now = new_x, new_y_now = new_y;

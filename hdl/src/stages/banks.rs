@@ -1,7 +1,8 @@
-//! In place of stage `receive` where the case is chosen per frame: a frame buffer for each case, and the choice.
+//! Replacement for stage `receive` where the case is chosen per frame: a frame buffer per case, and the choice of the
+//! case.
 //!
-//! Every buffer takes every code, each in the layout of its own subarrays; what is read comes from the one of the case
-//! chosen. They fill and become free together.
+//! Every buffer receives every code, each in the layout of its own subarrays; reads come from the buffer of the chosen
+//! case. All buffers fill and become free together.
 
 use dermis_golden::fixed::Model;
 use rust_hdl::prelude::*;
@@ -10,53 +11,53 @@ use super::{Choose, Receive};
 use crate::primitives::{by_case, count_bits, frame_quads};
 use crate::wire::{Wire, Word};
 
-/// The ports of [`Receive`]; `full` once the case is chosen as well.
+/// Ports as of [`Receive`]; `full` is high once the case has been chosen too.
 #[derive(LogicBlock)]
 pub struct Banks {
-    /// Clock.
+    /// Clock; registers change on its rising edge.
     pub clk: Signal<In, Clock>,
-    /// Reset.
+    /// Synchronous reset, active high.
     pub rst: Signal<In, Bit>,
-    /// A taxel's code.
+    /// A taxel's code, `input_bits` wide, two's complement; valid with `s_axis_tvalid`.
     pub s_axis_tdata: Wire<In>,
-    /// It is offered.
+    /// A beat is offered on `s_axis_tdata`; the sender holds it until `s_axis_tready`.
     pub s_axis_tvalid: Signal<In, Bit>,
-    /// It is taken.
+    /// The block accepts a beat in this cycle.
     pub s_axis_tready: Signal<Out, Bit>,
-    /// It is the frame's last.
+    /// The beat is the last of its frame; valid with `s_axis_tvalid`.
     pub s_axis_tlast: Signal<In, Bit>,
     /// A beat is accepted in this cycle.
     pub accept: Signal<Out, Bit>,
-    /// What is taken of a beat.
+    /// The accepted code, 0 for a dead taxel; valid with `accept`.
     pub taken_word: Wire<Out>,
-    /// The frame buffers hold a whole frame, and `which` is its case.
+    /// The frame buffers hold a whole frame and `which` is its case; high until `free`.
     pub full: Signal<Out, Bit>,
-    /// The frame has been read.
+    /// The frame has been read: the buffers may be overwritten.
     pub free: Signal<In, Bit>,
-    /// Index of the case chosen.
+    /// Index of the chosen case; valid with `full`.
     pub which: Wire<Out>,
-    /// Which quad to read.
+    /// Address of the quad to read, over all subarrays.
     pub quad_address: Wire<In>,
-    /// The quad, two cycles later.
+    /// Four codes, `input_bits` each, signed; two cycles after `quad_address`.
     pub quad: Wire<Out>,
-    /// The subarray that magnitude and signs are asked of.
+    /// Index of the subarray for `magnitude`, `positive` and `negative`; combinational.
     pub part: Wire<In>,
-    /// OR of the codes' magnitudes.
+    /// OR of the magnitudes of the subarray's codes, `input_bits` − 1 wide; valid while `full`.
     pub magnitude: Wire<Out>,
-    /// A code is above the noise floor.
+    /// A code of the subarray is above the noise floor; valid while `full`.
     pub positive: Signal<Out, Bit>,
-    /// A code is below minus the noise floor.
+    /// A code of the subarray is below minus the noise floor; valid while `full`.
     pub negative: Signal<Out, Bit>,
-    /// `tlast` was early or missing.
+    /// `tlast` was early or missing since the last `reported`.
     pub framing: Signal<Out, Bit>,
-    /// `framing` has been reported.
+    /// Clears `framing`.
     pub reported: Signal<In, Bit>,
     banks: Vec<Receive>,
     choose: Choose,
 }
 
 impl Banks {
-    /// For the cases of `model`.
+    /// A frame buffer for each case of `model`.
     pub fn new(model: &Model) -> Self {
         let cases = model.cases();
         let bits = model.formats.input_bits as usize;
@@ -98,7 +99,7 @@ impl Logic for Banks {
             bank.s_axis_tlast.next = self.s_axis_tlast.val();
             bank.free.next = self.free.val();
             bank.reported.next = self.reported.val();
-            // An address beyond a smaller bank is none of its own.
+            // An address beyond a smaller buffer is meant for another one; its data are not used.
             bank.quad_address.next = cut(&self.quad_address, bank.quad_address.width());
             bank.part.next = cut(&self.part, bank.part.width());
         }
@@ -167,7 +168,7 @@ impl Logic for Banks {
             format!("  {port} = {};\n", by_case(&each))
         };
         let outputs: String = ["quad", "magnitude", "positive", "negative"].iter().map(|port| chosen(port)).collect();
-        // All fill and become free together: what the first says of the stream, all say.
+        // All buffers fill and become free together: the handshake outputs of the first are those of all.
         let unused: Vec<String> = ["s_axis_tready", "accept", "taken_word", "framing"]
             .iter()
             .flat_map(|port| (1..count).map(move |number| format!("banks${number}${port}")))
@@ -197,7 +198,7 @@ always @(*) begin
     }
 }
 
-/// The low `bits` bits of a wire.
+/// The low `bits` bits of `wire`.
 fn cut(wire: &Wire<In>, bits: usize) -> Word {
     Word::from(wire.val().field(0, bits))
 }

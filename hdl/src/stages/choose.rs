@@ -1,6 +1,6 @@
-//! Stage `choose`: which case solves a frame, decided while the frame is received.
+//! Stage `choose`: the case that solves a frame, decided while the frame is received.
 //!
-//! Place and magnitude of a code (1 cycle), maxima (1), what counts as a contact (1), the choice (1).
+//! Four cycles: position and magnitude of a code, maxima, limit for a contact, choice.
 
 use dermis_golden::fixed::choose::{is_beside_boundary, quarters, FrameStats, CUT_SHIFT};
 use dermis_golden::fixed::Model;
@@ -12,25 +12,25 @@ use rust_hdl::prelude::*;
 use crate::primitives::count_bits;
 use crate::wire::{Wire, Word};
 
-/// Listens to the codes that are accepted; `which` is settled four cycles after the frame's last, until `free`, and
-/// stands until the next frame's is.
+/// Monitors the accepted codes. `which` is valid with `settled`, from four cycles after the frame's last code until
+/// `free`, and keeps its value until the next choice.
 #[derive(LogicBlock)]
 pub struct Choose {
-    /// Clock.
+    /// Clock; registers change on its rising edge.
     pub clk: Signal<In, Clock>,
-    /// Reset.
+    /// Synchronous reset, active high.
     pub rst: Signal<In, Bit>,
-    /// A code.
+    /// A code, `input_bits` wide, two's complement; valid with `accept`.
     pub code: Wire<In>,
-    /// It is accepted.
+    /// A code is accepted in this cycle.
     pub accept: Signal<In, Bit>,
-    /// With it the sender ends the frame: too early a frame starts over.
+    /// The code has `tlast`; before the end of the frame it drops the frame. Valid with `accept`.
     pub tlast: Signal<In, Bit>,
-    /// The frame has been read.
+    /// The frame has been read; clears `settled`.
     pub free: Signal<In, Bit>,
-    /// Index of the case.
+    /// Index of the chosen case; valid with `settled`.
     pub which: Wire<Out>,
-    /// It is this frame's.
+    /// The choice for the frame in the buffer is complete.
     pub settled: Signal<Out, Bit>,
     _sensor: Sensor,
     _grids: Vec<Grid>,
@@ -45,7 +45,7 @@ pub struct Choose {
 const LATENCY: usize = dermis_golden::fixed::choose::LATENCY as usize + 2;
 
 impl Choose {
-    /// Between the cases of `model`.
+    /// For the cases of `model`.
     pub fn new(model: &Model) -> Self {
         let bits = model.formats.input_bits as usize;
         let grids = model.grids();
@@ -61,7 +61,7 @@ impl Choose {
             _sensor: model.scene.sensor.clone(),
             _grids: grids,
             _condition: model.scene.partition.condition,
-            // A floor beyond the code's range hides every code; so does the range's end, in the code's width.
+            // A floor beyond the code's range is clamped to its end, which no code exceeds either.
             _floor: model.noise_floor.min((1 << (bits - 1)) - 1),
             _index: 0,
             _seen: FrameStats::default(),
@@ -69,7 +69,7 @@ impl Choose {
         }
     }
 
-    /// Takes an accepted code; whether it was the frame's last.
+    /// Evaluates an accepted code; returns whether it was the frame's last.
     fn take(&mut self) -> bool {
         let code = self.code.val().signed(0, self.code.width()) as i32;
         self._seen.add(&self._sensor, self._index, code, self._floor);
@@ -83,8 +83,8 @@ impl Choose {
         last
     }
 
-    /// Verilog of the signs of each quarter, and of the cases that leave a loaded subarray unmet. Where every loaded
-    /// subarray is searched there are none.
+    /// Verilog that collects the signs in each quarter of the array; and for each case an expression that is true if a
+    /// loaded subarray does not meet the condition. With `Condition::Loaded` every loaded subarray does.
     fn signs(&self) -> (String, Vec<String>) {
         let bits = self.code.width();
         if self._condition == Condition::Loaded {
@@ -156,7 +156,7 @@ impl Logic for Choose {
         let (rows, cols) = (self._sensor.rows, self._sensor.cols);
         let (r, c, m) = (count_bits(rows), count_bits(cols), self.code.width() - 1);
         let w = self.which.width();
-        // The lines beside a boundary: the first and the last of them.
+        // First and last of the lines beside a boundary.
         let beside = |lines: usize| {
             let mut all = (0..lines).filter(|&line| is_beside_boundary(line, lines));
             let first = all.next().unwrap_or(0);

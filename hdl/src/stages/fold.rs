@@ -8,38 +8,39 @@ use rust_hdl::prelude::*;
 use crate::primitives::{count_bits, frame_quads, largest, BitDelay, Butterfly, CaseCounter, Counter, Delay, Ram};
 use crate::wire::Wire;
 
-/// Quads pass `normalise` and the butterfly on their way from frame buffer to input memory.
+/// Reads the quads of a subarray from the frame buffer; they pass `normalise` and the butterfly on their way to the
+/// input memory.
 #[derive(LogicBlock)]
 pub struct Fold {
-    /// Clock.
+    /// Clock; registers change on its rising edge.
     pub clk: Signal<In, Clock>,
-    /// Reset.
+    /// Synchronous reset, active high.
     pub rst: Signal<In, Bit>,
-    /// Which case.
+    /// Index of the case.
     pub which: Wire<In>,
-    /// The frame's first quad comes next.
+    /// A new frame: reading restarts at the frame's first quad.
     pub begin_frame: Signal<In, Bit>,
     /// Fold the next subarray.
     pub start: Signal<In, Bit>,
-    /// It is the frame's last.
+    /// The subarray is the frame's last.
     pub last_part: Signal<In, Bit>,
-    /// Quad to read from the frame buffer.
+    /// Address of the quad to read from the frame buffer, over all subarrays.
     pub quad_address: Wire<Out>,
-    /// The frame's last quad is being read.
+    /// The frame's last quad is being read: the frame buffer is free from the next cycle.
     pub free: Signal<Out, Bit>,
-    /// The quad of three cycles ago, normalised.
+    /// Four normalised codes, `input_bits` each, signed; three cycles after `quad_address`.
     pub normalised: Wire<In>,
-    /// `normalised` is a quad.
+    /// `normalised` holds a quad.
     pub normalised_valid: Signal<Out, Bit>,
-    /// Its parities, one cycle later.
+    /// Four parities, two bits wider, one cycle after `normalised`.
     pub folded: Wire<Out>,
-    /// `folded` is a quad.
+    /// `folded` holds a quad.
     pub folded_valid: Signal<Out, Bit>,
-    /// The input memory holds the frame.
+    /// The input memory holds the subarray; high for one cycle.
     pub done: Signal<Out, Bit>,
-    /// Quad of the input memory to read.
+    /// Address of the quad to read from the input memory.
     pub read_address: Wire<In>,
-    /// Its parities, two cycles later.
+    /// Its four parities, two cycles after `read_address`.
     pub read_quad: Wire<Out>,
     quads: CaseCounter,
     frame_quads: Counter,
@@ -54,7 +55,7 @@ pub struct Fold {
 }
 
 impl Fold {
-    /// Widths of `model`.
+    /// With the widths of `model`.
     pub fn new(model: &Model) -> Self {
         let bits = model.formats.input_bits as usize;
         let limits: Vec<usize> = model.cases().iter().map(|case| case.formats.quads).collect();

@@ -1,4 +1,4 @@
-//! Stage `force`: p(μ*) by quad into a memory, out of it force words by taxel, which wait in a queue for the receiver.
+//! Stage `force`: p(μ*) by quad into a memory; from there, force words by taxel into the output queue.
 
 use dermis_golden::fixed::Model;
 use rust_hdl::prelude::*;
@@ -9,66 +9,66 @@ use crate::primitives::{
 };
 use crate::wire::Wire;
 
-/// Values in by quad; beats out in the order `send` asks for them.
+/// Values in by quad; beats out in the order in which `send` requests them.
 #[derive(LogicBlock)]
 pub struct Force {
-    /// Clock.
+    /// Clock; registers change on its rising edge.
     pub clk: Signal<In, Clock>,
-    /// Reset.
+    /// Synchronous reset, active high.
     pub rst: Signal<In, Bit>,
-    /// Which case is sent.
+    /// Index of the case of the frame being sent.
     pub which: Wire<In>,
-    /// Four taxels' p(μ*).
+    /// Four values p(μ*), `search_bits[0]` each, signed.
     pub values: Wire<In>,
-    /// `values` are a quad.
+    /// `values` holds a quad.
     pub values_valid: Signal<In, Bit>,
-    /// The frame's first values come next.
+    /// A new frame: its first values come next.
     pub begin_frame: Signal<In, Bit>,
-    /// A subarray's values are in: keep its μ, exponents and status.
+    /// Stores position, exponents and status of subarray `part` in this cycle.
     pub start: Signal<In, Bit>,
-    /// Which subarray.
+    /// Index of the subarray; valid with `start`.
     pub part: Wire<In>,
-    /// A beat may be asked for.
+    /// A beat may be requested in this cycle.
     pub room: Signal<Out, Bit>,
-    /// A beat is asked for.
+    /// A beat is requested; only with `room`.
     pub offer: Signal<In, Bit>,
-    /// Which beat: 0 a force, 1 … 3 the status.
+    /// 0: a force, 1 … 3: a status beat; valid with `offer`.
     pub beat: Wire<In>,
-    /// The beat's subarray.
+    /// Index of the beat's subarray; valid with `offer`.
     pub beat_part: Wire<In>,
-    /// The taxel's quad.
+    /// Address of the taxel's quad; valid with `offer`.
     pub address: Wire<In>,
-    /// The taxel's lane.
+    /// Lane of the taxel; valid with `offer`.
     pub lane: Wire<In>,
-    /// μ1 as a position.
+    /// μ1 in grid steps of the last level, signed; valid with `start`.
     pub position_x: Wire<In>,
-    /// μ2 as a position.
+    /// μ2 in grid steps of the last level, signed; valid with `start`.
     pub position_y: Wire<In>,
-    /// Left shift of `normalise`.
+    /// Left shift of `normalise`; valid with `start`.
     pub normalise: Wire<In>,
-    /// Right shift of `rescale`.
+    /// Right shift of `rescale`; valid with `start`.
     pub rescale: Wire<In>,
-    /// The scene's condition is met.
+    /// The subarray meets the scene's condition; valid with `start`.
     pub condition: Signal<In, Bit>,
-    /// The search found a candidate.
+    /// The search found a candidate; valid with `start`.
     pub found: Signal<In, Bit>,
-    /// `tlast` was early or missing.
+    /// `tlast` was early or missing; valid while the frame is sent.
     pub framing: Signal<In, Bit>,
-    /// The subarray's coefficients were not what they must be.
+    /// The coefficient signature is wrong, 1 bit; valid with `start`.
     pub damaged: Wire<In>,
-    /// Score of the winner.
+    /// Score of the best candidate, signed, 2^−6; valid with `start`.
     pub score: Wire<In>,
-    /// Words that `rescale` saturated.
+    /// Words saturated by `rescale`; valid with `start`.
     pub saturations: Wire<In>,
-    /// Cycles of the frame so far.
+    /// Cycle counter of the frame; sampled for its first beat.
     pub cycles: Wire<In>,
-    /// A beat stands on the output.
+    /// A beat is offered on `m_axis_tdata`; it is held until `m_axis_tready`.
     pub m_axis_tvalid: Signal<Out, Bit>,
-    /// The receiver takes it.
+    /// The receiver accepts a beat in this cycle.
     pub m_axis_tready: Signal<In, Bit>,
-    /// It is the frame's last.
+    /// The beat is the last of its frame; valid with `m_axis_tvalid`.
     pub m_axis_tlast: Signal<Out, Bit>,
-    /// `{fz, fy, fx}`.
+    /// `{fz, fy, fx}`, 32 bits signed each, or a status beat; valid with `m_axis_tvalid`.
     pub m_axis_tdata: Wire<Out>,
     quads: Counter,
     asked: Delay,
@@ -78,7 +78,7 @@ pub struct Force {
 }
 
 impl Force {
-    /// Widths of `model`.
+    /// With the widths of `model`.
     pub fn new(model: &Model) -> Self {
         let formats = &model.formats;
         let quads = frame_quads(model.cases());

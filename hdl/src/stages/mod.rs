@@ -1,7 +1,13 @@
-//! The stages of the pipeline, one file each, named as in the bit-true model.
+//! The stages of the pipeline, one file each, named as in the bit-true model. A stage starts on the `done` pulse of the
+//! one before.
 //!
-//! Every stage is a `#[hdl_gen]` kernel: single-bit control and wiring between the
-//! [primitives](crate::primitives). A stage begins on the `done` pulse of the one before.
+//! `prepare`, `receive`, `fold`, `pass`, `rescale`, `unfold`, `search`, `force` and `send` are `#[hdl_gen]` kernels:
+//! single-bit control and connections between the [primitives](crate::primitives), with Verilog derived from the Rust.
+//! `normalise`, `choose`, `banks` and `unsearched` have a Rust `update()` for rust-hdl's simulation and hand-written
+//! Verilog, which co-simulation compares.
+//!
+//! `banks` (with `choose`) replaces `receive` where the case is chosen per frame; `unsearched` replaces `search` in a
+//! scene without one.
 
 mod banks;
 mod choose;

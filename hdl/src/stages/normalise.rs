@@ -1,4 +1,4 @@
-//! Stage `normalise`: block floating point on the input, one left shift for all codes of a subarray.
+//! Stage `normalise`: block exponent of the input, one left shift for all codes of a subarray.
 
 use dermis_golden::fixed::normalise;
 use rust_hdl::prelude::*;
@@ -6,28 +6,28 @@ use rust_hdl::prelude::*;
 use crate::primitives::{by_leading_one, count_bits};
 use crate::wire::{Wire, Word};
 
-/// `start` takes the shift from `magnitude`, which stands two cycles later: the first quad comes after that. Then one quad
-/// per cycle is shifted (`shifted`, one cycle later).
+/// `start` computes the shift from `magnitude`; it is valid two cycles later, before the first quad arrives. Quads are
+/// then shifted one per cycle, each with a latency of one cycle.
 #[derive(LogicBlock)]
 pub struct Normalise {
-    /// Clock.
+    /// Clock; registers change on its rising edge.
     pub clk: Signal<In, Clock>,
-    /// Take the shift.
+    /// Compute the shift for a new subarray.
     pub start: Signal<In, Bit>,
-    /// OR of the subarray's magnitudes.
+    /// OR of the subarray's magnitudes; valid with `start`.
     pub magnitude: Wire<In>,
-    /// Four codes.
+    /// Four codes, `bits` each, signed.
     pub quad: Wire<In>,
-    /// The codes shifted, one cycle later.
+    /// Four shifted codes, one cycle after `quad`.
     pub shifted: Wire<Out>,
-    /// The left shift, held until the next start.
+    /// The left shift, from two cycles after `start` until the next one.
     pub shift: Wire<Out>,
     _left: u32,
     _started: bool,
 }
 
 impl Normalise {
-    /// Codes of `bits` bits.
+    /// For codes of `bits` bits.
     pub fn new(bits: usize) -> Self {
         Normalise {
             clk: Default::default(),
@@ -71,7 +71,7 @@ impl Logic for Normalise {
         let first = by_leading_one("magnitude", 0..bits - 1, bits - 2, shift_bits, |bit| bits - 2 - bit);
         Verilog::Custom(format!(
             "\
-// Zeros stay zero, whatever the shift: as if the first place behind them were set.
+// An all-zero subarray has the largest shift, as if a one followed the lowest bit.
 wire [{shift_end}:0] none = {{{shift_bits}{{!(|magnitude)}}}} & {shift_bits}'d{most};
 reg [{shift_end}:0] left;
 reg started;

@@ -1,8 +1,8 @@
 //! Stage `pass`: the matrix-vector products of a subarray, one after the other on the MAC lanes.
 //!
-//! The schedule runs through its steps, one column per cycle, and waits only where a step's operand is not finished yet. From
-//! issue to operands: addresses (1 cycle, 3 through a list of columns), memories (2), limb and parity selection (1); then
-//! the lanes.
+//! The schedule issues one column per cycle and stalls only where the operand of a step is not complete yet. From issue
+//! to operands: addresses (1 cycle, 3 with a column list), memories (2), selection of limb and parity (1); then the
+//! lanes.
 
 use dermis_golden::fixed::resources::operand_vectors;
 use dermis_golden::fixed::Model;
@@ -13,34 +13,34 @@ use crate::primitives::{
 };
 use crate::wire::Wire;
 
-/// Input memory and finished v_ij in, accumulators of whole rows out.
+/// Words of the input memory and finished v_ij in, accumulators of whole rows out.
 #[derive(LogicBlock)]
 pub struct Pass {
-    /// Clock.
+    /// Clock; registers change on its rising edge.
     pub clk: Signal<In, Clock>,
-    /// Reset.
+    /// Synchronous reset, active high.
     pub rst: Signal<In, Bit>,
-    /// Which case.
+    /// Index of the case.
     pub which: Wire<In>,
-    /// The input memory holds a frame.
+    /// The input memory holds a subarray: start its products.
     pub start: Signal<In, Bit>,
-    /// Quad of the input memory to read.
+    /// Address of the quad to read from the input memory.
     pub input_address: Wire<Out>,
-    /// Its parities, two cycles later.
+    /// Its four parities, `fold_bits` each, signed; two cycles after `input_address`.
     pub input_quad: Wire<In>,
-    /// A finished quad of a v_ij, in order.
+    /// Four parities of a finished v_ij, `data_bits` each, signed; quads in order.
     pub vector_quad: Wire<In>,
-    /// `vector_quad` is one.
+    /// `vector_quad` holds a quad.
     pub vector_valid: Signal<In, Bit>,
-    /// Accumulators of one row.
+    /// Accumulators of one row for the four parities, `acc_bits` each, signed.
     pub quad: Wire<Out>,
-    /// `quad` is a row.
+    /// `quad` holds a row.
     pub quad_valid: Signal<Out, Bit>,
-    /// The last subarray's coefficients were not what they must be; settled with its last row.
+    /// The coefficient signature of the subarray is wrong, 1 bit; valid with its last row.
     pub damaged: Wire<Out>,
     column: Counter,
     running: DFF<Bit>,
-    /// The schedule.
+    /// Schedule of the products.
     pub steps: Steps,
     vectors: Ram,
     filler: Filler,
@@ -57,7 +57,7 @@ pub struct Pass {
 }
 
 impl Pass {
-    /// The products of `model`.
+    /// For the schedule and the coefficients of `model`.
     pub fn new(model: &Model) -> Self {
         let formats = &model.formats;
         let quads = formats.quads;

@@ -1,4 +1,4 @@
-//! Stage `prepare`: calibration and averaging before `receive`; what the scene does not ask for is wire.
+//! Stage `prepare`: calibration and averaging before `receive`; options that the scene does not use are wires.
 
 use dermis_golden::fixed::Model;
 use rust_hdl::prelude::*;
@@ -9,33 +9,33 @@ use crate::wire::Wire;
 /// Codes in, words of the frame buffer out.
 #[derive(LogicBlock)]
 pub struct Prepare {
-    /// Clock.
+    /// Clock; registers change on its rising edge.
     pub clk: Signal<In, Clock>,
-    /// Reset.
+    /// Synchronous reset, active high.
     pub rst: Signal<In, Bit>,
-    /// A taxel's code.
+    /// A taxel's code, `code_bits` wide, two's complement; valid with `s_axis_tvalid`.
     pub s_axis_tdata: Wire<In>,
-    /// It is offered.
+    /// A beat is offered on `s_axis_tdata`; the sender holds it until `s_axis_tready`.
     pub s_axis_tvalid: Signal<In, Bit>,
-    /// It is taken.
+    /// The block accepts a beat in this cycle.
     pub s_axis_tready: Signal<Out, Bit>,
-    /// It is the frame's last.
+    /// The beat is the last of its frame; valid with `s_axis_tvalid`.
     pub s_axis_tlast: Signal<In, Bit>,
-    /// A taxel's word.
+    /// A taxel's word, `input_bits` wide, two's complement; valid with `m_axis_tvalid`.
     pub m_axis_tdata: Wire<Out>,
-    /// It is offered.
+    /// A beat is offered on `m_axis_tdata`; it is held until `m_axis_tready`.
     pub m_axis_tvalid: Signal<Out, Bit>,
-    /// It is taken.
+    /// The receiver accepts a beat in this cycle.
     pub m_axis_tready: Signal<In, Bit>,
-    /// It is the last one.
+    /// The word is the last of its frame; valid with `m_axis_tvalid`.
     pub m_axis_tlast: Signal<Out, Bit>,
-    /// Zero and gain.
+    /// Zero and gain of each taxel.
     pub calibrate: Calibrate,
     average: Average,
 }
 
 impl Prepare {
-    /// The input options of `model`.
+    /// With the input options of `model`.
     pub fn new(model: &Model) -> Self {
         let (formats, taxels) = (&model.formats, model.scene.sensor.taxels());
         let bits = formats.code_bits as usize;

@@ -1,8 +1,8 @@
-//! Stage `receive`: taxels row-major into the frame buffer, magnitude and signs on the way.
+//! Stage `receive`: taxels row-major into the frame buffer; magnitude and signs are gathered as they arrive.
 //!
-//! One beat per cycle while the buffer is free. The frame ends with its last taxel, whatever `tlast` says: a `tlast` that
-//! comes early drops the frame it cut short and starts over with the next beat; a missing one is
-//! only remembered. Both raise `framing` until `reported`.
+//! One beat per cycle while the buffer is free. A frame ends with its last taxel, whatever `tlast` says: an early
+//! `tlast` drops the frame, and the next beat starts a new one; a missing `tlast` is only recorded. Both set `framing`
+//! until `reported`.
 
 use dermis_golden::fixed::Model;
 use rust_hdl::prelude::*;
@@ -14,46 +14,47 @@ use crate::wire::Wire;
 /// s_axis --> frame buffer --> quad (two cycles after quad_address)
 ///       \--> magnitude, positive, negative
 /// ```
-/// `full` from two cycles after the frame's last beat until `free`; the gathered values stand as long.
+/// `full` is high from two cycles after the frame's last beat until `free`; the gathered values are valid for the same
+/// time.
 #[derive(LogicBlock)]
 pub struct Receive {
-    /// Clock.
+    /// Clock; registers change on its rising edge.
     pub clk: Signal<In, Clock>,
-    /// Reset.
+    /// Synchronous reset, active high.
     pub rst: Signal<In, Bit>,
-    /// A taxel's code.
+    /// A taxel's code, `input_bits` wide, two's complement; valid with `s_axis_tvalid`.
     pub s_axis_tdata: Wire<In>,
-    /// It is offered.
+    /// A beat is offered on `s_axis_tdata`; the sender holds it until `s_axis_tready`.
     pub s_axis_tvalid: Signal<In, Bit>,
-    /// It is taken.
+    /// The block accepts a beat in this cycle.
     pub s_axis_tready: Signal<Out, Bit>,
-    /// It is the frame's last.
+    /// The beat is the last of its frame; valid with `s_axis_tvalid`.
     pub s_axis_tlast: Signal<In, Bit>,
     /// A beat is accepted in this cycle.
     pub accept: Signal<Out, Bit>,
-    /// What it is taken for: 0 where the taxel is dead.
+    /// The accepted code, 0 for a dead taxel; valid with `accept`.
     pub taken_word: Wire<Out>,
-    /// The frame buffer holds a whole frame.
+    /// The frame buffer holds a whole frame; high until `free`.
     pub full: Signal<Out, Bit>,
-    /// The frame has been read.
+    /// The frame has been read: the buffer may be overwritten.
     pub free: Signal<In, Bit>,
-    /// There is one case: 0.
+    /// Constant 0: there is one case.
     pub which: Wire<Out>,
-    /// Which quad to read.
+    /// Address of the quad to read, over all subarrays.
     pub quad_address: Wire<In>,
-    /// The quad, two cycles later.
+    /// Four codes, `input_bits` each, signed; two cycles after `quad_address`.
     pub quad: Wire<Out>,
-    /// The subarray that magnitude and signs are asked of.
+    /// Index of the subarray for `magnitude`, `positive` and `negative`; combinational.
     pub part: Wire<In>,
-    /// OR of the codes' magnitudes.
+    /// OR of the magnitudes of the subarray's codes, `input_bits` − 1 wide; valid while `full`.
     pub magnitude: Wire<Out>,
-    /// A code is above the noise floor.
+    /// A code of the subarray is above the noise floor; valid while `full`.
     pub positive: Signal<Out, Bit>,
-    /// A code is below minus the noise floor.
+    /// A code of the subarray is below minus the noise floor; valid while `full`.
     pub negative: Signal<Out, Bit>,
-    /// `tlast` was early or missing.
+    /// `tlast` was early or missing since the last `reported`.
     pub framing: Signal<Out, Bit>,
-    /// `framing` has been reported.
+    /// Clears `framing`.
     pub reported: Signal<In, Bit>,
     scan: Scan,
     blank: Blank,
@@ -74,7 +75,7 @@ pub struct Receive {
 }
 
 impl Receive {
-    /// Frames of one case's `model`.
+    /// For frames in the layout of `model`, one case.
     pub fn new(model: &Model) -> Self {
         let bits = model.formats.input_bits as usize;
         let count = model.parts.len();

@@ -1,8 +1,8 @@
-//! Stage `rescale`: accumulators to v_ij words, v_00 after its exponent is known.
+//! Stage `rescale`: accumulators to words of v_ij; v_00 after its block exponent has been measured.
 //!
-//! The first Q rows of a frame are raw v_00: they wait in a memory while their length is measured, then go through the rescaler
-//! with the measured shift. All later rows go through directly with the constant shift of an A pass; the schedule
-//! keeps the two apart, because no A pass starts before v_00 is complete.
+//! The first Q rows of a subarray are raw v_00: they wait in a memory while their magnitude is measured, then pass the
+//! rescaler with the measured shift. All later rows pass it directly, with the constant shift of an A pass. The two
+//! never overlap, because no A pass starts before v_00 is complete.
 
 use dermis_golden::fixed::Model;
 use rust_hdl::prelude::*;
@@ -12,32 +12,32 @@ use crate::primitives::{
 };
 use crate::wire::Wire;
 
-/// Rows of accumulators in; words three cycles after the rescaler got them, operands four.
+/// Rows of accumulators in; words three cycles after they enter the rescaler, operands four.
 #[derive(LogicBlock)]
 pub struct Rescale {
-    /// Clock.
+    /// Clock; registers change on its rising edge.
     pub clk: Signal<In, Clock>,
-    /// Reset.
+    /// Synchronous reset, active high.
     pub rst: Signal<In, Bit>,
-    /// Which case.
+    /// Index of the case.
     pub which: Wire<In>,
-    /// New frame.
+    /// A new subarray.
     pub start: Signal<In, Bit>,
-    /// Accumulators of one row.
+    /// Accumulators of one row for the four parities, `acc_bits` each, signed.
     pub quad: Wire<In>,
-    /// `quad` is a row.
+    /// `quad` holds a row.
     pub quad_valid: Signal<In, Bit>,
-    /// Four parities of a v_ij.
+    /// Four parities of a v_ij, `vector_bits` each, signed.
     pub words: Wire<Out>,
-    /// `words` are a quad.
+    /// `words` holds a quad.
     pub words_valid: Signal<Out, Bit>,
-    /// The same as operands of later passes.
+    /// The same, rounded to `data_bits` each, as operands of later passes; one cycle later.
     pub operands: Wire<Out>,
-    /// `operands` are a quad.
+    /// `operands` holds a quad.
     pub operands_valid: Signal<Out, Bit>,
-    /// The measured right shift, until the next frame.
+    /// Measured right shift, valid from the first word until the next subarray.
     pub shift: Wire<Out>,
-    /// Words saturated in this frame.
+    /// Number of words saturated in this subarray.
     pub saturations: Wire<Out>,
     collecting: DFF<Bit>,
     replaying: DFF<Bit>,
@@ -55,7 +55,7 @@ pub struct Rescale {
 }
 
 impl Rescale {
-    /// Widths of `model`.
+    /// With the widths of `model`.
     pub fn new(model: &Model) -> Self {
         let formats = &model.formats;
         let quads: Vec<usize> = model.cases().iter().map(|case| case.formats.quads).collect();
@@ -109,7 +109,7 @@ impl Logic for Rescale {
         self.words_later.rst.next = self.rst.val();
         self.operands_later.rst.next = self.rst.val();
 
-        comment!("The first row comes much later");
+        comment!("Registered; the first row comes many cycles later");
         self.started.now.next = self.start.val();
         self.collected.next = self.collecting.q.val() & self.quad_valid.val();
         self.collecting.d.next = (self.started.then.val()

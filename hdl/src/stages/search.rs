@@ -1,10 +1,10 @@
 //! Stage `search`: the μ search over the polynomials of all taxels, sweep by sweep.
 //!
-//! `walk` sets up a sweep; one quad per cycle runs through memory (2 cycles), Taylor shift (4) and back into
-//! memory, candidates (2), score (6). The sum polynomial takes the same way beside the first quad and stays, so that Σp stands
-//! when the first taxel is scored; `weigh` makes of it what the totals are compared with, and `judge` compares (5). Coarse
-//! sweeps follow one another without a gap; a halving is set up when the sweep before it has been judged. The last sweep
-//! only moves to the winner: its constant coefficients are p(μ*).
+//! `walk` sets up a sweep. One quad per cycle passes memory (2 cycles), Taylor shift (4) and goes back to memory, and
+//! passes candidates (2) and score (6). The sum polynomial passes the same blocks beside the first quad and is held, so
+//! that Σp is available when the first taxel is scored. `weigh` computes the bias of the scores from it, `judge`
+//! compares (6). Coarse sweeps follow one another without a gap; a halving is set up when the previous sweep has been
+//! compared. The last sweep only moves to the best position: its constant coefficients are p(μ*).
 
 use dermis_golden::fixed::cycles::{coarse_period, SET_UP, SHORTEST_SWEEP};
 use dermis_golden::fixed::quads::Quads;
@@ -19,51 +19,51 @@ use crate::primitives::{
 };
 use crate::wire::Wire;
 
-/// Cycles from a quad's address to the quad moved.
+/// Cycles from a quad's address to its shifted polynomials.
 const MOVED: usize = STORE_LATENCY + TAYLOR_LATENCY;
 
 /// Polynomials in by coefficient, p(μ*) out by quad.
 #[derive(LogicBlock)]
 pub struct Search {
-    /// Clock.
+    /// Clock; registers change on its rising edge.
     pub clk: Signal<In, Clock>,
-    /// Reset.
+    /// Synchronous reset, active high.
     pub rst: Signal<In, Bit>,
-    /// Which case.
+    /// Index of the case.
     pub which: Wire<In>,
-    /// Four taxels' coefficient.
+    /// One coefficient of four taxels, signed.
     pub fill_quad: Wire<In>,
-    /// `fill_quad` is one.
+    /// `fill_quad` holds a coefficient.
     pub fill: Signal<In, Bit>,
-    /// Which coefficient.
+    /// Index of the coefficient; valid with `fill`.
     pub fill_index: Wire<In>,
-    /// Which quad.
+    /// Address of the quad; valid with `fill`.
     pub fill_address: Wire<In>,
-    /// All coefficients are in.
+    /// All coefficients have been written: start the search.
     pub start: Signal<In, Bit>,
-    /// Search; otherwise p(0) is passed on.
+    /// Search; otherwise p(0) is the result. Valid with `start`.
     pub enabled: Signal<In, Bit>,
-    /// Four taxels' p(μ*).
+    /// Four values p(μ*), `search_bits[0]` each, signed.
     pub values: Wire<Out>,
-    /// `values` are a quad.
+    /// `values` holds a quad.
     pub values_valid: Signal<Out, Bit>,
-    /// μ* is settled, the values follow.
+    /// μ*, `score` and `found` are final; high for one cycle, before the values.
     pub settled: Signal<Out, Bit>,
-    /// The first of the values.
+    /// High in the cycle of the first values.
     pub values_begin: Signal<Out, Bit>,
-    /// All values are out.
+    /// All values have been output; high for one cycle.
     pub done: Signal<Out, Bit>,
-    /// Best position, x.
+    /// Best position, x, in grid steps of the level, signed.
     pub best_x: Wire<Out>,
-    /// Best position, y.
+    /// Best position, y, in grid steps of the level, signed.
     pub best_y: Wire<Out>,
-    /// Its score.
+    /// Score of the best candidate, signed, 2^−6.
     pub score: Wire<Out>,
     /// A candidate was found.
     pub found: Signal<Out, Bit>,
-    /// A sweep has been judged.
+    /// The candidates of a sweep have been compared; high for one cycle.
     pub judged: Signal<Out, Bit>,
-    /// Something was taken at this level.
+    /// A candidate was taken at this level; valid with `judged`.
     pub taken: Signal<Out, Bit>,
     walk: Walk,
     weigh: Weigh,
@@ -103,7 +103,7 @@ pub struct Search {
 }
 
 impl Search {
-    /// Widths of `model`.
+    /// With the widths of `model`.
     pub fn new(model: &Model) -> Self {
         let formats = &model.formats;
         let quads = formats.quads;
@@ -113,7 +113,7 @@ impl Search {
         let taxel_counts: Vec<usize> = layouts.iter().map(|layout| layout.rows * layout.cols).collect();
         // One subarray is filled while another is searched.
         let apart = model.cases().iter().any(|case| case.parts.len() > 1);
-        // Where there are several cases none is so small.
+        // Zero where there are several cases: none of them has so few quads.
         let padding = (SHORTEST_SWEEP as usize).saturating_sub(quads);
         let address = count_bits(quads);
         let fill_bits = formats.vector_bits as usize + 2;
@@ -157,8 +157,8 @@ impl Search {
             quads: CaseCounter::new(&limits),
             period: CaseCounter::new(&periods),
             counting: Default::default(),
-            // What was judged stands in registers, and so does the move that is made of it, before a sweep is set up. That
-            // is itself a register: it goes to all of the search.
+            // The result of a comparison and the move computed from it are registered before a sweep is set up.
+            // `set_up` is a register too, because it drives the whole search.
             began: BitDelay::new(SET_UP as usize - 1),
             judged_then: BitDelay::new(SET_UP as usize - 1),
             go: BitDelay::new(1),
@@ -169,12 +169,12 @@ impl Search {
             sum_outcome: BitDelay::new(1),
             scored: BitDelay::new(CANDIDATES_LATENCY),
             first: BitDelay::new(MOVED + CANDIDATES_LATENCY),
-            // A cycle after the first quad's candidates, so that a sweep is judged before the next is weighed.
+            // One cycle after the first quad's candidates, so that a sweep is compared before the next is weighed.
             weighs: BitDelay::new(MOVED + CANDIDATES_LATENCY + 1),
             totals: BitDelay::new(MOVED + CANDIDATES_LATENCY + SCORE_LATENCY + padding),
             finish: BitDelay::new(MOVED + 1),
             step: Delay::new(5, STORE_LATENCY),
-            // The buffer is chosen a cycle after the set-up, and asked for a cycle before it is written.
+            // The target buffer is known one cycle after the set-up and needed one cycle before the write.
             target: Delay::new(BUFFER_BITS, MOVED - 2),
             moved_address: Delay::new(address, MOVED),
             scored_address: Delay::new(address, CANDIDATES_LATENCY),
@@ -241,7 +241,7 @@ impl Logic for Search {
         self.quads.which.next = self.which.val();
         self.period.which.next = self.which.val();
 
-        comment!("Coefficients come in");
+        comment!("Coefficients are written");
         self.store.fill.next = self.fill.val();
         self.store.fill_index.next = self.fill_index.val();
         self.store.fill_address.next = self.fill_address.val();
@@ -253,7 +253,7 @@ impl Logic for Search {
         self.sum.fill_mask.next = self.fill_counts.mask.val();
         self.sum.fill_quad.next = self.fill_quad.val();
 
-        comment!("A sweep is set up, and begins a cycle later");
+        comment!("A sweep is set up and starts one cycle later");
         self.walk.begin_frame.next = self.start.val();
         self.walk.enabled.next = self.enabled.val();
         self.judge.begin_frame.next = self.start.val();
@@ -273,7 +273,7 @@ impl Logic for Search {
         self.judge.halve.next = self.set_up.q.val() & self.walk.next_halves.val();
         self.go.now.next = self.set_up.q.val();
 
-        comment!("Quads run through memory, shift and candidates");
+        comment!("Quads pass memory, Taylor shift and candidates");
         self.quad_end.next = self.counting.q.val() & self.quads.last.val();
         self.counting.d.next =
             (self.set_up.q.val() | (self.counting.q.val() & !self.quads.last.val())) & !self.rst.val();
@@ -298,7 +298,7 @@ impl Logic for Search {
         self.store.write_data.next = self.taylor.moved.val();
         self.candidates.word.next = self.taylor.moved.val();
 
-        comment!("and so does their sum");
+        comment!("The sum polynomial passes the same blocks");
         self.sum.read.next = self.go.then.val();
         self.sum.read_buffer.next = self.walk.source.val();
         self.sum_taylor.word.next = self.sum.word.val();
@@ -310,7 +310,7 @@ impl Logic for Search {
         self.sum.write_data.next = self.sum_taylor.moved.val();
         self.sum_candidates.word.next = self.sum_taylor.moved.val();
 
-        comment!("Scores, and the judgement");
+        comment!("Scores and their comparison");
         self.scored.now.next = self.trial.then.val();
         self.scored_address.now.next = self.moved_address.then.val();
         self.counts.address.next = self.scored_address.then.val();
@@ -332,7 +332,7 @@ impl Logic for Search {
         self.judge.eligible.next = self.weigh.eligible.val();
         self.judge.sweep.next = self.weigh.weighed.val();
 
-        comment!("The last sweep's constants are the values");
+        comment!("The constant terms of the last sweep are the values");
         self.constants.word.next = self.taylor.moved.val();
         self.values.next = self.constants.low.val();
         self.values_valid.next = self.outcome.then.val();

@@ -1,4 +1,4 @@
-//! Stage `send`: asks for the forces row-major, then for each subarray's status, as fast as the queue has room.
+//! Stage `send`: requests the forces row-major, then each subarray's status beats, while the output queue has room.
 
 use dermis_golden::fixed::send::STATUS_BEATS;
 use dermis_golden::fixed::Model;
@@ -7,36 +7,36 @@ use rust_hdl::prelude::*;
 use crate::primitives::{count_bits, largest, BitDelay, CaseCounter, Counter, Scan, StatusCode};
 use crate::wire::Wire;
 
-/// From `start` one beat is asked for in each cycle that has `room` for it: all taxels, then the status beats.
+/// From `start`, one beat is requested in each cycle with `room`: all taxels, then the status beats.
 #[derive(LogicBlock)]
 pub struct Send {
-    /// Clock.
+    /// Clock; registers change on its rising edge.
     pub clk: Signal<In, Clock>,
-    /// Reset.
+    /// Synchronous reset, active high.
     pub rst: Signal<In, Bit>,
-    /// Which case.
+    /// Index of the case of the frame being sent.
     pub which: Wire<In>,
-    /// All values are in.
+    /// The first values are available: start requesting beats.
     pub start: Signal<In, Bit>,
-    /// A beat stands on the output.
+    /// A beat is offered on the output, monitored for the end of the frame.
     pub m_axis_tvalid: Signal<In, Bit>,
-    /// The receiver takes it.
+    /// The receiver accepts a beat in this cycle.
     pub m_axis_tready: Signal<In, Bit>,
-    /// It is the frame's last.
+    /// The offered beat is the last of its frame.
     pub m_axis_tlast: Signal<In, Bit>,
-    /// A beat may be asked for.
+    /// A beat may be requested in this cycle.
     pub room: Signal<In, Bit>,
-    /// A beat is asked for.
+    /// A beat is requested in this cycle.
     pub offer: Signal<Out, Bit>,
-    /// Which beat: 0 a force, 1 … 3 the status.
+    /// 0: a force, 1 … 3: a status beat; valid with `offer`.
     pub beat: Wire<Out>,
-    /// The beat's subarray.
+    /// Index of the beat's subarray; valid with `offer`.
     pub part: Wire<Out>,
-    /// The taxel's quad.
+    /// Address of the taxel's quad; valid with `offer`.
     pub address: Wire<Out>,
-    /// The taxel's lane.
+    /// Lane of the taxel; valid with `offer`.
     pub lane: Wire<Out>,
-    /// The frame's last beat was taken.
+    /// The frame's last beat was accepted one cycle ago; high for one cycle.
     pub done: Signal<Out, Bit>,
     scan: Scan,
     words: Counter,
@@ -51,7 +51,7 @@ pub struct Send {
 }
 
 impl Send {
-    /// Frames of `model`.
+    /// For frames of `model`.
     pub fn new(model: &Model) -> Self {
         let counts: Vec<usize> = model.cases().iter().map(|case| case.parts.len()).collect();
         let count = largest(&counts);
@@ -118,7 +118,7 @@ impl Logic for Send {
 
         self.sending.d.next = (self.start.val() | (self.sending.q.val() & !self.finish.val())) & !self.rst.val();
         self.status.d.next = (self.at_end.val() | (self.status.q.val() & !self.finish.val())) & !self.rst.val();
-        comment!("From a register: who takes the beats may be far away");
+        comment!("Registered once to shorten the route from the output");
         self.out.clk.next = self.clk.val();
         self.out.rst.next = self.rst.val();
         self.out.now.next = self.m_axis_tvalid.val() & self.m_axis_tready.val() & self.m_axis_tlast.val();

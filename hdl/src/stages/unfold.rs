@@ -1,4 +1,4 @@
-//! Stage `unfold`: v_ij words back to taxels, coefficient by coefficient into the search memory.
+//! Stage `unfold`: words of v_ij back to taxels, coefficient by coefficient into the search memory.
 
 use dermis_golden::fixed::schedule::{is_transposed, schedule, vectors};
 use dermis_golden::fixed::Model;
@@ -7,30 +7,30 @@ use rust_hdl::prelude::*;
 use crate::primitives::{count_bits, BitDelay, CaseCounter, Counter, Delay, Placer, Unfolder};
 use crate::wire::Wire;
 
-/// Quads of v_ij in order; two cycles later four taxels with coefficient index and quad address.
+/// Quads of v_ij in, in order; two cycles later four taxels with coefficient index and quad address.
 #[derive(LogicBlock)]
 pub struct Unfold {
-    /// Clock.
+    /// Clock; registers change on its rising edge.
     pub clk: Signal<In, Clock>,
-    /// Reset.
+    /// Synchronous reset, active high.
     pub rst: Signal<In, Bit>,
-    /// Which case.
+    /// Index of the case.
     pub which: Wire<In>,
-    /// New frame.
+    /// A new subarray.
     pub start: Signal<In, Bit>,
-    /// Four parities of a v_ij.
+    /// Four parities of a v_ij, `vector_bits` each, signed.
     pub words: Wire<In>,
-    /// `words` are a quad.
+    /// `words` holds a quad.
     pub words_valid: Signal<In, Bit>,
-    /// Four taxels' coefficient.
+    /// One coefficient of four taxels, two bits wider, signed; two cycles after `words`.
     pub taxels: Wire<Out>,
-    /// `taxels` are a quad.
+    /// `taxels` holds a quad.
     pub taxels_valid: Signal<Out, Bit>,
-    /// Which coefficient.
+    /// Index of the coefficient; valid with `taxels_valid`.
     pub index: Wire<Out>,
-    /// Which quad.
+    /// Address of the quad; valid with `taxels_valid`.
     pub address: Wire<Out>,
-    /// All coefficients of the frame are out.
+    /// All coefficients of the subarray have been output; high for one cycle.
     pub done: Signal<Out, Bit>,
     quads: CaseCounter,
     vectors: Counter,
@@ -45,7 +45,7 @@ pub struct Unfold {
 }
 
 impl Unfold {
-    /// Widths of `model`.
+    /// With the widths of `model`.
     pub fn new(model: &Model) -> Self {
         let formats = &model.formats;
         let across = schedule(formats).iter().enumerate().filter(|(_, p)| is_transposed(p)).map(|(k, _)| k).collect();

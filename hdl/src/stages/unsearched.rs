@@ -1,7 +1,8 @@
-//! In place of stage `search` where a scene has no search: v_00 passes on, μ is 0.
+//! Replacement for stage `search` in a scene without a search: μ is 0 and the values are v_00.
 //!
-//! The coefficients that `unfold` sends are p itself: they are the values as they come, and stand when `start` says so. So the
-//! force memory is written while the passes go on, and a frame is not computed before the last one is out.
+//! The coefficients that `unfold` delivers are p itself and pass on directly as values; `start` says that all have
+//! arrived. Since the force memory is written while the passes run, a frame is not computed before the previous one has
+//! been sent.
 
 use dermis_golden::fixed::Model;
 use rust_hdl::prelude::*;
@@ -9,53 +10,54 @@ use rust_hdl::prelude::*;
 use crate::primitives::{count_bits, position_bits};
 use crate::wire::Wire;
 
-/// The ports of [`Search`](super::Search); those that tell of a search are constant.
+/// Ports as of [`Search`](super::Search); inputs that only a search needs are unused, outputs that describe its result
+/// are constant.
 #[derive(LogicBlock)]
 pub struct Unsearched {
-    /// Clock.
+    /// Clock; registers change on its rising edge.
     pub clk: Signal<In, Clock>,
-    /// Reset.
+    /// Synchronous reset, active high.
     pub rst: Signal<In, Bit>,
-    /// There is one case.
+    /// Unused: there is one case.
     pub which: Wire<In>,
-    /// Four taxels' p.
+    /// Values p of four taxels, signed.
     pub fill_quad: Wire<In>,
-    /// `fill_quad` is one.
+    /// `fill_quad` holds a quad.
     pub fill: Signal<In, Bit>,
-    /// There is one coefficient.
+    /// Unused: there is one coefficient.
     pub fill_index: Wire<In>,
-    /// Quads come in order.
+    /// Unused: quads arrive in order.
     pub fill_address: Wire<In>,
-    /// All values are in.
+    /// All values have been output.
     pub start: Signal<In, Bit>,
-    /// There is nothing to enable.
+    /// Unused: there is no search.
     pub enabled: Signal<In, Bit>,
-    /// Four taxels' p.
+    /// Values p of four taxels, `fill_quad` in the same cycle.
     pub values: Wire<Out>,
-    /// `values` are a quad.
+    /// `values` holds a quad.
     pub values_valid: Signal<Out, Bit>,
-    /// All values are in, a cycle after `start`.
+    /// All values have been output; `start` one cycle later.
     pub settled: Signal<Out, Bit>,
-    /// The values may be sent.
+    /// The values may be sent; `start` one cycle later.
     pub values_begin: Signal<Out, Bit>,
-    /// All values are out.
+    /// `start` one cycle later.
     pub done: Signal<Out, Bit>,
-    /// 0.
+    /// Constant 0.
     pub best_x: Wire<Out>,
-    /// 0.
+    /// Constant 0.
     pub best_y: Wire<Out>,
-    /// 0.
+    /// Constant 0.
     pub score: Wire<Out>,
-    /// Never.
+    /// Constant 0.
     pub found: Signal<Out, Bit>,
-    /// Never.
+    /// Constant 0.
     pub judged: Signal<Out, Bit>,
-    /// Never.
+    /// Constant 0.
     pub taken: Signal<Out, Bit>,
 }
 
 impl Unsearched {
-    /// Widths of `model`.
+    /// With the widths of `model`.
     pub fn new(model: &Model) -> Self {
         let formats = &model.formats;
         let quad = 4 * (formats.vector_bits as usize + 2);
