@@ -1,4 +1,4 @@
-//! Matrices and frames of the golden model, and beside them those of the literal [`baseline`].
+//! Run times of the golden model, matrices and frames, and of the paper's algorithm ([`baseline`]).
 
 use criterion::{criterion_group, criterion_main, Criterion};
 use dermis_golden::baseline::Baseline;
@@ -23,7 +23,7 @@ fn reconstruct(criterion: &mut Criterion) {
     }
 }
 
-/// What takes longer than the plain method: contacts on a frame of several, the fit of an ellipse.
+/// Slower methods: regions per contact on a frame of several contacts, the fit of an ellipse.
 fn beyond(criterion: &mut Criterion) {
     for (name, case, objective) in
         [("sensor-3", Case::Contacts, ObjectiveKind::Sparse), ("sensor-1", Case::WHOLE, ObjectiveKind::Patch)]

@@ -30,6 +30,16 @@ pub struct Errors {
 
 impl Errors {
     /// Compares a resultant with its reference; both are [x, y, normal] in N.
+    ///
+    /// ```
+    /// use dermis_golden::errors::Errors;
+    ///
+    /// let errors = Errors::new([3.0, -4.0, 10.0], [3.3, -4.4, 9.0]);
+    /// let near = |error: Option<f64>, wanted: f64| (error.unwrap() - wanted).abs() < 1e-12;
+    /// assert!(near(errors.x1, -0.1) && near(errors.tangential, 0.1) && near(errors.normal, 0.1));
+    /// // Without a reference along x there is no relative error.
+    /// assert_eq!(Errors::new([0.0, 1.0, 5.0], [1.0, 1.0, 5.0]).x1, None);
+    /// ```
     pub fn new(reference: [f64; 3], value: [f64; 3]) -> Errors {
         let (reference, value) = (Vector3::from(reference), Vector3::from(value));
         let least = SMALLEST_SHARE * reference.norm();

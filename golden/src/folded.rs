@@ -66,7 +66,7 @@ pub struct Operator {
     pub blocks: Vec<Block>,
 }
 
-/// out += factor · m · v
+/// `out += factor · m · v`
 pub fn accumulate(m: &Mat<f64>, v: &[f64], factor: f64, out: &mut [f64]) {
     let v = ColRef::from_slice(v);
     matmul(ColMut::from_slice_mut(out), Accum::Add, m, v, factor, Par::Seq);
@@ -78,7 +78,7 @@ impl Operator {
         Operator { blocks: vec![Block { row0: 0, col0: 0, entries }] }
     }
 
-    /// out += factor · M · v, all in the folded basis.
+    /// `out += factor · M · v`, all in this basis.
     pub fn accumulate(&self, v: &[f64], factor: f64, out: &mut [f64]) {
         for Block { row0, col0, entries } in &self.blocks {
             let (v, out) = (&v[*col0..][..entries.ncols()], &mut out[*row0..][..entries.nrows()]);

@@ -101,6 +101,21 @@ impl Frame {
     /// A frame of stress alone, e.g. from a running sensor; `stress_MPa` is row-major, `id` the name in reports and
     /// errors.
     ///
+    /// ```
+    /// use dermis_golden::{frame::Frame, reconstruct::Golden, scene::Scene};
+    ///
+    /// let scene = Scene::builtin("eight-by-eight")?;
+    /// let mut stress_MPa = vec![0.0; scene.sensor.taxels()];
+    /// stress_MPa[27] = 0.25;
+    /// let frame = Frame::from_stress("one taxel", &scene.sensor, stress_MPa)?;
+    /// assert_eq!(frame.peak_MPa(), 0.25);
+    /// // The largest force is on the taxel with the stress.
+    /// let fz = Golden::new(&scene)?.run(&frame)?.forces_N.fz;
+    /// assert!(fz.iter().all(|f| *f <= fz[27]));
+    /// assert!(Frame::from_stress("too short", &scene.sensor, vec![0.0; 63]).is_err());
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    ///
     /// # Errors
     /// [`FrameError::WrongCount`] or [`FrameError::NotFinite`], with `id` in place of a file name.
     pub fn from_stress(id: &str, sensor: &Sensor, stress_MPa: Vec<f64>) -> Result<Frame, FrameError> {

@@ -46,6 +46,24 @@ use stress::Body;
 
 /// Computes the frame of `contacts` on a `medium`: stress on each taxel in MPa, force on each cell in N, resultant in
 /// N.
+/// ```
+/// use dermis_golden::{frame::Contact, generator::generate, scene::{Medium, Scene}};
+///
+/// let contact = Contact {
+///     shape: Some("hertz-circle".to_string()),
+///     size_mm: vec![4.0],
+///     normal_N: Some(5.0),
+///     tangential_N: Some([1.0, -0.5]),
+///     ..Default::default()
+/// };
+/// let frame = generate("press", &Scene::builtin("sensor-1")?.sensor, Medium::HalfSpace, &[contact])?;
+/// assert_eq!(frame.resultant_N, Some([1.0, -0.5, 5.0]));
+/// // The contact is inside the array: the cells carry all of it.
+/// let cells = frame.cell_forces_N.ok_or("no cells")?.resultant();
+/// assert!((cells[0] - 1.0).abs() < 1e-9 && (cells[2] - 5.0).abs() < 1e-9);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+///
 /// # Errors
 /// [`GeneratorError`]: a sensor out of range, no contact, or a contact with invalid shape, sizes, loads or slip.
 pub fn generate(id: &str, sensor: &Sensor, medium: Medium, contacts: &[Contact]) -> Result<Frame, GeneratorError> {

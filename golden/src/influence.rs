@@ -48,6 +48,17 @@ pub fn cy(dx: f64, dy: f64, a: f64, b: f64, h: f64) -> f64 {
 }
 
 /// Normal stress in MPa per N along z; arguments as for [`cx`].
+///
+/// ```
+/// use dermis_golden::influence::{cx, cz};
+///
+/// // 1 N on a cell much wider than its depth: below its centre the stress is the pressure on the cell.
+/// let (side, depth) = (1e4, 1.0);
+/// assert!((cz(0.0, 0.0, side, side, depth) * side * side - 1.0).abs() < 1e-9);
+/// // Shear towards a taxel compresses it as much as shear away from it pulls.
+/// let [ahead, behind] = [2.0, -2.0].map(|dx| cx(dx, 1.0, 4.0, 4.0, 3.0));
+/// assert!(ahead > 0.0 && (ahead + behind).abs() < 1e-14 * ahead);
+/// ```
 pub fn cz(dx: f64, dy: f64, a: f64, b: f64, h: f64) -> f64 {
     if far(dx, dy, a, b, h) {
         return mean(dx, dy, a, b, |x, y| 3.0 * h * h * h / (TAU * rho5(x, y, h)));

@@ -1,4 +1,32 @@
-//! Golden models of Dermis: from one frame of normal stress under a tactile array to a force vector per taxel.
+//! Golden models of Dermis: from one frame of normal stress on a tactile array to the force vector on each taxel.
+//!
+//! A force on the elastic cover of the array causes normal stress on the taxels below it, whether it presses or shears.
+//! With C = [Cx Cy Cz] the influence matrices and b the measured stress, forces proportional to one pressure
+//! distribution, x = (μ1 p, μ2 p, p), cause exactly b if
+//!
+//! ```text
+//! (μ1 Cx + μ2 Cy + Cz) p = b
+//! ```
+//!
+//! For each μ = (μ1, μ2) this determines p, as a polynomial p(μ) = Σ v_ij μ1^i μ2^j from Cz⁺ b on. Two unknowns remain per
+//! subarray; a search over |μ| ≤ mu_max takes the μ whose p looks most like a contact. [`float`] computes this in floating
+//! point, [`fixed`] bit for bit as the generated hardware does.
+//!
+//! # Example
+//!
+//! ```
+//! use dermis_golden::{frame::Frame, reconstruct::Golden, scene::Scene};
+//!
+//! let scene = Scene::builtin("sensor-1")?;
+//! let frame = Frame::shipped(&scene).remove(1);
+//! let result = Golden::new(&scene)?.run(&frame)?;
+//! // The frame was computed from a known contact: the normal force is found to 1 %.
+//! let [_, _, normal] = frame.resultant_N.ok_or("no known forces")?;
+//! assert!((result.resultant_N[2] / normal - 1.0).abs() < 0.01);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+//!
+//! # Data flow
 //!
 //! ```text
 //! scene ─┬─ sensor ── influence ── matrices ───────────┐
@@ -8,13 +36,30 @@
 //!                      v_ij           μ               fx, fy, fz      resultant, errors, flags
 //! ```
 //!
-//! [`generator`] makes frames with known forces; [`bonded`] is the influence of a layer on a rigid base.
+//! | module | content |
+//! |---|---|
+//! | [`scene`] | sensor, method, number formats and hardware of a run, from TOML |
+//! | [`sensor`], [`partition`] | the taxel array, and its division into subarrays |
+//! | [`board`] | the device for which hardware is generated |
+//! | [`frame`] | stress on every taxel, with known forces if there are any; JSON, CSV, frames shipped with the crate |
+//! | [`generator`] | frames computed from described or random contacts, with their exact forces |
+//! | [`input`] | averaging, calibration and dead taxels of a real sensor; stress that a unipolar sensor clips |
+//! | [`quantise`] | stress as the codes of a converter |
+//! | [`influence`], [`bonded`] | stress of a loaded cell on a half-space and on a layer bonded to a rigid base |
+//! | [`matrices`], [`folded`] | Cz⁺, Ax, Ay of a subarray; the basis of mirror parities in which they are computed |
+//! | [`float`] | the stages in floating point: `receive`, `pass`, `search`, `force`, and the objectives |
+//! | [`reconstruct`] | the golden engine, and the result format of all engines |
+//! | [`errors`], [`flags`] | errors relative to known forces; limitations of a result |
+//! | [`fixed`] | the same stages in integers, bit for bit the hardware; formats, cycles, resources |
+//! | [`link`] | packets between a host and a board |
+//! | [`baseline`], [`paper`] | the paper's algorithm as printed, and its published results, for comparison |
+//! | [`noise`], [`stability`] | studies: errors with noise against the Cramér–Rao bound; errors against conditioning |
+//! | [`gauss`], [`write`] | Gauss–Legendre quadrature; atomic file writing |
 //!
-//! The method: forces x = (μ1 p, μ2 p, p), shear and pressure alike in distribution, meet the measured stress b exactly
-//! when (μ1 Cx + μ2 Cy + Cz) p = b. That leaves two unknowns per subarray, found by a search over μ.
+//! # Conventions
 //!
-//! Units are mm, N and MPa; compression is positive; a taxel's index is row·cols + col, x runs along the columns, y
-//! along the rows, from the array's centre; fx and fy act on the elastic body.
+//! Units are mm, N and MPa; compression is positive. Taxel (row, col) has index row·cols + col; x runs along the columns,
+//! y along the rows, both from the array's centre. fx and fy act on the elastic body.
 #![deny(missing_docs)]
 // Names carry their unit as SI writes it: `stress_MPa`, `resultant_N`.
 #![allow(non_snake_case)]

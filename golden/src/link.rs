@@ -1,7 +1,7 @@
-//! The link between a host and the engine on a board: what goes over the wire, byte by byte.
+//! Link: the packets between a host and the engine on a board.
 //!
-//! It depends on no hardware: the host tool, the hardware description and the C header are made from the same
-//! definitions ([`Kind`], [`Header`] and the payloads).
+//! The definitions ([`Kind`], [`Header`] and the payloads) do not depend on the hardware description; the host program,
+//! the hardware description and the C header all use them.
 //!
 #![doc = include_str!("link/format.md")]
 
@@ -25,29 +25,28 @@ pub use link_kind::LinkKind;
 pub use packet::{Decoder, Packet, PacketError};
 pub use payload::{Beat, Counters, Field, Header, Identity, Sums};
 
-/// Version of the packets' meaning; a host refuses another one.
+/// Version of the packet format; a host rejects any other.
 pub const VERSION: u16 = 2;
-/// Bytes of a packet that are not payload: [`Header`] and CRC.
+/// Bytes of a packet besides its payload: [`Header`] and CRC.
 pub const OVERHEAD: usize = Header::BYTES + CRC_BYTES;
-/// Bytes of the CRC-32 behind the payload.
+/// Bytes of the CRC-32 after the payload.
 pub const CRC_BYTES: usize = 4;
-/// Set in the type of an answer, which is otherwise its request's.
+/// Bit that is set in the type of an answer, which is otherwise that of its request.
 pub const ANSWER: u8 = 0x80;
-/// What a CRC-32 (reflected polynomial 0xEDB88320) over a packet and its own CRC always leaves, before the final
-/// inversion.
+/// Residue: the CRC-32 (reflected polynomial 0xEDB88320) over a packet including its CRC, before the final inversion.
 pub const CRC_RESIDUE: u32 = 0xdebb_20e3;
 
-/// A packet's type.
+/// Type of a packet; the discriminant is the number in the packet.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u8)]
 pub enum Kind {
-    /// Asks who the board is.
+    /// Requests the board's [`Identity`].
     Identify = 0x01,
-    /// Asks for the counts of packets.
+    /// Requests the packet [`Counters`].
     ReadCounters = 0x02,
-    /// A frame whose resultants are asked for.
+    /// A frame; requests its resultants.
     FrameForResultants = 0x03,
-    /// A frame whose forces are asked for.
+    /// A frame; requests its forces.
     FrameForForces = 0x04,
     /// Answers `Identify`.
     Identity = 0x81,
@@ -72,17 +71,17 @@ impl Kind {
         Kind::Forces,
     ];
 
-    /// The type of this number, if there is one.
+    /// The type with this number; `None` if there is none.
     pub fn of(number: u8) -> Option<Kind> {
         Kind::ALL.into_iter().find(|kind| *kind as u8 == number)
     }
 
-    /// The answer to a request; an answer stays itself.
+    /// The type of the answer to a request; an answer is returned unchanged.
     pub fn answer(self) -> Kind {
         Kind::of(self as u8 | ANSWER).unwrap_or(self)
     }
 
-    /// Name as in the documentation and the C header.
+    /// Name in the documentation and the C header.
     pub fn name(self) -> &'static str {
         match self {
             Kind::Identify => "identify",

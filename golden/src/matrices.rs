@@ -151,6 +151,22 @@ impl Matrices {
     /// Computes the matrices of a (sub)array on a half-space with the exact inverse, for shear ratios up to `mu_max` (0
     /// to 2); the degree is at most [`MAX_DEGREE`].
     ///
+    /// ```
+    /// use dermis_golden::{frame::Frame, matrices::Matrices, scene::Scene};
+    ///
+    /// let scene = Scene::builtin("eight-by-eight")?;
+    /// let (matrices, b) = (Matrices::new(&scene.sensor, 0.6)?, Frame::shipped(&scene).remove(0).stress_MPa);
+    /// let product = |m: &faer::Mat<f64>, v: &[f64]| -> Vec<f64> {
+    ///     (0..64).map(|i| (0..64).map(|j| m[(i, j)] * v[j]).sum()).collect()
+    /// };
+    /// // The normal forces p = Cz⁺ b cause exactly the stress b.
+    /// let p = product(&matrices.cz_pinv, &b);
+    /// let stress = product(&matrices.cz, &p);
+    /// let peak = b.iter().fold(0.0f64, |peak, b| b.abs().max(peak));
+    /// assert!(stress.iter().zip(&b).all(|(s, b)| (s - b).abs() < 1e-13 * peak));
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    ///
     /// # Errors
     /// [`MatricesError`]; the size is checked before anything is allocated.
     pub fn new(sensor: &Sensor, mu_max: f64) -> Result<Matrices, MatricesError> {

@@ -128,6 +128,20 @@ pub struct Subarray {
 
 /// The subarrays of a case, row-major.
 ///
+/// ```
+/// use dermis_golden::{partition::{subarrays, Case}, scene::Scene};
+///
+/// let sensor = Scene::builtin("sensor-1")?.sensor;
+/// // The paper's case 1: 2 × 2 subarrays of 5 × 5 taxels.
+/// let parts = subarrays("1".parse::<Case>()?, &sensor)?;
+/// assert_eq!((parts.len(), parts[3].row0, parts[3].col0, parts[3].rows), (4, 5, 5, 5));
+/// // Each taxel is in exactly one subarray.
+/// let mut taxels: Vec<usize> = parts.iter().flat_map(|part| part.indices(&sensor)).collect();
+/// taxels.sort();
+/// assert!(taxels.into_iter().eq(0..100));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+///
 /// # Errors
 /// [`PartitionError`] if the counts do not divide the array or the case depends on the frame.
 pub fn subarrays(case: Case, sensor: &Sensor) -> Result<Vec<Subarray>, PartitionError> {

@@ -39,6 +39,16 @@ impl Codes {
 }
 
 /// Rounds stress in MPa to codes of `bits` bits, 2 to 31, whose largest code means `full_scale_MPa`.
+///
+/// ```
+/// use dermis_golden::quantise::quantise;
+///
+/// let codes = quantise(&[1.0, -0.5, 1.1], 8, 1.0);
+/// assert_eq!(codes.codes, [127, -64, 127]);
+/// assert_eq!(codes.clipped, [false, false, true]);
+/// // Rounding changes a stress within full scale by half an LSB at most.
+/// assert!((f64::from(codes.codes[1]) * codes.lsb_MPa() + 0.5).abs() <= codes.lsb_MPa() / 2.0);
+/// ```
 pub fn quantise(stress_MPa: &[f64], bits: u32, full_scale_MPa: f64) -> Codes {
     let largest = f64::from(largest_code(bits));
     // f64::round takes halves away from zero.

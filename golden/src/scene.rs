@@ -124,7 +124,7 @@ pub enum ObjectiveKind {
     Symmetric,
     /// One elliptic contact.
     Patch,
-    /// Chosen from the noise floor and the pitch.
+    /// Chosen per frame by the misfits of the others and the noise floor.
     Auto,
 }
 

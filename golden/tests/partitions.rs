@@ -1,4 +1,4 @@
-//! What the cases are worth, on the shipped half-space frames with known truth.
+//! Accuracy of the partition cases on the shipped half-space frames with known forces.
 
 use dermis_golden::frame::Frame;
 use dermis_golden::partition::{Case, Grid};
@@ -23,7 +23,7 @@ fn shipped(sensor: &str, contacts: impl Fn(usize) -> bool) -> Vec<Frame> {
     frames.filter(|frame| contacts(frame.contacts.len())).collect()
 }
 
-/// The value below which a share of the values lies, by the next rank.
+/// The quantile `share` (0 to 1) of the values, by the next rank.
 fn quantile(values: impl IntoIterator<Item = f64>, share: f64) -> f64 {
     let mut values: Vec<f64> = values.into_iter().collect();
     values.sort_by(f64::total_cmp);
@@ -54,7 +54,7 @@ fn single_contacts_meet_their_targets() {
 
 #[test]
 fn each_axis_is_below_the_papers_table_2() {
-    // Case 0 of the table; where it prints 1 % for X3 of sensor 2, 1 % is the bound.
+    // Case 0 of the table; its 1 % for X3 of sensor 2 is the bound there.
     for (sensor, bounds) in [("sensor-1", [0.1284, 0.1293, 0.0754]), ("sensor-2", [0.39, 0.16, 0.01])] {
         let results = run(&scene(sensor, Case::WHOLE), &shipped(sensor, |contacts| contacts == 1));
         let errors: Vec<_> = results.iter().filter_map(|result| result.error).collect();
@@ -126,7 +126,7 @@ fn adaptive_says_what_it_took_and_why() {
         assert!(json.contains(&format!("\"taken\":{{\"case\":\"{}\",\"reason\":\"", taken.case)));
         assert_eq!(serde_json::from_str::<Reconstruction>(&json).unwrap(), result);
     }
-    // By the paper's condition a quiet subarray forbids a cut.
+    // With the paper's condition a subarray without tension rules out a case.
     let mut both = scene("sensor-3", Case::Adaptive);
     both.partition.condition = Condition::BothSigns;
     let mut frame = frames[0].clone();
@@ -147,7 +147,7 @@ fn any_grid_that_divides_and_both_forms() {
         let orthogonal = run(&scene, frames).remove(0);
         let truncation = orthogonal.extra.truncation.unwrap();
         assert_eq!(truncation.len(), rows * cols);
-        // r is 0.42 at mu_max: what degree 3 leaves out is at most r^4/(1 − r) = 5 % there.
+        // r is 0.42 at mu_max: the remainder at degree 3 is at most r^4/(1 − r) = 5 % there.
         assert!(truncation.iter().all(|share| (0.0..0.06).contains(share)), "{rows}×{cols}: {truncation:?}");
     }
 }
@@ -159,7 +159,7 @@ fn sensor_4_in_four_parts_is_next_to_the_whole() {
     let four = run(&Scene::builtin("sensor-4").unwrap(), &frames);
     for (result, frame) in four.iter().zip(&frames) {
         assert_eq!(result.case, Grid { rows: 2, cols: 2 });
-        // A cell is nine times wider than the cover is thick: 6 % of the load is not seen in the worst frame.
+        // A cell is nine times wider than the cover is thick: in the worst frame 6 % of the load is not measured.
         assert!(result.error.unwrap().normal.unwrap() < 0.07, "{}: {:?}", frame.id, result.error);
     }
 }

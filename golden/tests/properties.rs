@@ -1,5 +1,5 @@
-//! Properties that hold whatever the contact: what a load's size, a mirror, a turn, a step aside or a second contact in
-//! another subarray do to the forces, and how far integers are from floating point.
+//! Properties for any contact: the forces under scaled loads, mirrors, quarter turns, shifts by a pitch and loads in
+//! several subarrays, and the difference between fixed and floating point.
 
 use dermis_golden::fixed::Model;
 use dermis_golden::frame::{Forces, Frame};
@@ -10,7 +10,7 @@ use dermis_golden::reconstruct::{Golden, Reconstruction};
 use dermis_golden::scene::Scene;
 use proptest::prelude::*;
 
-/// Steps of the search that rounding may move μ by, in mu_max/384, where two candidates score nearly alike.
+/// Steps of the search, in mu_max/384, by which rounding may change μ if two candidates have similar scores.
 const STEPS: f64 = 2.0;
 
 fn scene() -> Scene {
@@ -36,7 +36,7 @@ fn moved(frame: &Frame, from: impl Fn(usize, usize) -> [usize; 2]) -> Frame {
     Frame { stress_MPa: (0..frame.stress_MPa.len()).map(taxel).collect(), ..frame.clone() }
 }
 
-/// Whether μ agrees up to a few steps of the search, and the normal force with it.
+/// Whether μ agrees up to [`STEPS`] and the normal force up to 1 %.
 fn alike(scene: &Scene, a: &Reconstruction, mu: [f64; 2], normal: f64) -> bool {
     let step = scene.search.mu_max / 384.0;
     let own = a.subarrays[0].mu;
@@ -47,7 +47,7 @@ fn alike(scene: &Scene, a: &Reconstruction, mu: [f64; 2], normal: f64) -> bool {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(24))]
 
-    /// Powers of two scale every force by themselves, to the bit; fixed point gives the same words.
+    /// Powers of two scale every force exactly; fixed point gives the same words.
     #[test]
     fn the_load_scales_the_forces(seed in 0u64..1000, power in -40i32..40) {
         let scene = scene();
@@ -79,13 +79,13 @@ proptest! {
         prop_assert!(alike(&scene, &along, [x, -y], normal), "{:?} {:?}", plain.subarrays[0], along.subarrays[0]);
     }
 
-    /// A quarter turn of a square array turns the shear.
+    /// A quarter turn of the frame on a square array turns the shear.
     #[test]
     fn quarter_turns(seed in 0u64..1000) {
         let scene = scene();
         let frame = drawn(&scene, seed);
         let last = scene.sensor.cols - 1;
-        // (x, y) → (−y, x): what was right is below.
+        // (x, y) → (−y, x): the right side moves to the bottom.
         let turned = run(&scene, &moved(&frame, |row, col| [last - col, row]));
         let plain = run(&scene, &frame);
         let [x, y] = plain.subarrays[0].mu;
@@ -95,7 +95,7 @@ proptest! {
         );
     }
 
-    /// A contact one pitch aside has its forces one pitch aside, as far as the array's edge is not near.
+    /// A contact moved by one pitch has its forces moved by one pitch, away from the array's edge.
     #[test]
     fn one_pitch_aside(seed in 0u64..1000) {
         let mut scene = Scene::builtin("sensor-3").unwrap();
@@ -113,13 +113,14 @@ proptest! {
         for row in 4..scene.sensor.rows - 4 {
             for col in 4..cols - 5 {
                 let (a, b) = (here[row * cols + col], there[row * cols + col + 1]);
-                // What the edges add is a thousandth of the peak this far inside.
+                // The effect of the edges is a thousandth of the peak this far inside.
                 prop_assert!((a - b).abs() <= 1e-3 * peak, "{row},{col}: {a} {b}, peak {peak}");
             }
         }
     }
 
-    /// Subarrays do not see each other: forces of stress in several are the sums of those of each alone, to the bit.
+    /// Subarrays are independent: the forces of a frame are the sums of those of each subarray's stress alone, to the
+    /// bit.
     #[test]
     fn subarrays_add_up(seed in 0u64..1000) {
         let mut scene = scene();
@@ -146,8 +147,8 @@ proptest! {
         }
     }
 
-    /// Without a search integers stay within their own roundings of floating point:
-    /// ‖Cz⁺‖∞ times an input LSB, the coefficients' rounding and pruning times n and the peak, a vector word's LSB.
+    /// Without a search the difference between fixed and floating point is bounded by the roundings: ‖Cz⁺‖∞ times an
+    /// input LSB, rounding and pruning of the coefficients times n and the peak, an LSB of a vector word.
     #[test]
     fn fixed_stays_near_golden(seed in 0u64..1000) {
         let mut scene = scene();
@@ -164,13 +165,14 @@ proptest! {
         let coefficient = 0.5 * 2f64.powi(-model.formats.inverse_exponent)
             + 4.0 * largest * 2f64.powi(-(scene.fixed.prune_bits as i32));
         let strongest = float.iter().fold(0.0f64, |most, f| most.max(f.abs()));
-        // v_00 keeps vector_bits of its largest parity, which is up to four taxels' sum; dropped low products the rest.
+        // v_00 has vector_bits for its largest parity, the sum of up to four taxels; the rest is for the dropped low
+        // products.
         let word = 4.0 * 4.0 * strongest * 2f64.powi(-(model.formats.vector_bits as i32 - 2));
         let bound = norm * lsb + coefficient * n as f64 * peak + word;
         for (a, b) in float.iter().zip(&fixed) {
             prop_assert!((a - b).abs() <= bound, "{a} {b}, bound {bound}");
         }
-        // The bound says something: a thousandth of the strongest force.
+        // The bound is meaningful: below a thousandth of the largest force.
         prop_assert!(bound < 1e-3 * strongest, "{bound} {strongest}");
     }
 }

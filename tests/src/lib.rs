@@ -1,26 +1,26 @@
-//! What the tests of this crate share: scenes, their shipped frames, and where built libraries live.
+//! Shared by the tests of this crate: scenes, their shipped frames, and the folder of built libraries.
 //!
 //! | test | claims |
 //! |---|---|
 //! | `equality` | generated Verilog = rust-hdl's simulation = bit-true model, on every shipped frame; cycle budgets |
-//! | `accuracy` | golden against the truth, bit-true against golden |
-//! | `dead` | dead taxels: the same equality, blind to what they read, near the golden model |
+//! | `accuracy` | golden model against known forces, bit-true against golden model |
+//! | `dead` | dead taxels: the same equality, independence of their readings, agreement with the golden model |
 //! | `flipped_bit` | one wrong bit in a coefficient, a vector or the expected output is found |
-//! | `choice` | several cases in one design: equality in mixed order, wrong constants found, what the choice is worth |
-//! | `resources` | block RAMs and multipliers as Yosys counts them, flip-flops and LUTs near |
+//! | `choice` | several cases in one design: equality in mixed order, wrong constants found, benefit of the choice |
+//! | `resources` | block RAMs and multipliers equal Yosys's counts, flip-flops and LUTs are close |
 //! | `extreme` | zero, saturated, 1e±9 of full scale, at edges and corners: equal in hardware |
-//! | `fuzz` | readers, and the whole way from a scene to forces, on mutated and random input; counts for the report |
-//! | `explain` | what is left out is not in the Verilog, and what that saves; refusals name what fits |
-//! | `framing` | early and missing `tlast`: what is dropped, what is flagged, and equality right after |
-//! | `streams` | gaps, back-pressure, wrong `tlast`, a reset at every cycle: nothing lost or invented, right after |
-//! | `coefficients` | the coefficient check: no false alarm, every tried flip told, left out by default |
-//! | `faults` | flipped bits in ROM, RAM and registers: all of them are found, outcomes add up, a reset helps |
-//! | `proofs` | handshakes and queues lose, invent and change nothing, words are held to their range: proved, not tried |
+//! | `fuzz` | readers, and the path from a scene to forces, on mutated and random input; counts for the report |
+//! | `explain` | disabled features are not in the Verilog, and what that saves; errors suggest changes that fit |
+//! | `framing` | early and missing `tlast`: dropped frames, flags, and equality of the next frame |
+//! | `streams` | gaps, back-pressure, wrong `tlast`, a reset at every cycle: nothing lost or invented, the next frame correct |
+//! | `coefficients` | the coefficient check: no false alarm, every tried flip flagged, absent by default |
+//! | `faults` | flipped bits in ROM, RAM and registers: every bit is reachable, outcomes add up, a reset recovers |
+//! | `proofs` | formal proofs: handshakes and queues lose, invent and change nothing, words saturate |
 //! | `link` | the board's UART and SPI: answers, counters, recovery; Verilator = rust-hdl, pin by pin |
 //! | `synthesis` | Yosys reads the Verilog without latch or undriven signal |
 //! | `scenes` | the same equality for scenes of other shapes, degrees, words and conditions |
 //! | `scale` | the largest array, and a thousand random frames with stalls on both streams |
-//! | `lint` | the generated Verilog is clean under Verilator with its waivers, and needs every one of them |
+//! | `lint` | the generated Verilog is clean under Verilator with its waivers, and every waiver is needed |
 #![deny(missing_docs)]
 
 use std::path::PathBuf;
@@ -28,13 +28,13 @@ use std::path::PathBuf;
 use dermis_golden::frame::Frame;
 use dermis_golden::scene::Scene;
 
-/// Scenes that are verified on real frames, with the most cycles from the last input to the last output beat.
+/// Scenes verified on the shipped frames, with the limit of cycles from the last input to the last output beat.
 pub const SCENES: [(&str, u64); 2] = [("sensor-1", 1_400), ("eight-by-eight", 900)];
 
 /// A built-in scene and its shipped half-space frames.
 ///
 /// # Panics
-/// When the scene does not exist or has no frames; this crate holds tests only.
+/// If the scene does not exist or has no frames; this crate holds tests only.
 pub fn scene(name: &str) -> (Scene, Vec<Frame>) {
     let scene = Scene::builtin(name).expect("a built-in scene");
     let frames = Frame::shipped(&scene);
@@ -42,15 +42,15 @@ pub fn scene(name: &str) -> (Scene, Vec<Frame>) {
     (scene, frames)
 }
 
-/// The workspace's folder for built things: the libraries that `make run` has built serve here too.
+/// The workspace's build folder; libraries that `make run` has built are used here too.
 pub fn build_dir() -> PathBuf {
     PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../build")
 }
 
-/// How much a test tries: what the environment's variable says, else the short part that every run has.
+/// Number of trials of a test: the value of an environment variable, else the default of a normal run.
 ///
 /// # Panics
-/// When the variable is no number.
+/// If the variable is not a number.
 pub fn wanted(variable: &str, short: u64) -> u64 {
     std::env::var(variable).map_or(short, |text| text.parse().unwrap_or_else(|_| panic!("{variable}: a number")))
 }

@@ -1,5 +1,6 @@
-//! Accuracy: the golden model against the truth, the bit-true model (which the hardware equals) against the golden model
-//! on the same quantised input, at 20 bits and at the 16 of a common converter, on drawn frames of one contact each.
+//! Accuracy: the golden model against known forces, and the bit-true model (which the hardware equals) against the
+//! golden model on the same quantised input, with 20 bits and with the 16 of a common converter, on random frames of
+//! one contact each.
 //!
 //! `cargo test --release -p dermis-tests --test accuracy -- --nocapture` prints the table.
 
@@ -12,13 +13,13 @@ use dermis_sim::compare::median;
 use dermis_sim::fresh::{Fresh, Shapes};
 use dermis_tests::scene;
 
-/// Largest median tangential error of the golden model on sensor 1: twice what a study in f64 found (1.4 %).
+/// Bound of the golden model's median tangential error on sensor 1: twice the 1.4 % of a study in double precision.
 const GOLDEN_TANGENTIAL: f64 = 0.03;
-/// Largest normal error of the golden model on sensor 1, each frame.
+/// Bound of the golden model's normal error on sensor 1, for each frame.
 const GOLDEN_NORMAL: f64 = 0.015;
-/// Drawn frames of each sensor.
+/// Number of random frames of each sensor.
 const FRAMES: u32 = 100;
-/// How much the bit-true model may add to the median of a sensor at 20 bits.
+/// Bound of the bit-true model's additional median error at 20 bits.
 const FIXED_ADDS: f64 = 0.02;
 
 fn tangential(results: &[Reconstruction]) -> f64 {
@@ -26,7 +27,7 @@ fn tangential(results: &[Reconstruction]) -> f64 {
     median(errors.collect()).unwrap()
 }
 
-/// The frame as its codes have it.
+/// The frame with the stress of its codes.
 fn quantised(scene: &Scene, frame: &Frame) -> Frame {
     let codes = quantise(&frame.stress_MPa, scene.fixed.input_bits, full_scale(scene, frame));
     let stress = codes.codes.iter().map(|&code| f64::from(code) * codes.lsb_MPa()).collect();
@@ -68,7 +69,7 @@ fn fixed_adds_little_to_every_sensor() {
             let percent = [float, codes, fixed].map(|e| format!("{:.2} %", 100.0 * e)).join(" | ");
             let on = board.map_or_else(String::new, |board| format!(" on {board}"));
             println!("| {name}{on} | {bits} bits | {percent} |");
-            // Sensor 4 is reported: its cells are too wide against the cover, whatever computes.
+            // Sensor 4 is printed only: its cells are too wide relative to the cover for any model.
             assert!(
                 bits < 20 || name == "sensor-4" || fixed <= float + FIXED_ADDS,
                 "{name}: fixed {fixed}, float {float}"

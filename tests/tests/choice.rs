@@ -1,5 +1,5 @@
-//! Several cases in one design, chosen per frame: equality on frames that make each case be taken, in mixed order, at full
-//! speed and with stalls; what turns it red; what it is worth.
+//! Several cases in one design, chosen per frame: equality on frames for each case, in mixed order, at full speed and
+//! with stalls; defects that the comparison finds; benefit of the choice.
 
 use std::collections::BTreeSet;
 
@@ -16,7 +16,7 @@ use dermis_sim::fresh::{Fresh, Shapes};
 use dermis_sim::hardware::{Hardware, Simulator};
 use dermis_tests::build_dir;
 
-/// Frames of one run.
+/// Number of frames of one run.
 const FRAMES: usize = 24;
 
 fn scene(sensor: &str, more: &str) -> Scene {
@@ -29,7 +29,7 @@ fn scene(sensor: &str, more: &str) -> Scene {
     Scene::parse(&text, "choosing").unwrap()
 }
 
-/// A narrow bump at a taxel, with a little tension around it, as large as `most` or some octaves smaller.
+/// A narrow bump at a taxel with a little tension around it, of peak `most` or some octaves smaller.
 fn bump(scene: &Scene, random: &mut fastrand::Rng) -> Vec<i32> {
     let (rows, cols) = (scene.sensor.rows, scene.sensor.cols);
     let size = f64::from((1i32 << (scene.fixed.input_bits - 1 - random.u32(..8))) - 1);
@@ -42,7 +42,7 @@ fn bump(scene: &Scene, random: &mut fastrand::Rng) -> Vec<i32> {
     (0..rows * cols).map(code).collect()
 }
 
-/// A sixth of the peak beside the boundary of the rows: near the share that counts as a cut.
+/// A sixth of the peak beside the boundary of the rows: near the threshold for a cut.
 fn shared(scene: &Scene) -> Vec<i32> {
     let mut codes = vec![0; scene.sensor.taxels()];
     (codes[0], codes[scene.sensor.cols * (scene.sensor.rows / 2)]) = (60_000, 10_000);
@@ -123,7 +123,7 @@ fn a_frame_becomes_what_its_case_makes_of_it() {
     }
 }
 
-/// One changed constant of the choice, or of what depends on the case, is found.
+/// A change of any constant of the choice, or of anything that depends on the case, is found.
 #[test]
 fn a_wrong_constant_is_found() {
     let mut hardware = hardware(&scene("eight-by-eight", "[partition]\ncases = [0, 1]\n"));
@@ -152,11 +152,11 @@ fn a_board_of_several_cases_has_no_link() {
     assert!(error.starts_with("partition.case = adaptive: a board's link takes"), "{error}");
 }
 
-/// Frames of the measurement.
+/// Number of frames of the measurement.
 const DRAWN: u32 = 60;
 
-/// What the choice is worth: median tangential error over drawn frames, of each case, of the hardware's rule with several
-/// shares, and of the golden model's choice; the floating-point model solves.
+/// Benefit of the choice: median tangential error over random frames for each case, for the hardware's rule with
+/// several thresholds and for the golden model's choice; the floating-point model solves.
 #[test]
 fn the_choice_is_measured() {
     let grids: Vec<Grid> = (0..4).filter_map(|number| Case::numbered(number)?.grid()).collect();

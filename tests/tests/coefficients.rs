@@ -1,5 +1,5 @@
-//! The coefficient check: no false alarm over the shipped frames, every tried single flip in the coefficient memory told,
-//! no block RAM, multiplier or cycle; left out by default.
+//! The coefficient check: no false alarm on the shipped frames, every tried flip of a bit in the coefficient memory
+//! flagged, no additional block RAM, multiplier or cycle; absent by default.
 
 use dermis_golden::fixed::check::undetected;
 use dermis_golden::fixed::send::{FLAG_COEFFICIENTS, STATUS_BEATS};
@@ -15,7 +15,7 @@ use dermis_sim::hardware::{Hardware, Simulator};
 use dermis_sim::verify::verify;
 use dermis_tests::{build_dir, scene, SCENES};
 
-/// Flips tried in each scene.
+/// Number of flips tried in each scene.
 const FLIPS: usize = 100;
 
 fn checked(name: &str) -> (Scene, Vec<Frame>) {
@@ -36,7 +36,7 @@ fn assert_equal(scene: &Scene, frames: &[Frame]) {
     let verified = verify(scene, frames, &[Simulator::Verilator, Simulator::RustHdl], &build_dir()).unwrap();
     let first: Vec<String> = verified.findings.kept.iter().take(3).map(ToString::to_string).collect();
     assert!(verified.findings.is_equal(), "{}: {first:#?}", scene.name);
-    // Nothing differs from the model, which never raises the flag.
+    // The output equals the model's, which never raises the flag.
     assert!(verified.rows.iter().all(|row| !row.fixed.flags.contains(&Flag::CoefficientsDamaged)));
 }
 
@@ -46,7 +46,7 @@ fn no_false_alarm() {
         let (scene, frames) = checked(name);
         assert_equal(&scene, &frames);
     }
-    // Several subarrays and groups of rows, a list of columns; several cases, each with a signature of its own.
+    // Several subarrays and groups of rows, a list of columns; several cases, each with its own signature.
     let frames = Frame::shipped(&small(""));
     let eq2 = Frame::eq2(&small("").sensor);
     let frames = [&frames[..], &[eq2]].concat();
@@ -55,7 +55,7 @@ fn no_false_alarm() {
     }
 }
 
-/// A bit of a lane's coefficient in the memory file.
+/// Flips a bit of a lane's coefficient in the memory file.
 fn flip(text: &str, word: usize, bit: usize) -> String {
     let mut lines: Vec<Vec<u8>> = text.lines().map(|line| line.as_bytes().to_vec()).collect();
     let digit = lines[word].len() - 1 - bit / 4;
@@ -64,7 +64,7 @@ fn flip(text: &str, word: usize, bit: usize) -> String {
     lines.into_iter().map(|line| String::from_utf8(line).unwrap() + "\n").collect()
 }
 
-/// Whether each subarray's status tells of its coefficients.
+/// Whether each subarray's status flags its coefficients.
 fn tells(hardware: &Hardware, vector: &Vector) -> bool {
     let mut device = hardware.device(Simulator::Verilator).unwrap();
     let forces = vector.expected.beats.len();
@@ -82,7 +82,7 @@ fn every_tried_flip_is_told() {
         let mut hardware = Hardware::new(Model::for_frames(&scene, &frames).unwrap(), &build_dir()).unwrap();
         let vector = hardware.vector(&frames[..1]).unwrap();
         assert!(!tells(&hardware, &vector), "{name}: a false alarm");
-        // Every word is read, and no flip cancels itself.
+        // Every word is read, and no flip is undetected.
         let words = hardware.model.storage.words();
         assert_eq!(undetected(&hardware.model), [0; 0], "{name}");
         let file = hardware.generated.files.iter().position(|file| file.name == "coefficients.hex").unwrap();

@@ -1,5 +1,5 @@
-//! Dead taxels in hardware: equal to the bit, blind to what the dead taxels read, and near the golden model's answer
-//! for the array without them.
+//! Dead taxels in hardware: equal to the bit-true model, independent of what they read, and close to the golden model
+//! of the array without them.
 //!
 //! `cargo test --release -p dermis-tests --test dead -- --nocapture` prints the table of errors.
 
@@ -23,20 +23,20 @@ const SCENES: [(&str, &[[usize; 2]]); 4] = [
     ("sensor-1", &[[0, 3], [2, 3], [5, 5], [5, 6], [9, 9]]),
 ];
 
-/// What the bit-true model may add to the golden model's median tangential error at 20 bits; as for whole arrays.
+/// Bound of the bit-true model's additional median tangential error at 20 bits; as for whole arrays.
 const FIXED_ADDS: f64 = 0.02;
-/// Drawn frames of a table's line.
+/// Number of random frames per line of the table.
 const FRAMES: u32 = 100;
 
 fn masked(name: &str, dead: &[[usize; 2]]) -> Scene {
     let (mut scene, _) = scene(name);
     scene.input.dead = dead.to_vec();
-    // A name of its own: generated files carry it.
+    // A separate name, because generated files contain it.
     scene.name = format!("{name}-{}-dead", dead.len());
     scene
 }
 
-/// Contacts drawn from a seed; every second frame has dead taxels stuck far beyond the peak.
+/// Frames of random contacts; in every second one the dead taxels are stuck far beyond the peak.
 fn frames(scene: &Scene, count: u32) -> Vec<Frame> {
     let draw = Fresh { frames: count, contacts: vec![1, 2], shapes: Shapes::Elliptic, touching: false, seed: 11 };
     let mut frames = draw.draw(scene).unwrap();
@@ -54,7 +54,7 @@ fn stick(scene: &Scene, frame: &mut Frame) {
 fn drawn_frames_are_equal_on_every_simulator() {
     for (name, dead) in SCENES {
         let scene = masked(name, dead);
-        // Verilator takes its time to compile: one of each sensor, that with more dead taxels.
+        // Compilation by Verilator is slow: one scene of each sensor, the one with more dead taxels.
         let simulators = [Simulator::RustHdl, Simulator::Verilator];
         let simulators = if dead.len() > 1 { &simulators[..] } else { &simulators[..1] };
         let verified = verify(&scene, &frames(&scene, 4), simulators, &build_dir()).unwrap();
@@ -70,7 +70,7 @@ fn unlike_scenes_are_equal() {
         ("odd", "rows = 7\ncols = 9", "[[3, 4], [3, 0], [6, 4]]\n[fixed]\nlanes = 24\nprune_bits = 10\n"),
         ("no-search", "rows = 6\ncols = 4", "[[1, 2]]\n[search]\nmu_max = 0\n"),
         ("averaged", "rows = 5\ncols = 4", "[[0, 0], [4, 3]]\naverage = 1\n[output]\nforces = \"resultants\"\n"),
-        // Square and of degree 1: without the dead taxel Ax would serve for Ay.
+        // Square and of degree 1: without the dead taxel Ax would be used for Ay.
         ("degree-1", "rows = 6\ncols = 6", "[[2, 3]]\n[search]\nmu_max = 0.05\n"),
     ];
     for (name, size, dead) in scenes {
@@ -100,17 +100,17 @@ fn what_a_dead_taxel_reads_changes_no_bit() {
                 dead.iter().for_each(|taxel| other[at(*taxel)] = stuck);
                 assert_eq!(model.run(&other), trace, "{}, {}", scene.name, frame.id);
             }
-            // Any other taxel counts.
+            // Any other taxel matters.
             let mut other = codes.clone();
             other[at([1, 1])] ^= 1;
             assert_ne!(model.run(&other), trace);
-            // And in MPa, where the scale of the codes follows the frame's peak.
+            // The same in MPa, where the scale of the codes depends on the frame's peak.
             let mut other = frame.clone();
             stick(&scene, &mut other);
             assert_eq!(model.reconstruct(&other).unwrap(), model.reconstruct(&frame).unwrap());
             assert_eq!(golden.run(&other).unwrap(), golden.run(&frame).unwrap());
         }
-        // A frame of nothing but stuck taxels is no contact.
+        // A frame in which only stuck taxels read anything has no contact.
         let mut silent = Frame::from_stress("silent", &scene.sensor, vec![0.0; scene.sensor.taxels()]).unwrap();
         let quiet = model.reconstruct(&silent).unwrap();
         stick(&scene, &mut silent);
@@ -141,7 +141,7 @@ fn fixed_is_near_golden() {
         let percent = [golden, fixed, half, most].map(|e| format!("{:.2} %", 100.0 * e)).join(" | ");
         println!("| {name} | {} | {percent} |", dead.len());
         assert!(fixed <= golden + FIXED_ADDS, "{}: fixed {fixed}, golden {golden}", scene.name);
-        // A matrix taken without the taxels' forces, or with their readings, is off by tens of per cent.
+        // Wrong matrices, such as those that ignore the forces over dead taxels, cause errors of tens of per cent.
         assert!(half < FIXED_ADDS, "{}: {half}", scene.name);
     }
 }
@@ -171,7 +171,7 @@ fn a_flipped_coefficient_of_a_broken_symmetry_is_found() {
     let mut hardware = Hardware::new(Model::new(&scene).unwrap(), &build_dir()).unwrap();
     let vectors = [hardware.vector(&frames(&scene, 1)).unwrap()];
     assert!(compare(&hardware, &vectors).is_equal());
-    // The memory holds, of each matrix, first the columns of its symmetry's flip: the next line is of another one.
+    // The memory has the columns of the symmetric flip of each matrix first; the next line is of another flip.
     let quads = hardware.model.formats.quads;
     let index = hardware.generated.files.iter().position(|file| file.name == "coefficients.hex").unwrap();
     let mut lines: Vec<String> = hardware.generated.files[index].text.lines().map(str::to_owned).collect();

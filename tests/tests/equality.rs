@@ -54,7 +54,7 @@ fn degenerate_frames_are_equal() {
 #[test]
 fn clipped_codes_are_equal() {
     let (mut scene, frames) = scene("eight-by-eight");
-    // A tenth of the peak: most of the contact is clipped.
+    // Full scale is a tenth of the peak: most of the contact is clipped.
     scene.input.full_scale_MPa = Some(frames[0].peak_MPa() / 10.0);
     check(&scene, &frames[..2]);
 }
@@ -62,7 +62,7 @@ fn clipped_codes_are_equal() {
 #[test]
 fn golden_judges_the_codes_that_the_hardware_gets() {
     let (mut scene, mut frames) = scene("eight-by-eight");
-    // A noise floor gives all frames one full scale, that of the strongest: too coarse for a frame of a 200th.
+    // With a noise floor all frames have the full scale of the strongest, too coarse for a frame of a 200th of it.
     scene.search.noise_floor_MPa = 1e-9;
     frames.truncate(2);
     let peak = frames[0].peak_MPa();
@@ -73,7 +73,7 @@ fn golden_judges_the_codes_that_the_hardware_gets() {
     let rows: Vec<[bool; 2]> =
         verified.rows.iter().map(|row| [unreliable(&row.golden.flags), unreliable(&row.fixed.flags)]).collect();
     assert_eq!(rows, [[false; 2], [true; 2]]);
-    // And where no Verilog has run, the table does not say that it is equal.
+    // If no Verilog has run, the table does not claim equality.
     let (cosim, scenes) = (report::cosim(&verified), report::scenes(&[verified]));
     for table in [cosim, scenes] {
         let cells = |line: usize| table.lines().nth(line).unwrap().split('|').map(str::trim).collect::<Vec<_>>();

@@ -1,4 +1,4 @@
-//! What is left out is not in the Verilog, and what that saves is the difference of two builds.
+//! Disabled features are not in the Verilog, and the reported saving is the difference of two builds.
 
 use dermis_golden::fixed::{Cycles, Model};
 use dermis_golden::scene::Scene;
@@ -30,7 +30,7 @@ fn an_omission_saves_what_two_builds_differ_by() {
     ];
     assert_eq!(saved(bare, "search"), difference);
     assert!(difference[1] > 0 && difference[2] > 1000);
-    // Two products of 21 by 18 bits, one ROM: known without the model.
+    // Two products of 21 by 18 bits, one ROM: known independently of the model.
     assert_eq!(saved(bare, "calibration table")[..2], [2, 2]);
 }
 
@@ -74,9 +74,9 @@ fn a_scene_that_does_not_fit_is_told_what_does() {
         "name = \"wide\"\n[sensor]\nrows = 32\ncols = 32\npitch_x_mm = 2.0\npitch_y_mm = 4.0\nthickness_mm = 3.0\n";
     let error = Model::new(&Scene::parse(text, "wide").unwrap()).unwrap_err().to_string();
     assert!(error.contains("there are 208; it fits with any one of:"), "{error}");
-    // The remedy is one.
-    let remedy = error.lines().find_map(|line| line.trim().strip_prefix("partition.case = ")).unwrap();
-    let (case, needs) = remedy.split_once(": ").unwrap();
+    // The suggested change works.
+    let suggestion = error.lines().find_map(|line| line.trim().strip_prefix("partition.case = ")).unwrap();
+    let (case, needs) = suggestion.split_once(": ").unwrap();
     let model = Model::new(&Scene::parse(&format!("{text}[partition]\ncase = {case}\n"), "wide").unwrap()).unwrap();
     assert!(needs.starts_with(&format!("{} block RAMs", model.resources.block_rams())), "{error}");
 }

@@ -10,7 +10,7 @@ use dermis_sim::drive::Stimulus;
 use dermis_sim::hardware::{Hardware, Simulator};
 use dermis_tests::build_dir;
 
-/// The frames whose subarrays are the scene's, as codes of their own full scales.
+/// The frames with the scene's own partition, as codes with their own full scales.
 fn vectors(scene: &Scene, hardware: &Hardware) -> Vec<Vector> {
     let all = frames(scene).unwrap().into_iter();
     let own = all.filter(|e| e.scene.partition.case == scene.partition.case && e.scene.require_supported().is_ok());

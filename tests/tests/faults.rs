@@ -1,5 +1,5 @@
-//! Flipped bits under Verilator: every bit that the design keeps is found, what is known to be told is told, and a reset
-//! always helps.
+//! Flipped bits under Verilator: every bit of state is found, faults that must be flagged are flagged, and a reset
+//! always recovers.
 
 use dermis_golden::fixed::storage::word_bits;
 use dermis_golden::fixed::Model;
@@ -10,7 +10,7 @@ use dermis_sim::hardware::Hardware;
 use dermis_sim::report;
 use dermis_tests::build_dir;
 
-/// Few taxels and no search, so that the library with every signal open is soon built.
+/// Few taxels and no search, so that the library with access to every signal is built quickly.
 fn hardware() -> Hardware {
     let text = "name = \"faults\"\n[sensor]\nrows = 4\ncols = 4\npitch_x_mm = 3.0\npitch_y_mm = 4.0\n\
                 thickness_mm = 3.0\n[search]\nmu_max = 0.0\n";
@@ -29,7 +29,7 @@ fn every_bit_is_found() {
     let listed: usize = memories.iter().map(|memory| memory.words * memory.bits).sum();
     assert_eq!(bits(&|class| class != Class::Register), listed);
     assert_eq!(bits(&|class| class == Class::Rom), hardware.model.storage.words() * word_bits(&hardware.model.formats));
-    // Counted from the text of the Verilog; registers that a memory's block has of its own are not in it.
+    // Counted in the text of the Verilog, without the registers inside memory blocks.
     let estimated: usize = hardware.generated.usage.values().map(|usage| usage.flip_flops).sum();
     let registers = bits(&|class| class == Class::Register);
     println!("{registers} bits of registers, {estimated} flip-flops estimated");
@@ -46,10 +46,10 @@ fn outcomes_add_up_and_a_reset_helps() {
         assert!(row.large <= row.silent && (row.large == 0 || row.largest_error > 0.01), "{row:?}");
     }
     let of = |class: Class, stage: &str| rows.iter().find(|row| row.class == class && row.stage == stage).unwrap();
-    // A coefficient is read in every frame: what a force word shows of it is wrong, and nothing tells.
+    // A coefficient is read in every frame: the force words are wrong, and nothing flags it.
     let coefficients = of(Class::Rom, "pass");
     assert!(4 * coefficients.silent > coefficients.tried && coefficients.detected == 0, "{coefficients:?}");
-    // The states of the handshake: a lost one hangs or breaks a frame's length.
+    // State of the handshake: a flip hangs the design or breaks the length of a frame.
     let control = ["send", "engine", "receive"].map(|stage| of(Class::Register, stage));
     assert!(control.iter().any(|row| row.hang > 0) && control.iter().any(|row| row.detected > 0), "{control:?}");
     let shares = Shares::of(&rows, Class::Rom).unwrap();

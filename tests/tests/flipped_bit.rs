@@ -1,5 +1,5 @@
-//! The comparison is worth something only if it can fail: one flipped bit in a coefficient, in an input
-//! vector, or in the expected output turns it red, in the stage where it belongs.
+//! The comparison can fail: one flipped bit in a coefficient, an input vector or the expected output is found, in the
+//! stage concerned.
 
 use dermis_golden::fixed::Model;
 use dermis_sim::cosim::{run, Bench, Findings, Vector};

@@ -1,5 +1,5 @@
-//! Frames whose `tlast` comes early or not at all, under Verilator and in rust-hdl's simulation: a frame cut short
-//! leaves nothing behind, the next whole frame is equal to the bit-true model to the bit, and its status carries
+//! Frames whose `tlast` comes early or is missing, under Verilator and in rust-hdl's simulation: an incomplete frame
+//! leaves nothing behind, the next complete frame is equal to the bit-true model to the bit, and its status has
 //! `FLAG_FRAMING`, once.
 
 use dermis_golden::fixed::send::FLAG_FRAMING;
@@ -8,12 +8,12 @@ use dermis_hdl::device::{Device, Inputs};
 use dermis_sim::hardware::{Hardware, Simulator};
 use dermis_tests::{build_dir, scene};
 
-/// Far more cycles than a frame takes.
+/// Limit of cycles, far more than a frame takes.
 const PATIENCE: usize = 5_000;
 
 type Beats = Vec<[i32; 3]>;
 
-/// A device whose output is always taken, and the frames that have come out of it.
+/// A device whose output is always accepted, and the frames received from it.
 struct Line {
     device: Box<dyn Device>,
     beats: Beats,
@@ -33,7 +33,7 @@ impl Line {
         }
     }
 
-    /// One cycle; whether an offered code was taken.
+    /// Simulates one cycle; returns whether an offered code was accepted.
     fn cycle(&mut self, inputs: Inputs) -> bool {
         let outputs = self.device.cycle(&Inputs { m_ready: true, ..inputs });
         if outputs.m_valid {
@@ -45,7 +45,7 @@ impl Line {
         outputs.s_ready
     }
 
-    /// Offers the codes one a cycle, `tlast` on the code of index `last`.
+    /// Offers one code per cycle, with `tlast` on the code of index `last`.
     fn send(&mut self, codes: &[i32], last: Option<usize>) {
         for (index, &s_data) in codes.iter().enumerate() {
             let inputs = Inputs { s_valid: true, s_data, s_last: last == Some(index), ..Inputs::default() };
@@ -53,7 +53,7 @@ impl Line {
         }
     }
 
-    /// All frames that come in a time in which every frame would have come.
+    /// All frames received within the time for the expected ones.
     fn receive(&mut self) -> Vec<Beats> {
         for _ in 0..PATIENCE {
             self.cycle(Inputs::default());
@@ -63,7 +63,7 @@ impl Line {
     }
 }
 
-/// Hardware, two frames' codes, and what the model sends for each: without flag and with it.
+/// Hardware, the codes of two frames, and the model's output for each, without and with the flag.
 struct Setting {
     hardware: Hardware,
     codes: [Vec<i32>; 2],
@@ -123,7 +123,7 @@ fn two_cuts_are_one_flag_and_a_reset_clears_it() {
     for simulator in SIMULATORS {
         let mut line = Line::new(&s.hardware, simulator);
         line.send(&s.codes[0], end);
-        // While the first frame is computed, which must not notice.
+        // While the first frame is computed, which must not be affected.
         line.send(&s.codes[1][..5], Some(4));
         line.send(&s.codes[1][..5], Some(4));
         assert!(line.receive() == [s.plain[0].clone()], "{}, before", simulator.name());

@@ -1,5 +1,5 @@
-//! The generated Verilog is clean under `verilator --lint-only -Wall` with its waiver file, every waiver
-//! is still needed, and every waiver gives its reason.
+//! The generated Verilog is clean under `verilator --lint-only -Wall` with its waiver file; every waiver is needed and
+//! has its reason.
 
 use std::path::Path;
 use std::process::Command;
@@ -44,7 +44,7 @@ fn generated_verilog_is_clean_and_needs_each_waiver() {
         let waivers = generated.files[index].text.clone();
         let lines: Vec<&str> = waivers.lines().collect();
         for (number, line) in lines.iter().enumerate().filter(|(_, l)| l.starts_with("lint_off")) {
-            // A reason stands above a waiver or a group of them.
+            // The reason is in a comment above a waiver or a group of them.
             let above = lines[..number].iter().rev().find(|l| !l.starts_with("lint_off"));
             assert!(above.is_some_and(|l| l.starts_with("//")), "{name}: no reason above: {line}");
             let without = lines.iter().enumerate().filter(|(n, _)| *n != number).map(|(_, l)| *l);

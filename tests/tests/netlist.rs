@@ -1,5 +1,5 @@
-//! The netlist after synthesis computes the same bits in the same cycles, and the check finds a defect that the Verilog's
-//! simulation cannot: a constant whose sign two tools read differently.
+//! The netlist after synthesis computes the same bits in the same cycles, and the test finds a defect that simulation
+//! of the Verilog cannot: a constant whose sign two tools read differently.
 
 use dermis_golden::fixed::Model;
 use dermis_golden::frame::Frame;
@@ -10,8 +10,8 @@ use dermis_sim::fresh::{Fresh, Shapes};
 use dermis_sim::hardware::{Hardware, Simulator};
 use dermis_tests::build_dir;
 
-/// Small enough that synthesis and compilation are done in a minute. Without a search nine tenths of the cells are gone;
-/// limbs, matrix passes and force unit are in it.
+/// Small enough for synthesis and compilation within a minute. Without a search nine tenths of the cells are gone;
+/// limbs, matrix passes and force unit remain.
 const SCENE: &str = "name = \"netlist\"\n[sensor]\nrows = 4\ncols = 4\npitch_x_mm = 4.0\npitch_y_mm = 4.0\n\
                      thickness_mm = 3.0\n[fixed]\nlanes = 4\ninput_bits = 18\ndata_bits = 12\ncoef_bits = 12\n\
                      inverse_bits = 20\n[search]\n";
@@ -51,7 +51,7 @@ fn the_netlist_of_the_serial_engine_equals_the_model_and_a_sign_that_tools_read_
     netlist_and_defect("icebreaker", "0.05", "forces");
 }
 
-/// The output comes from block `last`.
+/// The output is that of block `last`.
 fn netlist_and_defect(board: &str, mu_max: &str, last: &str) {
     let (mut hardware, frames) = setup(board, mu_max);
     let netlist = findings(&hardware, &frames, Simulator::Netlist);

@@ -1,6 +1,6 @@
-//! The resource model against Yosys: block RAMs and multipliers are equal, flip-flops and LUTs near.
+//! The resource model against Yosys: block RAMs and multipliers must be equal, flip-flops and LUTs close.
 //!
-//! A model that is wrong by one is found: the count is compared, not bounded.
+//! The counts are compared exactly: an error of one is found.
 
 use std::process::Command;
 use std::thread::scope;
@@ -10,7 +10,7 @@ use dermis_golden::scene::Scene;
 use dermis_hdl::usage::total;
 use dermis_hdl::{generate, Generated};
 
-/// How far the estimate of flip-flops and LUTs may be from Yosys; the largest deviation of the scenes here is 7 %.
+/// Largest relative error of the estimated flip-flops and LUTs; the largest of these scenes is 7 %.
 const NEAR: f64 = 0.15;
 
 /// Runs Yosys to the end of a `synth_ecp5` stage and returns the counts of cells by type.
@@ -48,7 +48,7 @@ fn block_rams_and_multipliers_are_those_of_yosys() {
         ),
         // All of the paper's cases, chosen per frame.
         small("cases", "[partition]\ncases = [0, 1, 2, 3]\n[search]\nmu_max = 0.1\n[fixed]\nlanes = 12\n"),
-        // A word of the lanes that no block RAM divides evenly; deep coefficients.
+        // A lane word that is no multiple of a block RAM's; deep coefficients.
         small("deep", "[search]\nmu_max = 0.1\n[fixed]\nlanes = 12\ninput_bits = 16\n"),
     ];
     let check = |model: &Model| {
@@ -58,7 +58,7 @@ fn block_rams_and_multipliers_are_those_of_yosys() {
         assert_eq!(cells("DP16KD"), model.resources.block_rams(), "{name}: block RAMs");
         assert_eq!(cells("MULT18X18D"), model.resources.multipliers(), "{name}: multipliers");
     };
-    // Yosys uses one processor: two of them at a time.
+    // Yosys uses one processor, so two run at a time.
     let (some, others) = models.split_at(models.len() / 2);
     scope(|scope| {
         for half in [some, others] {
@@ -69,7 +69,7 @@ fn block_rams_and_multipliers_are_those_of_yosys() {
 
 #[test]
 fn flip_flops_and_luts_are_near_those_of_yosys() {
-    // Of low degree: the search is there, and Yosys takes a minute less.
+    // Low degree: with a search, but Yosys takes a minute less.
     let generated = generate(&small("near", "[search]\nmu_max = 0.1\n[fixed]\nlanes = 8\n")).unwrap();
     let cells = synthesise(&generated, "check");
     let counted = [cells("TRELLIS_FF"), cells("LUT4") + 2 * cells("CCU2C") + 6 * cells("TRELLIS_DPR16X4")];
@@ -83,12 +83,12 @@ fn flip_flops_and_luts_are_near_those_of_yosys() {
 
 #[test]
 fn a_missing_memory_and_a_wrong_count_are_found() {
-    // Without a search, which Yosys takes longest for.
+    // Without a search, which takes Yosys longest.
     let mut model = small("wrong", "[search]\nmu_max = 0\n[partition]\nrows = 2\ncols = 3\n[fixed]\nlanes = 16\n");
     let right = model.resources.clone();
     model.resources.memories[0].words += 1;
     assert!(generate(&model).unwrap_err().to_string().contains("memories"));
-    // One memory moved from block RAM to LUTs: Yosys counts another number.
+    // If one memory moves from block RAM to LUTs, Yosys counts differ.
     model.resources = right.clone();
     let moved = model.resources.memories.iter_mut().find(|memory| memory.block == "forces$store").unwrap();
     assert!(std::mem::take(&mut moved.block_rams) > 0);

@@ -1,5 +1,5 @@
-//! Co-simulation at scale, under Verilator, all stages compared: the largest array with a foot on it, and a thousand
-//! random frames of small sensors with random gaps and back-pressure on both streams.
+//! Co-simulation at scale, under Verilator, with all stages compared: the largest array with a foot on it, and a
+//! thousand random frames of small sensors with random gaps and back-pressure on both streams.
 
 use dermis_golden::fixed::Model;
 use dermis_golden::partition::Case;
@@ -10,7 +10,7 @@ use dermis_sim::hardware::{Hardware, Simulator};
 use dermis_sim::verify::verify;
 use dermis_tests::{build_dir, scene};
 
-/// Frames of one run; their traces are in memory together.
+/// Number of frames of one run; all their traces are in memory.
 const CHUNK: u64 = 50;
 
 #[test]
@@ -24,7 +24,7 @@ fn a_foot_on_the_largest_array_is_equal() {
     assert!(latency <= 31_000, "{latency} cycles");
 }
 
-/// Codes of one of the kinds that a converter may give: noise, sparse spikes, a bump, saturated patches.
+/// Random codes as from a converter: noise, sparse spikes, a bump or saturated patches.
 fn codes(random: &mut fastrand::Rng, scene: &Scene) -> Vec<i32> {
     let most = (1i32 << (scene.fixed.input_bits - 1)) - 1;
     let taxels = scene.sensor.taxels();

@@ -1,7 +1,7 @@
-//! The scene decides the hardware: scenes far from the built-in ones are equal to the bit as well.
+//! Scenes of other shapes, degrees, formats and options than the built-in ones are equal to the bit as well.
 //!
-//! A handful of shapes and formats goes through Verilator and rust-hdl's simulation; many random ones through
-//! rust-hdl's simulation alone, which needs no compiler.
+//! A few go through Verilator and rust-hdl's simulation; many random ones through rust-hdl's simulation alone, which
+//! needs no compiler.
 
 use dermis_golden::fixed::Model;
 use dermis_golden::frame::Frame;
@@ -13,19 +13,19 @@ use dermis_sim::verify::verify;
 use dermis_tests::build_dir;
 use proptest::prelude::*;
 
-/// Name, and what differs from an ordinary scene of 6×6 taxels.
+/// Name, and the difference from a default scene of 6×6 taxels.
 const SCENES: [(&str, &str); 11] = [
-    // Two quads: sweeps shorter than what follows them.
+    // Two quads: sweeps shorter than the pipeline that follows them.
     ("2x3", "[sensor]\nrows = 2\ncols = 3\npitch_x_mm = 4.0\npitch_y_mm = 4.0\nthickness_mm = 3.0\n"),
     // Six subarrays in turn, odd rows.
     ("partition", "[sensor]\nrows = 10\ncols = 12\npitch_x_mm = 2.0\npitch_y_mm = 4.0\nthickness_mm = 3.0\n[partition]\nrows = 2\ncols = 3\n"),
-    // Ax serves for Ay, and columns are left out.
+    // Ax is used for Ay, and columns are left out.
     ("thin", "[sensor]\nrows = 12\ncols = 12\npitch_x_mm = 8.0\npitch_y_mm = 8.0\nthickness_mm = 0.91\n[fixed]\nprune_bits = 12\n"),
     // Middle lines: quads whose lanes coincide.
     ("odd", "[sensor]\nrows = 5\ncols = 7\npitch_x_mm = 2.0\npitch_y_mm = 4.0\nthickness_mm = 3.0\n"),
-    // Degree 1: a small r leaves seven of ten coefficients out.
+    // Degree 1: with a small r, seven of ten coefficients are absent.
     ("degree-1", "[search]\nmu_max = 0.05\n"),
-    // Sums per subarray in the place of forces.
+    // Resultants per subarray instead of forces.
     ("resultants", "[output]\nforces = \"resultants\"\n[partition]\nrows = 3\ncols = 2\n"),
     // Sums of two frames, which overflow no word.
     ("averaged", "[input]\naverage = 1\n"),
@@ -48,7 +48,7 @@ fn parse(name: &str, text: &str) -> Scene {
     Scene::parse(&format!("name = \"{name}\"\n{sensor}{text}"), name).unwrap()
 }
 
-/// A pressure and its shear somewhere on the array, reproducible.
+/// The stress of a reproducible pressure with shear at some position on the array.
 fn frames(scene: &Scene) -> Vec<Frame> {
     let sensor = &scene.sensor;
     let at = |centre: [f64; 2], shear: f64| {
@@ -101,7 +101,7 @@ proptest! {
         );
         let model = Model::new(&parse("random", &(sensor + &fixed))).unwrap();
         let hardware = Hardware::new(model, &build_dir()).unwrap();
-        // Codes from a small generator: a value, its extremes and zero in turn.
+        // Codes from a small generator: values, extremes and zeros in turn.
         let most = (1i64 << (input_bits - 1)) - 1;
         let mut state = seed;
         let codes: Vec<i32> = (0..rows * cols)
@@ -124,12 +124,12 @@ proptest! {
     }
 }
 
-/// Readings of a sensor with a zero and a gain per taxel, and the table and tare frame that belong to it.
+/// Readings of a sensor with a zero and a gain per taxel, and its table and tare frame.
 #[test]
 fn calibrated_readings_are_equal_and_give_the_forces_of_the_stress() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("scene.toml");
-    // Without a search forces are linear in the stress, so that rounding stays rounding.
+    // Without a search the forces are linear in the stress, so rounding errors stay small.
     let plain = parse("plain", "[search]\nmu_max = 0\n");
     let stress = frames(&plain);
     let sensor = &plain.sensor;
@@ -169,7 +169,7 @@ fn calibrated_readings_are_equal_and_give_the_forces_of_the_stress() {
         let verified = verify(&scene, &readings, &simulators, &build_dir()).unwrap();
         let first: Vec<String> = verified.findings.kept.iter().take(3).map(ToString::to_string).collect();
         assert!(verified.findings.is_equal(), "{name}: {first:#?}");
-        // Rounding to codes of a scale up to a few times as coarse, through an inverse of condition 10².
+        // Rounding to codes with a scale up to a few times coarser, through an inverse of condition 10².
         for (row, frame) in verified.rows.iter().zip(&stress) {
             let (own, wanted) = (&row.fixed.resultant_N, &exact.reconstruct(frame).unwrap().resultant_N);
             assert!((own[2] - wanted[2]).abs() <= 1e-3 * wanted[2].abs().max(1e-3), "{name}: {own:?} {wanted:?}");

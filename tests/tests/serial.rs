@@ -1,5 +1,5 @@
-//! The serial engine: equal to the bit-true model in every stage, beat and cycle, in rust-hdl and under Verilator, and
-//! refused by field where it has not what a scene asks for.
+//! The serial engine: equal to the bit-true model in every stage, beat and cycle, in rust-hdl and under Verilator;
+//! scenes that it does not support are rejected by field.
 
 use std::process::Command;
 
@@ -72,7 +72,7 @@ fn degenerate_frames_are_equal() {
 #[test]
 fn other_arrays_degrees_widths_and_options_are_equal() {
     let scenes = [
-        // Quads that are no power of two; a rectangle.
+        // A number of quads that is no power of two; a rectangle.
         sensor(6, 10, ""),
         // Degree 1; neither input nor inverse has a low limb.
         sensor(
@@ -139,7 +139,7 @@ fn what_it_has_not_is_refused_by_field() {
         (sensor(8, 8, "[input]\naverage = 2\n"), ["input.average", "2"]),
         (sensor(8, 8, "[output]\nforces = \"resultants\"\n"), ["output.forces", "resultants"]),
         (sensor(8, 8, "[fixed]\nlanes = 8\n"), ["fixed.lanes", "8"]),
-        // 25 quads have more coefficients than there are block RAMs.
+        // The coefficients of 25 quads need more block RAMs than the board has.
         (on_board(Scene::builtin("sensor-1").unwrap()), ["block RAMs", BOARD]),
     ] {
         let error = refused(scene);

@@ -1,6 +1,6 @@
-//! The engine's streams under stress, on the Verilated engine: gaps and back-pressure, wrong `tlast`, resets. Nothing is
-//! lost, nothing invented, and the frame after whatever went wrong is right. Longer with `DERMIS_STRESS_CYCLES`
-//! (`make stress`).
+//! The engine's streams under stress, on the Verilated engine: gaps, back-pressure, wrong `tlast`, resets. Nothing is
+//! lost or invented, and the frame after any disturbance is correct. Longer with `DERMIS_STRESS_CYCLES` (`make
+//! stress`).
 
 use dermis_golden::fixed::Model;
 use dermis_golden::frame::Frame;
@@ -60,7 +60,7 @@ fn a_choice_of_cases_recovers() {
     let sensor = &eight.sensor;
     let lengths = [sensor.pitch_x_mm, sensor.pitch_y_mm, sensor.thickness_mm];
     let [x, y, h] = lengths;
-    // The same text as in choice.rs, hence the same library.
+    // The same text as in choice.rs, so that the library is shared.
     let text = format!(
         "name = \"choosing-eight-by-eight\"\n[sensor]\nrows = 8\ncols = 8\npitch_x_mm = {x}\npitch_y_mm = {y}\n\
          thickness_mm = {h}\n[partition]\ncase = \"adaptive\"\n"
@@ -80,14 +80,14 @@ fn unsearched() -> Scene {
     small(4, 4, "[search]\nmu_max = 0.0\n[output]\nforces = \"resultants\"\n")
 }
 
-/// Each experiment finds what it is there to find.
+/// Each experiment finds the defect it is designed for.
 #[test]
 fn a_defect_is_found() {
     let mut hardware = hardware(&unsearched());
     let good = hardware.generated.files[0].text.clone();
     let defects = [
-        // A frame is taken while the last one is not read yet; an early tlast does not start over; a reset leaves a
-        // frame in the buffer.
+        // Defects: a frame is accepted while the last one has not been read; an early tlast does not restart; a reset
+        // leaves a frame in the buffer.
         ("stalls", "s_axis_tready = ~whole$q & ~rst", "s_axis_tready = ~rst"),
         ("tlast", "scan$clear = rst | early", "scan$clear = rst"),
         ("reset", "(taken & scan$last)) & ~free & ~rst", "(taken & scan$last)) & ~free"),

@@ -1,4 +1,4 @@
-//! Yosys reads the generated Verilog as hardware: every signal driven, and driven once, and no latch.
+//! Yosys accepts the generated Verilog as hardware: every signal has exactly one driver, and there is no latch.
 
 use std::process::Command;
 

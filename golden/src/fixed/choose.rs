@@ -36,9 +36,9 @@ use crate::partition::Grid;
 use crate::scene::Condition;
 use crate::sensor::Sensor;
 
-/// The share of the frame's largest code that counts as a contact beside a boundary, as a right shift.
+/// Fraction of the frame's largest code from which stress beside a boundary counts as a contact, as a right shift.
 pub const CUT_SHIFT: u32 = 2;
-/// Taxel lines on each side of a boundary that are looked at.
+/// Number of rows or columns on each side of a boundary that are examined.
 pub const BOUNDARY_LINES: usize = 2;
 /// Clock cycles that the choice adds between a frame's last code and its first product: position and magnitude, maxima,
 /// comparison, choice.

@@ -188,7 +188,7 @@ pub fn derive(scene: &Scene, shapes: &[Shape], board: &Board) -> Result<Vec<Desi
     let flips = Flips { inverse: inverse.flips(), ax: ax.flips(), ay: ay.flips() };
 
     let sensor = &largest.matrices.sensor;
-    // One matrix serves both axes where all subarrays are square.
+    // Where all subarrays are square, one matrix is used for both axes.
     let square = sensor.rows == sensor.cols && sensor.pitch_x_mm == sensor.pitch_y_mm;
     let serial = board.engine == EngineKind::Serial;
     let shared_a = !serial && degree == 1 && square && shapes.len() == 1 && flips.are_symmetric();
@@ -238,7 +238,7 @@ pub fn derive(scene: &Scene, shapes: &[Shape], board: &Board) -> Result<Vec<Desi
         .collect();
     let shifted: Vec<u64> = (0..used).map(|k| reach(&coefficients, k)).collect();
     let taxels = (sensor.rows * sensor.cols) as u64;
-    // Without a search v_00 stays as it is unfolded.
+    // Without a search v_00 keeps its unfolded width.
     let search_bits: Vec<u32> = match degree {
         0 => vec![vector_bits + 2],
         _ => shifted.iter().map(|&bound| signed_bits(bound)).collect(),

@@ -163,6 +163,22 @@ pub struct Model {
 impl Model {
     /// Computes and quantises the scene's matrices and derives its formats.
     ///
+    /// ```
+    /// use dermis_golden::{fixed::{Cycles, Model}, frame::Frame, reconstruct::Golden, scene::Scene};
+    ///
+    /// let scene = Scene::builtin("eight-by-eight")?;
+    /// let frame = Frame::shipped(&scene).remove(0);
+    /// let model = Model::new(&scene)?;
+    /// let fixed = model.reconstruct(&frame)?.resultant_N;
+    /// let golden = Golden::new(&scene)?.run(&frame)?.resultant_N;
+    /// // The normal force differs from the golden model's by less than 0.1 %.
+    /// assert!((fixed[2] / golden[2] - 1.0).abs() < 1e-3);
+    /// // The same in words, one beat per taxel, and the duration of a frame with a search.
+    /// let trace = model.run(&model.readings(&[frame])?);
+    /// assert_eq!((trace.beats.len(), trace.cycles), (64, Cycles::longest(&model)));
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    ///
     /// # Errors
     /// The scene asks for something unavailable, its matrices or formats do not exist, or a threshold or noise floor
     /// lacks the full scale. [`FixedError::DoesNotFit`] lists the resources the board lacks and changes that make the

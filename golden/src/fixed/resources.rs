@@ -124,7 +124,7 @@ impl Resources {
         }
         memories.push(memory("pass$lanes", "memory", words, word_bits(f), true));
         if listed {
-            // The transposed address beside the straight one, where it is read.
+            // The transposed address as well, if it is read.
             let addresses = if f.shared_a { 2 } else { 1 };
             memories.push(memory("pass$steps", "columns", words, addresses * count_bits(quads), true));
         }

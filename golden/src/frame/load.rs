@@ -24,6 +24,20 @@ impl Frame {
 
     /// Reads a frame from the text of a `.json` or `.csv` file called `name`, as [`Frame::load`] does.
     ///
+    /// ```
+    /// use dermis_golden::{frame::Frame, scene::Scene, sensor::Sensor};
+    ///
+    /// let sensor = Sensor { rows: 2, cols: 2, pitch_x_mm: 4.0, pitch_y_mm: 4.0, thickness_mm: 3.0 };
+    /// let scene = Scene::of_sensor(&sensor, "small");
+    /// let csv = Frame::parse("a.csv", "0.01, 0.02\n-0.01, 0\n", Some(&scene))?;
+    /// assert_eq!(csv.stress_MPa, [0.01, 0.02, -0.01, 0.0]);
+    /// let json = Frame::parse("a.json", &csv.to_json(), None)?;
+    /// assert_eq!(json, csv);
+    /// let error = Frame::parse("b.csv", "0.01, x\n0, 0\n", Some(&scene)).unwrap_err();
+    /// assert_eq!(error.to_string(), "b.csv, line 1, value 2: \"x\" is not a finite number");
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    ///
     /// # Errors
     /// As [`Frame::load`], except those of the file system.
     pub fn parse(name: impl AsRef<Path>, text: &str, scene: Option<&Scene>) -> Result<Frame, FrameError> {

@@ -8,6 +8,17 @@ static FRAMES: Dir = include_dir!("$CARGO_MANIFEST_DIR/data/frames");
 
 impl Frame {
     /// The embedded frames of the scene's sensor and medium, sorted by id; all have a known resultant.
+    ///
+    /// ```
+    /// use dermis_golden::{frame::Frame, scene::Scene};
+    ///
+    /// for frame in Frame::shipped(&Scene::builtin("sensor-1")?) {
+    ///     // All contacts are inside the array: the forces on the cells add up to the resultant.
+    ///     let (resultant, cells) = (frame.resultant_N.unwrap(), frame.cell_forces_N.unwrap().resultant());
+    ///     assert!((0..3).all(|axis| (cells[axis] - resultant[axis]).abs() < 1e-6 * resultant[2]));
+    /// }
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     pub fn shipped(scene: &Scene) -> Vec<Frame> {
         let mut frames: Vec<Frame> = texts()
             .filter_map(|(file, text)| json::parse(text, &file, &file, None).ok())

@@ -43,7 +43,7 @@ fn a_dead_taxel_costs_little_and_its_reading_nothing() {
         results.push(result);
     }
     let errors = shears(results.into_iter());
-    // The whole array's median is 1.4 %.
+    // Without dead taxels the median is 1.4 %.
     assert!(errors[errors.len() / 2] <= 0.03, "{errors:?}");
 }
 

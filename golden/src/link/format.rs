@@ -1,35 +1,36 @@
-//! The packets as a page of documentation, `format.md`; a test keeps the committed page equal.
+//! The packet format as a page of documentation, `format.md`; a test checks that the committed page is up to date.
 
 use std::fmt::Write as _;
 
 use super::payload::{Beat, Counters, Field, Header, Identity, Sums};
 use super::{slip, Kind, CRC_BYTES, VERSION};
 
-/// What a packet's payload is made of.
+/// Contents of a packet's payload.
 pub(super) fn contents(kind: Kind) -> &'static str {
     match kind {
-        Kind::Identify | Kind::ReadCounters => "nothing",
+        Kind::Identify | Kind::ReadCounters => "none",
         Kind::FrameForResultants | Kind::FrameForForces => {
-            "one code per taxel, row-major: two's complement in the fewest bytes for `input_bits`"
+            "one code per taxel, row-major: two's complement in as many bytes as `input_bits` needs"
         }
         Kind::Identity => "identity",
         Kind::Counters => "counters",
-        Kind::Resultants => "sums, then one beat per status beat",
-        Kind::Forces => "one beat per taxel, row-major, then one beat per status beat",
+        Kind::Resultants => "sums, then the status beats",
+        Kind::Forces => "one beat per taxel, row-major, then the status beats",
     }
 }
 
-/// The page, in Markdown.
+/// The page in Markdown.
 pub fn markdown() -> String {
     let mut text = format!(
         "\
 # Packets, version {VERSION}
 
-All numbers are little-endian. On the wire a packet stands between two bytes 0x{end:02x} (SLIP, RFC 1055). A byte 0x{idle:02x}
-says nothing and is skipped wherever it comes: an SPI, which always moves bytes both ways, has it where there is nothing to
-send. In a packet {special}.
+All numbers are little-endian. Packets are framed by SLIP (RFC 1055): each stands between two END bytes, 0x{end:02x}, so a
+receiver resynchronises at the next END. A byte 0x{idle:02x}, IDLE, is skipped everywhere; an SPI, which always transfers bytes
+in both directions, sends it when there is nothing else to send. Inside a packet
+these bytes are escaped: {special}.
 
-The UART has 8 data bits, no parity, one stop bit. The SPI's slave is the board: mode 0, most significant bit first.
+The UART has 8 data bits, no parity, one stop bit. On the SPI the board is the slave: mode 0, most significant bit first.
 
 | byte | size | packet |
 |---:|---:|---|
@@ -48,11 +49,11 @@ The UART has 8 data bits, no parity, one stop bit. The SPI's slave is the board:
         text,
         "\
 | {at} | n | payload |
-| {at} + n | {CRC_BYTES} | CRC-32 of all before it: 0x04c11db7 reflected, start and final inversion 0xffffffff, as zlib |
+| {at} + n | {CRC_BYTES} | CRC-32 of all bytes before it: 0x04c11db7 reflected, initial value and final inversion 0xffffffff, as in zlib |
 
-The host asks, the board answers each request that it takes, frames in the order in which they came; an answer has its
-request's sequence number. A request that is damaged is dropped, counted and not answered. Up to three frames may be on
-their way at a time.
+The host sends requests; the board answers each request that it accepts, frames in the order of their arrival. An answer
+repeats the sequence number of its request. A damaged request is dropped and counted, but not answered. Up to three
+frames may be in flight at a time.
 
 | type | from | packet | payload |
 |---:|---|---|---|
@@ -72,12 +73,12 @@ their way at a time.
             at += field.bytes;
         }
     }
-    text + "\nThe board ignores the bits of a code above `input_bits`. The status beats are described with stage [`send`](crate::fixed::send).\n"
+    text + "\nThe board ignores the bits of a code above `input_bits`. Status beats are described in stage [`send`](crate::fixed::send).\n"
 }
 
-/// How a special byte stands in a packet.
+/// How a special byte is escaped in a packet.
 fn escaped((byte, after): (u8, u8)) -> String {
-    format!("0x{byte:02x} is 0x{:02x} 0x{after:02x}", slip::ESC)
+    format!("0x{byte:02x} as 0x{:02x} 0x{after:02x}", slip::ESC)
 }
 
 fn row(text: &mut String, at: usize, field: &Field) {

@@ -1,4 +1,4 @@
-//! Which scene a bitstream was made for.
+//! Identity of a board: the scene for which its bitstream was generated.
 
 use serde_json::json;
 use thiserror::Error;
@@ -11,16 +11,16 @@ use crate::fixed::send::STATUS_BEATS;
 use crate::fixed::Model;
 use crate::scene::{Condition, ForceOutput};
 
-/// The requests.
+/// All requests.
 const REQUESTS: [Kind; 4] = [Kind::Identify, Kind::ReadCounters, Kind::FrameForResultants, Kind::FrameForForces];
 
-/// Why a scene has no link.
+/// A scene or board cannot have a link.
 #[derive(Clone, Debug, PartialEq, Error)]
 pub enum LinkError {
-    /// A scene whose engine does not send one force per taxel, and as many status beats, for each frame.
+    /// The engine of the scene does not send one force per taxel and a fixed number of status beats for each frame.
     #[error(
-        "{field} = {value}: a board's link takes one frame for each answer, and one force per taxel and the status of \
-         always the same subarrays from the engine"
+        "{field} = {value}: a board's link does not support it; it needs one frame per answer, one force per taxel and the \
+         same subarrays in every frame"
     )]
     Unsupported {
         /// The scene's field.
@@ -28,33 +28,33 @@ pub enum LinkError {
         /// Its value.
         value: String,
     },
-    /// A payload longer than its length field can say.
+    /// A payload is longer than its length field allows.
     #[error("scene {scene}: {what} of {taxels} taxels take {bytes} bytes, a packet holds 65535")]
     TooLong {
         /// The scene's name.
         scene: String,
-        /// What the payload is.
+        /// The kind of payload.
         what: &'static str,
-        /// Taxels.
+        /// Number of taxels.
         taxels: usize,
-        /// Bytes.
+        /// Length of the payload in bytes.
         bytes: usize,
     },
-    /// A bit rate that the board's clock cannot follow.
+    /// The bit rate is too high for the board's clock.
     #[error("constraints/{board}.toml: {field} = {value}: the clock of {clock_MHz} MHz takes at most {most}")]
     TooFast {
         /// The board's name.
         board: String,
         /// Field of its file.
         field: &'static str,
-        /// Its bit rate, in the field's unit.
+        /// Its bit rate in the field's unit.
         value: f64,
-        /// Its clock.
+        /// The engine's clock.
         clock_MHz: f64,
-        /// The highest bit rate.
+        /// The highest bit rate in the field's unit.
         most: f64,
     },
-    /// An SPI on a board without pins for it.
+    /// The scene asks for SPI on a board without pins for it.
     #[error(
         "hardware.link = \"spi\": board {board} has no pins for it (no spi_MHz in constraints/{board}.toml); it has \"uart\""
     )]
@@ -68,8 +68,8 @@ impl Identity {
     /// The identity of the hardware of `model`.
     ///
     /// # Errors
-    /// A scene that averages, sends resultants only or chooses its case per frame, an array whose packets would be too
-    /// long, a link that the board does not have, a bit rate too high for the clock.
+    /// [`LinkError`]: the scene averages, sends resultants only or chooses its case per frame; a payload is too long;
+    /// the board lacks the link or its clock is too slow for the bit rate.
     pub fn of(model: &Model) -> Result<Identity, LinkError> {
         let (sensor, board) = (&model.scene.sensor, &model.board);
         let scene = &model.scene;
@@ -87,7 +87,7 @@ impl Identity {
         if let Some((what, bytes)) = payloads.into_iter().find(|(_, bytes)| *bytes > usize::from(u16::MAX)) {
             return Err(LinkError::TooLong { scene: model.scene.name.clone(), what, taxels: sensor.taxels(), bytes });
         }
-        // Rows, columns and subarrays are below the taxels, which are few enough for a packet.
+        // Rows, columns and subarrays are fewer than the taxels, whose codes fit a packet.
         Ok(Identity {
             version: VERSION,
             rows: sensor.rows as u16,
@@ -102,23 +102,24 @@ impl Identity {
         })
     }
 
-    /// Whether the board takes requests of this type.
+    /// Whether the board answers requests of this type.
     pub fn supports(&self, kind: Kind) -> bool {
         self.left_out & bit(kind) == 0
     }
 }
 
-/// Whether a board with this engine takes requests of this type: where logic cells are few, the host adds the forces up.
+/// Whether a board with this engine answers requests of this type. The serial engine has no resultants: logic cells are
+/// few, so the host adds up the forces.
 pub fn supports(engine: EngineKind, kind: Kind) -> bool {
     engine == EngineKind::Parallel || kind != Kind::FrameForResultants
 }
 
-/// The bit of a request in [`Identity::left_out`].
+/// Bit of a request in [`Identity::left_out`].
 fn bit(kind: Kind) -> u16 {
     1 << (kind as u8 - 1)
 }
 
-/// Bytes of a frame's codes, of its resultants and of its forces, each with a name.
+/// Length in bytes of a frame's codes, of its resultants and of its forces, each with a name.
 pub fn payloads(model: &Model) -> [(&'static str, usize); 3] {
     let taxels = model.scene.sensor.taxels();
     let status = model.status_beats() * BEAT_BYTES;
@@ -129,9 +130,9 @@ pub fn payloads(model: &Model) -> [(&'static str, usize); 3] {
     ]
 }
 
-/// CRC-32 over everything that decides the bits of the answers: this program's version, array, subarrays, formats,
-/// condition, noise floor and threshold in codes, zeros and gains of the taxels, the dead ones, and the quantised matrices
-/// with the columns kept. The names of scene and board, and the clock, are not in it.
+/// CRC-32 over everything that determines the bits of the answers: this program's version, array, subarrays, formats,
+/// condition, noise floor and threshold in codes, zeros and gains of the taxels, dead taxels, and the quantised
+/// matrices with the columns kept. The names of scene and board and the clock are not included.
 pub fn scene_hash(model: &Model) -> u32 {
     let sensor = &model.scene.sensor;
     let text = json!({

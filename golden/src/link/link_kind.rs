@@ -1,19 +1,19 @@
-//! What carries the packets' bytes between host and board.
+//! The physical link that carries the packets' bytes between host and board.
 
 use super::{LinkError, OVERHEAD};
 use crate::board::Board;
 
-/// Fewest clock cycles per bit of the UART: the receiver votes over three of them.
+/// Minimum clock cycles per bit of the UART: the receiver takes the majority of three samples.
 const MIN_CYCLES_PER_BIT: f64 = 8.0;
-/// Fewest clock cycles per byte of the SPI: the CRC takes four after the one in which a byte comes. The byte's register,
-/// which is read at the third clock edge at the latest, stands as long.
+/// Minimum clock cycles per byte of the SPI: the CRC takes four after the one in which a byte arrives. The byte's
+/// register is read at the third clock edge at the latest and is stable until then.
 const MIN_CYCLES_PER_BYTE: f64 = 5.0;
-/// Bits of a byte of the SPI.
+/// Bits per byte of the SPI.
 const SPI_BITS: f64 = 8.0;
-/// Bits of a byte of the UART, start and stop bit among them.
+/// Bits per byte of the UART, with start and stop bit.
 const UART_BITS: f64 = 10.0;
 
-/// The link of a board, `hardware.link` in a scene. A board has the pins of its link and of no other.
+/// The link of a board, `hardware.link` in a scene; the top module has the pins of this link only.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum LinkKind {
     /// A serial port.
@@ -32,7 +32,7 @@ impl LinkKind {
         Self::NAMES.iter().find(|(_, kind)| *kind == self).map_or("", |(name, _)| name)
     }
 
-    /// The board's input pins, as its top module names them.
+    /// The input pins, as the board's top module names them.
     pub fn inputs(self) -> &'static [&'static str] {
         match self {
             LinkKind::Uart => &["uart_rx"],
@@ -40,7 +40,7 @@ impl LinkKind {
         }
     }
 
-    /// The board's output pin.
+    /// The output pin, as the board's top module names it.
     pub fn output(self) -> &'static str {
         match self {
             LinkKind::Uart => "uart_tx",
@@ -48,7 +48,7 @@ impl LinkKind {
         }
     }
 
-    /// The input pin that is a clock of its own.
+    /// The input pin that is a clock; `None` for the UART.
     pub fn clock(self) -> Option<&'static str> {
         match self {
             LinkKind::Uart => None,
@@ -56,13 +56,13 @@ impl LinkKind {
         }
     }
 
-    /// Bit rate on `board`, bit/s: the UART's, or the highest of the SPI's clock.
+    /// Bit rate on `board` in bit/s: that of the UART, or the highest clock of the SPI.
     ///
     /// # Errors
-    /// [`LinkError::NoPins`], or [`LinkError::TooFast`] for the board's clock.
+    /// [`LinkError::NoPins`], or [`LinkError::TooFast`] if the board's clock is too slow.
     pub fn bit_rate(self, board: &Board) -> Result<u32, LinkError> {
         let clock_hz = board.clock_MHz * 1e6;
-        // Each value as the board's file has it, the most it may be, and Hz in a unit of both.
+        // The field, its value, the largest allowed value, and Hz per unit of both.
         let (field, value, most, unit) = match (self, board.spi_MHz) {
             (LinkKind::Uart, _) => ("uart_baud", f64::from(board.uart_baud), clock_hz / MIN_CYCLES_PER_BIT, 1.0),
             (LinkKind::Spi, Some(rate)) => ("spi_MHz", rate, board.clock_MHz * SPI_BITS / MIN_CYCLES_PER_BYTE, 1e6),
@@ -76,7 +76,7 @@ impl LinkKind {
         Ok((value * unit).round() as u32)
     }
 
-    /// Time of a packet of `payload` bytes at `bit_rate` bit/s, in ms; every byte that needs an escape adds another.
+    /// Duration in ms of a packet of `payload` bytes at `bit_rate` bit/s; each byte that must be escaped adds one more.
     pub fn wire_ms(self, payload: usize, bit_rate: u32) -> f64 {
         let bits = match self {
             LinkKind::Uart => UART_BITS,

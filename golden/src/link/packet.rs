@@ -1,4 +1,4 @@
-//! Packets, and how they are found in what comes over the wire.
+//! Packets, and a decoder that finds them in a stream of bytes.
 
 use thiserror::Error;
 
@@ -8,35 +8,35 @@ use super::{Header, Kind, CRC_BYTES, OVERHEAD};
 /// A packet.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Packet {
-    /// Its type.
+    /// Type of the packet.
     pub kind: Kind,
-    /// Its sequence number.
+    /// Sequence number: chosen by the host, repeated in the answer.
     pub sequence: u8,
-    /// What it carries, at most 65535 bytes.
+    /// Payload, at most 65535 bytes.
     pub payload: Vec<u8>,
 }
 
-/// Why bytes between two ENDs are no packet.
+/// The bytes between two ENDs are not a valid packet.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Error)]
 pub enum PacketError {
-    /// An escape before a byte that cannot follow it.
+    /// An escape byte is followed by a byte that is not allowed there.
     #[error("a broken escape sequence")]
     Framing,
-    /// Too short, too long, or damaged.
+    /// The bytes are too few, too many or damaged.
     #[error("the CRC of {bytes} bytes is wrong")]
     Crc {
-        /// How many came.
+        /// Number of bytes received.
         bytes: usize,
     },
-    /// A type that does not exist.
+    /// There is no such packet type.
     #[error("packet type 0x{0:02x} is unknown")]
     UnknownType(u8),
-    /// Its length is not what it says.
+    /// The length field does not match the number of bytes.
     #[error("a packet says {says} bytes of payload and has {has}")]
     Length {
-        /// In its header.
+        /// Length field of the header.
         says: usize,
-        /// Bytes of payload that came.
+        /// Bytes of payload received.
         has: usize,
     },
 }
@@ -47,7 +47,7 @@ impl Packet {
         Packet { kind, sequence, payload: Vec::new() }
     }
 
-    /// The packet as it goes over the wire.
+    /// The packet as bytes on the wire, with SLIP framing.
     pub fn to_wire(&self) -> Vec<u8> {
         let length = self.payload.len() as u16;
         let mut bytes = Header { kind: self.kind as u8, sequence: self.sequence, length }.to_bytes();
@@ -57,7 +57,7 @@ impl Packet {
         slip::encode(&bytes)
     }
 
-    /// Checks what came between two ENDs; the order of the checks is the board's.
+    /// Checks the bytes between two ENDs, in the same order as the board.
     fn of_bytes(bytes: &[u8]) -> Result<Packet, PacketError> {
         let crc = PacketError::Crc { bytes: bytes.len() };
         let (content, sum) = bytes.split_last_chunk::<CRC_BYTES>().ok_or(crc)?;
@@ -73,7 +73,21 @@ impl Packet {
     }
 }
 
-/// Finds packets in a stream of bytes.
+/// Finds packets in a stream of bytes; after an error it resynchronises at the next END.
+///
+/// ```
+/// use dermis_golden::link::{Decoder, Kind, Packet, PacketError};
+///
+/// let packet = Packet { kind: Kind::FrameForForces, sequence: 7, payload: vec![0xc0, 1, 0xdb] };
+/// let mut wire = packet.to_wire();
+/// let damaged = wire.len() - 2;
+/// let mut decoder = Decoder::default();
+/// let found: Vec<_> = wire.iter().filter_map(|byte| decoder.next(*byte)).collect();
+/// assert_eq!(found, [Ok(packet)]);
+/// wire[damaged] ^= 1;
+/// let found: Vec<_> = wire.iter().filter_map(|byte| decoder.next(*byte)).collect();
+/// assert!(matches!(found[..], [Err(PacketError::Crc { .. })]));
+/// ```
 #[derive(Clone, Debug, Default)]
 pub struct Decoder {
     unescape: Unescape,
@@ -82,7 +96,7 @@ pub struct Decoder {
 }
 
 impl Decoder {
-    /// The next byte from the wire; a packet or what is wrong with it when the byte ends one.
+    /// Takes the next byte from the wire; if it ends a packet, returns the packet or the error.
     pub fn next(&mut self, byte: u8) -> Option<Result<Packet, PacketError>> {
         match self.unescape.next(byte) {
             Symbol::None => None,
@@ -90,7 +104,7 @@ impl Decoder {
                 self.broken = true;
                 None
             }
-            // Beyond the longest packet only the count of bytes would be of use.
+            // Bytes beyond the longest packet are not stored.
             Symbol::Byte(byte) => {
                 if self.bytes.len() <= usize::from(u16::MAX) + OVERHEAD {
                     self.bytes.push(byte);
@@ -101,7 +115,7 @@ impl Decoder {
                 let bytes = std::mem::take(&mut self.bytes);
                 match (std::mem::take(&mut self.broken), bytes.is_empty()) {
                     (true, _) => Some(Err(PacketError::Framing)),
-                    // Between the END of one packet and that of the next there is nothing.
+                    // The END of one packet and that of the next have no bytes in between.
                     (false, true) => None,
                     (false, false) => Some(Packet::of_bytes(&bytes)),
                 }

@@ -1,21 +1,21 @@
-//! The payloads with fields, each defined once: structure, bytes, and the rows of the documentation and the C header.
+//! Payloads with fields. Each is defined once, as structure, bytes, and rows of the documentation and the C header.
 
 use serde::Serialize;
 
 /// A field of a payload.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Field {
-    /// Its name.
+    /// Name.
     pub name: &'static str,
-    /// Its Rust type: `u8`, `i32`, …
+    /// Rust type: `u8`, `i32`, …
     pub kind: &'static str,
-    /// Its size in bytes.
+    /// Size in bytes.
     pub bytes: usize,
-    /// What it means.
+    /// Meaning, in words.
     pub about: &'static str,
 }
 
-/// Defines a payload: its structure, its fields as data, and its little-endian bytes.
+/// Defines a payload: structure, fields as data, little-endian bytes.
 macro_rules! payload {
     ($(#[doc = $about:literal])* $name:ident { $($(#[doc = $doc:literal])* $field:ident: $kind:ident,)* }) => {
         $(#[doc = $about])*
@@ -25,7 +25,7 @@ macro_rules! payload {
         }
 
         impl $name {
-            /// The fields in order, without gaps.
+            /// The fields in order; there are no gaps between them.
             pub const FIELDS: &'static [Field] = &[$(Field {
                 name: stringify!($field),
                 kind: stringify!($kind),
@@ -35,14 +35,14 @@ macro_rules! payload {
             /// Size in bytes.
             pub const BYTES: usize = 0 $(+ size_of::<$kind>())*;
 
-            /// The bytes, little-endian.
+            /// The payload as little-endian bytes.
             pub fn to_bytes(&self) -> Vec<u8> {
                 let mut bytes = Vec::with_capacity(Self::BYTES);
                 $(bytes.extend(self.$field.to_le_bytes());)*
                 bytes
             }
 
-            /// Reads the bytes back; `None` when their number is wrong.
+            /// Reads the payload from its bytes; `None` if their number is wrong.
             pub fn of_bytes(bytes: &[u8]) -> Option<Self> {
                 let rest = bytes;
                 $(let ($field, rest) = rest.split_first_chunk()?;)*
@@ -55,85 +55,85 @@ macro_rules! payload {
 payload! {
     /// The first bytes of every packet.
     Header {
-        /// Type.
+        /// Packet type.
         kind: u8,
         /// Sequence number: chosen by the host, repeated in the answer.
         sequence: u8,
-        /// Bytes of payload.
+        /// Length of the payload in bytes.
         length: u16,
     }
 }
 
 payload! {
-    /// Who a board is.
+    /// What a board is and which scene it implements.
     Identity {
-        /// Version of the packets' meaning.
+        /// Version of the packet format.
         version: u16,
         /// Rows of the array.
         rows: u16,
         /// Columns of the array.
         cols: u16,
-        /// Bits of a code.
+        /// Width of a code in bits.
         input_bits: u8,
         /// Status beats per subarray.
         status_beats: u8,
-        /// CRC-32 of everything in the scene that decides the answers' bits.
+        /// CRC-32 of everything in the scene that determines the bits of the answers.
         scene: u32,
-        /// The engine's clock, Hz.
+        /// Clock of the engine, Hz.
         clock_hz: u32,
-        /// Bit rate of the link, bit/s: the UART's, or the highest of the SPI's clock.
+        /// Bit rate of the link, bit/s: that of the UART, or the highest clock of the SPI.
         bit_rate: u32,
-        /// Subarrays.
+        /// Number of subarrays.
         subarrays: u16,
-        /// Requests that the board leaves out and counts as of unknown type: bit k − 1 for type k.
+        /// Requests that the board does not support and counts as of unknown type: bit k − 1 for type k.
         left_out: u16,
     }
 }
 
 payload! {
-    /// Packets that the board took and dropped since reset, modulo 65536; each dropped packet is counted once.
+    /// Packets that the board accepted and dropped since reset, modulo 65536; each dropped packet is counted once.
     Counters {
-        /// Taken.
+        /// Accepted packets.
         taken: u16,
-        /// Dropped: a byte without stop bit on a UART, or a SLIP escape before any other byte than the two allowed.
+        /// Dropped: a UART byte without stop bit, or a SLIP escape followed by a byte that is not allowed there.
         framing: u16,
-        /// Dropped: the CRC is wrong, or there is none.
+        /// Dropped: the CRC is wrong or missing.
         crc: u16,
-        /// Dropped: of a type that the board does not know.
+        /// Dropped: the board does not know the type.
         unknown_type: u16,
-        /// Dropped: of another length than it says, or than its type has.
+        /// Dropped: the length does not match the length field or the type.
         length: u16,
-        /// Dropped: came while earlier requests were not answered yet.
+        /// Dropped: earlier requests had not been answered yet.
         overrun: u16,
     }
 }
 
 payload! {
-    /// Sums over all taxels, in LSBs of a force word; exact.
+    /// Resultants: exact sums over all taxels.
     Sums {
-        /// Σ fx.
+        /// Σ fx in LSBs of a force word.
         fx: i64,
-        /// Σ fy.
+        /// Σ fy in LSBs of a force word.
         fy: i64,
-        /// Σ fz.
+        /// Σ fz in LSBs of a force word.
         fz: i64,
-        /// Σ column · fz.
+        /// Σ column · fz in LSBs of a force word.
         moment_x: i64,
-        /// Σ row · fz.
+        /// Σ row · fz in LSBs of a force word.
         moment_y: i64,
-        /// Taxels with fz ≠ 0.
+        /// Number of taxels with fz ≠ 0.
         loaded: u64,
     }
 }
 
 payload! {
-    /// Three words, an output beat of the engine.
+    /// One output beat of the engine, three words.
     Beat {
-        /// Along x, or a status word.
+        /// Force along x in LSBs, or a status word.
         fx: i32,
-        /// Along y, or a status word.
+        /// Force along y in LSBs, or a status word.
         fy: i32,
-        /// Normal, or a status word.
+        /// Normal force in LSBs, or a status word.
         fz: i32,
     }
 }

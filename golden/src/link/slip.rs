@@ -1,33 +1,33 @@
-//! SLIP, RFC 1055: packets between END bytes, so that whoever has lost the thread finds the next packet at once; with
-//! one more special byte, [`IDLE`], for wires that must carry something when there is nothing to say.
+//! SLIP framing, RFC 1055: packets stand between END bytes, so a receiver resynchronises at the next END. One more
+//! special byte, [`IDLE`], fills links that must transfer bytes when there is nothing to send.
 
-/// Between packets.
+/// Start and end of a packet.
 pub const END: u8 = 0xc0;
-/// Before a byte that stands for another.
+/// Escape: the next byte represents a special byte of the packet.
 pub const ESC: u8 = 0xdb;
-/// Nothing: skipped wherever it comes, inside a packet, too.
+/// Idle: skipped everywhere, also inside a packet.
 pub const IDLE: u8 = 0xde;
-/// After [`ESC`]: a byte [`END`] of the packet.
+/// After [`ESC`]: represents a byte [`END`] of the packet.
 pub const ESC_END: u8 = 0xdc;
-/// After [`ESC`]: a byte [`ESC`] of the packet.
+/// After [`ESC`]: represents a byte [`ESC`] of the packet.
 pub const ESC_ESC: u8 = 0xdd;
-/// After [`ESC`]: a byte [`IDLE`] of the packet.
+/// After [`ESC`]: represents a byte [`IDLE`] of the packet.
 pub const ESC_IDLE: u8 = 0xdf;
 
-/// The bytes that no packet has on the wire as they are, each with the one that stands for it after [`ESC`].
+/// The bytes that must be escaped in a packet, each with the one that represents it after [`ESC`].
 pub const SPECIAL: [(u8, u8); 3] = [(END, ESC_END), (ESC, ESC_ESC), (IDLE, ESC_IDLE)];
 
-/// What stands for a byte of a packet after [`ESC`], if it needs that.
+/// The byte that represents `byte` after [`ESC`]; `None` if it needs no escape.
 pub fn escape(byte: u8) -> Option<u8> {
     SPECIAL.into_iter().find(|(special, _)| *special == byte).map(|(_, after)| after)
 }
 
-/// The byte of a packet that this one stands for after [`ESC`].
+/// The byte of a packet that `after` represents after [`ESC`]; `None` if there is none.
 pub fn unescape(after: u8) -> Option<u8> {
     SPECIAL.into_iter().find(|(_, stands)| *stands == after).map(|(special, _)| special)
 }
 
-/// A packet on the wire, an END before and after it.
+/// The bytes of a packet on the wire: escaped, with an END before and after.
 pub fn encode(packet: &[u8]) -> Vec<u8> {
     let mut wire = vec![END];
     for &byte in packet {
@@ -40,28 +40,28 @@ pub fn encode(packet: &[u8]) -> Vec<u8> {
     wire
 }
 
-/// What a byte from the wire gives.
+/// Meaning of a byte from the wire.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Symbol {
     /// A byte of the packet.
     Byte(u8),
-    /// The packet is over.
+    /// End of the packet.
     End,
-    /// An escape before a byte that cannot follow it.
+    /// A byte that is not allowed after an escape.
     Broken,
-    /// Nothing yet.
+    /// No byte of the packet: an idle or escape byte.
     None,
 }
 
-/// Takes bytes from the wire.
+/// Removes SLIP escapes and idle bytes from a stream.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Unescape {
     escaped: bool,
 }
 
 impl Unescape {
-    /// The next byte from the wire. An END always ends the packet, so that a broken escape spoils one packet only; an
-    /// escape right before it is lost, which the CRC shows.
+    /// Takes the next byte from the wire. An END always ends the packet, so a broken escape affects one packet only; an
+    /// escape right before an END is lost, which the CRC detects.
     pub fn next(&mut self, byte: u8) -> Symbol {
         if byte == IDLE {
             return Symbol::None;

@@ -1,9 +1,9 @@
-//! Resultants as the board computes them: integers, exact.
+//! Resultants as the board computes them: exact integers.
 
 use super::Sums;
 
 impl Sums {
-    /// Sums of force words `[fx, fy, fz]`, row-major over an array of `cols` columns.
+    /// Sums of the force words `[fx, fy, fz]`, row-major over an array of `cols` columns.
     pub fn of(beats: &[[i32; 3]], cols: usize) -> Sums {
         let mut sums = Sums::default();
         for (index, beat) in beats.iter().enumerate() {
@@ -18,7 +18,7 @@ impl Sums {
         sums
     }
 
-    /// Centre of pressure as `[column, row]`, fractions of a taxel; `None` where fz adds up to nothing.
+    /// Centre of pressure as `[column, row]`, with fractions of a taxel; `None` if Σ fz is zero.
     pub fn centre(&self) -> Option<[f64; 2]> {
         (self.fz != 0).then(|| [self.moment_x, self.moment_y].map(|moment| moment as f64 / self.fz as f64))
     }

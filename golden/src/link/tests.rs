@@ -2,7 +2,7 @@ use super::*;
 use crate::scene::Scene;
 use proptest::prelude::*;
 
-/// All that a decoder makes of `wire`.
+/// Everything that a decoder finds in `wire`.
 fn decode(wire: &[u8]) -> Vec<Result<Packet, PacketError>> {
     let mut decoder = Decoder::default();
     wire.iter().filter_map(|&byte| decoder.next(byte)).collect()
@@ -39,7 +39,7 @@ proptest! {
     ) {
         let packet = Packet { kind: Kind::Forces, sequence: 7, payload };
         let mut wire = packet.to_wire();
-        // The ENDs around it are flipped elsewhere: without the first the packet is whole.
+        // Flipped ENDs are another matter: without the first one the packet is still complete.
         let at = 1 + at.index(wire.len() - 2);
         wire[at] ^= 1 << bit;
         prop_assert!(decode(&wire).iter().all(|found| found.is_err()));
@@ -101,7 +101,7 @@ fn the_hash_tells_scenes_apart_and_clocks_not() {
         model(&|scene| scene.input.dead = vec![[3, 4]]),
     ];
     assert!(others.iter().all(|other| scene_hash(other) != scene_hash(&plain)));
-    // Which codes are blanked counts, even where the matrices were the same.
+    // The dead taxels are part of the hash even if the matrices are the same.
     let mut blanked = plain.clone();
     blanked.dead = vec![9];
     assert_ne!(scene_hash(&blanked), scene_hash(&plain));

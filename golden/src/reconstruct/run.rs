@@ -17,6 +17,21 @@ use crate::scene::{ForceOutput, Scene};
 impl Golden {
     /// Reconstructs one frame; its values are readings if the scene has a calibration or tare file, else stress in MPa.
     ///
+    /// ```
+    /// use dermis_golden::{frame::Frame, reconstruct::Golden, scene::Scene};
+    ///
+    /// let scene = Scene::builtin("sensor-1")?;
+    /// let golden = Golden::new(&scene)?;
+    /// let frame = Frame::shipped(&scene).into_iter().find(|frame| frame.id == "S1-hs-hertz").ok_or("no frame")?;
+    /// let result = golden.run(&frame)?;
+    /// let error = result.error.ok_or("no known forces")?;
+    /// assert!(error.tangential.unwrap() < 0.03 && error.normal.unwrap() < 0.01);
+    /// // Shear is proportional to pressure, by the μ that the search found.
+    /// let mu = result.subarrays[0].mu;
+    /// assert!((0..100).all(|k| result.forces_N.fx[k] == mu[0] * result.forces_N.fz[k]));
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    ///
     /// # Errors
     /// [`GoldenError::Frame`] if the frame is not of the scene's sensor, [`GoldenError::TooStrong`] if a force is not
     /// finite.
@@ -68,6 +83,21 @@ impl Golden {
 
     /// Averages 2^k frames, k the scene's `input.average`, and reconstructs their mean; known forces are those of the
     /// first.
+    ///
+    /// ```
+    /// use dermis_golden::{frame::Frame, generator::converter::Converter, reconstruct::Golden, scene::Scene};
+    ///
+    /// let mut scene = Scene::builtin("sensor-1")?;
+    /// scene.input.average = 4;
+    /// let frame = Frame::shipped(&scene).remove(1);
+    /// let noisy = |seed| Converter { noise: 0.01, seed, ..Default::default() }.convert(&frame).unwrap();
+    /// let frames: Vec<Frame> = (0..16).map(noisy).collect();
+    /// let golden = Golden::new(&scene)?;
+    /// let normal = golden.run_averaged(&frames)?.error.and_then(|error| error.normal);
+    /// assert!(normal.ok_or("no known forces")? < 0.03);
+    /// assert!(golden.run_averaged(&frames[1..]).is_err());
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     ///
     /// # Errors
     /// As [`Golden::run`]; [`GoldenError::Input`] unless there are 2^k frames.

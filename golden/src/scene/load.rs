@@ -23,6 +23,16 @@ impl Scene {
 
     /// The built-in scene called `name`; see [`Scene::builtin_names`].
     ///
+    /// ```
+    /// use dermis_golden::scene::Scene;
+    ///
+    /// let scene = Scene::builtin("sensor-1")?;
+    /// assert_eq!((scene.sensor.rows, scene.sensor.cols, scene.search.mu_max), (10, 10, 0.6));
+    /// let error = Scene::builtin("sensor1").unwrap_err().to_string();
+    /// assert!(error.ends_with("did you mean \"sensor-1\"?"));
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    ///
     /// # Errors
     /// [`SceneError::NotFound`], which suggests the most similar name.
     pub fn builtin(name: &str) -> Result<Scene, SceneError> {

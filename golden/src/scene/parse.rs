@@ -40,6 +40,17 @@ impl Scene {
     /// Reads a scene from TOML text. `origin` names the file in errors; its stem is the scene's name if the text has
     /// none, and its folder the place of calibration and tare files.
     ///
+    /// ```
+    /// use dermis_golden::scene::Scene;
+    ///
+    /// let sensor = "[sensor]\nrows = 8\ncols = 8\npitch_x_mm = 4\npitch_y_mm = 4\nthickness_mm = 3\n";
+    /// let scene = Scene::parse(sensor, "mine.toml")?;
+    /// assert_eq!((scene.name.as_str(), scene.fixed.input_bits), ("mine", 20));
+    /// let error = Scene::parse(&format!("{sensor}[search]\nmu_max = 9"), "mine.toml").unwrap_err();
+    /// assert!(error.to_string().starts_with("mine.toml: search.mu_max = 9 is not allowed"));
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    ///
     /// # Errors
     /// Any [`SceneError`] except those of finding and reading a file.
     pub fn parse(text: &str, origin: &str) -> Result<Scene, SceneError> {

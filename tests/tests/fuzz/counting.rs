@@ -1,25 +1,25 @@
-//! An allocator that counts, so that no input can fill the memory unseen. Each thread has its own count.
+//! A counting allocator, to detect input that allocates too much memory. Each thread has its own count.
 
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;
 
-/// Counts what is allocated.
+/// Allocator that counts allocated bytes.
 pub struct Counting;
 
 thread_local! {
-    /// Bytes of this thread: now, and the most since [`mark`].
+    /// Bytes of this thread: allocated now, and the maximum since [`mark`].
     static BYTES: Cell<[isize; 2]> = const { Cell::new([0, 0]) };
 }
 
 fn count(bytes: isize) {
-    // A thread that ends frees its last things without its counts.
+    // At the end of a thread memory is freed after its counts are gone.
     let _ = BYTES.try_with(|count| {
         let [now, most] = count.get();
         count.set([now + bytes, most.max(now + bytes)]);
     });
 }
 
-/// Bytes allocated now; counting for [`most_since`] begins.
+/// Bytes allocated now; starts the measurement of [`most_since`].
 pub fn mark() -> isize {
     BYTES.with(|count| {
         let [now, _] = count.get();
@@ -28,12 +28,12 @@ pub fn mark() -> isize {
     })
 }
 
-/// The most bytes since a mark.
+/// Maximum number of bytes allocated since [`mark`].
 pub fn most_since(mark: isize) -> usize {
     BYTES.with(|count| (count.get()[1] - mark).max(0) as usize)
 }
 
-// Every call is passed on as it is.
+// All calls are forwarded unchanged.
 unsafe impl GlobalAlloc for Counting {
     unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
         count(layout.size() as isize);

@@ -1,8 +1,8 @@
-//! What is drawn: changed seeds for readers, scenes and stress for the whole way.
+//! Random input: mutated seeds for readers; scenes and stress for the whole path.
 
 use fastrand::Rng;
 
-/// Words that readers treat specially.
+/// Words with a special meaning for the readers.
 const WORDS: [&str; 28] = [
     "nan",
     "NaN",
@@ -34,7 +34,7 @@ const WORDS: [&str; 28] = [
     "\n",
 ];
 
-/// A seed with a few changes: bits, bytes, words, pieces taken out, doubled, or taken from another seed.
+/// A seed with a few mutations: bits, bytes, words, parts removed, repeated or taken from another seed.
 pub fn mutated(random: &mut Rng, seeds: &[Vec<u8>]) -> Vec<u8> {
     let mut bytes = seeds[random.usize(..seeds.len())].clone();
     for _ in 0..random.usize(1..6) {
@@ -64,7 +64,7 @@ pub fn mutated(random: &mut Rng, seeds: &[Vec<u8>]) -> Vec<u8> {
     bytes
 }
 
-/// A scene's text with drawn choices, not all of which go together.
+/// The text of a random scene; not all of its values can be combined.
 pub fn drawn_scene(random: &mut Rng) -> String {
     fn pick<'a>(random: &mut Rng, of: &[&'a str]) -> &'a str {
         of[random.usize(..of.len())]
@@ -128,7 +128,7 @@ pub fn drawn_scene(random: &mut Rng) -> String {
     text
 }
 
-/// Stress of the kinds that a converter, a fault or a wrong unit may give.
+/// Random stress as from a converter, a fault or a wrong unit.
 pub fn drawn_stress(random: &mut Rng, taxels: usize) -> Vec<f64> {
     let size = 10f64.powi(*random.choice(&[-300, -30, -9, -3, -1, 0, 3, 9, 150, 307]).unwrap_or(&0));
     let kind = random.u8(..7);

@@ -1,19 +1,19 @@
-//! Fuzzing: every reader of files and packets, and the whole way from a scene's text to forces, on mutated and random
+//! Fuzzing: every reader of files and packets, and the whole path from a scene's text to forces, on mutated and random
 //! input.
 //!
 //! | part | input | must hold |
 //! |---|---|---|
-//! | scene, frame, calibration, manifest | seeds of `corpus/`, bytes and words changed | error or value, no panic |
-//! | frame.json | the same | what is read is written and read again as the same |
-//! | packets | the same | a packet found is found again when it is sent |
-//! | whole | drawn scenes, drawn and broken frames | error or finite forces, in floating point and in integers |
+//! | scene, frame, calibration, manifest | seeds of `corpus/`, mutated bytes and words | error or value, no panic |
+//! | frame.json | the same | a frame that is read, written and read again is the same |
+//! | packets | the same | a packet that is found is found again after encoding |
+//! | whole | random scenes, random and invalid frames | error or finite forces, in floating and fixed point |
 //!
-//! Besides: no input takes longer than [`LONGEST`], and reading allocates no more than [`BYTES_PER_BYTE`] for each byte
-//! of text and [`BYTES`]. Inputs are drawn from a seed and repeat; failing ones are counted and printed, to be added to
-//! `corpus/`, all of which is read first.
+//! No input takes longer than [`LONGEST`], and reading allocates at most [`BYTES_PER_BYTE`] per byte of text plus
+//! [`BYTES`]. Inputs depend on a seed only and are reproducible; failing ones are counted and printed, to be added to
+//! `corpus/`, which is read first.
 //!
-//! `make fuzz` runs 10⁷ inputs over the readers and 10⁵ over the whole way, and keeps the counts in `build/tried` for
-//! the report; without its variables a short part of both.
+//! `make fuzz` runs 10⁷ inputs on the readers and 10⁵ on the whole path, and stores the counts in `build/tried` for the
+//! report; without its variables both parts are short.
 
 use std::time::{Duration, Instant};
 
@@ -31,11 +31,11 @@ use draw::mutated;
 use readers::{corpus, TARGETS};
 use run::{conclude, on_all_processors, Outcome};
 
-/// Longest time for one input of a reader.
+/// Time limit for one input of a reader.
 const LONGEST: Duration = Duration::from_secs(2);
-/// Most bytes that reading may take, besides those for each byte of text.
+/// Limit of bytes allocated, besides those per byte of text.
 const BYTES: usize = 8 << 20;
-/// Most bytes for each byte of text: a parsed value for every character.
+/// Limit of bytes allocated per byte of text: a parsed value for every character.
 const BYTES_PER_BYTE: usize = 400;
 
 #[global_allocator]
@@ -47,13 +47,13 @@ fn readers_take_anything() {
     let inputs = wanted("DERMIS_FUZZ_INPUTS", SHORT as u64) as usize;
     let done = on_all_processors(TARGETS.len(), |number| reader(number, inputs.div_ceil(TARGETS.len())));
     for (name, outcome) in &done {
-        // The draw reaches both sides of the reader.
+        // Some inputs are accepted and some rejected.
         assert!(outcome.counted("accepted") > 0 && outcome.counted("refused") > 0, "{name}: {:?}", outcome.counts);
     }
     conclude("fuzz-readers", "inputs", inputs > SHORT, done);
 }
 
-/// The seeds of a reader and as many changed ones as asked for.
+/// Runs the seeds of a reader and the requested number of mutated ones.
 fn reader(number: usize, changed: usize) -> (&'static str, Outcome) {
     let (name, target) = TARGETS[number];
     let (seeds, start) = (corpus(name), Instant::now());
@@ -82,7 +82,7 @@ fn the_whole_way_takes_anything() {
         .into_iter()
         .for_each(|o| all.add(o));
     all.elapsed = start.elapsed();
-    // The draw is worth something: a good share of it goes all the way.
+    // A good part of the inputs reaches the end of the path.
     let (golden, fixed) = (all.counted("golden result"), all.counted("fixed result"));
     assert!(3 * golden > all.tried && 10 * fixed > all.tried, "{golden} {fixed} of {}", all.tried);
     conclude("fuzz-whole", "frames", runs > SHORT, vec![("scene to forces", all)]);

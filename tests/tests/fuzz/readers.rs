@@ -9,7 +9,7 @@ use dermis_golden::scene::Scene;
 use dermis_golden::sensor::Sensor;
 use dermis_hdl::manifest;
 
-/// The folder of a reader's seeds, and the reader: whether it took the bytes.
+/// The folder of a reader's seeds, and the reader, which returns whether it accepted the bytes.
 type Target = (&'static str, fn(&[u8]) -> bool);
 /// All readers.
 pub const TARGETS: [Target; 6] = [

@@ -1,4 +1,4 @@
-//! Running inputs: on all processors, each one survived or written down, with counts for the report.
+//! Runs inputs on all processors and records failures and counts for the report.
 
 use std::fmt::Write;
 use std::panic::{catch_unwind, AssertUnwindSafe};
@@ -12,28 +12,28 @@ use dermis_tests::build_dir;
 
 use super::counting::{mark, most_since};
 
-/// Failing inputs that are printed in full.
+/// Number of failing inputs that are printed in full.
 const PRINTED: usize = 20;
 
-/// What became of some inputs.
+/// Statistics of a set of inputs.
 #[derive(Default)]
 pub struct Outcome {
-    /// How many there were.
+    /// Number of inputs.
     pub tried: usize,
-    /// How many of them had an outcome of a name.
+    /// Number of inputs per outcome, by name.
     pub counts: Vec<(&'static str, usize)>,
-    /// What failed, with its input.
+    /// Failures with their inputs.
     pub failures: Vec<String>,
-    /// The most bytes that one took.
+    /// Largest number of bytes allocated for one input.
     pub most_bytes: usize,
-    /// The longest time that one took.
+    /// Longest time for one input.
     pub slowest: Duration,
-    /// Time of all.
+    /// Total time.
     pub elapsed: Duration,
 }
 
 impl Outcome {
-    /// Runs one input. A panic or a long time is a failure; else the value is given back with the bytes it took.
+    /// Runs one input. A panic or a timeout is a failure; otherwise the value is returned with the bytes allocated.
     pub fn survive<T>(
         &mut self,
         what: &str,
@@ -57,7 +57,7 @@ impl Outcome {
         }
     }
 
-    /// Another of a name.
+    /// Counts an outcome.
     pub fn count(&mut self, name: &'static str, more: usize) {
         match self.counts.iter_mut().find(|(own, _)| *own == name) {
             Some((_, count)) => *count += more,
@@ -65,12 +65,12 @@ impl Outcome {
         }
     }
 
-    /// How many of a name.
+    /// Number of inputs with an outcome.
     pub fn counted(&self, name: &str) -> usize {
         self.counts.iter().find(|(own, _)| *own == name).map_or(0, |(_, count)| *count)
     }
 
-    /// Both together; time is the sum.
+    /// The sum of both; times are added.
     pub fn add(&mut self, other: Outcome) {
         other.counts.iter().for_each(|(name, count)| self.count(name, *count));
         self.failures.extend(other.failures);
@@ -81,13 +81,13 @@ impl Outcome {
     }
 }
 
-/// Does tasks 0 … `count` − 1 on all processors; results in their order.
+/// Runs tasks 0 … `count` − 1 on all processors; the results are in their order.
 pub fn on_all_processors<R: Send>(count: usize, work: impl Fn(usize) -> R + Sync) -> Vec<R> {
     let jobs = available_parallelism().map_or(1, usize::from);
     parallel("inputs", (0..count).collect(), jobs, &Interrupt::default(), |task| Ok(work(task))).unwrap()
 }
 
-/// Prints a line per target, keeps the counts of a long run for the report, and fails where anything failed.
+/// Prints a line per target, stores the counts of a long run for the report, and fails if anything failed.
 pub fn conclude(name: &str, unit: &str, long: bool, outcomes: Vec<(&str, Outcome)>) {
     let mut run = Tried::new("make fuzz");
     let mut failures = String::new();

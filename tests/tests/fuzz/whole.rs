@@ -1,4 +1,4 @@
-//! The whole way: a drawn scene with its drawn frames through both models.
+//! The whole path: a random scene and its random frames through both models.
 
 use std::time::{Duration, Instant};
 
@@ -11,15 +11,15 @@ use fastrand::Rng;
 use super::draw::{drawn_scene, drawn_stress};
 use super::run::Outcome;
 
-/// Frames of one scene, which share its matrices.
+/// Number of frames of one scene, which share its matrices.
 pub const FRAMES: usize = 10;
-/// Longest time for a scene's matrices, and for one frame.
+/// Time limits for the matrices of a scene and for one frame.
 const LONGEST: Duration = Duration::from_secs(20);
 
-/// A scene of the floating-point and the bit-true model, each where it takes it.
+/// The floating-point and the bit-true model of a scene, each if it accepts the scene.
 type Engines = (Scene, Option<Golden>, Option<Model>);
 
-/// The scene drawn from a seed, and its frames.
+/// The random scene of a seed, and its frames.
 pub fn drawn(seed: u64) -> Outcome {
     let (mut random, start) = (Rng::with_seed(seed), Instant::now());
     let mut outcome = Outcome { tried: FRAMES, ..Outcome::default() };
@@ -45,7 +45,7 @@ pub fn drawn(seed: u64) -> Outcome {
     outcome
 }
 
-/// Both models; refusals say why.
+/// Builds both models; errors must have a message.
 fn engines(text: &str) -> Option<Engines> {
     let scene = Scene::parse(text, "fuzz.toml").ok()?;
     let (golden, model) = (Golden::new(&scene), Model::new(&scene));
@@ -56,7 +56,7 @@ fn engines(text: &str) -> Option<Engines> {
     Some((scene, golden.ok(), model.ok()))
 }
 
-/// Which models give forces of a stress; what they give is finite.
+/// The models that return forces for a stress; all forces must be finite.
 fn both((scene, golden, model): &Engines, stress: &[f64]) -> [bool; 2] {
     let Ok(frame) = Frame::from_stress("drawn", &scene.sensor, stress.to_vec()) else { return [false; 2] };
     let golden = golden.as_ref().and_then(|golden| golden.run(&frame).ok());

@@ -1,6 +1,6 @@
-//! The board's link: whatever comes over the UART, or over the SPI (`spi`), the board top answers alike under Verilator and in
-//! rust-hdl's simulation, pin by pin and half cycle by half cycle; its answers are those of the bit-true model; and its
-//! counters name every packet that it dropped.
+//! The board's link over UART or SPI (`spi`): for any input the board's top module behaves the same under Verilator and
+//! in rust-hdl's simulation, pin by pin and half cycle by half cycle; its answers are those of the bit-true model; and
+//! its counters record every packet dropped.
 
 use std::ops::Deref;
 
@@ -18,15 +18,15 @@ use dermis_tests::{build_dir, scene};
 
 mod spi;
 
-/// Clock cycles per bit, the fewest that the link takes: everything else of it runs as fast as ever.
+/// Clock cycles per bit, the minimum of the link; the rest of the design runs at full speed.
 const CYCLES_PER_BIT: u32 = 8;
 /// That bit rate at 100 MHz.
 const BAUD: u32 = 100_000_000 / CYCLES_PER_BIT;
 
-/// Changes of pins after which a board is out of reset: before, Verilator's registers hold anything.
+/// Changes of pins until a board is out of reset; before, Verilator's registers are undefined.
 const RESET: u64 = 40;
 
-/// Two simulators in step.
+/// Two simulators in lockstep.
 struct Both([Box<dyn BoardDevice>; 2], u64);
 
 impl BoardDevice for Both {
@@ -38,7 +38,7 @@ impl BoardDevice for Both {
     }
 }
 
-/// The board of `model` on one simulator or on two in step.
+/// The board of `model` on one simulator, or on two in lockstep.
 fn device(model: &Model, simulators: &[Simulator]) -> Box<dyn BoardDevice> {
     let hardware = Hardware::new(model.clone(), &build_dir()).unwrap();
     let mut devices: Vec<_> = simulators.iter().map(|simulator| hardware.board(*simulator).unwrap()).collect();
@@ -48,7 +48,7 @@ fn device(model: &Model, simulators: &[Simulator]) -> Box<dyn BoardDevice> {
     }
 }
 
-/// Frames for a board, and what it must answer.
+/// Frames for a board, and the expected answers.
 struct Questions {
     model: Model,
     codes: Vec<Vec<i32>>,
@@ -79,7 +79,7 @@ struct Board {
     line: UartLine,
     decoder: Decoder,
     questions: Questions,
-    /// Longer than a frame takes, in cycles.
+    /// A number of cycles longer than a frame takes.
     silence: u64,
 }
 
@@ -110,7 +110,7 @@ impl Board {
         wire.iter().for_each(|&byte| self.line.send(Sent::Byte(byte)));
     }
 
-    /// All packets that come until nothing has come for longer than a frame takes.
+    /// All packets received until there is none for longer than a frame takes.
     fn receive(&mut self) -> Vec<Packet> {
         while self.line.quiet() < self.silence {
             self.line.cycle();
@@ -120,7 +120,7 @@ impl Board {
         packets.collect::<Result<_, _>>().unwrap()
     }
 
-    /// The counters, this reading among them.
+    /// The counters, this request included.
     fn counters(&mut self) -> Counters {
         self.send(&Packet::request(Kind::ReadCounters, 9).to_wire());
         let packets = self.receive();
@@ -132,7 +132,7 @@ impl Board {
 /// The counter of a cause.
 type Cause = fn(&mut Counters) -> &mut u16;
 
-/// A packet with a right CRC around anything.
+/// A packet with a correct CRC around any bytes.
 fn sealed(kind: u8, length: u16, payload: &[u8]) -> Vec<u8> {
     let mut bytes = [Header { kind, sequence: 1, length }.to_bytes(), payload.to_vec()].concat();
     bytes.extend(crc32fast::hash(&bytes).to_le_bytes());
@@ -150,7 +150,7 @@ fn both_simulations_answer_as_the_model() {
         let wanted = board.answer(index, kind, 0xc0 + index as u8, false);
         assert!(board.receive() == [wanted], "frame {index}");
     }
-    // A frame cut short, one damaged in its last code, and a whole one right behind them.
+    // An incomplete frame, one damaged in its last code, and a complete one right after them.
     let frame = board.frame(0, Kind::FrameForResultants, 7).to_wire();
     let mut damaged = frame.clone();
     damaged[190] ^= 1;
@@ -189,7 +189,7 @@ fn every_packet_dropped_is_counted_once_under_its_cause() {
     let cases: [(Vec<u8>, Cause); 11] = [
         (vec![1, 2, 3, slip::END], |c| &mut c.crc),
         (vec![slip::ESC, 7, slip::END], |c| &mut c.framing),
-        // Cut short: the END of the next packet ends it.
+        // Incomplete: the END of the next packet ends it.
         ([&frame[..frame.len() / 2], &[slip::END]].concat(), |c| &mut c.crc),
         (sealed(0x05, 0, &[]), |c| &mut c.unknown_type),
         (sealed(0x00, 0, &[]), |c| &mut c.unknown_type),
@@ -209,7 +209,7 @@ fn every_packet_dropped_is_counted_once_under_its_cause() {
         *cause(&mut wanted) += 1;
         assert_eq!(board.counters(), wanted, "{wire:?}");
     }
-    // A byte without stop bit spoils its packet and no other.
+    // A byte without stop bit affects its own packet only.
     board.send(&frame[..50]);
     board.line.send(Sent::NoStop(frame[50]));
     board.send(&frame[51..]);
@@ -234,7 +234,7 @@ fn a_host_whose_bit_rate_is_two_percent_off_is_understood() {
 #[test]
 fn requests_that_come_too_fast_are_overruns_and_the_rest_is_answered_in_order() {
     let mut board = Board::new(&[Simulator::Verilator]);
-    // All forces take four times as long to send as a frame takes to come.
+    // Sending all forces takes four times as long as receiving a frame.
     let sequences: Vec<u8> = (0..12).collect();
     let wire: Vec<u8> = sequences.iter().flat_map(|&s| board.frame(1, Kind::FrameForForces, s).to_wire()).collect();
     board.send(&wire);
@@ -248,9 +248,9 @@ fn requests_that_come_too_fast_are_overruns_and_the_rest_is_answered_in_order() 
         assert!(beats[..board.codes[1].len()] == wanted[..board.codes[1].len()], "{}", packet.sequence);
     }
     let (taken, all) = (packets.len() as u16, sequences.len() as u16);
-    // Reading the counters counts as well.
+    // Reading the counters is counted as well.
     assert_eq!(board.counters(), Counters { taken: taken + 1, overrun: all - taken, ..Counters::default() });
-    // Afterwards everything is as before.
+    // Afterwards the board answers as before.
     board.send(&board.frame(0, Kind::FrameForResultants, 77).to_wire());
     assert_eq!(board.receive().len(), 1);
 }
@@ -277,17 +277,18 @@ fn small(text: &str) -> Questions {
     Questions { model, codes }
 }
 
-/// 5×6 taxels in two subarrays, whose code is two bytes.
+/// 5×6 taxels in two subarrays with two-byte codes.
 const TWO_SUBARRAYS: &str = "rows = 5\ncols = 6\n[partition]\nrows = 1\ncols = 2\n[fixed]\ninput_bits = 16\n";
-/// 2×3 taxels whose code is a single byte.
+/// 2×3 taxels with one-byte codes.
 const SINGLE_BYTE: &str =
     "rows = 2\ncols = 3\n[fixed]\ninput_bits = 8\ndata_bits = 12\ncoef_bits = 8\ninverse_bits = 8\n";
 
 #[test]
 fn a_code_on_offer_when_its_packet_turns_out_bad_is_taken_and_its_frame_dropped() {
     let mut board = Board::of(small(SINGLE_BYTE), &[Simulator::Verilator, Simulator::RustHdl]);
-    // All forces take longer to send than a frame to come: while the first frame's leave, the second waits behind them, the
-    // third in the engine's buffer, and the fourth's first code in front of it until after the packet's end.
+    // Sending all forces takes longer than receiving a frame: while the first frame's are sent, the second waits behind
+    // them, the third in the engine's buffer, and the first code of the fourth in front of it until after the packet's
+    // end.
     let kind = Kind::FrameForForces;
     for sequence in 0..3 {
         board.send(&board.frame(2, kind, sequence).to_wire());
@@ -295,7 +296,7 @@ fn a_code_on_offer_when_its_packet_turns_out_bad_is_taken_and_its_frame_dropped(
     board.send(&[&board.frame(0, kind, 9).to_wire()[..8], &[slip::END]].concat());
     let answers = board.receive();
     assert!(answers == [0, 1, 2].map(|sequence| board.answer(2, kind, sequence, false)), "{}", answers.len());
-    // The engine saw some codes and an early tlast, and says so once.
+    // The engine received some codes and an early tlast, and flags it once.
     for framing in [true, false] {
         board.send(&board.frame(0, kind, 10).to_wire());
         assert!(board.receive() == [board.answer(0, kind, 10, framing)], "framing {framing}");

@@ -1,4 +1,4 @@
-//! The link over SPI: an exact controller at rates from 1 MHz to the highest allowed, transactions that end anywhere.
+//! The link over SPI: a controller with rates from 1 MHz to the highest allowed, and transactions that end anywhere.
 
 use dermis_golden::fixed::{Cycles, Model};
 use dermis_golden::link::slip::{END, IDLE};
@@ -11,13 +11,13 @@ use dermis_tests::{build_dir, scene};
 
 use super::{device, shipped, small, Questions, RESET, SINGLE_BYTE, TWO_SUBARRAYS};
 
-/// Edges of the controller's clock in a byte.
+/// Edges of the controller's clock per byte.
 const EDGES: usize = 16;
-/// Bytes after which an answer is given up; longer than any frame takes.
+/// Bytes after which the test gives up waiting for an answer; longer than any frame takes.
 const PATIENCE: usize = 20_000;
-/// Bytes of a transaction in the guide's example of a frame of 8×8 taxels a millisecond.
+/// Bytes per transaction in the guide's example of an 8×8 frame per millisecond.
 const A_MILLISECOND: usize = 1_100;
-/// What the boards' files allow, Hz.
+/// SPI rate that the boards' files allow, Hz.
 const RATE: u32 = 25_000_000;
 
 /// A board with an SPI and its controller.
@@ -27,7 +27,7 @@ struct Board {
     questions: Questions,
 }
 
-/// The questions for a board with an SPI of `rate`.
+/// A test board with an SPI of `rate`.
 fn over_spi(mut questions: Questions, rate: u32) -> Questions {
     questions.model.scene.hardware.link = LinkKind::Spi;
     let slowest = questions.model.board.spi_MHz.unwrap();
@@ -53,7 +53,7 @@ impl Board {
         bytes.into_iter().filter_map(|byte| self.decoder.next(byte)).collect()
     }
 
-    /// Sends bytes in one transaction and reads in others until so many packets have come.
+    /// Sends bytes in one transaction and reads in others until the given number of packets has been received.
     fn ask(&mut self, wire: &[u8], answers: usize) -> Vec<Packet> {
         let bytes = self.controller.transfer(wire);
         let mut packets = self.read(bytes);
@@ -72,7 +72,7 @@ impl Board {
         Counters::of_bytes(&packets[0].payload).unwrap()
     }
 
-    /// Who the board is, and its answers to the first frame.
+    /// The board's identity and its answers to the first frame.
     fn answers_as_the_model(&mut self, kinds: &[Kind]) {
         let identity = Identity::of(&self.questions.model).unwrap();
         let packets = self.ask(&Packet::request(Kind::Identify, 200).to_wire(), 1);
@@ -100,7 +100,7 @@ fn the_serial_engines_board_answers_at_a_rate_near_its_clock_without_a_gap() {
     scene.hardware.board = "icebreaker".to_string();
     let mut board = Board::new(shipped(&scene), RATE, 0.7, &BOTH);
     board.answers_as_the_model(&[]);
-    // A transaction for the frame, and, after the time it takes, one for the answer.
+    // One transaction for the frame and, after the time it takes, one for the answer.
     let kind = Kind::FrameForForces;
     let request = board.questions.frame(1, kind, 7).to_wire();
     board.controller.transfer(&request);
@@ -128,7 +128,7 @@ fn one_transaction_a_millisecond_holds_a_frame_and_all_its_forces() {
 #[test]
 fn every_rate_and_phase_is_understood() {
     let kinds = [Kind::FrameForResultants, Kind::FrameForForces];
-    // The highest at 100 MHz, and rates that have no common period with the clock.
+    // The highest rate at 100 MHz, and rates without a common period with the clock.
     let rates = [(160_000_000, 0.5), (99_999_999, 0.1), (33_333_333, 0.9), (RATE, 0.0)];
     for (rate, phase) in rates {
         Board::new(small(SINGLE_BYTE), rate, phase, &BOTH).answers_as_the_model(&kinds);
@@ -146,21 +146,21 @@ fn idle_reads_bring_idle_and_garbage_is_counted_and_forgotten() {
     let garbage: Vec<u8> =
         (0u8..60).map(|byte| byte.wrapping_mul(7).wrapping_add(1)).filter(|byte| *byte != END).collect();
     let frame = board.questions.frame(0, Kind::FrameForForces, 1).to_wire();
-    // A frame with IDLE bytes anywhere in it, behind what belongs to no packet.
+    // A frame with IDLE bytes in any place, after bytes that belong to no packet.
     let spread: Vec<u8> = frame.iter().flat_map(|&byte| [IDLE, byte, IDLE]).collect();
     let answer = board.questions.answer(0, Kind::FrameForForces, 1, false);
     assert!(board.ask(&[garbage, spread].concat(), 1) == [answer]);
     assert_eq!(board.counters(), Counters { taken: 2, crc: 1, ..Counters::default() });
 }
 
-/// Whether frames and answers come through, both ways, when transactions end after each of these numbers of edges in turn.
+/// Whether frames and answers are transferred correctly when transactions end after these numbers of edges in turn.
 fn is_whole(board: &mut Board, cuts: [usize; 2]) -> bool {
     let kind = Kind::FrameForForces;
     let frames = [0, 1, 2].map(|index| board.questions.frame(index, kind, index as u8).to_wire()).concat();
     let (mut sent, mut packets) = (0, Vec::new());
     for &edges in cuts.iter().cycle().take(PATIENCE / 10) {
         let bytes = board.controller.cut(&frames[sent.min(frames.len())..], edges);
-        // The board has a byte when its last bit's rising edge was.
+        // The board has a byte at the rising edge of its last bit.
         sent += (edges + 1) / EDGES;
         packets.extend(board.read(bytes));
         if packets.len() == 3 {
@@ -171,7 +171,7 @@ fn is_whole(board: &mut Board, cuts: [usize; 2]) -> bool {
     packets == wanted
 }
 
-/// A small board under Verilator, with `to` in the place of `from` in its Verilog.
+/// A small board under Verilator with `from` replaced by `to` in its Verilog.
 fn small_board_with(from: &str, to: &str) -> Board {
     let questions = over_spi(small(SINGLE_BYTE), RATE);
     let mut generated = generate_board(&questions.model).unwrap();
@@ -182,8 +182,8 @@ fn small_board_with(from: &str, to: &str) -> Board {
     Board::with(Box::new(device), questions, RATE, 0.6)
 }
 
-/// The first number of edges after which a transaction may not end, the other ones being of four bytes: the first of a
-/// transaction brings nothing back.
+/// The first number of edges after which a transaction may not end, the other ones being of four bytes: the first byte
+/// of a transaction brings nothing back.
 fn broken(board: &mut Board) -> Option<usize> {
     (1..=3 * EDGES).find(|&edges| !is_whole(board, [edges, 4 * EDGES]))
 }
@@ -192,7 +192,7 @@ fn broken(board: &mut Board) -> Option<usize> {
 fn transactions_may_end_after_any_edge() {
     let mut board = Board::new(small(SINGLE_BYTE), RATE, 0.6, &[Simulator::Verilator]);
     assert_eq!(broken(&mut board), None);
-    // Many transactions as short as may be.
+    // Many of the shortest possible transactions.
     assert!(is_whole(&mut board, [2 * EDGES; 2]));
     let taken = 3 * (3 * EDGES as u16 + 1) + 1;
     assert_eq!(board.counters(), Counters { taken, ..Counters::default() });
@@ -201,10 +201,10 @@ fn transactions_may_end_after_any_edge() {
 #[test]
 fn a_byte_given_up_too_early_or_too_late_is_found() {
     let defects = [
-        // Given up when the next is there, whether or not its bits have been read; or at the end of a transaction.
+        // Dropped when the next byte is ready, whether or not its bits have been read, or at the end of a transaction.
         ("if (sclk_carries || !sclk_full)", "if (1'b1)"),
         ("sclk_carries <= 1'b0;", "sclk_carries <= sclk_carries;"),
-        // Acknowledged whether or not there was one.
+        // Acknowledged whether or not there was a byte.
         ("sclk_taken <= sclk_offered[1];", "sclk_taken <= !sclk_taken;"),
     ];
     for (from, to) in defects {

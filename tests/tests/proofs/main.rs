@@ -1,30 +1,30 @@
-//! Proofs about the small blocks that carry the handshake, for any input, any stall, a reset at any cycle, and any number
-//! of cycles: Yosys turns the generated Verilog with a property of `tests/proofs` into a circuit of and-gates, and the
-//! model checker ABC, which comes with it, finds an inductive invariant (property directed reachability).
+//! Formal proofs for the small blocks with a handshake, for any input, any stall, a reset at any cycle, and any number
+//! of cycles: Yosys translates the generated Verilog with a property of `tests/proofs` into an and-inverter graph, and
+//! the model checker ABC, which comes with it, finds an inductive invariant (property directed reachability).
 //!
 //! | property | blocks |
 //! |---|---|
-//! | `stream.v`: what is offered stays and stays the same | `prepare`, `resultants`, the link's relay |
+//! | `stream.v`: an offered beat stays valid and unchanged | `prepare`, `resultants`, the link's relay |
 //! | `calibrate.v`: each beat leaves once, in order, saturated | `calibrate` |
 //! | `average.v`: as many sums as taxels, tlast on the last | `average` |
-//! | `receive.v`: a frame stands whole where it belongs; tlast is judged; dead taxels count as 0 | `receive` |
-//! | `send.v`: a frame has all its beats, none leaves outside a frame | `send`, `force` |
-//! | `queue.v`: beats leave in order and as they are, what is offered stays | `force`'s queue |
-//! | `counter.v`: below its limit | counters |
-//! | `feeder.v`: what is offered stays; a whole frame for each packet taken and no other | the link's feeder |
-//! | `slip.v`: each byte goes out once and reads back | the link's encoder |
-//! | `rescale.v`: half up, held to the word's range, clips counted | `rescaler` |
-//! | `replay.v`: rows wait for their shift, then come out once, in order | `rescale` and its memory |
-//! | `filler.v`: inside the operand memory, complete when complete | `pass`'s filler |
-//! | `packer.v`: header, words, CRC between two borders; what is offered stays | the link's packer |
-//! | `roundtrip.v`: what is encoded is decoded, with IDLE bytes in between or without | the link's encoder and decoder |
-//! | `sums.v`: forces are taken, four words given, the status passed on | the link's resultants |
+//! | `receive.v`: a frame is stored completely at its address; tlast is checked; dead taxels become 0 | `receive` |
+//! | `send.v`: a frame has all its beats, none is sent outside a frame | `send`, `force` |
+//! | `queue.v`: beats leave in order and unchanged, an offered beat stays | `force`'s queue |
+//! | `counter.v`: a count is below its limit | counters |
+//! | `feeder.v`: an offered code stays; one complete frame per accepted packet and no other | the link's feeder |
+//! | `slip.v`: each byte is sent once and can be decoded | the link's encoder |
+//! | `rescale.v`: rounds half up, saturates, counts saturations | `rescaler` |
+//! | `replay.v`: rows wait for their shift, then leave once, in order | `rescale` and its memory |
+//! | `filler.v`: addresses are inside the operand memory; "complete" means complete | `pass`'s filler |
+//! | `packer.v`: header, words, CRC between two ENDs; an offered byte stays | the link's packer |
+//! | `roundtrip.v`: decoding restores the encoded bytes, with or without IDLE bytes in between | the link's encoder and decoder |
+//! | `sums.v`: forces are accepted, four words sent, the status passed on | the link's resultants |
 //!
-//! Without a proof, held by co-simulation alone: the UART's shift registers, the SPI slave's two clocks, the link's parser,
-//! counters and request queue, which have no back-pressure; the banks of an adaptive scene, several `receive` in step; the
-//! force unit's rounding.
+//! Not proved, but verified by co-simulation: the UART's shift registers, the SPI slave's two clocks, the link's
+//! parser, counters and request queue, which have no back-pressure; the banks of an adaptive scene, several `receive`
+//! in step; the rounding of the force unit.
 //!
-//! Each proof has a seeded defect with which it fails: a proof that cannot fail says nothing.
+//! Each proof has seeded defects with which it must fail.
 
 use dermis_golden::fixed::quads::Quads;
 use dermis_golden::fixed::resources::count_bits;
@@ -47,7 +47,7 @@ const DEAD: usize = 4;
 /// Zeros of the taxels in codes of 8 bits, for a full scale of 127.
 const ZEROS: [i32; ROWS * COLS] = [13, -25, 38, 0, 114, -114];
 
-/// Small words and a small array: the blocks' control does not depend on them.
+/// Narrow words and a small array: the control logic does not depend on them.
 fn model(more: &str) -> Model {
     let text = format!(
         "name = \"proofs\"\n[sensor]\nrows = {ROWS}\ncols = {COLS}\npitch_x_mm = 4.0\npitch_y_mm = 4.0\n\
@@ -64,7 +64,7 @@ fn prepared() -> Model {
     model("[input]\naverage = 1\nfull_scale_MPa = 127.0\ntare = \"tare.csv\"\ndead = [[1, 1]]\n")
 }
 
-/// The module of a board whose ports begin so.
+/// The module of a board whose ports begin with this text.
 fn block_with(board: &Generated, ports: &str) -> String {
     let verilog = board.files.iter().find(|file| file.name.ends_with(".v")).unwrap();
     let module = verilog.text.lines().find(|line| line.contains(ports)).and_then(|line| line.strip_prefix("module "));
@@ -183,7 +183,7 @@ fn the_feeder_keeps_what_it_offers_and_gives_the_engine_good_frames_only() {
     let block = modules.into_iter().find(|name| name.ends_with("$feeder")).unwrap().to_string();
     let taxels = ROWS * COLS;
     let defects = [
-        // What stands offered is dropped with its packet; one code is held back in the place of two.
+        // An offered code is dropped with its packet; one code is buffered instead of two.
         ("fill <= drop ? {1'b0, waits} :", "fill <= drop ? 2'd0 :"),
         ("delivered != 3'd3", "delivered != 3'd4"),
     ];

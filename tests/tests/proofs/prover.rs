@@ -1,31 +1,31 @@
-//! The prover: a property of `tests/proofs` and the Verilog it is about, to Yosys, to ABC.
+//! The prover: runs Yosys and ABC on a property of `tests/proofs` and the Verilog.
 
 use std::path::Path;
 use std::process::Command;
 
 use dermis_hdl::Generated;
 
-/// A property, what it is asked of, and defects that break it.
+/// A property, the Verilog to be proved, and defects that must break it.
 pub struct Proof<'a> {
     /// The Verilog.
     pub generated: &'a Generated,
-    /// File in `tests/proofs`. A module of the design that it brings itself takes the design's place.
+    /// File in `tests/proofs`. A module defined in it replaces the design's module of that name.
     pub property: &'a str,
-    /// Placeholders of the property file and what stands for them.
+    /// Placeholders of the property file and their values.
     pub given: Vec<(&'a str, String)>,
-    /// Each a text in the Verilog, and the text that takes its place.
+    /// Defects: a text in the Verilog and its replacement.
     pub defects: &'a [(&'a str, &'a str)],
-    /// Products may be anything: no property is about them.
+    /// Whether products are left undetermined, because no property depends on them.
     pub open_products: bool,
 }
 
-/// Modules of the design `top` that a property brings itself.
+/// Modules of the design `top` that a property replaces.
 fn replaced(top: &str, property: &str) -> String {
     let own = property.lines().filter_map(|line| line.strip_prefix("module ")?.strip_prefix(top));
     own.map(|rest| format!("delete {top}{}; ", rest.split('(').next().unwrap_or_default())).collect()
 }
 
-/// Whether the property is proved; a proof that does not end is none.
+/// Whether the property is proved; a timeout counts as not proved.
 fn proved(folder: &Path, top: &str, open_products: bool) -> bool {
     let cut = if open_products { "cutpoint t:$mul; " } else { "" };
     let own = replaced(top, &std::fs::read_to_string(folder.join("proof.v")).unwrap());
@@ -38,7 +38,7 @@ fn proved(folder: &Path, top: &str, open_products: bool) -> bool {
     let output = Command::new("yosys").current_dir(folder).args(["-q", "-p", &to_gates]).output();
     let output = output.expect("yosys is installed (make setup)");
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
-    // Signals that are always equal become one first: what is left is smaller by a third.
+    // Signals that are always equal are merged first, which makes the problem smaller by a third.
     let check = "read_aiger proof.aig; fold; strash; scorr; dc2; scorr; pdr -T 120";
     let output = Command::new("yosys-abc").current_dir(folder).args(["-c", check]).output();
     let text = String::from_utf8_lossy(&output.expect("yosys-abc comes with yosys").stdout).into_owned();
@@ -48,7 +48,7 @@ fn proved(folder: &Path, top: &str, open_products: bool) -> bool {
 }
 
 impl Proof<'_> {
-    /// Proves the property, then refutes it of the design with each of the defects.
+    /// Proves the property, then checks that it fails with each of the defects.
     pub fn run(&self) {
         let folder = tempfile::tempdir().unwrap();
         let Generated { top, files, .. } = self.generated;
@@ -72,7 +72,7 @@ impl Proof<'_> {
     }
 }
 
-/// A number as a property file takes it.
+/// A number in the form that a property file needs.
 pub fn number(value: usize) -> String {
     value.to_string()
 }

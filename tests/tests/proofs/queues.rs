@@ -1,4 +1,4 @@
-//! Proofs of what stands between the streams: the rescaler's arithmetic, queues, and the link's way out.
+//! Proofs for the blocks between the streams: rounding of the rescaler, queues, and the link's output.
 
 use dermis_golden::fixed::formats::SEARCH_EXTRA_BITS;
 use dermis_golden::fixed::resources::{count_bits, operand_vectors};
@@ -99,7 +99,7 @@ fn the_link_takes_and_gives_each_byte_once() {
     ];
     let defects = [
         ("index == (words ? 4'd11 : 4'd3)", "index == (words ? 4'd10 : 4'd3)"),
-        // A byte changes while it is offered; one goes before the CRC has taken in the last.
+        // Defects: a byte changes while it is offered; a byte is sent before the CRC has processed the last one.
         ("if (!valid) content <= stage", "content <= stage"),
         ("!crc_busy && (!words || word_valid)", "(!words || word_valid)"),
     ];
@@ -110,7 +110,7 @@ fn the_link_takes_and_gives_each_byte_once() {
     ];
     let defects = [
         ("data[0] ? 8'd219 : 8'd192", "data[0] ? 8'd192 : 8'd219"),
-        // An IDLE between an escape and what follows it ends the escape.
+        // Defect: an IDLE between an escape and the next byte ends the escape.
         ("else if (valid && !is_idle) escaped", "else if (valid) escaped"),
     ];
     Proof { generated, property: "roundtrip.v", given: both, defects: &defects, open_products: false }.run();
