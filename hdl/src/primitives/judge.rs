@@ -12,7 +12,7 @@ use crate::wire::{Wire, Word};
 /// candidate in row-major order wins; in a halving the centre, then row-major order. The last three candidates are
 /// compared with the best so far in parallel with each other.
 ///
-/// `start` with totals, weights, eligibility and sweep; `done`, with `improved`, [`LATENCY`] cycles later.
+/// `start` with totals, weights, eligibility and sweep; `done`, with `improved`, `LATENCY` cycles later.
 /// `begin_frame` clears the result for a new search, `halve` doubles the position for the next level.
 #[derive(LogicBlock)]
 pub struct Judge {
@@ -32,7 +32,7 @@ pub struct Judge {
     pub weights: Wire<In>,
     /// Nine bits, candidate k may be taken; valid with `start`.
     pub eligible: Wire<In>,
-    /// Word of the sweep ([`Sweep`]); valid with `start`.
+    /// Word of the sweep (`Sweep`); valid with `start`.
     pub sweep: Wire<In>,
     /// The comparison is complete; high for one cycle.
     pub done: Signal<Out, Bit>,

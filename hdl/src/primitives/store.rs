@@ -45,7 +45,7 @@ pub struct Store {
     pub begins: Signal<In, Bit>,
     /// The read addresses step to the next quad.
     pub counts: Signal<In, Bit>,
-    /// First address of that buffer in the memory ([`base`]); valid with `begins`.
+    /// First address of that buffer in the memory (`base`); valid with `begins`.
     pub next_base: Wire<In>,
     /// A quad of polynomials, [`LATENCY`] cycles after `read_address`.
     pub read_data: Wire<Out>,

@@ -54,7 +54,7 @@ pub struct Walk {
     pub next_base: Wire<Out>,
     /// Buffer to write, one cycle after the other outputs.
     pub target: Wire<Out>,
-    /// Word of the sweep ([`Sweep`]).
+    /// Word of the sweep (`Sweep`).
     pub sweep: Wire<Out>,
     /// Squared radius of the search disc in grid steps of the level.
     pub radius: Wire<Out>,

@@ -14,7 +14,7 @@ use crate::wire::{Wire, Word};
 /// half and table, times n.
 ///
 /// `start` with the sweep and its nine sums, which stay stable for the next three cycles. The results are valid
-/// [`LATENCY`] cycles after `start`, until those of the next sweep.
+/// `LATENCY` cycles after `start`, until those of the next sweep.
 #[derive(LogicBlock)]
 pub struct Weigh {
     /// Clock; registers change on its rising edge.
@@ -25,7 +25,7 @@ pub struct Weigh {
     pub which: Wire<In>,
     /// Start with the nine candidates of `sweep`.
     pub start: Signal<In, Bit>,
-    /// Word of the sweep ([`Sweep`]); valid with `start`.
+    /// Word of the sweep (`Sweep`); valid with `start`.
     pub sweep: Wire<In>,
     /// Squared radius of the search disc; valid with `start`.
     pub radius: Wire<In>,
