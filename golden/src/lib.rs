@@ -8,9 +8,9 @@
 //! (μ1 Cx + μ2 Cy + Cz) p = b
 //! ```
 //!
-//! For each μ = (μ1, μ2) this determines p, as a polynomial p(μ) = Σ v_ij μ1^i μ2^j from Cz⁺ b on. Two unknowns remain per
-//! subarray; a search over |μ| ≤ mu_max takes the μ whose p looks most like a contact. [`float`] computes this in floating
-//! point, [`fixed`] bit for bit as the generated hardware does.
+//! For each μ = (μ1, μ2) this determines p, as a polynomial p(μ) = Σ v_ij μ1^i μ2^j with v_00 = Cz⁺ b. Two unknowns
+//! remain per subarray; a search over |μ| ≤ mu_max takes the μ whose p looks most like a contact. [`float`] computes
+//! this in floating point, [`fixed`] bit for bit as the generated hardware does.
 //!
 //! # Example
 //!
@@ -54,12 +54,12 @@
 //! | [`link`] | packets between a host and a board |
 //! | [`baseline`], [`paper`] | the paper's algorithm as printed, and its published results, for comparison |
 //! | [`noise`], [`stability`] | studies: errors with noise against the Cramér–Rao bound; errors against conditioning |
-//! | [`gauss`], [`write`] | Gauss–Legendre quadrature; atomic file writing |
+//! | [`gauss`], [`mod@write`] | Gauss–Legendre quadrature; atomic file writing |
 //!
 //! # Conventions
 //!
-//! Units are mm, N and MPa; compression is positive. Taxel (row, col) has index row·cols + col; x runs along the columns,
-//! y along the rows, both from the array's centre. fx and fy act on the elastic body.
+//! Units are mm, N and MPa; compression is positive. Taxel (row, col) has index row·cols + col. x points towards higher
+//! columns, y towards higher rows, both from the array's centre. fx and fy act on the elastic body.
 #![deny(missing_docs)]
 // Names carry their unit as SI writes it: `stress_MPa`, `resultant_N`.
 #![allow(non_snake_case)]

@@ -127,7 +127,7 @@ impl Solver<'_> {
         let segments = Segments::whole(p.len());
         let start = Contacts { segments, found: vec![Some(found)], p, sweeps: 0, converged: true };
         let fit = self.fit(&start);
-        if let Some(fitted) = fit.as_ref().and_then(|fit| self.from_ellipses(fit, &start)) {
+        if let Some(fitted) = fit.as_ref().and_then(|fit| self.contacts_of_fit(fit, &start)) {
             return fitted;
         }
         let mut best = (found.objective, start.clone());
@@ -149,7 +149,7 @@ impl Solver<'_> {
         if fit.is_some_and(|fit| fit.patches.len() == best.segments.count) || best.segments.count == 1 {
             return best;
         }
-        self.fit(&best).and_then(|fit| self.from_ellipses(&fit, &best)).unwrap_or(best)
+        self.fit(&best).and_then(|fit| self.contacts_of_fit(&fit, &best)).unwrap_or(best)
     }
 
     /// Solves for the regions of `draw(p)`, drawn anew from each better p.

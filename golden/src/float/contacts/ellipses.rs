@@ -41,7 +41,7 @@ impl Solver<'_> {
     }
 
     /// The contacts of a fit that explains the stress; for a single ellipse `state`, if that has a single region too.
-    pub(super) fn from_ellipses(&self, fitted: &EllipseFit, state: &Contacts) -> Option<Contacts> {
+    pub(super) fn contacts_of_fit(&self, fitted: &EllipseFit, state: &Contacts) -> Option<Contacts> {
         match fitted.patches.len() {
             _ if !fitted.explains_stress() => None,
             1 => (state.segments.count == 1).then(|| state.clone()),
