@@ -264,6 +264,14 @@ pub fn main() -> ExitCode {
     }
 }
 
+/// Checks that the program takes these arguments, without running anything; the first one is the program's name.
+///
+/// # Errors
+/// What the program would print: an unknown command or option, a value or argument that is missing or wrong.
+pub fn check_arguments<'a>(words: impl IntoIterator<Item = &'a str>) -> Result<(), clap::Error> {
+    Arguments::try_parse_from(words).map(drop)
+}
+
 /// 1 for what is this program's own fault, a tool that failed on generated files among it; 2 for what the caller can
 /// mend; 130, as shells have it, where they interrupted.
 fn exit_code(error: &anyhow::Error) -> u8 {

@@ -1,26 +1,54 @@
-//! Guide: pages for people who use Dermis or extend it.
+//! Guide: pages for people who use Dermis or extend it; [`index`] lists them by task.
 //!
-//! | page | for |
-//! |---|---|
-//! | [`method`] | what is computed, and why it is the paper's Eq. 1 |
-//! | [`formats`] | widths and scales of the hardware's words |
-//! | [`architecture`] | stages, data flow, where a stage's three forms live |
-//! | [`sensor`] | adding a sensor |
-//! | [`board`] | adding a board |
-//! | [`design`] | using the generated engine in one's own design |
-//! | [`limits`] | what noise does to shear, and why |
+//! The pages are the Markdown files of `sim/guide`, readable in a Git web view as well. A link between pages is written
+//! `[text][page.md]` with a definition at the page's end, which names the file. Here the definitions of `links!` stand
+//! before a page's own, and Markdown takes the first of two: they name the page's module.
 
-#[doc = include_str!("../guide/method.md")]
-pub mod method {}
-#[doc = include_str!("../guide/formats.md")]
-pub mod formats {}
-#[doc = include_str!("../guide/architecture.md")]
-pub mod architecture {}
-#[doc = include_str!("../guide/sensor.md")]
-pub mod sensor {}
-#[doc = include_str!("../guide/board.md")]
-pub mod board {}
-#[doc = include_str!("../guide/design.md")]
-pub mod design {}
-#[doc = include_str!("../guide/limits.md")]
-pub mod limits {}
+/// Definitions of the links of all pages, as Markdown.
+macro_rules! links {
+    ($($file:literal $page:ident,)*) => {
+        concat!($("[", $file, "]: crate::guide::", stringify!($page), "\n",)* "[format.md]: dermis_golden::link\n\n")
+    };
+}
+
+/// A module for each page, all with the same definitions of links.
+macro_rules! modules {
+    ($all:tt $($file:literal $page:ident,)*) => { $(modules! { @one $all $file $page })* };
+    (@one { $($all:tt)* } $file:literal $page:ident) => {
+        #[doc = links!($($all)*)]
+        #[doc = include_str!(concat!("../guide/", $file))]
+        pub mod $page {}
+    };
+}
+
+/// The pages: file in `sim/guide`, module here.
+macro_rules! pages {
+    ($($list:tt)*) => { modules! { { $($list)* } $($list)* } };
+}
+
+pages! {
+    "index.md" index,
+    "your-sensor.md" your_sensor,
+    "accuracy.md" accuracy,
+    "limits.md" limits,
+    "partitions.md" partitions,
+    "stability.md" stability,
+    "robustness.md" robustness,
+    "boards.md" boards,
+    "your-board.md" your_board,
+    "in-your-soc.md" in_your_soc,
+    "method.md" method,
+    "formats.md" formats,
+    "architecture.md" architecture,
+    "architecture/prepare.md" prepare,
+    "architecture/receive.md" receive,
+    "architecture/normalise.md" normalise,
+    "architecture/fold.md" fold,
+    "architecture/pass.md" pass,
+    "architecture/rescale.md" rescale,
+    "architecture/unfold.md" unfold,
+    "architecture/search.md" search,
+    "architecture/force.md" force,
+    "architecture/send.md" send,
+    "glossary.md" glossary,
+}
