@@ -10,17 +10,17 @@
 //! | [`design`] | using the generated engine in one's own design |
 //! | [`limits`] | what noise does to shear, and why |
 
-#[doc = include_str!("guide/method.md")]
+#[doc = include_str!("../guide/method.md")]
 pub mod method {}
-#[doc = include_str!("guide/formats.md")]
+#[doc = include_str!("../guide/formats.md")]
 pub mod formats {}
-#[doc = include_str!("guide/architecture.md")]
+#[doc = include_str!("../guide/architecture.md")]
 pub mod architecture {}
-#[doc = include_str!("guide/sensor.md")]
+#[doc = include_str!("../guide/sensor.md")]
 pub mod sensor {}
-#[doc = include_str!("guide/board.md")]
+#[doc = include_str!("../guide/board.md")]
 pub mod board {}
-#[doc = include_str!("guide/design.md")]
+#[doc = include_str!("../guide/design.md")]
 pub mod design {}
-#[doc = include_str!("guide/limits.md")]
+#[doc = include_str!("../guide/limits.md")]
 pub mod limits {}
