@@ -166,6 +166,10 @@ enum Command {
     Stress(crate::stress::Arguments),
     /// Flip single bits of the simulated hardware and tell what is detected, harmless or silent.
     Faults(crate::faults::Arguments),
+    /// Print a comparison of the guide: input bits, dead taxels, several contacts, links.
+    Study(crate::study::Arguments),
+    /// Write the tables of README.md and of the guide by the commands that they name, or tell which are stale.
+    Guide(crate::guide_pages::Arguments),
     /// Print the errors of scenes in the paper's cases on their shipped frames, beside the paper's.
     #[command(after_help = "Examples:
   dermis table                                       every built-in scene, cases 0 to 3
@@ -348,6 +352,8 @@ fn run(arguments: &Arguments) -> Result<(String, bool)> {
         Command::Stability(arguments) => Ok((crate::stability::run(arguments)?, true)),
         Command::Faults(arguments) => crate::faults::run(arguments, build_dir),
         Command::Stress(arguments) => crate::stress::run(arguments, build_dir),
+        Command::Study(arguments) => Ok((crate::study::run(arguments)?, true)),
+        Command::Guide(arguments) => crate::guide_pages::run(arguments, build_dir),
         Command::Table { scenes, cases, fresh, format, cosim: false } => {
             Ok((table(scenes, cases, fresh, *format)?, true))
         }

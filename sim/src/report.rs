@@ -38,7 +38,7 @@ pub use cases::cases;
 pub use errors::errors;
 pub use extremes::extremes;
 pub use faults::faults;
-pub use host::{equality, resultants, wire_times};
+pub use host::{equality, link_times, resultants, wire_times};
 pub use implemented::{implemented, Implemented};
 pub use needs::{features, resources};
 pub use noise::noise;
@@ -47,6 +47,7 @@ pub use run::{run, Arguments};
 pub use sections::stability_picture;
 pub use stability::stability;
 pub use stress::stress;
+pub(crate) use table::{aligned, percent};
 pub use table::{cosim, scenes};
 
 use serde::Serialize;
