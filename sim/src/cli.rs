@@ -196,6 +196,7 @@ enum Command {
     /// Measure the shear's error under noise, beside the Cramér–Rao bound.
     #[command(after_help = "Examples:
   dermis noise sensor-1
+  dermis noise sensor-1 --frames 1 --medians
   dermis noise sensor-2 --objective patch --objective auto --draws 1000 --format csv")]
     Noise {
         /// Built-in name or path of a scene.
@@ -215,6 +216,9 @@ enum Command {
         /// Objective, repeatable; without it all.
         #[arg(long = "objective", value_name = "NAME", value_parser = objective)]
         objectives: Vec<ObjectiveKind>,
+        /// Only the median errors: a line per level, a column per objective.
+        #[arg(long, conflicts_with = "format")]
+        medians: bool,
         /// Form of the table.
         #[arg(long, value_enum, default_value = "markdown")]
         format: Format,
@@ -357,7 +361,7 @@ fn run(arguments: &Arguments) -> Result<(String, bool)> {
         Command::Table { scenes, cases, fresh, format, cosim: false } => {
             Ok((table(scenes, cases, fresh, *format)?, true))
         }
-        Command::Noise { scene, levels, draws, seed, frames, objectives, format } => {
+        Command::Noise { scene, levels, draws, seed, frames, objectives, medians, format } => {
             let mut wanted = Study { draws: *draws, seed: *seed, frames: *frames, ..Study::default() };
             if !levels.is_empty() {
                 wanted.levels = levels.clone();
@@ -368,7 +372,8 @@ fn run(arguments: &Arguments) -> Result<(String, bool)> {
             let scene = Scene::load(scene)?;
             let bar = Progress::steps(&format!("{}: noise", scene.name), 0);
             let rows = study(&scene, &wanted, &mut |done, total| bar.of(done as u64, total as u64))?;
-            Ok((report::noise(&rows, *format)?, true))
+            let text = if *medians { report::noise_medians(&rows) } else { report::noise(&rows, *format)? };
+            Ok((text, true))
         }
         Command::Table { scenes, cosim: true, .. } => {
             let verify = |name: &String| -> Result<Verified> {

@@ -10,7 +10,7 @@
 //! | [`marker`] | finds the markers of a page |
 //! | [`markdown`] | reads, selects and compares Markdown tables |
 //!
-//! The pictures are drawn by [`crate::report`].
+//! The pictures are drawn by [`crate::report`]; that of run times is measured anew each time and not compared.
 
 pub mod markdown;
 pub mod marker;
@@ -25,11 +25,14 @@ use clap::Args;
 use dermis_golden::write::write;
 
 use crate::progress::Progress;
+use crate::report::{fixed_pictures, time_picture, PictureFile};
 use markdown::{tables, Table};
 use marker::{markers, Marker};
 
 /// The guide's folder, from the repository's root.
 pub const GUIDE: &str = "sim/guide";
+/// Folder of the pictures in the guide's.
+const PICTURES: &str = "pictures";
 /// What every marker's command begins with.
 const PROGRAM: &str = "dermis";
 
@@ -40,6 +43,7 @@ const PROGRAM: &str = "dermis";
   dermis guide --only stability                      those whose command contains `stability`
   dermis guide --check                               compare in place of writing; exit code 1 when a table is stale
   dermis guide --check --quick                       the same with the markers' cheaper check commands
+  dermis guide --pictures                            draw sim/guide/pictures/*.svg
 
 A table stands between two lines of a Markdown page:
   <!-- table: dermis table sensor-1 ; table: 2 ; columns: case | e_t ; check: dermis table sensor-1 --case 0 ; table: 2 -->
@@ -63,6 +67,9 @@ pub struct Arguments {
     /// Only tables whose command contains this text.
     #[arg(long, value_name = "TEXT")]
     only: Option<String>,
+    /// The pictures in place of the tables.
+    #[arg(long, conflicts_with_all = ["quick", "only"])]
+    pictures: bool,
 }
 
 /// A page with its markers.
@@ -86,6 +93,9 @@ struct Commands<'a> {
 /// A page that cannot be read or written, a marker that is wrong, a command that fails or prints no such table.
 pub fn run(arguments: &Arguments, build: &Path) -> Result<(String, bool)> {
     let root = &arguments.root;
+    if arguments.pictures {
+        return pictures(root, arguments.check, build);
+    }
     let mut pages = Vec::new();
     for name in page_names(root)? {
         let path = root.join(&name);
@@ -188,6 +198,34 @@ fn check(pages: &[Page], quick: bool, commands: &mut Commands) -> Result<(String
     }
 }
 
+/// Draws the pictures, or tells which are not as they would be drawn.
+fn pictures(root: &Path, check: bool, build: &Path) -> Result<(String, bool)> {
+    let folder = Path::new(GUIDE).join(PICTURES);
+    let mut files = fixed_pictures()?;
+    if !check {
+        files.push(time_picture(build)?);
+    }
+    let (mut told, mut stale) = (String::new(), false);
+    for PictureFile { name, text } in &files {
+        let name = folder.join(name);
+        let path = root.join(&name);
+        let is_same = || std::fs::read_to_string(&path).is_ok_and(|old| old == *text);
+        let about = match check {
+            true if is_same() => "as drawn",
+            true => {
+                stale = true;
+                "stale; dermis guide --pictures draws it"
+            }
+            false => {
+                write(&path, text.as_bytes())?;
+                "drawn"
+            }
+        };
+        told.push_str(&format!("{}: {about}\n", name.display()));
+    }
+    Ok((told, !stale))
+}
+
 fn at(page: &Page, marker: &Marker) -> String {
     format!("{}:{}", page.name, marker.line)
 }
@@ -238,7 +276,8 @@ mod tests {
         Commands { build: root.to_owned(), root, outputs: outputs.iter().map(own).collect() }
     }
 
-    const PAGE: &str = "# A\n\n<!-- table: dermis a ; check: dermis b -->\n| s | x |\n|---|--:|\n| p | 1 |\n| q | 2 |\n\
+    const PAGE: &str =
+        "# A\n\n<!-- table: dermis a ; check: dermis b -->\n| s | x |\n|---|--:|\n| p | 1 |\n| q | 2 |\n\
                         <!-- end of table -->\n\ntext\n<!-- table: dermis a ; columns: x -->\n<!-- end of table -->\n";
     const NEW: &str = "| s |  x |\n|---|---:|\n| p |  1 |\n| q | 30 |\n\nlegend\n";
 
@@ -264,7 +303,10 @@ mod tests {
         let check = |quick, outputs: &[(&str, &str)]| check(std::slice::from_ref(&one), quick, &mut ran(root, outputs));
         let (text, good) = check(false, &[("dermis a", NEW)]).unwrap();
         assert!(!good);
-        assert!(text.starts_with("README.md:3: stale: dermis a\n  page:    | q | 2 |\n  command: | q | 30 |\n"), "{text}");
+        assert!(
+            text.starts_with("README.md:3: stale: dermis a\n  page:    | q | 2 |\n  command: | q | 30 |\n"),
+            "{text}"
+        );
         let same = "| s | x |\n|---|---|\n| p | 1 |\n| q | 2 |\n";
         assert!(check(false, &[("dermis a", same)]).unwrap().1);
         // The cheaper command prints a part of the rows.

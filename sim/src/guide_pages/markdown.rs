@@ -179,10 +179,7 @@ mod tests {
         let old = &tables(TEXT)[0];
         assert_eq!(old.differs(old), None);
         let new = &tables(&TEXT.replace("3 %", "4 %"))[0];
-        assert_eq!(
-            old.differs(new).unwrap().to_string(),
-            "  page:    | q | 10 | 3 % |\n  command: | q | 10 | 4 % |"
-        );
+        assert_eq!(old.differs(new).unwrap().to_string(), "  page:    | q | 10 | 3 % |\n  command: | q | 10 | 4 % |");
         let shorter = Table { rows: old.rows[..1].to_vec(), ..old.clone() };
         assert_eq!(old.differs(&shorter).unwrap().command, None);
     }

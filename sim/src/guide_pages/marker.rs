@@ -142,7 +142,8 @@ mod tests {
 
     #[test]
     fn attributes_lines_and_content() {
-        let text = "x\n<!-- table: dermis a --b ; check: dermis c; table: 2\n     ; columns: µs, max | n ; takes: 3 s -->\n\
+        let text =
+            "x\n<!-- table: dermis a --b ; check: dermis c; table: 2\n     ; columns: µs, max | n ; takes: 3 s -->\n\
                     | 1 |\n<!-- end of table -->\n<!-- table: dermis d -->\n<!-- end of table -->\n";
         let found = markers("a.md", text).unwrap();
         assert_eq!(found.len(), 2);

@@ -57,7 +57,8 @@ pub fn run(names: &[String]) -> Result<String> {
         let mut row = vec![label.to_owned()];
         let mut each = Vec::new();
         for engine in &engines {
-            let results: Vec<Reconstruction> = frames.iter().map(|frame| engine.run(frame)).collect::<Result<_, _>>()?;
+            let results: Vec<Reconstruction> =
+                frames.iter().map(|frame| engine.run(frame)).collect::<Result<_, _>>()?;
             let pairs = || frames.iter().zip(&results);
             let error = |(frame, result): (&Frame, &Reconstruction)| {
                 of_all(&frame.contacts, frame.resultant_N, result.resultant_N)

@@ -69,7 +69,8 @@ pub fn measure(name: &str, scene: &Scene) -> Result<Vec<Row>> {
         scene.fixed.input_bits = bits;
         let (golden, model) = (Golden::new(&scene)?, Model::new(&scene)?);
         let float = |frames: &[Frame]| -> Result<Option<f64>> {
-            let results: Vec<Reconstruction> = frames.iter().map(|frame| golden.run(frame)).collect::<Result<_, _>>()?;
+            let results: Vec<Reconstruction> =
+                frames.iter().map(|frame| golden.run(frame)).collect::<Result<_, _>>()?;
             Ok(tangential(&results))
         };
         let codes: Vec<Frame> = frames.iter().map(|frame| quantised(&scene, frame)).collect();
