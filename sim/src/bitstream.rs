@@ -17,7 +17,7 @@ pub mod tools;
 
 use std::path::Path;
 
-use anyhow::{anyhow, Result};
+use anyhow::{anyhow, ensure, Result};
 use clap::Args;
 use dermis_golden::board::Board;
 use dermis_golden::fixed::Model;
@@ -28,7 +28,7 @@ use dermis_hdl::link::generate_board;
 use crate::compare::median;
 use crate::jobs::{parallel, Interrupt};
 use crate::progress::Progress;
-use crate::report::{self, Implemented};
+use crate::report::{self, Implemented, Summary};
 use absorb::Absorbed;
 use baseline::{Baseline, Baselines, FILE};
 use family::{flow, pack_arguments, place_arguments, Flow, YOSYS};
@@ -44,10 +44,12 @@ const TOP: &str = "board";
 #[command(after_help = "Examples:
   dermis bitstream eight-by-eight
   dermis bitstream eight-by-eight --board icebreaker
-  dermis bitstream sensor-1 --seeds 5 --jobs 2 --update-baselines")]
+  dermis bitstream sensor-1 --seeds 5 --jobs 2 --update-baselines
+  dermis bitstream --committed --board ulx3s-85f")]
 pub struct Arguments {
     /// Built-in name or path of a scene.
-    scene: String,
+    #[arg(required_unless_present = "committed")]
+    scene: Option<String>,
     /// Board in place of the scene's own, a file's name in constraints.
     #[arg(long, value_name = "NAME")]
     board: Option<String>,
@@ -63,6 +65,9 @@ pub struct Arguments {
     /// Print the result as JSON and nothing else.
     #[arg(long)]
     json: bool,
+    /// Print the table of constraints/baselines.json, of SCENE or all built-in ones, and run no tool.
+    #[arg(long, conflicts_with_all = ["seeds", "jobs", "update_baselines", "json"])]
+    committed: bool,
 }
 
 /// Makes the bitstream; the text for stdout, and whether the clock is met and nothing got worse.
@@ -70,7 +75,10 @@ pub struct Arguments {
 /// # Errors
 /// The scene's and the board's; [`ToolError`] for what a tool did not do.
 pub fn run(arguments: &Arguments, build_dir: &Path) -> Result<(String, bool)> {
-    let mut scene = Scene::load(&arguments.scene)?;
+    let Some(scene) = arguments.scene.as_ref().filter(|_| !arguments.committed) else {
+        return Ok((committed(arguments.scene.as_deref(), arguments.board.as_deref())?, true));
+    };
+    let mut scene = Scene::load(scene)?;
     if let Some(board) = &arguments.board {
         scene.hardware.board.clone_from(board);
     }
@@ -107,6 +115,25 @@ pub fn run(arguments: &Arguments, build_dir: &Path) -> Result<(String, bool)> {
         if arguments.json { serde_json::to_string(&implemented)? + "\n" } else { report::implemented(&implemented) },
         good,
     ))
+}
+
+/// The table of the committed baselines of built-in scenes, of one scene or board where that is named; the tests' own
+/// scenes are left out.
+fn committed(scene: Option<&str>, board: Option<&str>) -> Result<String> {
+    let _progress = Progress::start("models of the baselines");
+    let mut all = Vec::new();
+    for (on, scenes) in Baselines::committed().0 {
+        for (name, baseline) in scenes {
+            let named = scene.is_none_or(|scene| scene == name) && board.is_none_or(|board| board == on);
+            if named && Scene::builtin_names().contains(&name.as_str()) {
+                let mut scene = Scene::builtin(&name)?;
+                scene.hardware.board.clone_from(&on);
+                all.push(Summary::new(&Model::new(&scene)?, baseline));
+            }
+        }
+    }
+    ensure!(!all.is_empty(), "{FILE}: nothing of scene {scene:?} on board {board:?}");
+    Ok(report::implementations(&all))
 }
 
 /// Compares the clocks that place and route was told with those of the board's file.

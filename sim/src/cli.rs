@@ -166,6 +166,10 @@ enum Command {
     Stress(crate::stress::Arguments),
     /// Flip single bits of the simulated hardware and tell what is detected, harmless or silent.
     Faults(crate::faults::Arguments),
+    /// Print a comparison of the guide: input bits, dead taxels, several contacts, links.
+    Study(crate::study::Arguments),
+    /// Write the tables of README.md and of the guide by the commands that they name, or tell which are stale.
+    Guide(crate::guide_pages::Arguments),
     /// Print the errors of scenes in the paper's cases on their shipped frames, beside the paper's.
     #[command(after_help = "Examples:
   dermis table                                       every built-in scene, cases 0 to 3
@@ -192,6 +196,7 @@ enum Command {
     /// Measure the shear's error under noise, beside the Cramér–Rao bound.
     #[command(after_help = "Examples:
   dermis noise sensor-1
+  dermis noise sensor-1 --frames 1 --medians
   dermis noise sensor-2 --objective patch --objective auto --draws 1000 --format csv")]
     Noise {
         /// Built-in name or path of a scene.
@@ -211,6 +216,9 @@ enum Command {
         /// Objective, repeatable; without it all.
         #[arg(long = "objective", value_name = "NAME", value_parser = objective)]
         objectives: Vec<ObjectiveKind>,
+        /// Only the median errors: a line per level, a column per objective.
+        #[arg(long, conflicts_with = "format")]
+        medians: bool,
         /// Form of the table.
         #[arg(long, value_enum, default_value = "markdown")]
         format: Format,
@@ -356,10 +364,12 @@ fn run(arguments: &Arguments) -> Result<(String, bool)> {
         Command::Stability(arguments) => Ok((crate::stability::run(arguments)?, true)),
         Command::Faults(arguments) => crate::faults::run(arguments, build_dir),
         Command::Stress(arguments) => crate::stress::run(arguments, build_dir),
+        Command::Study(arguments) => Ok((crate::study::run(arguments)?, true)),
+        Command::Guide(arguments) => crate::guide_pages::run(arguments, build_dir),
         Command::Table { scenes, cases, fresh, format, cosim: false } => {
             Ok((table(scenes, cases, fresh, *format)?, true))
         }
-        Command::Noise { scene, levels, draws, seed, frames, objectives, format } => {
+        Command::Noise { scene, levels, draws, seed, frames, objectives, medians, format } => {
             let mut wanted = Study { draws: *draws, seed: *seed, frames: *frames, ..Study::default() };
             if !levels.is_empty() {
                 wanted.levels = levels.clone();
@@ -370,7 +380,8 @@ fn run(arguments: &Arguments) -> Result<(String, bool)> {
             let scene = Scene::load(scene)?;
             let bar = Progress::steps(&format!("{}: noise", scene.name), 0);
             let rows = study(&scene, &wanted, &mut |done, total| bar.of(done as u64, total as u64))?;
-            Ok((report::noise(&rows, *format)?, true))
+            let text = if *medians { report::noise_medians(&rows) } else { report::noise(&rows, *format)? };
+            Ok((text, true))
         }
         Command::Table { scenes, cosim: true, .. } => {
             let verify = |name: &String| -> Result<Verified> {

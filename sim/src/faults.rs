@@ -211,6 +211,8 @@ impl Row {
 pub struct Shares {
     /// Bits of the class.
     pub bits: usize,
+    /// Faults in them.
+    pub tried: usize,
     /// Nothing comes of it.
     pub harmless: f64,
     /// The device tells.
@@ -233,6 +235,7 @@ impl Shares {
         };
         (bits > 0).then(|| Shares {
             bits,
+            tried: own().map(|row| row.tried).sum(),
             harmless: share(|row| row.harmless),
             detected: share(|row| row.detected),
             hang: share(|row| row.hang),

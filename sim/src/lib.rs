@@ -19,6 +19,7 @@
 //! | [`mod@generate`] | `dermis generate`: frames with known forces from described contacts |
 //! | [`board`] | a simulated board, its UART on a pseudo-terminal or its SPI under a controller |
 //! | [`mod@guide`] | pages: method, formats, architecture, adding a sensor or a board, the engine in a design, limits |
+//! | [`guide_pages`] | `dermis guide`: tables and pictures of README and guide, by the commands that they name |
 //! | [`hardware`] | a scene's generated hardware and its simulators |
 //! | [`compare`] | how far two force fields are apart |
 //! | [`mod@netlist`] | the netlist after synthesis, simulated |
@@ -28,6 +29,7 @@
 //! | [`stability`] | `dermis stability`: errors against condition, extreme frames |
 //! | [`mod@tried`] | what long runs have tried, kept for the report |
 //! | [`mod@stress`] | `dermis stress`: both streams under gaps, wrong `tlast` and resets |
+//! | [`mod@study`] | `dermis study`: comparisons that the guide shows |
 //! | [`jobs`] | tasks on several threads, until one fails or the user interrupts |
 //! | [`inputs`] | scene and frames from what the command line names |
 //! | [`mod@waves`] | a run as a waveform file |
@@ -47,6 +49,7 @@ pub mod faults;
 pub mod fresh;
 pub mod generate;
 pub mod guide;
+pub mod guide_pages;
 pub mod hardware;
 pub mod host;
 pub mod inputs;
@@ -57,6 +60,7 @@ mod progress;
 pub mod report;
 pub mod stability;
 pub mod stress;
+pub mod study;
 pub mod tabulate;
 pub mod tried;
 pub mod verify;

@@ -9,7 +9,7 @@
 
 use std::path::PathBuf;
 
-use anyhow::Result;
+use anyhow::{ensure, Result};
 use clap::Args;
 use dermis_golden::scene::Scene;
 use dermis_golden::stability::extreme::{frames, outcome};
@@ -25,6 +25,12 @@ use dermis_golden::write::write;
 pub struct Arguments {
     /// Built-in names or paths of scenes; without any the table from well conditioned to hopeless.
     scenes: Vec<String>,
+    /// Only scenes of this group of the table: thickness, poisson, size, pitches.
+    #[arg(long, value_name = "NAME", conflicts_with_all = ["scenes", "extreme"])]
+    group: Option<String>,
+    /// Only scenes with this kind of inverse: tsvd, tikhonov, exact.
+    #[arg(long, value_name = "KIND", conflicts_with = "extreme")]
+    inverse: Option<String>,
     /// Extreme frames in place of conditions, of sensor-1 where no scene is named.
     #[arg(long, conflicts_with = "plot")]
     extreme: bool,
@@ -38,6 +44,7 @@ pub struct Arguments {
 
 const EXAMPLES: &str = "Examples:
   dermis stability                                   thickness/pitch 0.1 to 10, Poisson ratios, sizes, pitches
+  dermis stability --group thickness --inverse tsvd
   dermis stability my-scene.toml --format json
   dermis stability --plot stability.svg
   dermis stability --extreme eight-by-eight          zero, saturated, 1e-9 to 1e9 of full scale, …";
@@ -50,10 +57,14 @@ pub fn run(arguments: &Arguments) -> Result<String> {
     if arguments.extreme {
         return extreme(arguments);
     }
-    let wanted = match arguments.scenes.as_slice() {
+    let mut wanted = match arguments.scenes.as_slice() {
         [] => settings(),
-        names => names.iter().map(|name| Ok(Setting::new(name, Scene::load(name)?))).collect::<Result<_>>()?,
+        names => names.iter().map(|name| Ok(Setting::new(name, Scene::load(name)?))).collect::<Result<Vec<_>>>()?,
     };
+    let Arguments { group, inverse, .. } = arguments;
+    wanted.retain(|setting| group.as_ref().is_none_or(|group| setting.group == *group));
+    wanted.retain(|setting| inverse.as_ref().is_none_or(|kind| setting.scene.inverse.kind.name() == kind));
+    ensure!(!wanted.is_empty(), "stability: no scene of --group {group:?} with --inverse {inverse:?}");
     let bar = Progress::steps("stability", wanted.len() as u64);
     let mut rows = Vec::with_capacity(wanted.len());
     for setting in &wanted {

@@ -165,7 +165,7 @@ fn relative_l2(truth: &Forces, value: &Forces) -> Option<f64> {
 }
 
 /// The error of the whole shear over the shear of all contacts, `None` without shear or where one is not known.
-fn of_all(contacts: &[Contact], truth: Option<[f64; 3]>, value: [f64; 3]) -> Option<f64> {
+pub(crate) fn of_all(contacts: &[Contact], truth: Option<[f64; 3]>, value: [f64; 3]) -> Option<f64> {
     let truth = truth?;
     let shears: Option<Vec<[f64; 2]>> = contacts.iter().map(|contact| contact.tangential_N).collect();
     let all: f64 = shears?.iter().map(|[x, y]| x.hypot(*y)).sum();
@@ -173,7 +173,7 @@ fn of_all(contacts: &[Contact], truth: Option<[f64; 3]>, value: [f64; 3]) -> Opt
 }
 
 /// The error of each contact's shear; contacts without shear or place have none.
-fn own(contacts: &[Contact], regions: &[Region]) -> Vec<f64> {
+pub(crate) fn own(contacts: &[Contact], regions: &[Region]) -> Vec<f64> {
     let error = |contact: &Contact| {
         let ([x, y], [tx, ty]) = (contact.centre_mm?, contact.tangential_N?);
         let far = |region: &Region| region.centre_mm.map_or(f64::INFINITY, |at| (at[0] - x).hypot(at[1] - y));

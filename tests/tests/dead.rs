@@ -1,39 +1,25 @@
 //! Dead taxels in hardware: equal to the bit-true model, independent of what they read, and close to the golden model
 //! of the array without them.
 //!
-//! `cargo test --release -p dermis-tests --test dead -- --nocapture` prints the table of errors.
+//! `dermis study dead-taxels` prints the table of errors.
 
 use dermis_golden::fixed::Model;
 use dermis_golden::frame::Frame;
-use dermis_golden::reconstruct::{Golden, Reconstruction};
+use dermis_golden::reconstruct::Golden;
 use dermis_golden::scene::Scene;
-use dermis_sim::compare::{difference, median};
 use dermis_sim::cosim::{run, Bench, Findings, Vector};
 use dermis_sim::drive::Stimulus;
 use dermis_sim::fresh::{Fresh, Shapes};
 use dermis_sim::hardware::{Hardware, Simulator};
+use dermis_sim::study::dead_taxels::{self, LINES as SCENES};
 use dermis_sim::verify::verify;
-use dermis_tests::{build_dir, scene};
-
-/// Built-in scene and its dead taxels: one and several, in the middle, on the edge and in the corner.
-const SCENES: [(&str, &[[usize; 2]]); 4] = [
-    ("eight-by-eight", &[[3, 4]]),
-    ("eight-by-eight", &[[0, 0], [2, 5], [5, 5], [6, 1]]),
-    ("sensor-1", &[[4, 6]]),
-    ("sensor-1", &[[0, 3], [2, 3], [5, 5], [5, 6], [9, 9]]),
-];
+use dermis_tests::build_dir;
 
 /// Bound of the bit-true model's additional median tangential error at 20 bits; as for whole arrays.
 const FIXED_ADDS: f64 = 0.02;
-/// Number of random frames per line of the table.
-const FRAMES: u32 = 100;
 
 fn masked(name: &str, dead: &[[usize; 2]]) -> Scene {
-    let (mut scene, _) = scene(name);
-    scene.input.dead = dead.to_vec();
-    // A separate name, because generated files contain it.
-    scene.name = format!("{name}-{}-dead", dead.len());
-    scene
+    dead_taxels::masked(name, dead).unwrap()
 }
 
 /// Frames of random contacts; in every second one the dead taxels are stuck far beyond the peak.
@@ -121,28 +107,14 @@ fn what_a_dead_taxel_reads_changes_no_bit() {
 
 #[test]
 fn fixed_is_near_golden() {
-    println!("| scene | dead | e_t golden | e_t fixed | fixed − golden, median | in nine of ten |");
-    println!("|---|---:|---:|---:|---:|---:|");
     for (name, dead) in SCENES {
         let scene = masked(name, dead);
-        let (model, golden) = (Model::new(&scene).unwrap(), Golden::new(&scene).unwrap());
-        let draw = Fresh { frames: FRAMES, contacts: vec![1], shapes: Shapes::Elliptic, touching: false, seed: 1 };
-        let frames = draw.draw(&scene).unwrap();
-        let float: Vec<Reconstruction> = frames.iter().map(|frame| golden.run(frame).unwrap()).collect();
-        let fixed: Vec<Reconstruction> = frames.iter().map(|frame| model.reconstruct(frame).unwrap()).collect();
-        let tangential = |results: &[Reconstruction]| {
-            median(results.iter().filter_map(|r| r.error.as_ref()?.tangential).collect()).unwrap()
-        };
-        let apart = |(a, b): (&Reconstruction, &Reconstruction)| difference(&a.forces_N, &b.forces_N, 1.0).max_share;
-        let mut shares: Vec<f64> = float.iter().zip(&fixed).map(apart).collect();
-        shares.sort_by(f64::total_cmp);
-        let (golden, fixed) = (tangential(&float), tangential(&fixed));
-        let [half, most] = [shares[shares.len() / 2], shares[shares.len() * 9 / 10]];
-        let percent = [golden, fixed, half, most].map(|e| format!("{:.2} %", 100.0 * e)).join(" | ");
-        println!("| {name} | {} | {percent} |", dead.len());
+        let row = dead_taxels::measure(&scene).unwrap();
+        let (golden, fixed, apart) = (row.golden.unwrap(), row.fixed.unwrap(), row.apart.unwrap());
+        println!("{}: {row:?}", scene.name);
         assert!(fixed <= golden + FIXED_ADDS, "{}: fixed {fixed}, golden {golden}", scene.name);
         // Wrong matrices, such as those that ignore the forces over dead taxels, cause errors of tens of per cent.
-        assert!(half < FIXED_ADDS, "{}: {half}", scene.name);
+        assert!(apart < FIXED_ADDS, "{}: {apart}", scene.name);
     }
 }
 

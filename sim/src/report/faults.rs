@@ -35,11 +35,11 @@ pub fn faults(rows: &[Row]) -> String {
          not recovered: the frame after the reset is wrong\n\n",
         percent(Some(LARGE))
     ));
-    let head = ["of all bits of", "bits", "harmless", "detected", "hang", "silent", "silent above"];
+    let head = ["of all bits of", "bits", "flipped", "harmless", "detected", "hang", "silent", "silent above"];
     let of = |class| {
         let all = Shares::of(rows, class)?;
         let shares = [all.harmless, all.detected, all.hang, all.silent, all.large];
-        let mut cells = vec![class.name().to_owned(), all.bits.to_string()];
+        let mut cells = vec![class.name().to_owned(), all.bits.to_string(), all.tried.to_string()];
         cells.extend(shares.map(|share| percent(Some(share))));
         Some(cells)
     };

@@ -3,7 +3,7 @@
 use dermis_golden::fixed::Model;
 use dermis_golden::link::{payloads, supports, Kind, LinkKind};
 
-use super::table::figures;
+use super::table::{aligned, figures};
 use crate::host::{Answer, Line};
 
 /// One frame's resultants.
@@ -36,13 +36,37 @@ pub fn equality(answer: &Answer) -> String {
 
 /// How long a frame's packets take on each of the links that the board has.
 pub fn wire_times(model: &Model) -> String {
+    let link = |(link, rate, times): (LinkKind, u32, Vec<(&str, Option<f64>)>)| {
+        let sent = times.iter().filter_map(|(what, ms)| Some(format!("{what} {:.3} ms", (*ms)?)));
+        format!("{} at {rate} bit/s: {}\n", link.name().to_uppercase(), sent.collect::<Vec<_>>().join(", "))
+    };
+    times(model).into_iter().map(link).collect()
+}
+
+/// The same of several scenes, a line for each link.
+pub fn link_times(models: &[Model]) -> String {
+    let head = ["scene", "link", "codes to the board", "resultants back", "all forces back"];
+    let of = |model: &Model| {
+        let name = model.scene.name.clone();
+        times(model).into_iter().map(move |(link, rate, times)| {
+            let rate = f64::from(rate) / 1e6;
+            let labels = vec![name.clone(), format!("{}, {rate} Mbit/s", link.name().to_uppercase())];
+            let times = times.iter().map(|(_, ms)| ms.map_or("-".into(), |ms| format!("{ms:.3} ms")));
+            labels.into_iter().chain(times).collect()
+        })
+    };
+    aligned(2, &head, models.iter().flat_map(of).collect())
+}
+
+/// Each link that the model's board has, its bit rate, and the time in ms of a frame's [`payloads`]; `None` for what
+/// the board does not send.
+fn times(model: &Model) -> Vec<(LinkKind, u32, Vec<(&'static str, Option<f64>)>)> {
     let sums = supports(model.board.engine, Kind::FrameForResultants);
-    let sent = || payloads(model).into_iter().filter(|(what, _)| sums || *what != Kind::Resultants.name());
-    let of = |(name, link): (&str, LinkKind)| {
+    let of = |(_, link): (&str, LinkKind)| {
         let rate = link.bit_rate(&model.board).ok()?;
-        let time = |(what, bytes)| format!("{what} {:.3} ms", link.wire_ms(bytes, rate));
-        let times: Vec<String> = sent().map(time).collect();
-        Some(format!("{} at {rate} bit/s: {}\n", name.to_uppercase(), times.join(", ")))
+        let sent = |what: &str| sums || what != Kind::Resultants.name();
+        let time = |(what, bytes)| (what, sent(what).then(|| link.wire_ms(bytes, rate)));
+        Some((link, rate, payloads(model).into_iter().map(time).collect()))
     };
     LinkKind::NAMES.into_iter().filter_map(of).collect()
 }

@@ -11,9 +11,9 @@ use crate::bitstream::absorb::Absorbed;
 use crate::bitstream::baseline::Baseline;
 use crate::bitstream::timing::Fmax;
 
-/// What `dermis bitstream` reached.
+/// A scene on its board: cells, clocks, and how long a frame takes.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Implemented {
+pub struct Summary {
     /// Scene name.
     pub scene: String,
     /// Board name.
@@ -29,6 +29,31 @@ pub struct Implemented {
     pub time_us: f64,
     /// What that leaves of [`BUDGET_US`].
     pub margin_us: f64,
+}
+
+impl Summary {
+    /// What was `reached` of a model's scene, with the cycles that the model takes.
+    pub fn new(model: &Model, reached: Baseline) -> Self {
+        let cycles = Cycles::longest(model).total;
+        let time_us = model.board.microseconds(cycles);
+        Summary {
+            scene: model.scene.name.clone(),
+            board: model.board.name.clone(),
+            reached,
+            clock_MHz: model.board.clock_MHz,
+            cycles,
+            time_us,
+            margin_us: BUDGET_US as f64 - time_us,
+        }
+    }
+}
+
+/// What `dermis bitstream` reached.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Implemented {
+    /// The table's line.
+    #[serde(flatten)]
+    pub summary: Summary,
     /// Registers that went into multipliers: operands, products.
     pub absorbed: [usize; 2],
     /// The clock that comes with the link, and its pin, where there is one.
@@ -49,16 +74,8 @@ impl Implemented {
         bitstream: Option<PathBuf>,
         lost: Vec<String>,
     ) -> Self {
-        let cycles = Cycles::longest(model).total;
-        let time_us = model.board.microseconds(cycles);
         Implemented {
-            scene: model.scene.name.clone(),
-            board: model.board.name.clone(),
-            reached,
-            clock_MHz: model.board.clock_MHz,
-            cycles,
-            time_us,
-            margin_us: BUDGET_US as f64 - time_us,
+            summary: Summary::new(model, reached),
             absorbed: [absorbed.operands, absorbed.products],
             link_clock,
             bitstream,
@@ -72,26 +89,31 @@ impl Implemented {
     }
 }
 
-/// The table's line and what follows from it.
-pub fn implemented(one: &Implemented) -> String {
+/// The table of scenes on their boards.
+pub fn implementations(all: &[Summary]) -> String {
+    markdown(&HEAD, all.iter().map(line).collect())
+}
+
+const HEAD: [&str; 14] = [
+    "scene",
+    "board",
+    "logic cells",
+    "flip-flops",
+    "multipliers",
+    "block RAMs",
+    "seeds",
+    "Fmax best",
+    "median",
+    "worst",
+    "clock, MHz",
+    "cycles",
+    "µs",
+    "margin to 1 ms",
+];
+
+fn line(one: &Summary) -> Vec<String> {
     let Baseline { luts, flip_flops, multipliers, block_rams, best_MHz, median_MHz, worst_MHz, seeds } = one.reached;
-    let head = [
-        "scene",
-        "board",
-        "LUTs",
-        "flip-flops",
-        "multipliers",
-        "block RAMs",
-        "seeds",
-        "Fmax best",
-        "median",
-        "worst",
-        "clock MHz",
-        "cycles",
-        "µs",
-        "margin to 1 ms",
-    ];
-    let row = vec![
+    vec![
         one.scene.clone(),
         one.board.clone(),
         luts.to_string(),
@@ -106,8 +128,12 @@ pub fn implemented(one: &Implemented) -> String {
         one.cycles.to_string(),
         format!("{:.2}", one.time_us),
         format!("{:.2} µs", one.margin_us),
-    ];
-    let mut text = markdown(&head, vec![row]);
+    ]
+}
+
+/// The table's line and what follows from it.
+pub fn implemented(one: &Implemented) -> String {
+    let mut text = implementations(std::slice::from_ref(&one.summary));
     let [operands, products] = one.absorbed;
     text.push_str(&format!("registers moved into multipliers: {operands} operands, {products} products\n"));
     if let Some((pin, clock)) = &one.link_clock {

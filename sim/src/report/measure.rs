@@ -166,8 +166,6 @@ impl Kind {
 /// An engine's errors and time on one scene in one case.
 #[derive(Clone, Debug)]
 pub struct Point {
-    /// Scene name.
-    pub scene: String,
     /// The case.
     pub case: Case,
     /// What computed.
@@ -213,7 +211,6 @@ impl Measured {
         let errors: Vec<Option<Errors>> = kept.map(|(_, errors)| errors).collect();
         let over = |value: fn(&Errors) -> Option<f64>| median(errors.iter().flatten().filter_map(value).collect());
         Some(Point {
-            scene: self.scene.name.clone(),
             case: self.scene.partition.case,
             engine,
             tangential: over(|e| e.tangential),

@@ -3,7 +3,7 @@
 use anyhow::Result;
 use dermis_golden::noise::{Row, Spread};
 
-use super::table::{markdown, percent};
+use super::table::{aligned, markdown, percent};
 use super::Format;
 
 /// A study's rows in one form. Fractions in CSV and JSON, percent in Markdown.
@@ -54,6 +54,27 @@ fn text(rows: &[Row]) -> String {
         "\nnoise: of max |b|, per taxel and frame; e_t: tangential error of the resultant; bound: Cramér–Rao\n",
     );
     text
+}
+
+/// Median errors: a line per noise level and number of averaged frames, a column per objective, then the bound of the six
+/// unknowns.
+pub fn noise_medians(rows: &[Row]) -> String {
+    let lines: Vec<&[Row]> = rows.chunk_by(|a, b| (a.noise, a.frames) == (b.noise, b.frames)).collect();
+    let objectives = lines.first().into_iter().flat_map(|line| line.iter()).map(|row| format!("`{}`", row.objective));
+    let head: Vec<String> = ["noise", "frames"]
+        .map(str::to_owned)
+        .into_iter()
+        .chain(objectives)
+        .chain(["Cramér–Rao bound".into()])
+        .collect();
+    let line = |rows: &[Row]| {
+        let mut cells = vec![percent(Some(rows[0].noise)), rows[0].frames.to_string()];
+        cells.extend(rows.iter().map(|row| percent(Some(row.found.median))));
+        cells.push(percent(Some(rows[0].bound_6.median)));
+        cells
+    };
+    let head: Vec<&str> = head.iter().map(String::as_str).collect();
+    aligned(2, &head, lines.into_iter().map(line).collect())
 }
 
 fn csv(rows: &[Row]) -> String {
@@ -145,6 +166,26 @@ mod tests {
                 assert_eq!(of.pointer(place).unwrap().as_f64(), wanted, "{place}");
             }
         }
+    }
+
+    #[test]
+    fn medians_stand_by_level_and_objective() {
+        let [noisy, silent] = &rows()[..] else { panic!("two rows") };
+        let other = Row { objective: "auto", found: silent.bound_6, ..noisy.clone() };
+        let text = noise_medians(&[noisy.clone(), other, silent.clone(), silent.clone()]);
+        let wanted = [
+            "| noise  | frames | `patch` | `auto` | Cramér–Rao bound |",
+            "|--------|--------|--------:|-------:|-----------------:|",
+            "| 0.01 % | 64     | 33.33 % | 0.00 % |          16.67 % |",
+            "| 0.00 % | 1      | 33.33 % | 33.33 % |           0.00 % |",
+        ];
+        let same = |line: &str| line.split_whitespace().collect::<Vec<_>>().join(" ");
+        assert_eq!(same(text.lines().next().unwrap()), same(wanted[0]));
+        assert_eq!(
+            text.lines().skip(2).map(same).collect::<Vec<_>>(),
+            wanted[2..].iter().map(|l| same(l)).collect::<Vec<_>>()
+        );
+        assert_eq!(noise_medians(&[]).lines().count(), 2);
     }
 
     #[test]

@@ -2,11 +2,13 @@
 
 mod bars;
 mod field;
+mod flow;
 mod plane;
 mod scatter;
 
 pub use bars::{bars, Bars};
 pub use field::{force_field, stress_map, Outline};
+pub use flow::{data_flow, FLOW_SCENE};
 pub use plane::objective;
 pub use scatter::{scatter, Guide, Scatter, Series};
 
@@ -27,9 +29,14 @@ const SMALL: i32 = 16;
 
 /// A picture of the common width.
 fn svg(height: u32, draw: impl FnOnce(&Area) -> Result<()>) -> Result<String> {
+    sized(WIDTH, height, draw)
+}
+
+/// A picture.
+fn sized(width: u32, height: u32, draw: impl FnOnce(&Area) -> Result<()>) -> Result<String> {
     let mut text = String::new();
     {
-        let area = SVGBackend::with_string(&mut text, (WIDTH, height)).into_drawing_area();
+        let area = SVGBackend::with_string(&mut text, (width, height)).into_drawing_area();
         draw(&area)?;
         area.present()?;
     }

@@ -24,7 +24,8 @@ pub fn save(document: &Document, folder: &Path) -> Result<PathBuf> {
             Item::Text(_) => {}
             Item::Table(table) => files.push((path_of_table(document, &table.id), csv(table))),
             Item::Pictures(all) => {
-                files.extend(all.iter().map(|p| (path_of_picture(document, &p.id), standalone(&p.svg))));
+                files
+                    .extend(all.iter().map(|p| (path_of_picture(document, &p.id), standalone(&p.svg, &p.caption, ""))));
             }
         }
     }

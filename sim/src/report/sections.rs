@@ -23,7 +23,7 @@ pub use search::search;
 pub use stability::{extremes, stability, stability_picture};
 pub use stages::stages;
 pub use sweeps::sweeps;
-pub use time::time;
+pub use time::{pictures as time_pictures, time};
 pub use tried::tried;
 
 use dermis_golden::frame::Frame;

@@ -1,10 +1,14 @@
 //! Style: roles of colour in pictures, and what they are on light and dark pages.
 //!
 //! A picture is drawn in stand-in colours, one per role. In a page they become CSS variables, which follow the
-//! reader's choice of light or dark; in a file of its own they become the light page's colours on white.
+//! reader's choice of light or dark. In a file of its own they become the light page's colours, with a style sheet that
+//! puts the dark ones in their place where the reader's system is dark: viewers that know no style sheets show the light
+//! ones.
 
 use plotters::style::RGBColor;
 
+/// The page behind everything: light and dark.
+const PAGE: [&str; 2] = ["#ffffff", "#12161d"];
 /// Text and axes.
 pub const INK: RGBColor = RGBColor(1, 1, 1);
 /// Lines that only guide the eye.
@@ -53,9 +57,10 @@ pub fn variables() -> String {
     let rules = |pick: fn(&(RGBColor, &str, &'static str, &'static str)) -> &'static str| {
         ROLES.iter().map(|role| format!("--{}:{};", role.1, pick(role))).collect::<String>()
     };
+    let [light, dark] = PAGE;
     format!(
-        ":root{{color-scheme:light dark;--page:#ffffff;--panel:#f5f6f8;{}}}\n\
-         @media (prefers-color-scheme:dark){{:root{{--page:#12161d;--panel:#1b212b;{}}}}}\n",
+        ":root{{color-scheme:light dark;--page:{light};--panel:#f5f6f8;{}}}\n\
+         @media (prefers-color-scheme:dark){{:root{{--page:{dark};--panel:#1b212b;{}}}}}\n",
         rules(|role| role.2),
         rules(|role| role.3),
     )
@@ -73,14 +78,29 @@ pub fn themed(svg: &str, caption: &str) -> String {
     format!("<svg viewBox=\"{box_}\" role=\"img\" aria-label=\"{}\">{body}", escape(caption))
 }
 
-/// The picture as a file: light colours on white.
-pub fn standalone(svg: &str) -> String {
+/// The picture as a file that follows the reader's choice of light or dark; `title` and `description` are for screen
+/// readers.
+pub fn standalone(svg: &str, title: &str, description: &str) -> String {
+    let [page, dark_page] = PAGE;
     let mut svg = svg.to_owned();
-    for role in &ROLES {
-        svg = svg.replace(&stand_in(role.0), &format!("\"{}\"", role.2));
+    let mut dark = format!("[fill=\"{page}\"]{{fill:{dark_page}}}");
+    for (drawn, _, light_colour, dark_colour) in ROLES {
+        let drawn = stand_in(drawn);
+        if !svg.contains(&drawn) {
+            continue;
+        }
+        svg = svg.replace(&drawn, &format!("\"{light_colour}\""));
+        for property in ["fill", "stroke"] {
+            dark.push_str(&format!("[{property}=\"{light_colour}\"]{{{property}:{dark_colour}}}"));
+        }
     }
+    let (title, description) = (escape(title), escape(description));
     match svg.split_once('>') {
-        Some((head, body)) => format!("{head}>\n<rect width=\"100%\" height=\"100%\" fill=\"#ffffff\"/>{body}"),
+        Some((head, body)) => format!(
+            "{head} role=\"img\">\n<title>{title}</title>\n<desc>{description}</desc>\n\
+             <style>@media (prefers-color-scheme:dark){{{dark}}}</style>\n\
+             <rect width=\"100%\" height=\"100%\" fill=\"{page}\"/>{body}"
+        ),
         None => svg,
     }
 }
@@ -103,7 +123,12 @@ mod tests {
             page,
             "<svg viewBox=\"0 0 4 2\" role=\"img\" aria-label=\"a &lt; b\">\n<rect fill=\"var(--ink)\"/></svg>"
         );
-        assert!(standalone(SVG).contains("<rect fill=\"#1c2330\"/>"));
+        let file = standalone(SVG, "a < b", "c");
+        assert!(file.contains("<title>a &lt; b</title>\n<desc>c</desc>") && file.contains("<rect fill=\"#1c2330\"/>"));
+        // The dark colours of what is drawn, and of nothing else.
+        let dark =
+            "[fill=\"#ffffff\"]{fill:#12161d}[fill=\"#1c2330\"]{fill:#e6e9ef}[stroke=\"#1c2330\"]{stroke:#e6e9ef}}";
+        assert!(file.contains(&format!("<style>@media (prefers-color-scheme:dark){{{dark}</style>")), "{file}");
         assert!(variables().contains("--ink:#e6e9ef;"));
     }
 
@@ -111,5 +136,8 @@ mod tests {
     fn stand_ins_differ() {
         let all: std::collections::BTreeSet<String> = ROLES.iter().map(|role| stand_in(role.0)).collect();
         assert_eq!(all.len(), ROLES.len());
+        // A file's style sheet tells roles, and the page, by their light colours.
+        let light: std::collections::BTreeSet<&str> = ROLES.iter().map(|role| role.2).chain([PAGE[0]]).collect();
+        assert_eq!(light.len(), ROLES.len() + 1);
     }
 }

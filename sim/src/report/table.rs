@@ -124,7 +124,8 @@ fn normal(result: &Reconstruction) -> Option<f64> {
     result.error.as_ref()?.normal
 }
 
-pub(super) fn percent(fraction: Option<f64>) -> String {
+/// A fraction in percent with two decimals, `-` for none.
+pub(crate) fn percent(fraction: Option<f64>) -> String {
     fraction.map_or("-".into(), |f| format!("{:.2} %", 100.0 * f))
 }
 
@@ -161,7 +162,7 @@ pub(super) fn markdown(head: &[&str], rows: Vec<Vec<String>>) -> String {
 }
 
 /// The same with the first `texts` columns left-aligned.
-pub(super) fn aligned(texts: usize, head: &[&str], rows: Vec<Vec<String>>) -> String {
+pub(crate) fn aligned(texts: usize, head: &[&str], rows: Vec<Vec<String>>) -> String {
     let head: Vec<String> = head.iter().map(|&h| h.to_owned()).collect();
     let width = |column: usize| {
         let cells = rows.iter().chain([&head]).map(|row| row[column].chars().count());

@@ -110,7 +110,9 @@ fn cells(area: &Area, map: &Map, sensor: &Sensor, values: &[f64], peak: f64) -> 
 /// The colour of a share −1 … 1.
 fn shade(share: f64) -> RGBAColor {
     // The square root shows what lies low, tension above all.
-    if share > 0.0 { PLUS } else { MINUS }.mix(share.abs().min(1.0).sqrt())
+    let shade = share.abs().min(1.0).sqrt();
+    // No more digits than show.
+    if share > 0.0 { PLUS } else { MINUS }.mix((100.0 * shade).round() / 100.0)
 }
 
 fn frame(area: &Area, map: &Map, sensor: &Sensor, outline: Outline) -> Result<()> {

@@ -10,6 +10,8 @@ use super::super::pictures::{scatter, Scatter, Series};
 use super::super::stability::{refusals, stability_table};
 use super::super::style::{standalone, SERIES};
 
+const CAPTION: &str = "Forward error and normal error of the resultant against the condition of Cz";
+const LEGEND: &str = "A mark for each scene and number format, double, single and fixed point.";
 /// Errors below and above stand on the plot's edges.
 const SHOWN: [f64; 2] = [1e-16, 1e3];
 
@@ -22,11 +24,7 @@ pub fn stability(rows: &[Row]) -> Result<Section> {
                 arithmetic's. By default singular values that input, noise and coefficients cannot tell are left out; \
                 `exact` keeps them all. The lines called 50 digits take stress that was computed elsewhere with as \
                 many.";
-    let picture = Picture {
-        id: "stability".into(),
-        caption: "Forward error and normal error of the resultant against the condition of Cz".into(),
-        svg: picture(rows)?,
-    };
+    let picture = Picture { id: "stability".into(), caption: CAPTION.into(), svg: picture(rows)? };
     let mut items = vec![Item::Text(text.into()), Item::Pictures(vec![picture]), Item::Table(stability_table(rows))];
     items.extend(refusals(rows).into_iter().map(|reason| Item::Text(format!("Refused: {reason}"))));
     Ok(Section { id: "stability", title: "Where it holds: condition against error".into(), items })
@@ -55,7 +53,7 @@ pub fn stability_picture(rows: &[Row]) -> Result<String> {
     if rows.iter().all(|row| row.spectrum.is_none()) {
         return Err(anyhow!("--plot: no scene has a condition to draw"));
     }
-    Ok(standalone(&picture(rows)?))
+    Ok(standalone(&picture(rows)?, CAPTION, LEGEND))
 }
 
 /// Condition against forward and normal error, one mark per scene and number format.

@@ -14,15 +14,9 @@ use super::{case_text, scenes};
 /// # Errors
 /// A picture that cannot be written.
 pub fn time(measured: &[Measured]) -> Result<Section> {
-    let points: Vec<Point> =
-        measured.iter().flat_map(|m| Engine::ALL.into_iter().filter_map(|engine| m.point(engine))).collect();
     let mut items = Vec::new();
     for scene in scenes(measured) {
-        let own: Vec<&Point> = points.iter().filter(|point| point.scene == scene).collect();
-        items.push(Item::Pictures(vec![
-            picture(scene, "shear", &own, |point| point.tangential)?,
-            picture(scene, "normal", &own, |point| point.normal)?,
-        ]));
+        items.push(Item::Pictures(pictures(scene, measured)?.to_vec()));
     }
     let head = [
         "sensor",
@@ -48,6 +42,19 @@ pub fn time(measured: &[Measured]) -> Result<Section> {
     );
     items.push(Item::Table(Table::new("time", "Every engine in every case", &head, rows.collect())));
     Ok(Section { id: "time", title: "Error against run time".into(), items })
+}
+
+/// Shear and normal error of a scene against the time of a frame.
+///
+/// # Errors
+/// A picture that cannot be written.
+pub fn pictures(scene: &str, measured: &[Measured]) -> Result<[Picture; 2]> {
+    let own = measured.iter().filter(|m| m.scene.name == scene);
+    let points: Vec<Point> = own.flat_map(|m| Engine::ALL.into_iter().filter_map(|engine| m.point(engine))).collect();
+    Ok([
+        picture(scene, "shear", &points, |point| point.tangential)?,
+        picture(scene, "normal", &points, |point| point.normal)?,
+    ])
 }
 
 fn row(m: &Measured, engine: Engine) -> Vec<Cell> {
@@ -77,7 +84,7 @@ fn row(m: &Measured, engine: Engine) -> Vec<Cell> {
     row
 }
 
-fn picture(scene: &str, what: &str, own: &[&Point], error: fn(&Point) -> Option<f64>) -> Result<Picture> {
+fn picture(scene: &str, what: &str, own: &[Point], error: fn(&Point) -> Option<f64>) -> Result<Picture> {
     let of = |engine: Engine| {
         let points = own.iter().filter(|point| point.engine == engine);
         // A logarithmic axis has no zero.

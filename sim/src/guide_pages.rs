@@ -1,0 +1,339 @@
+//! `dermis guide`: the tables and pictures of README.md and of the guide, made by the commands that they name.
+//!
+//! ```text
+//! page ── markers ── commands, each once ── Markdown table ──┬─ written between the marker's lines
+//!                                                            └─ --check: compared with what stands there
+//! ```
+//!
+//! | module | does |
+//! |---|---|
+//! | [`marker`] | finds the markers of a page |
+//! | [`markdown`] | reads, selects and compares Markdown tables |
+//!
+//! The pictures are drawn by [`crate::report`]; that of run times is measured anew each time and not compared.
+
+pub mod markdown;
+pub mod marker;
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+use std::time::Instant;
+
+use anyhow::{bail, ensure, Context, Result};
+use clap::Args;
+use dermis_golden::write::write;
+
+use crate::progress::Progress;
+use crate::report::{fixed_pictures, time_picture, PictureFile};
+use markdown::{tables, Table};
+use marker::{markers, Marker};
+
+/// The guide's folder, from the repository's root.
+pub const GUIDE: &str = "sim/guide";
+/// Folder of the pictures in the guide's.
+const PICTURES: &str = "pictures";
+/// What every marker's command begins with.
+const PROGRAM: &str = "dermis";
+
+/// What `dermis guide` is asked for.
+#[derive(Args, Debug)]
+#[command(after_help = "Examples:
+  dermis guide                                       run every command, write its table: minutes
+  dermis guide --only stability                      those whose command contains `stability`
+  dermis guide --check                               compare in place of writing; exit code 1 when a table is stale
+  dermis guide --check --quick                       the same with the markers' cheaper check commands
+  dermis guide --pictures                            draw sim/guide/pictures/*.svg
+
+A table stands between two lines of a Markdown page:
+  <!-- table: dermis table sensor-1 ; table: 2 ; columns: case | e_t ; check: dermis table sensor-1 --case 0 ; table: 2 -->
+  <!-- end of table -->
+Attributes follow the command after semicolons, all of them optional:
+  check: COMMAND          what --quick runs; each of its rows must stand in the page, in the columns that both have
+  check columns: A | B    compare only these columns of the check's table
+  table: N                the N-th table that the command prints, 1 if not given; the check's as well
+  columns: A | B          columns to keep, in this order
+  takes: 40 s             how long the command takes, for the reader")]
+pub struct Arguments {
+    /// Folder of the repository, which holds README.md and sim/guide; commands run in it.
+    #[arg(long, value_name = "DIR", default_value = ".")]
+    root: PathBuf,
+    /// Compare with the pages, write nothing.
+    #[arg(long)]
+    check: bool,
+    /// Take the markers' check commands, which print a part of the table.
+    #[arg(long, requires = "check")]
+    quick: bool,
+    /// Only tables whose command contains this text.
+    #[arg(long, value_name = "TEXT")]
+    only: Option<String>,
+    /// The pictures in place of the tables.
+    #[arg(long, conflicts_with_all = ["quick", "only"])]
+    pictures: bool,
+}
+
+/// A page with its markers.
+struct Page {
+    /// From the root.
+    name: String,
+    text: String,
+    markers: Vec<Marker>,
+}
+
+/// Outputs by command: a command that several markers name runs once.
+struct Commands<'a> {
+    build: PathBuf,
+    root: &'a Path,
+    outputs: BTreeMap<String, String>,
+}
+
+/// Runs the command: what was written, or what is stale; and whether nothing is.
+///
+/// # Errors
+/// A page that cannot be read or written, a marker that is wrong, a command that fails or prints no such table.
+pub fn run(arguments: &Arguments, build: &Path) -> Result<(String, bool)> {
+    let root = &arguments.root;
+    if arguments.pictures {
+        return pictures(root, arguments.check, build);
+    }
+    let mut pages = Vec::new();
+    for name in page_names(root)? {
+        let path = root.join(&name);
+        let text = std::fs::read_to_string(&path).with_context(|| path.display().to_string())?;
+        let mut markers = markers(&name, &text)?;
+        markers.retain(|marker| arguments.only.as_ref().is_none_or(|only| marker.command.contains(only)));
+        pages.push(Page { name, text, markers });
+    }
+    if let Some(only) = &arguments.only {
+        ensure!(pages.iter().any(|page| !page.markers.is_empty()), "--only {only:?}: no table's command contains it");
+    }
+    let build = std::path::absolute(build).with_context(|| build.display().to_string())?;
+    let mut commands = Commands { build, root, outputs: BTreeMap::new() };
+    match arguments.check {
+        true => check(&pages, arguments.quick, &mut commands),
+        false => Ok((fill(&pages, &mut commands)?, true)),
+    }
+}
+
+/// The Markdown pages: those beside README.md, and those of the guide with its folders.
+///
+/// # Errors
+/// A folder that cannot be read, or has no README.md.
+pub fn page_names(root: &Path) -> Result<Vec<String>> {
+    let mut names = markdown_files(root, Path::new(""))?;
+    ensure!(names.iter().any(|name| name == "README.md"), "{}: no README.md in it; see --root", root.display());
+    let mut folders = vec![PathBuf::from(GUIDE)];
+    while let Some(folder) = folders.pop() {
+        names.extend(markdown_files(root, &folder)?);
+        for entry in entries(&root.join(&folder))? {
+            if entry.is_dir() {
+                folders.extend(entry.file_name().map(|name| folder.join(name)));
+            }
+        }
+    }
+    names.sort();
+    Ok(names)
+}
+
+fn entries(folder: &Path) -> Result<Vec<PathBuf>> {
+    let read = || std::fs::read_dir(folder)?.map(|entry| Ok(entry?.path())).collect::<std::io::Result<_>>();
+    read().with_context(|| folder.display().to_string())
+}
+
+/// Names, from the root, of the Markdown files of one folder.
+fn markdown_files(root: &Path, folder: &Path) -> Result<Vec<String>> {
+    let paths = entries(&root.join(folder))?;
+    let files = paths.iter().filter(|path| path.extension().is_some_and(|extension| extension == "md"));
+    Ok(files.filter_map(|path| Some(folder.join(path.file_name()?).display().to_string())).collect())
+}
+
+/// Writes the tables of each page; which page has how many, and how many of them changed.
+fn fill(pages: &[Page], commands: &mut Commands) -> Result<String> {
+    let mut told = String::new();
+    for page in pages.iter().filter(|page| !page.markers.is_empty()) {
+        let mut text = page.text.clone();
+        let mut changed = 0;
+        // From the last to the first: what is written moves only what follows it.
+        for marker in page.markers.iter().rev() {
+            let table = commands.table(page, marker, &marker.command)?.select(&marker.columns);
+            let table = table.with_context(|| at(page, marker))?;
+            let old = tables(&page.text[marker.content.clone()]);
+            changed += usize::from(old.first() != Some(&table) || old.len() > 1);
+            text.replace_range(marker.content.clone(), &table.text());
+        }
+        if text != page.text {
+            write(&commands.root.join(&page.name), text.as_bytes())?;
+        }
+        told.push_str(&format!("{}: {} tables, {changed} changed\n", page.name, page.markers.len()));
+    }
+    Ok(told)
+}
+
+/// Compares the tables of all pages; what is stale, and whether nothing is.
+fn check(pages: &[Page], quick: bool, commands: &mut Commands) -> Result<(String, bool)> {
+    let mut stale = String::new();
+    let mut count = 0;
+    for page in pages {
+        for marker in &page.markers {
+            count += 1;
+            let old = match &tables(&page.text[marker.content.clone()])[..] {
+                [one] => one.clone(),
+                found => bail!("{}: {} tables between the marker and its end, wanted 1", at(page, marker), found.len()),
+            };
+            let cheap = marker.check.as_ref().filter(|_| quick);
+            let command = cheap.unwrap_or(&marker.command);
+            let new = commands.table(page, marker, command)?;
+            let difference = match cheap {
+                Some(_) => old.lacks(&new, &marker.check_columns),
+                None => new.select(&marker.columns).map(|new| old.differs(&new)),
+            };
+            if let Some(difference) = difference.with_context(|| at(page, marker))? {
+                stale.push_str(&format!("{}: stale: {command}\n{difference}\n", at(page, marker)));
+            }
+        }
+    }
+    match stale.is_empty() {
+        true => Ok((format!("{count} tables are as their commands print them\n"), true)),
+        false => Ok((format!("{stale}dermis guide --only TEXT writes what the command prints\n"), false)),
+    }
+}
+
+/// Draws the pictures, or tells which are not as they would be drawn.
+fn pictures(root: &Path, check: bool, build: &Path) -> Result<(String, bool)> {
+    let folder = Path::new(GUIDE).join(PICTURES);
+    let mut files = fixed_pictures()?;
+    if !check {
+        files.push(time_picture(build)?);
+    }
+    let (mut told, mut stale) = (String::new(), false);
+    for PictureFile { name, text } in &files {
+        let name = folder.join(name);
+        let path = root.join(&name);
+        let is_same = || std::fs::read_to_string(&path).is_ok_and(|old| old == *text);
+        let about = match check {
+            true if is_same() => "as drawn",
+            true => {
+                stale = true;
+                "stale; dermis guide --pictures draws it"
+            }
+            false => {
+                write(&path, text.as_bytes())?;
+                "drawn"
+            }
+        };
+        told.push_str(&format!("{}: {about}\n", name.display()));
+    }
+    Ok((told, !stale))
+}
+
+fn at(page: &Page, marker: &Marker) -> String {
+    format!("{}:{}", page.name, marker.line)
+}
+
+impl Commands<'_> {
+    /// The table of `command` that the marker asks for.
+    fn table(&mut self, page: &Page, marker: &Marker, command: &str) -> Result<Table> {
+        if !self.outputs.contains_key(command) {
+            let output = self.output(command, marker.takes.as_deref()).with_context(|| at(page, marker))?;
+            self.outputs.insert(command.to_owned(), output);
+        }
+        let mut all = tables(&self.outputs[command]);
+        let (wanted, printed) = (marker.table, all.len());
+        ensure!(wanted <= printed, "{}: {command}: table {wanted} of {printed} that it prints", at(page, marker));
+        Ok(all.swap_remove(wanted - 1))
+    }
+
+    /// What this program prints for a command.
+    fn output(&self, command: &str, takes: Option<&str>) -> Result<String> {
+        let mut words = command.split_whitespace();
+        ensure!(words.next() == Some(PROGRAM), "{command}: wanted a command of `{PROGRAM}`");
+        let about = takes.map_or(String::new(), |takes| format!(", takes {takes}"));
+        let progress = Progress::start(&format!("{command}{about}"));
+        let begun = Instant::now();
+        let program = std::env::current_exe().context("this program's own path")?;
+        let mut own = Command::new(program);
+        own.current_dir(self.root).args(words).arg("--build-dir").arg(&self.build);
+        let output = own.output().with_context(|| command.to_owned())?;
+        drop(progress);
+        let stderr = String::from_utf8_lossy(&output.stderr);
+        ensure!(output.status.success(), "{command}: {}: {}", output.status, stderr.trim());
+        eprintln!("{:7.1} s  {command}", begun.elapsed().as_secs_f64());
+        String::from_utf8(output.stdout).with_context(|| command.to_owned())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn page(text: &str) -> Page {
+        Page { name: "README.md".into(), text: text.into(), markers: markers("README.md", text).unwrap() }
+    }
+
+    /// Commands that have run already.
+    fn ran<'a>(root: &'a Path, outputs: &[(&str, &str)]) -> Commands<'a> {
+        let own = |(command, output): &(&str, &str)| ((*command).to_owned(), (*output).to_owned());
+        Commands { build: root.to_owned(), root, outputs: outputs.iter().map(own).collect() }
+    }
+
+    const PAGE: &str =
+        "# A\n\n<!-- table: dermis a ; check: dermis b -->\n| s | x |\n|---|--:|\n| p | 1 |\n| q | 2 |\n\
+                        <!-- end of table -->\n\ntext\n<!-- table: dermis a ; columns: x -->\n<!-- end of table -->\n";
+    const NEW: &str = "| s |  x |\n|---|---:|\n| p |  1 |\n| q | 30 |\n\nlegend\n";
+
+    #[test]
+    fn tables_are_written_between_their_markers() {
+        let folder = tempfile::tempdir().unwrap();
+        let told = fill(&[page(PAGE)], &mut ran(folder.path(), &[("dermis a", NEW)])).unwrap();
+        assert_eq!(told, "README.md: 2 tables, 2 changed\n");
+        let text = std::fs::read_to_string(folder.path().join("README.md")).unwrap();
+        let wanted = "# A\n\n<!-- table: dermis a ; check: dermis b -->\n| s |  x |\n|---|---:|\n| p |  1 |\n| q | 30 |\n\
+                      <!-- end of table -->\n\ntext\n<!-- table: dermis a ; columns: x -->\n|  x |\n|---:|\n|  1 |\n| 30 |\n\
+                      <!-- end of table -->\n";
+        assert_eq!(text, wanted);
+        // A second time nothing changes.
+        let told = fill(&[page(&text)], &mut ran(folder.path(), &[("dermis a", NEW)])).unwrap();
+        assert_eq!(told, "README.md: 2 tables, 0 changed\n");
+    }
+
+    #[test]
+    fn a_stale_table_is_found_with_its_place_command_and_rows() {
+        let one = page(PAGE.split_once("text\n").unwrap().0);
+        let root = Path::new("");
+        let check = |quick, outputs: &[(&str, &str)]| check(std::slice::from_ref(&one), quick, &mut ran(root, outputs));
+        let (text, good) = check(false, &[("dermis a", NEW)]).unwrap();
+        assert!(!good);
+        assert!(
+            text.starts_with("README.md:3: stale: dermis a\n  page:    | q | 2 |\n  command: | q | 30 |\n"),
+            "{text}"
+        );
+        let same = "| s | x |\n|---|---|\n| p | 1 |\n| q | 2 |\n";
+        assert!(check(false, &[("dermis a", same)]).unwrap().1);
+        // The cheaper command prints a part of the rows.
+        assert!(check(true, &[("dermis b", "| s | x |\n|---|---|\n| q | 2 |\n")]).unwrap().1);
+        let (text, good) = check(true, &[("dermis b", "| s | x |\n|---|---|\n| q | 3 |\n")]).unwrap();
+        assert!(!good && text.contains("README.md:3: stale: dermis b\n"), "{text}");
+    }
+
+    #[test]
+    fn a_table_that_the_command_does_not_print_is_an_error_with_its_place() {
+        let one = page(PAGE);
+        let error = fill(&[one], &mut ran(Path::new(""), &[("dermis a", "none\n")])).unwrap_err();
+        assert_eq!(error.to_string(), "README.md:11: dermis a: table 1 of 0 that it prints");
+        let other = page("<!-- table: rm a -->\n<!-- end of table -->\n");
+        let error = fill(&[other], &mut ran(Path::new(""), &[])).unwrap_err();
+        assert_eq!(format!("{error:#}"), "README.md:1: rm a: wanted a command of `dermis`");
+    }
+
+    #[test]
+    fn pages_are_the_root_s_and_the_guide_s_in_order() {
+        let folder = tempfile::tempdir().unwrap();
+        assert!(page_names(folder.path()).unwrap_err().to_string().contains("no README.md"));
+        std::fs::create_dir_all(folder.path().join("sim/guide/stages")).unwrap();
+        for name in ["README.md", "sim/guide/b.md", "sim/guide/a.svg", "sim/guide/stages/fold.md"] {
+            std::fs::write(folder.path().join(name), "").unwrap();
+        }
+        let wanted = ["README.md", "sim/guide/b.md", "sim/guide/stages/fold.md"];
+        assert_eq!(page_names(folder.path()).unwrap(), wanted);
+    }
+}

@@ -1,0 +1,183 @@
+//! Markers: HTML comments of a Markdown page that say which command prints a table.
+//!
+//! ```text
+//! <!-- table: COMMAND ; attribute: value ; … -->      may go on over several lines
+//! | … |                                                what the command printed
+//! <!-- end of table -->
+//! ```
+//!
+//! Code fences are skipped, so that a page can show a marker.
+
+use std::ops::Range;
+
+use anyhow::{bail, ensure, Result};
+
+/// What a marker begins with.
+const BEGIN: &str = "<!-- table:";
+/// What ends a comment.
+const CLOSE: &str = "-->";
+/// The line behind a table.
+const END: &str = "<!-- end of table -->";
+/// What begins and ends a block of code.
+const FENCES: [&str; 2] = ["```", "~~~"];
+
+/// A table of a page.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Marker {
+    /// Line of the marker, from 1.
+    pub line: usize,
+    /// Prints the table.
+    pub command: String,
+    /// Prints a part of it in less time.
+    pub check: Option<String>,
+    /// Columns of the check's table to compare; without any all that the page has.
+    pub check_columns: Vec<String>,
+    /// Which of the printed tables, from 1.
+    pub table: usize,
+    /// Columns to keep; without any all.
+    pub columns: Vec<String>,
+    /// How long the command takes.
+    pub takes: Option<String>,
+    /// Bytes between the marker's line and the end's.
+    pub content: Range<usize>,
+}
+
+/// The markers of a page, in order.
+///
+/// # Errors
+/// Names page and line: a marker or comment without end, an end without marker, an attribute that is unknown, given
+/// twice or wrong.
+pub fn markers(page: &str, text: &str) -> Result<Vec<Marker>> {
+    let mut markers = Vec::new();
+    let mut lines = text.split_inclusive('\n').zip(1..);
+    let (mut offset, mut fenced) = (0, false);
+    let mut open: Option<Marker> = None;
+    while let Some((line, number)) = lines.next() {
+        let begin = offset;
+        offset += line.len();
+        let line = line.trim();
+        if FENCES.iter().any(|fence| line.starts_with(fence)) {
+            fenced = !fenced;
+        } else if fenced {
+            continue;
+        } else if line == END {
+            let Some(mut marker) = open.take() else { bail!("{page}:{number}: `{END}` without a marker before it") };
+            marker.content.end = begin;
+            markers.push(marker);
+        } else if line.starts_with(BEGIN) {
+            if let Some(marker) = &open {
+                bail!("{}", unclosed(page, marker));
+            }
+            let mut comment = line.to_owned();
+            while !comment.ends_with(CLOSE) {
+                let Some((next, _)) = lines.next() else { bail!("{page}:{number}: the comment has no `{CLOSE}`") };
+                offset += next.len();
+                comment.extend([" ", next.trim()]);
+            }
+            let inner = comment[BEGIN.len()..comment.len() - CLOSE.len()].trim();
+            let mut marker = parse(inner).map_err(|reason| reason.context(format!("{page}:{number}")))?;
+            (marker.line, marker.content) = (number, offset..offset);
+            open = Some(marker);
+        }
+    }
+    match &open {
+        Some(marker) => bail!("{}", unclosed(page, marker)),
+        None => Ok(markers),
+    }
+}
+
+fn unclosed(page: &str, marker: &Marker) -> String {
+    format!("{page}:{}: no `{END}` behind the table of `{}`", marker.line, marker.command)
+}
+
+/// Command and attributes.
+fn parse(inner: &str) -> Result<Marker> {
+    let mut parts = inner.split(';').map(str::trim);
+    let command = parts.next().filter(|command| !command.is_empty());
+    let Some(command) = command else { bail!("a table without a command") };
+    let mut marker = Marker {
+        line: 0,
+        command: command.to_owned(),
+        check: None,
+        check_columns: Vec::new(),
+        table: 1,
+        columns: Vec::new(),
+        takes: None,
+        content: 0..0,
+    };
+    let mut seen = Vec::new();
+    for part in parts {
+        let Some((name, value)) = part.split_once(':') else { bail!("{part:?}: wanted `attribute: value`") };
+        let (name, value) = (name.trim(), value.trim());
+        ensure!(!value.is_empty() && !seen.contains(&name), "{name}: wanted one value");
+        seen.push(name);
+        match name {
+            "check" => marker.check = Some(value.to_owned()),
+            "check columns" => marker.check_columns = columns(value),
+            "columns" => marker.columns = columns(value),
+            "takes" => marker.takes = Some(value.to_owned()),
+            "table" => match value.parse() {
+                Ok(table) if table > 0 => marker.table = table,
+                _ => bail!("table: {value:?}: wanted a number from 1"),
+            },
+            _ => bail!("unknown attribute {name:?}; known: check, check columns, columns, table, takes"),
+        }
+    }
+    ensure!(marker.check_columns.is_empty() || marker.check.is_some(), "check columns: there is no check");
+    Ok(marker)
+}
+
+/// Heads of columns, which may hold commas.
+fn columns(value: &str) -> Vec<String> {
+    value.split('|').map(|column| column.trim().to_owned()).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn error(text: &str) -> String {
+        format!("{:#}", markers("a.md", text).unwrap_err())
+    }
+
+    #[test]
+    fn attributes_lines_and_content() {
+        let text =
+            "x\n<!-- table: dermis a --b ; check: dermis c; table: 2\n     ; columns: µs, max | n ; takes: 3 s -->\n\
+                    | 1 |\n<!-- end of table -->\n<!-- table: dermis d -->\n<!-- end of table -->\n";
+        let found = markers("a.md", text).unwrap();
+        assert_eq!(found.len(), 2);
+        let first = &found[0];
+        assert_eq!((first.line, first.command.as_str(), first.table), (2, "dermis a --b", 2));
+        assert_eq!((first.check.as_deref(), first.takes.as_deref()), (Some("dermis c"), Some("3 s")));
+        assert_eq!(first.columns, ["µs, max", "n"]);
+        assert_eq!(&text[first.content.clone()], "| 1 |\n");
+        assert_eq!((found[1].line, &text[found[1].content.clone()]), (6, ""));
+    }
+
+    #[test]
+    fn what_is_not_closed_is_named_with_page_and_line() {
+        let open = "a\n<!-- table: dermis a -->\n| 1 |\n";
+        assert_eq!(error(open), "a.md:2: no `<!-- end of table -->` behind the table of `dermis a`");
+        assert_eq!(error(&format!("{open}{open}")), error(open));
+        assert_eq!(error("\n<!-- table: dermis a\n"), "a.md:2: the comment has no `-->`");
+        assert_eq!(error("<!-- end of table -->"), "a.md:1: `<!-- end of table -->` without a marker before it");
+    }
+
+    #[test]
+    fn wrong_attributes_are_named() {
+        let of = |attribute: &str| error(&format!("<!-- table: dermis a ; {attribute} -->\n<!-- end of table -->\n"));
+        assert!(of("colums: a").starts_with("a.md:1: unknown attribute \"colums\"; known: check, "));
+        assert_eq!(of("table: 0"), "a.md:1: table: \"0\": wanted a number from 1");
+        assert_eq!(of("takes"), "a.md:1: \"takes\": wanted `attribute: value`");
+        assert_eq!(of("takes: 1 s ; takes: 2 s"), "a.md:1: takes: wanted one value");
+        assert_eq!(of("check columns: a"), "a.md:1: check columns: there is no check");
+        assert_eq!(error("<!-- table: ; check: dermis b -->"), "a.md:1: a table without a command");
+    }
+
+    #[test]
+    fn code_is_skipped() {
+        let text = "```text\n<!-- table: dermis a -->\n```\n";
+        assert_eq!(markers("a.md", text).unwrap(), []);
+    }
+}
