@@ -1,14 +1,14 @@
 //! `dermis bitstream`: a scene as a bitstream for its board, by open tools.
 //!
 //! ```text
-//! scene -> board top (Verilog) --yosys--> netlist --absorb, floor plan--> netlist
+//! scene -> board top (Verilog) --yosys--> netlist --register packing, floor plan--> netlist
 //!     netlist --nextpnr, several seeds--> best --pack--> bitstream
 //!             ^-- pins, PLL of constraints     |--> cells, clocks -> table, baselines
 //! ```
 //! Everything stands in `<build-dir>/<scene>/<board>/`, with a log per tool.
 
-pub mod absorb;
 pub mod baseline;
+pub mod dsp_register_packing;
 pub mod family;
 pub mod floor_plan;
 pub mod synthesis;
@@ -28,9 +28,9 @@ use dermis_hdl::link::generate_board;
 use crate::compare::median;
 use crate::jobs::{parallel, Interrupt};
 use crate::progress::Progress;
-use crate::report::{self, Implemented};
-use absorb::Absorbed;
+use crate::report::{self, BitstreamReport};
 use baseline::{Baseline, Baselines, FILE};
+use dsp_register_packing::PackedRegisters;
 use family::{flow, pack_arguments, place_arguments, Flow, YOSYS};
 use synthesis::NETLIST;
 use timing::{Fmax, Placed};
@@ -81,7 +81,7 @@ pub fn run(arguments: &Arguments, build_dir: &Path) -> Result<(String, bool)> {
         tool.version()?;
     }
     let folder = build_dir.join(&scene.name).join(&board.name);
-    let absorbed = synthesise(&model, &folder)?;
+    let packed = synthesise(&model, &folder)?;
     let seeds = arguments.seeds.unwrap_or(board.seeds);
     let placed = place(&model, &flow, &folder, seeds, arguments.jobs)?;
     let better =
@@ -91,22 +91,19 @@ pub fn run(arguments: &Arguments, build_dir: &Path) -> Result<(String, bool)> {
     })?;
     check_constraints(board, best)?;
     let product = format!("{}.{}", scene.name, flow.bitstream);
-    let reached = reached(&flow, &placed, best);
+    let achieved = summarise_seeds(&flow, &placed, best);
     let of = |(name, clock): (&str, Fmax)| format!("{name} {:.1} MHz of {} MHz", clock.achieved, clock.constraint);
-    let mut lost: Vec<String> = best.clocks().filter(|(_, clock)| !clock.is_met()).map(of).collect();
-    let met = lost.is_empty();
+    let mut failures: Vec<String> = best.clocks().filter(|(_, clock)| !clock.is_met()).map(of).collect();
+    let met = failures.is_empty();
     if met {
-        let arguments = pack_arguments(board.family, &format!("{}.config", try_name(*best_seed)), &product);
+        let arguments = pack_arguments(board.family, &format!("{}.config", seed_prefix(*best_seed)), &product);
         flow.pack.run(&folder, &arguments, "pack.log", synthesis::MINUTES)?;
     }
-    lost.extend(baselines(arguments.update_baselines && met, board, &scene, &reached)?);
+    failures.extend(compare_or_update_baselines(arguments.update_baselines && met, board, &scene, &achieved)?);
     let bitstream = met.then(|| folder.join(product));
-    let implemented = Implemented::new(&model, reached, absorbed, best.link, bitstream, lost);
-    let good = implemented.is_good();
-    Ok((
-        if arguments.json { serde_json::to_string(&implemented)? + "\n" } else { report::implemented(&implemented) },
-        good,
-    ))
+    let report = BitstreamReport::new(&model, achieved, packed, best.link, bitstream, failures);
+    let good = report.is_good();
+    Ok((if arguments.json { serde_json::to_string(&report)? + "\n" } else { report::bitstream(&report) }, good))
 }
 
 /// Compares the clocks that place and route was told with those of the board's file.
@@ -127,7 +124,7 @@ fn check_constraints(board: &Board, placed: &Placed) -> Result<()> {
 }
 
 /// Verilog to the netlist that is placed.
-fn synthesise(model: &Model, folder: &Path) -> Result<Absorbed> {
+fn synthesise(model: &Model, folder: &Path) -> Result<PackedRegisters> {
     let _progress = Progress::start(&format!("{}: synthesis", model.scene.name));
     let generated = generate_board(model)?;
     let board_files = model.board.files()?;
@@ -140,11 +137,11 @@ fn synthesise(model: &Model, folder: &Path) -> Result<Absorbed> {
     let link = model.scene.hardware.link.name().to_uppercase();
     let (top, board) = (&generated.top, &model.board.name);
     let read = format!("-D DERMIS_TOP={top} -D DERMIS_{link} {board}.v {top}.v");
-    let absorbed = synthesis::synthesise(folder, model.board.family, &read, TOP)?;
+    let packed = synthesis::synthesise(folder, model.board.family, &read, TOP)?;
     if let Some(blocks) = &model.board.multiplier_blocks {
-        synthesis::edit(folder, |netlist| floor_plan::plan(netlist, TOP, blocks))?;
+        synthesis::edit(folder, |netlist| floor_plan::assign_sites(netlist, TOP, blocks))?;
     }
-    Ok(absorbed)
+    Ok(packed)
 }
 
 /// Places and routes with seeds 1 … `seeds`, `jobs` at a time; those that came to an end.
@@ -160,14 +157,14 @@ fn place(model: &Model, flow: &Flow, folder: &Path, seeds: u32, jobs: u32) -> Re
 }
 
 /// What a seed's files begin with.
-fn try_name(seed: u32) -> String {
+fn seed_prefix(seed: u32) -> String {
     format!("seed{seed}")
 }
 
 /// One seed, by the first placer that converges.
 fn place_seed(model: &Model, flow: &Flow, folder: &Path, seed: u32) -> Result<Placed, ToolError> {
     let board = &model.board;
-    let name = try_name(seed);
+    let name = seed_prefix(seed);
     let mut last = Err(ToolError::Missing { tool: flow.place.name });
     for placer in &board.placers {
         let arguments = place_arguments(board, NETLIST, seed, placer, &name);
@@ -182,7 +179,7 @@ fn place_seed(model: &Model, flow: &Flow, folder: &Path, seed: u32) -> Result<Pl
 }
 
 /// The figures of all seeds; cells of the `best`.
-fn reached(flow: &Flow, placed: &[(u32, Placed)], best: &Placed) -> Baseline {
+fn summarise_seeds(flow: &Flow, placed: &[(u32, Placed)], best: &Placed) -> Baseline {
     // Of an even number of seeds the slower of the two in the middle: the median's larger one, of periods.
     let periods = || placed.iter().map(|(_, placed)| 1.0 / placed.engine.achieved);
     let rounded = |clock: f64| (clock * 10.0).round() / 10.0;
@@ -199,15 +196,15 @@ fn reached(flow: &Flow, placed: &[(u32, Placed)], best: &Placed) -> Baseline {
 }
 
 /// Writes the baseline, or says in what the scene has become worse than its one.
-fn baselines(update: bool, board: &Board, scene: &Scene, reached: &Baseline) -> Result<Vec<String>> {
+fn compare_or_update_baselines(update: bool, board: &Board, scene: &Scene, achieved: &Baseline) -> Result<Vec<String>> {
     let path = Path::new(FILE);
     let mut all = Baselines::read(path)?;
     if update {
-        all.0.entry(board.name.clone()).or_default().insert(scene.name.clone(), reached.clone());
+        all.0.entry(board.name.clone()).or_default().insert(scene.name.clone(), achieved.clone());
         all.write(path)?;
         return Ok(Vec::new());
     }
-    Ok(all.get(&board.name, &scene.name).map_or_else(Vec::new, |was| was.losses(reached)))
+    Ok(all.get(&board.name, &scene.name).map_or_else(Vec::new, |was| was.regressions(achieved)))
 }
 
 #[cfg(test)]
@@ -223,8 +220,8 @@ mod tests {
     fn the_median_of_two_seeds_is_the_slower_one() {
         let seeds = [(1, placed(94.52)), (2, placed(107.2)), (3, placed(101.0))];
         let clocks = |seeds: &[(u32, Placed)]| {
-            let reached = reached(&flow(dermis_golden::board::Family::Ecp5), seeds, &seeds[1].1);
-            [reached.best_MHz, reached.median_MHz, reached.worst_MHz]
+            let achieved = summarise_seeds(&flow(dermis_golden::board::Family::Ecp5), seeds, &seeds[1].1);
+            [achieved.best_MHz, achieved.median_MHz, achieved.worst_MHz]
         };
         assert_eq!(clocks(&seeds), [107.2, 101.0, 94.5]);
         assert_eq!(clocks(&seeds[..2]), [107.2, 94.5, 94.5]);

@@ -2,20 +2,20 @@
 //! opens.
 //!
 //! ```text
-//! host --- pseudo-terminal --- Wire --- UartLine --- BoardDevice (board top: UART, packets, engine)
+//! host --- pseudo-terminal --- NoisyChannel --- HostUart --- BoardDevice (board top: UART, packets, engine)
 //!                              drops, flips, delays
 //! bytes ---------------------------- SpiController --- BoardDevice (board top: SPI slave, packets, engine)
 //! ```
 
 mod controller;
-mod line;
+mod host_uart;
+mod noisy_channel;
 mod terminal;
-mod wire;
 
 pub use controller::SpiController;
-pub use line::{Sent, UartLine};
-pub use terminal::Terminal;
-pub use wire::{Faults, Wire};
+pub use host_uart::{HostUart, UartSymbol};
+pub use noisy_channel::{ChannelFaults, NoisyChannel};
+pub use terminal::PseudoTerminal;
 
 use std::path::Path;
 
@@ -23,13 +23,13 @@ use dermis_golden::link::LinkKind;
 use dermis_hdl::link::{BoardDevice, BoardOutputs};
 use dermis_hdl::Generated;
 
-use crate::verilator::{Bench, Design, VerilatorError};
+use crate::verilator::{Design, VerilatedBench, VerilatorError};
 
 /// Words of the bench's output; the shim takes no fewer.
 const OUT_WORDS: usize = 4;
 
 /// A board's top module under Verilator.
-pub struct VerilatedBoard(Bench);
+pub struct VerilatedBoard(VerilatedBench);
 
 impl VerilatedBoard {
     /// Builds what [`dermis_hdl::link::generate_board`] gives for a scene with this `link`, or takes it from `cache`, and
@@ -51,8 +51,8 @@ impl VerilatedBoard {
              .alive(out[1]), .busy(out[2]), .error(out[3]));\nendmodule\n"
         );
         let files = generated.files.iter().map(|f| (f.name.as_str(), f.text.as_str())).collect();
-        let design = Design { top, files, taps: &[], input_bits: 1, writable: false };
-        Bench::new(&design, &bench, OUT_WORDS, cache).map(VerilatedBoard)
+        let design = Design { top, files, taps: &[], input_bits: 1, writable_state: false };
+        VerilatedBench::new(&design, &bench, OUT_WORDS, cache).map(VerilatedBoard)
     }
 }
 

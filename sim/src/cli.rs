@@ -26,11 +26,11 @@ use dermis_hdl::link::generate_board;
 use dermis_hdl::{generate, manifest, HdlError};
 
 use crate::bitstream::tools::ToolError;
-use crate::compare::{compared, difference};
-use crate::fresh::Fresh;
-use crate::hardware::{Hardware, Simulator, Stuck};
+use crate::compare::{comparable_forces, difference};
+use crate::drawn_frames::DrawnFrames;
+use crate::hardware::{DeviceTimeout, Hardware, Simulator};
 use crate::host::HostError;
-use crate::inputs::{resolve, resolve_one, OnBoard};
+use crate::inputs::{resolve, resolve_one, BoardOverride};
 use crate::progress::Progress;
 use crate::report::{self, CosimReport, Format};
 use crate::tabulate::tabulate;
@@ -87,7 +87,7 @@ enum Command {
         #[arg(long)]
         json: bool,
         #[command(flatten)]
-        target: OnBoard,
+        target: BoardOverride,
     },
     /// Generate the hardware of a scene.
     #[command(after_help = "Examples:
@@ -108,7 +108,7 @@ enum Command {
         #[arg(long)]
         board: bool,
         #[command(flatten)]
-        target: OnBoard,
+        target: BoardOverride,
     },
     /// Make the bitstream of a scene for its board, with open tools.
     Bitstream(crate::bitstream::Arguments),
@@ -128,7 +128,7 @@ enum Command {
         /// Built-in name or path of a scene.
         scene: String,
         #[command(flatten)]
-        target: OnBoard,
+        target: BoardOverride,
     },
     /// Compare simulated hardware with the bit-true model, stage by stage and cycle by cycle.
     #[command(after_help = "Examples:
@@ -154,7 +154,7 @@ enum Command {
         #[arg(long, conflicts_with = "json")]
         waves: bool,
         #[command(flatten)]
-        target: OnBoard,
+        target: BoardOverride,
     },
     /// Measure errors and times of all engines, and write them as a page with pictures.
     Report(report::Arguments),
@@ -181,7 +181,7 @@ enum Command {
         #[arg(long = "case", value_name = "CASE")]
         cases: Vec<Case>,
         #[command(flatten)]
-        fresh: Fresh,
+        drawn: DrawnFrames,
         /// Form of the table.
         #[arg(long, value_enum, default_value = "markdown", conflicts_with = "cosim")]
         format: Format,
@@ -274,7 +274,7 @@ fn exit_code(error: &anyhow::Error) -> u8 {
         error.downcast_ref::<VerilatorError>(),
         Some(VerilatorError::Build { .. } | VerilatorError::Library { .. })
     );
-    let hardware = error.is::<Stuck>() || matches!(error.downcast_ref::<HdlError>(), Some(HdlError::Check(_)));
+    let hardware = error.is::<DeviceTimeout>() || matches!(error.downcast_ref::<HdlError>(), Some(HdlError::Check(_)));
     let model = matches!(error.downcast_ref::<FixedError>(), Some(FixedError::Internal(_) | FixedError::Beats { .. }));
     let board = matches!(error.downcast_ref::<HostError>(), Some(HostError::Answer { .. }));
     let flow = matches!(
@@ -295,7 +295,7 @@ fn run(arguments: &Arguments) -> Result<(String, bool)> {
     match &arguments.command {
         Command::Reconstruct { scene, frames, engine, json, target } => {
             let (scene, frames) = resolve_one(scene.as_deref(), frames)?;
-            let scene = target.put(scene);
+            let scene = target.apply(scene);
             // Seconds where the matrices are large.
             let _progress = Progress::start(&format!("{}: reconstruction", scene.name));
             let (result, full_scale_MPa) = reconstruct(&scene, &frames, *engine, build_dir)?;
@@ -309,14 +309,14 @@ fn run(arguments: &Arguments) -> Result<(String, bool)> {
             Ok((text, true))
         }
         Command::Build { scene, out, explain, board, target } => {
-            let scene = target.put(Scene::load(scene)?);
+            let scene = target.apply(Scene::load(scene)?);
             let folder = if *board { "board" } else { "rtl" };
             let out = out.clone().unwrap_or_else(|| build_dir.join(&scene.name).join(folder));
             Ok((build(&scene, &out, *board, *explain)?, true))
         }
         Command::Cosim { scene, frames, json, device, waves, target } => {
             let (scene, frames) = resolve(scene.as_deref(), frames)?;
-            let scene = target.put(scene);
+            let scene = target.apply(scene);
             let verified = verify(&scene, &frames, device.simulators(), build_dir)?;
             let mut text = if *json {
                 serde_json::to_string(&CosimReport::new(&verified))? + "\n"
@@ -337,7 +337,7 @@ fn run(arguments: &Arguments) -> Result<(String, bool)> {
         }
         Command::Host(arguments) => crate::host::run(arguments),
         Command::Board { scene, target } => {
-            let scene = target.put(Scene::load(scene)?);
+            let scene = target.apply(Scene::load(scene)?);
             let terminal = Hardware::new(Model::new(&scene)?, build_dir)?.terminal()?;
             print(&format!("{}\n", terminal.path().display()))?;
             terminal.wait()?;
@@ -348,8 +348,8 @@ fn run(arguments: &Arguments) -> Result<(String, bool)> {
         Command::Stability(arguments) => Ok((crate::stability::run(arguments)?, true)),
         Command::Faults(arguments) => crate::faults::run(arguments, build_dir),
         Command::Stress(arguments) => crate::stress::run(arguments, build_dir),
-        Command::Table { scenes, cases, fresh, format, cosim: false } => {
-            Ok((table(scenes, cases, fresh, *format)?, true))
+        Command::Table { scenes, cases, drawn, format, cosim: false } => {
+            Ok((table(scenes, cases, drawn, *format)?, true))
         }
         Command::Noise { scene, levels, draws, seed, frames, objectives, format } => {
             let mut wanted = Study { draws: *draws, seed: *seed, frames: *frames, ..Study::default() };
@@ -361,7 +361,7 @@ fn run(arguments: &Arguments) -> Result<(String, bool)> {
             }
             let scene = Scene::load(scene)?;
             let bar = Progress::steps(&format!("{}: noise", scene.name), 0);
-            let rows = study(&scene, &wanted, &mut |done, total| bar.of(done as u64, total as u64))?;
+            let rows = study(&scene, &wanted, &mut |done, total| bar.set_of(done as u64, total as u64))?;
             Ok((report::noise(&rows, *format)?, true))
         }
         Command::Table { scenes, cosim: true, .. } => {
@@ -377,16 +377,16 @@ fn run(arguments: &Arguments) -> Result<(String, bool)> {
 }
 
 /// The error table of scenes, all built-in ones when none is named.
-fn table(scenes: &[String], cases: &[Case], fresh: &Fresh, format: Format) -> Result<String> {
+fn table(scenes: &[String], cases: &[Case], drawn: &DrawnFrames, format: Format) -> Result<String> {
     let builtin = || Scene::builtin_names().into_iter().map(str::to_owned).collect();
     let scenes: Vec<String> = if scenes.is_empty() { builtin() } else { scenes.to_vec() };
     let numbered: Vec<Case> = (0..4).filter_map(Case::numbered).collect();
     let cases = if cases.is_empty() { &numbered } else { cases };
-    let mut lines = Vec::new();
+    let mut rows = Vec::new();
     for name in &scenes {
-        let (scene, frames) = if fresh.frames > 0 {
+        let (scene, frames) = if drawn.frames > 0 {
             let scene = Scene::load(name)?;
-            let frames = fresh.draw(&scene)?;
+            let frames = drawn.draw(&scene)?;
             (scene, frames)
         } else {
             resolve(Some(name), &[])?
@@ -395,11 +395,11 @@ fn table(scenes: &[String], cases: &[Case], fresh: &Fresh, format: Format) -> Re
         let mut done = 0;
         let mut step = || {
             done += 1;
-            bar.at(done);
+            bar.set(done);
         };
-        lines.extend(tabulate(&scene, cases, &frames, &mut step)?);
+        rows.extend(tabulate(&scene, cases, &frames, &mut step)?);
     }
-    report::errors(&lines, format)
+    report::errors(&rows, format)
 }
 
 /// An objective by its name in scenes.
@@ -435,7 +435,7 @@ fn against_golden(scene: &Scene, frames: &[Frame], result: &Reconstruction) -> R
     let golden = Golden::new(scene)?.run_averaged(frames)?;
     let model = Model::for_frames(scene, frames)?;
     let lsb_N = model.force_lsb_N(full_scale(&model.scene, &model.stress(frames)?));
-    Ok(report::difference(&difference(&compared(&golden), &compared(result), lsb_N)))
+    Ok(report::difference(&difference(&comparable_forces(&golden), &comparable_forces(result), lsb_N)))
 }
 
 /// Writes the generated files, each complete or not at all, and lists them.
@@ -482,7 +482,7 @@ mod tests {
     #[test]
     fn own_faults_exit_with_1_and_what_the_caller_can_mend_with_2() {
         let io = |kind| VerilatorError::File(FileError { path: "build".into(), source: ErrorKind::into(kind) });
-        let stuck = Stuck { frame: "press".into(), cycle: 7, rule: "nothing moved".into() };
+        let stuck = DeviceTimeout { frame: "press".into(), cycle: 7, rule: "nothing moved".into() };
         let answer = HostError::Answer { port: "p".into(), what: "forces", bytes: 7 };
         let own: [anyhow::Error; 7] = [
             VerilatorError::Build { design: "d".into(), folder: "f".into(), log: "l".into() }.into(),

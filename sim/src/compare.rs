@@ -26,7 +26,7 @@ pub struct Difference {
 }
 
 /// What two results are compared by: their forces, or their resultants where these take their place.
-pub fn compared(result: &Reconstruction) -> Forces {
+pub fn comparable_forces(result: &Reconstruction) -> Forces {
     match &result.extra.resultants {
         None => result.forces_N.clone(),
         Some(all) => {

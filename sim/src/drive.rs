@@ -10,17 +10,17 @@
 //! in which valid and ready are both set. latency = cycle of the last output beat − cycle of the last
 //! input beat; total = cycle of the last output beat − cycle of the first input beat + 1.
 
-mod held;
+mod axis_stability;
 mod receiver;
 mod recording;
 mod sender;
 
-pub(crate) use held::{Held, RULE};
-pub use recording::{Beat, Breach, Play, Recording, TapWord, Times};
+pub(crate) use axis_stability::{StabilityCheck, STABILITY_RULE};
+pub use recording::{Beat, InputFrame, ProtocolViolation, Recording, TapWord, Times};
 
 use dermis_hdl::device::{Device, Inputs};
 use receiver::Receiver;
-use sender::{Gaps, Sender};
+use sender::{Sender, StallGenerator};
 
 /// Cycles of reset before the first frame.
 const RESET_CYCLES: u64 = 4;
@@ -49,13 +49,19 @@ impl std::fmt::Display for Stimulus {
 }
 
 /// Plays `frames` and records what comes back; gives up after `watchdog` cycles without a transfer.
-pub fn record(device: &mut dyn Device, taps: usize, frames: &[Play], stimulus: Stimulus, watchdog: u64) -> Recording {
+pub fn record(
+    device: &mut dyn Device,
+    taps: usize,
+    frames: &[InputFrame],
+    stimulus: Stimulus,
+    watchdog: u64,
+) -> Recording {
     if let (Stimulus::Stalls { .. }, Some(first)) = (stimulus, frames.first()) {
-        interrupt(device, first);
+        leave_work_in_progress(device, first);
     }
     let mut receiver = Receiver::new(taps, frames);
     let mut sender = Sender::new(frames);
-    let mut gaps = Gaps::new(stimulus);
+    let mut stalls = StallGenerator::new(stimulus);
     let wanted: usize = frames.iter().map(|f| f.beats).sum();
     let mut idle = 0;
     let mut tail = TAIL_CYCLES;
@@ -63,27 +69,27 @@ pub fn record(device: &mut dyn Device, taps: usize, frames: &[Play], stimulus: S
         let mut inputs = Inputs { rst: cycle < RESET_CYCLES, ..Inputs::default() };
         if !inputs.rst {
             let may_start = stimulus != Stimulus::FullSpeed || receiver.frame >= sender.frame;
-            sender.offer(&mut inputs, may_start && gaps.send());
-            inputs.m_ready = gaps.receive();
+            sender.offer(&mut inputs, may_start && stalls.sends());
+            inputs.m_ready = stalls.receives();
         }
         let outputs = device.cycle(&inputs);
         if inputs.rst {
             continue;
         }
-        let taken = inputs.s_valid && outputs.s_ready;
-        if taken {
-            sender.taken(cycle, &mut receiver.recording.times);
+        let accepted = inputs.s_valid && outputs.s_ready;
+        if accepted {
+            sender.accepted(cycle, &mut receiver.recording.times);
         }
         // A device that sends without end must not keep the watchdog quiet.
-        let given = receiver.observe(cycle, &inputs, outputs) && receiver.recording.beats.len() <= wanted;
-        idle = if taken || given { 0 } else { idle + 1 };
+        let delivered = receiver.observe(cycle, &inputs, outputs) && receiver.recording.beats.len() <= wanted;
+        idle = if accepted || delivered { 0 } else { idle + 1 };
         if receiver.recording.beats.len() >= wanted && sender.frame == frames.len() {
             tail -= 1;
             if tail == 0 {
                 break;
             }
         } else if idle >= watchdog {
-            receiver.give_up(cycle, watchdog, &sender);
+            receiver.time_out(cycle, watchdog, &sender);
             break;
         }
     }
@@ -92,17 +98,17 @@ pub fn record(device: &mut dyn Device, taps: usize, frames: &[Play], stimulus: S
 
 /// Resets the device while it receives, and leaves it computing: the reset that follows must clear
 /// every trace of both.
-fn interrupt(device: &mut dyn Device, play: &Play) {
+fn leave_work_in_progress(device: &mut dyn Device, play: &InputFrame) {
     let (half, whole) = (play.codes.len() / 2, play.codes.len());
-    for taken in [half, whole] {
+    for count in [half, whole] {
         for _ in 0..RESET_CYCLES {
             device.cycle(&Inputs { rst: true, ..Inputs::default() });
         }
-        for (taxel, &s_data) in play.codes[..taken].iter().enumerate() {
+        for (taxel, &s_data) in play.codes[..count].iter().enumerate() {
             let s_last = (taxel + 1).is_multiple_of(play.taxels);
             device.cycle(&Inputs { s_valid: true, s_data, s_last, ..Inputs::default() });
         }
-        for _ in 0..taken {
+        for _ in 0..count {
             device.cycle(&Inputs::default());
         }
     }

@@ -13,9 +13,9 @@
 //! | hang | a frame's last beat does not come, until the reset |
 //! | silent | a beat is wrong and nothing tells; with the largest error of a force against the frame's largest force |
 
-mod judge;
-pub mod places;
-mod strike;
+mod bit_flip;
+mod classify;
+pub mod state_bits;
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
@@ -29,15 +29,15 @@ use dermis_golden::scene::Scene;
 use serde::Serialize;
 
 use crate::bench::INSTANCE;
-use crate::drive::{record, Play, Stimulus};
+use crate::drive::{record, InputFrame, Stimulus};
 use crate::hardware::Hardware;
 use crate::progress::Progress;
 use crate::report;
-use crate::stress::{drawn, own, Sample};
-use crate::tried::{self, Tried};
-use judge::{judge, Verdict};
-use places::{places, Class, Place, CLASSES};
-use strike::Struck;
+use crate::run_log::{RunLog, TargetCounts};
+use crate::stress::{shipped_samples, synthetic_samples, Sample};
+use bit_flip::{FaultInjector, StateBit};
+use classify::{classify, Outcome};
+use state_bits::{state_elements, StateElement, StorageClass, CLASSES};
 
 /// What to try.
 #[derive(Args, Debug)]
@@ -68,17 +68,20 @@ pub const LARGE: f64 = 0.01;
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Row {
     /// ROM, RAM or registers.
-    pub class: Class,
+    pub class: StorageClass,
     /// The stage.
     pub stage: String,
     /// Registers and memories.
     pub signals: usize,
     /// Their bits.
-    pub places: usize,
+    #[serde(rename = "places")]
+    pub bits: usize,
     /// Faults.
-    pub tried: usize,
+    #[serde(rename = "tried")]
+    pub flips: usize,
     /// Different bits among them.
-    pub hit: usize,
+    #[serde(rename = "hit")]
+    pub distinct_bits: usize,
     /// Nothing came of it.
     pub harmless: usize,
     /// The device told.
@@ -99,86 +102,88 @@ pub struct Row {
 ///
 /// # Errors
 /// No Verilator, a design that it refuses, or frames of another sensor.
-pub fn faults(hardware: &Hardware, frames: &[Frame], count: usize, seed: u64) -> Result<Vec<Row>> {
+pub fn inject_faults(hardware: &Hardware, frames: &[Frame], count: usize, seed: u64) -> Result<Vec<Row>> {
     let mut random = fastrand::Rng::with_seed(seed);
-    let mut pool = own(&hardware.model, frames)?;
-    if !pool.iter().any(Sample::presses) {
-        pool = drawn(&hardware.model, &mut random);
+    let mut pool = shipped_samples(&hardware.model, frames)?;
+    if !pool.iter().any(Sample::has_force) {
+        pool = synthetic_samples(&hardware.model, &mut random);
     }
-    pool.retain(Sample::presses);
-    let mut device = hardware.writable()?;
+    pool.retain(Sample::has_force);
+    let mut device = hardware.device_with_writable_state()?;
     let memories = &hardware.model.resources.memories;
-    let places = places(&device.listing()?, INSTANCE, memories)?;
+    let elements = state_elements(&device.listing()?, INSTANCE, memories)?;
     let longest = pool.iter().map(|sample| sample.cycles.total).max().unwrap_or(0);
-    let mut rows: BTreeMap<(Class, String), Row> = BTreeMap::new();
-    for place in &places {
+    let mut rows: BTreeMap<(StorageClass, String), Row> = BTreeMap::new();
+    for element in &elements {
         // There and back again: every place can be hit.
-        if ![(); 2].iter().all(|()| device.flip(&place.scope, &place.signal, place.words - 1, place.bits - 1)) {
+        if ![(); 2].iter().all(|()| device.flip(&element.scope, &element.signal, element.words - 1, element.bits - 1)) {
             bail!(
                 "{}.{}, word {}, bit {} cannot be flipped",
-                place.scope,
-                place.signal,
-                place.words - 1,
-                place.bits - 1
+                element.scope,
+                element.signal,
+                element.words - 1,
+                element.bits - 1
             );
         }
-        let row = rows.entry((place.class, place.stage.clone())).or_insert_with(|| Row::new(place));
-        (row.signals, row.places) = (row.signals + 1, row.places + place.words * place.bits);
+        let row = rows.entry((element.class, element.stage.clone())).or_insert_with(|| Row::new(element));
+        (row.signals, row.bits) = (row.signals + 1, row.bits + element.words * element.bits);
     }
-    let mut hit = BTreeSet::new();
+    let mut flipped = BTreeSet::new();
     let bar = Progress::steps("faults", count as u64);
     for run in 0..count {
-        bar.at(run as u64);
-        let Some((index, word, bit)) = draw(&places, run, &mut random) else { continue };
-        let place = &places[index];
+        bar.set(run as u64);
+        let Some((index, word, bit)) = draw(&elements, run, &mut random) else { continue };
+        let element = &elements[index];
         let [first, second, after] = [(); 3].map(|()| &pool[random.usize(..pool.len())]);
-        let at = random.u64(..first.cycles.total);
-        let mut struck = Struck::new(&mut device, (place, word, bit), at);
-        let played = [first, second].map(play);
-        let recording = record(&mut struck, 0, &played, Stimulus::FullSpeed, 4 * longest);
-        let verdict = judge(&recording, &[first, second]);
-        if place.class == Class::Rom {
-            struck.strike();
+        let flip_cycle = random.u64(..first.cycles.total);
+        let mut injector = FaultInjector::new(&mut device, StateBit { element, word, bit }, flip_cycle);
+        let frames = [first, second].map(input_frame);
+        let recording = record(&mut injector, 0, &frames, Stimulus::FullSpeed, 4 * longest);
+        let outcome = classify(&recording, &[first, second]);
+        if element.class == StorageClass::Rom {
+            injector.flip();
         }
-        let again = record(&mut device, 0, &[play(after)], Stimulus::FullSpeed, 4 * longest);
-        let recovered = judge(&again, &[after]) == Verdict::Harmless;
-        if let Some(row) = rows.get_mut(&(place.class, place.stage.clone())) {
-            row.add(verdict, recovered, hit.insert((index, word, bit)));
+        let again = record(&mut device, 0, &[input_frame(after)], Stimulus::FullSpeed, 4 * longest);
+        let recovered = classify(&again, &[after]) == Outcome::Harmless;
+        if let Some(row) = rows.get_mut(&(element.class, element.stage.clone())) {
+            row.add(outcome, recovered, flipped.insert((index, word, bit)));
         }
     }
     Ok(rows.into_values().collect())
 }
 
 /// The class's stages take turns; of a stage every bit is alike likely: place, word, bit.
-fn draw(places: &[Place], run: usize, random: &mut fastrand::Rng) -> Option<(usize, usize, usize)> {
+fn draw(elements: &[StateElement], run: usize, random: &mut fastrand::Rng) -> Option<(usize, usize, usize)> {
     let class = CLASSES[run % CLASSES.len()];
     let stages: BTreeSet<&str> =
-        places.iter().filter(|place| place.class == class).map(|place| place.stage.as_str()).collect();
+        elements.iter().filter(|element| element.class == class).map(|element| element.stage.as_str()).collect();
     let stage = stages.iter().nth(run / CLASSES.len() % stages.len().max(1))?;
-    let own = || places.iter().enumerate().filter(|(_, place)| (place.class, place.stage.as_str()) == (class, *stage));
-    let mut left = random.usize(..own().map(|(_, place)| place.words * place.bits).sum::<usize>());
-    for (index, place) in own() {
-        if left < place.words * place.bits {
-            return Some((index, left / place.bits, left % place.bits));
+    let own = || {
+        elements.iter().enumerate().filter(|(_, element)| (element.class, element.stage.as_str()) == (class, *stage))
+    };
+    let mut left = random.usize(..own().map(|(_, element)| element.words * element.bits).sum::<usize>());
+    for (index, element) in own() {
+        if left < element.words * element.bits {
+            return Some((index, left / element.bits, left % element.bits));
         }
-        left -= place.words * place.bits;
+        left -= element.words * element.bits;
     }
     None
 }
 
-fn play(sample: &Sample) -> Play<'_> {
-    Play { codes: &sample.codes, taxels: sample.taxels, beats: sample.beats.len() }
+fn input_frame(sample: &Sample) -> InputFrame<'_> {
+    InputFrame { codes: &sample.codes, taxels: sample.taxels, beats: sample.beats.len() }
 }
 
 impl Row {
-    fn new(place: &Place) -> Row {
+    fn new(element: &StateElement) -> Row {
         Row {
-            class: place.class,
-            stage: place.stage.clone(),
+            class: element.class,
+            stage: element.stage.clone(),
             signals: 0,
-            places: 0,
-            tried: 0,
-            hit: 0,
+            bits: 0,
+            flips: 0,
+            distinct_bits: 0,
             harmless: 0,
             detected: 0,
             hang: 0,
@@ -189,15 +194,15 @@ impl Row {
         }
     }
 
-    fn add(&mut self, verdict: Verdict, recovered: bool, new: bool) {
-        self.tried += 1;
-        self.hit += usize::from(new);
+    fn add(&mut self, outcome: Outcome, recovered: bool, new: bool) {
+        self.flips += 1;
+        self.distinct_bits += usize::from(new);
         self.not_recovered += usize::from(!recovered);
-        match verdict {
-            Verdict::Harmless => self.harmless += 1,
-            Verdict::Detected => self.detected += 1,
-            Verdict::Hang => self.hang += 1,
-            Verdict::Silent(error) => {
+        match outcome {
+            Outcome::Harmless => self.harmless += 1,
+            Outcome::Detected => self.detected += 1,
+            Outcome::Hang => self.hang += 1,
+            Outcome::Silent(error) => {
                 self.silent += 1;
                 self.large += usize::from(error > LARGE);
                 self.largest_error = self.largest_error.max(error);
@@ -225,11 +230,11 @@ pub struct Shares {
 
 impl Shares {
     /// Each stage's shares, weighted by its bits; `None` where there is no such bit or none was flipped.
-    pub fn of(rows: &[Row], class: Class) -> Option<Shares> {
-        let own = || rows.iter().filter(move |row| row.class == class && row.tried > 0);
-        let bits: usize = own().map(|row| row.places).sum();
+    pub fn of(rows: &[Row], class: StorageClass) -> Option<Shares> {
+        let own = || rows.iter().filter(move |row| row.class == class && row.flips > 0);
+        let bits: usize = own().map(|row| row.bits).sum();
         let share = |count: fn(&Row) -> usize| {
-            own().map(|row| row.places as f64 * count(row) as f64 / row.tried as f64).sum::<f64>() / bits as f64
+            own().map(|row| row.bits as f64 * count(row) as f64 / row.flips as f64).sum::<f64>() / bits as f64
         };
         (bits > 0).then(|| Shares {
             bits,
@@ -243,7 +248,7 @@ impl Shares {
 }
 
 /// What the report keeps of a class.
-fn kept(scene: &str, class: Class, rows: &[Row], seconds: f64) -> tried::Line {
+fn target_counts(scene: &str, class: StorageClass, rows: &[Row], seconds: f64) -> TargetCounts {
     let own = || rows.iter().filter(move |row| row.class == class);
     let sum = |count: fn(&Row) -> usize| own().map(count).sum::<usize>() as u64;
     let counts = [
@@ -253,8 +258,8 @@ fn kept(scene: &str, class: Class, rows: &[Row], seconds: f64) -> tried::Line {
         ("silent", sum(|row| row.silent)),
         ("not recovered", sum(|row| row.not_recovered)),
     ];
-    let tried = sum(|row| row.tried);
-    tried::Line::new(format!("{scene}, {}", class.name()), "bits flipped", tried, counts, seconds)
+    let flips = sum(|row| row.flips);
+    TargetCounts::new(format!("{scene}, {}", class.name()), "bits flipped", flips, counts, seconds)
 }
 
 /// The outcomes as text, and whether a reset always helped; the counts stay in the build folder for the report.
@@ -267,12 +272,12 @@ pub fn run(arguments: &Arguments, build: &Path) -> Result<(String, bool)> {
     let hardware = Hardware::new(Model::for_frames(&scene, &frames)?, build)?;
     let Arguments { scene: name, count, seed, .. } = arguments;
     let begun = Instant::now();
-    let rows = faults(&hardware, &frames, *count, *seed)?;
-    let mut tried = Tried::new(&format!("dermis faults {name} --count {count} --seed {seed}"));
+    let rows = inject_faults(&hardware, &frames, *count, *seed)?;
+    let mut log = RunLog::new(&format!("dermis faults {name} --count {count} --seed {seed}"));
     // The classes take turns, a third of the time each.
     let seconds = begun.elapsed().as_secs_f64() / CLASSES.len() as f64;
-    tried.lines.extend(CLASSES.map(|class| kept(&scene.name, class, &rows, seconds)));
-    tried.keep(build, "faults")?;
+    log.targets.extend(CLASSES.map(|class| target_counts(&scene.name, class, &rows, seconds)));
+    log.save(build, "faults")?;
     let good = rows.iter().all(|row| row.not_recovered == 0);
     let text = if arguments.json { serde_json::to_string(&rows)? + "\n" } else { report::faults(&rows) };
     Ok((text, good))

@@ -15,7 +15,7 @@ use dermis_golden::generator::converter::Converter;
 use dermis_golden::generator::{generate, random_contacts, Draw};
 use dermis_golden::scene::Scene;
 
-use crate::fresh::Shapes;
+use crate::drawn_frames::Shapes;
 use dermis_golden::write::write;
 
 /// What to generate.

@@ -18,9 +18,9 @@ use dermis_hdl::link::{board_simulator, generate_board, BoardDevice};
 use dermis_hdl::{generate, simulator, Generated};
 use thiserror::Error;
 
-use crate::board::{Faults, Terminal, UartLine, VerilatedBoard, Wire};
+use crate::board::{ChannelFaults, HostUart, NoisyChannel, PseudoTerminal, VerilatedBoard};
 use crate::cosim::Vector;
-use crate::drive::{record, Play, Stimulus};
+use crate::drive::{record, InputFrame, Stimulus};
 use crate::inputs::require_uart;
 use crate::netlist::netlist;
 use crate::verilator::{Design, Verilated, VerilatorError};
@@ -31,7 +31,7 @@ const WATCHDOG: u64 = 1_000_000;
 /// Hardware that stopped answering; a defect of this program.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 #[error("frame {frame}, cycle {cycle}: {rule}")]
-pub struct Stuck {
+pub struct DeviceTimeout {
     /// Frame name.
     pub frame: String,
     /// When it was given up.
@@ -101,18 +101,18 @@ impl Hardware {
     ///
     /// # Errors
     /// As [`Hardware::device`].
-    pub fn writable(&self) -> Result<Verilated, VerilatorError> {
+    pub fn device_with_writable_state(&self) -> Result<Verilated, VerilatorError> {
         self.verilated(&self.generated, true)
     }
 
-    fn verilated(&self, generated: &Generated, writable: bool) -> Result<Verilated, VerilatorError> {
+    fn verilated(&self, generated: &Generated, writable_state: bool) -> Result<Verilated, VerilatorError> {
         let files = generated.files.iter().map(|f| (f.name.as_str(), f.text.as_str()));
         let design = Design {
             top: &generated.top,
             files: files.collect(),
             taps: &generated.taps,
             input_bits: self.model.formats.code_bits,
-            writable,
+            writable_state,
         };
         Verilated::new(&design, &self.cache)
     }
@@ -135,20 +135,20 @@ impl Hardware {
     ///
     /// # Errors
     /// As [`Hardware::board`]; no pseudo-terminal, a link that is no UART.
-    pub fn terminal(&self) -> Result<Terminal> {
-        let perfect = || Wire::new(Faults::default());
-        self.terminal_behind(perfect(), perfect())
+    pub fn terminal(&self) -> Result<PseudoTerminal> {
+        let ideal = || NoisyChannel::new(ChannelFaults::default());
+        self.terminal_with_channels(ideal(), ideal())
     }
 
     /// The same behind these wires.
     ///
     /// # Errors
     /// As [`Hardware::terminal`].
-    pub fn terminal_behind(&self, to_board: Wire, to_host: Wire) -> Result<Terminal> {
+    pub fn terminal_with_channels(&self, to_board: NoisyChannel, to_host: NoisyChannel) -> Result<PseudoTerminal> {
         require_uart(&self.model.scene, "board")?;
         let identity = Identity::of(&self.model)?;
-        let line = UartLine::new(self.board(Simulator::Verilator)?, identity.bit_rate, identity.clock_hz);
-        Ok(Terminal::start(line, to_board, to_host)?)
+        let uart = HostUart::new(self.board(Simulator::Verilator)?, identity.bit_rate, identity.clock_hz);
+        Ok(PseudoTerminal::start(uart, to_board, to_host)?)
     }
 
     /// The stages' streams that a device of this simulator shows; in a netlist there are none left.
@@ -160,7 +160,11 @@ impl Hardware {
     }
 
     /// The names of the streams that a device of this simulator shows, and `vectors` without the stages that it does not.
-    pub fn shown<'a>(&self, simulator: Simulator, vectors: &'a [Vector]) -> (Vec<&'static str>, Cow<'a, [Vector]>) {
+    pub fn observable<'a>(
+        &self,
+        simulator: Simulator,
+        vectors: &'a [Vector],
+    ) -> (Vec<&'static str>, Cow<'a, [Vector]>) {
         let taps = self.taps(simulator);
         let vectors = match taps {
             [] => vectors.iter().map(Vector::without_stages).collect(),
@@ -189,16 +193,16 @@ impl Hardware {
     /// Reconstructs the mean of the scene's number of frames in the Verilated hardware, engine `rtl`.
     ///
     /// # Errors
-    /// As [`Hardware::device`]; [`Stuck`].
+    /// As [`Hardware::device`]; [`DeviceTimeout`].
     pub fn reconstruct(&self, frames: &[Frame]) -> Result<Reconstruction> {
         let vector = self.vector(frames)?;
         let forces = vector.expected.beats.len();
-        let plays =
-            [Play { codes: &vector.codes, taxels: vector.taxels, beats: forces + vector.expected.status.len() }];
+        let inputs =
+            [InputFrame { codes: &vector.codes, taxels: vector.taxels, beats: forces + vector.expected.status.len() }];
         let mut device = self.device(Simulator::Verilator)?;
-        let recording = record(device.as_mut(), 0, &plays, Stimulus::FullSpeed, WATCHDOG);
+        let recording = record(device.as_mut(), 0, &inputs, Stimulus::FullSpeed, WATCHDOG);
         if let Some(timeout) = recording.timeout {
-            return Err(Stuck { frame: vector.frame, cycle: timeout.cycle, rule: timeout.rule }.into());
+            return Err(DeviceTimeout { frame: vector.frame, cycle: timeout.cycle, rule: timeout.rule }.into());
         }
         let beats: Vec<[i32; 3]> = recording.beats.iter().map(|beat| beat.data).collect();
         let (forces, status) = beats.split_at(forces.min(beats.len()));

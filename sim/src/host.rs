@@ -12,8 +12,8 @@ mod client;
 mod error;
 mod stream;
 
-pub use answer::{Answer, Line};
-pub use client::{Client, Lost};
+pub use answer::{Answer, PhysicalAnswer};
+pub use client::{Client, LinkErrors};
 pub use error::HostError;
 
 use std::path::PathBuf;
@@ -28,12 +28,12 @@ use dermis_golden::quantise::full_scale;
 use dermis_golden::scene::Scene;
 use serialport::SerialPort;
 
-use crate::inputs::{require_uart, resolve, OnBoard};
+use crate::inputs::{require_uart, resolve, BoardOverride};
 use crate::progress::Progress;
 use crate::report;
 
 /// How long a read of the port waits for a byte.
-const READ: Duration = Duration::from_millis(10);
+const READ_TIMEOUT: Duration = Duration::from_millis(10);
 
 /// What to ask a board.
 #[derive(Args, Debug)]
@@ -68,7 +68,7 @@ pub struct Arguments {
     #[arg(long, value_name = "MS", default_value_t = 1000)]
     timeout: u64,
     #[command(flatten)]
-    target: OnBoard,
+    target: BoardOverride,
 }
 
 const EXAMPLES: &str = "Examples:
@@ -105,7 +105,7 @@ impl<P: std::io::Read + std::io::Write> Session<P> {
     }
 
     /// The frame without what the sensor reads when nothing touches it; 0 where a taxel is dead.
-    fn tared(&self, frame: &Frame) -> Frame {
+    fn subtract_tare(&self, frame: &Frame) -> Frame {
         let mut frame = frame.clone();
         for (stress, zero) in frame.stress_MPa.iter_mut().zip(self.tare_MPa.iter().flatten()) {
             *stress -= zero;
@@ -117,14 +117,14 @@ impl<P: std::io::Read + std::io::Write> Session<P> {
     ///
     /// # Errors
     /// A frame of another sensor, no answer.
-    pub fn ask(&mut self, frame: &Frame) -> Result<(Frame, Answer)> {
-        let frame = self.tared(frame);
+    pub fn request(&mut self, frame: &Frame) -> Result<(Frame, Answer)> {
+        let frame = self.subtract_tare(frame);
         let codes = self.model.codes(&frame)?.codes;
         // A board that adds nothing up sends all forces, and the host does.
         let forces = self.forces || !self.identity.takes(Kind::FrameForResultants);
         let mut answer = self.client.frame(&self.model, &codes, forces)?;
         if self.check {
-            answer.difference = Some(answer.against(&self.model, &codes));
+            answer.difference = Some(answer.compare_with_model(&self.model, &codes));
         }
         answer.beats = answer.beats.filter(|_| self.forces);
         Ok((frame, answer))
@@ -136,7 +136,7 @@ impl<P: std::io::Read + std::io::Write> Session<P> {
 /// # Errors
 /// A port that does not exist, is taken, or does not know the bit rate.
 pub fn open(port: &str, baud: u32, timeout: Duration) -> Result<Client<Box<dyn SerialPort>>, HostError> {
-    let opened = serialport::new(port, baud).timeout(READ).open();
+    let opened = serialport::new(port, baud).timeout(READ_TIMEOUT).open();
     let opened = opened.map_err(|error| HostError::Port { port: port.to_owned(), reason: error.to_string() })?;
     Ok(Client::new(opened, port, timeout))
 }
@@ -150,7 +150,7 @@ pub fn run(arguments: &Arguments) -> Result<(String, bool)> {
         true => (Scene::load(arguments.scene.as_deref().unwrap_or_default())?, Vec::new()),
         false => resolve(arguments.scene.as_deref(), &arguments.frames)?,
     };
-    let scene = arguments.target.put(scene);
+    let scene = arguments.target.apply(scene);
     require_uart(&scene, "host")?;
     let model = Model::new(&scene)?;
     let tare = arguments.tare.as_ref().map(|path| Frame::load(path, Some(&scene))).transpose()?;
@@ -160,25 +160,25 @@ pub fn run(arguments: &Arguments) -> Result<(String, bool)> {
     let mut session = Session::new(client, model, tare.as_ref(), arguments.forces, arguments.check)?;
     let before = session.client.counters()?;
     let begun = Instant::now();
-    let played = match arguments.stream {
+    let sent = match arguments.stream {
         true => stream::run(&mut session, &mut std::io::stdin().lock(), &mut std::io::stdout().lock())?,
-        false => play(&mut session, &frames)?,
+        false => send_frames(&mut session, &frames)?,
     };
-    let rate = played.answered as f64 / begun.elapsed().as_secs_f64();
+    let rate = sent.answered as f64 / begun.elapsed().as_secs_f64();
     let after = session.client.counters()?;
-    let summary = summary(&session.identity, played.answered, rate, session.client.lost, &before, &after);
+    let summary = summary(&session.identity, sent.answered, rate, session.client.link_errors, &before, &after);
     if arguments.stream {
         eprint!("{summary}");
     }
-    match (arguments.stream, played.refused) {
-        (true, 0) => Ok((String::new(), played.equal)),
-        (true, refused) => bail!("standard input: {refused} of {} lines were refused", refused + played.answered),
-        (false, _) => Ok((played.text + &summary, played.equal)),
+    match (arguments.stream, sent.refused) {
+        (true, 0) => Ok((String::new(), sent.equal)),
+        (true, refused) => bail!("standard input: {refused} of {} lines were refused", refused + sent.answered),
+        (false, _) => Ok((sent.text + &summary, sent.equal)),
     }
 }
 
 /// What became of all frames.
-struct Played {
+struct FramesSent {
     /// For standard output, where the frames came from files.
     text: String,
     /// All that was compared is equal to the model.
@@ -190,26 +190,37 @@ struct Played {
 }
 
 /// Sends the frames one after the other.
-fn play<P: std::io::Read + std::io::Write>(session: &mut Session<P>, frames: &[Frame]) -> Result<Played> {
+fn send_frames<P: std::io::Read + std::io::Write>(session: &mut Session<P>, frames: &[Frame]) -> Result<FramesSent> {
     let bar = Progress::steps(&format!("{}: frames", session.model.scene.name), frames.len() as u64);
     let (mut text, mut equal) = (String::new(), true);
     for (index, frame) in frames.iter().enumerate() {
-        let (frame, answer) = session.ask(frame)?;
+        let (frame, answer) = session.request(frame)?;
         if let Some(beats) = &answer.beats {
             let result = session.model.decode(&frame, "board", beats, &answer.status)?;
             let sensor = &session.model.scene.sensor;
             text.push_str(&report::reconstruction(&result, sensor, full_scale(&session.model.scene, &frame)));
             text.push_str(&report::equality(&answer));
         } else {
-            text.push_str(&report::resultants(&frame.id, &Line::new(&session.model, &frame, &answer)?, &answer));
+            text.push_str(&report::resultants(
+                &frame.id,
+                &PhysicalAnswer::new(&session.model, &frame, &answer)?,
+                &answer,
+            ));
         }
         equal &= !matches!(answer.difference, Some(Some(_)));
-        bar.at(index as u64 + 1);
+        bar.set(index as u64 + 1);
     }
-    Ok(Played { text, equal, answered: frames.len(), refused: 0 })
+    Ok(FramesSent { text, equal, answered: frames.len(), refused: 0 })
 }
 
-fn summary(identity: &Identity, count: usize, rate: f64, lost: Lost, before: &Counters, after: &Counters) -> String {
+fn summary(
+    identity: &Identity,
+    count: usize,
+    rate: f64,
+    errors: LinkErrors,
+    before: &Counters,
+    after: &Counters,
+) -> String {
     let since = |field: fn(&Counters) -> u16| field(after).wrapping_sub(field(before));
     format!(
         "board           {}×{} taxels, {} bit codes, {} MHz, scene {:08x}{}\n\
@@ -222,8 +233,8 @@ fn summary(identity: &Identity, count: usize, rate: f64, lost: Lost, before: &Co
         f64::from(identity.clock_hz) / 1e6,
         identity.scene,
         if identity.takes(Kind::FrameForResultants) { "" } else { ", sends forces for the host to add up" },
-        lost.repeated,
-        lost.damaged,
+        errors.repeated,
+        errors.damaged,
         since(|c| c.framing),
         since(|c| c.crc),
         since(|c| c.unknown_type),

@@ -19,15 +19,15 @@ pub const EQ2: &str = "eq2";
 
 /// Another board than a scene's own.
 #[derive(Args, Clone, Debug, Default)]
-pub struct OnBoard {
+pub struct BoardOverride {
     /// Board in place of the scene's own, a file's name in constraints.
     #[arg(long, value_name = "NAME")]
     target_board: Option<String>,
 }
 
-impl OnBoard {
+impl BoardOverride {
     /// The scene on that board.
-    pub fn put(&self, mut scene: Scene) -> Scene {
+    pub fn apply(&self, mut scene: Scene) -> Scene {
         scene.hardware.board = self.target_board.clone().unwrap_or(scene.hardware.board);
         scene
     }
@@ -55,7 +55,7 @@ pub fn require_uart(scene: &Scene, command: &str) -> Result<()> {
 pub fn resolve(scene: Option<&str>, frames: &[String]) -> Result<(Scene, Vec<Frame>)> {
     let scene = match (scene, frames.first().map(String::as_str)) {
         (Some(scene), _) => Scene::load(scene)?,
-        (None, Some(first)) if first != EQ2 => of_frame(first)?,
+        (None, Some(first)) if first != EQ2 => scene_of_frame(first)?,
         (None, Some(_)) => bail!("--frame {EQ2} has no sensor of its own: name a scene"),
         (None, None) => bail!(
             "name a scene ({}, or a file), or a frame file that holds its sensor",
@@ -106,7 +106,7 @@ fn load(path: &str, scene: &Scene) -> Result<Frame> {
 }
 
 /// The scene that a frame file's own sensor stands for.
-fn of_frame(path: &str) -> Result<Scene> {
+fn scene_of_frame(path: &str) -> Result<Scene> {
     let sensor = Frame::load(path, None)?.sensor;
     for name in Scene::builtin_names() {
         let scene = Scene::builtin(name)?;

@@ -11,7 +11,7 @@ use thiserror::Error;
 use crate::progress::Progress;
 
 /// Exit code of a second interruption, which does not wait.
-const IMPATIENT: i32 = 130;
+const SECOND_INTERRUPT_EXIT: i32 = 130;
 
 /// The user has had enough.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Error)]
@@ -27,11 +27,11 @@ impl Interrupt {
     ///
     /// # Errors
     /// The system has no signals to spare.
-    pub fn of_signals() -> Result<Interrupt> {
+    pub fn on_signals() -> Result<Interrupt> {
         let interrupt = Interrupt::default();
         for signal in [SIGINT, SIGTERM] {
             // In this order: the first one finds the flag unset.
-            flag::register_conditional_shutdown(signal, IMPATIENT, interrupt.0.clone())?;
+            flag::register_conditional_shutdown(signal, SECOND_INTERRUPT_EXIT, interrupt.0.clone())?;
             flag::register(signal, interrupt.0.clone())?;
         }
         Ok(interrupt)
@@ -70,7 +70,7 @@ pub fn parallel<T: Send, R: Send>(
             let result = work(task);
             failed.fetch_or(result.is_err(), Ordering::Relaxed);
             *results[index].lock().unwrap_or_else(PoisonError::into_inner) = Some(result);
-            bar.at(done.fetch_add(1, Ordering::Relaxed) as u64 + 1);
+            bar.set(done.fetch_add(1, Ordering::Relaxed) as u64 + 1);
         }
     };
     std::thread::scope(|scope| (0..jobs.max(1)).for_each(|_| drop(scope.spawn(worker))));

@@ -2,7 +2,7 @@
 //!
 //! ```text
 //! frame -> codes --+--> bit-true model ------------> Trace ----+
-//!                  |                                           +--> cosim::judge -> report
+//!                  |                                           +--> cosim::compare_recording -> report
 //!                  +--> drive -> Device (Verilator,            |
 //!                                rust-hdl) -> Recording -------+
 //! ```
@@ -15,7 +15,7 @@
 //! | [`drive`] | plays frames into a device and records every transfer with its cycle |
 //! | [`cosim`] | compares a recording with the bit-true model |
 //! | [`mod@faults`] | `dermis faults`: single bits flipped, and what comes of it |
-//! | [`fresh`] | frames of drawn contacts for `dermis table --fresh` |
+//! | [`drawn_frames`] | frames of drawn contacts for `dermis table --fresh` |
 //! | [`mod@generate`] | `dermis generate`: frames with known forces from described contacts |
 //! | [`board`] | a simulated board, its UART on a pseudo-terminal or its SPI under a controller |
 //! | [`mod@guide`] | pages: method, formats, architecture, adding a sensor or a board, the engine in a design, limits |
@@ -26,7 +26,7 @@
 //! | [`report`] | tables and the JSON contract; `dermis report`, measured and drawn |
 //! | [`host`] | frames to a board over a serial port, forces back |
 //! | [`stability`] | `dermis stability`: errors against condition, extreme frames |
-//! | [`mod@tried`] | what long runs have tried, kept for the report |
+//! | [`mod@run_log`] | what long runs have tried, kept for the report |
 //! | [`mod@stress`] | `dermis stress`: both streams under gaps, wrong `tlast` and resets |
 //! | [`jobs`] | tasks on several threads, until one fails or the user interrupts |
 //! | [`inputs`] | scene and frames from what the command line names |
@@ -36,15 +36,16 @@
 // Names carry their unit as SI writes it: `full_scale_MPa`.
 #![allow(non_snake_case)]
 
+mod artifact_cache;
 pub mod bench;
 pub mod bitstream;
 pub mod board;
 pub mod cli;
 pub mod compare;
 pub mod cosim;
+pub mod drawn_frames;
 pub mod drive;
 pub mod faults;
-pub mod fresh;
 pub mod generate;
 pub mod guide;
 pub mod hardware;
@@ -52,13 +53,12 @@ pub mod host;
 pub mod inputs;
 pub mod jobs;
 pub mod netlist;
-mod place;
 mod progress;
 pub mod report;
+pub mod run_log;
 pub mod stability;
 pub mod stress;
 pub mod tabulate;
-pub mod tried;
 pub mod verify;
 pub mod verilator;
 pub mod waves;

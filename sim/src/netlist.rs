@@ -14,10 +14,10 @@ use dermis_golden::board::Family;
 use dermis_golden::write::write;
 use dermis_hdl::{Generated, GeneratedFile};
 
+use crate::artifact_cache;
 use crate::bitstream::family::YOSYS;
 use crate::bitstream::synthesis::{run, synthesise, NETLIST};
 use crate::bitstream::tools::ToolError;
-use crate::place;
 use crate::progress::Progress;
 use crate::verilator::fingerprint;
 
@@ -53,7 +53,7 @@ pub fn netlist(generated: &Generated, family: Family, cache: &Path) -> Result<Ge
     let version = format!("{family:?} {}", YOSYS.version()?);
     let folder = cache.join(format!("netlist-{}", fingerprint(&texts, &version)));
     let path = folder.join(VERILOG);
-    if !place::is_whole(&folder, VERILOG) {
+    if !artifact_cache::is_intact(&folder, VERILOG) {
         make(&read, &generated.top, family, &folder)?;
     }
     let text = fs::read_to_string(&path).map_err(ToolError::io(&path))?;
@@ -74,7 +74,7 @@ fn is_read(name: &str) -> bool {
 
 /// Makes the netlist of `files` that `folder` is to hold.
 fn make(files: &[&GeneratedFile], top: &str, family: Family, folder: &Path) -> Result<(), ToolError> {
-    let work = place::begin(folder)?;
+    let work = artifact_cache::staging_folder(folder)?;
     for file in files {
         write(&work.path().join(&file.name), file.text.as_bytes())?;
     }
@@ -83,7 +83,7 @@ fn make(files: &[&GeneratedFile], top: &str, family: Family, folder: &Path) -> R
     // Without the cells, which Yosys has as empty modules.
     let script = format!("read_json {NETLIST}; select {top}; write_verilog -noattr -selected {VERILOG}");
     run(work.path(), script, "verilog.log")?;
-    Ok(place::finish(work, folder, VERILOG)?)
+    Ok(artifact_cache::publish(work, folder, VERILOG)?)
 }
 
 /// Models of the family's cells: Yosys's, and ours where it has none.

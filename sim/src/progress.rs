@@ -34,13 +34,13 @@ impl Progress {
     }
 
     /// Shows how many of how many steps are done.
-    pub fn of(&self, done: u64, total: u64) {
+    pub fn set_of(&self, done: u64, total: u64) {
         self.0.set_length(total);
         self.0.set_position(done);
     }
 
     /// Shows how many steps are done.
-    pub fn at(&self, done: u64) {
+    pub fn set(&self, done: u64) {
         self.0.set_position(done);
     }
 }

@@ -8,8 +8,11 @@
 //! Times are total cycles (first input beat to last output beat) at the engine's clock; the margin is
 //! what they leave of [`BUDGET_US`].
 
+mod bitstream_report;
 mod cases;
 mod csv;
+#[cfg(test)]
+mod csv_reader;
 mod data;
 mod document;
 mod errors;
@@ -17,13 +20,10 @@ mod extremes;
 mod faults;
 mod host;
 mod html;
-mod implemented;
 mod measure;
-mod needs;
 mod noise;
 mod pictures;
-#[cfg(test)]
-mod read;
+mod resource_report;
 mod result;
 mod run;
 mod save;
@@ -34,14 +34,14 @@ mod style;
 mod table;
 
 pub use crate::jobs::Interrupted;
+pub use bitstream_report::{bitstream, BitstreamReport};
 pub use cases::cases;
 pub use errors::errors;
 pub use extremes::extremes;
 pub use faults::faults;
 pub use host::{equality, resultants, wire_times};
-pub use implemented::{implemented, Implemented};
-pub use needs::{features, resources};
 pub use noise::noise;
+pub use resource_report::{features, resources};
 pub use result::{difference, reconstruction};
 pub use run::{run, Arguments};
 pub use sections::stability_picture;

@@ -58,7 +58,7 @@ pub fn run(arguments: &Arguments) -> Result<String> {
     let mut rows = Vec::with_capacity(wanted.len());
     for setting in &wanted {
         rows.push(measure(setting)?);
-        bar.at(rows.len() as u64);
+        bar.set(rows.len() as u64);
     }
     drop(bar);
     if let Some(path) = &arguments.plot {

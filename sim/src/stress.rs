@@ -9,11 +9,11 @@
 //! Each experiment takes about the asked number of cycles; resets end earlier, with one at each cycle of a frame. What a
 //! wrong `tlast` does is `stress/scoreboard.rs`'s to say.
 
-mod line;
-mod pace;
-mod pool;
+mod handshake_rates;
 mod resets;
+mod samples;
 mod scoreboard;
+mod testbench;
 
 use std::path::Path;
 use std::time::Instant;
@@ -25,15 +25,15 @@ use dermis_golden::frame::Frame;
 use dermis_golden::scene::Scene;
 use serde::Serialize;
 
-pub(crate) use pool::{drawn, own, Sample};
+pub(crate) use samples::{shipped_samples, synthetic_samples, Sample};
 pub use scoreboard::Violation;
 
 use crate::hardware::{Hardware, Simulator};
 use crate::progress::Progress;
 use crate::report;
-use crate::tried::{self, Tried};
-use line::{Burst, Line, RESET_CYCLES};
-use pace::Pace;
+use crate::run_log::{RunLog, TargetCounts};
+use handshake_rates::HandshakeRates;
+use testbench::{Burst, Testbench, RESET_CYCLES};
 
 /// What to try.
 #[derive(Args, Debug)]
@@ -83,7 +83,8 @@ pub struct Outcome {
     /// Resets.
     pub resets: u64,
     /// Cycles of a frame at full speed, where a reset may fall.
-    pub reset_places: u64,
+    #[serde(rename = "reset_places")]
+    pub possible_reset_cycles: u64,
     /// Longest reset in cycles.
     pub longest_reset: u64,
     /// How often something was other than it must.
@@ -98,47 +99,47 @@ pub struct Outcome {
 /// No Verilator, a design that it refuses, or frames of another sensor.
 pub fn stress(hardware: &Hardware, frames: &[Frame], cycles: u64, seed: u64) -> Result<Vec<Outcome>> {
     let mut random = fastrand::Rng::with_seed(seed);
-    let mut pool = own(&hardware.model, frames)?;
-    pool.extend(drawn(&hardware.model, &mut random));
+    let mut samples = shipped_samples(&hardware.model, frames)?;
+    samples.extend(synthetic_samples(&hardware.model, &mut random));
     let mut device = hardware.device(Simulator::Verilator)?;
     let mut outcomes = Vec::new();
     for experiment in ["stalls", "tlast", "reset"] {
-        let mut line = Line::new(device.as_mut(), &pool);
-        line.reset(RESET_CYCLES, &mut random);
+        let mut bench = Testbench::new(device.as_mut(), &samples);
+        bench.reset(RESET_CYCLES, &mut random);
         match experiment {
-            "stalls" => stalls(&mut line, &mut random, cycles),
-            "tlast" => tlast(&mut line, &mut random, cycles),
-            _ => resets::resets(&mut line, &mut random, cycles),
+            "stalls" => stalls(&mut bench, &mut random, cycles),
+            "tlast" => tlast(&mut bench, &mut random, cycles),
+            _ => resets::resets(&mut bench, &mut random, cycles),
         }
         let scene = hardware.model.scene.name.clone();
-        outcomes.push(Outcome { scene, experiment, ..line.finish() });
+        outcomes.push(Outcome { scene, experiment, ..bench.finish() });
     }
     Ok(outcomes)
 }
 
 /// Frames back to back; the pace changes every few frames.
-fn stalls(line: &mut Line, random: &mut fastrand::Rng, cycles: u64) {
-    while line.runs() && line.cycle() < cycles {
-        let mut pace = Pace::drawn(random);
+fn stalls(bench: &mut Testbench, random: &mut fastrand::Rng, cycles: u64) {
+    while bench.can_continue() && bench.cycle() < cycles {
+        let mut rates = HandshakeRates::random(random);
         for _ in 0..1 + random.usize(..6) {
-            let sample = random.usize(..line.samples());
-            line.send(&Burst::whole(line.sample(sample), sample), &mut pace);
+            let sample = random.usize(..bench.sample_count());
+            bench.send(&Burst::whole(bench.sample(sample), sample), &mut rates);
         }
         if random.u32(..8) == 0 {
-            let sample = random.usize(..line.samples());
-            line.send_alone(&Burst::whole(line.sample(sample), sample));
+            let sample = random.usize(..bench.sample_count());
+            bench.send_alone(&Burst::whole(bench.sample(sample), sample));
         }
     }
-    line.drain(&mut Pace::full_speed());
+    bench.drain(&mut HandshakeRates::full_speed());
 }
 
 /// Every other frame has a wrong `tlast`.
-fn tlast(line: &mut Line, random: &mut fastrand::Rng, cycles: u64) {
-    while line.runs() && line.cycle() < cycles {
-        let mut pace = Pace::drawn(random);
+fn tlast(bench: &mut Testbench, random: &mut fastrand::Rng, cycles: u64) {
+    while bench.can_continue() && bench.cycle() < cycles {
+        let mut rates = HandshakeRates::random(random);
         for _ in 0..1 + random.usize(..6) {
-            let sample = random.usize(..line.samples());
-            let codes = line.sample(sample);
+            let sample = random.usize(..bench.sample_count());
+            let codes = bench.sample(sample);
             let burst = match random.u32(..8) {
                 0 => Burst::cut(codes, sample, 1 + random.usize(..codes.codes.len() - 1)),
                 1 => Burst::missing(codes, sample),
@@ -146,14 +147,14 @@ fn tlast(line: &mut Line, random: &mut fastrand::Rng, cycles: u64) {
                 3 => Burst::late(codes, sample),
                 _ => Burst::whole(codes, sample),
             };
-            line.send(&burst, &mut pace);
+            bench.send(&burst, &mut rates);
         }
     }
-    line.drain(&mut Pace::full_speed());
+    bench.drain(&mut HandshakeRates::full_speed());
 }
 
 /// What the report keeps of an experiment.
-fn kept(outcome: &Outcome, seconds: f64) -> tried::Line {
+fn target_counts(outcome: &Outcome, seconds: f64) -> TargetCounts {
     let counts = [
         ("frames out", outcome.frames_out),
         ("wrong tlast", outcome.wrong_tlast),
@@ -162,7 +163,7 @@ fn kept(outcome: &Outcome, seconds: f64) -> tried::Line {
         ("resets", outcome.resets),
         ("violations", outcome.violations),
     ];
-    tried::Line::new(format!("{}, {}", outcome.scene, outcome.experiment), "cycles", outcome.cycles, counts, seconds)
+    TargetCounts::new(format!("{}, {}", outcome.scene, outcome.experiment), "cycles", outcome.cycles, counts, seconds)
 }
 
 /// The outcomes as text, and whether nothing was violated; the counts stay in the build folder for the report.
@@ -172,7 +173,7 @@ fn kept(outcome: &Outcome, seconds: f64) -> tried::Line {
 pub fn run(arguments: &Arguments, build: &Path) -> Result<(String, bool)> {
     let mut outcomes = Vec::new();
     let Arguments { scenes, cycles, seed, .. } = arguments;
-    let mut tried = Tried::new(&format!("dermis stress {} --cycles {cycles} --seed {seed}", scenes.join(" ")));
+    let mut log = RunLog::new(&format!("dermis stress {} --cycles {cycles} --seed {seed}", scenes.join(" ")));
     for name in scenes {
         let scene = Scene::load(name)?;
         let frames = Frame::shipped(&scene);
@@ -183,10 +184,10 @@ pub fn run(arguments: &Arguments, build: &Path) -> Result<(String, bool)> {
         let cycles: u64 = own.iter().map(|outcome| outcome.cycles).sum();
         // Of the time together each experiment has its share by its cycles.
         let per_cycle = begun.elapsed().as_secs_f64() / cycles.max(1) as f64;
-        tried.lines.extend(own.iter().map(|outcome| kept(outcome, per_cycle * outcome.cycles as f64)));
+        log.targets.extend(own.iter().map(|outcome| target_counts(outcome, per_cycle * outcome.cycles as f64)));
         outcomes.extend(own);
     }
-    tried.keep(build, "stress")?;
+    log.save(build, "stress")?;
     let good = outcomes.iter().all(|outcome| outcome.violations == 0);
     let text = if arguments.json { serde_json::to_string(&outcomes)? + "\n" } else { report::stress(&outcomes) };
     Ok((text, good))

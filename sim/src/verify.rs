@@ -3,7 +3,7 @@
 //!
 //! ```text
 //! frame -> golden ------------------------------> Reconstruction --+
-//!       -> bit-true model --> Trace, Reconstruction ---------------+--> Row
+//!       -> bit-true model --> Trace, Reconstruction ---------------+--> FrameResult
 //!       -> Verilator: full speed, then stalls --> Findings, Times -+
 //!       -> rust-hdl: full speed ----------------> Findings --------+
 //!       -> netlist, when asked for: full speed -> Findings --------+
@@ -19,8 +19,8 @@ use dermis_golden::quantise::full_scale;
 use dermis_golden::reconstruct::{Golden, Reconstruction};
 use dermis_golden::scene::Scene;
 
-use crate::compare::{compared, difference, Difference};
-use crate::cosim::{run, Bench, Findings, Vector};
+use crate::compare::{comparable_forces, difference, Difference};
+use crate::cosim::{run, DeviceUnderTest, Findings, Vector};
 use crate::drive::{Stimulus, Times};
 use crate::hardware::{Hardware, Simulator};
 use crate::progress::Progress;
@@ -30,7 +30,7 @@ const SEED: u64 = 1;
 
 /// One frame's outcome.
 #[derive(Clone, Debug)]
-pub struct Row {
+pub struct FrameResult {
     /// Frame name.
     pub frame: String,
     /// Stress of the largest code, MPa.
@@ -55,7 +55,7 @@ pub struct Verified {
     /// Its board.
     pub board: Board,
     /// Per frame, in the given order.
-    pub rows: Vec<Row>,
+    pub rows: Vec<FrameResult>,
     /// All mismatches of all runs.
     pub findings: Findings,
     /// Every run, for example `verilator, full speed`.
@@ -99,10 +99,10 @@ pub fn verify(scene: &Scene, frames: &[Frame], simulators: &[Simulator], build: 
         let golden = golden.run_averaged(frames)?;
         let fixed = hardware.model.decode(frame, "fixed", &vector.expected.beats, &vector.expected.status)?;
         let lsb_N = hardware.model.force_lsb_N(full_scale_MPa);
-        verified.rows.push(Row {
+        verified.rows.push(FrameResult {
             frame: frame.id.clone(),
             full_scale_MPa,
-            difference: difference(&compared(&golden), &compared(&fixed), lsb_N),
+            difference: difference(&comparable_forces(&golden), &comparable_forces(&fixed), lsb_N),
             golden,
             fixed,
             equal: !verified.findings.unequal.contains(&index),
@@ -124,13 +124,13 @@ fn simulate(
         Simulator::RustHdl | Simulator::Netlist => &[Stimulus::FullSpeed],
     };
     let mut device = hardware.device(simulator)?;
-    let (taps, vectors) = hardware.shown(simulator, vectors);
+    let (taps, vectors) = hardware.observable(simulator, vectors);
     let mut full_speed = Vec::new();
     for &stimulus in stimuli {
         let label = format!("{}, {stimulus}", simulator.name());
         let _progress = Progress::start(&format!("{}: {label}", verified.scene.name));
-        let bench = Bench { name: simulator.name(), device: device.as_mut(), taps: &taps };
-        let (findings, times) = run(bench, &vectors, stimulus);
+        let dut = DeviceUnderTest { name: simulator.name(), device: device.as_mut(), taps: &taps };
+        let (findings, times) = run(dut, &vectors, stimulus);
         verified.findings.extend(findings);
         verified.runs.push(label);
         if stimulus == Stimulus::FullSpeed {

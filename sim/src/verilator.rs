@@ -20,8 +20,8 @@ use dermis_hdl::device::{Device, Inputs, Outputs, Tap};
 use libloading::Library;
 use thiserror::Error;
 
+use crate::artifact_cache;
 use crate::bench::{Layout, INSTANCE};
-use crate::place;
 use crate::progress::Progress;
 
 /// What a built folder is for.
@@ -84,14 +84,14 @@ pub struct Design<'a> {
     /// Width of `s_axis_tdata`, 1..=32.
     pub input_bits: u32,
     /// Whether bits of its state can be flipped; slower.
-    pub writable: bool,
+    pub writable_state: bool,
 }
 
 /// Scope, signal, word, bit; 0 where there is none such.
 type Flip = unsafe extern "C" fn(*mut c_void, *const c_char, *const c_char, u64, u64) -> i32;
 
 /// A running verilated design, its pins still packed into two vectors.
-pub(crate) struct Bench {
+pub(crate) struct VerilatedBench {
     handle: *mut c_void,
     cycle: unsafe extern "C" fn(*mut c_void, u64, *mut u32),
     free: unsafe extern "C" fn(*mut c_void),
@@ -103,9 +103,9 @@ pub(crate) struct Bench {
 }
 
 // SAFETY: nothing else has the handle, and the library keeps no state of a running model outside it.
-unsafe impl Send for Bench {}
+unsafe impl Send for VerilatedBench {}
 
-impl Bench {
+impl VerilatedBench {
     /// Builds the design in its `bench` (Verilog text), or takes it from `cache`, and starts it; `out` has `words`
     /// words.
     pub(crate) fn new(design: &Design, bench: &str, words: usize, cache: &Path) -> Result<Self, VerilatorError> {
@@ -121,14 +121,22 @@ impl Bench {
                 *library.get::<extern "C" fn(*const c_char, i32) -> *mut c_void>(b"dermis_new").map_err(symbol)?;
             let cycle = *library.get(b"dermis_cycle").map_err(symbol)?;
             let free = *library.get(b"dermis_free").map_err(symbol)?;
-            let flip = if design.writable { Some(*library.get(b"dermis_flip").map_err(symbol)?) } else { None };
+            let flip = if design.writable_state { Some(*library.get(b"dermis_flip").map_err(symbol)?) } else { None };
             if bytes() as usize != 4 * words {
                 return Err(fail(format!("{} output bytes, {} expected", bytes(), 4 * words)));
             }
             let memories = memory_folder(design)?;
             let folder = CString::new(memories.path().to_string_lossy().as_bytes()).map_err(|e| fail(e.to_string()))?;
             let handle = start(folder.as_ptr(), RESET_SEED);
-            Ok(Bench { handle, cycle, free, flip, words: vec![0; words], path: path.clone(), _library: library })
+            Ok(VerilatedBench {
+                handle,
+                cycle,
+                free,
+                flip,
+                words: vec![0; words],
+                path: path.clone(),
+                _library: library,
+            })
         }
     }
 
@@ -140,7 +148,7 @@ impl Bench {
     }
 }
 
-impl Bench {
+impl VerilatedBench {
     /// Flips a bit; whether there is such a one.
     fn flip(&mut self, scope: &str, signal: &str, word: usize, bit: usize) -> bool {
         let names = [scope, signal].map(|name| CString::new(name).ok());
@@ -150,7 +158,7 @@ impl Bench {
     }
 }
 
-impl Drop for Bench {
+impl Drop for VerilatedBench {
     fn drop(&mut self) {
         // SAFETY: the only call, with the handle that `dermis_new` returned.
         unsafe { (self.free)(self.handle) };
@@ -160,7 +168,7 @@ impl Drop for Bench {
 /// A running verilated engine.
 pub struct Verilated {
     layout: Layout,
-    bench: Bench,
+    bench: VerilatedBench,
 }
 
 impl Verilated {
@@ -170,7 +178,7 @@ impl Verilated {
     /// [`VerilatorError`]: no Verilator, a design it refuses, or files that cannot be written.
     pub fn new(design: &Design, cache: &Path) -> Result<Self, VerilatorError> {
         let layout = Layout::new(design.input_bits, design.taps);
-        let bench = Bench::new(design, &layout.verilog(design.top), layout.out_words(), cache)?;
+        let bench = VerilatedBench::new(design, &layout.verilog(design.top), layout.out_words(), cache)?;
         Ok(Verilated { layout, bench })
     }
 
@@ -229,12 +237,12 @@ fn library(design: &Design, bench: &str, cache: &Path) -> Result<PathBuf, Verila
     let mut sources: Vec<(&str, &str)> = design.files.iter().filter(|(name, _)| is_source(name)).copied().collect();
     // Verilator applies a waiver only to what it reads afterwards.
     sources.sort_by_key(|(name, _)| !name.ends_with(".vlt"));
-    let shim = if design.writable { [SHIM, FAULTS].concat() } else { SHIM.to_owned() };
+    let shim = if design.writable_state { [SHIM, FAULTS].concat() } else { SHIM.to_owned() };
     sources.extend([("bench.v", bench), ("shim.cpp", &shim)]);
     let folder = cache.join(fingerprint(&sources, &version()?));
     let ready = folder.join(LIBRARY);
     let _one = BUILDING.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
-    if !place::is_whole(&folder, LIBRARY) {
+    if !artifact_cache::is_intact(&folder, LIBRARY) {
         build(design, &sources, &folder)?;
     }
     Ok(ready.canonicalize().map_err(FileError::at(&ready))?)
@@ -242,7 +250,7 @@ fn library(design: &Design, bench: &str, cache: &Path) -> Result<PathBuf, Verila
 
 /// Builds what `folder` is to hold.
 fn build(design: &Design, sources: &[(&str, &str)], folder: &Path) -> Result<(), VerilatorError> {
-    let work = place::begin(folder)?;
+    let work = artifact_cache::staging_folder(folder)?;
     for (name, text) in sources {
         write(&work.path().join(name), text.as_bytes())?;
     }
@@ -263,7 +271,7 @@ fn build(design: &Design, sources: &[(&str, &str)], folder: &Path) -> Result<(),
     ]
     .concat();
     let mut output = None;
-    if design.writable {
+    if design.writable_state {
         library.push("--public-flat-rw");
         output = Some(verilate(&["--xml-only", "--xml-output", LISTING], &sources[..sources.len() - 1])?);
     }
@@ -284,7 +292,7 @@ fn build(design: &Design, sources: &[(&str, &str)], folder: &Path) -> Result<(),
     // Only the library and its sources stay; the object files are ten times as large.
     let objects = work.path().join("obj_dir");
     fs::remove_dir_all(&objects).map_err(FileError::at(&objects))?;
-    Ok(place::finish(work, folder, LIBRARY)?)
+    Ok(artifact_cache::publish(work, folder, LIBRARY)?)
 }
 
 fn is_installed(program: &str) -> bool {

@@ -22,7 +22,7 @@ use dermis_golden::scene::Scene;
 use dermis_hdl::device::{Device, Inputs, Outputs, Tap};
 use vcd::{IdCode, SimulationCommand, TimescaleUnit, Value, Writer};
 
-use crate::cosim::{run, Bench};
+use crate::cosim::{run, DeviceUnderTest};
 use crate::drive::Stimulus;
 use crate::hardware::{Hardware, Simulator};
 use crate::progress::Progress;
@@ -179,7 +179,7 @@ pub fn waves(scene: &Scene, frames: &[Frame], simulator: Simulator, build: &Path
     let vectors = frames.chunks(1 << scene.input.average).map(|frames| hardware.vector(frames));
     let vectors = vectors.collect::<Result<Vec<_>>>()?;
     let taps = hardware.taps(simulator);
-    let (names, vectors) = hardware.shown(simulator, &vectors);
+    let (names, vectors) = hardware.observable(simulator, &vectors);
     let _progress = Progress::start(&format!("{}: waveforms", scene.name));
     // Gone with an error or an interruption that unwinds.
     let mut part = tempfile::Builder::new();
@@ -190,8 +190,8 @@ pub fn waves(scene: &Scene, frames: &[Frame], simulator: Simulator, build: &Path
     let device = hardware.device(simulator)?;
     let clock_MHz = hardware.model.board.clock_MHz;
     let mut device = Waves::new(device, taps, clock_MHz, &mut out).map_err(|e| at(part.path(), e))?;
-    let bench = Bench { name: simulator.name(), device: &mut device, taps: &names };
-    run(bench, &vectors, Stimulus::FullSpeed);
+    let dut = DeviceUnderTest { name: simulator.name(), device: &mut device, taps: &names };
+    run(dut, &vectors, Stimulus::FullSpeed);
     let failed = device.failed.take();
     failed.map_or_else(|| out.flush(), Err).map_err(|e| at(part.path(), e))?;
     let vcd = folder.join(format!("{}.vcd", scene.name));

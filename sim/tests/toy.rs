@@ -6,8 +6,8 @@ use std::path::PathBuf;
 
 use dermis_golden::fixed::{Cycles, Stage, Trace};
 use dermis_hdl::device::{Device, Inputs, Outputs, Tap};
-use dermis_sim::cosim::{judge, run, Bench, Findings, Vector, KEPT_PER_FRAME};
-use dermis_sim::drive::{record, Play, Stimulus, Times};
+use dermis_sim::cosim::{compare_recording, run, DeviceUnderTest, Findings, Vector, KEPT_PER_FRAME};
+use dermis_sim::drive::{record, InputFrame, Stimulus, Times};
 use dermis_sim::verilator::{Design, Verilated, VerilatorError};
 
 const TOY: &str = include_str!("toy/toy.v");
@@ -34,7 +34,7 @@ fn cache() -> PathBuf {
 
 fn toy_with(verilog: &str, gain: &str) -> Result<Verilated, VerilatorError> {
     let files = vec![("toy.v", verilog), ("gain.hex", gain)];
-    Verilated::new(&Design { top: "toy", files, taps: &taps(), input_bits: 12, writable: false }, &cache())
+    Verilated::new(&Design { top: "toy", files, taps: &taps(), input_bits: 12, writable_state: false }, &cache())
 }
 
 fn toy() -> Verilated {
@@ -65,8 +65,8 @@ fn vectors() -> Vec<Vector> {
 }
 
 fn check(device: &mut dyn Device, vectors: &[Vector], stimulus: Stimulus) -> (Findings, Vec<Times>) {
-    let bench = Bench { name: "toy", device, taps: &TAPS };
-    run(bench, vectors, stimulus)
+    let dut = DeviceUnderTest { name: "toy", device, taps: &TAPS };
+    run(dut, vectors, stimulus)
 }
 
 #[test]
@@ -121,17 +121,18 @@ fn a_wrong_cycle_count_is_found() {
 #[test]
 fn every_output_beat_has_its_cycle() {
     let vectors = vectors();
-    let plays: Vec<Play> = vectors.iter().map(|v| Play { codes: &v.codes, taxels: v.taxels, beats: 7 }).collect();
-    let mut recording = record(&mut toy(), TAPS.len(), &plays, Stimulus::FullSpeed, 10_000);
+    let inputs: Vec<InputFrame> =
+        vectors.iter().map(|v| InputFrame { codes: &v.codes, taxels: v.taxels, beats: 7 }).collect();
+    let mut recording = record(&mut toy(), TAPS.len(), &inputs, Stimulus::FullSpeed, 10_000);
     // The third beat of the second frame, a cycle late; the last one is in time.
     recording.beats[9].cycle += 1;
-    let findings = judge("toy", &TAPS, &vectors, &recording, true);
+    let findings = compare_recording("toy", &TAPS, &vectors, &recording, true);
     let (due, late) = (recording.beats[9].cycle - 1, recording.beats[9].cycle);
     assert_eq!(findings.count, 1);
     let wanted =
         format!("toy: frame extremes, stage cycles, word 2, cycle {late}: output beat 2 was due in cycle {due}");
     assert_eq!(findings.kept[0].to_string(), wanted);
-    assert!(judge("toy", &TAPS, &vectors, &recording, false).is_equal());
+    assert!(compare_recording("toy", &TAPS, &vectors, &recording, false).is_equal());
 }
 
 #[test]

@@ -9,7 +9,7 @@ use dermis_golden::quantise::{full_scale, quantise};
 use dermis_golden::reconstruct::{Golden, Reconstruction};
 use dermis_golden::scene::Scene;
 use dermis_sim::compare::median;
-use dermis_sim::fresh::{Fresh, Shapes};
+use dermis_sim::drawn_frames::{DrawnFrames, Shapes};
 use dermis_tests::scene;
 
 /// Largest median tangential error of the golden model on sensor 1: twice what a study in f64 found (1.4 %).
@@ -39,7 +39,7 @@ fn medians(name: &str, board: Option<&str>, bits: u32) -> [f64; 3] {
     if let Some(board) = board {
         scene.hardware.board = board.to_string();
     }
-    let draw = Fresh { frames: FRAMES, contacts: vec![1], shapes: Shapes::Elliptic, touching: false, seed: 1 };
+    let draw = DrawnFrames { frames: FRAMES, contacts: vec![1], shapes: Shapes::Elliptic, touching: false, seed: 1 };
     let frames = draw.draw(&scene).unwrap();
     scene.fixed.input_bits = bits;
     let golden = Golden::new(&scene).unwrap();

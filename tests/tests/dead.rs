@@ -8,9 +8,9 @@ use dermis_golden::frame::Frame;
 use dermis_golden::reconstruct::{Golden, Reconstruction};
 use dermis_golden::scene::Scene;
 use dermis_sim::compare::{difference, median};
-use dermis_sim::cosim::{run, Bench, Findings, Vector};
+use dermis_sim::cosim::{run, DeviceUnderTest, Findings, Vector};
+use dermis_sim::drawn_frames::{DrawnFrames, Shapes};
 use dermis_sim::drive::Stimulus;
-use dermis_sim::fresh::{Fresh, Shapes};
 use dermis_sim::hardware::{Hardware, Simulator};
 use dermis_sim::verify::verify;
 use dermis_tests::{build_dir, scene};
@@ -38,7 +38,7 @@ fn masked(name: &str, dead: &[[usize; 2]]) -> Scene {
 
 /// Contacts drawn from a seed; every second frame has dead taxels stuck far beyond the peak.
 fn frames(scene: &Scene, count: u32) -> Vec<Frame> {
-    let draw = Fresh { frames: count, contacts: vec![1, 2], shapes: Shapes::Elliptic, touching: false, seed: 11 };
+    let draw = DrawnFrames { frames: count, contacts: vec![1, 2], shapes: Shapes::Elliptic, touching: false, seed: 11 };
     let mut frames = draw.draw(scene).unwrap();
     frames.iter_mut().skip(1).step_by(2).for_each(|frame| stick(scene, frame));
     frames
@@ -126,7 +126,8 @@ fn fixed_is_near_golden() {
     for (name, dead) in SCENES {
         let scene = masked(name, dead);
         let (model, golden) = (Model::new(&scene).unwrap(), Golden::new(&scene).unwrap());
-        let draw = Fresh { frames: FRAMES, contacts: vec![1], shapes: Shapes::Elliptic, touching: false, seed: 1 };
+        let draw =
+            DrawnFrames { frames: FRAMES, contacts: vec![1], shapes: Shapes::Elliptic, touching: false, seed: 1 };
         let frames = draw.draw(&scene).unwrap();
         let float: Vec<Reconstruction> = frames.iter().map(|frame| golden.run(frame).unwrap()).collect();
         let fixed: Vec<Reconstruction> = frames.iter().map(|frame| model.reconstruct(frame).unwrap()).collect();
@@ -160,8 +161,8 @@ fn mirrored_pairs_keep_a_symmetry() {
 
 fn compare(hardware: &Hardware, vectors: &[Vector]) -> Findings {
     let mut device = hardware.device(Simulator::Verilator).unwrap();
-    let bench = Bench { name: "verilator", device: device.as_mut(), taps: &hardware.tap_names() };
-    run(bench, vectors, Stimulus::FullSpeed).0
+    let dut = DeviceUnderTest { name: "verilator", device: device.as_mut(), taps: &hardware.tap_names() };
+    run(dut, vectors, Stimulus::FullSpeed).0
 }
 
 #[test]

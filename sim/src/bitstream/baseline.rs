@@ -45,10 +45,10 @@ pub struct Baseline {
 
 impl Baseline {
     /// What `now` is worse in, each with both figures.
-    pub fn losses(&self, now: &Baseline) -> Vec<String> {
-        let mut losses = Vec::new();
+    pub fn regressions(&self, now: &Baseline) -> Vec<String> {
+        let mut regressions = Vec::new();
         if now.best_MHz < self.best_MHz * (1.0 - SLOWER) {
-            losses.push(format!("{:.1} MHz, was {:.1} MHz", now.best_MHz, self.best_MHz));
+            regressions.push(format!("{:.1} MHz, was {:.1} MHz", now.best_MHz, self.best_MHz));
         }
         let cells = [
             ("LUTs", now.luts, self.luts, LARGER),
@@ -58,10 +58,10 @@ impl Baseline {
         ];
         for (what, now, was, tolerance) in cells {
             if now as f64 > was as f64 * (1.0 + tolerance) {
-                losses.push(format!("{now} {what}, was {was}"));
+                regressions.push(format!("{now} {what}, was {was}"));
             }
         }
-        losses
+        regressions
     }
 }
 
@@ -130,9 +130,12 @@ mod tests {
     fn slower_and_larger_is_a_loss() {
         let was = baseline();
         let now = Baseline { best_MHz: 100.0, luts: 41_900, ..was.clone() };
-        assert_eq!(was.losses(&now), Vec::<String>::new());
+        assert_eq!(was.regressions(&now), Vec::<String>::new());
         let now = Baseline { best_MHz: 98.0, luts: 42_100, block_rams: 61, ..was.clone() };
-        assert_eq!(was.losses(&now), ["98.0 MHz, was 110.0 MHz", "42100 LUTs, was 40000", "61 block RAMs, was 60"]);
+        assert_eq!(
+            was.regressions(&now),
+            ["98.0 MHz, was 110.0 MHz", "42100 LUTs, was 40000", "61 block RAMs, was 60"]
+        );
     }
 
     #[test]

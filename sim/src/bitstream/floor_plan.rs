@@ -13,7 +13,7 @@
 use dermis_golden::board::MultiplierBlocks;
 use serde_json::{json, Value};
 
-use super::absorb::MULTIPLIER;
+use super::dsp_register_packing::MULTIPLIER;
 
 /// Sites of a block: how far each is from the block's column, which is its number in the block as well.
 const IN_BLOCK: [u32; MultiplierBlocks::SIZE] = [0, 1, 4, 5];
@@ -21,7 +21,7 @@ const IN_BLOCK: [u32; MultiplierBlocks::SIZE] = [0, 1, 4, 5];
 /// Gives the lanes' multipliers in the module `top` of Yosys's JSON their sites; how many.
 ///
 /// Other multipliers are left to the placer, and so are all of them where the lanes take more than there are.
-pub fn plan(netlist: &mut Value, top: &str, blocks: &MultiplierBlocks) -> usize {
+pub fn assign_sites(netlist: &mut Value, top: &str, blocks: &MultiplierBlocks) -> usize {
     let Some(cells) = netlist["modules"][top]["cells"].as_object_mut() else { return 0 };
     let mut lanes: Vec<((u32, u32), &mut Value)> = cells
         .iter_mut()
@@ -103,7 +103,7 @@ mod tests {
         cells.insert("unit.x_MULT".into(), json!({"type": "MULT18X18D"}));
         cells.insert("a.lanes.parity[0].lane[1].q".into(), json!({"type": "TRELLIS_FF"}));
         let mut netlist = json!({"modules": {"t": {"cells": cells}}});
-        assert_eq!(plan(&mut netlist, "t", &blocks()), 3);
+        assert_eq!(assign_sites(&mut netlist, "t", &blocks()), 3);
         let site = |name: &str| netlist["modules"]["t"]["cells"][name]["attributes"]["BEL"].clone();
         // By parity and number, not by the letters of the name.
         assert_eq!(
@@ -118,6 +118,6 @@ mod tests {
         let cells: serde_json::Map<String, Value> =
             (0..25).map(|k| (format!("lanes.parity[0].lane[{k}].a"), json!({"type": "MULT18X18D"}))).collect();
         let mut netlist = json!({"modules": {"t": {"cells": cells}}});
-        assert_eq!(plan(&mut netlist, "t", &blocks()), 0);
+        assert_eq!(assign_sites(&mut netlist, "t", &blocks()), 0);
     }
 }

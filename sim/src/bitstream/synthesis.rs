@@ -8,7 +8,7 @@ use dermis_golden::board::Family;
 use dermis_golden::write::write;
 use serde_json::Value;
 
-use super::absorb::{absorb, Absorbed};
+use super::dsp_register_packing::{pack_registers, PackedRegisters};
 use super::family::{flow, YOSYS};
 use super::tools::ToolError;
 
@@ -21,13 +21,13 @@ pub const MINUTES: u32 = 60;
 ///
 /// # Errors
 /// [`ToolError`]: no Yosys, a design that it refuses, files that cannot be used.
-pub fn synthesise(folder: &Path, family: Family, read: &str, top: &str) -> Result<Absorbed, ToolError> {
+pub fn synthesise(folder: &Path, family: Family, read: &str, top: &str) -> Result<PackedRegisters, ToolError> {
     let commands = flow(family).synthesis.replace("{top}", top).replace("{netlist}", NETLIST);
     run(folder, format!("read_verilog {read}; {commands}"), "synthesis.log")?;
     match family {
-        Family::Ecp5 => edit(folder, |netlist| absorb(netlist, top)),
+        Family::Ecp5 => edit(folder, |netlist| pack_registers(netlist, top)),
         // Yosys itself moves registers into SB_MAC16.
-        Family::Ice40 => Ok(Absorbed::default()),
+        Family::Ice40 => Ok(PackedRegisters::default()),
     }
 }
 

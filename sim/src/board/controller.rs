@@ -33,55 +33,55 @@ impl SpiController {
         let pins = BoardOutputs::default();
         let mut controller =
             SpiController { device, clock_hz, sclk_hz, now: 0, edge: sclk_hz, clock: false, inputs: CS_N, pins };
-        controller.put(CS_N, true);
-        controller.pass((phase * 2.0 * sclk_hz as f64) as u64);
+        controller.set_pin(CS_N, true);
+        controller.advance((phase * 2.0 * sclk_hz as f64) as u64);
         controller
     }
 
     /// Lets so many cycles of the board's clock pass between transactions.
     pub fn wait(&mut self, cycles: u64) {
-        self.pass(2 * cycles * self.sclk_hz);
+        self.advance(2 * cycles * self.sclk_hz);
     }
 
     /// One transaction; the bytes that come back.
     pub fn transfer(&mut self, bytes: &[u8]) -> Vec<u8> {
-        self.cut(bytes, 16 * bytes.len())
+        self.transfer_edges(bytes, 16 * bytes.len())
     }
 
     /// One transaction that ends after so many edges of its clock, 16 to a byte; the whole bytes that come back. Beyond
     /// `bytes` the controller sends IDLE.
-    pub fn cut(&mut self, bytes: &[u8], edges: usize) -> Vec<u8> {
+    pub fn transfer_edges(&mut self, bytes: &[u8], edges: usize) -> Vec<u8> {
         let mut received = Vec::new();
         let mut bits = 0u32;
-        self.put(CS_N, false);
+        self.set_pin(CS_N, false);
         for bit in 0..edges.div_ceil(2) {
             let byte = bytes.get(bit / 8).copied().unwrap_or(IDLE);
-            self.put(MOSI, byte >> (7 - bit % 8) & 1 == 1);
-            self.half();
+            self.set_pin(MOSI, byte >> (7 - bit % 8) & 1 == 1);
+            self.half_period();
             bits = bits << 1 | u32::from(self.pins.to_host);
-            self.put(SCLK, true);
+            self.set_pin(SCLK, true);
             if bit % 8 == 7 {
                 received.push(bits as u8);
             }
             if 2 * bit + 1 < edges {
-                self.half();
-                self.put(SCLK, false);
+                self.half_period();
+                self.set_pin(SCLK, false);
             }
         }
-        self.half();
-        self.put(CS_N, true);
+        self.half_period();
+        self.set_pin(CS_N, true);
         // Where the transaction ends while the clock is high, that falls when nobody listens.
-        self.put(SCLK, false);
-        self.half();
+        self.set_pin(SCLK, false);
+        self.half_period();
         received
     }
 
-    fn half(&mut self) {
-        self.pass(self.clock_hz);
+    fn half_period(&mut self) {
+        self.advance(self.clock_hz);
     }
 
     /// Lets time pass.
-    fn pass(&mut self, time: u64) {
+    fn advance(&mut self, time: u64) {
         let until = self.now + time;
         while self.edge <= until {
             self.clock = !self.clock;
@@ -91,7 +91,7 @@ impl SpiController {
         self.now = until;
     }
 
-    fn put(&mut self, pin: u64, level: bool) {
+    fn set_pin(&mut self, pin: u64, level: bool) {
         self.inputs = if level { self.inputs | pin } else { self.inputs & !pin };
         self.pins = self.device.settle(self.inputs, self.clock);
     }

@@ -2,7 +2,7 @@
 
 /// One frame to play: its codes and how many beats it must give.
 #[derive(Clone, Copy, Debug)]
-pub struct Play<'a> {
+pub struct InputFrame<'a> {
     /// One code per taxel, row-major, of one frame after the other.
     pub codes: &'a [i32],
     /// Taxels of a frame, which ends with `tlast`.
@@ -33,7 +33,7 @@ pub struct TapWord {
 
 /// A broken promise of the output stream.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Breach {
+pub struct ProtocolViolation {
     /// When it was seen.
     pub cycle: u64,
     /// Index of the output beat concerned, counted over all frames.
@@ -75,7 +75,7 @@ pub struct Recording {
     /// Per frame.
     pub times: Vec<Times>,
     /// Broken rules of the output stream.
-    pub breaches: Vec<Breach>,
+    pub violations: Vec<ProtocolViolation>,
     /// Set when the run was given up.
-    pub timeout: Option<Breach>,
+    pub timeout: Option<ProtocolViolation>,
 }

@@ -2,7 +2,7 @@
 
 use dermis_hdl::device::Inputs;
 
-use super::recording::{Play, Times};
+use super::recording::{InputFrame, Times};
 use super::Stimulus;
 
 /// One of so many cycles starts a long pause of the receiver, which fills every buffer behind it.
@@ -13,7 +13,7 @@ const LONG_PAUSE_CYCLES: u32 = 40;
 /// Offers the codes.
 pub(super) struct Sender<'a> {
     /// All frames to send.
-    pub(super) frames: &'a [Play<'a>],
+    pub(super) frames: &'a [InputFrame<'a>],
     /// The frame being sent; their number when all are.
     pub(super) frame: usize,
     /// Its next taxel.
@@ -23,7 +23,7 @@ pub(super) struct Sender<'a> {
 }
 
 impl<'a> Sender<'a> {
-    pub(super) fn new(frames: &'a [Play<'a>]) -> Self {
+    pub(super) fn new(frames: &'a [InputFrame<'a>]) -> Self {
         Sender { frames, frame: 0, taxel: 0, offering: false }
     }
 
@@ -39,7 +39,7 @@ impl<'a> Sender<'a> {
         }
     }
 
-    pub(super) fn taken(&mut self, cycle: u64, times: &mut [Times]) {
+    pub(super) fn accepted(&mut self, cycle: u64, times: &mut [Times]) {
         let times = &mut times[self.frame];
         times.first_in.get_or_insert(cycle);
         self.offering = false;
@@ -53,25 +53,25 @@ impl<'a> Sender<'a> {
 }
 
 /// When the two sides of the bench are willing.
-pub(super) struct Gaps {
+pub(super) struct StallGenerator {
     random: Option<fastrand::Rng>,
     pause: u32,
 }
 
-impl Gaps {
+impl StallGenerator {
     pub(super) fn new(stimulus: Stimulus) -> Self {
         let random = match stimulus {
             Stimulus::FullSpeed => None,
             Stimulus::Stalls { seed } => Some(fastrand::Rng::with_seed(seed)),
         };
-        Gaps { random, pause: 0 }
+        StallGenerator { random, pause: 0 }
     }
 
-    pub(super) fn send(&mut self) -> bool {
+    pub(super) fn sends(&mut self) -> bool {
         self.random.as_mut().is_none_or(|r| r.bool())
     }
 
-    pub(super) fn receive(&mut self) -> bool {
+    pub(super) fn receives(&mut self) -> bool {
         let Some(random) = &mut self.random else {
             return true;
         };

@@ -23,7 +23,7 @@ pub struct Answer {
     /// Where it was compared with the bit-true model: the first difference, if there is one.
     pub difference: Option<Option<String>>,
     /// When it came.
-    pub came: SystemTime,
+    pub received_at: SystemTime,
 }
 
 impl Answer {
@@ -38,22 +38,22 @@ impl Answer {
             Some(beats) => Sums::of(beats, sensor.cols),
             None => Sums::of_bytes(front)?,
         };
-        Some(Answer { sums, beats, status, difference: None, came: SystemTime::now() })
+        Some(Answer { sums, beats, status, difference: None, received_at: SystemTime::now() })
     }
 
     /// The first difference from what the bit-true model makes of `codes`. Whether a packet was dropped before the
     /// frame is no business of the model's.
-    pub fn against(&self, model: &Model, codes: &[i32]) -> Option<String> {
+    pub fn compare_with_model(&self, model: &Model, codes: &[i32]) -> Option<String> {
         let trace = model.run(codes);
         let cols = model.scene.sensor.cols;
         let pairs = self.beats.iter().flatten().zip(&trace.beats).enumerate();
-        let mut differing = pairs.filter(|(_, (has, wants))| has != wants);
-        if let Some((index, (has, wants))) = differing.next() {
-            return Some(format!("row {}, column {}: force {has:?}, model {wants:?}", index / cols, index % cols));
+        let mut differing = pairs.filter(|(_, (got, expected))| got != expected);
+        if let Some((index, (got, expected))) = differing.next() {
+            return Some(format!("row {}, column {}: force {got:?}, model {expected:?}", index / cols, index % cols));
         }
-        let wants = Sums::of(&trace.beats, cols);
-        if self.sums != wants {
-            return Some(format!("sums {:?}, model {wants:?}", self.sums));
+        let expected = Sums::of(&trace.beats, cols);
+        if self.sums != expected {
+            return Some(format!("sums {:?}, model {expected:?}", self.sums));
         }
         let mut status = self.status.clone();
         status.iter_mut().step_by(STATUS_BEATS).for_each(|beat| beat[2] &= !(FLAG_FRAMING as i32));
@@ -89,7 +89,7 @@ impl Answer {
 
 /// An answer in physical units, a line of `--stream`.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Line {
+pub struct PhysicalAnswer {
     /// The sum of the forces, [x, y, normal].
     pub resultant_N: [f64; 3],
     /// Centre of the normal forces from the array's centre, tension counted negative; none where they add up to
@@ -109,12 +109,12 @@ pub struct Line {
     pub equal: Option<bool>,
 }
 
-impl Line {
+impl PhysicalAnswer {
     /// The answer to `frame` in physical units.
     ///
     /// # Errors
     /// A frame of another sensor.
-    pub fn new(model: &Model, frame: &Frame, answer: &Answer) -> Result<Line> {
+    pub fn new(model: &Model, frame: &Frame, answer: &Answer) -> Result<PhysicalAnswer> {
         let lsb_N = model.force_lsb_N(model.codes(frame)?.full_scale_MPa);
         let sensor = &model.scene.sensor;
         let sums = &answer.sums;
@@ -123,7 +123,7 @@ impl Line {
         let centre_mm = centre.map(|[col, row]| [x0 + col * sensor.pitch_x_mm, y0 + row * sensor.pitch_y_mm]);
         let axis = |beats: &[[i32; 3]], axis: usize| beats.iter().map(|beat| f64::from(beat[axis]) * lsb_N).collect();
         let forces = |beats: &Vec<[i32; 3]>| Forces { fx: axis(beats, 0), fy: axis(beats, 1), fz: axis(beats, 2) };
-        Ok(Line {
+        Ok(PhysicalAnswer {
             resultant_N: [sums.fx, sums.fy, sums.fz].map(|sum| sum as f64 * lsb_N),
             centre_mm,
             loaded: sums.loaded,

@@ -13,7 +13,7 @@ const ATTEMPTS: u32 = 8;
 
 /// What went wrong on the way and was mended.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Lost {
+pub struct LinkErrors {
     /// Requests sent again.
     pub repeated: u64,
     /// Answers, or pieces of them, that did not pass their check.
@@ -28,14 +28,14 @@ pub struct Client<P> {
     decoder: Decoder,
     sequence: u8,
     /// What went wrong so far.
-    pub lost: Lost,
+    pub link_errors: LinkErrors,
 }
 
 impl<P: Read + Write> Client<P> {
     /// A board behind `port`, called `name` in messages; after `timeout` of silence a request is sent again.
     pub fn new(port: P, name: &str, timeout: Duration) -> Self {
-        let (decoder, lost) = (Decoder::default(), Lost::default());
-        Client { port, name: name.to_owned(), timeout, decoder, sequence: 0, lost }
+        let (decoder, link_errors) = (Decoder::default(), LinkErrors::default());
+        Client { port, name: name.to_owned(), timeout, decoder, sequence: 0, link_errors }
     }
 
     /// Asks the board who it is, and whether it is made for `model`.
@@ -43,7 +43,7 @@ impl<P: Read + Write> Client<P> {
     /// # Errors
     /// No answer, another version, another scene.
     pub fn identify(&mut self, model: &Model) -> Result<Identity, HostError> {
-        let bytes = self.ask(Kind::Identify, Vec::new())?;
+        let bytes = self.request(Kind::Identify, Vec::new())?;
         let port = || self.name.clone();
         // The version comes first in every version.
         let has = bytes.first_chunk().map(|version| u16::from_le_bytes(*version));
@@ -73,7 +73,7 @@ impl<P: Read + Write> Client<P> {
     /// # Errors
     /// No answer.
     pub fn counters(&mut self) -> Result<Counters, HostError> {
-        let bytes = self.ask(Kind::ReadCounters, Vec::new())?;
+        let bytes = self.request(Kind::ReadCounters, Vec::new())?;
         let wrong = HostError::Answer { port: self.name.clone(), what: "counters", bytes: bytes.len() };
         Counters::of_bytes(&bytes).ok_or(wrong)
     }
@@ -84,21 +84,21 @@ impl<P: Read + Write> Client<P> {
     /// No answer.
     pub fn frame(&mut self, model: &Model, codes: &[i32], forces: bool) -> Result<Answer, HostError> {
         let kind = if forces { Kind::FrameForForces } else { Kind::FrameForResultants };
-        let bytes = self.ask(kind, codes_to_bytes(codes, model.formats.code_bits))?;
+        let bytes = self.request(kind, codes_to_bytes(codes, model.formats.code_bits))?;
         let wrong = HostError::Answer { port: self.name.clone(), what: kind.answer().name(), bytes: bytes.len() };
         Answer::of_bytes(model, &bytes, forces).ok_or(wrong)
     }
 
     /// Sends a request until it is answered.
-    fn ask(&mut self, kind: Kind, payload: Vec<u8>) -> Result<Vec<u8>, HostError> {
+    fn request(&mut self, kind: Kind, payload: Vec<u8>) -> Result<Vec<u8>, HostError> {
         let mut packet = Packet { kind, sequence: self.sequence, payload };
         for attempt in 0..ATTEMPTS {
-            self.lost.repeated += u64::from(attempt > 0);
+            self.link_errors.repeated += u64::from(attempt > 0);
             // A late answer to an earlier attempt is then none to this one.
             self.sequence = self.sequence.wrapping_add(1);
             packet.sequence = self.sequence;
-            self.port.write_all(&packet.to_wire()).map_err(|error| self.broken(&error))?;
-            self.port.flush().map_err(|error| self.broken(&error))?;
+            self.port.write_all(&packet.to_wire()).map_err(|error| self.port_error(&error))?;
+            self.port.flush().map_err(|error| self.port_error(&error))?;
             if let Some(payload) = self.wait(kind.answer())? {
                 return Ok(payload);
             }
@@ -110,16 +110,16 @@ impl<P: Read + Write> Client<P> {
     /// The answer's payload; nothing after silence, or where the answer is damaged.
     fn wait(&mut self, kind: Kind) -> Result<Option<Vec<u8>>, HostError> {
         let mut buffer = [0; 4096];
-        let mut heard = Instant::now();
-        while heard.elapsed() < self.timeout {
+        let mut last_heard = Instant::now();
+        while last_heard.elapsed() < self.timeout {
             let count = match self.port.read(&mut buffer) {
                 Ok(count) => count,
                 Err(error) if matches!(error.kind(), ErrorKind::TimedOut | ErrorKind::WouldBlock) => 0,
                 Err(error) if error.kind() == ErrorKind::Interrupted => 0,
-                Err(error) => return Err(self.broken(&error)),
+                Err(error) => return Err(self.port_error(&error)),
             };
             if count > 0 {
-                heard = Instant::now();
+                last_heard = Instant::now();
             }
             let mut damaged = false;
             for &byte in &buffer[..count] {
@@ -130,7 +130,7 @@ impl<P: Read + Write> Client<P> {
                     // An answer that was given up.
                     Some(Ok(_)) | None => (),
                     Some(Err(_)) => {
-                        self.lost.damaged += 1;
+                        self.link_errors.damaged += 1;
                         damaged = true;
                     }
                 }
@@ -142,7 +142,7 @@ impl<P: Read + Write> Client<P> {
         Ok(None)
     }
 
-    fn broken(&self, error: &std::io::Error) -> HostError {
+    fn port_error(&self, error: &std::io::Error) -> HostError {
         HostError::Port { port: self.name.clone(), reason: error.to_string() }
     }
 }

@@ -8,7 +8,7 @@ use dermis_golden::frame::Frame;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
-use super::{HostError, Line, Played, Session};
+use super::{FramesSent, HostError, PhysicalAnswer, Session};
 
 /// Longest line in bytes; 65536 taxels of 25 characters take 1.6 MB.
 const LONGEST_LINE: u64 = 4 << 20;
@@ -30,7 +30,7 @@ struct Reply {
     sent_s: f64,
     answered_s: f64,
     #[serde(flatten)]
-    line: Line,
+    answer: PhysicalAnswer,
 }
 
 /// A line that goes out in place of an answer.
@@ -49,8 +49,8 @@ pub(super) fn run<P: Read + Write>(
     session: &mut Session<P>,
     input: &mut dyn BufRead,
     output: &mut dyn Write,
-) -> Result<Played> {
-    let mut played = Played { text: String::new(), equal: true, answered: 0, refused: 0 };
+) -> Result<FramesSent> {
+    let mut sent = FramesSent { text: String::new(), equal: true, answered: 0, refused: 0 };
     for index in 0.. {
         let mut line = String::new();
         // A line without end must not fill the memory.
@@ -65,14 +65,14 @@ pub(super) fn run<P: Read + Write>(
         }
         let text = match answer(session, &line) {
             Ok(reply) => {
-                played.equal &= reply.line.equal != Some(false);
-                played.answered += 1;
+                sent.equal &= reply.answer.equal != Some(false);
+                sent.answered += 1;
                 serde_json::to_string(&reply)?
             }
             // Without a board there is nothing to go on with.
             Err((_, error)) if error.is::<HostError>() => return Err(error),
             Err((id, error)) => {
-                played.refused += 1;
+                sent.refused += 1;
                 serde_json::to_string(&Refusal { id, line: index + 1, error: error.to_string() })?
             }
         };
@@ -82,7 +82,7 @@ pub(super) fn run<P: Read + Write>(
             Ok(()) => (),
         }
     }
-    Ok(played)
+    Ok(sent)
 }
 
 fn seconds(time: SystemTime) -> f64 {
@@ -100,7 +100,7 @@ fn answer<P: Read + Write>(session: &mut Session<P>, line: &str) -> Result<Reply
 
 fn reply<P: Read + Write>(session: &mut Session<P>, id: &Value, frame: &Frame) -> Result<Reply> {
     let sent_s = seconds(SystemTime::now());
-    let (frame, answer) = session.ask(frame)?;
-    let line = Line::new(&session.model, &frame, &answer)?;
-    Ok(Reply { id: id.clone(), sent_s, answered_s: seconds(answer.came), line })
+    let (frame, answer) = session.request(frame)?;
+    let physical = PhysicalAnswer::new(&session.model, &frame, &answer)?;
+    Ok(Reply { id: id.clone(), sent_s, answered_s: seconds(answer.received_at), answer: physical })
 }

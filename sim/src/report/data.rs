@@ -51,7 +51,7 @@ pub fn csv(table: &Table) -> String {
     for row in &table.rows {
         text.push_str(&line(&mut row.iter().map(|cell| match cell.number {
             Some(number) => number.to_string(),
-            None if *cell == super::document::none() => String::new(),
+            None if *cell == super::document::empty_cell() => String::new(),
             None => quoted(&cell.shown),
         })));
     }
@@ -62,7 +62,7 @@ pub fn csv(table: &Table) -> String {
 pub fn document(document: &Document) -> Value {
     let cell = |cell: &Cell| match cell.number {
         Some(number) => json!(number),
-        None if *cell == super::document::none() => Value::Null,
+        None if *cell == super::document::empty_cell() => Value::Null,
         None => json!(cell.shown),
     };
     let table = |table: &Table| {
@@ -90,8 +90,8 @@ pub fn document(document: &Document) -> Value {
 
 #[cfg(test)]
 mod tests {
-    use super::super::document::{none, percent, words};
-    use super::super::read;
+    use super::super::csv_reader;
+    use super::super::document::{empty_cell, percent, text_cell};
     use super::*;
 
     fn one() -> Table {
@@ -99,15 +99,15 @@ mod tests {
             "t",
             "errors",
             &["scene", "e_t"],
-            vec![vec![words("a, \"b\""), percent(Some(0.1 + 0.2))], vec![words("c"), none()]],
+            vec![vec![text_cell("a, \"b\""), percent(Some(0.1 + 0.2))], vec![text_cell("c"), empty_cell()]],
         )
     }
 
     #[test]
     fn csv_and_json_hold_the_number_in_full() {
-        let (head, rows) = read::csv(&csv(&one()));
+        let (head, rows) = csv_reader::csv(&csv(&one()));
         assert_eq!(
-            (read::field(&head, &rows[0], "e_t"), read::field(&head, &rows[1], "e_t")),
+            (csv_reader::field(&head, &rows[0], "e_t"), csv_reader::field(&head, &rows[1], "e_t")),
             ("0.30000000000000004", "")
         );
         assert!(csv(&one()).contains("\"a, \"\"b\"\"\""));

@@ -52,7 +52,7 @@ pub struct Table {
     /// Each as long as the head.
     pub rows: Vec<Vec<Cell>>,
     /// Long: shut until a reader opens it.
-    pub shut: bool,
+    pub collapsed: bool,
 }
 
 /// A picture.
@@ -78,12 +78,12 @@ pub struct Cell {
 impl Table {
     /// A table that is open.
     pub fn new(id: impl Into<String>, caption: impl Into<String>, head: &[&'static str], rows: Vec<Vec<Cell>>) -> Self {
-        Table { id: id.into(), caption: caption.into(), head: head.to_vec(), rows, shut: false }
+        Table { id: id.into(), caption: caption.into(), head: head.to_vec(), rows, collapsed: false }
     }
 
     /// The same, shut.
-    pub fn shut(self) -> Self {
-        Table { shut: true, ..self }
+    pub fn collapsed(self) -> Self {
+        Table { collapsed: true, ..self }
     }
 
     /// Whether a column holds numbers, which are aligned to the right.
@@ -93,13 +93,13 @@ impl Table {
 }
 
 /// Words.
-pub fn words(text: impl Into<String>) -> Cell {
+pub fn text_cell(text: impl Into<String>) -> Cell {
     Cell { shown: text.into(), number: None }
 }
 
 /// Nothing to say.
-pub fn none() -> Cell {
-    words("–")
+pub fn empty_cell() -> Cell {
+    text_cell("–")
 }
 
 /// A count.
@@ -109,7 +109,7 @@ pub fn count(n: u64) -> Cell {
 
 /// A fraction, shown in percent with two significant digits or more.
 pub fn percent(fraction: Option<f64>) -> Cell {
-    fraction.map_or_else(none, |f| Cell { shown: percent_text(f), number: Some(f) })
+    fraction.map_or_else(empty_cell, |f| Cell { shown: percent_text(f), number: Some(f) })
 }
 
 /// A fraction as text.
@@ -120,12 +120,12 @@ pub fn percent_text(f: f64) -> String {
 
 /// A number with `decimals`.
 pub fn decimal(value: Option<f64>, decimals: usize) -> Cell {
-    value.map_or_else(none, |v| Cell { shown: format!("{v:.decimals$}"), number: Some(v) })
+    value.map_or_else(empty_cell, |v| Cell { shown: format!("{v:.decimals$}"), number: Some(v) })
 }
 
 /// A time in seconds, shown in the unit that suits.
 pub fn seconds(s: Option<f64>) -> Cell {
-    s.map_or_else(none, |s| Cell { shown: seconds_text(s), number: Some(s) })
+    s.map_or_else(empty_cell, |s| Cell { shown: seconds_text(s), number: Some(s) })
 }
 
 /// A time in seconds as text: three digits and the unit that suits.
@@ -156,6 +156,6 @@ mod tests {
             assert_eq!(seconds_text(s), text);
         }
         assert_eq!([0.0107, -0.455, 1.75].map(percent_text), ["1.07 %", "-45.5 %", "175 %"]);
-        assert_eq!(percent(None), none());
+        assert_eq!(percent(None), empty_cell());
     }
 }

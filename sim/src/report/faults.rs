@@ -1,7 +1,7 @@
 //! The table of `dermis faults`.
 
 use super::table::{aligned, percent};
-use crate::faults::places::CLASSES;
+use crate::faults::state_bits::CLASSES;
 use crate::faults::{Row, Shares, LARGE};
 
 /// One line per class and stage; then the classes' shares, in which each stage counts by its bits.
@@ -22,8 +22,17 @@ pub fn faults(rows: &[Row]) -> String {
         "not recovered",
     ];
     let line = |row: &Row| {
-        let counts =
-            [row.signals, row.places, row.tried, row.hit, row.harmless, row.detected, row.hang, row.silent, row.large];
+        let counts = [
+            row.signals,
+            row.bits,
+            row.flips,
+            row.distinct_bits,
+            row.harmless,
+            row.detected,
+            row.hang,
+            row.silent,
+            row.large,
+        ];
         let mut cells = vec![row.class.name().to_owned(), row.stage.clone()];
         cells.extend(counts.iter().map(usize::to_string));
         cells.extend([percent((row.silent > 0).then_some(row.largest_error)), row.not_recovered.to_string()]);

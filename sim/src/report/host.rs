@@ -3,20 +3,20 @@
 use dermis_golden::fixed::Model;
 use dermis_golden::link::{payloads, takes, Kind, LinkKind};
 
-use super::table::figures;
-use crate::host::{Answer, Line};
+use super::table::significant_digits;
+use crate::host::{Answer, PhysicalAnswer};
 
 /// One frame's resultants.
-pub fn resultants(frame: &str, line: &Line, answer: &Answer) -> String {
-    let largest = line.resultant_N.iter().fold(0.0, |m: f64, x| m.max(x.abs()));
+pub fn resultants(frame: &str, physical: &PhysicalAnswer, answer: &Answer) -> String {
+    let largest = physical.resultant_N.iter().fold(0.0, |m: f64, x| m.max(x.abs()));
     let sign = |x: f64| if x.is_sign_negative() { "" } else { "+" };
-    let [x, y, normal] = line.resultant_N.map(|force| sign(force).to_owned() + &figures(force, largest));
-    let centre = line.centre_mm.map_or("-".to_owned(), |[x, y]| format!("({x:+.2}, {y:+.2}) mm"));
+    let [x, y, normal] = physical.resultant_N.map(|force| sign(force).to_owned() + &significant_digits(force, largest));
+    let centre = physical.centre_mm.map_or("-".to_owned(), |[x, y]| format!("({x:+.2}, {y:+.2}) mm"));
     let flags: Vec<String> =
-        line.flags.iter().filter_map(|f| serde_json::to_value(f).ok()?.as_str().map(str::to_owned)).collect();
+        physical.flags.iter().filter_map(|f| serde_json::to_value(f).ok()?.as_str().map(str::to_owned)).collect();
     format!(
         "{frame}: N x {x}   y {y}   normal {normal}   centre {centre}   taxels {}   flags {}\n{}",
-        line.loaded,
+        physical.loaded,
         if flags.is_empty() { "none".to_owned() } else { flags.join(", ") },
         equality(answer),
     )

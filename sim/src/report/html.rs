@@ -64,7 +64,7 @@ pub fn html(document: &Document) -> String {
 
 fn table(text: &mut String, table: &Table) {
     let caption = escape(&table.caption);
-    text.push_str(&match table.shut {
+    text.push_str(&match table.collapsed {
         true => format!("<details><summary>{caption} ({} rows)</summary>\n", table.rows.len()),
         false => format!("<p class=\"caption\">{caption}</p>\n"),
     });
@@ -80,7 +80,7 @@ fn table(text: &mut String, table: &Table) {
         text.push_str(&format!("<tr>{}</tr>\n", cells.collect::<String>()));
     }
     text.push_str("</table></div>\n");
-    if table.shut {
+    if table.collapsed {
         text.push_str("</details>\n");
     }
 }

@@ -13,7 +13,7 @@
 mod clock;
 mod formats;
 mod machine;
-mod plane;
+mod objective_map;
 mod stability;
 mod stages;
 mod sweep;
@@ -22,7 +22,7 @@ mod timing;
 pub use clock::{clock, Clock};
 pub use formats::{formats, FormatRow};
 pub use machine::machine;
-pub use plane::{plane, Plane};
+pub use objective_map::{objective_map, ObjectiveMap};
 pub use stability::{conditions, extremes};
 pub use stages::{stages, StageRow};
 pub use sweep::{sweep, SweepPoint};
@@ -101,7 +101,7 @@ impl Engine {
 
 /// The bit-true side of a case.
 #[derive(Debug)]
-pub struct Integers {
+pub struct BitTrue {
     /// The model.
     pub model: Model,
     /// Its result for every frame.
@@ -127,7 +127,7 @@ pub struct Measured {
     /// Its result for every frame.
     pub golden: Vec<Reconstruction>,
     /// The bit-true model and the hardware, or why there is none.
-    pub integers: Result<Integers, String>,
+    pub bit_true: Result<BitTrue, String>,
     /// The literal baseline's forces for every frame, or why there are none.
     pub baseline: Result<Vec<Forces>, String>,
     /// Times of a frame on the CPU.
@@ -137,28 +137,28 @@ pub struct Measured {
 
 /// How many contacts a frame has.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Kind {
+pub enum ContactCount {
     /// One, or none that is described.
     One,
     /// Several, which may be sheared each its own way.
     Several,
 }
 
-impl Kind {
+impl ContactCount {
     /// Of a frame.
-    pub fn of(frame: &Frame) -> Kind {
+    pub fn of(frame: &Frame) -> ContactCount {
         if frame.contacts.len() > 1 {
-            Kind::Several
+            ContactCount::Several
         } else {
-            Kind::One
+            ContactCount::One
         }
     }
 
     /// Name in tables.
     pub fn name(self) -> &'static str {
         match self {
-            Kind::One => "one",
-            Kind::Several => "several",
+            ContactCount::One => "one",
+            ContactCount::Several => "several",
         }
     }
 }
@@ -191,7 +191,7 @@ impl Measured {
         match engine {
             Engine::Baseline => self.baseline.as_ref().map(own).unwrap_or_default(),
             Engine::Golden => of(&self.golden),
-            Engine::Fixed | Engine::Hardware => self.integers.as_ref().map(|i| of(&i.results)).unwrap_or_default(),
+            Engine::Fixed | Engine::Hardware => self.bit_true.as_ref().map(|i| of(&i.results)).unwrap_or_default(),
         }
     }
 
@@ -204,8 +204,8 @@ impl Measured {
     pub fn point_over(&self, engine: Engine, keep: impl Fn(&Frame) -> bool) -> Option<Point> {
         let seconds = match engine {
             Engine::Hardware => {
-                let integers = self.integers.as_ref().ok()?;
-                clock(&integers.model.board, &self.scene).seconds(integers.cycles)
+                let bit_true = self.bit_true.as_ref().ok()?;
+                clock(&bit_true.model.board, &self.scene).seconds(bit_true.cycles)
             }
             cpu => self.times.get(&cpu)?.seconds(),
         };
@@ -245,7 +245,7 @@ pub fn measure(scenes: &[Scene], cases: &[Case], options: &Options) -> Result<Ve
             (scene.partition.case, scene.partition.condition) = (case, options.condition);
             let largest = match case {
                 // One μ per contact over the whole array; a single contact's is that of case 0.
-                Case::Contacts if !frames.iter().any(|frame| Kind::of(frame) == Kind::Several) => None,
+                Case::Contacts if !frames.iter().any(|frame| ContactCount::of(frame) == ContactCount::Several) => None,
                 Case::Contacts | Case::Adaptive => Some(scene.sensor.taxels()),
                 Case::Grid(_) => subarrays(case, &scene.sensor).ok().map(|parts| parts[0].rows * parts[0].cols),
             };
@@ -262,7 +262,7 @@ pub fn measure(scenes: &[Scene], cases: &[Case], options: &Options) -> Result<Ve
     for (done, measured) in all.iter_mut().enumerate() {
         options.interrupt.check()?;
         measured.times = timing::time(measured)?;
-        bar.at(done as u64 + 1);
+        bar.set(done as u64 + 1);
     }
     Ok(all)
 }
@@ -270,8 +270,8 @@ pub fn measure(scenes: &[Scene], cases: &[Case], options: &Options) -> Result<Ve
 fn prepare(scene: Scene, frames: Vec<Frame>, options: &Options) -> Result<Measured> {
     let engine = Golden::new(&scene)?;
     let golden = frames.iter().map(|frame| engine.run(frame)).collect::<Result<Vec<_>, _>>()?;
-    let integers = match Model::for_frames(&scene, &frames) {
-        Ok(model) => Ok(integers(model, &frames, options)?),
+    let bit_true = match Model::for_frames(&scene, &frames) {
+        Ok(model) => Ok(bit_true(model, &frames, options)?),
         Err(error @ (FixedError::DoesNotFit(_) | FixedError::Scene(_) | FixedError::Format { .. })) => {
             Err(error.to_string().lines().next().unwrap_or_default().to_owned())
         }
@@ -289,23 +289,23 @@ fn prepare(scene: Scene, frames: Vec<Frame>, options: &Options) -> Result<Measur
             (Some(literal), Ok(forces))
         }
     };
-    Ok(Measured { scene, frames, engine, golden, integers, baseline, times: BTreeMap::new(), literal })
+    Ok(Measured { scene, frames, engine, golden, bit_true, baseline, times: BTreeMap::new(), literal })
 }
 
-fn integers(model: Model, frames: &[Frame], options: &Options) -> Result<Integers> {
+fn bit_true(model: Model, frames: &[Frame], options: &Options) -> Result<BitTrue> {
     let traces = frames.iter().map(|frame| Ok(model.run(&model.readings(std::slice::from_ref(frame))?)));
     let traces: Vec<Trace> = traces.collect::<Result<_, FixedError>>()?;
     let decoded = frames.iter().zip(&traces).map(|(frame, t)| model.decode(frame, "fixed", &t.beats, &t.status));
     let results = decoded.collect::<Result<Vec<_>, _>>()?;
     let usage = generate(&model)?.usage;
     let slowest = traces.iter().map(|trace| trace.cycles.total).max().unwrap_or(0);
-    let mut integers = Integers { results, traces, equal: None, cycles: slowest, usage, model };
-    if is_simulated(&integers.model.scene, options) {
-        let verified = verify(&integers.model.scene, frames, &[Simulator::Verilator], &options.build)?;
-        integers.equal = Some(verified.findings.is_equal());
-        integers.cycles = verified.rows.iter().filter_map(|row| row.times.total()).max().unwrap_or(slowest);
+    let mut bit_true = BitTrue { results, traces, equal: None, cycles: slowest, usage, model };
+    if is_simulated(&bit_true.model.scene, options) {
+        let verified = verify(&bit_true.model.scene, frames, &[Simulator::Verilator], &options.build)?;
+        bit_true.equal = Some(verified.findings.is_equal());
+        bit_true.cycles = verified.rows.iter().filter_map(|row| row.times.total()).max().unwrap_or(slowest);
     }
-    Ok(integers)
+    Ok(bit_true)
 }
 
 /// The quick variant co-simulates the two scenes of `make run`.

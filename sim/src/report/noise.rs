@@ -80,7 +80,7 @@ fn csv(rows: &[Row]) -> String {
 
 #[cfg(test)]
 mod tests {
-    use super::super::read;
+    use super::super::csv_reader;
     use super::*;
     use serde_json::Value;
 
@@ -121,10 +121,10 @@ mod tests {
     #[test]
     fn csv_comes_back() {
         let rows = rows();
-        let (head, records) = read::csv(&noise(&rows, Format::Csv).unwrap());
+        let (head, records) = csv_reader::csv(&noise(&rows, Format::Csv).unwrap());
         assert_eq!((head.len(), records.len()), (14, 2));
         for (row, record) in rows.iter().zip(&records) {
-            let of = |name: &str| read::field(&head, record, name);
+            let of = |name: &str| csv_reader::field(&head, record, name);
             assert_eq!((of("frames"), of("objective")), (row.frames.to_string().as_str(), row.objective));
             for (name, _, wanted) in numbers(row) {
                 // The shortest text that reads back as the same number; empty where there is none.
@@ -149,7 +149,7 @@ mod tests {
 
     #[test]
     fn no_rows_are_a_head_alone() {
-        assert_eq!(read::csv(&noise(&[], Format::Csv).unwrap()).1.len(), 0);
+        assert_eq!(csv_reader::csv(&noise(&[], Format::Csv).unwrap()).1.len(), 0);
         assert_eq!(noise(&[], Format::Json).unwrap(), "[]\n");
     }
 }

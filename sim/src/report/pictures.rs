@@ -2,12 +2,12 @@
 
 mod bars;
 mod field;
-mod plane;
+mod objective_map;
 mod scatter;
 
 pub use bars::{bars, Bars};
 pub use field::{force_field, stress_map, Outline};
-pub use plane::objective;
+pub use objective_map::objective;
 pub use scatter::{scatter, Guide, Scatter, Series};
 
 use anyhow::Result;

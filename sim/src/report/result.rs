@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 use dermis_golden::reconstruct::Reconstruction;
 use dermis_golden::sensor::Sensor;
 
-use super::table::{figures, percent};
+use super::table::{percent, significant_digits};
 use crate::compare::Difference;
 
 /// Shades from no force to the largest.
@@ -25,9 +25,9 @@ pub fn reconstruction(result: &Reconstruction, sensor: &Sensor, full_scale_MPa: 
 fn lines(text: &mut String, result: &Reconstruction, full_scale_MPa: f64) -> std::fmt::Result {
     let largest = result.resultant_N.iter().fold(0.0, |m: f64, x| m.max(x.abs()));
     let sign = |x: f64| if x.is_sign_negative() { "" } else { "+" };
-    let [x1, x2, x3] = result.resultant_N.map(|x| sign(x).to_owned() + &figures(x, largest));
+    let [x1, x2, x3] = result.resultant_N.map(|x| sign(x).to_owned() + &significant_digits(x, largest));
     writeln!(text, "{}, frame {}, engine {}", result.scene, result.frame, result.engine)?;
-    writeln!(text, "full scale      {} MPa", figures(full_scale_MPa, full_scale_MPa))?;
+    writeln!(text, "full scale      {} MPa", significant_digits(full_scale_MPa, full_scale_MPa))?;
     writeln!(text, "resultant, N    x {x1}   y {x2}   normal {x3}")?;
     if let Some(e) = &result.error {
         let axes = [e.x1, e.x2, e.x3].map(percent);
@@ -74,7 +74,7 @@ fn picture(text: &mut String, sensor: &Sensor, fz: &[f64]) {
     }
     let group = sensor.cols.max(sensor.rows).div_ceil(PICTURE_COLUMNS);
     let repeat = if 2 * sensor.cols <= PICTURE_COLUMNS { 2 } else { 1 };
-    text.push_str(&format!("fz, darkest {} N per taxel, o is tension\n", figures(peak, peak)));
+    text.push_str(&format!("fz, darkest {} N per taxel, o is tension\n", significant_digits(peak, peak)));
     for row in (0..sensor.rows).step_by(group) {
         let shades = (0..sensor.cols).step_by(group).map(|col| {
             let rows = row..(row + group).min(sensor.rows);

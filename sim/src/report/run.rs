@@ -9,14 +9,14 @@ use dermis_golden::partition::Case;
 use dermis_golden::scene::{Condition, Scene};
 
 use super::document::{Document, Section};
-use super::measure::{self, clock, machine, measure, sweep, Kind, Measured, Options, SweepPoint};
+use super::measure::{self, clock, machine, measure, sweep, ContactCount, Measured, Options, SweepPoint};
 use super::save::save;
 use super::sections::{
-    choice, choose, extremes, fields, frames, paper, published, ratios, resources, search, stability, stages, sweeps,
-    time, tried, Choice,
+    choice, choose, extremes, fields, frames, paper, published, ratios, resources, run_logs, search, stability, stages,
+    sweeps, time, Choice,
 };
 use crate::jobs::Interrupt;
-use crate::tried::Tried;
+use crate::run_log::RunLog;
 
 /// Drawn frames of a sweep, beside the shipped ones; quick and full.
 const SWEEP_FRAMES: [u32; 2] = [0, 24];
@@ -65,7 +65,7 @@ pub fn run(arguments: &Arguments, build: &Path) -> Result<(String, bool)> {
         build: build.to_owned(),
         condition: if arguments.paper { Condition::BothSigns } else { Condition::default() },
         simulate: !arguments.paper,
-        interrupt: Interrupt::of_signals()?,
+        interrupt: Interrupt::on_signals()?,
     };
     let mut cases: Vec<Case> = (0..4).filter_map(Case::numbered).collect();
     if !arguments.paper {
@@ -89,8 +89,8 @@ pub fn run(arguments: &Arguments, build: &Path) -> Result<(String, bool)> {
     options.interrupt.check()?;
     let out = arguments.out.clone().unwrap_or_else(|| build.join("report"));
     let page = save(&document, &out)?;
-    let verdicts = measured.iter().filter_map(|m| m.integers.as_ref().ok()?.equal);
-    Ok((format!("{}\n", page.display()), verdicts.clone().all(|equal| equal)))
+    let results = measured.iter().filter_map(|m| m.bit_true.as_ref().ok()?.equal);
+    Ok((format!("{}\n", page.display()), results.clone().all(|equal| equal)))
 }
 
 fn sections(measured: &[Measured], options: &Options) -> Result<Vec<Section>> {
@@ -107,7 +107,7 @@ fn sections(measured: &[Measured], options: &Options) -> Result<Vec<Section>> {
         stability(&measure::conditions(options)?)?,
         extremes(&measure::extremes(measured, options)?),
         resources(measured, &choices, options)?,
-        tried(&Tried::all(&options.build)?),
+        run_logs(&RunLog::load_all(&options.build)?),
     ])
 }
 
@@ -116,13 +116,13 @@ fn all_sweeps(
     measured: &[Measured],
     choices: &[Choice],
     options: &Options,
-) -> Result<Vec<(Vec<SweepPoint>, Kind, usize)>> {
+) -> Result<Vec<(Vec<SweepPoint>, ContactCount, usize)>> {
     let kept = if options.quick { 1 } else { choices.len() };
-    let chosen = choices.iter().map(|choice| (&measured[choice.index].scene, choice.kind)).take(kept);
+    let chosen = choices.iter().map(|choice| (&measured[choice.index].scene, choice.contact_count)).take(kept);
     chosen
-        .map(|(scene, kind)| {
-            let frames = frames(scene, kind, SWEEP_FRAMES[usize::from(!options.quick)])?;
-            Ok((sweep(scene, &frames, options)?, kind, frames.len()))
+        .map(|(scene, contact_count)| {
+            let frames = frames(scene, contact_count, SWEEP_FRAMES[usize::from(!options.quick)])?;
+            Ok((sweep(scene, &frames, options)?, contact_count, frames.len()))
         })
         .collect()
 }
@@ -130,8 +130,8 @@ fn all_sweeps(
 /// Where the figures come from.
 fn intro(measured: &[Measured], options: &Options) -> Vec<String> {
     let mut intro = vec![machine()];
-    if let Some((m, integers)) = measured.iter().find_map(|m| Some((m, m.integers.as_ref().ok()?))) {
-        let (board, clock) = (&integers.model.board, clock(&integers.model.board, &m.scene));
+    if let Some((m, bit_true)) = measured.iter().find_map(|m| Some((m, m.bit_true.as_ref().ok()?))) {
+        let (board, clock) = (&bit_true.model.board, clock(&bit_true.model.board, &m.scene));
         intro.push(format!(
             "Hardware: cycles from the first input beat to the last output beat, over {} MHz ({} of {}).",
             clock.MHz, clock.origin, board.description

@@ -6,12 +6,12 @@ mod paper;
 mod published;
 mod ratios;
 mod resources;
+mod run_logs;
 mod search;
 mod stability;
 mod stages;
 mod sweeps;
 mod time;
-mod tried;
 
 pub use choice::{choice, choose, frames, Choice};
 pub use fields::fields;
@@ -19,17 +19,17 @@ pub use paper::paper;
 pub use published::published;
 pub use ratios::ratios;
 pub use resources::resources;
+pub use run_logs::run_logs;
 pub use search::search;
 pub use stability::{extremes, stability, stability_picture};
 pub use stages::stages;
 pub use sweeps::sweeps;
 pub use time::time;
-pub use tried::tried;
 
 use dermis_golden::frame::Frame;
 use dermis_golden::partition::Case;
 
-use super::measure::{Kind, Measured};
+use super::measure::{ContactCount, Measured};
 
 /// The scenes measured, each once, in order.
 fn scenes(measured: &[Measured]) -> Vec<&str> {
@@ -49,8 +49,8 @@ fn case_text(case: Case) -> String {
 }
 
 /// The frame of a scene that pictures of a kind show: the Hertz contact where there is one, else the first of the kind.
-fn shown(measured: &Measured, kind: Kind) -> usize {
-    let of_kind = |(_, frame): &(usize, &Frame)| Kind::of(frame) == kind;
+fn illustrated_frame(measured: &Measured, contact_count: ContactCount) -> usize {
+    let of_kind = |(_, frame): &(usize, &Frame)| ContactCount::of(frame) == contact_count;
     let frames = || measured.frames.iter().enumerate().filter(of_kind);
     let hertz = frames().find(|(_, frame)| frame.id.ends_with("hertz"));
     hertz.or(frames().next()).map_or(0, |(index, _)| index)

@@ -6,7 +6,7 @@ use dermis_golden::stability::{Figures, Row, Spectrum};
 
 use super::csv::quoted;
 use super::data::markdown;
-use super::document::{decimal, none, percent, words, Cell, Table};
+use super::document::{decimal, empty_cell, percent, text_cell, Cell, Table};
 use super::Format;
 
 /// Condition against error, one line per scene. Fractions in CSV and JSON, percent in Markdown.
@@ -78,12 +78,12 @@ fn line(row: &Row) -> Vec<Cell> {
     let error = |figures: Option<Figures>, pick: fn(&Figures) -> Option<f64>| percent(figures.as_ref().and_then(pick));
     let spectrum = |pick: fn(&Spectrum) -> f64| row.spectrum.as_ref().map(pick);
     vec![
-        words(row.group.clone()),
-        words(format!("{}×{}", sensor.rows, sensor.cols)),
-        words(format!("{}×{}", sensor.pitch_x_mm, sensor.pitch_y_mm)),
-        words(sensor.thickness_mm.to_string()),
-        words(medium(row.medium)),
-        words(row.inverse),
+        text_cell(row.group.clone()),
+        text_cell(format!("{}×{}", sensor.rows, sensor.cols)),
+        text_cell(format!("{}×{}", sensor.pitch_x_mm, sensor.pitch_y_mm)),
+        text_cell(sensor.thickness_mm.to_string()),
+        text_cell(medium(row.medium)),
+        text_cell(row.inverse),
         short(spectrum(|s| s.condition)),
         decimal(spectrum(|s| s.rank), 0),
         short(spectrum(|s| s.gain)),
@@ -105,7 +105,7 @@ fn line(row: &Row) -> Vec<Cell> {
 
 /// A power of ten with two digits.
 fn short(value: Option<f64>) -> Cell {
-    value.map_or_else(none, |value| Cell { shown: format!("{value:.1e}"), number: Some(value) })
+    value.map_or_else(empty_cell, |value| Cell { shown: format!("{value:.1e}"), number: Some(value) })
 }
 
 fn medium(medium: Medium) -> String {
@@ -159,7 +159,7 @@ fn csv(rows: &[Row]) -> String {
 
 #[cfg(test)]
 mod tests {
-    use super::super::read;
+    use super::super::csv_reader;
     use super::*;
     use dermis_golden::scene::Scene;
     use dermis_golden::stability::{measure, Setting};
@@ -177,8 +177,8 @@ mod tests {
     #[test]
     fn csv_comes_back() {
         let rows = rows();
-        let (head, records) = read::csv(&stability(&rows, Format::Csv).unwrap());
-        let of = |record: usize, name: &str| read::field(&head, &records[record], name).to_owned();
+        let (head, records) = csv_reader::csv(&stability(&rows, Format::Csv).unwrap());
+        let of = |record: usize, name: &str| csv_reader::field(&head, &records[record], name).to_owned();
         assert_eq!((of(0, "varied"), of(0, "inverse")), ("a, \"b\"".to_owned(), "tsvd".to_owned()));
         let fixed = rows[0].fixed.unwrap();
         assert_eq!(of(0, "forward_fixed").parse::<f64>().unwrap(), fixed.forward);

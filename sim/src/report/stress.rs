@@ -32,7 +32,7 @@ pub fn stress(outcomes: &[Outcome]) -> String {
             o.cut,
             o.flagged,
             o.resets,
-            o.reset_places,
+            o.possible_reset_cycles,
             o.longest_reset,
             o.violations,
         ];

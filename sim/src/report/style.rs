@@ -44,7 +44,7 @@ const ROLES: [(RGBColor, &str, &str, &str); 13] = [
     (SERIES[7], "s7", "#12637a", "#7fdbf0"),
 ];
 
-fn stand_in(RGBColor(r, g, b): RGBColor) -> String {
+fn placeholder(RGBColor(r, g, b): RGBColor) -> String {
     format!("\"#{r:02X}{g:02X}{b:02X}\"")
 }
 
@@ -65,7 +65,7 @@ pub fn variables() -> String {
 pub fn themed(svg: &str, caption: &str) -> String {
     let mut svg = svg.to_owned();
     for role in &ROLES {
-        svg = svg.replace(&stand_in(role.0), &format!("\"var(--{})\"", role.1));
+        svg = svg.replace(&placeholder(role.0), &format!("\"var(--{})\"", role.1));
     }
     let Some((head, body)) = svg.split_once('>') else { return svg };
     let box_ = head.split("viewBox=").nth(1).unwrap_or("\"0 0 1 1\"");
@@ -77,7 +77,7 @@ pub fn themed(svg: &str, caption: &str) -> String {
 pub fn standalone(svg: &str) -> String {
     let mut svg = svg.to_owned();
     for role in &ROLES {
-        svg = svg.replace(&stand_in(role.0), &format!("\"{}\"", role.2));
+        svg = svg.replace(&placeholder(role.0), &format!("\"{}\"", role.2));
     }
     match svg.split_once('>') {
         Some((head, body)) => format!("{head}>\n<rect width=\"100%\" height=\"100%\" fill=\"#ffffff\"/>{body}"),
@@ -108,8 +108,8 @@ mod tests {
     }
 
     #[test]
-    fn stand_ins_differ() {
-        let all: std::collections::BTreeSet<String> = ROLES.iter().map(|role| stand_in(role.0)).collect();
+    fn placeholders_differ() {
+        let all: std::collections::BTreeSet<String> = ROLES.iter().map(|role| placeholder(role.0)).collect();
         assert_eq!(all.len(), ROLES.len());
     }
 }

@@ -27,7 +27,7 @@ use dermis_golden::fixed::send::{Status, STATUS_BEATS};
 use dermis_golden::float::pass::Polynomial;
 use dermis_golden::quantise::full_scale;
 
-use super::{Integers, Measured};
+use super::{BitTrue, Measured};
 
 /// One stage of one frame.
 #[derive(Clone, Debug, PartialEq)]
@@ -58,13 +58,13 @@ pub struct StageRow {
 
 /// Words with their floating-point counterparts in LSB, and what an LSB is worth.
 #[derive(Default)]
-struct Pairs {
+struct ComparedWords {
     words: Vec<i64>,
     values: Vec<f64>,
     lsb: Vec<f64>,
 }
 
-impl Pairs {
+impl ComparedWords {
     fn add(&mut self, words: impl IntoIterator<Item = i64>, values: impl IntoIterator<Item = f64>) {
         self.words.extend(words);
         self.values.extend(values);
@@ -81,10 +81,10 @@ impl Pairs {
 
 /// All stages of a frame, in pipeline order; none where there is no bit-true model or the input is no plain stress.
 pub fn stages(measured: &Measured, index: usize) -> Vec<StageRow> {
-    let Ok(integers) = &measured.integers else { return Vec::new() };
-    let shadow = Shadow::new(measured, integers, index);
-    let f = &integers.model.formats;
-    let sum = |pick: fn(&Status) -> u32| shadow.status.iter().map(pick).sum::<u32>();
+    let Ok(bit_true) = &measured.bit_true else { return Vec::new() };
+    let reference = FloatReference::new(measured, bit_true, index);
+    let f = &bit_true.model.formats;
+    let sum = |pick: fn(&Status) -> u32| reference.status.iter().map(pick).sum::<u32>();
     let bits = [
         ("receive", f.code_bits, 0),
         ("normalise", f.input_bits, 0),
@@ -94,17 +94,20 @@ pub fn stages(measured: &Measured, index: usize) -> Vec<StageRow> {
         ("unfold", f.vector_bits + 2, 0),
         ("search", bit_length(MU_STEPS as u64) + 1, 0),
         ("force", f.search_bits[0], 0),
-        ("send", 32, shadow.status.first().map_or(0, |status| status.force_saturations)),
+        ("send", 32, reference.status.first().map_or(0, |status| status.force_saturations)),
     ];
     let row = |(stage, has_bits, saturations)| {
-        let pairs = shadow.pairs(stage);
-        let off = || pairs.words.iter().zip(&pairs.values).map(|(word, value)| (*word as f64 - value).abs());
-        let worth = || off().zip(&pairs.lsb).map(|(off, lsb)| off * lsb);
-        let peak =
-            pairs.values.iter().zip(&pairs.lsb).fold(0.0, |peak: f64, (value, lsb)| peak.max((value * lsb).abs()));
+        let compared = reference.compared_words(stage);
+        let off = || compared.words.iter().zip(&compared.values).map(|(word, value)| (*word as f64 - value).abs());
+        let worth = || off().zip(&compared.lsb).map(|(off, lsb)| off * lsb);
+        let peak = compared
+            .values
+            .iter()
+            .zip(&compared.lsb)
+            .fold(0.0, |peak: f64, (value, lsb)| peak.max((value * lsb).abs()));
         let share = |value: f64| if peak > 0.0 { value / peak } else { 0.0 };
-        let rms = |squares: f64| (squares / pairs.words.len().max(1) as f64).sqrt();
-        let used = pairs.words.iter().map(|word| bit_length((word ^ (word >> 63)) as u64) + 1).max();
+        let rms = |squares: f64| (squares / compared.words.len().max(1) as f64).sqrt();
+        let used = compared.words.iter().map(|word| bit_length((word ^ (word >> 63)) as u64) + 1).max();
         StageRow {
             scene: measured.scene.name.clone(),
             case: measured.scene.partition.case.to_string(),
@@ -123,9 +126,9 @@ pub fn stages(measured: &Measured, index: usize) -> Vec<StageRow> {
 }
 
 /// A frame in floating point beside its integers.
-struct Shadow<'a> {
+struct FloatReference<'a> {
     measured: &'a Measured,
-    integers: &'a Integers,
+    bit_true: &'a BitTrue,
     index: usize,
     status: Vec<Status>,
     /// Stress of a code's LSB.
@@ -134,15 +137,15 @@ struct Shadow<'a> {
     families: Vec<Polynomial>,
 }
 
-impl<'a> Shadow<'a> {
-    fn new(measured: &'a Measured, integers: &'a Integers, index: usize) -> Self {
-        let (model, frame) = (&integers.model, &measured.frames[index]);
-        let beats = &integers.traces[index].status;
+impl<'a> FloatReference<'a> {
+    fn new(measured: &'a Measured, bit_true: &'a BitTrue, index: usize) -> Self {
+        let (model, frame) = (&bit_true.model, &measured.frames[index]);
+        let beats = &bit_true.traces[index].status;
         let stress = |part: &dermis_golden::partition::Subarray| part.gather(&model.scene.sensor, &frame.stress_MPa);
         let family = |b: Vec<f64>| Polynomial::of_degree(measured.engine.matrices(), &b, model.formats.degree);
-        Shadow {
+        FloatReference {
             measured,
-            integers,
+            bit_true,
             index,
             status: beats.chunks(STATUS_BEATS).filter_map(Status::of_beats).collect(),
             code_MPa: full_scale(&model.scene, frame) / model.prepare.largest(),
@@ -151,62 +154,62 @@ impl<'a> Shadow<'a> {
     }
 
     fn formats(&self) -> &Formats {
-        &self.integers.model.formats
+        &self.bit_true.model.formats
     }
 
     /// The words of a stage of all subarrays, four to a quad.
     fn words(&self, stage: &str) -> &[Vec<i64>] {
-        let stages = &self.integers.traces[self.index].stages;
+        let stages = &self.bit_true.traces[self.index].stages;
         stages.iter().find(|s| s.name == stage).map_or(&[], |s| &s.words)
     }
 
-    fn pairs(&self, stage: &str) -> Pairs {
-        let mut pairs = Pairs::default();
+    fn compared_words(&self, stage: &str) -> ComparedWords {
+        let mut compared = ComparedWords::default();
         match stage {
             "receive" => {
                 let values = self.measured.frames[self.index].stress_MPa.iter().map(|b| b / self.code_MPa);
-                pairs.add(self.words(stage).iter().flatten().copied(), values);
+                compared.add(self.words(stage).iter().flatten().copied(), values);
             }
-            "search" => self.search(&mut pairs),
-            "send" => self.send(&mut pairs),
+            "search" => self.search(&mut compared),
+            "send" => self.send(&mut compared),
             _ => {
                 let words = self.words(stage);
                 let own = words.len() / self.status.len().max(1);
                 for (part, words) in words.chunks(own.max(1)).enumerate() {
                     let values = self.quads(stage, part);
-                    words.iter().zip(values).for_each(|(words, values)| pairs.add_quad(words, values));
+                    words.iter().zip(values).for_each(|(words, values)| compared.add_quad(words, values));
                 }
             }
         }
-        pairs
+        compared
     }
 
     /// μ of every subarray that was searched.
-    fn search(&self, pairs: &mut Pairs) {
+    fn search(&self, compared: &mut ComparedWords) {
         let step = self.measured.scene.search.mu_max / MU_STEPS as f64;
         let golden = &self.measured.golden[self.index].subarrays;
         for (status, golden) in self.status.iter().zip(golden).filter(|(_, golden)| golden.objective_value.is_some()) {
-            pairs.add(status.position.map(i64::from), golden.mu.map(|mu| mu / step));
+            compared.add(status.position.map(i64::from), golden.mu.map(|mu| mu / step));
         }
     }
 
     /// The forces as they leave.
-    fn send(&self, pairs: &mut Pairs) {
-        let model = &self.integers.model;
+    fn send(&self, compared: &mut ComparedWords) {
+        let model = &self.bit_true.model;
         if model.wants_resultants() {
             return;
         }
         let lsb_N = model.force_lsb_N(self.code_MPa * model.prepare.largest());
         let forces = &self.measured.golden[self.index].forces_N;
-        let beats = &self.integers.traces[self.index].beats;
+        let beats = &self.bit_true.traces[self.index].beats;
         for (k, axis) in [&forces.fx, &forces.fy, &forces.fz].into_iter().enumerate() {
-            pairs.add(beats.iter().map(|beat| i64::from(beat[k])), axis.iter().map(|f| f / lsb_N));
+            compared.add(beats.iter().map(|beat| i64::from(beat[k])), axis.iter().map(|f| f / lsb_N));
         }
     }
 
     /// The values of a stage of one subarray in quads, in LSB, with the LSB in MPa or N.
     fn quads(&self, stage: &str, part: usize) -> Vec<([f64; 4], f64)> {
-        let (f, model, status) = (self.formats(), &self.integers.model, &self.status[part]);
+        let (f, model, status) = (self.formats(), &self.bit_true.model, &self.status[part]);
         let layout = model.layout();
         let scene = &self.measured.scene;
         let code = self.code_MPa / 2f64.powi(status.normalise as i32);

@@ -56,11 +56,11 @@ pub(super) fn time(measured: &Measured) -> Result<BTreeMap<Engine, Timing>> {
             Ok(())
         })?,
     );
-    if let Ok(integers) = &measured.integers {
+    if let Ok(bit_true) = &measured.bit_true {
         times.insert(
             Engine::Fixed,
             Timing::of(frames.len(), |k| {
-                integers.model.reconstruct(&frames[k])?;
+                bit_true.model.reconstruct(&frames[k])?;
                 Ok(())
             })?,
         );

@@ -12,11 +12,11 @@ use dermis_golden::scene::Scene;
 use dermis_hdl::generate;
 use dermis_hdl::usage::{total, Usage};
 
-use super::super::document::{count, decimal, none, percent, seconds, words, Cell, Item, Section, Table};
-use super::super::measure::{clock, formats, Clock, Engine, FormatRow, Kind, Measured, Options};
+use super::super::document::{count, decimal, empty_cell, percent, seconds, text_cell, Cell, Item, Section, Table};
+use super::super::measure::{clock, formats, Clock, ContactCount, Engine, FormatRow, Measured, Options};
 use super::super::BUDGET_US;
 use super::{case_text, scenes};
-use crate::fresh::{Fresh, Shapes};
+use crate::drawn_frames::{DrawnFrames, Shapes};
 use crate::jobs::parallel;
 
 /// How much worse than the best a faster case may be: a share of the error, and a share of the force.
@@ -32,7 +32,7 @@ pub struct Choice {
     /// Index of the scene in its case among the measured.
     pub index: usize,
     /// The frames it is for.
-    pub kind: Kind,
+    pub contact_count: ContactCount,
     /// The format taken.
     pub format: FormatRow,
     /// All formats tried, the one taken among them.
@@ -50,19 +50,21 @@ pub struct Choice {
 /// # Errors
 /// An interruption; a frame that is not its scene's.
 pub fn choose(measured: &[Measured], options: &Options) -> Result<Vec<Choice>> {
-    let kinds = |scene| [Kind::One, Kind::Several].map(|kind| (scene, kind));
-    let best = scenes(measured).into_iter().flat_map(kinds);
-    let best = best.filter_map(|(scene, kind)| Some((best_case(measured, scene, kind)?, kind))).collect();
-    parallel("formats", best, options.jobs, &options.interrupt, |(index, kind)| {
-        choose_format(measured, index, kind, options)
+    let contact_counts = |scene| [ContactCount::One, ContactCount::Several].map(|contact_count| (scene, contact_count));
+    let best = scenes(measured).into_iter().flat_map(contact_counts);
+    let best = best
+        .filter_map(|(scene, contact_count)| Some((best_case(measured, scene, contact_count)?, contact_count)))
+        .collect();
+    parallel("formats", best, options.jobs, &options.interrupt, |(index, contact_count)| {
+        choose_format(measured, index, contact_count, options)
     })
 }
 
 /// The measured case of a scene to take.
-fn best_case(measured: &[Measured], scene: &str, kind: Kind) -> Option<usize> {
+fn best_case(measured: &[Measured], scene: &str, contact_count: ContactCount) -> Option<usize> {
     let own = measured.iter().enumerate().filter(|(_, m)| m.scene.name == scene);
     let point = |(index, m): (usize, &Measured)| {
-        let point = m.point_over(Engine::Hardware, |frame| Kind::of(frame) == kind)?;
+        let point = m.point_over(Engine::Hardware, |frame| ContactCount::of(frame) == contact_count)?;
         (point.seconds <= 1e-6 * BUDGET_US as f64).then_some((index, point.tangential?, point.seconds))
     };
     let all: Vec<(usize, f64, f64)> = own.filter_map(point).collect();
@@ -71,16 +73,21 @@ fn best_case(measured: &[Measured], scene: &str, kind: Kind) -> Option<usize> {
     near.min_by(|a, b| a.2.total_cmp(&b.2)).map(|(index, _, _)| index)
 }
 
-fn choose_format(measured: &[Measured], index: usize, kind: Kind, options: &Options) -> Result<Choice> {
+fn choose_format(
+    measured: &[Measured],
+    index: usize,
+    contact_count: ContactCount,
+    options: &Options,
+) -> Result<Choice> {
     let own = &measured[index];
-    let formats = formats(&own.scene, &frames(&own.scene, kind, DRAWN[usize::from(!options.quick)])?)?;
+    let formats = formats(&own.scene, &frames(&own.scene, contact_count, DRAWN[usize::from(!options.quick)])?)?;
     let format = cheapest(&formats).cloned();
     let format = format.ok_or_else(|| anyhow::anyhow!("scene {}: no format fits its board", own.scene.name))?;
     let model = Model::new(&with_format(&own.scene, format.bits))?;
     let usage = total(&generate(&model)?.usage);
     let simulated = model.scene == own.scene
-        && own.integers.as_ref().is_ok_and(|i| i.equal == Some(true) && i.cycles == format.cycles);
-    Ok(Choice { index, kind, clock: clock(&model.board, &model.scene), usage, formats, format, simulated })
+        && own.bit_true.as_ref().is_ok_and(|i| i.equal == Some(true) && i.cycles == format.cycles);
+    Ok(Choice { index, contact_count, clock: clock(&model.board, &model.scene), usage, formats, format, simulated })
 }
 
 /// The cheapest format near the best.
@@ -97,14 +104,14 @@ fn cheapest(formats: &[FormatRow]) -> Option<&FormatRow> {
 ///
 /// # Errors
 /// A stress that is not finite.
-pub fn frames(scene: &Scene, kind: Kind, drawn: u32) -> Result<Vec<Frame>> {
+pub fn frames(scene: &Scene, contact_count: ContactCount, drawn: u32) -> Result<Vec<Frame>> {
     let mut frames = Frame::shipped(scene);
-    frames.retain(|frame| Kind::of(frame) == kind);
+    frames.retain(|frame| ContactCount::of(frame) == contact_count);
     let sensor = &scene.sensor;
     if sensor.pitch_x_mm.max(sensor.pitch_y_mm) <= 2.0 * sensor.thickness_mm {
-        let contacts = if kind == Kind::One { vec![1] } else { vec![2, 3] };
-        let fresh = Fresh { frames: drawn, contacts, shapes: Shapes::Elliptic, touching: false, seed: 1 };
-        frames.extend(fresh.draw(scene)?);
+        let contacts = if contact_count == ContactCount::One { vec![1] } else { vec![2, 3] };
+        let draw = DrawnFrames { frames: drawn, contacts, shapes: Shapes::Elliptic, touching: false, seed: 1 };
+        frames.extend(draw.draw(scene)?);
     }
     Ok(frames)
 }
@@ -136,8 +143,8 @@ pub fn choice(measured: &[Measured], choices: &[Choice]) -> Section {
     let mut rows: Vec<Vec<Cell>> = choices.iter().map(|choice| row(measured, choice)).collect();
     let chosen = |name: &&str| choices.iter().any(|choice| measured[choice.index].scene.name == *name);
     for name in scenes(measured).into_iter().filter(|name| !chosen(name)) {
-        let mut row = vec![words(name), none(), none(), words("no hardware fits")];
-        row.resize(head.len(), none());
+        let mut row = vec![text_cell(name), empty_cell(), empty_cell(), text_cell("no hardware fits")];
+        row.resize(head.len(), empty_cell());
         rows.push(row);
     }
     let origin = choices.first().map_or("design clock", |choice| choice.clock.origin);
@@ -151,8 +158,9 @@ pub fn choice(measured: &[Measured], choices: &[Choice]) -> Section {
                 [partition] case, the bits into [fixed] input_bits, inverse_bits, data_bits, coef_bits. Several \
                 contacts with different shear suit no rectangle: in software [partition] case = \"contacts\" gives \
                 each its own μ; its error and time on a CPU stand below where it was measured.";
-    let formats =
-        choices.iter().flat_map(|choice| choice.formats.iter().map(|row| format_row(choice.kind, row, &choice.format)));
+    let formats = choices
+        .iter()
+        .flat_map(|choice| choice.formats.iter().map(|row| format_row(choice.contact_count, row, &choice.format)));
     let format_head = [
         "sensor",
         "contacts",
@@ -178,7 +186,7 @@ pub fn choice(measured: &[Measured], choices: &[Choice]) -> Section {
             Item::Table(Table::new("choice", caption, &head, rows)),
             Item::Text(rule.into()),
             Item::Table(compared(measured)),
-            Item::Table(formats.shut()),
+            Item::Table(formats.collapsed()),
         ],
     }
 }
@@ -186,7 +194,7 @@ pub fn choice(measured: &[Measured], choices: &[Choice]) -> Section {
 fn row(measured: &[Measured], choice: &Choice) -> Vec<Cell> {
     let own = &measured[choice.index];
     let (sensor, format, usage) = (&own.scene.sensor, &choice.format, &choice.usage);
-    let board = own.integers.as_ref().ok().map(|integers| &integers.model.board);
+    let board = own.bit_true.as_ref().ok().map(|bit_true| &bit_true.model.board);
     let share = |n: usize, of: Option<u32>| {
         let share = of.map_or(String::new(), |of| format!(" ({:.0} %)", 100.0 * n as f64 / f64::from(of)));
         Cell { shown: format!("{n}{share}"), number: Some(n as f64) }
@@ -194,11 +202,11 @@ fn row(measured: &[Measured], choice: &Choice) -> Vec<Cell> {
     let seconds = choice.clock.seconds(format.cycles);
     let [input, inverse, data, coef] = format.bits;
     vec![
-        words(own.scene.name.clone()),
-        words(format!("{}×{}", sensor.rows, sensor.cols)),
-        words(choice.kind.name()),
-        words(case_text(own.scene.partition.case)),
-        words(format!("{input} / {inverse} / {data} / {coef}")),
+        text_cell(own.scene.name.clone()),
+        text_cell(format!("{}×{}", sensor.rows, sensor.cols)),
+        text_cell(choice.contact_count.name()),
+        text_cell(case_text(own.scene.partition.case)),
+        text_cell(format!("{input} / {inverse} / {data} / {coef}")),
         percent(format.tangential),
         percent(format.normal),
         count(format.cycles),
@@ -206,7 +214,7 @@ fn row(measured: &[Measured], choice: &Choice) -> Vec<Cell> {
         share(usage.block_rams, board.map(|board| board.block_rams)),
         share(usage.multipliers, board.map(|board| board.multipliers)),
         share(usage.luts, board.map(|board| board.luts)),
-        words(if choice.simulated { "co-simulation" } else { "bit-true model" }),
+        text_cell(if choice.simulated { "co-simulation" } else { "bit-true model" }),
     ]
 }
 
@@ -229,20 +237,20 @@ fn compared(measured: &[Measured]) -> Table {
     ];
     let mut rows = Vec::new();
     for scene in scenes(measured) {
-        for kind in [Kind::One, Kind::Several] {
+        for contact_count in [ContactCount::One, ContactCount::Several] {
             let own = || measured.iter().filter(|m| m.scene.name == scene);
-            if !own().any(|m| m.frames.iter().any(|frame| Kind::of(frame) == kind)) {
+            if !own().any(|m| m.frames.iter().any(|frame| ContactCount::of(frame) == contact_count)) {
                 continue;
             }
-            let mut row = vec![words(scene), words(kind.name())];
+            let mut row = vec![text_cell(scene), text_cell(contact_count.name())];
             for case in cases {
                 let m = own().find(|m| m.scene.partition.case.to_string() == case);
                 let engine = if case == "contacts" { Engine::Golden } else { Engine::Hardware };
-                let point = m.and_then(|m| m.point_over(engine, |frame| Kind::of(frame) == kind));
+                let point = m.and_then(|m| m.point_over(engine, |frame| ContactCount::of(frame) == contact_count));
                 let missing = if m.is_some() { "does not fit" } else { "–" };
                 row.extend(match point {
                     Some(point) => [percent(point.tangential), seconds(Some(point.seconds))],
-                    None => [words(missing), none()],
+                    None => [text_cell(missing), empty_cell()],
                 });
             }
             rows.push(row);
@@ -254,12 +262,12 @@ fn compared(measured: &[Measured]) -> Table {
     Table::new("cases", caption, &head, rows)
 }
 
-fn format_row(kind: Kind, row: &FormatRow, taken: &FormatRow) -> Vec<Cell> {
+fn format_row(contact_count: ContactCount, row: &FormatRow, taken: &FormatRow) -> Vec<Cell> {
     let [input, inverse, data, coef] = row.bits.map(|bits| count(u64::from(bits)));
     vec![
-        words(row.scene.clone()),
-        words(kind.name()),
-        words(row.case.clone()),
+        text_cell(row.scene.clone()),
+        text_cell(contact_count.name()),
+        text_cell(row.case.clone()),
         input,
         inverse,
         data,
@@ -270,7 +278,7 @@ fn format_row(kind: Kind, row: &FormatRow, taken: &FormatRow) -> Vec<Cell> {
         count(row.cycles),
         count(row.block_rams as u64),
         count(row.multipliers as u64),
-        words(if row.bits == taken.bits { "yes" } else { "" }),
+        text_cell(if row.bits == taken.bits { "yes" } else { "" }),
     ]
 }
 

@@ -6,7 +6,7 @@ use dermis_golden::frame::Forces;
 use super::super::document::{Item, Picture, Section};
 use super::super::measure::Measured;
 use super::super::pictures::{force_field, stress_map, Outline};
-use super::{case_text, shown, Choice};
+use super::{case_text, illustrated_frame, Choice};
 
 /// The section.
 ///
@@ -21,7 +21,11 @@ pub fn fields(measured: &[Measured], choices: &[Choice]) -> Result<Section> {
     )];
     for choice in choices {
         let m = &measured[choice.index];
-        items.push(Item::Pictures(field_pictures(m, shown(m, choice.kind), &format!("field-{}", choice.kind.name()))?));
+        items.push(Item::Pictures(field_pictures(
+            m,
+            illustrated_frame(m, choice.contact_count),
+            &format!("field-{}", choice.contact_count.name()),
+        )?));
     }
     Ok(Section { id: "fields", title: "Stress and forces".into(), items })
 }
@@ -30,7 +34,7 @@ pub fn fields(measured: &[Measured], choices: &[Choice]) -> Result<Section> {
 pub(super) fn field_pictures(m: &Measured, index: usize, prefix: &str) -> Result<Vec<Picture>> {
     let (frame, golden) = (&m.frames[index], &m.golden[index]);
     let sensor = &m.scene.sensor;
-    let fixed = m.integers.as_ref().ok().map(|integers| &integers.results[index].forces_N);
+    let fixed = m.bit_true.as_ref().ok().map(|bit_true| &bit_true.results[index].forces_N);
     let fields: Vec<(&str, &Forces)> = [
         frame.cell_forces_N.as_ref().map(|forces| ("truth", forces)),
         Some(("golden", &golden.forces_N)),

@@ -11,7 +11,7 @@ use dermis_golden::paper::conclusions;
 use dermis_golden::partition::Case;
 use dermis_golden::reconstruct::Golden;
 
-use super::super::document::{count, none, percent, seconds, words, Cell, Item, Picture, Section, Table};
+use super::super::document::{count, empty_cell, percent, seconds, text_cell, Cell, Item, Picture, Section, Table};
 use super::super::measure::{Engine, Measured, Options};
 use super::super::pictures::{bars, force_field, stress_map, Bars, Outline};
 use super::super::style::SERIES;
@@ -65,7 +65,7 @@ pub fn paper(measured: &[Measured], options: &Options) -> Result<Vec<Section>> {
             Item::Table(operations(measured)),
         ],
     });
-    sections.push(one("conclusions", "Do the paper's conclusions hold?", judged(measured)));
+    sections.push(one("conclusions", "Do the paper's conclusions hold?", conclusions_table(measured)));
     Ok(sections)
 }
 
@@ -139,7 +139,7 @@ fn figure_7(measured: &[Measured], options: &Options) -> Result<Section> {
             let start = Instant::now();
             Golden::new(&m.scene)?.run(&m.frames[m.frame(PLANTAR)])?;
             *repeat = start.elapsed().as_secs_f64();
-            bar.at((REPEATS * all.len() + k + 1) as u64);
+            bar.set((REPEATS * all.len() + k + 1) as u64);
         }
         all.push(repeats);
     }
@@ -173,10 +173,10 @@ fn figure_7(measured: &[Measured], options: &Options) -> Result<Section> {
         (Some(whole), Some(own)) => {
             Cell { shown: format!("{} ×", super::time::short(whole / own)), number: Some(whole / own) }
         }
-        _ => none(),
+        _ => empty_cell(),
     };
     let rows = own.iter().zip(&all).map(|(m, repeats)| {
-        let mut row = vec![words(case_text(m.scene.partition.case)), seconds(printed(m))];
+        let mut row = vec![text_cell(case_text(m.scene.partition.case)), seconds(printed(m))];
         row.extend(repeats.map(|s| seconds(Some(s))));
         row.push(faster(whole.and_then(|(m, _)| printed(m)), printed(m)));
         row.push(faster(whole.and_then(|(_, repeats)| middle(repeats)), middle(repeats)));
@@ -223,7 +223,7 @@ fn operations(measured: &[Measured]) -> Table {
         let products = |degree: usize| 1 + 2 * (vectors(degree) as u64 - 1) - 2 * degree as u64;
         let ours = parts * products(matrices.degree) * n * n / 4;
         vec![
-            words(case_text(m.scene.partition.case)),
+            text_cell(case_text(m.scene.partition.case)),
             count(parts),
             count(n),
             Cell { shown: format!("{}² = {}", 3 * n, 9 * n * n), number: Some((9 * n * n) as f64) },
@@ -240,7 +240,7 @@ fn operations(measured: &[Measured]) -> Table {
 }
 
 /// The paper's best case per sensor beside ours.
-fn judged(measured: &[Measured]) -> Table {
+fn conclusions_table(measured: &[Measured]) -> Table {
     let head = [
         "sensor",
         "the paper's best",
@@ -262,18 +262,18 @@ fn judged(measured: &[Measured]) -> Table {
             all.min_by(|a, b| a.1.total_cmp(&b.1)).copied()
         };
         let cells = |found: Option<(Case, f64)>| match found {
-            Some((case, error)) => [words(case_text(case)), percent(Some(error))],
-            None => [none(), none()],
+            Some((case, error)) => [text_cell(case_text(case)), percent(Some(error))],
+            None => [empty_cell(), empty_cell()],
         };
         let theirs = errors.iter().find(|(case, _)| *case == conclusion.best).copied();
         // Where the paper calls a cut case best, it is compared with the other cut ones: its case 0 is the reference.
         let cut = conclusion.best != Case::WHOLE;
         let holds = least(cut).is_some_and(|(case, _)| case == conclusion.best);
-        let mut row = vec![words(name)];
-        row.extend([words(case_text(conclusion.best)), percent(theirs.map(|(_, error)| error))]);
+        let mut row = vec![text_cell(name)];
+        row.extend([text_cell(case_text(conclusion.best)), percent(theirs.map(|(_, error)| error))]);
         row.extend(cells(least(false)));
         row.extend(cells(least(true)));
-        row.extend([words(if holds { "yes" } else { "no" }), words(conclusion.text)]);
+        row.extend([text_cell(if holds { "yes" } else { "no" }), text_cell(conclusion.text)]);
         row
     });
     let caption =

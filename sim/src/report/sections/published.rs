@@ -5,7 +5,7 @@ use dermis_golden::paper::{run_times, table_2, RunTime};
 use dermis_golden::partition::Case;
 use dermis_golden::sensor::Sensor;
 
-use super::super::document::{median_percent, none, percent, seconds, words, Cell, Item, Section, Table};
+use super::super::document::{empty_cell, median_percent, percent, seconds, text_cell, Cell, Item, Section, Table};
 use super::super::measure::{Engine, Measured};
 use super::{case_text, find};
 
@@ -47,7 +47,7 @@ pub(super) fn table_two(measured: &[Measured]) -> Table {
                 pairs.map(|(whole, own)| Some(Errors::new(whole.resultant_N, own.resultant_N))).collect()
             }
         };
-        let mut row = vec![words(m.scene.name.clone()), words(case_text(m.scene.partition.case))];
+        let mut row = vec![text_cell(m.scene.name.clone()), text_cell(case_text(m.scene.partition.case))];
         row.extend(paper.map(|x| percent(Some(x))));
         for errors in [m.errors(Engine::Golden), to_whole, m.errors(Engine::Fixed)] {
             row.extend((0..3).map(|k| median_percent(errors.iter().map(|e| e.as_ref()?.axes()[k].map(f64::abs)))));
@@ -79,17 +79,17 @@ pub(super) fn times(measured: &[Measured]) -> Table {
         let own = measured.iter().find(|m| fits(m, &published));
         let time = |engine: Engine| own.and_then(|m| m.point(engine)).map(|point| point.seconds);
         let ratio = |engine: Engine| match time(engine) {
-            None => none(),
+            None => empty_cell(),
             Some(own) => {
                 let ratio = published.seconds / own;
                 Cell { shown: format!("{} ×", super::time::short(ratio)), number: Some(ratio) }
             }
         };
-        let case = published.case.map_or_else(none, |case| words(case_text(case)));
-        let mut row = vec![words(published.sensor.clone()), case, words(published.system.clone())];
+        let case = published.case.map_or_else(empty_cell, |case| text_cell(case_text(case)));
+        let mut row = vec![text_cell(published.sensor.clone()), case, text_cell(published.system.clone())];
         row.push(seconds(Some(published.seconds)));
         row.extend(Engine::ALL.map(|engine| seconds(time(engine))));
-        row.extend([ratio(Engine::Golden), ratio(Engine::Hardware), words(published.source.clone())]);
+        row.extend([ratio(Engine::Golden), ratio(Engine::Hardware), text_cell(published.source.clone())]);
         row
     });
     let caption =

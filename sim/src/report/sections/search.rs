@@ -3,8 +3,8 @@
 use anyhow::Result;
 use dermis_golden::partition::Case;
 
-use super::super::document::{decimal, percent, words, Item, Picture, Section, Table};
-use super::super::measure::{plane, Measured, Plane};
+use super::super::document::{decimal, percent, text_cell, Item, Picture, Section, Table};
+use super::super::measure::{objective_map, Measured, ObjectiveMap};
 use super::super::pictures::{objective, scatter, Scatter, Series};
 use super::super::style::SERIES;
 use super::time::short;
@@ -15,19 +15,17 @@ use super::time::short;
 /// A picture that cannot be written.
 pub fn search(measured: &[Measured]) -> Result<Section> {
     let whole = measured.iter().filter(|m| m.scene.partition.case == Case::WHOLE);
-    let planes: Vec<Vec<Plane>> =
-        whole.map(|m| (0..m.frames.len()).filter_map(|index| plane(m, index)).collect()).collect();
+    let maps: Vec<Vec<ObjectiveMap>> =
+        whole.map(|m| (0..m.frames.len()).filter_map(|index| objective_map(m, index)).collect()).collect();
     let mut pictures = Vec::new();
-    for first in
-        planes.iter().filter_map(|planes| planes.iter().find(|plane| !plane.path.is_empty()).or(planes.first()))
-    {
+    for first in maps.iter().filter_map(|maps| maps.iter().find(|map| !map.path.is_empty()).or(maps.first())) {
         let caption = format!("{}, case 0, frame {}: Π over μ", first.scene, first.frame);
         pictures.push(Picture { id: format!("plane-{}", first.scene), caption, svg: objective(first)? });
     }
-    pictures.push(margins(&planes)?);
+    pictures.push(margins(&maps)?);
     let head = ["sensor", "frame", "margin, bits", "shear error"];
-    let rows = planes.iter().flatten().map(|p| {
-        vec![words(p.scene.clone()), words(p.frame.clone()), decimal(Some(p.margin), 2), percent(p.tangential)]
+    let rows = maps.iter().flatten().map(|p| {
+        vec![text_cell(p.scene.clone()), text_cell(p.frame.clone()), decimal(Some(p.margin), 2), percent(p.tangential)]
     });
     Ok(Section {
         id: "search",
@@ -47,14 +45,14 @@ pub fn search(measured: &[Measured]) -> Result<Section> {
 }
 
 /// Margin against error, one mark per frame.
-fn margins(planes: &[Vec<Plane>]) -> Result<Picture> {
-    let series = planes.iter().zip(0..).filter_map(|(planes, index): (_, usize)| {
-        let points = planes
+fn margins(maps: &[Vec<ObjectiveMap>]) -> Result<Picture> {
+    let series = maps.iter().zip(0..).filter_map(|(maps, index): (_, usize)| {
+        let points = maps
             .iter()
             .filter(|p| p.margin > 0.0)
             .filter_map(|p| Some((p.margin, p.tangential.filter(|error| *error > 0.0)?, String::new())));
         Some(Series {
-            name: planes.first()?.scene.clone(),
+            name: maps.first()?.scene.clone(),
             colour: SERIES[1 + index % 7],
             shape: index % 4,
             points: points.collect(),

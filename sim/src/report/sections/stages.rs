@@ -2,7 +2,7 @@
 
 use anyhow::Result;
 
-use super::super::document::{count, decimal, percent, percent_text, words, Cell, Item, Picture, Section, Table};
+use super::super::document::{count, decimal, percent, percent_text, text_cell, Cell, Item, Picture, Section, Table};
 use super::super::measure::{stages as trace, Measured, StageRow};
 use super::super::pictures::{bars, Bars};
 use super::super::style::SERIES;
@@ -37,7 +37,7 @@ pub fn stages(measured: &[Measured], choices: &[Choice]) -> Result<Section> {
     let one_head: Vec<&'static str> = [&head[..2], &["frame"], &head[2..]].concat();
     let all = rows.iter().map(|row| {
         let mut cells = line(std::slice::from_ref(row));
-        cells.insert(2, words(row.frame.clone()));
+        cells.insert(2, text_cell(row.frame.clone()));
         cells
     });
     Ok(Section {
@@ -46,7 +46,7 @@ pub fn stages(measured: &[Measured], choices: &[Choice]) -> Result<Section> {
         items: vec![
             Item::Text(
                 "Each stage's words beside the same stage in floating point, which starts from the stress itself \
-                 with matrices unrounded. Stage force is p at the integers' own μ: what the arithmetic costs. Stage \
+                 with matrices unrounded. Stage force is p at the bit_true' own μ: what the arithmetic costs. Stage \
                  search is how far that μ is from the golden model's (LSB: mu_max/384), stage send what leaves: the \
                  arithmetic with the search's answer in it. Shares are of the frame's largest value; LSBs are a \
                  subarray's own, large where one has next to no load."
@@ -54,7 +54,7 @@ pub fn stages(measured: &[Measured], choices: &[Choice]) -> Result<Section> {
             ),
             Item::Pictures(pictures),
             Item::Table(Table::new("stages", "Worst and RMS difference over the frames", &head, summed(&rows))),
-            Item::Table(Table::new("stages-frames", "The same, frame by frame", &one_head, all.collect()).shut()),
+            Item::Table(Table::new("stages-frames", "The same, frame by frame", &one_head, all.collect()).collapsed()),
         ],
     })
 }
@@ -85,9 +85,9 @@ fn rms(rows: &[StageRow], value: fn(&StageRow) -> f64) -> f64 {
 fn line(rows: &[StageRow]) -> Vec<Cell> {
     let first = &rows[0];
     vec![
-        words(first.scene.clone()),
-        words(first.case.clone()),
-        words(first.stage),
+        text_cell(first.scene.clone()),
+        text_cell(first.case.clone()),
+        text_cell(first.stage),
         decimal(Some(largest(rows, |row| row.max_lsb)), 1),
         decimal(Some(rms(rows, |row| row.rms_lsb)), 2),
         small(largest(rows, |row| row.max_share)),

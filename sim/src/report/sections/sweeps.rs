@@ -2,8 +2,8 @@
 
 use anyhow::Result;
 
-use super::super::document::{count, percent, words, Cell, Item, Picture, Section, Table};
-use super::super::measure::{Kind, SweepPoint};
+use super::super::document::{count, percent, text_cell, Cell, Item, Picture, Section, Table};
+use super::super::measure::{ContactCount, SweepPoint};
 use super::super::pictures::{scatter, Guide, Scatter, Series};
 use super::super::style::SERIES;
 use super::time::short;
@@ -12,19 +12,19 @@ use super::time::short;
 ///
 /// # Errors
 /// A picture that cannot be written.
-pub fn sweeps(all: &[(Vec<SweepPoint>, Kind, usize)]) -> Result<Section> {
+pub fn sweeps(all: &[(Vec<SweepPoint>, ContactCount, usize)]) -> Result<Section> {
     let mut pictures = Vec::new();
-    for (points, kind, frames) in all {
+    for (points, contact_count, frames) in all {
         let Some((scene, case)) = points.first().map(|point| (&point.scene, &point.case)) else { continue };
         for (what, x) in
             [("cycles", (|p| p.cycles as f64) as fn(&SweepPoint) -> f64), ("block RAMs", |p| p.block_rams as f64)]
         {
             pictures.push(Picture {
-                id: format!("sweep-{scene}-{}-{}", kind.name(), what.replace(' ', "-")),
+                id: format!("sweep-{scene}-{}-{}", contact_count.name(), what.replace(' ', "-")),
                 caption: format!(
                     "{scene} from case {case}, contacts: {}: shear error of the bit-true model against {what}, median \
                      of {frames} frames",
-                    kind.name()
+                    contact_count.name()
                 ),
                 svg: scatter(&plot(points, what, x))?,
             });
@@ -55,18 +55,18 @@ pub fn sweeps(all: &[(Vec<SweepPoint>, Kind, usize)]) -> Result<Section> {
                     .into(),
             ),
             Item::Pictures(pictures),
-            Item::Table(Table::new("sweeps", "Every setting", &head, rows.collect()).shut()),
+            Item::Table(Table::new("sweeps", "Every setting", &head, rows.collect()).collapsed()),
         ],
     })
 }
 
 fn row(p: &SweepPoint) -> Vec<Cell> {
-    let yes = |is: bool| words(if is { "yes" } else { "" });
+    let yes = |is: bool| text_cell(if is { "yes" } else { "" });
     vec![
-        words(p.scene.clone()),
-        words(p.case.clone()),
-        words(p.field),
-        words(p.value.clone()),
+        text_cell(p.scene.clone()),
+        text_cell(p.case.clone()),
+        text_cell(p.field),
+        text_cell(p.value.clone()),
         yes(p.own),
         percent(p.tangential),
         percent(p.normal),

@@ -2,7 +2,9 @@
 
 use anyhow::Result;
 
-use super::super::document::{count, none, percent, seconds, seconds_text, words, Cell, Item, Picture, Section, Table};
+use super::super::document::{
+    count, empty_cell, percent, seconds, seconds_text, text_cell, Cell, Item, Picture, Section, Table,
+};
 use super::super::measure::{Engine, Measured, Point};
 use super::super::pictures::{scatter, Guide, Scatter, Series};
 use super::super::style::SERIES;
@@ -51,29 +53,37 @@ pub fn time(measured: &[Measured]) -> Result<Section> {
 }
 
 fn row(m: &Measured, engine: Engine) -> Vec<Cell> {
-    let mut row = vec![words(m.scene.name.clone()), words(case_text(m.scene.partition.case)), words(engine.name())];
-    let integers = m.integers.as_ref();
+    let mut row =
+        vec![text_cell(m.scene.name.clone()), text_cell(case_text(m.scene.partition.case)), text_cell(engine.name())];
+    let bit_true = m.bit_true.as_ref();
     let Some(point) = m.point(engine) else {
         let reason = match engine {
             Engine::Baseline => m.baseline.as_ref().err(),
-            _ => integers.err(),
+            _ => bit_true.err(),
         };
-        row.extend([none(), none(), none(), none(), none(), words(reason.map_or("", |reason| reason))]);
+        row.extend([
+            empty_cell(),
+            empty_cell(),
+            empty_cell(),
+            empty_cell(),
+            empty_cell(),
+            text_cell(reason.map_or("", |reason| reason)),
+        ]);
         return row;
     };
     row.extend([percent(point.tangential), percent(point.normal), seconds(Some(point.seconds))]);
-    row.extend(match integers {
-        Ok(integers) if engine == Engine::Hardware => {
-            let verdict = match integers.equal {
+    row.extend(match bit_true {
+        Ok(bit_true) if engine == Engine::Hardware => {
+            let equality = match bit_true.equal {
                 Some(true) => "yes",
                 Some(false) => "NO",
                 None => "not simulated",
             };
-            [count(integers.cycles), words(verdict)]
+            [count(bit_true.cycles), text_cell(equality)]
         }
-        _ => [none(), none()],
+        _ => [empty_cell(), empty_cell()],
     });
-    row.push(words(""));
+    row.push(text_cell(""));
     row
 }
 
@@ -101,7 +111,7 @@ fn picture(scene: &str, what: &str, own: &[&Point], error: fn(&Point) -> Option<
         log: [true, true],
         ticks: [|s| tick(&seconds_text(s)), |e| format!("{} %", short(100.0 * e))],
         series,
-        guides: vec![Guide::X(budget, "1 ms".into()), Guide::Front(front(all), "Pareto front".into())],
+        guides: vec![Guide::X(budget, "1 ms".into()), Guide::Front(pareto_front(all), "Pareto front".into())],
     };
     let caption = format!("{scene}: {what} error against time; marks are named by their case");
     Ok(Picture { id: format!("time-{scene}-{what}"), caption, svg: scatter(&plot)? })
@@ -129,7 +139,7 @@ pub(super) fn short(value: f64) -> String {
 }
 
 /// The points that no other beats in both, from left to right.
-fn front(mut points: Vec<(f64, f64)>) -> Vec<(f64, f64)> {
+fn pareto_front(mut points: Vec<(f64, f64)>) -> Vec<(f64, f64)> {
     points.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.total_cmp(&b.1)));
     let mut front: Vec<(f64, f64)> = Vec::new();
     for point in points {
@@ -147,8 +157,8 @@ mod tests {
     #[test]
     fn the_front_by_hand() {
         let points = vec![(3.0, 1.0), (1.0, 5.0), (2.0, 6.0), (2.5, 3.0), (4.0, 2.0), (1.0, 7.0)];
-        assert_eq!(front(points), [(1.0, 5.0), (2.5, 3.0), (3.0, 1.0)]);
-        assert_eq!(front(vec![]), []);
+        assert_eq!(pareto_front(points), [(1.0, 5.0), (2.5, 3.0), (3.0, 1.0)]);
+        assert_eq!(pareto_front(vec![]), []);
     }
 
     #[test]

@@ -14,7 +14,7 @@ use serde::Serialize;
 /// What kind of memory holds a bit.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 #[serde(rename_all = "kebab-case")]
-pub enum Class {
+pub enum StorageClass {
     /// Coefficients, lists of columns, calibration: never written.
     Rom,
     /// Buffers and operand memories.
@@ -24,24 +24,24 @@ pub enum Class {
 }
 
 /// Classes in the order of the table.
-pub const CLASSES: [Class; 3] = [Class::Rom, Class::Ram, Class::Register];
+pub const CLASSES: [StorageClass; 3] = [StorageClass::Rom, StorageClass::Ram, StorageClass::Register];
 
-impl Class {
+impl StorageClass {
     /// Name in the table.
     pub fn name(self) -> &'static str {
         match self {
-            Class::Rom => "ROM",
-            Class::Ram => "RAM",
-            Class::Register => "register",
+            StorageClass::Rom => "ROM",
+            StorageClass::Ram => "RAM",
+            StorageClass::Register => "register",
         }
     }
 }
 
 /// A register or a memory.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Place {
+pub struct StateElement {
     /// Which kind.
-    pub class: Class,
+    pub class: StorageClass,
     /// The pipeline's stage, by its name in the hardware; what belongs to none is the engine's.
     pub stage: String,
     /// Instances from the design's top down, separated by dots; empty at the top.
@@ -58,7 +58,7 @@ pub struct Place {
 ///
 /// # Errors
 /// A listing of another form than Verilator's.
-pub fn places(listing: &str, dut: &str, memories: &[Memory]) -> Result<Vec<Place>> {
+pub fn state_elements(listing: &str, dut: &str, memories: &[Memory]) -> Result<Vec<StateElement>> {
     let document = Document::parse(listing).map_err(|error| anyhow!("Verilator's listing: {error}"))?;
     let modules: BTreeMap<&str, Node> = document
         .descendants()
@@ -77,21 +77,21 @@ pub fn places(listing: &str, dut: &str, memories: &[Memory]) -> Result<Vec<Place
         let block = own.replace('.', "$");
         let stage = stage(&block);
         let mut scan = Scan::default();
-        scan.walk(*module, own);
+        scan.scan_module(*module, own);
         for ((scope, signal), kind) in &scan.declared {
             let listed = memories.iter().any(|memory| memory.block == block && memory.array == *signal);
             let class = match (listed, scan.assigned.contains(&(scope.clone(), signal.clone()))) {
-                (true, false) => Class::Rom,
-                (true, true) => Class::Ram,
-                (false, true) => Class::Register,
+                (true, false) => StorageClass::Rom,
+                (true, true) => StorageClass::Ram,
+                (false, true) => StorageClass::Register,
                 (false, false) => continue,
             };
             let [words, bits] = widths.of(kind).ok_or_else(|| anyhow!("no width of {scope}.{signal}"))?;
             let (stage, scope, signal) = (stage.to_owned(), scope.clone(), signal.clone());
-            all.push(Place { class, stage, scope, signal, words, bits });
+            all.push(StateElement { class, stage, scope, signal, words, bits });
         }
     }
-    let found = all.iter().filter(|place| place.class != Class::Register).count();
+    let found = all.iter().filter(|element| element.class != StorageClass::Register).count();
     match found == memories.len() {
         true => Ok(all),
         false => Err(anyhow!("{found} of {} memories are in Verilator's listing", memories.len())),
@@ -106,7 +106,7 @@ struct Scan {
 }
 
 impl Scan {
-    fn walk(&mut self, node: Node, scope: &str) {
+    fn scan_module(&mut self, node: Node, scope: &str) {
         for child in node.children().filter(Node::is_element) {
             let name = child.attribute("name").unwrap_or_default();
             match child.tag_name().name() {
@@ -115,17 +115,20 @@ impl Scan {
                     self.declared.insert((scope.to_owned(), name.to_owned()), kind);
                 }
                 // The blocks of a loop that is unrolled have names.
-                "begin" if !name.is_empty() => {
-                    self.walk(child, &[scope, name].into_iter().filter(|s| !s.is_empty()).collect::<Vec<_>>().join("."))
+                "begin" if !name.is_empty() => self.scan_module(
+                    child,
+                    &[scope, name].into_iter().filter(|s| !s.is_empty()).collect::<Vec<_>>().join("."),
+                ),
+                "assigndly" => {
+                    child.children().rfind(Node::is_element).iter().for_each(|to| self.add_target(*to, scope))
                 }
-                "assigndly" => child.children().rfind(Node::is_element).iter().for_each(|to| self.to(*to, scope)),
-                _ => self.walk(child, scope),
+                _ => self.scan_module(child, scope),
             }
         }
     }
 
     /// The target of an assignment: a variable, a part of one, or several side by side.
-    fn to(&mut self, target: Node, scope: &str) {
+    fn add_target(&mut self, target: Node, scope: &str) {
         let mut parts = target.children().filter(Node::is_element);
         match target.tag_name().name() {
             "varref" => {
@@ -135,9 +138,9 @@ impl Scan {
                 let own = scopes.find(|s| self.declared.contains_key(&((*s).to_owned(), name.clone())));
                 self.assigned.insert((own.unwrap_or_default().to_owned(), name));
             }
-            "concat" => parts.for_each(|part| self.to(part, scope)),
+            "concat" => parts.for_each(|part| self.add_target(part, scope)),
             // What is selected from comes first, then where.
-            _ => parts.next().iter().for_each(|part| self.to(*part, scope)),
+            _ => parts.next().iter().for_each(|part| self.add_target(*part, scope)),
         }
     }
 }

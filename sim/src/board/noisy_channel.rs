@@ -1,10 +1,10 @@
 //! A bad wire: bytes that get lost, flipped, late or broken on their way.
 
-use super::Sent;
+use super::UartSymbol;
 
 /// How often what goes wrong: one byte of so many; 0 is never.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Faults {
+pub struct ChannelFaults {
     /// Is lost.
     pub lost: u32,
     /// Has one bit flipped.
@@ -19,15 +19,15 @@ pub struct Faults {
 
 /// One direction of a wire.
 #[derive(Clone, Debug)]
-pub struct Wire {
-    faults: Faults,
+pub struct NoisyChannel {
+    faults: ChannelFaults,
     random: fastrand::Rng,
 }
 
-impl Wire {
+impl NoisyChannel {
     /// A wire with these faults.
-    pub fn new(faults: Faults) -> Self {
-        Wire { faults, random: fastrand::Rng::with_seed(faults.seed) }
+    pub fn new(faults: ChannelFaults) -> Self {
+        NoisyChannel { faults, random: fastrand::Rng::with_seed(faults.seed) }
     }
 
     fn happens(&mut self, once_in: u32) -> bool {
@@ -35,19 +35,19 @@ impl Wire {
     }
 
     /// What becomes of a byte.
-    pub fn carry(&mut self, byte: u8) -> Vec<Sent> {
+    pub fn transmit(&mut self, byte: u8) -> Vec<UartSymbol> {
         let faults = self.faults;
         let mut out = Vec::new();
         if self.happens(faults.late) {
-            out.push(Sent::Pause(self.random.u32(1..=30)));
+            out.push(UartSymbol::Pause(self.random.u32(1..=30)));
         }
         let (lost, flipped, no_stop) =
             (self.happens(faults.lost), self.happens(faults.flipped), self.happens(faults.no_stop));
         let byte = if flipped { byte ^ 1 << self.random.u32(..8) } else { byte };
         match (lost, no_stop) {
             (true, _) => (),
-            (false, true) => out.push(Sent::NoStop(byte)),
-            (false, false) => out.push(Sent::Byte(byte)),
+            (false, true) => out.push(UartSymbol::NoStop(byte)),
+            (false, false) => out.push(UartSymbol::Byte(byte)),
         }
         out
     }

@@ -9,7 +9,7 @@ const BITS: u64 = 10;
 
 /// What goes out on the line.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Sent {
+pub enum UartSymbol {
     /// A byte.
     Byte(u8),
     /// A byte whose stop bit is missing.
@@ -19,27 +19,27 @@ pub enum Sent {
 }
 
 /// A UART of exact bit times, clocked together with the board.
-pub struct UartLine {
+pub struct HostUart {
     device: Box<dyn BoardDevice>,
     /// Bits per clock cycle as a fraction: baud / clock.
     baud: u64,
     clock_hz: u64,
     cycle: u64,
-    queue: VecDeque<Sent>,
+    queue: VecDeque<UartSymbol>,
     /// What is being sent, and the cycle it began in.
-    sending: Option<(Sent, u64)>,
+    sending: Option<(UartSymbol, u64)>,
     /// The cycle of a start bit's edge, and the bits since.
     receiving: Option<(u64, u64, u32)>,
     received: Vec<u8>,
     pins: BoardOutputs,
     /// The last cycle in which anything was on the line.
-    moved: u64,
+    last_active: u64,
 }
 
-impl UartLine {
+impl HostUart {
     /// The line of a board that sends `baud` bit/s at a clock of `clock_hz`.
     pub fn new(device: Box<dyn BoardDevice>, baud: u32, clock_hz: u32) -> Self {
-        UartLine {
+        HostUart {
             device,
             baud: baud.into(),
             clock_hz: clock_hz.into(),
@@ -49,7 +49,7 @@ impl UartLine {
             receiving: None,
             received: Vec::new(),
             pins: BoardOutputs { to_host: true, ..BoardOutputs::default() },
-            moved: 0,
+            last_active: 0,
         }
     }
 
@@ -59,9 +59,9 @@ impl UartLine {
     }
 
     /// Puts something into the queue for the line.
-    pub fn send(&mut self, what: Sent) {
+    pub fn send(&mut self, what: UartSymbol) {
         self.queue.push_back(what);
-        self.moved = self.cycle;
+        self.last_active = self.cycle;
     }
 
     /// The bytes that have come since the last call.
@@ -69,9 +69,9 @@ impl UartLine {
         std::mem::take(&mut self.received)
     }
 
-    /// Clock cycles since the line last moved.
-    pub fn quiet(&self) -> u64 {
-        self.cycle - self.moved
+    /// Clock cycles since the line last last_active.
+    pub fn idle_cycles(&self) -> u64 {
+        self.cycle - self.last_active
     }
 
     /// Clock cycles so far.
@@ -90,7 +90,7 @@ impl UartLine {
         self.pins = self.device.cycle(level.into());
         self.listen();
         if !self.queue.is_empty() || self.sending.is_some() || self.receiving.is_some() {
-            self.moved = self.cycle;
+            self.last_active = self.cycle;
         }
         self.cycle += 1;
     }
@@ -103,7 +103,7 @@ impl UartLine {
     /// The level that the board sees.
     fn level(&mut self) -> bool {
         if let Some((what, from)) = self.sending {
-            let bytes = if let Sent::Pause(bytes) = what { u64::from(bytes) } else { 1 };
+            let bytes = if let UartSymbol::Pause(bytes) = what { u64::from(bytes) } else { 1 };
             if self.bits_since(from) >= BITS * bytes {
                 self.sending = None;
             }
@@ -113,9 +113,9 @@ impl UartLine {
         }
         let Some((what, from)) = self.sending else { return true };
         let (data, stop) = match what {
-            Sent::Byte(data) => (data, true),
-            Sent::NoStop(data) => (data, false),
-            Sent::Pause(_) => return true,
+            UartSymbol::Byte(data) => (data, true),
+            UartSymbol::NoStop(data) => (data, false),
+            UartSymbol::Pause(_) => return true,
         };
         match self.bits_since(from) {
             0 => false,

@@ -1,10 +1,10 @@
 //! What long runs in this build folder have tried and found.
 
-use super::super::document::{count, seconds, words, Cell, Item, Section, Table};
-use crate::tried::{Line, Tried};
+use super::super::document::{count, seconds, text_cell, Cell, Item, Section, Table};
+use crate::run_log::{RunLog, TargetCounts};
 
 /// The section.
-pub fn tried(all: &[Tried]) -> Section {
+pub fn run_logs(all: &[RunLog]) -> Section {
     let item = match all {
         [] => Item::Text(
             "No long run has left its counts in the build folder yet; `make fuzz`, `dermis stress` and
@@ -13,7 +13,7 @@ pub fn tried(all: &[Tried]) -> Section {
         ),
         all => {
             let head = ["command", "what", "unit", "tried", "time", "outcomes"];
-            let rows = all.iter().flat_map(|run| run.lines.iter().map(move |line| row(run, line)));
+            let rows = all.iter().flat_map(|run| run.targets.iter().map(move |target| row(run, target)));
             let caption = "Counts that the last run of each command in the build folder left behind";
             Item::Table(Table::new("tried", caption, &head, rows.collect()))
         }
@@ -21,14 +21,14 @@ pub fn tried(all: &[Tried]) -> Section {
     Section { id: "tried", title: "Inputs tried".into(), items: vec![item] }
 }
 
-fn row(run: &Tried, line: &Line) -> Vec<Cell> {
+fn row(run: &RunLog, target: &TargetCounts) -> Vec<Cell> {
     vec![
-        words(run.command.clone()),
-        words(line.what.clone()),
-        words(line.unit.clone()),
-        count(line.tried),
-        seconds(Some(line.seconds)),
-        words(line.outcome()),
+        text_cell(run.command.clone()),
+        text_cell(target.target.clone()),
+        text_cell(target.unit.clone()),
+        count(target.count),
+        seconds(Some(target.seconds)),
+        text_cell(target.outcomes_text()),
     ]
 }
 
@@ -37,17 +37,17 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_was_tried_is_a_table_once_there_is_any() {
-        assert!(matches!(tried(&[]).items[..], [Item::Text(_)]));
-        let mut run = Tried::new("make fuzz");
-        run.lines.push(Line {
-            what: "scene".into(),
+    fn run_logs_become_a_table() {
+        assert!(matches!(run_logs(&[]).items[..], [Item::Text(_)]));
+        let mut run = RunLog::new("make fuzz");
+        run.targets.push(TargetCounts {
+            target: "scene".into(),
             unit: "inputs".into(),
-            tried: 12,
+            count: 12,
             outcomes: [("refused".to_owned(), 12)].into(),
             seconds: 0.5,
         });
-        let Item::Table(table) = &tried(&[run]).items[0] else { panic!("no table") };
+        let Item::Table(table) = &run_logs(&[run]).items[0] else { panic!("no table") };
         assert_eq!((table.rows[0][3].number, table.rows[0][5].shown.as_str()), (Some(12.0), "12 refused"));
     }
 }

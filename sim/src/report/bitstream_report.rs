@@ -7,20 +7,20 @@ use serde::Serialize;
 
 use super::table::markdown;
 use super::BUDGET_US;
-use crate::bitstream::absorb::Absorbed;
 use crate::bitstream::baseline::Baseline;
+use crate::bitstream::dsp_register_packing::PackedRegisters;
 use crate::bitstream::timing::Fmax;
 
 /// What `dermis bitstream` reached.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Implemented {
+pub struct BitstreamReport {
     /// Scene name.
     pub scene: String,
     /// Board name.
     pub board: String,
     /// Cells, and the clocks of all seeds.
     #[serde(flatten)]
-    pub reached: Baseline,
+    pub achieved: Baseline,
     /// Clock of the board.
     pub clock_MHz: f64,
     /// From the first input beat to the last output beat of the engine.
@@ -30,51 +30,54 @@ pub struct Implemented {
     /// What that leaves of [`BUDGET_US`].
     pub margin_us: f64,
     /// Registers that went into multipliers: operands, products.
-    pub absorbed: [usize; 2],
-    /// The clock that comes with the link, and its pin, where there is one.
+    #[serde(rename = "absorbed")]
+    pub packed_registers: [usize; 2],
+    /// The clock that comes with the link, and its pin, where there is report.
     pub link_clock: Option<(&'static str, Fmax)>,
     /// The bitstream; none when a clock is missed.
     pub bitstream: Option<PathBuf>,
     /// What is missed or worse than the baseline.
-    pub lost: Vec<String>,
+    #[serde(rename = "lost")]
+    pub failures: Vec<String>,
 }
 
-impl Implemented {
+impl BitstreamReport {
     /// Sums up what was `reached`.
     pub fn new(
         model: &Model,
-        reached: Baseline,
-        absorbed: Absorbed,
+        achieved: Baseline,
+        packed: PackedRegisters,
         link_clock: Option<(&'static str, Fmax)>,
         bitstream: Option<PathBuf>,
-        lost: Vec<String>,
+        failures: Vec<String>,
     ) -> Self {
         let cycles = Cycles::longest(model).total;
         let time_us = model.board.microseconds(cycles);
-        Implemented {
+        BitstreamReport {
             scene: model.scene.name.clone(),
             board: model.board.name.clone(),
-            reached,
+            achieved,
             clock_MHz: model.board.clock_MHz,
             cycles,
             time_us,
             margin_us: BUDGET_US as f64 - time_us,
-            absorbed: [absorbed.operands, absorbed.products],
+            packed_registers: [packed.operands, packed.products],
             link_clock,
             bitstream,
-            lost,
+            failures,
         }
     }
 
     /// Whether the clock is met and nothing got worse.
     pub fn is_good(&self) -> bool {
-        self.lost.is_empty()
+        self.failures.is_empty()
     }
 }
 
 /// The table's line and what follows from it.
-pub fn implemented(one: &Implemented) -> String {
-    let Baseline { luts, flip_flops, multipliers, block_rams, best_MHz, median_MHz, worst_MHz, seeds } = one.reached;
+pub fn bitstream(report: &BitstreamReport) -> String {
+    let Baseline { luts, flip_flops, multipliers, block_rams, best_MHz, median_MHz, worst_MHz, seeds } =
+        report.achieved;
     let head = [
         "scene",
         "board",
@@ -92,8 +95,8 @@ pub fn implemented(one: &Implemented) -> String {
         "margin to 1 ms",
     ];
     let row = vec![
-        one.scene.clone(),
-        one.board.clone(),
+        report.scene.clone(),
+        report.board.clone(),
         luts.to_string(),
         flip_flops.to_string(),
         multipliers.to_string(),
@@ -102,23 +105,23 @@ pub fn implemented(one: &Implemented) -> String {
         format!("{best_MHz:.1}"),
         format!("{median_MHz:.1}"),
         format!("{worst_MHz:.1}"),
-        format!("{}", one.clock_MHz),
-        one.cycles.to_string(),
-        format!("{:.2}", one.time_us),
-        format!("{:.2} µs", one.margin_us),
+        format!("{}", report.clock_MHz),
+        report.cycles.to_string(),
+        format!("{:.2}", report.time_us),
+        format!("{:.2} µs", report.margin_us),
     ];
     let mut text = markdown(&head, vec![row]);
-    let [operands, products] = one.absorbed;
+    let [operands, products] = report.packed_registers;
     text.push_str(&format!("registers moved into multipliers: {operands} operands, {products} products\n"));
-    if let Some((pin, clock)) = &one.link_clock {
+    if let Some((pin, clock)) = &report.link_clock {
         text.push_str(&format!("{pin}: {:.1} MHz, meant for {} MHz\n", clock.achieved, clock.constraint));
     }
-    match &one.bitstream {
+    match &report.bitstream {
         Some(path) => text.push_str(&format!("{}\n", path.display())),
         None => text.push_str("no bitstream: a clock is missed\n"),
     }
-    for lost in &one.lost {
-        text.push_str(&format!("worse: {lost}\n"));
+    for failure in &report.failures {
+        text.push_str(&format!("worse: {failure}\n"));
     }
     text
 }

@@ -5,7 +5,7 @@ use dermis_golden::fixed::{Cycles, Model};
 use dermis_golden::frame::Frame;
 
 /// A scene's own frames that are taken.
-const OWN: usize = 4;
+const SHIPPED: usize = 4;
 
 /// The codes of one reconstruction and what the bit-true model makes of them.
 #[derive(Clone, Debug)]
@@ -31,7 +31,7 @@ impl Sample {
     }
 
     /// Whether there is a force.
-    pub(crate) fn presses(&self) -> bool {
+    pub(crate) fn has_force(&self) -> bool {
         self.beats[..self.forces].iter().any(|beat| *beat != [0; 3])
     }
 }
@@ -40,13 +40,13 @@ impl Sample {
 ///
 /// # Errors
 /// A frame of another sensor.
-pub(crate) fn own(model: &Model, frames: &[Frame]) -> Result<Vec<Sample>> {
-    let whole = frames.chunks_exact(1 << model.scene.input.average).take(OWN);
+pub(crate) fn shipped_samples(model: &Model, frames: &[Frame]) -> Result<Vec<Sample>> {
+    let whole = frames.chunks_exact(1 << model.scene.input.average).take(SHIPPED);
     whole.map(|frames| Ok(Sample::new(model, model.readings(frames)?))).collect()
 }
 
 /// Zeros, all codes at an end of their range, one taxel alone, and noise of two sizes.
-pub(crate) fn drawn(model: &Model, random: &mut fastrand::Rng) -> Vec<Sample> {
+pub(crate) fn synthetic_samples(model: &Model, random: &mut fastrand::Rng) -> Vec<Sample> {
     let taxels = model.scene.sensor.taxels();
     let count = taxels << model.scene.input.average;
     let most = (1i32 << (model.formats.code_bits - 1)) - 1;

@@ -15,7 +15,7 @@ use tempfile::TempDir;
 ///
 /// # Errors
 /// [`FileError`]: no folder can be made there.
-pub(crate) fn begin(folder: &Path) -> Result<TempDir, FileError> {
+pub(crate) fn staging_folder(folder: &Path) -> Result<TempDir, FileError> {
     let cache = folder.parent().unwrap_or(folder);
     fs::create_dir_all(cache).map_err(FileError::at(cache))?;
     tempfile::Builder::new().prefix("building-").tempdir_in(cache).map_err(FileError::at(cache))
@@ -25,31 +25,31 @@ pub(crate) fn begin(folder: &Path) -> Result<TempDir, FileError> {
 ///
 /// # Errors
 /// [`FileError`].
-pub(crate) fn finish(filled: TempDir, folder: &Path, product: &str) -> Result<(), FileError> {
-    let path = filled.path().join(product);
-    let sum = sum(&path).map_err(FileError::at(&path))?;
-    write(&sum_of(filled.path(), product), sum.as_bytes())?;
-    if folder.exists() && !is_whole(folder, product) {
+pub(crate) fn publish(staging: TempDir, folder: &Path, product: &str) -> Result<(), FileError> {
+    let path = staging.path().join(product);
+    let own = checksum(&path).map_err(FileError::at(&path))?;
+    write(&checksum_path(staging.path(), product), own.as_bytes())?;
+    if folder.exists() && !is_intact(folder, product) {
         fs::remove_dir_all(folder).map_err(FileError::at(folder))?;
     }
-    let built = filled.keep();
+    let built = staging.keep();
     match fs::rename(&built, folder) {
-        Err(_) if is_whole(folder, product) => fs::remove_dir_all(&built).map_err(FileError::at(&built)),
+        Err(_) if is_intact(folder, product) => fs::remove_dir_all(&built).map_err(FileError::at(&built)),
         renamed => renamed.map_err(FileError::at(folder)),
     }
 }
 
 /// Whether `product` is in `folder` as it was built.
-pub(crate) fn is_whole(folder: &Path, product: &str) -> bool {
-    let says = fs::read_to_string(sum_of(folder, product));
-    matches!((says, sum(&folder.join(product))), (Ok(says), Ok(has)) if says == has)
+pub(crate) fn is_intact(folder: &Path, product: &str) -> bool {
+    let recorded = fs::read_to_string(checksum_path(folder, product));
+    matches!((recorded, checksum(&folder.join(product))), (Ok(recorded), Ok(found)) if recorded == found)
 }
 
-fn sum_of(folder: &Path, product: &str) -> PathBuf {
+fn checksum_path(folder: &Path, product: &str) -> PathBuf {
     folder.join(format!("{product}.crc32"))
 }
 
-fn sum(path: &Path) -> io::Result<String> {
+fn checksum(path: &Path) -> io::Result<String> {
     Ok(format!("{:08x}\n", crc32fast::hash(&fs::read(path)?)))
 }
 
@@ -58,9 +58,9 @@ mod tests {
     use super::*;
 
     fn fill(folder: &Path, text: &str) -> Result<(), FileError> {
-        let work = begin(folder)?;
+        let work = staging_folder(folder)?;
         fs::write(work.path().join("product"), text).unwrap();
-        finish(work, folder, "product")
+        publish(work, folder, "product")
     }
 
     #[test]
@@ -78,22 +78,22 @@ mod tests {
     fn what_was_damaged_is_built_again() {
         let cache = tempfile::tempdir().unwrap();
         let folder = cache.path().join("b");
-        assert!(!is_whole(&folder, "product"));
+        assert!(!is_intact(&folder, "product"));
         fill(&folder, "first").unwrap();
-        assert!(is_whole(&folder, "product"));
+        assert!(is_intact(&folder, "product"));
         for damaged in ["firsT", "fir", ""] {
             fs::write(folder.join("product"), damaged).unwrap();
-            assert!(!is_whole(&folder, "product"), "{damaged:?}");
+            assert!(!is_intact(&folder, "product"), "{damaged:?}");
         }
         fill(&folder, "second").unwrap();
         assert_eq!(fs::read_to_string(folder.join("product")).unwrap(), "second");
-        assert!(is_whole(&folder, "product"));
+        assert!(is_intact(&folder, "product"));
     }
 
     #[test]
     fn what_cannot_be_built_leaves_nothing() {
         let cache = tempfile::tempdir().unwrap();
-        drop(begin(&cache.path().join("b")).unwrap());
+        drop(staging_folder(&cache.path().join("b")).unwrap());
         assert_eq!(fs::read_dir(cache.path()).unwrap().count(), 0);
         fs::write(cache.path().join("file"), "").unwrap();
         assert!(fill(&cache.path().join("file/b"), "").unwrap_err().to_string().contains("file: "));

@@ -11,7 +11,7 @@ use dermis_golden::scene::Scene;
 
 /// What to draw.
 #[derive(Args, Clone, Debug)]
-pub struct Fresh {
+pub struct DrawnFrames {
     /// Draw N frames per scene in place of the shipped ones.
     #[arg(long = "fresh", value_name = "N", default_value_t = 0, value_parser = value_parser!(u32).range(0..=100_000))]
     pub frames: u32,
@@ -47,7 +47,7 @@ impl From<Shapes> for generator::Shapes {
     }
 }
 
-impl Fresh {
+impl DrawnFrames {
     /// The drawn frames of a scene.
     ///
     /// # Errors
@@ -74,12 +74,12 @@ mod tests {
     #[test]
     fn frames_repeat_and_differ() {
         let scene = Scene::builtin("sensor-3").unwrap();
-        let fresh = Fresh { frames: 4, contacts: vec![1, 3], shapes: Shapes::Other, touching: true, seed: 5 };
-        let frames = fresh.draw(&scene).unwrap();
+        let drawn = DrawnFrames { frames: 4, contacts: vec![1, 3], shapes: Shapes::Other, touching: true, seed: 5 };
+        let frames = drawn.draw(&scene).unwrap();
         assert_eq!(frames.iter().map(|frame| frame.contacts.len()).collect::<Vec<_>>(), [1, 3, 1, 3]);
-        assert_eq!(frames, fresh.draw(&scene).unwrap());
+        assert_eq!(frames, drawn.draw(&scene).unwrap());
         assert_ne!(frames[0].stress_MPa, frames[2].stress_MPa);
-        let other = Fresh { seed: 6, ..fresh }.draw(&scene).unwrap();
+        let other = DrawnFrames { seed: 6, ..drawn }.draw(&scene).unwrap();
         assert_ne!(frames[0].stress_MPa, other[0].stress_MPa);
     }
 }

@@ -1,4 +1,4 @@
-//! Plane: the objective Π over the disc of μ, the path of the bit-true search, and how clear the maximum is.
+//! ObjectiveMap: the objective Π over the disc of μ, the path of the bit-true search, and how clear the maximum is.
 //!
 //! margin = Π(μ*) − max Π(μ) over |μ − μ*| ≥ mu_max/8, in bits: how much better the best μ is than the best of those
 //! that would be another answer. Small where shear can hardly be told from an uneven pressure.
@@ -17,7 +17,7 @@ const APART: f64 = 1.0 / 8.0;
 
 /// Π of a frame of one subarray.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Plane {
+pub struct ObjectiveMap {
     /// Scene name.
     pub scene: String,
     /// Frame name.
@@ -39,7 +39,7 @@ pub struct Plane {
 }
 
 /// The plane of a frame, `None` where the array is cut, not searched, or another objective than `sparse` is asked for.
-pub fn plane(measured: &Measured, index: usize) -> Option<Plane> {
+pub fn objective_map(measured: &Measured, index: usize) -> Option<ObjectiveMap> {
     let (frame, result) = (&measured.frames[index], &measured.golden[index]);
     let [part] = &result.subarrays[..] else { return None };
     let best = part.objective_value?;
@@ -53,14 +53,14 @@ pub fn plane(measured: &Measured, index: usize) -> Option<Plane> {
     let far = |[x, y]: [f64; 2]| (x - part.mu[0]).hypot(y - part.mu[1]) >= APART * mu_max;
     let others = grid().zip(&values).filter(|((i, j), _)| far(mu(*i, *j))).filter_map(|(_, value)| *value);
     let truth = frame.resultant_N.filter(|[_, _, n]| *n > 0.0).map(|[x, y, n]| [x / n, y / n]);
-    Some(Plane {
+    Some(ObjectiveMap {
         scene: measured.scene.name.clone(),
         frame: frame.id.clone(),
         mu_max,
         margin: best - others.fold(f64::NEG_INFINITY, f64::max),
         values,
-        path: measured.integers.as_ref().map_or(Vec::new(), |integers| {
-            let stage = integers.traces[index].stages.iter().find(|stage| stage.name == "search");
+        path: measured.bit_true.as_ref().map_or(Vec::new(), |bit_true| {
+            let stage = bit_true.traces[index].stages.iter().find(|stage| stage.name == "search");
             path(stage.map_or(&[][..], |stage| &stage.words), mu_max)
         }),
         golden: part.mu,

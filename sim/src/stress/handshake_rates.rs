@@ -6,7 +6,7 @@ const PAUSE_CYCLES: u32 = 200;
 const PAUSE_EVERY: u32 = 500;
 
 /// Percentages of the cycles in which each side is willing.
-pub(crate) struct Pace {
+pub(crate) struct HandshakeRates {
     random: fastrand::Rng,
     send: u32,
     receive: u32,
@@ -14,24 +14,24 @@ pub(crate) struct Pace {
     left: u32,
 }
 
-impl Pace {
+impl HandshakeRates {
     /// Both sides always.
-    pub(crate) fn full_speed() -> Pace {
-        Pace { random: fastrand::Rng::with_seed(0), send: 100, receive: 100, pauses: false, left: 0 }
+    pub(crate) fn full_speed() -> HandshakeRates {
+        HandshakeRates { random: fastrand::Rng::with_seed(0), send: 100, receive: 100, pauses: false, left: 0 }
     }
 
     /// From one side always and the other hardly ever to both now and then.
-    pub(super) fn drawn(random: &mut fastrand::Rng) -> Pace {
+    pub(super) fn random(random: &mut fastrand::Rng) -> HandshakeRates {
         let share = |random: &mut fastrand::Rng| [3, 20, 50, 80, 97, 100, 100][random.usize(..7)];
         let (send, receive, pauses) = (share(random), share(random), random.bool());
-        Pace { random: random.fork(), send, receive, pauses, left: 0 }
+        HandshakeRates { random: random.fork(), send, receive, pauses, left: 0 }
     }
 
-    pub(super) fn send(&mut self) -> bool {
+    pub(super) fn sends(&mut self) -> bool {
         self.random.u32(..100) < self.send
     }
 
-    pub(super) fn receive(&mut self) -> bool {
+    pub(super) fn receives(&mut self) -> bool {
         if self.left > 0 {
             self.left -= 1;
             return false;

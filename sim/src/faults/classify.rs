@@ -7,7 +7,7 @@ use crate::stress::Sample;
 
 /// What came of a fault.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) enum Verdict {
+pub(super) enum Outcome {
     /// Every beat is right.
     Harmless,
     /// Something is wrong and the device tells.
@@ -19,7 +19,7 @@ pub(super) enum Verdict {
 }
 
 /// Judges what left for these frames.
-pub(super) fn judge(recording: &Recording, samples: &[&Sample]) -> Verdict {
+pub(super) fn classify(recording: &Recording, samples: &[&Sample]) -> Outcome {
     let beats = &recording.beats;
     let ends: Vec<usize> = samples
         .iter()
@@ -32,23 +32,23 @@ pub(super) fn judge(recording: &Recording, samples: &[&Sample]) -> Verdict {
     let wrong_last = beats.iter().enumerate().any(|(index, beat)| beat.last != ends.contains(&(index + 1)));
     match (wrong_last || beats.len() > all, beats.len() < all) {
         // A frame of another length than it must be: whoever counts beats sees it.
-        (true, _) => return Verdict::Detected,
-        (false, true) => return Verdict::Hang,
+        (true, _) => return Outcome::Detected,
+        (false, true) => return Outcome::Hang,
         (false, false) => {}
     }
     let mut rest = &beats[..];
-    let (mut equal, mut told, mut error) = (recording.breaches.is_empty(), false, 0.0f64);
+    let (mut equal, mut reported, mut error) = (recording.violations.is_empty(), false, 0.0f64);
     for sample in samples {
         let (own, after) = rest.split_at(sample.beats.len());
         rest = after;
         equal &= own.iter().map(|beat| beat.data).eq(sample.beats.iter().copied());
         error = error.max(force_error(&own[..sample.forces], &sample.beats[..sample.forces]));
-        told |= tells(&own[sample.forces..], &sample.beats[sample.forces..]);
+        reported |= reports_error(&own[sample.forces..], &sample.beats[sample.forces..]);
     }
-    match (equal, told) {
-        (true, _) => Verdict::Harmless,
-        (false, true) => Verdict::Detected,
-        (false, false) => Verdict::Silent(error),
+    match (equal, reported) {
+        (true, _) => Outcome::Harmless,
+        (false, true) => Outcome::Detected,
+        (false, false) => Outcome::Silent(error),
     }
 }
 
@@ -61,16 +61,16 @@ fn force_error(got: &[Beat], wanted: &[[i32; 3]]) -> f64 {
 }
 
 /// Whether a status says that its frame is not to be trusted, where the model's does not.
-fn tells(got: &[Beat], wanted: &[[i32; 3]]) -> bool {
+fn reports_error(got: &[Beat], wanted: &[[i32; 3]]) -> bool {
     let got: Vec<[i32; 3]> = got.iter().map(|beat| beat.data).collect();
     got.chunks(STATUS_BEATS).zip(wanted.chunks(STATUS_BEATS)).any(|(got, wanted)| {
-        let doubts = |beats| Status::of_beats(beats).map_or([false; 4], |status| doubts(&status));
-        doubts(got).into_iter().zip(doubts(wanted)).any(|(got, wanted)| got && !wanted)
+        let flags = |beats| Status::of_beats(beats).map_or([false; 4], |status| error_flags(&status));
+        flags(got).into_iter().zip(flags(wanted)).any(|(got, wanted)| got && !wanted)
     })
 }
 
 /// The flags of framing and coefficients, saturations, a search without result.
-fn doubts(status: &Status) -> [bool; 4] {
+fn error_flags(status: &Status) -> [bool; 4] {
     let flag = |bit: u32| status.flags & bit != 0;
     let saturated = status.rescale_saturations + status.force_saturations > 0;
     [flag(FLAG_FRAMING), flag(FLAG_COEFFICIENTS), saturated, flag(FLAG_CONDITION) && !flag(FLAG_FOUND)]

@@ -2,15 +2,15 @@
 
 use dermis_hdl::device::{Device, Inputs};
 
-use super::pace::Pace;
+use super::handshake_rates::HandshakeRates;
 use super::scoreboard::Scoreboard;
 use super::{Outcome, Sample};
-use crate::drive::{Held, RULE};
+use crate::drive::{StabilityCheck, STABILITY_RULE};
 
 /// Cycles of the reset before an experiment.
 pub(crate) const RESET_CYCLES: u64 = 4;
 /// Cycles without a transfer after which a device hangs, beyond a frame's own.
-const PATIENCE: u64 = 20_000;
+const WATCHDOG: u64 = 20_000;
 /// Cycles after the last beat in which nothing may come.
 const QUIET_CYCLES: u64 = 16;
 
@@ -58,32 +58,41 @@ impl Burst {
 }
 
 /// A device whose every transfer is judged.
-pub(crate) struct Line<'a> {
+pub(crate) struct Testbench<'a> {
     device: &'a mut dyn Device,
-    pool: &'a [Sample],
+    samples: &'a [Sample],
     scoreboard: Scoreboard<'a>,
     cycle: u64,
     /// Cycles since the last transfer.
     idle: u64,
-    patience: u64,
-    held: Held,
-    hangs: bool,
+    watchdog: u64,
+    stability: StabilityCheck,
+    hung: bool,
 }
 
-impl<'a> Line<'a> {
-    pub(crate) fn new(device: &'a mut dyn Device, pool: &'a [Sample]) -> Self {
-        let longest = pool.iter().map(|sample| sample.cycles.total).max().unwrap_or(0);
-        let scoreboard = Scoreboard::new(pool);
-        let patience = PATIENCE + 4 * longest;
-        Line { device, pool, scoreboard, cycle: 0, idle: 0, patience, held: Held::default(), hangs: false }
+impl<'a> Testbench<'a> {
+    pub(crate) fn new(device: &'a mut dyn Device, samples: &'a [Sample]) -> Self {
+        let longest = samples.iter().map(|sample| sample.cycles.total).max().unwrap_or(0);
+        let scoreboard = Scoreboard::new(samples);
+        let watchdog = WATCHDOG + 4 * longest;
+        Testbench {
+            device,
+            samples,
+            scoreboard,
+            cycle: 0,
+            idle: 0,
+            watchdog,
+            stability: StabilityCheck::default(),
+            hung: false,
+        }
     }
 
-    pub(super) fn samples(&self) -> usize {
-        self.pool.len()
+    pub(super) fn sample_count(&self) -> usize {
+        self.samples.len()
     }
 
     pub(super) fn sample(&self, index: usize) -> &'a Sample {
-        &self.pool[index]
+        &self.samples[index]
     }
 
     pub(crate) fn cycle(&self) -> u64 {
@@ -91,8 +100,8 @@ impl<'a> Line<'a> {
     }
 
     /// Whether it makes sense to go on.
-    pub(super) fn runs(&self) -> bool {
-        !self.hangs && !self.scoreboard.is_hopeless()
+    pub(super) fn can_continue(&self) -> bool {
+        !self.hung && !self.scoreboard.is_over_limit()
     }
 
     pub(super) fn finish(self) -> Outcome {
@@ -104,30 +113,30 @@ impl<'a> Line<'a> {
     }
 
     /// Sends a burst, unless the device hangs.
-    pub(crate) fn send(&mut self, burst: &Burst, pace: &mut Pace) {
-        self.offer(burst, pace, false);
+    pub(crate) fn send(&mut self, burst: &Burst, rates: &mut HandshakeRates) {
+        self.offer(burst, rates, false);
     }
 
     /// Sends a frame at full speed when everything before it is out, and waits until it is: it must be in time.
     pub(crate) fn send_alone(&mut self, burst: &Burst) {
-        let mut pace = Pace::full_speed();
-        self.drain(&mut pace);
-        self.offer(burst, &mut pace, true);
-        self.drain(&mut pace);
+        let mut rates = HandshakeRates::full_speed();
+        self.drain(&mut rates);
+        self.offer(burst, &mut rates, true);
+        self.drain(&mut rates);
     }
 
-    fn offer(&mut self, burst: &Burst, pace: &mut Pace, alone: bool) {
+    fn offer(&mut self, burst: &Burst, rates: &mut HandshakeRates, alone: bool) {
         for &(code, last) in &burst.codes {
             // An offered beat stays until it is taken.
             let mut offering = false;
             loop {
-                offering |= pace.send();
+                offering |= rates.sends();
                 let offer = offering.then_some((code, last));
-                if self.step(offer, pace.receive()) {
-                    self.scoreboard.taken(self.cycle - 1, burst.sample, last, alone);
+                if self.step(offer, rates.receives()) {
+                    self.scoreboard.accepted(self.cycle - 1, burst.sample, last, alone);
                     break;
                 }
-                if !self.runs() {
+                if !self.can_continue() {
                     return;
                 }
             }
@@ -139,19 +148,19 @@ impl<'a> Line<'a> {
         let alone = self.scoreboard.is_empty();
         for &(code, last) in &burst.codes {
             while self.cycle == end || !self.step(Some((code, last)), true) {
-                if self.cycle >= end || !self.runs() {
+                if self.cycle >= end || !self.can_continue() {
                     return false;
                 }
             }
-            self.scoreboard.taken(self.cycle - 1, burst.sample, last, alone);
+            self.scoreboard.accepted(self.cycle - 1, burst.sample, last, alone);
         }
         true
     }
 
     /// Waits until everything is out, and whether nothing else comes.
-    pub(crate) fn drain(&mut self, pace: &mut Pace) {
-        while self.runs() && !self.scoreboard.is_empty() {
-            self.step(None, pace.receive());
+    pub(crate) fn drain(&mut self, rates: &mut HandshakeRates) {
+        while self.can_continue() && !self.scoreboard.is_empty() {
+            self.step(None, rates.receives());
         }
         for _ in 0..QUIET_CYCLES {
             self.step(None, true);
@@ -174,30 +183,30 @@ impl<'a> Line<'a> {
             }
             self.cycle += 1;
         }
-        (self.held, self.idle) = (Held::default(), 0);
+        (self.stability, self.idle) = (StabilityCheck::default(), 0);
     }
 
     /// One cycle; whether the offered code was taken.
     fn step(&mut self, offer: Option<(i32, bool)>, m_ready: bool) -> bool {
         let (s_data, s_last) = offer.unwrap_or_default();
         let outputs = self.device.cycle(&Inputs { rst: false, s_valid: offer.is_some(), s_data, s_last, m_ready });
-        let (given, kept) = self.held.observe(&outputs, m_ready);
-        if !kept {
-            self.scoreboard.violate(self.cycle, RULE.to_owned());
+        let (transferred, stable) = self.stability.observe(&outputs, m_ready);
+        if !stable {
+            self.scoreboard.violate(self.cycle, STABILITY_RULE.to_owned());
         }
-        if let Some((data, last)) = given {
-            self.scoreboard.given(self.cycle, data, last);
+        if let Some((data, last)) = transferred {
+            self.scoreboard.delivered(self.cycle, data, last);
         }
-        let taken = offer.is_some() && outputs.s_ready;
-        let waits = (offer.is_none() && outputs.s_ready) || self.held.waits();
-        self.scoreboard.outcome.stalled += u64::from(waits);
-        let moved = taken || given.is_some();
-        self.idle = if moved { 0 } else { self.idle + 1 };
-        if self.idle == self.patience && (offer.is_some() || !self.scoreboard.is_empty()) {
-            self.scoreboard.violate(self.cycle, format!("nothing moved for {} cycles", self.patience));
-            self.hangs = true;
+        let accepted = offer.is_some() && outputs.s_ready;
+        let stalled = (offer.is_none() && outputs.s_ready) || self.stability.is_pending();
+        self.scoreboard.outcome.stalled += u64::from(stalled);
+        let active = accepted || transferred.is_some();
+        self.idle = if active { 0 } else { self.idle + 1 };
+        if self.idle == self.watchdog && (offer.is_some() || !self.scoreboard.is_empty()) {
+            self.scoreboard.violate(self.cycle, format!("nothing moved for {} cycles", self.watchdog));
+            self.hung = true;
         }
         self.cycle += 1;
-        taken
+        accepted
     }
 }

@@ -27,66 +27,69 @@ const FOLDER: &str = "tried";
 /// One run.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Tried {
+pub struct RunLog {
     /// The command that makes these counts.
     pub command: String,
     /// What was tried, in order.
-    pub lines: Vec<Line>,
+    #[serde(rename = "lines")]
+    pub targets: Vec<TargetCounts>,
 }
 
 /// One target of a run.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Line {
+pub struct TargetCounts {
     /// The target.
-    pub what: String,
+    #[serde(rename = "what")]
+    pub target: String,
     /// What is counted: inputs, frames, cycles, …
     pub unit: String,
     /// How many.
-    pub tried: u64,
+    #[serde(rename = "tried")]
+    pub count: u64,
     /// Outcomes by name, failures among them even where there are none.
     pub outcomes: BTreeMap<String, u64>,
     /// Time in s.
     pub seconds: f64,
 }
 
-impl fmt::Display for Line {
+impl fmt::Display for TargetCounts {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
-        let Line { what, unit, tried, seconds, .. } = self;
-        write!(f, "{what}: {tried} {unit}: {}; {seconds:.1} s", self.outcome())
+        let TargetCounts { target, unit, count, seconds, .. } = self;
+        write!(f, "{target}: {count} {unit}: {}; {seconds:.1} s", self.outcomes_text())
     }
 }
 
-impl Line {
+impl TargetCounts {
     /// So many of a unit, with what came of them by name.
     pub fn new(
-        what: impl Into<String>,
+        target: impl Into<String>,
         unit: &str,
-        tried: u64,
+        count: u64,
         outcomes: impl IntoIterator<Item = (&'static str, u64)>,
         seconds: f64,
-    ) -> Line {
-        let outcomes = outcomes.into_iter().map(|(name, count)| (name.to_owned(), count)).collect();
-        Line { what: what.into(), unit: unit.to_owned(), tried, outcomes, seconds }
+    ) -> TargetCounts {
+        let outcomes = outcomes.into_iter().map(|(name, times)| (name.to_owned(), times)).collect();
+        TargetCounts { target: target.into(), unit: unit.to_owned(), count, outcomes, seconds }
     }
 
     /// Outcomes with their counts.
-    pub fn outcome(&self) -> String {
+    pub fn outcomes_text(&self) -> String {
         self.outcomes.iter().map(|(name, count)| format!("{count} {name}")).collect::<Vec<_>>().join(", ")
     }
 }
 
-impl Tried {
+impl RunLog {
     /// A run without lines yet.
-    pub fn new(command: &str) -> Tried {
-        Tried { command: command.to_owned(), lines: Vec::new() }
+    pub fn new(command: &str) -> RunLog {
+        RunLog { command: command.to_owned(), targets: Vec::new() }
     }
 
     /// Keeps the run under a name, whole or not at all.
     ///
     /// # Errors
     /// A folder or file that cannot be written.
-    pub fn keep(&self, build: &Path, name: &str) -> Result<()> {
+    pub fn save(&self, build: &Path, name: &str) -> Result<()> {
         let folder = build.join(FOLDER);
         fs::create_dir_all(&folder).map_err(|error| anyhow!("{}: {error}", folder.display()))?;
         let text = serde_json::to_string_pretty(self)? + "\n";
@@ -97,13 +100,13 @@ impl Tried {
     ///
     /// # Errors
     /// A file that cannot be read or is no run, with its path.
-    pub fn all(build: &Path) -> Result<Vec<Tried>> {
+    pub fn load_all(build: &Path) -> Result<Vec<RunLog>> {
         let Ok(entries) = fs::read_dir(build.join(FOLDER)) else { return Ok(Vec::new()) };
         let mut paths: Vec<_> = entries.filter_map(|entry| Some(entry.ok()?.path())).collect();
         // What a killed writer left behind is no run.
         paths.retain(|path| path.extension().is_some_and(|extension| extension == "json"));
         paths.sort();
-        let read = |path: &std::path::PathBuf| -> Result<Tried> {
+        let read = |path: &std::path::PathBuf| -> Result<RunLog> {
             let text = fs::read_to_string(path).with_context(|| path.display().to_string())?;
             serde_json::from_str(&text).with_context(|| path.display().to_string())
         };
@@ -118,20 +121,20 @@ mod tests {
     #[test]
     fn what_is_kept_comes_back() {
         let build = tempfile::tempdir().unwrap();
-        assert_eq!(Tried::all(build.path()).unwrap(), []);
-        let mut run = Tried::new("make fuzz");
-        run.lines.push(Line {
-            what: "scene".into(),
+        assert_eq!(RunLog::load_all(build.path()).unwrap(), []);
+        let mut run = RunLog::new("make fuzz");
+        run.targets.push(TargetCounts {
+            target: "scene".into(),
             unit: "inputs".into(),
-            tried: 3,
+            count: 3,
             outcomes: [("taken".to_owned(), 1), ("refused".to_owned(), 2)].into(),
             seconds: 0.25,
         });
-        run.keep(build.path(), "b").unwrap();
-        Tried::new("other").keep(build.path(), "a").unwrap();
-        assert_eq!(Tried::all(build.path()).unwrap(), [Tried::new("other"), run.clone()]);
-        assert_eq!(run.lines[0].to_string(), "scene: 3 inputs: 2 refused, 1 taken; 0.2 s");
+        run.save(build.path(), "b").unwrap();
+        RunLog::new("other").save(build.path(), "a").unwrap();
+        assert_eq!(RunLog::load_all(build.path()).unwrap(), [RunLog::new("other"), run.clone()]);
+        assert_eq!(run.targets[0].to_string(), "scene: 3 inputs: 2 refused, 1 taken; 0.2 s");
         fs::write(build.path().join("tried/c.json"), "{}").unwrap();
-        assert!(format!("{:#}", Tried::all(build.path()).unwrap_err()).contains("c.json: missing field"));
+        assert!(format!("{:#}", RunLog::load_all(build.path()).unwrap_err()).contains("c.json: missing field"));
     }
 }
