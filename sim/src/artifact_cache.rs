@@ -1,8 +1,8 @@
-//! Place: a folder of built files appears whole or not at all.
+//! Cache of built folders: a folder appears complete or not at all.
 //!
-//! It is filled beside its place and takes its name only when all is in it, so that neither an interruption nor a second
-//! process that builds the same leaves half a folder. Beside its product stands the product's CRC-32: what a disk has
-//! damaged since is as good as none, and built again.
+//! It is built in a staging folder beside its final path and renamed when complete, so that neither an interruption nor
+//! a second process that builds the same folder leaves a partial one. The product's CRC-32 is stored next to it: a
+//! product that has been damaged since does not match and is built again.
 
 use std::fs;
 use std::io;
@@ -11,17 +11,18 @@ use std::path::{Path, PathBuf};
 use dermis_golden::write::{write, FileError};
 use tempfile::TempDir;
 
-/// A folder to fill, gone when it is dropped; it lies where `folder` is to be.
+/// A temporary folder beside `folder` to build in, deleted when dropped.
 ///
 /// # Errors
-/// [`FileError`]: no folder can be made there.
+/// [`FileError`]: the folder cannot be created.
 pub(crate) fn staging_folder(folder: &Path) -> Result<TempDir, FileError> {
     let cache = folder.parent().unwrap_or(folder);
     fs::create_dir_all(cache).map_err(FileError::at(cache))?;
     tempfile::Builder::new().prefix("building-").tempdir_in(cache).map_err(FileError::at(cache))
 }
 
-/// Gives the filled folder its name. Where somebody else was first and `product` is whole there, theirs serves as well.
+/// Renames the staging folder to `folder` and records the checksum of `product`. If another process has published an
+/// intact `folder` meanwhile, that one is kept.
 ///
 /// # Errors
 /// [`FileError`].
@@ -39,7 +40,7 @@ pub(crate) fn publish(staging: TempDir, folder: &Path, product: &str) -> Result<
     }
 }
 
-/// Whether `product` is in `folder` as it was built.
+/// Whether `product` exists in `folder` and matches its recorded checksum.
 pub(crate) fn is_intact(folder: &Path, product: &str) -> bool {
     let recorded = fs::read_to_string(checksum_path(folder, product));
     matches!((recorded, checksum(&folder.join(product))), (Ok(recorded), Ok(found)) if recorded == found)
@@ -64,7 +65,7 @@ mod tests {
     }
 
     #[test]
-    fn the_first_stays_and_nothing_is_left_beside_it() {
+    fn the_first_folder_is_kept_and_no_staging_folder_remains() {
         let cache = tempfile::tempdir().unwrap();
         let folder = cache.path().join("a/b");
         for text in ["first", "second"] {
@@ -75,7 +76,7 @@ mod tests {
     }
 
     #[test]
-    fn what_was_damaged_is_built_again() {
+    fn a_damaged_product_is_not_intact_and_is_replaced() {
         let cache = tempfile::tempdir().unwrap();
         let folder = cache.path().join("b");
         assert!(!is_intact(&folder, "product"));
@@ -91,7 +92,7 @@ mod tests {
     }
 
     #[test]
-    fn what_cannot_be_built_leaves_nothing() {
+    fn a_failed_build_leaves_no_folder() {
         let cache = tempfile::tempdir().unwrap();
         drop(staging_folder(&cache.path().join("b")).unwrap());
         assert_eq!(fs::read_dir(cache.path()).unwrap().count(), 0);

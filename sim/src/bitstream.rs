@@ -1,11 +1,11 @@
-//! `dermis bitstream`: a scene as a bitstream for its board, by open tools.
+//! `dermis bitstream`: makes the bitstream of a scene for its board with open tools.
 //!
 //! ```text
 //! scene -> board top (Verilog) --yosys--> netlist --register packing, floor plan--> netlist
 //!     netlist --nextpnr, several seeds--> best --pack--> bitstream
 //!             ^-- pins, PLL of constraints     |--> cells, clocks -> table, baselines
 //! ```
-//! Everything stands in `<build-dir>/<scene>/<board>/`, with a log per tool.
+//! All files and one log per tool lie in `<build-dir>/<scene>/<board>/`.
 
 pub mod baseline;
 pub mod dsp_register_packing;
@@ -36,10 +36,10 @@ use synthesis::NETLIST;
 use timing::{Fmax, Placed};
 use tools::ToolError;
 
-/// Name of the board's own module, around the board top.
+/// Name of the outermost module, in `constraints/<board>.v`, which instantiates the board top.
 const TOP: &str = "board";
 
-/// What `dermis bitstream` is asked for.
+/// Arguments of `dermis bitstream`.
 #[derive(Args, Debug)]
 #[command(after_help = "Examples:
   dermis bitstream eight-by-eight
@@ -48,16 +48,16 @@ const TOP: &str = "board";
 pub struct Arguments {
     /// Built-in name or path of a scene.
     scene: String,
-    /// Board in place of the scene's own, a file's name in constraints.
+    /// Board to use instead of the scene's: the name of a file in constraints.
     #[arg(long, value_name = "NAME")]
     board: Option<String>,
-    /// Seeds of place and route; without it as many as the board's file says.
+    /// Number of place-and-route seeds; default: from the board's file.
     #[arg(long, value_parser = clap::value_parser!(u32).range(1..))]
     seeds: Option<u32>,
-    /// Tries at a time; each takes a core and about a gigabyte.
+    /// Number of seeds to run in parallel; each takes a core and about 1 GB of memory.
     #[arg(long, default_value_t = 2, value_parser = clap::value_parser!(u32).range(1..))]
     jobs: u32,
-    /// Write what was reached into constraints/baselines.json in place of comparing with it, if the clock is met.
+    /// If the clock is met, write the results into constraints/baselines.json instead of comparing with it.
     #[arg(long)]
     update_baselines: bool,
     /// Print the result as JSON and nothing else.
@@ -65,10 +65,10 @@ pub struct Arguments {
     json: bool,
 }
 
-/// Makes the bitstream; the text for stdout, and whether the clock is met and nothing got worse.
+/// Makes the bitstream: the text for stdout, and whether the clock is met without a regression against the baseline.
 ///
 /// # Errors
-/// The scene's and the board's; [`ToolError`] for what a tool did not do.
+/// An invalid scene or board; [`ToolError`]: a tool is missing or failed.
 pub fn run(arguments: &Arguments, build_dir: &Path) -> Result<(String, bool)> {
     let mut scene = Scene::load(&arguments.scene)?;
     if let Some(board) = &arguments.board {
@@ -87,7 +87,7 @@ pub fn run(arguments: &Arguments, build_dir: &Path) -> Result<(String, bool)> {
     let better =
         |a: &Placed, b: &Placed| a.is_met().cmp(&b.is_met()).then(a.engine.achieved.total_cmp(&b.engine.achieved));
     let (best_seed, best) = placed.iter().max_by(|(_, a), (_, b)| better(a, b)).ok_or_else(|| {
-        anyhow!("{}: no seed of {seeds} could be placed and routed; logs in {}", scene.name, folder.display())
+        anyhow!("{}: none of {seeds} seeds could be placed and routed; logs in {}", scene.name, folder.display())
     })?;
     check_constraints(board, best)?;
     let product = format!("{}.{}", scene.name, flow.bitstream);
@@ -106,7 +106,7 @@ pub fn run(arguments: &Arguments, build_dir: &Path) -> Result<(String, bool)> {
     Ok((if arguments.json { serde_json::to_string(&report)? + "\n" } else { report::bitstream(&report) }, good))
 }
 
-/// Compares the clocks that place and route was told with those of the board's file.
+/// Checks that the clock constraints seen by place and route are those of the board's file.
 fn check_constraints(board: &Board, placed: &Placed) -> Result<()> {
     let differs = |has: f64, wants: f64| (has / wants - 1.0).abs() > 1e-3;
     let (file, has, wants) = (&board.name, placed.engine.constraint, board.clock_MHz);
@@ -116,14 +116,14 @@ fn check_constraints(board: &Board, placed: &Placed) -> Result<()> {
     if let (Some((pin, clock)), Some(wants)) = (placed.link, board.spi_MHz) {
         let (pins, has) = (board.family.pins(), clock.constraint);
         if differs(has, wants) {
-            let pins = format!("constraints/{file}.{pins}: {pin} is meant for {has} MHz");
+            let pins = format!("constraints/{file}.{pins}: {pin} is constrained to {has} MHz");
             return Err(anyhow!("{pins}, {file}.toml says spi_MHz = {wants}"));
         }
     }
     Ok(())
 }
 
-/// Verilog to the netlist that is placed.
+/// Synthesises the board's Verilog to the netlist for place and route.
 fn synthesise(model: &Model, folder: &Path) -> Result<PackedRegisters> {
     let _progress = Progress::start(&format!("{}: synthesis", model.scene.name));
     let generated = generate_board(model)?;
@@ -144,11 +144,11 @@ fn synthesise(model: &Model, folder: &Path) -> Result<PackedRegisters> {
     Ok(packed)
 }
 
-/// Places and routes with seeds 1 … `seeds`, `jobs` at a time; those that came to an end.
+/// Places and routes with seeds 1 … `seeds`, `jobs` at a time; returns the seeds that completed.
 fn place(model: &Model, flow: &Flow, folder: &Path, seeds: u32, jobs: u32) -> Result<Vec<(u32, Placed)>> {
     let what = format!("{}: place and route", model.board.name);
     let place = |seed| match place_seed(model, flow, folder, seed) {
-        // What a seed does not converge to is no error of the call.
+        // A seed that does not converge is skipped as long as there are others.
         Err(ToolError::Late { .. } | ToolError::Failed { .. }) if seeds > 1 => Ok(None),
         placed => Ok(Some((seed, placed?))),
     };
@@ -156,12 +156,12 @@ fn place(model: &Model, flow: &Flow, folder: &Path, seeds: u32, jobs: u32) -> Re
     Ok(placed.into_iter().flatten().collect())
 }
 
-/// What a seed's files begin with.
+/// Prefix of a seed's files.
 fn seed_prefix(seed: u32) -> String {
     format!("seed{seed}")
 }
 
-/// One seed, by the first placer that converges.
+/// Places and routes one seed with the first of the board's placers that converges.
 fn place_seed(model: &Model, flow: &Flow, folder: &Path, seed: u32) -> Result<Placed, ToolError> {
     let board = &model.board;
     let name = seed_prefix(seed);
@@ -178,9 +178,9 @@ fn place_seed(model: &Model, flow: &Flow, folder: &Path, seed: u32) -> Result<Pl
     Placed::read(&report, synthesis::cells(folder, TOP)?, model.scene.hardware.link.clock())
 }
 
-/// The figures of all seeds; cells of the `best`.
+/// Clock figures over all seeds, and the cells of the `best`.
 fn summarise_seeds(flow: &Flow, placed: &[(u32, Placed)], best: &Placed) -> Baseline {
-    // Of an even number of seeds the slower of the two in the middle: the median's larger one, of periods.
+    // The median is taken of periods: of an even number of seeds it is then the slower of the two middle ones.
     let periods = || placed.iter().map(|(_, placed)| 1.0 / placed.engine.achieved);
     let rounded = |clock: f64| (clock * 10.0).round() / 10.0;
     Baseline {
@@ -195,7 +195,7 @@ fn summarise_seeds(flow: &Flow, placed: &[(u32, Placed)], best: &Placed) -> Base
     }
 }
 
-/// Writes the baseline, or says in what the scene has become worse than its one.
+/// Writes the baseline, or returns the regressions against it.
 fn compare_or_update_baselines(update: bool, board: &Board, scene: &Scene, achieved: &Baseline) -> Result<Vec<String>> {
     let path = Path::new(FILE);
     let mut all = Baselines::read(path)?;
@@ -228,18 +228,18 @@ mod tests {
     }
 
     #[test]
-    fn a_clock_that_place_and_route_was_not_told_is_named() {
+    fn a_clock_constraint_that_differs_from_the_board_file_is_an_error() {
         let board = Board::load("icebreaker").unwrap();
-        let told = |engine: f64, link: f64| {
+        let check = |engine: f64, link: f64| {
             let clock = |constraint| Fmax { achieved: 99.0, constraint };
             let link = Some(("spi_sclk", clock(link)));
             let placed = Placed { engine: clock(engine), link, cells: BTreeMap::new() };
             check_constraints(&board, &placed).map_err(|error| error.to_string())
         };
-        assert_eq!(told(25.505, 25.0), Ok(()));
+        assert_eq!(check(25.505, 25.0), Ok(()));
         let wanted = "constraints/icebreaker.v: its PLL gives 12 MHz, icebreaker.toml says clock_MHz = 25.5";
-        assert_eq!(told(12.0, 25.0), Err(wanted.to_string()));
-        let wanted = "constraints/icebreaker.pcf: spi_sclk is meant for 12 MHz, icebreaker.toml says spi_MHz = 25";
-        assert_eq!(told(25.5, 12.0), Err(wanted.to_string()));
+        assert_eq!(check(12.0, 25.0), Err(wanted.to_string()));
+        let wanted = "constraints/icebreaker.pcf: spi_sclk is constrained to 12 MHz, icebreaker.toml says spi_MHz = 25";
+        assert_eq!(check(25.5, 12.0), Err(wanted.to_string()));
     }
 }

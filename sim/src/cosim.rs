@@ -1,13 +1,12 @@
-//! Compares what a device did with the bit-true model, stage by stage and beat by beat.
+//! Compares the recording of a device with the bit-true model, stage by stage and beat by beat, without tolerance.
 //!
-//! Equal means equal: every tap's stream, every force beat, every status beat, the handshake in
-//! every cycle, and at full speed the two cycle counts and the cycle of every output beat: beat k leaves
-//! `first_output + k·interval` cycles after the last input beat. The first differing stage in hardware order comes first
-//! in the list.
+//! Compared are every tap's words, every force beat, every status beat and the handshake in every cycle; at full speed
+//! also the two cycle counts and the cycle of every output beat: beat k leaves `first_output + k·interval` cycles after
+//! the last input beat. Mismatches are listed in hardware order, the first differing stage first.
 //!
 //! | in | out |
 //! |---|---|
-//! | [`Vector`]s: codes and the model's [`Trace`] | [`Findings`]: kept [`Mismatch`]es and their true number |
+//! | [`Vector`]s: codes and the model's [`Trace`] | [`Findings`]: the first [`Mismatch`]es of each frame and their total number |
 //! | a [`Device`] with its tap names | [`Times`] of every frame |
 
 mod findings;
@@ -19,26 +18,26 @@ use dermis_hdl::device::Device;
 use crate::drive::{record, Beat, InputFrame, Recording, Stimulus, Times};
 use dermis_golden::fixed::{Cycles, Trace};
 
-/// The watchdog never bites below this many cycles without a transfer.
+/// Shortest watchdog, in cycles without a transfer.
 const WATCHDOG_MIN: u64 = 10_000;
 
-/// One frame's codes and what the bit-true model makes of them.
+/// Test vector: the codes of one reconstruction and the bit-true model's results.
 #[derive(Clone, Debug)]
 pub struct Vector {
     /// Frame name for messages.
     pub frame: String,
-    /// Columns of the array, to name a taxel by row and column.
+    /// Columns of the array, from which messages compute a taxel's row and column.
     pub cols: usize,
-    /// One code per taxel, row-major, of one frame after the other.
+    /// Codes of all frames in order, each row-major.
     pub codes: Vec<i32>,
-    /// Taxels of a frame.
+    /// Taxels per frame.
     pub taxels: usize,
     /// The model's stages, beats, status and cycle counts.
     pub expected: Trace,
 }
 
 impl Vector {
-    /// The same for a device that shows no stages: its beats and cycles are compared.
+    /// The vector without the model's stages, for a device without taps: only beats and cycles are compared.
     pub fn without_stages(&self) -> Vector {
         let mut vector = self.clone();
         vector.expected.stages.clear();
@@ -46,17 +45,17 @@ impl Vector {
     }
 }
 
-/// A device with its name and its tap names in the order of its outputs.
+/// A device with its name and its taps.
 pub struct DeviceUnderTest<'a> {
-    /// For messages: `verilator`, `rust-hdl`.
+    /// Name in messages: `verilator`, `rust-hdl`.
     pub name: &'a str,
-    /// What is clocked.
+    /// The device.
     pub device: &'a mut dyn Device,
-    /// Stage name of every tap.
+    /// Stage name of every tap, in the order of [`dermis_hdl::device::Outputs::taps`].
     pub taps: &'a [&'static str],
 }
 
-/// Runs the vectors through a device and compares.
+/// Sends the vectors through a device and compares; returns the findings and the times of each vector.
 pub fn run(dut: DeviceUnderTest, vectors: &[Vector], stimulus: Stimulus) -> (Findings, Vec<Times>) {
     let inputs: Vec<InputFrame> = vectors
         .iter()
@@ -74,7 +73,8 @@ pub fn run(dut: DeviceUnderTest, vectors: &[Vector], stimulus: Stimulus) -> (Fin
     (compare_recording(&label, dut.taps, vectors, &recording, exact), recording.times)
 }
 
-/// Compares a recording with the model; `exact` compares the cycle counts and every output beat's cycle as well.
+/// Compares a recording with the model; with `exact` also the cycle counts and the cycle of every output beat. `run`
+/// names the run in messages.
 pub fn compare_recording(
     run: &str,
     taps: &[&'static str],
@@ -91,7 +91,7 @@ pub fn compare_recording(
         let beats_after = beats_before + vector.expected.beats.len() + vector.expected.status.len();
         let last = number + 1 == vectors.len();
         let here = |beat: usize| beat >= beats_before && (beat < beats_after || last);
-        // First, because a run that was given up explains every missing word after it.
+        // First in the list: a watchdog timeout explains all missing words after it.
         for timeout in recording.timeout.iter().filter(|t| here(t.beat)) {
             comparison.add_violation(
                 "watchdog",
@@ -117,7 +117,7 @@ pub fn compare_recording(
             }
         }
         if last {
-            // What is left over belongs to no frame; it is reported with the last one.
+            // Words beyond all expected ones are reported with the last frame.
             for (stream, name) in streams.iter_mut().zip(taps) {
                 for (extra, word) in stream.enumerate() {
                     comparison.compare_word(name, extra, None, Some((word.cycle, word.fields.clone())));
@@ -144,7 +144,7 @@ pub fn compare_recording(
     findings
 }
 
-/// Collects one frame's findings.
+/// Comparison of one frame, with its findings so far.
 struct FrameComparison<'a> {
     run: &'a str,
     vector: &'a Vector,
@@ -162,13 +162,13 @@ impl FrameComparison<'_> {
         }
     }
 
-    /// One word against another; both missing cannot happen.
+    /// Compares one word; at most one of the two is missing.
     fn compare_word(&mut self, stage: &str, index: usize, expected: Option<Vec<i64>>, got: Option<(u64, Vec<i64>)>) {
         let (cycle, got) = got.unzip();
         if expected == got {
             return;
         }
-        // The streams whose words are taxels in the array's order; other stages may have as many words by chance.
+        // Only in these streams is the word's index a taxel; other stages may have as many words by coincidence.
         let forces = stage == "forces" && self.vector.expected.beats.len() == self.vector.taxels;
         let per_taxel = (stage == "receive" || forces) && expected.is_some();
         let cols = self.vector.cols;
@@ -200,18 +200,18 @@ impl FrameComparison<'_> {
         });
     }
 
-    /// The device's taps and the model's stages are the same set of names.
+    /// Checks that the device's taps and the model's stages have the same names.
     fn compare_stage_names(&mut self, taps: &[&'static str]) {
         let stages: Vec<&str> = self.vector.expected.stages.iter().map(|s| s.name).collect();
         for name in taps.iter().filter(|t| !stages.contains(t)) {
-            self.add_violation(name, 0, None, "a tap of the hardware that the model has no stage for".into());
+            self.add_violation(name, 0, None, "the hardware has a tap for which the model has no stage".into());
         }
         for name in stages.iter().filter(|s| !taps.contains(s)) {
-            self.add_violation(name, 0, None, "a stage of the model that the hardware has no tap for".into());
+            self.add_violation(name, 0, None, "the model has a stage for which the hardware has no tap".into());
         }
     }
 
-    /// The cycle of every output beat: beat k of the frame at last input + `first_output` + k·`interval`.
+    /// Checks the cycle of every output beat: beat k is due at last input + `first_output` + k·`interval`.
     fn compare_beat_cycles(&mut self, expected: Cycles, times: &Times, beats: &[Beat]) {
         let Some(last_in) = times.last_in else {
             return;

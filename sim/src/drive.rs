@@ -1,14 +1,13 @@
-//! Plays frames into a [`Device`] and records every transfer with its cycle.
+//! Sends frames into a [`Device`] and records every transfer with its cycle.
 //!
-//! Full speed: one code a cycle, output always ready, a frame starts when the one before is out.
-//! Stalls: seeded random gaps on both streams, the next frame offered as soon as the device takes
-//! it. Input codes follow the AXI rule (an offered beat stays until it is taken), and the same rule
-//! is checked on the output. Before a run with stalls the device is left with work in progress, and the
-//! reset must clear it.
+//! Full speed: one code per cycle, output always ready, a frame starts when the previous one has left completely.
+//! Stalls: seeded random gaps on both streams, the next frame offered as soon as the device accepts it. Input codes
+//! follow the AXI4-Stream rule (once valid, a beat stays unchanged until it is accepted); the same rule is checked on
+//! the output. Before a run with stalls the device is left with a frame in progress, which the reset must clear.
 //!
-//! **Counting.** Cycles are numbered from 0 at the first cycle of reset. A beat's cycle is the one
-//! in which valid and ready are both set. latency = cycle of the last output beat − cycle of the last
-//! input beat; total = cycle of the last output beat − cycle of the first input beat + 1.
+//! Cycles are numbered from 0 at the first cycle of reset. A beat is transferred in the cycle in which valid and ready
+//! are both high. Latency = cycle of the last output beat − cycle of the last input beat; total = cycle of the last
+//! output beat − cycle of the first input beat + 1.
 
 mod axis_stability;
 mod receiver;
@@ -24,17 +23,17 @@ use sender::{Sender, StallGenerator};
 
 /// Cycles of reset before the first frame.
 const RESET_CYCLES: u64 = 4;
-/// Cycles after the last expected beat in which nothing more may come.
+/// Cycles after the last expected beat during which no further beat may come.
 const TAIL_CYCLES: u64 = 64;
 
-/// How the two streams are clocked.
+/// Timing of the two streams.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Stimulus {
-    /// One code a cycle, output always ready: cycle counts are exact.
+    /// One code per cycle, output always ready: cycle counts are exact.
     FullSpeed,
     /// Random gaps on both streams.
     Stalls {
-        /// Of the random numbers.
+        /// Seed of the gaps.
         seed: u64,
     },
 }
@@ -48,7 +47,7 @@ impl std::fmt::Display for Stimulus {
     }
 }
 
-/// Plays `frames` and records what comes back; gives up after `watchdog` cycles without a transfer.
+/// Sends `frames` and records the output and `taps` taps; stops after `watchdog` cycles without a transfer.
 pub fn record(
     device: &mut dyn Device,
     taps: usize,
@@ -80,7 +79,7 @@ pub fn record(
         if accepted {
             sender.accepted(cycle, &mut receiver.recording.times);
         }
-        // A device that sends without end must not keep the watchdog quiet.
+        // Surplus beats do not count, so that the watchdog also ends a device that sends forever.
         let delivered = receiver.observe(cycle, &inputs, outputs) && receiver.recording.beats.len() <= wanted;
         idle = if accepted || delivered { 0 } else { idle + 1 };
         if receiver.recording.beats.len() >= wanted && sender.frame == frames.len() {
@@ -96,8 +95,8 @@ pub fn record(
     receiver.recording
 }
 
-/// Resets the device while it receives, and leaves it computing: the reset that follows must clear
-/// every trace of both.
+/// Leaves the device with work in progress: resets it in the middle of a frame, then sends a whole frame and stops
+/// while it is being computed. The next reset must clear both.
 fn leave_work_in_progress(device: &mut dyn Device, play: &InputFrame) {
     let (half, whole) = (play.codes.len() / 2, play.codes.len());
     for count in [half, whole] {

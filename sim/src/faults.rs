@@ -1,17 +1,20 @@
-//! `dermis faults`: single bits flipped in the simulated hardware, and what comes of it.
+//! `dermis faults`: flips single bits in the simulated hardware and classifies the effect.
 //!
-//! Each run plays two frames at full speed through the Verilated engine; at a random cycle of the first one, one bit of
-//! a ROM, a RAM or a register is flipped, a third of the runs each; the stages take turns, so that small ones are hit as
-//! well, and of a stage every bit is alike likely. A flipped ROM bit stays; what is written anew heals. Then the ROM is
-//! restored, and after a reset a frame must be right.
+//! Each run sends two frames at full speed through the verilated engine. At a random cycle of the first frame one bit
+//! flips. A third of the runs each flips a bit of a ROM, a RAM and a register; within these the stages take turns, so
+//! that small stages are covered as well, and the bits of a stage are equally likely. A flipped ROM bit stays; RAM and
+//! register bits last until they are written again. Then the ROM is restored, the engine is reset, and the next frame
+//! must be right.
 //!
 //! | outcome | when |
 //! |---|---|
 //! | harmless | all beats of both frames are right |
-//! | detected | a beat is wrong and the device tells: a `tlast` in the wrong place, or, where the model has none, a flag of |
-//! | | framing or coefficients, saturations, or a search without result |
-//! | hang | a frame's last beat does not come, until the reset |
-//! | silent | a beat is wrong and nothing tells; with the largest error of a force against the frame's largest force |
+//! | detected | a beat is wrong and the device reports it: `tlast` on the wrong beat, or one of these that the model's status |
+//! | | does not have: framing or coefficient flag, saturations, a search without result |
+//! | hang | beats are missing until the reset |
+//! | silent | a beat is wrong and the device reports nothing; the largest force error is recorded |
+//!
+//! Force errors are relative to the frame's largest force component.
 
 mod bit_flip;
 mod classify;
@@ -39,17 +42,17 @@ use bit_flip::{FaultInjector, StateBit};
 use classify::{classify, Outcome};
 use state_bits::{state_elements, StateElement, StorageClass, CLASSES};
 
-/// What to try.
+/// Arguments of `dermis faults`.
 #[derive(Args, Debug)]
 #[command(after_help = EXAMPLES)]
 pub struct Arguments {
     /// Built-in name or path of a scene.
     #[arg(default_value = "sensor-1")]
     scene: String,
-    /// Faults, one per run.
+    /// Number of faults, one per run.
     #[arg(long, value_name = "N", default_value_t = 1000)]
     count: usize,
-    /// Of places, cycles and frames.
+    /// Seed of bits, cycles and frames.
     #[arg(long, default_value_t = 1)]
     seed: u64,
     /// Print the outcomes as JSON and nothing else.
@@ -58,43 +61,43 @@ pub struct Arguments {
 }
 
 const EXAMPLES: &str = "Examples:
-  dermis faults                                      1000 flipped bits in ROM, RAM and registers, sensor-1
+  dermis faults                                      1000 bit flips in ROM, RAM and registers of sensor-1
   dermis faults eight-by-eight --count 60 --json";
 
-/// A relative force error from which a silent fault counts as large.
+/// Relative force error above which a silent fault counts as large.
 pub const LARGE: f64 = 0.01;
 
-/// What faults in one class of places of one stage did.
+/// Counts of the faults in one storage class of one stage.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Row {
     /// ROM, RAM or registers.
     pub class: StorageClass,
-    /// The stage.
+    /// Stage name.
     pub stage: String,
-    /// Registers and memories.
+    /// Number of registers and memories.
     pub signals: usize,
-    /// Their bits.
+    /// Number of their bits.
     #[serde(rename = "places")]
     pub bits: usize,
-    /// Faults.
+    /// Number of bit flips.
     #[serde(rename = "tried")]
     pub flips: usize,
-    /// Different bits among them.
+    /// Number of different bits flipped.
     #[serde(rename = "hit")]
     pub distinct_bits: usize,
-    /// Nothing came of it.
+    /// Flips without any wrong beat.
     pub harmless: usize,
-    /// The device told.
+    /// Flips with a wrong beat that the device reported.
     pub detected: usize,
-    /// No answer until the reset.
+    /// Flips after which beats were missing until the reset.
     pub hang: usize,
-    /// Wrong, and nothing told.
+    /// Flips with a wrong beat that the device did not report.
     pub silent: usize,
-    /// Silent, with a force error above [`LARGE`].
+    /// Silent flips with a force error above [`LARGE`].
     pub large: usize,
-    /// Largest force error of a silent fault against the frame's largest force.
+    /// Largest force error of a silent flip, relative to the frame's largest force component.
     pub largest_error: f64,
-    /// Faults after which a reset did not bring the next frame right.
+    /// Flips after which the frame following the reset was wrong.
     pub not_recovered: usize,
 }
 
@@ -115,7 +118,7 @@ pub fn inject_faults(hardware: &Hardware, frames: &[Frame], count: usize, seed: 
     let longest = pool.iter().map(|sample| sample.cycles.total).max().unwrap_or(0);
     let mut rows: BTreeMap<(StorageClass, String), Row> = BTreeMap::new();
     for element in &elements {
-        // There and back again: every place can be hit.
+        // Flips a bit twice, which leaves it unchanged: shows that it can be flipped.
         if ![(); 2].iter().all(|()| device.flip(&element.scope, &element.signal, element.words - 1, element.bits - 1)) {
             bail!(
                 "{}.{}, word {}, bit {} cannot be flipped",
@@ -152,7 +155,8 @@ pub fn inject_faults(hardware: &Hardware, frames: &[Frame], count: usize, seed: 
     Ok(rows.into_values().collect())
 }
 
-/// The class's stages take turns; of a stage every bit is alike likely: place, word, bit.
+/// Draws a bit as index of its element, word and bit: the classes and their stages take turns, the bits of a stage are
+/// equally likely. `None` where the class has no bits.
 fn draw(elements: &[StateElement], run: usize, random: &mut fastrand::Rng) -> Option<(usize, usize, usize)> {
     let class = CLASSES[run % CLASSES.len()];
     let stages: BTreeSet<&str> =
@@ -211,25 +215,25 @@ impl Row {
     }
 }
 
-/// Shares of the outcomes of a fault in any bit of a class.
+/// Shares of the outcomes of a flip in a random bit of a storage class.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct Shares {
-    /// Bits of the class.
+    /// Number of bits of the class.
     pub bits: usize,
-    /// Nothing comes of it.
+    /// No wrong beat.
     pub harmless: f64,
-    /// The device tells.
+    /// A wrong beat that the device reports.
     pub detected: f64,
-    /// No answer until the reset.
+    /// Missing beats until the reset.
     pub hang: f64,
-    /// Wrong, and nothing tells.
+    /// A wrong beat that the device does not report.
     pub silent: f64,
     /// Silent, with a force error above [`LARGE`].
     pub large: f64,
 }
 
 impl Shares {
-    /// Each stage's shares, weighted by its bits; `None` where there is no such bit or none was flipped.
+    /// The stages' shares, weighted by their bits; `None` where the class has no bits or none was flipped.
     pub fn of(rows: &[Row], class: StorageClass) -> Option<Shares> {
         let own = || rows.iter().filter(move |row| row.class == class && row.flips > 0);
         let bits: usize = own().map(|row| row.bits).sum();
@@ -247,7 +251,7 @@ impl Shares {
     }
 }
 
-/// What the report keeps of a class.
+/// The counts of a class for the run log.
 fn target_counts(scene: &str, class: StorageClass, rows: &[Row], seconds: f64) -> TargetCounts {
     let own = || rows.iter().filter(move |row| row.class == class);
     let sum = |count: fn(&Row) -> usize| own().map(count).sum::<usize>() as u64;
@@ -262,7 +266,8 @@ fn target_counts(scene: &str, class: StorageClass, rows: &[Row], seconds: f64) -
     TargetCounts::new(format!("{scene}, {}", class.name()), "bits flipped", flips, counts, seconds)
 }
 
-/// The outcomes as text, and whether a reset always helped; the counts stay in the build folder for the report.
+/// Runs the command: the outcomes as text, and whether the engine recovered after every reset. The counts are saved in
+/// the build folder for the report.
 ///
 /// # Errors
 /// An unknown scene, one without hardware, no Verilator.
@@ -274,7 +279,7 @@ pub fn run(arguments: &Arguments, build: &Path) -> Result<(String, bool)> {
     let begun = Instant::now();
     let rows = inject_faults(&hardware, &frames, *count, *seed)?;
     let mut log = RunLog::new(&format!("dermis faults {name} --count {count} --seed {seed}"));
-    // The classes take turns, a third of the time each.
+    // The classes take turns, so each is charged a third of the time.
     let seconds = begun.elapsed().as_secs_f64() / CLASSES.len() as f64;
     log.targets.extend(CLASSES.map(|class| target_counts(&scene.name, class, &rows, seconds)));
     log.save(build, "faults")?;

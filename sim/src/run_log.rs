@@ -1,15 +1,16 @@
-//! Tried: how much a long run has tried and what it found, kept in the build folder for the report.
+//! Counts of long test runs: how many inputs were tried and with which outcomes, saved in the build folder for the
+//! report.
 //!
 //! ```text
 //! make fuzz, dermis stress, dermis faults ─> build/tried/<name>.json ─> dermis report, section "Inputs tried"
 //! ```
 //!
-//! | field | |
+//! | JSON field | holds |
 //! |---|---|
-//! | `command` | what makes the counts again |
-//! | `lines` | per target: how many of which unit, how many had which outcome, seconds |
+//! | `command` | the command that repeats the run |
+//! | `lines` | per target: unit, number tried, counts by outcome, seconds |
 //!
-//! A run takes the place of an earlier one of the same name.
+//! A run replaces an earlier one of the same name.
 
 use std::collections::BTreeMap;
 use std::fmt;
@@ -21,16 +22,16 @@ use serde::{Deserialize, Serialize};
 
 use dermis_golden::write::write;
 
-/// Folder in the build folder.
+/// Name of the folder within the build folder.
 const FOLDER: &str = "tried";
 
 /// One run.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct RunLog {
-    /// The command that makes these counts.
+    /// The command that repeats the run.
     pub command: String,
-    /// What was tried, in order.
+    /// The run's targets, in order.
     #[serde(rename = "lines")]
     pub targets: Vec<TargetCounts>,
 }
@@ -39,15 +40,15 @@ pub struct RunLog {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct TargetCounts {
-    /// The target.
+    /// Name of the target, for example a file format or a scene with an experiment.
     #[serde(rename = "what")]
     pub target: String,
-    /// What is counted: inputs, frames, cycles, …
+    /// Unit of `count`: inputs, frames, cycles, …
     pub unit: String,
-    /// How many.
+    /// Number tried.
     #[serde(rename = "tried")]
     pub count: u64,
-    /// Outcomes by name, failures among them even where there are none.
+    /// Count of each outcome by its name; failures are listed even where their count is 0.
     pub outcomes: BTreeMap<String, u64>,
     /// Time in s.
     pub seconds: f64,
@@ -61,7 +62,7 @@ impl fmt::Display for TargetCounts {
 }
 
 impl TargetCounts {
-    /// So many of a unit, with what came of them by name.
+    /// Counts of one target; `outcomes` are pairs of name and count.
     pub fn new(
         target: impl Into<String>,
         unit: &str,
@@ -73,19 +74,19 @@ impl TargetCounts {
         TargetCounts { target: target.into(), unit: unit.to_owned(), count, outcomes, seconds }
     }
 
-    /// Outcomes with their counts.
+    /// The outcomes as text: `2 refused, 1 taken`.
     pub fn outcomes_text(&self) -> String {
         self.outcomes.iter().map(|(name, count)| format!("{count} {name}")).collect::<Vec<_>>().join(", ")
     }
 }
 
 impl RunLog {
-    /// A run without lines yet.
+    /// A run without targets yet.
     pub fn new(command: &str) -> RunLog {
         RunLog { command: command.to_owned(), targets: Vec::new() }
     }
 
-    /// Keeps the run under a name, whole or not at all.
+    /// Writes the run to `build/tried/<name>.json`, completely or not at all.
     ///
     /// # Errors
     /// A folder or file that cannot be written.
@@ -96,14 +97,14 @@ impl RunLog {
         Ok(write(&folder.join(format!("{name}.json")), text.as_bytes())?)
     }
 
-    /// All runs that were kept, by name; none where there is no folder.
+    /// All saved runs, sorted by name; none where the folder does not exist.
     ///
     /// # Errors
-    /// A file that cannot be read or is no run, with its path.
+    /// A file that cannot be read or parsed, with its path.
     pub fn load_all(build: &Path) -> Result<Vec<RunLog>> {
         let Ok(entries) = fs::read_dir(build.join(FOLDER)) else { return Ok(Vec::new()) };
         let mut paths: Vec<_> = entries.filter_map(|entry| Some(entry.ok()?.path())).collect();
-        // What a killed writer left behind is no run.
+        // Skips temporary files of an interrupted write.
         paths.retain(|path| path.extension().is_some_and(|extension| extension == "json"));
         paths.sort();
         let read = |path: &std::path::PathBuf| -> Result<RunLog> {
@@ -119,7 +120,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_is_kept_comes_back() {
+    fn saved_runs_are_loaded_again() {
         let build = tempfile::tempdir().unwrap();
         assert_eq!(RunLog::load_all(build.path()).unwrap(), []);
         let mut run = RunLog::new("make fuzz");

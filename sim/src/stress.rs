@@ -1,13 +1,14 @@
-//! `dermis stress`: the generated Verilog's two streams under gaps, back-pressure, wrong `tlast` and resets.
+//! `dermis stress`: tests the two AXI streams of the generated Verilog with gaps, back-pressure, wrong `tlast` and
+//! resets.
 //!
-//! | experiment | what happens | what must hold |
+//! | experiment | stimulus | requirement |
 //! |---|---|---|
-//! | `stalls` | frames back to back, both sides paced in many ways, now and then one at full speed alone | every whole frame leaves once, in order, equal to the bit-true model; alone, every beat in its promised cycle |
-//! | `tlast` | every other frame's `tlast` is early, missing, doubled or late, at random pace | what a wrong one cuts is dropped, the next frame that leaves carries the flag, once |
-//! | `reset` | a reset at a cycle of a frame, held from one cycle to as long as a frame takes | nothing leaves of what was inside; the next frame is right, unflagged and in time |
+//! | `stalls` | frames back to back at changing valid and ready rates; now and then one frame alone at full speed | every frame leaves once, in order, equal to the bit-true model; alone, every beat in the model's cycle |
+//! | `tlast` | every other frame has an early, missing, doubled or late `tlast`; random valid and ready rates | frames cut short are dropped; the next frame carries the framing flag, once |
+//! | `reset` | a reset at a given cycle of a frame, held for one cycle up to a frame's time | no beat of the frames inside leaves; the next frame is right, without flag, and in time |
 //!
-//! Each experiment takes about the asked number of cycles; resets end earlier, with one at each cycle of a frame. What a
-//! wrong `tlast` does is `stress/scoreboard.rs`'s to say.
+//! Each experiment runs for about the requested number of cycles; `reset` ends earlier once every cycle of a frame has
+//! had a reset. The expected effect of a wrong `tlast` is defined in `stress/scoreboard.rs`.
 
 mod handshake_rates;
 mod resets;
@@ -35,7 +36,7 @@ use crate::run_log::{RunLog, TargetCounts};
 use handshake_rates::HandshakeRates;
 use testbench::{Burst, Testbench, RESET_CYCLES};
 
-/// What to try.
+/// Arguments of `dermis stress`.
 #[derive(Args, Debug)]
 #[command(after_help = EXAMPLES)]
 pub struct Arguments {
@@ -45,7 +46,7 @@ pub struct Arguments {
     /// Cycles of each experiment.
     #[arg(long, value_name = "N", default_value_t = 1_000_000)]
     cycles: u64,
-    /// Of pace, codes, errors and resets.
+    /// Seed of rates, codes, wrong tlast and resets.
     #[arg(long, default_value_t = 1)]
     seed: u64,
     /// Print the outcomes as JSON and nothing else.
@@ -54,46 +55,46 @@ pub struct Arguments {
 }
 
 const EXAMPLES: &str = "Examples:
-  dermis stress                                      gaps, wrong tlast and resets, sensor-1
+  dermis stress                                      gaps, wrong tlast and resets on sensor-1
   dermis stress eight-by-eight --cycles 50000 --seed 7 --json";
 
-/// What one experiment did and found.
+/// Counts of one experiment.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct Outcome {
-    /// The scene.
+    /// Scene name.
     pub scene: String,
     /// `stalls`, `tlast` or `reset`.
     pub experiment: &'static str,
-    /// Clock cycles run.
+    /// Clock cycles simulated.
     pub cycles: u64,
-    /// Cycles in which nothing was offered to a device that was ready, or a beat of the device was kept waiting.
+    /// Cycles in which the device was ready without input, or had a beat waiting for ready.
     pub stalled: u64,
-    /// Whole frames that the device took and that no reset swept away.
+    /// Complete frames accepted and not discarded by a reset.
     pub frames_in: u64,
-    /// Frames that left, each of them right where there is no violation.
+    /// Frames delivered.
     pub frames_out: u64,
-    /// Of these, frames alone at full speed, whose every beat was asked for its cycle.
+    /// Of these, frames alone at full speed, for which the cycle of every beat was checked.
     pub timed: u64,
-    /// Beats whose `tlast` was wrong.
+    /// Input beats with a wrong `tlast`.
     pub wrong_tlast: u64,
-    /// Frames cut short, which leave nothing.
+    /// Frames cut short by an early `tlast`, which deliver nothing.
     pub cut: u64,
-    /// Frames out with the framing flag, as they must.
+    /// Frames delivered with the framing flag, as expected.
     pub flagged: u64,
-    /// Resets.
+    /// Number of resets.
     pub resets: u64,
-    /// Cycles of a frame at full speed, where a reset may fall.
+    /// Number of cycles of a frame at full speed, at each of which a reset can start.
     #[serde(rename = "reset_places")]
     pub possible_reset_cycles: u64,
     /// Longest reset in cycles.
     pub longest_reset: u64,
-    /// How often something was other than it must.
+    /// Number of violated requirements.
     pub violations: u64,
-    /// The first of them.
+    /// The first violations.
     pub first: Vec<Violation>,
 }
 
-/// Runs all experiments on the hardware's Verilog, with the codes of `frames` and drawn ones.
+/// Runs all experiments on the hardware's Verilog, with the codes of `frames` and synthetic ones.
 ///
 /// # Errors
 /// No Verilator, a design that it refuses, or frames of another sensor.
@@ -117,7 +118,7 @@ pub fn stress(hardware: &Hardware, frames: &[Frame], cycles: u64, seed: u64) -> 
     Ok(outcomes)
 }
 
-/// Frames back to back; the pace changes every few frames.
+/// Experiment `stalls`: frames back to back, with new valid and ready rates every few frames.
 fn stalls(bench: &mut Testbench, random: &mut fastrand::Rng, cycles: u64) {
     while bench.can_continue() && bench.cycle() < cycles {
         let mut rates = HandshakeRates::random(random);
@@ -133,7 +134,7 @@ fn stalls(bench: &mut Testbench, random: &mut fastrand::Rng, cycles: u64) {
     bench.drain(&mut HandshakeRates::full_speed());
 }
 
-/// Every other frame has a wrong `tlast`.
+/// Experiment `tlast`: every other frame on average has a wrong `tlast`.
 fn tlast(bench: &mut Testbench, random: &mut fastrand::Rng, cycles: u64) {
     while bench.can_continue() && bench.cycle() < cycles {
         let mut rates = HandshakeRates::random(random);
@@ -153,7 +154,7 @@ fn tlast(bench: &mut Testbench, random: &mut fastrand::Rng, cycles: u64) {
     bench.drain(&mut HandshakeRates::full_speed());
 }
 
-/// What the report keeps of an experiment.
+/// The counts of an experiment for the run log.
 fn target_counts(outcome: &Outcome, seconds: f64) -> TargetCounts {
     let counts = [
         ("frames out", outcome.frames_out),
@@ -166,7 +167,8 @@ fn target_counts(outcome: &Outcome, seconds: f64) -> TargetCounts {
     TargetCounts::new(format!("{}, {}", outcome.scene, outcome.experiment), "cycles", outcome.cycles, counts, seconds)
 }
 
-/// The outcomes as text, and whether nothing was violated; the counts stay in the build folder for the report.
+/// Runs the command: the outcomes as text, and whether there was no violation. The counts are saved in the build folder
+/// for the report.
 ///
 /// # Errors
 /// An unknown scene, one without hardware, no Verilator.
@@ -182,7 +184,7 @@ pub fn run(arguments: &Arguments, build: &Path) -> Result<(String, bool)> {
         let begun = Instant::now();
         let own = stress(&hardware, &frames, *cycles, *seed)?;
         let cycles: u64 = own.iter().map(|outcome| outcome.cycles).sum();
-        // Of the time together each experiment has its share by its cycles.
+        // Each experiment's share of the time is proportional to its cycles.
         let per_cycle = begun.elapsed().as_secs_f64() / cycles.max(1) as f64;
         log.targets.extend(own.iter().map(|outcome| target_counts(outcome, per_cycle * outcome.cycles as f64)));
         outcomes.extend(own);

@@ -1,4 +1,4 @@
-//! Error tables: each scene in each of the paper's cases on each frame, beside the paper's own figures.
+//! Error tables: each scene in each of the paper's cases on each frame, next to the figures of the paper.
 //!
 //! ```text
 //! scene × case × frame -> golden ------> errors against truth, against case 0, per taxel --+
@@ -11,9 +11,10 @@
 //! | errors, ℓ2, paper | fractions; X1 X2 X3 signed as in Eq. 3 |
 //! | difference | LSB of the force word, share of the largest force |
 //!
-//! ℓ2 = ‖f − f_ref‖/‖f_ref‖ over all taxels and components. Of several contacts, whose shears may cancel, the error of
-//! the whole shear is also given over Σ|t_k|, and of case `contacts` each contact's own shear, ‖T_k − t_k‖/|t_k|,
-//! T_k of the region whose centre is nearest. The bit-true columns are empty where the hardware does not have the case.
+//! ℓ2 = ‖f − f_ref‖/‖f_ref‖ over all taxels and components. The shears t_k of several contacts may cancel; for these
+//! the error of the total shear is also given over Σ|t_k|, and for case `contacts` the error of each contact's shear,
+//! ‖T_k − t_k‖/|t_k|, where T_k is the shear of the region with the nearest centre. The bit-true columns are empty
+//! where the hardware does not support the case.
 
 use anyhow::Result;
 use dermis_golden::errors::Errors;
@@ -29,23 +30,23 @@ use serde::Serialize;
 
 use crate::compare::{difference, Difference};
 
-/// One subarray of one row.
+/// One subarray of a row.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct SubarrayRow {
     /// Ratio of shear to normal force.
     pub mu: [f64; 2],
     /// Whether compression and tension both exceed the noise floor, the paper's condition.
     pub both_signs: bool,
-    /// Whether the scene's own condition is met.
+    /// Whether the scene's condition for a search is met.
     pub condition: bool,
 }
 
 /// The bit-true model on one frame.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct BitTrueErrors {
-    /// Against truth.
+    /// Error against the true force.
     pub error: Option<Errors>,
-    /// From the floating-point result.
+    /// Difference from the floating-point result.
     pub difference: Difference,
 }
 
@@ -54,48 +55,49 @@ pub struct BitTrueErrors {
 pub struct ErrorRow {
     /// Scene name.
     pub scene: String,
-    /// Case as scenes name it.
+    /// Case, as named in scene files.
     pub case: String,
     /// Frame name.
     pub frame: String,
-    /// Against truth.
+    /// Error against the true force.
     pub error: Option<Errors>,
-    /// Against case 0 of the same frame, as the paper does for sensors 3 and 4.
+    /// Error against case 0 of the same frame, as in the paper for sensors 3 and 4.
     pub error_case_0: Option<Errors>,
-    /// Per taxel, against truth.
+    /// ℓ2 error over all taxels against the true forces.
     pub l2: Option<f64>,
-    /// Contacts that the frame describes.
+    /// Number of contacts described in the frame.
     pub contacts: usize,
-    /// ‖T − T_ref‖/Σ|t_k|: against the shear of all contacts.
+    /// ‖T − T_ref‖/Σ|t_k|: error of the total shear over the sum of the contacts' shears.
     #[serde(rename = "of_all")]
     pub shear_over_all: Option<f64>,
-    /// Of `contacts`, the error of each contact's own shear.
+    /// For case `contacts`: the error of each contact's shear.
     #[serde(rename = "own")]
     pub contact_shears: Vec<f64>,
-    /// The case that `adaptive` took.
+    /// The case that `adaptive` has chosen for this frame.
     #[serde(rename = "taken")]
     pub chosen_case: Option<String>,
-    /// Per subarray, row-major.
+    /// The subarrays, row-major.
     pub subarrays: Vec<SubarrayRow>,
-    /// The bit-true model, where it has the case.
+    /// The bit-true model's errors, where the hardware supports the case.
     pub fixed: Option<BitTrueErrors>,
-    /// The paper's X1 X2 X3 of this sensor and case.
+    /// X1 X2 X3 of this sensor and case in the paper's Table 2.
     pub paper: Option<[f64; 3]>,
-    /// Remarks on the golden result.
+    /// Flags of the golden result.
     pub flags: Vec<Flag>,
 }
 
-/// The paper's sensor a built-in scene stands for.
+/// The number of the paper's sensor, if the scene is one of its four.
 fn paper_sensor(scene: &Scene) -> Option<u32> {
     let number: u32 = scene.name.strip_prefix("sensor-")?.parse().ok()?;
     let builtin = Scene::builtin(&scene.name).ok()?;
     (builtin.sensor == scene.sensor).then_some(number)
 }
 
-/// All lines of one scene, case by case; a case that does not divide the array has none.
+/// All rows of one scene, case by case; cases that do not divide the array are skipped. Calls `progress` after each
+/// row.
 ///
 /// # Errors
-/// A scene or frame the golden model refuses.
+/// A scene or frame that the golden model refuses.
 pub fn tabulate(scene: &Scene, cases: &[Case], frames: &[Frame], progress: &mut dyn FnMut()) -> Result<Vec<ErrorRow>> {
     let mut rows = Vec::new();
     let mut case_0: Vec<Reconstruction> = Vec::new();
@@ -106,7 +108,7 @@ pub fn tabulate(scene: &Scene, cases: &[Case], frames: &[Frame], progress: &mut 
         let mut scene = scene.clone();
         scene.partition.case = case;
         let golden = Golden::new(&scene)?;
-        // What hardware does not have is not an error here: the columns stay empty.
+        // A case without hardware is not an error here: its columns stay empty.
         let model = Model::for_frames(&scene, frames).ok();
         for (index, frame) in frames.iter().enumerate() {
             let result = golden.run(frame)?;
@@ -162,7 +164,7 @@ fn row(
     }
 }
 
-/// ‖value − truth‖/‖truth‖, `None` without force.
+/// ‖value − truth‖/‖truth‖; `None` if the true force is zero.
 fn relative_l2(truth: &Forces, value: &Forces) -> Option<f64> {
     let pairs = [(&truth.fx, &value.fx), (&truth.fy, &value.fy), (&truth.fz, &value.fz)];
     let each = || pairs.iter().flat_map(|(truth, value)| truth.iter().zip(value.iter()));
@@ -171,7 +173,7 @@ fn relative_l2(truth: &Forces, value: &Forces) -> Option<f64> {
     (size > 0.0).then(|| (off / size).sqrt())
 }
 
-/// The error of the whole shear over the shear of all contacts, `None` without shear or where one is not known.
+/// The error of the total shear over the sum of the contacts' shears; `None` if that is zero or a shear is unknown.
 fn shear_over_all(contacts: &[Contact], truth: Option<[f64; 3]>, value: [f64; 3]) -> Option<f64> {
     let truth = truth?;
     let shears: Option<Vec<[f64; 2]>> = contacts.iter().map(|contact| contact.tangential_N).collect();
@@ -179,7 +181,7 @@ fn shear_over_all(contacts: &[Contact], truth: Option<[f64; 3]>, value: [f64; 3]
     (all > 0.0).then(|| (value[0] - truth[0]).hypot(value[1] - truth[1]) / all)
 }
 
-/// The error of each contact's shear; contacts without shear or place have none.
+/// The error of each contact's shear; contacts without shear or centre are skipped.
 fn contact_shears(contacts: &[Contact], regions: &[Region]) -> Vec<f64> {
     let error = |contact: &Contact| {
         let ([x, y], [tx, ty]) = (contact.centre_mm?, contact.tangential_N?);
@@ -236,7 +238,7 @@ mod tests {
         // Three does not divide ten.
         assert_eq!((rows.len(), done), (7, 7));
         assert_eq!(rows.iter().map(|row| row.subarrays.len()).collect::<Vec<_>>(), [1, 4, 2, 2, 10, 1, 1]);
-        // Every case of rectangles has its bit-true model, and so has the choice between them.
+        // The hardware supports every case except `contacts`.
         assert!(rows.iter().all(|row| row.fixed.is_some() != (row.case == "contacts")));
         assert_eq!(rows[5].chosen_case.as_deref(), Some("0"));
         assert_eq!(rows.iter().map(|row| row.contact_shears.len()).collect::<Vec<_>>(), [0, 0, 0, 0, 0, 0, 1]);

@@ -1,12 +1,12 @@
-//! One scene's co-simulation: every frame through the golden model, the bit-true model and the
-//! simulated hardware, and how they differ.
+//! Co-simulation of one scene: every frame through the golden model, the bit-true model and the simulated hardware,
+//! with their differences.
 //!
 //! ```text
 //! frame -> golden ------------------------------> Reconstruction --+
 //!       -> bit-true model --> Trace, Reconstruction ---------------+--> FrameResult
 //!       -> Verilator: full speed, then stalls --> Findings, Times -+
 //!       -> rust-hdl: full speed ----------------> Findings --------+
-//!       -> netlist, when asked for: full speed -> Findings --------+
+//!       -> netlist, on request: full speed -----> Findings --------+
 //! ```
 
 use std::path::Path;
@@ -25,10 +25,10 @@ use crate::drive::{Stimulus, Times};
 use crate::hardware::{Hardware, Simulator};
 use crate::progress::Progress;
 
-/// Of the stalls; any number serves, a fixed one repeats.
+/// Seed of the stalls, fixed so that runs are reproducible.
 const SEED: u64 = 1;
 
-/// One frame's outcome.
+/// Result of one frame, or of the mean of several.
 #[derive(Clone, Debug)]
 pub struct FrameResult {
     /// Frame name.
@@ -37,41 +37,41 @@ pub struct FrameResult {
     pub full_scale_MPa: f64,
     /// The floating-point result.
     pub golden: Reconstruction,
-    /// The bit-true result, which the hardware's equals when `equal`.
+    /// The bit-true result; the hardware's as well where `equal` is set.
     pub fixed: Reconstruction,
-    /// Of `fixed` against `golden`.
+    /// Difference of `fixed` from `golden`.
     pub difference: Difference,
-    /// Whether no run differed from the bit-true model on this frame.
+    /// Whether every run equalled the bit-true model on this frame.
     pub equal: bool,
     /// Cycles at full speed.
     pub times: Times,
 }
 
-/// One scene's outcome.
+/// Result of one scene.
 #[derive(Clone, Debug)]
 pub struct Verified {
     /// The scene.
     pub scene: Scene,
     /// Its board.
     pub board: Board,
-    /// Per frame, in the given order.
+    /// Results of the frames, in the given order.
     pub rows: Vec<FrameResult>,
-    /// All mismatches of all runs.
+    /// Mismatches of all runs.
     pub findings: Findings,
-    /// Every run, for example `verilator, full speed`.
+    /// Labels of the runs, for example `verilator, full speed`.
     pub runs: Vec<String>,
-    /// Whether a run was one of the generated Verilog or of its netlist.
+    /// Whether at least one run simulated the generated Verilog or its netlist.
     pub verilog: bool,
 }
 
-/// Co-simulates `frames` (at least one) on the given simulators; cycles come from the first.
+/// Co-simulates `frames` (at least one) on the given simulators; cycles are those of the first simulator.
 ///
 /// # Errors
 /// A scene that cannot be built, a frame of another sensor, no Verilator.
 pub fn verify(scene: &Scene, frames: &[Frame], simulators: &[Simulator], build: &Path) -> Result<Verified> {
     let board = Board::load(&scene.hardware.board)?;
     let hardware = Hardware::new(Model::for_frames(scene, frames)?, build)?;
-    // With the full scale that the model has settled on: all models judge the same codes.
+    // The model's scene has the full scale filled in, so that all models use the same codes.
     let golden = Golden::new(&hardware.model.scene)?;
     let vectors =
         frames.chunks(1 << scene.input.average).map(|frames| hardware.vector(frames)).collect::<Result<Vec<_>>>()?;
@@ -112,7 +112,7 @@ pub fn verify(scene: &Scene, frames: &[Frame], simulators: &[Simulator], build: 
     Ok(verified)
 }
 
-/// All runs on one simulator; returns the times at full speed.
+/// Runs the vectors on one simulator at full speed, and with stalls under Verilator; returns the times at full speed.
 fn simulate(
     hardware: &Hardware,
     simulator: Simulator,

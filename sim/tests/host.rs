@@ -1,5 +1,5 @@
-//! The host tool and a whole board without a board: the Verilated board top's UART on a pseudo-terminal, opened like
-//! any serial port; good wires and bad ones.
+//! `dermis host` with a simulated board: the verilated board top's UART on a pseudo-terminal, opened like a serial
+//! port, over error-free and noisy channels.
 
 use std::io::Write;
 use std::path::PathBuf;
@@ -13,7 +13,7 @@ use dermis_sim::board::{ChannelFaults, NoisyChannel, PseudoTerminal};
 use dermis_sim::hardware::Hardware;
 use dermis_sim::host::{open, Session};
 
-/// Eight clock cycles per bit: as many frames as possible in the time of a test.
+/// Eight clock cycles per bit, to keep the simulation short.
 const BAUD: u32 = 12_500_000;
 
 fn model() -> Model {
@@ -31,7 +31,7 @@ fn board(to_board: ChannelFaults, to_host: ChannelFaults) -> PseudoTerminal {
 }
 
 #[test]
-fn over_a_bad_wire_every_frame_is_answered_right_and_every_loss_is_counted() {
+fn over_a_noisy_channel_every_answer_is_right_and_every_error_is_counted() {
     let to_board = ChannelFaults { lost: 1500, flipped: 1500, late: 200, no_stop: 2000, seed: 1 };
     let to_host = ChannelFaults { lost: 600, flipped: 600, seed: 2, ..ChannelFaults::default() };
     let terminal = board(to_board, to_host);
@@ -49,14 +49,14 @@ fn over_a_bad_wire_every_frame_is_answered_right_and_every_loss_is_counted() {
     }
     let counters = session.client.counters().unwrap();
     let errors = session.client.link_errors;
-    // Every request sent again has its reason: it was dropped and counted, or its answer was damaged.
+    // Every repeated request was dropped and counted by the board, or its answer was damaged.
     let drops = counters.framing + counters.crc + counters.unknown_type + counters.length;
     assert_eq!(errors.repeated, u64::from(drops) + errors.damaged, "{counters:?}, {errors:?}");
     assert!(counters.framing > 0 && counters.crc > 0 && errors.damaged > 0, "{counters:?}, {errors:?}");
-    // Taken were an identification, this reading, the frames, and those whose answer was damaged.
+    // Requests accepted: identification, counters, the frames, and repetitions after damaged answers.
     assert_eq!(u64::from(counters.taken), 2 + 2 * frames.len() as u64 + errors.damaged, "{counters:?}, {errors:?}");
     assert_eq!(counters.overrun, 0);
-    // A frame after a dropped one says so.
+    // The answer after a dropped frame packet has the flag.
     assert!(dropped > 0, "{counters:?}");
 }
 
@@ -69,7 +69,7 @@ fn host(terminal: &PseudoTerminal, scene: &str, more: &[&str], input: &str) -> O
         .stderr(Stdio::piped())
         .spawn()
         .unwrap();
-    // A program that refuses its arguments reads nothing.
+    // The write fails if the program has refused its arguments and exited.
     let _ = child.stdin.take().unwrap().write_all(input.as_bytes());
     child.wait_with_output().unwrap()
 }
@@ -100,7 +100,7 @@ fn the_program_sends_checks_tares_and_streams() {
     assert_eq!(forces.status.code(), Some(0), "{}", text(&forces.stderr));
     assert!(text(&forces.stdout).contains("engine board\n"), "{}", text(&forces.stdout));
 
-    // A frame that is its own tare has nothing left.
+    // A frame minus itself as tare is zero.
     let nothing = host(&terminal, scene, &["--tare", &frame, &frame], "");
     assert!(text(&nothing.stdout).contains("no-contact"), "{}", text(&nothing.stdout));
 
@@ -122,11 +122,11 @@ fn the_program_sends_checks_tares_and_streams() {
     let other = host(&terminal, "sensor-1", &[], "");
     assert_eq!(other.status.code(), Some(2));
     let message = text(&other.stderr);
-    assert!(message.contains("the board was made for another scene: 8×8 taxels"), "{message}");
+    assert!(message.contains("the board was built for another scene: 8×8 taxels"), "{message}");
 }
 
 #[test]
-fn a_board_that_adds_nothing_up_sends_all_forces_and_the_host_adds() {
+fn the_host_sums_the_forces_of_a_board_that_does_not() {
     let mut scene = Scene::builtin("eight-by-eight").unwrap();
     scene.hardware.board = "icebreaker".to_string();
     let model = Model::new(&scene).unwrap();

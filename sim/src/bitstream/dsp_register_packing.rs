@@ -1,19 +1,20 @@
-//! Registers into the multipliers, which have room for them.
+//! Moves registers from the fabric into the ECP5 multipliers (DSP register packing).
 //!
-//! An ECP5 multiplier has a register at each operand and one at its product. Yosys leaves them empty and puts flip-flops in
-//! the fabric, from where the way in costs as much time as the product itself. This moves them in: same clock, no
-//! enable, no reset, zero at the start.
+//! An ECP5 multiplier has a register at each operand and one at its product. Yosys leaves them unused and places
+//! flip-flops in the fabric, from which the route into the multiplier takes as long as the product itself. Flip-flops
+//! are moved if they have the same clock, no enable, no reset and the initial value zero.
 //!
 //! ```text
-//! flip-flops -> both operands    all bits, flip-flops or constant zeros; the flip-flops stay where others use them
-//! product    -> flip-flops       every used bit goes to one flip-flop and nowhere else
+//! flip-flops -> both operands    all bits are flip-flops or constant zeros; flip-flops with other loads are also kept
+//! product    -> flip-flops       every used bit drives one flip-flop and nothing else
 //! ```
-//! Their reset is zero for ever, which the device has no wire for: the zero is a net from a look-up table. One for all
-//! multipliers goes across the device and into every block by a wire that the block's multipliers share, and routing lays
-//! one of its arcs over the other without end. So every multiplier has a look-up table of its own.
+//! The registers' reset must be constant zero. The device has no constant there, so that a look-up table drives the
+//! net. Every multiplier has its own look-up table: a common net enters each DSP block through a wire shared by the
+//! block's multipliers, and nextpnr's router then does not converge.
 //!
-//! Block RAMs keep theirs outside: which clock and enable their registers have in the 36-bit mode that Yosys chooses is not
-//! documented. That the netlist still computes the same bits is what the replay shows.
+//! Registers are not moved into block RAMs: which clock and enable the block RAM's output registers have in the 36-bit
+//! mode that Yosys chooses is not documented. The netlist co-simulation shows that the edited netlist computes the same
+//! bits.
 
 use std::collections::{BTreeSet, HashMap};
 
@@ -21,30 +22,30 @@ use serde_json::{json, Map, Value};
 
 /// Yosys's cell of an ECP5 multiplier.
 pub const MULTIPLIER: &str = "MULT18X18D";
-/// Operand's bits of a multiplier.
+/// Bits of a multiplier's operand.
 const OPERAND: usize = 18;
-/// Names of its operands.
+/// Names of the operands.
 const SIDES: [&str; 2] = ["A", "B"];
-/// Its product's bits.
+/// Bits of the product.
 const PRODUCT: usize = 36;
-/// The reset of its registers.
+/// Reset pin of the registers.
 const RESET: &str = "RST0";
 
 /// A net's number in Yosys's JSON.
 type Net = u64;
 
-/// What was moved.
+/// Number of registers moved.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct PackedRegisters {
-    /// Operands whose register is now in the multiplier.
+    /// Operands whose registers are now in a multiplier.
     pub operands: usize,
-    /// Products.
+    /// Products whose registers are now in a multiplier.
     pub products: usize,
-    /// Flip-flops that are no longer needed.
+    /// Flip-flops removed from the fabric.
     pub flip_flops: usize,
 }
 
-/// A flip-flop without enable and reset that starts at zero.
+/// A flip-flop without enable and reset, with initial value zero.
 #[derive(Clone, Debug)]
 struct Register {
     cell: String,
@@ -55,7 +56,7 @@ struct Register {
 
 /// Moves registers in the module `top` of Yosys's JSON.
 ///
-/// Cells of other types and modules are left as they are. A netlist without that module has nothing to move.
+/// Other cells and modules are not changed. Without that module nothing is moved.
 pub fn pack_registers(netlist: &mut Value, top: &str) -> PackedRegisters {
     let Some(module) = netlist["modules"].get_mut(top) else { return PackedRegisters::default() };
     let fan_out = FanOut::of(module);
@@ -80,7 +81,7 @@ pub fn pack_registers(netlist: &mut Value, top: &str) -> PackedRegisters {
     packed
 }
 
-/// A look-up table of zeros for the reset of each multiplier that has registers.
+/// Drives the reset of each multiplier with registers from a look-up table of zeros.
 fn drive_resets(module: &mut Value) {
     let mut last = last_net(module);
     let Some(cells) = module["cells"].as_object_mut() else { return };
@@ -125,7 +126,7 @@ fn constant_zero(net: Net) -> Value {
     })
 }
 
-/// How many inputs of cells and outputs of the module each net goes to.
+/// Fan-out of each net: number of cell inputs and module outputs.
 struct FanOut(HashMap<Net, usize>);
 
 impl FanOut {
@@ -159,7 +160,7 @@ impl FanOut {
     }
 }
 
-/// The flip-flops that may move.
+/// The flip-flops that may be moved.
 fn registers(cells: &Map<String, Value>) -> impl Iterator<Item = Register> + '_ {
     cells.iter().filter_map(|(name, cell)| {
         let parameter = |name: &str| cell["parameters"][name].as_str().map(str::trim);
@@ -174,7 +175,7 @@ fn registers(cells: &Map<String, Value>) -> impl Iterator<Item = Register> + '_ 
     })
 }
 
-/// An operand's bits before its registers; no clock where all of them are constants.
+/// Inputs of an operand's registers; no clock if all bits are constants.
 struct Operand {
     clock: Option<Net>,
     data: Vec<Value>,
@@ -185,18 +186,19 @@ fn pins(side: &str) -> impl Iterator<Item = String> + '_ {
     (0..OPERAND).map(move |bit| format!("{side}{bit}"))
 }
 
-/// The nets and flip-flops around the cells.
+/// The netlist's nets and flip-flops.
 struct Design {
     fan_out: FanOut,
     by_output: HashMap<Net, Register>,
     by_data: HashMap<Net, Register>,
-    /// Flip-flops that a cell's output has taken.
+    /// Flip-flops moved into a product register.
     removed: BTreeSet<String>,
 }
 
 impl Design {
-    /// Moves the registers of both operands in, or of none: place and route knows no timing of a multiplier that has one
-    /// of the two. A constant operand may be registered as well: until it stands there, the other one is zero.
+    /// Moves the registers of both operands, or of none: nextpnr has no timing of a multiplier with only one operand
+    /// register. A constant operand may be registered too: until its register is loaded, the other operand is zero.
+    /// Returns the number of operands moved, constants not counted.
     fn operands(&mut self, cell: &mut Value) -> usize {
         let [a, b] = SIDES.map(|side| self.data(cell, side));
         let (Some(a), Some(b)) = (a, b) else { return 0 };
@@ -216,7 +218,7 @@ impl Design {
         moved
     }
 
-    /// What an operand's registers take in; `None` where not every bit comes from one, or from a constant.
+    /// The inputs of an operand's registers; `None` unless every bit comes from a movable flip-flop or is a constant.
     fn data(&self, cell: &Value, side: &str) -> Option<Operand> {
         let mut operand = Operand { clock: None, data: Vec::with_capacity(OPERAND) };
         let mut ones = false;
@@ -233,11 +235,11 @@ impl Design {
             }
             operand.data.push(register.data.clone());
         }
-        // At the start a register is zero, a constant beside it is not.
+        // A constant one cannot be registered with other bits: registers start at zero.
         (operand.clock.is_none() || !ones).then_some(operand)
     }
 
-    /// Moves the registers of a product in.
+    /// Moves the registers of a product; `None` if they cannot be moved.
     fn product(&mut self, cell: &mut Value) -> Option<()> {
         let mut clock = cell["connections"]["CLK0"][0].as_u64();
         let mut moved = Vec::new();
@@ -259,7 +261,7 @@ impl Design {
     }
 }
 
-/// Turns a multiplier's register on: of this clock, always enabled and never reset.
+/// Enables a multiplier's register with the given clock, always enabled and never reset.
 fn enable_register(cell: &mut Value, register: &str, clock: Net) {
     for (name, value) in [("CLK", "CLK0"), ("CE", "CE0"), ("RST", RESET)] {
         cell["parameters"][format!("{register}_{name}")] = json!(value);

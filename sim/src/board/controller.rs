@@ -1,4 +1,4 @@
-//! The other end of a simulated board's SPI.
+//! SPI controller of a simulated board.
 
 use dermis_golden::link::slip::IDLE;
 use dermis_hdl::link::{BoardDevice, BoardOutputs};
@@ -8,17 +8,16 @@ const SCLK: u64 = 1;
 const CS_N: u64 = 2;
 const MOSI: u64 = 4;
 
-/// An SPI controller, mode 0, with exact half periods of its clock against the board's, neither of which waits for the
-/// other.
+/// An SPI controller, mode 0, whose clock runs independently of the board's.
 ///
-/// Time is counted in parts of which both half periods have a whole number: the board's clock changes every `sclk_hz` of
-/// them and the controller's every `clock_hz`.
+/// Time is counted in units of 1/(2·`clock_hz`·`sclk_hz`) s, so that both half periods are integers: `sclk_hz` units
+/// for the board's clock, `clock_hz` units for the SPI clock.
 pub struct SpiController {
     device: Box<dyn BoardDevice>,
     clock_hz: u64,
     sclk_hz: u64,
     now: u64,
-    /// When the board's clock changes next.
+    /// Time of the next edge of the board's clock.
     edge: u64,
     clock: bool,
     inputs: u64,
@@ -26,8 +25,8 @@ pub struct SpiController {
 }
 
 impl SpiController {
-    /// The controller of a board with a clock of `clock_hz`, at `sclk_hz`; its clock begins so many cycles of the board's
-    /// after that, 0 … 1.
+    /// The controller of a board with a clock of `clock_hz`, with an SPI clock of `sclk_hz` that starts `phase` (0 … 1)
+    /// board cycles later.
     pub fn new(device: Box<dyn BoardDevice>, clock_hz: u32, sclk_hz: u32, phase: f64) -> Self {
         let (clock_hz, sclk_hz) = (u64::from(clock_hz), u64::from(sclk_hz));
         let pins = BoardOutputs::default();
@@ -38,18 +37,18 @@ impl SpiController {
         controller
     }
 
-    /// Lets so many cycles of the board's clock pass between transactions.
+    /// Waits for `cycles` of the board's clock between transactions.
     pub fn wait(&mut self, cycles: u64) {
         self.advance(2 * cycles * self.sclk_hz);
     }
 
-    /// One transaction; the bytes that come back.
+    /// Transfers `bytes` in one transaction; returns the bytes received.
     pub fn transfer(&mut self, bytes: &[u8]) -> Vec<u8> {
         self.transfer_edges(bytes, 16 * bytes.len())
     }
 
-    /// One transaction that ends after so many edges of its clock, 16 to a byte; the whole bytes that come back. Beyond
-    /// `bytes` the controller sends IDLE.
+    /// A transaction that ends after `edges` edges of its clock, 16 per byte; returns the complete bytes received.
+    /// After `bytes` the controller sends IDLE.
     pub fn transfer_edges(&mut self, bytes: &[u8], edges: usize) -> Vec<u8> {
         let mut received = Vec::new();
         let mut bits = 0u32;
@@ -70,7 +69,7 @@ impl SpiController {
         }
         self.half_period();
         self.set_pin(CS_N, true);
-        // Where the transaction ends while the clock is high, that falls when nobody listens.
+        // If the transaction has ended with the clock high, the clock falls while CS is inactive.
         self.set_pin(SCLK, false);
         self.half_period();
         received
@@ -80,7 +79,7 @@ impl SpiController {
         self.advance(self.clock_hz);
     }
 
-    /// Lets time pass.
+    /// Advances the simulation by `time` units.
     fn advance(&mut self, time: u64) {
         let until = self.now + time;
         while self.edge <= until {

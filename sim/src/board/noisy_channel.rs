@@ -1,23 +1,23 @@
-//! A bad wire: bytes that get lost, flipped, late or broken on their way.
+//! A noisy channel: bytes are lost, altered or delayed at random.
 
 use super::UartSymbol;
 
-/// How often what goes wrong: one byte of so many; 0 is never.
+/// Error rates: each value n means that one byte in n on average is affected; 0 means none.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct ChannelFaults {
-    /// Is lost.
+    /// Bytes lost.
     pub lost: u32,
-    /// Has one bit flipped.
+    /// Bytes with one bit flipped.
     pub flipped: u32,
-    /// Comes up to thirty bytes later than the one before; towards the board only.
+    /// Bytes delayed by up to thirty byte times; towards the board only.
     pub late: u32,
-    /// Has no stop bit; towards the board only.
+    /// Bytes without stop bit; towards the board only.
     pub no_stop: u32,
-    /// Of the random draws.
+    /// Seed of the random numbers.
     pub seed: u64,
 }
 
-/// One direction of a wire.
+/// One direction of a link.
 #[derive(Clone, Debug)]
 pub struct NoisyChannel {
     faults: ChannelFaults,
@@ -25,7 +25,7 @@ pub struct NoisyChannel {
 }
 
 impl NoisyChannel {
-    /// A wire with these faults.
+    /// A channel with the given error rates.
     pub fn new(faults: ChannelFaults) -> Self {
         NoisyChannel { faults, random: fastrand::Rng::with_seed(faults.seed) }
     }
@@ -34,7 +34,7 @@ impl NoisyChannel {
         once_in > 0 && self.random.u32(..once_in) == 0
     }
 
-    /// What becomes of a byte.
+    /// What arrives for one byte sent.
     pub fn transmit(&mut self, byte: u8) -> Vec<UartSymbol> {
         let faults = self.faults;
         let mut out = Vec::new();

@@ -1,4 +1,4 @@
-//! A simulated board on a pseudo-terminal, where a host finds it like one on a serial port.
+//! A simulated board on a pseudo-terminal, which a host opens like a serial port.
 
 use std::fs::File;
 use std::io::{self, ErrorKind, Read, Write};
@@ -14,11 +14,11 @@ use rustix::termios::{tcgetattr, tcsetattr, OptionalActions};
 
 use super::{HostUart, NoisyChannel, UartSymbol};
 
-/// Clock cycles between looks at the pseudo-terminal.
+/// Clock cycles simulated between two polls of the pseudo-terminal.
 const SLICE: u64 = 200;
-/// Quiet cycles after which the board waits for bytes in place of being clocked; longer than any frame is computed.
+/// Cycles without activity on the line after which the simulation waits for bytes; longer than any frame's computation.
 const QUIET: u64 = 100_000;
-/// Longest wait, so that a request to stop is seen, ns.
+/// Longest wait for bytes in ns, so that a request to stop is noticed.
 const WAIT_NS: i64 = 20_000_000;
 
 /// A running board; stops when dropped.
@@ -29,7 +29,7 @@ pub struct PseudoTerminal {
 }
 
 impl PseudoTerminal {
-    /// Runs the board behind `uart` in a thread of its own, its bytes going through these wires.
+    /// Runs the board behind `uart` in its own thread; bytes pass through the given channels.
     ///
     /// # Errors
     /// No pseudo-terminal.
@@ -38,7 +38,8 @@ impl PseudoTerminal {
         grantpt(&master)?;
         unlockpt(&master)?;
         let path = PathBuf::from(ptsname(&master, Vec::new())?.to_string_lossy().into_owned());
-        // A side that stays open here keeps the terminal alive between two hosts, and raw from the start.
+        // The slave side stays open here: it keeps the terminal usable between two hosts and in raw mode from the
+        // start.
         let slave = File::options().read(true).write(true).open(&path)?;
         let mut settings = tcgetattr(&slave)?;
         settings.make_raw();
@@ -53,7 +54,7 @@ impl PseudoTerminal {
         Ok(PseudoTerminal { path, stop, thread: Some(thread) })
     }
 
-    /// The port for the host.
+    /// Path of the port for the host.
     pub fn path(&self) -> &Path {
         &self.path
     }
@@ -74,7 +75,7 @@ impl Drop for PseudoTerminal {
     fn drop(&mut self) {
         self.stop.store(true, Ordering::Relaxed);
         if let Some(thread) = self.thread.take() {
-            // What the thread ends with concerns nobody any more.
+            // Nobody is left to report an error to.
             let _ = thread.join();
         }
     }
@@ -110,7 +111,7 @@ fn run(
     Ok(uart)
 }
 
-/// Writes everything; a host that does not read makes the board wait, as no real one would, but loses nothing.
+/// Writes all bytes. A host that does not read blocks the simulated board, unlike a real one, and no byte is lost.
 fn write(master: &mut File, mut bytes: &[u8], stop: &AtomicBool) -> io::Result<()> {
     while !bytes.is_empty() && !stop.load(Ordering::Relaxed) {
         match master.write(bytes) {

@@ -1,24 +1,24 @@
-//! The input side of the bench: offers codes, and decides in which cycles each side is willing.
+//! Input side of the test bench: offers codes, and generates the stalls of both sides.
 
 use dermis_hdl::device::Inputs;
 
 use super::recording::{InputFrame, Times};
 use super::Stimulus;
 
-/// One of so many cycles starts a long pause of the receiver, which fills every buffer behind it.
+/// The receiver starts a long pause, which fills every buffer, once in so many cycles on average.
 const LONG_PAUSE_EVERY: u32 = 64;
-/// Length of a long pause.
+/// Length of a long pause in cycles.
 const LONG_PAUSE_CYCLES: u32 = 40;
 
-/// Offers the codes.
+/// Offers codes to the device.
 pub(super) struct Sender<'a> {
     /// All frames to send.
     pub(super) frames: &'a [InputFrame<'a>],
-    /// The frame being sent; their number when all are.
+    /// Index of the frame being sent; the number of frames once all are sent.
     pub(super) frame: usize,
-    /// Its next taxel.
+    /// Index of its next code.
     pub(super) taxel: usize,
-    /// A beat is offered and not taken yet.
+    /// Whether a code is offered and not accepted yet.
     offering: bool,
 }
 
@@ -52,7 +52,7 @@ impl<'a> Sender<'a> {
     }
 }
 
-/// When the two sides of the bench are willing.
+/// Decides in which cycles the sender starts to offer a code and the receiver is ready.
 pub(super) struct StallGenerator {
     random: Option<fastrand::Rng>,
     pause: u32,

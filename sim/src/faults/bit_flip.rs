@@ -1,4 +1,4 @@
-//! A device in which a bit flips.
+//! A device that flips one of its bits at a given cycle.
 
 use dermis_hdl::device::{Device, Inputs, Outputs};
 
@@ -13,7 +13,7 @@ pub(super) struct StateBit<'a> {
     pub(super) bit: usize,
 }
 
-/// Flips its bit once, in the cycle `at` after the first one without reset.
+/// Wraps a device and flips `bit` once, in cycle `flip_cycle` counted from the first cycle without reset.
 pub(super) struct FaultInjector<'a> {
     device: &'a mut Verilated,
     bit: StateBit<'a>,
@@ -22,7 +22,7 @@ pub(super) struct FaultInjector<'a> {
 }
 
 impl<'a> FaultInjector<'a> {
-    /// A bit of a word of a place.
+    /// A device whose `bit` flips in cycle `flip_cycle`.
     pub(super) fn new(device: &'a mut Verilated, bit: StateBit<'a>, flip_cycle: u64) -> Self {
         FaultInjector { device, bit, flip_cycle, cycle: 0 }
     }

@@ -1,24 +1,25 @@
-//! What a reader of the output stream could have noticed.
+//! Classifies a fault by what a receiver of the output stream can notice.
 
 use dermis_golden::fixed::send::{Status, FLAG_COEFFICIENTS, FLAG_CONDITION, FLAG_FOUND, FLAG_FRAMING, STATUS_BEATS};
 
 use crate::drive::{Beat, Recording};
 use crate::stress::Sample;
 
-/// What came of a fault.
+/// Effect of a fault.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Outcome {
     /// Every beat is right.
     Harmless,
-    /// Something is wrong and the device tells.
+    /// A beat is wrong and the device reports it.
     Detected,
-    /// No end of a frame.
+    /// Beats are missing.
     Hang,
-    /// Something is wrong and nothing tells: the largest force error against the frame's largest force.
+    /// A beat is wrong and the device reports nothing; the largest force error relative to the frame's largest
+    /// component.
     Silent(f64),
 }
 
-/// Judges what left for these frames.
+/// Classifies the output recorded for these samples.
 pub(super) fn classify(recording: &Recording, samples: &[&Sample]) -> Outcome {
     let beats = &recording.beats;
     let ends: Vec<usize> = samples
@@ -31,7 +32,7 @@ pub(super) fn classify(recording: &Recording, samples: &[&Sample]) -> Outcome {
     let all = ends.last().copied().unwrap_or(0);
     let wrong_last = beats.iter().enumerate().any(|(index, beat)| beat.last != ends.contains(&(index + 1)));
     match (wrong_last || beats.len() > all, beats.len() < all) {
-        // A frame of another length than it must be: whoever counts beats sees it.
+        // A frame of the wrong length: a receiver that counts beats notices.
         (true, _) => return Outcome::Detected,
         (false, true) => return Outcome::Hang,
         (false, false) => {}
@@ -52,7 +53,7 @@ pub(super) fn classify(recording: &Recording, samples: &[&Sample]) -> Outcome {
     }
 }
 
-/// Largest difference of a component against the frame's largest component.
+/// Largest difference of a component, relative to the frame's largest component.
 fn force_error(got: &[Beat], wanted: &[[i32; 3]]) -> f64 {
     let difference = |(got, wanted): (i32, i32)| (f64::from(got) - f64::from(wanted)).abs();
     let pairs = got.iter().zip(wanted).flat_map(|(got, wanted)| got.data.into_iter().zip(*wanted));
@@ -60,7 +61,7 @@ fn force_error(got: &[Beat], wanted: &[[i32; 3]]) -> f64 {
     pairs.map(difference).fold(0.0, f64::max) / largest.max(1.0)
 }
 
-/// Whether a status says that its frame is not to be trusted, where the model's does not.
+/// Whether a status reports an error that the model's status does not report.
 fn reports_error(got: &[Beat], wanted: &[[i32; 3]]) -> bool {
     let got: Vec<[i32; 3]> = got.iter().map(|beat| beat.data).collect();
     got.chunks(STATUS_BEATS).zip(wanted.chunks(STATUS_BEATS)).any(|(got, wanted)| {
@@ -69,7 +70,7 @@ fn reports_error(got: &[Beat], wanted: &[[i32; 3]]) -> bool {
     })
 }
 
-/// The flags of framing and coefficients, saturations, a search without result.
+/// Error indications of a status: framing flag, coefficient flag, saturations, search without result.
 fn error_flags(status: &Status) -> [bool; 4] {
     let flag = |bit: u32| status.flags & bit != 0;
     let saturated = status.rescale_saturations + status.force_saturations > 0;

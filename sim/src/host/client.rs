@@ -1,4 +1,4 @@
-//! Requests and answers over a port, whatever gets lost on the way.
+//! Requests and answers over a port, with repetition after lost or damaged packets.
 
 use std::io::{ErrorKind, Read, Write};
 use std::time::{Duration, Instant};
@@ -8,49 +8,49 @@ use dermis_golden::link::{codes_to_bytes, Counters, Decoder, Identity, Kind, Pac
 
 use super::{Answer, HostError};
 
-/// How often a request is sent before it is given up.
+/// Number of times a request is sent before it fails.
 const ATTEMPTS: u32 = 8;
 
-/// What went wrong on the way and was mended.
+/// Transmission errors that were corrected by repetition.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct LinkErrors {
-    /// Requests sent again.
+    /// Number of requests sent again.
     pub repeated: u64,
-    /// Answers, or pieces of them, that did not pass their check.
+    /// Number of answers, or fragments of them, that failed their check.
     pub damaged: u64,
 }
 
-/// A board behind a port, whose reads return after a few milliseconds without a byte.
+/// A board behind a port. Reads of the port must time out after a few milliseconds.
 pub struct Client<P> {
     port: P,
     name: String,
     timeout: Duration,
     decoder: Decoder,
     sequence: u8,
-    /// What went wrong so far.
+    /// Transmission errors so far.
     pub link_errors: LinkErrors,
 }
 
 impl<P: Read + Write> Client<P> {
-    /// A board behind `port`, called `name` in messages; after `timeout` of silence a request is sent again.
+    /// A board behind `port`, named `name` in messages; requests are repeated after `timeout` without an answer.
     pub fn new(port: P, name: &str, timeout: Duration) -> Self {
         let (decoder, link_errors) = (Decoder::default(), LinkErrors::default());
         Client { port, name: name.to_owned(), timeout, decoder, sequence: 0, link_errors }
     }
 
-    /// Asks the board who it is, and whether it is made for `model`.
+    /// Reads the board's identification and checks that it was built for `model`.
     ///
     /// # Errors
     /// No answer, another version, another scene.
     pub fn identify(&mut self, model: &Model) -> Result<Identity, HostError> {
         let bytes = self.request(Kind::Identify, Vec::new())?;
         let port = || self.name.clone();
-        // The version comes first in every version.
+        // All versions of the packets start with the version.
         let has = bytes.first_chunk().map(|version| u16::from_le_bytes(*version));
         if let Some(has) = has.filter(|&has| has != VERSION) {
             return Err(HostError::Version { port: port(), has, wants: VERSION });
         }
-        let wrong = HostError::Answer { port: port(), what: "an identity", bytes: bytes.len() };
+        let wrong = HostError::Answer { port: port(), what: "identity", bytes: bytes.len() };
         let has = Identity::of_bytes(&bytes).ok_or(wrong)?;
         let sensor = &model.scene.sensor;
         let wants = dermis_golden::link::scene_hash(model);
@@ -68,7 +68,7 @@ impl<P: Read + Write> Client<P> {
         })
     }
 
-    /// Reads the counters of packets.
+    /// Reads the board's packet counters.
     ///
     /// # Errors
     /// No answer.
@@ -78,7 +78,7 @@ impl<P: Read + Write> Client<P> {
         Counters::of_bytes(&bytes).ok_or(wrong)
     }
 
-    /// Sends a frame and waits for its forces, or its resultants.
+    /// Sends a frame and waits for its forces or resultants.
     ///
     /// # Errors
     /// No answer.
@@ -89,12 +89,12 @@ impl<P: Read + Write> Client<P> {
         Answer::of_bytes(model, &bytes, forces).ok_or(wrong)
     }
 
-    /// Sends a request until it is answered.
+    /// Sends a request, repeatedly if necessary, until it is answered.
     fn request(&mut self, kind: Kind, payload: Vec<u8>) -> Result<Vec<u8>, HostError> {
         let mut packet = Packet { kind, sequence: self.sequence, payload };
         for attempt in 0..ATTEMPTS {
             self.link_errors.repeated += u64::from(attempt > 0);
-            // A late answer to an earlier attempt is then none to this one.
+            // A new number per attempt, so that a late answer to an earlier attempt is not taken for this one's.
             self.sequence = self.sequence.wrapping_add(1);
             packet.sequence = self.sequence;
             self.port.write_all(&packet.to_wire()).map_err(|error| self.port_error(&error))?;
@@ -107,7 +107,7 @@ impl<P: Read + Write> Client<P> {
         Err(HostError::NoAnswer { port: self.name.clone(), what: kind.name(), attempts: ATTEMPTS, milliseconds })
     }
 
-    /// The answer's payload; nothing after silence, or where the answer is damaged.
+    /// The answer's payload; `None` after the timeout or a damaged answer.
     fn wait(&mut self, kind: Kind) -> Result<Option<Vec<u8>>, HostError> {
         let mut buffer = [0; 4096];
         let mut last_heard = Instant::now();
@@ -127,7 +127,7 @@ impl<P: Read + Write> Client<P> {
                     Some(Ok(packet)) if packet.kind == kind && packet.sequence == self.sequence => {
                         return Ok(Some(packet.payload));
                     }
-                    // An answer that was given up.
+                    // A late answer to an earlier attempt.
                     Some(Ok(_)) | None => (),
                     Some(Err(_)) => {
                         self.link_errors.damaged += 1;

@@ -1,4 +1,4 @@
-//! Frames and answers as lines of JSON.
+//! `dermis host --stream`: frames and answers as lines of JSON.
 
 use std::io::{BufRead, ErrorKind, Read, Write};
 use std::time::{SystemTime, UNIX_EPOCH};
@@ -10,10 +10,10 @@ use serde_json::Value;
 
 use super::{FramesSent, HostError, PhysicalAnswer, Session};
 
-/// Longest line in bytes; 65536 taxels of 25 characters take 1.6 MB.
+/// Longest input line in bytes; 65536 taxels of 25 characters take 1.6 MB.
 const LONGEST_LINE: u64 = 4 << 20;
 
-/// A line that comes in.
+/// An input line.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Request {
@@ -22,7 +22,7 @@ struct Request {
     stress_MPa: Vec<f64>,
 }
 
-/// A line that goes out.
+/// An output line with an answer.
 #[derive(Serialize)]
 struct Reply {
     id: Value,
@@ -33,7 +33,7 @@ struct Reply {
     answer: PhysicalAnswer,
 }
 
-/// A line that goes out in place of an answer.
+/// An output line for an input line that was refused.
 #[derive(Serialize)]
 struct Refusal {
     id: Value,
@@ -41,7 +41,7 @@ struct Refusal {
     error: String,
 }
 
-/// Answers every line of `input`; a wrong one is answered with its error, and the next one is read.
+/// Answers every line of `input`; an invalid line is answered with its error.
 ///
 /// # Errors
 /// A board that does not answer, streams that fail.
@@ -53,7 +53,7 @@ pub(super) fn run<P: Read + Write>(
     let mut sent = FramesSent { text: String::new(), equal: true, answered: 0, refused: 0 };
     for index in 0.. {
         let mut line = String::new();
-        // A line without end must not fill the memory.
+        // Bounded, so that an endless line cannot exhaust the memory.
         let read = (&mut *input).take(LONGEST_LINE + 1).read_line(&mut line);
         match read.map_err(|error| anyhow!("standard input, line {}: {error}", index + 1))? {
             0 => break,
@@ -69,7 +69,7 @@ pub(super) fn run<P: Read + Write>(
                 sent.answered += 1;
                 serde_json::to_string(&reply)?
             }
-            // Without a board there is nothing to go on with.
+            // Without a working board no further line can be answered.
             Err((_, error)) if error.is::<HostError>() => return Err(error),
             Err((id, error)) => {
                 sent.refused += 1;
@@ -89,7 +89,7 @@ fn seconds(time: SystemTime) -> f64 {
     time.duration_since(UNIX_EPOCH).map_or(0.0, |since| since.as_secs_f64())
 }
 
-/// The answer to one line, or what is wrong with it under the id it has.
+/// The answer to one line, or its id (null if it cannot be parsed) with the error.
 fn answer<P: Read + Write>(session: &mut Session<P>, line: &str) -> Result<Reply, (Value, anyhow::Error)> {
     let request: Request = serde_json::from_str(line).map_err(|error| (Value::Null, error.into()))?;
     let id = request.id.clone();

@@ -1,4 +1,4 @@
-//! A placed and routed scene as a line of the README's table, and as JSON.
+//! Result of `dermis bitstream`, as a row of the README's table and as JSON.
 
 use std::path::PathBuf;
 
@@ -11,38 +11,38 @@ use crate::bitstream::baseline::Baseline;
 use crate::bitstream::dsp_register_packing::PackedRegisters;
 use crate::bitstream::timing::Fmax;
 
-/// What `dermis bitstream` reached.
+/// Result of `dermis bitstream`.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct BitstreamReport {
     /// Scene name.
     pub scene: String,
     /// Board name.
     pub board: String,
-    /// Cells, and the clocks of all seeds.
+    /// Cells of the best seed and clocks of all seeds.
     #[serde(flatten)]
     pub achieved: Baseline,
-    /// Clock of the board.
+    /// Required clock, from the board's file, in MHz.
     pub clock_MHz: f64,
-    /// From the first input beat to the last output beat of the engine.
+    /// Cycles from the engine's first input beat to its last output beat.
     pub cycles: u64,
-    /// The same at the board's clock.
+    /// Time of these cycles at the board's clock.
     pub time_us: f64,
-    /// What that leaves of [`BUDGET_US`].
+    /// [`BUDGET_US`] minus that time.
     pub margin_us: f64,
-    /// Registers that went into multipliers: operands, products.
+    /// Number of operands and of products whose registers were moved into multipliers.
     #[serde(rename = "absorbed")]
     pub packed_registers: [usize; 2],
-    /// The clock that comes with the link, and its pin, where there is report.
+    /// The link's own clock with its pin, if the link has one.
     pub link_clock: Option<(&'static str, Fmax)>,
-    /// The bitstream; none when a clock is missed.
+    /// Path of the bitstream; none if a clock is missed.
     pub bitstream: Option<PathBuf>,
-    /// What is missed or worse than the baseline.
+    /// Missed clocks and regressions against the baseline.
     #[serde(rename = "lost")]
     pub failures: Vec<String>,
 }
 
 impl BitstreamReport {
-    /// Sums up what was `reached`.
+    /// Summary of a run of place and route.
     pub fn new(
         model: &Model,
         achieved: Baseline,
@@ -68,13 +68,13 @@ impl BitstreamReport {
         }
     }
 
-    /// Whether the clock is met and nothing got worse.
+    /// Whether the clocks are met without a regression.
     pub fn is_good(&self) -> bool {
         self.failures.is_empty()
     }
 }
 
-/// The table's line and what follows from it.
+/// The row of the table, and details below it.
 pub fn bitstream(report: &BitstreamReport) -> String {
     let Baseline { luts, flip_flops, multipliers, block_rams, best_MHz, median_MHz, worst_MHz, seeds } =
         report.achieved;
@@ -114,14 +114,14 @@ pub fn bitstream(report: &BitstreamReport) -> String {
     let [operands, products] = report.packed_registers;
     text.push_str(&format!("registers moved into multipliers: {operands} operands, {products} products\n"));
     if let Some((pin, clock)) = &report.link_clock {
-        text.push_str(&format!("{pin}: {:.1} MHz, meant for {} MHz\n", clock.achieved, clock.constraint));
+        text.push_str(&format!("{pin}: {:.1} MHz, required {} MHz\n", clock.achieved, clock.constraint));
     }
     match &report.bitstream {
         Some(path) => text.push_str(&format!("{}\n", path.display())),
         None => text.push_str("no bitstream: a clock is missed\n"),
     }
     for failure in &report.failures {
-        text.push_str(&format!("worse: {failure}\n"));
+        text.push_str(&format!("failed: {failure}\n"));
     }
     text
 }

@@ -10,10 +10,10 @@ use super::Format;
 use crate::compare::{median, quantile};
 use crate::tabulate::ErrorRow;
 
-/// Lines in one form. Fractions in CSV and JSON, percent in Markdown.
+/// The rows in one format: fractions in CSV and JSON, percent in Markdown.
 ///
 /// # Errors
-/// A number JSON cannot hold.
+/// A number that JSON cannot represent.
 pub fn errors(rows: &[ErrorRow], format: Format) -> Result<String> {
     Ok(match format {
         Format::Json => serde_json::to_string(&Document { rows, medians: medians(rows) })? + "\n",
@@ -30,7 +30,7 @@ struct Document<'a> {
     medians: Vec<Medians>,
 }
 
-/// One scene and case over its frames; axes by size, as signs cancel.
+/// Medians of one scene and case over its frames; errors of axes by magnitude, as signs would cancel.
 #[derive(Serialize)]
 struct Medians {
     scene: String,
@@ -163,8 +163,8 @@ fn text(rows: &[ErrorRow]) -> String {
         row
     });
     format!(
-        "{}\nMedians over the frames, and what nine of ten do not exceed; several: frames of several contacts, and \
-         with case contacts each contact's own shear. The paper's sensors 3 and 4 are against case 0.\n\n{}",
+        "{}\nMedians over the frames, and 90 % quantiles (90 %). several: frames with several contacts; own e_t: shear \
+         error of each contact, case contacts only. The paper's figures of sensors 3 and 4 are relative to case 0.\n\n{}",
         markdown(&head, body.collect()),
         markdown(
             &head_of_medians.map(|name| name.replace('|', "\\|")).each_ref().map(String::as_str),
@@ -224,7 +224,7 @@ mod tests {
         SubarrayRow { mu, both_signs, condition: true }
     }
 
-    /// One line with every field and a name that CSV must quote, one with next to none.
+    /// One row with every field and a name that CSV must quote, one with as few fields as possible.
     fn rows() -> Vec<ErrorRow> {
         let error =
             Errors { x1: Some(-0.1), x2: None, x3: Some(1.0 / 3.0), tangential: Some(0.25), normal: Some(1.0 / 3.0) };
@@ -265,7 +265,7 @@ mod tests {
     }
 
     #[test]
-    fn csv_comes_back() {
+    fn csv_reads_back() {
         let rows = rows();
         let (head, records) = csv_reader::csv(&errors(&rows, Format::Csv).unwrap());
         assert_eq!((head.len(), records.len()), (30, 2));
@@ -289,7 +289,7 @@ mod tests {
             ("paper_x3", 0.0754),
         ];
         for (name, wanted) in numbers {
-            // The shortest text that reads back as the same number.
+            // Numbers are written so that they read back exactly.
             assert_eq!(of(0, name).parse::<f64>().unwrap(), wanted, "{name}");
             assert_eq!(of(1, name), "", "{name}");
         }
@@ -301,7 +301,7 @@ mod tests {
     }
 
     #[test]
-    fn json_comes_back() {
+    fn json_reads_back() {
         let rows = rows();
         let text = errors(&rows, Format::Json).unwrap();
         let read: Value = serde_json::from_str(&text).unwrap();
@@ -318,14 +318,14 @@ mod tests {
         }
         let medians = read["medians"].as_array().unwrap();
         assert_eq!(medians.len(), 2);
-        // By size: the sign of X1 is gone.
+        // By magnitude: without the sign of X1.
         assert_eq!((&medians[0]["axes"][0], &medians[0]["frames"]), (&Value::from(0.1), &Value::from(1)));
         assert_eq!((&medians[0]["of_all_ninety"], &medians[0]["own"]), (&Value::from(0.0625), &Value::from(0.75)));
         assert_eq!(medians[1]["tangential"], Value::Null);
     }
 
     #[test]
-    fn no_lines_are_a_head_alone() {
+    fn without_rows_only_the_header_remains() {
         let (head, records) = csv_reader::csv(&errors(&[], Format::Csv).unwrap());
         assert_eq!((head.len(), records.len()), (30, 0));
         assert_eq!(errors(&[], Format::Json).unwrap(), "{\"lines\":[],\"medians\":[]}\n");

@@ -1,4 +1,4 @@
-//! The extreme frames of `dermis stability --extreme` as Markdown, CSV and JSON, and for the report.
+//! Results on extreme frames, for `dermis stability --extreme` (Markdown, CSV, JSON) and for the report.
 
 use anyhow::Result;
 use dermis_golden::flags::Flag;
@@ -10,18 +10,18 @@ use super::data::markdown;
 use super::document::{percent, text_cell, Table};
 use super::Format;
 
-/// First line of the CSV.
+/// Header of the CSV.
 const HEAD: &str = "scene,frame,golden_x,golden_y,golden_n,golden_flags,fixed_x,fixed_y,fixed_n,fixed_flags,status,\
                     refused\n";
 
-/// What the columns are.
+/// Explanation of the columns.
 const LEGEND: &str =
-    "Forces in N, x, y, normal; e_t, e_n: against the whole load; status: the flags of the hardware's own status words";
+    "Resultants in N: x, y, normal; e_t, e_n: errors relative to the total load; status: flags of the status beats";
 
-/// The extreme frames of scenes, one table each.
+/// The extreme frames of several scenes, one table per scene.
 ///
 /// # Errors
-/// A number JSON cannot hold.
+/// A number that JSON cannot represent.
 pub fn extremes(all: &[(String, Vec<Row>)], format: Format) -> Result<String> {
     let mut text = String::new();
     match format {
@@ -101,7 +101,7 @@ mod tests {
     use dermis_golden::stability::extreme::{frames, outcome};
 
     #[test]
-    fn extremes_in_every_form() {
+    fn extremes_in_every_format() {
         let scene = Scene::builtin("eight-by-eight").unwrap();
         let rows: Vec<_> = frames(&scene).unwrap().iter().take(2).map(|e| outcome(e).unwrap()).collect();
         let all = vec![("eight-by-eight".to_owned(), rows)];

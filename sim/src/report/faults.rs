@@ -4,7 +4,7 @@ use super::table::{aligned, percent};
 use crate::faults::state_bits::CLASSES;
 use crate::faults::{Row, Shares, LARGE};
 
-/// One line per class and stage; then the classes' shares, in which each stage counts by its bits.
+/// One row per storage class and stage; then the shares of each class, with its stages weighted by their bits.
 pub fn faults(rows: &[Row]) -> String {
     let head = [
         "class",
@@ -40,7 +40,8 @@ pub fn faults(rows: &[Row]) -> String {
     };
     let mut text = aligned(2, &head, rows.iter().map(line).collect());
     text.push_str(&format!(
-        "silent above: with a force error above {} of the frame's largest force; hang: no answer until the reset;\n\
+        "bits: state bits of the stage; different: different bits flipped; hang: beats missing until the reset;\n\
+         silent above: silent, with a force error above {} of the frame's largest force;\n\
          not recovered: the frame after the reset is wrong\n\n",
         percent(Some(LARGE))
     ));

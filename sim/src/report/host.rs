@@ -1,4 +1,4 @@
-//! A board's answers for people.
+//! A board's answers as text.
 
 use dermis_golden::fixed::Model;
 use dermis_golden::link::{payloads, takes, Kind, LinkKind};
@@ -6,7 +6,7 @@ use dermis_golden::link::{payloads, takes, Kind, LinkKind};
 use super::table::significant_digits;
 use crate::host::{Answer, PhysicalAnswer};
 
-/// One frame's resultants.
+/// The resultants of one frame.
 pub fn resultants(frame: &str, physical: &PhysicalAnswer, answer: &Answer) -> String {
     let largest = physical.resultant_N.iter().fold(0.0, |m: f64, x| m.max(x.abs()));
     let sign = |x: f64| if x.is_sign_negative() { "" } else { "+" };
@@ -22,7 +22,7 @@ pub fn resultants(frame: &str, physical: &PhysicalAnswer, answer: &Answer) -> St
     )
 }
 
-/// Whether an answer is the bit-true model's, where that was asked for, and whether packets were dropped before it.
+/// Whether an answer equals the bit-true model's, if compared, and whether the board has dropped a packet before it.
 pub fn equality(answer: &Answer) -> String {
     let checked = match &answer.difference {
         None => String::new(),
@@ -34,7 +34,7 @@ pub fn equality(answer: &Answer) -> String {
     checked + dropped
 }
 
-/// How long a frame's packets take on each of the links that the board has.
+/// Transfer times of a frame's packets on each link that the board supports.
 pub fn wire_times(model: &Model) -> String {
     let sums = takes(model.board.engine, Kind::FrameForResultants);
     let sent = || payloads(model).into_iter().filter(|(what, _)| sums || *what != Kind::Resultants.name());

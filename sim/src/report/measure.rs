@@ -1,4 +1,4 @@
-//! Measure: scenes in cases, all engines on the same frames, errors and times of one run.
+//! Measurements of the report: all engines on the same frames of each scene and case, their errors and times.
 //!
 //! ```text
 //! scene × case ─┬─ literal baseline, CPU ─┐
@@ -7,8 +7,8 @@
 //!               └─ hardware: co-simulation ── cycles / clock
 //! ```
 //!
-//! First everything is prepared and compared, several cases at a time; then the engines on the CPU are timed one after
-//! the other, with nothing beside them.
+//! First all results are computed and compared, several cases in parallel; then the CPU engines are timed one after the
+//! other, with no other work in parallel.
 
 mod clock;
 mod formats;
@@ -48,30 +48,31 @@ use crate::jobs::{parallel, Interrupt};
 use crate::progress::Progress;
 use crate::verify::verify;
 
-/// Taxels of a subarray from which the quick variant leaves a case out.
+/// Largest subarray, in taxels, of the cases measured by the quick variant.
 const QUICK_TAXELS: usize = 1200;
-/// Taxels of a subarray from which the quick variant leaves the literal baseline out: seconds a frame.
+/// Largest subarray, in taxels, for which the quick variant runs the literal baseline, which takes seconds per frame
+/// beyond.
 const QUICK_LITERAL: usize = 200;
 
-/// What to measure.
+/// Options of a measurement.
 #[derive(Clone, Debug)]
 pub struct Options {
-    /// Two co-simulations, fewer drawn frames and sweeps, no case of more than 1200 taxels in a subarray, the literal
-    /// baseline up to 200.
+    /// Quick variant: two co-simulations, fewer drawn frames and sweeps, subarrays of at most 1200 taxels, literal
+    /// baseline up to 200 taxels.
     pub quick: bool,
-    /// Cases prepared at a time.
+    /// Number of cases prepared in parallel.
     pub jobs: usize,
-    /// Folder for everything built on the way.
+    /// Folder for build products and caches.
     pub build: PathBuf,
-    /// When a subarray is searched.
+    /// Condition under which a subarray is searched.
     pub condition: Condition,
-    /// Whether hardware is co-simulated at all; the bit-true model's cycles take its place.
+    /// Whether hardware is co-simulated; otherwise the bit-true model's cycle counts are used.
     pub simulate: bool,
-    /// Set when the user has had enough.
+    /// Set by SIGINT or SIGTERM.
     pub interrupt: Interrupt,
 }
 
-/// What computes.
+/// An implementation of the reconstruction.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Engine {
     /// Eq. 1 with dense matrices and a simplex search, on the CPU.
@@ -85,7 +86,7 @@ pub enum Engine {
 }
 
 impl Engine {
-    /// All, in the order of tables.
+    /// All engines, in the order of tables.
     pub const ALL: [Engine; 4] = [Engine::Baseline, Engine::Golden, Engine::Fixed, Engine::Hardware];
 
     /// Name in tables and legends.
@@ -99,53 +100,54 @@ impl Engine {
     }
 }
 
-/// The bit-true side of a case.
+/// Results of the bit-true model, and of the hardware, for a case.
 #[derive(Debug)]
 pub struct BitTrue {
     /// The model.
     pub model: Model,
     /// Its result for every frame.
     pub results: Vec<Reconstruction>,
-    /// What its stages passed on, for every frame.
+    /// The outputs of its stages, for every frame.
     pub traces: Vec<Trace>,
-    /// Whether the Verilated hardware equalled it in every bit and cycle; `None` where it was not simulated.
+    /// Whether the verilated hardware equalled it in every bit and cycle; `None` if not simulated.
     pub equal: Option<bool>,
-    /// From the first input beat to the last output beat, slowest frame: of the co-simulation, else of the model.
+    /// Cycles from the first input beat to the last output beat of the slowest frame, co-simulated if possible, else
+    /// from the model.
     pub cycles: u64,
-    /// What the stages take of the board.
+    /// Resources of each stage.
     pub usage: BTreeMap<String, Usage>,
 }
 
-/// A scene in one case on its frames.
+/// Measurements of a scene in one case.
 pub struct Measured {
-    /// The scene, its case among its fields.
+    /// The scene, with the case in its fields.
     pub scene: Scene,
     /// The frames, at least one.
     pub frames: Vec<Frame>,
-    /// The floating-point model, for pictures that need its matrices.
+    /// The floating-point model.
     pub engine: Golden,
     /// Its result for every frame.
     pub golden: Vec<Reconstruction>,
-    /// The bit-true model and the hardware, or why there is none.
+    /// Results of the bit-true model and the hardware, or the reason why there is no hardware.
     pub bit_true: Result<BitTrue, String>,
-    /// The literal baseline's forces for every frame, or why there are none.
+    /// The literal baseline's forces for every frame, or the reason why it was not run.
     pub baseline: Result<Vec<Forces>, String>,
-    /// Times of a frame on the CPU.
+    /// Times per frame on the CPU.
     pub times: BTreeMap<Engine, Timing>,
     literal: Option<Baseline>,
 }
 
-/// How many contacts a frame has.
+/// Whether a frame has one contact or several.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ContactCount {
-    /// One, or none that is described.
+    /// One contact, or none described.
     One,
-    /// Several, which may be sheared each its own way.
+    /// Several contacts, whose shears may differ.
     Several,
 }
 
 impl ContactCount {
-    /// Of a frame.
+    /// The contact count of a frame.
     pub fn of(frame: &Frame) -> ContactCount {
         if frame.contacts.len() > 1 {
             ContactCount::Several
@@ -163,25 +165,25 @@ impl ContactCount {
     }
 }
 
-/// An engine's errors and time on one scene in one case.
+/// Errors and time of an engine on one scene and case.
 #[derive(Clone, Debug)]
 pub struct Point {
     /// Scene name.
     pub scene: String,
     /// The case.
     pub case: Case,
-    /// What computed.
+    /// The engine.
     pub engine: Engine,
     /// Tangential error of the resultant, median over the frames.
     pub tangential: Option<f64>,
     /// Normal error of the resultant, median over the frames.
     pub normal: Option<f64>,
-    /// Time of a frame in s.
+    /// Time per frame in s.
     pub seconds: f64,
 }
 
 impl Measured {
-    /// Errors of an engine's resultants.
+    /// Errors of an engine's resultants, one per frame.
     pub fn errors(&self, engine: Engine) -> Vec<Option<Errors>> {
         let own = |forces: &Vec<Forces>| {
             let pairs = self.frames.iter().zip(forces);
@@ -195,12 +197,12 @@ impl Measured {
         }
     }
 
-    /// The engine's point, `None` where it does not have the case.
+    /// Errors and time of an engine; `None` if it does not support the case.
     pub fn point(&self, engine: Engine) -> Option<Point> {
         self.point_over(engine, |_| true)
     }
 
-    /// The same over some of the frames.
+    /// The same over the frames selected by `keep`.
     pub fn point_over(&self, engine: Engine, keep: impl Fn(&Frame) -> bool) -> Option<Point> {
         let seconds = match engine {
             Engine::Hardware => {
@@ -222,17 +224,16 @@ impl Measured {
         })
     }
 
-    /// Index of the frame called `id`, else 0.
+    /// Index of the frame with the id `id`, else 0.
     pub fn frame(&self, id: &str) -> usize {
         self.frames.iter().position(|frame| frame.id == id).unwrap_or(0)
     }
 }
 
-/// Measures scenes in cases on their shipped frames, in the order given; a case that does not divide an array is left
-/// out.
+/// Measures scenes in cases on their shipped frames, in the order given; cases that do not divide an array are skipped.
 ///
 /// # Errors
-/// A scene the golden model refuses or without shipped frames, no Verilator, an interruption.
+/// A scene that the golden model refuses or that has no shipped frames, no Verilator, an interruption.
 pub fn measure(scenes: &[Scene], cases: &[Case], options: &Options) -> Result<Vec<Measured>> {
     let mut tasks = Vec::new();
     for scene in scenes {
@@ -244,7 +245,7 @@ pub fn measure(scenes: &[Scene], cases: &[Case], options: &Options) -> Result<Ve
             let mut scene = scene.clone();
             (scene.partition.case, scene.partition.condition) = (case, options.condition);
             let largest = match case {
-                // One μ per contact over the whole array; a single contact's is that of case 0.
+                // One μ per contact over the whole array; equal to case 0 for a single contact.
                 Case::Contacts if !frames.iter().any(|frame| ContactCount::of(frame) == ContactCount::Several) => None,
                 Case::Contacts | Case::Adaptive => Some(scene.sensor.taxels()),
                 Case::Grid(_) => subarrays(case, &scene.sensor).ok().map(|parts| parts[0].rows * parts[0].cols),

@@ -1,4 +1,4 @@
-//! One reconstruction for people: resultant, error, μ per subarray, flags, and a picture of fz.
+//! One reconstruction as text: resultant, error, μ per subarray, flags, and a character map of fz.
 
 use std::fmt::Write as _;
 
@@ -8,12 +8,12 @@ use dermis_golden::sensor::Sensor;
 use super::table::{percent, significant_digits};
 use crate::compare::Difference;
 
-/// Shades from no force to the largest.
+/// Characters from zero to the largest force.
 const SHADES: [char; 8] = [' ', '.', ':', '-', '=', '+', '*', '#'];
-/// Widest picture in characters; a wider array is shown by the largest force of each group of taxels.
+/// Largest width of the map in characters; for wider arrays a character shows the largest force of a group of taxels.
 const PICTURE_COLUMNS: usize = 60;
 
-/// The summary of one result. `full_scale_MPa` is what the largest input code stood for.
+/// Summary of one result. `full_scale_MPa` is the stress of the largest input code.
 pub fn reconstruction(result: &Reconstruction, sensor: &Sensor, full_scale_MPa: f64) -> String {
     let mut text = String::new();
     // Writing to a String cannot fail.
@@ -55,7 +55,7 @@ fn lines(text: &mut String, result: &Reconstruction, full_scale_MPa: f64) -> std
     writeln!(text, "flags           {}", if flags.is_empty() { "none".to_owned() } else { flags.join(", ") })
 }
 
-/// One line for a result's distance from the golden model's.
+/// One line with the difference of a result from the golden model's.
 pub fn difference(d: &Difference) -> String {
     format!(
         "against golden  at most {:.0} LSB = {} of the largest force, RMS {:.0} LSB = {}\n",
@@ -66,7 +66,7 @@ pub fn difference(d: &Difference) -> String {
     )
 }
 
-/// fz as shades, row 0 on top, two characters per taxel where they fit.
+/// fz as a character map, row 0 on top, two characters per taxel if they fit.
 fn picture(text: &mut String, sensor: &Sensor, fz: &[f64]) {
     let peak = fz.iter().fold(0.0, |m: f64, v| m.max(v.abs()));
     if peak == 0.0 {

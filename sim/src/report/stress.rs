@@ -3,7 +3,7 @@
 use super::table::aligned;
 use crate::stress::Outcome;
 
-/// One line per experiment, and what was violated below.
+/// One row per experiment, and the violations below.
 pub fn stress(outcomes: &[Outcome]) -> String {
     let head = [
         "scene",

@@ -1,13 +1,13 @@
-//! Style: roles of colour in pictures, and what they are on light and dark pages.
+//! Colours of pictures, by role, on light and dark pages.
 //!
-//! A picture is drawn in stand-in colours, one per role. In a page they become CSS variables, which follow the
-//! reader's choice of light or dark; in a file of its own they become the light page's colours on white.
+//! Pictures are drawn in placeholder colours, one per role. In the HTML page these are replaced by CSS variables, which
+//! follow the reader's light or dark theme; in SVG files they are replaced by the light theme's colours on white.
 
 use plotters::style::RGBColor;
 
 /// Text and axes.
 pub const INK: RGBColor = RGBColor(1, 1, 1);
-/// Lines that only guide the eye.
+/// Grid lines.
 pub const GRID: RGBColor = RGBColor(2, 2, 2);
 /// Positive values on maps: compression, normal force.
 pub const PLUS: RGBColor = RGBColor(3, 3, 3);
@@ -15,7 +15,7 @@ pub const PLUS: RGBColor = RGBColor(3, 3, 3);
 pub const MINUS: RGBColor = RGBColor(4, 4, 4);
 /// Limits and warnings.
 pub const LIMIT: RGBColor = RGBColor(5, 5, 5);
-/// Series, told apart by the colour-blind as well.
+/// Series; distinguishable with colour vision deficiency.
 pub const SERIES: [RGBColor; 8] = [
     RGBColor(16, 0, 0),
     RGBColor(17, 0, 0),
@@ -27,7 +27,7 @@ pub const SERIES: [RGBColor; 8] = [
     RGBColor(23, 0, 0),
 ];
 
-/// Each role's stand-in, CSS variable, light and dark colour.
+/// Placeholder, CSS variable, light and dark colour of each role.
 const ROLES: [(RGBColor, &str, &str, &str); 13] = [
     (INK, "ink", "#1c2330", "#e6e9ef"),
     (GRID, "grid", "#c9ced8", "#4a5364"),
@@ -48,7 +48,7 @@ fn placeholder(RGBColor(r, g, b): RGBColor) -> String {
     format!("\"#{r:02X}{g:02X}{b:02X}\"")
 }
 
-/// The `:root` rules of a page.
+/// The page's `:root` rules, which define the CSS variables.
 pub fn variables() -> String {
     let rules = |pick: fn(&(RGBColor, &str, &'static str, &'static str)) -> &'static str| {
         ROLES.iter().map(|role| format!("--{}:{};", role.1, pick(role))).collect::<String>()
@@ -61,7 +61,7 @@ pub fn variables() -> String {
     )
 }
 
-/// The picture for a page: CSS variables, as wide as its place, a description for screen readers.
+/// The picture for the page: with CSS variables, scaled to the available width, with a description for screen readers.
 pub fn themed(svg: &str, caption: &str) -> String {
     let mut svg = svg.to_owned();
     for role in &ROLES {
@@ -73,7 +73,7 @@ pub fn themed(svg: &str, caption: &str) -> String {
     format!("<svg viewBox=\"{box_}\" role=\"img\" aria-label=\"{}\">{body}", escape(caption))
 }
 
-/// The picture as a file: light colours on white.
+/// The picture as an SVG file, in light colours on white.
 pub fn standalone(svg: &str) -> String {
     let mut svg = svg.to_owned();
     for role in &ROLES {
@@ -85,7 +85,7 @@ pub fn standalone(svg: &str) -> String {
     }
 }
 
-/// Text between tags or in quotes.
+/// Escapes text for use between tags or in quoted attributes.
 pub fn escape(text: &str) -> String {
     text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
 }

@@ -1,4 +1,4 @@
-//! Tables in Markdown, aligned, so that they read in a terminal and in a README.
+//! Markdown tables, aligned for reading in a terminal, and the tables of `dermis cosim` and `dermis table --cosim`.
 
 use dermis_golden::reconstruct::Reconstruction;
 
@@ -6,10 +6,10 @@ use super::{CosimReport, BUDGET_US};
 use crate::compare::median;
 use crate::verify::{FrameResult, Verified};
 
-/// Mismatches printed for people; `--json` holds more.
+/// Number of mismatches printed; `--json` contains more.
 const PRINTED: usize = 16;
 
-/// One co-simulation: a row per frame, the runs, the mismatches.
+/// One co-simulation: a row per frame, the runs, the result with mismatches.
 pub fn cosim(verified: &Verified) -> String {
     let head = [
         "frame",
@@ -48,7 +48,7 @@ pub fn cosim(verified: &Verified) -> String {
     text
 }
 
-/// Verdict, mismatches and margin.
+/// Equality, mismatches and margin.
 fn summary(verified: &Verified) -> String {
     let findings = &verified.findings;
     let mut text = String::new();
@@ -74,7 +74,7 @@ fn summary(verified: &Verified) -> String {
     text
 }
 
-/// One row per scene.
+/// The table of `dermis table --cosim`: one row per scene.
 pub fn scenes(all: &[Verified]) -> String {
     let head = [
         "scene",
@@ -133,7 +133,7 @@ fn count(cycles: Option<u64>) -> String {
     cycles.map_or("-".into(), |c| c.to_string())
 }
 
-/// Whether the Verilog equals the model; nothing to say where only rust-hdl's simulation ran.
+/// Whether the Verilog equals the model; `-` if only rust-hdl's simulation was run.
 fn equality_cell(verified: &Verified, equal: bool) -> String {
     match (verified.verilog, equal) {
         (false, _) => "-",
@@ -143,8 +143,8 @@ fn equality_cell(verified: &Verified, equal: bool) -> String {
     .into()
 }
 
-/// `value` with the decimals that give `largest` (of the values shown together) five significant digits; powers of
-/// ten where that takes too many zeros.
+/// Formats `value` with as many decimals as give `largest` (of the values shown together) five significant digits; in
+/// scientific notation if that takes too many zeros.
 pub(super) fn significant_digits(value: f64, largest: f64) -> String {
     const DIGITS: i32 = 5;
     let magnitude = if largest == 0.0 { 0 } else { largest.abs().log10().floor() as i32 };
@@ -156,7 +156,7 @@ pub(super) fn significant_digits(value: f64, largest: f64) -> String {
     }
 }
 
-/// A Markdown table with columns padded to the same width; the first column is left-aligned.
+/// A Markdown table with padded columns; the first one is left-aligned, the others right-aligned.
 pub(super) fn markdown(head: &[&str], rows: Vec<Vec<String>>) -> String {
     aligned(1, head, rows)
 }

@@ -1,11 +1,11 @@
-//! How willing the two sides of the bench are.
+//! Random valid and ready rates of the two sides of the test bench.
 
-/// Cycles of a pause that fills every buffer behind it.
+/// Length of a receiver's pause in cycles, enough to fill every buffer.
 const PAUSE_CYCLES: u32 = 200;
-/// One of so many cycles starts a pause, where there are some.
+/// With pauses, one starts once in so many cycles on average.
 const PAUSE_EVERY: u32 = 500;
 
-/// Percentages of the cycles in which each side is willing.
+/// Percentage of cycles in which the sender starts to offer a code, and in which the receiver is ready.
 pub(crate) struct HandshakeRates {
     random: fastrand::Rng,
     send: u32,
@@ -15,12 +15,12 @@ pub(crate) struct HandshakeRates {
 }
 
 impl HandshakeRates {
-    /// Both sides always.
+    /// Both sides in every cycle.
     pub(crate) fn full_speed() -> HandshakeRates {
         HandshakeRates { random: fastrand::Rng::with_seed(0), send: 100, receive: 100, pauses: false, left: 0 }
     }
 
-    /// From one side always and the other hardly ever to both now and then.
+    /// Random rates from 3 % to 100 % for each side, with or without pauses.
     pub(super) fn random(random: &mut fastrand::Rng) -> HandshakeRates {
         let share = |random: &mut fastrand::Rng| [3, 20, 50, 80, 97, 100, 100][random.usize(..7)];
         let (send, receive, pauses) = (share(random), share(random), random.bool());

@@ -1,8 +1,8 @@
-//! What must leave for what was taken, told from the accepted beats alone.
+//! Scoreboard: derives the expected output from the accepted input beats.
 //!
-//! A frame is whole with its last taxel. A `tlast` before that drops what came of it; one that is missing on the last
-//! taxel changes nothing. Either is told by [`FLAG_FRAMING`] in all subarrays of the next whole frame, the one it
-//! happened in among them, and forgotten by a reset.
+//! A frame is complete with its last taxel. An earlier `tlast` drops the frame's codes; a missing `tlast` on the last
+//! taxel changes nothing. Both set [`FLAG_FRAMING`] in all subarrays of the next complete frame, which may be the same
+//! frame. A reset clears the flag.
 
 use std::collections::VecDeque;
 
@@ -11,37 +11,37 @@ use serde::Serialize;
 
 use super::{Outcome, Sample};
 
-/// Violations that are kept; the others are counted.
+/// Violations reported with text; further ones are only counted.
 const REPORTED_VIOLATIONS: usize = 8;
-/// Violations after which an experiment ends.
+/// Number of violations that ends an experiment.
 const VIOLATION_LIMIT: u64 = 100;
 
-/// Something other than it must be.
+/// A violated requirement.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct Violation {
-    /// Cycle of the experiment.
+    /// Cycle within the experiment.
     pub cycle: u64,
-    /// What.
+    /// The violated rule as text.
     pub rule: String,
 }
 
-/// A whole frame that has not left yet.
+/// A complete frame that has not left yet.
 struct PendingFrame {
     sample: usize,
     flagged: bool,
-    /// Cycle of its last code, where the cycles of its beats are promised.
+    /// Cycle of its last code, if the cycles of its beats are checked.
     timed: Option<u64>,
 }
 
-/// The accepted beats' account.
+/// Input beats accepted so far and output beats due.
 pub(super) struct Scoreboard<'a> {
     samples: &'a [Sample],
-    /// Codes of the frame that is coming.
+    /// Codes accepted of the current frame.
     accepted: usize,
-    /// A wrong `tlast` since the last whole frame.
+    /// Whether a `tlast` was wrong since the last complete frame.
     framing_error: bool,
     pending: VecDeque<PendingFrame>,
-    /// Beats that have left of the frame in front.
+    /// Beats delivered of the oldest pending frame.
     delivered: usize,
     pub(super) outcome: Outcome,
 }
@@ -73,7 +73,7 @@ impl<'a> Scoreboard<'a> {
         self.pending.is_empty()
     }
 
-    /// A code of `sample` was taken; `alone` where its frame is at full speed and no other is inside.
+    /// Records an accepted code of `sample`; `alone`: sent at full speed, with no other frame in the device.
     pub(super) fn accepted(&mut self, cycle: u64, sample: usize, last: bool, alone: bool) {
         let Sample { codes, taxels, .. } = &self.samples[sample];
         self.accepted += 1;
@@ -94,10 +94,10 @@ impl<'a> Scoreboard<'a> {
         }
     }
 
-    /// A beat has left.
+    /// Checks a delivered beat.
     pub(super) fn delivered(&mut self, cycle: u64, data: [i32; 3], last: bool) {
         let Some(frame) = self.pending.front() else {
-            return self.violate(cycle, "a beat of no frame".to_owned());
+            return self.violate(cycle, "an output beat without a frame".to_owned());
         };
         let Sample { beats, forces, cycles, .. } = &self.samples[frame.sample];
         let (index, flagged, first_due) =
@@ -126,7 +126,7 @@ impl<'a> Scoreboard<'a> {
         }
     }
 
-    /// What is inside is gone: it was not taken for good.
+    /// Discards all frames in the device.
     pub(super) fn reset(&mut self) {
         self.outcome.frames_in -= self.pending.len() as u64;
         (self.accepted, self.delivered, self.framing_error) = (0, 0, false);

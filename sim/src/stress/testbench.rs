@@ -1,4 +1,4 @@
-//! A device between a sender and a receiver, watched in every cycle.
+//! Test bench of the stress experiments: a device between sender and receiver, checked in every cycle.
 
 use dermis_hdl::device::{Device, Inputs};
 
@@ -9,25 +9,25 @@ use crate::drive::{StabilityCheck, STABILITY_RULE};
 
 /// Cycles of the reset before an experiment.
 pub(crate) const RESET_CYCLES: u64 = 4;
-/// Cycles without a transfer after which a device hangs, beyond a frame's own.
+/// Cycles without a transfer after which the device counts as hung, in addition to four times a frame's cycles.
 const WATCHDOG: u64 = 20_000;
-/// Cycles after the last beat in which nothing may come.
+/// Cycles after the last beat during which no further beat may come.
 const QUIET_CYCLES: u64 = 16;
 
-/// Codes in a row, and where `tlast` stands.
+/// A sequence of codes with their `tlast`.
 pub(crate) struct Burst {
     sample: usize,
     codes: Vec<(i32, bool)>,
 }
 
 impl Burst {
-    /// A frame as it must be.
+    /// A correct frame.
     pub(crate) fn whole(of: &Sample, sample: usize) -> Burst {
         let end = |index: usize| (index + 1).is_multiple_of(of.taxels);
         Burst { sample, codes: of.codes.iter().enumerate().map(|(index, &code)| (code, end(index))).collect() }
     }
 
-    /// Only the first codes, at most `count`, `tlast` on the last of them, where none is due.
+    /// The first `count` codes with `tlast` on the last one; one code less where `tlast` would be correct there.
     pub(super) fn cut(of: &Sample, sample: usize, count: usize) -> Burst {
         let count = if count.is_multiple_of(of.taxels) { count - 1 } else { count };
         let mut burst = Burst::whole(of, sample);
@@ -41,7 +41,7 @@ impl Burst {
         Burst { sample, codes: of.codes.iter().map(|&code| (code, false)).collect() }
     }
 
-    /// `tlast` on the last code and on the one before, which makes two frames cut short.
+    /// `tlast` on the last code and on the one before: two frames cut short.
     pub(super) fn doubled(of: &Sample, sample: usize) -> Burst {
         let mut burst = Burst::whole(of, sample);
         let count = burst.codes.len();
@@ -49,7 +49,7 @@ impl Burst {
         burst
     }
 
-    /// `tlast` one beat late: a frame without, and one cut after a single code.
+    /// `tlast` one beat late: a frame without `tlast`, and one cut after a single code.
     pub(super) fn late(of: &Sample, sample: usize) -> Burst {
         let mut burst = Burst::missing(of, sample);
         burst.codes.push((of.codes[0], true));
@@ -57,7 +57,7 @@ impl Burst {
     }
 }
 
-/// A device whose every transfer is judged.
+/// A device with a sender, a receiver and a scoreboard that checks every transfer.
 pub(crate) struct Testbench<'a> {
     device: &'a mut dyn Device,
     samples: &'a [Sample],
@@ -99,7 +99,7 @@ impl<'a> Testbench<'a> {
         self.cycle
     }
 
-    /// Whether it makes sense to go on.
+    /// Whether the experiment can continue: the device is not hung, and the limit of violations is not reached.
     pub(super) fn can_continue(&self) -> bool {
         !self.hung && !self.scoreboard.is_over_limit()
     }
@@ -112,12 +112,13 @@ impl<'a> Testbench<'a> {
         &mut self.scoreboard.outcome
     }
 
-    /// Sends a burst, unless the device hangs.
+    /// Sends a burst, unless the device is hung.
     pub(crate) fn send(&mut self, burst: &Burst, rates: &mut HandshakeRates) {
         self.offer(burst, rates, false);
     }
 
-    /// Sends a frame at full speed when everything before it is out, and waits until it is: it must be in time.
+    /// Sends a frame at full speed after all earlier ones have left, and waits until it has left; the cycles of its
+    /// beats are checked.
     pub(crate) fn send_alone(&mut self, burst: &Burst) {
         let mut rates = HandshakeRates::full_speed();
         self.drain(&mut rates);
@@ -127,7 +128,7 @@ impl<'a> Testbench<'a> {
 
     fn offer(&mut self, burst: &Burst, rates: &mut HandshakeRates, alone: bool) {
         for &(code, last) in &burst.codes {
-            // An offered beat stays until it is taken.
+            // AXI4-Stream: once valid, a beat stays until it is accepted.
             let mut offering = false;
             loop {
                 offering |= rates.sends();
@@ -143,7 +144,7 @@ impl<'a> Testbench<'a> {
         }
     }
 
-    /// Sends a burst at full speed for as long as there are cycles left until `end`; whether the whole burst was taken.
+    /// Sends a burst at full speed up to cycle `end`; whether the whole burst was accepted.
     pub(super) fn send_until(&mut self, burst: &Burst, end: u64) -> bool {
         let alone = self.scoreboard.is_empty();
         for &(code, last) in &burst.codes {
@@ -157,7 +158,7 @@ impl<'a> Testbench<'a> {
         true
     }
 
-    /// Waits until everything is out, and whether nothing else comes.
+    /// Waits until all expected beats have left, then checks that no further beat comes.
     pub(crate) fn drain(&mut self, rates: &mut HandshakeRates) {
         while self.can_continue() && !self.scoreboard.is_empty() {
             self.step(None, rates.receives());
@@ -167,7 +168,7 @@ impl<'a> Testbench<'a> {
         }
     }
 
-    /// Holds the reset for some cycles, with both sides as they like.
+    /// Holds the reset for `cycles`, with random inputs.
     pub(crate) fn reset(&mut self, cycles: u64, random: &mut fastrand::Rng) {
         self.scoreboard.reset();
         for held in 0..cycles {
@@ -175,18 +176,18 @@ impl<'a> Testbench<'a> {
             let inputs = Inputs { rst: true, s_valid, s_data, s_last: random.bool(), m_ready };
             let outputs = self.device.cycle(&inputs);
             if outputs.s_ready {
-                self.scoreboard.violate(self.cycle, "s_axis_tready in reset".to_owned());
+                self.scoreboard.violate(self.cycle, "s_axis_tready is high during reset".to_owned());
             }
-            // In the first cycle the registers are still what they were.
+            // In the first cycle the registers still hold their old values.
             if outputs.m_valid && held > 0 {
-                self.scoreboard.violate(self.cycle, "m_axis_tvalid in reset".to_owned());
+                self.scoreboard.violate(self.cycle, "m_axis_tvalid is high during reset".to_owned());
             }
             self.cycle += 1;
         }
         (self.stability, self.idle) = (StabilityCheck::default(), 0);
     }
 
-    /// One cycle; whether the offered code was taken.
+    /// Simulates one cycle; whether the offered code was accepted.
     fn step(&mut self, offer: Option<(i32, bool)>, m_ready: bool) -> bool {
         let (s_data, s_last) = offer.unwrap_or_default();
         let outputs = self.device.cycle(&Inputs { rst: false, s_valid: offer.is_some(), s_data, s_last, m_ready });
@@ -203,7 +204,7 @@ impl<'a> Testbench<'a> {
         let active = accepted || transferred.is_some();
         self.idle = if active { 0 } else { self.idle + 1 };
         if self.idle == self.watchdog && (offer.is_some() || !self.scoreboard.is_empty()) {
-            self.scoreboard.violate(self.cycle, format!("nothing moved for {} cycles", self.watchdog));
+            self.scoreboard.violate(self.cycle, format!("no transfer for {} cycles", self.watchdog));
             self.hung = true;
         }
         self.cycle += 1;

@@ -1,4 +1,4 @@
-//! The objective over the disc of μ, with the search's path, its answer and the truth.
+//! The objective Π over the disc of μ, with the path and result of the search and the true μ.
 
 use anyhow::Result;
 use plotters::prelude::*;
@@ -10,10 +10,10 @@ use super::{note, svg, Area};
 
 const CENTRE: (i32, i32) = (184, 166);
 const RADIUS: f64 = 140.0;
-/// Bits below the maximum at which the colour ends.
+/// Exponent of the colour scale: the smaller, the steeper it is near the maximum.
 const DEPTH: f64 = 0.25;
 
-/// Draws it.
+/// Draws an objective map as SVG.
 ///
 /// # Errors
 /// A picture that cannot be written.
@@ -33,7 +33,7 @@ pub fn objective(map: &ObjectiveMap) -> Result<String> {
         for (index, value) in map.values.iter().enumerate() {
             let Some(value) = value else { continue };
             let (x, y) = ((index % side) as f64 - half, (index / side) as f64 - half);
-            // Steep near the maximum, where it matters.
+            // A power law: the colour scale is steepest near the maximum.
             let share = (1.0 - (best - value) / depth).max(0.0).powf(1.0 / DEPTH);
             let corners = [at([(x - 0.5) * cell, (y - 0.5) * cell]), at([(x + 0.5) * cell, (y + 0.5) * cell])];
             area.draw(&Rectangle::new(corners, SERIES[1].mix(0.06 + 0.9 * share).filled()))?;
@@ -74,9 +74,9 @@ fn axes(area: &Area, map: &ObjectiveMap) -> Result<()> {
 fn legend(area: &Area) -> Result<()> {
     area.draw(&PathElement::new(vec![(16, 346), (40, 346)], INK.stroke_width(1)))?;
     area.draw(&Circle::new((40, 346), 4, INK.filled()))?;
-    note(area, "path and answer, bit-true", (50, 346), HPos::Left, VPos::Center)?;
+    note(area, "path and result, bit-true", (50, 346), HPos::Left, VPos::Center)?;
     area.draw(&Circle::new((236, 346), 7, SERIES[2].stroke_width(2)))?;
-    note(area, "answer, golden", (250, 346), HPos::Left, VPos::Center)?;
+    note(area, "result, golden", (250, 346), HPos::Left, VPos::Center)?;
     cross(area, (28, 368))?;
     note(area, "true shear over load", (50, 368), HPos::Left, VPos::Center)?;
     area.draw(&Rectangle::new([(229, 361), (243, 375)], SERIES[1].mix(0.9).filled()))?;

@@ -1,9 +1,9 @@
-//! Which partition and which format to take for each sensor, and what that costs: derived from the measured figures,
-//! for frames of one contact and of several.
+//! Recommended partition and number format for each sensor, with errors and resources: derived from the measurements,
+//! for frames with one contact and with several.
 //!
-//! Case: of those whose hardware fits the board within 1 ms, the smallest median shear error; of those within a tenth
-//! and 0.2 % of it, the fastest. Format: of the candidates in that case, the fewest block RAMs whose median shear error
-//! is within a quarter and 0.5 % of the best candidate's.
+//! Case: the fastest one whose median shear error is at most 1.1 e + 0.2 %, where e is the smallest error among the
+//! cases whose hardware fits the board and takes at most 1 ms. Format: the one with the fewest block RAMs in that case
+//! whose median shear error is at most 1.25 e + 0.5 %, where e is the smallest error of the candidates.
 
 use anyhow::Result;
 use dermis_golden::fixed::Model;
@@ -19,36 +19,36 @@ use super::{case_text, scenes};
 use crate::drawn_frames::{DrawnFrames, Shapes};
 use crate::jobs::parallel;
 
-/// How much worse than the best a faster case may be: a share of the error, and a share of the force.
+/// Allowed error of a faster case: factor on the smallest error, plus an absolute error.
 const NEAR_CASE: [f64; 2] = [1.1, 0.002];
-/// How much worse than the best a cheaper format may be.
+/// Allowed error of a cheaper format: factor on the smallest error, plus an absolute error.
 const NEAR_FORMAT: [f64; 2] = [1.25, 0.005];
-/// Drawn frames on which formats are compared, beside the shipped ones; quick and full.
+/// Number of random frames on which formats are compared, in addition to the shipped ones: quick, full variant.
 const DRAWN: [u32; 2] = [4, 32];
 
-/// The choice for one scene and kind of frame.
+/// The recommendation for one scene and contact count.
 #[derive(Clone, Debug)]
 pub struct Choice {
-    /// Index of the scene in its case among the measured.
+    /// Index of the scene in the recommended case among the measurements.
     pub index: usize,
-    /// The frames it is for.
+    /// Contact count of the frames that it applies to.
     pub contact_count: ContactCount,
-    /// The format taken.
+    /// The recommended format.
     pub format: FormatRow,
-    /// All formats tried, the one taken among them.
+    /// All formats tried.
     pub formats: Vec<FormatRow>,
-    /// What the design takes of its board in that format.
+    /// Resources of the design in the recommended format.
     pub usage: Usage,
     /// The clock.
     pub clock: Clock,
-    /// Whether these very cycles were co-simulated and equal to the model's.
+    /// Whether this design was co-simulated, with cycles equal to the model's.
     pub simulated: bool,
 }
 
-/// Chooses for every scene and kind of frame for which some hardware fits.
+/// Chooses case and format for every scene and contact count for which hardware fits.
 ///
 /// # Errors
-/// An interruption; a frame that is not its scene's.
+/// An interruption; a frame of another sensor.
 pub fn choose(measured: &[Measured], options: &Options) -> Result<Vec<Choice>> {
     let contact_counts = |scene| [ContactCount::One, ContactCount::Several].map(|contact_count| (scene, contact_count));
     let best = scenes(measured).into_iter().flat_map(contact_counts);
@@ -60,7 +60,7 @@ pub fn choose(measured: &[Measured], options: &Options) -> Result<Vec<Choice>> {
     })
 }
 
-/// The measured case of a scene to take.
+/// Index of the recommended case of a scene among the measurements.
 fn best_case(measured: &[Measured], scene: &str, contact_count: ContactCount) -> Option<usize> {
     let own = measured.iter().enumerate().filter(|(_, m)| m.scene.name == scene);
     let point = |(index, m): (usize, &Measured)| {
@@ -90,17 +90,17 @@ fn choose_format(
     Ok(Choice { index, contact_count, clock: clock(&model.board, &model.scene), usage, formats, format, simulated })
 }
 
-/// The cheapest format near the best.
+/// The cheapest format within the allowed error.
 fn cheapest(formats: &[FormatRow]) -> Option<&FormatRow> {
     let error = |row: &FormatRow| row.tangential.unwrap_or(f64::INFINITY);
     let least = formats.iter().map(error).fold(f64::INFINITY, f64::min);
     let near = formats.iter().filter(|row| error(row) <= NEAR_FORMAT[0] * least + NEAR_FORMAT[1]);
-    // Of equals the finer one, which comes later.
+    // Of formats with equally many block RAMs the finer one, which is later in the list.
     near.rev().min_by_key(|row| row.block_rams)
 }
 
-/// The shipped frames of a kind and `drawn` ones beside them; none drawn where contacts of one to two thicknesses are
-/// no wider than a taxel.
+/// The shipped frames with a contact count, and `drawn` random ones; no random ones on sensors whose pitch exceeds two
+/// thicknesses, as their contacts would be no wider than a taxel.
 ///
 /// # Errors
 /// A stress that is not finite.
@@ -123,7 +123,7 @@ fn with_format(scene: &Scene, bits: [u32; 4]) -> Scene {
     scene
 }
 
-/// The section.
+/// The section with recommendations, comparison of cases and formats tried.
 pub fn choice(measured: &[Measured], choices: &[Choice]) -> Section {
     let head = [
         "sensor",
@@ -149,15 +149,16 @@ pub fn choice(measured: &[Measured], choices: &[Choice]) -> Section {
     }
     let origin = choices.first().map_or("design clock", |choice| choice.clock.origin);
     let caption = format!(
-        "What to take and what it costs, with the share of the board. Errors of the resultant: median over shipped and \
-         drawn frames; time: cycles over the {origin}"
+        "Recommended case and format with errors, time and resources (in brackets: share of the board). Errors of the \
+         resultant: median over shipped and random frames; time: cycles divided by the clock ({origin})"
     );
-    let rule = "Case: smallest median shear error on the shipped frames among the cases whose hardware fits the \
-                board within 1 ms; among cases within a tenth (and 0.2 %) of it the fastest. Format: fewest block \
-                RAMs among the candidates within a quarter (and 0.5 %) of the best candidate. Write the case into \
-                [partition] case, the bits into [fixed] input_bits, inverse_bits, data_bits, coef_bits. Several \
-                contacts with different shear suit no rectangle: in software [partition] case = \"contacts\" gives \
-                each its own μ; its error and time on a CPU stand below where it was measured.";
+    let rule = "Case: among the cases whose hardware fits the board and takes at most 1 ms, e is the smallest median \
+                shear error on the shipped frames; the fastest case with an error up to 1.1 e + 0.2 % is taken. \
+                Format: the candidate with the fewest block RAMs and an error up to 1.25 times the best candidate's \
+                + 0.5 %. In the scene file set [partition] case, and the bits in [fixed] input_bits, inverse_bits, \
+                data_bits, coef_bits. Contacts with different shears cannot be separated by rectangular subarrays: \
+                in software, [partition] case = \"contacts\" finds a μ for each contact; its error and time on a CPU \
+                are listed below where measured.";
     let formats = choices
         .iter()
         .flat_map(|choice| choice.formats.iter().map(|row| format_row(choice.contact_count, row, &choice.format)));
@@ -177,11 +178,15 @@ pub fn choice(measured: &[Measured], choices: &[Choice]) -> Section {
         "multipliers",
         "taken",
     ];
-    let formats =
-        Table::new("formats", "Formats tried in the chosen case, bit-true model", &format_head, formats.collect());
+    let formats = Table::new(
+        "formats",
+        "Formats tried in the recommended case, bit-true model; nine of ten below: 90 % quantile",
+        &format_head,
+        formats.collect(),
+    );
     Section {
         id: "choice",
-        title: "Which partition and format to take".into(),
+        title: "Recommended partition and number format".into(),
         items: vec![
             Item::Table(Table::new("choice", caption, &head, rows)),
             Item::Text(rule.into()),
@@ -218,7 +223,7 @@ fn row(measured: &[Measured], choice: &Choice) -> Vec<Cell> {
     ]
 }
 
-/// Every case of a sensor beside the others, on the shipped frames of each kind.
+/// Comparison of the cases of each sensor on the shipped frames, by contact count.
 fn compared(measured: &[Measured]) -> Table {
     let cases = ["0", "1", "2", "3", "contacts"];
     let head = [
@@ -257,8 +262,8 @@ fn compared(measured: &[Measured]) -> Table {
         }
     }
     let caption =
-        "The cases compared: median shear error on the shipped frames of hardware in cases 0 to 3, of the golden \
-                   model in case contacts, with the time of a frame";
+        "Comparison of cases on the shipped frames: median shear error and time per frame of the hardware in cases 0 \
+                   to 3, of the golden model in case contacts";
     Table::new("cases", caption, &head, rows)
 }
 
@@ -287,7 +292,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_cheapest_format_near_the_best() {
+    fn the_cheapest_format_within_the_allowed_error() {
         let row = |input: u32, error: f64, block_rams: usize| FormatRow {
             scene: "s".into(),
             case: "0".into(),

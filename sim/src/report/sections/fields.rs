@@ -1,4 +1,4 @@
-//! Stress and forces of a frame: truth, golden and bit-true model side by side on one scale.
+//! Stress and forces of a frame: truth, golden and bit-true model, side by side on the same scale.
 
 use anyhow::Result;
 use dermis_golden::frame::Forces;
@@ -8,15 +8,16 @@ use super::super::measure::Measured;
 use super::super::pictures::{force_field, stress_map, Outline};
 use super::{case_text, illustrated_frame, Choice};
 
-/// The section.
+/// The section with maps of stress and forces.
 ///
 /// # Errors
 /// A picture that cannot be written.
 pub fn fields(measured: &[Measured], choices: &[Choice]) -> Result<Section> {
     let mut items = vec![Item::Text(
-        "Stress under the taxels with the centroids of compression (+) and tension (−) of each subarray, then forces \
-         per taxel: normal by colour, tangential by arrows; truth, golden and bit-true model on one scale. Row 0 is \
-         on top; x runs to the right, y down. Colours follow the square root of the value, so that tension shows."
+        "Stress on the taxels with the centroids of compression (+) and tension (−) of each subarray, then forces \
+         per taxel, normal as colour, tangential as arrows: truth, golden and bit-true model on the same scale. Row \
+         0 is on top, x points to the right, y down. The colour scale is the square root of the value, to make \
+         tension visible."
             .into(),
     )];
     for choice in choices {
@@ -30,7 +31,7 @@ pub fn fields(measured: &[Measured], choices: &[Choice]) -> Result<Section> {
     Ok(Section { id: "fields", title: "Stress and forces".into(), items })
 }
 
-/// The pictures of one frame: stress, truth where it is known, golden, bit-true where there is one.
+/// The pictures of one frame: stress, true forces if known, golden model, bit-true model if supported.
 pub(super) fn field_pictures(m: &Measured, index: usize, prefix: &str) -> Result<Vec<Picture>> {
     let (frame, golden) = (&m.frames[index], &m.golden[index]);
     let sensor = &m.scene.sensor;
@@ -43,7 +44,7 @@ pub(super) fn field_pictures(m: &Measured, index: usize, prefix: &str) -> Result
     .into_iter()
     .flatten()
     .collect();
-    // One scale, of the truth where it is known: a result that is far off must not shrink the others.
+    // The scale is that of the true forces if known, so that a result with large errors does not shrink the others.
     let scale = fields[0].1;
     let peaks = [
         scale.fz.iter().fold(0.0, |peak: f64, f| peak.max(f.abs())),

@@ -1,4 +1,4 @@
-//! Beside the paper: Table 2 and the published run times, from the files in `golden/data/paper`.
+//! Comparison with published figures: Table 2 and run times, from the files in `golden/data/paper`.
 
 use dermis_golden::errors::Errors;
 use dermis_golden::paper::{run_times, table_2, RunTime};
@@ -9,16 +9,16 @@ use super::super::document::{empty_cell, median_percent, percent, seconds, text_
 use super::super::measure::{Engine, Measured};
 use super::{case_text, find};
 
-/// The section.
+/// The section with Table 2 and the published run times.
 pub fn published(measured: &[Measured]) -> Section {
     Section {
         id: "published",
-        title: "Beside the published figures".into(),
+        title: "Comparison with published figures".into(),
         items: vec![Item::Table(table_two(measured)), Item::Table(times(measured))],
     }
 }
 
-/// Table 2 with ours beside it: against truth and against case 0.
+/// The paper's Table 2 next to the errors measured here, against truth and against case 0.
 pub(super) fn table_two(measured: &[Measured]) -> Table {
     let head = [
         "sensor",
@@ -55,12 +55,12 @@ pub(super) fn table_two(measured: &[Measured]) -> Table {
         Some(row)
     });
     let caption =
-        "The paper's Table 2 (sensors 1, 2: against finite elements; 3, 4: against case 0; one frame) beside the \
-                   golden and the bit-true model, median of |X| over the frames";
+        "The paper's Table 2 (one frame; sensors 1, 2: against finite elements; 3, 4: against case 0) next to the \
+                   golden and the bit-true model (median of |X| over the frames)";
     Table::new("table-2", caption, &head, rows.collect())
 }
 
-/// The published run times with ours beside them.
+/// The published run times next to those measured here.
 pub(super) fn times(measured: &[Measured]) -> Table {
     let head = [
         "published for",
@@ -93,8 +93,8 @@ pub(super) fn times(measured: &[Measured]) -> Table {
         row
     });
     let caption =
-        "Published run times beside those of this run: ours are of a frame, with the matrices computed before (dermis \
-                   report --paper, Fig. 7, has them with the matrices)";
+        "Published run times next to those of this run, which are per frame, with the matrices computed beforehand \
+                   (dermis report --paper, Fig. 7, includes the matrices)";
     Table::new("run-times", caption, &head, rows.collect())
 }
 

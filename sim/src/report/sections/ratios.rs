@@ -1,4 +1,4 @@
-//! μ of every subarray in every case: the paper's Fig. 3.
+//! μ of every subarray in every case, as in the paper's Fig. 3.
 
 use anyhow::Result;
 
@@ -8,7 +8,7 @@ use super::super::pictures::{bars, Bars};
 use super::super::style::SERIES;
 use super::{case_text, illustrated_frame, scenes};
 
-/// The section.
+/// The section with the friction ratios.
 ///
 /// # Errors
 /// A picture that cannot be written.
@@ -27,7 +27,11 @@ pub fn ratios(measured: &[Measured]) -> Result<Section> {
         id: "ratios",
         title: "Friction ratios per subarray".into(),
         items: vec![
-            Item::Text("SA1, SA2, … row by row; both bars at zero: not searched, or no shear found.".into()),
+            Item::Text(
+                "Subarrays SA1, SA2, … are numbered row by row. Both bars are zero where a subarray was not searched \
+                 or no shear was found."
+                    .into(),
+            ),
             Item::Pictures(pictures),
             Item::Table(
                 Table::new("ratios", "μ of the golden model in every subarray", &head, rows.collect()).collapsed(),

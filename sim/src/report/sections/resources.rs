@@ -1,4 +1,4 @@
-//! What the chosen designs take of their board, and what was left out of them.
+//! Resources of the recommended designs, and the optional features left out of them.
 
 use anyhow::Result;
 use dermis_hdl::explain::explain;
@@ -11,10 +11,10 @@ use super::super::style::SERIES;
 use super::{case_text, Choice};
 use crate::jobs::parallel;
 
-/// The section; the quick variant tells what was left out for the first scene alone.
+/// The section with resources; the quick variant lists the features left out for the first scene only.
 ///
 /// # Errors
-/// A picture that cannot be written; a feature put back that has a model and no hardware; an interruption.
+/// A picture that cannot be written; a feature whose hardware cannot be generated; an interruption.
 pub fn resources(measured: &[Measured], choices: &[Choice], options: &Options) -> Result<Section> {
     let chosen = || {
         choices.iter().filter_map(|choice| {
@@ -37,18 +37,24 @@ pub fn resources(measured: &[Measured], choices: &[Choice], options: &Options) -
     };
     let board = chosen().next().map_or("", |(_, bit_true)| bit_true.model.board.name.as_str());
     let caption = format!(
-        "Share of the board ({board}) that each scene's hardware takes in the chosen case, which stands beside it"
+        "Resources of each scene's hardware in the recommended case (next to its name), as share of the board ({board})"
     );
     let picture = Picture { id: "resources".into(), caption, svg: bars(&plot)? };
     let head = ["sensor", "case", "stage", "block RAMs", "multipliers", "flip-flops, est.", "LUTs, est."];
     let stages = chosen().flat_map(|(m, bit_true)| stage_rows(m, bit_true));
     Ok(Section {
         id: "resources",
-        title: "What the hardware takes, and what was left out".into(),
+        title: "Resources of the hardware, and features left out".into(),
         items: vec![
             Item::Pictures(vec![picture]),
             Item::Table(
-                Table::new("resources", "By stage, in the scene's own format", &head, stages.collect()).collapsed(),
+                Table::new(
+                    "resources",
+                    "Resources by stage, in the number format of the scene file",
+                    &head,
+                    stages.collect(),
+                )
+                .collapsed(),
             ),
             Item::Table(left_out(chosen().collect(), options)?),
         ],
@@ -96,6 +102,7 @@ fn left_out(chosen: Vec<(&Measured, &BitTrue)>, options: &Options) -> Result<Tab
         "LUTs, est.",
         "cycles",
     ];
-    let caption = "Left out of the hardware because the scene does not ask for it, and what that saves";
+    let caption = "Features left out of the hardware because the scene does not use them, and the resources that this \
+                   saves; put back as: the setting that adds the feature";
     Ok(Table::new("left-out", caption, &head, rows.collect()))
 }

@@ -1,20 +1,20 @@
-//! What long runs in this build folder have tried and found.
+//! Counts of the long test runs saved in the build folder.
 
 use super::super::document::{count, seconds, text_cell, Cell, Item, Section, Table};
 use crate::run_log::{RunLog, TargetCounts};
 
-/// The section.
+/// The section with the counts of long test runs.
 pub fn run_logs(all: &[RunLog]) -> Section {
     let item = match all {
         [] => Item::Text(
-            "No long run has left its counts in the build folder yet; `make fuzz`, `dermis stress` and
-                          `dermis faults` do."
+            "The build folder contains no counts of long test runs yet; `make fuzz`, `dermis stress` and `dermis \
+             faults` save them."
                 .into(),
         ),
         all => {
             let head = ["command", "what", "unit", "tried", "time", "outcomes"];
             let rows = all.iter().flat_map(|run| run.targets.iter().map(move |target| row(run, target)));
-            let caption = "Counts that the last run of each command in the build folder left behind";
+            let caption = "Counts of the last run of each command with this build folder";
             Item::Table(Table::new("tried", caption, &head, rows.collect()))
         }
     };

@@ -1,4 +1,4 @@
-//! The search: Π over the disc of μ, and the margin of its maximum as a confidence in μ.
+//! The search for μ: Π over the disc of μ, and the margin of its maximum as a measure of confidence.
 
 use anyhow::Result;
 use dermis_golden::partition::Case;
@@ -9,7 +9,7 @@ use super::super::pictures::{objective, scatter, Scatter, Series};
 use super::super::style::SERIES;
 use super::time::short;
 
-/// The section.
+/// The section with objective maps and margins.
 ///
 /// # Errors
 /// A picture that cannot be written.
@@ -29,13 +29,14 @@ pub fn search(measured: &[Measured]) -> Result<Section> {
     });
     Ok(Section {
         id: "search",
-        title: "The search for μ and how sure it is".into(),
+        title: "The search for μ and its confidence".into(),
         items: vec![
             Item::Text(
-                "Π is the sparse objective: how few taxels carry the force, in bits. The margin is what its maximum \
-                 is above the best μ at least mu_max/8 away: a large margin means that no other answer fits the \
-                 frame as well, a small one that shear and an uneven pressure look alike in it, one below zero that \
-                 the search has missed the maximum."
+                "Π is the sparse objective, in bits; it is larger the fewer taxels carry the force. The margin is \
+                 the difference between Π at the μ found and the largest Π at a distance of at least mu_max/8. With \
+                 a large margin no clearly different μ explains the frame as well; with a small one, shear and \
+                 uneven pressure are hard to distinguish in the frame; a negative one means that the search has \
+                 missed the maximum."
                     .into(),
             ),
             Item::Pictures(pictures),
@@ -44,7 +45,7 @@ pub fn search(measured: &[Measured]) -> Result<Section> {
     })
 }
 
-/// Margin against error, one mark per frame.
+/// Shear error against margin, one mark per frame.
 fn margins(maps: &[Vec<ObjectiveMap>]) -> Result<Picture> {
     let series = maps.iter().zip(0..).filter_map(|(maps, index): (_, usize)| {
         let points = maps
@@ -67,6 +68,6 @@ fn margins(maps: &[Vec<ObjectiveMap>]) -> Result<Picture> {
         series: series.collect(),
         guides: Vec::new(),
     };
-    let caption = "Shear error against the margin, a mark per frame, case 0, golden model".into();
+    let caption = "Shear error against margin, one mark per frame, case 0, golden model".into();
     Ok(Picture { id: "margins".into(), caption, svg: scatter(&plot)? })
 }

@@ -1,4 +1,4 @@
-//! Sweeps: one field of a scene changed at a time; error against cycles and against block RAMs.
+//! Parameter sweeps: error against cycles and against block RAMs, with one field of a scene changed at a time.
 
 use anyhow::Result;
 
@@ -8,7 +8,7 @@ use super::super::pictures::{scatter, Guide, Scatter, Series};
 use super::super::style::SERIES;
 use super::time::short;
 
-/// The section from the sweeps of each scene, with the kind and the number of their frames.
+/// The section from the sweeps of each scene, given with contact count and number of frames.
 ///
 /// # Errors
 /// A picture that cannot be written.
@@ -49,13 +49,16 @@ pub fn sweeps(all: &[(Vec<SweepPoint>, ContactCount, usize)]) -> Result<Section>
         title: "What each setting costs".into(),
         items: vec![
             Item::Text(
-                "From each scene as it is, one field at a time; settings that the board has no room for are left \
-                 out, but those of degree. Cycles are the bit-true model's with every subarray searched, which \
-                 co-simulation holds equal to the hardware's."
+                "One field of each scene is changed at a time. Settings that do not fit the board are omitted, \
+                 except for degree. Cycles are the bit-true model's with every subarray searched; co-simulation \
+                 checks that the hardware's are equal."
                     .into(),
             ),
             Item::Pictures(pictures),
-            Item::Table(Table::new("sweeps", "Every setting", &head, rows.collect()).collapsed()),
+            Item::Table(
+                Table::new("sweeps", "All settings; the scene's own: the value in its file", &head, rows.collect())
+                    .collapsed(),
+            ),
         ],
     })
 }
@@ -87,7 +90,7 @@ fn plot(points: &[SweepPoint], what: &str, x: fn(&SweepPoint) -> f64) -> Scatter
             .iter()
             .filter_map(|p| Some((x(p), p.tangential.filter(|error| *error > 0.0)?, p.value.clone())))
             .collect(),
-        // Settings have an order, cases have none.
+        // Numeric settings are joined by a line, cases are not.
         joined: group[0].field != "case",
     });
     Scatter {
@@ -98,7 +101,7 @@ fn plot(points: &[SweepPoint], what: &str, x: fn(&SweepPoint) -> f64) -> Scatter
         series: series.collect(),
         guides: points
             .iter()
-            .find_map(|p| Some(Guide::Ring((x(p), p.tangential.filter(|_| p.own)?), "the scene as it is".into())))
+            .find_map(|p| Some(Guide::Ring((x(p), p.tangential.filter(|_| p.own)?), "unchanged scene".into())))
             .into_iter()
             .collect(),
     }
