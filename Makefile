@@ -1,4 +1,4 @@
-# Targets for Debian 12 with a Rust toolchain; `make help` lists them. Logic belongs to the `dermis` command.
+# Targets for Debian 12 with a Rust toolchain; `make help` lists them. Recipes only call cargo, the tools and `dermis`.
 
 SCENE     ?= sensor-1
 BOARD     ?=
@@ -7,7 +7,7 @@ BUILD     ?= build
 TOOLS      = $(BUILD)/tools
 CARGO     ?= cargo
 VERILATOR ?= verilator
-# Cargo's own variable, so that a folder elsewhere is found too.
+# Cargo's own variable: a target folder outside the repository is found too.
 CARGO_TARGET_DIR ?= target
 DERMIS     = $(CARGO_TARGET_DIR)/release/dermis
 PACKAGES   = verilator yosys nextpnr-ice40 fpga-icestorm g++ make chromium python3-venv
@@ -26,27 +26,27 @@ setup: ## install the Debian packages that are missing
 	if [ "$$(id -u)" = 0 ]; then sudo=; else sudo=sudo; fi; \
 	$$sudo apt-get update -q && $$sudo apt-get install -y --no-install-recommends $(PACKAGES)
 
-tools: setup ## install place and route: iCE40 by setup, ECP5 in the versions of constraints/tools.txt
+tools: setup ## install place and route: iCE40 from Debian, ECP5 in the version of constraints/tools.txt
 	@test -x $(TOOLS)/bin/pip || python3 -m venv $(TOOLS)
 	@$(TOOLS)/bin/pip install -q --disable-pip-version-check -r constraints/tools.txt
 
 program: setup
 	$(CARGO) build --release --bins
 
-run: program ## co-simulate both scenes on real frames and print the table
+run: program ## co-simulate SCENES on their shipped frames and print the table
 	$(DERMIS) --build-dir $(BUILD) table --cosim $(SCENES)
 
-test: setup fmt clippy unit lint quick docs ## all checks; what .ci/run calls
+test: setup fmt clippy unit lint quick docs ## run all checks, as .ci/run does
 
 fmt: ## check the formatting
 	@echo '== fmt'
 	$(CARGO) fmt --all --check
 
-clippy: ## check the code, warnings are errors
+clippy: ## lint the Rust code, warnings are errors
 	@echo '== clippy'
 	$(CARGO) clippy --workspace --all-targets -- -D warnings
 
-unit: setup ## run all tests: units, command line, co-simulation
+unit: setup ## run all tests: unit, command line, co-simulation
 	@echo '== unit'
 	$(CARGO) test --workspace
 
@@ -58,7 +58,7 @@ lint: setup ## lint the generated Verilog with its waivers
 	  echo "$$scene: verilator --lint-only -Wall is clean"; \
 	done
 
-quick: setup ## measure and draw the short report into build/report-quick
+quick: setup ## write the short report to build/report-quick
 	@echo '== quick report'
 	$(CARGO) run --quiet --bin dermis -- --build-dir $(BUILD) report --quick --out $(BUILD)/report-quick
 
@@ -75,20 +75,20 @@ build: program ## generate the hardware of SCENE
 cosim: program ## co-simulate SCENE on its shipped frames
 	$(DERMIS) --build-dir $(BUILD) cosim $(SCENE)
 
-bitstream: program tools ## make the bitstream of SCENE for BOARD or its own one (minutes to hours)
+bitstream: program tools ## make the bitstream of SCENE for BOARD, by default the scene's (minutes to hours)
 	PATH="$(abspath $(TOOLS))/bin:$$PATH" $(DERMIS) --build-dir $(BUILD) bitstream $(SCENE) $(if $(BOARD),--board $(BOARD))
 
-report: program ## measure and draw: build/report/report.html and paper.html; QUICK=1 in two minutes
+report: program ## write build/report/report.html and paper.html; QUICK=1 takes two minutes
 	$(DERMIS) --build-dir $(BUILD) report $(if $(QUICK),--quick)
 	$(DERMIS) --build-dir $(BUILD) report --paper $(if $(QUICK),--quick)
 
-netlist: setup ## compare the netlist of a small scene with a search, several minutes
+netlist: setup ## co-simulate the synthesised netlist of a small scene with search (several minutes)
 	$(CARGO) test --release -p dermis-tests --test netlist -- --include-ignored
 
-fuzz: ## 10^7 inputs over the readers, 10^5 frames through both models
+fuzz: ## run 10^7 mutated inputs through the file readers, 10^5 frames through both models
 	DERMIS_FUZZ_INPUTS=10000000 DERMIS_FUZZ_RUNS=100000 $(CARGO) test --release -p dermis-tests --test fuzz -- --nocapture
 
-stress: ## 4*10^6 cycles of each experiment on the streams: stalls, wrong tlast, resets
+stress: ## stress the streams: 4*10^6 cycles each of stalls, wrong tlast and resets
 	DERMIS_STRESS_CYCLES=4000000 $(CARGO) test --release -p dermis-tests --test streams -- --nocapture
 
 clean: ## remove everything built

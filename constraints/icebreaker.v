@@ -1,5 +1,5 @@
-// iCEBreaker: pins and clock around the board top DERMIS_TOP, whose name the flow defines, and DERMIS_SPI or DERMIS_UART, its
-// link. Pins are in icebreaker.pcf; their names are those of the board's schematic, or of the link.
+// iCEBreaker: PLL and pins around the board top. `dermis bitstream` defines DERMIS_TOP, the top's module name, and DERMIS_SPI
+// or DERMIS_UART, its link. Pins are in icebreaker.pcf, named as in the board's schematic, those of the SPI by function.
 module board (
   input wire clk_12mhz,
   input wire btn_n,
@@ -37,10 +37,10 @@ module board (
   assign ledr_n = !error;
 
 `ifdef DERMIS_SPI
-  // The pin's own way to a global buffer: through the fabric the clock would come late, and MISO after it.
+  // Dedicated path from the pin to a global buffer: through the fabric the clock, and with it MISO, would come late.
   wire spi_sclk_global;
   SB_GB_IO #(.PIN_TYPE(6'b000001)) sclk_pin (.PACKAGE_PIN(spi_sclk), .GLOBAL_BUFFER_OUTPUT(spi_sclk_global));
-  // Other slaves may share the line.
+  // High impedance while not selected: other slaves may share the line.
   wire miso;
   assign spi_miso = spi_cs_n ? 1'bz : miso;
 `endif

@@ -1,5 +1,5 @@
-// ULX3S: pins and clock around the board top DERMIS_TOP, whose name the flow defines, and DERMIS_SPI or DERMIS_UART, its link.
-// Pins are in ulx3s-85f.lpf; their names are those of the board's manual, or of the link.
+// ULX3S: PLL and pins around the board top. `dermis bitstream` defines DERMIS_TOP, the top's module name, and DERMIS_SPI or
+// DERMIS_UART, its link. Pins are in ulx3s-85f.lpf, named as in the board's manual, those of the SPI by function.
 module board (
   input wire clk_25mhz,
   input wire fire1,
@@ -48,12 +48,12 @@ module board (
     .ENCLKOP(1'b0)
   );
 
-  // Low would let the WiFi module's boot loader take the board over.
+  // Held high: low would let the WiFi module's boot loader take over the board.
   assign wifi_gpio0 = 1'b1;
   assign led[7:3] = 5'd0;
 
 `ifdef DERMIS_SPI
-  // Other slaves may share the line.
+  // High impedance while not selected: other slaves may share the line.
   wire miso;
   assign spi_miso = spi_cs_n ? 1'bz : miso;
 `endif

@@ -1,4 +1,4 @@
-// Simulation models of the ECP5 cells that Yosys ships as black boxes only, as far as the flow uses them.
+// Simulation models of the ECP5 cells that Yosys ships as black boxes only, in the modes that this flow uses.
 // Source of the behaviour: Lattice FPGA-TN-02204 (memory) and FPGA-TN-02205 (sysDSP).
 
 // An 18x18 multiplier with optional registers at the operands and at the product, all on CLK0, enabled, without reset.
@@ -40,8 +40,8 @@ module MULT18X18D (
 endmodule
 
 // A block RAM of 18 kbit as 1024 words of two bytes of nine bits, without output registers and resets.
-// Narrow words of 1, 2 and 4 bits use eight of a byte's nine bits; words of 36 bits are written over both ports' data pins
-// at port A and read over both at port B.
+// Words of 1, 2 and 4 bits use eight of a byte's nine bits. Words of 36 bits use the data pins of both ports: port A
+// writes them, port B reads them.
 module DP16KD (
   input DIA0, DIA1, DIA2, DIA3, DIA4, DIA5, DIA6, DIA7, DIA8, DIA9, DIA10, DIA11, DIA12, DIA13, DIA14, DIA15, DIA16, DIA17,
   input ADA0, ADA1, ADA2, ADA3, ADA4, ADA5, ADA6, ADA7, ADA8, ADA9, ADA10, ADA11, ADA12, ADA13,
@@ -156,7 +156,7 @@ module DP16KD (
   assign {DOB17, DOB16, DOB15, DOB14, DOB13, DOB12, DOB11, DOB10, DOB9, DOB8, DOB7, DOB6, DOB5, DOB4, DOB3, DOB2, DOB1,
     DOB0} = read_b;
 
-  // A narrow word in the byte that holds it.
+  // The narrow word at `address`, out of the 18-bit word that holds it.
   function [17:0] narrow(input integer width, input [13:0] address, input [17:0] word);
     reg [8:0] octet;
     begin
@@ -171,7 +171,7 @@ module DP16KD (
     end
   endfunction
 
-  // A word with what is written in place.
+  // The 18-bit word after `data` is written into it at `address`.
   function [17:0] merged(input integer width, input [13:0] address, input [17:0] word, input [17:0] data);
     reg [8:0] octet;
     begin
@@ -199,7 +199,7 @@ module DP16KD (
       wire [17:0] word = memory[address_a[13:4]];
       wire [17:0] written = merged(DATA_WIDTH_A, address_a, word, write_a);
       always @(posedge CLKA) if (CEA && WEA) memory[address_a[13:4]] <= written;
-      // Words of 36 bits take this port's data pins for their lower half.
+      // A 36-bit read at port B uses this port's data pins for its lower half.
       if (DATA_WIDTH_B != 36) begin : narrow_read
         always @(posedge CLKA) if (CEA && !(WEA && WRITEMODE_A == "NORMAL"))
           read_a <= narrow(DATA_WIDTH_A, address_a, WEA && WRITEMODE_A == "WRITETHROUGH" ? written : word);

@@ -1,10 +1,10 @@
-// Appended to shim.cpp in libraries whose state may be changed from outside (sim/src/verilator.rs).
+// Appended to shim.cpp in libraries whose registers and memories can be changed from outside (sim/src/verilator.rs).
 #include "verilated_syms.h"
 
 extern "C" {
 
-// Flips one bit of one word of a register or memory; 0 where there is none such. What depends on it follows with the
-// next cycle's first evaluation.
+// Flips one bit of one word of a register or memory; returns 0 if there is no such bit. Dependent signals change at the
+// first evaluation of the next cycle.
 int32_t dermis_flip(void* handle, const char* scope, const char* signal, uint64_t word, uint64_t bit) {
     auto* model = static_cast<Model*>(handle);
     const VerilatedScope* const found = model->context.scopeFind(scope);

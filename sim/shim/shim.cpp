@@ -15,7 +15,7 @@
 
 namespace {
 
-// Folder of the memory files while a model starts; one thread builds and starts one model.
+// Folder of the memory files while a model starts; each thread starts one model at a time.
 thread_local std::string memory_folder;
 
 struct Model {
@@ -39,7 +39,7 @@ FILE* __wrap_fopen(const char* path, const char* mode) {
 uint32_t dermis_out_bytes() { return sizeof(Vbench::out); }
 
 // A model after its initial blocks have run (the memory files are read here). Registers without
-// an initial value start random, from `seed`: a design that forgets to reset one is found.
+// an initial value start random, from `seed`, so that a missing reset shows.
 void* dermis_new(const char* folder, int32_t seed) {
     auto* model = new Model;
     model->context.randReset(2);

@@ -1,5 +1,5 @@
-//! The generated module `bench`: one instance of the design, its pins and taps packed into two
-//! vectors, so that one C++ shim serves every design.
+//! The generated Verilog module `bench`: one instance of the design, with its pins and taps packed into two vectors, so
+//! that the same C++ shim serves every design.
 //!
 //! | vector | bits | holds |
 //! |---|---|---|
@@ -9,28 +9,28 @@
 //! | | 127:32 | `m_axis_tdata` = {fz, fy, fx} |
 //! | | from 128 | per tap: one 32-bit word with valid in bit 0, then the data padded to 32-bit words |
 //!
-//! The taps are hierarchical references into the design: nothing is added to what is synthesised.
+//! Taps are hierarchical references into the design: the synthesised Verilog contains no logic for them.
 
 use std::fmt::Write as _;
 
 use dermis_hdl::device::{Inputs, Outputs, Tap};
 
-/// The design's instance in the bench.
+/// Hierarchical name of the design's instance.
 pub(crate) const INSTANCE: &str = "bench.dut";
 /// Words of `out` before the first tap.
 const PIN_WORDS: usize = 4;
 
-/// Where each pin and tap of one design sits in the packed vectors.
+/// Positions of a design's pins and taps in the packed vectors.
 #[derive(Clone, Debug)]
 pub struct Layout {
     input_bits: u32,
     taps: Vec<Tap>,
-    /// First word of each tap in `out`; one more entry for the end.
+    /// First 32-bit word of each tap in `out`, and the length of `out`.
     offsets: Vec<usize>,
 }
 
 impl Layout {
-    /// The layout of a design with `input_bits`-wide codes (1..=32) and these taps.
+    /// The layout of a design with codes of `input_bits` (1..=32) and the given taps.
     pub fn new(input_bits: u32, taps: &[Tap]) -> Self {
         let mut offsets = vec![PIN_WORDS];
         let mut end = PIN_WORDS;
@@ -115,7 +115,7 @@ impl Layout {
     }
 }
 
-/// Bits of a tap's word, at least one.
+/// Width of a tap's word in bits, at least one.
 fn tap_bits(tap: &Tap) -> usize {
     (tap.fields * tap.field_bits as usize).max(1)
 }

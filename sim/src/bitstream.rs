@@ -1,14 +1,14 @@
-//! `dermis bitstream`: a scene as a bitstream for its board, by open tools.
+//! `dermis bitstream`: makes the bitstream of a scene for its board with open tools.
 //!
 //! ```text
-//! scene -> board top (Verilog) --yosys--> netlist --absorb, floor plan--> netlist
+//! scene -> board top (Verilog) --yosys--> netlist --register packing, floor plan--> netlist
 //!     netlist --nextpnr, several seeds--> best --pack--> bitstream
 //!             ^-- pins, PLL of constraints     |--> cells, clocks -> table, baselines
 //! ```
-//! Everything stands in `<build-dir>/<scene>/<board>/`, with a log per tool.
+//! All files and one log per tool lie in `<build-dir>/<scene>/<board>/`.
 
-pub mod absorb;
 pub mod baseline;
+pub mod dsp_register_packing;
 pub mod family;
 pub mod floor_plan;
 pub mod synthesis;
@@ -28,18 +28,18 @@ use dermis_hdl::link::generate_board;
 use crate::compare::median;
 use crate::jobs::{parallel, Interrupt};
 use crate::progress::Progress;
-use crate::report::{self, Implemented, Summary};
-use absorb::Absorbed;
+use crate::report::{self, BitstreamReport, Summary};
 use baseline::{Baseline, Baselines, FILE};
+use dsp_register_packing::PackedRegisters;
 use family::{flow, pack_arguments, place_arguments, Flow, YOSYS};
 use synthesis::NETLIST;
 use timing::{Fmax, Placed};
 use tools::ToolError;
 
-/// Name of the board's own module, around the board top.
+/// Name of the outermost module, in `constraints/<board>.v`, which instantiates the board top.
 const TOP: &str = "board";
 
-/// What `dermis bitstream` is asked for.
+/// Arguments of `dermis bitstream`.
 #[derive(Args, Debug)]
 #[command(after_help = "Examples:
   dermis bitstream eight-by-eight
@@ -50,16 +50,16 @@ pub struct Arguments {
     /// Built-in name or path of a scene.
     #[arg(required_unless_present = "committed")]
     scene: Option<String>,
-    /// Board in place of the scene's own, a file's name in constraints.
+    /// Board to use instead of the scene's: the name of a file in constraints.
     #[arg(long, value_name = "NAME")]
     board: Option<String>,
-    /// Seeds of place and route; without it as many as the board's file says.
+    /// Number of place-and-route seeds; default: from the board's file.
     #[arg(long, value_parser = clap::value_parser!(u32).range(1..))]
     seeds: Option<u32>,
-    /// Tries at a time; each takes a core and about a gigabyte.
+    /// Number of seeds to run in parallel; each takes a core and about 1 GB of memory.
     #[arg(long, default_value_t = 2, value_parser = clap::value_parser!(u32).range(1..))]
     jobs: u32,
-    /// Write what was reached into constraints/baselines.json in place of comparing with it, if the clock is met.
+    /// If the clock is met, write the results into constraints/baselines.json instead of comparing with it.
     #[arg(long)]
     update_baselines: bool,
     /// Print the result as JSON and nothing else.
@@ -70,10 +70,10 @@ pub struct Arguments {
     committed: bool,
 }
 
-/// Makes the bitstream; the text for stdout, and whether the clock is met and nothing got worse.
+/// Makes the bitstream: the text for stdout, and whether the clock is met without a regression against the baseline.
 ///
 /// # Errors
-/// The scene's and the board's; [`ToolError`] for what a tool did not do.
+/// An invalid scene or board; [`ToolError`]: a tool is missing or failed.
 pub fn run(arguments: &Arguments, build_dir: &Path) -> Result<(String, bool)> {
     let Some(scene) = arguments.scene.as_ref().filter(|_| !arguments.committed) else {
         return Ok((committed(arguments.scene.as_deref(), arguments.board.as_deref())?, true));
@@ -89,32 +89,29 @@ pub fn run(arguments: &Arguments, build_dir: &Path) -> Result<(String, bool)> {
         tool.version()?;
     }
     let folder = build_dir.join(&scene.name).join(&board.name);
-    let absorbed = synthesise(&model, &folder)?;
+    let packed = synthesise(&model, &folder)?;
     let seeds = arguments.seeds.unwrap_or(board.seeds);
     let placed = place(&model, &flow, &folder, seeds, arguments.jobs)?;
     let better =
         |a: &Placed, b: &Placed| a.is_met().cmp(&b.is_met()).then(a.engine.achieved.total_cmp(&b.engine.achieved));
     let (best_seed, best) = placed.iter().max_by(|(_, a), (_, b)| better(a, b)).ok_or_else(|| {
-        anyhow!("{}: no seed of {seeds} could be placed and routed; logs in {}", scene.name, folder.display())
+        anyhow!("{}: none of {seeds} seeds could be placed and routed; logs in {}", scene.name, folder.display())
     })?;
     check_constraints(board, best)?;
     let product = format!("{}.{}", scene.name, flow.bitstream);
-    let reached = reached(&flow, &placed, best);
+    let achieved = summarise_seeds(&flow, &placed, best);
     let of = |(name, clock): (&str, Fmax)| format!("{name} {:.1} MHz of {} MHz", clock.achieved, clock.constraint);
-    let mut lost: Vec<String> = best.clocks().filter(|(_, clock)| !clock.is_met()).map(of).collect();
-    let met = lost.is_empty();
+    let mut failures: Vec<String> = best.clocks().filter(|(_, clock)| !clock.is_met()).map(of).collect();
+    let met = failures.is_empty();
     if met {
-        let arguments = pack_arguments(board.family, &format!("{}.config", try_name(*best_seed)), &product);
+        let arguments = pack_arguments(board.family, &format!("{}.config", seed_prefix(*best_seed)), &product);
         flow.pack.run(&folder, &arguments, "pack.log", synthesis::MINUTES)?;
     }
-    lost.extend(baselines(arguments.update_baselines && met, board, &scene, &reached)?);
+    failures.extend(compare_or_update_baselines(arguments.update_baselines && met, board, &scene, &achieved)?);
     let bitstream = met.then(|| folder.join(product));
-    let implemented = Implemented::new(&model, reached, absorbed, best.link, bitstream, lost);
-    let good = implemented.is_good();
-    Ok((
-        if arguments.json { serde_json::to_string(&implemented)? + "\n" } else { report::implemented(&implemented) },
-        good,
-    ))
+    let report = BitstreamReport::new(&model, achieved, packed, best.link, bitstream, failures);
+    let good = report.is_good();
+    Ok((if arguments.json { serde_json::to_string(&report)? + "\n" } else { report::bitstream(&report) }, good))
 }
 
 /// The table of the committed baselines of built-in scenes, of one scene or board where that is named; the tests' own
@@ -132,11 +129,11 @@ fn committed(scene: Option<&str>, board: Option<&str>) -> Result<String> {
             }
         }
     }
-    ensure!(!all.is_empty(), "{FILE}: nothing of scene {scene:?} on board {board:?}");
-    Ok(report::implementations(&all))
+    ensure!(!all.is_empty(), "{FILE}: no baseline of scene {scene:?} on board {board:?}");
+    Ok(report::summaries(&all))
 }
 
-/// Compares the clocks that place and route was told with those of the board's file.
+/// Checks that the clock constraints seen by place and route are those of the board's file.
 fn check_constraints(board: &Board, placed: &Placed) -> Result<()> {
     let differs = |has: f64, wants: f64| (has / wants - 1.0).abs() > 1e-3;
     let (file, has, wants) = (&board.name, placed.engine.constraint, board.clock_MHz);
@@ -146,15 +143,15 @@ fn check_constraints(board: &Board, placed: &Placed) -> Result<()> {
     if let (Some((pin, clock)), Some(wants)) = (placed.link, board.spi_MHz) {
         let (pins, has) = (board.family.pin_file_extension(), clock.constraint);
         if differs(has, wants) {
-            let pins = format!("constraints/{file}.{pins}: {pin} is meant for {has} MHz");
+            let pins = format!("constraints/{file}.{pins}: {pin} is constrained to {has} MHz");
             return Err(anyhow!("{pins}, {file}.toml says spi_MHz = {wants}"));
         }
     }
     Ok(())
 }
 
-/// Verilog to the netlist that is placed.
-fn synthesise(model: &Model, folder: &Path) -> Result<Absorbed> {
+/// Synthesises the board's Verilog to the netlist for place and route.
+fn synthesise(model: &Model, folder: &Path) -> Result<PackedRegisters> {
     let _progress = Progress::start(&format!("{}: synthesis", model.scene.name));
     let generated = generate_board(model)?;
     let board_files = model.board.files()?;
@@ -167,18 +164,18 @@ fn synthesise(model: &Model, folder: &Path) -> Result<Absorbed> {
     let link = model.scene.hardware.link.name().to_uppercase();
     let (top, board) = (&generated.top, &model.board.name);
     let read = format!("-D DERMIS_TOP={top} -D DERMIS_{link} {board}.v {top}.v");
-    let absorbed = synthesis::synthesise(folder, model.board.family, &read, TOP)?;
+    let packed = synthesis::synthesise(folder, model.board.family, &read, TOP)?;
     if let Some(blocks) = &model.board.multiplier_blocks {
-        synthesis::edit(folder, |netlist| floor_plan::plan(netlist, TOP, blocks))?;
+        synthesis::edit(folder, |netlist| floor_plan::assign_sites(netlist, TOP, blocks))?;
     }
-    Ok(absorbed)
+    Ok(packed)
 }
 
-/// Places and routes with seeds 1 … `seeds`, `jobs` at a time; those that came to an end.
+/// Places and routes with seeds 1 … `seeds`, `jobs` at a time; returns the seeds that completed.
 fn place(model: &Model, flow: &Flow, folder: &Path, seeds: u32, jobs: u32) -> Result<Vec<(u32, Placed)>> {
     let what = format!("{}: place and route", model.board.name);
     let place = |seed| match place_seed(model, flow, folder, seed) {
-        // What a seed does not converge to is no error of the call.
+        // A seed that does not converge is skipped as long as there are others.
         Err(ToolError::Late { .. } | ToolError::Failed { .. }) if seeds > 1 => Ok(None),
         placed => Ok(Some((seed, placed?))),
     };
@@ -186,15 +183,15 @@ fn place(model: &Model, flow: &Flow, folder: &Path, seeds: u32, jobs: u32) -> Re
     Ok(placed.into_iter().flatten().collect())
 }
 
-/// What a seed's files begin with.
-fn try_name(seed: u32) -> String {
+/// Prefix of a seed's files.
+fn seed_prefix(seed: u32) -> String {
     format!("seed{seed}")
 }
 
-/// One seed, by the first placer that converges.
+/// Places and routes one seed with the first of the board's placers that converges.
 fn place_seed(model: &Model, flow: &Flow, folder: &Path, seed: u32) -> Result<Placed, ToolError> {
     let board = &model.board;
-    let name = try_name(seed);
+    let name = seed_prefix(seed);
     let mut last = Err(ToolError::Missing { tool: flow.place.name });
     for placer in &board.placers {
         let arguments = place_arguments(board, NETLIST, seed, placer, &name);
@@ -208,9 +205,9 @@ fn place_seed(model: &Model, flow: &Flow, folder: &Path, seed: u32) -> Result<Pl
     Placed::read(&report, synthesis::cells(folder, TOP)?, model.scene.hardware.link.clock())
 }
 
-/// The figures of all seeds; cells of the `best`.
-fn reached(flow: &Flow, placed: &[(u32, Placed)], best: &Placed) -> Baseline {
-    // Of an even number of seeds the slower of the two in the middle: the median's larger one, of periods.
+/// Clock figures over all seeds, and the cells of the `best`.
+fn summarise_seeds(flow: &Flow, placed: &[(u32, Placed)], best: &Placed) -> Baseline {
+    // The median is taken of periods: of an even number of seeds it is then the slower of the two middle ones.
     let periods = || placed.iter().map(|(_, placed)| 1.0 / placed.engine.achieved);
     let rounded = |clock: f64| (clock * 10.0).round() / 10.0;
     Baseline {
@@ -225,16 +222,16 @@ fn reached(flow: &Flow, placed: &[(u32, Placed)], best: &Placed) -> Baseline {
     }
 }
 
-/// Writes the baseline, or says in what the scene has become worse than its one.
-fn baselines(update: bool, board: &Board, scene: &Scene, reached: &Baseline) -> Result<Vec<String>> {
+/// Writes the baseline, or returns the regressions against it.
+fn compare_or_update_baselines(update: bool, board: &Board, scene: &Scene, achieved: &Baseline) -> Result<Vec<String>> {
     let path = Path::new(FILE);
     let mut all = Baselines::read(path)?;
     if update {
-        all.0.entry(board.name.clone()).or_default().insert(scene.name.clone(), reached.clone());
+        all.0.entry(board.name.clone()).or_default().insert(scene.name.clone(), achieved.clone());
         all.write(path)?;
         return Ok(Vec::new());
     }
-    Ok(all.get(&board.name, &scene.name).map_or_else(Vec::new, |was| was.losses(reached)))
+    Ok(all.get(&board.name, &scene.name).map_or_else(Vec::new, |was| was.regressions(achieved)))
 }
 
 #[cfg(test)]
@@ -250,26 +247,26 @@ mod tests {
     fn the_median_of_two_seeds_is_the_slower_one() {
         let seeds = [(1, placed(94.52)), (2, placed(107.2)), (3, placed(101.0))];
         let clocks = |seeds: &[(u32, Placed)]| {
-            let reached = reached(&flow(dermis_golden::board::Family::Ecp5), seeds, &seeds[1].1);
-            [reached.best_MHz, reached.median_MHz, reached.worst_MHz]
+            let achieved = summarise_seeds(&flow(dermis_golden::board::Family::Ecp5), seeds, &seeds[1].1);
+            [achieved.best_MHz, achieved.median_MHz, achieved.worst_MHz]
         };
         assert_eq!(clocks(&seeds), [107.2, 101.0, 94.5]);
         assert_eq!(clocks(&seeds[..2]), [107.2, 94.5, 94.5]);
     }
 
     #[test]
-    fn a_clock_that_place_and_route_was_not_told_is_named() {
+    fn a_clock_constraint_that_differs_from_the_board_file_is_an_error() {
         let board = Board::load("icebreaker").unwrap();
-        let told = |engine: f64, link: f64| {
+        let check = |engine: f64, link: f64| {
             let clock = |constraint| Fmax { achieved: 99.0, constraint };
             let link = Some(("spi_sclk", clock(link)));
             let placed = Placed { engine: clock(engine), link, cells: BTreeMap::new() };
             check_constraints(&board, &placed).map_err(|error| error.to_string())
         };
-        assert_eq!(told(25.505, 25.0), Ok(()));
+        assert_eq!(check(25.505, 25.0), Ok(()));
         let wanted = "constraints/icebreaker.v: its PLL gives 12 MHz, icebreaker.toml says clock_MHz = 25.5";
-        assert_eq!(told(12.0, 25.0), Err(wanted.to_string()));
-        let wanted = "constraints/icebreaker.pcf: spi_sclk is meant for 12 MHz, icebreaker.toml says spi_MHz = 25";
-        assert_eq!(told(25.5, 12.0), Err(wanted.to_string()));
+        assert_eq!(check(12.0, 25.0), Err(wanted.to_string()));
+        let wanted = "constraints/icebreaker.pcf: spi_sclk is constrained to 12 MHz, icebreaker.toml says spi_MHz = 25";
+        assert_eq!(check(25.5, 12.0), Err(wanted.to_string()));
     }
 }

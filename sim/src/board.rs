@@ -1,21 +1,21 @@
-//! A board without a board: its top module under Verilator, the other end of its link, and a pseudo-terminal that a host
-//! opens.
+//! Simulated boards: the board's top module under Verilator, the host end of its link, and a pseudo-terminal that a
+//! host program can open.
 //!
 //! ```text
-//! host --- pseudo-terminal --- Wire --- UartLine --- BoardDevice (board top: UART, packets, engine)
-//!                              drops, flips, delays
+//! host --- pseudo-terminal --- NoisyChannel --- HostUart --- BoardDevice (board top: UART, packets, engine)
+//!                              loses, flips, delays bytes
 //! bytes ---------------------------- SpiController --- BoardDevice (board top: SPI slave, packets, engine)
 //! ```
 
 mod controller;
-mod line;
+mod host_uart;
+mod noisy_channel;
 mod terminal;
-mod wire;
 
 pub use controller::SpiController;
-pub use line::{Sent, UartLine};
-pub use terminal::Terminal;
-pub use wire::{Faults, Wire};
+pub use host_uart::{HostUart, UartSymbol};
+pub use noisy_channel::{ChannelFaults, NoisyChannel};
+pub use terminal::PseudoTerminal;
 
 use std::path::Path;
 
@@ -23,36 +23,36 @@ use dermis_golden::link::LinkKind;
 use dermis_hdl::link::{BoardDevice, BoardOutputs};
 use dermis_hdl::Generated;
 
-use crate::verilator::{Bench, Design, VerilatorError};
+use crate::verilator::{Design, VerilatedBench, VerilatorError};
 
-/// Words of the bench's output; the shim takes no fewer.
+/// Length of the bench's vector `out` in 32-bit words, the shim's minimum.
 const OUT_WORDS: usize = 4;
 
 /// A board's top module under Verilator.
-pub struct VerilatedBoard(Bench);
+pub struct VerilatedBoard(VerilatedBench);
 
 impl VerilatedBoard {
-    /// Builds what [`dermis_hdl::link::generate_board`] gives for a scene with this `link`, or takes it from `cache`, and
-    /// starts it.
+    /// Builds the board of [`dermis_hdl::link::generate_board`] for a scene with this `link`, or takes it from `cache`,
+    /// and starts it.
     ///
     /// # Errors
-    /// As for the engine.
+    /// [`VerilatorError`]: no Verilator, a design that it refuses, or files that cannot be written.
     pub fn new(generated: &Generated, link: LinkKind, cache: &Path) -> Result<Self, VerilatorError> {
         let top = &generated.top;
         let inputs = link.inputs().iter().enumerate();
         let inputs: String = inputs.map(|(at, pin)| format!(".{pin}(in[{}]), ", at + 1)).collect();
         let output = link.output();
         let bench = format!(
-            "// Test bench of {top}: pins packed into two vectors, the clock among them, which is not the only one. Generated, \
-             do not edit.\n\
+            "// Test bench of {top}: pins packed into two vectors, clk among them, as an SPI has a second clock. \
+             Generated, do not edit.\n\
              module bench(input wire clk, input wire [63:0] in, output wire [127:0] out);\n  \
              assign out[127:4] = 124'd0;\n  \
              {top} dut(.clk(in[0]), .button(1'b0), {inputs}.{output}(out[0]),\n    \
              .alive(out[1]), .busy(out[2]), .error(out[3]));\nendmodule\n"
         );
         let files = generated.files.iter().map(|f| (f.name.as_str(), f.text.as_str())).collect();
-        let design = Design { top, files, taps: &[], input_bits: 1, writable: false };
-        Bench::new(&design, &bench, OUT_WORDS, cache).map(VerilatedBoard)
+        let design = Design { top, files, taps: &[], input_bits: 1, writable_state: false };
+        VerilatedBench::new(&design, &bench, OUT_WORDS, cache).map(VerilatedBoard)
     }
 }
 

@@ -1,11 +1,11 @@
-//! The `dermis` command: arguments, commands, exit codes.
+//! The `dermis` command line: arguments, commands, exit codes.
 //!
 //! | exit code | when |
 //! |---|---|
-//! | 0 | done, and equal where something was compared |
-//! | 1 | hardware and model differ, a tool failed on generated files, or this program contradicts itself |
-//! | 2 | the input or the call is wrong, a file cannot be used, or a needed program is not installed |
-//! | 130 | interrupted |
+//! | 0 | success; every comparison was equal |
+//! | 1 | hardware and model differ, a tool failed on generated files, or an internal check failed |
+//! | 2 | an argument or input is wrong, a file cannot be used, or a needed program is not installed |
+//! | 130 | interrupted by SIGINT or SIGTERM |
 
 use std::io::{ErrorKind, Write};
 use std::path::{Path, PathBuf};
@@ -26,11 +26,11 @@ use dermis_hdl::link::generate_board;
 use dermis_hdl::{generate, manifest, HdlError};
 
 use crate::bitstream::tools::ToolError;
-use crate::compare::{compared, difference};
-use crate::fresh::Fresh;
-use crate::hardware::{Hardware, Simulator, Stuck};
+use crate::compare::{comparable_forces, difference};
+use crate::drawn_frames::DrawnFrames;
+use crate::hardware::{DeviceTimeout, Hardware, Simulator};
 use crate::host::HostError;
-use crate::inputs::{resolve, resolve_one, OnBoard};
+use crate::inputs::{resolve, resolve_one, BoardOverride};
 use crate::progress::Progress;
 use crate::report::{self, CosimReport, Format};
 use crate::tabulate::tabulate;
@@ -38,11 +38,11 @@ use crate::verify::{verify, Verified};
 use crate::verilator::VerilatorError;
 use dermis_golden::write::write;
 
-/// Normal stress under a tactile array in, a force vector per taxel out, in hardware within 1 ms.
+/// Reconstruct a 3-D force per taxel from the normal stress on a tactile array, in generated hardware within 1 ms.
 #[derive(Parser, Debug)]
 #[command(name = "dermis", version, arg_required_else_help = true, after_help = EXAMPLES)]
 struct Arguments {
-    /// Folder for everything built on the way.
+    /// Folder for build products and caches.
     #[arg(long, global = true, value_name = "DIR", default_value = "build")]
     build_dir: PathBuf,
     #[command(subcommand)]
@@ -52,18 +52,18 @@ struct Arguments {
 const EXAMPLES: &str = "Examples:
   dermis reconstruct sensor-1                        the scene's first shipped frame, golden model
   dermis reconstruct --frame press.json --json       scene from the sensor in the frame file
-  dermis reconstruct sensor-1 --engine rtl           the same in the Verilated hardware
+  dermis reconstruct sensor-1 --engine rtl           the same in the generated hardware, under Verilator
   dermis build eight-by-eight --out rtl              Verilog, memory files, manifest.json
-  dermis bitstream eight-by-eight                    the same placed and routed for its board
-  dermis host --port /dev/ttyUSB0 press.json         a frame to a board, its resultants back
+  dermis bitstream eight-by-eight                    synthesis, place and route for its board
+  dermis host --port /dev/ttyUSB0 press.json         send a frame to a board, print the resultants
   dermis cosim sensor-1                              all shipped frames, model against hardware
-  dermis table                                       errors of all scenes, beside the paper's
-  dermis noise sensor-1                              errors under noise, beside the Cramér–Rao bound
-  dermis report                                      a page: which case and format to take, errors against time
+  dermis table                                       errors of all scenes, next to the paper's
+  dermis noise sensor-1                              errors under noise, next to the Cramér–Rao bound
+  dermis report                                      HTML page: recommended cases and formats, error against time
   dermis generate sensor-3 --random 2 --out two.json  a frame with known forces
-  dermis stability --plot stability.svg              errors against a scene's condition
-  dermis stress                                      gaps, wrong tlast and resets, sensor-1
-  dermis faults                                      1000 flipped bits in ROM, RAM and registers, sensor-1";
+  dermis stability --plot stability.svg              error against the condition number
+  dermis stress                                      gaps, wrong tlast and resets on sensor-1
+  dermis faults                                      1000 bit flips in ROM, RAM and registers of sensor-1";
 
 #[derive(Subcommand, Debug)]
 enum Command {
@@ -76,101 +76,101 @@ enum Command {
     Reconstruct {
         /// Built-in name or path of a scene; may be left out when the frame holds its sensor.
         scene: Option<String>,
-        /// Frame file (.json, .csv) or `eq2`; without it the scene's first shipped frame. Repeat it 2^k times where the
+        /// Frame file (.json, .csv) or `eq2`; default: the scene's first shipped frame. Repeat it 2^k times if the
         /// scene has input.average = k.
         #[arg(long = "frame", value_name = "FILE")]
         frames: Vec<String>,
-        /// What computes.
+        /// Model or hardware that computes the forces.
         #[arg(long, value_enum, default_value = "golden")]
         engine: Engine,
         /// Print the result as JSON and nothing else.
         #[arg(long)]
         json: bool,
         #[command(flatten)]
-        target: OnBoard,
+        target: BoardOverride,
     },
-    /// Generate the hardware of a scene.
+    /// Generate the Verilog of a scene.
     #[command(after_help = "Examples:
   dermis build sensor-1 --out rtl
   dermis build sensor-4 --explain
-  dermis build sensor-1 --board                      with its link and packets, ready for place and route
-  dermis build eight-by-eight --target-board icebreaker     the serial engine of a small device")]
+  dermis build sensor-1 --board                      engine, link and packets, ready for place and route
+  dermis build eight-by-eight --target-board icebreaker     the serial engine, for small devices")]
     Build {
         /// Built-in name or path of a scene.
         scene: String,
-        /// Folder for the files; without it <build-dir>/<scene>/rtl.
+        /// Folder for the files; default: <build-dir>/<scene>/rtl.
         #[arg(long, value_name = "DIR")]
         out: Option<PathBuf>,
-        /// Print what the scene needs, what is left out, and what that saves.
+        /// Print which optional features the scene uses, which are left out, and what that saves.
         #[arg(long)]
         explain: bool,
-        /// The whole board, the engine behind its link, in place of the engine alone.
+        /// Generate the board top (engine, link and packets) instead of the engine alone.
         #[arg(long)]
         board: bool,
         #[command(flatten)]
-        target: OnBoard,
+        target: BoardOverride,
     },
-    /// Make the bitstream of a scene for its board, with open tools.
+    /// Make the bitstream of a scene for its board with open tools.
     Bitstream(crate::bitstream::Arguments),
-    /// Check that a generated folder is whole: every file against manifest.json, and that against its checksum.
+    /// Check the files of a generated folder against manifest.json, and manifest.json against its checksum.
     #[command(after_help = "Example:
   dermis check build/sensor-1/rtl")]
     Check {
-        /// Folder that `dermis build` wrote.
+        /// Folder written by `dermis build`.
         folder: PathBuf,
     },
     /// Send frames to a board and receive forces.
     Host(crate::host::Arguments),
-    /// Simulate a board on a pseudo-terminal, for a host that has none.
+    /// Simulate a board on a pseudo-terminal, to run `dermis host` without hardware.
     #[command(after_help = "Example:
   dermis board eight-by-eight       prints the port for `dermis host --port`, and runs until interrupted")]
     Board {
         /// Built-in name or path of a scene.
         scene: String,
         #[command(flatten)]
-        target: OnBoard,
+        target: BoardOverride,
     },
     /// Compare simulated hardware with the bit-true model, stage by stage and cycle by cycle.
     #[command(after_help = "Examples:
   dermis cosim sensor-1
   dermis cosim sensor-1 --frame a.json --frame b.csv --json
   dermis cosim eight-by-eight --device rust-hdl
-  dermis cosim eight-by-eight --device netlist       what synthesis makes of it, minutes
-  dermis cosim eight-by-eight --target-board icebreaker     the serial engine of a small device
-  dermis cosim sensor-1 --device verilator --waves   and prints the GTKWave command")]
+  dermis cosim eight-by-eight --device netlist       the netlist after synthesis (minutes)
+  dermis cosim eight-by-eight --target-board icebreaker     the serial engine, for small devices
+  dermis cosim sensor-1 --device verilator --waves   with a VCD file, prints the GTKWave command")]
     Cosim {
         /// Built-in name or path of a scene; may be left out when the first frame holds its sensor.
         scene: Option<String>,
-        /// Frame file (.json, .csv) or `eq2`, repeatable; without it all shipped frames of the scene.
+        /// Frame file (.json, .csv) or `eq2`, repeatable; default: all shipped frames of the scene.
         #[arg(long = "frame", value_name = "FILE")]
         frames: Vec<String>,
         /// Print the report as JSON and nothing else.
         #[arg(long)]
         json: bool,
-        /// What simulates the hardware.
+        /// Simulator of the hardware.
         #[arg(long, value_enum, default_value = "both")]
         device: DeviceChoice,
-        /// Write the pins and stages of the run at full speed to <build-dir>/<scene>/waves, with a list for GTKWave.
+        /// Write pins and stages of the full-speed run to <build-dir>/<scene>/waves as VCD, with a GTKWave signal list.
         #[arg(long, conflicts_with = "json")]
         waves: bool,
         #[command(flatten)]
-        target: OnBoard,
+        target: BoardOverride,
     },
-    /// Measure errors and times of all engines, and write them as a page with pictures.
+    /// Measure errors and times of all engines and write an HTML page with tables and pictures.
     Report(report::Arguments),
-    /// Make a frame with known forces from described contacts.
+    /// Generate a frame with known forces from contact descriptions.
     Generate(crate::generate::Arguments),
-    /// Measure errors of double, single and fixed point against a scene's condition, or on extreme frames.
+    /// Measure errors of double, single and fixed point against the condition number, or on extreme frames.
     Stability(crate::stability::Arguments),
-    /// Try the simulated hardware's streams under gaps, back-pressure, wrong tlast and resets.
+    /// Test the simulated hardware's AXI streams with gaps, back-pressure, wrong tlast and resets.
     Stress(crate::stress::Arguments),
-    /// Flip single bits of the simulated hardware and tell what is detected, harmless or silent.
+    /// Flip single bits of the simulated hardware and count harmless, detected, hanging and silent faults.
     Faults(crate::faults::Arguments),
     /// Print a comparison of the guide: input bits, dead taxels, several contacts, links.
     Study(crate::study::Arguments),
-    /// Write the tables of README.md and of the guide by the commands that they name, or tell which are stale.
+    /// Write the tables and pictures of README.md and the guide with the commands named there, or report stale ones.
     Guide(crate::guide_pages::Arguments),
-    /// Print the errors of scenes in the paper's cases on their shipped frames, beside the paper's.
+    /// Print the errors of scenes in the paper's cases on their shipped frames, next to the paper's.
     #[command(after_help = "Examples:
   dermis table                                       every built-in scene, cases 0 to 3
   dermis table sensor-1 --case 0 --format csv
@@ -178,22 +178,22 @@ enum Command {
   dermis table sensor-3 --case contacts --fresh 40 --contacts 2 --contacts 3 --shapes other
   dermis table sensor-1 eight-by-eight --cosim       co-simulate, one line per scene")]
     Table {
-        /// Built-in names or paths of scenes; without any all built-in ones.
+        /// Built-in names or paths of scenes; default: all built-in ones.
         #[arg(required_if_eq("cosim", "true"))]
         scenes: Vec<String>,
-        /// Case, repeatable: 0 to 3, ROWSxCOLS, adaptive, contacts; without it 0 to 3.
+        /// Case, repeatable: 0 to 3, ROWSxCOLS, adaptive, contacts; default: 0 to 3.
         #[arg(long = "case", value_name = "CASE")]
         cases: Vec<Case>,
         #[command(flatten)]
-        fresh: Fresh,
-        /// Form of the table.
+        drawn: DrawnFrames,
+        /// Output format.
         #[arg(long, value_enum, default_value = "markdown", conflicts_with = "cosim")]
         format: Format,
-        /// Co-simulate the hardware in place of the errors: one line per scene.
+        /// Co-simulate the hardware and print one line per scene instead of the errors.
         #[arg(long, conflicts_with_all = ["cases", "frames"])]
         cosim: bool,
     },
-    /// Measure the shear's error under noise, beside the Cramér–Rao bound.
+    /// Measure the shear error under noise, next to the Cramér–Rao bound.
     #[command(after_help = "Examples:
   dermis noise sensor-1
   dermis noise sensor-1 --frames 1 --medians
@@ -201,25 +201,25 @@ enum Command {
     Noise {
         /// Built-in name or path of a scene.
         scene: String,
-        /// Noise as a share of max |b|, repeatable; without it 0, 0.0001, 0.0005, 0.002 and 0.01.
+        /// Standard deviation of the noise over max |b|, repeatable; default: 0, 0.0001, 0.0005, 0.002, 0.01.
         #[arg(long = "level", value_name = "SHARE")]
         levels: Vec<f64>,
-        /// Random contacts.
+        /// Number of random contacts.
         #[arg(long, default_value_t = 200)]
         draws: usize,
-        /// Of contacts and noise.
+        /// Seed of contacts and noise.
         #[arg(long, default_value_t = 1)]
         seed: u64,
-        /// Frames averaged in the table's second half; 1 leaves it out.
+        /// Frames averaged in the second half of the table; 1 omits that half.
         #[arg(long, default_value_t = 64)]
         frames: usize,
-        /// Objective, repeatable; without it all.
+        /// Objective, repeatable; default: all.
         #[arg(long = "objective", value_name = "NAME", value_parser = objective)]
         objectives: Vec<ObjectiveKind>,
         /// Only the median errors: a line per level, a column per objective.
         #[arg(long, conflicts_with = "format")]
         medians: bool,
-        /// Form of the table.
+        /// Output format.
         #[arg(long, value_enum, default_value = "markdown")]
         format: Format,
     },
@@ -227,23 +227,23 @@ enum Command {
 
 #[derive(ValueEnum, Clone, Copy, Debug)]
 enum Engine {
-    /// Floating point.
+    /// The floating-point model.
     Golden,
     /// The bit-true integer model.
     Fixed,
-    /// The generated Verilog under Verilator.
+    /// The generated Verilog, under Verilator.
     Rtl,
 }
 
 #[derive(ValueEnum, Clone, Copy, Debug)]
 enum DeviceChoice {
-    /// The generated Verilog.
+    /// The generated Verilog, under Verilator.
     Verilator,
-    /// rust-hdl's own simulation.
+    /// The same design in rust-hdl's own simulator.
     RustHdl,
-    /// Verilog and rust-hdl, one after the other.
+    /// Verilator, then rust-hdl.
     Both,
-    /// What synthesis for the board makes of the Verilog: beats and cycles, no stages. Minutes.
+    /// The netlist synthesised for the board, under Verilator: compares beats and cycles, not stages; takes minutes.
     Netlist,
 }
 
@@ -258,7 +258,7 @@ impl DeviceChoice {
     }
 }
 
-/// Runs the command of this process's arguments.
+/// Parses the process's arguments and runs the command.
 pub fn main() -> ExitCode {
     let arguments = Arguments::parse();
     let outcome = run(&arguments).and_then(|(text, good)| print(&text).map(|()| good));
@@ -280,8 +280,8 @@ pub fn check_arguments<'a>(words: impl IntoIterator<Item = &'a str>) -> Result<(
     Arguments::try_parse_from(words).map(drop)
 }
 
-/// 1 for what is this program's own fault, a tool that failed on generated files among it; 2 for what the caller can
-/// mend; 130, as shells have it, where they interrupted.
+/// The exit code of an error: 1 for internal errors and for tools that fail on generated files, 2 for wrong input,
+/// unusable files and missing programs, 130 for an interruption.
 fn exit_code(error: &anyhow::Error) -> u8 {
     if error.is::<report::Interrupted>() {
         return 130;
@@ -290,7 +290,7 @@ fn exit_code(error: &anyhow::Error) -> u8 {
         error.downcast_ref::<VerilatorError>(),
         Some(VerilatorError::Build { .. } | VerilatorError::Library { .. })
     );
-    let hardware = error.is::<Stuck>() || matches!(error.downcast_ref::<HdlError>(), Some(HdlError::Check(_)));
+    let hardware = error.is::<DeviceTimeout>() || matches!(error.downcast_ref::<HdlError>(), Some(HdlError::Check(_)));
     let model = matches!(error.downcast_ref::<FixedError>(), Some(FixedError::Internal(_) | FixedError::Beats { .. }));
     let board = matches!(error.downcast_ref::<HostError>(), Some(HostError::Answer { .. }));
     let flow = matches!(
@@ -304,15 +304,15 @@ fn exit_code(error: &anyhow::Error) -> u8 {
     }
 }
 
-/// The text for stdout, and whether all that was compared is equal.
+/// Runs the command: the text for stdout, and whether every comparison was equal.
 fn run(arguments: &Arguments) -> Result<(String, bool)> {
     let build_dir = &arguments.build_dir;
     cache::set_folder(Some(&build_dir.join("matrices")));
     match &arguments.command {
         Command::Reconstruct { scene, frames, engine, json, target } => {
             let (scene, frames) = resolve_one(scene.as_deref(), frames)?;
-            let scene = target.put(scene);
-            // Seconds where the matrices are large.
+            let scene = target.apply(scene);
+            // Large matrices take seconds.
             let _progress = Progress::start(&format!("{}: reconstruction", scene.name));
             let (result, full_scale_MPa) = reconstruct(&scene, &frames, *engine, build_dir)?;
             if *json {
@@ -325,14 +325,14 @@ fn run(arguments: &Arguments) -> Result<(String, bool)> {
             Ok((text, true))
         }
         Command::Build { scene, out, explain, board, target } => {
-            let scene = target.put(Scene::load(scene)?);
+            let scene = target.apply(Scene::load(scene)?);
             let folder = if *board { "board" } else { "rtl" };
             let out = out.clone().unwrap_or_else(|| build_dir.join(&scene.name).join(folder));
             Ok((build(&scene, &out, *board, *explain)?, true))
         }
         Command::Cosim { scene, frames, json, device, waves, target } => {
             let (scene, frames) = resolve(scene.as_deref(), frames)?;
-            let scene = target.put(scene);
+            let scene = target.apply(scene);
             let verified = verify(&scene, &frames, device.simulators(), build_dir)?;
             let mut text = if *json {
                 serde_json::to_string(&CosimReport::new(&verified))? + "\n"
@@ -349,11 +349,11 @@ fn run(arguments: &Arguments) -> Result<(String, bool)> {
         Command::Bitstream(arguments) => crate::bitstream::run(arguments, build_dir),
         Command::Check { folder } => {
             let files = manifest::check(folder)?;
-            Ok((format!("{}: {files} files, whole\n", folder.display()), true))
+            Ok((format!("{}: {files} files match manifest.json\n", folder.display()), true))
         }
         Command::Host(arguments) => crate::host::run(arguments),
         Command::Board { scene, target } => {
-            let scene = target.put(Scene::load(scene)?);
+            let scene = target.apply(Scene::load(scene)?);
             let terminal = Hardware::new(Model::new(&scene)?, build_dir)?.terminal()?;
             print(&format!("{}\n", terminal.path().display()))?;
             terminal.wait()?;
@@ -366,8 +366,8 @@ fn run(arguments: &Arguments) -> Result<(String, bool)> {
         Command::Stress(arguments) => crate::stress::run(arguments, build_dir),
         Command::Study(arguments) => Ok((crate::study::run(arguments)?, true)),
         Command::Guide(arguments) => crate::guide_pages::run(arguments, build_dir),
-        Command::Table { scenes, cases, fresh, format, cosim: false } => {
-            Ok((table(scenes, cases, fresh, *format)?, true))
+        Command::Table { scenes, cases, drawn, format, cosim: false } => {
+            Ok((table(scenes, cases, drawn, *format)?, true))
         }
         Command::Noise { scene, levels, draws, seed, frames, objectives, medians, format } => {
             let mut wanted = Study { draws: *draws, seed: *seed, frames: *frames, ..Study::default() };
@@ -379,7 +379,7 @@ fn run(arguments: &Arguments) -> Result<(String, bool)> {
             }
             let scene = Scene::load(scene)?;
             let bar = Progress::steps(&format!("{}: noise", scene.name), 0);
-            let rows = study(&scene, &wanted, &mut |done, total| bar.of(done as u64, total as u64))?;
+            let rows = study(&scene, &wanted, &mut |done, total| bar.set_of(done as u64, total as u64))?;
             let text = if *medians { report::noise_medians(&rows) } else { report::noise(&rows, *format)? };
             Ok((text, true))
         }
@@ -395,17 +395,17 @@ fn run(arguments: &Arguments) -> Result<(String, bool)> {
     }
 }
 
-/// The error table of scenes, all built-in ones when none is named.
-fn table(scenes: &[String], cases: &[Case], fresh: &Fresh, format: Format) -> Result<String> {
+/// The error table of the named scenes, or of all built-in ones.
+fn table(scenes: &[String], cases: &[Case], drawn: &DrawnFrames, format: Format) -> Result<String> {
     let builtin = || Scene::builtin_names().into_iter().map(str::to_owned).collect();
     let scenes: Vec<String> = if scenes.is_empty() { builtin() } else { scenes.to_vec() };
     let numbered: Vec<Case> = (0..4).filter_map(Case::numbered).collect();
     let cases = if cases.is_empty() { &numbered } else { cases };
-    let mut lines = Vec::new();
+    let mut rows = Vec::new();
     for name in &scenes {
-        let (scene, frames) = if fresh.frames > 0 {
+        let (scene, frames) = if drawn.frames > 0 {
             let scene = Scene::load(name)?;
-            let frames = fresh.draw(&scene)?;
+            let frames = drawn.draw(&scene)?;
             (scene, frames)
         } else {
             resolve(Some(name), &[])?
@@ -414,21 +414,21 @@ fn table(scenes: &[String], cases: &[Case], fresh: &Fresh, format: Format) -> Re
         let mut done = 0;
         let mut step = || {
             done += 1;
-            bar.at(done);
+            bar.set(done);
         };
-        lines.extend(tabulate(&scene, cases, &frames, &mut step)?);
+        rows.extend(tabulate(&scene, cases, &frames, &mut step)?);
     }
-    report::errors(&lines, format)
+    report::errors(&rows, format)
 }
 
-/// An objective by its name in scenes.
+/// Parses an objective by its name in scene files.
 fn objective(name: &str) -> Result<ObjectiveKind, String> {
     let names = ObjectiveKind::NAMES;
     let known = || names.map(|(name, _)| name).join(", ");
     names.iter().find(|(known, _)| *known == name).map(|(_, kind)| *kind).ok_or_else(|| format!("one of {}", known()))
 }
 
-/// The result and the stress in MPa of the largest code.
+/// The result of one engine, and the stress in MPa of the largest code.
 fn reconstruct(scene: &Scene, frames: &[Frame], engine: Engine, build_dir: &Path) -> Result<(Reconstruction, f64)> {
     let model = || Model::for_frames(scene, frames);
     let stress = |model: &Model| Ok::<_, anyhow::Error>(full_scale(&model.scene, &model.stress(frames)?));
@@ -449,17 +449,17 @@ fn reconstruct(scene: &Scene, frames: &[Frame], engine: Engine, build_dir: &Path
     Ok(result)
 }
 
-/// One line: how far a result is from the floating-point model's.
+/// One line: the difference between a result and the floating-point model's.
 fn against_golden(scene: &Scene, frames: &[Frame], result: &Reconstruction) -> Result<String> {
     let golden = Golden::new(scene)?.run_averaged(frames)?;
     let model = Model::for_frames(scene, frames)?;
     let lsb_N = model.force_lsb_N(full_scale(&model.scene, &model.stress(frames)?));
-    Ok(report::difference(&difference(&compared(&golden), &compared(result), lsb_N)))
+    Ok(report::difference(&difference(&comparable_forces(&golden), &comparable_forces(result), lsb_N)))
 }
 
-/// Writes the generated files, each complete or not at all, and lists them.
+/// Writes the generated files, each completely or not at all; returns their list and the resource tables.
 fn build(scene: &Scene, out: &Path, board: bool, with_features: bool) -> Result<String> {
-    // Seconds where the matrices are large, more where remedies are tried.
+    // Large matrices take seconds; a design that does not fit takes longer, while other settings are tried.
     let progress = Progress::start(&format!("{}: model and Verilog", scene.name));
     let model = Model::new(scene)?;
     let mut generated = if board { generate_board(&model)? } else { generate(&model)? };
@@ -484,7 +484,7 @@ fn build(scene: &Scene, out: &Path, board: bool, with_features: bool) -> Result<
     Ok(text)
 }
 
-/// Writes to stdout; a reader that has gone away is no error.
+/// Writes to stdout; a closed pipe is not an error.
 fn print(text: &str) -> Result<()> {
     match std::io::stdout().lock().write_all(text.as_bytes()) {
         Err(error) if error.kind() != ErrorKind::BrokenPipe => Err(anyhow!("standard output: {error}")),
@@ -499,11 +499,11 @@ mod tests {
     use dermis_golden::write::FileError;
 
     #[test]
-    fn own_faults_exit_with_1_and_what_the_caller_can_mend_with_2() {
+    fn internal_errors_exit_with_1_and_input_errors_with_2() {
         let io = |kind| VerilatorError::File(FileError { path: "build".into(), source: ErrorKind::into(kind) });
-        let stuck = Stuck { frame: "press".into(), cycle: 7, rule: "nothing moved".into() };
+        let stuck = DeviceTimeout { frame: "press".into(), cycle: 7, rule: "no transfer".into() };
         let answer = HostError::Answer { port: "p".into(), what: "forces", bytes: 7 };
-        let own: [anyhow::Error; 7] = [
+        let internal: [anyhow::Error; 7] = [
             VerilatorError::Build { design: "d".into(), folder: "f".into(), log: "l".into() }.into(),
             VerilatorError::Library { path: "l".into(), reason: "r".into() }.into(),
             HdlError::Check("loop".into()).into(),
@@ -513,7 +513,7 @@ mod tests {
             answer.into(),
         ];
         let version = HostError::Version { port: "p".into(), has: 2, wants: 1 };
-        let callers: [anyhow::Error; 7] = [
+        let input: [anyhow::Error; 7] = [
             VerilatorError::Missing.into(),
             VerilatorError::MissingTool { program: "make" }.into(),
             io(ErrorKind::PermissionDenied).into(),
@@ -522,7 +522,7 @@ mod tests {
             version.into(),
             anyhow!("rtl: File exists"),
         ];
-        for (errors, code) in [(own, 1), (callers, 2)] {
+        for (errors, code) in [(internal, 1), (input, 2)] {
             for error in errors {
                 assert_eq!(exit_code(&error), code, "{error}");
             }

@@ -12,7 +12,7 @@ use dermis_golden::frame::Forces;
 use dermis_golden::reconstruct::Reconstruction;
 use serde::Serialize;
 
-/// How far two force fields are apart.
+/// Difference between two force fields.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct Difference {
     /// Largest difference of a component, in LSBs.
@@ -25,8 +25,8 @@ pub struct Difference {
     pub rms_share: f64,
 }
 
-/// What two results are compared by: their forces, or their resultants where these take their place.
-pub fn compared(result: &Reconstruction) -> Forces {
+/// The forces by which results are compared: per taxel, or the resultants where the scene outputs only those.
+pub fn comparable_forces(result: &Reconstruction) -> Forces {
     match &result.extra.resultants {
         None => result.forces_N.clone(),
         Some(all) => {
@@ -49,12 +49,12 @@ pub fn difference(reference: &Forces, other: &Forces, lsb_N: f64) -> Difference 
     Difference { max_lsb: max / lsb_N, rms_lsb: rms / lsb_N, max_share: share(max), rms_share: share(rms) }
 }
 
-/// The middle value; of an even number of values the larger of the two middle ones. `None` without values.
+/// Median; of an even number of values the larger of the two middle ones. `None` without values.
 pub fn median(values: Vec<f64>) -> Option<f64> {
     quantile(values, 0.5)
 }
 
-/// The smallest value that more than a share of the values, 0 … 1, does not exceed. `None` without values.
+/// Quantile `share` (0 … 1): the value at index ⌊share · n⌋ in sorted order, at most the last. `None` without values.
 pub fn quantile(mut values: Vec<f64>, share: f64) -> Option<f64> {
     values.sort_by(f64::total_cmp);
     let last = values.len().checked_sub(1)?;
@@ -78,7 +78,7 @@ mod tests {
     }
 
     #[test]
-    fn no_force_at_all_is_no_difference() {
+    fn zero_forces_give_zero_difference() {
         assert_eq!(difference(&forces([0.0; 2]), &forces([0.0; 2]), 1.0), Difference::default());
     }
 

@@ -1,40 +1,39 @@
-//! Plays frames into a [`Device`] and records every transfer with its cycle.
+//! Sends frames into a [`Device`] and records every transfer with its cycle.
 //!
-//! Full speed: one code a cycle, output always ready, a frame starts when the one before is out.
-//! Stalls: seeded random gaps on both streams, the next frame offered as soon as the device takes
-//! it. Input codes follow the AXI rule (an offered beat stays until it is taken), and the same rule
-//! is checked on the output. Before a run with stalls the device is left with work in progress, and the
-//! reset must clear it.
+//! Full speed: one code per cycle, output always ready, a frame starts when the previous one has left completely.
+//! Stalls: seeded random gaps on both streams, the next frame offered as soon as the device accepts it. Input codes
+//! follow the AXI4-Stream rule (once valid, a beat stays unchanged until it is accepted); the same rule is checked on
+//! the output. Before a run with stalls the device is left with a frame in progress, which the reset must clear.
 //!
-//! **Counting.** Cycles are numbered from 0 at the first cycle of reset. A beat's cycle is the one
-//! in which valid and ready are both set. latency = cycle of the last output beat − cycle of the last
-//! input beat; total = cycle of the last output beat − cycle of the first input beat + 1.
+//! Cycles are numbered from 0 at the first cycle of reset. A beat is transferred in the cycle in which valid and ready
+//! are both high. Latency = cycle of the last output beat − cycle of the last input beat; total = cycle of the last
+//! output beat − cycle of the first input beat + 1.
 
-mod held;
+mod axis_stability;
 mod receiver;
 mod recording;
 mod sender;
 
-pub(crate) use held::{Held, RULE};
-pub use recording::{Beat, Breach, Play, Recording, TapWord, Times};
+pub(crate) use axis_stability::{StabilityCheck, STABILITY_RULE};
+pub use recording::{Beat, InputFrame, ProtocolViolation, Recording, TapWord, Times};
 
 use dermis_hdl::device::{Device, Inputs};
 use receiver::Receiver;
-use sender::{Gaps, Sender};
+use sender::{Sender, StallGenerator};
 
 /// Cycles of reset before the first frame.
 const RESET_CYCLES: u64 = 4;
-/// Cycles after the last expected beat in which nothing more may come.
+/// Cycles after the last expected beat during which no further beat may come.
 const TAIL_CYCLES: u64 = 64;
 
-/// How the two streams are clocked.
+/// Timing of the two streams.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Stimulus {
-    /// One code a cycle, output always ready: cycle counts are exact.
+    /// One code per cycle, output always ready: cycle counts are exact.
     FullSpeed,
     /// Random gaps on both streams.
     Stalls {
-        /// Of the random numbers.
+        /// Seed of the gaps.
         seed: u64,
     },
 }
@@ -48,14 +47,20 @@ impl std::fmt::Display for Stimulus {
     }
 }
 
-/// Plays `frames` and records what comes back; gives up after `watchdog` cycles without a transfer.
-pub fn record(device: &mut dyn Device, taps: usize, frames: &[Play], stimulus: Stimulus, watchdog: u64) -> Recording {
+/// Sends `frames` and records the output and `taps` taps; stops after `watchdog` cycles without a transfer.
+pub fn record(
+    device: &mut dyn Device,
+    taps: usize,
+    frames: &[InputFrame],
+    stimulus: Stimulus,
+    watchdog: u64,
+) -> Recording {
     if let (Stimulus::Stalls { .. }, Some(first)) = (stimulus, frames.first()) {
-        interrupt(device, first);
+        leave_work_in_progress(device, first);
     }
     let mut receiver = Receiver::new(taps, frames);
     let mut sender = Sender::new(frames);
-    let mut gaps = Gaps::new(stimulus);
+    let mut stalls = StallGenerator::new(stimulus);
     let wanted: usize = frames.iter().map(|f| f.beats).sum();
     let mut idle = 0;
     let mut tail = TAIL_CYCLES;
@@ -63,46 +68,46 @@ pub fn record(device: &mut dyn Device, taps: usize, frames: &[Play], stimulus: S
         let mut inputs = Inputs { rst: cycle < RESET_CYCLES, ..Inputs::default() };
         if !inputs.rst {
             let may_start = stimulus != Stimulus::FullSpeed || receiver.frame >= sender.frame;
-            sender.offer(&mut inputs, may_start && gaps.send());
-            inputs.m_ready = gaps.receive();
+            sender.offer(&mut inputs, may_start && stalls.sends());
+            inputs.m_ready = stalls.receives();
         }
         let outputs = device.cycle(&inputs);
         if inputs.rst {
             continue;
         }
-        let taken = inputs.s_valid && outputs.s_ready;
-        if taken {
-            sender.taken(cycle, &mut receiver.recording.times);
+        let accepted = inputs.s_valid && outputs.s_ready;
+        if accepted {
+            sender.accepted(cycle, &mut receiver.recording.times);
         }
-        // A device that sends without end must not keep the watchdog quiet.
-        let given = receiver.observe(cycle, &inputs, outputs) && receiver.recording.beats.len() <= wanted;
-        idle = if taken || given { 0 } else { idle + 1 };
+        // Surplus beats do not count, so that the watchdog also ends a device that sends forever.
+        let delivered = receiver.observe(cycle, &inputs, outputs) && receiver.recording.beats.len() <= wanted;
+        idle = if accepted || delivered { 0 } else { idle + 1 };
         if receiver.recording.beats.len() >= wanted && sender.frame == frames.len() {
             tail -= 1;
             if tail == 0 {
                 break;
             }
         } else if idle >= watchdog {
-            receiver.give_up(cycle, watchdog, &sender);
+            receiver.time_out(cycle, watchdog, &sender);
             break;
         }
     }
     receiver.recording
 }
 
-/// Resets the device while it receives, and leaves it computing: the reset that follows must clear
-/// every trace of both.
-fn interrupt(device: &mut dyn Device, play: &Play) {
+/// Leaves the device with work in progress: resets it in the middle of a frame, then sends a whole frame and stops
+/// while it is being computed. The next reset must clear both.
+fn leave_work_in_progress(device: &mut dyn Device, play: &InputFrame) {
     let (half, whole) = (play.codes.len() / 2, play.codes.len());
-    for taken in [half, whole] {
+    for count in [half, whole] {
         for _ in 0..RESET_CYCLES {
             device.cycle(&Inputs { rst: true, ..Inputs::default() });
         }
-        for (taxel, &s_data) in play.codes[..taken].iter().enumerate() {
+        for (taxel, &s_data) in play.codes[..count].iter().enumerate() {
             let s_last = (taxel + 1).is_multiple_of(play.taxels);
             device.cycle(&Inputs { s_valid: true, s_data, s_last, ..Inputs::default() });
         }
-        for _ in 0..taken {
+        for _ in 0..count {
             device.cycle(&Inputs::default());
         }
     }

@@ -1,21 +1,24 @@
-//! `dermis faults`: single bits flipped in the simulated hardware, and what comes of it.
+//! `dermis faults`: flips single bits in the simulated hardware and classifies the effect.
 //!
-//! Each run plays two frames at full speed through the Verilated engine; at a random cycle of the first one, one bit of
-//! a ROM, a RAM or a register is flipped, a third of the runs each; the stages take turns, so that small ones are hit as
-//! well, and of a stage every bit is alike likely. A flipped ROM bit stays; what is written anew heals. Then the ROM is
-//! restored, and after a reset a frame must be right.
+//! Each run sends two frames at full speed through the verilated engine. At a random cycle of the first frame one bit
+//! flips. A third of the runs each flips a bit of a ROM, a RAM and a register; within these the stages take turns, so
+//! that small stages are covered as well, and the bits of a stage are equally likely. A flipped ROM bit stays; RAM and
+//! register bits last until they are written again. Then the ROM is restored, the engine is reset, and the next frame
+//! must be right.
 //!
 //! | outcome | when |
 //! |---|---|
 //! | harmless | all beats of both frames are right |
-//! | detected | a beat is wrong and the device tells: a `tlast` in the wrong place, or, where the model has none, a flag of |
-//! | | framing or coefficients, saturations, or a search without result |
-//! | hang | a frame's last beat does not come, until the reset |
-//! | silent | a beat is wrong and nothing tells; with the largest error of a force against the frame's largest force |
+//! | detected | a beat is wrong and the device reports it: `tlast` on the wrong beat, or one of these that the model's status |
+//! | | does not have: framing or coefficient flag, saturations, a search without result |
+//! | hang | beats are missing until the reset |
+//! | silent | a beat is wrong and the device reports nothing; the largest force error is recorded |
+//!
+//! Force errors are relative to the frame's largest force component.
 
-mod judge;
-pub mod places;
-mod strike;
+mod bit_flip;
+mod classify;
+pub mod state_bits;
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
@@ -29,27 +32,27 @@ use dermis_golden::scene::Scene;
 use serde::Serialize;
 
 use crate::bench::INSTANCE;
-use crate::drive::{record, Play, Stimulus};
+use crate::drive::{record, InputFrame, Stimulus};
 use crate::hardware::Hardware;
 use crate::progress::Progress;
 use crate::report;
-use crate::stress::{drawn, own, Sample};
-use crate::tried::{self, Tried};
-use judge::{judge, Verdict};
-use places::{places, Class, Place, CLASSES};
-use strike::Struck;
+use crate::run_log::{RunLog, TargetCounts};
+use crate::stress::{shipped_samples, synthetic_samples, Sample};
+use bit_flip::{FaultInjector, StateBit};
+use classify::{classify, Outcome};
+use state_bits::{state_elements, StateElement, StorageClass, CLASSES};
 
-/// What to try.
+/// Arguments of `dermis faults`.
 #[derive(Args, Debug)]
 #[command(after_help = EXAMPLES)]
 pub struct Arguments {
     /// Built-in name or path of a scene.
     #[arg(default_value = "sensor-1")]
     scene: String,
-    /// Faults, one per run.
+    /// Number of faults, one per run.
     #[arg(long, value_name = "N", default_value_t = 1000)]
     count: usize,
-    /// Of places, cycles and frames.
+    /// Seed of bits, cycles and frames.
     #[arg(long, default_value_t = 1)]
     seed: u64,
     /// Print the outcomes as JSON and nothing else.
@@ -58,40 +61,43 @@ pub struct Arguments {
 }
 
 const EXAMPLES: &str = "Examples:
-  dermis faults                                      1000 flipped bits in ROM, RAM and registers, sensor-1
+  dermis faults                                      1000 bit flips in ROM, RAM and registers of sensor-1
   dermis faults eight-by-eight --count 60 --json";
 
-/// A relative force error from which a silent fault counts as large.
+/// Relative force error above which a silent fault counts as large.
 pub const LARGE: f64 = 0.01;
 
-/// What faults in one class of places of one stage did.
+/// Counts of the faults in one storage class of one stage.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Row {
     /// ROM, RAM or registers.
-    pub class: Class,
-    /// The stage.
+    pub class: StorageClass,
+    /// Stage name.
     pub stage: String,
-    /// Registers and memories.
+    /// Number of registers and memories.
     pub signals: usize,
-    /// Their bits.
-    pub places: usize,
-    /// Faults.
-    pub tried: usize,
-    /// Different bits among them.
-    pub hit: usize,
-    /// Nothing came of it.
+    /// Number of their bits.
+    #[serde(rename = "places")]
+    pub bits: usize,
+    /// Number of bit flips.
+    #[serde(rename = "tried")]
+    pub flips: usize,
+    /// Number of different bits flipped.
+    #[serde(rename = "hit")]
+    pub distinct_bits: usize,
+    /// Flips without any wrong beat.
     pub harmless: usize,
-    /// The device told.
+    /// Flips with a wrong beat that the device reported.
     pub detected: usize,
-    /// No answer until the reset.
+    /// Flips after which beats were missing until the reset.
     pub hang: usize,
-    /// Wrong, and nothing told.
+    /// Flips with a wrong beat that the device did not report.
     pub silent: usize,
-    /// Silent, with a force error above [`LARGE`].
+    /// Silent flips with a force error above [`LARGE`].
     pub large: usize,
-    /// Largest force error of a silent fault against the frame's largest force.
+    /// Largest force error of a silent flip, relative to the frame's largest force component.
     pub largest_error: f64,
-    /// Faults after which a reset did not bring the next frame right.
+    /// Flips after which the frame following the reset was wrong.
     pub not_recovered: usize,
 }
 
@@ -99,86 +105,89 @@ pub struct Row {
 ///
 /// # Errors
 /// No Verilator, a design that it refuses, or frames of another sensor.
-pub fn faults(hardware: &Hardware, frames: &[Frame], count: usize, seed: u64) -> Result<Vec<Row>> {
+pub fn inject_faults(hardware: &Hardware, frames: &[Frame], count: usize, seed: u64) -> Result<Vec<Row>> {
     let mut random = fastrand::Rng::with_seed(seed);
-    let mut pool = own(&hardware.model, frames)?;
-    if !pool.iter().any(Sample::presses) {
-        pool = drawn(&hardware.model, &mut random);
+    let mut pool = shipped_samples(&hardware.model, frames)?;
+    if !pool.iter().any(Sample::has_force) {
+        pool = synthetic_samples(&hardware.model, &mut random);
     }
-    pool.retain(Sample::presses);
-    let mut device = hardware.writable()?;
+    pool.retain(Sample::has_force);
+    let mut device = hardware.device_with_writable_state()?;
     let memories = &hardware.model.resources.memories;
-    let places = places(&device.listing()?, INSTANCE, memories)?;
+    let elements = state_elements(&device.listing()?, INSTANCE, memories)?;
     let longest = pool.iter().map(|sample| sample.cycles.total).max().unwrap_or(0);
-    let mut rows: BTreeMap<(Class, String), Row> = BTreeMap::new();
-    for place in &places {
-        // There and back again: every place can be hit.
-        if ![(); 2].iter().all(|()| device.flip(&place.scope, &place.signal, place.words - 1, place.bits - 1)) {
+    let mut rows: BTreeMap<(StorageClass, String), Row> = BTreeMap::new();
+    for element in &elements {
+        // Flips a bit twice, which leaves it unchanged: shows that it can be flipped.
+        if ![(); 2].iter().all(|()| device.flip(&element.scope, &element.signal, element.words - 1, element.bits - 1)) {
             bail!(
                 "{}.{}, word {}, bit {} cannot be flipped",
-                place.scope,
-                place.signal,
-                place.words - 1,
-                place.bits - 1
+                element.scope,
+                element.signal,
+                element.words - 1,
+                element.bits - 1
             );
         }
-        let row = rows.entry((place.class, place.stage.clone())).or_insert_with(|| Row::new(place));
-        (row.signals, row.places) = (row.signals + 1, row.places + place.words * place.bits);
+        let row = rows.entry((element.class, element.stage.clone())).or_insert_with(|| Row::new(element));
+        (row.signals, row.bits) = (row.signals + 1, row.bits + element.words * element.bits);
     }
-    let mut hit = BTreeSet::new();
+    let mut flipped = BTreeSet::new();
     let bar = Progress::steps("faults", count as u64);
     for run in 0..count {
-        bar.at(run as u64);
-        let Some((index, word, bit)) = draw(&places, run, &mut random) else { continue };
-        let place = &places[index];
+        bar.set(run as u64);
+        let Some((index, word, bit)) = draw(&elements, run, &mut random) else { continue };
+        let element = &elements[index];
         let [first, second, after] = [(); 3].map(|()| &pool[random.usize(..pool.len())]);
-        let at = random.u64(..first.cycles.total);
-        let mut struck = Struck::new(&mut device, (place, word, bit), at);
-        let played = [first, second].map(play);
-        let recording = record(&mut struck, 0, &played, Stimulus::FullSpeed, 4 * longest);
-        let verdict = judge(&recording, &[first, second]);
-        if place.class == Class::Rom {
-            struck.strike();
+        let flip_cycle = random.u64(..first.cycles.total);
+        let mut injector = FaultInjector::new(&mut device, StateBit { element, word, bit }, flip_cycle);
+        let frames = [first, second].map(input_frame);
+        let recording = record(&mut injector, 0, &frames, Stimulus::FullSpeed, 4 * longest);
+        let outcome = classify(&recording, &[first, second]);
+        if element.class == StorageClass::Rom {
+            injector.flip();
         }
-        let again = record(&mut device, 0, &[play(after)], Stimulus::FullSpeed, 4 * longest);
-        let recovered = judge(&again, &[after]) == Verdict::Harmless;
-        if let Some(row) = rows.get_mut(&(place.class, place.stage.clone())) {
-            row.add(verdict, recovered, hit.insert((index, word, bit)));
+        let again = record(&mut device, 0, &[input_frame(after)], Stimulus::FullSpeed, 4 * longest);
+        let recovered = classify(&again, &[after]) == Outcome::Harmless;
+        if let Some(row) = rows.get_mut(&(element.class, element.stage.clone())) {
+            row.add(outcome, recovered, flipped.insert((index, word, bit)));
         }
     }
     Ok(rows.into_values().collect())
 }
 
-/// The class's stages take turns; of a stage every bit is alike likely: place, word, bit.
-fn draw(places: &[Place], run: usize, random: &mut fastrand::Rng) -> Option<(usize, usize, usize)> {
+/// Draws a bit as index of its element, word and bit: the classes and their stages take turns, the bits of a stage are
+/// equally likely. `None` where the class has no bits.
+fn draw(elements: &[StateElement], run: usize, random: &mut fastrand::Rng) -> Option<(usize, usize, usize)> {
     let class = CLASSES[run % CLASSES.len()];
     let stages: BTreeSet<&str> =
-        places.iter().filter(|place| place.class == class).map(|place| place.stage.as_str()).collect();
+        elements.iter().filter(|element| element.class == class).map(|element| element.stage.as_str()).collect();
     let stage = stages.iter().nth(run / CLASSES.len() % stages.len().max(1))?;
-    let own = || places.iter().enumerate().filter(|(_, place)| (place.class, place.stage.as_str()) == (class, *stage));
-    let mut left = random.usize(..own().map(|(_, place)| place.words * place.bits).sum::<usize>());
-    for (index, place) in own() {
-        if left < place.words * place.bits {
-            return Some((index, left / place.bits, left % place.bits));
+    let own = || {
+        elements.iter().enumerate().filter(|(_, element)| (element.class, element.stage.as_str()) == (class, *stage))
+    };
+    let mut left = random.usize(..own().map(|(_, element)| element.words * element.bits).sum::<usize>());
+    for (index, element) in own() {
+        if left < element.words * element.bits {
+            return Some((index, left / element.bits, left % element.bits));
         }
-        left -= place.words * place.bits;
+        left -= element.words * element.bits;
     }
     None
 }
 
-fn play(sample: &Sample) -> Play<'_> {
-    Play { codes: &sample.codes, taxels: sample.taxels, beats: sample.beats.len() }
+fn input_frame(sample: &Sample) -> InputFrame<'_> {
+    InputFrame { codes: &sample.codes, taxels: sample.taxels, beats: sample.beats.len() }
 }
 
 impl Row {
-    fn new(place: &Place) -> Row {
+    fn new(element: &StateElement) -> Row {
         Row {
-            class: place.class,
-            stage: place.stage.clone(),
+            class: element.class,
+            stage: element.stage.clone(),
             signals: 0,
-            places: 0,
-            tried: 0,
-            hit: 0,
+            bits: 0,
+            flips: 0,
+            distinct_bits: 0,
             harmless: 0,
             detected: 0,
             hang: 0,
@@ -189,15 +198,15 @@ impl Row {
         }
     }
 
-    fn add(&mut self, verdict: Verdict, recovered: bool, new: bool) {
-        self.tried += 1;
-        self.hit += usize::from(new);
+    fn add(&mut self, outcome: Outcome, recovered: bool, new: bool) {
+        self.flips += 1;
+        self.distinct_bits += usize::from(new);
         self.not_recovered += usize::from(!recovered);
-        match verdict {
-            Verdict::Harmless => self.harmless += 1,
-            Verdict::Detected => self.detected += 1,
-            Verdict::Hang => self.hang += 1,
-            Verdict::Silent(error) => {
+        match outcome {
+            Outcome::Harmless => self.harmless += 1,
+            Outcome::Detected => self.detected += 1,
+            Outcome::Hang => self.hang += 1,
+            Outcome::Silent(error) => {
                 self.silent += 1;
                 self.large += usize::from(error > LARGE);
                 self.largest_error = self.largest_error.max(error);
@@ -206,36 +215,36 @@ impl Row {
     }
 }
 
-/// Shares of the outcomes of a fault in any bit of a class.
+/// Shares of the outcomes of a flip in a random bit of a storage class.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct Shares {
-    /// Bits of the class.
+    /// Number of bits of the class.
     pub bits: usize,
-    /// Faults in them.
-    pub tried: usize,
-    /// Nothing comes of it.
+    /// Number of flips that were simulated.
+    pub flips: usize,
+    /// No wrong beat.
     pub harmless: f64,
-    /// The device tells.
+    /// A wrong beat that the device reports.
     pub detected: f64,
-    /// No answer until the reset.
+    /// Missing beats until the reset.
     pub hang: f64,
-    /// Wrong, and nothing tells.
+    /// A wrong beat that the device does not report.
     pub silent: f64,
     /// Silent, with a force error above [`LARGE`].
     pub large: f64,
 }
 
 impl Shares {
-    /// Each stage's shares, weighted by its bits; `None` where there is no such bit or none was flipped.
-    pub fn of(rows: &[Row], class: Class) -> Option<Shares> {
-        let own = || rows.iter().filter(move |row| row.class == class && row.tried > 0);
-        let bits: usize = own().map(|row| row.places).sum();
+    /// The stages' shares, weighted by their bits; `None` where the class has no bits or none was flipped.
+    pub fn of(rows: &[Row], class: StorageClass) -> Option<Shares> {
+        let own = || rows.iter().filter(move |row| row.class == class && row.flips > 0);
+        let bits: usize = own().map(|row| row.bits).sum();
         let share = |count: fn(&Row) -> usize| {
-            own().map(|row| row.places as f64 * count(row) as f64 / row.tried as f64).sum::<f64>() / bits as f64
+            own().map(|row| row.bits as f64 * count(row) as f64 / row.flips as f64).sum::<f64>() / bits as f64
         };
         (bits > 0).then(|| Shares {
             bits,
-            tried: own().map(|row| row.tried).sum(),
+            flips: own().map(|row| row.flips).sum(),
             harmless: share(|row| row.harmless),
             detected: share(|row| row.detected),
             hang: share(|row| row.hang),
@@ -245,8 +254,8 @@ impl Shares {
     }
 }
 
-/// What the report keeps of a class.
-fn kept(scene: &str, class: Class, rows: &[Row], seconds: f64) -> tried::Line {
+/// The counts of a class for the run log.
+fn target_counts(scene: &str, class: StorageClass, rows: &[Row], seconds: f64) -> TargetCounts {
     let own = || rows.iter().filter(move |row| row.class == class);
     let sum = |count: fn(&Row) -> usize| own().map(count).sum::<usize>() as u64;
     let counts = [
@@ -256,11 +265,12 @@ fn kept(scene: &str, class: Class, rows: &[Row], seconds: f64) -> tried::Line {
         ("silent", sum(|row| row.silent)),
         ("not recovered", sum(|row| row.not_recovered)),
     ];
-    let tried = sum(|row| row.tried);
-    tried::Line::new(format!("{scene}, {}", class.name()), "bits flipped", tried, counts, seconds)
+    let flips = sum(|row| row.flips);
+    TargetCounts::new(format!("{scene}, {}", class.name()), "bits flipped", flips, counts, seconds)
 }
 
-/// The outcomes as text, and whether a reset always helped; the counts stay in the build folder for the report.
+/// Runs the command: the outcomes as text, and whether the engine recovered after every reset. The counts are saved in
+/// the build folder for the report.
 ///
 /// # Errors
 /// An unknown scene, one without hardware, no Verilator.
@@ -270,12 +280,12 @@ pub fn run(arguments: &Arguments, build: &Path) -> Result<(String, bool)> {
     let hardware = Hardware::new(Model::for_frames(&scene, &frames)?, build)?;
     let Arguments { scene: name, count, seed, .. } = arguments;
     let begun = Instant::now();
-    let rows = faults(&hardware, &frames, *count, *seed)?;
-    let mut tried = Tried::new(&format!("dermis faults {name} --count {count} --seed {seed}"));
-    // The classes take turns, a third of the time each.
+    let rows = inject_faults(&hardware, &frames, *count, *seed)?;
+    let mut log = RunLog::new(&format!("dermis faults {name} --count {count} --seed {seed}"));
+    // The classes take turns, so each is charged a third of the time.
     let seconds = begun.elapsed().as_secs_f64() / CLASSES.len() as f64;
-    tried.lines.extend(CLASSES.map(|class| kept(&scene.name, class, &rows, seconds)));
-    tried.keep(build, "faults")?;
+    log.targets.extend(CLASSES.map(|class| target_counts(&scene.name, class, &rows, seconds)));
+    log.save(build, "faults")?;
     let good = rows.iter().all(|row| row.not_recovered == 0);
     let text = if arguments.json { serde_json::to_string(&rows)? + "\n" } else { report::faults(&rows) };
     Ok((text, good))

@@ -1,10 +1,10 @@
-//! `dermis generate`: a frame with known forces, from contacts on the command line.
+//! `dermis generate`: a frame with known forces, from contacts described on the command line.
 //!
-//! | contact | from |
+//! | option | contacts |
 //! |---|---|
 //! | `--contact shape:key=value:…` | keys `at`, `size`, `normal`, `shear`, `slip`, `friction` |
-//! | `--like FILE` | the contacts described in a frame file |
-//! | `--random N` | drawn from the seed |
+//! | `--like FILE` | those described in a frame file |
+//! | `--random N` | N random ones, drawn from the seed |
 
 use std::path::PathBuf;
 
@@ -15,56 +15,56 @@ use dermis_golden::generator::converter::Converter;
 use dermis_golden::generator::{generate, random_contacts, Draw};
 use dermis_golden::scene::Scene;
 
-use crate::fresh::Shapes;
+use crate::drawn_frames::Shapes;
 use dermis_golden::write::write;
 
-/// What to generate.
+/// Arguments of `dermis generate`.
 #[derive(Args, Debug)]
 #[command(after_help = EXAMPLES)]
 pub struct Arguments {
-    /// Built-in name or path of a scene: gives sensor and medium.
+    /// Built-in name or path of the scene that defines sensor and medium.
     scene: String,
-    /// A contact, repeatable: shape:key=value:… with at=X,Y (mm), size=… (mm, degrees), normal=N, shear=X,Y (N),
+    /// Contact, repeatable: shape:key=value:… with at=X,Y (mm), size=… (mm, degrees), normal=N, shear=X,Y (N),
     /// slip=none|full-sliding|partial-slip, friction=F.
     #[arg(long = "contact", value_name = "TEXT")]
     contacts: Vec<String>,
-    /// Take the contacts described in a frame file.
+    /// Use the contacts described in a frame file.
     #[arg(long, value_name = "FILE")]
     like: Option<PathBuf>,
-    /// Draw N contacts.
+    /// Draw N random contacts.
     #[arg(long, value_name = "N", default_value_t = 0)]
     random: usize,
-    /// Shapes that are drawn.
+    /// Shapes of the random contacts.
     #[arg(long, value_enum, default_value = "elliptic")]
     shapes: Shapes,
-    /// Drawn contacts touch each other.
+    /// Place random contacts so that they touch each other.
     #[arg(long)]
     touching: bool,
-    /// Start of everything drawn.
+    /// Seed of contacts and noise.
     #[arg(long, default_value_t = 1)]
     seed: u64,
     /// Standard deviation of Gaussian noise over the largest |b|.
     #[arg(long, value_name = "SHARE", default_value_t = 0.0)]
     noise: f64,
-    /// Tension reads as zero.
+    /// Unipolar sensor: tension reads as zero.
     #[arg(long)]
     unipolar: bool,
-    /// Round to codes of this width.
+    /// Quantise to codes of this width in bits.
     #[arg(long)]
     bits: Option<u32>,
-    /// Stress of the largest code; without it the frame's peak.
+    /// Stress of the largest code in MPa; default: the frame's peak.
     #[arg(long, value_name = "MPA")]
     full_scale: Option<f64>,
-    /// A taxel that reads zero, repeatable.
+    /// Dead taxel, which reads zero; repeatable.
     #[arg(long, value_name = "ROW,COL")]
     dead: Vec<String>,
-    /// A taxel that reads the same always, repeatable.
+    /// Stuck taxel, which always reads the given stress; repeatable.
     #[arg(long, value_name = "ROW,COL=MPA")]
     stuck: Vec<String>,
-    /// Name of the frame.
+    /// Id of the frame.
     #[arg(long, default_value = "generated")]
     id: String,
-    /// File to write; without it standard output.
+    /// File to write; default: standard output.
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
 }
@@ -79,10 +79,10 @@ const EXAMPLES: &str = "Examples:
 Shapes and sizes: hertz-circle a; hertz-ellipse a,b,angle; flat-punch a or a,b,angle; ring outer,inner;
   rectangle width,height,angle; plantar-left, plantar-right none or width,length,angle.";
 
-/// Generates the frame: its JSON, or where it was written.
+/// Generates the frame; returns its JSON, or the path and size of the file written.
 ///
 /// # Errors
-/// Contacts that cannot be read or do not fit together, options out of range, a file that cannot be written.
+/// Contacts that cannot be parsed or are inconsistent, options out of range, a file that cannot be written.
 pub fn run(arguments: &Arguments) -> Result<String> {
     let scene = Scene::load(&arguments.scene)?;
     let mut contacts = arguments.contacts.iter().map(|text| contact(text)).collect::<Result<Vec<_>>>()?;
@@ -114,14 +114,15 @@ pub fn run(arguments: &Arguments) -> Result<String> {
     }
 }
 
-/// shape:key=value:…
+/// Parses `shape:key=value:…`.
 fn contact(text: &str) -> Result<Contact> {
     let mut parts = text.split(':');
     let mut contact = Contact { shape: parts.next().map(str::to_string), ..Default::default() };
     for part in parts {
-        let wrong = || anyhow!("--contact {text}: {part:?} is not allowed");
+        let wrong = || anyhow!("--contact {text}: {part:?} is not of the form key=value");
         let (key, value) = part.split_once('=').ok_or_else(wrong)?;
-        let list = || numbers(value).ok_or_else(|| anyhow!("--contact {text}: {key} = {value:?} is not numbers"));
+        let list =
+            || numbers(value).ok_or_else(|| anyhow!("--contact {text}: {key} = {value:?} is not a list of numbers"));
         let fixed = |count: usize| {
             list().and_then(|list| match list.len() {
                 got if got == count => Ok(list),
@@ -145,13 +146,13 @@ fn numbers(text: &str) -> Option<Vec<f64>> {
     text.split(',').map(|number| number.trim().parse().ok()).collect()
 }
 
-/// row,col
+/// Parses `row,col`.
 fn taxel(option: &str, text: &str) -> Result<[usize; 2]> {
     let parse = |(row, col): (&str, &str)| Some([row.trim().parse().ok()?, col.trim().parse().ok()?]);
     text.split_once(',').and_then(parse).ok_or_else(|| anyhow!("{option} {text:?}: wanted row,col"))
 }
 
-/// row,col=MPa
+/// Parses `row,col=MPa`.
 fn stuck(text: &str) -> Result<([usize; 2], f64)> {
     let (place, reads) = text.split_once('=').ok_or_else(|| anyhow!("--stuck {text:?}: wanted row,col=MPa"))?;
     let reads = reads.trim().parse().map_err(|_| anyhow!("--stuck {text:?}: {reads:?} is not a number"))?;

@@ -1,9 +1,9 @@
-//! The generated hardware of one scene, ready to be simulated.
+//! The generated hardware of one scene, and its simulations.
 //!
 //! | in | out |
 //! |---|---|
 //! | bit-true [`Model`] | Verilog, taps and manifest ([`Generated`]) |
-//! | which simulator | a [`Device`] |
+//! | [`Simulator`] | a [`Device`] |
 
 use std::borrow::Cow;
 use std::path::{Path, PathBuf};
@@ -18,36 +18,36 @@ use dermis_hdl::link::{board_simulator, generate_board, BoardDevice};
 use dermis_hdl::{generate, simulator, Generated};
 use thiserror::Error;
 
-use crate::board::{Faults, Terminal, UartLine, VerilatedBoard, Wire};
+use crate::board::{ChannelFaults, HostUart, NoisyChannel, PseudoTerminal, VerilatedBoard};
 use crate::cosim::Vector;
-use crate::drive::{record, Play, Stimulus};
+use crate::drive::{record, InputFrame, Stimulus};
 use crate::inputs::require_uart;
 use crate::netlist::netlist;
 use crate::verilator::{Design, Verilated, VerilatorError};
 
-/// Cycles without a transfer after which a reconstruction is given up; far beyond any scene's pause.
+/// Cycles without a transfer after which a reconstruction is aborted; far above any scene's latency.
 const WATCHDOG: u64 = 1_000_000;
 
-/// Hardware that stopped answering; a defect of this program.
+/// The simulated hardware stopped transferring beats: a defect of this program.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 #[error("frame {frame}, cycle {cycle}: {rule}")]
-pub struct Stuck {
+pub struct DeviceTimeout {
     /// Frame name.
     pub frame: String,
-    /// When it was given up.
+    /// Cycle in which the watchdog ended the run.
     pub cycle: u64,
-    /// What was awaited.
+    /// The transfer that was awaited, as text.
     pub rule: String,
 }
 
-/// What simulates the hardware.
+/// Simulator of the hardware.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Simulator {
-    /// The generated Verilog under Verilator.
+    /// The generated Verilog, under Verilator.
     Verilator,
-    /// The same design in rust-hdl's own simulation.
+    /// The same design in rust-hdl's own simulator.
     RustHdl,
-    /// What synthesis for the scene's board makes of the Verilog, under Verilator.
+    /// The netlist synthesised for the scene's board, under Verilator.
     Netlist,
 }
 
@@ -68,12 +68,12 @@ pub struct Hardware {
     pub model: Model,
     /// Verilog, memory files, taps, manifest.
     pub generated: Generated,
-    /// Folder of built Verilator libraries.
+    /// Cache folder of Verilator libraries and netlists.
     cache: PathBuf,
 }
 
 impl Hardware {
-    /// Generates the hardware of `model`; `build` is the folder for everything built on the way.
+    /// Generates the hardware of `model`; caches lie in the folder `build`.
     ///
     /// # Errors
     /// A design that the generator refuses.
@@ -97,27 +97,27 @@ impl Hardware {
         })
     }
 
-    /// Starts a simulation of the Verilog of which any bit that it keeps can be flipped.
+    /// Starts a Verilator simulation in which every bit of a register or memory can be flipped.
     ///
     /// # Errors
     /// As [`Hardware::device`].
-    pub fn writable(&self) -> Result<Verilated, VerilatorError> {
+    pub fn device_with_writable_state(&self) -> Result<Verilated, VerilatorError> {
         self.verilated(&self.generated, true)
     }
 
-    fn verilated(&self, generated: &Generated, writable: bool) -> Result<Verilated, VerilatorError> {
+    fn verilated(&self, generated: &Generated, writable_state: bool) -> Result<Verilated, VerilatorError> {
         let files = generated.files.iter().map(|f| (f.name.as_str(), f.text.as_str()));
         let design = Design {
             top: &generated.top,
             files: files.collect(),
             taps: &generated.taps,
             input_bits: self.model.formats.code_bits,
-            writable,
+            writable_state,
         };
         Verilated::new(&design, &self.cache)
     }
 
-    /// Starts a simulation of the whole board, of its Verilog where a netlist is asked for.
+    /// Starts a simulation of the whole board; [`Simulator::Netlist`] simulates its Verilog.
     ///
     /// # Errors
     /// As [`Hardware::device`]; a scene whose board has no link.
@@ -131,27 +131,27 @@ impl Hardware {
         })
     }
 
-    /// Starts the whole board under Verilator on a pseudo-terminal, behind wires that lose nothing.
+    /// Starts the whole board under Verilator on a pseudo-terminal, over error-free channels.
     ///
     /// # Errors
-    /// As [`Hardware::board`]; no pseudo-terminal, a link that is no UART.
-    pub fn terminal(&self) -> Result<Terminal> {
-        let perfect = || Wire::new(Faults::default());
-        self.terminal_behind(perfect(), perfect())
+    /// As [`Hardware::board`]; no pseudo-terminal, a link other than a UART.
+    pub fn terminal(&self) -> Result<PseudoTerminal> {
+        let ideal = || NoisyChannel::new(ChannelFaults::default());
+        self.terminal_with_channels(ideal(), ideal())
     }
 
-    /// The same behind these wires.
+    /// The same over the given channels.
     ///
     /// # Errors
     /// As [`Hardware::terminal`].
-    pub fn terminal_behind(&self, to_board: Wire, to_host: Wire) -> Result<Terminal> {
+    pub fn terminal_with_channels(&self, to_board: NoisyChannel, to_host: NoisyChannel) -> Result<PseudoTerminal> {
         require_uart(&self.model.scene, "board")?;
         let identity = Identity::of(&self.model)?;
-        let line = UartLine::new(self.board(Simulator::Verilator)?, identity.bit_rate, identity.clock_hz);
-        Ok(Terminal::start(line, to_board, to_host)?)
+        let uart = HostUart::new(self.board(Simulator::Verilator)?, identity.bit_rate, identity.clock_hz);
+        Ok(PseudoTerminal::start(uart, to_board, to_host)?)
     }
 
-    /// The stages' streams that a device of this simulator shows; in a netlist there are none left.
+    /// The taps that a simulator has; a netlist has none.
     pub fn taps(&self, simulator: Simulator) -> &[Tap] {
         match simulator {
             Simulator::Netlist => &[],
@@ -159,8 +159,12 @@ impl Hardware {
         }
     }
 
-    /// The names of the streams that a device of this simulator shows, and `vectors` without the stages that it does not.
-    pub fn shown<'a>(&self, simulator: Simulator, vectors: &'a [Vector]) -> (Vec<&'static str>, Cow<'a, [Vector]>) {
+    /// The names of a simulator's taps, and `vectors` reduced to what that simulator can be compared by.
+    pub fn observable<'a>(
+        &self,
+        simulator: Simulator,
+        vectors: &'a [Vector],
+    ) -> (Vec<&'static str>, Cow<'a, [Vector]>) {
         let taps = self.taps(simulator);
         let vectors = match taps {
             [] => vectors.iter().map(Vector::without_stages).collect(),
@@ -169,15 +173,15 @@ impl Hardware {
         (taps.iter().map(|tap| tap.name).collect(), vectors)
     }
 
-    /// Stage names of the Verilog's and rust-hdl's taps, in the order of a device's outputs.
+    /// Stage names of the taps, in the order of a device's outputs.
     pub fn tap_names(&self) -> Vec<&'static str> {
         self.generated.taps.iter().map(|tap| tap.name).collect()
     }
 
-    /// The frames of one reconstruction as the device gets them, with what the bit-true model makes of them.
+    /// The test vector of one reconstruction: codes of its frames and the bit-true model's results.
     ///
     /// # Errors
-    /// A frame of another sensor, or not as many as the scene averages.
+    /// A frame of another sensor, or a number of frames that the scene does not average.
     pub fn vector(&self, frames: &[Frame]) -> Result<Vector> {
         let codes = self.model.readings(frames)?;
         let expected = self.model.run(&codes);
@@ -186,19 +190,19 @@ impl Hardware {
         Ok(Vector { frame, cols: sensor.cols, taxels: sensor.taxels(), codes, expected })
     }
 
-    /// Reconstructs the mean of the scene's number of frames in the Verilated hardware, engine `rtl`.
+    /// Reconstructs the mean of the frames in the verilated hardware (engine `rtl`).
     ///
     /// # Errors
-    /// As [`Hardware::device`]; [`Stuck`].
+    /// As [`Hardware::device`]; [`DeviceTimeout`].
     pub fn reconstruct(&self, frames: &[Frame]) -> Result<Reconstruction> {
         let vector = self.vector(frames)?;
         let forces = vector.expected.beats.len();
-        let plays =
-            [Play { codes: &vector.codes, taxels: vector.taxels, beats: forces + vector.expected.status.len() }];
+        let inputs =
+            [InputFrame { codes: &vector.codes, taxels: vector.taxels, beats: forces + vector.expected.status.len() }];
         let mut device = self.device(Simulator::Verilator)?;
-        let recording = record(device.as_mut(), 0, &plays, Stimulus::FullSpeed, WATCHDOG);
+        let recording = record(device.as_mut(), 0, &inputs, Stimulus::FullSpeed, WATCHDOG);
         if let Some(timeout) = recording.timeout {
-            return Err(Stuck { frame: vector.frame, cycle: timeout.cycle, rule: timeout.rule }.into());
+            return Err(DeviceTimeout { frame: vector.frame, cycle: timeout.cycle, rule: timeout.rule }.into());
         }
         let beats: Vec<[i32; 3]> = recording.beats.iter().map(|beat| beat.data).collect();
         let (forces, status) = beats.split_at(forces.min(beats.len()));

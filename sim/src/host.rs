@@ -1,19 +1,19 @@
-//! `dermis host`: frames to a board over a serial port, forces back.
+//! `dermis host`: sends frames to a board over a serial port and reads back forces.
 //!
 //! ```text
 //! frame file, or a line of JSON -> tare -> codes -> packet -> port -> board
 //!                     report, or a line of JSON <- forces, status <- packet <-'
 //! ```
-//! The board is asked who it is first. A request that stays unanswered, or whose answer is damaged, is sent again under
-//! a new sequence number; how often that happened is reported.
+//! The board must first identify itself. A request without answer, or with a damaged answer, is sent again with a new
+//! sequence number; the number of repetitions is reported.
 
 mod answer;
 mod client;
 mod error;
 mod stream;
 
-pub use answer::{Answer, Line};
-pub use client::{Client, Lost};
+pub use answer::{Answer, PhysicalAnswer};
+pub use client::{Client, LinkErrors};
 pub use error::HostError;
 
 use std::path::PathBuf;
@@ -28,18 +28,18 @@ use dermis_golden::quantise::full_scale;
 use dermis_golden::scene::Scene;
 use serialport::SerialPort;
 
-use crate::inputs::{require_uart, resolve, OnBoard};
+use crate::inputs::{require_uart, resolve, BoardOverride};
 use crate::progress::Progress;
 use crate::report;
 
-/// How long a read of the port waits for a byte.
-const READ: Duration = Duration::from_millis(10);
+/// Longest wait of a read of the port for a byte.
+const READ_TIMEOUT: Duration = Duration::from_millis(10);
 
-/// What to ask a board.
+/// Arguments of `dermis host`.
 #[derive(Args, Debug)]
 #[command(after_help = EXAMPLES)]
 pub struct Arguments {
-    /// Frame files (.json, .csv); without any all shipped frames of the scene.
+    /// Frame files (.json, .csv); default: all shipped frames of the scene.
     #[arg(value_name = "FILE", conflicts_with = "stream")]
     frames: Vec<String>,
     /// Serial port of the board.
@@ -48,27 +48,27 @@ pub struct Arguments {
     /// Built-in name or path of a scene; may be left out when the first frame holds its sensor.
     #[arg(long, required_if_eq("stream", "true"))]
     scene: Option<String>,
-    /// Bit rate; without it that of the scene's board.
+    /// Bit rate; default: that of the scene's board.
     #[arg(long, value_name = "BIT/S")]
     baud: Option<u32>,
-    /// Give the force on every taxel; without it the resultants, which take a fraction of the time on the wire where the
-    /// board adds up.
+    /// Read the force on every taxel instead of the resultants. Resultants take a fraction of the transfer time if the
+    /// board sums the forces.
     #[arg(long)]
     forces: bool,
     /// Compare every answer with the bit-true model.
     #[arg(long)]
     check: bool,
-    /// A frame read without contact, whose stress is subtracted from every frame's.
+    /// Frame recorded without contact; its stress is subtracted from every frame.
     #[arg(long, value_name = "FILE")]
     tare: Option<PathBuf>,
-    /// Frames from standard input, answers to standard output, one JSON object per line.
+    /// Read frames from standard input and write answers to standard output, one JSON object per line.
     #[arg(long)]
     stream: bool,
-    /// Silence in ms after which a request is sent again.
+    /// Time without an answer, in ms, after which a request is sent again.
     #[arg(long, value_name = "MS", default_value_t = 1000)]
     timeout: u64,
     #[command(flatten)]
-    target: OnBoard,
+    target: BoardOverride,
 }
 
 const EXAMPLES: &str = "Examples:
@@ -77,16 +77,16 @@ const EXAMPLES: &str = "Examples:
   dermis host --port /dev/ttyUSB1 --scene eight-by-eight --target-board icebreaker
   dermis host --port /dev/ttyUSB0 --scene sensor-1 --tare zero.json --stream <frames >answers
 
-A line in: {\"id\": 7, \"stress_MPa\": [0.1, ...]}, row-major
-A line out: {\"id\": 7, \"sent_s\": ..., \"answered_s\": ..., \"resultant_N\": [x, y, normal], \"centre_mm\": [x, y], ...}";
+Input line: {\"id\": 7, \"stress_MPa\": [0.1, ...]}, row-major
+Output line: {\"id\": 7, \"sent_s\": ..., \"answered_s\": ..., \"resultant_N\": [x, y, normal], \"centre_mm\": [x, y], ...}";
 
-/// A board that was asked who it is, with the model of its scene.
+/// A connection to an identified board, with the model of its scene.
 pub struct Session<P> {
     /// The board.
     pub client: Client<P>,
     /// The bit-true model.
     pub model: Model,
-    /// Who the board says it is.
+    /// The board's identification.
     pub identity: Identity,
     tare_MPa: Option<Vec<f64>>,
     forces: bool,
@@ -94,18 +94,18 @@ pub struct Session<P> {
 }
 
 impl<P: std::io::Read + std::io::Write> Session<P> {
-    /// Asks the board who it is.
+    /// Identifies the board and checks that it was built for `model`.
     ///
     /// # Errors
-    /// No answer, another version of the packets, another scene.
+    /// No answer, another packet version, another scene.
     pub fn new(mut client: Client<P>, model: Model, tare: Option<&Frame>, forces: bool, check: bool) -> Result<Self> {
         let identity = client.identify(&model)?;
         let tare_MPa = tare.map(|frame| frame.stress_MPa.clone());
         Ok(Session { client, model, identity, tare_MPa, forces, check })
     }
 
-    /// The frame without what the sensor reads when nothing touches it; 0 where a taxel is dead.
-    fn tared(&self, frame: &Frame) -> Frame {
+    /// The frame minus the tare frame; 0 for dead taxels.
+    fn subtract_tare(&self, frame: &Frame) -> Frame {
         let mut frame = frame.clone();
         for (stress, zero) in frame.stress_MPa.iter_mut().zip(self.tare_MPa.iter().flatten()) {
             *stress -= zero;
@@ -113,35 +113,35 @@ impl<P: std::io::Read + std::io::Write> Session<P> {
         self.model.scene.input.mask_dead(frame)
     }
 
-    /// Sends a frame; the answer, and what differs from the model where that was asked for.
+    /// Sends a frame; returns the frame after tare, and the answer, compared with the model if requested.
     ///
     /// # Errors
     /// A frame of another sensor, no answer.
-    pub fn ask(&mut self, frame: &Frame) -> Result<(Frame, Answer)> {
-        let frame = self.tared(frame);
+    pub fn request(&mut self, frame: &Frame) -> Result<(Frame, Answer)> {
+        let frame = self.subtract_tare(frame);
         let codes = self.model.codes(&frame)?.codes;
-        // A board that adds nothing up sends all forces, and the host does.
+        // A board that cannot sum forces sends them all, and the host sums them.
         let forces = self.forces || !self.identity.supports(Kind::FrameForResultants);
         let mut answer = self.client.frame(&self.model, &codes, forces)?;
         if self.check {
-            answer.difference = Some(answer.against(&self.model, &codes));
+            answer.difference = Some(answer.compare_with_model(&self.model, &codes));
         }
         answer.beats = answer.beats.filter(|_| self.forces);
         Ok((frame, answer))
     }
 }
 
-/// Opens a serial port at `baud` bit/s; after `timeout` of silence a request is sent again.
+/// Opens a serial port at `baud` bit/s; requests are repeated after `timeout` without an answer.
 ///
 /// # Errors
-/// A port that does not exist, is taken, or does not know the bit rate.
+/// A port that does not exist, is in use, or does not support the bit rate.
 pub fn open(port: &str, baud: u32, timeout: Duration) -> Result<Client<Box<dyn SerialPort>>, HostError> {
-    let opened = serialport::new(port, baud).timeout(READ).open();
+    let opened = serialport::new(port, baud).timeout(READ_TIMEOUT).open();
     let opened = opened.map_err(|error| HostError::Port { port: port.to_owned(), reason: error.to_string() })?;
     Ok(Client::new(opened, port, timeout))
 }
 
-/// Runs the command; the text for standard output, and whether everything that was compared is equal.
+/// Runs the command: the text for standard output, and whether every comparison was equal.
 ///
 /// # Errors
 /// Wrong input, a port that cannot be opened, a board of another scene, no answer.
@@ -150,7 +150,7 @@ pub fn run(arguments: &Arguments) -> Result<(String, bool)> {
         true => (Scene::load(arguments.scene.as_deref().unwrap_or_default())?, Vec::new()),
         false => resolve(arguments.scene.as_deref(), &arguments.frames)?,
     };
-    let scene = arguments.target.put(scene);
+    let scene = arguments.target.apply(scene);
     require_uart(&scene, "host")?;
     let model = Model::new(&scene)?;
     let tare = arguments.tare.as_ref().map(|path| Frame::load(path, Some(&scene))).transpose()?;
@@ -160,56 +160,67 @@ pub fn run(arguments: &Arguments) -> Result<(String, bool)> {
     let mut session = Session::new(client, model, tare.as_ref(), arguments.forces, arguments.check)?;
     let before = session.client.counters()?;
     let begun = Instant::now();
-    let played = match arguments.stream {
+    let sent = match arguments.stream {
         true => stream::run(&mut session, &mut std::io::stdin().lock(), &mut std::io::stdout().lock())?,
-        false => play(&mut session, &frames)?,
+        false => send_frames(&mut session, &frames)?,
     };
-    let rate = played.answered as f64 / begun.elapsed().as_secs_f64();
+    let rate = sent.answered as f64 / begun.elapsed().as_secs_f64();
     let after = session.client.counters()?;
-    let summary = summary(&session.identity, played.answered, rate, session.client.lost, &before, &after);
+    let summary = summary(&session.identity, sent.answered, rate, session.client.link_errors, &before, &after);
     if arguments.stream {
         eprint!("{summary}");
     }
-    match (arguments.stream, played.refused) {
-        (true, 0) => Ok((String::new(), played.equal)),
-        (true, refused) => bail!("standard input: {refused} of {} lines were refused", refused + played.answered),
-        (false, _) => Ok((played.text + &summary, played.equal)),
+    match (arguments.stream, sent.refused) {
+        (true, 0) => Ok((String::new(), sent.equal)),
+        (true, refused) => bail!("standard input: {refused} of {} lines were refused", refused + sent.answered),
+        (false, _) => Ok((sent.text + &summary, sent.equal)),
     }
 }
 
-/// What became of all frames.
-struct Played {
-    /// For standard output, where the frames came from files.
+/// Result of sending all frames.
+struct FramesSent {
+    /// Text for standard output; empty with `--stream`.
     text: String,
-    /// All that was compared is equal to the model.
+    /// Whether every compared answer was equal to the model's.
     equal: bool,
-    /// Frames answered.
+    /// Number of frames answered.
     answered: usize,
-    /// Lines that are no frame.
+    /// Number of input lines that are not a valid frame.
     refused: usize,
 }
 
-/// Sends the frames one after the other.
-fn play<P: std::io::Read + std::io::Write>(session: &mut Session<P>, frames: &[Frame]) -> Result<Played> {
+/// Sends frames from files one after the other.
+fn send_frames<P: std::io::Read + std::io::Write>(session: &mut Session<P>, frames: &[Frame]) -> Result<FramesSent> {
     let bar = Progress::steps(&format!("{}: frames", session.model.scene.name), frames.len() as u64);
     let (mut text, mut equal) = (String::new(), true);
     for (index, frame) in frames.iter().enumerate() {
-        let (frame, answer) = session.ask(frame)?;
+        let (frame, answer) = session.request(frame)?;
         if let Some(beats) = &answer.beats {
             let result = session.model.decode(&frame, "board", beats, &answer.status)?;
             let sensor = &session.model.scene.sensor;
             text.push_str(&report::reconstruction(&result, sensor, full_scale(&session.model.scene, &frame)));
             text.push_str(&report::equality(&answer));
         } else {
-            text.push_str(&report::resultants(&frame.id, &Line::new(&session.model, &frame, &answer)?, &answer));
+            text.push_str(&report::resultants(
+                &frame.id,
+                &PhysicalAnswer::new(&session.model, &frame, &answer)?,
+                &answer,
+            ));
         }
         equal &= !matches!(answer.difference, Some(Some(_)));
-        bar.at(index as u64 + 1);
+        bar.set(index as u64 + 1);
     }
-    Ok(Played { text, equal, answered: frames.len(), refused: 0 })
+    Ok(FramesSent { text, equal, answered: frames.len(), refused: 0 })
 }
 
-fn summary(identity: &Identity, count: usize, rate: f64, lost: Lost, before: &Counters, after: &Counters) -> String {
+fn summary(
+    identity: &Identity,
+    count: usize,
+    rate: f64,
+    errors: LinkErrors,
+    before: &Counters,
+    after: &Counters,
+) -> String {
     let since = |field: fn(&Counters) -> u16| field(after).wrapping_sub(field(before));
     format!(
         "board           {}×{} taxels, {} bit codes, {} MHz, scene {:08x}{}\n\
@@ -221,9 +232,9 @@ fn summary(identity: &Identity, count: usize, rate: f64, lost: Lost, before: &Co
         identity.input_bits,
         f64::from(identity.clock_hz) / 1e6,
         identity.scene,
-        if identity.supports(Kind::FrameForResultants) { "" } else { ", sends forces for the host to add up" },
-        lost.repeated,
-        lost.damaged,
+        if identity.supports(Kind::FrameForResultants) { "" } else { ", sends forces, which the host sums" },
+        errors.repeated,
+        errors.damaged,
         since(|c| c.framing),
         since(|c| c.crc),
         since(|c| c.unknown_type),

@@ -1,12 +1,12 @@
-//! Scene and frames from what the command line names.
+//! Scene and frames from the command line's SCENE and `--frame` arguments.
 //!
 //! | SCENE | `--frame` | gives |
 //! |---|---|---|
-//! | named | files, `eq2` | the scene, those frames |
-//! | named | none | the scene, its shipped frames |
+//! | given | files, `eq2` | the scene, those frames |
+//! | given | none | the scene, its shipped frames |
 //! | none | files | the built-in scene with the first file's sensor, else the default scene of that sensor |
 //!
-//! One reconstruction takes 2^k frames, k the scene's `input.average`.
+//! One reconstruction takes 2^k frames, where k is the scene's `input.average`.
 
 use anyhow::{bail, ensure, Result};
 use clap::Args;
@@ -14,29 +14,29 @@ use dermis_golden::frame::Frame;
 use dermis_golden::link::LinkKind;
 use dermis_golden::scene::Scene;
 
-/// `--frame` value that stands for the paper's Eq. 2.
+/// `--frame` value for the stress of the paper's Eq. 2.
 pub const EQ2: &str = "eq2";
 
-/// Another board than a scene's own.
+/// The option `--target-board`, which replaces a scene's board.
 #[derive(Args, Clone, Debug, Default)]
-pub struct OnBoard {
-    /// Board in place of the scene's own, a file's name in constraints.
+pub struct BoardOverride {
+    /// Board to use instead of the scene's: the name of a file in constraints.
     #[arg(long, value_name = "NAME")]
     target_board: Option<String>,
 }
 
-impl OnBoard {
-    /// The scene on that board.
-    pub fn put(&self, mut scene: Scene) -> Scene {
+impl BoardOverride {
+    /// The scene with that board; unchanged where the option is absent.
+    pub fn apply(&self, mut scene: Scene) -> Scene {
         scene.hardware.board = self.target_board.clone().unwrap_or(scene.hardware.board);
         scene
     }
 }
 
-/// Refuses a scene for `dermis <command>`, which knows serial ports only.
+/// Refuses a scene whose link is not a UART, for `dermis <command>`, which supports serial ports only.
 ///
 /// # Errors
-/// Another link than a UART.
+/// The scene's link is not a UART.
 pub fn require_uart(scene: &Scene, command: &str) -> Result<()> {
     let (name, link) = (&scene.name, scene.hardware.link);
     ensure!(
@@ -48,17 +48,17 @@ pub fn require_uart(scene: &Scene, command: &str) -> Result<()> {
     Ok(())
 }
 
-/// Finds the scene and its frames, at least one.
+/// Loads the scene and its frames, at least one.
 ///
 /// # Errors
-/// Unknown scene, unreadable frame, a frame of another sensor, neither scene nor sensor, no frames at all.
+/// Unknown scene, unreadable frame, a frame of another sensor, neither scene nor sensor given, no frames.
 pub fn resolve(scene: Option<&str>, frames: &[String]) -> Result<(Scene, Vec<Frame>)> {
     let scene = match (scene, frames.first().map(String::as_str)) {
         (Some(scene), _) => Scene::load(scene)?,
-        (None, Some(first)) if first != EQ2 => of_frame(first)?,
-        (None, Some(_)) => bail!("--frame {EQ2} has no sensor of its own: name a scene"),
+        (None, Some(first)) if first != EQ2 => scene_of_frame(first)?,
+        (None, Some(_)) => bail!("--frame {EQ2} defines no sensor: name a scene"),
         (None, None) => bail!(
-            "name a scene ({}, or a file), or a frame file that holds its sensor",
+            "name a scene ({}, or a file), or a frame file that contains its sensor",
             Scene::builtin_names().join(", ")
         ),
     };
@@ -74,11 +74,10 @@ pub fn resolve(scene: Option<&str>, frames: &[String]) -> Result<(Scene, Vec<Fra
     Ok((scene, frames))
 }
 
-/// Finds the scene and the frames of one reconstruction, 2^k of them; without `--frame` and averaging the first
-/// shipped.
+/// Loads the scene and the 2^k frames of one reconstruction; without `--frame` and averaging, the first shipped frame.
 ///
 /// # Errors
-/// As [`resolve`]; another number of frames than the scene averages.
+/// As [`resolve`]; a number of frames other than 2^k.
 pub fn resolve_one(scene: Option<&str>, files: &[String]) -> Result<(Scene, Vec<Frame>)> {
     let named = scene;
     let (scene, mut frames) = resolve(named, files)?;
@@ -105,8 +104,8 @@ fn load(path: &str, scene: &Scene) -> Result<Frame> {
     Ok(frame)
 }
 
-/// The scene that a frame file's own sensor stands for.
-fn of_frame(path: &str) -> Result<Scene> {
+/// The built-in scene with the sensor in a frame file, else the default scene of that sensor.
+fn scene_of_frame(path: &str) -> Result<Scene> {
     let sensor = Frame::load(path, None)?.sensor;
     for name in Scene::builtin_names() {
         let scene = Scene::builtin(name)?;

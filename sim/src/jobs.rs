@@ -1,4 +1,4 @@
-//! Tasks on several threads, in order of the list, until one fails or the user interrupts.
+//! Runs a list of tasks on several threads until one fails or the user interrupts.
 
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
@@ -10,35 +10,37 @@ use thiserror::Error;
 
 use crate::progress::Progress;
 
-/// Exit code of a second interruption, which does not wait.
-const IMPATIENT: i32 = 130;
+/// Exit code when a second signal ends the program at once.
+const SECOND_INTERRUPT_EXIT: i32 = 130;
 
-/// The user has had enough.
+/// Interrupted by SIGINT or SIGTERM.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Error)]
 #[error("interrupted; nothing was written")]
 pub struct Interrupted;
 
-/// Whether the user has had enough.
+/// Set when SIGINT or SIGTERM has arrived.
 #[derive(Clone, Debug, Default)]
 pub struct Interrupt(Arc<AtomicBool>);
 
 impl Interrupt {
-    /// Set by Ctrl-C or a request to terminate from now on; the second one ends the program at once.
+    /// Registers handlers: the first SIGINT or SIGTERM sets the flag, the second one ends the program at once.
     ///
     /// # Errors
-    /// The system has no signals to spare.
-    pub fn of_signals() -> Result<Interrupt> {
+    /// A handler cannot be registered.
+    pub fn on_signals() -> Result<Interrupt> {
         let interrupt = Interrupt::default();
         for signal in [SIGINT, SIGTERM] {
-            // In this order: the first one finds the flag unset.
-            flag::register_conditional_shutdown(signal, IMPATIENT, interrupt.0.clone())?;
+            // The order matters: on the first signal the shutdown handler must find the flag unset.
+            flag::register_conditional_shutdown(signal, SECOND_INTERRUPT_EXIT, interrupt.0.clone())?;
             flag::register(signal, interrupt.0.clone())?;
         }
         Ok(interrupt)
     }
 
+    /// Fails once a signal has arrived.
+    ///
     /// # Errors
-    /// The user has had enough.
+    /// [`Interrupted`].
     pub fn check(&self) -> Result<()> {
         match self.0.load(Ordering::Relaxed) {
             true => Err(Interrupted.into()),
@@ -47,10 +49,11 @@ impl Interrupt {
     }
 }
 
-/// Does all tasks on `jobs` threads, at least one; results in the tasks' order.
+/// Runs `work` on all tasks with `jobs` threads (at least one); the results are in the tasks' order. `what` names the
+/// progress bar.
 ///
 /// # Errors
-/// The first task's that failed, by the list; an interruption.
+/// The error of the first failed task in list order; [`Interrupted`].
 pub fn parallel<T: Send, R: Send>(
     what: &str,
     tasks: Vec<T>,
@@ -70,13 +73,13 @@ pub fn parallel<T: Send, R: Send>(
             let result = work(task);
             failed.fetch_or(result.is_err(), Ordering::Relaxed);
             *results[index].lock().unwrap_or_else(PoisonError::into_inner) = Some(result);
-            bar.at(done.fetch_add(1, Ordering::Relaxed) as u64 + 1);
+            bar.set(done.fetch_add(1, Ordering::Relaxed) as u64 + 1);
         }
     };
     std::thread::scope(|scope| (0..jobs.max(1)).for_each(|_| drop(scope.spawn(worker))));
     interrupt.check()?;
     let results = results.into_iter().map(|result| result.into_inner().unwrap_or_else(PoisonError::into_inner));
-    // A task without a result comes after one that failed.
+    // Tasks without a result were not started: they come after a failed one, whose error `collect` returns first.
     results.flatten().collect()
 }
 

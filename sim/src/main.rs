@@ -1,4 +1,4 @@
-//! The `dermis` program; everything is in [`dermis_sim::cli`].
+//! The `dermis` program: calls [`dermis_sim::cli`].
 use std::process::ExitCode;
 
 fn main() -> ExitCode {

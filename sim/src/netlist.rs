@@ -1,11 +1,10 @@
-//! The netlist after synthesis as a simulated device: the same vectors, the same bits, the same cycles.
+//! The netlist after synthesis, simulated: the same vectors must give the same bits in the same cycles.
 //!
 //! ```text
-//! Verilog --yosys--> cells of the family --absorb--> netlist.v + models of the cells --> Verilator
+//! Verilog --yosys--> cells of the family --register packing--> netlist.v + models of the cells --> Verilator
 //! ```
-//! It finds what a simulation of the Verilog cannot: constructs that the simulator reads differently from the
-//! synthesiser, and cells or registers that the flow itself has put wrong. The stages' streams are gone in a netlist; beats
-//! and cycle counts are what is compared.
+//! This finds what a simulation of the Verilog cannot: constructs that simulator and synthesiser interpret differently,
+//! and errors of the flow's own netlist edits. A netlist has no taps, so that only beats and cycle counts are compared.
 
 use std::fs;
 use std::path::Path;
@@ -14,21 +13,22 @@ use dermis_golden::board::Family;
 use dermis_golden::write::write;
 use dermis_hdl::{Generated, GeneratedFile};
 
+use crate::artifact_cache;
 use crate::bitstream::family::YOSYS;
 use crate::bitstream::synthesis::{run, synthesise, NETLIST};
 use crate::bitstream::tools::ToolError;
-use crate::place;
 use crate::progress::Progress;
 use crate::verilator::fingerprint;
 
-/// Our models of ECP5 cells that Yosys has none for.
+/// Models of the ECP5 cells for which Yosys has none.
 const ECP5_CELLS: &str = include_str!("../cells/ecp5.v");
-/// Yosys's models of iCE40 cells give unconnected inputs their values by defaults, which Verilator has not.
+/// Yosys's models of iCE40 cells use default values for unconnected inputs, which Verilator does not support; this
+/// turns them off.
 const ICE40_DEFINES: &str = "`define NO_ICE40_DEFAULT_ASSIGNMENTS\n";
-/// The netlist as Verilog.
+/// File name of the netlist as Verilog.
 const VERILOG: &str = "netlist.v";
-/// What Verilator says of files that tools have written: widths, loops through carry chains, memories of two clocks, models
-/// with a time scale beside a netlist without.
+/// Verilator warnings waived for the tools' files: widths, loops through carry chains, memories with two clocks, cell
+/// models with a time scale next to a netlist without one.
 const WAIVED: [&str; 9] = [
     "CASEINCOMPLETE",
     "COMBDLY",
@@ -41,19 +41,19 @@ const WAIVED: [&str; 9] = [
     "WIDTH",
 ];
 
-/// Synthesises `generated` for `family`, or takes the netlist from below `cache`; it comes with its cells' models, in the
-/// place of the Verilog.
+/// Synthesises `generated` for `family`, or takes the netlist from `cache`. The result's files are the netlist, the
+/// models of its cells and waivers, instead of the Verilog.
 ///
 /// # Errors
-/// [`ToolError`]: no Yosys or none that has its models beside it, or a design that it refuses.
+/// [`ToolError`]: no Yosys, a Yosys without its cell models, or a design that it refuses.
 pub fn netlist(generated: &Generated, family: Family, cache: &Path) -> Result<Generated, ToolError> {
-    // What Yosys reads; the other files may change without a change of the netlist.
+    // Only what Yosys reads is part of the cache key.
     let read: Vec<&GeneratedFile> = generated.files.iter().filter(|file| is_read(&file.name)).collect();
     let texts: Vec<(&str, &str)> = read.iter().map(|file| (file.name.as_str(), file.text.as_str())).collect();
     let version = format!("{family:?} {}", YOSYS.version()?);
     let folder = cache.join(format!("netlist-{}", fingerprint(&texts, &version)));
     let path = folder.join(VERILOG);
-    if !place::is_whole(&folder, VERILOG) {
+    if !artifact_cache::is_intact(&folder, VERILOG) {
         make(&read, &generated.top, family, &folder)?;
     }
     let text = fs::read_to_string(&path).map_err(ToolError::io(&path))?;
@@ -67,26 +67,26 @@ pub fn netlist(generated: &Generated, family: Family, cache: &Path) -> Result<Ge
     })
 }
 
-/// Whether Yosys reads a file of that name: Verilog, and the memories it names.
+/// Whether Yosys reads a file of that name: Verilog and memory files.
 fn is_read(name: &str) -> bool {
     name.ends_with(".v") || name.ends_with(".hex")
 }
 
-/// Makes the netlist of `files` that `folder` is to hold.
+/// Synthesises `files` and publishes the netlist as `folder`.
 fn make(files: &[&GeneratedFile], top: &str, family: Family, folder: &Path) -> Result<(), ToolError> {
-    let work = place::begin(folder)?;
+    let work = artifact_cache::staging_folder(folder)?;
     for file in files {
         write(&work.path().join(&file.name), file.text.as_bytes())?;
     }
     let _progress = Progress::start(&format!("{top}: netlist"));
     synthesise(work.path(), family, &format!("{top}.v"), top)?;
-    // Without the cells, which Yosys has as empty modules.
+    // Writes the top module alone: Yosys has the cells as empty modules.
     let script = format!("read_json {NETLIST}; select {top}; write_verilog -noattr -selected {VERILOG}");
     run(work.path(), script, "verilog.log")?;
-    Ok(place::finish(work, folder, VERILOG)?)
+    Ok(artifact_cache::publish(work, folder, VERILOG)?)
 }
 
-/// Models of the family's cells: Yosys's, and ours where it has none.
+/// Simulation models of the family's cells: Yosys's, or this program's where Yosys has only a black box.
 fn cells(family: Family) -> Result<String, ToolError> {
     let (folder, own) = match family {
         Family::Ecp5 => ("ecp5", ECP5_CELLS),
@@ -99,9 +99,9 @@ fn cells(family: Family) -> Result<String, ToolError> {
     let mut replaced = false;
     for line in text.lines() {
         let name = line.strip_prefix("module ").and_then(|rest| rest.split('(').next()).map(str::trim);
-        // Yosys has an empty module where ours is the model.
+        // Skips Yosys's black box of a cell that has a model here.
         replaced |= name.is_some_and(|name| own.contains(&format!("\nmodule {name} (")));
-        // Files that it includes are pasted in: the compiled design is one set of texts.
+        // Included files are inlined, as the compiled design consists of the given texts only.
         match line.trim().strip_prefix("`include \"").and_then(|name| name.strip_suffix('"')) {
             _ if replaced => {}
             Some(name) => {

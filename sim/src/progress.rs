@@ -1,18 +1,18 @@
-//! A progress line on stderr while something slow runs, only when stderr is a terminal.
+//! Progress lines on stderr, shown only when stderr is a terminal.
 
 use std::sync::LazyLock;
 use std::time::Duration;
 
 use indicatif::{MultiProgress, ProgressBar, ProgressStyle};
 
-/// All lines of the process, one below the other where several threads have one.
+/// All progress lines of the process, one below the other.
 static LINES: LazyLock<MultiProgress> = LazyLock::new(MultiProgress::new);
 
-/// Shown from [`Progress::start`] until dropped.
+/// A progress line, shown until dropped.
 pub struct Progress(ProgressBar);
 
 impl Progress {
-    /// Shows `message` with a moving mark and the elapsed time. Hidden when stderr is not a terminal.
+    /// Shows `message` with a spinner and the elapsed time.
     pub fn start(message: &str) -> Self {
         let bar = LINES.add(ProgressBar::new_spinner());
         if let Ok(style) = ProgressStyle::with_template("{spinner} {msg} ({elapsed})") {
@@ -23,7 +23,7 @@ impl Progress {
         Progress(bar)
     }
 
-    /// Shows `message` with a bar of `total` steps. Hidden when stderr is not a terminal.
+    /// Shows `message` with a bar of `total` steps.
     pub fn steps(message: &str, total: u64) -> Self {
         let bar = LINES.add(ProgressBar::new(total));
         if let Ok(style) = ProgressStyle::with_template("{msg} [{bar:30}] {pos}/{len} ({elapsed}, {eta} left)") {
@@ -33,14 +33,14 @@ impl Progress {
         Progress(bar)
     }
 
-    /// Shows how many of how many steps are done.
-    pub fn of(&self, done: u64, total: u64) {
+    /// Sets the number of finished steps and their total.
+    pub fn set_of(&self, done: u64, total: u64) {
         self.0.set_length(total);
         self.0.set_position(done);
     }
 
-    /// Shows how many steps are done.
-    pub fn at(&self, done: u64) {
+    /// Sets the number of finished steps.
+    pub fn set(&self, done: u64) {
         self.0.set_position(done);
     }
 }

@@ -1,15 +1,18 @@
-//! What the commands print: the JSON contract of `cosim` and the tables for people; and the report.
+//! Text, JSON and CSV that the commands print, and the files of `dermis report`.
 //!
 //! ```text
 //! run ─ measure ─ sections ─┬─ tables ───┬─ document ─┬─ html
 //!                           └─ pictures ─┘            └─ data: Markdown, CSV, JSON
 //! ```
 //!
-//! Times are total cycles (first input beat to last output beat) at the engine's clock; the margin is
-//! what they leave of [`BUDGET_US`].
+//! Times are total cycles (first input beat to last output beat) divided by the engine's clock; the margin is
+//! [`BUDGET_US`] minus the time.
 
+mod bitstream_report;
 mod cases;
 mod csv;
+#[cfg(test)]
+mod csv_reader;
 mod data;
 mod document;
 mod errors;
@@ -18,13 +21,10 @@ mod faults;
 mod guide;
 mod host;
 mod html;
-mod implemented;
 mod measure;
-mod needs;
 mod noise;
 mod pictures;
-#[cfg(test)]
-mod read;
+mod resource_report;
 mod result;
 mod run;
 mod save;
@@ -35,15 +35,15 @@ mod style;
 mod table;
 
 pub use crate::jobs::Interrupted;
+pub use bitstream_report::{bitstream, summaries, BitstreamReport, Summary};
 pub use cases::cases;
 pub use errors::errors;
 pub use extremes::extremes;
 pub use faults::faults;
 pub use guide::{fixed_pictures, time_picture, PictureFile};
 pub use host::{equality, link_times, resultants, wire_times};
-pub use implemented::{implementations, implemented, Implemented, Summary};
-pub use needs::{features, resources};
 pub use noise::{noise, noise_medians};
+pub use resource_report::{features, resources};
 pub use result::{difference, reconstruction};
 pub use run::{run, Arguments};
 pub use sections::stability_picture;
@@ -57,26 +57,26 @@ use serde::Serialize;
 use crate::cosim::Mismatch;
 use crate::verify::Verified;
 
-/// Form of a table.
+/// Output format of a table.
 #[derive(clap::ValueEnum, Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Format {
-    /// For people.
+    /// Aligned Markdown table.
     Markdown,
-    /// For spreadsheets.
+    /// CSV with full precision.
     Csv,
-    /// For programs.
+    /// JSON with full precision.
     Json,
 }
 
-/// Time that touch allows for a frame, in µs.
+/// Time budget of a frame for tactile sensing, in µs.
 pub const BUDGET_US: u64 = 1000;
 
-/// Smallest, middle and largest of some counts; none where no frame was finished.
+/// Smallest, median and largest of some counts; none if no frame was completed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 pub struct Spread {
     /// Smallest.
     pub min: Option<u64>,
-    /// Middle; of an even number of values the larger of the two middle ones.
+    /// Median; of an even number of values the larger of the two middle ones.
     pub median: Option<u64>,
     /// Largest.
     pub max: Option<u64>,
@@ -91,10 +91,10 @@ impl Spread {
     }
 }
 
-/// Middle and largest time in µs.
+/// Median and largest time in µs.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Time {
-    /// Middle.
+    /// Median.
     pub median: Option<f64>,
     /// Largest.
     pub max: Option<f64>,
@@ -105,26 +105,26 @@ pub struct Time {
 pub struct CosimReport {
     /// Scene name.
     pub scene: String,
-    /// Frames co-simulated.
+    /// Number of frames co-simulated.
     pub frames: usize,
-    /// Whether every run equalled the bit-true model to the bit.
+    /// Whether every run equalled the bit-true model in every bit and cycle.
     pub equal: bool,
-    /// The first differences of every frame.
+    /// The first mismatches of every frame.
     pub mismatches: Vec<Mismatch>,
-    /// From the last input beat to the last output beat.
+    /// Latency: cycles from the last input beat to the last output beat.
     pub cycles: Spread,
-    /// From the first input beat to the last output beat.
+    /// Cycles from the first input beat to the last output beat.
     pub total_cycles: Spread,
-    /// The engine's clock.
+    /// The engine's clock in MHz.
     pub clock_MHz: f64,
-    /// Of the total cycles.
+    /// Time of the total cycles.
     pub time_us: Time,
     /// [`BUDGET_US`].
     pub budget_us: u64,
 }
 
 impl CosimReport {
-    /// Sums up a co-simulation.
+    /// Summary of a co-simulation.
     pub fn new(verified: &Verified) -> Self {
         let total_cycles = Spread::of(verified.rows.iter().filter_map(|row| row.times.total()));
         let time = |cycles: Option<u64>| cycles.map(|c| verified.board.microseconds(c));

@@ -1,11 +1,11 @@
-//! `dermis stability`: errors of double, single and fixed point against the condition of a scene, and extreme frames.
+//! `dermis stability`: errors of double, single and fixed point against the condition number of Cz, and extreme frames.
 //!
-//! | call | prints |
+//! | arguments | prints |
 //! |---|---|
-//! | without scenes | the table of [`dermis_golden::stability::settings`] |
-//! | with scenes | one line for each |
-//! | `--extreme` | the extreme frames of each scene, by default sensor-1 |
-//! | `--plot FILE` | besides, condition against error as SVG |
+//! | no scenes | the table of [`dermis_golden::stability::settings`] |
+//! | scenes | one row for each |
+//! | `--extreme` | results on extreme frames of each scene, by default sensor-1 |
+//! | `--plot FILE` | additionally writes error against condition number as SVG |
 
 use std::path::PathBuf;
 
@@ -19,11 +19,11 @@ use crate::progress::Progress;
 use crate::report::{self, Format};
 use dermis_golden::write::write;
 
-/// What to measure.
+/// Arguments of `dermis stability`.
 #[derive(Args, Debug)]
 #[command(after_help = EXAMPLES)]
 pub struct Arguments {
-    /// Built-in names or paths of scenes; without any the table from well conditioned to hopeless.
+    /// Built-in names or paths of scenes; default: a series from well to ill conditioned.
     scenes: Vec<String>,
     /// Only scenes of this group of the table: thickness, poisson, size, pitches.
     #[arg(long, value_name = "NAME", conflicts_with_all = ["scenes", "extreme"])]
@@ -31,13 +31,13 @@ pub struct Arguments {
     /// Only scenes with this kind of inverse: tsvd, tikhonov, exact.
     #[arg(long, value_name = "KIND", conflicts_with = "extreme")]
     inverse: Option<String>,
-    /// Extreme frames in place of conditions, of sensor-1 where no scene is named.
+    /// Measure on extreme frames instead; default scene: sensor-1.
     #[arg(long, conflicts_with = "plot")]
     extreme: bool,
-    /// Draw condition against error into an SVG file.
+    /// Also plot error against condition number into an SVG file.
     #[arg(long, value_name = "FILE")]
     plot: Option<PathBuf>,
-    /// Form of the table.
+    /// Output format.
     #[arg(long, value_enum, default_value = "markdown")]
     format: Format,
 }
@@ -49,10 +49,10 @@ const EXAMPLES: &str = "Examples:
   dermis stability --plot stability.svg
   dermis stability --extreme eight-by-eight          zero, saturated, 1e-9 to 1e9 of full scale, …";
 
-/// The table's text; a picture is written beside.
+/// Runs the command: the table as text; writes the plot if asked for.
 ///
 /// # Errors
-/// An unknown scene, one that the golden model refuses with `--extreme`, or a file that cannot be written.
+/// An unknown scene, a scene that the golden model refuses (with `--extreme`), a file that cannot be written.
 pub fn run(arguments: &Arguments) -> Result<String> {
     if arguments.extreme {
         return extreme(arguments);
@@ -69,7 +69,7 @@ pub fn run(arguments: &Arguments) -> Result<String> {
     let mut rows = Vec::with_capacity(wanted.len());
     for setting in &wanted {
         rows.push(measure(setting)?);
-        bar.at(rows.len() as u64);
+        bar.set(rows.len() as u64);
     }
     drop(bar);
     if let Some(path) = &arguments.plot {

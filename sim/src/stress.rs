@@ -1,19 +1,20 @@
-//! `dermis stress`: the generated Verilog's two streams under gaps, back-pressure, wrong `tlast` and resets.
+//! `dermis stress`: tests the two AXI streams of the generated Verilog with gaps, back-pressure, wrong `tlast` and
+//! resets.
 //!
-//! | experiment | what happens | what must hold |
+//! | experiment | stimulus | requirement |
 //! |---|---|---|
-//! | `stalls` | frames back to back, both sides paced in many ways, now and then one at full speed alone | every whole frame leaves once, in order, equal to the bit-true model; alone, every beat in its promised cycle |
-//! | `tlast` | every other frame's `tlast` is early, missing, doubled or late, at random pace | what a wrong one cuts is dropped, the next frame that leaves carries the flag, once |
-//! | `reset` | a reset at a cycle of a frame, held from one cycle to as long as a frame takes | nothing leaves of what was inside; the next frame is right, unflagged and in time |
+//! | `stalls` | frames back to back at changing valid and ready rates; now and then one frame alone at full speed | every frame leaves once, in order, equal to the bit-true model; alone, every beat in the model's cycle |
+//! | `tlast` | every other frame has an early, missing, doubled or late `tlast`; random valid and ready rates | frames cut short are dropped; the next frame carries the framing flag, once |
+//! | `reset` | a reset at a given cycle of a frame, held for one cycle up to a frame's time | no beat of the frames inside leaves; the next frame is right, without flag, and in time |
 //!
-//! Each experiment takes about the asked number of cycles; resets end earlier, with one at each cycle of a frame. What a
-//! wrong `tlast` does is `stress/scoreboard.rs`'s to say.
+//! Each experiment runs for about the requested number of cycles; `reset` ends earlier once every cycle of a frame has
+//! had a reset. The expected effect of a wrong `tlast` is defined in `stress/scoreboard.rs`.
 
-mod line;
-mod pace;
-mod pool;
+mod handshake_rates;
 mod resets;
+mod samples;
 mod scoreboard;
+mod testbench;
 
 use std::path::Path;
 use std::time::Instant;
@@ -25,17 +26,17 @@ use dermis_golden::frame::Frame;
 use dermis_golden::scene::Scene;
 use serde::Serialize;
 
-pub(crate) use pool::{drawn, own, Sample};
+pub(crate) use samples::{shipped_samples, synthetic_samples, Sample};
 pub use scoreboard::Violation;
 
 use crate::hardware::{Hardware, Simulator};
 use crate::progress::Progress;
 use crate::report;
-use crate::tried::{self, Tried};
-use line::{Burst, Line, RESET_CYCLES};
-use pace::Pace;
+use crate::run_log::{RunLog, TargetCounts};
+use handshake_rates::HandshakeRates;
+use testbench::{Burst, Testbench, RESET_CYCLES};
 
-/// What to try.
+/// Arguments of `dermis stress`.
 #[derive(Args, Debug)]
 #[command(after_help = EXAMPLES)]
 pub struct Arguments {
@@ -45,7 +46,7 @@ pub struct Arguments {
     /// Cycles of each experiment.
     #[arg(long, value_name = "N", default_value_t = 1_000_000)]
     cycles: u64,
-    /// Of pace, codes, errors and resets.
+    /// Seed of rates, codes, wrong tlast and resets.
     #[arg(long, default_value_t = 1)]
     seed: u64,
     /// Print the outcomes as JSON and nothing else.
@@ -54,91 +55,92 @@ pub struct Arguments {
 }
 
 const EXAMPLES: &str = "Examples:
-  dermis stress                                      gaps, wrong tlast and resets, sensor-1
+  dermis stress                                      gaps, wrong tlast and resets on sensor-1
   dermis stress eight-by-eight --cycles 50000 --seed 7 --json";
 
-/// What one experiment did and found.
+/// Counts of one experiment.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct Outcome {
-    /// The scene.
+    /// Scene name.
     pub scene: String,
     /// `stalls`, `tlast` or `reset`.
     pub experiment: &'static str,
-    /// Clock cycles run.
+    /// Clock cycles simulated.
     pub cycles: u64,
-    /// Cycles in which nothing was offered to a device that was ready, or a beat of the device was kept waiting.
+    /// Cycles in which the device was ready without input, or had a beat waiting for ready.
     pub stalled: u64,
-    /// Whole frames that the device took and that no reset swept away.
+    /// Complete frames accepted and not discarded by a reset.
     pub frames_in: u64,
-    /// Frames that left, each of them right where there is no violation.
+    /// Frames delivered.
     pub frames_out: u64,
-    /// Of these, frames alone at full speed, whose every beat was asked for its cycle.
+    /// Of these, frames alone at full speed, for which the cycle of every beat was checked.
     pub timed: u64,
-    /// Beats whose `tlast` was wrong.
+    /// Input beats with a wrong `tlast`.
     pub wrong_tlast: u64,
-    /// Frames cut short, which leave nothing.
+    /// Frames cut short by an early `tlast`, which deliver nothing.
     pub cut: u64,
-    /// Frames out with the framing flag, as they must.
+    /// Frames delivered with the framing flag, as expected.
     pub flagged: u64,
-    /// Resets.
+    /// Number of resets.
     pub resets: u64,
-    /// Cycles of a frame at full speed, where a reset may fall.
-    pub reset_places: u64,
+    /// Number of cycles of a frame at full speed, at each of which a reset can start.
+    #[serde(rename = "reset_places")]
+    pub possible_reset_cycles: u64,
     /// Longest reset in cycles.
     pub longest_reset: u64,
-    /// How often something was other than it must.
+    /// Number of violated requirements.
     pub violations: u64,
-    /// The first of them.
+    /// The first violations.
     pub first: Vec<Violation>,
 }
 
-/// Runs all experiments on the hardware's Verilog, with the codes of `frames` and drawn ones.
+/// Runs all experiments on the hardware's Verilog, with the codes of `frames` and synthetic ones.
 ///
 /// # Errors
 /// No Verilator, a design that it refuses, or frames of another sensor.
 pub fn stress(hardware: &Hardware, frames: &[Frame], cycles: u64, seed: u64) -> Result<Vec<Outcome>> {
     let mut random = fastrand::Rng::with_seed(seed);
-    let mut pool = own(&hardware.model, frames)?;
-    pool.extend(drawn(&hardware.model, &mut random));
+    let mut samples = shipped_samples(&hardware.model, frames)?;
+    samples.extend(synthetic_samples(&hardware.model, &mut random));
     let mut device = hardware.device(Simulator::Verilator)?;
     let mut outcomes = Vec::new();
     for experiment in ["stalls", "tlast", "reset"] {
-        let mut line = Line::new(device.as_mut(), &pool);
-        line.reset(RESET_CYCLES, &mut random);
+        let mut bench = Testbench::new(device.as_mut(), &samples);
+        bench.reset(RESET_CYCLES, &mut random);
         match experiment {
-            "stalls" => stalls(&mut line, &mut random, cycles),
-            "tlast" => tlast(&mut line, &mut random, cycles),
-            _ => resets::resets(&mut line, &mut random, cycles),
+            "stalls" => stalls(&mut bench, &mut random, cycles),
+            "tlast" => tlast(&mut bench, &mut random, cycles),
+            _ => resets::resets(&mut bench, &mut random, cycles),
         }
         let scene = hardware.model.scene.name.clone();
-        outcomes.push(Outcome { scene, experiment, ..line.finish() });
+        outcomes.push(Outcome { scene, experiment, ..bench.finish() });
     }
     Ok(outcomes)
 }
 
-/// Frames back to back; the pace changes every few frames.
-fn stalls(line: &mut Line, random: &mut fastrand::Rng, cycles: u64) {
-    while line.runs() && line.cycle() < cycles {
-        let mut pace = Pace::drawn(random);
+/// Experiment `stalls`: frames back to back, with new valid and ready rates every few frames.
+fn stalls(bench: &mut Testbench, random: &mut fastrand::Rng, cycles: u64) {
+    while bench.can_continue() && bench.cycle() < cycles {
+        let mut rates = HandshakeRates::random(random);
         for _ in 0..1 + random.usize(..6) {
-            let sample = random.usize(..line.samples());
-            line.send(&Burst::whole(line.sample(sample), sample), &mut pace);
+            let sample = random.usize(..bench.sample_count());
+            bench.send(&Burst::whole(bench.sample(sample), sample), &mut rates);
         }
         if random.u32(..8) == 0 {
-            let sample = random.usize(..line.samples());
-            line.send_alone(&Burst::whole(line.sample(sample), sample));
+            let sample = random.usize(..bench.sample_count());
+            bench.send_alone(&Burst::whole(bench.sample(sample), sample));
         }
     }
-    line.drain(&mut Pace::full_speed());
+    bench.drain(&mut HandshakeRates::full_speed());
 }
 
-/// Every other frame has a wrong `tlast`.
-fn tlast(line: &mut Line, random: &mut fastrand::Rng, cycles: u64) {
-    while line.runs() && line.cycle() < cycles {
-        let mut pace = Pace::drawn(random);
+/// Experiment `tlast`: every other frame on average has a wrong `tlast`.
+fn tlast(bench: &mut Testbench, random: &mut fastrand::Rng, cycles: u64) {
+    while bench.can_continue() && bench.cycle() < cycles {
+        let mut rates = HandshakeRates::random(random);
         for _ in 0..1 + random.usize(..6) {
-            let sample = random.usize(..line.samples());
-            let codes = line.sample(sample);
+            let sample = random.usize(..bench.sample_count());
+            let codes = bench.sample(sample);
             let burst = match random.u32(..8) {
                 0 => Burst::cut(codes, sample, 1 + random.usize(..codes.codes.len() - 1)),
                 1 => Burst::missing(codes, sample),
@@ -146,14 +148,14 @@ fn tlast(line: &mut Line, random: &mut fastrand::Rng, cycles: u64) {
                 3 => Burst::late(codes, sample),
                 _ => Burst::whole(codes, sample),
             };
-            line.send(&burst, &mut pace);
+            bench.send(&burst, &mut rates);
         }
     }
-    line.drain(&mut Pace::full_speed());
+    bench.drain(&mut HandshakeRates::full_speed());
 }
 
-/// What the report keeps of an experiment.
-fn kept(outcome: &Outcome, seconds: f64) -> tried::Line {
+/// The counts of an experiment for the run log.
+fn target_counts(outcome: &Outcome, seconds: f64) -> TargetCounts {
     let counts = [
         ("frames out", outcome.frames_out),
         ("wrong tlast", outcome.wrong_tlast),
@@ -162,17 +164,18 @@ fn kept(outcome: &Outcome, seconds: f64) -> tried::Line {
         ("resets", outcome.resets),
         ("violations", outcome.violations),
     ];
-    tried::Line::new(format!("{}, {}", outcome.scene, outcome.experiment), "cycles", outcome.cycles, counts, seconds)
+    TargetCounts::new(format!("{}, {}", outcome.scene, outcome.experiment), "cycles", outcome.cycles, counts, seconds)
 }
 
-/// The outcomes as text, and whether nothing was violated; the counts stay in the build folder for the report.
+/// Runs the command: the outcomes as text, and whether there was no violation. The counts are saved in the build folder
+/// for the report.
 ///
 /// # Errors
 /// An unknown scene, one without hardware, no Verilator.
 pub fn run(arguments: &Arguments, build: &Path) -> Result<(String, bool)> {
     let mut outcomes = Vec::new();
     let Arguments { scenes, cycles, seed, .. } = arguments;
-    let mut tried = Tried::new(&format!("dermis stress {} --cycles {cycles} --seed {seed}", scenes.join(" ")));
+    let mut log = RunLog::new(&format!("dermis stress {} --cycles {cycles} --seed {seed}", scenes.join(" ")));
     for name in scenes {
         let scene = Scene::load(name)?;
         let frames = Frame::shipped(&scene);
@@ -181,12 +184,12 @@ pub fn run(arguments: &Arguments, build: &Path) -> Result<(String, bool)> {
         let begun = Instant::now();
         let own = stress(&hardware, &frames, *cycles, *seed)?;
         let cycles: u64 = own.iter().map(|outcome| outcome.cycles).sum();
-        // Of the time together each experiment has its share by its cycles.
+        // Each experiment's share of the time is proportional to its cycles.
         let per_cycle = begun.elapsed().as_secs_f64() / cycles.max(1) as f64;
-        tried.lines.extend(own.iter().map(|outcome| kept(outcome, per_cycle * outcome.cycles as f64)));
+        log.targets.extend(own.iter().map(|outcome| target_counts(outcome, per_cycle * outcome.cycles as f64)));
         outcomes.extend(own);
     }
-    tried.keep(build, "stress")?;
+    log.save(build, "stress")?;
     let good = outcomes.iter().all(|outcome| outcome.violations == 0);
     let text = if arguments.json { serde_json::to_string(&outcomes)? + "\n" } else { report::stress(&outcomes) };
     Ok((text, good))

@@ -19,7 +19,7 @@ use dermis_golden::reconstruct::Reconstruction;
 use dermis_golden::scene::Scene;
 
 use crate::compare::median;
-use crate::fresh::{Fresh, Shapes};
+use crate::drawn_frames::{DrawnFrames, Shapes};
 
 /// Drawn frames of a line of a study.
 pub const FRAMES: u32 = 100;
@@ -73,7 +73,7 @@ pub fn run(arguments: &Arguments) -> Result<String> {
 /// # Errors
 /// A stress that is not finite.
 pub fn one_contact(scene: &Scene) -> Result<Vec<Frame>> {
-    let draw = Fresh { frames: FRAMES, contacts: vec![1], shapes: Shapes::Elliptic, touching: false, seed: 1 };
+    let draw = DrawnFrames { frames: FRAMES, contacts: vec![1], shapes: Shapes::Elliptic, touching: false, seed: 1 };
     draw.draw(scene)
 }
 

@@ -1,8 +1,8 @@
-//! Error tables: each scene in each of the paper's cases on each frame, beside the paper's own figures.
+//! Error tables: each scene in each of the paper's cases on each frame, next to the figures of the paper.
 //!
 //! ```text
 //! scene × case × frame -> golden ------> errors against truth, against case 0, per taxel --+
-//!                      -> bit-true ----> errors, difference in LSB and % ------------------+--> Line
+//!                      -> bit-true ----> errors, difference in LSB and % ------------------+--> ErrorRow
 //! paper's Table 2 -------------------------------------------------------------------------+
 //! ```
 //!
@@ -11,9 +11,10 @@
 //! | errors, ℓ2, paper | fractions; X1 X2 X3 signed as in Eq. 3 |
 //! | difference | LSB of the force word, share of the largest force |
 //!
-//! ℓ2 = ‖f − f_ref‖/‖f_ref‖ over all taxels and components. Of several contacts, whose shears may cancel, the error of
-//! the whole shear is also given over Σ|t_k|, and of case `contacts` each contact's own shear, ‖T_k − t_k‖/|t_k|,
-//! T_k of the region whose centre is nearest. The bit-true columns are empty where the hardware does not have the case.
+//! ℓ2 = ‖f − f_ref‖/‖f_ref‖ over all taxels and components. The shears t_k of several contacts may cancel; for these
+//! the error of the total shear is also given over Σ|t_k|, and for case `contacts` the error of each contact's shear,
+//! ‖T_k − t_k‖/|t_k|, where T_k is the shear of the region with the nearest centre. The bit-true columns are empty
+//! where the hardware does not support the case.
 
 use anyhow::Result;
 use dermis_golden::errors::Errors;
@@ -29,73 +30,77 @@ use serde::Serialize;
 
 use crate::compare::{difference, Difference};
 
-/// One subarray of one line.
+/// One subarray of a row.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Part {
+pub struct SubarrayRow {
     /// Ratio of shear to normal force.
     pub mu: [f64; 2],
     /// Whether compression and tension both exceed the noise floor, the paper's condition.
     pub both_signs: bool,
-    /// Whether the scene's own condition is met.
+    /// Whether the scene's condition for a search is met.
     pub condition: bool,
 }
 
 /// The bit-true model on one frame.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Fixed {
-    /// Against truth.
+pub struct BitTrueErrors {
+    /// Error against the true force.
     pub error: Option<Errors>,
-    /// From the floating-point result.
+    /// Difference from the floating-point result.
     pub difference: Difference,
 }
 
 /// One scene, case and frame.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Line {
+pub struct ErrorRow {
     /// Scene name.
     pub scene: String,
-    /// Case as scenes name it.
+    /// Case, as named in scene files.
     pub case: String,
     /// Frame name.
     pub frame: String,
-    /// Against truth.
+    /// Error against the true force.
     pub error: Option<Errors>,
-    /// Against case 0 of the same frame, as the paper does for sensors 3 and 4.
+    /// Error against case 0 of the same frame, as in the paper for sensors 3 and 4.
     pub error_case_0: Option<Errors>,
-    /// Per taxel, against truth.
+    /// ℓ2 error over all taxels against the true forces.
     pub l2: Option<f64>,
-    /// Contacts that the frame describes.
+    /// Number of contacts described in the frame.
     pub contacts: usize,
-    /// ‖T − T_ref‖/Σ|t_k|: against the shear of all contacts.
-    pub of_all: Option<f64>,
-    /// Of `contacts`, the error of each contact's own shear.
-    pub own: Vec<f64>,
-    /// The case that `adaptive` took.
-    pub taken: Option<String>,
-    /// Per subarray, row-major.
-    pub subarrays: Vec<Part>,
-    /// The bit-true model, where it has the case.
-    pub fixed: Option<Fixed>,
-    /// The paper's X1 X2 X3 of this sensor and case.
+    /// ‖T − T_ref‖/Σ|t_k|: error of the total shear over the sum of the contacts' shears.
+    #[serde(rename = "of_all")]
+    pub shear_over_all: Option<f64>,
+    /// For case `contacts`: the error of each contact's shear.
+    #[serde(rename = "own")]
+    pub contact_shears: Vec<f64>,
+    /// The case that `adaptive` has chosen for this frame.
+    #[serde(rename = "taken")]
+    pub chosen_case: Option<String>,
+    /// The subarrays, row-major.
+    pub subarrays: Vec<SubarrayRow>,
+    /// The bit-true model's errors, where the hardware supports the case.
+    pub fixed: Option<BitTrueErrors>,
+    /// X1 X2 X3 of this sensor and case in the paper's Table 2.
     pub paper: Option<[f64; 3]>,
-    /// Remarks on the golden result.
+    /// Flags of the golden result.
     pub flags: Vec<Flag>,
 }
 
-/// The paper's sensor a built-in scene stands for.
+/// The number of the paper's sensor, if the scene is one of its four.
 fn paper_sensor(scene: &Scene) -> Option<u32> {
     let number: u32 = scene.name.strip_prefix("sensor-")?.parse().ok()?;
     let builtin = Scene::builtin(&scene.name).ok()?;
     (builtin.sensor == scene.sensor).then_some(number)
 }
 
-/// All lines of one scene, case by case; a case that does not divide the array has none.
+/// All rows of one scene, case by case; cases that do not divide the array are skipped. Calls `progress` after each
+/// row.
 ///
 /// # Errors
-/// A scene or frame the golden model refuses.
-pub fn tabulate(scene: &Scene, cases: &[Case], frames: &[Frame], progress: &mut dyn FnMut()) -> Result<Vec<Line>> {
-    let mut lines = Vec::new();
-    let mut whole: Vec<Reconstruction> = Vec::new();
+/// A scene or frame that the golden model refuses.
+pub fn tabulate(scene: &Scene, cases: &[Case], frames: &[Frame], progress: &mut dyn FnMut()) -> Result<Vec<ErrorRow>> {
+    let mut rows = Vec::new();
+    let mut case_0: Vec<Reconstruction> = Vec::new();
     for &case in cases {
         if matches!(subarrays(case, &scene.sensor), Err(PartitionError::NotDividing { .. })) {
             continue;
@@ -103,51 +108,55 @@ pub fn tabulate(scene: &Scene, cases: &[Case], frames: &[Frame], progress: &mut 
         let mut scene = scene.clone();
         scene.partition.case = case;
         let golden = Golden::new(&scene)?;
-        // What hardware does not have is not an error here: the columns stay empty.
+        // A case without hardware is not an error here: its columns stay empty.
         let model = Model::for_frames(&scene, frames).ok();
         for (index, frame) in frames.iter().enumerate() {
             let result = golden.run(frame)?;
-            let fixed = model.as_ref().map(|model| fixed(model, frame, &result)).transpose()?;
-            lines.push(line(&scene, case, frame, &result, fixed, whole.get(index)));
+            let fixed = model.as_ref().map(|model| bit_true(model, frame, &result)).transpose()?;
+            rows.push(row(&scene, case, frame, &result, fixed, case_0.get(index)));
             if case == Case::WHOLE {
-                whole.push(result);
+                case_0.push(result);
             }
             progress();
         }
     }
-    Ok(lines)
+    Ok(rows)
 }
 
-fn fixed(model: &Model, frame: &Frame, golden: &Reconstruction) -> Result<Fixed> {
+fn bit_true(model: &Model, frame: &Frame, golden: &Reconstruction) -> Result<BitTrueErrors> {
     let result = model.reconstruct(frame)?;
     let lsb_N = model.force_lsb_N(full_scale(&model.scene, frame));
-    Ok(Fixed { error: result.error, difference: difference(&golden.forces_N, &result.forces_N, lsb_N) })
+    Ok(BitTrueErrors { error: result.error, difference: difference(&golden.forces_N, &result.forces_N, lsb_N) })
 }
 
-fn line(
+fn row(
     scene: &Scene,
     case: Case,
     frame: &Frame,
     result: &Reconstruction,
-    fixed: Option<Fixed>,
-    whole: Option<&Reconstruction>,
-) -> Line {
-    let parts = result.subarrays.iter().map(|part| Part {
+    fixed: Option<BitTrueErrors>,
+    case_0: Option<&Reconstruction>,
+) -> ErrorRow {
+    let parts = result.subarrays.iter().map(|part| SubarrayRow {
         mu: part.mu,
         both_signs: part.compression_centroid_mm.is_some() && part.tension_centroid_mm.is_some(),
         condition: part.centroid_condition,
     });
-    Line {
+    ErrorRow {
         scene: scene.name.clone(),
         case: case.to_string(),
         frame: frame.id.clone(),
         error: result.error,
-        error_case_0: whole.map(|whole| Errors::new(whole.resultant_N, result.resultant_N)),
+        error_case_0: case_0.map(|case_0| Errors::new(case_0.resultant_N, result.resultant_N)),
         l2: frame.cell_forces_N.as_ref().and_then(|truth| relative_l2(truth, &result.forces_N)),
         contacts: frame.contacts.len(),
-        of_all: of_all(&frame.contacts, frame.resultant_N, result.resultant_N),
-        own: result.extra.regions.as_ref().map_or(Vec::new(), |regions| own(&frame.contacts, regions)),
-        taken: result.extra.taken.as_ref().map(|taken| taken.case.clone()),
+        shear_over_all: shear_over_all(&frame.contacts, frame.resultant_N, result.resultant_N),
+        contact_shears: result
+            .extra
+            .regions
+            .as_ref()
+            .map_or(Vec::new(), |regions| contact_shears(&frame.contacts, regions)),
+        chosen_case: result.extra.taken.as_ref().map(|taken| taken.case.clone()),
         subarrays: parts.collect(),
         fixed,
         paper: paper_sensor(scene).and_then(|sensor| table_2(sensor, case)),
@@ -155,7 +164,7 @@ fn line(
     }
 }
 
-/// ‖value − truth‖/‖truth‖, `None` without force.
+/// ‖value − truth‖/‖truth‖; `None` if the true force is zero.
 fn relative_l2(truth: &Forces, value: &Forces) -> Option<f64> {
     let pairs = [(&truth.fx, &value.fx), (&truth.fy, &value.fy), (&truth.fz, &value.fz)];
     let each = || pairs.iter().flat_map(|(truth, value)| truth.iter().zip(value.iter()));
@@ -164,16 +173,16 @@ fn relative_l2(truth: &Forces, value: &Forces) -> Option<f64> {
     (size > 0.0).then(|| (off / size).sqrt())
 }
 
-/// The error of the whole shear over the shear of all contacts, `None` without shear or where one is not known.
-pub(crate) fn of_all(contacts: &[Contact], truth: Option<[f64; 3]>, value: [f64; 3]) -> Option<f64> {
+/// The error of the total shear over the sum of the contacts' shears; `None` if that is zero or a shear is unknown.
+pub(crate) fn shear_over_all(contacts: &[Contact], truth: Option<[f64; 3]>, value: [f64; 3]) -> Option<f64> {
     let truth = truth?;
     let shears: Option<Vec<[f64; 2]>> = contacts.iter().map(|contact| contact.tangential_N).collect();
     let all: f64 = shears?.iter().map(|[x, y]| x.hypot(*y)).sum();
     (all > 0.0).then(|| (value[0] - truth[0]).hypot(value[1] - truth[1]) / all)
 }
 
-/// The error of each contact's shear; contacts without shear or place have none.
-pub(crate) fn own(contacts: &[Contact], regions: &[Region]) -> Vec<f64> {
+/// The error of each contact's shear; contacts without shear or centre are skipped.
+pub(crate) fn contact_shears(contacts: &[Contact], regions: &[Region]) -> Vec<f64> {
     let error = |contact: &Contact| {
         let ([x, y], [tx, ty]) = (contact.centre_mm?, contact.tangential_N?);
         let far = |region: &Region| region.centre_mm.map_or(f64::INFINITY, |at| (at[0] - x).hypot(at[1] - y));
@@ -203,8 +212,8 @@ mod tests {
             ..Contact::default()
         };
         let contacts = [contact(-5.0, [3.0, 0.0]), contact(5.0, [0.0, -1.0])];
-        assert_eq!(of_all(&contacts, Some([3.0, -1.0, 9.0]), [3.0, 1.0, 9.0]), Some(0.5));
-        assert_eq!(of_all(&[], Some([3.0, -1.0, 9.0]), [3.0, 1.0, 9.0]), None);
+        assert_eq!(shear_over_all(&contacts, Some([3.0, -1.0, 9.0]), [3.0, 1.0, 9.0]), Some(0.5));
+        assert_eq!(shear_over_all(&[], Some([3.0, -1.0, 9.0]), [3.0, 1.0, 9.0]), None);
         let region = |x: f64, load_N: [f64; 3]| Region {
             centroid_condition: true,
             mu: [0.0; 2],
@@ -213,7 +222,10 @@ mod tests {
             load_N,
             taxels: Vec::new(),
         };
-        assert_eq!(own(&contacts, &[region(4.0, [0.0, -2.0, 5.0]), region(-6.0, [3.0, 1.5, 4.0])]), [0.5, 1.0]);
+        assert_eq!(
+            contact_shears(&contacts, &[region(4.0, [0.0, -2.0, 5.0]), region(-6.0, [3.0, 1.5, 4.0])]),
+            [0.5, 1.0]
+        );
     }
 
     #[test]
@@ -222,16 +234,16 @@ mod tests {
         let frames = &Frame::shipped(&scene)[..1];
         let mut done = 0;
         let cases = ["0", "1", "2", "3", "5x2", "3x3", "adaptive", "contacts"].map(|name| name.parse().unwrap());
-        let lines = tabulate(&scene, &cases, frames, &mut || done += 1).unwrap();
+        let rows = tabulate(&scene, &cases, frames, &mut || done += 1).unwrap();
         // Three does not divide ten.
-        assert_eq!((lines.len(), done), (7, 7));
-        assert_eq!(lines.iter().map(|line| line.subarrays.len()).collect::<Vec<_>>(), [1, 4, 2, 2, 10, 1, 1]);
-        // Every case of rectangles has its bit-true model, and so has the choice between them.
-        assert!(lines.iter().all(|line| line.fixed.is_some() != (line.case == "contacts")));
-        assert_eq!(lines[5].taken.as_deref(), Some("0"));
-        assert_eq!(lines.iter().map(|line| line.own.len()).collect::<Vec<_>>(), [0, 0, 0, 0, 0, 0, 1]);
-        assert!(lines[6].own[0] < 0.05 && lines[0].error_case_0.is_none());
-        assert!(lines[1].error_case_0.is_some());
-        assert_eq!(lines[0].paper, Some([0.1284, 0.1293, 0.0754]));
+        assert_eq!((rows.len(), done), (7, 7));
+        assert_eq!(rows.iter().map(|row| row.subarrays.len()).collect::<Vec<_>>(), [1, 4, 2, 2, 10, 1, 1]);
+        // The hardware supports every case except `contacts`.
+        assert!(rows.iter().all(|row| row.fixed.is_some() != (row.case == "contacts")));
+        assert_eq!(rows[5].chosen_case.as_deref(), Some("0"));
+        assert_eq!(rows.iter().map(|row| row.contact_shears.len()).collect::<Vec<_>>(), [0, 0, 0, 0, 0, 0, 1]);
+        assert!(rows[6].contact_shears[0] < 0.05 && rows[0].error_case_0.is_none());
+        assert!(rows[1].error_case_0.is_some());
+        assert_eq!(rows[0].paper, Some([0.1284, 0.1293, 0.0754]));
     }
 }

@@ -1,12 +1,12 @@
-//! One scene's co-simulation: every frame through the golden model, the bit-true model and the
-//! simulated hardware, and how they differ.
+//! Co-simulation of one scene: every frame through the golden model, the bit-true model and the simulated hardware,
+//! with their differences.
 //!
 //! ```text
 //! frame -> golden ------------------------------> Reconstruction --+
-//!       -> bit-true model --> Trace, Reconstruction ---------------+--> Row
+//!       -> bit-true model --> Trace, Reconstruction ---------------+--> FrameResult
 //!       -> Verilator: full speed, then stalls --> Findings, Times -+
 //!       -> rust-hdl: full speed ----------------> Findings --------+
-//!       -> netlist, when asked for: full speed -> Findings --------+
+//!       -> netlist, on request: full speed -----> Findings --------+
 //! ```
 
 use std::path::Path;
@@ -19,59 +19,59 @@ use dermis_golden::quantise::full_scale;
 use dermis_golden::reconstruct::{Golden, Reconstruction};
 use dermis_golden::scene::Scene;
 
-use crate::compare::{compared, difference, Difference};
-use crate::cosim::{run, Bench, Findings, Vector};
+use crate::compare::{comparable_forces, difference, Difference};
+use crate::cosim::{run, DeviceUnderTest, Findings, Vector};
 use crate::drive::{Stimulus, Times};
 use crate::hardware::{Hardware, Simulator};
 use crate::progress::Progress;
 
-/// Of the stalls; any number serves, a fixed one repeats.
+/// Seed of the stalls, fixed so that runs are reproducible.
 const SEED: u64 = 1;
 
-/// One frame's outcome.
+/// Result of one frame, or of the mean of several.
 #[derive(Clone, Debug)]
-pub struct Row {
+pub struct FrameResult {
     /// Frame name.
     pub frame: String,
     /// Stress of the largest code, MPa.
     pub full_scale_MPa: f64,
     /// The floating-point result.
     pub golden: Reconstruction,
-    /// The bit-true result, which the hardware's equals when `equal`.
+    /// The bit-true result; the hardware's as well where `equal` is set.
     pub fixed: Reconstruction,
-    /// Of `fixed` against `golden`.
+    /// Difference of `fixed` from `golden`.
     pub difference: Difference,
-    /// Whether no run differed from the bit-true model on this frame.
+    /// Whether every run equalled the bit-true model on this frame.
     pub equal: bool,
     /// Cycles at full speed.
     pub times: Times,
 }
 
-/// One scene's outcome.
+/// Result of one scene.
 #[derive(Clone, Debug)]
 pub struct Verified {
     /// The scene.
     pub scene: Scene,
     /// Its board.
     pub board: Board,
-    /// Per frame, in the given order.
-    pub rows: Vec<Row>,
-    /// All mismatches of all runs.
+    /// Results of the frames, in the given order.
+    pub rows: Vec<FrameResult>,
+    /// Mismatches of all runs.
     pub findings: Findings,
-    /// Every run, for example `verilator, full speed`.
+    /// Labels of the runs, for example `verilator, full speed`.
     pub runs: Vec<String>,
-    /// Whether a run was one of the generated Verilog or of its netlist.
+    /// Whether at least one run simulated the generated Verilog or its netlist.
     pub verilog: bool,
 }
 
-/// Co-simulates `frames` (at least one) on the given simulators; cycles come from the first.
+/// Co-simulates `frames` (at least one) on the given simulators; cycles are those of the first simulator.
 ///
 /// # Errors
 /// A scene that cannot be built, a frame of another sensor, no Verilator.
 pub fn verify(scene: &Scene, frames: &[Frame], simulators: &[Simulator], build: &Path) -> Result<Verified> {
     let board = Board::load(&scene.hardware.board)?;
     let hardware = Hardware::new(Model::for_frames(scene, frames)?, build)?;
-    // With the full scale that the model has settled on: all models judge the same codes.
+    // The model's scene has the full scale filled in, so that all models use the same codes.
     let golden = Golden::new(&hardware.model.scene)?;
     let vectors =
         frames.chunks(1 << scene.input.average).map(|frames| hardware.vector(frames)).collect::<Result<Vec<_>>>()?;
@@ -99,10 +99,10 @@ pub fn verify(scene: &Scene, frames: &[Frame], simulators: &[Simulator], build: 
         let golden = golden.run_averaged(frames)?;
         let fixed = hardware.model.decode(frame, "fixed", &vector.expected.beats, &vector.expected.status)?;
         let lsb_N = hardware.model.force_lsb_N(full_scale_MPa);
-        verified.rows.push(Row {
+        verified.rows.push(FrameResult {
             frame: frame.id.clone(),
             full_scale_MPa,
-            difference: difference(&compared(&golden), &compared(&fixed), lsb_N),
+            difference: difference(&comparable_forces(&golden), &comparable_forces(&fixed), lsb_N),
             golden,
             fixed,
             equal: !verified.findings.unequal.contains(&index),
@@ -112,7 +112,7 @@ pub fn verify(scene: &Scene, frames: &[Frame], simulators: &[Simulator], build: 
     Ok(verified)
 }
 
-/// All runs on one simulator; returns the times at full speed.
+/// Runs the vectors on one simulator at full speed, and with stalls under Verilator; returns the times at full speed.
 fn simulate(
     hardware: &Hardware,
     simulator: Simulator,
@@ -124,13 +124,13 @@ fn simulate(
         Simulator::RustHdl | Simulator::Netlist => &[Stimulus::FullSpeed],
     };
     let mut device = hardware.device(simulator)?;
-    let (taps, vectors) = hardware.shown(simulator, vectors);
+    let (taps, vectors) = hardware.observable(simulator, vectors);
     let mut full_speed = Vec::new();
     for &stimulus in stimuli {
         let label = format!("{}, {stimulus}", simulator.name());
         let _progress = Progress::start(&format!("{}: {label}", verified.scene.name));
-        let bench = Bench { name: simulator.name(), device: device.as_mut(), taps: &taps };
-        let (findings, times) = run(bench, &vectors, stimulus);
+        let dut = DeviceUnderTest { name: simulator.name(), device: device.as_mut(), taps: &taps };
+        let (findings, times) = run(dut, &vectors, stimulus);
         verified.findings.extend(findings);
         verified.runs.push(label);
         if stimulus == Stimulus::FullSpeed {

@@ -5,9 +5,9 @@
 //! memory files ----------------------------------------- read when the device starts ----^
 //! ```
 //!
-//! The library's key is a fingerprint of every Verilog, waiver and shim byte and of Verilator's
-//! version; memory files are data and do not rebuild it. A library is built in a folder of its own
-//! and renamed into place: an interrupted or concurrent build never leaves half a library.
+//! The cache key is a fingerprint of all Verilog, waiver and shim texts and of Verilator's version; memory files are
+//! read at start and need no rebuild. Libraries are built in a staging folder and renamed when complete
+//! (`artifact_cache`).
 
 use std::ffi::{c_char, c_void, CString};
 use std::fs;
@@ -20,19 +20,19 @@ use dermis_hdl::device::{Device, Inputs, Outputs, Tap};
 use libloading::Library;
 use thiserror::Error;
 
+use crate::artifact_cache;
 use crate::bench::{Layout, INSTANCE};
-use crate::place;
 use crate::progress::Progress;
 
-/// What a built folder is for.
+/// The product of a built folder.
 const LIBRARY: &str = "libbench.so";
 /// The C++ side, compiled into every library.
 const SHIM: &str = include_str!("../shim/shim.cpp");
-/// Its addition for libraries whose state may be changed from outside.
+/// Addition to [`SHIM`] for libraries in which bits can be flipped.
 const FAULTS: &str = include_str!("../shim/faults.cpp");
-/// Verilator's listing of such a design, beside the library.
+/// File name of Verilator's XML listing of such a design, beside the library.
 const LISTING: &str = "listing.xml";
-/// Start value of registers without an initial value; any number shows a missing reset.
+/// Seed of the random start values of registers without an initial value; these show a missing reset.
 const RESET_SEED: i32 = 20_240_501;
 /// Lines of a failed tool's output that an error repeats.
 const LOG_LINES: usize = 20;
@@ -40,29 +40,29 @@ const LOG_LINES: usize = 20;
 /// Why a design could not be simulated.
 #[derive(Debug, Error)]
 pub enum VerilatorError {
-    /// The program is not installed.
+    /// Verilator is not installed.
     #[error("verilator is not installed; on Debian: sudo apt-get install verilator g++ make")]
     Missing,
-    /// What Verilator calls is not installed.
+    /// A program that Verilator calls is not installed.
     #[error("verilator needs {program}, which is not installed; on Debian: sudo apt-get install g++ make")]
     MissingTool {
         /// The program.
         program: &'static str,
     },
-    /// The program ran and failed.
+    /// Verilator or the compiler failed.
     #[error("verilator refused {design} (folder {folder}):\n{log}")]
     Build {
         /// Name of the top module.
         design: String,
         /// Folder with the sources.
         folder: PathBuf,
-        /// Last lines of its output.
+        /// First lines of its output.
         log: String,
     },
     /// A file or folder could not be used.
     #[error(transparent)]
     File(#[from] FileError),
-    /// The built library does not load or does not fit its bench.
+    /// The built library cannot be loaded or does not match its bench.
     #[error("{path}: {reason}")]
     Library {
         /// The library.
@@ -72,42 +72,42 @@ pub enum VerilatorError {
     },
 }
 
-/// What Verilator compiles.
+/// A design to compile.
 #[derive(Clone, Debug)]
 pub struct Design<'a> {
     /// Name of the top module.
     pub top: &'a str,
-    /// File names without folder, and texts: Verilog (`.v`), waivers (`.vlt`), memory files (any other).
+    /// File names without folder, and their texts: Verilog (`.v`), waivers (`.vlt`), memory files (all others).
     pub files: Vec<(&'a str, &'a str)>,
-    /// Streams to observe.
+    /// Taps to observe.
     pub taps: &'a [Tap],
     /// Width of `s_axis_tdata`, 1..=32.
     pub input_bits: u32,
-    /// Whether bits of its state can be flipped; slower.
-    pub writable: bool,
+    /// Whether bits of registers and memories can be flipped; the simulation is slower then.
+    pub writable_state: bool,
 }
 
-/// Scope, signal, word, bit; 0 where there is none such.
+/// `dermis_flip` of the shim: model, scope, signal, word, bit; returns 0 if there is no such bit.
 type Flip = unsafe extern "C" fn(*mut c_void, *const c_char, *const c_char, u64, u64) -> i32;
 
-/// A running verilated design, its pins still packed into two vectors.
-pub(crate) struct Bench {
+/// A running verilated design, with its pins packed into two vectors.
+pub(crate) struct VerilatedBench {
     handle: *mut c_void,
     cycle: unsafe extern "C" fn(*mut c_void, u64, *mut u32),
     free: unsafe extern "C" fn(*mut c_void),
     flip: Option<Flip>,
     words: Vec<u32>,
     path: PathBuf,
-    /// Keeps the code behind the pointers above loaded; dropped after `drop` has freed the model.
+    /// Keeps the code of the function pointers loaded; dropped after `drop` has freed the model.
     _library: Library,
 }
 
 // SAFETY: nothing else has the handle, and the library keeps no state of a running model outside it.
-unsafe impl Send for Bench {}
+unsafe impl Send for VerilatedBench {}
 
-impl Bench {
-    /// Builds the design in its `bench` (Verilog text), or takes it from `cache`, and starts it; `out` has `words`
-    /// words.
+impl VerilatedBench {
+    /// Builds the design with its `bench` (Verilog text), or takes it from `cache`, and starts it. `words` is the
+    /// length of the bench's vector `out` in 32-bit words.
     pub(crate) fn new(design: &Design, bench: &str, words: usize, cache: &Path) -> Result<Self, VerilatorError> {
         let path = library(design, bench, cache)?;
         let fail = |reason: String| VerilatorError::Library { path: path.clone(), reason };
@@ -121,14 +121,22 @@ impl Bench {
                 *library.get::<extern "C" fn(*const c_char, i32) -> *mut c_void>(b"dermis_new").map_err(symbol)?;
             let cycle = *library.get(b"dermis_cycle").map_err(symbol)?;
             let free = *library.get(b"dermis_free").map_err(symbol)?;
-            let flip = if design.writable { Some(*library.get(b"dermis_flip").map_err(symbol)?) } else { None };
+            let flip = if design.writable_state { Some(*library.get(b"dermis_flip").map_err(symbol)?) } else { None };
             if bytes() as usize != 4 * words {
                 return Err(fail(format!("{} output bytes, {} expected", bytes(), 4 * words)));
             }
             let memories = memory_folder(design)?;
             let folder = CString::new(memories.path().to_string_lossy().as_bytes()).map_err(|e| fail(e.to_string()))?;
             let handle = start(folder.as_ptr(), RESET_SEED);
-            Ok(Bench { handle, cycle, free, flip, words: vec![0; words], path: path.clone(), _library: library })
+            Ok(VerilatedBench {
+                handle,
+                cycle,
+                free,
+                flip,
+                words: vec![0; words],
+                path: path.clone(),
+                _library: library,
+            })
         }
     }
 
@@ -140,8 +148,8 @@ impl Bench {
     }
 }
 
-impl Bench {
-    /// Flips a bit; whether there is such a one.
+impl VerilatedBench {
+    /// Flips a bit; false if there is no such bit.
     fn flip(&mut self, scope: &str, signal: &str, word: usize, bit: usize) -> bool {
         let names = [scope, signal].map(|name| CString::new(name).ok());
         let (Some(flip), [Some(scope), Some(signal)]) = (self.flip, &names) else { return false };
@@ -150,7 +158,7 @@ impl Bench {
     }
 }
 
-impl Drop for Bench {
+impl Drop for VerilatedBench {
     fn drop(&mut self) {
         // SAFETY: the only call, with the handle that `dermis_new` returned.
         unsafe { (self.free)(self.handle) };
@@ -160,7 +168,7 @@ impl Drop for Bench {
 /// A running verilated engine.
 pub struct Verilated {
     layout: Layout,
-    bench: Bench,
+    bench: VerilatedBench,
 }
 
 impl Verilated {
@@ -170,22 +178,22 @@ impl Verilated {
     /// [`VerilatorError`]: no Verilator, a design it refuses, or files that cannot be written.
     pub fn new(design: &Design, cache: &Path) -> Result<Self, VerilatorError> {
         let layout = Layout::new(design.input_bits, design.taps);
-        let bench = Bench::new(design, &layout.verilog(design.top), layout.out_words(), cache)?;
+        let bench = VerilatedBench::new(design, &layout.verilog(design.top), layout.out_words(), cache)?;
         Ok(Verilated { layout, bench })
     }
 
-    /// Flips a bit of a word of a register or memory, before the next cycle; whether there is such a one in this
-    /// `writable` design. `scope` are the instances from its top down, separated by dots.
+    /// Flips a bit of a word of a register or memory before the next cycle; false if there is no such bit or the design
+    /// has no `writable_state`. `scope` is the instance path from the design's top, separated by dots.
     pub fn flip(&mut self, scope: &str, signal: &str, word: usize, bit: usize) -> bool {
-        // The shim's model has the name of the bench too.
+        // The shim also names its model "bench".
         let path = format!("bench.{INSTANCE}{}{scope}", if scope.is_empty() { "" } else { "." });
         self.bench.flip(&path, signal, word, bit)
     }
 
-    /// What Verilator lists of a `writable` design: modules, variables, assignments.
+    /// Verilator's XML listing of a design with `writable_state`: modules, variables, assignments.
     ///
     /// # Errors
-    /// [`VerilatorError::File`] when there is none.
+    /// [`VerilatorError::File`]: there is no listing.
     pub fn listing(&self) -> Result<String, VerilatorError> {
         let path = self.bench.path.with_file_name(LISTING);
         Ok(fs::read_to_string(&path).map_err(FileError::at(&path))?)
@@ -201,13 +209,13 @@ impl Device for Verilated {
 /// First line of `verilator --version`.
 ///
 /// # Errors
-/// [`VerilatorError::Missing`] when it cannot be started.
+/// [`VerilatorError::Missing`]: Verilator cannot be started.
 pub fn version() -> Result<String, VerilatorError> {
     let output = Command::new("verilator").arg("--version").output().map_err(|_| VerilatorError::Missing)?;
     Ok(String::from_utf8_lossy(&output.stdout).lines().next().unwrap_or_default().to_owned())
 }
 
-/// Writes the design's memory files where `$readmemh` will look for them.
+/// Writes the design's memory files into a temporary folder, from which the shim lets `$readmemh` read them.
 fn memory_folder(design: &Design) -> Result<tempfile::TempDir, VerilatorError> {
     let folder = tempfile::tempdir().map_err(FileError::at(&std::env::temp_dir()))?;
     for (name, text) in design.files.iter().filter(|(name, _)| !is_source(name)) {
@@ -216,33 +224,33 @@ fn memory_folder(design: &Design) -> Result<tempfile::TempDir, VerilatorError> {
     Ok(folder)
 }
 
-/// Whether Verilator compiles the file (and does not read it at run time).
+/// Whether Verilator compiles the file; all others are read at run time.
 fn is_source(name: &str) -> bool {
     name.ends_with(".v") || name.ends_with(".vlt")
 }
 
-/// One build at a time in a process: a second caller for the same design then finds it built.
+/// Allows one build at a time in a process, so that a second caller for the same design finds it built.
 static BUILDING: Mutex<()> = Mutex::new(());
 
 /// Path of the design's library, built when the cache does not hold it.
 fn library(design: &Design, bench: &str, cache: &Path) -> Result<PathBuf, VerilatorError> {
     let mut sources: Vec<(&str, &str)> = design.files.iter().filter(|(name, _)| is_source(name)).copied().collect();
-    // Verilator applies a waiver only to what it reads afterwards.
+    // Waivers come first: Verilator applies them only to files read afterwards.
     sources.sort_by_key(|(name, _)| !name.ends_with(".vlt"));
-    let shim = if design.writable { [SHIM, FAULTS].concat() } else { SHIM.to_owned() };
+    let shim = if design.writable_state { [SHIM, FAULTS].concat() } else { SHIM.to_owned() };
     sources.extend([("bench.v", bench), ("shim.cpp", &shim)]);
     let folder = cache.join(fingerprint(&sources, &version()?));
     let ready = folder.join(LIBRARY);
     let _one = BUILDING.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
-    if !place::is_whole(&folder, LIBRARY) {
+    if !artifact_cache::is_intact(&folder, LIBRARY) {
         build(design, &sources, &folder)?;
     }
     Ok(ready.canonicalize().map_err(FileError::at(&ready))?)
 }
 
-/// Builds what `folder` is to hold.
+/// Builds the library and publishes it as `folder`.
 fn build(design: &Design, sources: &[(&str, &str)], folder: &Path) -> Result<(), VerilatorError> {
-    let work = place::begin(folder)?;
+    let work = artifact_cache::staging_folder(folder)?;
     for (name, text) in sources {
         write(&work.path().join(name), text.as_bytes())?;
     }
@@ -263,7 +271,7 @@ fn build(design: &Design, sources: &[(&str, &str)], folder: &Path) -> Result<(),
     ]
     .concat();
     let mut output = None;
-    if design.writable {
+    if design.writable_state {
         library.push("--public-flat-rw");
         output = Some(verilate(&["--xml-only", "--xml-output", LISTING], &sources[..sources.len() - 1])?);
     }
@@ -278,13 +286,13 @@ fn build(design: &Design, sources: &[(&str, &str)], folder: &Path) -> Result<(),
         let text = [output.stderr, output.stdout].concat();
         let text = String::from_utf8_lossy(&text);
         let log: Vec<&str> = text.lines().take(LOG_LINES).collect();
-        // Kept, so that the named folder can be looked at.
+        // Kept, so that the user can inspect the folder named in the error.
         return Err(VerilatorError::Build { design: design.top.into(), folder: work.keep(), log: log.join("\n") });
     }
-    // Only the library and its sources stay; the object files are ten times as large.
+    // Deletes the object files, which are ten times as large as library and sources.
     let objects = work.path().join("obj_dir");
     fs::remove_dir_all(&objects).map_err(FileError::at(&objects))?;
-    Ok(place::finish(work, folder, LIBRARY)?)
+    Ok(artifact_cache::publish(work, folder, LIBRARY)?)
 }
 
 fn is_installed(program: &str) -> bool {
@@ -297,7 +305,7 @@ pub(crate) fn fingerprint(sources: &[(&str, &str)], version: &str) -> String {
     const PRIME: u128 = 0x0000_0000_0100_0000_0000_0000_0000_013b;
     let mut hash = OFFSET;
     let mut add = |text: &str| {
-        // The terminating zero keeps ("ab", "c") and ("a", "bc") apart.
+        // The terminating zero distinguishes ("ab", "c") from ("a", "bc").
         for byte in text.bytes().chain([0]) {
             hash = (hash ^ u128::from(byte)).wrapping_mul(PRIME);
         }

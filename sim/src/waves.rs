@@ -1,14 +1,15 @@
-//! Waveforms: a run as a VCD file with the stages' names, and a GTKWave list of what to look at first.
+//! Waveforms: a run as a VCD file, and a GTKWave list of its signals.
 //!
-//! What is written is what the bench sees: the pins, and every stage's stream with its words cut into named fields.
+//! Recorded are the engine's pins and the taps of all stages, with their words split into named fields.
 //!
 //! ```text
 //! dermis.clk
 //! dermis.input.{valid, ready, last, code}        dermis.output.{valid, ready, last, fx, fy, fz}
 //! dermis.fold.{valid, even_even, …}              dermis.search.{valid, x, y, score, taken}
 //! ```
-//! The stages of a netlist are gone: of it only the pins are written. A stage's fields keep their last word while its `valid` is low. Values stand from the rising edge of one cycle to that
-//! of the next, sampled before it; a cycle lasts as long as the board's clock.
+//! A netlist has no taps, so that only its pins are recorded. A stage's fields keep their last word while its `valid`
+//! is low. Values are sampled before the rising edge that ends a cycle and drawn over that whole cycle, one period of
+//! the board's clock.
 
 use std::fs::Permissions;
 use std::io::{BufWriter, Write};
@@ -22,18 +23,18 @@ use dermis_golden::scene::Scene;
 use dermis_hdl::device::{Device, Inputs, Outputs, Tap};
 use vcd::{IdCode, SimulationCommand, TimescaleUnit, Value, Writer};
 
-use crate::cosim::{run, Bench};
+use crate::cosim::{run, DeviceUnderTest};
 use crate::drive::Stimulus;
 use crate::hardware::{Hardware, Simulator};
 use crate::progress::Progress;
 use dermis_golden::write::write;
 
-/// Taxels of a quad, by their place in the subarray's halves.
+/// Taxels of a quad, by the quadrant of the subarray they lie in.
 const TAXELS: [&str; 4] = ["upper_left", "upper_right", "lower_left", "lower_right"];
 /// Parities of a quad, along the rows and along the columns.
 const PARITIES: [&str; 4] = ["even_even", "even_odd", "odd_even", "odd_odd"];
 
-/// Names of a stage's fields.
+/// Names of the fields of a stage's word.
 fn fields(stage: &str) -> &'static [&'static str] {
     match stage {
         "receive" => &["code"],
@@ -44,24 +45,24 @@ fn fields(stage: &str) -> &'static [&'static str] {
     }
 }
 
-/// A signal of the file.
+/// A signal in the VCD file, with the last value written.
 struct Signal {
     id: IdCode,
     bits: u32,
     last: Option<i64>,
 }
 
-/// A device whose every cycle is written down.
+/// Wraps a device and writes every cycle to the VCD file.
 struct Waves<W: Write> {
     device: Box<dyn Device>,
     writer: Writer<W>,
     clock: IdCode,
     pins: Vec<Signal>,
-    /// Of each tap: its valid, then its fields.
+    /// Signals of each tap: valid, then the fields.
     taps: Vec<Vec<Signal>>,
     cycle: u64,
     period_ps: u64,
-    /// The first thing that went wrong.
+    /// The first write error; nothing is written after it.
     failed: Option<std::io::Error>,
 }
 
@@ -73,7 +74,7 @@ const PINS: [(&str, &[(&str, u32)]); 3] = [
 ];
 
 impl<W: Write> Waves<W> {
-    /// Writes the file's head.
+    /// Writes the VCD header.
     fn new(device: Box<dyn Device>, taps: &[Tap], clock_MHz: f64, out: W) -> std::io::Result<Self> {
         let mut writer = Writer::new(out);
         writer.timescale(1, TimescaleUnit::PS)?;
@@ -104,7 +105,7 @@ impl<W: Write> Waves<W> {
         writer.enddefinitions()?;
         writer.begin(SimulationCommand::Dumpvars)?;
         writer.end()?;
-        // Even, so that half of it is whole.
+        // Even, so that half a period is an integer.
         let period_ps = 2 * (5e5 / clock_MHz).round() as u64;
         Ok(Waves { device, writer, clock, pins, taps: streams, cycle: 0, period_ps, failed: None })
     }
@@ -143,7 +144,7 @@ impl<W: Write> Waves<W> {
     }
 }
 
-/// Writes a value that is another than the last.
+/// Writes `value` if it differs from the last one.
 fn change<W: Write>(writer: &mut Writer<W>, signal: &mut Signal, value: i64) -> std::io::Result<()> {
     if signal.last == Some(value) {
         return Ok(());
@@ -167,8 +168,8 @@ impl<W: Write> Device for Waves<W> {
     }
 }
 
-/// Plays `frames` at full speed into a scene's hardware and writes `<scene>.vcd` and `<scene>.gtkw` below `folder`, each
-/// complete or not at all. Returns the command that shows them.
+/// Runs `frames` at full speed through a scene's hardware and writes `<scene>.vcd` and `<scene>.gtkw` into `folder`,
+/// each completely or not at all. Returns the GTKWave command that opens them.
 ///
 /// # Errors
 /// As [`Hardware::device`]; files that cannot be written.
@@ -179,19 +180,19 @@ pub fn waves(scene: &Scene, frames: &[Frame], simulator: Simulator, build: &Path
     let vectors = frames.chunks(1 << scene.input.average).map(|frames| hardware.vector(frames));
     let vectors = vectors.collect::<Result<Vec<_>>>()?;
     let taps = hardware.taps(simulator);
-    let (names, vectors) = hardware.shown(simulator, &vectors);
+    let (names, vectors) = hardware.observable(simulator, &vectors);
     let _progress = Progress::start(&format!("{}: waveforms", scene.name));
-    // Gone with an error or an interruption that unwinds.
+    // A temporary file until the run is complete; deleted on an error.
     let mut part = tempfile::Builder::new();
-    // A temporary file is its owner's alone otherwise, and so would the waveforms be.
+    // Temporary files are readable by their owner only; the waveforms get the usual permissions.
     part.prefix(".waves-").permissions(Permissions::from_mode(0o644));
     let part = part.tempfile_in(folder).map_err(|e| at(folder, e))?;
     let mut out = BufWriter::new(part.reopen().map_err(|e| at(part.path(), e))?);
     let device = hardware.device(simulator)?;
     let clock_MHz = hardware.model.board.clock_MHz;
     let mut device = Waves::new(device, taps, clock_MHz, &mut out).map_err(|e| at(part.path(), e))?;
-    let bench = Bench { name: simulator.name(), device: &mut device, taps: &names };
-    run(bench, &vectors, Stimulus::FullSpeed);
+    let dut = DeviceUnderTest { name: simulator.name(), device: &mut device, taps: &names };
+    run(dut, &vectors, Stimulus::FullSpeed);
     let failed = device.failed.take();
     failed.map_or_else(|| out.flush(), Err).map_err(|e| at(part.path(), e))?;
     let vcd = folder.join(format!("{}.vcd", scene.name));
@@ -201,7 +202,7 @@ pub fn waves(scene: &Scene, frames: &[Frame], simulator: Simulator, build: &Path
     Ok(format!("gtkwave {} {}", vcd.display(), list.display()))
 }
 
-/// GTKWave's save file: pins, then the stages in pipeline order, flags as bits and words as signed numbers.
+/// GTKWave's save file: pins, then the stages in pipeline order; single bits in binary, words as signed decimals.
 fn signal_list(vcd: &Path, taps: &[Tap]) -> String {
     const BINARY: &str = "@28";
     const SIGNED: &str = "@420";
@@ -236,7 +237,7 @@ mod tests {
     use std::fs::File;
     use vcd::{Command, Parser, ScopeItem};
 
-    /// Values of every signal by name, as signed numbers, one per change.
+    /// Width of every signal, and the values of every vector, one per change; both by name.
     fn read(path: &Path) -> (BTreeMap<String, u32>, BTreeMap<String, Vec<i64>>) {
         let mut parser = Parser::new(std::io::BufReader::new(File::open(path).unwrap()));
         let header = parser.parse_header().unwrap();
@@ -274,7 +275,7 @@ mod tests {
         let (vcd, list) = (folder.join("eight-by-eight.vcd"), folder.join("eight-by-eight.gtkw"));
         assert_eq!(command, format!("gtkwave {} {}", vcd.display(), list.display()));
         assert_eq!(std::fs::metadata(&vcd).unwrap().permissions().mode() & 0o777, 0o644);
-        // Nothing else is left.
+        // No temporary file remains.
         assert_eq!(std::fs::read_dir(&folder).unwrap().count(), 2);
         let (widths, values) = read(&vcd);
         // Every listed signal is in the file, with its width.
@@ -289,7 +290,7 @@ mod tests {
             count += 1;
         }
         assert_eq!(count, widths.len());
-        // The words are the model's: the answer of the search is the last position judged.
+        // The words are the model's: the search's last word is its result.
         let model = Model::new(&scene).unwrap();
         let trace = model.run(&model.readings(frames).unwrap());
         let stage = |name: &str| &trace.stages.iter().find(|stage| stage.name == name).unwrap().words;

@@ -1,5 +1,5 @@
-//! A small scene from its file to the bitstream, by the tools, and no worse than its committed line; and one whose clock is
-//! missed. Large ones take minutes to hours: `make bitstream`.
+//! Small scenes from scene file to bitstream with the real tools, without regression against their committed baselines;
+//! and a scene that misses its clock. Large scenes take minutes to hours: `make bitstream`.
 
 mod fake;
 
@@ -9,10 +9,10 @@ use std::process::Command;
 
 use dermis_sim::bitstream::baseline::Baselines;
 
-/// What an iCE40's bitstream has ahead of its first command.
+/// Synchronisation word of an iCE40 bitstream.
 const PREAMBLE: [u8; 4] = [0x7e, 0xaa, 0x99, 0x7e];
 
-/// One seed of a scene of `sim/tests/scenes`, from `folder`.
+/// `dermis bitstream` with one seed for a scene of `sim/tests/scenes`, run in `folder`.
 fn bitstream(name: &str, folder: &Path) -> Command {
     let scene = Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("tests/scenes/{name}.toml"));
     let mut command = Command::new(env!("CARGO_BIN_EXE_dermis"));
@@ -20,8 +20,8 @@ fn bitstream(name: &str, folder: &Path) -> Command {
     command
 }
 
-/// Makes a scene of `sim/tests/scenes` a bitstream.
-fn becomes_a_bitstream_no_worse_than_its_baseline(name: &str) {
+/// Makes the bitstream of a scene of `sim/tests/scenes` and compares it with the baseline.
+fn makes_a_bitstream_without_regression(name: &str) {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
     let build = tempfile::tempdir().unwrap();
     let output = bitstream(name, &root).arg("--build-dir").arg(build.path()).output().unwrap();
@@ -35,15 +35,15 @@ fn becomes_a_bitstream_no_worse_than_its_baseline(name: &str) {
 
 #[test]
 fn a_small_scene_behind_a_uart() {
-    becomes_a_bitstream_no_worse_than_its_baseline("tiny");
+    makes_a_bitstream_without_regression("tiny");
 }
 
 #[test]
 fn a_small_scene_behind_an_spi() {
-    becomes_a_bitstream_no_worse_than_its_baseline("tiny-spi");
+    makes_a_bitstream_without_regression("tiny-spi");
 }
 
-/// A router that reaches half of the clock.
+/// A stand-in for nextpnr that reaches half of the required clock.
 const SLOW: &str = r#"#!/bin/sh
 [ "$1" = --version ] && echo 'nextpnr 0.0' && exit
 while [ $# -gt 0 ]; do

@@ -1,14 +1,14 @@
-//! The program on wrong input: every file of `tests/cases` is one case, its message compared word for
-//! word. A case holds the arguments, the exit code, its input files, and what is expected:
+//! The program's messages: every file of `tests/cases` is one case with arguments, exit code, input files and the
+//! expected output, which is compared verbatim:
 //!
 //! ```text
-//! # why it is here
+//! # what the case tests
 //! args: reconstruct flat.toml
 //! exit: 2
 //! --- flat.toml          an input file
 //! ...
-//! --- stdout             lines that stdout must hold
-//! --- stderr             the whole of stderr
+//! --- stdout             lines that stdout must contain
+//! --- stderr             the complete stderr
 //! ```
 //! `DERMIS_ACCEPT=1 cargo test -p dermis-sim --test cli` rewrites the expected stderr of all cases.
 
@@ -93,7 +93,7 @@ fn wrong_input_ends_with_its_exit_code_and_message() {
     assert!(failures.is_empty(), "{failures}");
 }
 
-/// The exit code and the message of the simulated hardware with nothing on the path but what is in `work`.
+/// Exit code and stderr of a reconstruction in simulated hardware, with `work` as the only folder in PATH.
 fn rtl_in(work: &Path) -> (Option<i32>, String) {
     let output = Command::new(env!("CARGO_BIN_EXE_dermis"))
         .current_dir(work)
@@ -114,7 +114,7 @@ fn without_verilator_the_message_says_how_to_get_it() {
 #[test]
 fn without_a_compiler_the_message_says_what_is_missing() {
     let work = tempfile::tempdir().unwrap();
-    // A Verilator that is there and cannot build; nothing else is on the path.
+    // A stand-in for Verilator that fails to build; PATH contains nothing else.
     let script = "#!/bin/sh\n[ \"$1\" = --version ] && echo Verilator 0 && exit 0\nexit 127\n";
     fake::program(work.path(), "verilator", script);
     let wanted = "error: verilator needs make, which is not installed; on Debian: sudo apt-get install g++ make\n";

@@ -1,11 +1,11 @@
-//! The JSON that other programs read: fields, their order, and `null` for what does not exist.
+//! The JSON output: names and order of fields, and `null` for missing values.
 
 use std::path::Path;
 use std::process::Command;
 
 use serde_json::Value;
 
-/// Stdout of a run that must succeed; built libraries are shared with the other tests.
+/// Stdout of a run that must succeed; the Verilator cache is shared with the other tests.
 fn dermis(args: &[&str]) -> String {
     let build = Path::new(env!("CARGO_MANIFEST_DIR")).join("../build");
     let output = Command::new(env!("CARGO_BIN_EXE_dermis")).args(args).arg("--build-dir").arg(build).output().unwrap();
@@ -13,7 +13,7 @@ fn dermis(args: &[&str]) -> String {
     String::from_utf8(output.stdout).unwrap()
 }
 
-/// Names of the fields of the first object, in the order of the text.
+/// Names of the fields at a nesting depth, in the order of the text.
 fn fields(text: &str, nesting: usize) -> Vec<String> {
     let (mut depth, mut names, mut rest) = (0usize, Vec::new(), text);
     while let Some(at) = rest.find(['{', '}', '"']) {
@@ -34,7 +34,7 @@ fn fields(text: &str, nesting: usize) -> Vec<String> {
     names
 }
 
-/// What stands between two marks, each there once.
+/// The text between two markers.
 fn between<'a>(text: &'a str, start: &str, end: &str) -> &'a str {
     text.split_once(start).unwrap().1.split_once(end).unwrap().0
 }
@@ -61,7 +61,7 @@ fn reconstruct() {
             "mu",
             "objective_value",
         ];
-        // On the text itself: a parsed object does not keep the order.
+        // Read from the text, as a parsed object does not keep the order.
         assert_eq!(fields(between(&text, "\"subarrays\":[", "],\"resultant_N\""), 1), subarray);
         let error = ["x1", "x2", "x3", "tangential", "normal"];
         assert_eq!(fields(between(&text, "\"error\":", ",\"flags\""), 1), error);

@@ -1,5 +1,6 @@
-//! Every example of `--help` does what it says: each is run as printed, in a folder with the files it names, and must
-//! succeed. Those that take a board or minutes are listed with the reason; a listed one that is no example fails.
+//! Runs every example of `--help` as printed, in a folder with the files that it names; each must succeed. Examples
+//! that need a board or take minutes are listed as exceptions with the reason; an exception that is not an example
+//! fails.
 
 use std::collections::BTreeSet;
 use std::fs;
@@ -37,7 +38,7 @@ fn program() -> &'static Path {
     Path::new(env!("CARGO_BIN_EXE_dermis"))
 }
 
-/// Builds are shared with the other tests.
+/// The build folder, shared with the other tests.
 fn build_dir() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../build")
 }
@@ -47,12 +48,12 @@ fn help(command: &[&str]) -> String {
     String::from_utf8(output.stdout).unwrap()
 }
 
-/// The command lines of a help text, without what is said about them.
+/// The command lines of a help text, without the remarks behind them.
 fn examples(text: &str) -> Vec<String> {
     let joined = text.replace("\\\n", " ");
     let lines = joined.lines().filter_map(|line| line.strip_prefix("  ")).filter(|line| line.starts_with("dermis "));
     let command = |line: &str| {
-        // Where a line goes on after a backslash there are spaces too: a remark follows the last of them.
+        // Continuation lines are also separated by spaces: they begin with an option, remarks do not.
         let mut parts: Vec<&str> = line.split("  ").map(str::trim).filter(|part| !part.is_empty()).collect();
         parts.truncate(1 + parts[1..].iter().take_while(|part| part.starts_with("--")).count());
         parts.join(" ")
@@ -68,7 +69,7 @@ fn all_examples() -> BTreeSet<String> {
     texts.flat_map(|text| examples(&text)).collect()
 }
 
-/// The files that examples name.
+/// Creates the files that examples name.
 fn prepare(work: &Path) {
     let scene =
         fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("../golden/scenes/sensor-1.toml")).unwrap();
@@ -95,11 +96,11 @@ fn every_example_works() {
     assert!(not_run.is_subset(&all), "no examples: {:?}", not_run.difference(&all));
     let work = tempfile::tempdir().unwrap();
     prepare(work.path());
-    // Verilog libraries that other tests have built serve here too.
+    // Uses the Verilator libraries built by other tests.
     fs::create_dir_all(build_dir().join("verilator")).unwrap();
     fs::create_dir(work.path().join("build")).unwrap();
     std::os::unix::fs::symlink(build_dir().join("verilator"), work.path().join("build/verilator")).unwrap();
-    // The folder that `dermis check` is asked about.
+    // The folder for the example of `dermis check`.
     let built = Command::new(program()).current_dir(work.path()).args(["build", "sensor-1"]).output().unwrap();
     assert!(built.status.success(), "{}", String::from_utf8_lossy(&built.stderr));
     let path = format!("{}:{}", program().parent().unwrap().display(), std::env::var("PATH").unwrap());

@@ -1,5 +1,5 @@
-//! The host tool and a whole board without a board: the Verilated board top's UART on a pseudo-terminal, opened like
-//! any serial port; good wires and bad ones.
+//! `dermis host` with a simulated board: the verilated board top's UART on a pseudo-terminal, opened like a serial
+//! port, over error-free and noisy channels.
 
 use std::io::Write;
 use std::path::PathBuf;
@@ -9,11 +9,11 @@ use std::time::Duration;
 use dermis_golden::fixed::Model;
 use dermis_golden::frame::Frame;
 use dermis_golden::scene::Scene;
-use dermis_sim::board::{Faults, Terminal, Wire};
+use dermis_sim::board::{ChannelFaults, NoisyChannel, PseudoTerminal};
 use dermis_sim::hardware::Hardware;
 use dermis_sim::host::{open, Session};
 
-/// Eight clock cycles per bit: as many frames as possible in the time of a test.
+/// Eight clock cycles per bit, to keep the simulation short.
 const BAUD: u32 = 12_500_000;
 
 fn model() -> Model {
@@ -22,15 +22,18 @@ fn model() -> Model {
     model
 }
 
-fn board(to_board: Faults, to_host: Faults) -> Terminal {
+fn board(to_board: ChannelFaults, to_host: ChannelFaults) -> PseudoTerminal {
     let build = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../build");
-    Hardware::new(model(), &build).unwrap().terminal_behind(Wire::new(to_board), Wire::new(to_host)).unwrap()
+    Hardware::new(model(), &build)
+        .unwrap()
+        .terminal_with_channels(NoisyChannel::new(to_board), NoisyChannel::new(to_host))
+        .unwrap()
 }
 
 #[test]
-fn over_a_bad_wire_every_frame_is_answered_right_and_every_loss_is_counted() {
-    let to_board = Faults { lost: 1500, flipped: 1500, late: 200, no_stop: 2000, seed: 1 };
-    let to_host = Faults { lost: 600, flipped: 600, seed: 2, ..Faults::default() };
+fn over_a_noisy_channel_every_answer_is_right_and_every_error_is_counted() {
+    let to_board = ChannelFaults { lost: 1500, flipped: 1500, late: 200, no_stop: 2000, seed: 1 };
+    let to_host = ChannelFaults { lost: 600, flipped: 600, seed: 2, ..ChannelFaults::default() };
     let terminal = board(to_board, to_host);
     let client = open(&terminal.path().to_string_lossy(), BAUD, Duration::from_millis(1000)).unwrap();
     let model = model();
@@ -39,25 +42,25 @@ fn over_a_bad_wire_every_frame_is_answered_right_and_every_loss_is_counted() {
     let mut dropped = 0;
     for round in 0..2 {
         for frame in &frames {
-            let (_, answer) = session.ask(frame).unwrap();
+            let (_, answer) = session.request(frame).unwrap();
             assert_eq!(answer.difference, Some(None), "{}, round {round}", frame.id);
             dropped += usize::from(answer.dropped_before());
         }
     }
     let counters = session.client.counters().unwrap();
-    let lost = session.client.lost;
-    // Every request sent again has its reason: it was dropped and counted, or its answer was damaged.
+    let errors = session.client.link_errors;
+    // Every repeated request was dropped and counted by the board, or its answer was damaged.
     let drops = counters.framing + counters.crc + counters.unknown_type + counters.length;
-    assert_eq!(lost.repeated, u64::from(drops) + lost.damaged, "{counters:?}, {lost:?}");
-    assert!(counters.framing > 0 && counters.crc > 0 && lost.damaged > 0, "{counters:?}, {lost:?}");
-    // Taken were an identification, this reading, the frames, and those whose answer was damaged.
-    assert_eq!(u64::from(counters.taken), 2 + 2 * frames.len() as u64 + lost.damaged, "{counters:?}, {lost:?}");
+    assert_eq!(errors.repeated, u64::from(drops) + errors.damaged, "{counters:?}, {errors:?}");
+    assert!(counters.framing > 0 && counters.crc > 0 && errors.damaged > 0, "{counters:?}, {errors:?}");
+    // Requests accepted: identification, counters, the frames, and repetitions after damaged answers.
+    assert_eq!(u64::from(counters.taken), 2 + 2 * frames.len() as u64 + errors.damaged, "{counters:?}, {errors:?}");
     assert_eq!(counters.overrun, 0);
-    // A frame after a dropped one says so.
+    // The answer after a dropped frame packet has the flag.
     assert!(dropped > 0, "{counters:?}");
 }
 
-fn host(terminal: &Terminal, scene: &str, more: &[&str], input: &str) -> Output {
+fn host(terminal: &PseudoTerminal, scene: &str, more: &[&str], input: &str) -> Output {
     let mut child = Command::new(env!("CARGO_BIN_EXE_dermis"))
         .args(["host", "--port", &terminal.path().to_string_lossy(), "--scene", scene, "--timeout", "3000"])
         .args(more)
@@ -66,7 +69,7 @@ fn host(terminal: &Terminal, scene: &str, more: &[&str], input: &str) -> Output 
         .stderr(Stdio::piped())
         .spawn()
         .unwrap();
-    // A program that refuses its arguments reads nothing.
+    // The write fails if the program has refused its arguments and exited.
     let _ = child.stdin.take().unwrap().write_all(input.as_bytes());
     child.wait_with_output().unwrap()
 }
@@ -77,7 +80,7 @@ fn text(bytes: &[u8]) -> String {
 
 #[test]
 fn the_program_sends_checks_tares_and_streams() {
-    let terminal = board(Faults::default(), Faults::default());
+    let terminal = board(ChannelFaults::default(), ChannelFaults::default());
     let scene = "eight-by-eight";
 
     let all = host(&terminal, scene, &["--check"], "");
@@ -97,7 +100,7 @@ fn the_program_sends_checks_tares_and_streams() {
     assert_eq!(forces.status.code(), Some(0), "{}", text(&forces.stderr));
     assert!(text(&forces.stdout).contains("engine board\n"), "{}", text(&forces.stdout));
 
-    // A frame that is its own tare has nothing left.
+    // A frame minus itself as tare is zero.
     let nothing = host(&terminal, scene, &["--tare", &frame, &frame], "");
     assert!(text(&nothing.stdout).contains("no-contact"), "{}", text(&nothing.stdout));
 
@@ -119,11 +122,11 @@ fn the_program_sends_checks_tares_and_streams() {
     let other = host(&terminal, "sensor-1", &[], "");
     assert_eq!(other.status.code(), Some(2));
     let message = text(&other.stderr);
-    assert!(message.contains("the board was made for another scene: 8×8 taxels"), "{message}");
+    assert!(message.contains("the board was built for another scene: 8×8 taxels"), "{message}");
 }
 
 #[test]
-fn a_board_that_adds_nothing_up_sends_all_forces_and_the_host_adds() {
+fn the_host_sums_the_forces_of_a_board_that_does_not() {
     let mut scene = Scene::builtin("eight-by-eight").unwrap();
     scene.hardware.board = "icebreaker".to_string();
     let model = Model::new(&scene).unwrap();
@@ -132,7 +135,7 @@ fn a_board_that_adds_nothing_up_sends_all_forces_and_the_host_adds() {
     let baud = model.board.uart_baud;
     let client = open(&terminal.path().to_string_lossy(), baud, Duration::from_millis(5000)).unwrap();
     let mut session = Session::new(client, model, None, false, true).unwrap();
-    let (_, answer) = session.ask(&Frame::shipped(&scene)[0]).unwrap();
+    let (_, answer) = session.request(&Frame::shipped(&scene)[0]).unwrap();
     assert_eq!((answer.difference, answer.beats), (Some(None), None));
     assert_ne!(answer.sums.fz, 0);
 }

@@ -1,7 +1,7 @@
-//! The report in a browser: headless Chromium opens the page on a desk and on a phone, in light and in dark. No console
-//! message, every picture drawn, no label cut off, nothing wider than the window, and nothing asked of the network.
+//! The report in a browser: headless Chromium opens the page in desktop and phone width, in light and dark theme. There
+//! must be no console message, no missing picture, no clipped label, no horizontal overflow and no network request.
 //!
-//! The page itself has no script; a copy of it gets one that looks and writes what it finds into the document.
+//! The page has no script; a copy of it gets one that inspects the page and writes its findings into the document.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -9,8 +9,8 @@ use std::process::{Command, Output};
 
 use serde_json::Value;
 
-/// Looks at the page: windows, colours, pictures, labels.
-const LOOK: &str = r#"
+/// Script that inspects the page: window, colours, pictures, labels.
+const INSPECT: &str = r#"
 <script>
 const found = { errors: [], pictures: 0, drawn: 0, labels: 0, cut: [] };
 addEventListener("error", event => found.errors.push(String(event.message)));
@@ -44,22 +44,22 @@ addEventListener("load", () => {
 });
 </script>"#;
 
-/// Width of the window on a desk and of a phone held upright. Headless windows are no narrower than 500, so the phone is
-/// a frame in one.
-const DESK: u32 = 1280;
+/// Window widths of a desktop and of a phone in portrait format. Headless windows are at least 500 wide, so that the
+/// phone is an inline frame in a wider window.
+const DESKTOP: u32 = 1280;
 const PHONE: u32 = 360;
 
 fn dermis(work: &Path, args: &[&str]) -> Output {
-    // Built libraries are shared with the other tests.
+    // The Verilator cache is shared with the other tests.
     let build = Path::new(env!("CARGO_MANIFEST_DIR")).join("../build");
     let mut command = Command::new(env!("CARGO_BIN_EXE_dermis"));
     command.current_dir(work).args(args).arg("--build-dir").arg(build).output().unwrap()
 }
 
-/// What the look found in a copy of the page.
-fn look(work: &Path, page: &str, width: u32, dark: bool) -> Value {
+/// The findings of [`INSPECT`] in a copy of the page.
+fn inspect(work: &Path, page: &str, width: u32, dark: bool) -> Value {
     let copy = work.join("copy.html");
-    fs::write(&copy, page.replacen("</head>", &format!("{LOOK}</head>"), 1)).unwrap();
+    fs::write(&copy, page.replacen("</head>", &format!("{INSPECT}</head>"), 1)).unwrap();
     let opened = match width {
         PHONE => framed(work, &copy),
         _ => copy,
@@ -73,7 +73,7 @@ fn look(work: &Path, page: &str, width: u32, dark: bool) -> Value {
         "--allow-file-access-from-files",
     ]);
     command.arg(format!("--user-data-dir={}", work.join("profile").display()));
-    command.args([format!("--window-size={DESK},900"), "--virtual-time-budget=10000".into(), "--dump-dom".into()]);
+    command.args([format!("--window-size={DESKTOP},900"), "--virtual-time-budget=10000".into(), "--dump-dom".into()]);
     // 0 is dark, 1 is light.
     command.arg(format!("--blink-settings=preferredColorScheme={}", u8::from(!dark)));
     let output = command.arg(format!("file://{}", opened.display())).output();
@@ -86,7 +86,7 @@ fn look(work: &Path, page: &str, width: u32, dark: bool) -> Value {
     serde_json::from_str(&found.replace("&lt;", "<").replace("&gt;", ">").replace("&amp;", "&")).unwrap()
 }
 
-/// A page that holds the copy in a frame as wide as a phone and takes over what was found there.
+/// A page with the copy in an inline frame of phone width, into which the frame's findings are copied.
 fn framed(work: &Path, copy: &Path) -> PathBuf {
     let page = work.join("phone.html");
     let text = format!(
@@ -102,7 +102,7 @@ fn framed(work: &Path, copy: &Path) -> PathBuf {
 }
 
 #[test]
-fn the_page_opens_on_desk_and_phone_in_light_and_dark() {
+fn the_page_opens_in_desktop_and_phone_width_in_light_and_dark() {
     let work = tempfile::tempdir().unwrap();
     let report = dermis(work.path(), &["report", "eight-by-eight", "sensor-3", "--quick", "--out", "out"]);
     assert!(report.status.success(), "{}", String::from_utf8_lossy(&report.stderr));
@@ -110,8 +110,8 @@ fn the_page_opens_on_desk_and_phone_in_light_and_dark() {
     assert!(!page.contains("http://") && !page.contains("https://"), "the page points elsewhere");
     let pictures = fs::read_dir(work.path().join("out/report-pictures")).unwrap().count();
     let mut backgrounds = Vec::new();
-    for (width, dark) in [(DESK, false), (DESK, true), (PHONE, false), (PHONE, true)] {
-        let found = look(work.path(), &page, width, dark);
+    for (width, dark) in [(DESKTOP, false), (DESKTOP, true), (PHONE, false), (PHONE, true)] {
+        let found = inspect(work.path(), &page, width, dark);
         let what = format!("{width} wide, dark {dark}: {found}");
         assert_eq!(
             (&found["errors"], &found["cut"]),
@@ -125,9 +125,9 @@ fn the_page_opens_on_desk_and_phone_in_light_and_dark() {
         );
         assert_eq!(found["requests"], Value::from(Vec::<u8>::new()), "{what}");
         assert!(found["labels"].as_u64().unwrap() > 100, "{what}");
-        // Tables scroll in their own place, the page does not.
+        // Wide tables scroll within the page, which itself does not.
         assert!(found["width"].as_u64() <= found["window"].as_u64(), "{what}");
-        // Legible at arm's length.
+        // Smallest legible text.
         assert!(found["small"].as_f64().unwrap() >= 8.0, "{what}");
         assert_ne!(found["page"], found["ink"], "{what}");
         backgrounds.push(found["page"].clone());

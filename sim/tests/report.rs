@@ -1,4 +1,5 @@
-//! The report's files: all forms say the same, times are cycles over the clock, and an interruption leaves what was there.
+//! The report's files: all formats agree, times are cycles divided by the clock, and an interruption keeps earlier
+//! files.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -8,14 +9,14 @@ use std::time::Duration;
 use serde_json::Value;
 
 fn dermis(work: &Path, args: &[&str]) -> Command {
-    // Built libraries are shared with the other tests.
+    // The Verilator cache is shared with the other tests.
     let build = Path::new(env!("CARGO_MANIFEST_DIR")).join("../build");
     let mut command = Command::new(env!("CARGO_BIN_EXE_dermis"));
     command.current_dir(work).args(args).arg("--build-dir").arg(build);
     command
 }
 
-/// The table of an id, as its head and rows.
+/// Column headers and rows of the table with an id.
 fn table<'a>(report: &'a Value, id: &str) -> (Vec<&'a str>, &'a Vec<Value>) {
     let items = report["sections"].as_array().unwrap().iter().flat_map(|section| section["items"].as_array().unwrap());
     let table = items.filter(|item| item["table"] == id).collect::<Vec<_>>();
@@ -31,7 +32,7 @@ fn files(folder: &Path) -> Vec<PathBuf> {
 }
 
 #[test]
-fn all_forms_say_the_same() {
+fn all_formats_agree() {
     let work = tempfile::tempdir().unwrap();
     let out = work.path().join("out");
     fs::create_dir_all(out.join("report-tables")).unwrap();
@@ -43,14 +44,14 @@ fn all_forms_say_the_same() {
     let markdown = fs::read_to_string(out.join("report.md")).unwrap();
     let page = fs::read_to_string(out.join("report.html")).unwrap();
 
-    // One choice, case 0, with the cycles of the co-simulation.
+    // One recommendation, case 0, with co-simulated cycles.
     let (head, rows) = table(&report, "choice");
     let at = |name: &str| head.iter().position(|head| *head == name).unwrap();
     assert_eq!((rows.len(), &rows[0][at("take case")]), (1, &Value::from("0 (1×1)")));
     let (cycles, us) = (rows[0][at("cycles")].as_f64().unwrap(), rows[0][at("µs")].as_f64().unwrap());
     assert_eq!((cycles, us), (945.0, 9.45));
     assert_eq!(rows[0][at("cycles from")], "co-simulation");
-    // Every engine has its time; hardware's is cycles at 100 MHz, and equals its model.
+    // Every engine has a time; the hardware's is its cycles at 100 MHz.
     let (head, rows) = table(&report, "time");
     let at = |name: &str| head.iter().position(|head| *head == name).unwrap();
     assert_eq!(rows.len(), 4 * 4);
@@ -64,7 +65,7 @@ fn all_forms_say_the_same() {
     let simulated: Vec<&Value> = rows.iter().filter(|row| row[at("RTL = bit-true")] == "yes").collect();
     assert_eq!(simulated.len(), 1);
 
-    // Condition against error: the normal error stays within 1 % up to a condition of 10⁶, within 5 % beyond.
+    // The normal error is at most 1 % up to a condition number of 10⁶, and at most 5 % beyond.
     let (head, rows) = table(&report, "stability");
     let at = |name: &str| head.iter().position(|head| *head == name).unwrap();
     assert_eq!(rows.iter().filter(|row| row[at("varied")] == "50 digits").count(), 4);
@@ -74,7 +75,7 @@ fn all_forms_say_the_same() {
             assert!(row[column].as_f64().unwrap() <= most, "{row}");
         }
     }
-    // Extreme frames with what both models and the status words say of them.
+    // Extreme frames with the flags of both models and of the status beats.
     let (head, rows) = table(&report, "extremes-eight-by-eight");
     let at = |name: &str| head.iter().position(|head| *head == name).unwrap();
     let zero = rows.iter().find(|row| row[at("frame")] == "zero").unwrap();
@@ -84,7 +85,7 @@ fn all_forms_say_the_same() {
     );
     assert!(rows.len() >= 24);
 
-    // A file for each table and picture, and none of an earlier run.
+    // A file for each table and picture; those of an earlier run are deleted.
     let items = || report["sections"].as_array().unwrap().iter().flat_map(|s| s["items"].as_array().unwrap());
     let tables = items().filter_map(|item| item["table"].as_str());
     let mut wanted: Vec<PathBuf> = tables.map(|id| out.join(format!("report-tables/{id}.csv"))).collect();
@@ -106,7 +107,7 @@ fn all_forms_say_the_same() {
 }
 
 #[test]
-fn the_paper_by_number() {
+fn the_papers_figures() {
     let work = tempfile::tempdir().unwrap();
     let args = ["report", "sensor-1", "sensor-2", "--paper", "--quick", "--out", "out"];
     let output = dermis(work.path(), &args).output().unwrap();
@@ -115,21 +116,21 @@ fn the_paper_by_number() {
     let (head, rows) = table(&report, "table-2");
     assert_eq!((rows.len(), head[2], rows[0][2].as_f64()), (8, "paper X1", Some(0.1284)));
     let (_, judged) = table(&report, "judged");
-    // The paper's finding on a single Hertzian contact is ours as well.
+    // The paper's conclusion for a single Hertzian contact is confirmed.
     assert_eq!((judged.len(), &judged[0][1], &judged[0][7]), (4, &Value::from("0 (1×1)"), &Value::from("yes")));
     assert!(work.path().join("out/paper-pictures/fig-1-forces.svg").is_file());
     assert!(work.path().join("out/paper-pictures/fig-4a-sensor-1-case-2-golden.svg").is_file());
 }
 
 #[test]
-fn an_interruption_leaves_what_was_there() {
+fn an_interruption_keeps_earlier_files() {
     let work = tempfile::tempdir().unwrap();
     let out = work.path().join("out");
     fs::create_dir(&out).unwrap();
     fs::write(out.join("report.html"), "of before").unwrap();
     let mut command = dermis(work.path(), &["report", "--quick", "--out", "out"]);
     let child = command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
-    // Long enough to have begun, far from the end.
+    // Long enough to have started, far from finished.
     std::thread::sleep(Duration::from_millis(700));
     let pid = rustix::process::Pid::from_child(&child);
     rustix::process::kill_process(pid, rustix::process::Signal::INT).unwrap();

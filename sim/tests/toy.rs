@@ -1,18 +1,18 @@
-//! The bench itself, on a hand-written toy engine: it passes what is right, and every kind of
-//! defect turns it red (wrong vector, wrong expectation, wrong coefficient, broken handshake,
-//! missing beat, wrong cycle count). Seconds, and independent of the real design.
+//! Tests of the co-simulation bench itself, on a hand-written toy engine: a correct design passes, and every kind of
+//! defect is found (wrong vector, wrong expectation, wrong coefficient, broken handshake, missing beat, wrong cycle
+//! count).
 
 use std::path::PathBuf;
 
 use dermis_golden::fixed::{Cycles, Stage, Trace};
 use dermis_hdl::device::{Device, Inputs, Outputs, Tap};
-use dermis_sim::cosim::{judge, run, Bench, Findings, Vector, KEPT_PER_FRAME};
-use dermis_sim::drive::{record, Play, Stimulus, Times};
+use dermis_sim::cosim::{compare_recording, run, DeviceUnderTest, Findings, Vector, KEPT_PER_FRAME};
+use dermis_sim::drive::{record, InputFrame, Stimulus, Times};
 use dermis_sim::verilator::{Design, Verilated, VerilatorError};
 
 const TOY: &str = include_str!("toy/toy.v");
 const GAIN: i64 = 3;
-/// Beats leave one a cycle from the cycle after the last code: 6 forces and 1 status.
+/// One beat per cycle from the cycle after the last code: 6 forces and 1 status.
 const CYCLES: Cycles = Cycles { first_output: 1, latency: 7, total: 13, interval: 1 };
 const TAPS: [&str; 2] = ["receive", "scale"];
 const STALLS: Stimulus = Stimulus::Stalls { seed: 7 };
@@ -34,7 +34,7 @@ fn cache() -> PathBuf {
 
 fn toy_with(verilog: &str, gain: &str) -> Result<Verilated, VerilatorError> {
     let files = vec![("toy.v", verilog), ("gain.hex", gain)];
-    Verilated::new(&Design { top: "toy", files, taps: &taps(), input_bits: 12, writable: false }, &cache())
+    Verilated::new(&Design { top: "toy", files, taps: &taps(), input_bits: 12, writable_state: false }, &cache())
 }
 
 fn toy() -> Verilated {
@@ -65,8 +65,8 @@ fn vectors() -> Vec<Vector> {
 }
 
 fn check(device: &mut dyn Device, vectors: &[Vector], stimulus: Stimulus) -> (Findings, Vec<Times>) {
-    let bench = Bench { name: "toy", device, taps: &TAPS };
-    run(bench, vectors, stimulus)
+    let dut = DeviceUnderTest { name: "toy", device, taps: &TAPS };
+    run(dut, vectors, stimulus)
 }
 
 #[test]
@@ -121,17 +121,18 @@ fn a_wrong_cycle_count_is_found() {
 #[test]
 fn every_output_beat_has_its_cycle() {
     let vectors = vectors();
-    let plays: Vec<Play> = vectors.iter().map(|v| Play { codes: &v.codes, taxels: v.taxels, beats: 7 }).collect();
-    let mut recording = record(&mut toy(), TAPS.len(), &plays, Stimulus::FullSpeed, 10_000);
-    // The third beat of the second frame, a cycle late; the last one is in time.
+    let inputs: Vec<InputFrame> =
+        vectors.iter().map(|v| InputFrame { codes: &v.codes, taxels: v.taxels, beats: 7 }).collect();
+    let mut recording = record(&mut toy(), TAPS.len(), &inputs, Stimulus::FullSpeed, 10_000);
+    // Delays the third beat of the second frame by a cycle; the last beat keeps its cycle.
     recording.beats[9].cycle += 1;
-    let findings = judge("toy", &TAPS, &vectors, &recording, true);
+    let findings = compare_recording("toy", &TAPS, &vectors, &recording, true);
     let (due, late) = (recording.beats[9].cycle - 1, recording.beats[9].cycle);
     assert_eq!(findings.count, 1);
     let wanted =
         format!("toy: frame extremes, stage cycles, word 2, cycle {late}: output beat 2 was due in cycle {due}");
     assert_eq!(findings.kept[0].to_string(), wanted);
-    assert!(judge("toy", &TAPS, &vectors, &recording, false).is_equal());
+    assert!(compare_recording("toy", &TAPS, &vectors, &recording, false).is_equal());
 }
 
 #[test]
@@ -153,15 +154,17 @@ fn a_stage_without_a_tap_and_a_tap_without_a_stage_are_found() {
 }
 
 #[test]
-fn a_broken_design_is_an_error_with_the_tools_words() {
-    let Err(error) = toy_with(&TOY.replace("wire take =", "wire taken ="), "03\n") else { panic!("built") };
+fn a_broken_design_is_an_error_with_the_tools_message() {
+    let Err(error) = toy_with(&TOY.replace("wire take =", "wire taken ="), "03\n") else {
+        panic!("the broken design was built")
+    };
     assert!(error.to_string().contains("toy.v:"), "{error}");
 }
 
-/// The toy's outputs, spoiled on the way.
-struct Spoiled<F: FnMut(&mut Outputs)>(Verilated, F);
+/// The toy engine with altered outputs.
+struct Altered<F: FnMut(&mut Outputs)>(Verilated, F);
 
-impl<F: FnMut(&mut Outputs)> Device for Spoiled<F> {
+impl<F: FnMut(&mut Outputs)> Device for Altered<F> {
     fn cycle(&mut self, inputs: &Inputs) -> Outputs {
         let mut outputs = self.0.cycle(inputs);
         (self.1)(&mut outputs);
@@ -172,49 +175,52 @@ impl<F: FnMut(&mut Outputs)> Device for Spoiled<F> {
 #[test]
 fn a_beat_that_changes_while_it_waits_is_found() {
     let mut flicker = false;
-    let mut device = Spoiled(toy(), |outputs| {
+    let mut device = Altered(toy(), |outputs| {
         flicker = !flicker;
         outputs.m_valid &= flicker;
     });
     let (findings, _) = check(&mut device, &vectors(), STALLS);
-    assert!(findings.kept.iter().any(|m| m.rule.as_deref() == Some("an offered beat must stay until it is taken")));
+    assert!(findings
+        .kept
+        .iter()
+        .any(|m| m.rule.as_deref() == Some("a valid beat must stay unchanged until it is accepted")));
 }
 
 #[test]
 fn a_missing_tlast_is_found() {
-    let mut device = Spoiled(toy(), |outputs| outputs.m_last = false);
+    let mut device = Altered(toy(), |outputs| outputs.m_last = false);
     let (findings, _) = check(&mut device, &vectors(), Stimulus::FullSpeed);
     assert_eq!(findings.count, 2);
     assert_eq!((findings.kept[0].stage.as_str(), findings.kept[0].index), ("handshake", 6));
 }
 
 #[test]
-fn a_beat_too_many_is_found() {
+fn a_surplus_beat_is_found() {
     let mut beats = 0;
-    let mut device = Spoiled(toy(), |outputs| {
+    let mut device = Altered(toy(), |outputs| {
         beats += usize::from(outputs.m_valid);
         outputs.m_valid |= beats == 14;
     });
     let (findings, _) = check(&mut device, &vectors(), Stimulus::FullSpeed);
-    assert_eq!(findings.kept[0].rule.as_deref(), Some("no beat may follow the last frame's"));
+    assert_eq!(findings.kept[0].rule.as_deref(), Some("no beat may follow the last frame"));
 }
 
 #[test]
-fn a_dead_output_ends_the_run_and_names_what_was_awaited() {
-    let awaited = |spoil: fn(&mut Outputs), vectors: &[Vector]| {
-        let (findings, _) = check(&mut Spoiled(toy(), spoil), vectors, Stimulus::FullSpeed);
+fn a_hung_device_ends_the_run_and_the_awaited_transfer_is_named() {
+    let awaited = |alter: fn(&mut Outputs), vectors: &[Vector]| {
+        let (findings, _) = check(&mut Altered(toy(), alter), vectors, Stimulus::FullSpeed);
         assert!(findings.count > KEPT_PER_FRAME);
         findings.kept[0].rule.clone().unwrap()
     };
-    let dead = awaited(|outputs| outputs.m_valid = false, &vectors());
-    assert_eq!(dead, "nothing moved for 10000 cycles while waiting for output beat 0 of 7");
-    let deaf = awaited(|outputs| outputs.s_ready = false, &vectors()[..1]);
-    assert_eq!(deaf, "nothing moved for 10000 cycles while waiting for s_axis_tready for taxel 0 of 6");
+    let no_valid = awaited(|outputs| outputs.m_valid = false, &vectors());
+    assert_eq!(no_valid, "no transfer for 10000 cycles while waiting for output beat 0 of 7");
+    let no_ready = awaited(|outputs| outputs.s_ready = false, &vectors()[..1]);
+    assert_eq!(no_ready, "no transfer for 10000 cycles while waiting for s_axis_tready for taxel 0 of 6");
 }
 
 #[test]
 fn a_device_that_sends_without_end_does_not_hang_the_bench() {
-    let mut device = Spoiled(toy(), |outputs| {
+    let mut device = Altered(toy(), |outputs| {
         outputs.m_valid = true;
         outputs.s_ready = false;
     });
@@ -223,20 +229,20 @@ fn a_device_that_sends_without_end_does_not_hang_the_bench() {
     assert!(gave_up.as_ref().is_some_and(|text| text.contains("waiting for s_axis_tready")), "{gave_up:?}");
 }
 
-/// The toy without its reset.
-struct Stubborn(Verilated);
+/// The toy engine without its reset.
+struct WithoutReset(Verilated);
 
-impl Device for Stubborn {
+impl Device for WithoutReset {
     fn cycle(&mut self, inputs: &Inputs) -> Outputs {
         self.0.cycle(&Inputs { rst: false, ..*inputs })
     }
 }
 
 #[test]
-fn work_that_survives_a_reset_is_found() {
+fn a_missing_reset_is_found() {
     let mut device = toy();
-    // A defined start; from here on the reset does nothing.
+    // A first reset for a defined start; later ones have no effect.
     device.cycle(&Inputs { rst: true, ..Inputs::default() });
-    let (findings, _) = check(&mut Stubborn(device), &vectors(), STALLS);
+    let (findings, _) = check(&mut WithoutReset(device), &vectors(), STALLS);
     assert!(!findings.is_equal());
 }

@@ -1,4 +1,4 @@
-//! Files when writing fails or stops half way, and generated folders that are no longer whole.
+//! Failed and interrupted writes, and damaged generated folders.
 
 use std::fs;
 use std::path::Path;
@@ -6,14 +6,14 @@ use std::process::Command;
 
 use tempfile::TempDir;
 
-/// Runs the program in `folder` from a shell with `before` it; exit code and stderr.
+/// Runs the program in `folder` from a shell, after the commands `before`; returns exit code and stderr.
 fn dermis(folder: &Path, before: &str, args: &str) -> (Option<i32>, String) {
     let script = format!("{before} exec {} {args}", env!("CARGO_BIN_EXE_dermis"));
     let output = Command::new("sh").args(["-c", &script]).current_dir(folder).output().unwrap();
     (output.status.code(), String::from_utf8(output.stderr).unwrap())
 }
 
-/// A folder with a frame that is to be replaced.
+/// A folder with an old frame file.
 fn with_old_frame() -> TempDir {
     let folder = tempfile::tempdir().unwrap();
     fs::write(folder.path().join("f.json"), "old").unwrap();
@@ -25,7 +25,7 @@ const GENERATE: &str = "generate eight-by-eight --random 1 --out f.json";
 #[test]
 fn a_full_disk_leaves_the_old_file_and_no_other() {
     let folder = with_old_frame();
-    // One block of 512 bytes per file: writing goes on to an error.
+    // At most 512 bytes per file, with the signal ignored: the write returns an error.
     let (code, stderr) = dermis(folder.path(), "trap '' XFSZ; ulimit -f 1;", GENERATE);
     assert_eq!(code, Some(2), "{stderr}");
     assert!(stderr.starts_with("error: f.json: File too large"), "{stderr}");
@@ -36,18 +36,18 @@ fn a_full_disk_leaves_the_old_file_and_no_other() {
 #[test]
 fn a_killed_write_leaves_the_old_file() {
     let folder = with_old_frame();
-    // The same limit without the trap: the signal ends the program in the middle of the write.
+    // The same limit with the signal: the program is killed during the write.
     let (code, _) = dermis(folder.path(), "ulimit -f 1;", GENERATE);
     assert_eq!(code, None);
     assert_eq!(fs::read_to_string(folder.path().join("f.json")).unwrap(), "old");
-    // And where there is room, the new one is whole.
+    // Without the limit the new file is complete.
     assert_eq!(dermis(folder.path(), "", GENERATE).0, Some(0));
     let text = fs::read_to_string(folder.path().join("f.json")).unwrap();
     assert!(serde_json::from_str::<serde_json::Value>(&text).is_ok());
 }
 
 #[test]
-fn a_folder_that_is_not_whole_is_refused() {
+fn a_damaged_folder_is_refused() {
     let folder = tempfile::tempdir().unwrap();
     let check = || dermis(folder.path(), "", "check rtl");
     assert_eq!(dermis(folder.path(), "", "build eight-by-eight --out rtl").0, Some(0));
@@ -66,7 +66,7 @@ fn a_folder_that_is_not_whole_is_refused() {
         for kept in [0, 1, whole.len() / 2, whole.len() - 1] {
             refused(&whole[..kept]);
         }
-        // One bit of the last character; text stays text.
+        // Flips one bit of the last character; the file remains text.
         let last = whole.iter().rposition(|byte| !byte.is_ascii_whitespace()).unwrap();
         let mut flipped = whole.clone();
         flipped[last] ^= 1;

@@ -10,9 +10,9 @@ use dermis_golden::quantise::quantise;
 use dermis_golden::reconstruct::Golden;
 use dermis_golden::scene::Scene;
 use dermis_sim::compare::median;
-use dermis_sim::cosim::{run, Bench, Findings, Vector};
+use dermis_sim::cosim::{run, DeviceUnderTest, Findings, Vector};
+use dermis_sim::drawn_frames::{DrawnFrames, Shapes};
 use dermis_sim::drive::Stimulus;
-use dermis_sim::fresh::{Fresh, Shapes};
 use dermis_sim::hardware::{Hardware, Simulator};
 use dermis_tests::build_dir;
 
@@ -72,8 +72,8 @@ fn check(hardware: &Hardware, simulator: Simulator, vectors: &[Vector], stimuli:
     let taps = hardware.tap_names();
     let mut all = Findings::default();
     for &stimulus in stimuli {
-        let bench = Bench { name: simulator.name(), device: device.as_mut(), taps: &taps };
-        all.extend(run(bench, vectors, stimulus).0);
+        let dut = DeviceUnderTest { name: simulator.name(), device: device.as_mut(), taps: &taps };
+        all.extend(run(dut, vectors, stimulus).0);
     }
     all
 }
@@ -179,8 +179,8 @@ fn the_choice_is_measured() {
         let shifts = [1, 2, 3, 4, 5, 6, 8];
         let (mut by_case, mut by_shift, mut golden) = (vec![Vec::new(); 4], vec![Vec::new(); shifts.len()], Vec::new());
         let contacts = counts.to_vec();
-        let fresh = Fresh { frames: drawn, contacts, shapes: Shapes::Elliptic, touching: false, seed: 1 };
-        for frame in fresh.draw(&scene).unwrap() {
+        let draw = DrawnFrames { frames: drawn, contacts, shapes: Shapes::Elliptic, touching: false, seed: 1 };
+        for frame in draw.draw(&scene).unwrap() {
             let error = |model: &Golden| model.run(&frame).unwrap().error.and_then(|error| error.tangential);
             let errors: Vec<f64> = models.iter().filter_map(error).collect();
             let Some(own) = error(&adaptive).filter(|_| errors.len() == 4) else { continue };

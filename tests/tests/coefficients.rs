@@ -10,7 +10,7 @@ use dermis_golden::frame::Frame;
 use dermis_golden::scene::{CoefficientCheck, Scene};
 use dermis_hdl::{generate, usage::total};
 use dermis_sim::cosim::Vector;
-use dermis_sim::drive::{record, Play, Stimulus};
+use dermis_sim::drive::{record, InputFrame, Stimulus};
 use dermis_sim::hardware::{Hardware, Simulator};
 use dermis_sim::verify::verify;
 use dermis_tests::{build_dir, scene, SCENES};
@@ -69,7 +69,7 @@ fn tells(hardware: &Hardware, vector: &Vector) -> bool {
     let mut device = hardware.device(Simulator::Verilator).unwrap();
     let forces = vector.expected.beats.len();
     let beats = forces + vector.expected.status.len();
-    let play = Play { codes: &vector.codes, taxels: vector.taxels, beats };
+    let play = InputFrame { codes: &vector.codes, taxels: vector.taxels, beats };
     let recording = record(device.as_mut(), 0, &[play], Stimulus::FullSpeed, 100_000);
     assert_eq!(recording.beats.len(), beats);
     recording.beats[forces..].iter().step_by(STATUS_BEATS).all(|beat| beat.data[2] as u32 & FLAG_COEFFICIENTS != 0)

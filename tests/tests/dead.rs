@@ -7,9 +7,9 @@ use dermis_golden::fixed::Model;
 use dermis_golden::frame::Frame;
 use dermis_golden::reconstruct::Golden;
 use dermis_golden::scene::Scene;
-use dermis_sim::cosim::{run, Bench, Findings, Vector};
+use dermis_sim::cosim::{run, DeviceUnderTest, Findings, Vector};
+use dermis_sim::drawn_frames::{DrawnFrames, Shapes};
 use dermis_sim::drive::Stimulus;
-use dermis_sim::fresh::{Fresh, Shapes};
 use dermis_sim::hardware::{Hardware, Simulator};
 use dermis_sim::study::dead_taxels::{self, LINES as SCENES};
 use dermis_sim::verify::verify;
@@ -24,7 +24,7 @@ fn masked(name: &str, dead: &[[usize; 2]]) -> Scene {
 
 /// Frames of random contacts; in every second one the dead taxels are stuck far beyond the peak.
 fn frames(scene: &Scene, count: u32) -> Vec<Frame> {
-    let draw = Fresh { frames: count, contacts: vec![1, 2], shapes: Shapes::Elliptic, touching: false, seed: 11 };
+    let draw = DrawnFrames { frames: count, contacts: vec![1, 2], shapes: Shapes::Elliptic, touching: false, seed: 11 };
     let mut frames = draw.draw(scene).unwrap();
     frames.iter_mut().skip(1).step_by(2).for_each(|frame| stick(scene, frame));
     frames
@@ -132,8 +132,8 @@ fn mirrored_pairs_keep_a_symmetry() {
 
 fn compare(hardware: &Hardware, vectors: &[Vector]) -> Findings {
     let mut device = hardware.device(Simulator::Verilator).unwrap();
-    let bench = Bench { name: "verilator", device: device.as_mut(), taps: &hardware.tap_names() };
-    run(bench, vectors, Stimulus::FullSpeed).0
+    let dut = DeviceUnderTest { name: "verilator", device: device.as_mut(), taps: &hardware.tap_names() };
+    run(dut, vectors, Stimulus::FullSpeed).0
 }
 
 #[test]

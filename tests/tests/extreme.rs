@@ -5,7 +5,7 @@ use dermis_golden::fixed::Model;
 use dermis_golden::partition::Case;
 use dermis_golden::scene::Scene;
 use dermis_golden::stability::extreme::frames;
-use dermis_sim::cosim::{run, Bench, Vector};
+use dermis_sim::cosim::{run, DeviceUnderTest, Vector};
 use dermis_sim::drive::Stimulus;
 use dermis_sim::hardware::{Hardware, Simulator};
 use dermis_tests::build_dir;
@@ -40,8 +40,8 @@ fn check(scene: &Scene, least: usize) {
     ];
     for (simulator, stimulus) in runs {
         let mut device = hardware.device(simulator).unwrap();
-        let bench = Bench { name: simulator.name(), device: device.as_mut(), taps: &taps };
-        let (findings, _) = run(bench, &vectors, stimulus);
+        let dut = DeviceUnderTest { name: simulator.name(), device: device.as_mut(), taps: &taps };
+        let (findings, _) = run(dut, &vectors, stimulus);
         let first: Vec<String> = findings.kept.iter().take(3).map(ToString::to_string).collect();
         assert!(findings.is_equal(), "{}, {}: {first:#?}", scene.name, simulator.name());
     }

@@ -4,8 +4,8 @@
 use dermis_golden::fixed::storage::word_bits;
 use dermis_golden::fixed::Model;
 use dermis_golden::scene::Scene;
-use dermis_sim::faults::places::{places, Class};
-use dermis_sim::faults::{faults, Shares};
+use dermis_sim::faults::state_bits::{state_elements, StorageClass};
+use dermis_sim::faults::{inject_faults, Shares};
 use dermis_sim::hardware::Hardware;
 use dermis_sim::report;
 use dermis_tests::build_dir;
@@ -20,38 +20,42 @@ fn hardware() -> Hardware {
 #[test]
 fn every_bit_is_found() {
     let hardware = hardware();
-    let listing = hardware.writable().unwrap().listing().unwrap();
+    let listing = hardware.device_with_writable_state().unwrap().listing().unwrap();
     let memories = &hardware.model.resources.memories;
-    let all = places(&listing, "bench.dut", memories).unwrap();
-    let bits = |wanted: &dyn Fn(Class) -> bool| -> usize {
-        all.iter().filter(|place| wanted(place.class)).map(|place| place.words * place.bits).sum()
+    let all = state_elements(&listing, "bench.dut", memories).unwrap();
+    let bits = |wanted: &dyn Fn(StorageClass) -> bool| -> usize {
+        all.iter().filter(|element| wanted(element.class)).map(|element| element.words * element.bits).sum()
     };
     let listed: usize = memories.iter().map(|memory| memory.words * memory.bits).sum();
-    assert_eq!(bits(&|class| class != Class::Register), listed);
-    assert_eq!(bits(&|class| class == Class::Rom), hardware.model.storage.words() * word_bits(&hardware.model.formats));
+    assert_eq!(bits(&|class| class != StorageClass::Register), listed);
+    assert_eq!(
+        bits(&|class| class == StorageClass::Rom),
+        hardware.model.storage.words() * word_bits(&hardware.model.formats)
+    );
     // Counted in the text of the Verilog, without the registers inside memory blocks.
     let estimated: usize = hardware.generated.usage.values().map(|usage| usage.flip_flops).sum();
-    let registers = bits(&|class| class == Class::Register);
+    let registers = bits(&|class| class == StorageClass::Register);
     println!("{registers} bits of registers, {estimated} flip-flops estimated");
     assert!(registers > estimated && registers < estimated + estimated / 4, "{registers}, estimated {estimated}");
 }
 
 #[test]
 fn outcomes_add_up_and_a_reset_helps() {
-    let rows = faults(&hardware(), &[], 900, 1).unwrap();
+    let rows = inject_faults(&hardware(), &[], 900, 1).unwrap();
     println!("{}", report::faults(&rows));
     for row in &rows {
-        assert_eq!(row.harmless + row.detected + row.hang + row.silent, row.tried, "{row:?}");
-        assert!(row.tried >= 15 && row.hit > 0 && row.not_recovered == 0, "{row:?}");
+        assert_eq!(row.harmless + row.detected + row.hang + row.silent, row.flips, "{row:?}");
+        assert!(row.flips >= 15 && row.distinct_bits > 0 && row.not_recovered == 0, "{row:?}");
         assert!(row.large <= row.silent && (row.large == 0 || row.largest_error > 0.01), "{row:?}");
     }
-    let of = |class: Class, stage: &str| rows.iter().find(|row| row.class == class && row.stage == stage).unwrap();
+    let of =
+        |class: StorageClass, stage: &str| rows.iter().find(|row| row.class == class && row.stage == stage).unwrap();
     // A coefficient is read in every frame: the force words are wrong, and nothing flags it.
-    let coefficients = of(Class::Rom, "pass");
-    assert!(4 * coefficients.silent > coefficients.tried && coefficients.detected == 0, "{coefficients:?}");
+    let coefficients = of(StorageClass::Rom, "pass");
+    assert!(4 * coefficients.silent > coefficients.flips && coefficients.detected == 0, "{coefficients:?}");
     // State of the handshake: a flip hangs the design or breaks the length of a frame.
-    let control = ["send", "engine", "receive"].map(|stage| of(Class::Register, stage));
+    let control = ["send", "engine", "receive"].map(|stage| of(StorageClass::Register, stage));
     assert!(control.iter().any(|row| row.hang > 0) && control.iter().any(|row| row.detected > 0), "{control:?}");
-    let shares = Shares::of(&rows, Class::Rom).unwrap();
+    let shares = Shares::of(&rows, StorageClass::Rom).unwrap();
     assert!((shares.harmless + shares.detected + shares.hang + shares.silent - 1.0).abs() < 1e-9, "{shares:?}");
 }

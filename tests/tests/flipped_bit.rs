@@ -2,7 +2,7 @@
 //! stage concerned.
 
 use dermis_golden::fixed::Model;
-use dermis_sim::cosim::{run, Bench, Findings, Vector};
+use dermis_sim::cosim::{run, DeviceUnderTest, Findings, Vector};
 use dermis_sim::drive::Stimulus;
 use dermis_sim::hardware::{Hardware, Simulator};
 use dermis_tests::{build_dir, scene};
@@ -16,8 +16,8 @@ fn setup() -> (Hardware, Vec<Vector>) {
 
 fn check(hardware: &Hardware, vectors: &[Vector]) -> Findings {
     let mut device = hardware.device(Simulator::Verilator).unwrap();
-    let bench = Bench { name: "verilator", device: device.as_mut(), taps: &hardware.tap_names() };
-    run(bench, vectors, Stimulus::FullSpeed).0
+    let dut = DeviceUnderTest { name: "verilator", device: device.as_mut(), taps: &hardware.tap_names() };
+    run(dut, vectors, Stimulus::FullSpeed).0
 }
 
 /// Flips bit 0 of the first non-zero hexadecimal word in the middle of a memory file.

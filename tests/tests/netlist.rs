@@ -4,9 +4,9 @@
 use dermis_golden::fixed::Model;
 use dermis_golden::frame::Frame;
 use dermis_golden::scene::Scene;
-use dermis_sim::cosim::{run, Bench, Findings, Vector};
+use dermis_sim::cosim::{run, DeviceUnderTest, Findings, Vector};
+use dermis_sim::drawn_frames::{DrawnFrames, Shapes};
 use dermis_sim::drive::Stimulus;
-use dermis_sim::fresh::{Fresh, Shapes};
 use dermis_sim::hardware::{Hardware, Simulator};
 use dermis_tests::build_dir;
 
@@ -19,7 +19,7 @@ const SCENE: &str = "name = \"netlist\"\n[sensor]\nrows = 4\ncols = 4\npitch_x_m
 fn setup(board: &str, mu_max: &str) -> (Hardware, Vec<Frame>) {
     let text = format!("{SCENE}mu_max = {mu_max}\n[hardware]\nboard = \"{board}\"\n");
     let scene = Scene::parse(&text, "netlist").unwrap();
-    let frames = Fresh { frames: 4, contacts: vec![1], shapes: Shapes::Elliptic, touching: false, seed: 1 };
+    let frames = DrawnFrames { frames: 4, contacts: vec![1], shapes: Shapes::Elliptic, touching: false, seed: 1 };
     let frames = frames.draw(&scene).unwrap();
     (Hardware::new(Model::for_frames(&scene, &frames).unwrap(), &build_dir()).unwrap(), frames)
 }
@@ -28,9 +28,9 @@ fn findings(hardware: &Hardware, frames: &[Frame], simulator: Simulator) -> Find
     let mut device = hardware.device(simulator).unwrap();
     let vectors = frames.iter().map(|frame| hardware.vector(std::slice::from_ref(frame)).unwrap());
     let vectors: Vec<Vector> = vectors.collect();
-    let (taps, vectors) = hardware.shown(simulator, &vectors);
-    let bench = Bench { name: simulator.name(), device: device.as_mut(), taps: &taps };
-    run(bench, &vectors, Stimulus::FullSpeed).0
+    let (taps, vectors) = hardware.observable(simulator, &vectors);
+    let dut = DeviceUnderTest { name: simulator.name(), device: device.as_mut(), taps: &taps };
+    run(dut, &vectors, Stimulus::FullSpeed).0
 }
 
 #[test]

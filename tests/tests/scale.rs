@@ -4,7 +4,7 @@
 use dermis_golden::fixed::Model;
 use dermis_golden::partition::Case;
 use dermis_golden::scene::Scene;
-use dermis_sim::cosim::{run, Bench, Vector};
+use dermis_sim::cosim::{run, DeviceUnderTest, Vector};
 use dermis_sim::drive::Stimulus;
 use dermis_sim::hardware::{Hardware, Simulator};
 use dermis_sim::verify::verify;
@@ -66,8 +66,8 @@ fn random_frames(scene: &Scene, frames: u64) {
                 }
             })
             .collect();
-        let bench = Bench { name: "verilator", device: device.as_mut(), taps: &taps };
-        let (findings, _) = run(bench, &vectors, Stimulus::Stalls { seed });
+        let dut = DeviceUnderTest { name: "verilator", device: device.as_mut(), taps: &taps };
+        let (findings, _) = run(dut, &vectors, Stimulus::Stalls { seed });
         let first: Vec<String> = findings.kept.iter().take(3).map(ToString::to_string).collect();
         assert!(findings.is_equal(), "{}: {first:#?}", scene.name);
     }

@@ -6,7 +6,7 @@
 use dermis_golden::fixed::Model;
 use dermis_golden::frame::Frame;
 use dermis_golden::scene::Scene;
-use dermis_sim::cosim::{run, Bench};
+use dermis_sim::cosim::{run, DeviceUnderTest};
 use dermis_sim::drive::Stimulus;
 use dermis_sim::hardware::{Hardware, Simulator};
 use dermis_sim::verify::verify;
@@ -118,8 +118,8 @@ proptest! {
         let expected = hardware.model.run(&codes);
         let vectors = [dermis_sim::cosim::Vector { frame: "random".into(), cols, taxels: codes.len(), codes, expected }];
         let mut device = hardware.device(Simulator::RustHdl).unwrap();
-        let bench = Bench { name: "rust-hdl", device: device.as_mut(), taps: &hardware.tap_names() };
-        let (findings, _) = run(bench, &vectors, Stimulus::FullSpeed);
+        let dut = DeviceUnderTest { name: "rust-hdl", device: device.as_mut(), taps: &hardware.tap_names() };
+        let (findings, _) = run(dut, &vectors, Stimulus::FullSpeed);
         prop_assert!(findings.is_equal(), "{:?}", findings.kept.first().map(ToString::to_string));
     }
 }

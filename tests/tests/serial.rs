@@ -7,7 +7,7 @@ use dermis_golden::fixed::{Cycles, Model};
 use dermis_golden::frame::Frame;
 use dermis_golden::scene::Scene;
 use dermis_hdl::generate;
-use dermis_sim::fresh::{Fresh, Shapes};
+use dermis_sim::drawn_frames::{DrawnFrames, Shapes};
 use dermis_sim::hardware::Simulator;
 use dermis_sim::verify::verify;
 use dermis_tests::{build_dir, scene};
@@ -35,7 +35,7 @@ fn sensor(rows: usize, cols: usize, more: &str) -> Scene {
 }
 
 fn drawn(scene: &Scene, frames: u32) -> Vec<Frame> {
-    let draw = Fresh { frames, contacts: vec![1], shapes: Shapes::Elliptic, touching: false, seed: 1 };
+    let draw = DrawnFrames { frames, contacts: vec![1], shapes: Shapes::Elliptic, touching: false, seed: 1 };
     draw.draw(scene).unwrap()
 }
 

@@ -51,7 +51,7 @@ fn the_shipped_scenes_lose_and_invent_nothing() {
 fn several_subarrays_recover_from_a_reset_at_every_cycle() {
     let outcomes = check(&small(4, 6, "[partition]\ncase = 3\n[search]\nmu_max = 0.05\n"), &[], 1_000_000);
     let resets = outcomes.last().unwrap();
-    assert_eq!((resets.resets, resets.experiment), (resets.reset_places, "reset"));
+    assert_eq!((resets.resets, resets.experiment), (resets.possible_reset_cycles, "reset"));
 }
 
 #[test]
@@ -73,7 +73,7 @@ fn sums_without_a_search_and_averaged_frames_recover() {
     let averaged = "[search]\nmu_max = 0.0\n[input]\naverage = 1\n";
     check(&small(4, 4, averaged), &[], 100_000);
     let sums = check(&unsearched(), &[], 200_000);
-    assert_eq!(sums[2].resets, sums[2].reset_places);
+    assert_eq!(sums[2].resets, sums[2].possible_reset_cycles);
 }
 
 fn unsearched() -> Scene {

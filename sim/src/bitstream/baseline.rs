@@ -1,7 +1,7 @@
-//! What scenes took of their boards when somebody last looked: `constraints/baselines.json`.
+//! Committed results of place and route by board and scene: `constraints/baselines.json`.
 //!
-//! `dermis bitstream --update-baselines` writes it where the clock is met; without that a bitstream that is slower or larger
-//! than its line says, beyond the tolerances here, fails.
+//! `dermis bitstream --update-baselines` writes the file if the clock is met. Without that option `dermis bitstream`
+//! fails if its result is slower or larger than the baseline, beyond the tolerances below.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -11,16 +11,16 @@ use serde::{Deserialize, Serialize};
 use super::tools::ToolError;
 use dermis_golden::write::write;
 
-/// The file, from the repository's root.
+/// Path of the file, relative to the repository's root.
 pub const FILE: &str = "constraints/baselines.json";
-/// Its content when this program was built.
+/// Content of the file when this program was built.
 const COMMITTED: &str = include_str!("../../../constraints/baselines.json");
-/// How much slower the best seed may be: place and route scatters by about this much.
+/// Allowed relative loss of the best seed's clock; about the scatter of place and route.
 const SLOWER: f64 = 0.10;
-/// How many more look-up tables and flip-flops it may take; another version of the tools differs by less.
+/// Allowed relative increase of look-up tables and flip-flops; tool versions differ by less.
 const LARGER: f64 = 0.05;
 
-/// A scene on a board.
+/// Result of a scene on a board.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 #[allow(non_snake_case)]
@@ -33,22 +33,22 @@ pub struct Baseline {
     pub multipliers: u64,
     /// Block RAMs.
     pub block_rams: u64,
-    /// Highest clock of the seed that the bitstream is of, MHz.
+    /// Highest clock of the best seed, of which the bitstream is made, MHz.
     pub best_MHz: f64,
-    /// Median of the seeds.
+    /// Highest clock of the median seed, MHz.
     pub median_MHz: f64,
-    /// Slowest seed.
+    /// Highest clock of the slowest seed, MHz.
     pub worst_MHz: f64,
-    /// Seeds that were placed and routed.
+    /// Number of seeds placed and routed.
     pub seeds: u32,
 }
 
 impl Baseline {
-    /// What `now` is worse in, each with both figures.
-    pub fn losses(&self, now: &Baseline) -> Vec<String> {
-        let mut losses = Vec::new();
+    /// The figures in which `now` is worse beyond tolerance, each with both values.
+    pub fn regressions(&self, now: &Baseline) -> Vec<String> {
+        let mut regressions = Vec::new();
         if now.best_MHz < self.best_MHz * (1.0 - SLOWER) {
-            losses.push(format!("{:.1} MHz, was {:.1} MHz", now.best_MHz, self.best_MHz));
+            regressions.push(format!("{:.1} MHz, was {:.1} MHz", now.best_MHz, self.best_MHz));
         }
         let cells = [
             ("LUTs", now.luts, self.luts, LARGER),
@@ -58,10 +58,10 @@ impl Baseline {
         ];
         for (what, now, was, tolerance) in cells {
             if now as f64 > was as f64 * (1.0 + tolerance) {
-                losses.push(format!("{now} {what}, was {was}"));
+                regressions.push(format!("{now} {what}, was {was}"));
             }
         }
-        losses
+        regressions
     }
 }
 
@@ -71,15 +71,15 @@ impl Baseline {
 pub struct Baselines(pub BTreeMap<String, BTreeMap<String, Baseline>>);
 
 impl Baselines {
-    /// What this program was built with; a file that is none counts as empty, [`Baselines::read`] says why it is none.
+    /// The baselines built into this program; empty if they cannot be parsed ([`Baselines::read`] reports why).
     pub fn committed() -> Baselines {
         serde_json::from_str(COMMITTED).unwrap_or_default()
     }
 
-    /// Reads the file at `path`; none yet where there is no file.
+    /// Reads the file at `path`; empty if there is no file.
     ///
     /// # Errors
-    /// [`ToolError::File`]; [`ToolError::Output`] with line and field for what is none.
+    /// [`ToolError::File`]; [`ToolError::Output`] with line and field if the file cannot be parsed.
     pub fn read(path: &Path) -> Result<Baselines, ToolError> {
         if !path.exists() {
             return Ok(Baselines::default());
@@ -88,7 +88,7 @@ impl Baselines {
         serde_json::from_str(&text).map_err(|e| ToolError::Output { path: path.to_owned(), reason: e.to_string() })
     }
 
-    /// Writes the file at `path`, whole or not at all.
+    /// Writes the file at `path`, completely or not at all.
     ///
     /// # Errors
     /// [`ToolError::File`].
@@ -98,7 +98,7 @@ impl Baselines {
         Ok(write(path, text.as_bytes())?)
     }
 
-    /// The line of a scene.
+    /// The baseline of a scene on a board.
     pub fn get(&self, board: &str, scene: &str) -> Option<&Baseline> {
         self.0.get(board)?.get(scene)
     }
@@ -130,9 +130,12 @@ mod tests {
     fn slower_and_larger_is_a_loss() {
         let was = baseline();
         let now = Baseline { best_MHz: 100.0, luts: 41_900, ..was.clone() };
-        assert_eq!(was.losses(&now), Vec::<String>::new());
+        assert_eq!(was.regressions(&now), Vec::<String>::new());
         let now = Baseline { best_MHz: 98.0, luts: 42_100, block_rams: 61, ..was.clone() };
-        assert_eq!(was.losses(&now), ["98.0 MHz, was 110.0 MHz", "42100 LUTs, was 40000", "61 block RAMs, was 60"]);
+        assert_eq!(
+            was.regressions(&now),
+            ["98.0 MHz, was 110.0 MHz", "42100 LUTs, was 40000", "61 block RAMs, was 60"]
+        );
     }
 
     #[test]

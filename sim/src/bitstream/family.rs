@@ -1,30 +1,30 @@
-//! What the tools are asked for a family of devices: one place for all that differs between families.
+//! Tools, commands and cell names of each device family.
 
 use dermis_golden::board::{Board, Family};
 
 use super::tools::Tool;
 
-/// Synthesis, for all families.
+/// The synthesis tool of all families.
 pub const YOSYS: Tool = Tool { name: "yosys" };
 
-/// A family's tools and cells.
+/// Tools and cell names of a family.
 pub struct Flow {
     /// Place and route.
     pub place: Tool,
     /// Configuration to bitstream.
     pub pack: Tool,
-    /// Yosys's commands; `{top}` stands for the module and `{netlist}` for the file that is written.
+    /// Yosys commands; `{top}` stands for the top module, `{netlist}` for the file to write.
     pub synthesis: &'static str,
-    /// What the names of look-up tables begin with, in the report of place and route or else in the netlist; a carry's
-    /// halves and distributed RAM are among them.
+    /// Prefix of the cell names counted as look-up tables, in the report of place and route or in the netlist; includes
+    /// carry cells and distributed RAM.
     pub lut: &'static str,
-    /// A flip-flop.
+    /// Prefix of flip-flop cells.
     pub flip_flop: &'static str,
-    /// A multiplier.
+    /// Prefix of multiplier cells.
     pub multiplier: &'static str,
-    /// A block RAM.
+    /// Prefix of block RAM cells.
     pub block_ram: &'static str,
-    /// Ending of the bitstream.
+    /// File extension of the bitstream.
     pub bitstream: &'static str,
 }
 
@@ -34,9 +34,9 @@ pub fn flow(family: Family) -> Flow {
         Family::Ecp5 => Flow {
             place: Tool { name: "nextpnr-ecp5" },
             pack: Tool { name: "ecppack" },
-            // Tables joined by a slice's multiplexers move as one in placement; single ones find a place nearer to what
-            // they belong to. For the same reason a reset or an enable of a few flip-flops goes into their tables: a tile
-            // has few of each, and hundreds of them, for a flip-flop or two each, leave little choice of places.
+            // -nowidelut: look-up tables joined by a slice's multiplexers are placed as one; single ones can be placed
+            // closer to their neighbours. -minsrst, -mince: resets and enables of fewer than 16 flip-flops become
+            // logic, because a tile has few reset and enable signals and many small groups would restrict placement.
             synthesis: "synth_ecp5 -nowidelut -run begin:map_ffs -top {top}; \
                 dfflegalize -minsrst 16 -mince 16 -cell $_DFF_?_ 01 -cell $_DFF_?P?_ r -cell $_SDFF_?P?_ r \
                 -cell $_DFFE_??_ 01 -cell $_DFFE_?P??_ r -cell $_SDFFE_?P??_ r; \
@@ -52,7 +52,7 @@ pub fn flow(family: Family) -> Flow {
             pack: Tool { name: "icepack" },
             // Each of these saves half a percent of the cells.
             synthesis: "synth_ice40 -dsp -abc2 -dff -top {top} -json {netlist}",
-            // A logic cell holds a look-up table, a carry and a flip-flop: what counts is how many cells are taken.
+            // A logic cell holds a look-up table, a carry and a flip-flop, hence the number of logic cells is counted.
             lut: "ICESTORM_LC",
             flip_flop: "SB_DFF",
             multiplier: "ICESTORM_DSP",
@@ -62,7 +62,7 @@ pub fn flow(family: Family) -> Flow {
     }
 }
 
-/// Arguments of place and route for one try.
+/// Arguments of place and route for one seed and placer; output files begin with `name`.
 pub fn place_arguments(board: &Board, netlist: &str, seed: u32, placer: &str, name: &str) -> Vec<String> {
     let Board { size, package, speed_grade, .. } = board;
     let seed = seed.to_string();
@@ -80,7 +80,7 @@ pub fn place_arguments(board: &Board, netlist: &str, seed: u32, placer: &str, na
     arguments.into_iter().map(str::to_owned).collect()
 }
 
-/// Arguments of the packer.
+/// Arguments of the tool that packs a configuration into a bitstream.
 pub fn pack_arguments(family: Family, configuration: &str, bitstream: &str) -> Vec<String> {
     let arguments = match family {
         Family::Ecp5 => vec!["--compress", configuration, bitstream],

@@ -1,27 +1,28 @@
-//! Where the lanes' multipliers go.
+//! Floor plan: assigns sites to the multipliers of the MAC lanes.
 //!
-//! A device has its multipliers in a few rows. Left to a placer, the logic of the lanes is drawn together and the multipliers
-//! are what is left in those rows: the 36 wires of a product cross half the device, those of all lanes meet in the middle, and
-//! routing takes hours or does not end. Here the lanes take sites one beside the other, and their logic comes to them.
+//! A device has its multipliers in a few rows. A placer pulls the lanes' logic together and takes whatever multipliers
+//! are left in those rows: the 36 wires of a product then cross half the device, those of all lanes meet in the middle,
+//! and routing takes hours or does not converge. With neighbouring sites for neighbouring lanes the placer puts the
+//! logic near them.
 //!
 //! ```text
-//! row 0   1 2 3 4 \   / 21 ...    a block of four sites in each row of each column; from the first lane of the first
-//! row 1   5 6 7 8 |   | 17 ...    parity to the last of the fourth down one column and up the next, in as many columns
-//! row 2   9 ...   \__/  13 ...    in the middle as it takes, or all but the middle one
+//! row 0   1 2 3 4 \   / 21 ...    blocks of four sites; the lanes, sorted by parity and number, go down one
+//! row 1   5 6 7 8 |   | 17 ...    column and up the next, over as many columns as are needed in the middle
+//! row 2   9 ...   \__/  13 ...    of the device; if all but one are needed, the middle one stays free
 //! ```
 
 use dermis_golden::board::MultiplierBlocks;
 use serde_json::{json, Value};
 
-use super::absorb::MULTIPLIER;
+use super::dsp_register_packing::MULTIPLIER;
 
-/// Sites of a block: how far each is from the block's column, which is its number in the block as well.
+/// Sites of a block: offset from the block's column, which is also the site's number in its name.
 const IN_BLOCK: [u32; MultiplierBlocks::SIZE] = [0, 1, 4, 5];
 
-/// Gives the lanes' multipliers in the module `top` of Yosys's JSON their sites; how many.
+/// Assigns sites to the lanes' multipliers in the module `top` of Yosys's JSON; returns their number.
 ///
-/// Other multipliers are left to the placer, and so are all of them where the lanes take more than there are.
-pub fn plan(netlist: &mut Value, top: &str, blocks: &MultiplierBlocks) -> usize {
+/// Other multipliers are left to the placer. If there are more lanes than sites, nothing is assigned.
+pub fn assign_sites(netlist: &mut Value, top: &str, blocks: &MultiplierBlocks) -> usize {
     let Some(cells) = netlist["modules"][top]["cells"].as_object_mut() else { return 0 };
     let mut lanes: Vec<((u32, u32), &mut Value)> = cells
         .iter_mut()
@@ -39,7 +40,7 @@ pub fn plan(netlist: &mut Value, top: &str, blocks: &MultiplierBlocks) -> usize 
     lanes.len()
 }
 
-/// Parity and number of the lane that a cell belongs to: what `Lanes` calls `parity[p].lane[k]`.
+/// Parity and number of the lane that a cell belongs to, from its name `….parity[p].lane[k]…`; `None` for other cells.
 fn lane(name: &str) -> Option<(u32, u32)> {
     let (_, name) = name.split_once(".parity[")?;
     let (parity, name) = name.split_once("].lane[")?;
@@ -47,13 +48,13 @@ fn lane(name: &str) -> Option<(u32, u32)> {
     Some((parity.parse().ok()?, lane.parse().ok()?))
 }
 
-/// Sites for `count` multipliers or some more, in the order of the lanes; fewer where there are not so many.
+/// At least `count` sites in the order of the lanes, fewer if the device has fewer.
 fn sites(blocks: &MultiplierBlocks, count: usize) -> Vec<String> {
     let MultiplierBlocks { columns, rows } = blocks;
     let needed = count.div_ceil(rows.len() * IN_BLOCK.len()).min(columns.len());
     let mut taken = columns.clone();
     match columns.len() - needed {
-        // The only one left is for all other multipliers: at the edge it would be far from what they multiply.
+        // The single free column serves all other multipliers: in the middle it is near the logic that uses them.
         1 => drop(taken.remove(columns.len() / 2)),
         left => taken = columns[left / 2..][..needed].to_vec(),
     }
@@ -103,9 +104,9 @@ mod tests {
         cells.insert("unit.x_MULT".into(), json!({"type": "MULT18X18D"}));
         cells.insert("a.lanes.parity[0].lane[1].q".into(), json!({"type": "TRELLIS_FF"}));
         let mut netlist = json!({"modules": {"t": {"cells": cells}}});
-        assert_eq!(plan(&mut netlist, "t", &blocks()), 3);
+        assert_eq!(assign_sites(&mut netlist, "t", &blocks()), 3);
         let site = |name: &str| netlist["modules"]["t"]["cells"][name]["attributes"]["BEL"].clone();
-        // By parity and number, not by the letters of the name.
+        // Sorted by parity and number, not as text.
         assert_eq!(
             [names[2], names[1], names[0]].map(site),
             [json!("X13/Y10/MULT18_0"), json!("X14/Y10/MULT18_1"), json!("X17/Y10/MULT18_4")]
@@ -118,6 +119,6 @@ mod tests {
         let cells: serde_json::Map<String, Value> =
             (0..25).map(|k| (format!("lanes.parity[0].lane[{k}].a"), json!({"type": "MULT18X18D"}))).collect();
         let mut netlist = json!({"modules": {"t": {"cells": cells}}});
-        assert_eq!(plan(&mut netlist, "t", &blocks()), 0);
+        assert_eq!(assign_sites(&mut netlist, "t", &blocks()), 0);
     }
 }

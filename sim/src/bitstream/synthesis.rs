@@ -1,4 +1,4 @@
-//! Synthesis: Verilog in a folder to the netlist that is placed, and that is replayed.
+//! Synthesis: Verilog in a folder to a netlist, for place and route and for the netlist co-simulation.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -8,30 +8,30 @@ use dermis_golden::board::Family;
 use dermis_golden::write::write;
 use serde_json::Value;
 
-use super::absorb::{absorb, Absorbed};
+use super::dsp_register_packing::{pack_registers, PackedRegisters};
 use super::family::{flow, YOSYS};
 use super::tools::ToolError;
 
-/// Name of the netlist in Yosys's JSON.
+/// File name of the netlist, in Yosys's JSON format.
 pub const NETLIST: &str = "netlist.json";
-/// Time after which Yosys is given up, min.
+/// Time limit of Yosys and of the bitstream packer, min.
 pub const MINUTES: u32 = 60;
 
-/// Makes [`NETLIST`] of what `read` names, arguments of Yosys's `read_verilog`, for module `top`.
+/// Synthesises the module `top` to [`NETLIST`] in `folder`; `read` are the arguments of Yosys's `read_verilog`.
 ///
 /// # Errors
 /// [`ToolError`]: no Yosys, a design that it refuses, files that cannot be used.
-pub fn synthesise(folder: &Path, family: Family, read: &str, top: &str) -> Result<Absorbed, ToolError> {
+pub fn synthesise(folder: &Path, family: Family, read: &str, top: &str) -> Result<PackedRegisters, ToolError> {
     let commands = flow(family).synthesis.replace("{top}", top).replace("{netlist}", NETLIST);
     run(folder, format!("read_verilog {read}; {commands}"), "synthesis.log")?;
     match family {
-        Family::Ecp5 => edit(folder, |netlist| absorb(netlist, top)),
-        // Yosys itself moves registers into SB_MAC16.
-        Family::Ice40 => Ok(Absorbed::default()),
+        Family::Ecp5 => edit(folder, |netlist| pack_registers(netlist, top)),
+        // Yosys already moves registers into SB_MAC16.
+        Family::Ice40 => Ok(PackedRegisters::default()),
     }
 }
 
-/// Runs a script of Yosys's; what it says goes to `log`.
+/// Runs a Yosys script in `folder`; its output goes to the file `log`.
 ///
 /// # Errors
 /// As [`super::tools::Tool::run`].
@@ -39,10 +39,10 @@ pub fn run(folder: &Path, script: String, log: &str) -> Result<(), ToolError> {
     YOSYS.run(folder, &["-q".to_owned(), "-p".to_owned(), script], log, MINUTES)
 }
 
-/// Cells of module `top` of the netlist in `folder`, by type.
+/// Number of cells of each type in module `top` of the netlist in `folder`.
 ///
 /// # Errors
-/// [`ToolError`]: a file that cannot be read, or is no netlist.
+/// [`ToolError`]: a file that cannot be read or parsed.
 pub fn cells(folder: &Path, top: &str) -> Result<BTreeMap<String, u64>, ToolError> {
     let netlist = read(&folder.join(NETLIST))?;
     let mut counts = BTreeMap::new();
@@ -57,10 +57,10 @@ fn read(path: &Path) -> Result<Value, ToolError> {
     serde_json::from_slice(&fs::read(path).map_err(ToolError::io(path))?).map_err(wrong)
 }
 
-/// Lets `edit` work on the netlist in `folder`.
+/// Applies `edit` to the netlist in `folder` and returns its result.
 ///
 /// # Errors
-/// [`ToolError`]: a file that cannot be read or written, or is no netlist.
+/// [`ToolError`]: a file that cannot be read, parsed or written.
 pub fn edit<T>(folder: &Path, edit: impl FnOnce(&mut Value) -> T) -> Result<T, ToolError> {
     let path = folder.join(NETLIST);
     let wrong = |error: serde_json::Error| ToolError::Output { path: path.clone(), reason: error.to_string() };

@@ -1,4 +1,4 @@
-//! The open tools of synthesis, place and route: found under either of their names, run with a log and a time limit.
+//! The open tools of synthesis, place and route: looked up under two names, run with a log file and a time limit.
 
 use std::fs::File;
 use std::io;
@@ -10,41 +10,41 @@ use std::time::{Duration, Instant};
 use dermis_golden::write::FileError;
 use thiserror::Error;
 
-/// Lines at the end of a failed tool's log that an error repeats.
+/// Lines at the end of a failed tool's log that the error message repeats.
 const LOG_LINES: usize = 12;
-/// How often a running tool is looked at.
+/// Interval at which a running tool is polled.
 const POLL: Duration = Duration::from_millis(100);
 
-/// Why a tool did not do its work.
+/// Why a tool could not be used.
 #[derive(Debug, Error)]
 pub enum ToolError {
-    /// None of its names can be started.
+    /// The tool is not found under any of its names.
     #[error("{tool} is not installed; `make tools` installs it")]
     Missing {
         /// The tool.
         tool: &'static str,
     },
-    /// It ran and failed.
-    #[error("{tool} failed, {log}:\n{end}")]
+    /// The tool exited with an error.
+    #[error("{tool} failed; {log} ends with:\n{end}")]
     Failed {
         /// The tool.
         tool: &'static str,
-        /// Its whole log.
+        /// File with its complete log.
         log: PathBuf,
-        /// The log's end.
+        /// Last lines of the log.
         end: String,
     },
-    /// It was stopped at its time limit.
-    #[error("{tool} took longer than {minutes} min, {log}")]
+    /// The tool was stopped at its time limit.
+    #[error("{tool} took longer than {minutes} min; log: {log}")]
     Late {
         /// The tool.
         tool: &'static str,
-        /// The limit.
+        /// The time limit.
         minutes: u32,
-        /// Its log so far.
+        /// File with its log so far.
         log: PathBuf,
     },
-    /// What it wrote cannot be used.
+    /// A file written by a tool, or the baselines file, cannot be used.
     #[error("{path}: {reason}")]
     Output {
         /// The file.
@@ -58,13 +58,13 @@ pub enum ToolError {
 }
 
 impl ToolError {
-    /// For a file that `source` kept from being read or written.
+    /// Turns an I/O error on `path` into [`ToolError::File`].
     pub fn io(path: &Path) -> impl FnOnce(io::Error) -> ToolError + '_ {
         |source| FileError::at(path)(source).into()
     }
 }
 
-/// Where programs are looked for.
+/// The folders of PATH.
 fn folders() -> Vec<PathBuf> {
     std::env::var_os("PATH").iter().flat_map(std::env::split_paths).collect()
 }
@@ -72,7 +72,7 @@ fn folders() -> Vec<PathBuf> {
 /// A tool of the flow.
 #[derive(Clone, Copy, Debug)]
 pub struct Tool {
-    /// Its own name; packages from the Python index put `yowasp-` before it.
+    /// Its name; packages from PyPI install it with the prefix `yowasp-`.
     pub name: &'static str,
 }
 
@@ -84,10 +84,10 @@ impl Tool {
         names.into_iter().find(there).ok_or(ToolError::Missing { tool: self.name })
     }
 
-    /// The folder of its own files, `<prefix>/share/<name>`.
+    /// The folder of its data files, `<prefix>/share/<name>`.
     ///
     /// # Errors
-    /// [`ToolError::Missing`]; [`ToolError::Output`] where an installation of another shape has none.
+    /// [`ToolError::Missing`]; [`ToolError::Output`] if the installation has no such folder.
     pub fn share(self) -> Result<PathBuf, ToolError> {
         let program = self.program()?;
         let of = |folder: &Path| Some(folder.parent()?.join("share").join(self.name));
@@ -97,7 +97,7 @@ impl Tool {
         shares.into_iter().find(|share| share.is_dir()).ok_or_else(|| ToolError::Output { path, reason: reason() })
     }
 
-    /// What it says of its version, one line.
+    /// The first line of `--version` that contains a digit.
     ///
     /// # Errors
     /// [`ToolError::Missing`].
@@ -109,7 +109,7 @@ impl Tool {
         Ok(text.lines().find(|line| line.contains(|c: char| c.is_ascii_digit())).unwrap_or_default().trim().to_owned())
     }
 
-    /// Runs it in `folder` with `arguments`; what it prints goes to `<log>` there. It is stopped after `minutes`.
+    /// Runs it in `folder` with `arguments`; its output goes to the file `log` there. It is stopped after `minutes`.
     ///
     /// # Errors
     /// As [`ToolError`] lists.

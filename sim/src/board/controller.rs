@@ -1,4 +1,4 @@
-//! The other end of a simulated board's SPI.
+//! SPI controller of a simulated board.
 
 use dermis_golden::link::slip::IDLE;
 use dermis_hdl::link::{BoardDevice, BoardOutputs};
@@ -8,17 +8,16 @@ const SCLK: u64 = 1;
 const CS_N: u64 = 2;
 const MOSI: u64 = 4;
 
-/// An SPI controller, mode 0, with exact half periods of its clock against the board's, neither of which waits for the
-/// other.
+/// An SPI controller, mode 0, whose clock runs independently of the board's.
 ///
-/// Time is counted in parts of which both half periods have a whole number: the board's clock changes every `sclk_hz` of
-/// them and the controller's every `clock_hz`.
+/// Time is counted in units of 1/(2·`clock_hz`·`sclk_hz`) s, so that both half periods are integers: `sclk_hz` units
+/// for the board's clock, `clock_hz` units for the SPI clock.
 pub struct SpiController {
     device: Box<dyn BoardDevice>,
     clock_hz: u64,
     sclk_hz: u64,
     now: u64,
-    /// When the board's clock changes next.
+    /// Time of the next edge of the board's clock.
     edge: u64,
     clock: bool,
     inputs: u64,
@@ -26,62 +25,62 @@ pub struct SpiController {
 }
 
 impl SpiController {
-    /// The controller of a board with a clock of `clock_hz`, at `sclk_hz`; its clock begins so many cycles of the board's
-    /// after that, 0 … 1.
+    /// The controller of a board with a clock of `clock_hz`, with an SPI clock of `sclk_hz` that starts `phase` (0 … 1)
+    /// board cycles later.
     pub fn new(device: Box<dyn BoardDevice>, clock_hz: u32, sclk_hz: u32, phase: f64) -> Self {
         let (clock_hz, sclk_hz) = (u64::from(clock_hz), u64::from(sclk_hz));
         let pins = BoardOutputs::default();
         let mut controller =
             SpiController { device, clock_hz, sclk_hz, now: 0, edge: sclk_hz, clock: false, inputs: CS_N, pins };
-        controller.put(CS_N, true);
-        controller.pass((phase * 2.0 * sclk_hz as f64) as u64);
+        controller.set_pin(CS_N, true);
+        controller.advance((phase * 2.0 * sclk_hz as f64) as u64);
         controller
     }
 
-    /// Lets so many cycles of the board's clock pass between transactions.
+    /// Waits for `cycles` of the board's clock between transactions.
     pub fn wait(&mut self, cycles: u64) {
-        self.pass(2 * cycles * self.sclk_hz);
+        self.advance(2 * cycles * self.sclk_hz);
     }
 
-    /// One transaction; the bytes that come back.
+    /// Transfers `bytes` in one transaction; returns the bytes received.
     pub fn transfer(&mut self, bytes: &[u8]) -> Vec<u8> {
-        self.cut(bytes, 16 * bytes.len())
+        self.transfer_edges(bytes, 16 * bytes.len())
     }
 
-    /// One transaction that ends after so many edges of its clock, 16 to a byte; the whole bytes that come back. Beyond
-    /// `bytes` the controller sends IDLE.
-    pub fn cut(&mut self, bytes: &[u8], edges: usize) -> Vec<u8> {
+    /// A transaction that ends after `edges` edges of its clock, 16 per byte; returns the complete bytes received.
+    /// After `bytes` the controller sends IDLE.
+    pub fn transfer_edges(&mut self, bytes: &[u8], edges: usize) -> Vec<u8> {
         let mut received = Vec::new();
         let mut bits = 0u32;
-        self.put(CS_N, false);
+        self.set_pin(CS_N, false);
         for bit in 0..edges.div_ceil(2) {
             let byte = bytes.get(bit / 8).copied().unwrap_or(IDLE);
-            self.put(MOSI, byte >> (7 - bit % 8) & 1 == 1);
-            self.half();
+            self.set_pin(MOSI, byte >> (7 - bit % 8) & 1 == 1);
+            self.half_period();
             bits = bits << 1 | u32::from(self.pins.to_host);
-            self.put(SCLK, true);
+            self.set_pin(SCLK, true);
             if bit % 8 == 7 {
                 received.push(bits as u8);
             }
             if 2 * bit + 1 < edges {
-                self.half();
-                self.put(SCLK, false);
+                self.half_period();
+                self.set_pin(SCLK, false);
             }
         }
-        self.half();
-        self.put(CS_N, true);
-        // Where the transaction ends while the clock is high, that falls when nobody listens.
-        self.put(SCLK, false);
-        self.half();
+        self.half_period();
+        self.set_pin(CS_N, true);
+        // If the transaction has ended with the clock high, the clock falls while CS is inactive.
+        self.set_pin(SCLK, false);
+        self.half_period();
         received
     }
 
-    fn half(&mut self) {
-        self.pass(self.clock_hz);
+    fn half_period(&mut self) {
+        self.advance(self.clock_hz);
     }
 
-    /// Lets time pass.
-    fn pass(&mut self, time: u64) {
+    /// Advances the simulation by `time` units.
+    fn advance(&mut self, time: u64) {
         let until = self.now + time;
         while self.edge <= until {
             self.clock = !self.clock;
@@ -91,7 +90,7 @@ impl SpiController {
         self.now = until;
     }
 
-    fn put(&mut self, pin: u64, level: bool) {
+    fn set_pin(&mut self, pin: u64, level: bool) {
         self.inputs = if level { self.inputs | pin } else { self.inputs & !pin };
         self.pins = self.device.settle(self.inputs, self.clock);
     }

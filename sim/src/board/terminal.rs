@@ -1,4 +1,4 @@
-//! A simulated board on a pseudo-terminal, where a host finds it like one on a serial port.
+//! A simulated board on a pseudo-terminal, which a host opens like a serial port.
 
 use std::fs::File;
 use std::io::{self, ErrorKind, Read, Write};
@@ -12,33 +12,34 @@ use rustix::fs::{fcntl_setfl, OFlags};
 use rustix::pty::{grantpt, openpt, ptsname, unlockpt, OpenptFlags};
 use rustix::termios::{tcgetattr, tcsetattr, OptionalActions};
 
-use super::{Sent, UartLine, Wire};
+use super::{HostUart, NoisyChannel, UartSymbol};
 
-/// Clock cycles between looks at the pseudo-terminal.
+/// Clock cycles simulated between two polls of the pseudo-terminal.
 const SLICE: u64 = 200;
-/// Quiet cycles after which the board waits for bytes in place of being clocked; longer than any frame is computed.
+/// Cycles without activity on the line after which the simulation waits for bytes; longer than any frame's computation.
 const QUIET: u64 = 100_000;
-/// Longest wait, so that a request to stop is seen, ns.
+/// Longest wait for bytes in ns, so that a request to stop is noticed.
 const WAIT_NS: i64 = 20_000_000;
 
 /// A running board; stops when dropped.
-pub struct Terminal {
+pub struct PseudoTerminal {
     path: PathBuf,
     stop: Arc<AtomicBool>,
-    thread: Option<JoinHandle<io::Result<UartLine>>>,
+    thread: Option<JoinHandle<io::Result<HostUart>>>,
 }
 
-impl Terminal {
-    /// Runs the board behind `line` in a thread of its own, its bytes going through these wires.
+impl PseudoTerminal {
+    /// Runs the board behind `uart` in its own thread; bytes pass through the given channels.
     ///
     /// # Errors
     /// No pseudo-terminal.
-    pub fn start(line: UartLine, to_board: Wire, to_host: Wire) -> io::Result<Self> {
+    pub fn start(uart: HostUart, to_board: NoisyChannel, to_host: NoisyChannel) -> io::Result<Self> {
         let master = openpt(OpenptFlags::RDWR | OpenptFlags::NOCTTY)?;
         grantpt(&master)?;
         unlockpt(&master)?;
         let path = PathBuf::from(ptsname(&master, Vec::new())?.to_string_lossy().into_owned());
-        // A side that stays open here keeps the terminal alive between two hosts, and raw from the start.
+        // The slave side stays open here: it keeps the terminal usable between two hosts and in raw mode from the
+        // start.
         let slave = File::options().read(true).write(true).open(&path)?;
         let mut settings = tcgetattr(&slave)?;
         settings.make_raw();
@@ -48,12 +49,12 @@ impl Terminal {
         let seen = Arc::clone(&stop);
         let thread = std::thread::spawn(move || {
             let _slave = slave;
-            run(line, File::from(master), to_board, to_host, &seen)
+            run(uart, File::from(master), to_board, to_host, &seen)
         });
-        Ok(Terminal { path, stop, thread: Some(thread) })
+        Ok(PseudoTerminal { path, stop, thread: Some(thread) })
     }
 
-    /// The port for the host.
+    /// Path of the port for the host.
     pub fn path(&self) -> &Path {
         &self.path
     }
@@ -70,45 +71,47 @@ impl Terminal {
     }
 }
 
-impl Drop for Terminal {
+impl Drop for PseudoTerminal {
     fn drop(&mut self) {
         self.stop.store(true, Ordering::Relaxed);
         if let Some(thread) = self.thread.take() {
-            // What the thread ends with concerns nobody any more.
+            // Nobody is left to report an error to.
             let _ = thread.join();
         }
     }
 }
 
 fn run(
-    mut line: UartLine,
+    mut uart: HostUart,
     mut master: File,
-    mut to_board: Wire,
-    mut to_host: Wire,
+    mut to_board: NoisyChannel,
+    mut to_host: NoisyChannel,
     stop: &AtomicBool,
-) -> io::Result<UartLine> {
+) -> io::Result<HostUart> {
     let mut buffer = [0; 4096];
     while !stop.load(Ordering::Relaxed) {
         match master.read(&mut buffer) {
-            Ok(count) => buffer[..count].iter().flat_map(|&byte| to_board.carry(byte)).for_each(|what| line.send(what)),
+            Ok(count) => {
+                buffer[..count].iter().flat_map(|&byte| to_board.transmit(byte)).for_each(|what| uart.send(what))
+            }
             Err(error) if error.kind() == ErrorKind::WouldBlock => (),
             Err(error) => return Err(error),
         }
-        if line.quiet() > QUIET {
+        if uart.idle_cycles() > QUIET {
             let wait = Timespec { tv_sec: 0, tv_nsec: WAIT_NS };
             poll(&mut [PollFd::new(&master, PollFlags::IN)], Some(&wait))?;
             continue;
         }
-        (0..SLICE).for_each(|_| line.cycle());
-        let bytes = line.received().into_iter().flat_map(|byte| to_host.carry(byte));
+        (0..SLICE).for_each(|_| uart.cycle());
+        let bytes = uart.received().into_iter().flat_map(|byte| to_host.transmit(byte));
         let bytes: Vec<u8> =
-            bytes.filter_map(|what| if let Sent::Byte(byte) = what { Some(byte) } else { None }).collect();
+            bytes.filter_map(|what| if let UartSymbol::Byte(byte) = what { Some(byte) } else { None }).collect();
         write(&mut master, &bytes, stop)?;
     }
-    Ok(line)
+    Ok(uart)
 }
 
-/// Writes everything; a host that does not read makes the board wait, as no real one would, but loses nothing.
+/// Writes all bytes. A host that does not read blocks the simulated board, unlike a real one, and no byte is lost.
 fn write(master: &mut File, mut bytes: &[u8], stop: &AtomicBool) -> io::Result<()> {
     while !bytes.is_empty() && !stop.load(Ordering::Relaxed) {
         match master.write(bytes) {

@@ -1,4 +1,4 @@
-//! Differences: what each names, how they are counted and printed.
+//! Mismatches between a device and the bit-true model: contents, counting, text.
 
 use std::collections::BTreeSet;
 use std::fmt;
@@ -8,7 +8,7 @@ use serde::Serialize;
 /// Mismatches kept per frame; the rest are counted.
 pub const KEPT_PER_FRAME: usize = 16;
 
-/// One difference.
+/// One mismatch.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct Mismatch {
     /// Device and stimulus, for example `verilator, full speed`.
@@ -19,15 +19,15 @@ pub struct Mismatch {
     pub stage: String,
     /// Index of the word in the stage's stream of this frame.
     pub index: usize,
-    /// Row and column of the taxel, where a word is one: in `receive` and `forces`.
+    /// Row and column of the taxel, for the words of `receive` and `forces`.
     pub taxel: Option<[usize; 2]>,
-    /// Cycle of the differing word, none for a missing word.
+    /// Cycle of the device's word; none for a missing word.
     pub cycle: Option<u64>,
-    /// The model's word, none where nothing was due.
+    /// The model's word; none where no word was expected.
     pub expected: Option<Vec<i64>>,
-    /// The device's word, none where nothing came.
+    /// The device's word; none where it is missing.
     pub got: Option<Vec<i64>>,
-    /// The broken rule in words, for handshake, watchdog and key sets.
+    /// The violated rule as text, for handshake, watchdog, cycles and stage names.
     pub rule: Option<String>,
 }
 
@@ -48,19 +48,19 @@ impl fmt::Display for Mismatch {
     }
 }
 
-/// What a comparison found.
+/// Result of a comparison.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Findings {
-    /// The first [`KEPT_PER_FRAME`] of every frame.
+    /// The first [`KEPT_PER_FRAME`] mismatches of every frame.
     pub kept: Vec<Mismatch>,
-    /// All of them.
+    /// Number of all mismatches.
     pub count: usize,
-    /// Index of every frame with a difference; names may repeat.
+    /// Indices of the frames with a mismatch; frame names need not be unique.
     pub unequal: BTreeSet<usize>,
 }
 
 impl Findings {
-    /// Whether nothing differed.
+    /// Whether there is no mismatch.
     pub fn is_equal(&self) -> bool {
         self.count == 0
     }

@@ -1,24 +1,24 @@
-//! The output side of the bench: collects beats and taps and watches the rules of the stream.
+//! Output side of the test bench: records beats and taps and checks the protocol.
 
 use dermis_hdl::device::{Inputs, Outputs};
 
-use super::held::{Held, RULE};
-use super::recording::{Beat, Breach, Play, Recording, TapWord, Times};
+use super::axis_stability::{StabilityCheck, STABILITY_RULE};
+use super::recording::{Beat, InputFrame, ProtocolViolation, Recording, TapWord, Times};
 use super::sender::Sender;
 
-/// Collects beats and taps and watches the output's rules.
+/// Records beats and taps and checks the output's protocol.
 pub(super) struct Receiver {
-    /// So far.
+    /// The recording so far.
     pub(super) recording: Recording,
-    /// Beats up to and including each frame.
+    /// Cumulative number of beats at the end of each frame.
     ends: Vec<usize>,
-    /// Frames whose beats are all out.
+    /// Number of frames received completely.
     pub(super) frame: usize,
-    held: Held,
+    stability: StabilityCheck,
 }
 
 impl Receiver {
-    pub(super) fn new(taps: usize, frames: &[Play]) -> Self {
+    pub(super) fn new(taps: usize, frames: &[InputFrame]) -> Self {
         let ends = frames.iter().scan(0, |sum, f| {
             *sum += f.beats;
             Some(*sum)
@@ -28,38 +28,41 @@ impl Receiver {
             times: vec![Times::default(); frames.len()],
             ..Recording::default()
         };
-        Receiver { recording, ends: ends.collect(), frame: 0, held: Held::default() }
+        Receiver { recording, ends: ends.collect(), frame: 0, stability: StabilityCheck::default() }
     }
 
-    fn breach(&mut self, cycle: u64, rule: String) {
+    fn add_violation(&mut self, cycle: u64, rule: String) {
         let beat = self.recording.beats.len();
-        self.recording.breaches.push(Breach { cycle, beat, rule });
+        self.recording.violations.push(ProtocolViolation { cycle, beat, rule });
     }
 
-    /// Whether a beat was transferred.
+    /// Observes one cycle; whether a beat was transferred.
     pub(super) fn observe(&mut self, cycle: u64, inputs: &Inputs, outputs: Outputs) -> bool {
-        let (given, kept) = self.held.observe(&outputs, inputs.m_ready);
-        if !kept {
-            self.breach(cycle, RULE.into());
+        let (transferred, stable) = self.stability.observe(&outputs, inputs.m_ready);
+        if !stable {
+            self.add_violation(cycle, STABILITY_RULE.into());
         }
         for (stream, word) in self.recording.taps.iter_mut().zip(outputs.taps) {
             if let Some(fields) = word {
                 stream.push(TapWord { cycle, fields });
             }
         }
-        let Some((data, last)) = given else {
+        let Some((data, last)) = transferred else {
             return false;
         };
         match self.recording.times.get(self.frame).map(|t| t.last_in) {
-            None => self.breach(cycle, "no beat may follow the last frame's".into()),
-            Some(None) => self.breach(cycle, "no beat may come before the frame's last input".into()),
+            None => self.add_violation(cycle, "no beat may follow the last frame".into()),
+            Some(None) => self.add_violation(cycle, "no beat may precede the frame's last input beat".into()),
             Some(Some(_)) => {
                 let end = self.ends[self.frame];
                 let final_beat = self.recording.beats.len() + 1 == end;
                 if last != final_beat {
-                    let rule =
-                        if last { "tlast only on the last status beat" } else { "tlast on the last status beat" };
-                    self.breach(cycle, rule.into());
+                    let rule = if last {
+                        "tlast is only allowed on the last status beat"
+                    } else {
+                        "tlast is missing on the last status beat"
+                    };
+                    self.add_violation(cycle, rule.into());
                 }
                 if final_beat {
                     self.recording.times[self.frame].last_out = Some(cycle);
@@ -71,16 +74,16 @@ impl Receiver {
         true
     }
 
-    pub(super) fn give_up(&mut self, cycle: u64, watchdog: u64, sender: &Sender) {
+    pub(super) fn time_out(&mut self, cycle: u64, watchdog: u64, sender: &Sender) {
         let awaited = match sender.frames.get(sender.frame) {
-            // The output is behind: what is missing is a beat, whatever the input does.
+            // The output is behind the input: a beat is missing.
             Some(_) if self.frame < sender.frame => self.awaited_beat(),
             Some(play) => format!("s_axis_tready for taxel {} of {}", sender.taxel, play.codes.len()),
             None => self.awaited_beat(),
         };
-        let rule = format!("nothing moved for {watchdog} cycles while waiting for {awaited}");
+        let rule = format!("no transfer for {watchdog} cycles while waiting for {awaited}");
         let beat = self.recording.beats.len();
-        self.recording.timeout = Some(Breach { cycle, beat, rule });
+        self.recording.timeout = Some(ProtocolViolation { cycle, beat, rule });
     }
 
     fn awaited_beat(&self) -> String {

@@ -1,20 +1,20 @@
-//! What goes into a run and what it leaves behind.
+//! Input and recording of a run.
 
-/// One frame to play: its codes and how many beats it must give.
+/// Input of one reconstruction, with the number of output beats expected.
 #[derive(Clone, Copy, Debug)]
-pub struct Play<'a> {
-    /// One code per taxel, row-major, of one frame after the other.
+pub struct InputFrame<'a> {
+    /// Codes of all frames in order, each row-major.
     pub codes: &'a [i32],
-    /// Taxels of a frame, which ends with `tlast`.
+    /// Taxels per frame; `tlast` marks the last one.
     pub taxels: usize,
-    /// Output beats of the frame, status included.
+    /// Expected output beats, status included.
     pub beats: usize,
 }
 
 /// An output beat.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Beat {
-    /// When it was transferred.
+    /// Cycle of the transfer.
     pub cycle: u64,
     /// `[fx, fy, fz]`.
     pub data: [i32; 3],
@@ -22,34 +22,34 @@ pub struct Beat {
     pub last: bool,
 }
 
-/// A word that a tap showed.
+/// A word observed at a tap.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct TapWord {
-    /// When it passed.
+    /// Cycle in which it was valid.
     pub cycle: u64,
-    /// Its fields.
+    /// The word's fields.
     pub fields: Vec<i64>,
 }
 
-/// A broken promise of the output stream.
+/// A violation of the output stream's protocol.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Breach {
-    /// When it was seen.
+pub struct ProtocolViolation {
+    /// Cycle in which it was observed.
     pub cycle: u64,
-    /// Index of the output beat concerned, counted over all frames.
+    /// Index of the affected output beat, counted over all frames.
     pub beat: usize,
-    /// The rule, as a sentence.
+    /// The violated rule as text.
     pub rule: String,
 }
 
 /// Cycles of one frame's first and last beats.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Times {
-    /// First accepted code.
+    /// Cycle of the first accepted code.
     pub first_in: Option<u64>,
-    /// Last accepted code.
+    /// Cycle of the last accepted code.
     pub last_in: Option<u64>,
-    /// Last expected output beat.
+    /// Cycle of the last expected output beat.
     pub last_out: Option<u64>,
 }
 
@@ -59,23 +59,23 @@ impl Times {
         self.last_out?.checked_sub(self.last_in?)
     }
 
-    /// Cycles from the first accepted input beat to the last output beat, both counted.
+    /// Cycles from the first accepted input beat to the last output beat, both included.
     pub fn total(&self) -> Option<u64> {
         Some(self.last_out?.checked_sub(self.first_in?)? + 1)
     }
 }
 
-/// All that a run showed.
+/// Everything observed during a run.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Recording {
     /// Output beats of all frames in order.
     pub beats: Vec<Beat>,
-    /// Per tap, its words in order.
+    /// Words of each tap, in order.
     pub taps: Vec<Vec<TapWord>>,
-    /// Per frame.
+    /// Times of each frame.
     pub times: Vec<Times>,
-    /// Broken rules of the output stream.
-    pub breaches: Vec<Breach>,
-    /// Set when the run was given up.
-    pub timeout: Option<Breach>,
+    /// Violations of the output stream's protocol.
+    pub violations: Vec<ProtocolViolation>,
+    /// Set when the watchdog ended the run.
+    pub timeout: Option<ProtocolViolation>,
 }

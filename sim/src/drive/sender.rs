@@ -1,29 +1,29 @@
-//! The input side of the bench: offers codes, and decides in which cycles each side is willing.
+//! Input side of the test bench: offers codes, and generates the stalls of both sides.
 
 use dermis_hdl::device::Inputs;
 
-use super::recording::{Play, Times};
+use super::recording::{InputFrame, Times};
 use super::Stimulus;
 
-/// One of so many cycles starts a long pause of the receiver, which fills every buffer behind it.
+/// The receiver starts a long pause, which fills every buffer, once in so many cycles on average.
 const LONG_PAUSE_EVERY: u32 = 64;
-/// Length of a long pause.
+/// Length of a long pause in cycles.
 const LONG_PAUSE_CYCLES: u32 = 40;
 
-/// Offers the codes.
+/// Offers codes to the device.
 pub(super) struct Sender<'a> {
     /// All frames to send.
-    pub(super) frames: &'a [Play<'a>],
-    /// The frame being sent; their number when all are.
+    pub(super) frames: &'a [InputFrame<'a>],
+    /// Index of the frame being sent; the number of frames once all are sent.
     pub(super) frame: usize,
-    /// Its next taxel.
+    /// Index of its next code.
     pub(super) taxel: usize,
-    /// A beat is offered and not taken yet.
+    /// Whether a code is offered and not accepted yet.
     offering: bool,
 }
 
 impl<'a> Sender<'a> {
-    pub(super) fn new(frames: &'a [Play<'a>]) -> Self {
+    pub(super) fn new(frames: &'a [InputFrame<'a>]) -> Self {
         Sender { frames, frame: 0, taxel: 0, offering: false }
     }
 
@@ -39,7 +39,7 @@ impl<'a> Sender<'a> {
         }
     }
 
-    pub(super) fn taken(&mut self, cycle: u64, times: &mut [Times]) {
+    pub(super) fn accepted(&mut self, cycle: u64, times: &mut [Times]) {
         let times = &mut times[self.frame];
         times.first_in.get_or_insert(cycle);
         self.offering = false;
@@ -52,26 +52,26 @@ impl<'a> Sender<'a> {
     }
 }
 
-/// When the two sides of the bench are willing.
-pub(super) struct Gaps {
+/// Decides in which cycles the sender starts to offer a code and the receiver is ready.
+pub(super) struct StallGenerator {
     random: Option<fastrand::Rng>,
     pause: u32,
 }
 
-impl Gaps {
+impl StallGenerator {
     pub(super) fn new(stimulus: Stimulus) -> Self {
         let random = match stimulus {
             Stimulus::FullSpeed => None,
             Stimulus::Stalls { seed } => Some(fastrand::Rng::with_seed(seed)),
         };
-        Gaps { random, pause: 0 }
+        StallGenerator { random, pause: 0 }
     }
 
-    pub(super) fn send(&mut self) -> bool {
+    pub(super) fn sends(&mut self) -> bool {
         self.random.as_mut().is_none_or(|r| r.bool())
     }
 
-    pub(super) fn receive(&mut self) -> bool {
+    pub(super) fn receives(&mut self) -> bool {
         let Some(random) = &mut self.random else {
             return true;
         };

@@ -1,4 +1,4 @@
-//! What a board answers to a frame, in integers and in physical units.
+//! A board's answer to a frame, in LSBs and in physical units.
 
 use std::collections::BTreeSet;
 use std::time::SystemTime;
@@ -16,18 +16,18 @@ use serde::Serialize;
 pub struct Answer {
     /// Sums over all taxels.
     pub sums: Sums,
-    /// All forces `[fx, fy, fz]`, row-major, where they were asked for.
+    /// Forces `[fx, fy, fz]` of all taxels, row-major, if requested.
     pub beats: Option<Vec<[i32; 3]>>,
     /// Status beats.
     pub status: Vec<[i32; 3]>,
-    /// Where it was compared with the bit-true model: the first difference, if there is one.
+    /// Comparison with the bit-true model: `None` if not requested, else the first difference or `Some(None)`.
     pub difference: Option<Option<String>>,
-    /// When it came.
-    pub came: SystemTime,
+    /// Time at which the answer was complete.
+    pub received_at: SystemTime,
 }
 
 impl Answer {
-    /// Reads the payload of forces or resultants; `None` when its length is wrong.
+    /// Parses the payload of a forces or resultants packet; `None` if its length is wrong.
     pub fn of_bytes(model: &Model, bytes: &[u8], forces: bool) -> Option<Answer> {
         let (front, status) = bytes.split_at_checked(bytes.len().checked_sub(model.status_beats() * BEAT_BYTES)?)?;
         let status = beats_of_bytes(status)?;
@@ -38,22 +38,22 @@ impl Answer {
             Some(beats) => Sums::of(beats, sensor.cols),
             None => Sums::of_bytes(front)?,
         };
-        Some(Answer { sums, beats, status, difference: None, came: SystemTime::now() })
+        Some(Answer { sums, beats, status, difference: None, received_at: SystemTime::now() })
     }
 
-    /// The first difference from what the bit-true model makes of `codes`. Whether a packet was dropped before the
-    /// frame is no business of the model's.
-    pub fn against(&self, model: &Model, codes: &[i32]) -> Option<String> {
+    /// The first difference from the bit-true model's result for `codes`, `None` if equal. The framing flag is ignored:
+    /// it depends on packets dropped earlier, which the model does not see.
+    pub fn compare_with_model(&self, model: &Model, codes: &[i32]) -> Option<String> {
         let trace = model.run(codes);
         let cols = model.scene.sensor.cols;
         let pairs = self.beats.iter().flatten().zip(&trace.beats).enumerate();
-        let mut differing = pairs.filter(|(_, (has, wants))| has != wants);
-        if let Some((index, (has, wants))) = differing.next() {
-            return Some(format!("row {}, column {}: force {has:?}, model {wants:?}", index / cols, index % cols));
+        let mut differing = pairs.filter(|(_, (got, expected))| got != expected);
+        if let Some((index, (got, expected))) = differing.next() {
+            return Some(format!("row {}, column {}: force {got:?}, model {expected:?}", index / cols, index % cols));
         }
-        let wants = Sums::of(&trace.beats, cols);
-        if self.sums != wants {
-            return Some(format!("sums {:?}, model {wants:?}", self.sums));
+        let expected = Sums::of(&trace.beats, cols);
+        if self.sums != expected {
+            return Some(format!("sums {:?}, model {expected:?}", self.sums));
         }
         let mut status = self.status.clone();
         status.iter_mut().step_by(STATUS_BEATS).for_each(|beat| beat[2] &= !(FLAG_FRAMING as i32));
@@ -64,12 +64,12 @@ impl Answer {
         self.status.chunks(STATUS_BEATS).filter_map(Status::of_beats)
     }
 
-    /// Whether the board dropped a packet of a frame since the last answer.
+    /// Whether the board has dropped a frame's packet since its last answer.
     pub fn dropped_before(&self) -> bool {
         self.statuses().any(|status| status.flags & FLAG_FRAMING != 0)
     }
 
-    /// The remarks on the result, as a reconstruction has them.
+    /// The result's flags, as in a reconstruction.
     fn flags(&self, model: &Model, frame: &Frame) -> Result<Vec<Flag>> {
         let mut flags: BTreeSet<Flag> = frame_flags(&model.scene, frame, &model.codes(frame)?).into_iter().collect();
         for status in self.statuses() {
@@ -87,34 +87,33 @@ impl Answer {
     }
 }
 
-/// An answer in physical units, a line of `--stream`.
+/// An answer in physical units; an output line of `--stream`.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Line {
-    /// The sum of the forces, [x, y, normal].
+pub struct PhysicalAnswer {
+    /// Sum of the forces, [x, y, normal].
     pub resultant_N: [f64; 3],
-    /// Centre of the normal forces from the array's centre, tension counted negative; none where they add up to
-    /// nothing.
+    /// Centre of the normal forces relative to the array's centre, tension counted negative; none if their sum is zero.
     pub centre_mm: Option<[f64; 2]>,
-    /// Taxels with a normal force.
+    /// Number of taxels with a normal force.
     pub loaded: u64,
-    /// Remarks, sorted.
+    /// Flags, sorted.
     pub flags: Vec<Flag>,
-    /// The board has dropped a frame's packet since its last answer.
+    /// Whether the board has dropped a frame's packet since its last answer.
     pub dropped_before: bool,
-    /// One force vector per taxel, where they were asked for.
+    /// Force per taxel, if requested.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub forces_N: Option<Forces>,
-    /// Whether the answer is the bit-true model's, where that was asked for.
+    /// Whether the answer equals the bit-true model's, if compared.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub equal: Option<bool>,
 }
 
-impl Line {
+impl PhysicalAnswer {
     /// The answer to `frame` in physical units.
     ///
     /// # Errors
     /// A frame of another sensor.
-    pub fn new(model: &Model, frame: &Frame, answer: &Answer) -> Result<Line> {
+    pub fn new(model: &Model, frame: &Frame, answer: &Answer) -> Result<PhysicalAnswer> {
         let lsb_N = model.force_lsb_N(model.codes(frame)?.full_scale_MPa);
         let sensor = &model.scene.sensor;
         let sums = &answer.sums;
@@ -123,7 +122,7 @@ impl Line {
         let centre_mm = centre.map(|[col, row]| [x0 + col * sensor.pitch_x_mm, y0 + row * sensor.pitch_y_mm]);
         let axis = |beats: &[[i32; 3]], axis: usize| beats.iter().map(|beat| f64::from(beat[axis]) * lsb_N).collect();
         let forces = |beats: &Vec<[i32; 3]>| Forces { fx: axis(beats, 0), fy: axis(beats, 1), fz: axis(beats, 2) };
-        Ok(Line {
+        Ok(PhysicalAnswer {
             resultant_N: [sums.fx, sums.fy, sums.fz].map(|sum| sum as f64 * lsb_N),
             centre_mm,
             loaded: sums.loaded,

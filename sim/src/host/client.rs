@@ -1,4 +1,4 @@
-//! Requests and answers over a port, whatever gets lost on the way.
+//! Requests and answers over a port, with repetition after lost or damaged packets.
 
 use std::io::{ErrorKind, Read, Write};
 use std::time::{Duration, Instant};
@@ -8,49 +8,49 @@ use dermis_golden::link::{codes_to_bytes, Counters, Decoder, Identity, Kind, Pac
 
 use super::{Answer, HostError};
 
-/// How often a request is sent before it is given up.
+/// Number of times a request is sent before it fails.
 const ATTEMPTS: u32 = 8;
 
-/// What went wrong on the way and was mended.
+/// Transmission errors that were corrected by repetition.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Lost {
-    /// Requests sent again.
+pub struct LinkErrors {
+    /// Number of requests sent again.
     pub repeated: u64,
-    /// Answers, or pieces of them, that did not pass their check.
+    /// Number of answers, or fragments of them, that failed their check.
     pub damaged: u64,
 }
 
-/// A board behind a port, whose reads return after a few milliseconds without a byte.
+/// A board behind a port. Reads of the port must time out after a few milliseconds.
 pub struct Client<P> {
     port: P,
     name: String,
     timeout: Duration,
     decoder: Decoder,
     sequence: u8,
-    /// What went wrong so far.
-    pub lost: Lost,
+    /// Transmission errors so far.
+    pub link_errors: LinkErrors,
 }
 
 impl<P: Read + Write> Client<P> {
-    /// A board behind `port`, called `name` in messages; after `timeout` of silence a request is sent again.
+    /// A board behind `port`, named `name` in messages; requests are repeated after `timeout` without an answer.
     pub fn new(port: P, name: &str, timeout: Duration) -> Self {
-        let (decoder, lost) = (Decoder::default(), Lost::default());
-        Client { port, name: name.to_owned(), timeout, decoder, sequence: 0, lost }
+        let (decoder, link_errors) = (Decoder::default(), LinkErrors::default());
+        Client { port, name: name.to_owned(), timeout, decoder, sequence: 0, link_errors }
     }
 
-    /// Asks the board who it is, and whether it is made for `model`.
+    /// Reads the board's identification and checks that it was built for `model`.
     ///
     /// # Errors
     /// No answer, another version, another scene.
     pub fn identify(&mut self, model: &Model) -> Result<Identity, HostError> {
-        let bytes = self.ask(Kind::Identify, Vec::new())?;
+        let bytes = self.request(Kind::Identify, Vec::new())?;
         let port = || self.name.clone();
-        // The version comes first in every version.
+        // All versions of the packets start with the version.
         let has = bytes.first_chunk().map(|version| u16::from_le_bytes(*version));
         if let Some(has) = has.filter(|&has| has != VERSION) {
             return Err(HostError::Version { port: port(), has, wants: VERSION });
         }
-        let wrong = HostError::Answer { port: port(), what: "an identity", bytes: bytes.len() };
+        let wrong = HostError::Answer { port: port(), what: "identity", bytes: bytes.len() };
         let has = Identity::of_bytes(&bytes).ok_or(wrong)?;
         let sensor = &model.scene.sensor;
         let wants = dermis_golden::link::scene_hash(model);
@@ -68,37 +68,37 @@ impl<P: Read + Write> Client<P> {
         })
     }
 
-    /// Reads the counters of packets.
+    /// Reads the board's packet counters.
     ///
     /// # Errors
     /// No answer.
     pub fn counters(&mut self) -> Result<Counters, HostError> {
-        let bytes = self.ask(Kind::ReadCounters, Vec::new())?;
+        let bytes = self.request(Kind::ReadCounters, Vec::new())?;
         let wrong = HostError::Answer { port: self.name.clone(), what: "counters", bytes: bytes.len() };
         Counters::of_bytes(&bytes).ok_or(wrong)
     }
 
-    /// Sends a frame and waits for its forces, or its resultants.
+    /// Sends a frame and waits for its forces or resultants.
     ///
     /// # Errors
     /// No answer.
     pub fn frame(&mut self, model: &Model, codes: &[i32], forces: bool) -> Result<Answer, HostError> {
         let kind = if forces { Kind::FrameForForces } else { Kind::FrameForResultants };
-        let bytes = self.ask(kind, codes_to_bytes(codes, model.formats.code_bits))?;
+        let bytes = self.request(kind, codes_to_bytes(codes, model.formats.code_bits))?;
         let wrong = HostError::Answer { port: self.name.clone(), what: kind.answer().name(), bytes: bytes.len() };
         Answer::of_bytes(model, &bytes, forces).ok_or(wrong)
     }
 
-    /// Sends a request until it is answered.
-    fn ask(&mut self, kind: Kind, payload: Vec<u8>) -> Result<Vec<u8>, HostError> {
+    /// Sends a request, repeatedly if necessary, until it is answered.
+    fn request(&mut self, kind: Kind, payload: Vec<u8>) -> Result<Vec<u8>, HostError> {
         let mut packet = Packet { kind, sequence: self.sequence, payload };
         for attempt in 0..ATTEMPTS {
-            self.lost.repeated += u64::from(attempt > 0);
-            // A late answer to an earlier attempt is then none to this one.
+            self.link_errors.repeated += u64::from(attempt > 0);
+            // A new number per attempt, so that a late answer to an earlier attempt is not taken for this one's.
             self.sequence = self.sequence.wrapping_add(1);
             packet.sequence = self.sequence;
-            self.port.write_all(&packet.to_wire()).map_err(|error| self.broken(&error))?;
-            self.port.flush().map_err(|error| self.broken(&error))?;
+            self.port.write_all(&packet.to_wire()).map_err(|error| self.port_error(&error))?;
+            self.port.flush().map_err(|error| self.port_error(&error))?;
             if let Some(payload) = self.wait(kind.answer())? {
                 return Ok(payload);
             }
@@ -107,19 +107,19 @@ impl<P: Read + Write> Client<P> {
         Err(HostError::NoAnswer { port: self.name.clone(), what: kind.name(), attempts: ATTEMPTS, milliseconds })
     }
 
-    /// The answer's payload; nothing after silence, or where the answer is damaged.
+    /// The answer's payload; `None` after the timeout or a damaged answer.
     fn wait(&mut self, kind: Kind) -> Result<Option<Vec<u8>>, HostError> {
         let mut buffer = [0; 4096];
-        let mut heard = Instant::now();
-        while heard.elapsed() < self.timeout {
+        let mut last_heard = Instant::now();
+        while last_heard.elapsed() < self.timeout {
             let count = match self.port.read(&mut buffer) {
                 Ok(count) => count,
                 Err(error) if matches!(error.kind(), ErrorKind::TimedOut | ErrorKind::WouldBlock) => 0,
                 Err(error) if error.kind() == ErrorKind::Interrupted => 0,
-                Err(error) => return Err(self.broken(&error)),
+                Err(error) => return Err(self.port_error(&error)),
             };
             if count > 0 {
-                heard = Instant::now();
+                last_heard = Instant::now();
             }
             let mut damaged = false;
             for &byte in &buffer[..count] {
@@ -127,10 +127,10 @@ impl<P: Read + Write> Client<P> {
                     Some(Ok(packet)) if packet.kind == kind && packet.sequence == self.sequence => {
                         return Ok(Some(packet.payload));
                     }
-                    // An answer that was given up.
+                    // A late answer to an earlier attempt.
                     Some(Ok(_)) | None => (),
                     Some(Err(_)) => {
-                        self.lost.damaged += 1;
+                        self.link_errors.damaged += 1;
                         damaged = true;
                     }
                 }
@@ -142,7 +142,7 @@ impl<P: Read + Write> Client<P> {
         Ok(None)
     }
 
-    fn broken(&self, error: &std::io::Error) -> HostError {
+    fn port_error(&self, error: &std::io::Error) -> HostError {
         HostError::Port { port: self.name.clone(), reason: error.to_string() }
     }
 }

@@ -1,63 +1,63 @@
-//! What can go wrong between host and board.
+//! Errors between host and board.
 
 use thiserror::Error;
 
-/// A board that cannot be used.
+/// Why a board cannot be used.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 pub enum HostError {
     /// The port cannot be opened, or fails.
     #[error("--port {port}: {reason}")]
     Port {
-        /// As given.
+        /// The port, as given.
         port: String,
-        /// The system's reason.
+        /// The system's error message.
         reason: String,
     },
-    /// Nothing that could be an answer came, several times.
+    /// No valid answer after several attempts.
     #[error(
-        "--port {port}: no answer to {what}, sent {attempts} times with {milliseconds} ms of silence each: is it a \
-         Dermis board, configured, and of this bit rate?"
+        "--port {port}: no answer to {what}, sent {attempts} times with a timeout of {milliseconds} ms each: is it a \
+         Dermis board, configured, and at this bit rate?"
     )]
     NoAnswer {
         /// The port.
         port: String,
         /// The request.
         what: &'static str,
-        /// How often it was sent.
+        /// Number of attempts.
         attempts: u32,
-        /// The silence after each.
+        /// Timeout of each attempt in ms.
         milliseconds: u128,
     },
-    /// Packets of another version.
-    #[error("--port {port}: the board speaks version {has} of the packets, this program version {wants}")]
+    /// The board uses another packet version.
+    #[error("--port {port}: the board uses packet version {has}, this program version {wants}")]
     Version {
         /// The port.
         port: String,
-        /// The board's.
+        /// The board's version.
         has: u16,
-        /// This program's.
+        /// This program's version.
         wants: u16,
     },
-    /// A bitstream made for another scene.
-    #[error("--port {port}: the board was made for another scene: {has}; {scene} is {wants}")]
+    /// The board's bitstream was built for another scene.
+    #[error("--port {port}: the board was built for another scene: {has}; {scene} is {wants}")]
     OtherScene {
         /// The port.
         port: String,
-        /// What the board is made for.
+        /// Description of the board's scene.
         has: String,
-        /// The scene's name.
+        /// Name of the expected scene.
         scene: String,
-        /// What it would have to be made for.
+        /// Description of the expected scene.
         wants: String,
     },
-    /// An answer of the wrong length; a defect of board or program.
-    #[error("--port {port}: {what} of {bytes} bytes")]
+    /// An answer has the wrong length: a defect of the board or of this program.
+    #[error("--port {port}: {what} answer has a wrong length: {bytes} bytes")]
     Answer {
         /// The port.
         port: String,
-        /// Which answer.
+        /// The answer.
         what: &'static str,
-        /// Its length.
+        /// Its length in bytes.
         bytes: usize,
     },
 }

@@ -1,4 +1,4 @@
-//! Frames and answers as lines of JSON.
+//! `dermis host --stream`: frames and answers as lines of JSON.
 
 use std::io::{BufRead, ErrorKind, Read, Write};
 use std::time::{SystemTime, UNIX_EPOCH};
@@ -8,12 +8,12 @@ use dermis_golden::frame::Frame;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
-use super::{HostError, Line, Played, Session};
+use super::{FramesSent, HostError, PhysicalAnswer, Session};
 
-/// Longest line in bytes; 65536 taxels of 25 characters take 1.6 MB.
+/// Longest input line in bytes; 65536 taxels of 25 characters take 1.6 MB.
 const LONGEST_LINE: u64 = 4 << 20;
 
-/// A line that comes in.
+/// An input line.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Request {
@@ -22,7 +22,7 @@ struct Request {
     stress_MPa: Vec<f64>,
 }
 
-/// A line that goes out.
+/// An output line with an answer.
 #[derive(Serialize)]
 struct Reply {
     id: Value,
@@ -30,10 +30,10 @@ struct Reply {
     sent_s: f64,
     answered_s: f64,
     #[serde(flatten)]
-    line: Line,
+    answer: PhysicalAnswer,
 }
 
-/// A line that goes out in place of an answer.
+/// An output line for an input line that was refused.
 #[derive(Serialize)]
 struct Refusal {
     id: Value,
@@ -41,7 +41,7 @@ struct Refusal {
     error: String,
 }
 
-/// Answers every line of `input`; a wrong one is answered with its error, and the next one is read.
+/// Answers every line of `input`; an invalid line is answered with its error.
 ///
 /// # Errors
 /// A board that does not answer, streams that fail.
@@ -49,11 +49,11 @@ pub(super) fn run<P: Read + Write>(
     session: &mut Session<P>,
     input: &mut dyn BufRead,
     output: &mut dyn Write,
-) -> Result<Played> {
-    let mut played = Played { text: String::new(), equal: true, answered: 0, refused: 0 };
+) -> Result<FramesSent> {
+    let mut sent = FramesSent { text: String::new(), equal: true, answered: 0, refused: 0 };
     for index in 0.. {
         let mut line = String::new();
-        // A line without end must not fill the memory.
+        // Bounded, so that an endless line cannot exhaust the memory.
         let read = (&mut *input).take(LONGEST_LINE + 1).read_line(&mut line);
         match read.map_err(|error| anyhow!("standard input, line {}: {error}", index + 1))? {
             0 => break,
@@ -65,14 +65,14 @@ pub(super) fn run<P: Read + Write>(
         }
         let text = match answer(session, &line) {
             Ok(reply) => {
-                played.equal &= reply.line.equal != Some(false);
-                played.answered += 1;
+                sent.equal &= reply.answer.equal != Some(false);
+                sent.answered += 1;
                 serde_json::to_string(&reply)?
             }
-            // Without a board there is nothing to go on with.
+            // Without a working board no further line can be answered.
             Err((_, error)) if error.is::<HostError>() => return Err(error),
             Err((id, error)) => {
-                played.refused += 1;
+                sent.refused += 1;
                 serde_json::to_string(&Refusal { id, line: index + 1, error: error.to_string() })?
             }
         };
@@ -82,14 +82,14 @@ pub(super) fn run<P: Read + Write>(
             Ok(()) => (),
         }
     }
-    Ok(played)
+    Ok(sent)
 }
 
 fn seconds(time: SystemTime) -> f64 {
     time.duration_since(UNIX_EPOCH).map_or(0.0, |since| since.as_secs_f64())
 }
 
-/// The answer to one line, or what is wrong with it under the id it has.
+/// The answer to one line, or its id (null if it cannot be parsed) with the error.
 fn answer<P: Read + Write>(session: &mut Session<P>, line: &str) -> Result<Reply, (Value, anyhow::Error)> {
     let request: Request = serde_json::from_str(line).map_err(|error| (Value::Null, error.into()))?;
     let id = request.id.clone();
@@ -100,7 +100,7 @@ fn answer<P: Read + Write>(session: &mut Session<P>, line: &str) -> Result<Reply
 
 fn reply<P: Read + Write>(session: &mut Session<P>, id: &Value, frame: &Frame) -> Result<Reply> {
     let sent_s = seconds(SystemTime::now());
-    let (frame, answer) = session.ask(frame)?;
-    let line = Line::new(&session.model, &frame, &answer)?;
-    Ok(Reply { id: id.clone(), sent_s, answered_s: seconds(answer.came), line })
+    let (frame, answer) = session.request(frame)?;
+    let physical = PhysicalAnswer::new(&session.model, &frame, &answer)?;
+    Ok(Reply { id: id.clone(), sent_s, answered_s: seconds(answer.received_at), answer: physical })
 }

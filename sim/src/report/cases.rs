@@ -1,4 +1,4 @@
-//! The cases of a scene that chooses per frame, as text.
+//! The cases of a scene whose hardware chooses among several per frame, as text.
 
 use dermis_golden::fixed::choose::LATENCY;
 use dermis_golden::fixed::{Cycles, Model};
@@ -6,7 +6,8 @@ use dermis_hdl::Refused;
 
 use super::table::markdown;
 
-/// A table of the cases built with their cycles, and what was not built and why; nothing where there is one case.
+/// A table of the cases in hardware with their cycles, and the cases left out with the reason; empty if the scene has
+/// one case.
 pub fn cases(model: &Model, refused: &[Refused]) -> String {
     if !model.chooses() {
         return String::new();

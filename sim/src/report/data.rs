@@ -1,11 +1,11 @@
-//! A document as Markdown, its tables as CSV, and everything as JSON.
+//! A document as Markdown and JSON, and its tables as CSV.
 
 use serde_json::{json, Value};
 
 use super::csv::quoted;
 use super::document::{Cell, Document, Item, Picture, Section, Table};
 
-/// The document as Markdown; pictures are files beside it.
+/// The document as Markdown; pictures are references to files.
 pub fn text(document: &Document) -> String {
     let mut text = format!("# {}\n\n", document.title);
     document.intro.iter().for_each(|paragraph| text.push_str(&format!("{paragraph}\n\n")));
@@ -27,42 +27,42 @@ pub fn text(document: &Document) -> String {
     text
 }
 
-/// Where a picture lies, from the document's folder.
+/// Path of a picture, relative to the document's folder.
 pub fn path_of_picture(document: &Document, id: &str) -> String {
     format!("{}-pictures/{id}.svg", document.name)
 }
 
-/// Where a table lies, from the document's folder.
+/// Path of a table, relative to the document's folder.
 pub fn path_of_table(document: &Document, id: &str) -> String {
     format!("{}-tables/{id}.csv", document.name)
 }
 
-/// A table as Markdown, numbers to the right.
+/// A table as Markdown, with numbers right-aligned.
 pub fn markdown(table: &Table) -> String {
     let texts = (0..table.head.len()).take_while(|column| !table.is_number(*column)).count();
     let rows = table.rows.iter().map(|row| row.iter().map(|cell| cell.shown.clone()).collect());
     super::table::aligned(texts, &table.head, rows.collect())
 }
 
-/// A table for spreadsheets: numbers in full, fractions for percent, nothing for what is not there.
+/// A table as CSV: numbers with full precision, fractions instead of percent, empty fields for missing values.
 pub fn csv(table: &Table) -> String {
     let line = |fields: &mut dyn Iterator<Item = String>| fields.collect::<Vec<_>>().join(",") + "\n";
     let mut text = line(&mut table.head.iter().map(|head| quoted(head)));
     for row in &table.rows {
         text.push_str(&line(&mut row.iter().map(|cell| match cell.number {
             Some(number) => number.to_string(),
-            None if *cell == super::document::none() => String::new(),
+            None if *cell == super::document::empty_cell() => String::new(),
             None => quoted(&cell.shown),
         })));
     }
     text
 }
 
-/// The document for programs.
+/// The document as JSON.
 pub fn document(document: &Document) -> Value {
     let cell = |cell: &Cell| match cell.number {
         Some(number) => json!(number),
-        None if *cell == super::document::none() => Value::Null,
+        None if *cell == super::document::empty_cell() => Value::Null,
         None => json!(cell.shown),
     };
     let table = |table: &Table| {
@@ -90,8 +90,8 @@ pub fn document(document: &Document) -> Value {
 
 #[cfg(test)]
 mod tests {
-    use super::super::document::{none, percent, words};
-    use super::super::read;
+    use super::super::csv_reader;
+    use super::super::document::{empty_cell, percent, text_cell};
     use super::*;
 
     fn one() -> Table {
@@ -99,15 +99,15 @@ mod tests {
             "t",
             "errors",
             &["scene", "e_t"],
-            vec![vec![words("a, \"b\""), percent(Some(0.1 + 0.2))], vec![words("c"), none()]],
+            vec![vec![text_cell("a, \"b\""), percent(Some(0.1 + 0.2))], vec![text_cell("c"), empty_cell()]],
         )
     }
 
     #[test]
-    fn csv_and_json_hold_the_number_in_full() {
-        let (head, rows) = read::csv(&csv(&one()));
+    fn csv_and_json_hold_numbers_with_full_precision() {
+        let (head, rows) = csv_reader::csv(&csv(&one()));
         assert_eq!(
-            (read::field(&head, &rows[0], "e_t"), read::field(&head, &rows[1], "e_t")),
+            (csv_reader::field(&head, &rows[0], "e_t"), csv_reader::field(&head, &rows[1], "e_t")),
             ("0.30000000000000004", "")
         );
         assert!(csv(&one()).contains("\"a, \"\"b\"\"\""));

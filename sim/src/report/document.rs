@@ -1,42 +1,42 @@
-//! Document: what a report holds, before it becomes HTML, Markdown, CSV or JSON.
+//! Content of a report, independent of its output format (HTML, Markdown, CSV, JSON).
 //!
-//! Every figure is a [`Cell`] with its number beside its text: pages show the text, CSV and JSON take the number, so
-//! that all four forms say the same.
+//! Every value of a table is a [`Cell`] with both its text and its number: HTML and Markdown show the text, CSV and
+//! JSON contain the number.
 
 use crate::compare::median;
 
 /// A report.
 #[derive(Clone, Debug)]
 pub struct Document {
-    /// Name of its files.
+    /// Base name of its files.
     pub name: &'static str,
-    /// Headline.
+    /// Title.
     pub title: String,
-    /// Paragraphs below it.
+    /// Paragraphs below the title.
     pub intro: Vec<String>,
-    /// In the order of use to a reader.
+    /// Sections in order.
     pub sections: Vec<Section>,
 }
 
-/// A part under a heading.
+/// A section with a heading.
 #[derive(Clone, Debug)]
 pub struct Section {
     /// Anchor, unique in the document.
     pub id: &'static str,
     /// Heading.
     pub title: String,
-    /// In order.
+    /// Content in order.
     pub items: Vec<Item>,
 }
 
-/// Something in a section.
+/// An element of a section.
 #[derive(Clone, Debug)]
 pub enum Item {
     /// A paragraph.
     Text(String),
     /// A table.
     Table(Table),
-    /// Pictures side by side where there is room.
+    /// Pictures, side by side if there is room.
     Pictures(Vec<Picture>),
 }
 
@@ -45,14 +45,14 @@ pub enum Item {
 pub struct Table {
     /// Name of its CSV file, unique in the document.
     pub id: String,
-    /// What it shows, with units that the heads do not name.
+    /// Caption, with units that the column headers do not name.
     pub caption: String,
-    /// Of the columns.
+    /// Column headers.
     pub head: Vec<&'static str>,
-    /// Each as long as the head.
+    /// Rows; each has as many cells as there are columns.
     pub rows: Vec<Vec<Cell>>,
-    /// Long: shut until a reader opens it.
-    pub shut: bool,
+    /// Whether the HTML page shows it only after a click, for long tables.
+    pub collapsed: bool,
 }
 
 /// A picture.
@@ -60,75 +60,75 @@ pub struct Table {
 pub struct Picture {
     /// Name of its SVG file, unique in the document.
     pub id: String,
-    /// What it shows.
+    /// Caption.
     pub caption: String,
-    /// In the roles of [`super::style`].
+    /// SVG in the placeholder colours of [`super::style`].
     pub svg: String,
 }
 
 /// A cell of a table.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Cell {
-    /// As shown.
+    /// Text as shown.
     pub shown: String,
-    /// The number behind it, in the column's unit (fractions for percent).
+    /// Its value in the column's unit (fractions for percent); none for text.
     pub number: Option<f64>,
 }
 
 impl Table {
-    /// A table that is open.
+    /// A table that is shown at once.
     pub fn new(id: impl Into<String>, caption: impl Into<String>, head: &[&'static str], rows: Vec<Vec<Cell>>) -> Self {
-        Table { id: id.into(), caption: caption.into(), head: head.to_vec(), rows, shut: false }
+        Table { id: id.into(), caption: caption.into(), head: head.to_vec(), rows, collapsed: false }
     }
 
-    /// The same, shut.
-    pub fn shut(self) -> Self {
-        Table { shut: true, ..self }
+    /// The same table, collapsed.
+    pub fn collapsed(self) -> Self {
+        Table { collapsed: true, ..self }
     }
 
-    /// Whether a column holds numbers, which are aligned to the right.
+    /// Whether a column contains numbers, which are right-aligned.
     pub fn is_number(&self, column: usize) -> bool {
         self.rows.iter().any(|row| row[column].number.is_some())
     }
 }
 
-/// Words.
-pub fn words(text: impl Into<String>) -> Cell {
+/// A cell with text.
+pub fn text_cell(text: impl Into<String>) -> Cell {
     Cell { shown: text.into(), number: None }
 }
 
-/// Nothing to say.
-pub fn none() -> Cell {
-    words("–")
+/// A cell without value.
+pub fn empty_cell() -> Cell {
+    text_cell("–")
 }
 
-/// A count.
+/// A cell with a count.
 pub fn count(n: u64) -> Cell {
     Cell { shown: n.to_string(), number: Some(n as f64) }
 }
 
-/// A fraction, shown in percent with two significant digits or more.
+/// A cell with a fraction, shown in percent with at least two significant digits.
 pub fn percent(fraction: Option<f64>) -> Cell {
-    fraction.map_or_else(none, |f| Cell { shown: percent_text(f), number: Some(f) })
+    fraction.map_or_else(empty_cell, |f| Cell { shown: percent_text(f), number: Some(f) })
 }
 
-/// A fraction as text.
+/// A fraction in percent as text.
 pub fn percent_text(f: f64) -> String {
     let decimals = if f.abs() < 0.1 { 2 } else { usize::from(f.abs() < 1.0) };
     format!("{:.decimals$} %", 100.0 * f)
 }
 
-/// A number with `decimals`.
+/// A cell with a number, shown with `decimals` decimals.
 pub fn decimal(value: Option<f64>, decimals: usize) -> Cell {
-    value.map_or_else(none, |v| Cell { shown: format!("{v:.decimals$}"), number: Some(v) })
+    value.map_or_else(empty_cell, |v| Cell { shown: format!("{v:.decimals$}"), number: Some(v) })
 }
 
-/// A time in seconds, shown in the unit that suits.
+/// A cell with a time in seconds, shown in s, ms or µs.
 pub fn seconds(s: Option<f64>) -> Cell {
-    s.map_or_else(none, |s| Cell { shown: seconds_text(s), number: Some(s) })
+    s.map_or_else(empty_cell, |s| Cell { shown: seconds_text(s), number: Some(s) })
 }
 
-/// A time in seconds as text: three digits and the unit that suits.
+/// A time in seconds as text: three significant digits, in s, ms or µs.
 pub fn seconds_text(s: f64) -> String {
     let (value, unit) = match s {
         s if s >= 1.0 => (s, "s"),
@@ -139,7 +139,7 @@ pub fn seconds_text(s: f64) -> String {
     format!("{value:.decimals$} {unit}")
 }
 
-/// The median as a cell in percent.
+/// A cell with the median of fractions, in percent.
 pub fn median_percent(values: impl Iterator<Item = Option<f64>>) -> Cell {
     percent(median(values.flatten().collect()))
 }
@@ -156,6 +156,6 @@ mod tests {
             assert_eq!(seconds_text(s), text);
         }
         assert_eq!([0.0107, -0.455, 1.75].map(percent_text), ["1.07 %", "-45.5 %", "175 %"]);
-        assert_eq!(percent(None), none());
+        assert_eq!(percent(None), empty_cell());
     }
 }

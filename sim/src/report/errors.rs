@@ -8,28 +8,29 @@ use super::csv::quoted;
 use super::table::{markdown, percent};
 use super::Format;
 use crate::compare::{median, quantile};
-use crate::tabulate::Line;
+use crate::tabulate::ErrorRow;
 
-/// Lines in one form. Fractions in CSV and JSON, percent in Markdown.
+/// The rows in one format: fractions in CSV and JSON, percent in Markdown.
 ///
 /// # Errors
-/// A number JSON cannot hold.
-pub fn errors(lines: &[Line], format: Format) -> Result<String> {
+/// A number that JSON cannot represent.
+pub fn errors(rows: &[ErrorRow], format: Format) -> Result<String> {
     Ok(match format {
-        Format::Json => serde_json::to_string(&Document { lines, medians: medians(lines) })? + "\n",
-        Format::Csv => csv(lines),
-        Format::Markdown => text(lines),
+        Format::Json => serde_json::to_string(&Document { rows, medians: medians(rows) })? + "\n",
+        Format::Csv => csv(rows),
+        Format::Markdown => text(rows),
     })
 }
 
 /// The JSON.
 #[derive(Serialize)]
 struct Document<'a> {
-    lines: &'a [Line],
+    #[serde(rename = "lines")]
+    rows: &'a [ErrorRow],
     medians: Vec<Medians>,
 }
 
-/// One scene and case over its frames; axes by size, as signs cancel.
+/// Medians of one scene and case over its frames; errors of axes by magnitude, as signs would cancel.
 #[derive(Serialize)]
 struct Medians {
     scene: String,
@@ -52,35 +53,35 @@ fn axes(errors: Option<&Errors>) -> [Option<f64>; 3] {
     errors.map_or([None; 3], Errors::axes)
 }
 
-fn medians(lines: &[Line]) -> Vec<Medians> {
-    let same = |a: &Line, b: &Line| (&a.scene, &a.case) == (&b.scene, &b.case);
-    let of = |group: &[Line]| {
-        let ninety = |value: &dyn Fn(&Line) -> Option<f64>| quantile(group.iter().filter_map(value).collect(), 0.9);
-        let over = |value: &dyn Fn(&Line) -> Option<f64>| median(group.iter().filter_map(value).collect());
-        let tangential = |line: &Line| line.error.as_ref()?.tangential;
-        let normal = |line: &Line| line.error.as_ref()?.normal;
-        let of_all = |line: &Line| line.of_all.filter(|_| line.contacts > 1);
+fn medians(rows: &[ErrorRow]) -> Vec<Medians> {
+    let same = |a: &ErrorRow, b: &ErrorRow| (&a.scene, &a.case) == (&b.scene, &b.case);
+    let of = |group: &[ErrorRow]| {
+        let ninety = |value: &dyn Fn(&ErrorRow) -> Option<f64>| quantile(group.iter().filter_map(value).collect(), 0.9);
+        let over = |value: &dyn Fn(&ErrorRow) -> Option<f64>| median(group.iter().filter_map(value).collect());
+        let tangential = |row: &ErrorRow| row.error.as_ref()?.tangential;
+        let normal = |row: &ErrorRow| row.error.as_ref()?.normal;
+        let of_all = |row: &ErrorRow| row.shear_over_all.filter(|_| row.contacts > 1);
         Medians {
             scene: group[0].scene.clone(),
             case: group[0].case.clone(),
             frames: group.len(),
-            axes: [0, 1, 2].map(|k| over(&|line| Some(axes(line.error.as_ref())[k]?.abs()))),
-            axes_case_0: [0, 1, 2].map(|k| over(&|line| Some(axes(line.error_case_0.as_ref())[k]?.abs()))),
+            axes: [0, 1, 2].map(|k| over(&|row| Some(axes(row.error.as_ref())[k]?.abs()))),
+            axes_case_0: [0, 1, 2].map(|k| over(&|row| Some(axes(row.error_case_0.as_ref())[k]?.abs()))),
             tangential: over(&tangential),
             tangential_ninety: ninety(&tangential),
             normal: over(&normal),
             normal_ninety: ninety(&normal),
-            l2: over(&|line| line.l2),
+            l2: over(&|row| row.l2),
             of_all: over(&of_all),
             of_all_ninety: ninety(&of_all),
-            own: median(group.iter().flat_map(|line| line.own.clone()).collect()),
+            own: median(group.iter().flat_map(|row| row.contact_shears.clone()).collect()),
             paper: group[0].paper,
         }
     };
-    lines.chunk_by(same).map(of).collect()
+    rows.chunk_by(same).map(of).collect()
 }
 
-fn text(lines: &[Line]) -> String {
+fn text(rows: &[ErrorRow]) -> String {
     let head = [
         "scene",
         "case",
@@ -108,27 +109,27 @@ fn text(lines: &[Line]) -> String {
         "both signs",
         "μ",
     ];
-    let rows = lines.iter().map(|line| {
-        let fixed = line.fixed.as_ref();
+    let body = rows.iter().map(|row| {
+        let fixed = row.fixed.as_ref();
         let fixed_error = fixed.and_then(|fixed| fixed.error.as_ref());
-        let error = line.error.as_ref();
-        let case = line.taken.as_ref().map_or(line.case.clone(), |taken| format!("{}: {taken}", line.case));
-        let mut row = vec![line.scene.clone(), case, line.frame.clone()];
-        row.extend(axes(error).map(percent));
-        row.extend([error.and_then(|e| e.tangential), error.and_then(|e| e.normal), line.l2].map(percent));
-        row.push(percent(line.of_all));
-        row.extend(axes(line.error_case_0.as_ref()).map(percent));
-        row.extend(axes(fixed_error).map(percent));
-        row.extend([fixed_error.and_then(|e| e.tangential), fixed_error.and_then(|e| e.normal)].map(percent));
+        let error = row.error.as_ref();
+        let case = row.chosen_case.as_ref().map_or(row.case.clone(), |taken| format!("{}: {taken}", row.case));
+        let mut cells = vec![row.scene.clone(), case, row.frame.clone()];
+        cells.extend(axes(error).map(percent));
+        cells.extend([error.and_then(|e| e.tangential), error.and_then(|e| e.normal), row.l2].map(percent));
+        cells.push(percent(row.shear_over_all));
+        cells.extend(axes(row.error_case_0.as_ref()).map(percent));
+        cells.extend(axes(fixed_error).map(percent));
+        cells.extend([fixed_error.and_then(|e| e.tangential), fixed_error.and_then(|e| e.normal)].map(percent));
         let words = |lsb: f64, share: f64| format!("{lsb:.0} LSB = {}", percent(Some(share)));
         let gap = fixed.map(|fixed| &fixed.difference);
-        row.push(gap.map_or("-".into(), |d| words(d.max_lsb, d.max_share)));
-        row.push(gap.map_or("-".into(), |d| words(d.rms_lsb, d.rms_share)));
-        row.extend((0..3).map(|k| percent(line.paper.map(|paper| paper[k]))));
-        row.push(line.subarrays.iter().map(|part| if part.both_signs { "y" } else { "n" }).collect());
-        let mus = line.subarrays.iter().map(|part| format!("({:+.3}, {:+.3})", part.mu[0], part.mu[1]));
-        row.push(mus.collect::<Vec<_>>().join(" "));
-        row
+        cells.push(gap.map_or("-".into(), |d| words(d.max_lsb, d.max_share)));
+        cells.push(gap.map_or("-".into(), |d| words(d.rms_lsb, d.rms_share)));
+        cells.extend((0..3).map(|k| percent(row.paper.map(|paper| paper[k]))));
+        cells.push(row.subarrays.iter().map(|part| if part.both_signs { "y" } else { "n" }).collect());
+        let mus = row.subarrays.iter().map(|part| format!("({:+.3}, {:+.3})", part.mu[0], part.mu[1]));
+        cells.push(mus.collect::<Vec<_>>().join(" "));
+        cells
     });
     let head_of_medians = [
         "scene",
@@ -152,7 +153,7 @@ fn text(lines: &[Line]) -> String {
         "X2",
         "X3",
     ];
-    let of_medians = medians(lines).into_iter().map(|m| {
+    let of_medians = medians(rows).into_iter().map(|m| {
         let mut row = vec![m.scene, m.case, m.frames.to_string()];
         row.extend(m.axes.map(percent));
         row.extend([m.tangential, m.tangential_ninety, m.normal, m.normal_ninety, m.l2].map(percent));
@@ -162,9 +163,9 @@ fn text(lines: &[Line]) -> String {
         row
     });
     format!(
-        "{}\nMedians over the frames, and what nine of ten do not exceed; several: frames of several contacts, and \
-         with case contacts each contact's own shear. The paper's sensors 3 and 4 are against case 0.\n\n{}",
-        markdown(&head, rows.collect()),
+        "{}\nMedians over the frames, and 90 % quantiles (90 %). several: frames with several contacts; own e_t: shear \
+         error of each contact, case contacts only. The paper's figures of sensors 3 and 4 are relative to case 0.\n\n{}",
+        markdown(&head, body.collect()),
         markdown(
             &head_of_medians.map(|name| name.replace('|', "\\|")).each_ref().map(String::as_str),
             of_medians.collect()
@@ -172,20 +173,20 @@ fn text(lines: &[Line]) -> String {
     )
 }
 
-fn csv(lines: &[Line]) -> String {
+fn csv(rows: &[ErrorRow]) -> String {
     let mut text =
         "scene,case,taken,frame,x1,x2,x3,e_t,e_n,l2,of_all,x1_case0,x2_case0,x3_case0,fixed_x1,fixed_x2,fixed_x3,\
                     fixed_e_t,fixed_e_n,max_lsb,max_share,rms_lsb,rms_share,paper_x1,paper_x2,paper_x3,both_signs,\
                     condition,mu,own\n"
             .to_owned();
-    for line in lines {
-        let fixed = line.fixed.as_ref();
+    for row in rows {
+        let fixed = row.fixed.as_ref();
         let fixed_error = fixed.and_then(|fixed| fixed.error.as_ref());
-        let error = line.error.as_ref();
+        let error = row.error.as_ref();
         let gap = fixed.map(|fixed| fixed.difference);
         let mut numbers: Vec<Option<f64>> = axes(error).to_vec();
-        numbers.extend([error.and_then(|e| e.tangential), error.and_then(|e| e.normal), line.l2, line.of_all]);
-        numbers.extend(axes(line.error_case_0.as_ref()));
+        numbers.extend([error.and_then(|e| e.tangential), error.and_then(|e| e.normal), row.l2, row.shear_over_all]);
+        numbers.extend(axes(row.error_case_0.as_ref()));
         numbers.extend(axes(fixed_error));
         numbers.extend([fixed_error.and_then(|e| e.tangential), fixed_error.and_then(|e| e.normal)]);
         numbers.extend([
@@ -194,16 +195,16 @@ fn csv(lines: &[Line]) -> String {
             gap.map(|d| d.rms_lsb),
             gap.map(|d| d.rms_share),
         ]);
-        numbers.extend((0..3).map(|k| line.paper.map(|paper| paper[k])));
+        numbers.extend((0..3).map(|k| row.paper.map(|paper| paper[k])));
         let numbers: Vec<String> = numbers.iter().map(|n| n.map_or(String::new(), |n| n.to_string())).collect();
         let yes = |met: bool| if met { 'y' } else { 'n' };
-        let both: String = line.subarrays.iter().map(|part| yes(part.both_signs)).collect();
-        let condition: String = line.subarrays.iter().map(|part| yes(part.condition)).collect();
-        let mus = line.subarrays.iter().map(|part| format!("{} {}", part.mu[0], part.mu[1]));
-        let (scene, mus) = (quoted(&line.scene), mus.collect::<Vec<_>>().join(";"));
-        let frame = quoted(&line.frame);
-        let own: Vec<String> = line.own.iter().map(f64::to_string).collect();
-        let (case, taken) = (&line.case, line.taken.as_deref().unwrap_or_default());
+        let both: String = row.subarrays.iter().map(|part| yes(part.both_signs)).collect();
+        let condition: String = row.subarrays.iter().map(|part| yes(part.condition)).collect();
+        let mus = row.subarrays.iter().map(|part| format!("{} {}", part.mu[0], part.mu[1]));
+        let (scene, mus) = (quoted(&row.scene), mus.collect::<Vec<_>>().join(";"));
+        let frame = quoted(&row.frame);
+        let own: Vec<String> = row.contact_shears.iter().map(f64::to_string).collect();
+        let (case, taken) = (&row.case, row.chosen_case.as_deref().unwrap_or_default());
         let (numbers, own) = (numbers.join(","), own.join(";"));
         text.push_str(&format!("{scene},{case},{taken},{frame},{numbers},{both},{condition},{mus},{own}\n"));
     }
@@ -212,23 +213,23 @@ fn csv(lines: &[Line]) -> String {
 
 #[cfg(test)]
 mod tests {
-    use super::super::read;
+    use super::super::csv_reader;
     use super::*;
     use crate::compare::Difference;
-    use crate::tabulate::{Fixed, Part};
+    use crate::tabulate::{BitTrueErrors, SubarrayRow};
     use dermis_golden::flags::Flag;
     use serde_json::Value;
 
-    fn part(mu: [f64; 2], both_signs: bool) -> Part {
-        Part { mu, both_signs, condition: true }
+    fn part(mu: [f64; 2], both_signs: bool) -> SubarrayRow {
+        SubarrayRow { mu, both_signs, condition: true }
     }
 
-    /// One line with every field and a name that CSV must quote, one with next to none.
-    fn lines() -> Vec<Line> {
+    /// One row with every field and a name that CSV must quote, one with as few fields as possible.
+    fn rows() -> Vec<ErrorRow> {
         let error =
             Errors { x1: Some(-0.1), x2: None, x3: Some(1.0 / 3.0), tangential: Some(0.25), normal: Some(1.0 / 3.0) };
         let difference = Difference { max_lsb: 12.0, rms_lsb: 3.5, max_share: 1e-4, rms_share: 2e-5 };
-        let bare = Line {
+        let bare = ErrorRow {
             scene: "plain".into(),
             case: "1".into(),
             frame: "b".into(),
@@ -236,15 +237,15 @@ mod tests {
             error_case_0: None,
             l2: None,
             contacts: 0,
-            of_all: None,
-            own: Vec::new(),
-            taken: None,
+            shear_over_all: None,
+            contact_shears: Vec::new(),
+            chosen_case: None,
             subarrays: vec![part([0.0, 0.0], false)],
             fixed: None,
             paper: None,
             flags: Vec::new(),
         };
-        let full = Line {
+        let full = ErrorRow {
             scene: "odd, \"quoted\"\nname".into(),
             case: "0".into(),
             frame: "a,b".into(),
@@ -252,11 +253,11 @@ mod tests {
             error_case_0: Some(Errors { x1: Some(0.5), ..error }),
             l2: Some(0.125),
             contacts: 2,
-            of_all: Some(0.0625),
-            own: vec![0.5, 0.75],
-            taken: Some("3".into()),
+            shear_over_all: Some(0.0625),
+            contact_shears: vec![0.5, 0.75],
+            chosen_case: Some("3".into()),
             subarrays: vec![part([0.1, -0.2], true), part([0.3, 0.4], false)],
-            fixed: Some(Fixed { error: Some(Errors { x2: Some(0.75), ..error }), difference }),
+            fixed: Some(BitTrueErrors { error: Some(Errors { x2: Some(0.75), ..error }), difference }),
             paper: Some([0.1284, 0.1293, 0.0754]),
             flags: vec![Flag::LoadOutside],
         };
@@ -264,12 +265,12 @@ mod tests {
     }
 
     #[test]
-    fn csv_comes_back() {
-        let lines = lines();
-        let (head, records) = read::csv(&errors(&lines, Format::Csv).unwrap());
+    fn csv_reads_back() {
+        let rows = rows();
+        let (head, records) = csv_reader::csv(&errors(&rows, Format::Csv).unwrap());
         assert_eq!((head.len(), records.len()), (30, 2));
-        let of = |record: usize, name: &str| read::field(&head, &records[record], name).to_owned();
-        assert_eq!((of(0, "scene"), of(0, "frame")), (lines[0].scene.clone(), lines[0].frame.clone()));
+        let of = |record: usize, name: &str| csv_reader::field(&head, &records[record], name).to_owned();
+        assert_eq!((of(0, "scene"), of(0, "frame")), (rows[0].scene.clone(), rows[0].frame.clone()));
         let numbers = [
             ("x1", -0.1),
             ("x3", 1.0 / 3.0),
@@ -288,7 +289,7 @@ mod tests {
             ("paper_x3", 0.0754),
         ];
         for (name, wanted) in numbers {
-            // The shortest text that reads back as the same number.
+            // Numbers are written so that they read back exactly.
             assert_eq!(of(0, name).parse::<f64>().unwrap(), wanted, "{name}");
             assert_eq!(of(1, name), "", "{name}");
         }
@@ -300,13 +301,13 @@ mod tests {
     }
 
     #[test]
-    fn json_comes_back() {
-        let lines = lines();
-        let text = errors(&lines, Format::Json).unwrap();
+    fn json_reads_back() {
+        let rows = rows();
+        let text = errors(&rows, Format::Json).unwrap();
         let read: Value = serde_json::from_str(&text).unwrap();
         assert!(text.ends_with("}\n"));
         let [full, bare] = [&read["lines"][0], &read["lines"][1]];
-        assert_eq!(full["scene"], lines[0].scene.as_str());
+        assert_eq!(full["scene"], rows[0].scene.as_str());
         assert_eq!((&full["error"]["x1"], &full["error"]["x2"]), (&Value::from(-0.1), &Value::Null));
         assert_eq!(full["error"]["x3"], 1.0 / 3.0);
         assert_eq!(full["fixed"]["difference"]["rms_share"], 2e-5);
@@ -317,15 +318,15 @@ mod tests {
         }
         let medians = read["medians"].as_array().unwrap();
         assert_eq!(medians.len(), 2);
-        // By size: the sign of X1 is gone.
+        // By magnitude: without the sign of X1.
         assert_eq!((&medians[0]["axes"][0], &medians[0]["frames"]), (&Value::from(0.1), &Value::from(1)));
         assert_eq!((&medians[0]["of_all_ninety"], &medians[0]["own"]), (&Value::from(0.0625), &Value::from(0.75)));
         assert_eq!(medians[1]["tangential"], Value::Null);
     }
 
     #[test]
-    fn no_lines_are_a_head_alone() {
-        let (head, records) = read::csv(&errors(&[], Format::Csv).unwrap());
+    fn without_rows_only_the_header_remains() {
+        let (head, records) = csv_reader::csv(&errors(&[], Format::Csv).unwrap());
         assert_eq!((head.len(), records.len()), (30, 0));
         assert_eq!(errors(&[], Format::Json).unwrap(), "{\"lines\":[],\"medians\":[]}\n");
     }

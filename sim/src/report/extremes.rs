@@ -1,4 +1,4 @@
-//! The extreme frames of `dermis stability --extreme` as Markdown, CSV and JSON, and for the report.
+//! Results on extreme frames, for `dermis stability --extreme` (Markdown, CSV, JSON) and for the report.
 
 use anyhow::Result;
 use dermis_golden::flags::Flag;
@@ -7,21 +7,21 @@ use serde_json::json;
 
 use super::csv::quoted;
 use super::data::markdown;
-use super::document::{percent, words, Table};
+use super::document::{percent, text_cell, Table};
 use super::Format;
 
-/// First line of the CSV.
+/// Header of the CSV.
 const HEAD: &str = "scene,frame,golden_x,golden_y,golden_n,golden_flags,fixed_x,fixed_y,fixed_n,fixed_flags,status,\
                     refused\n";
 
-/// What the columns are.
+/// Explanation of the columns.
 const LEGEND: &str =
-    "Forces in N, x, y, normal; e_t, e_n: against the whole load; status: the flags of the hardware's own status words";
+    "Resultants in N: x, y, normal; e_t, e_n: errors relative to the total load; status: flags of the status beats";
 
-/// The extreme frames of scenes, one table each.
+/// The extreme frames of several scenes, one table per scene.
 ///
 /// # Errors
-/// A number JSON cannot hold.
+/// A number that JSON cannot represent.
 pub fn extremes(all: &[(String, Vec<Row>)], format: Format) -> Result<String> {
     let mut text = String::new();
     match format {
@@ -66,18 +66,18 @@ pub(super) fn extremes_table(scene: &str, rows: &[Row]) -> Table {
         "e_n golden",
         "e_n fixed",
     ];
-    let force = |o: &Outcome| words(o.resultant_N.map(|f| format!("{f:.3e}")).join(", "));
+    let force = |o: &Outcome| text_cell(o.resultant_N.map(|f| format!("{f:.3e}")).join(", "));
     let lines = rows.iter().map(|row| {
         let fixed = row.fixed.as_ref();
         let error = |outcome: Option<&Outcome>, k: usize| percent(outcome.and_then(|outcome| outcome.errors[k]));
         let golden = Some(&row.golden);
         vec![
-            words(row.frame.clone()),
+            text_cell(row.frame.clone()),
             force(&row.golden),
-            words(names(&row.golden.flags)),
-            fixed.map_or_else(|| words("refused"), force),
-            words(fixed.map_or_else(|| row.refused.clone().unwrap_or_default(), |fixed| names(&fixed.flags))),
-            words(row.status.clone()),
+            text_cell(names(&row.golden.flags)),
+            fixed.map_or_else(|| text_cell("refused"), force),
+            text_cell(fixed.map_or_else(|| row.refused.clone().unwrap_or_default(), |fixed| names(&fixed.flags))),
+            text_cell(row.status.clone()),
             error(golden, 0),
             error(fixed, 0),
             error(golden, 1),
@@ -95,19 +95,19 @@ fn names(flags: &[Flag]) -> String {
 
 #[cfg(test)]
 mod tests {
-    use super::super::read;
+    use super::super::csv_reader;
     use super::*;
     use dermis_golden::scene::Scene;
     use dermis_golden::stability::extreme::{frames, outcome};
 
     #[test]
-    fn extremes_in_every_form() {
+    fn extremes_in_every_format() {
         let scene = Scene::builtin("eight-by-eight").unwrap();
         let rows: Vec<_> = frames(&scene).unwrap().iter().take(2).map(|e| outcome(e).unwrap()).collect();
         let all = vec![("eight-by-eight".to_owned(), rows)];
-        let (head, records) = read::csv(&extremes(&all, Format::Csv).unwrap());
+        let (head, records) = csv_reader::csv(&extremes(&all, Format::Csv).unwrap());
         assert_eq!(records.len(), 2);
-        assert_eq!(read::field(&head, &records[0], "golden_flags"), "no-contact, condition-unmet");
+        assert_eq!(csv_reader::field(&head, &records[0], "golden_flags"), "no-contact, condition-unmet");
         assert!(extremes(&all, Format::Markdown).unwrap().contains("no-contact, condition-unmet"));
         let read: serde_json::Value = serde_json::from_str(&extremes(&all, Format::Json).unwrap()).unwrap();
         assert_eq!(read[0]["frames"][0]["golden"]["resultant_N"][2].as_f64(), Some(0.0));

@@ -1,10 +1,10 @@
 //! The table of `dermis faults`.
 
 use super::table::{aligned, percent};
-use crate::faults::places::CLASSES;
+use crate::faults::state_bits::CLASSES;
 use crate::faults::{Row, Shares, LARGE};
 
-/// One line per class and stage; then the classes' shares, in which each stage counts by its bits.
+/// One row per storage class and stage; then the shares of each class, with its stages weighted by their bits.
 pub fn faults(rows: &[Row]) -> String {
     let head = [
         "class",
@@ -22,8 +22,17 @@ pub fn faults(rows: &[Row]) -> String {
         "not recovered",
     ];
     let line = |row: &Row| {
-        let counts =
-            [row.signals, row.places, row.tried, row.hit, row.harmless, row.detected, row.hang, row.silent, row.large];
+        let counts = [
+            row.signals,
+            row.bits,
+            row.flips,
+            row.distinct_bits,
+            row.harmless,
+            row.detected,
+            row.hang,
+            row.silent,
+            row.large,
+        ];
         let mut cells = vec![row.class.name().to_owned(), row.stage.clone()];
         cells.extend(counts.iter().map(usize::to_string));
         cells.extend([percent((row.silent > 0).then_some(row.largest_error)), row.not_recovered.to_string()]);
@@ -31,7 +40,8 @@ pub fn faults(rows: &[Row]) -> String {
     };
     let mut text = aligned(2, &head, rows.iter().map(line).collect());
     text.push_str(&format!(
-        "silent above: with a force error above {} of the frame's largest force; hang: no answer until the reset;\n\
+        "bits: state bits of the stage; different: different bits flipped; hang: beats missing until the reset;\n\
+         silent above: silent, with a force error above {} of the frame's largest force;\n\
          not recovered: the frame after the reset is wrong\n\n",
         percent(Some(LARGE))
     ));
@@ -39,7 +49,7 @@ pub fn faults(rows: &[Row]) -> String {
     let of = |class| {
         let all = Shares::of(rows, class)?;
         let shares = [all.harmless, all.detected, all.hang, all.silent, all.large];
-        let mut cells = vec![class.name().to_owned(), all.bits.to_string(), all.tried.to_string()];
+        let mut cells = vec![class.name().to_owned(), all.bits.to_string(), all.flips.to_string()];
         cells.extend(shares.map(|share| percent(Some(share))));
         Some(cells)
     };

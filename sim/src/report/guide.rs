@@ -92,7 +92,7 @@ pub fn time_picture(build: &Path) -> Result<PictureFile> {
         build: build.to_owned(),
         condition: Condition::default(),
         simulate: false,
-        interrupt: Interrupt::of_signals()?,
+        interrupt: Interrupt::on_signals()?,
     };
     let cases: Vec<Case> = (0..4).filter_map(Case::numbered).collect();
     let measured = measure(&[Scene::builtin(FLOW_SCENE)?], &cases, &options)?;

@@ -1,28 +1,28 @@
-//! A board's answers for people.
+//! A board's answers as text.
 
 use dermis_golden::fixed::Model;
 use dermis_golden::link::{payloads, supports, Kind, LinkKind};
 
-use super::table::{aligned, figures};
-use crate::host::{Answer, Line};
+use super::table::{aligned, significant_digits};
+use crate::host::{Answer, PhysicalAnswer};
 
-/// One frame's resultants.
-pub fn resultants(frame: &str, line: &Line, answer: &Answer) -> String {
-    let largest = line.resultant_N.iter().fold(0.0, |m: f64, x| m.max(x.abs()));
+/// The resultants of one frame.
+pub fn resultants(frame: &str, physical: &PhysicalAnswer, answer: &Answer) -> String {
+    let largest = physical.resultant_N.iter().fold(0.0, |m: f64, x| m.max(x.abs()));
     let sign = |x: f64| if x.is_sign_negative() { "" } else { "+" };
-    let [x, y, normal] = line.resultant_N.map(|force| sign(force).to_owned() + &figures(force, largest));
-    let centre = line.centre_mm.map_or("-".to_owned(), |[x, y]| format!("({x:+.2}, {y:+.2}) mm"));
+    let [x, y, normal] = physical.resultant_N.map(|force| sign(force).to_owned() + &significant_digits(force, largest));
+    let centre = physical.centre_mm.map_or("-".to_owned(), |[x, y]| format!("({x:+.2}, {y:+.2}) mm"));
     let flags: Vec<String> =
-        line.flags.iter().filter_map(|f| serde_json::to_value(f).ok()?.as_str().map(str::to_owned)).collect();
+        physical.flags.iter().filter_map(|f| serde_json::to_value(f).ok()?.as_str().map(str::to_owned)).collect();
     format!(
         "{frame}: N x {x}   y {y}   normal {normal}   centre {centre}   taxels {}   flags {}\n{}",
-        line.loaded,
+        physical.loaded,
         if flags.is_empty() { "none".to_owned() } else { flags.join(", ") },
         equality(answer),
     )
 }
 
-/// Whether an answer is the bit-true model's, where that was asked for, and whether packets were dropped before it.
+/// Whether an answer equals the bit-true model's, if compared, and whether the board has dropped a packet before it.
 pub fn equality(answer: &Answer) -> String {
     let checked = match &answer.difference {
         None => String::new(),
@@ -34,7 +34,7 @@ pub fn equality(answer: &Answer) -> String {
     checked + dropped
 }
 
-/// How long a frame's packets take on each of the links that the board has.
+/// Transfer times of a frame's packets on each link that the board supports.
 pub fn wire_times(model: &Model) -> String {
     let link = |(link, rate, times): (LinkKind, u32, Vec<(&str, Option<f64>)>)| {
         let sent = times.iter().filter_map(|(what, ms)| Some(format!("{what} {:.3} ms", (*ms)?)));

@@ -1,4 +1,4 @@
-//! A document as one HTML page that needs nothing else: no network, no script, pictures inside.
+//! A document as one self-contained HTML page: no network access, no script, pictures embedded.
 
 use super::document::{Document, Item, Picture, Table};
 use super::style::{escape, themed, variables};
@@ -30,10 +30,10 @@ svg{display:block;width:100%;height:auto;font-family:system-ui,'Segoe UI','DejaV
 @media(max-width:30rem){body{padding:.6rem}figure{padding:.2rem}}\n\
 @media print{figure,table{break-inside:avoid}}\n";
 
-/// Characters from which a cell's text is wrapped.
+/// Number of characters above which a cell's text is wrapped.
 const LONG: usize = 40;
 
-/// The page.
+/// The document as HTML.
 pub fn html(document: &Document) -> String {
     let mut text = format!(
         "<!doctype html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n\
@@ -64,7 +64,7 @@ pub fn html(document: &Document) -> String {
 
 fn table(text: &mut String, table: &Table) {
     let caption = escape(&table.caption);
-    text.push_str(&match table.shut {
+    text.push_str(&match table.collapsed {
         true => format!("<details><summary>{caption} ({} rows)</summary>\n", table.rows.len()),
         false => format!("<p class=\"caption\">{caption}</p>\n"),
     });
@@ -80,13 +80,13 @@ fn table(text: &mut String, table: &Table) {
         text.push_str(&format!("<tr>{}</tr>\n", cells.collect::<String>()));
     }
     text.push_str("</table></div>\n");
-    if table.shut {
+    if table.collapsed {
         text.push_str("</details>\n");
     }
 }
 
 fn pictures(text: &mut String, all: &[Picture]) {
-    // Few beside each other are larger; four belong in one row.
+    // Two pictures are drawn larger; four are laid out in one row.
     let class = match all.len() {
         2 => " two",
         4 => " four",

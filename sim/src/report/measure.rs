@@ -1,4 +1,4 @@
-//! Measure: scenes in cases, all engines on the same frames, errors and times of one run.
+//! Measurements of the report: all engines on the same frames of each scene and case, their errors and times.
 //!
 //! ```text
 //! scene × case ─┬─ literal baseline, CPU ─┐
@@ -7,13 +7,13 @@
 //!               └─ hardware: co-simulation ── cycles / clock
 //! ```
 //!
-//! First everything is prepared and compared, several cases at a time; then the engines on the CPU are timed one after
-//! the other, with nothing beside them.
+//! First all results are computed and compared, several cases in parallel; then the CPU engines are timed one after the
+//! other, with no other work in parallel.
 
 mod clock;
 mod formats;
 mod machine;
-mod plane;
+mod objective_map;
 mod stability;
 mod stages;
 mod sweep;
@@ -22,7 +22,7 @@ mod timing;
 pub use clock::{clock, Clock};
 pub use formats::{formats, FormatRow};
 pub use machine::machine;
-pub use plane::{plane, Plane};
+pub use objective_map::{objective_map, ObjectiveMap};
 pub use stability::{conditions, extremes};
 pub use stages::{stages, StageRow};
 pub use sweep::{sweep, SweepPoint};
@@ -48,30 +48,31 @@ use crate::jobs::{parallel, Interrupt};
 use crate::progress::Progress;
 use crate::verify::verify;
 
-/// Taxels of a subarray from which the quick variant leaves a case out.
+/// Largest subarray, in taxels, of the cases measured by the quick variant.
 const QUICK_TAXELS: usize = 1200;
-/// Taxels of a subarray from which the quick variant leaves the literal baseline out: seconds a frame.
+/// Largest subarray, in taxels, for which the quick variant runs the literal baseline, which takes seconds per frame
+/// beyond.
 const QUICK_LITERAL: usize = 200;
 
-/// What to measure.
+/// Options of a measurement.
 #[derive(Clone, Debug)]
 pub struct Options {
-    /// Two co-simulations, fewer drawn frames and sweeps, no case of more than 1200 taxels in a subarray, the literal
-    /// baseline up to 200.
+    /// Quick variant: two co-simulations, fewer drawn frames and sweeps, subarrays of at most 1200 taxels, literal
+    /// baseline up to 200 taxels.
     pub quick: bool,
-    /// Cases prepared at a time.
+    /// Number of cases prepared in parallel.
     pub jobs: usize,
-    /// Folder for everything built on the way.
+    /// Folder for build products and caches.
     pub build: PathBuf,
-    /// When a subarray is searched.
+    /// Condition under which a subarray is searched.
     pub condition: Condition,
-    /// Whether hardware is co-simulated at all; the bit-true model's cycles take its place.
+    /// Whether hardware is co-simulated; otherwise the bit-true model's cycle counts are used.
     pub simulate: bool,
-    /// Set when the user has had enough.
+    /// Set by SIGINT or SIGTERM.
     pub interrupt: Interrupt,
 }
 
-/// What computes.
+/// An implementation of the reconstruction.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Engine {
     /// Eq. 1 with dense matrices and a simplex search, on the CPU.
@@ -85,7 +86,7 @@ pub enum Engine {
 }
 
 impl Engine {
-    /// All, in the order of tables.
+    /// All engines, in the order of tables.
     pub const ALL: [Engine; 4] = [Engine::Baseline, Engine::Golden, Engine::Fixed, Engine::Hardware];
 
     /// Name in tables and legends.
@@ -99,87 +100,88 @@ impl Engine {
     }
 }
 
-/// The bit-true side of a case.
+/// Results of the bit-true model, and of the hardware, for a case.
 #[derive(Debug)]
-pub struct Integers {
+pub struct BitTrue {
     /// The model.
     pub model: Model,
     /// Its result for every frame.
     pub results: Vec<Reconstruction>,
-    /// What its stages passed on, for every frame.
+    /// The outputs of its stages, for every frame.
     pub traces: Vec<Trace>,
-    /// Whether the Verilated hardware equalled it in every bit and cycle; `None` where it was not simulated.
+    /// Whether the verilated hardware equalled it in every bit and cycle; `None` if not simulated.
     pub equal: Option<bool>,
-    /// From the first input beat to the last output beat, slowest frame: of the co-simulation, else of the model.
+    /// Cycles from the first input beat to the last output beat of the slowest frame, co-simulated if possible, else
+    /// from the model.
     pub cycles: u64,
-    /// What the stages take of the board.
+    /// Resources of each stage.
     pub usage: BTreeMap<String, Usage>,
 }
 
-/// A scene in one case on its frames.
+/// Measurements of a scene in one case.
 pub struct Measured {
-    /// The scene, its case among its fields.
+    /// The scene, with the case in its fields.
     pub scene: Scene,
     /// The frames, at least one.
     pub frames: Vec<Frame>,
-    /// The floating-point model, for pictures that need its matrices.
+    /// The floating-point model.
     pub engine: Golden,
     /// Its result for every frame.
     pub golden: Vec<Reconstruction>,
-    /// The bit-true model and the hardware, or why there is none.
-    pub integers: Result<Integers, String>,
-    /// The literal baseline's forces for every frame, or why there are none.
+    /// Results of the bit-true model and the hardware, or the reason why there is no hardware.
+    pub bit_true: Result<BitTrue, String>,
+    /// The literal baseline's forces for every frame, or the reason why it was not run.
     pub baseline: Result<Vec<Forces>, String>,
-    /// Times of a frame on the CPU.
+    /// Times per frame on the CPU.
     pub times: BTreeMap<Engine, Timing>,
     literal: Option<Baseline>,
 }
 
-/// How many contacts a frame has.
+/// Whether a frame has one contact or several.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Kind {
-    /// One, or none that is described.
+pub enum ContactCount {
+    /// One contact, or none described.
     One,
-    /// Several, which may be sheared each its own way.
+    /// Several contacts, whose shears may differ.
     Several,
 }
 
-impl Kind {
-    /// Of a frame.
-    pub fn of(frame: &Frame) -> Kind {
+impl ContactCount {
+    /// The contact count of a frame.
+    pub fn of(frame: &Frame) -> ContactCount {
         if frame.contacts.len() > 1 {
-            Kind::Several
+            ContactCount::Several
         } else {
-            Kind::One
+            ContactCount::One
         }
     }
 
     /// Name in tables.
     pub fn name(self) -> &'static str {
         match self {
-            Kind::One => "one",
-            Kind::Several => "several",
+            ContactCount::One => "one",
+            ContactCount::Several => "several",
         }
     }
 }
 
-/// An engine's errors and time on one scene in one case.
+/// Errors and time of an engine on one scene and case.
 #[derive(Clone, Debug)]
 pub struct Point {
     /// The case.
     pub case: Case,
-    /// What computed.
+    /// The engine.
     pub engine: Engine,
     /// Tangential error of the resultant, median over the frames.
     pub tangential: Option<f64>,
     /// Normal error of the resultant, median over the frames.
     pub normal: Option<f64>,
-    /// Time of a frame in s.
+    /// Time per frame in s.
     pub seconds: f64,
 }
 
 impl Measured {
-    /// Errors of an engine's resultants.
+    /// Errors of an engine's resultants, one per frame.
     pub fn errors(&self, engine: Engine) -> Vec<Option<Errors>> {
         let own = |forces: &Vec<Forces>| {
             let pairs = self.frames.iter().zip(forces);
@@ -189,21 +191,21 @@ impl Measured {
         match engine {
             Engine::Baseline => self.baseline.as_ref().map(own).unwrap_or_default(),
             Engine::Golden => of(&self.golden),
-            Engine::Fixed | Engine::Hardware => self.integers.as_ref().map(|i| of(&i.results)).unwrap_or_default(),
+            Engine::Fixed | Engine::Hardware => self.bit_true.as_ref().map(|i| of(&i.results)).unwrap_or_default(),
         }
     }
 
-    /// The engine's point, `None` where it does not have the case.
+    /// Errors and time of an engine; `None` if it does not support the case.
     pub fn point(&self, engine: Engine) -> Option<Point> {
         self.point_over(engine, |_| true)
     }
 
-    /// The same over some of the frames.
+    /// The same over the frames selected by `keep`.
     pub fn point_over(&self, engine: Engine, keep: impl Fn(&Frame) -> bool) -> Option<Point> {
         let seconds = match engine {
             Engine::Hardware => {
-                let integers = self.integers.as_ref().ok()?;
-                clock(&integers.model.board, &self.scene).seconds(integers.cycles)
+                let bit_true = self.bit_true.as_ref().ok()?;
+                clock(&bit_true.model.board, &self.scene).seconds(bit_true.cycles)
             }
             cpu => self.times.get(&cpu)?.seconds(),
         };
@@ -219,17 +221,16 @@ impl Measured {
         })
     }
 
-    /// Index of the frame called `id`, else 0.
+    /// Index of the frame with the id `id`, else 0.
     pub fn frame(&self, id: &str) -> usize {
         self.frames.iter().position(|frame| frame.id == id).unwrap_or(0)
     }
 }
 
-/// Measures scenes in cases on their shipped frames, in the order given; a case that does not divide an array is left
-/// out.
+/// Measures scenes in cases on their shipped frames, in the order given; cases that do not divide an array are skipped.
 ///
 /// # Errors
-/// A scene the golden model refuses or without shipped frames, no Verilator, an interruption.
+/// A scene that the golden model refuses or that has no shipped frames, no Verilator, an interruption.
 pub fn measure(scenes: &[Scene], cases: &[Case], options: &Options) -> Result<Vec<Measured>> {
     let mut tasks = Vec::new();
     for scene in scenes {
@@ -241,8 +242,8 @@ pub fn measure(scenes: &[Scene], cases: &[Case], options: &Options) -> Result<Ve
             let mut scene = scene.clone();
             (scene.partition.case, scene.partition.condition) = (case, options.condition);
             let largest = match case {
-                // One μ per contact over the whole array; a single contact's is that of case 0.
-                Case::Contacts if !frames.iter().any(|frame| Kind::of(frame) == Kind::Several) => None,
+                // One μ per contact over the whole array; equal to case 0 for a single contact.
+                Case::Contacts if !frames.iter().any(|frame| ContactCount::of(frame) == ContactCount::Several) => None,
                 Case::Contacts | Case::Adaptive => Some(scene.sensor.taxels()),
                 Case::Grid(_) => subarrays(case, &scene.sensor).ok().map(|parts| parts[0].rows * parts[0].cols),
             };
@@ -259,7 +260,7 @@ pub fn measure(scenes: &[Scene], cases: &[Case], options: &Options) -> Result<Ve
     for (done, measured) in all.iter_mut().enumerate() {
         options.interrupt.check()?;
         measured.times = timing::time(measured)?;
-        bar.at(done as u64 + 1);
+        bar.set(done as u64 + 1);
     }
     Ok(all)
 }
@@ -267,8 +268,8 @@ pub fn measure(scenes: &[Scene], cases: &[Case], options: &Options) -> Result<Ve
 fn prepare(scene: Scene, frames: Vec<Frame>, options: &Options) -> Result<Measured> {
     let engine = Golden::new(&scene)?;
     let golden = frames.iter().map(|frame| engine.run(frame)).collect::<Result<Vec<_>, _>>()?;
-    let integers = match Model::for_frames(&scene, &frames) {
-        Ok(model) => Ok(integers(model, &frames, options)?),
+    let bit_true = match Model::for_frames(&scene, &frames) {
+        Ok(model) => Ok(bit_true(model, &frames, options)?),
         Err(error @ (FixedError::DoesNotFit(_) | FixedError::Scene(_) | FixedError::Format { .. })) => {
             Err(error.to_string().lines().next().unwrap_or_default().to_owned())
         }
@@ -286,23 +287,23 @@ fn prepare(scene: Scene, frames: Vec<Frame>, options: &Options) -> Result<Measur
             (Some(literal), Ok(forces))
         }
     };
-    Ok(Measured { scene, frames, engine, golden, integers, baseline, times: BTreeMap::new(), literal })
+    Ok(Measured { scene, frames, engine, golden, bit_true, baseline, times: BTreeMap::new(), literal })
 }
 
-fn integers(model: Model, frames: &[Frame], options: &Options) -> Result<Integers> {
+fn bit_true(model: Model, frames: &[Frame], options: &Options) -> Result<BitTrue> {
     let traces = frames.iter().map(|frame| Ok(model.run(&model.readings(std::slice::from_ref(frame))?)));
     let traces: Vec<Trace> = traces.collect::<Result<_, FixedError>>()?;
     let decoded = frames.iter().zip(&traces).map(|(frame, t)| model.decode(frame, "fixed", &t.beats, &t.status));
     let results = decoded.collect::<Result<Vec<_>, _>>()?;
     let usage = generate(&model)?.usage;
     let slowest = traces.iter().map(|trace| trace.cycles.total).max().unwrap_or(0);
-    let mut integers = Integers { results, traces, equal: None, cycles: slowest, usage, model };
-    if is_simulated(&integers.model.scene, options) {
-        let verified = verify(&integers.model.scene, frames, &[Simulator::Verilator], &options.build)?;
-        integers.equal = Some(verified.findings.is_equal());
-        integers.cycles = verified.rows.iter().filter_map(|row| row.times.total()).max().unwrap_or(slowest);
+    let mut bit_true = BitTrue { results, traces, equal: None, cycles: slowest, usage, model };
+    if is_simulated(&bit_true.model.scene, options) {
+        let verified = verify(&bit_true.model.scene, frames, &[Simulator::Verilator], &options.build)?;
+        bit_true.equal = Some(verified.findings.is_equal());
+        bit_true.cycles = verified.rows.iter().filter_map(|row| row.times.total()).max().unwrap_or(slowest);
     }
-    Ok(integers)
+    Ok(bit_true)
 }
 
 /// The quick variant co-simulates the two scenes of `make run`.

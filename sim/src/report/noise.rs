@@ -6,10 +6,10 @@ use dermis_golden::noise::{Row, Spread};
 use super::table::{aligned, markdown, percent};
 use super::Format;
 
-/// A study's rows in one form. Fractions in CSV and JSON, percent in Markdown.
+/// The rows of a noise study in one format: fractions in CSV and JSON, percent in Markdown.
 ///
 /// # Errors
-/// A number JSON cannot hold.
+/// A number that JSON cannot represent.
 pub fn noise(rows: &[Row], format: Format) -> Result<String> {
     Ok(match format {
         Format::Json => serde_json::to_string(rows)? + "\n",
@@ -51,7 +51,8 @@ fn text(rows: &[Row]) -> String {
     });
     let mut text = markdown(&head, lines.collect());
     text.push_str(
-        "\nnoise: of max |b|, per taxel and frame; e_t: tangential error of the resultant; bound: Cramér–Rao\n",
+        "\nnoise: standard deviation over max |b|, per taxel and frame; e_t: tangential error of the resultant; \
+         90 %: quantile; bound: Cramér–Rao, for 6 or 9 unknowns\n",
     );
     text
 }
@@ -101,7 +102,7 @@ fn csv(rows: &[Row]) -> String {
 
 #[cfg(test)]
 mod tests {
-    use super::super::read;
+    use super::super::csv_reader;
     use super::*;
     use serde_json::Value;
 
@@ -121,7 +122,7 @@ mod tests {
         vec![noisy, silent]
     }
 
-    /// Every number of a row by its CSV name and its place in the JSON.
+    /// Every number of a row with its CSV column and its JSON pointer.
     fn numbers(row: &Row) -> [(&'static str, &'static str, Option<f64>); 12] {
         [
             ("noise", "/noise", Some(row.noise)),
@@ -140,22 +141,22 @@ mod tests {
     }
 
     #[test]
-    fn csv_comes_back() {
+    fn csv_reads_back() {
         let rows = rows();
-        let (head, records) = read::csv(&noise(&rows, Format::Csv).unwrap());
+        let (head, records) = csv_reader::csv(&noise(&rows, Format::Csv).unwrap());
         assert_eq!((head.len(), records.len()), (14, 2));
         for (row, record) in rows.iter().zip(&records) {
-            let of = |name: &str| read::field(&head, record, name);
+            let of = |name: &str| csv_reader::field(&head, record, name);
             assert_eq!((of("frames"), of("objective")), (row.frames.to_string().as_str(), row.objective));
             for (name, _, wanted) in numbers(row) {
-                // The shortest text that reads back as the same number; empty where there is none.
+                // Numbers are written so that they read back exactly; missing ones are empty.
                 assert_eq!(of(name).parse::<f64>().ok(), wanted, "{name}");
             }
         }
     }
 
     #[test]
-    fn json_comes_back() {
+    fn json_reads_back() {
         let rows = rows();
         let read: Value = serde_json::from_str(&noise(&rows, Format::Json).unwrap()).unwrap();
         assert_eq!(read.as_array().map(Vec::len), Some(2));
@@ -189,8 +190,8 @@ mod tests {
     }
 
     #[test]
-    fn no_rows_are_a_head_alone() {
-        assert_eq!(read::csv(&noise(&[], Format::Csv).unwrap()).1.len(), 0);
+    fn without_rows_only_the_header_remains() {
+        assert_eq!(csv_reader::csv(&noise(&[], Format::Csv).unwrap()).1.len(), 0);
         assert_eq!(noise(&[], Format::Json).unwrap(), "[]\n");
     }
 }

@@ -1,15 +1,15 @@
-//! Pictures: SVG by `plotters`, in the colours of [`super::style`], all of one size that reads on a phone.
+//! Pictures: SVG drawn by `plotters` in the colours of [`super::style`], all of a width that is legible on a phone.
 
 mod bars;
 mod field;
 mod flow;
-mod plane;
+mod objective_map;
 mod scatter;
 
 pub use bars::{bars, Bars};
 pub use field::{force_field, stress_map, Outline};
 pub use flow::{data_flow, FLOW_SCENE};
-pub use plane::objective;
+pub use objective_map::objective;
 pub use scatter::{scatter, Guide, Scatter, Series};
 
 use anyhow::Result;
@@ -19,15 +19,15 @@ use plotters::style::text_anchor::{HPos, Pos, VPos};
 
 use super::style::INK;
 
-/// Where pictures are drawn.
+/// Drawing area of a picture.
 type Area<'a> = DrawingArea<SVGBackend<'a>, Shift>;
 
-/// Width of every picture in its own units, which are pixels of a phone held upright.
+/// Width of every picture in SVG units, about the width of a phone in CSS pixels.
 const WIDTH: u32 = 400;
-/// Size of small print, which `plotters` takes for a line's height: letters of 13 units, 10 pixels on a phone.
+/// Font size of small text as line height, as `plotters` defines it: letters of 13 units, 10 pixels on a phone.
 const SMALL: i32 = 16;
 
-/// A picture of the common width.
+/// Draws a picture of the common width and the given height.
 fn svg(height: u32, draw: impl FnOnce(&Area) -> Result<()>) -> Result<String> {
     sized(WIDTH, height, draw)
 }
@@ -43,13 +43,13 @@ fn sized(width: u32, height: u32, draw: impl FnOnce(&Area) -> Result<()>) -> Res
     Ok(text)
 }
 
-/// Text of a size in a colour, held at a point.
+/// Text style with size, colour and anchor.
 fn label(size: i32, colour: &RGBColor, h: HPos, v: VPos) -> TextStyle<'static> {
-    // The stylesheet of the page, or the viewer of the file, has the last word on the family.
+    // The page's stylesheet or the SVG viewer chooses the font.
     ("sans-serif", size).into_font().color(colour).pos(Pos::new(h, v))
 }
 
-/// Small print about a point.
+/// Draws small text anchored at a point.
 fn note(area: &Area, text: &str, at: (i32, i32), h: HPos, v: VPos) -> Result<()> {
     area.draw_text(text, &label(SMALL, &INK, h, v), at)?;
     Ok(())

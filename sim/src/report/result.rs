@@ -1,19 +1,19 @@
-//! One reconstruction for people: resultant, error, μ per subarray, flags, and a picture of fz.
+//! One reconstruction as text: resultant, error, μ per subarray, flags, and a character map of fz.
 
 use std::fmt::Write as _;
 
 use dermis_golden::reconstruct::Reconstruction;
 use dermis_golden::sensor::Sensor;
 
-use super::table::{figures, percent};
+use super::table::{percent, significant_digits};
 use crate::compare::Difference;
 
-/// Shades from no force to the largest.
+/// Characters from zero to the largest force.
 const SHADES: [char; 8] = [' ', '.', ':', '-', '=', '+', '*', '#'];
-/// Widest picture in characters; a wider array is shown by the largest force of each group of taxels.
+/// Largest width of the map in characters; for wider arrays a character shows the largest force of a group of taxels.
 const PICTURE_COLUMNS: usize = 60;
 
-/// The summary of one result. `full_scale_MPa` is what the largest input code stood for.
+/// Summary of one result. `full_scale_MPa` is the stress of the largest input code.
 pub fn reconstruction(result: &Reconstruction, sensor: &Sensor, full_scale_MPa: f64) -> String {
     let mut text = String::new();
     // Writing to a String cannot fail.
@@ -25,9 +25,9 @@ pub fn reconstruction(result: &Reconstruction, sensor: &Sensor, full_scale_MPa: 
 fn lines(text: &mut String, result: &Reconstruction, full_scale_MPa: f64) -> std::fmt::Result {
     let largest = result.resultant_N.iter().fold(0.0, |m: f64, x| m.max(x.abs()));
     let sign = |x: f64| if x.is_sign_negative() { "" } else { "+" };
-    let [x1, x2, x3] = result.resultant_N.map(|x| sign(x).to_owned() + &figures(x, largest));
+    let [x1, x2, x3] = result.resultant_N.map(|x| sign(x).to_owned() + &significant_digits(x, largest));
     writeln!(text, "{}, frame {}, engine {}", result.scene, result.frame, result.engine)?;
-    writeln!(text, "full scale      {} MPa", figures(full_scale_MPa, full_scale_MPa))?;
+    writeln!(text, "full scale      {} MPa", significant_digits(full_scale_MPa, full_scale_MPa))?;
     writeln!(text, "resultant, N    x {x1}   y {x2}   normal {x3}")?;
     if let Some(e) = &result.error {
         let axes = [e.x1, e.x2, e.x3].map(percent);
@@ -55,7 +55,7 @@ fn lines(text: &mut String, result: &Reconstruction, full_scale_MPa: f64) -> std
     writeln!(text, "flags           {}", if flags.is_empty() { "none".to_owned() } else { flags.join(", ") })
 }
 
-/// One line for a result's distance from the golden model's.
+/// One line with the difference of a result from the golden model's.
 pub fn difference(d: &Difference) -> String {
     format!(
         "against golden  at most {:.0} LSB = {} of the largest force, RMS {:.0} LSB = {}\n",
@@ -66,7 +66,7 @@ pub fn difference(d: &Difference) -> String {
     )
 }
 
-/// fz as shades, row 0 on top, two characters per taxel where they fit.
+/// fz as a character map, row 0 on top, two characters per taxel if they fit.
 fn picture(text: &mut String, sensor: &Sensor, fz: &[f64]) {
     let peak = fz.iter().fold(0.0, |m: f64, v| m.max(v.abs()));
     if peak == 0.0 {
@@ -74,7 +74,7 @@ fn picture(text: &mut String, sensor: &Sensor, fz: &[f64]) {
     }
     let group = sensor.cols.max(sensor.rows).div_ceil(PICTURE_COLUMNS);
     let repeat = if 2 * sensor.cols <= PICTURE_COLUMNS { 2 } else { 1 };
-    text.push_str(&format!("fz, darkest {} N per taxel, o is tension\n", figures(peak, peak)));
+    text.push_str(&format!("fz, darkest {} N per taxel, o is tension\n", significant_digits(peak, peak)));
     for row in (0..sensor.rows).step_by(group) {
         let shades = (0..sensor.cols).step_by(group).map(|col| {
             let rows = row..(row + group).min(sensor.rows);

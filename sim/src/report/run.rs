@@ -1,4 +1,4 @@
-//! `dermis report`: measures, puts the sections together, writes the files.
+//! `dermis report`: measures, assembles the sections, writes the files.
 
 use std::path::{Path, PathBuf};
 use std::thread::available_parallelism;
@@ -9,16 +9,16 @@ use dermis_golden::partition::Case;
 use dermis_golden::scene::{Condition, Scene};
 
 use super::document::{Document, Section};
-use super::measure::{self, clock, machine, measure, sweep, Kind, Measured, Options, SweepPoint};
+use super::measure::{self, clock, machine, measure, sweep, ContactCount, Measured, Options, SweepPoint};
 use super::save::save;
 use super::sections::{
-    choice, choose, extremes, fields, frames, paper, published, ratios, resources, search, stability, stages, sweeps,
-    time, tried, Choice,
+    choice, choose, extremes, fields, frames, paper, published, ratios, resources, run_logs, search, stability, stages,
+    sweeps, time, Choice,
 };
 use crate::jobs::Interrupt;
-use crate::tried::Tried;
+use crate::run_log::RunLog;
 
-/// Drawn frames of a sweep, beside the shipped ones; quick and full.
+/// Number of random frames of a sweep in addition to the shipped ones: quick, full variant.
 const SWEEP_FRAMES: [u32; 2] = [0, 24];
 
 /// Arguments of `dermis report`.
@@ -30,25 +30,25 @@ const SWEEP_FRAMES: [u32; 2] = [0, 24];
   dermis report --paper                              the paper's figures and tables by their numbers
 
 Writes report.html (one file, opens offline), report.md, report.json, report-tables/*.csv and report-pictures/*.svg;
-with --paper the same named paper.")]
+with --paper the same files, named paper.")]
 pub struct Arguments {
-    /// Built-in names or paths of scenes with shipped frames; without any all built-in ones.
+    /// Built-in names or paths of scenes with shipped frames; default: all built-in ones.
     scenes: Vec<String>,
-    /// Folder for the files; without it `report` in the build folder.
+    /// Folder for the files; default: `report` in the build folder.
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
-    /// Fewer drawn frames, sweeps and co-simulations; leaves out subarrays of more than 1200 taxels.
+    /// Fewer random frames, sweeps and co-simulations; no subarrays of more than 1200 taxels.
     #[arg(long)]
     quick: bool,
-    /// The paper's figures by number, under its centroid condition, in place of the report.
+    /// Reproduce the paper's figures and tables under its centroid condition, instead of the report.
     #[arg(long)]
     paper: bool,
-    /// Cases prepared at a time; without it as many as there are processors. Times are taken one after the other.
+    /// Number of cases prepared in parallel; default: the number of processors. Times are measured sequentially.
     #[arg(long, value_name = "N", value_parser = value_parser!(u16).range(1..=64))]
     jobs: Option<u16>,
 }
 
-/// Runs the command: the path of the page, and whether all hardware equalled its model.
+/// Runs the command: the path of the HTML page, and whether all hardware equalled its model.
 ///
 /// # Errors
 /// A scene that cannot be loaded or measured, no Verilator, files that cannot be written, an interruption.
@@ -65,7 +65,7 @@ pub fn run(arguments: &Arguments, build: &Path) -> Result<(String, bool)> {
         build: build.to_owned(),
         condition: if arguments.paper { Condition::BothSigns } else { Condition::default() },
         simulate: !arguments.paper,
-        interrupt: Interrupt::of_signals()?,
+        interrupt: Interrupt::on_signals()?,
     };
     let mut cases: Vec<Case> = (0..4).filter_map(Case::numbered).collect();
     if !arguments.paper {
@@ -89,8 +89,8 @@ pub fn run(arguments: &Arguments, build: &Path) -> Result<(String, bool)> {
     options.interrupt.check()?;
     let out = arguments.out.clone().unwrap_or_else(|| build.join("report"));
     let page = save(&document, &out)?;
-    let verdicts = measured.iter().filter_map(|m| m.integers.as_ref().ok()?.equal);
-    Ok((format!("{}\n", page.display()), verdicts.clone().all(|equal| equal)))
+    let results = measured.iter().filter_map(|m| m.bit_true.as_ref().ok()?.equal);
+    Ok((format!("{}\n", page.display()), results.clone().all(|equal| equal)))
 }
 
 fn sections(measured: &[Measured], options: &Options) -> Result<Vec<Section>> {
@@ -107,53 +107,50 @@ fn sections(measured: &[Measured], options: &Options) -> Result<Vec<Section>> {
         stability(&measure::conditions(options)?)?,
         extremes(&measure::extremes(measured, options)?),
         resources(measured, &choices, options)?,
-        tried(&Tried::all(&options.build)?),
+        run_logs(&RunLog::load_all(&options.build)?),
     ])
 }
 
-/// The sweeps of the scenes that have hardware, each in its chosen case, with the kind and the number of frames.
+/// The sweeps of the scenes with hardware, each in its recommended case, with contact count and number of frames.
 fn all_sweeps(
     measured: &[Measured],
     choices: &[Choice],
     options: &Options,
-) -> Result<Vec<(Vec<SweepPoint>, Kind, usize)>> {
+) -> Result<Vec<(Vec<SweepPoint>, ContactCount, usize)>> {
     let kept = if options.quick { 1 } else { choices.len() };
-    let chosen = choices.iter().map(|choice| (&measured[choice.index].scene, choice.kind)).take(kept);
+    let chosen = choices.iter().map(|choice| (&measured[choice.index].scene, choice.contact_count)).take(kept);
     chosen
-        .map(|(scene, kind)| {
-            let frames = frames(scene, kind, SWEEP_FRAMES[usize::from(!options.quick)])?;
-            Ok((sweep(scene, &frames, options)?, kind, frames.len()))
+        .map(|(scene, contact_count)| {
+            let frames = frames(scene, contact_count, SWEEP_FRAMES[usize::from(!options.quick)])?;
+            Ok((sweep(scene, &frames, options)?, contact_count, frames.len()))
         })
         .collect()
 }
 
-/// Where the figures come from.
+/// Introduction: origin of the figures.
 fn intro(measured: &[Measured], options: &Options) -> Vec<String> {
     let mut intro = vec![machine()];
-    if let Some((m, integers)) = measured.iter().find_map(|m| Some((m, m.integers.as_ref().ok()?))) {
-        let (board, clock) = (&integers.model.board, clock(&integers.model.board, &m.scene));
+    if let Some((m, bit_true)) = measured.iter().find_map(|m| Some((m, m.bit_true.as_ref().ok()?))) {
+        let (board, clock) = (&bit_true.model.board, clock(&bit_true.model.board, &m.scene));
         intro.push(format!(
-            "Hardware: cycles from the first input beat to the last output beat, over {} MHz ({} of {}).",
+            "Hardware times: cycles from the first input beat to the last output beat, divided by {} MHz ({} of {}).",
             clock.MHz, clock.origin, board.description
         ));
     }
     if options.quick {
         intro.push(
-            "Quick variant: few drawn frames, hardware co-simulated for sensor-1 and eight-by-eight in case 0 (else \
-             the bit-true model's cycles), no subarrays above 1200 taxels, literal Eq. 1 up to 200, one sweep. The \
-             full one: dermis report."
+            "Quick variant: few random frames; hardware co-simulated for sensor-1 and eight-by-eight in case 0 only, \
+             else with the bit-true model's cycle counts; no subarrays above 1200 taxels; literal Eq. 1 up to 200 \
+             taxels; one sweep. dermis report without --quick runs everything."
                 .into(),
         );
     }
     if !options.simulate {
-        intro.push(
-            "Hardware's cycles are the bit-true model's, which dermis cosim holds equal to the hardware's.".into(),
-        );
+        intro.push("Cycle counts are the bit-true model's; dermis cosim checks that the hardware's are equal.".into());
     }
     intro.push(
-        "Frames are those shipped in golden/data/frames, with known forces; every figure was measured in this run, \
-         but for the published ones, which stand in golden/data/paper, and the counts of inputs tried, which long runs \
-         have left in the build folder."
+        "Frames are those shipped in golden/data/frames, with known forces. All figures were measured in this run, \
+         except the published ones (golden/data/paper) and the counts of long test runs (saved in the build folder)."
             .into(),
     );
     intro

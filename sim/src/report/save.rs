@@ -1,4 +1,4 @@
-//! A document's files: page, Markdown, JSON, a CSV per table, an SVG per picture.
+//! Writes a document's files: HTML, Markdown, JSON, a CSV per table, an SVG per picture.
 
 use std::collections::BTreeSet;
 use std::fs;
@@ -12,8 +12,8 @@ use super::html::html;
 use super::style::standalone;
 use dermis_golden::write::write;
 
-/// Writes all files below `folder`, each complete or not at all, and takes away what an earlier report left in its own
-/// folders. The page comes last: what it stands for is then there. Returns its path.
+/// Writes all files into `folder`, each completely or not at all, and deletes tables and pictures of an earlier report.
+/// Tables and pictures are written before the HTML page. Returns the page's path.
 ///
 /// # Errors
 /// A folder or file that cannot be written.

@@ -1,4 +1,4 @@
-//! Sections of the report, one file each, in the order of use to a reader.
+//! Sections of the report, one file each.
 
 mod choice;
 mod fields;
@@ -6,12 +6,12 @@ mod paper;
 mod published;
 mod ratios;
 mod resources;
+mod run_logs;
 mod search;
 mod stability;
 mod stages;
 mod sweeps;
 mod time;
-mod tried;
 
 pub use choice::{choice, choose, frames, Choice};
 pub use fields::fields;
@@ -19,39 +19,40 @@ pub use paper::paper;
 pub use published::published;
 pub use ratios::ratios;
 pub use resources::resources;
+pub use run_logs::run_logs;
 pub use search::search;
 pub use stability::{extremes, stability, stability_picture};
 pub use stages::stages;
 pub use sweeps::sweeps;
 pub use time::{pictures as time_pictures, time};
-pub use tried::tried;
 
 use dermis_golden::frame::Frame;
 use dermis_golden::partition::Case;
 
-use super::measure::{Kind, Measured};
+use super::measure::{ContactCount, Measured};
 
-/// The scenes measured, each once, in order.
+/// Names of the scenes measured, each once, in order.
 fn scenes(measured: &[Measured]) -> Vec<&str> {
     let mut names: Vec<&str> = measured.iter().map(|m| m.scene.name.as_str()).collect();
     names.dedup();
     names
 }
 
-/// A scene in a case, where it was measured.
+/// The measurements of a scene in a case, if it was measured.
 fn find<'a>(measured: &'a [Measured], scene: &str, case: Case) -> Option<&'a Measured> {
     measured.iter().find(|m| m.scene.name == scene && m.scene.partition.case == case)
 }
 
-/// A case with its grid, as readers know it: `1 (2×2)`.
+/// A case with its grid: `1 (2×2)`.
 fn case_text(case: Case) -> String {
     case.grid().map_or(case.to_string(), |grid| format!("{case} ({}×{})", grid.rows, grid.cols))
 }
 
-/// The frame of a scene that pictures of a kind show: the Hertz contact where there is one, else the first of the kind.
-fn shown(measured: &Measured, kind: Kind) -> usize {
-    let of_kind = |(_, frame): &(usize, &Frame)| Kind::of(frame) == kind;
-    let frames = || measured.frames.iter().enumerate().filter(of_kind);
+/// Index of the frame shown in pictures for a contact count: the Hertzian contact if there is one, else the first
+/// frame.
+fn illustrated_frame(measured: &Measured, contact_count: ContactCount) -> usize {
+    let selected = |(_, frame): &(usize, &Frame)| ContactCount::of(frame) == contact_count;
+    let frames = || measured.frames.iter().enumerate().filter(selected);
     let hertz = frames().find(|(_, frame)| frame.id.ends_with("hertz"));
     hertz.or(frames().next()).map_or(0, |(index, _)| index)
 }

@@ -1,4 +1,4 @@
-//! The table of `dermis stability` as Markdown, CSV and JSON, and for the report.
+//! Error against condition number, for `dermis stability` (Markdown, CSV, JSON) and for the report.
 
 use anyhow::Result;
 use dermis_golden::scene::Medium;
@@ -6,13 +6,13 @@ use dermis_golden::stability::{FormatErrors, Row, Spectrum};
 
 use super::csv::quoted;
 use super::data::markdown;
-use super::document::{decimal, none, percent, words, Cell, Table};
+use super::document::{decimal, empty_cell, percent, text_cell, Cell, Table};
 use super::Format;
 
-/// Condition against error, one line per scene. Fractions in CSV and JSON, percent in Markdown.
+/// Error against condition number, one row per scene: fractions in CSV and JSON, percent in Markdown.
 ///
 /// # Errors
-/// A number JSON cannot hold.
+/// A number that JSON cannot represent.
 pub fn stability(rows: &[Row], format: Format) -> Result<String> {
     Ok(match format {
         Format::Json => serde_json::to_string(rows)? + "\n",
@@ -21,10 +21,10 @@ pub fn stability(rows: &[Row], format: Format) -> Result<String> {
     })
 }
 
-/// What the columns are.
+/// Explanation of the columns.
 const LEGEND: &str = "rank: Σ λ f(λ); gain: ‖Cz⁺‖ in N/MPa; r: spectral radius at mu_max; forward: ‖Cz⁺b − p‖/‖p‖ \
                       without shear; residual: ‖b − C x‖/‖b‖; e_n, e_t: errors of the resultant with shear; bits: \
-                      least input bits for a forward error within 1 % of f64's; –: refused, or none";
+                      smallest input width for a forward error within 1 % of f64's; –: refused or not applicable";
 
 fn text(rows: &[Row]) -> String {
     let mut text = format!("{}\n{LEGEND}\n", markdown(&stability_table(rows)));
@@ -32,7 +32,7 @@ fn text(rows: &[Row]) -> String {
     text
 }
 
-/// Why there are no figures, each reason once.
+/// The reasons of refusals, each once.
 pub(super) fn refusals(rows: &[Row]) -> Vec<&String> {
     let mut reasons: Vec<&String> = Vec::new();
     for reason in rows.iter().flat_map(|row| row.refused.iter().chain(&row.fixed_refused)) {
@@ -43,7 +43,7 @@ pub(super) fn refusals(rows: &[Row]) -> Vec<&String> {
     reasons
 }
 
-/// Condition against error, one line per scene.
+/// Error against condition number, one row per scene.
 pub(super) fn stability_table(rows: &[Row]) -> Table {
     let head = [
         "varied",
@@ -69,7 +69,7 @@ pub(super) fn stability_table(rows: &[Row]) -> Table {
         "e_t fixed",
         "bits",
     ];
-    Table::new("stability", format!("Every scene. {LEGEND}"), &head, rows.iter().map(line).collect())
+    Table::new("stability", format!("All scenes. {LEGEND}"), &head, rows.iter().map(line).collect())
 }
 
 fn line(row: &Row) -> Vec<Cell> {
@@ -80,12 +80,12 @@ fn line(row: &Row) -> Vec<Cell> {
     };
     let spectrum = |pick: fn(&Spectrum) -> f64| row.spectrum.as_ref().map(pick);
     vec![
-        words(row.group.clone()),
-        words(format!("{}×{}", sensor.rows, sensor.cols)),
-        words(format!("{}×{}", sensor.pitch_x_mm, sensor.pitch_y_mm)),
-        words(sensor.thickness_mm.to_string()),
-        words(medium(row.medium)),
-        words(row.inverse),
+        text_cell(row.group.clone()),
+        text_cell(format!("{}×{}", sensor.rows, sensor.cols)),
+        text_cell(format!("{}×{}", sensor.pitch_x_mm, sensor.pitch_y_mm)),
+        text_cell(sensor.thickness_mm.to_string()),
+        text_cell(medium(row.medium)),
+        text_cell(row.inverse),
         short(spectrum(|s| s.condition)),
         decimal(spectrum(|s| s.rank), 0),
         short(spectrum(|s| s.gain)),
@@ -105,9 +105,9 @@ fn line(row: &Row) -> Vec<Cell> {
     ]
 }
 
-/// A power of ten with two digits.
+/// A number in scientific notation with two digits.
 fn short(value: Option<f64>) -> Cell {
-    value.map_or_else(none, |value| Cell { shown: format!("{value:.1e}"), number: Some(value) })
+    value.map_or_else(empty_cell, |value| Cell { shown: format!("{value:.1e}"), number: Some(value) })
 }
 
 fn medium(medium: Medium) -> String {
@@ -161,7 +161,7 @@ fn csv(rows: &[Row]) -> String {
 
 #[cfg(test)]
 mod tests {
-    use super::super::read;
+    use super::super::csv_reader;
     use super::*;
     use dermis_golden::scene::Scene;
     use dermis_golden::stability::{measure, Setting};
@@ -177,16 +177,16 @@ mod tests {
     }
 
     #[test]
-    fn csv_comes_back() {
+    fn csv_reads_back() {
         let rows = rows();
-        let (head, records) = read::csv(&stability(&rows, Format::Csv).unwrap());
-        let of = |record: usize, name: &str| read::field(&head, &records[record], name).to_owned();
+        let (head, records) = csv_reader::csv(&stability(&rows, Format::Csv).unwrap());
+        let of = |record: usize, name: &str| csv_reader::field(&head, &records[record], name).to_owned();
         assert_eq!((of(0, "varied"), of(0, "inverse")), ("a, \"b\"".to_owned(), "tsvd".to_owned()));
         let fixed = rows[0].fixed.unwrap();
         assert_eq!(of(0, "forward_fixed").parse::<f64>().unwrap(), fixed.forward);
         assert_eq!(of(0, "normal_fixed").parse::<f64>().unwrap(), fixed.normal.unwrap());
         assert_eq!(of(0, "condition").parse::<f64>().unwrap(), rows[0].spectrum.unwrap().condition);
-        // A scene without series has no figures, and its reason.
+        // A scene without convergent series has no figures, but the reason.
         assert_eq!((of(1, "condition"), of(1, "forward_f64")), (String::new(), String::new()));
         assert!(of(1, "refused").contains("needs more than degree"));
     }

@@ -3,7 +3,7 @@
 use super::table::aligned;
 use crate::stress::Outcome;
 
-/// One line per experiment, and what was violated below.
+/// One row per experiment, and the violations below.
 pub fn stress(outcomes: &[Outcome]) -> String {
     let head = [
         "scene",
@@ -32,7 +32,7 @@ pub fn stress(outcomes: &[Outcome]) -> String {
             o.cut,
             o.flagged,
             o.resets,
-            o.reset_places,
+            o.possible_reset_cycles,
             o.longest_reset,
             o.violations,
         ];

@@ -1,9 +1,9 @@
-//! Style: roles of colour in pictures, and what they are on light and dark pages.
+//! Colours of pictures, by role, on light and dark pages.
 //!
-//! A picture is drawn in stand-in colours, one per role. In a page they become CSS variables, which follow the
-//! reader's choice of light or dark. In a file of its own they become the light page's colours, with a style sheet that
-//! puts the dark ones in their place where the reader's system is dark: viewers that know no style sheets show the light
-//! ones.
+//! Pictures are drawn in placeholder colours, one per role. In the HTML page these are replaced by CSS variables, which
+//! follow the reader's light or dark theme. In SVG files they are replaced by the light theme's colours, and a style
+//! sheet in the file replaces those by the dark ones where the reader's system is dark; viewers without style sheets
+//! show the light ones.
 
 use plotters::style::RGBColor;
 
@@ -11,7 +11,7 @@ use plotters::style::RGBColor;
 const PAGE: [&str; 2] = ["#ffffff", "#12161d"];
 /// Text and axes.
 pub const INK: RGBColor = RGBColor(1, 1, 1);
-/// Lines that only guide the eye.
+/// Grid lines.
 pub const GRID: RGBColor = RGBColor(2, 2, 2);
 /// Positive values on maps: compression, normal force.
 pub const PLUS: RGBColor = RGBColor(3, 3, 3);
@@ -19,7 +19,7 @@ pub const PLUS: RGBColor = RGBColor(3, 3, 3);
 pub const MINUS: RGBColor = RGBColor(4, 4, 4);
 /// Limits and warnings.
 pub const LIMIT: RGBColor = RGBColor(5, 5, 5);
-/// Series, told apart by the colour-blind as well.
+/// Series; distinguishable with colour vision deficiency.
 pub const SERIES: [RGBColor; 8] = [
     RGBColor(16, 0, 0),
     RGBColor(17, 0, 0),
@@ -31,7 +31,7 @@ pub const SERIES: [RGBColor; 8] = [
     RGBColor(23, 0, 0),
 ];
 
-/// Each role's stand-in, CSS variable, light and dark colour.
+/// Placeholder, CSS variable, light and dark colour of each role.
 const ROLES: [(RGBColor, &str, &str, &str); 13] = [
     (INK, "ink", "#1c2330", "#e6e9ef"),
     (GRID, "grid", "#c9ced8", "#4a5364"),
@@ -48,11 +48,11 @@ const ROLES: [(RGBColor, &str, &str, &str); 13] = [
     (SERIES[7], "s7", "#12637a", "#7fdbf0"),
 ];
 
-fn stand_in(RGBColor(r, g, b): RGBColor) -> String {
+fn placeholder(RGBColor(r, g, b): RGBColor) -> String {
     format!("\"#{r:02X}{g:02X}{b:02X}\"")
 }
 
-/// The `:root` rules of a page.
+/// The page's `:root` rules, which define the CSS variables.
 pub fn variables() -> String {
     let rules = |pick: fn(&(RGBColor, &str, &'static str, &'static str)) -> &'static str| {
         ROLES.iter().map(|role| format!("--{}:{};", role.1, pick(role))).collect::<String>()
@@ -66,11 +66,11 @@ pub fn variables() -> String {
     )
 }
 
-/// The picture for a page: CSS variables, as wide as its place, a description for screen readers.
+/// The picture for the page: with CSS variables, scaled to the available width, with a description for screen readers.
 pub fn themed(svg: &str, caption: &str) -> String {
     let mut svg = svg.to_owned();
     for role in &ROLES {
-        svg = svg.replace(&stand_in(role.0), &format!("\"var(--{})\"", role.1));
+        svg = svg.replace(&placeholder(role.0), &format!("\"var(--{})\"", role.1));
     }
     let Some((head, body)) = svg.split_once('>') else { return svg };
     let box_ = head.split("viewBox=").nth(1).unwrap_or("\"0 0 1 1\"");
@@ -78,18 +78,18 @@ pub fn themed(svg: &str, caption: &str) -> String {
     format!("<svg viewBox=\"{box_}\" role=\"img\" aria-label=\"{}\">{body}", escape(caption))
 }
 
-/// The picture as a file that follows the reader's choice of light or dark; `title` and `description` are for screen
+/// The picture as an SVG file that follows the reader's light or dark theme; `title` and `description` are for screen
 /// readers.
 pub fn standalone(svg: &str, title: &str, description: &str) -> String {
     let [page, dark_page] = PAGE;
     let mut svg = svg.to_owned();
     let mut dark = format!("[fill=\"{page}\"]{{fill:{dark_page}}}");
-    for (drawn, _, light_colour, dark_colour) in ROLES {
-        let drawn = stand_in(drawn);
-        if !svg.contains(&drawn) {
+    for (role, _, light_colour, dark_colour) in ROLES {
+        let role = placeholder(role);
+        if !svg.contains(&role) {
             continue;
         }
-        svg = svg.replace(&drawn, &format!("\"{light_colour}\""));
+        svg = svg.replace(&role, &format!("\"{light_colour}\""));
         for property in ["fill", "stroke"] {
             dark.push_str(&format!("[{property}=\"{light_colour}\"]{{{property}:{dark_colour}}}"));
         }
@@ -105,7 +105,7 @@ pub fn standalone(svg: &str, title: &str, description: &str) -> String {
     }
 }
 
-/// Text between tags or in quotes.
+/// Escapes text for use between tags or in quoted attributes.
 pub fn escape(text: &str) -> String {
     text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
 }
@@ -133,8 +133,8 @@ mod tests {
     }
 
     #[test]
-    fn stand_ins_differ() {
-        let all: std::collections::BTreeSet<String> = ROLES.iter().map(|role| stand_in(role.0)).collect();
+    fn placeholders_differ() {
+        let all: std::collections::BTreeSet<String> = ROLES.iter().map(|role| placeholder(role.0)).collect();
         assert_eq!(all.len(), ROLES.len());
         // A file's style sheet tells roles, and the page, by their light colours.
         let light: std::collections::BTreeSet<&str> = ROLES.iter().map(|role| role.2).chain([PAGE[0]]).collect();

@@ -1,15 +1,15 @@
-//! Tables in Markdown, aligned, so that they read in a terminal and in a README.
+//! Markdown tables, aligned for reading in a terminal, and the tables of `dermis cosim` and `dermis table --cosim`.
 
 use dermis_golden::reconstruct::Reconstruction;
 
 use super::{CosimReport, BUDGET_US};
 use crate::compare::median;
-use crate::verify::{Row, Verified};
+use crate::verify::{FrameResult, Verified};
 
-/// Mismatches printed for people; `--json` holds more.
+/// Number of mismatches printed; `--json` contains more.
 const PRINTED: usize = 16;
 
-/// One co-simulation: a row per frame, the runs, the mismatches.
+/// One co-simulation: a row per frame, the runs, the result with mismatches.
 pub fn cosim(verified: &Verified) -> String {
     let head = [
         "frame",
@@ -29,14 +29,14 @@ pub fn cosim(verified: &Verified) -> String {
         let d = &row.difference;
         vec![
             row.frame.clone(),
-            figures(row.full_scale_MPa, row.full_scale_MPa),
+            significant_digits(row.full_scale_MPa, row.full_scale_MPa),
             percent(tangential(&row.golden)),
             percent(tangential(&row.fixed)),
             percent(normal(&row.golden)),
             percent(normal(&row.fixed)),
             format!("{:.0} LSB = {}", d.max_lsb, percent(Some(d.max_share))),
             format!("{:.0} LSB = {}", d.rms_lsb, percent(Some(d.rms_share))),
-            verdict(verified, row.equal),
+            equality_cell(verified, row.equal),
             count(row.times.latency()),
             count(row.times.total()),
             row.times.total().map_or("-".into(), |c| format!("{:.2}", verified.board.microseconds(c))),
@@ -48,7 +48,7 @@ pub fn cosim(verified: &Verified) -> String {
     text
 }
 
-/// Verdict, mismatches and margin.
+/// Equality, mismatches and margin.
 fn summary(verified: &Verified) -> String {
     let findings = &verified.findings;
     let mut text = String::new();
@@ -74,7 +74,7 @@ fn summary(verified: &Verified) -> String {
     text
 }
 
-/// One row per scene.
+/// The table of `dermis table --cosim`: one row per scene.
 pub fn scenes(all: &[Verified]) -> String {
     let head = [
         "scene",
@@ -92,7 +92,8 @@ pub fn scenes(all: &[Verified]) -> String {
     ];
     let rows = all.iter().map(|verified| {
         let report = CosimReport::new(verified);
-        let of = |value: fn(&Row) -> Option<f64>| percent(median(verified.rows.iter().filter_map(value).collect()));
+        let of =
+            |value: fn(&FrameResult) -> Option<f64>| percent(median(verified.rows.iter().filter_map(value).collect()));
         let time = report.time_us.max;
         vec![
             report.scene,
@@ -101,7 +102,7 @@ pub fn scenes(all: &[Verified]) -> String {
             of(|row| tangential(&row.fixed)),
             of(|row| normal(&row.golden)),
             of(|row| normal(&row.fixed)),
-            verdict(verified, report.equal),
+            equality_cell(verified, report.equal),
             count(report.cycles.max),
             count(report.total_cycles.max),
             report.clock_MHz.to_string(),
@@ -133,8 +134,8 @@ fn count(cycles: Option<u64>) -> String {
     cycles.map_or("-".into(), |c| c.to_string())
 }
 
-/// Whether the Verilog equals the model; nothing to say where only rust-hdl's simulation ran.
-fn verdict(verified: &Verified, equal: bool) -> String {
+/// Whether the Verilog equals the model; `-` if only rust-hdl's simulation was run.
+fn equality_cell(verified: &Verified, equal: bool) -> String {
     match (verified.verilog, equal) {
         (false, _) => "-",
         (true, true) => "yes",
@@ -143,9 +144,9 @@ fn verdict(verified: &Verified, equal: bool) -> String {
     .into()
 }
 
-/// `value` with the decimals that give `largest` (of the values shown together) five significant digits; powers of
-/// ten where that takes too many zeros.
-pub(super) fn figures(value: f64, largest: f64) -> String {
+/// Formats `value` with as many decimals as give `largest` (of the values shown together) five significant digits; in
+/// scientific notation if that takes too many zeros.
+pub(super) fn significant_digits(value: f64, largest: f64) -> String {
     const DIGITS: i32 = 5;
     let magnitude = if largest == 0.0 { 0 } else { largest.abs().log10().floor() as i32 };
     if (-4..=6).contains(&magnitude) {
@@ -156,7 +157,7 @@ pub(super) fn figures(value: f64, largest: f64) -> String {
     }
 }
 
-/// A Markdown table with columns padded to the same width; the first column is left-aligned.
+/// A Markdown table with padded columns; the first one is left-aligned, the others right-aligned.
 pub(super) fn markdown(head: &[&str], rows: Vec<Vec<String>>) -> String {
     aligned(1, head, rows)
 }
@@ -197,7 +198,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn figures_keep_five_digits_of_the_largest() {
+    fn digits_keep_five_digits_of_the_largest() {
         let cases = [
             (0.25, 0.25, "0.25000"),
             (4.123_456, 4.2, "4.1235"),
@@ -209,7 +210,7 @@ mod tests {
             (0.0, 0.0, "0.0000"),
         ];
         for (value, largest, text) in cases {
-            assert_eq!(figures(value, largest), text);
+            assert_eq!(significant_digits(value, largest), text);
         }
     }
 

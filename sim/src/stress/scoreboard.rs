@@ -1,8 +1,8 @@
-//! What must leave for what was taken, told from the accepted beats alone.
+//! Scoreboard: derives the expected output from the accepted input beats.
 //!
-//! A frame is whole with its last taxel. A `tlast` before that drops what came of it; one that is missing on the last
-//! taxel changes nothing. Either is told by [`FLAG_FRAMING`] in all subarrays of the next whole frame, the one it
-//! happened in among them, and forgotten by a reset.
+//! A frame is complete with its last taxel. An earlier `tlast` drops the frame's codes; a missing `tlast` on the last
+//! taxel changes nothing. Both set [`FLAG_FRAMING`] in all subarrays of the next complete frame, which may be the same
+//! frame. A reset clears the flag.
 
 use std::collections::VecDeque;
 
@@ -11,89 +11,97 @@ use serde::Serialize;
 
 use super::{Outcome, Sample};
 
-/// Violations that are kept; the others are counted.
-const KEPT: usize = 8;
-/// Violations after which an experiment ends.
-const ENOUGH: u64 = 100;
+/// Violations reported with text; further ones are only counted.
+const REPORTED_VIOLATIONS: usize = 8;
+/// Number of violations that ends an experiment.
+const VIOLATION_LIMIT: u64 = 100;
 
-/// Something other than it must be.
+/// A violated requirement.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct Violation {
-    /// Cycle of the experiment.
+    /// Cycle within the experiment.
     pub cycle: u64,
-    /// What.
+    /// The violated rule as text.
     pub rule: String,
 }
 
-/// A whole frame that has not left yet.
-struct Due {
+/// A complete frame that has not left yet.
+struct PendingFrame {
     sample: usize,
     flagged: bool,
-    /// Cycle of its last code, where the cycles of its beats are promised.
+    /// Cycle of its last code, if the cycles of its beats are checked.
     timed: Option<u64>,
 }
 
-/// The accepted beats' account.
+/// Input beats accepted so far and output beats due.
 pub(super) struct Scoreboard<'a> {
-    pool: &'a [Sample],
-    /// Codes of the frame that is coming.
-    taken: usize,
-    /// A wrong `tlast` since the last whole frame.
-    broken: bool,
-    due: VecDeque<Due>,
-    /// Beats that have left of the frame in front.
-    given: usize,
+    samples: &'a [Sample],
+    /// Codes accepted of the current frame.
+    accepted: usize,
+    /// Whether a `tlast` was wrong since the last complete frame.
+    framing_error: bool,
+    pending: VecDeque<PendingFrame>,
+    /// Beats delivered of the oldest pending frame.
+    delivered: usize,
     pub(super) outcome: Outcome,
 }
 
 impl<'a> Scoreboard<'a> {
-    pub(super) fn new(pool: &'a [Sample]) -> Self {
-        Scoreboard { pool, taken: 0, broken: false, due: VecDeque::new(), given: 0, outcome: Outcome::default() }
+    pub(super) fn new(samples: &'a [Sample]) -> Self {
+        Scoreboard {
+            samples,
+            accepted: 0,
+            framing_error: false,
+            pending: VecDeque::new(),
+            delivered: 0,
+            outcome: Outcome::default(),
+        }
     }
 
     pub(super) fn violate(&mut self, cycle: u64, rule: String) {
         self.outcome.violations += 1;
-        if self.outcome.first.len() < KEPT {
+        if self.outcome.first.len() < REPORTED_VIOLATIONS {
             self.outcome.first.push(Violation { cycle, rule });
         }
     }
 
-    pub(super) fn is_hopeless(&self) -> bool {
-        self.outcome.violations >= ENOUGH
+    pub(super) fn is_over_limit(&self) -> bool {
+        self.outcome.violations >= VIOLATION_LIMIT
     }
 
     pub(super) fn is_empty(&self) -> bool {
-        self.due.is_empty()
+        self.pending.is_empty()
     }
 
-    /// A code of `sample` was taken; `alone` where its frame is at full speed and no other is inside.
-    pub(super) fn taken(&mut self, cycle: u64, sample: usize, last: bool, alone: bool) {
-        let Sample { codes, taxels, .. } = &self.pool[sample];
-        self.taken += 1;
-        let at_end = self.taken.is_multiple_of(*taxels);
+    /// Records an accepted code of `sample`; `alone`: sent at full speed, with no other frame in the device.
+    pub(super) fn accepted(&mut self, cycle: u64, sample: usize, last: bool, alone: bool) {
+        let Sample { codes, taxels, .. } = &self.samples[sample];
+        self.accepted += 1;
+        let at_end = self.accepted.is_multiple_of(*taxels);
         if last != at_end {
             self.outcome.wrong_tlast += 1;
-            self.broken = true;
+            self.framing_error = true;
         }
         if last && !at_end {
             self.outcome.cut += 1;
-            self.taken = 0;
+            self.accepted = 0;
         }
-        if at_end && self.taken == codes.len() {
+        if at_end && self.accepted == codes.len() {
             self.outcome.frames_in += 1;
-            let flagged = std::mem::take(&mut self.broken);
-            self.due.push_back(Due { sample, flagged, timed: alone.then_some(cycle) });
-            self.taken = 0;
+            let flagged = std::mem::take(&mut self.framing_error);
+            self.pending.push_back(PendingFrame { sample, flagged, timed: alone.then_some(cycle) });
+            self.accepted = 0;
         }
     }
 
-    /// A beat has left.
-    pub(super) fn given(&mut self, cycle: u64, data: [i32; 3], last: bool) {
-        let Some(due) = self.due.front() else {
-            return self.violate(cycle, "a beat of no frame".to_owned());
+    /// Checks a delivered beat.
+    pub(super) fn delivered(&mut self, cycle: u64, data: [i32; 3], last: bool) {
+        let Some(frame) = self.pending.front() else {
+            return self.violate(cycle, "an output beat without a frame".to_owned());
         };
-        let Sample { beats, forces, cycles, .. } = &self.pool[due.sample];
-        let (index, flagged, promised) = (self.given, due.flagged, due.timed.map(|at| at + cycles.first_output));
+        let Sample { beats, forces, cycles, .. } = &self.samples[frame.sample];
+        let (index, flagged, first_due) =
+            (self.delivered, frame.flagged, frame.timed.map(|at| at + cycles.first_output));
         let mut wanted = beats[index];
         if flagged && index >= *forces && (index - forces).is_multiple_of(STATUS_BEATS) {
             wanted[2] |= FLAG_FRAMING as i32;
@@ -105,23 +113,23 @@ impl<'a> Scoreboard<'a> {
         if last != at_end {
             self.violate(cycle, format!("beat {index}: tlast is {last}"));
         }
-        if let Some(due) = promised.map(|first| first + index as u64).filter(|due| *due != cycle) {
+        if let Some(due) = first_due.map(|first| first + index as u64).filter(|due| *due != cycle) {
             self.violate(cycle, format!("beat {index} was due in cycle {due}"));
         }
-        self.given += 1;
+        self.delivered += 1;
         if at_end {
             self.outcome.frames_out += 1;
-            self.outcome.timed += u64::from(promised.is_some());
+            self.outcome.timed += u64::from(first_due.is_some());
             self.outcome.flagged += u64::from(flagged);
-            self.due.pop_front();
-            self.given = 0;
+            self.pending.pop_front();
+            self.delivered = 0;
         }
     }
 
-    /// What is inside is gone: it was not taken for good.
+    /// Discards all frames in the device.
     pub(super) fn reset(&mut self) {
-        self.outcome.frames_in -= self.due.len() as u64;
-        (self.taken, self.given, self.broken) = (0, 0, false);
-        self.due.clear();
+        self.outcome.frames_in -= self.pending.len() as u64;
+        (self.accepted, self.delivered, self.framing_error) = (0, 0, false);
+        self.pending.clear();
     }
 }

@@ -8,10 +8,10 @@ use dermis_golden::reconstruct::{Golden, Reconstruction};
 use dermis_golden::scene::Scene;
 
 use crate::compare::{median, quantile};
-use crate::fresh::{Fresh, Shapes};
+use crate::drawn_frames::{DrawnFrames, Shapes};
 use crate::progress::Progress;
 use crate::report::{aligned, percent};
-use crate::tabulate::{of_all, own};
+use crate::tabulate::{contact_shears, shear_over_all};
 
 /// The scene: its array holds four contacts.
 const SCENE: &str = "sensor-3";
@@ -53,7 +53,7 @@ pub fn run(names: &[String]) -> Result<String> {
             continue;
         }
         let _progress = Progress::start(&format!("{}: {label}", scene.name));
-        let frames = Fresh { frames: FRAMES, contacts: CONTACTS.to_vec(), shapes, touching, seed: 1 }.draw(&scene)?;
+        let frames = DrawnFrames { frames: FRAMES, contacts: CONTACTS.to_vec(), shapes, touching, seed: 1 }.draw(&scene)?;
         let mut row = vec![label.to_owned()];
         let mut each = Vec::new();
         for engine in &engines {
@@ -61,12 +61,12 @@ pub fn run(names: &[String]) -> Result<String> {
                 frames.iter().map(|frame| engine.run(frame)).collect::<Result<_, _>>()?;
             let pairs = || frames.iter().zip(&results);
             let error = |(frame, result): (&Frame, &Reconstruction)| {
-                of_all(&frame.contacts, frame.resultant_N, result.resultant_N)
+                shear_over_all(&frame.contacts, frame.resultant_N, result.resultant_N)
             };
             let errors: Vec<f64> = pairs().filter_map(error).collect();
             row.extend(SHARES.map(|share| percent(quantile(errors.clone(), share))));
             let regions = |(frame, result): (&Frame, &Reconstruction)| {
-                result.extra.regions.as_ref().map_or(Vec::new(), |regions| own(&frame.contacts, regions))
+                result.extra.regions.as_ref().map_or(Vec::new(), |regions| contact_shears(&frame.contacts, regions))
             };
             each.extend(pairs().flat_map(regions));
         }

@@ -1,4 +1,4 @@
-//! Programs that stand in for tools.
+//! Stand-ins for external tools.
 
 use std::fs;
 use std::os::unix::fs::PermissionsExt;

@@ -1,5 +1,5 @@
-// Toy engine with the real ports, for the bench's own tests: answers each code c of a 6-taxel frame
-// with the beat {c, c, gain*c} and closes with one status beat {0, 0, 6}. Buffers one whole frame.
+// Toy engine with the ports of the real one, for the tests of the bench: answers each code c of a 6-taxel frame with the
+// beat {c, c, gain*c}, then sends one status beat {0, 0, 6}. Buffers one whole frame.
 module toy(
     input wire clk, input wire rst,
     input wire signed [11:0] s_axis_tdata, input wire s_axis_tvalid, output wire s_axis_tready,

@@ -7,7 +7,7 @@ use std::thread::available_parallelism;
 use std::time::{Duration, Instant};
 
 use dermis_sim::jobs::{parallel, Interrupt};
-use dermis_sim::tried::{Line, Tried};
+use dermis_sim::run_log::{RunLog, TargetCounts};
 use dermis_tests::build_dir;
 
 use super::counting::{mark, most_since};
@@ -89,20 +89,20 @@ pub fn on_all_processors<R: Send>(count: usize, work: impl Fn(usize) -> R + Sync
 
 /// Prints a line per target, stores the counts of a long run for the report, and fails if anything failed.
 pub fn conclude(name: &str, unit: &str, long: bool, outcomes: Vec<(&str, Outcome)>) {
-    let mut run = Tried::new("make fuzz");
+    let mut run = RunLog::new("make fuzz");
     let mut failures = String::new();
     for (what, outcome) in outcomes {
         let counts = outcome.counts.iter().copied().chain([("failed", outcome.failures.len())]);
         let counts = counts.map(|(name, count)| (name, count as u64));
-        let line = Line::new(what, unit, outcome.tried as u64, counts, outcome.elapsed.as_secs_f64());
+        let line = TargetCounts::new(what, unit, outcome.tried as u64, counts, outcome.elapsed.as_secs_f64());
         println!("{line}; one at most {} bytes, {:.1?}", outcome.most_bytes, outcome.slowest);
-        run.lines.push(line);
+        run.targets.push(line);
         for failure in outcome.failures.iter().take(PRINTED) {
             writeln!(failures, "{failure}").unwrap();
         }
     }
     if long {
-        run.keep(&build_dir(), name).unwrap();
+        run.save(&build_dir(), name).unwrap();
         println!("kept in {}", Path::new("build/tried").join(name).with_extension("json").display());
     }
     assert!(failures.is_empty(), "{failures}");

@@ -12,7 +12,7 @@ use dermis_golden::link::{
 };
 use dermis_golden::scene::Scene;
 use dermis_hdl::link::{BoardDevice, BoardOutputs};
-use dermis_sim::board::{Sent, UartLine};
+use dermis_sim::board::{HostUart, UartSymbol};
 use dermis_sim::hardware::{Hardware, Simulator};
 use dermis_tests::{build_dir, scene};
 
@@ -76,7 +76,7 @@ impl Questions {
 }
 
 struct Board {
-    line: UartLine,
+    uart: HostUart,
     decoder: Decoder,
     questions: Questions,
     /// A number of cycles longer than a frame takes.
@@ -102,20 +102,20 @@ impl Board {
         model.board.uart_baud = baud;
         let silence = Cycles::longest(model).total + 1_000;
         let clock_hz = Identity::of(model).unwrap().clock_hz;
-        let line = UartLine::new(device(model, simulators), baud, clock_hz);
-        Board { line, decoder: Decoder::default(), questions, silence }
+        let uart = HostUart::new(device(model, simulators), baud, clock_hz);
+        Board { uart, decoder: Decoder::default(), questions, silence }
     }
 
     fn send(&mut self, wire: &[u8]) {
-        wire.iter().for_each(|&byte| self.line.send(Sent::Byte(byte)));
+        wire.iter().for_each(|&byte| self.uart.send(UartSymbol::Byte(byte)));
     }
 
     /// All packets received until there is none for longer than a frame takes.
     fn receive(&mut self) -> Vec<Packet> {
-        while self.line.quiet() < self.silence {
-            self.line.cycle();
+        while self.uart.idle_cycles() < self.silence {
+            self.uart.cycle();
         }
-        let bytes = self.line.received();
+        let bytes = self.uart.received();
         let packets = bytes.iter().filter_map(|&byte| self.decoder.next(byte));
         packets.collect::<Result<_, _>>().unwrap()
     }
@@ -211,7 +211,7 @@ fn every_packet_dropped_is_counted_once_under_its_cause() {
     }
     // A byte without stop bit affects its own packet only.
     board.send(&frame[..50]);
-    board.line.send(Sent::NoStop(frame[50]));
+    board.uart.send(UartSymbol::NoStop(frame[50]));
     board.send(&frame[51..]);
     assert_eq!(board.receive(), []);
     board.send(&frame);
@@ -225,7 +225,7 @@ fn every_packet_dropped_is_counted_once_under_its_cause() {
 fn a_host_whose_bit_rate_is_two_percent_off_is_understood() {
     for baud in [BAUD / 100 * 98, BAUD / 100 * 102] {
         let mut board = Board::new(&[Simulator::Verilator]);
-        board.line.set_baud(baud);
+        board.uart.set_baud(baud);
         board.send(&board.frame(0, Kind::FrameForForces, 3).to_wire());
         assert!(board.receive() == [board.answer(0, Kind::FrameForForces, 3, false)], "{baud} bit/s");
     }

@@ -159,7 +159,7 @@ fn is_whole(board: &mut Board, cuts: [usize; 2]) -> bool {
     let frames = [0, 1, 2].map(|index| board.questions.frame(index, kind, index as u8).to_wire()).concat();
     let (mut sent, mut packets) = (0, Vec::new());
     for &edges in cuts.iter().cycle().take(PATIENCE / 10) {
-        let bytes = board.controller.cut(&frames[sent.min(frames.len())..], edges);
+        let bytes = board.controller.transfer_edges(&frames[sent.min(frames.len())..], edges);
         // The board has a byte at the rising edge of its last bit.
         sent += (edges + 1) / EDGES;
         packets.extend(board.read(bytes));

@@ -1,4 +1,4 @@
-//! The clock that turns cycles into time, and where it comes from.
+//! The clock by which cycles are converted to time, and its origin.
 
 use dermis_golden::board::Board;
 use dermis_golden::scene::Scene;
@@ -8,16 +8,14 @@ use crate::bitstream::baseline::Baselines;
 /// A clock with its origin.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Clock {
-    /// Frequency.
+    /// Frequency in MHz.
     pub MHz: f64,
-    /// Whether place and route has shown that the scene reaches it, or the board's file alone says so.
+    /// `place and route` if the scene has a committed baseline on the board, else `design clock`.
     pub origin: &'static str,
 }
 
-/// The engine's clock for a scene on a board: the one place that decides.
-///
-/// A bitstream runs at the board's clock, however much faster its design could be; a scene that has missed it when it was
-/// last placed runs at what it has reached.
+/// The engine's clock for a scene on a board: the board's clock, or, if the scene's committed baseline is slower, the
+/// highest clock that it has reached.
 pub fn clock(board: &Board, scene: &Scene) -> Clock {
     match Baselines::committed().get(&board.name, &scene.name) {
         Some(placed) => Clock { MHz: board.clock_MHz.min(placed.best_MHz), origin: "place and route" },
@@ -26,7 +24,7 @@ pub fn clock(board: &Board, scene: &Scene) -> Clock {
 }
 
 impl Clock {
-    /// Time of so many cycles in s.
+    /// Time of `cycles` in s.
     pub fn seconds(&self, cycles: u64) -> f64 {
         cycles as f64 / (1e6 * self.MHz)
     }

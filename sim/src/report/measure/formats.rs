@@ -1,4 +1,4 @@
-//! Formats: a few number formats for a scene, from the cheapest to the finest, on the same frames.
+//! Number formats: errors and resources of candidate formats of a scene on the same frames.
 
 use anyhow::Result;
 use dermis_golden::fixed::{Cycles, Model};
@@ -7,37 +7,37 @@ use dermis_golden::scene::Scene;
 
 use crate::compare::{median, quantile};
 
-/// `input_bits`, `inverse_bits`, `data_bits`, `coef_bits` that are worth a choice.
+/// Candidate formats from the cheapest to the finest: `input_bits`, `inverse_bits`, `data_bits`, `coef_bits`.
 const CANDIDATES: [[u32; 4]; 5] =
     [[16, 18, 16, 16], [16, 18, 18, 18], [16, 24, 18, 18], [20, 18, 18, 18], [20, 24, 18, 18]];
 
-/// A format of a scene and what it gives.
+/// Errors and resources of a scene in one format.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FormatRow {
     /// Scene name.
     pub scene: String,
-    /// The case, as scenes name it.
+    /// Case, as named in scene files.
     pub case: String,
     /// `input_bits`, `inverse_bits`, `data_bits`, `coef_bits`.
     pub bits: [u32; 4],
     /// Tangential error of the bit-true model, median over the frames.
     pub tangential: Option<f64>,
-    /// Nine of ten frames stay below.
+    /// 90 % quantile of the tangential error.
     pub ninety: Option<f64>,
-    /// Normal error, median.
+    /// Normal error, median over the frames.
     pub normal: Option<f64>,
-    /// From the first input beat to the last output beat with every subarray searched.
+    /// Cycles from the first input beat to the last output beat if every subarray is searched.
     pub cycles: u64,
-    /// Block RAMs.
+    /// Number of block RAMs.
     pub block_rams: usize,
-    /// Multipliers.
+    /// Number of multipliers.
     pub multipliers: usize,
 }
 
-/// The candidates that a scene can have on its board.
+/// Measures the candidate formats with which a scene fits its board.
 ///
 /// # Errors
-/// A frame that is not the scene's.
+/// A frame of another sensor.
 pub fn formats(scene: &Scene, frames: &[Frame]) -> Result<Vec<FormatRow>> {
     let mut rows = Vec::new();
     for bits in CANDIDATES {

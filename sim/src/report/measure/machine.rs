@@ -1,8 +1,8 @@
-//! What the report was measured on.
+//! Description of the machine that ran the measurement.
 
 use std::thread::available_parallelism;
 
-/// Processor, cores and versions in one sentence.
+/// Processor, number of cores and versions in one sentence.
 pub fn machine() -> String {
     let info = std::fs::read_to_string("/proc/cpuinfo").unwrap_or_default();
     let name = info.lines().find_map(|line| line.strip_prefix("model name")?.split_once(": "));

@@ -1,4 +1,4 @@
-//! Stability: the table's scenes and the extreme frames, for the report.
+//! Measurements of numerical stability for the report: error against condition number, extreme frames.
 
 use anyhow::Result;
 use dermis_golden::partition::Case;
@@ -8,10 +8,11 @@ use dermis_golden::stability::{self, extreme, settings, Setting};
 use super::{Measured, Options};
 use crate::jobs::parallel;
 
-/// Most taxels of a scene whose extreme frames are shown: each frame has a model of its own.
+/// Largest scene, in taxels, whose extreme frames are measured, as each frame needs its own model.
 const EXTREME_TAXELS: usize = 100;
 
-/// Condition against error; the quick variant keeps the thicknesses with the default inverse and the 50 digits.
+/// Error against condition number; the quick variant keeps only the series over thickness with the default inverse, and
+/// the frames computed with 50 digits.
 ///
 /// # Errors
 /// An interruption.
@@ -23,7 +24,8 @@ pub fn conditions(options: &Options) -> Result<Vec<stability::Row>> {
     parallel("stability", wanted, options.jobs, &options.interrupt, |setting| Ok(stability::measure(&setting)?))
 }
 
-/// What both models make of the extreme frames of the small scenes, by name; the quick variant takes the first.
+/// Results of both models on the extreme frames of the small scenes, by scene name; the quick variant measures only the
+/// first scene.
 ///
 /// # Errors
 /// A scene that the golden model refuses, an interruption.

@@ -1,8 +1,8 @@
-//! Stages: how far the integers of each stage are from the same stage in floating point, in its own LSB.
+//! Differences between fixed and floating point at each stage, in the stage's LSB.
 //!
-//! The floating-point side starts from the stress itself and has the matrices unrounded, but takes the block exponents
-//! of the integers, so that both count in the same unit. With s the left shift of `normalise` and r the right shift of
-//! `rescale` of a subarray:
+//! The floating-point reference starts from the unquantised stress with unrounded matrices, but uses the block
+//! exponents of the bit-true model, so that both have the same unit. With s the left shift of `normalise` and r the
+//! right shift of `rescale` of a subarray:
 //!
 //! | stage | floating point | LSB |
 //! |---|---|---|
@@ -12,13 +12,13 @@
 //! | rescale | the same | a 2^r = w |
 //! | unfold | v_ij (mu_max/3)^(i+j) per taxel | w/4 |
 //! | search | the golden model's μ | mu_max/384 |
-//! | force | p at the integers' own μ | w/4 |
-//! | send | the golden model's forces | force word's |
+//! | force | p at the bit-true model's μ | w/4 |
+//! | send | the golden model's forces | that of the force word |
 //!
-//! Shares are of the frame's largest value in physical units, so that a subarray with next to no load, whose block
-//! exponent makes rounding look large, weighs what it is worth.
+//! Shares are relative to the frame's largest value in physical units, so that a subarray with little load, in whose
+//! small LSB rounding looks large, does not dominate.
 //!
-//! So `force` shows what the arithmetic costs, and `send` what it costs with the search's answer in it.
+//! Stage `force` thus shows the error of the arithmetic alone, stage `send` the error of arithmetic and search.
 
 use dermis_golden::fixed::arith::{bit_length, hadamard};
 use dermis_golden::fixed::formats::{Formats, MU_STEPS, SEARCH_EXTRA_BITS};
@@ -27,18 +27,18 @@ use dermis_golden::fixed::send::{Status, STATUS_BEATS};
 use dermis_golden::float::pass::Polynomial;
 use dermis_golden::quantise::full_scale;
 
-use super::{Integers, Measured};
+use super::{BitTrue, Measured};
 
 /// One stage of one frame.
 #[derive(Clone, Debug, PartialEq)]
 pub struct StageRow {
     /// Scene name.
     pub scene: String,
-    /// The case, as scenes name it.
+    /// Case, as named in scene files.
     pub case: String,
     /// Frame name.
     pub frame: String,
-    /// Stage name, as everywhere.
+    /// Stage name.
     pub stage: &'static str,
     /// Largest difference, in LSB.
     pub max_lsb: f64,
@@ -48,30 +48,30 @@ pub struct StageRow {
     pub max_share: f64,
     /// RMS difference over the stage's largest value.
     pub rms_share: f64,
-    /// Bits that the largest word takes, sign included.
+    /// Bits needed by the largest word, sign included.
     pub used_bits: u32,
-    /// Bits of the word.
+    /// Width of the word in bits.
     pub has_bits: u32,
-    /// Words held at the end of their range.
+    /// Number of saturated words.
     pub saturations: u32,
 }
 
-/// Words with their floating-point counterparts in LSB, and what an LSB is worth.
+/// Words with their floating-point references in LSB, and the value of an LSB.
 #[derive(Default)]
-struct Pairs {
+struct ComparedWords {
     words: Vec<i64>,
     values: Vec<f64>,
     lsb: Vec<f64>,
 }
 
-impl Pairs {
+impl ComparedWords {
     fn add(&mut self, words: impl IntoIterator<Item = i64>, values: impl IntoIterator<Item = f64>) {
         self.words.extend(words);
         self.values.extend(values);
         self.lsb.resize(self.words.len(), 1.0);
     }
 
-    /// A quad of words that count in the same LSB.
+    /// Adds a quad of words with a common LSB.
     fn add_quad(&mut self, words: &[i64], (values, lsb): ([f64; 4], f64)) {
         self.words.extend(words);
         self.values.extend(values);
@@ -79,12 +79,12 @@ impl Pairs {
     }
 }
 
-/// All stages of a frame, in pipeline order; none where there is no bit-true model or the input is no plain stress.
+/// All stages of a frame in pipeline order; empty without bit-true model.
 pub fn stages(measured: &Measured, index: usize) -> Vec<StageRow> {
-    let Ok(integers) = &measured.integers else { return Vec::new() };
-    let shadow = Shadow::new(measured, integers, index);
-    let f = &integers.model.formats;
-    let sum = |pick: fn(&Status) -> u32| shadow.status.iter().map(pick).sum::<u32>();
+    let Ok(bit_true) = &measured.bit_true else { return Vec::new() };
+    let reference = FloatReference::new(measured, bit_true, index);
+    let f = &bit_true.model.formats;
+    let sum = |pick: fn(&Status) -> u32| reference.status.iter().map(pick).sum::<u32>();
     let bits = [
         ("receive", f.code_bits, 0),
         ("normalise", f.input_bits, 0),
@@ -94,17 +94,20 @@ pub fn stages(measured: &Measured, index: usize) -> Vec<StageRow> {
         ("unfold", f.vector_bits + 2, 0),
         ("search", bit_length(MU_STEPS as u64) + 1, 0),
         ("force", f.search_bits[0], 0),
-        ("send", 32, shadow.status.first().map_or(0, |status| status.force_saturations)),
+        ("send", 32, reference.status.first().map_or(0, |status| status.force_saturations)),
     ];
     let row = |(stage, has_bits, saturations)| {
-        let pairs = shadow.pairs(stage);
-        let off = || pairs.words.iter().zip(&pairs.values).map(|(word, value)| (*word as f64 - value).abs());
-        let worth = || off().zip(&pairs.lsb).map(|(off, lsb)| off * lsb);
-        let peak =
-            pairs.values.iter().zip(&pairs.lsb).fold(0.0, |peak: f64, (value, lsb)| peak.max((value * lsb).abs()));
+        let compared = reference.compared_words(stage);
+        let off = || compared.words.iter().zip(&compared.values).map(|(word, value)| (*word as f64 - value).abs());
+        let worth = || off().zip(&compared.lsb).map(|(off, lsb)| off * lsb);
+        let peak = compared
+            .values
+            .iter()
+            .zip(&compared.lsb)
+            .fold(0.0, |peak: f64, (value, lsb)| peak.max((value * lsb).abs()));
         let share = |value: f64| if peak > 0.0 { value / peak } else { 0.0 };
-        let rms = |squares: f64| (squares / pairs.words.len().max(1) as f64).sqrt();
-        let used = pairs.words.iter().map(|word| bit_length((word ^ (word >> 63)) as u64) + 1).max();
+        let rms = |squares: f64| (squares / compared.words.len().max(1) as f64).sqrt();
+        let used = compared.words.iter().map(|word| bit_length((word ^ (word >> 63)) as u64) + 1).max();
         StageRow {
             scene: measured.scene.name.clone(),
             case: measured.scene.partition.case.to_string(),
@@ -122,27 +125,27 @@ pub fn stages(measured: &Measured, index: usize) -> Vec<StageRow> {
     bits.into_iter().map(row).filter(|row| row.used_bits > 0).collect()
 }
 
-/// A frame in floating point beside its integers.
-struct Shadow<'a> {
+/// Floating-point reference of a frame.
+struct FloatReference<'a> {
     measured: &'a Measured,
-    integers: &'a Integers,
+    bit_true: &'a BitTrue,
     index: usize,
     status: Vec<Status>,
-    /// Stress of a code's LSB.
+    /// Stress of one LSB of a code.
     code_MPa: f64,
-    /// Of each subarray.
+    /// The family p(μ) of each subarray.
     families: Vec<Polynomial>,
 }
 
-impl<'a> Shadow<'a> {
-    fn new(measured: &'a Measured, integers: &'a Integers, index: usize) -> Self {
-        let (model, frame) = (&integers.model, &measured.frames[index]);
-        let beats = &integers.traces[index].status;
+impl<'a> FloatReference<'a> {
+    fn new(measured: &'a Measured, bit_true: &'a BitTrue, index: usize) -> Self {
+        let (model, frame) = (&bit_true.model, &measured.frames[index]);
+        let beats = &bit_true.traces[index].status;
         let stress = |part: &dermis_golden::partition::Subarray| part.gather(&model.scene.sensor, &frame.stress_MPa);
         let family = |b: Vec<f64>| Polynomial::of_degree(measured.engine.matrices(), &b, model.formats.degree);
-        Shadow {
+        FloatReference {
             measured,
-            integers,
+            bit_true,
             index,
             status: beats.chunks(STATUS_BEATS).filter_map(Status::of_beats).collect(),
             code_MPa: full_scale(&model.scene, frame) / model.prepare.largest(),
@@ -151,62 +154,62 @@ impl<'a> Shadow<'a> {
     }
 
     fn formats(&self) -> &Formats {
-        &self.integers.model.formats
+        &self.bit_true.model.formats
     }
 
-    /// The words of a stage of all subarrays, four to a quad.
+    /// The words of a stage, of all subarrays in order; four fields per quad.
     fn words(&self, stage: &str) -> &[Vec<i64>] {
-        let stages = &self.integers.traces[self.index].stages;
+        let stages = &self.bit_true.traces[self.index].stages;
         stages.iter().find(|s| s.name == stage).map_or(&[], |s| &s.words)
     }
 
-    fn pairs(&self, stage: &str) -> Pairs {
-        let mut pairs = Pairs::default();
+    fn compared_words(&self, stage: &str) -> ComparedWords {
+        let mut compared = ComparedWords::default();
         match stage {
             "receive" => {
                 let values = self.measured.frames[self.index].stress_MPa.iter().map(|b| b / self.code_MPa);
-                pairs.add(self.words(stage).iter().flatten().copied(), values);
+                compared.add(self.words(stage).iter().flatten().copied(), values);
             }
-            "search" => self.search(&mut pairs),
-            "send" => self.send(&mut pairs),
+            "search" => self.search(&mut compared),
+            "send" => self.send(&mut compared),
             _ => {
                 let words = self.words(stage);
                 let own = words.len() / self.status.len().max(1);
                 for (part, words) in words.chunks(own.max(1)).enumerate() {
                     let values = self.quads(stage, part);
-                    words.iter().zip(values).for_each(|(words, values)| pairs.add_quad(words, values));
+                    words.iter().zip(values).for_each(|(words, values)| compared.add_quad(words, values));
                 }
             }
         }
-        pairs
+        compared
     }
 
-    /// μ of every subarray that was searched.
-    fn search(&self, pairs: &mut Pairs) {
+    /// Adds μ of every subarray that was searched.
+    fn search(&self, compared: &mut ComparedWords) {
         let step = self.measured.scene.search.mu_max / MU_STEPS as f64;
         let golden = &self.measured.golden[self.index].subarrays;
         for (status, golden) in self.status.iter().zip(golden).filter(|(_, golden)| golden.objective_value.is_some()) {
-            pairs.add(status.position.map(i64::from), golden.mu.map(|mu| mu / step));
+            compared.add(status.position.map(i64::from), golden.mu.map(|mu| mu / step));
         }
     }
 
-    /// The forces as they leave.
-    fn send(&self, pairs: &mut Pairs) {
-        let model = &self.integers.model;
+    /// Adds the output forces.
+    fn send(&self, compared: &mut ComparedWords) {
+        let model = &self.bit_true.model;
         if model.sends_resultants() {
             return;
         }
         let lsb_N = model.force_lsb_N(self.code_MPa * model.prepare.largest());
         let forces = &self.measured.golden[self.index].forces_N;
-        let beats = &self.integers.traces[self.index].beats;
+        let beats = &self.bit_true.traces[self.index].beats;
         for (k, axis) in [&forces.fx, &forces.fy, &forces.fz].into_iter().enumerate() {
-            pairs.add(beats.iter().map(|beat| i64::from(beat[k])), axis.iter().map(|f| f / lsb_N));
+            compared.add(beats.iter().map(|beat| i64::from(beat[k])), axis.iter().map(|f| f / lsb_N));
         }
     }
 
-    /// The values of a stage of one subarray in quads, in LSB, with the LSB in MPa or N.
+    /// The reference values of a stage of one subarray in quads, in LSB, each with its LSB in MPa or N.
     fn quads(&self, stage: &str, part: usize) -> Vec<([f64; 4], f64)> {
-        let (f, model, status) = (self.formats(), &self.integers.model, &self.status[part]);
+        let (f, model, status) = (self.formats(), &self.bit_true.model, &self.status[part]);
         let layout = model.layout();
         let scene = &self.measured.scene;
         let code = self.code_MPa / 2f64.powi(status.normalise as i32);
@@ -255,7 +258,7 @@ impl<'a> Shadow<'a> {
     }
 }
 
-/// A quad in LSB, with the LSB.
+/// Converts a quad to LSBs; returns it with the LSB.
 fn in_lsb(quad: [f64; 4], lsb: f64) -> ([f64; 4], f64) {
     (quad.map(|value| value / lsb), lsb)
 }
@@ -282,20 +285,20 @@ mod tests {
         let scenes = |names: &[&str]| names.iter().map(|name| Scene::builtin(name).unwrap()).collect::<Vec<_>>();
         let mut measured = measure(&scenes(&["sensor-1", "eight-by-eight"]), &cases(&[0, 1, 3]), &options).unwrap();
         measured.extend(measure(&scenes(&["sensor-4"]), &cases(&[1]), &options).unwrap());
-        // Sensor 4 fits in case 1, where Ay is Ax transposed.
+        // sensor-4 fits the board in case 1, where Ay is Ax transposed.
         let rows: Vec<StageRow> = measured.iter().flat_map(|measured| stages(measured, 0)).collect();
         assert_eq!(rows.len(), 9 * 7);
         for row in &rows {
             let (stage, what) = (row.stage, format!("{row:?}"));
             assert!(row.used_bits <= row.has_bits, "{what}");
             match stage {
-                // Rounded once.
+                // The only error is one rounding.
                 "receive" => assert!(row.max_lsb <= 0.5 + 1e-9, "{what}"),
                 "search" | "send" => {}
-                // 20-bit input, 18-bit operands, pruning at 2⁻¹⁷ and below: 2⁻¹² of the largest is far off.
+                // 20-bit input, 18-bit operands, pruning at 2⁻¹⁷ or below: an error of 2⁻¹² would show a defect.
                 _ => assert!(row.max_share < 2.4e-4, "{what}"),
             }
-            // What counts in the wrong unit is off by half of itself at least.
+            // A wrong unit would give an error of at least half the value.
             assert!(stage == "search" || row.rms_share < 0.25, "{what}");
         }
         assert!(rows.iter().filter(|row| row.stage == "pass").all(|row| row.rms_lsb > 0.0));

@@ -1,4 +1,4 @@
-//! Sweep: one field of a scene changed at a time, and what that does to error, cycles and board.
+//! Parameter sweeps: one field of a scene changed at a time; effect on errors, cycles and resources.
 
 use anyhow::Result;
 use dermis_golden::fixed::{Cycles, FixedError, Model};
@@ -10,40 +10,40 @@ use super::Options;
 use crate::compare::median;
 use crate::jobs::parallel;
 
-/// A setting and what it gives.
+/// Errors, cycles and resources of one setting.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SweepPoint {
     /// Scene name.
     pub scene: String,
-    /// The case from which it starts, as scenes name it.
+    /// Case of the unchanged scene, as named in scene files.
     pub case: String,
-    /// What is swept, by its name in scenes.
+    /// Name of the swept field, as in scene files.
     pub field: &'static str,
-    /// Its value.
+    /// Value of the field.
     pub value: String,
-    /// Whether it is the scene's own.
+    /// Whether it is the value of the unchanged scene.
     pub own: bool,
     /// Tangential error of the bit-true model, median over the frames.
     pub tangential: Option<f64>,
-    /// Normal error, likewise.
+    /// Normal error of the bit-true model, median over the frames.
     pub normal: Option<f64>,
-    /// From the first input beat to the last output beat with every subarray searched.
+    /// Cycles from the first input beat to the last output beat if every subarray is searched.
     pub cycles: u64,
-    /// Block RAMs.
+    /// Number of block RAMs.
     pub block_rams: usize,
-    /// Multipliers.
+    /// Number of multipliers.
     pub multipliers: usize,
-    /// Whether the board has them.
+    /// Whether the design fits the board.
     pub fits: bool,
 }
 
-/// What a task needs.
+/// A sweep's task: name of the field, value, change of the scene, degree of the series if that is swept.
 type Task = (&'static str, String, Box<dyn Fn(&mut Scene) + Send>, Option<usize>);
 
-/// All sweeps of a scene.
+/// Runs all sweeps of a scene.
 ///
 /// # Errors
-/// A frame that is not the scene's; an interruption.
+/// A frame of another sensor; an interruption.
 pub fn sweep(scene: &Scene, frames: &[Frame], options: &Options) -> Result<Vec<SweepPoint>> {
     let tasks = tasks(scene);
     let own = Model::new(scene)?;
@@ -56,7 +56,7 @@ pub fn sweep(scene: &Scene, frames: &[Frame], options: &Options) -> Result<Vec<S
         };
         match model {
             Ok(model) => Ok(Some(point(&model, &own, field, value, frames)?)),
-            // A setting that the scene cannot have is no point.
+            // Settings that the scene does not support are skipped.
             Err(
                 FixedError::DoesNotFit(_) | FixedError::Scene(_) | FixedError::Format { .. } | FixedError::Partition(_),
             ) => Ok(None),

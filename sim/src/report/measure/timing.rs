@@ -1,4 +1,4 @@
-//! Times of a frame on the CPU: three repeats over the frames, one engine at a time.
+//! Times per frame on the CPU: three repeats over the frames, one engine at a time.
 
 use std::collections::BTreeMap;
 use std::time::{Duration, Instant};
@@ -8,25 +8,25 @@ use anyhow::Result;
 use super::{Engine, Measured};
 use crate::compare::median;
 
-/// Repeats of every engine on every frame.
+/// Number of repeats of every engine.
 pub const REPEATS: usize = 3;
-/// An engine gets no further frame in a repeat that has lasted so long; each repeat has one at least.
+/// Time after which a repeat runs no further frame; each repeat runs at least one.
 const PATIENCE: Duration = Duration::from_secs(2);
 
-/// Times of a frame, in s.
+/// Times per frame, in s.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Timing {
-    /// Median over the frames, of each repeat.
+    /// Median over the frames, for each repeat.
     pub repeats: Vec<f64>,
 }
 
 impl Timing {
-    /// The middle repeat.
+    /// Median of the repeats.
     pub fn seconds(&self) -> f64 {
         median(self.repeats.clone()).unwrap_or(f64::NAN)
     }
 
-    /// Times `run` on each frame by its index.
+    /// Measures `run` on each frame, given by its index.
     pub(super) fn of(frames: usize, mut run: impl FnMut(usize) -> Result<()>) -> Result<Timing> {
         let mut repeats = Vec::with_capacity(REPEATS);
         for _ in 0..REPEATS {
@@ -45,7 +45,7 @@ impl Timing {
     }
 }
 
-/// Times every engine that the case has.
+/// Measures every CPU engine that supports the case.
 pub(super) fn time(measured: &Measured) -> Result<BTreeMap<Engine, Timing>> {
     let frames = &measured.frames;
     let mut times = BTreeMap::new();
@@ -56,11 +56,11 @@ pub(super) fn time(measured: &Measured) -> Result<BTreeMap<Engine, Timing>> {
             Ok(())
         })?,
     );
-    if let Ok(integers) = &measured.integers {
+    if let Ok(bit_true) = &measured.bit_true {
         times.insert(
             Engine::Fixed,
             Timing::of(frames.len(), |k| {
-                integers.model.reconstruct(&frames[k])?;
+                bit_true.model.reconstruct(&frames[k])?;
                 Ok(())
             })?,
         );

@@ -1,4 +1,4 @@
-//! Bars: groups of values side by side, upright or lying, on a common axis.
+//! Bar charts: groups of horizontal bars on a common axis.
 
 use anyhow::Result;
 use plotters::prelude::*;
@@ -7,32 +7,32 @@ use plotters::style::text_anchor::{HPos, VPos};
 use super::super::style::{GRID, INK, LIMIT};
 use super::{label, note, svg, WIDTH};
 
-/// Left edge of the bars, right of their names.
+/// Left edge of the bars; their names are to the left.
 const LEFT: i32 = 132;
 const RIGHT: i32 = 344;
 const TOP: i32 = 10;
-/// Height of a bar, and room between groups.
+/// Height of a bar, and space between groups.
 const BAR: i32 = 14;
 const GAP: i32 = 7;
 
-/// What to draw: lying bars about zero.
+/// Content of a bar chart; bars start at zero.
 #[derive(Clone, Debug)]
 pub struct Bars {
     /// Name and unit of the axis.
     pub axis: String,
-    /// Name of a group, and its values in the order of `series`; `None` leaves the place empty.
+    /// Name of each group, and its values in the order of `series`; `None` draws no bar.
     pub groups: Vec<(String, Vec<Option<f64>>)>,
-    /// Names and colours.
+    /// Name and colour of each series.
     pub series: Vec<(String, RGBColor)>,
-    /// Text of a value.
+    /// Formats the text beside a bar.
     pub text: fn(f64) -> String,
-    /// A line across, for example a budget.
+    /// Value at which a line is drawn, for example a budget.
     pub limit: Option<f64>,
-    /// Logarithmic, from a tenth of the smallest value.
+    /// Whether the axis is logarithmic; it then starts at a tenth of the smallest value.
     pub log: bool,
 }
 
-/// Draws them.
+/// Draws a bar chart as SVG.
 ///
 /// # Errors
 /// A picture that cannot be written.
@@ -63,7 +63,7 @@ pub fn bars(plot: &Bars) -> Result<String> {
                 area.draw(&Rectangle::new(corners, colour.filled()))?;
                 let (h, x) =
                     if *value < 0.0 && !plot.log { (HPos::Left, zero + 4) } else { (HPos::Left, end.max(zero) + 4) };
-                // Not across the limit.
+                // Text that would cross the limit's line is moved to its right.
                 let limit = plot.limit.map(at).filter(|limit| x <= *limit && *limit < x + 36);
                 let x = limit.map_or(x, |limit| limit + 4);
                 area.draw_text(&(plot.text)(*value), &label(14, &INK, h, VPos::Center), (x, y + BAR / 2))?;

@@ -1,4 +1,5 @@
-//! Maps of the array: stress by colour, forces by colour (normal) and arrows (tangential), with the subarrays.
+//! Maps of the array: stress as colour, normal forces as colour, tangential forces as arrows, with the subarrays'
+//! outlines.
 
 use anyhow::Result;
 use dermis_golden::frame::Forces;
@@ -14,25 +15,25 @@ use super::{label, note, svg, Area, WIDTH};
 const SIDE: f64 = 290.0;
 /// Upper left corner of the map.
 const CORNER: (f64, f64) = (38.0, 24.0);
-/// Below this share of the largest value a cell is left blank.
+/// Share of the largest value below which a cell is left blank.
 const BLANK: f64 = 0.004;
-/// Most arrows along a side; a finer array has one for each group of taxels, their sum.
+/// Largest number of arrows along a side; on larger arrays an arrow shows the sum over a group of taxels.
 const ARROWS: usize = 24;
-/// Share of the longest arrow below which there is none.
+/// Share of the longest arrow below which no arrow is drawn.
 const LEAST_ARROW: f64 = 0.02;
-/// Shades of the colour bar.
+/// Number of shades in the colour bar.
 const SHADES: i32 = 24;
 
-/// What lies over a map: subarrays with their centroids.
+/// Overlay of a map: outlines and centroids of the subarrays.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Outline<'a> {
     /// The subarrays.
     pub subarrays: &'a [SubarrayResult],
-    /// Whether to show the centroids.
+    /// Whether to draw the centroids of compression and tension.
     pub centroids: bool,
 }
 
-/// Places of a sensor on a map, row 0 on top as in the frame files.
+/// Conversion from array positions to pixels; row 0 is on top.
 struct Map {
     cell: (f64, f64),
     size: (f64, f64),
@@ -47,12 +48,12 @@ impl Map {
         Map { cell: (sensor.pitch_x_mm * scale, sensor.pitch_y_mm * scale), size: (mm.0 * scale, mm.1 * scale), scale }
     }
 
-    /// Pixel of a place in taxels from the upper left corner.
+    /// Pixel of a position given in taxels from the upper left corner.
     fn at(&self, row: f64, col: f64) -> (i32, i32) {
         ((CORNER.0 + col * self.cell.0).round() as i32, (CORNER.1 + row * self.cell.1).round() as i32)
     }
 
-    /// Pixel of a place in mm from the centre.
+    /// Pixel of a position given in mm from the centre.
     fn of_mm(&self, [x, y]: [f64; 2]) -> (i32, i32) {
         let at = (CORNER.0 + self.size.0 / 2.0 + x * self.scale, CORNER.1 + self.size.1 / 2.0 + y * self.scale);
         (at.0.round() as i32, at.1.round() as i32)
@@ -63,7 +64,7 @@ impl Map {
     }
 }
 
-/// Stress in MPa: compression and tension by colour, centroids of both.
+/// Map of stress in MPa: compression and tension as colours, with the centroids of both.
 ///
 /// # Errors
 /// A picture that cannot be written.
@@ -77,8 +78,8 @@ pub fn stress_map(sensor: &Sensor, stress_MPa: &[f64], outline: Outline) -> Resu
     })
 }
 
-/// Forces in N: normal by colour on a scale that ends at `peaks[0]`, tangential by arrows of which the longest stands
-/// for `peaks[1]`, so that several fields compare.
+/// Map of forces in N: normal forces as colour on a scale up to `peaks[0]`, tangential forces as arrows, the longest
+/// for `peaks[1]`. With the same peaks several maps can be compared.
 ///
 /// # Errors
 /// A picture that cannot be written.
@@ -107,11 +108,11 @@ fn cells(area: &Area, map: &Map, sensor: &Sensor, values: &[f64], peak: f64) -> 
     Ok(())
 }
 
-/// The colour of a share −1 … 1.
+/// The colour of a relative value −1 … 1.
 fn shade(share: f64) -> RGBAColor {
-    // The square root shows what lies low, tension above all.
+    // The square root makes small values visible, in particular tension.
     let shade = share.abs().min(1.0).sqrt();
-    // No more digits than show.
+    // Two decimals keep the file small.
     if share > 0.0 { PLUS } else { MINUS }.mix((100.0 * shade).round() / 100.0)
 }
 
@@ -153,7 +154,7 @@ fn arrows(area: &Area, map: &Map, sensor: &Sensor, forces: &Forces, longest_N: f
             let all = rows.clone().flat_map(|r| cols.clone().map(move |c| r * sensor.cols + c));
             let (x, y) = all.fold((0.0, 0.0), |(x, y), k| (x + forces.fx[k], y + forces.fy[k]));
             let share = x.hypot(y) / (longest_N * (group * group) as f64);
-            // Nothing to divide by is no number.
+            // NaN where `longest_N` is zero.
             if share.is_nan() || share < LEAST_ARROW {
                 continue;
             }
@@ -178,13 +179,13 @@ fn arrow(area: &Area, (x, y): (i32, i32), (ux, uy): (f64, f64), length: f64) -> 
     Ok(())
 }
 
-/// Three significant digits.
+/// A value with three significant digits.
 fn three(value: f64) -> String {
     let decimals = (2.0 - value.abs().max(1e-9).log10().floor()).clamp(0.0, 9.0) as usize;
     format!("{value:.decimals$}")
 }
 
-/// The colour bar at the right.
+/// Draws the colour bar to the right of the map.
 fn bar(area: &Area, map: &Map, [minus, plus]: [&str; 2], unit: &str, peak: &str) -> Result<()> {
     let left = (CORNER.0 + map.size.0) as i32 + 12;
     let (top, bottom) = (CORNER.1 as i32 + 16, (CORNER.1 + map.size.1) as i32 - 16);
@@ -194,7 +195,7 @@ fn bar(area: &Area, map: &Map, [minus, plus]: [&str; 2], unit: &str, peak: &str)
         area.draw(&Rectangle::new([(left, y(k)), (left + 10, y(k + 1))], shade(share).filled()))?;
     }
     let right = WIDTH as i32 - left - 14;
-    // A narrow array leaves room beside the bar; a wide one has the names above and below it.
+    // Labels are beside the bar if the array is narrow enough, else above and below it.
     let beside = right > 70;
     let x = left + 14;
     note(area, peak, (x, top), HPos::Left, VPos::Center)?;

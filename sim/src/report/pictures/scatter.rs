@@ -1,4 +1,4 @@
-//! Points on two axes, each linear or logarithmic, with marks per series, a legend and guides.
+//! Scatter plots: series of points on linear or logarithmic axes, with a legend and guide lines.
 
 use anyhow::Result;
 use plotters::prelude::*;
@@ -7,60 +7,60 @@ use plotters::style::text_anchor::{HPos, VPos};
 use super::super::style::{GRID, INK, LIMIT};
 use super::{label, note, svg, Area, SMALL, WIDTH};
 
-/// Height of the plot with its axes; legend lines come below.
+/// Height of the plot with its axes; the legend is below.
 const HEIGHT: u32 = 300;
 /// Edges of the plot.
 const LEFT: i32 = 74;
 const RIGHT: i32 = 386;
 const TOP: i32 = 12;
 const BOTTOM: i32 = 250;
-/// Height of a legend line.
+/// Height of a line of the legend.
 const LINE: i32 = 20;
 
-/// Points that belong together.
+/// A series of points.
 #[derive(Clone, Debug)]
 pub struct Series {
-    /// In the legend.
+    /// Name in the legend.
     pub name: String,
-    /// Of its marks.
+    /// Colour of its marks.
     pub colour: RGBColor,
     /// Shape of its marks: 0 disc, 1 square, 2 triangle, 3 diamond.
     pub shape: usize,
-    /// x, y, what stands beside the mark.
+    /// Points as x, y and label; an empty label is not drawn.
     pub points: Vec<(f64, f64, String)>,
-    /// Joined by a line.
+    /// Whether the points are joined by a line.
     pub joined: bool,
 }
 
-/// A line across the plot.
+/// A guide line or ring.
 #[derive(Clone, Debug)]
 pub enum Guide {
-    /// At an x, with a name.
+    /// A vertical line at x, with its name.
     X(f64, String),
-    /// Steps through points, left to right, with a name in the legend.
+    /// A staircase through points from left to right, with its name in the legend.
     Front(Vec<(f64, f64)>, String),
-    /// A ring about a point, with a name in the legend.
+    /// A ring around a point, with its name in the legend.
     Ring((f64, f64), String),
 }
 
-/// What to draw.
+/// Content of a scatter plot.
 #[derive(Clone, Debug)]
 pub struct Scatter {
-    /// Name and unit.
+    /// Name and unit of the x axis.
     pub x: String,
-    /// Name and unit.
+    /// Name and unit of the y axis.
     pub y: String,
-    /// Logarithmic axes, x and y.
+    /// Whether the x axis and the y axis are logarithmic.
     pub log: [bool; 2],
-    /// Text of a tick.
+    /// Format the tick labels of x and y.
     pub ticks: [fn(f64) -> String; 2],
-    /// The points.
+    /// Series of points.
     pub series: Vec<Series>,
-    /// Lines.
+    /// Guide lines and rings.
     pub guides: Vec<Guide>,
 }
 
-/// One axis: values to pixels.
+/// Conversion from values to pixels on one axis.
 struct Axis {
     low: f64,
     high: f64,
@@ -70,7 +70,7 @@ struct Axis {
 }
 
 impl Axis {
-    /// An axis that holds all values with a little room.
+    /// An axis that covers all values, with a margin.
     fn new(values: impl Iterator<Item = f64>, log: bool, from: i32, to: i32) -> Axis {
         let scale = |v: f64| if log { v.log10() } else { v };
         let values: Vec<f64> = values.map(scale).filter(|v| v.is_finite()).collect();
@@ -88,7 +88,7 @@ impl Axis {
         self.from + (share * f64::from(self.to - self.from)).round() as i32
     }
 
-    /// Three to seven round values.
+    /// Three to seven round tick values.
     fn ticks(&self) -> Vec<f64> {
         if self.log {
             let decades = self.high - self.low;
@@ -112,7 +112,7 @@ impl Axis {
     }
 }
 
-/// Three to seven round values between two.
+/// Three to seven round values between `low` and `high`.
 fn linear(low: f64, high: f64) -> Vec<f64> {
     let rough = (high - low) / 5.0;
     let decade = 10f64.powf(rough.log10().floor());
@@ -121,10 +121,10 @@ fn linear(low: f64, high: f64) -> Vec<f64> {
     (first..).map(|k| k as f64 * step).take_while(|v| *v <= high).collect()
 }
 
-/// Draws it.
+/// Draws a scatter plot as SVG.
 ///
 /// # Errors
-/// A picture that cannot be written, which text in memory always can.
+/// A picture that cannot be written.
 pub fn scatter(plot: &Scatter) -> Result<String> {
     let points = || plot.series.iter().flat_map(|series| &series.points);
     let at_x = plot.guides.iter().filter_map(|guide| if let Guide::X(x, _) = guide { Some(*x) } else { None });
@@ -160,14 +160,14 @@ fn line(area: &Area, points: Vec<(i32, i32)>, colour: &RGBColor, width: u32) -> 
     Ok(())
 }
 
-/// Pixels and texts of an axis's ticks; of those with one text, too near each other for it, the first.
+/// Pixels and texts of an axis's ticks; of neighbouring ticks with the same text only the first.
 fn named(axis: &Axis, text: fn(f64) -> String) -> Vec<(i32, String)> {
     let mut all: Vec<(i32, String)> = axis.ticks().into_iter().map(|tick| (axis.at(tick), text(tick))).collect();
     all.dedup_by(|a, b| a.1 == b.1);
     all
 }
 
-/// Pixels that a text takes at most: digits and most letters are about half as wide as they are high.
+/// Estimated width of a text in pixels: digits and most letters are about half as wide as high.
 fn text_width(text: &str) -> i32 {
     7 * text.chars().count() as i32
 }
@@ -175,7 +175,7 @@ fn text_width(text: &str) -> i32 {
 fn axes(area: &Area, plot: &Scatter, x: &Axis, y: &Axis) -> Result<()> {
     for (at, text) in named(x, plot.ticks[0]) {
         line(area, vec![(at, TOP), (at, BOTTOM)], &GRID, 1)?;
-        // Moved in where the picture ends: a tick may stand at the very end of the axis.
+        // Labels of ticks at the end of the axis are moved left, into the picture.
         let middle = at.min(WIDTH as i32 - text_width(&text) / 2);
         note(area, &text, (middle, BOTTOM + 5), HPos::Center, VPos::Top)?;
     }
@@ -196,7 +196,7 @@ fn draw_guide(area: &Area, guide: &Guide, x: &Axis, y: &Axis) -> Result<()> {
         Guide::X(value, name) => {
             let at = x.at(*value);
             line(area, vec![(at, TOP), (at, BOTTOM)], &LIMIT, 2)?;
-            // On the side that has room.
+            // On the side with more space.
             let (h, at) = if at > (LEFT + RIGHT) / 2 { (HPos::Right, at - 4) } else { (HPos::Left, at + 4) };
             area.draw_text(name, &label(SMALL, &LIMIT, h, VPos::Top), (at, TOP))?;
         }
@@ -217,10 +217,10 @@ fn draw_guide(area: &Area, guide: &Guide, x: &Axis, y: &Axis) -> Result<()> {
     Ok(())
 }
 
-/// Names beside marks, each where there is room; where there is none it is left out.
+/// Places labels beside marks; a label without free space is omitted.
 #[derive(Default)]
 struct Names {
-    /// Left, top, right, bottom of marks and names.
+    /// Left, top, right, bottom of the marks and labels drawn.
     taken: Vec<[i32; 4]>,
 }
 
@@ -291,7 +291,7 @@ mod tests {
         let ticks: Vec<i32> = log.ticks().iter().map(|tick| tick.log10().round() as i32).collect();
         assert_eq!(ticks, [-5, -4, -3, -2, -1, 0]);
         assert_eq!((log.at(1e-9), log.at(1e9)), (0, 100));
-        // Less than a factor apart: round in between, and no text twice.
+        // A range below a factor of ten: round values in between, and no text twice.
         let near = Axis::new([0.0015, 0.0017].into_iter(), true, 0, 100);
         assert!(near.ticks().len() > 2);
         assert_eq!(named(&near, |tick| format!("{tick:.2}")).len(), 1);

@@ -1,9 +1,9 @@
-//! Which partition and which format to take for each sensor, and what that costs: derived from the measured figures,
-//! for frames of one contact and of several.
+//! Recommended partition and number format for each sensor, with errors and resources: derived from the measurements,
+//! for frames with one contact and with several.
 //!
-//! Case: of those whose hardware fits the board within 1 ms, the smallest median shear error; of those within a tenth
-//! and 0.2 % of it, the fastest. Format: of the candidates in that case, the fewest block RAMs whose median shear error
-//! is within a quarter and 0.5 % of the best candidate's.
+//! Case: the fastest one whose median shear error is at most 1.1 e + 0.2 %, where e is the smallest error among the
+//! cases whose hardware fits the board and takes at most 1 ms. Format: the one with the fewest block RAMs in that case
+//! whose median shear error is at most 1.25 e + 0.5 %, where e is the smallest error of the candidates.
 
 use anyhow::Result;
 use dermis_golden::fixed::Model;
@@ -12,57 +12,59 @@ use dermis_golden::scene::Scene;
 use dermis_hdl::generate;
 use dermis_hdl::usage::{total, Usage};
 
-use super::super::document::{count, decimal, none, percent, seconds, words, Cell, Item, Section, Table};
-use super::super::measure::{clock, formats, Clock, Engine, FormatRow, Kind, Measured, Options};
+use super::super::document::{count, decimal, empty_cell, percent, seconds, text_cell, Cell, Item, Section, Table};
+use super::super::measure::{clock, formats, Clock, ContactCount, Engine, FormatRow, Measured, Options};
 use super::super::BUDGET_US;
 use super::{case_text, scenes};
-use crate::fresh::{Fresh, Shapes};
+use crate::drawn_frames::{DrawnFrames, Shapes};
 use crate::jobs::parallel;
 
-/// How much worse than the best a faster case may be: a share of the error, and a share of the force.
+/// Allowed error of a faster case: factor on the smallest error, plus an absolute error.
 const NEAR_CASE: [f64; 2] = [1.1, 0.002];
-/// How much worse than the best a cheaper format may be.
+/// Allowed error of a cheaper format: factor on the smallest error, plus an absolute error.
 const NEAR_FORMAT: [f64; 2] = [1.25, 0.005];
-/// Drawn frames on which formats are compared, beside the shipped ones; quick and full.
+/// Number of random frames on which formats are compared, in addition to the shipped ones: quick, full variant.
 const DRAWN: [u32; 2] = [4, 32];
 
-/// The choice for one scene and kind of frame.
+/// The recommendation for one scene and contact count.
 #[derive(Clone, Debug)]
 pub struct Choice {
-    /// Index of the scene in its case among the measured.
+    /// Index of the scene in the recommended case among the measurements.
     pub index: usize,
-    /// The frames it is for.
-    pub kind: Kind,
-    /// The format taken.
+    /// Contact count of the frames that it applies to.
+    pub contact_count: ContactCount,
+    /// The recommended format.
     pub format: FormatRow,
-    /// All formats tried, the one taken among them.
+    /// All formats tried.
     pub formats: Vec<FormatRow>,
-    /// What the design takes of its board in that format.
+    /// Resources of the design in the recommended format.
     pub usage: Usage,
     /// The clock.
     pub clock: Clock,
-    /// Whether these very cycles were co-simulated and equal to the model's.
+    /// Whether this design was co-simulated, with cycles equal to the model's.
     pub simulated: bool,
 }
 
-/// Chooses for every scene and kind of frame for which some hardware fits.
+/// Chooses case and format for every scene and contact count for which hardware fits.
 ///
 /// # Errors
-/// An interruption; a frame that is not its scene's.
+/// An interruption; a frame of another sensor.
 pub fn choose(measured: &[Measured], options: &Options) -> Result<Vec<Choice>> {
-    let kinds = |scene| [Kind::One, Kind::Several].map(|kind| (scene, kind));
-    let best = scenes(measured).into_iter().flat_map(kinds);
-    let best = best.filter_map(|(scene, kind)| Some((best_case(measured, scene, kind)?, kind))).collect();
-    parallel("formats", best, options.jobs, &options.interrupt, |(index, kind)| {
-        choose_format(measured, index, kind, options)
+    let contact_counts = |scene| [ContactCount::One, ContactCount::Several].map(|contact_count| (scene, contact_count));
+    let best = scenes(measured).into_iter().flat_map(contact_counts);
+    let best = best
+        .filter_map(|(scene, contact_count)| Some((best_case(measured, scene, contact_count)?, contact_count)))
+        .collect();
+    parallel("formats", best, options.jobs, &options.interrupt, |(index, contact_count)| {
+        choose_format(measured, index, contact_count, options)
     })
 }
 
-/// The measured case of a scene to take.
-fn best_case(measured: &[Measured], scene: &str, kind: Kind) -> Option<usize> {
+/// Index of the recommended case of a scene among the measurements.
+fn best_case(measured: &[Measured], scene: &str, contact_count: ContactCount) -> Option<usize> {
     let own = measured.iter().enumerate().filter(|(_, m)| m.scene.name == scene);
     let point = |(index, m): (usize, &Measured)| {
-        let point = m.point_over(Engine::Hardware, |frame| Kind::of(frame) == kind)?;
+        let point = m.point_over(Engine::Hardware, |frame| ContactCount::of(frame) == contact_count)?;
         (point.seconds <= 1e-6 * BUDGET_US as f64).then_some((index, point.tangential?, point.seconds))
     };
     let all: Vec<(usize, f64, f64)> = own.filter_map(point).collect();
@@ -71,40 +73,45 @@ fn best_case(measured: &[Measured], scene: &str, kind: Kind) -> Option<usize> {
     near.min_by(|a, b| a.2.total_cmp(&b.2)).map(|(index, _, _)| index)
 }
 
-fn choose_format(measured: &[Measured], index: usize, kind: Kind, options: &Options) -> Result<Choice> {
+fn choose_format(
+    measured: &[Measured],
+    index: usize,
+    contact_count: ContactCount,
+    options: &Options,
+) -> Result<Choice> {
     let own = &measured[index];
-    let formats = formats(&own.scene, &frames(&own.scene, kind, DRAWN[usize::from(!options.quick)])?)?;
+    let formats = formats(&own.scene, &frames(&own.scene, contact_count, DRAWN[usize::from(!options.quick)])?)?;
     let format = cheapest(&formats).cloned();
     let format = format.ok_or_else(|| anyhow::anyhow!("scene {}: no format fits its board", own.scene.name))?;
     let model = Model::new(&with_format(&own.scene, format.bits))?;
     let usage = total(&generate(&model)?.usage);
     let simulated = model.scene == own.scene
-        && own.integers.as_ref().is_ok_and(|i| i.equal == Some(true) && i.cycles == format.cycles);
-    Ok(Choice { index, kind, clock: clock(&model.board, &model.scene), usage, formats, format, simulated })
+        && own.bit_true.as_ref().is_ok_and(|i| i.equal == Some(true) && i.cycles == format.cycles);
+    Ok(Choice { index, contact_count, clock: clock(&model.board, &model.scene), usage, formats, format, simulated })
 }
 
-/// The cheapest format near the best.
+/// The cheapest format within the allowed error.
 fn cheapest(formats: &[FormatRow]) -> Option<&FormatRow> {
     let error = |row: &FormatRow| row.tangential.unwrap_or(f64::INFINITY);
     let least = formats.iter().map(error).fold(f64::INFINITY, f64::min);
     let near = formats.iter().filter(|row| error(row) <= NEAR_FORMAT[0] * least + NEAR_FORMAT[1]);
-    // Of equals the finer one, which comes later.
+    // Of formats with equally many block RAMs the finer one, which is later in the list.
     near.rev().min_by_key(|row| row.block_rams)
 }
 
-/// The shipped frames of a kind and `drawn` ones beside them; none drawn where contacts of one to two thicknesses are
-/// no wider than a taxel.
+/// The shipped frames with a contact count, and `drawn` random ones; no random ones on sensors whose pitch exceeds two
+/// thicknesses, as their contacts would be no wider than a taxel.
 ///
 /// # Errors
 /// A stress that is not finite.
-pub fn frames(scene: &Scene, kind: Kind, drawn: u32) -> Result<Vec<Frame>> {
+pub fn frames(scene: &Scene, contact_count: ContactCount, drawn: u32) -> Result<Vec<Frame>> {
     let mut frames = Frame::shipped(scene);
-    frames.retain(|frame| Kind::of(frame) == kind);
+    frames.retain(|frame| ContactCount::of(frame) == contact_count);
     let sensor = &scene.sensor;
     if sensor.pitch_x_mm.max(sensor.pitch_y_mm) <= 2.0 * sensor.thickness_mm {
-        let contacts = if kind == Kind::One { vec![1] } else { vec![2, 3] };
-        let fresh = Fresh { frames: drawn, contacts, shapes: Shapes::Elliptic, touching: false, seed: 1 };
-        frames.extend(fresh.draw(scene)?);
+        let contacts = if contact_count == ContactCount::One { vec![1] } else { vec![2, 3] };
+        let draw = DrawnFrames { frames: drawn, contacts, shapes: Shapes::Elliptic, touching: false, seed: 1 };
+        frames.extend(draw.draw(scene)?);
     }
     Ok(frames)
 }
@@ -116,7 +123,7 @@ fn with_format(scene: &Scene, bits: [u32; 4]) -> Scene {
     scene
 }
 
-/// The section.
+/// The section with recommendations, comparison of cases and formats tried.
 pub fn choice(measured: &[Measured], choices: &[Choice]) -> Section {
     let head = [
         "sensor",
@@ -136,23 +143,25 @@ pub fn choice(measured: &[Measured], choices: &[Choice]) -> Section {
     let mut rows: Vec<Vec<Cell>> = choices.iter().map(|choice| row(measured, choice)).collect();
     let chosen = |name: &&str| choices.iter().any(|choice| measured[choice.index].scene.name == *name);
     for name in scenes(measured).into_iter().filter(|name| !chosen(name)) {
-        let mut row = vec![words(name), none(), none(), words("no hardware fits")];
-        row.resize(head.len(), none());
+        let mut row = vec![text_cell(name), empty_cell(), empty_cell(), text_cell("no hardware fits")];
+        row.resize(head.len(), empty_cell());
         rows.push(row);
     }
     let origin = choices.first().map_or("design clock", |choice| choice.clock.origin);
     let caption = format!(
-        "What to take and what it costs, with the share of the board. Errors of the resultant: median over shipped and \
-         drawn frames; time: cycles over the {origin}"
+        "Recommended case and format with errors, time and resources (in brackets: share of the board). Errors of the \
+         resultant: median over shipped and random frames; time: cycles divided by the clock ({origin})"
     );
-    let rule = "Case: smallest median shear error on the shipped frames among the cases whose hardware fits the \
-                board within 1 ms; among cases within a tenth (and 0.2 %) of it the fastest. Format: fewest block \
-                RAMs among the candidates within a quarter (and 0.5 %) of the best candidate. Write the case into \
-                [partition] case, the bits into [fixed] input_bits, inverse_bits, data_bits, coef_bits. Several \
-                contacts with different shear suit no rectangle: in software [partition] case = \"contacts\" gives \
-                each its own μ; its error and time on a CPU stand below where it was measured.";
-    let formats =
-        choices.iter().flat_map(|choice| choice.formats.iter().map(|row| format_row(choice.kind, row, &choice.format)));
+    let rule = "Case: among the cases whose hardware fits the board and takes at most 1 ms, e is the smallest median \
+                shear error on the shipped frames; the fastest case with an error up to 1.1 e + 0.2 % is taken. \
+                Format: the candidate with the fewest block RAMs and an error up to 1.25 times the best candidate's \
+                + 0.5 %. In the scene file set [partition] case, and the bits in [fixed] input_bits, inverse_bits, \
+                data_bits, coef_bits. Contacts with different shears cannot be separated by rectangular subarrays: \
+                in software, [partition] case = \"contacts\" finds a μ for each contact; its error and time on a CPU \
+                are listed below where measured.";
+    let formats = choices
+        .iter()
+        .flat_map(|choice| choice.formats.iter().map(|row| format_row(choice.contact_count, row, &choice.format)));
     let format_head = [
         "sensor",
         "contacts",
@@ -169,16 +178,20 @@ pub fn choice(measured: &[Measured], choices: &[Choice]) -> Section {
         "multipliers",
         "taken",
     ];
-    let formats =
-        Table::new("formats", "Formats tried in the chosen case, bit-true model", &format_head, formats.collect());
+    let formats = Table::new(
+        "formats",
+        "Formats tried in the recommended case, bit-true model; nine of ten below: 90 % quantile",
+        &format_head,
+        formats.collect(),
+    );
     Section {
         id: "choice",
-        title: "Which partition and format to take".into(),
+        title: "Recommended partition and number format".into(),
         items: vec![
             Item::Table(Table::new("choice", caption, &head, rows)),
             Item::Text(rule.into()),
             Item::Table(compared(measured)),
-            Item::Table(formats.shut()),
+            Item::Table(formats.collapsed()),
         ],
     }
 }
@@ -186,7 +199,7 @@ pub fn choice(measured: &[Measured], choices: &[Choice]) -> Section {
 fn row(measured: &[Measured], choice: &Choice) -> Vec<Cell> {
     let own = &measured[choice.index];
     let (sensor, format, usage) = (&own.scene.sensor, &choice.format, &choice.usage);
-    let board = own.integers.as_ref().ok().map(|integers| &integers.model.board);
+    let board = own.bit_true.as_ref().ok().map(|bit_true| &bit_true.model.board);
     let share = |n: usize, of: Option<u32>| {
         let share = of.map_or(String::new(), |of| format!(" ({:.0} %)", 100.0 * n as f64 / f64::from(of)));
         Cell { shown: format!("{n}{share}"), number: Some(n as f64) }
@@ -194,11 +207,11 @@ fn row(measured: &[Measured], choice: &Choice) -> Vec<Cell> {
     let seconds = choice.clock.seconds(format.cycles);
     let [input, inverse, data, coef] = format.bits;
     vec![
-        words(own.scene.name.clone()),
-        words(format!("{}×{}", sensor.rows, sensor.cols)),
-        words(choice.kind.name()),
-        words(case_text(own.scene.partition.case)),
-        words(format!("{input} / {inverse} / {data} / {coef}")),
+        text_cell(own.scene.name.clone()),
+        text_cell(format!("{}×{}", sensor.rows, sensor.cols)),
+        text_cell(choice.contact_count.name()),
+        text_cell(case_text(own.scene.partition.case)),
+        text_cell(format!("{input} / {inverse} / {data} / {coef}")),
         percent(format.tangential),
         percent(format.normal),
         count(format.cycles),
@@ -206,11 +219,11 @@ fn row(measured: &[Measured], choice: &Choice) -> Vec<Cell> {
         share(usage.block_rams, board.map(|board| board.block_rams)),
         share(usage.multipliers, board.map(|board| board.multipliers)),
         share(usage.luts, board.map(|board| board.luts)),
-        words(if choice.simulated { "co-simulation" } else { "bit-true model" }),
+        text_cell(if choice.simulated { "co-simulation" } else { "bit-true model" }),
     ]
 }
 
-/// Every case of a sensor beside the others, on the shipped frames of each kind.
+/// Comparison of the cases of each sensor on the shipped frames, by contact count.
 fn compared(measured: &[Measured]) -> Table {
     let cases = ["0", "1", "2", "3", "contacts"];
     let head = [
@@ -229,37 +242,37 @@ fn compared(measured: &[Measured]) -> Table {
     ];
     let mut rows = Vec::new();
     for scene in scenes(measured) {
-        for kind in [Kind::One, Kind::Several] {
+        for contact_count in [ContactCount::One, ContactCount::Several] {
             let own = || measured.iter().filter(|m| m.scene.name == scene);
-            if !own().any(|m| m.frames.iter().any(|frame| Kind::of(frame) == kind)) {
+            if !own().any(|m| m.frames.iter().any(|frame| ContactCount::of(frame) == contact_count)) {
                 continue;
             }
-            let mut row = vec![words(scene), words(kind.name())];
+            let mut row = vec![text_cell(scene), text_cell(contact_count.name())];
             for case in cases {
                 let m = own().find(|m| m.scene.partition.case.to_string() == case);
                 let engine = if case == "contacts" { Engine::Golden } else { Engine::Hardware };
-                let point = m.and_then(|m| m.point_over(engine, |frame| Kind::of(frame) == kind));
+                let point = m.and_then(|m| m.point_over(engine, |frame| ContactCount::of(frame) == contact_count));
                 let missing = if m.is_some() { "does not fit" } else { "–" };
                 row.extend(match point {
                     Some(point) => [percent(point.tangential), seconds(Some(point.seconds))],
-                    None => [words(missing), none()],
+                    None => [text_cell(missing), empty_cell()],
                 });
             }
             rows.push(row);
         }
     }
     let caption =
-        "The cases compared: median shear error on the shipped frames of hardware in cases 0 to 3, of the golden \
-                   model in case contacts, with the time of a frame";
+        "Comparison of cases on the shipped frames: median shear error and time per frame of the hardware in cases 0 \
+                   to 3, of the golden model in case contacts";
     Table::new("cases", caption, &head, rows)
 }
 
-fn format_row(kind: Kind, row: &FormatRow, taken: &FormatRow) -> Vec<Cell> {
+fn format_row(contact_count: ContactCount, row: &FormatRow, taken: &FormatRow) -> Vec<Cell> {
     let [input, inverse, data, coef] = row.bits.map(|bits| count(u64::from(bits)));
     vec![
-        words(row.scene.clone()),
-        words(kind.name()),
-        words(row.case.clone()),
+        text_cell(row.scene.clone()),
+        text_cell(contact_count.name()),
+        text_cell(row.case.clone()),
         input,
         inverse,
         data,
@@ -270,7 +283,7 @@ fn format_row(kind: Kind, row: &FormatRow, taken: &FormatRow) -> Vec<Cell> {
         count(row.cycles),
         count(row.block_rams as u64),
         count(row.multipliers as u64),
-        words(if row.bits == taken.bits { "yes" } else { "" }),
+        text_cell(if row.bits == taken.bits { "yes" } else { "" }),
     ]
 }
 
@@ -279,7 +292,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_cheapest_format_near_the_best() {
+    fn the_cheapest_format_within_the_allowed_error() {
         let row = |input: u32, error: f64, block_rams: usize| FormatRow {
             scene: "s".into(),
             case: "0".into(),

@@ -1,4 +1,4 @@
-//! Stress and forces of a frame: truth, golden and bit-true model side by side on one scale.
+//! Stress and forces of a frame: truth, golden and bit-true model, side by side on the same scale.
 
 use anyhow::Result;
 use dermis_golden::frame::Forces;
@@ -6,31 +6,36 @@ use dermis_golden::frame::Forces;
 use super::super::document::{Item, Picture, Section};
 use super::super::measure::Measured;
 use super::super::pictures::{force_field, stress_map, Outline};
-use super::{case_text, shown, Choice};
+use super::{case_text, illustrated_frame, Choice};
 
-/// The section.
+/// The section with maps of stress and forces.
 ///
 /// # Errors
 /// A picture that cannot be written.
 pub fn fields(measured: &[Measured], choices: &[Choice]) -> Result<Section> {
     let mut items = vec![Item::Text(
-        "Stress under the taxels with the centroids of compression (+) and tension (−) of each subarray, then forces \
-         per taxel: normal by colour, tangential by arrows; truth, golden and bit-true model on one scale. Row 0 is \
-         on top; x runs to the right, y down. Colours follow the square root of the value, so that tension shows."
+        "Stress on the taxels with the centroids of compression (+) and tension (−) of each subarray, then forces \
+         per taxel, normal as colour, tangential as arrows: truth, golden and bit-true model on the same scale. Row \
+         0 is on top, x points to the right, y down. The colour scale is the square root of the value, to make \
+         tension visible."
             .into(),
     )];
     for choice in choices {
         let m = &measured[choice.index];
-        items.push(Item::Pictures(field_pictures(m, shown(m, choice.kind), &format!("field-{}", choice.kind.name()))?));
+        items.push(Item::Pictures(field_pictures(
+            m,
+            illustrated_frame(m, choice.contact_count),
+            &format!("field-{}", choice.contact_count.name()),
+        )?));
     }
     Ok(Section { id: "fields", title: "Stress and forces".into(), items })
 }
 
-/// The pictures of one frame: stress, truth where it is known, golden, bit-true where there is one.
+/// The pictures of one frame: stress, true forces if known, golden model, bit-true model if supported.
 pub(super) fn field_pictures(m: &Measured, index: usize, prefix: &str) -> Result<Vec<Picture>> {
     let (frame, golden) = (&m.frames[index], &m.golden[index]);
     let sensor = &m.scene.sensor;
-    let fixed = m.integers.as_ref().ok().map(|integers| &integers.results[index].forces_N);
+    let fixed = m.bit_true.as_ref().ok().map(|bit_true| &bit_true.results[index].forces_N);
     let fields: Vec<(&str, &Forces)> = [
         frame.cell_forces_N.as_ref().map(|forces| ("truth", forces)),
         Some(("golden", &golden.forces_N)),
@@ -39,7 +44,7 @@ pub(super) fn field_pictures(m: &Measured, index: usize, prefix: &str) -> Result
     .into_iter()
     .flatten()
     .collect();
-    // One scale, of the truth where it is known: a result that is far off must not shrink the others.
+    // The scale is that of the true forces if known, so that a result with large errors does not shrink the others.
     let scale = fields[0].1;
     let peaks = [
         scale.fz.iter().fold(0.0, |peak: f64, f| peak.max(f.abs())),

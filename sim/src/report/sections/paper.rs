@@ -1,5 +1,5 @@
-//! The paper by number: Figs. 1 and 3 to 7, Table 2, the operation counts of its section 4, and whether its conclusions
-//! hold here.
+//! The paper's figures and tables, reproduced: Figs. 1 and 3 to 7, Table 2, the operation counts of its section 4, and
+//! a check of its conclusions.
 
 use std::time::Instant;
 
@@ -11,7 +11,7 @@ use dermis_golden::paper::conclusions;
 use dermis_golden::partition::Case;
 use dermis_golden::reconstruct::Golden;
 
-use super::super::document::{count, none, percent, seconds, words, Cell, Item, Picture, Section, Table};
+use super::super::document::{count, empty_cell, percent, seconds, text_cell, Cell, Item, Picture, Section, Table};
 use super::super::measure::{Engine, Measured, Options};
 use super::super::pictures::{bars, force_field, stress_map, Bars, Outline};
 use super::super::style::SERIES;
@@ -21,7 +21,7 @@ use super::{case_text, find, ratios, scenes};
 use crate::compare::median;
 use crate::progress::Progress;
 
-/// Figures of forces: number, sensor, case, and the shipped frame that stands for the paper's.
+/// Figures of forces: number, sensor, case, and the shipped frame that corresponds to the paper's.
 const FIELDS: [(&str, &str, i64, &str); 8] = [
     ("Fig. 4a", "sensor-1", 2, "S1-hs-hertz"),
     ("Fig. 4b", "sensor-2", 3, "S2-hs-ring"),
@@ -56,24 +56,24 @@ pub fn paper(measured: &[Measured], options: &Options) -> Result<Vec<Section>> {
         title: "Operation counts of section 4".into(),
         items: vec![
             Item::Text(
-                "The paper counts (3 n)² operations for a subarray of n taxels. Eq. 1 as printed takes 3 n² for C†b \
-                 and (3 n)² for I − C†C, in every subarray and for every candidate μ. The series in μ takes its \
-                 products once: folded by the two mirror symmetries they are n² / 4 each, and candidates cost no \
-                 matrix product at all."
+                "The paper counts (3 n)² operations for a subarray of n taxels. Eq. 1 as printed takes 3 n² \
+                 multiplications for C†b and (3 n)² for I − C†C, in every subarray and for every candidate μ. With \
+                 the series in μ the matrix products are computed once per frame, with n² / 4 multiplications each \
+                 after folding by the two mirror symmetries; a candidate needs no matrix product."
                     .into(),
             ),
             Item::Table(operations(measured)),
         ],
     });
-    sections.push(one("conclusions", "Do the paper's conclusions hold?", judged(measured)));
+    sections.push(one("conclusions", "Check of the paper's conclusions", conclusions_table(measured)));
     Ok(sections)
 }
 
 fn figure_1(measured: &[Measured]) -> Result<Section> {
     let mut items = vec![Item::Text(
-        "The function S of Eq. 2 as stress on 10×10 taxels. From the corner at 4 × 2 mm it spans −16 145 to 36 000 \
-         N/m²; the paper prints −36 000 to 20 912, which no origin or sign tried here gives. It is no contact: there \
-         is no true force."
+        "The function S of Eq. 2 as stress on 10×10 taxels. With the first taxel as origin and a pitch of 4 mm in x \
+         and 2 mm in y it ranges from −16 145 to 36 000 N/m²; the paper prints −36 000 to 20 912, which no origin or \
+         sign tried here reproduces. Eq. 2 does not describe a contact, so that there is no true force."
             .into(),
     )];
     if let Some(m) = find(measured, "sensor-1", Case::WHOLE) {
@@ -95,7 +95,7 @@ fn figure_1(measured: &[Measured]) -> Result<Section> {
     Ok(Section { id: "fig-1", title: "Fig. 1: Eq. 2 on sensor 1".into(), items })
 }
 
-/// The frame that stands for the paper's on a sensor.
+/// Index of the frame that corresponds to the paper's on a sensor.
 fn frame_of(m: &Measured) -> usize {
     FIELDS.iter().find(|field| field.1 == m.scene.name).map_or(0, |field| m.frame(field.3))
 }
@@ -106,7 +106,7 @@ fn figure_3(measured: &[Measured]) -> Result<Section> {
         let own: Vec<&Measured> = measured.iter().filter(|m| m.scene.name == scene).collect();
         pictures.push(ratios::picture(scene, &own, frame_of, "fig-3")?);
     }
-    let text = "Both bars at zero: the centroid condition is not met, as the paper has it.";
+    let text = "Both bars are zero where the centroid condition is not met, as in the paper.";
     let items = vec![Item::Text(text.into()), Item::Pictures(pictures)];
     Ok(Section { id: "fig-3", title: "Fig. 3: μ per subarray and case".into(), items })
 }
@@ -125,11 +125,11 @@ fn figure_of_fields(measured: &[Measured], id: &'static str, title: &str, from: 
     Ok(Section { id, title: format!("{title}: reconstructed forces"), items })
 }
 
-/// Three repeats of everything a case takes, matrices and one frame, as the paper's times do.
+/// Fig. 7: three repeats of computing the matrices and one frame in each case, as in the paper.
 fn figure_7(measured: &[Measured], options: &Options) -> Result<Section> {
     let own: Vec<&Measured> = measured.iter().filter(|m| m.scene.name == "sensor-4").collect();
     let bar = Progress::steps("Fig. 7", (REPEATS * own.len()) as u64);
-    // Matrices from an earlier run would not be a measurement.
+    // Without the matrix cache, so that computing the matrices is measured.
     cache::set_folder(None);
     let mut all: Vec<[f64; REPEATS]> = Vec::new();
     for m in &own {
@@ -139,7 +139,7 @@ fn figure_7(measured: &[Measured], options: &Options) -> Result<Section> {
             let start = Instant::now();
             Golden::new(&m.scene)?.run(&m.frames[m.frame(PLANTAR)])?;
             *repeat = start.elapsed().as_secs_f64();
-            bar.at((REPEATS * all.len() + k + 1) as u64);
+            bar.set((REPEATS * all.len() + k + 1) as u64);
         }
         all.push(repeats);
     }
@@ -164,7 +164,7 @@ fn figure_7(measured: &[Measured], options: &Options) -> Result<Section> {
     };
     let picture = Picture {
         id: "fig-7".into(),
-        caption: "Fig. 7: time of a 48×48 frame, golden model, matrices computed anew".into(),
+        caption: "Fig. 7: time of a 48×48 frame with its matrices, golden model".into(),
         svg: bars(&plot)?,
     };
     let middle = |repeats: &[f64; REPEATS]| median(repeats.to_vec());
@@ -173,10 +173,10 @@ fn figure_7(measured: &[Measured], options: &Options) -> Result<Section> {
         (Some(whole), Some(own)) => {
             Cell { shown: format!("{} ×", super::time::short(whole / own)), number: Some(whole / own) }
         }
-        _ => none(),
+        _ => empty_cell(),
     };
     let rows = own.iter().zip(&all).map(|(m, repeats)| {
-        let mut row = vec![words(case_text(m.scene.partition.case)), seconds(printed(m))];
+        let mut row = vec![text_cell(case_text(m.scene.partition.case)), seconds(printed(m))];
         row.extend(repeats.map(|s| seconds(Some(s))));
         row.push(faster(whole.and_then(|(m, _)| printed(m)), printed(m)));
         row.push(faster(whole.and_then(|(_, repeats)| middle(repeats)), middle(repeats)));
@@ -197,8 +197,8 @@ fn figure_7(measured: &[Measured], options: &Options) -> Result<Section> {
     ];
     let table = Table::new("fig-7-table", "Time of a 48×48 frame", &head, rows.collect());
     let text =
-        "The paper's conclusion that subarrays shorten the response is in the columns \"faster than case 0\": theirs \
-                and ours.";
+        "The columns \"faster than case 0\" show the paper's conclusion that subarrays shorten the response, with its \
+                times and with those measured here.";
     let items = vec![Item::Pictures(vec![picture]), Item::Text(text.into()), Item::Table(table)];
     Ok(Section { id: "fig-7-section", title: "Fig. 7: response time, three repeats".into(), items })
 }
@@ -223,7 +223,7 @@ fn operations(measured: &[Measured]) -> Table {
         let products = |degree: usize| 1 + 2 * (vectors(degree) as u64 - 1) - 2 * degree as u64;
         let ours = parts * products(matrices.degree) * n * n / 4;
         vec![
-            words(case_text(m.scene.partition.case)),
+            text_cell(case_text(m.scene.partition.case)),
             count(parts),
             count(n),
             Cell { shown: format!("{}² = {}", 3 * n, 9 * n * n), number: Some((9 * n * n) as f64) },
@@ -239,8 +239,8 @@ fn operations(measured: &[Measured]) -> Table {
     Table::new("operations-table", "Multiplications for 48×48 taxels", &head, rows.collect())
 }
 
-/// The paper's best case per sensor beside ours.
-fn judged(measured: &[Measured]) -> Table {
+/// The paper's best case per sensor next to the best one measured here.
+fn conclusions_table(measured: &[Measured]) -> Table {
     let head = [
         "sensor",
         "the paper's best",
@@ -262,22 +262,23 @@ fn judged(measured: &[Measured]) -> Table {
             all.min_by(|a, b| a.1.total_cmp(&b.1)).copied()
         };
         let cells = |found: Option<(Case, f64)>| match found {
-            Some((case, error)) => [words(case_text(case)), percent(Some(error))],
-            None => [none(), none()],
+            Some((case, error)) => [text_cell(case_text(case)), percent(Some(error))],
+            None => [empty_cell(), empty_cell()],
         };
         let theirs = errors.iter().find(|(case, _)| *case == conclusion.best).copied();
-        // Where the paper calls a cut case best, it is compared with the other cut ones: its case 0 is the reference.
+        // Where the paper calls a case with subarrays best, it is compared with such cases only: case 0 is its
+        // reference.
         let cut = conclusion.best != Case::WHOLE;
         let holds = least(cut).is_some_and(|(case, _)| case == conclusion.best);
-        let mut row = vec![words(name)];
-        row.extend([words(case_text(conclusion.best)), percent(theirs.map(|(_, error)| error))]);
+        let mut row = vec![text_cell(name)];
+        row.extend([text_cell(case_text(conclusion.best)), percent(theirs.map(|(_, error)| error))]);
         row.extend(cells(least(false)));
         row.extend(cells(least(true)));
-        row.extend([words(if holds { "yes" } else { "no" }), words(conclusion.text)]);
+        row.extend([text_cell(if holds { "yes" } else { "no" }), text_cell(conclusion.text)]);
         row
     });
     let caption =
-        "The case the paper calls best and the one with the smallest median shear error here, under its condition, \
-                   golden model, against the true contact";
+        "The best case according to the paper, and the case with the smallest median shear error here (golden model \
+                   under the paper's condition, against the true force)";
     Table::new("judged", caption, &head, rows.collect())
 }

@@ -1,24 +1,24 @@
-//! Beside the paper: Table 2 and the published run times, from the files in `golden/data/paper`.
+//! Comparison with published figures: Table 2 and run times, from the files in `golden/data/paper`.
 
 use dermis_golden::errors::Errors;
 use dermis_golden::paper::{run_times, table_2, RunTime};
 use dermis_golden::partition::Case;
 use dermis_golden::sensor::Sensor;
 
-use super::super::document::{median_percent, none, percent, seconds, words, Cell, Item, Section, Table};
+use super::super::document::{empty_cell, median_percent, percent, seconds, text_cell, Cell, Item, Section, Table};
 use super::super::measure::{Engine, Measured};
 use super::{case_text, find};
 
-/// The section.
+/// The section with Table 2 and the published run times.
 pub fn published(measured: &[Measured]) -> Section {
     Section {
         id: "published",
-        title: "Beside the published figures".into(),
+        title: "Comparison with published figures".into(),
         items: vec![Item::Table(table_two(measured)), Item::Table(times(measured))],
     }
 }
 
-/// Table 2 with ours beside it: against truth and against case 0.
+/// The paper's Table 2 next to the errors measured here, against truth and against case 0.
 pub(super) fn table_two(measured: &[Measured]) -> Table {
     let head = [
         "sensor",
@@ -47,7 +47,7 @@ pub(super) fn table_two(measured: &[Measured]) -> Table {
                 pairs.map(|(whole, own)| Some(Errors::new(whole.resultant_N, own.resultant_N))).collect()
             }
         };
-        let mut row = vec![words(m.scene.name.clone()), words(case_text(m.scene.partition.case))];
+        let mut row = vec![text_cell(m.scene.name.clone()), text_cell(case_text(m.scene.partition.case))];
         row.extend(paper.map(|x| percent(Some(x))));
         for errors in [m.errors(Engine::Golden), to_whole, m.errors(Engine::Fixed)] {
             row.extend((0..3).map(|k| median_percent(errors.iter().map(|e| e.as_ref()?.axes()[k].map(f64::abs)))));
@@ -55,12 +55,12 @@ pub(super) fn table_two(measured: &[Measured]) -> Table {
         Some(row)
     });
     let caption =
-        "The paper's Table 2 (sensors 1, 2: against finite elements; 3, 4: against case 0; one frame) beside the \
-                   golden and the bit-true model, median of |X| over the frames";
+        "The paper's Table 2 (one frame; sensors 1, 2: against finite elements; 3, 4: against case 0) next to the \
+                   golden and the bit-true model (median of |X| over the frames)";
     Table::new("table-2", caption, &head, rows.collect())
 }
 
-/// The published run times with ours beside them.
+/// The published run times next to those measured here.
 pub(super) fn times(measured: &[Measured]) -> Table {
     let head = [
         "published for",
@@ -79,22 +79,22 @@ pub(super) fn times(measured: &[Measured]) -> Table {
         let own = measured.iter().find(|m| fits(m, &published));
         let time = |engine: Engine| own.and_then(|m| m.point(engine)).map(|point| point.seconds);
         let ratio = |engine: Engine| match time(engine) {
-            None => none(),
+            None => empty_cell(),
             Some(own) => {
                 let ratio = published.seconds / own;
                 Cell { shown: format!("{} ×", super::time::short(ratio)), number: Some(ratio) }
             }
         };
-        let case = published.case.map_or_else(none, |case| words(case_text(case)));
-        let mut row = vec![words(published.sensor.clone()), case, words(published.system.clone())];
+        let case = published.case.map_or_else(empty_cell, |case| text_cell(case_text(case)));
+        let mut row = vec![text_cell(published.sensor.clone()), case, text_cell(published.system.clone())];
         row.push(seconds(Some(published.seconds)));
         row.extend(Engine::ALL.map(|engine| seconds(time(engine))));
-        row.extend([ratio(Engine::Golden), ratio(Engine::Hardware), words(published.source.clone())]);
+        row.extend([ratio(Engine::Golden), ratio(Engine::Hardware), text_cell(published.source.clone())]);
         row
     });
     let caption =
-        "Published run times beside those of this run: ours are of a frame, with the matrices computed before (dermis \
-                   report --paper, Fig. 7, has them with the matrices)";
+        "Published run times next to those of this run, which are per frame, with the matrices computed beforehand \
+                   (dermis report --paper, Fig. 7, includes the matrices)";
     Table::new("run-times", caption, &head, rows.collect())
 }
 

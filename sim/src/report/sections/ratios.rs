@@ -1,14 +1,14 @@
-//! μ of every subarray in every case: the paper's Fig. 3.
+//! μ of every subarray in every case, as in the paper's Fig. 3.
 
 use anyhow::Result;
 
-use super::super::document::{decimal, words, Cell, Item, Picture, Section, Table};
-use super::super::measure::{Kind, Measured};
+use super::super::document::{decimal, text_cell, Cell, Item, Picture, Section, Table};
+use super::super::measure::{ContactCount, Measured};
 use super::super::pictures::{bars, Bars};
 use super::super::style::SERIES;
-use super::{case_text, scenes, shown};
+use super::{case_text, illustrated_frame, scenes};
 
-/// The section.
+/// The section with the friction ratios.
 ///
 /// # Errors
 /// A picture that cannot be written.
@@ -17,9 +17,9 @@ pub fn ratios(measured: &[Measured]) -> Result<Section> {
     let mut pictures = Vec::new();
     for scene in scenes(measured) {
         let own: Vec<&Measured> = rectangles().filter(|m| m.scene.name == scene).collect();
-        let several = own.iter().any(|m| m.frames.iter().any(|frame| Kind::of(frame) == Kind::Several));
-        let kind = if several { Kind::Several } else { Kind::One };
-        pictures.push(picture(scene, &own, |m| shown(m, kind), "ratios")?);
+        let several = own.iter().any(|m| m.frames.iter().any(|frame| ContactCount::of(frame) == ContactCount::Several));
+        let contact_count = if several { ContactCount::Several } else { ContactCount::One };
+        pictures.push(picture(scene, &own, |m| illustrated_frame(m, contact_count), "ratios")?);
     }
     let head = ["sensor", "case", "frame", "subarray", "condition", "μ1", "μ2", "Π, bits"];
     let rows = rectangles().flat_map(|m| m.golden.iter().flat_map(move |result| rows(m, result)));
@@ -27,9 +27,15 @@ pub fn ratios(measured: &[Measured]) -> Result<Section> {
         id: "ratios",
         title: "Friction ratios per subarray".into(),
         items: vec![
-            Item::Text("SA1, SA2, … row by row; both bars at zero: not searched, or no shear found.".into()),
+            Item::Text(
+                "Subarrays SA1, SA2, … are numbered row by row. Both bars are zero where a subarray was not searched \
+                 or no shear was found."
+                    .into(),
+            ),
             Item::Pictures(pictures),
-            Item::Table(Table::new("ratios", "μ of the golden model in every subarray", &head, rows.collect()).shut()),
+            Item::Table(
+                Table::new("ratios", "μ of the golden model in every subarray", &head, rows.collect()).collapsed(),
+            ),
         ],
     })
 }
@@ -37,11 +43,11 @@ pub fn ratios(measured: &[Measured]) -> Result<Section> {
 fn rows(m: &Measured, result: &dermis_golden::reconstruct::Reconstruction) -> Vec<Vec<Cell>> {
     let row = |(k, part): (usize, &dermis_golden::reconstruct::SubarrayResult)| {
         vec![
-            words(m.scene.name.clone()),
-            words(case_text(m.scene.partition.case)),
-            words(result.frame.clone()),
-            words(format!("SA{}", k + 1)),
-            words(if part.centroid_condition { "met" } else { "not met" }),
+            text_cell(m.scene.name.clone()),
+            text_cell(case_text(m.scene.partition.case)),
+            text_cell(result.frame.clone()),
+            text_cell(format!("SA{}", k + 1)),
+            text_cell(if part.centroid_condition { "met" } else { "not met" }),
             decimal(Some(part.mu[0]), 4),
             decimal(Some(part.mu[1]), 4),
             decimal(part.objective_value, 1),

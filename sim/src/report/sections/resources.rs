@@ -1,29 +1,29 @@
-//! What the chosen designs take of their board, and what was left out of them.
+//! Resources of the recommended designs, and the optional features left out of them.
 
 use anyhow::Result;
 use dermis_hdl::explain::explain;
 use dermis_hdl::usage::{total, Usage, STAGES};
 
-use super::super::document::{count, words, Cell, Item, Picture, Section, Table};
-use super::super::measure::{Integers, Measured, Options};
+use super::super::document::{count, text_cell, Cell, Item, Picture, Section, Table};
+use super::super::measure::{BitTrue, Measured, Options};
 use super::super::pictures::{bars, Bars};
 use super::super::style::SERIES;
 use super::{case_text, Choice};
 use crate::jobs::parallel;
 
-/// The section; the quick variant tells what was left out for the first scene alone.
+/// The section with resources; the quick variant lists the features left out for the first scene only.
 ///
 /// # Errors
-/// A picture that cannot be written; a feature put back that has a model and no hardware; an interruption.
+/// A picture that cannot be written; a feature whose hardware cannot be generated; an interruption.
 pub fn resources(measured: &[Measured], choices: &[Choice], options: &Options) -> Result<Section> {
     let chosen = || {
         choices.iter().filter_map(|choice| {
             let m = &measured[choice.index];
-            Some((m, m.integers.as_ref().ok()?))
+            Some((m, m.bit_true.as_ref().ok()?))
         })
     };
-    let groups = chosen().map(|(m, integers)| {
-        let shares = total(&integers.usage).shares(&integers.model.board);
+    let groups = chosen().map(|(m, bit_true)| {
+        let shares = total(&bit_true.usage).shares(&bit_true.model.board);
         (format!("{}, {}", m.scene.name, m.scene.partition.case), shares.map(Some).to_vec())
     });
     let names = ["block RAMs", "multipliers", "flip-flops, estimated", "LUTs, estimated"];
@@ -35,35 +35,44 @@ pub fn resources(measured: &[Measured], choices: &[Choice], options: &Options) -
         limit: Some(100.0),
         log: false,
     };
-    let board = chosen().next().map_or("", |(_, integers)| integers.model.board.name.as_str());
+    let board = chosen().next().map_or("", |(_, bit_true)| bit_true.model.board.name.as_str());
     let caption = format!(
-        "Share of the board ({board}) that each scene's hardware takes in the chosen case, which stands beside it"
+        "Resources of each scene's hardware in the recommended case (next to its name), as share of the board ({board})"
     );
     let picture = Picture { id: "resources".into(), caption, svg: bars(&plot)? };
     let head = ["sensor", "case", "stage", "block RAMs", "multipliers", "flip-flops, est.", "LUTs, est."];
-    let stages = chosen().flat_map(|(m, integers)| stage_rows(m, integers));
+    let stages = chosen().flat_map(|(m, bit_true)| stage_rows(m, bit_true));
     Ok(Section {
         id: "resources",
-        title: "What the hardware takes, and what was left out".into(),
+        title: "Resources of the hardware, and features left out".into(),
         items: vec![
             Item::Pictures(vec![picture]),
-            Item::Table(Table::new("resources", "By stage, in the scene's own format", &head, stages.collect()).shut()),
+            Item::Table(
+                Table::new(
+                    "resources",
+                    "Resources by stage, in the number format of the scene file",
+                    &head,
+                    stages.collect(),
+                )
+                .collapsed(),
+            ),
             Item::Table(left_out(chosen().collect(), options)?),
         ],
     })
 }
 
-fn stage_rows(m: &Measured, integers: &Integers) -> Vec<Vec<Cell>> {
+fn stage_rows(m: &Measured, bit_true: &BitTrue) -> Vec<Vec<Cell>> {
     let row = |name: &str, usage: &Usage| {
-        let mut row = vec![words(m.scene.name.clone()), words(case_text(m.scene.partition.case)), words(name)];
+        let mut row =
+            vec![text_cell(m.scene.name.clone()), text_cell(case_text(m.scene.partition.case)), text_cell(name)];
         row.extend(usage.counts().map(|n| count(n as u64)));
         row
     };
-    let present = STAGES.iter().filter_map(|stage| Some(row(stage, integers.usage.get(*stage)?)));
-    present.chain([row("all", &total(&integers.usage))]).collect()
+    let present = STAGES.iter().filter_map(|stage| Some(row(stage, bit_true.usage.get(*stage)?)));
+    present.chain([row("all", &total(&bit_true.usage))]).collect()
 }
 
-fn left_out(chosen: Vec<(&Measured, &Integers)>, options: &Options) -> Result<Table> {
+fn left_out(chosen: Vec<(&Measured, &BitTrue)>, options: &Options) -> Result<Table> {
     let kept = if options.quick { 1 } else { chosen.len() };
     let chosen = chosen.into_iter().take(kept).collect();
     let explained = parallel(
@@ -71,13 +80,14 @@ fn left_out(chosen: Vec<(&Measured, &Integers)>, options: &Options) -> Result<Ta
         chosen,
         options.jobs,
         &options.interrupt,
-        |(m, integers): (&Measured, &Integers)| Ok((m.scene.name.clone(), explain(&integers.model)?)),
+        |(m, bit_true): (&Measured, &BitTrue)| Ok((m.scene.name.clone(), explain(&bit_true.model)?)),
     )?;
     let rows = explained.iter().flat_map(|(scene, features)| {
         features.iter().filter_map(move |feature| {
             let saved = feature.saved?;
             let numbers = [saved.block_rams, saved.multipliers, saved.flip_flops, saved.luts, saved.cycles];
-            let mut row = vec![words(scene.clone()), words(feature.feature), words(feature.setting.clone())];
+            let mut row =
+                vec![text_cell(scene.clone()), text_cell(feature.feature), text_cell(feature.setting.clone())];
             row.extend(numbers.map(|n| Cell { shown: n.to_string(), number: Some(n as f64) }));
             Some(row)
         })
@@ -92,6 +102,7 @@ fn left_out(chosen: Vec<(&Measured, &Integers)>, options: &Options) -> Result<Ta
         "LUTs, est.",
         "cycles",
     ];
-    let caption = "Left out of the hardware because the scene does not ask for it, and what that saves";
+    let caption = "Features left out of the hardware because the scene does not use them, and the resources that this \
+                   saves; put back as: the setting that adds the feature";
     Ok(Table::new("left-out", caption, &head, rows.collect()))
 }

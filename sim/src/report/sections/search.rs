@@ -1,43 +1,42 @@
-//! The search: Π over the disc of μ, and the margin of its maximum as a confidence in μ.
+//! The search for μ: Π over the disc of μ, and the margin of its maximum as a measure of confidence.
 
 use anyhow::Result;
 use dermis_golden::partition::Case;
 
-use super::super::document::{decimal, percent, words, Item, Picture, Section, Table};
-use super::super::measure::{plane, Measured, Plane};
+use super::super::document::{decimal, percent, text_cell, Item, Picture, Section, Table};
+use super::super::measure::{objective_map, Measured, ObjectiveMap};
 use super::super::pictures::{objective, scatter, Scatter, Series};
 use super::super::style::SERIES;
 use super::time::short;
 
-/// The section.
+/// The section with objective maps and margins.
 ///
 /// # Errors
 /// A picture that cannot be written.
 pub fn search(measured: &[Measured]) -> Result<Section> {
     let whole = measured.iter().filter(|m| m.scene.partition.case == Case::WHOLE);
-    let planes: Vec<Vec<Plane>> =
-        whole.map(|m| (0..m.frames.len()).filter_map(|index| plane(m, index)).collect()).collect();
+    let maps: Vec<Vec<ObjectiveMap>> =
+        whole.map(|m| (0..m.frames.len()).filter_map(|index| objective_map(m, index)).collect()).collect();
     let mut pictures = Vec::new();
-    for first in
-        planes.iter().filter_map(|planes| planes.iter().find(|plane| !plane.path.is_empty()).or(planes.first()))
-    {
+    for first in maps.iter().filter_map(|maps| maps.iter().find(|map| !map.path.is_empty()).or(maps.first())) {
         let caption = format!("{}, case 0, frame {}: Π over μ", first.scene, first.frame);
         pictures.push(Picture { id: format!("plane-{}", first.scene), caption, svg: objective(first)? });
     }
-    pictures.push(margins(&planes)?);
+    pictures.push(margins(&maps)?);
     let head = ["sensor", "frame", "margin, bits", "shear error"];
-    let rows = planes.iter().flatten().map(|p| {
-        vec![words(p.scene.clone()), words(p.frame.clone()), decimal(Some(p.margin), 2), percent(p.tangential)]
+    let rows = maps.iter().flatten().map(|p| {
+        vec![text_cell(p.scene.clone()), text_cell(p.frame.clone()), decimal(Some(p.margin), 2), percent(p.tangential)]
     });
     Ok(Section {
         id: "search",
-        title: "The search for μ and how sure it is".into(),
+        title: "The search for μ and its confidence".into(),
         items: vec![
             Item::Text(
-                "Π is the sparse objective: how few taxels carry the force, in bits. The margin is what its maximum \
-                 is above the best μ at least mu_max/8 away: a large margin means that no other answer fits the \
-                 frame as well, a small one that shear and an uneven pressure look alike in it, one below zero that \
-                 the search has missed the maximum."
+                "Π is the sparse objective, in bits; it is larger the fewer taxels carry the force. The margin is \
+                 the difference between Π at the μ found and the largest Π at a distance of at least mu_max/8. With \
+                 a large margin no clearly different μ explains the frame as well; with a small one, shear and \
+                 uneven pressure are hard to distinguish in the frame; a negative one means that the search has \
+                 missed the maximum."
                     .into(),
             ),
             Item::Pictures(pictures),
@@ -46,15 +45,15 @@ pub fn search(measured: &[Measured]) -> Result<Section> {
     })
 }
 
-/// Margin against error, one mark per frame.
-fn margins(planes: &[Vec<Plane>]) -> Result<Picture> {
-    let series = planes.iter().zip(0..).filter_map(|(planes, index): (_, usize)| {
-        let points = planes
+/// Shear error against margin, one mark per frame.
+fn margins(maps: &[Vec<ObjectiveMap>]) -> Result<Picture> {
+    let series = maps.iter().zip(0..).filter_map(|(maps, index): (_, usize)| {
+        let points = maps
             .iter()
             .filter(|p| p.margin > 0.0)
             .filter_map(|p| Some((p.margin, p.tangential.filter(|error| *error > 0.0)?, String::new())));
         Some(Series {
-            name: planes.first()?.scene.clone(),
+            name: maps.first()?.scene.clone(),
             colour: SERIES[1 + index % 7],
             shape: index % 4,
             points: points.collect(),
@@ -69,6 +68,6 @@ fn margins(planes: &[Vec<Plane>]) -> Result<Picture> {
         series: series.collect(),
         guides: Vec::new(),
     };
-    let caption = "Shear error against the margin, a mark per frame, case 0, golden model".into();
+    let caption = "Shear error against margin, one mark per frame, case 0, golden model".into();
     Ok(Picture { id: "margins".into(), caption, svg: scatter(&plot)? })
 }

@@ -1,4 +1,4 @@
-//! Where it holds: condition against error, and extreme frames.
+//! Numerical stability: error against condition number, and extreme frames.
 
 use anyhow::{anyhow, Result};
 use dermis_golden::scene::InverseKind;
@@ -10,31 +10,32 @@ use super::super::pictures::{scatter, Scatter, Series};
 use super::super::stability::{refusals, stability_table};
 use super::super::style::{standalone, SERIES};
 
-const CAPTION: &str = "Forward error and normal error of the resultant against the condition of Cz";
-const LEGEND: &str = "A mark for each scene and number format, double, single and fixed point.";
-/// Errors below and above stand on the plot's edges.
+const CAPTION: &str = "Forward error, and normal error of the resultant, against the condition number of Cz";
+const LEGEND: &str = "One mark per scene and number format: double, single and fixed point.";
+/// Range of errors in the plot; others are drawn at its edges.
 const SHOWN: [f64; 2] = [1e-16, 1e3];
 
-/// Condition against error, as table and picture.
+/// The section with error against condition number, as table and picture.
 ///
 /// # Errors
 /// A picture that cannot be written.
 pub fn stability(rows: &[Row]) -> Result<Section> {
-    let text = "Known forces without noise, their stress in extended precision: what is lost is the inverse's and the \
-                arithmetic's. By default singular values that input, noise and coefficients cannot tell are left out; \
-                `exact` keeps them all. The lines called 50 digits take stress that was computed elsewhere with as \
-                many.";
+    let text =
+        "The stress of known forces is computed in extended precision and without noise, so that all errors come from \
+                 the inverse and the arithmetic. By default singular values below the resolution of input, noise and \
+                 coefficients are truncated; `exact` keeps them all. The rows called 50 digits use stress computed \
+                 separately with 50 decimal digits.";
     let picture = Picture { id: "stability".into(), caption: CAPTION.into(), svg: picture(rows)? };
     let mut items = vec![Item::Text(text.into()), Item::Pictures(vec![picture]), Item::Table(stability_table(rows))];
     items.extend(refusals(rows).into_iter().map(|reason| Item::Text(format!("Refused: {reason}"))));
-    Ok(Section { id: "stability", title: "Where it holds: condition against error".into(), items })
+    Ok(Section { id: "stability", title: "Numerical stability: error against condition number".into(), items })
 }
 
-/// Frames at the ends of what a sensor can give, of scenes by name.
+/// The section with results on extreme frames, by scene name.
 pub fn extremes(all: &[(String, Vec<extreme::Row>)]) -> Section {
     let text =
-        "Each frame has a defined result in both models; the tests hold the hardware equal to the bit-true one on \
-                them, to the bit and the cycle.";
+        "Each of these frames has a defined result in both models; the tests check that the hardware equals the \
+                bit-true model on them in every bit and cycle.";
     let mut items = vec![Item::Text(text.into())];
     items.extend(all.iter().map(|(scene, rows)| Item::Table(extremes_table(scene, rows))));
     Section { id: "extremes", title: "Extreme frames".into(), items }
@@ -45,18 +46,18 @@ const FORMATS: [Format; 3] = [("f64", |row| row.double), ("f32", |row| row.singl
 type Error = (&'static str, fn(&FormatErrors) -> Option<f64>);
 const ERRORS: [Error; 2] = [("forward", |figures| Some(figures.forward)), ("e_n", |figures| figures.normal)];
 
-/// The picture as a file of its own.
+/// The picture as an SVG file.
 ///
 /// # Errors
-/// No row has a condition, or the picture cannot be written.
+/// No row has a condition number, or the picture cannot be written.
 pub fn stability_picture(rows: &[Row]) -> Result<String> {
     if rows.iter().all(|row| row.spectrum.is_none()) {
-        return Err(anyhow!("--plot: no scene has a condition to draw"));
+        return Err(anyhow!("--plot: no scene has a condition number to plot"));
     }
     Ok(standalone(&picture(rows)?, CAPTION, LEGEND))
 }
 
-/// Condition against forward and normal error, one mark per scene and number format.
+/// Forward and normal error against condition number, one mark per scene and number format.
 fn picture(rows: &[Row]) -> Result<String> {
     let exact = InverseKind::Exact.name();
     let series = FORMATS.into_iter().zip(1..).flat_map(|((format, figures), colour)| {
@@ -71,7 +72,7 @@ fn picture(rows: &[Row]) -> Result<String> {
         })
     });
     scatter(&Scatter {
-        x: "condition of Cz".into(),
+        x: "condition number of Cz".into(),
         y: "error".into(),
         log: [true, true],
         ticks: [|condition| format!("{condition:.0e}"), |error| format!("{error:.0e}")],

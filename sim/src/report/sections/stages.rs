@@ -1,14 +1,14 @@
-//! Fixed point against floating point, stage by stage, so that the stage that costs accuracy is seen at once.
+//! Fixed point against floating point stage by stage, to show which stage costs accuracy.
 
 use anyhow::Result;
 
-use super::super::document::{count, decimal, percent, percent_text, words, Cell, Item, Picture, Section, Table};
+use super::super::document::{count, decimal, percent, percent_text, text_cell, Cell, Item, Picture, Section, Table};
 use super::super::measure::{stages as trace, Measured, StageRow};
 use super::super::pictures::{bars, Bars};
 use super::super::style::SERIES;
 use super::{scenes, Choice};
 
-/// The section.
+/// The section with the differences of all stages.
 ///
 /// # Errors
 /// A picture that cannot be written.
@@ -37,29 +37,33 @@ pub fn stages(measured: &[Measured], choices: &[Choice]) -> Result<Section> {
     let one_head: Vec<&'static str> = [&head[..2], &["frame"], &head[2..]].concat();
     let all = rows.iter().map(|row| {
         let mut cells = line(std::slice::from_ref(row));
-        cells.insert(2, words(row.frame.clone()));
+        cells.insert(2, text_cell(row.frame.clone()));
         cells
     });
+    let caption =
+        "Largest and RMS difference over the frames; bits used: by the largest word; bits there: width of the \
+                   word";
     Ok(Section {
         id: "stages",
         title: "Fixed point against floating point, stage by stage".into(),
         items: vec![
             Item::Text(
-                "Each stage's words beside the same stage in floating point, which starts from the stress itself \
-                 with matrices unrounded. Stage force is p at the integers' own μ: what the arithmetic costs. Stage \
-                 search is how far that μ is from the golden model's (LSB: mu_max/384), stage send what leaves: the \
-                 arithmetic with the search's answer in it. Shares are of the frame's largest value; LSBs are a \
-                 subarray's own, large where one has next to no load."
+                "Difference between each stage's words and the same stage in floating point, which starts from the \
+                 unquantised stress with unrounded matrices. Stage force compares p at the bit-true model's μ: the \
+                 error of the arithmetic alone. Stage search compares that μ with the golden model's (LSB: \
+                 mu_max/384). Stage send compares the output: the error of arithmetic and search. Shares are \
+                 relative to the frame's largest value. LSBs differ between subarrays; the difference in LSB can be \
+                 large in a subarray with little load."
                     .into(),
             ),
             Item::Pictures(pictures),
-            Item::Table(Table::new("stages", "Worst and RMS difference over the frames", &head, summed(&rows))),
-            Item::Table(Table::new("stages-frames", "The same, frame by frame", &one_head, all.collect()).shut()),
+            Item::Table(Table::new("stages", caption, &head, summed(&rows))),
+            Item::Table(Table::new("stages-frames", "The same for each frame", &one_head, all.collect()).collapsed()),
         ],
     })
 }
 
-/// Rows of one scene, case and stage put together, in the order of their first.
+/// Combines the rows of each scene, case and stage over the frames, in order of first appearance.
 fn summed(rows: &[StageRow]) -> Vec<Vec<Cell>> {
     let mut groups: Vec<Vec<StageRow>> = Vec::new();
     for row in rows {
@@ -85,9 +89,9 @@ fn rms(rows: &[StageRow], value: fn(&StageRow) -> f64) -> f64 {
 fn line(rows: &[StageRow]) -> Vec<Cell> {
     let first = &rows[0];
     vec![
-        words(first.scene.clone()),
-        words(first.case.clone()),
-        words(first.stage),
+        text_cell(first.scene.clone()),
+        text_cell(first.case.clone()),
+        text_cell(first.stage),
         decimal(Some(largest(rows, |row| row.max_lsb)), 1),
         decimal(Some(rms(rows, |row| row.rms_lsb)), 2),
         small(largest(rows, |row| row.max_share)),
@@ -98,7 +102,7 @@ fn line(rows: &[StageRow]) -> Vec<Cell> {
     ]
 }
 
-/// A share that may be far below a percent.
+/// A share in percent, in scientific notation if small.
 fn small(share: f64) -> Cell {
     let shown = if share < 1e-3 { format!("{:.1e} %", 100.0 * share) } else { percent_text(share) };
     Cell { shown, ..percent(Some(share)) }

@@ -1,30 +1,30 @@
-//! Sweeps: one field of a scene changed at a time; error against cycles and against block RAMs.
+//! Parameter sweeps: error against cycles and against block RAMs, with one field of a scene changed at a time.
 
 use anyhow::Result;
 
-use super::super::document::{count, percent, words, Cell, Item, Picture, Section, Table};
-use super::super::measure::{Kind, SweepPoint};
+use super::super::document::{count, percent, text_cell, Cell, Item, Picture, Section, Table};
+use super::super::measure::{ContactCount, SweepPoint};
 use super::super::pictures::{scatter, Guide, Scatter, Series};
 use super::super::style::SERIES;
 use super::time::short;
 
-/// The section from the sweeps of each scene, with the kind and the number of their frames.
+/// The section from the sweeps of each scene, given with contact count and number of frames.
 ///
 /// # Errors
 /// A picture that cannot be written.
-pub fn sweeps(all: &[(Vec<SweepPoint>, Kind, usize)]) -> Result<Section> {
+pub fn sweeps(all: &[(Vec<SweepPoint>, ContactCount, usize)]) -> Result<Section> {
     let mut pictures = Vec::new();
-    for (points, kind, frames) in all {
+    for (points, contact_count, frames) in all {
         let Some((scene, case)) = points.first().map(|point| (&point.scene, &point.case)) else { continue };
         for (what, x) in
             [("cycles", (|p| p.cycles as f64) as fn(&SweepPoint) -> f64), ("block RAMs", |p| p.block_rams as f64)]
         {
             pictures.push(Picture {
-                id: format!("sweep-{scene}-{}-{}", kind.name(), what.replace(' ', "-")),
+                id: format!("sweep-{scene}-{}-{}", contact_count.name(), what.replace(' ', "-")),
                 caption: format!(
                     "{scene} from case {case}, contacts: {}: shear error of the bit-true model against {what}, median \
                      of {frames} frames",
-                    kind.name()
+                    contact_count.name()
                 ),
                 svg: scatter(&plot(points, what, x))?,
             });
@@ -49,24 +49,27 @@ pub fn sweeps(all: &[(Vec<SweepPoint>, Kind, usize)]) -> Result<Section> {
         title: "What each setting costs".into(),
         items: vec![
             Item::Text(
-                "From each scene as it is, one field at a time; settings that the board has no room for are left \
-                 out, but those of degree. Cycles are the bit-true model's with every subarray searched, which \
-                 co-simulation holds equal to the hardware's."
+                "One field of each scene is changed at a time. Settings that do not fit the board are omitted, \
+                 except for degree. Cycles are the bit-true model's with every subarray searched; co-simulation \
+                 checks that the hardware's are equal."
                     .into(),
             ),
             Item::Pictures(pictures),
-            Item::Table(Table::new("sweeps", "Every setting", &head, rows.collect()).shut()),
+            Item::Table(
+                Table::new("sweeps", "All settings; the scene's own: the value in its file", &head, rows.collect())
+                    .collapsed(),
+            ),
         ],
     })
 }
 
 fn row(p: &SweepPoint) -> Vec<Cell> {
-    let yes = |is: bool| words(if is { "yes" } else { "" });
+    let yes = |is: bool| text_cell(if is { "yes" } else { "" });
     vec![
-        words(p.scene.clone()),
-        words(p.case.clone()),
-        words(p.field),
-        words(p.value.clone()),
+        text_cell(p.scene.clone()),
+        text_cell(p.case.clone()),
+        text_cell(p.field),
+        text_cell(p.value.clone()),
         yes(p.own),
         percent(p.tangential),
         percent(p.normal),
@@ -87,7 +90,7 @@ fn plot(points: &[SweepPoint], what: &str, x: fn(&SweepPoint) -> f64) -> Scatter
             .iter()
             .filter_map(|p| Some((x(p), p.tangential.filter(|error| *error > 0.0)?, p.value.clone())))
             .collect(),
-        // Settings have an order, cases have none.
+        // Numeric settings are joined by a line, cases are not.
         joined: group[0].field != "case",
     });
     Scatter {
@@ -98,7 +101,7 @@ fn plot(points: &[SweepPoint], what: &str, x: fn(&SweepPoint) -> f64) -> Scatter
         series: series.collect(),
         guides: points
             .iter()
-            .find_map(|p| Some(Guide::Ring((x(p), p.tangential.filter(|_| p.own)?), "the scene as it is".into())))
+            .find_map(|p| Some(Guide::Ring((x(p), p.tangential.filter(|_| p.own)?), "unchanged scene".into())))
             .into_iter()
             .collect(),
     }

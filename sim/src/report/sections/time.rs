@@ -1,15 +1,17 @@
-//! Error against run time: all engines in all cases, the Pareto front, the line at 1 ms.
+//! Error against run time of all engines in all cases, with the Pareto front and the 1 ms budget.
 
 use anyhow::Result;
 
-use super::super::document::{count, none, percent, seconds, seconds_text, words, Cell, Item, Picture, Section, Table};
+use super::super::document::{
+    count, empty_cell, percent, seconds, seconds_text, text_cell, Cell, Item, Picture, Section, Table,
+};
 use super::super::measure::{Engine, Measured, Point};
 use super::super::pictures::{scatter, Guide, Scatter, Series};
 use super::super::style::SERIES;
 use super::super::BUDGET_US;
 use super::{case_text, scenes};
 
-/// The section.
+/// The section with error against run time.
 ///
 /// # Errors
 /// A picture that cannot be written.
@@ -33,14 +35,19 @@ pub fn time(measured: &[Measured]) -> Result<Section> {
     items.insert(
         0,
         Item::Text(
-            "Each mark is an engine on a sensor in a case, which stands beside it. Errors of the resultant against \
-             the true contact, median over the shipped frames; times: a frame on the CPU, median over the frames and \
-             of three repeats, or the hardware's cycles over its clock. Below and left is better; nothing beats the \
-             front in both."
+            "Each mark is an engine on a sensor in the case written next to it. Errors: resultant against the true \
+             force, median over the shipped frames. Times: per frame; on the CPU the median over the frames and over \
+             three repeats, for the hardware its cycles divided by its clock. Lower left is better; no mark is \
+             better than the Pareto front in both error and time."
                 .into(),
         ),
     );
-    items.push(Item::Table(Table::new("time", "Every engine in every case", &head, rows.collect())));
+    items.push(Item::Table(Table::new(
+        "time",
+        "All engines in all cases; why not: reason for a missing result",
+        &head,
+        rows.collect(),
+    )));
     Ok(Section { id: "time", title: "Error against run time".into(), items })
 }
 
@@ -58,29 +65,37 @@ pub fn pictures(scene: &str, measured: &[Measured]) -> Result<[Picture; 2]> {
 }
 
 fn row(m: &Measured, engine: Engine) -> Vec<Cell> {
-    let mut row = vec![words(m.scene.name.clone()), words(case_text(m.scene.partition.case)), words(engine.name())];
-    let integers = m.integers.as_ref();
+    let mut row =
+        vec![text_cell(m.scene.name.clone()), text_cell(case_text(m.scene.partition.case)), text_cell(engine.name())];
+    let bit_true = m.bit_true.as_ref();
     let Some(point) = m.point(engine) else {
         let reason = match engine {
             Engine::Baseline => m.baseline.as_ref().err(),
-            _ => integers.err(),
+            _ => bit_true.err(),
         };
-        row.extend([none(), none(), none(), none(), none(), words(reason.map_or("", |reason| reason))]);
+        row.extend([
+            empty_cell(),
+            empty_cell(),
+            empty_cell(),
+            empty_cell(),
+            empty_cell(),
+            text_cell(reason.map_or("", |reason| reason)),
+        ]);
         return row;
     };
     row.extend([percent(point.tangential), percent(point.normal), seconds(Some(point.seconds))]);
-    row.extend(match integers {
-        Ok(integers) if engine == Engine::Hardware => {
-            let verdict = match integers.equal {
+    row.extend(match bit_true {
+        Ok(bit_true) if engine == Engine::Hardware => {
+            let equality = match bit_true.equal {
                 Some(true) => "yes",
                 Some(false) => "NO",
                 None => "not simulated",
             };
-            [count(integers.cycles), words(verdict)]
+            [count(bit_true.cycles), text_cell(equality)]
         }
-        _ => [none(), none()],
+        _ => [empty_cell(), empty_cell()],
     });
-    row.push(words(""));
+    row.push(text_cell(""));
     row
 }
 
@@ -108,13 +123,13 @@ fn picture(scene: &str, what: &str, own: &[Point], error: fn(&Point) -> Option<f
         log: [true, true],
         ticks: [|s| tick(&seconds_text(s)), |e| format!("{} %", short(100.0 * e))],
         series,
-        guides: vec![Guide::X(budget, "1 ms".into()), Guide::Front(front(all), "Pareto front".into())],
+        guides: vec![Guide::X(budget, "1 ms".into()), Guide::Front(pareto_front(all), "Pareto front".into())],
     };
-    let caption = format!("{scene}: {what} error against time; marks are named by their case");
+    let caption = format!("{scene}: {what} error against time per frame; marks are labelled with their case");
     Ok(Picture { id: format!("time-{scene}-{what}"), caption, svg: scatter(&plot)? })
 }
 
-/// `1.00 ms` as `1 ms`.
+/// Shortens a time: `1.00 ms` to `1 ms`.
 fn tick(text: &str) -> String {
     match text.split_once(' ') {
         Some((number, unit)) if number.contains('.') => {
@@ -124,7 +139,7 @@ fn tick(text: &str) -> String {
     }
 }
 
-/// Two significant digits without trailing zeros.
+/// A value with two significant digits, without trailing zeros.
 pub(super) fn short(value: f64) -> String {
     let decimals = (1.0 - value.abs().max(1e-12).log10().floor()).clamp(0.0, 9.0) as usize;
     let text = format!("{value:.decimals$}");
@@ -135,8 +150,8 @@ pub(super) fn short(value: f64) -> String {
     }
 }
 
-/// The points that no other beats in both, from left to right.
-fn front(mut points: Vec<(f64, f64)>) -> Vec<(f64, f64)> {
+/// The Pareto front: the points that no other point dominates, from left to right.
+fn pareto_front(mut points: Vec<(f64, f64)>) -> Vec<(f64, f64)> {
     points.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.total_cmp(&b.1)));
     let mut front: Vec<(f64, f64)> = Vec::new();
     for point in points {
@@ -152,10 +167,10 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_front_by_hand() {
+    fn pareto_front_by_hand() {
         let points = vec![(3.0, 1.0), (1.0, 5.0), (2.0, 6.0), (2.5, 3.0), (4.0, 2.0), (1.0, 7.0)];
-        assert_eq!(front(points), [(1.0, 5.0), (2.5, 3.0), (3.0, 1.0)]);
-        assert_eq!(front(vec![]), []);
+        assert_eq!(pareto_front(points), [(1.0, 5.0), (2.5, 3.0), (3.0, 1.0)]);
+        assert_eq!(pareto_front(vec![]), []);
     }
 
     #[test]

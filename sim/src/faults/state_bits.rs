@@ -1,7 +1,7 @@
-//! Every bit that a design keeps from one clock cycle to the next, read from Verilator's own listing of it.
+//! Every state bit of a design: registers and memories, read from Verilator's XML listing.
 //!
-//! A register is what a non-blocking assignment writes; memories are those that the model lists, ROM where nothing
-//! writes them. Nothing is listed by hand: a register that a stage gets tomorrow is hit tomorrow.
+//! A register is a variable written by a non-blocking assignment. A memory is one that the resource model lists; it is
+//! a ROM where nothing writes it. Nothing is listed by hand, so that new registers are covered automatically.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -11,59 +11,59 @@ use dermis_hdl::usage::stage;
 use roxmltree::{Document, Node};
 use serde::Serialize;
 
-/// What kind of memory holds a bit.
+/// Kind of storage that holds a bit.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 #[serde(rename_all = "kebab-case")]
-pub enum Class {
-    /// Coefficients, lists of columns, calibration: never written.
+pub enum StorageClass {
+    /// Memories that are never written: coefficients, column lists, calibration.
     Rom,
-    /// Buffers and operand memories.
+    /// Memories that are written: buffers, operands.
     Ram,
-    /// Everything else.
+    /// Registers.
     Register,
 }
 
 /// Classes in the order of the table.
-pub const CLASSES: [Class; 3] = [Class::Rom, Class::Ram, Class::Register];
+pub const CLASSES: [StorageClass; 3] = [StorageClass::Rom, StorageClass::Ram, StorageClass::Register];
 
-impl Class {
-    /// Name in the table.
+impl StorageClass {
+    /// Name in tables.
     pub fn name(self) -> &'static str {
         match self {
-            Class::Rom => "ROM",
-            Class::Ram => "RAM",
-            Class::Register => "register",
+            StorageClass::Rom => "ROM",
+            StorageClass::Ram => "RAM",
+            StorageClass::Register => "register",
         }
     }
 }
 
 /// A register or a memory.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Place {
-    /// Which kind.
-    pub class: Class,
-    /// The pipeline's stage, by its name in the hardware; what belongs to none is the engine's.
+pub struct StateElement {
+    /// Kind of storage.
+    pub class: StorageClass,
+    /// Pipeline stage by its name in the hardware; `engine` for what belongs to no stage.
     pub stage: String,
-    /// Instances from the design's top down, separated by dots; empty at the top.
+    /// Instance path from the design's top, separated by dots; empty at the top.
     pub scope: String,
-    /// Its name there.
+    /// Name of the variable in that instance.
     pub signal: String,
-    /// Words.
+    /// Number of words.
     pub words: usize,
-    /// Bits of a word.
+    /// Bits per word.
     pub bits: usize,
 }
 
-/// Reads the listing of `dut`, the instance of the design in its bench.
+/// Reads the state elements of `dut`, the design's instance in the bench, from Verilator's listing.
 ///
 /// # Errors
-/// A listing of another form than Verilator's.
-pub fn places(listing: &str, dut: &str, memories: &[Memory]) -> Result<Vec<Place>> {
+/// A listing that cannot be parsed, or that does not contain all `memories`.
+pub fn state_elements(listing: &str, dut: &str, memories: &[Memory]) -> Result<Vec<StateElement>> {
     let document = Document::parse(listing).map_err(|error| anyhow!("Verilator's listing: {error}"))?;
     let modules: BTreeMap<&str, Node> = document
         .descendants()
         .filter(|node| node.has_tag_name("module"))
-        // The name as cells have it, its dollars spelt out.
+        // `origName` is the name that cells refer to, with dollar signs unescaped.
         .filter_map(|node| Some((node.attribute("origName")?, node)))
         .collect();
     let widths = Widths::new(&document);
@@ -77,28 +77,28 @@ pub fn places(listing: &str, dut: &str, memories: &[Memory]) -> Result<Vec<Place
         let block = own.replace('.', "$");
         let stage = stage(&block);
         let mut scan = Scan::default();
-        scan.walk(*module, own);
+        scan.scan_module(*module, own);
         for ((scope, signal), kind) in &scan.declared {
             let listed = memories.iter().any(|memory| memory.block == block && memory.array == *signal);
             let class = match (listed, scan.assigned.contains(&(scope.clone(), signal.clone()))) {
-                (true, false) => Class::Rom,
-                (true, true) => Class::Ram,
-                (false, true) => Class::Register,
+                (true, false) => StorageClass::Rom,
+                (true, true) => StorageClass::Ram,
+                (false, true) => StorageClass::Register,
                 (false, false) => continue,
             };
             let [words, bits] = widths.of(kind).ok_or_else(|| anyhow!("no width of {scope}.{signal}"))?;
             let (stage, scope, signal) = (stage.to_owned(), scope.clone(), signal.clone());
-            all.push(Place { class, stage, scope, signal, words, bits });
+            all.push(StateElement { class, stage, scope, signal, words, bits });
         }
     }
-    let found = all.iter().filter(|place| place.class != Class::Register).count();
+    let found = all.iter().filter(|element| element.class != StorageClass::Register).count();
     match found == memories.len() {
         true => Ok(all),
         false => Err(anyhow!("{found} of {} memories are in Verilator's listing", memories.len())),
     }
 }
 
-/// Variables of a module and which of them a clock writes, by scope and name.
+/// Variables of a module, and those written by non-blocking assignments; both by scope and name.
 #[derive(Default)]
 struct Scan {
     declared: BTreeMap<(String, String), String>,
@@ -106,7 +106,7 @@ struct Scan {
 }
 
 impl Scan {
-    fn walk(&mut self, node: Node, scope: &str) {
+    fn scan_module(&mut self, node: Node, scope: &str) {
         for child in node.children().filter(Node::is_element) {
             let name = child.attribute("name").unwrap_or_default();
             match child.tag_name().name() {
@@ -114,35 +114,38 @@ impl Scan {
                     let kind = child.attribute("dtype_id").unwrap_or_default().to_owned();
                     self.declared.insert((scope.to_owned(), name.to_owned()), kind);
                 }
-                // The blocks of a loop that is unrolled have names.
-                "begin" if !name.is_empty() => {
-                    self.walk(child, &[scope, name].into_iter().filter(|s| !s.is_empty()).collect::<Vec<_>>().join("."))
+                // Unrolled generate loops are named blocks.
+                "begin" if !name.is_empty() => self.scan_module(
+                    child,
+                    &[scope, name].into_iter().filter(|s| !s.is_empty()).collect::<Vec<_>>().join("."),
+                ),
+                "assigndly" => {
+                    child.children().rfind(Node::is_element).iter().for_each(|to| self.add_target(*to, scope))
                 }
-                "assigndly" => child.children().rfind(Node::is_element).iter().for_each(|to| self.to(*to, scope)),
-                _ => self.walk(child, scope),
+                _ => self.scan_module(child, scope),
             }
         }
     }
 
-    /// The target of an assignment: a variable, a part of one, or several side by side.
-    fn to(&mut self, target: Node, scope: &str) {
+    /// Adds the target of an assignment: a variable, a selection of one, or a concatenation.
+    fn add_target(&mut self, target: Node, scope: &str) {
         let mut parts = target.children().filter(Node::is_element);
         match target.tag_name().name() {
             "varref" => {
                 let name = target.attribute("name").unwrap_or_default().to_owned();
-                // Declared here or further out.
+                // Declared in this scope or an enclosing one.
                 let mut scopes = std::iter::successors(Some(scope), |s| s.rsplit_once('.').map(|(outer, _)| outer));
                 let own = scopes.find(|s| self.declared.contains_key(&((*s).to_owned(), name.clone())));
                 self.assigned.insert((own.unwrap_or_default().to_owned(), name));
             }
-            "concat" => parts.for_each(|part| self.to(part, scope)),
-            // What is selected from comes first, then where.
-            _ => parts.next().iter().for_each(|part| self.to(*part, scope)),
+            "concat" => parts.for_each(|part| self.add_target(part, scope)),
+            // The first child of a selection is the variable, the others are indices.
+            _ => parts.next().iter().for_each(|part| self.add_target(*part, scope)),
         }
     }
 }
 
-/// Words and bits of the listing's types.
+/// Words and bits of the types in the listing, by their id.
 struct Widths<'a>(BTreeMap<&'a str, Node<'a, 'a>>);
 
 impl<'a> Widths<'a> {
@@ -171,7 +174,7 @@ impl<'a> Widths<'a> {
     }
 }
 
-/// A Verilog number as Verilator lists it: `32'sh1f`.
+/// Parses a Verilog number as in Verilator's listing: `32'sh1f`.
 fn number(text: &str) -> Option<usize> {
     usize::from_str_radix(text.rsplit_once('h')?.1, 16).ok()
 }

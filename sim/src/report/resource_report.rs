@@ -1,4 +1,4 @@
-//! What a built design takes of its board, as text.
+//! Resources of a generated design and its optional features, as text.
 
 use std::collections::BTreeMap;
 
@@ -9,7 +9,7 @@ use dermis_hdl::usage::{total, Usage, STAGES};
 
 use super::table::{aligned, markdown};
 
-/// A table of the stages, the board's share, lanes and cycles.
+/// A table of the resources of each stage and their share of the board, with lanes and cycles.
 pub fn resources(model: &Model, usage: &BTreeMap<String, Usage>) -> String {
     let board = &model.board;
     let row = |name: &str, cells: [String; 4]| [vec![name.to_string()], cells.to_vec()].concat();
@@ -31,34 +31,34 @@ pub fn resources(model: &Model, usage: &BTreeMap<String, Usage>) -> String {
     text
 }
 
-/// What the scene has, then a table of what it leaves out.
+/// The optional features that the scene uses, then a table of those left out.
 pub fn features(explained: &[Explained]) -> String {
-    let mut text = "\nthe scene needs:\n".to_string();
+    let mut text = "\nfeatures of the scene:\n".to_string();
     let present = explained.iter().filter(|feature| feature.present);
     for feature in present {
         text.push_str(&format!("  {}: {}\n", feature.feature, feature.setting));
         if let Some(Saved { block_rams, multipliers, flip_flops, luts, cycles }) = feature.costs {
             text.push_str(&format!(
-                "    more than without: {block_rams} block RAMs, {multipliers} multipliers, {flip_flops} flip-flops*, \
+                "    cost: {block_rams} block RAMs, {multipliers} multipliers, {flip_flops} flip-flops*, \
                  {luts} LUTs*, {cycles} cycles\n"
             ));
         }
     }
     if explained.iter().all(|feature| !feature.present) {
-        text.push_str("  none of the features that hardware can do without\n");
+        text.push_str("  no optional feature\n");
     }
-    text.push_str("\nleft out, and what that saves against the scene with it put back:\n");
+    text.push_str("\nfeatures left out, and what each would cost:\n");
     let rows = explained.iter().filter_map(|feature| {
         let saved = feature.saved?;
         let numbers = [saved.block_rams, saved.multipliers, saved.flip_flops, saved.luts, saved.cycles];
         let names = vec![feature.feature.to_string(), feature.setting.clone()];
         Some([names, numbers.map(|n| n.to_string()).to_vec()].concat())
     });
-    let head = ["left out", "put back as", "block RAMs", "multipliers", "flip-flops*", "LUTs*", "cycles"];
+    let head = ["feature", "setting", "block RAMs", "multipliers", "flip-flops*", "LUTs*", "cycles"];
     text.push_str(&aligned(2, &head, rows.collect()));
     for feature in explained {
         if let Some(reason) = &feature.impossible {
-            text.push_str(&format!("{} ({}) cannot be put back: {reason}\n", feature.feature, feature.setting));
+            text.push_str(&format!("{} ({}) cannot be added: {reason}\n", feature.feature, feature.setting));
         }
     }
     text

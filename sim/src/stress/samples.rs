@@ -1,24 +1,24 @@
-//! The frames that are played: a scene's own, and some that no sensor would give.
+//! Input frames of the experiments with the model's results: a scene's shipped frames and synthetic ones.
 
 use anyhow::Result;
 use dermis_golden::fixed::{Cycles, Model};
 use dermis_golden::frame::Frame;
 
-/// A scene's own frames that are taken.
-const OWN: usize = 4;
+/// Largest number of shipped frames used.
+const SHIPPED: usize = 4;
 
-/// The codes of one reconstruction and what the bit-true model makes of them.
+/// The codes of one reconstruction and the bit-true model's results.
 #[derive(Clone, Debug)]
 pub(crate) struct Sample {
-    /// Codes, row-major, of one frame after the other.
+    /// Codes of all frames in order, each row-major.
     pub codes: Vec<i32>,
-    /// Taxels, after which `tlast` is due.
+    /// Taxels per frame; `tlast` marks the last one.
     pub taxels: usize,
-    /// Forces and status.
+    /// Expected output: force beats, then status beats.
     pub beats: Vec<[i32; 3]>,
-    /// Of these, the ones before the status.
+    /// Number of force beats.
     pub forces: usize,
-    /// Promised at full speed.
+    /// Cycle counts at full speed.
     pub cycles: Cycles,
 }
 
@@ -30,23 +30,23 @@ impl Sample {
         Sample { codes, taxels: model.scene.sensor.taxels(), beats, forces, cycles: trace.cycles }
     }
 
-    /// Whether there is a force.
-    pub(crate) fn presses(&self) -> bool {
+    /// Whether any force is not zero.
+    pub(crate) fn has_force(&self) -> bool {
         self.beats[..self.forces].iter().any(|beat| *beat != [0; 3])
     }
 }
 
-/// The first of a scene's own frames.
+/// Samples of the first shipped frames.
 ///
 /// # Errors
 /// A frame of another sensor.
-pub(crate) fn own(model: &Model, frames: &[Frame]) -> Result<Vec<Sample>> {
-    let whole = frames.chunks_exact(1 << model.scene.input.average).take(OWN);
+pub(crate) fn shipped_samples(model: &Model, frames: &[Frame]) -> Result<Vec<Sample>> {
+    let whole = frames.chunks_exact(1 << model.scene.input.average).take(SHIPPED);
     whole.map(|frames| Ok(Sample::new(model, model.readings(frames)?))).collect()
 }
 
-/// Zeros, all codes at an end of their range, one taxel alone, and noise of two sizes.
-pub(crate) fn drawn(model: &Model, random: &mut fastrand::Rng) -> Vec<Sample> {
+/// Synthetic samples: zeros, all codes at either end of their range, noise of two amplitudes, a single loaded taxel.
+pub(crate) fn synthetic_samples(model: &Model, random: &mut fastrand::Rng) -> Vec<Sample> {
     let taxels = model.scene.sensor.taxels();
     let count = taxels << model.scene.input.average;
     let most = (1i32 << (model.formats.code_bits - 1)) - 1;

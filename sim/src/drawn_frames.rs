@@ -1,7 +1,7 @@
-//! Fresh frames: contacts drawn from a seed, so that errors are measured on frames that nothing was tuned to.
+//! Frames of random contacts, drawn from a seed: test data that no parameter was tuned on.
 //!
-//! Frame k of a scene has the k-th of the wanted numbers of contacts, round and round, and its own start of the random
-//! numbers; sensor and medium are the scene's.
+//! Frame k takes its number of contacts from `--contacts` in turn and has its own seed; sensor and medium are the
+//! scene's.
 
 use anyhow::Result;
 use clap::{value_parser, Args, ValueEnum};
@@ -9,22 +9,22 @@ use dermis_golden::frame::Frame;
 use dermis_golden::generator::{self, generate, random_contacts, Draw};
 use dermis_golden::scene::Scene;
 
-/// What to draw.
+/// Command-line options of the drawn frames.
 #[derive(Args, Clone, Debug)]
-pub struct Fresh {
-    /// Draw N frames per scene in place of the shipped ones.
+pub struct DrawnFrames {
+    /// Draw N random frames per scene instead of using the shipped ones; 0 uses the shipped ones.
     #[arg(long = "fresh", value_name = "N", default_value_t = 0, value_parser = value_parser!(u32).range(0..=100_000))]
     pub frames: u32,
-    /// Contacts on a drawn frame; repeated, frames take them in turn.
+    /// Number of contacts on a drawn frame, repeatable; successive frames take the values in turn.
     #[arg(long = "contacts", value_name = "K", default_value = "1", value_parser = value_parser!(u8).range(1..=8))]
     pub contacts: Vec<u8>,
     /// Shapes of drawn contacts.
     #[arg(long, value_enum, default_value = "elliptic")]
     pub shapes: Shapes,
-    /// Drawn contacts touch each other.
+    /// Place drawn contacts so that they touch each other.
     #[arg(long)]
     pub touching: bool,
-    /// Start of the random numbers.
+    /// Seed of the random numbers.
     #[arg(long, default_value_t = 1)]
     pub seed: u64,
 }
@@ -32,9 +32,9 @@ pub struct Fresh {
 /// Shapes of drawn contacts.
 #[derive(ValueEnum, Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Shapes {
-    /// Ellipses, Hertz's pressure or a uniform one, full sliding.
+    /// Ellipses with Hertzian or uniform pressure, full sliding.
     Elliptic,
-    /// Rings, rectangles, uniform discs and Hertz circles in partial slip.
+    /// Rings, rectangles, uniform discs and Hertzian circles in partial slip.
     Other,
 }
 
@@ -47,7 +47,7 @@ impl From<Shapes> for generator::Shapes {
     }
 }
 
-impl Fresh {
+impl DrawnFrames {
     /// The drawn frames of a scene.
     ///
     /// # Errors
@@ -55,7 +55,7 @@ impl Fresh {
     pub fn draw(&self, scene: &Scene) -> Result<Vec<Frame>> {
         let frame = |index: usize| -> Result<Frame> {
             let count = usize::from(self.contacts[index % self.contacts.len()]);
-            // Seeds of neighbouring frames must not share their streams.
+            // Spread over 64 bits, so that neighbouring seeds and frames do not share random streams.
             let seed = self.seed.wrapping_mul(0x9e37_79b9_7f4a_7c15) ^ (index as u64) << 32;
             let contacts = random_contacts(
                 &scene.sensor,
@@ -74,12 +74,12 @@ mod tests {
     #[test]
     fn frames_repeat_and_differ() {
         let scene = Scene::builtin("sensor-3").unwrap();
-        let fresh = Fresh { frames: 4, contacts: vec![1, 3], shapes: Shapes::Other, touching: true, seed: 5 };
-        let frames = fresh.draw(&scene).unwrap();
+        let drawn = DrawnFrames { frames: 4, contacts: vec![1, 3], shapes: Shapes::Other, touching: true, seed: 5 };
+        let frames = drawn.draw(&scene).unwrap();
         assert_eq!(frames.iter().map(|frame| frame.contacts.len()).collect::<Vec<_>>(), [1, 3, 1, 3]);
-        assert_eq!(frames, fresh.draw(&scene).unwrap());
+        assert_eq!(frames, drawn.draw(&scene).unwrap());
         assert_ne!(frames[0].stress_MPa, frames[2].stress_MPa);
-        let other = Fresh { seed: 6, ..fresh }.draw(&scene).unwrap();
+        let other = DrawnFrames { seed: 6, ..drawn }.draw(&scene).unwrap();
         assert_ne!(frames[0].stress_MPa, other[0].stress_MPa);
     }
 }

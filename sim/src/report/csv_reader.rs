@@ -1,6 +1,6 @@
-//! Read: a CSV text back into fields, for the writers' tests.
+//! CSV parser for the tests of the CSV writers.
 
-/// The head and the records; a quoted field may hold commas, doubled quotes and line ends.
+/// Header and records of a CSV text; quoted fields may contain commas, doubled quotes and line ends.
 pub fn csv(text: &str) -> (Vec<String>, Vec<Vec<String>>) {
     let (mut records, mut record, mut field, mut quoted) = (Vec::new(), Vec::new(), String::new(), false);
     let mut characters = text.chars().peekable();
@@ -21,7 +21,7 @@ pub fn csv(text: &str) -> (Vec<String>, Vec<Vec<String>>) {
     (head, records)
 }
 
-/// The field of a record under a column's name.
+/// The field of a record in the column `name`.
 pub fn field<'a>(head: &[String], record: &'a [String], name: &str) -> &'a str {
     assert_eq!(head.len(), record.len());
     &record[head.iter().position(|column| column == name).unwrap()]

@@ -1,45 +1,45 @@
-//! The other end of a simulated board's UART.
+//! Host end of a simulated board's UART.
 
 use std::collections::VecDeque;
 
 use dermis_hdl::link::{BoardDevice, BoardOutputs};
 
-/// Bits of a byte on the line, start and stop bit among them.
+/// Bits per byte on the line, with start and stop bit.
 const BITS: u64 = 10;
 
-/// What goes out on the line.
+/// What the host sends on the line.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Sent {
+pub enum UartSymbol {
     /// A byte.
     Byte(u8),
     /// A byte whose stop bit is missing.
     NoStop(u8),
-    /// The line stays idle for so many bytes' time.
+    /// The line stays idle for the time of so many bytes.
     Pause(u32),
 }
 
-/// A UART of exact bit times, clocked together with the board.
-pub struct UartLine {
+/// A UART with exact bit times, simulated in step with the board's clock.
+pub struct HostUart {
     device: Box<dyn BoardDevice>,
-    /// Bits per clock cycle as a fraction: baud / clock.
+    /// Bits per clock cycle are the fraction `baud` / `clock_hz`.
     baud: u64,
     clock_hz: u64,
     cycle: u64,
-    queue: VecDeque<Sent>,
-    /// What is being sent, and the cycle it began in.
-    sending: Option<(Sent, u64)>,
-    /// The cycle of a start bit's edge, and the bits since.
+    queue: VecDeque<UartSymbol>,
+    /// What is being sent, and its first cycle.
+    sending: Option<(UartSymbol, u64)>,
+    /// Byte being received: cycle of its start edge, number of bits sampled, their values from bit 0.
     receiving: Option<(u64, u64, u32)>,
     received: Vec<u8>,
     pins: BoardOutputs,
-    /// The last cycle in which anything was on the line.
-    moved: u64,
+    /// The last cycle with activity on the line, in either direction.
+    last_active: u64,
 }
 
-impl UartLine {
-    /// The line of a board that sends `baud` bit/s at a clock of `clock_hz`.
+impl HostUart {
+    /// The host of a board with a clock of `clock_hz`, at `baud` bit/s.
     pub fn new(device: Box<dyn BoardDevice>, baud: u32, clock_hz: u32) -> Self {
-        UartLine {
+        HostUart {
             device,
             baud: baud.into(),
             clock_hz: clock_hz.into(),
@@ -49,32 +49,32 @@ impl UartLine {
             receiving: None,
             received: Vec::new(),
             pins: BoardOutputs { to_host: true, ..BoardOutputs::default() },
-            moved: 0,
+            last_active: 0,
         }
     }
 
-    /// From now on sends and listens at `baud` bit/s, whatever the board does.
+    /// Changes the host's bit rate to `baud` bit/s; the board keeps its own.
     pub fn set_baud(&mut self, baud: u32) {
         self.baud = baud.into();
     }
 
-    /// Puts something into the queue for the line.
-    pub fn send(&mut self, what: Sent) {
+    /// Appends to the queue of symbols to send.
+    pub fn send(&mut self, what: UartSymbol) {
         self.queue.push_back(what);
-        self.moved = self.cycle;
+        self.last_active = self.cycle;
     }
 
-    /// The bytes that have come since the last call.
+    /// Takes the bytes received since the last call.
     pub fn received(&mut self) -> Vec<u8> {
         std::mem::take(&mut self.received)
     }
 
-    /// Clock cycles since the line last moved.
-    pub fn quiet(&self) -> u64 {
-        self.cycle - self.moved
+    /// Clock cycles since the last activity on the line.
+    pub fn idle_cycles(&self) -> u64 {
+        self.cycle - self.last_active
     }
 
-    /// Clock cycles so far.
+    /// Clock cycles simulated so far.
     pub fn cycles(&self) -> u64 {
         self.cycle
     }
@@ -84,26 +84,26 @@ impl UartLine {
         self.pins
     }
 
-    /// One clock cycle.
+    /// Simulates one clock cycle.
     pub fn cycle(&mut self) {
         let level = self.level();
         self.pins = self.device.cycle(level.into());
         self.listen();
         if !self.queue.is_empty() || self.sending.is_some() || self.receiving.is_some() {
-            self.moved = self.cycle;
+            self.last_active = self.cycle;
         }
         self.cycle += 1;
     }
 
-    /// Whole bits since cycle `from`.
+    /// Whole bit times since cycle `from`.
     fn bits_since(&self, from: u64) -> u64 {
         (self.cycle - from) * self.baud / self.clock_hz
     }
 
-    /// The level that the board sees.
+    /// The level that the host drives.
     fn level(&mut self) -> bool {
         if let Some((what, from)) = self.sending {
-            let bytes = if let Sent::Pause(bytes) = what { u64::from(bytes) } else { 1 };
+            let bytes = if let UartSymbol::Pause(bytes) = what { u64::from(bytes) } else { 1 };
             if self.bits_since(from) >= BITS * bytes {
                 self.sending = None;
             }
@@ -113,9 +113,9 @@ impl UartLine {
         }
         let Some((what, from)) = self.sending else { return true };
         let (data, stop) = match what {
-            Sent::Byte(data) => (data, true),
-            Sent::NoStop(data) => (data, false),
-            Sent::Pause(_) => return true,
+            UartSymbol::Byte(data) => (data, true),
+            UartSymbol::NoStop(data) => (data, false),
+            UartSymbol::Pause(_) => return true,
         };
         match self.bits_since(from) {
             0 => false,

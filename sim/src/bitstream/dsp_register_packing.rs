@@ -1,19 +1,20 @@
-//! Registers into the multipliers, which have room for them.
+//! Moves registers from the fabric into the ECP5 multipliers (DSP register packing).
 //!
-//! An ECP5 multiplier has a register at each operand and one at its product. Yosys leaves them empty and puts flip-flops in
-//! the fabric, from where the way in costs as much time as the product itself. This moves them in: same clock, no
-//! enable, no reset, zero at the start.
+//! An ECP5 multiplier has a register at each operand and one at its product. Yosys leaves them unused and places
+//! flip-flops in the fabric, from which the route into the multiplier takes as long as the product itself. Flip-flops
+//! are moved if they have the same clock, no enable, no reset and the initial value zero.
 //!
 //! ```text
-//! flip-flops -> both operands    all bits, flip-flops or constant zeros; the flip-flops stay where others use them
-//! product    -> flip-flops       every used bit goes to one flip-flop and nowhere else
+//! flip-flops -> both operands    all bits are flip-flops or constant zeros; flip-flops with other loads are also kept
+//! product    -> flip-flops       every used bit drives one flip-flop and nothing else
 //! ```
-//! Their reset is zero for ever, which the device has no wire for: the zero is a net from a look-up table. One for all
-//! multipliers goes across the device and into every block by a wire that the block's multipliers share, and routing lays
-//! one of its arcs over the other without end. So every multiplier has a look-up table of its own.
+//! The registers' reset must be constant zero. The device has no constant there, so that a look-up table drives the
+//! net. Every multiplier has its own look-up table: a common net enters each DSP block through a wire shared by the
+//! block's multipliers, and nextpnr's router then does not converge.
 //!
-//! Block RAMs keep theirs outside: which clock and enable their registers have in the 36-bit mode that Yosys chooses is not
-//! documented. That the netlist still computes the same bits is what the replay shows.
+//! Registers are not moved into block RAMs: which clock and enable the block RAM's output registers have in the 36-bit
+//! mode that Yosys chooses is not documented. The netlist co-simulation shows that the edited netlist computes the same
+//! bits.
 
 use std::collections::{BTreeSet, HashMap};
 
@@ -21,30 +22,30 @@ use serde_json::{json, Map, Value};
 
 /// Yosys's cell of an ECP5 multiplier.
 pub const MULTIPLIER: &str = "MULT18X18D";
-/// Operand's bits of a multiplier.
+/// Bits of a multiplier's operand.
 const OPERAND: usize = 18;
-/// Names of its operands.
+/// Names of the operands.
 const SIDES: [&str; 2] = ["A", "B"];
-/// Its product's bits.
+/// Bits of the product.
 const PRODUCT: usize = 36;
-/// The reset of its registers.
+/// Reset pin of the registers.
 const RESET: &str = "RST0";
 
 /// A net's number in Yosys's JSON.
 type Net = u64;
 
-/// What was moved.
+/// Number of registers moved.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Absorbed {
-    /// Operands whose register is now in the multiplier.
+pub struct PackedRegisters {
+    /// Operands whose registers are now in a multiplier.
     pub operands: usize,
-    /// Products.
+    /// Products whose registers are now in a multiplier.
     pub products: usize,
-    /// Flip-flops that are no longer needed.
+    /// Flip-flops removed from the fabric.
     pub flip_flops: usize,
 }
 
-/// A flip-flop without enable and reset that starts at zero.
+/// A flip-flop without enable and reset, with initial value zero.
 #[derive(Clone, Debug)]
 struct Register {
     cell: String,
@@ -55,32 +56,32 @@ struct Register {
 
 /// Moves registers in the module `top` of Yosys's JSON.
 ///
-/// Cells of other types and modules are left as they are. A netlist without that module has nothing to move.
-pub fn absorb(netlist: &mut Value, top: &str) -> Absorbed {
-    let Some(module) = netlist["modules"].get_mut(top) else { return Absorbed::default() };
-    let users = Users::of(module);
-    let Some(cells) = module["cells"].as_object_mut() else { return Absorbed::default() };
+/// Other cells and modules are not changed. Without that module nothing is moved.
+pub fn pack_registers(netlist: &mut Value, top: &str) -> PackedRegisters {
+    let Some(module) = netlist["modules"].get_mut(top) else { return PackedRegisters::default() };
+    let fan_out = FanOut::of(module);
+    let Some(cells) = module["cells"].as_object_mut() else { return PackedRegisters::default() };
     let by_output: HashMap<Net, Register> = registers(cells).map(|r| (r.output, r)).collect();
     let by_data = by_output.values().filter_map(|r| Some((r.data.as_u64()?, r.clone()))).collect();
-    let mut design = Design { users, by_output, by_data, gone: BTreeSet::new() };
-    let mut absorbed = Absorbed::default();
+    let mut design = Design { fan_out, by_output, by_data, removed: BTreeSet::new() };
+    let mut packed = PackedRegisters::default();
     for cell in cells.values_mut() {
         if cell["type"] == MULTIPLIER {
-            absorbed.operands += design.operands(cell);
-            absorbed.products += usize::from(design.product(cell).is_some());
+            packed.operands += design.operands(cell);
+            packed.products += usize::from(design.product(cell).is_some());
         }
     }
     let before = cells.len();
-    let Design { users, by_output, gone, .. } = design;
-    let unread = by_output.values().filter(|register| users.count(register.output) == 0);
-    let unneeded: BTreeSet<&String> = gone.iter().chain(unread.map(|register| &register.cell)).collect();
+    let Design { fan_out, by_output, removed, .. } = design;
+    let unread = by_output.values().filter(|register| fan_out.count(register.output) == 0);
+    let unneeded: BTreeSet<&String> = removed.iter().chain(unread.map(|register| &register.cell)).collect();
     cells.retain(|name, _| !unneeded.contains(name));
-    absorbed.flip_flops = before - cells.len();
+    packed.flip_flops = before - cells.len();
     drive_resets(module);
-    absorbed
+    packed
 }
 
-/// A look-up table of zeros for the reset of each multiplier that has registers.
+/// Drives the reset of each multiplier with registers from a look-up table of zeros.
 fn drive_resets(module: &mut Value) {
     let mut last = last_net(module);
     let Some(cells) = module["cells"].as_object_mut() else { return };
@@ -89,7 +90,7 @@ fn drive_resets(module: &mut Value) {
     for (name, cell) in cells.iter_mut().filter(|(_, cell)| registered(cell)) {
         last += 1;
         cell["connections"][RESET] = json!([last]);
-        drivers.push((format!("{name}$never"), zero(last)));
+        drivers.push((format!("{name}$never"), constant_zero(last)));
     }
     cells.extend(drivers);
 }
@@ -109,7 +110,7 @@ fn last_net(module: &Value) -> Net {
 }
 
 /// A look-up table that drives `net` with zero.
-fn zero(net: Net) -> Value {
+fn constant_zero(net: Net) -> Value {
     let mut directions = json!({"Z": "output"});
     let mut connections = json!({"Z": [net]});
     for pin in ["A", "B", "C", "D"] {
@@ -125,26 +126,26 @@ fn zero(net: Net) -> Value {
     })
 }
 
-/// How many inputs of cells and outputs of the module each net goes to.
-struct Users(HashMap<Net, usize>);
+/// Fan-out of each net: number of cell inputs and module outputs.
+struct FanOut(HashMap<Net, usize>);
 
-impl Users {
-    fn of(module: &Value) -> Users {
-        let mut users = Users(HashMap::new());
+impl FanOut {
+    fn of(module: &Value) -> FanOut {
+        let mut fan_out = FanOut(HashMap::new());
         let cells = module["cells"].as_object().into_iter().flatten();
         for (_, cell) in cells {
             for (pin, nets) in cell["connections"].as_object().into_iter().flatten() {
                 if cell["port_directions"][pin] != "output" {
-                    users.add(nets, 1);
+                    fan_out.add(nets, 1);
                 }
             }
         }
         for (_, port) in module["ports"].as_object().into_iter().flatten() {
             if port["direction"] != "input" {
-                users.add(&port["bits"], 1);
+                fan_out.add(&port["bits"], 1);
             }
         }
-        users
+        fan_out
     }
 
     fn add(&mut self, nets: &Value, more: isize) {
@@ -159,7 +160,7 @@ impl Users {
     }
 }
 
-/// The flip-flops that may move.
+/// The flip-flops that may be moved.
 fn registers(cells: &Map<String, Value>) -> impl Iterator<Item = Register> + '_ {
     cells.iter().filter_map(|(name, cell)| {
         let parameter = |name: &str| cell["parameters"][name].as_str().map(str::trim);
@@ -174,7 +175,7 @@ fn registers(cells: &Map<String, Value>) -> impl Iterator<Item = Register> + '_ 
     })
 }
 
-/// An operand's bits before its registers; no clock where all of them are constants.
+/// Inputs of an operand's registers; no clock if all bits are constants.
 struct Operand {
     clock: Option<Net>,
     data: Vec<Value>,
@@ -185,18 +186,19 @@ fn pins(side: &str) -> impl Iterator<Item = String> + '_ {
     (0..OPERAND).map(move |bit| format!("{side}{bit}"))
 }
 
-/// The nets and flip-flops around the cells.
+/// The netlist's nets and flip-flops.
 struct Design {
-    users: Users,
+    fan_out: FanOut,
     by_output: HashMap<Net, Register>,
     by_data: HashMap<Net, Register>,
-    /// Flip-flops that a cell's output has taken.
-    gone: BTreeSet<String>,
+    /// Flip-flops moved into a product register.
+    removed: BTreeSet<String>,
 }
 
 impl Design {
-    /// Moves the registers of both operands in, or of none: place and route knows no timing of a multiplier that has one
-    /// of the two. A constant operand may be registered as well: until it stands there, the other one is zero.
+    /// Moves the registers of both operands, or of none: nextpnr has no timing of a multiplier with only one operand
+    /// register. A constant operand may be registered too: until its register is loaded, the other operand is zero.
+    /// Returns the number of operands moved, constants not counted.
     fn operands(&mut self, cell: &mut Value) -> usize {
         let [a, b] = SIDES.map(|side| self.data(cell, side));
         let (Some(a), Some(b)) = (a, b) else { return 0 };
@@ -207,16 +209,16 @@ impl Design {
         };
         for (side, operand) in SIDES.into_iter().zip([a, b]) {
             for (pin, data) in pins(side).zip(operand.data) {
-                self.users.add(&cell["connections"][&pin], -1);
+                self.fan_out.add(&cell["connections"][&pin], -1);
                 cell["connections"][&pin] = json!([data]);
-                self.users.add(&cell["connections"][&pin], 1);
+                self.fan_out.add(&cell["connections"][&pin], 1);
             }
-            turn_on(cell, &format!("REG_INPUT{side}"), clock);
+            enable_register(cell, &format!("REG_INPUT{side}"), clock);
         }
         moved
     }
 
-    /// What an operand's registers take in; `None` where not every bit comes from one, or from a constant.
+    /// The inputs of an operand's registers; `None` unless every bit comes from a movable flip-flop or is a constant.
     fn data(&self, cell: &Value, side: &str) -> Option<Operand> {
         let mut operand = Operand { clock: None, data: Vec::with_capacity(OPERAND) };
         let mut ones = false;
@@ -227,24 +229,24 @@ impl Design {
                 operand.data.push(net.clone());
                 continue;
             };
-            let register = self.by_output.get(&number).filter(|register| !self.gone.contains(&register.cell))?;
+            let register = self.by_output.get(&number).filter(|register| !self.removed.contains(&register.cell))?;
             if *operand.clock.get_or_insert(register.clock) != register.clock {
                 return None;
             }
             operand.data.push(register.data.clone());
         }
-        // At the start a register is zero, a constant beside it is not.
+        // A constant one cannot be registered with other bits: registers start at zero.
         (operand.clock.is_none() || !ones).then_some(operand)
     }
 
-    /// Moves the registers of a product in.
+    /// Moves the registers of a product; `None` if they cannot be moved.
     fn product(&mut self, cell: &mut Value) -> Option<()> {
         let mut clock = cell["connections"]["CLK0"][0].as_u64();
         let mut moved = Vec::new();
         for pin in (0..PRODUCT).map(|bit| format!("P{bit}")) {
-            let net = cell["connections"][&pin][0].as_u64().filter(|&net| self.users.count(net) > 0);
+            let net = cell["connections"][&pin][0].as_u64().filter(|&net| self.fan_out.count(net) > 0);
             let Some(net) = net else { continue };
-            let register = self.by_data.get(&net).filter(|_| self.users.count(net) == 1)?;
+            let register = self.by_data.get(&net).filter(|_| self.fan_out.count(net) == 1)?;
             if *clock.get_or_insert(register.clock) != register.clock {
                 return None;
             }
@@ -252,15 +254,15 @@ impl Design {
         }
         for (pin, register) in &moved {
             cell["connections"][pin] = json!([register.output]);
-            self.gone.insert(register.cell.clone());
+            self.removed.insert(register.cell.clone());
         }
-        turn_on(cell, "REG_OUTPUT", clock.filter(|_| !moved.is_empty())?);
+        enable_register(cell, "REG_OUTPUT", clock.filter(|_| !moved.is_empty())?);
         Some(())
     }
 }
 
-/// Turns a multiplier's register on: of this clock, always enabled and never reset.
-fn turn_on(cell: &mut Value, register: &str, clock: Net) {
+/// Enables a multiplier's register with the given clock, always enabled and never reset.
+fn enable_register(cell: &mut Value, register: &str, clock: Net) {
     for (name, value) in [("CLK", "CLK0"), ("CE", "CE0"), ("RST", RESET)] {
         cell["parameters"][format!("{register}_{name}")] = json!(value);
     }
@@ -276,7 +278,7 @@ mod tests {
 
     /// Nets: 1 clock; 100 + bit operand's data, 200 + bit its register's output; 300 + bit product, 400 + bit its
     /// register's output. Operand B is the constant 0 up to bit 17.
-    fn netlist(enable: &str, extra_user: bool) -> Value {
+    fn netlist(enable: &str, extra_load: bool) -> Value {
         let mut cells = Map::new();
         let mut flip_flop = |name: String, data: Net, output: Net, enable: &str| {
             let cell = json!({
@@ -309,7 +311,7 @@ mod tests {
             json!({"type": "MULT18X18D", "parameters": {}, "port_directions": directions, "connections": pins});
         cells.insert("m".into(), multiplier);
         let mut outputs: Vec<u64> = (400..436).collect();
-        if extra_user {
+        if extra_load {
             outputs.push(300);
             outputs.push(200);
         }
@@ -320,8 +322,8 @@ mod tests {
     #[test]
     fn both_registers_of_a_multiplier_move_in() {
         let mut netlist = netlist("1 ", false);
-        let absorbed = absorb(&mut netlist, "t");
-        assert_eq!(absorbed, Absorbed { operands: 1, products: 1, flip_flops: 54 });
+        let packed = pack_registers(&mut netlist, "t");
+        assert_eq!(packed, PackedRegisters { operands: 1, products: 1, flip_flops: 54 });
         let multiplier = &netlist["modules"]["t"]["cells"]["m"];
         assert_eq!(multiplier["connections"]["A5"], json!([105]));
         assert_eq!(multiplier["connections"]["P35"], json!([435]));
@@ -333,7 +335,7 @@ mod tests {
     #[test]
     fn the_reset_has_a_zero_of_its_own() {
         let mut netlist = netlist("1 ", false);
-        absorb(&mut netlist, "t");
+        pack_registers(&mut netlist, "t");
         let cells = netlist["modules"]["t"]["cells"].as_object().unwrap();
         assert_eq!(cells.len(), 2);
         // The greatest number in the netlist is 435.
@@ -345,7 +347,10 @@ mod tests {
     #[test]
     fn a_flip_flop_that_others_read_stays_and_a_product_that_others_read_is_left() {
         let mut netlist = netlist("1 ", true);
-        assert_eq!(absorb(&mut netlist, "t"), Absorbed { operands: 1, flip_flops: 17, ..Absorbed::default() });
+        assert_eq!(
+            pack_registers(&mut netlist, "t"),
+            PackedRegisters { operands: 1, flip_flops: 17, ..PackedRegisters::default() }
+        );
         assert!(netlist["modules"]["t"]["cells"]["a0"].is_object());
     }
 
@@ -354,14 +359,20 @@ mod tests {
         let mut netlist = netlist("1 ", false);
         // B's lowest bit comes straight from outside.
         netlist["modules"]["t"]["cells"]["m"]["connections"]["B0"] = json!([500]);
-        assert_eq!(absorb(&mut netlist, "t"), Absorbed { products: 1, flip_flops: 36, ..Absorbed::default() });
+        assert_eq!(
+            pack_registers(&mut netlist, "t"),
+            PackedRegisters { products: 1, flip_flops: 36, ..PackedRegisters::default() }
+        );
         assert!(netlist["modules"]["t"]["cells"]["m"]["parameters"]["REG_INPUTA_CLK"].is_null());
     }
 
     #[test]
     fn a_flip_flop_with_an_enable_stays() {
         let mut netlist = netlist("CE", false);
-        assert_eq!(absorb(&mut netlist, "t"), Absorbed { products: 1, flip_flops: 36, ..Absorbed::default() });
+        assert_eq!(
+            pack_registers(&mut netlist, "t"),
+            PackedRegisters { products: 1, flip_flops: 36, ..PackedRegisters::default() }
+        );
         assert_eq!(netlist["modules"]["t"]["cells"]["m"]["connections"]["A0"], json!([200]));
     }
 }

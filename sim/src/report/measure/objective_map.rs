@@ -1,7 +1,7 @@
-//! Plane: the objective Π over the disc of μ, the path of the bit-true search, and how clear the maximum is.
+//! The objective Π over the disc of μ, the path of the bit-true search, and the margin of the maximum.
 //!
-//! margin = Π(μ*) − max Π(μ) over |μ − μ*| ≥ mu_max/8, in bits: how much better the best μ is than the best of those
-//! that would be another answer. Small where shear can hardly be told from an uneven pressure.
+//! margin = Π(μ*) − max Π(μ) over |μ − μ*| ≥ mu_max/8, in bits: the advantage of the best μ over clearly different
+//! ones. It is small where shear and uneven pressure are hard to distinguish.
 
 use dermis_golden::fixed::formats::{HALVINGS, MU_STEPS};
 use dermis_golden::fixed::search::COARSE_CENTRES;
@@ -10,36 +10,37 @@ use dermis_golden::float::pass::Polynomial;
 
 use super::Measured;
 
-/// Candidates from the centre to mu_max, along an axis.
+/// Grid points from the centre to mu_max along an axis.
 pub const HALF: i32 = 20;
-/// Distance, as a share of mu_max, from which a μ is another answer.
+/// Distance from μ*, as a share of mu_max, from which a μ counts as clearly different.
 const APART: f64 = 1.0 / 8.0;
 
-/// Π of a frame of one subarray.
+/// Π over the disc of μ for a frame in one subarray.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Plane {
+pub struct ObjectiveMap {
     /// Scene name.
     pub scene: String,
     /// Frame name.
     pub frame: String,
     /// Largest |μ|.
     pub mu_max: f64,
-    /// Π on the square grid of 2·[`HALF`] + 1, row by row with μ2 the row; `None` off the disc or without compression.
+    /// Π on a square grid of 2·[`HALF`] + 1 points per axis, row by row, μ2 constant in a row; `None` outside the disc
+    /// or without compression.
     pub values: Vec<Option<f64>>,
-    /// Centres of the bit-true search's sweeps after the coarse grid, and μ* last.
+    /// Best μ of the bit-true search after the coarse grid and after each refinement; μ* last.
     pub path: Vec<[f64; 2]>,
     /// The golden model's μ*.
     pub golden: [f64; 2],
-    /// Shear over normal load of the true resultant, where the frame has one.
+    /// Shear over normal load of the true resultant, if known.
     pub truth: Option<[f64; 2]>,
-    /// Of the golden model's μ*, in bits.
+    /// Margin of the golden model's μ*, in bits.
     pub margin: f64,
     /// The golden model's tangential error.
     pub tangential: Option<f64>,
 }
 
-/// The plane of a frame, `None` where the array is cut, not searched, or another objective than `sparse` is asked for.
-pub fn plane(measured: &Measured, index: usize) -> Option<Plane> {
+/// The objective map of a frame; `None` if the array has several subarrays or was not searched.
+pub fn objective_map(measured: &Measured, index: usize) -> Option<ObjectiveMap> {
     let (frame, result) = (&measured.frames[index], &measured.golden[index]);
     let [part] = &result.subarrays[..] else { return None };
     let best = part.objective_value?;
@@ -53,14 +54,14 @@ pub fn plane(measured: &Measured, index: usize) -> Option<Plane> {
     let far = |[x, y]: [f64; 2]| (x - part.mu[0]).hypot(y - part.mu[1]) >= APART * mu_max;
     let others = grid().zip(&values).filter(|((i, j), _)| far(mu(*i, *j))).filter_map(|(_, value)| *value);
     let truth = frame.resultant_N.filter(|[_, _, n]| *n > 0.0).map(|[x, y, n]| [x / n, y / n]);
-    Some(Plane {
+    Some(ObjectiveMap {
         scene: measured.scene.name.clone(),
         frame: frame.id.clone(),
         mu_max,
         margin: best - others.fold(f64::NEG_INFINITY, f64::max),
         values,
-        path: measured.integers.as_ref().map_or(Vec::new(), |integers| {
-            let stage = integers.traces[index].stages.iter().find(|stage| stage.name == "search");
+        path: measured.bit_true.as_ref().map_or(Vec::new(), |bit_true| {
+            let stage = bit_true.traces[index].stages.iter().find(|stage| stage.name == "search");
             path(stage.map_or(&[][..], |stage| &stage.words), mu_max)
         }),
         golden: part.mu,
@@ -69,8 +70,8 @@ pub fn plane(measured: &Measured, index: usize) -> Option<Plane> {
     })
 }
 
-/// The best after the coarse grid and after each halving, from the words of stage `search`: x, y, score, taken; each in
-/// steps of its level.
+/// The best μ after the coarse grid and after each halving of the step, from the words of stage `search` (x, y, score,
+/// taken), whose x and y count in steps of their level.
 fn path(words: &[Vec<i64>], mu_max: f64) -> Vec<[f64; 2]> {
     let coarse = COARSE_CENTRES.len();
     let judged = words.iter().skip(coarse - 1).zip(0..=HALVINGS);
@@ -84,7 +85,7 @@ mod tests {
 
     #[test]
     fn a_path_by_hand() {
-        // Seven coarse sweeps that do not count, the coarse best (1, −1), then (3, −2) at half the step.
+        // Seven coarse sweeps that are skipped, the coarse best (1, −1), then (3, −2) at half the step.
         let mut words = vec![vec![0, 0, 0, 0]; 7];
         words.extend([vec![1, -1, 5, 1], vec![3, -2, 4, 1]]);
         let found = path(&words, 0.6);
