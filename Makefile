@@ -15,7 +15,7 @@ PACKAGES   = verilator yosys nextpnr-ice40 fpga-icestorm g++ make chromium pytho
 QUICK     ?=
 
 .DEFAULT_GOAL := help
-.PHONY: help setup tools program run test fmt clippy unit lint quick docs bench build cosim bitstream report netlist fuzz stress clean
+.PHONY: help setup tools program run test fmt clippy unit lint quick docs bench build cosim bitstream report guide netlist fuzz stress clean
 
 help: ## list the targets
 	@sed -n 's/^\([a-z]*\):.*## /\1	/p' $(MAKEFILE_LIST) | expand -t 10
@@ -50,8 +50,9 @@ unit: setup ## run all tests: unit, command line, co-simulation
 	@echo '== unit'
 	$(CARGO) test --workspace
 
-lint: setup ## lint the generated Verilog with its waivers
+lint: setup ## check wording against tests/words.txt, lint the generated Verilog with its waivers
 	@echo '== lint'
+	$(CARGO) test --quiet -p dermis-tests --test words
 	@set -e; for scene in $(SCENES); do \
 	  $(CARGO) run --quiet --bin dermis -- build $$scene --out $(BUILD)/$$scene/rtl >/dev/null; \
 	  (cd $(BUILD)/$$scene/rtl && $(VERILATOR) --lint-only -Wall *.vlt *.v); \
@@ -81,6 +82,10 @@ bitstream: program tools ## make the bitstream of SCENE for BOARD, by default th
 report: program ## write build/report/report.html and paper.html; QUICK=1 takes two minutes
 	$(DERMIS) --build-dir $(BUILD) report $(if $(QUICK),--quick)
 	$(DERMIS) --build-dir $(BUILD) report --paper $(if $(QUICK),--quick)
+
+guide: program ## write the tables and pictures of README and guide (an hour)
+	$(DERMIS) --build-dir $(BUILD) guide
+	$(DERMIS) --build-dir $(BUILD) guide --pictures
 
 netlist: setup ## co-simulate the synthesised netlist of a small scene with search (several minutes)
 	$(CARGO) test --release -p dermis-tests --test netlist -- --include-ignored

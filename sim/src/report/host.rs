@@ -49,8 +49,9 @@ pub fn link_times(models: &[Model]) -> String {
     let of = |model: &Model| {
         let name = model.scene.name.clone();
         times(model).into_iter().map(move |(link, rate, times)| {
-            let rate = f64::from(rate) / 1e6;
-            let labels = vec![name.clone(), format!("{}, {rate} Mbit/s", link.name().to_uppercase())];
+            let unit = if link.clock().is_some() { "MHz" } else { "Mbit/s" };
+            let rate = format!("{}, {} {unit}", link.name().to_uppercase(), f64::from(rate) / 1e6);
+            let labels = vec![name.clone(), rate];
             let times = times.iter().map(|(_, ms)| ms.map_or("-".into(), |ms| format!("{ms:.3} ms")));
             labels.into_iter().chain(times).collect()
         })

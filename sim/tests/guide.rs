@@ -1,0 +1,148 @@
+//! The tables and pictures of README.md and of the guide are those that the program makes, and `dermis guide` tells where
+//! they are not.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+
+use dermis_sim::guide_pages::{page_names, GUIDE};
+use roxmltree::Document;
+
+fn root() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("..")
+}
+
+fn guide(root: &Path, args: &[&str]) -> Output {
+    // Built libraries are shared with the other tests.
+    let build = self::root().join("build");
+    let mut command = Command::new(env!("CARGO_BIN_EXE_dermis"));
+    command.arg("guide").arg("--root").arg(root).args(args).arg("--build-dir").arg(build).output().unwrap()
+}
+
+/// What it printed, and its exit code.
+fn told(output: &Output) -> (String, Option<i32>) {
+    let all = [&output.stdout[..], &output.stderr[..]].concat();
+    (String::from_utf8_lossy(&all).into_owned(), output.status.code())
+}
+
+/// A folder with the repository's pages.
+fn copied() -> tempfile::TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    for name in page_names(&root()).unwrap() {
+        let path = folder.path().join(&name);
+        fs::create_dir_all(path.parent().unwrap()).unwrap();
+        fs::copy(root().join(&name), path).unwrap();
+    }
+    folder
+}
+
+#[test]
+fn the_tables_of_the_pages_are_what_their_commands_print() {
+    let (text, code) = told(&guide(&root(), &["--check", "--quick"]));
+    assert_eq!(code, Some(0), "{text}");
+}
+
+#[test]
+fn a_changed_digit_is_found_and_mended() {
+    const COMMAND: &str = "dermis bitstream --committed";
+    let folder = copied();
+    let marked = |name: &String| fs::read_to_string(folder.path().join(name)).unwrap().contains(COMMAND);
+    let name = page_names(folder.path()).unwrap().into_iter().find(marked).expect("a page with that table");
+    let path = folder.path().join(&name);
+    let whole = fs::read_to_string(&path).unwrap();
+    // The last digit of the table's last row.
+    let (before, rest) = whole.split_at(whole.find(COMMAND).unwrap());
+    let (table, after) = rest.split_at(rest.find("<!-- end of table -->").unwrap());
+    let digit = table.rfind(|character: char| character.is_ascii_digit()).unwrap();
+    let other = if table[digit..].starts_with('0') { "1" } else { "0" };
+    let mut changed = table.to_owned();
+    changed.replace_range(digit..=digit, other);
+    fs::write(&path, format!("{before}{changed}{after}")).unwrap();
+    let check = || told(&guide(folder.path(), &["--check", "--quick", "--only", COMMAND]));
+    let (text, code) = check();
+    assert_eq!(code, Some(1), "{text}");
+    let line = before.lines().count();
+    assert!(text.contains(&format!("{name}:{line}: stale: {COMMAND}")), "{text}");
+    let row = |table: &str| table.trim_end().lines().last().unwrap().split_whitespace().collect::<Vec<_>>().join(" ");
+    assert!(text.contains(&format!("page:    {}", row(&changed))), "{text}");
+    assert!(text.contains(&format!("command: {}", row(table))), "{text}");
+    // Written anew the table is as it was.
+    let (text, code) = told(&guide(folder.path(), &["--only", COMMAND]));
+    assert_eq!(code, Some(0), "{text}");
+    assert_eq!(fs::read_to_string(&path).unwrap(), whole);
+    assert_eq!(check().1, Some(0));
+}
+
+#[test]
+fn a_command_that_fails_and_a_marker_without_end_are_errors() {
+    let folder = tempfile::tempdir().unwrap();
+    fs::create_dir_all(folder.path().join(GUIDE)).unwrap();
+    let page = |text: &str| {
+        fs::write(folder.path().join("README.md"), text).unwrap();
+        told(&guide(folder.path(), &[]))
+    };
+    let (text, code) = page("a\n<!-- table: dermis study link-times no-such-scene -->\n<!-- end of table -->\n");
+    assert_eq!(code, Some(2), "{text}");
+    assert!(
+        text.contains("README.md:2: dermis study link-times no-such-scene: ") && text.contains("error: "),
+        "{text}"
+    );
+    let (text, code) = page("<!-- table: dermis study link-times -->\n");
+    assert_eq!(code, Some(2));
+    assert!(text.contains("README.md:1: no `<!-- end of table -->`"), "{text}");
+    assert_eq!(told(&guide(folder.path(), &["--only", "nothing"])).1, Some(2));
+    let (text, code) = told(&guide(&folder.path().join(GUIDE), &[]));
+    assert_eq!((code, text.contains("no README.md")), (Some(2), true), "{text}");
+}
+
+#[test]
+fn the_pictures_that_only_the_program_changes_are_drawn_anew() {
+    let (text, code) = told(&guide(&root(), &["--check", "--pictures"]));
+    assert_eq!(code, Some(0), "{text}");
+    // And one that is not is told.
+    let folder = tempfile::tempdir().unwrap();
+    let pictures = folder.path().join(GUIDE).join("pictures");
+    fs::create_dir_all(&pictures).unwrap();
+    fs::write(pictures.join("feet.svg"), "<svg/>").unwrap();
+    let (text, code) = told(&guide(folder.path(), &["--check", "--pictures"]));
+    assert_eq!(code, Some(1));
+    assert!(text.contains("feet.svg: stale"), "{text}");
+}
+
+#[test]
+fn pictures_have_titles_their_labels_and_colours_for_light_and_dark() {
+    let pictures = [
+        ("data-flow.svg", &["receive", "pass", "search", "20 bits", "μ of 18 bits"][..]),
+        ("feet.svg", &["N, normal"]),
+        ("time-sensor-1-shear.svg", &["1 ms", "hardware", "time of a frame"]),
+    ];
+    let folder = root().join(GUIDE).join("pictures");
+    assert_eq!(fs::read_dir(&folder).unwrap().count(), pictures.len());
+    for (name, labels) in pictures {
+        let text = fs::read_to_string(folder.join(name)).unwrap();
+        let document = Document::parse(&text).unwrap();
+        let svg = document.root_element();
+        assert_eq!(svg.attribute("role"), Some("img"), "{name}");
+        let of = |tag: &str| svg.children().find(|node| node.has_tag_name(tag)).and_then(|node| node.text());
+        assert!(of("title").is_some_and(|title| title.len() > 10), "{name}");
+        assert!(of("desc").is_some_and(|description| description.len() > 10), "{name}");
+        let shown: Vec<&str> = svg.descendants().filter(|n| n.has_tag_name("text")).filter_map(|n| n.text()).collect();
+        for label in labels {
+            assert!(shown.iter().any(|text| text.contains(label)), "{name}: {label}: {shown:?}");
+        }
+        // Every colour, the background's as well, has one for the dark.
+        let style = of("style").unwrap();
+        assert!(style.starts_with("@media (prefers-color-scheme:dark){"), "{name}: {style}");
+        for node in svg.descendants() {
+            for property in ["fill", "stroke"] {
+                let Some(colour) = node.attribute(property).filter(|colour| colour.starts_with('#')) else { continue };
+                assert!(
+                    style.contains(&format!("[{property}=\"{colour}\"]{{{property}:#")),
+                    "{name}: {property} {colour}"
+                );
+            }
+        }
+        let background = svg.children().find(|node| node.has_tag_name("rect")).unwrap();
+        assert_eq!((background.attribute("width"), background.attribute("fill")), (Some("100%"), Some("#ffffff")));
+    }
+}
