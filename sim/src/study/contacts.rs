@@ -53,7 +53,8 @@ pub fn run(names: &[String]) -> Result<String> {
             continue;
         }
         let _progress = Progress::start(&format!("{}: {label}", scene.name));
-        let frames = DrawnFrames { frames: FRAMES, contacts: CONTACTS.to_vec(), shapes, touching, seed: 1 }.draw(&scene)?;
+        let frames =
+            DrawnFrames { frames: FRAMES, contacts: CONTACTS.to_vec(), shapes, touching, seed: 1 }.draw(&scene)?;
         let mut row = vec![label.to_owned()];
         let mut each = Vec::new();
         for engine in &engines {
