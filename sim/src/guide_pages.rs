@@ -48,7 +48,7 @@ const PROGRAM: &str = "dermis";
   dermis guide --pictures                            draw sim/guide/pictures/*.svg
 
 A table stands between two lines of a Markdown page:
-  <!-- table: dermis table sensor-1 ; table: 2 ; columns: case | e_t ; check: dermis table sensor-1 --case 0 ; table: 2 -->
+  <!-- table: dermis table sensor-1 ; table: 2 ; columns: case | e_t ; check: dermis table sensor-1 --case 0 -->
   <!-- end of table -->
 Attributes follow the command after semicolons, all of them optional:
   check: COMMAND          what --quick runs; each of its rows must stand in the page, in the columns that both have
