@@ -15,18 +15,20 @@
 pub mod markdown;
 pub mod marker;
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 use std::process::Command;
+use std::thread::available_parallelism;
 use std::time::Instant;
 
-use anyhow::{bail, ensure, Context, Result};
+use anyhow::{anyhow, bail, ensure, Context, Result};
 use clap::Args;
 use dermis_golden::write::write;
 
+use crate::jobs::{parallel, Interrupt};
 use crate::progress::Progress;
 use crate::report::{fixed_pictures, time_picture, PictureFile};
-use markdown::{tables, Table};
+use markdown::{tables, Difference, Table};
 use marker::{markers, Marker};
 
 /// The guide's folder, from the repository's root.
@@ -46,7 +48,7 @@ const PROGRAM: &str = "dermis";
   dermis guide --pictures                            draw sim/guide/pictures/*.svg
 
 A table stands between two lines of a Markdown page:
-  <!-- table: dermis table sensor-1 ; table: 2 ; columns: case | e_t ; check: dermis table sensor-1 --case 0 ; table: 2 -->
+  <!-- table: dermis table sensor-1 ; table: 2 ; columns: case | e_t ; check: dermis table sensor-1 --case 0 -->
   <!-- end of table -->
 Attributes follow the command after semicolons, all of them optional:
   check: COMMAND          what --quick runs; each of its rows must stand in the page, in the columns that both have
@@ -67,6 +69,9 @@ pub struct Arguments {
     /// Only tables whose command contains this text.
     #[arg(long, value_name = "TEXT")]
     only: Option<String>,
+    /// Commands that run at a time; without it as many as there are processors.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=64))]
+    jobs: Option<u16>,
     /// The pictures in place of the tables.
     #[arg(long, conflicts_with_all = ["quick", "only"])]
     pictures: bool,
@@ -80,12 +85,8 @@ struct Page {
     markers: Vec<Marker>,
 }
 
-/// Outputs by command: a command that several markers name runs once.
-struct Commands<'a> {
-    build: PathBuf,
-    root: &'a Path,
-    outputs: BTreeMap<String, String>,
-}
+/// Outputs by command.
+type Outputs = BTreeMap<String, String>;
 
 /// Runs the command: what was written, or what is stale; and whether nothing is.
 ///
@@ -107,11 +108,14 @@ pub fn run(arguments: &Arguments, build: &Path) -> Result<(String, bool)> {
     if let Some(only) = &arguments.only {
         ensure!(pages.iter().any(|page| !page.markers.is_empty()), "--only {only:?}: no table's command contains it");
     }
-    let build = std::path::absolute(build).with_context(|| build.display().to_string())?;
-    let mut commands = Commands { build, root, outputs: BTreeMap::new() };
+    let command = |marker: &Marker| marker.quick_check(arguments.quick).unwrap_or(&marker.command).to_owned();
+    let of_page = |page: &Page| -> Vec<(String, String)> {
+        page.markers.iter().map(|marker| (at(page, marker), command(marker))).collect()
+    };
+    let outputs = outputs(pages.iter().flat_map(of_page).collect(), arguments, build)?;
     match arguments.check {
-        true => check(&pages, arguments.quick, &mut commands),
-        false => Ok((fill(&pages, &mut commands)?, true)),
+        true => check(&pages, arguments.quick, &outputs),
+        false => Ok((fill(&pages, root, &outputs)?, true)),
     }
 }
 
@@ -148,21 +152,21 @@ fn markdown_files(root: &Path, folder: &Path) -> Result<Vec<String>> {
 }
 
 /// Writes the tables of each page; which page has how many, and how many of them changed.
-fn fill(pages: &[Page], commands: &mut Commands) -> Result<String> {
+fn fill(pages: &[Page], root: &Path, outputs: &Outputs) -> Result<String> {
     let mut told = String::new();
     for page in pages.iter().filter(|page| !page.markers.is_empty()) {
         let mut text = page.text.clone();
         let mut changed = 0;
         // From the last to the first: what is written moves only what follows it.
         for marker in page.markers.iter().rev() {
-            let table = commands.table(page, marker, &marker.command)?.select(&marker.columns);
-            let table = table.with_context(|| at(page, marker))?;
+            let new = printed(marker, &marker.command, outputs).and_then(|table| table.select(&marker.columns));
+            let new = placed(page, marker, new)?;
             let old = tables(&page.text[marker.content.clone()]);
-            changed += usize::from(old.first() != Some(&table) || old.len() > 1);
-            text.replace_range(marker.content.clone(), &table.text());
+            changed += usize::from(old != [new.clone()]);
+            text.replace_range(marker.content.clone(), &new.text());
         }
         if text != page.text {
-            write(&commands.root.join(&page.name), text.as_bytes())?;
+            write(&root.join(&page.name), text.as_bytes())?;
         }
         told.push_str(&format!("{}: {} tables, {changed} changed\n", page.name, page.markers.len()));
     }
@@ -170,24 +174,14 @@ fn fill(pages: &[Page], commands: &mut Commands) -> Result<String> {
 }
 
 /// Compares the tables of all pages; what is stale, and whether nothing is.
-fn check(pages: &[Page], quick: bool, commands: &mut Commands) -> Result<(String, bool)> {
+fn check(pages: &[Page], quick: bool, outputs: &Outputs) -> Result<(String, bool)> {
     let mut stale = String::new();
     let mut count = 0;
     for page in pages {
         for marker in &page.markers {
             count += 1;
-            let old = match &tables(&page.text[marker.content.clone()])[..] {
-                [one] => one.clone(),
-                found => bail!("{}: {} tables between the marker and its end, wanted 1", at(page, marker), found.len()),
-            };
-            let cheap = marker.check.as_ref().filter(|_| quick);
-            let command = cheap.unwrap_or(&marker.command);
-            let new = commands.table(page, marker, command)?;
-            let difference = match cheap {
-                Some(_) => old.lacks(&new, &marker.check_columns),
-                None => new.select(&marker.columns).map(|new| old.differs(&new)),
-            };
-            if let Some(difference) = difference.with_context(|| at(page, marker))? {
+            let command = marker.quick_check(quick).unwrap_or(&marker.command);
+            if let Some(difference) = placed(page, marker, differs(page, marker, quick, outputs))? {
                 stale.push_str(&format!("{}: stale: {command}\n{difference}\n", at(page, marker)));
             }
         }
@@ -196,6 +190,63 @@ fn check(pages: &[Page], quick: bool, commands: &mut Commands) -> Result<(String
         true => Ok((format!("{count} tables are as their commands print them\n"), true)),
         false => Ok((format!("{stale}dermis guide --only TEXT writes what the command prints\n"), false)),
     }
+}
+
+/// The first row in which the page's table is not its command's, or its check's.
+fn differs(page: &Page, marker: &Marker, quick: bool, outputs: &Outputs) -> Result<Option<Difference>> {
+    let found = tables(&page.text[marker.content.clone()]);
+    let [old] = &found[..] else { bail!("{} tables between the marker and its end, wanted 1", found.len()) };
+    match marker.quick_check(quick) {
+        Some(command) => old.lacks(&printed(marker, command, outputs)?, &marker.check_columns),
+        None => Ok(old.differs(&printed(marker, &marker.command, outputs)?.select(&marker.columns)?)),
+    }
+}
+
+/// The table of `command` that the marker asks for.
+fn printed(marker: &Marker, command: &str, outputs: &Outputs) -> Result<Table> {
+    let mut all = outputs.get(command).map_or_else(Vec::new, |output| tables(output));
+    let (wanted, printed) = (marker.table, all.len());
+    ensure!(wanted <= printed, "{command}: table {wanted} of {printed} that it prints");
+    Ok(all.swap_remove(wanted - 1))
+}
+
+fn at(page: &Page, marker: &Marker) -> String {
+    format!("{}:{}", page.name, marker.line)
+}
+
+/// An error with the marker's place before it.
+fn placed<T>(page: &Page, marker: &Marker, result: Result<T>) -> Result<T> {
+    result.map_err(|error| anyhow!("{}: {error:#}", at(page, marker)))
+}
+
+/// Runs commands, each with the place that wants it, several at a time and each once.
+fn outputs(mut wanted: Vec<(String, String)>, arguments: &Arguments, build: &Path) -> Result<Outputs> {
+    let mut seen = BTreeSet::new();
+    wanted.retain(|(_, command)| seen.insert(command.clone()));
+    let build = std::path::absolute(build).with_context(|| build.display().to_string())?;
+    let run = |(place, command): (String, String)| {
+        let output = output(&command, &arguments.root, &build).map_err(|error| anyhow!("{place}: {error:#}"))?;
+        Ok((command, output))
+    };
+    let jobs = arguments.jobs.map_or_else(|| available_parallelism().map_or(1, usize::from), usize::from);
+    Ok(parallel("tables", wanted, jobs, &Interrupt::default(), run)?.into_iter().collect())
+}
+
+/// What this program prints for a command.
+fn output(command: &str, root: &Path, build: &Path) -> Result<String> {
+    let mut words = command.split_whitespace();
+    ensure!(words.next() == Some(PROGRAM), "{command}: wanted a command of `{PROGRAM}`");
+    let progress = Progress::start(command);
+    let begun = Instant::now();
+    let program = std::env::current_exe().context("this program's own path")?;
+    let mut own = Command::new(program);
+    own.current_dir(root).args(words).arg("--build-dir").arg(build);
+    let output = own.output().with_context(|| command.to_owned())?;
+    drop(progress);
+    let stderr = String::from_utf8_lossy(&output.stderr);
+    ensure!(output.status.success(), "{command}: {}: {}", output.status, stderr.trim());
+    eprintln!("{:7.1} s  {command}", begun.elapsed().as_secs_f64());
+    String::from_utf8(output.stdout).with_context(|| command.to_owned())
 }
 
 /// Draws the pictures, or tells which are not as they would be drawn.
@@ -226,42 +277,6 @@ fn pictures(root: &Path, check: bool, build: &Path) -> Result<(String, bool)> {
     Ok((told, !stale))
 }
 
-fn at(page: &Page, marker: &Marker) -> String {
-    format!("{}:{}", page.name, marker.line)
-}
-
-impl Commands<'_> {
-    /// The table of `command` that the marker asks for.
-    fn table(&mut self, page: &Page, marker: &Marker, command: &str) -> Result<Table> {
-        if !self.outputs.contains_key(command) {
-            let output = self.output(command, marker.takes.as_deref()).with_context(|| at(page, marker))?;
-            self.outputs.insert(command.to_owned(), output);
-        }
-        let mut all = tables(&self.outputs[command]);
-        let (wanted, printed) = (marker.table, all.len());
-        ensure!(wanted <= printed, "{}: {command}: table {wanted} of {printed} that it prints", at(page, marker));
-        Ok(all.swap_remove(wanted - 1))
-    }
-
-    /// What this program prints for a command.
-    fn output(&self, command: &str, takes: Option<&str>) -> Result<String> {
-        let mut words = command.split_whitespace();
-        ensure!(words.next() == Some(PROGRAM), "{command}: wanted a command of `{PROGRAM}`");
-        let about = takes.map_or(String::new(), |takes| format!(", takes {takes}"));
-        let progress = Progress::start(&format!("{command}{about}"));
-        let begun = Instant::now();
-        let program = std::env::current_exe().context("this program's own path")?;
-        let mut own = Command::new(program);
-        own.current_dir(self.root).args(words).arg("--build-dir").arg(&self.build);
-        let output = own.output().with_context(|| command.to_owned())?;
-        drop(progress);
-        let stderr = String::from_utf8_lossy(&output.stderr);
-        ensure!(output.status.success(), "{command}: {}: {}", output.status, stderr.trim());
-        eprintln!("{:7.1} s  {command}", begun.elapsed().as_secs_f64());
-        String::from_utf8(output.stdout).with_context(|| command.to_owned())
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -270,10 +285,9 @@ mod tests {
         Page { name: "README.md".into(), text: text.into(), markers: markers("README.md", text).unwrap() }
     }
 
-    /// Commands that have run already.
-    fn ran<'a>(root: &'a Path, outputs: &[(&str, &str)]) -> Commands<'a> {
-        let own = |(command, output): &(&str, &str)| ((*command).to_owned(), (*output).to_owned());
-        Commands { build: root.to_owned(), root, outputs: outputs.iter().map(own).collect() }
+    /// Commands that have run.
+    fn ran(outputs: &[(&str, &str)]) -> Outputs {
+        outputs.iter().map(|(command, output)| ((*command).to_owned(), (*output).to_owned())).collect()
     }
 
     const PAGE: &str =
@@ -284,7 +298,7 @@ mod tests {
     #[test]
     fn tables_are_written_between_their_markers() {
         let folder = tempfile::tempdir().unwrap();
-        let told = fill(&[page(PAGE)], &mut ran(folder.path(), &[("dermis a", NEW)])).unwrap();
+        let told = fill(&[page(PAGE)], folder.path(), &ran(&[("dermis a", NEW)])).unwrap();
         assert_eq!(told, "README.md: 2 tables, 2 changed\n");
         let text = std::fs::read_to_string(folder.path().join("README.md")).unwrap();
         let wanted = "# A\n\n<!-- table: dermis a ; check: dermis b -->\n| s |  x |\n|---|---:|\n| p |  1 |\n| q | 30 |\n\
@@ -292,15 +306,14 @@ mod tests {
                       <!-- end of table -->\n";
         assert_eq!(text, wanted);
         // A second time nothing changes.
-        let told = fill(&[page(&text)], &mut ran(folder.path(), &[("dermis a", NEW)])).unwrap();
+        let told = fill(&[page(&text)], folder.path(), &ran(&[("dermis a", NEW)])).unwrap();
         assert_eq!(told, "README.md: 2 tables, 0 changed\n");
     }
 
     #[test]
     fn a_stale_table_is_found_with_its_place_command_and_rows() {
         let one = page(PAGE.split_once("text\n").unwrap().0);
-        let root = Path::new("");
-        let check = |quick, outputs: &[(&str, &str)]| check(std::slice::from_ref(&one), quick, &mut ran(root, outputs));
+        let check = |quick, outputs: &[(&str, &str)]| check(std::slice::from_ref(&one), quick, &ran(outputs));
         let (text, good) = check(false, &[("dermis a", NEW)]).unwrap();
         assert!(!good);
         assert!(
@@ -318,11 +331,10 @@ mod tests {
     #[test]
     fn a_table_that_the_command_does_not_print_is_an_error_with_its_place() {
         let one = page(PAGE);
-        let error = fill(&[one], &mut ran(Path::new(""), &[("dermis a", "none\n")])).unwrap_err();
+        let error = fill(&[one], Path::new(""), &ran(&[("dermis a", "none\n")])).unwrap_err();
         assert_eq!(error.to_string(), "README.md:11: dermis a: table 1 of 0 that it prints");
-        let other = page("<!-- table: rm a -->\n<!-- end of table -->\n");
-        let error = fill(&[other], &mut ran(Path::new(""), &[])).unwrap_err();
-        assert_eq!(format!("{error:#}"), "README.md:1: rm a: wanted a command of `dermis`");
+        let error = output("rm a", Path::new(""), Path::new("")).unwrap_err();
+        assert_eq!(error.to_string(), "rm a: wanted a command of `dermis`");
     }
 
     #[test]

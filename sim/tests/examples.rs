@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 
 /// Examples that are not run here.
-const NOT_RUN: [(&str, &str); 21] = [
+const NOT_RUN: [(&str, &str); 29] = [
     ("dermis host --port /dev/ttyUSB0 press.json", BOARD),
     ("dermis host --port /dev/ttyUSB0 --scene sensor-1", BOARD),
     ("dermis host --port /dev/ttyUSB0 --forces --check press.json", BOARD),
@@ -23,6 +23,14 @@ const NOT_RUN: [(&str, &str); 21] = [
     ("dermis cosim eight-by-eight --target-board icebreaker", "tests/serial.rs"),
     ("dermis noise sensor-1", "200 draws of five objectives: minutes"),
     ("dermis noise sensor-2 --objective patch --objective auto --draws 1000 --format csv", "minutes"),
+    ("dermis noise sensor-1 --frames 1 --medians", "200 draws of five objectives: minutes"),
+    ("dermis study input-bits", "a minute; tests/accuracy.rs measures the same"),
+    ("dermis study contacts ellipses", "a minute; tests/guide.rs"),
+    ("dermis guide", PAGES),
+    ("dermis guide --only stability", PAGES),
+    ("dermis guide --check", PAGES),
+    ("dermis guide --check --quick", PAGES),
+    ("dermis guide --pictures", PAGES),
     ("dermis report", "every co-simulation: minutes; make report"),
     ("dermis report --quick", "make report QUICK=1; the same for two scenes is run"),
     ("dermis report --paper", "repeats of 48×48: minutes; make report"),
@@ -32,6 +40,7 @@ const NOT_RUN: [(&str, &str); 21] = [
     ("dermis cosim eight-by-eight --device netlist", "synthesis takes minutes; tests/netlist.rs"),
 ];
 const BOARD: &str = "needs a board on a serial port";
+const PAGES: &str = "needs the repository's pages; tests/guide.rs";
 const PLACED: &str = "place and route takes from minutes to hours; make bitstream";
 
 fn program() -> &'static Path {

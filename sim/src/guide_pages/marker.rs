@@ -36,10 +36,17 @@ pub struct Marker {
     pub table: usize,
     /// Columns to keep; without any all.
     pub columns: Vec<String>,
-    /// How long the command takes.
+    /// How long the command takes, for the reader of the page.
     pub takes: Option<String>,
     /// Bytes between the marker's line and the end's.
     pub content: Range<usize>,
+}
+
+impl Marker {
+    /// The check's command where it is to be taken, and there is one.
+    pub fn quick_check(&self, quick: bool) -> Option<&str> {
+        self.check.as_deref().filter(|_| quick)
+    }
 }
 
 /// The markers of a page, in order.

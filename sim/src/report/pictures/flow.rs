@@ -16,22 +16,22 @@ use dermis_golden::fixed::{Cycles, Model};
 use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, VPos};
 
-use super::super::style::{GRID, INK, SERIES};
+use super::super::style::{INK, SERIES};
 use super::{label, note, sized, Area};
 
 /// The scene whose picture is in the README.
 pub const FLOW_SCENE: &str = "sensor-1";
 /// Wide enough for four stages with letters of 13 pixels; a page shows it at its own size.
 const WIDTH: u32 = 720;
-const HEIGHT: u32 = 436;
+const HEIGHT: u32 = 462;
 /// A stage's box and the room between two.
 const BOX: (i32, i32) = (138, 78);
-const GAP: (i32, i32) = (49, 44);
+const GAP: (i32, i32) = (49, 56);
 /// Upper left corner of the first box.
 const CORNER: (i32, i32) = (10, 12);
 /// Of stages that work on one subarray at a time, and of the others.
 const OF_SUBARRAY: RGBColor = SERIES[1];
-const OF_FRAME: RGBColor = GRID;
+const OF_FRAME: RGBColor = SERIES[0];
 
 /// A stage with what it does, in two or three lines.
 struct Stage {
@@ -74,9 +74,9 @@ pub fn data_flow(model: &Model) -> Result<String> {
         // Vectors of one degree are operands of the next.
         let ((pass, bottom), (rescale, _)) = (corner((1, 0)), corner((1, 1)));
         let (from, to, y) = (rescale + BOX.0 / 2, pass + BOX.0 / 2, bottom + BOX.1);
-        arrow(area, &[(from, y + 2), (from, y + 16), (to, y + 16), (to, y + 2)], &OF_SUBARRAY)?;
+        arrow(area, &[(from, y + 2), (from, y + 20), (to, y + 20), (to, y + 2)], &OF_SUBARRAY)?;
         let text = format!("v_ij of {} bits", formats.data_bits);
-        area.draw_text(&text, &label(16, &OF_SUBARRAY, HPos::Center, VPos::Center), ((from + to) / 2, y + 8))?;
+        area.draw_text(&text, &label(16, &OF_SUBARRAY, HPos::Center, VPos::Center), ((from + to) / 2, y + 10))?;
         legend(area, model)
     })
 }
@@ -85,7 +85,7 @@ pub fn data_flow(model: &Model) -> Result<String> {
 fn stages(model: &Model) -> Vec<(Place, Stage)> {
     let (formats, sensor) = (&model.formats, &model.scene.sensor);
     let (taxels, quads) = (sensor.taxels(), formats.quads);
-    let sweeps = format!("{} sweeps, {HALVINGS} halvings", COARSE_CENTRES.len());
+    let sweeps = format!("{} coarse sweeps,", COARSE_CENTRES.len());
     let stage = |name, colour, lines: &[String]| Stage { name, lines: lines.to_vec(), colour };
     let frame = |name, lines: &[String]| stage(name, OF_FRAME, lines);
     let subarray = |name, lines: &[String]| stage(name, OF_SUBARRAY, lines);
@@ -108,7 +108,10 @@ fn stages(model: &Model) -> Vec<(Place, Stage)> {
         ),
         ((1, 1), subarray("rescale", &[text("round, saturate,"), text("exponent r")])),
         ((1, 2), subarray("unfold", &[text("parities back"), text("to taxels")])),
-        ((1, 3), subarray("search", &[text("p(μ), degree ") + &formats.degree.to_string(), sweeps])),
+        (
+            (1, 3),
+            subarray("search", &[format!("p(μ) of degree {}", formats.degree), sweeps, format!("{HALVINGS} halvings")]),
+        ),
         ((2, 0), frame("force", &[text("fx = μ1 p, fy = μ2 p"), text("fz = p, threshold")])),
         (
             (2, 1),
@@ -140,7 +143,6 @@ fn draw(area: &Area, place: Place, stage: &Stage) -> Result<()> {
 fn carry(area: &Area, row: i32, words: &str) -> Result<()> {
     let (last, top) = corner((row, 3));
     let (from, to, y) = (last + BOX.0 / 2, CORNER.0 + BOX.0 / 2, top + BOX.1);
-    // Below a row whose loop hangs from its boxes there is less room.
     let middle = y + GAP.1 - 14;
     arrow(area, &[(from, y + 2), (from, middle), (to, middle), (to, y + GAP.1 - 2)], &INK)?;
     note(area, words, ((from + to) / 2 + 60, middle - 9), HPos::Center, VPos::Center)
