@@ -74,7 +74,7 @@ enum Command {
   dermis reconstruct my-scene.toml --frame eq2 --json
   dermis reconstruct averaging.toml --frame 1.csv --frame 2.csv     the mean of 2 frames, input.average = 1")]
     Reconstruct {
-        /// Built-in name or path of a scene; may be left out when the frame holds its sensor.
+        /// Built-in name or path of a scene; optional if the frame file contains its sensor.
         scene: Option<String>,
         /// Frame file (.json, .csv) or `eq2`; default: the scene's first shipped frame. Repeat it 2^k times if the
         /// scene has input.average = k.
@@ -139,7 +139,7 @@ enum Command {
   dermis cosim eight-by-eight --target-board icebreaker     the serial engine, for small devices
   dermis cosim sensor-1 --device verilator --waves   with a VCD file, prints the GTKWave command")]
     Cosim {
-        /// Built-in name or path of a scene; may be left out when the first frame holds its sensor.
+        /// Built-in name or path of a scene; optional if the first frame file contains its sensor.
         scene: Option<String>,
         /// Frame file (.json, .csv) or `eq2`, repeatable; default: all shipped frames of the scene.
         #[arg(long = "frame", value_name = "FILE")]

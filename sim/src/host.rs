@@ -45,7 +45,7 @@ pub struct Arguments {
     /// Serial port of the board.
     #[arg(long, value_name = "PATH")]
     port: String,
-    /// Built-in name or path of a scene; may be left out when the first frame holds its sensor.
+    /// Built-in name or path of a scene; optional if the first frame file contains its sensor.
     #[arg(long, required_if_eq("stream", "true"))]
     scene: Option<String>,
     /// Bit rate; default: that of the scene's board.

@@ -12,7 +12,7 @@
 //! | [`mod@bench`] | the Verilog wrapper that packs pins and taps into two vectors |
 //! | [`verilator`] | builds, caches and loads a verilated design as a [`Device`](dermis_hdl::device::Device) |
 //! | [`bitstream`] | `dermis bitstream`: synthesis, place and route with open tools, compared with committed baselines |
-//! | [`drive`] | plays frames into a device and records every transfer with its cycle |
+//! | [`drive`] | sends frames into a device and records every transfer with its cycle |
 //! | [`cosim`] | compares a recording with the bit-true model |
 //! | [`mod@faults`] | `dermis faults`: flips single bits and classifies the effect |
 //! | [`drawn_frames`] | frames of random contacts, `dermis table --fresh` |

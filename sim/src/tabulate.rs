@@ -235,7 +235,7 @@ mod tests {
         let mut done = 0;
         let cases = ["0", "1", "2", "3", "5x2", "3x3", "adaptive", "contacts"].map(|name| name.parse().unwrap());
         let rows = tabulate(&scene, &cases, frames, &mut || done += 1).unwrap();
-        // Three does not divide ten.
+        // Case 3x3 is skipped: 3 does not divide 10.
         assert_eq!((rows.len(), done), (7, 7));
         assert_eq!(rows.iter().map(|row| row.subarrays.len()).collect::<Vec<_>>(), [1, 4, 2, 2, 10, 1, 1]);
         // The hardware supports every case except `contacts`.

@@ -9,9 +9,9 @@ pub const YOSYS: Tool = Tool { name: "yosys" };
 
 /// Tools and cell names of a family.
 pub struct Flow {
-    /// Place and route.
+    /// The tool for place and route.
     pub place: Tool,
-    /// Configuration to bitstream.
+    /// The tool that packs a configuration into a bitstream.
     pub pack: Tool,
     /// Yosys commands; `{top}` stands for the top module, `{netlist}` for the file to write.
     pub synthesis: &'static str,
@@ -50,7 +50,7 @@ pub fn flow(family: Family) -> Flow {
         Family::Ice40 => Flow {
             place: Tool { name: "nextpnr-ice40" },
             pack: Tool { name: "icepack" },
-            // Each of these saves half a percent of the cells.
+            // Each of these options saves half a percent of the cells.
             synthesis: "synth_ice40 -dsp -abc2 -dff -top {top} -json {netlist}",
             // A logic cell holds a look-up table, a carry and a flip-flop, hence the number of logic cells is counted.
             lut: "ICESTORM_LC",

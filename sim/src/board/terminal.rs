@@ -62,7 +62,7 @@ impl PseudoTerminal {
     /// Runs until the pseudo-terminal fails.
     ///
     /// # Errors
-    /// The failure.
+    /// The I/O error of the pseudo-terminal.
     pub fn wait(mut self) -> io::Result<()> {
         self.thread.take().map_or(Ok(()), |thread| match thread.join() {
             Ok(outcome) => outcome.map(drop),

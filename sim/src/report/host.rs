@@ -36,38 +36,51 @@ pub fn equality(answer: &Answer) -> String {
 
 /// Transfer times of a frame's packets on each link that the board supports.
 pub fn wire_times(model: &Model) -> String {
-    let link = |(link, rate, times): (LinkKind, u32, Vec<(&str, Option<f64>)>)| {
-        let sent = times.iter().filter_map(|(what, ms)| Some(format!("{what} {:.3} ms", (*ms)?)));
-        format!("{} at {rate} bit/s: {}\n", link.name().to_uppercase(), sent.collect::<Vec<_>>().join(", "))
+    let line = |link: LinkTimes| {
+        let sent = link.packets.iter().filter_map(|(packet, ms)| Some(format!("{packet} {:.3} ms", (*ms)?)));
+        format!("{} at {} bit/s: {}\n", link.name(), link.bit_rate, sent.collect::<Vec<_>>().join(", "))
     };
-    times(model).into_iter().map(link).collect()
+    times(model).into_iter().map(line).collect()
 }
 
-/// The same of several scenes, a line for each link.
+/// The same of several scenes as a table, a row per link.
 pub fn link_times(models: &[Model]) -> String {
     let head = ["scene", "link", "codes to the board", "resultants back", "all forces back"];
-    let of = |model: &Model| {
-        let name = model.scene.name.clone();
-        times(model).into_iter().map(move |(link, rate, times)| {
-            let unit = if link.clock().is_some() { "MHz" } else { "Mbit/s" };
-            let rate = format!("{}, {} {unit}", link.name().to_uppercase(), f64::from(rate) / 1e6);
-            let labels = vec![name.clone(), rate];
-            let times = times.iter().map(|(_, ms)| ms.map_or("-".into(), |ms| format!("{ms:.3} ms")));
-            labels.into_iter().chain(times).collect()
+    let rows = |model: &Model| {
+        let scene = model.scene.name.clone();
+        times(model).into_iter().map(move |link| {
+            let unit = if link.kind.clock().is_some() { "MHz" } else { "Mbit/s" };
+            let rate = format!("{}, {} {unit}", link.name(), f64::from(link.bit_rate) / 1e6);
+            let times = link.packets.iter().map(|(_, ms)| ms.map_or("-".into(), |ms| format!("{ms:.3} ms")));
+            [scene.clone(), rate].into_iter().chain(times).collect()
         })
     };
-    aligned(2, &head, models.iter().flat_map(of).collect())
+    aligned(2, &head, models.iter().flat_map(rows).collect())
 }
 
-/// Each link that the model's board has, its bit rate, and the time in ms of a frame's [`payloads`]; `None` for what
-/// the board does not send.
-fn times(model: &Model) -> Vec<(LinkKind, u32, Vec<(&'static str, Option<f64>)>)> {
+/// A link with the transfer times of a frame's packets.
+struct LinkTimes {
+    kind: LinkKind,
+    /// Bits per second.
+    bit_rate: u32,
+    /// Names of the [`payloads`] and their times in ms, `None` for those that the board does not send.
+    packets: Vec<(&'static str, Option<f64>)>,
+}
+
+impl LinkTimes {
+    fn name(&self) -> String {
+        self.kind.name().to_uppercase()
+    }
+}
+
+/// The links that the model's board has.
+fn times(model: &Model) -> Vec<LinkTimes> {
     let sums = supports(model.board.engine, Kind::FrameForResultants);
-    let of = |(_, link): (&str, LinkKind)| {
-        let rate = link.bit_rate(&model.board).ok()?;
-        let sent = |what: &str| sums || what != Kind::Resultants.name();
-        let time = |(what, bytes)| (what, sent(what).then(|| link.wire_ms(bytes, rate)));
-        Some((link, rate, payloads(model).into_iter().map(time).collect()))
+    let of = |(_, kind): (&str, LinkKind)| {
+        let bit_rate = kind.bit_rate(&model.board).ok()?;
+        let sent = |packet: &str| sums || packet != Kind::Resultants.name();
+        let time = |(packet, bytes)| (packet, sent(packet).then(|| kind.wire_ms(bytes, bit_rate)));
+        Some(LinkTimes { kind, bit_rate, packets: payloads(model).into_iter().map(time).collect() })
     };
     LinkKind::NAMES.into_iter().filter_map(of).collect()
 }

@@ -74,7 +74,7 @@ pub(super) fn stability_table(rows: &[Row]) -> Table {
 
 fn line(row: &Row) -> Vec<Cell> {
     let sensor = &row.sensor;
-    let of = |figures: Option<FormatErrors>, pick: fn(&FormatErrors) -> f64| short(figures.as_ref().map(pick));
+    let of = |figures: Option<FormatErrors>, pick: fn(&FormatErrors) -> f64| scientific(figures.as_ref().map(pick));
     let error = |figures: Option<FormatErrors>, pick: fn(&FormatErrors) -> Option<f64>| {
         percent(figures.as_ref().and_then(pick))
     };
@@ -86,9 +86,9 @@ fn line(row: &Row) -> Vec<Cell> {
         text_cell(sensor.thickness_mm.to_string()),
         text_cell(medium(row.medium)),
         text_cell(row.inverse),
-        short(spectrum(|s| s.condition)),
+        scientific(spectrum(|s| s.condition)),
         decimal(spectrum(|s| s.rank), 0),
-        short(spectrum(|s| s.gain)),
+        scientific(spectrum(|s| s.gain)),
         decimal(spectrum(|s| s.radius), 3),
         decimal(spectrum(|s| s.degree as f64), 0),
         of(row.double, |f| f.forward),
@@ -106,7 +106,7 @@ fn line(row: &Row) -> Vec<Cell> {
 }
 
 /// A number in scientific notation with two digits.
-fn short(value: Option<f64>) -> Cell {
+fn scientific(value: Option<f64>) -> Cell {
     value.map_or_else(empty_cell, |value| Cell { shown: format!("{value:.1e}"), number: Some(value) })
 }
 

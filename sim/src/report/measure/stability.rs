@@ -17,10 +17,10 @@ const EXTREME_TAXELS: usize = 100;
 /// # Errors
 /// An interruption.
 pub fn conditions(options: &Options) -> Result<Vec<stability::Row>> {
-    let short = |setting: &Setting| {
+    let in_quick = |setting: &Setting| {
         setting.frame.is_some() || setting.group == "thickness" && setting.scene.inverse.kind == InverseKind::default()
     };
-    let wanted = settings().into_iter().filter(|setting| !options.quick || short(setting)).collect();
+    let wanted = settings().into_iter().filter(|setting| !options.quick || in_quick(setting)).collect();
     parallel("stability", wanted, options.jobs, &options.interrupt, |setting| Ok(stability::measure(&setting)?))
 }
 

@@ -7,7 +7,7 @@
 //! | stage | floating point | LSB |
 //! |---|---|---|
 //! | receive | b | full scale / largest code |
-//! | normalise, fold | b, its parities | that / 2^s = c |
+//! | normalise, fold | b, its parities | LSB of `receive` / 2^s = c |
 //! | pass | parities of Cz⁺b; of v_ij (4/3 mu_max)^(i+j) | c 2^(raw_shift − inverse_exponent) = a; a 2^(r + 4 − a_exponent) |
 //! | rescale | the same | a 2^r = w |
 //! | unfold | v_ij (mu_max/3)^(i+j) per taxel | w/4 |

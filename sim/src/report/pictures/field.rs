@@ -74,7 +74,7 @@ pub fn stress_map(sensor: &Sensor, stress_MPa: &[f64], outline: Outline) -> Resu
     svg(map.height(), |area| {
         cells(area, &map, sensor, stress_MPa, peak)?;
         frame(area, &map, sensor, outline)?;
-        bar(area, &map, ["tension", "compression"], "kPa", &three(1e3 * peak))
+        bar(area, &map, ["tension", "compression"], "kPa", &three_digits(1e3 * peak))
     })
 }
 
@@ -90,9 +90,15 @@ pub fn force_field(sensor: &Sensor, forces: &Forces, peaks: [f64; 2], outline: O
         frame(area, &map, sensor, outline)?;
         arrows(area, &map, sensor, forces, peaks[1])?;
         let (unit, factor) = if peaks[0] >= 1.0 { ("N", 1.0) } else { ("mN", 1e3) };
-        bar(area, &map, ["pull", "press"], &format!("{unit}, normal"), &three(factor * peaks[0]))?;
+        bar(area, &map, ["pull", "press"], &format!("{unit}, normal"), &three_digits(factor * peaks[0]))?;
         let at = (CORNER.0 as i32, 8);
-        note(area, &format!("longest arrow {} mN, tangential", three(1e3 * peaks[1])), at, HPos::Left, VPos::Center)
+        note(
+            area,
+            &format!("longest arrow {} mN, tangential", three_digits(1e3 * peaks[1])),
+            at,
+            HPos::Left,
+            VPos::Center,
+        )
     })
 }
 
@@ -180,7 +186,7 @@ fn arrow(area: &Area, (x, y): (i32, i32), (ux, uy): (f64, f64), length: f64) -> 
 }
 
 /// A value with three significant digits.
-fn three(value: f64) -> String {
+fn three_digits(value: f64) -> String {
     let decimals = (2.0 - value.abs().max(1e-9).log10().floor()).clamp(0.0, 9.0) as usize;
     format!("{value:.decimals$}")
 }

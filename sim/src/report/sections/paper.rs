@@ -171,7 +171,7 @@ fn figure_7(measured: &[Measured], options: &Options) -> Result<Section> {
     let whole = own.iter().zip(&all).find(|(m, _)| m.scene.partition.case == Case::WHOLE);
     let faster = |whole: Option<f64>, own: Option<f64>| match (whole, own) {
         (Some(whole), Some(own)) => {
-            Cell { shown: format!("{} ×", super::time::short(whole / own)), number: Some(whole / own) }
+            Cell { shown: format!("{} ×", super::time::two_digits(whole / own)), number: Some(whole / own) }
         }
         _ => empty_cell(),
     };
@@ -219,7 +219,7 @@ fn operations(measured: &[Measured]) -> Table {
         let n = matrices.sensor.taxels() as u64;
         let parts = m.scene.sensor.taxels() as u64 / n;
         let literal = parts * (3 * n * n + 9 * n * n);
-        // Cz⁺ once; of each v_ij beyond, one product where i or j is 0, two elsewhere.
+        // One product for Cz⁺; for each further v_ij one if i or j is 0, else two.
         let products = |degree: usize| 1 + 2 * (vectors(degree) as u64 - 1) - 2 * degree as u64;
         let ours = parts * products(matrices.degree) * n * n / 4;
         vec![
@@ -231,7 +231,7 @@ fn operations(measured: &[Measured]) -> Table {
             count(matrices.degree as u64),
             count(ours),
             Cell {
-                shown: format!("{} ×", super::time::short(literal as f64 / ours as f64)),
+                shown: format!("{} ×", super::time::two_digits(literal as f64 / ours as f64)),
                 number: Some(literal as f64 / ours as f64),
             },
         ]

@@ -82,7 +82,7 @@ pub(super) fn times(measured: &[Measured]) -> Table {
             None => empty_cell(),
             Some(own) => {
                 let ratio = published.seconds / own;
-                Cell { shown: format!("{} ×", super::time::short(ratio)), number: Some(ratio) }
+                Cell { shown: format!("{} ×", super::time::two_digits(ratio)), number: Some(ratio) }
             }
         };
         let case = published.case.map_or_else(empty_cell, |case| text_cell(case_text(case)));

@@ -7,7 +7,7 @@ use super::super::document::{decimal, percent, text_cell, Item, Picture, Section
 use super::super::measure::{objective_map, Measured, ObjectiveMap};
 use super::super::pictures::{objective, scatter, Scatter, Series};
 use super::super::style::SERIES;
-use super::time::short;
+use super::time::two_digits;
 
 /// The section with objective maps and margins.
 ///
@@ -64,7 +64,7 @@ fn margins(maps: &[Vec<ObjectiveMap>]) -> Result<Picture> {
         x: "margin of Π's maximum, bits".into(),
         y: "shear error of the frame".into(),
         log: [true, true],
-        ticks: [short, |error| format!("{} %", short(100.0 * error))],
+        ticks: [two_digits, |error| format!("{} %", two_digits(100.0 * error))],
         series: series.collect(),
         guides: Vec::new(),
     };

@@ -121,7 +121,7 @@ fn picture(scene: &str, case: &str, own: &[&StageRow]) -> Result<Picture> {
         axis: "difference, % of the stage's largest value".into(),
         groups: groups.collect(),
         series: vec![("max over the frames".into(), SERIES[2]), ("RMS".into(), SERIES[1])],
-        text: |value| if value < 0.1 { format!("{value:.0e}") } else { super::time::short(value) },
+        text: |value| if value < 0.1 { format!("{value:.0e}") } else { super::time::two_digits(value) },
         limit: None,
         log: true,
     };

@@ -6,7 +6,7 @@ use super::super::document::{count, percent, text_cell, Cell, Item, Picture, Sec
 use super::super::measure::{ContactCount, SweepPoint};
 use super::super::pictures::{scatter, Guide, Scatter, Series};
 use super::super::style::SERIES;
-use super::time::short;
+use super::time::two_digits;
 
 /// The section from the sweeps of each scene, given with contact count and number of frames.
 ///
@@ -97,7 +97,7 @@ fn plot(points: &[SweepPoint], what: &str, x: fn(&SweepPoint) -> f64) -> Scatter
         x: what.into(),
         y: "shear error, median".into(),
         log: [false, true],
-        ticks: [|x| format!("{x:.0}"), |error| format!("{} %", short(100.0 * error))],
+        ticks: [|x| format!("{x:.0}"), |error| format!("{} %", two_digits(100.0 * error))],
         series: series.collect(),
         guides: points
             .iter()

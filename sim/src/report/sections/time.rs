@@ -121,7 +121,7 @@ fn picture(scene: &str, what: &str, own: &[Point], error: fn(&Point) -> Option<f
         x: "time of a frame".into(),
         y: format!("{what} error, median"),
         log: [true, true],
-        ticks: [|s| tick(&seconds_text(s)), |e| format!("{} %", short(100.0 * e))],
+        ticks: [|s| tick(&seconds_text(s)), |e| format!("{} %", two_digits(100.0 * e))],
         series,
         guides: vec![Guide::X(budget, "1 ms".into()), Guide::Front(pareto_front(all), "Pareto front".into())],
     };
@@ -140,7 +140,7 @@ fn tick(text: &str) -> String {
 }
 
 /// A value with two significant digits, without trailing zeros.
-pub(super) fn short(value: f64) -> String {
+pub(super) fn two_digits(value: f64) -> String {
     let decimals = (1.0 - value.abs().max(1e-12).log10().floor()).clamp(0.0, 9.0) as usize;
     let text = format!("{value:.decimals$}");
     if text.contains('.') {
@@ -176,6 +176,6 @@ mod tests {
     #[test]
     fn ticks_are_short() {
         assert_eq!(["1.00 ms", "30.0 µs", "300 s", "1.50 s"].map(tick), ["1 ms", "30 µs", "300 s", "1.5 s"]);
-        assert_eq!([100.0, 30.0, 3.0, 0.5, 0.015].map(short), ["100", "30", "3", "0.5", "0.015"]);
+        assert_eq!([100.0, 30.0, 3.0, 0.5, 0.015].map(two_digits), ["100", "30", "3", "0.5", "0.015"]);
     }
 }
