@@ -239,7 +239,7 @@ impl Logic for Engine {
         self.resultants.clk.next = self.clk.val();
         self.resultants.rst.next = self.rst.val();
 
-        comment!("A frame starts when the buffer is full and the engine idle");
+        comment!("A frame starts: buffer full, previous frame computed");
         self.begins.now.next = self.receive.full.val()
             & !self.begins.then.val()
             & !self.computing.q.val()
