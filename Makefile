@@ -83,7 +83,7 @@ report: program ## write build/report/report.html and paper.html; QUICK=1 takes 
 	$(DERMIS) --build-dir $(BUILD) report $(if $(QUICK),--quick)
 	$(DERMIS) --build-dir $(BUILD) report --paper $(if $(QUICK),--quick)
 
-guide: program ## write the tables and pictures of README and guide (an hour)
+guide: program ## write the tables and pictures of README and guide (20 minutes)
 	$(DERMIS) --build-dir $(BUILD) guide
 	$(DERMIS) --build-dir $(BUILD) guide --pictures
 

@@ -86,7 +86,7 @@ fn files(folder: &Path) -> Vec<PathBuf> {
                 all.extend(files(&path));
             }
         } else if ENDINGS.iter().any(|ending| name.ends_with(ending))
-            || path.parent().is_some_and(|p| p.ends_with(".ci"))
+            || path.parent().and_then(Path::file_name).is_some_and(|folder| folder == ".ci")
         {
             all.push(path);
         }
