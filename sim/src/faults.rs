@@ -237,14 +237,15 @@ pub struct Shares {
 impl Shares {
     /// The stages' shares, weighted by their bits; `None` where the class has no bits or none was flipped.
     pub fn of(rows: &[Row], class: StorageClass) -> Option<Shares> {
-        let own = || rows.iter().filter(move |row| row.class == class && row.flips > 0);
-        let bits: usize = own().map(|row| row.bits).sum();
+        let of_class = || rows.iter().filter(move |row| row.class == class);
+        let flipped = || of_class().filter(|row| row.flips > 0);
+        let weight: usize = flipped().map(|row| row.bits).sum();
         let share = |count: fn(&Row) -> usize| {
-            own().map(|row| row.bits as f64 * count(row) as f64 / row.flips as f64).sum::<f64>() / bits as f64
+            flipped().map(|row| row.bits as f64 * count(row) as f64 / row.flips as f64).sum::<f64>() / weight as f64
         };
-        (bits > 0).then(|| Shares {
-            bits,
-            flips: own().map(|row| row.flips).sum(),
+        (weight > 0).then(|| Shares {
+            bits: of_class().map(|row| row.bits).sum(),
+            flips: flipped().map(|row| row.flips).sum(),
             harmless: share(|row| row.harmless),
             detected: share(|row| row.detected),
             hang: share(|row| row.hang),

@@ -18,8 +18,8 @@
 //! | [`drawn_frames`] | frames of random contacts, `dermis table --fresh` |
 //! | [`mod@generate`] | `dermis generate`: frames with known forces from described contacts |
 //! | [`board`] | a simulated board: its UART on a pseudo-terminal, or its SPI driven by a simulated controller |
-//! | [`mod@guide`] | pages: method, formats, architecture, adding a sensor or a board, the engine in a design, limits |
-//! | [`guide_pages`] | `dermis guide`: tables and pictures of README and guide, by the commands that they name |
+//! | [`mod@guide`] | pages for users, by task, and one page per stage |
+//! | [`guide_pages`] | `dermis guide`: tables and pictures of README and guide, made by the commands named there |
 //! | [`hardware`] | a scene's generated hardware and its simulators |
 //! | [`compare`] | differences between two force fields |
 //! | [`mod@netlist`] | the netlist after synthesis, simulated |
@@ -29,7 +29,7 @@
 //! | [`stability`] | `dermis stability`: errors against condition number, extreme frames |
 //! | [`mod@run_log`] | counts of long test runs, saved for the report |
 //! | [`mod@stress`] | `dermis stress`: both streams under gaps, wrong `tlast` and resets |
-//! | [`mod@study`] | `dermis study`: comparisons that the guide shows |
+//! | [`mod@study`] | `dermis study`: comparisons shown in the guide |
 //! | [`jobs`] | tasks on several threads, until one fails or the user interrupts |
 //! | [`inputs`] | scene and frames from command-line arguments |
 //! | [`tabulate`] | errors of scenes, cases and frames, `dermis table` |

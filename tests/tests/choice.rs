@@ -149,7 +149,7 @@ fn a_wrong_constant_is_found() {
 fn a_board_of_several_cases_has_no_link() {
     let model = Model::new(&scene("eight-by-eight", "[partition]\ncases = [0, 1]\n")).unwrap();
     let error = dermis_hdl::link::generate_board(&model).unwrap_err().to_string();
-    assert!(error.starts_with("partition.case = adaptive: a board's link takes"), "{error}");
+    assert!(error.starts_with("partition.case = adaptive: a board's link does not support it"), "{error}");
 }
 
 /// Number of frames of the measurement.

@@ -188,14 +188,14 @@ mod tests {
         assert_eq!(of(0, "condition").parse::<f64>().unwrap(), rows[0].spectrum.unwrap().condition);
         // A scene without convergent series has no figures, but the reason.
         assert_eq!((of(1, "condition"), of(1, "forward_f64")), (String::new(), String::new()));
-        assert!(of(1, "refused").contains("needs more than degree"));
+        assert!(of(1, "refused").contains("needs a series of more than degree"));
     }
 
     #[test]
     fn markdown_and_json_hold_figures_and_reasons() {
         let rows = rows();
         let text = stability(&rows, Format::Markdown).unwrap();
-        assert!(text.contains("needs more than degree 8; search.mu_max = "), "{text}");
+        assert!(text.contains("needs a series of more than degree 8; use search.mu_max = "), "{text}");
         assert!(text.lines().nth(2).unwrap().contains("| tsvd "), "{text}");
         let read: serde_json::Value = serde_json::from_str(&stability(&rows, Format::Json).unwrap()).unwrap();
         assert_eq!(read[0]["single"]["forward"].as_f64(), Some(rows[0].single.unwrap().forward));
