@@ -160,7 +160,7 @@ fn fill(pages: &[Page], root: &Path, outputs: &Outputs) -> Result<String> {
         // From the last to the first: what is written moves only what follows it.
         for marker in page.markers.iter().rev() {
             let new = printed(marker, &marker.command, outputs).and_then(|table| table.select(&marker.columns));
-            let new = placed(page, marker, new)?;
+            let new = located(page, marker, new)?;
             let old = tables(&page.text[marker.content.clone()]);
             changed += usize::from(old != [new.clone()]);
             text.replace_range(marker.content.clone(), &new.text());
@@ -181,7 +181,7 @@ fn check(pages: &[Page], quick: bool, outputs: &Outputs) -> Result<(String, bool
         for marker in &page.markers {
             count += 1;
             let command = marker.quick_check(quick).unwrap_or(&marker.command);
-            if let Some(difference) = placed(page, marker, differs(page, marker, quick, outputs))? {
+            if let Some(difference) = located(page, marker, differs(page, marker, quick, outputs))? {
                 stale.push_str(&format!("{}: stale: {command}\n{difference}\n", at(page, marker)));
             }
         }
@@ -214,8 +214,8 @@ fn at(page: &Page, marker: &Marker) -> String {
     format!("{}:{}", page.name, marker.line)
 }
 
-/// An error with the marker's place before it.
-fn placed<T>(page: &Page, marker: &Marker, result: Result<T>) -> Result<T> {
+/// Adds the marker's page and line to an error.
+fn located<T>(page: &Page, marker: &Marker, result: Result<T>) -> Result<T> {
     result.map_err(|error| anyhow!("{}: {error:#}", at(page, marker)))
 }
 

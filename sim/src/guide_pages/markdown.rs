@@ -99,16 +99,16 @@ impl Table {
         if columns.is_empty() {
             return Ok(self.clone());
         }
-        let places = columns.iter().map(|column| self.place(column)).collect::<Result<Vec<usize>>>()?;
-        let pick = |row: &Vec<String>| places.iter().map(|&place| row[place].clone()).collect();
-        let labels = places.iter().take_while(|place| **place < self.labels).count();
+        let indices = columns.iter().map(|column| self.column_index(column)).collect::<Result<Vec<usize>>>()?;
+        let pick = |row: &Vec<String>| indices.iter().map(|&index| row[index].clone()).collect();
+        let labels = indices.iter().take_while(|index| **index < self.labels).count();
         Ok(Table { head: columns.to_vec(), rows: self.rows.iter().map(pick).collect(), labels })
     }
 
-    fn place(&self, column: &str) -> Result<usize> {
-        let mut places = (0..self.head.len()).filter(|place| self.head[*place] == column);
-        match (places.next(), places.next()) {
-            (Some(place), None) => Ok(place),
+    fn column_index(&self, column: &str) -> Result<usize> {
+        let mut indices = (0..self.head.len()).filter(|index| self.head[*index] == column);
+        match (indices.next(), indices.next()) {
+            (Some(index), None) => Ok(index),
             (None, _) => bail!("no column {column:?}; there are: {}", line(&self.head)),
             _ => bail!("two columns are called {column:?}"),
         }
