@@ -52,7 +52,7 @@ unit: setup ## run all tests: unit, command line, co-simulation
 
 lint: setup ## check wording against tests/words.txt, lint the generated Verilog with its waivers
 	@echo '== lint'
-	$(CARGO) test --quiet -p dermis-tests --test words
+	$(CARGO) test --quiet --workspace --test words
 	@set -e; for scene in $(SCENES); do \
 	  $(CARGO) run --quiet --bin dermis -- build $$scene --out $(BUILD)/$$scene/rtl >/dev/null; \
 	  (cd $(BUILD)/$$scene/rtl && $(VERILATOR) --lint-only -Wall *.vlt *.v); \
