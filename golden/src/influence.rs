@@ -114,19 +114,42 @@ fn mean(dx: f64, dy: f64, a: f64, b: f64, f: impl Fn(f64, f64) -> f64) -> f64 {
     sum / 4.0
 }
 
+/// The stress that a loaded cell of one size causes under a medium.
+pub struct CellInfluence {
+    /// Sides of the cell in mm, along x and y.
+    cell_mm: [f64; 2],
+    /// Depth of the taxels in mm.
+    h: f64,
+    /// The point kernel of a bonded layer.
+    layer: Option<Kernel>,
+}
+
+impl CellInfluence {
+    /// For cells of `cell_mm`, \[x, y\], at a height of `h` mm above the taxels.
+    pub fn new(cell_mm: [f64; 2], h: f64, medium: Medium) -> CellInfluence {
+        let layer = match medium {
+            Medium::HalfSpace => None,
+            Medium::BondedLayer { poisson } => Some(Kernel::new(poisson)),
+        };
+        CellInfluence { cell_mm, h, layer }
+    }
+
+    /// Stress in MPa per N along x, y and z on the cell; `offset` is taxel − cell centre in mm.
+    pub fn at(&self, offset: [f64; 2]) -> [f64; 3] {
+        let ([dx, dy], [a, b]) = (offset, self.cell_mm);
+        match &self.layer {
+            None => [cx, cy, cz].map(|f| f(dx, dy, a, b, self.h)),
+            Some(kernel) => cell::influence(kernel, offset, self.cell_mm, self.h),
+        }
+    }
+}
+
 /// Stress in MPa per N along x, y, z for each distance in rows and columns, row-major. cx is odd along the columns, cy
 /// along the rows.
 pub fn table(sensor: &Sensor, medium: Medium) -> Vec<[f64; 3]> {
     let Sensor { cols, pitch_x_mm: a, pitch_y_mm: b, thickness_mm: h, .. } = *sensor;
-    let offset = |index: usize| [(index % cols) as f64 * a, (index / cols) as f64 * b];
-    let offsets = (0..sensor.taxels()).map(offset);
-    match medium {
-        Medium::HalfSpace => offsets.map(|[dx, dy]| [cx, cy, cz].map(|f| f(dx, dy, a, b, h))).collect(),
-        Medium::BondedLayer { poisson } => {
-            let kernel = Kernel::new(poisson);
-            offsets.map(|offset| cell::influence(&kernel, offset, [a, b], h)).collect()
-        }
-    }
+    let cell = CellInfluence::new([a, b], h, medium);
+    (0..sensor.taxels()).map(|index| cell.at([(index % cols) as f64 * a, (index / cols) as f64 * b])).collect()
 }
 
 /// Influence matrices of an array, taxels × cells; row t, column f is the stress in MPa on taxel t per N on cell f.

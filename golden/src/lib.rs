@@ -48,6 +48,7 @@
 //! | [`influence`], [`bonded`] | stress of a loaded cell on a half-space and on a layer bonded to a rigid base |
 //! | [`matrices`], [`folded`] | Cz⁺, Ax, Ay of a subarray; the basis of mirror parities in which they are computed |
 //! | [`float`] | the stages in floating point: `receive`, `pass`, `search`, `force`, and the objectives |
+//! | [`evidence`] | forces and standard deviations for contacts of any shape under noise |
 //! | [`reconstruct`] | the golden engine, and the result format of all engines |
 //! | [`errors`], [`flags`] | errors relative to known forces; limitations of a result |
 //! | [`fixed`] | the same stages in integers, bit for bit the hardware; formats, cycles, resources |
@@ -68,6 +69,7 @@ pub mod baseline;
 pub mod board;
 pub mod bonded;
 pub mod errors;
+pub mod evidence;
 pub mod fixed;
 pub mod flags;
 pub mod float;

@@ -12,14 +12,14 @@
 //! | | `cases` (for "adaptive": 0 and others of 1 … 3 for the hardware; without it as many as fit together) |
 //! | | `condition` ("loaded"; "both-signs") |
 //! | `[search]` | `objective` ("sparse"; …), `mu_max` (0.6; 0, or 0.001 … 2), `noise_floor_MPa` (0) |
-//! | | `form` ("oblique"; "orthogonal") |
+//! | | `form` ("oblique"; "orthogonal"), `estimator` ("auto"; "search", "evidence") |
 //! | `[inverse]` | `kind` ("tsvd"; "tikhonov", "exact"), `level` (floor of format and noise; 0 … 1, both excluded) |
 //! | `[threshold]` | `min_force_N` (0) |
 //! | `[fixed]` | `input_bits` (20; 8 … 24), `data_bits` (18; 12 … 18), `coef_bits` (18; 8 … 18) |
 //! | | `inverse_bits` (24; `coef_bits` … 32), `prune_bits` (20; 8 … 31), `lanes` (as many as fit; 4, 8 … 1024) |
 //! | `[hardware]` | `board` ("ulx3s-85f"), `link` ("uart"; "spi"), `coefficient_check` ("none"; "signature") |
 //! | `[input]` | `full_scale_MPa` (the frame's peak), `average` (0 … 12), `calibration`, `tare` (files), `dead` |
-//! | | (\[row, col\] each), `unipolar` (false) |
+//! | | (\[row, col\] each), `unipolar` (false), `gain_spread` (0; 0 … 1) |
 //! | `[output]` | `forces` ("taxels"; "resultants") |
 
 mod error;
@@ -128,6 +128,18 @@ pub enum ObjectiveKind {
     Auto,
 }
 
+/// How forces are estimated from stress.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum EstimatorKind {
+    /// The one that fits the scene, [`Scene::estimator`].
+    #[default]
+    Auto,
+    /// The μ that maximises the objective Π.
+    Search,
+    /// The μ that makes the stress most probable, [`crate::evidence`].
+    Evidence,
+}
+
 /// How Eq. 1 is computed.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Form {
@@ -153,6 +165,8 @@ pub struct PartitionSpec {
 /// Table `[search]`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SearchSpec {
+    /// How forces are estimated; a scene that names an objective and no estimator takes `search`.
+    pub estimator: EstimatorKind,
     /// The objective that is maximised.
     pub objective: ObjectiveKind,
     /// Largest ratio of shear to normal force, 0.001 to 2; 0 means no shear and no search.
@@ -224,6 +238,8 @@ pub struct InputSpec {
     pub dead: Vec<[usize; 2]>,
     /// Whether the sensor reads tension as zero.
     pub unipolar: bool,
+    /// Standard deviation of the taxels' gains about their calibration, a fraction from 0 to 1.
+    pub gain_spread: f64,
 }
 
 /// The forces that a result holds.
@@ -278,7 +294,13 @@ impl Default for PartitionSpec {
 
 impl Default for SearchSpec {
     fn default() -> Self {
-        SearchSpec { objective: ObjectiveKind::default(), mu_max: 0.6, noise_floor_MPa: 0.0, form: Form::default() }
+        SearchSpec {
+            estimator: EstimatorKind::default(),
+            objective: ObjectiveKind::default(),
+            mu_max: 0.6,
+            noise_floor_MPa: 0.0,
+            form: Form::default(),
+        }
     }
 }
 
@@ -297,6 +319,18 @@ impl Default for FixedSpec {
 impl Default for HardwareSpec {
     fn default() -> Self {
         HardwareSpec { board: "ulx3s-85f".to_string(), link: LinkKind::Uart, coefficient_check: CoefficientCheck::None }
+    }
+}
+
+impl EstimatorKind {
+    /// Every estimator with its name in a scene file, the default first.
+    pub const NAMES: [(&'static str, EstimatorKind); 3] =
+        [("auto", EstimatorKind::Auto), ("search", EstimatorKind::Search), ("evidence", EstimatorKind::Evidence)];
+
+    /// Name in a scene file.
+    pub fn name(self) -> &'static str {
+        let named = Self::NAMES.iter().find(|(_, kind)| *kind == self);
+        named.map_or("", |(name, _)| name)
     }
 }
 

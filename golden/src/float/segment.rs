@@ -72,14 +72,21 @@ pub fn segment(sensor: &Sensor, p: &[f64], width: f64) -> Segments {
     segments
 }
 
-/// Compressive forces smoothed by a Gaussian window; at the edge the window is cut and normalised.
+/// Compressive forces smoothed by a Gaussian window of `width` · h, h at least [`MIN_PITCHES`].
 fn smooth(sensor: &Sensor, p: &[f64], width: f64) -> Vec<f64> {
+    let sigma = |pitch: f64| width * sensor.thickness_mm.max(MIN_PITCHES * pitch);
+    smooth_window(sensor, p, [sigma(sensor.pitch_x_mm), sigma(sensor.pitch_y_mm)])
+}
+
+/// Compressive forces smoothed by a Gaussian window of `sigma_mm` along x and y; at the edge the window is cut and
+/// normalised.
+pub(crate) fn smooth_window(sensor: &Sensor, p: &[f64], sigma_mm: [f64; 2]) -> Vec<f64> {
     let (rows, cols) = (sensor.rows, sensor.cols);
-    let weights = |pitch: f64, count: usize| -> Vec<f64> {
-        let sigma = width * sensor.thickness_mm.max(MIN_PITCHES * pitch);
+    let weights = |pitch: f64, sigma: f64, count: usize| -> Vec<f64> {
         (0..count).map(|k| (-0.5 * (k as f64 * pitch / sigma).powi(2)).exp()).collect()
     };
-    let (wx, wy) = (weights(sensor.pitch_x_mm, cols), weights(sensor.pitch_y_mm, rows));
+    let wx = weights(sensor.pitch_x_mm, sigma_mm[0], cols);
+    let wy = weights(sensor.pitch_y_mm, sigma_mm[1], rows);
     let mean = |w: &[f64], at: usize, count: usize, value: &dyn Fn(usize) -> f64| {
         let (mut sum, mut weight) = (0.0, 0.0);
         for k in 0..count {
@@ -112,7 +119,12 @@ fn climb(sensor: &Sensor, q: &[f64]) -> Vec<usize> {
         let best = neighbours(sensor, taxel).max_by(|a, b| slope(a).total_cmp(&slope(b)));
         best.filter(|best| q[*best] > q[taxel]).unwrap_or(taxel)
     };
-    let next: Vec<usize> = (0..q.len()).map(up).collect();
+    let mut next: Vec<usize> = (0..q.len()).map(up).collect();
+    // Taxels without any load are one basin, however many they are.
+    if let Some(first) = q.iter().position(|&q| q == 0.0) {
+        let flat = |(k, next): &(usize, &mut usize)| q[*k] == 0.0 && **next == *k;
+        next.iter_mut().enumerate().filter(flat).for_each(|(_, next)| *next = first);
+    }
     let top = |mut taxel: usize| {
         // q rises with every step, so the loop ends.
         while next[taxel] != taxel {

@@ -2,7 +2,7 @@
 
 use super::reader::Reader;
 use super::{
-    CoefficientCheck, Condition, FixedSpec, ForceOutput, Form, HardwareSpec, InputSpec, InverseKind, InverseSpec,
+    CoefficientCheck, Condition, EstimatorKind, FixedSpec, ForceOutput, Form, HardwareSpec, InputSpec, InverseKind, InverseSpec,
     Medium, ObjectiveKind, OutputSpec, PartitionSpec, Scene, SceneError, SearchSpec, ThresholdSpec,
 };
 use crate::board::Board;
@@ -19,12 +19,12 @@ const SCHEMA: [(&str, &[&str]); 11] = [
     ("sensor", &["rows", "cols", "pitch_x_mm", "pitch_y_mm", "thickness_mm"]),
     ("medium", &["kind", "poisson"]),
     ("partition", &["case", "cases", "condition", "rows", "cols"]),
-    ("search", &["objective", "mu_max", "noise_floor_MPa", "form"]),
+    ("search", &["estimator", "objective", "mu_max", "noise_floor_MPa", "form"]),
     ("inverse", &["kind", "level"]),
     ("threshold", &["min_force_N"]),
     ("fixed", &["input_bits", "data_bits", "coef_bits", "inverse_bits", "prune_bits", "lanes"]),
     ("hardware", &["board", "link", "coefficient_check"]),
-    ("input", &["full_scale_MPa", "average", "calibration", "tare", "dead", "unipolar"]),
+    ("input", &["full_scale_MPa", "average", "calibration", "tare", "dead", "unipolar", "gain_spread"]),
     ("output", &["forces"]),
 ];
 /// Default Poisson ratio of a bonded layer: soft rubber.
@@ -219,7 +219,13 @@ fn search(reader: &Reader) -> Result<SearchSpec, SceneError> {
     let in_range = |mu| mu == 0.0 || (LEAST_MU_MAX..=LARGEST_MU_MAX).contains(&mu);
     let mu_max = reader.number("search.mu_max", in_range, &allowed)?;
     let floor = reader.number("search.noise_floor_MPa", |mpa| mpa >= 0.0, "a number of at least 0")?;
+    // Who names an objective wants the search that maximises it.
+    let estimator = match (reader.value("search.estimator"), reader.value("search.objective")) {
+        (None, Some(_)) => EstimatorKind::Search,
+        _ => reader.choice("search.estimator", &EstimatorKind::NAMES)?,
+    };
     Ok(SearchSpec {
+        estimator,
         objective: reader.choice("search.objective", &ObjectiveKind::NAMES)?,
         mu_max: mu_max.unwrap_or(default.mu_max),
         noise_floor_MPa: floor.unwrap_or(default.noise_floor_MPa),
@@ -281,6 +287,7 @@ fn hardware(reader: &Reader) -> Result<HardwareSpec, SceneError> {
 }
 
 fn input(reader: &Reader, origin: &str, sensor: &Sensor) -> Result<InputSpec, SceneError> {
+    let spread = reader.number("input.gain_spread", |spread| (0.0..=1.0).contains(&spread), "a number from 0 to 1")?;
     let full_scale_MPa = reader.number("input.full_scale_MPa", |mpa| mpa > 0.0, "a number above 0")?;
     // Paths are relative to the folder of the scene's file.
     let file = |path| match reader.value(path) {
@@ -296,6 +303,7 @@ fn input(reader: &Reader, origin: &str, sensor: &Sensor) -> Result<InputSpec, Sc
         tare: file("input.tare")?,
         dead: dead(reader, sensor)?,
         unipolar: reader.typed("input.unipolar", Value::as_bool, "true or false")?.unwrap_or(false),
+        gain_spread: spread.unwrap_or(0.0),
     })
 }
 

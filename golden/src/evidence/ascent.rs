@@ -1,0 +1,115 @@
+//! Ascent: the μ of every contact at which the evidence, times a prior on μ, is largest.
+//!
+//! ```text
+//! log posterior = log evidence − |μ|²/2s²        s = mu_max/2
+//! step = (J + 1/s²)⁻¹ (slope − μ/s²)             J the information of μ
+//! ```
+//!
+//! A step that does not raise the log posterior is halved. The prior is that of friction: without it a noisy frame gives
+//! a shear that is worse than none. μ stays within mu_max.
+//!
+//! | | shape | unit |
+//! |---|---|---|
+//! | in: μ | contacts × 2 | – |
+//! | out: μ, covariance (J + 1/s²)⁻¹ | contacts × 2, square of it | – |
+
+use super::model::{Posterior, Products, Slope};
+use faer::linalg::solvers::{DenseSolveCore, Solve};
+use faer::{Col, Mat, Side};
+
+/// Halvings of a step before the ascent ends.
+const HALVINGS: usize = 6;
+/// Length of a step, in units of mu_max, below which the ascent ends.
+pub(super) const TOLERANCE: f64 = 1e-4;
+
+/// Range and prior of μ.
+#[derive(Clone, Copy)]
+pub(super) struct Prior {
+    /// Largest |μ|.
+    pub mu_max: f64,
+}
+
+/// The top that an ascent reached.
+pub(super) struct Top {
+    /// μ of each contact.
+    pub mu: Vec<[f64; 2]>,
+    /// The posterior there.
+    pub posterior: Posterior,
+    /// Slope and information there.
+    pub slope: Slope,
+}
+
+impl Prior {
+    /// 1/s².
+    pub fn precision(self) -> f64 {
+        (2.0 / self.mu_max).powi(2)
+    }
+
+    fn log(self, mu: &[[f64; 2]]) -> f64 {
+        -0.5 * self.precision() * mu.iter().map(|[x, y]| x * x + y * y).sum::<f64>()
+    }
+
+    fn within(self, [x, y]: [f64; 2]) -> [f64; 2] {
+        let size = x.hypot(y);
+        if size > self.mu_max {
+            [x, y].map(|mu| mu * self.mu_max / size)
+        } else {
+            [x, y]
+        }
+    }
+
+    /// J + 1/s², whose inverse is the covariance of μ.
+    pub fn information(self, slope: &Slope) -> Mat<f64> {
+        let n = slope.gradient.len();
+        Mat::from_fn(n, n, |i, j| slope.information[(i, j)] + if i == j { self.precision() } else { 0.0 })
+    }
+
+    /// The covariance of all μ; `None` if it is not representable.
+    pub fn covariance(self, slope: &Slope) -> Option<Mat<f64>> {
+        self.information(slope).llt(Side::Lower).ok().map(|factor| factor.inverse())
+    }
+}
+
+/// Ascends from `mu` by at most `steps` steps; `None` if the model is not representable there.
+pub(super) fn ascend(products: &Products, mu: &[[f64; 2]], prior: Prior, steps: usize) -> Option<Top> {
+    let top = |mu: Vec<[f64; 2]>| {
+        let posterior = products.at(&mu)?;
+        let slope = products.slope(&posterior);
+        Some(Top { mu, posterior, slope })
+    };
+    let mut best = top(mu.to_vec())?;
+    if prior.mu_max == 0.0 {
+        return Some(best);
+    }
+    for _ in 0..steps {
+        let value = best.posterior.value + prior.log(&best.mu);
+        let uphill = |i: usize| best.slope.gradient[i] - prior.precision() * best.mu[i / 2][i % 2];
+        let right = Col::from_fn(best.slope.gradient.len(), uphill);
+        let step = prior.information(&best.slope).llt(Side::Lower).ok()?.solve(&right);
+        let longest = step.iter().fold(0.0f64, |longest, step| step.abs().max(longest));
+        if longest <= TOLERANCE * prior.mu_max {
+            break;
+        }
+        let mut share = (prior.mu_max / longest).min(1.0);
+        let mut higher = None;
+        for _ in 0..HALVINGS {
+            let moved = |k: usize| {
+                let [x, y] = best.mu[k];
+                prior.within([x + share * step[2 * k], y + share * step[2 * k + 1]])
+            };
+            let mu: Vec<[f64; 2]> = (0..best.mu.len()).map(moved).collect();
+            let next = products.at(&mu).filter(|next| next.value + prior.log(&mu) > value);
+            if let Some(posterior) = next {
+                let slope = products.slope(&posterior);
+                higher = Some(Top { mu, posterior, slope });
+                break;
+            }
+            share /= 2.0;
+        }
+        match higher {
+            Some(higher) => best = higher,
+            None => break,
+        }
+    }
+    Some(best)
+}

@@ -1,0 +1,61 @@
+//! Contact: force and standard deviation of each contact, from the posterior of its pressure and its μ.
+//!
+//! The load Fz = 1ᵀp given μ has the variance fᵀM⁻¹f, f = Fᵀ1; it moves with μ by j = fᵀ ∂w/∂μ. With the covariance V
+//! of all μ, to first order,
+//!
+//! ```text
+//! dFz = j·dμ + ε        dT = Fz dμ + μ dFz
+//! ```
+//!
+//! | | shape | unit |
+//! |---|---|---|
+//! | in: f | r | N |
+//! | out: force and standard deviation | 3 per contact | N, [x, y, normal] |
+
+use super::ascent::{Prior, Top};
+use super::model::Products;
+use faer::Mat;
+
+/// Force of a contact with its standard deviation.
+pub(super) struct ContactForce {
+    /// N, [x, y, normal].
+    pub force_N: [f64; 3],
+    /// N, [x, y, normal].
+    pub sigma_N: [f64; 3],
+    /// Covariance of μ, [xx, xy, yy].
+    pub mu_covariance: [f64; 3],
+}
+
+/// The force of every contact; `loads` is f for each of them, 0 for the coefficients of the others. `None` if the
+/// covariance is not representable.
+pub(super) fn forces(products: &Products, top: &Top, prior: Prior, loads: &[Vec<f64>]) -> Option<Vec<ContactForce>> {
+    let unknowns = 2 * loads.len();
+    let covariance =
+        if prior.mu_max > 0.0 { prior.covariance(&top.slope)? } else { Mat::zeros(unknowns, unknowns) };
+    let drift = products.drift(&top.posterior, unknowns);
+    let one = |k: usize| {
+        let f = &loads[k];
+        let r = f.len();
+        let dot = |i: usize| -> f64 { (0..r).map(|j| top.posterior.covariance[(i, j)] * f[j]).sum() };
+        let given: f64 = (0..r).map(|i| f[i] * dot(i)).sum();
+        let normal: f64 = f.iter().zip(&top.posterior.w).map(|(f, w)| f * w).sum();
+        let slope: Vec<f64> = (0..unknowns).map(|u| (0..r).map(|i| f[i] * drift[(i, u)]).sum()).collect();
+        let quadratic = |a: &[f64]| -> f64 {
+            (0..unknowns).map(|i| (0..unknowns).map(|j| a[i] * covariance[(i, j)] * a[j]).sum::<f64>()).sum()
+        };
+        let along = |axis: usize| {
+            let mu = top.mu[k][axis];
+            let total: Vec<f64> =
+                (0..unknowns).map(|u| mu * slope[u] + if u == 2 * k + axis { normal } else { 0.0 }).collect();
+            (mu * normal, (quadratic(&total) + mu * mu * given).max(0.0).sqrt())
+        };
+        let ((x, sx), (y, sy)) = (along(0), along(1));
+        let at = |a: usize, b: usize| covariance[(2 * k + a, 2 * k + b)];
+        ContactForce {
+            force_N: [x, y, normal],
+            sigma_N: [sx, sy, (quadratic(&slope) + given).max(0.0).sqrt()],
+            mu_covariance: [at(0, 0), at(0, 1), at(1, 1)],
+        }
+    };
+    Some((0..loads.len()).map(one).collect())
+}

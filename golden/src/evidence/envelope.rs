@@ -1,0 +1,73 @@
+//! Envelope: the expected size of the pressure on each cell, from the pressure found so far.
+//!
+//! q is the compressive part of p, smoothed by a Gaussian of 0.3 ℓ. Above a tenth of its peak the envelope is its square
+//! root, so that a cell may carry several times what was found so far; below it is proportional, so that a tail fades
+//! with the rounds. Cells below 3 % of the largest envelope are left out.
+//!
+//! The first q is the stress itself: readings above zero, spread over the cells by a Gaussian of half a pitch. It is
+//! wider than the contact, and later rounds narrow it.
+//!
+//! | | shape | unit |
+//! |---|---|---|
+//! | in: p, or b | cells, or taxels | N, or MPa |
+//! | out: envelope | cells | N, 0 on cells left out |
+
+use super::cells::Cells;
+use crate::float::segment::smooth_window;
+
+/// Smoothing of the pressure in units of ℓ.
+const SMOOTHING: f64 = 0.3;
+/// Fraction of the peak below which the envelope is proportional to the pressure.
+const KNEE: f64 = 0.1;
+/// Fraction of the largest envelope below which a cell is left out.
+const LEAST: f64 = 0.03;
+/// Spread of a reading over the cells in units of the pitch.
+const SPREAD: f64 = 0.5;
+/// Distance in taxels from which a reading does not reach a cell: five of its spreads.
+const REACH: usize = 3;
+
+/// The first estimate of the pressure: the readings `b` above zero of the taxels `used`, in N per cell.
+pub(super) fn from_stress(cells: &Cells, b: &[f64], used: &[bool]) -> Vec<f64> {
+    let (sensor, grid) = (&cells.sensor, &cells.grid);
+    let area = grid.pitch_x_mm * grid.pitch_y_mm;
+    let near = |line: usize, lines: usize| line.saturating_sub(REACH)..(line + REACH + 1).min(lines);
+    let reading = |cell: usize| {
+        let ([x, y], own) = (cells.position_mm(cell), cells.taxel_of(cell));
+        let (mut sum, mut weight) = (0.0, 0.0);
+        for row in near(own / sensor.cols, sensor.rows) {
+            for taxel in near(own % sensor.cols, sensor.cols).map(|col| row * sensor.cols + col) {
+                let [u, v] = cells.taxel_mm(taxel);
+                let away = [(x - u) / (SPREAD * sensor.pitch_x_mm), (y - v) / (SPREAD * sensor.pitch_y_mm)];
+                let w = if used[taxel] { (-0.5 * (away[0] * away[0] + away[1] * away[1])).exp() } else { 0.0 };
+                sum += w * b[taxel].max(0.0);
+                weight += w;
+            }
+        }
+        if weight > 0.0 {
+            area * sum / weight
+        } else {
+            0.0
+        }
+    };
+    (0..grid.taxels()).map(reading).collect()
+}
+
+/// The envelope of the pressure `p` in N per cell.
+pub(super) fn envelope(cells: &Cells, p: &[f64], length_mm: f64) -> Vec<f64> {
+    let q = smooth_window(&cells.grid, p, [SMOOTHING * length_mm; 2]);
+    let peak = q.iter().copied().fold(0.0, f64::max);
+    let shape = |q: &f64| {
+        let share = q / peak;
+        let e = if share > KNEE { share.sqrt() } else { share / KNEE.sqrt() };
+        if e > LEAST {
+            peak * e
+        } else {
+            0.0
+        }
+    };
+    if peak > 0.0 {
+        q.iter().map(shape).collect()
+    } else {
+        vec![0.0; q.len()]
+    }
+}

@@ -1,0 +1,260 @@
+//! Model: stress, pressure and evidence of contacts whose envelopes are given, as functions of their μ.
+//!
+//! With F_k the factor of the prior of contact k, w all coefficients and G_a the influence of the cells along axis a,
+//!
+//! ```text
+//! b = H(μ) w + noise        H(μ) = [(Gz + μ1_k Gx + μ2_k Gy) F_k]_k        w ~ N(0, 1)
+//! log evidence = −½ yᵀK⁻¹y − ½ log|K|        K = H Hᵀ + T⁻¹,  T the precision of each reading
+//! ```
+//!
+//! K is as large as the array, but H has few columns: with M = 1 + HᵀTH and u = HᵀTy everything follows from M (r × r),
+//! log|K| = log|M| − log|T| and yᵀK⁻¹y = yᵀTy − uᵀM⁻¹u. M and u are polynomials in μ whose coefficients, the blocks of
+//! SᵀTS and SᵀTy with S = [Gz F, Gx F, Gy F], are computed once; a candidate μ then costs two r × r factorisations.
+//!
+//! | | shape | unit |
+//! |---|---|---|
+//! | in: S | readings × 3r | MPa |
+//! | in: y, T | readings | MPa, 1/MPa² |
+//! | out: w and its covariance M⁻¹ | r, r × r | – |
+//! | out: slope and information in μ | 2 × contacts, square of it | – |
+
+use faer::linalg::matmul::matmul;
+use faer::linalg::solvers::{DenseSolveCore, Solve};
+use faer::{Accum, Col, Mat, Par, Side};
+
+/// S for the readings in use, and which contact each column of a block belongs to.
+pub(super) struct Design {
+    /// [Gz F, Gx F, Gy F], readings × 3r, MPa.
+    pub s: Mat<f64>,
+    /// Contact of each of the r coefficients.
+    pub contact: Vec<usize>,
+}
+
+/// The readings as the model takes them: what each says, and how surely.
+#[derive(Clone)]
+pub(super) struct Readings {
+    /// y in MPa.
+    pub y: Vec<f64>,
+    /// T in 1/MPa²: 0 where a reading says nothing.
+    pub precision: Vec<f64>,
+}
+
+/// SᵀTS, SᵀTy and yᵀTy.
+pub(super) struct Products<'a> {
+    design: &'a Design,
+    gram: Mat<f64>,
+    right: Vec<f64>,
+    square: f64,
+    log_precision: f64,
+}
+
+/// The posterior at one μ.
+pub(super) struct Posterior {
+    /// Log evidence, without the constant.
+    pub value: f64,
+    /// yᵀK⁻¹y.
+    pub square: f64,
+    /// Posterior mean of w.
+    pub w: Vec<f64>,
+    /// Posterior covariance of w, M⁻¹.
+    pub covariance: Mat<f64>,
+    /// (Ga F)ᵀ T H for a = z, x, y: row block a of SᵀTS times the factors of μ.
+    rows: [Mat<f64>; 3],
+}
+
+/// Slope of the log evidence in μ, and its information.
+pub(super) struct Slope {
+    /// Derivative in μ1 and μ2 of each contact.
+    pub gradient: Vec<f64>,
+    /// Fisher information of μ with w marginalised, 2 contacts × 2 contacts.
+    pub information: Mat<f64>,
+}
+
+impl Design {
+    /// Number of coefficients r.
+    pub fn rank(&self) -> usize {
+        self.contact.len()
+    }
+
+    /// Factor of column `i` of block `axis` (z, x, y) at μ.
+    fn share(&self, mu: &[[f64; 2]], axis: usize, i: usize) -> f64 {
+        match axis {
+            0 => 1.0,
+            axis => mu[self.contact[i]][axis - 1],
+        }
+    }
+
+    /// H(μ), readings × r.
+    pub fn at(&self, mu: &[[f64; 2]]) -> Mat<f64> {
+        let r = self.rank();
+        Mat::from_fn(self.s.nrows(), r, |t, i| {
+            self.s[(t, i)] + self.share(mu, 1, i) * self.s[(t, r + i)] + self.share(mu, 2, i) * self.s[(t, 2 * r + i)]
+        })
+    }
+}
+
+impl<'a> Products<'a> {
+    /// The products of a design and readings.
+    pub fn new(design: &'a Design, readings: &Readings) -> Products<'a> {
+        let (n, wide) = (design.s.nrows(), design.s.ncols());
+        let Readings { y, precision } = readings;
+        let scaled = Mat::from_fn(n, wide, |t, i| precision[t].sqrt() * design.s[(t, i)]);
+        let mut gram = Mat::zeros(wide, wide);
+        matmul(&mut gram, Accum::Replace, scaled.transpose(), &scaled, 1.0, Par::Seq);
+        let weighted = Col::from_fn(n, |t| precision[t] * y[t]);
+        let right: Vec<f64> = (design.s.transpose() * weighted).iter().copied().collect();
+        let square = y.iter().zip(precision).map(|(y, t)| t * y * y).sum();
+        let log_precision = precision.iter().filter(|t| **t > 0.0).map(|t| t.ln()).sum();
+        Products { design, gram, right, square, log_precision }
+    }
+
+    /// The posterior at μ, one pair per contact; `None` if it is not representable.
+    pub fn at(&self, mu: &[[f64; 2]]) -> Option<Posterior> {
+        let (design, r) = (self.design, self.design.rank());
+        let share = |axis: usize, i: usize| design.share(mu, axis, i);
+        let rows = [0, 1, 2].map(|a| {
+            let entry = |i: usize, j: usize| {
+                let block = |b: usize| self.gram[(a * r + i, b * r + j)];
+                block(0) + share(1, j) * block(1) + share(2, j) * block(2)
+            };
+            Mat::from_fn(r, r, entry)
+        });
+        let m = Mat::from_fn(r, r, |i, j| {
+            let own = rows[0][(i, j)] + share(1, i) * rows[1][(i, j)] + share(2, i) * rows[2][(i, j)];
+            own + if i == j { 1.0 } else { 0.0 }
+        });
+        let u = Col::from_fn(r, |i| {
+            self.right[i] + share(1, i) * self.right[r + i] + share(2, i) * self.right[2 * r + i]
+        });
+        let factor = m.llt(Side::Lower).ok()?;
+        let w = factor.solve(&u);
+        let explained: f64 = w.iter().zip(u.iter()).map(|(w, u)| w * u).sum();
+        let square = (self.square - explained).max(0.0);
+        let lower = factor.L();
+        let log_m = 2.0 * (0..r).map(|i| lower[(i, i)].ln()).sum::<f64>();
+        let value = -0.5 * (square + log_m - self.log_precision);
+        let w: Vec<f64> = w.iter().copied().collect();
+        value.is_finite().then(|| Posterior { value, square, w, covariance: factor.inverse(), rows })
+    }
+
+    /// For each unknown of μ, contact by contact: HᵀT of the derivative of the stress (r × unknowns), and the part of
+    /// HᵀT(y − H w) that its own columns see (r × unknowns).
+    fn derivatives(&self, posterior: &Posterior, unknowns: usize) -> [Mat<f64>; 2] {
+        let (design, r) = (self.design, self.design.rank());
+        let Posterior { w, rows, .. } = posterior;
+        let (mut cross, mut left) = (Mat::<f64>::zeros(r, unknowns), Mat::<f64>::zeros(r, unknowns));
+        for axis in [0, 1] {
+            let rows = &rows[axis + 1];
+            for i in 0..r {
+                let unknown = 2 * design.contact[i] + axis;
+                let mut stress = 0.0;
+                for j in 0..r {
+                    stress += rows[(i, j)] * w[j];
+                    cross[(j, unknown)] += rows[(i, j)] * w[i];
+                }
+                left[(i, unknown)] = self.right[(axis + 1) * r + i] - stress;
+            }
+        }
+        [cross, left]
+    }
+
+    /// Derivative of the posterior mean w in each unknown of μ, r × unknowns.
+    pub fn drift(&self, posterior: &Posterior, unknowns: usize) -> Mat<f64> {
+        let [cross, left] = self.derivatives(posterior, unknowns);
+        &posterior.covariance * (left - cross)
+    }
+
+    /// Slope and information at the μ of `posterior`.
+    pub fn slope(&self, posterior: &Posterior) -> Slope {
+        let (design, r) = (self.design, self.design.rank());
+        let unknowns = 2 * design.contact.iter().max().map_or(0, |last| last + 1);
+        let Posterior { w, covariance, rows, .. } = posterior;
+        let [cross, left] = self.derivatives(posterior, unknowns);
+        let mut gradient = vec![0.0; unknowns];
+        for (axis, rows) in [(0, &rows[1]), (1, &rows[2])] {
+            for i in 0..r {
+                let unknown = 2 * design.contact[i] + axis;
+                let trace: f64 = (0..r).map(|j| rows[(i, j)] * covariance[(j, i)]).sum();
+                gradient[unknown] += w[i] * left[(i, unknown)] - trace;
+            }
+        }
+        let inner = cross.transpose() * (covariance * &cross);
+        let mut information = Mat::<f64>::zeros(unknowns, unknowns);
+        for (a, b) in [(0, 0), (0, 1), (1, 0), (1, 1)] {
+            for i in 0..r {
+                let row = (a + 1) * r + i;
+                let of = 2 * design.contact[i] + a;
+                for j in 0..r {
+                    information[(of, 2 * design.contact[j] + b)] += w[i] * self.gram[(row, (b + 1) * r + j)] * w[j];
+                }
+            }
+        }
+        Slope { gradient, information: information - inner }
+    }
+
+    /// Number of readings that the coefficients follow: r − tr M⁻¹.
+    pub fn followed(&self, posterior: &Posterior) -> f64 {
+        let r = self.design.rank();
+        r as f64 - (0..r).map(|i| posterior.covariance[(i, i)]).sum::<f64>()
+    }
+
+    /// Σ T (y − H w)² at the posterior: yᵀTy − 2 uᵀw + wᵀ(M − 1)w with M w = u.
+    pub fn residual(&self, posterior: &Posterior) -> f64 {
+        let own: f64 = posterior.w.iter().map(|w| w * w).sum();
+        // yᵀK⁻¹y = residual + wᵀw
+        (posterior.square - own).max(0.0)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Two contacts with two coefficients each, six readings.
+    fn setting() -> (Design, Readings) {
+        let s = Mat::from_fn(6, 12, |t, i| ((3 * t + 5 * i) as f64).sin());
+        let y = (0..6).map(|t| (t as f64).cos()).collect();
+        (Design { s, contact: vec![0, 0, 1, 1] }, Readings { y, precision: vec![4.0, 3.0, 0.0, 2.0, 9.0, 1.0] })
+    }
+
+    /// Evidence, slope and information agree with K as it is written.
+    #[test]
+    fn agrees_with_the_large_matrix() {
+        let (design, readings) = setting();
+        let products = Products::new(&design, &readings);
+        let mu = [[0.3, -0.2], [0.1, 0.4]];
+        let direct = |mu: &[[f64; 2]]| {
+            let h = design.at(mu);
+            let known: Vec<usize> = (0..6).filter(|&t| readings.precision[t] > 0.0).collect();
+            let k = nalgebra::DMatrix::from_fn(5, 5, |i, j| {
+                let (t, s) = (known[i], known[j]);
+                (0..4).map(|c| h[(t, c)] * h[(s, c)]).sum::<f64>()
+                    + if i == j { 1.0 / readings.precision[t] } else { 0.0 }
+            });
+            let y = nalgebra::DVector::from_fn(5, |i, _| readings.y[known[i]]);
+            let factor = k.cholesky().unwrap();
+            -0.5 * y.dot(&factor.solve(&y)) - factor.l().diagonal().map(f64::ln).sum()
+        };
+        let posterior = products.at(&mu).unwrap();
+        assert!((posterior.value - direct(&mu)).abs() < 1e-12);
+        let slope = products.slope(&posterior);
+        for unknown in 0..4 {
+            let moved = |by: f64| {
+                let mut mu = mu;
+                mu[unknown / 2][unknown % 2] += by;
+                direct(&mu)
+            };
+            let difference = (moved(1e-5) - moved(-1e-5)) / 2e-5;
+            assert!((slope.gradient[unknown] - difference).abs() < 1e-8, "{unknown}");
+            assert!(slope.information[(unknown, unknown)] > 0.0);
+        }
+        let h = design.at(&mu);
+        let residual: f64 = (0..6)
+            .map(|t| {
+                let stress: f64 = (0..4).map(|c| h[(t, c)] * posterior.w[c]).sum();
+                readings.precision[t] * (readings.y[t] - stress).powi(2)
+            })
+            .sum();
+        assert!((products.residual(&posterior) - residual).abs() < 1e-12);
+    }
+}
