@@ -149,7 +149,7 @@ impl Evidence {
     }
 
     /// The taxels that are read: all of a small array, those near the pressure `p` (N per cell) of a large one.
-    fn window(&self, p: &[f64]) -> Vec<usize> {
+    fn window(&self, p: &[f64], sigma: f64) -> Vec<usize> {
         let all = (0..self.alive.len()).filter(|&taxel| self.alive[taxel]);
         if self.alive.len() <= WINDOW_FROM {
             return all.collect();
@@ -158,7 +158,7 @@ impl Evidence {
         let lines = |pitch: f64| (WINDOW * sensor.thickness_mm / pitch).ceil() as usize + 1;
         let (along_x, along_y) = (lines(sensor.pitch_x_mm), lines(sensor.pitch_y_mm));
         let mut near = vec![false; self.alive.len()];
-        let loaded = envelope::envelope(&self.cells, p, self.length_mm);
+        let loaded = envelope::envelope(&self.cells, p, self.length_mm, sigma);
         let mut seen = vec![false; self.alive.len()];
         for cell in (0..loaded.len()).filter(|&cell| loaded[cell] > 0.0) {
             let taxel = self.cells.taxel_of(cell);

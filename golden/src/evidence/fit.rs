@@ -94,13 +94,13 @@ impl Regions {
 impl<'a> Fit<'a> {
     /// A fit that has not begun; `noise` in units of the peak.
     pub fn new(scene: &'a Evidence, b: &'a [f64], noise: Option<f64>) -> Fit<'a> {
-        let p = from_stress(&scene.cells, b, &scene.alive);
-        let taxels = scene.window(&p);
+        let sigma = noise.unwrap_or(UNKNOWN).max(FLOOR);
+        let p = from_stress(&scene.cells, b, &scene.alive, sigma);
+        let taxels = scene.window(&p, sigma);
         let is_clipped = |k: &usize| scene.unipolar && b[taxels[*k]] <= 0.0;
         let clipped = (0..taxels.len()).filter(is_clipped).collect();
         let readings = Readings { y: vec![0.0; taxels.len()], precision: vec![0.0; taxels.len()] };
         let (labels, mu) = (vec![0; p.len()], vec![[0.0; 2]]);
-        let sigma = noise.unwrap_or(UNKNOWN).max(FLOOR);
         Fit { scene, b, taxels, clipped, readings, sigma, stated: noise.is_some(), p, labels, mu }
     }
 
@@ -130,7 +130,7 @@ impl<'a> Fit<'a> {
     /// Divides the loaded cells into contacts; each keeps the μ that its strongest cell had.
     fn segment(&mut self) {
         let cells = &self.scene.cells;
-        let loaded = envelope(cells, &self.p, self.scene.length_mm);
+        let loaded = envelope(cells, &self.p, self.scene.length_mm, self.sigma);
         let p: Vec<f64> = self.p.iter().zip(&loaded).map(|(p, e)| if *e > 0.0 { *p } else { 0.0 }).collect();
         let segments = segment(&cells.grid, &p, WIDTH);
         let mut strongest: Vec<Option<usize>> = vec![None; segments.count];
@@ -154,7 +154,7 @@ impl<'a> Fit<'a> {
         for contact in 0..self.mu.len() {
             let inside = |cell: usize| self.labels[cell] == contact;
             let p: Vec<f64> = (0..self.p.len()).map(|cell| if inside(cell) { self.p[cell] } else { 0.0 }).collect();
-            let e = envelope(cells, &p, length);
+            let e = envelope(cells, &p, length, self.sigma);
             let own: Vec<usize> = (0..e.len()).filter(|&cell| e[cell] > 0.0 && inside(cell)).collect();
             let on_own: Vec<f64> = own.iter().map(|&cell| e[cell]).collect();
             factors.push(factor(cells, &own, &on_own, length));
