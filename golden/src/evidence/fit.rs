@@ -14,7 +14,7 @@ use super::envelope::{envelope, from_stress};
 use super::model::{Design, Products, Readings};
 use super::prior::factor;
 use super::{clipped, ContactEstimate, Estimate, Evidence};
-use crate::float::segment::{segment, WIDTH};
+use crate::float::segment::{neighbours, segment, WIDTH};
 use faer::linalg::matmul::matmul;
 use faer::{Accum, Mat, Par};
 use std::f64::consts::FRAC_1_SQRT_2;
@@ -25,6 +25,11 @@ const FLOOR: f64 = 1e-4;
 const UNKNOWN: f64 = 0.02;
 /// Largest number of rounds.
 const ROUNDS: usize = 16;
+/// Smallest number of rounds: the envelope has left the first, too wide one.
+const LEAST_ROUNDS: usize = 4;
+/// Square of the distance of two μ, in standard deviations, below which contacts that touch are one: the 95 % quantile
+/// of two unknowns.
+const SAME_MU: f64 = 6.0;
 /// Rounds after which the regions of the contacts are kept.
 const SEGMENTED: usize = 6;
 /// Times per round that noise and clipped readings are found anew.
@@ -106,10 +111,10 @@ impl<'a> Fit<'a> {
 
     /// The estimate; `None` if the model is not representable.
     pub fn run(mut self) -> Option<Estimate> {
-        let mut round = 0;
+        let (mut round, mut joined) = (0, false);
         let (regions, top) = loop {
             round += 1;
-            if round <= SEGMENTED {
+            if round <= SEGMENTED && !joined {
                 self.segment();
             }
             let before = self.mu.clone();
@@ -120,8 +125,18 @@ impl<'a> Fit<'a> {
             let moved = |(a, b): (&[f64; 2], &[f64; 2])| (a[0] - b[0]).hypot(a[1] - b[1]);
             let most = before.iter().zip(&self.mu).map(moved).fold(0.0, f64::max);
             let settled = most <= SETTLED * self.scene.prior.mu_max && before.len() == self.mu.len();
-            if round == ROUNDS || round > SEGMENTED && settled {
+            if round == ROUNDS {
                 break (regions, top);
+            }
+            if round >= LEAST_ROUNDS {
+                match self.similar_pair(&top) {
+                    Some((a, b)) => {
+                        self.join(a, b);
+                        joined = true;
+                    }
+                    None if settled => break (regions, top),
+                    None => (),
+                }
             }
         };
         self.estimate(&regions, &top, round)
@@ -145,6 +160,40 @@ impl<'a> Fit<'a> {
         self.mu = kept.iter().map(mu_of).collect();
         let number = |label: &usize| kept.iter().position(|kept| kept == label).unwrap_or(0);
         self.labels = segments.labels.iter().map(number).collect();
+    }
+
+    /// Two contacts that touch and whose μ the stress does not tell apart: parts of one, such as a ring.
+    fn similar_pair(&self, top: &Top) -> Option<(usize, usize)> {
+        if self.mu.len() < 2 || self.scene.prior.mu_max == 0.0 {
+            return None;
+        }
+        let covariance = self.scene.prior.covariance(&top.slope)?;
+        let distance = |&(a, b): &(usize, usize)| {
+            let spread = |i: usize, j: usize| {
+                let of = |k: usize, l: usize| covariance[(2 * k + i, 2 * l + j)];
+                of(a, a) + of(b, b) - of(a, b) - of(b, a)
+            };
+            let off = [self.mu[a][0] - self.mu[b][0], self.mu[a][1] - self.mu[b][1]];
+            let [xx, xy, yy] = [spread(0, 0), spread(0, 1), spread(1, 1)];
+            let determinant = xx * yy - xy * xy;
+            (yy * off[0] * off[0] - 2.0 * xy * off[0] * off[1] + xx * off[1] * off[1]) / determinant
+        };
+        let grid = &self.scene.cells.grid;
+        let loaded = |cell: &usize| self.p[*cell] > 0.0;
+        let pairs = (0..self.p.len()).filter(loaded).flat_map(|cell| {
+            let other = neighbours(grid, cell).filter(loaded);
+            other.map(move |other| (self.labels[cell], self.labels[other]))
+        });
+        let near = pairs.filter(|(a, b)| a < b).filter(|pair| distance(pair) <= SAME_MU);
+        near.min_by(|a, b| distance(a).total_cmp(&distance(b)))
+    }
+
+    /// Makes contact `b` a part of contact `a`.
+    fn join(&mut self, a: usize, b: usize) {
+        for label in &mut self.labels {
+            *label = if *label == b { a } else { *label - usize::from(*label > b) };
+        }
+        self.mu.remove(b);
     }
 
     /// The contacts under envelopes of the last pressure.

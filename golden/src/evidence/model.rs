@@ -123,9 +123,8 @@ impl<'a> Products<'a> {
             let own = rows[0][(i, j)] + share(1, i) * rows[1][(i, j)] + share(2, i) * rows[2][(i, j)];
             own + if i == j { 1.0 } else { 0.0 }
         });
-        let u = Col::from_fn(r, |i| {
-            self.right[i] + share(1, i) * self.right[r + i] + share(2, i) * self.right[2 * r + i]
-        });
+        let u =
+            Col::from_fn(r, |i| self.right[i] + share(1, i) * self.right[r + i] + share(2, i) * self.right[2 * r + i]);
         let factor = m.llt(Side::Lower).ok()?;
         let w = factor.solve(&u);
         let explained: f64 = w.iter().zip(u.iter()).map(|(w, u)| w * u).sum();

@@ -2,8 +2,8 @@
 
 use super::reader::Reader;
 use super::{
-    CoefficientCheck, Condition, EstimatorKind, FixedSpec, ForceOutput, Form, HardwareSpec, InputSpec, InverseKind, InverseSpec,
-    Medium, ObjectiveKind, OutputSpec, PartitionSpec, Scene, SceneError, SearchSpec, ThresholdSpec,
+    CoefficientCheck, Condition, EstimatorKind, FixedSpec, ForceOutput, Form, HardwareSpec, InputSpec, InverseKind,
+    InverseSpec, Medium, ObjectiveKind, OutputSpec, PartitionSpec, Scene, SceneError, SearchSpec, ThresholdSpec,
 };
 use crate::board::Board;
 use crate::link::LinkKind;
