@@ -2,8 +2,9 @@
 
 use super::reader::Reader;
 use super::{
-    CoefficientCheck, Condition, EstimatorKind, FixedSpec, ForceOutput, Form, HardwareSpec, InputSpec, InverseKind, InverseSpec,
-    Medium, ObjectiveKind, OutputSpec, PartitionSpec, Scene, SceneError, SearchSpec, ThresholdSpec,
+    CoefficientCheck, Condition, EstimatorKind, FixedSpec, ForceOutput, Form, HardwareSpec, InputSpec, InverseKind,
+    InverseSpec, Medium, ObjectiveKind, OutputSpec, PartitionSpec, Scene, SceneError, SearchSpec, ThresholdSpec,
+    PLAUSIBLE_MPA,
 };
 use crate::board::Board;
 use crate::link::LinkKind;
@@ -24,7 +25,10 @@ const SCHEMA: [(&str, &[&str]); 11] = [
     ("threshold", &["min_force_N"]),
     ("fixed", &["input_bits", "data_bits", "coef_bits", "inverse_bits", "prune_bits", "lanes"]),
     ("hardware", &["board", "link", "coefficient_check"]),
-    ("input", &["full_scale_MPa", "average", "calibration", "tare", "dead", "unipolar", "gain_spread"]),
+    (
+        "input",
+        &["full_scale_MPa", "average", "calibration", "tare", "dead", "unipolar", "gain_spread", "plausible_MPa"],
+    ),
     ("output", &["forces"]),
 ];
 /// Default Poisson ratio of a bonded layer: soft rubber.
@@ -289,6 +293,7 @@ fn hardware(reader: &Reader) -> Result<HardwareSpec, SceneError> {
 fn input(reader: &Reader, origin: &str, sensor: &Sensor) -> Result<InputSpec, SceneError> {
     let spread = reader.number("input.gain_spread", |spread| (0.0..=1.0).contains(&spread), "a number from 0 to 1")?;
     let full_scale_MPa = reader.number("input.full_scale_MPa", |mpa| mpa > 0.0, "a number above 0")?;
+    let plausible_MPa = reader.number("input.plausible_MPa", |mpa| mpa > 0.0, "a number above 0")?;
     // Paths are relative to the folder of the scene's file.
     let file = |path| match reader.value(path) {
         None => Ok(None),
@@ -304,6 +309,7 @@ fn input(reader: &Reader, origin: &str, sensor: &Sensor) -> Result<InputSpec, Sc
         dead: dead(reader, sensor)?,
         unipolar: reader.typed("input.unipolar", Value::as_bool, "true or false")?.unwrap_or(false),
         gain_spread: spread.unwrap_or(0.0),
+        plausible_MPa: plausible_MPa.unwrap_or(PLAUSIBLE_MPA),
     })
 }
 

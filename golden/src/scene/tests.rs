@@ -63,6 +63,7 @@ fn every_field_is_read() {
         tare = "zero.json"
         dead = [[3, 4], [0, 9], [3, 4]]
         unipolar = true
+        plausible_MPa = 2.5
         [output]
         forces = "resultants""#;
     let scene = with(more).unwrap();
@@ -87,6 +88,8 @@ fn every_field_is_read() {
         tare: Some("zero.json".into()),
         dead: vec![[0, 9], [3, 4]],
         unipolar: true,
+        gain_spread: 0.0,
+        plausible_MPa: 2.5,
     };
     assert_eq!((scene.input, scene.output.forces), (input, ForceOutput::Resultants));
     let beside = Scene::parse(&format!("{SENSOR}[input]\ntare = \"zero.json\""), "rig/my.toml").unwrap();
@@ -146,6 +149,7 @@ fn wrong_values_name_what_is_allowed() {
         ("[input]\ndead = [[0, 10]]", "a list of [row, col], row 0 to 9, col 0 to 9"),
         ("[input]\ndead = [3]", "a list of [row, col]"),
         ("[input]\nunipolar = 1", "true or false"),
+        ("[input]\nplausible_MPa = 0", "a number above 0"),
         ("[input]\ntare = 1", "the name of a file"),
         ("[output]\nforces = \"all\"", "\"taxels\" or \"resultants\""),
         ("[partition]\ncase = 4", "0, 1, 2, 3, \"adaptive\" or \"contacts\""),
