@@ -12,7 +12,7 @@
 //! | | `cases` (for "adaptive": 0 and others of 1 … 3 for the hardware; without it as many as fit together) |
 //! | | `condition` ("loaded"; "both-signs") |
 //! | `[search]` | `objective` ("sparse"; …), `mu_max` (0.6; 0, or 0.001 … 2), `noise_floor_MPa` (0) |
-//! | | `form` ("oblique"; "orthogonal"), `estimator` ("auto"; "search", "evidence") |
+//! | | `form` ("oblique"; "orthogonal"), `estimator` ("auto"; "search", "evidence"), `degree` (none; 1 … 8) |
 //! | `[inverse]` | `kind` ("tsvd"; "tikhonov", "exact"), `level` (floor of format and noise; 0 … 1, both excluded) |
 //! | `[threshold]` | `min_force_N` (0) |
 //! | `[fixed]` | `input_bits` (20; 8 … 24), `data_bits` (18; 12 … 18), `coef_bits` (18; 8 … 18) |
@@ -175,6 +175,8 @@ pub struct SearchSpec {
     pub noise_floor_MPa: f64,
     /// How Eq. 1 is computed.
     pub form: Form,
+    /// Degree of the series in μ, 1 to 8; `None` takes what the sensor needs, see [`crate::matrices::degree`].
+    pub degree: Option<usize>,
 }
 
 /// Table `[threshold]`.
@@ -325,6 +327,7 @@ impl Default for SearchSpec {
             mu_max: 0.6,
             noise_floor_MPa: 0.0,
             form: Form::default(),
+            degree: None,
         }
     }
 }

@@ -8,6 +8,7 @@ use super::{
 };
 use crate::board::Board;
 use crate::link::LinkKind;
+use crate::matrices::MAX_FLOAT_DEGREE;
 use crate::partition::{subarrays, Case, Grid};
 use crate::sensor::{Sensor, MAX_LENGTH_MM, MAX_SIDE, MIN_SIDE};
 use std::ops::RangeInclusive;
@@ -20,7 +21,7 @@ const SCHEMA: [(&str, &[&str]); 11] = [
     ("sensor", &["rows", "cols", "pitch_x_mm", "pitch_y_mm", "thickness_mm"]),
     ("medium", &["kind", "poisson"]),
     ("partition", &["case", "cases", "condition", "rows", "cols"]),
-    ("search", &["estimator", "objective", "mu_max", "noise_floor_MPa", "form"]),
+    ("search", &["estimator", "objective", "mu_max", "noise_floor_MPa", "form", "degree"]),
     ("inverse", &["kind", "level"]),
     ("threshold", &["min_force_N"]),
     ("fixed", &["input_bits", "data_bits", "coef_bits", "inverse_bits", "prune_bits", "lanes"]),
@@ -234,7 +235,14 @@ fn search(reader: &Reader) -> Result<SearchSpec, SceneError> {
         mu_max: mu_max.unwrap_or(default.mu_max),
         noise_floor_MPa: floor.unwrap_or(default.noise_floor_MPa),
         form: reader.choice("search.form", &[("oblique", Form::Oblique), ("orthogonal", Form::Orthogonal)])?,
+        degree: degree(reader)?,
     })
+}
+
+fn degree(reader: &Reader) -> Result<Option<usize>, SceneError> {
+    let in_range =
+        |value: &Value| usize::try_from(value.as_integer()?).ok().filter(|d| (1..=MAX_FLOAT_DEGREE).contains(d));
+    reader.typed("search.degree", in_range, &format!("a whole number from 1 to {MAX_FLOAT_DEGREE}"))
 }
 
 fn inverse(reader: &Reader) -> Result<InverseSpec, SceneError> {
