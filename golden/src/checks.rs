@@ -7,6 +7,7 @@
 //! | `mu_share` | – | `mu-at-bound` | at least [`MU_AT_BOUND`] | [`Checks::of`] |
 //! | `border_share` | – | none; beside `load-outside` | – | [`Checks::of`] |
 //! | `load_ratio` | – | `load-mismatch` | off 1 by more than [`LOAD_MISMATCH`] | the golden engine |
+//! | `shape_misfit` | – | `shape-mismatch` | above 1 | the golden engine, with `patch` and `symmetric` |
 //!
 //! A figure is there whenever it can be computed, whether or not its flag is raised.
 
@@ -48,6 +49,11 @@ pub struct Checks {
     /// Normal force over the one of the same stress without shear, Σ Cz⁺b; `None` for other engines than `golden`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub load_ratio: Option<f64>,
+    /// Root mean square of what the fitted shape leaves of the stress, over what the stated noise and the fit's own
+    /// error explain; the largest of all subarrays. `None` without the objective `patch` or `symmetric`, or where `auto`
+    /// takes `sparse`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub shape_misfit: Option<f64>,
 }
 
 impl Checks {
@@ -59,6 +65,7 @@ impl Checks {
             mu_share: mu_share(scene, result),
             border_share: border_share(&scene.sensor, &result.forces_N.fz),
             load_ratio: None,
+            shape_misfit: None,
         }
     }
 
@@ -72,6 +79,7 @@ impl Checks {
                 self.border_share.map(|share| format!("{:.1} % of the load at the border", 1e2 * share))
             }
             Flag::LoadMismatch => self.load_ratio.map(|ratio| format!("{ratio:.3} of the load without shear")),
+            Flag::ShapeMismatch => self.shape_misfit.map(|misfit| format!("misfit {misfit:.3} times the allowed")),
             _ => None,
         }
     }
@@ -83,6 +91,7 @@ impl Checks {
             (Flag::Saturated, self.full_scale_share.is_some_and(|share| share >= last_code)),
             (Flag::MuAtBound, self.mu_share.is_some_and(|share| share >= MU_AT_BOUND)),
             (Flag::ImplausibleStress, self.peak_MPa > scene.input.plausible_MPa),
+            (Flag::ShapeMismatch, self.shape_misfit.is_some_and(|misfit| misfit > 1.0)),
             (Flag::LoadMismatch, self.load_ratio.is_some_and(|ratio| (ratio - 1.0).abs() > LOAD_MISMATCH)),
         ]
         .into_iter()

@@ -13,6 +13,7 @@
 //! | `mu-at-bound` | a μ is at `search.mu_max` | [`Checks::flags`] |
 //! | `implausible-stress` | a stress is above `input.plausible_MPa` | `Checks::flags` |
 //! | `load-mismatch` | the normal force is far from that of the same stress without shear | `Checks::flags`, golden engine |
+//! | `shape-mismatch` | the shape that `patch` or `symmetric` fits leaves more than the noise | `Checks::flags`, golden engine |
 //!
 //! [`Checks::flags`]: crate::checks::Checks::flags
 
@@ -47,6 +48,8 @@ pub enum Flag {
     ImplausibleStress,
     /// The normal force differs from that of the same stress without shear.
     LoadMismatch,
+    /// No contact of the shape that the objective assumes explains the stress within the stated noise.
+    ShapeMismatch,
 }
 
 /// Fraction of the true normal load that the cells must carry for it to count as inside.
@@ -125,6 +128,7 @@ mod tests {
             Flag::MuAtBound,
             Flag::ImplausibleStress,
             Flag::LoadMismatch,
+            Flag::ShapeMismatch,
         ];
         let text = serde_json::to_string(&all).unwrap();
         let wanted = [
@@ -139,6 +143,7 @@ mod tests {
             "mu-at-bound",
             "implausible-stress",
             "load-mismatch",
+            "shape-mismatch",
         ];
         assert_eq!(text, serde_json::to_string(&wanted).unwrap());
     }

@@ -71,6 +71,7 @@ impl Golden {
         let checks = Checks {
             full_scale_share: self.input.full_scale_share(readings),
             load_ratio: self.load_ratio(&filled, &result),
+            shape_misfit: result.checks.shape_misfit,
             ..Checks::of(&self.scene, &frame, &result)
         };
         result.add_checks(&self.scene, checks);
