@@ -5,11 +5,17 @@
 //! | `no-contact` | no taxel carries a force | [`crate::reconstruct::assemble`] |
 //! | `no-compression` | no candidate μ leaves Σp > 0 | the engine |
 //! | `condition-unmet` | a subarray does not meet the scene's condition and is not searched | `assemble` |
-//! | `saturated` | an input code was clipped, or a word of the engine saturated | [`frame_flags`], the engine |
+//! | `saturated` | a reading reached full scale, or a word of the engine saturated | [`frame_flags`], `Checks::flags`, the engine |
 //! | `load-outside` | part of the contact is beyond the array's edge | `frame_flags` |
 //! | `medium-mismatch` | the frame names another medium than the scene | `frame_flags` |
 //! | `coefficients-damaged` | the hardware's coefficient memory has changed | the engine |
 //! | `shear-unreliable` | noise floor or LSB/√12 above 5·10⁻⁵ of the peak, with `sparse` | `frame_flags` |
+//! | `mu-at-bound` | a μ is at `search.mu_max` | [`Checks::flags`] |
+//! | `implausible-stress` | a stress is above `input.plausible_MPa` | `Checks::flags` |
+//! | `load-mismatch` | the normal force is far from that of the same stress without shear | `Checks::flags`, golden engine |
+//! | `shape-mismatch` | the shape that `patch` or `symmetric` fits leaves more than the noise | `Checks::flags`, golden engine |
+//!
+//! [`Checks::flags`]: crate::checks::Checks::flags
 
 use crate::frame::Frame;
 use crate::quantise::Codes;
@@ -36,6 +42,14 @@ pub enum Flag {
     ShearUnreliable,
     /// The hardware's coefficient memory does not hold the generated coefficients.
     CoefficientsDamaged,
+    /// The ratio of shear to normal force is at the scene's bound; the true one may be larger.
+    MuAtBound,
+    /// The stress is above what a contact can plausibly cause.
+    ImplausibleStress,
+    /// The normal force differs from that of the same stress without shear.
+    LoadMismatch,
+    /// No contact of the shape that the objective assumes explains the stress within the stated noise.
+    ShapeMismatch,
 }
 
 /// Fraction of the true normal load that the cells must carry for it to count as inside.
@@ -68,11 +82,7 @@ fn load_outside(frame: &Frame) -> bool {
         // Without an interior the position of the peak tells nothing.
         return false;
     }
-    let on_ring = |index: usize| {
-        let (row, col) = (index / cols, index % cols);
-        row == 0 || row == rows - 1 || col == 0 || col == cols - 1
-    };
-    let ring = frame.stress_MPa.iter().enumerate().filter(|(index, _)| on_ring(*index));
+    let ring = frame.stress_MPa.iter().enumerate().filter(|(index, _)| frame.sensor.is_border(*index));
     let ring_peak = ring.fold(0.0f64, |peak, (_, b)| b.abs().max(peak));
     ring_peak > 0.0 && ring_peak >= frame.peak_MPa()
 }
@@ -115,6 +125,10 @@ mod tests {
             Flag::MediumMismatch,
             Flag::ShearUnreliable,
             Flag::CoefficientsDamaged,
+            Flag::MuAtBound,
+            Flag::ImplausibleStress,
+            Flag::LoadMismatch,
+            Flag::ShapeMismatch,
         ];
         let text = serde_json::to_string(&all).unwrap();
         let wanted = [
@@ -126,6 +140,10 @@ mod tests {
             "medium-mismatch",
             "shear-unreliable",
             "coefficients-damaged",
+            "mu-at-bound",
+            "implausible-stress",
+            "load-mismatch",
+            "shape-mismatch",
         ];
         assert_eq!(text, serde_json::to_string(&wanted).unwrap());
     }

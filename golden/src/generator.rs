@@ -65,7 +65,8 @@ use stress::Body;
 /// ```
 ///
 /// # Errors
-/// [`GeneratorError`]: a sensor out of range, no contact, or a contact with invalid shape, sizes, loads or slip.
+/// [`GeneratorError`]: a sensor out of range, no contact, or a contact with invalid shape, sizes, loads or slip, or
+/// beside the array.
 pub fn generate(id: &str, sensor: &Sensor, medium: Medium, contacts: &[Contact]) -> Result<Frame, GeneratorError> {
     sensor.check()?;
     if contacts.is_empty() {
@@ -73,7 +74,11 @@ pub fn generate(id: &str, sensor: &Sensor, medium: Medium, contacts: &[Contact])
     }
     let mut pieces = Vec::new();
     for (index, contact) in contacts.iter().enumerate() {
-        pieces.extend(traction::pieces(index, contact)?);
+        let own = traction::pieces(index, contact)?;
+        if !own.iter().any(|piece| piece.touches(sensor)) {
+            return Err(beside(index, contact, sensor));
+        }
+        pieces.extend(own);
     }
     let h = sensor.thickness_mm;
     let (body, source) = match medium {
@@ -101,4 +106,15 @@ pub fn generate(id: &str, sensor: &Sensor, medium: Medium, contacts: &[Contact])
         stress_MPa,
         notes: None,
     })
+}
+
+/// The error of a contact of which no part is on the array.
+fn beside(index: usize, contact: &Contact, sensor: &Sensor) -> GeneratorError {
+    let [x, y] = sensor.half_mm();
+    GeneratorError::Contact {
+        index,
+        field: "centre_mm",
+        value: format!("{:?}", contact.centre_mm.unwrap_or_default()),
+        allowed: format!("such that part of the contact is on the array, x from -{x} to {x}, y from -{y} to {y} mm"),
+    }
 }

@@ -109,6 +109,32 @@ impl Input {
         InputError::Count { scene: scene.name.clone(), average, wanted: self.frames, got }
     }
 
+    /// The zero of each taxel in the readings' unit, row-major: the scene's tare frame, else the table's offset.
+    pub fn zero(&self) -> Option<&[f64]> {
+        self.scale.as_ref().map(|(zero, _)| zero.as_slice())
+    }
+
+    /// The largest share of the stated full scale that the frames of one reconstruction reach; `None` if the scene
+    /// states none. Counted are, of every live taxel, each reading and its zero at the largest gain, as the converter's
+    /// code holds them, and each calibrated reading.
+    pub fn full_scale_share(&self, readings: &[Frame]) -> Option<f64> {
+        let full_scale_MPa = self.spec.full_scale_MPa?;
+        let unity = (Vec::new(), Vec::new());
+        let (zeros, gains) = self.scale.as_ref().unwrap_or(&unity);
+        let (zero, gain) = (|k: usize| *zeros.get(k).unwrap_or(&0.0), |k: usize| *gains.get(k).unwrap_or(&1.0));
+        let largest_gain = gains.iter().map(|gain| gain.abs()).reduce(f64::max).unwrap_or(1.0);
+        let share = |frame: &Frame| {
+            let live = |k: &usize| !self.spec.is_dead([*k / frame.sensor.cols, *k % frame.sensor.cols]);
+            let stress = |k: usize| {
+                let reading = frame.stress_MPa[k];
+                let code = largest_gain * reading.abs().max(zero(k).abs());
+                code.max((gain(k) * (reading - zero(k))).abs())
+            };
+            (0..frame.stress_MPa.len()).filter(live).map(stress).fold(0.0, f64::max) / full_scale_MPa
+        };
+        Some(readings.iter().map(share).fold(0.0, f64::max))
+    }
+
     /// Converts readings to stress in MPa: b = gain · (reading − zero), the readings themselves without table and tare
     /// frame. Dead taxels become 0.
     pub fn calibrate(&self, frame: &Frame) -> Frame {

@@ -50,7 +50,7 @@
 //! | [`float`] | the stages in floating point: `receive`, `pass`, `search`, `force`, and the objectives |
 //! | [`evidence`] | forces and standard deviations for contacts of any shape under noise |
 //! | [`reconstruct`] | the golden engine, and the result format of all engines |
-//! | [`errors`], [`flags`] | errors relative to known forces; limitations of a result |
+//! | [`errors`], [`flags`], [`checks`] | errors relative to known forces; limitations of a result, and their figures |
 //! | [`fixed`] | the same stages in integers, bit for bit the hardware; formats, cycles, resources |
 //! | [`link`] | packets between a host and a board |
 //! | [`baseline`], [`paper`] | the paper's algorithm as printed, and its published results, for comparison |
@@ -68,6 +68,7 @@
 pub mod baseline;
 pub mod board;
 pub mod bonded;
+pub mod checks;
 pub mod errors;
 pub mod evidence;
 pub mod fixed;

@@ -9,7 +9,8 @@
 //! sin θ Cy) S where Cz is positive, and bounded by its 2-norm elsewhere. The norm is convex in (cos θ, sin θ) and even
 //! in both, so a few directions of one quadrant are enough: 9 miss at most 1 − cos(π/32) = 0.5 %.
 //!
-//! Degree d: the smallest with r^(d+1) ≤ 0.035, at least 3 if r > 0.2, at least 1 if mu_max > 0.
+//! The degree follows from r and from its effect on drawn contacts ([`degree`]), unless the scene sets `search.degree`;
+//! it is at least 1 if mu_max > 0.
 //!
 //! | | shape | unit |
 //! |---|---|---|
@@ -21,6 +22,7 @@
 //! symmetry of the array holds to the bit in every matrix, so folding it again is exact.
 
 pub mod cache;
+pub mod degree;
 mod inverse;
 mod masked;
 #[cfg(test)]
@@ -31,16 +33,13 @@ use crate::influence::Influence;
 use crate::scene::{Inversion, Medium, Scene};
 use crate::sensor::{Sensor, SensorError};
 use cache::{CacheFile, CachedMatrices};
+use degree::{by_effect, by_radius, SERIES_TOLERANCE};
 use faer::Mat;
 use inverse::{chain, Inverse};
 use thiserror::Error;
 
 /// Maximum taxels of a subarray: the 48 × 48 of the largest sensor. A matrix then takes 42 MB.
 pub const MAX_TAXELS: usize = 48 * 48;
-/// Largest allowed remainder of the series, r^(d+1).
-pub const SERIES_TOLERANCE: f64 = 0.035;
-/// r above which the degree is at least 3.
-pub const CUBIC_FROM: f64 = 0.2;
 /// Highest degree of the hardware and its bit-true model.
 pub const MAX_DEGREE: usize = 3;
 /// Highest degree of the floating-point model: enough for square taxels with a pitch of half their depth.
@@ -170,24 +169,59 @@ impl Matrices {
     /// # Errors
     /// [`MatricesError`]; the size is checked before anything is allocated.
     pub fn new(sensor: &Sensor, mu_max: f64) -> Result<Matrices, MatricesError> {
-        Matrices::up_to(sensor, Medium::HalfSpace, mu_max, Inversion::EXACT, MAX_DEGREE)
+        Matrices::solved(sensor, Medium::HalfSpace, mu_max, Inversion::EXACT)?.with_degree(
+            Medium::HalfSpace,
+            mu_max,
+            None,
+            MAX_DEGREE,
+        )
     }
 
-    /// Computes the matrices of a subarray with the scene's medium, mu_max and inverse; the degree is at most `most`.
+    /// Computes the matrices of a subarray with the scene's medium, mu_max, inverse and degree; without `search.degree`
+    /// the degree is at most `most`.
     ///
     /// # Errors
     /// As [`Matrices::new`].
     pub fn of(scene: &Scene, subarray: &Sensor, most: usize) -> Result<Matrices, MatricesError> {
-        Matrices::up_to(subarray, scene.medium, scene.search.mu_max, scene.inversion(), most)
+        let search = &scene.search;
+        Matrices::solved(subarray, scene.medium, search.mu_max, scene.inversion())?.with_degree(
+            scene.medium,
+            search.mu_max,
+            search.degree,
+            most,
+        )
     }
 
-    fn up_to(
-        sensor: &Sensor,
+    /// The matrices with the degree `set`, or the one that the series needs.
+    fn with_degree(
+        self,
         medium: Medium,
         mu_max: f64,
-        inversion: Inversion,
+        set: Option<usize>,
         most: usize,
     ) -> Result<Matrices, MatricesError> {
+        let radius = self.spectral_radius;
+        let degree = match set {
+            Some(degree) if radius < MAX_RADIUS => Some(if mu_max > 0.0 { degree } else { 0 }),
+            _ => by_radius(radius, mu_max, most).map(|least| match least {
+                1..MAX_DEGREE if least < most => by_effect(&self.sensor, medium, mu_max, self.inversion, least),
+                _ => least,
+            }),
+        };
+        match degree {
+            Some(degree) => Ok(Matrices { degree, ..self }),
+            None => Err(MatricesError::SlowSeries {
+                sensor: Box::new(self.sensor),
+                radius,
+                mu_max,
+                most,
+                suggested: largest_mu_max(radius / mu_max, most),
+            }),
+        }
+    }
+
+    /// The matrices without a degree, which is 0.
+    fn solved(sensor: &Sensor, medium: Medium, mu_max: f64, inversion: Inversion) -> Result<Matrices, MatricesError> {
         sensor.check()?;
         let boxed = || Box::new(sensor.clone());
         let n = sensor.taxels();
@@ -212,13 +246,6 @@ impl Matrices {
             }
         };
         let CachedMatrices { numbers: [condition, rank, gain, spectral_radius], operators: [cz_pinv, ax, ay] } = cached;
-        let degree = degree(spectral_radius, mu_max, most).ok_or_else(|| MatricesError::SlowSeries {
-            sensor: boxed(),
-            radius: spectral_radius,
-            mu_max,
-            most,
-            suggested: largest_mu_max(spectral_radius / mu_max, most),
-        })?;
         Ok(Matrices {
             sensor: sensor.clone(),
             condition,
@@ -233,7 +260,7 @@ impl Matrices {
             cy,
             folded: FoldedMatrices { basis, cz_pinv, ax, ay },
             spectral_radius,
-            degree,
+            degree: 0,
         })
     }
 }
@@ -249,16 +276,6 @@ fn compute(basis: &Basis, [cx, cy, cz]: [&Mat<f64>; 3], mu_max: f64, inversion: 
     let spectral_radius = if shear { mu_max * inverse.largest_radius(&folded_cx, &folded_cy) } else { 0.0 };
     let numbers = [inverse.condition, inverse.rank, inverse.gain, spectral_radius];
     Some(CachedMatrices { numbers, operators: [cz_pinv, ax, ay] })
-}
-
-/// The degree that a series of convergence rate `r` needs; `None` if it exceeds `most`.
-fn degree(r: f64, mu_max: f64, most: usize) -> Option<usize> {
-    if mu_max == 0.0 {
-        return Some(0);
-    }
-    let least = if r > CUBIC_FROM { 3 } else { 1 };
-    let enough = |d: &usize| r.powi(*d as i32 + 1) <= SERIES_TOLERANCE;
-    (least..=most).find(enough).filter(|_| r < MAX_RADIUS)
 }
 
 /// The largest mu_max with three decimals for which degree `most` is enough; `per_mu` is r / mu_max.

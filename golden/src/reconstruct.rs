@@ -25,10 +25,11 @@ pub use extra::{CaseChoice, Extra, Region, RejectedCase};
 pub use golden::{Golden, GoldenError};
 pub use output::Resultant;
 
+use crate::checks::Checks;
 use crate::errors::Errors;
 use crate::flags::Flag;
 use crate::frame::{Forces, Frame};
-use crate::partition::Grid;
+use crate::partition::{Grid, Subarray};
 use crate::scene::Scene;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeSet;
@@ -77,6 +78,9 @@ pub struct Reconstruction {
     pub error: Option<Errors>,
     /// Limitations of the result, sorted, without duplicates.
     pub flags: Vec<Flag>,
+    /// The figures behind the flags.
+    #[serde(default)]
+    pub checks: Checks,
     /// Fields that only some scenes have; in JSON they are at the same level as the others.
     #[serde(flatten)]
     pub extra: Extra,
@@ -110,7 +114,25 @@ pub fn assemble(
         subarrays,
         forces_N: forces,
         flags: flags.into_iter().collect(),
+        checks: Checks::default(),
         extra: Extra::default(),
+    }
+}
+
+impl Reconstruction {
+    /// Adds the figures of `checks` and the flags that they raise.
+    pub(crate) fn add_checks(&mut self, scene: &Scene, checks: Checks) {
+        self.checks = checks;
+        self.flags.extend(checks.flags(scene));
+        self.flags.sort();
+        self.flags.dedup();
+    }
+}
+
+impl SubarrayResult {
+    /// The subarray.
+    pub(crate) fn part(&self) -> Subarray {
+        Subarray { row0: self.row0, col0: self.col0, rows: self.rows, cols: self.cols }
     }
 }
 

@@ -12,14 +12,14 @@
 //! | | `cases` (for "adaptive": 0 and others of 1 … 3 for the hardware; without it as many as fit together) |
 //! | | `condition` ("loaded"; "both-signs") |
 //! | `[search]` | `objective` ("sparse"; …), `mu_max` (0.6; 0, or 0.001 … 2), `noise_floor_MPa` (0) |
-//! | | `form` ("oblique"; "orthogonal"), `estimator` ("auto"; "search", "evidence") |
+//! | | `form` ("oblique"; "orthogonal"), `estimator` ("auto"; "search", "evidence"), `degree` (none; 1 … 8) |
 //! | `[inverse]` | `kind` ("tsvd"; "tikhonov", "exact"), `level` (floor of format and noise; 0 … 1, both excluded) |
 //! | `[threshold]` | `min_force_N` (0) |
 //! | `[fixed]` | `input_bits` (20; 8 … 24), `data_bits` (18; 12 … 18), `coef_bits` (18; 8 … 18) |
 //! | | `inverse_bits` (24; `coef_bits` … 32), `prune_bits` (20; 8 … 31), `lanes` (as many as fit; 4, 8 … 1024) |
 //! | `[hardware]` | `board` ("ulx3s-85f"), `link` ("uart"; "spi"), `coefficient_check` ("none"; "signature") |
 //! | `[input]` | `full_scale_MPa` (the frame's peak), `average` (0 … 12), `calibration`, `tare` (files), `dead` |
-//! | | (\[row, col\] each), `unipolar` (false), `gain_spread` (0; 0 … 1) |
+//! | | (\[row, col\] each), `unipolar` (false), `gain_spread` (0; 0 … 1), `plausible_MPa` (10) |
 //! | `[output]` | `forces` ("taxels"; "resultants") |
 
 mod error;
@@ -175,6 +175,8 @@ pub struct SearchSpec {
     pub noise_floor_MPa: f64,
     /// How Eq. 1 is computed.
     pub form: Form,
+    /// Degree of the series in μ, 1 to 8; `None` takes what the sensor needs, see [`crate::matrices::degree`].
+    pub degree: Option<usize>,
 }
 
 /// Table `[threshold]`.
@@ -224,7 +226,7 @@ pub struct HardwareSpec {
 }
 
 /// Table `[input]`; its meaning is in [`crate::input`].
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct InputSpec {
     /// Stress in MPa of the largest code, above 0; `None` takes each frame's peak.
     pub full_scale_MPa: Option<f64>,
@@ -240,7 +242,12 @@ pub struct InputSpec {
     pub unipolar: bool,
     /// Standard deviation of the taxels' gains about their calibration, a fraction from 0 to 1.
     pub gain_spread: f64,
+    /// Stress in MPa above which a result is flagged `implausible-stress`, above 0.
+    pub plausible_MPa: f64,
 }
+
+/// Default of `input.plausible_MPa`: soft elastomers tear at about 10 MPa, and feet, hands and grippers stay below 2.
+pub const PLAUSIBLE_MPA: f64 = 10.0;
 
 /// The forces that a result holds.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -274,6 +281,11 @@ impl InputSpec {
         2f64.powf(-f64::from(self.average) / 2.0)
     }
 
+    /// Whether a taxel, [row, col], is dead.
+    pub fn is_dead(&self, taxel: [usize; 2]) -> bool {
+        self.dead.binary_search(&taxel).is_ok()
+    }
+
     /// The frame with 0 MPa on its dead taxels, so that they affect neither the peak nor the condition.
     pub fn mask_dead(&self, mut frame: Frame) -> Frame {
         let cols = frame.sensor.cols;
@@ -282,6 +294,21 @@ impl InputSpec {
             frame.stress_MPa.get_mut(row * cols + col).into_iter().for_each(|b| *b = 0.0);
         }
         frame
+    }
+}
+
+impl Default for InputSpec {
+    fn default() -> Self {
+        InputSpec {
+            full_scale_MPa: None,
+            average: 0,
+            calibration: None,
+            tare: None,
+            dead: Vec::new(),
+            unipolar: false,
+            gain_spread: 0.0,
+            plausible_MPa: PLAUSIBLE_MPA,
+        }
     }
 }
 
@@ -300,6 +327,7 @@ impl Default for SearchSpec {
             mu_max: 0.6,
             noise_floor_MPa: 0.0,
             form: Form::default(),
+            degree: None,
         }
     }
 }

@@ -58,6 +58,17 @@ impl Sensor {
         [from_middle(col, self.cols) * self.pitch_x_mm, from_middle(row, self.rows) * self.pitch_y_mm]
     }
 
+    /// Half of the array's size along x and along y, in mm.
+    pub fn half_mm(&self) -> [f64; 2] {
+        [self.cols as f64 * self.pitch_x_mm / 2.0, self.rows as f64 * self.pitch_y_mm / 2.0]
+    }
+
+    /// Whether a taxel, by its row-major index, is in an outermost row or column.
+    pub fn is_border(&self, index: usize) -> bool {
+        let (row, col) = (index / self.cols, index % self.cols);
+        row == 0 || row + 1 == self.rows || col == 0 || col + 1 == self.cols
+    }
+
     /// Checks every field against its range.
     ///
     /// # Errors

@@ -23,6 +23,7 @@ use anyhow::{bail, Result};
 use clap::Args;
 use dermis_golden::fixed::Model;
 use dermis_golden::frame::Frame;
+use dermis_golden::input::Input;
 use dermis_golden::link::{Counters, Identity, Kind};
 use dermis_golden::quantise::full_scale;
 use dermis_golden::scene::Scene;
@@ -58,7 +59,7 @@ pub struct Arguments {
     /// Compare every answer with the bit-true model.
     #[arg(long)]
     check: bool,
-    /// Frame recorded without contact; its stress is subtracted from every frame.
+    /// Frame recorded without contact; it takes the place of the scene's tare frame or offsets.
     #[arg(long, value_name = "FILE")]
     tare: Option<PathBuf>,
     /// Read frames from standard input and write answers to standard output, one JSON object per line.
@@ -88,7 +89,8 @@ pub struct Session<P> {
     pub model: Model,
     /// The board's identification.
     pub identity: Identity,
-    tare_MPa: Option<Vec<f64>>,
+    /// Subtracted from each reading before it is sent: the tare frame, less the zero that the board subtracts.
+    offset: Option<Vec<f64>>,
     forces: bool,
     check: bool,
 }
@@ -100,26 +102,24 @@ impl<P: std::io::Read + std::io::Write> Session<P> {
     /// No answer, another packet version, another scene.
     pub fn new(mut client: Client<P>, model: Model, tare: Option<&Frame>, forces: bool, check: bool) -> Result<Self> {
         let identity = client.identify(&model)?;
-        let tare_MPa = tare.map(|frame| frame.stress_MPa.clone());
-        Ok(Session { client, model, identity, tare_MPa, forces, check })
+        let input = Input::new(&model.scene)?;
+        let offset = tare.map(|tare| offset(&input, tare));
+        Ok(Session { client, model, identity, offset, forces, check })
     }
 
-    /// The frame minus the tare frame; 0 for dead taxels.
+    /// The readings to send for a frame, so that after the scene's own zero the tare frame has been subtracted once; 0
+    /// for dead taxels.
     fn subtract_tare(&self, frame: &Frame) -> Frame {
-        let mut frame = frame.clone();
-        for (stress, zero) in frame.stress_MPa.iter_mut().zip(self.tare_MPa.iter().flatten()) {
-            *stress -= zero;
-        }
-        self.model.scene.input.mask_dead(frame)
+        self.model.scene.input.mask_dead(less(frame, self.offset.as_deref().unwrap_or_default()))
     }
 
-    /// Sends a frame; returns the frame after tare, and the answer, compared with the model if requested.
+    /// Sends a frame; returns the readings sent, and the answer, compared with the model if requested.
     ///
     /// # Errors
     /// A frame of another sensor, no answer.
     pub fn request(&mut self, frame: &Frame) -> Result<(Frame, Answer)> {
         let frame = self.subtract_tare(frame);
-        let codes = self.model.codes(&frame)?.codes;
+        let codes = self.model.readings(std::slice::from_ref(&frame))?;
         // A board that cannot sum forces sends them all, and the host sums them.
         let forces = self.forces || !self.identity.supports(Kind::FrameForResultants);
         let mut answer = self.client.frame(&self.model, &codes, forces)?;
@@ -129,6 +129,19 @@ impl<P: std::io::Read + std::io::Write> Session<P> {
         answer.beats = answer.beats.filter(|_| self.forces);
         Ok((frame, answer))
     }
+}
+
+/// What to subtract from readings before a board subtracts the zero of its own `input`, so that `tare` is subtracted in
+/// total.
+fn offset(input: &Input, tare: &Frame) -> Vec<f64> {
+    less(tare, input.zero().unwrap_or_default()).stress_MPa
+}
+
+/// The frame minus `offset`, an empty one being zero.
+fn less(frame: &Frame, offset: &[f64]) -> Frame {
+    let mut frame = frame.clone();
+    frame.stress_MPa.iter_mut().zip(offset).for_each(|(reading, offset)| *reading -= offset);
+    frame
 }
 
 /// Opens a serial port at `baud` bit/s; requests are repeated after `timeout` without an answer.
@@ -194,16 +207,18 @@ fn send_frames<P: std::io::Read + std::io::Write>(session: &mut Session<P>, fram
     let bar = Progress::steps(&format!("{}: frames", session.model.scene.name), frames.len() as u64);
     let (mut text, mut equal) = (String::new(), true);
     for (index, frame) in frames.iter().enumerate() {
-        let (frame, answer) = session.request(frame)?;
+        let (readings, answer) = session.request(frame)?;
         if let Some(beats) = &answer.beats {
-            let result = session.model.decode(&frame, "board", beats, &answer.status)?;
+            let readings = std::slice::from_ref(&readings);
+            let result = session.model.decode(readings, "board", beats, &answer.status)?;
             let sensor = &session.model.scene.sensor;
-            text.push_str(&report::reconstruction(&result, sensor, full_scale(&session.model.scene, &frame)));
+            let full_scale_MPa = full_scale(&session.model.scene, &session.model.stress(readings)?);
+            text.push_str(&report::reconstruction(&result, sensor, full_scale_MPa));
             text.push_str(&report::equality(&answer));
         } else {
             text.push_str(&report::resultants(
                 &frame.id,
-                &PhysicalAnswer::new(&session.model, &frame, &answer)?,
+                &PhysicalAnswer::new(&session.model, &readings, &answer)?,
                 &answer,
             ));
         }
@@ -241,4 +256,27 @@ fn summary(
         since(|c| c.length),
         since(|c| c.overrun),
     )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_tare_of_the_host_takes_the_place_of_the_scenes() {
+        let folder = tempfile::tempdir().unwrap();
+        let mut scene = Scene::builtin("eight-by-eight").unwrap();
+        let reads = |value: f64| Frame::from_stress("reads", &scene.sensor, vec![value; 64]).unwrap();
+        let (own, later, pressed) = (reads(0.25), reads(0.5), reads(0.75));
+        let path = folder.path().join("zero.json");
+        std::fs::write(&path, own.to_json()).unwrap();
+        let sent = |scene: &Scene| {
+            let model = Model::new(scene).unwrap();
+            let sent = less(&pressed, &offset(&Input::new(scene).unwrap(), &later));
+            model.stress(&[sent]).unwrap().stress_MPa
+        };
+        assert_eq!(sent(&scene), vec![0.25; 64]);
+        (scene.input.tare, scene.input.full_scale_MPa) = (Some(path), Some(1.0));
+        assert_eq!(sent(&scene), vec![0.25; 64]);
+    }
 }

@@ -97,7 +97,7 @@ pub fn verify(scene: &Scene, frames: &[Frame], simulators: &[Simulator], build: 
         let frame = &hardware.model.stress(frames)?;
         let full_scale_MPa = full_scale(&hardware.model.scene, frame);
         let golden = golden.run_averaged(frames)?;
-        let fixed = hardware.model.decode(frame, "fixed", &vector.expected.beats, &vector.expected.status)?;
+        let fixed = hardware.model.decode(frames, "fixed", &vector.expected.beats, &vector.expected.status)?;
         let lsb_N = hardware.model.force_lsb_N(full_scale_MPa);
         verified.rows.push(FrameResult {
             frame: frame.id.clone(),

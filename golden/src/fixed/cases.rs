@@ -169,7 +169,7 @@ impl Model {
     /// [`Model::decode`] for a scene with several cases.
     pub(super) fn decode_chosen(
         &self,
-        frame: &Frame,
+        readings: &[Frame],
         engine: &str,
         beats: &[[i32; 3]],
         status: &[[i32; 3]],
@@ -177,7 +177,7 @@ impl Model {
         let number = status.first().map_or(0, |beat| beat[2] as u32 >> CASE_SHIFT & 3);
         let case = self.built.iter().find(|case| case.number() == number);
         let case = case.ok_or(FixedError::Internal("the status names a case that was not built"))?;
-        let mut result = case.decode(frame, engine, beats, status)?;
+        let mut result = case.decode(readings, engine, beats, status)?;
         let reason = "the finest whose boundaries cut nothing, by the hardware's rule".to_string();
         let case = case.scene.partition.case.to_string();
         result.extra.taken = Some(CaseChoice { case, reason, refused: Vec::new() });

@@ -12,7 +12,8 @@ use std::fmt;
 
 use super::cycles::Cycles;
 use super::model::Model;
-use crate::matrices::{Matrices, CUBIC_FROM, MAX_DEGREE, SERIES_TOLERANCE};
+use crate::matrices::degree::{CUBIC_FROM, SERIES_TOLERANCE};
+use crate::matrices::{Matrices, MAX_DEGREE};
 use crate::partition::{Case, Grid};
 use crate::scene::Scene;
 use crate::sensor::MIN_SIDE;

@@ -17,6 +17,7 @@ use super::send::{Status, FLAG_COEFFICIENTS, FLAG_CONDITION, FLAG_FOUND, FLAG_NO
 use super::storage::Storage;
 use super::subarray::SubarrayTrace;
 use crate::board::{Board, BoardError, EngineKind};
+use crate::checks::Checks;
 use crate::errors::Errors;
 use crate::flags::{frame_flags, Flag};
 use crate::float::receive::receive as receive_codes;
@@ -24,7 +25,7 @@ use crate::frame::{Forces, Frame, FrameError};
 use crate::input::{Input, InputError};
 use crate::matrices::{MatricesError, MAX_DEGREE};
 use crate::partition::{subarrays, Case, Grid, PartitionError, Subarray};
-use crate::quantise::{full_scale, noise_floor_codes, quantise, Codes};
+use crate::quantise::{full_scale, largest_code, noise_floor_codes, quantise, Codes};
 use crate::reconstruct::{assemble, Reconstruction, Resultant, SubarrayResult};
 use crate::scene::{ForceOutput, Scene, SceneError};
 
@@ -273,8 +274,10 @@ impl Model {
             let gain = Scale::new(&scene)?.largest;
             let peak = |frame: &Frame| scene.input.mask_dead(frame.clone()).peak_MPa();
             let largest = gain * frames.iter().map(peak).fold(0.0, f64::max);
-            // Frames of zeros fit any scale; 1 MPa is also the default of a single frame.
-            scene.input.full_scale_MPa = Some(if largest > 0.0 { largest } else { 1.0 });
+            let codes = f64::from(largest_code(scene.fixed.input_bits));
+            // The largest reading takes the code before the last, which would count as saturated. Frames of zeros fit
+            // any scale; 1 MPa is also the default of a single frame.
+            scene.input.full_scale_MPa = Some(if largest > 0.0 { largest * (codes / (codes - 1.0)) } else { 1.0 });
         }
         Model::new(&scene)
     }
@@ -414,24 +417,26 @@ impl Model {
     /// As [`Model::stress`].
     pub fn reconstruct_averaged(&self, frames: &[Frame]) -> Result<Reconstruction, FixedError> {
         let trace = self.run(&self.readings(frames)?);
-        self.decode(&self.stress(frames)?, "fixed", &trace.beats, &trace.status)
+        self.decode(frames, "fixed", &trace.beats, &trace.status)
     }
 
-    /// Converts the words that a device sent for `frame` (the [`Model::stress`] of the frames) to physical units;
-    /// `engine` names the device in the result.
+    /// Converts the words that a device sent for the [`Model::readings`] of `readings`, the frames of one
+    /// reconstruction, to physical units; `engine` names the device in the result.
     ///
     /// # Errors
-    /// [`FixedError::Beats`] if forces or status are incomplete; errors of the frame as in [`Model::codes`].
+    /// [`FixedError::Beats`] if forces or status are incomplete; errors of the frames as in [`Model::stress`].
     pub fn decode(
         &self,
-        frame: &Frame,
+        readings: &[Frame],
         engine: &str,
         beats: &[[i32; 3]],
         status: &[[i32; 3]],
     ) -> Result<Reconstruction, FixedError> {
         if self.chooses() {
-            return self.decode_chosen(frame, engine, beats, status);
+            return self.decode_chosen(readings, engine, beats, status);
         }
+        let input = Input::new(&self.scene)?;
+        let frame = &input.calibrate(&input.average(&self.scene, readings)?);
         let codes = self.codes(frame)?;
         if beats.len() != self.force_beats() {
             return Err(FixedError::Beats { what: "forces", got: beats.len(), expected: self.force_beats() });
@@ -494,6 +499,9 @@ impl Model {
             result.error = frame.resultant_N.map(|truth| Errors::new(truth, resultant_N));
             result.extra.resultants = resultants;
         }
+        let full_scale_share = input.full_scale_share(readings);
+        let checks = Checks { full_scale_share, ..Checks::of(&self.scene, frame, &result) };
+        result.add_checks(&self.scene, checks);
         Ok(result)
     }
 

@@ -54,7 +54,7 @@ pub struct Draw {
 pub fn random_contacts(sensor: &Sensor, draw: Draw) -> Vec<Contact> {
     let mut random = Random::new(draw.seed);
     let mut contacts: Vec<(Contact, [f64; 2], f64)> = Vec::with_capacity(draw.count);
-    let half = [sensor.cols as f64 * sensor.pitch_x_mm / 2.0, sensor.rows as f64 * sensor.pitch_y_mm / 2.0];
+    let half = sensor.half_mm();
     let h = sensor.thickness_mm;
     // On a small array the contacts are smaller.
     let unit = h.min(half[0].min(half[1]) / (LONGEST + INSIDE));

@@ -6,6 +6,7 @@
 use super::plantar::{self, Foot};
 use super::GeneratorError;
 use crate::frame::Contact;
+use crate::sensor::Sensor;
 use std::f64::consts::PI;
 
 /// Pressure distribution of a piece, in coordinates that are ±1 at its half-axes.
@@ -32,6 +33,19 @@ pub(super) struct Piece {
     pub(super) turn: [f64; 2],
     /// Force of the whole piece, [x, y, normal].
     pub(super) force_N: [f64; 3],
+}
+
+impl Piece {
+    /// Whether the smallest rectangle around the region, parallel to the array, has points above the array.
+    pub(super) fn touches(&self, sensor: &Sensor) -> bool {
+        let ([a, b], [cos, sin]) = (self.half_mm, self.turn.map(f64::abs));
+        let reach = match self.form {
+            PressureShape::Square => [a * cos + b * sin, a * sin + b * cos],
+            PressureShape::Hertz | PressureShape::Disc => [(a * cos).hypot(b * sin), (a * sin).hypot(b * cos)],
+        };
+        let half = sensor.half_mm();
+        (0..2).all(|axis| self.centre_mm[axis].abs() < half[axis] + reach[axis])
+    }
 }
 
 /// The pieces of one contact; `index` names it in errors.

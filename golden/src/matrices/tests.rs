@@ -73,20 +73,6 @@ fn radius_equals_the_largest_eigenvalue() {
 }
 
 #[test]
-fn degree_rule_at_its_edges() {
-    assert_eq!(degree(0.5, 0.0, MAX_DEGREE), Some(0));
-    assert_eq!(degree(0.0, 0.6, MAX_DEGREE), Some(1));
-    assert_eq!(degree(0.187, 0.6, MAX_DEGREE), Some(1));
-    assert_eq!(degree(0.19, 0.6, MAX_DEGREE), Some(2));
-    assert_eq!(degree(0.201, 0.6, MAX_DEGREE), Some(3));
-    assert_eq!(degree(0.43, 0.6, MAX_DEGREE), Some(3));
-    assert_eq!(degree(0.44, 0.6, MAX_DEGREE), None);
-    assert_eq!(degree(0.44, 0.6, MAX_FLOAT_DEGREE), Some(4));
-    assert_eq!(degree(0.7, 0.6, MAX_FLOAT_DEGREE), None);
-    assert_eq!(degree(f64::NAN, 0.6, MAX_DEGREE), None);
-}
-
-#[test]
 fn errors_name_their_reason() {
     let stiff = Matrices::new(&sensor(8, 8, [1.0, 1.0], 5.0), 0.6).unwrap_err();
     assert!(stiff.to_string().contains("r = 0.549"), "{stiff}");

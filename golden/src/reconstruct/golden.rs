@@ -78,6 +78,8 @@ pub(super) struct CaseOutcome {
     pub flags: Vec<Flag>,
     /// Truncation error of each subarray, with the orthogonal form.
     pub truncation: Vec<f64>,
+    /// Largest misfit of a subarray's fitted shape, see [`Estimate::shape_misfit`].
+    pub shape_misfit: Option<f64>,
 }
 
 /// A scene or frame cannot be reconstructed.
@@ -187,8 +189,9 @@ impl Golden {
     }
 
     pub(super) fn finish(&self, frame: &Frame, outcome: CaseOutcome) -> Reconstruction {
-        let CaseOutcome { subarrays, forces, flags, truncation } = outcome;
+        let CaseOutcome { subarrays, forces, flags, truncation, shape_misfit } = outcome;
         let mut result = assemble(&self.scene, frame, "golden", subarrays, forces, flags);
+        result.checks.shape_misfit = shape_misfit;
         result.extra.truncation = Some(truncation).filter(|truncation| !truncation.is_empty());
         result
     }
@@ -202,7 +205,13 @@ impl Golden {
     pub(super) fn subarrays(&self, input: &EngineInput, tiling: &Tiling) -> CaseOutcome {
         let sensor = &self.scene.sensor;
         let forces = Forces::zeros(sensor.taxels());
-        let mut outcome = CaseOutcome { subarrays: Vec::new(), forces, flags: Vec::new(), truncation: Vec::new() };
+        let mut outcome = CaseOutcome {
+            subarrays: Vec::new(),
+            forces,
+            flags: Vec::new(),
+            truncation: Vec::new(),
+            shape_misfit: None,
+        };
         for (index, part) in tiling.parts.iter().enumerate() {
             let received = self.receive(input, part);
             let b = part.gather(sensor, input.stress_MPa);
@@ -212,6 +221,8 @@ impl Golden {
             let (x, truncation) = tiling.apply_form(&b, w);
             outcome.truncation.extend(truncation);
             let own = threshold(x, self.scene.threshold.min_force_N);
+            let misfit = estimate.and_then(|estimate| estimate.shape_misfit(&b, input.noise_MPa));
+            outcome.shape_misfit = [outcome.shape_misfit, misfit].into_iter().flatten().reduce(f64::max);
             if searched && estimate.is_none() {
                 outcome.flags.push(Flag::NoCompression);
             }

@@ -9,7 +9,6 @@
 //! | out: centre | 2, `None` without compressive forces | mm from the array's centre |
 
 use super::Reconstruction;
-use crate::partition::Subarray;
 use crate::sensor::Sensor;
 use serde::{Deserialize, Serialize};
 
@@ -28,15 +27,7 @@ pub(super) fn resultants(sensor: &Sensor, result: &Reconstruction) -> Vec<Result
         Some(regions) => {
             regions.iter().map(|region| resultant(sensor, result, region.taxels.iter().copied())).collect()
         }
-        None => {
-            let parts = result.subarrays.iter().map(|part| Subarray {
-                row0: part.row0,
-                col0: part.col0,
-                rows: part.rows,
-                cols: part.cols,
-            });
-            parts.map(|part| resultant(sensor, result, part.indices(sensor))).collect()
-        }
+        None => result.subarrays.iter().map(|own| resultant(sensor, result, own.part().indices(sensor))).collect(),
     }
 }
 

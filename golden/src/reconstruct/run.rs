@@ -10,8 +10,13 @@
 
 use super::output::resultants;
 use super::{Golden, GoldenError, Reconstruction};
+use crate::checks::Checks;
+use crate::float::force::force;
+use crate::float::pass::Polynomial;
 use crate::frame::{Forces, Frame};
 use crate::input::unipolar::{fill_clipped, misfit, Unipolar};
+use crate::matrices::Matrices;
+use crate::partition::Subarray;
 use crate::scene::{ForceOutput, Scene};
 
 impl Golden {
@@ -36,7 +41,12 @@ impl Golden {
     /// [`GoldenError::Frame`] if the frame is not of the scene's sensor, [`GoldenError::TooStrong`] if a force is not
     /// finite.
     pub fn run(&self, frame: &Frame) -> Result<Reconstruction, GoldenError> {
-        self.run_with_noise(frame, self.scene.search.noise_floor_MPa * self.scene.input.noise_share())
+        self.run_with_noise(frame, self.noise_MPa())
+    }
+
+    /// Standard deviation of the noise in MPa as the scene states it, after averaging.
+    fn noise_MPa(&self) -> f64 {
+        self.scene.search.noise_floor_MPa * self.scene.input.noise_share()
     }
 
     /// Reconstructs one frame with the given standard deviation of the noise in MPa instead of the scene's noise floor.
@@ -44,17 +54,27 @@ impl Golden {
     /// # Errors
     /// As [`Golden::run`].
     pub fn run_with_noise(&self, frame: &Frame, noise_MPa: f64) -> Result<Reconstruction, GoldenError> {
-        frame.check(&self.scene)?;
-        let frame = self.input.calibrate(frame);
-        let mut result = if self.scene.input.unipolar {
-            let (filled, mut report) = self.filled(&frame);
-            let mut result = self.reconstruct_stress(&filled, noise_MPa)?;
-            report.misfit = misfit(&self.scene, &frame, &result.forces_N);
-            result.extra.unipolar = Some(report);
-            result
-        } else {
-            self.reconstruct_stress(&frame, noise_MPa)?
+        self.run_readings(std::slice::from_ref(frame), frame, noise_MPa)
+    }
+
+    /// Reconstructs `mean`, the average of the frames `readings`.
+    fn run_readings(&self, readings: &[Frame], mean: &Frame, noise_MPa: f64) -> Result<Reconstruction, GoldenError> {
+        mean.check(&self.scene)?;
+        let frame = self.input.calibrate(mean);
+        let (filled, report) = match self.scene.input.unipolar {
+            true => self.filled(&frame),
+            false => (frame.clone(), None),
         };
+        let mut result = self.reconstruct_stress(&filled, noise_MPa)?;
+        let misfit = |report| Unipolar { misfit: misfit(&self.scene, &frame, &result.forces_N), ..report };
+        result.extra.unipolar = report.map(misfit);
+        let checks = Checks {
+            full_scale_share: self.input.full_scale_share(readings),
+            load_ratio: self.load_ratio(&filled, &result),
+            shape_misfit: result.checks.shape_misfit,
+            ..Checks::of(&self.scene, &frame, &result)
+        };
+        result.add_checks(&self.scene, checks);
         if self.scene.output.forces == ForceOutput::Resultants {
             result.extra.resultants = Some(resultants(&self.scene.sensor, &result));
             result.forces_N = Forces::default();
@@ -62,8 +82,20 @@ impl Golden {
         Ok(result)
     }
 
+    /// Σ fz over that of the stress without shear, Σ Cz⁺b after the threshold; `None` unless both press.
+    fn load_ratio(&self, frame: &Frame, result: &Reconstruction) -> Option<f64> {
+        let scene = &self.scene;
+        let normal = |(part, matrices): (&Subarray, &Matrices)| {
+            let family = Polynomial::of_degree(matrices, &part.gather(&scene.sensor, &frame.stress_MPa), 0);
+            force(family.v(0, 0), [0.0; 2], scene.threshold.min_force_N).fz.iter().sum::<f64>()
+        };
+        let without_shear: f64 = self.parts().map(normal).sum();
+        let ratio = result.resultant_N[2] / without_shear;
+        (without_shear > 0.0 && ratio > 0.0).then_some(ratio)
+    }
+
     /// The frame with tension in place of clipped readings, and its report without the misfit.
-    fn filled(&self, frame: &Frame) -> (Frame, Unipolar) {
+    fn filled(&self, frame: &Frame) -> (Frame, Option<Unipolar>) {
         let Scene { sensor, input, search, .. } = &self.scene;
         let mut filled = frame.clone();
         filled.stress_MPa.iter_mut().for_each(|b| *b = b.max(0.0));
@@ -78,7 +110,7 @@ impl Golden {
             report.evaluations += own.evaluations;
             part.scatter(sensor, &own.stress_MPa, &mut filled.stress_MPa);
         }
-        (filled, report)
+        (filled, Some(report))
     }
 
     /// Averages 2^k frames, k the scene's `input.average`, and reconstructs their mean; known forces are those of the
@@ -102,7 +134,8 @@ impl Golden {
     /// # Errors
     /// As [`Golden::run`]; [`GoldenError::Input`] unless there are 2^k frames.
     pub fn run_averaged(&self, frames: &[Frame]) -> Result<Reconstruction, GoldenError> {
-        self.run(&self.input.average(&self.scene, frames)?)
+        let mean = self.input.average(&self.scene, frames)?;
+        self.run_readings(frames, &mean, self.noise_MPa())
     }
 
     /// The stress in MPa that [`Golden::run_averaged`] reconstructs: the calibrated mean of 2^k frames.

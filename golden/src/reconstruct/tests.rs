@@ -57,7 +57,12 @@ fn json_keeps_the_contract_and_comes_back() {
         "\"x3\":",
         "\"tangential\":",
         "\"normal\":",
-        "\"flags\":[]}",
+        "\"flags\":[]",
+        "\"checks\":{\"peak_MPa\":",
+        "\"mu_share\":",
+        "\"border_share\":",
+        "\"load_ratio\":",
+        "}}",
     ];
     let mut from = 0;
     for key in keys {

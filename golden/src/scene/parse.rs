@@ -4,9 +4,11 @@ use super::reader::Reader;
 use super::{
     CoefficientCheck, Condition, EstimatorKind, FixedSpec, ForceOutput, Form, HardwareSpec, InputSpec, InverseKind,
     InverseSpec, Medium, ObjectiveKind, OutputSpec, PartitionSpec, Scene, SceneError, SearchSpec, ThresholdSpec,
+    PLAUSIBLE_MPA,
 };
 use crate::board::Board;
 use crate::link::LinkKind;
+use crate::matrices::MAX_FLOAT_DEGREE;
 use crate::partition::{subarrays, Case, Grid};
 use crate::sensor::{Sensor, MAX_LENGTH_MM, MAX_SIDE, MIN_SIDE};
 use std::ops::RangeInclusive;
@@ -19,12 +21,15 @@ const SCHEMA: [(&str, &[&str]); 11] = [
     ("sensor", &["rows", "cols", "pitch_x_mm", "pitch_y_mm", "thickness_mm"]),
     ("medium", &["kind", "poisson"]),
     ("partition", &["case", "cases", "condition", "rows", "cols"]),
-    ("search", &["estimator", "objective", "mu_max", "noise_floor_MPa", "form"]),
+    ("search", &["estimator", "objective", "mu_max", "noise_floor_MPa", "form", "degree"]),
     ("inverse", &["kind", "level"]),
     ("threshold", &["min_force_N"]),
     ("fixed", &["input_bits", "data_bits", "coef_bits", "inverse_bits", "prune_bits", "lanes"]),
     ("hardware", &["board", "link", "coefficient_check"]),
-    ("input", &["full_scale_MPa", "average", "calibration", "tare", "dead", "unipolar", "gain_spread"]),
+    (
+        "input",
+        &["full_scale_MPa", "average", "calibration", "tare", "dead", "unipolar", "gain_spread", "plausible_MPa"],
+    ),
     ("output", &["forces"]),
 ];
 /// Default Poisson ratio of a bonded layer: soft rubber.
@@ -230,7 +235,14 @@ fn search(reader: &Reader) -> Result<SearchSpec, SceneError> {
         mu_max: mu_max.unwrap_or(default.mu_max),
         noise_floor_MPa: floor.unwrap_or(default.noise_floor_MPa),
         form: reader.choice("search.form", &[("oblique", Form::Oblique), ("orthogonal", Form::Orthogonal)])?,
+        degree: degree(reader)?,
     })
+}
+
+fn degree(reader: &Reader) -> Result<Option<usize>, SceneError> {
+    let in_range =
+        |value: &Value| usize::try_from(value.as_integer()?).ok().filter(|d| (1..=MAX_FLOAT_DEGREE).contains(d));
+    reader.typed("search.degree", in_range, &format!("a whole number from 1 to {MAX_FLOAT_DEGREE}"))
 }
 
 fn inverse(reader: &Reader) -> Result<InverseSpec, SceneError> {
@@ -289,6 +301,7 @@ fn hardware(reader: &Reader) -> Result<HardwareSpec, SceneError> {
 fn input(reader: &Reader, origin: &str, sensor: &Sensor) -> Result<InputSpec, SceneError> {
     let spread = reader.number("input.gain_spread", |spread| (0.0..=1.0).contains(&spread), "a number from 0 to 1")?;
     let full_scale_MPa = reader.number("input.full_scale_MPa", |mpa| mpa > 0.0, "a number above 0")?;
+    let plausible_MPa = reader.number("input.plausible_MPa", |mpa| mpa > 0.0, "a number above 0")?;
     // Paths are relative to the folder of the scene's file.
     let file = |path| match reader.value(path) {
         None => Ok(None),
@@ -304,6 +317,7 @@ fn input(reader: &Reader, origin: &str, sensor: &Sensor) -> Result<InputSpec, Sc
         dead: dead(reader, sensor)?,
         unipolar: reader.typed("input.unipolar", Value::as_bool, "true or false")?.unwrap_or(false),
         gain_spread: spread.unwrap_or(0.0),
+        plausible_MPa: plausible_MPa.unwrap_or(PLAUSIBLE_MPA),
     })
 }
 

@@ -6,6 +6,7 @@
 //! | `partition.case` | all | 0 … 3, rows × cols, "adaptive" of two or more cases, if they fit the device |
 //! | `search.mu_max`, `output.forces` | all | with "adaptive" above 0 and "taxels" |
 //! | `search.objective` | all; with "adaptive" and "contacts" "sparse" | "sparse" |
+//! | `search.degree` | all | 1 … 3 |
 //! | `search.form` | all, "orthogonal" up to [`crate::float::orthogonal::MAX_TAXELS`] taxels | "oblique" |
 //! | `input.dead` | all; with "orthogonal" none | with one subarray |
 //! | `input.unipolar` | all; with "orthogonal" none | none |
@@ -19,6 +20,7 @@
 //! rejected values always reports the same one.
 
 use super::{CoefficientCheck, ForceOutput, Form, Medium, ObjectiveKind, Scene, SceneError};
+use crate::matrices::MAX_DEGREE;
 use crate::partition::Case;
 
 /// A value and whether it is rejected.
@@ -66,6 +68,12 @@ impl Scene {
                 "sparse",
             ),
             rule(search.form != Form::Oblique, "search.form", "orthogonal".to_string(), "oblique"),
+            rule(
+                search.degree.is_some_and(|degree| degree > MAX_DEGREE),
+                "search.degree",
+                search.degree.unwrap_or_default().to_string(),
+                "1 to 3",
+            ),
             rule(
                 !input.dead.is_empty() && self.partition.case != Case::WHOLE,
                 "input.dead",

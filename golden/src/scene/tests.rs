@@ -42,6 +42,7 @@ fn every_field_is_read() {
         mu_max = 1
         noise_floor_MPa = 0.001
         form = "orthogonal"
+        degree = 5
         [inverse]
         kind = "tikhonov"
         level = 1e-4
@@ -63,6 +64,7 @@ fn every_field_is_read() {
         tare = "zero.json"
         dead = [[3, 4], [0, 9], [3, 4]]
         unipolar = true
+        plausible_MPa = 2.5
         [output]
         forces = "resultants""#;
     let scene = with(more).unwrap();
@@ -73,7 +75,7 @@ fn every_field_is_read() {
     assert_eq!(scene.hardware.link.name(), "spi");
     assert_eq!(scene.search.objective, ObjectiveKind::Patch);
     assert_eq!((scene.search.mu_max, scene.search.noise_floor_MPa), (1.0, 0.001));
-    assert_eq!(scene.search.form, Form::Orthogonal);
+    assert_eq!((scene.search.form, scene.search.degree), (Form::Orthogonal, Some(5)));
     assert_eq!(scene.inverse, InverseSpec { kind: InverseKind::Tikhonov, level: Some(1e-4) });
     assert_eq!(scene.threshold.min_force_N, 0.01);
     assert_eq!(
@@ -87,6 +89,8 @@ fn every_field_is_read() {
         tare: Some("zero.json".into()),
         dead: vec![[0, 9], [3, 4]],
         unipolar: true,
+        gain_spread: 0.0,
+        plausible_MPa: 2.5,
     };
     assert_eq!((scene.input, scene.output.forces), (input, ForceOutput::Resultants));
     let beside = Scene::parse(&format!("{SENSOR}[input]\ntare = \"zero.json\""), "rig/my.toml").unwrap();
@@ -146,6 +150,8 @@ fn wrong_values_name_what_is_allowed() {
         ("[input]\ndead = [[0, 10]]", "a list of [row, col], row 0 to 9, col 0 to 9"),
         ("[input]\ndead = [3]", "a list of [row, col]"),
         ("[input]\nunipolar = 1", "true or false"),
+        ("[search]\ndegree = 9", "a whole number from 1 to 8"),
+        ("[input]\nplausible_MPa = 0", "a number above 0"),
         ("[input]\ntare = 1", "the name of a file"),
         ("[output]\nforces = \"all\"", "\"taxels\" or \"resultants\""),
         ("[partition]\ncase = 4", "0, 1, 2, 3, \"adaptive\" or \"contacts\""),
@@ -238,6 +244,7 @@ fn choices_not_built_yet_say_so() {
         ),
         ("[input]\ndead = [[0, 1]]\n[partition]\ncases = [0, 1]", "input.dead = [[0, 1]]; available: none, or"),
         ("[input]\nunipolar = true", "input.unipolar"),
+        ("[search]\ndegree = 4", "search.degree"),
         ("[search]\nobjective = \"auto\"", "search.objective = auto; available: sparse"),
         ("[search]\nform = \"orthogonal\"", "search.form = orthogonal; available: oblique"),
     ];

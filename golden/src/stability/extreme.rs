@@ -89,7 +89,7 @@ pub struct Row {
 /// [`GeneratorError`] if a contact does not fit the sensor.
 pub fn frames(scene: &Scene) -> Result<Vec<Extreme>, GeneratorError> {
     let sensor = &scene.sensor;
-    let (half_x, half_y) = (sensor.cols as f64 * sensor.pitch_x_mm / 2.0, sensor.rows as f64 * sensor.pitch_y_mm / 2.0);
+    let [half_x, half_y] = sensor.half_mm();
     let pitch = sensor.pitch_x_mm.min(sensor.pitch_y_mm);
     let circle = |id: &str, shape: &str, radius: f64, centre: [f64; 2], mu: f64| {
         let contact = Contact {
@@ -174,7 +174,7 @@ pub fn outcome(extreme: &Extreme) -> Result<Row, GoldenError> {
     let fixed = || -> Result<(Reconstruction, String), FixedError> {
         let model = Model::for_frames(scene, std::slice::from_ref(frame))?;
         let trace = model.run(&model.readings(std::slice::from_ref(frame))?);
-        Ok((model.decode(frame, "fixed", &trace.beats, &trace.status)?, status(&trace.status)))
+        Ok((model.decode(std::slice::from_ref(frame), "fixed", &trace.beats, &trace.status)?, status(&trace.status)))
     };
     let (fixed, status, refused) = match fixed() {
         Ok((result, status)) => (Some(of(&result)), status, None),

@@ -4,10 +4,13 @@ use std::collections::BTreeSet;
 use std::time::SystemTime;
 
 use anyhow::Result;
+use dermis_golden::checks::Checks;
+use dermis_golden::fixed::formats::MU_STEPS;
 use dermis_golden::fixed::send::{Status, FLAG_CONDITION, FLAG_FOUND, FLAG_FRAMING, FLAG_NO_CONTACT, STATUS_BEATS};
 use dermis_golden::fixed::Model;
 use dermis_golden::flags::{frame_flags, Flag};
 use dermis_golden::frame::{Forces, Frame};
+use dermis_golden::input::Input;
 use dermis_golden::link::{beats_of_bytes, Sums, BEAT_BYTES};
 use serde::Serialize;
 
@@ -69,9 +72,28 @@ impl Answer {
         self.statuses().any(|status| status.flags & FLAG_FRAMING != 0)
     }
 
-    /// The result's flags, as in a reconstruction.
-    fn flags(&self, model: &Model, frame: &Frame) -> Result<Vec<Flag>> {
+    /// |μ| over `search.mu_max`; none with several subarrays, whose loads the resultants do not tell.
+    fn mu_share(&self) -> Option<f64> {
+        let mut all = self.statuses();
+        let (first, others) = (all.next(), all.next());
+        let [x, y] = first.filter(|_| others.is_none())?.position.map(f64::from);
+        Some(x.hypot(y) / MU_STEPS as f64)
+    }
+
+    /// The figures behind the flags that a board's answer allows.
+    fn checks(&self, model: &Model, readings: &Frame, frame: &Frame) -> Result<Checks> {
+        Ok(Checks {
+            full_scale_share: Input::new(&model.scene)?.full_scale_share(std::slice::from_ref(readings)),
+            peak_MPa: frame.peak_MPa(),
+            mu_share: self.mu_share(),
+            ..Checks::default()
+        })
+    }
+
+    /// The result's flags, as in a reconstruction, but `mu-at-bound` only with one subarray.
+    fn flags(&self, model: &Model, frame: &Frame, checks: &Checks) -> Result<Vec<Flag>> {
         let mut flags: BTreeSet<Flag> = frame_flags(&model.scene, frame, &model.codes(frame)?).into_iter().collect();
+        flags.extend(checks.flags(&model.scene));
         for status in self.statuses() {
             let has = |bit: u32| status.flags & bit != 0;
             let saturated = status.rescale_saturations + status.force_saturations > 0;
@@ -98,6 +120,8 @@ pub struct PhysicalAnswer {
     pub loaded: u64,
     /// Flags, sorted.
     pub flags: Vec<Flag>,
+    /// The figures behind the flags.
+    pub checks: Checks,
     /// Whether the board has dropped a frame's packet since its last answer.
     pub dropped_before: bool,
     /// Force per taxel, if requested.
@@ -109,24 +133,27 @@ pub struct PhysicalAnswer {
 }
 
 impl PhysicalAnswer {
-    /// The answer to `frame` in physical units.
+    /// The answer to the `readings` sent, in physical units.
     ///
     /// # Errors
     /// A frame of another sensor.
-    pub fn new(model: &Model, frame: &Frame, answer: &Answer) -> Result<PhysicalAnswer> {
+    pub fn new(model: &Model, readings: &Frame, answer: &Answer) -> Result<PhysicalAnswer> {
+        let frame = &model.stress(std::slice::from_ref(readings))?;
         let lsb_N = model.force_lsb_N(model.codes(frame)?.full_scale_MPa);
         let sensor = &model.scene.sensor;
         let sums = &answer.sums;
         let [x0, y0] = sensor.position_mm(0, 0);
         let centre = sums.centre();
         let centre_mm = centre.map(|[col, row]| [x0 + col * sensor.pitch_x_mm, y0 + row * sensor.pitch_y_mm]);
+        let checks = answer.checks(model, readings, frame)?;
         let axis = |beats: &[[i32; 3]], axis: usize| beats.iter().map(|beat| f64::from(beat[axis]) * lsb_N).collect();
         let forces = |beats: &Vec<[i32; 3]>| Forces { fx: axis(beats, 0), fy: axis(beats, 1), fz: axis(beats, 2) };
         Ok(PhysicalAnswer {
             resultant_N: [sums.fx, sums.fy, sums.fz].map(|sum| sum as f64 * lsb_N),
             centre_mm,
             loaded: sums.loaded,
-            flags: answer.flags(model, frame)?,
+            flags: answer.flags(model, frame, &checks)?,
+            checks,
             dropped_before: answer.dropped_before(),
             forces_N: answer.beats.as_ref().map(forces),
             equal: answer.difference.as_ref().map(Option::is_none),

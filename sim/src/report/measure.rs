@@ -293,7 +293,10 @@ fn prepare(scene: Scene, frames: Vec<Frame>, options: &Options) -> Result<Measur
 fn bit_true(model: Model, frames: &[Frame], options: &Options) -> Result<BitTrue> {
     let traces = frames.iter().map(|frame| Ok(model.run(&model.readings(std::slice::from_ref(frame))?)));
     let traces: Vec<Trace> = traces.collect::<Result<_, FixedError>>()?;
-    let decoded = frames.iter().zip(&traces).map(|(frame, t)| model.decode(frame, "fixed", &t.beats, &t.status));
+    let decoded = frames
+        .iter()
+        .zip(&traces)
+        .map(|(frame, t)| model.decode(std::slice::from_ref(frame), "fixed", &t.beats, &t.status));
     let results = decoded.collect::<Result<Vec<_>, _>>()?;
     let usage = generate(&model)?.usage;
     let slowest = traces.iter().map(|trace| trace.cycles.total).max().unwrap_or(0);

@@ -2,6 +2,7 @@
 
 use std::fmt::Write as _;
 
+use dermis_golden::flags::Flag;
 use dermis_golden::reconstruct::Reconstruction;
 use dermis_golden::sensor::Sensor;
 
@@ -50,8 +51,11 @@ fn lines(text: &mut String, result: &Reconstruction, full_scale_MPa: f64) -> std
             centroid(s.tension_centroid_mm),
         )?;
     }
-    let flags: Vec<String> =
-        result.flags.iter().filter_map(|f| serde_json::to_value(f).ok()?.as_str().map(str::to_owned)).collect();
+    let flag = |flag: &Flag| {
+        let name = serde_json::to_value(flag).ok()?.as_str().map(str::to_owned)?;
+        Some(result.checks.figure(*flag).map_or(name.clone(), |figure| format!("{name} ({figure})")))
+    };
+    let flags: Vec<String> = result.flags.iter().filter_map(flag).collect();
     writeln!(text, "flags           {}", if flags.is_empty() { "none".to_owned() } else { flags.join(", ") })
 }
 

@@ -6,6 +6,7 @@
 //! | out: μ, its objective, evaluations | 2, scalar, count | –, of the objective, – |
 //! | out: load | scalar | N, where the objective knows it more accurately than Σp |
 
+use super::misfit_limit;
 use crate::float::pass::Polynomial;
 use crate::float::search::{SearchResult, RADIUS};
 use crate::sensor::Sensor;
@@ -33,6 +34,11 @@ pub struct Estimate {
     /// Normal load in N to which the forces are scaled; `None` leaves them as they are.
     pub load_N: Option<f64>,
 }
+
+/// Ratio of a Hertz contact's radius to that of the disc where its pressure exceeds [`COUNTS_FROM`]: (1 − 0.3²)^−½.
+const RIM: f64 = 1.05;
+/// Radius in depths from which on a contact is wide: the fits of ellipses then take more nodes and a wider start.
+pub(super) const WIDE_FROM: f64 = 2.5;
 
 /// Fraction of the largest p₀ that a taxel must exceed to count for the centre.
 const COUNTS_FROM: f64 = 0.3;
@@ -65,7 +71,24 @@ impl SearchInput<'_> {
     }
 }
 
+impl SearchInput<'_> {
+    /// Radius in mm of a wide contact, from the area where p₀ exceeds [`COUNTS_FROM`]; `None` below [`WIDE_FROM`].
+    pub(super) fn wide_radius_mm(&self) -> Option<f64> {
+        let p = self.family.v(0, 0);
+        let largest = p.iter().copied().fold(0.0, f64::max);
+        let cells = p.iter().filter(|p| **p > COUNTS_FROM * largest).count();
+        let area = cells as f64 * self.sensor.pitch_x_mm * self.sensor.pitch_y_mm;
+        Some(RIM * (area / std::f64::consts::PI).sqrt()).filter(|radius| *radius > WIDE_FROM * self.sensor.thickness_mm)
+    }
+}
+
 impl Estimate {
+    /// Root mean square of the misfit over what the noise and the fit's own error explain, for the estimate of a fit;
+    /// above 1 the contact is of another shape or the noise larger than stated.
+    pub fn shape_misfit(&self, b: &[f64], noise_MPa: f64) -> Option<f64> {
+        self.load_N.map(|_| (-self.found.objective / misfit_limit(b, noise_MPa)).sqrt())
+    }
+
     /// p(μ) in N, scaled to the load if the objective finds it: the sum over cells is inaccurate by up to 2 % where the
     /// pitch exceeds the depth.
     pub fn pressure(&self, family: &Polynomial) -> Vec<f64> {

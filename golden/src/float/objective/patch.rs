@@ -15,10 +15,11 @@
 //! | out: μ | 2 | – | |μ| ≤ mu_max |
 //! | out: load | scalar | N | above 0 |
 //!
-//! The fit first uses few nodes, then takes a few steps with many. Where one contact does not explain the stress but
+//! The fit first uses few nodes, then takes a few steps with many, on wide contacts with still more. Where one contact does not explain the stress but
 //! several ellipses do ([`super::multi_ellipse`]), their forces are added up.
 
 use super::disc::Disc;
+use super::estimate::WIDE_FROM;
 use super::fit::{fit, misfit, Fit, Model, THOROUGH};
 use super::multi_ellipse::{fit_ellipses, start_parameters, EllipseFit, FIT_WIDTHS};
 use super::taxels::Taxels;
@@ -32,6 +33,9 @@ use nalgebra::{DMatrix, DVector};
 pub(super) const COARSE_NODES: [usize; 2] = [5, 12];
 /// Rings and angles of the second.
 pub(super) const FINE_NODES: [usize; 2] = [8, 24];
+/// Rings and angles for wide contacts: at five depths neighbouring nodes are 0.7 depths apart, which leaves an error of
+/// e^(−2π/0.7) = 10⁻⁴.
+pub(super) const WIDE_NODES: [usize; 2] = [12, 44];
 /// Initial radii in units of the depth.
 const START_RADII: [f64; 4] = [0.5, 1.0, 1.7, 2.7];
 /// Smallest and largest g.
@@ -45,13 +49,15 @@ pub struct Patch {
     taxels: Taxels,
     coarse: Disc,
     fine: Disc,
+    wide: Disc,
 }
 
 impl Patch {
     /// The objective for subarrays of the shape of `sensor` under `medium`.
     pub fn new(sensor: &Sensor, medium: Medium) -> Patch {
-        let [coarse, fine] = [COARSE_NODES, FINE_NODES].map(|[rings, angles]| Disc::new(rings, angles));
-        Patch { taxels: Taxels::new(sensor, medium), coarse, fine }
+        let discs = [COARSE_NODES, FINE_NODES, WIDE_NODES].map(|[rings, angles]| Disc::new(rings, angles));
+        let [coarse, fine, wide] = discs;
+        Patch { taxels: Taxels::new(sensor, medium), coarse, fine, wide }
     }
 }
 
@@ -142,20 +148,26 @@ pub(super) fn matrix<const K: usize>(columns: [Vec<f64>; K]) -> DMatrix<f64> {
 }
 
 impl Patch {
-    /// The fitted contact; the evaluations are those of both stages.
-    fn fit(&self, b: &DVector<f64>, centre: [f64; 2]) -> Option<Fit> {
-        let taxels = &self.taxels;
+    /// The fitted contact, with more nodes if it is wide; the evaluations are those of all stages.
+    fn fit(&self, b: &DVector<f64>, input: &SearchInput) -> Option<Fit> {
+        let (taxels, centre) = (&self.taxels, input.centre_mm());
         let mut model = Ellipse { taxels, disc: &self.coarse };
-        let start = |radius: &f64| {
-            let radius = radius * taxels.depth;
+        let radii: Vec<f64> =
+            START_RADII.iter().map(|radius| radius * taxels.depth).chain(input.wide_radius_mm()).collect();
+        let start = |&radius: &f64| {
             let theta = [centre[0], centre[1], radius, radius, 0.0, 0.5];
             misfit(&mut model, b, &theta).map(|misfit| (theta, misfit))
         };
-        let starts: Vec<_> = START_RADII.iter().filter_map(start).collect();
+        let starts: Vec<_> = radii.iter().filter_map(start).collect();
         let (theta, _) = starts.iter().min_by(|a, b| a.1.total_cmp(&b.1))?;
         let coarse = fit(&mut model, b, theta, THOROUGH)?;
         let fine = fit(&mut Ellipse { taxels, disc: &self.fine }, b, &coarse.theta, THOROUGH)?;
-        Some(Fit { evaluations: START_RADII.len() + coarse.evaluations + fine.evaluations, ..fine })
+        let evaluations = radii.len() + coarse.evaluations + fine.evaluations;
+        if fine.theta[2].max(fine.theta[3]) <= WIDE_FROM * taxels.depth {
+            return Some(Fit { evaluations, ..fine });
+        }
+        let wide = fit(&mut Ellipse { taxels, disc: &self.wide }, b, &fine.theta, THOROUGH)?;
+        Some(Fit { evaluations: evaluations + wide.evaluations, ..wide })
     }
 }
 
@@ -167,7 +179,7 @@ impl Objective for Patch {
 
     fn find(&self, input: &SearchInput) -> Option<Estimate> {
         let b = DVector::from_column_slice(input.b);
-        let fit = self.fit(&b, input.centre_mm())?;
+        let fit = self.fit(&b, input)?;
         let one = |evaluations: usize| {
             let force = [fit.loads[0], fit.loads[1], fit.loads[2]];
             Estimate::of_force(force, input.mu_max, -fit.misfit, evaluations)

@@ -16,7 +16,8 @@
 //! ```
 //!
 //! with x₀, μ and the symmetric L by Levenberg–Marquardt and the coefficients of e by linear least squares (variable
-//! projection).
+//! projection). A wide contact that neither of the two initial radii explains is fitted once more with more nodes, from
+//! the radius that p₀ shows.
 //!
 //! | | shape | unit | range |
 //! |---|---|---|---|
@@ -26,9 +27,10 @@
 
 use super::disc::Disc;
 use super::fit::{fit, Fit, THOROUGH};
+use super::patch::WIDE_NODES;
 use super::symmetric_pressure::SymmetricPressure;
 use super::taxels::Taxels;
-use super::{Estimate, Objective, SearchInput};
+use super::{misfit_limit, Estimate, Objective, SearchInput};
 use crate::float::search::search;
 use crate::scene::Medium;
 use crate::sensor::Sensor;
@@ -50,12 +52,14 @@ const NODES: [usize; 2] = [5, 14];
 pub struct Symmetric {
     taxels: Taxels,
     disc: Disc,
+    wide: Disc,
 }
 
 impl Symmetric {
     /// The objective for subarrays of the shape of `sensor` under `medium`.
     pub fn new(sensor: &Sensor, medium: Medium) -> Symmetric {
-        Symmetric { taxels: Taxels::new(sensor, medium), disc: Disc::new(NODES[0], NODES[1]) }
+        let [disc, wide] = [NODES, WIDE_NODES].map(|[rings, angles]| Disc::new(rings, angles));
+        Symmetric { taxels: Taxels::new(sensor, medium), disc, wide }
     }
 
     /// Derivatives of q at a position, in units of the width: order 0, two of order 1, three of order 2, four of order
@@ -98,14 +102,19 @@ impl Symmetric {
         place
     }
 
-    /// The second stage, started from x₀ and μ; the better of two initial radii.
+    /// The second stage, started from x₀ and μ; the best of the initial radii.
     fn refine(&self, input: &SearchInput, start: [f64; 4]) -> Option<Fit> {
         let b = DVector::from_column_slice(input.b);
+        let limit = misfit_limit(input.b, input.noise_MPa);
         let (mut best, mut evaluations): (Option<Fit>, usize) = (None, 0);
-        for support in SUPPORTS {
-            let mut model = SymmetricPressure::new(&self.taxels, &self.disc, input.mu_max);
+        let narrow = SUPPORTS.map(|support| (support * self.taxels.depth, &self.disc));
+        let wide = input.wide_radius_mm().map(|radius| (radius, &self.wide));
+        for (index, (radius, disc)) in narrow.into_iter().chain(wide).enumerate() {
+            if index >= narrow.len() && best.as_ref().is_some_and(|best| best.misfit <= limit) {
+                break;
+            }
+            let mut model = SymmetricPressure::new(&self.taxels, disc, input.mu_max);
             let [x, y, mu_x, mu_y] = start;
-            let radius = support * self.taxels.depth;
             let theta = [x, y, radius, radius, 0.0, mu_x, mu_y];
             let Some(fit) = fit(&mut model, &b, &theta, THOROUGH) else { continue };
             evaluations += fit.evaluations;

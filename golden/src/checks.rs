@@ -1,0 +1,131 @@
+//! Checks: the figures behind the flags of a result.
+//!
+//! | field | unit | flag | raised when | by |
+//! |---|---|---|---|---|
+//! | `full_scale_share` | – | `saturated` | a reading rounds to the last code of `input.full_scale_MPa` | [`Input`](crate::input::Input) |
+//! | `peak_MPa` | MPa | `implausible-stress` | above `input.plausible_MPa` | [`Checks::of`] |
+//! | `mu_share` | – | `mu-at-bound` | at least [`MU_AT_BOUND`] | [`Checks::of`] |
+//! | `border_share` | – | none; beside `load-outside` | – | [`Checks::of`] |
+//! | `load_ratio` | – | `load-mismatch` | off 1 by more than [`LOAD_MISMATCH`] | the golden engine |
+//! | `shape_misfit` | – | `shape-mismatch` | above 1 | the golden engine, with `patch` and `symmetric` |
+//!
+//! A figure is there whenever it can be computed, whether or not its flag is raised.
+
+#[cfg(test)]
+mod tests;
+
+use crate::flags::Flag;
+use crate::frame::Frame;
+use crate::reconstruct::Reconstruction;
+use crate::scene::Scene;
+use crate::sensor::Sensor;
+use serde::{Deserialize, Serialize};
+
+/// Share of `search.mu_max` from which on a μ counts as being at its bound. The search's last step is 1/384; a friction
+/// ratio beyond the bound gave 0.95 to 1 on drawn frames of the shipped sensors.
+pub const MU_AT_BOUND: f64 = 0.95;
+/// Share of the array's normal load below which the μ of a subarray or contact does not count for `mu-at-bound`.
+pub const MU_COUNTS_FROM: f64 = 0.05;
+/// Largest difference of `load_ratio` from 1.
+pub const LOAD_MISMATCH: f64 = 0.1;
+
+/// The figures behind the flags of one result.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
+pub struct Checks {
+    /// Largest of the readings, the zeros and the calibrated readings of live taxels, each over the stated full scale;
+    /// `None` if the scene states none.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub full_scale_share: Option<f64>,
+    /// Largest |b| in MPa, of the calibrated mean of the frames, without dead taxels.
+    pub peak_MPa: f64,
+    /// Largest |μ| of a searched subarray or contact over `search.mu_max`; `None` without a search.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub mu_share: Option<f64>,
+    /// Share of the normal load Σ|fz| in the array's outermost rows and columns; `None` without a force per taxel, a
+    /// load or an interior.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub border_share: Option<f64>,
+    /// Normal force over the one of the same stress without shear, Σ Cz⁺b; `None` for other engines than `golden`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub load_ratio: Option<f64>,
+    /// Root mean square of what the fitted shape leaves of the stress, over what the stated noise and the fit's own
+    /// error explain; the largest of all subarrays. `None` without the objective `patch` or `symmetric`, or where `auto`
+    /// takes `sparse`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub shape_misfit: Option<f64>,
+}
+
+impl Checks {
+    /// The figures that follow from a result and its calibrated frame.
+    pub fn of(scene: &Scene, frame: &Frame, result: &Reconstruction) -> Checks {
+        Checks {
+            full_scale_share: None,
+            peak_MPa: frame.peak_MPa(),
+            mu_share: mu_share(scene, result),
+            border_share: border_share(&scene.sensor, &result.forces_N.fz),
+            load_ratio: None,
+            shape_misfit: None,
+        }
+    }
+
+    /// The figure behind a flag, in words; `None` for flags without one.
+    pub fn figure(&self, flag: Flag) -> Option<String> {
+        match flag {
+            Flag::Saturated => self.full_scale_share.map(|share| format!("{share:.3} of full scale")),
+            Flag::MuAtBound => self.mu_share.map(|share| format!("{share:.3} of mu_max")),
+            Flag::ImplausibleStress => Some(format!("{:.3} MPa", self.peak_MPa)),
+            Flag::LoadOutside => {
+                self.border_share.map(|share| format!("{:.1} % of the load at the border", 1e2 * share))
+            }
+            Flag::LoadMismatch => self.load_ratio.map(|ratio| format!("{ratio:.3} of the load without shear")),
+            Flag::ShapeMismatch => self.shape_misfit.map(|misfit| format!("misfit {misfit:.3} times the allowed")),
+            _ => None,
+        }
+    }
+
+    /// The flags that the figures raise.
+    pub fn flags(&self, scene: &Scene) -> impl Iterator<Item = Flag> {
+        let last_code = 1.0 - 0.5 / f64::from(crate::quantise::largest_code(scene.fixed.input_bits));
+        [
+            (Flag::Saturated, self.full_scale_share.is_some_and(|share| share >= last_code)),
+            (Flag::MuAtBound, self.mu_share.is_some_and(|share| share >= MU_AT_BOUND)),
+            (Flag::ImplausibleStress, self.peak_MPa > scene.input.plausible_MPa),
+            (Flag::ShapeMismatch, self.shape_misfit.is_some_and(|misfit| misfit > 1.0)),
+            (Flag::LoadMismatch, self.load_ratio.is_some_and(|ratio| (ratio - 1.0).abs() > LOAD_MISMATCH)),
+        ]
+        .into_iter()
+        .filter_map(|(flag, raised)| raised.then_some(flag))
+    }
+}
+
+/// The largest |μ| over `mu_max` among the subarrays, or with `contacts` the regions, that carry a share of the load.
+fn mu_share(scene: &Scene, result: &Reconstruction) -> Option<f64> {
+    let mu_max = scene.search.mu_max;
+    let sum = |taxels: &mut dyn Iterator<Item = usize>| taxels.map(|k| result.forces_N.fz[k].abs()).sum::<f64>();
+    let has_forces = !result.forces_N.fz.is_empty();
+    let carried: Vec<([f64; 2], f64)> = match &result.extra.regions {
+        Some(regions) => regions.iter().map(|region| (region.mu, region.load_N[2].abs())).collect(),
+        None => {
+            let load = |index: usize| {
+                let part = result.subarrays[index].part();
+                match &result.extra.resultants {
+                    Some(all) if !has_forces => all[index].force_N[2].abs(),
+                    _ => sum(&mut part.indices(&scene.sensor)),
+                }
+            };
+            result.subarrays.iter().enumerate().map(|(index, own)| (own.mu, load(index))).collect()
+        }
+    };
+    let total: f64 = carried.iter().map(|(_, load)| load).sum();
+    let counts = carried.iter().filter(|(_, load)| *load > 0.0 && *load >= MU_COUNTS_FROM * total);
+    counts.map(|([x, y], _)| x.hypot(*y) / mu_max).filter(|share| share.is_finite()).reduce(f64::max)
+}
+
+/// The share of Σ|fz| in the outermost rows and columns.
+fn border_share(sensor: &Sensor, fz: &[f64]) -> Option<f64> {
+    let total: f64 = fz.iter().map(|fz| fz.abs()).sum();
+    let inside = sensor.rows > 2 && sensor.cols > 2 && fz.len() == sensor.taxels();
+    let border = fz.iter().enumerate().filter(|(index, _)| sensor.is_border(*index)).map(|(_, fz)| fz.abs());
+    (inside && total > 0.0).then(|| border.sum::<f64>() / total)
+}
