@@ -12,6 +12,8 @@
 //! |---|---|---|
 //! | `hertz-circle` | \[a\] | p0 √(1 − r²/a²) |
 //! | `hertz-ellipse` | \[a, b, angle\] | p0 √(1 − X²/a² − Y²/b²) |
+//! | `tilted` | \[a, b, angle, u, v\] | p0 (1 + u X/a + v Y/b) √(1 − X²/a² − Y²/b²), √(u² + v²) ≤ 1 |
+//! | `lobed` | \[a, b, angle\] | 65 % as `hertz-ellipse`; 35 % on half the half-axes, touching the rim at X = a |
 //! | `flat-punch` | \[a\] or \[a, b, angle\] | uniform on a disc or ellipse |
 //! | `ring` | \[outer, inner\] | uniform between two circles |
 //! | `rectangle` | \[width, height, angle\] | uniform |
@@ -27,6 +29,7 @@
 
 mod cells;
 pub mod converter;
+pub mod draws;
 mod error;
 mod plantar;
 mod random;
@@ -86,10 +89,7 @@ pub fn generate(id: &str, sensor: &Sensor, medium: Medium, contacts: &[Contact])
         return Err(GeneratorError::NotFinite { index });
     }
     let cell_forces = cells::forces(sensor, &pieces);
-    let mut resultant = [0.0; 3];
-    for piece in &pieces {
-        (0..3).for_each(|axis| resultant[axis] += piece.force_N[axis]);
-    }
+    let resultant = traction::total_N(&pieces);
     Ok(Frame {
         id: id.to_string(),
         medium: Some(medium),
