@@ -34,6 +34,7 @@ mod error;
 mod plantar;
 mod random;
 mod stress;
+pub(crate) mod support;
 #[cfg(test)]
 mod tests;
 mod traction;
@@ -41,7 +42,6 @@ mod traction;
 pub use error::GeneratorError;
 pub use random::{random_contacts, Draw, Shapes};
 
-use crate::bonded::kernel::Kernel;
 use crate::frame::{Contact, Frame};
 use crate::scene::Medium;
 use crate::sensor::Sensor;
@@ -78,10 +78,10 @@ pub fn generate(id: &str, sensor: &Sensor, medium: Medium, contacts: &[Contact])
     for (index, contact) in contacts.iter().enumerate() {
         pieces.extend(traction::pieces(index, contact)?);
     }
-    let h = sensor.thickness_mm;
-    let (body, source) = match medium {
-        Medium::HalfSpace => (Body::HalfSpace { h }, "half-space-quadrature"),
-        Medium::BondedLayer { poisson } => (Body::Layer { h, kernel: Kernel::new(poisson) }, "bonded-layer-quadrature"),
+    let body = Body::new(medium, sensor.thickness_mm);
+    let source = match medium {
+        Medium::HalfSpace => "half-space-quadrature",
+        Medium::BondedLayer { .. } => "bonded-layer-quadrature",
     };
     let at = |index: usize| sensor.position_mm(index / sensor.cols, index % sensor.cols);
     let stress_MPa: Vec<f64> = (0..sensor.taxels()).map(|index| body.stress_MPa(at(index), &pieces)).collect();

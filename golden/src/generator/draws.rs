@@ -99,6 +99,8 @@ pub struct DrawOptions {
     pub normal_N: [f64; 2],
     /// Smallest and largest ratio of shear to normal load.
     pub ratio: [f64; 2],
+    /// max |b| of the exact stress in MPa, to which all loads of a frame are scaled; `None`: not scaled.
+    pub peak_MPa: Option<f64>,
     /// The sensor; its seed is added to that of each frame.
     pub converter: Converter,
     /// Seed of contacts and noise.
@@ -112,6 +114,7 @@ impl Default for DrawOptions {
             contacts: 1,
             normal_N: [1.0, 12.0],
             ratio: [0.15, 0.5],
+            peak_MPa: None,
             converter: Converter::default(),
             seed: 1,
         }
@@ -197,6 +200,9 @@ impl Draws {
         if !(low >= 0.0 && high >= low && high.is_finite()) {
             return fail("ratio", if low >= 0.0 { high } else { low }, "two finite numbers of at least 0 in order");
         }
+        if let Some(peak) = options.peak_MPa.filter(|peak| !(*peak > 0.0 && peak.is_finite())) {
+            return fail("peak_MPa", peak, "a finite number above 0");
+        }
         Ok(Draws { sensor: scene.sensor.clone(), medium: scene.medium, options })
     }
 
@@ -243,8 +249,17 @@ impl Draws {
     /// # Errors
     /// As [`Draws::contacts`]; [`GeneratorError`] of the sensor or the converter.
     pub fn frame(&self, number: u64) -> Result<DrawnFrame, GeneratorError> {
-        let contacts = self.contacts(number)?;
-        let exact = generate(&format!("drawn-{}-{number}", self.options.seed), &self.sensor, self.medium, &contacts)?;
+        let id = format!("drawn-{}-{number}", self.options.seed);
+        let mut contacts = self.contacts(number)?;
+        let mut exact = generate(&id, &self.sensor, self.medium, &contacts)?;
+        if let Some(wanted) = self.options.peak_MPa {
+            let scale = wanted / exact.peak_MPa();
+            for contact in &mut contacts {
+                contact.normal_N = contact.normal_N.map(|normal| scale * normal);
+                contact.tangential_N = contact.tangential_N.map(|shear| shear.map(|t| scale * t));
+            }
+            exact = generate(&id, &self.sensor, self.medium, &contacts)?;
+        }
         let truth = |(index, contact): (usize, &Contact)| {
             let pieces = pieces(index, contact)?;
             let (centre_mm, force_N) = (centre_of_pressure_mm(&pieces), total_N(&pieces));
@@ -372,12 +387,23 @@ mod tests {
     }
 
     #[test]
+    fn loads_scale_to_the_peak() {
+        let options = DrawOptions { peak_MPa: Some(0.1), ..Default::default() };
+        let [drawn, plain] =
+            [options, DrawOptions::default()].map(|options| draws("sensor-1", options).frame(3).unwrap());
+        assert!((drawn.peak_MPa() / 0.1 - 1.0).abs() < 1e-12);
+        let ratio = |drawn: &DrawnFrame| drawn.total_N[0] / drawn.total_N[2];
+        assert!((ratio(&drawn) - ratio(&plain)).abs() < 1e-12);
+    }
+
+    #[test]
     fn refusals_name_the_option() {
         let scene = Scene::builtin("sensor-1").unwrap();
         let good = DrawOptions::default();
         let cases = [
             (DrawOptions { shapes: vec![], ..good.clone() }, "shapes"),
             (DrawOptions { contacts: 0, ..good.clone() }, "contacts"),
+            (DrawOptions { peak_MPa: Some(0.0), ..good.clone() }, "peak_MPa"),
             (DrawOptions { normal_N: [0.0, 1.0], ..good.clone() }, "normal_N"),
             (DrawOptions { ratio: [0.5, 0.1], ..good }, "ratio"),
         ];

@@ -17,6 +17,7 @@
 use super::traction::{Piece, PressureShape};
 use crate::bonded::kernel::{Kernel, REACH};
 use crate::gauss::rule;
+use crate::scene::Medium;
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
 /// Maximum number of nodes of a patch along each side.
@@ -76,7 +77,7 @@ impl Piece {
     }
 
     /// Position in mm, and density times area element.
-    fn map(&self, u: f64, v: f64) -> ([f64; 2], f64) {
+    pub(super) fn map(&self, u: f64, v: f64) -> ([f64; 2], f64) {
         let (x, y, density) = match self.form {
             PressureShape::Hertz => {
                 let (rho, cos) = u.sin_cos();
@@ -105,6 +106,14 @@ impl Piece {
 }
 
 impl Body {
+    /// The body of a medium; `h` in mm.
+    pub(super) fn new(medium: Medium, h: f64) -> Body {
+        match medium {
+            Medium::HalfSpace => Body::HalfSpace { h },
+            Medium::BondedLayer { poisson } => Body::Layer { h, kernel: Kernel::new(poisson) },
+        }
+    }
+
     /// Stress in MPa on a taxel at a position in mm, from all pieces.
     pub(super) fn stress_MPa(&self, taxel: [f64; 2], pieces: &[Piece]) -> f64 {
         let mut left = Vec::new();
@@ -156,7 +165,7 @@ impl Body {
     }
 
     /// Stress in MPa of a point force at an offset, taxel − force.
-    fn point(&self, [dx, dy]: [f64; 2], [fx, fy, fz]: [f64; 3]) -> f64 {
+    pub(super) fn point(&self, [dx, dy]: [f64; 2], [fx, fy, fz]: [f64; 3]) -> f64 {
         match self {
             Body::HalfSpace { h } => {
                 let square = dx * dx + dy * dy + h * h;

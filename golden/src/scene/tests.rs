@@ -87,6 +87,7 @@ fn every_field_is_read() {
         tare: Some("zero.json".into()),
         dead: vec![[0, 9], [3, 4]],
         unipolar: true,
+        gain_spread: 0.0,
     };
     assert_eq!((scene.input, scene.output.forces), (input, ForceOutput::Resultants));
     let beside = Scene::parse(&format!("{SENSOR}[input]\ntare = \"zero.json\""), "rig/my.toml").unwrap();
