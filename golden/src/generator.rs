@@ -12,6 +12,8 @@
 //! |---|---|---|
 //! | `hertz-circle` | \[a\] | p0 √(1 − r²/a²) |
 //! | `hertz-ellipse` | \[a, b, angle\] | p0 √(1 − X²/a² − Y²/b²) |
+//! | `tilted` | \[a, b, angle, u, v\] | p0 (1 + u X/a + v Y/b) √(1 − X²/a² − Y²/b²), √(u² + v²) ≤ 1 |
+//! | `lobed` | \[a, b, angle\] | 65 % as `hertz-ellipse`; 35 % on half the half-axes, touching the rim at X = a |
 //! | `flat-punch` | \[a\] or \[a, b, angle\] | uniform on a disc or ellipse |
 //! | `ring` | \[outer, inner\] | uniform between two circles |
 //! | `rectangle` | \[width, height, angle\] | uniform |
@@ -27,10 +29,12 @@
 
 mod cells;
 pub mod converter;
+pub mod draws;
 mod error;
 mod plantar;
 mod random;
 mod stress;
+pub(crate) mod support;
 #[cfg(test)]
 mod tests;
 mod traction;
@@ -38,7 +42,6 @@ mod traction;
 pub use error::GeneratorError;
 pub use random::{random_contacts, Draw, Shapes};
 
-use crate::bonded::kernel::Kernel;
 use crate::frame::{Contact, Frame};
 use crate::scene::Medium;
 use crate::sensor::Sensor;
@@ -80,10 +83,10 @@ pub fn generate(id: &str, sensor: &Sensor, medium: Medium, contacts: &[Contact])
         }
         pieces.extend(own);
     }
-    let h = sensor.thickness_mm;
-    let (body, source) = match medium {
-        Medium::HalfSpace => (Body::HalfSpace { h }, "half-space-quadrature"),
-        Medium::BondedLayer { poisson } => (Body::Layer { h, kernel: Kernel::new(poisson) }, "bonded-layer-quadrature"),
+    let body = Body::new(medium, sensor.thickness_mm);
+    let source = match medium {
+        Medium::HalfSpace => "half-space-quadrature",
+        Medium::BondedLayer { .. } => "bonded-layer-quadrature",
     };
     let at = |index: usize| sensor.position_mm(index / sensor.cols, index % sensor.cols);
     let stress_MPa: Vec<f64> = (0..sensor.taxels()).map(|index| body.stress_MPa(at(index), &pieces)).collect();
@@ -91,10 +94,7 @@ pub fn generate(id: &str, sensor: &Sensor, medium: Medium, contacts: &[Contact])
         return Err(GeneratorError::NotFinite { index });
     }
     let cell_forces = cells::forces(sensor, &pieces);
-    let mut resultant = [0.0; 3];
-    for piece in &pieces {
-        (0..3).for_each(|axis| resultant[axis] += piece.force_N[axis]);
-    }
+    let resultant = traction::total_N(&pieces);
     Ok(Frame {
         id: id.to_string(),
         medium: Some(medium),

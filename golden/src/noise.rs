@@ -10,13 +10,26 @@
 //! | out: the same for the bound | fraction | of errors drawn from the Cramér–Rao covariance ([`bound`]) |
 //! | out: ratio | – | median over the bound's median |
 //!
+//! [`shape_study`] does the same for contacts of any shape, several contacts, differing gains, clipped tension and any
+//! estimator, beside two baselines and the bound of a smooth pressure on a known support ([`support_bound`]).
+//! [`sensitivities`] measures scenes that state something wrongly.
+//!
 //! The errors of an unbiased estimator are at least as large as the bound's. An estimator that uses |μ| ≤ mu_max can be
 //! below the bound where it is wide.
 
 pub mod bound;
 pub mod contact;
+pub mod coverage;
+pub mod matching;
+pub mod outcome;
+mod sensitivity;
+mod shapes;
+pub mod statistic;
 mod study;
+pub mod support_bound;
 #[cfg(test)]
 mod tests;
 
+pub use sensitivity::{sensitivities, SensitivityRow};
+pub use shapes::{shape_study, BoundSpread, Candidate, ShapeRow, ShapeStudy};
 pub use study::{study, Averaging, Row, Spread, Study, StudyError};

@@ -16,11 +16,10 @@ use clap::{Parser, Subcommand, ValueEnum};
 use dermis_golden::fixed::{FixedError, Model};
 use dermis_golden::frame::Frame;
 use dermis_golden::matrices::cache;
-use dermis_golden::noise::{study, Study};
 use dermis_golden::partition::Case;
 use dermis_golden::quantise::full_scale;
 use dermis_golden::reconstruct::{Golden, Reconstruction};
-use dermis_golden::scene::{ObjectiveKind, Scene};
+use dermis_golden::scene::Scene;
 use dermis_hdl::explain::explain;
 use dermis_hdl::link::generate_board;
 use dermis_hdl::{generate, manifest, HdlError};
@@ -193,36 +192,8 @@ enum Command {
         #[arg(long, conflicts_with_all = ["cases", "frames"])]
         cosim: bool,
     },
-    /// Measure the shear error under noise, next to the Cramér–Rao bound.
-    #[command(after_help = "Examples:
-  dermis noise sensor-1
-  dermis noise sensor-1 --frames 1 --medians
-  dermis noise sensor-2 --objective patch --objective auto --draws 1000 --format csv")]
-    Noise {
-        /// Built-in name or path of a scene.
-        scene: String,
-        /// Standard deviation of the noise over max |b|, repeatable; default: 0, 0.0001, 0.0005, 0.002, 0.01.
-        #[arg(long = "level", value_name = "SHARE")]
-        levels: Vec<f64>,
-        /// Number of random contacts.
-        #[arg(long, default_value_t = 200)]
-        draws: usize,
-        /// Seed of contacts and noise.
-        #[arg(long, default_value_t = 1)]
-        seed: u64,
-        /// Frames averaged in the second half of the table; 1 omits that half.
-        #[arg(long, default_value_t = 64)]
-        frames: usize,
-        /// Objective, repeatable; default: all.
-        #[arg(long = "objective", value_name = "NAME", value_parser = objective)]
-        objectives: Vec<ObjectiveKind>,
-        /// Only the median errors: a line per level, a column per objective.
-        #[arg(long, conflicts_with = "format")]
-        medians: bool,
-        /// Output format.
-        #[arg(long, value_enum, default_value = "markdown")]
-        format: Format,
-    },
+    /// Measure the errors under noise, next to the Cramér–Rao bound; any shape, several contacts, wrong scenes.
+    Noise(crate::noise::Arguments),
 }
 
 #[derive(ValueEnum, Clone, Copy, Debug)]
@@ -369,20 +340,7 @@ fn run(arguments: &Arguments) -> Result<(String, bool)> {
         Command::Table { scenes, cases, drawn, format, cosim: false } => {
             Ok((table(scenes, cases, drawn, *format)?, true))
         }
-        Command::Noise { scene, levels, draws, seed, frames, objectives, medians, format } => {
-            let mut wanted = Study { draws: *draws, seed: *seed, frames: *frames, ..Study::default() };
-            if !levels.is_empty() {
-                wanted.levels = levels.clone();
-            }
-            if !objectives.is_empty() {
-                wanted.objectives = objectives.clone();
-            }
-            let scene = Scene::load(scene)?;
-            let bar = Progress::steps(&format!("{}: noise", scene.name), 0);
-            let rows = study(&scene, &wanted, &mut |done, total| bar.set_of(done as u64, total as u64))?;
-            let text = if *medians { report::noise_medians(&rows) } else { report::noise(&rows, *format)? };
-            Ok((text, true))
-        }
+        Command::Noise(arguments) => Ok((crate::noise::run(arguments)?, true)),
         Command::Table { scenes, cosim: true, .. } => {
             let verify = |name: &String| -> Result<Verified> {
                 let (scene, frames) = resolve(Some(name), &[])?;
@@ -419,13 +377,6 @@ fn table(scenes: &[String], cases: &[Case], drawn: &DrawnFrames, format: Format)
         rows.extend(tabulate(&scene, cases, &frames, &mut step)?);
     }
     report::errors(&rows, format)
-}
-
-/// Parses an objective by its name in scene files.
-fn objective(name: &str) -> Result<ObjectiveKind, String> {
-    let names = ObjectiveKind::NAMES;
-    let known = || names.map(|(name, _)| name).join(", ");
-    names.iter().find(|(known, _)| *known == name).map(|(_, kind)| *kind).ok_or_else(|| format!("one of {}", known()))
 }
 
 /// The result of one engine, and the stress in MPa of the largest code.

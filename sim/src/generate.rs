@@ -46,6 +46,18 @@ pub struct Arguments {
     /// Standard deviation of Gaussian noise over the largest |b|.
     #[arg(long, value_name = "SHARE", default_value_t = 0.0)]
     noise: f64,
+    /// Standard deviation of the taxels' gains.
+    #[arg(long, value_name = "SHARE", default_value_t = 0.0)]
+    gain_spread: f64,
+    /// Standard deviation of the taxels' zeros since the tare over the largest |b|.
+    #[arg(long, value_name = "SHARE", default_value_t = 0.0)]
+    drift: f64,
+    /// Frames without contact whose noisy mean is subtracted; 0: none.
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    tare_frames: usize,
+    /// Frames that are averaged, each with its own noise.
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    frames: usize,
     /// Unipolar sensor: tension reads as zero.
     #[arg(long)]
     unipolar: bool,
@@ -74,9 +86,11 @@ const EXAMPLES: &str = "Examples:
   dermis generate sensor-2 --contact ring:at=2,-3:size=7,3:normal=8 --noise 0.001 --bits 16 --seed 7
   dermis generate sensor-3 --contact flat-punch:at=-8,-20:size=4:normal=6:shear=0,2 \\
                            --contact hertz-ellipse:at=6,15:size=3,5,30:normal=9:shear=2,0:slip=partial-slip:friction=0.6
+  dermis generate sensor-1 --contact tilted:size=4,5,30,0.5,-0.3:normal=5:shear=1,1 --noise 0.01 --gain-spread 0.01 \
+                           --drift 0.002 --frames 64 --tare-frames 256
   dermis generate sensor-4 --contact plantar-left:at=-70,0:normal=350:shear=10,50
   dermis generate sensor-3 --random 4 --seed 12 --dead 3,4 --stuck 0,7=0.2
-Shapes and sizes: hertz-circle a; hertz-ellipse a,b,angle; flat-punch a or a,b,angle; ring outer,inner;
+Shapes and sizes: hertz-circle a; hertz-ellipse a,b,angle; tilted a,b,angle,u,v; lobed a,b,angle; flat-punch a or a,b,angle; ring outer,inner;
   rectangle width,height,angle; plantar-left, plantar-right none or width,length,angle.";
 
 /// Generates the frame; returns its JSON, or the path and size of the file written.
@@ -96,6 +110,10 @@ pub fn run(arguments: &Arguments) -> Result<String> {
     }
     let converter = Converter {
         noise: arguments.noise,
+        gain_spread: arguments.gain_spread,
+        drift: arguments.drift,
+        tare_frames: arguments.tare_frames,
+        frames: arguments.frames,
         unipolar: arguments.unipolar,
         bits: arguments.bits,
         full_scale_MPa: arguments.full_scale,

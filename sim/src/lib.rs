@@ -23,6 +23,7 @@
 //! | [`hardware`] | a scene's generated hardware and its simulators |
 //! | [`compare`] | differences between two force fields |
 //! | [`mod@netlist`] | the netlist after synthesis, simulated |
+//! | [`mod@noise`] | `dermis noise`: errors under noise beside the Cramér–Rao bound |
 //! | [`verify`] | one scene's frames through all three models |
 //! | [`report`] | text, JSON and CSV that the commands print; `dermis report`: measurements, pictures, files |
 //! | [`host`] | `dermis host`: sends frames to a board over a serial port and reads back forces |
@@ -57,6 +58,7 @@ pub mod host;
 pub mod inputs;
 pub mod jobs;
 pub mod netlist;
+pub mod noise;
 mod progress;
 pub mod report;
 pub mod run_log;

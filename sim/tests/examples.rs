@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 
 /// Examples that are not run here.
-const NOT_RUN: [(&str, &str); 29] = [
+const NOT_RUN: [(&str, &str); 32] = [
     ("dermis host --port /dev/ttyUSB0 press.json", BOARD),
     ("dermis host --port /dev/ttyUSB0 --scene sensor-1", BOARD),
     ("dermis host --port /dev/ttyUSB0 --forces --check press.json", BOARD),
@@ -24,6 +24,9 @@ const NOT_RUN: [(&str, &str); 29] = [
     ("dermis noise sensor-1", "200 draws of five objectives: minutes"),
     ("dermis noise sensor-2 --objective patch --objective auto --draws 1000 --format csv", "minutes"),
     ("dermis noise sensor-1 --frames 1 --medians", "200 draws of five objectives: minutes"),
+    ("dermis noise sensor-1 --shapes table --level 0.01 --gain-spread 0.01 --frames 64 --coverage", "a minute or more"),
+    ("dermis noise sensor-3 --shapes table --contacts 3 --level 0.0005", "a minute or more"),
+    ("dermis noise sensor-1 --shapes table --sensitivity", "minutes"),
     ("dermis study input-bits", "a minute; tests/accuracy.rs measures the same"),
     ("dermis study contacts ellipses", "a minute; tests/guide.rs"),
     ("dermis guide", PAGES),

@@ -9,6 +9,12 @@
 //! Hertz    ∫ √(1 − Q) dx from the chord's start to τ half chords past its middle = m/√A ½ (τ √(1 − τ²) + asin τ + π/2)
 //! uniform  ∫ dx = √(m/A) (τ + 1)
 //! ```
+//!
+//! A tilt multiplies the pressure by 1 + g·(x, y), along the chord level + slope τ, which adds
+//!
+//! ```text
+//! Hertz    slope (−⅓ (1 − τ²)^(3/2))        uniform  slope ½ (τ² − 1)
+//! ```
 
 use super::traction::{Piece, PressureShape};
 use crate::frame::Forces;
@@ -29,7 +35,8 @@ pub(super) fn forces(sensor: &Sensor, pieces: &[Piece]) -> Forces {
         let y_edges = Edges { count: sensor.rows, pitch: sensor.pitch_y_mm, shift: piece.centre_mm[1] };
         let cols = x_edges.cells(outline.reach()[0]);
         for row in y_edges.cells(outline.reach()[1]) {
-            let shares = outline.strip([y_edges.at(row), y_edges.at(row + 1)], &x_edges, cols.clone());
+            let shares =
+                outline.strip([y_edges.at(row), y_edges.at(row + 1)], &x_edges, cols.clone(), piece.gradient());
             for (col, share) in cols.clone().zip(shares) {
                 let cell = row * sensor.cols + col;
                 forces.fx[cell] += share * piece.force_N[0];
@@ -105,8 +112,8 @@ impl Outline {
         }
     }
 
-    /// Fractions of the load on the cells of one row.
-    fn strip(&self, [low, high]: [f64; 2], edges: &Edges, cols: Range<usize>) -> Vec<f64> {
+    /// Fractions of the load on the cells of one row; `gradient` is that of the tilt.
+    fn strip(&self, [low, high]: [f64; 2], edges: &Edges, cols: Range<usize>, gradient: [f64; 2]) -> Vec<f64> {
         let reach = self.reach()[1];
         let mut breaks = vec![low, high, -reach, reach];
         (cols.start..=cols.end).for_each(|edge| self.add_crossings(edges.at(edge), &mut breaks));
@@ -121,7 +128,7 @@ impl Outline {
             for &(t, weight) in rule(NODES) {
                 let angle = t * FRAC_PI_2;
                 let weight = weight * FRAC_PI_2 * half * angle.cos();
-                let chord = self.chord(middle + half * angle.sin());
+                let chord = self.chord(middle + half * angle.sin(), gradient);
                 let mut before = chord.up_to(edges.at(cols.start));
                 for (share, col) in shares.iter_mut().zip(cols.clone()) {
                     let after = chord.up_to(edges.at(col + 1));
@@ -154,14 +161,18 @@ impl Outline {
     }
 
     /// The region's chord at y.
-    fn chord(&self, y: f64) -> Chord {
+    fn chord(&self, y: f64, gradient: [f64; 2]) -> Chord {
+        let chord = |middle: f64, half: f64, scale: f64, hertz: bool| {
+            let level = 1.0 + gradient[0] * middle + gradient[1] * y;
+            Chord { middle, half, scale, level, slope: gradient[0] * half, hertz }
+        };
         match self {
             Outline::Ellipse { a, b, c, hertz } => {
                 let m = (1.0 - (c - b * b / a) * y * y).max(0.0);
                 let area = PI / (a * c - b * b).sqrt();
                 let (half, middle) = ((m / a).sqrt(), -b * y / a);
                 let scale = if *hertz { 1.5 * m / a.sqrt() / area } else { half / area };
-                Chord { middle, half, scale, hertz: *hertz }
+                chord(middle, half, scale, *hertz)
             }
             Outline::Polygon { corners, area } => {
                 let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
@@ -176,7 +187,7 @@ impl Outline {
                     (low, high) = (0.0, 0.0);
                 }
                 let half = (high - low) / 2.0;
-                Chord { middle: (low + high) / 2.0, half, scale: half / area, hertz: false }
+                chord((low + high) / 2.0, half, half / area, false)
             }
         }
     }
@@ -187,6 +198,9 @@ struct Chord {
     middle: f64,
     half: f64,
     scale: f64,
+    /// The tilt's factor in the middle, and its change from there to the end.
+    level: f64,
+    slope: f64,
     hertz: bool,
 }
 
@@ -196,7 +210,11 @@ impl Chord {
             return 0.0;
         }
         let t = ((x - self.middle) / self.half).clamp(-1.0, 1.0);
-        let form = if self.hertz { (t * (1.0 - t * t).sqrt() + t.asin() + FRAC_PI_2) / 2.0 } else { t + 1.0 };
-        self.scale * form
+        let root = (1.0 - t * t).sqrt();
+        let [even, odd] = match self.hertz {
+            true => [(t * root + t.asin() + FRAC_PI_2) / 2.0, -root * root * root / 3.0],
+            false => [t + 1.0, (t * t - 1.0) / 2.0],
+        };
+        self.scale * (self.level * even + self.slope * odd)
     }
 }

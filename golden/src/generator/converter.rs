@@ -1,11 +1,20 @@
 //! Converter: simulates the readings of a real sensor from a frame.
 //!
-//! Applied in this order: Gaussian noise, tension clipped to zero (a unipolar sensor), rounding to codes, dead taxels
-//! (read zero), stuck taxels (always read the same).
+//! Applied in this order: gains that differ between taxels, drift of the zeros since the tare, noise of the tare; then
+//! for each of the averaged frames Gaussian noise, tension clipped to zero (a unipolar sensor), rounding to codes; then
+//! the mean of the frames, dead taxels (read zero), stuck taxels (always read the same).
+//!
+//! ```text
+//! reading = mean over frames of round(clip((1 + γ g) b + (δ d − σ t/√tare_frames + σ n) max|b|))
+//! ```
+//!
+//! g, d and t are normal and one per taxel, n one per taxel and frame; averaging reduces only n.
 //!
 //! | | shape | unit | range |
 //! |---|---|---|---|
-//! | in: noise | scalar | fraction of max \|b\| | standard deviation, at least 0 |
+//! | in: noise σ | scalar | fraction of max \|b\| | standard deviation of one frame, at least 0 |
+//! | in: gain spread γ | scalar | fraction of each b | standard deviation, at least 0 |
+//! | in: drift δ | scalar | fraction of max \|b\| | standard deviation, at least 0 |
 //! | in: bits | scalar | bits | 2 … 24; full scale is the frame's own peak unless given |
 //! | in: dead, stuck | lists | \[row, col\], MPa | inside the array |
 //! | out: frame | taxels | MPa | known forces are passed through |
@@ -16,11 +25,22 @@ use crate::quantise::quantise;
 use crate::random::Random;
 use crate::sensor::Sensor;
 
-/// Noise, quantisation and faults of a sensor.
-#[derive(Clone, Debug, Default, PartialEq)]
+/// Largest number of averaged frames.
+const MOST_FRAMES: usize = 100_000;
+
+/// Noise, gains, quantisation and faults of a sensor.
+#[derive(Clone, Debug, PartialEq)]
 pub struct Converter {
-    /// Standard deviation of the noise as a fraction of the frame's largest |b|, at least 0.
+    /// Standard deviation of the noise of one frame as a fraction of the frame's largest |b|, at least 0.
     pub noise: f64,
+    /// Standard deviation of the taxels' gains as a fraction, at least 0.
+    pub gain_spread: f64,
+    /// Standard deviation of the taxels' zeros since the tare as a fraction of the frame's largest |b|, at least 0.
+    pub drift: f64,
+    /// Frames without contact whose mean is subtracted; their noise remains as an offset of each taxel. 0: none.
+    pub tare_frames: usize,
+    /// Number of frames whose mean is the reading, each with its own noise; at least 1.
+    pub frames: usize,
     /// Whether tension reads as zero.
     pub unipolar: bool,
     /// Width of the converter's codes, 2 to 24; `None`: not quantised.
@@ -31,8 +51,26 @@ pub struct Converter {
     pub dead: Vec<[usize; 2]>,
     /// Taxels that always read the same stress, [row, col] and MPa.
     pub stuck: Vec<([usize; 2], f64)>,
-    /// Seed of the noise.
+    /// Seed of gains, drift and noise.
     pub seed: u64,
+}
+
+impl Default for Converter {
+    fn default() -> Self {
+        Converter {
+            noise: 0.0,
+            gain_spread: 0.0,
+            drift: 0.0,
+            tare_frames: 0,
+            frames: 1,
+            unipolar: false,
+            bits: None,
+            full_scale_MPa: None,
+            dead: Vec::new(),
+            stuck: Vec::new(),
+            seed: 0,
+        }
+    }
 }
 
 impl Converter {
@@ -45,20 +83,13 @@ impl Converter {
         let mut frame = frame.clone();
         let peak = frame.peak_MPa();
         let mut random = Random::new(self.seed);
-        for b in &mut frame.stress_MPa {
-            if self.noise > 0.0 {
-                *b += self.noise * peak * random.normal();
-            }
-            if self.unipolar {
-                *b = b.max(0.0);
-            }
+        self.offset(&mut frame.stress_MPa, peak, &mut random);
+        let mut mean = vec![0.0; frame.stress_MPa.len()];
+        for _ in 0..self.frames {
+            let one = self.one(&frame.stress_MPa, peak, &mut random);
+            mean.iter_mut().zip(one).for_each(|(mean, b)| *mean += b / self.frames as f64);
         }
-        if let Some(bits) = self.bits {
-            let peak = frame.peak_MPa();
-            let full_scale = self.full_scale_MPa.unwrap_or(if peak > 0.0 { peak } else { 1.0 });
-            let codes = quantise(&frame.stress_MPa, bits, full_scale);
-            frame.stress_MPa = codes.codes.iter().map(|&code| f64::from(code) * codes.lsb_MPa()).collect();
-        }
+        frame.stress_MPa = mean;
         for taxel in &self.dead {
             let index = index("dead", &frame.sensor, *taxel)?;
             frame.stress_MPa[index] = 0.0;
@@ -70,10 +101,40 @@ impl Converter {
         Ok(frame)
     }
 
+    /// Applies what is the same in all averaged frames: gains, drift and the noise of the tare.
+    fn offset(&self, stress_MPa: &mut [f64], peak: f64, random: &mut Random) {
+        let tare = if self.tare_frames > 0 { self.noise / (self.tare_frames as f64).sqrt() } else { 0.0 };
+        // A deviation of zero draws no number.
+        for (deviation, share) in [(self.gain_spread, true), (self.drift, false), (tare, false)] {
+            for b in stress_MPa.iter_mut().filter(|_| deviation > 0.0) {
+                *b += deviation * random.normal() * if share { *b } else { peak };
+            }
+        }
+    }
+
+    /// One frame: noise, clipping, codes.
+    fn one(&self, stress_MPa: &[f64], peak: f64, random: &mut Random) -> Vec<f64> {
+        let noisy = |b: &f64| if self.noise > 0.0 { b + self.noise * peak * random.normal() } else { *b };
+        let mut stress_MPa: Vec<f64> = stress_MPa.iter().map(noisy).collect();
+        if self.unipolar {
+            stress_MPa.iter_mut().for_each(|b| *b = b.max(0.0));
+        }
+        let Some(bits) = self.bits else { return stress_MPa };
+        let peak = stress_MPa.iter().fold(0.0f64, |peak, b| b.abs().max(peak));
+        let full_scale = self.full_scale_MPa.unwrap_or(if peak > 0.0 { peak } else { 1.0 });
+        let codes = quantise(&stress_MPa, bits, full_scale);
+        codes.codes.iter().map(|&code| f64::from(code) * codes.lsb_MPa()).collect()
+    }
+
     fn check(&self) -> Result<(), GeneratorError> {
         let fail = |field, value, allowed| Err(GeneratorError::Option { field, value, allowed });
-        if !(self.noise >= 0.0 && self.noise.is_finite()) {
-            return fail("noise", self.noise, "a number of at least 0");
+        for (field, share) in [("noise", self.noise), ("gain_spread", self.gain_spread), ("drift", self.drift)] {
+            if !(share >= 0.0 && share.is_finite()) {
+                return fail(field, share, "a number of at least 0");
+            }
+        }
+        if !(1..=MOST_FRAMES).contains(&self.frames) {
+            return fail("frames", self.frames as f64, "a whole number from 1 to 100000");
         }
         if let Some(bits) = self.bits.filter(|bits| !(2..=24).contains(bits)) {
             return fail("bits", f64::from(bits), "a whole number from 2 to 24");
@@ -119,6 +180,30 @@ mod tests {
     }
 
     #[test]
+    fn averaging_leaves_gains_drift_and_the_tares_noise() {
+        let frame = frame();
+        let peak = frame.peak_MPa();
+        let off = |converter: Converter| {
+            let read = converter.convert(&frame).unwrap().stress_MPa;
+            let squares = read.iter().zip(&frame.stress_MPa).map(|(a, b)| (a - b).powi(2));
+            (squares.sum::<f64>() / 400.0).sqrt()
+        };
+        let sensor = Converter { noise: 0.01, frames: 64, seed: 3, ..Default::default() };
+        let rms = (frame.stress_MPa.iter().map(|b| b * b).sum::<f64>() / 400.0).sqrt();
+        let cases = [
+            (sensor.clone(), 0.01 * peak / 8.0),
+            (Converter { drift: 0.02, ..sensor.clone() }, peak * 0.01f64.hypot(0.16) / 8.0),
+            (Converter { tare_frames: 16, ..sensor.clone() }, 0.01 * peak * (1.0f64 / 64.0 + 1.0 / 16.0).sqrt()),
+            (Converter { noise: 0.0, gain_spread: 0.03, ..sensor }, 0.03 * rms),
+        ];
+        for (converter, wanted) in cases {
+            let text = format!("{converter:?}");
+            // Four deviations of an estimate from 400 draws; of gains the largest taxels count most.
+            assert!((off(converter) / wanted - 1.0).abs() < 0.2, "{text}");
+        }
+    }
+
+    #[test]
     fn clipping_codes_and_faults() {
         let converter = Converter {
             unipolar: true,
@@ -137,6 +222,9 @@ mod tests {
     fn refusals_name_option_and_value() {
         let cases = [
             (Converter { noise: f64::NAN, ..Default::default() }, "noise = NaN"),
+            (Converter { gain_spread: -0.1, ..Default::default() }, "gain_spread = -0.1"),
+            (Converter { drift: f64::INFINITY, ..Default::default() }, "drift = inf"),
+            (Converter { frames: 0, ..Default::default() }, "frames = 0"),
             (Converter { bits: Some(25), ..Default::default() }, "bits = 25"),
             (Converter { full_scale_MPa: Some(0.0), ..Default::default() }, "full_scale_MPa = 0"),
             (

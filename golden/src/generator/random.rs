@@ -53,20 +53,34 @@ pub struct Draw {
 /// Draws random contacts for an array.
 pub fn random_contacts(sensor: &Sensor, draw: Draw) -> Vec<Contact> {
     let mut random = Random::new(draw.seed);
-    let mut contacts: Vec<(Contact, [f64; 2], f64)> = Vec::with_capacity(draw.count);
+    let shaped = |random: &mut Random, _: usize, axes| shaped(random, draw.shapes, axes);
+    placed(sensor, &mut random, draw.count, draw.touching, shaped).0
+}
+
+/// Draws size and place of `count` contacts; `shaped` makes contact k of its half-axes. Also returns whether all places
+/// are within the array and apart from each other: there may be no room.
+pub(super) fn placed(
+    sensor: &Sensor,
+    random: &mut Random,
+    count: usize,
+    touching: bool,
+    shaped: impl Fn(&mut Random, usize, [f64; 2]) -> Contact,
+) -> (Vec<Contact>, bool) {
+    let mut contacts: Vec<(Contact, [f64; 2], f64)> = Vec::with_capacity(count);
+    let mut fits = true;
     let half = sensor.half_mm();
     let h = sensor.thickness_mm;
     // On a small array the contacts are smaller.
     let unit = h.min(half[0].min(half[1]) / (LONGEST + INSIDE));
-    for _ in 0..draw.count {
+    for index in 0..count {
         let first = random.between(unit, 2.0 * unit);
         let axes = [first, first * random.between(0.7, 1.35)];
         let reach = axes[0].max(axes[1]);
         let room = half.map(|half| (half - reach - INSIDE * unit).max(0.0));
-        let mut gap = if draw.touching { 0.0 } else { GAP * h };
-        let mut centre = [0.0; 2];
+        let mut gap = if touching { 0.0 } else { GAP * h };
+        let (mut centre, mut found) = ([0.0; 2], false);
         for _ in 0..TRIES {
-            centre = match random.pick(&contacts).filter(|_| draw.touching) {
+            centre = match random.pick(&contacts).filter(|_| touching) {
                 Some((_, [x, y], far)) => {
                     let towards = random.between(0.0, TAU);
                     // A margin, so that rounding does not cause an overlap.
@@ -78,15 +92,17 @@ pub fn random_contacts(sensor: &Sensor, draw: Draw) -> Vec<Contact> {
             let apart = |(_, other, far): &(Contact, [f64; 2], f64)| {
                 (centre[0] - other[0]).hypot(centre[1] - other[1]) >= far + reach + gap
             };
-            if contacts.iter().all(apart) && centre[0].abs() <= room[0] && centre[1].abs() <= room[1] {
+            found = contacts.iter().all(apart) && centre[0].abs() <= room[0] && centre[1].abs() <= room[1];
+            if found {
                 break;
             }
             gap *= 0.98;
         }
-        let contact = Contact { centre_mm: Some(centre), ..shaped(&mut random, draw.shapes, axes) };
+        fits &= found;
+        let contact = Contact { centre_mm: Some(centre), ..shaped(random, index, axes) };
         contacts.push((contact, centre, reach));
     }
-    contacts.into_iter().map(|(contact, _, _)| contact).collect()
+    (contacts.into_iter().map(|(contact, _, _)| contact).collect(), fits)
 }
 
 /// A contact of the given half-axes with random shape, load and slip, without position.

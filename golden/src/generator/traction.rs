@@ -1,13 +1,17 @@
 //! Traction: decomposition of a described contact into simple pieces.
 //!
 //! A piece is a region with a pressure distribution and a force of fixed direction. A contact is a sum of pieces: a
-//! ring is a disc minus a disc, partial slip is two Hertz pressures of different radii, a foot is one square per pixel.
+//! ring is a disc minus a disc, partial slip is two Hertz pressures of different radii, a lobed contact is two Hertz
+//! pressures of which the smaller one touches the rim of the other, a foot is one square per pixel.
 
 use super::plantar::{self, Foot};
 use super::GeneratorError;
 use crate::frame::Contact;
 use crate::sensor::Sensor;
 use std::f64::consts::PI;
+
+/// Share of the load and of the half-axes of the smaller pressure of a lobed contact.
+const LOBE: [f64; 2] = [0.35, 0.5];
 
 /// Pressure distribution of a piece, in coordinates that are ±1 at its half-axes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -31,6 +35,9 @@ pub(super) struct Piece {
     pub(super) half_mm: [f64; 2],
     /// Cosine and sine of the angle from +x to the first half-axis.
     pub(super) turn: [f64; 2],
+    /// Slopes of the pressure along the half-axes, in units of the mean at the half-axis' end: the pressure's factor is
+    /// 1 + tilt·(X, Y). The load does not depend on it.
+    pub(super) tilt: [f64; 2],
     /// Force of the whole piece, [x, y, normal].
     pub(super) force_N: [f64; 3],
 }
@@ -46,6 +53,39 @@ impl Piece {
         let half = sensor.half_mm();
         (0..2).all(|axis| self.centre_mm[axis].abs() < half[axis] + reach[axis])
     }
+
+    /// The tilt's gradient in 1/mm along x and y.
+    pub(super) fn gradient(&self) -> [f64; 2] {
+        let [along, across] = [self.tilt[0] / self.half_mm[0], self.tilt[1] / self.half_mm[1]];
+        let [cos, sin] = self.turn;
+        [along * cos - across * sin, along * sin + across * cos]
+    }
+
+    /// Centre of pressure in mm: the tilt shifts it by its share of the mean square of X.
+    pub(super) fn centre_of_pressure_mm(&self) -> [f64; 2] {
+        let square = match self.form {
+            PressureShape::Hertz => 1.0 / 5.0,
+            PressureShape::Disc => 1.0 / 4.0,
+            PressureShape::Square => 1.0 / 3.0,
+        };
+        let [along, across] = [0, 1].map(|axis| square * self.tilt[axis] * self.half_mm[axis]);
+        let [cos, sin] = self.turn;
+        [self.centre_mm[0] + along * cos - across * sin, self.centre_mm[1] + along * sin + across * cos]
+    }
+}
+
+/// Force of all pieces in N, [x, y, normal].
+pub(super) fn total_N(pieces: &[Piece]) -> [f64; 3] {
+    let mut total = [0.0; 3];
+    pieces.iter().for_each(|piece| (0..3).for_each(|axis| total[axis] += piece.force_N[axis]));
+    total
+}
+
+/// Centre of pressure of all pieces in mm.
+pub(super) fn centre_of_pressure_mm(pieces: &[Piece]) -> [f64; 2] {
+    let normal = total_N(pieces)[2];
+    let moment = |axis: usize| pieces.iter().map(move |piece| piece.force_N[2] * piece.centre_of_pressure_mm()[axis]);
+    [0, 1].map(|axis| moment(axis).sum::<f64>() / normal)
 }
 
 /// The pieces of one contact; `index` names it in errors.
@@ -70,6 +110,8 @@ pub(super) fn pieces(index: usize, contact: &Contact) -> Result<Vec<Piece>, Gene
     let allowed = match (shape, sizes.as_slice()) {
         ("hertz-circle", [_]) | ("flat-punch", [_]) if lengths(1) => None,
         ("hertz-ellipse" | "flat-punch" | "rectangle", [_, _, angle]) if lengths(2) && angle.is_finite() => None,
+        ("lobed", [_, _, angle]) if lengths(2) && angle.is_finite() => None,
+        ("tilted", [_, _, angle, u, v]) if lengths(2) && angle.is_finite() && u.hypot(*v) <= 1.0 => None,
         ("ring", [outer, inner]) if lengths(2) && inner < outer => None,
         ("rectangle", [_, _]) | ("hertz-ellipse", [_, _]) if lengths(2) => None,
         (_, []) if Foot::named(shape).is_some() => None,
@@ -78,11 +120,13 @@ pub(super) fn pieces(index: usize, contact: &Contact) -> Result<Vec<Piece>, Gene
         ("hertz-circle", _) => Some("[a], a above 0"),
         ("hertz-ellipse", _) => Some("[a, b, angle], a and b above 0"),
         ("flat-punch", _) => Some("[a] or [a, b, angle], a and b above 0"),
+        ("lobed", _) => Some("[a, b, angle], a and b above 0"),
+        ("tilted", _) => Some("[a, b, angle, u, v], a and b above 0, √(u² + v²) at most 1"),
         ("ring", _) => Some("[outer, inner], inner above 0 and below outer"),
         ("rectangle", _) => Some("[width, height, angle], width and height above 0"),
         _ if Foot::named(shape).is_some() => Some("[], or [width, length, angle], width and length above 0"),
         _ => {
-            let known = "hertz-circle, hertz-ellipse, flat-punch, ring, rectangle, plantar-left or plantar-right";
+            let known = "hertz-circle, hertz-ellipse, tilted, lobed, flat-punch, ring, rectangle, plantar-left or plantar-right";
             return fail("shape", format!("{shape:?}"), known);
         }
     };
@@ -91,7 +135,7 @@ pub(super) fn pieces(index: usize, contact: &Contact) -> Result<Vec<Piece>, Gene
     }
     let angle = contact.rotation_rad.unwrap_or_else(|| sizes.get(2).map_or(0.0, |degrees| degrees.to_radians()));
     let turn = [angle.cos(), angle.sin()];
-    let piece = |form, half_mm, force_N| Piece { form, centre_mm, half_mm, turn, force_N };
+    let piece = |form, half_mm, force_N| Piece { form, centre_mm, half_mm, turn, tilt: [0.0; 2], force_N };
     let force = [shear[0], shear[1], normal];
     let both = |sizes: &[f64]| [sizes[0], *sizes.get(1).unwrap_or(&sizes[0])];
     let slip = contact.kind_of_slip.as_deref().unwrap_or("full-sliding");
@@ -115,6 +159,14 @@ pub(super) fn pieces(index: usize, contact: &Contact) -> Result<Vec<Piece>, Gene
     let times = |factor: f64| force.map(|f| f * factor);
     Ok(match shape {
         "hertz-circle" | "hertz-ellipse" => vec![piece(PressureShape::Hertz, both(sizes), force)],
+        "tilted" => vec![Piece { tilt: [sizes[3], sizes[4]], ..piece(PressureShape::Hertz, both(sizes), force) }],
+        "lobed" => {
+            let [share, size] = LOBE;
+            let off = (1.0 - size) * sizes[0];
+            let centre = [centre_mm[0] + off * turn[0], centre_mm[1] + off * turn[1]];
+            let lobe = piece(PressureShape::Hertz, both(sizes).map(|a| size * a), times(share));
+            vec![piece(PressureShape::Hertz, both(sizes), times(1.0 - share)), Piece { centre_mm: centre, ..lobe }]
+        }
         "flat-punch" => vec![piece(PressureShape::Disc, both(sizes), force)],
         "rectangle" => vec![piece(PressureShape::Square, [sizes[0] / 2.0, sizes[1] / 2.0], force)],
         "ring" => {

@@ -2,10 +2,12 @@
 
 use super::bound::Bound;
 use super::contact::{ContactStress, HertzContact};
+use super::statistic::quantile;
 use crate::frame::{Frame, FrameError};
+use crate::generator::GeneratorError;
 use crate::random::Random;
 use crate::reconstruct::{Golden, GoldenError};
-use crate::scene::{ObjectiveKind, Scene};
+use crate::scene::{EstimatorKind, ObjectiveKind, Scene};
 use nalgebra::Vector2;
 use serde::Serialize;
 use thiserror::Error;
@@ -76,6 +78,9 @@ pub enum StudyError {
     /// A frame is not finite.
     #[error(transparent)]
     Frame(#[from] FrameError),
+    /// Contacts cannot be drawn.
+    #[error(transparent)]
+    Generator(#[from] GeneratorError),
     /// A parameter of the study is out of range.
     #[error("{field} = {value} is not allowed; it must be {allowed}")]
     Parameter {
@@ -91,7 +96,7 @@ pub enum StudyError {
 impl Spread {
     fn of(mut values: Vec<f64>) -> Spread {
         values.sort_by(f64::total_cmp);
-        let at = |share: f64| values.get((share * values.len() as f64) as usize).copied().unwrap_or_default();
+        let at = |share: f64| quantile(&values, share);
         let square: f64 = values.iter().map(|v| v * v).sum();
         Spread { median: at(0.5), ninety: at(0.9), rms: (square / values.len().max(1) as f64).sqrt() }
     }
@@ -126,7 +131,7 @@ const BOUND_DRAWS: usize = 32;
 /// # Errors
 /// [`StudyError`]: a scene that the golden model cannot reconstruct, or a parameter out of range.
 pub fn study(scene: &Scene, study: &Study, progress: &mut dyn FnMut(usize, usize)) -> Result<Vec<Row>, StudyError> {
-    check(study)?;
+    check_parameters(study.draws, study.frames, &study.levels)?;
     let draws = draws(scene, study);
     let averagings: Vec<Averaging> = if study.frames == 1 { vec![1] } else { vec![1, study.frames] };
     let total = averagings.len() * study.levels.len() * study.objectives.len();
@@ -134,6 +139,7 @@ pub fn study(scene: &Scene, study: &Study, progress: &mut dyn FnMut(usize, usize
     let mut engines = Vec::new();
     for &kind in &study.objectives {
         let mut scene = scene.clone();
+        scene.search.estimator = EstimatorKind::Search;
         scene.search.objective = kind;
         engines.push((kind, Golden::new(&scene)?));
     }
@@ -169,15 +175,16 @@ pub fn study(scene: &Scene, study: &Study, progress: &mut dyn FnMut(usize, usize
     Ok(rows)
 }
 
-fn check(study: &Study) -> Result<(), StudyError> {
+/// Checks what both studies take.
+pub(super) fn check_parameters(draws: usize, frames: usize, levels: &[f64]) -> Result<(), StudyError> {
     let wrong = |field, value: String, allowed| Err(StudyError::Parameter { field, value, allowed });
-    if !(1..=MAX_COUNT).contains(&study.draws) {
-        return wrong("draws", study.draws.to_string(), "from 1 to 100000");
+    if !(1..=MAX_COUNT).contains(&draws) {
+        return wrong("draws", draws.to_string(), "from 1 to 100000");
     }
-    if !(1..=MAX_COUNT).contains(&study.frames) {
-        return wrong("frames", study.frames.to_string(), "from 1 to 100000");
+    if !(1..=MAX_COUNT).contains(&frames) {
+        return wrong("frames", frames.to_string(), "from 1 to 100000");
     }
-    match study.levels.iter().find(|level| !(0.0..=1.0).contains(*level)) {
+    match levels.iter().find(|level| !(0.0..=1.0).contains(*level)) {
         Some(level) => wrong("noise", level.to_string(), "a fraction of max |b| from 0 to 1"),
         None => Ok(()),
     }

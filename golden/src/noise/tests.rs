@@ -1,7 +1,10 @@
 //! The study with few contacts: properties of the bound and the estimators.
 
 use super::*;
-use crate::scene::{ObjectiveKind, Scene};
+use crate::generator::converter::Converter;
+use crate::generator::draws::{DrawOptions, Shape};
+use crate::partition::Case;
+use crate::scene::{ObjectiveKind, PartitionSpec, Scene};
 
 /// Medians of few contacts scatter; the ratios of the full study are below 1.3.
 const RATIO: f64 = 1.5;
@@ -61,4 +64,114 @@ fn parameters_out_of_range_are_refused() {
     for bad in bad {
         assert!(matches!(study(&scene, &bad, &mut |_, _| ()), Err(StudyError::Parameter { .. })));
     }
+}
+
+/// A small study of drawn shapes.
+fn shapes(scene: &str, options: DrawOptions, candidates: Vec<Candidate>, levels: Vec<f64>) -> Vec<ShapeRow> {
+    let wanted = ShapeStudy { levels, draws: 20, options, candidates, ..Default::default() };
+    shape_study(&Scene::builtin(scene).unwrap(), &wanted, &|_, _| ()).unwrap()
+}
+
+const SPARSE: Candidate = Candidate::Objective(ObjectiveKind::Sparse);
+
+#[test]
+fn sparse_holds_any_shape_without_noise_and_none_with() {
+    let rows = shapes("sensor-1", DrawOptions::default(), vec![SPARSE], vec![0.0, 1e-2]);
+    let median = |k: usize| rows[k].summary.tangential.median.value;
+    assert_eq!(
+        rows.iter().map(|row| row.estimator.as_str()).collect::<Vec<_>>(),
+        ["none", "search sparse", "none", "search sparse"]
+    );
+    assert!(median(1) < 0.05 && median(3) > 0.5, "{rows:?}");
+    // The baseline knows no shear; the integral of the stress is within some percent of the normal force.
+    assert_eq!((median(0), rows[0].summary.tangential.ninety.value), (1.0, 1.0));
+    assert!(rows[0].summary.normal.median.value < 0.2 && rows[0].summary.normal.median.value > 1e-3);
+    assert_eq!((rows[1].bound.tangential, rows[1].bound.draws), ([0.0; 2], 20));
+    assert!(rows[3].bound.tangential[0] < median(3));
+    // Stated noise is flagged.
+    assert_eq!(rows[3].summary.flagged.value, 1.0);
+}
+
+#[test]
+fn the_bound_is_a_smooth_pressures_inside_its_support() {
+    // Published for sensor-1 and a friction ratio of 0.3: 0.4, 1.6, 5.0, 18 % of the shear as standard deviation of a
+    // component pair; medians of drawn shapes and ratios scatter about it.
+    let rows = shapes("sensor-1", DrawOptions::default(), vec![], vec![1e-4, 5e-4, 2e-3, 1e-2]);
+    for (row, published) in rows.iter().zip([0.004, 0.016, 0.05, 0.18]) {
+        let ratio = row.bound.tangential[0] / published;
+        assert!((0.4..2.0).contains(&ratio), "{}: {:?}", row.noise, row.bound);
+    }
+}
+
+#[test]
+fn averaging_divides_the_bound_until_the_gains_limit_it() {
+    let bound = |noise: f64, frames: usize, gain_spread: f64| {
+        let converter = Converter { frames, gain_spread, ..Default::default() };
+        let options = DrawOptions { converter, ..Default::default() };
+        shapes("sensor-1", options, vec![], vec![noise])[0].bound.tangential[0]
+    };
+    let (one, many, gains) = (bound(1e-3, 1, 0.0), bound(1e-3, 64, 0.0), bound(1e-3, 64, 0.01));
+    // By at most 8: with much noise the smoothness helps.
+    assert!((5.0..8.01).contains(&(one / many)), "{one} {many}");
+    // A spread of 1 % is noise of at most 1 % of the largest stress.
+    assert!(gains > 1.5 * many && gains < bound(1e-2, 1, 0.0), "{gains} {many}");
+}
+
+#[test]
+fn several_contacts_have_their_own_errors() {
+    let scene = Scene {
+        partition: PartitionSpec { case: Case::Contacts, ..Default::default() },
+        ..Scene::builtin("sensor-3").unwrap()
+    };
+    let options = DrawOptions { contacts: 2, ..Default::default() };
+    let wanted = ShapeStudy { levels: vec![0.0], draws: 8, options, candidates: vec![SPARSE], ..Default::default() };
+    let rows = shape_study(&scene, &wanted, &|_, _| ()).unwrap();
+    let own = rows[1].summary.contact_tangential.unwrap();
+    assert!(own.median.value < 0.2, "{own:?}");
+    assert_eq!(rows[0].summary.contact_tangential.unwrap().median.value, 1.0);
+}
+
+#[test]
+fn unipolar_readings_untold_noise_and_shapes_are_rows() {
+    let converter = Converter { unipolar: true, ..Default::default() };
+    let options = DrawOptions { converter, shapes: vec![Shape::Ring, Shape::Tilted], ..Default::default() };
+    let run = |told| {
+        let wanted = ShapeStudy {
+            levels: vec![2e-3],
+            draws: 10,
+            options: options.clone(),
+            told,
+            candidates: vec![SPARSE],
+            by_shape: true,
+        };
+        shape_study(&Scene::builtin("sensor-1").unwrap(), &wanted, &|_, _| ()).unwrap()
+    };
+    let (told, untold) = (run(true), run(false));
+    let names: Vec<&str> = told.iter().map(|row| row.shape).collect();
+    assert_eq!(names, ["all", "ring", "tilted", "all", "ring", "tilted"]);
+    assert_eq!(told.iter().map(|row| row.summary.draws).collect::<Vec<_>>(), [10, 5, 5, 10, 5, 5]);
+    assert!(told[3].unipolar && told[3].summary.flagged.value == 1.0 && untold[3].summary.flagged.value < 1.0);
+    // Clipping takes information away: the bound without it is smaller.
+    let bipolar = DrawOptions { shapes: options.shapes, ..Default::default() };
+    let all = shapes("sensor-1", bipolar, vec![], vec![2e-3]);
+    assert!(all[0].bound.tangential[0] < told[0].bound.tangential[0]);
+}
+
+#[test]
+fn what_is_stated_wrongly_costs_accuracy() {
+    let wanted = ShapeStudy { levels: vec![0.0], draws: 5, candidates: vec![SPARSE], ..Default::default() };
+    let rows = sensitivities(&Scene::builtin("sensor-1").unwrap(), &wanted, &|_, _| ()).unwrap();
+    assert_eq!(rows.len(), 1 + 6 + 6 + 6 + 1 + 4);
+    let of = |what: &str, off: Option<f64>| {
+        let row = rows.iter().find(|row| row.what == what && row.off == off).unwrap();
+        row.summary.tangential.median.value
+    };
+    let exact = of("nothing", None);
+    assert!(exact < 0.05);
+    for what in ["cover thickness", "pitch"] {
+        assert!(of(what, Some(0.10)) > 2.0 * exact, "{what}");
+    }
+    // A bonded layer read as a half-space loses half of the shear.
+    assert!(of("half-space for bonded layer", None) > 0.2);
+    assert!(of("gain spread", Some(0.10)) > of("gain spread", Some(0.005)));
 }

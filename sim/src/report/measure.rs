@@ -13,6 +13,7 @@
 mod clock;
 mod formats;
 mod machine;
+mod noise;
 mod objective_map;
 mod stability;
 mod stages;
@@ -22,6 +23,7 @@ mod timing;
 pub use clock::{clock, Clock};
 pub use formats::{formats, FormatRow};
 pub use machine::machine;
+pub use noise::noise;
 pub use objective_map::{objective_map, ObjectiveMap};
 pub use stability::{conditions, extremes};
 pub use stages::{stages, StageRow};

@@ -12,8 +12,8 @@ use super::document::{Document, Section};
 use super::measure::{self, clock, machine, measure, sweep, ContactCount, Measured, Options, SweepPoint};
 use super::save::save;
 use super::sections::{
-    choice, choose, extremes, fields, frames, paper, published, ratios, resources, run_logs, search, stability, stages,
-    sweeps, time, Choice,
+    choice, choose, extremes, fields, frames, noise, paper, published, ratios, resources, run_logs, search, stability,
+    stages, sweeps, time, Choice,
 };
 use crate::jobs::Interrupt;
 use crate::run_log::RunLog;
@@ -95,7 +95,8 @@ pub fn run(arguments: &Arguments, build: &Path) -> Result<(String, bool)> {
 
 fn sections(measured: &[Measured], options: &Options) -> Result<Vec<Section>> {
     let choices = choose(measured, options)?;
-    Ok(vec![
+    let first = noise(measured, measure::noise(measured, options)?.as_ref())?;
+    let others = vec![
         choice(measured, &choices),
         time(measured)?,
         published(measured),
@@ -108,7 +109,8 @@ fn sections(measured: &[Measured], options: &Options) -> Result<Vec<Section>> {
         extremes(&measure::extremes(measured, options)?),
         resources(measured, &choices, options)?,
         run_logs(&RunLog::load_all(&options.build)?),
-    ])
+    ];
+    Ok(first.into_iter().chain(others).collect())
 }
 
 /// The sweeps of the scenes with hardware, each in its recommended case, with contact count and number of frames.

@@ -2,6 +2,7 @@
 
 mod choice;
 mod fields;
+mod noise;
 mod paper;
 mod published;
 mod ratios;
@@ -15,6 +16,7 @@ mod time;
 
 pub use choice::{choice, choose, frames, Choice};
 pub use fields::fields;
+pub use noise::noise;
 pub use paper::paper;
 pub use published::published;
 pub use ratios::ratios;

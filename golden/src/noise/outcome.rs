@@ -1,0 +1,100 @@
+//! Outcome: the errors of one reconstruction of a drawn frame, and their summary over many.
+
+use super::coverage::Coverage;
+use super::matching::{found, partners};
+use super::statistic::{ErrorSpread, Interval};
+use crate::errors::Errors;
+use crate::generator::draws::{DrawnFrame, Shape};
+use crate::reconstruct::Reconstruction;
+use crate::sensor::Sensor;
+use serde::Serialize;
+
+/// The errors of one frame.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Outcome {
+    /// Shape of the first contact.
+    pub shape: Shape,
+    /// e_t of the resultant.
+    pub tangential: Option<f64>,
+    /// e_n of the resultant.
+    pub normal: Option<f64>,
+    /// e_t of each contact.
+    pub contact_tangential: Vec<f64>,
+    /// Whether the result has a flag.
+    pub flagged: bool,
+    /// |F − F_ref|/σ of each contact along x, y and normal; empty without standard deviations.
+    pub deviations: Vec<[f64; 3]>,
+}
+
+/// Errors over many frames.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Summary {
+    /// Number of frames.
+    pub draws: usize,
+    /// e_t of the resultant, a fraction.
+    pub tangential: ErrorSpread,
+    /// e_n of the resultant, a fraction.
+    pub normal: ErrorSpread,
+    /// e_t of each contact, where frames have several.
+    pub contact_tangential: Option<ErrorSpread>,
+    /// Share of frames with a flag.
+    pub flagged: Interval,
+    /// How often the forces are within their standard deviations; `None` without them.
+    pub coverage: Option<Coverage>,
+}
+
+impl Outcome {
+    /// Compares a result with the truth.
+    pub fn new(drawn: &DrawnFrame, result: &Reconstruction) -> Outcome {
+        let errors = Errors::new(drawn.total_N, result.resultant_N);
+        let mut outcome = Outcome {
+            shape: drawn.truth[0].shape,
+            tangential: errors.tangential,
+            normal: errors.normal,
+            contact_tangential: Vec::new(),
+            flagged: !result.flags.is_empty(),
+            deviations: Vec::new(),
+        };
+        for (truth, partner) in drawn.truth.iter().zip(partners(&found(result), &drawn.truth)) {
+            let force_N = partner.map_or([0.0; 3], |found| found.force_N);
+            outcome.contact_tangential.extend(Errors::new(truth.force_N, force_N).tangential);
+            if let Some(sigma_N) = partner.and_then(|found| found.sigma_N) {
+                outcome.deviations.push([0, 1, 2].map(|k| (force_N[k] - truth.force_N[k]).abs() / sigma_N[k]));
+            }
+        }
+        outcome
+    }
+
+    /// The baseline that needs no estimator: no shear, and the integral of the stress as normal force. On half-space and
+    /// layer alike shear adds nothing to the integral.
+    pub fn baseline(drawn: &DrawnFrame, sensor: &Sensor, reading_MPa: &[f64]) -> Outcome {
+        let normal = reading_MPa.iter().sum::<f64>() * sensor.pitch_x_mm * sensor.pitch_y_mm;
+        let errors = Errors::new(drawn.total_N, [0.0, 0.0, normal]);
+        let alone = |truth: &crate::generator::draws::ContactTruth| Errors::new(truth.force_N, [0.0; 3]).tangential;
+        Outcome {
+            shape: drawn.truth[0].shape,
+            tangential: errors.tangential,
+            normal: errors.normal,
+            contact_tangential: drawn.truth.iter().filter_map(alone).collect(),
+            flagged: false,
+            deviations: Vec::new(),
+        }
+    }
+}
+
+impl Summary {
+    /// Of some frames.
+    pub fn of(outcomes: &[&Outcome]) -> Summary {
+        let all = |of: fn(&Outcome) -> Option<f64>| -> Vec<f64> { outcomes.iter().filter_map(|o| of(o)).collect() };
+        let contacts: Vec<f64> = outcomes.iter().flat_map(|o| o.contact_tangential.iter().copied()).collect();
+        let deviations: Vec<&[[f64; 3]]> = outcomes.iter().map(|o| o.deviations.as_slice()).collect();
+        Summary {
+            draws: outcomes.len(),
+            tangential: ErrorSpread::of(&all(|o| o.tangential)),
+            normal: ErrorSpread::of(&all(|o| o.normal)),
+            contact_tangential: (contacts.len() > outcomes.len()).then(|| ErrorSpread::of(&contacts)),
+            flagged: Interval::share(&outcomes.iter().map(|o| vec![o.flagged]).collect::<Vec<_>>()),
+            coverage: Coverage::of(&deviations),
+        }
+    }
+}

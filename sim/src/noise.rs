@@ -1,0 +1,205 @@
+//! `dermis noise`: errors under noise beside the Cramér–Rao bound.
+//!
+//! | option | prints |
+//! |---|---|
+//! | none | objectives on elliptic Hertz contacts, beside the bounds with 6 and 9 unknowns |
+//! | `--shapes` | estimators on drawn contacts of any shape, beside two baselines and the bound of a known support |
+//! | `--shapes --sensitivity` | errors if the scene states something wrongly, or the gains differ |
+
+use anyhow::{anyhow, Result};
+use clap::Args;
+use dermis_golden::generator::converter::Converter;
+use dermis_golden::generator::draws::{DrawOptions, Shape};
+use dermis_golden::noise::{sensitivities, shape_study, study, Candidate, ShapeStudy, Study};
+use dermis_golden::scene::{EstimatorKind, ObjectiveKind, Scene};
+
+use crate::progress::Progress;
+use crate::report::{self, Format};
+
+/// Frames averaged in the second half of the table of elliptic contacts.
+const AVERAGED: usize = 64;
+/// Noise level of the table of sensitivities.
+const SENSITIVITY_LEVEL: f64 = 1e-3;
+
+/// Arguments of `dermis noise`.
+#[derive(Args, Debug)]
+#[command(after_help = "Examples:
+  dermis noise sensor-1
+  dermis noise sensor-1 --frames 1 --medians
+  dermis noise sensor-2 --objective patch --objective auto --draws 1000 --format csv
+  dermis noise sensor-1 --shapes all --draws 20 --level 0.0005      any shape, with baselines and bound
+  dermis noise sensor-1 --shapes tilted,ring --unipolar --unstated --objective sparse --draws 20 --json
+  dermis noise sensor-1 --shapes table --level 0.01 --gain-spread 0.01 --frames 64 --coverage
+  dermis noise sensor-3 --shapes table --contacts 3 --level 0.0005
+  dermis noise sensor-1 --shapes table --sensitivity")]
+pub struct Arguments {
+    /// Built-in name or path of a scene.
+    scene: String,
+    /// Standard deviation of the noise over max |b|, repeatable; default: 0, 0.0001, 0.0005, 0.002, 0.01.
+    #[arg(long = "level", value_name = "SHARE")]
+    levels: Vec<f64>,
+    /// Number of random frames.
+    #[arg(long, default_value_t = 200)]
+    draws: usize,
+    /// Seed of contacts and noise.
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+    /// Frames averaged: in the second half of the table, 1 omits that half, default 64; with --shapes in every reading,
+    /// default 1.
+    #[arg(long)]
+    frames: Option<usize>,
+    /// Objective of the search, repeatable; default: all; with --shapes: what the scene names.
+    #[arg(long = "objective", value_name = "NAME", value_parser = objective)]
+    objectives: Vec<ObjectiveKind>,
+    /// Only the median errors: a line per level, a column per objective.
+    #[arg(long, conflicts_with = "format")]
+    medians: bool,
+    /// Output format.
+    #[arg(long, value_enum, default_value = "markdown")]
+    format: Format,
+    /// The same as --format json.
+    #[arg(long, conflicts_with_all = ["format", "medians"])]
+    json: bool,
+    #[command(flatten)]
+    shapes: ShapeArguments,
+}
+
+/// Options of the study over shapes.
+#[derive(Args, Debug)]
+struct ShapeArguments {
+    /// Draw these shapes in turn: all, table (all but asymmetric), or of hertz, punch, ring, rectangle, tilted,
+    /// asymmetric, separated by commas.
+    #[arg(long, value_name = "SHAPES", value_parser = shapes)]
+    shapes: Option<Shapes>,
+    /// Estimator, repeatable; default: what the scene names.
+    #[arg(long = "estimator", value_name = "NAME", value_parser = estimator, requires = "shapes")]
+    estimators: Vec<EstimatorKind>,
+    /// Number of contacts of a frame.
+    #[arg(long, value_name = "N", default_value_t = 1, requires = "shapes")]
+    contacts: usize,
+    /// Standard deviation of the taxels' gains.
+    #[arg(long, value_name = "SHARE", default_value_t = 0.0, requires = "shapes")]
+    gain_spread: f64,
+    /// Standard deviation of the taxels' zeros since the tare over max |b|.
+    #[arg(long, value_name = "SHARE", default_value_t = 0.0, requires = "shapes")]
+    drift: f64,
+    /// Frames without contact whose noisy mean is subtracted; 0: none.
+    #[arg(long, value_name = "N", default_value_t = 0, requires = "shapes")]
+    tare_frames: usize,
+    /// The sensor reads tension as zero.
+    #[arg(long, requires = "shapes")]
+    unipolar: bool,
+    /// The scene does not state noise and gain spread.
+    #[arg(long, requires = "shapes")]
+    unstated: bool,
+    /// Print how often the forces are within their standard deviations, also for each shape.
+    #[arg(long, requires = "shapes", conflicts_with_all = ["sensitivity", "medians"])]
+    coverage: bool,
+    /// Print the errors if the scene states something wrongly, or the gains differ; at the first level, default 0.001.
+    #[arg(long, requires = "shapes", conflicts_with = "medians")]
+    sensitivity: bool,
+}
+
+/// A list of shapes.
+#[derive(Clone, Debug)]
+struct Shapes(Vec<Shape>);
+
+/// Runs the study: the table as text.
+///
+/// # Errors
+/// An unknown scene, one that the golden model refuses, contacts that do not fit, a parameter out of range.
+pub fn run(arguments: &Arguments) -> Result<String> {
+    let scene = Scene::load(&arguments.scene)?;
+    let format = if arguments.json { Format::Json } else { arguments.format };
+    if let Some(Shapes(shapes)) = &arguments.shapes.shapes {
+        return over_shapes(arguments, &scene, shapes, format);
+    }
+    let mut wanted = Study {
+        draws: arguments.draws,
+        seed: arguments.seed,
+        frames: arguments.frames.unwrap_or(AVERAGED),
+        ..Study::default()
+    };
+    if !arguments.levels.is_empty() {
+        wanted.levels = arguments.levels.clone();
+    }
+    if !arguments.objectives.is_empty() {
+        wanted.objectives = arguments.objectives.clone();
+    }
+    let bar = Progress::steps(&format!("{}: noise", scene.name), 0);
+    let rows = study(&scene, &wanted, &mut |done, total| bar.set_of(done as u64, total as u64))?;
+    match arguments.medians {
+        true => Ok(report::noise_medians(&rows)),
+        false => report::noise(&rows, format),
+    }
+}
+
+fn over_shapes(arguments: &Arguments, scene: &Scene, shapes: &[Shape], format: Format) -> Result<String> {
+    let own = &arguments.shapes;
+    let converter = Converter {
+        gain_spread: own.gain_spread,
+        drift: own.drift,
+        tare_frames: own.tare_frames,
+        frames: arguments.frames.unwrap_or(1),
+        unipolar: own.unipolar,
+        ..Default::default()
+    };
+    let options = DrawOptions {
+        shapes: shapes.to_vec(),
+        contacts: own.contacts,
+        seed: arguments.seed,
+        converter,
+        ..Default::default()
+    };
+    let estimators = own.estimators.iter().copied().map(Candidate::Estimator);
+    let mut candidates: Vec<Candidate> =
+        estimators.chain(arguments.objectives.iter().copied().map(Candidate::Objective)).collect();
+    if candidates.is_empty() {
+        candidates.push(Candidate::Scene);
+    }
+    let (draws, told, by_shape) = (arguments.draws, !own.unstated, own.coverage);
+    let mut wanted = ShapeStudy { draws, options, told, candidates, by_shape, ..Default::default() };
+    if !arguments.levels.is_empty() {
+        wanted.levels = arguments.levels.clone();
+    }
+    let bar = Progress::steps(&format!("{}: noise, any shape", scene.name), 0);
+    let progress = |done: usize, total: usize| bar.set_of(done as u64, total as u64);
+    if own.sensitivity {
+        let level = arguments.levels.first().copied().unwrap_or(SENSITIVITY_LEVEL);
+        let wanted = ShapeStudy { levels: vec![level], ..wanted };
+        return report::sensitivity(&sensitivities(scene, &wanted, &progress)?, level, format);
+    }
+    let rows = shape_study(scene, &wanted, &progress)?;
+    match (arguments.medians, own.coverage, format) {
+        (true, _, _) => Ok(report::shape_medians(&rows)),
+        (false, true, Format::Markdown) => Ok(report::coverage(&rows)),
+        _ => report::shapes(&rows, format),
+    }
+}
+
+/// Parses an objective by its name in scene files.
+fn objective(name: &str) -> Result<ObjectiveKind, String> {
+    named(name, &ObjectiveKind::NAMES)
+}
+
+/// Parses an estimator by its name in scene files.
+fn estimator(name: &str) -> Result<EstimatorKind, String> {
+    named(name, &EstimatorKind::NAMES)
+}
+
+fn named<T: Copy>(name: &str, names: &[(&str, T)]) -> Result<T, String> {
+    let known = || names.iter().map(|(name, _)| *name).collect::<Vec<_>>().join(", ");
+    names.iter().find(|(known, _)| *known == name).map(|(_, kind)| *kind).ok_or_else(|| format!("one of {}", known()))
+}
+
+/// Parses a list of shapes.
+fn shapes(text: &str) -> Result<Shapes> {
+    match text {
+        "all" => Ok(Shapes(Shape::NAMES.map(|(_, shape)| shape).to_vec())),
+        "table" => Ok(Shapes(Shape::TABLE.to_vec())),
+        list => {
+            let shape = |name: &str| named(name.trim(), &Shape::NAMES).map_err(|known| anyhow!("{name:?}: {known}"));
+            Ok(Shapes(list.split(',').map(shape).collect::<Result<_>>()?))
+        }
+    }
+}
