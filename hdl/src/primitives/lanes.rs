@@ -469,8 +469,8 @@ mod tests {
     fn a_line_of_the_memory_file_has_lane_0_lowest() {
         let block = Lanes::of(&Shape { memory: vec![[-1, 0, 1].repeat(4); 2], ..shape() });
         let text = block.memory_file();
-        // All digits of 12 lanes of 18 bits; 1, 0 and −1 in the lowest three.
+        // All digits of 12 lanes of 18 bits; −1, 1, 0 and −1 in the lowest four.
         assert_eq!(text.lines().count(), 2);
-        assert!(text.lines().all(|line| line.len() == 54 && line.ends_with("0000100003ffff")), "{text}");
+        assert!(text.lines().all(|line| line.len() == 54 && line.ends_with("c000100003ffff")), "{text}");
     }
 }
