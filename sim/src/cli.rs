@@ -379,8 +379,20 @@ fn table(scenes: &[String], cases: &[Case], drawn: &DrawnFrames, format: Format)
     report::errors(&rows, format)
 }
 
+/// One line where the hardware takes another estimator than the scene.
+fn note_estimator(scene: &Scene) {
+    let (golden, hardware) = (scene.estimator(), scene.for_hardware().estimator());
+    if golden != hardware {
+        let (golden, hardware) = (golden.name(), hardware.name());
+        eprintln!("{}: the hardware has no estimator {golden} and takes {hardware} with sparse", scene.name);
+    }
+}
+
 /// The result of one engine, and the stress in MPa of the largest code.
 fn reconstruct(scene: &Scene, frames: &[Frame], engine: Engine, build_dir: &Path) -> Result<(Reconstruction, f64)> {
+    if !matches!(engine, Engine::Golden) {
+        note_estimator(scene);
+    }
     let model = || Model::for_frames(scene, frames);
     let stress = |model: &Model| Ok::<_, anyhow::Error>(full_scale(&model.scene, &model.stress(frames)?));
     let result = match engine {
@@ -402,7 +414,8 @@ fn reconstruct(scene: &Scene, frames: &[Frame], engine: Engine, build_dir: &Path
 
 /// One line: the difference between a result and the floating-point model's.
 fn against_golden(scene: &Scene, frames: &[Frame], result: &Reconstruction) -> Result<String> {
-    let golden = Golden::new(scene)?.run_averaged(frames)?;
+    // Compared with the same estimator.
+    let golden = Golden::new(&scene.for_hardware())?.run_averaged(frames)?;
     let model = Model::for_frames(scene, frames)?;
     let lsb_N = model.force_lsb_N(full_scale(&model.scene, &model.stress(frames)?));
     Ok(report::difference(&difference(&comparable_forces(&golden), &comparable_forces(result), lsb_N)))
@@ -411,6 +424,7 @@ fn against_golden(scene: &Scene, frames: &[Frame], result: &Reconstruction) -> R
 /// Writes the generated files, each completely or not at all; returns their list and the resource tables.
 fn build(scene: &Scene, out: &Path, board: bool, with_features: bool) -> Result<String> {
     // Large matrices take seconds; a design that does not fit takes longer, while other settings are tried.
+    note_estimator(scene);
     let progress = Progress::start(&format!("{}: model and Verilog", scene.name));
     let model = Model::new(scene)?;
     let mut generated = if board { generate_board(&model)? } else { generate(&model)? };

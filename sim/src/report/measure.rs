@@ -268,7 +268,7 @@ pub fn measure(scenes: &[Scene], cases: &[Case], options: &Options) -> Result<Ve
 }
 
 fn prepare(scene: Scene, frames: Vec<Frame>, options: &Options) -> Result<Measured> {
-    let engine = Golden::new(&scene)?;
+    let engine = Golden::new(&scene.for_hardware())?;
     let golden = frames.iter().map(|frame| engine.run(frame)).collect::<Result<Vec<_>, _>>()?;
     let bit_true = match Model::for_frames(&scene, &frames) {
         Ok(model) => Ok(bit_true(model, &frames, options)?),
