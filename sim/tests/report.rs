@@ -44,6 +44,20 @@ fn all_formats_agree() {
     let markdown = fs::read_to_string(out.join("report.md")).unwrap();
     let page = fs::read_to_string(out.join("report.html")).unwrap();
 
+    // The page begins with error against noise beside error against run time.
+    let first = &report["sections"][0];
+    let names: Vec<&str> = first["items"].as_array().unwrap().iter().filter_map(|item| item["file"].as_str()).collect();
+    let pictures = ["noise-eight-by-eight", "first-time-eight-by-eight-shear"];
+    assert_eq!(names, pictures.map(|name| format!("report-pictures/{name}.svg")));
+    let (head, rows) = table(&report, "noise");
+    let at = |name: &str| head.iter().position(|head| *head == name).unwrap();
+    for row in rows {
+        let (error, noise) = (row[at("shear error, median")].as_f64().unwrap(), row[at("noise")].as_f64().unwrap());
+        assert!(if row[at("estimator")] == "none" { error == 1.0 } else { error > 0.0 && error < 3.0 }, "{row}");
+        assert_eq!(row[at("bound, median")].as_f64().unwrap() > 0.0, noise > 0.0, "{row}");
+    }
+    assert_eq!(rows.iter().filter(|row| row[at("estimator")] == "search sparse").count(), 5);
+
     // One recommendation, case 0, with co-simulated cycles.
     let (head, rows) = table(&report, "choice");
     let at = |name: &str| head.iter().position(|head| *head == name).unwrap();

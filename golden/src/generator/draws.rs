@@ -3,7 +3,8 @@
 //! | drawn | range |
 //! |---|---|
 //! | shape of contact k of frame n | `shapes` in turn, from the (n + k)th |
-//! | half-axes, angle, place | as [`super::random_contacts`]: h to 2 h, ratio 0.7 to 1.35, rim h/2 inside, 2 h apart |
+//! | first half-axis | s to 2 s, s = h, but the larger pitch where it exceeds 2 h: taxels miss smaller ones |
+//! | second half-axis, angle, place | as [`super::random_contacts`]: ratio 0.7 to 1.35, rim s/2 inside, 2 h apart |
 //! | inner over outer radius of a ring | 0.3 … 0.7 |
 //! | tilt | 0.3 … 0.8, any direction |
 //! | normal load | `normal_N`, 1 … 12 N |
@@ -30,6 +31,8 @@ use std::f64::consts::TAU;
 
 /// Draws of all places before the array counts as too small.
 const TRIES: usize = 20;
+/// Pitch in units of the thickness above which contacts of the size of the thickness fall between taxels.
+const COARSE: f64 = 2.0;
 /// Multiplier of the seed: neighbouring seeds have no random numbers in common.
 const SPREAD: u64 = 0x9e37_79b9_7f4a_7c15;
 
@@ -230,8 +233,11 @@ impl Draws {
                 ..Default::default()
             }
         };
+        let Sensor { pitch_x_mm, pitch_y_mm, thickness_mm, .. } = self.sensor;
+        let pitch_mm = pitch_x_mm.max(pitch_y_mm);
+        let size_mm = if pitch_mm > COARSE * thickness_mm { pitch_mm } else { thickness_mm };
         for _ in 0..TRIES {
-            if let (contacts, true) = placed(&self.sensor, &mut random, count, false, shaped) {
+            if let (contacts, true) = placed(&self.sensor, size_mm, &mut random, count, false, shaped) {
                 return Ok(contacts);
             }
         }
@@ -278,6 +284,7 @@ impl Draws {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::f64::consts::PI;
 
     fn draws(scene: &str, options: DrawOptions) -> Draws {
         Draws::new(&Scene::builtin(scene).unwrap(), options).unwrap()
@@ -384,6 +391,17 @@ mod tests {
         assert_ne!(drawn.frame.stress_MPa, drawn.exact_MPa);
         assert!(drawn.frame.stress_MPa.iter().all(|b| *b >= 0.0));
         assert_eq!(drawn.read(&Converter::default()).unwrap().stress_MPa, drawn.exact_MPa);
+    }
+
+    #[test]
+    fn contacts_are_seen_on_a_coarse_array() {
+        let draws = draws("sensor-4", DrawOptions::default());
+        for number in 0..10 {
+            let drawn = draws.frame(number).unwrap();
+            // Of the mean pressure on the largest contact, half-axes of 2 · 1.35 pitches.
+            let least = drawn.total_N[2] / (PI * (2.7f64 * 8.0).powi(2));
+            assert!(drawn.peak_MPa() > least, "{number}");
+        }
     }
 
     #[test]
