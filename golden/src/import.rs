@@ -13,7 +13,8 @@
 //! | NumPy `.npy` | first six bytes | size | unit, pitch |
 //! | plain CSV | `.csv`, `.tsv`, `.txt`, `.dat` | | size, unit, pitch |
 //!
-//! Missing sensels become dead taxels. Counts have no stress: without a stated full scale they are refused.
+//! Missing sensels become dead taxels, on which forces continue those around them; where nothing can press on them, as
+//! outside the outline of an insole, they may be stated to read 0 instead. Counts have no stress: without a stated full scale they are refused.
 
 mod crop;
 mod csv;
@@ -73,6 +74,8 @@ pub struct Settings {
     pub frames: Option<[usize; 2]>,
     /// What to keep of the array.
     pub crop: Crop,
+    /// Whether missing sensels become taxels that read 0 instead of dead ones.
+    pub missing_as_zero: bool,
     /// Thickness of an elastic cover over the array in mm.
     pub thickness_mm: Option<f64>,
 }
@@ -163,7 +166,8 @@ pub fn import(file: &str, bytes: &[u8], settings: &Settings) -> Result<Imported,
         device: recording.device.clone(),
         array: [recording.rows, recording.cols],
         window,
-        dead: dead.iter().filter(|dead| **dead).count(),
+        missing: dead.iter().filter(|dead| **dead).count(),
+        missing_as_zero: settings.missing_as_zero,
         unit,
         units_per_MPa: per_MPa,
         full_scale_MPa,
@@ -173,7 +177,8 @@ pub fn import(file: &str, bytes: &[u8], settings: &Settings) -> Result<Imported,
         noise: noise(&stress, &alive),
         frames: records,
     };
-    let facts = scene::Facts { sensor: &sensor, covered: summary.covered, unipolar, dead: &dead };
+    let listed: &[bool] = if settings.missing_as_zero { &[] } else { &dead };
+    let facts = scene::Facts { sensor: &sensor, covered: summary.covered, unipolar, dead: listed };
     let (scene_text, scene) = scene::scene(&summary, &facts)?;
     Ok(Imported { scene_text, scene, frames, summary })
 }

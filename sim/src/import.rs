@@ -7,7 +7,7 @@ use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
 use anyhow::{anyhow, bail, Result};
-use clap::Args;
+use clap::{Args, ValueEnum};
 use dermis_golden::import::{load, Crop, Format, Settings, Summary, Unit};
 
 use crate::report::document::percent_text;
@@ -51,13 +51,25 @@ pub struct Arguments {
     /// auto, contact, or rows and columns counted from 0: A..B,C..D, ends included.
     #[arg(long, value_name = "WINDOW", default_value = "auto")]
     crop: String,
+    /// What missing sensels become: dead taxels, on which forces continue those around them, or taxels that read 0.
+    #[arg(long, value_enum, default_value = "dead")]
+    missing: Missing,
     /// Print the summary as JSON and nothing else.
     #[arg(long)]
     json: bool,
 }
 
+/// What missing sensels become.
+#[derive(ValueEnum, Clone, Copy, Debug, PartialEq, Eq)]
+enum Missing {
+    /// Dead taxels.
+    Dead,
+    /// Taxels that read 0, where nothing can press on them.
+    Zero,
+}
+
 const EXAMPLES: &str = "Examples:
-  dermis import walk.asf
+  dermis import walk.asf --missing zero
   dermis import finger.csv --full-scale 0.4 --crop contact --frames 1..20 --out finger
   dermis import press.npy --units kPa --pitch 2.5,2.5 --thickness 3
   dermis import log.csv --size 4x4 --units N/cm2 --pitch 5,5 --json
@@ -100,6 +112,7 @@ impl Arguments {
             bits: self.bits,
             frames: frames.transpose()?,
             crop: crop(&self.crop)?,
+            missing_as_zero: self.missing == Missing::Zero,
             thickness_mm: self.thickness,
         })
     }
@@ -119,13 +132,19 @@ fn lines(text: &mut String, summary: &Summary, sensor: &str) -> std::fmt::Result
     )?;
     writeln!(
         text,
-        "window          rows {}..{}, columns {}..{}: {sensor}; {} dead",
+        "window          rows {}..{}, columns {}..{}: {sensor}",
         window.row0,
         window.row0 + window.rows - 1,
         window.col0,
         window.col0 + window.cols - 1,
-        summary.dead
     )?;
+    if summary.missing > 0 {
+        let what = match summary.missing_as_zero {
+            true => "they read 0",
+            false => "dead taxels; forces on them continue those around (--missing zero: none)",
+        };
+        writeln!(text, "missing         {} sensels: {what}", summary.missing)?;
+    }
     if summary.outside_share() > 0.0 {
         writeln!(
             text,

@@ -25,7 +25,7 @@ pub(super) struct Facts<'a> {
     pub covered: bool,
     /// Whether no reading is negative.
     pub unipolar: bool,
-    /// Dead taxels in the window, row-major.
+    /// Dead taxels in the window, row-major; empty if there are none.
     pub dead: &'a [bool],
 }
 

@@ -46,8 +46,10 @@ pub struct Summary {
     pub array: [usize; 2],
     /// The part of it that the scene has.
     pub window: Window,
-    /// Missing sensels in the window, dead taxels of the scene.
-    pub dead: usize,
+    /// Missing sensels in the window.
+    pub missing: usize,
+    /// Whether they are taxels that read 0; else they are dead taxels.
+    pub missing_as_zero: bool,
     /// Unit of the readings.
     pub unit: Unit,
     /// Units per MPa.

@@ -24,7 +24,7 @@ fn tekscan_counts_with_pads_and_raw_sums() {
     assert_eq!(summary.device.as_deref(), Some("Tekscan 6900"));
     // Four pads of 11×11 with a gap of two; the lines without sensels around them are left out.
     assert_eq!(summary.window, Window { row0: 2, col0: 2, rows: 24, cols: 24 });
-    assert_eq!((summary.dead, imported.scene.input.dead.len()), (24 * 24 - 4 * 11 * 11, 24 * 24 - 4 * 11 * 11));
+    assert_eq!((summary.missing, imported.scene.input.dead.len()), (24 * 24 - 4 * 11 * 11, 24 * 24 - 4 * 11 * 11));
     assert_eq!((sensor.pitch_x_mm, sensor.pitch_y_mm, sensor.thickness_mm), (1.27, 1.27, 0.127));
     // "Frame 60, 5.96,, …": the sums of the file's lines are those of the readings.
     let first = &summary.frames[0];
@@ -94,6 +94,11 @@ fn without_a_cover_there_is_normal_force_and_no_shear() {
     assert!((share - 1.0).abs() < 0.01, "{share}");
     // The finger lies over the gap between the pads.
     assert!(result.resultant_N[2] > 1.01 * alive, "{} {alive}", result.resultant_N[2]);
+    // Stated to read 0, they have no force.
+    let zero = import("iscan-finger.csv", ISCAN, &Settings { missing_as_zero: true, ..settings.clone() }).unwrap();
+    assert_eq!((zero.summary.missing, zero.scene.input.dead.len()), (imported.summary.missing, 0));
+    let result = Golden::new(&zero.scene).unwrap().run(&zero.frames[0]).unwrap();
+    assert!((result.resultant_N[2] / imported.summary.frames[0].normal_N - 1.0).abs() < 0.01);
     let covered = import("iscan-finger.csv", ISCAN, &Settings { thickness_mm: Some(2.0), ..settings }).unwrap();
     assert!(covered.scene.search.mu_max > 0.0 && covered.scene.input.unipolar);
     assert_eq!(covered.scene.sensor.thickness_mm, 2.0);
@@ -145,7 +150,7 @@ fn arrays_that_numpy_wrote() {
     for (name, bytes, settings, first, value) in cases {
         let imported = import("a.npy", bytes, &settings).unwrap();
         let dead = if name == "f4-fortran" { 1 } else { 0 };
-        assert_eq!(imported.summary.dead, dead, "{name}");
+        assert_eq!(imported.summary.missing, dead, "{name}");
         assert_eq!(imported.frames.len(), if first == 0 { 2 } else { 1 }, "{name}");
         for (index, frame) in imported.frames.iter().enumerate() {
             for (k, stress) in frame.stress_MPa.iter().enumerate().take(12 - dead) {

@@ -118,7 +118,7 @@ fn recording(name: &str, format: Format, bytes: &[u8]) -> bool {
     let settings = Settings {
         format: Some(format),
         // NumPy states the size, but for lines of sensels.
-        size: (plain && (format == Format::Csv || bytes.len() % 2 == 1)).then_some([3, 4]),
+        size: (plain && (format == Format::Csv || !bytes.len().is_multiple_of(2))).then_some([3, 4]),
         unit: plain.then_some(Unit::KiloPa),
         pitch_mm: plain.then_some([2.0, 3.0]),
         full_scale_MPa: (format == Format::Tekscan).then_some(1.0),

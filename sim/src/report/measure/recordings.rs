@@ -78,7 +78,7 @@ fn fixed(model: &Model, frames: &[&Frame], golden: &[Reconstruction], interrupt:
     let (results, seconds) = timed(frames, interrupt, |frame| {
         let trace = model.run(&model.readings(std::slice::from_ref(frame))?);
         cycles = cycles.max(trace.cycles.total);
-        Ok(model.decode(frame, "fixed", &trace.beats, &trace.status)?)
+        Ok(model.decode(std::slice::from_ref(frame), "fixed", &trace.beats, &trace.status)?)
     })?;
     let compared = golden.iter().zip(&results).zip(frames).map(|((golden, fixed), frame)| {
         let lsb_N = model.force_lsb_N(full_scale(&model.scene, frame));

@@ -65,7 +65,7 @@ fn measured(all: &[Recorded]) -> Table {
         "recording",
         "array",
         "taken",
-        "dead",
+        "missing",
         "frames",
         "levels",
         "step, kPa",
@@ -84,7 +84,7 @@ fn measured(all: &[Recorded]) -> Table {
             text_cell(recorded.imported.summary.name.clone()),
             text_cell(format!("{rows}×{cols}")),
             text_cell(format!("{}×{}", window.rows, window.cols)),
-            count(recorded.imported.summary.dead as u64),
+            count(recorded.imported.summary.missing as u64),
             count(recorded.imported.frames.len() as u64),
             count(codes.levels as u64),
             kPa(codes.step_MPa),
@@ -149,7 +149,7 @@ fn force_row(recorded: &Recorded) -> Vec<Cell> {
         percent(closure.map(|[_, median]| median)),
         percent(closure.map(|[most, _]| most)),
         median_percent(indices().map(|k| Some((alive[k][0] / normal(k) - 1.0).abs()))),
-        match summary.dead {
+        match recorded.imported.scene.input.dead.len() {
             0 => empty_cell(),
             _ => median_percent(indices().map(|k| Some(alive[k][1] / (alive[k][0] + alive[k][1])))),
         },
