@@ -60,6 +60,7 @@ const EXAMPLES: &str = "Examples:
   dermis noise sensor-1                              errors under noise, next to the Cramér–Rao bound
   dermis report                                      HTML page: recommended cases and formats, error against time
   dermis generate sensor-3 --random 2 --out two.json  a frame with known forces
+  dermis import walk.asf                             scene and frames of a recording of a real array
   dermis stability --plot stability.svg              error against the condition number
   dermis stress                                      gaps, wrong tlast and resets on sensor-1
   dermis faults                                      1000 bit flips in ROM, RAM and registers of sensor-1";
@@ -159,6 +160,8 @@ enum Command {
     Report(report::Arguments),
     /// Generate a frame with known forces from contact descriptions.
     Generate(crate::generate::Arguments),
+    /// Make a scene and frames from a recording of a real pressure array.
+    Import(crate::import::Arguments),
     /// Measure errors of double, single and fixed point against the condition number, or on extreme frames.
     Stability(crate::stability::Arguments),
     /// Test the simulated hardware's AXI streams with gaps, back-pressure, wrong tlast and resets.
@@ -332,6 +335,7 @@ fn run(arguments: &Arguments) -> Result<(String, bool)> {
         }
         Command::Report(arguments) => report::run(arguments, build_dir),
         Command::Generate(arguments) => Ok((crate::generate::run(arguments)?, true)),
+        Command::Import(arguments) => Ok((crate::import::run(arguments, build_dir)?, true)),
         Command::Stability(arguments) => Ok((crate::stability::run(arguments)?, true)),
         Command::Faults(arguments) => crate::faults::run(arguments, build_dir),
         Command::Stress(arguments) => crate::stress::run(arguments, build_dir),

@@ -137,6 +137,38 @@ fn the_papers_figures() {
 }
 
 #[test]
+fn the_page_of_a_recording() {
+    let work = tempfile::tempdir().unwrap();
+    let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../golden/data/recordings/iscan-finger.csv");
+    let args = ["--full-scale", "0.5", "--crop", "contact", "--frames", "3..10", "--out", "finger"];
+    let mut import = dermis(work.path(), &["import"]);
+    assert!(import.arg(file).args(args).status().unwrap().success());
+    let output = dermis(work.path(), &["report", "--recording", "finger", "--out", "out"]).output().unwrap();
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    assert_eq!(String::from_utf8(output.stdout).unwrap(), "out/recordings.html\n");
+    let text = fs::read_to_string(work.path().join("out/recordings.json")).unwrap();
+    let report: Value = serde_json::from_str(&text).unwrap();
+    let (head, rows) = table(&report, "recordings");
+    let at = |name: &str| head.iter().position(|head| *head == name).unwrap();
+    assert_eq!((rows.len(), &rows[0][at("array")], rows[0][at("frames")].as_f64()), (1, &"28×28".into(), Some(8.0)));
+    // Counts: a step of 1/255 of full scale, noise of the order of a step and well below the peak.
+    assert!((rows[0][at("step, kPa")].as_f64().unwrap() / (500.0 / 255.0) - 1.0).abs() < 1e-9);
+    let noise = rows[0][at("of peak")].as_f64().unwrap();
+    assert!((0.001..0.05).contains(&noise), "{noise}");
+    let (head, rows) = table(&report, "recording-forces");
+    let at = |name: &str| head.iter().position(|head| *head == name).unwrap();
+    let share = |name: &str| rows[0][at(name)].as_f64().unwrap();
+    // The file's raw sums are exact; the force of a film is stress times area; 18-bit words agree to 0.1 %.
+    assert!(share("at most") < 1e-9);
+    assert!(share("reconstructed off stress × area, median") < 0.01);
+    assert!(share("fixed off golden, largest") < 1e-3);
+    assert!(share("cycles") > 0.0 && share("golden, CPU") > 0.0);
+    // No shear is claimed.
+    assert!(text.contains("no shear is searched, and none is claimed") && !text.contains("e_t"));
+    assert_eq!(files(&work.path().join("out/recordings-pictures")).len(), 5);
+}
+
+#[test]
 fn an_interruption_keeps_earlier_files() {
     let work = tempfile::tempdir().unwrap();
     let out = work.path().join("out");
