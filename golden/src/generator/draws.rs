@@ -31,6 +31,8 @@ use std::f64::consts::TAU;
 
 /// Draws of all places before the array counts as too small.
 const TRIES: usize = 20;
+/// Largest number of contacts of a frame.
+const MOST_CONTACTS: usize = 64;
 /// Pitch in units of the thickness above which contacts of the size of the thickness fall between taxels.
 const COARSE: f64 = 2.0;
 /// Multiplier of the seed: neighbouring seeds have no random numbers in common.
@@ -96,7 +98,7 @@ impl Shape {
 pub struct DrawOptions {
     /// The shapes, taken in turn; not empty.
     pub shapes: Vec<Shape>,
-    /// Number of contacts of a frame, at least 1; they do not overlap.
+    /// Number of contacts of a frame, 1 to 64; they do not overlap.
     pub contacts: usize,
     /// Smallest and largest normal load of a contact in N.
     pub normal_N: [f64; 2],
@@ -192,8 +194,8 @@ impl Draws {
         if options.shapes.is_empty() {
             return fail("shapes", 0.0, "at least one");
         }
-        if options.contacts == 0 {
-            return fail("contacts", 0.0, "at least 1");
+        if !(1..=MOST_CONTACTS).contains(&options.contacts) {
+            return fail("contacts", options.contacts as f64, "a whole number from 1 to 64");
         }
         let [light, heavy] = options.normal_N;
         if !(light > 0.0 && heavy >= light && heavy.is_finite()) {
@@ -420,7 +422,8 @@ mod tests {
         let good = DrawOptions::default();
         let cases = [
             (DrawOptions { shapes: vec![], ..good.clone() }, "shapes"),
-            (DrawOptions { contacts: 0, ..good.clone() }, "contacts"),
+            (DrawOptions { contacts: 0, ..good.clone() }, "contacts = 0"),
+            (DrawOptions { contacts: 65, ..good.clone() }, "contacts = 65"),
             (DrawOptions { peak_MPa: Some(0.0), ..good.clone() }, "peak_MPa"),
             (DrawOptions { normal_N: [0.0, 1.0], ..good.clone() }, "normal_N"),
             (DrawOptions { ratio: [0.5, 0.1], ..good }, "ratio"),
