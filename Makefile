@@ -67,8 +67,9 @@ docs: ## build the documentation, warnings are errors
 	@echo '== docs'
 	RUSTDOCFLAGS="-D warnings" $(CARGO) doc --workspace --no-deps
 
-bench: ## time a golden reconstruction
+bench: setup ## time a golden reconstruction, and rust-hdl's simulation against Verilator's
 	$(CARGO) bench --package dermis-golden
+	$(CARGO) bench --package dermis-sim
 
 build: program ## generate the hardware of SCENE
 	$(DERMIS) --build-dir $(BUILD) build $(SCENE)
