@@ -8,6 +8,9 @@
 //! | `border_share` | – | none; beside `load-outside` | – | [`Checks::of`] |
 //! | `load_ratio` | – | `load-mismatch` | off 1 by more than [`LOAD_MISMATCH`] | the golden engine |
 //! | `shape_misfit` | – | `shape-mismatch` | above 1 | the golden engine, with `patch` and `symmetric` |
+//! | `noise_MPa` | MPa | none | – | the estimator `evidence` |
+//! | `misfit_probability` | – | `misfit` | below [`MISFIT`] | the estimator `evidence`, where the noise is stated |
+//! | `shear_spread` | – | `shear-not-resolved` | above [`NOT_RESOLVED`] | the estimator `evidence` |
 //!
 //! A figure is there whenever it can be computed, whether or not its flag is raised.
 
@@ -28,6 +31,10 @@ pub const MU_AT_BOUND: f64 = 0.95;
 pub const MU_COUNTS_FROM: f64 = 0.05;
 /// Largest difference of `load_ratio` from 1.
 pub const LOAD_MISMATCH: f64 = 0.1;
+/// Probability of what is left unexplained below which the model does not fit: one frame in a thousand.
+pub const MISFIT: f64 = 1e-3;
+/// Standard deviation of a shear, over its size, above which it is not resolved.
+pub const NOT_RESOLVED: f64 = 1.0 / 3.0;
 
 /// The figures behind the flags of one result.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -54,6 +61,17 @@ pub struct Checks {
     /// takes `sparse`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub shape_misfit: Option<f64>,
+    /// Standard deviation of the noise in MPa that the estimate rests on: the scene's, else the one found from the
+    /// frame; `None` with `search`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub noise_MPa: Option<f64>,
+    /// Probability that noise of the stated size leaves as much of the stress unexplained; `None` with `search`, or
+    /// where no noise is stated.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub misfit_probability: Option<f64>,
+    /// Standard deviation of the shear over its size, the largest of all contacts; `None` with `search`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub shear_spread: Option<f64>,
 }
 
 impl Checks {
@@ -65,7 +83,7 @@ impl Checks {
             mu_share: mu_share(scene, result),
             border_share: border_share(&scene.sensor, &result.forces_N.fz),
             load_ratio: None,
-            shape_misfit: None,
+            ..result.checks
         }
     }
 
@@ -80,6 +98,10 @@ impl Checks {
             }
             Flag::LoadMismatch => self.load_ratio.map(|ratio| format!("{ratio:.3} of the load without shear")),
             Flag::ShapeMismatch => self.shape_misfit.map(|misfit| format!("misfit {misfit:.3} times the allowed")),
+            Flag::ShearNotResolved => {
+                self.shear_spread.map(|spread| format!("standard deviation {:.0} % of the shear", 1e2 * spread))
+            }
+            Flag::Misfit => self.misfit_probability.map(|probability| format!("probability {probability:.1e}")),
             _ => None,
         }
     }
@@ -92,6 +114,8 @@ impl Checks {
             (Flag::MuAtBound, self.mu_share.is_some_and(|share| share >= MU_AT_BOUND)),
             (Flag::ImplausibleStress, self.peak_MPa > scene.input.plausible_MPa),
             (Flag::ShapeMismatch, self.shape_misfit.is_some_and(|misfit| misfit > 1.0)),
+            (Flag::Misfit, self.misfit_probability.is_some_and(|probability| probability < MISFIT)),
+            (Flag::ShearNotResolved, self.shear_spread.is_some_and(|spread| spread > NOT_RESOLVED)),
             (Flag::LoadMismatch, self.load_ratio.is_some_and(|ratio| (ratio - 1.0).abs() > LOAD_MISMATCH)),
         ]
         .into_iter()

@@ -28,7 +28,7 @@
 //! |---|---|---|
 //! | in: b | taxels | MPa |
 //! | in: noise | 1 | MPa, optional |
-//! | out: pressure | taxels | N |
+//! | out: forces | 3 × taxels | N |
 //! | out: per contact centre, μ, force, σ | – | mm, –, N |
 
 mod ascent;
@@ -42,10 +42,12 @@ mod prior;
 #[cfg(test)]
 mod tests;
 
+use crate::frame::Forces;
 use crate::scene::Scene;
 use ascent::Prior;
 use cells::Cells;
 use fit::Fit;
+use serde::{Deserialize, Serialize};
 
 /// ℓ in units of the depth, and at least in units of the larger pitch.
 const LENGTH: [f64; 2] = [2.0 / 3.0, 0.5];
@@ -66,7 +68,7 @@ pub struct Evidence {
 }
 
 /// One contact.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ContactEstimate {
     /// Centre of pressure in mm from the array's centre.
     pub centre_mm: [f64; 2],
@@ -83,12 +85,10 @@ pub struct ContactEstimate {
 /// What one frame says.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Estimate {
-    /// The contacts, the largest load first; none without a reading above zero.
+    /// The contacts; none without a reading above zero.
     pub contacts: Vec<ContactEstimate>,
-    /// Normal force on each taxel in N.
-    pub pressure_N: Vec<f64>,
-    /// Contact of each taxel; `None` where no force is.
-    pub contact_of: Vec<Option<usize>>,
+    /// Force on each taxel in N.
+    pub forces_N: Forces,
     /// Standard deviation of the noise in MPa, as it was given or as it was found.
     pub noise_MPa: f64,
     /// Probability that noise of the given size leaves as much unexplained; `None` where the noise was found from the
@@ -123,8 +123,7 @@ impl Evidence {
         let peak = (0..b.len()).filter(|&t| self.alive[t]).fold(0.0f64, |peak, t| b[t].max(peak));
         let nothing = || Estimate {
             contacts: Vec::new(),
-            pressure_N: vec![0.0; b.len()],
-            contact_of: vec![None; b.len()],
+            forces_N: Forces::zeros(b.len()),
             noise_MPa: noise_MPa.unwrap_or(0.0),
             misfit_probability: None,
             rounds: 0,
@@ -139,7 +138,8 @@ impl Evidence {
             None => nothing(),
             Some(mut estimate) => {
                 estimate.noise_MPa = noise_MPa.unwrap_or(estimate.noise_MPa * peak);
-                estimate.pressure_N.iter_mut().for_each(|p| *p *= peak);
+                let Forces { fx, fy, fz } = &mut estimate.forces_N;
+                [fx, fy, fz].into_iter().flatten().for_each(|force| *force *= peak);
                 for contact in &mut estimate.contacts {
                     contact.force_N.iter_mut().chain(&mut contact.sigma_N).for_each(|force| *force *= peak);
                 }

@@ -13,13 +13,15 @@
 //! | `mu-at-bound` | a μ is at `search.mu_max` | [`Checks::flags`] |
 //! | `implausible-stress` | a stress is above `input.plausible_MPa` | `Checks::flags` |
 //! | `load-mismatch` | the normal force is far from that of the same stress without shear | `Checks::flags`, golden engine |
+//! | `shear-not-resolved` | the shear's standard deviation is above a third of it | `Checks::flags`, estimator `evidence` |
+//! | `misfit` | the stated noise does not explain what the estimate leaves | `Checks::flags`, estimator `evidence` |
 //! | `shape-mismatch` | the shape that `patch` or `symmetric` fits leaves more than the noise | `Checks::flags`, golden engine |
 //!
 //! [`Checks::flags`]: crate::checks::Checks::flags
 
 use crate::frame::Frame;
 use crate::quantise::Codes;
-use crate::scene::{ObjectiveKind, Scene};
+use crate::scene::{EstimatorKind, ObjectiveKind, Scene};
 use serde::{Deserialize, Serialize};
 
 /// A limitation of a result.
@@ -50,6 +52,10 @@ pub enum Flag {
     LoadMismatch,
     /// No contact of the shape that the objective assumes explains the stress within the stated noise.
     ShapeMismatch,
+    /// The shear's standard deviation is above a third of it.
+    ShearNotResolved,
+    /// Noise of the stated size does not explain what the estimate leaves of the stress.
+    Misfit,
 }
 
 /// Fraction of the true normal load that the cells must carry for it to count as inside.
@@ -90,7 +96,8 @@ fn load_outside(frame: &Frame) -> bool {
 /// Compares the noise floor after averaging, or the standard deviation LSB/√12 of rounding, with the peak.
 fn shear_unreliable(scene: &Scene, frame: &Frame, codes: &Codes) -> bool {
     let search = &scene.search;
-    let searched = search.objective == ObjectiveKind::Sparse && search.mu_max > 0.0;
+    let by_search = scene.estimator() == EstimatorKind::Search;
+    let searched = by_search && search.objective == ObjectiveKind::Sparse && search.mu_max > 0.0;
     let noise = (search.noise_floor_MPa * scene.input.noise_share()).max(codes.lsb_MPa() / 12f64.sqrt());
     let peak = frame.peak_MPa();
     searched && peak > 0.0 && noise > SPARSE_NOISE_LIMIT * peak
@@ -129,6 +136,8 @@ mod tests {
             Flag::ImplausibleStress,
             Flag::LoadMismatch,
             Flag::ShapeMismatch,
+            Flag::ShearNotResolved,
+            Flag::Misfit,
         ];
         let text = serde_json::to_string(&all).unwrap();
         let wanted = [
@@ -144,6 +153,8 @@ mod tests {
             "implausible-stress",
             "load-mismatch",
             "shape-mismatch",
+            "shear-not-resolved",
+            "misfit",
         ];
         assert_eq!(text, serde_json::to_string(&wanted).unwrap());
     }

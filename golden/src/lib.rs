@@ -43,6 +43,7 @@
 //! | [`board`] | the device for which hardware is generated |
 //! | [`frame`] | stress on every taxel, with known forces if there are any; JSON, CSV, frames shipped with the crate |
 //! | [`generator`] | frames computed from described or random contacts, with their exact forces |
+//! | [`import`] | recordings of real arrays as scene and frames |
 //! | [`input`] | averaging, calibration and dead taxels of a real sensor; stress that a unipolar sensor clips |
 //! | [`quantise`] | stress as the codes of a converter |
 //! | [`influence`], [`bonded`] | stress of a loaded cell on a half-space and on a layer bonded to a rigid base |
@@ -78,6 +79,7 @@ pub mod folded;
 pub mod frame;
 pub mod gauss;
 pub mod generator;
+pub mod import;
 pub mod influence;
 pub mod input;
 pub mod link;

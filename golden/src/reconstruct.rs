@@ -13,6 +13,7 @@
 mod adaptive;
 #[cfg(test)]
 mod bonded_tests;
+mod by_evidence;
 mod contacts;
 mod extra;
 mod golden;

@@ -12,7 +12,7 @@
 //! | | `cases` (for "adaptive": 0 and others of 1 … 3 for the hardware; without it as many as fit together) |
 //! | | `condition` ("loaded"; "both-signs") |
 //! | `[search]` | `objective` ("sparse"; …), `mu_max` (0.6; 0, or 0.001 … 2), `noise_floor_MPa` (0) |
-//! | | `form` ("oblique"; "orthogonal"), `estimator` ("auto"; "search", "evidence"), `degree` (none; 1 … 8) |
+//! | | `form` ("oblique"; "orthogonal"), `estimator` ("search"; "evidence", "auto"), `degree` (none; 1 … 8) |
 //! | `[inverse]` | `kind` ("tsvd"; "tikhonov", "exact"), `level` (floor of format and noise; 0 … 1, both excluded) |
 //! | `[threshold]` | `min_force_N` (0) |
 //! | `[fixed]` | `input_bits` (20; 8 … 24), `data_bits` (18; 12 … 18), `coef_bits` (18; 8 … 18) |
@@ -131,13 +131,13 @@ pub enum ObjectiveKind {
 /// How forces are estimated from stress.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum EstimatorKind {
-    /// The one that fits the scene, [`Scene::estimator`].
-    #[default]
-    Auto,
     /// The μ that maximises the objective Π.
+    #[default]
     Search,
     /// The μ that makes the stress most probable, [`crate::evidence`].
     Evidence,
+    /// `evidence` where it implements the scene, else `search`.
+    Auto,
 }
 
 /// How Eq. 1 is computed.
@@ -165,7 +165,7 @@ pub struct PartitionSpec {
 /// Table `[search]`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SearchSpec {
-    /// How forces are estimated; a scene that names an objective and no estimator takes `search`.
+    /// How forces are estimated.
     pub estimator: EstimatorKind,
     /// The objective that is maximised.
     pub objective: ObjectiveKind,
@@ -353,7 +353,7 @@ impl Default for HardwareSpec {
 impl EstimatorKind {
     /// Every estimator with its name in a scene file, the default first.
     pub const NAMES: [(&'static str, EstimatorKind); 3] =
-        [("auto", EstimatorKind::Auto), ("search", EstimatorKind::Search), ("evidence", EstimatorKind::Evidence)];
+        [("search", EstimatorKind::Search), ("evidence", EstimatorKind::Evidence), ("auto", EstimatorKind::Auto)];
 
     /// Name in a scene file.
     pub fn name(self) -> &'static str {
@@ -380,6 +380,21 @@ impl ObjectiveKind {
 }
 
 impl Scene {
+    /// The estimator of the golden model: the scene's, and for `auto` the one that implements the scene.
+    pub fn estimator(&self) -> EstimatorKind {
+        match self.search.estimator {
+            EstimatorKind::Auto if self.evidence_refusal().is_none() => EstimatorKind::Evidence,
+            EstimatorKind::Auto => EstimatorKind::Search,
+            named => named,
+        }
+    }
+
+    /// The scene as the hardware and its bit-true model take it, with the estimator `search`.
+    pub fn for_hardware(&self) -> Scene {
+        let search = SearchSpec { estimator: EstimatorKind::Search, ..self.search };
+        Scene { search, ..self.clone() }
+    }
+
     /// The scene of a sensor with defaults for everything else; `name` is used in reports.
     pub fn of_sensor(sensor: &Sensor, name: &str) -> Scene {
         Scene {

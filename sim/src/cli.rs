@@ -60,6 +60,7 @@ const EXAMPLES: &str = "Examples:
   dermis noise sensor-1                              errors under noise, next to the Cramér–Rao bound
   dermis report                                      HTML page: recommended cases and formats, error against time
   dermis generate sensor-3 --random 2 --out two.json  a frame with known forces
+  dermis import walk.asf                             scene and frames of a recording of a real array
   dermis stability --plot stability.svg              error against the condition number
   dermis stress                                      gaps, wrong tlast and resets on sensor-1
   dermis faults                                      1000 bit flips in ROM, RAM and registers of sensor-1";
@@ -159,6 +160,8 @@ enum Command {
     Report(report::Arguments),
     /// Generate a frame with known forces from contact descriptions.
     Generate(crate::generate::Arguments),
+    /// Make a scene and frames from a recording of a real pressure array.
+    Import(crate::import::Arguments),
     /// Measure errors of double, single and fixed point against the condition number, or on extreme frames.
     Stability(crate::stability::Arguments),
     /// Test the simulated hardware's AXI streams with gaps, back-pressure, wrong tlast and resets.
@@ -332,6 +335,7 @@ fn run(arguments: &Arguments) -> Result<(String, bool)> {
         }
         Command::Report(arguments) => report::run(arguments, build_dir),
         Command::Generate(arguments) => Ok((crate::generate::run(arguments)?, true)),
+        Command::Import(arguments) => Ok((crate::import::run(arguments, build_dir)?, true)),
         Command::Stability(arguments) => Ok((crate::stability::run(arguments)?, true)),
         Command::Faults(arguments) => crate::faults::run(arguments, build_dir),
         Command::Stress(arguments) => crate::stress::run(arguments, build_dir),
@@ -379,8 +383,20 @@ fn table(scenes: &[String], cases: &[Case], drawn: &DrawnFrames, format: Format)
     report::errors(&rows, format)
 }
 
+/// One line where the hardware takes another estimator than the scene.
+fn note_estimator(scene: &Scene) {
+    let (golden, hardware) = (scene.estimator(), scene.for_hardware().estimator());
+    if golden != hardware {
+        let (golden, hardware) = (golden.name(), hardware.name());
+        eprintln!("{}: the hardware has no estimator {golden} and takes {hardware} with sparse", scene.name);
+    }
+}
+
 /// The result of one engine, and the stress in MPa of the largest code.
 fn reconstruct(scene: &Scene, frames: &[Frame], engine: Engine, build_dir: &Path) -> Result<(Reconstruction, f64)> {
+    if !matches!(engine, Engine::Golden) {
+        note_estimator(scene);
+    }
     let model = || Model::for_frames(scene, frames);
     let stress = |model: &Model| Ok::<_, anyhow::Error>(full_scale(&model.scene, &model.stress(frames)?));
     let result = match engine {
@@ -402,7 +418,8 @@ fn reconstruct(scene: &Scene, frames: &[Frame], engine: Engine, build_dir: &Path
 
 /// One line: the difference between a result and the floating-point model's.
 fn against_golden(scene: &Scene, frames: &[Frame], result: &Reconstruction) -> Result<String> {
-    let golden = Golden::new(scene)?.run_averaged(frames)?;
+    // Compared with the same estimator.
+    let golden = Golden::new(&scene.for_hardware())?.run_averaged(frames)?;
     let model = Model::for_frames(scene, frames)?;
     let lsb_N = model.force_lsb_N(full_scale(&model.scene, &model.stress(frames)?));
     Ok(report::difference(&difference(&comparable_forces(&golden), &comparable_forces(result), lsb_N)))
@@ -411,6 +428,7 @@ fn against_golden(scene: &Scene, frames: &[Frame], result: &Reconstruction) -> R
 /// Writes the generated files, each completely or not at all; returns their list and the resource tables.
 fn build(scene: &Scene, out: &Path, board: bool, with_features: bool) -> Result<String> {
     // Large matrices take seconds; a design that does not fit takes longer, while other settings are tried.
+    note_estimator(scene);
     let progress = Progress::start(&format!("{}: model and Verilog", scene.name));
     let model = Model::new(scene)?;
     let mut generated = if board { generate_board(&model)? } else { generate(&model)? };

@@ -29,6 +29,7 @@ macro_rules! pages {
 pages! {
     "index.md" index,
     "your-sensor.md" your_sensor,
+    "recordings.md" recordings,
     "accuracy.md" accuracy,
     "limits.md" limits,
     "partitions.md" partitions,

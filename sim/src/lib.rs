@@ -32,6 +32,7 @@
 //! | [`mod@stress`] | `dermis stress`: both streams under gaps, wrong `tlast` and resets |
 //! | [`mod@study`] | `dermis study`: comparisons shown in the guide |
 //! | [`jobs`] | tasks on several threads, until one fails or the user interrupts |
+//! | [`mod@import`] | `dermis import`: recordings of real arrays as scene and frames |
 //! | [`inputs`] | scene and frames from command-line arguments |
 //! | [`tabulate`] | errors of scenes, cases and frames, `dermis table` |
 //! | [`mod@waves`] | `dermis cosim --waves`: a run as a waveform file |
@@ -55,6 +56,7 @@ pub mod guide;
 pub mod guide_pages;
 pub mod hardware;
 pub mod host;
+pub mod import;
 pub mod inputs;
 pub mod jobs;
 pub mod netlist;

@@ -14,7 +14,7 @@ mod csv;
 #[cfg(test)]
 mod csv_reader;
 mod data;
-mod document;
+pub(crate) mod document;
 mod errors;
 mod extremes;
 mod faults;

@@ -105,7 +105,7 @@ pub fn tabulate(scene: &Scene, cases: &[Case], frames: &[Frame], progress: &mut 
         if matches!(subarrays(case, &scene.sensor), Err(PartitionError::NotDividing { .. })) {
             continue;
         }
-        let mut scene = scene.clone();
+        let mut scene = scene.for_hardware();
         scene.partition.case = case;
         let golden = Golden::new(&scene)?;
         // A case without hardware is not an error here: its columns stay empty.

@@ -43,7 +43,8 @@ fn between<'a>(text: &'a str, start: &str, end: &str) -> &'a str {
 fn reconstruct() {
     for engine in ["golden", "fixed", "rtl"] {
         let text = dermis(&["reconstruct", "eight-by-eight", "--engine", engine, "--json"]);
-        let top = ["scene", "frame", "engine", "case", "subarrays", "resultant_N", "forces_N", "error", "flags", "checks"];
+        let top =
+            ["scene", "frame", "engine", "case", "subarrays", "resultant_N", "forces_N", "error", "flags", "checks"];
         assert_eq!(fields(&text, 1), top);
         let value: Value = serde_json::from_str(&text).unwrap();
         assert_eq!((&value["scene"], &value["engine"]), (&"eight-by-eight".into(), &engine.into()));

@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 
 /// Examples that are not run here.
-const NOT_RUN: [(&str, &str); 32] = [
+const NOT_RUN: [(&str, &str); 33] = [
     ("dermis host --port /dev/ttyUSB0 press.json", BOARD),
     ("dermis host --port /dev/ttyUSB0 --scene sensor-1", BOARD),
     ("dermis host --port /dev/ttyUSB0 --forces --check press.json", BOARD),
@@ -36,12 +36,14 @@ const NOT_RUN: [(&str, &str); 32] = [
     ("dermis guide --pictures", PAGES),
     ("dermis report", "every co-simulation: minutes; make report"),
     ("dermis report --quick", "make report QUICK=1; the same for two scenes is run"),
+    ("dermis report --recording build/recordings/walk", IMPORTED),
     ("dermis report --paper", "repeats of 48×48: minutes; make report"),
     ("dermis bitstream eight-by-eight", PLACED),
     ("dermis bitstream eight-by-eight --board icebreaker", PLACED),
     ("dermis bitstream sensor-1 --seeds 5 --jobs 2 --update-baselines", PLACED),
     ("dermis cosim eight-by-eight --device netlist", "synthesis takes minutes; tests/netlist.rs"),
 ];
+const IMPORTED: &str = "needs an imported recording; tests/report.rs";
 const BOARD: &str = "needs a board on a serial port";
 const PAGES: &str = "needs the repository's pages; tests/guide.rs";
 const PLACED: &str = "place and route takes from minutes to hours; make bitstream";
@@ -99,6 +101,13 @@ fn prepare(work: &Path) {
     for name in ["press.csv", "1.csv", "2.csv", "b.csv"] {
         fs::write(work.join(name), &csv).unwrap();
     }
+    let recordings = Path::new(env!("CARGO_MANIFEST_DIR")).join("../golden/data/recordings");
+    for (name, file) in
+        [("walk.asf", "fscan-walk.asf"), ("finger.csv", "iscan-finger.csv"), ("press.npy", "numpy/i2.npy")]
+    {
+        fs::copy(recordings.join(file), work.join(name)).unwrap();
+    }
+    fs::write(work.join("log.csv"), "0,0,0,0,0,5,6,0,0,7,9,0,0,0,0,0\n".repeat(3)).unwrap();
 }
 
 #[test]

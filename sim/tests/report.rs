@@ -44,6 +44,20 @@ fn all_formats_agree() {
     let markdown = fs::read_to_string(out.join("report.md")).unwrap();
     let page = fs::read_to_string(out.join("report.html")).unwrap();
 
+    // The page begins with error against noise beside error against run time.
+    let first = &report["sections"][0];
+    let names: Vec<&str> = first["items"].as_array().unwrap().iter().filter_map(|item| item["file"].as_str()).collect();
+    let pictures = ["noise-eight-by-eight", "first-time-eight-by-eight-shear"];
+    assert_eq!(names, pictures.map(|name| format!("report-pictures/{name}.svg")));
+    let (head, rows) = table(&report, "noise");
+    let at = |name: &str| head.iter().position(|head| *head == name).unwrap();
+    for row in rows {
+        let (error, noise) = (row[at("shear error, median")].as_f64().unwrap(), row[at("noise")].as_f64().unwrap());
+        assert!(if row[at("estimator")] == "none" { error == 1.0 } else { error > 0.0 && error < 3.0 }, "{row}");
+        assert_eq!(row[at("bound, median")].as_f64().unwrap() > 0.0, noise > 0.0, "{row}");
+    }
+    assert_eq!(rows.iter().filter(|row| row[at("estimator")] == "search sparse").count(), 5);
+
     // One recommendation, case 0, with co-simulated cycles.
     let (head, rows) = table(&report, "choice");
     let at = |name: &str| head.iter().position(|head| *head == name).unwrap();
@@ -120,6 +134,38 @@ fn the_papers_figures() {
     assert_eq!((judged.len(), &judged[0][1], &judged[0][7]), (4, &Value::from("0 (1×1)"), &Value::from("yes")));
     assert!(work.path().join("out/paper-pictures/fig-1-forces.svg").is_file());
     assert!(work.path().join("out/paper-pictures/fig-4a-sensor-1-case-2-golden.svg").is_file());
+}
+
+#[test]
+fn the_page_of_a_recording() {
+    let work = tempfile::tempdir().unwrap();
+    let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../golden/data/recordings/iscan-finger.csv");
+    let args = ["--full-scale", "0.5", "--crop", "contact", "--frames", "3..10", "--out", "finger"];
+    let mut import = dermis(work.path(), &["import"]);
+    assert!(import.arg(file).args(args).status().unwrap().success());
+    let output = dermis(work.path(), &["report", "--recording", "finger", "--out", "out"]).output().unwrap();
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    assert_eq!(String::from_utf8(output.stdout).unwrap(), "out/recordings.html\n");
+    let text = fs::read_to_string(work.path().join("out/recordings.json")).unwrap();
+    let report: Value = serde_json::from_str(&text).unwrap();
+    let (head, rows) = table(&report, "recordings");
+    let at = |name: &str| head.iter().position(|head| *head == name).unwrap();
+    assert_eq!((rows.len(), &rows[0][at("array")], rows[0][at("frames")].as_f64()), (1, &"28×28".into(), Some(8.0)));
+    // Counts: a step of 1/255 of full scale, noise of the order of a step and well below the peak.
+    assert!((rows[0][at("step, kPa")].as_f64().unwrap() / (500.0 / 255.0) - 1.0).abs() < 1e-9);
+    let noise = rows[0][at("of peak")].as_f64().unwrap();
+    assert!((0.001..0.05).contains(&noise), "{noise}");
+    let (head, rows) = table(&report, "recording-forces");
+    let at = |name: &str| head.iter().position(|head| *head == name).unwrap();
+    let share = |name: &str| rows[0][at(name)].as_f64().unwrap();
+    // The file's raw sums are exact; the force of a film is stress times area; 18-bit words agree to 0.1 %.
+    assert!(share("at most") < 1e-9);
+    assert!(share("reconstructed off stress × area, median") < 0.01);
+    assert!(share("fixed off golden, largest") < 1e-3);
+    assert!(share("cycles") > 0.0 && share("golden, CPU") > 0.0);
+    // No shear is claimed.
+    assert!(text.contains("no shear is searched, and none is claimed") && !text.contains("e_t"));
+    assert_eq!(files(&work.path().join("out/recordings-pictures")).len(), 5);
 }
 
 #[test]

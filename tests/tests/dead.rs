@@ -57,7 +57,7 @@ fn unlike_scenes_are_equal() {
         ("no-search", "rows = 6\ncols = 4", "[[1, 2]]\n[search]\nmu_max = 0\n"),
         ("averaged", "rows = 5\ncols = 4", "[[0, 0], [4, 3]]\naverage = 1\n[output]\nforces = \"resultants\"\n"),
         // Square and of degree 1: without the dead taxel Ax would be used for Ay.
-        ("degree-1", "rows = 6\ncols = 6", "[[2, 3]]\n[search]\nmu_max = 0.05\n"),
+        ("degree-1", "rows = 6\ncols = 6", "[[2, 3]]\n[search]\nmu_max = 0.05\ndegree = 1\n"),
     ];
     for (name, size, dead) in scenes {
         let text = format!(

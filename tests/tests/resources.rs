@@ -44,12 +44,12 @@ fn block_rams_and_multipliers_are_those_of_yosys() {
         // Three flips more of every matrix, columns left out.
         small(
             "dead",
-            "[search]\nmu_max = 0.1\n[input]\ndead = [[4, 7], [0, 2]]\n[fixed]\nlanes = 16\nprune_bits = 10\n",
+            "[search]\nmu_max = 0.1\ndegree = 1\n[input]\ndead = [[4, 7], [0, 2]]\n[fixed]\nlanes = 16\nprune_bits = 10\n",
         ),
         // All of the paper's cases, chosen per frame.
-        small("cases", "[partition]\ncases = [0, 1, 2, 3]\n[search]\nmu_max = 0.1\n[fixed]\nlanes = 12\n"),
+        small("cases", "[partition]\ncases = [0, 1, 2, 3]\n[search]\nmu_max = 0.1\ndegree = 1\n[fixed]\nlanes = 12\n"),
         // A lane word that is no multiple of a block RAM's; deep coefficients.
-        small("deep", "[search]\nmu_max = 0.1\n[fixed]\nlanes = 12\ninput_bits = 16\n"),
+        small("deep", "[search]\nmu_max = 0.1\ndegree = 1\n[fixed]\nlanes = 12\ninput_bits = 16\n"),
     ];
     let check = |model: &Model| {
         let generated = generate(model).unwrap();
@@ -70,7 +70,7 @@ fn block_rams_and_multipliers_are_those_of_yosys() {
 #[test]
 fn flip_flops_and_luts_are_near_those_of_yosys() {
     // Low degree: with a search, but Yosys takes a minute less.
-    let generated = generate(&small("near", "[search]\nmu_max = 0.1\n[fixed]\nlanes = 8\n")).unwrap();
+    let generated = generate(&small("near", "[search]\nmu_max = 0.1\ndegree = 1\n[fixed]\nlanes = 8\n")).unwrap();
     let cells = synthesise(&generated, "check");
     let counted = [cells("TRELLIS_FF"), cells("LUT4") + 2 * cells("CCU2C") + 6 * cells("TRELLIS_DPR16X4")];
     let usage = total(&generated.usage);

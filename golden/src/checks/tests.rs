@@ -5,7 +5,7 @@ use crate::fixed::Model;
 use crate::frame::Contact;
 use crate::generator::generate;
 use crate::reconstruct::Golden;
-use crate::scene::{Medium, ObjectiveKind};
+use crate::scene::{EstimatorKind, Medium, ObjectiveKind};
 
 fn press(sensor: &Sensor, radius_mm: f64, normal_N: f64, tangential_N: [f64; 2]) -> Frame {
     let contact = Contact {
@@ -18,6 +18,13 @@ fn press(sensor: &Sensor, radius_mm: f64, normal_N: f64, tangential_N: [f64; 2])
     generate("press", sensor, Medium::HalfSpace, &[contact]).unwrap()
 }
 
+/// The search, which both models have.
+fn sensor_1() -> Scene {
+    let mut scene = Scene::builtin("sensor-1").unwrap();
+    scene.search.estimator = EstimatorKind::Search;
+    scene
+}
+
 fn run(scene: &Scene, frame: &Frame) -> Reconstruction {
     Golden::new(scene).unwrap().run(frame).unwrap()
 }
@@ -26,7 +33,7 @@ fn run(scene: &Scene, frame: &Frame) -> Reconstruction {
 /// stress and the readings clips every code.
 #[test]
 fn readings_beyond_full_scale_are_flagged_by_both_models() {
-    let mut scene = Scene::builtin("sensor-1").unwrap();
+    let mut scene = sensor_1();
     let stress = press(&scene.sensor, 4.0, 18.8, [3.0, -2.0]);
     let folder = tempfile::tempdir().unwrap();
     let (gain, zero) = (0.00035, |k: usize| 600.0 + (k % 7) as f64);
@@ -64,7 +71,7 @@ fn readings_beyond_full_scale_are_flagged_by_both_models() {
 /// The mean of two frames is within full scale, one of them is not.
 #[test]
 fn one_of_several_averaged_frames_beyond_full_scale_is_enough() {
-    let mut scene = Scene::builtin("sensor-1").unwrap();
+    let mut scene = sensor_1();
     let frame = press(&scene.sensor, 4.0, 10.0, [2.0, 0.0]);
     scene.input.average = 1;
     scene.input.full_scale_MPa = Some(1.5 * frame.peak_MPa());
@@ -83,7 +90,7 @@ fn one_of_several_averaged_frames_beyond_full_scale_is_enough() {
 
 #[test]
 fn a_friction_ratio_beyond_mu_max_is_flagged() {
-    let mut scene = Scene::builtin("sensor-1").unwrap();
+    let mut scene = sensor_1();
     for (ratio, flagged) in [(50.0, true), (0.8, true), (0.3, false)] {
         let frame = press(&scene.sensor, 4.0, 1.0, [ratio, 0.0]);
         let both = [run(&scene, &frame), Model::new(&scene).unwrap().reconstruct(&frame).unwrap()];
@@ -100,7 +107,7 @@ fn a_friction_ratio_beyond_mu_max_is_flagged() {
 /// A subarray that carries next to nothing may have any μ.
 #[test]
 fn a_subarray_without_load_does_not_count_for_mu() {
-    let mut scene = Scene::builtin("sensor-1").unwrap();
+    let mut scene = sensor_1();
     scene.partition.case = crate::partition::Case::numbered(1).unwrap();
     let mut frame = press(&scene.sensor, 3.0, 5.0, [0.5, 0.0]);
     frame.stress_MPa = (0..100).map(|k| if k / 10 < 5 && k % 10 < 5 { 1.0 } else { 1e-9 }).collect();
@@ -113,7 +120,7 @@ fn a_subarray_without_load_does_not_count_for_mu() {
 /// Counts of a 10-bit converter taken for MPa.
 #[test]
 fn implausible_stress_is_flagged() {
-    let mut scene = Scene::builtin("sensor-1").unwrap();
+    let mut scene = sensor_1();
     let mut frame = press(&scene.sensor, 4.0, 10.0, [2.0, 0.0]);
     assert!(!run(&scene, &frame).flags.contains(&Flag::ImplausibleStress));
     let factor = 900.0 / frame.peak_MPa();
@@ -127,7 +134,7 @@ fn implausible_stress_is_flagged() {
 
 #[test]
 fn the_share_of_the_border_grows_towards_the_edge() {
-    let scene = Scene::builtin("sensor-1").unwrap();
+    let scene = sensor_1();
     let contact = |x: f64| Contact {
         shape: Some("hertz-circle".to_string()),
         size_mm: vec![3.0],
@@ -148,7 +155,7 @@ fn the_share_of_the_border_grows_towards_the_edge() {
 
 #[test]
 fn a_normal_force_far_from_that_without_shear_is_flagged() {
-    let scene = Scene::builtin("sensor-1").unwrap();
+    let scene = sensor_1();
     for (load_ratio, flagged) in [(0.89, true), (0.91, false), (1.09, false), (8.6, true)] {
         let checks = Checks { load_ratio: Some(load_ratio), ..Checks::default() };
         assert_eq!(checks.flags(&scene).collect::<Vec<_>>() == [Flag::LoadMismatch], flagged, "{load_ratio}");
@@ -162,7 +169,7 @@ fn large_contacts_are_right_or_flagged() {
     for sensor in [Scene::builtin("sensor-1").unwrap().sensor, thin] {
         for objective in [ObjectiveKind::Symmetric, ObjectiveKind::Patch, ObjectiveKind::Auto] {
             let mut scene = Scene::of_sensor(&sensor, "large");
-            scene.search.objective = objective;
+            (scene.search.estimator, scene.search.objective) = (EstimatorKind::Search, objective);
             for radius in [6.0, 8.0, 10.0] {
                 let frame = press(&sensor, radius, 15.0, [3.0, 2.0]);
                 let result = run(&scene, &frame);

@@ -15,6 +15,7 @@ use super::model::{Design, Products, Readings};
 use super::prior::factor;
 use super::{clipped, ContactEstimate, Estimate, Evidence};
 use crate::float::segment::{neighbours, segment, WIDTH};
+use crate::frame::Forces;
 use faer::linalg::matmul::matmul;
 use faer::{Accum, Mat, Par};
 use std::f64::consts::FRAC_1_SQRT_2;
@@ -277,8 +278,7 @@ impl<'a> Fit<'a> {
         let cells = &self.scene.cells;
         let products = Products::new(&regions.design, &self.readings);
         let forces = forces(&products, top, self.scene.prior, &regions.loads())?;
-        let mut pressure_N = vec![0.0; self.b.len()];
-        let mut contact_of: Vec<Option<usize>> = vec![None; self.b.len()];
+        let mut on_taxels = Forces::zeros(self.b.len());
         let mut contacts = Vec::with_capacity(forces.len());
         for (k, (own, force)) in regions.cells.iter().zip(forces).enumerate() {
             let pressed: f64 = own.iter().map(|&cell| self.p[cell].max(0.0)).sum();
@@ -288,8 +288,10 @@ impl<'a> Fit<'a> {
                 let share = self.p[cell].max(0.0) / pressed;
                 let ([x, y], taxel) = (cells.position_mm(cell), cells.taxel_of(cell));
                 moment = [moment[0] + share * x, moment[1] + share * y];
-                pressure_N[taxel] += share * force.force_N[2];
-                contact_of[taxel].get_or_insert(k);
+                let [fx, fy, fz] = force.force_N.map(|force| share * force);
+                on_taxels.fx[taxel] += fx;
+                on_taxels.fy[taxel] += fy;
+                on_taxels.fz[taxel] += fz;
             }
             let contact = ContactEstimate {
                 centre_mm: moment,
@@ -303,7 +305,7 @@ impl<'a> Fit<'a> {
         let known = self.taxels.len() - self.clipped.len();
         let misfit_probability = self.stated.then(|| chi_square_tail(top.posterior.square, known as f64));
         let (noise_MPa, rank) = (self.sigma, regions.design.rank());
-        Some(Estimate { contacts, pressure_N, contact_of, noise_MPa, misfit_probability, rounds, rank })
+        Some(Estimate { contacts, forces_N: on_taxels, noise_MPa, misfit_probability, rounds, rank })
     }
 }
 

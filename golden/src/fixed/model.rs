@@ -211,6 +211,7 @@ impl Model {
     /// small.
     pub(super) fn with_scale(scene: &Scene, scale: Scale, degree: Option<usize>) -> Result<Self, FixedError> {
         scene.require_supported()?;
+        let scene = &scene.for_hardware();
         let board = Board::load(&scene.hardware.board)?;
         if board.engine == EngineKind::Serial {
             scene.require_serial()?;

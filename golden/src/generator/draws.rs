@@ -3,7 +3,8 @@
 //! | drawn | range |
 //! |---|---|
 //! | shape of contact k of frame n | `shapes` in turn, from the (n + k)th |
-//! | half-axes, angle, place | as [`super::random_contacts`]: h to 2 h, ratio 0.7 to 1.35, rim h/2 inside, 2 h apart |
+//! | first half-axis | s to 2 s, s = h, but the larger pitch where it exceeds 2 h: taxels miss smaller ones |
+//! | second half-axis, angle, place | as [`super::random_contacts`]: ratio 0.7 to 1.35, rim s/2 inside, 2 h apart |
 //! | inner over outer radius of a ring | 0.3 … 0.7 |
 //! | tilt | 0.3 … 0.8, any direction |
 //! | normal load | `normal_N`, 1 … 12 N |
@@ -30,6 +31,10 @@ use std::f64::consts::TAU;
 
 /// Draws of all places before the array counts as too small.
 const TRIES: usize = 20;
+/// Largest number of contacts of a frame.
+const MOST_CONTACTS: usize = 64;
+/// Pitch in units of the thickness above which contacts of the size of the thickness fall between taxels.
+const COARSE: f64 = 2.0;
 /// Multiplier of the seed: neighbouring seeds have no random numbers in common.
 const SPREAD: u64 = 0x9e37_79b9_7f4a_7c15;
 
@@ -93,7 +98,7 @@ impl Shape {
 pub struct DrawOptions {
     /// The shapes, taken in turn; not empty.
     pub shapes: Vec<Shape>,
-    /// Number of contacts of a frame, at least 1; they do not overlap.
+    /// Number of contacts of a frame, 1 to 64; they do not overlap.
     pub contacts: usize,
     /// Smallest and largest normal load of a contact in N.
     pub normal_N: [f64; 2],
@@ -189,8 +194,8 @@ impl Draws {
         if options.shapes.is_empty() {
             return fail("shapes", 0.0, "at least one");
         }
-        if options.contacts == 0 {
-            return fail("contacts", 0.0, "at least 1");
+        if !(1..=MOST_CONTACTS).contains(&options.contacts) {
+            return fail("contacts", options.contacts as f64, "a whole number from 1 to 64");
         }
         let [light, heavy] = options.normal_N;
         if !(light > 0.0 && heavy >= light && heavy.is_finite()) {
@@ -230,8 +235,11 @@ impl Draws {
                 ..Default::default()
             }
         };
+        let Sensor { pitch_x_mm, pitch_y_mm, thickness_mm, .. } = self.sensor;
+        let pitch_mm = pitch_x_mm.max(pitch_y_mm);
+        let size_mm = if pitch_mm > COARSE * thickness_mm { pitch_mm } else { thickness_mm };
         for _ in 0..TRIES {
-            if let (contacts, true) = placed(&self.sensor, &mut random, count, false, shaped) {
+            if let (contacts, true) = placed(&self.sensor, size_mm, &mut random, count, false, shaped) {
                 return Ok(contacts);
             }
         }
@@ -278,6 +286,7 @@ impl Draws {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::f64::consts::PI;
 
     fn draws(scene: &str, options: DrawOptions) -> Draws {
         Draws::new(&Scene::builtin(scene).unwrap(), options).unwrap()
@@ -387,6 +396,17 @@ mod tests {
     }
 
     #[test]
+    fn contacts_are_seen_on_a_coarse_array() {
+        let draws = draws("sensor-4", DrawOptions::default());
+        for number in 0..10 {
+            let drawn = draws.frame(number).unwrap();
+            // Of the mean pressure on the largest contact, half-axes of 2 · 1.35 pitches.
+            let least = drawn.total_N[2] / (PI * (2.7f64 * 8.0).powi(2));
+            assert!(drawn.peak_MPa() > least, "{number}");
+        }
+    }
+
+    #[test]
     fn loads_scale_to_the_peak() {
         let options = DrawOptions { peak_MPa: Some(0.1), ..Default::default() };
         let [drawn, plain] =
@@ -402,7 +422,8 @@ mod tests {
         let good = DrawOptions::default();
         let cases = [
             (DrawOptions { shapes: vec![], ..good.clone() }, "shapes"),
-            (DrawOptions { contacts: 0, ..good.clone() }, "contacts"),
+            (DrawOptions { contacts: 0, ..good.clone() }, "contacts = 0"),
+            (DrawOptions { contacts: 65, ..good.clone() }, "contacts = 65"),
             (DrawOptions { peak_MPa: Some(0.0), ..good.clone() }, "peak_MPa"),
             (DrawOptions { normal_N: [0.0, 1.0], ..good.clone() }, "normal_N"),
             (DrawOptions { ratio: [0.5, 0.1], ..good }, "ratio"),

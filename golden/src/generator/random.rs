@@ -54,13 +54,15 @@ pub struct Draw {
 pub fn random_contacts(sensor: &Sensor, draw: Draw) -> Vec<Contact> {
     let mut random = Random::new(draw.seed);
     let shaped = |random: &mut Random, _: usize, axes| shaped(random, draw.shapes, axes);
-    placed(sensor, &mut random, draw.count, draw.touching, shaped).0
+    placed(sensor, sensor.thickness_mm, &mut random, draw.count, draw.touching, shaped).0
 }
 
-/// Draws size and place of `count` contacts; `shaped` makes contact k of its half-axes. Also returns whether all places
+/// Draws size and place of `count` contacts, the first half-axis from `size_mm` to twice that; `shaped` makes contact k of
+/// its half-axes. Also returns whether all places
 /// are within the array and apart from each other: there may be no room.
 pub(super) fn placed(
     sensor: &Sensor,
+    size_mm: f64,
     random: &mut Random,
     count: usize,
     touching: bool,
@@ -71,7 +73,7 @@ pub(super) fn placed(
     let half = sensor.half_mm();
     let h = sensor.thickness_mm;
     // On a small array the contacts are smaller.
-    let unit = h.min(half[0].min(half[1]) / (LONGEST + INSIDE));
+    let unit = size_mm.min(half[0].min(half[1]) / (LONGEST + INSIDE));
     for index in 0..count {
         let first = random.between(unit, 2.0 * unit);
         let axes = [first, first * random.between(0.7, 1.35)];

@@ -8,6 +8,7 @@
 //! | in: found and true contacts | centre, force, standard deviation | mm, N |
 //! | out: partner of each true contact | – | – |
 
+use crate::evidence::ContactEstimate;
 use crate::generator::draws::ContactTruth;
 use crate::reconstruct::Reconstruction;
 
@@ -22,8 +23,16 @@ pub struct FoundContact {
     pub sigma_N: Option<[f64; 3]>,
 }
 
-/// The contacts of a result: its regions, or the whole array as one.
+/// The contacts of a result: those of `evidence`, its regions, or the whole array as one.
 pub fn found(result: &Reconstruction) -> Vec<FoundContact> {
+    if let Some(contacts) = &result.extra.contacts {
+        let contact = |own: &ContactEstimate| FoundContact {
+            centre_mm: own.centre_mm,
+            force_N: own.force_N,
+            sigma_N: Some(own.sigma_N),
+        };
+        return contacts.iter().map(contact).collect();
+    }
     match &result.extra.regions {
         Some(regions) => {
             let contact = |region: &crate::reconstruct::Region| {

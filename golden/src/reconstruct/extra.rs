@@ -7,9 +7,11 @@
 //! | `truncation` | `search.form = "orthogonal"` | ‖x − w‖/‖w‖ of each subarray: truncation error of the series in μ |
 //! | `unipolar` | `input.unipolar = true` | clipped and filled taxels, evaluations, misfit |
 //! | `resultants` | `output.forces = "resultants"` | force and centre of pressure per subarray or contact |
+//! | `contacts` | `search.estimator = "evidence"` | centre, μ, force and standard deviation of each contact |
 //! | `sweeps`, `converged` | `partition.case = "contacts"` | convergence of the search over the regions |
 
 use super::output::Resultant;
+use crate::evidence::ContactEstimate;
 use crate::float::contacts::Contacts;
 use crate::frame::Forces;
 use crate::input::unipolar::Unipolar;
@@ -26,6 +28,9 @@ pub struct Extra {
     /// The regions of `contacts`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub regions: Option<Vec<Region>>,
+    /// The contacts of the estimator `evidence`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub contacts: Option<Vec<ContactEstimate>>,
     /// Number of sweeps over all regions.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub sweeps: Option<usize>,

@@ -7,6 +7,7 @@
 //! | contacts | the whole array first; then its regions, each with its own μ |
 
 use super::{assemble, Reconstruction, SubarrayResult};
+use crate::evidence::Evidence;
 use crate::flags::{frame_flags, Flag};
 use crate::float::force::{force, threshold};
 use crate::float::objective::taxels::Taxels;
@@ -19,7 +20,7 @@ use crate::input::{Input, InputError};
 use crate::matrices::{Matrices, MatricesError, MAX_FLOAT_DEGREE};
 use crate::partition::{subarrays, Case, PartitionError, Subarray};
 use crate::quantise::{full_scale, noise_floor_codes, quantise};
-use crate::scene::{Form, Scene, SceneError};
+use crate::scene::{EstimatorKind, Form, Scene, SceneError};
 use thiserror::Error;
 
 /// The golden engine of one scene, its matrices computed.
@@ -31,6 +32,8 @@ pub struct Golden {
     pub(super) tilings: Vec<Tiling>,
     /// For fits of ellipses: with `adaptive` and `contacts`, without dead taxels and with mu_max > 0.
     pub(super) taxels: Option<Taxels>,
+    /// The estimator `evidence`, if the scene takes it.
+    pub(super) evidence: Option<Evidence>,
 }
 
 /// A partition into equal rectangles with its matrices.
@@ -143,7 +146,8 @@ impl Golden {
         let by_contact = scene.partition.case.grid().is_none();
         let fits = by_contact && scene.input.dead.is_empty() && scene.search.mu_max > 0.0;
         let taxels = fits.then(|| Taxels::new(&scene.sensor, scene.medium));
-        Ok(Golden { scene: scene.clone(), input: Input::new(scene)?, tilings, taxels })
+        let evidence = (scene.estimator() == EstimatorKind::Evidence).then(|| Evidence::new(scene));
+        Ok(Golden { scene: scene.clone(), input: Input::new(scene)?, tilings, taxels, evidence })
     }
 
     /// The matrices of the first subarray; with `adaptive` and `contacts` those of the whole array.

@@ -61,6 +61,13 @@ impl Golden {
     fn run_readings(&self, readings: &[Frame], mean: &Frame, noise_MPa: f64) -> Result<Reconstruction, GoldenError> {
         mean.check(&self.scene)?;
         let frame = self.input.calibrate(mean);
+        if let Some(evidence) = &self.evidence {
+            let mut result = self.by_evidence(evidence, &frame, noise_MPa)?;
+            let full_scale_share = self.input.full_scale_share(readings);
+            let checks = Checks { full_scale_share, ..Checks::of(&self.scene, &frame, &result) };
+            result.add_checks(&self.scene, checks);
+            return Ok(self.with_output(result));
+        }
         let (filled, report) = match self.scene.input.unipolar {
             true => self.filled(&frame),
             false => (frame.clone(), None),
@@ -75,11 +82,16 @@ impl Golden {
             ..Checks::of(&self.scene, &frame, &result)
         };
         result.add_checks(&self.scene, checks);
+        Ok(self.with_output(result))
+    }
+
+    /// The result with the forces that `output.forces` asks for.
+    fn with_output(&self, mut result: Reconstruction) -> Reconstruction {
         if self.scene.output.forces == ForceOutput::Resultants {
             result.extra.resultants = Some(resultants(&self.scene.sensor, &result));
             result.forces_N = Forces::default();
         }
-        Ok(result)
+        result
     }
 
     /// Σ fz over that of the stress without shear, Σ Cz⁺b after the threshold; `None` unless both press.

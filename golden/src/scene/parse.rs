@@ -224,13 +224,8 @@ fn search(reader: &Reader) -> Result<SearchSpec, SceneError> {
     let in_range = |mu| mu == 0.0 || (LEAST_MU_MAX..=LARGEST_MU_MAX).contains(&mu);
     let mu_max = reader.number("search.mu_max", in_range, &allowed)?;
     let floor = reader.number("search.noise_floor_MPa", |mpa| mpa >= 0.0, "a number of at least 0")?;
-    // Who names an objective wants the search that maximises it.
-    let estimator = match (reader.value("search.estimator"), reader.value("search.objective")) {
-        (None, Some(_)) => EstimatorKind::Search,
-        _ => reader.choice("search.estimator", &EstimatorKind::NAMES)?,
-    };
     Ok(SearchSpec {
-        estimator,
+        estimator: reader.choice("search.estimator", &EstimatorKind::NAMES)?,
         objective: reader.choice("search.objective", &ObjectiveKind::NAMES)?,
         mu_max: mu_max.unwrap_or(default.mu_max),
         noise_floor_MPa: floor.unwrap_or(default.noise_floor_MPa),

@@ -7,9 +7,13 @@
 //! | `search.mu_max`, `output.forces` | all | with "adaptive" above 0 and "taxels" |
 //! | `search.objective` | all; with "adaptive" and "contacts" "sparse" | "sparse" |
 //! | `search.degree` | all | 1 … 3 |
+//! | `search.estimator` | all; "evidence" as below | "search", which they take for the others as well |
 //! | `search.form` | all, "orthogonal" up to [`crate::float::orthogonal::MAX_TAXELS`] taxels | "oblique" |
 //! | `input.dead` | all; with "orthogonal" none | with one subarray |
 //! | `input.unipolar` | all; with "orthogonal" none | none |
+//!
+//! The estimator "evidence" takes no objective but the default, no "orthogonal" form, mu_max above 0, and as partition 0
+//! or "contacts": it finds the contacts itself. "auto" takes it for these scenes and "search" for the others.
 //!
 //! Dead taxels in hardware: Cz⁺, Ax and Ay are multiplied by Π ([`crate::matrices::Matrices::without`]). The broken
 //! mirror symmetry takes up to four products instead of one ([`crate::fixed::coefficients`]). A subarray with a dead
@@ -19,12 +23,12 @@
 //! Fields not listed are the same for both. Rules are checked in the order of the table, so a scene with several
 //! rejected values always reports the same one.
 
-use super::{CoefficientCheck, ForceOutput, Form, Medium, ObjectiveKind, Scene, SceneError};
+use super::{CoefficientCheck, EstimatorKind, ForceOutput, Form, Medium, ObjectiveKind, Scene, SceneError};
 use crate::matrices::MAX_DEGREE;
 use crate::partition::Case;
 
 /// A value and whether it is rejected.
-struct Rule {
+pub(super) struct Rule {
     refused: bool,
     field: &'static str,
     value: String,
@@ -143,6 +147,9 @@ impl Scene {
         // Regions and the choice of a case are compared by the sparse objective.
         let by_contact = self.partition.case.grid().is_none();
         let rule = |refused, field, value, available| Rule { refused, field, value, available };
+        if let Some(refusal) = self.evidence_refusal().filter(|_| self.search.estimator == EstimatorKind::Evidence) {
+            return self.require([refusal]);
+        }
         self.require([
             rule(
                 by_contact && objective != ObjectiveKind::Sparse,
@@ -163,6 +170,34 @@ impl Scene {
                 "false, with search.form = orthogonal",
             ),
         ])
+    }
+
+    /// The first value that the estimator `evidence` does not implement.
+    pub(super) fn evidence_refusal(&self) -> Option<Rule> {
+        let Scene { search, partition, .. } = self;
+        let rule = |refused, field, value, available| Rule { refused, field, value, available };
+        let rules = [
+            rule(
+                !matches!(partition.case, Case::WHOLE | Case::Contacts),
+                "partition.case",
+                partition.case.to_string(),
+                "0 or contacts, with search.estimator = evidence",
+            ),
+            rule(
+                search.objective != ObjectiveKind::Sparse,
+                "search.objective",
+                search.objective.name().to_string(),
+                "left out, with search.estimator = evidence",
+            ),
+            rule(search.mu_max == 0.0, "search.mu_max", "0".to_string(), "above 0, with search.estimator = evidence"),
+            rule(
+                search.form != Form::Oblique,
+                "search.form",
+                "orthogonal".to_string(),
+                "oblique, with search.estimator = evidence",
+            ),
+        ];
+        rules.into_iter().find(|rule| rule.refused)
     }
 
     /// The error of the first rule that rejects its value.

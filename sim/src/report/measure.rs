@@ -15,6 +15,7 @@ mod formats;
 mod machine;
 mod noise;
 mod objective_map;
+mod recordings;
 mod stability;
 mod stages;
 mod sweep;
@@ -25,6 +26,7 @@ pub use formats::{formats, FormatRow};
 pub use machine::machine;
 pub use noise::noise;
 pub use objective_map::{objective_map, ObjectiveMap};
+pub use recordings::{recorded, Recorded, MOST_FRAMES};
 pub use stability::{conditions, extremes};
 pub use stages::{stages, StageRow};
 pub use sweep::{sweep, SweepPoint};
@@ -268,7 +270,7 @@ pub fn measure(scenes: &[Scene], cases: &[Case], options: &Options) -> Result<Ve
 }
 
 fn prepare(scene: Scene, frames: Vec<Frame>, options: &Options) -> Result<Measured> {
-    let engine = Golden::new(&scene)?;
+    let engine = Golden::new(&scene.for_hardware())?;
     let golden = frames.iter().map(|frame| engine.run(frame)).collect::<Result<Vec<_>, _>>()?;
     let bit_true = match Model::for_frames(&scene, &frames) {
         Ok(model) => Ok(bit_true(model, &frames, options)?),

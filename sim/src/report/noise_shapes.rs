@@ -138,8 +138,12 @@ pub fn coverage(rows: &[ShapeRow]) -> String {
 /// # Errors
 /// JSON that cannot be written.
 pub fn sensitivity(rows: &[SensitivityRow], level: f64, format: Format) -> Result<String> {
-    let signed = |off: f64| format!("{}{} %", if off > 0.0 { "+" } else { "" }, 100.0 * off);
-    let off = |row: &SensitivityRow| row.off.map_or("-".into(), signed);
+    let off = |row: &SensitivityRow| match row.off {
+        None => "-".to_owned(),
+        // A spread has no sign.
+        Some(off) if row.what == "gain spread" => format!("{} %", 100.0 * off),
+        Some(off) => format!("{:+} %", 100.0 * off),
+    };
     Ok(match format {
         Format::Json => serde_json::to_string(rows)? + "\n",
         Format::Csv => {

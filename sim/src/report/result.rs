@@ -51,6 +51,14 @@ fn lines(text: &mut String, result: &Reconstruction, full_scale_MPa: f64) -> std
             centroid(s.tension_centroid_mm),
         )?;
     }
+    for own in result.extra.contacts.iter().flatten() {
+        let [x, y] = own.centre_mm;
+        let along = |axis: usize| {
+            let (force, sigma) = (own.force_N[axis], own.sigma_N[axis]);
+            format!("{}{} ± {}", sign(force), significant_digits(force, largest), significant_digits(sigma, largest))
+        };
+        writeln!(text, "contact at ({x:+.2}, {y:+.2}) mm, N   x {}   y {}   normal {}", along(0), along(1), along(2))?;
+    }
     let flag = |flag: &Flag| {
         let name = serde_json::to_value(flag).ok()?.as_str().map(str::to_owned)?;
         Some(result.checks.figure(*flag).map_or(name.clone(), |figure| format!("{name} ({figure})")))

@@ -5,15 +5,18 @@ use std::thread::available_parallelism;
 
 use anyhow::Result;
 use clap::{value_parser, Args};
+use dermis_golden::import::Imported;
 use dermis_golden::partition::Case;
 use dermis_golden::scene::{Condition, Scene};
 
 use super::document::{Document, Section};
-use super::measure::{self, clock, machine, measure, sweep, ContactCount, Measured, Options, SweepPoint};
+use super::measure::{
+    self, clock, machine, measure, recorded, sweep, ContactCount, Measured, Options, SweepPoint, MOST_FRAMES,
+};
 use super::save::save;
 use super::sections::{
-    choice, choose, extremes, fields, frames, noise, paper, published, ratios, resources, run_logs, search, stability,
-    stages, sweeps, time, Choice,
+    choice, choose, extremes, fields, frames, noise, paper, published, ratios, recordings, resources, run_logs, search,
+    stability, stages, sweeps, time, Choice,
 };
 use crate::jobs::Interrupt;
 use crate::run_log::RunLog;
@@ -28,9 +31,10 @@ const SWEEP_FRAMES: [u32; 2] = [0, 24];
   dermis report --quick                              fewer frames and co-simulations, under two minutes
   dermis report sensor-1 eight-by-eight --quick --out target/small-report
   dermis report --paper                              the paper's figures and tables by their numbers
+  dermis report --recording build/recordings/walk    noise, closure, agreement and pictures of a recording
 
 Writes report.html (one file, opens offline), report.md, report.json, report-tables/*.csv and report-pictures/*.svg;
-with --paper the same files, named paper.")]
+with --paper and --recording the same files, named paper and recordings.")]
 pub struct Arguments {
     /// Built-in names or paths of scenes with shipped frames; default: all built-in ones.
     scenes: Vec<String>,
@@ -43,6 +47,9 @@ pub struct Arguments {
     /// Reproduce the paper's figures and tables under its centroid condition, instead of the report.
     #[arg(long)]
     paper: bool,
+    /// Folder that dermis import wrote, repeatable: a page about these recordings instead of the report.
+    #[arg(long = "recording", value_name = "DIR", conflicts_with_all = ["scenes", "paper", "quick"])]
+    recordings: Vec<PathBuf>,
     /// Number of cases prepared in parallel; default: the number of processors. Times are measured sequentially.
     #[arg(long, value_name = "N", value_parser = value_parser!(u16).range(1..=64))]
     jobs: Option<u16>,
@@ -53,6 +60,9 @@ pub struct Arguments {
 /// # Errors
 /// A scene that cannot be loaded or measured, no Verilator, files that cannot be written, an interruption.
 pub fn run(arguments: &Arguments, build: &Path) -> Result<(String, bool)> {
+    if !arguments.recordings.is_empty() {
+        return Ok((recordings_page(arguments, build)?, true));
+    }
     let names: Vec<String> = match &arguments.scenes[..] {
         [] => Scene::builtin_names().into_iter().map(str::to_owned).collect(),
         named => named.to_vec(),
@@ -93,6 +103,35 @@ pub fn run(arguments: &Arguments, build: &Path) -> Result<(String, bool)> {
     Ok((format!("{}\n", page.display()), results.clone().all(|equal| equal)))
 }
 
+/// The page about recordings; returns its path.
+fn recordings_page(arguments: &Arguments, build: &Path) -> Result<String> {
+    let interrupt = Interrupt::on_signals()?;
+    let load = |folder: &PathBuf| recorded(Imported::open(folder)?, &interrupt);
+    let all = arguments.recordings.iter().map(load).collect::<Result<Vec<_>>>()?;
+    let document = Document {
+        name: "recordings",
+        title: "Dermis: recordings of real arrays".into(),
+        intro: vec![
+            machine(),
+            format!("Of recordings of more than {MOST_FRAMES} frames, that many at even distances are reconstructed."),
+        ],
+        sections: vec![recordings(&all)?],
+    };
+    interrupt.check()?;
+    let out = arguments.out.clone().unwrap_or_else(|| build.join("report"));
+    Ok(format!("{}\n", save(&document, &out)?.display()))
+}
+
+/// The shipped recordings; the quick variant takes the smallest.
+fn shipped_recordings(options: &Options) -> Result<Section> {
+    let mut shipped = Imported::shipped()?;
+    if options.quick {
+        shipped.truncate(1);
+    }
+    let all = shipped.into_iter().map(|imported| recorded(imported, &options.interrupt)).collect::<Result<Vec<_>>>()?;
+    recordings(&all)
+}
+
 fn sections(measured: &[Measured], options: &Options) -> Result<Vec<Section>> {
     let choices = choose(measured, options)?;
     let first = noise(measured, measure::noise(measured, options)?.as_ref())?;
@@ -107,6 +146,7 @@ fn sections(measured: &[Measured], options: &Options) -> Result<Vec<Section>> {
         sweeps(&all_sweeps(measured, &choices, options)?)?,
         stability(&measure::conditions(options)?)?,
         extremes(&measure::extremes(measured, options)?),
+        shipped_recordings(options)?,
         resources(measured, &choices, options)?,
         run_logs(&RunLog::load_all(&options.build)?),
     ];

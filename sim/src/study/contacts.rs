@@ -42,7 +42,7 @@ pub fn run(names: &[String]) -> Result<String> {
     let scene = Scene::builtin(SCENE)?;
     let cases = [Case::WHOLE, Case::Adaptive, Case::Contacts];
     let engine = |case: Case| {
-        let mut scene = scene.clone();
+        let mut scene = scene.for_hardware();
         scene.partition.case = case;
         Golden::new(&scene)
     };

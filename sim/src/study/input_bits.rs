@@ -65,7 +65,7 @@ pub fn scenes(names: &[String]) -> Result<Vec<(String, Scene)>> {
 pub fn measure(name: &str, scene: &Scene) -> Result<Vec<Row>> {
     let frames = one_contact(scene)?;
     let row = |bits: u32| {
-        let mut scene = scene.clone();
+        let mut scene = scene.for_hardware();
         scene.fixed.input_bits = bits;
         let (golden, model) = (Golden::new(&scene)?, Model::new(&scene)?);
         let float = |frames: &[Frame]| -> Result<Option<f64>> {

@@ -3,6 +3,7 @@
 use std::path::Path;
 
 use dermis_golden::frame::Frame;
+use dermis_golden::import::{import, Format, Settings, Unit};
 use dermis_golden::input::calibration::Calibration;
 use dermis_golden::link::Decoder;
 use dermis_golden::scene::Scene;
@@ -12,13 +13,17 @@ use dermis_hdl::manifest;
 /// The folder of a reader's seeds, and the reader, which returns whether it accepted the bytes.
 type Target = (&'static str, fn(&[u8]) -> bool);
 /// All readers.
-pub const TARGETS: [Target; 6] = [
+pub const TARGETS: [Target; 10] = [
     ("scene", scene),
     ("frame.json", json),
     ("frame.csv", csv),
     ("calibration", calibration),
     ("manifest", manifests),
     ("packets", packets),
+    ("import.tekscan", |bytes| recording("fuzz.asf", Format::Tekscan, bytes)),
+    ("import.lst", |bytes| recording("fuzz.lst", Format::Lst, bytes)),
+    ("import.npy", |bytes| recording("fuzz.npy", Format::Npy, bytes)),
+    ("import.csv", |bytes| recording("fuzz.csv", Format::Csv, bytes)),
 ];
 
 /// The seeds of a target, in the order of their names.
@@ -105,4 +110,36 @@ fn packets(bytes: &[u8]) -> bool {
         any = true;
     }
     any
+}
+
+/// Imports a recording of 3×4 sensels, where its format does not state the size, in the format's unit or as counts.
+fn recording(name: &str, format: Format, bytes: &[u8]) -> bool {
+    let plain = matches!(format, Format::Npy | Format::Csv);
+    let settings = Settings {
+        format: Some(format),
+        // NumPy states the size, but for lines of sensels.
+        size: (plain && (format == Format::Csv || !bytes.len().is_multiple_of(2))).then_some([3, 4]),
+        unit: plain.then_some(Unit::KiloPa),
+        pitch_mm: plain.then_some([2.0, 3.0]),
+        full_scale_MPa: (format == Format::Tekscan).then_some(1.0),
+        ..Settings::default()
+    };
+    match import(name, bytes, &settings) {
+        Ok(imported) => {
+            let sensor = &imported.scene.sensor;
+            assert_eq!(imported.frames.len(), imported.summary.frames.len());
+            for (frame, record) in imported.frames.iter().zip(&imported.summary.frames) {
+                assert_eq!(&frame.sensor, sensor);
+                assert!(frame.stress_MPa.iter().all(|b| b.is_finite()));
+                assert!(record.normal_N.is_finite() && record.outside_N.is_finite());
+            }
+            let again = Scene::parse(&imported.scene_text, &format!("{}.toml", imported.summary.name));
+            assert_eq!(again.unwrap(), imported.scene);
+            true
+        }
+        Err(error) => {
+            assert!(error.to_string().contains("fuzz"), "{error}");
+            false
+        }
+    }
 }

@@ -3,7 +3,7 @@
 use anyhow::Result;
 use dermis_golden::noise::{shape_study, Candidate, ShapeRow, ShapeStudy};
 use dermis_golden::partition::Case;
-use dermis_golden::scene::ObjectiveKind;
+use dermis_golden::scene::{EstimatorKind, ObjectiveKind};
 
 use super::{Measured, Options};
 use crate::progress::Progress;
@@ -11,8 +11,8 @@ use crate::progress::Progress;
 /// Number of drawn frames: quick, full variant.
 const DRAWN: [usize; 2] = [20, 200];
 
-/// Error against noise of the first scene, for what it names and for two objectives of the search, on contacts of five
-/// shapes; with the scene's name.
+/// Error against noise of the first scene, for what it names, the estimator `auto` and two objectives of the search, on
+/// contacts of five shapes; with the scene's name.
 ///
 /// # Errors
 /// A scene that the golden model refuses, contacts that do not fit, an interruption.
@@ -20,8 +20,12 @@ pub fn noise(measured: &[Measured], options: &Options) -> Result<Option<(String,
     let Some(first) = measured.iter().find(|m| m.scene.partition.case == Case::WHOLE) else { return Ok(None) };
     let scene = &first.scene;
     let mut candidates = vec![Candidate::Scene];
-    let others = [ObjectiveKind::Sparse, ObjectiveKind::Patch].map(Candidate::Objective);
-    candidates.extend(others.into_iter().filter(|other| other.name(scene) != Candidate::Scene.name(scene)));
+    let [sparse, patch] = [ObjectiveKind::Sparse, ObjectiveKind::Patch].map(Candidate::Objective);
+    for other in [Candidate::Estimator(EstimatorKind::Auto), sparse, patch] {
+        if candidates.iter().all(|known| known.name(scene) != other.name(scene)) {
+            candidates.push(other);
+        }
+    }
     let draws = DRAWN[usize::from(!options.quick)];
     let wanted = ShapeStudy { draws, candidates, ..Default::default() };
     let bar = Progress::steps(&format!("{}: noise", scene.name), 0);

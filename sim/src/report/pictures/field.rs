@@ -140,7 +140,11 @@ fn frame(area: &Area, map: &Map, sensor: &Sensor, outline: Outline) -> Result<()
     // Ticks in mm: edges and centre.
     let half = [cols * sensor.pitch_x_mm / 2.0, rows * sensor.pitch_y_mm / 2.0];
     let bottom = map.at(rows, 0.0).1;
-    let place = |mm: f64| if mm < 0.0 { format!("−{}", -mm) } else { (mm + 0.0).to_string() };
+    // At most three digits: the margin has no room for more.
+    let place = |mm: f64| {
+        let decimals = usize::from(mm.abs() < 10.0);
+        format!("{}{}", if mm < 0.0 { "−" } else { "" }, format!("{:.decimals$}", mm.abs()).trim_end_matches(".0"))
+    };
     for share in [-1.0, 0.0, 1.0] {
         let x = map.of_mm([share * half[0], 0.0]).0;
         note(area, &place(share * half[0]), (x, bottom + 4), HPos::Center, VPos::Top)?;

@@ -1,0 +1,206 @@
+//! NumPy arrays: `\x93NUMPY`, version, length of the header, a Python dictionary, then the values.
+//!
+//! | field | read |
+//! |---|---|
+//! | `descr` | integers of 1 to 8 bytes, floats of 2, 4 and 8, booleans; little- and big-endian |
+//! | `fortran_order` | both |
+//! | `shape` | (frames, rows, cols), (rows, cols) for one frame, (frames, taxels) beside a stated size |
+//!
+//! A value that is not a number marks its sensel as missing. The header is read here and not by a general reader of
+//! Python literals: three fields of fixed kinds need no recursion and no allocation that a damaged header can inflate.
+
+use super::error::{ImportError, Source};
+use super::format::Format;
+use super::recording::{is_reading, RawFrame, Recording, LARGEST_SIDE};
+
+/// First bytes of a file.
+pub(super) const MAGIC: &[u8] = b"\x93NUMPY";
+
+/// Kind of a value.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Kind {
+    Signed,
+    Unsigned,
+    Float,
+}
+
+/// The fields of a header.
+#[derive(Debug, PartialEq)]
+struct Header {
+    kind: Kind,
+    /// Bytes of a value.
+    width: usize,
+    big_endian: bool,
+    fortran: bool,
+    shape: Vec<usize>,
+}
+
+/// Reads a recording; `size` is the stated number of rows and columns.
+pub(super) fn parse(bytes: &[u8], size: Option<[usize; 2]>, source: &Source) -> Result<Recording, ImportError> {
+    let (text, data) = split(bytes).ok_or_else(|| source.field("the NumPy header", "cut off", "complete"))?;
+    let header = header(&text, source)?;
+    let [count, rows, cols] = dimensions(&header.shape, size, source)?;
+    let taxels = rows * cols;
+    let wanted = count.checked_mul(taxels).and_then(|values| values.checked_mul(header.width));
+    if wanted != Some(data.len()) {
+        let allowed = format!("the number of bytes of shape {:?}", header.shape);
+        return Err(source.field("bytes behind the NumPy header", data.len(), allowed));
+    }
+    let value = |index: usize| number(&data[index * header.width..][..header.width], &header);
+    let mut missing = vec![false; taxels];
+    let mut frames = Vec::with_capacity(count);
+    for frame in 0..count {
+        let mut values = Vec::with_capacity(taxels);
+        for (taxel, absent) in missing.iter_mut().enumerate() {
+            let (row, col) = (taxel / cols, taxel % cols);
+            let index = match (header.fortran, header.shape.len()) {
+                (false, _) => frame * taxels + taxel,
+                (true, 3) => frame + count * (row + rows * col),
+                // One frame, or a line of taxels per frame.
+                (true, _) if count == 1 && header.shape == [rows, cols] => row + rows * col,
+                (true, _) => frame + count * taxel,
+            };
+            let number = value(index);
+            *absent |= number.is_nan();
+            if !number.is_nan() && !is_reading(number) {
+                let place = format!("frame {}, row {row}, column {col}", frame + 1);
+                return Err(source.field(&place, number, "a number up to 1e9 in magnitude, or NaN"));
+            }
+            values.push(number);
+        }
+        frames.push(RawFrame { number: frame + 1, time_s: None, values, device: None });
+    }
+    for frame in &mut frames {
+        frame.values.iter_mut().zip(&missing).filter(|(_, missing)| **missing).for_each(|(value, _)| *value = 0.0);
+    }
+    Ok(Recording {
+        format: Format::Npy,
+        device: None,
+        rows,
+        cols,
+        pitch_mm: None,
+        unit: None,
+        bits: None,
+        full_scale: None,
+        missing,
+        frames,
+    })
+}
+
+/// Text of the header, and the bytes behind it.
+fn split(bytes: &[u8]) -> Option<(String, &[u8])> {
+    let rest = bytes.strip_prefix(MAGIC)?;
+    let (version, rest) = rest.split_at_checked(2)?;
+    let (length, rest) = match version[0] {
+        1 => rest.split_at_checked(2).map(|(l, rest)| (usize::from(u16::from_le_bytes([l[0], l[1]])), rest))?,
+        _ => {
+            let (l, rest) = rest.split_at_checked(4)?;
+            (usize::try_from(u32::from_le_bytes([l[0], l[1], l[2], l[3]])).ok()?, rest)
+        }
+    };
+    let (header, data) = rest.split_at_checked(length)?;
+    Some((String::from_utf8_lossy(header).into_owned(), data))
+}
+
+/// The value behind `'key':`.
+fn field<'a>(text: &'a str, key: &str, source: &Source) -> Result<&'a str, ImportError> {
+    let behind = ['\'', '"'].iter().find_map(|quote| text.split_once(&format!("{quote}{key}{quote}")));
+    let value = behind.and_then(|(_, rest)| rest.trim_start().strip_prefix(':'));
+    value.map(str::trim_start).ok_or_else(|| source.missing(key, "the header of a NumPy file states it"))
+}
+
+fn header(text: &str, source: &Source) -> Result<Header, ImportError> {
+    let descr = field(text, "descr", source)?;
+    let quoted = descr.strip_prefix(['\'', '"']).and_then(|rest| rest.split(['\'', '"']).next());
+    let (kind, width, big_endian) = quoted.and_then(kind).ok_or_else(|| {
+        source.field("descr", descr.split(',').next().unwrap_or(""), "an integer, float or boolean type, such as '<f4'")
+    })?;
+    let order = field(text, "fortran_order", source)?;
+    let fortran = match (order.starts_with("True"), order.starts_with("False")) {
+        (true, _) => true,
+        (_, true) => false,
+        _ => return Err(source.field("fortran_order", order, "True or False")),
+    };
+    let shape = field(text, "shape", source)?;
+    let wrong = || source.field("shape", shape.split(')').next().unwrap_or(""), "two or three whole numbers above 0");
+    let inner = shape.strip_prefix('(').and_then(|rest| rest.split_once(')')).ok_or_else(wrong)?.0;
+    let numbers = inner.split(',').map(str::trim).filter(|number| !number.is_empty());
+    let shape: Vec<usize> =
+        numbers.map(|n| n.parse().ok().filter(|n| *n > 0).ok_or_else(wrong)).collect::<Result<_, _>>()?;
+    Ok(Header { kind, width, big_endian, fortran, shape })
+}
+
+/// Kind, width and byte order of a type such as `<f4`.
+fn kind(descr: &str) -> Option<(Kind, usize, bool)> {
+    let order = descr.chars().next()?;
+    let rest = descr.strip_prefix(['<', '>', '|', '='])?;
+    let (kind, width) = match rest {
+        "b1" | "u1" => (Kind::Unsigned, 1),
+        "u2" => (Kind::Unsigned, 2),
+        "u4" => (Kind::Unsigned, 4),
+        "u8" => (Kind::Unsigned, 8),
+        "i1" => (Kind::Signed, 1),
+        "i2" => (Kind::Signed, 2),
+        "i4" => (Kind::Signed, 4),
+        "i8" => (Kind::Signed, 8),
+        "f2" => (Kind::Float, 2),
+        "f4" => (Kind::Float, 4),
+        "f8" => (Kind::Float, 8),
+        _ => return None,
+    };
+    Some((kind, width, order == '>'))
+}
+
+/// Frames, rows and columns of a shape.
+fn dimensions(shape: &[usize], size: Option<[usize; 2]>, source: &Source) -> Result<[usize; 3], ImportError> {
+    let wrong = |allowed: &str| source.field("shape", format!("{shape:?}"), allowed);
+    let sides = match (shape, size) {
+        ([frames, taxels], Some([rows, cols])) if rows * cols == *taxels => [*frames, rows, cols],
+        ([rows, cols], None) => [1, *rows, *cols],
+        ([frames, rows, cols], None) => [*frames, *rows, *cols],
+        ([rows, cols], Some(size)) if size == [*rows, *cols] => [1, *rows, *cols],
+        ([frames, rows, cols], Some(size)) if size == [*rows, *cols] => [*frames, *rows, *cols],
+        (_, Some(_)) => return Err(wrong("that of --size: (frames, rows, cols), (rows, cols) or (frames, taxels)")),
+        _ => return Err(wrong("(frames, rows, cols) or (rows, cols)")),
+    };
+    match sides[1].max(sides[2]) <= LARGEST_SIDE {
+        true => Ok(sides),
+        false => Err(wrong(&format!("at most {LARGEST_SIDE} rows and columns"))),
+    }
+}
+
+/// A value; bytes are as many as its width.
+fn number(bytes: &[u8], header: &Header) -> f64 {
+    let mut word = 0u64;
+    for (k, byte) in bytes.iter().enumerate() {
+        let place = if header.big_endian { header.width - 1 - k } else { k };
+        word |= u64::from(*byte) << (8 * place);
+    }
+    match (header.kind, header.width) {
+        (Kind::Unsigned, _) => word as f64,
+        (Kind::Signed, width) => {
+            let unused = 64 - 8 * width as u32;
+            ((word << unused) as i64 >> unused) as f64
+        }
+        // The casts keep the word's width.
+        (Kind::Float, 2) => half(word as u16),
+        (Kind::Float, 4) => f64::from(f32::from_bits(word as u32)),
+        (Kind::Float, _) => f64::from_bits(word),
+    }
+}
+
+/// A float of 16 bits: sign, 5 bits exponent, 10 bits fraction.
+fn half(word: u16) -> f64 {
+    let (exponent, fraction) = (i32::from(word >> 10 & 31), f64::from(word & 1023));
+    let size = match exponent {
+        0 => fraction * 2f64.powi(-24),
+        31 if fraction == 0.0 => f64::INFINITY,
+        31 => f64::NAN,
+        _ => (1024.0 + fraction) * 2f64.powi(exponent - 25),
+    };
+    if word >> 15 == 1 {
+        -size
+    } else {
+        size
+    }
+}

@@ -1,0 +1,78 @@
+//! A recording as its file states it: readings in the file's unit, not yet stress.
+
+use super::error::{ImportError, Source};
+use super::format::Format;
+use super::units::Unit;
+
+/// Largest magnitude of a reading, in any unit; beyond it sums would lose their meaning.
+const LARGEST_READING: f64 = 1e9;
+/// Largest number of rows or columns of a recording, before it is cropped.
+pub(super) const LARGEST_SIDE: usize = 4096;
+
+/// The device's own figure of a frame.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum DeviceFigure {
+    /// Normal force in N.
+    Force(f64),
+    /// Sum of all readings, in the file's unit.
+    Sum(f64),
+}
+
+/// One frame of readings.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct RawFrame {
+    /// Number as the device counts, from 1.
+    pub number: usize,
+    /// Time from the start in s, if known.
+    pub time_s: Option<f64>,
+    /// Readings, row-major; 0 where a sensel is missing.
+    pub values: Vec<f64>,
+    /// The device's own figure, if printed.
+    pub device: Option<DeviceFigure>,
+}
+
+/// All frames of a file.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Recording {
+    pub format: Format,
+    /// The device, as the file names it.
+    pub device: Option<String>,
+    pub rows: usize,
+    pub cols: usize,
+    /// Pitch along columns and rows in mm, if stated.
+    pub pitch_mm: Option<[f64; 2]>,
+    /// Unit of the readings, if stated.
+    pub unit: Option<Unit>,
+    /// Bits of a count, if the format has counts of a known width.
+    pub bits: Option<u32>,
+    /// Reading at which the device saturates, if stated.
+    pub full_scale: Option<f64>,
+    /// Sensels that do not exist in some frame, row-major.
+    pub missing: Vec<bool>,
+    pub frames: Vec<RawFrame>,
+}
+
+/// A reading of a text.
+pub(super) fn reading(source: &Source, line: usize, column: usize, text: &str) -> Result<f64, ImportError> {
+    let number = text.trim().parse().ok().filter(|value: &f64| is_reading(*value));
+    number.ok_or_else(|| source.value(line, column, text, "a number up to 1e9 in magnitude"))
+}
+
+/// Whether a number is finite and small enough.
+pub(super) fn is_reading(value: f64) -> bool {
+    value.abs() <= LARGEST_READING
+}
+
+/// Checks rows or columns against [`LARGEST_SIDE`].
+pub(super) fn side(source: &Source, field: &str, text: &str) -> Result<usize, ImportError> {
+    let count = text.trim().parse().ok().filter(|count| (1..=LARGEST_SIDE).contains(count));
+    count.ok_or_else(|| source.field(field, text, format!("a whole number from 1 to {LARGEST_SIDE}")))
+}
+
+/// The file's text: UTF-8, else Latin-1; without the mark U+FEFF.
+pub(super) fn decoded(bytes: &[u8]) -> String {
+    match std::str::from_utf8(bytes) {
+        Ok(text) => text.strip_prefix('\u{feff}').unwrap_or(text).to_string(),
+        Err(_) => bytes.iter().map(|byte| char::from(*byte)).collect(),
+    }
+}

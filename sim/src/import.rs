@@ -1,0 +1,227 @@
+//! `dermis import`: a recording of a real pressure array becomes a scene and frames.
+//!
+//! The folder holds `NAME.toml`, `frames/NAME-0001.json` … and `recording.json`; `dermis reconstruct` takes scene and
+//! frames, `dermis report --recording` the folder.
+
+use std::fmt::Write as _;
+use std::path::{Path, PathBuf};
+
+use anyhow::{anyhow, bail, Result};
+use clap::{Args, ValueEnum};
+use dermis_golden::import::{load, Crop, Format, Settings, Summary, Unit};
+
+use crate::report::document::percent_text;
+
+/// Arguments of `dermis import`.
+#[derive(Args, Debug)]
+#[command(after_help = EXAMPLES)]
+pub struct Arguments {
+    /// Recording: Tekscan ASF or CSV, novel LST, NumPy .npy, or CSV with one frame per line.
+    file: PathBuf,
+    /// Folder for scene, frames and recording.json; default: <build-dir>/recordings/<name>.
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
+    /// Name of the scene; default: the file's.
+    #[arg(long)]
+    name: Option<String>,
+    /// Format, if it is not recognised: tekscan, lst, npy or csv.
+    #[arg(long, value_name = "NAME", value_parser = format)]
+    format: Option<Format>,
+    /// Unit of the readings: Pa, kPa, MPa, N/cm2, psi, mmHg, kg/cm2, g/cm2 or raw; default: the file's.
+    #[arg(long, value_name = "UNIT", value_parser = unit)]
+    units: Option<Unit>,
+    /// Stress of the largest reading in MPa; raw counts need it.
+    #[arg(long, value_name = "MPA")]
+    full_scale: Option<f64>,
+    /// Bits of a raw count; default: 8 for Tekscan.
+    #[arg(long, value_name = "N")]
+    bits: Option<u32>,
+    /// Rows and columns of the array, for plain CSV and arrays of one line per frame.
+    #[arg(long, value_name = "ROWSxCOLS")]
+    size: Option<String>,
+    /// Pitch in mm along columns and rows; default: the file's.
+    #[arg(long, value_name = "X,Y")]
+    pitch: Option<String>,
+    /// Thickness in mm of an elastic cover over the array; without it no shear is searched.
+    #[arg(long, value_name = "MM")]
+    thickness: Option<f64>,
+    /// Frames to import, the first and the last, counted from 1; default: all.
+    #[arg(long, value_name = "A..B")]
+    frames: Option<String>,
+    /// auto, contact, or rows and columns counted from 0: A..B,C..D, ends included.
+    #[arg(long, value_name = "WINDOW", default_value = "auto")]
+    crop: String,
+    /// What missing sensels become: dead taxels, on which forces continue those around them, or taxels that read 0.
+    #[arg(long, value_enum, default_value = "dead")]
+    missing: Missing,
+    /// Print the summary as JSON and nothing else.
+    #[arg(long)]
+    json: bool,
+}
+
+/// What missing sensels become.
+#[derive(ValueEnum, Clone, Copy, Debug, PartialEq, Eq)]
+enum Missing {
+    /// Dead taxels.
+    Dead,
+    /// Taxels that read 0, where nothing can press on them.
+    Zero,
+}
+
+const EXAMPLES: &str = "Examples:
+  dermis import walk.asf --missing zero
+  dermis import finger.csv --full-scale 0.4 --crop contact --frames 1..20 --out finger
+  dermis import press.npy --units kPa --pitch 2.5,2.5 --thickness 3
+  dermis import log.csv --size 4x4 --units N/cm2 --pitch 5,5 --json
+
+Reads the size, pitch and unit that the file states. Missing sensels (B, NaN, empty) become dead taxels. An array of
+more than 2304 sensels is cropped around the contact; rows and columns in --crop choose another part.
+Then: dermis reconstruct DIR/NAME.toml --frame DIR/frames/NAME-0001.json, dermis report --recording DIR";
+
+/// Imports the recording and writes its folder; returns the summary.
+///
+/// # Errors
+/// A file that cannot be read or is malformed, something that neither file nor options state, an option out of range, a
+/// folder that cannot be written.
+pub fn run(arguments: &Arguments, build_dir: &Path) -> Result<String> {
+    let imported = load(&arguments.file, &arguments.settings()?)?;
+    let summary = &imported.summary;
+    let out = arguments.out.clone().unwrap_or_else(|| build_dir.join("recordings").join(&summary.name));
+    let scene = imported.save(&out)?;
+    if arguments.json {
+        return Ok(serde_json::to_string(summary)? + "\n");
+    }
+    let mut text = String::new();
+    // Writing to a String cannot fail.
+    let _ = lines(&mut text, summary, &imported.scene.sensor.to_string());
+    Ok(text + &format!("written         {} and {} frames\n", scene.display(), summary.frames.len()))
+}
+
+impl Arguments {
+    fn settings(&self) -> Result<Settings> {
+        let size = self.size.as_deref().map(|text| pair("--size", text, "ROWSxCOLS", |text| text.split_once('x')));
+        let pitch = self.pitch.as_deref().map(|text| pair("--pitch", text, "X,Y", |text| text.split_once(',')));
+        let frames = self.frames.as_deref().map(|text| range("--frames", text, text));
+        Ok(Settings {
+            name: self.name.clone(),
+            format: self.format,
+            unit: self.units,
+            size: size.transpose()?,
+            pitch_mm: pitch.transpose()?,
+            full_scale_MPa: self.full_scale,
+            bits: self.bits,
+            frames: frames.transpose()?,
+            crop: crop(&self.crop)?,
+            missing_as_zero: self.missing == Missing::Zero,
+            thickness_mm: self.thickness,
+        })
+    }
+}
+
+/// The lines of the printed summary, without the written files.
+fn lines(text: &mut String, summary: &Summary, sensor: &str) -> std::fmt::Result {
+    let Summary { window, codes, noise, .. } = summary;
+    let [rows, cols] = summary.array;
+    let device = summary.device.as_deref().unwrap_or("device not stated");
+    writeln!(
+        text,
+        "{}: {}, {device}, {rows}×{cols}, unit {}",
+        summary.file,
+        summary.format.name(),
+        summary.unit.name()
+    )?;
+    writeln!(
+        text,
+        "window          rows {}..{}, columns {}..{}: {sensor}",
+        window.row0,
+        window.row0 + window.rows - 1,
+        window.col0,
+        window.col0 + window.cols - 1,
+    )?;
+    if summary.missing > 0 {
+        let what = match summary.missing_as_zero {
+            true => "they read 0",
+            false => "dead taxels; forces on them continue those around (--missing zero: none)",
+        };
+        writeln!(text, "missing         {} sensels: {what}", summary.missing)?;
+    }
+    if summary.outside_share() > 0.0 {
+        writeln!(
+            text,
+            "                up to {} of the largest load is outside",
+            percent_text(summary.outside_share())
+        )?;
+    }
+    let count = summary.frames.len();
+    let period = summary.frames.first().zip(summary.frames.get(1)).and_then(|(a, b)| Some(b.time_s? - a.time_s?));
+    let period = period.map_or(String::new(), |seconds| format!(", {seconds:.4} s apart"));
+    writeln!(text, "frames          {count} of {}{period}", summary.frames_in_file)?;
+    let step = codes.step_MPa.map_or("none".to_owned(), |MPa| format!("{:.3} kPa", 1e3 * MPa));
+    let bits = codes.bits.map_or(String::new(), |bits| format!(", {bits} bits"));
+    let full_kPa = 1e3 * summary.full_scale_MPa;
+    writeln!(text, "codes           {} levels, step {step}{bits}; full scale {full_kPa:.1} kPa", codes.levels)?;
+    if codes.at_full_scale > 0 {
+        writeln!(text, "                {} readings at full scale", codes.at_full_scale)?;
+    }
+    match (noise.loaded_MPa, noise.loaded_share) {
+        (Some(MPa), Some(share)) => {
+            let of = format!("{:.3} kPa, {} of the peak", 1e3 * MPa, percent_text(share));
+            writeln!(text, "noise           {of}, in {} frames of a held load", noise.held_frames)?;
+        }
+        _ => writeln!(text, "noise           not measured: no frame holds its load")?,
+    }
+    if let Some(MPa) = noise.empty_MPa {
+        writeln!(text, "                {:.3} kPa without contact, {} frames", 1e3 * MPa, noise.empty_frames)?;
+    }
+    let forces = || summary.frames.iter().map(|frame| frame.normal_N + frame.outside_N);
+    let (least, most) = (forces().fold(f64::INFINITY, f64::min), forces().fold(f64::NEG_INFINITY, f64::max));
+    writeln!(text, "normal force    {least:.2} to {most:.2} N, stress times area")?;
+    if let Some([largest, median]) = summary.closure() {
+        let (largest, median) = (percent_text(largest), percent_text(median));
+        writeln!(text, "                off the device's own figure by {largest} at most, {median} median")?;
+    }
+    match summary.covered {
+        true => writeln!(text, "shear           searched under the stated cover"),
+        false => writeln!(text, "shear           not searched: no cover of known thickness (--thickness)"),
+    }
+}
+
+/// Two values between a separator.
+fn pair<T: std::str::FromStr>(
+    option: &str,
+    text: &str,
+    wanted: &str,
+    split: impl Fn(&str) -> Option<(&str, &str)>,
+) -> Result<[T; 2]> {
+    let parse = |(a, b): (&str, &str)| Some([a.trim().parse().ok()?, b.trim().parse().ok()?]);
+    split(text).and_then(parse).ok_or_else(|| anyhow!("{option} {text:?}: wanted {wanted}"))
+}
+
+/// `A..B`; `whole` is the option's value.
+fn range(option: &str, text: &str, whole: &str) -> Result<[usize; 2]> {
+    pair(option, text, "A..B", |text| text.split_once("..")).map_err(|_| anyhow!("{option} {whole:?}: wanted A..B"))
+}
+
+/// `auto`, `contact` or `A..B,C..D`.
+fn crop(text: &str) -> Result<Crop> {
+    match text {
+        "auto" => Ok(Crop::Auto),
+        "contact" => Ok(Crop::Contact),
+        _ => {
+            let wrong = || anyhow!("--crop {text:?}: wanted auto, contact or rows and columns A..B,C..D");
+            let (rows, cols) = text.split_once(',').ok_or_else(wrong)?;
+            let lines = |part| range("--crop", part, text).map_err(|_| wrong());
+            Ok(Crop::Lines { rows: lines(rows)?, cols: lines(cols)? })
+        }
+    }
+}
+
+fn format(name: &str) -> Result<Format> {
+    let known = Format::ALL.iter().find(|(own, _)| *own == name);
+    let Some((_, format)) = known else { bail!("one of {}", Format::names().join(", ")) };
+    Ok(*format)
+}
+
+fn unit(name: &str) -> Result<Unit> {
+    Unit::named(name).ok_or_else(|| anyhow!("one of {}", Unit::names()))
+}
