@@ -289,8 +289,8 @@ fn kernel(t: usize, w: usize) -> Kernel {
         k.when(coarse, || found.set(k.constant(1, 1)));
     });
     k.when(halve, || {
-        best_x.set(best_x.shift_left(1).low(p).signed());
-        best_y.set(best_y.shift_left(1).low(p).signed());
+        best_x.set(best_x.low(p - 1).concat(k.constant(1, 0)).signed());
+        best_y.set(best_y.low(p - 1).concat(k.constant(1, 0)).signed());
         taken.set(k.constant(1, 0));
     });
     k.when(begin_frame, || {
