@@ -43,7 +43,8 @@ impl Cells {
         let side = [grid.pitch_x_mm, grid.pitch_y_mm];
         let influence = CellInfluence::new(side, sensor.thickness_mm, medium);
         // A taxel with an even number of cells has its centre on their border: all distances are odd in half sides.
-        let distance = |step: usize, per_taxel: usize| step as f64 + if per_taxel.is_multiple_of(2) { 0.5 } else { 0.0 };
+        let distance =
+            |step: usize, per_taxel: usize| step as f64 + if per_taxel.is_multiple_of(2) { 0.5 } else { 0.0 };
         let at = |index: usize| {
             let (row, col) = (index / grid.cols, index % grid.cols);
             influence.at([distance(col, fx) * side[0], distance(row, fy) * side[1]])
