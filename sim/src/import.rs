@@ -18,7 +18,7 @@ use crate::report::document::percent_text;
 pub struct Arguments {
     /// Recording: Tekscan ASF or CSV, novel LST, NumPy .npy, or CSV with one frame per line.
     file: PathBuf,
-    /// Folder for scene, frames and recording.json; default: <build-dir>/recordings/<name>.
+    /// Folder for scene, frames and recording.json; default: recordings/NAME in the build folder.
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
     /// Name of the scene; default: the file's.
