@@ -348,6 +348,8 @@ impl<'k> Add for Expr<'k> {
 impl<'k> Sub for Expr<'k> {
     type Output = Expr<'k>;
 
+    // A difference has one bit more than its operands.
+    #[allow(clippy::suspicious_arithmetic_impl)]
     fn sub(self, other: Expr<'k>) -> Expr<'k> {
         let bits = self.bits().max(other.bits()) + 1;
         self.binary(Binary::Sub, other, Type::signed(bits))
@@ -357,6 +359,8 @@ impl<'k> Sub for Expr<'k> {
 impl<'k> Mul for Expr<'k> {
     type Output = Expr<'k>;
 
+    // A product has the bits of both operands.
+    #[allow(clippy::suspicious_arithmetic_impl)]
     fn mul(self, other: Expr<'k>) -> Expr<'k> {
         let bits = self.bits() + other.bits();
         self.binary(Binary::Mul, other, Type { bits, signed: self.ty().signed })

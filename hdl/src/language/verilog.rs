@@ -130,10 +130,11 @@ impl Printer<'_> {
         };
         for &node in &order {
             match &kernel.nodes[node].0 {
-                Node::Slice(a, low) => match kernel.nodes[kernel.bare(*a)].0 {
-                    Node::Signal(signal) => mark(signal, *low, kernel.ty(node).bits),
-                    _ => {}
-                },
+                Node::Slice(a, low) => {
+                    if let Node::Signal(signal) = kernel.nodes[kernel.bare(*a)].0 {
+                        mark(signal, *low, kernel.ty(node).bits);
+                    }
+                }
                 other => {
                     for operand in other.operands() {
                         if let Node::Signal(signal) = kernel.nodes[kernel.bare(operand)].0 {
