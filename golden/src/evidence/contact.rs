@@ -8,8 +8,8 @@
 //! ```
 //!
 //! The envelope is taken as known, which makes the variance of the load too small: on drawn frames of sensor-1 and
-//! sensor-2 the error of the load is 1.3 to 1.6 times as large. Its standard deviation is therefore multiplied by 1.4;
-//! that of the shear, which μ decides, is not.
+//! sensor-2 its error has another 0.5 % of the load at every noise level. They are added to its variance; that of the
+//! shear, which μ decides, needs nothing.
 //!
 //! | | shape | unit |
 //! |---|---|---|
@@ -20,8 +20,8 @@ use super::ascent::{Prior, Top};
 use super::model::Products;
 use faer::Mat;
 
-/// Factor of the load's standard deviation, for what the envelope leaves out.
-const LOAD_FACTOR: f64 = 1.4;
+/// Standard deviation, as a share of the load, of what the envelope leaves out.
+const ENVELOPE_SHARE: f64 = 0.005;
 
 /// Force of a contact with its standard deviation.
 pub(super) struct ContactForce {
@@ -55,11 +55,12 @@ pub(super) fn forces(products: &Products, top: &Top, prior: Prior, loads: &[Vec<
                 (0..unknowns).map(|u| mu * slope[u] + if u == 2 * k + axis { normal } else { 0.0 }).collect();
             (mu * normal, (quadratic(&total) + mu * mu * given).max(0.0).sqrt())
         };
+        let load_N = (quadratic(&slope) + given).max(0.0).sqrt().hypot(ENVELOPE_SHARE * normal);
         let ((x, sx), (y, sy)) = (along(0), along(1));
         let at = |a: usize, b: usize| covariance[(2 * k + a, 2 * k + b)];
         ContactForce {
             force_N: [x, y, normal],
-            sigma_N: [sx, sy, LOAD_FACTOR * (quadratic(&slope) + given).max(0.0).sqrt()],
+            sigma_N: [sx, sy, load_N],
             mu_covariance: [at(0, 0), at(0, 1), at(1, 1)],
         }
     };
