@@ -18,11 +18,11 @@
 //! | `model` | evidence, posterior, slope and information in μ |
 //! | `ascent` | μ of all contacts |
 //! | `clipped` | readings of zero on an array that reads no tension |
+//! | `noise` | size of the noise, where it is not stated |
 //! | `contact` | force and standard deviation |
 //!
 //! ℓ is ⅔ h, at least half the larger pitch: finer structure is not visible at the depth of the taxels. The noise has a
-//! floor of 1e-4 of the peak, the error of the cells. Where it is not known, σ² = Σ(b − H w)²/(n − r + tr M⁻¹) in every
-//! round (MacKay 1992): what the pressures do not explain.
+//! floor of 1e-4 of the peak, the error of the cells. Where it is not known, `noise` finds it in every round.
 //!
 //! | | shape | unit |
 //! |---|---|---|
@@ -38,6 +38,7 @@ mod contact;
 mod envelope;
 mod fit;
 mod model;
+mod noise;
 mod prior;
 #[cfg(test)]
 mod tests;

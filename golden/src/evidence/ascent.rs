@@ -1,7 +1,7 @@
 //! Ascent: the μ of every contact at which the evidence, times a prior on μ, is largest.
 //!
 //! ```text
-//! log posterior = log evidence − |μ|²/2s²        s = mu_max/2
+//! log posterior = log evidence − |μ|²/2s²        s = 0.4 mu_max
 //! step = (J + 1/s²)⁻¹ (slope − μ/s²)             J the information of μ
 //! ```
 //!
@@ -19,6 +19,8 @@ use faer::{Col, Mat, Side};
 
 /// Halvings of a step before the ascent ends.
 const HALVINGS: usize = 6;
+/// s in units of mu_max.
+const SPREAD: f64 = 0.4;
 /// Length of a step, in units of mu_max, below which the ascent ends.
 pub(super) const TOLERANCE: f64 = 1e-4;
 
@@ -42,7 +44,7 @@ pub(super) struct Top {
 impl Prior {
     /// 1/s².
     pub fn precision(self) -> f64 {
-        (2.0 / self.mu_max).powi(2)
+        (SPREAD * self.mu_max).powi(-2)
     }
 
     fn log(self, mu: &[[f64; 2]]) -> f64 {

@@ -15,7 +15,7 @@
 //! | in: b with its variance | clipped readings | MPa, MPa² |
 //! | out: reading, precision | clipped readings | MPa, 1/MPa² |
 
-use super::model::{Design, Posterior, Readings};
+use super::model::Readings;
 use std::f64::consts::{FRAC_1_SQRT_2, TAU};
 
 /// φ(z)/Φ(z).
@@ -27,23 +27,11 @@ fn mills(z: f64) -> f64 {
     (-0.5 * z * z).exp() / TAU.sqrt() / (0.5 * libm::erfc(-z * FRAC_1_SQRT_2))
 }
 
-/// Replaces the readings `clipped` by those that agree with `posterior` at μ; `sigma` is the noise in MPa.
-pub(super) fn update(
-    readings: &mut Readings,
-    clipped: &[usize],
-    design: &Design,
-    posterior: &Posterior,
-    mu: &[[f64; 2]],
-    sigma: f64,
-) {
-    let h = design.at(mu);
-    let spread = &h * &posterior.covariance;
+/// Replaces the readings `clipped` by those that agree with the posterior's `stress`, mean in MPa and variance in MPa² of
+/// every reading; `sigma` is the noise in MPa.
+pub(super) fn update(readings: &mut Readings, clipped: &[usize], stress: &[[f64; 2]], sigma: f64) {
     for &t in clipped {
-        let (mut mean, mut variance) = (0.0, 0.0);
-        for i in 0..design.rank() {
-            mean += h[(t, i)] * posterior.w[i];
-            variance += h[(t, i)] * spread[(t, i)];
-        }
+        let [mean, variance] = stress[t];
         let (y, precision) = (readings.y[t], readings.precision[t]);
         // Without the reading itself.
         let rest = 1.0 / variance - precision;
@@ -66,7 +54,7 @@ pub(super) fn update(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::evidence::model::Products;
+    use crate::evidence::model::{Design, Products};
     use faer::Mat;
 
     #[test]
@@ -86,7 +74,7 @@ mod tests {
             let mu = [[0.0; 2]];
             for _ in 0..3 {
                 let posterior = Products::new(&design, &readings).at(&mu).unwrap();
-                update(&mut readings, &[1], &design, &posterior, &mu, sigma);
+                update(&mut readings, &[1], &design.stress(&posterior, &mu), sigma);
             }
             let posterior = Products::new(&design, &readings).at(&mu).unwrap();
             let density = |w: f64| {

@@ -7,9 +7,9 @@
 //! dFz = j·dμ + ε        dT = Fz dμ + μ dFz
 //! ```
 //!
-//! The envelope is taken as known, which makes the variance of the load too small: on drawn frames of sensor-1 and
-//! sensor-2 its error has another 0.5 % of the load at every noise level. They are added to its variance; that of the
-//! shear, which μ decides, needs nothing.
+//! The envelope is taken as known, which makes the variances too small: on drawn frames of sensor-1 and sensor-2 the
+//! error of the load has another 0.5 % at every noise level, which are added to its variance, and that of μ is larger by
+//! a tenth.
 //!
 //! | | shape | unit |
 //! |---|---|---|
@@ -22,6 +22,8 @@ use faer::Mat;
 
 /// Standard deviation, as a share of the load, of what the envelope leaves out.
 const ENVELOPE_SHARE: f64 = 0.005;
+/// Standard deviation of μ over the one under a known envelope.
+const ENVELOPE_FACTOR: f64 = 1.1;
 
 /// Force of a contact with its standard deviation.
 pub(super) struct ContactForce {
@@ -37,7 +39,9 @@ pub(super) struct ContactForce {
 /// covariance is not representable.
 pub(super) fn forces(products: &Products, top: &Top, prior: Prior, loads: &[Vec<f64>]) -> Option<Vec<ContactForce>> {
     let unknowns = 2 * loads.len();
-    let covariance = if prior.mu_max > 0.0 { prior.covariance(&top.slope)? } else { Mat::zeros(unknowns, unknowns) };
+    let none = Mat::zeros(unknowns, unknowns);
+    let covariance = if prior.mu_max > 0.0 { prior.covariance(&top.slope)? } else { none };
+    let covariance = covariance * faer::Scale(ENVELOPE_FACTOR * ENVELOPE_FACTOR);
     let drift = products.drift(&top.posterior, unknowns);
     let one = |k: usize| {
         let f = &loads[k];

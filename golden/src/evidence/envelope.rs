@@ -2,7 +2,7 @@
 //!
 //! q is the compressive part of p, smoothed by a Gaussian of 0.3 ℓ. Above a tenth of its peak the envelope is its square
 //! root, so that a cell may carry several times what was found so far; below it is proportional, so that a tail fades
-//! with the rounds. Cells below σ^⅓ of the largest envelope are left out, σ the noise in units of the stress' peak: the
+//! with the rounds. Cells below 1.4 σ^⅓ of the largest envelope are left out, σ the noise in units of the stress' peak: the
 //! more noise, the less a weak cell is known to be loaded.
 //!
 //! The first q is the stress itself: readings above 2 σ, spread over the cells by a Gaussian of half a pitch. It is wider
@@ -20,8 +20,10 @@ use crate::float::segment::smooth_window;
 const SMOOTHING: f64 = 0.3;
 /// Fraction of the peak below which the envelope is proportional to the pressure.
 const KNEE: f64 = 0.1;
-/// Range of the fraction of the largest envelope below which a cell is left out.
-const LEAST: [f64; 2] = [0.03, 0.3];
+/// Fraction of the largest envelope below which a cell is left out, over σ^⅓.
+const LEAST: f64 = 1.4;
+/// Range of that fraction.
+const LEAST_RANGE: [f64; 2] = [0.03, 0.3];
 /// Noise that is taken off every reading before the first round, in standard deviations.
 const CUT: f64 = 2.0;
 /// Spread of a reading over the cells in units of the pitch.
@@ -57,7 +59,7 @@ pub(super) fn from_stress(cells: &Cells, b: &[f64], used: &[bool], sigma: f64) -
 
 /// The envelope of the pressure `p` in N per cell; `sigma` is the noise in units of the stress' peak.
 pub(super) fn envelope(cells: &Cells, p: &[f64], length_mm: f64, sigma: f64) -> Vec<f64> {
-    let least = sigma.cbrt().clamp(LEAST[0], LEAST[1]);
+    let least = (LEAST * sigma.cbrt()).clamp(LEAST_RANGE[0], LEAST_RANGE[1]);
     let q = smooth_window(&cells.grid, p, [SMOOTHING * length_mm; 2]);
     let peak = q.iter().copied().fold(0.0, f64::max);
     let shape = |q: &f64| {

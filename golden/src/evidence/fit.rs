@@ -13,7 +13,7 @@ use super::contact::forces;
 use super::envelope::{envelope, from_stress};
 use super::model::{Design, Products, Readings};
 use super::prior::factor;
-use super::{clipped, ContactEstimate, Estimate, Evidence};
+use super::{clipped, noise, ContactEstimate, Estimate, Evidence};
 use crate::float::segment::{neighbours, segment, WIDTH};
 use crate::frame::Forces;
 use faer::linalg::matmul::matmul;
@@ -260,14 +260,12 @@ impl<'a> Fit<'a> {
             return Some(top);
         }
         for _ in 0..PASSES {
+            let stress = design.stress(&top.posterior, &top.mu);
             if !self.stated {
-                let products = Products::new(design, &self.readings);
-                let free = (self.taxels.len() - self.clipped.len()) as f64 - products.followed(&top.posterior);
-                let ratio = products.residual(&top.posterior) / free.max(1.0);
-                self.sigma = (self.sigma * ratio.sqrt()).clamp(FLOOR, 1.0);
+                self.sigma = (self.sigma * noise::ratio(&self.readings, &self.clipped, &stress)).clamp(FLOOR, 1.0);
                 self.weigh();
             }
-            clipped::update(&mut self.readings, &self.clipped, design, &top.posterior, &top.mu, self.sigma);
+            clipped::update(&mut self.readings, &self.clipped, &stress, self.sigma);
             top = ascend(&Products::new(design, &self.readings), &top.mu, prior, STEPS)?;
         }
         Some(top)

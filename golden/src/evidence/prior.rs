@@ -19,7 +19,7 @@ use faer::Mat;
 /// β, standard deviation of the load in units of the envelope's.
 const LOAD: f64 = 3.0;
 /// α, standard deviation of the shape in units of the envelope.
-const SHAPE: f64 = 1.5;
+const SHAPE: f64 = 2.0;
 /// Largest variance left out, in units of the largest variance of the shape.
 const REMAINDER: f64 = 1e-4;
 
