@@ -27,8 +27,8 @@ use serde::{Deserialize, Serialize};
 /// Share of `search.mu_max` from which on a μ counts as being at its bound. The search's last step is 1/384; a friction
 /// ratio beyond the bound gave 0.95 to 1 on drawn frames of the shipped sensors.
 pub const MU_AT_BOUND: f64 = 0.95;
-/// Share of the array's normal load below which the μ of a subarray or contact does not count for `mu-at-bound`.
-pub const MU_COUNTS_FROM: f64 = 0.05;
+/// Share of the array's normal load below which a subarray or contact does not count for the flags of its shear.
+pub const COUNTS_FROM: f64 = 0.05;
 /// Largest difference of `load_ratio` from 1.
 pub const LOAD_MISMATCH: f64 = 0.1;
 /// Probability of what is left unexplained below which the model does not fit: one frame in a thousand.
@@ -142,7 +142,7 @@ fn mu_share(scene: &Scene, result: &Reconstruction) -> Option<f64> {
         }
     };
     let total: f64 = carried.iter().map(|(_, load)| load).sum();
-    let counts = carried.iter().filter(|(_, load)| *load > 0.0 && *load >= MU_COUNTS_FROM * total);
+    let counts = carried.iter().filter(|(_, load)| *load > 0.0 && *load >= COUNTS_FROM * total);
     counts.map(|([x, y], _)| x.hypot(*y) / mu_max).filter(|share| share.is_finite()).reduce(f64::max)
 }
 

@@ -66,6 +66,8 @@ pub struct Evidence {
     alive: Vec<bool>,
     unipolar: bool,
     gain_spread: f64,
+    /// Noise of each taxel over the root mean square of all.
+    noise_shares: Vec<f64>,
 }
 
 /// One contact.
@@ -116,7 +118,14 @@ impl Evidence {
             alive,
             unipolar: scene.input.unipolar,
             gain_spread: scene.input.gain_spread,
+            noise_shares: vec![1.0; sensor.taxels()],
         }
+    }
+
+    /// The same estimator with noise that differs between taxels: `shares` is the standard deviation of each one over
+    /// the root mean square of all, a value per taxel.
+    pub fn with_noise_shares(self, shares: Vec<f64>) -> Evidence {
+        Evidence { noise_shares: shares, ..self }
     }
 
     /// Estimates the contacts of stress `b` in MPa; `noise_MPa` is the standard deviation of its noise, if it is known.

@@ -9,13 +9,14 @@
 //! |---|---|
 //! | `average = k` | 2^k frames are averaged into one; the additional bits are kept |
 //! | `calibration = "table.csv"` | offset and gain of each taxel, [`calibration`] |
-//! | `tare = "zero.json"` | a frame read without contact, in the readings' unit |
+//! | `tare = "zero.json"` | frames read without contact, in the readings' unit, [`tare`] |
 //! | `dead = [[row, col], …]` | taxels left out of the inverse, whatever they read: [`crate::matrices::Matrices::without`] |
 //! | `unipolar = true` | a reading of zero or less is only an upper bound of the stress, [`unipolar`] |
 //!
 //! Paths are relative to the scene's file. The known forces of a frame are passed through unchanged.
 
 pub mod calibration;
+pub mod tare;
 #[cfg(test)]
 mod tests;
 pub mod unipolar;
@@ -23,6 +24,7 @@ pub mod unipolar;
 use crate::frame::{Frame, FrameError};
 use crate::scene::{InputSpec, Scene};
 use calibration::{Calibration, CalibrationError};
+use tare::Tare;
 use thiserror::Error;
 
 /// A scene's input options with their files loaded.
@@ -31,6 +33,10 @@ pub struct Input {
     frames: usize,
     /// Zero and gain of each taxel, if the scene has a table or a tare frame.
     scale: Option<(Vec<f64>, Vec<f64>)>,
+    /// Standard deviation of the calibrated mean of 2^k frames in MPa as the scene states it, else 0.
+    stated_noise_MPa: f64,
+    /// The same of each taxel, from tare frames; `None` where the scene states it.
+    taxel_noise_MPa: Option<Vec<f64>>,
     spec: InputSpec,
 }
 
@@ -66,19 +72,37 @@ impl Input {
         let spec = &scene.input;
         let (frames, spec) = (1 << spec.average, spec.clone());
         let table = spec.calibration.as_ref().map(|path| Calibration::load(path, &scene.sensor)).transpose()?;
-        let tare = match &spec.tare {
-            None => None,
-            Some(path) => {
-                let frame = Frame::load(path, Some(scene))?;
-                frame.check(scene)?;
-                Some(frame.stress_MPa)
-            }
-        };
+        let tare = spec.tare.as_ref().map(|path| Tare::load(path, scene)).transpose()?;
+        let stated_noise_MPa = scene.search.noise_floor_MPa * spec.noise_share();
+        let input = Input { frames, scale: None, stated_noise_MPa, taxel_noise_MPa: None, spec };
         if table.is_none() && tare.is_none() {
-            return Ok(Input { frames, scale: None, spec });
+            return Ok(input);
         }
         let Calibration { offset, gain } = table.unwrap_or_else(|| Calibration::identity(scene.sensor.taxels()));
-        Ok(Input { frames, scale: Some((tare.unwrap_or(offset), gain)), spec })
+        let Some(Tare { zero, spread, frames: taken }) = tare else {
+            return Ok(Input { scale: Some((offset, gain)), ..input });
+        };
+        // The zero has noise of its own, that of a mean of the tare frames.
+        let share = (1.0 / frames as f64 + 1.0 / taken as f64).sqrt();
+        let noise = |spread: Vec<f64>| spread.iter().zip(&gain).map(|(s, gain)| share * s * gain.abs()).collect();
+        let taxel_noise_MPa = spread.filter(|_| stated_noise_MPa == 0.0).map(noise);
+        Ok(Input { taxel_noise_MPa, scale: Some((zero, gain)), ..input })
+    }
+
+    /// Standard deviation in MPa of a taxel of a calibrated mean of 2^k frames: as the scene states it, else as the tare
+    /// frames show it, the root mean square over the taxels; 0 if neither does.
+    pub fn noise_MPa(&self) -> f64 {
+        match &self.taxel_noise_MPa {
+            Some(noise) => (noise.iter().map(|noise| noise * noise).sum::<f64>() / noise.len() as f64).sqrt(),
+            None => self.stated_noise_MPa,
+        }
+    }
+
+    /// The noise of each taxel over that of [`Input::noise_MPa`], where tare frames show it and the scene does not state
+    /// it; row-major.
+    pub fn noise_shares(&self) -> Option<Vec<f64>> {
+        let mean = self.noise_MPa();
+        self.taxel_noise_MPa.as_ref().map(|noise| noise.iter().map(|noise| noise / mean).collect())
     }
 
     /// Number of frames that are averaged into one, 2^k.

@@ -29,6 +29,7 @@ pub use output::Resultant;
 use crate::checks::Checks;
 use crate::errors::Errors;
 use crate::flags::Flag;
+use crate::float::receive::Received;
 use crate::frame::{Forces, Frame};
 use crate::partition::{Grid, Subarray};
 use crate::scene::Scene;
@@ -131,6 +132,21 @@ impl Reconstruction {
 }
 
 impl SubarrayResult {
+    /// The result of subarray `part`.
+    pub(crate) fn new(part: &Subarray, received: &Received, mu: [f64; 2], objective_value: Option<f64>) -> Self {
+        SubarrayResult {
+            row0: part.row0,
+            col0: part.col0,
+            rows: part.rows,
+            cols: part.cols,
+            centroid_condition: received.condition_met,
+            compression_centroid_mm: received.compression_centroid_mm,
+            tension_centroid_mm: received.tension_centroid_mm,
+            mu,
+            objective_value,
+        }
+    }
+
     /// The subarray.
     pub(crate) fn part(&self) -> Subarray {
         Subarray { row0: self.row0, col0: self.col0, rows: self.rows, cols: self.cols }

@@ -12,7 +12,7 @@
 //! | | `cases` (for "adaptive": 0 and others of 1 … 3 for the hardware; without it as many as fit together) |
 //! | | `condition` ("loaded"; "both-signs") |
 //! | `[search]` | `objective` ("sparse"; …), `mu_max` (0.6; 0, or 0.001 … 2), `noise_floor_MPa` (0) |
-//! | | `form` ("oblique"; "orthogonal"), `estimator` ("search"; "evidence", "auto"), `degree` (none; 1 … 8) |
+//! | | `form` ("oblique"; "orthogonal"), `estimator` ("auto"; "evidence", "search"), `degree` (none; 1 … 8) |
 //! | `[inverse]` | `kind` ("tsvd"; "tikhonov", "exact"), `level` (floor of format and noise; 0 … 1, both excluded) |
 //! | `[threshold]` | `min_force_N` (0) |
 //! | `[fixed]` | `input_bits` (20; 8 … 24), `data_bits` (18; 12 … 18), `coef_bits` (18; 8 … 18) |
@@ -132,11 +132,11 @@ pub enum ObjectiveKind {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum EstimatorKind {
     /// The μ that maximises the objective Π.
-    #[default]
     Search,
     /// The μ that makes the stress most probable, [`crate::evidence`].
     Evidence,
     /// `evidence` where it implements the scene, else `search`.
+    #[default]
     Auto,
 }
 
@@ -353,7 +353,7 @@ impl Default for HardwareSpec {
 impl EstimatorKind {
     /// Every estimator with its name in a scene file, the default first.
     pub const NAMES: [(&'static str, EstimatorKind); 3] =
-        [("search", EstimatorKind::Search), ("evidence", EstimatorKind::Evidence), ("auto", EstimatorKind::Auto)];
+        [("auto", EstimatorKind::Auto), ("evidence", EstimatorKind::Evidence), ("search", EstimatorKind::Search)];
 
     /// Name in a scene file.
     pub fn name(self) -> &'static str {

@@ -14,7 +14,7 @@ fn scene(sensor: &str, case: Case) -> Scene {
 }
 
 fn run(scene: &Scene, frames: &[Frame]) -> Vec<Reconstruction> {
-    let golden = Golden::new(scene).unwrap();
+    let golden = Golden::new(&scene.for_hardware()).unwrap();
     frames.iter().map(|frame| golden.run(frame).unwrap()).collect()
 }
 

@@ -33,7 +33,7 @@ fn fixed_adds_little_to_every_sensor() {
 #[test]
 fn sensor_1_meets_its_targets() {
     let (scene, frames) = scene("sensor-1");
-    let golden = Golden::new(&scene).unwrap();
+    let golden = Golden::new(&scene.for_hardware()).unwrap();
     let golden: Vec<_> = frames.iter().map(|f| golden.run(f).unwrap()).collect();
     for result in &golden {
         let normal = result.error.as_ref().unwrap().normal.unwrap();

@@ -26,7 +26,7 @@ fn sensor_1() -> Scene {
 }
 
 fn run(scene: &Scene, frame: &Frame) -> Reconstruction {
-    Golden::new(scene).unwrap().run(frame).unwrap()
+    Golden::new(&scene.for_hardware()).unwrap().run(frame).unwrap()
 }
 
 /// Counts of 0.00035 MPa above offsets near 600, a table, a tare frame and a dead taxel: a full scale between the
@@ -80,7 +80,7 @@ fn one_of_several_averaged_frames_beyond_full_scale_is_enough() {
         frame.stress_MPa.iter_mut().for_each(|b| *b *= factor);
         frame
     };
-    let (golden, fixed) = (Golden::new(&scene).unwrap(), Model::new(&scene).unwrap());
+    let (golden, fixed) = (Golden::new(&scene.for_hardware()).unwrap(), Model::new(&scene).unwrap());
     for (factor, flagged) in [(1.6, true), (1.4, false)] {
         let frames = [scaled(factor), scaled(0.1)];
         let results = [golden.run_averaged(&frames).unwrap(), fixed.reconstruct_averaged(&frames).unwrap()];

@@ -27,28 +27,25 @@ fn mills(z: f64) -> f64 {
     (-0.5 * z * z).exp() / TAU.sqrt() / (0.5 * libm::erfc(-z * FRAC_1_SQRT_2))
 }
 
-/// Replaces the readings `clipped` by those that agree with the posterior's `stress`, mean in MPa and variance in MPa² of
-/// every reading; `sigma` is the noise in MPa.
-pub(super) fn update(readings: &mut Readings, clipped: &[usize], stress: &[[f64; 2]], sigma: f64) {
-    for &t in clipped {
-        let [mean, variance] = stress[t];
-        let (y, precision) = (readings.y[t], readings.precision[t]);
-        // Without the reading itself.
-        let rest = 1.0 / variance - precision;
-        if rest.is_nan() || rest <= 0.0 {
-            continue;
-        }
-        let v = 1.0 / rest;
-        let m = v * (mean / variance - precision * y);
-        let s = (sigma * sigma + v).sqrt();
-        let z = -m / s;
-        let ratio = mills(z);
-        let delta = ratio * (z + ratio) / (s * s);
-        let tau = delta / (1.0 - v * delta);
-        let own = tau * (m - v * ratio / s) - ratio / s;
-        let found = tau.is_finite() && tau > f64::MIN_POSITIVE.sqrt();
-        (readings.y[t], readings.precision[t]) = if found { (own / tau, tau) } else { (0.0, 0.0) };
+/// Replaces clipped reading `t` by the one that agrees with the posterior's stress there, its mean in MPa and variance in
+/// MPa²; `sigma` is the reading's noise in MPa.
+pub(super) fn update(readings: &mut Readings, t: usize, [mean, variance]: [f64; 2], sigma: f64) {
+    let (y, precision) = (readings.y[t], readings.precision[t]);
+    // Without the reading itself.
+    let rest = 1.0 / variance - precision;
+    if rest.is_nan() || rest <= 0.0 {
+        return;
     }
+    let v = 1.0 / rest;
+    let m = v * (mean / variance - precision * y);
+    let s = (sigma * sigma + v).sqrt();
+    let z = -m / s;
+    let ratio = mills(z);
+    let delta = ratio * (z + ratio) / (s * s);
+    let tau = delta / (1.0 - v * delta);
+    let own = tau * (m - v * ratio / s) - ratio / s;
+    let found = tau.is_finite() && tau > f64::MIN_POSITIVE.sqrt();
+    (readings.y[t], readings.precision[t]) = if found { (own / tau, tau) } else { (0.0, 0.0) };
 }
 
 #[cfg(test)]
@@ -74,7 +71,7 @@ mod tests {
             let mu = [[0.0; 2]];
             for _ in 0..3 {
                 let posterior = Products::new(&design, &readings).at(&mu).unwrap();
-                update(&mut readings, &[1], &design.stress(&posterior, &mu), sigma);
+                update(&mut readings, 1, design.stress(&posterior, &mu)[1], sigma);
             }
             let posterior = Products::new(&design, &readings).at(&mu).unwrap();
             let density = |w: f64| {

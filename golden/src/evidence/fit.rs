@@ -239,14 +239,19 @@ impl<'a> Fit<'a> {
         Design { s, contact }
     }
 
+    /// Standard deviation of a taxel.
+    fn noise(&self, taxel: usize) -> f64 {
+        (self.sigma * self.scene.noise_shares[taxel]).max(FLOOR)
+    }
+
     /// Readings and precision of the taxels that are not clipped.
     fn weigh(&mut self) {
         for (k, &taxel) in self.taxels.iter().enumerate() {
             let b = self.b[taxel];
             if !(self.scene.unipolar && b <= 0.0) {
-                let gain = self.scene.gain_spread * b;
+                let (noise, gain) = (self.noise(taxel), self.scene.gain_spread * b);
                 self.readings.y[k] = b;
-                self.readings.precision[k] = 1.0 / (self.sigma * self.sigma + gain * gain);
+                self.readings.precision[k] = 1.0 / (noise * noise + gain * gain);
             }
         }
     }
@@ -265,7 +270,10 @@ impl<'a> Fit<'a> {
                 self.sigma = (self.sigma * noise::ratio(&self.readings, &self.clipped, &stress)).clamp(FLOOR, 1.0);
                 self.weigh();
             }
-            clipped::update(&mut self.readings, &self.clipped, &stress, self.sigma);
+            for &k in &self.clipped {
+                let noise = self.noise(self.taxels[k]);
+                clipped::update(&mut self.readings, k, stress[k], noise);
+            }
             top = ascend(&Products::new(design, &self.readings), &top.mu, prior, STEPS)?;
         }
         Some(top)

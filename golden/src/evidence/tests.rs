@@ -152,6 +152,41 @@ fn dead_taxels_are_not_read() {
     assert_eq!(evidence.solve(&frame.stress_MPa, None), evidence.solve(&other, None));
 }
 
+/// Tare frames tell zero and noise of each taxel: the right half of the array is five times as noisy. The bit-true model
+/// takes the same noise for its flag.
+#[test]
+fn noise_of_each_taxel_from_tare_frames() {
+    let mut scene = scene("sensor-1");
+    let drawn = Draws::new(&scene, DrawOptions::default()).unwrap().frame(0).unwrap();
+    let peak = drawn.peak_MPa();
+    let sigma = |taxel: usize| peak * if taxel % 10 < 5 { 0.001 } else { 0.005 };
+    let mut random = crate::random::Random::new(9);
+    let mut read = |stress: &dyn Fn(usize) -> f64| -> Vec<f64> {
+        (0..100).map(|taxel| stress(taxel) + 0.1 * peak + sigma(taxel) * random.normal()).collect()
+    };
+    let rows = |frame: &[f64]| frame.chunks(10).map(|row| row.iter().map(f64::to_string).collect::<Vec<_>>().join(","));
+    let zeros: Vec<String> = (0..40).flat_map(|_| rows(&read(&|_| 0.0)).collect::<Vec<_>>()).collect();
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("zeros.csv");
+    std::fs::write(&path, zeros.join("\n")).unwrap();
+    scene.input.tare = Some(path);
+    scene.input.full_scale_MPa = Some(2.0 * peak);
+    let stress = read(&|taxel| drawn.exact_MPa[taxel]);
+    let frame = crate::frame::Frame::from_stress("read", &scene.sensor, stress).unwrap();
+    let result = Golden::new(&scene).unwrap().run(&frame).unwrap();
+    let expected = peak * ((0.001f64.powi(2) + 0.005f64.powi(2)) / 2.0 * (1.0 + 1.0 / 40.0)).sqrt();
+    let found = result.checks.noise_MPa.unwrap();
+    assert!((found / expected - 1.0).abs() < 0.1, "{found} {expected}");
+    assert!(result.checks.misfit_probability.unwrap() > 0.01, "{:?}", result.checks);
+    // One noise for all does not fit: the right half is too loud for it.
+    let one =
+        Scene { search: crate::scene::SearchSpec { noise_floor_MPa: 0.001 * peak, ..scene.search }, ..scene.clone() };
+    let other = Golden::new(&one).unwrap().run(&frame).unwrap();
+    assert!(other.flags.contains(&Flag::Misfit), "{:?}", other.checks);
+    let fixed = crate::fixed::Model::new(&scene).unwrap().reconstruct(&frame).unwrap();
+    assert!(fixed.flags.contains(&Flag::ShearUnreliable), "{:?}", fixed.flags);
+}
+
 /// A bonded layer read as a half-space does not fit, and 2 % of noise does not resolve a small shear.
 #[test]
 fn flags_with_their_figures() {

@@ -20,7 +20,7 @@ use crate::board::{Board, BoardError, EngineKind};
 use crate::checks::Checks;
 use crate::errors::Errors;
 use crate::flags::{frame_flags, Flag};
-use crate::float::receive::receive as receive_codes;
+use crate::float::receive::{receive as receive_codes, Received};
 use crate::frame::{Forces, Frame, FrameError};
 use crate::input::{Input, InputError};
 use crate::matrices::{MatricesError, MAX_DEGREE};
@@ -461,7 +461,7 @@ impl Model {
         }
         let step = self.scene.search.mu_max / MU_STEPS as f64;
         let sensor = &self.scene.sensor;
-        let mut flags = frame_flags(&self.scene, frame, &codes);
+        let mut flags = frame_flags(&self.scene, frame, &codes, input.noise_MPa());
         let mut subarrays = Vec::with_capacity(self.parts.len());
         for (part, beats) in self.parts.iter().zip(status.chunks(STATUS_BEATS)) {
             let Some(status) = Status::of_beats(beats) else { continue };
@@ -479,17 +479,10 @@ impl Model {
             if status.flags & FLAG_COEFFICIENTS != 0 {
                 flags.push(Flag::CoefficientsDamaged);
             }
-            subarrays.push(SubarrayResult {
-                row0: part.row0,
-                col0: part.col0,
-                rows: part.rows,
-                cols: part.cols,
-                centroid_condition: met,
-                compression_centroid_mm: received.compression_centroid_mm,
-                tension_centroid_mm: received.tension_centroid_mm,
-                mu: status.position.map(|x| f64::from(x) * step),
-                objective_value: found.then(|| -f64::from(status.score) / f64::from(1u32 << LOG_FRACTION)),
-            });
+            let received = Received { condition_met: met, ..received };
+            let mu = status.position.map(|x| f64::from(x) * step);
+            let score = found.then(|| -f64::from(status.score) / f64::from(1u32 << LOG_FRACTION));
+            subarrays.push(SubarrayResult::new(part, &received, mu, score));
         }
         let mut result = assemble(&self.scene, frame, engine, subarrays, forces, flags);
         if self.sends_resultants() {

@@ -1,17 +1,35 @@
-//! Frames in CSV: one line per row of taxels, one number in MPa per column, separated by commas.
+//! Frames in CSV: one line per row of taxels, one number in MPa per column, separated by commas; several frames follow
+//! one another.
 
 use super::error::check_count;
 use super::{Frame, FrameError};
 use crate::scene::Scene;
+use crate::sensor::Sensor;
 
 /// Reads a frame of the scene's sensor; blank lines are ignored.
 pub(super) fn parse(text: &str, file: &str, stem: &str, scene: Option<&Scene>) -> Result<Frame, FrameError> {
+    let (sensor, stress) = values(text, file, scene)?;
+    check_count(file, "rows", stress.len() / sensor.cols, sensor.rows)?;
+    Frame::from_stress(stem, sensor, stress)
+}
+
+/// Reads one or more frames of the scene's sensor.
+pub(super) fn parse_all(text: &str, file: &str, stem: &str, scene: Option<&Scene>) -> Result<Vec<Frame>, FrameError> {
+    let (sensor, stress) = values(text, file, scene)?;
+    let rows = stress.len() / sensor.cols;
+    if rows == 0 || !rows.is_multiple_of(sensor.rows) {
+        check_count(file, "rows", rows, (rows / sensor.rows + 1) * sensor.rows)?;
+    }
+    stress.chunks(sensor.taxels()).map(|frame| Frame::from_stress(stem, sensor, frame.to_vec())).collect()
+}
+
+/// The sensor and the values of all lines, `cols` each.
+fn values<'a>(text: &str, file: &str, scene: Option<&'a Scene>) -> Result<(&'a Sensor, Vec<f64>), FrameError> {
     let sensor = match scene {
         Some(scene) => &scene.sensor,
         None => return Err(FrameError::NoSensor { file: file.to_string() }),
     };
     let mut stress = Vec::with_capacity(sensor.taxels());
-    let mut rows = 0;
     let filled = text.lines().enumerate().filter(|(_, line)| !line.trim().is_empty());
     for (index, line) in filled {
         let hint = if line.contains([';', '\t']) { "; values are separated by commas" } else { "" };
@@ -29,8 +47,6 @@ pub(super) fn parse(text: &str, file: &str, stem: &str, scene: Option<&Scene>) -
                 hint,
             })?);
         }
-        rows += 1;
     }
-    check_count(file, "rows", rows, sensor.rows)?;
-    Frame::from_stress(stem, sensor, stress)
+    Ok((sensor, stress))
 }

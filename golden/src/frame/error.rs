@@ -22,6 +22,12 @@ pub enum FrameError {
         /// Largest size in bytes.
         limit: u64,
     },
+    /// A folder has no frame.
+    #[error("{file}: has no frames; their file names end in .json or .csv")]
+    NoFrames {
+        /// Path as given.
+        file: String,
+    },
     /// The file name ends in neither `.json` nor `.csv`.
     #[error("{file}: a frame's file name ends in .json or .csv")]
     UnknownKind {

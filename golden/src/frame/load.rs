@@ -22,6 +22,45 @@ impl Frame {
         Frame::parsed(parser, &read(path, &file)?, path, scene)
     }
 
+    /// Reads every frame of a recording: of a folder the `.json` and `.csv` files in the order of their names, of a CSV
+    /// file one frame after the other, of a JSON file its frame.
+    ///
+    /// ```
+    /// use dermis_golden::{frame::Frame, scene::Scene, sensor::Sensor};
+    ///
+    /// let sensor = Sensor { rows: 2, cols: 2, pitch_x_mm: 4.0, pitch_y_mm: 4.0, thickness_mm: 3.0 };
+    /// let scene = Scene::of_sensor(&sensor, "small");
+    /// let folder = tempfile::tempdir()?;
+    /// std::fs::write(folder.path().join("zero.csv"), "0.01, 0.02\n-0.01, 0\n0, 0.01\n0, 0\n")?;
+    /// let frames = Frame::load_all(folder.path(), Some(&scene))?;
+    /// assert_eq!((frames.len(), frames[1].stress_MPa[1]), (2, 0.01));
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    ///
+    /// # Errors
+    /// As [`Frame::load`]; [`FrameError::NoFrames`] for a folder without frames.
+    pub fn load_all(path: impl AsRef<Path>, scene: Option<&Scene>) -> Result<Vec<Frame>, FrameError> {
+        let path = path.as_ref();
+        let file = path.display().to_string();
+        if path.is_dir() {
+            let unreadable = |source| FrameError::Unreadable { file: file.clone(), source };
+            let entries =
+                std::fs::read_dir(path).and_then(Iterator::collect::<Result<Vec<_>, _>>).map_err(unreadable)?;
+            let mut files: Vec<_> = entries.into_iter().map(|entry| entry.path()).collect();
+            files.retain(|path| parser(path).is_ok());
+            files.sort();
+            let frames: Vec<Vec<Frame>> =
+                files.iter().map(|path| Frame::load_all(path, scene)).collect::<Result<_, _>>()?;
+            let frames = frames.concat();
+            return if frames.is_empty() { Err(FrameError::NoFrames { file }) } else { Ok(frames) };
+        }
+        if is_csv(path) {
+            let text = read(path, &file)?;
+            return csv::parse_all(without_mark(&text), &file, &stem(path), scene);
+        }
+        Ok(vec![Frame::load(path, scene)?])
+    }
+
     /// Reads a frame from the text of a `.json` or `.csv` file called `name`, as [`Frame::load`] does.
     ///
     /// ```
@@ -46,11 +85,22 @@ impl Frame {
     }
 
     fn parsed(parser: Parser, text: &str, path: &Path, scene: Option<&Scene>) -> Result<Frame, FrameError> {
-        let stem = path.file_stem().map(|stem| stem.to_string_lossy().into_owned());
-        // Spreadsheets mark UTF-8 with U+FEFF, which belongs to no value.
-        let text = text.strip_prefix('\u{feff}').unwrap_or(text);
-        parser(text, &path.display().to_string(), &stem.unwrap_or_default(), scene)
+        parser(without_mark(text), &path.display().to_string(), &stem(path), scene)
     }
+}
+
+/// Spreadsheets mark UTF-8 with U+FEFF, which belongs to no value.
+fn without_mark(text: &str) -> &str {
+    text.strip_prefix('\u{feff}').unwrap_or(text)
+}
+
+/// The file's name without its ending.
+fn stem(path: &Path) -> String {
+    path.file_stem().map(|stem| stem.to_string_lossy().into_owned()).unwrap_or_default()
+}
+
+fn is_csv(path: &Path) -> bool {
+    path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("csv"))
 }
 
 /// Text, file, its stem, scene.

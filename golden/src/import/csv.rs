@@ -43,21 +43,7 @@ pub(super) fn parse(text: &str, size: Option<[usize; 2]>, source: &Source) -> Re
         }
         frames.push(RawFrame { number: frames.len() + 1, time_s, values, device: None });
     }
-    for frame in &mut frames {
-        frame.values.iter_mut().zip(&missing).filter(|(_, missing)| **missing).for_each(|(value, _)| *value = 0.0);
-    }
-    Ok(Recording {
-        format: Format::Csv,
-        device: None,
-        rows,
-        cols,
-        pitch_mm: None,
-        unit: None,
-        bits: None,
-        full_scale: None,
-        missing,
-        frames,
-    })
+    Ok(Recording::bare(Format::Csv, [rows, cols], missing, frames))
 }
 
 /// The separator of the last line, which has values even where the first has names.

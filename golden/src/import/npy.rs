@@ -70,21 +70,7 @@ pub(super) fn parse(bytes: &[u8], size: Option<[usize; 2]>, source: &Source) -> 
         }
         frames.push(RawFrame { number: frame + 1, time_s: None, values, device: None });
     }
-    for frame in &mut frames {
-        frame.values.iter_mut().zip(&missing).filter(|(_, missing)| **missing).for_each(|(value, _)| *value = 0.0);
-    }
-    Ok(Recording {
-        format: Format::Npy,
-        device: None,
-        rows,
-        cols,
-        pitch_mm: None,
-        unit: None,
-        bits: None,
-        full_scale: None,
-        missing,
-        frames,
-    })
+    Ok(Recording::bare(Format::Npy, [rows, cols], missing, frames))
 }
 
 /// Text of the header, and the bytes behind it.

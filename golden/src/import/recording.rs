@@ -52,6 +52,33 @@ pub(super) struct Recording {
     pub frames: Vec<RawFrame>,
 }
 
+impl Recording {
+    /// Frames of a format that states neither device, pitch, unit nor codes. A sensel that is missing in one frame reads 0
+    /// in all.
+    pub(super) fn bare(
+        format: Format,
+        [rows, cols]: [usize; 2],
+        missing: Vec<bool>,
+        mut frames: Vec<RawFrame>,
+    ) -> Self {
+        for frame in &mut frames {
+            frame.values.iter_mut().zip(&missing).filter(|(_, missing)| **missing).for_each(|(value, _)| *value = 0.0);
+        }
+        Recording {
+            format,
+            device: None,
+            rows,
+            cols,
+            pitch_mm: None,
+            unit: None,
+            bits: None,
+            full_scale: None,
+            missing,
+            frames,
+        }
+    }
+}
+
 /// A reading of a text.
 pub(super) fn reading(source: &Source, line: usize, column: usize, text: &str) -> Result<f64, ImportError> {
     let number = text.trim().parse().ok().filter(|value: &f64| is_reading(*value));

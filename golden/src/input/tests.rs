@@ -15,7 +15,7 @@ fn hertz() -> Frame {
 }
 
 fn run(scene: &Scene, frame: &Frame) -> Reconstruction {
-    Golden::new(scene).unwrap().run(frame).unwrap()
+    Golden::new(&scene.for_hardware()).unwrap().run(frame).unwrap()
 }
 
 fn shears(results: impl Iterator<Item = Reconstruction>) -> Vec<f64> {
@@ -31,7 +31,7 @@ fn a_dead_taxel_costs_little_and_its_reading_nothing() {
     for frame in Frame::shipped(&scene) {
         let peak = (0..100).max_by(|a, b| frame.stress_MPa[*a].total_cmp(&frame.stress_MPa[*b])).unwrap();
         scene.input.dead = vec![[peak / 10, peak % 10]];
-        let golden = Golden::new(&scene).unwrap();
+        let golden = Golden::new(&scene.for_hardware()).unwrap();
         let result = golden.run(&frame).unwrap();
         // A masked taxel may read anything: forces, condition, centroids and flags do not change.
         for share in [-0.5, 1e6] {
@@ -98,7 +98,7 @@ fn table_and_tare_undo_what_the_sensor_did() {
     readings.stress_MPa.iter_mut().for_each(|b| *b += 0.3);
     assert!(near(run(&scene, &readings)));
     scene.input.tare = Some(folder.path().join("absent.json"));
-    assert!(Golden::new(&scene).err().unwrap().to_string().contains("absent.json: cannot be read"));
+    assert!(Golden::new(&scene.for_hardware()).err().unwrap().to_string().contains("absent.json: cannot be read"));
 }
 
 #[test]
@@ -137,7 +137,7 @@ fn averages_lower_the_noise_by_the_root_of_their_count() {
     let deviation = (squares / 100.0).sqrt() / frame.peak_MPa();
     // 100 draws estimate a deviation to 1/√200 = 7 %; four times that.
     assert!((deviation / 0.00125 - 1.0).abs() < 0.28, "{deviation}");
-    let error = Golden::new(&scene).unwrap().run_averaged(&frames[1..]).unwrap_err().to_string();
+    let error = Golden::new(&scene.for_hardware()).unwrap().run_averaged(&frames[1..]).unwrap_err().to_string();
     assert_eq!(error, "scene sensor-1: input.average = 6 takes 64 frames at a time, got 63");
     assert!(input.average(&scene, &[]).is_err());
 }
@@ -154,7 +154,8 @@ fn filled_readings_beat_zeros_and_are_reported() {
         let plain = scene(name);
         let mut scene = plain.clone();
         scene.input.unipolar = true;
-        let (golden, zeros) = (Golden::new(&scene).unwrap(), Golden::new(&plain).unwrap());
+        let (golden, zeros) =
+            (Golden::new(&scene.for_hardware()).unwrap(), Golden::new(&plain.for_hardware()).unwrap());
         let converter = Converter { unipolar: true, ..Default::default() };
         let (mut with, mut without) = (Vec::new(), Vec::new());
         for frame in Frame::shipped(&scene) {

@@ -75,6 +75,7 @@ pub(super) struct EngineInput<'a> {
 }
 
 /// Results of all subarrays of a case.
+#[derive(Default)]
 pub(super) struct CaseOutcome {
     pub subarrays: Vec<SubarrayResult>,
     pub forces: Forces,
@@ -146,8 +147,13 @@ impl Golden {
         let by_contact = scene.partition.case.grid().is_none();
         let fits = by_contact && scene.input.dead.is_empty() && scene.search.mu_max > 0.0;
         let taxels = fits.then(|| Taxels::new(&scene.sensor, scene.medium));
+        let input = Input::new(scene)?;
         let evidence = (scene.estimator() == EstimatorKind::Evidence).then(|| Evidence::new(scene));
-        Ok(Golden { scene: scene.clone(), input: Input::new(scene)?, tilings, taxels, evidence })
+        let evidence = evidence.map(|evidence| match input.noise_shares() {
+            None => evidence,
+            Some(shares) => evidence.with_noise_shares(shares),
+        });
+        Ok(Golden { scene: scene.clone(), input, tilings, taxels, evidence })
     }
 
     /// The matrices of the first subarray; with `adaptive` and `contacts` those of the whole array.
@@ -177,16 +183,17 @@ impl Golden {
         let codes = quantise(&frame.stress_MPa, scene.fixed.input_bits, full_scale(scene, frame));
         let floor = noise_floor_codes(scene, &codes);
         let input = EngineInput { stress_MPa: &frame.stress_MPa, codes: &codes.codes, floor, noise_MPa };
-        let mut result = match scene.partition.case {
-            Case::Grid(_) => self.finish(frame, self.subarrays(&input, self.whole())),
-            Case::Adaptive => self.adaptive(frame, &input),
-            Case::Contacts => self.contacts(frame, &input),
+        let mut result = match (&self.evidence, scene.partition.case) {
+            (Some(evidence), _) => self.by_evidence(evidence, frame, &input),
+            (None, Case::Grid(_)) => self.finish(frame, self.subarrays(&input, self.whole())),
+            (None, Case::Adaptive) => self.adaptive(frame, &input),
+            (None, Case::Contacts) => self.contacts(frame, &input),
         };
         if !result.resultant_N.iter().all(|sum| sum.is_finite()) {
             let (frame, peak_MPa) = (frame.id.clone(), frame.peak_MPa());
             return Err(GoldenError::TooStrong { frame, peak_MPa });
         }
-        result.flags.extend(frame_flags(scene, frame, &codes));
+        result.flags.extend(frame_flags(scene, frame, &codes, noise_MPa));
         result.flags.sort();
         result.flags.dedup();
         Ok(result)
@@ -208,14 +215,7 @@ impl Golden {
     /// Solves every subarray of a partition on its own.
     pub(super) fn subarrays(&self, input: &EngineInput, tiling: &Tiling) -> CaseOutcome {
         let sensor = &self.scene.sensor;
-        let forces = Forces::zeros(sensor.taxels());
-        let mut outcome = CaseOutcome {
-            subarrays: Vec::new(),
-            forces,
-            flags: Vec::new(),
-            truncation: Vec::new(),
-            shape_misfit: None,
-        };
+        let mut outcome = CaseOutcome { forces: Forces::zeros(sensor.taxels()), ..CaseOutcome::default() };
         for (index, part) in tiling.parts.iter().enumerate() {
             let received = self.receive(input, part);
             let b = part.gather(sensor, input.stress_MPa);
@@ -233,17 +233,9 @@ impl Golden {
             part.scatter(sensor, &own.fx, &mut outcome.forces.fx);
             part.scatter(sensor, &own.fy, &mut outcome.forces.fy);
             part.scatter(sensor, &own.fz, &mut outcome.forces.fz);
-            outcome.subarrays.push(SubarrayResult {
-                row0: part.row0,
-                col0: part.col0,
-                rows: part.rows,
-                cols: part.cols,
-                centroid_condition: received.condition_met,
-                compression_centroid_mm: received.compression_centroid_mm,
-                tension_centroid_mm: received.tension_centroid_mm,
-                mu: estimate.map_or([0.0; 2], |estimate| estimate.found.mu),
-                objective_value: estimate.map(|estimate| estimate.found.objective),
-            });
+            let found = estimate.map(|estimate| estimate.found);
+            let (mu, objective) = (found.map_or([0.0; 2], |found| found.mu), found.map(|found| found.objective));
+            outcome.subarrays.push(SubarrayResult::new(part, &received, mu, objective));
         }
         outcome
     }

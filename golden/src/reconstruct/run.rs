@@ -41,12 +41,7 @@ impl Golden {
     /// [`GoldenError::Frame`] if the frame is not of the scene's sensor, [`GoldenError::TooStrong`] if a force is not
     /// finite.
     pub fn run(&self, frame: &Frame) -> Result<Reconstruction, GoldenError> {
-        self.run_with_noise(frame, self.noise_MPa())
-    }
-
-    /// Standard deviation of the noise in MPa as the scene states it, after averaging.
-    fn noise_MPa(&self) -> f64 {
-        self.scene.search.noise_floor_MPa * self.scene.input.noise_share()
+        self.run_with_noise(frame, self.input.noise_MPa())
     }
 
     /// Reconstructs one frame with the given standard deviation of the noise in MPa instead of the scene's noise floor.
@@ -61,14 +56,9 @@ impl Golden {
     fn run_readings(&self, readings: &[Frame], mean: &Frame, noise_MPa: f64) -> Result<Reconstruction, GoldenError> {
         mean.check(&self.scene)?;
         let frame = self.input.calibrate(mean);
-        if let Some(evidence) = &self.evidence {
-            let mut result = self.by_evidence(evidence, &frame, noise_MPa)?;
-            let full_scale_share = self.input.full_scale_share(readings);
-            let checks = Checks { full_scale_share, ..Checks::of(&self.scene, &frame, &result) };
-            result.add_checks(&self.scene, checks);
-            return Ok(self.with_output(result));
-        }
-        let (filled, report) = match self.scene.input.unipolar {
+        // Evidence takes clipped readings as they are, and its load does not come from Cz⁺b.
+        let searched = self.evidence.is_none();
+        let (filled, report) = match self.scene.input.unipolar && searched {
             true => self.filled(&frame),
             false => (frame.clone(), None),
         };
@@ -77,8 +67,7 @@ impl Golden {
         result.extra.unipolar = report.map(misfit);
         let checks = Checks {
             full_scale_share: self.input.full_scale_share(readings),
-            load_ratio: self.load_ratio(&filled, &result),
-            shape_misfit: result.checks.shape_misfit,
+            load_ratio: if searched { self.load_ratio(&filled, &result) } else { None },
             ..Checks::of(&self.scene, &frame, &result)
         };
         result.add_checks(&self.scene, checks);
@@ -147,7 +136,7 @@ impl Golden {
     /// As [`Golden::run`]; [`GoldenError::Input`] unless there are 2^k frames.
     pub fn run_averaged(&self, frames: &[Frame]) -> Result<Reconstruction, GoldenError> {
         let mean = self.input.average(&self.scene, frames)?;
-        self.run_readings(frames, &mean, self.noise_MPa())
+        self.run_readings(frames, &mean, self.input.noise_MPa())
     }
 
     /// The stress in MPa that [`Golden::run_averaged`] reconstructs: the calibrated mean of 2^k frames.

@@ -19,7 +19,7 @@ fn hertz() -> Frame {
 }
 
 fn run(scene: &Scene, frame: &Frame) -> Reconstruction {
-    Golden::new(scene).unwrap().run(frame).unwrap()
+    Golden::new(&scene.for_hardware()).unwrap().run(frame).unwrap()
 }
 
 #[test]
@@ -172,7 +172,7 @@ fn extreme_stress_is_an_error_or_a_finite_result() {
     for case in [Case::WHOLE, Case::Adaptive, Case::Contacts] {
         let mut scene = scene();
         scene.partition.case = case;
-        let golden = Golden::new(&scene).unwrap();
+        let golden = Golden::new(&scene.for_hardware()).unwrap();
         for scale in [1e-300, 1e150, 1e300, 1e307, 1e308] {
             let mut frame = hertz();
             frame.stress_MPa.iter_mut().for_each(|b| *b *= scale);
@@ -187,7 +187,7 @@ fn extreme_stress_is_an_error_or_a_finite_result() {
 #[test]
 fn frames_of_another_sensor_are_rejected() {
     let eight = Scene::builtin("eight-by-eight").unwrap();
-    let other = Golden::new(&eight).unwrap().run(&hertz());
+    let other = Golden::new(&eight.for_hardware()).unwrap().run(&hertz());
     assert!(matches!(other, Err(GoldenError::Frame(_))));
 }
 

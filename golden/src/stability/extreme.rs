@@ -170,7 +170,7 @@ pub fn frames(scene: &Scene) -> Result<Vec<Extreme>, GeneratorError> {
 /// [`GoldenError`] if the golden model rejects scene or frame.
 pub fn outcome(extreme: &Extreme) -> Result<Row, GoldenError> {
     let Extreme { scene, frame } = extreme;
-    let golden = Golden::new(scene)?.run(frame)?;
+    let golden = Golden::new(&scene.for_hardware())?.run(frame)?;
     let fixed = || -> Result<(Reconstruction, String), FixedError> {
         let model = Model::for_frames(scene, std::slice::from_ref(frame))?;
         let trace = model.run(&model.readings(std::slice::from_ref(frame))?);

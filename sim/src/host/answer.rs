@@ -92,7 +92,9 @@ impl Answer {
 
     /// The result's flags, as in a reconstruction, but `mu-at-bound` only with one subarray.
     fn flags(&self, model: &Model, frame: &Frame, checks: &Checks) -> Result<Vec<Flag>> {
-        let mut flags: BTreeSet<Flag> = frame_flags(&model.scene, frame, &model.codes(frame)?).into_iter().collect();
+        let noise_MPa = Input::new(&model.scene)?.noise_MPa();
+        let of_frame = frame_flags(&model.scene, frame, &model.codes(frame)?, noise_MPa);
+        let mut flags: BTreeSet<Flag> = of_frame.into_iter().collect();
         flags.extend(checks.flags(&model.scene));
         for status in self.statuses() {
             let has = |bit: u32| status.flags & bit != 0;

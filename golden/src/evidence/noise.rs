@@ -1,0 +1,51 @@
+//! Noise: its size from what the pressures do not explain, where neither scene nor tare frames state it.
+//!
+//! Of the readings, Σ T (b − H w)² is left over; noise of the assumed size would leave Σ (1 − T v), v the variance that
+//! the posterior still has there (MacKay 1992). Clipped readings count in neither sum.
+//!
+//! | | shape | unit |
+//! |---|---|---|
+//! | in: readings, stress of the posterior | readings | MPa, 1/MPa² |
+//! | out: noise found over noise assumed | 1 | – |
+
+use super::model::Readings;
+
+/// Noise found over the noise assumed in the precision of `readings`; `stress` is mean and variance of the posterior's
+/// stress, `clipped` are the readings that count for nothing, in ascending order.
+pub(super) fn ratio(readings: &Readings, clipped: &[usize], stress: &[[f64; 2]]) -> f64 {
+    let (mut left, mut free) = (0.0, 0.0);
+    for (t, [mean, variance]) in stress.iter().enumerate() {
+        if clipped.binary_search(&t).is_err() {
+            left += readings.precision[t] * (readings.y[t] - mean).powi(2);
+            free += 1.0 - readings.precision[t] * variance;
+        }
+    }
+    (left / free.max(1.0)).sqrt()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::evidence::model::{Design, Products};
+    use crate::random::Random;
+    use faer::Mat;
+
+    /// Two coefficients, 400 readings of which every fourth is clipped: noise that is assumed three times too small is
+    /// found within its own uncertainty, 1/√(2·300), and clipped readings do not disturb it.
+    #[test]
+    fn noise_is_found_from_unclipped_readings() {
+        let count = 400;
+        let s = Mat::from_fn(count, 6, |t, i| if i < 2 { ((t + 1) as f64 * (i + 1) as f64).sin() } else { 0.0 });
+        let design = Design { s, contact: vec![0, 0] };
+        let clipped: Vec<usize> = (0..count).step_by(4).collect();
+        let mut random = Random::new(5);
+        let sigma = 0.03;
+        let y = (0..count).map(|t| if t % 4 == 0 { 7.0 } else { design.s[(t, 0)] + sigma * random.normal() }).collect();
+        let precision = (0..count).map(|t| if t % 4 == 0 { 1e-9 } else { (3.0 / sigma).powi(2) }).collect();
+        let readings = Readings { y, precision };
+        let mu = [[0.0; 2]];
+        let posterior = Products::new(&design, &readings).at(&mu).unwrap();
+        let found = ratio(&readings, &clipped, &design.stress(&posterior, &mu));
+        assert!((found / 3.0 - 1.0).abs() < 0.1, "{found}");
+    }
+}
