@@ -22,7 +22,7 @@ use std::f64::consts::FRAC_1_SQRT_2;
 
 /// Smallest standard deviation of a reading.
 const FLOOR: f64 = 1e-4;
-/// First noise where it is not known.
+/// Largest first noise where it is not known.
 const UNKNOWN: f64 = 0.02;
 /// Largest number of rounds.
 const ROUNDS: usize = 16;
@@ -98,16 +98,17 @@ impl Regions {
 }
 
 impl<'a> Fit<'a> {
-    /// A fit that has not begun; `noise` in units of the peak.
-    pub fn new(scene: &'a Evidence, b: &'a [f64], noise: Option<f64>) -> Fit<'a> {
-        let sigma = noise.unwrap_or(UNKNOWN).max(FLOOR);
+    /// A fit that has not begun; `stated` is the noise in units of the peak, if it is known.
+    pub fn new(scene: &'a Evidence, b: &'a [f64], stated: Option<f64>) -> Fit<'a> {
+        let alive = b.iter().zip(&scene.alive).filter_map(|(b, alive)| alive.then_some(*b));
+        let sigma = stated.unwrap_or_else(|| noise::first(alive).min(UNKNOWN)).max(FLOOR);
         let p = from_stress(&scene.cells, b, &scene.alive, sigma);
         let taxels = scene.window(&p, sigma);
         let is_clipped = |k: &usize| scene.unipolar && b[taxels[*k]] <= 0.0;
         let clipped = (0..taxels.len()).filter(is_clipped).collect();
         let readings = Readings { y: vec![0.0; taxels.len()], precision: vec![0.0; taxels.len()] };
         let (labels, mu) = (vec![0; p.len()], vec![[0.0; 2]]);
-        Fit { scene, b, taxels, clipped, readings, sigma, stated: noise.is_some(), p, labels, mu }
+        Fit { scene, b, taxels, clipped, readings, sigma, stated: stated.is_some(), p, labels, mu }
     }
 
     /// The estimate; `None` if the model is not representable.

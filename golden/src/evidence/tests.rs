@@ -164,8 +164,8 @@ fn noise_of_each_taxel_from_tare_frames() {
     let mut read = |stress: &dyn Fn(usize) -> f64| -> Vec<f64> {
         (0..100).map(|taxel| stress(taxel) + 0.1 * peak + sigma(taxel) * random.normal()).collect()
     };
-    let rows = |frame: &[f64]| frame.chunks(10).map(|row| row.iter().map(f64::to_string).collect::<Vec<_>>().join(","));
-    let zeros: Vec<String> = (0..40).flat_map(|_| rows(&read(&|_| 0.0)).collect::<Vec<_>>()).collect();
+    let line = |row: &[f64]| row.iter().map(f64::to_string).collect::<Vec<_>>().join(",");
+    let zeros: Vec<String> = (0..40).flat_map(|_| read(&|_| 0.0).chunks(10).map(line).collect::<Vec<_>>()).collect();
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("zeros.csv");
     std::fs::write(&path, zeros.join("\n")).unwrap();
