@@ -43,9 +43,11 @@ mod prior;
 mod tests;
 
 use crate::frame::Forces;
+use crate::learned::Learned;
 use crate::scene::Scene;
 use ascent::Prior;
 use cells::Cells;
+use fit::advice::Adviser;
 use fit::Fit;
 use serde::{Deserialize, Serialize};
 
@@ -65,6 +67,7 @@ pub struct Evidence {
     alive: Vec<bool>,
     unipolar: bool,
     gain_spread: f64,
+    adviser: Option<Adviser>,
 }
 
 /// One contact.
@@ -115,7 +118,13 @@ impl Evidence {
             alive,
             unipolar: scene.input.unipolar,
             gain_spread: scene.input.gain_spread,
+            adviser: None,
         }
+    }
+
+    /// The same with the μ of each contact from a trained network; `combined` with the evidence's own or in its place.
+    pub fn advised_by(self, network: Learned, combined: bool) -> Evidence {
+        Evidence { adviser: Some(Adviser { network, combined }), ..self }
     }
 
     /// Estimates the contacts of stress `b` in MPa; `noise_MPa` is the standard deviation of its noise, if it is known.

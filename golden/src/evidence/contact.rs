@@ -16,7 +16,7 @@
 //! | in: f | r | N |
 //! | out: force and standard deviation | 3 per contact | N, [x, y, normal] |
 
-use super::ascent::{Prior, Top};
+use super::ascent::Top;
 use super::model::Products;
 use faer::Mat;
 
@@ -33,11 +33,10 @@ pub(super) struct ContactForce {
     pub mu_covariance: [f64; 3],
 }
 
-/// The force of every contact; `loads` is f for each of them, 0 for the coefficients of the others. `None` if the
-/// covariance is not representable.
-pub(super) fn forces(products: &Products, top: &Top, prior: Prior, loads: &[Vec<f64>]) -> Option<Vec<ContactForce>> {
+/// The force of every contact; `loads` is f for each of them, 0 for the coefficients of the others,
+/// `covariance` that of all μ.
+pub(super) fn forces(products: &Products, top: &Top, covariance: &Mat<f64>, loads: &[Vec<f64>]) -> Vec<ContactForce> {
     let unknowns = 2 * loads.len();
-    let covariance = if prior.mu_max > 0.0 { prior.covariance(&top.slope)? } else { Mat::zeros(unknowns, unknowns) };
     let drift = products.drift(&top.posterior, unknowns);
     let one = |k: usize| {
         let f = &loads[k];
@@ -64,5 +63,5 @@ pub(super) fn forces(products: &Products, top: &Top, prior: Prior, loads: &[Vec<
             mu_covariance: [at(0, 0), at(0, 1), at(1, 1)],
         }
     };
-    Some((0..loads.len()).map(one).collect())
+    (0..loads.len()).map(one).collect()
 }
