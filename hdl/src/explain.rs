@@ -7,7 +7,7 @@ use serde::Serialize;
 
 use crate::generate::HdlError;
 use crate::simulate::design;
-use crate::usage::{stages, total, Usage};
+use crate::usage::{total, Usage};
 
 /// A feature of the hardware.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
@@ -77,6 +77,6 @@ fn difference((with, cycles_with): &(Usage, u64), (without, cycles_without): &(U
 }
 
 fn needs(model: &Model) -> Result<(Usage, u64), HdlError> {
-    let usage = total(&stages(model, &design(model)?.verilog()));
+    let usage = total(&design(model)?.usage(model));
     Ok((usage, Cycles::longest(model).latency))
 }

@@ -18,11 +18,12 @@ use thiserror::Error;
 use crate::core_file::core_file;
 use crate::device::Tap;
 use crate::explain::Explained;
+use crate::language::KernelError;
 use crate::manifest::seal;
 use crate::primitives::MEMORY_FILE;
 use crate::simulate::design;
 use crate::taps::taps;
-use crate::usage::{stages, total, Usage};
+use crate::usage::{total, Usage};
 
 /// `manifest_version`: version of the generated files' meaning; a reader rejects any other.
 pub(crate) const MANIFEST_VERSION: u32 = 1;
@@ -45,6 +46,9 @@ pub enum HdlError {
     /// The scene's link cannot be built.
     #[error(transparent)]
     Link(#[from] LinkError),
+    /// A block's kernel is not sound; a defect of this crate.
+    #[error("internal: {0}")]
+    Kernel(#[from] KernelError),
     /// The description fails rust-hdl's checks; a defect of this crate.
     #[error("internal: the hardware description does not pass its checks: {0}")]
     Check(String),
@@ -92,7 +96,7 @@ fn refused(model: &Model) -> Result<Vec<Refused>, HdlError> {
     let refused = |dropped: &Dropped| {
         let with: Vec<u32> = dropped.design.cases().iter().map(Model::number).collect();
         let case = with.iter().copied().find(|number| Case::numbered(i64::from(*number)) == Some(dropped.case));
-        let needs = total(&stages(&dropped.design, &design(&dropped.design)?.verilog()));
+        let needs = total(&design(&dropped.design)?.usage(&dropped.design));
         Ok(Refused { case: case.unwrap_or_default(), with, needs })
     };
     model.dropped.iter().map(refused).collect()
@@ -121,7 +125,7 @@ pub fn generate(model: &Model) -> Result<Generated, HdlError> {
     let top = top_name(&model.scene.name);
     let file = |name: String, text: String| GeneratedFile { name, text };
     let verilog = place(&engine.verilog(), model, "")?;
-    let usage = stages(model, &verilog);
+    let usage = engine.usage(model);
     let dropped = refused(model)?;
     let manifest = manifest(model, &top, &usage, &dropped);
     let verilog = header(model, &top) + &rename(&verilog, &top);

@@ -1,6 +1,7 @@
 //! Resources of a generated design by stage: block RAMs and multipliers exact, flip-flops and LUTs estimated.
 
 use std::collections::{BTreeMap, BTreeSet};
+use std::sync::Arc;
 
 use dermis_golden::board::Board;
 use dermis_golden::fixed::resources::Memory;
@@ -8,9 +9,7 @@ use dermis_golden::fixed::Model;
 use serde::Serialize;
 
 use crate::estimate::modules;
-
-/// A distributed RAM cell of the ECP5: words, bits per word, LUTs.
-const CELL: [usize; 3] = [16, 4, 6];
+use crate::language::{distributed_luts, Kernel};
 
 /// Instance names of the stages, in pipeline order: parallel engine, then serial engine. Blocks outside any stage count
 /// as `engine`.
@@ -86,7 +85,9 @@ pub fn stage(block: &str) -> &str {
 }
 
 /// Usage of each stage by its instance name; blocks outside any stage under `engine`.
-pub fn stages(model: &Model, verilog: &str) -> BTreeMap<String, Usage> {
+///
+/// Flip-flops and LUTs are estimated from a block's kernel where it has one, else from the text of its module.
+pub fn stages(model: &Model, verilog: &str, kernels: &BTreeMap<String, Arc<Kernel>>) -> BTreeMap<String, Usage> {
     let mut all: BTreeMap<String, Usage> = BTreeMap::new();
     let mut add = |block: &str, usage: Usage| {
         *all.entry(stage(block).to_string()).or_default() += usage;
@@ -94,12 +95,14 @@ pub fn stages(model: &Model, verilog: &str) -> BTreeMap<String, Usage> {
     let memories = &model.resources.memories;
     let placed: BTreeSet<(String, String)> =
         memories.iter().map(|memory| (format!("top${}", memory.block), memory.array.clone())).collect();
-    for (module, logic) in modules(verilog, &placed) {
+    for (module, text) in modules(verilog, &placed) {
+        let own = || placed.iter().filter(|(block, _)| block == module).map(|(_, array)| array.as_str()).collect();
+        let logic = kernels.get(module).map_or(text, |kernel| kernel.logic(&own()));
         let block = module.strip_prefix("top$").unwrap_or_default();
         add(block, Usage { flip_flops: logic.flip_flops, luts: logic.luts.round() as usize, ..Usage::default() });
     }
     for memory in memories {
-        add(memory.block, Usage { block_rams: memory.block_rams, luts: distributed_luts(memory), ..Usage::default() });
+        add(memory.block, Usage { block_rams: memory.block_rams, luts: luts_of(memory), ..Usage::default() });
     }
     for &(block, multipliers) in &model.resources.multipliers {
         add(block, Usage { multipliers, ..Usage::default() });
@@ -114,10 +117,9 @@ pub fn total(stages: &BTreeMap<String, Usage>) -> Usage {
     sum
 }
 
-fn distributed_luts(memory: &Memory) -> usize {
-    let [words, bits, luts] = CELL;
+fn luts_of(memory: &Memory) -> usize {
     match (memory.block_rams, memory.large_rams) {
-        (0, 0) => memory.words.div_ceil(words) * memory.bits.div_ceil(bits) * luts,
+        (0, 0) => distributed_luts(memory.words, memory.bits),
         _ => 0,
     }
 }

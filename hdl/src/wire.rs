@@ -94,6 +94,17 @@ impl Word {
         word
     }
 
+    /// Sets the word from limbs of 64 bits, least significant first; the others become 0.
+    pub fn set_limbs(&mut self, limbs: &[u64]) {
+        self.0[..limbs.len()].copy_from_slice(limbs);
+        self.0[limbs.len()..].fill(0);
+    }
+
+    /// Limbs of 64 bits, least significant first.
+    pub fn limbs(&self) -> &[u64] {
+        &self.0
+    }
+
     /// The low 64 bits as an unsigned number.
     pub fn number(&self) -> u64 {
         self.0[0]
@@ -136,6 +147,11 @@ impl<D: Direction> Wire<D> {
         self.value
     }
 
+    /// The limbs of the current value, least significant first.
+    pub fn limbs(&self) -> &[u64] {
+        self.value.limbs()
+    }
+
     /// The width in bits.
     pub fn width(&self) -> usize {
         self.bits
@@ -153,9 +169,11 @@ impl<D: Direction> Block for Wire<D> {
     fn connect_all(&mut self) {}
 
     fn update_all(&mut self) {
-        self.changed = self.value != self.next;
+        // Only the limbs in use: the others are zeros.
+        let used = self.bits.div_ceil(64);
+        self.changed = self.value.0[..used] != self.next.0[..used];
         if self.changed {
-            self.value = self.next;
+            self.value.0[..used].copy_from_slice(&self.next.0[..used]);
         }
     }
 

@@ -8,6 +8,7 @@ use serde_json::json;
 
 use super::{Board, BoardTop, SerialBoardTop, SerialSpiBoardTop, SpiBoardTop};
 use crate::generate::{place, rename, top_name, Generated, GeneratedFile, HdlError};
+use crate::language::check_kernels;
 
 /// The board of `model`, after rust-hdl's checks.
 pub(super) fn board_top(model: &Model) -> Result<Box<dyn Board>, HdlError> {
@@ -27,6 +28,7 @@ pub(super) fn board_top(model: &Model) -> Result<Box<dyn Board>, HdlError> {
 }
 
 fn checked<B: Board + 'static>(top: B) -> Result<Box<dyn Board>, HdlError> {
+    check_kernels(&top)?;
     check_all(&top).map_err(|error| HdlError::Check(format!("{error:?}")))?;
     Ok(Box::new(top))
 }

@@ -3,6 +3,7 @@
 use rust_hdl::prelude::*;
 
 use super::counter::count_bits;
+use crate::language::{Builder, Expr};
 use crate::wire::{Wire, Word};
 
 /// As [`Counter`](super::Counter), with the limit of case `which`. When `which` changes, the count must be below the
@@ -55,6 +56,17 @@ pub fn by_case(values: &[String]) -> String {
         [first, ..] => first.clone(),
         [] => String::new(),
     }
+}
+
+/// The value of case `which`, of `bits` bits; a constant where all are equal.
+pub fn value_by_case<'k>(k: &'k Builder, which: Expr<'k>, values: &[usize], bits: usize) -> Expr<'k> {
+    let constant = |value: usize| k.constant(bits, value as u64);
+    let Some((&first, rest)) = values.split_first() else { return constant(0) };
+    if rest.iter().all(|&value| value == first) {
+        return constant(first);
+    }
+    let arms: Vec<(u64, Expr)> = (1..).zip(rest.iter().map(|&value| constant(value))).collect();
+    which.case(&arms, constant(first))
 }
 
 /// [`by_case`] of unsigned numbers of `bits` bits.

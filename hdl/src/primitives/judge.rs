@@ -1,12 +1,13 @@
 //! After a sweep: compares its nine candidates with each other and with the best so far.
 
 use dermis_golden::fixed::formats::Formats;
-use dermis_golden::fixed::search::Best;
 use rust_hdl::prelude::*;
 
-use super::sweep::{position_bits, sweep_bits, unpack, Sweep};
+use super::sweep::{position_bits, sweep_bits, Fields};
 use super::weigh::weight_bits;
-use crate::wire::{Wire, Word};
+use crate::kernel_block;
+use crate::language::{concat, Body, Builder, Expr, Kernel, Type};
+use crate::wire::Wire;
 
 /// Score = total − weight for all nine at once, then a tree of comparisons. Ties: in the coarse grid the first
 /// candidate in row-major order wins; in a halving the centre, then row-major order. The last three candidates are
@@ -52,28 +53,35 @@ pub struct Judge {
     pub taken: Signal<Out, Bit>,
     /// A candidate was taken in the coarse grid.
     pub found: Signal<Out, Bit>,
-    _left: usize,
-    _next: (Word, Word, Word),
-    _best: Best,
-    _found: bool,
+    kernel: Body,
 }
 
 /// Cycles from `start` to `done`.
 pub const LATENCY: usize = 6;
-/// Order of comparison: index 0 in a halving, centre first; index 1 in the coarse grid, row-major.
-const ORDERS: [[usize; 9]; 2] = [[4, 0, 1, 2, 3, 5, 6, 7, 8], [0, 1, 2, 3, 4, 5, 6, 7, 8]];
+
+kernel_block!(
+    Judge,
+    clock clk,
+    inputs [rst, begin_frame, halve, start, totals, weights, eligible, sweep],
+    outputs [done, improved, closes, judged, best_x, best_y, score, taken, found]
+);
 
 impl Judge {
     /// With the widths of `formats`, for subarrays of at most `taxels` taxels.
     pub fn new(formats: &Formats, taxels: usize) -> Self {
-        Judge {
+        Judge::with_widths(formats.score_bits as usize, weight_bits(taxels))
+    }
+
+    /// With scores of `score_bits` and weights of `weight_bits`.
+    fn with_widths(score_bits: usize, weight_bits: usize) -> Self {
+        let block = Judge {
             clk: Default::default(),
             rst: Default::default(),
             begin_frame: Default::default(),
             halve: Default::default(),
             start: Default::default(),
-            totals: Wire::new(9 * formats.score_bits as usize),
-            weights: Wire::new(9 * weight_bits(taxels)),
+            totals: Wire::new(9 * score_bits),
+            weights: Wire::new(9 * weight_bits),
             eligible: Wire::new(9),
             sweep: Wire::new(sweep_bits()),
             done: Default::default(),
@@ -82,276 +90,355 @@ impl Judge {
             judged: Wire::new(sweep_bits()),
             best_x: Wire::new(position_bits()),
             best_y: Wire::new(position_bits()),
-            score: Wire::new(formats.score_bits as usize),
+            score: Wire::new(score_bits),
             taken: Default::default(),
             found: Default::default(),
-            _left: 0,
-            _next: Default::default(),
-            _best: Default::default(),
-            _found: false,
-        }
-    }
-
-    /// Compares all nine candidates one after the other; whether the best changed.
-    fn judge(&mut self, totals: Word, weights: Word, sweep: Sweep, eligible: u64) -> bool {
-        let (t, w) = (self.totals.width() / 9, self.weights.width() / 9);
-        let mut improved = false;
-        for k in ORDERS[usize::from(sweep.coarse)] {
-            if eligible >> k & 1 == 0 || !(sweep.coarse || self._found) {
-                continue;
-            }
-            let score = totals.signed(k, t) - weights.field(k * w, w) as i64;
-            let position = [sweep.centre[0] as i32 + k as i32 % 3 - 1, sweep.centre[1] as i32 + k as i32 / 3 - 1];
-            let best = &mut self._best;
-            let earlier = sweep.coarse && (position[1], position[0]) < (best.position[1], best.position[0]);
-            if !best.taken || score < best.score || (score == best.score && earlier) {
-                *best = Best { position, score, taken: true };
-                improved = true;
-            }
-        }
-        self._found |= sweep.coarse && self._best.taken;
-        improved
+            kernel: Body::default(),
+        };
+        block.bind(kernel(score_bits, weight_bits))
     }
 }
 
-impl Logic for Judge {
-    fn update(&mut self) {
-        if self.clk.pos_edge() {
-            self.done.next = false;
-            if self._left == 1 {
-                let (totals, weights, word) = self._next;
-                let sweep = Sweep::of_word(&word);
-                let eligible = word.field(sweep_bits(), 9);
-                self.improved.next = self.judge(totals, weights, sweep, eligible);
-                self.closes.next = sweep.closes;
-                self.judged.next = sweep.word();
-                self.done.next = true;
+/// A register that takes `value` in every cycle.
+fn delay<'k>(k: &'k Builder, name: &str, value: Expr<'k>) -> Expr<'k> {
+    let register = k.register(name, value.ty());
+    register.set(value);
+    *register
+}
+
+/// a < b, both signed. Exchanging the sign bits makes the comparison unsigned, which takes only the carry out of one
+/// chain; a signed comparison also taps the chain below the sign bit.
+fn less<'k>(a: Expr<'k>, b: Expr<'k>) -> Expr<'k> {
+    let below = a.bits() - 1;
+    b.top().concat(a.low(below)).less(a.top().concat(b.low(below)))
+}
+
+/// A candidate on its way through the tree: eligible, score, index.
+#[derive(Clone, Copy)]
+struct Candidate<'k> {
+    ok: Expr<'k>,
+    score: Expr<'k>,
+    index: Expr<'k>,
+}
+
+impl<'k> Candidate<'k> {
+    /// The candidate one cycle later.
+    fn delayed(self, k: &'k Builder, name: &str) -> Self {
+        let later = |prefix: &str, value| delay(k, &format!("{prefix}_{name}"), value);
+        Candidate { ok: later("ok", self.ok), score: later("s", self.score), index: later("k", self.index) }
+    }
+
+    /// The better of this and `other`, this on a tie, one cycle later.
+    fn better(self, k: &'k Builder, other: Candidate<'k>, name: &str) -> Self {
+        let second = k.wire(&format!("second_{name}"), other.ok & (!self.ok | less(other.score, self.score)));
+        let winner = Candidate {
+            ok: self.ok | other.ok,
+            score: second.mux(other.score, self.score),
+            index: second.mux(other.index, self.index),
+        };
+        winner.delayed(k, name)
+    }
+
+    /// Whether this, a later candidate, wins against `earlier`.
+    fn beats(self, earlier: Candidate<'k>) -> Expr<'k> {
+        !earlier.ok | less(self.score, earlier.score)
+    }
+}
+
+/// −1, 0 or 1 in two bits, signed: the column of candidate `index` in the 3×3.
+fn column<'k>(k: &'k Builder, index: Expr<'k>) -> Expr<'k> {
+    let one_of = |numbers: [u64; 3]| index.is(numbers[0]) | index.is(numbers[1]) | index.is(numbers[2]);
+    let step = |value| k.signed_constant(2, value);
+    one_of([0, 3, 6]).mux(step(-1), one_of([1, 4, 7]).mux(step(0), step(1)))
+}
+
+/// −1, 0 or 1 in two bits, signed: the row of candidate `index` in the 3×3.
+fn row<'k>(k: &'k Builder, index: Expr<'k>) -> Expr<'k> {
+    let below = |limit| index.less(k.constant(4, limit));
+    let step = |value| k.signed_constant(2, value);
+    below(3).mux(step(-1), below(6).mux(step(0), step(1)))
+}
+
+/// Along one axis: whether the best so far, `ahead` of the centre, is past the candidate at centre + `step`.
+fn beyond<'k>(ahead: Expr<'k>, step: Expr<'k>) -> Expr<'k> {
+    let half = ahead.slice(1, ahead.bits() - 1);
+    !ahead.top() & (step.at(1) | step.at(0).mux(half.any(), ahead.any()))
+}
+
+/// What the comparison with the best so far needs: its score, its distance from the centre, the centre.
+#[derive(Clone, Copy)]
+struct Best<'k> {
+    score: Expr<'k>,
+    ahead: [Expr<'k>; 2],
+    centre: [Expr<'k>; 2],
+}
+
+/// One of the last three candidates: whether it is lower than the best so far, or level and earlier; score, position.
+#[derive(Clone, Copy)]
+struct Compared<'k> {
+    lower: Expr<'k>,
+    tie: Expr<'k>,
+    score: Expr<'k>,
+    x: Expr<'k>,
+    y: Expr<'k>,
+}
+
+impl<'k> Compared<'k> {
+    fn new(k: &'k Builder, candidate: Candidate<'k>, best: Best<'k>, name: &str) -> Self {
+        let later = |prefix: &str, value| delay(k, &format!("{prefix}_{name}"), value);
+        let column = k.wire(&format!("column_{name}"), column(k, candidate.index));
+        let row = k.wire(&format!("row_{name}"), row(k, candidate.index));
+        let position = |axis: usize, step| (best.centre[axis] + step).low(position_bits()).signed();
+        let lower = later("lower", less(candidate.score, best.score));
+        let same = later("same", candidate.score.equals(best.score));
+        let above = later("above", beyond(best.ahead[1], row));
+        let level = later("level", best.ahead[1].equals(row));
+        let left = later("left", beyond(best.ahead[0], column));
+        Compared {
+            lower,
+            tie: k.wire(&format!("tie_{name}"), same & (above | (level & left))),
+            score: later("score", candidate.score),
+            x: later("at_x", position(0, column)),
+            y: later("at_y", position(1, row)),
+        }
+    }
+}
+
+fn kernel(t: usize, w: usize) -> Kernel {
+    let p = position_bits();
+    let k = Builder::new("judge");
+    let (rst, begin_frame) = (k.input("rst", 1), k.input("begin_frame", 1));
+    let (halve, start) = (k.input("halve", 1), k.input("start", 1));
+    let (totals, weights) = (k.input("totals", 9 * t), k.input("weights", 9 * w));
+    let (eligible, sweep) = (k.input("eligible", 9), k.input("sweep", sweep_bits()));
+    let bit = Type::unsigned(1);
+    let done = k.state("done", bit, rst, 0);
+    let (improved, closes) = (k.register("improved", bit), k.register("closes", bit));
+    let judged = k.register("judged", Type::unsigned(sweep_bits()));
+    let (best_x, best_y) = (k.register("best_x", Type::signed(p)), k.register("best_y", Type::signed(p)));
+    let score = k.register("score", Type::signed(t));
+    let (taken, found) = (k.register("taken", bit), k.register("found", bit));
+    let valid = k.state("valid", Type::unsigned(LATENCY - 1), rst, 0);
+
+    // Score = total − weight, for all nine at once.
+    let difference = |n: usize| {
+        let weight = weights.slice(n * w, w);
+        (totals.slice(n * t, t) - weight.low(w.min(t))).low(t)
+    };
+    let scores = delay(&k, "scores", concat(&(0..9).rev().map(difference).collect::<Vec<_>>()));
+    let (fits, held) = (k.register("fits", Type::unsigned(9)), k.register("held", Type::unsigned(sweep_bits())));
+    k.when(start, || {
+        fits.set(eligible);
+        held.set(sweep);
+    });
+    let fields = Fields::of(*held);
+    let centre = [("held_centre_x", fields.centre[0]), ("held_centre_y", fields.centre[1])];
+    let centre = centre.map(|(name, value)| k.wire(name, value));
+    let coarse = k.wire("held_coarse", fields.coarse);
+
+    k.comment("The eight around the centre keep their order: four pairs, then the four before and the four after it.");
+    let leaf = |n: usize| {
+        let (ok, score) = (fits.at(n), scores.slice(n * t, t).signed());
+        Candidate { ok, score, index: k.constant(4, n as u64) }
+    };
+    let [a, b, c, d] = [(0, "a"), (2, "b"), (5, "c"), (7, "d")].map(|(n, name)| leaf(n).better(&k, leaf(n + 1), name));
+    let middle = leaf(4).delayed(&k, "middle");
+    let (before, after) = (a.better(&k, b, "before"), c.better(&k, d, "after"));
+    let central = middle.delayed(&k, "centre");
+
+    k.comment("The earlier one wins ties; in a halving that is the centre.");
+    let level = !coarse & central.score.equals(before.score);
+    let centre_wins = k.wire("centre_wins", central.ok & (central.beats(before) | level));
+    let after_wins = k.wire("after_wins", after.ok & after.beats(before) & after.beats(central));
+    let takes_centre = delay(&k, "takes_centre", centre_wins);
+    let takes_after = delay(&k, "takes_after", after_wins);
+    let some = delay(&k, "some", before.ok | central.ok | after.ok);
+
+    k.comment(
+        "All three are compared with the best so far in parallel with the choice among them. The best's distance",
+    );
+    k.comment("from the centre was registered a cycle earlier.");
+    let ahead = [delay(&k, "ahead_x", *best_x - centre[0]), delay(&k, "ahead_y", *best_y - centre[1])];
+    let best = Best { score: *score, ahead, centre };
+    let compared = |candidate, name| Compared::new(&k, candidate, best, name);
+    let last = [compared(before, "before"), compared(central, "centre"), compared(after, "after")];
+    let choose = |what: usize| {
+        let [before, centre, after] = last.map(|one| [one.lower, one.tie, one.score, one.x, one.y][what]);
+        takes_after.mux(after, takes_centre.mux(centre, before))
+    };
+    let fit = delay(&k, "fit", some & (coarse | *found));
+    let lower = delay(&k, "lower", !*taken | choose(0));
+    let tie = delay(&k, "tie", coarse & choose(1));
+    let [s, x, y] = [("s", 2), ("x", 3), ("y", 4)].map(|(name, what)| delay(&k, name, choose(what)));
+    let ends = valid.top();
+    let take = k.wire("take", ends & fit & (lower | tie));
+
+    valid.set(valid.low(LATENCY - 2).concat(start));
+    done.set(ends);
+    improved.set(take);
+    k.when(ends, || {
+        closes.set(fields.closes);
+        judged.set(*held);
+    });
+    // A new search has priority over a new level, and that over a result.
+    k.when(take & !halve, || {
+        best_x.set(x);
+        best_y.set(y);
+        score.set(s);
+        taken.set(k.constant(1, 1));
+        k.when(coarse, || found.set(k.constant(1, 1)));
+    });
+    k.when(halve, || {
+        best_x.set(best_x.low(p - 1).concat(k.constant(1, 0)).signed());
+        best_y.set(best_y.low(p - 1).concat(k.constant(1, 0)).signed());
+        taken.set(k.constant(1, 0));
+    });
+    k.when(begin_frame, || {
+        best_x.set(k.signed_constant(p, 0));
+        best_y.set(k.signed_constant(p, 0));
+        score.set(k.signed_constant(t, 0));
+        taken.set(k.constant(1, 0));
+        found.set(k.constant(1, 0));
+    });
+    k.finish()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::sweep::Sweep;
+    use super::*;
+    use crate::language::testbench::{check, Reference};
+    use crate::wire::Word;
+
+    const SCORE_BITS: usize = 20;
+    const WEIGHT_BITS: usize = 14;
+    /// Order of comparison: centre first in a halving, row-major in the coarse grid.
+    const ORDERS: [[usize; 9]; 2] = [[4, 0, 1, 2, 3, 5, 6, 7, 8], [0, 1, 2, 3, 4, 5, 6, 7, 8]];
+
+    /// Compares all nine one after the other in the cycle of the result.
+    #[derive(Default)]
+    struct OneByOne {
+        left: usize,
+        next: Vec<Word>,
+        /// Position, score, taken, found; none before the first search.
+        best: Option<([i64; 2], i64, bool, bool)>,
+        done: Option<bool>,
+        improved: bool,
+        sweep: Option<Sweep>,
+    }
+
+    impl OneByOne {
+        fn compare(&mut self) -> bool {
+            let sweep = Sweep::of_word(&self.next[7]);
+            let Some((position, score, taken, found)) = &mut self.best else { return false };
+            let mut improved = false;
+            for n in ORDERS[usize::from(sweep.coarse)] {
+                if self.next[6].field(n, 1) == 0 || !(sweep.coarse || *found) {
+                    continue;
+                }
+                let own = self.next[4].signed(n, SCORE_BITS) - self.next[5].field(n * WEIGHT_BITS, WEIGHT_BITS) as i64;
+                let at = [sweep.centre[0] + n as i64 % 3 - 1, sweep.centre[1] + n as i64 / 3 - 1];
+                let earlier = sweep.coarse && (at[1], at[0]) < (position[1], position[0]);
+                if !*taken || own < *score || (own == *score && earlier) {
+                    (*position, *score, *taken, improved) = (at, own, true, true);
+                }
             }
-            self._left = match (self.rst.val(), self.start.val()) {
+            *found |= sweep.coarse && *taken;
+            improved
+        }
+    }
+
+    impl Reference for OneByOne {
+        fn outputs(&mut self, _: &[Word]) -> Vec<Option<Word>> {
+            let signed = |value: i64, bits| Some(Word::of_fields(&[value], bits));
+            let best = self.best.map(|(position, score, taken, found)| {
+                let p = position_bits();
+                [
+                    signed(position[0], p),
+                    signed(position[1], p),
+                    signed(score, SCORE_BITS),
+                    Some(taken.into()),
+                    Some(found.into()),
+                ]
+            });
+            let start = [
+                self.done.map(Word::from),
+                self.done.map(|_| Word::from(self.improved)),
+                self.sweep.map(|sweep| Word::from(sweep.closes)),
+                self.sweep.map(|sweep| sweep.word()),
+            ];
+            start.into_iter().chain(best.unwrap_or_default()).collect()
+        }
+
+        fn clock(&mut self, inputs: &[Word]) {
+            let [rst, begin_frame, halve, start] = [0, 1, 2, 3].map(|k| inputs[k].number() == 1);
+            let ends = self.left == 1;
+            self.improved = ends && self.compare();
+            if ends {
+                self.sweep = Some(Sweep::of_word(&self.next[7]));
+            }
+            self.done = if rst { Some(false) } else { self.done.map(|_| ends) };
+            self.left = match (rst, start) {
                 (true, _) => 0,
                 (false, true) => LATENCY - 1,
-                (false, false) => self._left.saturating_sub(1),
+                (false, false) => self.left.saturating_sub(1),
             };
-            if self.start.val() {
-                let mut word = self.sweep.val();
-                word.set(sweep_bits(), 9, self.eligible.val().number());
-                self._next = (self.totals.val(), self.weights.val(), word);
+            if start {
+                self.next = inputs.to_vec();
             }
-            if self.begin_frame.val() {
-                self._best = Default::default();
-                self._found = false;
-            } else if self.halve.val() {
-                self._best.position = self._best.position.map(|p| 2 * p);
-                self._best.taken = false;
+            match (&mut self.best, begin_frame, halve) {
+                (best, true, _) => *best = Some(([0; 2], 0, false, false)),
+                (Some((position, _, taken, _)), false, true) => (*position, *taken) = (position.map(|p| 2 * p), false),
+                _ => {}
             }
-            self.best_x.next = Word::of_fields(&[self._best.position[0].into()], position_bits());
-            self.best_y.next = Word::of_fields(&[self._best.position[1].into()], position_bits());
-            self.score.next = Word::of_fields(&[self._best.score], self.score.width());
-            self.taken.next = self._best.taken;
-            self.found.next = self._found;
         }
     }
 
-    fn connect(&mut self) {
-        for bit in [&mut self.done, &mut self.improved, &mut self.closes, &mut self.taken, &mut self.found] {
-            bit.connect();
-        }
-        for wire in [&mut self.judged, &mut self.best_x, &mut self.best_y, &mut self.score] {
-            wire.connect();
-        }
+    /// Searches of some sweeps each, with ties, levels, resets; a new one never while another is compared.
+    fn stimulus(cycles: usize) -> Vec<Vec<Word>> {
+        let mut random = fastrand::Rng::with_seed(5);
+        let mut busy = 0;
+        let mut levels = 0;
+        let inputs = |cycle: usize| {
+            let idle = busy == 0;
+            busy = usize::max(busy, 1) - 1;
+            let rst = cycle < 2 || random.u16(..300) == 0;
+            let begin_frame = idle && (cycle < 4 || random.u8(..20) == 0);
+            let halve = idle && levels < 3 && random.u8(..10) == 0;
+            let start = idle && cycle > 4 && !begin_frame && !halve && random.bool();
+            levels = if begin_frame { 0 } else { levels + usize::from(halve) };
+            if start {
+                busy = LATENCY + random.usize(..3);
+            }
+            let sweep = Sweep {
+                centre: [random.i64(-4..5), random.i64(-4..5)],
+                square: random.i64(..100).abs(),
+                buffer: random.usize(..4),
+                coarse: random.bool(),
+                closes: random.bool(),
+            };
+            // Small numbers tie; large ones reach the ends of the range.
+            let large = random.bool();
+            let total = |_| if large { random.i64(-500_000..500_000) } else { random.i64(-2..3) };
+            let totals: Vec<i64> = (0..9).map(total).collect();
+            let weights: Vec<i64> = (0..9).map(|_| random.i64(0..if large { 16_000 } else { 2 })).collect();
+            vec![
+                rst.into(),
+                begin_frame.into(),
+                halve.into(),
+                start.into(),
+                Word::of_fields(&totals, SCORE_BITS),
+                Word::of_fields(&weights, WEIGHT_BITS),
+                random.u64(..512).into(),
+                sweep.word(),
+            ]
+        };
+        (0..cycles).map(inputs).collect()
     }
 
-    fn hdl(&self) -> Verilog {
-        let (t, w) = (self.totals.width() / 9, self.weights.width() / 9);
-        let p = position_bits();
-        let weight = match t.checked_sub(w) {
-            Some(0) => format!("weights[k * {w} +: {w}]"),
-            Some(more) => format!("{{{more}'d0, weights[k * {w} +: {w}]}}"),
-            None => format!("weights[k * {w} +: {t}]"),
-        };
-        // Declarations of a candidate: eligible, score, index.
-        let declare = |kind: &str, names: &[&str]| -> String {
-            let one = |n: &&str| format!("{kind} ok_{n};\n{kind} signed [{}:0] s_{n};\n{kind} [3:0] k_{n};\n", t - 1);
-            names.iter().map(one).collect()
-        };
-        // The better of two, the first on a tie, one cycle later.
-        let duel = |a: &str, b: &str, to: &str| {
-            format!(
-                "  ok_{to} <= ok_{a} || ok_{b};\n  if (ok_{b} && (!ok_{a} || less(s_{b}, s_{a}))) begin\n    s_{to} <= s_{b};\n    \
-                 k_{to} <= k_{b};\n  end else begin\n    s_{to} <= s_{a};\n    k_{to} <= k_{a};\n  end\n"
-            )
-        };
-        let candidates = ["0", "1", "2", "3", "4", "5", "6", "7", "8"];
-        let leaves: String = candidates
-            .iter()
-            .map(|k| {
-                format!(
-                    "always @(*) ok_{k} = fits[{k}];\nalways @(*) s_{k} = scores[{k} * {t} +: {t}];\n\
-                     always @(*) k_{k} = 4'd{k};\n"
-                )
-            })
-            .collect();
-        // The eight around the centre keep their order: four pairs, then the four before and the four after the centre.
-        let pairs = duel("0", "1", "a") + &duel("2", "3", "b") + &duel("5", "6", "c") + &duel("7", "8", "d");
-        let halves = duel("a", "b", "before") + &duel("c", "d", "after");
-        let last = ["before", "centre", "after"];
-        let each = |text: &dyn Fn(&str) -> String| -> String { last.iter().map(|n| text(n)).collect() };
-        let positions = each(&|n| {
-            format!(
-                "wire [{end}:0] x_{n} = held_centre_x + along(column(k_{n}));\n\
-                 wire [{end}:0] y_{n} = held_centre_y + along(row(k_{n}));\n",
-                end = p - 1
-            )
-        });
-        let compared = each(&|n| {
-            format!(
-                "reg lower_{n}, same_{n}, above_{n}, level_{n}, left_{n};\n\
-                 wire tie_{n} = same_{n} && (above_{n} || (level_{n} && left_{n}));\n\
-                 reg [{}:0] score_{n};\nreg [{end}:0] at_x_{n}, at_y_{n};\n",
-                t - 1,
-                end = p - 1
-            )
-        });
-        let compare = each(&|n| {
-            format!(
-                "  lower_{n} <= less(s_{n}, s_best);\n  \
-                 same_{n} <= s_{n} == s_best;\n  \
-                 above_{n} <= beyond(ahead_y, row(k_{n}));\n  level_{n} <= in_line(ahead_y, row(k_{n}));\n  \
-                 left_{n} <= beyond(ahead_x, column(k_{n}));\n  \
-                 score_{n} <= s_{n};\n  at_x_{n} <= x_{n};\n  at_y_{n} <= y_{n};\n"
-            )
-        });
-        // The value of the best of the last three.
-        let winner = |what: &str| format!("takes_after ? {what}_after : takes_centre ? {what}_centre : {what}_before");
-        Verilog::Custom(format!(
-            "\
-function [1:0] column;
-  input [3:0] k;
-  case (k)
-    4'd0, 4'd3, 4'd6: column = 2'b11;
-    4'd1, 4'd4, 4'd7: column = 2'b00;
-    default: column = 2'b01;
-  endcase
-endfunction
-function [1:0] row;
-  input [3:0] k;
-  row = k < 4'd3 ? 2'b11 : k < 4'd6 ? 2'b00 : 2'b01;
-endfunction
-function [{p_end}:0] along;
-  input [1:0] step;
-  along = {{{{{p_more}{{step[1]}}}}, step}};
-endfunction
-// Along one axis: whether the best so far is past the candidate at centre + step, or level with it.
-function beyond;
-  input [{p}:0] ahead;
-  input [1:0] step;
-  beyond = !ahead[{p}] && (step[1] || (step[0] ? ahead[{p}:1] != {p}'d0 : ahead != {p_wide}'d0));
-endfunction
-function in_line;
-  input [{p}:0] ahead;
-  input [1:0] step;
-  in_line = ahead == {{{{{p_end}{{step[1]}}}}, step}};
-endfunction
-// a < b, both signed. Exchanging the sign bits makes the comparison unsigned, which takes only the carry out of one
-// chain; a signed comparison also taps the chain below the sign bit.
-function less;
-  input [{t_end}:0] a, b;
-  less = {{b[{t_end}], a[{t_less}:0]}} < {{a[{t_end}], b[{t_less}:0]}};
-endfunction
-reg [{scores_end}:0] scores;
-reg [8:0] fits;
-reg [{sweep_end}:0] held;
-reg [4:0] valid;
-{declared}{leaves}genvar k;
-generate
-  for (k = 0; k < 9; k = k + 1) begin : candidate
-    always @(posedge clk) scores[k * {t} +: {t}] <= totals[k * {t} +: {t}] - {weight};
-  end
-endgenerate
-always @(posedge clk) begin
-  if (start) begin
-    fits <= eligible;
-    held <= sweep;
-  end
-{pairs}  {{ok_middle, s_middle, k_middle}} <= {{ok_4, s_4, k_4}};
-{halves}  {{ok_centre, s_centre, k_centre}} <= {{ok_middle, s_middle, k_middle}};
-end
-{fields}wire unused = &{{1'b0, held_square, held_buffer}};
-// The earlier one wins ties; in a halving that is the centre.
-wire centre_wins = ok_centre && (!ok_before || less(s_centre, s_before) || (!held_coarse && s_centre == s_before));
-wire after_wins = ok_after && (!ok_before || less(s_after, s_before)) && (!ok_centre || less(s_after, s_centre));
-// All three are compared with the best so far in parallel with the choice among them.
-wire signed [{t_end}:0] s_best = score;
-// Distance of the best so far from the centre, registered a cycle earlier.
-reg [{p}:0] ahead_x, ahead_y;
-always @(posedge clk) begin
-  ahead_x <= {{best_x[{p_end}], best_x}} - {{held_centre_x[{p_end}], held_centre_x}};
-  ahead_y <= {{best_y[{p_end}], best_y}} - {{held_centre_y[{p_end}], held_centre_y}};
-end
-{positions}reg some, takes_centre, takes_after;
-{compared}always @(posedge clk) begin
-  some <= ok_before || ok_centre || ok_after;
-  takes_centre <= centre_wins;
-  takes_after <= after_wins;
-{compare}end
-reg fit, lower, tie;
-reg [{t_end}:0] s;
-reg [{p_end}:0] x, y;
-always @(posedge clk) begin
-  fit <= some && (held_coarse || found);
-  lower <= !taken || ({lower});
-  tie <= held_coarse && ({tie});
-  s <= {score};
-  x <= {at_x};
-  y <= {at_y};
-end
-wire take = valid[4] && fit && (lower || tie);
-always @(posedge clk) begin
-  if (rst) begin
-    valid <= 5'd0;
-    done <= 1'b0;
-  end else begin
-    valid <= {{valid[3:0], start}};
-    done <= valid[4];
-  end
-  improved <= take;
-  if (valid[4]) begin
-    closes <= held_closes;
-    judged <= held;
-  end
-  if (begin_frame) begin
-    best_x <= {p}'d0;
-    best_y <= {p}'d0;
-    score <= {t}'d0;
-    taken <= 1'b0;
-    found <= 1'b0;
-  end else if (halve) begin
-    best_x <= best_x << 1;
-    best_y <= best_y << 1;
-    taken <= 1'b0;
-  end else if (take) begin
-    best_x <= x;
-    best_y <= y;
-    score <= s;
-    taken <= 1'b1;
-    if (held_coarse) found <= 1'b1;
-  end
-end",
-            lower = winner("lower"),
-            tie = winner("tie"),
-            score = winner("score"),
-            at_x = winner("at_x"),
-            at_y = winner("at_y"),
-            p_end = p - 1,
-            p_more = p - 2,
-            p_wide = p + 1,
-            t_end = t - 1,
-            t_less = t - 2,
-            scores_end = 9 * t - 1,
-            sweep_end = sweep_bits() - 1,
-            declared = declare("reg", &candidates)
-                + &declare("reg", &["a", "b", "c", "d", "middle", "before", "centre", "after"]),
-            fields = unpack("held", "held_"),
-        ))
+    #[test]
+    fn the_tree_finds_what_comparing_one_by_one_finds() {
+        let block = Judge::with_widths(SCORE_BITS, WEIGHT_BITS);
+        check(block.kernel.kernel(), &stimulus(8000), &mut OneByOne::default());
     }
 }

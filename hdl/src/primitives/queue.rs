@@ -1,10 +1,10 @@
 //! Output queue, in which beats wait for the receiver, so that the pipeline before it never stalls.
 
-use std::collections::VecDeque;
-
 use rust_hdl::prelude::*;
 
-use crate::wire::{Wire, Word};
+use crate::kernel_block;
+use crate::language::{Body, Builder, Contents, Kernel, Type};
+use crate::wire::Wire;
 
 /// ```text
 /// reserve ... later write, word --> queue --> m_axis, two cycles after write
@@ -36,9 +36,7 @@ pub struct Queue {
     pub m_axis_tlast: Signal<Out, Bit>,
     /// Data of the beat; valid with `m_axis_tvalid`.
     pub m_axis_tdata: Wire<Out>,
-    _reserved: usize,
-    _waiting: VecDeque<(Word, bool)>,
-    _standing: bool,
+    kernel: Body,
 }
 
 const PLACE_BITS: usize = 4;
@@ -47,10 +45,17 @@ pub const PLACES: usize = 1 << PLACE_BITS;
 /// Cycles from `write` to `m_axis_tvalid`, if the queue is empty.
 pub const LATENCY: usize = 2;
 
+kernel_block!(
+    Queue,
+    clock clk,
+    inputs [rst, reserve, write, last, word, m_axis_tready],
+    outputs [room, m_axis_tvalid, m_axis_tlast, m_axis_tdata]
+);
+
 impl Queue {
     /// A queue of beats of `bits` bits.
     pub fn new(bits: usize) -> Self {
-        Queue {
+        let block = Queue {
             clk: Default::default(),
             rst: Default::default(),
             reserve: Default::default(),
@@ -62,78 +67,124 @@ impl Queue {
             m_axis_tready: Default::default(),
             m_axis_tlast: Default::default(),
             m_axis_tdata: Wire::new(bits),
-            _reserved: 0,
-            _waiting: VecDeque::new(),
-            _standing: false,
-        }
+            kernel: Body::default(),
+        };
+        block.bind(kernel(bits))
     }
 }
 
-impl Logic for Queue {
-    fn update(&mut self) {
-        if self.clk.pos_edge() {
-            let taken = self._standing && self.m_axis_tready.val();
-            self._reserved = (self._reserved + usize::from(self.reserve.val())).saturating_sub(usize::from(taken));
-            if !self._standing || taken {
-                let leaves = self._waiting.pop_front();
-                self._standing = leaves.is_some();
-                if let Some((word, last)) = leaves {
-                    self.m_axis_tdata.next = word;
-                    self.m_axis_tlast.next = last;
-                }
+fn kernel(bits: usize) -> Kernel {
+    let k = Builder::new("queue");
+    let (rst, reserve) = (k.input("rst", 1), k.input("reserve", 1));
+    let (write, last, word) = (k.input("write", 1), k.input("last", 1), k.input("word", bits));
+    let ready = k.input("m_axis_tready", 1);
+    let (bit, count) = (Type::unsigned(1), Type::unsigned(PLACE_BITS + 1));
+    let places = k.memory("places", PLACES, bits + 1, Contents::Undefined);
+    let [written, read, reserved] = ["written", "read", "reserved"].map(|name| k.state(name, count, rst, 0));
+    let room = k.state("room", bit, rst, 1);
+    let valid = k.state("m_axis_tvalid", bit, rst, 0);
+    let tlast = k.register("m_axis_tlast", bit);
+    let tdata = k.register("m_axis_tdata", Type::unsigned(bits));
+
+    let taken = k.wire("taken", *valid & ready);
+    let moves = k.wire("moves", !*valid | ready);
+    let waits = k.wire("waits", written.differs(*read));
+    let now_reserved = k.wire("now_reserved", (*reserved + reserve - taken).low(PLACE_BITS + 1));
+    let head = k.wire("head", places.read(read.low(PLACE_BITS)));
+    places.write(write, written.low(PLACE_BITS), last.concat(word));
+    k.when(moves & waits, || {
+        tlast.set(head.top());
+        tdata.set(head.low(bits));
+        read.set(read.plus(1));
+    });
+    k.when(write, || written.set(written.plus(1)));
+    reserved.set(now_reserved);
+    room.set(!now_reserved.is(PLACES as u64));
+    k.when(moves, || valid.set(waits));
+    k.finish()
+}
+
+#[cfg(test)]
+mod tests {
+    use std::collections::VecDeque;
+
+    use super::*;
+    use crate::language::testbench::{check, Reference};
+    use crate::wire::Word;
+
+    const BITS: usize = 70;
+
+    /// A list of beats, the number of places promised, the beat on the output.
+    #[derive(Default)]
+    struct List {
+        reserved: usize,
+        waiting: VecDeque<(Word, bool)>,
+        offered: Option<(Word, bool)>,
+        reset: bool,
+    }
+
+    impl Reference for List {
+        fn outputs(&mut self, _: &[Word]) -> Vec<Option<Word>> {
+            let bit = |bit: bool| self.reset.then(|| Word::from(bit));
+            vec![
+                bit(self.reserved < PLACES),
+                bit(self.offered.is_some()),
+                self.offered.map(|(_, last)| Word::from(last)),
+                self.offered.map(|(word, _)| word),
+            ]
+        }
+
+        fn clock(&mut self, inputs: &[Word]) {
+            let [rst, reserve, write, last] = [0, 1, 2, 3].map(|k| inputs[k].number() == 1);
+            let taken = self.offered.is_some() && inputs[5].number() == 1;
+            self.reserved = self.reserved + usize::from(reserve) - usize::from(taken && self.reset);
+            if taken || self.offered.is_none() {
+                self.offered = self.waiting.pop_front();
             }
-            if self.write.val() {
-                self._waiting.push_back((self.word.val(), self.last.val()));
+            if write {
+                self.waiting.push_back((inputs[4], last));
             }
-            if self.rst.val() {
-                self._reserved = 0;
-                self._waiting.clear();
-                self._standing = false;
+            if rst {
+                *self = List { reset: true, ..List::default() };
             }
-            self.room.next = self._reserved < PLACES;
-            self.m_axis_tvalid.next = self._standing;
         }
     }
 
-    fn connect(&mut self) {
-        self.room.connect();
-        self.m_axis_tvalid.connect();
-        self.m_axis_tlast.connect();
-        self.m_axis_tdata.connect();
+    /// Reserves only with room and writes only what is reserved, as the reference counts; stalls, resets.
+    fn stimulus(cycles: usize) -> Vec<Vec<Word>> {
+        let mut random = fastrand::Rng::with_seed(3);
+        let mut list = List::default();
+        let (mut unwritten, mut speed) = (0usize, [4, 4, 4]);
+        let mut all = Vec::new();
+        for cycle in 0..cycles {
+            if cycle % 64 == 0 {
+                // Mostly full, mostly empty, or balanced.
+                speed = [(); 3].map(|()| random.u8(1..8));
+            }
+            let rst = cycle < 2 || random.u16(..200) == 0;
+            let reserve = !rst && list.reserved < PLACES && random.u8(..8) < speed[0];
+            let write = !rst && unwritten > 0 && random.u8(..8) < speed[1];
+            let mut word = Word::default();
+            word.set_limbs(&[random.u64(..), random.u64(..64)]);
+            let ready = random.u8(..8) < speed[2];
+            let inputs = vec![
+                Word::from(rst),
+                Word::from(reserve),
+                Word::from(write),
+                Word::from(random.bool()),
+                word,
+                Word::from(ready),
+            ];
+            list.clock(&inputs);
+            unwritten = if rst { 0 } else { unwritten + usize::from(reserve) - usize::from(write) };
+            all.push(inputs);
+        }
+        all
     }
 
-    fn hdl(&self) -> Verilog {
-        Verilog::Custom(format!(
-            "\
-reg [{bits}:0] places [0:{last}];
-reg [{count_end}:0] written, read, reserved;
-wire taken = m_axis_tvalid && m_axis_tready;
-wire moves = !m_axis_tvalid || m_axis_tready;
-wire waits = written != read;
-wire [{count_end}:0] now_reserved = reserved + {{{place_bits}'d0, reserve}} - {{{place_bits}'d0, taken}};
-always @(posedge clk) begin
-  if (write) places[written[{place_end}:0]] <= {{last, word}};
-  if (moves && waits) {{m_axis_tlast, m_axis_tdata}} <= places[read[{place_end}:0]];
-  if (rst) begin
-    written <= {count_bits}'d0;
-    read <= {count_bits}'d0;
-    reserved <= {count_bits}'d0;
-    room <= 1'b1;
-    m_axis_tvalid <= 1'b0;
-  end else begin
-    if (write) written <= written + {count_bits}'d1;
-    if (moves && waits) read <= read + {count_bits}'d1;
-    reserved <= now_reserved;
-    room <= now_reserved != {count_bits}'d{PLACES};
-    if (moves) m_axis_tvalid <= waits;
-  end
-end",
-            bits = self.word.width(),
-            last = PLACES - 1,
-            place_bits = PLACE_BITS,
-            place_end = PLACE_BITS - 1,
-            count_bits = PLACE_BITS + 1,
-            count_end = PLACE_BITS,
-        ))
+    #[test]
+    fn beats_leave_in_order_and_no_place_is_promised_twice() {
+        let queue = Queue::new(BITS);
+        check(queue.kernel.kernel(), &stimulus(5000), &mut List::default());
     }
 }

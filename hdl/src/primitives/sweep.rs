@@ -3,6 +3,7 @@
 pub use dermis_golden::fixed::resources::position_bits;
 use dermis_golden::fixed::resources::SEARCH_BUFFERS;
 
+use crate::language::Expr;
 use crate::wire::Word;
 
 /// Width of a squared distance in grid steps of the last level, in bits.
@@ -70,6 +71,26 @@ impl Sweep {
             coarse: word.field(coarse, 1) == 1,
             closes: word.field(closes, 1) == 1,
         }
+    }
+}
+
+/// The fields of a sweep's word that the comparison reads.
+#[derive(Clone, Copy, Debug)]
+pub struct Fields<'k> {
+    /// As [`Sweep::centre`], signed.
+    pub centre: [Expr<'k>; 2],
+    /// As [`Sweep::coarse`].
+    pub coarse: Expr<'k>,
+    /// As [`Sweep::closes`].
+    pub closes: Expr<'k>,
+}
+
+impl<'k> Fields<'k> {
+    /// The fields of `word`.
+    pub fn of(word: Expr<'k>) -> Self {
+        let [x, y, _, _, coarse, closes, _] = offsets();
+        let centre = [x, y].map(|offset| word.slice(offset, position_bits()).signed());
+        Fields { centre, coarse: word.at(coarse), closes: word.at(closes) }
     }
 }
 

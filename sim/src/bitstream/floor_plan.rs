@@ -40,11 +40,11 @@ pub fn assign_sites(netlist: &mut Value, top: &str, blocks: &MultiplierBlocks) -
     lanes.len()
 }
 
-/// Parity and number of the lane that a cell belongs to, from its name `….parity[p].lane[k]…`; `None` for other cells.
+/// Parity and number of the lane that a cell belongs to, from its name `….parity_p__lane_k__…`; `None` for other cells.
 fn lane(name: &str) -> Option<(u32, u32)> {
-    let (_, name) = name.split_once(".parity[")?;
-    let (parity, name) = name.split_once("].lane[")?;
-    let (lane, _) = name.split_once(']')?;
+    let (_, name) = name.split_once(".parity_")?;
+    let (parity, name) = name.split_once("__lane_")?;
+    let (lane, _) = name.split_once("__")?;
     Some((parity.parse().ok()?, lane.parse().ok()?))
 }
 
@@ -98,11 +98,11 @@ mod tests {
     #[test]
     fn a_lane_s_multiplier_gets_its_site_and_another_none() {
         let names =
-            ["a.lanes.parity[1].lane[0].a_MULT", "a.lanes.parity[0].lane[10].a_MULT", "a.lanes.parity[0].lane[9].x"];
+            ["a.lanes.parity_1__lane_0__a_MULT", "a.lanes.parity_0__lane_10__a_MULT", "a.lanes.parity_0__lane_9__x"];
         let mut cells: serde_json::Map<String, Value> =
             names.iter().map(|name| (name.to_string(), json!({"type": "MULT18X18D"}))).collect();
         cells.insert("unit.x_MULT".into(), json!({"type": "MULT18X18D"}));
-        cells.insert("a.lanes.parity[0].lane[1].q".into(), json!({"type": "TRELLIS_FF"}));
+        cells.insert("a.lanes.parity_0__lane_1__q".into(), json!({"type": "TRELLIS_FF"}));
         let mut netlist = json!({"modules": {"t": {"cells": cells}}});
         assert_eq!(assign_sites(&mut netlist, "t", &blocks()), 3);
         let site = |name: &str| netlist["modules"]["t"]["cells"][name]["attributes"]["BEL"].clone();
@@ -111,13 +111,13 @@ mod tests {
             [names[2], names[1], names[0]].map(site),
             [json!("X13/Y10/MULT18_0"), json!("X14/Y10/MULT18_1"), json!("X17/Y10/MULT18_4")]
         );
-        assert!(site("unit.x_MULT").is_null() && site("a.lanes.parity[0].lane[1].q").is_null());
+        assert!(site("unit.x_MULT").is_null() && site("a.lanes.parity_0__lane_1__q").is_null());
     }
 
     #[test]
     fn more_lanes_than_sites_are_left_to_the_placer() {
         let cells: serde_json::Map<String, Value> =
-            (0..25).map(|k| (format!("lanes.parity[0].lane[{k}].a"), json!({"type": "MULT18X18D"}))).collect();
+            (0..25).map(|k| (format!("a.lanes.parity_0__lane_{k}__a"), json!({"type": "MULT18X18D"}))).collect();
         let mut netlist = json!({"modules": {"t": {"cells": cells}}});
         assert_eq!(assign_sites(&mut netlist, "t", &blocks()), 0);
     }

@@ -1,0 +1,283 @@
+//! A kernel as the body of a rust-hdl block.
+
+use std::cell::RefCell;
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+use rust_hdl::core::probe::Probe;
+use rust_hdl::prelude::*;
+
+use super::compile::limbs;
+use super::error::KernelError;
+use super::kernel::{Kernel, Role};
+use super::simulate::Simulation;
+use crate::wire::Wire;
+
+/// A port of a rust-hdl block as limbs of 64 bits, least significant first.
+pub trait Port {
+    /// Width in bits.
+    fn port_bits(&self) -> usize;
+    /// Whether the value changed in the last update.
+    fn has_new_value(&self) -> bool;
+    /// Gives the current value to `take`.
+    fn read(&self, take: &mut dyn FnMut(&[u64]));
+    /// Sets the value after the next update.
+    fn write(&mut self, value: &[u64]);
+    /// Marks the port as driven by its block.
+    fn drive(&mut self);
+}
+
+impl<D: Direction> Port for Wire<D> {
+    fn port_bits(&self) -> usize {
+        self.width()
+    }
+
+    fn has_new_value(&self) -> bool {
+        self.changed()
+    }
+
+    fn read(&self, take: &mut dyn FnMut(&[u64])) {
+        take(&self.limbs()[..self.width().div_ceil(64)]);
+    }
+
+    fn write(&mut self, value: &[u64]) {
+        self.next.set_limbs(value);
+    }
+
+    fn drive(&mut self) {
+        Logic::connect(self);
+    }
+}
+
+macro_rules! bit_port {
+    ($direction:ty) => {
+        impl Port for Signal<$direction, Bit> {
+            fn port_bits(&self) -> usize {
+                1
+            }
+
+            fn has_new_value(&self) -> bool {
+                self.changed
+            }
+
+            fn read(&self, take: &mut dyn FnMut(&[u64])) {
+                take(&[u64::from(self.val())]);
+            }
+
+            fn write(&mut self, value: &[u64]) {
+                self.next = value[0] != 0;
+            }
+
+            fn drive(&mut self) {
+                Logic::connect(self);
+            }
+        }
+    };
+}
+
+bit_port!(In);
+bit_port!(Out);
+
+/// First limb and limbs of a port in the simulation.
+type Place = (usize, usize);
+
+/// A kernel bound to the ports of its block, with its simulation. [`kernel_block!`](crate::kernel_block) calls it.
+#[derive(Debug, Default)]
+pub struct Body {
+    kernel: Arc<Kernel>,
+    simulation: Option<Simulation>,
+    inputs: Vec<Place>,
+    outputs: Vec<Place>,
+    started: bool,
+}
+
+impl Body {
+    /// Binds the ports, by name and width, to the kernel's signals of the same names.
+    pub fn new(mut kernel: Kernel, inputs: &[(&str, usize)], outputs: &[(&str, usize)]) -> Self {
+        for (ports, is_output) in [(inputs, false), (outputs, true)] {
+            for &(port, bits) in ports {
+                kernel.bind(port, bits, is_output);
+            }
+        }
+        let simulation = kernel.errors().is_empty().then(|| Simulation::new(&kernel));
+        let places = |ports: &[(&str, usize)]| -> Vec<Place> {
+            let place = |(name, bits): &(&str, usize)| {
+                let slot = simulation.as_ref().and_then(|simulation| simulation.slot_of(&kernel, name));
+                (slot.unwrap_or_default(), limbs(*bits) as usize)
+            };
+            ports.iter().map(place).collect()
+        };
+        let (inputs, outputs) = (places(inputs), places(outputs));
+        Body { kernel: Arc::new(kernel), simulation, inputs, outputs, started: false }
+    }
+
+    /// The kernel.
+    pub fn kernel(&self) -> &Kernel {
+        &self.kernel
+    }
+
+    /// One update of rust-hdl: new inputs, a clock edge, or the first of all. `inputs` sets and `outputs` takes the
+    /// values of the ports; they are called only if something changed.
+    pub fn update(
+        &mut self,
+        edge: bool,
+        changed: bool,
+        inputs: impl FnOnce(&mut dyn FnMut(usize, &dyn Port)),
+        outputs: impl FnOnce(&mut dyn FnMut(usize, &mut dyn Port)),
+    ) {
+        let Some(simulation) = &mut self.simulation else { return };
+        if !(edge || changed || !self.started) {
+            return;
+        }
+        self.started = true;
+        let places = &self.inputs;
+        inputs(&mut |index, port| port.read(&mut |value| simulation.set(places[index].0, value)));
+        if edge {
+            simulation.clock();
+        }
+        simulation.show();
+        let places = &self.outputs;
+        outputs(&mut |index, port| {
+            let (slot, limbs) = places[index];
+            port.write(simulation.get(slot, limbs));
+        });
+    }
+
+    /// The Verilog of the block's body.
+    pub fn hdl(&self) -> Verilog {
+        Verilog::Custom(self.kernel.verilog())
+    }
+}
+
+impl Kernel {
+    /// Makes the signal `port` a port.
+    fn bind(&mut self, port: &str, bits: usize, is_output: bool) {
+        let found = match self.signal_of(port).map(|id| &mut self.signals[id]) {
+            None => "the kernel has no such signal".to_owned(),
+            Some(signal) if signal.ty.bits != bits => format!("the kernel's signal has {} bits", signal.ty.bits),
+            Some(signal) if (signal.role == Role::Input) == is_output => {
+                "the kernel's signal has another direction".to_owned()
+            }
+            Some(signal) => {
+                signal.output = is_output;
+                return;
+            }
+        };
+        self.errors.push(KernelError::Port { block: self.block.clone(), port: port.to_owned(), bits, found });
+    }
+}
+
+thread_local! {
+    /// The kernel seen since the innermost scope began, while [`kernels`] walks a design.
+    static SEEN: RefCell<Vec<Arc<Kernel>>> = const { RefCell::new(Vec::new()) };
+}
+
+impl Logic for Body {
+    fn update(&mut self) {}
+}
+
+impl Block for Body {
+    fn connect_all(&mut self) {}
+
+    fn update_all(&mut self) {}
+
+    fn has_changed(&self) -> bool {
+        false
+    }
+
+    fn accept(&self, _name: &str, _probe: &mut dyn Probe) {
+        SEEN.with_borrow_mut(|seen| seen.push(self.kernel.clone()));
+    }
+}
+
+/// Collects the kernels of a design by instance path.
+#[derive(Default)]
+struct Collector {
+    path: Vec<String>,
+    kernels: BTreeMap<String, Arc<Kernel>>,
+}
+
+impl Probe for Collector {
+    fn visit_start_scope(&mut self, name: &str, _node: &dyn Block) {
+        self.path.push(name.to_owned());
+    }
+
+    fn visit_end_scope(&mut self, _name: &str, _node: &dyn Block) {
+        let path = self.path.join("$");
+        self.kernels.extend(SEEN.take().into_iter().map(|kernel| (path.clone(), kernel)));
+        self.path.pop();
+    }
+}
+
+/// The kernels of all blocks of `design` by their module names, levels separated by `$`; the design itself is `top`.
+pub fn kernels(design: &dyn Block) -> BTreeMap<String, Arc<Kernel>> {
+    SEEN.take();
+    let mut collector = Collector::default();
+    design.accept("top", &mut collector);
+    collector.kernels
+}
+
+/// Checks the kernels of all blocks of `design`.
+///
+/// # Errors
+/// The first defect of one of them.
+pub fn check_kernels(design: &dyn Block) -> Result<(), KernelError> {
+    let all = kernels(design);
+    let mut errors = all.values().flat_map(|kernel| kernel.errors());
+    errors.next().map_or(Ok(()), |error| Err(error.clone()))
+}
+
+/// Implements rust-hdl's `Logic` for a block from its kernel, and `bind`, which makes its field `kernel`.
+///
+/// ```text
+/// kernel_block!(Queue, clock clk, inputs [rst, write, word], outputs [room, m_axis_tvalid]);
+/// ```
+#[macro_export]
+macro_rules! kernel_block {
+    ($block:ty, $(clock $clock:ident,)? inputs [$($input:ident),* $(,)?], outputs [$($output:ident),* $(,)?]) => {
+        impl $block {
+            /// Takes `kernel` as the block's behaviour.
+            fn bind(mut self, kernel: $crate::language::Kernel) -> Self {
+                use $crate::language::Port;
+                self.kernel = $crate::language::Body::new(
+                    kernel,
+                    &[$((stringify!($input), self.$input.port_bits())),*],
+                    &[$((stringify!($output), self.$output.port_bits())),*],
+                );
+                self
+            }
+        }
+
+        impl rust_hdl::prelude::Logic for $block {
+            fn update(&mut self) {
+                #[allow(unused_imports)]
+                use $crate::language::Port;
+                let edge = false $(|| self.$clock.pos_edge())?;
+                let changed = false $(|| self.$input.has_new_value())*;
+                let Self { kernel, $($input,)* $($output,)* .. } = self;
+                kernel.update(
+                    edge,
+                    changed,
+                    |_set| {
+                        let mut _index = 0;
+                        $(_set(_index, &*$input); _index += 1;)*
+                    },
+                    |take| {
+                        let mut index = 0;
+                        $(take(index, $output); index += 1;)*
+                        let _ = index;
+                    },
+                );
+            }
+
+            fn connect(&mut self) {
+                use $crate::language::Port;
+                $(self.$output.drive();)*
+            }
+
+            fn hdl(&self) -> rust_hdl::prelude::Verilog {
+                self.kernel.hdl()
+            }
+        }
+    };
+}

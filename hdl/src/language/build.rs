@@ -1,0 +1,298 @@
+//! Construction of a kernel: ports, wires, registers, memories, conditions.
+
+use std::cell::RefCell;
+
+use super::error::KernelError;
+use super::expression::Expr;
+use super::kernel::{
+    Contents, Item, Kernel, Memory, MemoryId, Node, NodeId, Register, Role, Signal, SignalId, Type, Write,
+};
+
+/// Words that Verilog keeps for itself and that a block might use as names.
+const KEYWORDS: [&str; 24] = [
+    "always", "assign", "begin", "buf", "case", "default", "edge", "else", "end", "event", "for", "if", "initial",
+    "input", "integer", "module", "not", "output", "posedge", "real", "reg", "time", "wait", "wire",
+];
+
+/// Builds a [`Kernel`]. Its expressions borrow it, so that Rust's operators, loops and functions compose them.
+#[derive(Debug)]
+pub struct Builder {
+    pub(crate) kernel: RefCell<Kernel>,
+    /// Condition of the assignments made now, innermost last.
+    conditions: RefCell<Vec<NodeId>>,
+    scope: RefCell<String>,
+}
+
+/// A declared signal, which is assigned with [`Net::set`].
+#[derive(Clone, Copy, Debug)]
+pub struct Net<'k> {
+    builder: &'k Builder,
+    signal: SignalId,
+    value: Expr<'k>,
+}
+
+impl<'k> std::ops::Deref for Net<'k> {
+    type Target = Expr<'k>;
+
+    fn deref(&self) -> &Expr<'k> {
+        &self.value
+    }
+}
+
+/// A memory under construction.
+#[derive(Clone, Copy, Debug)]
+pub struct MemoryPort<'k> {
+    builder: &'k Builder,
+    memory: MemoryId,
+    bits: usize,
+}
+
+impl Builder {
+    /// A kernel for the block of this name whose registers change at the rising edge of port `clk`.
+    pub fn new(block: &str) -> Self {
+        Builder::combinational(block).clocked("clk")
+    }
+
+    /// A kernel without clock.
+    pub fn combinational(block: &str) -> Self {
+        let kernel = Kernel { block: block.to_owned(), ..Kernel::default() };
+        Builder { kernel: RefCell::new(kernel), conditions: RefCell::default(), scope: RefCell::default() }
+    }
+
+    /// With the clock port of this name.
+    pub fn clocked(self, clock: &str) -> Self {
+        self.kernel.borrow_mut().clock = Some(clock.to_owned());
+        self
+    }
+
+    /// An input port, unsigned, of `bits` bits.
+    pub fn input(&self, name: &str, bits: usize) -> Expr<'_> {
+        *self.declare(name, Type::unsigned(bits), Role::Input)
+    }
+
+    /// A combinational signal with a value. A driven port is a signal of the port's name.
+    pub fn wire<'k>(&'k self, name: &str, value: Expr<'k>) -> Expr<'k> {
+        let net = self.declare(name, value.ty(), Role::Wire { declared: false });
+        self.kernel.borrow_mut().items.push(Item::Wire(net.signal));
+        net.set(value);
+        *net
+    }
+
+    /// A combinational signal that is assigned later.
+    pub fn net(&self, name: &str, ty: Type) -> Net<'_> {
+        self.declare(name, ty, Role::Wire { declared: true })
+    }
+
+    /// A register without reset; before its first assignment its value is undefined in hardware, 0 in the simulation.
+    pub fn register(&self, name: &str, ty: Type) -> Net<'_> {
+        self.declare(name, ty, Role::Register(Register::default()))
+    }
+
+    /// A register that takes `value` at the clock edge while `reset` is 1.
+    pub fn state<'k>(&'k self, name: &str, ty: Type, reset: Expr<'k>, value: u64) -> Net<'k> {
+        let reset = Some((reset.bit("reset").id, value));
+        self.declare(name, ty, Role::Register(Register { reset, ..Register::default() }))
+    }
+
+    /// A memory of `words` words of `bits` bits.
+    pub fn memory(&self, name: &str, words: usize, bits: usize, contents: Contents) -> MemoryPort<'_> {
+        let name = self.check_name(name);
+        let mut kernel = self.kernel.borrow_mut();
+        kernel.memories.push(Memory { name, words, bits, contents, style: None, writes: Vec::new() });
+        MemoryPort { builder: self, memory: kernel.memories.len() - 1, bits }
+    }
+
+    /// A comment line before what is defined next.
+    pub fn comment(&self, text: &str) {
+        self.kernel.borrow_mut().items.push(Item::Comment(text.to_owned()));
+    }
+
+    /// An unsigned constant of `bits` bits.
+    pub fn constant(&self, bits: usize, value: u64) -> Expr<'_> {
+        let mut limbs = vec![0; bits.div_ceil(64)];
+        limbs[0] = value;
+        let fits = bits >= 64 || value >> bits == 0;
+        let constant = self.node(Node::Constant(limbs), Type::unsigned(bits));
+        if !fits {
+            self.width_error(constant, format!("{value} needs more bits"));
+        }
+        constant
+    }
+
+    /// A two's complement constant of `bits` bits, at most 64.
+    pub fn signed_constant(&self, bits: usize, value: i64) -> Expr<'_> {
+        let shift = 64 - bits.min(64);
+        let constant = self.constant(bits, (value as u64) << shift >> shift).signed();
+        if value << shift >> shift != value {
+            self.width_error(constant, format!("{value} needs more bits"));
+        }
+        constant
+    }
+
+    /// Makes the assignments of `body` under `condition`; outside, and where it is 0, registers keep what they have.
+    pub fn when<'k>(&'k self, condition: Expr<'k>, body: impl FnOnce()) {
+        let mut all = condition.bit("condition");
+        if let Some(&outer) = self.conditions.borrow().last() {
+            all = Expr { builder: self, id: outer } & all;
+        }
+        self.conditions.borrow_mut().push(all.id);
+        body();
+        self.conditions.borrow_mut().pop();
+    }
+
+    /// Puts `prefix` and two underscores before the names that `body` declares.
+    pub fn scope<R>(&self, prefix: &str, body: impl FnOnce() -> R) -> R {
+        let outer = self.scope.borrow().clone();
+        *self.scope.borrow_mut() = format!("{outer}{prefix}__");
+        let result = body();
+        *self.scope.borrow_mut() = outer;
+        result
+    }
+
+    /// The kernel; its [`Kernel::errors`] list what is wrong with it.
+    pub fn finish(self) -> Kernel {
+        let mut kernel = self.kernel.into_inner();
+        kernel.check();
+        kernel
+    }
+
+    pub(crate) fn node(&self, node: Node, ty: Type) -> Expr<'_> {
+        Expr { builder: self, id: self.kernel.borrow_mut().intern(node, ty) }
+    }
+
+    pub(crate) fn fail(&self, error: KernelError) {
+        self.kernel.borrow_mut().errors.push(error);
+    }
+
+    pub(crate) fn block(&self) -> String {
+        self.kernel.borrow().block.clone()
+    }
+
+    pub(crate) fn width_error(&self, expression: Expr, reason: String) {
+        self.fail(KernelError::Width { block: self.block(), expression: expression.to_string(), reason });
+    }
+
+    fn check_name(&self, name: &str) -> String {
+        let name = format!("{}{name}", self.scope.borrow());
+        let kernel = self.kernel.borrow();
+        let taken = kernel.signal_of(&name).is_some() || kernel.memories.iter().any(|memory| memory.name == name);
+        let plain = |c: char| c.is_ascii_alphanumeric() || c == '_';
+        let reason = match taken || kernel.clock.as_deref() == Some(&name) {
+            true => Some("the name is used twice"),
+            false if !name.starts_with(|c: char| c.is_ascii_alphabetic()) || !name.chars().all(plain) => {
+                Some("not a Verilog identifier")
+            }
+            false if KEYWORDS.contains(&name.as_str()) => Some("a keyword of Verilog"),
+            false => None,
+        };
+        let block = kernel.block.clone();
+        drop(kernel);
+        if let Some(reason) = reason {
+            self.fail(KernelError::Name { block, signal: name.clone(), reason });
+        }
+        name
+    }
+
+    fn declare(&self, name: &str, ty: Type, role: Role) -> Net<'_> {
+        let name = self.check_name(name);
+        let mut kernel = self.kernel.borrow_mut();
+        kernel.signals.push(Signal { name, ty, role, value: None, guards: Vec::new(), comment: None, output: false });
+        let signal = kernel.signals.len() - 1;
+        let id = kernel.intern(Node::Signal(signal), ty);
+        Net { builder: self, signal, value: Expr { builder: self, id } }
+    }
+}
+
+impl<'k> Net<'k> {
+    /// Assigns `value` under the conditions of the enclosing [`Builder::when`]. A later assignment has priority over an
+    /// earlier one of another condition. A narrower value is extended.
+    pub fn set(&self, value: Expr<'k>) {
+        let value = value.assigned_to(self.signal);
+        let guard = self.builder.conditions.borrow().last().copied();
+        let (before, twice, is_wire) = {
+            let kernel = self.builder.kernel.borrow();
+            let signal = &kernel.signals[self.signal];
+            let is_wire = matches!(signal.role, Role::Wire { .. });
+            (signal.value, signal.guards.contains(&guard) || (guard.is_none() && !signal.guards.is_empty()), is_wire)
+        };
+        if twice {
+            let signal = self.name();
+            let expression = value.to_string();
+            return self.builder.fail(KernelError::AssignedTwice { block: self.builder.block(), signal, expression });
+        }
+        let next = match guard {
+            None => value,
+            // A wire keeps nothing: it needs a value before the condition.
+            Some(_) if is_wire && before.is_none() => {
+                return self.builder.fail(KernelError::Unassigned { block: self.builder.block(), signal: self.name() })
+            }
+            Some(condition) => {
+                let otherwise = before.unwrap_or(self.value.id);
+                let at = |id| Expr { builder: self.builder, id };
+                at(condition).mux(value, at(otherwise))
+            }
+        };
+        let mut kernel = self.builder.kernel.borrow_mut();
+        let signal = &mut kernel.signals[self.signal];
+        signal.value = Some(next.id);
+        signal.guards.push(guard);
+        if is_wire && !kernel.items.contains(&Item::Wire(self.signal)) {
+            kernel.items.push(Item::Wire(self.signal));
+        }
+    }
+
+    /// The current value.
+    pub fn get(&self) -> Expr<'k> {
+        self.value
+    }
+
+    /// With a comment at its declaration.
+    pub fn comment(self, text: &str) -> Self {
+        self.builder.kernel.borrow_mut().signals[self.signal].comment = Some(text.to_owned());
+        self
+    }
+
+    /// With the attribute `keep`: synthesis must neither merge nor remove the register.
+    pub fn keep(self) -> Self {
+        self.register(|register| register.keep = true)
+    }
+
+    /// With an initial value.
+    pub fn initially(self, value: u64) -> Self {
+        self.register(|register| register.initial = Some(value))
+    }
+
+    fn register(self, change: impl FnOnce(&mut Register)) -> Self {
+        if let Role::Register(register) = &mut self.builder.kernel.borrow_mut().signals[self.signal].role {
+            change(register);
+        }
+        self
+    }
+
+    fn name(&self) -> String {
+        self.builder.kernel.borrow().signals[self.signal].name.clone()
+    }
+}
+
+impl<'k> MemoryPort<'k> {
+    /// The word at `address`, asynchronous; 0 in the simulation at an address beyond the memory.
+    pub fn read(&self, address: Expr<'k>) -> Expr<'k> {
+        let node = Node::Read { memory: self.memory, address: address.unsigned().id };
+        self.builder.node(node, Type::unsigned(self.bits))
+    }
+
+    /// Writes `data` to `address` at the clock edge if `enable` is 1.
+    pub fn write(&self, enable: Expr<'k>, address: Expr<'k>, data: Expr<'k>) {
+        if data.ty().bits != self.bits {
+            self.builder.width_error(data, format!("a word of the memory has {} bits", self.bits));
+        }
+        let write = Write { enable: enable.bit("write enable").id, address: address.id, data: data.id };
+        self.builder.kernel.borrow_mut().memories[self.memory].writes.push(write);
+    }
+
+    /// With this value of the attribute `ram_style`.
+    pub fn style(self, style: &str) -> Self {
+        self.builder.kernel.borrow_mut().memories[self.memory].style = Some(style.to_owned());
+        self
+    }
+}

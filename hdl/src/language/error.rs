@@ -1,0 +1,98 @@
+//! Defects of a description, found when it is built.
+
+use thiserror::Error;
+
+use super::kernel::Type;
+
+/// A defect of a block's description; names block, signal, expression.
+#[derive(Clone, Debug, PartialEq, Eq, Error)]
+pub enum KernelError {
+    /// Signed and unsigned operands, or a value of the other signedness than its signal.
+    #[error("block {block}: `{expression}` mixes signed and unsigned")]
+    MixedSigns {
+        /// Name of the block.
+        block: String,
+        /// The expression.
+        expression: String,
+    },
+    /// A value is wider than its signal.
+    #[error("block {block}, signal {signal}: `{expression}` has {bits} bits, the signal {room}")]
+    LostBits {
+        /// Name of the block.
+        block: String,
+        /// Name of the signal.
+        signal: String,
+        /// The value.
+        expression: String,
+        /// Its width.
+        bits: usize,
+        /// The signal's width.
+        room: usize,
+    },
+    /// Operands of widths that the operator cannot take.
+    #[error("block {block}: `{expression}`: {reason}")]
+    Width {
+        /// Name of the block.
+        block: String,
+        /// The expression.
+        expression: String,
+        /// What is wrong with its widths.
+        reason: String,
+    },
+    /// A declared signal has no value.
+    #[error("block {block}, signal {signal}: not assigned")]
+    Unassigned {
+        /// Name of the block.
+        block: String,
+        /// Name of the signal.
+        signal: String,
+    },
+    /// A second value in the same condition.
+    #[error("block {block}, signal {signal}: assigned twice, the second time `{expression}`")]
+    AssignedTwice {
+        /// Name of the block.
+        block: String,
+        /// Name of the signal.
+        signal: String,
+        /// The second value.
+        expression: String,
+    },
+    /// A wire depends on itself in the same cycle.
+    #[error("block {block}: combinational loop through {signals}: `{expression}`")]
+    Loop {
+        /// Name of the block.
+        block: String,
+        /// Names of its wires, separated by commas.
+        signals: String,
+        /// Value of the first of them.
+        expression: String,
+    },
+    /// A name that is used twice or is no Verilog identifier.
+    #[error("block {block}, signal {signal}: {reason}")]
+    Name {
+        /// Name of the block.
+        block: String,
+        /// The name.
+        signal: String,
+        /// What is wrong with it.
+        reason: &'static str,
+    },
+    /// A port of the block that the kernel lacks, or that has another width there.
+    #[error("block {block}, port {port} of {bits} bits: {found}")]
+    Port {
+        /// Name of the block.
+        block: String,
+        /// Name of the port.
+        port: String,
+        /// Its width.
+        bits: usize,
+        /// The kernel's signal of that name.
+        found: String,
+    },
+}
+
+impl std::fmt::Display for Type {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "{}{}", if self.signed { "s" } else { "u" }, self.bits)
+    }
+}

@@ -1,0 +1,76 @@
+//! Flip-flops and LUTs of a kernel, estimated from its graph.
+//!
+//! | node | four-input LUTs |
+//! |---|---|
+//! | sum, difference, comparison by size | 1 per bit |
+//! | multiplexer | 1 per bit; 1/2 with a constant; none where a register keeps its value or is reset |
+//! | and, or, exclusive or | 1/4 per bit: mostly merged into another node |
+//! | equality | 1/2 per bit, 1/4 with a constant |
+//! | parity, all or any of n bits | (n − 1)/3 |
+//! | shift by a signal | 3 per bit |
+//! | product, memory in block RAM | none: counted as multipliers and block RAMs |
+//! | memory of w words and b bits in LUTs | 6 per 16 words and 4 bits |
+//!
+//! Synthesis shares and removes some of it; the tests state how far the estimate is from Yosys.
+
+use std::collections::BTreeSet;
+
+use super::kernel::{Binary, Kernel, Node, NodeId, Unary};
+use crate::estimate::Logic;
+
+/// A distributed RAM cell of the ECP5: words, bits per word, LUTs.
+const CELL: [usize; 3] = [16, 4, 6];
+
+/// LUTs of a memory of `words` words and `bits` bits as distributed RAM.
+pub(crate) fn distributed_luts(words: usize, bits: usize) -> usize {
+    let [cell_words, cell_bits, luts] = CELL;
+    words.div_ceil(cell_words) * bits.div_ceil(cell_bits) * luts
+}
+
+impl Kernel {
+    /// Logic of the block. The memories named in `placed` are counted elsewhere, with their output registers.
+    pub(crate) fn logic(&self, placed: &BTreeSet<&str>) -> Logic {
+        let mut logic = Logic::default();
+        let mut free = BTreeSet::new();
+        for (id, signal, _) in self.registers() {
+            let own = self.interned[&(Node::Signal(id), signal.ty)];
+            let next = signal.value.unwrap_or(own);
+            let of_memory = match self.nodes[next].0 {
+                Node::Read { memory, .. } => placed.contains(self.memories[memory].name.as_str()),
+                _ => false,
+            };
+            if !of_memory {
+                logic.flip_flops += signal.ty.bits;
+            }
+            // An enable is an input of the flip-flop.
+            if let Node::Mux(_, a, b) = self.nodes[next].0 {
+                if a == own || b == own {
+                    free.insert(next);
+                }
+            }
+        }
+        let values: Vec<NodeId> = self.signals.iter().filter_map(|signal| signal.value).collect();
+        let order = self.order(&[values, self.edge_roots()].concat()).unwrap_or_default();
+        logic.luts = order.iter().filter(|node| !free.contains(*node)).map(|&node| self.luts(node)).sum();
+        for memory in self.memories.iter().filter(|memory| !placed.contains(memory.name.as_str())) {
+            logic.luts += distributed_luts(memory.words, memory.bits) as f64;
+        }
+        logic
+    }
+
+    fn luts(&self, node: NodeId) -> f64 {
+        let bits = |id: NodeId| self.ty(id).bits as f64;
+        let constant = |id: NodeId| matches!(self.nodes[id].0, Node::Constant(_));
+        match &self.nodes[node].0 {
+            Node::Binary(Binary::Add | Binary::Sub, ..) => bits(node),
+            Node::Binary(Binary::Less, a, b) => bits(*a).max(bits(*b)),
+            Node::Binary(Binary::Equal, a, b) => bits(*a) * if constant(*a) || constant(*b) { 0.25 } else { 0.5 },
+            Node::Binary(Binary::And | Binary::Or | Binary::Xor, ..) => 0.25 * bits(node),
+            Node::Binary(Binary::ShiftLeft | Binary::ShiftRight, ..) => 3.0 * bits(node),
+            Node::Mux(_, a, b) if constant(*a) || constant(*b) => 0.5 * bits(node),
+            Node::Mux(..) => bits(node),
+            Node::Unary(Unary::All | Unary::Any | Unary::Parity, a) => (bits(*a) - 1.0) / 3.0,
+            _ => 0.0,
+        }
+    }
+}

@@ -1,0 +1,358 @@
+//! Execution of a compiled kernel.
+//!
+//! At a clock edge the next values are computed from the state and the inputs, then taken all at once. Combinational
+//! outputs are computed after an edge and when an input changed. Where neither an input nor a register changed since
+//! the last edge, nothing is computed.
+
+use super::compile::{limbs, mask, Op, Operand, Program, Wide};
+use super::kernel::{Binary, Contents, Kernel, Node, Role, Unary};
+
+/// A register's transition: its slot, the next value, the reset.
+#[derive(Clone, Debug)]
+struct Transition {
+    to: usize,
+    next: usize,
+    limbs: usize,
+    reset: Option<(usize, u64)>,
+}
+
+/// A write port in slots.
+#[derive(Clone, Debug)]
+struct WritePort {
+    memory: usize,
+    enable: usize,
+    address: usize,
+    data: usize,
+}
+
+/// A memory's words, one after the other.
+#[derive(Clone, Debug)]
+struct Words {
+    words: usize,
+    limbs: usize,
+    content: Vec<u64>,
+}
+
+/// The state of a kernel.
+#[derive(Clone, Debug)]
+pub struct Simulation {
+    program: Program,
+    slots: Vec<u64>,
+    memories: Vec<Words>,
+    transitions: Vec<Transition>,
+    /// Next values of the registers, before they are taken.
+    staged: Vec<u64>,
+    writes: Vec<WritePort>,
+    /// An input or a register changed since the next values were computed.
+    changed: bool,
+}
+
+impl Simulation {
+    /// The initial state of a kernel without errors.
+    pub fn new(kernel: &Kernel) -> Self {
+        let program = Program::new(kernel);
+        let mut slots = vec![0; program.limbs];
+        for (slot, value) in &program.constants {
+            slots[*slot as usize..][..value.len()].copy_from_slice(value);
+        }
+        let node = |id| program.operand(kernel, id).slot as usize;
+        let mut transitions = Vec::new();
+        for (signal, of, register) in kernel.registers() {
+            let own = kernel.interned[&(Node::Signal(signal), of.ty)];
+            let sign = |value: u64| match of.ty.signed && of.ty.bits < 64 && value >> (of.ty.bits - 1) & 1 == 1 {
+                true => value | !mask(of.ty.bits),
+                false => value,
+            };
+            let Some(next) = of.value else { continue };
+            slots[node(own)] = sign(register.initial.unwrap_or(0));
+            let reset = register.reset.map(|(condition, value)| (node(condition), sign(value)));
+            let limbs = limbs(of.ty.bits) as usize;
+            transitions.push(Transition { to: node(own), next: node(next), limbs, reset });
+        }
+        let mut writes = Vec::new();
+        for (memory, of) in kernel.memories.iter().enumerate() {
+            writes.extend(of.writes.iter().map(|write| WritePort {
+                memory,
+                enable: node(write.enable),
+                address: node(write.address),
+                data: node(write.data),
+            }));
+        }
+        let memories = kernel.memories.iter().map(|memory| {
+            let limbs = limbs(memory.bits) as usize;
+            let mut content = vec![0; memory.words * limbs];
+            if let Contents::File { words, .. } = &memory.contents {
+                for (to, word) in content.chunks_mut(limbs).zip(words) {
+                    to[..word.len()].copy_from_slice(word);
+                }
+            }
+            Words { words: memory.words, limbs, content }
+        });
+        let staged = vec![0; transitions.iter().map(|transition| transition.limbs).sum()];
+        let memories = memories.collect();
+        Simulation { slots, memories, transitions, staged, writes, changed: true, program }
+    }
+
+    /// Sets an input from its limbs; `signal` as from [`Simulation::slot_of`].
+    pub fn set(&mut self, slot: usize, value: &[u64]) {
+        let own = &mut self.slots[slot..][..value.len()];
+        if own != value {
+            own.copy_from_slice(value);
+            self.changed = true;
+        }
+    }
+
+    /// The limbs of a signal.
+    pub fn get(&self, slot: usize, limbs: usize) -> &[u64] {
+        &self.slots[slot..][..limbs]
+    }
+
+    /// First limb of the signal of this name; inputs, registers and outputs have one.
+    pub fn slot_of(&self, kernel: &Kernel, name: &str) -> Option<usize> {
+        let signal = kernel.signal_of(name)?;
+        let of = &kernel.signals[signal];
+        let node = match of.role {
+            Role::Wire { .. } => of.value?,
+            _ => *kernel.interned.get(&(Node::Signal(signal), of.ty))?,
+        };
+        Some(self.program.operand(kernel, node).slot as usize)
+    }
+
+    /// A rising edge of the clock.
+    pub fn clock(&mut self) {
+        if !self.changed {
+            return;
+        }
+        let Simulation { program, slots, memories, transitions, staged, writes, .. } = self;
+        run(&program.edge, &program.wide, slots, memories);
+        let mut at = 0;
+        for transition in transitions.iter() {
+            let own = &mut staged[at..][..transition.limbs];
+            match transition.reset {
+                Some((condition, value)) if slots[condition] != 0 => {
+                    own.fill(0);
+                    own[0] = value;
+                }
+                _ => own.copy_from_slice(&slots[transition.next..][..transition.limbs]),
+            }
+            at += transition.limbs;
+        }
+        let mut changed = false;
+        for write in writes.iter().filter(|write| slots[write.enable] != 0) {
+            let memory = &mut memories[write.memory];
+            let address = slots[write.address] as usize;
+            if address < memory.words {
+                let data = &slots[write.data..][..memory.limbs];
+                let word = &mut memory.content[address * memory.limbs..][..memory.limbs];
+                changed |= word != data;
+                word.copy_from_slice(data);
+            }
+        }
+        let mut at = 0;
+        for transition in transitions.iter() {
+            let own = &mut slots[transition.to..][..transition.limbs];
+            let next = &staged[at..][..transition.limbs];
+            if own != next {
+                own.copy_from_slice(next);
+                changed = true;
+            }
+            at += transition.limbs;
+        }
+        self.changed = changed;
+    }
+
+    /// Computes the combinational outputs.
+    pub fn show(&mut self) {
+        run(&self.program.show, &self.program.wide, &mut self.slots, &self.memories);
+    }
+}
+
+fn run(ops: &[Op], wide: &[Wide], slots: &mut [u64], memories: &[Words]) {
+    for op in ops {
+        match *op {
+            Op::Add { to, a, b } => slots[to as usize] = slots[a as usize].wrapping_add(slots[b as usize]),
+            Op::Sub { to, a, b } => slots[to as usize] = slots[a as usize].wrapping_sub(slots[b as usize]),
+            Op::Mul { to, a, b } => slots[to as usize] = slots[a as usize].wrapping_mul(slots[b as usize]),
+            Op::And { to, a, b } => slots[to as usize] = slots[a as usize] & slots[b as usize],
+            Op::Or { to, a, b } => slots[to as usize] = slots[a as usize] | slots[b as usize],
+            Op::Xor { to, a, b } => slots[to as usize] = slots[a as usize] ^ slots[b as usize],
+            Op::Equal { to, a, b } => slots[to as usize] = u64::from(slots[a as usize] == slots[b as usize]),
+            Op::LessSigned { to, a, b } => {
+                slots[to as usize] = u64::from((slots[a as usize] as i64) < slots[b as usize] as i64);
+            }
+            Op::LessUnsigned { to, a, b } => slots[to as usize] = u64::from(slots[a as usize] < slots[b as usize]),
+            Op::Not { to, a, mask } => slots[to as usize] = !slots[a as usize] & mask,
+            Op::IsMask { to, a, mask } => slots[to as usize] = u64::from(slots[a as usize] & mask == mask),
+            Op::IsNonZero { to, a } => slots[to as usize] = u64::from(slots[a as usize] != 0),
+            Op::Parity { to, a, mask } => {
+                slots[to as usize] = u64::from((slots[a as usize] & mask).count_ones() & 1);
+            }
+            Op::Mux { to, c, a, b } => {
+                slots[to as usize] = if slots[c as usize] != 0 { slots[a as usize] } else { slots[b as usize] };
+            }
+            Op::Field { to, a, shift, mask } => slots[to as usize] = slots[a as usize] >> shift & mask,
+            Op::Straddle { to, a, shift, mask } => {
+                let [low, high] = [slots[a as usize], slots[a as usize + 1]];
+                slots[to as usize] = (low >> shift | high << (64 - shift)) & mask;
+            }
+            Op::Sign { to, a, bits } => {
+                let up = 64 - bits;
+                slots[to as usize] = ((slots[a as usize] << up) as i64 >> up) as u64;
+            }
+            Op::Join { to, high, low, by } => slots[to as usize] = slots[high as usize] << by | slots[low as usize],
+            Op::Shift { to, a, by, ty, left } => {
+                let (a, by) = (slots[a as usize], slots[by as usize]);
+                let signed = i128::from(a as i64);
+                let value = match (left, ty.signed) {
+                    (true, _) if by >= 64 => 0,
+                    (true, _) => a << by,
+                    (false, true) => (signed >> by.min(127)) as u64,
+                    (false, false) if by >= 64 => 0,
+                    (false, false) => a >> by,
+                };
+                let up = 64 - ty.bits;
+                slots[to as usize] = match ty.signed {
+                    true => ((value << up) as i64 >> up) as u64,
+                    false => value << up >> up,
+                };
+            }
+            Op::Read { to, memory, address } => {
+                let memory = &memories[memory as usize];
+                slots[to as usize] = memory.content.get(slots[address as usize] as usize).copied().unwrap_or(0);
+            }
+            Op::Wide { index } => run_wide(&wide[index as usize], slots, memories),
+        }
+    }
+}
+
+fn run_wide(op: &Wide, slots: &mut [u64], memories: &[Words]) {
+    let at = |slot: u32| slot as usize;
+    match op {
+        Wide::Arithmetic { operator, to, a, b } => {
+            let (x, y) = (number(slots, a), number(slots, b));
+            let value = match operator {
+                Binary::Add => x.wrapping_add(y),
+                Binary::Sub => x.wrapping_sub(y),
+                Binary::Mul => x.wrapping_mul(y),
+                Binary::Less => i128::from(x < y),
+                Binary::ShiftLeft => {
+                    if (0..128).contains(&y) {
+                        x << y
+                    } else {
+                        0
+                    }
+                }
+                // Numbers are at most 127 bits wide, so that the sign of an unsigned one is 0.
+                Binary::ShiftRight => x >> y.clamp(0, 127),
+                Binary::Equal | Binary::And | Binary::Or | Binary::Xor => 0,
+            };
+            let unused = 128 - to.ty.bits;
+            let value = match to.ty.signed {
+                true => value << unused >> unused,
+                false => ((value as u128) << unused >> unused) as i128,
+            };
+            slots[at(to.slot)] = value as u64;
+            if to.limbs == 2 {
+                slots[at(to.slot) + 1] = (value >> 64) as u64;
+            }
+        }
+        Wide::Bitwise { operator, to, a, b } => {
+            for limb in 0..at(to.limbs) {
+                let (x, y) = (slots[at(*a) + limb], slots[at(*b) + limb]);
+                slots[at(to.slot) + limb] = match operator {
+                    Binary::And => x & y,
+                    Binary::Or => x | y,
+                    _ => x ^ y,
+                };
+            }
+        }
+        Wide::Equal { to, a, b, limbs } => {
+            let of = |slot: &u32| &slots[at(*slot)..][..at(*limbs)];
+            slots[at(*to)] = u64::from(of(a) == of(b));
+        }
+        Wide::Unary { operator, to, a } => {
+            let last = at(a.limbs) - 1;
+            let used = |limb: usize| if limb == last { mask(a.ty.bits - 64 * last) } else { u64::MAX };
+            let own = |limb: usize| slots[at(a.slot) + limb] & used(limb);
+            match operator {
+                Unary::Not => {
+                    for limb in 0..=last {
+                        slots[at(to.slot) + limb] = !slots[at(a.slot) + limb] & used(limb);
+                    }
+                }
+                Unary::All => slots[at(to.slot)] = u64::from((0..=last).all(|limb| own(limb) == used(limb))),
+                Unary::Any => slots[at(to.slot)] = u64::from((0..=last).any(|limb| own(limb) != 0)),
+                Unary::Parity => {
+                    slots[at(to.slot)] = u64::from((0..=last).map(|limb| own(limb).count_ones()).sum::<u32>() & 1);
+                }
+            }
+        }
+        Wide::Mux { to, c, a, b } => {
+            let from = at(if slots[at(*c)] != 0 { *a } else { *b });
+            slots.copy_within(from..from + at(to.limbs), at(to.slot));
+        }
+        Wide::Read { to, memory, address } => {
+            let memory = &memories[at(*memory)];
+            let address = slots[at(*address)] as usize;
+            let own = &mut slots[at(to.slot)..][..memory.limbs];
+            match address < memory.words {
+                true => own.copy_from_slice(&memory.content[address * memory.limbs..][..memory.limbs]),
+                false => own.fill(0),
+            }
+        }
+        Wide::Slice { to, a, low } => {
+            let (skip, shift) = (at(*low) / 64, low % 64);
+            for limb in 0..at(to.limbs) {
+                let from = |k: usize| if k < at(a.limbs) { slots[at(a.slot) + k] } else { 0 };
+                let high = if shift == 0 { 0 } else { from(limb + skip + 1) << (64 - shift) };
+                slots[at(to.slot) + limb] = from(limb + skip) >> shift | high;
+            }
+            trim(slots, to);
+        }
+        Wide::Concat { to, parts } => {
+            slots[at(to.slot)..][..at(to.limbs)].fill(0);
+            for (part, offset) in parts {
+                let shift = offset % 64;
+                for limb in 0..at(part.limbs) {
+                    let value = slots[at(part.slot) + limb];
+                    let into = at(*offset) / 64 + limb;
+                    slots[at(to.slot) + into] |= value << shift;
+                    if shift > 0 && into + 1 < at(to.limbs) {
+                        slots[at(to.slot) + into + 1] |= value >> (64 - shift);
+                    }
+                }
+            }
+        }
+        Wide::Resize { to, a } => {
+            let sign = match a.ty.signed && (slots[at(a.slot) + at(a.limbs) - 1] as i64) < 0 {
+                true => u64::MAX,
+                false => 0,
+            };
+            for limb in 0..at(to.limbs) {
+                slots[at(to.slot) + limb] = if limb < at(a.limbs) { slots[at(a.slot) + limb] } else { sign };
+            }
+            trim(slots, to);
+        }
+    }
+}
+
+/// A number of at most two limbs.
+fn number(slots: &[u64], of: &Operand) -> i128 {
+    let low = slots[of.slot as usize];
+    match (of.limbs, of.ty.signed) {
+        (1, true) => i128::from(low as i64),
+        (1, false) => i128::from(low),
+        _ => (u128::from(slots[of.slot as usize + 1]) << 64 | u128::from(low)) as i128,
+    }
+}
+
+/// Makes the bits above the width zeros, or copies of the sign.
+fn trim(slots: &mut [u64], of: &Operand) {
+    let last = of.limbs as usize - 1;
+    let unused = 64 * (last + 1) - of.ty.bits;
+    let limb = &mut slots[of.slot as usize + last];
+    *limb = match of.ty.signed {
+        true => ((*limb << unused) as i64 >> unused) as u64,
+        false => *limb << unused >> unused,
+    };
+}

@@ -1,0 +1,424 @@
+use super::testbench::{check, Reference};
+use super::*;
+use crate::wire::Word;
+
+/// Makes all of `names` driven ports of a finished kernel.
+fn bound(kernel: Kernel, outputs: &[(&str, usize)]) -> Kernel {
+    Body::new(kernel, &[], outputs).kernel().clone()
+}
+
+fn first_error(builder: Builder) -> String {
+    let kernel = builder.finish();
+    kernel.errors().first().expect("an error").to_string()
+}
+
+#[test]
+fn each_error_names_block_signal_and_expression() {
+    let k = Builder::new("b");
+    let (a, s) = (k.input("a", 4), k.input("s", 4).signed());
+    k.wire("y", a + s);
+    assert_eq!(first_error(k), "block b: `(a + s4(s))` mixes signed and unsigned");
+
+    let k = Builder::new("b");
+    let a = k.input("a", 4);
+    k.register("r", Type::unsigned(4)).set(a + a);
+    assert_eq!(first_error(k), "block b, signal r: `(a + a)` has 5 bits, the signal 4");
+
+    let k = Builder::new("b");
+    let a = k.input("a", 4);
+    k.register("r", Type::signed(4)).set(a);
+    assert_eq!(first_error(k), "block b: `r = a` mixes signed and unsigned");
+
+    let k = Builder::new("b");
+    k.net("n", Type::unsigned(1));
+    assert_eq!(first_error(k), "block b, signal n: not assigned");
+
+    let k = Builder::new("b");
+    let c = k.input("c", 1);
+    let n = k.net("n", Type::unsigned(1));
+    k.when(c, || n.set(c));
+    assert_eq!(first_error(k), "block b, signal n: not assigned");
+
+    let k = Builder::new("b");
+    let a = k.input("a", 4);
+    let r = k.register("r", Type::unsigned(4));
+    r.set(a);
+    r.set(!a);
+    assert_eq!(first_error(k), "block b, signal r: assigned twice, the second time `~a`");
+
+    let k = Builder::new("b");
+    let (a, c) = (k.input("a", 4), k.input("c", 1));
+    let r = k.register("r", Type::unsigned(4));
+    k.when(c, || r.set(a));
+    k.when(c, || r.set(!a));
+    assert_eq!(first_error(k), "block b, signal r: assigned twice, the second time `~a`");
+
+    let k = Builder::new("b");
+    let c = k.input("c", 1);
+    let (m, n) = (k.net("m", Type::unsigned(1)), k.net("n", Type::unsigned(1)));
+    m.set(n.get() & c);
+    n.set(!m.get());
+    assert_eq!(first_error(k), "block b: combinational loop through n, m: `~m`");
+
+    let k = Builder::new("b");
+    let (a, c) = (k.input("a", 4), k.input("c", 3));
+    k.wire("y", a & c);
+    assert_eq!(first_error(k), "block b: `(a & c)`: operands of 4 and 3 bits");
+
+    let k = Builder::new("b");
+    let a = k.input("a", 4);
+    k.wire("y", a.slice(2, 3));
+    assert_eq!(first_error(k), "block b: `a`: bits 2 to 5 of 4");
+
+    let k = Builder::new("b");
+    k.constant(3, 8);
+    assert_eq!(first_error(k), "block b: `3'd8`: 8 needs more bits");
+
+    for (name, reason) in
+        [("a", "the name is used twice"), ("a$b", "not a Verilog identifier"), ("reg", "a keyword of Verilog")]
+    {
+        let k = Builder::new("b");
+        k.input("a", 4);
+        k.input(name, 1);
+        assert_eq!(first_error(k), format!("block b, signal {name}: {reason}"));
+    }
+    let k = Builder::new("b");
+    k.input("a", 4);
+    let body = Body::new(k.finish(), &[("a", 5), ("x", 1)], &[("a", 4)]);
+    let errors: Vec<String> = body.kernel().errors().iter().map(ToString::to_string).collect();
+    assert_eq!(
+        errors,
+        [
+            "block b, port a of 5 bits: the kernel's signal has 4 bits",
+            "block b, port x of 1 bits: the kernel has no such signal",
+            "block b, port a of 4 bits: the kernel's signal has another direction"
+        ]
+    );
+}
+
+/// An operator, its inputs' widths, and the same in integers: operands are unsigned, or signed if so marked.
+struct Case {
+    name: &'static str,
+    bits: usize,
+    integer: fn(&[i128]) -> i128,
+}
+
+/// Operands: unsigned a, b of 13 and 9 bits; signed s, t of 13 and 9; wide unsigned w, v of 90 and 70; wide signed x;
+/// a bit c; a number n of 4 bits.
+const OPERANDS: [(&str, usize, bool); 9] = [
+    ("a", 13, false),
+    ("b", 9, false),
+    ("s", 13, true),
+    ("t", 9, true),
+    ("w", 90, false),
+    ("v", 70, false),
+    ("x", 90, true),
+    ("c", 1, false),
+    ("n", 4, false),
+];
+
+fn round(value: i128, by: u32) -> i128 {
+    (value + (1 << (by - 1))) >> by
+}
+
+const CASES: &[Case] = &[
+    Case { name: "add_u", bits: 14, integer: |i| i[0] + i[1] },
+    Case { name: "add_s", bits: 14, integer: |i| i[2] + i[3] },
+    Case { name: "add_w", bits: 91, integer: |i| i[4] + i[5] },
+    Case { name: "add_x", bits: 91, integer: |i| i[6] + i[3] },
+    Case { name: "sub_u", bits: 14, integer: |i| i[0] - i[1] },
+    Case { name: "sub_s", bits: 14, integer: |i| i[2] - i[3] },
+    Case { name: "sub_w", bits: 91, integer: |i| i[5] - i[4] },
+    Case { name: "low_add", bits: 5, integer: |i| i[0] + i[1] },
+    Case { name: "low_sub", bits: 11, integer: |i| i[2] - i[3] },
+    Case { name: "low_wide", bits: 60, integer: |i| i[4] - i[5] },
+    Case { name: "mul_u", bits: 22, integer: |i| i[0] * i[1] },
+    Case { name: "mul_s", bits: 22, integer: |i| i[2] * i[3] },
+    Case { name: "mul_w", bits: 79, integer: |i| i[5] * i[1] },
+    Case { name: "mul_x", bits: 99, integer: |i| i[6] * i[3] },
+    Case { name: "mul_add", bits: 24, integer: |i| i[2] * i[3] + i[3] },
+    Case { name: "and_u", bits: 13, integer: |i| i[0] & (i[1] << 4) },
+    Case { name: "or_w", bits: 90, integer: |i| i[4] | i[5] },
+    Case { name: "xor_w", bits: 70, integer: |i| i[5] ^ (i[4] & ((1 << 70) - 1)) },
+    Case { name: "not_u", bits: 13, integer: |i| !i[0] },
+    Case { name: "not_w", bits: 90, integer: |i| !i[4] },
+    Case { name: "equal", bits: 1, integer: |i| (i[1] & 3 == i[8] & 3).into() },
+    Case { name: "equal_w", bits: 1, integer: |i| (i[4] & 1 == i[7]).into() },
+    Case { name: "less_u", bits: 1, integer: |i| (i[0] < i[1]).into() },
+    Case { name: "less_s", bits: 1, integer: |i| (i[2] < i[3]).into() },
+    Case { name: "less_w", bits: 1, integer: |i| (i[4] < i[5]).into() },
+    Case { name: "less_x", bits: 1, integer: |i| (i[6] < i[3]).into() },
+    Case { name: "mux_s", bits: 13, integer: |i| if i[7] == 1 { i[2] } else { i[3] } },
+    Case { name: "mux_w", bits: 90, integer: |i| if i[7] == 1 { i[4] } else { i[5] } },
+    Case {
+        name: "case_u",
+        bits: 13,
+        integer: |i| match i[8] {
+            3 => i[0],
+            5 => i[1],
+            6 => 77,
+            _ => 0,
+        },
+    },
+    Case { name: "slice_s", bits: 7, integer: |i| i[2] >> 5 },
+    Case { name: "slice_w", bits: 20, integer: |i| i[4] >> 55 },
+    Case { name: "slice_x", bits: 80, integer: |i| i[6] >> 9 },
+    Case { name: "slice_sum", bits: 6, integer: |i| (i[0] + i[1]) >> 3 },
+    Case { name: "concat", bits: 23, integer: |i| i[7] << 22 | i[1] << 13 | (i[2] & 0x1fff) },
+    Case { name: "concat_w", bits: 104, integer: |i| i[0] << 91 | i[4] << 1 | i[7] },
+    Case { name: "extend_s", bits: 40, integer: |i| i[2] },
+    Case { name: "extend_x", bits: 120, integer: |i| i[3] },
+    Case { name: "all", bits: 1, integer: |i| (i[8] == 15).into() },
+    Case { name: "any", bits: 1, integer: |i| (i[8] != 0).into() },
+    Case { name: "parity", bits: 1, integer: |i| ((i[2] & 0x1fff).count_ones() % 2).into() },
+    Case { name: "parity_w", bits: 1, integer: |i| (i[4].count_ones() % 2).into() },
+    Case { name: "any_w", bits: 1, integer: |i| (i[4] >> 80 != 0).into() },
+    Case { name: "all_w", bits: 1, integer: |i| (i[7] == 1 || i[4] == (1 << 90) - 1).into() },
+    Case { name: "left", bits: 18, integer: |i| i[2] << 5 },
+    Case { name: "right", bits: 8, integer: |i| i[2] >> 5 },
+    Case { name: "round_s", bits: 10, integer: |i| round(i[2], 4) },
+    Case { name: "round_u", bits: 10, integer: |i| round(i[0], 4) },
+    Case { name: "round_x", bits: 61, integer: |i| round(i[6], 30) },
+    Case { name: "left_by", bits: 13, integer: |i| i[0] << i[8] },
+    Case { name: "right_by", bits: 13, integer: |i| i[0] >> i[8] },
+    Case { name: "arithmetic_by", bits: 13, integer: |i| i[2] >> i[8] },
+    Case { name: "inner_arithmetic", bits: 14, integer: |i| (i[2] >> i[8]) + i[3] },
+    Case { name: "left_w", bits: 90, integer: |i| (i[4] << i[8]) & ((1 << 90) - 1) },
+    Case { name: "arithmetic_x", bits: 90, integer: |i| i[6] >> i[8] },
+];
+
+fn operators() -> Kernel {
+    let k = Builder::combinational("operators");
+    let inputs: Vec<Expr> = OPERANDS
+        .iter()
+        .map(|&(name, bits, signed)| {
+            let input = k.input(name, bits);
+            if signed {
+                input.signed()
+            } else {
+                input
+            }
+        })
+        .collect();
+    let [a, b, s, t, w, v, x, c, n] = inputs[..] else { panic!("nine operands") };
+    let values = [
+        a + b,
+        s + t,
+        w + v,
+        x + t,
+        a - b,
+        s - t,
+        v - w,
+        (a + b).low(5),
+        (s - t).low(11),
+        (w - v).low(60),
+        a * b,
+        s * t,
+        v * b,
+        x * t,
+        s * t + t.extend(23),
+        a & b.concat(k.constant(4, 0)),
+        w | v.extend(90),
+        v ^ w.low(70),
+        !a,
+        !w,
+        b.low(2).equals(n.low(2)),
+        w.equals(w.slice(1, 89).concat(c)),
+        a.less(b),
+        s.less(t),
+        w.less(v),
+        x.less(t),
+        c.mux(s, t),
+        c.mux(w, v),
+        n.case(&[(3, a), (5, b), (6, k.constant(7, 77))], k.constant(1, 0)),
+        s.slice(5, 7),
+        w.slice(55, 20),
+        x.slice(9, 80),
+        (a + b).slice(3, 6),
+        concat(&[c, b, s]),
+        concat(&[a, w, c]),
+        s.extend(40),
+        t.extend(120),
+        n.all(),
+        n.any(),
+        s.parity(),
+        w.parity(),
+        w.slice(80, 10).any(),
+        (c.mux(!w, w) | w).all(),
+        s.shift_left(5),
+        s.shift_right(5),
+        s.round_shift(4),
+        a.round_shift(4),
+        x.round_shift(30),
+        a.shift_left_by(n),
+        a.shift_right_by(n),
+        s.shift_right_by(n),
+        s.shift_right_by(n) + t,
+        w.shift_left_by(n),
+        x.shift_right_by(n),
+    ];
+    assert_eq!(values.len(), CASES.len());
+    for (case, value) in CASES.iter().zip(values) {
+        k.wire(case.name, value);
+    }
+    let outputs: Vec<(&str, usize)> = CASES.iter().map(|case| (case.name, case.bits)).collect();
+    bound(k.finish(), &outputs)
+}
+
+/// The operators in integers of 128 bits.
+struct Integers;
+
+impl Reference for Integers {
+    fn outputs(&mut self, inputs: &[Word]) -> Vec<Option<Word>> {
+        let number = |(word, &(_, bits, signed)): (&Word, &(&str, usize, bool))| {
+            let value = i128::from(word.limbs()[1]) << 64 | i128::from(word.limbs()[0]);
+            if signed {
+                value << (128 - bits) >> (128 - bits)
+            } else {
+                value
+            }
+        };
+        let numbers: Vec<i128> = inputs.iter().zip(&OPERANDS).map(number).collect();
+        let word = |case: &Case| {
+            let value = (case.integer)(&numbers);
+            let mut word = Word::default();
+            word.set(0, case.bits.min(64), value as u64);
+            if case.bits > 64 {
+                word.set(64, case.bits - 64, (value >> 64) as u64);
+            }
+            Some(word)
+        };
+        CASES.iter().map(word).collect()
+    }
+
+    fn clock(&mut self, _: &[Word]) {}
+}
+
+/// Random operands, of which every fourth is all zeros or all ones.
+fn stimulus(cycles: usize, widths: &[usize]) -> Vec<Vec<Word>> {
+    let mut random = fastrand::Rng::with_seed(20);
+    let field = |random: &mut fastrand::Rng, bits: usize| {
+        let kind = random.u8(..8);
+        let mut word = Word::default();
+        for low in (0..bits).step_by(64) {
+            let limb = match kind {
+                0 => 0,
+                1 => u64::MAX,
+                _ => random.u64(..),
+            };
+            word.set(low, (bits - low).min(64), limb);
+        }
+        word
+    };
+    (0..cycles).map(|_| widths.iter().map(|&bits| field(&mut random, bits)).collect()).collect()
+}
+
+#[test]
+fn operators_are_those_of_integers() {
+    let widths = OPERANDS.map(|(_, bits, _)| bits);
+    check(&operators(), &stimulus(2000, &widths), &mut Integers);
+}
+
+/// Registers with enable, reset, priority; a memory with an output register, one with contents.
+fn state() -> Kernel {
+    let k = Builder::new("state");
+    let (rst, up, down, data, address) =
+        (k.input("rst", 1), k.input("up", 1), k.input("down", 1), k.input("data", 70), k.input("address", 3));
+    let count = k.state("count", Type::unsigned(4), rst, 9);
+    k.when(up, || count.set((count.get() + k.constant(1, 1)).low(4)));
+    k.when(down, || count.set((count.get() - k.constant(1, 1)).low(4)));
+    let held = k.register("held", Type::unsigned(70)).keep();
+    k.when(up, || k.when(down, || held.set(data)));
+    let swapped = [k.register("one", Type::unsigned(70)), k.register("two", Type::unsigned(70))];
+    swapped[0].set(up.mux(data, swapped[1].get()));
+    swapped[1].set(swapped[0].get());
+    let ram = k.memory("ram", 8, 70, Contents::Undefined).style("distributed");
+    ram.write(up, address, data);
+    let read = k.register("read", Type::unsigned(70));
+    k.when(down, || read.set(ram.read(address)));
+    let words = (0..8).map(|word| vec![word * 0x1111_2222_3333, word]).collect();
+    let rom = k.memory("rom", 8, 70, Contents::File { name: "rom.hex".into(), words });
+    k.wire("direct", rom.read(address));
+    let names = ["count", "held", "one", "two", "read", "direct"];
+    let outputs: Vec<(&str, usize)> = names.iter().map(|name| (*name, if *name == "count" { 4 } else { 70 })).collect();
+    bound(k.finish(), &outputs)
+}
+
+#[derive(Default)]
+struct State {
+    count: Option<u64>,
+    held: Option<Word>,
+    swapped: [Option<Word>; 2],
+    ram: [Option<Word>; 8],
+    read: Option<Word>,
+}
+
+impl Reference for State {
+    fn outputs(&mut self, inputs: &[Word]) -> Vec<Option<Word>> {
+        let address = inputs[4].number();
+        let mut direct = Word::default();
+        direct.set_limbs(&[address * 0x1111_2222_3333, address]);
+        vec![self.count.map(Word::from), self.held, self.swapped[0], self.swapped[1], self.read, Some(direct)]
+    }
+
+    fn clock(&mut self, inputs: &[Word]) {
+        let [rst, up, down] = [0, 1, 2].map(|k| inputs[k].number() == 1);
+        let (data, address) = (inputs[3], inputs[4].number() as usize);
+        self.count = match (rst, up, down) {
+            (true, ..) => Some(9),
+            (_, _, true) => self.count.map(|count| count.wrapping_sub(1) & 15),
+            (_, true, _) => self.count.map(|count| (count + 1) & 15),
+            _ => self.count,
+        };
+        if up && down {
+            self.held = Some(data);
+        }
+        self.swapped = [if up { Some(data) } else { self.swapped[1] }, self.swapped[0]];
+        if down {
+            self.read = self.ram[address];
+        }
+        if up {
+            self.ram[address] = Some(data);
+        }
+    }
+}
+
+#[test]
+fn registers_and_memories_are_those_of_the_reference() {
+    check(&state(), &stimulus(3000, &[1, 1, 1, 70, 3]), &mut State::default());
+}
+
+#[test]
+fn verilog_keeps_names_comments_and_constants() {
+    let k = Builder::new("small");
+    let (rst, a) = (k.input("rst", 1), k.input("a", 4));
+    k.comment("Twice the input.");
+    let twice = k.wire("twice", a + a);
+    let sum = k.state("sum", Type::unsigned(8), rst, 3).comment("Sum of all inputs.");
+    k.when(a.any(), || sum.set((sum.get() + twice).low(8)));
+    k.scope("lane_2", || k.register("copy", Type::unsigned(1)).keep().set(a.at(3)));
+    let kernel = bound(k.finish(), &[("twice", 5)]);
+    assert_eq!(
+        kernel.verilog(),
+        "\
+// Sum of all inputs.
+reg [7:0] sum;
+reg lane_2__copy;
+// Twice the input.
+always @(*) twice = {1'b0, a} + {1'b0, a};
+(* keep *) always @(posedge clk) begin
+  lane_2__copy <= a[3];
+end
+always @(posedge clk) begin
+  if (rst) begin
+    sum <= 8'd3;
+  end else begin
+    if (|a) sum <= sum + {3'd0, twice};
+  end
+end
+wire unused_signals = &{1'b0, lane_2__copy};"
+    );
+    let logic = kernel.logic(&Default::default());
+    // 5 and 8 for the sums, 1 for |a.
+    assert_eq!((logic.flip_flops, logic.luts), (9, 14.0));
+}

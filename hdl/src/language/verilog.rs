@@ -1,0 +1,292 @@
+//! Prints a kernel as the body of a Verilog-2001 module.
+//!
+//! All signals are unsigned vectors; a signed product, comparison or shift says `$signed` itself. Every operand is
+//! printed with the width of its operator, so that Verilog's rules for widths and signs of a context change nothing.
+//! The module's header is rust-hdl's, which declares every driven port as `output reg`.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use super::kernel::{Contents, Item, Kernel, Memory, Node, NodeId, Role, Signal, SignalId};
+use super::text::{number, Text};
+
+struct Printer<'a> {
+    kernel: &'a Kernel,
+    expressions: Text<'a>,
+    /// Nodes to which such a wire has been printed.
+    printed: BTreeSet<NodeId>,
+    text: String,
+}
+
+impl Kernel {
+    /// The module's body.
+    pub fn verilog(&self) -> String {
+        let mut printer =
+            Printer { kernel: self, expressions: Text::new(self), printed: BTreeSet::new(), text: String::new() };
+        printer.body();
+        printer.text.truncate(printer.text.trim_end().len());
+        printer.text
+    }
+
+    /// The text of `$readmemh` and its file for every memory with contents.
+    pub fn memory_files(&self) -> Vec<(String, String)> {
+        let files = self.memories.iter().filter_map(|memory| match &memory.contents {
+            Contents::File { name, words } => Some((name.clone(), memory_text(memory.bits, words))),
+            Contents::Undefined => None,
+        });
+        files.collect()
+    }
+}
+
+/// The text of a memory file: one word per line, hexadecimal, with all digits.
+fn memory_text(bits: usize, words: &[Vec<u64>]) -> String {
+    let digits = bits.div_ceil(4);
+    let line = |word: &Vec<u64>| {
+        let all: String = word.iter().rev().map(|limb| format!("{limb:016x}")).collect();
+        format!("{}\n", &all[all.len() - digits..])
+    };
+    words.iter().map(line).collect()
+}
+
+/// `[high:0] ` of a declaration, nothing for one bit.
+fn range(bits: usize) -> String {
+    if bits == 1 {
+        String::new()
+    } else {
+        format!("[{}:0] ", bits - 1)
+    }
+}
+
+impl Printer<'_> {
+    fn line(&mut self, text: &str) {
+        self.text.push_str(text);
+        self.text.push('\n');
+    }
+
+    fn body(&mut self) {
+        let kernel = self.kernel;
+        for memory in &kernel.memories {
+            self.declare_memory(memory);
+        }
+        for signal in &kernel.signals {
+            self.declare(signal);
+        }
+        let unread = self.unused();
+        for item in &kernel.items {
+            match item {
+                Item::Comment(text) => self.line(&format!("// {text}")),
+                Item::Wire(signal) => self.wire(*signal),
+            }
+        }
+        for root in kernel.edge_roots() {
+            self.own_wires(root);
+        }
+        if let Some(clock) = &kernel.clock {
+            self.clocked(clock);
+        }
+        if !unread.is_empty() {
+            self.line(&format!("wire unused_signals = &{{1'b0, {}}};", unread.join(", ")));
+        }
+    }
+
+    fn declare_memory(&mut self, memory: &Memory) {
+        let Memory { name, words, bits, .. } = memory;
+        if let Some(style) = &memory.style {
+            self.line(&format!("(* ram_style = \"{style}\" *)"));
+        }
+        self.line(&format!("reg [{}:0] {name} [0:{}];", bits - 1, words - 1));
+        if let Contents::File { name: file, .. } = &memory.contents {
+            self.line(&format!("initial $readmemh(\"{file}\", {name});"));
+        }
+    }
+
+    fn declare(&mut self, signal: &Signal) {
+        if let (Some(comment), false) = (&signal.comment, signal.role == Role::Input) {
+            self.line(&format!("// {comment}"));
+        }
+        let Signal { name, ty, .. } = signal;
+        match &signal.role {
+            Role::Register(register) => {
+                if !signal.output {
+                    self.line(&format!("reg {}{name};", range(ty.bits)));
+                }
+                if let Some(value) = register.initial {
+                    self.line(&format!("initial {name} = {};", number(ty.bits, &[value])));
+                }
+            }
+            Role::Wire { declared: true } if !signal.output => self.line(&format!("wire {}{name};", range(ty.bits))),
+            Role::Wire { .. } | Role::Input => {}
+        }
+    }
+
+    /// Reads the inputs that no expression reads, so that a linter does not warn; returns the unread wires and registers.
+    fn unused(&mut self) -> Vec<String> {
+        let kernel = self.kernel;
+        let values = kernel.signals.iter().filter_map(|signal| signal.value).collect();
+        let order = kernel.order(&[values, kernel.edge_roots()].concat()).unwrap_or_default();
+        let mut read: BTreeMap<SignalId, Vec<bool>> = BTreeMap::new();
+        let mut mark = |signal: SignalId, low: usize, bits: usize| {
+            let all = read.entry(signal).or_insert_with(|| vec![false; kernel.signals[signal].ty.bits]);
+            all[low..low + bits].fill(true);
+        };
+        for &node in &order {
+            match &kernel.nodes[node].0 {
+                Node::Slice(a, low) => {
+                    if let Node::Signal(signal) = kernel.nodes[kernel.bare(*a)].0 {
+                        mark(signal, *low, kernel.ty(node).bits);
+                    }
+                }
+                other => {
+                    for operand in other.operands() {
+                        if let Node::Signal(signal) = kernel.nodes[kernel.bare(operand)].0 {
+                            mark(signal, 0, kernel.signals[signal].ty.bits);
+                        }
+                    }
+                }
+            }
+        }
+        for root in kernel.signals.iter().filter_map(|signal| signal.value).chain(kernel.edge_roots()) {
+            if let Node::Signal(signal) = kernel.nodes[kernel.bare(root)].0 {
+                mark(signal, 0, kernel.signals[signal].ty.bits);
+            }
+        }
+        let unread = |(id, signal): &(SignalId, &Signal)| {
+            !signal.output && !read.get(id).is_some_and(|bits| bits.iter().all(|bit| *bit))
+        };
+        let unread = kernel.signals.iter().enumerate().filter(unread).map(|(_, signal)| signal.name.clone());
+        let has_edge = kernel.registers().next().is_some() || kernel.memories.iter().any(|m| !m.writes.is_empty());
+        let clock = kernel.clock.iter().filter(|_| !has_edge).cloned();
+        let (inputs, wires): (Vec<String>, Vec<String>) = clock
+            .chain(unread)
+            .partition(|name| kernel.signal_of(name).is_none_or(|id| kernel.signals[id].role == Role::Input));
+        if !inputs.is_empty() {
+            self.line(&format!("wire unused = &{{1'b0, {}}};", inputs.join(", ")));
+        }
+        wires
+    }
+
+    /// The wires of the unnamed nodes that `node` reads, itself included.
+    fn own_wires(&mut self, node: NodeId) {
+        for operand in self.kernel.nodes[node].0.operands() {
+            self.own_wires(operand);
+        }
+        let Some(name) = self.expressions.names.get(&node).cloned() else { return };
+        if self.printed.insert(node) {
+            let value = self.expressions.form(node).0;
+            self.line(&format!("wire {}{name} = {value};", range(self.kernel.ty(node).bits)));
+        }
+    }
+
+    fn wire(&mut self, id: SignalId) {
+        let signal = &self.kernel.signals[id];
+        let Some(value) = signal.value else { return };
+        self.own_wires(value);
+        let text = self.expressions.root(value);
+        let Signal { name, ty, .. } = signal;
+        match (signal.output, &signal.role) {
+            (true, _) => self.line(&format!("always @(*) {name} = {text};")),
+            (false, Role::Wire { declared: true }) => self.line(&format!("assign {name} = {text};")),
+            _ => self.line(&format!("wire {}{name} = {text};", range(ty.bits))),
+        }
+    }
+
+    fn clocked(&mut self, clock: &str) {
+        let kernel = self.kernel;
+        let mut free: [Vec<String>; 2] = Default::default();
+        let mut reset: BTreeMap<NodeId, [Vec<String>; 2]> = BTreeMap::new();
+        for memory in &kernel.memories {
+            for write in &memory.writes {
+                let assign = format!(
+                    "{}[{}] <= {};",
+                    memory.name,
+                    self.expressions.root(write.address),
+                    self.expressions.root(write.data)
+                );
+                free[0].push(format!("if ({}) {assign}", self.expressions.root(write.enable)));
+            }
+        }
+        for (id, signal, register) in kernel.registers() {
+            let Some(next) = signal.value else { continue };
+            let own = kernel.interned[&(Node::Signal(id), signal.ty)];
+            let mut lines = Vec::new();
+            self.transition(&signal.name, own, next, "", &mut lines);
+            match register.reset {
+                None => free[usize::from(register.keep)].extend(lines),
+                Some((condition, value)) => {
+                    let [under, after] = reset.entry(condition).or_default();
+                    under.push(format!("{} <= {};", signal.name, number(signal.ty.bits, &[value])));
+                    after.extend(lines);
+                }
+            }
+        }
+        let [plain, kept] = free;
+        for (lines, attribute) in [(plain, ""), (kept, "(* keep *) ")] {
+            if !lines.is_empty() {
+                self.line(&format!("{attribute}always @(posedge {clock}) begin"));
+                lines.iter().for_each(|line| self.line(&format!("  {line}")));
+                self.line("end");
+            }
+        }
+        for (condition, [under, after]) in reset {
+            self.line(&format!("always @(posedge {clock}) begin\n  if ({}) begin", self.expressions.root(condition)));
+            under.iter().for_each(|line| self.line(&format!("    {line}")));
+            self.line("  end else begin");
+            after.iter().for_each(|line| self.line(&format!("    {line}")));
+            self.line("  end\nend");
+        }
+    }
+
+    /// The statements by which the register `own` takes `next`: conditions where it keeps its value in one branch.
+    fn transition(&self, name: &str, own: NodeId, next: NodeId, indent: &str, lines: &mut Vec<String>) {
+        if next == own {
+            return;
+        }
+        let mux = match self.kernel.nodes[next].0 {
+            Node::Mux(c, a, b) if self.keeps(next, own) && !self.expressions.names.contains_key(&next) => {
+                Some((c, a, b))
+            }
+            _ => None,
+        };
+        let Some((c, a, b)) = mux else {
+            lines.push(format!("{indent}{name} <= {};", self.expressions.root(next)));
+            return;
+        };
+        let (condition, then, otherwise) = match a == own {
+            true => (self.expressions.negated(c), b, own),
+            false => (self.expressions.root(c), a, b),
+        };
+        let single = |node: NodeId| !matches!(self.kernel.nodes[node].0, Node::Mux(..)) || !self.keeps(node, own);
+        let before = lines.len();
+        match single(then) {
+            true => lines.push(format!("{indent}if ({condition}) {name} <= {};", self.expressions.root(then))),
+            false => {
+                lines.push(format!("{indent}if ({condition}) begin"));
+                self.transition(name, own, then, &format!("{indent}  "), lines);
+                lines.push(format!("{indent}end"));
+            }
+        }
+        debug_assert!(lines.len() > before);
+        if otherwise != own {
+            let mut more = Vec::new();
+            self.transition(name, own, otherwise, indent, &mut more);
+            let last = lines.last_mut().filter(|line| line.trim() == "end");
+            match (last, more.first_mut()) {
+                (Some(end), Some(first)) => {
+                    *end = format!("{end} else {}", first.trim_start());
+                    more.remove(0);
+                }
+                (None, Some(first)) => *first = format!("{indent}else {}", first.trim_start()),
+                _ => {}
+            }
+            lines.extend(more);
+        }
+    }
+
+    /// Whether a multiplexer tree has `own` at one of its ends.
+    fn keeps(&self, node: NodeId, own: NodeId) -> bool {
+        match self.kernel.nodes[node].0 {
+            _ if node == own => true,
+            Node::Mux(_, a, b) => self.keeps(a, own) || self.keeps(b, own),
+            _ => false,
+        }
+    }
+}
