@@ -52,7 +52,7 @@ use window::MIRRORS;
 const LARGEST_FILE: u64 = 64 << 20;
 
 /// Networks that are part of the program: `search.network` without its folder, and bytes.
-const SHIPPED: [(&str, &[u8]); 0] = [];
+const SHIPPED: [(&str, &[u8]); 1] = [("dermis:sensor-1", include_bytes!("../scenes/sensor-1.network"))];
 
 /// A trained network, ready for the array of a scene.
 pub struct Learned {

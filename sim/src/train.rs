@@ -22,7 +22,7 @@ const FRESH: u64 = 1_000_003;
 #[derive(Args, Debug)]
 #[command(after_help = "Examples:
   dermis train sensor-1 --steps 200 --contacts 500 --draws 10 --out quick.network     seconds: to see it work
-  dermis train my-scene.toml                         my-scene.network beside it, half an hour
+  dermis train my-scene.toml                         my-scene.network beside it, a quarter of an hour
   dermis train my-scene.toml --hidden 96,48 --steps 10000 --out small.network
 
 Then, in the scene: [search] with estimator = \"learned\" and network = \"my-scene.network\".
@@ -112,13 +112,12 @@ pub fn run(arguments: &Arguments) -> Result<(String, bool)> {
         text.push_str(&format!("loss            {mean:8.4} at step {steps}\n"));
     }
     text.push_str(&format!("loss            {:8.4} at first, {:.4} at last\n\n", trained.loss[0], trained.loss[1]));
-    let study = ShapeStudy {
+    let mut study = ShapeStudy {
         levels: LEVELS.to_vec(),
         draws: arguments.draws,
         candidates: vec![Candidate::Estimator(EstimatorKind::Learned)],
         ..Default::default()
     };
-    let mut study = study;
     study.options.seed = arguments.seed.wrapping_add(FRESH);
     study.options.converter.unipolar = scene.input.unipolar;
     let bar = Progress::steps(&format!("{}: errors on fresh frames", scene.name), 0);

@@ -79,7 +79,7 @@ impl Features {
         let mut inputs = Mat::<f32>::zeros(Features::inputs(n), frames);
         let wide = self.inverse.nrows();
         matmul(inputs.subrows_mut(n, wide), Accum::Replace, &self.inverse, b, 1.0, Par::Seq);
-        for frame in 0..frames {
+        for (frame, sigma) in sigma.iter().enumerate() {
             let column = inputs.col_mut(frame).try_as_col_major_mut().map(|column| column.as_slice_mut());
             let Some(column) = column else { continue };
             let norm = norm(b.col(frame).iter());
@@ -91,7 +91,7 @@ impl Features {
             }
             let rest = &mut column[n + wide..];
             rest.iter_mut().zip(masked.col(frame).iter()).for_each(|(input, masked)| *input = *masked);
-            let share = if norm > 0.0 { sigma[frame] / norm } else { 0.0 };
+            let share = if norm > 0.0 { sigma / norm } else { 0.0 };
             rest[n] = (share.max(LEAST_NOISE as f32).ln() - NOISE[0] as f32) / NOISE[1] as f32;
         }
         inputs

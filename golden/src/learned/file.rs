@@ -232,7 +232,8 @@ mod tests {
             change(&mut other);
             signature.check(&other, "n").unwrap_err().to_string()
         };
-        let cases: [(fn(&mut Scene), &str); 7] = [
+        type Case = (fn(&mut Scene), &'static str);
+        let cases: [Case; 7] = [
             (|s| s.sensor.pitch_x_mm = 2.5, "sensor.pitch_x_mm = 2, the scene has 2.5"),
             (|s| s.sensor.pitch_y_mm = 2.0, "sensor.pitch_y_mm = 4, the scene has 2"),
             (|s| s.sensor.thickness_mm = 4.0, "sensor.thickness_mm = 3, the scene has 4"),

@@ -10,8 +10,8 @@
 //! | mirror image | none, x, y, both |
 //! | share of the others' stress that is left | 1 in half of the frames, −0.1 … 0.1 in the other half |
 //! | σ of the noise | 0.005 … 2 % of max \|b\|, its logarithm evenly |
-//! | gain spread | none in three of four frames, 0.2 … 2 % in the others |
-//! | dead taxels | the scene's, and in one frame of 16 one to three more |
+//! | gain spread | none in half of the frames, 0.2 … 3 % in the other half |
+//! | dead taxels | the scene's, and in one frame of eight one to three more |
 //! | tension | reads 0 where the scene is unipolar |
 //!
 //! | | shape | unit |
@@ -35,11 +35,9 @@ const RATIO: f64 = 0.85;
 /// Range of the noise in units of the peak.
 const NOISE: [f64; 2] = [5e-5, 2e-2];
 /// Range of the gain spread where there is one.
-const GAINS: [f64; 2] = [2e-3, 2e-2];
-/// Share of the frames with gains that differ.
-const SPREAD_GAINS: f64 = 0.25;
+const GAINS: [f64; 2] = [2e-3, 3e-2];
 /// Share of the frames with more dead taxels than the scene has.
-const DEAD: f64 = 0.0625;
+const DEAD: f64 = 0.125;
 /// Largest share of the others' stress that a second round leaves.
 const LEFT: f64 = 0.1;
 /// Multiplier of the seed: neighbouring seeds have no random numbers in common.
@@ -130,7 +128,7 @@ impl Frames {
         let own_peak = exact.iter().fold(0.0f32, |peak, b| b.abs().max(peak));
         let log = |[low, high]: [f64; 2], random: &mut Random| random.between(low.ln(), high.ln()).exp() as f32;
         let sigma = own_peak * log(NOISE, random);
-        let gains = if random.between(0.0, 1.0) < SPREAD_GAINS { log(GAINS, random) } else { 0.0 };
+        let gains = if random.coin() { log(GAINS, random) } else { 0.0 };
         let mut masked = item.masked.clone();
         if random.between(0.0, 1.0) < DEAD {
             for _ in 0..=(random.between(0.0, 3.0) as usize) {

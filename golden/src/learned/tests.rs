@@ -1,5 +1,6 @@
 use super::*;
 use crate::generator::draws::{DrawOptions, Draws};
+use crate::noise::{shape_study, Candidate, ShapeStudy};
 use crate::reconstruct::Golden;
 use crate::scene::EstimatorKind;
 
@@ -29,7 +30,8 @@ fn near(a: Gaussian, b: Gaussian, sign: [f64; 2]) -> bool {
 #[test]
 fn a_small_network_learns() {
     let scene = scene("sensor-1");
-    let Trained { learned, loss: [first, last], bytes } = trained(&scene, 400);
+    let training = Training { rate: 5e-3, contacts: 1500, ..small(1000) };
+    let Trained { learned, loss: [first, last], bytes } = Learned::train(&scene, &training, &|_| ()).unwrap();
     assert!(last < first - 0.8, "loss {first} {last}");
     assert!(bytes.len() < 2 * learned.weights(), "{} bytes", bytes.len());
     let draws = Draws::new(&scene, DrawOptions { seed: 77, ..Default::default() }).unwrap();
@@ -42,7 +44,26 @@ fn a_small_network_learns() {
         errors.push(off[0].hypot(off[1]) * normal / x.hypot(y));
     }
     errors.sort_by(f64::total_cmp);
-    assert!(errors[30] < 0.6 && errors[48] < 1.0, "median {}, four of five {}", errors[30], errors[48]);
+    assert!(errors[30] < 0.7 && errors[48] < 1.0, "median {}, four of five {}", errors[30], errors[48]);
+}
+
+/// The network that the program carries, on fresh frames at three levels of noise.
+#[test]
+fn the_shipped_network_is_accurate() {
+    let scene = Scene::builtin("sensor-1").unwrap();
+    let study = ShapeStudy {
+        levels: vec![5e-4, 2e-3, 1e-2],
+        draws: 40,
+        candidates: vec![Candidate::Estimator(EstimatorKind::Learned), Candidate::Estimator(EstimatorKind::Auto)],
+        ..Default::default()
+    };
+    let rows = shape_study(&scene, &study, &|_, _| ()).unwrap();
+    for (row, most) in rows.chunks(3).zip([0.06, 0.13, 0.42]) {
+        for own in &row[1..] {
+            let median = own.summary.tangential.median.value;
+            assert!(median < most, "{} at {}: {median}", own.estimator, own.noise);
+        }
+    }
 }
 
 #[test]
@@ -91,7 +112,7 @@ fn a_window_moves_with_its_contact() {
     (larger.sensor.rows, larger.sensor.cols) = (24, 22);
     let other = Learned::from_bytes(&larger, &bytes, "n").unwrap();
     let stress = |cols: usize, at: [usize; 2]| {
-        let mut b = vec![0.0; 400.max(24 * 22)];
+        let mut b = vec![0.0; 24 * 22];
         for (k, value) in [0.2, 1.0, 0.3, 0.1, 0.7, -0.2].iter().enumerate() {
             b[(at[0] + k / 3) * cols + at[1] + k % 3] = *value;
         }

@@ -4,8 +4,11 @@
 //! know μ as a normal density, the evidence (μ_e, V_e) and the network (μ_n, V_n); combined,
 //!
 //! ```text
-//! V⁻¹ = V_e⁻¹ + V_n⁻¹        μ = V (V_e⁻¹ μ_e + V_n⁻¹ μ_n)
+//! V⁻¹ = ½V_e⁻¹ + V_n⁻¹        μ = V (½V_e⁻¹ μ_e + V_n⁻¹ μ_n)
 //! ```
+//!
+//! Both read the same noise, so that their errors are alike: with ½ one standard deviation covers 61 to 72 % on drawn
+//! frames of sensor-1 with 0.05 to 1 % of noise, without it 54 to 63 %; the errors themselves are the same.
 //!
 //! At that μ the envelope, the pressure and what they leave unexplained are found as for any other.
 //!
@@ -21,6 +24,9 @@ use faer::{Col, Mat, Side};
 
 /// Rounds with the network: the second takes the others' stress out with its own first answer.
 const ROUNDS: usize = 2;
+
+/// Share of the evidence's precision that is counted.
+const OWN: f64 = 0.5;
 
 /// A network, and whether the evidence has a say.
 pub(in crate::evidence) struct Adviser {
@@ -77,14 +83,8 @@ fn variances(told: &[Gaussian]) -> Mat<f64> {
 /// μ and covariance of two normal densities combined; `None` if they are not representable.
 fn combine(own: &[[f64; 2]], covariance: &Mat<f64>, told: &[Gaussian]) -> Option<(Vec<[f64; 2]>, Mat<f64>)> {
     let count = covariance.nrows();
-    let [a, c] = std::env::var("BLEND")
-        .map(|t| {
-            let v: Vec<f64> = t.split(',').map(|x| x.parse().unwrap()).collect();
-            [v[0], v[1]]
-        })
-        .unwrap_or([1.0, 1.0]);
-    let precision = a * covariance.llt(Side::Lower).ok()?.inverse();
-    let known = |i: usize| c / told[i / 2].sigma[i % 2].powi(2);
+    let precision = OWN * covariance.llt(Side::Lower).ok()?.inverse();
+    let known = |i: usize| 1.0 / told[i / 2].sigma[i % 2].powi(2);
     let from_own = &precision * Col::from_fn(count, |i| own[i / 2][i % 2]);
     let right = Col::from_fn(count, |i| from_own[i] + known(i) * told[i / 2].mean[i % 2]);
     let sum = Mat::from_fn(count, count, |i, j| precision[(i, j)] + if i == j { known(i) } else { 0.0 });
@@ -97,11 +97,11 @@ fn combine(own: &[[f64; 2]], covariance: &Mat<f64>, told: &[Gaussian]) -> Option
 mod tests {
     use super::*;
 
-    /// The surer one decides, and two that are as sure meet in the middle with half the variance.
+    /// The surer one decides; the evidence counts by half.
     #[test]
     fn densities_combine() {
         let told = |sigma: f64| [Gaussian { mean: [0.4, 0.0], sigma: [sigma, 0.1] }];
-        let own = Mat::from_fn(2, 2, |i, j| if i == j { 0.01 } else { 0.0 });
+        let own = Mat::from_fn(2, 2, |i, j| if i == j { 0.005 } else { 0.0 });
         let (mu, covariance) = combine(&[[0.2, 0.0]], &own, &told(0.1)).unwrap();
         assert!((mu[0][0] - 0.3).abs() < 1e-12 && mu[0][1].abs() < 1e-12 && (covariance[(0, 0)] - 0.005).abs() < 1e-12);
         let (mu, covariance) = combine(&[[0.2, 0.0]], &own, &told(1e-3)).unwrap();
