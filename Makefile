@@ -15,7 +15,7 @@ PACKAGES   = verilator yosys nextpnr-ice40 fpga-icestorm g++ make chromium pytho
 QUICK     ?=
 
 .DEFAULT_GOAL := help
-.PHONY: help setup tools program run test fmt clippy unit lint quick docs bench build cosim bitstream report guide netlist fuzz stress clean
+.PHONY: help setup tools program run test fmt clippy unit lint quick docs bench build cosim bitstream report guide netlist fuzz stress train clean
 
 help: ## list the targets
 	@sed -n 's/^\([a-z]*\):.*## /\1	/p' $(MAKEFILE_LIST) | expand -t 10
@@ -96,6 +96,10 @@ fuzz: ## run 10^7 mutated inputs through the file readers, 10^5 frames through b
 
 stress: ## stress the streams: 4*10^6 cycles each of stalls, wrong tlast and resets
 	DERMIS_STRESS_CYCLES=4000000 $(CARGO) test --release -p dermis-tests --test streams -- --nocapture
+
+train: program ## train the network of SCENE for search.estimator = "learned" (a quarter of an hour)
+	mkdir -p $(BUILD)
+	$(DERMIS) --build-dir $(BUILD) train $(SCENE) --out $(BUILD)/$(notdir $(basename $(SCENE))).network
 
 clean: ## remove everything built
 	$(CARGO) clean

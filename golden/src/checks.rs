@@ -8,9 +8,9 @@
 //! | `border_share` | – | none; beside `load-outside` | – | [`Checks::of`] |
 //! | `load_ratio` | – | `load-mismatch` | off 1 by more than [`LOAD_MISMATCH`] | the golden engine |
 //! | `shape_misfit` | – | `shape-mismatch` | above 1 | the golden engine, with `patch` and `symmetric` |
-//! | `noise_MPa` | MPa | none | – | the estimator `evidence` |
-//! | `misfit_probability` | – | `misfit` | below [`MISFIT`] | the estimator `evidence`, where the noise is stated |
-//! | `shear_spread` | – | `shear-not-resolved` | above [`NOT_RESOLVED`] | the estimator `evidence` |
+//! | `noise_MPa` | MPa | none | – | the estimators `evidence` and `learned` |
+//! | `misfit_probability` | – | `misfit` | below [`MISFIT`] | the same, where the noise is stated |
+//! | `shear_spread` | – | `shear-not-resolved` | above [`NOT_RESOLVED`] | the same |
 //!
 //! A figure is there whenever it can be computed, whether or not its flag is raised.
 

@@ -44,9 +44,11 @@ mod prior;
 mod tests;
 
 use crate::frame::Forces;
+use crate::learned::Learned;
 use crate::scene::Scene;
 use ascent::Prior;
 use cells::Cells;
+use fit::advice::Adviser;
 use fit::Fit;
 use serde::{Deserialize, Serialize};
 
@@ -68,6 +70,7 @@ pub struct Evidence {
     gain_spread: f64,
     /// Noise of each taxel over the root mean square of all.
     noise_shares: Vec<f64>,
+    adviser: Option<Adviser>,
 }
 
 /// One contact.
@@ -119,6 +122,7 @@ impl Evidence {
             unipolar: scene.input.unipolar,
             gain_spread: scene.input.gain_spread,
             noise_shares: vec![1.0; sensor.taxels()],
+            adviser: None,
         }
     }
 
@@ -126,6 +130,11 @@ impl Evidence {
     /// the root mean square of all, a value per taxel.
     pub fn with_noise_shares(self, shares: Vec<f64>) -> Evidence {
         Evidence { noise_shares: shares, ..self }
+    }
+
+    /// The same with the μ of each contact from a trained network; `combined` with the evidence's own or in its place.
+    pub fn advised_by(self, network: Learned, combined: bool) -> Evidence {
+        Evidence { adviser: Some(Adviser { network, combined }), ..self }
     }
 
     /// Estimates the contacts of stress `b` in MPa; `noise_MPa` is the standard deviation of its noise, if it is known.

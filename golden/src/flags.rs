@@ -13,8 +13,8 @@
 //! | `mu-at-bound` | a μ is at `search.mu_max` | [`Checks::flags`] |
 //! | `implausible-stress` | a stress is above `input.plausible_MPa` | `Checks::flags` |
 //! | `load-mismatch` | the normal force is far from that of the same stress without shear | `Checks::flags`, golden engine |
-//! | `shear-not-resolved` | the shear's standard deviation is above a third of it | `Checks::flags`, estimator `evidence` |
-//! | `misfit` | the stated noise does not explain what the estimate leaves | `Checks::flags`, estimator `evidence` |
+//! | `shear-not-resolved` | the shear's standard deviation is above a third of it | `Checks::flags`, estimators but `search` |
+//! | `misfit` | the stated noise does not explain what the estimate leaves | `Checks::flags`, estimators but `search` |
 //! | `shape-mismatch` | the shape that `patch` or `symmetric` fits leaves more than the noise | `Checks::flags`, golden engine |
 //!
 //! [`Checks::flags`]: crate::checks::Checks::flags

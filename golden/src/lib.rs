@@ -50,6 +50,7 @@
 //! | [`matrices`], [`folded`] | Cz⁺, Ax, Ay of a subarray; the basis of mirror parities in which they are computed |
 //! | [`float`] | the stages in floating point: `receive`, `pass`, `search`, `force`, and the objectives |
 //! | [`evidence`] | forces and standard deviations for contacts of any shape under noise |
+//! | [`learned`] | shear by a small network that is trained on the scene's own physics |
 //! | [`reconstruct`] | the golden engine, and the result format of all engines |
 //! | [`errors`], [`flags`], [`checks`] | errors relative to known forces; limitations of a result, and their figures |
 //! | [`fixed`] | the same stages in integers, bit for bit the hardware; formats, cycles, resources |
@@ -82,6 +83,7 @@ pub mod generator;
 pub mod import;
 pub mod influence;
 pub mod input;
+pub mod learned;
 pub mod link;
 pub mod matrices;
 pub mod noise;

@@ -12,7 +12,8 @@
 //! | | `cases` (for "adaptive": 0 and others of 1 … 3 for the hardware; without it as many as fit together) |
 //! | | `condition` ("loaded"; "both-signs") |
 //! | `[search]` | `objective` ("sparse"; …), `mu_max` (0.6; 0, or 0.001 … 2), `noise_floor_MPa` (0) |
-//! | | `form` ("oblique"; "orthogonal"), `estimator` ("auto"; "evidence", "search"), `degree` (none; 1 … 8) |
+//! | | `form` ("oblique"; "orthogonal"), `estimator` ("auto"; "evidence", "learned", "search"), `degree` (none; 1 … 8) |
+//! | | `network` (none; a file, or "dermis:sensor-1") |
 //! | `[inverse]` | `kind` ("tsvd"; "tikhonov", "exact"), `level` (floor of format and noise; 0 … 1, both excluded) |
 //! | `[threshold]` | `min_force_N` (0) |
 //! | `[fixed]` | `input_bits` (20; 8 … 24), `data_bits` (18; 12 … 18), `coef_bits` (18; 8 … 18) |
@@ -135,7 +136,9 @@ pub enum EstimatorKind {
     Search,
     /// The μ that makes the stress most probable, [`crate::evidence`].
     Evidence,
-    /// `evidence` where it implements the scene, else `search`.
+    /// The μ of a trained network, [`crate::learned`].
+    Learned,
+    /// `evidence` where it implements the scene, with the network if there is one; else `search`.
     #[default]
     Auto,
 }
@@ -163,7 +166,7 @@ pub struct PartitionSpec {
 }
 
 /// Table `[search]`.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct SearchSpec {
     /// How forces are estimated.
     pub estimator: EstimatorKind,
@@ -177,6 +180,8 @@ pub struct SearchSpec {
     pub form: Form,
     /// Degree of the series in μ, 1 to 8; `None` takes what the sensor needs, see [`crate::matrices::degree`].
     pub degree: Option<usize>,
+    /// Path of a trained network, relative to the working folder, or ending in `dermis:NAME`: one of the program's own.
+    pub network: Option<PathBuf>,
 }
 
 /// Table `[threshold]`.
@@ -328,6 +333,7 @@ impl Default for SearchSpec {
             noise_floor_MPa: 0.0,
             form: Form::default(),
             degree: None,
+            network: None,
         }
     }
 }
@@ -352,8 +358,12 @@ impl Default for HardwareSpec {
 
 impl EstimatorKind {
     /// Every estimator with its name in a scene file, the default first.
-    pub const NAMES: [(&'static str, EstimatorKind); 3] =
-        [("auto", EstimatorKind::Auto), ("evidence", EstimatorKind::Evidence), ("search", EstimatorKind::Search)];
+    pub const NAMES: [(&'static str, EstimatorKind); 4] = [
+        ("auto", EstimatorKind::Auto),
+        ("evidence", EstimatorKind::Evidence),
+        ("learned", EstimatorKind::Learned),
+        ("search", EstimatorKind::Search),
+    ];
 
     /// Name in a scene file.
     pub fn name(self) -> &'static str {
@@ -391,7 +401,7 @@ impl Scene {
 
     /// The scene as the hardware and its bit-true model take it, with the estimator `search`.
     pub fn for_hardware(&self) -> Scene {
-        let search = SearchSpec { estimator: EstimatorKind::Search, ..self.search };
+        let search = SearchSpec { estimator: EstimatorKind::Search, ..self.search.clone() };
         Scene { search, ..self.clone() }
     }
 

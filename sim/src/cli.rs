@@ -58,6 +58,7 @@ const EXAMPLES: &str = "Examples:
   dermis cosim sensor-1                              all shipped frames, model against hardware
   dermis table                                       errors of all scenes, next to the paper's
   dermis noise sensor-1                              errors under noise, next to the Cramér–Rao bound
+  dermis train sensor-1                              a network for search.estimator = \"learned\"
   dermis report                                      HTML page: recommended cases and formats, error against time
   dermis generate sensor-3 --random 2 --out two.json  a frame with known forces
   dermis import walk.asf                             scene and frames of a recording of a real array
@@ -195,6 +196,8 @@ enum Command {
         #[arg(long, conflicts_with_all = ["cases", "frames"])]
         cosim: bool,
     },
+    /// Train a network for search.estimator = "learned" on frames drawn from the scene's own physics.
+    Train(crate::train::Arguments),
     /// Measure the errors under noise, next to the Cramér–Rao bound; any shape, several contacts, wrong scenes.
     Noise(crate::noise::Arguments),
 }
@@ -344,6 +347,7 @@ fn run(arguments: &Arguments) -> Result<(String, bool)> {
         Command::Table { scenes, cases, drawn, format, cosim: false } => {
             Ok((table(scenes, cases, drawn, *format)?, true))
         }
+        Command::Train(arguments) => crate::train::run(arguments),
         Command::Noise(arguments) => Ok((crate::noise::run(arguments)?, true)),
         Command::Table { scenes, cosim: true, .. } => {
             let verify = |name: &String| -> Result<Verified> {

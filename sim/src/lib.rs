@@ -68,6 +68,7 @@ pub mod stability;
 pub mod stress;
 pub mod study;
 pub mod tabulate;
+pub mod train;
 pub mod verify;
 pub mod verilator;
 pub mod waves;

@@ -8,22 +8,19 @@
 //! ```
 //!
 //! The envelope is taken as known, which makes the variances too small: on drawn frames of sensor-1 and sensor-2 the
-//! error of the load has another 0.5 % at every noise level, which are added to its variance, and that of μ is larger by
-//! a tenth.
+//! error of the load has another 0.5 % at every noise level, which are added to its variance.
 //!
 //! | | shape | unit |
 //! |---|---|---|
 //! | in: f | r | N |
 //! | out: force and standard deviation | 3 per contact | N, [x, y, normal] |
 
-use super::ascent::{Prior, Top};
+use super::ascent::Top;
 use super::model::Products;
 use faer::Mat;
 
 /// Standard deviation, as a share of the load, of what the envelope leaves out.
 const ENVELOPE_SHARE: f64 = 0.005;
-/// Standard deviation of μ over the one under a known envelope.
-const ENVELOPE_FACTOR: f64 = 1.1;
 
 /// Force of a contact with its standard deviation.
 pub(super) struct ContactForce {
@@ -35,13 +32,10 @@ pub(super) struct ContactForce {
     pub mu_covariance: [f64; 3],
 }
 
-/// The force of every contact; `loads` is f for each of them, 0 for the coefficients of the others. `None` if the
-/// covariance is not representable.
-pub(super) fn forces(products: &Products, top: &Top, prior: Prior, loads: &[Vec<f64>]) -> Option<Vec<ContactForce>> {
+/// The force of every contact; `loads` is f for each of them, 0 for the coefficients of the others,
+/// `covariance` that of all μ.
+pub(super) fn forces(products: &Products, top: &Top, covariance: &Mat<f64>, loads: &[Vec<f64>]) -> Vec<ContactForce> {
     let unknowns = 2 * loads.len();
-    let none = Mat::zeros(unknowns, unknowns);
-    let covariance = if prior.mu_max > 0.0 { prior.covariance(&top.slope)? } else { none };
-    let covariance = covariance * faer::Scale(ENVELOPE_FACTOR * ENVELOPE_FACTOR);
     let drift = products.drift(&top.posterior, unknowns);
     let one = |k: usize| {
         let f = &loads[k];
@@ -68,5 +62,5 @@ pub(super) fn forces(products: &Products, top: &Top, prior: Prior, loads: &[Vec<
             mu_covariance: [at(0, 0), at(0, 1), at(1, 1)],
         }
     };
-    Some((0..loads.len()).map(one).collect())
+    (0..loads.len()).map(one).collect()
 }

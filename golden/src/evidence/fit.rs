@@ -8,6 +8,8 @@
 //! | in: b | taxels | of its peak |
 //! | out: [`Estimate`] | – | N per MPa of the peak |
 
+pub(super) mod advice;
+
 use super::ascent::{ascend, Top};
 use super::contact::forces;
 use super::envelope::{envelope, from_stress};
@@ -17,7 +19,7 @@ use super::{clipped, noise, ContactEstimate, Estimate, Evidence};
 use crate::float::segment::{neighbours, segment, WIDTH};
 use crate::frame::Forces;
 use faer::linalg::matmul::matmul;
-use faer::{Accum, Mat, Par};
+use faer::{Accum, Mat, Par, Scale};
 use std::f64::consts::FRAC_1_SQRT_2;
 
 /// Smallest standard deviation of a reading.
@@ -33,6 +35,8 @@ const LEAST_ROUNDS: usize = 4;
 const SAME_MU: f64 = 6.0;
 /// Rounds after which the regions of the contacts are kept.
 const SEGMENTED: usize = 6;
+/// Standard deviation of μ over the one under a known envelope, on drawn frames of sensor-1.
+const ENVELOPE_FACTOR: f64 = 1.1;
 /// Times per round that noise and clipped readings are found anew.
 const PASSES: usize = 2;
 /// Steps of the ascent.
@@ -67,6 +71,15 @@ struct Regions {
     /// F of each contact.
     factors: Vec<Mat<f64>>,
     design: Design,
+}
+
+/// The contacts with their μ.
+struct Found {
+    regions: Regions,
+    /// The posterior at their μ.
+    top: Top,
+    /// Covariance of all μ.
+    covariance: Mat<f64>,
 }
 
 impl Regions {
@@ -121,7 +134,7 @@ impl<'a> Fit<'a> {
             }
             let before = self.mu.clone();
             let regions = self.regions();
-            let top = self.ascend(&regions.design)?;
+            let top = self.ascend(&regions.design, STEPS)?;
             self.mu.clone_from(&top.mu);
             self.p = regions.pressure(&top.posterior.w, self.p.len());
             let moved = |(a, b): (&[f64; 2], &[f64; 2])| (a[0] - b[0]).hypot(a[1] - b[1]);
@@ -141,7 +154,17 @@ impl<'a> Fit<'a> {
                 }
             }
         };
-        self.estimate(&regions, &top, round)
+        let unknowns = 2 * top.mu.len();
+        let searched = self.scene.prior.mu_max > 0.0;
+        let covariance = match searched {
+            true => self.scene.prior.covariance(&top.slope)? * Scale(ENVELOPE_FACTOR * ENVELOPE_FACTOR),
+            false => Mat::zeros(unknowns, unknowns),
+        };
+        let mut found = Found { regions, top, covariance };
+        if let Some(adviser) = &self.scene.adviser {
+            found = self.advised(adviser, found)?;
+        }
+        self.estimate(&found, round)
     }
 
     /// Divides the loaded cells into contacts; each keeps the μ that its strongest cell had.
@@ -257,11 +280,12 @@ impl<'a> Fit<'a> {
         }
     }
 
-    /// The largest posterior of μ under the present envelopes, with the noise and the clipped readings that go with it.
-    fn ascend(&mut self, design: &Design) -> Option<Top> {
+    /// The largest posterior of μ under the present envelopes within `steps` steps, with the noise and the clipped readings
+    /// that go with it; without a step the posterior at the present μ.
+    fn ascend(&mut self, design: &Design, steps: usize) -> Option<Top> {
         let prior = self.scene.prior;
         self.weigh();
-        let mut top = ascend(&Products::new(design, &self.readings), &self.mu, prior, STEPS)?;
+        let mut top = ascend(&Products::new(design, &self.readings), &self.mu, prior, steps)?;
         if self.clipped.is_empty() && self.stated {
             return Some(top);
         }
@@ -275,33 +299,43 @@ impl<'a> Fit<'a> {
                 let noise = self.noise(self.taxels[k]);
                 clipped::update(&mut self.readings, k, stress[k], noise);
             }
-            top = ascend(&Products::new(design, &self.readings), &top.mu, prior, STEPS)?;
+            top = ascend(&Products::new(design, &self.readings), &top.mu, prior, steps)?;
         }
         Some(top)
     }
 
+    /// Centre of pressure of the cells of a contact in mm from the array's centre.
+    fn centre_mm(&self, own: &[usize]) -> [f64; 2] {
+        let pressed: f64 = own.iter().map(|&cell| self.p[cell].max(0.0)).sum();
+        let mut moment = [0.0; 2];
+        for &cell in own {
+            let place = self.scene.cells.position_mm(cell);
+            (0..2).for_each(|axis| moment[axis] += self.p[cell].max(0.0) / pressed * place[axis]);
+        }
+        moment
+    }
+
     /// The result of the last round.
-    fn estimate(&self, regions: &Regions, top: &Top, rounds: usize) -> Option<Estimate> {
+    fn estimate(&self, found: &Found, rounds: usize) -> Option<Estimate> {
+        let Found { regions, top, covariance } = found;
         let cells = &self.scene.cells;
         let products = Products::new(&regions.design, &self.readings);
-        let forces = forces(&products, top, self.scene.prior, &regions.loads())?;
+        let forces = forces(&products, top, covariance, &regions.loads());
         let mut on_taxels = Forces::zeros(self.b.len());
         let mut contacts = Vec::with_capacity(forces.len());
         for (k, (own, force)) in regions.cells.iter().zip(forces).enumerate() {
             let pressed: f64 = own.iter().map(|&cell| self.p[cell].max(0.0)).sum();
-            let mut moment = [0.0; 2];
             for &cell in own {
                 // Contacts do not pull: the pressures below zero go to the others.
                 let share = self.p[cell].max(0.0) / pressed;
-                let ([x, y], taxel) = (cells.position_mm(cell), cells.taxel_of(cell));
-                moment = [moment[0] + share * x, moment[1] + share * y];
+                let taxel = cells.taxel_of(cell);
                 let [fx, fy, fz] = force.force_N.map(|force| share * force);
                 on_taxels.fx[taxel] += fx;
                 on_taxels.fy[taxel] += fy;
                 on_taxels.fz[taxel] += fz;
             }
             let contact = ContactEstimate {
-                centre_mm: moment,
+                centre_mm: self.centre_mm(own),
                 mu: top.mu[k],
                 force_N: force.force_N,
                 sigma_N: force.sigma_N,

@@ -179,8 +179,10 @@ fn noise_of_each_taxel_from_tare_frames() {
     assert!((found / expected - 1.0).abs() < 0.1, "{found} {expected}");
     assert!(result.checks.misfit_probability.unwrap() > 0.01, "{:?}", result.checks);
     // One noise for all does not fit: the right half is too loud for it.
-    let one =
-        Scene { search: crate::scene::SearchSpec { noise_floor_MPa: 0.001 * peak, ..scene.search }, ..scene.clone() };
+    let one = Scene {
+        search: crate::scene::SearchSpec { noise_floor_MPa: 0.001 * peak, ..scene.search.clone() },
+        ..scene.clone()
+    };
     let other = Golden::new(&one).unwrap().run(&frame).unwrap();
     assert!(other.flags.contains(&Flag::Misfit), "{:?}", other.checks);
     let fixed = crate::fixed::Model::new(&scene).unwrap().reconstruct(&frame).unwrap();

@@ -16,8 +16,9 @@
 
 use super::arith::{round_shift, saturate};
 use super::FixedError;
-use crate::frame::{Frame, FrameError};
+use crate::frame::FrameError;
 use crate::input::calibration::Calibration;
+use crate::input::tare::Tare;
 use crate::input::InputError;
 use crate::quantise::{largest_code, quantise};
 use crate::scene::Scene;
@@ -62,11 +63,7 @@ impl Scale {
         let spec = &scene.input;
         let table = spec.calibration.as_ref().map(|path| Calibration::load(path, &scene.sensor)).transpose();
         let table = table.map_err(InputError::from)?;
-        let tare = spec.tare.as_ref().map(|path| -> Result<Vec<f64>, FrameError> {
-            let frame = Frame::load(path, Some(scene))?;
-            frame.check(scene)?;
-            Ok(frame.stress_MPa)
-        });
+        let tare = spec.tare.as_ref().map(|path| Ok::<_, FrameError>(Tare::load(path, scene)?.zero));
         let largest = table.as_ref().map_or(1.0, |table| table.gain.iter().fold(0.0f64, |most, g| most.max(g.abs())));
         Ok(Scale { tare: tare.transpose()?, table, largest })
     }

@@ -17,6 +17,7 @@ use crate::float::pass::Polynomial;
 use crate::float::receive::{receive, Received};
 use crate::frame::{Forces, Frame, FrameError};
 use crate::input::{Input, InputError};
+use crate::learned::{Learned, LearnedError};
 use crate::matrices::{Matrices, MatricesError, MAX_FLOAT_DEGREE};
 use crate::partition::{subarrays, Case, PartitionError, Subarray};
 use crate::quantise::{full_scale, noise_floor_codes, quantise};
@@ -107,6 +108,9 @@ pub enum GoldenError {
     /// A file named by the input options cannot be used, or the frames do not fit them.
     #[error(transparent)]
     Input(#[from] InputError),
+    /// The network that the scene names cannot be used.
+    #[error(transparent)]
+    Learned(#[from] LearnedError),
     /// The stress is so large that its forces are not finite.
     #[error("frame {frame}: peak stress {peak_MPa:e} MPa gives forces beyond the range of numbers")]
     TooStrong {
@@ -115,6 +119,17 @@ pub enum GoldenError {
         /// Its largest |b|.
         peak_MPa: f64,
     },
+}
+
+/// The estimator of a scene that takes another one than the search.
+fn evidence(scene: &Scene) -> Result<Option<Evidence>, LearnedError> {
+    let advised = |combined| Ok(Some(Evidence::new(scene).advised_by(Learned::of_scene(scene)?, combined)));
+    match scene.estimator() {
+        EstimatorKind::Search => Ok(None),
+        EstimatorKind::Learned => advised(false),
+        _ if scene.search.estimator == EstimatorKind::Auto && scene.search.network.is_some() => advised(true),
+        _ => Ok(Some(Evidence::new(scene))),
+    }
 }
 
 impl Golden {
@@ -148,8 +163,7 @@ impl Golden {
         let fits = by_contact && scene.input.dead.is_empty() && scene.search.mu_max > 0.0;
         let taxels = fits.then(|| Taxels::new(&scene.sensor, scene.medium));
         let input = Input::new(scene)?;
-        let evidence = (scene.estimator() == EstimatorKind::Evidence).then(|| Evidence::new(scene));
-        let evidence = evidence.map(|evidence| match input.noise_shares() {
+        let evidence = evidence(scene)?.map(|evidence| match input.noise_shares() {
             None => evidence,
             Some(shares) => evidence.with_noise_shares(shares),
         });

@@ -12,7 +12,7 @@ use crate::matrices::MAX_FLOAT_DEGREE;
 use crate::partition::{subarrays, Case, Grid};
 use crate::sensor::{Sensor, MAX_LENGTH_MM, MAX_SIDE, MIN_SIDE};
 use std::ops::RangeInclusive;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use toml::{Table, Value};
 
 /// Tables and their fields; "" is the top level.
@@ -21,7 +21,7 @@ const SCHEMA: [(&str, &[&str]); 11] = [
     ("sensor", &["rows", "cols", "pitch_x_mm", "pitch_y_mm", "thickness_mm"]),
     ("medium", &["kind", "poisson"]),
     ("partition", &["case", "cases", "condition", "rows", "cols"]),
-    ("search", &["estimator", "objective", "mu_max", "noise_floor_MPa", "form", "degree"]),
+    ("search", &["estimator", "objective", "mu_max", "noise_floor_MPa", "form", "degree", "network"]),
     ("inverse", &["kind", "level"]),
     ("threshold", &["min_force_N"]),
     ("fixed", &["input_bits", "data_bits", "coef_bits", "inverse_bits", "prune_bits", "lanes"]),
@@ -67,7 +67,7 @@ impl Scene {
             name: name(&reader, origin)?,
             medium: medium(&reader)?,
             partition: partition(&reader, &sensor)?,
-            search: search(&reader)?,
+            search: search(&reader, origin)?,
             inverse: inverse(&reader)?,
             threshold: threshold(&reader)?,
             fixed: fixed(&reader)?,
@@ -218,7 +218,7 @@ fn named_case(reader: &Reader, value: &Value) -> Result<Case, SceneError> {
     case.ok_or_else(|| reader.wrong("partition.case", value, "0, 1, 2, 3, \"adaptive\" or \"contacts\""))
 }
 
-fn search(reader: &Reader) -> Result<SearchSpec, SceneError> {
+fn search(reader: &Reader, origin: &str) -> Result<SearchSpec, SceneError> {
     let default = SearchSpec::default();
     let allowed = format!("0, or a number from {LEAST_MU_MAX} to {LARGEST_MU_MAX}");
     let in_range = |mu| mu == 0.0 || (LEAST_MU_MAX..=LARGEST_MU_MAX).contains(&mu);
@@ -231,6 +231,7 @@ fn search(reader: &Reader) -> Result<SearchSpec, SceneError> {
         noise_floor_MPa: floor.unwrap_or(default.noise_floor_MPa),
         form: reader.choice("search.form", &[("oblique", Form::Oblique), ("orthogonal", Form::Orthogonal)])?,
         degree: degree(reader)?,
+        network: file(reader, origin, "search.network")?,
     })
 }
 
@@ -297,23 +298,26 @@ fn input(reader: &Reader, origin: &str, sensor: &Sensor) -> Result<InputSpec, Sc
     let spread = reader.number("input.gain_spread", |spread| (0.0..=1.0).contains(&spread), "a number from 0 to 1")?;
     let full_scale_MPa = reader.number("input.full_scale_MPa", |mpa| mpa > 0.0, "a number above 0")?;
     let plausible_MPa = reader.number("input.plausible_MPa", |mpa| mpa > 0.0, "a number above 0")?;
-    // Paths are relative to the folder of the scene's file.
-    let file = |path| match reader.value(path) {
-        None => Ok(None),
-        Some(Value::String(name)) if !name.is_empty() => Ok(Some(Path::new(origin).with_file_name(name))),
-        Some(value) => Err(reader.wrong(path, value, "the name of a file")),
-    };
     Ok(InputSpec {
         full_scale_MPa,
         // In range, so that the cast keeps the value.
         average: reader.integer("input.average", 0..=12, Some(0))? as u32,
-        calibration: file("input.calibration")?,
-        tare: file("input.tare")?,
+        calibration: file(reader, origin, "input.calibration")?,
+        tare: file(reader, origin, "input.tare")?,
         dead: dead(reader, sensor)?,
         unipolar: reader.typed("input.unipolar", Value::as_bool, "true or false")?.unwrap_or(false),
         gain_spread: spread.unwrap_or(0.0),
         plausible_MPa: plausible_MPa.unwrap_or(PLAUSIBLE_MPA),
     })
+}
+
+/// A path relative to the folder of the scene's file.
+fn file(reader: &Reader, origin: &str, field: &str) -> Result<Option<PathBuf>, SceneError> {
+    match reader.value(field) {
+        None => Ok(None),
+        Some(Value::String(name)) if !name.is_empty() => Ok(Some(Path::new(origin).with_file_name(name))),
+        Some(value) => Err(reader.wrong(field, value, "the name of a file")),
+    }
 }
 
 fn dead(reader: &Reader, sensor: &Sensor) -> Result<Vec<[usize; 2]>, SceneError> {

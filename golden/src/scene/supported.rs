@@ -7,13 +7,13 @@
 //! | `search.mu_max`, `output.forces` | all | with "adaptive" above 0 and "taxels" |
 //! | `search.objective` | all; with "adaptive" and "contacts" "sparse" | "sparse" |
 //! | `search.degree` | all | 1 … 3 |
-//! | `search.estimator` | all; "evidence" as below | "search", which they take for the others as well |
+//! | `search.estimator` | all; "evidence" and "learned" as below | "search", which they take for the others as well |
 //! | `search.form` | all, "orthogonal" up to [`crate::float::orthogonal::MAX_TAXELS`] taxels | "oblique" |
 //! | `input.dead` | all; with "orthogonal" none | with one subarray |
 //! | `input.unipolar` | all; with "orthogonal" none | none |
 //!
-//! The estimator "evidence" takes no objective but the default, no "orthogonal" form, mu_max above 0, and as partition 0
-//! or "contacts": it finds the contacts itself. "auto" takes it for these scenes and "search" for the others.
+//! The estimators "evidence" and "learned" take no objective but the default, no "orthogonal" form, mu_max above 0, and as partition 0
+//! or "contacts": they find the contacts themselves. "auto" takes it for these scenes and "search" for the others.
 //!
 //! Dead taxels in hardware: Cz⁺, Ax and Ay are multiplied by Π ([`crate::matrices::Matrices::without`]). The broken
 //! mirror symmetry takes up to four products instead of one ([`crate::fixed::coefficients`]). A subarray with a dead
@@ -147,7 +147,10 @@ impl Scene {
         // Regions and the choice of a case are compared by the sparse objective.
         let by_contact = self.partition.case.grid().is_none();
         let rule = |refused, field, value, available| Rule { refused, field, value, available };
-        if let Some(refusal) = self.evidence_refusal().filter(|_| self.search.estimator == EstimatorKind::Evidence) {
+        if let Some(refusal) = self
+            .evidence_refusal()
+            .filter(|_| matches!(self.search.estimator, EstimatorKind::Evidence | EstimatorKind::Learned))
+        {
             return self.require([refusal]);
         }
         self.require([

@@ -1,4 +1,4 @@
-use super::testbench::{check, Reference};
+use super::testbench::{check, random_words, Reference};
 use super::*;
 use crate::wire::Word;
 
@@ -73,6 +73,16 @@ fn each_error_names_block_signal_and_expression() {
     let k = Builder::new("b");
     k.constant(3, 8);
     assert_eq!(first_error(k), "block b: `3'd8`: 8 needs more bits");
+
+    let k = Builder::new("b");
+    let (a, c) = (k.input("a", 1), k.input("c", 1));
+    k.falling(c, || k.state("r", Type::unsigned(1), !a, 0).set(a));
+    assert_eq!(first_error(k), "block b: `~a`: an asynchronous reset is an input of one bit");
+
+    let k = Builder::new("b");
+    let a = k.input("a", 2);
+    k.rising(a, || k.register("r", Type::unsigned(2)).set(a));
+    assert_eq!(first_error(k), "block b: `a`: a clock is an input of one bit");
 
     for (name, reason) in
         [("a", "the name is used twice"), ("a$b", "not a Verilog identifier"), ("reg", "a keyword of Verilog")]
@@ -168,6 +178,10 @@ const CASES: &[Case] = &[
     Case { name: "concat_w", bits: 104, integer: |i| i[0] << 91 | i[4] << 1 | i[7] },
     Case { name: "extend_s", bits: 40, integer: |i| i[2] },
     Case { name: "extend_x", bits: 120, integer: |i| i[3] },
+    Case { name: "resize_s", bits: 5, integer: |i| i[2] },
+    Case { name: "resize_t", bits: 20, integer: |i| i[3] },
+    Case { name: "repeated", bits: 12, integer: |i| i[8] * 0x111 },
+    Case { name: "squares", bits: 9, integer: |i| i[8] * i[8] + 3 },
     Case { name: "all", bits: 1, integer: |i| (i[8] == 15).into() },
     Case { name: "any", bits: 1, integer: |i| (i[8] != 0).into() },
     Case { name: "parity", bits: 1, integer: |i| ((i[2] & 0x1fff).count_ones() % 2).into() },
@@ -239,6 +253,10 @@ fn operators() -> Kernel {
         concat(&[a, w, c]),
         s.extend(40),
         t.extend(120),
+        s.resize(5),
+        t.resize(20),
+        n.repeat(3),
+        n.table(9, &(0..16).map(|index| index * index + 3).collect::<Vec<_>>()),
         n.all(),
         n.any(),
         s.parity(),
@@ -294,29 +312,10 @@ impl Reference for Integers {
     fn clock(&mut self, _: &[Word]) {}
 }
 
-/// Random operands, of which every fourth is all zeros or all ones.
-fn stimulus(cycles: usize, widths: &[usize]) -> Vec<Vec<Word>> {
-    let mut random = fastrand::Rng::with_seed(20);
-    let field = |random: &mut fastrand::Rng, bits: usize| {
-        let kind = random.u8(..8);
-        let mut word = Word::default();
-        for low in (0..bits).step_by(64) {
-            let limb = match kind {
-                0 => 0,
-                1 => u64::MAX,
-                _ => random.u64(..),
-            };
-            word.set(low, (bits - low).min(64), limb);
-        }
-        word
-    };
-    (0..cycles).map(|_| widths.iter().map(|&bits| field(&mut random, bits)).collect()).collect()
-}
-
 #[test]
 fn operators_are_those_of_integers() {
     let widths = OPERANDS.map(|(_, bits, _)| bits);
-    check(&operators(), &stimulus(2000, &widths), &mut Integers);
+    check(&operators(), &random_words(2000, &widths), &mut Integers);
 }
 
 /// Registers with enable, reset, priority; a memory with an output register, one with contents.
@@ -385,7 +384,60 @@ impl Reference for State {
 
 #[test]
 fn registers_and_memories_are_those_of_the_reference() {
-    check(&state(), &stimulus(3000, &[1, 1, 1, 70, 3]), &mut State::default());
+    check(&state(), &random_words(3000, &[1, 1, 1, 70, 3]), &mut State::default());
+}
+
+/// Registers at both edges of a second clock, with a reset that acts at once; a memory with words in the text.
+fn clocks() -> Kernel {
+    let k = Builder::new("clocks");
+    let (other, clear, data) = (k.input("other", 1), k.input("clear", 1), k.input("data", 4));
+    let ty = Type::unsigned(4);
+    let down = k.falling(other, || k.state("down", ty, clear, 9));
+    let up = k.rising(other, || k.register("up", ty));
+    down.set((*down + data).low(4));
+    up.set(*down);
+    k.register("here", ty).set(*up);
+    let rom = k.memory("rom", 16, 4, Contents::Words((0..16).map(|word| (word, word as u64 * 7 % 16)).collect()));
+    k.register("word", ty).set(rom.read(data));
+    bound(k.finish(), &[("down", 4), ("up", 4), ("here", 4), ("word", 4)])
+}
+
+#[derive(Default)]
+struct Clocks {
+    level: bool,
+    down: Option<u64>,
+    up: Option<u64>,
+    here: Option<u64>,
+    word: Option<u64>,
+}
+
+impl Reference for Clocks {
+    fn outputs(&mut self, inputs: &[Word]) -> Vec<Option<Word>> {
+        let [other, clear, data] = [0, 1, 2].map(|k| inputs[k].number());
+        match (self.level, other == 1) {
+            (false, true) => self.up = self.down,
+            (true, false) => self.down = self.down.map(|down| (down + data) % 16),
+            _ => {}
+        }
+        self.level = other == 1;
+        if clear == 1 {
+            self.down = Some(9);
+        }
+        [self.down, self.up, self.here, self.word].map(|value| value.map(Word::from)).to_vec()
+    }
+
+    fn clock(&mut self, inputs: &[Word]) {
+        self.here = self.up;
+        self.word = Some(inputs[2].number() * 7 % 16);
+    }
+}
+
+#[test]
+fn registers_of_other_clocks_follow_their_edges_and_resets() {
+    let mut all = stimulus(3000, &[1, 1, 4]);
+    // Verilator sees the edges after the first cycle.
+    all[0] = vec![Word::default(); 3];
+    check(&clocks(), &all, &mut Clocks::default());
 }
 
 #[test]

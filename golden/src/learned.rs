@@ -1,0 +1,280 @@
+//! Learned: the ratio μ of shear to normal force by a small network, trained on the scene's own physics.
+//!
+//! Frames with known forces cost nothing: contacts are drawn, their stress is computed, noise is added. A perceptron that
+//! has seen some ten million of them knows which μ such stress has on average, and how far that may be off. Where noise
+//! hides the exact shape of the pressure it is better than what is computed for one frame; without noise it is not.
+//!
+//! ```text
+//! b, mask, σ ── window ── features ── network ── μ1, μ2 and their σ ── evidence at that μ: forces, misfit, flags
+//! training:  frames ── features ── network ── loss ── Adam        file: weights of 12 bits, signature
+//! ```
+//!
+//! | file | step |
+//! |---|---|
+//! | `window` | the taxels that are read, mirror images |
+//! | `features` | stress over its norm, two deconvolutions, mask, noise |
+//! | `network` | layers |
+//! | `frames`, `training` | drawn frames; loss and Adam |
+//! | `file` | bytes, signature |
+//!
+//! The four mirror images of a window are asked, and their answers, mirrored back, averaged.
+//!
+//! | | shape | unit |
+//! |---|---|---|
+//! | in: stress of one contact, noise | taxels | MPa |
+//! | out: μ with standard deviations | 2 | – |
+
+mod features;
+mod file;
+mod frames;
+mod network;
+#[cfg(test)]
+mod tests;
+mod training;
+mod window;
+
+pub use file::Signature;
+pub use training::{Stage, Training};
+pub use window::{Place, Window};
+
+use crate::generator::GeneratorError;
+use crate::scene::Scene;
+use crate::sensor::Sensor;
+use crate::write::FileError;
+use faer::Mat;
+use features::{Features, Readings};
+use network::Network;
+use std::path::Path;
+use thiserror::Error;
+use window::MIRRORS;
+
+/// Largest file of a network in bytes.
+const LARGEST_FILE: u64 = 64 << 20;
+
+/// Networks that are part of the program: `search.network` without its folder, and bytes.
+const SHIPPED: [(&str, &[u8]); 1] = [("dermis:sensor-1", include_bytes!("../scenes/sensor-1.network"))];
+
+/// A trained network, ready for the array of a scene.
+pub struct Learned {
+    signature: Signature,
+    sensor: Sensor,
+    features: Features,
+    network: Network,
+}
+
+/// μ as the network knows it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Gaussian {
+    /// Mean of μ, [x, y].
+    pub mean: [f64; 2],
+    /// Standard deviation of μ, [x, y].
+    pub sigma: [f64; 2],
+}
+
+/// The stress of one contact.
+pub struct OneContact<'a> {
+    /// Stress on every taxel of the array, that of other contacts taken out.
+    pub b: &'a [f64],
+    /// Which taxels are not dead.
+    pub alive: &'a [bool],
+    /// Standard deviation of the noise, in the unit of `b`.
+    pub sigma: f64,
+    /// Standard deviation of the gains.
+    pub gain_spread: f64,
+    /// Centre of pressure in mm from the array's centre.
+    pub centre_mm: [f64; 2],
+}
+
+/// A network cannot be trained, read or used.
+#[derive(Debug, Error)]
+pub enum LearnedError {
+    /// The scene names no network.
+    #[error("scene {scene}: search.network is missing; search.estimator = learned needs a file made by dermis train")]
+    NoNetwork {
+        /// The scene's name.
+        scene: String,
+    },
+    /// The file cannot be read.
+    #[error("{file}: search.network cannot be read: {source}; dermis train makes it")]
+    Unreadable {
+        /// Its path.
+        file: String,
+        /// Error of the operating system.
+        source: std::io::Error,
+    },
+    /// The file is no network, or damaged.
+    #[error("{file}: not a network of this version: {reason}")]
+    Damaged {
+        /// Its path.
+        file: String,
+        /// What is wrong.
+        reason: String,
+    },
+    /// The network was trained for something else.
+    #[error("{file}: trained for {field} = {trained}, the scene has {scene}; train it anew with dermis train")]
+    Mismatch {
+        /// Its path.
+        file: String,
+        /// The scene's field.
+        field: &'static str,
+        /// The value it was trained for.
+        trained: String,
+        /// The scene's value.
+        scene: String,
+    },
+    /// An option of the training is out of range.
+    #[error("training: {field} = {value} is not allowed; it must be {allowed}")]
+    Option {
+        /// Name of the option.
+        field: &'static str,
+        /// Its value.
+        value: f64,
+        /// The allowed values, in words.
+        allowed: &'static str,
+    },
+    /// No frames can be drawn for the scene.
+    #[error(transparent)]
+    Frames(#[from] GeneratorError),
+    /// Cz has no singular value decomposition.
+    #[error("{sensor}: the singular value decomposition of Cz did not converge")]
+    NotConverged {
+        /// The window.
+        sensor: String,
+    },
+    /// Weights or loss are not finite.
+    #[error("training diverged at a rate of {rate}; take a smaller one")]
+    Diverged {
+        /// The rate.
+        rate: f64,
+    },
+    /// The signature cannot be written.
+    #[error("network file: {0}")]
+    Encode(String),
+    /// The file cannot be written.
+    #[error(transparent)]
+    File(#[from] FileError),
+}
+
+/// A finished training.
+pub struct Trained {
+    /// The network, its weights as the file has them.
+    pub learned: Learned,
+    /// The file.
+    pub bytes: Vec<u8>,
+    /// Mean loss of the first and of the last twentieth of the steps.
+    pub loss: [f64; 2],
+}
+
+impl Learned {
+    /// Trains a network for a scene; `progress` is told what is done.
+    ///
+    /// # Errors
+    /// [`LearnedError::Option`], [`LearnedError::Frames`], [`LearnedError::NotConverged`] or [`LearnedError::Diverged`].
+    pub fn train(
+        scene: &Scene,
+        training: &Training,
+        progress: &(dyn Fn(Stage) + Sync),
+    ) -> Result<Trained, LearnedError> {
+        let signature = Signature::of(scene);
+        let (network, losses) = training::train(scene, signature.window, training, progress)?;
+        let bytes = file::encode(&network, &signature)?;
+        let learned = Learned::from_bytes(scene, &bytes, "the trained network")?;
+        Ok(Trained { learned, bytes, loss: [losses.first, losses.last] })
+    }
+
+    /// The network that a scene names with `search.network`: a file, or `dermis:NAME`, a part of the program.
+    ///
+    /// # Errors
+    /// [`LearnedError::NoNetwork`], [`LearnedError::Unreadable`], [`LearnedError::Damaged`] or
+    /// [`LearnedError::Mismatch`].
+    pub fn of_scene(scene: &Scene) -> Result<Learned, LearnedError> {
+        let Some(path) = &scene.search.network else {
+            return Err(LearnedError::NoNetwork { scene: scene.name.clone() });
+        };
+        let file = path.display().to_string();
+        match SHIPPED.iter().find(|(name, _)| path.file_name().is_some_and(|file| file == *name)) {
+            Some((name, bytes)) => Learned::from_bytes(scene, bytes, name),
+            None => Learned::from_bytes(scene, &read(path, &file)?, &file),
+        }
+    }
+
+    /// The network in the bytes of a file, for a scene; `file` names it in errors.
+    ///
+    /// # Errors
+    /// [`LearnedError::Damaged`] or [`LearnedError::Mismatch`].
+    pub fn from_bytes(scene: &Scene, bytes: &[u8], file: &str) -> Result<Learned, LearnedError> {
+        let (network, signature) = file::decode(bytes, file)?;
+        signature.check(scene, file)?;
+        let features = Features::new(&signature.window.sensor(&scene.sensor), scene.medium)?;
+        Ok(Learned { signature, sensor: scene.sensor.clone(), features, network })
+    }
+
+    /// What the network was trained for.
+    pub fn signature(&self) -> &Signature {
+        &self.signature
+    }
+
+    /// Number of weights.
+    pub fn weights(&self) -> usize {
+        self.network.widths().windows(2).map(|pair| pair[0] * pair[1]).sum()
+    }
+
+    /// μ of one contact.
+    pub fn shear(&self, contact: &OneContact) -> Gaussian {
+        let window = self.signature.window;
+        let n = window.taxels();
+        let origin = window.origin(&self.sensor, contact.centre_mm);
+        let taxels = window.taxels_of(&self.sensor, origin);
+        let images = MIRRORS.len();
+        let mut readings =
+            Readings { b: Mat::zeros(n, images), masked: Mat::zeros(n, images), sigma: Vec::with_capacity(images) };
+        let mut square = 0.0;
+        for (own, taxel) in taxels.iter().enumerate() {
+            let b = taxel.filter(|taxel| contact.alive[*taxel]).map(|taxel| contact.b[taxel]);
+            // A unipolar array reads no tension, also where that of another contact was taken out.
+            let b = b.map(|b| if self.signature.unipolar { b.max(0.0) } else { b } as f32);
+            square += b.map_or(0.0, |b| b * b);
+            for (k, across) in MIRRORS.iter().enumerate() {
+                let image = window.mirrored(own, *across);
+                readings.b[(image, k)] = b.unwrap_or(0.0);
+                readings.masked[(image, k)] = if b.is_some() { 0.0 } else { 1.0 };
+            }
+        }
+        let sigma = effective_sigma(contact.sigma as f32, contact.gain_spread as f32, square, n);
+        readings.sigma.resize(images, sigma);
+        let answers = self.network.outputs(self.features.of(&readings));
+        let mut found = Gaussian { mean: [0.0; 2], sigma: [0.0; 2] };
+        let share = self.signature.mu_max / images as f64;
+        for ((mean, sigma), across) in answers.iter().zip(&MIRRORS) {
+            for axis in [0, 1] {
+                found.mean[axis] += share * if across[axis] { -mean[axis] } else { mean[axis] };
+                found.sigma[axis] += share * sigma[axis];
+            }
+        }
+        let size = found.mean[0].hypot(found.mean[1]);
+        if size > self.signature.mu_max {
+            found.mean = found.mean.map(|mu| mu * self.signature.mu_max / size);
+        }
+        found
+    }
+}
+
+/// The noise that a network is told: σ, and the gains as if they were noise on every taxel alike; `square` is Σb² of `n`
+/// taxels.
+fn effective_sigma(sigma: f32, gain_spread: f32, square: f32, n: usize) -> f32 {
+    (sigma * sigma + gain_spread * gain_spread * square / n as f32).sqrt()
+}
+
+/// The bytes of a file.
+fn read(path: &Path, file: &str) -> Result<Vec<u8>, LearnedError> {
+    use std::io::Read;
+    let unreadable = |source| LearnedError::Unreadable { file: file.to_owned(), source };
+    let mut bytes = Vec::new();
+    std::fs::File::open(path)
+        .and_then(|open| open.take(LARGEST_FILE + 1).read_to_end(&mut bytes))
+        .map_err(unreadable)?;
+    match bytes.len() as u64 > LARGEST_FILE {
+        true => Err(LearnedError::Damaged { file: file.to_owned(), reason: "it is too large".to_owned() }),
+        false => Ok(bytes),
+    }
+}

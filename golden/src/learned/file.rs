@@ -1,0 +1,250 @@
+//! File: a trained network with the physics it was trained for.
+//!
+//! ```text
+//! "dermis network 1\n"     magic and version
+//! JSON, "\n"               signature and widths
+//! per layer, row by row    scale (f32), bias (f32), weights of 12 bits, two in three bytes
+//! CRC-32                   of all before it
+//! ```
+//!
+//! Numbers are little-endian. A weight is its row's scale times a whole number of −2047 … 2047; a pair (u, v) of them, 2048
+//! added to each, is u + 4096 v; an odd row ends with v = 2048.
+//!
+//! | | shape | unit |
+//! |---|---|---|
+//! | in, out: network, signature | – | – |
+//! | out, in: bytes | about 1.5 per weight | – |
+
+use super::network::{Layer, Network, OUTPUTS};
+use super::window::Window;
+use super::LearnedError;
+use crate::scene::{Medium, Scene};
+use faer::Mat;
+use serde::{Deserialize, Serialize};
+
+/// Magic and version.
+const MAGIC: &[u8] = b"dermis network 1\n";
+/// Largest whole number of a weight.
+const LARGEST: f32 = 2047.0;
+/// Added to a weight's number.
+const ZERO: i32 = 2048;
+/// Widest layer, so that a damaged file asks for no more memory than it may.
+const WIDEST: usize = 1 << 14;
+
+/// The physics that a network was trained for.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Signature {
+    /// Pitch along columns in mm.
+    pub pitch_x_mm: f64,
+    /// Pitch along rows in mm.
+    pub pitch_y_mm: f64,
+    /// Thickness of the cover in mm.
+    pub thickness_mm: f64,
+    /// The elastic body.
+    pub medium: Medium,
+    /// The window that is read.
+    pub window: Window,
+    /// Whether tension reads as zero.
+    pub unipolar: bool,
+    /// Largest ratio of shear to normal force.
+    pub mu_max: f64,
+}
+
+#[derive(Serialize, Deserialize)]
+struct Head {
+    signature: Signature,
+    widths: Vec<usize>,
+}
+
+impl Signature {
+    /// The signature of a scene.
+    pub fn of(scene: &Scene) -> Signature {
+        Signature {
+            pitch_x_mm: scene.sensor.pitch_x_mm,
+            pitch_y_mm: scene.sensor.pitch_y_mm,
+            thickness_mm: scene.sensor.thickness_mm,
+            medium: scene.medium,
+            window: Window::of(&scene.sensor),
+            unipolar: scene.input.unipolar,
+            mu_max: scene.search.mu_max,
+        }
+    }
+
+    /// Checks that a network with this signature serves `scene`; `file` names it in the error.
+    ///
+    /// # Errors
+    /// [`LearnedError::Mismatch`] with the first field that differs.
+    pub fn check(&self, scene: &Scene, file: &str) -> Result<(), LearnedError> {
+        let wanted = Signature::of(scene);
+        let pairs = [
+            ("sensor.pitch_x_mm", self.pitch_x_mm.to_string(), wanted.pitch_x_mm.to_string()),
+            ("sensor.pitch_y_mm", self.pitch_y_mm.to_string(), wanted.pitch_y_mm.to_string()),
+            ("sensor.thickness_mm", self.thickness_mm.to_string(), wanted.thickness_mm.to_string()),
+            ("medium.kind", self.medium.to_string(), wanted.medium.to_string()),
+            ("sensor.rows and cols", self.window.to_string(), wanted.window.to_string()),
+            ("input.unipolar", self.unipolar.to_string(), wanted.unipolar.to_string()),
+            ("search.mu_max", self.mu_max.to_string(), wanted.mu_max.to_string()),
+        ];
+        match pairs.into_iter().find(|(_, own, other)| own != other) {
+            None => Ok(()),
+            Some((field, trained, scene)) => {
+                Err(LearnedError::Mismatch { file: file.to_owned(), field, trained, scene })
+            }
+        }
+    }
+}
+
+/// The bytes of a file.
+pub(super) fn encode(network: &Network, signature: &Signature) -> Result<Vec<u8>, LearnedError> {
+    let head = Head { signature: signature.clone(), widths: network.widths() };
+    let mut bytes = MAGIC.to_vec();
+    bytes.extend(serde_json::to_vec(&head).map_err(|error| LearnedError::Encode(error.to_string()))?);
+    bytes.push(b'\n');
+    for layer in &network.layers {
+        for (row, bias) in layer.bias.iter().enumerate() {
+            let scale = scale(layer, row);
+            bytes.extend(scale.to_le_bytes());
+            bytes.extend(bias.to_le_bytes());
+            let number = |col: usize| match col < layer.weights.ncols() && scale > 0.0 {
+                true => ((layer.weights[(row, col)] / scale).round() as i32 + ZERO) as u32,
+                false => ZERO as u32,
+            };
+            for col in (0..layer.weights.ncols()).step_by(2) {
+                bytes.extend(&(number(col) | number(col + 1) << 12).to_le_bytes()[..3]);
+            }
+        }
+    }
+    let crc = crc32fast::hash(&bytes);
+    bytes.extend(crc.to_le_bytes());
+    Ok(bytes)
+}
+
+/// The scale of a row's weights.
+fn scale(layer: &Layer, row: usize) -> f32 {
+    layer.weights.row(row).iter().fold(0.0f32, |most, weight| weight.abs().max(most)) / LARGEST
+}
+
+/// Network and signature of a file's bytes; `file` names it in errors.
+pub(super) fn decode(bytes: &[u8], file: &str) -> Result<(Network, Signature), LearnedError> {
+    let damaged = |reason: &str| LearnedError::Damaged { file: file.to_owned(), reason: reason.to_owned() };
+    let body = bytes.strip_prefix(MAGIC).ok_or_else(|| damaged("it does not begin with \"dermis network 1\""))?;
+    let (checked, crc) = bytes.split_last_chunk::<4>().ok_or_else(|| damaged("it is too short"))?;
+    if crc32fast::hash(checked) != u32::from_le_bytes(*crc) {
+        return Err(damaged("its check sum does not fit"));
+    }
+    let end = body.iter().position(|byte| *byte == b'\n').ok_or_else(|| damaged("it has no signature"))?;
+    let head: Head = serde_json::from_slice(&body[..end]).map_err(|error| damaged(&error.to_string()))?;
+    let widths = &head.widths;
+    if widths.len() < 2 || widths.iter().any(|width| !(1..=WIDEST).contains(width)) {
+        return Err(damaged("its widths are out of range"));
+    }
+    if widths.first() != Some(&super::features::Features::inputs(head.signature.window.taxels()))
+        || widths.last() != Some(&OUTPUTS)
+    {
+        return Err(damaged("its widths do not fit its window"));
+    }
+    let mut rest = &body[end + 1..body.len() - 4];
+    let mut layers = Vec::new();
+    for pair in widths.windows(2) {
+        layers.push(layer(&mut rest, pair[0], pair[1]).ok_or_else(|| damaged("it is too short"))?);
+    }
+    if !rest.is_empty() {
+        return Err(damaged("it is too long"));
+    }
+    Ok((Network { layers }, head.signature))
+}
+
+fn layer(rest: &mut &[u8], inputs: usize, outputs: usize) -> Option<Layer> {
+    let mut weights = Mat::zeros(outputs, inputs);
+    let mut bias = Vec::with_capacity(outputs);
+    let float = |rest: &mut &[u8]| {
+        let (head, tail) = rest.split_first_chunk::<4>()?;
+        *rest = tail;
+        Some(f32::from_le_bytes(*head)).filter(|value| value.is_finite())
+    };
+    for row in 0..outputs {
+        let scale = float(rest)?;
+        bias.push(float(rest)?);
+        for col in (0..inputs).step_by(2) {
+            let ([a, b, c], tail) = rest.split_first_chunk::<3>()?;
+            *rest = tail;
+            let pair = u32::from_le_bytes([*a, *b, *c, 0]);
+            let weight = |number: u32| scale * (number as i32 - ZERO) as f32;
+            weights[(row, col)] = weight(pair & 0xfff);
+            if col + 1 < inputs {
+                weights[(row, col + 1)] = weight(pair >> 12);
+            }
+        }
+    }
+    Some(Layer { weights, bias })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::random::Random;
+
+    fn network() -> (Network, Signature) {
+        let mut scene = Scene::builtin("sensor-1").unwrap();
+        (scene.sensor.rows, scene.sensor.cols) = (2, 2);
+        (Network::random(&[17, 5, OUTPUTS], &mut Random::new(1)), Signature::of(&scene))
+    }
+
+    #[test]
+    fn a_file_has_the_network_to_12_bits() {
+        let (network, signature) = network();
+        let bytes = encode(&network, &signature).unwrap();
+        let (read, own) = decode(&bytes, "f").unwrap();
+        assert_eq!(own, signature);
+        for (a, b) in network.layers.iter().zip(&read.layers) {
+            assert_eq!(a.bias, b.bias);
+            for row in 0..a.bias.len() {
+                let step = scale(a, row);
+                let near = |col: usize| (a.weights[(row, col)] - b.weights[(row, col)]).abs() <= 0.51 * step;
+                assert!((0..a.weights.ncols()).all(near));
+            }
+        }
+        // Weights that are whole numbers of the scale stay as they are.
+        assert_eq!(decode(&encode(&read, &own).unwrap(), "f").unwrap().0.widths(), [17, 5, 4]);
+    }
+
+    #[test]
+    fn damage_is_found() {
+        let (network, signature) = network();
+        let bytes = encode(&network, &signature).unwrap();
+        for at in [0, 20, bytes.len() / 2, bytes.len() - 1] {
+            let mut bad = bytes.clone();
+            bad[at] ^= 4;
+            assert!(matches!(decode(&bad, "f"), Err(LearnedError::Damaged { .. })), "{at}");
+        }
+        for length in [0, 3, 17, bytes.len() - 1] {
+            assert!(matches!(decode(&bytes[..length], "f"), Err(LearnedError::Damaged { .. })), "{length}");
+        }
+    }
+
+    #[test]
+    fn another_physics_is_refused_by_field() {
+        let scene = Scene::builtin("sensor-1").unwrap();
+        let signature = Signature::of(&scene);
+        assert!(signature.check(&scene, "n").is_ok());
+        let refused = |change: fn(&mut Scene)| {
+            let mut other = scene.clone();
+            change(&mut other);
+            signature.check(&other, "n").unwrap_err().to_string()
+        };
+        type Case = (fn(&mut Scene), &'static str);
+        let cases: [Case; 7] = [
+            (|s| s.sensor.pitch_x_mm = 2.5, "sensor.pitch_x_mm = 2, the scene has 2.5"),
+            (|s| s.sensor.pitch_y_mm = 2.0, "sensor.pitch_y_mm = 4, the scene has 2"),
+            (|s| s.sensor.thickness_mm = 4.0, "sensor.thickness_mm = 3, the scene has 4"),
+            (|s| s.medium = Medium::BondedLayer { poisson: 0.48 }, "half-space, the scene has bonded-layer"),
+            (|s| s.sensor.rows = 9, "whole array of 10 × 10, the scene has whole array of 9 × 10"),
+            (|s| s.input.unipolar = true, "input.unipolar = false, the scene has true"),
+            (|s| s.search.mu_max = 1.0, "search.mu_max = 0.6, the scene has 1"),
+        ];
+        for (change, wanted) in cases {
+            let message = refused(change);
+            assert!(message.starts_with("n:") && message.contains(wanted), "{message}");
+        }
+    }
+}
