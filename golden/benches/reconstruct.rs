@@ -6,17 +6,22 @@ use dermis_golden::frame::Frame;
 use dermis_golden::generator::{generate, random_contacts, Draw, Shapes};
 use dermis_golden::partition::Case;
 use dermis_golden::reconstruct::Golden;
-use dermis_golden::scene::{ObjectiveKind, Scene};
+use dermis_golden::scene::{EstimatorKind, ObjectiveKind, Scene};
 use std::hint::black_box;
 
 fn reconstruct(criterion: &mut Criterion) {
     for name in ["sensor-1", "sensor-3", "sensor-4"] {
         let scene = Scene::builtin(name).expect("the scene is built in");
-        let golden = Golden::new(&scene).expect("the scene has matrices");
         let frame = &Frame::shipped(&scene)[0];
-        criterion.bench_function(&format!("golden frame {name}"), |bencher| {
-            bencher.iter(|| golden.run(black_box(frame)));
-        });
+        for estimator in [EstimatorKind::Search, EstimatorKind::Evidence] {
+            let mut own = scene.clone();
+            own.search.estimator = estimator;
+            // Evidence refuses pitches as large as sensor-4's.
+            let Ok(golden) = Golden::new(&own) else { continue };
+            criterion.bench_function(&format!("golden frame {name}, {}", estimator.name()), |bencher| {
+                bencher.iter(|| golden.run(black_box(frame)));
+            });
+        }
         criterion.bench_function(&format!("golden matrices {name}"), |bencher| {
             bencher.iter(|| Golden::new(black_box(&scene)));
         });
@@ -30,6 +35,7 @@ fn beyond(criterion: &mut Criterion) {
     {
         let mut scene = Scene::builtin(name).expect("the scene is built in");
         (scene.partition.case, scene.search.objective) = (case, objective);
+        scene.search.estimator = EstimatorKind::Search;
         let golden = Golden::new(&scene).expect("the scene has matrices");
         for shapes in [Shapes::Elliptic, Shapes::Other] {
             let count = if case == Case::Contacts { 3 } else { 1 };

@@ -93,6 +93,9 @@ fn wrong_input_ends_with_its_exit_code_and_message() {
     assert!(failures.is_empty(), "{failures}");
 }
 
+/// What commands for the hardware print of a scene that names no estimator.
+const NOTE: &str = "eight-by-eight: the hardware has no estimator evidence and takes search with sparse\n";
+
 /// Exit code and stderr of a reconstruction in simulated hardware, with `work` as the only folder in PATH.
 fn rtl_in(work: &Path) -> (Option<i32>, String) {
     let output = Command::new(env!("CARGO_BIN_EXE_dermis"))
@@ -108,7 +111,7 @@ fn rtl_in(work: &Path) -> (Option<i32>, String) {
 fn without_verilator_the_message_says_how_to_get_it() {
     let work = tempfile::tempdir().unwrap();
     let wanted = "error: verilator is not installed; on Debian: sudo apt-get install verilator g++ make\n";
-    assert_eq!(rtl_in(work.path()), (Some(2), wanted.to_owned()));
+    assert_eq!(rtl_in(work.path()), (Some(2), NOTE.to_owned() + wanted));
 }
 
 #[test]
@@ -118,7 +121,7 @@ fn without_a_compiler_the_message_says_what_is_missing() {
     let script = "#!/bin/sh\n[ \"$1\" = --version ] && echo Verilator 0 && exit 0\nexit 127\n";
     fake::program(work.path(), "verilator", script);
     let wanted = "error: verilator needs make, which is not installed; on Debian: sudo apt-get install g++ make\n";
-    assert_eq!(rtl_in(work.path()), (Some(2), wanted.to_owned()));
+    assert_eq!(rtl_in(work.path()), (Some(2), NOTE.to_owned() + wanted));
 }
 
 #[test]

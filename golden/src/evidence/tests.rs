@@ -206,14 +206,15 @@ fn flags_with_their_figures() {
 
 #[test]
 fn refused_by_field() {
-    for (text, field) in [
-        ("[search]\nestimator = \"evidence\"\nobjective = \"patch\"", "search.objective"),
-        ("[search]\nestimator = \"evidence\"\nmu_max = 0", "search.mu_max"),
-        ("[search]\nestimator = \"evidence\"\n[partition]\ncase = 1", "partition.case"),
-        ("[search]\nestimator = \"evidence\"\nform = \"orthogonal\"", "search.form"),
+    for (text, thickness, field) in [
+        ("[search]\nestimator = \"evidence\"", 1.3, "sensor.thickness_mm"),
+        ("[search]\nestimator = \"evidence\"\nobjective = \"patch\"", 3.0, "search.objective"),
+        ("[search]\nestimator = \"evidence\"\nmu_max = 0", 3.0, "search.mu_max"),
+        ("[search]\nestimator = \"evidence\"\n[partition]\ncase = 1", 3.0, "partition.case"),
+        ("[search]\nestimator = \"evidence\"\nform = \"orthogonal\"", 3.0, "search.form"),
     ] {
-        let sensor = "[sensor]\nrows = 8\ncols = 8\npitch_x_mm = 4\npitch_y_mm = 4\nthickness_mm = 3\n";
-        let scene = Scene::parse(&format!("{sensor}{text}"), "mine.toml").unwrap();
+        let pitches = "[sensor]\nrows = 8\ncols = 8\npitch_x_mm = 4\npitch_y_mm = 4\n";
+        let scene = Scene::parse(&format!("{pitches}thickness_mm = {thickness}\n{text}"), "mine.toml").unwrap();
         let error = Golden::new(&scene).err().unwrap().to_string();
         assert!(error.contains(field), "{error}");
         // `auto` takes the other estimator.
