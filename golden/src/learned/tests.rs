@@ -149,6 +149,9 @@ fn what_cannot_be_used_is_named() {
     assert_eq!(message(&scene), "");
     scene.input.unipolar = true;
     assert!(message(&scene).contains("input.unipolar = false, the scene has true"), "{}", message(&scene));
+    scene.search.estimator = EstimatorKind::Auto;
+    assert_eq!(message(&scene), "");
+    scene.search.estimator = EstimatorKind::Learned;
     scene.input.unipolar = false;
     scene.partition.case = crate::partition::Case::numbered(1).unwrap();
     assert!(message(&scene).contains("partition.case"), "{}", message(&scene));

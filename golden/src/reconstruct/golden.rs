@@ -121,13 +121,17 @@ pub enum GoldenError {
     },
 }
 
-/// The estimator of a scene that takes another one than the search.
+/// The estimator of a scene that takes another one than the search. `auto` asks a network only if it was trained for the
+/// scene's physics.
 fn evidence(scene: &Scene) -> Result<Option<Evidence>, LearnedError> {
     let advised = |combined| Ok(Some(Evidence::new(scene).advised_by(Learned::of_scene(scene)?, combined)));
     match scene.estimator() {
         EstimatorKind::Search => Ok(None),
         EstimatorKind::Learned => advised(false),
-        _ if scene.search.estimator == EstimatorKind::Auto && scene.search.network.is_some() => advised(true),
+        _ if scene.search.estimator == EstimatorKind::Auto && scene.search.network.is_some() => match advised(true) {
+            Err(LearnedError::Mismatch { .. }) => Ok(Some(Evidence::new(scene))),
+            other => other,
+        },
         _ => Ok(Some(Evidence::new(scene))),
     }
 }
