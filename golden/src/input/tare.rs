@@ -97,9 +97,9 @@ mod tests {
         let (scene, frames) = frames(100, |k, normal| 0.5 + sigma(k) * normal);
         let tare = Tare::of(&frames, &scene);
         let spread = tare.spread.unwrap();
-        for k in 0..64 {
-            assert!((tare.zero[k] - 0.5).abs() < 0.4 * sigma(k), "{k}: {}", tare.zero[k]);
-            assert!((spread[k] / sigma(k) - 1.0).abs() < 0.25, "{k}: {}", spread[k]);
+        for (k, (zero, spread)) in tare.zero.iter().zip(&spread).enumerate() {
+            assert!((zero - 0.5).abs() < 0.4 * sigma(k), "{k}: {zero}");
+            assert!((spread / sigma(k) - 1.0).abs() < 0.25, "{k}: {spread}");
         }
     }
 
