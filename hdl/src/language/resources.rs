@@ -4,6 +4,7 @@
 //! |---|---|
 //! | sum, difference, comparison by size | 1 per bit |
 //! | multiplexer | 1 per bit; 1/2 with a constant; none where a register keeps its value or is reset |
+//! | multiplexers between constants | 1 per bit and 16 constants, none for fewer: merged into another node |
 //! | and, or, exclusive or | 1/4 per bit: mostly merged into another node |
 //! | equality | 1/2 per bit, 1/4 with a constant |
 //! | parity, all or any of n bits | (n − 1)/3 |
@@ -20,6 +21,9 @@ use crate::estimate::Logic;
 
 /// A distributed RAM cell of the ECP5: words, bits per word, LUTs.
 const CELL: [usize; 3] = [16, 4, 6];
+
+/// Inputs of a LUT.
+const TABLE_BITS: usize = 4;
 
 /// LUTs of a memory of `words` words and `bits` bits as distributed RAM.
 pub(crate) fn distributed_luts(words: usize, bits: usize) -> usize {
@@ -58,6 +62,15 @@ impl Kernel {
         logic
     }
 
+    /// Levels of multiplexers from `node` to constants; `None` if it depends on anything else.
+    fn table_depth(&self, node: NodeId) -> Option<usize> {
+        match &self.nodes[node].0 {
+            Node::Constant(_) => Some(0),
+            Node::Mux(_, a, b) => Some(1 + self.table_depth(*a)?.max(self.table_depth(*b)?)),
+            _ => None,
+        }
+    }
+
     fn luts(&self, node: NodeId) -> f64 {
         let bits = |id: NodeId| self.ty(id).bits as f64;
         let constant = |id: NodeId| matches!(self.nodes[id].0, Node::Constant(_));
@@ -67,6 +80,7 @@ impl Kernel {
             Node::Binary(Binary::Equal, a, b) => bits(*a) * if constant(*a) || constant(*b) { 0.25 } else { 0.5 },
             Node::Binary(Binary::And | Binary::Or | Binary::Xor, ..) => 0.25 * bits(node),
             Node::Binary(Binary::ShiftLeft | Binary::ShiftRight, ..) => 3.0 * bits(node),
+            Node::Mux(..) if self.table_depth(node).is_some_and(|depth| depth < TABLE_BITS) => 0.0,
             Node::Mux(_, a, b) if constant(*a) || constant(*b) => 0.5 * bits(node),
             Node::Mux(..) => bits(node),
             Node::Unary(Unary::All | Unary::Any | Unary::Parity, a) => (bits(*a) - 1.0) / 3.0,

@@ -1,4 +1,21 @@
-//! Verilog for rounding half up after a barrel shifter.
+//! Rounding half up and saturation after a barrel shifter.
+
+use crate::language::{Builder, Expr};
+
+/// `moved`, signed, with half an LSB as its lowest bit: rounded half up and saturated to `word` bits; and whether it was
+/// saturated.
+///
+/// The fit is tested in parallel with the rounding, not after it: the bits above the word must be sign bits once the
+/// carry from the low bits has been added.
+pub fn saturate<'k>(k: &'k Builder, moved: Expr<'k>, word: usize) -> (Expr<'k>, Expr<'k>) {
+    let rounded = moved.low(word + 1).plus(1).slice(1, word);
+    let carry = k.wire("carry", moved.low(word).all());
+    let above = k.wire("above", moved.slice(word, moved.bits() - word));
+    let carried = !above.slice(1, above.bits() - 1).all();
+    let clips = k.wire("clips", carry.mux(carried, above.any() & !above.all()));
+    let sign = moved.top();
+    (clips.mux(sign.concat((!sign).repeat(word - 1)), rounded), clips)
+}
 
 /// Verilog that declares `half_up` and assigns `clips`. `moved` is signed, of `bits` bits, with half an LSB as its
 /// lowest bit; bits 1 … `word` of `half_up` are its value rounded half up, and `clips` is high if that does not fit

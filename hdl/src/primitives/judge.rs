@@ -33,7 +33,7 @@ pub struct Judge {
     pub weights: Wire<In>,
     /// Nine bits, candidate k may be taken; valid with `start`.
     pub eligible: Wire<In>,
-    /// Word of the sweep (`Sweep`); valid with `start`.
+    /// Word of the sweep (`Fields`); valid with `start`.
     pub sweep: Wire<In>,
     /// The comparison is complete; high for one cycle.
     pub done: Signal<Out, Bit>,

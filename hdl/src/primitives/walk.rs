@@ -5,7 +5,7 @@ use dermis_golden::fixed::search::COARSE_CENTRES;
 use rust_hdl::prelude::*;
 
 use super::store::{base, base_bits};
-use super::sweep::{position_bits, square_bits, sweep_bits, Fields, BUFFERS, BUFFER_BITS, START};
+use super::sweep::{position_bits, square_bits, sweep_bits, Fields, BUFFER_BITS, START};
 use crate::kernel_block;
 use crate::language::{concat, Body, Builder, Expr, Kernel, Type};
 use crate::wire::Wire;
@@ -56,7 +56,7 @@ pub struct Walk {
     pub next_base: Wire<Out>,
     /// Buffer to write, one cycle after the other outputs.
     pub target: Wire<Out>,
-    /// Word of the sweep (`Sweep`).
+    /// Word of the sweep (`Fields`).
     pub sweep: Wire<Out>,
     /// Squared radius of the search disc in grid steps of the level.
     pub radius: Wire<Out>,
@@ -237,7 +237,7 @@ fn kernel(quads: usize) -> Kernel {
 
 #[cfg(test)]
 mod tests {
-    use super::super::sweep::Sweep;
+    use super::super::sweep::{Sweep, BUFFERS};
     use super::*;
     use crate::language::testbench::{check, Reference};
     use crate::wire::Word;

@@ -15,7 +15,7 @@ use crate::wire::Wire;
 /// half and table, times n.
 ///
 /// `start` with the sweep and its nine sums, which stay stable for the next three cycles. The results are valid
-/// `LATENCY` cycles after `start`, until those of the next sweep.
+/// eight cycles after `start`, until those of the next sweep.
 #[derive(LogicBlock)]
 pub struct Weigh {
     /// Clock; registers change on its rising edge.
@@ -26,7 +26,7 @@ pub struct Weigh {
     pub which: Wire<In>,
     /// Start with the nine candidates of `sweep`.
     pub start: Signal<In, Bit>,
-    /// Word of the sweep (`Sweep`); valid with `start`.
+    /// Word of the sweep (`Fields`); valid with `start`.
     pub sweep: Wire<In>,
     /// Squared radius of the search disc; valid with `start`.
     pub radius: Wire<In>,
@@ -47,9 +47,6 @@ kernel_block!(
     inputs [rst, which, start, sweep, radius, sums],
     outputs [weights, eligible, weighed]
 );
-
-/// Cycles from `start` to the results.
-pub const LATENCY: usize = 8;
 
 /// Width of n·log2 Σp for subarrays of `taxels` taxels, in bits.
 pub fn weight_bits(taxels: usize) -> usize {
@@ -185,6 +182,8 @@ mod tests {
     use crate::language::testbench::{check, Reference};
     use crate::wire::Word;
 
+    /// Cycles from `start` to the results.
+    const LATENCY: usize = 8;
     const SUM_BITS: usize = 30;
     const TAXELS: [usize; 3] = [64, 25, 9];
 

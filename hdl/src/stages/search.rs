@@ -150,7 +150,7 @@ impl Search {
             candidates: Candidates::new(&taxels),
             scores: Score::new(formats),
             counts: Counts::new(&layouts),
-            sum: Sum::new(sums.clone(), quads, fill_bits, apart),
+            sum: Sum::new(&sums, quads, fill_bits, apart),
             sum_taylor: Taylor::new(&sums),
             sum_candidates: Candidates::new(&sums),
             fill_counts: Counts::new(&layouts),
