@@ -191,7 +191,10 @@ impl<'k> Expr<'k> {
             return self.builder.constant(bits, 0);
         }
         for bit in 0..self.bits() {
-            entries = entries.chunks(2).map(|pair| self.at(bit).mux(pair[1], pair[0])).collect();
+            entries = entries
+                .chunks(2)
+                .map(|pair| if pair[0].id == pair[1].id { pair[0] } else { self.at(bit).mux(pair[1], pair[0]) })
+                .collect();
         }
         entries[0]
     }

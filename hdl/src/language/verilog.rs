@@ -118,50 +118,42 @@ impl Printer<'_> {
         }
     }
 
-    /// Reads the inputs that no expression reads, so that a linter does not warn; returns the unread wires and registers.
+    /// Reads the inputs that no expression reads, so that a linter does not warn; returns the other signals, and the
+    /// wires of unnamed nodes, of which a bit is not read.
     fn unused(&mut self) -> Vec<String> {
         let kernel = self.kernel;
         let values = kernel.signals.iter().filter_map(|signal| signal.value).collect();
         let order = kernel.order(&[values, kernel.edge_roots()].concat()).unwrap_or_default();
-        let mut read: BTreeMap<SignalId, Vec<bool>> = BTreeMap::new();
-        let mut mark = |signal: SignalId, low: usize, bits: usize| {
-            let all = read.entry(signal).or_insert_with(|| vec![false; kernel.signals[signal].ty.bits]);
-            all[low..low + bits].fill(true);
+        let mut read: BTreeMap<NodeId, Vec<bool>> = BTreeMap::new();
+        let mut mark = |node: NodeId, low: usize, bits: usize| {
+            let whole = kernel.ty(node).bits;
+            read.entry(kernel.bare(node)).or_insert_with(|| vec![false; whole])[low..low + bits].fill(true);
         };
         for &node in &order {
             match &kernel.nodes[node].0 {
-                Node::Slice(a, low) => {
-                    if let Node::Signal(signal) = kernel.nodes[kernel.bare(*a)].0 {
-                        mark(signal, *low, kernel.ty(node).bits);
-                    }
-                }
-                other => {
-                    for operand in other.operands() {
-                        if let Node::Signal(signal) = kernel.nodes[kernel.bare(operand)].0 {
-                            mark(signal, 0, kernel.signals[signal].ty.bits);
-                        }
-                    }
-                }
+                Node::Slice(a, low) => mark(*a, *low, kernel.ty(node).bits),
+                other => other.operands().iter().for_each(|&operand| mark(operand, 0, kernel.ty(operand).bits)),
             }
         }
         for root in kernel.signals.iter().filter_map(|signal| signal.value).chain(kernel.edge_roots()) {
-            if let Node::Signal(signal) = kernel.nodes[kernel.bare(root)].0 {
-                mark(signal, 0, kernel.signals[signal].ty.bits);
-            }
+            mark(root, 0, kernel.ty(root).bits);
         }
-        let unread = |(id, signal): &(SignalId, &Signal)| {
-            !signal.output && !read.get(id).is_some_and(|bits| bits.iter().all(|bit| *bit))
-        };
-        let unread = kernel.signals.iter().enumerate().filter(unread).map(|(_, signal)| signal.name.clone());
+        let whole = |node: NodeId| read.get(&node).is_some_and(|bits| bits.iter().all(|bit| *bit));
+        let node_of = |id: SignalId, signal: &Signal| kernel.interned[&(Node::Signal(id), signal.ty)];
+        let signals =
+            kernel.signals.iter().enumerate().filter(|(id, signal)| !signal.output && !whole(node_of(*id, signal)));
+        let (inputs, others): (Vec<&Signal>, Vec<&Signal>) =
+            signals.map(|(_, signal)| signal).partition(|signal| signal.role == Role::Input);
         let has_edge = kernel.registers().next().is_some() || kernel.memories.iter().any(|m| !m.writes.is_empty());
         let clock = kernel.clock.iter().filter(|_| !has_edge).cloned();
-        let (inputs, wires): (Vec<String>, Vec<String>) = clock
-            .chain(unread)
-            .partition(|name| kernel.signal_of(name).is_none_or(|id| kernel.signals[id].role == Role::Input));
+        let inputs: Vec<String> = clock.chain(inputs.iter().map(|signal| signal.name.clone())).collect();
+        let parts = self.expressions.names.iter().filter(|(&node, _)| kernel.bare(node) == node && !whole(node));
+        let others =
+            others.iter().map(|signal| signal.name.clone()).chain(parts.map(|(_, name)| name.clone())).collect();
         if !inputs.is_empty() {
             self.line(&format!("wire unused = &{{1'b0, {}}};", inputs.join(", ")));
         }
-        wires
+        others
     }
 
     /// The wires of the unnamed nodes that `node` reads, itself included.
