@@ -1,11 +1,11 @@
 //! Construction of a kernel: ports, wires, registers, memories, conditions.
 
-use std::cell::RefCell;
+use std::cell::{Cell, RefCell};
 
 use super::error::KernelError;
 use super::expression::Expr;
 use super::kernel::{
-    Contents, Item, Kernel, Memory, MemoryId, Node, NodeId, Register, Role, Signal, SignalId, Type, Write,
+    Contents, Domain, Item, Kernel, Memory, MemoryId, Node, NodeId, Register, Role, Signal, SignalId, Type, Write,
 };
 
 /// Words that Verilog keeps for itself and that a block might use as names.
@@ -15,12 +15,14 @@ const KEYWORDS: [&str; 26] = [
 ];
 
 /// Builds a [`Kernel`]. Its expressions borrow it, so that Rust's operators, loops and functions compose them.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 pub struct Builder {
     pub(crate) kernel: RefCell<Kernel>,
     /// Condition of the assignments made now, innermost last.
     conditions: RefCell<Vec<NodeId>>,
     scope: RefCell<String>,
+    /// Domain of the registers declared now.
+    domain: Cell<Option<usize>>,
 }
 
 /// A declared signal, which is assigned with [`Net::set`].
@@ -56,7 +58,7 @@ impl Builder {
     /// A kernel without clock.
     pub fn combinational(block: &str) -> Self {
         let kernel = Kernel { block: block.to_owned(), ..Kernel::default() };
-        Builder { kernel: RefCell::new(kernel), conditions: RefCell::default(), scope: RefCell::default() }
+        Builder { kernel: RefCell::new(kernel), ..Builder::default() }
     }
 
     /// With the clock port of this name.
@@ -85,7 +87,7 @@ impl Builder {
 
     /// A register without reset; before its first assignment its value is undefined in hardware, 0 in the simulation.
     pub fn register(&self, name: &str, ty: Type) -> Net<'_> {
-        self.declare(name, ty, Role::Register(Register::default()))
+        self.declare(name, ty, Role::Register(Register { domain: self.domain.get(), ..Register::default() }))
     }
 
     /// `value` one cycle later: a register without reset that takes it at every clock edge.
@@ -95,17 +97,63 @@ impl Builder {
         *register
     }
 
-    /// A register that takes `value` at the clock edge while `reset` is 1.
+    /// A register that takes `value` at the clock edge while `reset` is 1; in a domain of its own, at once.
     pub fn state<'k>(&'k self, name: &str, ty: Type, reset: Expr<'k>, value: u64) -> Net<'k> {
-        let reset = Some((reset.bit("reset").id, value));
-        self.declare(name, ty, Role::Register(Register { reset, ..Register::default() }))
+        let (condition, domain) = (reset.bit("reset").id, self.domain.get());
+        if domain.is_some() {
+            self.input_of(condition, "an asynchronous reset");
+        }
+        self.declare(
+            name,
+            ty,
+            Role::Register(Register { reset: Some((condition, value)), domain, ..Register::default() }),
+        )
+    }
+
+    /// Declares the registers of `body` in a domain of their own: they change at the rising edge of input `clock`.
+    pub fn rising<'k, R>(&'k self, clock: Expr<'k>, body: impl FnOnce() -> R) -> R {
+        self.domain(clock, false, body)
+    }
+
+    /// As [`Builder::rising`], at the falling edge.
+    pub fn falling<'k, R>(&'k self, clock: Expr<'k>, body: impl FnOnce() -> R) -> R {
+        self.domain(clock, true, body)
+    }
+
+    fn domain<'k, R>(&'k self, clock: Expr<'k>, falling: bool, body: impl FnOnce() -> R) -> R {
+        let outer = self.domain.get();
+        if let Some(clock) = self.input_of(clock.id, "a clock") {
+            let domains = &mut self.kernel.borrow_mut().domains;
+            domains.push(Domain { clock, falling });
+            self.domain.set(Some(domains.len() - 1));
+        }
+        let result = body();
+        self.domain.set(outer);
+        result
+    }
+
+    /// The input of one bit that the node is; otherwise an error.
+    fn input_of(&self, id: NodeId, what: &str) -> Option<SignalId> {
+        let input = {
+            let kernel = self.kernel.borrow();
+            match kernel.nodes[id] {
+                (Node::Signal(signal), Type { bits: 1, .. }) if kernel.signals[signal].role == Role::Input => {
+                    Some(signal)
+                }
+                _ => None,
+            }
+        };
+        if input.is_none() {
+            self.width_error(Expr { builder: self, id }, format!("{what} is an input of one bit"));
+        }
+        input
     }
 
     /// A memory of `words` words of `bits` bits.
     pub fn memory(&self, name: &str, words: usize, bits: usize, contents: Contents) -> MemoryPort<'_> {
         let name = self.check_name(name);
         let mut kernel = self.kernel.borrow_mut();
-        kernel.memories.push(Memory { name, words, bits, contents, style: None, writes: Vec::new() });
+        kernel.memories.push(Memory { name, words, bits, contents, style: None, unchecked: false, writes: Vec::new() });
         MemoryPort { builder: self, memory: kernel.memories.len() - 1, bits }
     }
 
@@ -300,6 +348,12 @@ impl<'k> MemoryPort<'k> {
     /// With this value of the attribute `ram_style`.
     pub fn style(self, style: &str) -> Self {
         self.builder.kernel.borrow_mut().memories[self.memory].style = Some(style.to_owned());
+        self
+    }
+
+    /// With the attribute `no_rw_check`: what is read in the cycle of a write to the same address is not used.
+    pub fn unchecked(self) -> Self {
+        self.builder.kernel.borrow_mut().memories[self.memory].unchecked = true;
         self
     }
 }

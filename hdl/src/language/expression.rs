@@ -59,6 +59,11 @@ impl<'k> Expr<'k> {
         }
     }
 
+    /// Whether this is the same expression as `other`, of the same operands.
+    pub fn is_same(self, other: Expr<'k>) -> bool {
+        self.id == other.id
+    }
+
     /// The same bits as a two's complement number.
     pub fn signed(self) -> Self {
         self.cast(true)

@@ -129,6 +129,17 @@ pub(crate) struct Register {
     pub(crate) initial: Option<u64>,
     /// Synthesis must neither merge nor remove it.
     pub(crate) keep: bool,
+    /// Clock domain: that of the block's clock port, or one of [`Kernel::domains`].
+    pub(crate) domain: Option<usize>,
+}
+
+/// A clock domain besides that of the block's clock port. Its resets are asynchronous.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Domain {
+    /// Input that is its clock.
+    pub(crate) clock: SignalId,
+    /// Registers change at the falling edge.
+    pub(crate) falling: bool,
 }
 
 /// A named signal.
@@ -159,6 +170,8 @@ pub enum Contents {
         /// Words, limbs of 64 bits, least significant first.
         words: Vec<Vec<u64>>,
     },
+    /// Words of at most 64 bits by address, written out in the Verilog; the others are undefined, zeros in the simulation.
+    Words(Vec<(usize, u64)>),
 }
 
 /// A write port.
@@ -182,6 +195,8 @@ pub struct Memory {
     pub contents: Contents,
     /// Value of the attribute `ram_style`: `block`, `distributed`; none leaves the choice to synthesis.
     pub style: Option<String>,
+    /// What is read in the cycle of a write to the same address is not used: attribute `no_rw_check`.
+    pub unchecked: bool,
     pub(crate) writes: Vec<Write>,
 }
 
@@ -199,6 +214,7 @@ pub(crate) enum Item {
 pub struct Kernel {
     pub(crate) block: String,
     pub(crate) clock: Option<String>,
+    pub(crate) domains: Vec<Domain>,
     pub(crate) nodes: Vec<(Node, Type)>,
     pub(crate) interned: HashMap<(Node, Type), NodeId>,
     pub(crate) signals: Vec<Signal>,

@@ -2,10 +2,11 @@
 //!
 //! At a clock edge the next values are computed from the state and the inputs, then taken all at once. Combinational
 //! outputs are computed after an edge and when an input changed. Where neither an input nor a register changed since
-//! the last edge, nothing is computed.
+//! the last edge, nothing is computed. The clocks of other domains are inputs; their edges and resets act before the
+//! outputs are computed.
 
 use super::compile::{limbs, mask, Op, Operand, Program, Wide};
-use super::kernel::{Binary, Contents, Kernel, Node, Role, Unary};
+use super::kernel::{Binary, Contents, Domain, Kernel, Node, Role, Unary};
 
 /// A register's transition: its slot, the next value, the reset.
 #[derive(Clone, Debug)]
@@ -14,6 +15,7 @@ struct Transition {
     next: usize,
     limbs: usize,
     reset: Option<(usize, u64)>,
+    domain: Option<usize>,
 }
 
 /// A write port in slots.
@@ -43,6 +45,8 @@ pub struct Simulation {
     /// Next values of the registers, before they are taken.
     staged: Vec<u64>,
     writes: Vec<WritePort>,
+    /// Clock of each other domain: slot, whether its falling edge counts, its last level.
+    clocks: Vec<(usize, bool, bool)>,
     /// An input or a register changed since the next values were computed.
     changed: bool,
 }
@@ -67,7 +71,7 @@ impl Simulation {
             slots[node(own)] = sign(register.initial.unwrap_or(0));
             let reset = register.reset.map(|(condition, value)| (node(condition), sign(value)));
             let limbs = limbs(of.ty.bits) as usize;
-            transitions.push(Transition { to: node(own), next: node(next), limbs, reset });
+            transitions.push(Transition { to: node(own), next: node(next), limbs, reset, domain: register.domain });
         }
         let mut writes = Vec::new();
         for (memory, of) in kernel.memories.iter().enumerate() {
@@ -81,16 +85,26 @@ impl Simulation {
         let memories = kernel.memories.iter().map(|memory| {
             let limbs = limbs(memory.bits) as usize;
             let mut content = vec![0; memory.words * limbs];
-            if let Contents::File { words, .. } = &memory.contents {
-                for (to, word) in content.chunks_mut(limbs).zip(words) {
-                    to[..word.len()].copy_from_slice(word);
+            match &memory.contents {
+                Contents::File { words, .. } => {
+                    let each = content.chunks_mut(limbs).zip(words);
+                    each.for_each(|(to, word)| to[..word.len()].copy_from_slice(word));
                 }
+                Contents::Words(words) => {
+                    words.iter().for_each(|&(address, word)| content[address * limbs] = word);
+                }
+                Contents::Undefined => {}
             }
             Words { words: memory.words, limbs, content }
         });
         let staged = vec![0; transitions.iter().map(|transition| transition.limbs).sum()];
         let memories = memories.collect();
-        Simulation { slots, memories, transitions, staged, writes, changed: true, program }
+        let clock = |&Domain { clock, falling }: &Domain| {
+            let own = kernel.interned[&(Node::Signal(clock), kernel.signals[clock].ty)];
+            (node(own), falling, false)
+        };
+        let clocks = kernel.domains.iter().map(clock).collect();
+        Simulation { clocks, slots, memories, transitions, staged, writes, changed: true, program }
     }
 
     /// Sets an input from its limbs; `signal` as from [`Simulation::slot_of`].
@@ -120,13 +134,18 @@ impl Simulation {
 
     /// A rising edge of the clock.
     pub fn clock(&mut self) {
-        if !self.changed {
-            return;
+        if self.changed {
+            self.changed = self.edge(None);
         }
+    }
+
+    /// An edge of one domain; says whether anything changed.
+    fn edge(&mut self, domain: Option<usize>) -> bool {
         let Simulation { program, slots, memories, transitions, staged, writes, .. } = self;
+        let own = |transition: &&Transition| transition.domain == domain;
         run(&program.edge, &program.wide, slots, memories);
         let mut at = 0;
-        for transition in transitions.iter() {
+        for transition in transitions.iter().filter(own) {
             let own = &mut staged[at..][..transition.limbs];
             match transition.reset {
                 Some((condition, value)) if slots[condition] != 0 => {
@@ -138,7 +157,7 @@ impl Simulation {
             at += transition.limbs;
         }
         let mut changed = false;
-        for write in writes.iter().filter(|write| slots[write.enable] != 0) {
+        for write in writes.iter().filter(|write| domain.is_none() && slots[write.enable] != 0) {
             let memory = &mut memories[write.memory];
             let address = slots[write.address] as usize;
             if address < memory.words {
@@ -149,7 +168,7 @@ impl Simulation {
             }
         }
         let mut at = 0;
-        for transition in transitions.iter() {
+        for transition in transitions.iter().filter(own) {
             let own = &mut slots[transition.to..][..transition.limbs];
             let next = &staged[at..][..transition.limbs];
             if own != next {
@@ -158,11 +177,32 @@ impl Simulation {
             }
             at += transition.limbs;
         }
-        self.changed = changed;
+        changed
+    }
+
+    /// Edges and resets of the other domains since the last call.
+    fn follow(&mut self) {
+        for domain in 0..self.clocks.len() {
+            let (slot, falling, before) = self.clocks[domain];
+            let level = self.slots[slot] != 0;
+            self.clocks[domain].2 = level;
+            if level != before && before == falling {
+                self.changed |= self.edge(Some(domain));
+            }
+        }
+        for transition in self.transitions.iter().filter(|transition| transition.domain.is_some()) {
+            if let Some((_, value)) = transition.reset.filter(|(condition, _)| self.slots[*condition] != 0) {
+                let own = &mut self.slots[transition.to..][..transition.limbs];
+                self.changed |= own[0] != value || own[1..].iter().any(|&limb| limb != 0);
+                own.fill(0);
+                own[0] = value;
+            }
+        }
     }
 
     /// Computes the combinational outputs.
     pub fn show(&mut self) {
+        self.follow();
         run(&self.program.show, &self.program.wide, &mut self.slots, &self.memories);
     }
 }

@@ -74,6 +74,16 @@ fn each_error_names_block_signal_and_expression() {
     k.constant(3, 8);
     assert_eq!(first_error(k), "block b: `3'd8`: 8 needs more bits");
 
+    let k = Builder::new("b");
+    let (a, c) = (k.input("a", 1), k.input("c", 1));
+    k.falling(c, || k.state("r", Type::unsigned(1), !a, 0).set(a));
+    assert_eq!(first_error(k), "block b: `~a`: an asynchronous reset is an input of one bit");
+
+    let k = Builder::new("b");
+    let a = k.input("a", 2);
+    k.rising(a, || k.register("r", Type::unsigned(2)).set(a));
+    assert_eq!(first_error(k), "block b: `a`: a clock is an input of one bit");
+
     for (name, reason) in
         [("a", "the name is used twice"), ("a$b", "not a Verilog identifier"), ("reg", "a keyword of Verilog")]
     {
@@ -375,6 +385,59 @@ impl Reference for State {
 #[test]
 fn registers_and_memories_are_those_of_the_reference() {
     check(&state(), &random_words(3000, &[1, 1, 1, 70, 3]), &mut State::default());
+}
+
+/// Registers at both edges of a second clock, with a reset that acts at once; a memory with words in the text.
+fn clocks() -> Kernel {
+    let k = Builder::new("clocks");
+    let (other, clear, data) = (k.input("other", 1), k.input("clear", 1), k.input("data", 4));
+    let ty = Type::unsigned(4);
+    let down = k.falling(other, || k.state("down", ty, clear, 9));
+    let up = k.rising(other, || k.register("up", ty));
+    down.set((*down + data).low(4));
+    up.set(*down);
+    k.register("here", ty).set(*up);
+    let rom = k.memory("rom", 16, 4, Contents::Words((0..16).map(|word| (word, word as u64 * 7 % 16)).collect()));
+    k.register("word", ty).set(rom.read(data));
+    bound(k.finish(), &[("down", 4), ("up", 4), ("here", 4), ("word", 4)])
+}
+
+#[derive(Default)]
+struct Clocks {
+    level: bool,
+    down: Option<u64>,
+    up: Option<u64>,
+    here: Option<u64>,
+    word: Option<u64>,
+}
+
+impl Reference for Clocks {
+    fn outputs(&mut self, inputs: &[Word]) -> Vec<Option<Word>> {
+        let [other, clear, data] = [0, 1, 2].map(|k| inputs[k].number());
+        match (self.level, other == 1) {
+            (false, true) => self.up = self.down,
+            (true, false) => self.down = self.down.map(|down| (down + data) % 16),
+            _ => {}
+        }
+        self.level = other == 1;
+        if clear == 1 {
+            self.down = Some(9);
+        }
+        [self.down, self.up, self.here, self.word].map(|value| value.map(Word::from)).to_vec()
+    }
+
+    fn clock(&mut self, inputs: &[Word]) {
+        self.here = self.up;
+        self.word = Some(inputs[2].number() * 7 % 16);
+    }
+}
+
+#[test]
+fn registers_of_other_clocks_follow_their_edges_and_resets() {
+    let mut all = stimulus(3000, &[1, 1, 4]);
+    // Verilator sees the edges after the first cycle.
+    all[0] = vec![Word::default(); 3];
+    check(&clocks(), &all, &mut Clocks::default());
 }
 
 #[test]

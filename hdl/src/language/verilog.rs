@@ -6,7 +6,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use super::kernel::{Contents, Item, Kernel, Memory, Node, NodeId, Role, Signal, SignalId};
+use super::kernel::{Contents, Domain, Item, Kernel, Memory, Node, NodeId, Role, Signal, SignalId};
 use super::text::{number, Text};
 
 struct Printer<'a> {
@@ -31,7 +31,7 @@ impl Kernel {
     pub fn memory_files(&self) -> Vec<(String, String)> {
         let files = self.memories.iter().filter_map(|memory| match &memory.contents {
             Contents::File { name, words } => Some((name.clone(), memory_text(memory.bits, words))),
-            Contents::Undefined => None,
+            Contents::Words(_) | Contents::Undefined => None,
         });
         files.collect()
     }
@@ -81,7 +81,11 @@ impl Printer<'_> {
             self.own_wires(root);
         }
         if let Some(clock) = &kernel.clock {
-            self.clocked(clock);
+            self.clocked(&format!("posedge {clock}"), None);
+        }
+        for (index, Domain { clock, falling }) in kernel.domains.iter().enumerate() {
+            let edge = if *falling { "negedge" } else { "posedge" };
+            self.clocked(&format!("{edge} {}", kernel.signals[*clock].name), Some(index));
         }
         if !unread.is_empty() {
             self.line(&format!("wire unused_signals = &{{1'b0, {}}};", unread.join(", ")));
@@ -90,12 +94,22 @@ impl Printer<'_> {
 
     fn declare_memory(&mut self, memory: &Memory) {
         let Memory { name, words, bits, .. } = memory;
-        if let Some(style) = &memory.style {
-            self.line(&format!("(* ram_style = \"{style}\" *)"));
+        let style = memory.style.iter().map(|style| format!("ram_style = \"{style}\""));
+        let attributes: Vec<String> = style.chain(memory.unchecked.then(|| "no_rw_check".to_owned())).collect();
+        if !attributes.is_empty() {
+            self.line(&format!("(* {} *)", attributes.join(", ")));
         }
         self.line(&format!("reg [{}:0] {name} [0:{}];", bits - 1, words - 1));
-        if let Contents::File { name: file, .. } = &memory.contents {
-            self.line(&format!("initial $readmemh(\"{file}\", {name});"));
+        match &memory.contents {
+            Contents::File { name: file, .. } => self.line(&format!("initial $readmemh(\"{file}\", {name});")),
+            Contents::Words(words) => {
+                self.line("initial begin");
+                for (address, word) in words {
+                    self.line(&format!("  {name}[{address}] = {};", number(*bits, &[*word])));
+                }
+                self.line("end");
+            }
+            Contents::Undefined => {}
         }
     }
 
@@ -124,6 +138,7 @@ impl Printer<'_> {
         let kernel = self.kernel;
         let values = kernel.signals.iter().filter_map(|signal| signal.value).collect();
         let order = kernel.order(&[values, kernel.edge_roots()].concat()).unwrap_or_default();
+        let node_of = |id: SignalId| kernel.interned[&(Node::Signal(id), kernel.signals[id].ty)];
         let mut read: BTreeMap<NodeId, Vec<bool>> = BTreeMap::new();
         let mut mark = |node: NodeId, low: usize, bits: usize| {
             let whole = kernel.ty(node).bits;
@@ -135,16 +150,18 @@ impl Printer<'_> {
                 other => other.operands().iter().for_each(|&operand| mark(operand, 0, kernel.ty(operand).bits)),
             }
         }
+        for domain in &kernel.domains {
+            mark(node_of(domain.clock), 0, 1);
+        }
         for root in kernel.signals.iter().filter_map(|signal| signal.value).chain(kernel.edge_roots()) {
             mark(root, 0, kernel.ty(root).bits);
         }
         let whole = |node: NodeId| read.get(&node).is_some_and(|bits| bits.iter().all(|bit| *bit));
-        let node_of = |id: SignalId, signal: &Signal| kernel.interned[&(Node::Signal(id), signal.ty)];
-        let signals =
-            kernel.signals.iter().enumerate().filter(|(id, signal)| !signal.output && !whole(node_of(*id, signal)));
+        let signals = kernel.signals.iter().enumerate().filter(|(id, signal)| !signal.output && !whole(node_of(*id)));
         let (inputs, others): (Vec<&Signal>, Vec<&Signal>) =
             signals.map(|(_, signal)| signal).partition(|signal| signal.role == Role::Input);
-        let has_edge = kernel.registers().next().is_some() || kernel.memories.iter().any(|m| !m.writes.is_empty());
+        let has_edge = kernel.registers().any(|(_, _, register)| register.domain.is_none())
+            || kernel.memories.iter().any(|m| !m.writes.is_empty());
         let clock = kernel.clock.iter().filter(|_| !has_edge).cloned();
         let inputs: Vec<String> = clock.chain(inputs.iter().map(|signal| signal.name.clone())).collect();
         let parts = self.expressions.names.iter().filter(|(&node, _)| kernel.bare(node) == node && !whole(node));
@@ -181,11 +198,12 @@ impl Printer<'_> {
         }
     }
 
-    fn clocked(&mut self, clock: &str) {
+    /// The registers that change at this edge; the memories are in the domain of the block's clock port.
+    fn clocked(&mut self, edge: &str, domain: Option<usize>) {
         let kernel = self.kernel;
         let mut free: [Vec<String>; 2] = Default::default();
         let mut reset: BTreeMap<NodeId, [Vec<String>; 2]> = BTreeMap::new();
-        for memory in &kernel.memories {
+        for memory in kernel.memories.iter().filter(|_| domain.is_none()) {
             for write in &memory.writes {
                 let assign = format!(
                     "{}[{}] <= {};",
@@ -196,7 +214,7 @@ impl Printer<'_> {
                 free[0].push(format!("if ({}) {assign}", self.expressions.root(write.enable)));
             }
         }
-        for (id, signal, register) in kernel.registers() {
+        for (id, signal, register) in kernel.registers().filter(|(_, _, register)| register.domain == domain) {
             let Some(next) = signal.value else { continue };
             let own = kernel.interned[&(Node::Signal(id), signal.ty)];
             let mut lines = Vec::new();
@@ -213,13 +231,15 @@ impl Printer<'_> {
         let [plain, kept] = free;
         for (lines, attribute) in [(plain, ""), (kept, "(* keep *) ")] {
             if !lines.is_empty() {
-                self.line(&format!("{attribute}always @(posedge {clock}) begin"));
+                self.line(&format!("{attribute}always @({edge}) begin"));
                 lines.iter().for_each(|line| self.line(&format!("  {line}")));
                 self.line("end");
             }
         }
         for (condition, [under, after]) in reset {
-            self.line(&format!("always @(posedge {clock}) begin\n  if ({}) begin", self.expressions.root(condition)));
+            let condition = self.expressions.root(condition);
+            let at_once = domain.map(|_| format!(" or posedge {condition}")).unwrap_or_default();
+            self.line(&format!("always @({edge}{at_once}) begin\n  if ({condition}) begin"));
             under.iter().for_each(|line| self.line(&format!("    {line}")));
             self.line("  end else begin");
             after.iter().for_each(|line| self.line(&format!("    {line}")));

@@ -9,9 +9,10 @@ use crate::{engine, serial};
 
 /// Board top `$name` with engine `$engine` and link block `$block`, which `$line` builds from an identity. A macro,
 /// because rust-hdl connects blocks by their fields and does not support type parameters for them. The pins are named
-/// as in the link block.
+/// as in the link block. A link that can receive a byte wrongly has an output for it, `$broken`; otherwise `$never` is
+/// `false`.
 macro_rules! board_top {
-    ($name:ident, $engine:ty, $block:ty, $line:expr, [$($input:ident),+] -> $output:ident) => {
+    ($name:ident, $engine:ty, $block:ty, $line:expr, [$($input:ident),+] -> $output:ident, [$($broken:ident)?], [$($never:tt)?]) => {
         /// ```text
         ///               +-----------+
         ///  link's pins <->  board   |
@@ -99,7 +100,8 @@ macro_rules! board_top {
                 self.$output.next = self.line.$output.val();
                 self.link.receive_data.next = self.line.data.val();
                 self.link.receive_valid.next = self.line.valid.val();
-                self.link.receive_broken.next = self.line.broken.val();
+                $(self.link.receive_broken.next = self.line.$broken.val();)?
+                $(self.link.receive_broken.next = $never;)?
                 self.line.send_data.next = self.link.send_data.val();
                 self.line.send_valid.next = self.link.send_valid.val();
                 self.link.send_ready.next = self.line.send_ready.val();
@@ -147,8 +149,8 @@ macro_rules! board_top {
 /// Board tops for the two links of an engine.
 macro_rules! boards {
     ($uart:ident, $spi:ident, $engine:ty) => {
-        board_top!($uart, $engine, Uart, Uart::new, [uart_rx] -> uart_tx);
-        board_top!($spi, $engine, SpiSlave, |_| SpiSlave::default(), [spi_sclk, spi_cs_n, spi_mosi] -> spi_miso);
+        board_top!($uart, $engine, Uart, Uart::new, [uart_rx] -> uart_tx, [broken], []);
+        board_top!($spi, $engine, SpiSlave, |_| SpiSlave::default(), [spi_sclk, spi_cs_n, spi_mosi] -> spi_miso, [], [false]);
     };
 }
 

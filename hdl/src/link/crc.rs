@@ -3,7 +3,9 @@
 use dermis_golden::link::CRC_RESIDUE;
 use rust_hdl::prelude::*;
 
-use crate::wire::{Wire, Word};
+use crate::kernel_block;
+use crate::language::{Body, Builder, Kernel, Type};
+use crate::wire::Wire;
 
 /// Initial value of the CRC register.
 const START: u32 = u32::MAX;
@@ -36,13 +38,14 @@ pub struct Crc {
     pub right: Signal<Out, Bit>,
     /// A byte is being processed.
     pub busy: Signal<Out, Bit>,
-    _crc: u32,
-    _left: u32,
+    kernel: Body,
 }
+
+kernel_block!(Crc, clock clk, inputs [restart, octet, load], outputs [low, right, busy]);
 
 impl Default for Crc {
     fn default() -> Self {
-        Crc {
+        let block = Crc {
             clk: Default::default(),
             restart: Default::default(),
             octet: Wire::new(8),
@@ -50,96 +53,118 @@ impl Default for Crc {
             low: Wire::new(8),
             right: Default::default(),
             busy: Default::default(),
-            _crc: START,
-            _left: 0,
-        }
+            kernel: Body::default(),
+        };
+        block.bind(kernel())
     }
 }
 
-impl Logic for Crc {
-    fn update(&mut self) {
-        if self.clk.pos_edge() {
-            if self.restart.val() {
-                (self._crc, self._left) = (START, 0);
-            } else if self.load.val() {
-                self._crc ^= self.octet.val().number() as u32;
-                self._left = CYCLES;
-            } else if self._left > 0 {
-                for _ in 0..8 / CYCLES {
-                    let feedback = if self._crc & 1 == 1 { POLYNOMIAL } else { 0 };
-                    self._crc = self._crc >> 1 ^ feedback;
-                }
-                self._left -= 1;
-            }
-        }
-        self.low.next = Word::from(u64::from(!self._crc & 0xff));
-        self.right.next = self._crc == CRC_RESIDUE;
-        self.busy.next = self._left > 0;
-    }
-
-    fn connect(&mut self) {
-        self.low.connect();
-        self.right.connect();
-        self.busy.connect();
-    }
-
-    fn hdl(&self) -> Verilog {
-        Verilog::Custom(format!(
-            "\
-reg [31:0] crc;
-reg [2:0] left;
-always @(*) begin
-  low = ~crc[7:0];
-  right = crc == 32'h{CRC_RESIDUE:x};
-  busy = left != 3'd0;
-end
-always @(posedge clk) begin
-  if (restart) begin
-    crc <= 32'h{START:x};
-    left <= 3'd0;
-  end else if (load) begin
-    crc[7:0] <= crc[7:0] ^ octet;
-    left <= 3'd{CYCLES};
-  end else if (busy) begin
-    crc <= {{2'd0, crc[31:2]}} ^ (crc[0] ? 32'h{BEFORE:x} : 32'd0) ^ (crc[1] ? 32'h{POLYNOMIAL:x} : 32'd0);
-    left <= left - 3'd1;
-  end
-end"
-        ))
-    }
+fn kernel() -> Kernel {
+    let k = Builder::new("crc");
+    let (restart, octet, load) = (k.input("restart", 1), k.input("octet", 8), k.input("load", 1));
+    let crc = k.state("crc", Type::unsigned(32), restart, START.into());
+    let left = k.state("left", Type::unsigned(3), restart, 0);
+    let busy = k.wire("busy", left.any());
+    k.wire("low", !crc.low(8));
+    k.wire("right", crc.is(CRC_RESIDUE.into()));
+    let feedback = |bit: usize, polynomial: u32| crc.at(bit).mux(k.constant(32, polynomial.into()), k.constant(32, 0));
+    k.when(busy, || {
+        crc.set(crc.slice(2, 30).extend(32) ^ feedback(0, BEFORE) ^ feedback(1, POLYNOMIAL));
+        left.set(left.minus(1));
+    });
+    k.when(load, || {
+        crc.set(crc.slice(8, 24).concat(crc.low(8) ^ octet));
+        left.set(k.constant(3, CYCLES.into()));
+    });
+    k.finish()
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::simulate::settles;
+    use crate::language::testbench::{check, simulated, Reference};
+    use crate::wire::Word;
 
-    fn add(crc: &mut Crc, octet: u8) {
-        for cycle in 0..=CYCLES {
-            crc.octet.next = Word::from(u64::from(octet));
-            crc.load.next = cycle == 0;
-            for clock in [false, true] {
-                crc.clk.next = clock.into();
-                assert!(settles(crc));
+    /// The CRC of the bytes so far, inverted, bit by bit as in its definition.
+    fn crc_32(bytes: &[u8]) -> u32 {
+        let bit = |crc: u32, _| crc >> 1 ^ if crc & 1 == 1 { POLYNOMIAL } else { 0 };
+        bytes.iter().fold(START, |crc, &byte| (0..8).fold(crc ^ u32::from(byte), bit))
+    }
+
+    /// The bytes of the packet, the cycles that the last one still takes.
+    #[derive(Default)]
+    struct Bytes {
+        bytes: Vec<u8>,
+        left: u32,
+        started: bool,
+    }
+
+    impl Reference for Bytes {
+        fn outputs(&mut self, _: &[Word]) -> Vec<Option<Word>> {
+            let crc = (self.started && self.left == 0).then(|| crc_32(&self.bytes));
+            vec![
+                self.started.then(|| Word::from(self.left > 0)),
+                crc.map(|crc| Word::from(u64::from(!crc & 0xff))),
+                crc.map(|crc| Word::from(crc == CRC_RESIDUE)),
+            ]
+        }
+
+        fn clock(&mut self, inputs: &[Word]) {
+            let [restart, octet, load] = [0, 1, 2].map(|k| inputs[k].number());
+            self.left = if load == 1 { CYCLES } else { self.left.saturating_sub(1) };
+            if load == 1 {
+                self.bytes.push(octet as u8);
+            }
+            if restart == 1 {
+                *self = Bytes { started: true, ..Bytes::default() };
             }
         }
     }
 
-    #[test]
-    fn the_published_check_value_and_the_residue() {
-        let mut crc = Crc::default();
-        crc.connect_all();
-        b"123456789".iter().for_each(|&octet| add(&mut crc, octet));
-        // CRC-32/ISO-HDLC of "123456789".
-        assert_eq!(!crc._crc, 0xcbf4_3926);
-        // Sending the CRC by its own low bytes leaves zero in the register.
-        let mut out = Crc { _crc: crc._crc, ..Crc::default() };
-        out.connect_all();
-        for octet in 0xcbf4_3926u32.to_le_bytes() {
-            assert_eq!(out._crc as u8, !octet);
-            add(&mut out, !octet);
-            add(&mut crc, octet);
+    /// Packets of random bytes, some with their CRC appended, with pauses and restarts at any time.
+    fn stimulus(cycles: usize) -> Vec<Vec<Word>> {
+        let mut random = fastrand::Rng::with_seed(6);
+        let mut bytes = Bytes::default();
+        let mut all = Vec::new();
+        for cycle in 0..cycles {
+            let restart = cycle < 2 || random.u8(..120) == 0;
+            let load = bytes.left == 0 && random.u8(..4) > 0;
+            // The bytes of the CRC take the register to its residue.
+            let octet = match bytes.bytes.len() {
+                4..=7 => (!crc_32(&bytes.bytes[..4]) >> (8 * (bytes.bytes.len() - 4))) as u8,
+                _ => random.u8(..),
+            };
+            let inputs = vec![Word::from(restart), Word::from(u64::from(octet)), Word::from(load)];
+            bytes.clock(&inputs);
+            all.push(inputs);
         }
-        assert_eq!((out._crc, crc._crc), (0, CRC_RESIDUE));
+        all
+    }
+
+    #[test]
+    fn bytes_at_any_distance_give_the_crc_of_its_definition() {
+        // CRC-32/ISO-HDLC of "123456789".
+        assert_eq!(!crc_32(b"123456789"), 0xcbf4_3926);
+        let (block, all) = (Crc::default(), stimulus(6000));
+        check(block.kernel.kernel(), &all, &mut Bytes::default());
+        let right = simulated(block.kernel.kernel(), &all).iter().filter(|outputs| outputs[2].number() == 1).count();
+        assert!(right > 20, "{right} cycles with a correct CRC");
+    }
+
+    #[test]
+    fn loading_its_own_low_byte_sends_the_crc() {
+        let load = |octet: u8| {
+            let inputs = move |at| vec![Word::from(false), Word::from(u64::from(octet)), Word::from(at == 0)];
+            (0..=CYCLES).map(inputs)
+        };
+        let crc = 0xcbf4_3926u32.to_le_bytes();
+        let mut all = vec![vec![Word::from(true), Word::default(), Word::default()]];
+        all.extend(b"123456789".iter().copied().chain(crc.map(|octet| !octet)).flat_map(load));
+        let outputs = simulated(Crc::default().kernel.kernel(), &all);
+        // The low byte before each byte of the CRC is that byte; its inverse clears the register.
+        for (at, &octet) in crc.iter().enumerate() {
+            let cycle = 1 + (9 + at) * (CYCLES as usize + 1);
+            assert_eq!(outputs[cycle][1].number(), u64::from(octet), "byte {at}");
+        }
     }
 }

@@ -2,22 +2,22 @@
 //!
 //! ```text
 //!                        .------------------------- packet_link ---------------------------.
-//! pins ---> line: uart, -> slip_decoder -> parser -> feeder ----------------------> s_axis |
+//! pins ---> line: uart, -> slip_decoder -> parser -> frame_ingress ---------------> s_axis |
 //!           or spi_slave |                     '-> requests                            engine
-//! pins <--- of the link <- slip_encoder <- packer <- sources <- resultants, ledger <- m_axis
+//! pins <--- of the link <- slip_encoder <- packer <- sources <- resultants, counter_ram <- m_axis
 //! ```
 //! The packets are those of [`dermis_golden::link`]. Any block that carries bytes both ways can replace the UART or the
 //! SPI slave; a board has one of them.
 //!
-//! `board_top`, `packet_link` and `uart` are `#[hdl_gen]` kernels; the other blocks have a Rust `update()` for
-//! rust-hdl's simulation and hand-written Verilog, which co-simulation compares.
+//! `board_top`, `packet_link` and `uart` connect blocks by `#[hdl_gen]`; each other block is one
+//! [kernel](crate::language).
 
 mod board_top;
+mod counter_ram;
 mod crc;
-mod feeder;
+mod frame_ingress;
 mod generate;
 mod lamps;
-mod ledger;
 mod packer;
 mod packet_link;
 mod parser;
@@ -35,11 +35,11 @@ mod uart_receiver;
 mod uart_transmitter;
 
 pub use board_top::{BoardTop, SerialBoardTop, SerialSpiBoardTop, SpiBoardTop};
+pub use counter_ram::CounterRam;
 pub use crc::Crc;
-pub use feeder::Feeder;
+pub use frame_ingress::FrameIngress;
 pub use generate::generate_board;
 pub use lamps::Lamps;
-pub use ledger::Ledger;
 pub use packer::Packer;
 pub use packet_link::PacketLink;
 pub use parser::Parser;

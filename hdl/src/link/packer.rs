@@ -3,7 +3,9 @@
 use dermis_golden::link::ANSWER;
 use rust_hdl::prelude::*;
 
-use crate::wire::{Wire, Word};
+use crate::kernel_block;
+use crate::language::{Body, Builder, Kernel, Type};
+use crate::wire::Wire;
 
 /// Sends SLIP END, header, words of twelve bytes up to the last, CRC, SLIP END.
 ///
@@ -59,19 +61,17 @@ pub struct Packer {
     pub valid: Signal<Out, Bit>,
     /// The byte is accepted in this cycle.
     pub ready: Signal<In, Bit>,
-    _lengths: [usize; 4],
-    _state: State,
+    kernel: Body,
 }
 
-#[derive(Clone, Copy, Debug, Default)]
-struct State {
-    stage: u64,
-    index: u64,
-    source: usize,
-    number: u64,
-    octet: u64,
-    offered: bool,
-}
+kernel_block!(
+    Packer,
+    clock clk,
+    inputs [rst, offer, number, offered_source, octet, word_valid, word_last, crc_low, crc_busy, ready],
+    outputs [
+        begun, source, wanted, index, taken, halfway, crc_restart, crc_octet, crc_load, content, border, valid
+    ]
+);
 
 const IDLE: u64 = 0;
 const OPEN: u64 = 1;
@@ -79,11 +79,13 @@ const HEADER: u64 = 2;
 const WORDS: u64 = 3;
 const SUM: u64 = 4;
 const CLOSE: u64 = 5;
+/// Index of the last byte of a word; of the header and of the CRC.
+const LAST: [u64; 2] = [11, 3];
 
 impl Packer {
     /// `lengths` are the bytes of the payload, by source.
     pub fn new(lengths: [usize; 4]) -> Self {
-        Packer {
+        let block = Packer {
             clk: Default::default(),
             rst: Default::default(),
             offer: Default::default(),
@@ -107,146 +109,174 @@ impl Packer {
             border: Default::default(),
             valid: Default::default(),
             ready: Default::default(),
-            _lengths: lengths,
-            _state: State::default(),
-        }
-    }
-
-    /// `index` is the last of the stage.
-    fn at_end(&self) -> bool {
-        let s = self._state;
-        s.index == if s.stage == WORDS { 11 } else { 3 }
-    }
-
-    fn goes(&self) -> bool {
-        self._state.offered && self.ready.val()
-    }
-
-    fn next(&self) -> State {
-        let s = self._state;
-        let mut next = s;
-        if s.stage == IDLE {
-            next.source = self.offered_source.val().number() as usize;
-            next.number = self.number.val().number();
-            next.stage = if self.offer.val() { OPEN } else { IDLE };
-        }
-        if !s.offered {
-            let length = self._lengths[s.source] as u64;
-            let header = [u64::from(ANSWER) + s.source as u64 + 1, s.number, length & 0xff, length >> 8];
-            next.octet = match s.stage {
-                HEADER => header[(s.index & 3) as usize],
-                SUM => self.crc_low.val().number(),
-                _ => self.octet.val().number(),
-            };
-            next.offered = match s.stage {
-                IDLE => false,
-                OPEN | CLOSE => true,
-                WORDS => !self.crc_busy.val() && self.word_valid.val(),
-                _ => !self.crc_busy.val(),
-            };
-        } else if self.ready.val() {
-            next.offered = false;
-            let border = s.stage == OPEN || s.stage == CLOSE;
-            next.index = if border || self.at_end() { 0 } else { s.index + 1 };
-            next.stage = match s.stage {
-                CLOSE => IDLE,
-                WORDS if self.at_end() && !self.word_last.val() => WORDS,
-                stage if border || self.at_end() => stage + 1,
-                stage => stage,
-            };
-        }
-        if self.rst.val() {
-            (next.stage, next.index, next.offered) = (IDLE, 0, false);
-        }
-        next
+            kernel: Body::default(),
+        };
+        block.bind(kernel(lengths))
     }
 }
 
-impl Logic for Packer {
-    fn update(&mut self) {
-        if self.clk.pos_edge() {
-            self._state = self.next();
+fn kernel(lengths: [usize; 4]) -> Kernel {
+    let k = Builder::new("packer");
+    let (rst, offer, number) = (k.input("rst", 1), k.input("offer", 1), k.input("number", 8));
+    let (offered_source, octet) = (k.input("offered_source", 2), k.input("octet", 8));
+    let (word_valid, word_last) = (k.input("word_valid", 1), k.input("word_last", 1));
+    let (crc_low, crc_busy, ready) = (k.input("crc_low", 8), k.input("crc_busy", 1), k.input("ready", 1));
+    let stage = k.state("stage", Type::unsigned(3), rst, IDLE);
+    let index = k.state("index", Type::unsigned(4), rst, 0);
+    let source = k.register("source", Type::unsigned(2));
+    let [kept, content] = ["kept", "content"].map(|name| k.register(name, Type::unsigned(8)));
+    let valid = k.state("valid", Type::unsigned(1), rst, 0);
+
+    let idle = k.wire("idle", stage.is(IDLE));
+    let words = k.wire("wanted", stage.is(WORDS));
+    let border = k.wire("border", stage.is(OPEN) | stage.is(CLOSE));
+    let [last_of_word, last] = LAST.map(|last| k.constant(4, last));
+    let at_end = k.wire("at_end", index.equals(words.mux(last_of_word, last)));
+    let goes = k.wire("goes", *valid & ready);
+    let of = |at: usize| k.constant(16, lengths[at] as u64);
+    let high = source.at(1);
+    let length = k.wire("length", high.mux(source.at(0).mux(of(3), of(2)), source.at(0).mux(of(1), of(0))));
+    let first = k.constant(8, u64::from(ANSWER) + 1);
+    let start = index.at(0).mux(*kept, (first + *source).low(8));
+    let header = k.wire("header", index.at(1).mux(index.at(0).mux(length.slice(8, 8), length.low(8)), start));
+    let begun = k.wire("begun", idle & offer);
+    k.wire("halfway", !*valid & index.at(0));
+    k.wire("crc_restart", stage.is(OPEN));
+    k.wire("crc_octet", stage.is(SUM).mux(!*content, *content));
+    k.wire("taken", goes & words & at_end);
+    k.wire("crc_load", goes & !border);
+
+    // Stored every cycle while idle: `offer` settles late.
+    k.when(idle, || {
+        source.set(offered_source);
+        kept.set(number);
+    });
+    let next = stage.is(HEADER).mux(header, stage.is(SUM).mux(crc_low, octet));
+    k.when(!*valid, || content.set(next));
+    let stands = k.wire("stands", border | (!idle & !crc_busy & (!words | word_valid)));
+    valid.set(valid.mux(!ready, stands));
+    k.when(begun, || stage.set(k.constant(3, OPEN)));
+    k.when(goes, || {
+        index.set((border | at_end).mux(k.constant(4, 0), index.plus(1)));
+        k.when(border | (at_end & (!words | word_last)), || stage.set(stage.plus(1)));
+        k.when(stage.is(CLOSE), || stage.set(k.constant(3, IDLE)));
+    });
+    k.finish()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::language::testbench::{check, Reference};
+    use crate::wire::Word;
+
+    const LENGTHS: [usize; 4] = [24, 12, 0x234, 0xfeed];
+
+    /// Position in the packet; the byte on offer.
+    #[derive(Default)]
+    struct Sending {
+        stage: u64,
+        index: u64,
+        source: Option<usize>,
+        number: u64,
+        offered: Option<u8>,
+        reset: bool,
+    }
+
+    impl Sending {
+        fn border(&self) -> bool {
+            matches!(self.stage, OPEN | CLOSE)
         }
-        let s = self._state;
-        let border = s.stage == OPEN || s.stage == CLOSE;
-        self.begun.next = s.stage == IDLE && self.offer.val();
-        self.source.next = Word::from(s.source as u64);
-        self.wanted.next = s.stage == WORDS;
-        self.index.next = Word::from(s.index);
-        self.taken.next = self.goes() && s.stage == WORDS && self.at_end();
-        self.halfway.next = !s.offered && s.index & 1 == 1;
-        self.crc_restart.next = s.stage == OPEN;
-        self.crc_octet.next = Word::from(if s.stage == SUM { !s.octet & 0xff } else { s.octet });
-        self.crc_load.next = self.goes() && !border;
-        self.content.next = Word::from(s.octet);
-        self.border.next = border;
-        self.valid.next = s.offered;
+
+        fn at_end(&self) -> bool {
+            self.index == LAST[usize::from(self.stage != WORDS)]
+        }
+
+        /// The byte that is next, if it is ready.
+        fn next(&self, inputs: &[Word]) -> Option<u8> {
+            let source = self.source.unwrap_or_default();
+            let [low, high] = (LENGTHS[source] as u16).to_le_bytes();
+            let header = [ANSWER + 1 + source as u8, self.number as u8, low, high];
+            let busy = inputs[8].number() == 1;
+            match self.stage {
+                IDLE => None,
+                OPEN | CLOSE => Some(0),
+                _ if busy => None,
+                HEADER => Some(header[self.index as usize]),
+                WORDS => (inputs[5].number() == 1).then(|| inputs[4].number() as u8),
+                _ => Some(inputs[7].number() as u8),
+            }
+        }
     }
 
-    fn connect(&mut self) {
-        let bits = [
-            &mut self.begun,
-            &mut self.wanted,
-            &mut self.taken,
-            &mut self.halfway,
-            &mut self.crc_restart,
-            &mut self.crc_load,
-            &mut self.border,
-            &mut self.valid,
-        ];
-        bits.into_iter().for_each(Signal::connect);
-        let wires = [&mut self.source, &mut self.index, &mut self.crc_octet, &mut self.content];
-        wires.into_iter().for_each(Wire::connect);
+    impl Reference for Sending {
+        fn outputs(&mut self, inputs: &[Word]) -> Vec<Option<Word>> {
+            if !self.reset {
+                return vec![None; 12];
+            }
+            let (words, goes) = (self.stage == WORDS, self.offered.is_some() && inputs[9].number() == 1);
+            let bit = |bit: bool| Some(Word::from(bit));
+            let byte = self.offered.filter(|_| !self.border());
+            let to_crc = byte.map(|byte| if self.stage == SUM { !byte } else { byte });
+            let word = |byte: u8| Word::from(u64::from(byte));
+            vec![
+                Some(Word::from(self.index)),
+                self.source.filter(|_| self.stage != IDLE).map(|source| Word::from(source as u64)),
+                byte.map(word),
+                bit(self.offered.is_some()),
+                bit(words),
+                bit(self.border()),
+                bit(self.stage == IDLE && inputs[1].number() == 1),
+                bit(self.offered.is_none() && self.index % 2 == 1),
+                bit(self.stage == OPEN),
+                to_crc.map(word),
+                bit(goes && words && self.at_end()),
+                bit(goes && !self.border()),
+            ]
+        }
+
+        fn clock(&mut self, inputs: &[Word]) {
+            let was_idle = self.stage == IDLE;
+            match self.offered {
+                None => self.offered = self.next(inputs),
+                Some(_) if inputs[9].number() == 1 => {
+                    self.offered = None;
+                    let ends = self.border() || self.at_end();
+                    self.index = if ends { 0 } else { self.index + 1 };
+                    let last = self.stage != WORDS || inputs[6].number() == 1;
+                    self.stage = (self.stage + u64::from(ends && last)) % (CLOSE + 1);
+                }
+                Some(_) => {}
+            }
+            if was_idle && inputs[1].number() == 1 {
+                (self.stage, self.number) = (OPEN, inputs[2].number());
+                self.source = Some(inputs[3].number() as usize);
+            }
+            if inputs[0].number() == 1 {
+                *self = Sending { reset: true, ..Sending::default() };
+            }
+        }
     }
 
-    fn hdl(&self) -> Verilog {
-        let [identity, counters, resultants, forces] = self._lengths;
-        Verilog::Custom(format!(
-            "\
-reg [2:0] stage;
-reg [7:0] kept;
-wire words = stage == 3'd{WORDS};
-wire at_end = index == (words ? 4'd11 : 4'd3);
-wire goes = valid && ready;
-wire [15:0] length = source[1] ? (source[0] ? 16'd{forces} : 16'd{resultants})
-  : (source[0] ? 16'd{counters} : 16'd{identity});
-wire [7:0] header = index[1] ? (index[0] ? length[15:8] : length[7:0])
-  : (index[0] ? kept : 8'd{first_kind} + {{6'd0, source}});
-always @(*) begin
-  begun = stage == 3'd{IDLE} && offer;
-  wanted = words;
-  halfway = !valid && index[0];
-  border = stage == 3'd{OPEN} || stage == 3'd{CLOSE};
-  crc_restart = stage == 3'd{OPEN};
-  crc_octet = stage == 3'd{SUM} ? ~content : content;
-end
-// In a block of their own: `ready` depends on the outputs above.
-always @(*) begin
-  taken = goes && words && at_end;
-  crc_load = goes && !border;
-end
-always @(posedge clk) begin
-  // Stored every cycle while idle: `offer` settles late.
-  if (stage == 3'd{IDLE}) begin
-    source <= offered_source;
-    kept <= number;
-  end
-  if (!valid) content <= stage == 3'd{HEADER} ? header : stage == 3'd{SUM} ? crc_low : octet;
-  if (rst) begin
-    stage <= 3'd{IDLE};
-    index <= 4'd0;
-    valid <= 1'b0;
-  end else begin
-    valid <= valid ? !ready : border || (stage != 3'd{IDLE} && !crc_busy && (!words || word_valid));
-    if (begun) stage <= 3'd{OPEN};
-    if (goes) begin
-      index <= border || at_end ? 4'd0 : index + 4'd1;
-      if (stage == 3'd{CLOSE}) stage <= 3'd{IDLE};
-      else if (border || (at_end && (!words || word_last))) stage <= stage + 3'd1;
-    end
-  end
-end",
-            first_kind = ANSWER + 1,
-        ))
+    #[test]
+    fn packets_have_header_words_and_crc() {
+        let mut random = fastrand::Rng::with_seed(17);
+        let cycle = |cycle: usize| {
+            let bit = |likely: bool| Word::from(likely);
+            vec![
+                bit(cycle < 2 || random.u16(..700) == 0),
+                bit(random.bool()),
+                Word::from(u64::from(random.u8(..))),
+                Word::from(random.u64(..4)),
+                Word::from(u64::from(random.u8(..))),
+                bit(random.u8(..4) > 0),
+                bit(random.u8(..3) == 0),
+                Word::from(u64::from(random.u8(..))),
+                bit(random.u8(..4) == 0),
+                bit(random.bool()),
+            ]
+        };
+        let all: Vec<Vec<Word>> = (0..20_000).map(cycle).collect();
+        check(Packer::new(LENGTHS).kernel.kernel(), &all, &mut Sending::default());
     }
 }

@@ -3,14 +3,16 @@
 use dermis_golden::link::Identity;
 use rust_hdl::prelude::*;
 
-use super::{Crc, Feeder, Ledger, Packer, Parser, Requests, Resultants, Shape, SlipDecoder, SlipEncoder, Sources};
+use super::{
+    CounterRam, Crc, FrameIngress, Packer, Parser, Requests, Resultants, Shape, SlipDecoder, SlipEncoder, Sources,
+};
 use crate::primitives::Relay;
 use crate::wire::Wire;
 
 /// ```text
-/// bytes in  -> slip_decoder -> parser -> feeder -> towards -> s_axis
+/// bytes in  -> slip_decoder -> parser -> ingress -> towards -> s_axis
 ///                                 '-> requests -> packer -> slip_encoder -> bytes out
-/// m_axis -> back -> resultants, ledger -> sources ---^
+/// m_axis -> back -> resultants, counters -> sources ---^
 /// ```
 /// `towards` and `back` are register slices where the engine is large and far from the link's pins. Received bytes
 /// arrive at any time, at least five cycles apart, without back-pressure; bytes are sent with `send_ready`.
@@ -54,7 +56,7 @@ pub struct PacketLink {
     pub dropped: Signal<Out, Bit>,
     decoder: SlipDecoder,
     parser: Parser,
-    feeder: Feeder,
+    ingress: FrameIngress,
     towards: Relay,
     back: Relay,
     requests: Requests,
@@ -62,7 +64,7 @@ pub struct PacketLink {
     sources: Sources,
     packer: Packer,
     encoder: SlipEncoder,
-    ledger: Ledger,
+    counters: CounterRam,
     arriving: Crc,
     leaving: Crc,
     unused: Signal<Local, Bit>,
@@ -93,7 +95,7 @@ impl PacketLink {
             dropped: Default::default(),
             decoder: SlipDecoder::default(),
             parser: Parser::new(shape),
-            feeder: Feeder::new(shape.rows * shape.cols, shape.input_bits),
+            ingress: FrameIngress::new(shape.rows * shape.cols, shape.input_bits),
             towards: Relay::new(shape.input_bits as usize, shape.resultants),
             back: Relay::new(96, shape.resultants),
             requests: Requests::new(shape.frames),
@@ -101,7 +103,7 @@ impl PacketLink {
             sources: Sources::new(shape.resultants),
             packer: Packer::new(shape.payloads()),
             encoder: SlipEncoder::new(shape.resultants),
-            ledger: Ledger::new(identity),
+            counters: CounterRam::new(identity),
             arriving: Crc::default(),
             leaving: Crc::default(),
             unused: Default::default(),
@@ -115,7 +117,7 @@ impl Logic for PacketLink {
     fn update(&mut self) {
         self.decoder.clk.next = self.clk.val();
         self.parser.clk.next = self.clk.val();
-        self.feeder.clk.next = self.clk.val();
+        self.ingress.clk.next = self.clk.val();
         self.towards.clk.next = self.clk.val();
         self.back.clk.next = self.clk.val();
         self.requests.clk.next = self.clk.val();
@@ -123,19 +125,19 @@ impl Logic for PacketLink {
         self.sources.clk.next = self.clk.val();
         self.packer.clk.next = self.clk.val();
         self.encoder.clk.next = self.clk.val();
-        self.ledger.clk.next = self.clk.val();
+        self.counters.clk.next = self.clk.val();
         self.arriving.clk.next = self.clk.val();
         self.leaving.clk.next = self.clk.val();
         self.decoder.rst.next = self.rst.val();
         self.parser.rst.next = self.rst.val();
-        self.feeder.rst.next = self.rst.val();
+        self.ingress.rst.next = self.rst.val();
         self.towards.rst.next = self.rst.val();
         self.back.rst.next = self.rst.val();
         self.requests.rst.next = self.rst.val();
         self.resultants.rst.next = self.rst.val();
         self.packer.rst.next = self.rst.val();
         self.encoder.rst.next = self.rst.val();
-        self.ledger.rst.next = self.rst.val();
+        self.counters.rst.next = self.rst.val();
 
         comment!("Received bytes to packets");
         self.decoder.data.next = self.receive_data.val();
@@ -151,15 +153,15 @@ impl Logic for PacketLink {
         self.arriving.load.next = self.decoder.content_valid.val();
 
         comment!("Packets to the engine");
-        self.feeder.frame_begin.next = self.parser.frame_begin.val();
-        self.feeder.payload.next = self.parser.payload.val();
-        self.feeder.content.next = self.decoder.content.val();
-        self.feeder.good.next = self.parser.good.val();
-        self.feeder.bad.next = self.parser.bad.val();
-        self.feeder.ready.next = self.towards.s_axis_tready.val();
-        self.towards.s_axis_tdata.next = self.feeder.code.val();
-        self.towards.s_axis_tvalid.next = self.feeder.valid.val();
-        self.towards.s_axis_tlast.next = self.feeder.last.val();
+        self.ingress.frame_begin.next = self.parser.frame_begin.val();
+        self.ingress.payload.next = self.parser.payload.val();
+        self.ingress.content.next = self.decoder.content.val();
+        self.ingress.good.next = self.parser.good.val();
+        self.ingress.bad.next = self.parser.bad.val();
+        self.ingress.ready.next = self.towards.s_axis_tready.val();
+        self.towards.s_axis_tdata.next = self.ingress.code.val();
+        self.towards.s_axis_tvalid.next = self.ingress.valid.val();
+        self.towards.s_axis_tlast.next = self.ingress.last.val();
         self.towards.m_axis_tready.next = self.s_axis_tready.val();
         self.s_axis_tdata.next = self.towards.m_axis_tdata.val();
         self.s_axis_tvalid.next = self.towards.m_axis_tvalid.val();
@@ -169,12 +171,12 @@ impl Logic for PacketLink {
         self.requests.good.next = self.parser.good.val();
         self.requests.kind.next = self.parser.kind.val();
         self.requests.number.next = self.parser.number.val();
-        self.requests.taken.next = self.feeder.taken.val();
+        self.requests.taken.next = self.ingress.taken.val();
         self.requests.answered.next = self.back.m_axis_tvalid.val();
         self.requests.begun.next = self.packer.begun.val();
-        self.ledger.taken.next = self.feeder.taken.val() | self.requests.noted.val();
-        self.ledger.fault.next = self.parser.fault.val();
-        self.ledger.overrun.next = self.feeder.overrun.val() | self.requests.overrun.val();
+        self.counters.taken.next = self.ingress.taken.val() | self.requests.noted.val();
+        self.counters.fault.next = self.parser.fault.val();
+        self.counters.overrun.next = self.ingress.overrun.val() | self.requests.overrun.val();
 
         comment!("Engine to packets");
         self.resultants.run.next = self.sources.answer_wanted.val();
@@ -193,10 +195,10 @@ impl Logic for PacketLink {
         self.sources.wanted.next = self.packer.wanted.val();
         self.sources.index.next = self.packer.index.val();
         self.sources.taken.next = self.packer.taken.val();
-        self.ledger.address.next = self.sources.address.val();
-        self.ledger.hold.next = self.packer.halfway.val();
-        self.sources.entry.next = self.ledger.entry.val();
-        self.sources.entry_valid.next = self.ledger.entry_valid.val();
+        self.counters.address.next = self.sources.address.val();
+        self.counters.hold.next = self.packer.halfway.val();
+        self.sources.entry.next = self.counters.entry.val();
+        self.sources.entry_valid.next = self.counters.entry_valid.val();
         self.sources.answer.next = self.resultants.word.val();
         self.sources.answer_valid.next = self.resultants.word_valid.val();
         self.sources.answer_last.next = self.resultants.word_last.val();
@@ -226,6 +228,6 @@ impl Logic for PacketLink {
         self.send_valid.next = self.encoder.valid.val();
 
         self.activity.next = self.receive_valid.val() | self.requests.waiting.val() | self.encoder.valid.val();
-        self.dropped.next = self.parser.bad.val() | self.feeder.overrun.val() | self.requests.overrun.val();
+        self.dropped.next = self.parser.bad.val() | self.ingress.overrun.val() | self.requests.overrun.val();
     }
 }

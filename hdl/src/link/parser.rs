@@ -4,8 +4,10 @@ use dermis_golden::link::{code_bytes, Kind, OVERHEAD};
 use rust_hdl::prelude::*;
 
 use super::Shape;
+use crate::kernel_block;
+use crate::language::{Body, Builder, Kernel, Type};
 use crate::primitives::count_bits;
-use crate::wire::{Wire, Word};
+use crate::wire::Wire;
 
 /// Checks each packet at its end: `good` or `bad` is high for one cycle, one cycle after `packet_end`; `kind` and
 /// `number` are valid until the header of the next packet. Two ENDs in a row enclose no packet.
@@ -42,32 +44,27 @@ pub struct Parser {
     pub kind: Wire<Out>,
     /// The packet's sequence number; valid with `good`.
     pub number: Wire<Out>,
-    _frame_bytes: u32,
-    _frame_kinds: Vec<u8>,
-    _state: State,
+    kernel: Body,
 }
 
-#[derive(Clone, Copy, Debug)]
-struct State {
-    count: u32,
-    kind: u8,
-    number: u8,
-    length: u32,
-    spoiled: bool,
-    streaming: bool,
-    good: bool,
-    fault: u32,
-}
+kernel_block!(
+    Parser,
+    clock clk,
+    inputs [rst, content, content_valid, packet_end, spoiled, crc_right],
+    outputs [frame_begin, payload, good, bad, fault, kind, number]
+);
 
 const PLAIN_KINDS: [u8; 2] = [Kind::Identify as u8, Kind::ReadCounters as u8];
+/// Bits of `fault`.
+const FRAMING: u64 = 1;
+const CRC: u64 = 2;
+const UNKNOWN: u64 = 4;
+const LENGTH: u64 = 8;
 
 impl Parser {
     /// For the frames of `shape`, whose payload has at most 65535 bytes.
     pub fn new(shape: &Shape) -> Self {
-        let resultants = shape.resultants.then_some(Kind::FrameForResultants as u8);
-        let blank =
-            State { count: 0, kind: 0, number: 0, length: 0, spoiled: false, streaming: false, good: false, fault: 0 };
-        Parser {
+        let block = Parser {
             clk: Default::default(),
             rst: Default::default(),
             content: Wire::new(8),
@@ -82,148 +79,223 @@ impl Parser {
             fault: Wire::new(4),
             kind: Wire::new(8),
             number: Wire::new(8),
-            _frame_bytes: (shape.rows * shape.cols * code_bytes(shape.input_bits)) as u32,
-            _frame_kinds: resultants.into_iter().chain([Kind::FrameForForces as u8]).collect(),
-            _state: blank,
-        }
-    }
-
-    /// Limit of the byte count: one more than a frame's packet has.
-    fn most(&self) -> u32 {
-        self._frame_bytes + OVERHEAD as u32 + 1
-    }
-
-    /// Index of the first byte after a frame's payload.
-    fn payload_end(&self) -> u32 {
-        self._frame_bytes + 4
-    }
-
-    /// Whether the packet is correct, otherwise the bits of `fault`; `(false, 0)` if there is no packet.
-    fn judge(&self) -> (bool, u32) {
-        let s = self._state;
-        let frame = self._frame_kinds.contains(&s.kind);
-        if s.spoiled {
-            (false, 0b0001)
-        } else if s.count == 0 {
-            (false, 0)
-        } else if s.count < OVERHEAD as u32 || !self.crc_right.val() {
-            (false, 0b0010)
-        } else if !frame && !PLAIN_KINDS.contains(&s.kind) {
-            (false, 0b0100)
-        } else if s.count != s.length + OVERHEAD as u32 || s.length != if frame { self._frame_bytes } else { 0 } {
-            (false, 0b1000)
-        } else {
-            (true, 0)
-        }
-    }
-
-    /// The byte of this cycle completes the header of a frame.
-    fn begins(&self) -> bool {
-        let s = self._state;
-        let length = s.length | (self.content.val().number() as u32) << 8;
-        let whole = self.content_valid.val() && s.count == 3;
-        whole && self._frame_kinds.contains(&s.kind) && length == self._frame_bytes
-    }
-
-    fn next(&self) -> State {
-        let mut s = State { good: false, fault: 0, ..self._state };
-        let data = self.content.val().number() as u8;
-        s.spoiled |= self.spoiled.val();
-        if self.packet_end.val() {
-            (s.good, s.fault) = self.judge();
-            (s.count, s.spoiled, s.streaming) = (0, false, false);
-        } else if self.content_valid.val() {
-            match s.count {
-                0 => s.kind = data,
-                1 => s.number = data,
-                2 => s.length = u32::from(data),
-                3 => s.length |= u32::from(data) << 8,
-                _ => (),
-            }
-            s.streaming = s.streaming && s.count + 1 != self.payload_end() || self.begins();
-            s.count = (s.count + 1).min(self.most());
-        }
-        if self.rst.val() {
-            (s.count, s.spoiled, s.streaming, s.good, s.fault) = (0, false, false, false, 0);
-        }
-        s
+            kernel: Body::default(),
+        };
+        let resultants = shape.resultants.then_some(Kind::FrameForResultants as u8);
+        let frame_kinds: Vec<u8> = resultants.into_iter().chain([Kind::FrameForForces as u8]).collect();
+        block.bind(kernel(shape.rows * shape.cols * code_bytes(shape.input_bits), &frame_kinds))
     }
 }
 
-impl Logic for Parser {
-    fn update(&mut self) {
-        if self.clk.pos_edge() {
-            self._state = self.next();
-        }
-        let s = &self._state;
-        self.frame_begin.next = self.begins();
-        self.payload.next = self.content_valid.val() && s.streaming;
-        self.good.next = s.good;
-        self.bad.next = s.fault != 0;
-        self.fault.next = Word::from(u64::from(s.fault));
-        self.kind.next = Word::from(u64::from(s.kind));
-        self.number.next = Word::from(u64::from(s.number));
+/// For frames of `frame_bytes` bytes of payload in packets of the types `frame_kinds`.
+fn kernel(frame_bytes: usize, frame_kinds: &[u8]) -> Kernel {
+    let k = Builder::new("parser");
+    let (rst, content, content_valid) = (k.input("rst", 1), k.input("content", 8), k.input("content_valid", 1));
+    let (packet_end, spoiled, crc_right) = (k.input("packet_end", 1), k.input("spoiled", 1), k.input("crc_right", 1));
+    // The count stops at one more byte than a frame's packet has.
+    let most = frame_bytes + OVERHEAD + 1;
+    let (bit, byte, c) = (Type::unsigned(1), Type::unsigned(8), count_bits(most + 1));
+    let clears = k.wire("clears", rst | packet_end);
+    let count = k.state("count", Type::unsigned(c), clears, 0);
+    let frame_length = k.register("frame_length", bit);
+    let frame_length = frame_length.comment("The length bytes so far match a frame's length, or zero.");
+    let no_length = k.register("no_length", bit);
+    let [lost, streaming] = ["lost", "streaming"].map(|name| k.state(name, bit, clears, 0));
+    let good = k.state("good", bit, rst, 0);
+    let fault = k.state("fault", Type::unsigned(4), rst, 0);
+    let [kind, number] = ["kind", "number"].map(|name| k.register(name, byte));
+
+    let at = |index: usize| count.is(index as u64);
+    let kind_is = |kinds: &[u8]| kinds.iter().map(|&of| kind.is(of.into())).reduce(|a, b| a | b);
+    let never = k.constant(1, 0);
+    let frame = k.wire("frame", kind_is(frame_kinds).unwrap_or(never));
+    let plain = k.wire("plain", kind_is(&PLAIN_KINDS).unwrap_or(never));
+    let too_short = count.less(k.constant(c, OVERHEAD as u64));
+    let wrong_crc = k.wire("wrong_crc", too_short | !crc_right);
+    let wrong_frame = !at(frame_bytes + OVERHEAD) | !*frame_length;
+    let wrong_length = k.wire("wrong_length", frame.mux(wrong_frame, !at(OVERHEAD) | !*no_length));
+    let empty = k.wire("empty", at(0) & !*lost);
+    let known = frame | plain;
+    let cause = |cause: u64| k.constant(4, cause);
+    let later = (!known).mux(cause(UNKNOWN), wrong_length.mux(cause(LENGTH), cause(0)));
+    let found = lost.mux(cause(FRAMING), wrong_crc.mux(cause(CRC), later));
+    fault.set((packet_end & !empty).mux(found, cause(0)));
+    good.set(packet_end & !empty & !*lost & !wrong_crc & known & !wrong_length);
+    k.wire("bad", fault.any());
+
+    let (high, low) = ((frame_bytes >> 8) as u64, (frame_bytes & 0xff) as u64);
+    let begins = at(3) & frame & *frame_length & content.is(high);
+    let frame_begin = k.wire("frame_begin", content_valid & begins);
+    k.wire("payload", content_valid & *streaming);
+    k.when(spoiled, || lost.set(k.constant(1, 1)));
+    k.when(content_valid & !at(most), || count.set(count.plus(1)));
+    k.when(content_valid & at(frame_bytes + 3), || streaming.set(never));
+    k.when(frame_begin, || streaming.set(k.constant(1, 1)));
+    let takes = k.wire("takes", content_valid & !clears);
+    k.when(takes & at(0), || kind.set(content));
+    k.when(takes & at(1), || number.set(content));
+    k.when(takes & (at(2) | at(3)), || {
+        let second = count.at(0);
+        frame_length.set(second.mux(*frame_length & content.is(high), content.is(low)));
+        no_length.set((*no_length | !second) & content.is(0));
+    });
+    k.finish()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::language::testbench::{check, simulated, Reference};
+    use crate::wire::Word;
+
+    /// Collects a packet and judges it as a whole.
+    #[derive(Default)]
+    struct Packet {
+        frame_bytes: usize,
+        bytes: Vec<u8>,
+        lost: bool,
+        /// Type and number of the packet last begun.
+        header: [Option<u8>; 2],
+        verdict: Option<u64>,
+        reset: bool,
     }
 
-    fn connect(&mut self) {
-        for bit in [&mut self.frame_begin, &mut self.payload, &mut self.good, &mut self.bad] {
-            bit.connect();
+    const FRAMES: [u8; 2] = [Kind::FrameForResultants as u8, Kind::FrameForForces as u8];
+
+    impl Packet {
+        fn of(frame_bytes: usize) -> Self {
+            Packet { frame_bytes, ..Packet::default() }
         }
-        for wire in [&mut self.fault, &mut self.kind, &mut self.number] {
-            wire.connect();
+
+        /// The byte `content` completes the header of a frame of the right length.
+        fn begins(&self, content: u8) -> bool {
+            let length = |low| usize::from(u16::from_le_bytes([low, content]));
+            matches!(self.bytes[..], [kind, _, low] if FRAMES.contains(&kind) && length(low) == self.frame_bytes)
+        }
+
+        /// 0 if the packet is correct, else the bit of its fault; none without a packet.
+        fn judge(&self, crc_right: bool) -> Option<u64> {
+            let whole = self.bytes.len();
+            if self.lost {
+                return Some(FRAMING);
+            }
+            let &[kind, _, low, high, ..] = &self.bytes[..] else { return (whole > 0).then_some(CRC) };
+            if whole < OVERHEAD || !crc_right {
+                return Some(CRC);
+            }
+            let wanted = match (FRAMES.contains(&kind), PLAIN_KINDS.contains(&kind)) {
+                (true, _) => self.frame_bytes,
+                (_, true) => 0,
+                _ => return Some(UNKNOWN),
+            };
+            let right = whole == wanted + OVERHEAD && usize::from(u16::from_le_bytes([low, high])) == wanted;
+            Some(if right { 0 } else { LENGTH })
         }
     }
 
-    fn hdl(&self) -> Verilog {
-        let c = count_bits(self.most() as usize + 1);
-        let frames: Vec<String> = self._frame_kinds.iter().map(|kind| format!("kind == 8'd{kind}")).collect();
-        let [plain_0, plain_1] = PLAIN_KINDS;
-        Verilog::Custom(format!(
-            "\
-reg [{c_end}:0] count;
-// The length bytes so far match a frame's length, or zero.
-reg frame_length, no_length;
-reg lost, streaming;
-wire frame = {frame};
-wire plain = kind == 8'd{plain_0} || kind == 8'd{plain_1};
-wire wrong_crc = count < {c}'d{OVERHEAD} || !crc_right;
-wire wrong_length = frame ? count != {c}'d{frame_end} || !frame_length : count != {c}'d{OVERHEAD} || !no_length;
-wire empty = count == {c}'d0 && !lost;
-always @(*) begin
-  frame_begin = content_valid && count == {c}'d3 && frame && frame_length && content == 8'd{high};
-  payload = content_valid && streaming;
-  bad = fault != 4'd0;
-end
-always @(posedge clk) begin
-  good <= !rst && packet_end && !empty && !lost && !wrong_crc && (frame || plain) && !wrong_length;
-  fault <= rst || !packet_end || empty ? 4'd0 : lost ? 4'd1 : wrong_crc ? 4'd2 : !frame && !plain ? 4'd4
-    : wrong_length ? 4'd8 : 4'd0;
-  if (rst || packet_end) begin
-    count <= {c}'d0;
-    lost <= 1'b0;
-    streaming <= 1'b0;
-  end else begin
-    if (spoiled) lost <= 1'b1;
-    if (content_valid) begin
-      if (count == {c}'d0) kind <= content;
-      if (count == {c}'d1) number <= content;
-      if (count == {c}'d2 || count == {c}'d3) begin
-        frame_length <= count[0] ? frame_length && content == 8'd{high} : content == 8'd{low};
-        no_length <= (no_length || !count[0]) && content == 8'd0;
-      end
-      if (frame_begin) streaming <= 1'b1;
-      else if (count == {c}'d{payload_last}) streaming <= 1'b0;
-      if (count != {c}'d{most}) count <= count + {c}'d1;
-    end
-  end
-end",
-            c_end = c - 1,
-            frame = frames.join(" || "),
-            frame_end = self._frame_bytes + OVERHEAD as u32,
-            most = self.most(),
-            high = self._frame_bytes >> 8,
-            low = self._frame_bytes & 0xff,
-            payload_last = self.payload_end() - 1,
-        ))
+    impl Reference for Packet {
+        fn outputs(&mut self, inputs: &[Word]) -> Vec<Option<Word>> {
+            if !self.reset {
+                return vec![None; 7];
+            }
+            let (content, valid) = (inputs[1].number() as u8, inputs[2].number() == 1);
+            let streams = self.bytes.len() >= 4 && self.bytes.len() < self.frame_bytes + 4;
+            let payload = valid && streams && Packet { bytes: self.bytes[..3].to_vec(), ..*self }.begins(self.bytes[3]);
+            let header = self.header.map(|byte| byte.map(|byte| Word::from(u64::from(byte))));
+            let fault = self.verdict.unwrap_or(0);
+            vec![
+                Some(Word::from(self.verdict == Some(0))),
+                Some(Word::from(fault)),
+                header[0],
+                header[1],
+                Some(Word::from(fault != 0)),
+                Some(Word::from(valid && self.begins(content))),
+                Some(Word::from(payload)),
+            ]
+        }
+
+        fn clock(&mut self, inputs: &[Word]) {
+            let [rst, _, valid, ends, spoiled, right] = [0, 1, 2, 3, 4, 5].map(|k| inputs[k].number() == 1);
+            self.verdict = None;
+            if ends {
+                self.verdict = self.judge(right);
+            } else {
+                self.lost |= spoiled;
+                if valid {
+                    self.bytes.push(inputs[1].number() as u8);
+                }
+                // A header appears byte by byte.
+                let from = self.bytes.len().saturating_sub(usize::from(valid));
+                (from..self.bytes.len().min(2)).filter(|_| !rst).for_each(|at| self.header[at] = Some(self.bytes[at]));
+            }
+            if ends || rst {
+                (self.bytes, self.lost) = (Vec::new(), false);
+            }
+            if rst {
+                (self.verdict, self.reset) = (None, true);
+            }
+        }
+    }
+
+    /// Packets that are mostly right: of any type, length, with lost bytes, wrong CRCs, two ENDs in a row, resets.
+    fn stimulus(packets: usize, frame_bytes: usize) -> Vec<Vec<Word>> {
+        let mut random = fastrand::Rng::with_seed(16);
+        let cycle = |bits: [bool; 5], content: u8| {
+            let [rst, valid, ends, spoiled, right] = bits.map(Word::from);
+            vec![rst, Word::from(u64::from(content)), valid, ends, spoiled, right]
+        };
+        let mut all = vec![cycle([true, false, false, false, false], 0); 2];
+        for _ in 0..packets {
+            let kind = match random.u8(..8) {
+                0 => random.u8(..),
+                1..=3 => PLAIN_KINDS[random.usize(..2)],
+                _ => FRAMES[random.usize(..2)],
+            };
+            let own = if FRAMES.contains(&kind) { frame_bytes } else { 0 };
+            let named = if random.u8(..8) == 0 { random.usize(..0x10000) } else { own };
+            let count = own + OVERHEAD;
+            let count = match random.u8(..8) {
+                0 => random.usize(..count),
+                1 => count + random.usize(1..9),
+                _ => count,
+            };
+            for at in 0..count {
+                let content = match at {
+                    0 => kind,
+                    2 => named as u8,
+                    3 => (named >> 8) as u8,
+                    _ => random.u8(..),
+                };
+                let [rst, spoiled] = [random.u16(..4000) == 0, random.u16(..400) == 0];
+                all.push(cycle([rst, true, false, spoiled, random.bool()], content));
+                (0..random.u8(..3)).for_each(|_| all.push(cycle([false; 5], content)));
+            }
+            let right = random.u8(..8) > 0;
+            all.push(cycle([false, false, true, false, right], random.u8(..)));
+        }
+        all
+    }
+
+    #[test]
+    fn packets_are_judged_as_a_whole() {
+        for frame_bytes in [6, 300] {
+            let all = stimulus(if frame_bytes > 100 { 60 } else { 800 }, frame_bytes);
+            let block = Body::new(
+                kernel(frame_bytes, &FRAMES),
+                &[],
+                &[
+                    ("frame_begin", 1),
+                    ("payload", 1),
+                    ("good", 1),
+                    ("bad", 1),
+                    ("fault", 4),
+                    ("kind", 8),
+                    ("number", 8),
+                ],
+            );
+            check(block.kernel(), &all, &mut Packet::of(frame_bytes));
+            let faults: Vec<u64> = simulated(block.kernel(), &all).iter().map(|outputs| outputs[1].number()).collect();
+            assert!([FRAMING, CRC, UNKNOWN, LENGTH].iter().all(|fault| faults.contains(fault)));
+        }
     }
 }

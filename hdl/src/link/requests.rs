@@ -4,8 +4,10 @@ use dermis_golden::link::Kind;
 use rust_hdl::prelude::*;
 
 use super::{COUNTERS, FORCES, IDENTITY, RESULTANTS};
+use crate::kernel_block;
+use crate::language::{Body, Builder, Contents, Kernel, Type};
 use crate::primitives::count_bits;
-use crate::wire::{Wire, Word};
+use crate::wire::Wire;
 
 /// Holds accepted requests until they are answered: one identification, one reading of the counters, and the frames in
 /// the engine, in order. `offer` is high when one can be answered, with the number of the request and the source of the
@@ -43,24 +45,20 @@ pub struct Requests {
     pub source: Wire<Out>,
     /// Frames are in the engine.
     pub waiting: Signal<Out, Bit>,
-    _depth: usize,
-    _state: State,
+    kernel: Body,
 }
 
-#[derive(Clone, Debug, Default)]
-struct State {
-    /// Sequence numbers of a pending identification and of a pending reading of the counters.
-    plain: [Option<u8>; 2],
-    /// Sequence numbers of the frames, and whether all forces (not resultants) are requested.
-    frames: Vec<(u8, bool)>,
-}
-
-const PLAIN: [u8; 2] = [Kind::Identify as u8, Kind::ReadCounters as u8];
+kernel_block!(
+    Requests,
+    clock clk,
+    inputs [rst, good, kind, number, taken, answered, begun],
+    outputs [noted, overrun, offer, answer_number, source, waiting]
+);
 
 impl Requests {
     /// With a queue of `depth` frames, a power of two.
     pub fn new(depth: usize) -> Self {
-        Requests {
+        let block = Requests {
             clk: Default::default(),
             rst: Default::default(),
             good: Default::default(),
@@ -75,122 +73,153 @@ impl Requests {
             answer_number: Wire::new(8),
             source: Wire::new(2),
             waiting: Default::default(),
-            _depth: depth,
-            _state: State::default(),
-        }
-    }
-
-    /// Which of the two requests without payload has been received in this cycle, if any.
-    fn plain(&self) -> Option<usize> {
-        let kind = self.kind.val().number() as u8;
-        PLAIN.iter().position(|&plain| plain == kind).filter(|_| self.good.val())
-    }
-
-    /// Source and sequence number of the next answer.
-    fn next_answer(&self) -> (usize, u8) {
-        match (&self._state.plain, self._state.frames.first()) {
-            ([Some(number), _], _) => (IDENTITY, *number),
-            ([None, Some(number)], _) => (COUNTERS, *number),
-            (_, Some(&(number, forces))) => (if forces { FORCES } else { RESULTANTS }, number),
-            (_, None) => (RESULTANTS, 0),
-        }
-    }
-
-    fn advance(&mut self) {
-        let number = self.number.val().number() as u8;
-        let plain = self.plain().filter(|&plain| self._state.plain[plain].is_none());
-        let (source, _) = self.next_answer();
-        let s = &mut self._state;
-        if self.begun.val() {
-            match source {
-                IDENTITY | COUNTERS => s.plain[source] = None,
-                _ => {
-                    s.frames.remove(0);
-                }
-            }
-        }
-        if let Some(plain) = plain {
-            s.plain[plain] = Some(number);
-        }
-        if self.taken.val() {
-            s.frames.push((number, self.kind.val().number() as u8 == Kind::FrameForForces as u8));
-        }
-        if self.rst.val() {
-            *s = State::default();
-        }
+            kernel: Body::default(),
+        };
+        block.bind(kernel(depth))
     }
 }
 
-impl Logic for Requests {
-    fn update(&mut self) {
-        if self.clk.pos_edge() {
-            self.advance();
-        }
-        let (source, number) = self.next_answer();
-        let s = &self._state;
-        let plain = self.plain().map(|plain| s.plain[plain].is_none());
-        self.noted.next = plain == Some(true);
-        self.overrun.next = plain == Some(false);
-        let waiting = !s.frames.is_empty();
-        self.offer.next = s.plain.iter().any(Option::is_some) || (waiting && self.answered.val());
-        self.answer_number.next = Word::from(u64::from(number));
-        self.source.next = Word::from(source as u64);
-        self.waiting.next = waiting;
+fn kernel(depth: usize) -> Kernel {
+    let k = Builder::new("requests");
+    let (rst, good, kind) = (k.input("rst", 1), k.input("good", 1), k.input("kind", 8));
+    let (number, taken) = (k.input("number", 8), k.input("taken", 1));
+    let (answered, begun) = (k.input("answered", 1), k.input("begun", 1));
+    let (bit, byte, at) = (Type::unsigned(1), Type::unsigned(8), count_bits(depth));
+    let numbers = ["identity_number", "counters_number"].map(|name| k.register(name, byte));
+    let [identity, counters] = ["identity", "counters"].map(|name| k.state(name, bit, rst, 0));
+    let frames = k.memory("frames", depth, 9, Contents::Undefined);
+    let [head, tail] = ["head", "tail"].map(|name| k.state(name, Type::unsigned(at), rst, 0));
+    let fill = k.state("fill", Type::unsigned(at + 1), rst, 0);
+
+    let asks = |name, of: Kind| k.wire(name, good & kind.is(of as u64));
+    let asked = [asks("asks_identity", Kind::Identify), asks("asks_counters", Kind::ReadCounters)];
+    let pending = [*identity, *counters];
+    let frame = k.wire("frame", frames.read(*head));
+    let waiting = k.wire("waiting", fill.any());
+    k.wire("noted", (asked[0] & !pending[0]) | (asked[1] & !pending[1]));
+    k.wire("overrun", (asked[0] & pending[0]) | (asked[1] & pending[1]));
+    k.wire("offer", *identity | *counters | (waiting & answered));
+    let from = |source: usize| k.constant(2, source as u64);
+    let of_frame = (waiting & frame.top()).mux(from(FORCES), from(RESULTANTS));
+    k.wire("source", identity.mux(from(IDENTITY), counters.mux(from(COUNTERS), of_frame)));
+    k.wire("answer_number", identity.mux(*numbers[0], counters.mux(*numbers[1], frame.low(8))));
+
+    for ((kept, asked), pending) in numbers.iter().zip(asked).zip(pending) {
+        k.when(asked & !pending, || kept.set(number));
+    }
+    frames.write(taken, *tail, kind.is(Kind::FrameForForces as u64).concat(number));
+    identity.set(identity.mux(!begun, asked[0]));
+    counters.set(counters.mux(!begun | *identity, asked[1]));
+    let pop = k.wire("pop", begun & !*identity & !*counters);
+    k.when(pop, || head.set(head.plus(1)));
+    k.when(taken, || tail.set(tail.plus(1)));
+    k.when(taken.differs(pop), || fill.set(taken.mux(fill.plus(1), fill.minus(1))));
+    k.finish()
+}
+
+#[cfg(test)]
+mod tests {
+    use std::collections::VecDeque;
+
+    use super::*;
+    use crate::language::testbench::{check, Reference};
+    use crate::wire::Word;
+
+    const DEPTH: usize = 4;
+    const PLAIN: [u8; 2] = [Kind::Identify as u8, Kind::ReadCounters as u8];
+
+    /// Requests in lists.
+    #[derive(Default)]
+    struct Lists {
+        /// Numbers of a pending identification and of a pending reading of the counters.
+        plain: [Option<u8>; 2],
+        /// Numbers of the frames, and whether all forces are requested.
+        frames: VecDeque<(u8, bool)>,
+        reset: bool,
     }
 
-    fn connect(&mut self) {
-        for bit in [&mut self.noted, &mut self.overrun, &mut self.offer, &mut self.waiting] {
-            bit.connect();
+    impl Lists {
+        /// Source and number of the next answer.
+        fn next(&self) -> Option<(usize, u8)> {
+            let plain = [IDENTITY, COUNTERS].into_iter().find_map(|source| Some((source, self.plain[source]?)));
+            let frame = self.frames.front().map(|&(number, forces)| (if forces { FORCES } else { RESULTANTS }, number));
+            plain.or(frame)
         }
-        self.answer_number.connect();
-        self.source.connect();
+
+        fn offers(&self, inputs: &[Word]) -> bool {
+            self.plain.iter().any(Option::is_some) || (!self.frames.is_empty() && inputs[5].number() == 1)
+        }
+
+        fn asked(&self, inputs: &[Word]) -> Option<usize> {
+            let kind = inputs[2].number() as u8;
+            PLAIN.iter().position(|&plain| plain == kind).filter(|_| inputs[1].number() == 1)
+        }
     }
 
-    fn hdl(&self) -> Verilog {
-        let at = count_bits(self._depth);
-        Verilog::Custom(format!(
-            "\
-reg [7:0] identity_number, counters_number;
-reg identity, counters;
-reg [8:0] frames [0:{depth_end}];
-reg [{at_end}:0] head, tail;
-reg [{at}:0] fill;
-wire [8:0] frame = frames[head];
-wire asks_identity = good && kind == 8'd{ask_identity};
-wire asks_counters = good && kind == 8'd{ask_counters};
-always @(*) begin
-  waiting = |fill;
-  noted = (asks_identity && !identity) || (asks_counters && !counters);
-  overrun = (asks_identity && identity) || (asks_counters && counters);
-  offer = identity || counters || (waiting && answered);
-  source = identity ? 2'd{IDENTITY} : counters ? 2'd{COUNTERS} : waiting && frame[8] ? 2'd{FORCES} : 2'd{RESULTANTS};
-  answer_number = identity ? identity_number : counters ? counters_number : frame[7:0];
-end
-wire pop = begun && !identity && !counters;
-always @(posedge clk) begin
-  if (asks_identity && !identity) identity_number <= number;
-  if (asks_counters && !counters) counters_number <= number;
-  if (taken) frames[tail] <= {{kind == 8'd{ask_forces}, number}};
-  if (rst) begin
-    identity <= 1'b0;
-    counters <= 1'b0;
-    head <= {at}'d0;
-    tail <= {at}'d0;
-    fill <= {wide}'d0;
-  end else begin
-    identity <= identity ? !begun : asks_identity;
-    counters <= counters ? !begun || identity : asks_counters;
-    if (pop) head <= head + {at}'d1;
-    if (taken) tail <= tail + {at}'d1;
-    if (taken != pop) fill <= taken ? fill + {wide}'d1 : fill - {wide}'d1;
-  end
-end",
-            depth_end = self._depth - 1,
-            at_end = at - 1,
-            wide = at + 1,
-            ask_identity = Kind::Identify as u8,
-            ask_counters = Kind::ReadCounters as u8,
-            ask_forces = Kind::FrameForForces as u8,
-        ))
+    impl Reference for Lists {
+        fn outputs(&mut self, inputs: &[Word]) -> Vec<Option<Word>> {
+            if !self.reset {
+                return vec![None; 6];
+            }
+            let bit = |bit: bool| Some(Word::from(bit));
+            let asked = self.asked(inputs).map(|asked| self.plain[asked].is_none());
+            let next = self.next().filter(|_| self.offers(inputs));
+            vec![
+                bit(!self.frames.is_empty()),
+                bit(asked == Some(true)),
+                bit(asked == Some(false)),
+                bit(self.offers(inputs)),
+                next.map(|(source, _)| Word::from(source as u64)),
+                next.map(|(_, number)| Word::from(u64::from(number))),
+            ]
+        }
+
+        fn clock(&mut self, inputs: &[Word]) {
+            let number = inputs[3].number() as u8;
+            let asked = self.asked(inputs).filter(|&asked| self.plain[asked].is_none());
+            match self.next().filter(|_| inputs[6].number() == 1) {
+                Some((source @ (IDENTITY | COUNTERS), _)) => self.plain[source] = None,
+                Some(_) => drop(self.frames.pop_front()),
+                None => {}
+            }
+            if let Some(asked) = asked {
+                self.plain[asked] = Some(number);
+            }
+            if inputs[4].number() == 1 {
+                self.frames.push_back((number, inputs[2].number() as u8 == Kind::FrameForForces as u8));
+            }
+            if inputs[0].number() == 1 {
+                *self = Lists { reset: true, ..Lists::default() };
+            }
+        }
+    }
+
+    /// Requests of all types, frames only where the queue has room; answers at any time; resets.
+    fn stimulus(cycles: usize) -> Vec<Vec<Word>> {
+        let mut random = fastrand::Rng::with_seed(18);
+        let mut lists = Lists::default();
+        let kinds = [PLAIN[0], PLAIN[1], Kind::FrameForForces as u8, Kind::FrameForResultants as u8];
+        let mut speed = 4;
+        let inputs = |cycle: usize| {
+            if cycle % 100 == 0 {
+                speed = random.u8(1..8);
+            }
+            let rst = cycle < 2 || random.u16(..500) == 0;
+            let good = !rst && random.u8(..4) == 0;
+            let kind = kinds[random.usize(..4)];
+            let taken = good && !PLAIN.contains(&kind) && lists.frames.len() < DEPTH;
+            let mut inputs = vec![Word::from(rst), Word::from(good), Word::from(u64::from(kind))];
+            inputs.extend([Word::from(u64::from(random.u8(..))), Word::from(taken), Word::from(random.bool())]);
+            inputs.push(Word::default());
+            inputs[6] = Word::from(!rst && lists.offers(&inputs) && random.u8(..8) < speed);
+            lists.clock(&inputs);
+            inputs
+        };
+        (0..cycles).map(inputs).collect()
+    }
+
+    #[test]
+    fn requests_are_answered_in_order() {
+        check(Requests::new(DEPTH).kernel.kernel(), &stimulus(8000), &mut Lists::default());
     }
 }

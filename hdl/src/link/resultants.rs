@@ -2,10 +2,11 @@
 
 use rust_hdl::prelude::*;
 
-use super::super::primitives::count_bits;
 use super::Shape;
-use crate::wire::{Wire, Word};
-use dermis_golden::link::Sums;
+use crate::kernel_block;
+use crate::language::{concat, Body, Builder, Expr, Type};
+use crate::primitives::count_bits;
+use crate::wire::Wire;
 
 /// While `run`, beats pass as words; without resultants in the `shape` that is all. With `summarise`, the forces are
 /// added up, and four words of sums go out before the status beats. No multiplier is needed: for Σ column · fz, the sum
@@ -38,40 +39,27 @@ pub struct Resultants {
     pub word_valid: Signal<Out, Bit>,
     /// The word is the payload's last; valid with `word_valid`.
     pub word_last: Signal<Out, Bit>,
-    _shape: Shape,
-    _bits: usize,
-    _state: State,
+    kernel: Body,
 }
 
-#[derive(Clone, Copy, Debug, Default)]
-struct State {
-    stage: usize,
-    row: usize,
-    col: usize,
-    more: usize,
-    out: usize,
-    line: i64,
-    sums: Sums,
-    /// `beat_ready`, separately for beats that are added and beats that pass.
-    adding: bool,
-    passing: bool,
-    /// The word was accepted in the previous cycle.
-    taken: bool,
-}
+kernel_block!(
+    Resultants,
+    clock clk,
+    inputs [rst, run, taken, summarise, beat, beat_valid, beat_last],
+    outputs [beat_ready, word, word_valid, word_last]
+);
 
-const ADD: usize = 0;
-const FINISH: usize = 1;
-const OUT: usize = 2;
-const STATUS: usize = 3;
-/// Number of words of the sums.
-const WORDS: usize = 4;
-/// Number of sums.
-const COUNT: usize = 6;
+const ADD: u64 = 0;
+const FINISH: u64 = 1;
+const OUT: u64 = 2;
+const STATUS: u64 = 3;
+/// Index of the last word of the sums.
+const LAST_WORD: u64 = 3;
 
 impl Resultants {
     /// For the array of `shape`.
     pub fn new(shape: &Shape) -> Self {
-        Resultants {
+        let block = Resultants {
             clk: Default::default(),
             rst: Default::default(),
             run: Default::default(),
@@ -84,212 +72,258 @@ impl Resultants {
             word: Wire::new(96),
             word_valid: Default::default(),
             word_last: Default::default(),
-            // Every intermediate sum is at most the largest force word times taxels times the longer side.
-            _bits: 32 + count_bits(shape.rows * shape.cols + 1) + count_bits(shape.rows.max(shape.cols)),
-            _shape: shape.clone(),
-            _state: State::default(),
+            kernel: Body::default(),
+        };
+        let k = Builder::new("resultants");
+        let ports = Ports::new(&k);
+        match shape.resultants {
+            true => sums(&k, ports, shape.rows, shape.cols),
+            false => pass(&k, ports),
         }
-    }
-
-    fn passes(&self) -> bool {
-        !self._shape.resultants || !self.summarise.val() || self._state.stage == STATUS
-    }
-
-    fn add(&mut self) {
-        let [fx, fy, fz] = [0, 1, 2].map(|axis| self.beat.val().signed(axis, 32));
-        let (rows, cols) = (self._shape.rows, self._shape.cols);
-        let s = &mut self._state;
-        if s.row == 0 && s.col == 0 {
-            s.sums = Sums::default();
-        }
-        if s.col == 0 {
-            s.sums.moment_y -= s.sums.fz;
-            s.line = fz;
-        } else {
-            s.sums.moment_x -= s.line;
-            s.line += fz;
-        }
-        s.sums.fx += fx;
-        s.sums.fy += fy;
-        s.sums.fz += fz;
-        s.sums.loaded += u64::from(fz != 0);
-        s.more = 0;
-        s.out = 0;
-        s.col += 1;
-        if s.col == cols {
-            (s.col, s.row) = (0, s.row + 1);
-        }
-        if s.row == rows {
-            (s.row, s.stage) = (0, FINISH);
-        }
-    }
-
-    fn advance(&mut self) {
-        let (rows, cols) = (self._shape.rows, self._shape.cols);
-        let old = self._state;
-        let adds = old.adding && self.beat_valid.val();
-        let at_end = old.row + 1 == rows && old.col + 1 == cols;
-        let run = self.run.val() && !self.rst.val();
-        self._state.adding = run && !self.passes() && old.stage == ADD && !(adds && at_end);
-        self._state.passing = self._shape.resultants && !self.rst.val() && self.passes() && old.taken;
-        self._state.taken = self.taken.val() && !self.rst.val();
-        if adds {
-            self.add();
-        } else if self._state.stage == FINISH {
-            let s = &mut self._state;
-            s.sums.moment_x += if s.more + 1 < cols { s.sums.fz } else { 0 };
-            s.sums.moment_y += if s.more + 1 < rows { s.sums.fz } else { 0 };
-            s.more += 1;
-            if s.more == rows.max(cols) {
-                s.stage = OUT;
-            }
-        } else if self._state.stage == OUT && old.taken {
-            self._state.out += 1;
-            if self._state.out == WORDS {
-                self._state.stage = STATUS;
-            }
-        } else if old.passing && self.beat_valid.val() && self.beat_last.val() {
-            self._state.stage = ADD;
-        }
-        if self.rst.val() {
-            (self._state.stage, self._state.row, self._state.col) = (ADD, 0, 0);
-        }
+        block.bind(k.finish())
     }
 }
 
-impl Logic for Resultants {
-    fn update(&mut self) {
-        if self.clk.pos_edge() {
-            self.advance();
+/// The block's inputs.
+#[derive(Clone, Copy)]
+struct Ports<'k> {
+    rst: Expr<'k>,
+    run: Expr<'k>,
+    taken: Expr<'k>,
+    summarise: Expr<'k>,
+    beat: Expr<'k>,
+    beat_valid: Expr<'k>,
+    beat_last: Expr<'k>,
+}
+
+impl<'k> Ports<'k> {
+    fn new(k: &'k Builder) -> Self {
+        let [rst, run, taken, summarise] = ["rst", "run", "taken", "summarise"].map(|name| k.input(name, 1));
+        let beat = k.input("beat", 96);
+        let [beat_valid, beat_last] = ["beat_valid", "beat_last"].map(|name| k.input(name, 1));
+        Ports { rst, run, taken, summarise, beat, beat_valid, beat_last }
+    }
+}
+
+/// Beats pass as words.
+fn pass<'k>(k: &'k Builder, ports: Ports<'k>) {
+    k.wire("beat_ready", ports.run & ports.taken);
+    k.wire("word", ports.beat);
+    k.wire("word_valid", ports.run & ports.beat_valid);
+    k.wire("word_last", ports.beat_last);
+}
+
+/// Beats pass as words, or are added up.
+fn sums<'k>(k: &'k Builder, ports: Ports<'k>, rows: usize, cols: usize) {
+    let Ports { rst, run, taken, summarise, beat, beat_valid, beat_last } = ports;
+    // Every intermediate sum is at most the largest force word times taxels times the longer side.
+    let bits = 32 + count_bits(rows * cols + 1) + count_bits(rows.max(cols));
+    let (r, c, m, l) = (count_bits(rows), count_bits(cols), count_bits(rows.max(cols)), count_bits(rows * cols + 1));
+    let bit = Type::unsigned(1);
+    let stage = k.state("stage", Type::unsigned(2), rst, ADD);
+    let out = k.register("out", Type::unsigned(2));
+    let adding = k.state("adding", bit, rst, 0);
+    let adding = adding.comment("beat_ready, separately for beats that are added and beats that pass.");
+    let passing = k.state("passing", bit, rst, 0);
+    let was_taken = k.state("was_taken", bit, rst, 0).comment(
+        "Registered to shorten the route from the packer; meanwhile the CRC processes the last byte of the word.",
+    );
+    let row = k.state("row", Type::unsigned(r), rst, 0);
+    let col = k.state("col", Type::unsigned(c), rst, 0);
+    let more = k.register("more", Type::unsigned(m));
+    let sum = |name: &str| k.register(name, Type::signed(bits));
+    let totals = ["sum_x", "sum_y", "sum_z"].map(sum);
+    let [moment_x, moment_y, line] = ["moment_x", "moment_y", "line"].map(sum);
+    let loaded = k.register("loaded", Type::unsigned(l));
+
+    let passes = k.wire("passes", !summarise | stage.is(STATUS));
+    let begins = k.wire("begins", col.is(0));
+    let first = k.wire("first", row.is(0) & begins);
+    let line_end = k.wire("line_end", col.is(cols as u64 - 1));
+    let at_end = k.wire("at_end", line_end & row.is(rows as u64 - 1));
+    let adds = k.wire("adds", *adding & beat_valid);
+    let sends = k.wire("sends", stage.is(OUT));
+    let finishes = k.wire("finishes", stage.is(FINISH));
+    let ends = passing.get() & beat_valid & beat_last;
+    adding.set(run & !passes & stage.is(ADD) & !(adds & at_end));
+    passing.set(passes & *was_taken);
+    was_taken.set(taken);
+
+    let wrapped = |sum: Expr<'k>| sum.low(bits).signed();
+    let nothing = k.signed_constant(bits, 0);
+    let forces = [0, 1, 2].map(|axis| beat.slice(32 * axis, 32).signed().extend(bits));
+    let [.., z] = forces;
+    let sum_z = *totals[2];
+    k.when(adds, || {
+        for (total, force) in totals.iter().zip(forces) {
+            total.set(first.mux(force, wrapped(**total + force)));
         }
-        let s = self._state;
-        let stands = if self.passes() { self.beat_valid.val() } else { s.stage == OUT };
-        self.word_valid.next = self.run.val() && stands && !s.passing;
-        self.beat_ready.next = match self._shape.resultants {
-            true => s.adding || s.passing,
-            false => self.run.val() && self.taken.val(),
-        };
-        self.word_last.next = self.passes() && self.beat_last.val();
-        self.word.next = if self.passes() {
-            self.beat.val()
-        } else {
+        loaded.set((first.mux(k.constant(l, 0), *loaded) + beat.slice(64, 32).any()).low(l));
+        line.set(begins.mux(z, wrapped(*line + z)));
+        moment_x.set(first.mux(nothing, begins.mux(*moment_x, wrapped(*moment_x - *line))));
+        moment_y.set(first.mux(nothing, begins.mux(wrapped(*moment_y - sum_z), *moment_y)));
+        more.set(k.constant(m, 0));
+        out.set(k.constant(2, 0));
+        col.set(line_end.mux(k.constant(c, 0), col.plus(1)));
+        k.when(line_end, || row.set(at_end.mux(k.constant(r, 0), row.plus(1))));
+    });
+    k.when(finishes, || {
+        for (moment, side) in [(&moment_x, cols), (&moment_y, rows)] {
+            let counts = more.less(k.constant(m, side as u64 - 1));
+            k.when(counts, || moment.set(wrapped(**moment + sum_z)));
+        }
+        more.set(more.plus(1));
+    });
+    let leaves = k.wire("leaves", sends & *was_taken);
+    k.when(leaves, || out.set(out.plus(1)));
+    let goes_to = |next: u64| stage.set(k.constant(2, next));
+    k.when(ends, || goes_to(ADD));
+    k.when(leaves & out.is(LAST_WORD), || goes_to(STATUS));
+    k.when(finishes & more.is(rows.max(cols) as u64 - 1), || goes_to(OUT));
+    k.when(adds & at_end, || goes_to(FINISH));
+
+    let sum = |sum: Expr<'k>| sum.extend(64);
+    let words = [sum(*moment_y), sum(*moment_x), sum(sum_z), sum(*totals[1]), sum(*totals[0])];
+    let all = k.wire("all", loaded.extend(64).concat(concat(&words)));
+    let [low, second, third, high] = [0, 1, 2, 3].map(|word| all.slice(96 * word, 96));
+    let of_sums = out.at(1).mux(out.at(0).mux(high, third), out.at(0).mux(second, low));
+    k.wire("beat_ready", *adding | *passing);
+    k.wire("word", passes.mux(beat, of_sums));
+    k.wire("word_valid", run & passes.mux(beat_valid & !*passing, sends));
+    k.wire("word_last", passes & beat_last);
+}
+
+#[cfg(test)]
+mod tests {
+    use dermis_golden::link::Sums;
+
+    use super::*;
+    use crate::language::testbench::{check, Reference};
+    use crate::wire::Word;
+
+    const STATUS_BEATS: usize = 3;
+
+    /// Adds the beats of a whole frame with the golden model's [`Sums`].
+    #[derive(Clone, Default)]
+    struct Answers {
+        rows: usize,
+        cols: usize,
+        beats: Vec<[i32; 3]>,
+        /// Cycles since the last force was added, words of the sums sent; none before.
+        after: Option<(usize, usize)>,
+        adding: bool,
+        passing: bool,
+        was_taken: bool,
+        reset: bool,
+    }
+
+    impl Answers {
+        fn passes(&self, inputs: &[Word]) -> bool {
+            inputs[3].number() == 0 || self.after.is_some_and(|(_, words)| words == 4)
+        }
+
+        /// The sums are complete, and words of them are to be sent.
+        fn sends(&self) -> bool {
+            self.after.is_some_and(|(cycles, words)| cycles >= self.rows.max(self.cols) && words < 4)
+        }
+
+        fn word(&self, word: usize) -> Word {
+            let bytes = Sums::of(&self.beats, self.cols).to_bytes();
             let mut all = Word::default();
-            for (index, bytes) in s.sums.to_bytes().chunks(8).enumerate() {
-                let sum = bytes.iter().rev().fold(0, |sum, &byte| sum << 8 | u64::from(byte));
-                all.set(64 * index, 64, sum);
+            bytes[12 * word..][..12].iter().enumerate().for_each(|(at, &byte)| all.set(8 * at, 8, byte.into()));
+            all
+        }
+    }
+
+    impl Reference for Answers {
+        fn outputs(&mut self, inputs: &[Word]) -> Vec<Option<Word>> {
+            if !self.reset {
+                return vec![None; 4];
             }
-            let mut word = Word::default();
-            word.set(0, 48, all.field(96 * s.out.min(WORDS - 1), 48));
-            word.set(48, 48, all.field(96 * s.out.min(WORDS - 1) + 48, 48));
-            word
+            let [run, valid, last] = [1, 5, 6].map(|k| inputs[k].number() == 1);
+            let passes = self.passes(inputs);
+            let stands = if passes { valid && !self.passing } else { self.sends() };
+            let word = match (passes, self.after) {
+                (true, _) => Some(inputs[4]),
+                (false, Some((_, words))) if self.sends() => Some(self.word(words)),
+                _ => None,
+            };
+            let bit = |bit: bool| Some(Word::from(bit));
+            vec![bit(self.adding || self.passing), word, bit(run && stands), bit(passes && last)]
+        }
+
+        fn clock(&mut self, inputs: &[Word]) {
+            let [rst, run, taken, _, _, valid, last] = [0, 1, 2, 3, 4, 5, 6].map(|k| inputs[k].number() == 1);
+            let (before, passes) = (self.clone(), self.passes(inputs));
+            if before.adding && valid {
+                self.beats.push([0, 1, 2].map(|axis| inputs[4].signed(axis, 32) as i32));
+            }
+            self.after = match before.after {
+                None => (self.beats.len() == self.rows * self.cols).then_some((0, 0)),
+                Some((_, words)) if before.sends() => {
+                    Some((self.rows.max(self.cols), words + usize::from(before.was_taken)))
+                }
+                Some((cycles, words)) => Some((cycles + 1, words)),
+            };
+            if before.passing && valid && last {
+                (self.after, self.beats) = (None, Vec::new());
+            }
+            self.adding = run && !passes && self.after.is_none() && before.after.is_none();
+            self.passing = passes && before.was_taken;
+            self.was_taken = taken;
+            if rst {
+                *self = Answers { reset: true, rows: self.rows, cols: self.cols, ..Answers::default() };
+            }
+        }
+    }
+
+    /// Frames of forces and status; some answers are all beats, the others their sums. Beats stay until they are
+    /// accepted; no word is accepted in the cycle after one; resets.
+    fn stimulus(cycles: usize, rows: usize, cols: usize) -> Vec<Vec<Word>> {
+        let mut random = fastrand::Rng::with_seed(21);
+        let mut answers = Answers { rows, cols, ..Answers::default() };
+        let (mut at, mut pause, mut summarise, mut beat, mut offered, mut large) =
+            (0, 0, false, Word::default(), false, false);
+        let inputs = |cycle: usize| {
+            let rst = cycle < 2 || random.u16(..1500) == 0;
+            if rst || (pause == 0 && at == rows * cols + STATUS_BEATS) {
+                // Between answers: `run` is low, and the kind of the next is known.
+                (at, pause, summarise, offered, large) = (0, 3, random.u8(..3) > 0, false, random.bool());
+            }
+            pause -= usize::from(pause > 0);
+            if !offered {
+                offered = !rst && pause == 0 && random.u8(..4) > 0;
+                let one = |random: &mut fastrand::Rng| match (large, random.u8(..3)) {
+                    (_, 0) => 0,
+                    (true, 1) => i32::MIN.into(),
+                    (true, _) => i32::MAX.into(),
+                    _ => i64::from(random.i32(..)),
+                };
+                beat = Word::of_fields(&[one(&mut random), one(&mut random), one(&mut random)], 32);
+            }
+            let last = at == rows * cols + STATUS_BEATS - 1;
+            let run = pause == 0 && random.u8(..16) > 0;
+            let bit = Word::from;
+            let mut inputs = vec![bit(rst), bit(run), bit(false), bit(summarise), beat, bit(offered), bit(last)];
+            answers.reset = true;
+            let outputs = answers.outputs(&inputs);
+            let stands = outputs[2] == Some(Word::from(true));
+            inputs[2] = bit(stands && !answers.was_taken && random.u8(..3) == 0);
+            if offered && outputs[0] == Some(Word::from(true)) {
+                (offered, at) = (false, at + 1);
+            }
+            answers.clock(&inputs);
+            inputs
         };
+        (0..cycles).map(inputs).collect()
     }
 
-    fn connect(&mut self) {
-        for bit in [&mut self.beat_ready, &mut self.word_valid, &mut self.word_last] {
-            bit.connect();
+    #[test]
+    fn the_sums_are_those_of_the_model() {
+        for (rows, cols) in [(3, 5), (6, 2)] {
+            let shape = Shape { rows, cols, input_bits: 12, status_beats: STATUS_BEATS, resultants: true, frames: 4 };
+            let mut answers = Answers { rows, cols, ..Answers::default() };
+            check(Resultants::new(&shape).kernel.kernel(), &stimulus(12_000, rows, cols), &mut answers);
         }
-        self.word.connect();
-    }
-
-    fn hdl(&self) -> Verilog {
-        if !self._shape.resultants {
-            return Verilog::Custom(
-                "\
-wire unused = &{1'b0, clk, rst, summarise};
-always @(*) begin
-  beat_ready = run && taken;
-  word_valid = run && beat_valid;
-  word_last = beat_last;
-  word = beat;
-end"
-                .to_string(),
-            );
-        }
-        let (rows, cols, bits) = (self._shape.rows, self._shape.cols, self._bits);
-        let (r, c, m) = (count_bits(rows), count_bits(cols), count_bits(rows.max(cols)));
-        let l = count_bits(rows * cols + 1);
-        let sums: Vec<String> = ["moment_y", "moment_x", "sum_z", "sum_y", "sum_x"]
-            .iter()
-            .map(|sum| format!("{{{{{}{{{sum}[{}]}}}}, {sum}}}", 64 - bits, bits - 1))
-            .collect();
-        Verilog::Custom(format!(
-            "\
-reg [1:0] stage, out;
-// beat_ready, separately for beats that are added and beats that pass.
-reg adding, passing;
-// Registered to shorten the route from the packer; meanwhile the CRC processes the last byte of the word.
-reg was_taken;
-reg [{r_end}:0] row;
-reg [{c_end}:0] col;
-reg [{m_end}:0] more;
-reg [{end}:0] sum_x, sum_y, sum_z, moment_x, moment_y, line;
-reg [{l_end}:0] loaded;
-wire [{end}:0] x = {{{{{wider}{{beat[31]}}}}, beat[31:0]}};
-wire [{end}:0] y = {{{{{wider}{{beat[63]}}}}, beat[63:32]}};
-wire [{end}:0] z = {{{{{wider}{{beat[95]}}}}, beat[95:64]}};
-wire [{all_end}:0] all = {{{l_more}'d0, loaded, {sums}}};
-wire passes = !summarise || stage == 2'd{STATUS};
-wire line_end = col == {c}'d{last_col};
-wire first = row == {r}'d0 && col == {c}'d0;
-always @(*) begin
-  beat_ready = adding || passing;
-  word_valid = run && (passes ? beat_valid && !passing : stage == 2'd{OUT});
-  word_last = passes && beat_last;
-  word = passes ? beat : out[1] ? (out[0] ? all[383:288] : all[287:192]) : (out[0] ? all[191:96] : all[95:0]);
-end
-wire adds = adding && beat_valid;
-wire at_end = line_end && row == {r}'d{last_row};
-always @(posedge clk) begin
-  adding <= !rst && run && !passes && stage == 2'd{ADD} && !(adds && at_end);
-  passing <= !rst && passes && was_taken;
-  was_taken <= !rst && taken;
-  if (adds) begin
-    sum_x <= first ? x : sum_x + x;
-    sum_y <= first ? y : sum_y + y;
-    sum_z <= first ? z : sum_z + z;
-    loaded <= (first ? {l}'d0 : loaded) + {{{l_less}'d0, beat[95:64] != 32'd0}};
-    line <= col == {c}'d0 ? z : line + z;
-    moment_x <= first ? {bits}'d0 : col == {c}'d0 ? moment_x : moment_x - line;
-    moment_y <= first ? {bits}'d0 : col == {c}'d0 ? moment_y - sum_z : moment_y;
-    more <= {m}'d0;
-    out <= 2'd0;
-  end
-  if (stage == 2'd{FINISH}) begin
-    if (more < {m}'d{last_col}) moment_x <= moment_x + sum_z;
-    if (more < {m}'d{last_row}) moment_y <= moment_y + sum_z;
-    more <= more + {m}'d1;
-  end
-  if (stage == 2'd{OUT} && was_taken) out <= out + 2'd1;
-  if (rst) begin
-    stage <= 2'd{ADD};
-    row <= {r}'d0;
-    col <= {c}'d0;
-  end else begin
-    if (adds) begin
-      col <= line_end ? {c}'d0 : col + {c}'d1;
-      if (line_end) row <= at_end ? {r}'d0 : row + {r}'d1;
-      if (at_end) stage <= 2'd{FINISH};
-    end else if (stage == 2'd{FINISH}) begin
-      if (more == {m}'d{last_more}) stage <= 2'd{OUT};
-    end else if (stage == 2'd{OUT} && was_taken) begin
-      if (out == 2'd3) stage <= 2'd{STATUS};
-    end else if (passing && beat_valid && beat_last) stage <= 2'd{ADD};
-  end
-end",
-            r_end = r - 1,
-            c_end = c - 1,
-            m_end = m - 1,
-            end = bits - 1,
-            l_end = l - 1,
-            wider = bits - 32,
-            all_end = 64 * COUNT - 1,
-            l_more = 64 - l,
-            l_less = l - 1,
-            sums = sums.join(", "),
-            last_col = cols - 1,
-            last_row = rows - 1,
-            last_more = rows.max(cols) - 1,
-        ))
     }
 }

@@ -1,9 +1,11 @@
 //! SLIP encoder: from the bytes of packets to the bytes of the link.
 
-use dermis_golden::link::slip::{escape, END, ESC, ESC_END, ESC_ESC, ESC_IDLE, IDLE};
+use dermis_golden::link::slip::{END, ESC, ESC_END, ESC_ESC, ESC_IDLE, IDLE};
 use rust_hdl::prelude::*;
 
-use crate::wire::{Wire, Word};
+use crate::kernel_block;
+use crate::language::{Body, Builder, Kernel, Type};
+use crate::wire::Wire;
 
 /// Escapes bytes as SLIP requires; with `border`, an END between packets is sent unescaped.
 ///
@@ -29,16 +31,20 @@ pub struct SlipEncoder {
     pub valid: Signal<Out, Bit>,
     /// The link accepts the byte in this cycle.
     pub ready: Signal<In, Bit>,
-    _registered: bool,
-    _second: bool,
-    _seen: bool,
-    _gone: bool,
+    kernel: Body,
 }
+
+kernel_block!(
+    SlipEncoder,
+    clock clk,
+    inputs [rst, content, border, content_valid, ready],
+    outputs [content_ready, data, valid]
+);
 
 impl SlipEncoder {
     /// With the two extra registers if `registered`.
     pub fn new(registered: bool) -> Self {
-        SlipEncoder {
+        let block = SlipEncoder {
             clk: Default::default(),
             rst: Default::default(),
             content: Wire::new(8),
@@ -48,88 +54,135 @@ impl SlipEncoder {
             data: Wire::new(8),
             valid: Default::default(),
             ready: Default::default(),
-            _registered: registered,
-            _second: false,
-            _seen: false,
-            _gone: false,
-        }
-    }
-
-    /// A byte is offered, and it is known whether it has to be escaped.
-    fn stands(&self) -> bool {
-        match self._registered {
-            true => self._seen,
-            false => self.content_valid.val(),
-        }
-    }
-
-    /// The link accepts a byte.
-    fn goes(&self) -> bool {
-        self.stands() && self.ready.val()
-    }
-
-    /// The link accepts the last byte of `content`: the only one, or the second of an escape.
-    fn takes(&self, special: bool) -> bool {
-        self.goes() && (!special || self._second)
+            kernel: Body::default(),
+        };
+        block.bind(kernel(registered))
     }
 }
 
-impl Logic for SlipEncoder {
-    fn update(&mut self) {
-        let content = self.content.val().number() as u8;
-        let after = escape(content).filter(|_| !self.border.val());
-        let special = after.is_some();
-        if self.clk.pos_edge() {
-            let taken = self.takes(special);
-            self._second = !self.rst.val() && (self._second ^ (self.goes() && special));
-            self._seen = !self.rst.val() && self.content_valid.val() && !taken && !self._gone;
-            self._gone = !self.rst.val() && taken;
+fn kernel(registered: bool) -> Kernel {
+    let k = Builder::new("slip_encoder");
+    let (rst, content, border) = (k.input("rst", 1), k.input("content", 8), k.input("border", 1));
+    let (content_valid, ready) = (k.input("content_valid", 1), k.input("ready", 1));
+    let bit = Type::unsigned(1);
+    let second = k.state("second", bit, rst, 0);
+    let byte = |byte: u8| k.constant(8, byte.into());
+    let is_end = k.wire("is_end", content.equals(byte(END)));
+    let is_escape = k.wire("is_escape", content.equals(byte(ESC)));
+    let found = k.wire("found", !border & (is_end | is_escape | content.equals(byte(IDLE))));
+    let registers = registered
+        .then(|| (k.register("special", bit), k.state("stands", bit, rst, 0), k.state("content_ready", bit, rst, 0)));
+    let (special, stands) = registers.map_or((found, content_valid), |(special, stands, _)| (*special, *stands));
+    let taken = k.wire("taken", stands & ready & (!special | *second));
+    match registers {
+        None => {
+            k.wire("content_ready", taken);
         }
-        let data = match after {
-            _ if self.border.val() => END,
-            Some(after) if self._second => after,
-            Some(_) => ESC,
-            None => content,
-        };
-        self.data.next = Word::from(u64::from(data));
-        self.valid.next = self.stands();
-        self.content_ready.next = match self._registered {
-            true => self._gone,
-            false => self.takes(special),
-        };
+        Some((special, stands, content_ready)) => {
+            special.set(found);
+            stands.set(content_valid & !taken & !*content_ready);
+            content_ready.set(taken);
+        }
+    }
+    let after = is_end.mux(byte(ESC_END), is_escape.mux(byte(ESC_ESC), byte(ESC_IDLE)));
+    k.wire("data", border.mux(byte(END), (!special).mux(content, (!*second).mux(byte(ESC), after))));
+    k.wire("valid", stands);
+    k.when(stands & ready, || second.set(special & !*second));
+    k.finish()
+}
+
+#[cfg(test)]
+mod tests {
+    use dermis_golden::link::slip::{escape, SPECIAL};
+
+    use super::*;
+    use crate::language::testbench::{check, Reference};
+    use crate::wire::Word;
+
+    /// The bytes of the link for a byte of the packet, one after the other.
+    struct Parts {
+        registered: bool,
+        sent: usize,
+        /// With registers: the byte is known, and whether it was taken in the cycle before.
+        stands: bool,
+        told: bool,
+        reset: bool,
     }
 
-    fn connect(&mut self) {
-        self.content_ready.connect();
-        self.data.connect();
-        self.valid.connect();
+    impl Parts {
+        fn new(registered: bool) -> Self {
+            Parts { registered, sent: 0, stands: false, told: false, reset: false }
+        }
+
+        /// The bytes of the link; whether one is offered; whether its last is accepted in this cycle.
+        fn state(&self, inputs: &[Word]) -> (Vec<u8>, bool, bool) {
+            let byte = inputs[1].number() as u8;
+            let parts = match escape(byte) {
+                _ if inputs[2].number() == 1 => vec![END],
+                Some(after) => vec![ESC, after],
+                None => vec![byte],
+            };
+            let stands = if self.registered { self.stands } else { inputs[3].number() == 1 };
+            let taken = stands && inputs[4].number() == 1 && self.sent + 1 == parts.len();
+            (parts, stands, taken)
+        }
     }
 
-    fn hdl(&self) -> Verilog {
-        let (known, told) = match self._registered {
-            false => ("wire stands = content_valid;\nwire special = found;\n", "always @(*) content_ready = taken;\n"),
-            true => (
-                "reg stands, special;\n",
-                "always @(posedge clk) begin\n  special <= found;\n  \
-                 stands <= !rst && content_valid && !taken && !content_ready;\n  content_ready <= !rst && taken;\nend\n",
-            ),
-        };
-        Verilog::Custom(format!(
-            "\
-reg second;
-wire is_end = content == 8'd{END};
-wire is_escape = content == 8'd{ESC};
-wire found = !border && (is_end || is_escape || content == 8'd{IDLE});
-{known}wire taken = stands && ready && (!special || second);
-{told}always @(*) begin
-  data = border ? 8'd{END} : !special ? content : !second ? 8'd{ESC}
-    : is_end ? 8'd{ESC_END} : is_escape ? 8'd{ESC_ESC} : 8'd{ESC_IDLE};
-  valid = stands;
-end
-always @(posedge clk) begin
-  if (rst) second <= 1'b0;
-  else if (stands && ready) second <= special && !second;
-end"
-        ))
+    impl Reference for Parts {
+        fn outputs(&mut self, inputs: &[Word]) -> Vec<Option<Word>> {
+            let (parts, stands, taken) = self.state(inputs);
+            let data = parts.get(self.sent).filter(|_| stands).map(|&byte| Word::from(u64::from(byte)));
+            let content_ready = Word::from(if self.registered { self.told } else { taken });
+            let defined = |word| self.reset.then_some(word);
+            vec![
+                defined(content_ready),
+                data.filter(|_| self.reset && inputs[0].number() == 0),
+                defined(Word::from(stands)),
+            ]
+        }
+
+        fn clock(&mut self, inputs: &[Word]) {
+            let (_, stands, taken) = self.state(inputs);
+            let goes = stands && inputs[4].number() == 1;
+            self.sent = if taken { 0 } else { self.sent + usize::from(goes) };
+            (self.stands, self.told) = (inputs[3].number() == 1 && !taken && !self.told, taken);
+            if inputs[0].number() == 1 {
+                *self = Parts { reset: true, ..Parts::new(self.registered) };
+            }
+        }
+    }
+
+    /// Bytes, every other one special, held until they are accepted; pauses, stalls, resets.
+    fn stimulus(cycles: usize, registered: bool) -> Vec<Vec<Word>> {
+        let mut random = fastrand::Rng::with_seed(7);
+        let mut parts = Parts::new(registered);
+        let mut offered = vec![Word::default(); 3];
+        let mut all = Vec::new();
+        for cycle in 0..cycles {
+            let rst = cycle < 2 || random.u8(..) == 0;
+            if rst || offered[2].number() == 0 {
+                let byte = if random.bool() { SPECIAL[random.usize(..3)].0 } else { random.u8(..) };
+                let valid = !rst && random.u8(..4) > 0;
+                offered = vec![Word::from(u64::from(byte)), Word::from(random.u8(..8) == 0), Word::from(valid)];
+            }
+            let mut inputs = vec![Word::from(rst)];
+            inputs.extend(&offered);
+            inputs.push(Word::from(random.bool()));
+            let accepted = if registered { parts.told } else { parts.state(&inputs).2 };
+            if accepted {
+                offered[2] = Word::default();
+            }
+            parts.clock(&inputs);
+            all.push(inputs);
+        }
+        all
+    }
+
+    #[test]
+    fn each_byte_leaves_as_itself_or_as_its_escape() {
+        for registered in [false, true] {
+            let block = SlipEncoder::new(registered);
+            check(block.kernel.kernel(), &stimulus(6000, registered), &mut Parts::new(registered));
+        }
     }
 }

@@ -2,10 +2,11 @@
 
 use rust_hdl::prelude::*;
 
-use super::{COUNTERS, IDENTITY};
-use crate::wire::{Wire, Word};
+use crate::kernel_block;
+use crate::language::{concat, Body, Builder, Expr, Kernel, Type};
+use crate::wire::Wire;
 
-/// Multiplexer, byte by byte, between the ledger, which holds identity and counters, and the engine's answer.
+/// Multiplexer, byte by byte, between the counter RAM, which holds identity and counters, and the engine's answer.
 ///
 /// With many lanes it has two register stages: the packer uses a byte no sooner than five cycles after it asked for it.
 /// A link whose bit rate is close to the clock has no cycle to spare, but a smaller multiplexer.
@@ -23,7 +24,7 @@ pub struct Sources {
     pub index: Wire<In>,
     /// The last byte of a word is accepted in this cycle.
     pub taken: Signal<In, Bit>,
-    /// Entry of the ledger to read.
+    /// Entry of the counter RAM to read.
     pub address: Wire<Out>,
     /// The entry, two bytes.
     pub entry: Wire<In>,
@@ -45,19 +46,20 @@ pub struct Sources {
     pub word_valid: Signal<Out, Bit>,
     /// The word is the payload's last; valid with `word_valid`.
     pub word_last: Signal<Out, Bit>,
-    _registered: bool,
-    _taken: bool,
-    _second: bool,
-    _half: Half,
+    kernel: Body,
 }
 
-/// Content of the first register stage: two bytes, whether their word is valid, whether it is the last.
-type Half = (u64, bool, bool);
+kernel_block!(
+    Sources,
+    clock clk,
+    inputs [source, begun, wanted, index, taken, entry, entry_valid, answer, answer_valid, answer_last],
+    outputs [address, answer_wanted, summarise, octet, word_valid, word_last]
+);
 
 impl Sources {
     /// With the two register stages if `registered`.
     pub fn new(registered: bool) -> Self {
-        Sources {
+        let block = Sources {
             clk: Default::default(),
             source: Wire::new(2),
             begun: Default::default(),
@@ -75,82 +77,151 @@ impl Sources {
             octet: Wire::new(8),
             word_valid: Default::default(),
             word_last: Default::default(),
-            _registered: registered,
-            _taken: false,
-            _second: false,
-            _half: Half::default(),
-        }
+            kernel: Body::default(),
+        };
+        block.bind(kernel(registered))
     }
 }
 
-impl Logic for Sources {
-    fn update(&mut self) {
-        let source = self.source.val().number() as usize;
-        let own = source == IDENTITY || source == COUNTERS;
-        let index = self.index.val().number() as usize;
-        let counters = source & 1 == 1;
-        let edge = self.clk.pos_edge();
-        let before = self._second;
-        if edge {
-            let taken = if self._registered { self._taken } else { self.taken.val() };
-            self._second = !self.begun.val() && (before || taken);
-            self._taken = self.taken.val();
-        }
-        let second = if self._registered { before } else { self._second };
-        let half = match own {
-            true => (self.entry.val().field(0, 16), self.entry_valid.val(), counters || second),
-            false => {
-                let low = 16 * (index / 2).min(5);
-                (self.answer.val().field(low, 16), self.answer_valid.val(), self.answer_last.val())
+/// A register of `value`, or a wire.
+fn stage<'k>(k: &'k Builder, registered: bool, name: &str, value: Expr<'k>) -> Expr<'k> {
+    if !registered {
+        return k.wire(name, value);
+    }
+    let register = k.register(name, value.ty());
+    register.set(value);
+    *register
+}
+
+fn kernel(registered: bool) -> Kernel {
+    let k = Builder::new("sources");
+    let (source, begun, wanted) = (k.input("source", 2), k.input("begun", 1), k.input("wanted", 1));
+    let (index, taken) = (k.input("index", 4), k.input("taken", 1));
+    let (entry, entry_valid) = (k.input("entry", 16), k.input("entry_valid", 1));
+    let (answer, answer_valid, answer_last) =
+        (k.input("answer", 96), k.input("answer_valid", 1), k.input("answer_last", 1));
+    let second = k.register("second", Type::unsigned(1));
+    let stage = |name: &str, value| stage(&k, registered, name, value);
+    let was_taken = stage("was_taken", taken);
+    second.set(!begun & (*second | was_taken));
+    k.wire("address", concat(&[source.at(0), *second, index.slice(1, 3)]));
+    let is_answer = source.at(1);
+    k.wire("answer_wanted", wanted & is_answer);
+    let [high, middle, low] = [2, 1, 0].map(|word| answer.slice(32 * word, 32));
+    let word = k.wire("answer_word", index.at(3).mux(high, index.at(2).mux(middle, low)));
+    let half = index.at(1).mux(word.slice(16, 16), word.low(16));
+    let both = stage("both", is_answer.mux(half, entry));
+    let valid = stage("valid", is_answer.mux(answer_valid, entry_valid));
+    let last = stage("last", is_answer.mux(answer_last, source.at(0) | *second));
+    stage("octet", index.at(0).mux(both.slice(8, 8), both.low(8)));
+    stage("word_valid", valid);
+    stage("word_last", last);
+    stage("summarise", !source.at(0));
+    k.finish()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::{COUNTERS, IDENTITY};
+    use super::*;
+    use crate::language::testbench::{check, Reference};
+    use crate::wire::Word;
+
+    /// Byte, whether its word is valid, whether it is the last; the last of the registers first.
+    type Byte = (u64, bool, bool);
+
+    /// Selects from whole words; with registers, the index selects one byte of two in the second cycle.
+    #[derive(Default)]
+    struct Selection {
+        registered: bool,
+        second: Option<bool>,
+        was_taken: Option<bool>,
+        half: Option<Byte>,
+        byte: Option<(Byte, bool)>,
+    }
+
+    impl Selection {
+        fn half(&self, inputs: &[Word]) -> Option<Byte> {
+            let (source, index) = (inputs[0].number() as usize, inputs[3].number() as usize);
+            match source {
+                IDENTITY => Some((inputs[5].number(), inputs[6].number() == 1, self.second?)),
+                COUNTERS => Some((inputs[5].number(), inputs[6].number() == 1, true)),
+                _ => {
+                    let half = inputs[7].field(16 * (index / 2), 16);
+                    Some((half, inputs[8].number() == 1, inputs[9].number() == 1))
+                }
             }
-        };
-        if edge || !self._registered {
-            let (both, valid, last) = if self._registered { self._half } else { half };
-            self.octet.next = Word::from(both >> (8 * (index & 1)) & 0xff);
-            (self.word_valid.next, self.word_last.next) = (valid, last);
-            self.summarise.next = !counters;
-            self._half = half;
         }
-        self.address.next = Word::from(u64::from(counters) << 4 | u64::from(self._second) << 3 | (index as u64) >> 1);
-        self.answer_wanted.next = self.wanted.val() && !own;
+
+        fn byte(inputs: &[Word], half: Byte) -> (Byte, bool) {
+            let byte = half.0 >> (8 * (inputs[3].number() & 1)) & 0xff;
+            ((byte, half.1, half.2), inputs[0].number() & 1 == 0)
+        }
     }
 
-    fn connect(&mut self) {
-        for bit in [&mut self.answer_wanted, &mut self.summarise, &mut self.word_valid, &mut self.word_last] {
-            bit.connect();
+    impl Reference for Selection {
+        fn outputs(&mut self, inputs: &[Word]) -> Vec<Option<Word>> {
+            let (source, index) = (inputs[0].number(), inputs[3].number());
+            let address = self.second.map(|second| Word::from((source & 1) << 4 | u64::from(second) << 3 | index >> 1));
+            let byte = match self.registered {
+                true => self.byte,
+                false => self.half(inputs).map(|half| Selection::byte(inputs, half)),
+            };
+            vec![
+                address,
+                Some(Word::from(inputs[2].number() == 1 && source >= 2)),
+                byte.map(|((byte, ..), _)| Word::from(byte)),
+                byte.map(|((_, valid, _), _)| Word::from(valid)),
+                byte.map(|((.., last), _)| Word::from(last)),
+                byte.map(|(_, sums)| Word::from(sums)),
+            ]
         }
-        self.address.connect();
-        self.octet.connect();
+
+        fn clock(&mut self, inputs: &[Word]) {
+            self.byte = self.half.map(|half| Selection::byte(inputs, half));
+            self.half = self.half(inputs);
+            let taken = inputs[4].number() == 1;
+            let counts = if self.registered { self.was_taken } else { Some(taken) };
+            self.was_taken = Some(taken);
+            self.second = match inputs[1].number() {
+                1 => Some(false),
+                _ => self.second.zip(counts).map(|(second, taken)| second || taken),
+            };
+        }
     }
 
-    fn hdl(&self) -> Verilog {
-        let (when, to) = if self._registered { ("always @(posedge clk)", "<=") } else { ("always @(*)", "=") };
-        let taken = match self._registered {
-            true => "reg was_taken;\nalways @(posedge clk) was_taken <= taken;\n",
-            false => "wire was_taken = taken;\n",
+    #[test]
+    fn the_byte_is_that_of_the_source() {
+        let mut random = fastrand::Rng::with_seed(19);
+        let (mut source, mut index) = (0, 0);
+        let cycle = |cycle: usize| {
+            let begun = cycle == 0 || random.u8(..40) == 0;
+            if begun {
+                source = random.u64(..4);
+            }
+            // The packer keeps the index for some cycles.
+            if random.u8(..3) == 0 {
+                index = random.u64(..12);
+            }
+            let mut answer = Word::default();
+            answer.set_limbs(&[random.u64(..), random.u64(..1 << 32)]);
+            vec![
+                Word::from(source),
+                Word::from(begun),
+                Word::from(random.bool()),
+                Word::from(index),
+                Word::from(random.u8(..12) == 0),
+                Word::from(random.u64(..0x10000)),
+                Word::from(random.bool()),
+                answer,
+                Word::from(random.bool()),
+                Word::from(random.bool()),
+            ]
         };
-        Verilog::Custom(format!(
-            "\
-reg second, valid, last;
-reg [15:0] both;
-wire [31:0] answer_word = index[3] ? answer[95:64] : index[2] ? answer[63:32] : answer[31:0];
-wire [15:0] answer_half = index[1] ? answer_word[31:16] : answer_word[15:0];
-always @(*) begin
-  address = {{source[0], second, index[3:1]}};
-  answer_wanted = wanted && source[1];
-end
-{taken}always @(posedge clk) second <= !begun && (second || was_taken);
-{when} begin
-  both {to} source[1] ? answer_half : entry;
-  valid {to} source[1] ? answer_valid : entry_valid;
-  last {to} source[1] ? answer_last : source[0] || second;
-end
-{when} begin
-  octet {to} index[0] ? both[15:8] : both[7:0];
-  word_valid {to} valid;
-  word_last {to} last;
-  summarise {to} !source[0];
-end"
-        ))
+        let all: Vec<Vec<Word>> = (0..5000).map(cycle).collect();
+        for registered in [false, true] {
+            let mut selection = Selection { registered, ..Selection::default() };
+            check(Sources::new(registered).kernel.kernel(), &all, &mut selection);
+        }
     }
 }

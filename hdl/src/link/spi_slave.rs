@@ -3,7 +3,9 @@
 use dermis_golden::link::slip::IDLE;
 use rust_hdl::prelude::*;
 
-use crate::wire::{Wire, Word};
+use crate::kernel_block;
+use crate::language::{Body, Builder, Kernel, Type};
+use crate::wire::Wire;
 
 /// Mode 0, most significant bit first, bytes in both directions at once. Registers `sclk_…` are in the controller's
 /// clock domain:
@@ -40,49 +42,28 @@ pub struct SpiSlave {
     pub data: Wire<Out>,
     /// A byte was received in this cycle.
     pub valid: Signal<Out, Bit>,
-    /// Constant 0: every eight bits are a byte.
-    pub broken: Signal<Out, Bit>,
     /// A byte to send; valid with `send_valid`.
     pub send_data: Wire<In>,
     /// `send_data` is offered; held until `send_ready`.
     pub send_valid: Signal<In, Bit>,
     /// The byte is accepted in this cycle.
     pub send_ready: Signal<Out, Bit>,
-    _level: bool,
-    _sclk: Sclk,
-    _state: State,
-}
-
-/// Registers in the controller's clock domain.
-#[derive(Clone, Copy, Debug, Default)]
-struct Sclk {
-    bit: u32,
-    shift: u8,
-    carries: bool,
-    mosi: bool,
-    received: u8,
-    toggle: bool,
-    kept: u8,
-    full: bool,
-    taken: bool,
-    offered: [bool; 2],
-}
-
-/// Registers in the domain of `clk`.
-#[derive(Clone, Copy, Debug, Default)]
-struct State {
-    received: [bool; 3],
-    taken: [bool; 2],
-    offer: bool,
-    offered: u8,
+    kernel: Body,
 }
 
 /// Index of the last bit of a byte.
-const LAST: u32 = 7;
+const LAST: usize = 7;
+
+kernel_block!(
+    SpiSlave,
+    clock clk,
+    inputs [rst, spi_sclk, spi_cs_n, spi_mosi, send_data, send_valid],
+    outputs [spi_miso, data, valid, send_ready]
+);
 
 impl Default for SpiSlave {
     fn default() -> Self {
-        SpiSlave {
+        let block = SpiSlave {
             clk: Default::default(),
             rst: Default::default(),
             spi_sclk: Default::default(),
@@ -91,158 +72,181 @@ impl Default for SpiSlave {
             spi_miso: Default::default(),
             data: Wire::new(8),
             valid: Default::default(),
-            broken: Default::default(),
             send_data: Wire::new(8),
             send_valid: Default::default(),
             send_ready: Default::default(),
-            _level: false,
-            _sclk: Sclk::default(),
-            _state: State::default(),
-        }
-    }
-}
-
-impl SpiSlave {
-    fn rises(&mut self) {
-        let (s, mosi) = (self._sclk, self.spi_mosi.val());
-        let next = &mut self._sclk;
-        next.mosi = mosi;
-        next.offered = [self._state.offer, s.offered[0]];
-        if s.bit == LAST {
-            next.received = s.shift << 1 | u8::from(mosi);
-            next.toggle = !s.toggle;
-            if s.carries || !s.full {
-                next.full = s.offered[1] != s.taken;
-                next.taken = s.offered[1];
-                next.kept = self._state.offered;
-            }
-        }
-    }
-
-    fn falls(&mut self) {
-        let s = self._sclk;
-        let next = &mut self._sclk;
-        next.bit = (s.bit + 1) % (LAST + 1);
-        next.shift = match s.bit {
-            LAST if s.full => s.kept,
-            LAST => IDLE,
-            _ => s.shift << 1 | u8::from(s.mosi),
+            kernel: Body::default(),
         };
-        if s.bit == LAST {
-            next.carries = s.full;
-        }
-    }
-
-    fn clocked(&mut self) {
-        let s = self._state;
-        let next = &mut self._state;
-        next.received = [self._sclk.toggle, s.received[0], s.received[1]];
-        next.taken = [self._sclk.taken, s.taken[0]];
-        if self.send_valid.val() && s.taken[1] == s.offer && !self.rst.val() {
-            next.offer = !s.offer;
-            next.offered = self.send_data.val().number() as u8;
-        }
+        block.bind(kernel())
     }
 }
 
-impl Logic for SpiSlave {
-    fn update(&mut self) {
-        // The two clocks never change in the same update round: callers settle in between.
-        if self.clk.pos_edge() {
-            self.clocked();
-        }
-        match (self._level, self.spi_sclk.val()) {
-            (false, true) => self.rises(),
-            (true, false) => self.falls(),
-            _ => (),
-        }
-        self._level = self.spi_sclk.val();
-        if self.spi_cs_n.val() {
-            (self._sclk.bit, self._sclk.shift, self._sclk.carries) = (0, IDLE, false);
-        }
-        let s = &self._state;
-        self.spi_miso.next = self._sclk.shift >> 7 == 1;
-        self.data.next = Word::from(u64::from(self._sclk.received));
-        self.valid.next = s.received[1] != s.received[2];
-        self.broken.next = false;
-        self.send_ready.next = s.taken[1] == s.offer;
-    }
+fn kernel() -> Kernel {
+    let k = Builder::new("spi_slave");
+    let (rst, sclk) = (k.input("rst", 1), k.input("spi_sclk", 1));
+    let (cs_n, mosi) = (k.input("spi_cs_n", 1), k.input("spi_mosi", 1));
+    let (send_data, send_valid) = (k.input("send_data", 8), k.input("send_valid", 1));
+    let (bit, byte, idle) = (Type::unsigned(1), Type::unsigned(8), u64::from(IDLE));
+    let (sclk_bit, sclk_shift, sclk_carries) = k.falling(sclk, || {
+        let sclk_bit = k.state("sclk_bit", Type::unsigned(3), cs_n, 0);
+        let sclk_bit = sclk_bit.comment("Controller's clock domain, falling edges; reset between transactions.");
+        (sclk_bit, k.state("sclk_shift", byte, cs_n, idle), k.state("sclk_carries", bit, cs_n, 0))
+    });
+    let (sclk_mosi, [sclk_received, sclk_kept], sclk_offered, [sclk_toggle, sclk_full, sclk_taken]) =
+        k.rising(sclk, || {
+            let sclk_mosi = k.register("sclk_mosi", bit).comment(
+                "Controller's clock domain, rising edges; not reset: the handshake with clk holds across transactions.",
+            );
+            let bytes = ["sclk_received", "sclk_kept"].map(|name| k.register(name, byte));
+            let sclk_offered = k.register("sclk_offered", Type::unsigned(2)).initially(0);
+            let bits = ["sclk_toggle", "sclk_full", "sclk_taken"].map(|name| k.register(name, bit).initially(0));
+            (sclk_mosi, bytes, sclk_offered, bits)
+        });
+    let received = k.register("received", Type::unsigned(3)).initially(0).comment("Domain of clk.");
+    let (taken, offer) = (k.register("taken", Type::unsigned(2)).initially(0), k.register("offer", bit).initially(0));
+    let offered = k.register("offered", byte);
 
-    fn connect(&mut self) {
-        self.spi_miso.connect();
-        self.data.connect();
-        self.valid.connect();
-        self.broken.connect();
-        self.send_ready.connect();
-    }
+    let last = k.wire("sclk_last", sclk_bit.is(LAST as u64));
+    sclk_mosi.set(mosi);
+    sclk_offered.set(sclk_offered.at(0).concat(*offer));
+    k.when(last, || {
+        sclk_received.set(sclk_shift.low(7).concat(mosi));
+        sclk_toggle.set(!*sclk_toggle);
+        sclk_carries.set(*sclk_full);
+    });
+    let stores = k.wire("sclk_stores", last & (*sclk_carries | !*sclk_full));
+    k.when(stores, || {
+        sclk_full.set(sclk_offered.at(1).differs(*sclk_taken));
+        sclk_taken.set(sclk_offered.at(1));
+        sclk_kept.set(*offered);
+    });
+    sclk_bit.set(sclk_bit.plus(1));
+    let next = sclk_full.mux(*sclk_kept, k.constant(8, idle));
+    sclk_shift.set((!last).mux(sclk_shift.low(7).concat(*sclk_mosi), next));
 
-    fn hdl(&self) -> Verilog {
-        Verilog::Custom(format!(
-            "\
-// Controller's clock domain, falling edges; reset between transactions.
-reg [2:0] sclk_bit;
-reg [7:0] sclk_shift;
-reg sclk_carries;
-// Controller's clock domain, rising edges; not reset, so that the handshake with clk holds across transactions.
-reg sclk_mosi;
-reg [7:0] sclk_received, sclk_kept;
-reg [1:0] sclk_offered = 2'd0;
-reg sclk_toggle = 1'b0;
-reg sclk_full = 1'b0;
-reg sclk_taken = 1'b0;
-// Domain of clk.
-reg [2:0] received = 3'd0;
-reg [1:0] taken = 2'd0;
-reg offer = 1'b0;
-reg [7:0] offered;
-wire sclk_last = sclk_bit == 3'd{LAST};
-always @(*) begin
-  spi_miso = sclk_shift[7];
-  data = sclk_received;
-  valid = received[1] != received[2];
-  broken = 1'b0;
-  send_ready = taken[1] == offer;
-end
-always @(posedge spi_sclk) begin
-  sclk_mosi <= spi_mosi;
-  sclk_offered <= {{sclk_offered[0], offer}};
-  if (sclk_last) begin
-    sclk_received <= {{sclk_shift[6:0], spi_mosi}};
-    sclk_toggle <= !sclk_toggle;
-    if (sclk_carries || !sclk_full) begin
-      sclk_full <= sclk_offered[1] != sclk_taken;
-      sclk_taken <= sclk_offered[1];
-      sclk_kept <= offered;
-    end
-  end
-end
-always @(negedge spi_sclk or posedge spi_cs_n) begin
-  if (spi_cs_n) begin
-    sclk_bit <= 3'd0;
-    sclk_shift <= 8'd{IDLE};
-    sclk_carries <= 1'b0;
-  end else begin
-    sclk_bit <= sclk_bit + 3'd1;
-    sclk_shift <= !sclk_last ? {{sclk_shift[6:0], sclk_mosi}} : sclk_full ? sclk_kept : 8'd{IDLE};
-    if (sclk_last) sclk_carries <= sclk_full;
-  end
-end
-always @(posedge clk) begin
-  received <= {{received[1:0], sclk_toggle}};
-  taken <= {{taken[0], sclk_taken}};
-  if (send_valid && send_ready && !rst) begin
-    offer <= !offer;
-    offered <= send_data;
-  end
-end"
-        ))
-    }
+    k.wire("spi_miso", sclk_shift.top());
+    k.wire("data", *sclk_received);
+    k.wire("valid", received.at(1).differs(received.at(2)));
+    let send_ready = k.wire("send_ready", taken.at(1).equals(*offer));
+    received.set(received.low(2).concat(*sclk_toggle));
+    taken.set(taken.at(0).concat(*sclk_taken));
+    k.when(send_valid & send_ready & !rst, || {
+        offer.set(!*offer);
+        offered.set(send_data);
+    });
+    k.finish()
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::language::testbench::{check, Reference};
     use crate::simulate::settles;
+    use crate::wire::Word;
+
+    /// The registers of both sides in plain integers.
+    #[derive(Default)]
+    struct Sides {
+        level: bool,
+        bit: usize,
+        shift: u8,
+        carries: bool,
+        mosi: bool,
+        received: Option<u8>,
+        toggle: bool,
+        kept: u8,
+        full: bool,
+        taken: bool,
+        seen_offers: [bool; 2],
+        toggles: [bool; 3],
+        seen_taken: [bool; 2],
+        offer: bool,
+        offered: u8,
+        selected: bool,
+    }
+
+    impl Sides {
+        fn rises(&mut self, mosi: bool) {
+            let [last, seen] = self.seen_offers;
+            if self.bit == LAST {
+                self.received = Some(self.shift << 1 | u8::from(mosi));
+                self.toggle = !self.toggle;
+                if self.carries || !self.full {
+                    (self.full, self.taken, self.kept) = (seen != self.taken, seen, self.offered);
+                }
+            }
+            (self.mosi, self.seen_offers) = (mosi, [self.offer, last]);
+        }
+
+        fn falls(&mut self) {
+            self.shift = match self.bit {
+                LAST if self.full => self.kept,
+                LAST => IDLE,
+                _ => self.shift << 1 | u8::from(self.mosi),
+            };
+            if self.bit == LAST {
+                self.carries = self.full;
+            }
+            self.bit = (self.bit + 1) % (LAST + 1);
+        }
+    }
+
+    impl Reference for Sides {
+        fn outputs(&mut self, inputs: &[Word]) -> Vec<Option<Word>> {
+            let [sclk, cs_n, mosi] = [1, 2, 3].map(|k| inputs[k].number() == 1);
+            match (self.level, sclk) {
+                (false, true) => self.rises(mosi),
+                (true, false) => self.falls(),
+                _ => {}
+            }
+            self.level = sclk;
+            if cs_n {
+                (self.bit, self.shift, self.carries, self.selected) = (0, IDLE, false, true);
+            }
+            vec![
+                self.selected.then(|| Word::from(self.shift >> 7 == 1)),
+                self.received.map(|byte| Word::from(u64::from(byte))),
+                Some(Word::from(self.toggles[1] != self.toggles[2])),
+                Some(Word::from(self.seen_taken[1] == self.offer)),
+            ]
+        }
+
+        fn clock(&mut self, inputs: &[Word]) {
+            let [rst, valid] = [0, 5].map(|k| inputs[k].number() == 1);
+            if valid && !rst && self.seen_taken[1] == self.offer {
+                (self.offer, self.offered) = (!self.offer, inputs[4].number() as u8);
+            }
+            self.toggles = [self.toggle, self.toggles[0], self.toggles[1]];
+            self.seen_taken = [self.taken, self.seen_taken[0]];
+        }
+    }
+
+    /// Transactions of any number of edges, at up to one edge per cycle; edges of the clock between them.
+    fn stimulus(cycles: usize) -> Vec<Vec<Word>> {
+        let mut random = fastrand::Rng::with_seed(13);
+        let (mut sclk, mut cs_n, mut speed) = (false, false, 8);
+        let inputs = |cycle: usize| {
+            if cycle % 100 == 0 {
+                speed = random.u8(2..9);
+            }
+            match cycle {
+                0 => {}
+                1 => cs_n = true,
+                // Chip select changes while the clock is low, and never together with it.
+                _ if !sclk && random.u8(..60) == 0 => cs_n = !cs_n,
+                _ => sclk ^= random.u8(..8) < speed,
+            }
+            let bits = [cycle < 2 || random.u16(..1000) == 0, sclk, cs_n, random.bool()].map(Word::from);
+            let send = [Word::from(u64::from(random.u8(..))), Word::from(random.bool())];
+            bits.into_iter().chain(send).collect()
+        };
+        (0..cycles).map(inputs).collect()
+    }
+
+    #[test]
+    fn both_clocks_see_what_the_registers_of_the_other_say() {
+        check(SpiSlave::default().kernel.kernel(), &stimulus(20_000), &mut Sides::default());
+    }
 
     /// The block, the bytes that the `clk` side has received, and the bytes it still has to send.
     struct Bench {

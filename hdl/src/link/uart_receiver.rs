@@ -3,7 +3,9 @@
 use rust_hdl::prelude::*;
 
 use super::phase::Phase;
-use crate::wire::{Wire, Word};
+use crate::kernel_block;
+use crate::language::{Body, Builder, Kernel, Type};
+use crate::wire::Wire;
 
 /// Two registers against metastability, then the majority of three samples. After a falling edge, ten bits are sampled
 /// in their middle: the start bit half a bit later, which must still be low, eight data bits, and the stop bit. A byte
@@ -24,125 +26,155 @@ pub struct UartReceiver {
     pub valid: Signal<Out, Bit>,
     /// A byte without stop bit was received in this cycle.
     pub broken: Signal<Out, Bit>,
-    _phase: Phase,
-    _state: State,
+    kernel: Body,
 }
 
-#[derive(Clone, Copy, Debug, Default)]
-struct State {
-    samples: u32,
-    armed: bool,
-    left: u32,
-    phase: u32,
-    data: u32,
-    valid: bool,
-    broken: bool,
-}
+kernel_block!(UartReceiver, clock clk, inputs [rst, line], outputs [data, valid, broken]);
 
 /// Bits from start bit to stop bit.
-const BITS: u32 = 10;
+const BITS: u64 = 10;
 
 impl UartReceiver {
     /// For `baud` bit/s at a clock of `clock_hz` Hz.
     pub fn new(baud: u32, clock_hz: u32) -> Self {
-        UartReceiver {
+        let block = UartReceiver {
             clk: Default::default(),
             rst: Default::default(),
             line: Default::default(),
             data: Wire::new(8),
             valid: Default::default(),
             broken: Default::default(),
-            _phase: Phase::new(baud, clock_hz),
-            _state: State::default(),
-        }
-    }
-
-    fn next(&self) -> State {
-        let s = self._state;
-        let level = (s.samples >> 2).count_ones() >= 2;
-        let mut next =
-            State { samples: (s.samples << 1 | u32::from(self.line.val())) & 0x1f, valid: false, broken: false, ..s };
-        if s.left == 0 {
-            next.armed = level;
-            if s.armed && !level {
-                next.left = BITS;
-                next.phase = self._phase.half;
-            }
-        } else {
-            let sum = s.phase + self._phase.increment;
-            next.phase = sum & (2 * self._phase.half - 1);
-            if sum >= 2 * self._phase.half {
-                next.left = s.left - 1;
-                match s.left {
-                    // A glitch, not a start bit.
-                    BITS if level => next.left = 0,
-                    BITS => (),
-                    1 => (next.valid, next.broken) = (level, !level),
-                    _ => next.data = u32::from(level) << 7 | s.data >> 1,
-                }
-            }
-        }
-        if self.rst.val() {
-            (next.left, next.armed, next.valid, next.broken) = (0, false, false, false);
-        }
-        next
+            kernel: Body::default(),
+        };
+        block.bind(kernel(Phase::new(baud, clock_hz)))
     }
 }
 
-impl Logic for UartReceiver {
-    fn update(&mut self) {
-        if self.clk.pos_edge() {
-            // The outputs are one cycle later, as in the Verilog.
-            let State { data, valid, broken, .. } = self._state;
-            self._state = self.next();
-            self.data.next = Word::from(u64::from(data));
-            self.valid.next = valid && !self.rst.val();
-            self.broken.next = broken && !self.rst.val();
+fn kernel(timing: Phase) -> Kernel {
+    let k = Builder::new("uart_receiver");
+    let (rst, line) = (k.input("rst", 1), k.input("line", 1));
+    let bit = Type::unsigned(1);
+    let samples = k.register("samples", Type::unsigned(5));
+    let armed = k.state("armed", bit, rst, 0);
+    let sampled =
+        k.register("sampled", bit).comment("Bit, shift and stop are registered to shorten the route to the data.");
+    let (shifts, stops) = (k.register("shifts", bit), k.state("stops", bit, rst, 0));
+    let left = k.state("left", Type::unsigned(4), rst, 0);
+    let phase = k.register("phase", Type::unsigned(timing.fraction));
+    let data = k.register("data", Type::unsigned(8));
+    let (valid, broken) = (k.state("valid", bit, rst, 0), k.state("broken", bit, rst, 0));
+
+    let [a, b, c] = [4, 3, 2].map(|at| samples.at(at));
+    let level = k.wire("level", (a & b) | (a & c) | (b & c));
+    let idle = k.wire("idle", left.is(0));
+    let sum = k.wire("sum", *phase + k.constant(timing.fraction, timing.increment));
+    let tick = k.wire("tick", !idle & sum.top());
+    let (first, last) = (left.is(BITS), left.is(1));
+    samples.set(samples.low(4).concat(line));
+    phase.set(idle.mux(k.constant(timing.fraction, timing.half), sum.low(timing.fraction)));
+    sampled.set(level);
+    shifts.set(tick & !first & !last);
+    stops.set(tick & last);
+    k.when(*shifts, || data.set(sampled.concat(data.slice(1, 7))));
+    valid.set(*stops & *sampled);
+    broken.set(*stops & !*sampled);
+    k.when(tick, || left.set((first & level).mux(k.constant(4, 0), left.minus(1))));
+    k.when(idle, || armed.set(level));
+    k.when(idle & *armed & !level, || left.set(k.constant(4, BITS)));
+    k.finish()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::language::testbench::{check, simulated, Reference};
+    use crate::wire::Word;
+
+    const BAUD: u32 = 1_000_000;
+    const CLOCK_HZ: u32 = 9_300_000;
+
+    /// Samples bits in their middle, with the time in fractions of a bit.
+    #[derive(Default)]
+    struct Sampler {
+        line: Vec<bool>,
+        armed: bool,
+        /// Bits still to come, time since the last one, bits so far.
+        frame: Option<(u64, u64, u64)>,
+        /// What the last samples said: a byte, or a byte without stop bit; one cycle later on the outputs.
+        said: [Option<(bool, u8)>; 2],
+        reset: bool,
+    }
+
+    impl Reference for Sampler {
+        fn outputs(&mut self, _: &[Word]) -> Vec<Option<Word>> {
+            let bit = |bit: bool| self.reset.then(|| Word::from(bit));
+            let [_, now] = self.said;
+            vec![
+                now.filter(|(right, _)| *right).map(|(_, byte)| Word::from(u64::from(byte))),
+                bit(now.is_some_and(|(right, _)| right)),
+                bit(now.is_some_and(|(right, _)| !right)),
+            ]
+        }
+
+        fn clock(&mut self, inputs: &[Word]) {
+            let timing = Phase::new(BAUD, CLOCK_HZ);
+            let before = |cycles: usize| self.line.len().checked_sub(cycles).is_some_and(|at| self.line[at]);
+            let level = [3, 4, 5].into_iter().filter(|&cycles| before(cycles)).count() >= 2;
+            let idle = self.frame.is_none();
+            self.said = [None, self.said[0]];
+            self.frame = match self.frame {
+                None if self.armed && !level => Some((BITS, timing.half, 0)),
+                None => None,
+                Some((left, time, bits)) => match (left, time + timing.increment) {
+                    (left, time) if time < 2 * timing.half => Some((left, time, bits)),
+                    (BITS, _) if level => None,
+                    (1, _) => {
+                        self.said[0] = Some((level, (bits >> 1) as u8));
+                        None
+                    }
+                    (left, time) => Some((left - 1, time - 2 * timing.half, bits | u64::from(level) << (BITS - left))),
+                },
+            };
+            if idle {
+                self.armed = level;
+            }
+            self.line.push(inputs[1].number() == 1);
+            if inputs[0].number() == 1 {
+                let line = std::mem::take(&mut self.line);
+                *self = Sampler { reset: true, line, ..Sampler::default() };
+            }
         }
     }
 
-    fn connect(&mut self) {
-        self.data.connect();
-        self.valid.connect();
-        self.broken.connect();
+    /// Bytes with rates up to 2 % off, glitches, missing stop bits, pauses, resets.
+    fn stimulus(bytes: usize) -> Vec<Vec<Word>> {
+        let mut random = fastrand::Rng::with_seed(9);
+        let mut levels = vec![true; 30];
+        for _ in 0..bytes {
+            let byte = u64::from(random.u8(..));
+            let word = byte << 1 | u64::from(random.u8(..8) > 0) << 9;
+            let cycles = f64::from(CLOCK_HZ) / f64::from(BAUD) * (0.98 + 0.04 * random.f64());
+            let count = (10.0 * cycles) as usize;
+            levels.extend((0..count).map(|at| word >> (at as f64 / cycles) as u64 & 1 == 1));
+            levels.extend(vec![true; random.usize(..30)]);
+            if random.bool() {
+                levels.extend(vec![false; random.usize(1..4)]);
+                levels.extend(vec![true; random.usize(10..20)]);
+            }
+        }
+        let noisy = levels.into_iter().enumerate().map(|(cycle, level)| {
+            let rst = cycle < 2 || random.u16(..3000) == 0;
+            vec![Word::from(rst), Word::from(level ^ (random.u8(..60) == 0))]
+        });
+        noisy.collect()
     }
 
-    fn hdl(&self) -> Verilog {
-        let Phase { fraction, half, increment } = self._phase;
-        Verilog::Custom(format!(
-            "\
-reg [4:0] samples;
-reg armed;
-// Sampled bit, shift and stop are registered once to shorten the route to the data register.
-reg sampled, shifts, stops;
-reg [3:0] left;
-reg [{end}:0] phase;
-wire level = (samples[4] & samples[3]) | (samples[4] & samples[2]) | (samples[3] & samples[2]);
-wire [{fraction}:0] sum = {{1'b0, phase}} + {width}'d{increment};
-wire tick = left != 4'd0 && sum[{fraction}];
-wire false_start = left == 4'd{BITS} && level;
-always @(posedge clk) begin
-  samples <= {{samples[3:0], line}};
-  if (left == 4'd0) phase <= {fraction}'d{half};
-  else phase <= sum[{end}:0];
-  sampled <= level;
-  shifts <= tick && left != 4'd{BITS} && left != 4'd1;
-  stops <= !rst && tick && left == 4'd1;
-  if (shifts) data <= {{sampled, data[7:1]}};
-  valid <= !rst && stops && sampled;
-  broken <= !rst && stops && !sampled;
-  if (rst) begin
-    left <= 4'd0;
-    armed <= 1'b0;
-  end else begin
-    if (left == 4'd0) begin
-      armed <= level;
-      if (armed && !level) left <= 4'd{BITS};
-    end else if (tick) left <= false_start ? 4'd0 : left - 4'd1;
-  end
-end",
-            end = fraction - 1,
-            width = fraction + 1,
-        ))
+    #[test]
+    fn bytes_are_sampled_in_the_middle_of_their_bits() {
+        let (block, all) = (UartReceiver::new(BAUD, CLOCK_HZ), stimulus(300));
+        check(block.kernel.kernel(), &all, &mut Sampler::default());
+        let outputs = simulated(block.kernel.kernel(), &all);
+        let count = |k: usize| outputs.iter().filter(|outputs| outputs[k].number() == 1).count();
+        assert!(count(1) > 150 && count(2) > 10, "{} bytes, {} broken", count(1), count(2));
     }
 }

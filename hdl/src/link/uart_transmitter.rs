@@ -3,6 +3,8 @@
 use rust_hdl::prelude::*;
 
 use super::phase::Phase;
+use crate::kernel_block;
+use crate::language::{concat, Body, Builder, Kernel, Type};
 use crate::wire::Wire;
 
 /// Start bit, eight data bits, stop bit. A byte is accepted when `valid` and `ready` are both high.
@@ -20,101 +22,99 @@ pub struct UartTransmitter {
     pub ready: Signal<Out, Bit>,
     /// The line, high when idle.
     pub line: Signal<Out, Bit>,
-    _phase: Phase,
-    _state: State,
+    kernel: Body,
 }
 
-#[derive(Clone, Copy, Debug)]
-struct State {
-    left: u32,
-    phase: u32,
-    shift: u32,
-    line: bool,
-}
+kernel_block!(UartTransmitter, clock clk, inputs [rst, data, valid], outputs [ready, line]);
 
 /// Bits from start bit to stop bit.
-const BITS: u32 = 10;
+const BITS: usize = 10;
 
 impl UartTransmitter {
     /// For `baud` bit/s at a clock of `clock_hz` Hz.
     pub fn new(baud: u32, clock_hz: u32) -> Self {
-        UartTransmitter {
+        let block = UartTransmitter {
             clk: Default::default(),
             rst: Default::default(),
             data: Wire::new(8),
             valid: Default::default(),
             ready: Default::default(),
             line: Default::default(),
-            _phase: Phase::new(baud, clock_hz),
-            _state: State { left: 0, phase: 0, shift: 0, line: true },
-        }
-    }
-
-    fn next(&self) -> State {
-        let s = self._state;
-        let mut next = State { line: s.left == 0 || s.shift & 1 == 1, ..s };
-        if s.left == 0 {
-            next.phase = 0;
-            if self.valid.val() {
-                next.left = BITS;
-                next.shift = 1 << (BITS - 1) | (self.data.val().number() as u32) << 1;
-            }
-        } else {
-            let sum = s.phase + self._phase.increment;
-            next.phase = sum & (2 * self._phase.half - 1);
-            if sum >= 2 * self._phase.half {
-                next.left = s.left - 1;
-                next.shift = s.shift >> 1;
-            }
-        }
-        if self.rst.val() {
-            (next.left, next.line) = (0, true);
-        }
-        next
+            kernel: Body::default(),
+        };
+        block.bind(kernel(Phase::new(baud, clock_hz)))
     }
 }
 
-impl Logic for UartTransmitter {
-    fn update(&mut self) {
-        if self.clk.pos_edge() {
-            self._state = self.next();
+fn kernel(timing: Phase) -> Kernel {
+    let k = Builder::new("uart_transmitter");
+    let (rst, data, valid) = (k.input("rst", 1), k.input("data", 8), k.input("valid", 1));
+    let left = k.state("left", Type::unsigned(4), rst, 0);
+    let phase = k.register("phase", Type::unsigned(timing.fraction));
+    let shift = k.register("shift", Type::unsigned(BITS));
+    let line = k.state("line", Type::unsigned(1), rst, 1).initially(1);
+    let line = line.comment("Idle after configuration: a low line would be a start bit.");
+    let (one, zero) = (k.constant(1, 1), k.constant(1, 0));
+    let ready = k.wire("ready", left.is(0));
+    let sum = k.wire("sum", *phase + k.constant(timing.fraction, timing.increment));
+    let tick = sum.top();
+    phase.set(ready.mux(k.constant(timing.fraction, 0), sum.low(timing.fraction)));
+    k.when(tick, || {
+        shift.set(one.concat(shift.slice(1, BITS - 1)));
+        left.set(left.minus(1));
+    });
+    k.when(ready, || {
+        shift.set(concat(&[one, data, zero]));
+        left.set(valid.mux(k.constant(4, BITS as u64), k.constant(4, 0)));
+    });
+    line.set(ready | shift.at(0));
+    k.finish()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::language::testbench::{check, Reference};
+    use crate::wire::Word;
+
+    const BAUD: u32 = 700_000;
+    const CLOCK_HZ: u32 = 5_000_000;
+
+    /// The byte that is sent and the cycles since it was accepted; the line one cycle later.
+    #[derive(Default)]
+    struct Sending {
+        byte: Option<(u8, u64)>,
+        line: Option<bool>,
+    }
+
+    impl Reference for Sending {
+        fn outputs(&mut self, _: &[Word]) -> Vec<Option<Word>> {
+            vec![self.line.map(Word::from), self.line.map(|_| Word::from(self.byte.is_none()))]
         }
-        self.line.next = self._state.line;
-        self.ready.next = self._state.left == 0;
+
+        fn clock(&mut self, inputs: &[Word]) {
+            let timing = Phase::new(BAUD, CLOCK_HZ);
+            let bits = |cycles: u64| cycles * timing.increment / (2 * timing.half);
+            let level = |(byte, cycles): (u8, u64)| (u64::from(byte) << 1 | 1 << 9) >> bits(cycles) & 1 == 1;
+            self.line = Some(self.byte.is_none_or(level));
+            self.byte = match self.byte {
+                Some((byte, cycles)) => Some((byte, cycles + 1)).filter(|(_, cycles)| bits(*cycles) < BITS as u64),
+                None => (inputs[2].number() == 1).then(|| (inputs[1].number() as u8, 0)),
+            };
+            if inputs[0].number() == 1 {
+                *self = Sending { byte: None, line: Some(true) };
+            }
+        }
     }
 
-    fn connect(&mut self) {
-        self.ready.connect();
-        self.line.connect();
-    }
-
-    fn hdl(&self) -> Verilog {
-        let Phase { fraction, increment, .. } = self._phase;
-        Verilog::Custom(format!(
-            "\
-reg [3:0] left;
-reg [{end}:0] phase;
-reg [{bits_end}:0] shift;
-wire [{fraction}:0] sum = {{1'b0, phase}} + {width}'d{increment};
-// Idle after configuration: a low line would be a start bit.
-initial line = 1'b1;
-always @(*) ready = left == 4'd0;
-always @(posedge clk) begin
-  phase <= ready ? {fraction}'d0 : sum[{end}:0];
-  if (ready) shift <= {{1'b1, data, 1'b0}};
-  else if (sum[{fraction}]) shift <= {{1'b1, shift[{bits_end}:1]}};
-  if (rst) begin
-    left <= 4'd0;
-    line <= 1'b1;
-  end else begin
-    line <= ready || shift[0];
-    if (ready) left <= valid ? 4'd{BITS} : 4'd0;
-    else if (sum[{fraction}]) left <= left - 4'd1;
-  end
-end",
-            end = fraction - 1,
-            width = fraction + 1,
-            bits_end = BITS - 1,
-        ))
+    #[test]
+    fn start_bit_eight_bits_and_stop_bit_have_the_rate_of_the_line() {
+        let mut random = fastrand::Rng::with_seed(10);
+        let cycle = |cycle: usize| {
+            let rst = cycle < 2 || random.u16(..1000) == 0;
+            vec![Word::from(rst), Word::from(u64::from(random.u8(..))), Word::from(random.u8(..8) == 0)]
+        };
+        let all: Vec<Vec<Word>> = (0..8000).map(cycle).collect();
+        check(UartTransmitter::new(BAUD, CLOCK_HZ).kernel.kernel(), &all, &mut Sending::default());
     }
 }

@@ -66,13 +66,16 @@ pub fn by_case(values: &[String]) -> String {
 
 /// The value of case `which`, of `bits` bits; a constant where all are equal.
 pub fn value_by_case<'k>(k: &'k Builder, which: Expr<'k>, values: &[usize], bits: usize) -> Expr<'k> {
-    let constant = |value: usize| k.constant(bits, value as u64);
-    let Some((&first, rest)) = values.split_first() else { return constant(0) };
-    if rest.iter().all(|&value| value == first) {
-        return constant(first);
-    }
-    let arms: Vec<(u64, Expr)> = (1..).zip(rest.iter().map(|&value| constant(value))).collect();
-    which.case(&arms, constant(first))
+    let constants: Vec<Expr> = values.iter().map(|&value| k.constant(bits, value as u64)).collect();
+    expression_by_case(which, &constants).unwrap_or(k.constant(bits, 0))
+}
+
+/// The one of `values` for case `which`; the first without a selection where all are equal. `None` without values.
+pub fn expression_by_case<'k>(which: Expr<'k>, values: &[Expr<'k>]) -> Option<Expr<'k>> {
+    let (&first, rest) = values.split_first()?;
+    let arms: Vec<(u64, Expr)> = (1..).zip(rest.iter().copied()).collect();
+    let equal = rest.iter().all(|value| value.is_same(first));
+    Some(if equal { first } else { which.case(&arms, first) })
 }
 
 /// [`by_case`] of unsigned numbers of `bits` bits.

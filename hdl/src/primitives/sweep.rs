@@ -3,7 +3,7 @@
 pub use dermis_golden::fixed::resources::position_bits;
 use dermis_golden::fixed::resources::SEARCH_BUFFERS;
 
-use crate::language::Expr;
+use crate::language::{concat, Expr};
 use crate::wire::Word;
 
 /// Width of a squared distance in grid steps of the last level, in bits.
@@ -74,11 +74,15 @@ impl Sweep {
     }
 }
 
-/// The fields of a sweep's word that the comparison reads.
+/// The fields of a sweep's word.
 #[derive(Clone, Copy, Debug)]
 pub struct Fields<'k> {
     /// As [`Sweep::centre`], signed.
     pub centre: [Expr<'k>; 2],
+    /// As [`Sweep::square`], unsigned.
+    pub square: Expr<'k>,
+    /// As [`Sweep::buffer`].
+    pub buffer: Expr<'k>,
     /// As [`Sweep::coarse`].
     pub coarse: Expr<'k>,
     /// As [`Sweep::closes`].
@@ -88,25 +92,21 @@ pub struct Fields<'k> {
 impl<'k> Fields<'k> {
     /// The fields of `word`.
     pub fn of(word: Expr<'k>) -> Self {
-        let [x, y, _, _, coarse, closes, _] = offsets();
-        let centre = [x, y].map(|offset| word.slice(offset, position_bits()).signed());
-        Fields { centre, coarse: word.at(coarse), closes: word.at(closes) }
+        let [x, y, square, buffer, coarse, closes, _] = offsets();
+        Fields {
+            centre: [x, y].map(|offset| word.slice(offset, position_bits()).signed()),
+            square: word.slice(square, square_bits()),
+            buffer: word.slice(buffer, BUFFER_BITS),
+            coarse: word.at(coarse),
+            closes: word.at(closes),
+        }
     }
-}
 
-/// Verilog wires for the fields of the sweep in signal `word`: `<prefix>centre_x`, `centre_y`, `square`, `buffer`,
-/// `coarse`, `closes`.
-pub fn unpack(word: &str, prefix: &str) -> String {
-    let names = ["centre_x", "centre_y", "square", "buffer", "coarse", "closes"];
-    let at = offsets();
-    names
-        .iter()
-        .enumerate()
-        .map(|(k, name)| match at[k + 1] - at[k] {
-            1 => format!("wire {prefix}{name} = {word}[{}];\n", at[k]),
-            bits => format!("wire [{}:0] {prefix}{name} = {word}[{}:{}];\n", bits - 1, at[k + 1] - 1, at[k]),
-        })
-        .collect()
+    /// The word of the fields.
+    pub fn word(&self) -> Expr<'k> {
+        let Fields { centre: [x, y], square, buffer, coarse, closes } = *self;
+        concat(&[closes, coarse, buffer, square, y, x])
+    }
 }
 
 #[cfg(test)]

@@ -202,7 +202,7 @@ fn transactions_may_end_after_any_edge() {
 fn a_byte_given_up_too_early_or_too_late_is_found() {
     let defects = [
         // Dropped when the next byte is ready, whether or not its bits have been read, or at the end of a transaction.
-        ("if (sclk_carries || !sclk_full)", "if (1'b1)"),
+        ("sclk_last && (sclk_carries || !sclk_full)", "sclk_last"),
         ("sclk_carries <= 1'b0;", "sclk_carries <= sclk_carries;"),
         // Acknowledged whether or not there was a byte.
         ("sclk_taken <= sclk_offered[1];", "sclk_taken <= !sclk_taken;"),

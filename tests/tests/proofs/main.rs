@@ -11,7 +11,7 @@
 //! | `send.v`: a frame has all its beats, none is sent outside a frame | `send`, `force` |
 //! | `queue.v`: beats leave in order and unchanged, an offered beat stays | `force`'s queue |
 //! | `counter.v`: a count is below its limit | counters |
-//! | `feeder.v`: an offered code stays; one complete frame per accepted packet and no other | the link's feeder |
+//! | `frame_ingress.v`: an offered code stays; one complete frame per accepted packet and no other | `frame_ingress` |
 //! | `slip.v`: each byte is sent once and can be decoded | the link's encoder |
 //! | `rescale.v`: rounds half up, saturates, counts saturations | `rescaler` |
 //! | `replay.v`: rows wait for their shift, then leave once, in order | `rescale` and its memory |
@@ -176,11 +176,11 @@ fn bytes_of_the_link_read_back() {
 }
 
 #[test]
-fn the_feeder_keeps_what_it_offers_and_gives_the_engine_good_frames_only() {
+fn the_frame_ingress_keeps_what_it_offers_and_gives_the_engine_good_frames_only() {
     let generated = &generate_board(&model("")).unwrap();
     let verilog = generated.files.iter().find(|file| file.name.ends_with(".v")).unwrap();
     let modules = verilog.text.lines().filter_map(|line| line.strip_prefix("module ")?.split('(').next());
-    let block = modules.into_iter().find(|name| name.ends_with("$feeder")).unwrap().to_string();
+    let block = modules.into_iter().find(|name| name.ends_with("$ingress")).unwrap().to_string();
     let taxels = ROWS * COLS;
     let defects = [
         // An offered code is dropped with its packet; one code is buffered instead of two.
@@ -188,5 +188,5 @@ fn the_feeder_keeps_what_it_offers_and_gives_the_engine_good_frames_only() {
         ("delivered != 3'd3", "delivered != 3'd4"),
     ];
     let given = vec![("BLOCK", block), ("BITS", number(8)), ("BYTES", number(taxels)), ("LAST", number(taxels - 1))];
-    Proof { generated, property: "feeder.v", given, defects: &defects, open_products: false }.run();
+    Proof { generated, property: "frame_ingress.v", given, defects: &defects, open_products: false }.run();
 }

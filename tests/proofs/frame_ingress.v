@@ -1,4 +1,4 @@
-// A beat offered by the feeder stays, unchanged, until it is accepted, even if its packet turns out bad; the engine
+// A beat offered by the frame ingress stays, unchanged, until it is accepted, even if its packet turns out bad; the engine
 // gets a whole frame for each packet with taken, and for no other.
 module proof(
   input clk, input again, input begins, input pays, input [7:0] content, input ends, input sound, input ready

@@ -1,0 +1,202 @@
+//! Identity of the board and counters of received and dropped packets, in one memory.
+
+use dermis_golden::link::{Counters, Identity};
+use rust_hdl::prelude::*;
+
+use crate::kernel_block;
+use crate::language::{concat, Body, Builder, Contents, Kernel, Type};
+use crate::primitives::count_bits;
+use crate::wire::Wire;
+
+/// Memory of 32 entries of two bytes: the first twelve bytes of the identity from entry 0, the other twelve from 8, the
+/// counters, in the order of [`Counters`], from 16.
+///
+/// An event of a packet is counted in the three cycles after it (read, add, write); while `hold` is high it waits,
+/// because the two bytes of a counter are being read. `entry` is not valid meanwhile. Counters wrap. Reset clears one
+/// counter per cycle and has to last at least eight cycles.
+#[derive(LogicBlock)]
+pub struct CounterRam {
+    /// Clock; registers change on its rising edge.
+    pub clk: Signal<In, Clock>,
+    /// Synchronous reset, active high for at least eight cycles.
+    pub rst: Signal<In, Bit>,
+    /// A packet was accepted in this cycle.
+    pub taken: Signal<In, Bit>,
+    /// A packet was dropped in this cycle, one bit per cause: framing, CRC, unknown type, length.
+    pub fault: Wire<In>,
+    /// A packet was dropped in this cycle because earlier ones are not answered yet.
+    pub overrun: Signal<In, Bit>,
+    /// Counting is postponed.
+    pub hold: Signal<In, Bit>,
+    /// Entry to read, 5 bits.
+    pub address: Wire<In>,
+    /// The entry, 16 bits, one cycle after `address`.
+    pub entry: Wire<Out>,
+    /// `entry` is that of `address`, and no counter is changing.
+    pub entry_valid: Signal<Out, Bit>,
+    kernel: Body,
+}
+
+kernel_block!(
+    CounterRam,
+    clock clk,
+    inputs [rst, taken, fault, overrun, hold, address],
+    outputs [entry, entry_valid]
+);
+
+const ENTRIES: usize = 32;
+/// Entry of the first counter.
+const COUNTS: usize = 16;
+/// Entries cleared by reset: the counters, and two unused ones.
+const KINDS: usize = 8;
+const EVENTS: usize = Counters::BYTES / 2;
+
+impl CounterRam {
+    /// Answers requests for the identity with `identity`.
+    pub fn new(identity: &Identity) -> Self {
+        let block = CounterRam {
+            clk: Default::default(),
+            rst: Default::default(),
+            taken: Default::default(),
+            fault: Wire::new(EVENTS - 2),
+            overrun: Default::default(),
+            hold: Default::default(),
+            address: Wire::new(5),
+            entry: Wire::new(16),
+            entry_valid: Default::default(),
+            kernel: Body::default(),
+        };
+        block.bind(kernel(&words(identity)))
+    }
+}
+
+/// The identity by entry, the first byte of each in the low bits.
+fn words(identity: &Identity) -> Vec<(usize, u64)> {
+    let word = |(at, pair): (usize, &[u8])| (at % 6 + 8 * (at / 6), u64::from(u16::from_le_bytes([pair[0], pair[1]])));
+    identity.to_bytes().chunks(2).enumerate().map(word).collect()
+}
+
+fn kernel(words: &[(usize, u64)]) -> Kernel {
+    let k = Builder::new("counter_ram");
+    let (rst, taken, fault) = (k.input("rst", 1), k.input("taken", 1), k.input("fault", EVENTS - 2));
+    let (overrun, hold, address) = (k.input("overrun", 1), k.input("hold", 1), k.input("address", 5));
+    let memory = k.memory("memory", ENTRIES, 16, Contents::Words(words.to_vec())).style("block").unchecked();
+    let which = k.register("which", Type::unsigned(count_bits(KINDS)));
+    let due = k.state("due", Type::unsigned(1), rst, 0);
+    let counted = k.register("counted", Type::unsigned(3));
+    let counted = counted.comment("Pipeline of a count: adding, writing, just written.");
+    let [entry, raised] = ["entry", "raised"].map(|name| k.register(name, Type::unsigned(16)));
+
+    let events = k.wire("events", concat(&[overrun, fault, taken]));
+    let counts = k.wire("counts", *due & !hold);
+    let counter = k.constant(2, (COUNTS / KINDS) as u64).concat(*which);
+    entry.set(memory.read(counts.mux(counter, address)));
+    raised.set(entry.plus(1));
+    memory.write(rst | counted.at(1), counter, rst.mux(k.constant(16, 0), *raised));
+    counted.set(concat(&[counted.at(1), counted.at(0) & !rst, counts & !rst]));
+    due.set(events.any() | (*due & !counts));
+    // The number of the event, as each has its own bit.
+    let bit = |bit: usize| {
+        let of = (0..EVENTS).filter(|event| event >> bit & 1 == 1).map(|event| events.at(event));
+        of.reduce(|a, b| a | b).unwrap_or(k.constant(1, 0))
+    };
+    k.when(events.any(), || which.set(concat(&[bit(2), bit(1), bit(0)])));
+    k.when(rst, || which.set(which.plus(1)));
+    k.wire("entry_valid", counted.is(0));
+    k.finish()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::language::testbench::{check, Reference};
+    use crate::wire::Word;
+
+    const IDENTITY: [(usize, u64); 3] = [(0, 0x1234), (5, 0xffff), (13, 7)];
+
+    /// Counters, the event that waits, the cycles of the pipeline that it still takes, the entry read.
+    #[derive(Default)]
+    struct Table {
+        resets: usize,
+        runs: bool,
+        counters: [u16; KINDS],
+        waiting: Option<usize>,
+        left: u64,
+        entry: Option<u64>,
+    }
+
+    impl Table {
+        fn is_reset(&self) -> bool {
+            self.resets >= KINDS
+        }
+    }
+
+    impl Reference for Table {
+        fn outputs(&mut self, _: &[Word]) -> Vec<Option<Word>> {
+            let valid = self.left == 0;
+            let entry = self.entry.filter(|_| self.is_reset() && valid).map(Word::from);
+            vec![entry, self.is_reset().then(|| Word::from(valid))]
+        }
+
+        fn clock(&mut self, inputs: &[Word]) {
+            let [rst, taken, fault, overrun, hold, address] = [0, 1, 2, 3, 4, 5].map(|k| inputs[k].number());
+            if rst == 1 {
+                let before = if self.runs { 0 } else { self.resets };
+                *self = Table { resets: before + 1, ..Table::default() };
+                return;
+            }
+            self.runs = true;
+            let events = taken | fault << 1 | overrun << (EVENTS - 1);
+            self.left = self.left.saturating_sub(1);
+            let (at, own) = (address as usize, IDENTITY.iter().find(|(at, _)| *at == address as usize));
+            self.entry = match at.checked_sub(COUNTS) {
+                Some(counter) if counter < EVENTS => Some(u64::from(self.counters[counter])),
+                _ => own.map(|(_, word)| *word),
+            };
+            if let Some(event) = self.waiting.filter(|_| hold == 0) {
+                self.counters[event] = self.counters[event].wrapping_add(1);
+                (self.waiting, self.left) = (None, 3);
+            }
+            if events != 0 {
+                self.waiting = Some(events.trailing_zeros() as usize);
+            }
+        }
+    }
+
+    /// Events at least eight cycles apart, which may be held back; entries of the identity and counters.
+    fn stimulus(cycles: usize) -> Vec<Vec<Word>> {
+        let mut random = fastrand::Rng::with_seed(15);
+        let (mut resets, mut pause) = (KINDS + 2, 0);
+        let inputs = |_| {
+            if random.u16(..3000) == 0 {
+                resets = KINDS + random.usize(..4);
+            }
+            let rst = resets > 0;
+            resets = resets.saturating_sub(1);
+            let event = if !rst && pause == 0 { 1u64 << random.usize(..EVENTS) } else { 0 };
+            pause = if event > 0 { random.usize(8..20) } else { pause.saturating_sub(1) };
+            // An event is counted before the next one.
+            let hold = pause > 5 && random.u8(..4) > 0;
+            let address = match random.bool() {
+                true => COUNTS + random.usize(..EVENTS),
+                false => IDENTITY[random.usize(..IDENTITY.len())].0,
+            };
+            vec![
+                Word::from(rst),
+                Word::from(event & 1),
+                Word::from(event >> 1 & 15),
+                Word::from(event >> (EVENTS - 1)),
+                Word::from(hold),
+                Word::from(address as u64),
+            ]
+        };
+        (0..cycles).map(inputs).collect()
+    }
+
+    #[test]
+    fn events_are_counted_and_the_identity_is_read() {
+        let kernel = kernel(&IDENTITY);
+        let block = Body::new(kernel, &[], &[("entry", 16), ("entry_valid", 1)]);
+        check(block.kernel(), &stimulus(30_000), &mut Table::default());
+    }
+}

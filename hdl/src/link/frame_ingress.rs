@@ -1,0 +1,305 @@
+//! Frame ingress: from the payload bytes of a frame's packet to the engine's input stream, while they arrive.
+
+use dermis_golden::link::code_bytes;
+use rust_hdl::prelude::*;
+
+use crate::kernel_block;
+use crate::language::{Body, Builder, Expr, Kernel, Type};
+use crate::primitives::count_bits;
+use crate::wire::Wire;
+
+/// Codes go to the engine as they arrive, except the last two, which are held until the packet has been checked. A good
+/// packet releases them, with `tlast` on the last. A bad one ends with an early `tlast`, at which the engine drops the
+/// frame. Two codes must be held: after all codes but one, any beat would complete the frame. A code that is already
+/// offered when its packet turns out bad stays until it is accepted, as AXI-Stream requires; the early `tlast` follows
+/// it.
+///
+/// The engine accepts no code while its buffer is full. A frame that loses a code because of that, or that starts while
+/// the previous one is still held, is dropped too, and counts as an `overrun` if its packet is good.
+#[derive(LogicBlock)]
+pub struct FrameIngress {
+    /// Clock; registers change on its rising edge.
+    pub clk: Signal<In, Clock>,
+    /// Synchronous reset, active high.
+    pub rst: Signal<In, Bit>,
+    /// The header of a frame's packet is complete; high for one cycle.
+    pub frame_begin: Signal<In, Bit>,
+    /// `content` is a byte of the payload.
+    pub payload: Signal<In, Bit>,
+    /// A byte of the packet, 8 bits.
+    pub content: Wire<In>,
+    /// The frame's packet is complete and correct; high for one cycle.
+    pub good: Signal<In, Bit>,
+    /// The packet is damaged; high for one cycle.
+    pub bad: Signal<In, Bit>,
+    /// The engine gets the whole frame; with `good`.
+    pub taken: Signal<Out, Bit>,
+    /// The frame is dropped although its packet is good; with `good`.
+    pub overrun: Signal<Out, Bit>,
+    /// A taxel's code, two's complement; valid with `valid`.
+    pub code: Wire<Out>,
+    /// `code` is offered to the engine; held until `ready`.
+    pub valid: Signal<Out, Bit>,
+    /// The beat has `tlast`; valid with `valid`.
+    pub last: Signal<Out, Bit>,
+    /// The engine accepts the beat in this cycle.
+    pub ready: Signal<In, Bit>,
+    kernel: Body,
+}
+
+kernel_block!(
+    FrameIngress,
+    clock clk,
+    inputs [rst, frame_begin, payload, content, good, bad, ready],
+    outputs [taken, overrun, code, valid, last]
+);
+
+/// Codes that are held until the end of the packet.
+const HELD: usize = 2;
+
+impl FrameIngress {
+    /// For frames of `taxels` codes of `bits` bits each.
+    pub fn new(taxels: usize, bits: u32) -> Self {
+        let block = FrameIngress {
+            clk: Default::default(),
+            rst: Default::default(),
+            frame_begin: Default::default(),
+            payload: Default::default(),
+            content: Wire::new(8),
+            good: Default::default(),
+            bad: Default::default(),
+            taken: Default::default(),
+            overrun: Default::default(),
+            code: Wire::new(bits as usize),
+            valid: Default::default(),
+            last: Default::default(),
+            ready: Default::default(),
+            kernel: Body::default(),
+        };
+        block.bind(kernel(taxels, bits as usize, code_bytes(bits)))
+    }
+}
+
+/// The code of the bytes before `content`, which is its last, most significant byte.
+fn assemble<'k>(k: &'k Builder, content: Expr<'k>, enable: Expr<'k>, bits: usize, bytes: usize) -> Expr<'k> {
+    if bytes == 1 {
+        return content.low(bits);
+    }
+    let before = 8 * (bytes - 1);
+    let raw = k.register("raw", Type::unsigned(before));
+    let shifted = if before == 8 { content } else { content.concat(raw.slice(8, before - 8)) };
+    k.when(enable, || raw.set(shifted));
+    content.low(bits - before).concat(*raw)
+}
+
+fn kernel(taxels: usize, bits: usize, bytes: usize) -> Kernel {
+    let k = Builder::new("frame_ingress");
+    let (rst, frame_begin, payload) = (k.input("rst", 1), k.input("frame_begin", 1), k.input("payload", 1));
+    let (content, good, bad, ready) =
+        (k.input("content", 8), k.input("good", 1), k.input("bad", 1), k.input("ready", 1));
+    let (bit, one, zero) = (Type::unsigned(1), k.constant(1, 1), k.constant(1, 0));
+    let (b, d) = (count_bits(bytes), count_bits(taxels));
+    // Codes that leave before the end of the packet.
+    let early_codes = taxels.saturating_sub(HELD);
+    let byte_index = k.state("byte_index", Type::unsigned(b), rst, 0);
+    let [code, second] = ["code", "second"].map(|name| k.register(name, Type::unsigned(bits)));
+    let fill = k.state("fill", Type::unsigned(2), rst, 0);
+    let delivered = k.state("delivered", Type::unsigned(d), rst, 0);
+    let flag = |name| k.state(name, bit, rst, 0);
+    let (within_frame, deaf, lost) = (flag("within_frame"), flag("deaf"), flag("lost"));
+    let (released, aborting) = (flag("released"), flag("aborting"));
+    let some_ahead = u64::from(early_codes > 0);
+    let ahead = k.state("ahead", bit, rst, some_ahead);
+    let ahead = ahead.comment("Codes that may leave before the end of the packet are left.");
+
+    let refused = k.wire("refused", *deaf | *lost);
+    let at_last = k.wire("at_last", delivered.is(taxels as u64 - 1));
+    let empty = fill.is(0);
+    let early = k.wire("early", *aborting & empty);
+    let accepted = good & *within_frame;
+    let taken = k.wire("taken", accepted & !refused);
+    k.wire("overrun", accepted & refused);
+    let valid = k.wire("valid", *aborting | (!empty & (*released | *ahead)));
+    k.wire("last", early | at_last);
+    let moves = k.wire("moves", valid & ready & !early);
+    let aborts = k.wire("aborts", early & ready);
+    let waits = k.wire("waits", valid & !ready);
+    let hears = k.wire("hears", payload & !*deaf);
+    let arrived = k.wire("arrived", assemble(&k, content, hears, bits, bytes));
+    let complete = k.wire("complete", hears & byte_index.is(bytes as u64 - 1));
+    let left = k.wire("left", (*fill - moves).low(2));
+    let full = left.is(HELD as u64);
+    let push = k.wire("push", complete & !full);
+    let drop = k.wire("drop", *within_frame & !*deaf & (bad | (good & *lost)));
+
+    k.when(hears, || byte_index.set(complete.mux(k.constant(b, 0), byte_index.plus(1))));
+    k.when(moves, || code.set(*second));
+    k.when(push & left.is(0), || code.set(arrived));
+    k.when(push & left.any(), || second.set(arrived));
+    fill.set(drop.mux(waits.extend(2), push.mux(left.plus(1), left)));
+    k.when(moves, || {
+        delivered.set(at_last.mux(k.constant(d, 0), delivered.plus(1)));
+        let last_ahead = early_codes.saturating_sub(1) as u64;
+        ahead.set(at_last.mux(k.constant(1, some_ahead), *ahead & !delivered.is(last_ahead)));
+        k.when(at_last, || released.set(zero));
+    });
+    k.when(aborts, || {
+        delivered.set(k.constant(d, 0));
+        ahead.set(k.constant(1, some_ahead));
+        aborting.set(zero);
+    });
+    k.when(taken, || released.set(one));
+    k.when(drop, || aborting.set(waits | moves.mux(!at_last, delivered.any())));
+    k.when(complete & full, || lost.set(one));
+    k.when(good | bad, || within_frame.set(zero));
+    k.when(frame_begin, || {
+        within_frame.set(one);
+        deaf.set(!empty | *aborting);
+        lost.set(zero);
+        byte_index.set(k.constant(b, 0));
+    });
+    k.finish()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::language::testbench::{check, Reference};
+    use crate::wire::Word;
+
+    /// The codes of the frame in lists, as the block's documentation says.
+    #[derive(Clone, Default)]
+    struct Frames {
+        taxels: usize,
+        bits: usize,
+        bytes: usize,
+        code: Vec<u8>,
+        held: Vec<u64>,
+        delivered: usize,
+        within_frame: bool,
+        deaf: bool,
+        lost: bool,
+        released: bool,
+        aborting: bool,
+        reset: bool,
+    }
+
+    impl Frames {
+        fn new(taxels: usize, bits: usize) -> Self {
+            Frames { taxels, bits, bytes: code_bytes(bits as u32), ..Frames::default() }
+        }
+
+        fn offers(&self) -> bool {
+            let ahead = self.delivered < self.taxels.saturating_sub(HELD);
+            self.aborting || (!self.held.is_empty() && (self.released || ahead))
+        }
+
+        fn ends_early(&self) -> bool {
+            self.aborting && self.held.is_empty()
+        }
+
+        fn code_of(&self) -> u64 {
+            let number = self.code.iter().rev().fold(0, |number, &byte| number << 8 | u64::from(byte));
+            number & ((1 << self.bits) - 1)
+        }
+    }
+
+    impl Reference for Frames {
+        fn outputs(&mut self, inputs: &[Word]) -> Vec<Option<Word>> {
+            if !self.reset {
+                return vec![None; 5];
+            }
+            let accepted = inputs[4].number() == 1 && self.within_frame;
+            let refused = self.deaf || self.lost;
+            let code = self.held.first().filter(|_| self.offers()).map(|&code| Word::from(code));
+            let last = self.ends_early() || self.delivered + 1 == self.taxels;
+            let bits =
+                [accepted && !refused, accepted && refused, self.offers(), last].map(|bit| Some(Word::from(bit)));
+            [code].into_iter().chain(bits).collect()
+        }
+
+        fn clock(&mut self, inputs: &[Word]) {
+            let [rst, begin, payload, _, good, bad, ready] = [0, 1, 2, 3, 4, 5, 6].map(|k| inputs[k].number() == 1);
+            let before = self.clone();
+            let waits = self.offers() && !ready;
+            if self.offers() && ready {
+                if self.ends_early() {
+                    (self.aborting, self.delivered) = (false, 0);
+                } else {
+                    self.held.remove(0);
+                    self.delivered = (self.delivered + 1) % self.taxels;
+                    self.released &= self.delivered != 0;
+                }
+            }
+            if payload && !before.deaf {
+                self.code.push(inputs[3].number() as u8);
+                if self.code.len() == self.bytes {
+                    match self.held.len() {
+                        HELD => self.lost = true,
+                        _ => self.held.push(self.code_of()),
+                    }
+                    self.code.clear();
+                }
+            }
+            if before.within_frame && !before.deaf {
+                if bad || (good && before.lost) {
+                    self.held.truncate(usize::from(waits));
+                    self.aborting = waits || self.delivered > 0;
+                } else if good {
+                    self.released = true;
+                }
+            }
+            self.within_frame &= !(good || bad);
+            if begin {
+                (self.within_frame, self.deaf, self.lost) = (true, !before.held.is_empty() || before.aborting, false);
+                self.code.clear();
+            }
+            if rst {
+                *self = Frames { reset: true, ..Frames::new(self.taxels, self.bits) };
+            }
+        }
+    }
+
+    /// Packets of a frame's bytes, of which some are too short or bad, against a receiver that stalls; resets.
+    fn stimulus(cycles: usize, frames: &Frames) -> Vec<Vec<Word>> {
+        let mut random = fastrand::Rng::with_seed(14);
+        let (mut left, mut pause, mut speed) = (None, 3, [4, 4]);
+        let inputs = |cycle: usize| {
+            if cycle % 200 == 0 {
+                speed = [(); 2].map(|()| random.u8(1..9));
+            }
+            let rst = cycle < 2 || random.u16(..900) == 0;
+            let acts = !rst && random.u8(..8) < speed[0];
+            let [mut begin, mut payload, mut good, mut bad] = [false; 4];
+            match left {
+                _ if !acts => {}
+                None if pause > 0 => pause -= 1,
+                None => (begin, left) = (true, Some(frames.taxels * frames.bytes)),
+                Some(bytes) if bytes > 0 && random.u8(..40) > 0 => {
+                    (payload, left) = (true, Some(bytes - 1));
+                }
+                Some(bytes) => {
+                    good = bytes == 0 && random.u8(..4) > 0;
+                    (bad, left, pause) = (!good, None, random.u8(1..12));
+                }
+            }
+            if rst {
+                left = None;
+            }
+            let bits = |bits: [bool; 3]| bits.map(Word::from);
+            let ready = random.u8(..8) < speed[1];
+            let content = Word::from(u64::from(random.u8(..)));
+            [&bits([rst, begin, payload])[..], &[content], &bits([good, bad, ready])[..]].concat()
+        };
+        (0..cycles).map(inputs).collect()
+    }
+
+    #[test]
+    fn good_packets_and_no_others_become_whole_frames() {
+        for (taxels, bits) in [(5, 12), (2, 8), (7, 8), (4, 20)] {
+            let mut frames = Frames::new(taxels, bits);
+            let block = FrameIngress::new(taxels, bits as u32);
+            check(block.kernel.kernel(), &stimulus(8000, &frames), &mut frames);
+        }
+    }
+}
