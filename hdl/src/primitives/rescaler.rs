@@ -139,7 +139,7 @@ mod tests {
     use crate::language::testbench::{check, random_word, Reference};
     use crate::wire::Word;
 
-    const SHAPE: Shape = Shape { acc: 45, word: 24, data: 18, a_shift: 9 };
+    const SHAPE: Shape = Shape { acc: 45, word: 18 + SEARCH_EXTRA_BITS as usize, data: 18, a_shift: 9 };
 
     /// The quads on their way with their shift, and the counts.
     #[derive(Default)]
