@@ -126,11 +126,19 @@ mod tests {
 
     const BITS: usize = 30;
 
+    /// Coefficients w_ij; whether the polynomial is to be evaluated, and whether it is the sum polynomial.
+    #[derive(Clone, Copy, Default)]
+    struct Polynomial {
+        coefficients: [[i64; 4]; 4],
+        present: bool,
+        sum: bool,
+    }
+
     /// Whole polynomials, evaluated at the candidates; what the two last ones said of themselves.
     struct Evaluated {
         degree: usize,
-        /// Coefficients, present, sums: of the polynomial that arrives, and of the one before.
-        polynomials: [Option<([[i64; 4]; 4], u64, u64)>; 2],
+        /// The polynomial that arrives, and the one before.
+        polynomials: [Polynomial; 2],
         out: Option<(usize, i64, bool)>,
         cycle: Option<usize>,
     }
@@ -159,17 +167,14 @@ mod tests {
             let [cycle, present, sums] = [1, 2, 3].map(|k| inputs[k].number());
             let cycle = cycle as usize;
             if cycle == 0 {
-                self.polynomials = [Some(([[0; 4]; 4], present & 1, sums & 1)), self.polynomials[0]];
+                let own = Polynomial { present: present & 1 == 1, sum: sums & 1 == 1, ..Polynomial::default() };
+                self.polynomials = [own, self.polynomials[0]];
             }
-            if let Some((coefficients, ..)) = &mut self.polynomials[0] {
-                coefficients[cycle / 4][cycle % 4] = inputs[0].signed(0, BITS);
-            }
+            self.polynomials[0].coefficients[cycle / 4][cycle % 4] = inputs[0].signed(0, BITS);
             let candidate = LEAVES.iter().position(|&leaves| leaves == cycle);
             let from = self.polynomials[usize::from(cycle < 4 && cycle != 1)];
-            self.out = candidate
-                .zip(from)
-                .filter(|(_, (_, present, _))| *present == 1)
-                .map(|(candidate, from)| (candidate, self.value(from.0, candidate), from.2 == 1));
+            let value = |candidate| (candidate, self.value(from.coefficients, candidate), from.sum);
+            self.out = candidate.filter(|_| from.present).map(value);
             self.cycle = Some(cycle);
         }
     }
@@ -194,7 +199,7 @@ mod tests {
             let all: Vec<Vec<Word>> = (0..200).flat_map(polynomial).collect();
             let ports = [("value", BITS), ("index", 4), ("valid", 1), ("sum", 1)];
             let block = Body::new(kernel(BITS, degree), &[], &ports);
-            let mut evaluated = Evaluated { degree, polynomials: [None; 2], out: None, cycle: None };
+            let mut evaluated = Evaluated { degree, polynomials: Default::default(), out: None, cycle: None };
             check(block.kernel(), &all, &mut evaluated);
         }
     }

@@ -183,7 +183,7 @@ mod tests {
             self.new = valid;
             if valid {
                 let (i, j) = EXPONENTS[self.vector % EXPONENTS.len()];
-                self.words.push(round_shift(inputs[2].signed(0, SIZES.mixed), (2 * (i + j)) as u32));
+                self.words.push(round_shift(inputs[2].signed(0, SIZES.mixed), 2 * (i + j)));
             }
             if rst || start {
                 *self = Vectors { reset: self.reset || rst, ..Vectors::default() };
