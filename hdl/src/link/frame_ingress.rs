@@ -265,7 +265,7 @@ mod tests {
         let mut random = fastrand::Rng::with_seed(14);
         let (mut left, mut pause, mut speed) = (None, 3, [4, 4]);
         let inputs = |cycle: usize| {
-            if cycle % 200 == 0 {
+            if cycle.is_multiple_of(200) {
                 speed = [(); 2].map(|()| random.u8(1..9));
             }
             let rst = cycle < 2 || random.u16(..900) == 0;

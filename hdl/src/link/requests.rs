@@ -201,7 +201,7 @@ mod tests {
         let kinds = [PLAIN[0], PLAIN[1], Kind::FrameForForces as u8, Kind::FrameForResultants as u8];
         let mut speed = 4;
         let inputs = |cycle: usize| {
-            if cycle % 100 == 0 {
+            if cycle.is_multiple_of(100) {
                 speed = random.u8(1..8);
             }
             let rst = cycle < 2 || random.u16(..500) == 0;

@@ -226,7 +226,7 @@ mod tests {
         let mut random = fastrand::Rng::with_seed(13);
         let (mut sclk, mut cs_n, mut speed) = (false, false, 8);
         let inputs = |cycle: usize| {
-            if cycle % 100 == 0 {
+            if cycle.is_multiple_of(100) {
                 speed = random.u8(2..9);
             }
             match cycle {
