@@ -434,7 +434,7 @@ impl Reference for Clocks {
 
 #[test]
 fn registers_of_other_clocks_follow_their_edges_and_resets() {
-    let mut all = stimulus(3000, &[1, 1, 4]);
+    let mut all = random_words(3000, &[1, 1, 4]);
     // Verilator sees the edges after the first cycle.
     all[0] = vec![Word::default(); 3];
     check(&clocks(), &all, &mut Clocks::default());
