@@ -135,7 +135,7 @@ fn a_wrong_constant_is_found() {
     let changes = [
         // The threshold of the choice; the quads of a subarray.
         (share.as_str(), wrong_share.as_str()),
-        ("which == 1'd1 ? 4'd3 : 4'd15", "which == 1'd1 ? 4'd2 : 4'd15"),
+        ("which == 1'b1 ? 4'd3 : 4'd15", "which == 1'b1 ? 4'd2 : 4'd15"),
     ];
     for (right, wrong) in changes {
         assert!(good.contains(right), "{right} is not in the Verilog");
