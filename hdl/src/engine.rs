@@ -11,16 +11,58 @@
 //! - While a frame is sent, the first v_ij of the next are computed; they wait until that frame has been sent.
 //!
 //! Without a search there is no memory in which v_ij could wait: then a frame starts when the previous one has been
-//! sent. Where the case is chosen per frame, it is chosen while the frame is received ([`choosing`](crate::choosing)).
+//! sent. Where the case is chosen per frame, it is chosen while the frame is received. [`Receiver`] and [`Seeker`] are
+//! the stages that differ.
 
 use dermis_golden::fixed::Model;
 use dermis_golden::scene::Condition;
 use rust_hdl::prelude::*;
 
-use super::{Receive, Search};
+use crate::ports::one_of;
 use crate::primitives::{count_bits, largest, BitDelay, CaseCounter, Counter, Keep, Resultants, CYCLE_BITS};
-use crate::stages::{Fold, Force, Normalise, Pass, Prepare, Rescale, Send, Unfold};
+use crate::stages::{
+    Banks, Fold, Force, Normalise, Pass, Prepare, Receive, ReceivePorts, Rescale, Search, SearchPorts, Send, Unfold,
+    Unsearched,
+};
 use crate::wire::Wire;
+
+one_of! {
+    /// The stage that receives frames.
+    pub enum Receiver: ReceivePorts {
+        /// One case.
+        Receive,
+        /// Several cases, one of which is chosen per frame.
+        Banks,
+    }
+}
+
+impl Receiver {
+    fn new(model: &Model) -> Self {
+        match model.chooses() {
+            false => Receiver::Receive(Box::new(Receive::new(model))),
+            true => Receiver::Banks(Box::new(Banks::new(model))),
+        }
+    }
+}
+
+one_of! {
+    /// The stage that finds p(μ*).
+    pub enum Seeker: SearchPorts {
+        /// With a search for μ*.
+        Search,
+        /// μ* is 0.
+        Unsearched,
+    }
+}
+
+impl Seeker {
+    fn new(model: &Model) -> Self {
+        match model.searches() {
+            true => Seeker::Search(Box::new(Search::new(model))),
+            false => Seeker::Unsearched(Box::new(Unsearched::new(model))),
+        }
+    }
+}
 
 /// The parallel engine, the top module of the generated hardware.
 ///
@@ -59,13 +101,13 @@ pub struct Engine {
     /// The beat is the last of its frame; valid with `m_axis_tvalid`.
     pub m_axis_tlast: Signal<Out, Bit>,
     pub(crate) prepare: Prepare,
-    pub(crate) receive: Receive,
+    pub(crate) receive: Receiver,
     pub(crate) normalise: Normalise,
     pub(crate) fold: Fold,
     pub(crate) pass: Pass,
     pub(crate) rescale: Rescale,
     pub(crate) unfold: Unfold,
-    pub(crate) search: Search,
+    pub(crate) search: Seeker,
     pub(crate) forces: Force,
     send: Send,
     resultants: Resultants,
@@ -127,11 +169,11 @@ impl Engine {
             m_axis_tready: Default::default(),
             m_axis_tlast: Default::default(),
             prepare: Prepare::new(model),
-            receive: Receive::new(model),
+            receive: Receiver::new(model),
             fold: Fold::new(model),
             pass: Pass::new(model),
             unfold: Unfold::new(model),
-            search: Search::new(model),
+            search: Seeker::new(model),
             forces: force,
             send: Send::new(model),
             resultants: Resultants::new(model.sends_resultants(), &model.scene.sensor, model.grid()),

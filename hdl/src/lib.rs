@@ -23,7 +23,6 @@ macro_rules! comment {
     ($text:literal) => {};
 }
 
-pub mod choosing;
 pub mod device;
 pub mod engine;
 pub mod estimate;
@@ -34,18 +33,14 @@ pub mod manifest;
 pub mod primitives;
 pub mod serial;
 pub mod stages;
-pub mod unsearched;
 pub mod usage;
 pub mod wire;
 
 mod core_file;
 mod generate;
+mod ports;
 mod simulate;
 mod taps;
-
-// `receive` and `search` blocks of [`engine`]; [`choosing`] and [`unsearched`] import replacements under the same
-// names.
-use stages::{Receive, Search};
 
 pub use generate::{generate, Generated, GeneratedFile, HdlError, Refused};
 pub use simulate::simulator;

@@ -8,12 +8,12 @@ use rust_hdl::prelude::*;
 
 use crate::device::{Device, Inputs, Outputs, Tap};
 use crate::generate::HdlError;
-use crate::language::{check_kernels, kernels};
+use crate::language::{check_kernels, kernels, verilog};
 use crate::primitives::{position_bits, CALIBRATION_FILE, COLUMN_FILE, MEMORY_FILE};
 use crate::taps::{taps, SEARCH_FIELD};
 use crate::usage::{stages, Usage};
 use crate::wire::Word;
-use crate::{choosing, engine, serial, unsearched};
+use crate::{engine, serial};
 
 /// Update rounds after which signals that still change count as a combinational loop.
 const SETTLE_ROUNDS: usize = 200;
@@ -70,7 +70,7 @@ macro_rules! design {
             }
 
             fn verilog(&self) -> String {
-                generate_verilog_unchecked(self)
+                verilog(self)
             }
 
             fn memory_files(&self) -> Vec<(&'static str, String)> {
@@ -99,34 +99,25 @@ macro_rules! best {
     };
 }
 
-/// Taps and memory files of a parallel engine.
-macro_rules! side_by_side {
-    ($engine:ty) => {
-        design!(
-            $engine,
-            |engine: &$engine| [
-                ("receive", engine.receive.accept.val(), engine.receive.taken_word.val()),
-                ("choose", engine.begin_frame.val(), engine.receive.which.val()),
-                ("normalise", engine.fold.normalised_valid.val(), engine.normalise.shifted.val()),
-                ("fold", engine.fold.folded_valid.val(), engine.fold.folded.val()),
-                ("pass", engine.pass.quad_valid.val(), engine.pass.quad.val()),
-                ("rescale", engine.rescale.words_valid.val(), engine.rescale.words.val()),
-                ("unfold", engine.unfold.taxels_valid.val(), engine.unfold.taxels.val()),
-                ("search", engine.search.judged.val(), best!(engine.search)),
-                ("force", engine.search.values_valid.val(), engine.search.values.val()),
-            ],
-            |engine: &$engine| {
-                let columns = engine.pass.steps.column_file().map(|text| (COLUMN_FILE, text));
-                let table = engine.prepare.calibrate.table_file().map(|text| (CALIBRATION_FILE, text));
-                [(MEMORY_FILE, engine.pass.lanes.memory_file())].into_iter().chain(columns).chain(table).collect()
-            }
-        );
-    };
-}
-
-side_by_side!(engine::Engine);
-side_by_side!(unsearched::engine::Engine);
-side_by_side!(choosing::engine::Engine);
+design!(
+    engine::Engine,
+    |engine: &engine::Engine| [
+        ("receive", engine.receive.accept.val(), engine.receive.taken_word.val()),
+        ("choose", engine.begin_frame.val(), engine.receive.which.val()),
+        ("normalise", engine.fold.normalised_valid.val(), engine.normalise.shifted.val()),
+        ("fold", engine.fold.folded_valid.val(), engine.fold.folded.val()),
+        ("pass", engine.pass.quad_valid.val(), engine.pass.quad.val()),
+        ("rescale", engine.rescale.words_valid.val(), engine.rescale.words.val()),
+        ("unfold", engine.unfold.taxels_valid.val(), engine.unfold.taxels.val()),
+        ("search", engine.search.judged.val(), best!(engine.search)),
+        ("force", engine.search.values_valid.val(), engine.search.values.val()),
+    ],
+    |engine: &engine::Engine| {
+        let columns = engine.pass.steps.column_file().map(|text| (COLUMN_FILE, text));
+        let table = engine.prepare.calibrate.table_file().map(|text| (CALIBRATION_FILE, text));
+        [(MEMORY_FILE, engine.pass.lanes.memory_file())].into_iter().chain(columns).chain(table).collect()
+    }
+);
 
 design!(
     serial::Engine,
@@ -145,11 +136,9 @@ design!(
 
 /// The engine of `model`, after rust-hdl's checks.
 pub(crate) fn design(model: &Model) -> Result<Box<dyn Design>, HdlError> {
-    let design: Box<dyn Design> = match (model.searches(), model.chooses()) {
-        _ if model.board.engine == EngineKind::Serial => checked(serial::Engine::new(model))?,
-        (true, false) => checked(engine::Engine::new(model))?,
-        (true, true) => checked(choosing::engine::Engine::new(model))?,
-        (false, _) => checked(unsearched::engine::Engine::new(model))?,
+    let design: Box<dyn Design> = match model.board.engine {
+        EngineKind::Serial => checked(serial::Engine::new(model))?,
+        EngineKind::Parallel => checked(engine::Engine::new(model))?,
     };
     Ok(design)
 }

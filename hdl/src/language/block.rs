@@ -1,7 +1,7 @@
 //! A kernel as the body of a rust-hdl block.
 
 use std::cell::RefCell;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
 use rust_hdl::core::probe::Probe;
@@ -217,6 +217,30 @@ pub fn kernels(design: &dyn Block) -> BTreeMap<String, Arc<Kernel>> {
     collector.kernels
 }
 
+/// The Verilog of `design`, top module `top`. rust-hdl prints the hierarchy and declares every driven port as a
+/// variable; the combinational outputs of kernels become nets, which hold a constant from time 0 on.
+pub fn verilog(design: &impl Block) -> String {
+    let all = kernels(design);
+    let mut nets = BTreeSet::new();
+    let mut text = String::new();
+    for line in generate_verilog_unchecked(design).lines() {
+        if let Some(rest) = line.trim_start().strip_prefix("module ") {
+            let module = rest.split('(').next().unwrap_or_default();
+            nets = all.get(module).map(|kernel| kernel.nets().collect()).unwrap_or_default();
+        }
+        let net = line.split_once("output reg ").filter(|(_, port)| {
+            let name = port.trim_end().trim_end_matches(';').rsplit(' ').next();
+            name.is_some_and(|name| nets.contains(name))
+        });
+        match net {
+            Some((indent, port)) => text.extend([indent, "output wire ", port]),
+            None => text.push_str(line),
+        }
+        text.push('\n');
+    }
+    text
+}
+
 /// Checks the kernels of all blocks of `design`.
 ///
 /// # Errors
@@ -231,10 +255,12 @@ pub fn check_kernels(design: &dyn Block) -> Result<(), KernelError> {
 ///
 /// ```text
 /// kernel_block!(Queue, clock clk, inputs [rst, write, word], outputs [room, m_axis_tvalid]);
+/// kernel_block!(Unsearched, ports SearchPorts, clock clk, inputs [rst, start], outputs [done]);
 /// ```
+/// The ports are fields of the block, or with `ports` those of its field `ports`.
 #[macro_export]
 macro_rules! kernel_block {
-    ($block:ty, $(clock $clock:ident,)? inputs [$($input:ident),* $(,)?], outputs [$($output:ident),* $(,)?]) => {
+    (@ $block:ty, [$($clock:ident)?], [$($input:ident)*], [$($output:ident)*], $kernel:ident, $fields:pat) => {
         impl $block {
             /// Takes `kernel` as the block's behaviour.
             fn bind(mut self, kernel: $crate::language::Kernel) -> Self {
@@ -254,8 +280,8 @@ macro_rules! kernel_block {
                 use $crate::language::Port;
                 let edge = false $(|| self.$clock.pos_edge())?;
                 let changed = false $(|| self.$input.has_new_value())*;
-                let Self { kernel, $($input,)* $($output,)* .. } = self;
-                kernel.update(
+                let $fields = self;
+                $kernel.update(
                     edge,
                     changed,
                     |_set| {
@@ -279,5 +305,20 @@ macro_rules! kernel_block {
                 self.kernel.hdl()
             }
         }
+    };
+    ($block:ty, $(clock $clock:ident,)? inputs [$($input:ident),* $(,)?], outputs [$($output:ident),* $(,)?]) => {
+        $crate::kernel_block!(
+            @ $block, [$($clock)?], [$($input)*], [$($output)*], kernel,
+            Self { kernel, $($input,)* $($output,)* .. }
+        );
+    };
+    (
+        $block:ty, ports $ports:ident, $(clock $clock:ident,)?
+        inputs [$($input:ident),* $(,)?], outputs [$($output:ident),* $(,)?]
+    ) => {
+        $crate::kernel_block!(
+            @ $block, [$($clock)?], [$($input)*], [$($output)*], kernel,
+            Self { kernel, ports: $ports { $($input,)* $($output,)* .. }, .. }
+        );
     };
 }

@@ -244,6 +244,12 @@ impl Kernel {
         self.signals.iter().map(|signal| (signal.name.as_str(), signal.ty))
     }
 
+    /// Names of the combinational outputs; the module declares them as nets.
+    pub(crate) fn nets(&self) -> impl Iterator<Item = &str> {
+        let nets = self.signals.iter().filter(|signal| signal.output && matches!(signal.role, Role::Wire { .. }));
+        nets.map(|signal| signal.name.as_str())
+    }
+
     pub(crate) fn ty(&self, node: NodeId) -> Type {
         self.nodes[node].1
     }

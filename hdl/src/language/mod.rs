@@ -38,7 +38,7 @@ pub(crate) mod testbench;
 #[cfg(test)]
 mod tests;
 
-pub use block::{check_kernels, kernels, Body, Port};
+pub use block::{check_kernels, kernels, verilog, Body, Port};
 pub use build::{Builder, MemoryPort, Net};
 pub use error::KernelError;
 pub use expression::{concat, Expr, ARITHMETIC_BITS};

@@ -110,7 +110,7 @@ impl<'a> Text<'a> {
     pub(super) fn negated(&self, condition: NodeId) -> String {
         match self.kernel.nodes[condition].0 {
             Node::Unary(Unary::Not, a) => self.root(a),
-            _ => format!("!{}", self.within(condition, Binding::Atom)),
+            _ => format!("!{}", self.operand(condition)),
         }
     }
 
@@ -121,6 +121,15 @@ impl<'a> Text<'a> {
         }
         let (text, binding) = self.form(node);
         match binding < least {
+            true => format!("({text})"),
+            false => text,
+        }
+    }
+
+    /// The text of the operand of a unary operator; Verilog has no operator right behind another one.
+    fn operand(&self, node: NodeId) -> String {
+        let text = self.within(node, Binding::Atom);
+        match text.starts_with(['!', '~', '&', '|', '^']) {
             true => format!("({text})"),
             false => text,
         }
@@ -177,8 +186,8 @@ impl<'a> Text<'a> {
             Node::Unary(Unary::Not, a) if self.inequality(*a).is_some() => {
                 (self.inequality(*a).unwrap_or_default(), Binding::Operator)
             }
-            Node::Unary(Unary::Not, a) if ty.bits == 1 => atom(format!("!{}", self.within(*a, Binding::Atom))),
-            Node::Unary(operator, a) => atom(format!("{}{}", operator.symbol(), self.within(*a, Binding::Atom))),
+            Node::Unary(Unary::Not, a) if ty.bits == 1 => atom(format!("!{}", self.operand(*a))),
+            Node::Unary(operator, a) => atom(format!("{}{}", operator.symbol(), self.operand(*a))),
             Node::Slice(a, low) => atom(self.select(kernel.bare(*a), *low, ty.bits)),
             Node::Cast(a) => match self.names.get(a) {
                 Some(name) => atom(name.clone()),

@@ -2,7 +2,8 @@
 //!
 //! All signals are unsigned vectors; a signed product, comparison or shift says `$signed` itself. Every operand is
 //! printed with the width of its operator, so that Verilog's rules for widths and signs of a context change nothing.
-//! The module's header is rust-hdl's, which declares every driven port as `output reg`.
+//! The module's header declares an output as `output reg` if it is a register, else as `output wire`
+//! ([`verilog`](super::verilog)).
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -168,7 +169,12 @@ impl Printer<'_> {
         if !inputs.is_empty() {
             self.line(&format!("wire unused = &{{1'b0, {}}};", inputs.join(", ")));
         }
-        let own = self.expressions.names.iter().filter(|(&node, _)| kernel.bare(node) == node && unread(node)).map(|(_, name)| name.clone());
+        let own = self
+            .expressions
+            .names
+            .iter()
+            .filter(|(&node, _)| kernel.bare(node) == node && unread(node))
+            .map(|(_, name)| name.clone());
         names(signals).chain(own).collect()
     }
 
@@ -191,8 +197,7 @@ impl Printer<'_> {
         let text = self.expressions.root(value);
         let Signal { name, ty, .. } = signal;
         match (signal.output, &signal.role) {
-            (true, _) => self.line(&format!("always @(*) {name} = {text};")),
-            (false, Role::Wire { declared: true }) => self.line(&format!("assign {name} = {text};")),
+            (true, _) | (_, Role::Wire { declared: true }) => self.line(&format!("assign {name} = {text};")),
             _ => self.line(&format!("wire {}{name} = {text};", range(ty.bits))),
         }
     }

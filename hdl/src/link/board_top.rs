@@ -5,6 +5,7 @@ use dermis_golden::link::{Identity, LinkError};
 use rust_hdl::prelude::*;
 
 use super::{Board, BoardOutputs, Lamps, PacketLink, PowerOn, Shape, SpiSlave, Uart};
+use crate::language::verilog;
 use crate::{engine, serial};
 
 /// Board top `$name` with engine `$engine` and link block `$block`, which `$line` builds from an identity. A macro,
@@ -140,7 +141,7 @@ macro_rules! board_top {
             }
 
             fn verilog(&self) -> String {
-                generate_verilog_unchecked(self)
+                verilog(self)
             }
         }
     };

@@ -4,7 +4,9 @@ use dermis_golden::fixed::quads::Quads;
 use rust_hdl::prelude::*;
 
 use super::counter::count_bits;
-use crate::wire::{Wire, Word};
+use crate::kernel_block;
+use crate::language::{Body, Builder, Kernel};
+use crate::wire::Wire;
 
 /// Quad address to lane mask; combinational. All four lanes count, except that of each pair of copies on the middle
 /// line of an odd row or column count only one does.
@@ -16,56 +18,60 @@ pub struct Counts {
     pub address: Wire<In>,
     /// One bit per lane: the lane is counted.
     pub mask: Wire<Out>,
-    _layouts: Vec<Quads>,
+    kernel: Body,
 }
+
+kernel_block!(Counts, inputs [which, address], outputs [mask]);
+
+/// Lanes of a quad.
+const LANES: usize = 4;
 
 impl Counts {
     /// `layouts[case]` is the quad layout of the subarrays of each case.
     pub fn new(layouts: &[Quads]) -> Self {
         let quads = layouts.iter().map(Quads::len).max().unwrap_or(1);
-        Counts {
+        let block = Counts {
             which: Wire::new(count_bits(layouts.len())),
             address: Wire::new(count_bits(quads)),
-            mask: Wire::new(4),
-            _layouts: layouts.to_vec(),
-        }
+            mask: Wire::new(LANES),
+            kernel: Body::default(),
+        };
+        block.bind(kernel(layouts, count_bits(quads)))
     }
 }
 
-impl Logic for Counts {
-    fn update(&mut self) {
-        let address = self.address.val().number() as usize;
-        let layout = self._layouts.get(self.which.val().number() as usize).filter(|layout| address < layout.len());
-        let mask = layout.map_or(0b1111, |layout| layout.lane_mask(address));
-        self.mask.next = Word::from(u64::from(mask));
-    }
+/// The mask at an address of `bits` bits; where a case has no quad, all lanes.
+fn kernel(layouts: &[Quads], bits: usize) -> Kernel {
+    let k = Builder::combinational("counts");
+    let (which, address) = (k.input("which", count_bits(layouts.len())), k.input("address", bits));
+    let mask = |case: usize, address: usize| {
+        let layout = layouts.get(case).filter(|layout| address < layout.len());
+        layout.map_or((1 << LANES) - 1, |layout| u64::from(layout.lane_mask(address)))
+    };
+    let masks = (0..1 << which.bits()).flat_map(|case| (0..1 << bits).map(move |address| mask(case, address)));
+    let masks: Vec<u64> = masks.collect();
+    k.wire("mask", which.concat(address).table(LANES, &masks));
+    k.finish()
+}
 
-    fn connect(&mut self) {
-        self.mask.connect();
-    }
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::language::testbench::{check, random_words, Pipeline};
+    use crate::wire::Word;
 
-    fn hdl(&self) -> Verilog {
-        let bits = self.address.width();
-        let (selector, selector_bits) = match self._layouts.len() {
-            1 => ("address", bits),
-            _ => ("{which, address}", self.which.width() + bits),
-        };
-        let all = self._layouts.iter().enumerate().flat_map(|(case, layout)| {
-            (0..layout.len()).map(move |address| (case << bits | address, layout.lane_mask(address)))
-        });
-        let cases: String = all
-            .filter(|&(_, mask)| mask != 0b1111)
-            .map(|(index, mask)| format!("    {selector_bits}'d{index}: mask = 4'b{mask:04b};\n"))
-            .collect();
-        Verilog::Custom(if cases.is_empty() {
-            "// Even row and column counts: every lane is a taxel.\n\
-             wire unused = &{1'b0, which, address};\nalways @(*) mask = 4'b1111;"
-                .to_string()
-        } else {
-            format!(
-                "wire unused_which = &{{1'b0, which}};\n\
-                 always @(*) begin\n  case ({selector})\n{cases}    default: mask = 4'b1111;\n  endcase\nend"
-            )
-        })
+    #[test]
+    fn copies_on_a_middle_line_count_once() {
+        for sizes in [vec![(8, 8)], vec![(5, 7)], vec![(10, 5), (5, 5), (10, 3)]] {
+            let layouts: Vec<Quads> = sizes.iter().map(|&(rows, cols)| Quads { rows, cols }).collect();
+            let block = Counts::new(&layouts);
+            let of = |inputs: &[Word]| {
+                let (case, address) = (inputs[0].number() as usize, inputs[1].number() as usize);
+                let layout = layouts.get(case).filter(|layout| address < layout.len());
+                vec![Some(Word::from(layout.map_or(15, |layout| u64::from(layout.lane_mask(address)))))]
+            };
+            let widths = [block.which.width(), block.address.width()];
+            check(block.kernel.kernel(), &random_words(1000, &widths), &mut Pipeline::new(0, 1, of));
+        }
     }
 }

@@ -83,7 +83,7 @@ fn kernel(bits: usize) -> Kernel {
     let [written, read, reserved] = ["written", "read", "reserved"].map(|name| k.state(name, count, rst, 0));
     let room = k.state("room", bit, rst, 1);
     let valid = k.state("m_axis_tvalid", bit, rst, 0);
-    let tlast = k.register("m_axis_tlast", bit);
+    let tlast = k.state("m_axis_tlast", bit, rst, 0);
     let tdata = k.register("m_axis_tdata", Type::unsigned(bits));
 
     let taken = k.wire("taken", *valid & ready);

@@ -2,7 +2,9 @@
 
 use rust_hdl::prelude::*;
 
-use crate::wire::{Wire, Word};
+use crate::kernel_block;
+use crate::language::{Body, Builder};
+use crate::wire::Wire;
 
 /// The least significant bits of a wider word; combinational.
 #[derive(LogicBlock)]
@@ -11,35 +13,37 @@ pub struct Slice {
     pub word: Wire<In>,
     /// Its low bits.
     pub low: Wire<Out>,
+    kernel: Body,
 }
+
+kernel_block!(Slice, inputs[word], outputs[low]);
 
 impl Slice {
     /// The low `low` bits of words of `bits` bits.
     pub fn new(bits: usize, low: usize) -> Self {
-        Slice { word: Wire::new(bits), low: Wire::new(low) }
+        let block = Slice { word: Wire::new(bits), low: Wire::new(low), kernel: Body::default() };
+        let k = Builder::combinational("slice");
+        k.wire("low", k.input("word", bits).low(low));
+        block.bind(k.finish())
     }
 }
 
-impl Logic for Slice {
-    fn update(&mut self) {
-        let mut low = Word::default();
-        for at in (0..self.low.width()).step_by(64) {
-            let part = (self.low.width() - at).min(64);
-            low.set(at, part, self.word.val().field(at, part));
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::language::testbench::{check, random_words, Pipeline};
+    use crate::wire::Word;
+
+    #[test]
+    fn the_low_bits_are_kept() {
+        for low in [7, 70, 130] {
+            let of = |inputs: &[Word]| {
+                let mut kept = Word::default();
+                (0..low).for_each(|bit| kept.set(bit, 1, inputs[0].field(bit, 1)));
+                vec![Some(kept)]
+            };
+            let block = Slice::new(130, low);
+            check(block.kernel.kernel(), &random_words(200, &[130]), &mut Pipeline::new(0, 1, of));
         }
-        self.low.next = low;
-    }
-
-    fn connect(&mut self) {
-        self.low.connect();
-    }
-
-    fn hdl(&self) -> Verilog {
-        let end = self.low.width() - 1;
-        Verilog::Custom(if self.low.width() == self.word.width() {
-            "always @(*) low = word;".to_string()
-        } else {
-            format!("always @(*) low = word[{end}:0];\nwire unused = &{{1'b0, word}};")
-        })
     }
 }

@@ -1,56 +1,73 @@
-//! Kind and subarray of the beat that `send` requests.
+//! Beat code and subarray of the requested beat.
 
 use rust_hdl::prelude::*;
 
-use crate::wire::{Wire, Word};
+use crate::kernel_block;
+use crate::language::{Body, Builder, Kernel};
+use crate::wire::Wire;
 
-/// Beat 0 with the subarray of the scanned taxel, or beat `word + 1` with the subarray of the status; combinational.
+/// During the status, beat codes 1 to 3 and the status counter's subarray; otherwise code 0 and the scanned subarray;
+/// combinational.
 #[derive(LogicBlock)]
 pub struct StatusCode {
-    /// Status beats are being requested, not forces.
+    /// The status is being requested.
     pub status: Signal<In, Bit>,
-    /// Index of the status beat in its subarray, from 0.
+    /// Index of the status beat within its subarray, 0 to 2, 2 bits.
     pub word: Wire<In>,
-    /// Index of the subarray of the status beat.
+    /// Subarray whose status is requested.
     pub status_part: Wire<In>,
-    /// Index of the subarray of the current taxel.
+    /// Subarray of the scanned taxel.
     pub scan_part: Wire<In>,
     /// 0: a force, 1 … 3: a status beat.
     pub beat: Wire<Out>,
-    /// Index of the subarray of the beat.
+    /// Index of the beat's subarray.
     pub part: Wire<Out>,
+    kernel: Body,
 }
+
+kernel_block!(StatusCode, inputs [status, word, status_part, scan_part], outputs [beat, part]);
+
+/// Width of a beat code in bits.
+const BEAT_BITS: usize = 2;
 
 impl StatusCode {
-    /// For `word` of `word_bits` bits and subarray indices of `part_bits` bits.
-    pub fn new(word_bits: usize, part_bits: usize) -> Self {
-        StatusCode {
+    /// For subarray indices of `part_bits` bits.
+    pub fn new(part_bits: usize) -> Self {
+        let block = StatusCode {
             status: Default::default(),
-            word: Wire::new(word_bits),
+            word: Wire::new(BEAT_BITS),
             status_part: Wire::new(part_bits),
             scan_part: Wire::new(part_bits),
-            beat: Wire::new(2),
+            beat: Wire::new(BEAT_BITS),
             part: Wire::new(part_bits),
-        }
+            kernel: Body::default(),
+        };
+        block.bind(kernel(part_bits))
     }
 }
 
-impl Logic for StatusCode {
-    fn update(&mut self) {
-        let status = self.status.val();
-        self.beat.next = Word::from(if status { self.word.val().number() + 1 } else { 0 });
-        self.part.next = if status { self.status_part.val() } else { self.scan_part.val() };
-    }
+fn kernel(part_bits: usize) -> Kernel {
+    let k = Builder::combinational("status_code");
+    let (status, word) = (k.input("status", 1), k.input("word", BEAT_BITS));
+    let (status_part, scan_part) = (k.input("status_part", part_bits), k.input("scan_part", part_bits));
+    k.wire("beat", status.mux(word.plus(1), k.constant(BEAT_BITS, 0)));
+    k.wire("part", status.mux(status_part, scan_part));
+    k.finish()
+}
 
-    fn connect(&mut self) {
-        self.beat.connect();
-        self.part.connect();
-    }
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::language::testbench::{check, random_words, Pipeline};
+    use crate::wire::Word;
 
-    fn hdl(&self) -> Verilog {
-        Verilog::Custom(
-            "always @(*) beat = status ? word + 2'd1 : 2'd0;\nalways @(*) part = status ? status_part : scan_part;"
-                .to_string(),
-        )
+    #[test]
+    fn a_status_beat_has_a_code_and_its_own_subarray() {
+        let block = StatusCode::new(3);
+        let of = |inputs: &[Word]| match inputs[0].number() {
+            0 => vec![Some(Word::from(0)), Some(inputs[3])],
+            _ => vec![Some(Word::from((inputs[1].number() + 1) % 4)), Some(inputs[2])],
+        };
+        check(block.kernel.kernel(), &random_words(500, &[1, BEAT_BITS, 3, 3]), &mut Pipeline::new(0, 2, of));
     }
 }

@@ -2,15 +2,17 @@
 //!
 //! Four cycles: position and magnitude of a code, maxima, limit for a contact, choice.
 
-use dermis_golden::fixed::choose::{is_beside_boundary, quarters, FrameStats, CUT_SHIFT};
+use dermis_golden::fixed::choose::{is_beside_boundary, quarters, CUT_SHIFT};
 use dermis_golden::fixed::Model;
 use dermis_golden::partition::Grid;
 use dermis_golden::scene::Condition;
 use dermis_golden::sensor::Sensor;
 use rust_hdl::prelude::*;
 
+use crate::kernel_block;
+use crate::language::{concat, Body, Builder, Expr, Kernel, Type};
 use crate::primitives::count_bits;
-use crate::wire::{Wire, Word};
+use crate::wire::Wire;
 
 /// Monitors the accepted codes. `which` is valid with `settled`, from four cycles after the frame's last code until
 /// `free`, and keeps its value until the next choice.
@@ -32,204 +34,259 @@ pub struct Choose {
     pub which: Wire<Out>,
     /// The choice for the frame in the buffer is complete.
     pub settled: Signal<Out, Bit>,
-    _sensor: Sensor,
-    _grids: Vec<Grid>,
-    _condition: Condition,
-    _floor: i32,
-    _index: usize,
-    _seen: FrameStats,
-    _left: usize,
+    kernel: Body,
 }
 
-/// Cycles from the last code to `settled`.
-const LATENCY: usize = dermis_golden::fixed::choose::LATENCY as usize + 2;
+kernel_block!(Choose, clock clk, inputs [rst, code, accept, tlast, free], outputs [which, settled]);
+
+/// What a choice depends on.
+struct Rule<'a> {
+    sensor: &'a Sensor,
+    /// Subarrays of each case.
+    grids: Vec<Grid>,
+    condition: Condition,
+    /// Noise floor in codes.
+    floor: i32,
+    /// Width of a code.
+    bits: usize,
+}
 
 impl Choose {
     /// For the cases of `model`.
     pub fn new(model: &Model) -> Self {
         let bits = model.formats.input_bits as usize;
-        let grids = model.grids();
-        Choose {
+        Choose::with(&Rule {
+            sensor: &model.scene.sensor,
+            grids: model.grids(),
+            condition: model.scene.partition.condition,
+            // A floor beyond the code's range is clamped to its end, which no code exceeds either.
+            floor: model.noise_floor.min((1 << (bits - 1)) - 1),
+            bits,
+        })
+    }
+
+    fn with(rule: &Rule) -> Self {
+        let block = Choose {
             clk: Default::default(),
             rst: Default::default(),
-            code: Wire::new(bits),
+            code: Wire::new(rule.bits),
             accept: Default::default(),
             tlast: Default::default(),
             free: Default::default(),
-            which: Wire::new(count_bits(grids.len())),
+            which: Wire::new(count_bits(rule.grids.len())),
             settled: Default::default(),
-            _sensor: model.scene.sensor.clone(),
-            _grids: grids,
-            _condition: model.scene.partition.condition,
-            // A floor beyond the code's range is clamped to its end, which no code exceeds either.
-            _floor: model.noise_floor.min((1 << (bits - 1)) - 1),
-            _index: 0,
-            _seen: FrameStats::default(),
-            _left: 0,
-        }
-    }
-
-    /// Evaluates an accepted code; returns whether it was the frame's last.
-    fn take(&mut self) -> bool {
-        let code = self.code.val().signed(0, self.code.width()) as i32;
-        self._seen.add(&self._sensor, self._index, code, self._floor);
-        self._index += 1;
-        let last = self._index == self._sensor.taxels();
-        if last {
-            self._index = 0;
-        } else if self.tlast.val() {
-            (self._index, self._seen) = (0, FrameStats::default());
-        }
-        last
-    }
-
-    /// Verilog that collects the signs in each quarter of the array; and for each case an expression that is true if a
-    /// loaded subarray does not meet the condition. With `Condition::Loaded` every loaded subarray does.
-    fn signs(&self) -> (String, Vec<String>) {
-        let bits = self.code.width();
-        if self._condition == Condition::Loaded {
-            return (String::new(), vec!["1'b0".to_string(); self._grids.len()]);
-        }
-        let declare = format!(
-            "\
-wire signed [{end}:0] value = code;
-wire signed [{end}:0] floor_code = {bits}'sd{floor};
-reg above1, below1;
-reg [1:0] quarter1;
-reg [3:0] above, below;
-always @(posedge clk) begin
-  quarter1 <= {{row >= {r}'d{half_rows}, col >= {c}'d{half_cols}}};
-  above1 <= value > floor_code;
-  below1 <= value < -floor_code;
-  if (forget) {{above, below}} <= 8'd0;
-  else if (valid1) begin
-    above[quarter1] <= above[quarter1] || above1;
-    below[quarter1] <= below[quarter1] || below1;
-  end
-end
-",
-            end = bits - 1,
-            floor = self._floor,
-            r = count_bits(self._sensor.rows),
-            c = count_bits(self._sensor.cols),
-            half_rows = self._sensor.rows.div_ceil(2),
-            half_cols = self._sensor.cols.div_ceil(2),
-        );
-        let any = |name: &str, part: &[usize]| {
-            let bits: Vec<String> = part.iter().map(|quarter| format!("{name}[{quarter}]")).collect();
-            format!("|{{{}}}", bits.join(", "))
+            kernel: Body::default(),
         };
-        let unmet = |grid: &Grid| {
-            let parts = quarters(*grid);
-            let differ = parts.iter().map(|part| format!("(({}) != ({}))", any("above", part), any("below", part)));
-            differ.collect::<Vec<_>>().join(" || ")
-        };
-        (declare, self._grids.iter().map(unmet).collect())
+        block.bind(kernel(rule))
     }
 }
 
-impl Logic for Choose {
-    fn update(&mut self) {
-        if self.clk.pos_edge() {
-            if self._left == 1 {
-                let case = self._seen.choose(&self._grids, self._condition, self._floor);
-                self.which.next = Word::from(case as u64);
-                self._seen = FrameStats::default();
+fn kernel(rule: &Rule) -> Kernel {
+    let k = Builder::new("choose");
+    let (rst, accept, tlast, free) = (k.input("rst", 1), k.input("accept", 1), k.input("tlast", 1), k.input("free", 1));
+    let code = k.input("code", rule.bits);
+    let bit = Type::unsigned(1);
+    let (rows, cols, magnitude_bits) = (rule.sensor.rows, rule.sensor.cols, rule.bits - 1);
+    let magnitude = Type::unsigned(magnitude_bits);
+
+    let [line_end, frame_end, restart, last3] = ["line_end", "frame_end", "restart", "last3"].map(|name| match name {
+        "last3" => k.register(name, bit),
+        _ => k.net(name, bit),
+    });
+    let row = k.state("row", Type::unsigned(count_bits(rows)), *restart, 0);
+    let col = k.state("col", Type::unsigned(count_bits(cols)), *restart, 0);
+    line_end.set(col.is(cols as u64 - 1));
+    frame_end.set(*line_end & row.is(rows as u64 - 1));
+    restart.set(rst | accept & tlast & !*frame_end);
+    k.when(accept, || {
+        col.set(line_end.mux(k.constant(col.bits(), 0), col.plus(1)));
+        k.when(*line_end, || row.set(frame_end.mux(k.constant(row.bits(), 0), row.plus(1))));
+    });
+
+    k.comment("Position and magnitude of a code");
+    let forget = k.wire("forget", *restart | *last3);
+    let valid1 = k.delay("valid1", accept & !*restart);
+    let last1 = k.delay("last1", accept & *frame_end & !rst);
+    let last2 = k.delay("last2", last1 & !rst);
+    last3.set(last2 & !rst);
+    let magnitude1 = k.delay("magnitude1", code.low(magnitude_bits) ^ code.top().repeat(magnitude_bits));
+    let rows1 = k.delay("rows1", beside(&k, *row, rows));
+    let cols1 = k.delay("cols1", beside(&k, *col, cols));
+
+    k.comment("Maxima");
+    let [peak, middle_rows, middle_cols] =
+        ["peak", "middle_rows", "middle_cols"].map(|name| k.state(name, magnitude, forget, 0));
+    for (most, counts) in [(peak, None), (middle_rows, Some(rows1)), (middle_cols, Some(cols1))] {
+        let larger = most.less(magnitude1);
+        let takes = counts.map_or(larger, |counts| counts & larger);
+        k.when(valid1 & takes, || most.set(magnitude1));
+    }
+    let signs = (rule.condition != Condition::Loaded).then(|| signs(&k, rule, [*row, *col, code, valid1, forget]));
+
+    k.comment("Limit for a contact, choice");
+    let share = peak.shift_right(CUT_SHIFT as usize).extend(magnitude_bits);
+    let floor = k.constant(magnitude_bits, rule.floor.max(0) as u64);
+    let limit = k.delay("limit", if rule.floor > 0 { floor.less(share).mux(share, floor) } else { share });
+    let cut_rows = k.wire("cut_rows", limit.less(*middle_rows));
+    let cut_cols = k.wire("cut_cols", limit.less(*middle_cols));
+    let which_bits = count_bits(rule.grids.len());
+    let choice = rule.grids.iter().enumerate().skip(1).rev().fold(k.constant(which_bits, 0), |other, (case, grid)| {
+        let cut = match (grid.rows > 1, grid.cols > 1) {
+            (true, true) => cut_rows | cut_cols,
+            (true, false) => cut_rows,
+            _ => cut_cols,
+        };
+        let refused = signs.map_or(cut, |signs| cut | differ(signs, *grid));
+        (!refused).mux(k.constant(which_bits, case as u64), other)
+    });
+    let which = k.register("which", Type::unsigned(which_bits));
+    k.when(*last3, || which.set(choice));
+    let settled = k.register("settled", bit);
+    settled.set((*settled | *last3) & !free & !rst);
+    k.finish()
+}
+
+/// Whether `line` of `lines` is beside the boundary in the middle; 1 bit.
+fn beside<'k>(k: &'k Builder, line: Expr<'k>, lines: usize) -> Expr<'k> {
+    let mut all = (0..lines).filter(|&line| is_beside_boundary(line, lines));
+    let first = all.next().unwrap_or(0);
+    let last = all.next_back().unwrap_or(first);
+    let at = |number: usize| k.constant(line.bits(), number as u64);
+    let within =
+        (first > 0).then(|| !line.less(at(first))).into_iter().chain((last + 1 < lines).then(|| !at(last).less(line)));
+    within.reduce(|a, b| a & b).unwrap_or(k.constant(1, 1))
+}
+
+/// For each quarter of the array a bit: a code was above the noise floor, a code was below its negative.
+fn signs<'k>(k: &'k Builder, rule: &Rule, [row, col, code, valid1, forget]: [Expr<'k>; 5]) -> [Expr<'k>; 2] {
+    let half = |line: Expr<'k>, lines: usize| !line.less(k.constant(line.bits(), lines.div_ceil(2) as u64));
+    let quarter1 = k.delay("quarter1", half(row, rule.sensor.rows).concat(half(col, rule.sensor.cols)));
+    let quarter = k.constant(4, 1).shift_left_by(quarter1);
+    let floor = i64::from(rule.floor);
+    let above = k.signed_constant(rule.bits, floor).less(code.signed());
+    let below = code.signed().less(k.signed_constant(rule.bits, -floor));
+    [("above", above), ("below", below)].map(|(name, beyond)| {
+        let beyond1 = k.delay(&format!("{name}1"), beyond);
+        let seen = k.state(name, Type::unsigned(4), forget, 0);
+        k.when(valid1 & beyond1, || seen.set(*seen | quarter));
+        *seen
+    })
+}
+
+/// Whether a loaded subarray of a case has codes of one sign only.
+fn differ<'k>([above, below]: [Expr<'k>; 2], grid: Grid) -> Expr<'k> {
+    let any = |signs: Expr<'k>, part: &[usize]| {
+        concat(&part.iter().map(|&quarter| signs.at(quarter)).collect::<Vec<_>>()).any()
+    };
+    let parts = quarters(grid);
+    let unmet = concat(&parts.iter().map(|part| any(above, part) ^ any(below, part)).collect::<Vec<_>>());
+    unmet.any()
+}
+
+#[cfg(test)]
+mod tests {
+    use dermis_golden::fixed::choose::FrameStats;
+    use dermis_golden::scene::Scene;
+
+    use super::*;
+    use crate::language::testbench::{check, Reference};
+    use crate::wire::Word;
+
+    const BITS: usize = 12;
+
+    /// The choice of the bit-true model, with the cycles that it takes.
+    struct Expected<'a> {
+        rule: &'a Rule<'a>,
+        index: usize,
+        seen: FrameStats,
+        /// Edges until the choice, while a frame is complete.
+        left: Option<usize>,
+        which: Option<u64>,
+        settled: Option<bool>,
+    }
+
+    impl<'a> Expected<'a> {
+        fn new(rule: &'a Rule<'a>) -> Self {
+            Expected { rule, index: 0, seen: FrameStats::default(), left: None, which: None, settled: None }
+        }
+
+        /// A frame is complete and has not been read.
+        fn full(&self) -> bool {
+            self.left.is_some() || self.settled == Some(true)
+        }
+    }
+
+    impl Reference for Expected<'_> {
+        fn outputs(&mut self, _: &[Word]) -> Vec<Option<Word>> {
+            vec![self.which.map(Word::from), self.settled.map(Word::from)]
+        }
+
+        fn clock(&mut self, inputs: &[Word]) {
+            let [rst, accept, tlast, free] = [0, 1, 2, 3].map(|k| inputs[k].number() == 1);
+            let rule = self.rule;
+            if rst {
+                *self = Expected { which: self.which, settled: Some(false), ..Expected::new(rule) };
+                return;
             }
-            self.settled.next = (self.settled.val() || self._left == 1) && !self.free.val() && !self.rst.val();
-            self._left = self._left.saturating_sub(1);
-            if self.accept.val() && self.take() {
-                self._left = LATENCY - 1;
+            let chosen = self.left == Some(1);
+            if chosen {
+                self.which = Some(self.seen.choose(&rule.grids, rule.condition, rule.floor) as u64);
+                self.seen = FrameStats::default();
             }
-            if self.rst.val() {
-                (self._index, self._seen, self._left) = (0, FrameStats::default(), 0);
+            self.settled = self.settled.map(|settled| (settled || chosen) && !free);
+            self.left = self.left.map(|left| left - 1).filter(|left| *left > 0);
+            if accept {
+                let code = inputs[4].signed(0, BITS) as i32;
+                self.seen.add(rule.sensor, self.index, code, rule.floor);
+                self.index += 1;
+                if self.index == rule.sensor.taxels() {
+                    (self.index, self.left) = (0, Some(3));
+                } else if tlast {
+                    (self.index, self.seen) = (0, FrameStats::default());
+                }
             }
         }
     }
 
-    fn connect(&mut self) {
-        self.which.connect();
-        self.settled.connect();
+    /// Codes of sparse contacts with gaps; early `tlast`, resets, a buffer that stays full for a while.
+    fn stimulus(rule: &Rule, cycles: usize) -> Vec<Vec<Word>> {
+        let mut random = fastrand::Rng::with_seed(6);
+        let mut state = Expected::new(rule);
+        let mut all = Vec::new();
+        let mut size = 1;
+        for cycle in 0..cycles {
+            let rst = cycle < 2 || random.u16(..3000) == 0;
+            let settled = state.settled == Some(true);
+            if state.index == 0 {
+                size = 1 << random.u32(2..BITS as u32 - 1);
+            }
+            let code = if random.u8(..8) == 0 { random.i64(-size..size) } else { random.i64(-2..2) };
+            let bits = [
+                rst,
+                !rst && !state.full() && random.u8(..8) > 0,
+                random.u16(..200) == 0,
+                !rst && settled && random.u8(..4) == 0,
+            ];
+            let inputs = [&bits.map(Word::from)[..], &[Word::of_fields(&[code], BITS)]].concat();
+            state.clock(&inputs);
+            all.push(inputs);
+        }
+        all
     }
 
-    fn hdl(&self) -> Verilog {
-        let (rows, cols) = (self._sensor.rows, self._sensor.cols);
-        let (r, c, m) = (count_bits(rows), count_bits(cols), self.code.width() - 1);
-        let w = self.which.width();
-        // First and last of the lines beside a boundary.
-        let beside = |lines: usize| {
-            let mut all = (0..lines).filter(|&line| is_beside_boundary(line, lines));
-            let first = all.next().unwrap_or(0);
-            (first, all.next_back().unwrap_or(first))
-        };
-        let within = |name: &str, bits: usize, lines: usize| {
-            let (first, last) = beside(lines);
-            let from = if first == 0 { String::new() } else { format!("{name} >= {bits}'d{first} && ") };
-            format!("{from}{name} <= {bits}'d{last}")
-        };
-        let (signs, unmet) = self.signs();
-        let cut = |grid: &Grid| match (grid.rows > 1, grid.cols > 1) {
-            (true, true) => "cut_rows || cut_cols",
-            (true, false) => "cut_rows",
-            _ => "cut_cols",
-        };
-        let refused = self._grids.iter().zip(&unmet).enumerate().skip(1);
-        let choice: String =
-            refused.map(|(case, (grid, unmet))| format!("!({} || {unmet}) ? {w}'d{case} : ", cut(grid))).collect();
-        let share = format!("{{{CUT_SHIFT}'d0, peak[{}:{CUT_SHIFT}]}}", m - 1);
-        let limit = match self._floor.max(0) {
-            0 => share,
-            floor => format!("{share} > {m}'d{floor} ? {share} : {m}'d{floor}"),
-        };
-        Verilog::Custom(format!(
-            "\
-reg [{r_end}:0] row;
-reg [{c_end}:0] col;
-reg valid1, last1, last2, last3;
-reg rows1, cols1;
-reg [{m_end}:0] magnitude1, peak, middle_rows, middle_cols, limit;
-wire line_end = col == {c}'d{last_col};
-wire frame_end = line_end && row == {r}'d{last_row};
-wire restart = rst || (accept && tlast && !frame_end);
-wire forget = restart || last3;
-{signs}wire cut_rows = middle_rows > limit;
-wire cut_cols = middle_cols > limit;
-wire unused = &{{1'b0, cut_rows, cut_cols}};
-always @(posedge clk) begin
-  if (restart) begin
-    row <= {r}'d0;
-    col <= {c}'d0;
-  end else if (accept) begin
-    col <= line_end ? {c}'d0 : col + {c}'d1;
-    if (line_end) row <= frame_end ? {r}'d0 : row + {r}'d1;
-  end
-  valid1 <= accept && !restart;
-  last1 <= accept && frame_end && !rst;
-  last2 <= last1 && !rst;
-  last3 <= last2 && !rst;
-  magnitude1 <= code[{m_end}:0] ^ {{{m}{{code[{m}]}}}};
-  rows1 <= {beside_rows};
-  cols1 <= {beside_cols};
-  if (forget) begin
-    peak <= {m}'d0;
-    middle_rows <= {m}'d0;
-    middle_cols <= {m}'d0;
-  end else if (valid1) begin
-    if (magnitude1 > peak) peak <= magnitude1;
-    if (rows1 && magnitude1 > middle_rows) middle_rows <= magnitude1;
-    if (cols1 && magnitude1 > middle_cols) middle_cols <= magnitude1;
-  end
-  limit <= {limit};
-  if (last3) which <= {choice}{w}'d0;
-  settled <= (settled || last3) && !free && !rst;
-end",
-            r_end = r - 1,
-            c_end = c - 1,
-            m_end = m - 1,
-            last_col = cols - 1,
-            last_row = rows - 1,
-            beside_rows = within("row", r, rows),
-            beside_cols = within("col", c, cols),
-        ))
+    #[test]
+    fn the_choice_is_that_of_the_bit_true_model() {
+        let sensor = Scene::builtin("eight-by-eight").unwrap().sensor;
+        let grid = |rows, cols| Grid { rows, cols };
+        let all = vec![grid(1, 1), grid(2, 2), grid(1, 2), grid(2, 1)];
+        for (condition, floor, grids) in [
+            (Condition::Loaded, 0, all.clone()),
+            (Condition::BothSigns, 9, all),
+            (Condition::BothSigns, 0, vec![grid(1, 1), grid(2, 1)]),
+        ] {
+            let rule = Rule { sensor: &sensor, grids, condition, floor, bits: BITS };
+            let block = Choose::with(&rule);
+            check(block.kernel.kernel(), &stimulus(&rule, 30_000), &mut Expected::new(&rule));
+        }
     }
 }

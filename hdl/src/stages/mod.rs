@@ -3,11 +3,11 @@
 //!
 //! `prepare`, `receive`, `fold`, `pass`, `rescale`, `unfold`, `search`, `force` and `send` are `#[hdl_gen]` kernels:
 //! single-bit control and connections between the [primitives](crate::primitives), with Verilog derived from the Rust.
-//! `normalise`, `choose`, `banks` and `unsearched` have a Rust `update()` for rust-hdl's simulation and hand-written
-//! Verilog, which co-simulation compares.
+//! `normalise`, `choose` and `unsearched` are kernels of the [`language`](crate::language). `banks` has a Rust
+//! `update()` for rust-hdl's simulation and hand-written Verilog, which co-simulation compares.
 //!
-//! `banks` (with `choose`) replaces `receive` where the case is chosen per frame; `unsearched` replaces `search` in a
-//! scene without one.
+//! `banks` (with `choose`) stands in the place of `receive` where the case is chosen per frame; `unsearched` in that of
+//! `search` in a scene without one. Both pairs have the same ports.
 
 mod banks;
 mod choose;
@@ -30,9 +30,9 @@ pub use force::Force;
 pub use normalise::Normalise;
 pub use pass::Pass;
 pub use prepare::Prepare;
-pub use receive::Receive;
+pub use receive::{Receive, ReceivePorts};
 pub use rescale::Rescale;
-pub use search::Search;
+pub use search::{Search, SearchPorts};
 pub use send::Send;
 pub use unfold::Unfold;
 pub use unsearched::Unsearched;

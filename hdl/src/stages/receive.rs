@@ -7,7 +7,8 @@
 use dermis_golden::fixed::Model;
 use rust_hdl::prelude::*;
 
-use crate::primitives::{count_bits, BitDelay, Blank, Delay, Gather, Ram, Scan, Spread};
+use crate::ports::{has_ports, ports};
+use crate::primitives::{count_bits, frame_quads, largest, BitDelay, Blank, Delay, Gather, Ram, Scan, Spread};
 use crate::wire::Wire;
 
 /// ```text
@@ -18,44 +19,7 @@ use crate::wire::Wire;
 /// time.
 #[derive(LogicBlock)]
 pub struct Receive {
-    /// Clock; registers change on its rising edge.
-    pub clk: Signal<In, Clock>,
-    /// Synchronous reset, active high.
-    pub rst: Signal<In, Bit>,
-    /// A taxel's code, `input_bits` wide, two's complement; valid with `s_axis_tvalid`.
-    pub s_axis_tdata: Wire<In>,
-    /// A beat is offered on `s_axis_tdata`; the sender holds it until `s_axis_tready`.
-    pub s_axis_tvalid: Signal<In, Bit>,
-    /// The block accepts a beat in this cycle.
-    pub s_axis_tready: Signal<Out, Bit>,
-    /// The beat is the last of its frame; valid with `s_axis_tvalid`.
-    pub s_axis_tlast: Signal<In, Bit>,
-    /// A beat is accepted in this cycle.
-    pub accept: Signal<Out, Bit>,
-    /// The accepted code, 0 for a dead taxel; valid with `accept`.
-    pub taken_word: Wire<Out>,
-    /// The frame buffer holds a whole frame; high until `free`.
-    pub full: Signal<Out, Bit>,
-    /// The frame has been read: the buffer may be overwritten.
-    pub free: Signal<In, Bit>,
-    /// Constant 0: there is one case.
-    pub which: Wire<Out>,
-    /// Address of the quad to read, over all subarrays.
-    pub quad_address: Wire<In>,
-    /// Four codes, `input_bits` each, signed; two cycles after `quad_address`.
-    pub quad: Wire<Out>,
-    /// Index of the subarray for `magnitude`, `positive` and `negative`; combinational.
-    pub part: Wire<In>,
-    /// OR of the magnitudes of the subarray's codes, `input_bits` − 1 wide; valid while `full`.
-    pub magnitude: Wire<Out>,
-    /// A code of the subarray is above the noise floor; valid while `full`.
-    pub positive: Signal<Out, Bit>,
-    /// A code of the subarray is below minus the noise floor; valid while `full`.
-    pub negative: Signal<Out, Bit>,
-    /// `tlast` was early or missing since the last `reported`.
-    pub framing: Signal<Out, Bit>,
-    /// Clears `framing`.
-    pub reported: Signal<In, Bit>,
+    ports: ReceivePorts,
     scan: Scan,
     blank: Blank,
     spread: Spread,
@@ -74,14 +38,56 @@ pub struct Receive {
     early: Signal<Local, Bit>,
 }
 
-impl Receive {
-    /// For frames in the layout of `model`, one case.
-    pub fn new(model: &Model) -> Self {
-        let bits = model.formats.input_bits as usize;
-        let count = model.parts.len();
-        let quads = count * model.formats.quads;
-        let taxels = model.scene.sensor.taxels();
-        Receive {
+ports! {
+    /// Ports of a stage that receives frames.
+    pub struct ReceivePorts {
+        /// Clock; registers change on its rising edge.
+        pub clk: Signal<In, Clock>,
+        /// Synchronous reset, active high.
+        pub rst: Signal<In, Bit>,
+        /// A taxel's code, `input_bits` wide, two's complement; valid with `s_axis_tvalid`.
+        pub s_axis_tdata: Wire<In>,
+        /// A beat is offered on `s_axis_tdata`; the sender holds it until `s_axis_tready`.
+        pub s_axis_tvalid: Signal<In, Bit>,
+        /// The block accepts a beat in this cycle.
+        pub s_axis_tready: Signal<Out, Bit>,
+        /// The beat is the last of its frame; valid with `s_axis_tvalid`.
+        pub s_axis_tlast: Signal<In, Bit>,
+        /// A beat is accepted in this cycle.
+        pub accept: Signal<Out, Bit>,
+        /// The accepted code, 0 for a dead taxel; valid with `accept`.
+        pub taken_word: Wire<Out>,
+        /// The frame buffer holds a whole frame, and `which` is its case; high until `free`.
+        pub full: Signal<Out, Bit>,
+        /// The frame has been read: the buffer may be overwritten.
+        pub free: Signal<In, Bit>,
+        /// Index of the chosen case; valid with `full`, 0 where there is one case.
+        pub which: Wire<Out>,
+        /// Address of the quad to read, over all subarrays.
+        pub quad_address: Wire<In>,
+        /// Four codes, `input_bits` each, signed; two cycles after `quad_address`.
+        pub quad: Wire<Out>,
+        /// Index of the subarray for `magnitude`, `positive` and `negative`; combinational.
+        pub part: Wire<In>,
+        /// OR of the magnitudes of the subarray's codes, `input_bits` − 1 wide; valid while `full`.
+        pub magnitude: Wire<Out>,
+        /// A code of the subarray is above the noise floor; valid while `full`.
+        pub positive: Signal<Out, Bit>,
+        /// A code of the subarray is below minus the noise floor; valid while `full`.
+        pub negative: Signal<Out, Bit>,
+        /// `tlast` was early or missing since the last `reported`.
+        pub framing: Signal<Out, Bit>,
+        /// Clears `framing`.
+        pub reported: Signal<In, Bit>,
+    }
+}
+
+impl ReceivePorts {
+    /// For frames that are read in the layout of any of `cases`.
+    pub(super) fn new(cases: &[Model]) -> Self {
+        let bits = cases[0].formats.input_bits as usize;
+        let parts: Vec<usize> = cases.iter().map(|case| case.parts.len()).collect();
+        ReceivePorts {
             clk: Default::default(),
             rst: Default::default(),
             s_axis_tdata: Wire::new(bits),
@@ -92,15 +98,30 @@ impl Receive {
             taken_word: Wire::new(bits),
             full: Default::default(),
             free: Default::default(),
-            which: Wire::new(1),
-            quad_address: Wire::new(count_bits(quads)),
-            part: Wire::new(count_bits(count)),
+            which: Wire::new(count_bits(cases.len())),
+            quad_address: Wire::new(count_bits(frame_quads(cases))),
             quad: Wire::new(4 * bits),
+            part: Wire::new(count_bits(largest(&parts))),
             magnitude: Wire::new(bits - 1),
             positive: Default::default(),
             negative: Default::default(),
             framing: Default::default(),
             reported: Default::default(),
+        }
+    }
+}
+
+has_ports!(Receive: ReceivePorts);
+
+impl Receive {
+    /// For frames in the layout of `model`, one case.
+    pub fn new(model: &Model) -> Self {
+        let bits = model.formats.input_bits as usize;
+        let count = model.parts.len();
+        let quads = count * model.formats.quads;
+        let taxels = model.scene.sensor.taxels();
+        Receive {
+            ports: ReceivePorts::new(std::slice::from_ref(model)),
             scan: Scan::new(std::slice::from_ref(model)),
             blank: Blank::new(bits, taxels, &model.dead),
             spread: Spread::new(bits),

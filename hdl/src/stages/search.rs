@@ -12,6 +12,7 @@ use dermis_golden::fixed::schedule::vectors;
 use dermis_golden::fixed::Model;
 use rust_hdl::prelude::*;
 
+use crate::ports::{has_ports, ports};
 use crate::primitives::{
     count_bits, largest, position_bits, BitDelay, Candidates, CaseCounter, Counts, Delay, Judge, PolynomialWord, Score,
     Slice, Store, Sum, Taylor, Walk, Weigh, BUFFER_BITS, CANDIDATES_LATENCY, SCORE_LATENCY, STORE_LATENCY,
@@ -25,46 +26,7 @@ const MOVED: usize = STORE_LATENCY + TAYLOR_LATENCY;
 /// Polynomials in by coefficient, p(μ*) out by quad.
 #[derive(LogicBlock)]
 pub struct Search {
-    /// Clock; registers change on its rising edge.
-    pub clk: Signal<In, Clock>,
-    /// Synchronous reset, active high.
-    pub rst: Signal<In, Bit>,
-    /// Index of the case.
-    pub which: Wire<In>,
-    /// One coefficient of four taxels, signed.
-    pub fill_quad: Wire<In>,
-    /// `fill_quad` holds a coefficient.
-    pub fill: Signal<In, Bit>,
-    /// Index of the coefficient; valid with `fill`.
-    pub fill_index: Wire<In>,
-    /// Address of the quad; valid with `fill`.
-    pub fill_address: Wire<In>,
-    /// All coefficients have been written: start the search.
-    pub start: Signal<In, Bit>,
-    /// Search; otherwise p(0) is the result. Valid with `start`.
-    pub enabled: Signal<In, Bit>,
-    /// Four values p(μ*), `search_bits[0]` each, signed.
-    pub values: Wire<Out>,
-    /// `values` holds a quad.
-    pub values_valid: Signal<Out, Bit>,
-    /// μ*, `score` and `found` are final; high for one cycle, before the values.
-    pub settled: Signal<Out, Bit>,
-    /// High in the cycle of the first values.
-    pub values_begin: Signal<Out, Bit>,
-    /// All values have been output; high for one cycle.
-    pub done: Signal<Out, Bit>,
-    /// Best position, x, in grid steps of the level, signed.
-    pub best_x: Wire<Out>,
-    /// Best position, y, in grid steps of the level, signed.
-    pub best_y: Wire<Out>,
-    /// Score of the best candidate, signed, 2^−6.
-    pub score: Wire<Out>,
-    /// A candidate was found.
-    pub found: Signal<Out, Bit>,
-    /// The candidates of a sweep have been compared; high for one cycle.
-    pub judged: Signal<Out, Bit>,
-    /// A candidate was taken at this level; valid with `judged`.
-    pub taken: Signal<Out, Bit>,
+    ports: SearchPorts,
     walk: Walk,
     weigh: Weigh,
     judge: Judge,
@@ -102,6 +64,83 @@ pub struct Search {
     quad_end: Signal<Local, Bit>,
 }
 
+ports! {
+    /// Ports of a stage that finds p(μ*).
+    pub struct SearchPorts {
+        /// Clock; registers change on its rising edge.
+        pub clk: Signal<In, Clock>,
+        /// Synchronous reset, active high.
+        pub rst: Signal<In, Bit>,
+        /// Index of the case.
+        pub which: Wire<In>,
+        /// One coefficient of four taxels, signed.
+        pub fill_quad: Wire<In>,
+        /// `fill_quad` holds a coefficient.
+        pub fill: Signal<In, Bit>,
+        /// Index of the coefficient; valid with `fill`.
+        pub fill_index: Wire<In>,
+        /// Address of the quad; valid with `fill`.
+        pub fill_address: Wire<In>,
+        /// All coefficients have been written: start the search.
+        pub start: Signal<In, Bit>,
+        /// Search; otherwise p(0) is the result. Valid with `start`.
+        pub enabled: Signal<In, Bit>,
+        /// Four values p(μ*), `search_bits[0]` each, signed.
+        pub values: Wire<Out>,
+        /// `values` holds a quad.
+        pub values_valid: Signal<Out, Bit>,
+        /// μ*, `score` and `found` are final; high for one cycle, before the values.
+        pub settled: Signal<Out, Bit>,
+        /// High in the cycle of the first values.
+        pub values_begin: Signal<Out, Bit>,
+        /// All values have been output; high for one cycle.
+        pub done: Signal<Out, Bit>,
+        /// Best position, x, in grid steps of the level, signed.
+        pub best_x: Wire<Out>,
+        /// Best position, y, in grid steps of the level, signed.
+        pub best_y: Wire<Out>,
+        /// Score of the best candidate, signed, 2^−6.
+        pub score: Wire<Out>,
+        /// A candidate was found.
+        pub found: Signal<Out, Bit>,
+        /// The candidates of a sweep have been compared; high for one cycle.
+        pub judged: Signal<Out, Bit>,
+        /// A candidate was taken at this level; valid with `judged`.
+        pub taken: Signal<Out, Bit>,
+    }
+}
+
+impl SearchPorts {
+    /// With the widths of `model`.
+    pub(super) fn new(model: &Model) -> Self {
+        let formats = &model.formats;
+        SearchPorts {
+            clk: Default::default(),
+            rst: Default::default(),
+            which: Wire::new(count_bits(model.cases().len())),
+            fill_quad: Wire::new(4 * (formats.vector_bits as usize + 2)),
+            fill: Default::default(),
+            fill_index: Wire::new(count_bits(vectors(formats.degree))),
+            fill_address: Wire::new(count_bits(formats.quads)),
+            start: Default::default(),
+            enabled: Default::default(),
+            values: Wire::new(4 * formats.search_bits[0] as usize),
+            values_valid: Default::default(),
+            settled: Default::default(),
+            values_begin: Default::default(),
+            done: Default::default(),
+            best_x: Wire::new(position_bits()),
+            best_y: Wire::new(position_bits()),
+            score: Wire::new(formats.score_bits as usize),
+            found: Default::default(),
+            judged: Default::default(),
+            taken: Default::default(),
+        }
+    }
+}
+
+has_ports!(Search: SearchPorts);
+
 impl Search {
     /// With the widths of `model`.
     pub fn new(model: &Model) -> Self {
@@ -121,26 +160,7 @@ impl Search {
         let sums = PolynomialWord::new(1, &formats.sum_bits);
         let value = 4 * formats.search_bits[0] as usize;
         Search {
-            clk: Default::default(),
-            rst: Default::default(),
-            which: Wire::new(count_bits(layouts.len())),
-            fill_quad: Wire::new(4 * fill_bits),
-            fill: Default::default(),
-            fill_index: Wire::new(count_bits(vectors(formats.degree))),
-            fill_address: Wire::new(address),
-            start: Default::default(),
-            enabled: Default::default(),
-            values: Wire::new(value),
-            values_valid: Default::default(),
-            settled: Default::default(),
-            values_begin: Default::default(),
-            done: Default::default(),
-            best_x: Wire::new(position_bits()),
-            best_y: Wire::new(position_bits()),
-            score: Wire::new(formats.score_bits as usize),
-            found: Default::default(),
-            judged: Default::default(),
-            taken: Default::default(),
+            ports: SearchPorts::new(model),
             walk: Walk::new(quads),
             weigh: Weigh::new(formats, &taxel_counts),
             judge: Judge::new(formats, largest(&taxel_counts)),

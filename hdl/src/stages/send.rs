@@ -74,7 +74,7 @@ impl Send {
             scan,
             words: Counter::new(STATUS_BEATS),
             parts: CaseCounter::new(&counts),
-            code: StatusCode::new(count_bits(STATUS_BEATS), count_bits(count)),
+            code: StatusCode::new(count_bits(count)),
             sending: Default::default(),
             status: Default::default(),
             out: BitDelay::new(1),
