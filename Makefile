@@ -10,7 +10,7 @@ VERILATOR ?= verilator
 # Cargo's own variable: a target folder outside the repository is found too.
 CARGO_TARGET_DIR ?= target
 DERMIS     = $(CARGO_TARGET_DIR)/release/dermis
-PACKAGES   = verilator yosys nextpnr-ice40 fpga-icestorm g++ make chromium python3-venv
+PACKAGES   = verilator iverilog yosys nextpnr-ice40 fpga-icestorm g++ make chromium python3-venv
 # The short report: make report QUICK=1
 QUICK     ?=
 

@@ -3,6 +3,7 @@
 //! | test | claims |
 //! |---|---|
 //! | `equality` | generated Verilog = rust-hdl's simulation = bit-true model, on every shipped frame; cycle budgets |
+//! | `event_driven` | every word and cycle under Icarus; no X after a reset; undefined registers found |
 //! | `accuracy` | golden model against known forces, bit-true against golden model |
 //! | `dead` | dead taxels: the same equality, independence of their readings, agreement with the golden model |
 //! | `flipped_bit` | one wrong bit in a coefficient, a vector or the expected output is found |

@@ -218,7 +218,7 @@ pub fn kernels(design: &dyn Block) -> BTreeMap<String, Arc<Kernel>> {
 }
 
 /// The Verilog of `design`, top module `top`. rust-hdl prints the hierarchy and declares every driven port as a
-/// variable; the combinational outputs of kernels become nets, which hold a constant from time 0 on.
+/// variable; the constant outputs of kernels become nets, which hold their value from time 0 on.
 pub fn verilog(design: &impl Block) -> String {
     let all = kernels(design);
     let mut nets = BTreeSet::new();
@@ -226,7 +226,8 @@ pub fn verilog(design: &impl Block) -> String {
     for line in generate_verilog_unchecked(design).lines() {
         if let Some(rest) = line.trim_start().strip_prefix("module ") {
             let module = rest.split('(').next().unwrap_or_default();
-            nets = all.get(module).map(|kernel| kernel.nets().collect()).unwrap_or_default();
+            let constants = all.get(module).into_iter().flat_map(|kernel| kernel.constants());
+            nets = constants.map(|signal| signal.name.as_str()).collect();
         }
         let net = line.split_once("output reg ").filter(|(_, port)| {
             let name = port.trim_end().trim_end_matches(';').rsplit(' ').next();

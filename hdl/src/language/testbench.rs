@@ -86,7 +86,7 @@ fn modules(kernel: &Kernel) -> String {
     let clock_name = clock.clone().unwrap_or_default();
     let mut list: Vec<String> = clock.iter().map(|clock| format!("input wire {clock}")).collect();
     list.extend(inputs.iter().map(|(name, ty)| format!("input wire {} {name}", range(ty.bits))));
-    let nets: Vec<&str> = kernel.nets().collect();
+    let nets: Vec<&str> = kernel.constants().map(|signal| signal.name.as_str()).collect();
     let kind = |name: &str| if nets.contains(&name) { "wire" } else { "reg" };
     list.extend(outputs.iter().map(|(name, ty)| format!("output {} {} {name}", kind(name), range(ty.bits))));
     // A port of one bit has no range, so that it can be named without a selection.

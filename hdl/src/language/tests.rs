@@ -457,7 +457,7 @@ fn verilog_keeps_names_comments_and_constants() {
 reg [7:0] sum;
 reg lane_2__copy;
 // Twice the input.
-assign twice = {1'b0, a} + {1'b0, a};
+always @(*) twice = {1'b0, a} + {1'b0, a};
 (* keep *) always @(posedge clk) begin
   lane_2__copy <= a[3];
 end

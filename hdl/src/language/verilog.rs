@@ -2,8 +2,9 @@
 //!
 //! All signals are unsigned vectors; a signed product, comparison or shift says `$signed` itself. Every operand is
 //! printed with the width of its operator, so that Verilog's rules for widths and signs of a context change nothing.
-//! The module's header declares an output as `output reg` if it is a register, else as `output wire`
-//! ([`verilog`](super::verilog)).
+//! The module's header declares an output as `output wire` if it is constant, else as `output reg`
+//! ([`verilog`](super::verilog)). What is not constant is computed by a process: rust-hdl connects blocks in one process
+//! per block, which would miss what changes while it runs.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -191,12 +192,14 @@ impl Printer<'_> {
     }
 
     fn wire(&mut self, id: SignalId) {
-        let signal = &self.kernel.signals[id];
+        let kernel = self.kernel;
+        let signal = &kernel.signals[id];
         let Some(value) = signal.value else { return };
         self.own_wires(value);
         let text = self.expressions.root(value);
         let Signal { name, ty, .. } = signal;
         match (signal.output, &signal.role) {
+            (true, _) if !kernel.is_constant(signal) => self.line(&format!("always @(*) {name} = {text};")),
             (true, _) | (_, Role::Wire { declared: true }) => self.line(&format!("assign {name} = {text};")),
             _ => self.line(&format!("wire {}{name} = {text};", range(ty.bits))),
         }
