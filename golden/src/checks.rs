@@ -8,7 +8,7 @@
 //! | `border_share` | – | none; beside `load-outside` | – | [`Checks::of`] |
 //! | `load_ratio` | – | `load-mismatch` | off 1 by more than [`LOAD_MISMATCH`] | the golden engine |
 //! | `shape_misfit` | – | `shape-mismatch` | above 1 | the golden engine, with `patch` and `symmetric` |
-//! | `noise_MPa` | MPa | none | – | the estimators `evidence` and `learned` |
+//! | `noise_MPa` | MPa | `shear-unreliable` | above [`FOUND_NOISE_LIMIT`](crate::reconstruct::FOUND_NOISE_LIMIT) of the peak, with `search` | the estimators `evidence` and `learned`, [`Reconstruction::find_noise`] |
 //! | `misfit_probability` | – | `misfit` | below [`MISFIT`] | the same, where the noise is stated |
 //! | `shear_spread` | – | `shear-not-resolved` | above [`NOT_RESOLVED`] | the same |
 //!
@@ -62,7 +62,7 @@ pub struct Checks {
     #[serde(skip_serializing_if = "Option::is_none")]
     pub shape_misfit: Option<f64>,
     /// Standard deviation of the noise in MPa that the estimate rests on: the scene's, else the one found from the
-    /// frame; `None` with `search`.
+    /// frame. With `search` the one found from the frame; `None` where nothing looked for it.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub noise_MPa: Option<f64>,
     /// Probability that noise of the stated size leaves as much of the stress unexplained; `None` with `search`, or
@@ -100,6 +100,9 @@ impl Checks {
             Flag::ShapeMismatch => self.shape_misfit.map(|misfit| format!("misfit {misfit:.3} times the allowed")),
             Flag::ShearNotResolved => {
                 self.shear_spread.map(|spread| format!("standard deviation {:.0} % of the shear", 1e2 * spread))
+            }
+            Flag::ShearUnreliable => {
+                self.noise_MPa.map(|noise| format!("noise {:.3} % of the peak", 1e2 * noise / self.peak_MPa))
             }
             Flag::Misfit => self.misfit_probability.map(|probability| format!("probability {probability:.1e}")),
             _ => None,

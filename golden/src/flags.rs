@@ -9,7 +9,7 @@
 //! | `load-outside` | part of the contact is beyond the array's edge | `frame_flags` |
 //! | `medium-mismatch` | the frame names another medium than the scene | `frame_flags` |
 //! | `coefficients-damaged` | the hardware's coefficient memory has changed | the engine |
-//! | `shear-unreliable` | noise floor or LSB/√12 above 5·10⁻⁵ of the peak, with `sparse` | `frame_flags` |
+//! | `shear-unreliable` | noise floor or LSB/√12 above 5·10⁻⁵ of the peak, or noise found above 1.25·10⁻⁴, with `sparse` | `frame_flags`, [`find_noise`](crate::reconstruct::Reconstruction::find_noise) |
 //! | `mu-at-bound` | a μ is at `search.mu_max` | [`Checks::flags`] |
 //! | `implausible-stress` | a stress is above `input.plausible_MPa` | `Checks::flags` |
 //! | `load-mismatch` | the normal force is far from that of the same stress without shear | `Checks::flags`, golden engine |
