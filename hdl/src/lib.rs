@@ -9,7 +9,7 @@
 //! What is derived from what:
 //! - Engines, most stages and the link's top levels are `#[hdl_gen]` kernels: rust-hdl simulates them and derives their
 //!   Verilog from the same Rust. They hold single-bit control and connections.
-//! - Kernels of the [`language`] (`primitives::{Queue, Lanes, Judge}`): simulation, Verilog and estimate of the logic from
+//! - Kernels of the [`language`], the blocks with a field `kernel`: simulation, Verilog and estimate of the logic from
 //!   one graph of typed expressions, each tested against plain integers in both simulations, every output, every cycle.
 //! - All other blocks, which hold the arithmetic, the memories and most state machines, are written twice: a Rust
 //!   `update()` for rust-hdl's simulation, and a hand-written Verilog text (`Verilog::Custom`), which is synthesised.

@@ -9,9 +9,9 @@ use super::kernel::{
 };
 
 /// Words that Verilog keeps for itself and that a block might use as names.
-const KEYWORDS: [&str; 24] = [
+const KEYWORDS: [&str; 26] = [
     "always", "assign", "begin", "buf", "case", "default", "edge", "else", "end", "event", "for", "if", "initial",
-    "input", "integer", "module", "not", "output", "posedge", "real", "reg", "time", "wait", "wire",
+    "input", "integer", "module", "not", "output", "posedge", "real", "reg", "repeat", "table", "time", "wait", "wire",
 ];
 
 /// Builds a [`Kernel`]. Its expressions borrow it, so that Rust's operators, loops and functions compose them.
@@ -88,6 +88,13 @@ impl Builder {
     /// A register without reset; before its first assignment its value is undefined in hardware, 0 in the simulation.
     pub fn register(&self, name: &str, ty: Type) -> Net<'_> {
         self.declare(name, ty, Role::Register(Register { domain: self.domain.get(), ..Register::default() }))
+    }
+
+    /// `value` one cycle later: a register without reset that takes it at every clock edge.
+    pub fn delay<'k>(&'k self, name: &str, value: Expr<'k>) -> Expr<'k> {
+        let register = self.register(name, value.ty());
+        register.set(value);
+        *register
     }
 
     /// A register that takes `value` at the clock edge while `reset` is 1; in a domain of its own, at once.

@@ -59,6 +59,11 @@ impl<'k> Expr<'k> {
         }
     }
 
+    /// Whether this is the same expression as `other`, of the same operands.
+    pub fn is_same(self, other: Expr<'k>) -> bool {
+        self.id == other.id
+    }
+
     /// The same bits as a two's complement number.
     pub fn signed(self) -> Self {
         self.cast(true)
@@ -135,6 +140,19 @@ impl<'k> Expr<'k> {
         self.slice(bit, 1)
     }
 
+    /// The same number with `bits` bits: extended as by [`Expr::extend`], or modulo 2^bits.
+    pub fn resize(self, bits: usize) -> Self {
+        match bits < self.bits() {
+            true => self.low(bits).cast(self.ty().signed),
+            false => self.extend(bits),
+        }
+    }
+
+    /// These bits `times` times, unsigned.
+    pub fn repeat(self, times: usize) -> Self {
+        concat(&vec![self; times])
+    }
+
     /// The most significant bit.
     pub fn top(self) -> Self {
         self.at(self.bits() - 1)
@@ -168,6 +186,22 @@ impl<'k> Expr<'k> {
         arms.iter().rev().fold(default, |other, &(number, value)| {
             self.equals(self.builder.constant(self.bits(), number)).mux(value, other)
         })
+    }
+
+    /// The entry of `table` at this unsigned index, of `bits` bits, without sign; as many entries as indices.
+    pub fn table(self, bits: usize, table: &[u64]) -> Self {
+        let mut entries: Vec<Expr<'k>> = table.iter().map(|&entry| self.builder.constant(bits, entry)).collect();
+        if entries.len() != 1 << self.bits() {
+            self.builder.width_error(self, format!("a table of {} entries", entries.len()));
+            return self.builder.constant(bits, 0);
+        }
+        for bit in 0..self.bits() {
+            entries = entries
+                .chunks(2)
+                .map(|pair| if pair[0].id == pair[1].id { pair[0] } else { self.at(bit).mux(pair[1], pair[0]) })
+                .collect();
+        }
+        entries[0]
     }
 
     /// Whether the numbers are equal.

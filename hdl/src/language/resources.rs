@@ -4,6 +4,7 @@
 //! |---|---|
 //! | sum, difference, comparison by size | 1 per bit |
 //! | multiplexer | 1 per bit; 1/2 with a constant; none where a register keeps its value or is reset |
+//! | multiplexers between up to 16 constants | 1 per bit |
 //! | and, or, exclusive or | 1/4 per bit: mostly merged into another node |
 //! | equality | 1/2 per bit, 1/4 with a constant |
 //! | parity, all or any of n bits | (n − 1)/3 |
@@ -35,7 +36,11 @@ impl Kernel {
         for (id, signal, _) in self.registers() {
             let own = self.interned[&(Node::Signal(id), signal.ty)];
             let next = signal.value.unwrap_or(own);
-            let of_memory = match self.nodes[next].0 {
+            let taken = match self.nodes[next].0 {
+                Node::Mux(_, a, b) if b == own => a,
+                _ => next,
+            };
+            let of_memory = match self.nodes[taken].0 {
                 Node::Read { memory, .. } => placed.contains(self.memories[memory].name.as_str()),
                 _ => false,
             };
@@ -51,11 +56,24 @@ impl Kernel {
         }
         let values: Vec<NodeId> = self.signals.iter().filter_map(|signal| signal.value).collect();
         let order = self.order(&[values, self.edge_roots()].concat()).unwrap_or_default();
+        // Inner multiplexers of a table are in the same LUT as the outer one.
+        for &node in order.iter().filter(|&&node| self.choices(node).is_some()) {
+            free.extend(self.nodes[node].0.operands());
+        }
         logic.luts = order.iter().filter(|node| !free.contains(*node)).map(|&node| self.luts(node)).sum();
         for memory in self.memories.iter().filter(|memory| !placed.contains(memory.name.as_str())) {
             logic.luts += distributed_luts(memory.words, memory.bits) as f64;
         }
         logic
+    }
+
+    /// Levels of multiplexers between constants under `node`, up to the inputs of a LUT.
+    fn choices(&self, node: NodeId) -> Option<usize> {
+        match self.nodes[node].0 {
+            Node::Constant(_) => Some(0),
+            Node::Mux(_, a, b) => Some(self.choices(a)?.max(self.choices(b)?) + 1).filter(|levels| *levels <= 4),
+            _ => None,
+        }
     }
 
     fn luts(&self, node: NodeId) -> f64 {

@@ -1,6 +1,7 @@
 //! Runs a kernel in its own simulation and under Verilator against a reference in plain integers: every output, every
 //! cycle.
 
+use std::collections::VecDeque;
 use std::fmt::Write as _;
 use std::io::Write as _;
 use std::process::{Command, Stdio};
@@ -16,6 +17,49 @@ pub(crate) trait Reference {
     fn outputs(&mut self, inputs: &[Word]) -> Vec<Option<Word>>;
     /// The clock edge.
     fn clock(&mut self, inputs: &[Word]);
+}
+
+/// A reference without state: the outputs are a function of the inputs of `latency` cycles earlier.
+pub(crate) struct Pipeline<F> {
+    of: F,
+    outputs: VecDeque<Vec<Option<Word>>>,
+}
+
+impl<F: FnMut(&[Word]) -> Vec<Option<Word>>> Pipeline<F> {
+    /// `of` gives the `count` outputs from the inputs; before, they are undefined.
+    pub(crate) fn new(latency: usize, count: usize, of: F) -> Self {
+        Pipeline { of, outputs: vec![vec![None; count]; latency].into() }
+    }
+}
+
+impl<F: FnMut(&[Word]) -> Vec<Option<Word>>> Reference for Pipeline<F> {
+    fn outputs(&mut self, inputs: &[Word]) -> Vec<Option<Word>> {
+        self.outputs.push_back((self.of)(inputs));
+        self.outputs.pop_front().unwrap()
+    }
+
+    fn clock(&mut self, _: &[Word]) {}
+}
+
+/// Random words of these widths, of which every fourth is all zeros or all ones.
+pub(crate) fn random_words(cycles: usize, widths: &[usize]) -> Vec<Vec<Word>> {
+    let mut random = fastrand::Rng::with_seed(20);
+    (0..cycles).map(|_| widths.iter().map(|&bits| random_word(&mut random, bits)).collect()).collect()
+}
+
+/// A random word of `bits` bits, every fourth all zeros or all ones.
+pub(crate) fn random_word(random: &mut fastrand::Rng, bits: usize) -> Word {
+    let kind = random.u8(..8);
+    let mut word = Word::default();
+    for low in (0..bits).step_by(64) {
+        let limb = match kind {
+            0 => 0,
+            1 => u64::MAX,
+            _ => random.u64(..),
+        };
+        word.set(low, (bits - low).min(64), limb);
+    }
+    word
 }
 
 /// Name and width of the ports of a kernel: inputs, driven ports.

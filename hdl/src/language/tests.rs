@@ -1,4 +1,4 @@
-use super::testbench::{check, Reference};
+use super::testbench::{check, random_words, Reference};
 use super::*;
 use crate::wire::Word;
 
@@ -178,6 +178,10 @@ const CASES: &[Case] = &[
     Case { name: "concat_w", bits: 104, integer: |i| i[0] << 91 | i[4] << 1 | i[7] },
     Case { name: "extend_s", bits: 40, integer: |i| i[2] },
     Case { name: "extend_x", bits: 120, integer: |i| i[3] },
+    Case { name: "resize_s", bits: 5, integer: |i| i[2] },
+    Case { name: "resize_t", bits: 20, integer: |i| i[3] },
+    Case { name: "repeated", bits: 12, integer: |i| i[8] * 0x111 },
+    Case { name: "squares", bits: 9, integer: |i| i[8] * i[8] + 3 },
     Case { name: "all", bits: 1, integer: |i| (i[8] == 15).into() },
     Case { name: "any", bits: 1, integer: |i| (i[8] != 0).into() },
     Case { name: "parity", bits: 1, integer: |i| ((i[2] & 0x1fff).count_ones() % 2).into() },
@@ -249,6 +253,10 @@ fn operators() -> Kernel {
         concat(&[a, w, c]),
         s.extend(40),
         t.extend(120),
+        s.resize(5),
+        t.resize(20),
+        n.repeat(3),
+        n.table(9, &(0..16).map(|index| index * index + 3).collect::<Vec<_>>()),
         n.all(),
         n.any(),
         s.parity(),
@@ -304,29 +312,10 @@ impl Reference for Integers {
     fn clock(&mut self, _: &[Word]) {}
 }
 
-/// Random operands, of which every fourth is all zeros or all ones.
-fn stimulus(cycles: usize, widths: &[usize]) -> Vec<Vec<Word>> {
-    let mut random = fastrand::Rng::with_seed(20);
-    let field = |random: &mut fastrand::Rng, bits: usize| {
-        let kind = random.u8(..8);
-        let mut word = Word::default();
-        for low in (0..bits).step_by(64) {
-            let limb = match kind {
-                0 => 0,
-                1 => u64::MAX,
-                _ => random.u64(..),
-            };
-            word.set(low, (bits - low).min(64), limb);
-        }
-        word
-    };
-    (0..cycles).map(|_| widths.iter().map(|&bits| field(&mut random, bits)).collect()).collect()
-}
-
 #[test]
 fn operators_are_those_of_integers() {
     let widths = OPERANDS.map(|(_, bits, _)| bits);
-    check(&operators(), &stimulus(2000, &widths), &mut Integers);
+    check(&operators(), &random_words(2000, &widths), &mut Integers);
 }
 
 /// Registers with enable, reset, priority; a memory with an output register, one with contents.
@@ -395,7 +384,7 @@ impl Reference for State {
 
 #[test]
 fn registers_and_memories_are_those_of_the_reference() {
-    check(&state(), &stimulus(3000, &[1, 1, 1, 70, 3]), &mut State::default());
+    check(&state(), &random_words(3000, &[1, 1, 1, 70, 3]), &mut State::default());
 }
 
 /// Registers at both edges of a second clock, with a reset that acts at once; a memory with words in the text.
@@ -445,7 +434,7 @@ impl Reference for Clocks {
 
 #[test]
 fn registers_of_other_clocks_follow_their_edges_and_resets() {
-    let mut all = stimulus(3000, &[1, 1, 4]);
+    let mut all = random_words(3000, &[1, 1, 4]);
     // Verilator sees the edges after the first cycle.
     all[0] = vec![Word::default(); 3];
     check(&clocks(), &all, &mut Clocks::default());

@@ -6,7 +6,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use super::kernel::{Contents, Domain, Item, Kernel, Memory, Node, NodeId, Role, Signal, SignalId};
+use super::kernel::{Contents, Domain, Item, Kernel, Memory, Node, NodeId, Role, Signal, SignalId, Type};
 use super::text::{number, Text};
 
 struct Printer<'a> {
@@ -132,54 +132,44 @@ impl Printer<'_> {
         }
     }
 
-    /// Reads the inputs that no expression reads, so that a linter does not warn; returns the unread wires and registers.
+    /// Reads the inputs that no expression reads, so that a linter does not warn; returns the unread wires and
+    /// registers.
     fn unused(&mut self) -> Vec<String> {
         let kernel = self.kernel;
         let values = kernel.signals.iter().filter_map(|signal| signal.value).collect();
         let order = kernel.order(&[values, kernel.edge_roots()].concat()).unwrap_or_default();
-        let mut read: BTreeMap<SignalId, Vec<bool>> = BTreeMap::new();
-        let mut mark = |signal: SignalId, low: usize, bits: usize| {
-            let all = read.entry(signal).or_insert_with(|| vec![false; kernel.signals[signal].ty.bits]);
-            all[low..low + bits].fill(true);
+        let mut read: BTreeMap<NodeId, Vec<bool>> = BTreeMap::new();
+        let mut mark = |node: NodeId, low: usize, bits: usize| {
+            let node = kernel.bare(node);
+            read.entry(node).or_insert_with(|| vec![false; kernel.ty(node).bits])[low..low + bits].fill(true);
         };
         for &node in &order {
             match &kernel.nodes[node].0 {
-                Node::Slice(a, low) => {
-                    if let Node::Signal(signal) = kernel.nodes[kernel.bare(*a)].0 {
-                        mark(signal, *low, kernel.ty(node).bits);
-                    }
-                }
-                other => {
-                    for operand in other.operands() {
-                        if let Node::Signal(signal) = kernel.nodes[kernel.bare(operand)].0 {
-                            mark(signal, 0, kernel.signals[signal].ty.bits);
-                        }
-                    }
-                }
+                Node::Slice(a, low) => mark(*a, *low, kernel.ty(node).bits),
+                other => other.operands().into_iter().for_each(|operand| mark(operand, 0, kernel.ty(operand).bits)),
             }
         }
         for domain in &kernel.domains {
-            mark(domain.clock, 0, 1);
+            mark(kernel.interned[&(Node::Signal(domain.clock), Type::unsigned(1))], 0, 1);
         }
         for root in kernel.signals.iter().filter_map(|signal| signal.value).chain(kernel.edge_roots()) {
-            if let Node::Signal(signal) = kernel.nodes[kernel.bare(root)].0 {
-                mark(signal, 0, kernel.signals[signal].ty.bits);
-            }
+            mark(root, 0, kernel.ty(root).bits);
         }
-        let unread = |(id, signal): &(SignalId, &Signal)| {
-            !signal.output && !read.get(id).is_some_and(|bits| bits.iter().all(|bit| *bit))
-        };
-        let unread = kernel.signals.iter().enumerate().filter(unread).map(|(_, signal)| signal.name.clone());
+        let unread = |node: NodeId| !read.get(&node).is_some_and(|bits| bits.iter().all(|bit| *bit));
+        let own_node = |id: SignalId| kernel.interned[&(Node::Signal(id), kernel.signals[id].ty)];
+        let signals = (0..kernel.signals.len()).filter(|&id| !kernel.signals[id].output && unread(own_node(id)));
+        let (inputs, signals): (Vec<SignalId>, Vec<SignalId>) =
+            signals.partition(|&id| kernel.signals[id].role == Role::Input);
+        let names = |ids: Vec<SignalId>| ids.into_iter().map(|id| kernel.signals[id].name.clone());
         let has_edge = kernel.registers().any(|(_, _, register)| register.domain.is_none())
             || kernel.memories.iter().any(|m| !m.writes.is_empty());
         let clock = kernel.clock.iter().filter(|_| !has_edge).cloned();
-        let (inputs, wires): (Vec<String>, Vec<String>) = clock
-            .chain(unread)
-            .partition(|name| kernel.signal_of(name).is_none_or(|id| kernel.signals[id].role == Role::Input));
+        let inputs: Vec<String> = clock.chain(names(inputs)).collect();
         if !inputs.is_empty() {
             self.line(&format!("wire unused = &{{1'b0, {}}};", inputs.join(", ")));
         }
-        wires
+        let own = self.expressions.names.iter().filter(|(&node, _)| kernel.bare(node) == node && unread(node)).map(|(_, name)| name.clone());
+        names(signals).chain(own).collect()
     }
 
     /// The wires of the unnamed nodes that `node` reads, itself included.

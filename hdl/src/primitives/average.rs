@@ -3,8 +3,10 @@
 use rust_hdl::prelude::*;
 
 use super::counter::count_bits;
-use super::pass_through::pass_through;
-use crate::wire::{Wire, Word};
+use super::pass_through::wires;
+use crate::kernel_block;
+use crate::language::{Body, Builder, Contents, Kernel, Type};
+use crate::wire::Wire;
 
 /// ```text
 /// s_axis --> read sum, hold word --> add --> memory; in the last of the 2^k frames also m_axis
@@ -37,29 +39,20 @@ pub struct Average {
     pub m_axis_tready: Signal<In, Bit>,
     /// The beat is the last of the sums; valid with `m_axis_tvalid`.
     pub m_axis_tlast: Signal<Out, Bit>,
-    _sums: Vec<i64>,
-    _power: u32,
-    _taxel: usize,
-    _frame: usize,
-    _missed: bool,
-    _held: Option<Held>,
-    _out: Option<(i64, bool)>,
+    kernel: Body,
 }
 
-/// An accepted word and what becomes of its sum.
-#[derive(Clone, Copy, Debug)]
-struct Held {
-    taxel: usize,
-    word: i64,
-    first: bool,
-    leaves: bool,
-    last: bool,
-}
+kernel_block!(
+    Average,
+    clock clk,
+    inputs [rst, s_axis_tdata, s_axis_tvalid, s_axis_tlast, m_axis_tready],
+    outputs [s_axis_tready, m_axis_tdata, m_axis_tvalid, m_axis_tlast]
+);
 
 impl Average {
     /// Sums words of `bits` bits of `taxels` taxels over 2^`power` frames.
     pub fn new(taxels: usize, bits: usize, power: u32) -> Self {
-        Average {
+        let block = Average {
             clk: Default::default(),
             rst: Default::default(),
             s_axis_tdata: Wire::new(bits),
@@ -70,138 +63,149 @@ impl Average {
             m_axis_tvalid: Default::default(),
             m_axis_tready: Default::default(),
             m_axis_tlast: Default::default(),
-            _sums: vec![0; taxels],
-            _power: power,
-            _taxel: 0,
-            _frame: 0,
-            _missed: false,
-            _held: None,
-            _out: None,
-        }
-    }
-
-    fn take(&mut self) -> Held {
-        let (at_end, last) = (self._taxel + 1 == self._sums.len(), self.s_axis_tlast.val());
-        let final_frame = self._frame + 1 == 1 << self._power;
-        let early = last && !at_end;
-        let held = Held {
-            taxel: self._taxel,
-            word: self.s_axis_tdata.val().signed(0, self.s_axis_tdata.width()),
-            first: self._frame == 0,
-            leaves: final_frame || early,
-            last: last && (early || !self._missed),
+            kernel: Body::default(),
         };
-        self._missed = match (early, at_end) {
-            (true, _) => false,
-            (false, true) => !final_frame && (self._missed || !last),
-            (false, false) => self._missed,
-        };
-        self._frame = match (early, at_end) {
-            (true, _) => 0,
-            (false, true) => (self._frame + 1) % (1 << self._power),
-            (false, false) => self._frame,
-        };
-        self._taxel = if early || at_end { 0 } else { self._taxel + 1 };
-        held
+        block.bind(match power {
+            0 => wires("average", bits, "No averaging: the stream passes through."),
+            _ => kernel(taxels, bits, power as usize),
+        })
     }
 }
 
-impl Logic for Average {
-    fn update(&mut self) {
-        if self._power == 0 {
-            self.m_axis_tdata.next = self.s_axis_tdata.val();
-            self.m_axis_tvalid.next = self.s_axis_tvalid.val();
-            self.m_axis_tlast.next = self.s_axis_tlast.val();
-            self.s_axis_tready.next = self.m_axis_tready.val();
-            return;
-        }
-        if self.clk.pos_edge() {
-            if self._out.is_none() || self.m_axis_tready.val() {
-                self._out = self._held.and_then(|held| {
-                    let sum = held.word + if held.first { 0 } else { self._sums[held.taxel] };
-                    self._sums[held.taxel] = sum;
-                    held.leaves.then_some((sum, held.last))
-                });
-                self._held = self.s_axis_tvalid.val().then(|| self.take());
+fn kernel(taxels: usize, bits: usize, power: usize) -> Kernel {
+    let k = Builder::new("average");
+    let (bit, index, wide) = (Type::unsigned(1), Type::unsigned(count_bits(taxels)), bits + power);
+    let (rst, data) = (k.input("rst", 1), k.input("s_axis_tdata", bits));
+    let [offered, tlast, ready] = ["s_axis_tvalid", "s_axis_tlast", "m_axis_tready"].map(|name| k.input(name, 1));
+    let sums = k.memory("sums", taxels, wide, Contents::Undefined);
+    let taxel = k.state("taxel", index, rst, 0);
+    let frame = k.state("frame", Type::unsigned(power), rst, 0);
+    let [missed, held, valid] = ["missed", "held", "m_axis_tvalid"].map(|name| k.state(name, bit, rst, 0));
+    let held_taxel = k.register("held_taxel", index);
+    let [held_first, held_leaves, held_last] =
+        ["held_first", "held_leaves", "held_last"].map(|name| k.register(name, bit));
+    let (word, sofar) = (k.register("word", Type::unsigned(bits)), k.register("sofar", Type::unsigned(wide)));
+    let (sum_out, last_out) = (k.register("m_axis_tdata", Type::unsigned(wide)), k.register("m_axis_tlast", bit));
+
+    let zero = |bits: usize| k.constant(bits, 0);
+    let at_end = k.wire("at_end", taxel.is(taxels as u64 - 1));
+    let final_frame = k.wire("final_frame", frame.all());
+    let early = k.wire("early", tlast & !at_end);
+    let before = held_first.mux(zero(wide), *sofar);
+    let sum = k.wire("sum", (word.signed().extend(wide).unsigned() + before).low(wide));
+    let moves = k.wire("moves", !*valid | ready);
+    k.wire("s_axis_tready", moves & !rst);
+    k.when(moves, || {
+        held.set(offered);
+        valid.set(*held & *held_leaves);
+        k.when(offered, || {
+            taxel.set((early | at_end).mux(zero(taxel.bits()), taxel.plus(1)));
+            k.when(at_end, || {
+                frame.set(frame.plus(1));
+                missed.set(!final_frame & (*missed | !tlast));
+            });
+            k.when(early, || {
+                frame.set(zero(power));
+                missed.set(zero(1));
+            });
+        });
+        word.set(data);
+        sofar.set(sums.read(*taxel));
+        held_taxel.set(*taxel);
+        held_first.set(frame.is(0));
+        held_leaves.set(final_frame | early);
+        held_last.set(tlast & (early | !*missed));
+        sum_out.set(sum);
+        last_out.set(*held_last);
+    });
+    sums.write(moves & *held, *held_taxel, sum);
+    k.finish()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::language::testbench::{check, random_word, Reference};
+    use crate::wire::Word;
+
+    const TAXELS: usize = 5;
+    const BITS: usize = 9;
+    const POWER: u32 = 2;
+
+    /// Sums, the taxel and frame of the next word, the beats in the block.
+    #[derive(Default)]
+    struct Sums {
+        sums: [i64; TAXELS],
+        taxel: usize,
+        frame: usize,
+        missed: bool,
+        held: Option<(i64, bool, bool)>,
+        offered: Option<(i64, bool)>,
+        reset: bool,
+    }
+
+    impl Sums {
+        /// Adds a word: its sum, whether it leaves, and whether it is the last.
+        fn add(&mut self, word: i64, tlast: bool) -> (i64, bool, bool) {
+            let (at_end, final_frame) = (self.taxel + 1 == TAXELS, self.frame + 1 == 1 << POWER);
+            let early = tlast && !at_end;
+            let sum = word + if self.frame == 0 { 0 } else { self.sums[self.taxel] };
+            self.sums[self.taxel] = sum;
+            let beat = (sum, final_frame || early, tlast && (early || !self.missed));
+            self.taxel = if early || at_end { 0 } else { self.taxel + 1 };
+            if early {
+                (self.frame, self.missed) = (0, false);
+            } else if at_end {
+                self.missed = !final_frame && (self.missed || !tlast);
+                self.frame = (self.frame + 1) % (1 << POWER);
             }
-            if self.rst.val() {
-                (self._held, self._out, self._taxel, self._frame, self._missed) = (None, None, 0, 0, false);
-            }
-        }
-        self.s_axis_tready.next = (self._out.is_none() || self.m_axis_tready.val()) && !self.rst.val();
-        self.m_axis_tvalid.next = self._out.is_some();
-        if let Some((sum, last)) = self._out {
-            self.m_axis_tdata.next = Word::of_fields(&[sum], self.m_axis_tdata.width());
-            self.m_axis_tlast.next = last;
+            beat
         }
     }
 
-    fn connect(&mut self) {
-        self.s_axis_tready.connect();
-        self.m_axis_tdata.connect();
-        self.m_axis_tvalid.connect();
-        self.m_axis_tlast.connect();
+    impl Reference for Sums {
+        fn outputs(&mut self, inputs: &[Word]) -> Vec<Option<Word>> {
+            let [rst, ready] = [0, 4].map(|k| inputs[k].number() == 1);
+            let moves = self.offered.is_none() || ready;
+            vec![
+                self.reset.then(|| Word::from(self.offered.is_some())),
+                self.offered.map(|(sum, _)| Word::of_fields(&[sum], BITS + POWER as usize)),
+                self.offered.map(|(_, last)| Word::from(last)),
+                self.reset.then(|| Word::from(moves && !rst)),
+            ]
+        }
+
+        fn clock(&mut self, inputs: &[Word]) {
+            let [rst, valid, tlast, ready] = [0, 2, 3, 4].map(|k| inputs[k].number() == 1);
+            if self.offered.is_none() || ready {
+                self.offered = self.held.take().and_then(|(sum, leaves, last)| leaves.then_some((sum, last)));
+                if valid && !rst {
+                    self.held = Some(self.add(inputs[1].signed(0, BITS), tlast));
+                }
+            }
+            if rst {
+                *self = Sums { sums: self.sums, reset: true, ..Sums::default() };
+            }
+        }
     }
 
-    fn hdl(&self) -> Verilog {
-        if self._power == 0 {
-            return pass_through("No averaging: the stream passes through.");
-        }
-        let (k, bits, taxel) = (self._power as usize, self.s_axis_tdata.width(), count_bits(self._sums.len()));
-        Verilog::Custom(format!(
-            "\
-reg [{sum_end}:0] sums [0:{last_taxel}];
-reg [{taxel_end}:0] taxel, held_taxel;
-reg [{k_end}:0] frame;
-reg missed;
-reg held, held_first, held_leaves, held_last;
-reg [{end}:0] word;
-reg [{sum_end}:0] sofar;
-wire at_end = taxel == {taxel}'d{last_taxel};
-wire final_frame = frame == {{{k}{{1'b1}}}};
-wire early = s_axis_tlast && !at_end;
-wire [{sum_end}:0] sum = {{{{{k}{{word[{end}]}}}}, word}} + (held_first ? {sum_bits}'d0 : sofar);
-wire moves = !m_axis_tvalid || m_axis_tready;
-always @(*) s_axis_tready = moves && !rst;
-always @(posedge clk) begin
-  if (rst) begin
-    held <= 1'b0;
-    m_axis_tvalid <= 1'b0;
-    taxel <= {taxel}'d0;
-    frame <= {k}'d0;
-    missed <= 1'b0;
-  end else if (moves) begin
-    held <= s_axis_tvalid;
-    m_axis_tvalid <= held && held_leaves;
-    if (s_axis_tvalid) begin
-      taxel <= early || at_end ? {taxel}'d0 : taxel + {taxel}'d1;
-      if (early) begin
-        frame <= {k}'d0;
-        missed <= 1'b0;
-      end else if (at_end) begin
-        frame <= frame + {k}'d1;
-        missed <= !final_frame && (missed || !s_axis_tlast);
-      end
-    end
-  end
-  if (moves) begin
-    word <= s_axis_tdata;
-    sofar <= sums[taxel];
-    held_taxel <= taxel;
-    held_first <= frame == {k}'d0;
-    held_leaves <= final_frame || early;
-    held_last <= s_axis_tlast && (early || !missed);
-    m_axis_tdata <= sum;
-    m_axis_tlast <= held_last;
-  end
-  if (moves && held) sums[held_taxel] <= sum;
-end",
-            sum_bits = bits + k,
-            sum_end = bits + k - 1,
-            last_taxel = self._sums.len() - 1,
-            taxel_end = taxel - 1,
-            k_end = k - 1,
-            end = bits - 1,
-        ))
+    #[test]
+    fn frames_are_added_up_and_framing_errors_restart_the_sum() {
+        let mut random = fastrand::Rng::with_seed(5);
+        let mut sums = Sums::default();
+        let stimulus: Vec<Vec<Word>> = (0..6000)
+            .map(|cycle| {
+                let rst = cycle < 3 || random.u16(..400) == 0;
+                // Mostly frames of the right length.
+                let tlast = if random.u8(..40) == 0 { random.bool() } else { sums.taxel + 1 == TAXELS };
+                let word = random_word(&mut random, BITS);
+                let [offered, ready] = [(); 2].map(|()| Word::from(random.u8(..8) > 0));
+                let inputs = vec![rst.into(), word, offered, tlast.into(), ready];
+                sums.clock(&inputs);
+                inputs
+            })
+            .collect();
+        let average = Average::new(TAXELS, BITS, POWER);
+        check(average.kernel.kernel(), &stimulus, &mut Sums::default());
     }
 }

@@ -4,8 +4,10 @@ use dermis_golden::fixed::prepare::{Prepare, GAIN_BITS, GAIN_FRACTION};
 use rust_hdl::prelude::*;
 
 use super::counter::count_bits;
-use super::pass_through::pass_through;
-use crate::wire::{Wire, Word};
+use super::pass_through::wires;
+use crate::kernel_block;
+use crate::language::{Body, Builder, Contents, Kernel, Type};
+use crate::wire::Wire;
 
 /// ```text
 /// s_axis --> read table, hold code --> difference --> product --> round, saturate --> m_axis
@@ -34,11 +36,15 @@ pub struct Calibrate {
     pub m_axis_tready: Signal<In, Bit>,
     /// The beat is the last of its frame; valid with `m_axis_tvalid`.
     pub m_axis_tlast: Signal<Out, Bit>,
-    _prepare: Prepare,
-    _taxels: usize,
-    _taxel: usize,
-    _pipe: Vec<Option<(i64, bool)>>,
+    kernel: Body,
 }
+
+kernel_block!(
+    Calibrate,
+    clock clk,
+    inputs [rst, s_axis_tdata, s_axis_tvalid, s_axis_tlast, m_axis_tready],
+    outputs [s_axis_tready, m_axis_tdata, m_axis_tvalid, m_axis_tlast]
+);
 
 /// File of the table, one line per taxel: zero in the low bits, gain above.
 pub const CALIBRATION_FILE: &str = "calibration.hex";
@@ -46,12 +52,11 @@ pub const CALIBRATION_FILE: &str = "calibration.hex";
 impl Calibrate {
     /// Calibrates codes of `bits` bits of `taxels` taxels with the tables of `prepare`.
     pub fn new(prepare: &Prepare, taxels: usize, bits: usize) -> Self {
-        let steps = match (&prepare.zero, &prepare.gain) {
-            (None, None) => 0,
-            (_, None) => 2,
-            (_, Some(_)) => 4,
-        };
-        Calibrate {
+        Calibrate::of(prepare.zero.as_deref(), prepare.gain.as_deref(), taxels, bits)
+    }
+
+    fn of(zero: Option<&[i32]>, gain: Option<&[i32]>, taxels: usize, bits: usize) -> Self {
+        let block = Calibrate {
             clk: Default::default(),
             rst: Default::default(),
             s_axis_tdata: Wire::new(bits),
@@ -62,142 +67,148 @@ impl Calibrate {
             m_axis_tvalid: Default::default(),
             m_axis_tready: Default::default(),
             m_axis_tlast: Default::default(),
-            _prepare: prepare.clone(),
-            _taxels: taxels,
-            _taxel: 0,
-            _pipe: vec![None; steps],
-        }
+            kernel: Body::default(),
+        };
+        block.bind(match zero {
+            None => wires("calibrate", bits, "No zero and no gain: the stream passes through."),
+            Some(zero) => kernel(zero, gain, taxels, bits),
+        })
     }
 
     /// Content of [`CALIBRATION_FILE`] for `$readmemh`; `None` without a table.
     pub fn table_file(&self) -> Option<String> {
-        let bits = self.s_axis_tdata.width();
-        let zero = self._prepare.zero.as_ref()?;
-        let word = |taxel: usize| {
-            let gain = self._prepare.gain.as_ref().map_or(0, |gain| gain[taxel] as u64 & ((1 << GAIN_BITS) - 1));
-            gain << bits | zero[taxel] as u64 & ((1 << bits) - 1)
-        };
-        Some((0..self._taxels).map(|taxel| format!("{:x}\n", word(taxel))).collect())
+        self.kernel.kernel().memory_files().into_iter().next().map(|(_, text)| text)
     }
 }
 
-impl Logic for Calibrate {
-    fn update(&mut self) {
-        let bits = self.s_axis_tdata.width();
-        let Some(&leaving) = self._pipe.first() else {
-            self.m_axis_tdata.next = self.s_axis_tdata.val();
-            self.m_axis_tvalid.next = self.s_axis_tvalid.val();
-            self.m_axis_tlast.next = self.s_axis_tlast.val();
-            self.s_axis_tready.next = self.m_axis_tready.val();
-            return;
-        };
-        let moves = leaving.is_none() || self.m_axis_tready.val();
-        if self.clk.pos_edge() {
-            if moves {
-                let taken = self.s_axis_tvalid.val().then(|| {
-                    let last = self.s_axis_tlast.val();
-                    let code = self.s_axis_tdata.val().signed(0, bits) as i32;
-                    let stress = self._prepare.calibrate(self._taxel, code);
-                    self._taxel = if last || self._taxel + 1 == self._taxels { 0 } else { self._taxel + 1 };
-                    (stress, last)
+fn kernel(zero: &[i32], gain: Option<&[i32]>, taxels: usize, bits: usize) -> Kernel {
+    let (gain_bits, steps) = gain.map_or((0, 2), |_| (GAIN_BITS as usize, 4));
+    let word = |taxel: usize| {
+        let gain = gain.map_or(0, |gain| gain[taxel] as u64 & ((1 << gain_bits) - 1));
+        vec![gain << bits | zero[taxel] as u64 & ((1 << bits) - 1)]
+    };
+    let k = Builder::new("calibrate");
+    let (rst, data) = (k.input("rst", 1), k.input("s_axis_tdata", bits));
+    let [offered, tlast, ready] = ["s_axis_tvalid", "s_axis_tlast", "m_axis_tready"].map(|name| k.input(name, 1));
+    let contents = Contents::File { name: CALIBRATION_FILE.to_owned(), words: (0..taxels).map(word).collect() };
+    let entries = k.memory("entries", taxels, bits + gain_bits, contents);
+    let taxel = k.state("taxel", Type::unsigned(count_bits(taxels)), rst, 0);
+    let entry = k.register("entry", Type::unsigned(bits + gain_bits));
+    let code = k.register("code", Type::signed(bits));
+    let valids = k.state("valids", Type::unsigned(steps), rst, 0);
+    let lasts = k.register("lasts", Type::unsigned(steps));
+    let moves = k.wire("moves", !valids.top() | ready);
+    k.wire("s_axis_tready", moves & !rst);
+    k.wire("m_axis_tvalid", valids.top());
+    k.wire("m_axis_tlast", lasts.top());
+
+    let difference = k.wire("difference", *code - entry.low(bits).signed());
+    let result = match gain {
+        None => difference,
+        Some(_) => {
+            let held = k.register("held", difference.ty());
+            let held_gain = k.register("held_gain", Type::signed(gain_bits));
+            let product = k.register("product", Type::signed(difference.bits() + gain_bits));
+            k.when(moves, || {
+                held.set(difference);
+                held_gain.set(entry.slice(bits, gain_bits).signed());
+                product.set(*held * *held_gain);
+            });
+            k.wire("rounded", product.shift_right(GAIN_FRACTION as usize - 1).round_shift(1))
+        }
+    };
+    let sign = k.wire("sign", result.slice(bits - 1, result.bits() - bits + 1));
+    let clipped = k.wire("clipped", sign.differs(sign.top().repeat(sign.bits())));
+    let limit = sign.top().concat((!sign.top()).repeat(bits - 1));
+    let calibrated = k.register("m_axis_tdata", Type::unsigned(bits));
+    k.when(moves, || {
+        valids.set(valids.low(steps - 1).concat(offered));
+        let after = tlast | taxel.is(taxels as u64 - 1);
+        k.when(offered, || taxel.set(after.mux(k.constant(taxel.bits(), 0), taxel.plus(1))));
+        lasts.set(lasts.low(steps - 1).concat(tlast));
+        entry.set(entries.read(*taxel));
+        code.set(data.signed());
+        calibrated.set(clipped.mux(limit, result.low(bits)));
+    });
+    k.finish()
+}
+
+#[cfg(test)]
+mod tests {
+    use std::collections::VecDeque;
+
+    use dermis_golden::fixed::arith::{round_shift, saturate};
+
+    use super::*;
+    use crate::language::testbench::{check, random_word, Reference};
+    use crate::wire::Word;
+
+    const TAXELS: usize = 6;
+    const BITS: usize = 8;
+
+    /// The arithmetic in integers, and the beats in the block.
+    struct Table {
+        zero: Vec<i32>,
+        gain: Option<Vec<i32>>,
+        taxel: usize,
+        pipe: VecDeque<Option<(i64, bool)>>,
+        reset: bool,
+    }
+
+    impl Reference for Table {
+        fn outputs(&mut self, inputs: &[Word]) -> Vec<Option<Word>> {
+            let [rst, ready] = [0, 4].map(|k| inputs[k].number() == 1);
+            let leaving = self.pipe[0];
+            let bit = |bit: bool| self.reset.then(|| Word::from(bit));
+            vec![
+                bit((leaving.is_none() || ready) && !rst),
+                bit(leaving.is_some()),
+                leaving.map(|(_, last)| Word::from(last)),
+                leaving.map(|(stress, _)| Word::of_fields(&[stress], BITS)),
+            ]
+        }
+
+        fn clock(&mut self, inputs: &[Word]) {
+            let [rst, valid, last, ready] = [0, 2, 3, 4].map(|k| inputs[k].number() == 1);
+            if self.pipe[0].is_none() || ready {
+                let taken = valid.then(|| {
+                    let difference = inputs[1].signed(0, BITS) - i64::from(self.zero[self.taxel]);
+                    let gain = self.gain.as_ref().map(|gain| i64::from(gain[self.taxel]));
+                    let stress = gain.map_or(difference, |gain| round_shift(difference * gain, GAIN_FRACTION));
+                    self.taxel = if last || self.taxel + 1 == TAXELS { 0 } else { self.taxel + 1 };
+                    (saturate(stress, BITS as u32).0, last)
                 });
-                self._pipe.remove(0);
-                self._pipe.push(taken);
+                self.pipe.push_back(taken);
+                self.pipe.pop_front();
             }
-            if self.rst.val() {
-                self._pipe.fill(None);
-                self._taxel = 0;
+            if rst {
+                self.pipe.iter_mut().for_each(|beat| *beat = None);
+                (self.taxel, self.reset) = (0, true);
             }
         }
-        let leaving = self._pipe[0];
-        self.s_axis_tready.next = (leaving.is_none() || self.m_axis_tready.val()) && !self.rst.val();
-        self.m_axis_tvalid.next = leaving.is_some();
-        let (stress, last) = leaving.unwrap_or((self.m_axis_tdata.val().signed(0, bits), self.m_axis_tlast.val()));
-        self.m_axis_tdata.next = Word::of_fields(&[stress], bits);
-        self.m_axis_tlast.next = last;
     }
 
-    fn connect(&mut self) {
-        self.s_axis_tready.connect();
-        self.m_axis_tdata.connect();
-        self.m_axis_tvalid.connect();
-        self.m_axis_tlast.connect();
-    }
-
-    fn hdl(&self) -> Verilog {
-        let bits = self.s_axis_tdata.width();
-        let steps = self._pipe.len();
-        if steps == 0 {
-            return pass_through("No zero and no gain: the stream passes through.");
+    #[test]
+    fn codes_are_calibrated_with_their_taxel_s_words() {
+        let mut random = fastrand::Rng::with_seed(7);
+        let zero: Vec<i32> = (0..TAXELS).map(|_| random.i32(-128..128)).collect();
+        let gain: Vec<i32> = (0..TAXELS).map(|_| random.i32(-(1 << 17)..1 << 17)).collect();
+        let stimulus: Vec<Vec<Word>> = (0..4000)
+            .map(|cycle| {
+                let rst = cycle < 2 || random.u16(..300) == 0;
+                let [offered, ready] = [(); 2].map(|()| Word::from(random.u8(..8) > 0));
+                let last = Word::from(random.u8(..10) == 0);
+                vec![rst.into(), random_word(&mut random, BITS), offered, last, ready]
+            })
+            .collect();
+        for (gain, steps) in [(None, 2), (Some(gain), 4)] {
+            let block = Calibrate::of(Some(&zero), gain.as_deref(), TAXELS, BITS);
+            let pipe = vec![None; steps].into();
+            check(
+                block.kernel.kernel(),
+                &stimulus,
+                &mut Table { zero: zero.clone(), gain, taxel: 0, pipe, reset: false },
+            );
         }
-        let gain = if self._prepare.gain.is_some() { GAIN_BITS as usize } else { 0 };
-        let taxel = count_bits(self._taxels);
-        // The difference has one bit more; the product with a gain is shifted right by its fraction.
-        let product = bits + 1 + gain;
-        let (declare, clocked, result) = match gain {
-            0 => (String::new(), String::new(), "difference".to_string()),
-            _ => (
-                format!(
-                    "\
-wire signed [{gain_end}:0] gain = entry[{bits} +: {gain}];
-reg signed [{bits}:0] held;
-reg signed [{gain_end}:0] held_gain;
-reg signed [{product_end}:0] product;
-wire signed [{product_end}:0] doubled = product >>> {fraction_less};
-wire [{product_end}:0] half_up = doubled + {product}'sd1;
-wire [{cut_end}:0] rounded = half_up[{product_end}:1];
-wire unused = &{{1'b0, half_up[0]}};
-",
-                    gain_end = gain - 1,
-                    product_end = product - 1,
-                    fraction_less = GAIN_FRACTION - 1,
-                    cut_end = product - 2,
-                ),
-                "    held <= difference;\n    held_gain <= gain;\n    product <= held * held_gain;\n".to_string(),
-                "rounded".to_string(),
-            ),
-        };
-        let wide = if gain == 0 { bits + 1 } else { product - 1 };
-        Verilog::Custom(format!(
-            "\
-reg [{entry_end}:0] entries [0:{last_taxel}];
-initial $readmemh(\"{CALIBRATION_FILE}\", entries);
-reg [{taxel_end}:0] taxel;
-reg [{entry_end}:0] entry;
-reg signed [{end}:0] code;
-reg [{steps_end}:0] valids, lasts;
-wire signed [{end}:0] zero = entry[0 +: {bits}];
-wire signed [{bits}:0] difference = code - zero;
-{declare}wire [{over}:0] sign = {result}[{wide_end}:{end}];
-wire clipped = sign != {{{over1}{{{result}[{wide_end}]}}}};
-wire moves = !valids[{steps_end}] || m_axis_tready;
-always @(*) s_axis_tready = moves && !rst;
-always @(*) m_axis_tvalid = valids[{steps_end}];
-always @(*) m_axis_tlast = lasts[{steps_end}];
-always @(posedge clk) begin
-  if (rst) begin
-    valids <= {steps}'d0;
-    taxel <= {taxel}'d0;
-  end else if (moves) begin
-    valids <= {{valids[{steps_less}:0], s_axis_tvalid}};
-    if (s_axis_tvalid) taxel <= s_axis_tlast || taxel == {taxel}'d{last_taxel} ? {taxel}'d0 : taxel + {taxel}'d1;
-  end
-  if (moves) begin
-    lasts <= {{lasts[{steps_less}:0], s_axis_tlast}};
-    entry <= entries[taxel];
-    code <= s_axis_tdata;
-{clocked}    m_axis_tdata <= clipped ? {{{result}[{wide_end}], {{{end}{{!{result}[{wide_end}]}}}}}} : {result}[{end}:0];
-  end
-end",
-            entry_end = bits + gain - 1,
-            last_taxel = self._taxels - 1,
-            taxel_end = taxel - 1,
-            end = bits - 1,
-            steps_end = steps - 1,
-            steps_less = steps - 2,
-            wide_end = wide - 1,
-            over = wide - bits,
-            over1 = wide - bits + 1,
-        ))
     }
 }

@@ -2,9 +2,10 @@
 
 use rust_hdl::prelude::*;
 
-use super::counter::count_bits;
-use crate::language::{Builder, Expr};
-use crate::wire::{Wire, Word};
+use super::counter::{count_bits, kernel};
+use crate::kernel_block;
+use crate::language::{Body, Builder, Expr};
+use crate::wire::Wire;
 
 /// As [`Counter`](super::Counter), with the limit of case `which`. When `which` changes, the count must be below the
 /// new limit, or be cleared before it is enabled again.
@@ -22,21 +23,26 @@ pub struct CaseCounter {
     pub value: Wire<Out>,
     /// The count is at its last value, the limit of the case − 1; combinational.
     pub last: Signal<Out, Bit>,
-    _ends: Vec<u64>,
+    kernel: Body,
 }
+
+kernel_block!(CaseCounter, clock clk, inputs [which, clear, enable], outputs [value, last]);
 
 impl CaseCounter {
     /// `limits[case]` is the number of counts of each case; 0 is taken as 1.
     pub fn new(limits: &[usize]) -> Self {
-        CaseCounter {
+        let (which, bits) = (count_bits(limits.len()), count_bits(largest(limits)));
+        let block = CaseCounter {
             clk: Default::default(),
-            which: Wire::new(count_bits(limits.len())),
+            which: Wire::new(which),
             clear: Default::default(),
             enable: Default::default(),
-            value: Wire::new(count_bits(largest(limits))),
+            value: Wire::new(bits),
             last: Default::default(),
-            _ends: limits.iter().map(|&limit| limit.max(1) as u64 - 1).collect(),
-        }
+            kernel: Body::default(),
+        };
+        let ends: Vec<usize> = limits.iter().map(|&limit| limit.max(1) - 1).collect();
+        block.bind(kernel(bits, |k, bits| value_by_case(k, k.input("which", which), &ends, bits)))
     }
 }
 
@@ -60,13 +66,16 @@ pub fn by_case(values: &[String]) -> String {
 
 /// The value of case `which`, of `bits` bits; a constant where all are equal.
 pub fn value_by_case<'k>(k: &'k Builder, which: Expr<'k>, values: &[usize], bits: usize) -> Expr<'k> {
-    let constant = |value: usize| k.constant(bits, value as u64);
-    let Some((&first, rest)) = values.split_first() else { return constant(0) };
-    if rest.iter().all(|&value| value == first) {
-        return constant(first);
-    }
-    let arms: Vec<(u64, Expr)> = (1..).zip(rest.iter().map(|&value| constant(value))).collect();
-    which.case(&arms, constant(first))
+    let constants: Vec<Expr> = values.iter().map(|&value| k.constant(bits, value as u64)).collect();
+    expression_by_case(which, &constants).unwrap_or(k.constant(bits, 0))
+}
+
+/// The one of `values` for case `which`; the first without a selection where all are equal. `None` without values.
+pub fn expression_by_case<'k>(which: Expr<'k>, values: &[Expr<'k>]) -> Option<Expr<'k>> {
+    let (&first, rest) = values.split_first()?;
+    let arms: Vec<(u64, Expr)> = (1..).zip(rest.iter().copied()).collect();
+    let equal = rest.iter().all(|value| value.is_same(first));
+    Some(if equal { first } else { which.case(&arms, first) })
 }
 
 /// [`by_case`] of unsigned numbers of `bits` bits.
@@ -74,37 +83,13 @@ pub fn number_by_case(values: impl Iterator<Item = usize>, bits: usize) -> Strin
     by_case(&values.map(|value| format!("{bits}'d{value}")).collect::<Vec<_>>())
 }
 
-impl Logic for CaseCounter {
-    fn update(&mut self) {
-        let end = self._ends.get(self.which.val().number() as usize).copied().unwrap_or_default();
-        if self.clk.pos_edge() {
-            let value = self.value.val().number();
-            self.value.next = match (self.clear.val(), self.enable.val()) {
-                (true, _) => Word::default(),
-                (false, true) if value == end => Word::default(),
-                (false, true) => Word::from(value + 1),
-                (false, false) => self.value.val(),
-            };
-        }
-        self.last.next = self.value.val().number() == end;
-    }
+#[cfg(test)]
+mod tests {
+    use super::super::counter::tests::counts;
+    use super::*;
 
-    fn connect(&mut self) {
-        self.value.connect();
-        self.last.connect();
-    }
-
-    fn hdl(&self) -> Verilog {
-        let bits = self.value.width();
-        let end = number_by_case(self._ends.iter().map(|&end| end as usize), bits);
-        Verilog::Custom(format!(
-            "\
-wire unused_which = &{{1'b0, which}};
-always @(*) last = value == {end};
-always @(posedge clk) begin
-  if (clear) value <= {bits}'d0;
-  else if (enable) value <= last ? {bits}'d0 : value + {bits}'d1;
-end"
-        ))
+    #[test]
+    fn values_wrap_at_the_limit_of_the_case() {
+        counts(CaseCounter::new(&[5, 11]).kernel.kernel(), &[5, 11]);
     }
 }

@@ -2,7 +2,9 @@
 
 use rust_hdl::prelude::*;
 
-use crate::wire::{Wire, Word};
+use crate::kernel_block;
+use crate::language::{Body, Builder, Kernel, Type};
+use crate::wire::Wire;
 
 /// A word delayed by `depth` cycles. Data, therefore without reset.
 #[derive(LogicBlock)]
@@ -13,50 +15,26 @@ pub struct Delay {
     pub now: Wire<In>,
     /// The word that was on `now` `depth` cycles earlier.
     pub then: Wire<Out>,
-    _pipe: Vec<Word>,
+    kernel: Body,
 }
+
+kernel_block!(Delay, clock clk, inputs [now], outputs [then]);
 
 impl Delay {
     /// Delays words of `bits` bits by `depth` ≥ 1 cycles.
     pub fn new(bits: usize, depth: usize) -> Self {
-        Delay {
-            clk: Default::default(),
-            now: Wire::new(bits),
-            then: Wire::new(bits),
-            _pipe: vec![Word::default(); depth - 1],
-        }
+        let (now, then) = (Wire::new(bits), Wire::new(bits));
+        let block = Delay { clk: Default::default(), now, then, kernel: Body::default() };
+        block.bind(kernel(bits, depth))
     }
 }
 
-impl Logic for Delay {
-    fn update(&mut self) {
-        if self.clk.pos_edge() {
-            self._pipe.push(self.now.val());
-            self.then.next = self._pipe.remove(0);
-        }
-    }
-
-    fn connect(&mut self) {
-        self.then.connect();
-    }
-
-    fn hdl(&self) -> Verilog {
-        Verilog::Custom(match self._pipe.len() {
-            0 => "always @(posedge clk) then <= now;".to_string(),
-            inner => format!(
-                "\
-reg [{bits}:0] pipe [0:{end}];
-integer i;
-always @(posedge clk) begin
-  pipe[0] <= now;
-  for (i = 1; i < {inner}; i = i + 1) pipe[i] <= pipe[i - 1];
-  then <= pipe[{end}];
-end",
-                bits = self.now.width() - 1,
-                end = inner - 1,
-            ),
-        })
-    }
+fn kernel(bits: usize, depth: usize) -> Kernel {
+    let k = Builder::new("delay");
+    let first = k.input("now", bits);
+    let last = (1..depth).fold(first, |value, number| k.delay(&format!("pipe{number}"), value));
+    k.delay("then", last);
+    k.finish()
 }
 
 /// A control bit delayed by `depth` cycles; reset clears the whole shift register.
@@ -70,51 +48,74 @@ pub struct BitDelay {
     pub now: Signal<In, Bit>,
     /// The bit that was on `now` `depth` cycles earlier.
     pub then: Signal<Out, Bit>,
-    _pipe: Vec<bool>,
+    kernel: Body,
 }
+
+kernel_block!(BitDelay, clock clk, inputs [rst, now], outputs [then]);
 
 impl BitDelay {
     /// Delays by `depth` ≥ 1 cycles.
     pub fn new(depth: usize) -> Self {
-        BitDelay {
+        let block = BitDelay {
             clk: Default::default(),
             rst: Default::default(),
             now: Default::default(),
             then: Default::default(),
-            _pipe: vec![false; depth - 1],
-        }
+            kernel: Body::default(),
+        };
+        block.bind(bit_kernel(depth))
     }
 }
 
-impl Logic for BitDelay {
-    fn update(&mut self) {
-        if self.clk.pos_edge() {
-            self._pipe.push(self.now.val());
-            self.then.next = self._pipe.remove(0) && !self.rst.val();
-            if self.rst.val() {
-                self._pipe.fill(false);
+fn bit_kernel(depth: usize) -> Kernel {
+    let k = Builder::new("bit_delay");
+    let (rst, mut value) = (k.input("rst", 1), k.input("now", 1));
+    let inner = (1..depth).map(|number| format!("pipe{number}"));
+    for name in inner.chain(["then".to_owned()]) {
+        let register = k.state(&name, Type::unsigned(1), rst, 0);
+        register.set(value);
+        value = *register;
+    }
+    k.finish()
+}
+
+#[cfg(test)]
+mod tests {
+    use std::collections::VecDeque;
+
+    use super::*;
+    use crate::language::testbench::{check, random_words, Pipeline, Reference};
+    use crate::wire::Word;
+
+    struct Bits(VecDeque<Option<bool>>);
+
+    impl Reference for Bits {
+        fn outputs(&mut self, _: &[Word]) -> Vec<Option<Word>> {
+            vec![self.0[0].map(Word::from)]
+        }
+
+        fn clock(&mut self, inputs: &[Word]) {
+            self.0.push_back(Some(inputs[1].number() == 1));
+            self.0.pop_front();
+            if inputs[0].number() == 1 {
+                self.0.iter_mut().for_each(|bit| *bit = Some(false));
             }
         }
     }
 
-    fn connect(&mut self) {
-        self.then.connect();
-    }
-
-    fn hdl(&self) -> Verilog {
-        Verilog::Custom(match self._pipe.len() {
-            0 => "always @(posedge clk) then <= rst ? 1'b0 : now;".to_string(),
-            1 => "\
-reg pipe;
-always @(posedge clk) {then, pipe} <= rst ? 2'd0 : {pipe, now};"
-                .to_string(),
-            inner => format!(
-                "\
-reg [{end}:0] pipe;
-always @(posedge clk) {{then, pipe}} <= rst ? {all}'d0 : {{pipe, now}};",
-                end = inner - 1,
-                all = inner + 1,
-            ),
-        })
+    #[test]
+    fn words_and_bits_come_later() {
+        for depth in [1, 2, 5] {
+            let delay = Delay::new(70, depth);
+            check(
+                delay.kernel.kernel(),
+                &random_words(1000, &[70]),
+                &mut Pipeline::new(depth, 1, |inputs: &[Word]| vec![Some(inputs[0])]),
+            );
+            let mut stimulus = random_words(1000, &[1, 1]);
+            stimulus.iter_mut().enumerate().for_each(|(cycle, inputs)| inputs[0] = (cycle % 17 == 0).into());
+            let block = BitDelay::new(depth);
+            check(block.kernel.kernel(), &stimulus, &mut Bits(vec![None; depth].into()));
+        }
     }
 }

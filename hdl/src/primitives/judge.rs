@@ -33,7 +33,7 @@ pub struct Judge {
     pub weights: Wire<In>,
     /// Nine bits, candidate k may be taken; valid with `start`.
     pub eligible: Wire<In>,
-    /// Word of the sweep (`Sweep`); valid with `start`.
+    /// Word of the sweep (`Fields`); valid with `start`.
     pub sweep: Wire<In>,
     /// The comparison is complete; high for one cycle.
     pub done: Signal<Out, Bit>,
@@ -99,13 +99,6 @@ impl Judge {
     }
 }
 
-/// A register that takes `value` in every cycle.
-fn delay<'k>(k: &'k Builder, name: &str, value: Expr<'k>) -> Expr<'k> {
-    let register = k.register(name, value.ty());
-    register.set(value);
-    *register
-}
-
 /// a < b, both signed. Exchanging the sign bits makes the comparison unsigned, which takes only the carry out of one
 /// chain; a signed comparison also taps the chain below the sign bit.
 fn less<'k>(a: Expr<'k>, b: Expr<'k>) -> Expr<'k> {
@@ -124,7 +117,7 @@ struct Candidate<'k> {
 impl<'k> Candidate<'k> {
     /// The candidate one cycle later.
     fn delayed(self, k: &'k Builder, name: &str) -> Self {
-        let later = |prefix: &str, value| delay(k, &format!("{prefix}_{name}"), value);
+        let later = |prefix: &str, value| k.delay(&format!("{prefix}_{name}"), value);
         Candidate { ok: later("ok", self.ok), score: later("s", self.score), index: later("k", self.index) }
     }
 
@@ -185,7 +178,7 @@ struct Compared<'k> {
 
 impl<'k> Compared<'k> {
     fn new(k: &'k Builder, candidate: Candidate<'k>, best: Best<'k>, name: &str) -> Self {
-        let later = |prefix: &str, value| delay(k, &format!("{prefix}_{name}"), value);
+        let later = |prefix: &str, value| k.delay(&format!("{prefix}_{name}"), value);
         let column = k.wire(&format!("column_{name}"), column(k, candidate.index));
         let row = k.wire(&format!("row_{name}"), row(k, candidate.index));
         let position = |axis: usize, step| (best.centre[axis] + step).low(position_bits()).signed();
@@ -225,7 +218,7 @@ fn kernel(t: usize, w: usize) -> Kernel {
         let weight = weights.slice(n * w, w);
         (totals.slice(n * t, t) - weight.low(w.min(t))).low(t)
     };
-    let scores = delay(&k, "scores", concat(&(0..9).rev().map(difference).collect::<Vec<_>>()));
+    let scores = k.delay("scores", concat(&(0..9).rev().map(difference).collect::<Vec<_>>()));
     let (fits, held) = (k.register("fits", Type::unsigned(9)), k.register("held", Type::unsigned(sweep_bits())));
     k.when(start, || {
         fits.set(eligible);
@@ -250,15 +243,15 @@ fn kernel(t: usize, w: usize) -> Kernel {
     let level = !coarse & central.score.equals(before.score);
     let centre_wins = k.wire("centre_wins", central.ok & (central.beats(before) | level));
     let after_wins = k.wire("after_wins", after.ok & after.beats(before) & after.beats(central));
-    let takes_centre = delay(&k, "takes_centre", centre_wins);
-    let takes_after = delay(&k, "takes_after", after_wins);
-    let some = delay(&k, "some", before.ok | central.ok | after.ok);
+    let takes_centre = k.delay("takes_centre", centre_wins);
+    let takes_after = k.delay("takes_after", after_wins);
+    let some = k.delay("some", before.ok | central.ok | after.ok);
 
     k.comment(
         "All three are compared with the best so far in parallel with the choice among them. The best's distance",
     );
     k.comment("from the centre was registered a cycle earlier.");
-    let ahead = [delay(&k, "ahead_x", *best_x - centre[0]), delay(&k, "ahead_y", *best_y - centre[1])];
+    let ahead = [k.delay("ahead_x", *best_x - centre[0]), k.delay("ahead_y", *best_y - centre[1])];
     let best = Best { score: *score, ahead, centre };
     let compared = |candidate, name| Compared::new(&k, candidate, best, name);
     let last = [compared(before, "before"), compared(central, "centre"), compared(after, "after")];
@@ -266,10 +259,10 @@ fn kernel(t: usize, w: usize) -> Kernel {
         let [before, centre, after] = last.map(|one| [one.lower, one.tie, one.score, one.x, one.y][what]);
         takes_after.mux(after, takes_centre.mux(centre, before))
     };
-    let fit = delay(&k, "fit", some & (coarse | *found));
-    let lower = delay(&k, "lower", !*taken | choose(0));
-    let tie = delay(&k, "tie", coarse & choose(1));
-    let [s, x, y] = [("s", 2), ("x", 3), ("y", 4)].map(|(name, what)| delay(&k, name, choose(what)));
+    let fit = k.delay("fit", some & (coarse | *found));
+    let lower = k.delay("lower", !*taken | choose(0));
+    let tie = k.delay("tie", coarse & choose(1));
+    let [s, x, y] = [("s", 2), ("x", 3), ("y", 4)].map(|(name, what)| k.delay(name, choose(what)));
     let ends = valid.top();
     let take = k.wire("take", ends & fit & (lower | tie));
 

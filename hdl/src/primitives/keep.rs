@@ -2,7 +2,9 @@
 
 use rust_hdl::prelude::*;
 
-use crate::wire::{Wire, Word};
+use crate::kernel_block;
+use crate::language::{Body, Builder, Kernel, Type};
+use crate::wire::Wire;
 
 /// `kept` is the value of `word` at the last clock edge at which `keep` was high.
 #[derive(LogicBlock)]
@@ -15,52 +17,67 @@ pub struct Keep {
     pub word: Wire<In>,
     /// Stored word, from the cycle after `keep`; undefined before the first.
     pub kept: Wire<Out>,
-    _value: Word,
-    _constant: bool,
+    kernel: Body,
 }
+
+kernel_block!(Keep, clock clk, inputs [keep, word], outputs [kept]);
 
 impl Keep {
     /// A register of `bits` bits.
     pub fn new(bits: usize) -> Self {
-        Keep {
+        Keep::with(bits, false)
+    }
+
+    /// With `constant`, wires in place of the register, for a word that never changes.
+    pub fn constant(self, constant: bool) -> Self {
+        Keep::with(self.word.width(), constant)
+    }
+
+    fn with(bits: usize, constant: bool) -> Self {
+        let block = Keep {
             clk: Default::default(),
             keep: Default::default(),
             word: Wire::new(bits),
             kept: Wire::new(bits),
-            _value: Word::default(),
-            _constant: false,
-        }
-    }
-
-    /// With `constant`, wires in place of the register, for a word that never changes.
-    pub fn constant(mut self, constant: bool) -> Self {
-        self._constant = constant;
-        self
+            kernel: Body::default(),
+        };
+        block.bind(kernel(bits, constant))
     }
 }
 
-impl Logic for Keep {
-    fn update(&mut self) {
-        if self.clk.pos_edge() {
-            if self.keep.val() {
-                self._value = self.word.val();
-            }
-            self.kept.next = self._value;
+fn kernel(bits: usize, constant: bool) -> Kernel {
+    let k = Builder::new("keep");
+    let (keep, word) = (k.input("keep", 1), k.input("word", bits));
+    if constant {
+        k.wire("kept", word);
+    } else {
+        let kept = k.register("kept", Type::unsigned(bits));
+        k.when(keep, || kept.set(word));
+    }
+    k.finish()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::language::testbench::{check, random_words, Reference};
+    use crate::wire::Word;
+
+    struct Kept(Option<Word>);
+
+    impl Reference for Kept {
+        fn outputs(&mut self, _: &[Word]) -> Vec<Option<Word>> {
+            vec![self.0]
         }
-        if self._constant {
-            self.kept.next = self.word.val();
+
+        fn clock(&mut self, inputs: &[Word]) {
+            self.0 = if inputs[0].number() == 1 { Some(inputs[1]) } else { self.0 };
         }
     }
 
-    fn connect(&mut self) {
-        self.kept.connect();
-    }
-
-    fn hdl(&self) -> Verilog {
-        let text = match self._constant {
-            false => "always @(posedge clk) if (keep) kept <= word;",
-            true => "wire unused = &{1'b0, clk, keep};\nalways @(*) kept = word;",
-        };
-        Verilog::Custom(text.to_string())
+    #[test]
+    fn a_word_stays_until_the_next() {
+        let block = Keep::new(70);
+        check(block.kernel.kernel(), &random_words(1000, &[1, 70]), &mut Kept(None));
     }
 }

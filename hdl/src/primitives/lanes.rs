@@ -147,14 +147,7 @@ struct Shared<'k> {
     ends: Expr<'k>,
 }
 
-/// A register that takes `value` in every cycle.
-fn delay<'k>(k: &'k Builder, name: &str, value: Expr<'k>) -> Expr<'k> {
-    let register = k.register(name, value.ty());
-    register.set(value);
-    *register
-}
-
-/// As [`delay`], not merged with equal registers.
+/// As [`Builder::delay`], not merged with equal registers.
 fn own_copy<'k>(k: &'k Builder, name: &str, value: Expr<'k>) -> Expr<'k> {
     let register = k.register(name, value.ty()).keep();
     register.set(value);
@@ -171,8 +164,8 @@ impl Shape {
         let words = self.memory.iter().map(|word| limbs(word)).collect();
         let contents = Contents::File { name: MEMORY_FILE.to_owned(), words };
         let memory = k.memory("memory", self.memory.len(), lanes * M, contents);
-        let word = delay(&k, "word", memory.read(address));
-        let coefficients = delay(&k, "coefficients", word);
+        let word = k.delay("word", memory.read(address));
+        let coefficients = k.delay("coefficients", word);
 
         let later = |name: &str, value| {
             let state = k.state(name, bit, rst, 0);
@@ -183,13 +176,13 @@ impl Shape {
         let valid2 = later("valid2", valid1);
         let valid3 = later("valid3", valid2);
         let valid4 = later("valid4", valid3);
-        let first1 = delay(&k, "first1", control.at(1));
-        let first2 = delay(&k, "first2", first1);
-        let last1 = delay(&k, "last1", control.at(2));
-        let last2 = delay(&k, "last2", last1);
-        let last3 = delay(&k, "last3", last2);
-        let last4 = delay(&k, "last4", last3);
-        let aligns = (self.align > 0).then(|| delay(&k, "align1", control.at(0)));
+        let first1 = k.delay("first1", control.at(1));
+        let first2 = k.delay("first2", first1);
+        let last1 = k.delay("last1", control.at(2));
+        let last2 = k.delay("last2", last1);
+        let last3 = k.delay("last3", last2);
+        let last4 = k.delay("last4", last3);
+        let aligns = (self.align > 0).then(|| k.delay("align1", control.at(0)));
 
         let captured = k.wire("captured", valid4 & last4);
         let rows = self.rows(&k, which, rst, captured);
@@ -238,10 +231,10 @@ impl Shape {
             let one = |n: usize| of.slice(n * bits, bits).parity();
             concat(&(0..of.bits() / bits).rev().map(one).collect::<Vec<_>>())
         };
-        let odd_lanes = delay(k, "odd_lanes", parities(coefficients, M));
-        let odd_fours = delay(k, "odd_fours", parities(odd_lanes, 4));
-        let opens1 = delay(k, "opens1", control.at(3));
-        let opens2 = delay(k, "opens2", opens1);
+        let odd_lanes = k.delay("odd_lanes", parities(coefficients, M));
+        let odd_fours = k.delay("odd_fours", parities(odd_lanes, 4));
+        let opens1 = k.delay("opens1", control.at(3));
+        let opens2 = k.delay("opens2", opens1);
         k.comment("Signature of the coefficients read, compared with the expected one.");
         let signature = k.register("signature", Type::unsigned(32));
         let so_far = k.wire("sofar", opens2.mux(k.constant(32, START.into()), *signature));
@@ -276,9 +269,9 @@ impl Shape {
         // One copy per lane, to limit fan-out; the attribute keeps synthesis from merging them.
         let adds = own_copy(k, "adds", shared.adds);
         let begins = own_copy(k, "begins", shared.begins);
-        let a = delay(k, "a", shared.coefficients.slice(lane * M, M).signed());
-        let b = delay(k, "b", shared.operands.slice(parity * M, M).signed());
-        let product = delay(k, "product", a * b);
+        let a = k.delay("a", shared.coefficients.slice(lane * M, M).signed());
+        let b = k.delay("b", shared.operands.slice(parity * M, M).signed());
+        let product = k.delay("product", a * b);
         // Only products of two high limbs are shifted; without limbs the multiplexer is omitted.
         let shifted = match shared.aligns {
             Some(align) => {
@@ -288,7 +281,7 @@ impl Shape {
             None => product,
         };
         let fits = shifted.low(self.acc_bits.min(shifted.bits())).signed();
-        let aligned = delay(k, "aligned", fits.extend(self.acc_bits));
+        let aligned = k.delay("aligned", fits.extend(self.acc_bits));
         let accumulator = k.register("accumulator", Type::signed(self.acc_bits));
         let sum = (*accumulator + aligned).low(self.acc_bits).signed();
         k.when(adds, || accumulator.set(begins.mux(aligned, sum)));

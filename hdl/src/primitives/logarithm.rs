@@ -1,4 +1,4 @@
-//! Verilog of the table logarithm, shared by the two blocks that need one.
+//! The table logarithm in two halves, shared by the two blocks that need one.
 //!
 //! A binary search finds the leading one: if the upper half of the word is zero, the lower half is moved up. Each
 //! decision is a bit of the leading one's position, and the remaining bits start with the leading one. The search is
@@ -9,8 +9,10 @@
 use dermis_golden::fixed::formats::{LOG_FRACTION, LOG_TABLE_BITS};
 use dermis_golden::fixed::search::log_table;
 
+use crate::language::{concat, Builder, Expr};
+
 /// Bits of the integer part of a logarithm of an argument below 2^64.
-pub const LENGTH_BITS: usize = 6;
+const LENGTH_BITS: usize = 6;
 /// Bits of a logarithm, [`LOG_FRACTION`] of them the fraction.
 pub const LOG_BITS: usize = LENGTH_BITS + LOG_FRACTION as usize;
 /// Halves that the second function tests, in bits.
@@ -26,88 +28,73 @@ fn first_halves(bits: usize) -> Vec<usize> {
     (LAST.len()..LENGTH_BITS).rev().map(|k| 1 << k).filter(|half| 2 * half <= width).collect()
 }
 
-/// Bits of the register between the two functions, for arguments of `bits` bits.
-pub fn located_bits(bits: usize) -> usize {
-    first_halves(bits).len() + REST_BITS
+/// `word` without change if `stays`, else its bits moved up by `by`.
+fn move_up<'k>(stays: Expr<'k>, word: Expr<'k>, by: usize) -> Expr<'k> {
+    stays.mux(word, word.low(word.bits() - by).shift_left(by))
 }
 
-/// Verilog functions `locate`, from an argument of `bits` bits to the word of [`located_bits`] in between, and
-/// `logarithm`, from that word to the logarithm of [`LOG_BITS`]. The logarithm of 0 is that of 1.
-pub fn functions(bits: usize) -> String {
-    let halves = first_halves(bits);
+/// From an argument to the word in between: the upper bits of the leading one's position, then the bits from the nibble
+/// of the leading one on. Names of wires start with `name`.
+pub fn locate<'k>(k: &'k Builder, name: &str, argument: Expr<'k>) -> Expr<'k> {
+    let halves = first_halves(argument.bits());
     let width = 2 * halves[0];
-    let located = located_bits(bits);
-    let nibbles = width / NIBBLE;
-    let used: String =
-        (0..nibbles).map(|n| format!("    used[{n}] = |y[{}:{}];\n", (n + 1) * NIBBLE - 1, n * NIBBLE)).collect();
-    // One step: store whether the upper `half` of the `bits` bits of `asked` is non-zero; if it is zero, move the lower
-    // half up.
-    let step = |name: &str, bit: usize, asked: &str, bits: usize, half: usize, moves: String| {
-        let (high, low) = (bits - 1, bits - half);
-        format!("    {name}[{bit}] = |{asked}[{high}:{low}];\n    if (!{name}[{bit}]) {moves}\n")
-    };
-    let head = halves.iter().enumerate().map(|(k, &half)| {
-        let moved = half / NIBBLE;
-        let moves = format!("begin\n      used = used << {moved};\n      y = y << {half};\n    end");
-        step("locate", located - 1 - k, "used", nibbles, moved, moves)
-    });
-    let tail = LAST
-        .iter()
-        .enumerate()
-        .map(|(k, &half)| step("place", LAST.len() - 1 - k, "y", REST_BITS, half, format!("y = y << {half};")));
-    let (head, tail): (String, String) = (head.collect(), tail.collect());
-    let cases: String = log_table()
-        .iter()
-        .enumerate()
-        .map(|(m, value)| {
-            format!(
-                "      {LOG_TABLE_BITS}'d{m}: logarithm = {{{{{above}position}}, {LOG_FRACTION}'d{value}}};\n",
-                above = match LENGTH_BITS - halves.len() - LAST.len() {
-                    0 => String::new(),
-                    more => format!("{more}'d0, "),
-                }
-            )
-        })
-        .collect();
-    format!(
-        "\
-function [{located_end}:0] locate;
-  input [{x_end}:0] x;
-  reg [{y_end}:0] y;
-  reg [{used_end}:0] used;
-  begin
-    y = {padded};
-{used}{head}    locate[{rest_end}:0] = y[{y_end}:{y_rest}];
-  end
-endfunction
-function [{log_end}:0] logarithm;
-  input [{located_end}:0] located;
-  reg [{rest_end}:0] y;
-  reg [{place_end}:0] place;
-  reg [{position_end}:0] position;
-  begin
-    y = located[{rest_end}:0];
-{tail}    position = {{located[{located_end}:{rest}], place}};
-    case (y[{slot_high}:{slot_low}])
-{cases}    endcase
-  end
-endfunction
-",
-        located_end = located - 1,
-        x_end = bits - 1,
-        y_end = width - 1,
-        used_end = nibbles - 1,
-        place_end = LAST.len() - 1,
-        padded = match width - bits {
-            0 => "x".to_string(),
-            more => format!("{{{more}'d0, x}}"),
-        },
-        rest = REST_BITS,
-        rest_end = REST_BITS - 1,
-        y_rest = width - REST_BITS,
-        log_end = LOG_BITS - 1,
-        position_end = halves.len() + LAST.len() - 1,
-        slot_high = REST_BITS - 2,
-        slot_low = REST_BITS - 1 - LOG_TABLE_BITS as usize,
-    )
+    let mut word = argument.extend(width);
+    let nibbles: Vec<Expr> = (0..width / NIBBLE).rev().map(|n| word.slice(n * NIBBLE, NIBBLE).any()).collect();
+    let mut used = k.wire(&format!("{name}_used"), concat(&nibbles));
+    let mut parts = Vec::new();
+    for half in halves {
+        let upper = half / NIBBLE;
+        let high = k.wire(&format!("{name}_high_{half}"), used.slice(used.bits() - upper, upper).any());
+        used = move_up(high, used, upper);
+        word = move_up(high, word, half);
+        parts.push(high);
+    }
+    parts.push(word.slice(width - REST_BITS, REST_BITS));
+    concat(&parts)
+}
+
+/// From the word in between to the logarithm, of [`LOG_BITS`] bits. The logarithm of 0 is that of 1.
+pub fn logarithm<'k>(k: &'k Builder, name: &str, located: Expr<'k>) -> Expr<'k> {
+    let mut rest = located.low(REST_BITS);
+    let mut position = located.slice(REST_BITS, located.bits() - REST_BITS);
+    for half in LAST {
+        let high = k.wire(&format!("{name}_high_{half}"), rest.slice(REST_BITS - half, half).any());
+        rest = move_up(high, rest, half);
+        position = position.concat(high);
+    }
+    let table: Vec<u64> = log_table().iter().map(|&value| value as u64).collect();
+    let cell = k.wire(&format!("{name}_cell"), rest.slice(NIBBLE - 1, LOG_TABLE_BITS as usize));
+    position.extend(LENGTH_BITS).concat(cell.table(LOG_FRACTION as usize, &table))
+}
+
+#[cfg(test)]
+mod tests {
+    use dermis_golden::fixed::search::log2;
+
+    use super::*;
+    use crate::language::testbench::{check, Pipeline};
+    use crate::language::Body;
+    use crate::wire::Word;
+
+    const WIDTHS: [usize; 4] = [5, 17, 32, 63];
+
+    #[test]
+    fn logarithms_are_those_of_the_model() {
+        let k = Builder::combinational("logarithms");
+        for bits in WIDTHS {
+            let x = k.input(&format!("x{bits}"), bits);
+            let located = k.wire(&format!("located{bits}"), locate(&k, &format!("locate{bits}"), x));
+            k.wire(&format!("log{bits}"), logarithm(&k, &format!("log{bits}"), located));
+        }
+        let names = WIDTHS.map(|bits| format!("log{bits}"));
+        let outputs: Vec<(&str, usize)> = names.iter().map(|name| (name.as_str(), LOG_BITS)).collect();
+        let body = Body::new(k.finish(), &[], &outputs);
+        let mut random = fastrand::Rng::with_seed(1);
+        // Leading ones at every position, and 0.
+        let inputs = |_| WIDTHS.map(|bits| Word::from(random.u64(..) >> random.usize(64 - bits..64))).to_vec();
+        let stimulus: Vec<Vec<Word>> = (0..4000).map(inputs).chain([vec![Word::default(); 4]]).collect();
+        let log = |word: &Word| Some(Word::from(log2(word.number() as i64) as u64));
+        let logs = |inputs: &[Word]| inputs.iter().map(log).collect();
+        check(body.kernel(), &stimulus, &mut Pipeline::new(0, WIDTHS.len(), logs));
+    }
 }

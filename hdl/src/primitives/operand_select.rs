@@ -3,9 +3,10 @@
 use dermis_golden::fixed::formats::{Formats, MULTIPLIER_BITS};
 use rust_hdl::prelude::*;
 
-use super::polynomial_word::resize;
 use super::steps::SOURCE_BITS;
-use crate::wire::{Wire, Word};
+use crate::kernel_block;
+use crate::language::{concat, Body, Builder, Kernel};
+use crate::wire::Wire;
 
 /// Words of the input memory and of a v_ij in, four multiplier operands out one cycle later.
 #[derive(LogicBlock)]
@@ -21,86 +22,100 @@ pub struct OperandSelect {
     pub source: Wire<In>,
     /// Operand of each lane group, four times 18 bits, signed; one cycle later.
     pub operands: Wire<Out>,
-    _low: usize,
-    _align: usize,
+    kernel: Body,
 }
 
+kernel_block!(OperandSelect, clock clk, inputs [input_quad, vector_quad, source], outputs [operands]);
+
 const M: usize = MULTIPLIER_BITS as usize;
+
+/// Widths of the words.
+#[derive(Clone, Copy)]
+struct Shape {
+    fold: usize,
+    data: usize,
+    /// Bits of the low limb; 0 without limbs.
+    low: usize,
+    /// Position of the low limb's top in the multiplier's operand.
+    align: usize,
+}
 
 impl OperandSelect {
     /// Widths of `formats`.
     pub fn new(formats: &Formats) -> Self {
-        OperandSelect {
+        let shape = Shape {
+            fold: formats.fold_bits as usize,
+            data: formats.data_bits as usize,
+            low: formats.input_low_bits as usize,
+            align: formats.limb_align as usize,
+        };
+        OperandSelect::of(shape)
+    }
+
+    fn of(shape: Shape) -> Self {
+        let block = OperandSelect {
             clk: Default::default(),
-            input_quad: Wire::new(4 * formats.fold_bits as usize),
-            vector_quad: Wire::new(4 * formats.data_bits as usize),
+            input_quad: Wire::new(4 * shape.fold),
+            vector_quad: Wire::new(4 * shape.data),
             source: Wire::new(SOURCE_BITS),
             operands: Wire::new(4 * M),
-            _low: formats.input_low_bits as usize,
-            _align: formats.limb_align as usize,
-        }
+            kernel: Body::default(),
+        };
+        block.bind(shape.kernel())
     }
 }
 
-impl Logic for OperandSelect {
-    fn update(&mut self) {
-        if self.clk.pos_edge() {
-            let control = self.source.val().number();
-            let flip = (control >> 2 & 3) as usize;
-            let fields: [i64; 4] = std::array::from_fn(|target| {
-                let source = if control >> 4 == 1 { [0, 2, 1, 3][target ^ flip] } else { target ^ flip };
-                let folded = self.input_quad.val().signed(source, self.input_quad.width() / 4);
-                match control & 3 {
-                    1 => folded >> self._low,
-                    2 => (folded & ((1 << self._low) - 1)) << (self._align - self._low),
-                    _ => self.vector_quad.val().signed(source, self.vector_quad.width() / 4),
-                }
-            });
-            self.operands.next = Word::of_fields(&fields, M);
+impl Shape {
+    fn kernel(self) -> Kernel {
+        let k = Builder::new("operand_select");
+        let (input, vectors) = (k.input("input_quad", 4 * self.fold), k.input("vector_quad", 4 * self.data));
+        let source = k.input("source", SOURCE_BITS);
+        let parity = |p: usize| {
+            let high = input.slice(p * self.fold + self.low, self.fold - self.low).signed().resize(M).unsigned();
+            let vector = vectors.slice(p * self.data, self.data).signed().resize(M).unsigned();
+            let low = match self.low {
+                0 => k.constant(M, 0),
+                bits => input.slice(p * self.fold, bits).shift_left(self.align - bits).resize(M),
+            };
+            k.wire(&format!("q{p}"), source.low(2).case(&[(1, high), (2, low)], vector))
+        };
+        let [q0, q1, q2, q3] = [0, 1, 2, 3].map(parity);
+        k.comment("Parities 1 and 2 exchanged if source[4]; then parity t XOR flip, bit 0 (s to r), then bit 1.");
+        let choose = |name: &str, bit: usize, a, b| k.wire(name, source.at(bit).mux(a, b));
+        let (s1, s2) = (choose("s1", 4, q2, q1), choose("s2", 4, q1, q2));
+        let (r0, r1) = (choose("r0", 2, s1, q0), choose("r1", 2, q0, s1));
+        let (r2, r3) = (choose("r2", 2, q3, s2), choose("r3", 2, s2, q3));
+        k.delay("operands", source.at(3).mux(concat(&[r1, r0, r3, r2]), concat(&[r3, r2, r1, r0])));
+        k.finish()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::language::testbench::{check, random_words, Pipeline};
+    use crate::wire::Word;
+
+    #[test]
+    fn each_lane_group_gets_its_limb_of_its_parity() {
+        for shape in [Shape { fold: 26, data: 18, low: 9, align: 17 }, Shape { fold: 14, data: 16, low: 0, align: 0 }] {
+            let of = |inputs: &[Word]| {
+                let control = inputs[2].number();
+                let flip = (control >> 2 & 3) as usize;
+                let fields: [i64; 4] = std::array::from_fn(|target| {
+                    let source = if control >> 4 == 1 { [0, 2, 1, 3][target ^ flip] } else { target ^ flip };
+                    let folded = inputs[0].signed(source, shape.fold);
+                    match control & 3 {
+                        1 => folded >> shape.low,
+                        2 => (folded & ((1 << shape.low) - 1)) << (shape.align - shape.low),
+                        _ => inputs[1].signed(source, shape.data),
+                    }
+                });
+                vec![Some(Word::of_fields(&fields, M))]
+            };
+            let stimulus = random_words(3000, &[4 * shape.fold, 4 * shape.data, SOURCE_BITS]);
+            let block = OperandSelect::of(shape);
+            check(block.kernel.kernel(), &stimulus, &mut Pipeline::new(1, 1, of));
         }
-    }
-
-    fn connect(&mut self) {
-        self.operands.connect();
-    }
-
-    fn hdl(&self) -> Verilog {
-        let (fold, data) = (self.input_quad.width() / 4, self.vector_quad.width() / 4);
-        let (low, align) = (self._low, self._align);
-        let wires: String = (0..4)
-            .map(|p| {
-                let low_limb = if low == 0 {
-                    format!("{M}'d0")
-                } else {
-                    let zeros = if align > low { format!(", {}'d0", align - low) } else { String::new() };
-                    format!("{{{}'d0, input_quad[{} +: {low}]{zeros}}}", M - align, p * fold)
-                };
-                format!(
-                    "wire [{high_end}:0] high{p} = input_quad[{high_low} +: {high_bits}];\n\
-                     wire [{data_end}:0] vector{p} = vector_quad[{data_low} +: {data}];\n\
-                     wire [{m_end}:0] q{p} = source[1:0] == 2'd1 ? {high} : source[1:0] == 2'd2 ? {low_limb} : {vector};\n",
-                    high_bits = fold - low,
-                    high_end = fold - low - 1,
-                    high_low = p * fold + low,
-                    data_end = data - 1,
-                    data_low = p * data,
-                    m_end = M - 1,
-                    high = resize(&format!("high{p}"), fold - low, M),
-                    vector = resize(&format!("vector{p}"), data, M),
-                )
-            })
-            .collect();
-        // Exchange parities 1 and 2 if source[4]; then parity t XOR flip, bit 0 (s to r), then bit 1.
-        Verilog::Custom(format!(
-            "\
-{wires}wire [{end}:0] s1 = source[4] ? q2 : q1;
-wire [{end}:0] s2 = source[4] ? q1 : q2;
-wire [{end}:0] r0 = source[2] ? s1 : q0;
-wire [{end}:0] r1 = source[2] ? q0 : s1;
-wire [{end}:0] r2 = source[2] ? q3 : s2;
-wire [{end}:0] r3 = source[2] ? s2 : q3;
-always @(posedge clk) operands <= source[3] ? {{r1, r0, r3, r2}} : {{r3, r2, r1, r0}};",
-            end = M - 1,
-        ))
     }
 }

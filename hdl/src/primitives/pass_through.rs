@@ -1,6 +1,22 @@
-//! Verilog of a stage that the scene omits: its stream passes through on wires.
+//! A stage that the scene omits: its stream passes through on wires.
 
 use rust_hdl::prelude::Verilog;
+
+use crate::language::{Builder, Kernel};
+
+/// The kernel of `block` that connects `m_axis` to `s_axis`, of `bits` bits each; `why` is a comment that says what is
+/// omitted, on one line.
+pub fn wires(block: &str, bits: usize, why: &str) -> Kernel {
+    let k = Builder::new(block);
+    k.comment(why);
+    k.input("rst", 1);
+    let streams = [("s_axis_tdata", "m_axis_tdata", bits), ("s_axis_tvalid", "m_axis_tvalid", 1)];
+    let handshake = [("s_axis_tlast", "m_axis_tlast", 1), ("m_axis_tready", "s_axis_tready", 1)];
+    for (from, to, bits) in streams.into_iter().chain(handshake) {
+        k.wire(to, k.input(from, bits));
+    }
+    k.finish()
+}
 
 /// Verilog that connects `m_axis` to `s_axis`; `why` is a comment that says what is omitted, on one line.
 pub fn pass_through(why: &str) -> Verilog {

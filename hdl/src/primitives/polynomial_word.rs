@@ -2,6 +2,7 @@
 
 use dermis_golden::fixed::search::Polynomial;
 
+use crate::language::{concat, Expr};
 use crate::wire::Word;
 
 /// Layout of `lanes` polynomials in one word: coefficient k of lane l is `widths[k]` bits at `offset(k) + l·widths[k]`.
@@ -45,6 +46,17 @@ impl PolynomialWord {
         for (k, &bits) in self.widths.iter().enumerate() {
             word.set(self.offset(k) + lane * bits, bits, polynomial[k] as u64);
         }
+    }
+
+    /// Coefficient `k` of `lane` in `word`, signed.
+    pub fn coefficient<'k>(&self, word: Expr<'k>, k: usize, lane: usize) -> Expr<'k> {
+        word.slice(self.offset(k) + lane * self.widths[k], self.widths[k]).signed()
+    }
+
+    /// The word of `polynomials`, one list of coefficients per lane.
+    pub fn join<'k>(&self, polynomials: &[Vec<Expr<'k>>]) -> Expr<'k> {
+        let each = (0..self.widths.len()).flat_map(|k| polynomials.iter().map(move |polynomial| polynomial[k]));
+        concat(&each.rev().collect::<Vec<_>>())
     }
 
     /// Verilog part select of coefficient `k` of lane `lane` (an expression) in `word`.

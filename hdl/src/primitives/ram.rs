@@ -3,7 +3,9 @@
 use rust_hdl::prelude::*;
 
 use super::counter::count_bits;
-use crate::wire::{Wire, Word};
+use crate::kernel_block;
+use crate::language::{concat, Body, Builder, Contents, Expr, Kernel, Type};
+use crate::wire::Wire;
 
 /// ```text
 /// write (one bit per field), write_address, write_data --> memory --> read_data one or two cycles after read_address
@@ -26,107 +28,138 @@ pub struct Ram {
     pub read_address: Wire<In>,
     /// The word read, one cycle after `read_address`, or two if [`registered`](Ram::registered).
     pub read_data: Wire<Out>,
-    _memory: Vec<Word>,
+    kernel: Body,
+    _shape: Shape,
+}
+
+kernel_block!(
+    Ram,
+    clock clk,
+    inputs [write, write_address, write_data, read, read_address],
+    outputs [read_data]
+);
+
+#[derive(Clone, Copy, Debug)]
+struct Shape {
+    depth: usize,
+    fields: usize,
+    /// Width of a field.
+    bits: usize,
     /// There is an output register behind the read register of the memory.
-    _behind: bool,
-    _read: Word,
+    behind: bool,
+    left_out: bool,
 }
 
 impl Ram {
     /// A memory of `depth` words of `fields` fields of `bits` bits.
     pub fn new(depth: usize, fields: usize, bits: usize) -> Self {
-        Ram {
-            clk: Default::default(),
-            write: Wire::new(fields),
-            write_address: Wire::new(count_bits(depth)),
-            write_data: Wire::new(fields * bits),
-            read: Default::default(),
-            read_address: Wire::new(count_bits(depth)),
-            read_data: Wire::new(fields * bits),
-            _memory: vec![Word::default(); depth],
-            _behind: false,
-            _read: Word::default(),
-        }
+        Ram::of(Shape { depth, fields, bits, behind: false, left_out: false })
     }
 
     /// Adds an output register: `read_data` follows two cycles after `read_address`. The clock-to-output time of a
     /// block RAM leaves no room for logic behind it.
-    pub fn registered(mut self) -> Self {
-        self._behind = true;
-        self
+    pub fn registered(self) -> Self {
+        Ram::of(Shape { behind: true, ..self._shape })
     }
 
     /// Omits the memory, for scenes that do not need it: `read_data` is zero.
-    pub fn left_out(mut self) -> Self {
-        self._memory.clear();
-        self
+    pub fn left_out(self) -> Self {
+        Ram::of(Shape { left_out: true, ..self._shape })
+    }
+
+    fn of(shape: Shape) -> Self {
+        let word = shape.fields * shape.bits;
+        let block = Ram {
+            clk: Default::default(),
+            write: Wire::new(shape.fields),
+            write_address: Wire::new(count_bits(shape.depth)),
+            write_data: Wire::new(word),
+            read: Default::default(),
+            read_address: Wire::new(count_bits(shape.depth)),
+            read_data: Wire::new(word),
+            kernel: Body::default(),
+            _shape: shape,
+        };
+        block.bind(shape.kernel())
     }
 }
 
-impl Logic for Ram {
-    fn update(&mut self) {
-        if self.clk.pos_edge() {
-            if self.read.val() {
-                let address = self.read_address.val().number() as usize;
-                let read = self._memory.get(address).copied().unwrap_or_default();
-                self.read_data.next = if self._behind { self._read } else { read };
-                self._read = read;
-            }
-            let bits = self.write_data.width() / self.write.width();
-            if let Some(word) = self._memory.get_mut(self.write_address.val().number() as usize) {
-                for field in 0..self.write.width() {
-                    if self.write.val().field(field, 1) == 1 {
-                        for at in (0..bits).step_by(64) {
-                            let part = (bits - at).min(64);
-                            let value = self.write_data.val().field(field * bits + at, part);
-                            word.set(field * bits + at, part, value);
-                        }
-                    }
-                }
-            }
-        }
-    }
-
-    fn connect(&mut self) {
-        self.read_data.connect();
-    }
-
-    fn hdl(&self) -> Verilog {
-        let fields = self.write.width();
-        let bits = self.write_data.width() / fields;
-        if self._memory.is_empty() {
-            return Verilog::Custom(format!(
-                "always @(*) read_data = {}'d0;\n\
-                 wire unused = &{{1'b0, clk, write, write_address, write_data, read, read_address}};",
-                self.read_data.width()
-            ));
+impl Shape {
+    fn kernel(self) -> Kernel {
+        let k = Builder::new("ram");
+        let (word, address) = (self.fields * self.bits, count_bits(self.depth));
+        let write = k.input("write", self.fields);
+        let (write_address, data) = (k.input("write_address", address), k.input("write_data", word));
+        let (read, read_address) = (k.input("read", 1), k.input("read_address", address));
+        if self.left_out {
+            k.wire("read_data", k.constant(word, 0));
+            return k.finish();
         }
         // One array per field: every synthesiser maps it to plain memories.
-        Verilog::Custom(
-            (0..fields)
-                .map(|field| {
-                    let enable = if fields == 1 { "write".to_string() } else { format!("write[{field}]") };
-                    let place = format!("read_data[{field} * {bits} +: {bits}]");
-                    let (declared, read) = match self._behind {
-                        true => (
-                            format!("reg [{}:0] read{field};\n", bits - 1),
-                            format!("begin\n    read{field} <= field{field}[read_address];\n    {place} <= read{field};\n  end"),
-                        ),
-                        false => (String::new(), format!("{place} <= field{field}[read_address];")),
-                    };
-                    format!(
-                        "\
-reg [{end}:0] field{field} [0:{depth}];
-{declared}always @(posedge clk) begin
-  if ({enable}) field{field}[write_address] <= write_data[{field} * {bits} +: {bits}];
-  if (read) {read}
-end
-",
-                        end = bits - 1,
-                        depth = self._memory.len() - 1,
-                    )
-                })
-                .collect(),
-        )
+        let field = |number: usize| {
+            let memory = k.memory(&format!("field{number}"), self.depth, self.bits, Contents::Undefined);
+            memory.write(write.at(number), write_address, data.slice(number * self.bits, self.bits));
+            let held = k.register(&format!("read{number}"), Type::unsigned(self.bits));
+            k.when(read, || held.set(memory.read(read_address)));
+            if !self.behind {
+                return *held;
+            }
+            let behind = k.register(&format!("behind{number}"), Type::unsigned(self.bits));
+            k.when(read, || behind.set(*held));
+            *behind
+        };
+        let fields: Vec<Expr> = (0..self.fields).map(field).collect();
+        k.wire("read_data", concat(&fields.into_iter().rev().collect::<Vec<_>>()));
+        k.finish()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::language::testbench::{check, random_words, Reference};
+    use crate::wire::Word;
+
+    const SHAPE: Shape = Shape { depth: 11, fields: 3, bits: 30, behind: false, left_out: false };
+
+    /// Fields of the memory and of the registers behind it.
+    struct Fields {
+        behind: bool,
+        memory: Vec<[Option<u64>; 3]>,
+        read: [Option<u64>; 3],
+        shown: [Option<u64>; 3],
+    }
+
+    impl Reference for Fields {
+        fn outputs(&mut self, _: &[Word]) -> Vec<Option<Word>> {
+            let shown = if self.behind { self.shown } else { self.read };
+            let known = shown.iter().all(Option::is_some);
+            vec![known.then(|| Word::of_fields(&shown.map(|field| field.unwrap_or_default() as i64), SHAPE.bits))]
+        }
+
+        fn clock(&mut self, inputs: &[Word]) {
+            if inputs[3].number() == 1 {
+                self.shown = self.read;
+                self.read = self.memory[inputs[4].number() as usize];
+            }
+            for field in (0..SHAPE.fields).filter(|&field| inputs[0].field(field, 1) == 1) {
+                let place = &mut self.memory[inputs[1].number() as usize][field];
+                *place = Some(inputs[2].field(field * SHAPE.bits, SHAPE.bits));
+            }
+        }
+    }
+
+    #[test]
+    fn fields_are_written_alone_and_the_old_word_is_read() {
+        let mut stimulus = random_words(4000, &[3, 4, 90, 1, 4]);
+        for inputs in &mut stimulus {
+            [1, 4].iter().for_each(|&address| inputs[address] = Word::from(inputs[address].number() % 11));
+        }
+        for behind in [false, true] {
+            let memory = vec![[None; 3]; SHAPE.depth];
+            let mut fields = Fields { behind, memory, read: [None; 3], shown: [None; 3] };
+            let block = Ram::of(Shape { behind, ..SHAPE });
+            check(block.kernel.kernel(), &stimulus, &mut fields);
+        }
     }
 }

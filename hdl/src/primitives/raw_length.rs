@@ -1,13 +1,13 @@
 //! Block exponent of v_00: the right shift that brings its largest accumulator to a full word.
 
-use dermis_golden::fixed::arith::{bit_length, magnitude_bits};
 use dermis_golden::fixed::formats::Formats;
-use dermis_golden::fixed::rescale;
 use rust_hdl::prelude::*;
 
 use super::counter::count_bits;
 use super::leading_one::by_leading_one;
-use crate::wire::{Wire, Word};
+use crate::kernel_block;
+use crate::language::{Body, Builder, Kernel, Type};
+use crate::wire::Wire;
 
 /// ORs the magnitudes of the raw quads; `shift` is valid two cycles after the last of them.
 #[derive(LogicBlock)]
@@ -22,9 +22,10 @@ pub struct RawLength {
     pub quad: Wire<In>,
     /// Right shift for `rescale`, of the quads so far; two cycles later.
     pub shift: Wire<Out>,
-    _seen: u64,
-    _formats: Formats,
+    kernel: Body,
 }
+
+kernel_block!(RawLength, clock clk, inputs [clear, accept, quad], outputs [shift]);
 
 /// Width of the right shift of `rescale`, in bits.
 pub fn shift_bits(formats: &Formats) -> usize {
@@ -34,62 +35,83 @@ pub fn shift_bits(formats: &Formats) -> usize {
 impl RawLength {
     /// With the widths of `formats`.
     pub fn new(formats: &Formats) -> Self {
-        RawLength {
+        RawLength::of(formats.acc_bits as usize, formats.vector_bits as usize)
+    }
+
+    fn of(acc: usize, word: usize) -> Self {
+        let block = RawLength {
             clk: Default::default(),
             clear: Default::default(),
             accept: Default::default(),
-            quad: Wire::new(4 * formats.acc_bits as usize),
-            shift: Wire::new(shift_bits(formats)),
-            _seen: 0,
-            _formats: formats.clone(),
-        }
+            quad: Wire::new(4 * acc),
+            shift: Wire::new(count_bits(acc)),
+            kernel: Body::default(),
+        };
+        block.bind(kernel(acc, word))
     }
 }
 
-impl Logic for RawLength {
-    fn update(&mut self) {
-        if self.clk.pos_edge() {
-            self.shift.next = Word::from(u64::from(rescale::shift(&self._formats, bit_length(self._seen))));
-            let bits = self._formats.acc_bits as usize;
-            let magnitude = (0..4).fold(0, |m, lane| m | magnitude_bits(self.quad.val().signed(lane, bits)));
-            if self.clear.val() {
-                self._seen = 0;
-            } else if self.accept.val() {
-                self._seen |= magnitude;
-            }
+fn kernel(acc: usize, word: usize) -> Kernel {
+    let k = Builder::new("raw_length");
+    let [clear, accept] = ["clear", "accept"].map(|name| k.input(name, 1));
+    let (quad, full) = (k.input("quad", 4 * acc), word - 1);
+    let seen = k.state("seen", Type::unsigned(acc - 1), clear, 0);
+    let magnitude = |lane: usize| {
+        let (low, sign) = (quad.slice(lane * acc, acc - 1), quad.at(lane * acc + acc - 1));
+        k.wire(&format!("m{lane}"), low ^ sign.repeat(acc - 1))
+    };
+    let all = (0..4).map(magnitude).fold(*seen, |all, magnitude| all | magnitude);
+    k.when(accept, || seen.set(all));
+    k.delay("shift", by_leading_one(&k, *seen, full..acc - 1, count_bits(acc), |bit| bit + 1 - full));
+    k.finish()
+}
+
+#[cfg(test)]
+mod tests {
+    use dermis_golden::fixed::arith::{bit_length, magnitude_bits};
+
+    use super::*;
+    use crate::language::testbench::{check, Reference};
+    use crate::wire::Word;
+
+    const ACC: usize = 40;
+    const WORD: usize = 24;
+
+    /// The OR of the magnitudes since `clear`, and the shift one cycle later.
+    #[derive(Default)]
+    struct Seen {
+        seen: Option<u64>,
+        shift: Option<u32>,
+    }
+
+    impl Reference for Seen {
+        fn outputs(&mut self, _: &[Word]) -> Vec<Option<Word>> {
+            vec![self.shift.map(|shift| Word::from(u64::from(shift)))]
+        }
+
+        fn clock(&mut self, inputs: &[Word]) {
+            self.shift = self.seen.map(|seen| bit_length(seen).saturating_sub(WORD as u32 - 1));
+            let all = (0..4).fold(0, |all, lane| all | magnitude_bits(inputs[2].signed(lane, ACC)));
+            self.seen = match [inputs[0].number(), inputs[1].number()] {
+                [1, _] => Some(0),
+                [_, 1] => self.seen.map(|seen| seen | all),
+                _ => self.seen,
+            };
         }
     }
 
-    fn connect(&mut self) {
-        self.shift.connect();
-    }
-
-    fn hdl(&self) -> Verilog {
-        let bits = self._formats.acc_bits as usize;
-        let shift_bits = self.shift.width();
-        let full = self._formats.vector_bits as usize - 1;
-        let magnitudes: String = (0..4)
-            .map(|lane| {
-                let (low, top) = (lane * bits, lane * bits + bits - 1);
-                format!(
-                    "wire [{end}:0] m{lane} = quad[{before}:{low}] ^ {{{less}{{quad[{top}]}}}};\n",
-                    end = bits - 2,
-                    before = top - 1,
-                    less = bits - 1
-                )
-            })
-            .collect();
-        let shift = by_leading_one("seen", full..bits - 1, bits - 2, shift_bits, |bit| bit + 1 - full);
-        Verilog::Custom(format!(
-            "\
-reg [{end}:0] seen;
-{magnitudes}always @(posedge clk) begin
-  if (clear) seen <= {less}'d0;
-  else if (accept) seen <= seen | m0 | m1 | m2 | m3;
-  shift <= {shift};
-end",
-            end = bits - 2,
-            less = bits - 1,
-        ))
+    #[test]
+    fn the_shift_brings_the_longest_word_to_full_length() {
+        let mut random = fastrand::Rng::with_seed(4);
+        let mut inputs = |cycle: usize| {
+            // Words of all lengths.
+            let scale = random.u32(0..ACC as u32 - 1);
+            let quad = [(); 4].map(|()| random.i64(-(1 << scale)..1 << scale));
+            let clear = cycle == 0 || random.u8(..4) == 0;
+            vec![clear.into(), random.bool().into(), Word::of_fields(&quad, ACC)]
+        };
+        let stimulus: Vec<Vec<Word>> = (0..4000).map(&mut inputs).collect();
+        let block = RawLength::of(ACC, WORD);
+        check(block.kernel.kernel(), &stimulus, &mut Seen::default());
     }
 }

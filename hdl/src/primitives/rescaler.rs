@@ -1,12 +1,13 @@
 //! Accumulators to words: shift, round, saturate, count saturations.
 
-use dermis_golden::fixed::arith::{round_shift, saturate};
 use dermis_golden::fixed::formats::{Formats, SEARCH_EXTRA_BITS};
 use rust_hdl::prelude::*;
 
-use super::half_up::half_up;
-use super::raw_length::shift_bits;
-use crate::wire::{Wire, Word};
+use super::counter::count_bits;
+use super::half_up::rounded;
+use crate::kernel_block;
+use crate::language::{concat, Body, Builder, Expr, Kernel, Type};
+use crate::wire::Wire;
 
 /// A quad of accumulators, shifted right by `shift` if `measured`, otherwise by the constant shift of an A pass.
 ///
@@ -32,129 +33,170 @@ pub struct Rescaler {
     pub operands: Wire<Out>,
     /// Number of saturated words, 16 bits; stays at the largest count.
     pub saturations: Wire<Out>,
-    _formats: Formats,
-    _taken: (Word, u32, bool),
-    _shifted: [i64; 4],
-    _valid: bool,
-    _clipped: u64,
-    _clips: u64,
+    kernel: Body,
 }
+
+kernel_block!(
+    Rescaler,
+    clock clk,
+    inputs [clear, valid, measured, shift, quad],
+    outputs [words, operands, saturations]
+);
 
 /// Width of a saturation counter, in bits.
 pub const SATURATION_BITS: usize = 16;
 
+/// Widths of the words.
+#[derive(Clone, Copy)]
+struct Shape {
+    acc: usize,
+    word: usize,
+    data: usize,
+    /// Shift of an A pass.
+    a_shift: u32,
+}
+
 impl Rescaler {
     /// With the widths of `formats`.
     pub fn new(formats: &Formats) -> Self {
-        Rescaler {
+        let shape = Shape {
+            acc: formats.acc_bits as usize,
+            word: formats.vector_bits as usize,
+            data: formats.data_bits as usize,
+            a_shift: formats.a_shift,
+        };
+        Rescaler::of(shape)
+    }
+
+    fn of(shape: Shape) -> Self {
+        let block = Rescaler {
             clk: Default::default(),
             clear: Default::default(),
             valid: Default::default(),
             measured: Default::default(),
-            shift: Wire::new(shift_bits(formats)),
-            quad: Wire::new(4 * formats.acc_bits as usize),
-            words: Wire::new(4 * formats.vector_bits as usize),
-            operands: Wire::new(4 * formats.data_bits as usize),
+            shift: Wire::new(count_bits(shape.acc)),
+            quad: Wire::new(4 * shape.acc),
+            words: Wire::new(4 * shape.word),
+            operands: Wire::new(4 * shape.data),
             saturations: Wire::new(SATURATION_BITS),
-            _formats: formats.clone(),
-            _taken: (Word::default(), 0, false),
-            _shifted: [0; 4],
-            _valid: false,
-            _clipped: 0,
-            _clips: 0,
-        }
+            kernel: Body::default(),
+        };
+        block.bind(shape.kernel())
     }
 }
 
-impl Logic for Rescaler {
-    fn update(&mut self) {
-        if self.clk.pos_edge() {
-            let f = &self._formats;
-            let operand = |lane| {
-                let word = self.words.val().signed(lane, f.vector_bits as usize);
-                saturate(round_shift(word, SEARCH_EXTRA_BITS), f.data_bits).0
-            };
-            self.operands.next = Word::of_fields(&[0, 1, 2, 3].map(operand), f.data_bits as usize);
-            let rounded = self._shifted.map(|value| saturate(value, f.vector_bits));
-            self.words.next = Word::of_fields(&rounded.map(|(word, _)| word), f.vector_bits as usize);
-            let count = self.saturations.val().number() + self._clips;
-            self.saturations.next = Word::from(match self.clear.val() {
-                true => 0,
-                false => count.min((1 << SATURATION_BITS) - 1),
-            });
-            let clipped = rounded.iter().filter(|(_, clipped)| *clipped).count() as u64;
-            self._clips = self._clipped;
-            self._clipped = if self._valid { clipped } else { 0 };
-            let (quad, shift, valid) = self._taken;
-            self._shifted = std::array::from_fn(|lane| round_shift(quad.signed(lane, f.acc_bits as usize), shift));
-            self._valid = valid;
-            let shift = if self.measured.val() { self.shift.val().number() as u32 } else { f.a_shift };
-            self._taken = (self.quad.val(), shift, self.valid.val());
+impl Shape {
+    fn kernel(self) -> Kernel {
+        let k = Builder::new("rescaler");
+        let [clear, valid, measured] = ["clear", "valid", "measured"].map(|name| k.input(name, 1));
+        let (shift, quad) = (k.input("shift", count_bits(self.acc)), k.input("quad", 4 * self.acc));
+        let taken = k.delay("taken", quad);
+        let valid2 = k.delay("valid2", k.delay("valid1", valid));
+        let amount = measured.mux(shift, k.constant(shift.bits(), self.a_shift.into()));
+        let lane = |lane: usize| {
+            let code = taken.slice(lane * self.acc, self.acc);
+            k.scope(&format!("lane_{lane}"), || self.lane(&k, code, amount))
+        };
+        let lanes: Vec<[Expr; 3]> = (0..4).rev().map(lane).collect();
+        let [words, operands, clipped] =
+            [0, 1, 2].map(|n| concat(&lanes.iter().map(|lane| lane[n]).collect::<Vec<_>>()));
+        k.wire("words", words);
+        k.wire("operands", operands);
+
+        let clipped3 = k.delay("clipped3", valid2.mux(clipped, k.constant(4, 0)));
+        let clips = (clipped3.at(0) + clipped3.at(1)) + (clipped3.at(2) + clipped3.at(3));
+        let clips = k.delay("clips", clips);
+        let saturations = k.state("saturations", Type::unsigned(SATURATION_BITS), clear, 0);
+        let count = k.wire("count", *saturations + clips);
+        let most = k.constant(SATURATION_BITS, (1 << SATURATION_BITS) - 1);
+        saturations.set(count.top().mux(most, count.low(SATURATION_BITS)));
+        k.finish()
+    }
+
+    /// Word, operand and saturation of one accumulator.
+    fn lane<'k>(self, k: &'k Builder, code: Expr<'k>, amount: Expr<'k>) -> [Expr<'k>; 3] {
+        // One copy per lane: the lanes are placed far apart, near the MAC lanes that feed them.
+        let copy = k.register("amount", amount.ty()).keep();
+        copy.set(amount);
+        // One bit below the LSB is kept, so that adding one and dropping it rounds half up.
+        let moved = k.delay("moved", k.wire("doubled", code.signed().shift_left(1)).shift_right_by(*copy));
+        let (half_up, clips) = rounded(k, moved, self.word);
+        let clipped = k.wire("clipped", clips);
+        let most = moved.top().concat((!moved.top()).repeat(self.word - 1));
+        let word = k.delay("word", clipped.mux(most, half_up));
+        let operand = k.wire("short", word.signed().shift_right(SEARCH_EXTRA_BITS as usize - 1).round_shift(1));
+        let overflow = k.wire("overflow", operand.top().differs(operand.at(self.data - 1)));
+        let most = k.constant(self.data, (1 << (self.data - 1)) - 1);
+        [word, k.delay("operand", overflow.mux(most, operand.low(self.data))), clipped]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use dermis_golden::fixed::arith::{round_shift, saturate};
+
+    use super::*;
+    use crate::language::testbench::{check, random_word, Reference};
+    use crate::wire::Word;
+
+    const SHAPE: Shape = Shape { acc: 45, word: 18 + SEARCH_EXTRA_BITS as usize, data: 18, a_shift: 9 };
+
+    /// The quads on their way with their shift, and the counts.
+    #[derive(Default)]
+    struct Quads {
+        /// Accumulators, then v_ij, of one, two and three cycles ago, and how many of them were saturated.
+        taken: Option<([i64; 4], u32, bool)>,
+        shifted: Option<([i64; 4], bool)>,
+        words: Option<[i64; 4]>,
+        operands: Option<[i64; 4]>,
+        clipped: Option<usize>,
+        clips: Option<usize>,
+        count: Option<usize>,
+    }
+
+    impl Reference for Quads {
+        fn outputs(&mut self, _: &[Word]) -> Vec<Option<Word>> {
+            vec![
+                self.words.map(|words| Word::of_fields(&words, SHAPE.word)),
+                self.operands.map(|operands| Word::of_fields(&operands, SHAPE.data)),
+                self.count.map(|count| Word::from(count as u64)),
+            ]
+        }
+
+        fn clock(&mut self, inputs: &[Word]) {
+            let operand = |word| saturate(round_shift(word, SEARCH_EXTRA_BITS), SHAPE.data as u32).0;
+            self.operands = self.words.map(|words| words.map(operand));
+            let counted = self.count.zip(self.clips).map(|(count, clips)| (count + clips).min(0xffff));
+            self.count = if inputs[0].number() == 1 { Some(0) } else { counted };
+            self.clips = self.clipped;
+            let rounded =
+                self.shifted.map(|(quad, valid)| (quad.map(|value| saturate(value, SHAPE.word as u32)), valid));
+            self.words = rounded.map(|(quad, _)| quad.map(|(word, _)| word));
+            self.clipped = rounded.map(|(quad, valid)| quad.iter().filter(|(_, clipped)| *clipped && valid).count());
+            self.shifted = self.taken.map(|(quad, shift, valid)| (quad.map(|value| round_shift(value, shift)), valid));
+            let shift = if inputs[2].number() == 1 { inputs[3].number() as u32 } else { SHAPE.a_shift };
+            let quad = [0, 1, 2, 3].map(|lane| inputs[4].signed(lane, SHAPE.acc));
+            self.taken = Some((quad, shift, inputs[1].number() == 1));
         }
     }
 
-    fn connect(&mut self) {
-        self.words.connect();
-        self.operands.connect();
-        self.saturations.connect();
-    }
-
-    fn hdl(&self) -> Verilog {
-        let f = &self._formats;
-        let (acc, r, d) = (f.acc_bits as usize, f.vector_bits as usize, f.data_bits as usize);
-        let extra = SEARCH_EXTRA_BITS as usize;
-        let shift_bits = self.shift.width();
-        let cap = SATURATION_BITS;
-        Verilog::Custom(format!(
-            "\
-reg [{quad_end}:0] taken;
-reg valid1, valid2;
-wire [3:0] clipped;
-reg [3:0] clipped3;
-reg [2:0] clips;
-wire [{cap}:0] count = {{1'b0, saturations}} + {{{count_more}'d0, clips}};
-always @(posedge clk) begin
-  taken <= quad;
-  valid1 <= valid;
-  valid2 <= valid1;
-  clipped3 <= valid2 ? clipped : 4'd0;
-  clips <= {{2'd0, clipped3[0]}} + {{2'd0, clipped3[1]}} + {{2'd0, clipped3[2]}} + {{2'd0, clipped3[3]}};
-  if (clear) saturations <= {cap}'d0;
-  else saturations <= count[{cap}] ? {{{cap}{{1'b1}}}} : count[{cap_end}:0];
-end
-genvar l;
-generate
-  for (l = 0; l < 4; l = l + 1) begin : lane
-    // One copy per lane: the lanes are placed far apart, near the MAC lanes that feed them.
-    reg [{shift_end}:0] amount;
-    (* keep *) always @(posedge clk) amount <= measured ? shift : {shift_bits}'d{a_shift};
-    // One bit below the LSB is kept, so that adding one and dropping it rounds half up.
-    reg signed [{acc}:0] moved;
-    wire signed [{acc}:0] doubled = {{taken[l * {acc} +: {acc}], 1'b0}};
-{rounding}    wire [{r_end}:0] now = words[l * {r} +: {r}];
-    wire [{short_end}:0] operand = {{now[{r_end}], now[{r_end}:{extra_low}]}} + {short}'d1;
-    wire overflow = operand[{short_end}] != operand[{short_less}];
-    wire unused = &{{1'b0, operand[0], now, half_up[0]}};
-    always @(posedge clk) begin
-      moved <= doubled >>> amount;
-      words[l * {r} +: {r}] <= clipped[l] ? {{moved[{acc}], {{{r_less}{{!moved[{acc}]}}}}}} : half_up[{r}:1];
-      operands[l * {d} +: {d}] <= overflow ? {{1'b0, {{{d_less}{{1'b1}}}}}} : operand[{d}:1];
-    end
-  end
-endgenerate",
-            shift_end = shift_bits - 1,
-            quad_end = 4 * acc - 1,
-            a_shift = f.a_shift,
-            count_more = cap + 1 - 3,
-            cap_end = cap - 1,
-            rounding = half_up(acc + 1, r, "clipped[l]"),
-            r_end = r - 1,
-            r_less = r - 1,
-            extra_low = extra - 1,
-            short = d + 2,
-            short_end = d + 1,
-            short_less = d,
-            d_less = d - 1,
-        ))
+    #[test]
+    fn words_are_rounded_and_saturated_and_the_saturations_counted() {
+        let mut random = fastrand::Rng::with_seed(12);
+        let mut inputs = |cycle: usize| {
+            // Accumulators of all lengths, and some that round to just beyond the range.
+            let length = random.u32(1..SHAPE.acc as u32);
+            let shift = random.u64(..SHAPE.acc as u64 - 1);
+            let mut code = || match random.u8(..4) {
+                0 => random_word(&mut random, SHAPE.acc).signed(0, SHAPE.acc),
+                1 => ((1 << (SHAPE.word - 1)) << SHAPE.a_shift) - random.i64(..1 << SHAPE.a_shift),
+                _ => random.i64(-(1 << (length - 1))..1 << (length - 1)),
+            };
+            let quad = Word::of_fields(&[(); 4].map(|()| code()), SHAPE.acc);
+            let clear = cycle < 6 || random.u16(..500) == 0;
+            vec![clear.into(), random.bool().into(), random.bool().into(), shift.into(), quad]
+        };
+        let stimulus: Vec<Vec<Word>> = (0..5000).map(&mut inputs).collect();
+        check(Rescaler::of(SHAPE).kernel.kernel(), &stimulus, &mut Quads::default());
     }
 }

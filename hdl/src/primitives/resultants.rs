@@ -1,14 +1,15 @@
 //! Sums per subarray in place of a force per taxel.
 
 use dermis_golden::fixed::formats::FORCE_BITS;
-use dermis_golden::fixed::resultants::{beats, BEATS, POSITION_BITS, SUMS, SUM_BITS};
+use dermis_golden::fixed::resultants::{BEATS, POSITION_BITS, SUMS, SUM_BITS};
 use dermis_golden::partition::Grid;
 use dermis_golden::sensor::Sensor;
 use rust_hdl::prelude::*;
 
 use super::counter::count_bits;
-use super::pass_through::pass_through;
-use crate::wire::{Wire, Word};
+use crate::kernel_block;
+use crate::language::{concat, Body, Builder, Expr, Kernel, Net, Type};
+use crate::wire::Wire;
 
 /// ```text
 /// s_axis (forces, row-major; status) --> X fz⁺, Y fz⁺ --> sums of each subarray --> m_axis (sums; status)
@@ -37,250 +38,307 @@ pub struct Resultants {
     pub m_axis_tready: Signal<In, Bit>,
     /// The beat is the last of its frame; valid with `m_axis_tvalid`.
     pub m_axis_tlast: Signal<Out, Bit>,
-    _wanted: bool,
-    _sensor: Sensor,
-    _parts: Grid,
-    _state: State,
+    kernel: Body,
 }
 
-/// Position in the frame.
-#[derive(Clone, Debug, Default)]
-struct State {
-    taxel: usize,
-    /// Remaining cycles until the sums are complete.
-    settling: usize,
-    /// Index of the next beat of sums.
-    beat: usize,
-    sums: Vec<[i64; SUMS]>,
-}
+/// Width of a component of a force, in bits.
+const WORD: usize = FORCE_BITS as usize;
+/// Width of a coordinate in half pitches with its sign, in bits.
+const PLACE: usize = POSITION_BITS as usize + 1;
+/// Width of a sum on the stream, in bits.
+const WIDE: usize = 64;
 
-/// Cycles from the last force to complete sums.
-const SETTLE: usize = 3;
+kernel_block!(
+    Resultants,
+    clock clk,
+    inputs [rst, s_axis_tdata, s_axis_tvalid, s_axis_tlast, m_axis_tready],
+    outputs [s_axis_tready, m_axis_tdata, m_axis_tvalid, m_axis_tlast]
+);
 
 impl Resultants {
     /// For the array `sensor` divided into `parts`; if sums are not `wanted`, the stream passes through.
     pub fn new(wanted: bool, sensor: &Sensor, parts: Grid) -> Self {
-        let beat = 3 * FORCE_BITS as usize;
-        Resultants {
+        let block = Resultants {
             clk: Default::default(),
             rst: Default::default(),
-            s_axis_tdata: Wire::new(beat),
+            s_axis_tdata: Wire::new(3 * WORD),
             s_axis_tvalid: Default::default(),
             s_axis_tready: Default::default(),
             s_axis_tlast: Default::default(),
-            m_axis_tdata: Wire::new(beat),
+            m_axis_tdata: Wire::new(3 * WORD),
             m_axis_tvalid: Default::default(),
             m_axis_tready: Default::default(),
             m_axis_tlast: Default::default(),
-            _wanted: wanted,
-            _sensor: sensor.clone(),
-            _parts: parts,
-            _state: State { sums: vec![[0; SUMS]; parts.rows * parts.cols], ..State::default() },
-        }
-    }
-
-    fn counting(&self) -> bool {
-        self._wanted && self._state.taxel < self._sensor.taxels()
-    }
-
-    fn sending(&self) -> bool {
-        self._wanted && !self.counting() && self._state.beat < BEATS * self._state.sums.len()
-    }
-
-    fn add(&mut self) {
-        let (sensor, parts, taxel) = (&self._sensor, self._parts, self._state.taxel);
-        let (row, col) = (taxel / sensor.cols, taxel % sensor.cols);
-        let part = row / (sensor.rows / parts.rows) * parts.cols + col / (sensor.cols / parts.cols);
-        let [x, y] = dermis_golden::fixed::resultants::half_pitches(sensor, taxel);
-        let [fx, fy, fz] = [0, 1, 2].map(|k| self.s_axis_tdata.val().signed(k, FORCE_BITS as usize));
-        let pressed = fz.max(0);
-        let values = [fx, fy, fz, pressed, x * pressed, y * pressed];
-        self._state.sums[part].iter_mut().zip(values).for_each(|(sum, value)| *sum += value);
-        self._state.taxel += 1;
-        self._state.settling = SETTLE;
-    }
-
-    fn restart(&mut self) {
-        let parts = self._state.sums.len();
-        self._state = State { sums: vec![[0; SUMS]; parts], ..State::default() };
+            kernel: Body::default(),
+        };
+        block.bind(if wanted { sums(sensor, parts) } else { pass_through() })
     }
 }
 
-impl Logic for Resultants {
-    fn update(&mut self) {
-        if self._wanted && self.clk.pos_edge() {
-            if self.counting() {
-                if self.s_axis_tvalid.val() {
-                    self.add();
+/// The stream on wires.
+fn pass_through() -> Kernel {
+    let k = Builder::new("resultants");
+    k.input("rst", 1);
+    let (data, valid) = (k.input("s_axis_tdata", 3 * WORD), k.input("s_axis_tvalid", 1));
+    let (last, ready) = (k.input("s_axis_tlast", 1), k.input("m_axis_tready", 1));
+    k.comment("A force per taxel: the stream passes through.");
+    k.wire("s_axis_tready", ready);
+    k.wire("m_axis_tdata", data);
+    k.wire("m_axis_tvalid", valid);
+    k.wire("m_axis_tlast", last);
+    k.finish()
+}
+
+/// A counter from 0 to `last` that starts again at 0.
+struct Lines<'k> {
+    count: Net<'k>,
+    is_last: Expr<'k>,
+}
+
+impl<'k> Lines<'k> {
+    fn new(k: &'k Builder, name: &str, limit: usize, restart: Expr<'k>) -> Self {
+        let count = k.state(name, Type::unsigned(count_bits(limit)), restart, 0);
+        Lines { count, is_last: k.wire(&format!("{name}_last"), count.is(limit as u64 - 1)) }
+    }
+
+    fn step(&self, k: &'k Builder) {
+        let zero = k.constant(self.count.bits(), 0);
+        self.count.set(self.is_last.mux(zero, self.count.plus(1)));
+    }
+}
+
+/// The one of `values` with number `index`.
+fn pick<'k>(index: Expr<'k>, values: &[Expr<'k>]) -> Expr<'k> {
+    let arms: Vec<(u64, Expr)> = (1..).zip(values[1..].iter().copied()).collect();
+    index.case(&arms, values[0])
+}
+
+fn sums(sensor: &Sensor, parts: Grid) -> Kernel {
+    let count = parts.rows * parts.cols;
+    let (rows, cols) = (sensor.rows / parts.rows, sensor.cols / parts.cols);
+    let k = Builder::new("resultants");
+    let rst = k.input("rst", 1);
+    let (data, valid) = (k.input("s_axis_tdata", 3 * WORD), k.input("s_axis_tvalid", 1));
+    let (last, ready) = (k.input("s_axis_tlast", 1), k.input("m_axis_tready", 1));
+    let (bit, one, zero) = (Type::unsigned(1), k.constant(1, 1), k.constant(1, 0));
+    let restart = k.net("restart", bit);
+    let counting = k.state("counting", bit, *restart, 1);
+    let sending = k.state("sending", bit, *restart, 0);
+    let later = |name: &str, value| {
+        let state = k.state(name, bit, *restart, 0);
+        state.set(value);
+        *state
+    };
+
+    k.comment("The taxel of the next force: row and column in its subarray, and of its subarray.");
+    let col = Lines::new(&k, "col", cols, *restart);
+    let part_col = Lines::new(&k, "part_col", parts.cols, *restart);
+    let row = Lines::new(&k, "row", rows, *restart);
+    let part_row = Lines::new(&k, "part_row", parts.rows, *restart);
+    let line_last = k.wire("line_last", col.is_last & part_col.is_last);
+    let last_force = k.wire("last_force", line_last & row.is_last & part_row.is_last);
+    let take = k.wire("take", *counting & valid);
+    let start_of = |lines: usize| 1 - lines as i64;
+    let axis = |name: &str, lines: usize| {
+        let start = start_of(lines) as u64 & ((1 << PLACE) - 1);
+        k.state(name, Type::signed(PLACE), *restart, start)
+    };
+    let (x, y) = (axis("x", sensor.cols), axis("y", sensor.rows));
+    let pitch = k.signed_constant(PLACE, 2);
+    k.when(take, || {
+        col.step(&k);
+        x.set(line_last.mux(k.signed_constant(PLACE, start_of(sensor.cols)), (*x + pitch).resize(PLACE)));
+        k.when(col.is_last, || part_col.step(&k));
+        k.when(line_last, || {
+            y.set((*y + pitch).resize(PLACE));
+            row.step(&k);
+            k.when(row.is_last, || part_row.step(&k));
+        });
+        k.when(last_force, || counting.set(zero));
+    });
+
+    k.comment("A force and its products; the index of the subarray as a table, in place of a product.");
+    let part_bits = count_bits(count);
+    let index = |k_part: usize| {
+        let (i, j) = (k_part / parts.cols, k_part % parts.cols);
+        let at = (i << part_col.count.bits() | j) as u64;
+        (at, k.constant(part_bits, k_part as u64))
+    };
+    let arms: Vec<(u64, Expr)> = (0..count).map(index).collect();
+    let part = k.wire("part", part_row.count.concat(*part_col.count).case(&arms, k.constant(part_bits, 0)));
+    let part_2 = k.delay("part_2", k.delay("part_1", part));
+    let component = |n: usize| data.slice(n * WORD, WORD).signed();
+    let force = ["fx", "fy", "fz"]
+        .iter()
+        .enumerate()
+        .map(|(n, name)| k.delay(name, k.delay(&format!("{name}_1"), component(n))));
+    let pressed = k.delay("pressed_1", data.top().mux(k.signed_constant(WORD, 0), component(2)));
+    let moments = [("moment_x", "x_1", *x), ("moment_y", "y_1", *y)];
+    let moments = moments.map(|(name, held, place)| k.delay(name, pressed * k.delay(held, place)));
+    let values: Vec<Expr> = force.chain([k.delay("pressed", pressed)]).chain(moments).collect();
+
+    let adds = later("valid_2", later("valid_1", take));
+    let settling = later("settling_1", take & last_force);
+    let settling = [settling, later("settling_2", settling)];
+    let settled = later("settling_3", settling[1]);
+    let part_out = k.state("part_out", Type::unsigned(part_bits), *restart, 0);
+    let sum = |n: usize| {
+        let one = |part: usize| k.state(&format!("sum_{n}_{part}"), Type::signed(SUM_BITS as usize), *restart, 0);
+        let own: Vec<Net> = (0..count).map(one).collect();
+        let present: Vec<Expr> = own.iter().map(Net::get).collect();
+        let sum = k.wire(&format!("next_{n}"), (pick(part_2, &present) + values[n]).resize(SUM_BITS as usize));
+        for (part, own) in own.iter().enumerate() {
+            k.when(adds & part_2.is(part as u64), || own.set(sum));
+        }
+        pick(*part_out, &present).extend(WIDE)
+    };
+    let all: Vec<Expr> = (0..SUMS).rev().map(sum).collect();
+    let all = k.wire("all", concat(&all));
+
+    let quarter = k.state("quarter", Type::unsigned(2), *restart, 0);
+    let now: Vec<Expr> = (0..BEATS).map(|n| all.slice(n * 3 * WORD, 3 * WORD)).collect();
+    let sent = k.wire("sent", *sending & ready);
+    k.when(settled, || sending.set(one));
+    k.when(sent, || {
+        quarter.set(quarter.plus(1));
+        k.when(quarter.is(BEATS as u64 - 1), || {
+            part_out.set(part_out.plus(1));
+            k.when(part_out.is(count as u64 - 1), || sending.set(zero));
+        });
+    });
+    let passing = k.wire("passing", !(*counting | settling[0] | settling[1] | settled | *sending));
+    let finish = k.wire("finish", passing & valid & ready & last);
+    restart.set(rst | finish);
+    k.wire("s_axis_tready", *counting | (passing & ready));
+    k.wire("m_axis_tvalid", *sending | (passing & valid));
+    k.wire("m_axis_tlast", passing & last);
+    k.wire("m_axis_tdata", sending.mux(pick(*quarter, &now), data));
+    k.finish()
+}
+
+#[cfg(test)]
+mod tests {
+    use dermis_golden::fixed::resultants::{beats, half_pitches};
+    use dermis_golden::scene::Scene;
+
+    use super::*;
+    use crate::language::testbench::{check, random_word, Reference};
+    use crate::wire::Word;
+
+    /// Cycles from the last force to complete sums.
+    const SETTLE: usize = 3;
+
+    /// Adds up each force as it is taken.
+    struct Sums {
+        sensor: Sensor,
+        parts: Grid,
+        reset: bool,
+        taxel: usize,
+        /// Remaining cycles until the sums are complete.
+        settling: usize,
+        /// Index of the next beat of sums.
+        beat: usize,
+        sums: Vec<[i64; SUMS]>,
+    }
+
+    impl Sums {
+        fn restart(&mut self) {
+            let parts = self.sums.len();
+            (self.taxel, self.settling, self.beat, self.sums) = (0, 0, 0, vec![[0; SUMS]; parts]);
+        }
+
+        fn counting(&self) -> bool {
+            self.taxel < self.sensor.taxels()
+        }
+
+        fn sending(&self) -> bool {
+            !self.counting() && self.settling == 0 && self.beat < BEATS * self.sums.len()
+        }
+
+        fn passing(&self) -> bool {
+            !self.counting() && self.settling == 0 && self.beat == BEATS * self.sums.len()
+        }
+
+        fn add(&mut self, data: &Word) {
+            let (sensor, parts, taxel) = (&self.sensor, self.parts, self.taxel);
+            let (row, col) = (taxel / sensor.cols, taxel % sensor.cols);
+            let part = row / (sensor.rows / parts.rows) * parts.cols + col / (sensor.cols / parts.cols);
+            let [x, y] = half_pitches(sensor, taxel);
+            let [fx, fy, fz] = [0, 1, 2].map(|n| data.signed(n, WORD));
+            let pressed = fz.max(0);
+            let values = [fx, fy, fz, pressed, x * pressed, y * pressed];
+            self.sums[part].iter_mut().zip(values).for_each(|(sum, value)| *sum += value);
+            self.taxel += 1;
+            self.settling = SETTLE;
+        }
+    }
+
+    impl Reference for Sums {
+        fn outputs(&mut self, inputs: &[Word]) -> Vec<Option<Word>> {
+            if !self.reset {
+                return vec![None; 4];
+            }
+            let [valid, last, ready] = [2, 3, 4].map(|k| inputs[k].number() == 1);
+            let data = match self.sending() {
+                true => {
+                    let words = beats(&self.sums[self.beat / BEATS])[self.beat % BEATS];
+                    Word::of_fields(&words.map(i64::from), WORD)
                 }
-            } else if self._state.settling > 0 {
-                self._state.settling -= 1;
+                false => inputs[1],
+            };
+            vec![
+                Some((self.counting() || self.passing() && ready).into()),
+                Some((self.sending() || self.passing() && valid).into()),
+                Some((self.passing() && last).into()),
+                Some(data),
+            ]
+        }
+
+        fn clock(&mut self, inputs: &[Word]) {
+            let [rst, valid, last, ready] = [0, 2, 3, 4].map(|k| inputs[k].number() == 1);
+            if self.counting() {
+                if valid {
+                    self.add(&inputs[1]);
+                }
+            } else if self.settling > 0 {
+                self.settling -= 1;
             } else if self.sending() {
-                self._state.beat += usize::from(self.m_axis_tready.val());
-            } else if self.s_axis_tvalid.val() && self.m_axis_tready.val() && self.s_axis_tlast.val() {
+                self.beat += usize::from(ready);
+            } else if valid && ready && last {
                 self.restart();
             }
-            if self.rst.val() {
+            if rst {
                 self.restart();
+                self.reset = true;
             }
         }
-        let (counting, sending) = (self.counting(), self.sending());
-        let passing = !counting && !sending;
-        self.s_axis_tready.next = counting || passing && self.m_axis_tready.val();
-        self.m_axis_tvalid.next = sending && self._state.settling == 0 || passing && self.s_axis_tvalid.val();
-        self.m_axis_tlast.next = passing && self.s_axis_tlast.val();
-        self.m_axis_tdata.next = match (sending, self._state.beat) {
-            (true, beat) => {
-                let words = beats(&self._state.sums[beat / BEATS])[beat % BEATS];
-                Word::of_fields(&words.map(i64::from), FORCE_BITS as usize)
-            }
-            (false, _) => self.s_axis_tdata.val(),
+    }
+
+    fn are_those_of_the_model(rows: usize, cols: usize, parts: Grid) {
+        let text = format!(
+            "name = \"sums\"\n[sensor]\nrows = {rows}\ncols = {cols}\npitch_x_mm = 4.0\npitch_y_mm = 4.0\nthickness_mm = 3.0\n"
+        );
+        let sensor = Scene::parse(&text, "sums.toml").unwrap().sensor;
+        let block = Resultants::new(true, &sensor, parts);
+        let mut random = fastrand::Rng::with_seed(12);
+        let inputs = |cycle: usize| {
+            vec![
+                (cycle < 2 || random.u16(..400) == 0).into(),
+                random_word(&mut random, 3 * WORD),
+                (random.u8(..4) > 0).into(),
+                (random.u8(..4) == 0).into(),
+                (random.u8(..4) > 0).into(),
+            ]
         };
+        let stimulus: Vec<Vec<Word>> = (0..6000).map(inputs).collect();
+        let sums = vec![[0; SUMS]; parts.rows * parts.cols];
+        let mut reference = Sums { sensor, parts, reset: false, taxel: 0, settling: 0, beat: 0, sums };
+        check(block.kernel.kernel(), &stimulus, &mut reference);
     }
 
-    fn connect(&mut self) {
-        self.s_axis_tready.connect();
-        self.m_axis_tdata.connect();
-        self.m_axis_tvalid.connect();
-        self.m_axis_tlast.connect();
-    }
-
-    fn hdl(&self) -> Verilog {
-        if !self._wanted {
-            return pass_through("A force per taxel: the stream passes through.");
-        }
-        let (sensor, parts) = (&self._sensor, self._parts);
-        let count = parts.rows * parts.cols;
-        let (rows, cols) = (sensor.rows / parts.rows, sensor.cols / parts.cols);
-        let [r, c, pr, pc, p] = [rows, cols, parts.rows, parts.cols, count].map(count_bits);
-        let (place, sum) = (POSITION_BITS as usize + 1, SUM_BITS as usize);
-        // Sign extension of each sum to 64 bits.
-        let more = 64 - sum;
-        let wide: Vec<String> =
-            (0..SUMS).rev().map(|k| format!("{{{{{more}{{sum{k}[{e}]}}}}, sum{k}}}", e = sum - 1)).collect();
-        let each = |text: &dyn Fn(usize) -> String| (0..SUMS).map(text).collect::<String>();
-        let declare = each(&|k| {
-            format!("reg [{e}:0] sums{k} [0:{}];\nwire [{e}:0] sum{k} = sums{k}[part_out];\n", count - 1, e = sum - 1)
-        });
-        let clear = each(&|k| format!("      sums{k}[i] <= {sum}'d0;\n"));
-        let values = ["fx", "fy", "fz", "pressed", "moment_x", "moment_y"];
-        let bits = [32, 32, 32, 32, 32 + place, 32 + place];
-        let add = each(&|k| {
-            let (value, from) = (values[k], bits[k]);
-            format!(
-                "    sums{k}[part2] <= sums{k}[part2] + {{{{{}{{{value}[{}]}}}}, {value}}};\n",
-                sum - from,
-                from - 1
-            )
-        });
-        // Index of the subarray as a table, in place of a product.
-        let part = (0..count)
-            .map(|k| {
-                let (i, j) = (k / parts.cols, k % parts.cols);
-                format!("    {{{pr}'d{i}, {pc}'d{j}}}: part = {p}'d{k};\n")
-            })
-            .collect::<String>();
-        Verilog::Custom(format!(
-            "\
-reg [{c_end}:0] col;
-reg [{pc_end}:0] part_col;
-reg [{r_end}:0] row;
-reg [{pr_end}:0] part_row;
-reg signed [{place_end}:0] x, y, x1, y1;
-reg [{p_end}:0] part, part1, part2, part_out;
-reg [1:0] quarter;
-reg counting, settling1, settling2, settling3, sending;
-reg valid1, valid2;
-reg signed [31:0] fx1, fy1, fz1, pressed1;
-reg signed [31:0] fx, fy, fz, pressed;
-reg signed [{moment_end}:0] moment_x, moment_y;
-integer i;
-always @(*) begin
-  case ({{part_row, part_col}})
-{part}    default: part = {p}'d0;
-  endcase
-end
-{declare}wire [383:0] all = {{{wide}}};
-wire [95:0] now = quarter[1] ? (quarter[0] ? all[288 +: 96] : all[192 +: 96])
-  : (quarter[0] ? all[96 +: 96] : all[0 +: 96]);
-wire col_last = col == {c}'d{col_last};
-wire line_last = col_last && part_col == {pc}'d{part_col_last};
-wire row_last = row == {r}'d{row_last};
-wire last_force = line_last && row_last && part_row == {pr}'d{part_row_last};
-wire take = counting && s_axis_tvalid;
-wire passing = !counting && !settling1 && !settling2 && !settling3 && !sending;
-wire sent = sending && m_axis_tready;
-wire finish = passing && s_axis_tvalid && m_axis_tready && s_axis_tlast;
-always @(*) s_axis_tready = counting || (passing && m_axis_tready);
-always @(*) m_axis_tvalid = sending || (passing && s_axis_tvalid);
-always @(*) m_axis_tlast = passing && s_axis_tlast;
-always @(*) m_axis_tdata = sending ? now : s_axis_tdata;
-always @(posedge clk) begin
-  if (rst || finish) begin
-    counting <= 1'b1;
-    {{settling1, settling2, settling3, sending}} <= 4'd0;
-    {{valid1, valid2}} <= 2'd0;
-    col <= {c}'d0;
-    part_col <= {pc}'d0;
-    row <= {r}'d0;
-    part_row <= {pr}'d0;
-    x <= -{place}'sd{x_last};
-    y <= -{place}'sd{y_last};
-    part_out <= {p}'d0;
-    quarter <= 2'd0;
-    for (i = 0; i <= {last_part}; i = i + 1) begin
-{clear}    end
-  end else begin
-    valid1 <= take;
-    valid2 <= valid1;
-    if (take) begin
-      col <= col_last ? {c}'d0 : col + {c}'d1;
-      x <= line_last ? -{place}'sd{x_last} : x + {place}'sd2;
-      if (col_last) part_col <= line_last ? {pc}'d0 : part_col + {pc}'d1;
-      if (line_last) begin
-        y <= y + {place}'sd2;
-        row <= row_last ? {r}'d0 : row + {r}'d1;
-        if (row_last) part_row <= part_row + {pr}'d1;
-      end
-      if (last_force) counting <= 1'b0;
-    end
-    settling1 <= take && last_force;
-    settling2 <= settling1;
-    settling3 <= settling2;
-    if (settling3) sending <= 1'b1;
-    if (sent) begin
-      quarter <= quarter + 2'd1;
-      if (quarter == 2'd3) begin
-        part_out <= part_out + {p}'d1;
-        if (part_out == {p}'d{last_part}) sending <= 1'b0;
-      end
-    end
-    if (valid2) begin
-{add}    end
-  end
-  {{fz1, fy1, fx1}} <= s_axis_tdata;
-  pressed1 <= s_axis_tdata[95] ? 32'd0 : s_axis_tdata[95:64];
-  {{x1, y1, part1}} <= {{x, y, part}};
-  {{fz, fy, fx, pressed}} <= {{fz1, fy1, fx1, pressed1}};
-  moment_x <= pressed1 * x1;
-  moment_y <= pressed1 * y1;
-  part2 <= part1;
-end",
-            c_end = c - 1,
-            pc_end = pc - 1,
-            r_end = r - 1,
-            pr_end = pr - 1,
-            p_end = p - 1,
-            place_end = place - 1,
-            moment_end = 32 + place - 1,
-            wide = wide.join(", "),
-            col_last = cols - 1,
-            part_col_last = parts.cols - 1,
-            row_last = rows - 1,
-            part_row_last = parts.rows - 1,
-            x_last = sensor.cols - 1,
-            y_last = sensor.rows - 1,
-            last_part = count - 1,
-        ))
+    #[test]
+    fn sums_are_those_of_the_model() {
+        are_those_of_the_model(4, 6, Grid { rows: 2, cols: 3 });
+        are_those_of_the_model(3, 5, Grid { rows: 1, cols: 1 });
     }
 }

@@ -6,7 +6,9 @@ use dermis_golden::fixed::Model;
 use rust_hdl::prelude::*;
 
 use super::counter::count_bits;
-use crate::wire::{Wire, Word};
+use crate::kernel_block;
+use crate::language::{concat, Body, Builder, Contents, Expr, Kernel, Net, Type};
+use crate::wire::Wire;
 
 /// One product over the columns of one group of rows: an instruction of the schedule.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -111,14 +113,15 @@ pub struct Steps {
     /// Control of [`Lanes`](super::Lanes) from bit 0: align, first, last product of an accumulation; with the
     /// coefficient check also first product of a subarray; with the addresses.
     pub control: Wire<Out>,
-    _steps: Vec<Vec<Step>>,
-    _list: Vec<[usize; 2]>,
-    /// Some step reads its operand transposed.
-    _across: bool,
-    /// The current step, and its index in the case.
-    _now: (Step, usize),
-    _pipe: Vec<(Step, usize)>,
+    kernel: Body,
 }
+
+kernel_block!(
+    Steps,
+    clock clk,
+    inputs [which, start, advance, column, finished],
+    outputs [ready, last, ends, coefficient_address, operand_address, source, control]
+);
 
 /// File of the column list, one line per word of the coefficient memory.
 pub const COLUMN_FILE: &str = "columns.hex";
@@ -129,246 +132,287 @@ pub fn control_bits(model: &Model) -> usize {
 /// Width of `source`, in bits.
 pub const SOURCE_BITS: usize = 5;
 
+/// What decides the circuit.
+struct Shape {
+    /// The steps of each case.
+    steps: Vec<Vec<Step>>,
+    /// Address of each coefficient word's column, and its transposed address; empty without a column list.
+    list: Vec<[usize; 2]>,
+    /// Some step reads its operand transposed.
+    across: bool,
+    /// Words of the coefficient memory, quads of a subarray, operand vectors.
+    words: usize,
+    quads: usize,
+    vectors: usize,
+    control_bits: usize,
+}
+
 impl Steps {
     /// The schedule of `model`.
     pub fn new(model: &Model) -> Self {
         let (formats, cases) = (&model.formats, model.cases());
-        let steps: Vec<Vec<Step>> = cases.iter().map(unroll).collect();
-        let words = cases.iter().map(|case| case.storage.words()).sum();
-        // Address of each word's column, and its transposed address.
         let pair = |case: &Model, j| [j, if formats.shared_a { case.layout().transposed(j) } else { j }];
         let pairs = |case: &Model| case.storage.column_list().iter().map(|&j| pair(case, j)).collect::<Vec<_>>();
-        let listed = cases.iter().filter(|case| case.storage.listed);
-        let list: Vec<[usize; 2]> = listed.flat_map(pairs).collect();
-        let vectors = operand_vectors(formats.degree);
-        Steps {
+        Steps::of(&Shape {
+            steps: cases.iter().map(unroll).collect(),
+            list: cases.iter().filter(|case| case.storage.listed).flat_map(pairs).collect(),
+            across: formats.shared_a,
+            words: cases.iter().map(|case| case.storage.words()).sum(),
+            quads: formats.quads,
+            vectors: operand_vectors(formats.degree),
+            control_bits: control_bits(model),
+        })
+    }
+
+    fn of(shape: &Shape) -> Self {
+        let block = Steps {
             clk: Default::default(),
-            which: Wire::new(count_bits(cases.len())),
+            which: Wire::new(count_bits(shape.steps.len())),
             start: Default::default(),
             advance: Default::default(),
-            column: Wire::new(count_bits(formats.quads)),
-            finished: Wire::new(count_bits(vectors + 1)),
+            column: Wire::new(count_bits(shape.quads)),
+            finished: Wire::new(count_bits(shape.vectors + 1)),
             ready: Default::default(),
             last: Default::default(),
             ends: Default::default(),
-            coefficient_address: Wire::new(count_bits(words)),
-            operand_address: Wire::new(count_bits(vectors.max(1) * formats.quads)),
+            coefficient_address: Wire::new(count_bits(shape.words)),
+            operand_address: Wire::new(count_bits(shape.vectors.max(1) * shape.quads)),
             source: Wire::new(SOURCE_BITS),
-            control: Wire::new(control_bits(model)),
-            _now: Default::default(),
-            _pipe: Vec::new(),
-            _list: list,
-            _across: formats.shared_a,
-            _steps: steps,
-        }
+            control: Wire::new(shape.control_bits),
+            kernel: Body::default(),
+        };
+        block.bind(shape.kernel())
     }
 
     /// Cycles from `column` to the addresses: 1, or 3 with a column list.
     pub fn latency(&self) -> usize {
-        if self._list.is_empty() {
-            1
-        } else {
-            3
+        match self.kernel.kernel().memories() {
+            [] => 1,
+            _ => 3,
         }
     }
 
     /// Content of [`COLUMN_FILE`] for `$readmemh`, the transposed address above the plain one; `None` without a list.
     pub fn column_file(&self) -> Option<String> {
-        let bits = self.column.width();
-        let word = |&[straight, transposed]: &[usize; 2]| match self._across {
-            true => format!("{:x}\n", transposed << bits | straight),
-            false => format!("{straight:x}\n"),
-        };
-        (!self._list.is_empty()).then(|| self._list.iter().map(word).collect())
-    }
-
-    fn put(&mut self, step: &Step, column: usize) {
-        let address = step.coefficients + column;
-        let quad = match self._list.get(address) {
-            Some(pair) => pair[usize::from(step.transposed)],
-            None => column,
-        };
-        self.coefficient_address.next = Word::from(address as u64);
-        self.operand_address.next = Word::from((step.operand + quad) as u64);
-        self.source.next = Word::from(step.kind | step.flip << 2 | u64::from(step.transposed) << 4);
-        let first = step.first && column == 0;
-        let last = step.last && column + 1 == step.columns;
-        let opens = step.opens && column == 0 && self.control.width() == 4;
-        let bits = [step.align, first, last, opens];
-        self.control.next = Word::from(bits.iter().rev().fold(0, |word, &bit| word << 1 | u64::from(bit)));
+        self.kernel.kernel().memory_files().into_iter().next().map(|(_, text)| text)
     }
 }
 
-impl Logic for Steps {
-    fn update(&mut self) {
-        let column = self.column.val().number() as usize;
-        if self.clk.pos_edge() {
-            let (step, index) = self._now;
-            self._pipe.push((step, column));
-            if self._pipe.len() == self.latency() {
-                let (step, column) = self._pipe.remove(0);
-                self.put(&step, column);
-            }
-            if self.start.val() || self.advance.val() {
-                let asked = if self.start.val() || step.ends { 0 } else { index + 1 };
-                let case = self._steps.get(self.which.val().number() as usize);
-                let word = case.and_then(|steps| steps.get(asked)).copied().unwrap_or_default();
-                self._now = (word, asked);
+impl Shape {
+    /// Widths of the fields of an instruction, from bit 0: align, first, last, kind and flip and transposed as in
+    /// `source`, ends, final column, needs, operand, coefficients.
+    fn fields(&self) -> [usize; 9] {
+        let (columns, needs) = (count_bits(self.quads), count_bits(self.vectors + 1));
+        let operand = count_bits(self.vectors.max(1) * self.quads);
+        [1, 1, 1, SOURCE_BITS, 1, columns, needs, operand, count_bits(self.words)]
+    }
+
+    /// The instruction of `step`.
+    fn word(&self, step: &Step) -> u64 {
+        let source = step.kind | step.flip << 2 | u64::from(step.transposed) << 4;
+        let [align, first, last, ends] = [step.align, step.first, step.last, step.ends].map(u64::from);
+        let numbers = [step.columns - 1, step.needs, step.operand, step.coefficients].map(|number| number as u64);
+        let [columns, needs, operand, coefficients] = numbers;
+        let all = [align, first, last, source, ends, columns, needs, operand, coefficients];
+        all.into_iter().zip(self.fields()).rev().fold(0, |word, (field, bits)| word << bits | field)
+    }
+
+    /// The instruction at index `asked` of case `which`; zeros beyond the last.
+    fn table<'k>(&self, k: &'k Builder, which: Expr<'k>, asked: Expr<'k>) -> Expr<'k> {
+        let (length, bits) = (1 << asked.bits(), self.fields().iter().sum());
+        let (index, cases) = match self.steps.len() {
+            1 => (asked, 1),
+            _ => (which.concat(asked), 1 << which.bits()),
+        };
+        let mut words = vec![0; cases * length];
+        for (case, steps) in self.steps.iter().enumerate() {
+            for (step, word) in steps.iter().zip(&mut words[case * length..]) {
+                *word = self.word(step);
             }
         }
-        let (step, _) = self._now;
-        self.ready.next = self.finished.val().number() as usize >= step.needs;
-        self.last.next = column + 1 == step.columns;
-        self.ends.next = step.ends;
+        k.wire("instruction", index.table(bits, &words))
     }
 
-    fn connect(&mut self) {
-        self.ready.connect();
-        self.last.connect();
-        self.ends.connect();
-        self.coefficient_address.connect();
-        self.operand_address.connect();
-        self.source.connect();
-        self.control.connect();
-    }
-
-    fn hdl(&self) -> Verilog {
-        let step_bits = count_bits(self._steps.iter().map(Vec::len).max().unwrap_or(1));
-        let column_bits = self.column.width();
-        let needs_bits = self.finished.width();
-        let control = self.control.width();
-        let (c_bits, o_bits) = (self.coefficient_address.width(), self.operand_address.width());
-        let word_bits = c_bits + o_bits + needs_bits + column_bits + 9;
-        let bit = |b: bool| u8::from(b);
-        // With several cases the table is indexed by case and step.
-        let (selector, selector_bits) = match self._steps.len() {
-            1 => ("asked", step_bits),
-            _ => ("{which, asked}", self.which.width() + step_bits),
+    fn kernel(&self) -> Kernel {
+        let k = Builder::new("steps");
+        let which = k.input("which", count_bits(self.steps.len()));
+        let (start, advance) = (k.input("start", 1), k.input("advance", 1));
+        let (column, finished) = (k.input("column", count_bits(self.quads)), k.input("finished", self.fields()[6]));
+        let step = k.register("step", Type::unsigned(count_bits(largest_of(&self.steps))));
+        let names = ["align", "first", "last_product", "selects", "ends", "final_column", "needs", "o_base", "c_base"];
+        let registers: Vec<Net> =
+            names.iter().zip(self.fields()).map(|(name, bits)| k.register(name, Type::unsigned(bits))).collect();
+        let &[align, first, last_product, selects, ends, final_column, needs, o_base, c_base] = &registers[..] else {
+            unreachable!("one register per field")
         };
-        let indexed = self._steps.iter().enumerate().flat_map(|(case, steps)| {
-            steps.iter().enumerate().map(move |(index, step)| (case << step_bits | index, step))
+        let asked = k.wire("asked", (start | *ends).mux(k.constant(step.bits(), 0), step.plus(1)));
+        let instruction = self.table(&k, which, asked);
+        k.when(start | advance, || {
+            step.set(asked);
+            let mut at = 0;
+            for register in &registers {
+                register.set(instruction.slice(at, register.bits()));
+                at += register.bits();
+            }
         });
-        let cases: String = indexed
-            .map(|(index, s)| {
-                format!(
-                    "    {selector_bits}'d{index}: word = {{{c_bits}'d{}, {o_bits}'d{}, {needs_bits}'d{}, {column_bits}'d{}, \
-                     9'b{}{}{:02b}{:02b}{}{}{}}};\n",
-                    s.coefficients,
-                    s.operand,
-                    s.needs,
-                    s.columns - 1,
-                    bit(s.ends),
-                    bit(s.transposed),
-                    s.flip,
-                    s.kind,
-                    bit(s.last),
-                    bit(s.first),
-                    bit(s.align),
-                )
-            })
-            .collect();
-        let to_c = widen("column", column_bits, c_bits);
-        let declare = format!(
-            "\
-wire unused_which = &{{1'b0, which}};
-reg [{step_end}:0] step;
-reg [{c_end}:0] c_base;
-reg [{o_end}:0] o_base;
-reg [{n_end}:0] needs;
-reg [{column_end}:0] final_column;
-reg [7:0] fixed;  // transposed, flip, kind, last, first, align
-wire [{step_end}:0] asked = start || ends ? {step_bits}'d0 : step + {step_bits}'d1;
-reg [{word_end}:0] word;
-always @(*) begin
-  // A short table, kept out of block RAM.
-  (* rom_style = \"logic\" *)
-  case ({selector})
-{cases}    default: word = {word_bits}'d0;
-  endcase
-end
-always @(posedge clk)
-  if (start || advance) begin
-    step <= asked;
-    {{c_base, o_base, needs, final_column, ends, fixed}} <= word;
-  end
-always @(*) ready = finished >= needs;
-always @(*) last = column == final_column;
-wire [{control_end}:0] flags = {{{opens}fixed[2] && last, fixed[1] && column == {column_bits}'d0, fixed[0]}};
-",
-            step_end = step_bits - 1,
-            word_end = word_bits - 1,
-            c_end = c_bits - 1,
-            o_end = o_bits - 1,
-            n_end = needs_bits - 1,
-            column_end = column_bits - 1,
-            control_end = control - 1,
-            opens = match control {
-                4 => format!("step == {step_bits}'d0 && column == {column_bits}'d0, "),
-                _ => String::new(),
-            },
-        );
-        let body = if self._list.is_empty() {
-            format!(
-                "\
-always @(posedge clk) begin
-  coefficient_address <= c_base + {to_c};
-  operand_address <= o_base + {to_o};
-  source <= fixed[7:3];
-  control <= flags;
-end",
-                to_o = widen("column", column_bits, o_bits)
-            )
-        } else {
-            let (addresses, kept) = match self._across {
-                true => (
-                    2,
-                    format!("source2[4] ? pair[{}:{column_bits}] : pair[{}:0]", 2 * column_bits - 1, column_bits - 1),
-                ),
-                false => (1, "pair".to_string()),
-            };
-            format!(
-                "\
-// Column of each coefficient word, and its transposed address above it if one is needed.
-reg [{pair_end}:0] columns [0:{list_end}];
-initial $readmemh(\"{COLUMN_FILE}\", columns);
-reg [{pair_end}:0] pair;
-reg [{c_end}:0] c_address1, c_address2;
-reg [{o_end}:0] o_base1, o_base2;
-reg [4:0] source1, source2;
-reg [{control_end}:0] control1, control2;
-wire [{column_end}:0] kept = {kept};
-always @(posedge clk) begin
-  c_address1 <= c_base + {to_c};
-  o_base1 <= o_base;
-  source1 <= fixed[7:3];
-  control1 <= flags;
-  pair <= columns[c_address1];
-  c_address2 <= c_address1;
-  o_base2 <= o_base1;
-  source2 <= source1;
-  control2 <= control1;
-  coefficient_address <= c_address2;
-  operand_address <= o_base2 + {to_o};
-  source <= source2;
-  control <= control2;
-end",
-                control_end = control - 1,
-                pair_end = addresses * column_bits - 1,
-                list_end = self._list.len() - 1,
-                c_end = c_bits - 1,
-                o_end = o_bits - 1,
-                column_end = column_bits - 1,
-                to_o = widen("kept", column_bits, o_bits)
-            )
+        k.wire("ready", !finished.less(*needs));
+        let last = k.wire("last", column.equals(*final_column));
+        let opens = (self.control_bits == 4).then(|| step.is(0) & column.is(0));
+        let flags: Vec<Expr> = opens.into_iter().chain([*last_product & last, *first & column.is(0), *align]).collect();
+        let flags = k.wire("flags", concat(&flags));
+        self.addresses(&k, column, [*c_base, *o_base], *selects, flags);
+        k.finish()
+    }
+
+    /// The registers from column to addresses and control.
+    fn addresses<'k>(
+        &self,
+        k: &'k Builder,
+        column: Expr<'k>,
+        bases: [Expr<'k>; 2],
+        source: Expr<'k>,
+        control: Expr<'k>,
+    ) {
+        let [c_base, o_base] = bases;
+        let coefficients = (c_base + column).low(c_base.bits());
+        if self.list.is_empty() {
+            k.delay("coefficient_address", coefficients);
+            k.delay("operand_address", (o_base + column).low(o_base.bits()));
+            k.delay("source", source);
+            k.delay("control", control);
+            return;
+        }
+        let bits = column.bits();
+        let word = |&[straight, transposed]: &[usize; 2]| match self.across {
+            true => vec![(transposed << bits | straight) as u64],
+            false => vec![straight as u64],
         };
-        Verilog::Custom(declare + &body)
+        let contents = Contents::File { name: COLUMN_FILE.to_owned(), words: self.list.iter().map(word).collect() };
+        k.comment("Column of each coefficient word, and its transposed address above it if one is needed.");
+        let columns = k.memory("columns", self.list.len(), bits << usize::from(self.across), contents);
+        let twice = |name: &str, value: Expr<'k>| {
+            let once = k.delay(&format!("{name}1"), value);
+            [once, k.delay(&format!("{name}2"), once)]
+        };
+        let [c_address1, c_address2] = twice("c_address", coefficients);
+        let [_, o_base2] = twice("o_base", o_base);
+        let [_, source2] = twice("source", source);
+        let [_, control2] = twice("control", control);
+        let pair = k.delay("pair", columns.read(c_address1));
+        let kept = match self.across {
+            true => source2.at(4).mux(pair.slice(bits, bits), pair.low(bits)),
+            false => pair,
+        };
+        let kept = k.wire("kept", kept);
+        k.delay("coefficient_address", c_address2);
+        k.delay("operand_address", (o_base2 + kept).low(o_base.bits()));
+        k.delay("source", source2);
+        k.delay("control", control2);
     }
 }
 
-/// Verilog that zero-extends the signal `name` of `from` bits to `to` bits.
-fn widen(name: &str, from: usize, to: usize) -> String {
-    match to - from {
-        0 => name.to_string(),
-        more => format!("{{{more}'d0, {name}}}"),
+/// Steps of the case that has most.
+fn largest_of(steps: &[Vec<Step>]) -> usize {
+    steps.iter().map(Vec::len).max().unwrap_or(1)
+}
+
+#[cfg(test)]
+mod tests {
+    use std::collections::VecDeque;
+
+    use super::*;
+    use crate::language::testbench::{check, Reference};
+    use crate::wire::Word;
+
+    const QUADS: usize = 7;
+    const VECTORS: usize = 2;
+
+    /// Two cases of steps with random fields, with or without a column list.
+    fn shape(listed: bool, control_bits: usize) -> Shape {
+        let mut random = fastrand::Rng::with_seed(6);
+        let mut step = |index: usize, count: usize| Step {
+            coefficients: random.usize(..40),
+            columns: random.usize(1..=QUADS),
+            operand: random.usize(..VECTORS) * QUADS,
+            kind: random.u64(..3),
+            flip: random.u64(..4),
+            transposed: random.bool(),
+            align: random.bool(),
+            first: random.bool(),
+            last: random.bool(),
+            opens: index == 0,
+            ends: index + 1 == count,
+            needs: random.usize(..=VECTORS),
+        };
+        let steps = [5, 3].map(|count| (0..count).map(|index| step(index, count)).collect()).into();
+        let list = (0..47).map(|_| [random.usize(..QUADS), random.usize(..QUADS)]).collect();
+        let list = if listed { list } else { Vec::new() };
+        Shape { steps, list, across: listed, words: 47, quads: QUADS, vectors: VECTORS, control_bits }
+    }
+
+    /// The step in execution, its index, the outputs on their way.
+    struct Program {
+        shape: Shape,
+        now: Option<(Step, usize)>,
+        pipe: VecDeque<[Option<Word>; 4]>,
+    }
+
+    impl Program {
+        /// Addresses, selection and control for `column` of the present step.
+        fn put(&self, column: usize) -> [Option<Word>; 4] {
+            let Some((step, _)) = &self.now else { return [None; 4] };
+            let address = step.coefficients + column;
+            let quad = self.shape.list.get(address).map_or(column, |pair| pair[usize::from(step.transposed)]);
+            let source = step.kind | step.flip << 2 | u64::from(step.transposed) << 4;
+            let first = step.first && column == 0;
+            let last = step.last && column + 1 == step.columns;
+            let opens = step.opens && column == 0 && self.shape.control_bits == 4;
+            let control = [opens, last, first, step.align].iter().fold(0, |word, &bit| word << 1 | u64::from(bit));
+            [address as u64, (step.operand + quad) as u64, source, control].map(|word| Some(Word::from(word)))
+        }
+    }
+
+    impl Reference for Program {
+        fn outputs(&mut self, inputs: &[Word]) -> Vec<Option<Word>> {
+            let [column, finished] = [3, 4].map(|k| inputs[k].number() as usize);
+            let of = |of: &dyn Fn(&Step) -> bool| self.now.map(|(step, _)| Word::from(of(&step)));
+            let flags =
+                [of(&|step| step.ends), of(&|step| finished >= step.needs), of(&|step| column + 1 == step.columns)];
+            flags.into_iter().chain(self.pipe[0]).collect()
+        }
+
+        fn clock(&mut self, inputs: &[Word]) {
+            let [case, column] = [0, 3].map(|k| inputs[k].number() as usize);
+            let [start, advance] = [1, 2].map(|k| inputs[k].number() == 1);
+            self.pipe.push_back(self.put(column));
+            self.pipe.pop_front();
+            if start {
+                self.now = Some((self.shape.steps[case][0], 0));
+            } else if let Some((step, index)) = self.now.filter(|_| advance) {
+                let next = if step.ends { 0 } else { index + 1 };
+                self.now = Some((self.shape.steps[case][next], next));
+            }
+        }
+    }
+
+    #[test]
+    fn steps_follow_each_other_and_their_columns_have_their_addresses() {
+        let mut random = fastrand::Rng::with_seed(1);
+        let mut case = 0;
+        let inputs = |cycle: usize| {
+            let start = cycle == 1 || random.u8(..60) == 0;
+            if start {
+                case = random.u64(..2);
+            }
+            let (column, finished) = (random.u64(..QUADS as u64), random.u64(..=VECTORS as u64));
+            vec![case.into(), start.into(), (random.u8(..3) == 0).into(), column.into(), finished.into()]
+        };
+        let stimulus: Vec<Vec<Word>> = (0..3000).map(inputs).collect();
+        for (listed, control_bits) in [(false, 3), (true, 4)] {
+            let shape = shape(listed, control_bits);
+            let block = Steps::of(&shape);
+            let pipe = vec![[None; 4]; block.latency()].into();
+            check(block.kernel.kernel(), &stimulus, &mut Program { shape, now: None, pipe });
+        }
     }
 }

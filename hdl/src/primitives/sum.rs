@@ -3,9 +3,11 @@
 use rust_hdl::prelude::*;
 
 use super::counter::count_bits;
-use super::polynomial_word::{resize, PolynomialWord};
+use super::polynomial_word::PolynomialWord;
 use super::sweep::{BUFFERS, BUFFER_BITS, START};
-use crate::wire::{Wire, Word};
+use crate::kernel_block;
+use crate::language::{concat, Body, Builder, Expr, Kernel, Net, Type};
+use crate::wire::Wire;
 
 /// Adds the counted lanes of each `fill` to the sum of buffer `START`, three cycles later; quad 0 restarts a
 /// coefficient. `read` puts a buffer's sum on `word` after the same two cycles as the search memory, where it is held;
@@ -37,180 +39,227 @@ pub struct Sum {
     pub write_buffer: Wire<In>,
     /// The new sum; valid one cycle after `write`.
     pub write_data: Wire<In>,
-    _layout: PolynomialWord,
-    _apart: bool,
-    _buffers: [Word; BUFFERS + 1],
-    _filled: Option<Added>,
-    _added: Option<Added>,
-    _reads: Option<usize>,
-    _writes: Option<usize>,
+    kernel: Body,
 }
 
-/// A pending addition to a coefficient.
-#[derive(Clone, Copy, Debug)]
-struct Added {
-    index: usize,
-    first: bool,
-    sum: i64,
-}
+/// Taxels of a quad.
+const LANES: usize = 4;
+
+kernel_block!(
+    Sum,
+    clock clk,
+    inputs [fill, fill_address, fill_index, fill_mask, fill_quad, read, read_buffer, write, write_buffer, write_data],
+    outputs [word]
+);
 
 impl Sum {
     /// Sums in `layout` (one lane) over `quads` quads, of coefficients of `fill_bits` bits; `apart` says whether one
     /// subarray is filled while another is searched.
-    pub fn new(layout: PolynomialWord, quads: usize, fill_bits: usize, apart: bool) -> Self {
-        Sum {
+    pub fn new(layout: &PolynomialWord, quads: usize, fill_bits: usize, apart: bool) -> Self {
+        let block = Sum {
             clk: Default::default(),
             fill: Default::default(),
             fill_address: Wire::new(count_bits(quads)),
             fill_index: Wire::new(count_bits(layout.widths.len())),
-            fill_mask: Wire::new(4),
-            fill_quad: Wire::new(4 * fill_bits),
+            fill_mask: Wire::new(LANES),
+            fill_quad: Wire::new(LANES * fill_bits),
             read: Default::default(),
             read_buffer: Wire::new(BUFFER_BITS),
             word: Wire::new(layout.bits()),
             write: Default::default(),
             write_buffer: Wire::new(BUFFER_BITS),
             write_data: Wire::new(layout.bits()),
-            _layout: layout,
-            _apart: apart,
-            _buffers: Default::default(),
-            _filled: None,
-            _added: None,
-            _reads: None,
-            _writes: None,
-        }
+            kernel: Body::default(),
+        };
+        block.bind(kernel(layout, quads, fill_bits, apart))
     }
 }
 
-impl Sum {
-    /// Index of the register that holds the sum of `buffer`.
-    fn buffer(&self, buffer: usize) -> usize {
-        if buffer == START && !self._apart {
-            0
-        } else {
-            buffer
-        }
+/// Number of the buffer that holds the sums about μ = 0.
+fn start(apart: bool) -> usize {
+    if apart {
+        START
+    } else {
+        0
     }
 }
 
-impl Logic for Sum {
-    fn update(&mut self) {
-        if self.clk.pos_edge() {
-            if let Some(buffer) = self._reads.take() {
-                self.word.next = self._buffers[buffer];
+/// The addition of a quad to a coefficient, two cycles after its `fill`.
+#[derive(Clone, Copy)]
+struct Addition<'k> {
+    adds: Expr<'k>,
+    index: Expr<'k>,
+    first: Expr<'k>,
+    added: Expr<'k>,
+}
+
+fn kernel(layout: &PolynomialWord, quads: usize, bits: usize, apart: bool) -> Kernel {
+    let k = Builder::new("sum");
+    let (fill, fill_address) = (k.input("fill", 1), k.input("fill_address", count_bits(quads)));
+    let fill_index = k.input("fill_index", count_bits(layout.widths.len()));
+    let (fill_mask, fill_quad) = (k.input("fill_mask", LANES), k.input("fill_quad", LANES * bits));
+    let (read, read_buffer) = (k.input("read", 1), k.input("read_buffer", BUFFER_BITS));
+    let (write, write_buffer) = (k.input("write", 1), k.input("write_buffer", BUFFER_BITS));
+    let write_data = k.input("write_data", layout.bits());
+    let term = |lane: usize| {
+        let counted = fill_mask.at(lane).mux(fill_quad.slice(lane * bits, bits), k.constant(bits, 0));
+        k.delay(&format!("term_{lane}"), counted.signed())
+    };
+    let terms = [0, 1, 2, 3].map(term);
+    let twice = |name: &str, value| k.delay(name, k.delay(&format!("{name}_1"), value));
+    let addition = Addition {
+        adds: twice("adds", fill),
+        index: twice("index", fill_index),
+        first: twice("first", fill_address.is(0)),
+        added: k.delay("added", terms[0] + terms[1] + (terms[2] + terms[3])),
+    };
+    let written: Vec<Expr> = (0..BUFFERS).map(|b| write & write_buffer.is(b as u64)).collect();
+    let coefficient = |n: usize| {
+        k.scope(&format!("coefficient_{n}"), || {
+            // Own control registers, to limit fan-out; the attribute keeps synthesis from merging them.
+            let own = |name: &str, value: Expr<'_>| {
+                let register = k.register(name, value.ty()).keep();
+                register.set(value);
+                register
+            };
+            let (reads, from) = (own("reads", read), own("from", read_buffer));
+            let writes: Vec<Net> = (0..BUFFERS).map(|b| own(&format!("writes_{b}"), written[b])).collect();
+            let data = layout.coefficient(write_data, n, 0);
+            let buffer = |b: usize| k.register(&format!("buffer_{b}"), Type::signed(layout.widths[n]));
+            let buffers: Vec<Net> = (0..BUFFERS + usize::from(apart)).map(buffer).collect();
+            let others: Vec<(u64, Expr)> = (1..).zip(buffers[1..].iter().map(Net::get)).collect();
+            let word = k.register("word", Type::signed(layout.widths[n]));
+            k.when(*reads, || word.set(from.case(&others, *buffers[0])));
+            for (writes, buffer) in writes.iter().zip(&buffers) {
+                k.when(writes.get(), || buffer.set(data));
             }
-            if let Some(buffer) = self._writes.take() {
-                self._buffers[buffer] = self.write_data.val();
-            }
-            let named = |wire: &Wire<In>| self.buffer(wire.val().number() as usize);
-            let (reads, writes) = (named(&self.read_buffer), named(&self.write_buffer));
-            self._reads = self.read.val().then_some(reads);
-            self._writes = self.write.val().then_some(writes);
-            let filled = self._filled.take();
-            if let Some(Added { index, first, sum: added }) = std::mem::replace(&mut self._added, filled) {
-                if let Some(&width) = self._layout.widths.get(index) {
-                    let start = self.buffer(START);
-                    let before = self._layout.get(&self._buffers[start], 0)[index];
-                    let sum = added + if first { 0 } else { before };
-                    self._buffers[start].set(self._layout.offset(index), width, sum as u64);
-                }
-            }
-            if self.fill.val() {
-                let bits = self.fill_quad.width() / 4;
-                let counted = |lane: &usize| self.fill_mask.val().field(*lane, 1) == 1;
-                let sum = (0..4).filter(counted).map(|lane| self.fill_quad.val().signed(lane, bits)).sum();
-                let index = self.fill_index.val().number() as usize;
-                self._filled = Some(Added { index, first: self.fill_address.val().number() == 0, sum });
+            add(&k, addition, n, buffers[start(apart)]);
+            word.get()
+        })
+    };
+    let sums: Vec<Expr> = (0..layout.widths.len()).map(coefficient).collect();
+    k.wire("word", concat(&sums.into_iter().rev().collect::<Vec<_>>()));
+    k.finish()
+}
+
+/// Adds to coefficient `n`, which is in `buffer`.
+fn add<'k>(k: &'k Builder, addition: Addition<'k>, n: usize, buffer: Net<'k>) {
+    let Addition { adds, index, first, added } = addition;
+    let bits = buffer.bits();
+    let before = first.mux(k.signed_constant(bits, 0), *buffer);
+    k.when(adds & index.is(n as u64), || buffer.set((added.resize(bits) + before).resize(bits)));
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::language::testbench::{check, random_word, Reference};
+    use crate::wire::Word;
+
+    const QUADS: usize = 9;
+    const FILL_BITS: usize = 20;
+    const WIDTHS: [u32; 3] = [27, 25, 24];
+
+    /// A quad on its way to its coefficient.
+    #[derive(Clone, Copy)]
+    struct Added {
+        index: usize,
+        first: bool,
+        sum: i64,
+    }
+
+    /// The buffers' coefficients, undefined before they are written; reads, writes and additions on their way.
+    struct Buffers {
+        layout: PolynomialWord,
+        apart: bool,
+        buffers: [[Option<i64>; WIDTHS.len()]; BUFFERS + 1],
+        word: [Option<i64>; WIDTHS.len()],
+        added: [Option<Added>; 2],
+        reads: Option<usize>,
+        writes: Option<usize>,
+    }
+
+    impl Buffers {
+        fn buffer(&self, word: &Word) -> usize {
+            match word.number() as usize {
+                START => start(self.apart),
+                other => other,
             }
         }
     }
 
-    fn connect(&mut self) {
-        self.word.connect();
+    impl Reference for Buffers {
+        fn outputs(&mut self, _: &[Word]) -> Vec<Option<Word>> {
+            let all: Option<Vec<i64>> = self.word.iter().copied().collect();
+            let word = |all: Vec<i64>| {
+                let mut word = Word::default();
+                let polynomial = std::array::from_fn(|n| all.get(n).copied().unwrap_or(0));
+                self.layout.put(&mut word, 0, &polynomial);
+                word
+            };
+            vec![all.map(word)]
+        }
+
+        fn clock(&mut self, inputs: &[Word]) {
+            if let Some(buffer) = self.reads.take() {
+                self.word = self.buffers[buffer];
+            }
+            let before = self.buffers;
+            if let Some(buffer) = self.writes.take() {
+                let data = self.layout.get(&inputs[9], 0);
+                self.buffers[buffer] = std::array::from_fn(|n| Some(data[n]));
+            }
+            let start = start(self.apart);
+            if let Some(Added { index, first, sum }) = self.added[0].filter(|added| added.index < WIDTHS.len()) {
+                let old = if first { Some(0) } else { before[start][index] };
+                let bits = WIDTHS[index];
+                self.buffers[start][index] = old.map(|old| (old + sum) << (64 - bits) >> (64 - bits));
+            }
+            let counted = |lane: &usize| inputs[3].field(*lane, 1) == 1;
+            let sum = (0..LANES).filter(counted).map(|lane| inputs[4].signed(lane, FILL_BITS)).sum();
+            let (index, first) = (inputs[2].number() as usize, inputs[1].number() == 0);
+            let enters = (inputs[0].number() == 1).then_some(Added { index, first, sum });
+            self.added = [self.added[1], enters];
+            self.reads = (inputs[5].number() == 1).then(|| self.buffer(&inputs[6]));
+            // Sweeps never write START.
+            self.writes = (inputs[7].number() == 1).then(|| inputs[8].number() as usize);
+        }
     }
 
-    fn hdl(&self) -> Verilog {
-        let bits = self.fill_quad.width() / 4;
-        let wide = bits + 2;
-        let index_bits = self.fill_index.width();
-        let terms: Vec<String> = (0..4).map(|lane| resize(&format!("t{lane}"), bits, wide)).collect();
-        let lanes: String = (0..4)
-            .map(|lane| {
-                format!(
-                    "\
-reg [{end}:0] t{lane};
-always @(posedge clk) t{lane} <= fill_mask[{lane}] ? fill_quad[{low} +: {bits}] : {bits}'d0;
-",
-                    end = bits - 1,
-                    low = lane * bits,
-                )
-            })
-            .collect();
-        let buffers = BUFFERS + usize::from(self._apart);
-        let names: Vec<String> = (0..buffers).map(|b| format!("buffer{b}")).collect();
-        let decoded: Vec<String> = (0..BUFFERS).rev().map(|b| format!("write && write_buffer == 2'd{b}")).collect();
-        let decoded = decoded.join(", ");
-        let coefficients: String = self
-            ._layout
-            .widths
-            .iter()
-            .enumerate()
-            .map(|(k, &width)| {
-                let field = format!("[{} +: {width}]", self._layout.offset(k));
-                let choices: String =
-                    (1..buffers).map(|b| format!("      2'd{b}: word{field} <= buffer{b}{field};\n")).collect();
-                let writes: String = (0..BUFFERS)
-                    .map(|b| format!("  if (writes{k}[{b}]) buffer{b}{field} <= write_data{field};\n"))
-                    .collect();
-                format!(
-                    "\
-reg reads{k};
-reg [1:0] from{k};
-reg [{last}:0] writes{k};
-(* keep *) always @(posedge clk) begin
-  reads{k} <= read;
-  from{k} <= read_buffer;
-  writes{k} <= {{{decoded}}};
-end
-always @(posedge clk) begin
-  if (reads{k}) begin
-    case (from{k})
-{choices}      default: word{field} <= buffer0{field};
-    endcase
-  end
-{writes}  if (adds && index == {index_bits}'d{k})
-    buffer{start}{field} <= {added} + (first ? {width}'d0 : buffer{start}{field});
-end
-",
-                    last = BUFFERS - 1,
-                    start = self.buffer(START),
-                    added = resize("added", wide, width),
-                )
-            })
-            .collect();
-        Verilog::Custom(format!(
-            "\
-{lanes}reg filled, adds, first1, first;
-reg [{index_end}:0] index1, index;
-reg [{wide_end}:0] added;
-reg [{end}:0] {names};
-always @(posedge clk) begin
-  filled <= fill;
-  adds <= filled;
-  index1 <= fill_index;
-  index <= index1;
-  first1 <= fill_address == {address_bits}'d0;
-  first <= first1;
-  added <= {terms};
-end
-// Each coefficient has its own control registers, to limit fan-out; the attribute keeps synthesis from merging them.
-{coefficients}",
-            wide_end = wide - 1,
-            index_end = index_bits - 1,
-            end = self._layout.bits() - 1,
-            address_bits = self.fill_address.width(),
-            terms = terms.join(" + "),
-            names = names.join(", "),
-        ))
+    fn adds_and_keeps_buffers_apart(apart: bool) {
+        let layout = PolynomialWord::new(1, &WIDTHS);
+        let block = Sum::new(&layout, QUADS, FILL_BITS, apart);
+        let mut random = fastrand::Rng::with_seed(8);
+        let inputs = |_| {
+            vec![
+                random.bool().into(),
+                random.u64(..QUADS as u64).into(),
+                random.u64(..4).into(),
+                random.u64(..16).into(),
+                random_word(&mut random, LANES * FILL_BITS),
+                random.bool().into(),
+                random.u64(..4).into(),
+                (random.u8(..4) == 0).into(),
+                random.u64(..BUFFERS as u64).into(),
+                random_word(&mut random, layout.bits()),
+            ]
+        };
+        let stimulus: Vec<Vec<Word>> = (0..3000).map(inputs).collect();
+        let mut reference = Buffers {
+            layout,
+            apart,
+            buffers: Default::default(),
+            word: Default::default(),
+            added: Default::default(),
+            reads: None,
+            writes: None,
+        };
+        check(block.kernel.kernel(), &stimulus, &mut reference);
+    }
+
+    #[test]
+    fn sums_are_those_of_integers_in_each_buffer() {
+        adds_and_keeps_buffers_apart(true);
+        adds_and_keeps_buffers_apart(false);
     }
 }

@@ -4,6 +4,7 @@ pub use dermis_golden::fixed::resources::position_bits;
 use dermis_golden::fixed::resources::SEARCH_BUFFERS;
 
 use crate::language::Expr;
+#[cfg(test)]
 use crate::wire::Word;
 
 /// Width of a squared distance in grid steps of the last level, in bits.
@@ -17,21 +18,6 @@ pub const BUFFER_BITS: usize = 2;
 pub const START: usize = 3;
 /// Number of buffers that sweeps write.
 pub const BUFFERS: usize = SEARCH_BUFFERS;
-
-/// One sweep.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Sweep {
-    /// Centre of the nine candidates, x and y in grid steps.
-    pub centre: [i64; 2],
-    /// |centre|².
-    pub square: i64,
-    /// Buffer that holds the polynomials about the centre.
-    pub buffer: usize,
-    /// The sweep belongs to the coarse grid.
-    pub coarse: bool,
-    /// The next sweep is set up only after the comparison of this one.
-    pub closes: bool,
-}
 
 /// Bit offset of each field in the word: centre x, centre y, square, buffer, coarse, closes; last the width of the
 /// word.
@@ -47,6 +33,52 @@ pub fn sweep_bits() -> usize {
     offsets()[6]
 }
 
+/// The fields of a sweep's word.
+#[derive(Clone, Copy, Debug)]
+pub struct Fields<'k> {
+    /// Centre of the nine candidates, x and y in grid steps, signed.
+    pub centre: [Expr<'k>; 2],
+    /// |centre|².
+    pub square: Expr<'k>,
+    /// Buffer that holds the polynomials about the centre.
+    pub buffer: Expr<'k>,
+    /// The sweep belongs to the coarse grid.
+    pub coarse: Expr<'k>,
+    /// The next sweep is set up only after the comparison of this one.
+    pub closes: Expr<'k>,
+}
+
+impl<'k> Fields<'k> {
+    /// The fields of `word`.
+    pub fn of(word: Expr<'k>) -> Self {
+        let [x, y, square, buffer, coarse, closes, _] = offsets();
+        Fields {
+            centre: [x, y].map(|offset| word.slice(offset, position_bits()).signed()),
+            square: word.slice(square, square_bits()),
+            buffer: word.slice(buffer, BUFFER_BITS),
+            coarse: word.at(coarse),
+            closes: word.at(closes),
+        }
+    }
+}
+
+/// One sweep in plain integers, for references; fields as of [`Fields`].
+#[cfg(test)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Sweep {
+    /// Centre of the nine candidates, x and y in grid steps.
+    pub centre: [i64; 2],
+    /// |centre|².
+    pub square: i64,
+    /// Buffer that holds the polynomials about the centre.
+    pub buffer: usize,
+    /// The sweep belongs to the coarse grid.
+    pub coarse: bool,
+    /// The next sweep is set up only after the comparison of this one.
+    pub closes: bool,
+}
+
+#[cfg(test)]
 impl Sweep {
     /// The sweep as a word.
     pub fn word(&self) -> Word {
@@ -72,41 +104,6 @@ impl Sweep {
             closes: word.field(closes, 1) == 1,
         }
     }
-}
-
-/// The fields of a sweep's word that the comparison reads.
-#[derive(Clone, Copy, Debug)]
-pub struct Fields<'k> {
-    /// As [`Sweep::centre`], signed.
-    pub centre: [Expr<'k>; 2],
-    /// As [`Sweep::coarse`].
-    pub coarse: Expr<'k>,
-    /// As [`Sweep::closes`].
-    pub closes: Expr<'k>,
-}
-
-impl<'k> Fields<'k> {
-    /// The fields of `word`.
-    pub fn of(word: Expr<'k>) -> Self {
-        let [x, y, _, _, coarse, closes, _] = offsets();
-        let centre = [x, y].map(|offset| word.slice(offset, position_bits()).signed());
-        Fields { centre, coarse: word.at(coarse), closes: word.at(closes) }
-    }
-}
-
-/// Verilog wires for the fields of the sweep in signal `word`: `<prefix>centre_x`, `centre_y`, `square`, `buffer`,
-/// `coarse`, `closes`.
-pub fn unpack(word: &str, prefix: &str) -> String {
-    let names = ["centre_x", "centre_y", "square", "buffer", "coarse", "closes"];
-    let at = offsets();
-    names
-        .iter()
-        .enumerate()
-        .map(|(k, name)| match at[k + 1] - at[k] {
-            1 => format!("wire {prefix}{name} = {word}[{}];\n", at[k]),
-            bits => format!("wire [{}:0] {prefix}{name} = {word}[{}:{}];\n", bits - 1, at[k + 1] - 1, at[k]),
-        })
-        .collect()
 }
 
 #[cfg(test)]

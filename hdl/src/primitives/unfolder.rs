@@ -1,12 +1,12 @@
 //! Parities of a v_ij back to taxels, scaled to the units of the search.
 
-use dermis_golden::fixed::arith::{hadamard, round_shift};
 use dermis_golden::fixed::schedule::EXPONENTS;
 use rust_hdl::prelude::*;
 
-use super::butterfly::Butterfly;
 use super::counter::count_bits;
-use crate::wire::{Wire, Word};
+use crate::kernel_block;
+use crate::language::{concat, Body, Builder, Expr, Kernel};
+use crate::wire::Wire;
 
 /// Butterfly, then v_ij / 4^(i+j), rounded half up: taxels two cycles after their parities.
 #[derive(LogicBlock)]
@@ -19,73 +19,82 @@ pub struct Unfolder {
     pub index: Wire<In>,
     /// Four taxels, two bits wider, signed; two cycles after `quad`.
     pub taxels: Wire<Out>,
-    _sums: [i64; 4],
-    _vectors: usize,
+    kernel: Body,
 }
+
+kernel_block!(Unfolder, clock clk, inputs [quad, index], outputs [taxels]);
 
 impl Unfolder {
     /// For parities of `bits` bits of `vectors` v_ij.
     pub fn new(bits: usize, vectors: usize) -> Self {
-        Unfolder {
+        let block = Unfolder {
             clk: Default::default(),
             quad: Wire::new(4 * bits),
             index: Wire::new(count_bits(vectors)),
             taxels: Wire::new(4 * (bits + 2)),
-            _sums: [0; 4],
-            _vectors: vectors,
-        }
-    }
-
-    fn shift(&self, index: usize) -> u32 {
-        EXPONENTS.get(index).map_or(0, |(i, j)| 2 * (i + j))
+            kernel: Body::default(),
+        };
+        block.bind(kernel(bits, vectors))
     }
 }
 
-impl Logic for Unfolder {
-    fn update(&mut self) {
-        if self.clk.pos_edge() {
-            let bits = self.quad.width() / 4;
-            let shift = self.shift(self.index.val().number() as usize);
-            self.taxels.next = Word::of_fields(&self._sums.map(|sum| round_shift(sum, shift)), bits + 2);
-            self._sums = hadamard(std::array::from_fn(|lane| self.quad.val().signed(lane, bits)));
-        }
-    }
+/// Right shift of v_ij of this index: 4^(i+j).
+fn shift(index: usize, vectors: usize) -> u32 {
+    EXPONENTS[..vectors].get(index).map_or(0, |(i, j)| 2 * (i + j))
+}
 
-    fn connect(&mut self) {
-        self.taxels.connect();
-    }
+/// The four-point Hadamard butterfly of four signed fields, two bits wider.
+fn hadamard<'k>(quad: Expr<'k>) -> [Expr<'k>; 4] {
+    let bits = quad.bits() / 4;
+    let wide = bits + 2;
+    let [a, b, c, d] = [0, 1, 2, 3].map(|lane| quad.slice(lane * bits, bits).signed().extend(wide));
+    [a + b + c + d, a - b + c - d, a + b - c - d, a - b - c + d].map(|sum| sum.resize(wide))
+}
 
-    fn hdl(&self) -> Verilog {
-        let bits = self.quad.width() / 4;
-        let wide = bits + 2;
-        let index_bits = self.index.width();
-        let cases: String = (0..self._vectors)
-            .map(|index| format!("    {index_bits}'d{index}: amount = 3'd{};\n", self.shift(index)))
-            .collect();
-        let Verilog::Custom(butterfly) = Butterfly::new(bits).hdl() else { return Verilog::Empty };
-        Verilog::Custom(format!(
-            "\
-reg [{all_end}:0] sums;
-{butterfly}
-reg [2:0] amount;
-always @(*) begin
-  case (index)
-{cases}    default: amount = 3'd0;
-  endcase
-end
-genvar l;
-generate
-  for (l = 0; l < 4; l = l + 1) begin : lane
-    wire signed [{wide}:0] doubled = {{sums[l * {wide} +: {wide}], 1'b0}};
-    wire signed [{wide}:0] moved = doubled >>> amount;
-    wire [{wide1}:0] half_up = {{moved[{wide}], moved}} + {wide2}'d1;
-    always @(posedge clk) taxels[l * {wide} +: {wide}] <= half_up[{wide}:1];
-    wire unused = &{{1'b0, half_up[{wide1}], half_up[0]}};
-  end
-endgenerate",
-            all_end = 4 * wide - 1,
-            wide1 = wide + 1,
-            wide2 = wide + 2,
-        ))
+fn kernel(bits: usize, vectors: usize) -> Kernel {
+    let wide = bits + 2;
+    let k = Builder::new("unfolder");
+    let (quad, index) = (k.input("quad", 4 * bits), k.input("index", count_bits(vectors)));
+    let shifts: Vec<u64> = (0..1 << index.bits()).map(|index| shift(index, vectors).into()).collect();
+    let amount = k.wire("amount", index.table(3, &shifts));
+    let sums = hadamard(quad);
+    let taxel = |lane: usize| {
+        let sum = k.delay(&format!("sum_{lane}"), sums[lane]);
+        let moved = k.wire(&format!("moved_{lane}"), sum.shift_left(1).shift_right_by(amount));
+        k.delay(&format!("taxel_{lane}"), moved.round_shift(1).low(wide))
+    };
+    let taxels: Vec<Expr> = (0..4).rev().map(taxel).collect();
+    k.wire("taxels", concat(&taxels));
+    k.finish()
+}
+
+#[cfg(test)]
+mod tests {
+    use dermis_golden::fixed::arith::{hadamard, round_shift};
+
+    use super::*;
+    use crate::language::testbench::{check, random_word, Pipeline};
+    use crate::wire::Word;
+
+    const BITS: usize = 19;
+
+    #[test]
+    fn taxels_are_those_of_the_model() {
+        let vectors = EXPONENTS.len();
+        let block = Unfolder::new(BITS, vectors);
+        let mut random = fastrand::Rng::with_seed(9);
+        let quads: Vec<(Word, usize)> =
+            (0..2000).map(|_| (random_word(&mut random, 4 * BITS), random.usize(..vectors))).collect();
+        // The index follows its quad by a cycle.
+        let stimulus: Vec<Vec<Word>> =
+            (1..quads.len()).map(|n| vec![quads[n].0, Word::from(quads[n - 1].1 as u64)]).collect();
+        let mut at = 0;
+        let taxels = |inputs: &[Word]| {
+            at += 1;
+            let quad = std::array::from_fn(|lane| inputs[0].signed(lane, BITS));
+            let all = hadamard(quad).map(|sum| round_shift(sum, shift(quads[at].1, vectors)));
+            vec![Some(Word::of_fields(&all, BITS + 2))]
+        };
+        check(block.kernel.kernel(), &stimulus, &mut Pipeline::new(2, 1, taxels));
     }
 }

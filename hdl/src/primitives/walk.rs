@@ -4,9 +4,11 @@ use dermis_golden::fixed::formats::HALVINGS;
 use dermis_golden::fixed::search::COARSE_CENTRES;
 use rust_hdl::prelude::*;
 
-use super::store::{base, base_bits, base_of};
-use super::sweep::{offsets, position_bits, square_bits, sweep_bits, unpack, Sweep, BUFFERS, BUFFER_BITS, START};
-use crate::wire::{Wire, Word};
+use super::store::{base, base_bits};
+use super::sweep::{position_bits, square_bits, sweep_bits, Fields, BUFFER_BITS, START};
+use crate::kernel_block;
+use crate::language::{concat, Body, Builder, Expr, Kernel, Type};
+use crate::wire::Wire;
 
 /// Sweeps over the coarse tiles, then the halvings, then a last sweep that only moves to the best position.
 ///
@@ -54,35 +56,32 @@ pub struct Walk {
     pub next_base: Wire<Out>,
     /// Buffer to write, one cycle after the other outputs.
     pub target: Wire<Out>,
-    /// Word of the sweep (`Sweep`).
+    /// Word of the sweep (`Fields`).
     pub sweep: Wire<Out>,
     /// Squared radius of the search disc in grid steps of the level.
     pub radius: Wire<Out>,
-    _quads: usize,
-    _state: State,
+    kernel: Body,
 }
+
+kernel_block!(
+    Walk,
+    clock clk,
+    inputs [rst, begin_frame, enabled, set_up, judged, improved, judged_sweep, best_x, best_y],
+    outputs [step, last, next_halves, chains, source, next_base, target, sweep, radius]
+);
 
 /// Number of sweeps whose candidates are compared.
 const JUDGED: usize = COARSE_CENTRES.len() + HALVINGS as usize;
-const SWEEP_BITS: usize = 4;
-
-#[derive(Clone, Copy, Debug, Default)]
-struct State {
-    count: usize,
-    sweep: Sweep,
-    kept: Sweep,
-    radius: i64,
-    /// The target buffer of the sweep is output in the next cycle.
-    chosen: bool,
-    /// The target buffer on the output.
-    target: usize,
-}
+/// Width of the number of a sweep, in bits.
+const COUNT_BITS: usize = 4;
+/// Squared radius of the search disc in steps of the coarse grid.
+const COARSE_RADIUS: u64 = 9;
 
 impl Walk {
     /// For a search memory with buffers of `quads` quads.
     pub fn new(quads: usize) -> Self {
         let p = position_bits();
-        Walk {
+        let block = Walk {
             clk: Default::default(),
             rst: Default::default(),
             begin_frame: Default::default(),
@@ -102,9 +101,9 @@ impl Walk {
             target: Wire::new(BUFFER_BITS),
             sweep: Wire::new(sweep_bits()),
             radius: Wire::new(square_bits()),
-            _quads: quads,
-            _state: State::default(),
-        }
+            kernel: Body::default(),
+        };
+        block.bind(kernel(quads))
     }
 }
 
@@ -119,193 +118,275 @@ fn coarse_moves() -> Vec<[i64; 2]> {
     COARSE_CENTRES.iter().map(step).collect()
 }
 
-impl Walk {
-    fn advance(&mut self) {
-        let s = &mut self._state;
-        let coarse = s.count < COARSE_CENTRES.len();
-        let halving = !coarse && s.count < JUDGED;
-        let best = [&self.best_x, &self.best_y].map(|wire| wire.val().signed(0, position_bits()));
-        let from = if coarse { s.sweep } else { s.kept };
-        let by = match coarse_moves().get(s.count) {
-            Some(by) => *by,
-            None => [best[0] - from.centre[0], best[1] - from.centre[1]],
-        };
-        let moved = [from.centre[0] + by[0], from.centre[1] + by[1]];
-        let square = from.square + 2 * (by[0] * from.centre[0] + by[1] * from.centre[1]) + by[0].abs() + by[1].abs();
-        let double = u32::from(halving);
-        let free = (1..=BUFFERS).map(|b| b % BUFFERS).find(|b| *b != from.buffer && *b != s.kept.buffer);
-        let buffer = if coarse { free.unwrap_or(0) } else { s.kept.buffer };
-        let closes = !coarse || s.count + 1 == COARSE_CENTRES.len();
-        s.sweep = Sweep { centre: moved.map(|c| c << double), square: square << (2 * double), buffer, coarse, closes };
-        s.radius <<= 2 * double;
-        // The first coarse sweep replaces START as the best so far; its centre is one step away from μ = 0.
-        if !coarse || s.count == 0 {
-            s.kept = s.sweep;
-        }
-        s.count += 1;
-        self.source.next = Word::from(from.buffer as u64);
-        s.chosen = true;
-        self.step.next = Word::of_fields(&[by[0], by[1], i64::from(halving)], 2);
-        self.last.next = !coarse && !halving;
-        self.chains.next = !closes;
-    }
+/// The coordinate `from` after the move `go` of −1, 0 or 1.
+fn moved<'k>(from: Expr<'k>, go: Expr<'k>) -> Expr<'k> {
+    (from + go.signed().resize(from.bits())).resize(from.bits())
 }
 
-impl Logic for Walk {
-    fn update(&mut self) {
-        if self.clk.pos_edge() {
-            let s = &self._state;
-            let next = if s.count < COARSE_CENTRES.len() { s.target } else { s.kept.buffer };
-            self.next_base.next = Word::from(base(next, self._quads) as u64);
-            if self.begin_frame.val() {
+/// (c + u)² − c² for the move `go` of −1, 0 or 1 from `from`, modulo the width of a square.
+fn grows<'k>(k: &'k Builder, from: Expr<'k>, go: Expr<'k>) -> Expr<'k> {
+    let bits = square_bits();
+    let (one, twice) = (k.constant(bits, 1), from.shift_left(1).resize(bits).unsigned());
+    go.at(1).mux((one - twice).low(bits), go.at(0).mux((one + twice).low(bits), k.constant(bits, 0)))
+}
+
+/// A number times 2^`by` with its own width.
+fn shifted(value: Expr<'_>, by: usize) -> Expr<'_> {
+    value.shift_left(by).low(value.bits())
+}
+
+fn kernel(quads: usize) -> Kernel {
+    let (p, q) = (position_bits(), square_bits());
+    let (final_coarse, final_halving) = (COARSE_CENTRES.len() as u64 - 1, JUDGED as u64 - 1);
+    let k = Builder::new("walk");
+    let (rst, begin_frame, enabled) = (k.input("rst", 1), k.input("begin_frame", 1), k.input("enabled", 1));
+    let (set_up, judged, improved) = (k.input("set_up", 1), k.input("judged", 1), k.input("improved", 1));
+    let judged_sweep = k.input("judged_sweep", sweep_bits());
+    let best = [k.input("best_x", p), k.input("best_y", p)];
+    let (bit, buffer) = (Type::unsigned(1), Type::unsigned(BUFFER_BITS));
+    let zero = k.constant(1, 0);
+    let number = |buffer: usize| k.constant(BUFFER_BITS, buffer as u64);
+    let count = k.register("count", Type::unsigned(COUNT_BITS));
+    let (is_coarse, is_halving) = (k.register("is_coarse", bit), k.register("is_halving", bit));
+    let (step, last) = (k.register("step", Type::unsigned(5)), k.register("last", bit));
+    let chains = k.state("chains", bit, rst, 0);
+    let (source, target) = (k.register("source", buffer), k.register("target", buffer));
+    let radius = k.register("radius", Type::unsigned(q));
+    let kept = k.register("kept", Type::unsigned(sweep_bits()));
+    let (closes, coarse) = (k.register("taken_closes", bit), k.register("taken_coarse", bit));
+    let place = k.register("place", Type::unsigned(q + 2 * p));
+
+    let at_last_coarse = k.wire("at_last_coarse", count.is(final_coarse));
+    let closing = k.wire("closing", !*is_coarse | at_last_coarse);
+    k.wire("next_halves", *is_halving);
+    k.comment(
+        "A coarse sweep set up in the cycle of `judged` already uses its result for the choice of buffers; a halving",
+    );
+    k.comment("is set up later.");
+    let keeps = k.wire("keeps", judged & improved & Fields::of(judged_sweep).coarse);
+    let kept_buffer = k.wire("kept_buffer", Fields::of(*kept).buffer);
+    let sweep = k.wire("sweep", concat(&[*closes, *coarse, *target, *place]));
+    let from = Fields::of(k.wire("from", is_coarse.mux(sweep, *kept)));
+
+    k.comment(
+        "The best position is at most one step from the centre of its polynomials, so two bits of the difference are",
+    );
+    k.comment("the move. Move, starting point and destination are registered before the sweep is set up.");
+    let moves = coarse_moves();
+    let axis = |axis: usize, name: &str| {
+        let table: Vec<u64> = (0..1 << COUNT_BITS).map(|n| moves.get(n).map_or(0, |by| by[axis] as u64 & 3)).collect();
+        let to_best = (best[axis].low(2) - from.centre[axis].low(2)).low(2);
+        let go = k.delay(&format!("go_{name}"), is_coarse.mux(count.table(2, &table), to_best));
+        (go, k.delay(&format!("base_{name}"), from.centre[axis]))
+    };
+    let [(go_x, base_x), (go_y, base_y)] = [axis(0, "x"), axis(1, "y")];
+    let base_square = k.delay("base_square", from.square);
+    let base_buffer = k.delay("base_buffer", from.buffer);
+    let bases: Vec<u64> = (0..1 << BUFFER_BITS).map(|b| base(b, quads) as u64).collect();
+    k.delay("next_base", from.buffer.table(base_bits(quads), &bases));
+    let to_square = base_square + grows(&k, base_x, go_x) + grows(&k, base_y, go_y);
+    let at_square = k.delay("at_square", to_square.low(q));
+    let at_x = k.delay("at_x", moved(base_x, go_x));
+    let at_y = k.delay("at_y", moved(base_y, go_y));
+    let next = [(at_square, 2), (at_y, 1), (at_x, 1)];
+    let next = next.map(|(value, by)| is_halving.mux(shifted(value, by), value.unsigned()));
+    let next = k.wire("next", concat(&next));
+
+    k.comment(
+        "A coarse sweep writes the first of buffers 1, 2, 0 that is neither read nor the best, chosen one cycle after",
+    );
+    k.comment("the set-up, when a `judged` in the cycle of the set-up has taken effect. The first, which reads START,");
+    k.comment("writes 1. Other sweeps work in place.");
+    let unused = |b: u64| !source.is(b) & !kept_buffer.is(b);
+    let other = unused(2).mux(number(2), number(0));
+    let free = k.wire("free", (source.is(START as u64) | unused(1)).mux(number(1), other));
+    let (set_up_1, coarse_1) = (k.delay("set_up_1", set_up), k.delay("coarse_1", *is_coarse));
+    k.when(set_up_1, || target.set(coarse_1.mux(free, *source)));
+    k.when(set_up, || {
+        count.set(count.plus(1));
+        k.when(at_last_coarse, || is_coarse.set(zero));
+        is_halving.set((*is_halving | at_last_coarse) & !count.is(final_halving));
+        closes.set(closing);
+        coarse.set(*is_coarse);
+        place.set(next);
+        k.when(*is_halving, || radius.set(shifted(*radius, 2)));
+        chains.set(!closing);
+    });
+    k.when(set_up & !begin_frame, || {
+        step.set(concat(&[*is_halving, go_y, go_x]));
+        last.set(!*is_coarse & !*is_halving);
+        source.set(base_buffer);
+    });
+    k.when(keeps, || kept.set(judged_sweep));
+    k.when(set_up & (!*is_coarse | count.is(0)), || {
+        kept.set(concat(&[closing, *is_coarse, is_coarse.mux(number(1), kept_buffer), next]));
+    });
+    k.when(begin_frame, || {
+        count.set(enabled.mux(k.constant(COUNT_BITS, 0), k.constant(COUNT_BITS, JUDGED as u64)));
+        is_coarse.set(enabled);
+        is_halving.set(zero);
+        closes.set(zero);
+        coarse.set(zero);
+        place.set(zero.repeat(place.bits()));
+        target.set(number(START));
+        kept.set(concat(&[zero, zero, number(START), zero.repeat(place.bits())]));
+        radius.set(k.constant(q, COARSE_RADIUS));
+    });
+    k.finish()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::sweep::{Sweep, BUFFERS};
+    use super::*;
+    use crate::language::testbench::{check, Reference};
+    use crate::wire::Word;
+
+    const QUADS: usize = 25;
+
+    /// The search in plain integers; a sweep is computed in the cycle in which it is set up.
+    #[derive(Clone, Copy, Debug, Default)]
+    struct Search {
+        /// A search has started; before, nothing is defined.
+        begun: bool,
+        count: usize,
+        sweep: Sweep,
+        kept: Sweep,
+        radius: i64,
+        /// The target buffer of the sweep is output in the next cycle.
+        chosen: bool,
+        target: usize,
+        chains: Option<bool>,
+        next_base: Option<usize>,
+        /// Step, last, source of a sweep.
+        taken: Option<(Word, bool, usize)>,
+    }
+
+    impl Search {
+        fn is_coarse(&self) -> bool {
+            self.count < COARSE_CENTRES.len()
+        }
+
+        fn advance(&mut self, best: [i64; 2]) {
+            let coarse = self.is_coarse();
+            let halving = !coarse && self.count < JUDGED;
+            let from = if coarse { self.sweep } else { self.kept };
+            let by = match coarse_moves().get(self.count) {
+                Some(by) => *by,
+                None => [best[0] - from.centre[0], best[1] - from.centre[1]],
+            };
+            let double = i64::from(halving) + 1;
+            let centre = [0, 1].map(|axis| double * (from.centre[axis] + by[axis]));
+            let free = (1..=BUFFERS).map(|b| b % BUFFERS).find(|b| *b != from.buffer && *b != self.kept.buffer);
+            let buffer = if coarse { free.unwrap_or(0) } else { self.kept.buffer };
+            let closes = !coarse || self.count + 1 == COARSE_CENTRES.len();
+            let square = centre[0] * centre[0] + centre[1] * centre[1];
+            self.sweep = Sweep { centre, square, buffer, coarse, closes };
+            self.radius *= double * double;
+            if !coarse || self.count == 0 {
+                self.kept = self.sweep;
+            }
+            self.count += 1;
+            self.chosen = true;
+            let step = Word::of_fields(&[by[0], by[1], i64::from(halving)], 2);
+            self.taken = Some((step, !coarse && !halving, from.buffer));
+            self.chains = Some(!closes);
+        }
+    }
+
+    impl Reference for Search {
+        fn outputs(&mut self, _: &[Word]) -> Vec<Option<Word>> {
+            let number = |value: usize| Word::from(value as u64);
+            let begun = |word: Word| self.begun.then_some(word);
+            vec![
+                self.taken.map(|(step, ..)| step),
+                self.taken.map(|(_, last, _)| last.into()),
+                self.chains.map(Word::from),
+                self.taken.map(|(.., source)| number(source)),
+                begun(number(self.target)),
+                begun(Word::from(self.radius as u64)),
+                begun((COARSE_CENTRES.len()..JUDGED).contains(&self.count).into()),
+                begun(Sweep { buffer: self.target, ..self.sweep }.word()),
+                self.next_base.map(number),
+            ]
+        }
+
+        fn clock(&mut self, inputs: &[Word]) {
+            let [rst, begin_frame, enabled, set_up, judged, improved] =
+                [0, 1, 2, 3, 4, 5].map(|k| inputs[k].number() == 1);
+            let next = if self.is_coarse() { self.target } else { self.kept.buffer };
+            self.next_base = self.begun.then_some(base(next, QUADS));
+            if begin_frame {
                 let start = Sweep { buffer: START, ..Sweep::default() };
-                let count = if self.enabled.val() { 0 } else { JUDGED };
-                self._state = State { count, radius: 9, sweep: start, kept: start, chosen: false, target: START };
+                let count = if enabled { 0 } else { JUDGED };
+                let before = *self;
+                *self = Search { begun: true, count, radius: 9, sweep: start, kept: start, target: START, ..before };
+                self.chosen = false;
             }
-            if std::mem::take(&mut self._state.chosen) {
-                self._state.target = self._state.sweep.buffer;
+            if std::mem::take(&mut self.chosen) {
+                self.target = self.sweep.buffer;
             }
-            let judged = Sweep::of_word(&self.judged_sweep.val());
-            if self.judged.val() && self.improved.val() && judged.coarse {
-                self._state.kept = judged;
+            let compared = Sweep::of_word(&inputs[6]);
+            if judged && improved && compared.coarse {
+                self.kept = compared;
             }
-            if self.set_up.val() {
-                self.advance();
+            if set_up {
+                self.advance([7, 8].map(|k| inputs[k].signed(0, position_bits())));
             }
-            if self.rst.val() {
-                self.chains.next = false;
+            if rst {
+                self.chains = Some(false);
             }
-            let s = &self._state;
-            self.sweep.next = Sweep { buffer: s.target, ..s.sweep }.word();
-            self.target.next = Word::from(s.target as u64);
-            self.radius.next = Word::from(s.radius as u64);
-            self.next_halves.next = (COARSE_CENTRES.len()..JUDGED).contains(&s.count);
         }
     }
 
-    fn connect(&mut self) {
-        for wire in
-            [&mut self.step, &mut self.source, &mut self.next_base, &mut self.target, &mut self.sweep, &mut self.radius]
-        {
-            wire.connect();
-        }
-        for bit in [&mut self.last, &mut self.next_halves, &mut self.chains] {
-            bit.connect();
-        }
+    /// Searches with results of comparisons at random times: in the coarse grid also in the cycle of a set-up,
+    /// otherwise at least three cycles before it.
+    fn stimulus(cycles: usize) -> Vec<Vec<Word>> {
+        let mut random = fastrand::Rng::with_seed(7);
+        let mut search = Search::default();
+        let (mut since, mut go, mut coarse) = (0, [0, 0], Vec::new());
+        let inputs = |cycle: usize| {
+            let done = search.count > JUDGED;
+            let begin_frame = cycle > 2 && (!search.begun || (done && random.u8(..4) == 0) || random.u16(..500) == 0);
+            let enabled = random.u8(..6) > 0;
+            let set_up = search.begun && !begin_frame && !done && since > 4 && random.u8(..4) == 0;
+            // After the last coarse sweep nothing is kept in the last cycles before a halving.
+            let quiet = since > 0 && !search.is_coarse();
+            let judged = !begin_frame && !quiet && !coarse.is_empty() && random.u8(..3) == 0;
+            let improved = random.bool();
+            let judged_sweep = if judged { coarse[random.usize(..coarse.len())] } else { Sweep::default() };
+            let best = [0, 1].map(|axis| Word::of_fields(&[search.kept.centre[axis] + go[axis]], position_bits()));
+            let inputs = vec![
+                (cycle < 2 || random.u16(..100) == 0).into(),
+                begin_frame.into(),
+                enabled.into(),
+                set_up.into(),
+                judged.into(),
+                improved.into(),
+                judged_sweep.word(),
+                best[0],
+                best[1],
+            ];
+            since = if begin_frame || set_up { 0 } else { since + 1 };
+            search.clock(&inputs);
+            if begin_frame {
+                coarse.clear();
+                go = [0, 0];
+            }
+            if set_up {
+                go = [random.i64(-1..2), random.i64(-1..2)];
+                if search.sweep.coarse {
+                    coarse.push(search.sweep);
+                }
+            }
+            inputs
+        };
+        (0..cycles).map(inputs).collect()
     }
 
-    fn hdl(&self) -> Verilog {
-        let (p, q, w) = (position_bits(), square_bits(), sweep_bits());
-        let [_, _, _, buffer, ..] = offsets();
-        let low = buffer - 1;
-        let cases: String = coarse_moves()
-            .iter()
-            .enumerate()
-            .map(|(count, [x, y])| {
-                format!("    {SWEEP_BITS}'d{count}: {{table_y, table_x}} = 4'b{:02b}{:02b};\n", y & 3, x & 3)
-            })
-            .collect();
-        Verilog::Custom(format!(
-            "\
-reg [{s_end}:0] count;
-reg [{w_end}:0] kept;
-reg [1:0] table_x, table_y;
-always @(*) begin
-  case (count)
-{cases}    default: {{table_y, table_x}} = 4'd0;
-  endcase
-end
-reg is_coarse, is_halving;
-wire closing = !is_coarse || count == {SWEEP_BITS}'d{final_coarse};
-always @(*) next_halves = is_halving;
-// A coarse sweep set up in the cycle of `judged` already uses its result for the choice of buffers; a halving is set up
-// later.
-{judged_fields}wire keeps = judged && improved && judged_coarse;
-wire [1:0] kept_buffer = kept[{buffer} +: 2];
-wire [{w_end}:0] from = is_coarse ? sweep : kept;
-{from_fields}wire unused = &{{1'b0, from_coarse, from_closes, best_x, best_y, judged_centre_x, judged_centre_y, judged_square,
-  judged_buffer, judged_closes}};
-// The best position is at most one step from the centre of its polynomials, so two bits of the difference are the move.
-// Move, starting point and destination are registered before the sweep is set up.
-reg [1:0] go_x, go_y;
-reg [1:0] base_buffer;
-reg [{p_end}:0] base_x, base_y;
-reg [{q_end}:0] base_square;
-wire [1:0] step_x = is_coarse ? table_x : best_x[1:0] - from_centre_x[1:0];
-wire [1:0] step_y = is_coarse ? table_y : best_y[1:0] - from_centre_y[1:0];
-wire [{q_end}:0] twice_x = {{{{{q_more}{{base_x[{p_end}]}}}}, base_x, 1'b0}};
-wire [{q_end}:0] twice_y = {{{{{q_more}{{base_y[{p_end}]}}}}, base_y, 1'b0}};
-wire [{q_end}:0] along_x = go_x[1] ? {q}'d1 - twice_x : go_x[0] ? {q}'d1 + twice_x : {q}'d0;
-wire [{q_end}:0] along_y = go_y[1] ? {q}'d1 - twice_y : go_y[0] ? {q}'d1 + twice_y : {q}'d0;
-wire [{q_end}:0] to_square = base_square + along_x + along_y;
-wire [{p_end}:0] to_x = base_x + {{{{{p_more}{{go_x[1]}}}}, go_x}};
-wire [{p_end}:0] to_y = base_y + {{{{{p_more}{{go_y[1]}}}}, go_y}};
-reg [{p_end}:0] at_x, at_y;
-reg [{q_end}:0] at_square;
-always @(posedge clk) begin
-  go_x <= step_x;
-  go_y <= step_y;
-  base_buffer <= from_buffer;
-  next_base <= {next_base};
-  base_x <= from_centre_x;
-  base_y <= from_centre_y;
-  base_square <= from_square;
-  at_x <= to_x;
-  at_y <= to_y;
-  at_square <= to_square;
-end
-wire [{low}:0] next = {{is_halving ? at_square << 2 : at_square, is_halving ? at_y << 1 : at_y,
-  is_halving ? at_x << 1 : at_x}};
-// A coarse sweep writes the first of buffers 1, 2, 0 that is neither read nor the best, chosen one cycle after the
-// set-up, when a `judged` in the cycle of the set-up has taken effect. The first, which reads START, writes 1. Other
-// sweeps work in place.
-reg set_up1, coarse1, taken_closes, taken_coarse;
-reg [{low}:0] place;
-wire [1:0] free = source == 2'd{START} || (source != 2'd1 && kept_buffer != 2'd1) ? 2'd1
-  : source != 2'd2 && kept_buffer != 2'd2 ? 2'd2 : 2'd0;
-always @(*) sweep = {{taken_closes, taken_coarse, target, place}};
-always @(posedge clk) begin
-  if (begin_frame) begin
-    count <= enabled ? {SWEEP_BITS}'d0 : {SWEEP_BITS}'d{JUDGED};
-    is_coarse <= enabled;
-    is_halving <= 1'b0;
-    {{taken_closes, taken_coarse, place}} <= {w_less}'d0;
-    target <= 2'd{START};
-    kept <= {start};
-    radius <= {q}'d9;
-  end else begin
-    kept <= set_up && (!is_coarse || count == {SWEEP_BITS}'d0)
-      ? {{closing, is_coarse, is_coarse ? 2'd1 : kept_buffer, next}} : keeps ? judged_sweep : kept;
-    if (set_up1) target <= coarse1 ? free : source;
-    if (set_up) begin
-      count <= count + {SWEEP_BITS}'d1;
-      if (count == {SWEEP_BITS}'d{final_coarse}) is_coarse <= 1'b0;
-      is_halving <= (is_halving || count == {SWEEP_BITS}'d{final_coarse}) && count != {SWEEP_BITS}'d{final_halving};
-      {{taken_closes, taken_coarse, place}} <= {{closing, is_coarse, next}};
-      step <= {{is_halving, go_y, go_x}};
-      last <= !is_coarse && !is_halving;
-      source <= base_buffer;
-      if (is_halving) radius <= radius << 2;
-    end
-  end
-  set_up1 <= set_up;
-  coarse1 <= is_coarse;
-  if (rst) chains <= 1'b0;
-  else if (set_up) chains <= !closing;
-end",
-            s_end = SWEEP_BITS - 1,
-            w_end = w - 1,
-            w_less = w - 2,
-            p_end = p - 1,
-            q_end = q - 1,
-            next_base = base_of("from_buffer", self._quads),
-            q_more = q - p - 1,
-            p_more = p - 2,
-            final_coarse = COARSE_CENTRES.len() - 1,
-            final_halving = JUDGED - 1,
-            start = format_args!("{{2'd0, 2'd{START}, {}'d0}}", q + 2 * p),
-            judged_fields = unpack("judged_sweep", "judged_"),
-            from_fields = unpack("from", "from_"),
-        ))
+    #[test]
+    fn sweeps_are_those_of_the_search_in_integers() {
+        let block = Walk::new(QUADS);
+        check(block.kernel.kernel(), &stimulus(10_000), &mut Search::default());
     }
 }

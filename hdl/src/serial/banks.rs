@@ -4,8 +4,10 @@ use dermis_golden::fixed::formats::Formats;
 use dermis_golden::fixed::serial::{polynomials, word_bits};
 use rust_hdl::prelude::*;
 
+use crate::kernel_block;
+use crate::language::{Body, Builder, Contents, Kernel, Type};
 use crate::primitives::count_bits;
-use crate::wire::{Wire, Word};
+use crate::wire::Wire;
 
 /// `odd` selects the bank that is read; writes go to the other one. An address is `{region, polynomial, coefficient}`,
 /// of 1, n and 4 bits.
@@ -25,18 +27,17 @@ pub struct Banks {
     pub write_address: Wire<In>,
     /// Word to write; valid with `write`.
     pub data: Wire<In>,
-    _banks: [Vec<Word>; 2],
-    _words: [Word; 2],
-    _odd: bool,
+    kernel: Body,
 }
+
+kernel_block!(Banks, clock clk, inputs [odd, read_address, write, write_address, data], outputs [word]);
 
 impl Banks {
     /// With the word width and the number of polynomials of `formats`.
     pub fn new(formats: &Formats) -> Self {
         let address = 1 + count_bits(polynomials(formats)) + 4;
         let bits = word_bits(formats);
-        let bank = || vec![Word::default(); 1 << address];
-        Banks {
+        let block = Banks {
             clk: Default::default(),
             odd: Default::default(),
             read_address: Wire::new(address),
@@ -44,57 +45,74 @@ impl Banks {
             write: Default::default(),
             write_address: Wire::new(address),
             data: Wire::new(bits),
-            _banks: [bank(), bank()],
-            _words: [Word::default(); 2],
-            _odd: false,
-        }
+            kernel: Body::default(),
+        };
+        block.bind(kernel(address, bits))
     }
 }
 
-impl Logic for Banks {
-    fn update(&mut self) {
-        if self.clk.pos_edge() {
-            for bank in 0..2 {
-                if (bank == 1) == self.odd.val() {
-                    self._words[bank] = self._banks[bank][self.read_address.val().number() as usize];
-                } else if self.write.val() {
-                    self._banks[bank][self.write_address.val().number() as usize] = self.data.val();
-                }
-            }
-            self._odd = self.odd.val();
+fn kernel(address: usize, bits: usize) -> Kernel {
+    let k = Builder::new("banks");
+    let (odd, read_address) = (k.input("odd", 1), k.input("read_address", address));
+    let (write, write_address, data) = (k.input("write", 1), k.input("write_address", address), k.input("data", bits));
+    let [even_word, odd_word] = [("even", !odd), ("odd_bank", odd)].map(|(name, reads)| {
+        let memory = k.memory(name, 1 << address, bits, Contents::Undefined);
+        let word = k.register(&format!("{name}_word"), Type::unsigned(bits));
+        let reads = k.wire(&format!("{name}_reads"), reads);
+        // One port: a bank is read or written.
+        let own = k.wire(&format!("{name}_address"), reads.mux(read_address, write_address));
+        k.when(reads, || word.set(memory.read(own)));
+        memory.write(!reads & write, own, data);
+        *word
+    });
+    let odd_then = k.register("odd_then", Type::unsigned(1));
+    odd_then.set(odd);
+    k.wire("word", odd_then.mux(odd_word, even_word));
+    k.finish()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::language::testbench::{check, Reference};
+    use crate::wire::Word;
+
+    const ADDRESS: usize = 5;
+    const BITS: usize = 29;
+
+    /// Both banks, and the word of the address of the last cycle.
+    #[derive(Default)]
+    struct Both {
+        banks: [[Option<Word>; 1 << ADDRESS]; 2],
+        word: Option<Word>,
+    }
+
+    impl Reference for Both {
+        fn outputs(&mut self, _: &[Word]) -> Vec<Option<Word>> {
+            vec![self.word]
         }
-        self.word.next = self._words[usize::from(self._odd)];
+
+        fn clock(&mut self, inputs: &[Word]) {
+            let [odd, from, write, to] = [0, 1, 2, 3].map(|k| inputs[k].number() as usize);
+            self.word = self.banks[odd][from];
+            if write == 1 {
+                self.banks[1 - odd][to] = Some(inputs[4]);
+            }
+        }
     }
 
-    fn connect(&mut self) {
-        self.word.connect();
-    }
-
-    fn hdl(&self) -> Verilog {
-        let end = self.word.width() - 1;
-        let address_end = self.read_address.width() - 1;
-        let last = self._banks[0].len() - 1;
-        let bank = |name: &str, reads: &str| {
-            format!(
-                "\
-reg [{end}:0] {name} [0:{last}];
-reg [{end}:0] {name}_word;
-wire {name}_reads = {reads};
-wire [{address_end}:0] {name}_address = {name}_reads ? read_address : write_address;
-always @(posedge clk) begin
-  if ({name}_reads) {name}_word <= {name}[{name}_address];
-  else if (write) {name}[{name}_address] <= data;
-end
-"
-            )
+    #[test]
+    fn one_bank_is_read_while_the_other_is_written() {
+        let mut random = fastrand::Rng::with_seed(23);
+        let mut odd = false;
+        let cycle = |_| {
+            odd ^= random.u8(..40) == 0;
+            let mut address = || Word::from(random.u64(..1 << ADDRESS));
+            let (from, to) = (address(), address());
+            vec![Word::from(odd), from, Word::from(random.bool()), to, Word::from(random.u64(..1 << BITS))]
         };
-        Verilog::Custom(format!(
-            "\
-{}{}reg odd_then;
-always @(posedge clk) odd_then <= odd;
-always @(*) word = odd_then ? odd_bank_word : even_word;",
-            bank("even", "!odd"),
-            bank("odd_bank", "odd"),
-        ))
+        let all: Vec<Vec<Word>> = (0..6000).map(cycle).collect();
+        let block = Body::new(kernel(ADDRESS, BITS), &[], &[("word", BITS)]);
+        check(block.kernel(), &all, &mut Both::default());
     }
 }

@@ -7,7 +7,10 @@ use dermis_golden::fixed::Model;
 use dermis_golden::scene::Condition;
 use rust_hdl::prelude::*;
 
-use super::{Banks, Force, Halve, Horner, Mixer, Nine, Order, Pass, Receive, Rounder, Score, Solve, Unfold, Walk};
+use super::{
+    Banks, Candidates, CoefficientShift, Force, Horner, Pass, Receive, Rounder, Score, SerialButterfly, Solve,
+    TaxelReorder, Unfold, Walk,
+};
 use crate::primitives::{Ram, Slice};
 use crate::wire::Wire;
 
@@ -35,11 +38,11 @@ pub struct Engine {
     /// The beat is the last of its frame; valid with `m_axis_tvalid`.
     pub m_axis_tlast: Signal<Out, Bit>,
     pub(crate) receive: Receive,
-    order: Order,
+    order: TaxelReorder,
     pub(crate) leader: Solve,
     pub(crate) rounder: Rounder,
     pub(crate) shifted: Slice,
-    pub(crate) mixer: Mixer,
+    pub(crate) mixer: SerialButterfly,
     pub(crate) pass: Pass,
     raw: Ram,
     pub(crate) unfold: Unfold,
@@ -48,8 +51,8 @@ pub struct Engine {
     along_x: Horner,
     turned: Ram,
     along_y: Horner,
-    pub(crate) halve: Halve,
-    nine: Nine,
+    pub(crate) halve: CoefficientShift,
+    nine: Candidates,
     score: Score,
     floors: Ram,
     totals: Ram,
@@ -83,11 +86,11 @@ impl Engine {
             m_axis_tready: Default::default(),
             m_axis_tlast: Default::default(),
             receive: Receive::new(f, model.noise_floor),
-            order: Order::new(model.layout()),
+            order: TaxelReorder::new(model.layout()),
             leader: Solve::new(f, unrounded, rounded),
             rounder: Rounder::new(unrounded, rounded),
             shifted: Slice::new(32, rounded),
-            mixer: Mixer::new(rounded),
+            mixer: SerialButterfly::new(rounded),
             pass: Pass::new(model),
             raw: Ram::new(4 * f.quads, 1, f.acc_bits as usize),
             unfold: Unfold::new(f, rounded + 2),
@@ -96,8 +99,8 @@ impl Engine {
             along_x: Horner::new(word),
             turned: Ram::new(4 * SLOT as usize, 1, word),
             along_y: Horner::new(word),
-            halve: Halve::new(word, f.search_bits[0] as usize),
-            nine: Nine::new(f),
+            halve: CoefficientShift::new(word, f.search_bits[0] as usize),
+            nine: Candidates::new(f),
             score: Score::new(f),
             floors: Ram::new(SLOT as usize, 1, floor_bits(f)),
             totals: Ram::new(SLOT as usize, 1, f.score_bits as usize + 1),

@@ -9,14 +9,16 @@
 //! place of the forces.
 
 use dermis_golden::fixed::formats::{Formats, FORCE_BITS, FORCE_SHIFT_MAX, MU_ROUND};
-use dermis_golden::fixed::send::{FLAG_CONDITION, FLAG_FOUND, FLAG_FRAMING, FLAG_NO_CONTACT, STATUS_BEATS};
+use dermis_golden::fixed::send::STATUS_BEATS;
 use dermis_golden::fixed::serial::{polynomials, word_bits, BEAT, FACTOR_BITS, FIRST_BEAT, MU_WORDS};
 use rust_hdl::prelude::*;
 
 use super::rounder::SHIFT_BITS;
-use super::solve::{extended, padded, SATURATION_BITS};
+use super::solve::SATURATION_BITS;
+use crate::kernel_block;
+use crate::language::{concat, Body, Builder, Expr, Kernel, Net, Type};
 use crate::primitives::{count_bits, position_bits};
-use crate::wire::{Wire, Word};
+use crate::wire::Wire;
 
 const WORD: usize = FORCE_BITS as usize;
 const FACTOR: usize = FACTOR_BITS as usize;
@@ -83,53 +85,66 @@ pub struct Force {
     pub m_axis_tlast: Signal<Out, Bit>,
     /// The frame's last beat is accepted in this cycle.
     pub done: Signal<Out, Bit>,
-    _value_bits: usize,
-    _mu_step: i64,
-    _mu_fraction: u32,
-    _shift_base: i64,
-    _threshold: i64,
-    _taxels: u64,
-    _state: State,
+    kernel: Body,
 }
 
-#[derive(Clone, Copy, Debug, Default)]
-struct State {
-    scaling: bool,
-    sending: bool,
-    phase: u64,
-    status: bool,
-    beat: u64,
-    ahead: u64,
-    counting: bool,
-    factors: [i64; 2],
-    product: i64,
-    mu: [i64; 2],
-    words: [i64; 3],
-    saturations: u64,
-    contact: bool,
-    cycles: u64,
-    valid: bool,
-    shift: i64,
+kernel_block!(
+    Force,
+    clock clk,
+    inputs [
+        rst, start, place, value, best_x, best_y, score, found, condition, framing, normalise, rescale, saturations,
+        frame_begin, rounded, clipped, m_axis_tready
+    ],
+    outputs [index, wanted, product, round_shift, m_axis_tdata, m_axis_tvalid, m_axis_tlast, done]
+);
+
+/// Widths of the words, and constants of the scene.
+#[derive(Clone, Copy)]
+struct Sizes {
+    places: usize,
+    wanted: usize,
+    /// Width of a word from the bank, and of the value p(μ*) in it.
+    word: usize,
+    value: usize,
+    score: usize,
+    unrounded: usize,
+    mu_step: i64,
+    mu_fraction: u32,
+    shift_base: i64,
+    threshold: i64,
+    taxels: u64,
 }
 
 impl Force {
     /// With the widths of `formats`; `threshold` is in force LSBs, the rounder takes words of `unrounded` bits.
     pub fn new(formats: &Formats, threshold: i64, unrounded: usize) -> Self {
         let f = formats;
-        let places = count_bits(4 * f.quads);
         let rescale_max = i64::from(f.raw_length_max.saturating_sub(f.vector_bits - 1));
         let headroom = i64::from(FORCE_BITS - f.search_bits[0]);
-        Force {
+        let sizes = Sizes {
+            places: count_bits(4 * f.quads),
+            wanted: count_bits(polynomials(f)),
+            word: word_bits(f),
+            value: f.search_bits[0] as usize,
+            score: f.score_bits as usize,
+            unrounded,
+            mu_step: f.mu_step,
+            mu_fraction: f.mu_fraction,
+            shift_base: i64::from(f.mu_fraction) + rescale_max - headroom,
+            threshold,
+            taxels: 4 * f.quads as u64,
+        };
+        let block = Force {
             clk: Default::default(),
             rst: Default::default(),
             start: Default::default(),
-            index: Wire::new(places),
-            place: Wire::new(places),
-            wanted: Wire::new(count_bits(polynomials(f))),
-            value: Wire::new(word_bits(f)),
+            index: Wire::new(sizes.places),
+            place: Wire::new(sizes.places),
+            wanted: Wire::new(sizes.wanted),
+            value: Wire::new(sizes.word),
             best_x: Wire::new(position_bits()),
             best_y: Wire::new(position_bits()),
-            score: Wire::new(f.score_bits as usize),
+            score: Wire::new(sizes.score),
             found: Default::default(),
             condition: Default::default(),
             framing: Default::default(),
@@ -146,297 +161,178 @@ impl Force {
             m_axis_tready: Default::default(),
             m_axis_tlast: Default::default(),
             done: Default::default(),
-            _value_bits: f.search_bits[0] as usize,
-            _mu_step: f.mu_step,
-            _mu_fraction: f.mu_fraction,
-            _shift_base: i64::from(f.mu_fraction) + rescale_max - headroom,
-            _threshold: threshold,
-            _taxels: 4 * f.quads as u64,
-            _state: State::default(),
-        }
-    }
-
-    fn value_bits(&self) -> usize {
-        self._value_bits
-    }
-
-    fn shift(&self) -> i64 {
-        let more = self.normalise.val().number() as i64 - self.rescale.val().number() as i64;
-        (self._shift_base + more).clamp(0, i64::from(FORCE_SHIFT_MAX))
-    }
-
-    fn is_last(&self) -> bool {
-        self._state.status && self._state.beat == STATUS_BEATS as u64 - 1
-    }
-
-    fn clocked(&mut self) {
-        let s = self._state;
-        let mut next = s;
-        let position = |wire: &Wire<In>| wire.val().signed(0, position_bits());
-        next.product = s.factors[0] * s.factors[1];
-        let rounded = self.rounded.val().signed(0, WORD);
-        if s.scaling {
-            next.phase = s.phase + 1;
-            match s.phase {
-                0 => next.factors = [self._mu_step, position(&self.best_x)],
-                1 => next.factors[1] = position(&self.best_y),
-                6 => next.mu[0] = rounded,
-                7 => next.mu[1] = rounded,
-                _ => {}
-            }
-            if s.phase == MU_WORDS - 1 {
-                (next.scaling, next.sending, next.phase) = (false, true, 0);
-            }
-        } else if s.sending {
-            next.phase = s.phase + 1;
-            let forces = !s.status;
-            match s.phase {
-                2 => self.take_value(&mut next),
-                3 => next.factors[1] = s.mu[1],
-                4 => next.factors[1] = 1 << self._mu_fraction,
-                8..=10 => {
-                    let word = s.phase as usize - 8;
-                    let captured = if s.status { i64::from(self.status(s.beat)[word]) } else { rounded };
-                    // All three enter at fz and shift down: only one register has the multiplexer.
-                    next.words = [s.words[1], s.words[2], captured];
-                    next.saturations += u64::from(self.clipped.val() && forces);
-                }
-                11 => {
-                    if forces && s.words[2].abs() < self._threshold {
-                        next.words = [0; 3];
-                    } else if forces {
-                        next.contact |= s.words[2] != 0;
-                    }
-                    next.counting = false;
-                    next.valid = true;
-                }
-                LAST_PHASE => {
-                    next.phase = s.phase;
-                    if self.m_axis_tready.val() {
-                        (next.phase, next.valid) = (AGAIN_PHASE, false);
-                        self.take_value(&mut next);
-                        let forces_end = forces && s.beat == self._taxels - 1;
-                        next.beat = if forces_end { 0 } else { s.beat + 1 };
-                        next.status |= forces_end;
-                        next.sending = !self.is_last();
-                    }
-                }
-                _ => {}
-            }
-        } else if self.start.val() {
-            next = State { scaling: true, cycles: s.cycles, counting: true, ..State::default() };
-        }
-        next.cycles = match (self.frame_begin.val(), s.counting) {
-            (true, _) => COUNTED_LATER,
-            (false, true) => next.cycles + 1,
-            (false, false) => next.cycles,
+            kernel: Body::default(),
         };
-        next.counting |= self.frame_begin.val();
-        if self.rst.val() {
-            next = State::default();
-        }
-        // Registered: its inputs are stable long before it is used.
-        next.shift = self.shift();
-        self._state = next;
-    }
-
-    /// Takes the value that has been read as a factor, and addresses the next one.
-    fn take_value(&self, next: &mut State) {
-        let bits = self.value_bits();
-        let value = Word::of_fields(&[self.value.val().signed(0, self.value.width())], bits).signed(0, bits);
-        next.factors = [value, self._state.mu[0]];
-        next.ahead = self._state.ahead + 1;
-    }
-
-    fn status(&self, beat: u64) -> [i32; 3] {
-        let s = &self._state;
-        let position = |wire: &Wire<In>| wire.val().signed(0, position_bits()) as i32;
-        let flag = |set: bool, bit: u32| if set { bit as i32 } else { 0 };
-        match beat {
-            0 => [
-                position(&self.best_x),
-                position(&self.best_y),
-                flag(self.condition.val(), FLAG_CONDITION)
-                    | flag(self.found.val(), FLAG_FOUND)
-                    | flag(!s.contact, FLAG_NO_CONTACT)
-                    | flag(self.framing.val(), FLAG_FRAMING),
-            ],
-            1 => [
-                if self.found.val() { self.score.val().signed(0, self.score.width()) as i32 } else { 0 },
-                self.rescale.val().number() as i32,
-                self.normalise.val().number() as i32,
-            ],
-            _ => [self.saturations.val().number() as i32, s.saturations as i32, s.cycles as i32],
-        }
+        block.bind(kernel(sizes))
     }
 }
 
-impl Logic for Force {
-    fn update(&mut self) {
-        if self.clk.pos_edge() {
-            self.clocked();
-        }
-        let s = self._state;
-        self.index.next = Word::from(s.ahead & ((1 << self.index.width()) - 1));
-        self.wanted.next = Word::from(self.place.val().number() + 1);
-        self.product.next = Word::of_fields(&[s.product], self.product.width());
-        let shift = if s.scaling { i64::from(MU_ROUND) } else { s.shift };
-        self.round_shift.next = Word::from(shift as u64);
-        self.m_axis_tdata.next = Word::of_fields(&s.words, WORD);
-        self.m_axis_tvalid.next = s.valid;
-        self.m_axis_tlast.next = s.valid && self.is_last();
-        self.done.next = s.valid && self.is_last() && self.m_axis_tready.val();
-    }
+/// Right shift of the forces, 0 to [`FORCE_SHIFT_MAX`]; registered: its inputs are stable long before it is used.
+fn force_shift<'k>(k: &'k Builder, base: i64, normalise: Expr<'k>, rescale: Expr<'k>) -> Expr<'k> {
+    let sum = (k.signed_constant(10, base) + normalise.extend(10).signed()).low(10);
+    let shift = k.wire("shift", (sum - rescale.extend(10)).low(10));
+    let most = k.constant(SHIFT_BITS, FORCE_SHIFT_MAX.into());
+    let own = shift.low(SHIFT_BITS);
+    let above = shift.slice(6, 3).any() | most.less(own);
+    let settled = k.register("settled_shift", Type::unsigned(SHIFT_BITS));
+    settled.set(shift.top().mux(k.constant(SHIFT_BITS, 0), above.mux(most, own)));
+    *settled
+}
 
-    fn connect(&mut self) {
-        let wires =
-            [&mut self.index, &mut self.wanted, &mut self.product, &mut self.round_shift, &mut self.m_axis_tdata];
-        wires.into_iter().for_each(Wire::connect);
-        [&mut self.m_axis_tvalid, &mut self.m_axis_tlast, &mut self.done].into_iter().for_each(Signal::connect);
-    }
+/// What the status words hold.
+struct Status<'k> {
+    /// x and y of the best position.
+    best: [Expr<'k>; 2],
+    score: Expr<'k>,
+    /// Framing error, no contact, found, condition: the flags, most significant first.
+    flags: Expr<'k>,
+    found: Expr<'k>,
+    normalise: Expr<'k>,
+    rescale: Expr<'k>,
+    /// Saturations of `rescale` and of the forces; cycles to the first beat.
+    counts: [Expr<'k>; 3],
+}
 
-    fn hdl(&self) -> Verilog {
-        let (value, word_bits) = (self.value_bits(), self.value.width());
-        let (product, places, wanted) = (value + FACTOR, self.place.width(), self.wanted.width());
-        let position = position_bits();
-        let score = self.score.width();
-        let status_end = STATUS_BEATS - 1;
-        let small = match self._threshold {
-            0 => "wire too_small = 1'b0;".to_string(),
-            threshold => format!(
-                "wire [{WORD}:0] size = {{1'b0, fz[{end}] ? {WORD}'d0 - fz : fz}};\n\
-                 wire too_small = size < 33'd{threshold};",
-                end = WORD - 1
-            ),
-        };
-        let unused = if word_bits > value {
-            format!("wire unused = &{{1'b0, value[{}:{value}]}};\n", word_bits - 1)
-        } else {
-            String::new()
-        };
-        let shift_base = self._shift_base;
-        let base = if shift_base < 0 { format!("-10'sd{}", -shift_base) } else { format!("10'sd{shift_base}") };
-        let mu_step = format!("{value}'sd{}", self._mu_step);
-        Verilog::Custom(format!(
-            "\
-{unused}reg scaling, sending, status, counting, contact, valid;
-reg [3:0] phase;
-reg [{places_end}:0] beat, ahead;
-wire beat_taken = sending && phase == 4'd{last_phase} && m_axis_tready;
-wire take_value = beat_taken || (sending && phase == 4'd2);
-reg signed [{value_end}:0] factor_a;
-reg signed [{factor_end}:0] factor_b, mu_x, mu_y;
-reg signed [{product_end}:0] result;
-reg [{word_end}:0] fx, fy, fz;
-reg [15:0] force_saturations;
-reg [{cycles_end}:0] first_cycles;
-wire last_beat = status && beat == {places}'d{status_end};
-wire last_force = !status && beat == {places}'d{last_force};
-{small}
-wire signed [9:0] shift = {base} + {{4'd0, normalise}} - {{4'd0, rescale}};
-wire [{word_end}:0] status_x = beat[1:0] == 2'd0 ? {x_word} : beat[1:0] == 2'd1 ? (found ? {score_word} : {word}'d0) : {saturations_word};
-wire [{word_end}:0] status_y = beat[1:0] == 2'd0 ? {y_word} : beat[1:0] == 2'd1 ? {{26'd0, rescale}} : {{16'd0, force_saturations}};
-wire [{word_end}:0] status_z = beat[1:0] == 2'd0 ? {{28'd0, framing, !contact, found, condition}}
-  : beat[1:0] == 2'd1 ? {{26'd0, normalise}} : {cycles_word};
-wire [{word_end}:0] captured = !status ? rounded : phase[1] ? status_z : phase[0] ? status_y : status_x;
-reg [5:0] settled_shift;
-always @(posedge clk) begin
-  settled_shift <= shift[9] ? 6'd0 : |shift[8:6] || shift[5:0] > 6'd{shift_max} ? 6'd{shift_max} : shift[5:0];
-  result <= factor_a * factor_b;
-  if (scaling) begin
-    phase <= phase == 4'd{scaled} ? 4'd0 : phase + 4'd1;
-    if (phase == 4'd0) factor_a <= {mu_step};
-    if (phase == 4'd0) factor_b <= {best_x};
-    if (phase == 4'd1) factor_b <= {best_y};
-    if (phase == 4'd6) mu_x <= rounded[{factor_end}:0];
-    if (phase == 4'd7) mu_y <= rounded[{factor_end}:0];
-    if (phase == 4'd{scaled}) begin
-      scaling <= 1'b0;
-      sending <= 1'b1;
-    end
-  end else if (sending) begin
-    if (phase != 4'd{last_phase}) phase <= phase + 4'd1;
-    if (take_value) factor_a <= value[{value_end}:0];
-    if (take_value) factor_b <= mu_x;
-    if (take_value) ahead <= ahead + {places}'d1;
-    if (phase == 4'd3) factor_b <= mu_y;
-    if (phase == 4'd4) factor_b <= {factor}'sd{one};
-    if (phase == 4'd8 || phase == 4'd9 || phase == 4'd10) begin
-      fx <= fy;
-      fy <= fz;
-      fz <= captured;
-    end
-    if (clipped && !status && phase >= 4'd8 && phase <= 4'd10) force_saturations <= force_saturations + 16'd1;
-    if (phase == 4'd11) begin
-      if (too_small && !status) begin
-        fx <= {word}'d0;
-        fy <= {word}'d0;
-        fz <= {word}'d0;
-      end else if (!status && fz != {word}'d0) contact <= 1'b1;
-      counting <= 1'b0;
-      valid <= 1'b1;
-    end
-    if (beat_taken) begin
-      phase <= 4'd{again};
-      valid <= 1'b0;
-      beat <= last_force ? {places}'d0 : beat + {places}'d1;
-      if (last_force) status <= 1'b1;
-      if (last_beat) sending <= 1'b0;
-    end
-  end else if (start) begin
-    scaling <= 1'b1;
-    phase <= 4'd0;
-    status <= 1'b0;
-    beat <= {places}'d0;
-    ahead <= {places}'d0;
-    force_saturations <= 16'd0;
-    contact <= 1'b0;
-  end
-  if (frame_begin) counting <= 1'b1;
-  if (frame_begin) first_cycles <= {cycle_bits}'d{later};
-  else if (counting) first_cycles <= first_cycles + {cycle_bits}'d1;
-  if (rst) begin
-    scaling <= 1'b0;
-    sending <= 1'b0;
-    valid <= 1'b0;
-  end
-end
-always @(*) begin
-  index = ahead;
-  wanted = {wanted_place} + {wanted}'d1;
-  product = {result};
-  round_shift = scaling ? 6'd{mu_round} : settled_shift;
-  m_axis_tdata = {{fz, fy, fx}};
-  m_axis_tvalid = valid;
-  m_axis_tlast = valid && last_beat;
-  done = valid && last_beat && m_axis_tready;
-end",
-            places_end = places - 1,
-            value_end = value - 1,
-            factor = FACTOR,
-            factor_end = FACTOR - 1,
-            product_end = product - 1,
-            result = extended("result", product, self.product.width()),
-            word = WORD,
-            word_end = WORD - 1,
-            cycle_bits = CYCLES,
-            cycles_end = CYCLES - 1,
-            last_force = self._taxels - 1,
-            x_word = extended("best_x", position, WORD),
-            y_word = extended("best_y", position, WORD),
-            score_word = extended("score", score, WORD),
-            saturations_word = padded("saturations", SATURATION_BITS, WORD),
-            cycles_word = padded("first_cycles", CYCLES, WORD),
-            scaled = MU_WORDS - 1,
-            best_x = extended("best_x", position, FACTOR),
-            best_y = extended("best_y", position, FACTOR),
-            last_phase = LAST_PHASE,
-            again = AGAIN_PHASE,
-            one = 1u64 << self._mu_fraction,
-            later = COUNTED_LATER,
-            wanted_place = padded("place", places, wanted),
-            mu_round = MU_ROUND,
-            shift_max = FORCE_SHIFT_MAX,
-        ))
+impl<'k> Status<'k> {
+    /// Word `axis` of status beat `beat`.
+    fn word(&self, k: &'k Builder, beat: Expr<'k>, axis: usize) -> Expr<'k> {
+        let zero = k.constant(WORD, 0);
+        let number = |word: Expr<'k>| word.signed().extend(WORD).unsigned();
+        let first = [number(self.best[0]), number(self.best[1]), self.flags];
+        let second = [self.found.mux(number(self.score), zero), self.rescale, self.normalise];
+        let choose = |words: [Expr<'k>; 3]| words[axis].extend(WORD);
+        beat.is(0).mux(choose(first), beat.is(1).mux(choose(second), choose(self.counts)))
     }
 }
+
+fn kernel(sizes: Sizes) -> Kernel {
+    let Sizes { places, value: value_bits, .. } = sizes;
+    let k = Builder::new("force");
+    let (rst, start) = (k.input("rst", 1), k.input("start", 1));
+    let (place, value) = (k.input("place", places), k.input("value", sizes.word));
+    let best = ["best_x", "best_y"].map(|name| k.input(name, position_bits()));
+    let score = k.input("score", sizes.score);
+    let [found, condition, framing] = ["found", "condition", "framing"].map(|name| k.input(name, 1));
+    let [normalise, rescale] = ["normalise", "rescale"].map(|name| k.input(name, SHIFT_BITS));
+    let (saturations, frame_begin) = (k.input("saturations", SATURATION_BITS), k.input("frame_begin", 1));
+    let (rounded, clipped, ready) = (k.input("rounded", WORD), k.input("clipped", 1), k.input("m_axis_tready", 1));
+    let (bit, one, zero) = (Type::unsigned(1), k.constant(1, 1), k.constant(1, 0));
+    let [scaling, sending, valid] = ["scaling", "sending", "valid"].map(|name| k.state(name, bit, rst, 0));
+    let [status, counting, contact] = ["status", "counting", "contact"].map(|name| k.register(name, bit));
+    let phase = k.register("phase", Type::unsigned(4));
+    let [beat, ahead] = ["beat", "ahead"].map(|name| k.register(name, Type::unsigned(places)));
+    let factor_a = k.register("factor_a", Type::signed(value_bits));
+    let [factor_b, mu_x, mu_y] = ["factor_b", "mu_x", "mu_y"].map(|name| k.register(name, Type::signed(FACTOR)));
+    let result = k.register("result", Type::signed(value_bits + FACTOR));
+    let words = ["fx", "fy", "fz"].map(|name| k.register(name, Type::unsigned(WORD)));
+    let force_saturations = k.register("force_saturations", Type::unsigned(SATURATION_BITS));
+    let first_cycles = k.register("first_cycles", Type::unsigned(CYCLES));
+
+    let at = |phases: &[usize]| super::one_of(&k, *phase, phases);
+    let sends = k.wire("sends", !*scaling & *sending);
+    let beat_taken = k.wire("beat_taken", *sending & at(&[LAST_PHASE as usize]) & ready);
+    let take_value = k.wire("take_value", beat_taken | (*sending & at(&[2])));
+    let last_beat = k.wire("last_beat", *status & beat.is(STATUS_BEATS as u64 - 1));
+    let last_force = k.wire("last_force", !*status & beat.is(sizes.taxels - 1));
+    let [fx, fy, fz] = words;
+    let size = fz.top().mux((k.constant(WORD, 0) - *fz).low(WORD), *fz);
+    let too_small = match sizes.threshold {
+        0 => zero,
+        threshold => k.wire("too_small", size.less(k.constant(WORD + 1, threshold as u64))),
+    };
+    let settled_shift = force_shift(&k, sizes.shift_base, normalise, rescale);
+    let state = Status {
+        best,
+        score,
+        flags: concat(&[framing, !*contact, found, condition]),
+        found,
+        normalise,
+        rescale,
+        counts: [saturations, *force_saturations, *first_cycles],
+    };
+    let own = beat.low(places.min(2));
+    let [status_x, status_y, status_z] = [0, 1, 2].map(|axis| {
+        let name = ["status_x", "status_y", "status_z"][axis];
+        k.wire(name, state.word(&k, own, axis))
+    });
+    let of_status = phase.at(1).mux(status_z, phase.at(0).mux(status_y, status_x));
+    let captured = k.wire("captured", (!*status).mux(rounded, of_status));
+
+    result.set(*factor_a * *factor_b);
+    // The two μ words.
+    let scaled = at(&[MU_WORDS as usize - 1]);
+    k.when(*scaling, || {
+        phase.set(scaled.mux(k.constant(4, 0), phase.plus(1)));
+        k.when(at(&[0]), || {
+            factor_a.set(k.signed_constant(value_bits, sizes.mu_step));
+            factor_b.set(best[0].signed());
+        });
+        k.when(at(&[1]), || factor_b.set(best[1].signed()));
+        for (word, phase) in [(mu_x, 6), (mu_y, 7)] {
+            k.when(at(&[phase]), || word.set(rounded.low(FACTOR).signed()));
+        }
+        k.when(scaled, || {
+            scaling.set(zero);
+            sending.set(one);
+        });
+    });
+    // The beats.
+    let is_force = !*status;
+    k.when(sends, || {
+        k.when(!at(&[LAST_PHASE as usize]), || phase.set(phase.plus(1)));
+        k.when(take_value, || {
+            factor_a.set(value.low(value_bits).signed());
+            factor_b.set(*mu_x);
+            ahead.set(ahead.plus(1));
+        });
+        k.when(at(&[3]), || factor_b.set(*mu_y));
+        k.when(at(&[4]), || factor_b.set(k.signed_constant(FACTOR, 1 << sizes.mu_fraction)));
+        k.when(at(&[8, 9, 10]), || {
+            // All three enter at fz and shift down: only one register has the multiplexer.
+            fx.set(*fy);
+            fy.set(*fz);
+            fz.set(captured);
+            k.when(clipped & is_force, || force_saturations.set(force_saturations.plus(1)));
+        });
+        k.when(at(&[11]), || {
+            k.when(is_force & too_small, || words.iter().for_each(|word: &Net<'_>| word.set(k.constant(WORD, 0))));
+            k.when(is_force & !too_small & fz.any(), || contact.set(one));
+            counting.set(zero);
+            valid.set(one);
+        });
+        k.when(beat_taken, || {
+            phase.set(k.constant(4, AGAIN_PHASE));
+            valid.set(zero);
+            beat.set(last_force.mux(k.constant(places, 0), beat.plus(1)));
+            k.when(last_force, || status.set(one));
+            k.when(last_beat, || sending.set(zero));
+        });
+    });
+    k.when(!*scaling & !*sending & start, || {
+        scaling.set(one);
+        phase.set(k.constant(4, 0));
+        status.set(zero);
+        beat.set(k.constant(places, 0));
+        ahead.set(k.constant(places, 0));
+        force_saturations.set(k.constant(SATURATION_BITS, 0));
+        contact.set(zero);
+    });
+    k.when(*counting, || first_cycles.set(first_cycles.plus(1)));
+    k.when(frame_begin, || {
+        counting.set(one);
+        first_cycles.set(k.constant(CYCLES, COUNTED_LATER));
+    });
+
+    k.wire("index", *ahead);
+    k.wire("wanted", place.extend(sizes.wanted).plus(1));
+    k.wire("product", result.extend(sizes.unrounded).unsigned());
+    k.wire("round_shift", scaling.mux(k.constant(SHIFT_BITS, MU_ROUND.into()), settled_shift));
+    k.wire("m_axis_tdata", concat(&[*fz, *fy, *fx]));
+    k.wire("m_axis_tvalid", *valid);
+    let last = k.wire("m_axis_tlast", *valid & last_beat);
+    k.wire("done", last & ready);
+    k.finish()
+}
+
+#[cfg(test)]
+mod tests;

@@ -3,7 +3,9 @@
 
 use rust_hdl::prelude::*;
 
-use crate::wire::{Wire, Word};
+use crate::kernel_block;
+use crate::language::{concat, Body, Builder, Kernel, Type};
+use crate::wire::Wire;
 
 /// ```text
 /// word (c3, c2, c1, c0) --> s0 --> s1 --> s2 --> s3 --> moved (c0, c1, c2, c3 about the new centre)
@@ -28,13 +30,15 @@ pub struct Horner {
     pub down: Signal<In, Bit>,
     /// Coefficient `element` of the previous polynomial about the new centre, signed.
     pub moved: Wire<Out>,
-    _stages: [i64; 4],
+    kernel: Body,
 }
+
+kernel_block!(Horner, clock clk, inputs [word, element, top, moves, down], outputs [moved]);
 
 impl Horner {
     /// For coefficients of `bits` bits.
     pub fn new(bits: usize) -> Self {
-        Horner {
+        let block = Horner {
             clk: Default::default(),
             word: Wire::new(bits),
             element: Wire::new(2),
@@ -42,64 +46,86 @@ impl Horner {
             moves: Default::default(),
             down: Default::default(),
             moved: Wire::new(bits),
-            _stages: [0; 4],
-        }
+            kernel: Body::default(),
+        };
+        block.bind(kernel(bits))
     }
 }
 
-impl Logic for Horner {
-    fn update(&mut self) {
-        let bits = self.word.width();
-        let element = self.element.val().number() as usize;
-        if self.clk.pos_edge() {
-            let top = self.top.val().number() as usize;
-            let by = match (self.moves.val(), self.down.val()) {
-                (false, _) => 0,
-                (true, false) => 1,
-                (true, true) => -1,
-            };
-            let [s0, s1, s2, _] = self._stages;
-            // Register k receives coefficient 3 − element + k in this cycle.
-            let incoming = [self.word.val().signed(0, bits), s0, s1, s2];
-            for (k, stage) in self._stages.iter_mut().enumerate().filter(|(k, _)| *k <= element) {
-                let begins = 3 + k - element == top || k == 3;
-                let kept = if begins { 0 } else { by * *stage };
-                *stage = Word::of_fields(&[incoming[k] + kept], bits).signed(0, bits);
+fn kernel(bits: usize) -> Kernel {
+    let k = Builder::new("horner");
+    let (word, element, top) = (k.input("word", bits), k.input("element", 2), k.input("top", 2));
+    let (moves, down) = (k.input("moves", 1), k.input("down", 1));
+    let [s0, s1, s2, s3] = ["s0", "s1", "s2", "s3"].map(|name| k.register(name, Type::unsigned(bits)));
+    let inverted = k.wire("inverted", concat(&vec![down; bits]));
+    k.comment("Zero at the start of a polynomial; complement, with a carry, where the centre moves by -1.");
+    // Register `at` takes coefficient 3 − element + at.
+    for (at, (register, incoming)) in [(&s0, word), (&s1, *s0), (&s2, *s1)].into_iter().enumerate() {
+        let starts = element.equals((k.constant(2, (3 + at as u64) % 4) - top).low(2));
+        let adds = k.wire(&format!("adds{at}"), moves & !starts);
+        let kept = adds.mux(**register ^ inverted, k.constant(bits, 0));
+        let sum = (incoming + kept + (adds & down)).low(bits);
+        match at {
+            0 => register.set(sum),
+            1 => k.when(element.any(), || register.set(sum)),
+            _ => k.when(element.at(1), || register.set(sum)),
+        }
+    }
+    k.when(element.is(3), || s3.set(*s2));
+    k.wire("moved", element.case(&[(0, *s0), (1, *s1), (2, *s2)], *s3));
+    k.finish()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::language::testbench::{check, Reference};
+    use crate::wire::Word;
+
+    const BITS: usize = 30;
+
+    /// Whole polynomials, moved by the binomial theorem.
+    #[derive(Default)]
+    struct Polynomials {
+        entering: [i64; 4],
+        moved: Option<(usize, [i64; 4])>,
+    }
+
+    impl Reference for Polynomials {
+        fn outputs(&mut self, inputs: &[Word]) -> Vec<Option<Word>> {
+            let element = inputs[1].number() as usize;
+            let moved = self.moved.filter(|(top, _)| element <= *top);
+            vec![moved.map(|(_, moved)| Word::of_fields(&[moved[element]], BITS))]
+        }
+
+        fn clock(&mut self, inputs: &[Word]) {
+            let [element, top] = [1, 2].map(|k| inputs[k].number() as usize);
+            self.entering[3 - element] = if 3 - element <= top { inputs[0].signed(0, BITS) } else { 0 };
+            if element == 3 {
+                let by = inputs[3].number() as i64 * (1 - 2 * inputs[4].number() as i64);
+                let [c0, c1, c2, c3] = self.entering;
+                let square = by * by;
+                let moved =
+                    [c0 + by * c1 + square * c2 + by * c3, c1 + 2 * by * c2 + 3 * square * c3, c2 + 3 * by * c3, c3];
+                self.moved = Some((top, moved));
             }
         }
-        self.moved.next = Word::of_fields(&[self._stages[element]], bits);
     }
 
-    fn connect(&mut self) {
-        self.moved.connect();
-    }
-
-    fn hdl(&self) -> Verilog {
-        let bits = self.word.width();
-        let end = bits - 1;
-        Verilog::Custom(format!(
-            "\
-reg [{end}:0] s0, s1, s2, s3;
-// Zero at the start of a polynomial; complement, with a carry, where the centre moves by -1.
-wire [{end}:0] kept0 = (moves && element != 2'd3 - top) ? s0 ^ {{{bits}{{down}}}} : {bits}'d0;
-wire [{end}:0] kept1 = (moves && element != 2'd0 - top) ? s1 ^ {{{bits}{{down}}}} : {bits}'d0;
-wire [{end}:0] kept2 = (moves && element != 2'd1 - top) ? s2 ^ {{{bits}{{down}}}} : {bits}'d0;
-wire carry0 = moves && down && element != 2'd3 - top;
-wire carry1 = moves && down && element != 2'd0 - top;
-wire carry2 = moves && down && element != 2'd1 - top;
-always @(posedge clk) begin
-  s0 <= word + kept0 + {{{end}'d0, carry0}};
-  if (element != 2'd0) s1 <= s0 + kept1 + {{{end}'d0, carry1}};
-  if (element[1]) s2 <= s1 + kept2 + {{{end}'d0, carry2}};
-  if (element == 2'd3) s3 <= s2;
-end
-always @(*)
-  case (element)
-    2'd0: moved = s0;
-    2'd1: moved = s1;
-    2'd2: moved = s2;
-    default: moved = s3;
-  endcase"
-        ))
+    #[test]
+    fn the_centre_of_polynomials_back_to_back_moves() {
+        let mut random = fastrand::Rng::with_seed(3);
+        let polynomial = |_| {
+            let [moves, down] = [random.bool(), random.bool()].map(Word::from);
+            let top = Word::from(random.u64(..4));
+            // Words above the degree are arbitrary.
+            let cycle = |element| {
+                let word = Word::of_fields(&[random.i64(-(1 << 23)..1 << 23)], BITS);
+                vec![word, Word::from(element), top, moves, down]
+            };
+            (0..4).map(cycle).collect::<Vec<_>>()
+        };
+        let all: Vec<Vec<Word>> = (0..1000).flat_map(polynomial).collect();
+        check(Horner::new(BITS).kernel.kernel(), &all, &mut Polynomials::default());
     }
 }

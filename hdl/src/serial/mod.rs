@@ -5,44 +5,54 @@
 //! bench, link and host are the same.
 //!
 //! ```text
-//! receive -> rounder -> mixer -> pass -> raw -> rounder -> mixer -> unfold -> banks <-> walk, horner, nine, score
-//!            normalise  fold                    rescale    unfold             '-> force -> rounder -> m_axis
+//! receive -> rounder -> butterfly -> pass -> raw -> rounder -> butterfly -> unfold -> banks <-> walk, candidates
+//!            normalise  fold                        rescale    unfold                 '-> force -> rounder -> m_axis
 //! ```
 //! [`Solve`] sequences the blocks up to `unfold`, [`Walk`] the search, [`Force`] the output. [`Engine`] and [`Receive`]
-//! are `#[hdl_gen]` kernels; the other blocks have a Rust `update()` for rust-hdl's simulation and hand-written
-//! Verilog, which co-simulation compares.
+//! connect blocks by `#[hdl_gen]`; [`Solve`] and [`Walk`] have a Rust `update()` for rust-hdl's simulation and
+//! hand-written Verilog, which co-simulation compares; each other block is one [kernel](crate::language).
 
 mod banks;
+mod candidates;
+mod coefficient_shift;
 mod engine;
 mod force;
-mod halve;
 mod horner;
-mod mixer;
-mod nine;
-mod order;
 mod pass;
 mod receive;
 mod rounder;
 mod score;
+mod serial_butterfly;
 mod solve;
+mod taxel_reorder;
 mod unfold;
 mod walk;
 
-#[cfg(test)]
-mod tests;
-
 pub use banks::Banks;
+pub use candidates::Candidates;
+pub use coefficient_shift::CoefficientShift;
 pub use engine::Engine;
 pub use force::Force;
-pub use halve::Halve;
 pub use horner::Horner;
-pub use mixer::Mixer;
-pub use nine::Nine;
-pub use order::Order;
 pub use pass::{Pass, LOW_FILE, WIDE_FILE};
 pub use receive::Receive;
 pub use rounder::Rounder;
 pub use score::Score;
+pub use serial_butterfly::SerialButterfly;
 pub use solve::Solve;
+pub use taxel_reorder::TaxelReorder;
 pub use unfold::Unfold;
 pub use walk::Walk;
+
+use crate::language::{concat, Builder, Expr};
+
+/// Whether `signal` is one of `numbers`.
+fn one_of<'k>(k: &'k Builder, signal: Expr<'k>, numbers: &[usize]) -> Expr<'k> {
+    let terms = numbers.iter().map(|&number| signal.is(number as u64));
+    terms.reduce(|a, b| a | b).unwrap_or(k.constant(1, 0))
+}
+
+/// A word of `width` bits of which `bit` gives each, from the number of the bit.
+fn bits_of<'k>(width: usize, bit: impl Fn(usize) -> Expr<'k>) -> Expr<'k> {
+    concat(&(0..width).rev().map(bit).collect::<Vec<_>>())
+}

@@ -16,6 +16,8 @@ use dermis_golden::fixed::serial::{coefficients, first_vector, OPERAND_BITS, WID
 use dermis_golden::fixed::Model;
 use rust_hdl::prelude::*;
 
+use crate::kernel_block;
+use crate::language::{concat, Body, Builder, Contents, Expr, Kernel, Type};
 use crate::primitives::count_bits;
 use crate::wire::{Wire, Word};
 
@@ -62,34 +64,29 @@ pub struct Pass {
     pub word: Wire<Out>,
     /// `word` is valid.
     pub word_valid: Signal<Out, Bit>,
-    _wide: Vec<[i64; 4]>,
-    _low: Vec<[i64; 4]>,
-    _low_bits: usize,
-    _align: usize,
-    _operands: Vec<[i64; 4]>,
-    _state: State,
+    kernel: Body,
 }
 
-#[derive(Clone, Copy, Debug, Default)]
-struct State {
-    control: [Control; 3],
-    coefficient: [i64; 4],
-    low: [i64; 4],
-    operand: [i64; 4],
-    factors: [[i64; 2]; 4],
-    products: [i64; 4],
-    accumulators: [i64; 4],
-    reading: bool,
-    read: u64,
-}
+kernel_block!(
+    Pass,
+    clock clk,
+    inputs [
+        rst, valid, last, address, low, operand_address, flip, align, write, write_address, write_lane, write_data
+    ],
+    outputs [quad, quad_valid, word, word_valid]
+);
 
-/// Control bits that travel with a product.
-#[derive(Clone, Copy, Debug, Default)]
-struct Control {
-    valid: bool,
-    last: bool,
-    low: bool,
-    align: bool,
+/// Coefficients by address, and the widths that depend on the scene.
+struct Tables {
+    wide: Vec<[i64; 4]>,
+    /// Of Cz⁺; empty if it has no low limb.
+    low: Vec<[i64; 4]>,
+    low_bits: usize,
+    /// Left shift of a product of two high limbs.
+    align: usize,
+    acc_bits: usize,
+    address_bits: usize,
+    operand_bits: usize,
 }
 
 impl Pass {
@@ -97,223 +94,269 @@ impl Pass {
     pub fn new(model: &Model) -> Self {
         let f = &model.formats;
         let bits = count_bits(f.quads);
-        let vectors = first_vector(f) + operand_vectors(f.degree);
         let table = |kind| coefficients(f, &model.quantised, kind);
         let low_bits = f.inverse_low_bits as usize;
-        Pass {
+        let tables = Tables {
+            wide: WIDE.into_iter().flat_map(table).collect(),
+            low: if low_bits > 0 { table(Kind::InverseLow) } else { Vec::new() },
+            low_bits,
+            align: f.limb_align as usize,
+            acc_bits: f.acc_bits as usize,
+            address_bits: 2 + 2 * bits,
+            operand_bits: count_bits(first_vector(f) + operand_vectors(f.degree)) + bits,
+        };
+        let block = Pass {
             clk: Default::default(),
             rst: Default::default(),
             valid: Default::default(),
             last: Default::default(),
-            address: Wire::new(2 + 2 * bits),
+            address: Wire::new(tables.address_bits),
             low: Default::default(),
-            operand_address: Wire::new(count_bits(vectors) + bits),
+            operand_address: Wire::new(tables.operand_bits),
             flip: Default::default(),
             align: Default::default(),
             write: Default::default(),
-            write_address: Wire::new(count_bits(vectors) + bits),
+            write_address: Wire::new(tables.operand_bits),
             write_lane: Wire::new(2),
             write_data: Wire::new(OPERAND),
-            quad: Wire::new(4 * f.acc_bits as usize),
+            quad: Wire::new(4 * tables.acc_bits),
             quad_valid: Default::default(),
-            word: Wire::new(f.acc_bits as usize),
+            word: Wire::new(tables.acc_bits),
             word_valid: Default::default(),
-            _wide: WIDE.into_iter().flat_map(table).collect(),
-            _low: if low_bits > 0 { table(Kind::InverseLow) } else { Vec::new() },
-            _low_bits: low_bits,
-            _align: f.limb_align as usize,
-            _operands: vec![[0; 4]; 2 << (count_bits(vectors) + bits)],
-            _state: State::default(),
-        }
+            kernel: Body::default(),
+        };
+        block.bind(kernel(&tables))
     }
 
     /// Memory files: name and text.
     pub fn memory_files(&self) -> Vec<(&'static str, String)> {
-        let text = |words: &[[i64; 4]], bits: usize| -> String {
-            let digits = (4 * bits).div_ceil(4);
-            let line = |word: &[i64; 4]| {
-                let packed = Word::of_fields(word, bits);
-                format!("{:0digits$x}\n", packed.field(0, 4 * bits))
-            };
-            words.iter().map(line).collect()
-        };
-        let low = (self._low_bits > 0).then(|| (LOW_FILE, text(&self._low, self._low_bits)));
-        [(WIDE_FILE, text(&self._wide, OPERAND))].into_iter().chain(low).collect()
-    }
-
-    fn clocked(&mut self) {
-        let state = self._state;
-        let mut next = state;
-        let row = self.address.val().number() as usize;
-        let low_address = row % self._low.len().max(1);
-        next.coefficient = self._wide.get(row).copied().unwrap_or_default();
-        next.low = self._low.get(low_address).copied().unwrap_or_default();
-        let half = self._operands.len() / 2;
-        let at = self.operand_address.val().number() as usize + if self.flip.val() { half } else { 0 };
-        next.operand = self._operands.get(at).copied().unwrap_or_default();
-        next.control = [
-            Control {
-                valid: self.valid.val() && !self.rst.val(),
-                last: self.last.val(),
-                low: self.low.val(),
-                align: self.align.val(),
-            },
-            Control { valid: state.control[0].valid && !self.rst.val(), ..state.control[0] },
-            Control { valid: state.control[1].valid && !self.rst.val(), ..state.control[1] },
-        ];
-        let control = state.control[0];
-        let coefficient = if control.low { state.low } else { state.coefficient };
-        next.factors = std::array::from_fn(|lane| [coefficient[lane], state.operand[lane]]);
-        next.products = state.factors.map(|[c, x]| c * x);
-        let arriving = state.control[2];
-        let ends = state.reading && state.read == 3;
-        for lane in 0..4 {
-            if ends || self.rst.val() {
-                next.accumulators[lane] = 0;
-            } else if arriving.valid {
-                let shift = if arriving.align { self._align } else { 0 };
-                next.accumulators[lane] += state.products[lane] << shift;
-            }
-        }
-        next.reading = ((arriving.valid && arriving.last) || (state.reading && !ends)) && !self.rst.val();
-        next.read = if state.reading && !self.rst.val() { (state.read + 1) % 4 } else { 0 };
-        self._state = next;
-        if self.write.val() {
-            let at = self.write_address.val().number() as usize;
-            let lane = self.write_lane.val().number() as usize;
-            for (at, lane) in [(at, lane), (at + half, 3 - lane)] {
-                if let Some(word) = self._operands.get_mut(at) {
-                    word[lane] = self.write_data.val().signed(0, OPERAND);
-                }
-            }
-        }
+        let texts = self.kernel.kernel().memory_files().into_iter().map(|(_, text)| text);
+        [WIDE_FILE, LOW_FILE].into_iter().zip(texts).collect()
     }
 }
 
-impl Logic for Pass {
-    fn update(&mut self) {
-        if self.clk.pos_edge() {
-            self.clocked();
-        }
-        let bits = self.word.width();
-        let state = &self._state;
-        self.quad.next = Word::of_fields(&state.accumulators, bits);
-        self.quad_valid.next = state.reading && state.read == 0;
-        self.word.next = Word::of_fields(&[state.accumulators[state.read as usize]], bits);
-        self.word_valid.next = state.reading;
-    }
+/// The word at `address` of a memory of `table`, four fields of `bits` bits, one cycle later.
+fn coefficient_memory<'k>(
+    k: &'k Builder,
+    [memory, word, file]: [&str; 3],
+    table: &[[i64; 4]],
+    bits: usize,
+    address: Expr<'k>,
+) -> Expr<'k> {
+    let words = table.iter().map(|fields| Word::of_fields(fields, bits).limbs()[..(4 * bits).div_ceil(64)].to_vec());
+    let contents = Contents::File { name: file.to_owned(), words: words.collect() };
+    let memory = k.memory(memory, table.len(), 4 * bits, contents);
+    let word = k.register(word, Type::unsigned(4 * bits));
+    word.set(memory.read(address));
+    *word
+}
 
-    fn connect(&mut self) {
-        self.quad.connect();
-        self.quad_valid.connect();
-        self.word.connect();
-        self.word_valid.connect();
-    }
+fn kernel(tables: &Tables) -> Kernel {
+    let &Tables { low_bits, align: by, acc_bits: acc, address_bits, operand_bits, .. } = tables;
+    let k = Builder::new("pass");
+    let (rst, valid, last) = (k.input("rst", 1), k.input("valid", 1), k.input("last", 1));
+    let (address, low) = (k.input("address", address_bits), k.input("low", 1));
+    let operand_address = k.input("operand_address", operand_bits);
+    let (flip, align, write) = (k.input("flip", 1), k.input("align", 1), k.input("write", 1));
+    let (write_address, write_lane) = (k.input("write_address", operand_bits), k.input("write_lane", 2));
+    let write_data = k.input("write_data", OPERAND);
 
-    fn hdl(&self) -> Verilog {
-        let acc = self.word.width();
-        let acc_end = acc - 1;
-        let end = OPERAND - 1;
-        let low_bits = self._low_bits;
-        let wide_end = 4 * OPERAND - 1;
-        let operands_end = self._operands.len() - 1;
-        let fields = |lane: usize, bits: usize| format!("[{}:{}]", (lane + 1) * bits - 1, lane * bits);
-        let low_memory = match low_bits {
-            0 => "wire unused = &{1'b0, low};\n".to_string(),
-            bits => format!(
-                "\
-reg [{low_end}:0] low_word;
-reg [{low_end}:0] low_memory [0:{last}];
-initial $readmemh(\"{LOW_FILE}\", low_memory);
-always @(posedge clk) low_word <= low_memory[address[{at_end}:0]];
-reg low_selected;
-always @(posedge clk) low_selected <= low;
-",
-                low_end = 4 * bits - 1,
-                last = self._low.len() - 1,
-                at_end = count_bits(self._low.len()) - 1,
-            ),
+    let wide_word = coefficient_memory(&k, ["wide", "wide_word", WIDE_FILE], &tables.wide, OPERAND, address);
+    let low_word = (low_bits > 0).then(|| {
+        let own = address.low(count_bits(tables.low.len()));
+        let selected = k.register("low_selected", Type::unsigned(1));
+        selected.set(low);
+        (*selected, coefficient_memory(&k, ["low_memory", "low_word", LOW_FILE], &tables.low, low_bits, own))
+    });
+    // valid, last, align
+    let [first, second, third] = ["control0", "control1", "control2"].map(|name| k.register(name, Type::unsigned(3)));
+    first.set(concat(&[valid & !rst, last, align]));
+    second.set((first.at(2) & !rst).concat(first.low(2)));
+    third.set((second.at(2) & !rst).concat(second.low(2)));
+    let (adds, ends, aligns) = (third.at(2), third.at(1), third.at(0));
+    let reading = k.state("reading", Type::unsigned(1), rst, 0);
+    let idle = k.wire("idle", rst | !*reading);
+    let read = k.state("read", Type::unsigned(2), idle, 0);
+    let clears = k.wire("clears", rst | (*reading & read.is(3)));
+    reading.set((adds & ends) | (*reading & !read.is(3)));
+    read.set(read.plus(1));
+
+    let accumulators = [0, 1, 2, 3].map(|lane| {
+        let named = |name: &str| format!("{name}{lane}");
+        let operands = k.memory(&named("operands"), 2 << operand_bits, OPERAND, Contents::Undefined);
+        let ty = Type::signed(OPERAND);
+        let operand = k.register(&named("operand"), Type::unsigned(OPERAND));
+        let [coefficient, factor] = ["coefficient", "factor"].map(|name| k.register(&named(name), ty));
+        let product = k.register(&named("product"), Type::signed(2 * OPERAND));
+        let accumulator = k.state(&named("accumulator"), Type::unsigned(acc), clears, 0);
+        // A lane holds its own parity, and in the upper half the opposite one.
+        let opposite = write_lane.at(0) ^ write_lane.at(1);
+        let own = if lane == 0 || lane == 3 { !opposite } else { opposite };
+        let half = if lane % 2 == 1 { !write_lane.at(0) } else { write_lane.at(0) };
+        operands.write(write & own, half.concat(write_address), write_data);
+        operand.set(operands.read(flip.concat(operand_address)));
+        let wide = wide_word.slice(lane * OPERAND, OPERAND);
+        let own = low_word
+            .map_or(wide, |(selected, word)| selected.mux(word.slice(lane * low_bits, low_bits).extend(OPERAND), wide));
+        coefficient.set(own.signed());
+        factor.set(operand.signed());
+        product.set(*coefficient * *factor);
+        // The sums fit an accumulator, so the higher bits of a product are not needed.
+        let shifted = |by: usize| {
+            let shifted = product.shift_left(by);
+            if shifted.bits() > acc {
+                shifted.low(acc)
+            } else {
+                shifted.extend(acc).unsigned()
+            }
         };
-        let lanes: String = (0..4)
-            .map(|lane| {
-                let coefficient = match low_bits {
-                    0 => format!("wide_word{}", fields(lane, OPERAND)),
-                    bits => format!(
-                        "low_selected ? {{{}'d0, low_word{}}} : wide_word{}",
-                        OPERAND - bits,
-                        fields(lane, bits),
-                        fields(lane, OPERAND)
-                    ),
+        let aligned = if by == 0 { shifted(0) } else { aligns.mux(shifted(by), shifted(0)) };
+        k.when(adds, || accumulator.set((*accumulator + aligned).low(acc)));
+        *accumulator
+    });
+    let [a, b, c, d] = accumulators;
+    k.wire("quad", concat(&[d, c, b, a]));
+    k.wire("quad_valid", *reading & read.is(0));
+    k.wire("word", read.case(&[(0, a), (1, b), (2, c)], d));
+    k.wire("word_valid", *reading);
+    k.finish()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::language::testbench::{check, Reference};
+
+    const ADDRESS: usize = 5;
+    const OPERANDS: usize = 3;
+    const LOW_BITS: usize = 9;
+    const ALIGN: usize = 7;
+
+    /// Whole products in integers; three cycles later they are in the accumulators.
+    struct Lanes {
+        tables: Tables,
+        operands: [[Option<i64>; 4]; 1 << OPERANDS],
+        /// Products and whether they are the last of a row, the newest first.
+        products: [Option<([i64; 4], bool)>; 3],
+        sums: [i64; 4],
+        /// Accumulators that have left.
+        read: Option<usize>,
+        reset: bool,
+    }
+
+    impl Reference for Lanes {
+        fn outputs(&mut self, _: &[Word]) -> Vec<Option<Word>> {
+            let bit = |bit: bool| self.reset.then(|| Word::from(bit));
+            let acc = self.tables.acc_bits;
+            vec![
+                self.read.filter(|read| *read == 0).map(|_| Word::of_fields(&self.sums, acc)),
+                bit(self.read == Some(0)),
+                self.read.map(|read| Word::of_fields(&[self.sums[read]], acc)),
+                bit(self.read.is_some()),
+            ]
+        }
+
+        fn clock(&mut self, inputs: &[Word]) {
+            let [rst, valid, last, address, low, operand, flip, align, write, to, lane] =
+                [0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10].map(|k| inputs[k].number() as usize);
+            let arriving = self.products[2];
+            self.products.rotate_right(1);
+            self.products[0] = (valid == 1).then(|| {
+                let table = if low == 1 { &self.tables.low } else { &self.tables.wide };
+                let shift = if align == 1 { ALIGN } else { 0 };
+                let product = |lane: usize| {
+                    let operand = self.operands[operand][if flip == 1 { 3 - lane } else { lane }];
+                    (table[address % table.len()][lane] * operand.unwrap()) << shift
                 };
-                // The sums fit an accumulator, so the higher bits of a product are not needed.
-                let shifted = |by: usize| {
-                    let bits = (acc - by).min(32);
-                    let fill = if by > 0 { format!(", {by}'d0") } else { String::new() };
-                    match acc - by - bits {
-                        0 => format!("{{product{lane}[{}:0]{fill}}}", bits - 1),
-                        more => format!("{{{{{more}{{product{lane}[31]}}}}, product{lane}{fill}}}"),
-                    }
-                };
-                let align = match self._align {
-                    0 => shifted(0),
-                    by => format!("control2[0] ? {}\n    : {}", shifted(by), shifted(0)),
-                };
-                let unused = match acc < 32 {
-                    true => format!("wire unused{lane} = &{{1'b0, product{lane}[31:{acc}]}};\n"),
-                    false => String::new(),
-                };
-                format!(
-                    "
-reg [{end}:0] operands{lane} [0:{operands_end}];
-reg [{end}:0] operand{lane};
-reg signed [{end}:0] coefficient{lane}, factor{lane};
-reg signed [31:0] product{lane};
-reg [{acc_end}:0] accumulator{lane};
-{unused}wire [{acc_end}:0] aligned{lane} = {align};
-always @(posedge clk) begin
-  if (write && {own} (write_lane[0] ^ write_lane[1])) operands{lane}[{{{other}write_lane[0], write_address}}] <= write_data;
-  operand{lane} <= operands{lane}[{{flip, operand_address}}];
-  coefficient{lane} <= {coefficient};
-  factor{lane} <= operand{lane};
-  product{lane} <= coefficient{lane} * factor{lane};
-  if (rst || (reading && read == 2'd3)) accumulator{lane} <= {acc}'d0;
-  else if (control2[2]) accumulator{lane} <= accumulator{lane} + aligned{lane};
-end
-",
-                    own = if lane == 0 || lane == 3 { "!" } else { "" },
-                    other = if lane % 2 == 1 { "!" } else { "" },
-                )
-            })
-            .collect();
-        Verilog::Custom(format!(
-            "\
-reg [{wide_end}:0] wide_word;
-reg [{wide_end}:0] wide [0:{wide_last}];
-initial $readmemh(\"{WIDE_FILE}\", wide);
-always @(posedge clk) wide_word <= wide[address];
-{low_memory}// valid, last, align
-reg [2:0] control0, control1, control2;
-reg reading;
-reg [1:0] read;
-always @(posedge clk) begin
-  control0 <= {{valid && !rst, last, align}};
-  control1 <= {{control0[2] && !rst, control0[1:0]}};
-  control2 <= {{control1[2] && !rst, control1[1:0]}};
-  reading <= ((control2[2] && control2[1]) || (reading && read != 2'd3)) && !rst;
-  read <= reading && !rst ? read + 2'd1 : 2'd0;
-end
-{lanes}always @(*) begin
-  quad = {{accumulator3, accumulator2, accumulator1, accumulator0}};
-  quad_valid = reading && read == 2'd0;
-  case (read)
-    2'd0: word = accumulator0;
-    2'd1: word = accumulator1;
-    2'd2: word = accumulator2;
-    default: word = accumulator3;
-  endcase
-  word_valid = reading;
-end",
-            wide_last = self._wide.len() - 1,
-        ))
+                ([0, 1, 2, 3].map(product), last == 1)
+            });
+            self.read = self.read.map(|read| read + 1).filter(|read| *read < 4).or_else(|| {
+                if self.read.is_some() {
+                    self.sums = [0; 4];
+                }
+                None
+            });
+            if let Some((products, last)) = arriving {
+                self.sums.iter_mut().zip(products).for_each(|(sum, product)| *sum += product);
+                self.read = self.read.or(last.then_some(0));
+            }
+            if write == 1 {
+                self.operands[to][lane] = Some(inputs[11].signed(0, OPERAND));
+            }
+            if rst == 1 {
+                (self.products, self.sums, self.read, self.reset) = ([None; 3], [0; 4], None, true);
+            }
+        }
+    }
+
+    fn tables(random: &mut fastrand::Rng, low: bool, acc_bits: usize) -> Tables {
+        let wide = (0..1 << ADDRESS).map(|_| [(); 4].map(|()| i64::from(random.i16(..)) >> 5)).collect();
+        let low_words = (0..8).map(|_| [(); 4].map(|()| random.i64(0..1 << LOW_BITS)));
+        Tables {
+            wide,
+            low: if low { low_words.collect() } else { Vec::new() },
+            low_bits: if low { LOW_BITS } else { 0 },
+            align: if low { ALIGN } else { 0 },
+            acc_bits,
+            address_bits: ADDRESS,
+            operand_bits: OPERANDS,
+        }
+    }
+
+    /// All operands, then rows of products with pauses, while single operands change; resets.
+    fn stimulus(cycles: usize, low: bool) -> Vec<Vec<Word>> {
+        let mut random = fastrand::Rng::with_seed(27);
+        let (mut left, mut pause) = (0usize, 0usize);
+        let inputs = |cycle: usize| {
+            let filling = cycle < 4 << OPERANDS;
+            let rst = cycle < 2 || random.u16(..400) == 0;
+            if left == 0 && pause == 0 {
+                left = random.usize(1..20);
+            }
+            let valid = !filling && left > 0 && random.u8(..8) > 0;
+            let last = left == 1;
+            if valid {
+                left -= 1;
+                pause = if last { random.usize(8..14) } else { 0 };
+            } else if left == 0 {
+                pause -= 1;
+            }
+            let is_low = low && random.bool();
+            let to = if filling { cycle / 4 } else { random.usize(..1 << OPERANDS) };
+            let lane = if filling { cycle % 4 } else { random.usize(..4) };
+            vec![
+                Word::from(rst),
+                Word::from(valid),
+                Word::from(last),
+                Word::from(random.u64(..if is_low { 8 } else { 1 << ADDRESS })),
+                Word::from(is_low),
+                Word::from(random.u64(..1 << OPERANDS)),
+                Word::from(random.bool()),
+                Word::from(low && random.bool()),
+                Word::from(filling || random.u8(..8) == 0),
+                Word::from(to as u64),
+                Word::from(lane as u64),
+                Word::of_fields(&[i64::from(random.i16(..)) >> 4], OPERAND),
+            ]
+        };
+        (0..cycles).map(inputs).collect()
+    }
+
+    #[test]
+    fn the_lanes_multiply_and_add_in_step() {
+        for (low, acc) in [(false, 30), (true, 38)] {
+            let tables = || tables(&mut fastrand::Rng::with_seed(28), low, acc);
+            let ports = [("quad", 4 * acc), ("quad_valid", 1), ("word", acc), ("word_valid", 1)];
+            let block = Body::new(kernel(&tables()), &[], &ports);
+            let mut lanes = Lanes {
+                tables: tables(),
+                operands: [[None; 4]; 1 << OPERANDS],
+                products: [None; 3],
+                sums: [0; 4],
+                read: None,
+                reset: false,
+            };
+            check(block.kernel(), &stimulus(6000, low), &mut lanes);
+        }
     }
 }

@@ -7,12 +7,14 @@
 //! total starts at −n log2 Σp.
 
 use dermis_golden::fixed::formats::{Formats, EPSILON_SHIFT, LOG_FRACTION};
-use dermis_golden::fixed::search::{log2, log_table};
+use dermis_golden::fixed::search::log_table;
 use dermis_golden::fixed::serial::{floor_bits, word_bits};
 use rust_hdl::prelude::*;
 
-use super::solve::padded;
-use crate::wire::{Wire, Word};
+use super::{bits_of, one_of};
+use crate::kernel_block;
+use crate::language::{concat, Body, Builder, Kernel, Type};
+use crate::wire::Wire;
 
 /// Width of the leading one's position: words have at most 32 bits.
 const PLACE_BITS: usize = 5;
@@ -52,188 +54,215 @@ pub struct Score {
     pub write_index: Wire<Out>,
     /// `{Σp > 0, total}` to write; valid with `write`.
     pub write_data: Wire<Out>,
-    _taxels: i64,
-    _state: [Stage; 5],
+    kernel: Body,
 }
 
-#[derive(Clone, Copy, Debug, Default)]
-struct Stage {
-    number: i64,
-    index: u64,
-    valid: bool,
-    sum: bool,
-    positive: bool,
-}
+kernel_block!(
+    Score,
+    clock clk,
+    inputs [rst, value, index, valid, sum, floor, total],
+    outputs [floor_write, floor_index, floor_data, read_index, write, write_index, write_data]
+);
 
 impl Score {
     /// With the widths of `formats`.
     pub fn new(formats: &Formats) -> Self {
-        let total = formats.score_bits as usize + 1;
-        Score {
+        let sizes = Sizes {
+            word: word_bits(formats),
+            floor: floor_bits(formats),
+            score: formats.score_bits as usize,
+            taxels: 4 * formats.quads as u64,
+        };
+        let total = sizes.score + 1;
+        let block = Score {
             clk: Default::default(),
             rst: Default::default(),
-            value: Wire::new(word_bits(formats)),
+            value: Wire::new(sizes.word),
             index: Wire::new(4),
             valid: Default::default(),
             sum: Default::default(),
-            floor: Wire::new(floor_bits(formats)),
+            floor: Wire::new(sizes.floor),
             floor_write: Default::default(),
             floor_index: Wire::new(4),
-            floor_data: Wire::new(floor_bits(formats)),
+            floor_data: Wire::new(sizes.floor),
             read_index: Wire::new(4),
             total: Wire::new(total),
             write: Default::default(),
             write_index: Wire::new(4),
             write_data: Wire::new(total),
-            _taxels: 4 * formats.quads as i64,
-            _state: [Stage::default(); 5],
-        }
+            kernel: Body::default(),
+        };
+        block.bind(kernel(sizes))
     }
 }
 
-impl Logic for Score {
-    fn update(&mut self) {
-        if self.clk.pos_edge() {
-            let s = self._state;
-            let value = self.value.val().signed(0, self.value.width());
-            let sum = self.sum.val();
-            let floor = if s[0].sum { 0 } else { self.floor.val().number() as i64 };
-            self._state = [
-                Stage {
-                    number: if sum { value } else { value.abs() },
-                    index: self.index.val().number(),
-                    valid: self.valid.val(),
-                    sum,
-                    positive: value > 0,
-                },
-                Stage { number: s[0].number + floor, ..s[0] },
-                s[1],
-                Stage { number: log2(s[2].number), ..s[2] },
-                s[3],
-            ];
-            if self.rst.val() {
-                self._state = [Stage::default(); 5];
+/// Widths of the words and number of taxels.
+#[derive(Clone, Copy)]
+struct Sizes {
+    word: usize,
+    floor: usize,
+    score: usize,
+    taxels: u64,
+}
+
+fn kernel(sizes: Sizes) -> Kernel {
+    let Sizes { word: bits, floor, score, taxels } = sizes;
+    let k = Builder::new("score");
+    let (rst, value, index) = (k.input("rst", 1), k.input("value", bits), k.input("index", 4));
+    let (valid, sum, floor_in) = (k.input("valid", 1), k.input("sum", 1), k.input("floor", floor));
+    let total = k.input("total", score + 1);
+    let [magnitude, argument] = ["magnitude", "argument"].map(|name| k.register(name, Type::unsigned(bits)));
+    let (coarse, place_high) = (k.register("coarse", Type::unsigned(12)), k.register("place_high", Type::unsigned(2)));
+    let [logarithm, late] = ["logarithm", "late"].map(|name| k.register(name, Type::unsigned(LOG_BITS)));
+    let indices = [0, 1, 2, 3, 4].map(|step| k.register(&format!("index{step}"), Type::unsigned(4)));
+    // valid, sum, positive of each pipeline step
+    let kinds = [0, 1, 2, 3, 4].map(|step| k.state(&format!("kind{step}"), Type::unsigned(3), rst, 0));
+
+    let negative = k.wire("negative", value.top() & !sum);
+    magnitude.set(((value ^ concat(&vec![negative; bits])) + negative).low(bits));
+    let of_floor = kinds[0].at(1).mux(k.constant(floor, 0), floor_in);
+    argument.set((*magnitude + of_floor).low(bits));
+    k.comment("Leading one: by 16 and by 8 in one cycle, by 4, 2 and 1 in the next.");
+    let whole = k.wire("whole", argument.extend(32));
+    let upper = k.wire("upper", whole.slice(16, 16).any());
+    let half = k.wire("half", upper.mux(whole.slice(12, 20), whole.low(16).shift_left(4)));
+    let upper_byte = k.wire("upper_byte", half.slice(12, 8).any());
+    coarse.set(upper_byte.mux(half.slice(8, 12), half.low(12)));
+    place_high.set(upper.concat(upper_byte));
+    let fours = k.wire("fours", coarse.slice(8, 4).any());
+    let byte_left = k.wire("byte_left", fours.mux(coarse.slice(4, 8), coarse.low(8)));
+    let twos = k.wire("twos", byte_left.slice(6, 2).any());
+    let pair_left = k.wire("pair_left", twos.mux(byte_left.slice(2, 6), byte_left.low(6)));
+    let ones = pair_left.at(5);
+    let mantissa = k.wire("mantissa", ones.mux(pair_left.slice(1, 4), pair_left.low(4)));
+    // As gates: synthesis would map a table to a memory.
+    let table = bits_of(LOG_FRACTION as usize, |bit| {
+        let cells = log_table().iter().enumerate().filter(|(_, entry)| **entry >> bit & 1 == 1);
+        one_of(&k, mantissa, &cells.map(|(cell, _)| cell).collect::<Vec<_>>())
+    });
+    logarithm.set(concat(&[*place_high, fours, twos, ones, table]));
+    late.set(*logarithm);
+
+    let values = [index, *indices[0], *indices[1], *indices[2], *indices[3]];
+    indices.iter().zip(values).for_each(|(register, value)| register.set(value));
+    let positive = !value.top() & value.any();
+    let values = [concat(&[valid, sum, positive]), *kinds[0], *kinds[1], *kinds[2], *kinds[3]];
+    kinds.iter().zip(values).for_each(|(register, value)| register.set(value));
+
+    let room = score - LOG_BITS;
+    let multiples =
+        (0..room).filter(|shift| taxels >> shift & 1 == 1).map(|shift| late.shift_left(shift).extend(score));
+    let weighed = multiples.reduce(|a, b| (a + b).low(score)).unwrap_or(k.constant(score, 0));
+    let weighed = k.wire("weighed", weighed);
+    let grown = k.wire("grown", (total.low(score) + *late).low(score));
+    let [first, .., last] = kinds;
+    k.wire("floor_write", first.at(2) & first.at(1));
+    k.wire("floor_index", *indices[0]);
+    let low = EPSILON_SHIFT as usize;
+    let top = if bits > low { magnitude.slice(low, bits - low) } else { k.constant(floor, 0) };
+    k.wire("floor_data", first.at(0).mux(top, k.constant(floor, 0)));
+    k.wire("read_index", *indices[3]);
+    k.wire("write", last.at(2));
+    k.wire("write_index", *indices[4]);
+    let negated = (k.constant(score, 0) - weighed).low(score);
+    k.wire("write_data", last.at(1).mux(last.at(0).concat(negated), total.at(score).concat(grown)));
+    k.finish()
+}
+
+#[cfg(test)]
+mod tests {
+    use dermis_golden::fixed::search::log2;
+
+    use super::*;
+    use crate::language::testbench::{check, Reference};
+    use crate::wire::Word;
+
+    const SIZES: Sizes = Sizes { word: 29, floor: 9, score: 20, taxels: 44 };
+    const STEPS: usize = 5;
+
+    /// A value on its way: p or Σp, index, whether it is Σp; then its logarithm.
+    #[derive(Clone, Copy, Default)]
+    struct Step {
+        value: i64,
+        index: u64,
+        sum: bool,
+        logarithm: i64,
+    }
+
+    /// The values of the last cycles, the last one first.
+    #[derive(Default)]
+    struct Values {
+        steps: [Option<Step>; STEPS],
+        reset: bool,
+    }
+
+    impl Reference for Values {
+        fn outputs(&mut self, inputs: &[Word]) -> Vec<Option<Word>> {
+            let [first, .., before, last] = self.steps;
+            let bit = |bit: bool| self.reset.then(|| Word::from(bit));
+            let floor = first.filter(|step| step.sum);
+            let total = |step: Step| {
+                let own = inputs[6];
+                let (total, positive) = match step.sum {
+                    true => (-(SIZES.taxels as i64) * step.logarithm, step.value > 0),
+                    false => (own.signed(0, SIZES.score) + step.logarithm, own.field(SIZES.score, 1) == 1),
+                };
+                let mut word = Word::of_fields(&[total], SIZES.score);
+                word.set(SIZES.score, 1, u64::from(positive));
+                word
+            };
+            vec![
+                bit(floor.is_some()),
+                floor.map(|step| Word::from(step.index)),
+                floor.map(|step| Word::from(step.value.max(0) as u64 >> EPSILON_SHIFT)),
+                before.map(|step| Word::from(step.index)),
+                bit(last.is_some()),
+                last.map(|step| Word::from(step.index)),
+                // The logarithm of a sum that is not positive is not used.
+                last.map(total).filter(|_| last.is_some_and(|step| !step.sum || step.value > 0)),
+            ]
+        }
+
+        fn clock(&mut self, inputs: &[Word]) {
+            let [rst, _, index, valid, sum, floor] = [0, 1, 2, 3, 4, 5].map(|k| inputs[k].number());
+            let value = inputs[1].signed(0, SIZES.word);
+            if let Some(step) = &mut self.steps[0] {
+                let number = if step.sum { step.value } else { step.value.abs() + floor as i64 };
+                step.logarithm = if number > 0 { log2(number) } else { 0 };
+            }
+            self.steps.rotate_right(1);
+            self.steps[0] = (valid == 1).then_some(Step { value, index, sum: sum == 1, logarithm: 0 });
+            if rst == 1 {
+                *self = Values { reset: true, ..Values::default() };
             }
         }
-        let s = self._state;
-        self.floor_write.next = s[0].valid && s[0].sum;
-        self.floor_index.next = Word::from(s[0].index);
-        self.floor_data.next = Word::from(if s[0].positive { s[0].number as u64 >> EPSILON_SHIFT } else { 0 });
-        self.read_index.next = Word::from(s[3].index);
-        let end = s[4];
-        self.write.next = end.valid;
-        self.write_index.next = Word::from(end.index);
-        let bits = self.total.width() - 1;
-        let old = self.total.val();
-        let (total, positive) = match end.sum {
-            true => (-self._taxels * end.number, end.positive),
-            false => (old.signed(0, bits) + end.number, old.field(bits, 1) == 1),
-        };
-        let mut word = Word::of_fields(&[total], bits);
-        word.set(bits, 1, u64::from(positive));
-        self.write_data.next = word;
     }
 
-    fn connect(&mut self) {
-        let wires = [
-            &mut self.floor_index,
-            &mut self.floor_data,
-            &mut self.read_index,
-            &mut self.write_index,
-            &mut self.write_data,
+    #[test]
+    fn logarithms_are_added_to_the_totals_of_their_candidates() {
+        let mut random = fastrand::Rng::with_seed(26);
+        let cycle = |cycle: usize| {
+            let value = random.i64(-(1 << 27)..1 << 27) >> random.u8(..28);
+            vec![
+                Word::from(cycle < 2 || random.u16(..500) == 0),
+                Word::of_fields(&[value], SIZES.word),
+                Word::from(random.u64(..9)),
+                Word::from(random.bool()),
+                Word::from(random.u8(..4) == 0),
+                Word::from(random.u64(1..1 << SIZES.floor)),
+                Word::of_fields(&[random.i64(-400_000..400_000)], SIZES.score + 1),
+            ]
+        };
+        let all: Vec<Vec<Word>> = (0..6000).map(cycle).collect();
+        let ports = [
+            ("floor_write", 1),
+            ("floor_index", 4),
+            ("floor_data", SIZES.floor),
+            ("read_index", 4),
+            ("write", 1),
+            ("write_index", 4),
+            ("write_data", SIZES.score + 1),
         ];
-        wires.into_iter().for_each(Wire::connect);
-        [&mut self.floor_write, &mut self.write].into_iter().for_each(Signal::connect);
-    }
-
-    fn hdl(&self) -> Verilog {
-        let (bits, floor, total) = (self.value.width(), self.floor.width(), self.total.width() - 1);
-        let end = bits - 1;
-        // As gates: synthesis would map a table to a memory.
-        let table: Vec<String> = (0..LOG_FRACTION)
-            .rev()
-            .map(|bit| {
-                let terms: Vec<String> = log_table()
-                    .iter()
-                    .enumerate()
-                    .filter(|(_, entry)| **entry >> bit & 1 == 1)
-                    .map(|(cell, _)| format!("mantissa == 4'd{cell}"))
-                    .collect();
-                if terms.is_empty() {
-                    "1'b0".to_string()
-                } else {
-                    format!("({})", terms.join(" || "))
-                }
-            })
-            .collect();
-        let weighed: Vec<String> = (0..total - LOG_BITS)
-            .filter(|shift| self._taxels >> shift & 1 == 1)
-            .map(|shift| match (shift, total - LOG_BITS - shift) {
-                (0, zeros) => format!("{{{zeros}'d0, late}}"),
-                (_, zeros) => format!("{{{zeros}'d0, late, {shift}'d0}}"),
-            })
-            .collect();
-        let floor_top = if bits > EPSILON_SHIFT as usize {
-            format!("magnitude[{end}:{EPSILON_SHIFT}]")
-        } else {
-            format!("{floor}'d0")
-        };
-        Verilog::Custom(format!(
-            "\
-reg [{end}:0] magnitude, argument;
-reg [11:0] coarse;
-reg [1:0] place_high;
-reg [{log_end}:0] logarithm, late;
-reg [3:0] index0, index1, index2, index3, index4;
-// valid, sum, positive of each pipeline step
-reg [2:0] kind0, kind1, kind2, kind3, kind4;
-wire negative = value[{end}] && !sum;
-wire [31:0] whole = {whole};
-wire upper = |whole[31:16];
-wire [19:0] half = upper ? whole[31:12] : {{whole[15:0], 4'd0}};
-wire upper_byte = |half[19:12];
-wire fours = |coarse[11:8];
-wire [7:0] byte_left = fours ? coarse[11:4] : coarse[7:0];
-wire twos = |byte_left[7:6];
-wire [5:0] pair_left = twos ? byte_left[7:2] : byte_left[5:0];
-wire ones = pair_left[5];
-wire [3:0] mantissa = ones ? pair_left[4:1] : pair_left[3:0];
-wire [{total_end}:0] weighed = {weighed};
-wire [{total_end}:0] grown = total[{total_end}:0] + {late};
-always @(posedge clk) begin
-  magnitude <= (value ^ {{{bits}{{negative}}}}) + {{{end}'d0, negative}};
-  argument <= magnitude + (kind0[1] ? {bits}'d0 : {floor_word});
-  coarse <= upper_byte ? half[19:8] : half[11:0];
-  place_high <= {{upper, upper_byte}};
-  logarithm <= {{place_high, fours, twos, ones, {table}}};
-  late <= logarithm;
-  index0 <= index;
-  index1 <= index0;
-  index2 <= index1;
-  index3 <= index2;
-  index4 <= index3;
-  kind0 <= {{valid && !rst, sum, !value[{end}] && value != {bits}'d0}};
-  kind1 <= rst ? 3'd0 : kind0;
-  kind2 <= rst ? 3'd0 : kind1;
-  kind3 <= rst ? 3'd0 : kind2;
-  kind4 <= rst ? 3'd0 : kind3;
-end
-always @(*) begin
-  floor_write = kind0[2] && kind0[1];
-  floor_index = index0;
-  floor_data = kind0[0] ? {floor_top} : {floor}'d0;
-  read_index = index3;
-  write = kind4[2];
-  write_index = index4;
-  write_data = kind4[1] ? {{kind4[0], {total}'d0 - weighed}} : {{total[{total}], grown}};
-end",
-            log_end = LOG_BITS - 1,
-            total_end = total - 1,
-            whole = padded("argument", bits, 32),
-            weighed = weighed.join(" + "),
-            late = padded("late", LOG_BITS, total),
-            floor_word = padded("floor", floor, bits),
-            table = table.join(", "),
-        ))
+        check(Body::new(kernel(SIZES), &[], &ports).kernel(), &all, &mut Values::default());
     }
 }

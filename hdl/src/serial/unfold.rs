@@ -1,14 +1,15 @@
 //! Stage `unfold`: words from the mixer to the coefficients of the taxels' polynomials, and their sum.
 
-use dermis_golden::fixed::arith::round_shift;
 use dermis_golden::fixed::formats::Formats;
 use dermis_golden::fixed::schedule::{vectors, EXPONENTS};
 use dermis_golden::fixed::serial::{polynomials, word_bits};
 use rust_hdl::prelude::*;
 
-use super::solve::extended;
+use super::{bits_of, one_of};
+use crate::kernel_block;
+use crate::language::{Body, Builder, Kernel, Type};
 use crate::primitives::count_bits;
-use crate::wire::{Wire, Word};
+use crate::wire::Wire;
 
 /// Words of v_ij, one vector after the other, to words of the polynomial memory. Polynomial 0 is the sum, polynomial 1
 /// + p the taxel at place p; coefficient v_ij of a polynomial is at 4j + i.
@@ -34,149 +35,185 @@ pub struct Unfold {
     pub address: Wire<Out>,
     /// Coefficient of a taxel or of the sum, signed; valid with `write`.
     pub data: Wire<Out>,
-    _taxels: u64,
-    _vectors: usize,
-    _state: State,
+    kernel: Body,
 }
 
-#[derive(Clone, Copy, Debug, Default)]
-struct State {
-    word: i64,
-    valid: bool,
-    place: u64,
-    vector: usize,
-    sum: i64,
-    closing: bool,
-}
+kernel_block!(
+    Unfold,
+    clock clk,
+    inputs [rst, start, mixed, valid],
+    outputs [taxel, taxel_valid, write, address, data]
+);
 
 impl Unfold {
     /// With the widths of `formats`; words from the mixer have `mixed` bits.
     pub fn new(formats: &Formats, mixed: usize) -> Self {
-        Unfold {
+        let sizes = Sizes {
+            mixed,
+            taxel: formats.vector_bits as usize + 2,
+            data: word_bits(formats),
+            place: count_bits(polynomials(formats)),
+            taxels: 4 * formats.quads as u64,
+            vectors: vectors(formats.degree),
+        };
+        let block = Unfold {
             clk: Default::default(),
             rst: Default::default(),
             start: Default::default(),
             mixed: Wire::new(mixed),
             valid: Default::default(),
-            taxel: Wire::new(formats.vector_bits as usize + 2),
+            taxel: Wire::new(sizes.taxel),
             taxel_valid: Default::default(),
             write: Default::default(),
-            address: Wire::new(1 + count_bits(polynomials(formats)) + 4),
-            data: Wire::new(word_bits(formats)),
-            _taxels: 4 * formats.quads as u64,
-            _vectors: vectors(formats.degree),
-            _state: State::default(),
-        }
+            address: Wire::new(1 + sizes.place + 4),
+            data: Wire::new(sizes.data),
+            kernel: Body::default(),
+        };
+        block.bind(kernel(sizes))
     }
+}
+
+/// Widths of the words and of a polynomial's number; numbers of taxels and of the v_ij.
+#[derive(Clone, Copy)]
+struct Sizes {
+    mixed: usize,
+    taxel: usize,
+    data: usize,
+    place: usize,
+    taxels: u64,
+    vectors: usize,
 }
 
 /// Position 4j + i of coefficient v_ij in its polynomial.
-fn code(vector: usize) -> u64 {
-    let (i, j) = EXPONENTS[vector % EXPONENTS.len()];
-    u64::from(4 * j + i)
+fn code(vector: usize) -> usize {
+    let (i, j) = EXPONENTS[vector];
+    (4 * j + i) as usize
 }
 
-impl Logic for Unfold {
-    fn update(&mut self) {
-        if self.clk.pos_edge() {
-            let s = self._state;
-            let (i, j) = EXPONENTS[s.vector % EXPONENTS.len()];
-            let mixed = self.mixed.val().signed(0, self.mixed.width());
-            let last = s.valid && s.place == self._taxels - 1;
-            self._state = State {
-                word: round_shift(mixed, 2 * (i + j)),
-                valid: self.valid.val() && !self.rst.val(),
-                place: match s.valid {
-                    true if last => 0,
-                    valid => s.place + u64::from(valid),
-                },
-                vector: s.vector + usize::from(s.closing),
-                sum: if s.closing { 0 } else { s.sum + if s.valid { s.word } else { 0 } },
-                closing: last,
-            };
-            if self.start.val() || self.rst.val() {
-                self._state = State::default();
+fn kernel(sizes: Sizes) -> Kernel {
+    let Sizes { taxel, data, place, .. } = sizes;
+    let k = Builder::new("unfold");
+    let (rst, start) = (k.input("rst", 1), k.input("start", 1));
+    let (mixed, valid) = (k.input("mixed", sizes.mixed), k.input("valid", 1));
+    let bits = count_bits(sizes.vectors + 1);
+    let begins = k.wire("begins", start | rst);
+    let word = k.register("word", Type::unsigned(taxel));
+    let bit = Type::unsigned(1);
+    let (valid_then, closing) = (k.state("valid_then", bit, rst, 0), k.state("closing", bit, rst, 0));
+    let polynomial = k.state("polynomial", Type::unsigned(place), begins, 1);
+    let vector = k.state("vector", Type::unsigned(bits), begins, 0);
+    let sum = k.state("sum", Type::unsigned(data), begins, 0);
+
+    let last = k.wire("last", *valid_then & polynomial.is(sizes.taxels));
+    let of = |of: &dyn Fn(usize) -> usize, width: usize| {
+        bits_of(width, |bit| {
+            let set: Vec<usize> = (0..sizes.vectors).filter(|&vector| of(vector) >> bit & 1 == 1).collect();
+            one_of(&k, *vector, &set)
+        })
+    };
+    let degree = k.wire("degree", of(&|vector| (EXPONENTS[vector].0 + EXPONENTS[vector].1) as usize, 2));
+    k.comment("An extra bit on the right keeps the half LSB for the rounding.");
+    let doubled = mixed.concat(k.constant(1, 0)).signed();
+    let half = k.wire("half", doubled.shift_right_by(degree.concat(k.constant(1, 0))).unsigned().plus(1));
+    let wider = k.wire("wider", word.signed().extend(data).unsigned());
+    word.set(half.slice(1, taxel));
+    valid_then.set(valid);
+    closing.set(last);
+    k.when(*valid_then, || {
+        polynomial.set(last.mux(k.constant(place, 1), polynomial.plus(1)));
+        sum.set((*sum + wider).low(data));
+    });
+    k.when(*closing, || {
+        vector.set(vector.plus(1));
+        sum.set(k.constant(data, 0));
+    });
+    k.wire("taxel", *word);
+    k.wire("taxel_valid", *valid_then);
+    k.wire("write", *valid_then | *closing);
+    let zero = k.constant(place, 0);
+    let own = closing.mux(zero, *polynomial).concat(of(&code, 4));
+    k.wire("address", k.constant(1, 0).concat(own));
+    k.wire("data", closing.mux(*sum, wider));
+    k.finish()
+}
+
+#[cfg(test)]
+mod tests {
+    use dermis_golden::fixed::arith::round_shift;
+
+    use super::*;
+    use crate::language::testbench::{check, Reference};
+    use crate::wire::Word;
+
+    const SIZES: Sizes = Sizes { mixed: 22, taxel: 22, data: 27, place: 4, taxels: 12, vectors: 10 };
+
+    /// Words of the vector so far; whether the last one has just come, or the sum is written.
+    #[derive(Default)]
+    struct Vectors {
+        vector: usize,
+        words: Vec<i64>,
+        new: bool,
+        closing: bool,
+        reset: bool,
+    }
+
+    impl Reference for Vectors {
+        fn outputs(&mut self, _: &[Word]) -> Vec<Option<Word>> {
+            let bit = |bit: bool| self.reset.then(|| Word::from(bit));
+            let writes = self.new || self.closing;
+            let word = if self.closing { self.words.iter().sum() } else { self.words.last().copied().unwrap_or(0) };
+            let place = if self.closing { 0 } else { self.words.len() };
+            let (i, j) = EXPONENTS[self.vector % EXPONENTS.len()];
+            let address = (place as u64) << 4 | u64::from(4 * j + i);
+            vec![
+                self.words.last().filter(|_| self.new).map(|&word| Word::of_fields(&[word], SIZES.taxel)),
+                bit(self.new),
+                bit(writes),
+                (self.reset && writes).then(|| Word::from(address)),
+                (self.reset && writes).then(|| Word::of_fields(&[word], SIZES.data)),
+            ]
+        }
+
+        fn clock(&mut self, inputs: &[Word]) {
+            let [rst, start, valid] = [0, 1, 3].map(|k| inputs[k].number() == 1);
+            if self.closing {
+                (self.words, self.vector) = (Vec::new(), self.vector + 1);
+            }
+            self.closing = self.new && self.words.len() == SIZES.taxels as usize;
+            self.new = valid;
+            if valid {
+                let (i, j) = EXPONENTS[self.vector % EXPONENTS.len()];
+                self.words.push(round_shift(inputs[2].signed(0, SIZES.mixed), 2 * (i + j)));
+            }
+            if rst || start {
+                *self = Vectors { reset: self.reset || rst, ..Vectors::default() };
             }
         }
-        let s = self._state;
-        self.taxel.next = Word::of_fields(&[s.word], self.taxel.width());
-        self.taxel_valid.next = s.valid;
-        self.write.next = s.valid || s.closing;
-        let polynomial = if s.closing { 0 } else { s.place + 1 };
-        self.address.next = Word::from(polynomial << 4 | code(s.vector));
-        self.data.next = Word::of_fields(&[if s.closing { s.sum } else { s.word }], self.data.width());
     }
 
-    fn connect(&mut self) {
-        [&mut self.taxel, &mut self.address, &mut self.data].into_iter().for_each(Wire::connect);
-        [&mut self.taxel_valid, &mut self.write].into_iter().for_each(Signal::connect);
-    }
-
-    fn hdl(&self) -> Verilog {
-        let (taxel, data, mixed) = (self.taxel.width(), self.data.width(), self.mixed.width());
-        let place = self.address.width() - 5;
-        let bits = count_bits(self._vectors + 1);
-        let set = |of: &dyn Fn(usize) -> u64, bit: u64| {
-            let terms: Vec<String> = (0..self._vectors)
-                .filter(|&k| of(k) >> bit & 1 == 1)
-                .map(|k| format!("vector == {bits}'d{k}"))
-                .collect();
-            if terms.is_empty() {
-                "1'b0".to_string()
-            } else {
-                format!("({})", terms.join(" || "))
-            }
+    /// Frames of ten vectors in bursts of four words, with a pause after each vector; resets.
+    #[test]
+    fn coefficients_and_their_sum_have_their_places() {
+        let mut random = fastrand::Rng::with_seed(25);
+        let cycle = |rst: bool, start: bool, valid: bool, word: i64| {
+            vec![Word::from(rst), Word::from(start), Word::of_fields(&[word], SIZES.mixed), Word::from(valid)]
         };
-        let degree = |k: usize| u64::from(EXPONENTS[k].0 + EXPONENTS[k].1);
-        Verilog::Custom(format!(
-            "\
-reg [{taxel_end}:0] word;
-reg valid_then, closing;
-reg [{pe}:0] polynomial;
-reg [{be}:0] vector;
-reg [{de}:0] sum;
-wire last = valid_then && polynomial == {place}'d{taxels};
-wire [1:0] degree = {{{degree1}, {degree0}}};
-// An extra bit on the right keeps the half LSB for the rounding.
-wire signed [{mixed}:0] doubled = {{mixed, 1'b0}};
-wire signed [{mixed}:0] shifted = doubled >>> {{degree, 1'b0}};
-wire [{mixed}:0] half = shifted + {{{mixed}'d0, 1'b1}};
-wire [{de}:0] wider = {wider};
-wire unused = &{{1'b0, half[0]{beyond}}};
-always @(posedge clk) begin
-  word <= half[{taxel}:1];
-  valid_then <= valid && !rst;
-  closing <= last && !rst;
-  if (valid_then) polynomial <= last ? {place}'d1 : polynomial + {place}'d1;
-  if (closing) vector <= vector + {bits}'d1;
-  if (closing) sum <= {data}'d0;
-  else if (valid_then) sum <= sum + wider;
-  if (start || rst) begin
-    polynomial <= {place}'d1;
-    vector <= {bits}'d0;
-    sum <= {data}'d0;
-  end
-end
-always @(*) begin
-  taxel = word;
-  taxel_valid = valid_then;
-  write = valid_then || closing;
-  address = {{1'b0, closing ? {place}'d0 : polynomial, {code3}, {code2}, {code1}, {code0}}};
-  data = closing ? sum : wider;
-end",
-            taxel_end = taxel - 1,
-            beyond = if mixed > taxel { format!(", half[{mixed}:{}]", taxel + 1) } else { String::new() },
-            pe = place - 1,
-            be = bits - 1,
-            de = data - 1,
-            taxels = self._taxels,
-            degree1 = set(&degree, 1),
-            degree0 = set(&degree, 0),
-            wider = extended("word", taxel, data),
-            code3 = set(&code, 3),
-            code2 = set(&code, 2),
-            code1 = set(&code, 1),
-            code0 = set(&code, 0),
-        ))
+        let mut all = vec![cycle(true, false, false, 0); 2];
+        for _ in 0..25 {
+            all.push(cycle(false, true, false, 0));
+            for _ in 0..SIZES.vectors {
+                for _ in 0..SIZES.taxels {
+                    let valid = |random: &mut fastrand::Rng| random.i64(-(1 << 21)..1 << 21) >> random.u8(..20);
+                    all.push(cycle(false, false, true, valid(&mut random)));
+                    (0..random.u8(..3)).for_each(|_| all.push(cycle(false, false, false, 0)));
+                }
+                (0..4).for_each(|_| all.push(cycle(false, false, false, 0)));
+            }
+            if random.bool() {
+                all.push(cycle(true, false, false, 0));
+            }
+        }
+        let ports = [("taxel", 22), ("taxel_valid", 1), ("write", 1), ("address", 9), ("data", 27)];
+        check(Body::new(kernel(SIZES), &[], &ports).kernel(), &all, &mut Vectors::default());
     }
 }

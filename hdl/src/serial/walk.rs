@@ -81,9 +81,9 @@ pub struct Walk {
     pub write_address: Wire<Out>,
     /// Cycle 4i + j of the coefficient that goes to the candidates.
     pub cycle: Wire<Out>,
-    /// As `present` of [`Nine`](super::Nine).
+    /// As `present` of [`Candidates`](super::Candidates).
     pub present: Wire<Out>,
-    /// As `sums` of [`Nine`](super::Nine).
+    /// As `sums` of [`Candidates`](super::Candidates).
     pub sums: Wire<Out>,
     /// The coefficient written is a taxel's value p(μ*).
     pub value_valid: Signal<Out, Bit>,

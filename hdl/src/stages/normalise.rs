@@ -1,10 +1,11 @@
 //! Stage `normalise`: block exponent of the input, one left shift for all codes of a subarray.
 
-use dermis_golden::fixed::normalise;
 use rust_hdl::prelude::*;
 
+use crate::kernel_block;
+use crate::language::{concat, Body, Builder, Expr, Kernel, Type};
 use crate::primitives::{by_leading_one, count_bits};
-use crate::wire::{Wire, Word};
+use crate::wire::Wire;
 
 /// `start` computes the shift from `magnitude`; it is valid two cycles later, before the first quad arrives. Quads are
 /// then shifted one per cycle, each with a latency of one cycle.
@@ -22,66 +23,83 @@ pub struct Normalise {
     pub shifted: Wire<Out>,
     /// The left shift, from two cycles after `start` until the next one.
     pub shift: Wire<Out>,
-    _left: u32,
-    _started: bool,
+    kernel: Body,
 }
+
+kernel_block!(Normalise, clock clk, inputs [start, magnitude, quad], outputs [shifted, shift]);
 
 impl Normalise {
     /// For codes of `bits` bits.
     pub fn new(bits: usize) -> Self {
-        Normalise {
+        let block = Normalise {
             clk: Default::default(),
             start: Default::default(),
             magnitude: Wire::new(bits - 1),
             quad: Wire::new(4 * bits),
             shifted: Wire::new(4 * bits),
             shift: Wire::new(count_bits(bits)),
-            _left: 0,
-            _started: false,
-        }
+            kernel: Body::default(),
+        };
+        block.bind(kernel(bits))
     }
 }
 
-impl Logic for Normalise {
-    fn update(&mut self) {
-        if self.clk.pos_edge() {
-            let bits = self.quad.width() / 4;
-            if self._started {
-                self.shift.next = Word::from(u64::from(self._left));
-            }
-            self._left = normalise::shift(self.magnitude.val().number(), bits as u32);
-            self._started = self.start.val();
-            let shift = self.shift.val().number();
-            let shifted: [i64; 4] = std::array::from_fn(|lane| self.quad.val().signed(lane, bits) << shift);
-            self.shifted.next = Word::of_fields(&shifted, bits);
+fn kernel(bits: usize) -> Kernel {
+    let k = Builder::new("normalise");
+    let (start, magnitude) = (k.input("start", 1), k.input("magnitude", bits - 1));
+    let quad = k.input("quad", 4 * bits);
+    let shift = k.register("shift", Type::unsigned(count_bits(bits)));
+    k.comment("An all-zero subarray has the largest shift, as if a one followed the lowest bit.");
+    let most = k.constant(shift.bits(), bits as u64 - 1);
+    let none = k.wire("none", (!magnitude.any()).repeat(shift.bits()) & most);
+    let first = by_leading_one(&k, magnitude, 0..bits - 1, shift.bits(), |bit| bits - 2 - bit);
+    let left = k.delay("left", none | first);
+    let started = k.delay("started", start);
+    k.when(started, || shift.set(left));
+    let lanes: Vec<Expr> = (0..4).rev().map(|lane| quad.slice(lane * bits, bits).shift_left_by(*shift)).collect();
+    k.delay("shifted", concat(&lanes));
+    k.finish()
+}
+
+#[cfg(test)]
+mod tests {
+    use dermis_golden::fixed::normalise;
+
+    use super::*;
+    use crate::language::testbench::{check, random_words, Reference};
+    use crate::wire::Word;
+
+    const BITS: usize = 13;
+
+    /// The shift on its way, the shift, the shifted codes.
+    #[derive(Default)]
+    struct Shifts {
+        computed: Option<u32>,
+        shift: Option<u32>,
+        shifted: Option<Word>,
+    }
+
+    impl Reference for Shifts {
+        fn outputs(&mut self, _: &[Word]) -> Vec<Option<Word>> {
+            vec![self.shift.map(|shift| Word::from(u64::from(shift))), self.shifted]
+        }
+
+        fn clock(&mut self, inputs: &[Word]) {
+            let codes = [0, 1, 2, 3].map(|lane| inputs[2].signed(lane, BITS));
+            self.shifted = self.shift.map(|shift| Word::of_fields(&codes.map(|code| code << shift), BITS));
+            self.shift = self.computed.take().or(self.shift);
+            self.computed = (inputs[0].number() == 1).then(|| normalise::shift(inputs[1].number(), BITS as u32));
         }
     }
 
-    fn connect(&mut self) {
-        self.shifted.connect();
-        self.shift.connect();
-    }
-
-    fn hdl(&self) -> Verilog {
-        let bits = self.quad.width() / 4;
-        let shift_bits = self.shift.width();
-        let shifts: String = (0..4)
-            .map(|lane| format!("  shifted[{lane} * {bits} +: {bits}] <= quad[{lane} * {bits} +: {bits}] << shift;\n"))
-            .collect();
-        let first = by_leading_one("magnitude", 0..bits - 1, bits - 2, shift_bits, |bit| bits - 2 - bit);
-        Verilog::Custom(format!(
-            "\
-// An all-zero subarray has the largest shift, as if a one followed the lowest bit.
-wire [{shift_end}:0] none = {{{shift_bits}{{!(|magnitude)}}}} & {shift_bits}'d{most};
-reg [{shift_end}:0] left;
-reg started;
-always @(posedge clk) begin
-  left <= none | {first};
-  started <= start;
-  if (started) shift <= left;
-{shifts}end",
-            shift_end = shift_bits - 1,
-            most = bits - 1,
-        ))
+    #[test]
+    fn codes_are_shifted_until_the_largest_fills_the_word() {
+        let mut stimulus = random_words(3000, &[1, BITS - 1, 4 * BITS]);
+        // Magnitudes of all lengths.
+        for (cycle, inputs) in stimulus.iter_mut().enumerate() {
+            inputs[1] = Word::from(inputs[1].number() >> (cycle % BITS));
+        }
+        let block = Normalise::new(BITS);
+        check(block.kernel.kernel(), &stimulus, &mut Shifts::default());
     }
 }

@@ -32,10 +32,10 @@ fn rescaled_words_are_rounded_and_held_to_their_range() {
     let (generated, given, word) = widths();
     let (half, none) = (format!("+ {}'d1;\n", word + 1), format!("+ {}'d0;\n", word + 1));
     let defects = [
-        ("clipped[l] ? ", "1'b0 ? "),
-        ("overflow ? ", "1'b0 ? "),
+        ("word <= lane_0__clipped ? ", "word <= 1'b0 ? "),
+        ("lane_0__overflow ? ", "1'b0 ? "),
         (half.as_str(), none.as_str()),
-        ("carry ? ", "1'b0 ? "),
+        ("lane_0__carry ? ", "1'b0 ? "),
         ("clipped3 <= valid2 ? ", "clipped3 <= 1'b1 ? "),
     ];
     Proof { generated: &generated, property: "rescale.v", given, defects: &defects, open_products: false }.run();
@@ -79,8 +79,7 @@ fn operand_vectors_stay_inside_their_memory() {
         ("VECTORS", number(vectors)),
         ("QUADS", number(quads)),
     ];
-    let limit = format!("keep = valid && finished != {finished}'d{vectors};");
-    let (generated, defects) = (&generate(&model).unwrap(), &[(limit.as_str(), "keep = valid;")]);
+    let (generated, defects) = (&generate(&model).unwrap(), &[("keep = valid && finished != 1'b1;", "keep = valid;")]);
     Proof { generated, property: "filler.v", given, defects, open_products: false }.run();
 }
 
