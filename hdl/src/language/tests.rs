@@ -474,3 +474,14 @@ wire unused_signals = &{1'b0, lane_2__copy};"
     // 5 and 8 for the sums, 1 for |a.
     assert_eq!((logic.flip_flops, logic.luts), (9, 14.0));
 }
+
+#[test]
+fn verilog_holds_constants_and_separates_operators() {
+    let k = Builder::combinational("small");
+    let a = k.input("a", 4);
+    let three = k.wire("three", k.constant(2, 3));
+    k.wire("four", three.plus(1));
+    k.wire("none", !a.any());
+    let kernel = bound(k.finish(), &[("three", 2), ("four", 2), ("none", 1)]);
+    assert_eq!(kernel.verilog(), "assign three = 2'd3;\nassign four = three + 2'd1;\nalways @(*) none = !(|a);");
+}
