@@ -1,6 +1,6 @@
 //! The Verilog in an event-driven simulator, Icarus, which knows undefined values (X) and runs a process only when
-//! something it reads changes: the words and cycles of the bit-true model, stage by stage, and after a reset no X on valid, ready or
-//! last, none on the data of a beat.
+//! something it reads changes: the words and cycles of the bit-true model, stage by stage, and after a reset no X on
+//! valid, ready or last, none on the data of a beat.
 
 use std::io::{BufRead, BufReader, Write};
 use std::path::Path;
