@@ -259,24 +259,7 @@ fn kernel(sizes: Sizes) -> Kernel {
     let captured = k.wire("captured", (!*status).mux(rounded, of_status));
 
     result.set(*factor_a * *factor_b);
-    // The two μ words.
-    let scaled = at(&[MU_WORDS as usize - 1]);
-    k.when(*scaling, || {
-        phase.set(scaled.mux(k.constant(4, 0), phase.plus(1)));
-        k.when(at(&[0]), || {
-            factor_a.set(k.signed_constant(value_bits, sizes.mu_step));
-            factor_b.set(best[0].signed());
-        });
-        k.when(at(&[1]), || factor_b.set(best[1].signed()));
-        for (word, phase) in [(mu_x, 6), (mu_y, 7)] {
-            k.when(at(&[phase]), || word.set(rounded.low(FACTOR).signed()));
-        }
-        k.when(scaled, || {
-            scaling.set(zero);
-            sending.set(one);
-        });
-    });
-    // The beats.
+    // The beats. They come first: what waits for m_axis_tready arrives late, so the μ words take precedence.
     let is_force = !*status;
     k.when(sends, || {
         k.when(!at(&[LAST_PHASE as usize]), || phase.set(phase.plus(1)));
@@ -306,6 +289,23 @@ fn kernel(sizes: Sizes) -> Kernel {
             beat.set(last_force.mux(k.constant(places, 0), beat.plus(1)));
             k.when(last_force, || status.set(one));
             k.when(last_beat, || sending.set(zero));
+        });
+    });
+    // The two μ words.
+    let scaled = at(&[MU_WORDS as usize - 1]);
+    k.when(*scaling, || {
+        phase.set(scaled.mux(k.constant(4, 0), phase.plus(1)));
+        k.when(at(&[0]), || {
+            factor_a.set(k.signed_constant(value_bits, sizes.mu_step));
+            factor_b.set(best[0].signed());
+        });
+        k.when(at(&[1]), || factor_b.set(best[1].signed()));
+        for (word, phase) in [(mu_x, 6), (mu_y, 7)] {
+            k.when(at(&[phase]), || word.set(rounded.low(FACTOR).signed()));
+        }
+        k.when(scaled, || {
+            scaling.set(zero);
+            sending.set(one);
         });
     });
     k.when(!*scaling & !*sending & start, || {
