@@ -8,8 +8,9 @@
 //! | `border_share` | – | none; beside `load-outside` | – | [`Checks::of`] |
 //! | `load_ratio` | – | `load-mismatch` | off 1 by more than [`LOAD_MISMATCH`] | the golden engine |
 //! | `shape_misfit` | – | `shape-mismatch` | above 1 | the golden engine, with `patch` and `symmetric` |
-//! | `noise_MPa` | MPa | none | – | the estimators `evidence` and `learned` |
+//! | `noise_MPa` | MPa | `shear-unreliable` | above [`FOUND_NOISE_LIMIT`](crate::reconstruct::FOUND_NOISE_LIMIT) of the peak, with `search` | the estimators `evidence` and `learned`, [`Reconstruction::find_noise`] |
 //! | `misfit_probability` | – | `misfit` | below [`MISFIT`] | the same, where the noise is stated |
+//! | `noise_MPa` | MPa | `misfit` | above [`LOUD`] of the peak | the same, where the noise is not stated |
 //! | `shear_spread` | – | `shear-not-resolved` | above [`NOT_RESOLVED`] | the same |
 //!
 //! A figure is there whenever it can be computed, whether or not its flag is raised.
@@ -33,6 +34,9 @@ pub const COUNTS_FROM: f64 = 0.05;
 pub const LOAD_MISMATCH: f64 = 0.1;
 /// Probability of what is left unexplained below which the model does not fit: one frame in a thousand.
 pub const MISFIT: f64 = 1e-3;
+/// Noise found from a frame, relative to its peak, that no sensor has: the model does not fit. Real arrays have 0.006 to
+/// 0.027.
+pub const LOUD: f64 = 0.1;
 /// Standard deviation of a shear, over its size, above which it is not resolved.
 pub const NOT_RESOLVED: f64 = 1.0 / 3.0;
 
@@ -62,7 +66,7 @@ pub struct Checks {
     #[serde(skip_serializing_if = "Option::is_none")]
     pub shape_misfit: Option<f64>,
     /// Standard deviation of the noise in MPa that the estimate rests on: the scene's, else the one found from the
-    /// frame; `None` with `search`.
+    /// frame. With `search` the one found from the frame; `None` where nothing looked for it.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub noise_MPa: Option<f64>,
     /// Probability that noise of the stated size leaves as much of the stress unexplained; `None` with `search`, or
@@ -101,8 +105,20 @@ impl Checks {
             Flag::ShearNotResolved => {
                 self.shear_spread.map(|spread| format!("standard deviation {:.0} % of the shear", 1e2 * spread))
             }
-            Flag::Misfit => self.misfit_probability.map(|probability| format!("probability {probability:.1e}")),
+            Flag::ShearUnreliable => self.noise_MPa.map(|noise| noise_figure(noise, self.peak_MPa)),
+            Flag::Misfit => match self.misfit_probability {
+                Some(probability) => Some(format!("probability {probability:.1e}")),
+                None => self.noise_MPa.map(|noise| noise_figure(noise, self.peak_MPa)),
+            },
             _ => None,
+        }
+    }
+
+    /// Whether noise explains what the estimate leaves: of the stated size, else of one that a sensor can have.
+    fn misfits(&self) -> bool {
+        match self.misfit_probability {
+            Some(probability) => probability < MISFIT,
+            None => self.noise_MPa.is_some_and(|noise| noise > LOUD * self.peak_MPa),
         }
     }
 
@@ -114,13 +130,17 @@ impl Checks {
             (Flag::MuAtBound, self.mu_share.is_some_and(|share| share >= MU_AT_BOUND)),
             (Flag::ImplausibleStress, self.peak_MPa > scene.input.plausible_MPa),
             (Flag::ShapeMismatch, self.shape_misfit.is_some_and(|misfit| misfit > 1.0)),
-            (Flag::Misfit, self.misfit_probability.is_some_and(|probability| probability < MISFIT)),
+            (Flag::Misfit, self.misfits()),
             (Flag::ShearNotResolved, self.shear_spread.is_some_and(|spread| spread > NOT_RESOLVED)),
             (Flag::LoadMismatch, self.load_ratio.is_some_and(|ratio| (ratio - 1.0).abs() > LOAD_MISMATCH)),
         ]
         .into_iter()
         .filter_map(|(flag, raised)| raised.then_some(flag))
     }
+}
+
+fn noise_figure(noise_MPa: f64, peak_MPa: f64) -> String {
+    format!("noise {:.3} % of the peak", 1e2 * noise_MPa / peak_MPa)
 }
 
 /// The largest |μ| over `mu_max` among the subarrays, or with `contacts` the regions, that carry a share of the load.

@@ -21,8 +21,9 @@
 //! | `noise` | size of the noise, where it is not stated |
 //! | `contact` | force and standard deviation |
 //!
-//! ℓ is ⅔ h, at least half the larger pitch: finer structure is not visible at the depth of the taxels. The noise has a
-//! floor of 1e-4 of the peak, the error of the cells. Where it is not known, `noise` finds it in every round.
+//! ℓ is ⅔ h: finer structure is not visible at the depth of the taxels. ℓ² is at least a quarter of a taxel's area, and at
+//! most half of it: with a larger one a contact narrower than a thick cover has no room, and its shear is wrong by more
+//! than its standard deviation says. The noise has a floor of 1e-4 of the peak, the error of the cells. Where it is not known, `noise` finds it in every round.
 //!
 //! | | shape | unit |
 //! |---|---|---|
@@ -52,8 +53,10 @@ use fit::advice::Adviser;
 use fit::Fit;
 use serde::{Deserialize, Serialize};
 
-/// ℓ in units of the depth, and at least in units of the larger pitch.
-const LENGTH: [f64; 2] = [2.0 / 3.0, 0.5];
+/// ℓ in units of the depth.
+const LENGTH_PER_DEPTH: f64 = 2.0 / 3.0;
+/// Least and largest ℓ² in units of a taxel's area.
+const LENGTH_PER_TAXEL: [f64; 2] = [0.25, 0.5];
 /// Number of taxels above which only those near the contacts are read.
 const WINDOW_FROM: usize = 400;
 /// Distance from the cells of a contact within which taxels are read, in units of the depth.
@@ -110,8 +113,9 @@ impl Evidence {
     /// Prepares the estimator: tables of influence, milliseconds for 20 × 20 taxels.
     pub fn new(scene: &Scene) -> Evidence {
         let sensor = &scene.sensor;
-        let pitch = sensor.pitch_x_mm.max(sensor.pitch_y_mm);
-        let length_mm = (LENGTH[0] * sensor.thickness_mm).max(LENGTH[1] * pitch);
+        let area_mm2 = sensor.pitch_x_mm * sensor.pitch_y_mm;
+        let [least, most] = LENGTH_PER_TAXEL.map(|share| (share * area_mm2).sqrt());
+        let length_mm = (LENGTH_PER_DEPTH * sensor.thickness_mm).clamp(least, most);
         let mut alive = vec![true; sensor.taxels()];
         scene.input.dead.iter().for_each(|[row, col]| alive[row * sensor.cols + col] = false);
         Evidence {

@@ -9,12 +9,12 @@
 //! | `load-outside` | part of the contact is beyond the array's edge | `frame_flags` |
 //! | `medium-mismatch` | the frame names another medium than the scene | `frame_flags` |
 //! | `coefficients-damaged` | the hardware's coefficient memory has changed | the engine |
-//! | `shear-unreliable` | noise floor or LSB/√12 above 5·10⁻⁵ of the peak, with `sparse` | `frame_flags` |
+//! | `shear-unreliable` | noise floor or LSB/√12 above 5·10⁻⁵ of the peak, or noise found above 1.25·10⁻⁴, with `sparse` | `frame_flags`, [`find_noise`](crate::reconstruct::Reconstruction::find_noise) |
 //! | `mu-at-bound` | a μ is at `search.mu_max` | [`Checks::flags`] |
 //! | `implausible-stress` | a stress is above `input.plausible_MPa` | `Checks::flags` |
 //! | `load-mismatch` | the normal force is far from that of the same stress without shear | `Checks::flags`, golden engine |
 //! | `shear-not-resolved` | the shear's standard deviation is above a third of it | `Checks::flags`, estimators but `search` |
-//! | `misfit` | the stated noise does not explain what the estimate leaves | `Checks::flags`, estimators but `search` |
+//! | `misfit` | the stated noise does not explain what the estimate leaves, or noise found from the frame is above a tenth of its peak | `Checks::flags`, estimators but `search` |
 //! | `shape-mismatch` | the shape that `patch` or `symmetric` fits leaves more than the noise | `Checks::flags`, golden engine |
 //!
 //! [`Checks::flags`]: crate::checks::Checks::flags
@@ -54,7 +54,8 @@ pub enum Flag {
     ShapeMismatch,
     /// The shear's standard deviation is above a third of it.
     ShearNotResolved,
-    /// Noise of the stated size does not explain what the estimate leaves of the stress.
+    /// Noise of the stated size, or of a size that a sensor can have, does not explain what the estimate leaves of the
+    /// stress.
     Misfit,
 }
 

@@ -16,6 +16,7 @@ mod bonded_tests;
 mod by_evidence;
 mod contacts;
 mod extra;
+mod found_noise;
 mod golden;
 mod output;
 mod run;
@@ -23,6 +24,7 @@ mod run;
 mod tests;
 
 pub use extra::{CaseChoice, Extra, Region, RejectedCase};
+pub use found_noise::FOUND_NOISE_LIMIT;
 pub use golden::{Golden, GoldenError};
 pub use output::Resultant;
 

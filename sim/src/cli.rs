@@ -398,26 +398,24 @@ fn note_estimator(scene: &Scene) {
 
 /// The result of one engine, and the stress in MPa of the largest code.
 fn reconstruct(scene: &Scene, frames: &[Frame], engine: Engine, build_dir: &Path) -> Result<(Reconstruction, f64)> {
-    if !matches!(engine, Engine::Golden) {
-        note_estimator(scene);
+    if matches!(engine, Engine::Golden) {
+        let golden = Golden::new(scene)?;
+        return with_found_noise(scene, golden.run_averaged(frames)?, &golden.stress(frames)?);
     }
-    let model = || Model::for_frames(scene, frames);
-    let stress = |model: &Model| Ok::<_, anyhow::Error>(full_scale(&model.scene, &model.stress(frames)?));
+    note_estimator(scene);
+    let model = Model::for_frames(scene, frames)?;
+    let (scene, stress) = (model.scene.clone(), model.stress(frames)?);
     let result = match engine {
-        Engine::Golden => {
-            let golden = Golden::new(scene)?;
-            return Ok((golden.run_averaged(frames)?, full_scale(scene, &golden.stress(frames)?)));
-        }
-        Engine::Fixed => {
-            let model = model()?;
-            (model.reconstruct_averaged(frames)?, stress(&model)?)
-        }
-        Engine::Rtl => {
-            let hardware = Hardware::new(model()?, build_dir)?;
-            (hardware.reconstruct(frames)?, stress(&hardware.model)?)
-        }
+        Engine::Rtl => Hardware::new(model, build_dir)?.reconstruct(frames)?,
+        _ => model.reconstruct_averaged(frames)?,
     };
-    Ok(result)
+    with_found_noise(&scene, result, &stress)
+}
+
+/// The result with the noise found from its calibrated frame, and the stress in MPa of the largest code.
+fn with_found_noise(scene: &Scene, mut result: Reconstruction, stress: &Frame) -> Result<(Reconstruction, f64)> {
+    result.find_noise(scene, stress)?;
+    Ok((result, full_scale(scene, stress)))
 }
 
 /// One line: the difference between a result and the floating-point model's.

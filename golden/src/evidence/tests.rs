@@ -204,10 +204,49 @@ fn flags_with_their_figures() {
     assert!(result.flags.contains(&Flag::ShearNotResolved) && result.checks.shear_spread.unwrap() > NOT_RESOLVED);
 }
 
+/// A cover five times as thick as the smaller pitch: a contact narrower than the cover is not made wider.
+#[test]
+fn thick_cover() {
+    let mut scene = scene("sensor-1");
+    scene.sensor.thickness_mm = 10.0;
+    let results = results(&scene, 10, 0.0, 1, Converter::default());
+    let errors = shear_errors(&results);
+    assert!(errors[5] < 0.01 && errors[9] < 0.03, "{errors:?}");
+    for (drawn, result) in &results {
+        let sigma = result.extra.contacts.as_ref().unwrap()[0].sigma_N;
+        for axis in 0..2 {
+            let off = (result.resultant_N[axis] - drawn.total_N[axis]).abs();
+            assert!(off < 3.0 * sigma[axis], "{} {axis}: {off} {sigma:?}", result.frame);
+        }
+    }
+}
+
+/// More shear than `search.mu_max` admits never comes without a flag, whether noise is stated or not.
+#[test]
+fn shear_beyond_the_bound_is_flagged() {
+    let scene = scene("sensor-1");
+    let golden = Golden::new(&scene).unwrap();
+    let bound = scene.search.mu_max;
+    for ratio in [1.5, 3.0, 50.0] {
+        let options = DrawOptions { ratio: [ratio * bound, 1.01 * ratio * bound], ..Default::default() };
+        let draws = Draws::new(&scene, options).unwrap();
+        for number in 0..6 {
+            let drawn = draws.frame(number).unwrap();
+            for noise in [0.0, 0.001] {
+                let result = golden.run_with_noise(&drawn.frame, noise * drawn.peak_MPa()).unwrap();
+                let told = [Flag::MuAtBound, Flag::Misfit, Flag::NoContact];
+                assert!(result.flags.iter().any(|flag| told.contains(flag)), "{ratio} {number} {:?}", result.checks);
+            }
+        }
+    }
+}
+
 #[test]
 fn refused_by_field() {
+    let layer = "[medium]\nkind = \"bonded-layer\"\npoisson = 0.48\n[search]\nestimator = \"evidence\"";
     for (text, thickness, field) in [
         ("[search]\nestimator = \"evidence\"", 1.3, "sensor.thickness_mm"),
+        (layer, 2.5, "sensor.thickness_mm"),
         ("[search]\nestimator = \"evidence\"\nobjective = \"patch\"", 3.0, "search.objective"),
         ("[search]\nestimator = \"evidence\"\nmu_max = 0", 3.0, "search.mu_max"),
         ("[search]\nestimator = \"evidence\"\n[partition]\ncase = 1", 3.0, "partition.case"),

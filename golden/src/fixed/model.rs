@@ -171,7 +171,8 @@ impl Model {
     /// let frame = Frame::shipped(&scene).remove(0);
     /// let model = Model::new(&scene)?;
     /// let fixed = model.reconstruct(&frame)?.resultant_N;
-    /// let golden = Golden::new(&scene)?.run(&frame)?.resultant_N;
+    /// // The golden model with the estimator that the hardware has.
+    /// let golden = Golden::new(&scene.for_hardware())?.run(&frame)?.resultant_N;
     /// // The normal force differs from the golden model's by less than 0.1 %.
     /// assert!((fixed[2] / golden[2] - 1.0).abs() < 1e-3);
     /// // The same in words, one beat per taxel, and the duration of a frame with a search.

@@ -72,7 +72,12 @@ fn feet() -> Result<PictureFile> {
         largest(&mut forces.fz.iter().map(|f| f.abs())),
         largest(&mut forces.fx.iter().zip(&forces.fy).map(|(x, y)| x.hypot(*y))),
     ];
-    let svg = force_field(&scene.sensor, forces, peaks, Outline { subarrays: &result.subarrays, centroids: false })?;
+    let svg = force_field(
+        &scene.sensor,
+        forces,
+        peaks,
+        Outline { subarrays: &result.subarrays, centroids: false, contacts: &[] },
+    )?;
     let (rows, cols, parts) = (scene.sensor.rows, scene.sensor.cols, result.subarrays.len());
     let title = format!("Forces of two feet on {rows} × {cols} taxels");
     let description = format!(

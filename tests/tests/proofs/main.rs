@@ -106,7 +106,7 @@ fn calibrate_loses_nothing_and_saturates() {
     let zeros: String = ZEROS.iter().enumerate().map(zero).collect();
     let defects = [
         ("wire moves = !valids[1] || m_axis_tready;", "wire moves = 1'b1;"),
-        ("wire clipped = sign != {2{sign[1]}};", "wire clipped = 1'b0;"),
+        ("wire clipped = sign != {{2{sign[1]}}};", "wire clipped = 1'b0;"),
     ];
     let given = vec![("ZEROS", zeros), ("BITS", number(8)), ("MOST", number(127)), ("LAST", number(ZEROS.len() - 1))];
     Proof { generated, property: "calibrate.v", given, defects: &defects, open_products: false }.run();

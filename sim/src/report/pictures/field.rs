@@ -1,7 +1,8 @@
 //! Maps of the array: stress as colour, normal forces as colour, tangential forces as arrows, with the subarrays'
-//! outlines.
+//! outlines; or an arrow per contact with the standard deviation of its force.
 
 use anyhow::Result;
+use dermis_golden::evidence::ContactEstimate;
 use dermis_golden::frame::Forces;
 use dermis_golden::reconstruct::SubarrayResult;
 use dermis_golden::sensor::Sensor;
@@ -21,6 +22,10 @@ const BLANK: f64 = 0.004;
 const ARROWS: usize = 24;
 /// Share of the longest arrow below which no arrow is drawn.
 const LEAST_ARROW: f64 = 0.02;
+/// Length of the longest arrow of a contact.
+const CONTACT_ARROW: f64 = 60.0;
+/// Half the cap of an error bar.
+const CAP: i32 = 3;
 /// Number of shades in the colour bar.
 const SHADES: i32 = 24;
 
@@ -31,6 +36,8 @@ pub struct Outline<'a> {
     pub subarrays: &'a [SubarrayResult],
     /// Whether to draw the centroids of compression and tension.
     pub centroids: bool,
+    /// Contacts whose forces are drawn as arrows, in place of those of the taxels.
+    pub contacts: &'a [ContactEstimate],
 }
 
 /// Conversion from array positions to pixels; row 0 is on top.
@@ -88,17 +95,15 @@ pub fn force_field(sensor: &Sensor, forces: &Forces, peaks: [f64; 2], outline: O
     svg(map.height(), |area| {
         cells(area, &map, sensor, &forces.fz, peaks[0])?;
         frame(area, &map, sensor, outline)?;
-        arrows(area, &map, sensor, forces, peaks[1])?;
+        let legend = if outline.contacts.is_empty() {
+            arrows(area, &map, sensor, forces, peaks[1])?;
+            format!("longest arrow {} mN, tangential", three_digits(1e3 * peaks[1]))
+        } else {
+            contact_arrows(area, &map, outline.contacts)?
+        };
         let (unit, factor) = if peaks[0] >= 1.0 { ("N", 1.0) } else { ("mN", 1e3) };
         bar(area, &map, ["pull", "press"], &format!("{unit}, normal"), &three_digits(factor * peaks[0]))?;
-        let at = (CORNER.0 as i32, 8);
-        note(
-            area,
-            &format!("longest arrow {} mN, tangential", three_digits(1e3 * peaks[1])),
-            at,
-            HPos::Left,
-            VPos::Center,
-        )
+        note(area, &legend, (CORNER.0 as i32, 8), HPos::Left, VPos::Center)
     })
 }
 
@@ -175,6 +180,32 @@ fn arrows(area: &Area, map: &Map, sensor: &Sensor, forces: &Forces, longest_N: f
         }
     }
     Ok(())
+}
+
+/// Draws the tangential force of each contact from its centre, with a bar of one standard deviation to either side of
+/// the tip along x and y; returns the legend.
+fn contact_arrows(area: &Area, map: &Map, contacts: &[ContactEstimate]) -> Result<String> {
+    let shear = |contact: &ContactEstimate| contact.force_N[0].hypot(contact.force_N[1]);
+    let longest_N = contacts.iter().map(shear).fold(0.0, f64::max);
+    let pixels = |force_N: f64| if longest_N > 0.0 { CONTACT_ARROW * force_N / longest_N } else { 0.0 };
+    for contact in contacts {
+        let centre = map.of_mm(contact.centre_mm);
+        let ([x, y, _], [sx, sy, _]) = (contact.force_N, contact.sigma_N);
+        if shear(contact) > 0.0 {
+            arrow(area, centre, (x / shear(contact), y / shear(contact)), pixels(shear(contact)))?;
+        }
+        let tip = (centre.0 + pixels(x).round() as i32, centre.1 + pixels(y).round() as i32);
+        for (sigma_N, (ux, uy)) in [(sx, (1, 0)), (sy, (0, 1))] {
+            // No bar is longer than the map.
+            let reach = pixels(sigma_N).min(SIDE).round() as i32;
+            let end = |along: i32, aside: i32| (tip.0 + along * ux + aside * uy, tip.1 + along * uy + aside * ux);
+            for line in [[(-reach, 0), (reach, 0)], [(-reach, -CAP), (-reach, CAP)], [(reach, -CAP), (reach, CAP)]] {
+                let line = line.map(|(along, aside)| end(along, aside)).to_vec();
+                area.draw(&PathElement::new(line, SERIES[3].stroke_width(1)))?;
+            }
+        }
+    }
+    Ok(format!("longest arrow {} N; bars: ± one standard deviation", three_digits(longest_N)))
 }
 
 /// An arrow from a point along a unit vector.

@@ -2,6 +2,8 @@
 
 use anyhow::Result;
 use dermis_golden::frame::Forces;
+use dermis_golden::reconstruct::Golden;
+use dermis_golden::scene::EstimatorKind;
 
 use super::super::document::{Item, Picture, Section};
 use super::super::measure::Measured;
@@ -15,8 +17,9 @@ use super::{case_text, illustrated_frame, Choice};
 pub fn fields(measured: &[Measured], choices: &[Choice]) -> Result<Section> {
     let mut items = vec![Item::Text(
         "Stress on the taxels with the centroids of compression (+) and tension (−) of each subarray, then forces \
-         per taxel, normal as colour, tangential as arrows: truth, golden and bit-true model on the same scale. Row \
-         0 is on top, x points to the right, y down. The colour scale is the square root of the value, to make \
+         per taxel, normal as colour, tangential as arrows: truth, golden and bit-true model on the same scale, both \
+         with the estimator that the hardware has. Where the golden model takes another one, its forces per contact \
+         follow, with bars of one standard deviation. Row 0 is on top, x points to the right, y down. The colour scale is the square root of the value, to make \
          tension visible."
             .into(),
     )];
@@ -31,7 +34,8 @@ pub fn fields(measured: &[Measured], choices: &[Choice]) -> Result<Section> {
     Ok(Section { id: "fields", title: "Stress and forces".into(), items })
 }
 
-/// The pictures of one frame: stress, true forces if known, golden model, bit-true model if supported.
+/// The pictures of one frame: stress, true forces if known, golden model, bit-true model if supported, forces per contact
+/// if the scene's estimator finds contacts.
 pub(super) fn field_pictures(m: &Measured, index: usize, prefix: &str) -> Result<Vec<Picture>> {
     let (frame, golden) = (&m.frames[index], &m.golden[index]);
     let sensor = &m.scene.sensor;
@@ -52,7 +56,7 @@ pub(super) fn field_pictures(m: &Measured, index: usize, prefix: &str) -> Result
     ];
     let what = format!("{}, case {}, frame {}", m.scene.name, case_text(m.scene.partition.case), frame.id);
     let id = |name: &str| format!("{prefix}-{}-case-{}-{name}", m.scene.name, m.scene.partition.case);
-    let outline = Outline { subarrays: &golden.subarrays, centroids: true };
+    let outline = Outline { subarrays: &golden.subarrays, centroids: true, contacts: &[] };
     let mut pictures = vec![Picture {
         id: id("stress"),
         caption: format!("{what}: stress"),
@@ -64,6 +68,17 @@ pub(super) fn field_pictures(m: &Measured, index: usize, prefix: &str) -> Result
             id: id(name),
             caption: format!("{what}: forces, {name}"),
             svg: force_field(sensor, forces, peaks, outline)?,
+        });
+    }
+    if m.scene.estimator() != EstimatorKind::Search {
+        let result = Golden::new(&m.scene)?.run(frame)?;
+        let contacts = result.extra.contacts.as_deref().unwrap_or_default();
+        let outline = Outline { subarrays: &result.subarrays, contacts, ..outline };
+        let name = m.scene.estimator().name();
+        pictures.push(Picture {
+            id: id(name),
+            caption: format!("{what}: force of each contact, {name}"),
+            svg: force_field(sensor, &result.forces_N, peaks, outline)?,
         });
     }
     Ok(pictures)

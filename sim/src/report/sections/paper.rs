@@ -79,7 +79,7 @@ fn figure_1(measured: &[Measured]) -> Result<Section> {
     if let Some(m) = find(measured, "sensor-1", Case::WHOLE) {
         let frame = Frame::eq2(&m.scene.sensor);
         let result = m.engine.run(&frame)?;
-        let outline = Outline { subarrays: &result.subarrays, centroids: true };
+        let outline = Outline { subarrays: &result.subarrays, centroids: true, contacts: &[] };
         let forces = &result.forces_N;
         let peaks = [
             forces.fz.iter().fold(0.0, |peak: f64, f| peak.max(f.abs())),
