@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use dermis_golden::board::EngineKind;
-use dermis_golden::fixed::resources::{Memory, SEARCH_MEMORY};
+use dermis_golden::fixed::resources::Memory;
 use dermis_golden::fixed::send::{
     CASE_SHIFT, FLAG_COEFFICIENTS, FLAG_CONDITION, FLAG_FOUND, FLAG_FRAMING, FLAG_NO_CONTACT, STATUS_BEATS,
 };
@@ -166,10 +166,9 @@ pub(crate) fn place(verilog: &str, model: &Model, engine: &str) -> Result<String
                 (0, _) => "block",
                 _ => "huge",
             };
-            // Read-during-write data is unused: the serial engine never reads a word in the cycle that writes it, and
-            // the search discards what it reads so. So no logic is needed to define it.
-            let unchecked = model.board.engine == EngineKind::Serial || memory.block == SEARCH_MEMORY;
-            let check = if unchecked { ", no_rw_check" } else { "" };
+            // The serial engine never reads a word in the cycle that writes it, so no logic is needed to define what it
+            // would read.
+            let check = if model.board.engine == EngineKind::Serial { ", no_rw_check" } else { "" };
             placed.push_str(&format!("(* ram_style = \"{style}\"{check} *)\n"));
             marked += 1;
         }

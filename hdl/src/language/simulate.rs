@@ -3,7 +3,8 @@
 //! At a clock edge the next values are computed from the state and the inputs, then taken all at once. Combinational
 //! outputs are computed after an edge and when an input changed. Where neither an input nor a register changed since
 //! the last edge, nothing is computed. The clocks of other domains are inputs; their edges and resets act before the
-//! outputs are computed.
+//! outputs are computed. A register that takes a word of an unchecked memory in the cycle that writes the word gets its
+//! complement, so that using it shows as an error.
 
 use super::compile::{limbs, mask, Op, Operand, Program, Wide};
 use super::kernel::{Binary, Contents, Domain, Kernel, Node, Role, Unary};
@@ -16,6 +17,15 @@ struct Transition {
     limbs: usize,
     reset: Option<(usize, u64)>,
     domain: Option<usize>,
+    collides: Option<Collision>,
+}
+
+/// Where a register takes a word of a memory whose reads in the cycle of a write are not used.
+#[derive(Clone, Debug)]
+struct Collision {
+    memory: usize,
+    address: usize,
+    bits: usize,
 }
 
 /// A write port in slots.
@@ -71,7 +81,14 @@ impl Simulation {
             slots[node(own)] = sign(register.initial.unwrap_or(0));
             let reset = register.reset.map(|(condition, value)| (node(condition), sign(value)));
             let limbs = limbs(of.ty.bits) as usize;
-            transitions.push(Transition { to: node(own), next: node(next), limbs, reset, domain: register.domain });
+            let collides = match kernel.nodes[next].0 {
+                Node::Read { memory, address } if kernel.memories[memory].unchecked => {
+                    Some(Collision { memory, address: node(address), bits: of.ty.bits })
+                }
+                _ => None,
+            };
+            let (to, next, domain) = (node(own), node(next), register.domain);
+            transitions.push(Transition { to, next, limbs, reset, domain, collides });
         }
         let mut writes = Vec::new();
         for (memory, of) in kernel.memories.iter().enumerate() {
@@ -153,6 +170,14 @@ impl Simulation {
                     own[0] = value;
                 }
                 _ => own.copy_from_slice(&slots[transition.next..][..transition.limbs]),
+            }
+            if let Some(Collision { memory, address, bits }) = transition.collides {
+                let written = |write: &WritePort| {
+                    write.memory == memory && slots[write.enable] != 0 && slots[write.address] == slots[address]
+                };
+                if writes.iter().any(written) {
+                    own.iter_mut().enumerate().for_each(|(limb, value)| *value ^= mask((bits - 64 * limb).min(64)));
+                }
             }
             at += transition.limbs;
         }

@@ -3,7 +3,9 @@
 use rust_hdl::prelude::*;
 
 use super::counter::count_bits;
-use crate::wire::{Wire, Word};
+use crate::kernel_block;
+use crate::language::{Body, Builder, Kernel, Type};
+use crate::wire::Wire;
 
 /// Counts the taxels of a frame; `kept` is `word`, or 0 if the current taxel is dead. Combinational from `word` to
 /// `kept`: the comparison with the list of dead taxels is registered a cycle ahead.
@@ -19,75 +21,81 @@ pub struct Blank {
     pub word: Wire<In>,
     /// `word`, or 0 for a dead taxel; same cycle.
     pub kept: Wire<Out>,
-    _dead: Vec<usize>,
-    _taxels: usize,
-    _taxel: usize,
+    kernel: Body,
 }
+
+kernel_block!(Blank, clock clk, inputs [clear, enable, word], outputs [kept]);
 
 impl Blank {
     /// Words of `bits` bits of a frame of `taxels` taxels; `dead` lists the row-major indices of the dead ones.
     pub fn new(bits: usize, taxels: usize, dead: &[usize]) -> Self {
-        Blank {
+        let block = Blank {
             clk: Default::default(),
             clear: Default::default(),
             enable: Default::default(),
             word: Wire::new(bits),
             kept: Wire::new(bits),
-            _dead: dead.to_vec(),
-            _taxels: taxels,
-            _taxel: 0,
-        }
+            kernel: Body::default(),
+        };
+        block.bind(kernel(bits, taxels, dead))
     }
 }
 
-impl Logic for Blank {
-    fn update(&mut self) {
-        if self.clk.pos_edge() {
-            let last = self._taxel + 1 == self._taxels;
-            self._taxel = match (self.clear.val(), self.enable.val()) {
-                (true, _) => 0,
-                (false, true) if last => 0,
-                (false, enable) => self._taxel + usize::from(enable),
+fn kernel(bits: usize, taxels: usize, dead: &[usize]) -> Kernel {
+    let k = Builder::new("blank");
+    let (clear, enable, word) = (k.input("clear", 1), k.input("enable", 1), k.input("word", bits));
+    if dead.is_empty() {
+        k.comment("No taxel is dead.");
+        k.wire("kept", word);
+        return k.finish();
+    }
+    let count = Type::unsigned(count_bits(taxels));
+    let taxel = k.register("taxel", count);
+    let zero = k.constant(count.bits, 0);
+    let after = k.wire("after", taxel.is(taxels as u64 - 1).mux(zero, taxel.plus(1)));
+    let following = k.wire("following", clear.mux(zero, enable.mux(after, *taxel)));
+    let table: Vec<u64> = (0..1 << count.bits).map(|taxel| u64::from(dead.contains(&taxel))).collect();
+    taxel.set(following);
+    let dead = k.delay("dead", following.table(1, &table));
+    k.wire("kept", dead.mux(k.constant(bits, 0), word));
+    k.finish()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::language::testbench::{check, random_words, Reference};
+    use crate::wire::Word;
+
+    /// The current taxel; undefined before the first `clear`.
+    struct Frame {
+        taxel: Option<usize>,
+        taxels: usize,
+        dead: Vec<usize>,
+    }
+
+    impl Reference for Frame {
+        fn outputs(&mut self, inputs: &[Word]) -> Vec<Option<Word>> {
+            let kept = |taxel| if self.dead.contains(&taxel) { Word::default() } else { inputs[2] };
+            vec![self.taxel.map(kept)]
+        }
+
+        fn clock(&mut self, inputs: &[Word]) {
+            let step = usize::from(inputs[1].number() == 1);
+            self.taxel = match inputs[0].number() {
+                1 => Some(0),
+                _ => self.taxel.map(|taxel| (taxel + step) % self.taxels),
             };
         }
-        let dead = self._dead.contains(&self._taxel);
-        self.kept.next = if dead { Word::default() } else { self.word.val() };
     }
 
-    fn connect(&mut self) {
-        self.kept.connect();
-    }
-
-    fn hdl(&self) -> Verilog {
-        if self._dead.is_empty() {
-            return Verilog::Custom(
-                "// No taxel is dead.\nwire unused = &{1'b0, clk, clear, enable};\nalways @(*) kept = word;"
-                    .to_string(),
-            );
+    #[test]
+    fn dead_taxels_are_zero() {
+        for (taxels, dead) in [(35, vec![0, 7, 8, 34]), (64, vec![63]), (9, vec![])] {
+            let mut stimulus = random_words(3000, &[1, 1, 12]);
+            stimulus.iter_mut().enumerate().for_each(|(cycle, inputs)| inputs[0] = (cycle % 500 == 0).into());
+            let block = Blank::new(12, taxels, &dead);
+            check(block.kernel.kernel(), &stimulus, &mut Frame { taxel: None, taxels, dead });
         }
-        let (bits, count) = (self.word.width(), count_bits(self._taxels));
-        let is: String = self._dead.iter().map(|taxel| format!("    {count}'d{taxel},\n")).collect();
-        Verilog::Custom(format!(
-            "\
-reg [{end}:0] taxel;
-wire [{end}:0] after = taxel == {count}'d{last} ? {count}'d0 : taxel + {count}'d1;
-wire [{end}:0] following = clear ? {count}'d0 : enable ? after : taxel;
-reg among, dead;
-always @(*) begin
-  (* rom_style = \"logic\" *)
-  case (following)
-{cases}: among = 1'b1;
-    default: among = 1'b0;
-  endcase
-end
-always @(posedge clk) begin
-  taxel <= following;
-  dead <= among;
-end
-always @(*) kept = dead ? {bits}'d0 : word;",
-            end = count - 1,
-            last = self._taxels - 1,
-            cases = is.trim_end().trim_end_matches(','),
-        ))
     }
 }

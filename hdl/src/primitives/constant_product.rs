@@ -1,21 +1,10 @@
 //! Products with constants as sums of shifts, which take no multiplier: those are reserved for the passes.
 
-/// Verilog expression of `value · constant`, truncated to the width of `value`; `constant` is at least 1.
-pub fn times(value: &str, constant: usize) -> String {
-    let terms: Vec<String> = (0..usize::BITS)
-        .filter(|bit| constant >> bit & 1 == 1)
-        .map(|bit| if bit == 0 { value.to_string() } else { format!("({value} << {bit})") })
-        .collect();
-    format!("({})", terms.join(" + "))
-}
+use crate::language::{Builder, Expr};
 
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn one_term_per_bit() {
-        assert_eq!(times("x", 1), "(x)");
-        assert_eq!(times("x", 12), "((x << 2) + (x << 3))");
-    }
+/// `constant` · `value` of `bits` bits, modulo 2^`bits`.
+pub fn times<'k>(k: &'k Builder, value: Expr<'k>, constant: usize, bits: usize) -> Expr<'k> {
+    let shifts = (0..usize::BITS as usize).filter(|bit| constant >> bit & 1 == 1);
+    let sum = shifts.map(|bit| value.shift_left(bit)).reduce(|sum, term| sum + term);
+    sum.map_or(k.constant(bits, 0), |sum| sum.resize(bits))
 }

@@ -1,11 +1,12 @@
 //! Magnitude and signs of each subarray, gathered while the frame arrives.
 
-use dermis_golden::fixed::arith::magnitude_bits;
-use dermis_golden::fixed::receive::Received;
 use rust_hdl::prelude::*;
 
+use super::case_counter::expression_by_case;
 use super::counter::count_bits;
-use crate::wire::{Wire, Word};
+use crate::kernel_block;
+use crate::language::{Body, Builder, Expr, Kernel, Type};
+use crate::wire::Wire;
 
 /// For each subarray: the OR of the magnitudes of its accepted codes, and whether any code was above the noise floor or
 /// below its negative. `select` chooses the subarray whose values are on the outputs.
@@ -29,14 +30,20 @@ pub struct Gather {
     pub positive: Signal<Out, Bit>,
     /// A code of subarray `select` was below minus the noise floor.
     pub negative: Signal<Out, Bit>,
-    _floor: i64,
-    _parts: Vec<Received>,
+    kernel: Body,
 }
+
+kernel_block!(
+    Gather,
+    clock clk,
+    inputs [clear, accept, code, part, select],
+    outputs [magnitude, positive, negative]
+);
 
 impl Gather {
     /// For codes of `bits` bits, a noise floor of `floor` codes and `parts` subarrays.
     pub fn new(bits: usize, floor: i32, parts: usize) -> Self {
-        Gather {
+        let block = Gather {
             clk: Default::default(),
             clear: Default::default(),
             accept: Default::default(),
@@ -46,73 +53,84 @@ impl Gather {
             magnitude: Wire::new(bits - 1),
             positive: Default::default(),
             negative: Default::default(),
-            // A floor beyond the code's range is clamped to its end, which no code exceeds either.
-            _floor: i64::from(floor).min((1 << (bits - 1)) - 1),
-            _parts: vec![Received::default(); parts],
-        }
+            kernel: Body::default(),
+        };
+        // A floor beyond the code's range is clamped to its end, which no code exceeds either.
+        block.bind(kernel(bits, i64::from(floor).min((1 << (bits - 1)) - 1), parts))
     }
 }
 
-impl Logic for Gather {
-    fn update(&mut self) {
-        if self.clk.pos_edge() {
-            let code = self.code.val().signed(0, self.code.width());
-            let floor = self._floor;
-            if self.clear.val() {
-                self._parts.fill(Received::default());
-            } else if self.accept.val() {
-                if let Some(seen) = self._parts.get_mut(self.part.val().number() as usize) {
-                    seen.magnitude |= magnitude_bits(code);
-                    seen.positive |= code > floor;
-                    seen.negative |= code < -floor;
+fn kernel(bits: usize, floor: i64, parts: usize) -> Kernel {
+    let k = Builder::new("gather");
+    let (clear, accept, code) = (k.input("clear", 1), k.input("accept", 1), k.input("code", bits));
+    let (part, select) = (k.input("part", count_bits(parts)), k.input("select", count_bits(parts)));
+    let magnitude = k.wire("own_magnitude", code.low(bits - 1) ^ code.top().repeat(bits - 1));
+    let above = k.wire("above", k.signed_constant(bits, floor).less(code.signed()));
+    let below = k.wire("below", code.signed().less(k.signed_constant(bits, -floor)));
+    // Each the OR over the accepted codes of a subarray.
+    for (name, value) in [("magnitude", magnitude), ("positive", above), ("negative", below)] {
+        let of = |number: usize| {
+            let held = k.state(&format!("{name}_of{number}"), Type::unsigned(value.bits()), clear, 0);
+            let own = if parts == 1 { accept } else { accept & part.is(number as u64) };
+            k.when(own, || held.set(*held | value));
+            *held
+        };
+        let all: Vec<Expr> = (0..parts).map(of).collect();
+        k.wire(name, expression_by_case(select, &all).unwrap_or(value));
+    }
+    k.finish()
+}
+
+#[cfg(test)]
+mod tests {
+    use dermis_golden::fixed::arith::magnitude_bits;
+
+    use super::*;
+    use crate::language::testbench::{check, random_words, Reference};
+    use crate::wire::Word;
+
+    const BITS: usize = 9;
+
+    /// Magnitude, above, below of each subarray; undefined before the first `clear`.
+    struct Seen {
+        floor: i64,
+        parts: usize,
+        each: Vec<(u64, bool, bool)>,
+    }
+
+    impl Reference for Seen {
+        fn outputs(&mut self, inputs: &[Word]) -> Vec<Option<Word>> {
+            let seen = self.each.get(inputs[4].number() as usize);
+            let (magnitude, above, below) = seen.copied().unwrap_or_default();
+            [Word::from(magnitude), above.into(), below.into()].map(|word| seen.map(|_| word)).into()
+        }
+
+        fn clock(&mut self, inputs: &[Word]) {
+            let code = inputs[2].signed(0, BITS);
+            if inputs[0].number() == 1 {
+                self.each = vec![(0, false, false); self.parts];
+            } else if inputs[1].number() == 1 {
+                if let Some(seen) = self.each.get_mut(inputs[3].number() as usize) {
+                    *seen =
+                        (seen.0 | magnitude_bits(code), seen.1 | (code > self.floor), seen.2 | (code < -self.floor));
                 }
             }
         }
-        let seen = self._parts.get(self.select.val().number() as usize).copied().unwrap_or_default();
-        self.magnitude.next = Word::from(seen.magnitude);
-        self.positive.next = seen.positive;
-        self.negative.next = seen.negative;
     }
 
-    fn connect(&mut self) {
-        self.magnitude.connect();
-        self.positive.connect();
-        self.negative.connect();
-    }
-
-    fn hdl(&self) -> Verilog {
-        let bits = self.code.width();
-        Verilog::Custom(format!(
-            "\
-wire signed [{end}:0] value = code;
-wire signed [{end}:0] floor_code = {bits}'sd{floor};
-reg [{less_end}:0] magnitudes [0:{last}];
-reg positives [0:{last}];
-reg negatives [0:{last}];
-integer i;
-always @(posedge clk) begin
-  if (clear) begin
-    for (i = 0; i <= {last}; i = i + 1) begin
-      magnitudes[i] <= {less}'d0;
-      positives[i] <= 1'b0;
-      negatives[i] <= 1'b0;
-    end
-  end else if (accept) begin
-    magnitudes[part] <= magnitudes[part] | (code[{less_end}:0] ^ {{{less}{{code[{end}]}}}});
-    positives[part] <= positives[part] || value > floor_code;
-    negatives[part] <= negatives[part] || value < -floor_code;
-  end
-end
-always @(*) begin
-  magnitude = magnitudes[select];
-  positive = positives[select];
-  negative = negatives[select];
-end",
-            last = self._parts.len() - 1,
-            end = bits - 1,
-            less = bits - 1,
-            less_end = bits - 2,
-            floor = self._floor,
-        ))
+    #[test]
+    fn codes_of_each_subarray_are_gathered() {
+        for (floor, parts) in [(7, 3), (255, 1), (100, 4)] {
+            let mut stimulus = random_words(4000, &[1, 1, BITS, count_bits(parts), count_bits(parts)]);
+            for (cycle, inputs) in stimulus.iter_mut().enumerate() {
+                inputs[0] = (cycle % 29 == 0).into();
+                if parts == 1 {
+                    (inputs[3], inputs[4]) = Default::default();
+                }
+            }
+            let block = Gather::new(BITS, floor, parts);
+            let mut seen = Seen { floor: floor.into(), parts, each: Vec::new() };
+            check(block.kernel.kernel(), &stimulus, &mut seen);
+        }
     }
 }

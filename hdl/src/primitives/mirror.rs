@@ -5,10 +5,12 @@ use dermis_golden::fixed::Model;
 use dermis_golden::partition::Grid;
 use rust_hdl::prelude::*;
 
-use super::case_counter::{by_case, largest};
+use super::case_counter::{expression_by_case, largest};
 use super::constant_product::times;
 use super::counter::count_bits;
-use crate::wire::{Wire, Word};
+use crate::kernel_block;
+use crate::language::{concat, Body, Builder, Expr, Kernel};
+use crate::wire::Wire;
 
 /// Row and column of a taxel in its subarray, and of the subarray in the array, to quad address, lane and write mask;
 /// combinational. Subarrays follow each other row-major, each with all its quads. A taxel on the middle line of an odd
@@ -33,26 +35,36 @@ pub struct Mirror {
     pub lane: Wire<Out>,
     /// Lanes the taxel is written to, one bit each.
     pub mask: Wire<Out>,
-    _cases: Vec<(Quads, Grid)>,
+    kernel: Body,
 }
+
+kernel_block!(Mirror, inputs [which, row, col, part_row, part_col], outputs [address, part, lane, mask]);
 
 impl Mirror {
     /// For the layout and the grid of each of `cases`.
     pub fn new(cases: &[Model]) -> Self {
+        let places: Vec<(Quads, Grid)> = cases.iter().map(|case| (case.layout(), case.grid())).collect();
+        Mirror::of(&places, frame_quads(cases))
+    }
+
+    fn of(cases: &[(Quads, Grid)], frame_quads: usize) -> Self {
         let wire =
-            |of: &dyn Fn(&Model) -> usize| Wire::new(count_bits(largest(&cases.iter().map(of).collect::<Vec<_>>())));
-        Mirror {
+            |of: fn(&(Quads, Grid)) -> usize| Wire::new(count_bits(largest(&cases.iter().map(of).collect::<Vec<_>>())));
+        let parts = cases.iter().map(|(_, grid)| grid.rows * grid.cols).max().unwrap_or(1);
+        let block = Mirror {
             which: Wire::new(count_bits(cases.len())),
-            part_row: wire(&|case| case.grid().rows),
-            part_col: wire(&|case| case.grid().cols),
-            part: Wire::new(count_bits(largest(&cases.iter().map(|case| case.parts.len()).collect::<Vec<_>>()))),
-            row: wire(&|case| case.layout().rows),
-            col: wire(&|case| case.layout().cols),
-            address: Wire::new(count_bits(frame_quads(cases))),
+            part_row: wire(|(_, grid)| grid.rows),
+            part_col: wire(|(_, grid)| grid.cols),
+            part: Wire::new(count_bits(parts)),
+            row: wire(|(layout, _)| layout.rows),
+            col: wire(|(layout, _)| layout.cols),
+            address: Wire::new(count_bits(frame_quads)),
             lane: Wire::new(2),
             mask: Wire::new(4),
-            _cases: cases.iter().map(|case| (case.layout(), case.grid())).collect(),
-        }
+            kernel: Body::default(),
+        };
+        let kernel = block.kernel_of(cases);
+        block.bind(kernel)
     }
 }
 
@@ -61,121 +73,99 @@ pub fn frame_quads(cases: &[Model]) -> usize {
     largest(&cases.iter().map(|case| case.parts.len() * case.formats.quads).collect::<Vec<_>>())
 }
 
-impl Logic for Mirror {
-    fn update(&mut self) {
-        let (row, col) = (self.row.val().number() as usize, self.col.val().number() as usize);
-        let case = self._cases.get(self.which.val().number() as usize);
-        let inside = |(layout, _): &&(Quads, Grid)| row < layout.rows && col < layout.cols;
-        if let Some((layout, parts)) = case.filter(inside) {
-            let place = layout.locate(row, col);
-            let part = self.part_row.val().number() as usize * parts.cols + self.part_col.val().number() as usize;
-            self.address.next = Word::from((part * layout.len() + place.address) as u64);
-            self.part.next = Word::from(part as u64);
-            self.lane.next = Word::from(place.lane as u64);
-            self.mask.next = Word::from(u64::from(place.mask));
-        }
-    }
-
-    fn connect(&mut self) {
-        self.address.connect();
-        self.part.connect();
-        self.lane.connect();
-        self.mask.connect();
-    }
-
-    fn hdl(&self) -> Verilog {
-        let cases: String = (0..self._cases.len()).map(|case| self.place(case)).collect();
-        let all = |name: &str| {
-            let each: Vec<String> = (0..self._cases.len()).map(|case| format!("{name}{case}")).collect();
-            by_case(&each)
-        };
-        // Bits beyond the target width are always zero.
-        let cut = |bits: usize| match self.wide() == bits {
-            true => String::new(),
-            false => format!("[{}:0]", bits - 1),
-        };
-        Verilog::Custom(format!(
-            "\
-{cases}wire [{end}:0] place = {place};
-wire [{end}:0] number = {number};
-wire lower = {lower};
-wire right = {right};
-wire both_rows = {both_rows};
-wire both_cols = {both_cols};
-wire unused = &{{1'b0, which, place, number}};
-always @(*) begin
-  address = place{address_cut};
-  part = number{part_cut};
-  lane = {{lower, right}};
-  mask[0] = (!lower || both_rows) && (!right || both_cols);
-  mask[1] = (!lower || both_rows) && (right || both_cols);
-  mask[2] = (lower || both_rows) && (!right || both_cols);
-  mask[3] = (lower || both_rows) && (right || both_cols);
-end",
-            end = self.wide() - 1,
-            place = all("place"),
-            number = all("number"),
-            lower = all("lower"),
-            right = all("right"),
-            both_rows = all("both_rows"),
-            both_cols = all("both_cols"),
-            address_cut = cut(self.address.width()),
-            part_cut = cut(self.part.width()),
-        ))
-    }
+/// Of one taxel in one case.
+struct Place<'k> {
+    part: Expr<'k>,
+    address: Expr<'k>,
+    lower: Expr<'k>,
+    right: Expr<'k>,
+    /// The taxel is on the middle line of an odd count, which is its own mirror image: written to both lanes.
+    both_rows: Expr<'k>,
+    both_cols: Expr<'k>,
 }
 
 impl Mirror {
-    /// Width of the intermediate results.
-    fn wide(&self) -> usize {
-        let widths = [
-            self.address.width(),
-            self.row.width(),
-            self.col.width(),
-            self.part.width(),
-            self.part_row.width(),
-            self.part_col.width(),
-        ];
-        widths.into_iter().max().unwrap_or(1)
-    }
-
-    /// Verilog of a taxel's address and lane in case `case`.
-    fn place(&self, case: usize) -> String {
-        let (layout, parts) = self._cases[case];
-        let (rows, cols) = (layout.rows, layout.cols);
-        let (row_bits, col_bits, wide) = (self.row.width(), self.col.width(), self.wide());
-        let extend = |name: &str, from: usize| match wide - from {
-            0 => name.to_string(),
-            more => format!("{{{more}'d0, {name}}}"),
+    fn kernel_of(&self, cases: &[(Quads, Grid)]) -> Kernel {
+        let k = Builder::combinational("mirror");
+        let which = k.input("which", self.which.width());
+        let (row, col) = (k.input("row", self.row.width()), k.input("col", self.col.width()));
+        let part = [k.input("part_row", self.part_row.width()), k.input("part_col", self.part_col.width())];
+        let (address_bits, part_bits) = (self.address.width(), self.part.width());
+        let place = |&(layout, grid): &(Quads, Grid)| {
+            let (lower, near_row, both_rows) = fold(&k, row, layout.rows);
+            let (right, near_col, both_cols) = fold(&k, col, layout.cols);
+            let part = match grid.rows * grid.cols {
+                1 => k.constant(part_bits, 0),
+                _ => (times(&k, part[0], grid.cols, part_bits) + part[1]).resize(part_bits),
+            };
+            let first = times(&k, part, layout.len(), address_bits);
+            let address = first + times(&k, near_row, layout.quad_cols(), address_bits) + near_col;
+            Place { part, address: address.resize(address_bits), lower, right, both_rows, both_cols }
         };
-        // The middle line of an odd count is its own mirror image: written to both lanes.
-        let middle_row = if rows % 2 == 1 { format!("row == {row_bits}'d{}", rows / 2) } else { "1'b0".into() };
-        let middle_col = if cols % 2 == 1 { format!("col == {col_bits}'d{}", cols / 2) } else { "1'b0".into() };
-        let single = parts.rows * parts.cols == 1;
-        let row = extend("part_row", self.part_row.width());
-        let col = extend("part_col", self.part_col.width());
-        let number = if single { format!("{row} | {col}") } else { format!("{} + {col}", times(&row, parts.cols)) };
-        let base = if single { String::new() } else { format!("{} + ", times(&format!("number{case}"), layout.len())) };
-        format!(
-            "\
-wire lower{case} = row > {row_bits}'d{row_half};
-wire right{case} = col > {col_bits}'d{col_half};
-wire [{row_end}:0] near_row{case} = lower{case} ? {row_bits}'d{row_last} - row : row;
-wire [{col_end}:0] near_col{case} = right{case} ? {col_bits}'d{col_last} - col : col;
-wire [{end}:0] number{case} = {number};
-wire [{end}:0] place{case} = {base}{row_place} + {col_wide};
-wire both_rows{case} = {middle_row};
-wire both_cols{case} = {middle_col};
-",
-            row_half = (rows - 1) / 2,
-            col_half = (cols - 1) / 2,
-            row_last = rows - 1,
-            col_last = cols - 1,
-            row_end = row_bits - 1,
-            col_end = col_bits - 1,
-            end = wide - 1,
-            row_place = times(&extend(&format!("near_row{case}"), row_bits), layout.quad_cols()),
-            col_wide = extend(&format!("near_col{case}"), col_bits),
-        )
+        let places: Vec<Place> = cases.iter().map(place).collect();
+        let chosen = |of: for<'k> fn(&Place<'k>) -> Expr<'k>, bits: usize| {
+            let each: Vec<Expr> = places.iter().map(of).collect();
+            expression_by_case(which, &each).unwrap_or(k.constant(bits, 0))
+        };
+        k.wire("address", chosen(|place| place.address, address_bits));
+        k.wire("part", chosen(|place| place.part, part_bits));
+        let lower = k.wire("lower", chosen(|place| place.lower, 1));
+        let right = k.wire("right", chosen(|place| place.right, 1));
+        let both_rows = k.wire("both_rows", chosen(|place| place.both_rows, 1));
+        let both_cols = k.wire("both_cols", chosen(|place| place.both_cols, 1));
+        k.wire("lane", lower.concat(right));
+        let (rows, cols) = ([lower | both_rows, !lower | both_rows], [right | both_cols, !right | both_cols]);
+        k.wire("mask", concat(&[rows[0] & cols[0], rows[0] & cols[1], rows[1] & cols[0], rows[1] & cols[1]]));
+        k.finish()
+    }
+}
+
+/// For line `at` of `count`: whether it is in the second half, its image in the first half, whether it is in the middle.
+fn fold<'k>(k: &'k Builder, at: Expr<'k>, count: usize) -> (Expr<'k>, Expr<'k>, Expr<'k>) {
+    let number = |value: usize| k.constant(at.bits(), value as u64);
+    let beyond = number((count - 1) / 2).less(at);
+    let near = beyond.mux((number(count - 1) - at).low(at.bits()), at);
+    let middle = if count % 2 == 1 { at.equals(number(count / 2)) } else { k.constant(1, 0) };
+    (beyond, near, middle)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::language::testbench::{check, Pipeline};
+    use crate::wire::Word;
+
+    #[test]
+    fn taxels_are_placed_as_in_the_layout() {
+        for (sizes, grids) in
+            [(vec![(8, 8)], vec![(1, 1)]), (vec![(5, 7), (10, 7), (5, 14)], vec![(2, 3), (1, 3), (2, 1)])]
+        {
+            let cases: Vec<(Quads, Grid)> = sizes
+                .iter()
+                .zip(&grids)
+                .map(|(&(rows, cols), &grid)| (Quads { rows, cols }, Grid { rows: grid.0, cols: grid.1 }))
+                .collect();
+            let largest = |of: fn(&(Quads, Grid)) -> usize| cases.iter().map(of).max().unwrap();
+            let frame = largest(|(layout, grid)| layout.len() * grid.rows * grid.cols);
+            let mirror = Mirror::of(&cases, frame);
+            let mut random = fastrand::Rng::with_seed(20);
+            let mut taxel = || {
+                let which = random.usize(..cases.len());
+                let (layout, grid) = cases[which];
+                let limits = [layout.rows, layout.cols, grid.rows, grid.cols];
+                let place = limits.map(|limit| Word::from(random.u64(..limit as u64)));
+                [Word::from(which as u64)].into_iter().chain(place).collect()
+            };
+            let stimulus: Vec<Vec<Word>> = (0..20000).map(|_| taxel()).collect();
+            let of = |inputs: &[Word]| {
+                let [which, row, col, part_row, part_col] = [0, 1, 2, 3, 4].map(|k| inputs[k].number() as usize);
+                let (layout, grid) = cases[which];
+                let (place, part) = (layout.locate(row, col), part_row * grid.cols + part_col);
+                let address = part * layout.len() + place.address;
+                let mask = usize::from(place.mask);
+                [address, part, place.lane, mask].map(|value| Some(Word::from(value as u64))).into()
+            };
+            check(mirror.kernel.kernel(), &stimulus, &mut Pipeline::new(0, 4, of));
+        }
     }
 }

@@ -2,14 +2,11 @@
 //!
 //! rust-hdl 0.46 reads some signed constructs differently from the Verilog it prints, and has no multiplication beyond
 //! 16×16. So blocks are kernels of the [`language`](crate::language): simulation, Verilog and the estimate of their logic
-//! follow from one graph. `Scan` is an `#[hdl_gen]` kernel. The blocks without a kernel are written twice:
-//! `update` computes in integers, with functions of the bit-true model where there are any, for rust-hdl's simulation;
-//! `hdl` returns hand-written Verilog (`Verilog::Custom`) with the scene's widths, which is what gets synthesised.
-//! Co-simulation compares the two with the bit-true model, stage by stage, and proofs cover the blocks that carry a
-//! handshake.
+//! follow from one graph. `Scan` is an `#[hdl_gen]` kernel that connects others. Co-simulation compares the blocks with
+//! the bit-true model, stage by stage, and proofs cover those that carry a handshake.
 //!
-//! The other modules hold what several blocks share: expressions of kernels in `half_up`, `logarithm`,
-//! `polynomial_word`, `sweep`; Verilog text in `constant_product`, `leading_one`, `pass_through`.
+//! The other modules hold what several blocks share: expressions of kernels in `constant_product`, `half_up`,
+//! `logarithm`, `pass_through`, `polynomial_word`, `sweep`; Verilog text in `leading_one`.
 
 mod average;
 mod blank;

@@ -4,7 +4,9 @@ use dermis_golden::fixed::quads::Quads;
 use rust_hdl::prelude::*;
 
 use super::counter::count_bits;
-use crate::wire::{Wire, Word};
+use crate::kernel_block;
+use crate::language::{concat, Body, Builder, Expr, Kernel};
+use crate::wire::Wire;
 
 /// Address and taxels of a quad; rows and columns are exchanged for the v_ij that were computed transposed.
 /// Combinational.
@@ -20,75 +22,70 @@ pub struct Placer {
     pub placed: Wire<Out>,
     /// Its four taxels in lane order.
     pub taxels: Wire<Out>,
-    _layout: Quads,
-    _transposed: Vec<usize>,
+    kernel: Body,
 }
+
+kernel_block!(Placer, inputs [index, address, quad], outputs [placed, taxels]);
 
 impl Placer {
     /// For subarrays of `layout`, taxels of `bits` bits and `vectors` v_ij, of which those listed in `transposed`
     /// arrive with rows and columns exchanged.
     pub fn new(layout: Quads, bits: usize, vectors: usize, transposed: Vec<usize>) -> Self {
-        Placer {
+        let block = Placer {
             index: Wire::new(count_bits(vectors)),
             address: Wire::new(count_bits(layout.len())),
             quad: Wire::new(4 * bits),
             placed: Wire::new(count_bits(layout.len())),
             taxels: Wire::new(4 * bits),
-            _layout: layout,
-            _transposed: transposed,
-        }
+            kernel: Body::default(),
+        };
+        block.bind(kernel(layout, bits, count_bits(vectors), &transposed))
     }
 }
 
-impl Logic for Placer {
-    fn update(&mut self) {
-        let (bits, quad) = (self.quad.width() / 4, self.quad.val());
-        let address = self.address.val().number() as usize;
-        let exchange = self._transposed.contains(&(self.index.val().number() as usize)) && address < self._layout.len();
-        self.placed.next = match exchange {
-            true => Word::from(self._layout.transposed(address) as u64),
-            false => self.address.val(),
-        };
-        self.taxels.next = match exchange {
-            true => Word::of_fields(&[0, 2, 1, 3].map(|lane| quad.signed(lane, bits)), bits),
-            false => quad,
-        };
-    }
-
-    fn connect(&mut self) {
-        self.placed.connect();
-        self.taxels.connect();
-    }
-
-    fn hdl(&self) -> Verilog {
-        if self._transposed.is_empty() {
-            return Verilog::Custom(
-                "// No v_ij is computed transposed.\nwire unused = &{1'b0, index};\n\
-                 always @(*) placed = address;\nalways @(*) taxels = quad;"
-                    .to_string(),
-            );
+fn kernel(layout: Quads, bits: usize, index_bits: usize, transposed: &[usize]) -> Kernel {
+    let k = Builder::combinational("placer");
+    let (index, address) = (k.input("index", index_bits), k.input("address", count_bits(layout.len())));
+    let quad = k.input("quad", 4 * bits);
+    let across = |at: usize| if at < layout.len() { layout.transposed(at) } else { at };
+    let is = transposed.iter().map(|&own| index.is(own as u64)).reduce(|any, own| any | own);
+    let (placed, taxels) = match is {
+        None => (address, quad),
+        Some(is) => {
+            let exchange = k.wire("exchange", is);
+            let table: Vec<u64> = (0..1 << address.bits()).map(|at| across(at) as u64).collect();
+            let lanes: Vec<Expr> = [3, 1, 2, 0].map(|lane| quad.slice(lane * bits, bits)).into();
+            let across = k.wire("across", address.table(address.bits(), &table));
+            (exchange.mux(across, address), exchange.mux(concat(&lanes), quad))
         }
-        let (index, bits, address) = (self.index.width(), self.quad.width() / 4, self.address.width());
-        let is: Vec<String> = self._transposed.iter().map(|k| format!("index == {index}'d{k}")).collect();
-        let cases: String = (0..self._layout.len())
-            .map(|a| format!("    {address}'d{a}: across = {address}'d{};\n", self._layout.transposed(a)))
-            .collect();
-        Verilog::Custom(format!(
-            "\
-wire exchange = {is};
-reg [{end}:0] across;
-always @(*) begin
-  case (address)
-{cases}    default: across = address;
-  endcase
-end
-always @(*) placed = exchange ? across : address;
-always @(*) taxels = exchange ? {{quad[{b3} +: {bits}], quad[{b1} +: {bits}], quad[{b2} +: {bits}], quad[0 +: {bits}]}} : quad;",
-            is = is.join(" || "),
-            end = address - 1,
-            b1 = bits,
-            b2 = 2 * bits,
-            b3 = 3 * bits,
-        ))
+    };
+    k.wire("placed", placed);
+    k.wire("taxels", taxels);
+    k.finish()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::language::testbench::{check, random_words, Pipeline};
+    use crate::wire::Word;
+
+    #[test]
+    fn transposed_vectors_are_put_back() {
+        let (layout, bits, vectors) = (Quads { rows: 6, cols: 6 }, 20, 5);
+        for transposed in [vec![], vec![1, 4]] {
+            let of = |inputs: &[Word]| {
+                let (index, address) = (inputs[0].number() as usize, inputs[1].number() as usize);
+                if !transposed.contains(&index) {
+                    return vec![Some(inputs[1]), Some(inputs[2])];
+                }
+                let placed = (address < layout.len()).then(|| Word::from(layout.transposed(address) as u64));
+                let lanes = [0, 2, 1, 3].map(|lane| inputs[2].signed(lane, bits));
+                vec![placed, Some(Word::of_fields(&lanes, bits))]
+            };
+            let stimulus = random_words(2000, &[count_bits(vectors), count_bits(layout.len()), 4 * bits]);
+            let block = Placer::new(layout, bits, vectors, transposed.clone());
+            check(block.kernel.kernel(), &stimulus, &mut Pipeline::new(0, 2, of));
+        }
     }
 }

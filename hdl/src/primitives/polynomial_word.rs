@@ -64,12 +64,3 @@ impl PolynomialWord {
         format!("{word}[{} + {lane} * {} +: {}]", self.offset(k), self.widths[k], self.widths[k])
     }
 }
-
-/// Verilog that sign-extends or truncates the signal `value` of `from` bits to `to` bits.
-pub fn resize(value: &str, from: usize, to: usize) -> String {
-    match to.checked_sub(from) {
-        Some(0) => value.to_string(),
-        Some(more) => format!("{{{{{more}{{{value}[{}]}}}}, {value}}}", from - 1),
-        None => format!("{value}[{}:0]", to - 1),
-    }
-}

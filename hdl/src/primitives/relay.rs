@@ -2,8 +2,10 @@
 
 use rust_hdl::prelude::*;
 
-use super::pass_through::pass_through;
-use crate::wire::{Wire, Word};
+use super::pass_through::wires;
+use crate::kernel_block;
+use crate::language::{Body, Builder, Kernel, Type};
+use crate::wire::Wire;
 
 /// ```text
 /// s_axis --> register --> m_axis
@@ -32,15 +34,20 @@ pub struct Relay {
     pub m_axis_tready: Signal<In, Bit>,
     /// The beat is the last of its frame; valid with `m_axis_tvalid`.
     pub m_axis_tlast: Signal<Out, Bit>,
-    _wanted: bool,
-    _stands: bool,
-    _beat: (Word, bool),
+    kernel: Body,
 }
+
+kernel_block!(
+    Relay,
+    clock clk,
+    inputs [rst, s_axis_tdata, s_axis_tvalid, s_axis_tlast, m_axis_tready],
+    outputs [s_axis_tready, m_axis_tdata, m_axis_tvalid, m_axis_tlast]
+);
 
 impl Relay {
     /// For beats of `bits` bits; a register if `wanted`, otherwise wires.
     pub fn new(bits: usize, wanted: bool) -> Self {
-        Relay {
+        let block = Relay {
             clk: Default::default(),
             rst: Default::default(),
             s_axis_tdata: Wire::new(bits),
@@ -51,52 +58,63 @@ impl Relay {
             m_axis_tvalid: Default::default(),
             m_axis_tready: Default::default(),
             m_axis_tlast: Default::default(),
-            _wanted: wanted,
-            _stands: false,
-            _beat: Default::default(),
-        }
+            kernel: Body::default(),
+        };
+        block.bind(match wanted {
+            true => kernel(bits),
+            false => wires("relay", bits, "No register slice: sender and receiver are placed close together."),
+        })
     }
 }
 
-impl Logic for Relay {
-    fn update(&mut self) {
-        let offered = (self.s_axis_tdata.val(), self.s_axis_tlast.val());
-        if self.clk.pos_edge() {
-            if !self._stands {
-                self._beat = offered;
-            }
-            let stands = if self._stands { !self.m_axis_tready.val() } else { self.s_axis_tvalid.val() };
-            self._stands = stands && !self.rst.val();
+fn kernel(bits: usize) -> Kernel {
+    let k = Builder::new("relay");
+    let rst = k.input("rst", 1);
+    let (data, given) = (k.input("s_axis_tdata", bits), k.input("s_axis_tvalid", 1));
+    let (last, taken) = (k.input("s_axis_tlast", 1), k.input("m_axis_tready", 1));
+    let tdata = k.register("m_axis_tdata", Type::unsigned(bits));
+    let valid = k.state("m_axis_tvalid", Type::unsigned(1), rst, 0);
+    let tlast = k.register("m_axis_tlast", Type::unsigned(1));
+    k.wire("s_axis_tready", !*valid);
+    k.when(!*valid, || {
+        tdata.set(data);
+        tlast.set(last);
+    });
+    valid.set(valid.mux(!taken, given));
+    k.finish()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::language::testbench::{check, random_words, Reference};
+    use crate::wire::Word;
+
+    /// The beat in the register; undefined before the first reset.
+    struct Slice(Option<Option<(Word, Word)>>);
+
+    impl Reference for Slice {
+        fn outputs(&mut self, _: &[Word]) -> Vec<Option<Word>> {
+            let (beat, bit) = (self.0.flatten(), |bit: bool| self.0.map(|_| Word::from(bit)));
+            // In the order of the kernel's signals.
+            vec![beat.map(|beat| beat.0), bit(beat.is_some()), beat.map(|beat| beat.1), bit(beat.is_none())]
         }
-        let (valid, ready, (data, last)) = match self._wanted {
-            true => (self._stands, !self._stands, self._beat),
-            false => (self.s_axis_tvalid.val(), self.m_axis_tready.val(), offered),
-        };
-        self.m_axis_tvalid.next = valid;
-        self.s_axis_tready.next = ready;
-        self.m_axis_tdata.next = data;
-        self.m_axis_tlast.next = last;
+
+        fn clock(&mut self, inputs: &[Word]) {
+            let [rst, valid, ready] = [0, 2, 4].map(|k| inputs[k].number() == 1);
+            self.0 = match self.0 {
+                _ if rst => Some(None),
+                Some(Some(_)) if ready => Some(None),
+                Some(None) => Some(valid.then_some((inputs[1], inputs[3]))),
+                same => same,
+            };
+        }
     }
 
-    fn connect(&mut self) {
-        self.s_axis_tready.connect();
-        self.m_axis_tdata.connect();
-        self.m_axis_tvalid.connect();
-        self.m_axis_tlast.connect();
-    }
-
-    fn hdl(&self) -> Verilog {
-        if !self._wanted {
-            return pass_through("No register slice: sender and receiver are placed close together.");
-        }
-        Verilog::Custom(
-            "\
-always @(*) s_axis_tready = !m_axis_tvalid;
-always @(posedge clk) begin
-  if (!m_axis_tvalid) {m_axis_tlast, m_axis_tdata} <= {s_axis_tlast, s_axis_tdata};
-  m_axis_tvalid <= !rst && (m_axis_tvalid ? !m_axis_tready : s_axis_tvalid);
-end"
-            .to_string(),
-        )
+    #[test]
+    fn beats_pass_one_at_a_time() {
+        let mut stimulus = random_words(4000, &[1, 33, 1, 1, 1]);
+        stimulus.iter_mut().enumerate().for_each(|(cycle, inputs)| inputs[0] = (cycle % 101 == 0).into());
+        check(Relay::new(33, true).kernel.kernel(), &stimulus, &mut Slice(None));
     }
 }

@@ -2,7 +2,9 @@
 
 use rust_hdl::prelude::*;
 
-use crate::wire::{Wire, Word};
+use crate::kernel_block;
+use crate::language::{Body, Builder, Kernel};
+use crate::wire::Wire;
 
 /// The sample on all four lanes, and the mask gated by `enable`; combinational.
 #[derive(LogicBlock)]
@@ -17,34 +19,48 @@ pub struct Spread {
     pub quad: Wire<Out>,
     /// Write enable of each lane.
     pub write: Wire<Out>,
+    kernel: Body,
 }
+
+kernel_block!(Spread, inputs [word, mask, enable], outputs [quad, write]);
 
 impl Spread {
     /// For samples of `bits` bits.
     pub fn new(bits: usize) -> Self {
-        Spread {
+        let block = Spread {
             word: Wire::new(bits),
             mask: Wire::new(4),
             enable: Default::default(),
             quad: Wire::new(4 * bits),
             write: Wire::new(4),
-        }
+            kernel: Body::default(),
+        };
+        block.bind(kernel(bits))
     }
 }
 
-impl Logic for Spread {
-    fn update(&mut self) {
-        let bits = self.word.width();
-        self.quad.next = Word::of_fields(&[self.word.val().signed(0, bits); 4], bits);
-        self.write.next = if self.enable.val() { self.mask.val() } else { Word::default() };
-    }
+fn kernel(bits: usize) -> Kernel {
+    let k = Builder::combinational("spread");
+    let (word, mask, enable) = (k.input("word", bits), k.input("mask", 4), k.input("enable", 1));
+    k.wire("quad", word.repeat(4));
+    k.wire("write", enable.mux(mask, k.constant(4, 0)));
+    k.finish()
+}
 
-    fn connect(&mut self) {
-        self.quad.connect();
-        self.write.connect();
-    }
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::language::testbench::{check, random_words, Pipeline};
+    use crate::wire::Word;
 
-    fn hdl(&self) -> Verilog {
-        Verilog::Custom("always @(*) quad = {4{word}};\nalways @(*) write = enable ? mask : 4'd0;".to_string())
+    #[test]
+    fn the_sample_is_on_every_lane() {
+        for bits in [9, 24] {
+            let of = |inputs: &[Word]| {
+                let quad = Word::of_fields(&[inputs[0].signed(0, bits); 4], bits);
+                vec![Some(quad), Some(if inputs[2].number() == 1 { inputs[1] } else { Word::default() })]
+            };
+            check(Spread::new(bits).kernel.kernel(), &random_words(500, &[bits, 4, 1]), &mut Pipeline::new(0, 2, of));
+        }
     }
 }

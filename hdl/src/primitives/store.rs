@@ -3,9 +3,11 @@
 use rust_hdl::prelude::*;
 
 use super::counter::count_bits;
-use super::polynomial_word::{resize, PolynomialWord};
+use super::polynomial_word::PolynomialWord;
 use super::sweep::{BUFFERS, BUFFER_BITS, START};
-use crate::wire::{Wire, Word};
+use crate::kernel_block;
+use crate::language::{concat, Body, Builder, Contents, Expr, Kernel, MemoryPort, Type};
+use crate::wire::Wire;
 
 /// Buffers of quads of polynomials. `fill` writes one coefficient of a quad into buffer `START`; `write` writes a whole
 /// quad into one of the others. Both take effect one cycle later, through registers beside the memory. `read_data`
@@ -49,23 +51,18 @@ pub struct Store {
     pub next_base: Wire<In>,
     /// A quad of polynomials, [`LATENCY`] cycles after `read_address`.
     pub read_data: Wire<Out>,
-    _layout: PolynomialWord,
-    _quads: usize,
-    _apart: bool,
-    _memory: Vec<Vec<Word>>,
-    _read: Word,
-    _write_buffer: Word,
-    _asked: [Option<Write>; 2],
+    kernel: Body,
 }
 
-/// A pending write: one coefficient of four taxels, or all of them.
-#[derive(Clone, Copy, Debug)]
-struct Write {
-    /// Index of the memory, address of the quad.
-    place: (usize, usize),
-    coefficient: Option<usize>,
-    data: Word,
-}
+kernel_block!(
+    Store,
+    clock clk,
+    inputs [
+        fill, fill_index, fill_address, fill_quad, write, write_buffer, write_address, write_data, read_buffer,
+        read_address, begins, counts, next_base
+    ],
+    outputs [read_data]
+);
 
 /// Cycles from `read_address` to `read_data`.
 pub const LATENCY: usize = 2;
@@ -73,13 +70,6 @@ pub const LATENCY: usize = 2;
 /// First address of `buffer` in the memory, where buffers of `quads` quads follow each other without gaps.
 pub fn base(buffer: usize, quads: usize) -> usize {
     (buffer % BUFFERS) * quads
-}
-
-/// Verilog expression of [`base`], where signal `buffer` holds the number of the buffer.
-pub fn base_of(buffer: &str, quads: usize) -> String {
-    let bits = base_bits(quads);
-    let choices: String = (1..BUFFERS).map(|b| format!("{buffer} == 2'd{b} ? {bits}'d{} : ", base(b, quads))).collect();
-    format!("{choices}{bits}'d0")
 }
 
 /// Width of an address in that memory, in bits.
@@ -92,7 +82,7 @@ impl Store {
     /// one subarray is filled while another is searched.
     pub fn new(layout: PolynomialWord, quads: usize, fill_bits: usize, apart: bool) -> Self {
         let address = count_bits(quads);
-        Store {
+        let block = Store {
             clk: Default::default(),
             fill: Default::default(),
             fill_index: Wire::new(count_bits(layout.widths.len())),
@@ -108,188 +98,83 @@ impl Store {
             counts: Default::default(),
             next_base: Wire::new(base_bits(quads)),
             read_data: Wire::new(layout.bits()),
-            _quads: quads,
-            _apart: apart,
-            _memory: vec![vec![Word::default(); quads]; BUFFERS + usize::from(apart)],
-            _read: Word::default(),
-            _write_buffer: Word::default(),
-            _asked: [None; 2],
-            _layout: layout,
-        }
-    }
-
-    /// Index of the memory that holds `buffer`.
-    fn memory(&self, buffer: Word) -> usize {
-        let buffer = buffer.number() as usize;
-        if buffer == START && !self._apart {
-            0
-        } else {
-            buffer
-        }
-    }
-
-    fn put(&mut self, Write { place, coefficient, data }: Write) {
-        let Some(word) = self._memory[place.0].get_mut(place.1) else { return };
-        let Some(k) = coefficient else {
-            *word = data;
-            return;
+            kernel: Body::default(),
         };
-        let bits = self.fill_quad.width() / 4;
-        if let Some(&width) = self._layout.widths.get(k) {
-            for lane in 0..4 {
-                word.set(self._layout.offset(k) + lane * width, width, data.signed(lane, bits) as u64);
-            }
-        }
+        block.bind(kernel(&layout, quads, fill_bits, apart))
     }
 }
 
-impl Logic for Store {
-    fn update(&mut self) {
-        if self.clk.pos_edge() {
-            let (read_buffer, read_address) = (self.memory(self.read_buffer.val()), self.read_address.val());
-            let place = (read_buffer, read_address.number() as usize);
-            let read = self._memory[place.0].get(place.1).copied().unwrap_or_default();
-            let asked = std::mem::take(&mut self._asked);
-            let collides = asked.iter().flatten().any(|write| write.place == place);
-            self.read_data.next = self._read;
-            self._read = if collides { read.complement(self._layout.bits()) } else { read };
-            asked.into_iter().flatten().for_each(|write| self.put(write));
-            if self.write.val() {
-                let place = (self.memory(self._write_buffer), self.write_address.val().number() as usize);
-                self._asked[0] = Some(Write { place, coefficient: None, data: self.write_data.val() });
-            }
-            self._write_buffer = self.write_buffer.val();
-            if self.fill.val() {
-                let place = (self.memory(Word::from(START as u64)), self.fill_address.val().number() as usize);
-                let coefficient = Some(self.fill_index.val().number() as usize);
-                self._asked[1] = Some(Write { place, coefficient, data: self.fill_quad.val() });
-            }
-        }
-    }
+fn kernel(layout: &PolynomialWord, quads: usize, fill_bits: usize, apart: bool) -> Kernel {
+    let k = Builder::new("store");
+    let (quad_bits, bits) = (count_bits(quads), base_bits(quads));
+    let (fill, fill_index) = (k.input("fill", 1), k.input("fill_index", count_bits(layout.widths.len())));
+    let (fill_address, fill_quad) = (k.input("fill_address", quad_bits), k.input("fill_quad", 4 * fill_bits));
+    let (write, write_buffer) = (k.input("write", 1), k.input("write_buffer", BUFFER_BITS));
+    let (write_address, write_data) = (k.input("write_address", quad_bits), k.input("write_data", layout.bits()));
+    let (read_buffer, read_address) = (k.input("read_buffer", BUFFER_BITS), k.input("read_address", quad_bits));
+    let (begins, counts) = (k.input("begins", 1), k.input("counts", 1));
+    let next_base = k.input("next_base", bits);
 
-    fn connect(&mut self) {
-        self.read_data.connect();
-    }
-
-    fn hdl(&self) -> Verilog {
-        let bits = self.fill_quad.width() / 4;
-        let index_bits = self.fill_index.width();
-        let lanes: String = (0..4)
-            .map(|lane| format!("wire [{}:0] t{lane} = fill_quad[{} +: {bits}];\n", bits - 1, lane * bits))
-            .collect();
-        let depth = BUFFERS * self._quads;
-        let address_bits = base_bits(self._quads);
-        let pad = match address_bits - self.read_address.width() {
-            0 => String::new(),
-            more => format!("{more}'d0, "),
+    let bases: Vec<(u64, Expr)> = (1..BUFFERS).map(|b| (b as u64, k.constant(bits, base(b, quads) as u64))).collect();
+    let write_base = k.delay("write_base", write_buffer.case(&bases, k.constant(bits, 0)));
+    let to_buffer = k.wire("to_buffer", (write_base + write_address).low(bits));
+    let write_to = if apart { to_buffer } else { fill.mux(fill_address, to_buffer) };
+    let write_to = k.wire("write_to", write_to);
+    let from_start = apart.then(|| k.delay("from_start", read_buffer.is(START as u64)));
+    k.comment(
+        "Read and write addresses are registers of each coefficient, because the memories are placed far apart; the",
+    );
+    k.comment("attribute keeps synthesis from merging them.");
+    let coefficient = |index: usize| {
+        let (width, all) = (layout.widths[index], 4 * layout.widths[index]);
+        let memory = format!("memory{index}");
+        let place = k.memory(&memory, BUFFERS * quads, all, Contents::Undefined).unchecked();
+        let from = k.register(&format!("from{index}"), Type::unsigned(bits)).keep();
+        k.when(counts, || from.set(from.plus(1)));
+        k.when(begins, || from.set(next_base));
+        let filled = |lane: usize| fill_quad.slice(lane * fill_bits, fill_bits).signed().resize(width).unsigned();
+        let filled = concat(&[3, 2, 1, 0].map(filled));
+        let fills = fill_index.is(index as u64);
+        let whole = write_data.slice(layout.offset(index), all);
+        let read = k.delay(&format!("read{index}"), place.read(*from));
+        let shown = match from_start {
+            Some(from_start) => {
+                let start = format!("start{index}");
+                let own = k.memory(&start, quads, all, Contents::Undefined).unchecked();
+                write_port(&k, (&start, own), [fill & fills, fill_address, filled]);
+                write_port(&k, (&memory, place), [write, write_to, whole]);
+                let read_start = k.delay(&format!("read_start{index}"), own.read(read_address));
+                from_start.mux(read_start, read)
+            }
+            None => {
+                write_port(&k, (&memory, place), [fill.mux(fills, write), write_to, fill.mux(filled, whole)]);
+                read
+            }
         };
-        let end = address_bits - 1;
-        let to_buffer = format!(
-            "\
-reg [{end}:0] write_base;
-always @(posedge clk) write_base <= {write_base};
-wire [{end}:0] to_buffer = write_base + {{{pad}write_address}};
-",
-            write_base = base_of("write_buffer", self._quads),
-        );
-        let write_to = match self._apart {
-            true => "to_buffer".to_string(),
-            false => format!("fill ? {{{pad}fill_address}} : to_buffer"),
-        };
-        let memories: String = (0..self._layout.widths.len())
-            .map(|k| {
-                let (width, low) = (self._layout.widths[k], self._layout.offset(k));
-                let all = 4 * width;
-                let filled: Vec<String> = (0..4).rev().map(|lane| resize(&format!("t{lane}"), bits, width)).collect();
-                let filled = filled.join(", ");
-                let declare = format!(
-                    "\
-reg [{all_end}:0] memory{k} [0:{depth_end}];
-reg [{end}:0] from{k};
-(* keep *) always @(posedge clk) begin
-  if (begins) from{k} <= next_base;
-  else if (counts) from{k} <= from{k} + {address_bits}'d1;
-end
-",
-                    all_end = all - 1,
-                    depth_end = depth - 1,
-                );
-                let fills = format!("fill_index == {index_bits}'d{k}");
-                let whole = format!("write_data[{low} +: {all}]");
-                let (asks, data, start, read) = match self._apart {
-                    true => {
-                        let fill = [&format!("fill && {fills}"), "fill_address", &format!("{{{filled}}}")];
-                        let start = format!(
-                            "\
-reg [{end}:0] start{k} [0:{last}];
-reg [{end}:0] read_start{k};
-{port}always @(posedge clk) read_start{k} <= start{k}[read_address];
-",
-                            end = all - 1,
-                            last = self._quads - 1,
-                            port = write_port(&format!("start{k}"), fill, [self.fill_address.width(), all]),
-                        );
-                        ("write".to_string(), whole, start, format!("from_start ? read_start{k} : read{k}"))
-                    }
-                    false => (
-                        format!("fill ? {fills} : write"),
-                        format!("fill ? {{{filled}}} : {whole}"),
-                        String::new(),
-                        format!("read{k}"),
-                    ),
-                };
-                let port = write_port(&format!("memory{k}"), [&asks, "write_to", &data], [address_bits, all]);
-                format!(
-                    "\
-{declare}{start}{port}reg [{end}:0] read{k};
-always @(posedge clk) begin
-  read{k} <= memory{k}[from{k}];
-  read_data[{low} +: {all}] <= {read};
-end
-",
-                    end = all - 1,
-                )
-            })
-            .collect();
-        let from_start = match self._apart {
-            true => format!("reg from_start;\nalways @(posedge clk) from_start <= read_buffer == 2'd{START};\n"),
-            false => "wire unused_read = &{1'b0, read_buffer, read_address};\n".to_string(),
-        };
-        Verilog::Custom(format!(
-            "{lanes}{to_buffer}wire [{end}:0] write_to = {write_to};
-// Read and write addresses are registers of each coefficient, because the memories are placed far apart; the attribute
-// keeps synthesis from merging them.
-{from_start}{memories}",
-        ))
-    }
+        k.delay(&format!("shown{index}"), shown)
+    };
+    let shown: Vec<Expr> = (0..layout.widths.len()).map(coefficient).collect();
+    k.wire("read_data", concat(&shown.into_iter().rev().collect::<Vec<_>>()));
+    k.finish()
 }
 
-/// Verilog of a registered write port: `data` goes to address `to` of `memory` one cycle after `asks`. The last
-/// argument gives the widths of `to` and `data`.
-fn write_port(memory: &str, [asks, to, data]: [&str; 3], [to_bits, data_bits]: [usize; 2]) -> String {
-    format!(
-        "\
-reg {memory}_writes;
-reg [{to_end}:0] {memory}_to;
-reg [{data_end}:0] {memory}_data;
-(* keep *) always @(posedge clk) begin
-  {memory}_writes <= {asks};
-  {memory}_to <= {to};
-end
-always @(posedge clk) begin
-  {memory}_data <= {data};
-  if ({memory}_writes) {memory}[{memory}_to] <= {memory}_data;
-end
-",
-        to_end = to_bits - 1,
-        data_end = data_bits - 1,
-    )
+/// Writes the memory of this name one cycle after it is asked to: enable, address, data.
+fn write_port<'k>(k: &'k Builder, (name, memory): (&str, MemoryPort<'k>), [asks, to, data]: [Expr<'k>; 3]) {
+    let kept = |what: &str, value: Expr<'k>| {
+        let register = k.register(&format!("{name}_{what}"), value.ty()).keep();
+        register.set(value);
+        *register
+    };
+    let (writes, to) = (kept("writes", asks), kept("to", to));
+    memory.write(writes, to, k.delay(&format!("{name}_data"), data));
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::language::testbench::{check, random_words, Reference};
     use crate::simulate::settles;
+    use crate::wire::Word;
 
     const BITS: usize = 5;
 
@@ -310,10 +195,11 @@ mod tests {
     fn read(store: &mut Store, data: u64, at: u64, late: usize) -> u64 {
         store.write_data.next = Word::from(data);
         store.write_address.next = Word::from(1);
-        for cycle in 0..late + LATENCY {
-            store.write.next = cycle == 0;
+        store.begins.next = true;
+        for cycle in 0..=late + LATENCY {
+            store.write.next = cycle == 1;
             // Reads another quad in all cycles but the tested one.
-            store.read_address.next = Word::from(if cycle == late { at } else { 2 });
+            store.next_base.next = Word::from(if cycle == late { at } else { 2 });
             clock(store);
         }
         store.read_data.val().field(0, 4 * BITS)
@@ -327,5 +213,94 @@ mod tests {
         assert_eq!(read(&mut store, 0xabcde, 1, 1), !0x12345 & 0xfffff);
         assert_eq!(read(&mut store, 0x00001, 1, 0), 0xabcde);
         assert_eq!(read(&mut store, 0x00002, 0, 1), 0);
+    }
+
+    const WIDTHS: [usize; 2] = [5, 9];
+    const QUADS: usize = 3;
+    const FILL: usize = 7;
+
+    /// Memory by name (that of the buffers, `START`) and coefficient; what is undefined is `None`.
+    struct Buffers {
+        apart: bool,
+        content: [[Vec<Option<u64>>; 2]; 2],
+        /// Memory, coefficient, address, data of the writes asked for.
+        asked: Vec<(usize, usize, usize, u64)>,
+        from: Option<usize>,
+        write_base: usize,
+        from_start: bool,
+        read: [[Option<u64>; 2]; 2],
+        shown: [Option<u64>; 2],
+    }
+
+    impl Reference for Buffers {
+        fn outputs(&mut self, _: &[Word]) -> Vec<Option<Word>> {
+            let word = |low: u64, high: u64| {
+                let mut word = Word::default();
+                word.set(0, 4 * WIDTHS[0], low);
+                word.set(4 * WIDTHS[0], 4 * WIDTHS[1], high);
+                word
+            };
+            vec![self.shown[0].zip(self.shown[1]).map(|(low, high)| word(low, high))]
+        }
+
+        fn clock(&mut self, inputs: &[Word]) {
+            let number = |k: usize| inputs[k].number() as usize;
+            let bit = |k: usize| number(k) == 1;
+            self.shown = self.read[usize::from(self.apart && self.from_start)];
+            let from = [self.from, Some(number(9))];
+            for (memory, k) in [(0, 0), (0, 1), (1, 0), (1, 1)] {
+                let collides =
+                    |&(m, c, at, _): &(usize, usize, usize, u64)| (m, c, Some(at)) == (memory, k, from[memory]);
+                let place = from[memory].filter(|_| !self.asked.iter().any(collides));
+                self.read[memory][k] = place.and_then(|at| self.content[memory][k].get(at).copied().flatten());
+            }
+            for (memory, k, at, data) in std::mem::take(&mut self.asked) {
+                if let Some(word) = self.content[memory][k].get_mut(at) {
+                    *word = Some(data);
+                }
+            }
+            let end = 1 << base_bits(QUADS);
+            for (k, width) in WIDTHS.into_iter().enumerate() {
+                if bit(0) && number(1) == k {
+                    let lanes: [i64; 4] = std::array::from_fn(|lane| inputs[3].signed(lane, FILL));
+                    let data = Word::of_fields(&lanes, width).field(0, 4 * width);
+                    self.asked.push((usize::from(self.apart), k, number(2), data));
+                }
+                if bit(4) && (self.apart || !bit(0)) {
+                    let data = inputs[7].field(k * 4 * WIDTHS[0], 4 * width);
+                    self.asked.push((0, k, (self.write_base + number(6)) % end, data));
+                }
+            }
+            self.from = match (bit(10), bit(11)) {
+                (true, _) => Some(number(12)),
+                (false, steps) => self.from.map(|at| (at + usize::from(steps)) % end),
+            };
+            self.write_base = base(number(5), QUADS);
+            self.from_start = number(8) == START;
+        }
+    }
+
+    #[test]
+    fn quads_are_read_where_they_were_written() {
+        let layout = PolynomialWord { lanes: 4, widths: WIDTHS.into() };
+        let (quad, bits) = (count_bits(QUADS), base_bits(QUADS));
+        let widths = [1, 1, quad, 4 * FILL, 1, BUFFER_BITS, quad, layout.bits(), BUFFER_BITS, quad, 1, 1, bits];
+        let mut stimulus = random_words(20000, &widths);
+        // The base of the first write is not yet known.
+        stimulus[0][4] = Word::default();
+        for apart in [false, true] {
+            let store = Store::new(layout.clone(), QUADS, FILL, apart);
+            let mut buffers = Buffers {
+                apart,
+                content: [BUFFERS * QUADS, QUADS].map(|quads| [vec![None; quads], vec![None; quads]]),
+                asked: Vec::new(),
+                from: None,
+                write_base: 0,
+                from_start: false,
+                read: Default::default(),
+                shown: Default::default(),
+            };
+            check(store.kernel.kernel(), &stimulus, &mut buffers);
+        }
     }
 }

@@ -83,13 +83,7 @@ fn streams_keep_what_they_offer() {
             "wire moves = 1'b1;",
         ),
         (generate(&sums), "resultants", [96, 96], "wire sent = sending && m_axis_tready;", "wire sent = sending;"),
-        (
-            generate_board(&model("")),
-            "link$back",
-            [96, 96],
-            "if (!m_axis_tvalid) {m_axis_tlast, m_axis_tdata} <=",
-            "{m_axis_tlast, m_axis_tdata} <=",
-        ),
+        (generate_board(&model("")), "link$back", [96, 96], "if (!m_axis_tvalid) m_axis_tdata <=", "m_axis_tdata <="),
     ];
     for (generated, block, [taken, offered], sound, broken) in streams {
         let given = vec![("BLOCK", format!("@TOP@${block}")), ("IN", number(taken)), ("OUT", number(offered))];
