@@ -19,7 +19,7 @@ use dermis_golden::scene::Condition;
 use rust_hdl::prelude::*;
 
 use crate::ports::one_of;
-use crate::primitives::{count_bits, largest, BitDelay, CaseCounter, Counter, Keep, Resultants, CYCLE_BITS};
+use crate::primitives::{count_bits, largest, BitDelay, CaseCounter, Counter, Dff, Keep, Resultants, CYCLE_BITS};
 use crate::stages::{
     Banks, Fold, Force, Normalise, Pass, Prepare, Receive, ReceivePorts, Rescale, Search, SearchPorts, Send, Unfold,
     Unsearched,
@@ -114,16 +114,16 @@ pub struct Engine {
     begins: BitDelay,
     begun: BitDelay,
     waits: BitDelay,
-    computing: DFF<Bit>,
-    first: DFF<Bit>,
-    filled: DFF<Bit>,
-    searching: DFF<Bit>,
-    sending: DFF<Bit>,
-    condition: DFF<Bit>,
-    framing: DFF<Bit>,
-    searched_condition: DFF<Bit>,
-    searched_last: DFF<Bit>,
-    sent_framing: DFF<Bit>,
+    computing: Dff,
+    first: Dff,
+    filled: Dff,
+    searching: Dff,
+    sending: Dff,
+    condition: Dff,
+    framing: Dff,
+    searched_condition: Dff,
+    searched_last: Dff,
+    sent_framing: Dff,
     frame_case: Keep,
     sent_case: Keep,
     searched_part: Keep,
@@ -253,16 +253,16 @@ impl Logic for Engine {
         self.begun.rst.next = self.rst.val();
         self.waits.clk.next = self.clk.val();
         self.waits.rst.next = self.rst.val();
-        self.computing.clock.next = self.clk.val();
-        self.first.clock.next = self.clk.val();
-        self.filled.clock.next = self.clk.val();
-        self.searching.clock.next = self.clk.val();
-        self.sending.clock.next = self.clk.val();
-        self.condition.clock.next = self.clk.val();
-        self.framing.clock.next = self.clk.val();
-        self.searched_condition.clock.next = self.clk.val();
-        self.searched_last.clock.next = self.clk.val();
-        self.sent_framing.clock.next = self.clk.val();
+        self.computing.clk.next = self.clk.val();
+        self.first.clk.next = self.clk.val();
+        self.filled.clk.next = self.clk.val();
+        self.searching.clk.next = self.clk.val();
+        self.sending.clk.next = self.clk.val();
+        self.condition.clk.next = self.clk.val();
+        self.framing.clk.next = self.clk.val();
+        self.searched_condition.clk.next = self.clk.val();
+        self.searched_last.clk.next = self.clk.val();
+        self.sent_framing.clk.next = self.clk.val();
         self.frame_case.clk.next = self.clk.val();
         self.sent_case.clk.next = self.clk.val();
         self.searched_part.clk.next = self.clk.val();

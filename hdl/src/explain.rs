@@ -6,8 +6,9 @@ use dermis_golden::fixed::{Cycles, Model};
 use serde::Serialize;
 
 use crate::generate::HdlError;
+use crate::language::Hierarchy;
 use crate::simulate::design;
-use crate::usage::{total, Usage};
+use crate::usage::{stages, total, Usage};
 
 /// A feature of the hardware.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
@@ -77,6 +78,6 @@ fn difference((with, cycles_with): &(Usage, u64), (without, cycles_without): &(U
 }
 
 fn needs(model: &Model) -> Result<(Usage, u64), HdlError> {
-    let usage = total(&design(model)?.usage(model));
+    let usage = total(&stages(model, &Hierarchy::of(&*design(model)?)));
     Ok((usage, Cycles::longest(model).latency))
 }

@@ -3,7 +3,6 @@
 use std::collections::BTreeMap;
 
 use dermis_golden::board::EngineKind;
-use dermis_golden::fixed::resources::Memory;
 use dermis_golden::fixed::send::{
     CASE_SHIFT, FLAG_COEFFICIENTS, FLAG_CONDITION, FLAG_FOUND, FLAG_FRAMING, FLAG_NO_CONTACT, STATUS_BEATS,
 };
@@ -18,12 +17,12 @@ use thiserror::Error;
 use crate::core_file::core_file;
 use crate::device::Tap;
 use crate::explain::Explained;
-use crate::language::KernelError;
+use crate::language::{self, Attributes, Hierarchy, KernelError};
 use crate::manifest::seal;
 use crate::primitives::MEMORY_FILE;
 use crate::simulate::design;
 use crate::taps::taps;
-use crate::usage::{total, Usage};
+use crate::usage::{stages, total, Usage};
 
 /// `manifest_version`: version of the generated files' meaning; a reader rejects any other.
 pub(crate) const MANIFEST_VERSION: u32 = 1;
@@ -96,7 +95,7 @@ fn refused(model: &Model) -> Result<Vec<Refused>, HdlError> {
     let refused = |dropped: &Dropped| {
         let with: Vec<u32> = dropped.design.cases().iter().map(Model::number).collect();
         let case = with.iter().copied().find(|number| Case::numbered(i64::from(*number)) == Some(dropped.case));
-        let needs = total(&design(&dropped.design)?.usage(&dropped.design));
+        let needs = total(&stages(&dropped.design, &Hierarchy::of(&*design(&dropped.design)?)));
         Ok(Refused { case: case.unwrap_or_default(), with, needs })
     };
     model.dropped.iter().map(refused).collect()
@@ -124,11 +123,11 @@ pub fn generate(model: &Model) -> Result<Generated, HdlError> {
     let engine = design(model)?;
     let top = top_name(&model.scene.name);
     let file = |name: String, text: String| GeneratedFile { name, text };
-    let verilog = place(&engine.verilog(), model, "")?;
-    let usage = engine.usage(model);
+    let hierarchy = Hierarchy::of(&*engine);
+    let verilog = header(model, &top) + &hierarchy.verilog(&top, &placement(&hierarchy, model, "")?);
+    let usage = stages(model, &hierarchy);
     let dropped = refused(model)?;
     let manifest = manifest(model, &top, &usage, &dropped);
-    let verilog = header(model, &top) + &rename(&verilog, &top);
     let mut files = vec![
         file(format!("{top}.v"), verilog),
         file(format!("{top}.vlt"), waivers(model).to_string()),
@@ -144,56 +143,37 @@ pub fn generate(model: &Model) -> Result<Generated, HdlError> {
     Ok(generated)
 }
 
-/// Adds a `ram_style` attribute to the array of every memory of the model; names of the engine's modules start with
-/// `engine` after `top$`.
-pub(crate) fn place(verilog: &str, model: &Model, engine: &str) -> Result<String, HdlError> {
-    let mut placed = String::with_capacity(verilog.len());
-    let mut module = "";
-    let mut marked = 0;
-    for line in verilog.lines() {
-        if let Some(rest) = line.strip_prefix("module top$") {
-            let name = rest.split('(').next().unwrap_or_default();
-            module = name.strip_prefix(engine).unwrap_or_default();
+/// The `ram_style` attribute of every memory of the model; paths of the engine's blocks start with `engine`.
+///
+/// # Errors
+/// [`HdlError::Check`] if a memory of the model is not in the hardware, or not of its size.
+pub(crate) fn placement(hierarchy: &Hierarchy, model: &Model, engine: &str) -> Result<Attributes, HdlError> {
+    let mut attributes = Attributes::new();
+    for memory in &model.resources.memories {
+        let path = format!("{engine}{}", memory.block);
+        let is =
+            |own: &&language::Memory| (&own.name, own.words, own.bits) == (&memory.array, memory.words, memory.bits);
+        let mut kernels = hierarchy.kernels().filter(|(own, _)| *own == path);
+        if !kernels.any(|(_, kernel)| kernel.memories().iter().any(|own| is(&own))) {
+            return Err(HdlError::Check(format!("the model's memory {memory:?} is not in the hardware")));
         }
-        let own = model.resources.memories.iter().filter(|memory| memory.block == module);
-        let declares = |memory: &&Memory| {
-            let end = format!("[{}:0] {} [0:{}];", memory.bits - 1, memory.array, memory.words - 1);
-            line.trim_start().strip_prefix("reg ") == Some(&end)
+        let style = match (memory.large_rams, memory.block_rams) {
+            (0, 0) => "distributed",
+            (0, _) => "block",
+            _ => "huge",
         };
-        if let Some(memory) = own.into_iter().find(declares) {
-            let style = match (memory.large_rams, memory.block_rams) {
-                (0, 0) => "distributed",
-                (0, _) => "block",
-                _ => "huge",
-            };
-            // The serial engine never reads a word in the cycle that writes it, so no logic is needed to define what it
-            // would read.
-            let check = if model.board.engine == EngineKind::Serial { ", no_rw_check" } else { "" };
-            placed.push_str(&format!("(* ram_style = \"{style}\"{check} *)\n"));
-            marked += 1;
-        }
-        placed.push_str(line);
-        placed.push('\n');
+        // The serial engine never reads a word in the cycle that writes it, so no logic is needed to define what it
+        // would read.
+        let check = if model.board.engine == EngineKind::Serial { ", no_rw_check" } else { "" };
+        attributes.insert((path, memory.array.clone()), format!("ram_style = \"{style}\"{check}"));
     }
-    match model.resources.memories.len() {
-        all if all == marked => Ok(placed),
-        all => Err(HdlError::Check(format!("{marked} of the model's {all} memories are in the Verilog"))),
-    }
+    Ok(attributes)
 }
 
 /// `dermis_` and the scene's name, every character except ASCII letters and digits replaced by an underscore.
 pub(crate) fn top_name(scene: &str) -> String {
     let tame = |c: char| if c.is_ascii_alphanumeric() { c } else { '_' };
     format!("dermis_{}", scene.chars().map(tame).collect::<String>())
-}
-
-/// Replaces the names that rust-hdl gives, `top` and `top$…`, by those of `top`.
-pub(crate) fn rename(verilog: &str, top: &str) -> String {
-    let trimmed: String = verilog.lines().map(|line| line.trim_end().to_string() + "\n").collect();
-    trimmed
-        .replace("top$", &format!("{top}$"))
-        .replace("module top(", &format!("module {top}("))
-        .replace("endmodule // top\n", &format!("endmodule // {top}\n"))
 }
 
 /// Waivers of Verilator warnings.

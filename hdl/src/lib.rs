@@ -25,7 +25,6 @@ macro_rules! comment {
 
 pub mod device;
 pub mod engine;
-pub mod estimate;
 pub mod explain;
 pub mod language;
 pub mod link;

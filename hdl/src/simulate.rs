@@ -1,17 +1,14 @@
 //! rust-hdl's own simulation of the engine as a [`Device`].
 
-use std::collections::BTreeMap;
-
 use dermis_golden::board::EngineKind;
 use dermis_golden::fixed::Model;
 use rust_hdl::prelude::*;
 
 use crate::device::{Device, Inputs, Outputs, Tap};
 use crate::generate::HdlError;
-use crate::language::{check_kernels, kernels, verilog};
+use crate::language::Hierarchy;
 use crate::primitives::{position_bits, CALIBRATION_FILE, COLUMN_FILE, MEMORY_FILE};
 use crate::taps::{taps, SEARCH_FIELD};
-use crate::usage::{stages, Usage};
 use crate::wire::Word;
 use crate::{engine, serial};
 
@@ -32,12 +29,8 @@ pub(crate) trait Design: Block {
     fn drive(&mut self, inputs: &Inputs, clock: bool);
     /// Samples the output pins and the word of each of `taps`.
     fn observe(&self, taps: &[Tap]) -> Outputs;
-    /// The Verilog of the engine, top module `top`.
-    fn verilog(&self) -> String;
     /// Memory files read by the Verilog: name and text.
     fn memory_files(&self) -> Vec<(&'static str, String)>;
-    /// Resources by stage.
-    fn usage(&self, model: &Model) -> BTreeMap<String, Usage>;
 }
 
 macro_rules! design {
@@ -69,16 +62,8 @@ macro_rules! design {
                 }
             }
 
-            fn verilog(&self) -> String {
-                verilog(self)
-            }
-
             fn memory_files(&self) -> Vec<(&'static str, String)> {
                 $files(self)
-            }
-
-            fn usage(&self, model: &Model) -> BTreeMap<String, Usage> {
-                stages(model, &self.verilog(), &kernels(self))
             }
         }
     };
@@ -144,7 +129,7 @@ pub(crate) fn design(model: &Model) -> Result<Box<dyn Design>, HdlError> {
 }
 
 fn checked<E: Design + 'static>(engine: E) -> Result<Box<dyn Design>, HdlError> {
-    check_kernels(&engine)?;
+    Hierarchy::of(&engine).check()?;
     check_all(&engine).map_err(|error| HdlError::Check(format!("{error:?}")))?;
     Ok(Box::new(engine))
 }

@@ -27,44 +27,52 @@ pub fn taps(model: &Model) -> Vec<Tap> {
         field_bits,
     };
     let extended = |signal: &str, bits: u32| {
-        format!("{{{}{{{{}}{block}${signal}[{}]}}}}, {{}}{block}${signal}", SEARCH_FIELD - bits, bits - 1)
+        format!("{{{}{{{{}}{block}__{signal}[{}]}}}}, {{}}{block}__{signal}", SEARCH_FIELD - bits, bits - 1)
     };
     let position = position_bits() as u32;
     let search = format!(
-        "{{{}'d0, {{}}{block}$taken, {{{score}}}, {{{y}}}, {{{x}}}}}",
+        "{{{}'d0, {{}}{block}__taken, {{{score}}}, {{{y}}}, {{{x}}}}}",
         SEARCH_FIELD - 1,
         score = extended("score", f.score_bits),
         y = extended("best_y", position),
         x = extended("best_x", position),
     );
-    let search =
-        Tap { name: "search", valid: format!("{{}}{block}$judged"), data: search, fields: 4, field_bits: SEARCH_FIELD };
+    let search = Tap {
+        name: "search",
+        valid: format!("{{}}{block}__judged"),
+        data: search,
+        fields: 4,
+        field_bits: SEARCH_FIELD,
+    };
     if serial {
         let mixed = f.input_bits.max(f.vector_bits) + 2;
         return vec![
-            tap("receive", "receive$accept", "receive$s_axis_tdata", 1, f.input_bits),
-            tap("normalise", "leader$normalised_valid", "rounder$rounded", 1, FORCE_BITS),
-            Tap { valid: "({}mixer$quad_valid && {}leader$folding)".into(), ..tap("fold", "", "mixer$quad", 4, mixed) },
-            tap("pass", "pass$quad_valid", "pass$quad", 4, f.acc_bits),
-            tap("rescale", "leader$rescaled_valid", "rounder$rounded", 1, FORCE_BITS),
-            tap("unfold", "unfold$taxel_valid", "unfold$taxel", 1, f.vector_bits + 2),
+            tap("receive", "receive__accept", "receive__s_axis_tdata", 1, f.input_bits),
+            tap("normalise", "leader__normalised_valid", "rounder__rounded", 1, FORCE_BITS),
+            Tap {
+                valid: "({}mixer__quad_valid && {}leader__folding)".into(),
+                ..tap("fold", "", "mixer__quad", 4, mixed)
+            },
+            tap("pass", "pass__quad_valid", "pass__quad", 4, f.acc_bits),
+            tap("rescale", "leader__rescaled_valid", "rounder__rounded", 1, FORCE_BITS),
+            tap("unfold", "unfold__taxel_valid", "unfold__taxel", 1, f.vector_bits + 2),
             search,
-            tap("force", "walk$value_valid", "halve$value", 1, f.search_bits[0]),
+            tap("force", "walk__value_valid", "halve__value", 1, f.search_bits[0]),
         ];
     }
     let mut all = vec![
-        tap("receive", "receive$accept", "receive$taken_word", 1, f.input_bits),
-        tap("normalise", "fold$normalised_valid", "normalise$shifted", 4, f.input_bits),
-        tap("fold", "fold$folded_valid", "fold$folded", 4, f.fold_bits),
-        tap("pass", "pass$quad_valid", "pass$quad", 4, f.acc_bits),
-        tap("rescale", "rescale$words_valid", "rescale$words", 4, f.vector_bits),
-        tap("unfold", "unfold$taxels_valid", "unfold$taxels", 4, f.vector_bits + 2),
+        tap("receive", "receive__accept", "receive__taken_word", 1, f.input_bits),
+        tap("normalise", "fold__normalised_valid", "normalise__shifted", 4, f.input_bits),
+        tap("fold", "fold__folded_valid", "fold__folded", 4, f.fold_bits),
+        tap("pass", "pass__quad_valid", "pass__quad", 4, f.acc_bits),
+        tap("rescale", "rescale__words_valid", "rescale__words", 4, f.vector_bits),
+        tap("unfold", "unfold__taxels_valid", "unfold__taxels", 4, f.vector_bits + 2),
         search,
-        tap("force", "search$values_valid", "search$values", 4, f.search_bits[0]),
+        tap("force", "search__values_valid", "search__values", 4, f.search_bits[0]),
     ];
     if model.chooses() {
         let zeros = CHOICE_FIELD - count_bits(model.cases().len()) as u32;
-        let data = format!("{{{zeros}'d0, {{}}receive$which}}");
+        let data = format!("{{{zeros}'d0, {{}}receive__which}}");
         all.insert(1, Tap { name: "choose", valid: "{}begin_frame".into(), data, fields: 1, field_bits: CHOICE_FIELD });
     }
     all

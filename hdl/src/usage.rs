@@ -1,15 +1,13 @@
 //! Resources of a generated design by stage: block RAMs and multipliers exact, flip-flops and LUTs estimated.
 
-use std::collections::{BTreeMap, BTreeSet};
-use std::sync::Arc;
+use std::collections::BTreeMap;
 
 use dermis_golden::board::Board;
 use dermis_golden::fixed::resources::Memory;
 use dermis_golden::fixed::Model;
 use serde::Serialize;
 
-use crate::estimate::modules;
-use crate::language::{distributed_luts, Kernel};
+use crate::language::{distributed_luts, Hierarchy, SEPARATOR};
 
 /// Instance names of the stages, in pipeline order: parallel engine, then serial engine. Blocks outside any stage count
 /// as `engine`.
@@ -79,26 +77,21 @@ impl std::ops::AddAssign for Usage {
     }
 }
 
-/// The stage of the block with instance path `block`, separated by `$`; `engine` if it belongs to none.
+/// The stage of the block with instance path `block`; `engine` if it belongs to none.
 pub fn stage(block: &str) -> &str {
-    block.split('$').next().filter(|stage| STAGES.contains(stage)).unwrap_or("engine")
+    block.split(SEPARATOR).next().filter(|stage| STAGES.contains(stage)).unwrap_or("engine")
 }
 
 /// Usage of each stage by its instance name; blocks outside any stage under `engine`.
-///
-/// Flip-flops and LUTs are estimated from a block's kernel where it has one, else from the text of its module.
-pub fn stages(model: &Model, verilog: &str, kernels: &BTreeMap<String, Arc<Kernel>>) -> BTreeMap<String, Usage> {
+pub(crate) fn stages(model: &Model, hierarchy: &Hierarchy) -> BTreeMap<String, Usage> {
     let mut all: BTreeMap<String, Usage> = BTreeMap::new();
     let mut add = |block: &str, usage: Usage| {
         *all.entry(stage(block).to_string()).or_default() += usage;
     };
     let memories = &model.resources.memories;
-    let placed: BTreeSet<(String, String)> =
-        memories.iter().map(|memory| (format!("top${}", memory.block), memory.array.clone())).collect();
-    for (module, text) in modules(verilog, &placed) {
-        let own = || placed.iter().filter(|(block, _)| block == module).map(|(_, array)| array.as_str()).collect();
-        let logic = kernels.get(module).map_or(text, |kernel| kernel.logic(&own()));
-        let block = module.strip_prefix("top$").unwrap_or_default();
+    for (block, kernel) in hierarchy.kernels() {
+        let own = memories.iter().filter(|memory| memory.block == block).map(|memory| memory.array.as_str());
+        let logic = kernel.logic(&own.collect());
         add(block, Usage { flip_flops: logic.flip_flops, luts: logic.luts.round() as usize, ..Usage::default() });
     }
     for memory in memories {

@@ -14,7 +14,7 @@ module proof(
   wire takes = s_valid && s_ready && second;
   wire gives = m_valid && m_ready;
   wire s_last = taxel == 3'd@LAST@;
-  @TOP@$prepare$average block(
+  @TOP@__prepare__average block(
     .clk(clk), .rst(rst),
     .s_axis_tdata(s_data), .s_axis_tvalid(s_valid), .s_axis_tready(s_ready), .s_axis_tlast(s_last),
     .m_axis_tdata(m_data), .m_axis_tvalid(m_valid), .m_axis_tready(m_ready), .m_axis_tlast(m_last)

@@ -8,7 +8,7 @@ module proof(
   wire rst = again || !started;
   wire s_ready, m_valid, m_last;
   wire [@BITS@-1:0] m_data;
-  @TOP@$prepare$calibrate block(
+  @TOP@__prepare__calibrate block(
     .clk(clk), .rst(rst),
     .s_axis_tdata(s_data), .s_axis_tvalid(s_valid), .s_axis_tready(s_ready), .s_axis_tlast(s_last),
     .m_axis_tdata(m_data), .m_axis_tvalid(m_valid), .m_axis_tready(m_ready), .m_axis_tlast(m_last)

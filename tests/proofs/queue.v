@@ -13,7 +13,7 @@ module proof(input clk, input again, input wants, input comes, input sample, inp
   wire taken = m_valid && takes;
   wire [4:0] waiting = written - put;
   wire puts = (!m_valid || takes) && waiting != 5'd0;
-  @TOP@$forces$leaving queue(
+  @TOP@__forces__leaving queue(
     .clk(clk), .rst(rst), .reserve(reserve), .room(room), .write(write), .last(!sample), .word({96{sample}}),
     .m_axis_tvalid(m_valid), .m_axis_tready(takes), .m_axis_tlast(m_last), .m_axis_tdata(m_data)
   );

@@ -20,7 +20,7 @@ module proof(
     endcase
   end
   wire free = full && release_it;
-  @TOP@$receive block(
+  @TOP@__receive block(
     .clk(clk), .rst(rst), .s_axis_tdata(s_data), .s_axis_tvalid(s_valid), .s_axis_tready(s_ready), .s_axis_tlast(s_last),
     .accept(accept), .taken_word(taken_word), .full(full), .free(free), .quad_address(address), .quad(quad), .part(1'b0),
     .magnitude(magnitude), .positive(positive), .negative(negative), .framing(framing), .reported(reported)

@@ -20,7 +20,7 @@ module proof(input clk, input again, input begin_it, input offered, input sample
   wire [4*@DATA@-1:0] operands;
   wire [@SHIFTS@-1:0] shift;
   wire [15:0] saturations;
-  @TOP@$rescale block(
+  @TOP@__rescale block(
     .clk(clk), .rst(rst), .which(1'b0), .start(start && !rst), .quad(quad), .quad_valid(quad_valid && !rst),
     .words(words), .words_valid(words_valid), .operands(operands), .operands_valid(operands_valid), .shift(shift),
     .saturations(saturations)
@@ -49,7 +49,7 @@ module proof(input clk, input again, input begin_it, input offered, input sample
 endmodule
 
 // Replaces the arithmetic, which has its own proof: passes the accumulators on with the latency of the words.
-module @TOP@$rescale$rescaler(
+module @TOP@__rescale__rescaler(
   input clk, input clear, input valid, input measured, input [@SHIFTS@-1:0] shift, input [4*@ACC@-1:0] quad,
   output reg [4*@WORD@-1:0] words, output [4*@DATA@-1:0] operands, output [15:0] saturations
 );

@@ -4,7 +4,7 @@ module proof(input clk, input clear, input valid, input measured, input [@SHIFTS
   wire [4*@WORD@-1:0] words;
   wire [4*@DATA@-1:0] operands;
   wire [15:0] saturations;
-  @TOP@$rescale$rescaler block(
+  @TOP@__rescale__rescaler block(
     .clk(clk), .clear(clear), .valid(valid), .measured(measured), .shift(shift), .quad(quad),
     .words(words), .operands(operands), .saturations(saturations)
   );

@@ -1,6 +1,6 @@
 // From its start to its tlast a frame has all its forces and status beats, each reserved in the queue with room, and no
 // beat leaves outside a frame. The products of the force unit are unconstrained.
-module @TOP@$forces$leaving(
+module @TOP@__forces__leaving(
   input clk, input rst, input reserve, output room, input write, input last, input [95:0] word,
   output reg m_axis_tvalid, input m_axis_tready, output reg m_axis_tlast, output [95:0] m_axis_tdata
 );
@@ -24,11 +24,11 @@ module proof(
   reg within, ended;
   // Assumed of the engine: a frame starts when the previous one has been sent.
   wire begins = start_it && !within;
-  @TOP@$send send(
+  @TOP@__send send(
     .clk(clk), .rst(rst), .start(begins), .room(may), .m_axis_tvalid(m_valid), .m_axis_tready(1'b1),
     .m_axis_tlast(m_last), .offer(offer), .beat(beat), .part(part), .address(address), .lane(lane), .done(done)
   );
-  @TOP@$forces forces(
+  @TOP@__forces forces(
     .clk(clk), .rst(rst), .values(values), .values_valid(values_valid), .begin_frame(begins), .start(settled),
     .part(1'b0), .room(may), .offer(offer), .beat(beat), .beat_part(part), .address(address), .lane(lane),
     .saturations(saturations), .m_axis_tvalid(m_valid), .m_axis_tready(room), .m_axis_tlast(m_last), .m_axis_tdata(m_data)

@@ -178,7 +178,7 @@ fn words_and_cycles_are_those_of_the_model_and_nothing_is_undefined() {
 fn an_undefined_register_is_found() {
     let (mut hardware, vectors) = setup(1);
     let good = hardware.generated.files[0].text.clone();
-    let queue = good.find("forces$leaving(clk").expect("the output queue");
+    let queue = good.find("forces__leaving (").expect("the output queue");
     let defects = [
         ("    m_axis_tvalid <= 1'b0;\n", "", "valid"),
         ("m_axis_tdata <= head[95:0];", "m_axis_tdata <= {undefined, head[94:0]};", "data"),

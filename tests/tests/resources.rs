@@ -90,7 +90,7 @@ fn a_missing_memory_and_a_wrong_count_are_found() {
     assert!(generate(&model).unwrap_err().to_string().contains("memories"));
     // If one memory moves from block RAM to LUTs, Yosys counts differ.
     model.resources = right.clone();
-    let moved = model.resources.memories.iter_mut().find(|memory| memory.block == "forces$store").unwrap();
+    let moved = model.resources.memories.iter_mut().find(|memory| memory.block == "forces__store").unwrap();
     assert!(std::mem::take(&mut moved.block_rams) > 0);
     let counted = synthesise(&generate(&model).unwrap(), "map_ffram")("DP16KD");
     assert_eq!(counted, model.resources.block_rams());

@@ -88,9 +88,9 @@ fn a_defect_is_found() {
     let defects = [
         // Defects: a frame is accepted while the last one has not been read; an early tlast does not restart; a reset
         // leaves a frame in the buffer.
-        ("stalls", "s_axis_tready = ~whole$q & ~rst", "s_axis_tready = ~rst"),
-        ("tlast", "scan$clear = rst | early", "scan$clear = rst"),
-        ("reset", "(taken & scan$last)) & ~free & ~rst", "(taken & scan$last)) & ~free"),
+        ("stalls", "s_axis_tready = !whole__q && !rst", "s_axis_tready = !rst"),
+        ("tlast", "scan__clear = part_0;", "scan__clear = rst;"),
+        ("reset", "whole__d = (whole__q || part_1) && !free && !rst", "whole__d = (whole__q || part_1) && !free"),
     ];
     for (experiment, right, wrong) in defects {
         assert!(good.contains(right), "{right} is not in the Verilog");

@@ -28,11 +28,11 @@ use crate::board::Board;
 use crate::scene::{ForceOutput, Scene};
 
 /// [`Memory::block`] of the search memory.
-pub const SEARCH_MEMORY: &str = "search$store";
+pub const SEARCH_MEMORY: &str = "search__store";
 
 /// Frame buffers of designs with several cases.
 const BANKS: [&str; 4] =
-    ["receive$banks$0$frame", "receive$banks$1$frame", "receive$banks$2$frame", "receive$banks$3$frame"];
+    ["receive__banks__0__frame", "receive__banks__1__frame", "receive__banks__2__frame", "receive__banks__3__frame"];
 
 /// Number of polynomial buffers between which the sweeps of the search alternate.
 pub const SEARCH_BUFFERS: usize = 3;
@@ -40,7 +40,7 @@ pub const SEARCH_BUFFERS: usize = 3;
 /// A memory of the hardware.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct Memory {
-    /// Path of its block in the hardware, levels separated by `$`.
+    /// Path of its block in the hardware, levels separated by `__`.
     pub block: &'static str,
     /// Its name in the block.
     pub array: String,
@@ -108,42 +108,42 @@ impl Resources {
         let mut memories = Vec::new();
         if input.calibration.is_some() || input.tare.is_some() {
             let gain = if input.calibration.is_some() { GAIN_BITS } else { 0 };
-            memories.push(memory("prepare$calibrate", "entries", taxels, (f.code_bits + gain) as usize, true));
+            memories.push(memory("prepare__calibrate", "entries", taxels, (f.code_bits + gain) as usize, true));
         }
         if input.average > 0 {
-            memories.push(memory("prepare$average", "sums", taxels, f.input_bits as usize, false));
+            memories.push(memory("prepare__average", "sums", taxels, f.input_bits as usize, false));
         }
         for (number, case) in cases.iter().enumerate() {
-            let block = if cases.len() == 1 { "receive$frame" } else { BANKS[number] };
+            let block = if cases.len() == 1 { "receive__frame" } else { BANKS[number] };
             let lane = |lane| memory(block, &format!("field{lane}"), frame_quads(case), f.input_bits as usize, false);
             memories.extend((0..4).map(lane));
         }
-        memories.push(ram("fold$memory", quads, quad(f.fold_bits)));
+        memories.push(ram("fold__memory", quads, quad(f.fold_bits)));
         if f.degree > 0 {
-            memories.push(ram("pass$vectors", operand_vectors(f.degree) * quads, quad(f.data_bits)));
+            memories.push(ram("pass__vectors", operand_vectors(f.degree) * quads, quad(f.data_bits)));
         }
-        memories.push(memory("pass$lanes", "memory", words, word_bits(f), true));
+        memories.push(memory("pass__lanes", "memory", words, word_bits(f), true));
         if listed {
             // The transposed address as well, if it is read.
             let addresses = if f.shared_a { 2 } else { 1 };
-            memories.push(memory("pass$steps", "columns", words, addresses * count_bits(quads), true));
+            memories.push(memory("pass__steps", "columns", words, addresses * count_bits(quads), true));
         }
-        memories.push(ram("rescale$raw", quads, quad(f.acc_bits)));
+        memories.push(ram("rescale__raw", quads, quad(f.acc_bits)));
         for (k, &bits) in f.search_bits.iter().enumerate().filter(|_| f.degree > 0) {
             memories.push(memory(SEARCH_MEMORY, &format!("memory{k}"), SEARCH_BUFFERS * quads, quad(bits), false));
             if several {
                 memories.push(memory(SEARCH_MEMORY, &format!("start{k}"), quads, quad(bits), false));
             }
         }
-        memories.push(ram("forces$store", cases.iter().map(frame_quads).max().unwrap_or(0), quad(f.search_bits[0])));
+        memories.push(ram("forces__store", cases.iter().map(frame_quads).max().unwrap_or(0), quad(f.search_bits[0])));
         let calibrate = match input.calibration {
             Some(_) => board.multipliers_for(f.code_bits + 1, GAIN_BITS),
             None => 0,
         };
         let multipliers = vec![
-            ("prepare$calibrate", calibrate),
-            ("pass$lanes", 4 * f.lanes_per_parity * board.multipliers_for(MULTIPLIER_BITS, MULTIPLIER_BITS)),
-            ("forces$unit", force_multipliers(f, board)),
+            ("prepare__calibrate", calibrate),
+            ("pass__lanes", 4 * f.lanes_per_parity * board.multipliers_for(MULTIPLIER_BITS, MULTIPLIER_BITS)),
+            ("forces__unit", force_multipliers(f, board)),
             ("resultants", resultant_multipliers(scene, board)),
         ];
         Resources { memories, multipliers }

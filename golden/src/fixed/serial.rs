@@ -146,7 +146,7 @@ fn resources(f: &Formats, board: &Board) -> Resources {
     let operands = 2 << (count_bits(first_vector(f) + operand_vectors(f.degree)) + count_bits(f.quads));
     let bank = 2 << (count_bits(polynomials(f)) + 4);
     let mut memories = vec![
-        memory("receive$frame", "field0", taxels, f.input_bits as usize),
+        memory("receive__frame", "field0", taxels, f.input_bits as usize),
         memory("order", "places", 2 << count_bits(taxels), count_bits(taxels)),
         memory("pass", "wide", WIDE.len() * side * side, 4 * OPERAND_BITS as usize),
     ];

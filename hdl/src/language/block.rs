@@ -1,7 +1,5 @@
 //! A kernel as the body of a rust-hdl block.
 
-use std::cell::RefCell;
-use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
 use rust_hdl::core::probe::Probe;
@@ -9,6 +7,7 @@ use rust_hdl::prelude::*;
 
 use super::compile::limbs;
 use super::error::KernelError;
+use super::hierarchy::visit;
 use super::kernel::{Kernel, Role};
 use super::simulate::Simulation;
 use crate::wire::Wire;
@@ -49,9 +48,9 @@ impl<D: Direction> Port for Wire<D> {
     }
 }
 
-macro_rules! bit_port {
-    ($direction:ty) => {
-        impl Port for Signal<$direction, Bit> {
+macro_rules! one_bit_port {
+    ($direction:ty, $type:ty, $bit:expr) => {
+        impl Port for Signal<$direction, $type> {
             fn port_bits(&self) -> usize {
                 1
             }
@@ -61,11 +60,12 @@ macro_rules! bit_port {
             }
 
             fn read(&self, take: &mut dyn FnMut(&[u64])) {
-                take(&[u64::from(self.val())]);
+                let bit: fn($type) -> bool = $bit;
+                take(&[u64::from(bit(self.val()))]);
             }
 
             fn write(&mut self, value: &[u64]) {
-                self.next = value[0] != 0;
+                self.next = (value[0] != 0).into();
             }
 
             fn drive(&mut self) {
@@ -75,8 +75,9 @@ macro_rules! bit_port {
     };
 }
 
-bit_port!(In);
-bit_port!(Out);
+one_bit_port!(In, Bit, |bit| bit);
+one_bit_port!(Out, Bit, |bit| bit);
+one_bit_port!(In, Clock, |clock| clock.clk);
 
 /// First limb and limbs of a port in the simulation.
 type Place = (usize, usize);
@@ -142,16 +143,11 @@ impl Body {
             port.write(simulation.get(slot, limbs));
         });
     }
-
-    /// The Verilog of the block's body.
-    pub fn hdl(&self) -> Verilog {
-        Verilog::Custom(self.kernel.verilog())
-    }
 }
 
 impl Kernel {
     /// Makes the signal `port` a port.
-    fn bind(&mut self, port: &str, bits: usize, is_output: bool) {
+    pub(super) fn bind(&mut self, port: &str, bits: usize, is_output: bool) {
         let found = match self.signal_of(port).map(|id| &mut self.signals[id]) {
             None => "the kernel has no such signal".to_owned(),
             Some(signal) if signal.ty.bits != bits => format!("the kernel's signal has {} bits", signal.ty.bits),
@@ -165,11 +161,6 @@ impl Kernel {
         };
         self.errors.push(KernelError::Port { block: self.block.clone(), port: port.to_owned(), bits, found });
     }
-}
-
-thread_local! {
-    /// The kernel seen since the innermost scope began, while [`kernels`] walks a design.
-    static SEEN: RefCell<Vec<Arc<Kernel>>> = const { RefCell::new(Vec::new()) };
 }
 
 impl Logic for Body {
@@ -186,70 +177,8 @@ impl Block for Body {
     }
 
     fn accept(&self, _name: &str, _probe: &mut dyn Probe) {
-        SEEN.with_borrow_mut(|seen| seen.push(self.kernel.clone()));
+        visit(&self.kernel);
     }
-}
-
-/// Collects the kernels of a design by instance path.
-#[derive(Default)]
-struct Collector {
-    path: Vec<String>,
-    kernels: BTreeMap<String, Arc<Kernel>>,
-}
-
-impl Probe for Collector {
-    fn visit_start_scope(&mut self, name: &str, _node: &dyn Block) {
-        self.path.push(name.to_owned());
-    }
-
-    fn visit_end_scope(&mut self, _name: &str, _node: &dyn Block) {
-        let path = self.path.join("$");
-        self.kernels.extend(SEEN.take().into_iter().map(|kernel| (path.clone(), kernel)));
-        self.path.pop();
-    }
-}
-
-/// The kernels of all blocks of `design` by their module names, levels separated by `$`; the design itself is `top`.
-pub fn kernels(design: &dyn Block) -> BTreeMap<String, Arc<Kernel>> {
-    SEEN.take();
-    let mut collector = Collector::default();
-    design.accept("top", &mut collector);
-    collector.kernels
-}
-
-/// The Verilog of `design`, top module `top`. rust-hdl prints the hierarchy and declares every driven port as a
-/// variable; the constant outputs of kernels become nets, which hold their value from time 0 on.
-pub fn verilog(design: &impl Block) -> String {
-    let all = kernels(design);
-    let mut nets = BTreeSet::new();
-    let mut text = String::new();
-    for line in generate_verilog_unchecked(design).lines() {
-        if let Some(rest) = line.trim_start().strip_prefix("module ") {
-            let module = rest.split('(').next().unwrap_or_default();
-            let constants = all.get(module).into_iter().flat_map(|kernel| kernel.constants());
-            nets = constants.map(|signal| signal.name.as_str()).collect();
-        }
-        let net = line.split_once("output reg ").filter(|(_, port)| {
-            let name = port.trim_end().trim_end_matches(';').rsplit(' ').next();
-            name.is_some_and(|name| nets.contains(name))
-        });
-        match net {
-            Some((indent, port)) => text.extend([indent, "output wire ", port]),
-            None => text.push_str(line),
-        }
-        text.push('\n');
-    }
-    text
-}
-
-/// Checks the kernels of all blocks of `design`.
-///
-/// # Errors
-/// The first defect of one of them.
-pub fn check_kernels(design: &dyn Block) -> Result<(), KernelError> {
-    let all = kernels(design);
-    let mut errors = all.values().flat_map(|kernel| kernel.errors());
-    errors.next().map_or(Ok(()), |error| Err(error.clone()))
 }
 
 /// Implements rust-hdl's `Logic` for a block from its kernel, and `bind`, which makes its field `kernel`.
@@ -300,10 +229,6 @@ macro_rules! kernel_block {
             fn connect(&mut self) {
                 use $crate::language::Port;
                 $(self.$output.drive();)*
-            }
-
-            fn hdl(&self) -> rust_hdl::prelude::Verilog {
-                self.kernel.hdl()
             }
         }
     };

@@ -221,6 +221,8 @@ pub struct Kernel {
     pub(crate) memories: Vec<Memory>,
     pub(crate) items: Vec<Item>,
     pub(crate) errors: Vec<KernelError>,
+    /// The kernel only connects blocks: a linter shall see which of their outputs nobody reads.
+    pub(crate) connects: bool,
 }
 
 impl Kernel {
@@ -242,24 +244,6 @@ impl Kernel {
     /// Name and type of every signal: ports, wires, registers.
     pub fn signals(&self) -> impl Iterator<Item = (&str, Type)> {
         self.signals.iter().map(|signal| (signal.name.as_str(), signal.ty))
-    }
-
-    /// The outputs that are constant. They are nets: a process that computes a constant waits forever for its trigger in
-    /// an event-driven simulator.
-    pub(crate) fn constants(&self) -> impl Iterator<Item = &Signal> {
-        self.signals.iter().filter(|signal| signal.output && self.is_constant(signal))
-    }
-
-    /// Whether a wire depends on no input, register or memory.
-    pub(crate) fn is_constant(&self, signal: &Signal) -> bool {
-        let changes = |node: &NodeId| match self.nodes[*node].0 {
-            Node::Signal(source) => !matches!(self.signals[source].role, Role::Wire { .. }),
-            Node::Read { .. } => true,
-            _ => false,
-        };
-        let value = signal.value.filter(|_| matches!(signal.role, Role::Wire { .. }));
-        let order = value.and_then(|value| self.order(&[value]).ok());
-        order.is_some_and(|order| !order.iter().any(changes))
     }
 
     pub(crate) fn ty(&self, node: NodeId) -> Type {

@@ -18,6 +18,7 @@
 //! | operands of unequal or impossible width | [`KernelError::Width`] |
 //! | a signal without value, or with two | [`KernelError::Unassigned`], [`KernelError::AssignedTwice`] |
 //! | a wire that depends on itself | [`KernelError::Loop`] |
+//! | more than connections in a block that connects others | [`KernelError::Wiring`] |
 //! | a port that the kernel lacks | [`KernelError::Port`] |
 //! | a name used twice, or none of Verilog | [`KernelError::Name`] |
 
@@ -27,21 +28,24 @@ mod check;
 mod compile;
 mod error;
 mod expression;
+mod hierarchy;
 mod kernel;
 mod resources;
 mod simulate;
 mod text;
 mod verilog;
+mod wiring;
 
 #[cfg(test)]
 pub(crate) mod testbench;
 #[cfg(test)]
 mod tests;
 
-pub use block::{check_kernels, kernels, verilog, Body, Port};
+pub use block::{Body, Port};
 pub use build::{Builder, MemoryPort, Net};
 pub use error::KernelError;
 pub use expression::{concat, Expr, ARITHMETIC_BITS};
+pub use hierarchy::{Attributes, Hierarchy, SEPARATOR};
 pub use kernel::{Contents, Kernel, Memory, Type};
 pub(crate) use resources::distributed_luts;
 pub use simulate::Simulation;

@@ -17,10 +17,18 @@
 use std::collections::BTreeSet;
 
 use super::kernel::{Binary, Kernel, Node, NodeId, Unary};
-use crate::estimate::Logic;
 
 /// A distributed RAM cell of the ECP5: words, bits per word, LUTs.
 const CELL: [usize; 3] = [16, 4, 6];
+
+/// Logic of a block.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(crate) struct Logic {
+    /// Register bits.
+    pub(crate) flip_flops: usize,
+    /// Four-input LUTs; the caller rounds.
+    pub(crate) luts: f64,
+}
 
 /// LUTs of a memory of `words` words and `bits` bits as distributed RAM.
 pub(crate) fn distributed_luts(words: usize, bits: usize) -> usize {

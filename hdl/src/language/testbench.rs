@@ -81,17 +81,11 @@ fn ports(kernel: &Kernel) -> [Vec<(&str, Type)>; 2] {
 fn modules(kernel: &Kernel) -> String {
     let [inputs, outputs] = ports(kernel);
     let range = |bits: usize| format!("[{}:0]", bits - 1);
-    let mut text = String::from("module dut(");
     let clock = kernel.clock.clone();
     let clock_name = clock.clone().unwrap_or_default();
-    let mut list: Vec<String> = clock.iter().map(|clock| format!("input wire {clock}")).collect();
-    list.extend(inputs.iter().map(|(name, ty)| format!("input wire {} {name}", range(ty.bits))));
-    let nets: Vec<&str> = kernel.constants().map(|signal| signal.name.as_str()).collect();
-    let kind = |name: &str| if nets.contains(&name) { "wire" } else { "reg" };
-    list.extend(outputs.iter().map(|(name, ty)| format!("output {} {} {name}", kind(name), range(ty.bits))));
-    // A port of one bit has no range, so that it can be named without a selection.
-    let body = kernel.verilog();
-    let _ = writeln!(text, "{});\n{body}\nendmodule", list.join(", ").replace("[0:0] ", ""));
+    let names = inputs.iter().chain(&outputs).map(|(name, _)| *name);
+    let head = kernel.header("dut", clock.as_deref().into_iter().chain(names));
+    let mut text = format!("{head}\n{}\nendmodule\n", kernel.verilog());
     let sum = |ports: &[(&str, Type)]| ports.iter().map(|(_, ty)| ty.bits).sum::<usize>().max(65);
     let _ = writeln!(
         text,

@@ -2,9 +2,8 @@
 //!
 //! All signals are unsigned vectors; a signed product, comparison or shift says `$signed` itself. Every operand is
 //! printed with the width of its operator, so that Verilog's rules for widths and signs of a context change nothing.
-//! The module's header declares an output as `output wire` if it is constant, else as `output reg`
-//! ([`verilog`](super::verilog)). What is not constant is computed by a process: rust-hdl connects blocks in one process
-//! per block, which would miss what changes while it runs.
+//! What is combinational is assigned continuously: a process that computes a constant would wait forever for its trigger
+//! in an event-driven simulator.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -13,6 +12,8 @@ use super::text::{number, Text};
 
 struct Printer<'a> {
     kernel: &'a Kernel,
+    /// Attributes of memories that the kernel does not state itself.
+    attributes: &'a BTreeMap<String, String>,
     expressions: Text<'a>,
     /// Nodes to which such a wire has been printed.
     printed: BTreeSet<NodeId>,
@@ -22,8 +23,13 @@ struct Printer<'a> {
 impl Kernel {
     /// The module's body.
     pub fn verilog(&self) -> String {
-        let mut printer =
-            Printer { kernel: self, expressions: Text::new(self), printed: BTreeSet::new(), text: String::new() };
+        self.verilog_with(&BTreeMap::new())
+    }
+
+    /// The module's body, with these attributes of memories by their name.
+    pub(super) fn verilog_with(&self, attributes: &BTreeMap<String, String>) -> String {
+        let (expressions, printed) = (Text::new(self), BTreeSet::new());
+        let mut printer = Printer { kernel: self, attributes, expressions, printed, text: String::new() };
         printer.body();
         printer.text.truncate(printer.text.trim_end().len());
         printer.text
@@ -50,7 +56,7 @@ fn memory_text(bits: usize, words: &[Vec<u64>]) -> String {
 }
 
 /// `[high:0] ` of a declaration, nothing for one bit.
-fn range(bits: usize) -> String {
+pub(super) fn range(bits: usize) -> String {
     if bits == 1 {
         String::new()
     } else {
@@ -72,7 +78,7 @@ impl Printer<'_> {
         for signal in &kernel.signals {
             self.declare(signal);
         }
-        let unread = self.unused();
+        let unread = if kernel.connects { Vec::new() } else { self.unused() };
         for item in &kernel.items {
             match item {
                 Item::Comment(text) => self.line(&format!("// {text}")),
@@ -97,7 +103,9 @@ impl Printer<'_> {
     fn declare_memory(&mut self, memory: &Memory) {
         let Memory { name, words, bits, .. } = memory;
         let style = memory.style.iter().map(|style| format!("ram_style = \"{style}\""));
-        let attributes: Vec<String> = style.chain(memory.unchecked.then(|| "no_rw_check".to_owned())).collect();
+        let unchecked = memory.unchecked.then(|| "no_rw_check".to_owned());
+        let given = self.attributes.get(name).cloned();
+        let attributes: Vec<String> = style.chain(unchecked).chain(given).collect();
         if !attributes.is_empty() {
             self.line(&format!("(* {} *)", attributes.join(", ")));
         }
@@ -199,7 +207,6 @@ impl Printer<'_> {
         let text = self.expressions.root(value);
         let Signal { name, ty, .. } = signal;
         match (signal.output, &signal.role) {
-            (true, _) if !kernel.is_constant(signal) => self.line(&format!("always @(*) {name} = {text};")),
             (true, _) | (_, Role::Wire { declared: true }) => self.line(&format!("assign {name} = {text};")),
             _ => self.line(&format!("wire {}{name} = {text};", range(ty.bits))),
         }

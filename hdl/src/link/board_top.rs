@@ -5,7 +5,7 @@ use dermis_golden::link::{Identity, LinkError};
 use rust_hdl::prelude::*;
 
 use super::{Board, BoardOutputs, Lamps, PacketLink, PowerOn, Shape, SpiSlave, Uart};
-use crate::language::verilog;
+use crate::primitives::Dff;
 use crate::{engine, serial};
 
 /// Board top `$name` with engine `$engine` and link block `$block`, which `$line` builds from an identity. A macro,
@@ -46,7 +46,7 @@ macro_rules! board_top {
             pub error: Signal<Out, Bit>,
             power_on: PowerOn,
             // Registered once more, because the engine is large and its reset has a long route.
-            engine_rst: DFF<Bit>,
+            engine_rst: Dff,
             line: $block,
             link: PacketLink,
             engine: $engine,
@@ -85,7 +85,7 @@ macro_rules! board_top {
             #[hdl_gen]
             fn update(&mut self) {
                 self.power_on.clk.next = self.clk.val();
-                self.engine_rst.clock.next = self.clk.val();
+                self.engine_rst.clk.next = self.clk.val();
                 self.line.clk.next = self.clk.val();
                 self.link.clk.next = self.clk.val();
                 self.engine.clk.next = self.clk.val();
@@ -138,10 +138,6 @@ macro_rules! board_top {
                     busy: self.busy.val(),
                     error: self.error.val(),
                 }
-            }
-
-            fn verilog(&self) -> String {
-                verilog(self)
             }
         }
     };

@@ -7,8 +7,8 @@ use rust_hdl::prelude::*;
 use serde_json::json;
 
 use super::{Board, BoardTop, SerialBoardTop, SerialSpiBoardTop, SpiBoardTop};
-use crate::generate::{place, rename, top_name, Generated, GeneratedFile, HdlError};
-use crate::language::check_kernels;
+use crate::generate::{placement, top_name, Generated, GeneratedFile, HdlError};
+use crate::language::Hierarchy;
 
 /// The board of `model`, after rust-hdl's checks.
 pub(super) fn board_top(model: &Model) -> Result<Box<dyn Board>, HdlError> {
@@ -28,7 +28,7 @@ pub(super) fn board_top(model: &Model) -> Result<Box<dyn Board>, HdlError> {
 }
 
 fn checked<B: Board + 'static>(top: B) -> Result<Box<dyn Board>, HdlError> {
-    check_kernels(&top)?;
+    Hierarchy::of(&top).check()?;
     check_all(&top).map_err(|error| HdlError::Check(format!("{error:?}")))?;
     Ok(Box::new(top))
 }
@@ -66,7 +66,8 @@ pub fn generate_board(model: &Model) -> Result<Generated, HdlError> {
     let board = board_top(model)?;
     let engine = crate::generate(model)?;
     let top = format!("{}_board", top_name(&model.scene.name));
-    let verilog = rename(&place(&board.verilog(), model, "engine$")?, &top);
+    let hierarchy = Hierarchy::of(&*board);
+    let verilog = hierarchy.verilog(&top, &placement(&hierarchy, model, "engine__")?);
     let link = model.scene.hardware.link;
     let (behind, pins) = link_text(link, link.bit_rate(&model.board)?);
     let text = format!(

@@ -42,8 +42,6 @@ pub trait Board: Block + Send {
     fn drive(&mut self, inputs: u64, clock: bool);
     /// Samples the output pins.
     fn outputs(&self) -> BoardOutputs;
-    /// The Verilog of the board, top module `top`.
-    fn verilog(&self) -> String;
 }
 
 struct Simulator(Box<dyn Board>);

@@ -1,4 +1,4 @@
-//! A counter whose limit depends on the case, and Verilog expressions for values that depend on the case.
+//! A counter whose limit depends on the case, and expressions for values that depend on the case.
 
 use rust_hdl::prelude::*;
 
@@ -51,19 +51,6 @@ pub fn largest(limits: &[usize]) -> usize {
     limits.iter().copied().max().unwrap_or(1)
 }
 
-/// Verilog expression that selects `values[which]`; `values[0]` without a selection where all are equal.
-pub fn by_case(values: &[String]) -> String {
-    let which = count_bits(values.len());
-    match values {
-        [first, rest @ ..] if rest.iter().any(|value| value != first) => {
-            let other = |(case, value): (usize, &String)| format!("which == {which}'d{} ? {value} : ", case + 1);
-            format!("({}{first})", rest.iter().enumerate().map(other).collect::<String>())
-        }
-        [first, ..] => first.clone(),
-        [] => String::new(),
-    }
-}
-
 /// The value of case `which`, of `bits` bits; a constant where all are equal.
 pub fn value_by_case<'k>(k: &'k Builder, which: Expr<'k>, values: &[usize], bits: usize) -> Expr<'k> {
     let constants: Vec<Expr> = values.iter().map(|&value| k.constant(bits, value as u64)).collect();
@@ -76,11 +63,6 @@ pub fn expression_by_case<'k>(which: Expr<'k>, values: &[Expr<'k>]) -> Option<Ex
     let arms: Vec<(u64, Expr)> = (1..).zip(rest.iter().copied()).collect();
     let equal = rest.iter().all(|value| value.is_same(first));
     Some(if equal { first } else { which.case(&arms, first) })
-}
-
-/// [`by_case`] of unsigned numbers of `bits` bits.
-pub fn number_by_case(values: impl Iterator<Item = usize>, bits: usize) -> String {
-    by_case(&values.map(|value| format!("{bits}'d{value}")).collect::<Vec<_>>())
 }
 
 #[cfg(test)]

@@ -6,7 +6,7 @@
 //! the bit-true model, stage by stage, and proofs cover those that carry a handshake.
 //!
 //! The other modules hold what several blocks share: expressions of kernels in `constant_product`, `half_up`,
-//! `logarithm`, `pass_through`, `polynomial_word`, `sweep`; Verilog text in `leading_one`.
+//! `leading_one`, `logarithm`, `pass_through`, `polynomial_word`, `sweep`.
 
 mod average;
 mod blank;
@@ -18,6 +18,7 @@ mod constant_product;
 mod counter;
 mod counts;
 mod delay;
+mod dff;
 mod filler;
 mod force_unit;
 mod gather;
@@ -57,10 +58,11 @@ pub use blank::Blank;
 pub use butterfly::Butterfly;
 pub use calibrate::{Calibrate, CALIBRATION_FILE};
 pub use candidates::{Candidates, LATENCY as CANDIDATES_LATENCY};
-pub use case_counter::{by_case, largest, number_by_case, CaseCounter};
+pub use case_counter::{expression_by_case, largest, CaseCounter};
 pub use counter::{count_bits, Counter};
 pub use counts::Counts;
 pub use delay::{BitDelay, Delay};
+pub use dff::Dff;
 pub use filler::Filler;
 pub use force_unit::{ForceUnit, CYCLE_BITS, STEPS as FORCE_STEPS};
 pub use gather::Gather;

@@ -11,7 +11,7 @@ use super::{
     Banks, Candidates, CoefficientShift, Force, Horner, Pass, Receive, Rounder, Score, SerialButterfly, Solve,
     TaxelReorder, Unfold, Walk,
 };
-use crate::primitives::{Ram, Slice};
+use crate::primitives::{Dff, Ram, Slice};
 use crate::wire::Wire;
 
 /// The serial engine, with the ports of the parallel [`Engine`](crate::engine::Engine).
@@ -57,9 +57,9 @@ pub struct Engine {
     floors: Ram,
     totals: Ram,
     forces: Force,
-    computing: DFF<Bit>,
-    condition: DFF<Bit>,
-    framing: DFF<Bit>,
+    computing: Dff,
+    condition: Dff,
+    framing: Dff,
     both_signs: Constant<Bit>,
     begin_frame: Signal<Local, Bit>,
 }
@@ -138,9 +138,9 @@ impl Logic for Engine {
         self.floors.clk.next = self.clk.val();
         self.totals.clk.next = self.clk.val();
         self.forces.clk.next = self.clk.val();
-        self.computing.clock.next = self.clk.val();
-        self.condition.clock.next = self.clk.val();
-        self.framing.clock.next = self.clk.val();
+        self.computing.clk.next = self.clk.val();
+        self.condition.clk.next = self.clk.val();
+        self.framing.clk.next = self.clk.val();
         self.receive.rst.next = self.rst.val();
         self.leader.rst.next = self.rst.val();
         self.mixer.rst.next = self.rst.val();

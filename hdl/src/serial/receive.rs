@@ -5,7 +5,7 @@
 use dermis_golden::fixed::formats::Formats;
 use rust_hdl::prelude::*;
 
-use crate::primitives::{count_bits, Counter, Gather, Ram};
+use crate::primitives::{count_bits, Counter, Dff, Gather, Ram};
 use crate::wire::Wire;
 
 /// ```text
@@ -52,8 +52,8 @@ pub struct Receive {
     taxels: Counter,
     frame: Ram,
     gather: Gather,
-    whole: DFF<Bit>,
-    broken: DFF<Bit>,
+    whole: Dff,
+    broken: Dff,
     taken: Signal<Local, Bit>,
     early: Signal<Local, Bit>,
 }
@@ -96,8 +96,8 @@ impl Logic for Receive {
         self.taxels.clk.next = self.clk.val();
         self.frame.clk.next = self.clk.val();
         self.gather.clk.next = self.clk.val();
-        self.whole.clock.next = self.clk.val();
-        self.broken.clock.next = self.clk.val();
+        self.whole.clk.next = self.clk.val();
+        self.broken.clk.next = self.clk.val();
 
         self.s_axis_tready.next = !self.whole.q.val() & !self.rst.val();
         self.taken.next = self.s_axis_tvalid.val() & !self.whole.q.val() & !self.rst.val();

@@ -4,13 +4,15 @@
 //! Every buffer receives every code, each in the layout of its own subarrays; reads come from the buffer of the chosen
 //! case. All buffers fill and become free together.
 
+use std::collections::BTreeMap;
+
 use dermis_golden::fixed::Model;
 use rust_hdl::prelude::*;
 
 use super::{Choose, Receive, ReceivePorts};
+use crate::language::{Body, Builder, Expr, Kernel, Port, SEPARATOR};
 use crate::ports::has_ports;
-use crate::primitives::by_case;
-use crate::wire::{Wire, Word};
+use crate::primitives::expression_by_case;
 
 /// `full` is high once the case has been chosen too.
 #[derive(LogicBlock)]
@@ -18,137 +20,165 @@ pub struct Banks {
     ports: ReceivePorts,
     banks: Vec<Receive>,
     choose: Choose,
+    kernel: Body,
 }
 
 has_ports!(Banks: ReceivePorts);
+
+/// The block that has a port: this one, a frame buffer, or the choice.
+#[derive(Clone, Copy)]
+enum Of {
+    Own,
+    Bank(usize),
+    Choose,
+}
+
+impl Of {
+    /// Name of a port in the kernel.
+    fn port(self, port: &str) -> String {
+        match self {
+            Of::Own => port.to_owned(),
+            Of::Bank(number) => ["banks", &number.to_string(), port].join(SEPARATOR),
+            Of::Choose => ["choose", port].join(SEPARATOR),
+        }
+    }
+}
+
+/// What the kernel reads.
+type Reads<'a> = Vec<(Of, &'static str, &'a dyn Port)>;
+/// What the kernel drives.
+type Drives<'a> = Vec<(Of, &'static str, &'a mut dyn Port)>;
+
+/// Adds the ports of `$ports` to two lists.
+macro_rules! divide {
+    ($of:expr, $type:ident, $ports:expr, $reads:ident [$($read:ident),+], $drives:ident [$($drive:ident),+]) => {
+        let $type { $($read,)+ $($drive,)+ .. } = $ports;
+        $($reads.push(($of, stringify!($read), $read));)+
+        $($drives.push(($of, stringify!($drive), $drive));)+
+    };
+}
 
 impl Banks {
     /// A frame buffer for each case of `model`.
     pub fn new(model: &Model) -> Self {
         let cases = model.cases();
-        Banks {
+        let mut block = Banks {
             ports: ReceivePorts::new(cases),
             banks: cases.iter().map(Receive::new).collect(),
             choose: Choose::new(model),
+            kernel: Body::default(),
+        };
+        let (_, reads, drives) = block.pins();
+        let reads: Vec<(String, usize)> =
+            reads.iter().map(|(of, name, port)| (of.port(name), port.port_bits())).collect();
+        let drives: Vec<(Of, &str, usize)> =
+            drives.iter().map(|(of, name, port)| (*of, *name, port.port_bits())).collect();
+        let inputs: Vec<(&str, usize)> = reads.iter().map(|(name, bits)| (name.as_str(), *bits)).collect();
+        let names: Vec<String> = drives.iter().map(|(of, name, _)| of.port(name)).collect();
+        let outputs: Vec<(&str, usize)> =
+            names.iter().zip(&drives).map(|(name, (.., bits))| (name.as_str(), *bits)).collect();
+        block.kernel = Body::new(kernel(&inputs, &drives, cases.len()), &inputs, &outputs);
+        block
+    }
+
+    /// The kernel and its pins: the ports of this block, and those of the blocks inside.
+    fn pins(&mut self) -> (&mut Body, Reads<'_>, Drives<'_>) {
+        let Banks { ports, banks, choose, kernel } = self;
+        let (mut reads, mut drives) = (Reads::new(), Drives::new());
+        divide!(
+            Of::Own, ReceivePorts, ports,
+            reads [clk, rst, s_axis_tdata, s_axis_tvalid, s_axis_tlast, free, quad_address, part, reported],
+            drives [s_axis_tready, accept, taken_word, full, which, quad, magnitude, positive, negative, framing]
+        );
+        for (number, bank) in banks.iter_mut().enumerate() {
+            divide!(
+                Of::Bank(number), ReceivePorts, &mut **bank,
+                reads [s_axis_tready, accept, taken_word, full, which, quad, magnitude, positive, negative, framing],
+                drives [clk, rst, s_axis_tdata, s_axis_tvalid, s_axis_tlast, free, quad_address, part, reported]
+            );
         }
+        divide!(
+            Of::Choose, Choose, choose, reads [which, settled], drives [clk, rst, code, accept, tlast, free]
+        );
+        (kernel, reads, drives)
     }
 }
 
 impl Logic for Banks {
     fn update(&mut self) {
-        let Banks { ports, banks, choose } = self;
-        let which = (choose.which.val().number() as usize).min(banks.len() - 1);
-        for bank in banks.iter_mut() {
-            bank.clk.next = ports.clk.val();
-            bank.rst.next = ports.rst.val();
-            bank.s_axis_tdata.next = ports.s_axis_tdata.val();
-            bank.s_axis_tvalid.next = ports.s_axis_tvalid.val();
-            bank.s_axis_tlast.next = ports.s_axis_tlast.val();
-            bank.free.next = ports.free.val();
-            bank.reported.next = ports.reported.val();
-            // An address beyond a smaller buffer is meant for another one; its data are not used.
-            bank.quad_address.next = cut(&ports.quad_address, bank.quad_address.width());
-            bank.part.next = cut(&ports.part, bank.part.width());
-        }
-        let (first, bank) = (&banks[0], &banks[which]);
-        ports.s_axis_tready.next = first.s_axis_tready.val();
-        ports.accept.next = first.accept.val();
-        ports.taken_word.next = first.taken_word.val();
-        ports.framing.next = first.framing.val();
-        ports.quad.next = bank.quad.val();
-        ports.magnitude.next = bank.magnitude.val();
-        ports.positive.next = bank.positive.val();
-        ports.negative.next = bank.negative.val();
-        choose.clk.next = ports.clk.val();
-        choose.rst.next = ports.rst.val();
-        choose.code.next = ports.s_axis_tdata.val();
-        choose.accept.next = first.accept.val();
-        choose.tlast.next = ports.s_axis_tlast.val();
-        choose.free.next = ports.free.val();
-        ports.which.next = choose.which.val();
-        ports.full.next = choose.settled.val();
+        let (kernel, reads, mut drives) = self.pins();
+        let changed = reads.iter().any(|(.., port)| port.has_new_value());
+        kernel.update(
+            false,
+            changed,
+            |set| reads.iter().enumerate().for_each(|(index, (.., port))| set(index, *port)),
+            |take| drives.iter_mut().enumerate().for_each(|(index, (.., port))| take(index, *port)),
+        );
     }
 
     fn connect(&mut self) {
-        let Banks { ports, banks, choose } = self;
-        for bank in banks.iter_mut() {
-            let bank: &mut ReceivePorts = bank;
-            bank.clk.connect();
-            for bit in
-                [&mut bank.rst, &mut bank.s_axis_tvalid, &mut bank.s_axis_tlast, &mut bank.free, &mut bank.reported]
-            {
-                bit.connect();
-            }
-            for wire in [&mut bank.s_axis_tdata, &mut bank.quad_address, &mut bank.part] {
-                wire.connect();
-            }
-        }
-        choose.clk.connect();
-        choose.code.connect();
-        for bit in [&mut choose.rst, &mut choose.accept, &mut choose.tlast, &mut choose.free] {
-            bit.connect();
-        }
-        for bit in
-            [&mut ports.s_axis_tready, &mut ports.accept, &mut ports.full, &mut ports.positive, &mut ports.negative]
-        {
-            bit.connect();
-        }
-        ports.framing.connect();
-        for wire in [&mut ports.taken_word, &mut ports.which, &mut ports.quad, &mut ports.magnitude] {
-            wire.connect();
-        }
-    }
-
-    fn hdl(&self) -> Verilog {
-        let same = ["clk", "rst", "s_axis_tdata", "s_axis_tvalid", "s_axis_tlast", "free", "reported"];
-        let inputs = |(number, bank): (usize, &Receive)| {
-            let forward = |port: &&str| format!("  banks${number}${port} = {port};\n");
-            let cut = |port: &str, from: &Wire<In>, to: &Wire<In>| match from.width() == to.width() {
-                true => format!("  banks${number}${port} = {port};\n"),
-                false => format!("  banks${number}${port} = {port}[{}:0];\n", to.width() - 1),
-            };
-            same.iter().map(forward).collect::<String>()
-                + &cut("quad_address", &self.quad_address, &bank.quad_address)
-                + &cut("part", &self.part, &bank.part)
-        };
-        let inputs: String = self.banks.iter().enumerate().map(inputs).collect();
-        let count = self.banks.len();
-        let chosen = |port: &str| {
-            let each: Vec<String> = (0..count).map(|number| format!("banks${number}${port}")).collect();
-            format!("  {port} = {};\n", by_case(&each))
-        };
-        let outputs: String = ["quad", "magnitude", "positive", "negative"].iter().map(|port| chosen(port)).collect();
-        // All buffers fill and become free together: the handshake outputs of the first are those of all.
-        let unused: Vec<String> = ["s_axis_tready", "accept", "taken_word", "framing"]
-            .iter()
-            .flat_map(|port| (1..count).map(move |number| format!("banks${number}${port}")))
-            .chain((0..count).flat_map(|number| ["full", "which"].map(|port| format!("banks${number}${port}"))))
-            .collect();
-        Verilog::Custom(format!(
-            "\
-wire unused = &{{1'b0, {unused}}};
-always @(*) begin
-{inputs}  choose$clk = clk;
-  choose$rst = rst;
-  choose$code = s_axis_tdata;
-  choose$accept = banks$0$accept;
-  choose$tlast = s_axis_tlast;
-  choose$free = free;
-  s_axis_tready = banks$0$s_axis_tready;
-  accept = banks$0$accept;
-  taken_word = banks$0$taken_word;
-  framing = banks$0$framing;
-  which = choose$which;
-  full = choose$settled;
-end
-always @(*) begin
-{outputs}end",
-            unused = unused.join(", "),
-        ))
+        self.pins().2.into_iter().for_each(|(.., port)| port.drive());
     }
 }
 
-/// The low `bits` bits of `wire`.
-fn cut(wire: &Wire<In>, bits: usize) -> Word {
-    Word::from(wire.val().field(0, bits))
+/// All buffers get what this block gets; its outputs are those of the chosen one.
+fn kernel(inputs: &[(&str, usize)], outputs: &[(Of, &str, usize)], cases: usize) -> Kernel {
+    let k = Builder::combinational("banks");
+    let read: BTreeMap<&str, Expr> = inputs.iter().map(|&(name, bits)| (name, k.input(name, bits))).collect();
+    let port = |of: Of, name: &str| read[of.port(name).as_str()];
+    for &(of, name, bits) in outputs {
+        let value = match (of, name) {
+            (Of::Own, "which") => port(Of::Choose, "which"),
+            (Of::Own, "full") => port(Of::Choose, "settled"),
+            (Of::Own, "quad" | "magnitude" | "positive" | "negative") => {
+                let each: Vec<Expr> = (0..cases).map(|number| port(Of::Bank(number), name)).collect();
+                expression_by_case(port(Of::Choose, "which"), &each).unwrap_or(each[0])
+            }
+            // All buffers fill and become free together: the handshake of the first is that of all.
+            (Of::Own, _) => port(Of::Bank(0), name),
+            (Of::Choose, "code") => port(Of::Own, "s_axis_tdata"),
+            (Of::Choose, "tlast") => port(Of::Own, "s_axis_tlast"),
+            (Of::Choose, "accept") => port(Of::Bank(0), "accept"),
+            // An address beyond a smaller buffer is meant for another one; its data are not used.
+            (Of::Bank(_) | Of::Choose, _) => port(Of::Own, name).low(bits),
+        };
+        k.wire(&of.port(name), value);
+    }
+    k.finish()
+}
+
+#[cfg(test)]
+mod tests {
+    use dermis_golden::scene::Scene;
+
+    use super::*;
+    use crate::language::testbench::{check, random_words, Pipeline};
+    use crate::wire::Word;
+
+    #[test]
+    fn outputs_are_those_of_the_chosen_bank() {
+        let text = "name = \"banks\"\nsensor = \"sensor-1\"\n[partition]\ncases = [0, 1]\n";
+        let mut banks = Banks::new(&Model::new(&Scene::parse(text, "banks.toml").unwrap()).unwrap());
+        let (_, reads, drives) = banks.pins();
+        let widths: Vec<usize> = reads.iter().map(|(.., port)| port.port_bits()).collect();
+        let inputs: Vec<String> = reads.iter().map(|(of, name, _)| of.port(name)).collect();
+        let outputs: Vec<(String, usize)> =
+            drives.iter().map(|(of, name, port)| (of.port(name), port.port_bits())).collect();
+        let of = |words: &[Word]| {
+            let read = |name: &str| words[inputs.iter().position(|input| input == name).expect(name)];
+            let which = read("choose__which").number();
+            let source = |output: &str| match output {
+                "which" => "choose__which".to_owned(),
+                "full" => "choose__settled".to_owned(),
+                "quad" | "magnitude" | "positive" | "negative" => format!("banks__{which}__{output}"),
+                "choose__code" => "s_axis_tdata".to_owned(),
+                "choose__tlast" => "s_axis_tlast".to_owned(),
+                "choose__accept" => "banks__0__accept".to_owned(),
+                inner if inner.contains("__") => inner.rsplit("__").next().unwrap().to_owned(),
+                own => format!("banks__0__{own}"),
+            };
+            outputs.iter().map(|(output, bits)| Some(Word::from(read(&source(output)).field(0, *bits)))).collect()
+        };
+        check(banks.kernel.kernel(), &random_words(2000, &widths), &mut Pipeline::new(0, outputs.len(), of));
+    }
 }

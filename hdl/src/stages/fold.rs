@@ -5,7 +5,7 @@
 use dermis_golden::fixed::Model;
 use rust_hdl::prelude::*;
 
-use crate::primitives::{count_bits, frame_quads, largest, BitDelay, Butterfly, CaseCounter, Counter, Delay, Ram};
+use crate::primitives::{count_bits, frame_quads, largest, BitDelay, Butterfly, CaseCounter, Counter, Delay, Dff, Ram};
 use crate::wire::Wire;
 
 /// Reads the quads of a subarray from the frame buffer; they pass `normalise` and the butterfly on their way to the
@@ -44,7 +44,7 @@ pub struct Fold {
     pub read_quad: Wire<Out>,
     quads: CaseCounter,
     frame_quads: Counter,
-    running: DFF<Bit>,
+    running: Dff,
     normalised_later: BitDelay,
     folded_later: BitDelay,
     finish: BitDelay,
@@ -97,7 +97,7 @@ impl Logic for Fold {
     fn update(&mut self) {
         self.quads.clk.next = self.clk.val();
         self.frame_quads.clk.next = self.clk.val();
-        self.running.clock.next = self.clk.val();
+        self.running.clk.next = self.clk.val();
         self.normalised_later.clk.next = self.clk.val();
         self.folded_later.clk.next = self.clk.val();
         self.finish.clk.next = self.clk.val();

@@ -9,7 +9,8 @@ use dermis_golden::fixed::Model;
 use rust_hdl::prelude::*;
 
 use crate::primitives::{
-    control_bits, count_bits, BitDelay, Counter, Delay, Filler, Lanes, OperandSelect, Ram, Slice, Steps, SOURCE_BITS,
+    control_bits, count_bits, BitDelay, Counter, Delay, Dff, Filler, Lanes, OperandSelect, Ram, Slice, Steps,
+    SOURCE_BITS,
 };
 use crate::wire::Wire;
 
@@ -39,7 +40,7 @@ pub struct Pass {
     /// The coefficient signature of the subarray is wrong, 1 bit; valid with its last row.
     pub damaged: Wire<Out>,
     column: Counter,
-    running: DFF<Bit>,
+    running: Dff,
     /// Schedule of the products.
     pub steps: Steps,
     vectors: Ram,
@@ -100,7 +101,7 @@ impl Logic for Pass {
     #[hdl_gen]
     fn update(&mut self) {
         self.column.clk.next = self.clk.val();
-        self.running.clock.next = self.clk.val();
+        self.running.clk.next = self.clk.val();
         self.steps.clk.next = self.clk.val();
         self.vectors.clk.next = self.clk.val();
         self.filler.clk.next = self.clk.val();

@@ -8,7 +8,7 @@ use dermis_golden::fixed::Model;
 use rust_hdl::prelude::*;
 
 use crate::ports::{has_ports, ports};
-use crate::primitives::{count_bits, frame_quads, largest, BitDelay, Blank, Delay, Gather, Ram, Scan, Spread};
+use crate::primitives::{count_bits, frame_quads, largest, BitDelay, Blank, Delay, Dff, Gather, Ram, Scan, Spread};
 use crate::wire::Wire;
 
 /// ```text
@@ -30,10 +30,10 @@ pub struct Receive {
     gathered_code: Delay,
     gathered_address: Delay,
     gathered_mask: Delay,
-    clears: DFF<Bit>,
-    whole: DFF<Bit>,
-    complete: DFF<Bit>,
-    broken: DFF<Bit>,
+    clears: Dff,
+    whole: Dff,
+    complete: Dff,
+    broken: Dff,
     taken: Signal<Local, Bit>,
     early: Signal<Local, Bit>,
 }
@@ -155,10 +155,10 @@ impl Logic for Receive {
         self.gathered_code.clk.next = self.clk.val();
         self.gathered_address.clk.next = self.clk.val();
         self.gathered_mask.clk.next = self.clk.val();
-        self.clears.clock.next = self.clk.val();
-        self.whole.clock.next = self.clk.val();
-        self.complete.clock.next = self.clk.val();
-        self.broken.clock.next = self.clk.val();
+        self.clears.clk.next = self.clk.val();
+        self.whole.clk.next = self.clk.val();
+        self.complete.clk.next = self.clk.val();
+        self.broken.clk.next = self.clk.val();
 
         self.s_axis_tready.next = !self.whole.q.val() & !self.rst.val();
         self.taken.next = self.s_axis_tvalid.val() & !self.whole.q.val() & !self.rst.val();

@@ -8,7 +8,7 @@ use dermis_golden::fixed::Model;
 use rust_hdl::prelude::*;
 
 use crate::primitives::{
-    count_bits, largest, shift_bits, BitDelay, CaseCounter, Ram, RawLength, Rescaler, SATURATION_BITS,
+    count_bits, largest, shift_bits, BitDelay, CaseCounter, Dff, Ram, RawLength, Rescaler, SATURATION_BITS,
 };
 use crate::wire::Wire;
 
@@ -39,8 +39,8 @@ pub struct Rescale {
     pub shift: Wire<Out>,
     /// Number of words saturated in this subarray.
     pub saturations: Wire<Out>,
-    collecting: DFF<Bit>,
-    replaying: DFF<Bit>,
+    collecting: Dff,
+    replaying: Dff,
     rows: CaseCounter,
     replay: CaseCounter,
     raw: Ram,
@@ -93,8 +93,8 @@ impl Rescale {
 impl Logic for Rescale {
     #[hdl_gen]
     fn update(&mut self) {
-        self.collecting.clock.next = self.clk.val();
-        self.replaying.clock.next = self.clk.val();
+        self.collecting.clk.next = self.clk.val();
+        self.replaying.clk.next = self.clk.val();
         self.rows.clk.next = self.clk.val();
         self.replay.clk.next = self.clk.val();
         self.raw.clk.next = self.clk.val();

@@ -14,8 +14,8 @@ use rust_hdl::prelude::*;
 
 use crate::ports::{has_ports, ports};
 use crate::primitives::{
-    count_bits, largest, position_bits, BitDelay, Candidates, CaseCounter, Counts, Delay, Judge, PolynomialWord, Score,
-    Slice, Store, Sum, Taylor, Walk, Weigh, BUFFER_BITS, CANDIDATES_LATENCY, SCORE_LATENCY, STORE_LATENCY,
+    count_bits, largest, position_bits, BitDelay, Candidates, CaseCounter, Counts, Delay, Dff, Judge, PolynomialWord,
+    Score, Slice, Store, Sum, Taylor, Walk, Weigh, BUFFER_BITS, CANDIDATES_LATENCY, SCORE_LATENCY, STORE_LATENCY,
     TAYLOR_LATENCY,
 };
 use crate::wire::Wire;
@@ -42,7 +42,7 @@ pub struct Search {
     constants: Slice,
     quads: CaseCounter,
     period: CaseCounter,
-    counting: DFF<Bit>,
+    counting: Dff,
     began: BitDelay,
     judged_then: BitDelay,
     go: BitDelay,
@@ -60,7 +60,7 @@ pub struct Search {
     target: Delay,
     moved_address: Delay,
     scored_address: Delay,
-    set_up: DFF<Bit>,
+    set_up: Dff,
     quad_end: Signal<Local, Bit>,
 }
 
@@ -223,8 +223,8 @@ impl Logic for Search {
         self.sum_taylor.clk.next = self.clk.val();
         self.sum_candidates.clk.next = self.clk.val();
         self.quads.clk.next = self.clk.val();
-        self.counting.clock.next = self.clk.val();
-        self.set_up.clock.next = self.clk.val();
+        self.counting.clk.next = self.clk.val();
+        self.set_up.clk.next = self.clk.val();
         self.trial.clk.next = self.clk.val();
         self.trial.rst.next = self.rst.val();
         self.outcome.clk.next = self.clk.val();

@@ -4,7 +4,7 @@ use dermis_golden::fixed::send::STATUS_BEATS;
 use dermis_golden::fixed::Model;
 use rust_hdl::prelude::*;
 
-use crate::primitives::{count_bits, largest, BitDelay, CaseCounter, Counter, Scan, StatusCode};
+use crate::primitives::{count_bits, largest, BitDelay, CaseCounter, Counter, Dff, Scan, StatusCode};
 use crate::wire::Wire;
 
 /// From `start`, one beat is requested in each cycle with `room`: all taxels, then the status beats.
@@ -42,8 +42,8 @@ pub struct Send {
     words: Counter,
     parts: CaseCounter,
     code: StatusCode,
-    sending: DFF<Bit>,
-    status: DFF<Bit>,
+    sending: Dff,
+    status: Dff,
     out: BitDelay,
     step: Signal<Local, Bit>,
     at_end: Signal<Local, Bit>,
@@ -91,8 +91,8 @@ impl Logic for Send {
         self.scan.clk.next = self.clk.val();
         self.words.clk.next = self.clk.val();
         self.parts.clk.next = self.clk.val();
-        self.sending.clock.next = self.clk.val();
-        self.status.clock.next = self.clk.val();
+        self.sending.clk.next = self.clk.val();
+        self.status.clk.next = self.clk.val();
 
         self.scan.which.next = self.which.val();
         self.parts.which.next = self.which.val();

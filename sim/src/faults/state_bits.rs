@@ -7,6 +7,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use anyhow::{anyhow, Result};
 use dermis_golden::fixed::resources::Memory;
+use dermis_hdl::language::SEPARATOR;
 use dermis_hdl::usage::stage;
 use roxmltree::{Document, Node};
 use serde::Serialize;
@@ -74,7 +75,7 @@ pub fn state_elements(listing: &str, dut: &str, memories: &[Memory]) -> Result<V
             continue;
         };
         let (own, Some(module)) = (own.trim_start_matches('.'), modules.get(module)) else { continue };
-        let block = own.replace('.', "$");
+        let block = own.replace('.', SEPARATOR);
         let stage = stage(&block);
         let mut scan = Scan::default();
         scan.scan_module(*module, own);

@@ -64,13 +64,6 @@ fn prepared() -> Model {
     model("[input]\naverage = 1\nfull_scale_MPa = 127.0\ntare = \"tare.csv\"\ndead = [[1, 1]]\n")
 }
 
-/// The module of a board whose ports begin with this text.
-fn block_with(board: &Generated, ports: &str) -> String {
-    let verilog = board.files.iter().find(|file| file.name.ends_with(".v")).unwrap();
-    let module = verilog.text.lines().find(|line| line.contains(ports)).and_then(|line| line.strip_prefix("module "));
-    module.unwrap().split('(').next().unwrap().to_string()
-}
-
 #[test]
 fn streams_keep_what_they_offer() {
     let sums = model("[output]\nforces = \"resultants\"\n");
@@ -83,10 +76,10 @@ fn streams_keep_what_they_offer() {
             "wire moves = 1'b1;",
         ),
         (generate(&sums), "resultants", [96, 96], "wire sent = sending && m_axis_tready;", "wire sent = sending;"),
-        (generate_board(&model("")), "link$back", [96, 96], "if (!m_axis_tvalid) m_axis_tdata <=", "m_axis_tdata <="),
+        (generate_board(&model("")), "link__back", [96, 96], "if (!m_axis_tvalid) m_axis_tdata <=", "m_axis_tdata <="),
     ];
     for (generated, block, [taken, offered], sound, broken) in streams {
-        let given = vec![("BLOCK", format!("@TOP@${block}")), ("IN", number(taken)), ("OUT", number(offered))];
+        let given = vec![("BLOCK", format!("@TOP@__{block}")), ("IN", number(taken)), ("OUT", number(offered))];
         let (generated, defects) = (&generated.unwrap(), &[(sound, broken)]);
         Proof { generated, property: "stream.v", given, defects, open_products: true }.run();
     }
@@ -120,7 +113,7 @@ fn receive_holds_whole_frames() {
     let bits = count_bits(quads.len());
     let place = |k: usize| format!("      {}'d{k}: own = 8'd{};\n", bits + 2, quads.taxel(k / 4, k % 4));
     let generated = &generate(&prepared()).unwrap();
-    let defects = [("dead ? 9'd0 : word", "word"), ("frame$write = spread$write;", "frame$write = scan$mask;")];
+    let defects = [("dead ? 9'd0 : word", "word"), ("frame__write = spread__write;", "frame__write = scan__mask;")];
     let given = vec![
         ("PLACES", (0..4 * quads.len()).map(place).collect()),
         ("DEAD", format!("count == 8'd{DEAD}")),
@@ -143,7 +136,7 @@ fn send_gives_whole_frames() {
     ];
     let defects = [
         ("last <= leaves && beat_out == 2'd3", "last <= leaves && beat_out == 2'd2"),
-        ("step = sending$q & room;", "step = sending$q;"),
+        ("step = sending__q && room;", "step = sending__q;"),
     ];
     Proof { generated: &generate(&model).unwrap(), property: "send.v", given, defects: &defects, open_products: true }
         .run();
@@ -152,9 +145,9 @@ fn send_gives_whole_frames() {
 #[test]
 fn counters_stay_below_their_limits() {
     let generated = &generate(&prepared()).unwrap();
-    for (block, limit) in [("receive$scan$col", COLS), ("send$scan$col", COLS), ("send$words", STATUS_BEATS)] {
+    for (block, limit) in [("receive__scan__col", COLS), ("send__scan__col", COLS), ("send__words", STATUS_BEATS)] {
         let (bits, end) = (count_bits(limit), limit - 1);
-        let given = vec![("BLOCK", format!("@TOP@${block}")), ("BITS", number(bits)), ("LIMIT", number(limit))];
+        let given = vec![("BLOCK", format!("@TOP@__{block}")), ("BITS", number(bits)), ("LIMIT", number(limit))];
         let [sound, broken] = [end, limit].map(|end| format!("last = value == {bits}'d{end};"));
         let defects = &[(sound.as_str(), broken.as_str())];
         Proof { generated, property: "counter.v", given, defects, open_products: false }.run();
@@ -164,7 +157,7 @@ fn counters_stay_below_their_limits() {
 #[test]
 fn bytes_of_the_link_read_back() {
     let generated = &generate_board(&model("")).unwrap();
-    let given = vec![("BLOCK", block_with(generated, "(clk,rst,content,border,content_valid,"))];
+    let given = vec![("BLOCK", "@TOP@__link__encoder".into())];
     let defects = &[("second <= special && !second;", "second <= special;")];
     Proof { generated, property: "slip.v", given, defects, open_products: false }.run();
 }
@@ -172,15 +165,17 @@ fn bytes_of_the_link_read_back() {
 #[test]
 fn the_frame_ingress_keeps_what_it_offers_and_gives_the_engine_good_frames_only() {
     let generated = &generate_board(&model("")).unwrap();
-    let verilog = generated.files.iter().find(|file| file.name.ends_with(".v")).unwrap();
-    let modules = verilog.text.lines().filter_map(|line| line.strip_prefix("module ")?.split('(').next());
-    let block = modules.into_iter().find(|name| name.ends_with("$ingress")).unwrap().to_string();
     let taxels = ROWS * COLS;
     let defects = [
         // An offered code is dropped with its packet; one code is buffered instead of two.
         ("fill <= drop ? {1'b0, waits} :", "fill <= drop ? 2'd0 :"),
         ("delivered != 3'd3", "delivered != 3'd4"),
     ];
-    let given = vec![("BLOCK", block), ("BITS", number(8)), ("BYTES", number(taxels)), ("LAST", number(taxels - 1))];
+    let given = vec![
+        ("BLOCK", "@TOP@__link__ingress".into()),
+        ("BITS", number(8)),
+        ("BYTES", number(taxels)),
+        ("LAST", number(taxels - 1)),
+    ];
     Proof { generated, property: "frame_ingress.v", given, defects: &defects, open_products: false }.run();
 }

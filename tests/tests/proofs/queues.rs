@@ -9,7 +9,7 @@ use dermis_hdl::primitives::QUEUE_PLACES;
 use dermis_hdl::{generate, Generated};
 
 use super::prover::{number, Proof};
-use super::{block_with, model, COLS, ROWS};
+use super::{model, COLS, ROWS};
 
 /// Widths of the rescaler's words.
 fn widths() -> (Generated, Vec<(&'static str, String)>, usize) {
@@ -45,9 +45,9 @@ fn rescaled_words_are_rounded_and_held_to_their_range() {
 fn rows_that_wait_for_their_shift_come_out_in_order() {
     let (generated, given, _) = widths();
     let defects = [
-        ("replay$enable = replaying$q;", "replay$enable = 1'b0;"),
-        ("raw$write_address = rows$value;", "raw$write_address = ~rows$value;"),
-        ("enters = read$then | (quad_valid & ~collecting$q);", "enters = read$then | quad_valid;"),
+        ("replay__enable = replaying__q;", "replay__enable = 1'b0;"),
+        ("raw__write_address = rows__value;", "raw__write_address = ~rows__value;"),
+        ("enters = read__then || quad_valid && !collecting__q;", "enters = read__then || quad_valid;"),
     ];
     Proof { generated: &generated, property: "replay.v", given, defects: &defects, open_products: false }.run();
 }
@@ -89,7 +89,7 @@ fn the_link_takes_and_gives_each_byte_once() {
     let generated = &generate_board(&model).unwrap();
     let [(_, _), (_, resultants), (_, forces)] = payloads(&model);
     let packer = vec![
-        ("BLOCK", block_with(generated, "(clk,rst,offer,number,offered_source,")),
+        ("BLOCK", "@TOP@__link__packer".into()),
         ("IDENTITY", number(Identity::BYTES)),
         ("COUNTERS", number(Counters::BYTES)),
         ("RESULTANTS", number(resultants)),
@@ -103,10 +103,7 @@ fn the_link_takes_and_gives_each_byte_once() {
         ("!crc_busy && (!wanted || word_valid)", "(!wanted || word_valid)"),
     ];
     Proof { generated, property: "packer.v", given: packer, defects: &defects, open_products: false }.run();
-    let both = vec![
-        ("ENCODER", block_with(generated, "(clk,rst,content,border,content_valid,")),
-        ("DECODER", block_with(generated, "(clk,rst,data,valid,broken,content,")),
-    ];
+    let both = vec![("ENCODER", "@TOP@__link__encoder".into()), ("DECODER", "@TOP@__link__decoder".into())];
     let defects = [
         ("data[0] ? 8'd219 : 8'd192", "data[0] ? 8'd192 : 8'd219"),
         // Defect: an IDLE between an escape and the next byte ends the escape.
@@ -119,7 +116,7 @@ fn the_link_takes_and_gives_each_byte_once() {
 fn sums_come_before_the_status() {
     let generated = &generate_board(&model("")).unwrap();
     let given = vec![
-        ("BLOCK", block_with(generated, "(clk,rst,run,taken,summarise,beat,")),
+        ("BLOCK", "@TOP@__link__resultants".into()),
         ("TAXELS", number(ROWS * COLS)),
         ("LAST", number(ROWS * COLS + STATUS_BEATS - 1)),
         ("MOST", number(ROWS.max(COLS) + 1)),

@@ -1,0 +1,208 @@
+//! The modules of a design: every block with its ports, its kernel and the blocks inside it.
+//!
+//! rust-hdl's probe visits the blocks. A block that only connects others gets its kernel from its `#[hdl_gen]` text, so
+//! that all modules are printed, checked and estimated in the same way.
+
+use std::cell::RefCell;
+use std::collections::BTreeMap;
+use std::fmt::Write as _;
+use std::sync::Arc;
+
+use rust_hdl::core::probe::Probe;
+use rust_hdl::prelude::*;
+
+use super::error::KernelError;
+use super::kernel::{Kernel, Role};
+use super::verilog::range;
+use super::wiring::{wiring, Pin};
+
+/// Between the levels of the name of a module or a net. Not rust-hdl's `$`, which Tcl, XDC and VHDL do not take.
+pub const SEPARATOR: &str = "__";
+
+thread_local! {
+    /// The kernels of bodies that a probe has visited since its last scope began or ended.
+    static VISITED: RefCell<Option<Arc<Kernel>>> = const { RefCell::new(None) };
+}
+
+/// Tells the probe that walks the design that the current block has this kernel.
+pub(super) fn visit(kernel: &Arc<Kernel>) {
+    VISITED.set(Some(kernel.clone()));
+}
+
+/// A block of a design.
+#[derive(Debug)]
+struct Module {
+    /// Names of the instances that lead to it from the top, none for the top.
+    path: Vec<String>,
+    ports: Vec<Pin>,
+    locals: Vec<Pin>,
+    /// Ports of the blocks inside, as they are called in this module.
+    inner: Vec<Pin>,
+    /// Instance and ports of the blocks inside.
+    children: Vec<(String, Vec<String>)>,
+    code: Verilog,
+    kernel: Option<Arc<Kernel>>,
+}
+
+impl Module {
+    fn new(path: Vec<String>, code: Verilog) -> Self {
+        let (ports, locals, inner) = Default::default();
+        Module { path, ports, locals, inner, children: Vec::new(), code, kernel: None }
+    }
+}
+
+/// All blocks of a design.
+#[derive(Debug)]
+pub struct Hierarchy {
+    /// By their path.
+    modules: BTreeMap<String, Module>,
+}
+
+/// Attributes of memories by the path of their block and their name in it.
+pub type Attributes = BTreeMap<(String, String), String>;
+
+impl Hierarchy {
+    /// The blocks of `design`.
+    pub fn of(design: &dyn Block) -> Self {
+        VISITED.take();
+        let mut collector = Collector::default();
+        design.accept("", &mut collector);
+        let modules = collector.done.into_iter().map(|module| (module.path.join(SEPARATOR), module)).collect();
+        Hierarchy { modules }
+    }
+
+    /// The kernel of every block by its path: the instances from the top, levels separated by [`SEPARATOR`].
+    pub fn kernels(&self) -> impl Iterator<Item = (&str, &Kernel)> {
+        self.modules.iter().filter_map(|(path, module)| Some((path.as_str(), module.kernel.as_deref()?)))
+    }
+
+    /// # Errors
+    /// The first defect of one of the kernels.
+    pub fn check(&self) -> Result<(), KernelError> {
+        let without = self.modules.iter().find(|(_, module)| module.kernel.is_none());
+        if let Some((path, _)) = without {
+            return Err(KernelError::Wiring { block: path.clone(), what: "the block".into(), reason: "has no kernel" });
+        }
+        if let Some(error) = self.kernels().flat_map(|(_, kernel)| kernel.errors()).next() {
+            return Err(error.clone());
+        }
+        for (path, module) in &self.modules {
+            let kernel = module.kernel.as_deref().into_iter();
+            let lacks = |kernel: &Kernel, pin: &Pin| {
+                let signal = kernel.signal_of(&pin.name).map(|id| &kernel.signals[id]);
+                kernel.clock.as_deref() != Some(&pin.name) && signal.is_none_or(|signal| signal.output != pin.driven)
+            };
+            let pin = kernel.flat_map(|kernel| module.ports.iter().chain(&module.inner).find(|pin| lacks(kernel, pin)));
+            if let Some(Pin { name, .. }) = pin.into_iter().next() {
+                let reason = "is not in the kernel, or in the other direction";
+                return Err(KernelError::Wiring { block: path.clone(), what: name.clone(), reason });
+            }
+        }
+        Ok(())
+    }
+
+    /// The Verilog of all blocks, with the top module `top`, and `attributes` in front of memories.
+    pub fn verilog(&self, top: &str, attributes: &Attributes) -> String {
+        let name = |path: &str| match path {
+            "" => top.to_owned(),
+            path => format!("{top}{SEPARATOR}{path}"),
+        };
+        let mut text = String::new();
+        for (path, module) in &self.modules {
+            let Some(kernel) = &module.kernel else { continue };
+            let own = |((block, array), attribute): (&(String, String), &String)| {
+                (block == path).then(|| (array.clone(), attribute.clone()))
+            };
+            let body = kernel.verilog_with(&attributes.iter().filter_map(own).collect());
+            let mut lines: Vec<String> = Vec::new();
+            lines.extend(module.inner.iter().map(|pin| format!("wire {}{};", range(pin.bits), pin.name)));
+            lines.extend(body.lines().map(str::to_owned));
+            for (instance, ports) in &module.children {
+                let child = [module.path.clone(), vec![instance.clone()]].concat().join(SEPARATOR);
+                let connect = |port: &String| format!("    .{port}({instance}{SEPARATOR}{port})");
+                lines.push(format!("{} {instance} (", name(&child)));
+                lines.push(format!("{}\n);", ports.iter().map(connect).collect::<Vec<_>>().join(",\n")));
+            }
+            let _ = writeln!(text, "{}", kernel.header(&name(path), module.ports.iter().map(|pin| &*pin.name)));
+            lines.iter().flat_map(|line| line.lines()).for_each(|line| {
+                let _ = writeln!(text, "{}", format!("    {line}").trim_end());
+            });
+            let _ = writeln!(text, "endmodule\n");
+        }
+        text
+    }
+}
+
+impl Kernel {
+    /// The head of a module of this name with these ports, in this order.
+    pub(super) fn header<'a>(&self, name: &str, ports: impl Iterator<Item = &'a str>) -> String {
+        let port = |port: &str| {
+            let Some(signal) = self.signal_of(port).map(|id| &self.signals[id]) else {
+                return format!("    input wire {port}");
+            };
+            let kind = match &signal.role {
+                Role::Input => "input wire",
+                Role::Wire { .. } => "output wire",
+                Role::Register(_) => "output reg",
+            };
+            format!("    {kind} {}{port}", range(signal.ty.bits))
+        };
+        format!("module {name} (\n{}\n);", ports.map(port).collect::<Vec<_>>().join(",\n"))
+    }
+}
+
+/// Collects the blocks of a design.
+#[derive(Default)]
+struct Collector {
+    open: Vec<Module>,
+    done: Vec<Module>,
+}
+
+impl Collector {
+    /// Gives the kernel that was visited last to the current block.
+    fn keep(&mut self) {
+        if let (Some(kernel), Some(module)) = (VISITED.take(), self.open.last_mut()) {
+            module.kernel = Some(kernel);
+        }
+    }
+}
+
+impl Probe for Collector {
+    fn visit_start_scope(&mut self, name: &str, node: &dyn Block) {
+        self.keep();
+        let outer = self.open.last().map(|module| module.path.clone());
+        let path = outer.map_or(Vec::new(), |path| [path, vec![name.replace('$', SEPARATOR)]].concat());
+        self.open.push(Module::new(path, node.hdl()));
+    }
+
+    fn visit_atom(&mut self, name: &str, signal: &dyn Atom) {
+        let Some(module) = self.open.last_mut() else { return };
+        let driven = !matches!(signal.kind(), AtomKind::InputParameter | AtomKind::Constant);
+        let value = (signal.kind() == AtomKind::Constant).then(|| signal.verilog().as_usize() as u64);
+        let pin = Pin { name: name.to_owned(), bits: signal.bits(), driven, value };
+        match signal.kind() {
+            AtomKind::InputParameter | AtomKind::OutputParameter => module.ports.push(pin),
+            _ => module.locals.push(pin),
+        }
+    }
+
+    fn visit_end_scope(&mut self, _name: &str, _node: &dyn Block) {
+        self.keep();
+        let Some(mut module) = self.open.pop() else { return };
+        if let Verilog::Combinatorial(code) = &module.code {
+            let pins: Vec<Pin> = module.ports.iter().chain(&module.inner).cloned().collect();
+            module.kernel = Some(Arc::new(wiring(&module.path.join(SEPARATOR), &pins, &module.locals, code)));
+        }
+        if let (Some(outer), Some(instance)) = (self.open.last_mut(), module.path.last()) {
+            let called = |pin: &Pin| Pin {
+                name: format!("{instance}{SEPARATOR}{}", pin.name),
+                bits: pin.bits,
+                driven: !pin.driven,
+                value: None,
+            };
+            outer.inner.extend(module.ports.iter().map(called));
+            outer.children.push((instance.clone(), module.ports.iter().map(|pin| pin.name.clone()).collect()));
+        }
+        self.done.push(module);
+    }
+}

@@ -1,0 +1,187 @@
+//! The kernel of a block that connects others: from the assignments that `#[hdl_gen]` reads off its `update`.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use rust_hdl::core::ast::{
+    VerilogBlock, VerilogBlockOrConditional, VerilogExpression, VerilogLiteral, VerilogOp, VerilogOpUnary,
+    VerilogStatement,
+};
+
+use super::build::{Builder, Net};
+use super::error::KernelError;
+use super::expression::Expr;
+use super::hierarchy::SEPARATOR;
+use super::kernel::{Kernel, Type};
+
+/// A signal of a block as it stands in the block's module: a port, a port of a block inside, or a signal of its own.
+#[derive(Clone, Debug)]
+pub(super) struct Pin {
+    pub(super) name: String,
+    pub(super) bits: usize,
+    /// The block assigns it.
+    pub(super) driven: bool,
+    /// The value of a constant.
+    pub(super) value: Option<u64>,
+}
+
+/// The kernel of the block `block` with these pins and signals of its own.
+pub(super) fn wiring(block: &str, pins: &[Pin], locals: &[Pin], code: &VerilogBlock) -> Kernel {
+    let builder = Builder::combinational(block);
+    Wiring::new(&builder, pins, locals).connect(code);
+    let mut kernel = builder.finish();
+    kernel.connects = true;
+    pins.iter().for_each(|pin| kernel.bind(&pin.name, pin.bits, pin.driven));
+    kernel
+}
+
+/// Values by the name of the assigned signal.
+type Values<'k> = BTreeMap<String, Expr<'k>>;
+
+struct Wiring<'k> {
+    builder: &'k Builder,
+    inputs: BTreeMap<String, Expr<'k>>,
+    nets: BTreeMap<String, Net<'k>>,
+}
+
+impl<'k> Wiring<'k> {
+    fn new(builder: &'k Builder, pins: &[Pin], locals: &[Pin]) -> Self {
+        let (driven, inputs): (Vec<&Pin>, Vec<&Pin>) = pins.iter().chain(locals).partition(|pin| pin.driven);
+        let input = |pin: &Pin| match pin.value {
+            Some(value) => builder.wire(&pin.name, builder.constant(pin.bits, value)),
+            None => builder.input(&pin.name, pin.bits),
+        };
+        Wiring {
+            builder,
+            inputs: inputs.iter().map(|pin| (pin.name.clone(), input(pin))).collect(),
+            nets: driven
+                .iter()
+                .map(|pin| (pin.name.clone(), builder.net(&pin.name, Type::unsigned(pin.bits))))
+                .collect(),
+        }
+    }
+
+    /// Assigns every signal once, after its last statement, so that comments stay in front of what they explain.
+    fn connect(&self, code: &VerilogBlock) {
+        let mut values = Values::new();
+        let assigned: Vec<BTreeSet<String>> = code.iter().map(|statement| self.targets(statement)).collect();
+        for (index, statement) in code.iter().enumerate() {
+            if let VerilogStatement::Comment(text) = statement {
+                self.builder.comment(text.trim());
+            }
+            self.run(statement, &mut values);
+            for name in &assigned[index] {
+                let later = assigned[index + 1..].iter().any(|names| names.contains(name));
+                if let (false, Some(net), Some(&value)) = (later, self.nets.get(name), values.get(name)) {
+                    net.set(value);
+                }
+            }
+        }
+    }
+
+    fn targets(&self, statement: &VerilogStatement) -> BTreeSet<String> {
+        let of = |block: &VerilogBlock| block.iter().flat_map(|statement| self.targets(statement)).collect();
+        match statement {
+            VerilogStatement::Assignment(VerilogExpression::Signal(name), _) => BTreeSet::from([plain(name)]),
+            VerilogStatement::Macro(block) => of(block),
+            VerilogStatement::If(choice) => {
+                let mut names: BTreeSet<String> = of(&choice.then);
+                match &choice.otherwise {
+                    VerilogBlockOrConditional::Block(block) => names.append(&mut of(block)),
+                    VerilogBlockOrConditional::Conditional(statement) => names.append(&mut self.targets(statement)),
+                    VerilogBlockOrConditional::None => {}
+                }
+                names
+            }
+            _ => BTreeSet::new(),
+        }
+    }
+
+    fn run(&self, statement: &VerilogStatement, values: &mut Values<'k>) {
+        match statement {
+            VerilogStatement::Assignment(VerilogExpression::Signal(name), value) => {
+                let name = plain(name);
+                if !self.nets.contains_key(&name) {
+                    self.fail(&name, "is not assigned by this block");
+                }
+                values.insert(name, self.value(value));
+            }
+            VerilogStatement::Macro(block) => block.iter().for_each(|statement| self.run(statement, values)),
+            VerilogStatement::If(choice) => {
+                let condition = self.value(&choice.test);
+                let (mut then, mut otherwise) = (values.clone(), values.clone());
+                choice.then.iter().for_each(|statement| self.run(statement, &mut then));
+                match &choice.otherwise {
+                    VerilogBlockOrConditional::Block(block) => {
+                        block.iter().for_each(|statement| self.run(statement, &mut otherwise));
+                    }
+                    VerilogBlockOrConditional::Conditional(statement) => self.run(statement, &mut otherwise),
+                    VerilogBlockOrConditional::None => {}
+                }
+                for name in self.targets(statement) {
+                    let value = match (then.get(&name), otherwise.get(&name)) {
+                        (Some(a), Some(b)) if a.is_same(*b) => *a,
+                        (Some(a), Some(b)) => condition.mux(*a, *b),
+                        _ => {
+                            self.fail(&name, "has no value under one of two conditions");
+                            continue;
+                        }
+                    };
+                    values.insert(name, value);
+                }
+            }
+            VerilogStatement::Comment(_) => {}
+            other => self.fail(&format!("{other:?}"), UNKNOWN),
+        }
+    }
+
+    fn value(&self, expression: &VerilogExpression) -> Expr<'k> {
+        match expression {
+            VerilogExpression::Signal(name) => {
+                let name = plain(name);
+                let net = || self.nets.get(&name).map(Net::get);
+                self.inputs.get(&name).copied().or_else(net).unwrap_or_else(|| {
+                    self.fail(&name, "is no signal of this block");
+                    self.builder.constant(1, 0)
+                })
+            }
+            VerilogExpression::Literal(literal) => self.builder.constant(width(literal), literal.as_usize() as u64),
+            VerilogExpression::Paren(inner) => self.value(inner),
+            VerilogExpression::Unary(VerilogOpUnary::Not, inner) => !self.value(inner),
+            VerilogExpression::Binary(a, operator, b) => {
+                let (a, b) = (self.value(a), self.value(b));
+                match operator {
+                    VerilogOp::BitAnd | VerilogOp::LogicalAnd => a & b,
+                    VerilogOp::BitOr | VerilogOp::LogicalOr => a | b,
+                    VerilogOp::BitXor => a ^ b,
+                    VerilogOp::Eq => a.equals(b),
+                    VerilogOp::Ne => a.differs(b),
+                    other => {
+                        self.fail(&format!("{other:?}"), UNKNOWN);
+                        a
+                    }
+                }
+            }
+            other => {
+                self.fail(&format!("{other:?}"), UNKNOWN);
+                self.builder.constant(1, 0)
+            }
+        }
+    }
+
+    fn fail(&self, what: &str, reason: &'static str) {
+        self.builder.fail(KernelError::Wiring { block: self.builder.block(), what: what.to_owned(), reason });
+    }
+}
+
+const UNKNOWN: &str = "belongs into a kernel: a block that connects others has assignments, conditions and logic";
+
+/// The name in the module of a signal that rust-hdl calls by its path of fields.
+fn plain(path: &str) -> String {
+    let name = path.trim_start_matches(['.', '$']).replace(['.', '$'], SEPARATOR);
+    name.strip_suffix("__next").map(str::to_owned).unwrap_or(name)
+}
+
+/// Width of a literal, which rust-hdl tells in its text only.
+fn width(literal: &VerilogLiteral) -> usize {
+    literal.to_string().split('\'').next().and_then(|bits| bits.parse().ok()).unwrap_or(1)
+}
