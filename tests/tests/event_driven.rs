@@ -186,7 +186,7 @@ fn an_undefined_register_is_found() {
     for (right, wrong, output) in defects {
         let (before, text) = good.split_at(queue);
         assert!(text.contains(right), "{right} is not in the Verilog");
-        let text = text.replacen(right, wrong, 1).replacen("reg [", "reg undefined;\n    reg [", 1);
+        let text = text.replacen(right, wrong, 1).replacen("\n    reg [", "\n    reg undefined;\n    reg [", 1);
         hardware.generated.files[0].text = format!("{before}{text}");
         let (_, undefined) = simulate(&hardware, &vectors, Stimulus::FullSpeed);
         assert!(undefined.iter().any(|(_, name)| *name == output), "{wrong} went unnoticed: {undefined:?}");

@@ -457,7 +457,7 @@ fn verilog_keeps_names_comments_and_constants() {
 reg [7:0] sum;
 reg lane_2__copy;
 // Twice the input.
-always @(*) twice = {1'b0, a} + {1'b0, a};
+assign twice = {1'b0, a} + {1'b0, a};
 (* keep *) always @(posedge clk) begin
   lane_2__copy <= a[3];
 end
@@ -483,5 +483,5 @@ fn verilog_holds_constants_and_separates_operators() {
     k.wire("four", three.plus(1));
     k.wire("none", !a.any());
     let kernel = bound(k.finish(), &[("three", 2), ("four", 2), ("none", 1)]);
-    assert_eq!(kernel.verilog(), "assign three = 2'd3;\nassign four = three + 2'd1;\nalways @(*) none = !(|a);");
+    assert_eq!(kernel.verilog(), "assign three = 2'd3;\nassign four = three + 2'd1;\nassign none = !(|a);");
 }

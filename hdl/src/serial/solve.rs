@@ -8,8 +8,6 @@
 //! ```
 //! Each step ends with [`DRAIN`] cycles, in which its last words reach their memory.
 
-use dermis_golden::fixed::arith::{bit_length, magnitude_bits, round_shift, saturate};
-use dermis_golden::fixed::coefficients::FLIP_X;
 use dermis_golden::fixed::formats::{Formats, SEARCH_EXTRA_BITS};
 use dermis_golden::fixed::resources::operand_vectors;
 use dermis_golden::fixed::schedule::{schedule, Kind, Product};
@@ -17,8 +15,10 @@ use dermis_golden::fixed::serial::{first_vector, operand_index, DRAIN, OPERAND_B
 use rust_hdl::prelude::*;
 
 use super::rounder::SHIFT_BITS;
+use crate::kernel_block;
+use crate::language::{concat, Body, Builder, Expr, Type};
 use crate::primitives::count_bits;
-use crate::wire::{Wire, Word};
+use crate::wire::Wire;
 
 /// Width of the count of saturated words, in bits.
 pub const SATURATION_BITS: usize = 16;
@@ -115,10 +115,21 @@ pub struct Solve {
     pub busy: Signal<Out, Bit>,
     /// Last cycle of the sequence.
     pub done: Signal<Out, Bit>,
-    _formats: Formats,
-    _program: Vec<Instruction>,
-    _state: State,
+    kernel: Body,
 }
+
+kernel_block!(
+    Solve,
+    clock clk,
+    inputs [
+        rst, start, magnitude, code, row_word, row_valid, raw_word, rounded, clipped, round_done, mixed, mixed_valid
+    ],
+    outputs [
+        index, raw_write, raw_write_address, raw_read_address, unrounded, round_shift, round, mix, issue, last, address,
+        low, operand_address, flip, align, write, write_address, write_lane, write_data, normalised_valid, folding,
+        rescaled_valid, unfolding, free, normalise, rescale, saturations, busy, done
+    ]
+);
 
 /// One product of the program. The operand memory holds the v_ij with their column parity inverted, as Ax needs them;
 /// for Ay both parity bits of the address are inverted.
@@ -130,29 +141,6 @@ struct Instruction {
     flip: bool,
     align: bool,
     last: bool,
-}
-
-#[derive(Clone, Copy, Debug, Default)]
-struct State {
-    step: u64,
-    draining: bool,
-    wait: u64,
-    quad: u64,
-    phase: u64,
-    column: u64,
-    gap: u64,
-    product: u64,
-    first_product: u64,
-    seen: u64,
-    length: u64,
-    normalise: u64,
-    rescale: u64,
-    saturations: u64,
-    read: [bool; 2],
-    replayed: bool,
-    written: u64,
-    vector: u64,
-    stored: u64,
 }
 
 impl Solve {
@@ -173,7 +161,7 @@ impl Solve {
             align: product.align,
             last,
         };
-        Solve {
+        let block = Solve {
             clk: Default::default(),
             rst: Default::default(),
             start: Default::default(),
@@ -216,453 +204,192 @@ impl Solve {
             saturations: Wire::new(SATURATION_BITS),
             busy: Default::default(),
             done: Default::default(),
-            _program: instructions.map(instruction).collect(),
-            _formats: formats.clone(),
-            _state: State::default(),
-        }
-    }
-
-    fn drained(&self) -> bool {
-        self._state.draining && self._state.wait == DRAIN - 1
-    }
-
-    fn clocked(&mut self) {
-        let f = &self._formats;
-        let quads = f.quads as u64;
-        let s = self._state;
-        let mut next = s;
-        let end_of_words = 4 * quads - 1;
-        next.length = u64::from(bit_length(s.seen));
-        next.read = [self.reads(), s.read[0]];
-        next.replayed = s.step == REPLAY && !s.draining && s.phase < 4;
-        if s.step == FOLD_HIGH {
-            next.normalise = u64::from(f.input_bits - 1) - s.length;
-        }
-        if s.step == FIRST {
-            next.rescale = s.length.saturating_sub(u64::from(f.vector_bits - 1));
-        }
-        if self.rescaled() && self.clipped.val() {
-            next.saturations += 1;
-        }
-        if s.step == FIRST && self.row_valid.val() {
-            next.seen |= magnitude_bits(self.row_word.val().signed(0, f.acc_bits as usize));
-            next.stored = if s.stored == end_of_words { 0 } else { s.stored + 1 };
-        }
-        if (self.is_folding() && self.mixed_valid.val()) || self.rescaled() {
-            next.written = if s.written == end_of_words { 0 } else { s.written + 1 };
-            if self.rescaled() && s.written == end_of_words {
-                next.vector += 1;
-            }
-        }
-        let last_quad = s.quad == quads - 1;
-        if s.draining {
-            next.wait = s.wait + 1;
-            if self.drained() {
-                next.draining = false;
-                next.step = match s.step {
-                    FOLD_HIGH if f.input_low_bits == 0 => FIRST,
-                    OTHERS => 0,
-                    step => step + 1,
-                };
-                if next.step == FIRST {
-                    next.seen = 0;
-                }
-            }
-        } else if self.is_folding() || s.step == REPLAY {
-            next.phase = (s.phase + 1) % 8;
-            if s.phase == 7 {
-                next.quad = if last_quad { 0 } else { s.quad + 1 };
-                next.draining = last_quad;
-            }
-        } else if s.step != 0 {
-            let last = self._program[s.product as usize].last;
-            if s.gap == 0 {
-                next.column = if s.column == quads - 1 { 0 } else { s.column + 1 };
-                if s.column == quads - 1 {
-                    if last {
-                        next.gap = 1;
-                    } else {
-                        next.product = s.product + 1;
-                    }
-                }
-            } else if s.gap == ROW_GAP {
-                next.gap = 0;
-                next.quad = if last_quad { 0 } else { s.quad + 1 };
-                next.product = if last_quad { s.product + 1 } else { s.first_product };
-                next.first_product = if last_quad { s.product + 1 } else { s.first_product };
-                next.draining = last_quad && (s.step == FIRST || s.product as usize == self._program.len() - 1);
-            } else {
-                next.gap = s.gap + 1;
-            }
-        }
-        if !s.draining {
-            next.wait = 0;
-        }
-        if s.step == 0 && self.start.val() {
-            next = State { step: FOLD_HIGH, seen: self.magnitude.val().number(), ..State::default() };
-        }
-        if self.rst.val() {
-            next.step = 0;
-            next.draining = false;
-        }
-        self._state = next;
-    }
-
-    fn is_folding(&self) -> bool {
-        matches!(self._state.step, FOLD_HIGH | FOLD_LOW)
-    }
-
-    fn reads(&self) -> bool {
-        self.is_folding() && !self._state.draining && self._state.phase < 4
-    }
-
-    fn is_unfolding(&self) -> bool {
-        matches!(self._state.step, REPLAY | OTHERS)
-    }
-
-    fn rescaled(&self) -> bool {
-        self.is_unfolding() && self.round_done.val()
-    }
-
-    /// The operand to write: a limb of a folded word, or a rescaled word rounded to `data_bits`.
-    fn operand(&self) -> i64 {
-        let f = &self._formats;
-        let low = f.input_low_bits;
-        let mixed = self.mixed.val().signed(0, self.mixed.width());
-        match self._state.step {
-            FOLD_HIGH => mixed >> low,
-            FOLD_LOW => (mixed & ((1 << low) - 1)) << (f.limb_align - low),
-            _ => {
-                let word = self.rounded.val().signed(0, self.rounded.width());
-                saturate(round_shift(word, SEARCH_EXTRA_BITS), f.data_bits).0
-            }
-        }
+            kernel: Body::default(),
+        };
+        let program: Vec<Instruction> = instructions.map(instruction).collect();
+        let k = Builder::new("solve");
+        build(&k, f, &program, unrounded, rounded);
+        block.bind(k.finish())
     }
 }
 
-impl Logic for Solve {
-    fn update(&mut self) {
-        if self.clk.pos_edge() {
-            self.clocked();
-        }
-        let f = &self._formats;
-        let s = self._state;
-        let at = 4 * s.quad + s.phase % 4;
-        let bits = count_bits(f.quads);
-        self.index.next = Word::from(at);
-        self.raw_read_address.next = Word::from(at);
-        self.raw_write.next = s.step == FIRST && self.row_valid.val();
-        self.raw_write_address.next = Word::from(s.stored);
-        let (unrounded, shift, round) = match s.step {
-            REPLAY => (self.raw_word.val().signed(0, self.raw_word.width()), s.rescale, s.replayed),
-            OTHERS => {
-                (self.row_word.val().signed(0, self.row_word.width()), u64::from(f.a_shift), self.row_valid.val())
-            }
-            _ => (self.code.val().signed(0, self.code.width()) << (f.input_bits - 1), s.length, s.read[1]),
-        };
-        self.unrounded.next = Word::of_fields(&[unrounded], self.unrounded.width());
-        self.round_shift.next = Word::from(shift);
-        self.round.next = round;
-        self.mix.next = self.round_done.val() && s.step != 0;
-        let instruction = self._program[(s.product as usize).min(self._program.len() - 1)];
-        self.issue.next = matches!(s.step, FIRST | OTHERS) && !s.draining && s.gap == 0;
-        self.last.next = instruction.last && s.column == f.quads as u64 - 1;
-        self.address.next = Word::from(((instruction.matrix as u64) << bits | s.quad) << bits | s.column);
-        self.low.next = instruction.low;
-        self.operand_address.next = Word::from((instruction.operand as u64) << bits | s.column);
-        self.flip.next = instruction.flip;
-        self.align.next = instruction.align;
-        let vector = match s.step {
-            FOLD_HIGH => 0,
-            FOLD_LOW => 1,
-            _ => first_vector(f) as u64 + s.vector,
-        };
-        let kept = s.vector < operand_vectors(f.degree) as u64;
-        self.write.next = (self.is_folding() && self.mixed_valid.val()) || (self.rescaled() && kept);
-        let mut write_address = Word::default();
-        write_address.set(0, self.write_address.width(), vector << bits | s.written >> 2);
-        self.write_address.next = write_address;
-        let stored_flip = if self.is_folding() { 0 } else { FLIP_X as u64 };
-        self.write_lane.next = Word::from(s.written & 3 ^ stored_flip);
-        self.write_data.next = Word::of_fields(&[self.operand()], OPERAND_BITS as usize);
-        self.normalised_valid.next = s.step == FOLD_HIGH && self.round_done.val();
-        self.folding.next = s.step == FOLD_HIGH;
-        self.rescaled_valid.next = self.rescaled();
-        self.unfolding.next = self.is_unfolding();
-        self.free.next = self.drained() && (s.step == FOLD_LOW || (s.step == FOLD_HIGH && f.input_low_bits == 0));
-        self.normalise.next = Word::from(s.normalise);
-        self.rescale.next = Word::from(s.rescale);
-        self.saturations.next = Word::from(s.saturations);
-        self.busy.next = s.step != 0;
-        self.done.next = self.drained() && s.step == OTHERS;
-    }
+/// The circuit for `program`; the rounder takes words of `unrounded` bits and returns words of `rounded_bits` bits.
+fn build<'k>(k: &'k Builder, f: &Formats, program: &[Instruction], unrounded: usize, rounded_bits: usize) {
+    let (quads, words) = (count_bits(f.quads), count_bits(4 * f.quads));
+    let (count, operands) = (program.len(), OPERAND_BITS as usize);
+    let pc = count_bits(count + 1);
+    let vectors = count_bits(first_vector(f) + operand_vectors(f.degree));
+    let (acc, code_bits, data) = (f.acc_bits as usize, f.input_bits as usize, f.data_bits as usize);
+    let seen_bits = acc.max(code_bits) - 1;
+    let (low, extra) = (f.input_low_bits as usize, SEARCH_EXTRA_BITS as usize);
 
-    fn connect(&mut self) {
-        let wires = [
-            &mut self.index,
-            &mut self.raw_write_address,
-            &mut self.raw_read_address,
-            &mut self.unrounded,
-            &mut self.round_shift,
-            &mut self.address,
-            &mut self.operand_address,
-            &mut self.write_address,
-            &mut self.write_lane,
-            &mut self.write_data,
-            &mut self.normalise,
-            &mut self.rescale,
-            &mut self.saturations,
+    let (rst, start, magnitude) = (k.input("rst", 1), k.input("start", 1), k.input("magnitude", code_bits - 1));
+    let (code, row_word, row_valid) = (k.input("code", code_bits), k.input("row_word", acc), k.input("row_valid", 1));
+    let (raw_word, rounded) = (k.input("raw_word", acc), k.input("rounded", rounded_bits));
+    let (clipped, round_done) = (k.input("clipped", 1), k.input("round_done", 1));
+    let (mixed, mixed_valid) = (k.input("mixed", rounded_bits + 2), k.input("mixed_valid", 1));
+
+    let register = |name: &str, bits: usize| k.register(name, Type::unsigned(bits));
+    let zero = |bits: usize| k.constant(bits, 0);
+    let step = k.state("step", Type::unsigned(3), rst, 0);
+    let draining = k.state("draining", Type::unsigned(1), rst, 0);
+    let (phase, gap, wait_count) = (register("phase", 3), register("gap", 3), register("wait_count", 4));
+    let (quad, column) = (register("quad", quads), register("column", quads));
+    let (product, first_product) = (register("product", pc), register("first_product", pc));
+    let (seen, length) = (register("seen", seen_bits), register("length", SHIFT_BITS));
+    let (read, replayed) = (register("read", 2), register("replayed", 1));
+    let (written, stored, vector) =
+        (register("written", words), register("stored", words), register("vector", vectors));
+    let (normalise, rescale) = (register("normalise", SHIFT_BITS), register("rescale", SHIFT_BITS));
+    let saturations = register("saturations", SATURATION_BITS);
+
+    // As gates: synthesis would map a table to a memory.
+    let set = |bit: &dyn Fn(&Instruction) -> bool| {
+        let terms = (0..count).filter(|&at| bit(&program[at])).map(|at| product.is(at as u64));
+        terms.reduce(|any, term| any | term).unwrap_or(zero(1))
+    };
+    let field = |bits: usize, of: &dyn Fn(&Instruction) -> usize| {
+        let bits: Vec<Expr> = (0..bits).rev().map(|bit| set(&|i| of(i) >> bit & 1 == 1)).collect();
+        concat(&bits)
+    };
+    let wraps = |count: Expr<'k>, last: usize| count.is(last as u64);
+    let is = |number: u64| step.is(number);
+
+    let row_folding = k.wire("row_folding", is(FOLD_HIGH) | is(FOLD_LOW));
+    let unfolding = k.wire("unfolding", is(REPLAY) | is(OTHERS));
+    let rescaled = k.wire("rescaled", unfolding & round_done);
+    let drained = k.wire("drained", *draining & wait_count.is(DRAIN - 1));
+    let last_quad = k.wire("last_quad", wraps(*quad, f.quads - 1));
+    let last_column = k.wire("last_column", wraps(*column, f.quads - 1));
+    let row_last = k.wire("row_last", set(&|i| i.last));
+    let next_product = k.wire("next_product", product.plus(1));
+    let place = k.wire("place", quad.concat(phase.low(2)));
+    let folded = k.wire("folded", row_folding & mixed_valid);
+    let row_magnitude = k.wire("row_magnitude", row_word.low(acc - 1) ^ row_word.top().repeat(acc - 1));
+    k.comment("Binary search for the leading one.");
+    let (mut rest, mut leading) = (seen.resize(64), Vec::new());
+    for half in [32, 16, 8, 4, 2] {
+        let upper = rest.slice(half, half);
+        leading.push(upper.any());
+        rest = upper.any().mux(upper, rest.low(half));
+    }
+    leading.push(rest.at(1));
+    let seen_length = k.wire("seen_length", (concat(&leading) + rest.any()).low(SHIFT_BITS));
+
+    length.set(seen_length);
+    let runs = !*draining & !phase.at(2);
+    read.set(read.at(0).concat(row_folding & runs));
+    replayed.set(is(REPLAY) & runs);
+    k.when(is(FOLD_HIGH), || {
+        normalise.set((k.constant(SHIFT_BITS, u64::from(f.input_bits - 1)) - *length).low(SHIFT_BITS));
+    });
+    let full = k.constant(SHIFT_BITS, u64::from(f.vector_bits - 1));
+    k.when(is(FIRST), || rescale.set(full.less(*length).mux((*length - full).low(SHIFT_BITS), zero(SHIFT_BITS))));
+    k.when(rescaled & clipped, || saturations.set(saturations.plus(1)));
+    k.when(is(FIRST) & row_valid, || {
+        seen.set(*seen | row_magnitude.resize(seen_bits));
+        stored.set(wraps(*stored, 4 * f.quads - 1).mux(zero(words), stored.plus(1)));
+    });
+    k.when(folded | rescaled, || {
+        let end = wraps(*written, 4 * f.quads - 1);
+        written.set(end.mux(zero(words), written.plus(1)));
+        // The vectors of the highest degree are not kept: the count stays at their first.
+        k.when(rescaled & end & !vector.is(operand_vectors(f.degree) as u64), || vector.set(vector.plus(1)));
+    });
+    wait_count.set(draining.mux(wait_count.plus(1), zero(4)));
+    let (after_fold, freed) = if low == 0 { (FIRST, FOLD_HIGH) } else { (FOLD_LOW, FOLD_LOW) };
+    k.when(drained, || {
+        draining.set(zero(1));
+        step.set(is(FOLD_HIGH).mux(k.constant(3, after_fold), is(OTHERS).mux(zero(3), step.plus(1))));
+        k.when(is(freed), || seen.set(zero(seen_bits)));
+    });
+    k.when(!*draining & (row_folding | is(REPLAY)), || {
+        phase.set(phase.plus(1));
+        k.when(phase.all(), || {
+            quad.set(last_quad.mux(zero(quads), quad.plus(1)));
+            draining.set(last_quad);
+        });
+    });
+    let multiplies = is(FIRST) | is(OTHERS);
+    k.when(!*draining & multiplies, || {
+        k.when(gap.is(0), || {
+            column.set(last_column.mux(zero(quads), column.plus(1)));
+            k.when(last_column & row_last, || gap.set(k.constant(3, 1)));
+            k.when(last_column & !row_last, || product.set(next_product));
+        });
+        k.when(gap.is(ROW_GAP), || {
+            gap.set(zero(3));
+            quad.set(last_quad.mux(zero(quads), quad.plus(1)));
+            product.set(last_quad.mux(next_product, *first_product));
+            k.when(last_quad, || first_product.set(next_product));
+            draining.set(last_quad & (is(FIRST) | product.is(count as u64 - 1)));
+        });
+        k.when(!gap.is(0) & !gap.is(ROW_GAP), || gap.set(gap.plus(1)));
+    });
+    k.when(is(0) & start, || {
+        step.set(k.constant(3, FOLD_HIGH));
+        draining.set(zero(1));
+        seen.set(magnitude.resize(seen_bits));
+        let cleared = [
+            phase,
+            gap,
+            quad,
+            column,
+            product,
+            first_product,
+            length,
+            saturations,
+            read,
+            replayed,
+            written,
+            stored,
+            vector,
+            normalise,
+            rescale,
         ];
-        wires.into_iter().for_each(Wire::connect);
-        let bits = [
-            &mut self.raw_write,
-            &mut self.round,
-            &mut self.mix,
-            &mut self.issue,
-            &mut self.last,
-            &mut self.low,
-            &mut self.align,
-            &mut self.flip,
-            &mut self.write,
-            &mut self.normalised_valid,
-            &mut self.folding,
-            &mut self.rescaled_valid,
-            &mut self.unfolding,
-            &mut self.free,
-            &mut self.busy,
-            &mut self.done,
-        ];
-        bits.into_iter().for_each(Signal::connect);
-    }
+        cleared.iter().for_each(|register| register.set(zero(register.bits())));
+    });
 
-    fn hdl(&self) -> Verilog {
-        let f = &self._formats;
-        let (quads, words) = (count_bits(f.quads), count_bits(4 * f.quads));
-        let count = self._program.len();
-        let pc = count_bits(count + 1);
-        let vectors = self.write_address.width() - quads;
-        // As gates: synthesis would map a table to a memory.
-        let set = |bit: &dyn Fn(&Instruction) -> bool| {
-            let terms: Vec<String> =
-                (0..count).filter(|&at| bit(&self._program[at])).map(|at| format!("product == {pc}'d{at}")).collect();
-            if terms.is_empty() {
-                "1'b0".to_string()
-            } else {
-                format!("({})", terms.join(" || "))
-            }
-        };
-        let field = |bits: usize, of: &dyn Fn(&Instruction) -> usize| {
-            let bits: Vec<String> = (0..bits).rev().map(|bit| set(&|i| of(i) >> bit & 1 == 1)).collect();
-            format!("{{{}}}", bits.join(", "))
-        };
-        let (acc, seen) = (f.acc_bits as usize, f.acc_bits.max(f.input_bits) as usize - 1);
-        let unrounded = self.unrounded.width();
-        let low = f.input_low_bits as usize;
-        let mixed = self.mixed.width();
-        let operand = OPERAND_BITS as usize;
-        let data = f.data_bits as usize;
-        let high_limb = if low + operand > mixed {
-            format!("{{{{{}{{mixed[{}]}}}}, mixed[{}:{low}]}}", low + operand - mixed, mixed - 1, mixed - 1)
-        } else {
-            format!("mixed[{}:{low}]", low + operand - 1)
-        };
-        let align = (f.limb_align as usize).saturating_sub(low);
-        let low_limb = match (low, align) {
-            (0, _) => high_limb.clone(),
-            (_, 0) => format!("{{{}'d0, mixed[{}:0]}}", operand - low, low - 1),
-            _ => format!("{{{}'d0, mixed[{}:0], {align}'d0}}", operand - low - align, low - 1),
-        };
-        let extra = SEARCH_EXTRA_BITS as usize;
-        let after_fold = if low == 0 { "3'd3" } else { "3'd2" };
-        let freed = if low == 0 { "3'd1" } else { "3'd2" };
-        let code = f.input_bits as usize;
-        let code_word = format!("{{{{{}{{code[{}]}}}}, code, {}'d0}}", unrounded - 2 * code + 1, code - 1, code - 1);
-        Verilog::Custom(format!(
-            "\
-reg [2:0] step, phase, gap;
-reg draining;
-reg [3:0] wait_count;
-reg [{qe}:0] quad, column;
-reg [{pe}:0] product, first_product;
-reg [{se}:0] seen;
-reg [5:0] length;
-reg [1:0] read;
-reg replayed;
-reg [{we}:0] written, stored;
-reg [{ve}:0] vector;
-wire row_folding = step == 3'd1 || step == 3'd2;
-wire rescaled = unfolding && round_done;
-wire drained = draining && wait_count == 4'd{drain};
-wire last_quad = quad == {quads}'d{last_quad};
-wire last_column = column == {quads}'d{last_quad};
-wire row_last = {row_last};
-wire [{pe}:0] next_product = product + {pc}'d1;
-wire [{we}:0] place = {{quad, phase[1:0]}};
-wire folded = row_folding && mixed_valid;
-wire [{acc_less}:0] row_magnitude = row_word[{acc_less}:0] ^ {{{acc_end}{{row_word[{acc_end}]}}}};
-// Binary search for the leading one.
-wire [63:0] whole = {{{seen_fill}'d0, seen}};
-wire [31:0] half = |whole[63:32] ? whole[63:32] : whole[31:0];
-wire [15:0] quarter = |half[31:16] ? half[31:16] : half[15:0];
-wire [7:0] byte_left = |quarter[15:8] ? quarter[15:8] : quarter[7:0];
-wire [3:0] nibble = |byte_left[7:4] ? byte_left[7:4] : byte_left[3:0];
-wire [1:0] pair = |nibble[3:2] ? nibble[3:2] : nibble[1:0];
-wire [5:0] leading = {{|whole[63:32], |half[31:16], |quarter[15:8], |byte_left[7:4], |nibble[3:2], pair[1]}};
-wire [5:0] seen_length = leading + {{5'd0, |pair}};
-always @(posedge clk) begin
-  length <= seen_length;
-  read <= {{read[0], row_folding && !draining && !phase[2]}};
-  replayed <= step == 3'd4 && !draining && !phase[2];
-  if (step == 3'd1) normalise <= 6'd{most} - length;
-  if (step == 3'd3) rescale <= length > 6'd{vector_less} ? length - 6'd{vector_less} : 6'd0;
-  if (rescaled && clipped) saturations <= saturations + {saturation_bits}'d1;
-  if (step == 3'd3 && row_valid) begin
-    seen <= seen | {row_seen};
-    stored <= stored == {words}'d{last_word} ? {words}'d0 : stored + {words}'d1;
-  end
-  if (folded || rescaled) begin
-    written <= written == {words}'d{last_word} ? {words}'d0 : written + {words}'d1;
-    if (rescaled && written == {words}'d{last_word} && vector != {vectors}'d{kept}) vector <= vector + {vectors}'d1;
-  end
-  wait_count <= draining ? wait_count + 4'd1 : 4'd0;
-  if (draining) begin
-    if (drained) begin
-      draining <= 1'b0;
-      step <= step == 3'd1 ? {after_fold} : step == 3'd5 ? 3'd0 : step + 3'd1;
-      if (step == {freed}) seen <= {seen}'d0;
-    end
-  end else if (row_folding || step == 3'd4) begin
-    phase <= phase + 3'd1;
-    if (phase == 3'd7) begin
-      quad <= last_quad ? {quads}'d0 : quad + {quads}'d1;
-      draining <= last_quad;
-    end
-  end else if (step != 3'd0) begin
-    if (gap == 3'd0) begin
-      column <= last_column ? {quads}'d0 : column + {quads}'d1;
-      if (last_column && row_last) gap <= 3'd1;
-      else if (last_column) product <= next_product;
-    end else if (gap == 3'd{row_gap}) begin
-      gap <= 3'd0;
-      quad <= last_quad ? {quads}'d0 : quad + {quads}'d1;
-      product <= last_quad ? next_product : first_product;
-      if (last_quad) first_product <= next_product;
-      draining <= last_quad && (step == 3'd3 || product == {pc}'d{last_product});
-    end else gap <= gap + 3'd1;
-  end
-  if (step == 3'd0 && start) begin
-    step <= 3'd1;
-    phase <= 3'd0;
-    gap <= 3'd0;
-    draining <= 1'b0;
-    quad <= {quads}'d0;
-    column <= {quads}'d0;
-    product <= {pc}'d0;
-    first_product <= {pc}'d0;
-    seen <= {magnitude};
-    length <= 6'd0;
-    saturations <= {saturation_bits}'d0;
-    read <= 2'd0;
-    replayed <= 1'b0;
-    written <= {words}'d0;
-    stored <= {words}'d0;
-    vector <= {vectors}'d0;
-    normalise <= 6'd0;
-    rescale <= 6'd0;
-  end
-  if (rst) begin
-    step <= 3'd0;
-    draining <= 1'b0;
-  end
-end
-// Adds half an LSB of the operand; only the largest positive values can overflow.
-wire [{data_end}:0] nearest = (!rounded[{top}] && &rounded[{below}:{half}]) ? {{1'b0, {{{data_less}{{1'b1}}}}}}
-  : rounded[{top}:{extra}] + {{{data_less}'d0, rounded[{half}]}};
-wire [{operand_end}:0] rescaled_operand = {extended_operand};
-wire unused = &{{1'b0, rounded[{unused_end}:0]}};
-always @(*) begin
-  index = place;
-  raw_read_address = place;
-  raw_write = step == 3'd3 && row_valid;
-  raw_write_address = stored;
-  case (step)
-    3'd4: begin unrounded = {raw}; round_shift = rescale; round = replayed; end
-    3'd5: begin unrounded = {row}; round_shift = 6'd{a_shift}; round = row_valid; end
-    default: begin unrounded = {code_word}; round_shift = length; round = read[1]; end
-  endcase
-  mix = round_done && step != 3'd0;
-  issue = (step == 3'd3 || step == 3'd5) && !draining && gap == 3'd0;
-  last = row_last && last_column;
-  address = {{{matrix}, quad, column}};
-  low = {is_low};
-  operand_address = {{{operand_vector}, column}};
-  flip = {flips};
-  align = {aligned};
-  write = folded || (rescaled && vector < {vectors}'d{kept});
-  write_address = {{step == 3'd1 ? {vectors}'d0 : step == 3'd2 ? {vectors}'d1 : vector + {vectors}'d{first}, written[{we}:2]}};
-  write_lane = {{written[1], written[0] ^ !row_folding}};
-  write_data = step == 3'd1 ? {high_limb} : step == 3'd2 ? {low_limb} : rescaled_operand;
-  normalised_valid = step == 3'd1 && round_done;
-  folding = step == 3'd1;
-  rescaled_valid = rescaled;
-  unfolding = step == 3'd4 || step == 3'd5;
-  free = drained && step == {freed};
-  busy = step != 3'd0;
-  done = drained && step == 3'd5;
-end",
-            qe = quads - 1,
-            pe = pc - 1,
-            se = seen - 1,
-            seen_fill = 64 - seen,
-            we = words - 1,
-            ve = vectors - 1,
-            drain = DRAIN - 1,
-            last_quad = f.quads - 1,
-            last_word = 4 * f.quads - 1,
-            row_last = set(&|i| i.last),
-            acc_less = acc - 2,
-            acc_end = acc - 1,
-            unused_end = SEARCH_EXTRA_BITS - 2,
-            most = f.input_bits - 1,
-            vector_less = f.vector_bits - 1,
-            saturation_bits = SATURATION_BITS,
-            row_seen = padded("row_magnitude", acc - 1, seen),
-            row_gap = ROW_GAP,
-            last_product = count - 1,
-            magnitude = padded("magnitude", code - 1, seen),
-            operand_end = operand - 1,
-            raw = extended("raw_word", acc, unrounded),
-            row = extended("row_word", acc, unrounded),
-            a_shift = f.a_shift,
-            matrix = field(2, &|i| i.matrix),
-            is_low = set(&|i| i.low),
-            operand_vector = field(vectors, &|i| i.operand),
-            flips = set(&|i| i.flip),
-            aligned = set(&|i| i.align),
-            kept = operand_vectors(f.degree),
-            first = first_vector(f),
-            data_end = data - 1,
-            data_less = data - 1,
-            top = data + extra - 1,
-            below = data + extra - 2,
-            half = extra - 1,
-            extended_operand = extended("nearest", data, operand),
-        ))
-    }
-}
+    k.comment("Adds half an LSB of the operand; only the largest positive values can overflow.");
+    let (top, half) = (data + extra - 1, extra - 1);
+    let most = zero(1).concat(k.constant(1, 1).repeat(data - 1));
+    let overflows = !rounded.at(top) & rounded.slice(half, top - half).all();
+    let nearest = (rounded.slice(extra, data) + rounded.at(half)).low(data);
+    let nearest = k.wire("nearest", overflows.mux(most, nearest));
+    let wide = |word: Expr<'k>, bits: usize| word.signed().resize(bits).unsigned();
+    let high_limb = wide(mixed.slice(low, (mixed.bits() - low).min(operands)), operands);
+    let align = (f.limb_align as usize).saturating_sub(low);
+    let low_limb = if low == 0 { high_limb } else { mixed.low(low).shift_left(align).resize(operands) };
 
-/// Verilog that sign-extends `signal` of `bits` bits to `wide` bits.
-pub(super) fn extended(signal: &str, bits: usize, wide: usize) -> String {
-    match wide - bits {
-        0 => signal.to_string(),
-        more => format!("{{{{{more}{{{signal}[{}]}}}}, {signal}}}", bits - 1),
-    }
-}
-
-/// Verilog that zero-extends `signal` of `bits` bits to `wide` bits.
-pub(super) fn padded(signal: &str, bits: usize, wide: usize) -> String {
-    match wide - bits {
-        0 => signal.to_string(),
-        more => format!("{{{more}'d0, {signal}}}"),
-    }
+    k.wire("index", place);
+    k.wire("raw_read_address", place);
+    k.wire("raw_write", is(FIRST) & row_valid);
+    k.wire("raw_write_address", *stored);
+    let from = |replay, others, fold| is(REPLAY).mux(replay, is(OTHERS).mux(others, fold));
+    let code_word = code.signed().shift_left(code_bits - 1).resize(unrounded).unsigned();
+    k.wire("unrounded", from(wide(raw_word, unrounded), wide(row_word, unrounded), code_word));
+    k.wire("round_shift", from(*rescale, k.constant(SHIFT_BITS, u64::from(f.a_shift)), *length));
+    k.wire("round", from(*replayed, row_valid, read.at(1)));
+    let busy = k.wire("busy", step.any());
+    k.wire("mix", round_done & busy);
+    k.wire("issue", multiplies & !*draining & gap.is(0));
+    k.wire("last", row_last & last_column);
+    k.wire("address", concat(&[field(2, &|i| i.matrix), *quad, *column]));
+    k.wire("low", set(&|i| i.low));
+    k.wire("operand_address", field(vectors, &|i| i.operand).concat(*column));
+    k.wire("flip", set(&|i| i.flip));
+    k.wire("align", set(&|i| i.align));
+    let kept = vector.less(k.constant(vectors, operand_vectors(f.degree) as u64));
+    k.wire("write", folded | rescaled & kept);
+    let target =
+        is(FOLD_HIGH).mux(zero(vectors), is(FOLD_LOW).mux(k.constant(vectors, 1), vector.plus(first_vector(f) as u64)));
+    k.wire("write_address", target.concat(written.slice(2, words - 2)));
+    k.wire("write_lane", written.at(1).concat(written.at(0) ^ !row_folding));
+    let operand = is(FOLD_HIGH).mux(high_limb, is(FOLD_LOW).mux(low_limb, wide(nearest, operands)));
+    k.wire("write_data", operand);
+    k.wire("normalised_valid", is(FOLD_HIGH) & round_done);
+    k.wire("folding", is(FOLD_HIGH));
+    k.wire("rescaled_valid", rescaled);
+    k.wire("free", drained & is(freed));
+    k.wire("done", drained & is(OTHERS));
 }

@@ -157,7 +157,8 @@ mod tests {
 
     #[test]
     fn outputs_are_those_of_the_chosen_bank() {
-        let text = "name = \"banks\"\nsensor = \"sensor-1\"\n[partition]\ncases = [0, 1]\n";
+        let text = "name = \"banks\"\n[sensor]\nrows = 8\ncols = 8\npitch_x_mm = 2.0\npitch_y_mm = 2.0\n\
+                    thickness_mm = 2.0\n[partition]\ncases = [0, 1]\n";
         let mut banks = Banks::new(&Model::new(&Scene::parse(text, "banks.toml").unwrap()).unwrap());
         let (_, reads, drives) = banks.pins();
         let widths: Vec<usize> = reads.iter().map(|(.., port)| port.port_bits()).collect();
@@ -177,7 +178,9 @@ mod tests {
                 inner if inner.contains("__") => inner.rsplit("__").next().unwrap().to_owned(),
                 own => format!("banks__0__{own}"),
             };
-            outputs.iter().map(|(output, bits)| Some(Word::from(read(&source(output)).field(0, *bits)))).collect()
+            // Only addresses are cut, and they are short.
+            let cut = |word: Word, bits: usize| if bits < 64 { Word::from(word.field(0, bits)) } else { word };
+            outputs.iter().map(|(output, bits)| Some(cut(read(&source(output)), *bits))).collect()
         };
         check(banks.kernel.kernel(), &random_words(2000, &widths), &mut Pipeline::new(0, outputs.len(), of));
     }
