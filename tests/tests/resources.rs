@@ -87,7 +87,7 @@ fn a_missing_memory_and_a_wrong_count_are_found() {
     let mut model = small("wrong", "[search]\nmu_max = 0\n[partition]\nrows = 2\ncols = 3\n[fixed]\nlanes = 16\n");
     let right = model.resources.clone();
     model.resources.memories[0].words += 1;
-    assert!(generate(&model).unwrap_err().to_string().contains("memories"));
+    assert!(generate(&model).unwrap_err().to_string().contains("is not in the hardware"));
     // If one memory moves from block RAM to LUTs, Yosys counts differ.
     model.resources = right.clone();
     let moved = model.resources.memories.iter_mut().find(|memory| memory.block == "forces__store").unwrap();

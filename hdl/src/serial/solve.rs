@@ -149,18 +149,6 @@ impl Solve {
         let f = formats;
         let (quads, words) = (count_bits(f.quads), count_bits(4 * f.quads));
         let vectors = count_bits(first_vector(f) + operand_vectors(f.degree));
-        let instructions = schedule(f).into_iter().flat_map(|products| {
-            let count = products.len();
-            products.into_iter().enumerate().map(move |(at, product)| (product, at + 1 == count)).collect::<Vec<_>>()
-        });
-        let instruction = |(product, last): (Product, bool)| Instruction {
-            matrix: WIDE.iter().position(|&kind| kind == product.matrix.kind).unwrap_or(0),
-            low: product.matrix.kind == Kind::InverseLow,
-            operand: operand_index(f, product.operand),
-            flip: product.matrix.kind == Kind::Ay,
-            align: product.align,
-            last,
-        };
         let block = Solve {
             clk: Default::default(),
             rst: Default::default(),
@@ -206,11 +194,27 @@ impl Solve {
             done: Default::default(),
             kernel: Body::default(),
         };
-        let program: Vec<Instruction> = instructions.map(instruction).collect();
         let k = Builder::new("solve");
-        build(&k, f, &program, unrounded, rounded);
+        build(&k, f, &program(f), unrounded, rounded);
         block.bind(k.finish())
     }
+}
+
+/// The products of all passes of `f` in their order.
+fn program(f: &Formats) -> Vec<Instruction> {
+    let instructions = schedule(f).into_iter().flat_map(|products| {
+        let count = products.len();
+        products.into_iter().enumerate().map(move |(at, product)| (product, at + 1 == count)).collect::<Vec<_>>()
+    });
+    let instruction = |(product, last): (Product, bool)| Instruction {
+        matrix: WIDE.iter().position(|&kind| kind == product.matrix.kind).unwrap_or(0),
+        low: product.matrix.kind == Kind::InverseLow,
+        operand: operand_index(f, product.operand),
+        flip: product.matrix.kind == Kind::Ay,
+        align: product.align,
+        last,
+    };
+    instructions.map(instruction).collect()
 }
 
 /// The circuit for `program`; the rounder takes words of `unrounded` bits and returns words of `rounded_bits` bits.
@@ -263,7 +267,7 @@ fn build<'k>(k: &'k Builder, f: &Formats, program: &[Instruction], unrounded: us
     let last_column = k.wire("last_column", wraps(*column, f.quads - 1));
     let row_last = k.wire("row_last", set(&|i| i.last));
     let next_product = k.wire("next_product", product.plus(1));
-    let place = k.wire("place", quad.concat(phase.low(2)));
+    let place = k.wire("place", quad.concat(phase.low(2)).low(words));
     let folded = k.wire("folded", row_folding & mixed_valid);
     let row_magnitude = k.wire("row_magnitude", row_word.low(acc - 1) ^ row_word.top().repeat(acc - 1));
     k.comment("Binary search for the leading one.");
@@ -383,7 +387,9 @@ fn build<'k>(k: &'k Builder, f: &Formats, program: &[Instruction], unrounded: us
     k.wire("write", folded | rescaled & kept);
     let target =
         is(FOLD_HIGH).mux(zero(vectors), is(FOLD_LOW).mux(k.constant(vectors, 1), vector.plus(first_vector(f) as u64)));
-    k.wire("write_address", target.concat(written.slice(2, words - 2)));
+    // An array of one quad has a quad address of one bit, which is 0.
+    let written_quad = if f.quads == 1 { zero(quads) } else { written.slice(2, quads) };
+    k.wire("write_address", target.concat(written_quad));
     k.wire("write_lane", written.at(1).concat(written.at(0) ^ !row_folding));
     let operand = is(FOLD_HIGH).mux(high_limb, is(FOLD_LOW).mux(low_limb, wide(nearest, operands)));
     k.wire("write_data", operand);
@@ -393,3 +399,6 @@ fn build<'k>(k: &'k Builder, f: &Formats, program: &[Instruction], unrounded: us
     k.wire("free", drained & is(freed));
     k.wire("done", drained & is(OTHERS));
 }
+
+#[cfg(test)]
+mod tests;

@@ -379,3 +379,6 @@ fn build<'k>(k: &'k Builder, degree: u64, polynomials: u64, score_bits: usize) {
     k.wire("candidate", *turn_read_then);
     k.wire("judged", state.is(SET_UP) & *searching & !sweep.is(0));
 }
+
+#[cfg(test)]
+mod tests;

@@ -31,9 +31,9 @@ use dermis_golden::fixed::resources::count_bits;
 use dermis_golden::fixed::send::STATUS_BEATS;
 use dermis_golden::fixed::Model;
 use dermis_golden::scene::Scene;
+use dermis_hdl::generate;
 use dermis_hdl::link::generate_board;
 use dermis_hdl::primitives::FORCE_STEPS;
-use dermis_hdl::{generate, Generated};
 
 mod prover;
 mod queues;
