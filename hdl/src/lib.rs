@@ -23,6 +23,7 @@ macro_rules! comment {
     ($text:literal) => {};
 }
 
+pub mod describe;
 pub mod device;
 pub mod engine;
 pub mod estimate;
