@@ -199,6 +199,15 @@ pub fn block_verilog(model: &Model, name: &str) -> Result<String, DescribeError>
     Ok(module(&block, own))
 }
 
+/// The Rust source of a block, its test included.
+///
+/// # Errors
+/// As [`block`].
+pub fn block_source(model: &Model, name: &str) -> Result<&'static str, DescribeError> {
+    let block = block(model, name)?;
+    Ok(ENTRIES.iter().find(|entry| entry.name == block.name).map_or("", |entry| entry.source))
+}
+
 /// A module with commented ports.
 fn module(block: &BlockText, kernel: &Kernel) -> String {
     let nets: Vec<&str> = kernel.constants().map(|signal| signal.name.as_str()).collect();
@@ -233,7 +242,7 @@ fn describe(mut ports: Ports) -> Vec<BlockText> {
         let text = |(name, output, bits, _): (String, bool, usize, Word)| {
             let comment = comments.get(name.as_str()).map(String::as_str).unwrap_or_default();
             let (meaning, valid) = comment.split_once("; ").unwrap_or((comment, if bits == 1 { ALWAYS } else { "" }));
-            let tidy = |text: &str| text.trim_end_matches('.').to_owned();
+            let tidy = |text: &str| text.trim_start_matches("valid ").trim_end_matches('.').to_owned();
             PortText { name, output, bits, meaning: tidy(meaning), valid: tidy(valid) }
         };
         let ports = ports.found.remove(entry.instance)?.into_iter().map(text).collect();

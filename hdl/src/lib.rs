@@ -7,14 +7,19 @@
 //! puts either behind a UART or an SPI. All widths come from the formats of the bit-true model.
 //!
 //! What is derived from what:
-//! - Engines, most stages and the link's top levels are `#[hdl_gen]` kernels: rust-hdl simulates them and derives their
+//! - *Kernels of the [`language`]*, the blocks with a field `kernel`: rust-hdl's simulation, the body of the Verilog
+//!   module, the waveform's names and the estimate of the logic come from one graph of typed expressions. Each is tested
+//!   against plain integers in its own simulation and under Verilator, every output, every cycle.
+//! - *`#[hdl_gen]` kernels*, engines, most stages and the link's top levels: rust-hdl simulates them and derives their
 //!   Verilog from the same Rust. They hold single-bit control and connections.
-//! - Kernels of the [`language`], the blocks with a field `kernel`: simulation, Verilog and estimate of the logic from
-//!   one graph of typed expressions, each tested against plain integers in both simulations, every output, every cycle.
-//! - All other blocks, which hold the arithmetic, the memories and most state machines, are written twice: a Rust
-//!   `update()` for rust-hdl's simulation, and a hand-written Verilog text (`Verilog::Custom`), which is synthesised.
-//!   Co-simulation compares both with the bit-true model: the streams between the stages word by word, the output
-//!   beats, the cycle counts.
+//! - *Blocks written twice*, those with an `hdl()` of their own: a Rust `update()` for the simulation and a hand-written
+//!   Verilog text (`Verilog::Custom`), which is synthesised. They are being replaced by kernels. Co-simulation compares
+//!   both with the bit-true model: the streams between the stages word by word, the output beats, the cycle counts.
+//! - The hierarchy and the declarations of the modules are printed by rust-hdl; [`fn@generate`] adds the placement of the
+//!   memories and the names. [`estimate`] counts the logic of kernels from their graphs and that of other blocks from
+//!   their Verilog.
+//! - Widths, names and directions of ports in the guide come from the built engine, their meaning from the comments of
+//!   the fields ([`describe`]).
 #![deny(missing_docs)]
 
 /// A comment that `#[hdl_gen]` copies into the Verilog; expands to nothing in Rust. One short line: rust-hdl breaks a

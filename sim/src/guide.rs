@@ -51,5 +51,6 @@ pages! {
     "architecture/search.md" search,
     "architecture/force.md" force,
     "architecture/send.md" send,
+    "architecture/blocks.md" blocks,
     "glossary.md" glossary,
 }

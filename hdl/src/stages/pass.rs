@@ -24,7 +24,7 @@ pub struct Pass {
     pub which: Wire<In>,
     /// The input memory holds a subarray: start its products.
     pub start: Signal<In, Bit>,
-    /// Address of the quad to read from the input memory; one per product, from the cycle after `start` on.
+    /// Address of the quad to read from the input memory; in every cycle of a product with the input.
     pub input_address: Wire<Out>,
     /// Four parities of that quad, `fold_bits` each, signed; two cycles after `input_address`.
     pub input_quad: Wire<In>,
