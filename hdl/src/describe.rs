@@ -186,7 +186,7 @@ pub fn block(model: &Model, name: &str) -> Result<BlockText, DescribeError> {
 /// The Verilog of a block with a kernel: its ports with their comments, then the body as in the generated file.
 ///
 /// # Errors
-/// As [`block`]; [`DescribeError::NoKernel`].
+/// As [`fn@block`]; [`DescribeError::NoKernel`].
 pub fn block_verilog(model: &Model, name: &str) -> Result<String, DescribeError> {
     let block = block(model, name)?;
     let engine = engine(model)?;
@@ -202,7 +202,7 @@ pub fn block_verilog(model: &Model, name: &str) -> Result<String, DescribeError>
 /// The Rust source of a block, its test included.
 ///
 /// # Errors
-/// As [`block`].
+/// As [`fn@block`].
 pub fn block_source(model: &Model, name: &str) -> Result<&'static str, DescribeError> {
     let block = block(model, name)?;
     Ok(ENTRIES.iter().find(|entry| entry.name == block.name).map_or("", |entry| entry.source))
