@@ -13,6 +13,7 @@ use std::path::{Path, PathBuf};
 use anyhow::{anyhow, Result};
 use clap::Args;
 use dermis_golden::fixed::Model;
+use dermis_golden::partition::Case;
 use dermis_golden::scene::Scene;
 use dermis_golden::write::write;
 use dermis_hdl::describe::{block, block_source, block_verilog, blocks};
@@ -26,6 +27,7 @@ use crate::report;
   dermis block                                       the blocks of sensor-1
   dermis block fold                                  its ports: width, meaning, when they are valid
   dermis block search --scene eight-by-eight --json
+  dermis block choose --case adaptive                a stage of scenes that choose the case per frame
   dermis block normalise --verilog                   ports with comments, and the body of the module
   dermis block fold --timing fold.svg                its ports during a frame, drawn")]
 pub struct Arguments {
@@ -34,6 +36,9 @@ pub struct Arguments {
     /// Built-in name or path of a scene, which decides the widths.
     #[arg(long, default_value = timing::SCENE)]
     scene: String,
+    /// Partition case in place of the scene's: 0 to 3, ROWSxCOLS, adaptive.
+    #[arg(long)]
+    case: Option<Case>,
     /// Print the table of the ports, as without any option.
     #[arg(long, requires = "name")]
     ports: bool,
@@ -58,7 +63,8 @@ pub struct Arguments {
 /// # Errors
 /// A scene that cannot be loaded or has the serial engine, a block that it does not have, a file that cannot be written.
 pub fn run(arguments: &Arguments, build: &Path) -> Result<String> {
-    let scene = arguments.target.apply(Scene::load(&arguments.scene)?);
+    let mut scene = arguments.target.apply(Scene::load(&arguments.scene)?);
+    scene.partition.case = arguments.case.unwrap_or(scene.partition.case);
     let model = Model::new(&scene)?;
     let Some(name) = &arguments.name else {
         let all = blocks(&model)?;

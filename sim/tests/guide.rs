@@ -111,7 +111,8 @@ fn the_pictures_that_only_the_program_changes_are_drawn_anew() {
 
 #[test]
 fn pictures_have_titles_their_labels_and_colours_for_light_and_dark() {
-    let stages = ["prepare", "receive", "normalise", "fold", "pass", "rescale", "unfold", "search", "force", "send"];
+    let stages =
+        ["prepare", "receive", "choose", "normalise", "fold", "pass", "rescale", "unfold", "search", "force", "send"];
     let timings = stages.map(|stage| format!("timing-{stage}.svg"));
     let of_stages = timings.iter().map(|name| (name.as_str(), &["cycle", "input", "output"][..]));
     let pictures = [

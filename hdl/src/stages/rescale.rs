@@ -37,7 +37,7 @@ pub struct Rescale {
     pub operands_valid: Signal<Out, Bit>,
     /// Measured right shift; valid from the first word until the next subarray.
     pub shift: Wire<Out>,
-    /// Number of words saturated in this subarray; final one cycle after its last word.
+    /// Number of words saturated in this subarray; final two cycles after its last word.
     pub saturations: Wire<Out>,
     collecting: DFF<Bit>,
     replaying: DFF<Bit>,

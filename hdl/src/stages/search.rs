@@ -83,7 +83,7 @@ ports! {
         pub fill_address: Wire<In>,
         /// All coefficients have been written: start the search.
         pub start: Signal<In, Bit>,
-        /// Search; otherwise p(0) is the result. Valid with `start`.
+        /// The subarray is searched, else p(0) is the result; valid with `start`.
         pub enabled: Signal<In, Bit>,
         /// Four values p(μ*), `search_bits[0]` each, signed; valid with `values_valid`.
         pub values: Wire<Out>,
@@ -101,7 +101,7 @@ ports! {
         pub best_y: Wire<Out>,
         /// Score of the best candidate, signed, 2^−6; valid with `judged` and `settled`.
         pub score: Wire<Out>,
-        /// A candidate was found.
+        /// A candidate was found; valid with `settled`.
         pub found: Signal<Out, Bit>,
         /// The candidates of a sweep have been compared; high for one cycle.
         pub judged: Signal<Out, Bit>,

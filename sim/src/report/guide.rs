@@ -54,6 +54,11 @@ pub fn fixed_pictures(build: &Path) -> Result<Vec<PictureFile>> {
     for stage in stages.iter().filter(|trace| !trace.block.instance.contains('$')) {
         files.push(timing_picture(&scene.name, stage)?);
     }
+    let mut choosing = scene;
+    choosing.partition.case = Case::Adaptive;
+    for stage in timing::traces(&choosing, build)?.iter().filter(|trace| trace.block.name == "choose") {
+        files.push(timing_picture(&choosing.name, stage)?);
+    }
     Ok(files)
 }
 
