@@ -15,6 +15,7 @@ use serde_json::json;
 use thiserror::Error;
 
 use crate::core_file::core_file;
+use crate::describe::port_comment;
 use crate::device::Tap;
 use crate::explain::Explained;
 use crate::language::{self, Attributes, Hierarchy, KernelError};
@@ -124,7 +125,7 @@ pub fn generate(model: &Model) -> Result<Generated, HdlError> {
     let top = top_name(&model.scene.name);
     let file = |name: String, text: String| GeneratedFile { name, text };
     let hierarchy = Hierarchy::of(&*engine);
-    let verilog = header(model, &top) + &hierarchy.verilog(&top, &placement(&hierarchy, model, "")?);
+    let verilog = header(model, &top) + &hierarchy.verilog(&top, &placement(&hierarchy, model, "")?, &port_comment);
     let usage = stages(model, &hierarchy);
     let dropped = refused(model)?;
     let manifest = manifest(model, &top, &usage, &dropped);

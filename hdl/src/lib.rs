@@ -7,14 +7,16 @@
 //! puts either behind a UART or an SPI. All widths come from the formats of the bit-true model.
 //!
 //! What is derived from what:
-//! - Engines, most stages and the link's top levels are `#[hdl_gen]` kernels: rust-hdl simulates them and derives their
-//!   Verilog from the same Rust. They hold single-bit control and connections.
-//! - Kernels of the [`language`], the blocks with a field `kernel`: simulation, Verilog and estimate of the logic from
-//!   one graph of typed expressions, each tested against plain integers in both simulations, every output, every cycle.
-//! - All other blocks, which hold the arithmetic, the memories and most state machines, are written twice: a Rust
-//!   `update()` for rust-hdl's simulation, and a hand-written Verilog text (`Verilog::Custom`), which is synthesised.
-//!   Co-simulation compares both with the bit-true model: the streams between the stages word by word, the output
-//!   beats, the cycle counts.
+//! - *Kernels of the [`language`]*, the blocks with a field `kernel`: rust-hdl's simulation, the body of the Verilog
+//!   module, the waveform's names and the estimate of the logic come from one graph of typed expressions. Each is tested
+//!   against plain integers in its own simulation and under Verilator, every output, every cycle.
+//! - *`#[hdl_gen]` blocks*, which connect others: engines, most stages and the link's top levels. rust-hdl simulates
+//!   them, and the assignments that it reads off the same Rust become a kernel too ([`language::Hierarchy`]), from which
+//!   Verilog and estimate follow. They hold single-bit control and connections.
+//! - rust-hdl's probe gives the hierarchy; all modules are printed by the [`language`], with the memories placed as the
+//!   bit-true model plans them. No block has a second description, and nothing reads Verilog back.
+//! - Widths, names and directions of ports in the guide come from the built engine, their meaning from the comments of
+//!   the fields ([`describe`]).
 #![deny(missing_docs)]
 
 /// A comment that `#[hdl_gen]` copies into the Verilog; expands to nothing in Rust. One short line: rust-hdl breaks a
@@ -23,6 +25,7 @@ macro_rules! comment {
     ($text:literal) => {};
 }
 
+pub mod describe;
 pub mod device;
 pub mod engine;
 pub mod explain;

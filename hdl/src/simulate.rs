@@ -147,18 +147,26 @@ pub fn simulator(model: &Model) -> Result<Box<dyn Device>, HdlError> {
     Ok(Box::new(Simulator { engine: design(model)?, taps: taps(model) }))
 }
 
-impl Simulator {
-    fn settle(&mut self, inputs: &Inputs, clock: bool) {
-        self.engine.drive(inputs, clock);
-        assert!(settles(&mut *self.engine), "the engine has a combinational loop: a defect of this crate");
-    }
+/// One clock cycle: the signals settle with the clock low, `sample` sees them before the rising edge.
+pub(crate) fn cycle(
+    engine: &mut dyn Design,
+    inputs: &Inputs,
+    taps: &[Tap],
+    sample: impl FnOnce(&dyn Design),
+) -> Outputs {
+    let settle = |engine: &mut dyn Design, clock: bool| {
+        engine.drive(inputs, clock);
+        assert!(settles(engine), "the engine has a combinational loop: a defect of this crate");
+    };
+    settle(engine, false);
+    let outputs = engine.observe(taps);
+    sample(engine);
+    settle(engine, true);
+    outputs
 }
 
 impl Device for Simulator {
     fn cycle(&mut self, inputs: &Inputs) -> Outputs {
-        self.settle(inputs, false);
-        let outputs = self.engine.observe(&self.taps);
-        self.settle(inputs, true);
-        outputs
+        cycle(&mut *self.engine, inputs, &self.taps, |_| {})
     }
 }

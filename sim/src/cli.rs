@@ -55,6 +55,7 @@ const EXAMPLES: &str = "Examples:
   dermis build eight-by-eight --out rtl              Verilog, memory files, manifest.json
   dermis bitstream eight-by-eight                    synthesis, place and route for its board
   dermis host --port /dev/ttyUSB0 press.json         send a frame to a board, print the resultants
+  dermis block fold                                  ports of a stage: width, meaning, validity
   dermis cosim sensor-1                              all shipped frames, model against hardware
   dermis table                                       errors of all scenes, next to the paper's
   dermis noise sensor-1                              errors under noise, next to the Cramér–Rao bound
@@ -131,6 +132,8 @@ enum Command {
         #[command(flatten)]
         target: BoardOverride,
     },
+    /// Print the ports of a block, its Verilog, or draw its timing.
+    Block(crate::block::Arguments),
     /// Compare simulated hardware with the bit-true model, stage by stage and cycle by cycle.
     #[command(after_help = "Examples:
   dermis cosim sensor-1
@@ -328,6 +331,7 @@ fn run(arguments: &Arguments) -> Result<(String, bool)> {
             let files = manifest::check(folder)?;
             Ok((format!("{}: {files} files match manifest.json\n", folder.display()), true))
         }
+        Command::Block(arguments) => Ok((crate::block::run(arguments, build_dir)?, true)),
         Command::Host(arguments) => crate::host::run(arguments),
         Command::Board { scene, target } => {
             let scene = target.apply(Scene::load(scene)?);

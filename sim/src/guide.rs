@@ -43,6 +43,7 @@ pages! {
     "architecture.md" architecture,
     "architecture/prepare.md" prepare,
     "architecture/receive.md" receive,
+    "architecture/choose.md" choose,
     "architecture/normalise.md" normalise,
     "architecture/fold.md" fold,
     "architecture/pass.md" pass,
@@ -51,5 +52,6 @@ pages! {
     "architecture/search.md" search,
     "architecture/force.md" force,
     "architecture/send.md" send,
+    "architecture/blocks.md" blocks,
     "glossary.md" glossary,
 }

@@ -1,4 +1,4 @@
-//! `dermis guide`: the tables and pictures of README.md and of the guide, made by the commands that they name.
+//! `dermis guide`: the tables, code and pictures of README.md and of the guide, made by the commands that they name.
 //!
 //! ```text
 //! page ── markers ── commands, each once ── Markdown table ──┬─ written between the marker's lines
@@ -47,9 +47,11 @@ const PROGRAM: &str = "dermis";
   dermis guide --check --quick                       the same with the markers' cheaper check commands
   dermis guide --pictures                            draw sim/guide/pictures/*.svg
 
-A table stands between two lines of a Markdown page:
+A table or code stands between two lines of a Markdown page:
   <!-- table: dermis table sensor-1 ; table: 2 ; columns: case | e_t ; check: dermis table sensor-1 --case 0 -->
   <!-- end of table -->
+  <!-- code: dermis block butterfly --verilog ; language: verilog -->
+  <!-- end of code -->
 Attributes follow the command after semicolons, all of them optional:
   check: COMMAND          what --quick runs; each of its rows must stand in the page, in the columns that both have
   check columns: A | B    compare only these columns of the check's table
@@ -159,11 +161,10 @@ fn fill(pages: &[Page], root: &Path, outputs: &Outputs) -> Result<String> {
         let mut changed = 0;
         // From the last to the first: what is written moves only what follows it.
         for marker in page.markers.iter().rev() {
-            let new = printed(marker, &marker.command, outputs).and_then(|table| table.select(&marker.columns));
-            let new = located(page, marker, new)?;
-            let old = tables(&page.text[marker.content.clone()]);
-            changed += usize::from(old != [new.clone()]);
-            text.replace_range(marker.content.clone(), &new.text());
+            let old = &page.text[marker.content.clone()];
+            let (new, differs) = located(page, marker, content(marker, old, outputs))?;
+            changed += usize::from(differs);
+            text.replace_range(marker.content.clone(), &new);
         }
         if text != page.text {
             write(&root.join(&page.name), text.as_bytes())?;
@@ -171,6 +172,23 @@ fn fill(pages: &[Page], root: &Path, outputs: &Outputs) -> Result<String> {
         told.push_str(&format!("{}: {} tables, {changed} changed\n", page.name, page.markers.len()));
     }
     Ok(told)
+}
+
+/// What is to stand behind a marker, and whether it differs from what stands there.
+fn content(marker: &Marker, old: &str, outputs: &Outputs) -> Result<(String, bool)> {
+    if let Some(code) = code(marker, outputs) {
+        let differs = old != code;
+        return Ok((code, differs));
+    }
+    let new = printed(marker, &marker.command, outputs)?.select(&marker.columns)?;
+    Ok((new.text(), tables(old) != [new]))
+}
+
+/// The fenced block of a marker of code.
+fn code(marker: &Marker, outputs: &Outputs) -> Option<String> {
+    let language = marker.language.as_ref()?;
+    let printed = outputs.get(&marker.command).map(String::as_str).unwrap_or_default();
+    Some(format!("```{language}\n{}\n```\n", printed.trim_end()))
 }
 
 /// Compares the tables of all pages; what is stale, and whether nothing is.
@@ -194,6 +212,9 @@ fn check(pages: &[Page], quick: bool, outputs: &Outputs) -> Result<(String, bool
 
 /// The first row in which the page's table is not its command's, or its check's.
 fn differs(page: &Page, marker: &Marker, quick: bool, outputs: &Outputs) -> Result<Option<Difference>> {
+    if let Some(code) = code(marker, outputs) {
+        return Ok(Difference::of_lines(&page.text[marker.content.clone()], &code));
+    }
     let found = tables(&page.text[marker.content.clone()]);
     let [old] = &found[..] else { bail!("{} tables between the marker and its end, wanted 1", found.len()) };
     match marker.quick_check(quick) {
@@ -252,7 +273,7 @@ fn output(command: &str, root: &Path, build: &Path) -> Result<String> {
 /// Draws the pictures, or tells which are not as they would be drawn.
 fn pictures(root: &Path, check: bool, build: &Path) -> Result<(String, bool)> {
     let folder = Path::new(GUIDE).join(PICTURES);
-    let mut files = fixed_pictures()?;
+    let mut files = fixed_pictures(build)?;
     if !check {
         files.push(time_picture(build)?);
     }

@@ -17,6 +17,7 @@
 //! | [`mod@faults`] | `dermis faults`: flips single bits and classifies the effect |
 //! | [`drawn_frames`] | frames of random contacts, `dermis table --fresh` |
 //! | [`mod@generate`] | `dermis generate`: frames with known forces from described contacts |
+//! | [`block`] | `dermis block`: ports, Verilog and drawn timing of the blocks |
 //! | [`board`] | a simulated board: its UART on a pseudo-terminal, or its SPI driven by a simulated controller |
 //! | [`mod@guide`] | pages for users, by task, and one page per stage |
 //! | [`guide_pages`] | `dermis guide`: tables and pictures of README and guide, made by the commands named there |
@@ -44,6 +45,7 @@
 mod artifact_cache;
 pub mod bench;
 pub mod bitstream;
+pub mod block;
 pub mod board;
 pub mod cli;
 pub mod compare;

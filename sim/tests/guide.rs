@@ -111,12 +111,17 @@ fn the_pictures_that_only_the_program_changes_are_drawn_anew() {
 
 #[test]
 fn pictures_have_titles_their_labels_and_colours_for_light_and_dark() {
+    let stages =
+        ["prepare", "receive", "choose", "normalise", "fold", "pass", "rescale", "unfold", "search", "force", "send"];
+    let timings = stages.map(|stage| format!("timing-{stage}.svg"));
+    let of_stages = timings.iter().map(|name| (name.as_str(), &["cycle", "input", "output"][..]));
     let pictures = [
         ("data-flow.svg", &["receive", "pass", "search", "20 bits", "μ of 18 bits"][..]),
         ("feet.svg", &["N, normal"]),
         ("time-sensor-1-shear.svg", &["1 ms", "hardware", "time of a frame"]),
     ];
     let folder = root().join(GUIDE).join("pictures");
+    let pictures: Vec<_> = pictures.into_iter().chain(of_stages).collect();
     assert_eq!(fs::read_dir(&folder).unwrap().count(), pictures.len());
     for (name, labels) in pictures {
         let text = fs::read_to_string(folder.join(name)).unwrap();

@@ -101,42 +101,55 @@ impl Hierarchy {
         Ok(())
     }
 
-    /// The Verilog of all blocks, with the top module `top`, and `attributes` in front of memories.
-    pub fn verilog(&self, top: &str, attributes: &Attributes) -> String {
+    /// The Verilog of all blocks, with the top module `top`, and `attributes` in front of memories. `comment` gives the
+    /// comment of a port by the path of its block and its name.
+    pub fn verilog(&self, top: &str, attributes: &Attributes, comment: &Comment) -> String {
+        let texts = self.modules.keys().filter_map(|path| self.module(path, top, attributes, comment));
+        texts.map(|text| text + "\n").collect()
+    }
+
+    /// The Verilog of the block `path`.
+    pub fn module(&self, path: &str, top: &str, attributes: &Attributes, comment: &Comment) -> Option<String> {
+        let module = self.modules.get(path)?;
+        let kernel = module.kernel.as_ref()?;
         let name = |path: &str| match path {
             "" => top.to_owned(),
             path => format!("{top}{SEPARATOR}{path}"),
         };
-        let mut text = String::new();
-        for (path, module) in &self.modules {
-            let Some(kernel) = &module.kernel else { continue };
-            let own = |((block, array), attribute): (&(String, String), &String)| {
-                (block == path).then(|| (array.clone(), attribute.clone()))
-            };
-            let body = kernel.verilog_with(&attributes.iter().filter_map(own).collect());
-            let mut lines: Vec<String> = Vec::new();
-            lines.extend(module.inner.iter().map(|pin| format!("wire {}{};", range(pin.bits), pin.name)));
-            lines.extend(body.lines().map(str::to_owned));
-            for (instance, ports) in &module.children {
-                let child = [module.path.clone(), vec![instance.clone()]].concat().join(SEPARATOR);
-                let connect = |port: &String| format!("    .{port}({instance}{SEPARATOR}{port})");
-                lines.push(format!("{} {instance} (", name(&child)));
-                lines.push(format!("{}\n);", ports.iter().map(connect).collect::<Vec<_>>().join(",\n")));
-            }
-            let _ = writeln!(text, "{}", kernel.header(&name(path), module.ports.iter().map(|pin| &*pin.name)));
-            lines.iter().flat_map(|line| line.lines()).for_each(|line| {
-                let _ = writeln!(text, "{}", format!("    {line}").trim_end());
-            });
-            let _ = writeln!(text, "endmodule\n");
+        let own = |((block, array), attribute): (&(String, String), &String)| {
+            (block == path).then(|| (array.clone(), attribute.clone()))
+        };
+        let body = kernel.verilog_with(&attributes.iter().filter_map(own).collect());
+        let mut lines: Vec<String> = Vec::new();
+        lines.extend(module.inner.iter().map(|pin| format!("wire {}{};", range(pin.bits), pin.name)));
+        lines.extend(body.lines().map(str::to_owned));
+        for (instance, ports) in &module.children {
+            let child = [module.path.clone(), vec![instance.clone()]].concat().join(SEPARATOR);
+            let connect = |port: &String| format!("    .{port}({instance}{SEPARATOR}{port})");
+            lines.push(format!("{} {instance} (", name(&child)));
+            lines.push(format!("{}\n);", ports.iter().map(connect).collect::<Vec<_>>().join(",\n")));
         }
-        text
+        let ports = module.ports.iter().map(|pin| &*pin.name);
+        let mut text = kernel.header(&name(path), ports, &|port| comment(path, port));
+        for line in lines.iter().flat_map(|line| line.lines()) {
+            let _ = write!(text, "\n{}", format!("    {line}").trim_end());
+        }
+        Some(text + "\nendmodule\n")
     }
 }
 
+/// The comment of a port: path of its block, its name.
+pub type Comment<'a> = dyn Fn(&str, &str) -> Option<String> + 'a;
+
 impl Kernel {
     /// The head of a module of this name with these ports, in this order.
-    pub(super) fn header<'a>(&self, name: &str, ports: impl Iterator<Item = &'a str>) -> String {
-        let port = |port: &str| {
+    pub(super) fn header<'a>(
+        &self,
+        name: &str,
+        ports: impl Iterator<Item = &'a str>,
+        comment: &dyn Fn(&str) -> Option<String>,
+    ) -> String {
+        let declared = |port: &str| {
             let Some(signal) = self.signal_of(port).map(|id| &self.signals[id]) else {
                 return format!("    input wire {port}");
             };
@@ -146,6 +159,10 @@ impl Kernel {
                 Role::Register(_) => "output reg",
             };
             format!("    {kind} {}{port}", range(signal.ty.bits))
+        };
+        let port = |port: &str| {
+            let comment = comment(port).map(|text| format!("    // {text}\n"));
+            comment.unwrap_or_default() + &declared(port)
         };
         format!("module {name} (\n{}\n);", ports.map(port).collect::<Vec<_>>().join(",\n"))
     }

@@ -45,7 +45,7 @@ pub use block::{Body, Port};
 pub use build::{Builder, MemoryPort, Net};
 pub use error::KernelError;
 pub use expression::{concat, Expr, ARITHMETIC_BITS};
-pub use hierarchy::{Attributes, Hierarchy, SEPARATOR};
+pub use hierarchy::{Attributes, Comment, Hierarchy, SEPARATOR};
 pub use kernel::{Contents, Kernel, Memory, Type};
 pub(crate) use resources::distributed_luts;
 pub use simulate::Simulation;

@@ -1,4 +1,4 @@
-use super::testbench::{check, random_words, Reference};
+use super::testbench::{check, random_words, simulated, verilated, Reference};
 use super::*;
 use crate::wire::Word;
 
@@ -484,4 +484,19 @@ fn verilog_holds_constants_and_separates_operators() {
     k.wire("none", !a.any());
     let kernel = bound(k.finish(), &[("three", 2), ("four", 2), ("none", 1)]);
     assert_eq!(kernel.verilog(), "assign three = 2'd3;\nassign four = three + 2'd1;\nassign none = !(|a);");
+}
+
+#[test]
+fn a_changed_kernel_differs_under_verilator() {
+    let adder = |number: u64| {
+        let k = Builder::new("adder");
+        let x = k.input("x", 8);
+        let sum = k.register("sum", Type::unsigned(8)).initially(0);
+        sum.set(x.plus(number).low(8));
+        bound(k.finish(), &[("sum", 8)])
+    };
+    let stimulus = random_words(50, &[8]);
+    let expected = simulated(&adder(3), &stimulus);
+    assert_eq!(verilated(&adder(3), &stimulus), expected);
+    assert_ne!(verilated(&adder(2), &stimulus), expected);
 }

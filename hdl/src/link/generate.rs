@@ -7,6 +7,7 @@ use rust_hdl::prelude::*;
 use serde_json::json;
 
 use super::{Board, BoardTop, SerialBoardTop, SerialSpiBoardTop, SpiBoardTop};
+use crate::describe::{comments, port_comment};
 use crate::generate::{placement, top_name, Generated, GeneratedFile, HdlError};
 use crate::language::Hierarchy;
 
@@ -67,7 +68,12 @@ pub fn generate_board(model: &Model) -> Result<Generated, HdlError> {
     let engine = crate::generate(model)?;
     let top = format!("{}_board", top_name(&model.scene.name));
     let hierarchy = Hierarchy::of(&*board);
-    let verilog = hierarchy.verilog(&top, &placement(&hierarchy, model, "engine__")?);
+    let comment = |path: &str, port: &str| match (path, path.strip_prefix("engine__")) {
+        ("", _) => comments(include_str!("board_top.rs")).remove(port),
+        ("engine", _) => port_comment("", port),
+        (_, own) => port_comment(own?, port),
+    };
+    let verilog = hierarchy.verilog(&top, &placement(&hierarchy, model, "engine__")?, &comment);
     let link = model.scene.hardware.link;
     let (behind, pins) = link_text(link, link.bit_rate(&model.board)?);
     let text = format!(

@@ -11,7 +11,7 @@ use crate::wire::Wire;
 pub struct Butterfly {
     /// Clock; registers change on its rising edge.
     pub clk: Signal<In, Clock>,
-    /// Four signed fields of `bits` bits, one per taxel of the quad.
+    /// Four signed fields of `bits` bits, one per taxel of the quad; a new quad in every cycle.
     pub quad: Wire<In>,
     /// Four signed sums of `bits + 2` bits, field p = parity p; one cycle after `quad`.
     pub sums: Wire<Out>,

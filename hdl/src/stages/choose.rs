@@ -26,9 +26,9 @@ pub struct Choose {
     pub code: Wire<In>,
     /// A code is accepted in this cycle.
     pub accept: Signal<In, Bit>,
-    /// The code has `tlast`; before the end of the frame it drops the frame. Valid with `accept`.
+    /// The code has `tlast`, which before the end of the frame drops the frame; valid with `accept`.
     pub tlast: Signal<In, Bit>,
-    /// The frame has been read; clears `settled`.
+    /// The frame has been read: clears `settled`.
     pub free: Signal<In, Bit>,
     /// Index of the chosen case; valid with `settled`.
     pub which: Wire<Out>,

@@ -16,7 +16,7 @@ pub struct Fold {
     pub clk: Signal<In, Clock>,
     /// Synchronous reset, active high.
     pub rst: Signal<In, Bit>,
-    /// Index of the case.
+    /// Index of the case; constant while a frame is computed.
     pub which: Wire<In>,
     /// A new frame: reading restarts at the frame's first quad.
     pub begin_frame: Signal<In, Bit>,
@@ -24,7 +24,8 @@ pub struct Fold {
     pub start: Signal<In, Bit>,
     /// The subarray is the frame's last.
     pub last_part: Signal<In, Bit>,
-    /// Address of the quad to read from the frame buffer, over all subarrays.
+    /// Address of the quad to read from the frame buffer, over all subarrays; steps in every cycle after `start` until
+    /// the subarray is read.
     pub quad_address: Wire<Out>,
     /// The frame's last quad is being read: the frame buffer is free from the next cycle.
     pub free: Signal<Out, Bit>,
@@ -32,15 +33,15 @@ pub struct Fold {
     pub normalised: Wire<In>,
     /// `normalised` holds a quad.
     pub normalised_valid: Signal<Out, Bit>,
-    /// Four parities, two bits wider, one cycle after `normalised`.
+    /// Four parities, two bits wider, signed; valid with `folded_valid`, one cycle after `normalised`.
     pub folded: Wire<Out>,
     /// `folded` holds a quad.
     pub folded_valid: Signal<Out, Bit>,
     /// The input memory holds the subarray; high for one cycle.
     pub done: Signal<Out, Bit>,
-    /// Address of the quad to read from the input memory.
+    /// Address of the quad to read from the input memory; sampled in every cycle.
     pub read_address: Wire<In>,
-    /// Its four parities, two cycles after `read_address`.
+    /// Four parities of that quad, signed; two cycles after `read_address`.
     pub read_quad: Wire<Out>,
     quads: CaseCounter,
     frame_quads: Counter,

@@ -16,9 +16,9 @@ pub struct Force {
     pub clk: Signal<In, Clock>,
     /// Synchronous reset, active high.
     pub rst: Signal<In, Bit>,
-    /// Index of the case of the frame being sent.
+    /// Index of the case of the frame being sent; constant until its last beat.
     pub which: Wire<In>,
-    /// Four values p(μ*), `search_bits[0]` each, signed.
+    /// Four values p(μ*), `search_bits[0]` each, signed; valid with `values_valid`.
     pub values: Wire<In>,
     /// `values` holds a quad.
     pub values_valid: Signal<In, Bit>,

@@ -17,11 +17,11 @@ pub struct Normalise {
     pub start: Signal<In, Bit>,
     /// OR of the subarray's magnitudes; valid with `start`.
     pub magnitude: Wire<In>,
-    /// Four codes, `bits` each, signed.
+    /// Four codes, `bits` each, signed; one quad per cycle.
     pub quad: Wire<In>,
-    /// Four shifted codes, one cycle after `quad`.
+    /// Four shifted codes, `bits` each, signed; one cycle after `quad`.
     pub shifted: Wire<Out>,
-    /// The left shift, from two cycles after `start` until the next one.
+    /// The left shift; from two cycles after `start` until the next one.
     pub shift: Wire<Out>,
     kernel: Body,
 }

@@ -21,19 +21,19 @@ pub struct Pass {
     pub clk: Signal<In, Clock>,
     /// Synchronous reset, active high.
     pub rst: Signal<In, Bit>,
-    /// Index of the case.
+    /// Index of the case; constant while a frame is computed.
     pub which: Wire<In>,
     /// The input memory holds a subarray: start its products.
     pub start: Signal<In, Bit>,
-    /// Address of the quad to read from the input memory.
+    /// Address of the quad to read from the input memory; in every cycle of a product with the input.
     pub input_address: Wire<Out>,
-    /// Its four parities, `fold_bits` each, signed; two cycles after `input_address`.
+    /// Four parities of that quad, `fold_bits` each, signed; two cycles after `input_address`.
     pub input_quad: Wire<In>,
-    /// Four parities of a finished v_ij, `data_bits` each, signed; quads in order.
+    /// Four parities of a finished v_ij, `data_bits` each, signed, quads in order; valid with `vector_valid`.
     pub vector_quad: Wire<In>,
     /// `vector_quad` holds a quad.
     pub vector_valid: Signal<In, Bit>,
-    /// Accumulators of one row for the four parities, `acc_bits` each, signed.
+    /// Accumulators of one row for the four parities, `acc_bits` each, signed; valid with `quad_valid`.
     pub quad: Wire<Out>,
     /// `quad` holds a row.
     pub quad_valid: Signal<Out, Bit>,

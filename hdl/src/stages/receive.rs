@@ -63,7 +63,7 @@ ports! {
         pub free: Signal<In, Bit>,
         /// Index of the chosen case; valid with `full`, 0 where there is one case.
         pub which: Wire<Out>,
-        /// Address of the quad to read, over all subarrays.
+        /// Address of the quad to read, over all subarrays; sampled in every cycle.
         pub quad_address: Wire<In>,
         /// Four codes, `input_bits` each, signed; two cycles after `quad_address`.
         pub quad: Wire<Out>,

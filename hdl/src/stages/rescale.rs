@@ -19,25 +19,25 @@ pub struct Rescale {
     pub clk: Signal<In, Clock>,
     /// Synchronous reset, active high.
     pub rst: Signal<In, Bit>,
-    /// Index of the case.
+    /// Index of the case; constant while a frame is computed.
     pub which: Wire<In>,
     /// A new subarray.
     pub start: Signal<In, Bit>,
-    /// Accumulators of one row for the four parities, `acc_bits` each, signed.
+    /// Accumulators of one row for the four parities, `acc_bits` each, signed; valid with `quad_valid`.
     pub quad: Wire<In>,
     /// `quad` holds a row.
     pub quad_valid: Signal<In, Bit>,
-    /// Four parities of a v_ij, `vector_bits` each, signed.
+    /// Four parities of a v_ij, `vector_bits` each, signed; valid with `words_valid`.
     pub words: Wire<Out>,
     /// `words` holds a quad.
     pub words_valid: Signal<Out, Bit>,
-    /// The same, rounded to `data_bits` each, as operands of later passes; one cycle later.
+    /// The same, rounded to `data_bits` each, as operands of later passes; valid with `operands_valid`, a cycle later.
     pub operands: Wire<Out>,
     /// `operands` holds a quad.
     pub operands_valid: Signal<Out, Bit>,
-    /// Measured right shift, valid from the first word until the next subarray.
+    /// Measured right shift; valid from the first word until the next subarray.
     pub shift: Wire<Out>,
-    /// Number of words saturated in this subarray.
+    /// Number of words saturated in this subarray; final two cycles after its last word.
     pub saturations: Wire<Out>,
     collecting: Dff,
     replaying: Dff,

@@ -71,9 +71,9 @@ ports! {
         pub clk: Signal<In, Clock>,
         /// Synchronous reset, active high.
         pub rst: Signal<In, Bit>,
-        /// Index of the case.
+        /// Index of the case; constant while a frame is computed.
         pub which: Wire<In>,
-        /// One coefficient of four taxels, signed.
+        /// One coefficient of four taxels, signed; valid with `fill`.
         pub fill_quad: Wire<In>,
         /// `fill_quad` holds a coefficient.
         pub fill: Signal<In, Bit>,
@@ -83,9 +83,9 @@ ports! {
         pub fill_address: Wire<In>,
         /// All coefficients have been written: start the search.
         pub start: Signal<In, Bit>,
-        /// Search; otherwise p(0) is the result. Valid with `start`.
+        /// The subarray is searched, else p(0) is the result; valid with `start`.
         pub enabled: Signal<In, Bit>,
-        /// Four values p(μ*), `search_bits[0]` each, signed.
+        /// Four values p(μ*), `search_bits[0]` each, signed; valid with `values_valid`.
         pub values: Wire<Out>,
         /// `values` holds a quad.
         pub values_valid: Signal<Out, Bit>,
@@ -95,13 +95,13 @@ ports! {
         pub values_begin: Signal<Out, Bit>,
         /// All values have been output; high for one cycle.
         pub done: Signal<Out, Bit>,
-        /// Best position, x, in grid steps of the level, signed.
+        /// Best position, x, in grid steps of the level, signed; valid with `judged` and `settled`.
         pub best_x: Wire<Out>,
-        /// Best position, y, in grid steps of the level, signed.
+        /// Best position, y, in grid steps of the level, signed; valid with `judged` and `settled`.
         pub best_y: Wire<Out>,
-        /// Score of the best candidate, signed, 2^−6.
+        /// Score of the best candidate, signed, 2^−6; valid with `judged` and `settled`.
         pub score: Wire<Out>,
-        /// A candidate was found.
+        /// A candidate was found; valid with `settled`.
         pub found: Signal<Out, Bit>,
         /// The candidates of a sweep have been compared; high for one cycle.
         pub judged: Signal<Out, Bit>,

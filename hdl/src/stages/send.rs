@@ -14,7 +14,7 @@ pub struct Send {
     pub clk: Signal<In, Clock>,
     /// Synchronous reset, active high.
     pub rst: Signal<In, Bit>,
-    /// Index of the case of the frame being sent.
+    /// Index of the case of the frame being sent; constant until its last beat.
     pub which: Wire<In>,
     /// The first values are available: start requesting beats.
     pub start: Signal<In, Bit>,

@@ -14,15 +14,15 @@ pub struct Unfold {
     pub clk: Signal<In, Clock>,
     /// Synchronous reset, active high.
     pub rst: Signal<In, Bit>,
-    /// Index of the case.
+    /// Index of the case; constant while a frame is computed.
     pub which: Wire<In>,
     /// A new subarray.
     pub start: Signal<In, Bit>,
-    /// Four parities of a v_ij, `vector_bits` each, signed.
+    /// Four parities of a v_ij, `vector_bits` each, signed; valid with `words_valid`.
     pub words: Wire<In>,
     /// `words` holds a quad.
     pub words_valid: Signal<In, Bit>,
-    /// One coefficient of four taxels, two bits wider, signed; two cycles after `words`.
+    /// One coefficient of four taxels, two bits wider, signed; valid with `taxels_valid`, two cycles after `words`.
     pub taxels: Wire<Out>,
     /// `taxels` holds a quad.
     pub taxels_valid: Signal<Out, Bit>,

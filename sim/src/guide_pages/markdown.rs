@@ -28,6 +28,20 @@ pub struct Difference {
     pub command: Option<String>,
 }
 
+impl Difference {
+    /// The first line in which two texts differ.
+    pub fn of_lines(page: &str, command: &str) -> Option<Self> {
+        let (mut page, mut command) = (page.lines(), command.lines());
+        loop {
+            let pair = (page.next(), command.next());
+            if pair.0 != pair.1 {
+                return Some(Difference { page: pair.0.map(str::to_owned), command: pair.1.map(str::to_owned) });
+            }
+            pair.0?;
+        }
+    }
+}
+
 impl fmt::Display for Difference {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
         let row = |row: &Option<String>| row.clone().unwrap_or_else(|| "no such row".into());

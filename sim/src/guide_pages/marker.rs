@@ -1,9 +1,12 @@
-//! Markers: HTML comments of a Markdown page that say which command prints a table.
+//! Markers: HTML comments of a Markdown page that say which command prints a table or a piece of code.
 //!
 //! ```text
 //! <!-- table: COMMAND ; attribute: value ; … -->      may go on over several lines
 //! | … |                                                what the command printed
 //! <!-- end of table -->
+//! <!-- code: COMMAND ; language: verilog -->
+//! a fenced block                                       all that the command printed
+//! <!-- end of code -->
 //! ```
 //!
 //! Code fences are skipped, so that a page can show a marker.
@@ -12,21 +15,19 @@ use std::ops::Range;
 
 use anyhow::{bail, ensure, Result};
 
-/// What a marker begins with.
-const BEGIN: &str = "<!-- table:";
+/// What a marker begins with, and the line behind its content: of a table, of code.
+const KINDS: [(&str, &str); 2] = [("<!-- table:", "<!-- end of table -->"), ("<!-- code:", "<!-- end of code -->")];
 /// What ends a comment.
 const CLOSE: &str = "-->";
-/// The line behind a table.
-const END: &str = "<!-- end of table -->";
 /// What begins and ends a block of code.
 const FENCES: [&str; 2] = ["```", "~~~"];
 
-/// A table of a page.
+/// A table or a piece of code of a page.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Marker {
     /// Line of the marker, from 1.
     pub line: usize,
-    /// Prints the table.
+    /// Prints the table or code.
     pub command: String,
     /// Prints a part of it in less time.
     pub check: Option<String>,
@@ -36,6 +37,8 @@ pub struct Marker {
     pub table: usize,
     /// Columns to keep; without any all.
     pub columns: Vec<String>,
+    /// Language of code; `None` for a table.
+    pub language: Option<String>,
     /// How long the command takes, for the reader of the page.
     pub takes: Option<String>,
     /// Bytes between the marker's line and the end's.
@@ -46,6 +49,11 @@ impl Marker {
     /// The check's command where it is to be taken, and there is one.
     pub fn quick_check(&self, quick: bool) -> Option<&str> {
         self.check.as_deref().filter(|_| quick)
+    }
+
+    /// The line behind the content.
+    fn end(&self) -> &'static str {
+        KINDS[usize::from(self.language.is_some())].1
     }
 }
 
@@ -67,11 +75,14 @@ pub fn markers(page: &str, text: &str) -> Result<Vec<Marker>> {
             fenced = !fenced;
         } else if fenced {
             continue;
-        } else if line == END {
-            let Some(mut marker) = open.take() else { bail!("{page}:{number}: `{END}` without a marker before it") };
+        } else if let Some((_, end)) = KINDS.iter().find(|(_, end)| *end == line) {
+            let closes = |marker: &Marker| marker.end() == *end;
+            let Some(mut marker) = open.take().filter(closes) else {
+                bail!("{page}:{number}: `{end}` without a marker before it")
+            };
             marker.content.end = begin;
             markers.push(marker);
-        } else if line.starts_with(BEGIN) {
+        } else if let Some((begin, end)) = KINDS.iter().find(|(begin, _)| line.starts_with(begin)) {
             if let Some(marker) = &open {
                 bail!("{}", unclosed(page, marker));
             }
@@ -81,9 +92,14 @@ pub fn markers(page: &str, text: &str) -> Result<Vec<Marker>> {
                 offset += next.len();
                 comment.extend([" ", next.trim()]);
             }
-            let inner = comment[BEGIN.len()..comment.len() - CLOSE.len()].trim();
+            let inner = comment[begin.len()..comment.len() - CLOSE.len()].trim();
             let mut marker = parse(inner).map_err(|reason| reason.context(format!("{page}:{number}")))?;
             (marker.line, marker.content) = (number, offset..offset);
+            let is_code = *end == KINDS[1].1;
+            ensure!(
+                is_code == marker.language.is_some(),
+                "{page}:{number}: code wants one attribute `language`, a table none"
+            );
             open = Some(marker);
         }
     }
@@ -94,7 +110,7 @@ pub fn markers(page: &str, text: &str) -> Result<Vec<Marker>> {
 }
 
 fn unclosed(page: &str, marker: &Marker) -> String {
-    format!("{page}:{}: no `{END}` behind the table of `{}`", marker.line, marker.command)
+    format!("{page}:{}: no `{}` behind what `{}` prints", marker.line, marker.end(), marker.command)
 }
 
 /// Command and attributes.
@@ -109,6 +125,7 @@ fn parse(inner: &str) -> Result<Marker> {
         check_columns: Vec::new(),
         table: 1,
         columns: Vec::new(),
+        language: None,
         takes: None,
         content: 0..0,
     };
@@ -122,12 +139,13 @@ fn parse(inner: &str) -> Result<Marker> {
             "check" => marker.check = Some(value.to_owned()),
             "check columns" => marker.check_columns = columns(value),
             "columns" => marker.columns = columns(value),
+            "language" => marker.language = Some(value.to_owned()),
             "takes" => marker.takes = Some(value.to_owned()),
             "table" => match value.parse() {
                 Ok(table) if table > 0 => marker.table = table,
                 _ => bail!("table: {value:?}: wanted a number from 1"),
             },
-            _ => bail!("unknown attribute {name:?}; known: check, check columns, columns, table, takes"),
+            _ => bail!("unknown attribute {name:?}; known: check, check columns, columns, language, table, takes"),
         }
     }
     ensure!(marker.check_columns.is_empty() || marker.check.is_some(), "check columns: there is no check");
@@ -165,7 +183,7 @@ mod tests {
     #[test]
     fn what_is_not_closed_is_named_with_page_and_line() {
         let open = "a\n<!-- table: dermis a -->\n| 1 |\n";
-        assert_eq!(error(open), "a.md:2: no `<!-- end of table -->` behind the table of `dermis a`");
+        assert_eq!(error(open), "a.md:2: no `<!-- end of table -->` behind what `dermis a` prints");
         assert_eq!(error(&format!("{open}{open}")), error(open));
         assert_eq!(error("\n<!-- table: dermis a\n"), "a.md:2: the comment has no `-->`");
         assert_eq!(error("<!-- end of table -->"), "a.md:1: `<!-- end of table -->` without a marker before it");
@@ -180,6 +198,17 @@ mod tests {
         assert_eq!(of("takes: 1 s ; takes: 2 s"), "a.md:1: takes: wanted one value");
         assert_eq!(of("check columns: a"), "a.md:1: check columns: there is no check");
         assert_eq!(error("<!-- table: ; check: dermis b -->"), "a.md:1: a table without a command");
+    }
+
+    #[test]
+    fn code_has_a_language_and_its_own_end() {
+        let text =
+            "<!-- code: dermis a ; language: rust -->\n```rust\n<!-- end of code -->\n```\n<!-- end of code -->\n";
+        let found = markers("a.md", text).unwrap();
+        assert_eq!(found[0].language.as_deref(), Some("rust"));
+        assert_eq!(&text[found[0].content.clone()], "```rust\n<!-- end of code -->\n```\n");
+        assert!(error("<!-- code: dermis a -->\n<!-- end of code -->\n").contains("wants one attribute `language`"));
+        assert!(error("<!-- code: dermis a ; language: rust -->\n<!-- end of table -->\n").contains("without a marker"));
     }
 
     #[test]

@@ -4,6 +4,7 @@
 //! |---|---|---|
 //! | `data-flow.svg` | stages of the hardware and the words between them | always the same |
 //! | `feet.svg` | forces of two feet, bit-true model | always the same |
+//! | `timing-STAGE.svg` | the ports of a stage during a frame, rust-hdl's simulation | always the same |
 //! | `time-sensor-1-shear.svg` | shear error against the time of a frame | measured anew |
 
 use std::path::Path;
@@ -13,12 +14,14 @@ use dermis_golden::fixed::Model;
 use dermis_golden::frame::Frame;
 use dermis_golden::partition::Case;
 use dermis_golden::scene::{Condition, Scene};
+use dermis_hdl::describe::Trace;
 
 use super::document::Picture;
 use super::measure::{measure, Options};
-use super::pictures::{data_flow, force_field, Outline, FLOW_SCENE};
+use super::pictures::{data_flow, force_field, waveform, Outline, FLOW_SCENE};
 use super::sections::time_pictures;
 use super::style::standalone;
+use crate::block::timing::{self, timing};
 use crate::jobs::Interrupt;
 use crate::progress::Progress;
 
@@ -44,8 +47,30 @@ impl PictureFile {
 ///
 /// # Errors
 /// A picture that cannot be written.
-pub fn fixed_pictures() -> Result<Vec<PictureFile>> {
-    Ok(vec![flow()?, feet()?])
+pub fn fixed_pictures(build: &Path) -> Result<Vec<PictureFile>> {
+    let mut files = vec![flow()?, feet()?];
+    let scene = Scene::builtin(timing::SCENE)?;
+    let stages = timing::traces(&scene, build)?;
+    for stage in stages.iter().filter(|trace| !trace.block.instance.contains('$')) {
+        files.push(timing_picture(&scene.name, stage)?);
+    }
+    let mut choosing = scene;
+    choosing.partition.case = Case::Adaptive;
+    for stage in timing::traces(&choosing, build)?.iter().filter(|trace| trace.block.name == "choose") {
+        files.push(timing_picture(&choosing.name, stage)?);
+    }
+    Ok(files)
+}
+
+/// The picture of a block's ports during a frame.
+///
+/// # Errors
+/// A picture that cannot be written.
+pub fn timing_picture(scene: &str, trace: &Trace) -> Result<PictureFile> {
+    let block = &trace.block;
+    let title = format!("Timing of {} for {scene}", block.name);
+    let description = format!("{} Its ports in the cycles of one frame in which a handshake changes.", block.purpose);
+    Ok(PictureFile::new(&format!("timing-{}", block.name), &waveform(&timing(trace))?, &title, &description))
 }
 
 fn flow() -> Result<PictureFile> {

@@ -5,12 +5,14 @@ mod field;
 mod flow;
 mod objective_map;
 mod scatter;
+mod waveform;
 
 pub use bars::{bars, Bars};
 pub use field::{force_field, stress_map, Outline};
 pub use flow::{data_flow, FLOW_SCENE};
 pub use objective_map::objective;
 pub use scatter::{scatter, Guide, Scatter, Series};
+pub use waveform::waveform;
 
 use anyhow::Result;
 use plotters::coord::Shift;

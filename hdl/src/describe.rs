@@ -1,0 +1,344 @@
+//! The blocks of the parallel engine that the guide describes: ports, kernels, recordings of a run.
+//!
+//! Name, direction and width of a port come from a walk over the built engine, its meaning from the comment of the
+//! field in the block's source. A comment reads `MEANING; WHEN.`: behind the first semicolon it says when the port is
+//! valid. A single bit without it is a control signal, valid in every cycle.
+
+use std::collections::BTreeMap;
+
+use dermis_golden::board::EngineKind;
+use dermis_golden::fixed::Model;
+use rust_hdl::core::probe::Probe;
+use rust_hdl::prelude::*;
+use serde::Serialize;
+use thiserror::Error;
+
+use crate::generate::HdlError;
+use crate::language::{Attributes, Hierarchy, SEPARATOR};
+use crate::simulate::{design, Design};
+use crate::wire::Word;
+
+/// What a single bit says about its validity when its comment does not.
+const ALWAYS: &str = "in every cycle";
+
+/// Name of the engine's module where the scene does not matter.
+const ENGINE: &str = "engine";
+
+/// A block: name, instances from the engine on, source.
+struct Entry {
+    name: &'static str,
+    instance: &'static str,
+    source: &'static str,
+}
+
+macro_rules! entries {
+    ($($name:literal $instance:literal $file:literal,)+) => {
+        [$(Entry { name: $name, instance: $instance, source: include_str!($file) },)+]
+    };
+}
+
+/// The stages in the order of the data flow, then blocks that the guide takes as examples.
+const ENTRIES: [Entry; 12] = entries! {
+    "prepare" "prepare" "stages/prepare.rs",
+    "receive" "receive" "stages/receive.rs",
+    "choose" "receive__choose" "stages/choose.rs",
+    "normalise" "normalise" "stages/normalise.rs",
+    "fold" "fold" "stages/fold.rs",
+    "pass" "pass" "stages/pass.rs",
+    "rescale" "rescale" "stages/rescale.rs",
+    "unfold" "unfold" "stages/unfold.rs",
+    "search" "search" "stages/search.rs",
+    "force" "forces" "stages/force.rs",
+    "send" "send" "stages/send.rs",
+    "butterfly" "fold__butterfly" "primitives/butterfly.rs",
+};
+
+/// Why a block cannot be described.
+#[derive(Debug, Error)]
+pub enum DescribeError {
+    /// The scene's engine has no such block.
+    #[error("{scene} has no block {name:?}; its blocks: {}", known.join(", "))]
+    Unknown {
+        /// The scene.
+        scene: String,
+        /// The name asked for.
+        name: String,
+        /// The names that it has.
+        known: Vec<&'static str>,
+    },
+    /// The serial engine has other blocks.
+    #[error("{scene} on board {board}: the serial engine is not described; choose a board with engine = \"parallel\"")]
+    Serial {
+        /// The scene.
+        scene: String,
+        /// The board.
+        board: String,
+    },
+    /// The engine cannot be built.
+    #[error(transparent)]
+    Hardware(#[from] HdlError),
+}
+
+/// A port of a block.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+pub struct PortText {
+    /// Its name, the same in Rust and Verilog.
+    pub name: String,
+    /// Whether the block drives it.
+    pub output: bool,
+    /// Width in bits.
+    pub bits: usize,
+    /// What it carries.
+    pub meaning: String,
+    /// When it is valid.
+    pub valid: String,
+}
+
+/// A block with its ports.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+pub struct BlockText {
+    /// Name of the stage or block.
+    pub name: &'static str,
+    /// Instances from the engine on, separated by two underscores.
+    pub instance: &'static str,
+    /// First sentence of its source.
+    pub purpose: String,
+    /// The ports in the order of the source.
+    pub ports: Vec<PortText>,
+}
+
+/// Ports of the described blocks at one moment.
+#[derive(Default)]
+struct Ports {
+    path: Vec<String>,
+    /// By instance: name, direction, width, value.
+    found: BTreeMap<&'static str, Vec<(String, bool, usize, Word)>>,
+}
+
+impl Ports {
+    fn of(engine: &dyn Design) -> Self {
+        let mut ports = Ports::default();
+        engine.accept("top", &mut ports);
+        ports
+    }
+}
+
+impl Probe for Ports {
+    fn visit_start_scope(&mut self, name: &str, _node: &dyn Block) {
+        self.path.push(name.to_owned());
+    }
+
+    fn visit_end_scope(&mut self, _name: &str, _node: &dyn Block) {
+        self.path.pop();
+    }
+
+    fn visit_atom(&mut self, name: &str, signal: &dyn Atom) {
+        let output = match signal.kind() {
+            AtomKind::InputParameter => false,
+            AtomKind::OutputParameter => true,
+            _ => return,
+        };
+        let instance = self.path.get(1..).unwrap_or_default().join(SEPARATOR);
+        let Some(entry) = ENTRIES.iter().find(|entry| entry.instance == instance) else { return };
+        let port = (name.to_owned(), output, signal.bits(), value(signal));
+        self.found.entry(entry.instance).or_default().push(port);
+    }
+}
+
+/// The signal's value.
+fn value(signal: &dyn Atom) -> Word {
+    let mut word = Word::default();
+    match signal.vcd() {
+        VCDValue::Single(bit) => word.set(0, 1, u64::from(bit == vcd::Value::V1)),
+        VCDValue::Vector(bits) => {
+            let ones = bits.iter().rev().enumerate().filter(|(_, bit)| **bit == vcd::Value::V1);
+            ones.for_each(|(at, _)| word.set(at, 1, 1));
+        }
+        VCDValue::String(_) | VCDValue::Composite(_) => {}
+    }
+    word
+}
+
+/// The described blocks of the engine of `model`, in the order of the data flow.
+///
+/// # Errors
+/// [`DescribeError::Serial`]; an engine that cannot be built.
+pub fn blocks(model: &Model) -> Result<Vec<BlockText>, DescribeError> {
+    Ok(describe(Ports::of(&*engine(model)?)))
+}
+
+/// The block `name` of the engine of `model`.
+///
+/// # Errors
+/// As [`blocks`]; [`DescribeError::Unknown`].
+pub fn block(model: &Model, name: &str) -> Result<BlockText, DescribeError> {
+    let all = blocks(model)?;
+    let known: Vec<&str> = all.iter().map(|block| block.name).collect();
+    let unknown = DescribeError::Unknown { scene: model.scene.name.clone(), name: name.to_owned(), known };
+    all.into_iter().find(|block| block.name == name).ok_or(unknown)
+}
+
+/// The Verilog of a block: its ports with their comments, then the body as in the generated file.
+///
+/// # Errors
+/// As [`fn@block`].
+pub fn block_verilog(model: &Model, name: &str) -> Result<String, DescribeError> {
+    let block = block(model, name)?;
+    let hierarchy = Hierarchy::of(&*engine(model)?);
+    let text = hierarchy.module(block.instance, ENGINE, &Attributes::new(), &port_comment).unwrap_or_default();
+    Ok(format!("// {}\n{text}", block.purpose))
+}
+
+/// What the Verilog says of a port of a described block, or of the engine, whose path is empty: meaning, and when it is
+/// valid.
+pub(crate) fn port_comment(path: &str, port: &str) -> Option<String> {
+    let own = || ENTRIES.iter().find(|entry| entry.instance == path).map(|entry| entry.source);
+    let source = if path.is_empty() { Some(include_str!("engine.rs")) } else { own() };
+    comments(source?).remove(port)
+}
+
+/// The Rust source of a block, its test included.
+///
+/// # Errors
+/// As [`fn@block`].
+pub fn block_source(model: &Model, name: &str) -> Result<&'static str, DescribeError> {
+    let block = block(model, name)?;
+    Ok(ENTRIES.iter().find(|entry| entry.name == block.name).map_or("", |entry| entry.source))
+}
+
+fn engine(model: &Model) -> Result<Box<dyn Design>, DescribeError> {
+    match model.board.engine {
+        EngineKind::Parallel => Ok(design(model)?),
+        EngineKind::Serial => {
+            Err(DescribeError::Serial { scene: model.scene.name.clone(), board: model.board.name.clone() })
+        }
+    }
+}
+
+fn describe(mut ports: Ports) -> Vec<BlockText> {
+    let described = |entry: &Entry| {
+        let comments = comments(entry.source);
+        let text = |(name, output, bits, _): (String, bool, usize, Word)| {
+            let comment = comments.get(name.as_str()).map(String::as_str).unwrap_or_default();
+            let (meaning, valid) = comment.split_once("; ").unwrap_or((comment, if bits == 1 { ALWAYS } else { "" }));
+            let tidy = |text: &str| text.trim_start_matches("valid ").trim_end_matches('.').to_owned();
+            PortText { name, output, bits, meaning: tidy(meaning), valid: tidy(valid) }
+        };
+        let ports = ports.found.remove(entry.instance)?.into_iter().map(text).collect();
+        let purpose = entry.source.lines().next().and_then(|line| line.strip_prefix("//! ")).unwrap_or_default();
+        Some(BlockText { name: entry.name, instance: entry.instance, purpose: purpose.to_owned(), ports })
+    };
+    ENTRIES.iter().filter_map(described).collect()
+}
+
+/// The comments of the public fields of a source that are signals, by name.
+pub(crate) fn comments(source: &str) -> BTreeMap<&str, String> {
+    let mut found = BTreeMap::new();
+    let mut comment = String::new();
+    for line in source.lines().map(str::trim) {
+        if let Some(text) = line.strip_prefix("/// ") {
+            comment.push_str(if comment.is_empty() { "" } else { " " });
+            comment.push_str(text);
+            continue;
+        }
+        let field = line.strip_prefix("pub ").and_then(|field| field.split_once(": "));
+        if let Some((name, _)) = field.filter(|(_, ty)| ty.starts_with("Signal<") || ty.starts_with("Wire<")) {
+            found.insert(name, std::mem::take(&mut comment));
+        }
+        comment.clear();
+    }
+    found
+}
+
+/// A run's values of a block's ports.
+#[derive(Clone, Debug)]
+pub struct Trace {
+    /// The block.
+    pub block: BlockText,
+    /// For each cycle the value of each port, before the rising edge that ends the cycle.
+    pub cycles: Vec<Vec<Word>>,
+}
+
+/// The engine in rust-hdl's simulation, with the ports of the described blocks recorded in every cycle.
+pub struct Recorder {
+    engine: Box<dyn Design>,
+    traces: Vec<Trace>,
+}
+
+impl Recorder {
+    /// Starts the engine of `model`.
+    ///
+    /// # Errors
+    /// As [`blocks`].
+    pub fn new(model: &Model) -> Result<Self, DescribeError> {
+        let engine = engine(model)?;
+        let traces = describe(Ports::of(&*engine)).into_iter().map(|block| Trace { block, cycles: Vec::new() });
+        Ok(Recorder { traces: traces.collect(), engine })
+    }
+
+    /// What was recorded, one trace per block.
+    pub fn into_traces(self) -> Vec<Trace> {
+        self.traces
+    }
+}
+
+impl crate::device::Device for Recorder {
+    fn cycle(&mut self, inputs: &crate::device::Inputs) -> crate::device::Outputs {
+        let Recorder { engine, traces } = self;
+        crate::simulate::cycle(&mut **engine, inputs, &[], |engine| {
+            let mut ports = Ports::of(engine);
+            for trace in traces {
+                let values = ports.found.remove(trace.block.instance).unwrap_or_default();
+                trace.cycles.push(values.into_iter().map(|(.., value)| value).collect());
+            }
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use dermis_golden::partition::Case;
+    use dermis_golden::scene::Scene;
+
+    fn model(adaptive: bool) -> Model {
+        let mut scene = Scene::builtin("eight-by-eight").unwrap();
+        if adaptive {
+            scene.partition.case = Case::Adaptive;
+        }
+        Model::new(&scene).unwrap()
+    }
+
+    #[test]
+    fn every_port_has_its_meaning_and_says_when_it_is_valid() {
+        let all = blocks(&model(true)).unwrap();
+        assert_eq!(all.len(), ENTRIES.len());
+        for block in &all {
+            assert!(!block.purpose.is_empty() && block.ports.len() >= 3, "{block:?}");
+            for port in &block.ports {
+                assert!(!port.meaning.is_empty() && !port.valid.is_empty(), "{}: {port:?}", block.name);
+            }
+        }
+    }
+
+    #[test]
+    fn ports_are_those_of_the_scene() {
+        let model = model(false);
+        let fold = block(&model, "fold").unwrap();
+        let port = |name: &str| fold.ports.iter().find(|port| port.name == name).unwrap();
+        assert_eq!(port("folded").bits, 4 * model.formats.fold_bits as usize);
+        assert!(port("folded").output && !port("normalised").output);
+        let error = block(&model, "choose").unwrap_err().to_string();
+        assert!(error.contains("no block \"choose\"; its blocks: prepare, receive, normalise, fold"), "{error}");
+    }
+
+    #[test]
+    fn verilog_is_that_of_the_kernel() {
+        let model = model(false);
+        let text = block_verilog(&model, "butterfly").unwrap();
+        assert!(text.contains("\nmodule engine__fold__butterfly (\n    // Clock"), "{text}");
+        assert!(text.contains("always @(posedge clk)"), "{text}");
+        let text = block_verilog(&model, "fold").unwrap();
+        assert!(text.contains("engine__fold__butterfly butterfly (\n"), "{text}");
+    }
+}

@@ -1,0 +1,30 @@
+//! Tables of `dermis block`.
+
+use dermis_hdl::describe::BlockText;
+
+use super::table::aligned;
+
+/// The ports of a block.
+pub fn ports(block: &BlockText) -> String {
+    let row = |port: &dermis_hdl::describe::PortText| {
+        let direction = if port.output { "out" } else { "in" };
+        let cell = |text: &str| text.replace('|', "\\|");
+        vec![
+            format!("`{}`", port.name),
+            direction.to_owned(),
+            cell(&port.meaning),
+            cell(&port.valid),
+            port.bits.to_string(),
+        ]
+    };
+    aligned(4, &["port", "direction", "meaning", "valid", "bits"], block.ports.iter().map(row).collect())
+}
+
+/// The blocks of an engine.
+pub fn blocks(all: &[BlockText]) -> String {
+    let row = |block: &BlockText| {
+        let (name, path) = (format!("`{}`", block.name), format!("`{}`", block.instance));
+        vec![name, path, block.purpose.clone(), block.ports.len().to_string()]
+    };
+    aligned(3, &["block", "instance", "does", "ports"], all.iter().map(row).collect())
+}
