@@ -27,8 +27,10 @@
 
 use std::path::PathBuf;
 
+use dermis_golden::fixed::Model;
 use dermis_golden::frame::Frame;
 use dermis_golden::scene::Scene;
+use dermis_hdl::generate;
 
 /// Scenes verified on the shipped frames, with the limit of cycles from the last input to the last output beat.
 pub const SCENES: [(&str, u64); 2] = [("sensor-1", 1_400), ("eight-by-eight", 900)];
@@ -42,6 +44,16 @@ pub fn scene(name: &str) -> (Scene, Vec<Frame>) {
     let frames = Frame::shipped(&scene);
     assert!(!frames.is_empty(), "{name} has no frames");
     (scene, frames)
+}
+
+/// The Verilog of a scene's engine without its comments, which name stages that a scene may lack.
+///
+/// # Panics
+/// If no hardware can be generated.
+pub fn verilog_code(scene: &Scene) -> String {
+    let generated = generate(&Model::new(scene).expect("a model")).expect("hardware");
+    let lines = generated.files[0].text.lines().filter(|line| !line.trim_start().starts_with("//"));
+    lines.collect::<Vec<_>>().join("\n")
 }
 
 /// The workspace's build folder; libraries that `make run` has built are used here too.

@@ -13,7 +13,7 @@ use dermis_sim::cosim::Vector;
 use dermis_sim::drive::{record, InputFrame, Stimulus};
 use dermis_sim::hardware::{Hardware, Simulator};
 use dermis_sim::verify::verify;
-use dermis_tests::{build_dir, scene, SCENES};
+use dermis_tests::{build_dir, scene, verilog_code, SCENES};
 
 /// Number of flips tried in each scene.
 const FLIPS: usize = 100;
@@ -110,8 +110,7 @@ fn it_costs_some_logic_and_nothing_else() {
 
 #[test]
 fn it_is_left_out_by_default() {
-    let text = |scene: &Scene| generate(&Model::new(scene).unwrap()).unwrap().files[0].text.clone();
     let logic = ["signature", "odd_lanes", "damages"];
-    let (with, without) = (text(&checked("eight-by-eight").0), text(&scene("eight-by-eight").0));
+    let (with, without) = (verilog_code(&checked("eight-by-eight").0), verilog_code(&scene("eight-by-eight").0));
     assert!(logic.iter().all(|name| with.contains(name)) && !logic.iter().any(|name| without.contains(name)));
 }

@@ -5,6 +5,7 @@ use dermis_golden::scene::Scene;
 use dermis_hdl::explain::explain;
 use dermis_hdl::generate;
 use dermis_hdl::usage::total;
+use dermis_tests::verilog_code;
 
 fn model(more: &str) -> Model {
     let sensor = "[sensor]\nrows = 6\ncols = 6\npitch_x_mm = 3.0\npitch_y_mm = 4.0\nthickness_mm = 3.0\n";
@@ -57,7 +58,7 @@ fn what_the_scene_has_is_not_left_out() {
 
 #[test]
 fn absent_stages_leave_no_logic() {
-    let verilog = |more: &str| generate(&model(more)).unwrap().files[0].text.clone();
+    let verilog = |more: &str| verilog_code(&model(more).scene);
     let bare = verilog("[search]\nmu_max = 0\n");
     for word in ["taylor", "candidates", "sums [", "entries [", "x__mu [", "below <="] {
         assert!(!bare.contains(word), "{word}");
