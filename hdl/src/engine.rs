@@ -39,7 +39,7 @@ one_of! {
 impl Receiver {
     fn new(model: &Model) -> Self {
         match model.chooses() {
-            false => Receiver::Receive(Box::new(Receive::new(model))),
+            false => Receiver::Receive(Box::new(Receive::new(model, 0))),
             true => Receiver::Banks(Box::new(Banks::new(model))),
         }
     }

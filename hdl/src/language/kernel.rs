@@ -197,6 +197,8 @@ pub struct Memory {
     pub style: Option<String>,
     /// What is read in the cycle of a write to the same address is not used: attribute `no_rw_check`.
     pub unchecked: bool,
+    /// What it holds, by which a plan of the memories refers to it.
+    pub label: Option<String>,
     pub(crate) writes: Vec<Write>,
 }
 

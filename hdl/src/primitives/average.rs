@@ -1,5 +1,6 @@
 //! Sums of 2^k frames, taxel by taxel.
 
+use dermis_golden::fixed::resources::Holds;
 use rust_hdl::prelude::*;
 
 use super::counter::count_bits;
@@ -77,7 +78,7 @@ fn kernel(taxels: usize, bits: usize, power: usize) -> Kernel {
     let (bit, index, wide) = (Type::unsigned(1), Type::unsigned(count_bits(taxels)), bits + power);
     let (rst, data) = (k.input("rst", 1), k.input("s_axis_tdata", bits));
     let [offered, tlast, ready] = ["s_axis_tvalid", "s_axis_tlast", "m_axis_tready"].map(|name| k.input(name, 1));
-    let sums = k.memory("sums", taxels, wide, Contents::Undefined);
+    let sums = k.memory("sums", taxels, wide, Contents::Undefined).holds(Holds::Average);
     let taxel = k.state("taxel", index, rst, 0);
     let frame = k.state("frame", Type::unsigned(power), rst, 0);
     let [missed, held, valid] = ["missed", "held", "m_axis_tvalid"].map(|name| k.state(name, bit, rst, 0));

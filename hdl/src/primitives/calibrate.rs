@@ -1,6 +1,7 @@
 //! Codes to stress: subtracts the zero and multiplies by the gain of each taxel, from a table in a memory file.
 
 use dermis_golden::fixed::prepare::{Prepare, GAIN_BITS, GAIN_FRACTION};
+use dermis_golden::fixed::resources::Holds;
 use rust_hdl::prelude::*;
 
 use super::counter::count_bits;
@@ -91,7 +92,7 @@ fn kernel(zero: &[i32], gain: Option<&[i32]>, taxels: usize, bits: usize) -> Ker
     let (rst, data) = (k.input("rst", 1), k.input("s_axis_tdata", bits));
     let [offered, tlast, ready] = ["s_axis_tvalid", "s_axis_tlast", "m_axis_tready"].map(|name| k.input(name, 1));
     let contents = Contents::File { name: CALIBRATION_FILE.to_owned(), words: (0..taxels).map(word).collect() };
-    let entries = k.memory("entries", taxels, bits + gain_bits, contents);
+    let entries = k.memory("entries", taxels, bits + gain_bits, contents).holds(Holds::Calibration);
     let taxel = k.state("taxel", Type::unsigned(count_bits(taxels)), rst, 0);
     let entry = k.register("entry", Type::unsigned(bits + gain_bits));
     let code = k.register("code", Type::signed(bits));

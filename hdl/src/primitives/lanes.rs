@@ -2,6 +2,7 @@
 
 use dermis_golden::fixed::check::{signature, POLYNOMIAL, START};
 use dermis_golden::fixed::formats::{Formats, MULTIPLIER_BITS};
+use dermis_golden::fixed::resources::Holds;
 use dermis_golden::fixed::Model;
 use rust_hdl::prelude::*;
 
@@ -163,7 +164,7 @@ impl Shape {
         let (valid, control) = (k.input("valid", 1), k.input("control", self.control_bits));
         let words = self.memory.iter().map(|word| limbs(word)).collect();
         let contents = Contents::File { name: MEMORY_FILE.to_owned(), words };
-        let memory = k.memory("memory", self.memory.len(), lanes * M, contents);
+        let memory = k.memory("memory", self.memory.len(), lanes * M, contents).holds(Holds::Coefficients);
         let word = k.delay("word", memory.read(address));
         let coefficients = k.delay("coefficients", word);
 

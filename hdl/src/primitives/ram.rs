@@ -1,5 +1,6 @@
 //! Simple dual-port memory: one write port with an enable per field, one read port with one or two registers.
 
+use dermis_golden::fixed::resources::Holds;
 use rust_hdl::prelude::*;
 
 use super::counter::count_bits;
@@ -39,7 +40,7 @@ kernel_block!(
     outputs [read_data]
 );
 
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 struct Shape {
     depth: usize,
     fields: usize,
@@ -48,12 +49,14 @@ struct Shape {
     /// There is an output register behind the read register of the memory.
     behind: bool,
     left_out: bool,
+    /// What the memory of each field holds, as far as the plan of the memories says it.
+    holds: Vec<Holds>,
 }
 
 impl Ram {
     /// A memory of `depth` words of `fields` fields of `bits` bits.
     pub fn new(depth: usize, fields: usize, bits: usize) -> Self {
-        Ram::of(Shape { depth, fields, bits, behind: false, left_out: false })
+        Ram::of(Shape { depth, fields, bits, behind: false, left_out: false, holds: Vec::new() })
     }
 
     /// Adds an output register: `read_data` follows two cycles after `read_address`. The clock-to-output time of a
@@ -67,6 +70,11 @@ impl Ram {
         Ram::of(Shape { left_out: true, ..self._shape })
     }
 
+    /// With what the memory of each field holds.
+    pub fn holding(self, holds: impl IntoIterator<Item = Holds>) -> Self {
+        Ram::of(Shape { holds: holds.into_iter().collect(), ..self._shape })
+    }
+
     fn of(shape: Shape) -> Self {
         let word = shape.fields * shape.bits;
         let block = Ram {
@@ -78,7 +86,7 @@ impl Ram {
             read_address: Wire::new(count_bits(shape.depth)),
             read_data: Wire::new(word),
             kernel: Body::default(),
-            _shape: shape,
+            _shape: shape.clone(),
         };
         block.bind(shape.kernel())
     }
@@ -98,6 +106,7 @@ impl Shape {
         // One array per field: every synthesiser maps it to plain memories.
         let field = |number: usize| {
             let memory = k.memory(&format!("field{number}"), self.depth, self.bits, Contents::Undefined);
+            let memory = self.holds.get(number).map_or(memory, |holds| memory.holds(holds));
             memory.write(write.at(number), write_address, data.slice(number * self.bits, self.bits));
             let held = k.register(&format!("read{number}"), Type::unsigned(self.bits));
             k.when(read, || held.set(memory.read(read_address)));
@@ -120,7 +129,7 @@ mod tests {
     use crate::language::testbench::{check, random_words, Reference};
     use crate::wire::Word;
 
-    const SHAPE: Shape = Shape { depth: 11, fields: 3, bits: 30, behind: false, left_out: false };
+    const SHAPE: Shape = Shape { depth: 11, fields: 3, bits: 30, behind: false, left_out: false, holds: Vec::new() };
 
     /// Fields of the memory and of the registers behind it.
     struct Fields {

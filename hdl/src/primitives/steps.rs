@@ -1,6 +1,6 @@
 //! Schedule of the matrix passes as a table of instructions.
 
-use dermis_golden::fixed::resources::operand_vectors;
+use dermis_golden::fixed::resources::{operand_vectors, Holds};
 use dermis_golden::fixed::schedule::{schedule, Operand};
 use dermis_golden::fixed::Model;
 use rust_hdl::prelude::*;
@@ -289,7 +289,8 @@ impl Shape {
         };
         let contents = Contents::File { name: COLUMN_FILE.to_owned(), words: self.list.iter().map(word).collect() };
         k.comment("Column of each coefficient word, and its transposed address above it if one is needed.");
-        let columns = k.memory("columns", self.list.len(), bits << usize::from(self.across), contents);
+        let columns =
+            k.memory("columns", self.list.len(), bits << usize::from(self.across), contents).holds(Holds::Columns);
         let twice = |name: &str, value: Expr<'k>| {
             let once = k.delay(&format!("{name}1"), value);
             [once, k.delay(&format!("{name}2"), once)]

@@ -1,5 +1,6 @@
 //! Search memory: every taxel's polynomial, about up to three centres.
 
+use dermis_golden::fixed::resources::Holds;
 use rust_hdl::prelude::*;
 
 use super::counter::count_bits;
@@ -129,6 +130,7 @@ fn kernel(layout: &PolynomialWord, quads: usize, fill_bits: usize, apart: bool) 
         let (width, all) = (layout.widths[index], 4 * layout.widths[index]);
         let memory = format!("memory{index}");
         let place = k.memory(&memory, BUFFERS * quads, all, Contents::Undefined).unchecked();
+        let place = place.holds(Holds::Polynomials(index));
         let from = k.register(&format!("from{index}"), Type::unsigned(bits)).keep();
         k.when(counts, || from.set(from.plus(1)));
         k.when(begins, || from.set(next_base));
@@ -141,6 +143,7 @@ fn kernel(layout: &PolynomialWord, quads: usize, fill_bits: usize, apart: bool) 
             Some(from_start) => {
                 let start = format!("start{index}");
                 let own = k.memory(&start, quads, all, Contents::Undefined).unchecked();
+                let own = own.holds(Holds::Start(index));
                 write_port(&k, (&start, own), [fill & fills, fill_address, filled]);
                 write_port(&k, (&memory, place), [write, write_to, whole]);
                 let read_start = k.delay(&format!("read_start{index}"), own.read(read_address));

@@ -2,6 +2,7 @@
 //!
 //! One frame at a time. While it is computed and sent, the next is received as soon as the frame buffer has been read.
 
+use dermis_golden::fixed::resources::Holds;
 use dermis_golden::fixed::serial::{floor_bits, product_bits, word_bits, SLOT};
 use dermis_golden::fixed::Model;
 use dermis_golden::scene::Condition;
@@ -92,18 +93,18 @@ impl Engine {
             shifted: Slice::new(32, rounded),
             mixer: SerialButterfly::new(rounded),
             pass: Pass::new(model),
-            raw: Ram::new(4 * f.quads, 1, f.acc_bits as usize),
+            raw: Ram::new(4 * f.quads, 1, f.acc_bits as usize).holding([Holds::Raw]),
             unfold: Unfold::new(f, rounded + 2),
             banks: Banks::new(f),
             walk: Walk::new(f),
             along_x: Horner::new(word),
-            turned: Ram::new(4 * SLOT as usize, 1, word),
+            turned: Ram::new(4 * SLOT as usize, 1, word).holding([Holds::Transposed]),
             along_y: Horner::new(word),
             halve: CoefficientShift::new(word, f.search_bits[0] as usize),
             nine: Candidates::new(f),
             score: Score::new(f),
-            floors: Ram::new(SLOT as usize, 1, floor_bits(f)),
-            totals: Ram::new(SLOT as usize, 1, f.score_bits as usize + 1),
+            floors: Ram::new(SLOT as usize, 1, floor_bits(f)).holding([Holds::Floors]),
+            totals: Ram::new(SLOT as usize, 1, f.score_bits as usize + 1).holding([Holds::Totals]),
             forces: force,
             computing: Default::default(),
             condition: Default::default(),

@@ -3,6 +3,7 @@
 //! As in the parallel engine ([`crate::stages::Receive`]), with a buffer of single taxels in place of quads.
 
 use dermis_golden::fixed::formats::Formats;
+use dermis_golden::fixed::resources::Holds;
 use rust_hdl::prelude::*;
 
 use crate::primitives::{count_bits, Counter, Dff, Gather, Ram};
@@ -80,7 +81,7 @@ impl Receive {
             framing: Default::default(),
             reported: Default::default(),
             taxels: Counter::new(taxels),
-            frame: Ram::new(taxels, 1, bits),
+            frame: Ram::new(taxels, 1, bits).holding([Holds::Frame { case: 0, lane: 0 }]),
             gather: Gather::new(bits, floor, 1),
             whole: Default::default(),
             broken: Default::default(),

@@ -4,7 +4,7 @@
 //! to operands: addresses (1 cycle, 3 with a column list), memories (2), selection of limb and parity (1); then the
 //! lanes.
 
-use dermis_golden::fixed::resources::operand_vectors;
+use dermis_golden::fixed::resources::{operand_vectors, Holds};
 use dermis_golden::fixed::Model;
 use rust_hdl::prelude::*;
 
@@ -82,7 +82,9 @@ impl Pass {
             column: Counter::new(quads),
             running: Default::default(),
             low_address: Slice::new(steps.operand_address.width(), count_bits(quads)),
-            vectors: vectors(Ram::new(operands.max(1) * quads, 1, parity_bits)).registered(),
+            vectors: vectors(Ram::new(operands.max(1) * quads, 1, parity_bits))
+                .holding([Holds::Operands(0)])
+                .registered(),
             filler: Filler::new(operands, &model.cases().iter().map(|case| case.formats.quads).collect::<Vec<_>>()),
             source: Delay::new(SOURCE_BITS, 2),
             control: Delay::new(control_bits(model), 3),

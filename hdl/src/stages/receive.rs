@@ -4,6 +4,7 @@
 //! `tlast` drops the frame, and the next beat starts a new one; a missing `tlast` is only recorded. Both set `framing`
 //! until `reported`.
 
+use dermis_golden::fixed::resources::Holds;
 use dermis_golden::fixed::Model;
 use rust_hdl::prelude::*;
 
@@ -114,8 +115,8 @@ impl ReceivePorts {
 has_ports!(Receive: ReceivePorts);
 
 impl Receive {
-    /// For frames in the layout of `model`, one case.
-    pub fn new(model: &Model) -> Self {
+    /// For frames in the layout of `model`, which is the case of index `case`.
+    pub fn new(model: &Model, case: usize) -> Self {
         let bits = model.formats.input_bits as usize;
         let count = model.parts.len();
         let quads = count * model.formats.quads;
@@ -125,7 +126,7 @@ impl Receive {
             scan: Scan::new(std::slice::from_ref(model)),
             blank: Blank::new(bits, taxels, &model.dead),
             spread: Spread::new(bits),
-            frame: Ram::new(quads, 4, bits).registered(),
+            frame: Ram::new(quads, 4, bits).holding((0..4).map(|lane| Holds::Frame { case, lane })).registered(),
             gather: Gather::new(bits, model.noise_floor, count),
             gathers: BitDelay::new(1),
             gathered_part: Delay::new(count_bits(count), 1),
