@@ -15,6 +15,7 @@ use dermis_golden::frame::Frame;
 use dermis_golden::partition::Case;
 use dermis_golden::scene::{Condition, Scene};
 use dermis_hdl::describe::Trace;
+use dermis_hdl::language::SEPARATOR;
 
 use super::document::Picture;
 use super::measure::{measure, Options};
@@ -51,7 +52,7 @@ pub fn fixed_pictures(build: &Path) -> Result<Vec<PictureFile>> {
     let mut files = vec![flow()?, feet()?];
     let scene = Scene::builtin(timing::SCENE)?;
     let stages = timing::traces(&scene, build)?;
-    for stage in stages.iter().filter(|trace| !trace.block.instance.contains('$')) {
+    for stage in stages.iter().filter(|trace| !trace.block.instance.contains(SEPARATOR)) {
         files.push(timing_picture(&scene.name, stage)?);
     }
     let mut choosing = scene;
