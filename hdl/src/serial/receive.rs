@@ -6,7 +6,7 @@ use dermis_golden::fixed::formats::Formats;
 use dermis_golden::fixed::resources::Holds;
 use rust_hdl::prelude::*;
 
-use crate::primitives::{count_bits, Counter, Dff, Gather, Ram};
+use crate::primitives::{count_bits, Counter, Dff, FrameStats, Ram};
 use crate::wire::Wire;
 
 /// ```text
@@ -52,7 +52,7 @@ pub struct Receive {
     pub reported: Signal<In, Bit>,
     taxels: Counter,
     frame: Ram,
-    gather: Gather,
+    gather: FrameStats,
     whole: Dff,
     broken: Dff,
     taken: Signal<Local, Bit>,
@@ -82,7 +82,7 @@ impl Receive {
             reported: Default::default(),
             taxels: Counter::new(taxels),
             frame: Ram::new(taxels, 1, bits).holding([Holds::Frame { case: 0, lane: 0 }]),
-            gather: Gather::new(bits, floor, 1),
+            gather: FrameStats::new(bits, floor, 1),
             whole: Default::default(),
             broken: Default::default(),
             taken: Default::default(),

@@ -9,7 +9,9 @@ use dermis_golden::fixed::Model;
 use rust_hdl::prelude::*;
 
 use crate::ports::{has_ports, ports};
-use crate::primitives::{count_bits, frame_quads, largest, BitDelay, Blank, Delay, Dff, Gather, Ram, Scan, Spread};
+use crate::primitives::{
+    count_bits, frame_quads, largest, BitDelay, DeadTaxelMask, Delay, Dff, FrameStats, LaneBroadcast, Ram, Scan,
+};
 use crate::wire::Wire;
 
 /// ```text
@@ -22,10 +24,10 @@ use crate::wire::Wire;
 pub struct Receive {
     ports: ReceivePorts,
     scan: Scan,
-    blank: Blank,
-    spread: Spread,
+    blank: DeadTaxelMask,
+    spread: LaneBroadcast,
     frame: Ram,
-    gather: Gather,
+    gather: FrameStats,
     gathers: BitDelay,
     gathered_part: Delay,
     gathered_code: Delay,
@@ -124,10 +126,10 @@ impl Receive {
         Receive {
             ports: ReceivePorts::new(std::slice::from_ref(model)),
             scan: Scan::new(std::slice::from_ref(model)),
-            blank: Blank::new(bits, taxels, &model.dead),
-            spread: Spread::new(bits),
+            blank: DeadTaxelMask::new(bits, taxels, &model.dead),
+            spread: LaneBroadcast::new(bits),
             frame: Ram::new(quads, 4, bits).holding((0..4).map(|lane| Holds::Frame { case, lane })).registered(),
-            gather: Gather::new(bits, model.noise_floor, count),
+            gather: FrameStats::new(bits, model.noise_floor, count),
             gathers: BitDelay::new(1),
             gathered_part: Delay::new(count_bits(count), 1),
             gathered_code: Delay::new(bits, 1),
