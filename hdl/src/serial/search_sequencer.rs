@@ -208,8 +208,9 @@ fn build<'k>(k: &'k Builder, degree: u64, polynomials: u64, score_bits: usize) {
     let _ = source.comment("Locations of polynomials: bit 1 odd bank, bit 0 upper region.");
     let [centre_x, centre_y, new_x, new_y, best_x, best_y] =
         ["centre_x", "centre_y", "new_x", "new_y", "best_x", "best_y"].map(|name| register(name, position));
-    let [centre_disc, disc, settled, best_disc] =
-        ["centre_disc", "disc", "settled", "best_disc"].map(|name| register(name, DISC_BITS));
+    let (centre_disc, disc) = (register("centre_disc", DISC_BITS), register("disc", DISC_BITS));
+    // Read only times four, modulo 2^DISC_BITS.
+    let (settled, best_disc) = (register("settled", DISC_BITS - 2), register("best_disc", DISC_BITS - 2));
     let score = register("score", score_bits);
     let (taken, found, done) = (register("taken", 1), register("found", 1), register("done", 1));
 
@@ -299,8 +300,8 @@ fn build<'k>(k: &'k Builder, degree: u64, polynomials: u64, score_bits: usize) {
                     best.set(doubled);
                     centre.set(doubled);
                 }
-                let quadrupled = best_disc.low(DISC_BITS - 2).concat(zero(2));
-                best_disc.set(quadrupled);
+                let quadrupled = best_disc.concat(zero(2));
+                best_disc.set(quadrupled.low(DISC_BITS - 2));
                 centre_disc.set(quadrupled);
                 offset_x.set(zero(2));
                 offset_y.set(zero(2));
@@ -323,7 +324,7 @@ fn build<'k>(k: &'k Builder, degree: u64, polynomials: u64, score_bits: usize) {
         turn_read_then.set(*turn);
         disc.set((disc_before + sideways.mux(further, zero(DISC_BITS))).low(DISC_BITS));
         k.when(count.at(0), || {
-            settled.set(*disc);
+            settled.set(disc.low(DISC_BITS - 2));
             let has_score = !count.less(k.constant(5, 3)) & total.top();
             takes.set(has_score & in_disc & (coarse | *found) & better);
         });
