@@ -50,7 +50,7 @@ const ENTRIES: [Entry; 12] = entries! {
     "search" "search" "stages/search.rs",
     "force" "forces" "stages/force.rs",
     "send" "send" "stages/send.rs",
-    "butterfly" "fold__butterfly" "primitives/butterfly.rs",
+    "butterfly" "fold__butterfly" "primitives/arithmetic/butterfly.rs",
 };
 
 /// Why a block cannot be described.

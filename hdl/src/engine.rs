@@ -19,7 +19,9 @@ use dermis_golden::scene::Condition;
 use rust_hdl::prelude::*;
 
 use crate::ports::one_of;
-use crate::primitives::{count_bits, largest, BitDelay, CaseCounter, Counter, Dff, Keep, Resultants, CYCLE_BITS};
+use crate::primitives::{
+    count_bits, largest, BitDelay, CaseCounter, Counter, Dff, EnableRegister, Resultants, CYCLE_BITS,
+};
 use crate::stages::{
     Banks, Fold, Force, Normalise, Pass, Prepare, Receive, ReceivePorts, Rescale, Search, SearchPorts, Send, Unfold,
     Unsearched,
@@ -39,7 +41,7 @@ one_of! {
 impl Receiver {
     fn new(model: &Model) -> Self {
         match model.chooses() {
-            false => Receiver::Receive(Box::new(Receive::new(model))),
+            false => Receiver::Receive(Box::new(Receive::new(model, 0))),
             true => Receiver::Banks(Box::new(Banks::new(model))),
         }
     }
@@ -124,13 +126,13 @@ pub struct Engine {
     searched_condition: Dff,
     searched_last: Dff,
     sent_framing: Dff,
-    frame_case: Keep,
-    sent_case: Keep,
-    searched_part: Keep,
-    searched_normalise: Keep,
-    searched_rescale: Keep,
-    searched_saturations: Keep,
-    searched_damaged: Keep,
+    frame_case: EnableRegister,
+    sent_case: EnableRegister,
+    searched_part: EnableRegister,
+    searched_normalise: EnableRegister,
+    searched_rescale: EnableRegister,
+    searched_saturations: EnableRegister,
+    searched_damaged: EnableRegister,
     cycles: Counter,
     part: CaseCounter,
     again: BitDelay,
@@ -190,13 +192,13 @@ impl Engine {
             searched_condition: Default::default(),
             searched_last: Default::default(),
             sent_framing: Default::default(),
-            frame_case: Keep::new(which).constant(!model.chooses()),
-            sent_case: Keep::new(which).constant(!model.chooses()),
-            searched_part: Keep::new(count_bits(largest(&counts))),
-            searched_normalise: Keep::new(normalise.shift.width()),
-            searched_rescale: Keep::new(rescale.shift.width()),
-            searched_saturations: Keep::new(rescale.saturations.width()),
-            searched_damaged: Keep::new(1).constant(!model.has_coefficient_check()),
+            frame_case: EnableRegister::new(which).constant(!model.chooses()),
+            sent_case: EnableRegister::new(which).constant(!model.chooses()),
+            searched_part: EnableRegister::new(count_bits(largest(&counts))),
+            searched_normalise: EnableRegister::new(normalise.shift.width()),
+            searched_rescale: EnableRegister::new(rescale.shift.width()),
+            searched_saturations: EnableRegister::new(rescale.saturations.width()),
+            searched_damaged: EnableRegister::new(1).constant(!model.has_coefficient_check()),
             normalise,
             rescale,
             cycles: Counter::new(1 << CYCLE_BITS),

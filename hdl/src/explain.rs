@@ -5,10 +5,8 @@ use dermis_golden::fixed::feature_costs::{features, Feature};
 use dermis_golden::fixed::{Cycles, Model};
 use serde::Serialize;
 
-use crate::generate::HdlError;
-use crate::language::Hierarchy;
-use crate::simulate::design;
-use crate::usage::{stages, total, Usage};
+use crate::generate::{usage, HdlError};
+use crate::usage::{total, Usage};
 
 /// A feature of the hardware.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
@@ -78,6 +76,6 @@ fn difference((with, cycles_with): &(Usage, u64), (without, cycles_without): &(U
 }
 
 fn needs(model: &Model) -> Result<(Usage, u64), HdlError> {
-    let usage = total(&stages(model, &Hierarchy::of(&*design(model)?)));
+    let usage = total(&usage(model)?);
     Ok((usage, Cycles::longest(model).latency))
 }

@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 
 use dermis_golden::board::EngineKind;
+use dermis_golden::fixed::resources::Memory;
 use dermis_golden::fixed::send::{
     CASE_SHIFT, FLAG_COEFFICIENTS, FLAG_CONDITION, FLAG_FOUND, FLAG_FRAMING, FLAG_NO_CONTACT, STATUS_BEATS,
 };
@@ -23,7 +24,7 @@ use crate::manifest::seal;
 use crate::primitives::MEMORY_FILE;
 use crate::simulate::design;
 use crate::taps::taps;
-use crate::usage::{stages, total, Usage};
+use crate::usage::{stages, total, PlacedMemory, Usage};
 
 /// `manifest_version`: version of the generated files' meaning; a reader rejects any other.
 pub(crate) const MANIFEST_VERSION: u32 = 1;
@@ -70,6 +71,8 @@ pub struct Generated {
     pub top: String,
     /// `<top>.v`, memory files, `<top>.vlt`, `<top>.core`, `manifest.json`, `dermis_link.h`.
     pub files: Vec<GeneratedFile>,
+    /// The memories that the model plans, with their places in the hardware.
+    pub memories: Vec<PlacedMemory>,
     /// The observed streams between the stages; none for a board.
     pub taps: Vec<Tap>,
     /// Content of `manifest.json`.
@@ -96,7 +99,7 @@ fn refused(model: &Model) -> Result<Vec<Refused>, HdlError> {
     let refused = |dropped: &Dropped| {
         let with: Vec<u32> = dropped.design.cases().iter().map(Model::number).collect();
         let case = with.iter().copied().find(|number| Case::numbered(i64::from(*number)) == Some(dropped.case));
-        let needs = total(&stages(&dropped.design, &Hierarchy::of(&*design(&dropped.design)?)));
+        let needs = total(&usage(&dropped.design)?);
         Ok(Refused { case: case.unwrap_or_default(), with, needs })
     };
     model.dropped.iter().map(refused).collect()
@@ -116,6 +119,16 @@ impl Generated {
     }
 }
 
+/// Resources of the engine of `model` by stage.
+///
+/// # Errors
+/// As [`generate`].
+pub(crate) fn usage(model: &Model) -> Result<BTreeMap<String, Usage>, HdlError> {
+    let engine = design(model)?;
+    let hierarchy = Hierarchy::of(&*engine);
+    Ok(stages(model, &hierarchy, &placed(&hierarchy, model)?))
+}
+
 /// Generates the hardware of `model`. The same model always gives the same bytes.
 ///
 /// # Errors
@@ -125,10 +138,11 @@ pub fn generate(model: &Model) -> Result<Generated, HdlError> {
     let top = top_name(&model.scene.name);
     let file = |name: String, text: String| GeneratedFile { name, text };
     let hierarchy = Hierarchy::of(&*engine);
-    let verilog = header(model, &top) + &hierarchy.verilog(&top, &placement(&hierarchy, model, "")?, &port_comment);
-    let usage = stages(model, &hierarchy);
+    let memories = placed(&hierarchy, model)?;
+    let verilog = header(model, &top) + &hierarchy.verilog(&top, &attributes(&memories, model), &port_comment);
+    let usage = stages(model, &hierarchy, &memories);
     let dropped = refused(model)?;
-    let manifest = manifest(model, &top, &usage, &dropped);
+    let manifest = manifest(model, &top, &usage, &memories, &dropped);
     let mut files = vec![
         file(format!("{top}.v"), verilog),
         file(format!("{top}.vlt"), waivers(model).to_string()),
@@ -139,26 +153,34 @@ pub fn generate(model: &Model) -> Result<Generated, HdlError> {
     let names: Vec<&str> = files.iter().map(|file| file.name.as_str()).collect();
     let core = core_file(&top, &model.scene.name, &names);
     files.push(file(format!("{top}.core"), core));
-    let mut generated = Generated { top, files, taps: taps(model), manifest, usage, dropped };
+    let mut generated = Generated { top, files, memories, taps: taps(model), manifest, usage, dropped };
     generated.seal();
     Ok(generated)
 }
 
-/// The `ram_style` attribute of every memory of the model; paths of the engine's blocks start with `engine`.
+/// Finds every memory that the model plans in the hardware, by its label.
 ///
 /// # Errors
-/// [`HdlError::Check`] if a memory of the model is not in the hardware, or not of its size.
-pub(crate) fn placement(hierarchy: &Hierarchy, model: &Model, engine: &str) -> Result<Attributes, HdlError> {
-    let mut attributes = Attributes::new();
-    for memory in &model.resources.memories {
-        let path = format!("{engine}{}", memory.block);
-        let is =
-            |own: &&language::Memory| (&own.name, own.words, own.bits) == (&memory.array, memory.words, memory.bits);
-        let mut kernels = hierarchy.kernels().filter(|(own, _)| *own == path);
-        if !kernels.any(|(_, kernel)| kernel.memories().iter().any(|own| is(&own))) {
-            return Err(HdlError::Check(format!("the model's memory {memory:?} is not in the hardware")));
-        }
-        let style = match (memory.large_rams, memory.block_rams) {
+/// [`HdlError::Check`] if one is missing, or not of its size.
+pub(crate) fn placed(hierarchy: &Hierarchy, model: &Model) -> Result<Vec<PlacedMemory>, HdlError> {
+    let all: Vec<(&str, &language::Memory)> =
+        hierarchy.kernels().flat_map(|(block, kernel)| kernel.memories().iter().map(move |own| (block, own))).collect();
+    let place = |planned: &Memory| {
+        let label = planned.holds.to_string();
+        let is = |own: &language::Memory| {
+            own.label.as_ref() == Some(&label) && (own.words, own.bits) == (planned.words, planned.bits)
+        };
+        let found = all.iter().find(|(_, own)| is(own));
+        let missing = || HdlError::Check(format!("the model's memory {planned:?} is not in the hardware"));
+        found.map(|(block, own)| PlacedMemory::new(block, &own.name, planned)).ok_or_else(missing)
+    };
+    model.resources.memories.iter().map(place).collect()
+}
+
+/// The `ram_style` attribute of every memory.
+pub(crate) fn attributes(memories: &[PlacedMemory], model: &Model) -> Attributes {
+    let attribute = |memory: &PlacedMemory| {
+        let style = match (memory.planned.large_rams, memory.planned.block_rams) {
             (0, 0) => "distributed",
             (0, _) => "block",
             _ => "huge",
@@ -166,9 +188,9 @@ pub(crate) fn placement(hierarchy: &Hierarchy, model: &Model, engine: &str) -> R
         // The serial engine never reads a word in the cycle that writes it, so no logic is needed to define what it
         // would read.
         let check = if model.board.engine == EngineKind::Serial { ", no_rw_check" } else { "" };
-        attributes.insert((path, memory.array.clone()), format!("ram_style = \"{style}\"{check}"));
-    }
-    Ok(attributes)
+        ((memory.block.clone(), memory.array.clone()), format!("ram_style = \"{style}\"{check}"))
+    };
+    memories.iter().map(attribute).collect()
 }
 
 /// `dermis_` and the scene's name, every character except ASCII letters and digits replaced by an underscore.
@@ -234,7 +256,13 @@ fn case(case: &Model) -> serde_json::Value {
     })
 }
 
-fn manifest(model: &Model, top: &str, usage: &BTreeMap<String, Usage>, dropped: &[Refused]) -> serde_json::Value {
+fn manifest(
+    model: &Model,
+    top: &str,
+    usage: &BTreeMap<String, Usage>,
+    memories: &[PlacedMemory],
+    dropped: &[Refused],
+) -> serde_json::Value {
     let (scene, f) = (&model.scene, &model.formats);
     let full_scale = scene.input.full_scale_MPa;
     json!({
@@ -279,7 +307,7 @@ fn manifest(model: &Model, top: &str, usage: &BTreeMap<String, Usage>, dropped: 
         "resources": {
             "total": total(usage),
             "stages": usage,
-            "memories": model.resources.memories,
+            "memories": memories,
         },
         "cycles": cycles(model),
         "cases": model.chooses().then(|| model.cases().iter().map(case).collect::<Vec<_>>()),

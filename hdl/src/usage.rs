@@ -68,6 +68,24 @@ impl Usage {
     }
 }
 
+/// A memory that the model plans, and where it is in the hardware.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+pub struct PlacedMemory {
+    /// Instances from the top to its block, levels separated by two underscores.
+    pub block: String,
+    /// Its name in the block.
+    pub array: String,
+    /// What it holds, its size, and the RAMs that it takes.
+    #[serde(flatten)]
+    pub planned: Memory,
+}
+
+impl PlacedMemory {
+    pub(crate) fn new(block: &str, array: &str, planned: &Memory) -> Self {
+        PlacedMemory { block: block.to_owned(), array: array.to_owned(), planned: planned.clone() }
+    }
+}
+
 impl std::ops::AddAssign for Usage {
     fn add_assign(&mut self, other: Usage) {
         self.block_rams += other.block_rams;
@@ -83,22 +101,22 @@ pub fn stage(block: &str) -> &str {
 }
 
 /// Usage of each stage by its instance name; blocks outside any stage under `engine`.
-pub(crate) fn stages(model: &Model, hierarchy: &Hierarchy) -> BTreeMap<String, Usage> {
+pub(crate) fn stages(model: &Model, hierarchy: &Hierarchy, memories: &[PlacedMemory]) -> BTreeMap<String, Usage> {
     let mut all: BTreeMap<String, Usage> = BTreeMap::new();
     let mut add = |block: &str, usage: Usage| {
         *all.entry(stage(block).to_string()).or_default() += usage;
     };
-    let memories = &model.resources.memories;
     for (block, kernel) in hierarchy.kernels() {
         let own = memories.iter().filter(|memory| memory.block == block).map(|memory| memory.array.as_str());
         let logic = kernel.logic(&own.collect());
         add(block, Usage { flip_flops: logic.flip_flops, luts: logic.luts.round() as usize, ..Usage::default() });
     }
-    for memory in memories {
-        add(memory.block, Usage { block_rams: memory.block_rams, luts: luts_of(memory), ..Usage::default() });
+    for PlacedMemory { block, planned, .. } in memories {
+        add(block, Usage { block_rams: planned.block_rams, luts: luts_of(planned), ..Usage::default() });
     }
-    for &(block, multipliers) in &model.resources.multipliers {
-        add(block, Usage { multipliers, ..Usage::default() });
+    for &(stage, multipliers) in &model.resources.multipliers {
+        // Verilog keeps the word `force` for itself.
+        add(if stage == "force" { "forces" } else { stage }, Usage { multipliers, ..Usage::default() });
     }
     all
 }

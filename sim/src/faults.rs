@@ -113,7 +113,7 @@ pub fn inject_faults(hardware: &Hardware, frames: &[Frame], count: usize, seed: 
     }
     pool.retain(Sample::has_force);
     let mut device = hardware.device_with_writable_state()?;
-    let memories = &hardware.model.resources.memories;
+    let memories = &hardware.generated.memories;
     let elements = state_elements(&device.listing()?, INSTANCE, memories)?;
     let longest = pool.iter().map(|sample| sample.cycles.total).max().unwrap_or(0);
     let mut rows: BTreeMap<(StorageClass, String), Row> = BTreeMap::new();

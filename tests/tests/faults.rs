@@ -21,12 +21,12 @@ fn hardware() -> Hardware {
 fn every_bit_is_found() {
     let hardware = hardware();
     let listing = hardware.device_with_writable_state().unwrap().listing().unwrap();
-    let memories = &hardware.model.resources.memories;
+    let memories = &hardware.generated.memories;
     let all = state_elements(&listing, "bench.dut", memories).unwrap();
     let bits = |wanted: &dyn Fn(StorageClass) -> bool| -> usize {
         all.iter().filter(|element| wanted(element.class)).map(|element| element.words * element.bits).sum()
     };
-    let listed: usize = memories.iter().map(|memory| memory.words * memory.bits).sum();
+    let listed: usize = memories.iter().map(|memory| memory.planned.words * memory.planned.bits).sum();
     assert_eq!(bits(&|class| class != StorageClass::Register), listed);
     assert_eq!(
         bits(&|class| class == StorageClass::Rom),

@@ -5,6 +5,7 @@
 use std::process::Command;
 use std::thread::scope;
 
+use dermis_golden::fixed::resources::Holds;
 use dermis_golden::fixed::Model;
 use dermis_golden::scene::Scene;
 use dermis_hdl::usage::total;
@@ -90,7 +91,7 @@ fn a_missing_memory_and_a_wrong_count_are_found() {
     assert!(generate(&model).unwrap_err().to_string().contains("is not in the hardware"));
     // If one memory moves from block RAM to LUTs, Yosys counts differ.
     model.resources = right.clone();
-    let moved = model.resources.memories.iter_mut().find(|memory| memory.block == "forces__store").unwrap();
+    let moved = model.resources.memories.iter_mut().find(|memory| memory.holds == Holds::Values).unwrap();
     assert!(std::mem::take(&mut moved.block_rams) > 0);
     let counted = synthesise(&generate(&model).unwrap(), "map_ffram")("DP16KD");
     assert_eq!(counted, model.resources.block_rams());

@@ -27,23 +27,88 @@ use super::storage::word_bits;
 use crate::board::Board;
 use crate::scene::{ForceOutput, Scene};
 
-/// [`Memory::block`] of the search memory.
-pub const SEARCH_MEMORY: &str = "search__store";
-
-/// Frame buffers of designs with several cases.
-const BANKS: [&str; 4] =
-    ["receive__banks__0__frame", "receive__banks__1__frame", "receive__banks__2__frame", "receive__banks__3__frame"];
-
 /// Number of polynomial buffers between which the sweeps of the search alternate.
 pub const SEARCH_BUFFERS: usize = 3;
 
-/// A memory of the hardware.
+/// What a memory holds; the hardware's memories carry it as a label.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Holds {
+    /// Zero and gain of each taxel.
+    Calibration,
+    /// Sums of the frames that are averaged.
+    Average,
+    /// One lane of the quads of a frame, in the layout of a case.
+    Frame {
+        /// Index of the case.
+        case: usize,
+        /// Lane of the quad.
+        lane: usize,
+    },
+    /// Taxel of each place, and place of each taxel.
+    TaxelOrder,
+    /// Folded input.
+    Folded,
+    /// Operand vectors of the passes, one memory or one per lane.
+    Operands(usize),
+    /// Coefficients of the matrices.
+    Coefficients,
+    /// Low limbs of the coefficients of Cz⁺.
+    LowCoefficients,
+    /// Columns of the coefficients that are not left out.
+    Columns,
+    /// Accumulators that wait for their shift.
+    Raw,
+    /// Coefficient of this index of the polynomials, in the buffers of the search.
+    Polynomials(usize),
+    /// The same at the start of the search.
+    Start(usize),
+    /// Bank of polynomials of the serial search, 0 or 1.
+    Bank(usize),
+    /// Transposed polynomial of the serial search.
+    Transposed,
+    /// Floors of the logarithms.
+    Floors,
+    /// Totals of the candidates.
+    Totals,
+    /// Values p(μ*).
+    Values,
+}
+
+impl std::fmt::Display for Holds {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Holds::Calibration => write!(f, "calibration"),
+            Holds::Average => write!(f, "average"),
+            Holds::Frame { case, lane } => write!(f, "frame, case {case}, lane {lane}"),
+            Holds::TaxelOrder => write!(f, "taxel order"),
+            Holds::Folded => write!(f, "folded input"),
+            Holds::Operands(lane) => write!(f, "operands {lane}"),
+            Holds::Coefficients => write!(f, "coefficients"),
+            Holds::LowCoefficients => write!(f, "low coefficients"),
+            Holds::Columns => write!(f, "columns"),
+            Holds::Raw => write!(f, "raw words"),
+            Holds::Polynomials(index) => write!(f, "polynomials, coefficient {index}"),
+            Holds::Start(index) => write!(f, "polynomials at the start, coefficient {index}"),
+            Holds::Bank(bank) => write!(f, "polynomials, bank {bank}"),
+            Holds::Transposed => write!(f, "transposed polynomial"),
+            Holds::Floors => write!(f, "floors"),
+            Holds::Totals => write!(f, "totals"),
+            Holds::Values => write!(f, "values"),
+        }
+    }
+}
+
+impl Serialize for Holds {
+    fn serialize<S: serde::Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.collect_str(self)
+    }
+}
+
+/// A memory that the hardware needs.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct Memory {
-    /// Path of its block in the hardware, levels separated by `__`.
-    pub block: &'static str,
-    /// Its name in the block.
-    pub array: String,
+    /// What it holds; each occurs once.
+    pub holds: Holds,
     /// Number of words.
     pub words: usize,
     /// Width of a word in bits.
@@ -64,7 +129,7 @@ fn is_zero(count: &usize) -> bool {
 pub struct Resources {
     /// Every memory, in pipeline order.
     pub memories: Vec<Memory>,
-    /// Multipliers of each block that can have some: (block, count).
+    /// Multipliers of each stage that can have some: (stage, count).
     pub multipliers: Vec<(&'static str, usize)>,
 }
 
@@ -95,55 +160,53 @@ impl Resources {
         let frame_quads = |case: &LaidOut| case.parts * case.formats.quads;
         let several = cases.iter().any(|case| case.parts > 1);
         let quad = |bits: u32| 4 * bits as usize;
-        let memory = |block, array: &str, words: usize, bits: usize, rom: bool| Memory {
-            block,
-            array: array.to_string(),
+        let memory = |holds: Holds, words: usize, bits: usize, rom: bool| Memory {
+            holds,
             words,
             bits,
             block_rams: if rom || words > shallow { board.block_rams_for(words, bits) } else { 0 },
             large_rams: 0,
         };
-        let ram = |block, words, bits| memory(block, "field0", words, bits, false);
+        let ram = |holds, words, bits| memory(holds, words, bits, false);
         let (input, taxels) = (&scene.input, scene.sensor.taxels());
         let mut memories = Vec::new();
         if input.calibration.is_some() || input.tare.is_some() {
             let gain = if input.calibration.is_some() { GAIN_BITS } else { 0 };
-            memories.push(memory("prepare__calibrate", "entries", taxels, (f.code_bits + gain) as usize, true));
+            memories.push(memory(Holds::Calibration, taxels, (f.code_bits + gain) as usize, true));
         }
         if input.average > 0 {
-            memories.push(memory("prepare__average", "sums", taxels, f.input_bits as usize, false));
+            memories.push(memory(Holds::Average, taxels, f.input_bits as usize, false));
         }
-        for (number, case) in cases.iter().enumerate() {
-            let block = if cases.len() == 1 { "receive__frame" } else { BANKS[number] };
-            let lane = |lane| memory(block, &format!("field{lane}"), frame_quads(case), f.input_bits as usize, false);
+        for (index, case) in cases.iter().enumerate() {
+            let lane = |lane| ram(Holds::Frame { case: index, lane }, frame_quads(case), f.input_bits as usize);
             memories.extend((0..4).map(lane));
         }
-        memories.push(ram("fold__memory", quads, quad(f.fold_bits)));
+        memories.push(ram(Holds::Folded, quads, quad(f.fold_bits)));
         if f.degree > 0 {
-            memories.push(ram("pass__vectors", operand_vectors(f.degree) * quads, quad(f.data_bits)));
+            memories.push(ram(Holds::Operands(0), operand_vectors(f.degree) * quads, quad(f.data_bits)));
         }
-        memories.push(memory("pass__lanes", "memory", words, word_bits(f), true));
+        memories.push(memory(Holds::Coefficients, words, word_bits(f), true));
         if listed {
             // The transposed address as well, if it is read.
             let addresses = if f.shared_a { 2 } else { 1 };
-            memories.push(memory("pass__steps", "columns", words, addresses * count_bits(quads), true));
+            memories.push(memory(Holds::Columns, words, addresses * count_bits(quads), true));
         }
-        memories.push(ram("rescale__raw", quads, quad(f.acc_bits)));
+        memories.push(ram(Holds::Raw, quads, quad(f.acc_bits)));
         for (k, &bits) in f.search_bits.iter().enumerate().filter(|_| f.degree > 0) {
-            memories.push(memory(SEARCH_MEMORY, &format!("memory{k}"), SEARCH_BUFFERS * quads, quad(bits), false));
+            memories.push(ram(Holds::Polynomials(k), SEARCH_BUFFERS * quads, quad(bits)));
             if several {
-                memories.push(memory(SEARCH_MEMORY, &format!("start{k}"), quads, quad(bits), false));
+                memories.push(ram(Holds::Start(k), quads, quad(bits)));
             }
         }
-        memories.push(ram("forces__store", cases.iter().map(frame_quads).max().unwrap_or(0), quad(f.search_bits[0])));
+        memories.push(ram(Holds::Values, cases.iter().map(frame_quads).max().unwrap_or(0), quad(f.search_bits[0])));
         let calibrate = match input.calibration {
             Some(_) => board.multipliers_for(f.code_bits + 1, GAIN_BITS),
             None => 0,
         };
         let multipliers = vec![
-            ("prepare__calibrate", calibrate),
-            ("pass__lanes", 4 * f.lanes_per_parity * board.multipliers_for(MULTIPLIER_BITS, MULTIPLIER_BITS)),
-            ("forces__unit", force_multipliers(f, board)),
+            ("prepare", calibrate),
+            ("pass", 4 * f.lanes_per_parity * board.multipliers_for(MULTIPLIER_BITS, MULTIPLIER_BITS)),
+            ("force", force_multipliers(f, board)),
             ("resultants", resultant_multipliers(scene, board)),
         ];
         Resources { memories, multipliers }

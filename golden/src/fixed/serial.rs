@@ -19,7 +19,7 @@ use super::cycles::Cycles;
 use super::formats::{Formats, LaidOut, Quantised, EPSILON_SHIFT, HALVINGS};
 use super::model::Model;
 use super::pass::coefficient;
-use super::resources::{count_bits, operand_vectors, Memory, Resources};
+use super::resources::{count_bits, operand_vectors, Holds, Memory, Resources};
 use super::schedule::{schedule, Kind, Matrix, Operand, Product};
 use super::search::COARSE_CENTRES;
 use super::send::STATUS_BEATS;
@@ -129,39 +129,38 @@ pub(super) fn fit(
 
 fn resources(f: &Formats, board: &Board) -> Resources {
     let (taxels, side) = (4 * f.quads, 1 << count_bits(f.quads));
-    let memory = |block, array: &str, words: usize, bits: usize| Memory {
-        block,
-        array: array.to_string(),
+    let memory = |holds, words: usize, bits: usize| Memory {
+        holds,
         words,
         bits,
         block_rams: board.block_rams_for(words, bits),
         large_rams: 0,
     };
-    let large = |block, array: &str, words: usize, bits: usize| Memory {
+    let large = |holds, words: usize, bits: usize| Memory {
         block_rams: 0,
         large_rams: board.large_rams_for(words, bits),
-        ..memory(block, array, words, bits)
+        ..memory(holds, words, bits)
     };
     // Each is stored twice: for the lane of its own parity and for that of the flipped parity.
     let operands = 2 << (count_bits(first_vector(f) + operand_vectors(f.degree)) + count_bits(f.quads));
     let bank = 2 << (count_bits(polynomials(f)) + 4);
     let mut memories = vec![
-        memory("receive__frame", "field0", taxels, f.input_bits as usize),
-        memory("order", "places", 2 << count_bits(taxels), count_bits(taxels)),
-        memory("pass", "wide", WIDE.len() * side * side, 4 * OPERAND_BITS as usize),
+        memory(Holds::Frame { case: 0, lane: 0 }, taxels, f.input_bits as usize),
+        memory(Holds::TaxelOrder, 2 << count_bits(taxels), count_bits(taxels)),
+        memory(Holds::Coefficients, WIDE.len() * side * side, 4 * OPERAND_BITS as usize),
     ];
     if f.inverse_low_bits > 0 {
-        memories.push(memory("pass", "low_memory", side * side, 4 * f.inverse_low_bits as usize));
+        memories.push(memory(Holds::LowCoefficients, side * side, 4 * f.inverse_low_bits as usize));
     }
-    memories.extend((0..4).map(|lane| memory("pass", &format!("operands{lane}"), operands, OPERAND_BITS as usize)));
-    memories.push(memory("raw", "field0", taxels, f.acc_bits as usize));
-    memories.extend(["even", "odd_bank"].map(|array| large("banks", array, bank, word_bits(f))));
-    memories.push(memory("turned", "field0", 4 * SLOT as usize, word_bits(f)));
-    memories.push(memory("floors", "field0", SLOT as usize, floor_bits(f)));
-    memories.push(memory("totals", "field0", SLOT as usize, f.score_bits as usize + 1));
+    memories.extend((0..4).map(|lane| memory(Holds::Operands(lane), operands, OPERAND_BITS as usize)));
+    memories.push(memory(Holds::Raw, taxels, f.acc_bits as usize));
+    memories.extend([0, 1].map(|number| large(Holds::Bank(number), bank, word_bits(f))));
+    memories.push(memory(Holds::Transposed, 4 * SLOT as usize, word_bits(f)));
+    memories.push(memory(Holds::Floors, SLOT as usize, floor_bits(f)));
+    memories.push(memory(Holds::Totals, SLOT as usize, f.score_bits as usize + 1));
     let multipliers = vec![
         ("pass", 4 * board.multipliers_for(OPERAND_BITS, OPERAND_BITS)),
-        ("forces", board.multipliers_for(f.search_bits[0], FACTOR_BITS)),
+        ("force", board.multipliers_for(f.search_bits[0], FACTOR_BITS)),
     ];
     Resources { memories, multipliers }
 }

@@ -153,7 +153,16 @@ impl Builder {
     pub fn memory(&self, name: &str, words: usize, bits: usize, contents: Contents) -> MemoryPort<'_> {
         let name = self.check_name(name);
         let mut kernel = self.kernel.borrow_mut();
-        kernel.memories.push(Memory { name, words, bits, contents, style: None, unchecked: false, writes: Vec::new() });
+        kernel.memories.push(Memory {
+            name,
+            words,
+            bits,
+            contents,
+            style: None,
+            unchecked: false,
+            label: None,
+            writes: Vec::new(),
+        });
         MemoryPort { builder: self, memory: kernel.memories.len() - 1, bits }
     }
 
@@ -348,6 +357,12 @@ impl<'k> MemoryPort<'k> {
     /// With this value of the attribute `ram_style`.
     pub fn style(self, style: &str) -> Self {
         self.builder.kernel.borrow_mut().memories[self.memory].style = Some(style.to_owned());
+        self
+    }
+
+    /// With a label, by which a plan of the memories refers to it.
+    pub fn holds(self, label: impl std::fmt::Display) -> Self {
+        self.builder.kernel.borrow_mut().memories[self.memory].label = Some(label.to_string());
         self
     }
 

@@ -4,7 +4,7 @@
 //! that all modules are printed, checked and estimated in the same way.
 
 use std::cell::RefCell;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write as _;
 use std::sync::Arc;
 
@@ -45,9 +45,29 @@ struct Module {
 }
 
 impl Module {
+    /// The net of a signal of this module at `path`: a port of a block inside belongs to that block.
+    fn net(&self, path: &str, name: &str) -> Net {
+        let inner = self.children.iter().find_map(|(instance, ports)| {
+            let port = name.strip_prefix(instance)?.strip_prefix(SEPARATOR)?;
+            ports.iter().any(|own| own == port).then(|| (called(path, instance), port.to_owned()))
+        });
+        inner.unwrap_or_else(|| (path.to_owned(), name.to_owned()))
+    }
+
     fn new(path: Vec<String>, code: Verilog) -> Self {
         let (ports, locals, inner) = Default::default();
         Module { path, ports, locals, inner, children: Vec::new(), code, kernel: None }
+    }
+}
+
+/// Path of a block, and one of its ports or signals.
+type Net = (String, String);
+
+/// A net as it is called in the whole design.
+fn called(path: &str, name: &str) -> String {
+    match path {
+        "" => name.to_owned(),
+        path => format!("{path}{SEPARATOR}{name}"),
     }
 }
 
@@ -96,6 +116,39 @@ impl Hierarchy {
             if let Some(Pin { name, .. }) = pin.into_iter().next() {
                 let reason = "is not in the kernel, or in the other direction";
                 return Err(KernelError::Wiring { block: path.clone(), what: name.clone(), reason });
+            }
+        }
+        self.loops()
+    }
+
+    /// Finds a combinational loop through several blocks.
+    fn loops(&self) -> Result<(), KernelError> {
+        let mut sources: BTreeMap<Net, Vec<Net>> = BTreeMap::new();
+        for (path, module) in &self.modules {
+            let Some(kernel) = &module.kernel else { continue };
+            for (output, inputs) in kernel.combinational() {
+                let of = |name: &str| module.net(path, name);
+                sources.entry(of(output)).or_default().extend(inputs.into_iter().map(of));
+            }
+        }
+        // Nets whose sources are all known to be free of loops, and those on the way to the current one.
+        let (mut free, mut open): (BTreeSet<&Net>, Vec<(&Net, usize)>) = Default::default();
+        for start in sources.keys() {
+            open.push((start, 0));
+            while let Some((net, next)) = open.pop() {
+                let source = sources.get(net).and_then(|all| all.get(next)).filter(|_| !free.contains(net));
+                let Some(source) = source else {
+                    free.insert(net);
+                    continue;
+                };
+                open.push((net, next + 1));
+                if let Some(first) = open.iter().position(|(net, _)| *net == source) {
+                    let through: Vec<String> =
+                        open[first..].iter().map(|((path, name), _)| called(path, name)).collect();
+                    let (block, signals) = (source.0.clone(), through.join(", "));
+                    return Err(KernelError::Loop { block, signals, expression: source.1.clone() });
+                }
+                open.push((source, 0));
             }
         }
         Ok(())
@@ -223,3 +276,6 @@ impl Probe for Collector {
         self.done.push(module);
     }
 }
+
+#[cfg(test)]
+mod tests;

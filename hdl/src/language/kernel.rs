@@ -197,6 +197,8 @@ pub struct Memory {
     pub style: Option<String>,
     /// What is read in the cycle of a write to the same address is not used: attribute `no_rw_check`.
     pub unchecked: bool,
+    /// What it holds, by which a plan of the memories refers to it.
+    pub label: Option<String>,
     pub(crate) writes: Vec<Write>,
 }
 
@@ -258,6 +260,32 @@ impl Kernel {
         self.nodes.push((node.clone(), ty));
         self.interned.insert((node, ty), self.nodes.len() - 1);
         self.nodes.len() - 1
+    }
+
+    /// Every output that depends on inputs in the same cycle, with their names.
+    pub(crate) fn combinational(&self) -> Vec<(&str, Vec<&str>)> {
+        let outputs = self.signals.iter().filter(|signal| signal.output && matches!(signal.role, Role::Wire { .. }));
+        outputs.map(|signal| (signal.name.as_str(), self.inputs_of(signal))).collect()
+    }
+
+    /// Names of the inputs on which a wire depends in the same cycle.
+    fn inputs_of(&self, signal: &Signal) -> Vec<&str> {
+        let mut open: Vec<NodeId> = signal.value.into_iter().collect();
+        let (mut seen, mut found) = (vec![false; self.nodes.len()], Vec::new());
+        while let Some(node) = open.pop() {
+            if std::mem::replace(&mut seen[node], true) {
+                continue;
+            }
+            if let Node::Signal(id) = self.nodes[node].0 {
+                match &self.signals[id].role {
+                    Role::Input => found.push(self.signals[id].name.as_str()),
+                    Role::Wire { .. } => open.extend(self.signals[id].value),
+                    Role::Register(_) => {}
+                }
+            }
+            open.extend(self.nodes[node].0.operands());
+        }
+        found
     }
 
     pub(crate) fn signal_of(&self, name: &str) -> Option<SignalId> {

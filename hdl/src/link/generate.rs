@@ -8,7 +8,7 @@ use serde_json::json;
 
 use super::{Board, BoardTop, SerialBoardTop, SerialSpiBoardTop, SpiBoardTop};
 use crate::describe::{comments, port_comment};
-use crate::generate::{placement, top_name, Generated, GeneratedFile, HdlError};
+use crate::generate::{attributes, placed, top_name, Generated, GeneratedFile, HdlError};
 use crate::language::Hierarchy;
 
 /// The board of `model`, after rust-hdl's checks.
@@ -68,12 +68,13 @@ pub fn generate_board(model: &Model) -> Result<Generated, HdlError> {
     let engine = crate::generate(model)?;
     let top = format!("{}_board", top_name(&model.scene.name));
     let hierarchy = Hierarchy::of(&*board);
+    let memories = placed(&hierarchy, model)?;
     let comment = |path: &str, port: &str| match (path, path.strip_prefix("engine__")) {
         ("", _) => comments(include_str!("board_top.rs")).remove(port),
         ("engine", _) => port_comment("", port),
         (_, own) => port_comment(own?, port),
     };
-    let verilog = hierarchy.verilog(&top, &placement(&hierarchy, model, "engine__")?, &comment);
+    let verilog = hierarchy.verilog(&top, &attributes(&memories, model), &comment);
     let link = model.scene.hardware.link;
     let (behind, pins) = link_text(link, link.bit_rate(&model.board)?);
     let text = format!(
@@ -103,7 +104,7 @@ pub fn generate_board(model: &Model) -> Result<Generated, HdlError> {
     });
     let mut manifest = engine.manifest.clone();
     manifest["top"] = json!(top);
-    let mut board = Generated { files: files.collect(), top, taps: Vec::new(), manifest, ..engine };
+    let mut board = Generated { files: files.collect(), top, memories, taps: Vec::new(), manifest, ..engine };
     board.seal();
     Ok(board)
 }

@@ -6,7 +6,7 @@ use rust_hdl::prelude::*;
 use super::{
     CounterRam, Crc, FrameIngress, Packer, Parser, Requests, Resultants, Shape, SlipDecoder, SlipEncoder, Sources,
 };
-use crate::primitives::Relay;
+use crate::primitives::RegisterSlice;
 use crate::wire::Wire;
 
 /// ```text
@@ -57,8 +57,8 @@ pub struct PacketLink {
     decoder: SlipDecoder,
     parser: Parser,
     ingress: FrameIngress,
-    towards: Relay,
-    back: Relay,
+    towards: RegisterSlice,
+    back: RegisterSlice,
     requests: Requests,
     resultants: Resultants,
     sources: Sources,
@@ -96,8 +96,8 @@ impl PacketLink {
             decoder: SlipDecoder::default(),
             parser: Parser::new(shape),
             ingress: FrameIngress::new(shape.rows * shape.cols, shape.input_bits),
-            towards: Relay::new(shape.input_bits as usize, shape.resultants),
-            back: Relay::new(96, shape.resultants),
+            towards: RegisterSlice::new(shape.input_bits as usize, shape.resultants),
+            back: RegisterSlice::new(96, shape.resultants),
             requests: Requests::new(shape.frames),
             resultants: Resultants::new(shape),
             sources: Sources::new(shape.resultants),

@@ -1,6 +1,7 @@
 //! Memories of the polynomials: two single-port banks, one read while the other is written.
 
 use dermis_golden::fixed::formats::Formats;
+use dermis_golden::fixed::resources::Holds;
 use dermis_golden::fixed::serial::{polynomials, word_bits};
 use rust_hdl::prelude::*;
 
@@ -55,8 +56,8 @@ fn kernel(address: usize, bits: usize) -> Kernel {
     let k = Builder::new("banks");
     let (odd, read_address) = (k.input("odd", 1), k.input("read_address", address));
     let (write, write_address, data) = (k.input("write", 1), k.input("write_address", address), k.input("data", bits));
-    let [even_word, odd_word] = [("even", !odd), ("odd_bank", odd)].map(|(name, reads)| {
-        let memory = k.memory(name, 1 << address, bits, Contents::Undefined);
+    let [even_word, odd_word] = [(0, "even", !odd), (1, "odd_bank", odd)].map(|(number, name, reads)| {
+        let memory = k.memory(name, 1 << address, bits, Contents::Undefined).holds(Holds::Bank(number));
         let word = k.register(&format!("{name}_word"), Type::unsigned(bits));
         let reads = k.wire(&format!("{name}_reads"), reads);
         // One port: a bank is read or written.

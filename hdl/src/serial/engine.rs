@@ -2,14 +2,15 @@
 //!
 //! One frame at a time. While it is computed and sent, the next is received as soon as the frame buffer has been read.
 
+use dermis_golden::fixed::resources::Holds;
 use dermis_golden::fixed::serial::{floor_bits, product_bits, word_bits, SLOT};
 use dermis_golden::fixed::Model;
 use dermis_golden::scene::Condition;
 use rust_hdl::prelude::*;
 
 use super::{
-    Banks, Candidates, CoefficientShift, Force, Horner, Pass, Receive, Rounder, Score, SerialButterfly, Solve,
-    TaxelReorder, Unfold, Walk,
+    Banks, Candidates, CoefficientShift, Force, Horner, Pass, PassSequencer, Receive, Rounder, Score, SearchSequencer,
+    SerialButterfly, TaxelReorder, Unfold,
 };
 use crate::primitives::{Dff, Ram, Slice};
 use crate::wire::Wire;
@@ -39,7 +40,7 @@ pub struct Engine {
     pub m_axis_tlast: Signal<Out, Bit>,
     pub(crate) receive: Receive,
     order: TaxelReorder,
-    pub(crate) leader: Solve,
+    pub(crate) leader: PassSequencer,
     pub(crate) rounder: Rounder,
     pub(crate) shifted: Slice,
     pub(crate) mixer: SerialButterfly,
@@ -47,7 +48,7 @@ pub struct Engine {
     raw: Ram,
     pub(crate) unfold: Unfold,
     banks: Banks,
-    pub(crate) walk: Walk,
+    pub(crate) walk: SearchSequencer,
     along_x: Horner,
     turned: Ram,
     along_y: Horner,
@@ -87,23 +88,23 @@ impl Engine {
             m_axis_tlast: Default::default(),
             receive: Receive::new(f, model.noise_floor),
             order: TaxelReorder::new(model.layout()),
-            leader: Solve::new(f, unrounded, rounded),
+            leader: PassSequencer::new(f, unrounded, rounded),
             rounder: Rounder::new(unrounded, rounded),
             shifted: Slice::new(32, rounded),
             mixer: SerialButterfly::new(rounded),
             pass: Pass::new(model),
-            raw: Ram::new(4 * f.quads, 1, f.acc_bits as usize),
+            raw: Ram::new(4 * f.quads, 1, f.acc_bits as usize).holding([Holds::Raw]),
             unfold: Unfold::new(f, rounded + 2),
             banks: Banks::new(f),
-            walk: Walk::new(f),
+            walk: SearchSequencer::new(f),
             along_x: Horner::new(word),
-            turned: Ram::new(4 * SLOT as usize, 1, word),
+            turned: Ram::new(4 * SLOT as usize, 1, word).holding([Holds::Transposed]),
             along_y: Horner::new(word),
             halve: CoefficientShift::new(word, f.search_bits[0] as usize),
             nine: Candidates::new(f),
             score: Score::new(f),
-            floors: Ram::new(SLOT as usize, 1, floor_bits(f)),
-            totals: Ram::new(SLOT as usize, 1, f.score_bits as usize + 1),
+            floors: Ram::new(SLOT as usize, 1, floor_bits(f)).holding([Holds::Floors]),
+            totals: Ram::new(SLOT as usize, 1, f.score_bits as usize + 1).holding([Holds::Totals]),
             forces: force,
             computing: Default::default(),
             condition: Default::default(),

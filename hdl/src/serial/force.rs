@@ -13,8 +13,8 @@ use dermis_golden::fixed::send::STATUS_BEATS;
 use dermis_golden::fixed::serial::{polynomials, word_bits, BEAT, FACTOR_BITS, FIRST_BEAT, MU_WORDS};
 use rust_hdl::prelude::*;
 
+use super::pass_sequencer::SATURATION_BITS;
 use super::rounder::SHIFT_BITS;
-use super::solve::SATURATION_BITS;
 use crate::kernel_block;
 use crate::language::{concat, Body, Builder, Expr, Kernel, Net, Type};
 use crate::primitives::{count_bits, position_bits};

@@ -8,8 +8,8 @@
 //! receive -> rounder -> butterfly -> pass -> raw -> rounder -> butterfly -> unfold -> banks <-> walk, candidates
 //!            normalise  fold                        rescale    unfold                 '-> force -> rounder -> m_axis
 //! ```
-//! [`Solve`] sequences the blocks up to `unfold`, [`Walk`] the search, [`Force`] the output. [`Engine`] and [`Receive`]
-//! connect blocks by `#[hdl_gen]`; [`Solve`] and [`Walk`] have a Rust `update()` for rust-hdl's simulation and
+//! [`PassSequencer`] sequences the blocks up to `unfold`, [`SearchSequencer`] the search, [`Force`] the output. [`Engine`] and [`Receive`]
+//! connect blocks by `#[hdl_gen]`; [`PassSequencer`] and [`SearchSequencer`] have a Rust `update()` for rust-hdl's simulation and
 //! hand-written Verilog, which co-simulation compares; each other block is one [kernel](crate::language).
 
 mod banks;
@@ -19,14 +19,14 @@ mod engine;
 mod force;
 mod horner;
 mod pass;
+mod pass_sequencer;
 mod receive;
 mod rounder;
 mod score;
+mod search_sequencer;
 mod serial_butterfly;
-mod solve;
 mod taxel_reorder;
 mod unfold;
-mod walk;
 
 pub use banks::Banks;
 pub use candidates::Candidates;
@@ -35,14 +35,14 @@ pub use engine::Engine;
 pub use force::Force;
 pub use horner::Horner;
 pub use pass::{Pass, LOW_FILE, WIDE_FILE};
+pub use pass_sequencer::PassSequencer;
 pub use receive::Receive;
 pub use rounder::Rounder;
 pub use score::Score;
+pub use search_sequencer::SearchSequencer;
 pub use serial_butterfly::SerialButterfly;
-pub use solve::Solve;
 pub use taxel_reorder::TaxelReorder;
 pub use unfold::Unfold;
-pub use walk::Walk;
 
 use crate::language::{concat, Builder, Expr};
 

@@ -10,7 +10,7 @@
 //! fourth cycle after the `last` product, and are cleared with the fourth; the first product of the next row follows
 //! the last one by five cycles at the earliest.
 
-use dermis_golden::fixed::resources::operand_vectors;
+use dermis_golden::fixed::resources::{operand_vectors, Holds};
 use dermis_golden::fixed::schedule::Kind;
 use dermis_golden::fixed::serial::{coefficients, first_vector, OPERAND_BITS, WIDE};
 use dermis_golden::fixed::Model;
@@ -138,6 +138,7 @@ impl Pass {
 /// The word at `address` of a memory of `table`, four fields of `bits` bits, one cycle later.
 fn coefficient_memory<'k>(
     k: &'k Builder,
+    holds: Holds,
     [memory, word, file]: [&str; 3],
     table: &[[i64; 4]],
     bits: usize,
@@ -145,7 +146,7 @@ fn coefficient_memory<'k>(
 ) -> Expr<'k> {
     let words = table.iter().map(|fields| Word::of_fields(fields, bits).limbs()[..(4 * bits).div_ceil(64)].to_vec());
     let contents = Contents::File { name: file.to_owned(), words: words.collect() };
-    let memory = k.memory(memory, table.len(), 4 * bits, contents);
+    let memory = k.memory(memory, table.len(), 4 * bits, contents).holds(holds);
     let word = k.register(word, Type::unsigned(4 * bits));
     word.set(memory.read(address));
     *word
@@ -161,12 +162,23 @@ fn kernel(tables: &Tables) -> Kernel {
     let (write_address, write_lane) = (k.input("write_address", operand_bits), k.input("write_lane", 2));
     let write_data = k.input("write_data", OPERAND);
 
-    let wide_word = coefficient_memory(&k, ["wide", "wide_word", WIDE_FILE], &tables.wide, OPERAND, address);
+    let wide_word =
+        coefficient_memory(&k, Holds::Coefficients, ["wide", "wide_word", WIDE_FILE], &tables.wide, OPERAND, address);
     let low_word = (low_bits > 0).then(|| {
         let own = address.low(count_bits(tables.low.len()));
         let selected = k.register("low_selected", Type::unsigned(1));
         selected.set(low);
-        (*selected, coefficient_memory(&k, ["low_memory", "low_word", LOW_FILE], &tables.low, low_bits, own))
+        (
+            *selected,
+            coefficient_memory(
+                &k,
+                Holds::LowCoefficients,
+                ["low_memory", "low_word", LOW_FILE],
+                &tables.low,
+                low_bits,
+                own,
+            ),
+        )
     });
     // valid, last, align
     let [first, second, third] = ["control0", "control1", "control2"].map(|name| k.register(name, Type::unsigned(3)));
@@ -184,6 +196,7 @@ fn kernel(tables: &Tables) -> Kernel {
     let accumulators = [0, 1, 2, 3].map(|lane| {
         let named = |name: &str| format!("{name}{lane}");
         let operands = k.memory(&named("operands"), 2 << operand_bits, OPERAND, Contents::Undefined);
+        let operands = operands.holds(Holds::Operands(lane));
         let ty = Type::signed(OPERAND);
         let operand = k.register(&named("operand"), Type::unsigned(OPERAND));
         let [coefficient, factor] = ["coefficient", "factor"].map(|name| k.register(&named(name), ty));

@@ -3,9 +3,10 @@
 //! As in the parallel engine ([`crate::stages::Receive`]), with a buffer of single taxels in place of quads.
 
 use dermis_golden::fixed::formats::Formats;
+use dermis_golden::fixed::resources::Holds;
 use rust_hdl::prelude::*;
 
-use crate::primitives::{count_bits, Counter, Dff, Gather, Ram};
+use crate::primitives::{count_bits, Counter, Dff, FrameStats, Ram};
 use crate::wire::Wire;
 
 /// ```text
@@ -51,7 +52,7 @@ pub struct Receive {
     pub reported: Signal<In, Bit>,
     taxels: Counter,
     frame: Ram,
-    gather: Gather,
+    gather: FrameStats,
     whole: Dff,
     broken: Dff,
     taken: Signal<Local, Bit>,
@@ -80,8 +81,8 @@ impl Receive {
             framing: Default::default(),
             reported: Default::default(),
             taxels: Counter::new(taxels),
-            frame: Ram::new(taxels, 1, bits),
-            gather: Gather::new(bits, floor, 1),
+            frame: Ram::new(taxels, 1, bits).holding([Holds::Frame { case: 0, lane: 0 }]),
+            gather: FrameStats::new(bits, floor, 1),
             whole: Default::default(),
             broken: Default::default(),
             taken: Default::default(),

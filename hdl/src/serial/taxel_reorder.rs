@@ -1,6 +1,7 @@
 //! Table between the two orders of the taxels: row-major on the streams, quad by quad in the engine.
 
 use dermis_golden::fixed::quads::Quads;
+use dermis_golden::fixed::resources::Holds;
 use rust_hdl::prelude::*;
 
 use crate::kernel_block;
@@ -48,7 +49,7 @@ fn kernel(layout: Quads, bits: usize) -> Kernel {
         [(place, taxel as u64), ((1 << bits) + taxel, place as u64)]
     };
     let words = (0..4 * layout.len()).flat_map(words).collect();
-    let places = k.memory("places", 2 << bits, bits, Contents::Words(words));
+    let places = k.memory("places", 2 << bits, bits, Contents::Words(words)).holds(Holds::TaxelOrder);
     k.register("place", Type::unsigned(bits)).set(places.read(back.concat(index)));
     k.finish()
 }

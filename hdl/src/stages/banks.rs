@@ -64,7 +64,7 @@ impl Banks {
         let cases = model.cases();
         let mut block = Banks {
             ports: ReceivePorts::new(cases),
-            banks: cases.iter().map(Receive::new).collect(),
+            banks: cases.iter().enumerate().map(|(index, case)| Receive::new(case, index)).collect(),
             choose: Choose::new(model),
             kernel: Body::default(),
         };

@@ -2,6 +2,7 @@
 //!
 //! One quad per cycle: frame buffer (2 cycles), `normalise` (1), butterfly (1), memory.
 
+use dermis_golden::fixed::resources::Holds;
 use dermis_golden::fixed::Model;
 use rust_hdl::prelude::*;
 
@@ -87,7 +88,7 @@ impl Fold {
             finish: BitDelay::new(5),
             address: Delay::new(address, 4),
             butterfly: Butterfly::new(bits),
-            memory: Ram::new(quads, 1, 4 * (bits + 2)).registered(),
+            memory: Ram::new(quads, 1, 4 * (bits + 2)).holding([Holds::Folded]).registered(),
             ending: Default::default(),
         }
     }

@@ -1,5 +1,6 @@
 //! Stage `force`: p(μ*) by quad into a memory; from there, force words by taxel into the output queue.
 
+use dermis_golden::fixed::resources::Holds;
 use dermis_golden::fixed::Model;
 use rust_hdl::prelude::*;
 
@@ -116,7 +117,7 @@ impl Force {
             m_axis_tdata: Wire::new(unit.beat_data.width()),
             quads: Counter::new(quads),
             asked: Delay::new(address, 1),
-            store: Ram::new(quads, 1, value).registered(),
+            store: Ram::new(quads, 1, value).holding([Holds::Values]).registered(),
             leaving: Queue::new(unit.beat_data.width()),
             unit,
         }

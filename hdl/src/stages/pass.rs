@@ -4,13 +4,13 @@
 //! to operands: addresses (1 cycle, 3 with a column list), memories (2), selection of limb and parity (1); then the
 //! lanes.
 
-use dermis_golden::fixed::resources::operand_vectors;
+use dermis_golden::fixed::resources::{operand_vectors, Holds};
 use dermis_golden::fixed::Model;
 use rust_hdl::prelude::*;
 
 use crate::primitives::{
-    control_bits, count_bits, BitDelay, Counter, Delay, Dff, Filler, Lanes, OperandSelect, Ram, Slice, Steps,
-    SOURCE_BITS,
+    control_bits, count_bits, BitDelay, Counter, Delay, Dff, Lanes, OperandSelect, OperandWriter, PassProgram, Ram,
+    Slice, SOURCE_BITS,
 };
 use crate::wire::Wire;
 
@@ -42,9 +42,9 @@ pub struct Pass {
     column: Counter,
     running: Dff,
     /// Schedule of the products.
-    pub steps: Steps,
+    pub steps: PassProgram,
     vectors: Ram,
-    filler: Filler,
+    filler: OperandWriter,
     source: Delay,
     control: Delay,
     valid: BitDelay,
@@ -62,7 +62,7 @@ impl Pass {
     pub fn new(model: &Model) -> Self {
         let formats = &model.formats;
         let quads = formats.quads;
-        let steps = Steps::new(model);
+        let steps = PassProgram::new(model);
         let lanes = Lanes::new(model);
         let operands = operand_vectors(formats.degree);
         let vectors = |memory: Ram| if operands == 0 { memory.left_out() } else { memory };
@@ -82,8 +82,13 @@ impl Pass {
             column: Counter::new(quads),
             running: Default::default(),
             low_address: Slice::new(steps.operand_address.width(), count_bits(quads)),
-            vectors: vectors(Ram::new(operands.max(1) * quads, 1, parity_bits)).registered(),
-            filler: Filler::new(operands, &model.cases().iter().map(|case| case.formats.quads).collect::<Vec<_>>()),
+            vectors: vectors(Ram::new(operands.max(1) * quads, 1, parity_bits))
+                .holding([Holds::Operands(0)])
+                .registered(),
+            filler: OperandWriter::new(
+                operands,
+                &model.cases().iter().map(|case| case.formats.quads).collect::<Vec<_>>(),
+            ),
             source: Delay::new(SOURCE_BITS, 2),
             control: Delay::new(control_bits(model), 3),
             valid: BitDelay::new(3 + steps.latency()),

@@ -4,11 +4,14 @@
 //! `tlast` drops the frame, and the next beat starts a new one; a missing `tlast` is only recorded. Both set `framing`
 //! until `reported`.
 
+use dermis_golden::fixed::resources::Holds;
 use dermis_golden::fixed::Model;
 use rust_hdl::prelude::*;
 
 use crate::ports::{has_ports, ports};
-use crate::primitives::{count_bits, frame_quads, largest, BitDelay, Blank, Delay, Dff, Gather, Ram, Scan, Spread};
+use crate::primitives::{
+    count_bits, frame_quads, largest, BitDelay, DeadTaxelMask, Delay, Dff, FrameStats, LaneBroadcast, Ram, Scan,
+};
 use crate::wire::Wire;
 
 /// ```text
@@ -21,10 +24,10 @@ use crate::wire::Wire;
 pub struct Receive {
     ports: ReceivePorts,
     scan: Scan,
-    blank: Blank,
-    spread: Spread,
+    blank: DeadTaxelMask,
+    spread: LaneBroadcast,
     frame: Ram,
-    gather: Gather,
+    gather: FrameStats,
     gathers: BitDelay,
     gathered_part: Delay,
     gathered_code: Delay,
@@ -114,8 +117,8 @@ impl ReceivePorts {
 has_ports!(Receive: ReceivePorts);
 
 impl Receive {
-    /// For frames in the layout of `model`, one case.
-    pub fn new(model: &Model) -> Self {
+    /// For frames in the layout of `model`, which is the case of index `case`.
+    pub fn new(model: &Model, case: usize) -> Self {
         let bits = model.formats.input_bits as usize;
         let count = model.parts.len();
         let quads = count * model.formats.quads;
@@ -123,10 +126,10 @@ impl Receive {
         Receive {
             ports: ReceivePorts::new(std::slice::from_ref(model)),
             scan: Scan::new(std::slice::from_ref(model)),
-            blank: Blank::new(bits, taxels, &model.dead),
-            spread: Spread::new(bits),
-            frame: Ram::new(quads, 4, bits).registered(),
-            gather: Gather::new(bits, model.noise_floor, count),
+            blank: DeadTaxelMask::new(bits, taxels, &model.dead),
+            spread: LaneBroadcast::new(bits),
+            frame: Ram::new(quads, 4, bits).holding((0..4).map(|lane| Holds::Frame { case, lane })).registered(),
+            gather: FrameStats::new(bits, model.noise_floor, count),
             gathers: BitDelay::new(1),
             gathered_part: Delay::new(count_bits(count), 1),
             gathered_code: Delay::new(bits, 1),

@@ -4,6 +4,7 @@
 //! rescaler with the measured shift. All later rows pass it directly, with the constant shift of an A pass. The two
 //! never overlap, because no A pass starts before v_00 is complete.
 
+use dermis_golden::fixed::resources::Holds;
 use dermis_golden::fixed::Model;
 use rust_hdl::prelude::*;
 
@@ -77,7 +78,7 @@ impl Rescale {
             replaying: Default::default(),
             rows: CaseCounter::new(&quads),
             replay: CaseCounter::new(&quads),
-            raw: Ram::new(largest(&quads), 1, acc).registered(),
+            raw: Ram::new(largest(&quads), 1, acc).holding([Holds::Raw]).registered(),
             length: RawLength::new(formats),
             rescaler: Rescaler::new(formats),
             started: BitDelay::new(1),

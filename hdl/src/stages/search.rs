@@ -14,9 +14,9 @@ use rust_hdl::prelude::*;
 
 use crate::ports::{has_ports, ports};
 use crate::primitives::{
-    count_bits, largest, position_bits, BitDelay, Candidates, CaseCounter, Counts, Delay, Dff, Judge, PolynomialWord,
-    Score, Slice, Store, Sum, Taylor, Walk, Weigh, BUFFER_BITS, CANDIDATES_LATENCY, SCORE_LATENCY, STORE_LATENCY,
-    TAYLOR_LATENCY,
+    count_bits, largest, position_bits, BestCandidate, BitDelay, Candidates, CaseCounter, Delay, Dff, LaneMask,
+    PolynomialWord, Score, ScoreBias, SearchSequencer, Slice, Store, Sum, Taylor, BUFFER_BITS, CANDIDATES_LATENCY,
+    SCORE_LATENCY, STORE_LATENCY, TAYLOR_LATENCY,
 };
 use crate::wire::Wire;
 
@@ -27,18 +27,18 @@ const MOVED: usize = STORE_LATENCY + TAYLOR_LATENCY;
 #[derive(LogicBlock)]
 pub struct Search {
     ports: SearchPorts,
-    walk: Walk,
-    weigh: Weigh,
-    judge: Judge,
+    walk: SearchSequencer,
+    weigh: ScoreBias,
+    judge: BestCandidate,
     store: Store,
     taylor: Taylor,
     candidates: Candidates,
     scores: Score,
-    counts: Counts,
+    counts: LaneMask,
     sum: Sum,
     sum_taylor: Taylor,
     sum_candidates: Candidates,
-    fill_counts: Counts,
+    fill_counts: LaneMask,
     constants: Slice,
     quads: CaseCounter,
     period: CaseCounter,
@@ -161,19 +161,19 @@ impl Search {
         let value = 4 * formats.search_bits[0] as usize;
         Search {
             ports: SearchPorts::new(model),
-            walk: Walk::new(quads),
-            weigh: Weigh::new(formats, &taxel_counts),
-            judge: Judge::new(formats, largest(&taxel_counts)),
+            walk: SearchSequencer::new(quads),
+            weigh: ScoreBias::new(formats, &taxel_counts),
+            judge: BestCandidate::new(formats, largest(&taxel_counts)),
             constants: Slice::new(taxels.bits(), value),
             store: Store::new(taxels.clone(), quads, fill_bits, apart),
             taylor: Taylor::new(&taxels),
             candidates: Candidates::new(&taxels),
             scores: Score::new(formats),
-            counts: Counts::new(&layouts),
+            counts: LaneMask::new(&layouts),
             sum: Sum::new(&sums, quads, fill_bits, apart),
             sum_taylor: Taylor::new(&sums),
             sum_candidates: Candidates::new(&sums),
-            fill_counts: Counts::new(&layouts),
+            fill_counts: LaneMask::new(&layouts),
             quads: CaseCounter::new(&limits),
             period: CaseCounter::new(&periods),
             counting: Default::default(),

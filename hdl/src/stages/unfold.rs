@@ -4,7 +4,7 @@ use dermis_golden::fixed::schedule::{is_transposed, schedule, vectors};
 use dermis_golden::fixed::Model;
 use rust_hdl::prelude::*;
 
-use crate::primitives::{count_bits, BitDelay, CaseCounter, Counter, Delay, Placer, Unfolder};
+use crate::primitives::{count_bits, BitDelay, CaseCounter, Counter, Delay, TransposedPlace, Unfolder};
 use crate::wire::Wire;
 
 /// Quads of v_ij in, in order; two cycles later four taxels with coefficient index and quad address.
@@ -35,7 +35,7 @@ pub struct Unfold {
     quads: CaseCounter,
     vectors: Counter,
     unfolder: Unfolder,
-    placer: Placer,
+    placer: TransposedPlace,
     index_first: Delay,
     index_later: Delay,
     address_later: Delay,
@@ -68,7 +68,7 @@ impl Unfold {
             quads: CaseCounter::new(&quads),
             vectors: Counter::new(count),
             unfolder: Unfolder::new(bits, count),
-            placer: Placer::new(model.layout(), bits + 2, count, across),
+            placer: TransposedPlace::new(model.layout(), bits + 2, count, across),
             index_first: Delay::new(index, 1),
             index_later: Delay::new(index, 1),
             address_later: Delay::new(address, 2),

@@ -69,3 +69,46 @@ fn kernel(ports: &SearchPorts) -> Kernel {
     }
     k.finish()
 }
+
+#[cfg(test)]
+mod tests {
+    use dermis_golden::scene::Scene;
+
+    use super::*;
+    use crate::language::testbench::{check, random_words, Reference};
+    use crate::wire::Word;
+
+    /// `start` of the cycle before, outside a reset; undefined before the first edge.
+    struct Passed {
+        began: Option<bool>,
+        outputs: Vec<String>,
+    }
+
+    impl Reference for Passed {
+        fn outputs(&mut self, inputs: &[Word]) -> Vec<Option<Word>> {
+            let of = |name: &String| match name.as_str() {
+                "values" => Some(inputs[6]),
+                "values_valid" => Some(inputs[7]),
+                "settled" | "values_begin" | "done" => self.began.map(Word::from),
+                _ => Some(Word::default()),
+            };
+            self.outputs.iter().map(of).collect()
+        }
+
+        fn clock(&mut self, inputs: &[Word]) {
+            self.began = Some(inputs[1].number() == 1 && inputs[0].number() == 0);
+        }
+    }
+
+    #[test]
+    fn coefficients_pass_on_as_values() {
+        let mut scene = Scene::builtin("eight-by-eight").unwrap();
+        scene.search.mu_max = 0.0;
+        let block = Unsearched::new(&Model::new(&scene).unwrap());
+        let kernel = block.kernel.kernel();
+        let widths = ["rst", "start", "which", "fill_index", "fill_address", "enabled", "fill_quad", "fill"]
+            .map(|name| kernel.signals().find(|(own, _)| *own == name).unwrap().1.bits);
+        let outputs = kernel.signals.iter().filter(|signal| signal.output).map(|signal| signal.name.clone()).collect();
+        check(kernel, &random_words(1000, &widths), &mut Passed { began: None, outputs });
+    }
+}

@@ -6,9 +6,8 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use anyhow::{anyhow, Result};
-use dermis_golden::fixed::resources::Memory;
 use dermis_hdl::language::SEPARATOR;
-use dermis_hdl::usage::stage;
+use dermis_hdl::usage::{stage, PlacedMemory};
 use roxmltree::{Document, Node};
 use serde::Serialize;
 
@@ -59,7 +58,7 @@ pub struct StateElement {
 ///
 /// # Errors
 /// A listing that cannot be parsed, or that does not contain all `memories`.
-pub fn state_elements(listing: &str, dut: &str, memories: &[Memory]) -> Result<Vec<StateElement>> {
+pub fn state_elements(listing: &str, dut: &str, memories: &[PlacedMemory]) -> Result<Vec<StateElement>> {
     let document = Document::parse(listing).map_err(|error| anyhow!("Verilator's listing: {error}"))?;
     let modules: BTreeMap<&str, Node> = document
         .descendants()

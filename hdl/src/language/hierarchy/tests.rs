@@ -1,0 +1,104 @@
+//! Designs of two blocks: their modules, and what is wrong with them.
+
+use rust_hdl::prelude::*;
+
+use super::*;
+use crate::kernel_block;
+use crate::language::{Body, Builder};
+
+/// The contrary of a bit.
+#[derive(LogicBlock)]
+struct Inverter {
+    a: Signal<In, Bit>,
+    b: Signal<Out, Bit>,
+    kernel: Body,
+}
+
+kernel_block!(Inverter, inputs[a], outputs[b]);
+
+impl Default for Inverter {
+    fn default() -> Self {
+        let k = Builder::combinational("inverter");
+        k.wire("b", !k.input("a", 1));
+        Inverter { a: Default::default(), b: Default::default(), kernel: Body::default() }.bind(k.finish())
+    }
+}
+
+/// Two inverters, one behind the other.
+#[derive(LogicBlock, Default)]
+struct Chain {
+    a: Signal<In, Bit>,
+    b: Signal<Out, Bit>,
+    first: Inverter,
+    second: Inverter,
+}
+
+impl Logic for Chain {
+    #[hdl_gen]
+    fn update(&mut self) {
+        self.first.a.next = self.a.val();
+        self.second.a.next = self.first.b.val();
+        self.b.next = self.second.b.val();
+    }
+}
+
+/// Two inverters in a ring while `a` is high.
+#[derive(LogicBlock, Default)]
+struct Ring {
+    a: Signal<In, Bit>,
+    b: Signal<Out, Bit>,
+    first: Inverter,
+    second: Inverter,
+}
+
+impl Logic for Ring {
+    #[hdl_gen]
+    fn update(&mut self) {
+        self.first.a.next = self.second.b.val() & self.a.val();
+        self.second.a.next = self.first.b.val();
+        self.b.next = self.second.b.val();
+    }
+}
+
+#[test]
+fn a_block_that_connects_others_is_a_module_with_instances() {
+    let hierarchy = Hierarchy::of(&Chain::default());
+    hierarchy.check().unwrap();
+    let comment = |path: &str, port: &str| (path.is_empty() && port == "a").then(|| "A bit.".to_owned());
+    let text = hierarchy.verilog("chain", &Attributes::new(), &comment);
+    let chain = "\
+module chain (
+    // A bit.
+    input wire a,
+    output wire b
+);
+    wire first__a;
+    wire first__b;
+    wire second__a;
+    wire second__b;
+    assign first__a = a;
+    assign second__a = first__b;
+    assign b = second__b;
+    chain__first first (
+        .a(first__a),
+        .b(first__b)
+    );
+    chain__second second (
+        .a(second__a),
+        .b(second__b)
+    );
+endmodule
+";
+    assert!(text.starts_with(chain), "{text}");
+    assert!(
+        text.contains("module chain__first (\n    input wire a,\n    output wire b\n);\n    assign b = !a;\n"),
+        "{text}"
+    );
+}
+
+#[test]
+fn a_loop_through_several_blocks_is_named() {
+    let error = Hierarchy::of(&Ring::default()).check().unwrap_err().to_string();
+    assert!(error.contains("combinational loop through"), "{error}");
+    assert!(["first__a", "first__b", "second__a", "second__b"].iter().all(|net| error.contains(net)), "{error}");
+}

@@ -1,0 +1,102 @@
+//! Counter over the taxels of the array, row by row, with quad address and lane of each.
+
+use dermis_golden::fixed::Model;
+use rust_hdl::prelude::*;
+
+use crate::primitives::address::counter::count_bits;
+use crate::primitives::{CaseCounter, QuadAddress};
+use crate::wire::Wire;
+
+/// LaneMask the taxels of the whole array row-major, across all subarrays, one per `enable`. The outputs are
+/// combinational from the count.
+#[derive(LogicBlock)]
+pub struct Scan {
+    /// Clock; registers change on its rising edge.
+    pub clk: Signal<In, Clock>,
+    /// Index of the case.
+    pub which: Wire<In>,
+    /// Back to the first taxel, with priority over `enable`.
+    pub clear: Signal<In, Bit>,
+    /// PassProgram to the next taxel at the clock edge; after the last to the first.
+    pub enable: Signal<In, Bit>,
+    /// The current taxel is the array's last.
+    pub last: Signal<Out, Bit>,
+    /// Quad address of the current taxel, over all subarrays.
+    pub address: Wire<Out>,
+    /// Index of the current taxel's subarray.
+    pub part: Wire<Out>,
+    /// Lane the current taxel is read from, 2 bits.
+    pub lane: Wire<Out>,
+    /// Lanes the current taxel is written to, one bit each.
+    pub mask: Wire<Out>,
+    col: CaseCounter,
+    part_col: CaseCounter,
+    row: CaseCounter,
+    part_row: CaseCounter,
+    mirror: QuadAddress,
+    line_end: Signal<Local, Bit>,
+    part_end: Signal<Local, Bit>,
+}
+
+impl Scan {
+    /// For the subarrays of each of `cases`.
+    pub fn new(cases: &[Model]) -> Self {
+        let each = |of: &dyn Fn(&Model) -> usize| CaseCounter::new(&cases.iter().map(of).collect::<Vec<_>>());
+        let mirror = QuadAddress::new(cases);
+        Scan {
+            clk: Default::default(),
+            which: Wire::new(count_bits(cases.len())),
+            clear: Default::default(),
+            enable: Default::default(),
+            last: Default::default(),
+            address: Wire::new(mirror.address.width()),
+            part: Wire::new(mirror.part.width()),
+            lane: Wire::new(2),
+            mask: Wire::new(4),
+            col: each(&|case| case.layout().cols),
+            part_col: each(&|case| case.grid().cols),
+            row: each(&|case| case.layout().rows),
+            part_row: each(&|case| case.grid().rows),
+            mirror,
+            line_end: Default::default(),
+            part_end: Default::default(),
+        }
+    }
+}
+
+impl Logic for Scan {
+    #[hdl_gen]
+    fn update(&mut self) {
+        self.col.clk.next = self.clk.val();
+        self.part_col.clk.next = self.clk.val();
+        self.row.clk.next = self.clk.val();
+        self.part_row.clk.next = self.clk.val();
+        self.col.clear.next = self.clear.val();
+        self.part_col.clear.next = self.clear.val();
+        self.row.clear.next = self.clear.val();
+        self.part_row.clear.next = self.clear.val();
+
+        self.col.which.next = self.which.val();
+        self.part_col.which.next = self.which.val();
+        self.row.which.next = self.which.val();
+        self.part_row.which.next = self.which.val();
+        self.mirror.which.next = self.which.val();
+        self.line_end.next = self.enable.val() & self.col.last.val() & self.part_col.last.val();
+        self.part_end.next = self.line_end.val() & self.row.last.val();
+        self.col.enable.next = self.enable.val();
+        self.part_col.enable.next = self.enable.val() & self.col.last.val();
+        self.row.enable.next = self.line_end.val();
+        self.part_row.enable.next = self.part_end.val();
+        self.last.next =
+            self.col.last.val() & self.part_col.last.val() & self.row.last.val() & self.part_row.last.val();
+
+        self.mirror.row.next = self.row.value.val();
+        self.mirror.col.next = self.col.value.val();
+        self.mirror.part_row.next = self.part_row.value.val();
+        self.mirror.part_col.next = self.part_col.value.val();
+        self.address.next = self.mirror.address.val();
+        self.part.next = self.mirror.part.val();
+        self.lane.next = self.mirror.lane.val();
+        self.mask.next = self.mirror.mask.val();
+    }
+}

@@ -1,0 +1,470 @@
+//! The MAC lanes with their coefficient memory and shift-out chains.
+
+use dermis_golden::fixed::check::{signature, POLYNOMIAL, START};
+use dermis_golden::fixed::formats::{Formats, MULTIPLIER_BITS};
+use dermis_golden::fixed::resources::Holds;
+use dermis_golden::fixed::Model;
+use rust_hdl::prelude::*;
+
+use crate::kernel_block;
+use crate::language::{concat, Body, Builder, Contents, Expr, Kernel, Net, Type};
+use crate::primitives::address::case_counter::{largest, value_by_case};
+use crate::primitives::address::counter::count_bits;
+use crate::primitives::arithmetic::pass_program::control_bits;
+use crate::wire::Wire;
+
+const M: usize = MULTIPLIER_BITS as usize;
+
+/// ```text
+/// address --> memory --> register --> a \
+///                                        * --> product --> aligned --> accumulator --> chain --> quad
+/// operands -----------------------> b   /
+/// ```
+/// A memory word holds one coefficient per lane. `operands`, `valid` and `control` belong to the address of two cycles
+/// earlier. After the last product of an accumulation its rows leave one per cycle: `lanes_per_parity` quads, fewer in
+/// the last group, the first of them five cycles after the `control` of that product.
+#[derive(LogicBlock)]
+pub struct Lanes {
+    /// Clock; registers change on its rising edge.
+    pub clk: Signal<In, Clock>,
+    /// Synchronous reset, active high; clears the control pipeline only.
+    pub rst: Signal<In, Bit>,
+    /// Index of the case.
+    pub which: Wire<In>,
+    /// Address in the coefficient memory, two cycles before its operands.
+    pub address: Wire<In>,
+    /// Four operands, one per parity, 18 bits each, signed.
+    pub operands: Wire<In>,
+    /// `operands` and `control` are valid: one product per lane to accumulate.
+    pub valid: Signal<In, Bit>,
+    /// From bit 0: align, first product, last product of an accumulation; with the coefficient check also first product
+    /// of a subarray. Valid with `valid`.
+    pub control: Wire<In>,
+    /// Accumulators of one row for the four parities, `acc_bits` each, signed.
+    pub quad: Wire<Out>,
+    /// `quad` holds a row.
+    pub quad_valid: Signal<Out, Bit>,
+    /// The signature of the coefficients read since the subarray's first product is wrong, 1 bit; valid from four
+    /// cycles after its last product. Constant 0 without the check.
+    pub damaged: Wire<Out>,
+    kernel: Body,
+}
+
+/// File of the coefficient memory, one line per word.
+pub const MEMORY_FILE: &str = "coefficients.hex";
+
+kernel_block!(
+    Lanes,
+    clock clk,
+    inputs [rst, which, address, operands, valid, control],
+    outputs [quad, quad_valid, damaged]
+);
+
+/// Sizes of the lanes.
+#[derive(Clone, Debug)]
+struct Shape {
+    /// Lanes of one parity; the whole has four times as many.
+    per_parity: usize,
+    acc_bits: usize,
+    /// Shift of a product of two high limbs; 0 without limbs.
+    align: usize,
+    /// Groups of rows, and rows of the last group, of each case.
+    groups: Vec<usize>,
+    last_rows: Vec<usize>,
+    /// Coefficients of each word, one per lane.
+    memory: Vec<Vec<i64>>,
+    /// Expected signatures of the cases, with the coefficient check.
+    signatures: Option<Vec<u32>>,
+    control_bits: usize,
+}
+
+impl Lanes {
+    /// The lanes of `model`, with the coefficients of all its cases in one memory.
+    pub fn new(model: &Model) -> Self {
+        let (formats, cases) = (&model.formats, model.cases());
+        let words = |case: &Model| case.storage.memory(&case.formats, &case.quantised);
+        Lanes::of(&Shape {
+            per_parity: formats.lanes_per_parity,
+            acc_bits: formats.acc_bits as usize,
+            align: formats.limb_align as usize,
+            groups: cases.iter().map(|case| case.formats.groups).collect(),
+            last_rows: cases.iter().map(|case| last_rows(&case.formats)).collect(),
+            memory: cases.iter().flat_map(words).collect(),
+            signatures: model.has_coefficient_check().then(|| cases.iter().map(signature).collect()),
+            control_bits: control_bits(model),
+        })
+    }
+
+    fn of(shape: &Shape) -> Self {
+        let block = Lanes {
+            clk: Default::default(),
+            rst: Default::default(),
+            which: Wire::new(count_bits(shape.groups.len())),
+            address: Wire::new(count_bits(shape.memory.len())),
+            operands: Wire::new(4 * M),
+            valid: Default::default(),
+            control: Wire::new(shape.control_bits),
+            quad: Wire::new(4 * shape.acc_bits),
+            quad_valid: Default::default(),
+            damaged: Wire::new(1),
+            kernel: Body::default(),
+        };
+        block.bind(shape.kernel())
+    }
+
+    /// Content of [`MEMORY_FILE`] for `$readmemh`, lane 0 in the least significant bits.
+    pub fn memory_file(&self) -> String {
+        self.kernel.kernel().memory_files().into_iter().map(|(_, text)| text).collect()
+    }
+}
+
+/// Rows (quads) of the last group of a pass.
+fn last_rows(formats: &Formats) -> usize {
+    formats.quads - (formats.groups - 1) * formats.lanes_per_parity
+}
+
+/// A word of the memory as limbs of 64 bits, lane 0 lowest.
+fn limbs(coefficients: &[i64]) -> Vec<u64> {
+    let mut limbs = vec![0; (coefficients.len() * M).div_ceil(64)];
+    for (lane, &coefficient) in coefficients.iter().enumerate() {
+        for bit in (0..M).filter(|bit| coefficient >> bit & 1 == 1) {
+            let at = lane * M + bit;
+            limbs[at / 64] |= 1 << (at % 64);
+        }
+    }
+    limbs
+}
+
+/// The signals that all lanes read.
+#[derive(Clone, Copy)]
+struct Shared<'k> {
+    coefficients: Expr<'k>,
+    operands: Expr<'k>,
+    adds: Expr<'k>,
+    begins: Expr<'k>,
+    /// `None` without limbs: nothing is shifted.
+    aligns: Option<Expr<'k>>,
+    /// The last product of an accumulation, two cycles after its operands.
+    ends: Expr<'k>,
+}
+
+/// As [`Builder::delay`], not merged with equal registers.
+fn own_copy<'k>(k: &'k Builder, name: &str, value: Expr<'k>) -> Expr<'k> {
+    let register = k.register(name, value.ty()).keep();
+    register.set(value);
+    *register
+}
+
+impl Shape {
+    fn kernel(&self) -> Kernel {
+        let (lanes, bit) = (4 * self.per_parity, Type::unsigned(1));
+        let k = Builder::new("lanes");
+        let (rst, which) = (k.input("rst", 1), k.input("which", count_bits(self.groups.len())));
+        let (address, operands) = (k.input("address", count_bits(self.memory.len())), k.input("operands", 4 * M));
+        let (valid, control) = (k.input("valid", 1), k.input("control", self.control_bits));
+        let words = self.memory.iter().map(|word| limbs(word)).collect();
+        let contents = Contents::File { name: MEMORY_FILE.to_owned(), words };
+        let memory = k.memory("memory", self.memory.len(), lanes * M, contents).holds(Holds::Coefficients);
+        let word = k.delay("word", memory.read(address));
+        let coefficients = k.delay("coefficients", word);
+
+        let later = |name: &str, value| {
+            let state = k.state(name, bit, rst, 0);
+            state.set(value);
+            *state
+        };
+        let valid1 = later("valid1", valid);
+        let valid2 = later("valid2", valid1);
+        let valid3 = later("valid3", valid2);
+        let valid4 = later("valid4", valid3);
+        let first1 = k.delay("first1", control.at(1));
+        let first2 = k.delay("first2", first1);
+        let last1 = k.delay("last1", control.at(2));
+        let last2 = k.delay("last2", last1);
+        let last3 = k.delay("last3", last2);
+        let last4 = k.delay("last4", last3);
+        let aligns = (self.align > 0).then(|| k.delay("align1", control.at(0)));
+
+        let captured = k.wire("captured", valid4 & last4);
+        let rows = self.rows(&k, which, rst, captured);
+        let row_bits = rows.bits();
+        let left = k.state("left", Type::unsigned(row_bits), rst, 0);
+        let more = k.wire("more", left.any());
+        k.when(more, || left.set(left.minus(1)));
+        k.when(captured, || left.set(rows));
+        k.comment(
+            "Registered to shorten a long route. Not written as left > 1, which is constant where left has one bit.",
+        );
+        let quad_valid = k.state("quad_valid", bit, rst, 0);
+        quad_valid.set(captured | (more & !left.is(1)));
+
+        self.check(&k, which, control, valid2, coefficients);
+        let ends = k.wire("ends", valid1 & last1);
+        let shared = Shared { coefficients, operands, adds: valid2, begins: first2, aligns, ends };
+        let heads: Vec<Expr> = (0..4).rev().map(|parity| self.parity(&k, rst, parity, shared)).collect();
+        k.wire("quad", concat(&heads));
+        k.finish()
+    }
+
+    /// Rows that leave after the present group; a counter of the groups where there are several.
+    fn rows<'k>(&self, k: &'k Builder, which: Expr<'k>, rst: Expr<'k>, captured: Expr<'k>) -> Expr<'k> {
+        let row_bits = count_bits(self.per_parity + 1);
+        let last_rows = value_by_case(k, which, &self.last_rows, row_bits);
+        let groups = largest(&self.groups);
+        if groups == 1 {
+            return last_rows;
+        }
+        let ends: Vec<usize> = self.groups.iter().map(|groups| groups - 1).collect();
+        let group = k.state("group", Type::unsigned(count_bits(groups)), rst, 0);
+        let is_last = k.wire("last_group", group.equals(value_by_case(k, which, &ends, group.bits())));
+        k.when(captured, || group.set(is_last.mux(k.constant(group.bits(), 0), group.plus(1))));
+        is_last.mux(last_rows, k.constant(row_bits, self.per_parity as u64))
+    }
+
+    /// Signature of the coefficients read, compared with the expected one: parity of each lane, of four lanes, of all
+    /// lanes, one cycle each.
+    fn check<'k>(&self, k: &'k Builder, which: Expr<'k>, control: Expr<'k>, valid2: Expr<'k>, coefficients: Expr<'k>) {
+        let Some(signatures) = &self.signatures else {
+            k.wire("damaged", k.constant(1, 0));
+            return;
+        };
+        let parities = |of: Expr<'k>, bits: usize| {
+            let one = |n: usize| of.slice(n * bits, bits).parity();
+            concat(&(0..of.bits() / bits).rev().map(one).collect::<Vec<_>>())
+        };
+        let odd_lanes = k.delay("odd_lanes", parities(coefficients, M));
+        let odd_fours = k.delay("odd_fours", parities(odd_lanes, 4));
+        let opens1 = k.delay("opens1", control.at(3));
+        let opens2 = k.delay("opens2", opens1);
+        k.comment("Signature of the coefficients read, compared with the expected one.");
+        let signature = k.register("signature", Type::unsigned(32));
+        let so_far = k.wire("sofar", opens2.mux(k.constant(32, START.into()), *signature));
+        let feedback = so_far.top().mux(k.constant(32, POLYNOMIAL.into()), k.constant(32, 0));
+        k.when(valid2, || signature.set(so_far.low(31).concat(odd_fours.parity()) ^ feedback));
+        let expected: Vec<usize> = signatures.iter().map(|&signature| signature as usize).collect();
+        k.wire("damaged", signature.differs(value_by_case(k, which, &expected, 32)));
+    }
+
+    /// The lanes of one parity; the accumulator that its chain shows.
+    fn parity<'k>(&self, k: &'k Builder, rst: Expr<'k>, parity: usize, shared: Shared<'k>) -> Expr<'k> {
+        let acc = Type::signed(self.acc_bits);
+        k.scope(&format!("parity_{parity}"), || {
+            // One copy per parity, each for a quarter of the lanes, to limit fan-out and route length.
+            let leaves2 = own_copy(k, "leaves2", !rst & shared.ends);
+            let leaves3 = own_copy(k, "leaves3", !rst & leaves2);
+            let chain = |lane: usize| k.scope(&format!("lane_{lane}"), || k.register("chain", acc));
+            let chains: Vec<Net<'k>> = (0..self.per_parity).map(chain).collect();
+            for (lane, chain) in chains.iter().enumerate() {
+                let accumulator =
+                    k.scope(&format!("lane_{lane}"), || self.lane(k, parity, parity * self.per_parity + lane, shared));
+                let leaves = k.scope(&format!("lane_{lane}"), || own_copy(k, "leaves", leaves3));
+                let next = chains.get(lane + 1).map_or(k.signed_constant(self.acc_bits, 0), Net::get);
+                chain.set(leaves.mux(accumulator, next));
+            }
+            chains[0].get()
+        })
+    }
+
+    /// The accumulator of one lane.
+    fn lane<'k>(&self, k: &'k Builder, parity: usize, lane: usize, shared: Shared<'k>) -> Expr<'k> {
+        // One copy per lane, to limit fan-out; the attribute keeps synthesis from merging them.
+        let adds = own_copy(k, "adds", shared.adds);
+        let begins = own_copy(k, "begins", shared.begins);
+        let a = k.delay("a", shared.coefficients.slice(lane * M, M).signed());
+        let b = k.delay("b", shared.operands.slice(parity * M, M).signed());
+        let product = k.delay("product", a * b);
+        // Only products of two high limbs are shifted; without limbs the multiplexer is omitted.
+        let shifted = match shared.aligns {
+            Some(align) => {
+                let aligns = own_copy(k, "aligns", align);
+                k.wire("shifted", aligns.mux(product.shift_left(self.align), product))
+            }
+            None => product,
+        };
+        let fits = shifted.low(self.acc_bits.min(shifted.bits())).signed();
+        let aligned = k.delay("aligned", fits.extend(self.acc_bits));
+        let accumulator = k.register("accumulator", Type::signed(self.acc_bits));
+        let sum = (*accumulator + aligned).low(self.acc_bits).signed();
+        k.when(adds, || accumulator.set(begins.mux(aligned, sum)));
+        *accumulator
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use dermis_golden::fixed::check::{parity, step};
+
+    use super::*;
+    use crate::language::testbench::{check, Reference};
+    use crate::wire::Word;
+
+    /// Three lanes per parity and two cases: one group of two rows, two groups of which the second has one row.
+    fn shape() -> Shape {
+        let mut random = fastrand::Rng::with_seed(8);
+        let mut coefficient = || random.i64(-(1 << (M - 1))..1 << (M - 1));
+        let memory = (0..20).map(|_| (0..12).map(|_| coefficient()).collect()).collect();
+        Shape {
+            per_parity: 3,
+            acc_bits: 45,
+            align: 11,
+            groups: vec![1, 2],
+            last_rows: vec![2, 1],
+            memory,
+            signatures: Some(vec![0x1234_5678, 0xabcd_ef01]),
+            control_bits: 4,
+        }
+    }
+
+    /// One product per lane, as it enters.
+    #[derive(Clone, Default)]
+    struct Beat {
+        valid: bool,
+        control: u64,
+        word: usize,
+        operands: Word,
+    }
+
+    struct Integers {
+        shape: Shape,
+        pipe: [Beat; 4],
+        addresses: [usize; 2],
+        /// `None` before the first product of an accumulation.
+        accumulators: Option<Vec<i64>>,
+        chain: Option<Vec<i64>>,
+        left: usize,
+        group: usize,
+        signature: Option<u32>,
+        reset: bool,
+    }
+
+    impl Integers {
+        fn accumulate(&mut self, beat: &Beat) {
+            let word = &self.shape.memory[beat.word];
+            let product = |lane: usize| {
+                let operand = beat.operands.signed(lane / self.shape.per_parity, M);
+                (word[lane] * operand) << if beat.control & 1 == 1 { self.shape.align } else { 0 }
+            };
+            let products: Vec<i64> = (0..word.len()).map(product).collect();
+            self.accumulators = match beat.control & 2 == 2 {
+                true => Some(products),
+                false => self.accumulators.take().map(|sums| {
+                    let wrap = 64 - self.shape.acc_bits;
+                    sums.iter().zip(&products).map(|(sum, product)| (sum + product) << wrap >> wrap).collect()
+                }),
+            };
+        }
+    }
+
+    impl Reference for Integers {
+        fn outputs(&mut self, inputs: &[Word]) -> Vec<Option<Word>> {
+            let per_parity = self.shape.per_parity;
+            let heads = |chain: &Vec<i64>| [0, 1, 2, 3].map(|parity| chain[parity * per_parity]);
+            let quad = self.chain.as_ref().filter(|_| self.left > 0).map(heads);
+            let expected = self.shape.signatures.as_ref().map(|all| all[inputs[1].number() as usize]);
+            vec![
+                self.reset.then(|| Word::from(self.left > 0)),
+                self.signature.map(|signature| Word::from(Some(signature) != expected)),
+                quad.map(|heads| Word::of_fields(&heads, self.shape.acc_bits)),
+            ]
+        }
+
+        fn clock(&mut self, inputs: &[Word]) {
+            let rst = inputs[0].number() == 1;
+            let per_parity = self.shape.per_parity;
+            if self.left > 0 {
+                self.left -= 1;
+                self.chain.iter_mut().for_each(|chain| {
+                    (0..4).for_each(|parity| chain[parity * per_parity..][..per_parity].rotate_left(1));
+                });
+            }
+            let [captured, done, checked, _] = self.pipe.clone();
+            if checked.valid {
+                let start = if checked.control & 8 == 8 { Some(START) } else { self.signature };
+                self.signature = start.map(|signature| step(signature, parity(&self.shape.memory[checked.word])));
+            }
+            if captured.valid && captured.control & 4 == 4 {
+                self.chain.clone_from(&self.accumulators);
+                let case = inputs[1].number() as usize;
+                self.group = (self.group + 1) % self.shape.groups[case];
+                self.left = if self.group == 0 { self.shape.last_rows[case] } else { per_parity };
+            }
+            if done.valid {
+                self.accumulate(&done);
+            }
+            self.pipe.rotate_left(1);
+            self.pipe[3] = Beat {
+                valid: inputs[4].number() == 1 && !rst,
+                control: inputs[5].number(),
+                word: self.addresses[1],
+                operands: inputs[3],
+            };
+            self.addresses = [inputs[2].number() as usize, self.addresses[0]];
+            if rst {
+                self.pipe.iter_mut().for_each(|beat| beat.valid = false);
+                (self.left, self.group, self.reset) = (0, 0, true);
+                // A product on its way may or may not have been added.
+                (self.accumulators, self.chain, self.signature) = (None, None, None);
+            }
+        }
+    }
+
+    /// Accumulations of random length with gaps, an end at least as many cycles after the last as rows leave; resets,
+    /// and another case after a reset.
+    fn stimulus(shape: &Shape, cycles: usize) -> Vec<Vec<Word>> {
+        let mut random = fastrand::Rng::with_seed(9);
+        let (mut case, mut first, mut since) = (0u64, true, 0);
+        let inputs = |cycle: usize| {
+            let rst = cycle < 3 || random.u16(..150) == 0;
+            if rst {
+                (case, first) = (random.u64(..2), true);
+            }
+            let valid = !rst && random.u8(..4) > 0;
+            let last = since > shape.per_parity + 1 && random.u8(..4) == 0;
+            let opens = first && random.bool();
+            let control =
+                u64::from(random.bool()) | u64::from(first) << 1 | u64::from(last) << 2 | u64::from(opens) << 3;
+            since = if valid && last { 0 } else { since + 1 };
+            if valid {
+                first = last;
+            }
+            let operands: Vec<i64> = (0..4).map(|_| random.i64(-(1 << (M - 1))..1 << (M - 1))).collect();
+            vec![
+                rst.into(),
+                case.into(),
+                random.u64(..shape.memory.len() as u64).into(),
+                Word::of_fields(&operands, M),
+                valid.into(),
+                control.into(),
+            ]
+        };
+        (0..cycles).map(inputs).collect()
+    }
+
+    #[test]
+    fn rows_of_sums_leave_and_the_signature_is_the_model_s() {
+        let shape = shape();
+        let block = Lanes::of(&shape);
+        let stimulus = stimulus(&shape, 6000);
+        let mut reference = Integers {
+            pipe: Default::default(),
+            addresses: [0; 2],
+            accumulators: None,
+            chain: None,
+            left: 0,
+            group: 0,
+            signature: None,
+            reset: false,
+            shape,
+        };
+        check(block.kernel.kernel(), &stimulus, &mut reference);
+    }
+
+    #[test]
+    fn a_line_of_the_memory_file_has_lane_0_lowest() {
+        let block = Lanes::of(&Shape { memory: vec![[-1, 0, 1].repeat(4); 2], ..shape() });
+        let text = block.memory_file();
+        // All digits of 12 lanes of 18 bits; −1, 1, 0 and −1 in the lowest four.
+        assert_eq!(text.lines().count(), 2);
+        assert!(text.lines().all(|line| line.len() == 54 && line.ends_with("c000100003ffff")), "{text}");
+    }
+}

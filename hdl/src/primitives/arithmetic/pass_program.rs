@@ -1,0 +1,419 @@
+//! Schedule of the matrix passes as a table of instructions.
+
+use dermis_golden::fixed::resources::{operand_vectors, Holds};
+use dermis_golden::fixed::schedule::{schedule, Operand};
+use dermis_golden::fixed::Model;
+use rust_hdl::prelude::*;
+
+use crate::kernel_block;
+use crate::language::{concat, Body, Builder, Contents, Expr, Kernel, Net, Type};
+use crate::primitives::address::counter::count_bits;
+use crate::wire::Wire;
+
+/// One product over the columns of one group of rows: an instruction of the schedule.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Step {
+    /// First address in the coefficient memory.
+    pub coefficients: usize,
+    /// Number of words there: the stored columns.
+    pub columns: usize,
+    /// First address in the operand memory.
+    pub operand: usize,
+    /// Operand: 0 = v_ij, 1 = high limb of the input, 2 = low limb.
+    pub kind: u64,
+    /// Source parity = target parity XOR `flip`.
+    pub flip: u64,
+    /// The operand is read with x and y exchanged.
+    pub transposed: bool,
+    /// The product is of two high limbs and is shifted left.
+    pub align: bool,
+    /// First product of an accumulation.
+    pub first: bool,
+    /// Last product of an accumulation.
+    pub last: bool,
+    /// First step of a subarray.
+    pub opens: bool,
+    /// Last step of a subarray.
+    pub ends: bool,
+    /// Number of operand vectors that must be complete before this step.
+    pub needs: usize,
+}
+
+/// The steps of one case's `model`: for each v_ij, for each group of rows, its products.
+pub fn unroll(model: &Model) -> Vec<Step> {
+    let (formats, storage) = (&model.formats, &model.storage);
+    let mut steps = Vec::new();
+    for products in schedule(formats) {
+        for group in 0..formats.groups {
+            for (index, product) in products.iter().enumerate() {
+                let (kind, operand, needs) = match product.operand {
+                    Operand::Vector(k) => (0, k * formats.quads, k + 1),
+                    Operand::InputHigh => (1, 0, 0),
+                    Operand::InputLow => (2, 0, 0),
+                };
+                steps.push(Step {
+                    coefficients: storage.address_of(product.matrix, group),
+                    columns: storage.columns_of(product.matrix, group).len(),
+                    operand,
+                    kind,
+                    flip: product.matrix.flip as u64,
+                    transposed: product.transposed,
+                    align: product.align,
+                    first: index == 0,
+                    last: index + 1 == products.len(),
+                    opens: steps.is_empty(),
+                    ends: false,
+                    needs,
+                });
+            }
+        }
+    }
+    if let Some(step) = steps.last_mut() {
+        step.ends = true;
+    }
+    steps
+}
+
+/// Position in the step's columns in; addresses and control out, one cycle later, or three where a column list is read.
+///
+/// `start` loads the first step of case `which`, `advance` the next one, both at the clock edge. `ready` (the step's
+/// operand is complete), `last` (its last column) and `ends` (the last step of the case, after which the first follows)
+/// are combinational.
+///
+/// The current instruction is in a register. The table is always read at the next instruction, because `advance`
+/// settles late in the cycle.
+#[derive(LogicBlock)]
+pub struct PassProgram {
+    /// Clock; registers change on its rising edge.
+    pub clk: Signal<In, Clock>,
+    /// Index of the case.
+    pub which: Wire<In>,
+    /// Load the first step at the clock edge.
+    pub start: Signal<In, Bit>,
+    /// Load the next step at the clock edge.
+    pub advance: Signal<In, Bit>,
+    /// Position in the step's columns.
+    pub column: Wire<In>,
+    /// Number of complete operand vectors of this subarray.
+    pub finished: Wire<In>,
+    /// The step's operand is complete.
+    pub ready: Signal<Out, Bit>,
+    /// `column` is the step's last.
+    pub last: Signal<Out, Bit>,
+    /// The step is the last of its case.
+    pub ends: Signal<Out, Bit>,
+    /// Address in the coefficient memory; [`latency`](PassProgram::latency) cycles after `column`.
+    pub coefficient_address: Wire<Out>,
+    /// Address in the operand memory, and in its low bits in the input memory; [`latency`](PassProgram::latency) cycles after
+    /// `column`.
+    pub operand_address: Wire<Out>,
+    /// Operand selection as in [`OperandSelect`](super::OperandSelect): kind, flip, exchange, from bit 0; with the
+    /// addresses.
+    pub source: Wire<Out>,
+    /// Control of [`Lanes`](super::Lanes) from bit 0: align, first, last product of an accumulation; with the
+    /// coefficient check also first product of a subarray; with the addresses.
+    pub control: Wire<Out>,
+    kernel: Body,
+}
+
+kernel_block!(
+    PassProgram,
+    clock clk,
+    inputs [which, start, advance, column, finished],
+    outputs [ready, last, ends, coefficient_address, operand_address, source, control]
+);
+
+/// File of the column list, one line per word of the coefficient memory.
+pub const COLUMN_FILE: &str = "columns.hex";
+/// Width of `control`, in bits.
+pub fn control_bits(model: &Model) -> usize {
+    3 + usize::from(model.has_coefficient_check())
+}
+/// Width of `source`, in bits.
+pub const SOURCE_BITS: usize = 5;
+
+/// What decides the circuit.
+struct Shape {
+    /// The steps of each case.
+    steps: Vec<Vec<Step>>,
+    /// Address of each coefficient word's column, and its transposed address; empty without a column list.
+    list: Vec<[usize; 2]>,
+    /// Some step reads its operand transposed.
+    across: bool,
+    /// Words of the coefficient memory, quads of a subarray, operand vectors.
+    words: usize,
+    quads: usize,
+    vectors: usize,
+    control_bits: usize,
+}
+
+impl PassProgram {
+    /// The schedule of `model`.
+    pub fn new(model: &Model) -> Self {
+        let (formats, cases) = (&model.formats, model.cases());
+        let pair = |case: &Model, j| [j, if formats.shared_a { case.layout().transposed(j) } else { j }];
+        let pairs = |case: &Model| case.storage.column_list().iter().map(|&j| pair(case, j)).collect::<Vec<_>>();
+        PassProgram::of(&Shape {
+            steps: cases.iter().map(unroll).collect(),
+            list: cases.iter().filter(|case| case.storage.listed).flat_map(pairs).collect(),
+            across: formats.shared_a,
+            words: cases.iter().map(|case| case.storage.words()).sum(),
+            quads: formats.quads,
+            vectors: operand_vectors(formats.degree),
+            control_bits: control_bits(model),
+        })
+    }
+
+    fn of(shape: &Shape) -> Self {
+        let block = PassProgram {
+            clk: Default::default(),
+            which: Wire::new(count_bits(shape.steps.len())),
+            start: Default::default(),
+            advance: Default::default(),
+            column: Wire::new(count_bits(shape.quads)),
+            finished: Wire::new(count_bits(shape.vectors + 1)),
+            ready: Default::default(),
+            last: Default::default(),
+            ends: Default::default(),
+            coefficient_address: Wire::new(count_bits(shape.words)),
+            operand_address: Wire::new(count_bits(shape.vectors.max(1) * shape.quads)),
+            source: Wire::new(SOURCE_BITS),
+            control: Wire::new(shape.control_bits),
+            kernel: Body::default(),
+        };
+        block.bind(shape.kernel())
+    }
+
+    /// Cycles from `column` to the addresses: 1, or 3 with a column list.
+    pub fn latency(&self) -> usize {
+        match self.kernel.kernel().memories() {
+            [] => 1,
+            _ => 3,
+        }
+    }
+
+    /// Content of [`COLUMN_FILE`] for `$readmemh`, the transposed address above the plain one; `None` without a list.
+    pub fn column_file(&self) -> Option<String> {
+        self.kernel.kernel().memory_files().into_iter().next().map(|(_, text)| text)
+    }
+}
+
+impl Shape {
+    /// Widths of the fields of an instruction, from bit 0: align, first, last, kind and flip and transposed as in
+    /// `source`, ends, final column, needs, operand, coefficients.
+    fn fields(&self) -> [usize; 9] {
+        let (columns, needs) = (count_bits(self.quads), count_bits(self.vectors + 1));
+        let operand = count_bits(self.vectors.max(1) * self.quads);
+        [1, 1, 1, SOURCE_BITS, 1, columns, needs, operand, count_bits(self.words)]
+    }
+
+    /// The instruction of `step`.
+    fn word(&self, step: &Step) -> u64 {
+        let source = step.kind | step.flip << 2 | u64::from(step.transposed) << 4;
+        let [align, first, last, ends] = [step.align, step.first, step.last, step.ends].map(u64::from);
+        let numbers = [step.columns - 1, step.needs, step.operand, step.coefficients].map(|number| number as u64);
+        let [columns, needs, operand, coefficients] = numbers;
+        let all = [align, first, last, source, ends, columns, needs, operand, coefficients];
+        all.into_iter().zip(self.fields()).rev().fold(0, |word, (field, bits)| word << bits | field)
+    }
+
+    /// The instruction at index `asked` of case `which`; zeros beyond the last.
+    fn table<'k>(&self, k: &'k Builder, which: Expr<'k>, asked: Expr<'k>) -> Expr<'k> {
+        let (length, bits) = (1 << asked.bits(), self.fields().iter().sum());
+        let (index, cases) = match self.steps.len() {
+            1 => (asked, 1),
+            _ => (which.concat(asked), 1 << which.bits()),
+        };
+        let mut words = vec![0; cases * length];
+        for (case, steps) in self.steps.iter().enumerate() {
+            for (step, word) in steps.iter().zip(&mut words[case * length..]) {
+                *word = self.word(step);
+            }
+        }
+        k.wire("instruction", index.table(bits, &words))
+    }
+
+    fn kernel(&self) -> Kernel {
+        let k = Builder::new("pass_program");
+        let which = k.input("which", count_bits(self.steps.len()));
+        let (start, advance) = (k.input("start", 1), k.input("advance", 1));
+        let (column, finished) = (k.input("column", count_bits(self.quads)), k.input("finished", self.fields()[6]));
+        let step = k.register("step", Type::unsigned(count_bits(largest_of(&self.steps))));
+        let names = ["align", "first", "last_product", "selects", "ends", "final_column", "needs", "o_base", "c_base"];
+        let registers: Vec<Net> =
+            names.iter().zip(self.fields()).map(|(name, bits)| k.register(name, Type::unsigned(bits))).collect();
+        let &[align, first, last_product, selects, ends, final_column, needs, o_base, c_base] = &registers[..] else {
+            unreachable!("one register per field")
+        };
+        let asked = k.wire("asked", (start | *ends).mux(k.constant(step.bits(), 0), step.plus(1)));
+        let instruction = self.table(&k, which, asked);
+        k.when(start | advance, || {
+            step.set(asked);
+            let mut at = 0;
+            for register in &registers {
+                register.set(instruction.slice(at, register.bits()));
+                at += register.bits();
+            }
+        });
+        k.wire("ready", !finished.less(*needs));
+        let last = k.wire("last", column.equals(*final_column));
+        let opens = (self.control_bits == 4).then(|| step.is(0) & column.is(0));
+        let flags: Vec<Expr> = opens.into_iter().chain([*last_product & last, *first & column.is(0), *align]).collect();
+        let flags = k.wire("flags", concat(&flags));
+        self.addresses(&k, column, [*c_base, *o_base], *selects, flags);
+        k.finish()
+    }
+
+    /// The registers from column to addresses and control.
+    fn addresses<'k>(
+        &self,
+        k: &'k Builder,
+        column: Expr<'k>,
+        bases: [Expr<'k>; 2],
+        source: Expr<'k>,
+        control: Expr<'k>,
+    ) {
+        let [c_base, o_base] = bases;
+        let coefficients = (c_base + column).low(c_base.bits());
+        if self.list.is_empty() {
+            k.delay("coefficient_address", coefficients);
+            k.delay("operand_address", (o_base + column).low(o_base.bits()));
+            k.delay("source", source);
+            k.delay("control", control);
+            return;
+        }
+        let bits = column.bits();
+        let word = |&[straight, transposed]: &[usize; 2]| match self.across {
+            true => vec![(transposed << bits | straight) as u64],
+            false => vec![straight as u64],
+        };
+        let contents = Contents::File { name: COLUMN_FILE.to_owned(), words: self.list.iter().map(word).collect() };
+        k.comment("Column of each coefficient word, and its transposed address above it if one is needed.");
+        let columns =
+            k.memory("columns", self.list.len(), bits << usize::from(self.across), contents).holds(Holds::Columns);
+        let twice = |name: &str, value: Expr<'k>| {
+            let once = k.delay(&format!("{name}1"), value);
+            [once, k.delay(&format!("{name}2"), once)]
+        };
+        let [c_address1, c_address2] = twice("c_address", coefficients);
+        let [_, o_base2] = twice("o_base", o_base);
+        let [_, source2] = twice("source", source);
+        let [_, control2] = twice("control", control);
+        let pair = k.delay("pair", columns.read(c_address1));
+        let kept = match self.across {
+            true => source2.at(4).mux(pair.slice(bits, bits), pair.low(bits)),
+            false => pair,
+        };
+        let kept = k.wire("kept", kept);
+        k.delay("coefficient_address", c_address2);
+        k.delay("operand_address", (o_base2 + kept).low(o_base.bits()));
+        k.delay("source", source2);
+        k.delay("control", control2);
+    }
+}
+
+/// PassProgram of the case that has most.
+fn largest_of(steps: &[Vec<Step>]) -> usize {
+    steps.iter().map(Vec::len).max().unwrap_or(1)
+}
+
+#[cfg(test)]
+mod tests {
+    use std::collections::VecDeque;
+
+    use super::*;
+    use crate::language::testbench::{check, Reference};
+    use crate::wire::Word;
+
+    const QUADS: usize = 7;
+    const VECTORS: usize = 2;
+
+    /// Two cases of steps with random fields, with or without a column list.
+    fn shape(listed: bool, control_bits: usize) -> Shape {
+        let mut random = fastrand::Rng::with_seed(6);
+        let mut step = |index: usize, count: usize| Step {
+            coefficients: random.usize(..40),
+            columns: random.usize(1..=QUADS),
+            operand: random.usize(..VECTORS) * QUADS,
+            kind: random.u64(..3),
+            flip: random.u64(..4),
+            transposed: random.bool(),
+            align: random.bool(),
+            first: random.bool(),
+            last: random.bool(),
+            opens: index == 0,
+            ends: index + 1 == count,
+            needs: random.usize(..=VECTORS),
+        };
+        let steps = [5, 3].map(|count| (0..count).map(|index| step(index, count)).collect()).into();
+        let list = (0..47).map(|_| [random.usize(..QUADS), random.usize(..QUADS)]).collect();
+        let list = if listed { list } else { Vec::new() };
+        Shape { steps, list, across: listed, words: 47, quads: QUADS, vectors: VECTORS, control_bits }
+    }
+
+    /// The step in execution, its index, the outputs on their way.
+    struct Program {
+        shape: Shape,
+        now: Option<(Step, usize)>,
+        pipe: VecDeque<[Option<Word>; 4]>,
+    }
+
+    impl Program {
+        /// Addresses, selection and control for `column` of the present step.
+        fn put(&self, column: usize) -> [Option<Word>; 4] {
+            let Some((step, _)) = &self.now else { return [None; 4] };
+            let address = step.coefficients + column;
+            let quad = self.shape.list.get(address).map_or(column, |pair| pair[usize::from(step.transposed)]);
+            let source = step.kind | step.flip << 2 | u64::from(step.transposed) << 4;
+            let first = step.first && column == 0;
+            let last = step.last && column + 1 == step.columns;
+            let opens = step.opens && column == 0 && self.shape.control_bits == 4;
+            let control = [opens, last, first, step.align].iter().fold(0, |word, &bit| word << 1 | u64::from(bit));
+            [address as u64, (step.operand + quad) as u64, source, control].map(|word| Some(Word::from(word)))
+        }
+    }
+
+    impl Reference for Program {
+        fn outputs(&mut self, inputs: &[Word]) -> Vec<Option<Word>> {
+            let [column, finished] = [3, 4].map(|k| inputs[k].number() as usize);
+            let of = |of: &dyn Fn(&Step) -> bool| self.now.map(|(step, _)| Word::from(of(&step)));
+            let flags =
+                [of(&|step| step.ends), of(&|step| finished >= step.needs), of(&|step| column + 1 == step.columns)];
+            flags.into_iter().chain(self.pipe[0]).collect()
+        }
+
+        fn clock(&mut self, inputs: &[Word]) {
+            let [case, column] = [0, 3].map(|k| inputs[k].number() as usize);
+            let [start, advance] = [1, 2].map(|k| inputs[k].number() == 1);
+            self.pipe.push_back(self.put(column));
+            self.pipe.pop_front();
+            if start {
+                self.now = Some((self.shape.steps[case][0], 0));
+            } else if let Some((step, index)) = self.now.filter(|_| advance) {
+                let next = if step.ends { 0 } else { index + 1 };
+                self.now = Some((self.shape.steps[case][next], next));
+            }
+        }
+    }
+
+    #[test]
+    fn steps_follow_each_other_and_their_columns_have_their_addresses() {
+        let mut random = fastrand::Rng::with_seed(1);
+        let mut case = 0;
+        let inputs = |cycle: usize| {
+            let start = cycle == 1 || random.u8(..60) == 0;
+            if start {
+                case = random.u64(..2);
+            }
+            let (column, finished) = (random.u64(..QUADS as u64), random.u64(..=VECTORS as u64));
+            vec![case.into(), start.into(), (random.u8(..3) == 0).into(), column.into(), finished.into()]
+        };
+        let stimulus: Vec<Vec<Word>> = (0..3000).map(inputs).collect();
+        for (listed, control_bits) in [(false, 3), (true, 4)] {
+            let shape = shape(listed, control_bits);
+            let block = PassProgram::of(&shape);
+            let pipe = vec![[None; 4]; block.latency()].into();
+            check(block.kernel.kernel(), &stimulus, &mut Program { shape, now: None, pipe });
+        }
+    }
+}

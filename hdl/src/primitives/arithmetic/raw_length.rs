@@ -1,0 +1,117 @@
+//! Block exponent of v_00: the right shift that brings its largest accumulator to a full word.
+
+use dermis_golden::fixed::formats::Formats;
+use rust_hdl::prelude::*;
+
+use crate::kernel_block;
+use crate::language::{Body, Builder, Kernel, Type};
+use crate::primitives::address::counter::count_bits;
+use crate::primitives::arithmetic::leading_one::by_leading_one;
+use crate::wire::Wire;
+
+/// ORs the magnitudes of the raw quads; `shift` is valid two cycles after the last of them.
+#[derive(LogicBlock)]
+pub struct RawLength {
+    /// Clock; registers change on its rising edge.
+    pub clk: Signal<In, Clock>,
+    /// Clears the OR for a new subarray, with priority over `accept`.
+    pub clear: Signal<In, Bit>,
+    /// `quad` is valid and taken in.
+    pub accept: Signal<In, Bit>,
+    /// Four accumulators, `acc_bits` each, signed.
+    pub quad: Wire<In>,
+    /// Right shift for `rescale`, of the quads so far; two cycles later.
+    pub shift: Wire<Out>,
+    kernel: Body,
+}
+
+kernel_block!(RawLength, clock clk, inputs [clear, accept, quad], outputs [shift]);
+
+/// Width of the right shift of `rescale`, in bits.
+pub fn shift_bits(formats: &Formats) -> usize {
+    count_bits(formats.acc_bits as usize)
+}
+
+impl RawLength {
+    /// With the widths of `formats`.
+    pub fn new(formats: &Formats) -> Self {
+        RawLength::of(formats.acc_bits as usize, formats.vector_bits as usize)
+    }
+
+    fn of(acc: usize, word: usize) -> Self {
+        let block = RawLength {
+            clk: Default::default(),
+            clear: Default::default(),
+            accept: Default::default(),
+            quad: Wire::new(4 * acc),
+            shift: Wire::new(count_bits(acc)),
+            kernel: Body::default(),
+        };
+        block.bind(kernel(acc, word))
+    }
+}
+
+fn kernel(acc: usize, word: usize) -> Kernel {
+    let k = Builder::new("raw_length");
+    let [clear, accept] = ["clear", "accept"].map(|name| k.input(name, 1));
+    let (quad, full) = (k.input("quad", 4 * acc), word - 1);
+    let seen = k.state("seen", Type::unsigned(acc - 1), clear, 0);
+    let magnitude = |lane: usize| {
+        let (low, sign) = (quad.slice(lane * acc, acc - 1), quad.at(lane * acc + acc - 1));
+        k.wire(&format!("m{lane}"), low ^ sign.repeat(acc - 1))
+    };
+    let all = (0..4).map(magnitude).fold(*seen, |all, magnitude| all | magnitude);
+    k.when(accept, || seen.set(all));
+    k.delay("shift", by_leading_one(&k, *seen, full..acc - 1, count_bits(acc), |bit| bit + 1 - full));
+    k.finish()
+}
+
+#[cfg(test)]
+mod tests {
+    use dermis_golden::fixed::arith::{bit_length, magnitude_bits};
+
+    use super::*;
+    use crate::language::testbench::{check, Reference};
+    use crate::wire::Word;
+
+    const ACC: usize = 40;
+    const WORD: usize = 24;
+
+    /// The OR of the magnitudes since `clear`, and the shift one cycle later.
+    #[derive(Default)]
+    struct Seen {
+        seen: Option<u64>,
+        shift: Option<u32>,
+    }
+
+    impl Reference for Seen {
+        fn outputs(&mut self, _: &[Word]) -> Vec<Option<Word>> {
+            vec![self.shift.map(|shift| Word::from(u64::from(shift)))]
+        }
+
+        fn clock(&mut self, inputs: &[Word]) {
+            self.shift = self.seen.map(|seen| bit_length(seen).saturating_sub(WORD as u32 - 1));
+            let all = (0..4).fold(0, |all, lane| all | magnitude_bits(inputs[2].signed(lane, ACC)));
+            self.seen = match [inputs[0].number(), inputs[1].number()] {
+                [1, _] => Some(0),
+                [_, 1] => self.seen.map(|seen| seen | all),
+                _ => self.seen,
+            };
+        }
+    }
+
+    #[test]
+    fn the_shift_brings_the_longest_word_to_full_length() {
+        let mut random = fastrand::Rng::with_seed(4);
+        let mut inputs = |cycle: usize| {
+            // Words of all lengths.
+            let scale = random.u32(0..ACC as u32 - 1);
+            let quad = [(); 4].map(|()| random.i64(-(1 << scale)..1 << scale));
+            let clear = cycle == 0 || random.u8(..4) == 0;
+            vec![clear.into(), random.bool().into(), Word::of_fields(&quad, ACC)]
+        };
+        let stimulus: Vec<Vec<Word>> = (0..4000).map(&mut inputs).collect();
+        let block = RawLength::of(ACC, WORD);
+        check(block.kernel.kernel(), &stimulus, &mut Seen::default());
+    }
+}

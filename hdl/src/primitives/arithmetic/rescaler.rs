@@ -1,0 +1,202 @@
+//! Accumulators to words: shift, round, saturate, count saturations.
+
+use dermis_golden::fixed::formats::{Formats, SEARCH_EXTRA_BITS};
+use rust_hdl::prelude::*;
+
+use crate::kernel_block;
+use crate::language::{concat, Body, Builder, Expr, Kernel, Type};
+use crate::primitives::address::counter::count_bits;
+use crate::primitives::arithmetic::half_up::rounded;
+use crate::wire::Wire;
+
+/// A quad of accumulators, shifted right by `shift` if `measured`, otherwise by the constant shift of an A pass.
+///
+/// `words` follow three cycles later, `operands` (the same rounded and saturated to `data_bits`) four. `saturations`
+/// counts the saturated words of valid quads since `clear`; it includes a quad two cycles after its `words`.
+#[derive(LogicBlock)]
+pub struct Rescaler {
+    /// Clock; registers change on its rising edge.
+    pub clk: Signal<In, Clock>,
+    /// Sets `saturations` to 0.
+    pub clear: Signal<In, Bit>,
+    /// `quad` holds a row; otherwise its saturations are not counted.
+    pub valid: Signal<In, Bit>,
+    /// Shift this quad by `shift`, not by the constant.
+    pub measured: Signal<In, Bit>,
+    /// Measured right shift; valid with `measured`.
+    pub shift: Wire<In>,
+    /// Four accumulators, `acc_bits` each, signed.
+    pub quad: Wire<In>,
+    /// Four v_ij, `vector_bits` each, signed; three cycles after `quad`.
+    pub words: Wire<Out>,
+    /// Four operands, `data_bits` each, signed; four cycles after `quad`.
+    pub operands: Wire<Out>,
+    /// Number of saturated words, 16 bits; stays at the largest count.
+    pub saturations: Wire<Out>,
+    kernel: Body,
+}
+
+kernel_block!(
+    Rescaler,
+    clock clk,
+    inputs [clear, valid, measured, shift, quad],
+    outputs [words, operands, saturations]
+);
+
+/// Width of a saturation counter, in bits.
+pub const SATURATION_BITS: usize = 16;
+
+/// Widths of the words.
+#[derive(Clone, Copy)]
+struct Shape {
+    acc: usize,
+    word: usize,
+    data: usize,
+    /// Shift of an A pass.
+    a_shift: u32,
+}
+
+impl Rescaler {
+    /// With the widths of `formats`.
+    pub fn new(formats: &Formats) -> Self {
+        let shape = Shape {
+            acc: formats.acc_bits as usize,
+            word: formats.vector_bits as usize,
+            data: formats.data_bits as usize,
+            a_shift: formats.a_shift,
+        };
+        Rescaler::of(shape)
+    }
+
+    fn of(shape: Shape) -> Self {
+        let block = Rescaler {
+            clk: Default::default(),
+            clear: Default::default(),
+            valid: Default::default(),
+            measured: Default::default(),
+            shift: Wire::new(count_bits(shape.acc)),
+            quad: Wire::new(4 * shape.acc),
+            words: Wire::new(4 * shape.word),
+            operands: Wire::new(4 * shape.data),
+            saturations: Wire::new(SATURATION_BITS),
+            kernel: Body::default(),
+        };
+        block.bind(shape.kernel())
+    }
+}
+
+impl Shape {
+    fn kernel(self) -> Kernel {
+        let k = Builder::new("rescaler");
+        let [clear, valid, measured] = ["clear", "valid", "measured"].map(|name| k.input(name, 1));
+        let (shift, quad) = (k.input("shift", count_bits(self.acc)), k.input("quad", 4 * self.acc));
+        let taken = k.delay("taken", quad);
+        let valid2 = k.delay("valid2", k.delay("valid1", valid));
+        let amount = measured.mux(shift, k.constant(shift.bits(), self.a_shift.into()));
+        let lane = |lane: usize| {
+            let code = taken.slice(lane * self.acc, self.acc);
+            k.scope(&format!("lane_{lane}"), || self.lane(&k, code, amount))
+        };
+        let lanes: Vec<[Expr; 3]> = (0..4).rev().map(lane).collect();
+        let [words, operands, clipped] =
+            [0, 1, 2].map(|n| concat(&lanes.iter().map(|lane| lane[n]).collect::<Vec<_>>()));
+        k.wire("words", words);
+        k.wire("operands", operands);
+
+        let clipped3 = k.delay("clipped3", valid2.mux(clipped, k.constant(4, 0)));
+        let clips = (clipped3.at(0) + clipped3.at(1)) + (clipped3.at(2) + clipped3.at(3));
+        let clips = k.delay("clips", clips);
+        let saturations = k.state("saturations", Type::unsigned(SATURATION_BITS), clear, 0);
+        let count = k.wire("count", *saturations + clips);
+        let most = k.constant(SATURATION_BITS, (1 << SATURATION_BITS) - 1);
+        saturations.set(count.top().mux(most, count.low(SATURATION_BITS)));
+        k.finish()
+    }
+
+    /// Word, operand and saturation of one accumulator.
+    fn lane<'k>(self, k: &'k Builder, code: Expr<'k>, amount: Expr<'k>) -> [Expr<'k>; 3] {
+        // One copy per lane: the lanes are placed far apart, near the MAC lanes that feed them.
+        let copy = k.register("amount", amount.ty()).keep();
+        copy.set(amount);
+        // One bit below the LSB is kept, so that adding one and dropping it rounds half up.
+        let moved = k.delay("moved", k.wire("doubled", code.signed().shift_left(1)).shift_right_by(*copy));
+        let (half_up, clips) = rounded(k, moved, self.word);
+        let clipped = k.wire("clipped", clips);
+        let most = moved.top().concat((!moved.top()).repeat(self.word - 1));
+        let word = k.delay("word", clipped.mux(most, half_up));
+        let operand = k.wire("short", word.signed().shift_right(SEARCH_EXTRA_BITS as usize - 1).round_shift(1));
+        let overflow = k.wire("overflow", operand.top().differs(operand.at(self.data - 1)));
+        let most = k.constant(self.data, (1 << (self.data - 1)) - 1);
+        [word, k.delay("operand", overflow.mux(most, operand.low(self.data))), clipped]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use dermis_golden::fixed::arith::{round_shift, saturate};
+
+    use super::*;
+    use crate::language::testbench::{check, random_word, Reference};
+    use crate::wire::Word;
+
+    const SHAPE: Shape = Shape { acc: 45, word: 18 + SEARCH_EXTRA_BITS as usize, data: 18, a_shift: 9 };
+
+    /// The quads on their way with their shift, and the counts.
+    #[derive(Default)]
+    struct Quads {
+        /// Accumulators, then v_ij, of one, two and three cycles ago, and how many of them were saturated.
+        taken: Option<([i64; 4], u32, bool)>,
+        shifted: Option<([i64; 4], bool)>,
+        words: Option<[i64; 4]>,
+        operands: Option<[i64; 4]>,
+        clipped: Option<usize>,
+        clips: Option<usize>,
+        count: Option<usize>,
+    }
+
+    impl Reference for Quads {
+        fn outputs(&mut self, _: &[Word]) -> Vec<Option<Word>> {
+            vec![
+                self.words.map(|words| Word::of_fields(&words, SHAPE.word)),
+                self.operands.map(|operands| Word::of_fields(&operands, SHAPE.data)),
+                self.count.map(|count| Word::from(count as u64)),
+            ]
+        }
+
+        fn clock(&mut self, inputs: &[Word]) {
+            let operand = |word| saturate(round_shift(word, SEARCH_EXTRA_BITS), SHAPE.data as u32).0;
+            self.operands = self.words.map(|words| words.map(operand));
+            let counted = self.count.zip(self.clips).map(|(count, clips)| (count + clips).min(0xffff));
+            self.count = if inputs[0].number() == 1 { Some(0) } else { counted };
+            self.clips = self.clipped;
+            let rounded =
+                self.shifted.map(|(quad, valid)| (quad.map(|value| saturate(value, SHAPE.word as u32)), valid));
+            self.words = rounded.map(|(quad, _)| quad.map(|(word, _)| word));
+            self.clipped = rounded.map(|(quad, valid)| quad.iter().filter(|(_, clipped)| *clipped && valid).count());
+            self.shifted = self.taken.map(|(quad, shift, valid)| (quad.map(|value| round_shift(value, shift)), valid));
+            let shift = if inputs[2].number() == 1 { inputs[3].number() as u32 } else { SHAPE.a_shift };
+            let quad = [0, 1, 2, 3].map(|lane| inputs[4].signed(lane, SHAPE.acc));
+            self.taken = Some((quad, shift, inputs[1].number() == 1));
+        }
+    }
+
+    #[test]
+    fn words_are_rounded_and_saturated_and_the_saturations_counted() {
+        let mut random = fastrand::Rng::with_seed(12);
+        let mut inputs = |cycle: usize| {
+            // Accumulators of all lengths, and some that round to just beyond the range.
+            let length = random.u32(1..SHAPE.acc as u32);
+            let shift = random.u64(..SHAPE.acc as u64 - 1);
+            let mut code = || match random.u8(..4) {
+                0 => random_word(&mut random, SHAPE.acc).signed(0, SHAPE.acc),
+                1 => ((1 << (SHAPE.word - 1)) << SHAPE.a_shift) - random.i64(..1 << SHAPE.a_shift),
+                _ => random.i64(-(1 << (length - 1))..1 << (length - 1)),
+            };
+            let quad = Word::of_fields(&[(); 4].map(|()| code()), SHAPE.acc);
+            let clear = cycle < 6 || random.u16(..500) == 0;
+            vec![clear.into(), random.bool().into(), random.bool().into(), shift.into(), quad]
+        };
+        let stimulus: Vec<Vec<Word>> = (0..5000).map(&mut inputs).collect();
+        check(Rescaler::of(SHAPE).kernel.kernel(), &stimulus, &mut Quads::default());
+    }
+}

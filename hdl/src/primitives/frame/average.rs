@@ -1,0 +1,212 @@
+//! Sums of 2^k frames, taxel by taxel.
+
+use dermis_golden::fixed::resources::Holds;
+use rust_hdl::prelude::*;
+
+use crate::kernel_block;
+use crate::language::{Body, Builder, Contents, Kernel, Type};
+use crate::primitives::address::counter::count_bits;
+use crate::primitives::stream::pass_through::wires;
+use crate::wire::Wire;
+
+/// ```text
+/// s_axis --> read sum, hold word --> add --> memory; in the last of the 2^k frames also m_axis
+/// ```
+/// The sums have their own memory, so that frames arrive while the frame buffer is still being read. An early `tlast`
+/// in any of the frames restarts the sum; its partial sum leaves as a beat with `tlast`, at which `receive` drops the
+/// frame and sets `framing`. If `tlast` is missing in any of the frames, it is missing on the sum's last beat too. With
+/// k = 0 the stream passes through.
+///
+/// Latency two cycles; all registers advance together while the output is free.
+#[derive(LogicBlock)]
+pub struct Average {
+    /// Clock; registers change on its rising edge.
+    pub clk: Signal<In, Clock>,
+    /// Synchronous reset, active high.
+    pub rst: Signal<In, Bit>,
+    /// A taxel's word, `bits` wide, two's complement; valid with `s_axis_tvalid`.
+    pub s_axis_tdata: Wire<In>,
+    /// A beat is offered on `s_axis_tdata`; the sender holds it until `s_axis_tready`.
+    pub s_axis_tvalid: Signal<In, Bit>,
+    /// The block accepts a beat in this cycle.
+    pub s_axis_tready: Signal<Out, Bit>,
+    /// The beat is the last of its frame; valid with `s_axis_tvalid`.
+    pub s_axis_tlast: Signal<In, Bit>,
+    /// A taxel's sum, `bits + power` wide, two's complement; valid with `m_axis_tvalid`.
+    pub m_axis_tdata: Wire<Out>,
+    /// A beat is offered on `m_axis_tdata`; it is held until `m_axis_tready`.
+    pub m_axis_tvalid: Signal<Out, Bit>,
+    /// The receiver accepts a beat in this cycle.
+    pub m_axis_tready: Signal<In, Bit>,
+    /// The beat is the last of the sums; valid with `m_axis_tvalid`.
+    pub m_axis_tlast: Signal<Out, Bit>,
+    kernel: Body,
+}
+
+kernel_block!(
+    Average,
+    clock clk,
+    inputs [rst, s_axis_tdata, s_axis_tvalid, s_axis_tlast, m_axis_tready],
+    outputs [s_axis_tready, m_axis_tdata, m_axis_tvalid, m_axis_tlast]
+);
+
+impl Average {
+    /// Sums words of `bits` bits of `taxels` taxels over 2^`power` frames.
+    pub fn new(taxels: usize, bits: usize, power: u32) -> Self {
+        let block = Average {
+            clk: Default::default(),
+            rst: Default::default(),
+            s_axis_tdata: Wire::new(bits),
+            s_axis_tvalid: Default::default(),
+            s_axis_tready: Default::default(),
+            s_axis_tlast: Default::default(),
+            m_axis_tdata: Wire::new(bits + power as usize),
+            m_axis_tvalid: Default::default(),
+            m_axis_tready: Default::default(),
+            m_axis_tlast: Default::default(),
+            kernel: Body::default(),
+        };
+        block.bind(match power {
+            0 => wires("average", bits, "No averaging: the stream passes through."),
+            _ => kernel(taxels, bits, power as usize),
+        })
+    }
+}
+
+fn kernel(taxels: usize, bits: usize, power: usize) -> Kernel {
+    let k = Builder::new("average");
+    let (bit, index, wide) = (Type::unsigned(1), Type::unsigned(count_bits(taxels)), bits + power);
+    let (rst, data) = (k.input("rst", 1), k.input("s_axis_tdata", bits));
+    let [offered, tlast, ready] = ["s_axis_tvalid", "s_axis_tlast", "m_axis_tready"].map(|name| k.input(name, 1));
+    let sums = k.memory("sums", taxels, wide, Contents::Undefined).holds(Holds::Average);
+    let taxel = k.state("taxel", index, rst, 0);
+    let frame = k.state("frame", Type::unsigned(power), rst, 0);
+    let [missed, held, valid] = ["missed", "held", "m_axis_tvalid"].map(|name| k.state(name, bit, rst, 0));
+    let held_taxel = k.register("held_taxel", index);
+    let [held_first, held_leaves, held_last] =
+        ["held_first", "held_leaves", "held_last"].map(|name| k.register(name, bit));
+    let (word, sofar) = (k.register("word", Type::unsigned(bits)), k.register("sofar", Type::unsigned(wide)));
+    let (sum_out, last_out) = (k.register("m_axis_tdata", Type::unsigned(wide)), k.register("m_axis_tlast", bit));
+
+    let zero = |bits: usize| k.constant(bits, 0);
+    let at_end = k.wire("at_end", taxel.is(taxels as u64 - 1));
+    let final_frame = k.wire("final_frame", frame.all());
+    let early = k.wire("early", tlast & !at_end);
+    let before = held_first.mux(zero(wide), *sofar);
+    let sum = k.wire("sum", (word.signed().extend(wide).unsigned() + before).low(wide));
+    let moves = k.wire("moves", !*valid | ready);
+    k.wire("s_axis_tready", moves & !rst);
+    k.when(moves, || {
+        held.set(offered);
+        valid.set(*held & *held_leaves);
+        k.when(offered, || {
+            taxel.set((early | at_end).mux(zero(taxel.bits()), taxel.plus(1)));
+            k.when(at_end, || {
+                frame.set(frame.plus(1));
+                missed.set(!final_frame & (*missed | !tlast));
+            });
+            k.when(early, || {
+                frame.set(zero(power));
+                missed.set(zero(1));
+            });
+        });
+        word.set(data);
+        sofar.set(sums.read(*taxel));
+        held_taxel.set(*taxel);
+        held_first.set(frame.is(0));
+        held_leaves.set(final_frame | early);
+        held_last.set(tlast & (early | !*missed));
+        sum_out.set(sum);
+        last_out.set(*held_last);
+    });
+    sums.write(moves & *held, *held_taxel, sum);
+    k.finish()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::language::testbench::{check, random_word, Reference};
+    use crate::wire::Word;
+
+    const TAXELS: usize = 5;
+    const BITS: usize = 9;
+    const POWER: u32 = 2;
+
+    /// Sums, the taxel and frame of the next word, the beats in the block.
+    #[derive(Default)]
+    struct Sums {
+        sums: [i64; TAXELS],
+        taxel: usize,
+        frame: usize,
+        missed: bool,
+        held: Option<(i64, bool, bool)>,
+        offered: Option<(i64, bool)>,
+        reset: bool,
+    }
+
+    impl Sums {
+        /// Adds a word: its sum, whether it leaves, and whether it is the last.
+        fn add(&mut self, word: i64, tlast: bool) -> (i64, bool, bool) {
+            let (at_end, final_frame) = (self.taxel + 1 == TAXELS, self.frame + 1 == 1 << POWER);
+            let early = tlast && !at_end;
+            let sum = word + if self.frame == 0 { 0 } else { self.sums[self.taxel] };
+            self.sums[self.taxel] = sum;
+            let beat = (sum, final_frame || early, tlast && (early || !self.missed));
+            self.taxel = if early || at_end { 0 } else { self.taxel + 1 };
+            if early {
+                (self.frame, self.missed) = (0, false);
+            } else if at_end {
+                self.missed = !final_frame && (self.missed || !tlast);
+                self.frame = (self.frame + 1) % (1 << POWER);
+            }
+            beat
+        }
+    }
+
+    impl Reference for Sums {
+        fn outputs(&mut self, inputs: &[Word]) -> Vec<Option<Word>> {
+            let [rst, ready] = [0, 4].map(|k| inputs[k].number() == 1);
+            let moves = self.offered.is_none() || ready;
+            vec![
+                self.reset.then(|| Word::from(self.offered.is_some())),
+                self.offered.map(|(sum, _)| Word::of_fields(&[sum], BITS + POWER as usize)),
+                self.offered.map(|(_, last)| Word::from(last)),
+                self.reset.then(|| Word::from(moves && !rst)),
+            ]
+        }
+
+        fn clock(&mut self, inputs: &[Word]) {
+            let [rst, valid, tlast, ready] = [0, 2, 3, 4].map(|k| inputs[k].number() == 1);
+            if self.offered.is_none() || ready {
+                self.offered = self.held.take().and_then(|(sum, leaves, last)| leaves.then_some((sum, last)));
+                if valid && !rst {
+                    self.held = Some(self.add(inputs[1].signed(0, BITS), tlast));
+                }
+            }
+            if rst {
+                *self = Sums { sums: self.sums, reset: true, ..Sums::default() };
+            }
+        }
+    }
+
+    #[test]
+    fn frames_are_added_up_and_framing_errors_restart_the_sum() {
+        let mut random = fastrand::Rng::with_seed(5);
+        let mut sums = Sums::default();
+        let stimulus: Vec<Vec<Word>> = (0..6000)
+            .map(|cycle| {
+                let rst = cycle < 3 || random.u16(..400) == 0;
+                // Mostly frames of the right length.
+                let tlast = if random.u8(..40) == 0 { random.bool() } else { sums.taxel + 1 == TAXELS };
+                let word = random_word(&mut random, BITS);
+                let [offered, ready] = [(); 2].map(|()| Word::from(random.u8(..8) > 0));
+                let inputs = vec![rst.into(), word, offered, tlast.into(), ready];
+                sums.clock(&inputs);
+                inputs
+            })
+            .collect();
+        let average = Average::new(TAXELS, BITS, POWER);
+        check(average.kernel.kernel(), &stimulus, &mut Sums::default());
+    }
+}

@@ -1,0 +1,101 @@
+//! Replaces the words of dead taxels by zero.
+
+use rust_hdl::prelude::*;
+
+use crate::kernel_block;
+use crate::language::{Body, Builder, Kernel, Type};
+use crate::primitives::address::counter::count_bits;
+use crate::wire::Wire;
+
+/// LaneMask the taxels of a frame; `kept` is `word`, or 0 if the current taxel is dead. Combinational from `word` to
+/// `kept`: the comparison with the list of dead taxels is registered a cycle ahead.
+#[derive(LogicBlock)]
+pub struct DeadTaxelMask {
+    /// Clock; registers change on its rising edge.
+    pub clk: Signal<In, Clock>,
+    /// Restarts the count at the first taxel, with priority over `enable`.
+    pub clear: Signal<In, Bit>,
+    /// `word` is accepted; the next taxel follows.
+    pub enable: Signal<In, Bit>,
+    /// The current taxel's word, `bits` wide.
+    pub word: Wire<In>,
+    /// `word`, or 0 for a dead taxel; same cycle.
+    pub kept: Wire<Out>,
+    kernel: Body,
+}
+
+kernel_block!(DeadTaxelMask, clock clk, inputs [clear, enable, word], outputs [kept]);
+
+impl DeadTaxelMask {
+    /// Words of `bits` bits of a frame of `taxels` taxels; `dead` lists the row-major indices of the dead ones.
+    pub fn new(bits: usize, taxels: usize, dead: &[usize]) -> Self {
+        let block = DeadTaxelMask {
+            clk: Default::default(),
+            clear: Default::default(),
+            enable: Default::default(),
+            word: Wire::new(bits),
+            kept: Wire::new(bits),
+            kernel: Body::default(),
+        };
+        block.bind(kernel(bits, taxels, dead))
+    }
+}
+
+fn kernel(bits: usize, taxels: usize, dead: &[usize]) -> Kernel {
+    let k = Builder::new("dead_taxel_mask");
+    let (clear, enable, word) = (k.input("clear", 1), k.input("enable", 1), k.input("word", bits));
+    if dead.is_empty() {
+        k.comment("No taxel is dead.");
+        k.wire("kept", word);
+        return k.finish();
+    }
+    let count = Type::unsigned(count_bits(taxels));
+    let taxel = k.register("taxel", count);
+    let zero = k.constant(count.bits, 0);
+    let after = k.wire("after", taxel.is(taxels as u64 - 1).mux(zero, taxel.plus(1)));
+    let following = k.wire("following", clear.mux(zero, enable.mux(after, *taxel)));
+    let table: Vec<u64> = (0..1 << count.bits).map(|taxel| u64::from(dead.contains(&taxel))).collect();
+    taxel.set(following);
+    let dead = k.delay("dead", following.table(1, &table));
+    k.wire("kept", dead.mux(k.constant(bits, 0), word));
+    k.finish()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::language::testbench::{check, random_words, Reference};
+    use crate::wire::Word;
+
+    /// The current taxel; undefined before the first `clear`.
+    struct Frame {
+        taxel: Option<usize>,
+        taxels: usize,
+        dead: Vec<usize>,
+    }
+
+    impl Reference for Frame {
+        fn outputs(&mut self, inputs: &[Word]) -> Vec<Option<Word>> {
+            let kept = |taxel| if self.dead.contains(&taxel) { Word::default() } else { inputs[2] };
+            vec![self.taxel.map(kept)]
+        }
+
+        fn clock(&mut self, inputs: &[Word]) {
+            let step = usize::from(inputs[1].number() == 1);
+            self.taxel = match inputs[0].number() {
+                1 => Some(0),
+                _ => self.taxel.map(|taxel| (taxel + step) % self.taxels),
+            };
+        }
+    }
+
+    #[test]
+    fn dead_taxels_are_zero() {
+        for (taxels, dead) in [(35, vec![0, 7, 8, 34]), (64, vec![63]), (9, vec![])] {
+            let mut stimulus = random_words(3000, &[1, 1, 12]);
+            stimulus.iter_mut().enumerate().for_each(|(cycle, inputs)| inputs[0] = (cycle % 500 == 0).into());
+            let block = DeadTaxelMask::new(12, taxels, &dead);
+            check(block.kernel.kernel(), &stimulus, &mut Frame { taxel: None, taxels, dead });
+        }
+    }
+}

@@ -1,0 +1,6 @@
+//! What is done to the codes of a frame as they arrive.
+
+pub(crate) mod average;
+pub(crate) mod calibrate;
+pub(crate) mod dead_taxel_mask;
+pub(crate) mod frame_stats;

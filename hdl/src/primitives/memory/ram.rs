@@ -1,0 +1,174 @@
+//! Simple dual-port memory: one write port with an enable per field, one read port with one or two registers.
+
+use dermis_golden::fixed::resources::Holds;
+use rust_hdl::prelude::*;
+
+use crate::kernel_block;
+use crate::language::{concat, Body, Builder, Contents, Expr, Kernel, Type};
+use crate::primitives::address::counter::count_bits;
+use crate::wire::Wire;
+
+/// ```text
+/// write (one bit per field), write_address, write_data --> memory --> read_data one or two cycles after read_address
+/// ```
+/// The read registers change only while `read` is high. Reading a word in the cycle that writes it returns the old one;
+/// the content is undefined until written.
+#[derive(LogicBlock)]
+pub struct Ram {
+    /// Clock; registers change on its rising edge.
+    pub clk: Signal<In, Clock>,
+    /// Write enable, one bit per field.
+    pub write: Wire<In>,
+    /// Address of the word to write; valid with `write`.
+    pub write_address: Wire<In>,
+    /// Fields to write; valid with `write`.
+    pub write_data: Wire<In>,
+    /// Enable of the read registers.
+    pub read: Signal<In, Bit>,
+    /// Address of the word to read.
+    pub read_address: Wire<In>,
+    /// The word read, one cycle after `read_address`, or two if [`registered`](Ram::registered).
+    pub read_data: Wire<Out>,
+    kernel: Body,
+    _shape: Shape,
+}
+
+kernel_block!(
+    Ram,
+    clock clk,
+    inputs [write, write_address, write_data, read, read_address],
+    outputs [read_data]
+);
+
+#[derive(Clone, Debug)]
+struct Shape {
+    depth: usize,
+    fields: usize,
+    /// Width of a field.
+    bits: usize,
+    /// There is an output register behind the read register of the memory.
+    behind: bool,
+    left_out: bool,
+    /// What the memory of each field holds, as far as the plan of the memories says it.
+    holds: Vec<Holds>,
+}
+
+impl Ram {
+    /// A memory of `depth` words of `fields` fields of `bits` bits.
+    pub fn new(depth: usize, fields: usize, bits: usize) -> Self {
+        Ram::of(Shape { depth, fields, bits, behind: false, left_out: false, holds: Vec::new() })
+    }
+
+    /// Adds an output register: `read_data` follows two cycles after `read_address`. The clock-to-output time of a
+    /// block RAM leaves no room for logic behind it.
+    pub fn registered(self) -> Self {
+        Ram::of(Shape { behind: true, ..self._shape })
+    }
+
+    /// Omits the memory, for scenes that do not need it: `read_data` is zero.
+    pub fn left_out(self) -> Self {
+        Ram::of(Shape { left_out: true, ..self._shape })
+    }
+
+    /// With what the memory of each field holds.
+    pub fn holding(self, holds: impl IntoIterator<Item = Holds>) -> Self {
+        Ram::of(Shape { holds: holds.into_iter().collect(), ..self._shape })
+    }
+
+    fn of(shape: Shape) -> Self {
+        let word = shape.fields * shape.bits;
+        let block = Ram {
+            clk: Default::default(),
+            write: Wire::new(shape.fields),
+            write_address: Wire::new(count_bits(shape.depth)),
+            write_data: Wire::new(word),
+            read: Default::default(),
+            read_address: Wire::new(count_bits(shape.depth)),
+            read_data: Wire::new(word),
+            kernel: Body::default(),
+            _shape: shape.clone(),
+        };
+        block.bind(shape.kernel())
+    }
+}
+
+impl Shape {
+    fn kernel(self) -> Kernel {
+        let k = Builder::new("ram");
+        let (word, address) = (self.fields * self.bits, count_bits(self.depth));
+        let write = k.input("write", self.fields);
+        let (write_address, data) = (k.input("write_address", address), k.input("write_data", word));
+        let (read, read_address) = (k.input("read", 1), k.input("read_address", address));
+        if self.left_out {
+            k.wire("read_data", k.constant(word, 0));
+            return k.finish();
+        }
+        // One array per field: every synthesiser maps it to plain memories.
+        let field = |number: usize| {
+            let memory = k.memory(&format!("field{number}"), self.depth, self.bits, Contents::Undefined);
+            let memory = self.holds.get(number).map_or(memory, |holds| memory.holds(holds));
+            memory.write(write.at(number), write_address, data.slice(number * self.bits, self.bits));
+            let held = k.register(&format!("read{number}"), Type::unsigned(self.bits));
+            k.when(read, || held.set(memory.read(read_address)));
+            if !self.behind {
+                return *held;
+            }
+            let behind = k.register(&format!("behind{number}"), Type::unsigned(self.bits));
+            k.when(read, || behind.set(*held));
+            *behind
+        };
+        let fields: Vec<Expr> = (0..self.fields).map(field).collect();
+        k.wire("read_data", concat(&fields.into_iter().rev().collect::<Vec<_>>()));
+        k.finish()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::language::testbench::{check, random_words, Reference};
+    use crate::wire::Word;
+
+    const SHAPE: Shape = Shape { depth: 11, fields: 3, bits: 30, behind: false, left_out: false, holds: Vec::new() };
+
+    /// Fields of the memory and of the registers behind it.
+    struct Fields {
+        behind: bool,
+        memory: Vec<[Option<u64>; 3]>,
+        read: [Option<u64>; 3],
+        shown: [Option<u64>; 3],
+    }
+
+    impl Reference for Fields {
+        fn outputs(&mut self, _: &[Word]) -> Vec<Option<Word>> {
+            let shown = if self.behind { self.shown } else { self.read };
+            let known = shown.iter().all(Option::is_some);
+            vec![known.then(|| Word::of_fields(&shown.map(|field| field.unwrap_or_default() as i64), SHAPE.bits))]
+        }
+
+        fn clock(&mut self, inputs: &[Word]) {
+            if inputs[3].number() == 1 {
+                self.shown = self.read;
+                self.read = self.memory[inputs[4].number() as usize];
+            }
+            for field in (0..SHAPE.fields).filter(|&field| inputs[0].field(field, 1) == 1) {
+                let place = &mut self.memory[inputs[1].number() as usize][field];
+                *place = Some(inputs[2].field(field * SHAPE.bits, SHAPE.bits));
+            }
+        }
+    }
+
+    #[test]
+    fn fields_are_written_alone_and_the_old_word_is_read() {
+        let mut stimulus = random_words(4000, &[3, 4, 90, 1, 4]);
+        for inputs in &mut stimulus {
+            [1, 4].iter().for_each(|&address| inputs[address] = Word::from(inputs[address].number() % 11));
+        }
+        for behind in [false, true] {
+            let memory = vec![[None; 3]; SHAPE.depth];
+            let mut fields = Fields { behind, memory, read: [None; 3], shown: [None; 3] };
+            let block = Ram::of(Shape { behind, ..SHAPE });
+            check(block.kernel.kernel(), &stimulus, &mut fields);
+        }
+    }
+}

@@ -1,0 +1,613 @@
+//! Force arithmetic: p(μ*) to force words, and the output beats with their status.
+
+use dermis_golden::fixed::cycles::ACCEPT;
+use dermis_golden::fixed::formats::{force_shift, FORCE_BITS, FORCE_SHIFT_MAX, MULTIPLIER_BITS, MU_ROUND};
+use dermis_golden::fixed::send::CASE_SHIFT;
+use dermis_golden::fixed::Model;
+use rust_hdl::prelude::*;
+
+use crate::kernel_block;
+use crate::language::{concat, Body, Builder, Contents, Expr, Kernel, MemoryPort, Type};
+use crate::primitives::address::case_counter::{largest, value_by_case};
+use crate::primitives::address::counter::count_bits;
+use crate::primitives::arithmetic::half_up::saturate;
+use crate::primitives::arithmetic::raw_length::shift_bits;
+use crate::primitives::arithmetic::rescaler::SATURATION_BITS;
+use crate::primitives::search::sweep::position_bits;
+use crate::primitives::stream::queue::LATENCY as LEAVING;
+use crate::wire::Wire;
+
+/// A pipeline without stalls: memory (3 cycles), lane selection, products (2), shift, rounding and saturation,
+/// threshold, output.
+///
+/// `beat` 0 asks for a force from `quad`, 1 … 3 for a status beat; the beat is on `beat_data` for one cycle, [`STEPS`]
+/// cycles after `offer`. `start` stores μ, shift and status of subarray `part`, which are usable three cycles later;
+/// `begin_frame` clears the counts of the frame.
+#[derive(LogicBlock)]
+pub struct ForceUnit {
+    /// Clock; registers change on its rising edge.
+    pub clk: Signal<In, Clock>,
+    /// Synchronous reset, active high; clears the control pipeline only.
+    pub rst: Signal<In, Bit>,
+    /// Index of the case of the frame being sent.
+    pub which: Wire<In>,
+    /// A new frame: clears its counts, the contact flag and the saturations.
+    pub begin_frame: Signal<In, Bit>,
+    /// Stores position, exponents and status of subarray `part` in this cycle.
+    pub start: Signal<In, Bit>,
+    /// Index of the subarray; valid with `start`.
+    pub part: Wire<In>,
+    /// A beat is requested in this cycle.
+    pub offer: Signal<In, Bit>,
+    /// 0: a force, 1 … 3: a status beat; valid with `offer`.
+    pub beat: Wire<In>,
+    /// Index of the beat's subarray; valid with `offer`.
+    pub beat_part: Wire<In>,
+    /// Lane of the taxel in its quad; valid with `offer`.
+    pub lane: Wire<In>,
+    /// Four values p(μ*), `search_bits[0]` each, signed; three cycles after `offer`.
+    pub quad: Wire<In>,
+    /// μ1 in grid steps of the last level, signed; valid with `start`.
+    pub position_x: Wire<In>,
+    /// μ2 in grid steps of the last level, signed; valid with `start`.
+    pub position_y: Wire<In>,
+    /// Left shift of `normalise`; valid with `start`.
+    pub normalise: Wire<In>,
+    /// Right shift of `rescale`; valid with `start`.
+    pub rescale: Wire<In>,
+    /// The subarray meets the scene's condition; valid with `start`.
+    pub condition: Signal<In, Bit>,
+    /// The search found a candidate; valid with `start`.
+    pub found: Signal<In, Bit>,
+    /// `tlast` was early or missing; sampled when the beat with the flags leaves.
+    pub framing: Signal<In, Bit>,
+    /// The coefficient signature is wrong, 1 bit; valid with `start`.
+    pub damaged: Wire<In>,
+    /// Score of the best candidate, signed, 2^−6; valid with `start`.
+    pub score: Wire<In>,
+    /// Words saturated by `rescale`; valid with `start`.
+    pub saturations: Wire<In>,
+    /// Cycle counter of the frame; sampled when the first beat leaves.
+    pub cycles: Wire<In>,
+    /// `beat_data` holds a beat in this cycle.
+    pub valid: Signal<Out, Bit>,
+    /// The beat is the frame's last; valid with `valid`.
+    pub last: Signal<Out, Bit>,
+    /// `{fz, fy, fx}`, 32 bits signed each, or three status words; valid with `valid`.
+    pub beat_data: Wire<Out>,
+    kernel: Body,
+}
+
+kernel_block!(
+    ForceUnit,
+    clock clk,
+    inputs [
+        rst, which, begin_frame, start, part, offer, beat, beat_part, lane, quad, position_x, position_y, normalise,
+        rescale, condition, found, framing, damaged, score, saturations, cycles,
+    ],
+    outputs [valid, last, beat_data]
+);
+
+/// Cycles from `offer` to `valid`.
+pub const STEPS: usize = 10;
+/// Cycles from `offer` to `quad`.
+const READ_STEPS: usize = 3;
+/// Cycles from a value to its products.
+const PRODUCT_STEPS: usize = 2;
+/// Cycles for which a request travels along the pipeline.
+const ASKED: usize = STEPS - 1;
+/// Bits of the unsigned low part of p: a multiplier operand without its sign bit.
+const LOW: usize = MULTIPLIER_BITS as usize - 1;
+/// Cycles of a frame outside its counter: before the counter is cleared, two cycles after the frame starts, and from
+/// its sampling to the first beat behind the queue.
+const UNCOUNTED: u32 = ACCEPT as u32 + 3 + LEAVING as u32;
+/// Width of the cycle counter, in bits.
+pub const CYCLE_BITS: usize = 24;
+
+/// Width of a word of a beat, in bits.
+const WORD: usize = FORCE_BITS as usize;
+/// Width of a μ word, in bits.
+const MU_BITS: usize = MULTIPLIER_BITS as usize;
+/// Flags of a subarray, the bits below the case's number.
+const FLAGS: usize = 5;
+/// Width of a right shift, in bits.
+const SHIFT_BITS: usize = 6;
+
+/// Widths and constants of the unit.
+#[derive(Clone, Debug)]
+struct Shape {
+    /// Bits of p(μ*), of the exponents, of the score.
+    value_bits: usize,
+    normalise_bits: usize,
+    rescale_bits: usize,
+    score_bits: usize,
+    /// Without a search, fx and fy are zero.
+    searches: bool,
+    /// Fraction bits of a μ word.
+    fraction: usize,
+    /// μ per step of the search.
+    mu_step: i64,
+    /// Right shift for exponents of zero.
+    base_shift: u64,
+    /// Forces with a smaller |fz| are zero.
+    threshold: u64,
+    /// The scene has the coefficient check.
+    checks: bool,
+    /// Subarrays and number of each case.
+    counts: Vec<usize>,
+    numbers: Vec<usize>,
+}
+
+impl ForceUnit {
+    /// With the widths, subarrays and case numbers of `model`.
+    pub fn new(model: &Model) -> Self {
+        let f = &model.formats;
+        // The status names the case only where it is chosen per frame.
+        let number = |case: &Model| if model.chooses() { case.number() as usize } else { 0 };
+        let shape = Shape {
+            value_bits: f.search_bits[0] as usize,
+            normalise_bits: count_bits(f.input_bits as usize),
+            rescale_bits: shift_bits(f),
+            score_bits: f.score_bits as usize,
+            searches: f.degree > 0,
+            fraction: f.mu_fraction as usize,
+            mu_step: f.mu_step,
+            base_shift: force_shift(f, 0, 0).into(),
+            threshold: model.threshold.clamp(0, 1 << WORD) as u64,
+            checks: model.has_coefficient_check(),
+            counts: model.cases().iter().map(|case| case.parts.len()).collect(),
+            numbers: model.cases().iter().map(number).collect(),
+        };
+        let part_bits = count_bits(shape.parts());
+        let block = ForceUnit {
+            clk: Default::default(),
+            rst: Default::default(),
+            which: Wire::new(count_bits(shape.counts.len())),
+            begin_frame: Default::default(),
+            start: Default::default(),
+            part: Wire::new(part_bits),
+            beat_part: Wire::new(part_bits),
+            offer: Default::default(),
+            beat: Wire::new(2),
+            lane: Wire::new(2),
+            quad: Wire::new(4 * shape.value_bits),
+            position_x: Wire::new(position_bits()),
+            position_y: Wire::new(position_bits()),
+            normalise: Wire::new(shape.normalise_bits),
+            rescale: Wire::new(shape.rescale_bits),
+            condition: Default::default(),
+            found: Default::default(),
+            framing: Default::default(),
+            damaged: Wire::new(1),
+            score: Wire::new(shape.score_bits),
+            saturations: Wire::new(SATURATION_BITS),
+            cycles: Wire::new(CYCLE_BITS),
+            valid: Default::default(),
+            last: Default::default(),
+            beat_data: Wire::new(3 * WORD),
+            kernel: Body::default(),
+        };
+        block.bind(shape.kernel())
+    }
+}
+
+/// A register of the last `steps` values of a signal, the latest lowest.
+fn travel<'k>(k: &'k Builder, name: &str, value: Expr<'k>, steps: usize) -> Expr<'k> {
+    let register = k.register(name, Type::unsigned(value.bits() * steps));
+    register.set(register.low(value.bits() * (steps - 1)).concat(value));
+    *register
+}
+
+/// One word of a beat, with the sign of a signed `value`.
+fn word(value: Expr<'_>) -> Expr<'_> {
+    value.extend(WORD).unsigned()
+}
+
+/// What comes with `start`, is stored per subarray and read by the status.
+struct Kept<'k> {
+    k: &'k Builder,
+    start: Expr<'k>,
+    part: Expr<'k>,
+    parts: usize,
+    /// Subarray of the beat that leaves.
+    at_out: Expr<'k>,
+}
+
+impl<'k> Kept<'k> {
+    /// A memory with one word per subarray.
+    fn memory(&self, name: &str, bits: usize) -> MemoryPort<'k> {
+        self.k.memory(name, self.parts, bits, Contents::Undefined)
+    }
+
+    /// `value` at the `start` of the subarray of the beat that leaves.
+    fn status(&self, name: &str, value: Expr<'k>) -> Expr<'k> {
+        let memory = self.memory(name, value.bits());
+        memory.write(self.start, self.part, value.unsigned());
+        memory.read(self.at_out)
+    }
+}
+
+impl Shape {
+    /// Most subarrays of a case.
+    fn parts(&self) -> usize {
+        largest(&self.counts)
+    }
+
+    fn kernel(&self) -> Kernel {
+        let (v, part_bits, bit) = (self.value_bits, count_bits(self.parts()), Type::unsigned(1));
+        let k = Builder::new("force_unit");
+        let (rst, which) = (k.input("rst", 1), k.input("which", count_bits(self.counts.len())));
+        let (begin_frame, start) = (k.input("begin_frame", 1), k.input("start", 1));
+        let (part, offer, beat) = (k.input("part", part_bits), k.input("offer", 1), k.input("beat", 2));
+        let (beat_part, lane) = (k.input("beat_part", part_bits), k.input("lane", 2));
+        let quad = k.input("quad", 4 * v);
+        let [position_x, position_y] = ["position_x", "position_y"].map(|name| k.input(name, position_bits()).signed());
+        let normalise = k.input("normalise", self.normalise_bits);
+        let rescale = k.input("rescale", self.rescale_bits);
+        let (condition, found) = (k.input("condition", 1), k.input("found", 1));
+        let (framing, damaged) = (k.input("framing", 1), k.input("damaged", 1));
+        let score = k.input("score", self.score_bits).signed();
+        let (saturations, cycles) = (k.input("saturations", SATURATION_BITS), k.input("cycles", CYCLE_BITS));
+
+        k.comment("The request travels along the pipeline: to the lane selection, the shift, the output.");
+        let offers = k.state("offers", Type::unsigned(ASKED), rst, 0);
+        offers.set(offers.low(ASKED - 1).concat(offer));
+        let leaves = k.wire("leaves", offers.top());
+        let beats = travel(&k, "beats", beat, ASKED);
+        let lanes = travel(&k, "lanes", lane, READ_STEPS);
+        let parts = travel(&k, "parts", beat_part, ASKED);
+        let part_after = |steps: usize| parts.slice(part_bits * (steps - 1), part_bits);
+        let beat_out = k.wire("beat_out", beats.slice(2 * (ASKED - 1), 2));
+        let lane_value = lanes.slice(2 * (READ_STEPS - 1), 2);
+        let at_out = k.wire("at_out", part_after(ASKED));
+        let kept = Kept { k: &k, start, part, parts: self.parts(), at_out };
+
+        k.comment("Shift and μ of a subarray follow their inputs by two cycles.");
+        let (start_2, part_2) =
+            (k.delay("start_2", k.delay("start_1", start)), k.delay("part_2", k.delay("part_1", part)));
+        let exponents = [("normalise_held", normalise), ("rescale_held", rescale)];
+        let [normalise_held, rescale_held] = exponents.map(|(name, value)| k.delay(name, value));
+        let raw_shift = k.wire("raw_shift", (k.constant(8, self.base_shift) + normalise_held - rescale_held).low(8));
+        let most = k.constant(SHIFT_BITS, FORCE_SHIFT_MAX.into());
+        let limited = most.less(raw_shift).mux(most, raw_shift.low(SHIFT_BITS));
+        let shift = k.delay("shift_now", raw_shift.top().mux(k.constant(SHIFT_BITS, 0), limited));
+        let shifts = kept.memory("shifts", SHIFT_BITS);
+        shifts.write(start_2, part_2, shift);
+        let shift = k.delay("shift", shifts.read(part_after(READ_STEPS + PRODUCT_STEPS)));
+
+        let of_lane = |lane: usize| quad.slice(lane * v, v);
+        let high = lane_value.at(0).mux(of_lane(3), of_lane(2));
+        let low = lane_value.at(0).mux(of_lane(1), of_lane(0));
+        let value = k.delay("value", lane_value.at(1).mux(high, low).signed());
+        let later = k.delay("value_2", k.delay("value_1", value));
+        let doubled = later.shift_left(self.fraction + 1).extend(v + MU_BITS + 1);
+        let z = k.delay("moved_z", doubled.shift_right_by(shift));
+        let (x, y) = match self.searches {
+            false => (None, None),
+            true => {
+                let at_value = part_after(READ_STEPS);
+                let shear = |name: &str, position| {
+                    k.scope(name, || {
+                        let words = kept.memory("mu", MU_BITS);
+                        words.write(start_2, part_2, self.mu_word(&k, position));
+                        let mu = k.delay("mu_value", words.read(at_value).signed());
+                        k.delay("moved", product(&k, value, mu).shift_left(1).shift_right_by(shift))
+                    })
+                };
+                (Some(shear("x", position_x)), Some(shear("y", position_y)))
+            }
+        };
+        let round = |name: &str, moved: Option<_>| {
+            let rounded = |moved| k.scope(name, || Component::new(&k, moved));
+            moved.map(rounded)
+        };
+        let z = k.scope("z", || Component::new(&k, z));
+        let [x, y] = [round("x", x), round("y", y)];
+        let all = [Some(z), y, x];
+        let force = concat(&all.map(|one| one.map_or(k.constant(WORD, 0), |one| one.force)));
+        let below = (self.threshold > 0).then(|| {
+            let wide = z.word.extend(WORD + 1).unsigned();
+            let magnitude = wide.top().mux((k.constant(WORD + 1, 0) - wide).low(WORD + 1), wide);
+            k.comment("The result of the threshold is registered beside the words.");
+            k.delay("below", magnitude.less(k.constant(WORD + 1, self.threshold)))
+        });
+        let presses = k.delay("presses", z.word.any());
+
+        let (contact, counting) = (k.register("contact", bit), k.register("counting", bit));
+        let force_saturations = k.register("force_saturations", Type::unsigned(SATURATION_BITS));
+        let cycles_held = k.register("cycles_held", Type::unsigned(CYCLE_BITS));
+        let clips = all.iter().flatten().map(|one| one.clips);
+        let start_count = force_saturations.extend(SATURATION_BITS + 1);
+        let count = clips.fold(start_count, |count, clips| (count + clips).low(SATURATION_BITS + 1));
+        let count = k.wire("count", count);
+        let case = value_by_case(&k, which, &self.numbers, WORD - CASE_SHIFT as usize);
+        let flags = [
+            case,
+            k.constant(CASE_SHIFT as usize - FLAGS, 0),
+            if self.checks { kept.status("damages", damaged) } else { k.constant(1, 0) },
+            framing,
+            !*contact,
+            kept.status("founds", found),
+            kept.status("conditions", condition),
+        ];
+        let position = |name: &str, position| match self.searches {
+            true => word(kept.status(name, position).signed()),
+            false => k.constant(WORD, 0),
+        };
+        let score = found.mux(score.extend(WORD), k.signed_constant(WORD, 0));
+        let [x, y] = [position("positions_x", position_x), position("positions_y", position_y)];
+        let [normalise, rescale] = [kept.status("normalises", normalise), kept.status("rescales", rescale)];
+        let rescale_saturations = kept.status("rescale_saturations", saturations);
+        let first = concat(&[concat(&flags), y, x]);
+        let second = concat(&[word(normalise), word(rescale), kept.status("scores", score)]);
+        let third = concat(&[word(*cycles_held), word(*force_saturations), word(rescale_saturations)]);
+        let status = k.wire("status", beat_out.case(&[(1, first), (2, second)], third));
+        let force = below.map_or(force, |below| below.mux(k.constant(3 * WORD, 0), force));
+        k.delay("beat_data", beat_out.is(0).mux(force, status));
+        let valid = k.state("valid", bit, rst, 0);
+        valid.set(leaves);
+        let ends: Vec<usize> = self.counts.iter().map(|count| count - 1).collect();
+        let last = k.state("last", bit, rst, 0);
+        last.set(leaves & beat_out.is(3) & at_out.equals(value_by_case(&k, which, &ends, part_bits)));
+
+        let (zero, one) = (k.constant(1, 0), k.constant(1, 1));
+        k.when(leaves, || {
+            counting.set(zero);
+            k.when(*counting & !begin_frame, || cycles_held.set(cycles.plus(UNCOUNTED.into())));
+            k.when(beat_out.is(0), || {
+                let most = one.repeat(SATURATION_BITS);
+                force_saturations.set(count.top().mux(most, count.low(SATURATION_BITS)));
+                k.when(below.map_or(presses, |below| presses & !below), || contact.set(one));
+            });
+        });
+        k.when(begin_frame, || {
+            counting.set(one);
+            contact.set(zero);
+            force_saturations.set(k.constant(SATURATION_BITS, 0));
+        });
+        k.finish()
+    }
+
+    /// The μ word of a position, two cycles later.
+    fn mu_word<'k>(&self, k: &'k Builder, position: Expr<'k>) -> Expr<'k> {
+        let position = k.delay("position", position);
+        let scaled = k.delay("scaled", position * k.signed_constant(MU_BITS, self.mu_step));
+        scaled.round_shift(MU_ROUND as usize).resize(MU_BITS).unsigned()
+    }
+}
+
+/// p times a μ word, two cycles later: p as an unsigned low part that fits a multiplier and the signed rest, whose
+/// products are added a cycle later.
+fn product<'k>(k: &'k Builder, value: Expr<'k>, mu: Expr<'k>) -> Expr<'k> {
+    let (bits, more) = (value.bits() + MU_BITS, value.bits() - LOW);
+    let low = k.delay("low", value.low(LOW).extend(LOW + 1).signed() * mu);
+    let high = k.delay("high", value.slice(LOW, more).signed() * mu);
+    k.delay("product", (high.shift_left(LOW) + low).resize(bits))
+}
+
+/// One component of a force: rounded and saturated, and a cycle later beside the result of the threshold.
+#[derive(Clone, Copy)]
+struct Component<'k> {
+    word: Expr<'k>,
+    force: Expr<'k>,
+    clips: Expr<'k>,
+}
+
+impl<'k> Component<'k> {
+    fn new(k: &'k Builder, moved: Expr<'k>) -> Self {
+        let (word, clips) = saturate(k, moved, WORD);
+        let (word, clips) = (k.delay("word", word.signed()), k.delay("clipped", clips));
+        Component { word, force: k.delay("force", word), clips: k.delay("force_clips", clips) }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::collections::VecDeque;
+
+    use dermis_golden::fixed::force::{force, mu_word};
+    use dermis_golden::fixed::send::{FLAG_COEFFICIENTS, FLAG_CONDITION, FLAG_FOUND, FLAG_FRAMING, FLAG_NO_CONTACT};
+    use dermis_golden::scene::Scene;
+
+    use super::*;
+    use crate::language::testbench::{check, random_word, Reference};
+    use crate::wire::Word;
+
+    fn model(side: usize, more: &str) -> Model {
+        let text = format!(
+            "name = \"force\"\n[sensor]\nrows = {side}\ncols = {side}\npitch_x_mm = 4.0\npitch_y_mm = 4.0\nthickness_mm = 3.0\n{more}"
+        );
+        Model::new(&Scene::parse(&text, "force.toml").unwrap()).unwrap()
+    }
+
+    /// A request, and its value once it has been read.
+    #[derive(Clone, Copy, Debug)]
+    struct Entry {
+        beat: u64,
+        part: usize,
+        lane: usize,
+        value: i64,
+    }
+
+    /// Values stored per subarray.
+    #[derive(Clone, Copy, Debug, Default)]
+    struct Part {
+        position: [i32; 2],
+        normalise: u32,
+        rescale: u32,
+        condition: bool,
+        found: bool,
+        damaged: bool,
+        score: i32,
+        saturations: u32,
+    }
+
+    /// Values stored per frame.
+    #[derive(Clone, Copy, Debug, Default)]
+    struct Frame {
+        cycles: u32,
+        saturations: u32,
+        contact: bool,
+        counting: bool,
+    }
+
+    /// The model's force on every request.
+    struct Requests {
+        model: Model,
+        /// Requests of the last cycles, the latest first.
+        pipe: VecDeque<Option<Entry>>,
+        frame: Frame,
+        parts: Vec<Part>,
+        output: Option<(bool, Word)>,
+        reset: bool,
+    }
+
+    impl Requests {
+        fn new(model: Model) -> Self {
+            let parts = model.cases().iter().map(|case| case.parts.len()).max().unwrap();
+            let (pipe, parts) = (vec![None; ASKED].into(), vec![Part::default(); parts]);
+            Requests { model, pipe, frame: Frame::default(), parts, output: None, reset: false }
+        }
+
+        fn keep(&mut self, inputs: &[Word]) {
+            let [condition, found, damaged] = [14, 15, 17].map(|k| inputs[k].number() == 1);
+            self.parts[inputs[4].number() as usize] = Part {
+                position: [10, 11].map(|k| inputs[k].signed(0, position_bits()) as i32),
+                normalise: inputs[12].number() as u32,
+                rescale: inputs[13].number() as u32,
+                condition,
+                found,
+                damaged: damaged && self.model.has_coefficient_check(),
+                score: if found { inputs[18].signed(0, self.model.formats.score_bits as usize) as i32 } else { 0 },
+                saturations: inputs[19].number() as u32,
+            };
+        }
+
+        fn answer(&mut self, entry: Entry, inputs: &[Word]) -> [i32; 3] {
+            let f = &self.model.formats;
+            let (frame, part) = (&mut self.frame, self.parts[entry.part]);
+            match entry.beat {
+                0 => {
+                    let shift = force_shift(f, part.normalise, part.rescale);
+                    let mu = part.position.map(|x| mu_word(f, x));
+                    let result = force(f, entry.value, mu, shift, self.model.threshold);
+                    frame.saturations = (frame.saturations + result.saturations).min((1 << SATURATION_BITS) - 1);
+                    frame.contact |= result.words[2] != 0;
+                    result.words
+                }
+                1 => {
+                    let flag = |set: bool, bit: u32| if set { bit } else { 0 };
+                    let case = &self.model.cases()[inputs[1].number() as usize];
+                    let number = if self.model.chooses() { case.number() } else { 0 };
+                    let flags = flag(part.condition, FLAG_CONDITION)
+                        | flag(part.found, FLAG_FOUND)
+                        | flag(!frame.contact, FLAG_NO_CONTACT)
+                        | flag(inputs[16].number() == 1, FLAG_FRAMING)
+                        | flag(part.damaged, FLAG_COEFFICIENTS)
+                        | number << CASE_SHIFT;
+                    let position = if self.model.searches() { part.position } else { [0; 2] };
+                    [position[0], position[1], flags as i32]
+                }
+                2 => [part.score, part.rescale as i32, part.normalise as i32],
+                _ => [part.saturations as i32, frame.saturations as i32, frame.cycles as i32],
+            }
+        }
+    }
+
+    impl Reference for Requests {
+        fn outputs(&mut self, _: &[Word]) -> Vec<Option<Word>> {
+            let bit = |bit: bool| self.reset.then(|| Word::from(bit));
+            vec![
+                self.output.map(|(_, word)| word),
+                bit(self.output.is_some()),
+                bit(self.output.is_some_and(|(last, _)| last)),
+            ]
+        }
+
+        fn clock(&mut self, inputs: &[Word]) {
+            let [rst, begin_frame, start, offer] = [0, 2, 3, 5].map(|k| inputs[k].number() == 1);
+            if let Some(entry) = &mut self.pipe[READ_STEPS - 1] {
+                entry.value = inputs[9].signed(entry.lane, self.model.formats.search_bits[0] as usize);
+            }
+            self.output = self.pipe.pop_back().unwrap().map(|entry| {
+                if std::mem::take(&mut self.frame.counting) {
+                    self.frame.cycles = (inputs[20].number() as u32 + UNCOUNTED) % (1 << CYCLE_BITS);
+                }
+                let words = self.answer(entry, inputs).map(i64::from);
+                let ends = self.model.cases()[inputs[1].number() as usize].parts.len();
+                (entry.beat == 3 && entry.part + 1 == ends, Word::of_fields(&words, WORD))
+            });
+            let [beat, part, lane] = [6, 7, 8].map(|k| inputs[k].number());
+            self.pipe.push_front(offer.then_some(Entry { beat, part: part as usize, lane: lane as usize, value: 0 }));
+            if begin_frame {
+                self.frame = Frame { counting: true, ..Frame::default() };
+            }
+            if start {
+                self.keep(inputs);
+            }
+            if rst {
+                self.pipe.iter_mut().for_each(|entry| *entry = None);
+                (self.output, self.reset) = (None, true);
+            }
+        }
+    }
+
+    /// Frames: all subarrays are stored, then beats requested at random, first forces.
+    fn stimulus(model: &Model, block: &ForceUnit, cycles: usize) -> Vec<Vec<Word>> {
+        let mut random = fastrand::Rng::with_seed(11);
+        let cases = model.cases().len() as u64;
+        let parts = model.cases().iter().map(|case| case.parts.len()).max().unwrap();
+        let mut which = 0;
+        let inputs = |cycle: usize| {
+            // 40 cycles of a frame begin it and store the subarrays, the rest request beats.
+            let at = cycle % 300;
+            if at == 0 {
+                which = random.u64(..cases);
+            }
+            let offer = (40..280).contains(&at) && random.u8(..4) > 0;
+            // Small values are below the threshold or round to zero, large ones saturate.
+            let v = block.quad.width() / 4;
+            let value = |_| random.i64(..) >> random.usize(64 - v..64);
+            let quad: Vec<i64> = (0..4).map(value).collect();
+            vec![
+                (cycle < 2 || (at == 290 && random.bool())).into(),
+                which.into(),
+                (at == 20).into(),
+                (21..21 + parts).contains(&at).into(),
+                (at.saturating_sub(21) as u64 % parts as u64).into(),
+                offer.into(),
+                if at < 60 || random.bool() { Word::default() } else { random.u64(..4).into() },
+                random.u64(..parts as u64).into(),
+                random.u64(..4).into(),
+                Word::of_fields(&quad, v),
+                random_word(&mut random, position_bits()),
+                random_word(&mut random, position_bits()),
+                random.u64(..u64::from(model.formats.input_bits)).into(),
+                random.u64(..1 << block.rescale.width()).into(),
+                random.bool().into(),
+                random.bool().into(),
+                random.bool().into(),
+                random.bool().into(),
+                random_word(&mut random, block.score.width()),
+                random_word(&mut random, SATURATION_BITS),
+                random_word(&mut random, CYCLE_BITS),
+            ]
+        };
+        (0..cycles).map(inputs).collect()
+    }
+
+    fn is_the_model_s(side: usize, more: &str, threshold: i64) {
+        let mut model = model(side, more);
+        model.threshold = threshold;
+        let block = ForceUnit::new(&model);
+        check(block.kernel.kernel(), &stimulus(&model, &block, 6000), &mut Requests::new(model));
+    }
+
+    #[test]
+    fn beats_are_those_of_the_model() {
+        is_the_model_s(4, "[search]\nmu_max = 0.05\n[partition]\nrows = 2\ncols = 1\n", 1000);
+        is_the_model_s(4, "[search]\nmu_max = 0.0\n", 0);
+        let cases = "[search]\nmu_max = 0.1\ndegree = 1\n[partition]\ncases = [0, 1, 3]\n";
+        is_the_model_s(8, &format!("{cases}[hardware]\ncoefficient_check = \"signature\"\n"), 1 << 20);
+    }
+}

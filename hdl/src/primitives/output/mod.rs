@@ -1,0 +1,5 @@
+//! What leaves: forces, sums of forces, status.
+
+pub(crate) mod force_unit;
+pub(crate) mod resultants;
+pub(crate) mod status_code;

@@ -1,0 +1,309 @@
+//! Search memory: every taxel's polynomial, about up to three centres.
+
+use dermis_golden::fixed::resources::Holds;
+use rust_hdl::prelude::*;
+
+use crate::kernel_block;
+use crate::language::{concat, Body, Builder, Contents, Expr, Kernel, MemoryPort, Type};
+use crate::primitives::address::counter::count_bits;
+use crate::primitives::search::polynomial_word::PolynomialWord;
+use crate::primitives::search::sweep::{BUFFERS, BUFFER_BITS, START};
+use crate::wire::Wire;
+
+/// Buffers of quads of polynomials. `fill` writes one coefficient of a quad into buffer `START`; `write` writes a whole
+/// quad into one of the others. Both take effect one cycle later, through registers beside the memory. `read_data`
+/// follows its address by two cycles: the read register of the memory and an output register.
+///
+/// Where one subarray is filled while another is searched, `START` is a memory of its own; otherwise it is another name
+/// of buffer 0, and `fill` and `write` never coincide.
+///
+/// Read-during-write data is undefined and unused: a sweep writes quads that it read several cycles earlier, or a
+/// buffer that is not being read. So block RAM needs no bypass. In simulation such a read returns the complement of the
+/// old content, so that using it would show as an error.
+#[derive(LogicBlock)]
+pub struct Store {
+    /// Clock; registers change on its rising edge.
+    pub clk: Signal<In, Clock>,
+    /// Write coefficient `fill_index` of quad `fill_address` of buffer `START`.
+    pub fill: Signal<In, Bit>,
+    /// Index of the coefficient; valid with `fill`.
+    pub fill_index: Wire<In>,
+    /// Address of the quad; valid with `fill`.
+    pub fill_address: Wire<In>,
+    /// The coefficient of four taxels, signed; valid with `fill`.
+    pub fill_quad: Wire<In>,
+    /// Write `write_data` to quad `write_address`.
+    pub write: Signal<In, Bit>,
+    /// Buffer to write; valid one cycle before `write`.
+    pub write_buffer: Wire<In>,
+    /// Address of the quad; valid with `write`.
+    pub write_address: Wire<In>,
+    /// A quad of polynomials; valid with `write`.
+    pub write_data: Wire<In>,
+    /// Buffer to read; valid with `read_address`.
+    pub read_buffer: Wire<In>,
+    /// Address of the quad to read: 0 in the cycle after `begins`, then one more after each cycle with `counts`.
+    pub read_address: Wire<In>,
+    /// A buffer is read from the next cycle on; loads `next_base` into the read addresses.
+    pub begins: Signal<In, Bit>,
+    /// The read addresses step to the next quad.
+    pub counts: Signal<In, Bit>,
+    /// First address of that buffer in the memory (`base`); valid with `begins`.
+    pub next_base: Wire<In>,
+    /// A quad of polynomials, [`LATENCY`] cycles after `read_address`.
+    pub read_data: Wire<Out>,
+    kernel: Body,
+}
+
+kernel_block!(
+    Store,
+    clock clk,
+    inputs [
+        fill, fill_index, fill_address, fill_quad, write, write_buffer, write_address, write_data, read_buffer,
+        read_address, begins, counts, next_base
+    ],
+    outputs [read_data]
+);
+
+/// Cycles from `read_address` to `read_data`.
+pub const LATENCY: usize = 2;
+
+/// First address of `buffer` in the memory, where buffers of `quads` quads follow each other without gaps.
+pub fn base(buffer: usize, quads: usize) -> usize {
+    (buffer % BUFFERS) * quads
+}
+
+/// Width of an address in that memory, in bits.
+pub fn base_bits(quads: usize) -> usize {
+    count_bits(BUFFERS * quads)
+}
+
+impl Store {
+    /// `quads` quads of polynomials in `layout`, filled with coefficients of `fill_bits` bits; `apart` says whether
+    /// one subarray is filled while another is searched.
+    pub fn new(layout: PolynomialWord, quads: usize, fill_bits: usize, apart: bool) -> Self {
+        let address = count_bits(quads);
+        let block = Store {
+            clk: Default::default(),
+            fill: Default::default(),
+            fill_index: Wire::new(count_bits(layout.widths.len())),
+            fill_address: Wire::new(address),
+            fill_quad: Wire::new(4 * fill_bits),
+            write: Default::default(),
+            write_buffer: Wire::new(BUFFER_BITS),
+            write_address: Wire::new(address),
+            write_data: Wire::new(layout.bits()),
+            read_buffer: Wire::new(BUFFER_BITS),
+            read_address: Wire::new(address),
+            begins: Default::default(),
+            counts: Default::default(),
+            next_base: Wire::new(base_bits(quads)),
+            read_data: Wire::new(layout.bits()),
+            kernel: Body::default(),
+        };
+        block.bind(kernel(&layout, quads, fill_bits, apart))
+    }
+}
+
+fn kernel(layout: &PolynomialWord, quads: usize, fill_bits: usize, apart: bool) -> Kernel {
+    let k = Builder::new("store");
+    let (quad_bits, bits) = (count_bits(quads), base_bits(quads));
+    let (fill, fill_index) = (k.input("fill", 1), k.input("fill_index", count_bits(layout.widths.len())));
+    let (fill_address, fill_quad) = (k.input("fill_address", quad_bits), k.input("fill_quad", 4 * fill_bits));
+    let (write, write_buffer) = (k.input("write", 1), k.input("write_buffer", BUFFER_BITS));
+    let (write_address, write_data) = (k.input("write_address", quad_bits), k.input("write_data", layout.bits()));
+    let (read_buffer, read_address) = (k.input("read_buffer", BUFFER_BITS), k.input("read_address", quad_bits));
+    let (begins, counts) = (k.input("begins", 1), k.input("counts", 1));
+    let next_base = k.input("next_base", bits);
+
+    let bases: Vec<(u64, Expr)> = (1..BUFFERS).map(|b| (b as u64, k.constant(bits, base(b, quads) as u64))).collect();
+    let write_base = k.delay("write_base", write_buffer.case(&bases, k.constant(bits, 0)));
+    let to_buffer = k.wire("to_buffer", (write_base + write_address).low(bits));
+    let write_to = if apart { to_buffer } else { fill.mux(fill_address, to_buffer) };
+    let write_to = k.wire("write_to", write_to);
+    let from_start = apart.then(|| k.delay("from_start", read_buffer.is(START as u64)));
+    k.comment(
+        "Read and write addresses are registers of each coefficient, because the memories are placed far apart; the",
+    );
+    k.comment("attribute keeps synthesis from merging them.");
+    let coefficient = |index: usize| {
+        let (width, all) = (layout.widths[index], 4 * layout.widths[index]);
+        let memory = format!("memory{index}");
+        let place = k.memory(&memory, BUFFERS * quads, all, Contents::Undefined).unchecked();
+        let place = place.holds(Holds::Polynomials(index));
+        let from = k.register(&format!("from{index}"), Type::unsigned(bits)).keep();
+        k.when(counts, || from.set(from.plus(1)));
+        k.when(begins, || from.set(next_base));
+        let filled = |lane: usize| fill_quad.slice(lane * fill_bits, fill_bits).signed().resize(width).unsigned();
+        let filled = concat(&[3, 2, 1, 0].map(filled));
+        let fills = fill_index.is(index as u64);
+        let whole = write_data.slice(layout.offset(index), all);
+        let read = k.delay(&format!("read{index}"), place.read(*from));
+        let shown = match from_start {
+            Some(from_start) => {
+                let start = format!("start{index}");
+                let own = k.memory(&start, quads, all, Contents::Undefined).unchecked();
+                let own = own.holds(Holds::Start(index));
+                write_port(&k, (&start, own), [fill & fills, fill_address, filled]);
+                write_port(&k, (&memory, place), [write, write_to, whole]);
+                let read_start = k.delay(&format!("read_start{index}"), own.read(read_address));
+                from_start.mux(read_start, read)
+            }
+            None => {
+                write_port(&k, (&memory, place), [fill.mux(fills, write), write_to, fill.mux(filled, whole)]);
+                read
+            }
+        };
+        k.delay(&format!("shown{index}"), shown)
+    };
+    let shown: Vec<Expr> = (0..layout.widths.len()).map(coefficient).collect();
+    k.wire("read_data", concat(&shown.into_iter().rev().collect::<Vec<_>>()));
+    k.finish()
+}
+
+/// Writes the memory of this name one cycle after it is asked to: enable, address, data.
+fn write_port<'k>(k: &'k Builder, (name, memory): (&str, MemoryPort<'k>), [asks, to, data]: [Expr<'k>; 3]) {
+    let kept = |what: &str, value: Expr<'k>| {
+        let register = k.register(&format!("{name}_{what}"), value.ty()).keep();
+        register.set(value);
+        *register
+    };
+    let (writes, to) = (kept("writes", asks), kept("to", to));
+    memory.write(writes, to, k.delay(&format!("{name}_data"), data));
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::language::testbench::{check, random_words, Reference};
+    use crate::simulate::settles;
+    use crate::wire::Word;
+
+    const BITS: usize = 5;
+
+    fn store() -> Store {
+        let mut store = Store::new(PolynomialWord { lanes: 4, widths: vec![BITS] }, 3, BITS, false);
+        store.connect_all();
+        store
+    }
+
+    fn clock(store: &mut Store) {
+        for level in [false, true] {
+            store.clk.next = level.into();
+            assert!(settles(store));
+        }
+    }
+
+    /// Writes `data` to quad 1 of buffer 0 and reads quad `at`, `late` cycles after `write`.
+    fn read(store: &mut Store, data: u64, at: u64, late: usize) -> u64 {
+        store.write_data.next = Word::from(data);
+        store.write_address.next = Word::from(1);
+        store.begins.next = true;
+        for cycle in 0..=late + LATENCY {
+            store.write.next = cycle == 1;
+            // Reads another quad in all cycles but the tested one.
+            store.next_base.next = Word::from(if cycle == late { at } else { 2 });
+            clock(store);
+        }
+        store.read_data.val().field(0, 4 * BITS)
+    }
+
+    #[test]
+    fn what_is_read_where_and_when_it_is_written_is_the_complement() {
+        let mut store = store();
+        assert_eq!(read(&mut store, 0x12345, 1, 2), 0x12345);
+        // The write takes effect one cycle after `write`.
+        assert_eq!(read(&mut store, 0xabcde, 1, 1), !0x12345 & 0xfffff);
+        assert_eq!(read(&mut store, 0x00001, 1, 0), 0xabcde);
+        assert_eq!(read(&mut store, 0x00002, 0, 1), 0);
+    }
+
+    const WIDTHS: [usize; 2] = [5, 9];
+    const QUADS: usize = 3;
+    const FILL: usize = 7;
+
+    /// Memory by name (that of the buffers, `START`) and coefficient; what is undefined is `None`.
+    struct Buffers {
+        apart: bool,
+        content: [[Vec<Option<u64>>; 2]; 2],
+        /// Memory, coefficient, address, data of the writes asked for.
+        asked: Vec<(usize, usize, usize, u64)>,
+        from: Option<usize>,
+        write_base: usize,
+        from_start: bool,
+        read: [[Option<u64>; 2]; 2],
+        shown: [Option<u64>; 2],
+    }
+
+    impl Reference for Buffers {
+        fn outputs(&mut self, _: &[Word]) -> Vec<Option<Word>> {
+            let word = |low: u64, high: u64| {
+                let mut word = Word::default();
+                word.set(0, 4 * WIDTHS[0], low);
+                word.set(4 * WIDTHS[0], 4 * WIDTHS[1], high);
+                word
+            };
+            vec![self.shown[0].zip(self.shown[1]).map(|(low, high)| word(low, high))]
+        }
+
+        fn clock(&mut self, inputs: &[Word]) {
+            let number = |k: usize| inputs[k].number() as usize;
+            let bit = |k: usize| number(k) == 1;
+            self.shown = self.read[usize::from(self.apart && self.from_start)];
+            let from = [self.from, Some(number(9))];
+            for (memory, k) in [(0, 0), (0, 1), (1, 0), (1, 1)] {
+                let collides =
+                    |&(m, c, at, _): &(usize, usize, usize, u64)| (m, c, Some(at)) == (memory, k, from[memory]);
+                let place = from[memory].filter(|_| !self.asked.iter().any(collides));
+                self.read[memory][k] = place.and_then(|at| self.content[memory][k].get(at).copied().flatten());
+            }
+            for (memory, k, at, data) in std::mem::take(&mut self.asked) {
+                if let Some(word) = self.content[memory][k].get_mut(at) {
+                    *word = Some(data);
+                }
+            }
+            let end = 1 << base_bits(QUADS);
+            for (k, width) in WIDTHS.into_iter().enumerate() {
+                if bit(0) && number(1) == k {
+                    let lanes: [i64; 4] = std::array::from_fn(|lane| inputs[3].signed(lane, FILL));
+                    let data = Word::of_fields(&lanes, width).field(0, 4 * width);
+                    self.asked.push((usize::from(self.apart), k, number(2), data));
+                }
+                if bit(4) && (self.apart || !bit(0)) {
+                    let data = inputs[7].field(k * 4 * WIDTHS[0], 4 * width);
+                    self.asked.push((0, k, (self.write_base + number(6)) % end, data));
+                }
+            }
+            self.from = match (bit(10), bit(11)) {
+                (true, _) => Some(number(12)),
+                (false, steps) => self.from.map(|at| (at + usize::from(steps)) % end),
+            };
+            self.write_base = base(number(5), QUADS);
+            self.from_start = number(8) == START;
+        }
+    }
+
+    #[test]
+    fn quads_are_read_where_they_were_written() {
+        let layout = PolynomialWord { lanes: 4, widths: WIDTHS.into() };
+        let (quad, bits) = (count_bits(QUADS), base_bits(QUADS));
+        let widths = [1, 1, quad, 4 * FILL, 1, BUFFER_BITS, quad, layout.bits(), BUFFER_BITS, quad, 1, 1, bits];
+        let mut stimulus = random_words(20000, &widths);
+        // The base of the first write is not yet known.
+        stimulus[0][4] = Word::default();
+        for apart in [false, true] {
+            let store = Store::new(layout.clone(), QUADS, FILL, apart);
+            let mut buffers = Buffers {
+                apart,
+                content: [BUFFERS * QUADS, QUADS].map(|quads| [vec![None; quads], vec![None; quads]]),
+                asked: Vec::new(),
+                from: None,
+                write_base: 0,
+                from_start: false,
+                read: Default::default(),
+                shown: Default::default(),
+            };
+            check(store.kernel.kernel(), &stimulus, &mut buffers);
+        }
+    }
+}

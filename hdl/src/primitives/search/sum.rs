@@ -1,0 +1,265 @@
+//! Sum of all taxels' polynomials of a subarray, one per search buffer.
+
+use rust_hdl::prelude::*;
+
+use crate::kernel_block;
+use crate::language::{concat, Body, Builder, Expr, Kernel, Net, Type};
+use crate::primitives::address::counter::count_bits;
+use crate::primitives::search::polynomial_word::PolynomialWord;
+use crate::primitives::search::sweep::{BUFFERS, BUFFER_BITS, START};
+use crate::wire::Wire;
+
+/// Adds the counted lanes of each `fill` to the sum of buffer `START`, three cycles later; quad 0 restarts a
+/// coefficient. `read` puts a buffer's sum on `word` after the same two cycles as the search memory, where it is held;
+/// `write` replaces a buffer's sum by the `write_data` of the next cycle. As in the search memory, `START` is buffer 0
+/// unless one subarray is filled while another is searched.
+#[derive(LogicBlock)]
+pub struct Sum {
+    /// Clock; registers change on its rising edge.
+    pub clk: Signal<In, Clock>,
+    /// Add `fill_quad` to coefficient `fill_index`.
+    pub fill: Signal<In, Bit>,
+    /// Address of the quad; 0 restarts the coefficient. Valid with `fill`.
+    pub fill_address: Wire<In>,
+    /// Index of the coefficient; valid with `fill`.
+    pub fill_index: Wire<In>,
+    /// Counted lanes, one bit each; valid with `fill`.
+    pub fill_mask: Wire<In>,
+    /// The coefficient of four taxels, signed; valid with `fill`.
+    pub fill_quad: Wire<In>,
+    /// Put the sum of `read_buffer` on `word`.
+    pub read: Signal<In, Bit>,
+    /// Buffer to read; valid with `read`.
+    pub read_buffer: Wire<In>,
+    /// The sum read last, in the layout of the sums; two cycles after `read`.
+    pub word: Wire<Out>,
+    /// Replace the sum of `write_buffer`.
+    pub write: Signal<In, Bit>,
+    /// Buffer to write; valid with `write`.
+    pub write_buffer: Wire<In>,
+    /// The new sum; valid one cycle after `write`.
+    pub write_data: Wire<In>,
+    kernel: Body,
+}
+
+/// Taxels of a quad.
+const LANES: usize = 4;
+
+kernel_block!(
+    Sum,
+    clock clk,
+    inputs [fill, fill_address, fill_index, fill_mask, fill_quad, read, read_buffer, write, write_buffer, write_data],
+    outputs [word]
+);
+
+impl Sum {
+    /// Sums in `layout` (one lane) over `quads` quads, of coefficients of `fill_bits` bits; `apart` says whether one
+    /// subarray is filled while another is searched.
+    pub fn new(layout: &PolynomialWord, quads: usize, fill_bits: usize, apart: bool) -> Self {
+        let block = Sum {
+            clk: Default::default(),
+            fill: Default::default(),
+            fill_address: Wire::new(count_bits(quads)),
+            fill_index: Wire::new(count_bits(layout.widths.len())),
+            fill_mask: Wire::new(LANES),
+            fill_quad: Wire::new(LANES * fill_bits),
+            read: Default::default(),
+            read_buffer: Wire::new(BUFFER_BITS),
+            word: Wire::new(layout.bits()),
+            write: Default::default(),
+            write_buffer: Wire::new(BUFFER_BITS),
+            write_data: Wire::new(layout.bits()),
+            kernel: Body::default(),
+        };
+        block.bind(kernel(layout, quads, fill_bits, apart))
+    }
+}
+
+/// Number of the buffer that holds the sums about μ = 0.
+fn start(apart: bool) -> usize {
+    if apart {
+        START
+    } else {
+        0
+    }
+}
+
+/// The addition of a quad to a coefficient, two cycles after its `fill`.
+#[derive(Clone, Copy)]
+struct Addition<'k> {
+    adds: Expr<'k>,
+    index: Expr<'k>,
+    first: Expr<'k>,
+    added: Expr<'k>,
+}
+
+fn kernel(layout: &PolynomialWord, quads: usize, bits: usize, apart: bool) -> Kernel {
+    let k = Builder::new("sum");
+    let (fill, fill_address) = (k.input("fill", 1), k.input("fill_address", count_bits(quads)));
+    let fill_index = k.input("fill_index", count_bits(layout.widths.len()));
+    let (fill_mask, fill_quad) = (k.input("fill_mask", LANES), k.input("fill_quad", LANES * bits));
+    let (read, read_buffer) = (k.input("read", 1), k.input("read_buffer", BUFFER_BITS));
+    let (write, write_buffer) = (k.input("write", 1), k.input("write_buffer", BUFFER_BITS));
+    let write_data = k.input("write_data", layout.bits());
+    let term = |lane: usize| {
+        let counted = fill_mask.at(lane).mux(fill_quad.slice(lane * bits, bits), k.constant(bits, 0));
+        k.delay(&format!("term_{lane}"), counted.signed())
+    };
+    let terms = [0, 1, 2, 3].map(term);
+    let twice = |name: &str, value| k.delay(name, k.delay(&format!("{name}_1"), value));
+    let addition = Addition {
+        adds: twice("adds", fill),
+        index: twice("index", fill_index),
+        first: twice("first", fill_address.is(0)),
+        added: k.delay("added", terms[0] + terms[1] + (terms[2] + terms[3])),
+    };
+    let written: Vec<Expr> = (0..BUFFERS).map(|b| write & write_buffer.is(b as u64)).collect();
+    let coefficient = |n: usize| {
+        k.scope(&format!("coefficient_{n}"), || {
+            // Own control registers, to limit fan-out; the attribute keeps synthesis from merging them.
+            let own = |name: &str, value: Expr<'_>| {
+                let register = k.register(name, value.ty()).keep();
+                register.set(value);
+                register
+            };
+            let (reads, from) = (own("reads", read), own("from", read_buffer));
+            let writes: Vec<Net> = (0..BUFFERS).map(|b| own(&format!("writes_{b}"), written[b])).collect();
+            let data = layout.coefficient(write_data, n, 0);
+            let buffer = |b: usize| k.register(&format!("buffer_{b}"), Type::signed(layout.widths[n]));
+            let buffers: Vec<Net> = (0..BUFFERS + usize::from(apart)).map(buffer).collect();
+            let others: Vec<(u64, Expr)> = (1..).zip(buffers[1..].iter().map(Net::get)).collect();
+            let word = k.register("word", Type::signed(layout.widths[n]));
+            k.when(*reads, || word.set(from.case(&others, *buffers[0])));
+            for (writes, buffer) in writes.iter().zip(&buffers) {
+                k.when(writes.get(), || buffer.set(data));
+            }
+            add(&k, addition, n, buffers[start(apart)]);
+            word.get()
+        })
+    };
+    let sums: Vec<Expr> = (0..layout.widths.len()).map(coefficient).collect();
+    k.wire("word", concat(&sums.into_iter().rev().collect::<Vec<_>>()));
+    k.finish()
+}
+
+/// Adds to coefficient `n`, which is in `buffer`.
+fn add<'k>(k: &'k Builder, addition: Addition<'k>, n: usize, buffer: Net<'k>) {
+    let Addition { adds, index, first, added } = addition;
+    let bits = buffer.bits();
+    let before = first.mux(k.signed_constant(bits, 0), *buffer);
+    k.when(adds & index.is(n as u64), || buffer.set((added.resize(bits) + before).resize(bits)));
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::language::testbench::{check, random_word, Reference};
+    use crate::wire::Word;
+
+    const QUADS: usize = 9;
+    const FILL_BITS: usize = 20;
+    const WIDTHS: [u32; 3] = [27, 25, 24];
+
+    /// A quad on its way to its coefficient.
+    #[derive(Clone, Copy)]
+    struct Added {
+        index: usize,
+        first: bool,
+        sum: i64,
+    }
+
+    /// The buffers' coefficients, undefined before they are written; reads, writes and additions on their way.
+    struct Buffers {
+        layout: PolynomialWord,
+        apart: bool,
+        buffers: [[Option<i64>; WIDTHS.len()]; BUFFERS + 1],
+        word: [Option<i64>; WIDTHS.len()],
+        added: [Option<Added>; 2],
+        reads: Option<usize>,
+        writes: Option<usize>,
+    }
+
+    impl Buffers {
+        fn buffer(&self, word: &Word) -> usize {
+            match word.number() as usize {
+                START => start(self.apart),
+                other => other,
+            }
+        }
+    }
+
+    impl Reference for Buffers {
+        fn outputs(&mut self, _: &[Word]) -> Vec<Option<Word>> {
+            let all: Option<Vec<i64>> = self.word.iter().copied().collect();
+            let word = |all: Vec<i64>| {
+                let mut word = Word::default();
+                let polynomial = std::array::from_fn(|n| all.get(n).copied().unwrap_or(0));
+                self.layout.put(&mut word, 0, &polynomial);
+                word
+            };
+            vec![all.map(word)]
+        }
+
+        fn clock(&mut self, inputs: &[Word]) {
+            if let Some(buffer) = self.reads.take() {
+                self.word = self.buffers[buffer];
+            }
+            let before = self.buffers;
+            if let Some(buffer) = self.writes.take() {
+                let data = self.layout.get(&inputs[9], 0);
+                self.buffers[buffer] = std::array::from_fn(|n| Some(data[n]));
+            }
+            let start = start(self.apart);
+            if let Some(Added { index, first, sum }) = self.added[0].filter(|added| added.index < WIDTHS.len()) {
+                let old = if first { Some(0) } else { before[start][index] };
+                let bits = WIDTHS[index];
+                self.buffers[start][index] = old.map(|old| (old + sum) << (64 - bits) >> (64 - bits));
+            }
+            let counted = |lane: &usize| inputs[3].field(*lane, 1) == 1;
+            let sum = (0..LANES).filter(counted).map(|lane| inputs[4].signed(lane, FILL_BITS)).sum();
+            let (index, first) = (inputs[2].number() as usize, inputs[1].number() == 0);
+            let enters = (inputs[0].number() == 1).then_some(Added { index, first, sum });
+            self.added = [self.added[1], enters];
+            self.reads = (inputs[5].number() == 1).then(|| self.buffer(&inputs[6]));
+            // Sweeps never write START.
+            self.writes = (inputs[7].number() == 1).then(|| inputs[8].number() as usize);
+        }
+    }
+
+    fn adds_and_keeps_buffers_apart(apart: bool) {
+        let layout = PolynomialWord::new(1, &WIDTHS);
+        let block = Sum::new(&layout, QUADS, FILL_BITS, apart);
+        let mut random = fastrand::Rng::with_seed(8);
+        let inputs = |_| {
+            vec![
+                random.bool().into(),
+                random.u64(..QUADS as u64).into(),
+                random.u64(..4).into(),
+                random.u64(..16).into(),
+                random_word(&mut random, LANES * FILL_BITS),
+                random.bool().into(),
+                random.u64(..4).into(),
+                (random.u8(..4) == 0).into(),
+                random.u64(..BUFFERS as u64).into(),
+                random_word(&mut random, layout.bits()),
+            ]
+        };
+        let stimulus: Vec<Vec<Word>> = (0..3000).map(inputs).collect();
+        let mut reference = Buffers {
+            layout,
+            apart,
+            buffers: Default::default(),
+            word: Default::default(),
+            added: Default::default(),
+            reads: None,
+            writes: None,
+        };
+        check(block.kernel.kernel(), &stimulus, &mut reference);
+    }
+
+    #[test]
+    fn sums_are_those_of_integers_in_each_buffer() {
+        adds_and_keeps_buffers_apart(true);
+        adds_and_keeps_buffers_apart(false);
+    }
+}

@@ -1,0 +1,183 @@
+//! Taylor shift: moves the polynomials' centre by a grid step and halves the step, with additions and shifts only.
+
+use dermis_golden::fixed::schedule::EXPONENTS;
+use rust_hdl::prelude::*;
+
+use crate::kernel_block;
+use crate::language::{Body, Builder, Expr, Kernel};
+use crate::primitives::search::polynomial_word::PolynomialWord;
+use crate::wire::Wire;
+
+/// Polynomials and their `step` in; the polynomials about the new centre [`LATENCY`] cycles later: two cycles for x,
+/// two for y and the halving. The first cycle of an axis adds up the terms to be multiplied by the step, the second
+/// adds or subtracts them.
+#[derive(LogicBlock)]
+pub struct Taylor {
+    /// Clock; registers change on its rising edge.
+    pub clk: Signal<In, Clock>,
+    /// Bits 1:0: move along x, −1, 0 or 1, signed; bits 3:2: along y; bit 4: halve the grid step afterwards. Valid with
+    /// `word`.
+    pub step: Wire<In>,
+    /// Polynomials, one per lane.
+    pub word: Wire<In>,
+    /// The polynomials about the new centre, four cycles later.
+    pub moved: Wire<Out>,
+    kernel: Body,
+}
+
+/// Cycles from `word` to `moved`.
+pub const LATENCY: usize = 4;
+/// Width of `step`, in bits.
+const STEP_BITS: usize = 5;
+
+kernel_block!(Taylor, clock clk, inputs [step, word], outputs [moved]);
+
+impl Taylor {
+    /// For polynomials in `layout`.
+    pub fn new(layout: &PolynomialWord) -> Self {
+        let block = Taylor {
+            clk: Default::default(),
+            step: Wire::new(STEP_BITS),
+            word: Wire::new(layout.bits()),
+            moved: Wire::new(layout.bits()),
+            kernel: Body::default(),
+        };
+        block.bind(kernel(layout))
+    }
+}
+
+fn kernel(layout: &PolynomialWord) -> Kernel {
+    let k = Builder::new("taylor");
+    let (step, word) = (k.input("step", STEP_BITS), k.input("word", layout.bits()));
+    // The step travels along the pipeline: x moves in the second cycle, y in the fourth.
+    let later = k.delay("later_1", step.slice(2, 3));
+    let later = k.delay("later_2", later);
+    let lane = |lane| k.scope(&format!("lane_{lane}"), || moved(&k, layout, step.low(2), later, word, lane));
+    let lanes: Vec<Vec<Expr>> = (0..layout.lanes).map(lane).collect();
+    k.wire("moved", layout.join(&lanes));
+    k.finish()
+}
+
+/// The polynomial of one lane: moved along x, then along y by the lower bits of `later`, then halved by its top bit.
+fn moved<'k>(
+    k: &'k Builder,
+    layout: &PolynomialWord,
+    step: Expr<'k>,
+    later: Expr<'k>,
+    word: Expr<'k>,
+    lane: usize,
+) -> Vec<Expr<'k>> {
+    // One copy per lane, to limit fan-out; the attribute keeps synthesis from merging them.
+    let own = |name: &str, value: Expr<'k>| {
+        let register = k.register(name, value.ty()).keep();
+        register.set(value);
+        *register
+    };
+    let (dx, dy, halving) = (own("dx", step), own("dy", later.low(2)), own("halving", later.top()));
+    let start: Vec<Expr> = (0..layout.widths.len()).map(|n| layout.coefficient(word, n, lane)).collect();
+    let along_x = shift(k, "x", &start, dx);
+    let between: Vec<Expr> = (0..).zip(along_x).map(|(n, value)| k.delay(&format!("between_{n}"), value)).collect();
+    let along_y = shift(k, "y", &between, dy);
+    let halved = |(n, value): (usize, Expr<'k>)| {
+        let value = k.wire(&format!("shifted_{n}"), value);
+        let degree = (EXPONENTS[n].0 + EXPONENTS[n].1) as usize;
+        let half = if degree > 0 { halving.mux(value.shift_right(degree), value) } else { value };
+        k.delay(&format!("moved_{n}"), half)
+    };
+    (0..).zip(along_y).map(halved).collect()
+}
+
+/// A move of the polynomial `w` along an axis: the terms that the step multiplies are registered; the result is that of
+/// one cycle later.
+///
+/// c0' = c0 + d (c1 + c3) + d² c2,  c1' = c1 + 2d c2 + 3d² c3,  c2' = c2 + 3d c3, with d one of −1, 0, 1. So d² is
+/// 1 if there is a move, and d·c is c, −c or 0, where −c is the complement plus one. Written as one sum, which
+/// synthesis maps to one carry chain.
+fn shift<'k>(k: &'k Builder, axis: &str, w: &[Expr<'k>], step: Expr<'k>) -> Vec<Expr<'k>> {
+    let along_x = axis == "x";
+    let one = |n: usize| {
+        let bits = w[n].bits();
+        let (i, j) = EXPONENTS[n];
+        let order = if along_x { i } else { j };
+        // The term `by` above, times its binomial factor: those an odd distance above change sign with the step, the
+        // others do not.
+        let term = |by: u32| {
+            let above = if along_x { (i + by, j) } else { (i, j + by) };
+            let term = w.get(EXPONENTS.iter().position(|&e| e == above)?)?.resize(bits);
+            let twice = term.shift_left(1).low(bits);
+            Some(match binomial(order + by, by) {
+                2 => twice,
+                3 => (twice + term.unsigned()).low(bits),
+                _ => term.unsigned(),
+            })
+        };
+        let register = |name: &str, value| k.delay(&format!("{axis}{n}_{name}"), value);
+        let mut sum = register("own", w[n].unsigned());
+        let odd = match (term(1), term(3)) {
+            (Some(one), Some(three)) => Some((one + three).low(bits)),
+            (one, _) => one,
+        };
+        if let Some(odd) = odd {
+            let product = (register("odd", odd) & step.at(0).repeat(bits)) ^ step.at(1).repeat(bits);
+            sum = (sum + product + step.at(1)).low(bits);
+        }
+        if let Some(even) = term(2) {
+            sum = (sum + (register("even", even) & step.at(0).repeat(bits))).low(bits);
+        }
+        sum.signed()
+    };
+    (0..w.len()).map(one).collect()
+}
+
+/// n over k for n up to 3.
+fn binomial(n: u32, k: u32) -> u32 {
+    (0..k).fold(1, |product, m| product * (n - m) / (m + 1))
+}
+
+#[cfg(test)]
+mod tests {
+    use dermis_golden::fixed::search::{halve, taylor_shift};
+
+    use super::*;
+    use crate::language::testbench::{check, random_word, Pipeline};
+    use crate::wire::Word;
+
+    /// A move, and coefficients of which all but the constant have room to grow, as in the search.
+    fn stimulus(layout: &PolynomialWord, cycles: usize) -> Vec<Vec<Word>> {
+        let mut random = fastrand::Rng::with_seed(4);
+        let inputs = |_| {
+            let step = [random.i64(-1..2), random.i64(-1..2), random.i64(0..2)];
+            let mut word = random_word(&mut random, layout.bits());
+            for lane in 0..layout.lanes {
+                let w = layout.get(&word, lane);
+                let small = std::array::from_fn(|n| if n == 0 { w[0] } else { w[n] >> 5 });
+                layout.put(&mut word, lane, &small);
+            }
+            vec![Word::of_fields(&step, 2), word]
+        };
+        (0..cycles).map(inputs).collect()
+    }
+
+    fn is_exact(lanes: usize, widths: &[u32]) {
+        let layout = PolynomialWord::new(lanes, widths);
+        let block = Taylor::new(&layout);
+        let moved = |inputs: &[Word]| {
+            let (dx, dy, halving) = (inputs[0].signed(0, 2), inputs[0].signed(1, 2), inputs[0].field(4, 1) == 1);
+            let mut out = Word::default();
+            for lane in 0..lanes {
+                let moved = taylor_shift(&layout.get(&inputs[1], lane), dx, dy);
+                layout.put(&mut out, lane, &if halving { halve(&moved) } else { moved });
+            }
+            vec![Some(out)]
+        };
+        check(block.kernel.kernel(), &stimulus(&layout, 2000), &mut Pipeline::new(LATENCY, 1, moved));
+    }
+
+    /// Degrees 3, 2 and 1; the constant coefficient may wrap.
+    #[test]
+    fn the_shift_is_exact() {
+        is_exact(4, &[27, 26, 26, 25, 25, 25, 20, 22, 21, 20]);
+        is_exact(1, &[34, 33, 31, 30, 29, 28]);
+        is_exact(2, &[19, 18, 17]);
+    }
+}
