@@ -11,7 +11,7 @@
 //! - While a frame is sent, the first v_ij of the next are computed; they wait until that frame has been sent.
 //!
 //! Without a search there is no memory in which v_ij could wait: then a frame starts when the previous one has been
-//! sent. Where the case is chosen per frame, it is chosen while the frame is received. [`Receiver`] and [`Seeker`] are
+//! sent. Where the case is chosen per frame, it is chosen while the frame is received. [`ReceiveStage`] and [`SearchStage`] are
 //! the stages that differ.
 
 use dermis_golden::fixed::Model;
@@ -30,7 +30,7 @@ use crate::wire::Wire;
 
 one_of! {
     /// The stage that receives frames.
-    pub enum Receiver: ReceivePorts {
+    pub enum ReceiveStage: ReceivePorts {
         /// One case.
         Receive,
         /// Several cases, one of which is chosen per frame.
@@ -38,18 +38,18 @@ one_of! {
     }
 }
 
-impl Receiver {
+impl ReceiveStage {
     fn new(model: &Model) -> Self {
         match model.chooses() {
-            false => Receiver::Receive(Box::new(Receive::new(model, 0))),
-            true => Receiver::Banks(Box::new(Banks::new(model))),
+            false => ReceiveStage::Receive(Box::new(Receive::new(model, 0))),
+            true => ReceiveStage::Banks(Box::new(Banks::new(model))),
         }
     }
 }
 
 one_of! {
     /// The stage that finds p(μ*).
-    pub enum Seeker: SearchPorts {
+    pub enum SearchStage: SearchPorts {
         /// With a search for μ*.
         Search,
         /// μ* is 0.
@@ -57,11 +57,11 @@ one_of! {
     }
 }
 
-impl Seeker {
+impl SearchStage {
     fn new(model: &Model) -> Self {
         match model.searches() {
-            true => Seeker::Search(Box::new(Search::new(model))),
-            false => Seeker::Unsearched(Box::new(Unsearched::new(model))),
+            true => SearchStage::Search(Box::new(Search::new(model))),
+            false => SearchStage::Unsearched(Box::new(Unsearched::new(model))),
         }
     }
 }
@@ -103,13 +103,13 @@ pub struct Engine {
     /// The beat is the last of its frame; valid with `m_axis_tvalid`.
     pub m_axis_tlast: Signal<Out, Bit>,
     pub(crate) prepare: Prepare,
-    pub(crate) receive: Receiver,
+    pub(crate) receive: ReceiveStage,
     pub(crate) normalise: Normalise,
     pub(crate) fold: Fold,
     pub(crate) pass: Pass,
     pub(crate) rescale: Rescale,
     pub(crate) unfold: Unfold,
-    pub(crate) search: Seeker,
+    pub(crate) search: SearchStage,
     pub(crate) forces: Force,
     send: Send,
     resultants: Resultants,
@@ -171,11 +171,11 @@ impl Engine {
             m_axis_tready: Default::default(),
             m_axis_tlast: Default::default(),
             prepare: Prepare::new(model),
-            receive: Receiver::new(model),
+            receive: ReceiveStage::new(model),
             fold: Fold::new(model),
             pass: Pass::new(model),
             unfold: Unfold::new(model),
-            search: Seeker::new(model),
+            search: SearchStage::new(model),
             forces: force,
             send: Send::new(model),
             resultants: Resultants::new(model.sends_resultants(), &model.scene.sensor, model.grid()),
@@ -284,13 +284,13 @@ impl Logic for Engine {
         self.resultants.rst.next = self.rst.val();
 
         comment!("A frame starts: buffer full, previous frame computed");
-        self.begins.now.next = self.receive.full.val()
-            & !self.begins.then.val()
+        self.begins.d.next = self.receive.full.val()
+            & !self.begins.q.val()
             & !self.computing.q.val()
             & (!self.sending.q.val() | self.ahead.val());
-        self.begin_frame.next = self.begins.then.val();
+        self.begin_frame.next = self.begins.q.val();
         self.computing.d.next =
-            (self.begin_frame.val() | (self.computing.q.val() & !self.finish.then.val())) & !self.rst.val();
+            (self.begin_frame.val() | (self.computing.q.val() & !self.finish.q.val())) & !self.rst.val();
 
         comment!("Case of the frame being computed, case of the frame being sent");
         self.frame_case.keep.next = self.begin_frame.val();
@@ -315,13 +315,13 @@ impl Logic for Engine {
         self.behind.next = self.first.q.val() & self.sending.q.val() & !self.send.done.val();
         self.hand_over.next =
             self.complete.val() & !self.behind.val() & (!self.searching.q.val() | self.search.done.val());
-        self.handed.now.next = self.hand_over.val();
-        self.opens.now.next = self.hand_over.val() & self.first.q.val();
+        self.handed.d.next = self.hand_over.val();
+        self.opens.d.next = self.hand_over.val() & self.first.q.val();
         self.filled.d.next = self.complete.val() & !self.hand_over.val() & !self.rst.val();
         self.searching.d.next =
             (self.hand_over.val() | (self.searching.q.val() & !self.search.done.val())) & !self.rst.val();
         self.first.d.next = self.begin_frame.val() | (self.first.q.val() & !self.hand_over.val());
-        self.finish.now.next = self.search.done.val() & self.searched_last.q.val();
+        self.finish.d.next = self.search.done.val() & self.searched_last.q.val();
         self.searched_condition.d.next = self.searched_condition.q.val();
         self.searched_last.d.next = self.searched_last.q.val();
         self.sent_framing.d.next = self.sent_framing.q.val();
@@ -333,26 +333,26 @@ impl Logic for Engine {
         self.searched_part.keep.next = self.hand_over.val();
         self.searched_part.word.next = self.part.value.val();
         comment!("Captured a cycle later, before the stages restart");
-        self.searched_normalise.keep.next = self.handed.then.val();
+        self.searched_normalise.keep.next = self.handed.q.val();
         self.searched_normalise.word.next = self.normalise.shift.val();
-        self.searched_rescale.keep.next = self.handed.then.val();
+        self.searched_rescale.keep.next = self.handed.q.val();
         self.searched_rescale.word.next = self.rescale.shift.val();
-        self.searched_saturations.keep.next = self.handed.then.val();
+        self.searched_saturations.keep.next = self.handed.q.val();
         self.searched_saturations.word.next = self.rescale.saturations.val();
-        self.searched_damaged.keep.next = self.handed.then.val();
+        self.searched_damaged.keep.next = self.handed.q.val();
         self.searched_damaged.word.next = self.pass.damaged.val();
 
         comment!("Then the next subarray starts");
         self.part.clear.next = self.rst.val();
         self.part.enable.next = self.hand_over.val();
-        self.again.now.next = self.hand_over.val() & !self.part.last.val();
-        self.start.next = self.begin_frame.val() | self.again.then.val();
+        self.again.d.next = self.hand_over.val() & !self.part.last.val();
+        self.start.next = self.begin_frame.val() | self.again.q.val();
         comment!("Stalls behind the previous frame are excluded");
         comment!("Registered once to shorten the route to the counter");
-        self.begun.now.next = self.begin_frame.val();
-        self.waits.now.next = self.complete.val() & self.behind.val();
-        self.cycles.clear.next = self.begun.then.val();
-        self.cycles.enable.next = !self.waits.then.val();
+        self.begun.d.next = self.begin_frame.val();
+        self.waits.d.next = self.complete.val() & self.behind.val();
+        self.cycles.clear.next = self.begun.q.val();
+        self.cycles.enable.next = !self.waits.q.val();
         self.condition.d.next = self.condition.q.val();
         self.framing.d.next = self.framing.q.val();
         if self.start.val() {
@@ -404,8 +404,8 @@ impl Logic for Engine {
         self.search.fill.next = self.unfold.taxels_valid.val();
         self.search.fill_index.next = self.unfold.index.val();
         self.search.fill_address.next = self.unfold.address.val();
-        self.seeks.now.next = self.handed.then.val();
-        self.search.start.next = self.seeks.then.val();
+        self.seeks.d.next = self.handed.q.val();
+        self.search.start.next = self.seeks.q.val();
         self.search.enabled.next = self.searched_condition.q.val();
 
         comment!("search -> force -> send");
@@ -413,7 +413,7 @@ impl Logic for Engine {
         self.forces.values_valid.next = self.search.values_valid.val();
         self.forces.begin_frame.next = self.begin_frame.val();
         if self.ahead.val() {
-            self.forces.begin_frame.next = self.opens.then.val();
+            self.forces.begin_frame.next = self.opens.q.val();
         }
         self.forces.start.next = self.search.settled.val();
         self.forces.part.next = self.searched_part.kept.val();

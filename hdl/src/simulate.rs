@@ -94,11 +94,11 @@ design!(
         ("pass", engine.pass.quad_valid.val(), engine.pass.quad.val()),
         ("rescale", engine.rescale.words_valid.val(), engine.rescale.words.val()),
         ("unfold", engine.unfold.taxels_valid.val(), engine.unfold.taxels.val()),
-        ("search", engine.search.judged.val(), best!(engine.search)),
+        ("search", engine.search.compared.val(), best!(engine.search)),
         ("force", engine.search.values_valid.val(), engine.search.values.val()),
     ],
     |engine: &engine::Engine| {
-        let columns = engine.pass.steps.column_file().map(|text| (COLUMN_FILE, text));
+        let columns = engine.pass.pass_program.column_file().map(|text| (COLUMN_FILE, text));
         let table = engine.prepare.calibrate.table_file().map(|text| (CALIBRATION_FILE, text));
         [(MEMORY_FILE, engine.pass.lanes.memory_file())].into_iter().chain(columns).chain(table).collect()
     }
@@ -108,13 +108,13 @@ design!(
     serial::Engine,
     |engine: &serial::Engine| [
         ("receive", engine.receive.accept.val(), engine.receive.s_axis_tdata.val()),
-        ("normalise", engine.leader.normalised_valid.val(), engine.rounder.rounded.val()),
-        ("fold", engine.mixer.quad_valid.val() && engine.leader.folding.val(), engine.mixer.quad.val()),
+        ("normalise", engine.pass_sequencer.normalised_valid.val(), engine.rounder.rounded.val()),
+        ("fold", engine.butterfly.quad_valid.val() && engine.pass_sequencer.folding.val(), engine.butterfly.quad.val()),
         ("pass", engine.pass.quad_valid.val(), engine.pass.quad.val()),
-        ("rescale", engine.leader.rescaled_valid.val(), engine.rounder.rounded.val()),
+        ("rescale", engine.pass_sequencer.rescaled_valid.val(), engine.rounder.rounded.val()),
         ("unfold", engine.unfold.taxel_valid.val(), engine.unfold.taxel.val()),
-        ("search", engine.walk.judged.val(), best!(engine.walk)),
-        ("force", engine.walk.value_valid.val(), engine.halve.value.val()),
+        ("search", engine.search_sequencer.compared.val(), best!(engine.search_sequencer)),
+        ("force", engine.search_sequencer.value_valid.val(), engine.coefficient_shift.value.val()),
     ],
     |engine: &serial::Engine| engine.pass.memory_files()
 );

@@ -17,7 +17,7 @@ const CHOICE_FIELD: u32 = 3;
 /// The taps of the engine of `model`, in pipeline order.
 pub fn taps(model: &Model) -> Vec<Tap> {
     let serial = model.board.engine == EngineKind::Serial;
-    let block = if serial { "walk" } else { "search" };
+    let block = if serial { "search_sequencer" } else { "search" };
     let f = &model.formats;
     let tap = |name, valid: &str, data: &str, fields, field_bits| Tap {
         name,
@@ -39,7 +39,7 @@ pub fn taps(model: &Model) -> Vec<Tap> {
     );
     let search = Tap {
         name: "search",
-        valid: format!("{{}}{block}__judged"),
+        valid: format!("{{}}{block}__compared"),
         data: search,
         fields: 4,
         field_bits: SEARCH_FIELD,
@@ -48,16 +48,16 @@ pub fn taps(model: &Model) -> Vec<Tap> {
         let mixed = f.input_bits.max(f.vector_bits) + 2;
         return vec![
             tap("receive", "receive__accept", "receive__s_axis_tdata", 1, f.input_bits),
-            tap("normalise", "leader__normalised_valid", "rounder__rounded", 1, FORCE_BITS),
+            tap("normalise", "pass_sequencer__normalised_valid", "rounder__rounded", 1, FORCE_BITS),
             Tap {
-                valid: "({}mixer__quad_valid && {}leader__folding)".into(),
-                ..tap("fold", "", "mixer__quad", 4, mixed)
+                valid: "({}butterfly__quad_valid && {}pass_sequencer__folding)".into(),
+                ..tap("fold", "", "butterfly__quad", 4, mixed)
             },
             tap("pass", "pass__quad_valid", "pass__quad", 4, f.acc_bits),
-            tap("rescale", "leader__rescaled_valid", "rounder__rounded", 1, FORCE_BITS),
+            tap("rescale", "pass_sequencer__rescaled_valid", "rounder__rounded", 1, FORCE_BITS),
             tap("unfold", "unfold__taxel_valid", "unfold__taxel", 1, f.vector_bits + 2),
             search,
-            tap("force", "walk__value_valid", "halve__value", 1, f.search_bits[0]),
+            tap("force", "search_sequencer__value_valid", "coefficient_shift__value", 1, f.search_bits[0]),
         ];
     }
     let mut all = vec![

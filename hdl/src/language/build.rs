@@ -7,12 +7,7 @@ use super::expression::Expr;
 use super::kernel::{
     Contents, Domain, Item, Kernel, Memory, MemoryId, Node, NodeId, Register, Role, Signal, SignalId, Type, Write,
 };
-
-/// Words that Verilog keeps for itself and that a block might use as names.
-const KEYWORDS: [&str; 26] = [
-    "always", "assign", "begin", "buf", "case", "default", "edge", "else", "end", "event", "for", "if", "initial",
-    "input", "integer", "module", "not", "output", "posedge", "real", "reg", "repeat", "table", "time", "wait", "wire",
-];
+use super::keywords::is_keyword;
 
 /// Builds a [`Kernel`]. Its expressions borrow it, so that Rust's operators, loops and functions compose them.
 #[derive(Debug, Default)]
@@ -246,7 +241,7 @@ impl Builder {
             false if !name.starts_with(|c: char| c.is_ascii_alphabetic()) || !name.chars().all(plain) => {
                 Some("not a Verilog identifier")
             }
-            false if KEYWORDS.contains(&name.as_str()) => Some("a keyword of Verilog"),
+            false if is_keyword(&name) => Some("a keyword of Verilog"),
             false => None,
         };
         let block = kernel.block.clone();

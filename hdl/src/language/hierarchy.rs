@@ -13,6 +13,7 @@ use rust_hdl::prelude::*;
 
 use super::error::KernelError;
 use super::kernel::{Kernel, Role};
+use super::keywords::is_keyword;
 use super::verilog::range;
 use super::wiring::{wiring, Pin};
 
@@ -102,6 +103,12 @@ impl Hierarchy {
         let without = self.modules.iter().find(|(_, module)| module.kernel.is_none());
         if let Some((path, _)) = without {
             return Err(KernelError::Wiring { block: path.clone(), what: "the block".into(), reason: "has no kernel" });
+        }
+        for (path, module) in &self.modules {
+            if let Some((instance, _)) = module.children.iter().find(|(instance, _)| is_keyword(instance)) {
+                let (block, signal) = (path.clone(), instance.clone());
+                return Err(KernelError::Name { block, signal, reason: "a keyword of Verilog" });
+            }
         }
         if let Some(error) = self.kernels().flat_map(|(_, kernel)| kernel.errors()).next() {
             return Err(error.clone());

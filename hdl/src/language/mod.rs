@@ -30,6 +30,7 @@ mod error;
 mod expression;
 mod hierarchy;
 mod kernel;
+mod keywords;
 mod resources;
 mod simulate;
 mod text;

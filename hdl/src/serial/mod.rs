@@ -5,12 +5,13 @@
 //! bench, link and host are the same.
 //!
 //! ```text
-//! receive -> rounder -> butterfly -> pass -> raw -> rounder -> butterfly -> unfold -> banks <-> walk, candidates
-//!            normalise  fold                        rescale    unfold                 '-> force -> rounder -> m_axis
+//! receive -> rounder -> butterfly -> pass -> raw -> rounder -> butterfly -> unfold -> banks -> force -> rounder -> m_axis
+//!            normalise  fold                        rescale    unfold                  ^
+//!                                                                                      '-> along_x, transposed, along_y,
+//!                                                                                          candidates, score
 //! ```
-//! [`PassSequencer`] sequences the blocks up to `unfold`, [`SearchSequencer`] the search, [`Force`] the output. [`Engine`] and [`Receive`]
-//! connect blocks by `#[hdl_gen]`; [`PassSequencer`] and [`SearchSequencer`] have a Rust `update()` for rust-hdl's simulation and
-//! hand-written Verilog, which co-simulation compares; each other block is one [kernel](crate::language).
+//! [`PassSequencer`] sequences the blocks up to `unfold`, [`SearchSequencer`] the search, [`Force`] the output. [`Engine`]
+//! and [`Receive`] connect blocks by `#[hdl_gen]`; each other block is one [kernel](crate::language).
 
 mod banks;
 mod candidates;

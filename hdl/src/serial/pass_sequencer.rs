@@ -1,10 +1,10 @@
 //! Sequencer from the frame buffer to the polynomials: which word goes where in which cycle.
 //!
 //! ```text
-//! step 1, 2  frame --> rounder (normalise) --> mixer (fold) --> operands, high and low limbs
+//! step 1, 2  frame --> rounder (normalise) --> butterfly (fold) --> operands, high and low limbs
 //! step 3     pass of v_00 --> raw memory, length
-//! step 4     raw memory --> rounder (rescale) --> operands; mixer --> unfold
-//! step 5     the other passes --> rounder --> operands; mixer --> unfold
+//! step 4     raw memory --> rounder (rescale) --> operands; butterfly --> unfold
+//! step 5     the other passes --> rounder --> operands; butterfly --> unfold
 //! ```
 //! Each step ends with [`DRAIN`] cycles, in which its last words reach their memory.
 
@@ -67,9 +67,9 @@ pub struct PassSequencer {
     pub clipped: Signal<In, Bit>,
     /// `rounded` is valid.
     pub round_done: Signal<In, Bit>,
-    /// `rounded` goes to the mixer in this cycle.
+    /// `rounded` goes to the butterfly in this cycle.
     pub mix: Signal<Out, Bit>,
-    /// Word from the mixer, signed.
+    /// Word from the butterfly, signed.
     pub mixed: Wire<In>,
     /// `mixed` is valid.
     pub mixed_valid: Signal<In, Bit>,
@@ -97,11 +97,11 @@ pub struct PassSequencer {
     pub write_data: Wire<Out>,
     /// The rounder's word is a normalised code.
     pub normalised_valid: Signal<Out, Bit>,
-    /// The mixer's quads are folded input, high limb.
+    /// The butterfly's quads are folded input, high limb.
     pub folding: Signal<Out, Bit>,
     /// The rounder's word is a rescaled v_ij.
     pub rescaled_valid: Signal<Out, Bit>,
-    /// The mixer's words are taxels of a v_ij.
+    /// The butterfly's words are taxels of a v_ij.
     pub unfolding: Signal<Out, Bit>,
     /// The frame buffer has been read; high for one cycle.
     pub free: Signal<Out, Bit>,
@@ -111,7 +111,7 @@ pub struct PassSequencer {
     pub rescale: Wire<Out>,
     /// Number of words saturated by `rescale`, 16 bits.
     pub saturations: Wire<Out>,
-    /// The sequence is running; rounder and mixer are in use.
+    /// The sequence is running; rounder and butterfly are in use.
     pub busy: Signal<Out, Bit>,
     /// Last cycle of the sequence.
     pub done: Signal<Out, Bit>,

@@ -52,7 +52,7 @@ pub struct Receive {
     pub reported: Signal<In, Bit>,
     taxels: Counter,
     frame: Ram,
-    gather: FrameStats,
+    stats: FrameStats,
     whole: Dff,
     broken: Dff,
     taken: Signal<Local, Bit>,
@@ -82,7 +82,7 @@ impl Receive {
             reported: Default::default(),
             taxels: Counter::new(taxels),
             frame: Ram::new(taxels, 1, bits).holding([Holds::Frame { case: 0, lane: 0 }]),
-            gather: FrameStats::new(bits, floor, 1),
+            stats: FrameStats::new(bits, floor, 1),
             whole: Default::default(),
             broken: Default::default(),
             taken: Default::default(),
@@ -96,7 +96,7 @@ impl Logic for Receive {
     fn update(&mut self) {
         self.taxels.clk.next = self.clk.val();
         self.frame.clk.next = self.clk.val();
-        self.gather.clk.next = self.clk.val();
+        self.stats.clk.next = self.clk.val();
         self.whole.clk.next = self.clk.val();
         self.broken.clk.next = self.clk.val();
 
@@ -114,14 +114,14 @@ impl Logic for Receive {
         self.frame.read_address.next = self.read_address.val();
         self.word.next = self.frame.read_data.val();
 
-        self.gather.accept.next = self.taken.val();
-        self.gather.clear.next = self.rst.val() | self.free.val() | self.early.val();
-        self.gather.part.next = false.into();
-        self.gather.select.next = false.into();
-        self.gather.code.next = self.s_axis_tdata.val();
-        self.magnitude.next = self.gather.magnitude.val();
-        self.positive.next = self.gather.positive.val();
-        self.negative.next = self.gather.negative.val();
+        self.stats.accept.next = self.taken.val();
+        self.stats.clear.next = self.rst.val() | self.free.val() | self.early.val();
+        self.stats.part.next = false.into();
+        self.stats.select.next = false.into();
+        self.stats.code.next = self.s_axis_tdata.val();
+        self.magnitude.next = self.stats.magnitude.val();
+        self.positive.next = self.stats.positive.val();
+        self.negative.next = self.stats.negative.val();
 
         self.full.next = self.whole.q.val();
         self.whole.d.next =

@@ -29,7 +29,7 @@ const LAST: u64 = COARSE + HALVINGS as u64;
 const IDLE: u64 = 0;
 const SET_UP: u64 = 1;
 const RUN: u64 = 2;
-const JUDGE: u64 = 3;
+const COMPARE: u64 = 3;
 /// Ticks from a bank's address to the word entering the chain along y; then to the word leaving it, and to its
 /// write-back.
 const ALONG_Y: u64 = TRANSPOSE + 1;
@@ -90,8 +90,8 @@ pub struct SearchSequencer {
     /// The coefficient written is a taxel's value p(μ*).
     pub value_valid: Signal<Out, Bit>,
     /// The comparison reads the totals, so they are addressed by `candidate`.
-    pub judging: Signal<Out, Bit>,
-    /// Index of the candidate whose total is read; valid with `judging`.
+    pub comparing: Signal<Out, Bit>,
+    /// Index of the candidate whose total is read; valid with `comparing`.
     pub candidate: Wire<Out>,
     /// `{Σp > 0, total}`, one cycle after `candidate`.
     pub total: Wire<In>,
@@ -106,7 +106,7 @@ pub struct SearchSequencer {
     /// A candidate was taken at this level.
     pub taken: Signal<Out, Bit>,
     /// The candidates of a sweep have been compared; high for one cycle.
-    pub judged: Signal<Out, Bit>,
+    pub compared: Signal<Out, Bit>,
     /// All values are in the bank that is now read; high for one cycle.
     pub done: Signal<Out, Bit>,
     kernel: Body,
@@ -118,8 +118,8 @@ kernel_block!(
     inputs [rst, filling, start, enabled, wanted, total],
     outputs [
         odd, read_address, x_element, x_top, x_moves, x_down, turn_write, turn_read, y_element, y_top, y_moves, y_down,
-        halvings, write, write_address, cycle, present, sums, value_valid, judging, candidate, best_x, best_y, score,
-        found, taken, judged, done
+        halvings, write, write_address, cycle, present, sums, value_valid, comparing, candidate, best_x, best_y, score,
+        found, taken, compared, done
     ]
 );
 
@@ -166,7 +166,7 @@ impl SearchSequencer {
             present: Wire::new(2),
             sums: Wire::new(2),
             value_valid: Default::default(),
-            judging: Default::default(),
+            comparing: Default::default(),
             candidate: Wire::new(4),
             total: Wire::new(formats.score_bits as usize + 1),
             best_x: Wire::new(position_bits()),
@@ -174,7 +174,7 @@ impl SearchSequencer {
             score: Wire::new(formats.score_bits as usize),
             found: Default::default(),
             taken: Default::default(),
-            judged: Default::default(),
+            compared: Default::default(),
             done: Default::default(),
             kernel: Body::default(),
         };
@@ -313,13 +313,13 @@ fn build<'k>(k: &'k Builder, degree: u64, polynomials: u64, score_bits: usize) {
     k.when(running, || {
         tick.set(tick.plus(1));
         k.when(run_end, || {
-            state.set(final_sweep.mux(k.constant(2, IDLE), k.constant(2, JUDGE)));
+            state.set(final_sweep.mux(k.constant(2, IDLE), k.constant(2, COMPARE)));
             count.set(zero(5));
             takes.set(zero(1));
         });
     });
-    let judging = k.wire("judging", state.is(JUDGE));
-    k.when(judging, || {
+    let comparing = k.wire("comparing", state.is(COMPARE));
+    k.when(comparing, || {
         count.set(count.plus(1));
         turn_read_then.set(*turn);
         disc.set((disc_before + sideways.mux(further, zero(DISC_BITS))).low(DISC_BITS));
@@ -378,7 +378,7 @@ fn build<'k>(k: &'k Builder, degree: u64, polynomials: u64, score_bits: usize) {
     k.wire("sums", slot.is(1).concat(slot.is(0)));
     k.wire("value_valid", whole & final_sweep & !slot.is(0) & back.low(4).is(0));
     k.wire("candidate", *turn_read_then);
-    k.wire("judged", state.is(SET_UP) & *searching & !sweep.is(0));
+    k.wire("compared", state.is(SET_UP) & *searching & !sweep.is(0));
 }
 
 #[cfg(test)]

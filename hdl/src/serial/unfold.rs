@@ -1,4 +1,4 @@
-//! Stage `unfold`: words from the mixer to the coefficients of the taxels' polynomials, and their sum.
+//! Stage `unfold`: words from the butterfly to the coefficients of the taxels' polynomials, and their sum.
 
 use dermis_golden::fixed::formats::Formats;
 use dermis_golden::fixed::schedule::{vectors, EXPONENTS};
@@ -21,7 +21,7 @@ pub struct Unfold {
     pub rst: Signal<In, Bit>,
     /// A new frame.
     pub start: Signal<In, Bit>,
-    /// A word from the mixer, signed; places in order.
+    /// A word from the butterfly, signed; places in order.
     pub mixed: Wire<In>,
     /// `mixed` is valid.
     pub valid: Signal<In, Bit>,
@@ -46,7 +46,7 @@ kernel_block!(
 );
 
 impl Unfold {
-    /// With the widths of `formats`; words from the mixer have `mixed` bits.
+    /// With the widths of `formats`; words from the butterfly have `mixed` bits.
     pub fn new(formats: &Formats, mixed: usize) -> Self {
         let sizes = Sizes {
             mixed,

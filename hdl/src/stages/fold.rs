@@ -120,21 +120,21 @@ impl Logic for Fold {
         self.quad_address.next = self.frame_quads.value.val();
         self.free.next = self.ending.val() & self.last_part.val();
 
-        self.normalised_later.now.next = self.running.q.val();
-        self.folded_later.now.next = self.normalised_later.then.val();
-        self.normalised_valid.next = self.normalised_later.then.val();
+        self.normalised_later.d.next = self.running.q.val();
+        self.folded_later.d.next = self.normalised_later.q.val();
+        self.normalised_valid.next = self.normalised_later.q.val();
         self.butterfly.quad.next = self.normalised.val();
         self.folded.next = self.butterfly.sums.val();
-        self.folded_valid.next = self.folded_later.then.val();
+        self.folded_valid.next = self.folded_later.q.val();
 
-        self.address.now.next = self.quads.value.val();
-        self.memory.write.next = self.folded_later.then.val().into();
-        self.memory.write_address.next = self.address.then.val();
+        self.address.d.next = self.quads.value.val();
+        self.memory.write.next = self.folded_later.q.val().into();
+        self.memory.write_address.next = self.address.q.val();
         self.memory.write_data.next = self.butterfly.sums.val();
         self.memory.read.next = true;
         self.memory.read_address.next = self.read_address.val();
         self.read_quad.next = self.memory.read_data.val();
-        self.finish.now.next = self.ending.val();
-        self.done.next = self.finish.then.val();
+        self.finish.d.next = self.ending.val();
+        self.done.next = self.finish.q.val();
     }
 }

@@ -140,8 +140,8 @@ impl Logic for Force {
         self.store.write_address.next = self.quads.value.val();
         self.store.write_data.next = self.values.val();
         self.store.read.next = true;
-        self.asked.now.next = self.address.val();
-        self.store.read_address.next = self.asked.then.val();
+        self.asked.d.next = self.address.val();
+        self.store.read_address.next = self.asked.q.val();
 
         self.unit.which.next = self.which.val();
         self.unit.begin_frame.next = self.begin_frame.val();

@@ -42,9 +42,9 @@ pub struct Pass {
     column: Counter,
     running: Dff,
     /// Schedule of the products.
-    pub steps: PassProgram,
+    pub pass_program: PassProgram,
     vectors: Ram,
-    filler: OperandWriter,
+    operand_writer: OperandWriter,
     source: Delay,
     control: Delay,
     valid: BitDelay,
@@ -62,7 +62,7 @@ impl Pass {
     pub fn new(model: &Model) -> Self {
         let formats = &model.formats;
         let quads = formats.quads;
-        let steps = PassProgram::new(model);
+        let pass_program = PassProgram::new(model);
         let lanes = Lanes::new(model);
         let operands = operand_vectors(formats.degree);
         let vectors = |memory: Ram| if operands == 0 { memory.left_out() } else { memory };
@@ -81,20 +81,20 @@ impl Pass {
             damaged: Wire::new(1),
             column: Counter::new(quads),
             running: Default::default(),
-            low_address: Slice::new(steps.operand_address.width(), count_bits(quads)),
+            low_address: Slice::new(pass_program.operand_address.width(), count_bits(quads)),
             vectors: vectors(Ram::new(operands.max(1) * quads, 1, parity_bits))
                 .holding([Holds::Operands(0)])
                 .registered(),
-            filler: OperandWriter::new(
+            operand_writer: OperandWriter::new(
                 operands,
                 &model.cases().iter().map(|case| case.formats.quads).collect::<Vec<_>>(),
             ),
             source: Delay::new(SOURCE_BITS, 2),
             control: Delay::new(control_bits(model), 3),
-            valid: BitDelay::new(3 + steps.latency()),
-            address: Delay::new(steps.coefficient_address.width(), 1),
+            valid: BitDelay::new(3 + pass_program.latency()),
+            address: Delay::new(pass_program.coefficient_address.width(), 1),
             select: OperandSelect::new(formats),
-            steps,
+            pass_program,
             lanes,
             issue: Default::default(),
             column_end: Default::default(),
@@ -107,9 +107,9 @@ impl Logic for Pass {
     fn update(&mut self) {
         self.column.clk.next = self.clk.val();
         self.running.clk.next = self.clk.val();
-        self.steps.clk.next = self.clk.val();
+        self.pass_program.clk.next = self.clk.val();
         self.vectors.clk.next = self.clk.val();
-        self.filler.clk.next = self.clk.val();
+        self.operand_writer.clk.next = self.clk.val();
         self.source.clk.next = self.clk.val();
         self.control.clk.next = self.clk.val();
         self.valid.clk.next = self.clk.val();
@@ -119,43 +119,43 @@ impl Logic for Pass {
         self.valid.rst.next = self.rst.val();
         self.lanes.rst.next = self.rst.val();
 
-        self.steps.which.next = self.which.val();
-        self.filler.which.next = self.which.val();
+        self.pass_program.which.next = self.which.val();
+        self.operand_writer.which.next = self.which.val();
         self.lanes.which.next = self.which.val();
-        self.issue.next = self.running.q.val() & self.steps.ready.val();
-        self.column_end.next = self.issue.val() & self.steps.last.val();
+        self.issue.next = self.running.q.val() & self.pass_program.ready.val();
+        self.column_end.next = self.issue.val() & self.pass_program.last.val();
         self.running.d.next = (self.start.val()
-            | (self.running.q.val() & !(self.column_end.val() & self.steps.ends.val())))
+            | (self.running.q.val() & !(self.column_end.val() & self.pass_program.ends.val())))
             & !self.rst.val();
         self.column.clear.next = self.start.val() | self.column_end.val();
         self.column.enable.next = self.issue.val();
-        self.steps.start.next = self.start.val();
-        self.steps.advance.next = self.column_end.val();
-        self.steps.column.next = self.column.value.val();
-        self.steps.finished.next = self.filler.finished.val();
+        self.pass_program.start.next = self.start.val();
+        self.pass_program.advance.next = self.column_end.val();
+        self.pass_program.column.next = self.column.value.val();
+        self.pass_program.finished.next = self.operand_writer.finished.val();
 
-        self.low_address.word.next = self.steps.operand_address.val();
+        self.low_address.word.next = self.pass_program.operand_address.val();
         self.input_address.next = self.low_address.low.val();
         self.vectors.read.next = true;
-        self.vectors.read_address.next = self.steps.operand_address.val();
-        self.filler.clear.next = self.start.val();
-        self.filler.valid.next = self.vector_valid.val();
-        self.vectors.write.next = self.filler.keep.val().into();
-        self.vectors.write_address.next = self.filler.address.val();
+        self.vectors.read_address.next = self.pass_program.operand_address.val();
+        self.operand_writer.clear.next = self.start.val();
+        self.operand_writer.valid.next = self.vector_valid.val();
+        self.vectors.write.next = self.operand_writer.keep.val().into();
+        self.vectors.write_address.next = self.operand_writer.address.val();
         self.vectors.write_data.next = self.vector_quad.val();
 
-        self.source.now.next = self.steps.source.val();
-        self.select.source.next = self.source.then.val();
+        self.source.d.next = self.pass_program.source.val();
+        self.select.source.next = self.source.q.val();
         self.select.input_quad.next = self.input_quad.val();
         self.select.vector_quad.next = self.vectors.read_data.val();
-        self.control.now.next = self.steps.control.val();
-        self.valid.now.next = self.issue.val();
+        self.control.d.next = self.pass_program.control.val();
+        self.valid.d.next = self.issue.val();
 
-        self.address.now.next = self.steps.coefficient_address.val();
-        self.lanes.address.next = self.address.then.val();
+        self.address.d.next = self.pass_program.coefficient_address.val();
+        self.lanes.address.next = self.address.q.val();
         self.lanes.operands.next = self.select.operands.val();
-        self.lanes.valid.next = self.valid.then.val();
-        self.lanes.control.next = self.control.then.val();
+        self.lanes.valid.next = self.valid.q.val();
+        self.lanes.control.next = self.control.q.val();
         self.quad.next = self.lanes.quad.val();
         self.quad_valid.next = self.lanes.quad_valid.val();
         self.damaged.next = self.lanes.damaged.val();

@@ -24,15 +24,15 @@ use crate::wire::Wire;
 pub struct Receive {
     ports: ReceivePorts,
     scan: Scan,
-    blank: DeadTaxelMask,
-    spread: LaneBroadcast,
+    dead_taxels: DeadTaxelMask,
+    broadcast: LaneBroadcast,
     frame: Ram,
-    gather: FrameStats,
-    gathers: BitDelay,
-    gathered_part: Delay,
-    gathered_code: Delay,
-    gathered_address: Delay,
-    gathered_mask: Delay,
+    stats: FrameStats,
+    stats_enable: BitDelay,
+    stats_part: Delay,
+    stats_code: Delay,
+    stats_address: Delay,
+    stats_mask: Delay,
     clears: Dff,
     whole: Dff,
     complete: Dff,
@@ -126,15 +126,15 @@ impl Receive {
         Receive {
             ports: ReceivePorts::new(std::slice::from_ref(model)),
             scan: Scan::new(std::slice::from_ref(model)),
-            blank: DeadTaxelMask::new(bits, taxels, &model.dead),
-            spread: LaneBroadcast::new(bits),
+            dead_taxels: DeadTaxelMask::new(bits, taxels, &model.dead),
+            broadcast: LaneBroadcast::new(bits),
             frame: Ram::new(quads, 4, bits).holding((0..4).map(|lane| Holds::Frame { case, lane })).registered(),
-            gather: FrameStats::new(bits, model.noise_floor, count),
-            gathers: BitDelay::new(1),
-            gathered_part: Delay::new(count_bits(count), 1),
-            gathered_code: Delay::new(bits, 1),
-            gathered_address: Delay::new(count_bits(quads), 1),
-            gathered_mask: Delay::new(4, 1),
+            stats: FrameStats::new(bits, model.noise_floor, count),
+            stats_enable: BitDelay::new(1),
+            stats_part: Delay::new(count_bits(count), 1),
+            stats_code: Delay::new(bits, 1),
+            stats_address: Delay::new(count_bits(quads), 1),
+            stats_mask: Delay::new(4, 1),
             clears: Default::default(),
             whole: Default::default(),
             complete: Default::default(),
@@ -149,15 +149,15 @@ impl Logic for Receive {
     #[hdl_gen]
     fn update(&mut self) {
         self.scan.clk.next = self.clk.val();
-        self.blank.clk.next = self.clk.val();
+        self.dead_taxels.clk.next = self.clk.val();
         self.frame.clk.next = self.clk.val();
-        self.gather.clk.next = self.clk.val();
-        self.gathers.clk.next = self.clk.val();
-        self.gathers.rst.next = self.rst.val();
-        self.gathered_part.clk.next = self.clk.val();
-        self.gathered_code.clk.next = self.clk.val();
-        self.gathered_address.clk.next = self.clk.val();
-        self.gathered_mask.clk.next = self.clk.val();
+        self.stats.clk.next = self.clk.val();
+        self.stats_enable.clk.next = self.clk.val();
+        self.stats_enable.rst.next = self.rst.val();
+        self.stats_part.clk.next = self.clk.val();
+        self.stats_code.clk.next = self.clk.val();
+        self.stats_address.clk.next = self.clk.val();
+        self.stats_mask.clk.next = self.clk.val();
         self.clears.clk.next = self.clk.val();
         self.whole.clk.next = self.clk.val();
         self.complete.clk.next = self.clk.val();
@@ -172,34 +172,34 @@ impl Logic for Receive {
         self.scan.which.next = false.into();
         self.scan.enable.next = self.taken.val();
         self.scan.clear.next = self.rst.val() | self.early.val();
-        self.blank.enable.next = self.taken.val();
-        self.blank.clear.next = self.rst.val() | self.early.val();
-        self.blank.word.next = self.s_axis_tdata.val();
-        self.taken_word.next = self.blank.kept.val();
-        self.gathered_code.now.next = self.blank.kept.val();
-        self.gathered_mask.now.next = self.scan.mask.val();
-        self.gathered_address.now.next = self.scan.address.val();
-        self.spread.word.next = self.gathered_code.then.val();
-        self.spread.mask.next = self.gathered_mask.then.val();
-        self.spread.enable.next = self.gathers.then.val();
-        self.frame.write_address.next = self.gathered_address.then.val();
-        self.frame.write_data.next = self.spread.quad.val();
-        self.frame.write.next = self.spread.write.val();
+        self.dead_taxels.enable.next = self.taken.val();
+        self.dead_taxels.clear.next = self.rst.val() | self.early.val();
+        self.dead_taxels.word.next = self.s_axis_tdata.val();
+        self.taken_word.next = self.dead_taxels.kept.val();
+        self.stats_code.d.next = self.dead_taxels.kept.val();
+        self.stats_mask.d.next = self.scan.mask.val();
+        self.stats_address.d.next = self.scan.address.val();
+        self.broadcast.word.next = self.stats_code.q.val();
+        self.broadcast.mask.next = self.stats_mask.q.val();
+        self.broadcast.enable.next = self.stats_enable.q.val();
+        self.frame.write_address.next = self.stats_address.q.val();
+        self.frame.write_data.next = self.broadcast.quad.val();
+        self.frame.write.next = self.broadcast.write.val();
         self.frame.read.next = true;
         self.frame.read_address.next = self.quad_address.val();
         self.quad.next = self.frame.read_data.val();
 
-        self.gathers.now.next = self.taken.val() & !self.early.val();
-        self.gathered_part.now.next = self.scan.part.val();
-        self.gather.accept.next = self.gathers.then.val();
+        self.stats_enable.d.next = self.taken.val() & !self.early.val();
+        self.stats_part.d.next = self.scan.part.val();
+        self.stats.accept.next = self.stats_enable.q.val();
         self.clears.d.next = self.rst.val() | self.free.val() | self.early.val();
-        self.gather.clear.next = self.clears.q.val();
-        self.gather.part.next = self.gathered_part.then.val();
-        self.gather.select.next = self.part.val();
-        self.gather.code.next = self.gathered_code.then.val();
-        self.magnitude.next = self.gather.magnitude.val();
-        self.positive.next = self.gather.positive.val();
-        self.negative.next = self.gather.negative.val();
+        self.stats.clear.next = self.clears.q.val();
+        self.stats.part.next = self.stats_part.q.val();
+        self.stats.select.next = self.part.val();
+        self.stats.code.next = self.stats_code.q.val();
+        self.magnitude.next = self.stats.magnitude.val();
+        self.positive.next = self.stats.positive.val();
+        self.negative.next = self.stats.negative.val();
 
         self.full.next = self.complete.q.val();
         self.complete.d.next = self.whole.q.val() & !self.free.val() & !self.rst.val();

@@ -111,46 +111,46 @@ impl Logic for Rescale {
         self.operands_later.rst.next = self.rst.val();
 
         comment!("Registered; the first row comes many cycles later");
-        self.started.now.next = self.start.val();
+        self.started.d.next = self.start.val();
         self.collected.next = self.collecting.q.val() & self.quad_valid.val();
-        self.collecting.d.next = (self.started.then.val()
+        self.collecting.d.next = (self.started.q.val()
             | (self.collecting.q.val() & !(self.quad_valid.val() & self.rows.last.val())))
             & !self.rst.val();
         self.rows.which.next = self.which.val();
         self.replay.which.next = self.which.val();
-        self.rows.clear.next = self.started.then.val();
+        self.rows.clear.next = self.started.q.val();
         self.rows.enable.next = self.collected.val();
         self.raw.write.next = self.collected.val().into();
         self.raw.write_address.next = self.rows.value.val();
         self.raw.write_data.next = self.quad.val();
-        self.length.clear.next = self.started.then.val();
+        self.length.clear.next = self.started.q.val();
         self.length.accept.next = self.collected.val();
         self.length.quad.next = self.quad.val();
 
         self.replaying.d.next = ((self.collected.val() & self.rows.last.val())
             | (self.replaying.q.val() & !self.replay.last.val()))
             & !self.rst.val();
-        self.replay.clear.next = self.started.then.val();
+        self.replay.clear.next = self.started.q.val();
         self.replay.enable.next = self.replaying.q.val();
         self.raw.read.next = true;
         self.raw.read_address.next = self.replay.value.val();
-        self.read.now.next = self.replaying.q.val();
+        self.read.d.next = self.replaying.q.val();
 
-        self.enters.next = self.read.then.val() | (self.quad_valid.val() & !self.collecting.q.val());
-        self.rescaler.clear.next = self.started.then.val();
+        self.enters.next = self.read.q.val() | (self.quad_valid.val() & !self.collecting.q.val());
+        self.rescaler.clear.next = self.started.q.val();
         self.rescaler.valid.next = self.enters.val();
-        self.rescaler.measured.next = self.read.then.val();
+        self.rescaler.measured.next = self.read.q.val();
         self.rescaler.shift.next = self.length.shift.val();
         self.rescaler.quad.next = self.quad.val();
-        if self.read.then.val() {
+        if self.read.q.val() {
             self.rescaler.quad.next = self.raw.read_data.val();
         }
-        self.words_later.now.next = self.enters.val();
-        self.operands_later.now.next = self.words_later.then.val();
+        self.words_later.d.next = self.enters.val();
+        self.operands_later.d.next = self.words_later.q.val();
         self.words.next = self.rescaler.words.val();
-        self.words_valid.next = self.words_later.then.val();
+        self.words_valid.next = self.words_later.q.val();
         self.operands.next = self.rescaler.operands.val();
-        self.operands_valid.next = self.operands_later.then.val();
+        self.operands_valid.next = self.operands_later.q.val();
         self.shift.next = self.length.shift.val();
         self.saturations.next = self.rescaler.saturations.val();
     }

@@ -1,8 +1,8 @@
 //! Stage `search`: the μ search over the polynomials of all taxels, sweep by sweep.
 //!
-//! `walk` sets up a sweep. One quad per cycle passes memory (2 cycles), Taylor shift (4) and goes back to memory, and
+//! `sequencer` sets up a sweep. One quad per cycle passes memory (2 cycles), Taylor shift (4) and goes back to memory, and
 //! passes candidates (2) and score (6). The sum polynomial passes the same blocks beside the first quad and is held, so
-//! that Σp is available when the first taxel is scored. `weigh` computes the bias of the scores from it, `judge`
+//! that Σp is available when the first taxel is scored. `bias` computes the bias of the scores from it, `best`
 //! compares (6). Coarse sweeps follow one another without a gap; a halving is set up when the previous sweep has been
 //! compared. The last sweep only moves to the best position: its constant coefficients are p(μ*).
 
@@ -27,24 +27,24 @@ const MOVED: usize = STORE_LATENCY + TAYLOR_LATENCY;
 #[derive(LogicBlock)]
 pub struct Search {
     ports: SearchPorts,
-    walk: SearchSequencer,
-    weigh: ScoreBias,
-    judge: BestCandidate,
+    sequencer: SearchSequencer,
+    bias: ScoreBias,
+    best: BestCandidate,
     store: Store,
     taylor: Taylor,
     candidates: Candidates,
     scores: Score,
-    counts: LaneMask,
+    lane_mask: LaneMask,
     sum: Sum,
     sum_taylor: Taylor,
     sum_candidates: Candidates,
-    fill_counts: LaneMask,
+    fill_mask: LaneMask,
     constants: Slice,
     quads: CaseCounter,
     period: CaseCounter,
     counting: Dff,
     began: BitDelay,
-    judged_then: BitDelay,
+    compared_later: BitDelay,
     go: BitDelay,
     moved: BitDelay,
     sum_moved: BitDelay,
@@ -53,7 +53,7 @@ pub struct Search {
     sum_outcome: BitDelay,
     scored: BitDelay,
     first: BitDelay,
-    weighs: BitDelay,
+    bias_start: BitDelay,
     totals: BitDelay,
     finish: BitDelay,
     step: Delay,
@@ -95,17 +95,17 @@ ports! {
         pub values_begin: Signal<Out, Bit>,
         /// All values have been output; high for one cycle.
         pub done: Signal<Out, Bit>,
-        /// Best position, x, in grid steps of the level, signed; valid with `judged` and `settled`.
+        /// Best position, x, in grid steps of the level, signed; valid with `compared` and `settled`.
         pub best_x: Wire<Out>,
-        /// Best position, y, in grid steps of the level, signed; valid with `judged` and `settled`.
+        /// Best position, y, in grid steps of the level, signed; valid with `compared` and `settled`.
         pub best_y: Wire<Out>,
-        /// Score of the best candidate, signed, 2^−6; valid with `judged` and `settled`.
+        /// Score of the best candidate, signed, 2^−6; valid with `compared` and `settled`.
         pub score: Wire<Out>,
         /// A candidate was found; valid with `settled`.
         pub found: Signal<Out, Bit>,
         /// The candidates of a sweep have been compared; high for one cycle.
-        pub judged: Signal<Out, Bit>,
-        /// A candidate was taken at this level; valid with `judged`.
+        pub compared: Signal<Out, Bit>,
+        /// A candidate was taken at this level; valid with `compared`.
         pub taken: Signal<Out, Bit>,
     }
 }
@@ -133,7 +133,7 @@ impl SearchPorts {
             best_y: Wire::new(position_bits()),
             score: Wire::new(formats.score_bits as usize),
             found: Default::default(),
-            judged: Default::default(),
+            compared: Default::default(),
             taken: Default::default(),
         }
     }
@@ -161,26 +161,26 @@ impl Search {
         let value = 4 * formats.search_bits[0] as usize;
         Search {
             ports: SearchPorts::new(model),
-            walk: SearchSequencer::new(quads),
-            weigh: ScoreBias::new(formats, &taxel_counts),
-            judge: BestCandidate::new(formats, largest(&taxel_counts)),
+            sequencer: SearchSequencer::new(quads),
+            bias: ScoreBias::new(formats, &taxel_counts),
+            best: BestCandidate::new(formats, largest(&taxel_counts)),
             constants: Slice::new(taxels.bits(), value),
             store: Store::new(taxels.clone(), quads, fill_bits, apart),
             taylor: Taylor::new(&taxels),
             candidates: Candidates::new(&taxels),
             scores: Score::new(formats),
-            counts: LaneMask::new(&layouts),
+            lane_mask: LaneMask::new(&layouts),
             sum: Sum::new(&sums, quads, fill_bits, apart),
             sum_taylor: Taylor::new(&sums),
             sum_candidates: Candidates::new(&sums),
-            fill_counts: LaneMask::new(&layouts),
+            fill_mask: LaneMask::new(&layouts),
             quads: CaseCounter::new(&limits),
             period: CaseCounter::new(&periods),
             counting: Default::default(),
             // The result of a comparison and the move computed from it are registered before a sweep is set up.
             // `set_up` is a register too, because it drives the whole search.
             began: BitDelay::new(SET_UP as usize - 1),
-            judged_then: BitDelay::new(SET_UP as usize - 1),
+            compared_later: BitDelay::new(SET_UP as usize - 1),
             go: BitDelay::new(1),
             moved: BitDelay::new(MOVED - 1),
             sum_moved: BitDelay::new(MOVED - 1),
@@ -190,7 +190,7 @@ impl Search {
             scored: BitDelay::new(CANDIDATES_LATENCY),
             first: BitDelay::new(MOVED + CANDIDATES_LATENCY),
             // One cycle after the first quad's candidates, so that a sweep is compared before the next is weighed.
-            weighs: BitDelay::new(MOVED + CANDIDATES_LATENCY + 1),
+            bias_start: BitDelay::new(MOVED + CANDIDATES_LATENCY + 1),
             totals: BitDelay::new(MOVED + CANDIDATES_LATENCY + SCORE_LATENCY + padding),
             finish: BitDelay::new(MOVED + 1),
             step: Delay::new(5, STORE_LATENCY),
@@ -207,12 +207,12 @@ impl Search {
 impl Logic for Search {
     #[hdl_gen]
     fn update(&mut self) {
-        self.walk.clk.next = self.clk.val();
-        self.weigh.clk.next = self.clk.val();
-        self.judge.clk.next = self.clk.val();
+        self.sequencer.clk.next = self.clk.val();
+        self.bias.clk.next = self.clk.val();
+        self.best.clk.next = self.clk.val();
         self.period.clk.next = self.clk.val();
         self.first.clk.next = self.clk.val();
-        self.weighs.clk.next = self.clk.val();
+        self.bias_start.clk.next = self.clk.val();
         self.step.clk.next = self.clk.val();
         self.target.clk.next = self.clk.val();
         self.store.clk.next = self.clk.val();
@@ -232,7 +232,7 @@ impl Logic for Search {
         self.sum_outcome.clk.next = self.clk.val();
         self.sum_outcome.rst.next = self.rst.val();
         self.began.clk.next = self.clk.val();
-        self.judged_then.clk.next = self.clk.val();
+        self.compared_later.clk.next = self.clk.val();
         self.go.clk.next = self.clk.val();
         self.moved.clk.next = self.clk.val();
         self.sum_moved.clk.next = self.clk.val();
@@ -241,13 +241,13 @@ impl Logic for Search {
         self.finish.clk.next = self.clk.val();
         self.moved_address.clk.next = self.clk.val();
         self.scored_address.clk.next = self.clk.val();
-        self.walk.rst.next = self.rst.val();
-        self.weigh.rst.next = self.rst.val();
-        self.judge.rst.next = self.rst.val();
+        self.sequencer.rst.next = self.rst.val();
+        self.bias.rst.next = self.rst.val();
+        self.best.rst.next = self.rst.val();
         self.first.rst.next = self.rst.val();
-        self.weighs.rst.next = self.rst.val();
+        self.bias_start.rst.next = self.rst.val();
         self.began.rst.next = self.rst.val();
-        self.judged_then.rst.next = self.rst.val();
+        self.compared_later.rst.next = self.rst.val();
         self.go.rst.next = self.rst.val();
         self.moved.rst.next = self.rst.val();
         self.sum_moved.rst.next = self.rst.val();
@@ -255,9 +255,9 @@ impl Logic for Search {
         self.totals.rst.next = self.rst.val();
         self.finish.rst.next = self.rst.val();
 
-        self.weigh.which.next = self.which.val();
-        self.counts.which.next = self.which.val();
-        self.fill_counts.which.next = self.which.val();
+        self.bias.which.next = self.which.val();
+        self.lane_mask.which.next = self.which.val();
+        self.fill_mask.which.next = self.which.val();
         self.quads.which.next = self.which.val();
         self.period.which.next = self.which.val();
 
@@ -266,32 +266,32 @@ impl Logic for Search {
         self.store.fill_index.next = self.fill_index.val();
         self.store.fill_address.next = self.fill_address.val();
         self.store.fill_quad.next = self.fill_quad.val();
-        self.fill_counts.address.next = self.fill_address.val();
+        self.fill_mask.address.next = self.fill_address.val();
         self.sum.fill.next = self.fill.val();
         self.sum.fill_index.next = self.fill_index.val();
         self.sum.fill_address.next = self.fill_address.val();
-        self.sum.fill_mask.next = self.fill_counts.mask.val();
+        self.sum.fill_mask.next = self.fill_mask.mask.val();
         self.sum.fill_quad.next = self.fill_quad.val();
 
         comment!("A sweep is set up and starts one cycle later");
-        self.walk.begin_frame.next = self.start.val();
-        self.walk.enabled.next = self.enabled.val();
-        self.judge.begin_frame.next = self.start.val();
-        self.began.now.next = self.start.val();
+        self.sequencer.begin_frame.next = self.start.val();
+        self.sequencer.enabled.next = self.enabled.val();
+        self.best.begin_frame.next = self.start.val();
+        self.began.d.next = self.start.val();
         self.set_up.d.next =
-            (self.began.then.val() | self.judged_then.then.val() | (self.walk.chains.val() & self.period.last.val()))
+            (self.began.q.val() | self.compared_later.q.val() | (self.sequencer.chains.val() & self.period.last.val()))
                 & !self.rst.val();
-        self.judged_then.now.next = self.judge.done.val() & self.judge.closes.val();
+        self.compared_later.d.next = self.best.done.val() & self.best.closes.val();
         self.period.clear.next = self.set_up.q.val();
         self.period.enable.next = true;
-        self.walk.set_up.next = self.set_up.q.val();
-        self.walk.judged.next = self.judge.done.val();
-        self.walk.improved.next = self.judge.improved.val();
-        self.walk.judged_sweep.next = self.judge.judged.val();
-        self.walk.best_x.next = self.judge.best_x.val();
-        self.walk.best_y.next = self.judge.best_y.val();
-        self.judge.halve.next = self.set_up.q.val() & self.walk.next_halves.val();
-        self.go.now.next = self.set_up.q.val();
+        self.sequencer.set_up.next = self.set_up.q.val();
+        self.sequencer.compared.next = self.best.done.val();
+        self.sequencer.improved.next = self.best.improved.val();
+        self.sequencer.compared_sweep.next = self.best.compared.val();
+        self.sequencer.best_x.next = self.best.best_x.val();
+        self.sequencer.best_y.next = self.best.best_y.val();
+        self.best.halve.next = self.set_up.q.val() & self.sequencer.next_halves.val();
+        self.go.d.next = self.set_up.q.val();
 
         comment!("Quads pass memory, Taylor shift and candidates");
         self.quad_end.next = self.counting.q.val() & self.quads.last.val();
@@ -299,72 +299,72 @@ impl Logic for Search {
             (self.set_up.q.val() | (self.counting.q.val() & !self.quads.last.val())) & !self.rst.val();
         self.quads.clear.next = self.set_up.q.val();
         self.quads.enable.next = self.counting.q.val();
-        self.step.now.next = self.walk.step.val();
-        self.target.now.next = self.walk.target.val();
-        self.store.read_buffer.next = self.walk.source.val();
+        self.step.d.next = self.sequencer.step.val();
+        self.target.d.next = self.sequencer.target.val();
+        self.store.read_buffer.next = self.sequencer.source.val();
         self.store.begins.next = self.set_up.q.val();
         self.store.counts.next = self.counting.q.val();
-        self.store.next_base.next = self.walk.next_base.val();
+        self.store.next_base.next = self.sequencer.next_base.val();
         self.store.read_address.next = self.quads.value.val();
         self.taylor.word.next = self.store.read_data.val();
-        self.taylor.step.next = self.step.then.val();
-        self.moved.now.next = self.counting.q.val();
-        self.trial.now.next = self.moved.then.val() & !self.walk.last.val();
-        self.outcome.now.next = self.moved.then.val() & self.walk.last.val();
-        self.moved_address.now.next = self.quads.value.val();
-        self.store.write.next = self.trial.then.val();
-        self.store.write_buffer.next = self.target.then.val();
-        self.store.write_address.next = self.moved_address.then.val();
+        self.taylor.step.next = self.step.q.val();
+        self.moved.d.next = self.counting.q.val();
+        self.trial.d.next = self.moved.q.val() & !self.sequencer.last.val();
+        self.outcome.d.next = self.moved.q.val() & self.sequencer.last.val();
+        self.moved_address.d.next = self.quads.value.val();
+        self.store.write.next = self.trial.q.val();
+        self.store.write_buffer.next = self.target.q.val();
+        self.store.write_address.next = self.moved_address.q.val();
         self.store.write_data.next = self.taylor.moved.val();
         self.candidates.word.next = self.taylor.moved.val();
 
         comment!("The sum polynomial passes the same blocks");
-        self.sum.read.next = self.go.then.val();
-        self.sum.read_buffer.next = self.walk.source.val();
+        self.sum.read.next = self.go.q.val();
+        self.sum.read_buffer.next = self.sequencer.source.val();
         self.sum_taylor.word.next = self.sum.word.val();
-        self.sum_taylor.step.next = self.step.then.val();
-        self.sum_moved.now.next = self.go.then.val();
-        self.sum_outcome.now.next = self.sum_moved.then.val() & self.walk.last.val();
-        self.sum.write.next = self.sum_moved.then.val() & !self.walk.last.val();
-        self.sum.write_buffer.next = self.target.then.val();
+        self.sum_taylor.step.next = self.step.q.val();
+        self.sum_moved.d.next = self.go.q.val();
+        self.sum_outcome.d.next = self.sum_moved.q.val() & self.sequencer.last.val();
+        self.sum.write.next = self.sum_moved.q.val() & !self.sequencer.last.val();
+        self.sum.write_buffer.next = self.target.q.val();
         self.sum.write_data.next = self.sum_taylor.moved.val();
         self.sum_candidates.word.next = self.sum_taylor.moved.val();
 
         comment!("Scores and their comparison");
-        self.scored.now.next = self.trial.then.val();
-        self.scored_address.now.next = self.moved_address.then.val();
-        self.counts.address.next = self.scored_address.then.val();
-        self.first.now.next = self.go.then.val();
-        self.scores.first.next = self.first.then.val();
-        self.scores.valid.next = self.scored.then.val();
-        self.scores.mask.next = self.counts.mask.val();
+        self.scored.d.next = self.trial.q.val();
+        self.scored_address.d.next = self.moved_address.q.val();
+        self.lane_mask.address.next = self.scored_address.q.val();
+        self.first.d.next = self.go.q.val();
+        self.scores.first.next = self.first.q.val();
+        self.scores.valid.next = self.scored.q.val();
+        self.scores.mask.next = self.lane_mask.mask.val();
         self.scores.values.next = self.candidates.values.val();
         self.scores.sums.next = self.sum_candidates.values.val();
-        self.totals.now.next = self.quad_end.val() & !self.walk.last.val();
-        self.weighs.now.next = self.go.then.val() & !self.walk.last.val();
-        self.weigh.start.next = self.weighs.then.val();
-        self.weigh.sweep.next = self.walk.sweep.val();
-        self.weigh.radius.next = self.walk.radius.val();
-        self.weigh.sums.next = self.sum_candidates.values.val();
-        self.judge.start.next = self.totals.then.val();
-        self.judge.totals.next = self.scores.totals.val();
-        self.judge.weights.next = self.weigh.weights.val();
-        self.judge.eligible.next = self.weigh.eligible.val();
-        self.judge.sweep.next = self.weigh.weighed.val();
+        self.totals.d.next = self.quad_end.val() & !self.sequencer.last.val();
+        self.bias_start.d.next = self.go.q.val() & !self.sequencer.last.val();
+        self.bias.start.next = self.bias_start.q.val();
+        self.bias.sweep.next = self.sequencer.sweep.val();
+        self.bias.radius.next = self.sequencer.radius.val();
+        self.bias.sums.next = self.sum_candidates.values.val();
+        self.best.start.next = self.totals.q.val();
+        self.best.totals.next = self.scores.totals.val();
+        self.best.weights.next = self.bias.weights.val();
+        self.best.eligible.next = self.bias.eligible.val();
+        self.best.sweep.next = self.bias.weighed.val();
 
         comment!("The constant terms of the last sweep are the values");
         self.constants.word.next = self.taylor.moved.val();
         self.values.next = self.constants.low.val();
-        self.values_valid.next = self.outcome.then.val();
-        self.settled.next = self.go.then.val() & self.walk.last.val();
-        self.values_begin.next = self.sum_outcome.then.val();
-        self.finish.now.next = self.quad_end.val() & self.walk.last.val();
-        self.done.next = self.finish.then.val();
-        self.best_x.next = self.judge.best_x.val();
-        self.best_y.next = self.judge.best_y.val();
-        self.score.next = self.judge.score.val();
-        self.found.next = self.judge.found.val();
-        self.judged.next = self.judge.done.val();
-        self.taken.next = self.judge.taken.val();
+        self.values_valid.next = self.outcome.q.val();
+        self.settled.next = self.go.q.val() & self.sequencer.last.val();
+        self.values_begin.next = self.sum_outcome.q.val();
+        self.finish.d.next = self.quad_end.val() & self.sequencer.last.val();
+        self.done.next = self.finish.q.val();
+        self.best_x.next = self.best.best_x.val();
+        self.best_y.next = self.best.best_y.val();
+        self.score.next = self.best.score.val();
+        self.found.next = self.best.found.val();
+        self.compared.next = self.best.done.val();
+        self.taken.next = self.best.taken.val();
     }
 }

@@ -121,7 +121,7 @@ impl Logic for Send {
         comment!("Registered once to shorten the route from the output");
         self.out.clk.next = self.clk.val();
         self.out.rst.next = self.rst.val();
-        self.out.now.next = self.m_axis_tvalid.val() & self.m_axis_tready.val() & self.m_axis_tlast.val();
-        self.done.next = self.out.then.val();
+        self.out.d.next = self.m_axis_tvalid.val() & self.m_axis_tready.val() & self.m_axis_tlast.val();
+        self.done.next = self.out.q.val();
     }
 }

@@ -35,7 +35,7 @@ pub struct Unfold {
     quads: CaseCounter,
     vectors: Counter,
     unfolder: Unfolder,
-    placer: TransposedPlace,
+    transposed: TransposedPlace,
     index_first: Delay,
     index_later: Delay,
     address_later: Delay,
@@ -68,7 +68,7 @@ impl Unfold {
             quads: CaseCounter::new(&quads),
             vectors: Counter::new(count),
             unfolder: Unfolder::new(bits, count),
-            placer: TransposedPlace::new(model.layout(), bits + 2, count, across),
+            transposed: TransposedPlace::new(model.layout(), bits + 2, count, across),
             index_first: Delay::new(index, 1),
             index_later: Delay::new(index, 1),
             address_later: Delay::new(address, 2),
@@ -100,20 +100,20 @@ impl Logic for Unfold {
         self.vectors.clear.next = self.start.val();
         self.vectors.enable.next = self.quad_end.val();
         self.unfolder.quad.next = self.words.val();
-        self.index_first.now.next = self.vectors.value.val();
-        self.unfolder.index.next = self.index_first.then.val();
-        self.index_later.now.next = self.index_first.then.val();
-        self.address_later.now.next = self.quads.value.val();
-        self.valid_later.now.next = self.words_valid.val();
+        self.index_first.d.next = self.vectors.value.val();
+        self.unfolder.index.next = self.index_first.q.val();
+        self.index_later.d.next = self.index_first.q.val();
+        self.address_later.d.next = self.quads.value.val();
+        self.valid_later.d.next = self.words_valid.val();
 
-        self.placer.index.next = self.index_later.then.val();
-        self.placer.address.next = self.address_later.then.val();
-        self.placer.quad.next = self.unfolder.taxels.val();
-        self.taxels.next = self.placer.taxels.val();
-        self.taxels_valid.next = self.valid_later.then.val();
-        self.index.next = self.index_later.then.val();
-        self.address.next = self.placer.placed.val();
-        self.finish.now.next = self.quad_end.val() & self.vectors.last.val();
-        self.done.next = self.finish.then.val();
+        self.transposed.index.next = self.index_later.q.val();
+        self.transposed.address.next = self.address_later.q.val();
+        self.transposed.quad.next = self.unfolder.taxels.val();
+        self.taxels.next = self.transposed.taxels.val();
+        self.taxels_valid.next = self.valid_later.q.val();
+        self.index.next = self.index_later.q.val();
+        self.address.next = self.transposed.placed.val();
+        self.finish.d.next = self.quad_end.val() & self.vectors.last.val();
+        self.done.next = self.finish.q.val();
     }
 }

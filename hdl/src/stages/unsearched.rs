@@ -28,7 +28,7 @@ kernel_block!(
     clock clk,
     inputs [rst, which, fill_quad, fill, fill_index, fill_address, start, enabled],
     outputs [
-        values, values_valid, settled, values_begin, done, best_x, best_y, score, found, judged, taken,
+        values, values_valid, settled, values_begin, done, best_x, best_y, score, found, compared, taken,
     ]
 );
 
@@ -62,7 +62,7 @@ fn kernel(ports: &SearchPorts) -> Kernel {
         ("best_y", ports.best_y.width()),
         ("score", ports.score.width()),
         ("found", 1),
-        ("judged", 1),
+        ("compared", 1),
         ("taken", 1),
     ] {
         k.wire(name, k.constant(bits, 0));

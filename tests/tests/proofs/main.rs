@@ -15,7 +15,7 @@
 //! | `slip.v`: each byte is sent once and can be decoded | the link's encoder |
 //! | `rescale.v`: rounds half up, saturates, counts saturations | `rescaler` |
 //! | `replay.v`: rows wait for their shift, then leave once, in order | `rescale` and its memory |
-//! | `filler.v`: addresses are inside the operand memory; "complete" means complete | `pass`'s filler |
+//! | `operand_writer.v`: addresses are inside the operand memory; "complete" means complete | `pass`'s operand writer |
 //! | `packer.v`: header, words, CRC between two ENDs; an offered byte stays | the link's packer |
 //! | `roundtrip.v`: decoding restores the encoded bytes, with or without IDLE bytes in between | the link's encoder and decoder |
 //! | `sums.v`: forces are accepted, four words sent, the status passed on | the link's resultants |
@@ -113,7 +113,7 @@ fn receive_holds_whole_frames() {
     let bits = count_bits(quads.len());
     let place = |k: usize| format!("      {}'d{k}: own = 8'd{};\n", bits + 2, quads.taxel(k / 4, k % 4));
     let generated = &generate(&prepared()).unwrap();
-    let defects = [("dead ? 9'd0 : word", "word"), ("frame__write = spread__write;", "frame__write = scan__mask;")];
+    let defects = [("dead ? 9'd0 : word", "word"), ("frame__write = broadcast__write;", "frame__write = scan__mask;")];
     let given = vec![
         ("PLACES", (0..4 * quads.len()).map(place).collect()),
         ("DEAD", format!("count == 8'd{DEAD}")),

@@ -47,7 +47,7 @@ fn rows_that_wait_for_their_shift_come_out_in_order() {
     let defects = [
         ("replay__enable = replaying__q;", "replay__enable = 1'b0;"),
         ("raw__write_address = rows__value;", "raw__write_address = ~rows__value;"),
-        ("enters = read__then || quad_valid && !collecting__q;", "enters = read__then || quad_valid;"),
+        ("enters = read__q || quad_valid && !collecting__q;", "enters = read__q || quad_valid;"),
     ];
     Proof { generated: &generated, property: "replay.v", given, defects: &defects, open_products: false }.run();
 }
@@ -80,7 +80,7 @@ fn operand_vectors_stay_inside_their_memory() {
         ("QUADS", number(quads)),
     ];
     let (generated, defects) = (&generate(&model).unwrap(), &[("keep = valid && finished != 1'b1;", "keep = valid;")]);
-    Proof { generated, property: "filler.v", given, defects, open_products: false }.run();
+    Proof { generated, property: "operand_writer.v", given, defects, open_products: false }.run();
 }
 
 #[test]

@@ -60,6 +60,29 @@ impl Logic for Ring {
     }
 }
 
+/// An instance with a name that tools refuse.
+#[derive(LogicBlock, Default)]
+struct Named {
+    a: Signal<In, Bit>,
+    b: Signal<Out, Bit>,
+    program: Inverter,
+}
+
+impl Logic for Named {
+    #[hdl_gen]
+    fn update(&mut self) {
+        self.program.a.next = self.a.val();
+        self.b.next = self.program.b.val();
+    }
+}
+
+#[test]
+fn an_instance_named_by_a_keyword_is_an_error() {
+    let error = Hierarchy::of(&Named::default()).check().unwrap_err();
+    assert!(error.to_string().contains("program"), "{error}");
+    assert!(matches!(error, KernelError::Name { .. }));
+}
+
 #[test]
 fn a_block_that_connects_others_is_a_module_with_instances() {
     let hierarchy = Hierarchy::of(&Chain::default());

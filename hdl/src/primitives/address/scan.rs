@@ -33,7 +33,7 @@ pub struct Scan {
     part_col: CaseCounter,
     row: CaseCounter,
     part_row: CaseCounter,
-    mirror: QuadAddress,
+    quad_address: QuadAddress,
     line_end: Signal<Local, Bit>,
     part_end: Signal<Local, Bit>,
 }
@@ -42,22 +42,22 @@ impl Scan {
     /// For the subarrays of each of `cases`.
     pub fn new(cases: &[Model]) -> Self {
         let each = |of: &dyn Fn(&Model) -> usize| CaseCounter::new(&cases.iter().map(of).collect::<Vec<_>>());
-        let mirror = QuadAddress::new(cases);
+        let quad_address = QuadAddress::new(cases);
         Scan {
             clk: Default::default(),
             which: Wire::new(count_bits(cases.len())),
             clear: Default::default(),
             enable: Default::default(),
             last: Default::default(),
-            address: Wire::new(mirror.address.width()),
-            part: Wire::new(mirror.part.width()),
+            address: Wire::new(quad_address.address.width()),
+            part: Wire::new(quad_address.part.width()),
             lane: Wire::new(2),
             mask: Wire::new(4),
             col: each(&|case| case.layout().cols),
             part_col: each(&|case| case.grid().cols),
             row: each(&|case| case.layout().rows),
             part_row: each(&|case| case.grid().rows),
-            mirror,
+            quad_address,
             line_end: Default::default(),
             part_end: Default::default(),
         }
@@ -80,7 +80,7 @@ impl Logic for Scan {
         self.part_col.which.next = self.which.val();
         self.row.which.next = self.which.val();
         self.part_row.which.next = self.which.val();
-        self.mirror.which.next = self.which.val();
+        self.quad_address.which.next = self.which.val();
         self.line_end.next = self.enable.val() & self.col.last.val() & self.part_col.last.val();
         self.part_end.next = self.line_end.val() & self.row.last.val();
         self.col.enable.next = self.enable.val();
@@ -90,13 +90,13 @@ impl Logic for Scan {
         self.last.next =
             self.col.last.val() & self.part_col.last.val() & self.row.last.val() & self.part_row.last.val();
 
-        self.mirror.row.next = self.row.value.val();
-        self.mirror.col.next = self.col.value.val();
-        self.mirror.part_row.next = self.part_row.value.val();
-        self.mirror.part_col.next = self.part_col.value.val();
-        self.address.next = self.mirror.address.val();
-        self.part.next = self.mirror.part.val();
-        self.lane.next = self.mirror.lane.val();
-        self.mask.next = self.mirror.mask.val();
+        self.quad_address.row.next = self.row.value.val();
+        self.quad_address.col.next = self.col.value.val();
+        self.quad_address.part_row.next = self.part_row.value.val();
+        self.quad_address.part_col.next = self.part_col.value.val();
+        self.address.next = self.quad_address.address.val();
+        self.part.next = self.quad_address.part.val();
+        self.lane.next = self.quad_address.lane.val();
+        self.mask.next = self.quad_address.mask.val();
     }
 }

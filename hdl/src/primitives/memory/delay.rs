@@ -12,28 +12,28 @@ pub struct Delay {
     /// Clock; registers change on its rising edge.
     pub clk: Signal<In, Clock>,
     /// Input word.
-    pub now: Wire<In>,
-    /// The word that was on `now` `depth` cycles earlier.
-    pub then: Wire<Out>,
+    pub d: Wire<In>,
+    /// The word that was on `d` `depth` cycles earlier.
+    pub q: Wire<Out>,
     kernel: Body,
 }
 
-kernel_block!(Delay, clock clk, inputs [now], outputs [then]);
+kernel_block!(Delay, clock clk, inputs [d], outputs [q]);
 
 impl Delay {
     /// Delays words of `bits` bits by `depth` ≥ 1 cycles.
     pub fn new(bits: usize, depth: usize) -> Self {
-        let (now, then) = (Wire::new(bits), Wire::new(bits));
-        let block = Delay { clk: Default::default(), now, then, kernel: Body::default() };
+        let (d, q) = (Wire::new(bits), Wire::new(bits));
+        let block = Delay { clk: Default::default(), d, q, kernel: Body::default() };
         block.bind(kernel(bits, depth))
     }
 }
 
 fn kernel(bits: usize, depth: usize) -> Kernel {
     let k = Builder::new("delay");
-    let first = k.input("now", bits);
+    let first = k.input("d", bits);
     let last = (1..depth).fold(first, |value, number| k.delay(&format!("pipe{number}"), value));
-    k.delay("then", last);
+    k.delay("q", last);
     k.finish()
 }
 
@@ -45,13 +45,13 @@ pub struct BitDelay {
     /// Synchronous reset, active high.
     pub rst: Signal<In, Bit>,
     /// Input bit.
-    pub now: Signal<In, Bit>,
-    /// The bit that was on `now` `depth` cycles earlier.
-    pub then: Signal<Out, Bit>,
+    pub d: Signal<In, Bit>,
+    /// The bit that was on `d` `depth` cycles earlier.
+    pub q: Signal<Out, Bit>,
     kernel: Body,
 }
 
-kernel_block!(BitDelay, clock clk, inputs [rst, now], outputs [then]);
+kernel_block!(BitDelay, clock clk, inputs [rst, d], outputs [q]);
 
 impl BitDelay {
     /// Delays by `depth` ≥ 1 cycles.
@@ -59,8 +59,8 @@ impl BitDelay {
         let block = BitDelay {
             clk: Default::default(),
             rst: Default::default(),
-            now: Default::default(),
-            then: Default::default(),
+            d: Default::default(),
+            q: Default::default(),
             kernel: Body::default(),
         };
         block.bind(bit_kernel(depth))
@@ -69,9 +69,9 @@ impl BitDelay {
 
 fn bit_kernel(depth: usize) -> Kernel {
     let k = Builder::new("bit_delay");
-    let (rst, mut value) = (k.input("rst", 1), k.input("now", 1));
+    let (rst, mut value) = (k.input("rst", 1), k.input("d", 1));
     let inner = (1..depth).map(|number| format!("pipe{number}"));
-    for name in inner.chain(["then".to_owned()]) {
+    for name in inner.chain(["q".to_owned()]) {
         let register = k.state(&name, Type::unsigned(1), rst, 0);
         register.set(value);
         value = *register;

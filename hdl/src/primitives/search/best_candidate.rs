@@ -42,7 +42,7 @@ pub struct BestCandidate {
     /// The next sweep was waiting for this result; valid with `done`.
     pub closes: Signal<Out, Bit>,
     /// Word of the sweep just compared; valid with `done`.
-    pub judged: Wire<Out>,
+    pub compared: Wire<Out>,
     /// Best position, x, in grid steps of the level, signed.
     pub best_x: Wire<Out>,
     /// Best position, y, in grid steps of the level, signed.
@@ -63,7 +63,7 @@ kernel_block!(
     BestCandidate,
     clock clk,
     inputs [rst, begin_frame, halve, start, totals, weights, eligible, sweep],
-    outputs [done, improved, closes, judged, best_x, best_y, score, taken, found]
+    outputs [done, improved, closes, compared, best_x, best_y, score, taken, found]
 );
 
 impl BestCandidate {
@@ -87,7 +87,7 @@ impl BestCandidate {
             done: Default::default(),
             improved: Default::default(),
             closes: Default::default(),
-            judged: Wire::new(sweep_bits()),
+            compared: Wire::new(sweep_bits()),
             best_x: Wire::new(position_bits()),
             best_y: Wire::new(position_bits()),
             score: Wire::new(score_bits),
@@ -207,7 +207,7 @@ fn kernel(t: usize, w: usize) -> Kernel {
     let bit = Type::unsigned(1);
     let done = k.state("done", bit, rst, 0);
     let (improved, closes) = (k.register("improved", bit), k.register("closes", bit));
-    let judged = k.register("judged", Type::unsigned(sweep_bits()));
+    let compared = k.register("compared", Type::unsigned(sweep_bits()));
     let (best_x, best_y) = (k.register("best_x", Type::signed(p)), k.register("best_y", Type::signed(p)));
     let score = k.register("score", Type::signed(t));
     let (taken, found) = (k.register("taken", bit), k.register("found", bit));
@@ -253,8 +253,8 @@ fn kernel(t: usize, w: usize) -> Kernel {
     k.comment("from the centre was registered a cycle earlier.");
     let ahead = [k.delay("ahead_x", *best_x - centre[0]), k.delay("ahead_y", *best_y - centre[1])];
     let best = Best { score: *score, ahead, centre };
-    let compared = |candidate, name| Compared::new(&k, candidate, best, name);
-    let last = [compared(before, "before"), compared(central, "centre"), compared(after, "after")];
+    let against_best = |candidate, name| Compared::new(&k, candidate, best, name);
+    let last = [against_best(before, "before"), against_best(central, "centre"), against_best(after, "after")];
     let choose = |what: usize| {
         let [before, centre, after] = last.map(|one| [one.lower, one.tie, one.score, one.x, one.y][what]);
         takes_after.mux(after, takes_centre.mux(centre, before))
@@ -271,7 +271,7 @@ fn kernel(t: usize, w: usize) -> Kernel {
     improved.set(take);
     k.when(ends, || {
         closes.set(fields.closes);
-        judged.set(*held);
+        compared.set(*held);
     });
     // A new search has priority over a new level, and that over a result.
     k.when(take & !halve, || {

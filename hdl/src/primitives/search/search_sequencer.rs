@@ -14,11 +14,11 @@ use crate::wire::Wire;
 ///
 /// `set_up` starts a sweep. Its `step`, `sweep` and `source` are valid from the next cycle until the following
 /// `set_up`; `target`, also a field of `sweep`, one cycle later. In the coarse grid `set_up` may coincide with
-/// `judged`; otherwise it comes three cycles after `judged` or `begin_frame`.
+/// `compared`; otherwise it comes three cycles after `compared` or `begin_frame`.
 ///
 /// Coarse sweeps follow one another without waiting for the comparison of their candidates (`chains`): each reads the
 /// buffer that the previous one wrote, and writes the one that is neither that nor the best so far. Three buffers are
-/// enough as long as a sweep is compared before the next but one is set up. Halvings work in place. `judged` with
+/// enough as long as a sweep is compared before the next but one is set up. Halvings work in place. `compared` with
 /// `improved` makes the buffer of a coarse sweep the best.
 #[derive(LogicBlock)]
 pub struct SearchSequencer {
@@ -33,11 +33,11 @@ pub struct SearchSequencer {
     /// Set up the next sweep.
     pub set_up: Signal<In, Bit>,
     /// The candidates of a sweep have been compared.
-    pub judged: Signal<In, Bit>,
-    /// The best candidate changed; valid with `judged`.
+    pub compared: Signal<In, Bit>,
+    /// The best candidate changed; valid with `compared`.
     pub improved: Signal<In, Bit>,
-    /// Word of that sweep; valid with `judged`.
-    pub judged_sweep: Wire<In>,
+    /// Word of that sweep; valid with `compared`.
+    pub compared_sweep: Wire<In>,
     /// Best position, x, in grid steps, signed.
     pub best_x: Wire<In>,
     /// Best position, y, in grid steps, signed.
@@ -66,12 +66,12 @@ pub struct SearchSequencer {
 kernel_block!(
     SearchSequencer,
     clock clk,
-    inputs [rst, begin_frame, enabled, set_up, judged, improved, judged_sweep, best_x, best_y],
+    inputs [rst, begin_frame, enabled, set_up, compared, improved, compared_sweep, best_x, best_y],
     outputs [step, last, next_halves, chains, source, next_base, target, sweep, radius]
 );
 
 /// Number of sweeps whose candidates are compared.
-const JUDGED: usize = COARSE_CENTRES.len() + HALVINGS as usize;
+const COMPARED: usize = COARSE_CENTRES.len() + HALVINGS as usize;
 /// Width of the number of a sweep, in bits.
 const COUNT_BITS: usize = 4;
 /// Squared radius of the search disc in steps of the coarse grid.
@@ -87,9 +87,9 @@ impl SearchSequencer {
             begin_frame: Default::default(),
             enabled: Default::default(),
             set_up: Default::default(),
-            judged: Default::default(),
+            compared: Default::default(),
             improved: Default::default(),
-            judged_sweep: Wire::new(sweep_bits()),
+            compared_sweep: Wire::new(sweep_bits()),
             best_x: Wire::new(p),
             best_y: Wire::new(p),
             step: Wire::new(5),
@@ -137,11 +137,11 @@ fn shifted(value: Expr<'_>, by: usize) -> Expr<'_> {
 
 fn kernel(quads: usize) -> Kernel {
     let (p, q) = (position_bits(), square_bits());
-    let (final_coarse, final_halving) = (COARSE_CENTRES.len() as u64 - 1, JUDGED as u64 - 1);
+    let (final_coarse, final_halving) = (COARSE_CENTRES.len() as u64 - 1, COMPARED as u64 - 1);
     let k = Builder::new("search_sequencer");
     let (rst, begin_frame, enabled) = (k.input("rst", 1), k.input("begin_frame", 1), k.input("enabled", 1));
-    let (set_up, judged, improved) = (k.input("set_up", 1), k.input("judged", 1), k.input("improved", 1));
-    let judged_sweep = k.input("judged_sweep", sweep_bits());
+    let (set_up, compared, improved) = (k.input("set_up", 1), k.input("compared", 1), k.input("improved", 1));
+    let compared_sweep = k.input("compared_sweep", sweep_bits());
     let best = [k.input("best_x", p), k.input("best_y", p)];
     let (bit, buffer) = (Type::unsigned(1), Type::unsigned(BUFFER_BITS));
     let zero = k.constant(1, 0);
@@ -160,10 +160,10 @@ fn kernel(quads: usize) -> Kernel {
     let closing = k.wire("closing", !*is_coarse | at_last_coarse);
     k.wire("next_halves", *is_halving);
     k.comment(
-        "A coarse sweep set up in the cycle of `judged` already uses its result for the choice of buffers; a halving",
+        "A coarse sweep set up in the cycle of `compared` already uses its result for the choice of buffers; a halving",
     );
     k.comment("is set up later.");
-    let keeps = k.wire("keeps", judged & improved & Fields::of(judged_sweep).coarse);
+    let keeps = k.wire("keeps", compared & improved & Fields::of(compared_sweep).coarse);
     let kept_buffer = k.wire("kept_buffer", Fields::of(*kept).buffer);
     let sweep = k.wire("sweep", concat(&[*closes, *coarse, *target, *place]));
     let from = Fields::of(k.wire("from", is_coarse.mux(sweep, *kept)));
@@ -195,7 +195,9 @@ fn kernel(quads: usize) -> Kernel {
     k.comment(
         "A coarse sweep writes the first of buffers 1, 2, 0 that is neither read nor the best, chosen one cycle after",
     );
-    k.comment("the set-up, when a `judged` in the cycle of the set-up has taken effect. The first, which reads START,");
+    k.comment(
+        "the set-up, when a `compared` in the cycle of the set-up has taken effect. The first, which reads START,",
+    );
     k.comment("writes 1. Other sweeps work in place.");
     let unused = |b: u64| !source.is(b) & !kept_buffer.is(b);
     let other = unused(2).mux(number(2), number(0));
@@ -217,12 +219,12 @@ fn kernel(quads: usize) -> Kernel {
         last.set(!*is_coarse & !*is_halving);
         source.set(base_buffer);
     });
-    k.when(keeps, || kept.set(judged_sweep));
+    k.when(keeps, || kept.set(compared_sweep));
     k.when(set_up & (!*is_coarse | count.is(0)), || {
         kept.set(concat(&[closing, *is_coarse, is_coarse.mux(number(1), kept_buffer), next]));
     });
     k.when(begin_frame, || {
-        count.set(enabled.mux(k.constant(COUNT_BITS, 0), k.constant(COUNT_BITS, JUDGED as u64)));
+        count.set(enabled.mux(k.constant(COUNT_BITS, 0), k.constant(COUNT_BITS, COMPARED as u64)));
         is_coarse.set(enabled);
         is_halving.set(zero);
         closes.set(zero);
@@ -269,7 +271,7 @@ mod tests {
 
         fn advance(&mut self, best: [i64; 2]) {
             let coarse = self.is_coarse();
-            let halving = !coarse && self.count < JUDGED;
+            let halving = !coarse && self.count < COMPARED;
             let from = if coarse { self.sweep } else { self.kept };
             let by = match coarse_moves().get(self.count) {
                 Some(by) => *by,
@@ -305,20 +307,20 @@ mod tests {
                 self.taken.map(|(.., source)| number(source)),
                 begun(number(self.target)),
                 begun(Word::from(self.radius as u64)),
-                begun((COARSE_CENTRES.len()..JUDGED).contains(&self.count).into()),
+                begun((COARSE_CENTRES.len()..COMPARED).contains(&self.count).into()),
                 begun(Sweep { buffer: self.target, ..self.sweep }.word()),
                 self.next_base.map(number),
             ]
         }
 
         fn clock(&mut self, inputs: &[Word]) {
-            let [rst, begin_frame, enabled, set_up, judged, improved] =
+            let [rst, begin_frame, enabled, set_up, compared, improved] =
                 [0, 1, 2, 3, 4, 5].map(|k| inputs[k].number() == 1);
             let next = if self.is_coarse() { self.target } else { self.kept.buffer };
             self.next_base = self.begun.then_some(base(next, QUADS));
             if begin_frame {
                 let start = Sweep { buffer: START, ..Sweep::default() };
-                let count = if enabled { 0 } else { JUDGED };
+                let count = if enabled { 0 } else { COMPARED };
                 let before = *self;
                 *self = Search { begun: true, count, radius: 9, sweep: start, kept: start, target: START, ..before };
                 self.chosen = false;
@@ -326,9 +328,9 @@ mod tests {
             if std::mem::take(&mut self.chosen) {
                 self.target = self.sweep.buffer;
             }
-            let compared = Sweep::of_word(&inputs[6]);
-            if judged && improved && compared.coarse {
-                self.kept = compared;
+            let sweep = Sweep::of_word(&inputs[6]);
+            if compared && improved && sweep.coarse {
+                self.kept = sweep;
             }
             if set_up {
                 self.advance([7, 8].map(|k| inputs[k].signed(0, position_bits())));
@@ -346,24 +348,24 @@ mod tests {
         let mut search = Search::default();
         let (mut since, mut go, mut coarse) = (0, [0, 0], Vec::new());
         let inputs = |cycle: usize| {
-            let done = search.count > JUDGED;
+            let done = search.count > COMPARED;
             let begin_frame = cycle > 2 && (!search.begun || (done && random.u8(..4) == 0) || random.u16(..500) == 0);
             let enabled = random.u8(..6) > 0;
             let set_up = search.begun && !begin_frame && !done && since > 4 && random.u8(..4) == 0;
             // After the last coarse sweep nothing is kept in the last cycles before a halving.
             let quiet = since > 0 && !search.is_coarse();
-            let judged = !begin_frame && !quiet && !coarse.is_empty() && random.u8(..3) == 0;
+            let compared = !begin_frame && !quiet && !coarse.is_empty() && random.u8(..3) == 0;
             let improved = random.bool();
-            let judged_sweep = if judged { coarse[random.usize(..coarse.len())] } else { Sweep::default() };
+            let compared_sweep = if compared { coarse[random.usize(..coarse.len())] } else { Sweep::default() };
             let best = [0, 1].map(|axis| Word::of_fields(&[search.kept.centre[axis] + go[axis]], position_bits()));
             let inputs = vec![
                 (cycle < 2 || random.u16(..100) == 0).into(),
                 begin_frame.into(),
                 enabled.into(),
                 set_up.into(),
-                judged.into(),
+                compared.into(),
                 improved.into(),
-                judged_sweep.word(),
+                compared_sweep.word(),
                 best[0],
                 best[1],
             ];

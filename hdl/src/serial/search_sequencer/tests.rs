@@ -123,12 +123,12 @@ impl Machine {
             RUN => {
                 next.tick = s.tick + 1;
                 if self.run_end() {
-                    next.state = if s.sweep == LAST { IDLE } else { JUDGE };
+                    next.state = if s.sweep == LAST { IDLE } else { COMPARE };
                     next.count = 0;
                     next.takes = false;
                 }
             }
-            JUDGE => self.judge(&mut next, inputs),
+            COMPARE => self.compare(&mut next, inputs),
             _ => {}
         }
         if bit(inputs, RST) {
@@ -139,7 +139,7 @@ impl Machine {
 
     /// Compares a candidate every two cycles, five cycles each: index, disc by x, disc by y and position, decision,
     /// update.
-    fn judge(&self, next: &mut State, inputs: &[Word]) {
+    fn compare(&self, next: &mut State, inputs: &[Word]) {
         let s = self.state;
         let coarse = s.sweep < COARSE;
         let offset = |turn: u64| [turn as i64 % 3 - 1, turn as i64 / 3 - 1];
@@ -203,7 +203,7 @@ impl Machine {
         let bit = |value: bool| i64::from(value);
         let number = |value: u64| value as i64;
         let value = present && s.sweep == LAST && slot >= 1 && back & 15 == 0;
-        let judging = s.state == JUDGE;
+        let comparing = s.state == COMPARE;
         let (run, start) = (self.runs && running, self.started);
         [
             ("odd", (self.runs || bit(odd) == 1 && inputs[FILLING].number() == 1, bit(odd))),
@@ -225,14 +225,14 @@ impl Machine {
             ("present", (self.reset, bit(present && scored) | bit(before && scored) << 1)),
             ("sums", (present || before, bit(slot == 0) | bit(slot == 1) << 1)),
             ("value_valid", (self.reset, bit(value))),
-            ("judging", (self.reset, bit(judging))),
-            ("candidate", (judging && s.count >= 2, number(s.turns[2] & 15))),
+            ("comparing", (self.reset, bit(comparing))),
+            ("candidate", (comparing && s.count >= 2, number(s.turns[2] & 15))),
             ("best_x", (start, s.best[0])),
             ("best_y", (start, s.best[1])),
             ("score", (start, s.score)),
             ("found", (start, bit(s.found))),
             ("taken", (start, bit(s.taken))),
-            ("judged", (start, bit(s.state == SET_UP && s.enabled && s.sweep != 0))),
+            ("compared", (start, bit(s.state == SET_UP && s.enabled && s.sweep != 0))),
             ("done", (self.reset, bit(self.done))),
         ]
         .into()

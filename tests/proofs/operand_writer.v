@@ -6,7 +6,7 @@ module proof(input clk, input again, input valid);
   wire [@ADDRESS@-1:0] address;
   wire [@FINISHED@-1:0] finished;
   wire keep;
-  @TOP@__pass__filler block(
+  @TOP@__pass__operand_writer block(
     .clk(clk), .which(1'b0), .clear(again || !started), .valid(valid), .address(address), .keep(keep),
     .finished(finished)
   );
