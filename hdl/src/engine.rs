@@ -19,12 +19,10 @@ use dermis_golden::scene::Condition;
 use rust_hdl::prelude::*;
 
 use crate::ports::one_of;
-use crate::primitives::{
-    count_bits, largest, BitDelay, CaseCounter, Counter, Dff, EnableRegister, Resultants, CYCLE_BITS,
-};
+use crate::primitives::{count_bits, largest, BitDelay, CaseCounter, Counter, Dff, EnableRegister, CYCLE_BITS};
 use crate::stages::{
-    Banks, Fold, Force, Normalise, Pass, Prepare, Receive, ReceivePorts, Rescale, Search, SearchPorts, Send, Unfold,
-    Unsearched,
+    Banks, Fold, Force, Normalise, Pass, Prepare, Receive, ReceivePorts, Rescale, Resultants, Search, SearchPorts,
+    Send, Unfold, Unsearched,
 };
 use crate::wire::Wire;
 

@@ -1,10 +1,9 @@
 //! The stages of the pipeline, one file each, named as in the bit-true model. A stage starts on the `done` pulse of the
 //! one before.
 //!
-//! `prepare`, `receive`, `fold`, `pass`, `rescale`, `unfold`, `search`, `force` and `send` are `#[hdl_gen]` kernels:
-//! single-bit control and connections between the [primitives](crate::primitives), with Verilog derived from the Rust.
-//! `normalise`, `choose` and `unsearched` are kernels of the [`language`](crate::language). `banks` has a Rust
-//! `update()` for rust-hdl's simulation and hand-written Verilog, which co-simulation compares.
+//! `prepare`, `receive`, `fold`, `pass`, `rescale`, `unfold`, `search`, `force` and `send` connect
+//! [primitives](crate::primitives) by `#[hdl_gen]`: single-bit control and connections. `normalise`, `choose`, `banks`,
+//! `unsearched` and `resultants` are [kernels](crate::language).
 //!
 //! `banks` (with `choose`) stands in the place of `receive` where the case is chosen per frame; `unsearched` in that of
 //! `search` in a scene without one. Both pairs have the same ports.
@@ -18,6 +17,7 @@ mod pass;
 mod prepare;
 mod receive;
 mod rescale;
+mod resultants;
 mod search;
 mod send;
 mod unfold;
@@ -32,6 +32,7 @@ pub use pass::Pass;
 pub use prepare::Prepare;
 pub use receive::{Receive, ReceivePorts};
 pub use rescale::Rescale;
+pub use resultants::Resultants;
 pub use search::{Search, SearchPorts};
 pub use send::Send;
 pub use unfold::Unfold;

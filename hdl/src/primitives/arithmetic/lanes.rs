@@ -10,7 +10,7 @@ use crate::kernel_block;
 use crate::language::{concat, Body, Builder, Contents, Expr, Kernel, Net, Type};
 use crate::primitives::address::case_counter::{largest, value_by_case};
 use crate::primitives::address::counter::count_bits;
-use crate::primitives::arithmetic::pass_program::control_bits;
+use crate::primitives::pass::pass_program::control_bits;
 use crate::wire::Wire;
 
 const M: usize = MULTIPLIER_BITS as usize;

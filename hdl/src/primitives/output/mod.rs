@@ -1,5 +1,4 @@
 //! What leaves: forces, sums of forces, status.
 
 pub(crate) mod force_unit;
-pub(crate) mod resultants;
 pub(crate) mod status_code;

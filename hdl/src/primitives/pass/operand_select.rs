@@ -5,7 +5,7 @@ use rust_hdl::prelude::*;
 
 use crate::kernel_block;
 use crate::language::{concat, Body, Builder, Kernel};
-use crate::primitives::arithmetic::pass_program::SOURCE_BITS;
+use crate::primitives::pass::pass_program::SOURCE_BITS;
 use crate::wire::Wire;
 
 /// Words of the input memory and of a v_ij in, four multiplier operands out one cycle later.

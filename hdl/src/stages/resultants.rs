@@ -8,7 +8,7 @@ use rust_hdl::prelude::*;
 
 use crate::kernel_block;
 use crate::language::{concat, Body, Builder, Expr, Kernel, Net, Type};
-use crate::primitives::address::counter::count_bits;
+use crate::primitives::count_bits;
 use crate::wire::Wire;
 
 /// ```text

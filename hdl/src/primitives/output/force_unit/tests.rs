@@ -1,0 +1,209 @@
+//! The force unit against the bit-true model's forces, with stalls and resets.
+
+use std::collections::VecDeque;
+
+use dermis_golden::fixed::force::{force, mu_word};
+use dermis_golden::fixed::send::{FLAG_COEFFICIENTS, FLAG_CONDITION, FLAG_FOUND, FLAG_FRAMING, FLAG_NO_CONTACT};
+use dermis_golden::scene::Scene;
+
+use super::*;
+use crate::language::testbench::{check, random_word, Reference};
+use crate::wire::Word;
+
+fn model(side: usize, more: &str) -> Model {
+    let text = format!(
+        "name = \"force\"\n[sensor]\nrows = {side}\ncols = {side}\npitch_x_mm = 4.0\npitch_y_mm = 4.0\nthickness_mm = 3.0\n{more}"
+    );
+    Model::new(&Scene::parse(&text, "force.toml").unwrap()).unwrap()
+}
+
+/// A request, and its value once it has been read.
+#[derive(Clone, Copy, Debug)]
+struct Entry {
+    beat: u64,
+    part: usize,
+    lane: usize,
+    value: i64,
+}
+
+/// Values stored per subarray.
+#[derive(Clone, Copy, Debug, Default)]
+struct Part {
+    position: [i32; 2],
+    normalise: u32,
+    rescale: u32,
+    condition: bool,
+    found: bool,
+    damaged: bool,
+    score: i32,
+    saturations: u32,
+}
+
+/// Values stored per frame.
+#[derive(Clone, Copy, Debug, Default)]
+struct Frame {
+    cycles: u32,
+    saturations: u32,
+    contact: bool,
+    counting: bool,
+}
+
+/// The model's force on every request.
+struct Requests {
+    model: Model,
+    /// Requests of the last cycles, the latest first.
+    pipe: VecDeque<Option<Entry>>,
+    frame: Frame,
+    parts: Vec<Part>,
+    output: Option<(bool, Word)>,
+    reset: bool,
+}
+
+impl Requests {
+    fn new(model: Model) -> Self {
+        let parts = model.cases().iter().map(|case| case.parts.len()).max().unwrap();
+        let (pipe, parts) = (vec![None; ASKED].into(), vec![Part::default(); parts]);
+        Requests { model, pipe, frame: Frame::default(), parts, output: None, reset: false }
+    }
+
+    fn keep(&mut self, inputs: &[Word]) {
+        let [condition, found, damaged] = [14, 15, 17].map(|k| inputs[k].number() == 1);
+        self.parts[inputs[4].number() as usize] = Part {
+            position: [10, 11].map(|k| inputs[k].signed(0, position_bits()) as i32),
+            normalise: inputs[12].number() as u32,
+            rescale: inputs[13].number() as u32,
+            condition,
+            found,
+            damaged: damaged && self.model.has_coefficient_check(),
+            score: if found { inputs[18].signed(0, self.model.formats.score_bits as usize) as i32 } else { 0 },
+            saturations: inputs[19].number() as u32,
+        };
+    }
+
+    fn answer(&mut self, entry: Entry, inputs: &[Word]) -> [i32; 3] {
+        let f = &self.model.formats;
+        let (frame, part) = (&mut self.frame, self.parts[entry.part]);
+        match entry.beat {
+            0 => {
+                let shift = force_shift(f, part.normalise, part.rescale);
+                let mu = part.position.map(|x| mu_word(f, x));
+                let result = force(f, entry.value, mu, shift, self.model.threshold);
+                frame.saturations = (frame.saturations + result.saturations).min((1 << SATURATION_BITS) - 1);
+                frame.contact |= result.words[2] != 0;
+                result.words
+            }
+            1 => {
+                let flag = |set: bool, bit: u32| if set { bit } else { 0 };
+                let case = &self.model.cases()[inputs[1].number() as usize];
+                let number = if self.model.chooses() { case.number() } else { 0 };
+                let flags = flag(part.condition, FLAG_CONDITION)
+                    | flag(part.found, FLAG_FOUND)
+                    | flag(!frame.contact, FLAG_NO_CONTACT)
+                    | flag(inputs[16].number() == 1, FLAG_FRAMING)
+                    | flag(part.damaged, FLAG_COEFFICIENTS)
+                    | number << CASE_SHIFT;
+                let position = if self.model.searches() { part.position } else { [0; 2] };
+                [position[0], position[1], flags as i32]
+            }
+            2 => [part.score, part.rescale as i32, part.normalise as i32],
+            _ => [part.saturations as i32, frame.saturations as i32, frame.cycles as i32],
+        }
+    }
+}
+
+impl Reference for Requests {
+    fn outputs(&mut self, _: &[Word]) -> Vec<Option<Word>> {
+        let bit = |bit: bool| self.reset.then(|| Word::from(bit));
+        vec![
+            self.output.map(|(_, word)| word),
+            bit(self.output.is_some()),
+            bit(self.output.is_some_and(|(last, _)| last)),
+        ]
+    }
+
+    fn clock(&mut self, inputs: &[Word]) {
+        let [rst, begin_frame, start, offer] = [0, 2, 3, 5].map(|k| inputs[k].number() == 1);
+        if let Some(entry) = &mut self.pipe[READ_STEPS - 1] {
+            entry.value = inputs[9].signed(entry.lane, self.model.formats.search_bits[0] as usize);
+        }
+        self.output = self.pipe.pop_back().unwrap().map(|entry| {
+            if std::mem::take(&mut self.frame.counting) {
+                self.frame.cycles = (inputs[20].number() as u32 + UNCOUNTED) % (1 << CYCLE_BITS);
+            }
+            let words = self.answer(entry, inputs).map(i64::from);
+            let ends = self.model.cases()[inputs[1].number() as usize].parts.len();
+            (entry.beat == 3 && entry.part + 1 == ends, Word::of_fields(&words, WORD))
+        });
+        let [beat, part, lane] = [6, 7, 8].map(|k| inputs[k].number());
+        self.pipe.push_front(offer.then_some(Entry { beat, part: part as usize, lane: lane as usize, value: 0 }));
+        if begin_frame {
+            self.frame = Frame { counting: true, ..Frame::default() };
+        }
+        if start {
+            self.keep(inputs);
+        }
+        if rst {
+            self.pipe.iter_mut().for_each(|entry| *entry = None);
+            (self.output, self.reset) = (None, true);
+        }
+    }
+}
+
+/// Frames: all subarrays are stored, then beats requested at random, first forces.
+fn stimulus(model: &Model, block: &ForceUnit, cycles: usize) -> Vec<Vec<Word>> {
+    let mut random = fastrand::Rng::with_seed(11);
+    let cases = model.cases().len() as u64;
+    let parts = model.cases().iter().map(|case| case.parts.len()).max().unwrap();
+    let mut which = 0;
+    let inputs = |cycle: usize| {
+        // 40 cycles of a frame begin it and store the subarrays, the rest request beats.
+        let at = cycle % 300;
+        if at == 0 {
+            which = random.u64(..cases);
+        }
+        let offer = (40..280).contains(&at) && random.u8(..4) > 0;
+        // Small values are below the threshold or round to zero, large ones saturate.
+        let v = block.quad.width() / 4;
+        let value = |_| random.i64(..) >> random.usize(64 - v..64);
+        let quad: Vec<i64> = (0..4).map(value).collect();
+        vec![
+            (cycle < 2 || (at == 290 && random.bool())).into(),
+            which.into(),
+            (at == 20).into(),
+            (21..21 + parts).contains(&at).into(),
+            (at.saturating_sub(21) as u64 % parts as u64).into(),
+            offer.into(),
+            if at < 60 || random.bool() { Word::default() } else { random.u64(..4).into() },
+            random.u64(..parts as u64).into(),
+            random.u64(..4).into(),
+            Word::of_fields(&quad, v),
+            random_word(&mut random, position_bits()),
+            random_word(&mut random, position_bits()),
+            random.u64(..u64::from(model.formats.input_bits)).into(),
+            random.u64(..1 << block.rescale.width()).into(),
+            random.bool().into(),
+            random.bool().into(),
+            random.bool().into(),
+            random.bool().into(),
+            random_word(&mut random, block.score.width()),
+            random_word(&mut random, SATURATION_BITS),
+            random_word(&mut random, CYCLE_BITS),
+        ]
+    };
+    (0..cycles).map(inputs).collect()
+}
+
+fn is_the_model_s(side: usize, more: &str, threshold: i64) {
+    let mut model = model(side, more);
+    model.threshold = threshold;
+    let block = ForceUnit::new(&model);
+    check(block.kernel.kernel(), &stimulus(&model, &block, 6000), &mut Requests::new(model));
+}
+
+#[test]
+fn beats_are_those_of_the_model() {
+    is_the_model_s(4, "[search]\nmu_max = 0.05\n[partition]\nrows = 2\ncols = 1\n", 1000);
+    is_the_model_s(4, "[search]\nmu_max = 0.0\n", 0);
+    let cases = "[search]\nmu_max = 0.1\ndegree = 1\n[partition]\ncases = [0, 1, 3]\n";
+    is_the_model_s(8, &format!("{cases}[hardware]\ncoefficient_check = \"signature\"\n"), 1 << 20);
+}
