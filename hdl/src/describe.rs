@@ -38,7 +38,7 @@ macro_rules! entries {
 }
 
 /// The stages in the order of the data flow, then blocks that the guide takes as examples.
-const ENTRIES: [Entry; 12] = entries! {
+const ENTRIES: [Entry; 13] = entries! {
     "prepare" "prepare" "stages/prepare.rs",
     "receive" "receive" "stages/receive.rs",
     "choose" "receive__choose" "stages/choose.rs",
@@ -50,6 +50,7 @@ const ENTRIES: [Entry; 12] = entries! {
     "search" "search" "stages/search.rs",
     "force" "forces" "stages/force.rs",
     "send" "send" "stages/send.rs",
+    "resultants" "resultants" "stages/resultants.rs",
     "butterfly" "fold__butterfly" "primitives/arithmetic/butterfly.rs",
 };
 

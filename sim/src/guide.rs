@@ -52,6 +52,7 @@ pages! {
     "architecture/search.md" search,
     "architecture/force.md" force,
     "architecture/send.md" send,
+    "architecture/resultants.md" resultants,
     "architecture/blocks.md" blocks,
     "glossary.md" glossary,
 }
