@@ -45,6 +45,11 @@ impl Receiver {
             true => Receiver::Banks(Box::new(Banks::new(model))),
         }
     }
+
+    /// Whether a case is chosen per frame.
+    pub(crate) fn chooses(&self) -> bool {
+        matches!(self, Receiver::Banks(_))
+    }
 }
 
 one_of! {
