@@ -111,9 +111,9 @@ pub(crate) fn words(design: &dyn Observed) -> Vec<Option<Vec<i64>>> {
     words
 }
 
-/// Declares the streams of an engine, one a line: `name: valid signals => [signals of the word; fields in each]`; `as`
-/// gives the fields a width other than that of the signal, `if` the method of a block that says whether the stream is
-/// there.
+/// Declares the streams of an engine, one a line: `name: valid signals => [signals of the word; fields in each]`. `as`
+/// gives the fields a width other than that of their signals; `if` names the method that says whether the engine has the
+/// stream.
 macro_rules! streams {
     ($engine:ty {$(
         $name:ident $(if $($chosen:ident).+)?: $($($valid:ident).+)&+
