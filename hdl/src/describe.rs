@@ -286,7 +286,7 @@ impl Recorder {
 impl crate::device::Device for Recorder {
     fn cycle(&mut self, inputs: &crate::device::Inputs) -> crate::device::Outputs {
         let Recorder { engine, traces } = self;
-        crate::simulate::cycle(&mut **engine, inputs, &[], |engine| {
+        crate::simulate::cycle(&mut **engine, inputs, |engine| {
             let mut ports = Ports::of(engine);
             for trace in traces {
                 let values = ports.found.remove(trace.block.instance).unwrap_or_default();

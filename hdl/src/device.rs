@@ -44,15 +44,32 @@ pub struct Outputs {
 pub struct Tap {
     /// Stage name, as in the bit-true model.
     pub name: &'static str,
-    /// Verilog expression, high in a cycle in which a word passes; `{}` stands for the path of the top instance and a
-    /// dot (`bench.dut.`).
-    pub valid: String,
-    /// Verilog expression of the word, with the same placeholder; field 0 in the least significant bits.
-    pub data: String,
-    /// Number of signed fields in a word.
+    /// Signals of the top module, one bit each; a word passes in a cycle in which all are 1.
+    pub valid: Vec<String>,
+    /// Signals whose fields form the word, the first fields first; each holds the same number of fields.
+    pub word: Vec<TapSignal>,
+    /// Number of fields in a word.
     pub fields: usize,
-    /// Width of each field in bits, 1..=64.
+    /// Width of each field in bits, two's complement, 1..=64.
     pub field_bits: u32,
+}
+
+impl Tap {
+    /// Width of a word in bits.
+    pub fn bits(&self) -> usize {
+        self.fields * self.field_bits as usize
+    }
+}
+
+/// A signal in the word of a [`Tap`]. One that is narrower than its fields holds one field, and is extended.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct TapSignal {
+    /// Name in the top module.
+    pub name: String,
+    /// Width in bits.
+    pub bits: u32,
+    /// Extended by its sign if set, else by zeros.
+    pub signed: bool,
 }
 
 /// A simulated engine, advanced one clock cycle at a time.

@@ -43,6 +43,11 @@ impl ReceiveStage {
             true => ReceiveStage::Banks(Box::new(Banks::new(model))),
         }
     }
+
+    /// Whether a case is chosen per frame.
+    pub(crate) fn chooses(&self) -> bool {
+        matches!(self, Receiver::Banks(_))
+    }
 }
 
 one_of! {

@@ -153,7 +153,7 @@ pub fn generate(model: &Model) -> Result<Generated, HdlError> {
     let names: Vec<&str> = files.iter().map(|file| file.name.as_str()).collect();
     let core = core_file(&top, &model.scene.name, &names);
     files.push(file(format!("{top}.core"), core));
-    let mut generated = Generated { top, files, memories, taps: taps(model), manifest, usage, dropped };
+    let mut generated = Generated { top, files, memories, taps: taps(&*engine), manifest, usage, dropped };
     generated.seal();
     Ok(generated)
 }

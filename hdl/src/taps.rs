@@ -1,79 +1,233 @@
-//! The observed streams between the stages: names, Verilog expressions and word formats.
+//! The observed streams between the stages. One declaration per stream: the names of its signals in the Verilog and the
+//! reading of the same signals in rust-hdl's simulation both follow from it, all widths from the built engine.
 
-use dermis_golden::board::EngineKind;
-use dermis_golden::fixed::formats::FORCE_BITS;
-use dermis_golden::fixed::Model;
+use rust_hdl::prelude::*;
 
-use crate::device::Tap;
-use crate::primitives::{count_bits, position_bits};
+use crate::device::{Tap, TapSignal};
+use crate::language::SEPARATOR;
+use crate::wire::{Wire, Word};
+use crate::{engine, serial};
 
-/// Field width of the search's tap, in bits: its fields have different widths in hardware and are sign-extended to
-/// this.
-pub const SEARCH_FIELD: u32 = 32;
+/// Field width of the tap of `search`, in bits: at least that of each of its signals.
+const SEARCH_FIELD: u32 = 32;
 
 /// Field width of the tap of `choose`, in bits: the index of a case, and a sign bit.
 const CHOICE_FIELD: u32 = 3;
 
-/// The taps of the engine of `model`, in pipeline order.
-pub fn taps(model: &Model) -> Vec<Tap> {
-    let serial = model.board.engine == EngineKind::Serial;
-    let block = if serial { "search_sequencer" } else { "search" };
-    let f = &model.formats;
-    let tap = |name, valid: &str, data: &str, fields, field_bits| Tap {
-        name,
-        valid: format!("{{}}{valid}"),
-        data: format!("{{}}{data}"),
-        fields,
-        field_bits,
-    };
-    let extended = |signal: &str, bits: u32| {
-        format!("{{{}{{{{}}{block}__{signal}[{}]}}}}, {{}}{block}__{signal}", SEARCH_FIELD - bits, bits - 1)
-    };
-    let position = position_bits() as u32;
-    let search = format!(
-        "{{{}'d0, {{}}{block}__taken, {{{score}}}, {{{y}}}, {{{x}}}}}",
-        SEARCH_FIELD - 1,
-        score = extended("score", f.score_bits),
-        y = extended("best_y", position),
-        x = extended("best_x", position),
-    );
-    let search = Tap {
-        name: "search",
-        valid: format!("{{}}{block}__compared"),
-        data: search,
-        fields: 4,
-        field_bits: SEARCH_FIELD,
-    };
-    if serial {
-        let mixed = f.input_bits.max(f.vector_bits) + 2;
-        return vec![
-            tap("receive", "receive__accept", "receive__s_axis_tdata", 1, f.input_bits),
-            tap("normalise", "pass_sequencer__normalised_valid", "rounder__rounded", 1, FORCE_BITS),
-            Tap {
-                valid: "({}butterfly__quad_valid && {}pass_sequencer__folding)".into(),
-                ..tap("fold", "", "butterfly__quad", 4, mixed)
-            },
-            tap("pass", "pass__quad_valid", "pass__quad", 4, f.acc_bits),
-            tap("rescale", "pass_sequencer__rescaled_valid", "rounder__rounded", 1, FORCE_BITS),
-            tap("unfold", "unfold__taxel_valid", "unfold__taxel", 1, f.vector_bits + 2),
-            search,
-            tap("force", "search_sequencer__value_valid", "coefficient_shift__value", 1, f.search_bits[0]),
-        ];
+/// A signal whose width and value can be read.
+pub(crate) trait Signalled: Atom {
+    /// The current value, zero beyond the width.
+    fn word(&self) -> Word;
+}
+
+impl<D: Direction> Signalled for Wire<D> {
+    fn word(&self) -> Word {
+        self.val()
     }
-    let mut all = vec![
-        tap("receive", "receive__accept", "receive__taken_word", 1, f.input_bits),
-        tap("normalise", "fold__normalised_valid", "normalise__shifted", 4, f.input_bits),
-        tap("fold", "fold__folded_valid", "fold__folded", 4, f.fold_bits),
-        tap("pass", "pass__quad_valid", "pass__quad", 4, f.acc_bits),
-        tap("rescale", "rescale__words_valid", "rescale__words", 4, f.vector_bits),
-        tap("unfold", "unfold__taxels_valid", "unfold__taxels", 4, f.vector_bits + 2),
-        search,
-        tap("force", "search__values_valid", "search__values", 4, f.search_bits[0]),
-    ];
-    if model.chooses() {
-        let zeros = CHOICE_FIELD - count_bits(model.cases().len()) as u32;
-        let data = format!("{{{zeros}'d0, {{}}receive__which}}");
-        all.insert(1, Tap { name: "choose", valid: "{}begin_frame".into(), data, fields: 1, field_bits: CHOICE_FIELD });
+}
+
+impl Signalled for Signal<Out, Bit> {
+    fn word(&self) -> Word {
+        self.val().into()
     }
-    all
+}
+
+/// Names that lead to a signal from the engine: the block's instance, the port; or one of the engine's own signals.
+type Path = [&'static str];
+
+/// The name of the signal at `path` in the top module.
+fn name(path: &Path) -> String {
+    path.join(SEPARATOR)
+}
+
+/// A signal of a stream's word.
+pub(crate) struct Part<'a> {
+    path: &'a Path,
+    signed: bool,
+    signal: &'a dyn Signalled,
+}
+
+/// A stream in the current cycle.
+pub(crate) struct Stream<'a> {
+    name: &'static str,
+    /// Signals that are all 1 in a cycle in which a word passes: path, value.
+    valid: &'a [(&'a Path, bool)],
+    /// Signals of the word, the first fields first.
+    parts: &'a [Part<'a>],
+    /// Fields in each of `parts`.
+    count: usize,
+    /// Width of a field in bits, if not that of the signal's fields.
+    field_bits: Option<u32>,
+}
+
+impl Stream<'_> {
+    /// Names and widths.
+    fn tap(&self) -> Tap {
+        let signal = |part: &Part| {
+            let Part { path, signed, signal } = *part;
+            TapSignal { name: name(path), bits: signal.bits() as u32, signed }
+        };
+        let word: Vec<TapSignal> = self.parts.iter().map(signal).collect();
+        Tap {
+            name: self.name,
+            valid: self.valid.iter().map(|(path, _)| name(path)).collect(),
+            fields: self.count * word.len(),
+            field_bits: self.field_bits.unwrap_or(word[0].bits / self.count as u32),
+            word,
+        }
+    }
+
+    /// The fields of the word that passes in this cycle.
+    fn sample(&self) -> Option<Vec<i64>> {
+        let fields = |part: &Part| {
+            let (word, bits, signed) = (part.signal.word(), part.signal.bits() / self.count, part.signed);
+            let field = move |index| match signed {
+                true => word.signed(index, bits),
+                false => word.field(index * bits, bits) as i64,
+            };
+            (0..self.count).map(field)
+        };
+        self.valid.iter().all(|(_, high)| *high).then(|| self.parts.iter().flat_map(fields).collect())
+    }
+}
+
+/// A design with observed streams.
+pub(crate) trait Observed {
+    /// Calls `visit` with each stream in pipeline order; the same streams in every cycle.
+    fn streams(&self, visit: &mut dyn FnMut(&Stream));
+}
+
+/// The taps of `design`, in pipeline order.
+pub(crate) fn taps(design: &dyn Observed) -> Vec<Tap> {
+    let mut taps = Vec::new();
+    design.streams(&mut |stream| taps.push(stream.tap()));
+    taps
+}
+
+/// The words that pass in the current cycle, one entry per tap, in the order of [`taps`].
+pub(crate) fn words(design: &dyn Observed) -> Vec<Option<Vec<i64>>> {
+    let mut words = Vec::new();
+    design.streams(&mut |stream| words.push(stream.sample()));
+    words
+}
+
+/// Declares the streams of an engine, one a line: `name: valid signals => [signals of the word; fields in each]`. `as`
+/// gives the fields a width other than that of their signals; `if` names the method that says whether the engine has the
+/// stream.
+macro_rules! streams {
+    ($engine:ty {$(
+        $name:ident $(if $($chosen:ident).+)?: $($($valid:ident).+)&+
+            => [$($sign:ident $($part:ident).+),+ $(; $count:literal)?] $(as $bits:ident)?,
+    )+}) => {
+        impl Observed for $engine {
+            fn streams(&self, visit: &mut dyn FnMut(&Stream)) {
+                $($(if self.$($chosen).+())? {
+                    visit(&Stream {
+                        name: stringify!($name),
+                        valid: &[$((&[$(stringify!($valid)),+], self.$($valid).+.val())),+],
+                        parts: &[$(Part {
+                            path: &[$(stringify!($part)),+],
+                            signed: is_signed!($sign),
+                            signal: &self.$($part).+,
+                        }),+],
+                        count: [1, $($count)?].into_iter().product(),
+                        field_bits: [$($bits)?].first().copied(),
+                    });
+                })+
+            }
+        }
+    };
+}
+
+/// Whether the fields of a signal are two's complement.
+macro_rules! is_signed {
+    (signed) => {
+        true
+    };
+    (unsigned) => {
+        false
+    };
+}
+
+streams!(engine::Engine {
+    receive: receive.accept => [signed receive.taken_word],
+    choose if receive.chooses: begin_frame => [unsigned receive.which] as CHOICE_FIELD,
+    normalise: fold.normalised_valid => [signed normalise.shifted; 4],
+    fold: fold.folded_valid => [signed fold.folded; 4],
+    pass: pass.quad_valid => [signed pass.quad; 4],
+    rescale: rescale.words_valid => [signed rescale.words; 4],
+    unfold: unfold.taxels_valid => [signed unfold.taxels; 4],
+    search: search.compared
+        => [signed search.best_x, signed search.best_y, signed search.score, unsigned search.taken] as SEARCH_FIELD,
+    force: search.values_valid => [signed search.values; 4],
+});
+
+streams!(serial::Engine {
+    receive: receive.accept => [signed receive.s_axis_tdata],
+    normalise: pass_sequencer.normalised_valid => [signed rounder.rounded],
+    fold: butterfly.quad_valid & pass_sequencer.folding => [signed butterfly.quad; 4],
+    pass: pass.quad_valid => [signed pass.quad; 4],
+    rescale: pass_sequencer.rescaled_valid => [signed rounder.rounded],
+    unfold: unfold.taxel_valid => [signed unfold.taxel],
+    search: search_sequencer.compared
+        => [signed search_sequencer.best_x, signed search_sequencer.best_y, signed search_sequencer.score, unsigned search_sequencer.taken] as SEARCH_FIELD,
+    force: search_sequencer.value_valid => [signed coefficient_shift.value],
+});
+
+#[cfg(test)]
+mod tests {
+    use dermis_golden::board::EngineKind;
+    use dermis_golden::fixed::Model;
+    use dermis_golden::partition::Case;
+    use dermis_golden::scene::Scene;
+
+    use super::*;
+    use crate::language::Hierarchy;
+    use crate::simulate::design;
+
+    fn model(change: impl Fn(&mut Scene)) -> Model {
+        let mut scene = Scene::builtin("eight-by-eight").unwrap();
+        change(&mut scene);
+        Model::new(&scene).unwrap()
+    }
+
+    /// The taps of the engine of `model`, after a check that their signals are in the top module, with their widths.
+    fn checked(model: &Model) -> Vec<Tap> {
+        let engine = design(model).unwrap();
+        let (hierarchy, taps) = (Hierarchy::of(&*engine), taps(&*engine));
+        let (_, top) = hierarchy.kernels().find(|(path, _)| path.is_empty()).unwrap();
+        let bits = |name: &str| top.signal_of(name).map(|id| top.signals[id].ty.bits as u32);
+        for tap in &taps {
+            let each = (tap.fields / tap.word.len()) as u32;
+            assert!(tap.valid.iter().all(|name| bits(name) == Some(1)), "{tap:?}");
+            for signal in &tap.word {
+                assert_eq!(bits(&signal.name), Some(signal.bits), "{}", signal.name);
+                // Fields are two's complement: an unsigned signal needs a bit for the sign.
+                let needed = signal.bits + u32::from(!signal.signed);
+                assert!(needed == each * tap.field_bits || each == 1 && needed < tap.field_bits, "{tap:?}");
+            }
+        }
+        assert_eq!(words(&*engine).len(), taps.len());
+        taps
+    }
+
+    fn names(taps: &[Tap]) -> Vec<&'static str> {
+        taps.iter().map(|tap| tap.name).collect()
+    }
+
+    #[test]
+    fn signals_are_in_the_top_module() {
+        const STAGES: [&str; 8] = ["receive", "normalise", "fold", "pass", "rescale", "unfold", "search", "force"];
+        let parallel = checked(&model(|_| {}));
+        assert_eq!(names(&parallel), STAGES);
+        assert_eq!(parallel[0].valid, ["receive__accept"]);
+        let serial = model(|scene| scene.hardware.board = "icebreaker".into());
+        assert_eq!(serial.board.engine, EngineKind::Serial);
+        let serial = checked(&serial);
+        assert_eq!(names(&serial), STAGES);
+        assert_eq!(serial[2].valid, ["butterfly__quad_valid", "pass_sequencer__folding"]);
+        let choosing = checked(&model(|scene| scene.partition.case = Case::Adaptive));
+        assert_eq!(names(&choosing)[1], "choose");
+        assert_eq!(choosing.len(), 1 + STAGES.len());
+    }
 }

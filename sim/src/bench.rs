@@ -13,7 +13,7 @@
 
 use std::fmt::Write as _;
 
-use dermis_hdl::device::{Inputs, Outputs, Tap};
+use dermis_hdl::device::{Inputs, Outputs, Tap, TapSignal};
 
 /// Hierarchical name of the design's instance.
 pub(crate) const INSTANCE: &str = "bench.dut";
@@ -35,7 +35,7 @@ impl Layout {
         let mut offsets = vec![PIN_WORDS];
         let mut end = PIN_WORDS;
         for tap in taps {
-            end += 1 + tap_bits(tap).div_ceil(32);
+            end += 1 + tap.bits().div_ceil(32);
             offsets.push(end);
         }
         Layout { input_bits, taps: taps.to_vec(), offsets }
@@ -65,7 +65,7 @@ impl Layout {
             data = self.input_bits - 1,
         );
         for (index, tap) in self.taps.iter().enumerate() {
-            let bits = tap_bits(tap);
+            let bits = tap.bits();
             let (first, last) = (32 * self.offsets[index], 32 * self.offsets[index + 1] - 1);
             let padding = last - first + 1 - 32 - bits;
             let zeros = if padding == 0 { String::new() } else { format!("{padding}'d0, ") };
@@ -78,8 +78,8 @@ impl Layout {
                 name = tap.name,
                 fields = tap.fields,
                 width = tap.field_bits,
-                valid = tap.valid.replace("{}", "dut."),
-                data = tap.data.replace("{}", "dut."),
+                valid = valid(tap, "dut"),
+                data = word(tap, "dut"),
                 top_bit = bits - 1,
             );
         }
@@ -115,9 +115,22 @@ impl Layout {
     }
 }
 
-/// Width of a tap's word in bits, at least one.
-fn tap_bits(tap: &Tap) -> usize {
-    (tap.fields * tap.field_bits as usize).max(1)
+/// Verilog expression that is 1 in a cycle in which a word of `tap` passes, for an instance of the design.
+pub fn valid(tap: &Tap, instance: &str) -> String {
+    let signals: Vec<String> = tap.valid.iter().map(|name| format!("{instance}.{name}")).collect();
+    signals.join(" && ")
+}
+
+/// Verilog expression of the word of `tap`, field 0 in the least significant bits, for an instance of the design.
+pub fn word(tap: &Tap, instance: &str) -> String {
+    let bits = tap.bits() / tap.word.len();
+    let extended = |TapSignal { name, bits: own, signed }: &TapSignal| match (bits - *own as usize, signed) {
+        (0, _) => format!("{instance}.{name}"),
+        (more, false) => format!("{more}'d0, {instance}.{name}"),
+        (more, true) => format!("{{{more}{{{instance}.{name}[{}]}}}}, {instance}.{name}", own - 1),
+    };
+    let signals: Vec<String> = tap.word.iter().rev().map(extended).collect();
+    format!("{{{}}}", signals.join(", "))
 }
 
 /// The signed field of `bits` (1..=64) at bit `start` of little-endian 32-bit words.
@@ -135,7 +148,19 @@ mod tests {
     use super::*;
 
     fn tap(name: &'static str, fields: usize, field_bits: u32) -> Tap {
-        Tap { name, valid: "{}v".into(), data: "{}d".into(), fields, field_bits }
+        let word = vec![TapSignal { name: "d".into(), bits: fields as u32 * field_bits, signed: true }];
+        Tap { name, valid: vec!["v".into()], word, fields, field_bits }
+    }
+
+    #[test]
+    fn signals_are_extended_to_their_fields() {
+        assert_eq!(word(&tap("a", 4, 20), "dut"), "{dut.d}");
+        let signal = |name: &str, bits, signed| TapSignal { name: name.into(), bits, signed };
+        let word_of = vec![signal("x", 11, true), signal("y", 32, true), signal("taken", 1, false)];
+        let valid_of = vec!["m__valid".into(), "l__folding".into()];
+        let tap = Tap { name: "a", valid: valid_of, word: word_of, fields: 3, field_bits: 32 };
+        assert_eq!(valid(&tap, "dut"), "dut.m__valid && dut.l__folding");
+        assert_eq!(word(&tap, "dut"), "{31'd0, dut.taken, dut.y, {21{dut.x[10]}}, dut.x}");
     }
 
     #[test]

@@ -5,7 +5,7 @@
 use std::path::PathBuf;
 
 use dermis_golden::fixed::{Cycles, Stage, Trace};
-use dermis_hdl::device::{Device, Inputs, Outputs, Tap};
+use dermis_hdl::device::{Device, Inputs, Outputs, Tap, TapSignal};
 use dermis_sim::cosim::{compare_recording, run, DeviceUnderTest, Findings, Vector, KEPT_PER_FRAME};
 use dermis_sim::drive::{record, InputFrame, Stimulus, Times};
 use dermis_sim::verilator::{Design, Verilated, VerilatorError};
@@ -18,14 +18,14 @@ const TAPS: [&str; 2] = ["receive", "scale"];
 const STALLS: Stimulus = Stimulus::Stalls { seed: 7 };
 
 fn taps() -> Vec<Tap> {
-    let tap = |name, valid: &str, data: &str, field_bits| Tap {
+    let tap = |name, valid: &str, word: &str, bits| Tap {
         name,
-        valid: valid.into(),
-        data: data.into(),
+        valid: vec![valid.into()],
+        word: vec![TapSignal { name: word.into(), bits, signed: true }],
         fields: 1,
-        field_bits,
+        field_bits: bits,
     };
-    vec![tap("receive", "{}take", "{}s_axis_tdata", 12), tap("scale", "{}scale_valid", "{}scaled", 32)]
+    vec![tap("receive", "take", "s_axis_tdata", 12), tap("scale", "scale_valid", "scaled", 32)]
 }
 
 fn cache() -> PathBuf {

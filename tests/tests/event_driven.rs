@@ -9,6 +9,7 @@ use std::process::{Child, ChildStdin, ChildStdout, Command, Stdio};
 use dermis_golden::fixed::Model;
 use dermis_hdl::device::{Device, Inputs, Outputs, Tap};
 use dermis_hdl::Generated;
+use dermis_sim::bench::{valid, word};
 use dermis_sim::cosim::{run, DeviceUnderTest, Findings, Vector};
 use dermis_sim::drive::Stimulus;
 use dermis_sim::hardware::Hardware;
@@ -21,10 +22,8 @@ const WORD: usize = 32;
 /// A bench that reads the pins of a cycle as a hexadecimal number and writes the output pins and the taps, valid and
 /// word, in binary, before the rising edge.
 fn bench(top: &str, code_bits: u32, taps: &[Tap]) -> String {
-    let of = |expression: &str| expression.replace("{}", "dut.");
     let declared = taps.iter().enumerate().map(|(k, tap)| {
-        let bits = tap.fields * tap.field_bits as usize;
-        format!("  wire v{k} = {};\n  wire [{}:0] d{k} = {};\n", of(&tap.valid), bits - 1, of(&tap.data))
+        format!("  wire v{k} = {};\n  wire [{}:0] d{k} = {};\n", valid(tap, "dut"), tap.bits() - 1, word(tap, "dut"))
     });
     let declared: String = declared.collect();
     let format = " %b %b".repeat(taps.len());
