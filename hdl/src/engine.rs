@@ -46,7 +46,7 @@ impl ReceiveStage {
 
     /// Whether a case is chosen per frame.
     pub(crate) fn chooses(&self) -> bool {
-        matches!(self, Receiver::Banks(_))
+        matches!(self, ReceiveStage::Banks(_))
     }
 }
 
