@@ -19,7 +19,7 @@ use crate::core_file::core_file;
 use crate::describe::port_comment;
 use crate::device::Tap;
 use crate::explain::Explained;
-use crate::language::{self, Attributes, Hierarchy, KernelError};
+use crate::language::{self, Attributes, Change, Hierarchy, KernelError};
 use crate::manifest::seal;
 use crate::primitives::MEMORY_FILE;
 use crate::simulate::design;
@@ -134,10 +134,18 @@ pub(crate) fn usage(model: &Model) -> Result<BTreeMap<String, Usage>, HdlError> 
 /// # Errors
 /// [`HdlError::Check`] if the description fails rust-hdl's checks: a defect of this crate.
 pub fn generate(model: &Model) -> Result<Generated, HdlError> {
+    generate_changed(model, &[])
+}
+
+/// As [`generate()`], with seeded defects in the Verilog: for a test that a check finds them.
+///
+/// # Errors
+/// As [`generate()`]; a change that does not apply to the hardware.
+pub fn generate_changed(model: &Model, changes: &[Change]) -> Result<Generated, HdlError> {
     let engine = design(model)?;
     let top = top_name(&model.scene.name);
     let file = |name: String, text: String| GeneratedFile { name, text };
-    let hierarchy = Hierarchy::of(&*engine);
+    let hierarchy = Hierarchy::of(&*engine).changed(changes)?;
     let memories = placed(&hierarchy, model)?;
     let verilog = header(model, &top) + &hierarchy.verilog(&top, &attributes(&memories, model), &port_comment);
     let usage = stages(model, &hierarchy, &memories);

@@ -44,5 +44,5 @@ mod ports;
 mod simulate;
 mod taps;
 
-pub use generate::{generate, Generated, GeneratedFile, HdlError, Refused};
+pub use generate::{generate, generate_changed, Generated, GeneratedFile, HdlError, Refused};
 pub use simulate::simulator;

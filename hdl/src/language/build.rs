@@ -208,6 +208,46 @@ impl Builder {
         result
     }
 
+    /// Over a finished kernel, to build expressions of what it has.
+    pub(super) fn over(kernel: Kernel) -> Self {
+        Builder { kernel: RefCell::new(kernel), ..Builder::default() }
+    }
+
+    /// The signal of this name, in a [`Change`](super::Change) of a finished kernel.
+    pub fn named(&self, name: &str) -> Expr<'_> {
+        let found = {
+            let kernel = self.kernel.borrow();
+            kernel.signal_of(name).map(|id| (Node::Signal(id), kernel.signals[id].ty))
+        };
+        match found {
+            Some((node, ty)) => self.node(node, ty),
+            None => {
+                self.unknown(name);
+                self.constant(1, 0)
+            }
+        }
+    }
+
+    /// The memory of this name, in a [`Change`](super::Change) of a finished kernel.
+    pub fn array(&self, name: &str) -> MemoryPort<'_> {
+        let found = {
+            let kernel = self.kernel.borrow();
+            kernel.memories.iter().position(|memory| memory.name == name).map(|at| (at, kernel.memories[at].bits))
+        };
+        match found {
+            Some((memory, bits)) => MemoryPort { builder: self, memory, bits },
+            None => {
+                self.unknown(name);
+                self.memory(name, 1, 1, Contents::Undefined)
+            }
+        }
+    }
+
+    fn unknown(&self, name: &str) {
+        let (block, signal) = (self.block(), name.to_owned());
+        self.fail(KernelError::Change { block, signal, reason: "is neither signal nor memory of it" });
+    }
+
     /// The kernel; its [`Kernel::errors`] list what is wrong with it.
     pub fn finish(self) -> Kernel {
         let mut kernel = self.kernel.into_inner();

@@ -77,6 +77,16 @@ pub enum KernelError {
         /// What is wrong with it.
         reason: &'static str,
     },
+    /// A seeded defect that does not apply to the block, or reads what the block does not have.
+    #[error("block {block}, signal {signal}: {reason}")]
+    Change {
+        /// Path or name of the block.
+        block: String,
+        /// The signal that was to be changed or read.
+        signal: String,
+        /// Why not.
+        reason: &'static str,
+    },
     /// A block that connects others says what a connection cannot.
     #[error("block {block}: `{what}` {reason}")]
     Wiring {

@@ -11,6 +11,7 @@ use std::sync::Arc;
 use rust_hdl::core::probe::Probe;
 use rust_hdl::prelude::*;
 
+use super::change::Change;
 use super::error::KernelError;
 use super::kernel::{Kernel, Role};
 use super::keywords::is_keyword;
@@ -126,6 +127,19 @@ impl Hierarchy {
             }
         }
         self.loops()
+    }
+
+    /// The same blocks with these changes: seeded defects, which a check must find.
+    ///
+    /// # Errors
+    /// [`KernelError::Change`] for a block or a signal that the design does not have; what is wrong with a new value.
+    pub fn changed(mut self, changes: &[Change]) -> Result<Self, KernelError> {
+        for change in changes {
+            let module = self.modules.get_mut(change.block());
+            let kernel = module.and_then(|module| module.kernel.as_mut()).ok_or_else(|| change.without_block())?;
+            *kernel = Arc::new(change.apply(kernel)?);
+        }
+        Ok(self)
     }
 
     /// Finds a combinational loop through several blocks.

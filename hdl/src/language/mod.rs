@@ -24,6 +24,7 @@
 
 mod block;
 mod build;
+mod change;
 mod check;
 mod compile;
 mod error;
@@ -44,6 +45,7 @@ mod tests;
 
 pub use block::{Body, Port};
 pub use build::{Builder, MemoryPort, Net};
+pub use change::Change;
 pub use error::KernelError;
 pub use expression::{concat, Expr, ARITHMETIC_BITS};
 pub use hierarchy::{Attributes, Comment, Hierarchy, SEPARATOR};

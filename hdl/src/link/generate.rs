@@ -9,7 +9,7 @@ use serde_json::json;
 use super::{Board, BoardTop, SerialBoardTop, SerialSpiBoardTop, SpiBoardTop};
 use crate::describe::{comments, port_comment};
 use crate::generate::{attributes, placed, top_name, Generated, GeneratedFile, HdlError};
-use crate::language::Hierarchy;
+use crate::language::{Change, Hierarchy};
 
 /// The board of `model`, after rust-hdl's checks.
 pub(super) fn board_top(model: &Model) -> Result<Box<dyn Board>, HdlError> {
@@ -64,10 +64,18 @@ fn link_text(link: LinkKind, bit_rate: u32) -> (&'static str, String) {
 /// As [`crate::generate()`]; [`HdlError::Unsupported`] without a search; [`HdlError::Link`] if packets are too long,
 /// the board lacks the link, or the clock is too slow for the bit rate.
 pub fn generate_board(model: &Model) -> Result<Generated, HdlError> {
+    generate_board_changed(model, &[])
+}
+
+/// As [`generate_board`], with seeded defects in the Verilog: for a test that a check finds them.
+///
+/// # Errors
+/// As [`generate_board`]; a change that does not apply to the hardware.
+pub fn generate_board_changed(model: &Model, changes: &[Change]) -> Result<Generated, HdlError> {
     let board = board_top(model)?;
     let engine = crate::generate(model)?;
     let top = format!("{}_board", top_name(&model.scene.name));
-    let hierarchy = Hierarchy::of(&*board);
+    let hierarchy = Hierarchy::of(&*board).changed(changes)?;
     let memories = placed(&hierarchy, model)?;
     let comment = |path: &str, port: &str| match (path, path.strip_prefix("engine__")) {
         ("", _) => comments(include_str!("board_top.rs")).remove(port),

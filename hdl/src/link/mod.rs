@@ -38,7 +38,7 @@ pub use board_top::{BoardTop, SerialBoardTop, SerialSpiBoardTop, SpiBoardTop};
 pub use counter_ram::CounterRam;
 pub use crc::Crc;
 pub use frame_ingress::FrameIngress;
-pub use generate::generate_board;
+pub use generate::{generate_board, generate_board_changed};
 pub use lamps::Lamps;
 pub use packer::Packer;
 pub use packet_link::PacketLink;
