@@ -9,6 +9,8 @@ use dermis_golden::partition::{Case, Grid};
 use dermis_golden::quantise::quantise;
 use dermis_golden::reconstruct::Golden;
 use dermis_golden::scene::Scene;
+use dermis_hdl::generate_changed;
+use dermis_hdl::language::Change;
 use dermis_sim::compare::median;
 use dermis_sim::cosim::{run, DeviceUnderTest, Findings, Vector};
 use dermis_sim::drawn_frames::{DrawnFrames, Shapes};
@@ -128,20 +130,20 @@ fn a_frame_becomes_what_its_case_makes_of_it() {
 fn a_wrong_constant_is_found() {
     let mut hardware = hardware(&scene("eight-by-eight", "[partition]\ncases = [0, 1]\n"));
     let vectors = vectors(&hardware, 1);
-    let good = hardware.generated.files[0].text.clone();
     assert!(check(&hardware, Simulator::Verilator, &vectors, &[Stimulus::FullSpeed]).is_equal());
-    let share = format!("{{{CUT_SHIFT}'d0, peak[18:{CUT_SHIFT}]}}");
-    let wrong_share = format!("{{{}'d0, peak[18:{}]}}", CUT_SHIFT ^ 1, CUT_SHIFT ^ 1);
     let changes = [
         // The threshold of the choice; the quads of a subarray.
-        (share.as_str(), wrong_share.as_str()),
-        ("which == 1'b1 ? 4'd3 : 4'd15", "which == 1'b1 ? 4'd2 : 4'd15"),
+        Change::within("receive__choose", "limit", |k| {
+            let peak = k.named("peak");
+            [CUT_SHIFT, CUT_SHIFT ^ 1].map(|by| peak.shift_right(by as usize).extend(peak.bits()))
+        }),
+        Change::within("fold__quads", "last", |k| [3, 2].map(|quads| k.constant(4, quads))),
     ];
-    for (right, wrong) in changes {
-        assert!(good.contains(right), "{right} is not in the Verilog");
-        hardware.generated.files[0].text = good.replace(right, wrong);
+    for change in changes {
+        let name = change.to_string();
+        hardware.generated = generate_changed(&hardware.model, &[change]).unwrap();
         let findings = check(&hardware, Simulator::Verilator, &vectors, &[Stimulus::FullSpeed]);
-        assert!(!findings.is_equal(), "{wrong} went unnoticed");
+        assert!(!findings.is_equal(), "the change of {name} went unnoticed");
     }
 }
 

@@ -29,6 +29,12 @@ pub struct Change {
     kind: Kind,
 }
 
+impl std::fmt::Display for Change {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "{}, signal {}", self.block, self.signal)
+    }
+}
+
 impl Change {
     fn new(block: &str, signal: &str, kind: Kind) -> Self {
         Change { block: block.to_owned(), signal: signal.to_owned(), kind }

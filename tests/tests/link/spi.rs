@@ -4,7 +4,8 @@ use dermis_golden::fixed::{Cycles, Model};
 use dermis_golden::link::slip::{END, IDLE};
 use dermis_golden::link::{Counters, Decoder, Identity, Kind, LinkKind, Packet, PacketError};
 use dermis_golden::scene::Scene;
-use dermis_hdl::link::{generate_board, BoardDevice};
+use dermis_hdl::language::Change;
+use dermis_hdl::link::{generate_board, generate_board_changed, BoardDevice};
 use dermis_sim::board::{SpiController, VerilatedBoard};
 use dermis_sim::hardware::Simulator;
 use dermis_tests::{build_dir, scene};
@@ -171,13 +172,10 @@ fn is_whole(board: &mut Board, cuts: [usize; 2]) -> bool {
     packets == wanted
 }
 
-/// A small board under Verilator with `from` replaced by `to` in its Verilog.
-fn small_board_with(from: &str, to: &str) -> Board {
+/// A small board under Verilator with this defect.
+fn small_board_with(defect: Change) -> Board {
     let questions = over_spi(small(SINGLE_BYTE), RATE);
-    let mut generated = generate_board(&questions.model).unwrap();
-    let verilog = generated.files.iter_mut().find(|file| file.name.ends_with(".v")).unwrap();
-    assert_eq!(verilog.text.matches(from).count(), 1, "{from}");
-    verilog.text = verilog.text.replace(from, to);
+    let generated = generate_board_changed(&questions.model, &[defect]).unwrap();
     let device = VerilatedBoard::new(&generated, LinkKind::Spi, &build_dir().join("verilator")).unwrap();
     Board::with(Box::new(device), questions, RATE, 0.6)
 }
@@ -202,13 +200,14 @@ fn transactions_may_end_after_any_edge() {
 fn a_byte_given_up_too_early_or_too_late_is_found() {
     let defects = [
         // Dropped when the next byte is ready, whether or not its bits have been read, or at the end of a transaction.
-        ("sclk_last && (sclk_carries || !sclk_full)", "sclk_last"),
-        ("sclk_carries <= 1'b0;", "sclk_carries <= sclk_carries;"),
+        Change::value("line", "sclk_stores", |k| k.named("sclk_last")),
+        Change::undefined("line", "sclk_carries"),
         // Acknowledged whether or not there was a byte.
-        ("sclk_taken <= sclk_offered[1];", "sclk_taken <= !sclk_taken;"),
+        Change::within("line", "sclk_taken", |k| [k.named("sclk_offered").at(1), !k.named("sclk_taken")]),
     ];
-    for (from, to) in defects {
-        assert_ne!(broken(&mut small_board_with(from, to)), None, "{from} → {to} went unnoticed");
+    for defect in defects {
+        let name = defect.to_string();
+        assert_ne!(broken(&mut small_board_with(defect)), None, "the defect in {name} went unnoticed");
     }
 }
 

@@ -31,14 +31,13 @@ use dermis_golden::fixed::resources::count_bits;
 use dermis_golden::fixed::send::STATUS_BEATS;
 use dermis_golden::fixed::Model;
 use dermis_golden::scene::Scene;
-use dermis_hdl::generate;
-use dermis_hdl::link::generate_board;
+use dermis_hdl::language::Change;
 use dermis_hdl::primitives::FORCE_STEPS;
 
 mod prover;
 mod queues;
 
-use prover::{number, Proof};
+use prover::{number, Hardware, Proof};
 
 const ROWS: usize = 2;
 const COLS: usize = 3;
@@ -66,45 +65,48 @@ fn prepared() -> Model {
 
 #[test]
 fn streams_keep_what_they_offer() {
-    let sums = model("[output]\nforces = \"resultants\"\n");
+    let (prepared, sums, plain) = (prepared(), model("[output]\nforces = \"resultants\"\n"), model(""));
     let streams = [
         (
-            generate(&prepared()),
+            Hardware::Engine(&prepared),
             "prepare",
             [8, 9],
-            "wire moves = !m_axis_tvalid || m_axis_tready;",
-            "wire moves = 1'b1;",
+            Change::value("prepare__average", "moves", |k| k.constant(1, 1)),
         ),
-        (generate(&sums), "resultants", [96, 96], "wire sent = sending && m_axis_tready;", "wire sent = sending;"),
-        (generate_board(&model("")), "link__back", [96, 96], "if (!m_axis_tvalid) m_axis_tdata <=", "m_axis_tdata <="),
+        (Hardware::Engine(&sums), "resultants", [96, 96], Change::value("resultants", "sent", |k| k.named("sending"))),
+        (
+            Hardware::Board(&plain),
+            "link__back",
+            [96, 96],
+            Change::value("link__back", "m_axis_tdata", |k| k.named("s_axis_tdata")),
+        ),
     ];
-    for (generated, block, [taken, offered], sound, broken) in streams {
+    for (hardware, block, [taken, offered], defect) in streams {
         let given = vec![("BLOCK", format!("@TOP@__{block}")), ("IN", number(taken)), ("OUT", number(offered))];
-        let (generated, defects) = (&generated.unwrap(), &[(sound, broken)]);
-        Proof { generated, property: "stream.v", given, defects, open_products: true }.run();
+        Proof { hardware, property: "stream.v", given, defects: vec![defect], open_products: true }.run();
     }
 }
 
 #[test]
 fn calibrate_loses_nothing_and_saturates() {
-    let generated = &generate(&prepared()).unwrap();
+    let hardware = Hardware::Engine(&prepared());
     let sign = |zero: i32| if zero < 0 { "-" } else { "" };
     let zero = |(taxel, zero): (usize, &i32)| format!("      3'd{taxel}: zero = {}16'sd{};\n", sign(*zero), zero.abs());
     let zeros: String = ZEROS.iter().enumerate().map(zero).collect();
-    let defects = [
-        ("wire moves = !valids[1] || m_axis_tready;", "wire moves = 1'b1;"),
-        ("wire clipped = sign != {{2{sign[1]}}};", "wire clipped = 1'b0;"),
-    ];
+    let never = |signal, bit| Change::value("prepare__calibrate", signal, move |k| k.constant(1, bit));
+    let defects = vec![never("moves", 1), never("clipped", 0)];
     let given = vec![("ZEROS", zeros), ("BITS", number(8)), ("MOST", number(127)), ("LAST", number(ZEROS.len() - 1))];
-    Proof { generated, property: "calibrate.v", given, defects: &defects, open_products: false }.run();
+    Proof { hardware, property: "calibrate.v", given, defects, open_products: false }.run();
 }
 
 #[test]
 fn average_gives_as_many_sums_as_taxels() {
-    let generated = &generate(&prepared()).unwrap();
+    let hardware = Hardware::Engine(&prepared());
     let given = vec![("BITS", number(8)), ("LAST", number(ROWS * COLS - 1))];
-    let defects = &[("m_axis_tvalid <= held && held_leaves;", "m_axis_tvalid <= held;")];
-    Proof { generated, property: "average.v", given, defects, open_products: false }.run();
+    // A sum leaves with every frame.
+    let defects =
+        vec![Change::within("prepare__average", "m_axis_tvalid", |k| [k.named("held_leaves"), k.constant(1, 1)])];
+    Proof { hardware, property: "average.v", given, defects, open_products: false }.run();
 }
 
 #[test]
@@ -112,8 +114,11 @@ fn receive_holds_whole_frames() {
     let quads = Quads { rows: ROWS, cols: COLS };
     let bits = count_bits(quads.len());
     let place = |k: usize| format!("      {}'d{k}: own = 8'd{};\n", bits + 2, quads.taxel(k / 4, k % 4));
-    let generated = &generate(&prepared()).unwrap();
-    let defects = [("dead ? 9'd0 : word", "word"), ("frame__write = broadcast__write;", "frame__write = scan__mask;")];
+    let defects = vec![
+        // A dead taxel keeps its code; a lane is written without a beat.
+        Change::value("receive__dead_taxels", "kept", |k| k.named("word")),
+        Change::value("receive", "frame__write", |k| k.named("scan__mask")),
+    ];
     let given = vec![
         ("PLACES", (0..4 * quads.len()).map(place).collect()),
         ("DEAD", format!("count == 8'd{DEAD}")),
@@ -121,7 +126,8 @@ fn receive_holds_whole_frames() {
         ("LAST", number(ROWS * COLS - 1)),
         ("ADDRESS", number(bits)),
     ];
-    Proof { generated, property: "receive.v", given, defects: &defects, open_products: false }.run();
+    let hardware = Hardware::Engine(&prepared());
+    Proof { hardware, property: "receive.v", given, defects, open_products: false }.run();
 }
 
 #[test]
@@ -134,48 +140,53 @@ fn send_gives_whole_frames() {
         ("STEPS", number(FORCE_STEPS)),
         ("WIDTH", number(FORCE_STEPS + 10)),
     ];
-    let defects = [
-        ("last <= leaves && beat_out == 2'd3", "last <= leaves && beat_out == 2'd2"),
-        ("step = sending__q && room;", "step = sending__q;"),
+    let defects = vec![
+        // tlast comes a beat early; a beat is requested without room.
+        Change::within("forces__unit", "last", |k| [3, 2].map(|beat| k.named("beat_out").is(beat))),
+        Change::value("send", "step", |k| k.named("sending__q")),
     ];
-    Proof { generated: &generate(&model).unwrap(), property: "send.v", given, defects: &defects, open_products: true }
-        .run();
+    let hardware = Hardware::Engine(&model);
+    Proof { hardware, property: "send.v", given, defects, open_products: true }.run();
 }
 
 #[test]
 fn counters_stay_below_their_limits() {
-    let generated = &generate(&prepared()).unwrap();
+    let model = prepared();
     for (block, limit) in [("receive__scan__col", COLS), ("send__scan__col", COLS), ("send__words", STATUS_BEATS)] {
-        let (bits, end) = (count_bits(limit), limit - 1);
+        let bits = count_bits(limit);
         let given = vec![("BLOCK", format!("@TOP@__{block}")), ("BITS", number(bits)), ("LIMIT", number(limit))];
-        let [sound, broken] = [end, limit].map(|end| format!("last = value == {bits}'d{end};"));
-        let defects = &[(sound.as_str(), broken.as_str())];
-        Proof { generated, property: "counter.v", given, defects, open_products: false }.run();
+        let defects = vec![Change::value(block, "last", move |k| k.named("value").is(limit as u64))];
+        let hardware = Hardware::Engine(&model);
+        Proof { hardware, property: "counter.v", given, defects, open_products: false }.run();
     }
 }
 
 #[test]
 fn bytes_of_the_link_read_back() {
-    let generated = &generate_board(&model("")).unwrap();
     let given = vec![("BLOCK", "@TOP@__link__encoder".into())];
-    let defects = &[("second <= special && !second;", "second <= special;")];
-    Proof { generated, property: "slip.v", given, defects, open_products: false }.run();
+    // A byte that follows an escape is sent again and again.
+    let defects = vec![Change::within("link__encoder", "second", |k| {
+        [k.named("special") & !k.named("second"), k.named("special")]
+    })];
+    let hardware = Hardware::Board(&model(""));
+    Proof { hardware, property: "slip.v", given, defects, open_products: false }.run();
 }
 
 #[test]
 fn the_frame_ingress_keeps_what_it_offers_and_gives_the_engine_good_frames_only() {
-    let generated = &generate_board(&model("")).unwrap();
     let taxels = ROWS * COLS;
-    let defects = [
-        // An offered code is dropped with its packet; one code is buffered instead of two.
-        ("fill <= drop ? {1'b0, waits} :", "fill <= drop ? 2'd0 :"),
-        ("delivered != 3'd3", "delivered != 3'd4"),
+    let ingress = "link__ingress";
+    let defects = vec![
+        // An offered code is dropped with its packet; codes that leave before the end of the packet are one too many.
+        Change::within(ingress, "fill", |k| [k.named("waits").extend(2), k.constant(2, 0)]),
+        Change::within(ingress, "ahead", |k| [3, 4].map(|last| k.named("delivered").is(last))),
     ];
     let given = vec![
-        ("BLOCK", "@TOP@__link__ingress".into()),
+        ("BLOCK", format!("@TOP@__{ingress}")),
         ("BITS", number(8)),
         ("BYTES", number(taxels)),
         ("LAST", number(taxels - 1)),
     ];
-    Proof { generated, property: "frame_ingress.v", given, defects: &defects, open_products: false }.run();
+    let hardware = Hardware::Board(&model(""));
+    Proof { hardware, property: "frame_ingress.v", given, defects, open_products: false }.run();
 }

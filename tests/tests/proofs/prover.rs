@@ -3,18 +3,40 @@
 use std::path::Path;
 use std::process::Command;
 
-use dermis_hdl::Generated;
+use dermis_golden::fixed::Model;
+use dermis_hdl::language::Change;
+use dermis_hdl::link::generate_board_changed;
+use dermis_hdl::{generate_changed, Generated};
 
-/// A property, the Verilog to be proved, and defects that must break it.
+/// What is proved.
+#[derive(Clone, Copy)]
+pub enum Hardware<'a> {
+    /// The engine of a model.
+    Engine(&'a Model),
+    /// The same behind its board's link.
+    Board(&'a Model),
+}
+
+impl Hardware<'_> {
+    fn generate(self, changes: &[Change]) -> Generated {
+        let generated = match self {
+            Hardware::Engine(model) => generate_changed(model, changes),
+            Hardware::Board(model) => generate_board_changed(model, changes),
+        };
+        generated.unwrap_or_else(|error| panic!("{error}"))
+    }
+}
+
+/// A property, the hardware to be proved, and defects that must break it.
 pub struct Proof<'a> {
-    /// The Verilog.
-    pub generated: &'a Generated,
+    /// The hardware.
+    pub hardware: Hardware<'a>,
     /// File in `tests/proofs`. A module defined in it replaces the design's module of that name.
     pub property: &'a str,
     /// Placeholders of the property file and their values.
     pub given: Vec<(&'a str, String)>,
-    /// Defects: a text in the Verilog and its replacement.
-    pub defects: &'a [(&'a str, &'a str)],
+    /// Seeded defects, each with which the property must fail.
+    pub defects: Vec<Change>,
     /// Whether products are left undetermined, because no property depends on them.
     pub open_products: bool,
 }
@@ -71,9 +93,9 @@ fn abc(folder: &Path, commands: &str) -> String {
 
 impl Proof<'_> {
     /// Proves the property, then checks that it fails with each of the defects.
-    pub fn run(&self) {
+    pub fn run(self) {
         let folder = tempfile::tempdir().unwrap();
-        let Generated { top, files, .. } = self.generated;
+        let Generated { top, files, .. } = &self.hardware.generate(&[]);
         files.iter().for_each(|file| std::fs::write(folder.path().join(&file.name), &file.text).unwrap());
         let property = Path::new(env!("CARGO_MANIFEST_DIR")).join("proofs").join(self.property);
         let mut text = std::fs::read_to_string(&property).unwrap();
@@ -83,13 +105,13 @@ impl Proof<'_> {
         std::fs::write(folder.path().join("proof.v"), text.replace("@TOP@", top)).unwrap();
         assert!(proved(folder.path(), top, self.open_products), "{} {:?}", self.property, self.given);
 
-        let verilog = folder.path().join(format!("{top}.v"));
-        let sound = std::fs::read_to_string(&verilog).unwrap();
-        for (from, to) in self.defects {
-            assert!(sound.contains(from), "nothing to break: {from}");
-            std::fs::write(&verilog, sound.replace(from, to)).unwrap();
+        let verilog = format!("{top}.v");
+        for defect in self.defects {
+            let name = defect.to_string();
+            let broken = self.hardware.generate(&[defect]).files.into_iter().find(|file| file.name == verilog);
+            std::fs::write(folder.path().join(&verilog), broken.unwrap().text).unwrap();
             let noticed = !proved(folder.path(), top, self.open_products);
-            assert!(noticed, "{}: {from} → {to} went unnoticed", self.property);
+            assert!(noticed, "{}: the defect in {name} went unnoticed", self.property);
         }
     }
 }

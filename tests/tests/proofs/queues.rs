@@ -3,16 +3,16 @@
 use dermis_golden::fixed::formats::SEARCH_EXTRA_BITS;
 use dermis_golden::fixed::resources::{count_bits, operand_vectors};
 use dermis_golden::fixed::send::STATUS_BEATS;
+use dermis_golden::fixed::Model;
 use dermis_golden::link::{payloads, Counters, Identity, ANSWER};
-use dermis_hdl::link::generate_board;
+use dermis_hdl::language::Change;
 use dermis_hdl::primitives::QUEUE_PLACES;
-use dermis_hdl::{generate, Generated};
 
-use super::prover::{number, Proof};
+use super::prover::{number, Hardware, Proof};
 use super::{model, COLS, ROWS};
 
-/// Widths of the rescaler's words.
-fn widths() -> (Generated, Vec<(&'static str, String)>, usize) {
+/// A model, and the widths of its rescaler's words.
+fn widths() -> (Model, Vec<(&'static str, String)>) {
     let model = model("");
     let f = &model.formats;
     let given = vec![
@@ -24,47 +24,55 @@ fn widths() -> (Generated, Vec<(&'static str, String)>, usize) {
         ("LESS", number(SEARCH_EXTRA_BITS as usize)),
         ("ROWS", number(f.quads)),
     ];
-    (generate(&model).unwrap(), given, f.vector_bits as usize)
+    (model, given)
 }
 
 #[test]
 fn rescaled_words_are_rounded_and_held_to_their_range() {
-    let (generated, given, word) = widths();
-    let (half, none) = (format!("+ {}'d1;\n", word + 1), format!("+ {}'d0;\n", word + 1));
-    let defects = [
-        ("word <= lane_0__clipped ? ", "word <= 1'b0 ? "),
-        ("lane_0__overflow ? ", "1'b0 ? "),
-        (half.as_str(), none.as_str()),
-        ("lane_0__carry ? ", "1'b0 ? "),
-        ("clipped3 <= valid2 ? ", "clipped3 <= 1'b1 ? "),
+    let (model, given) = widths();
+    let word = model.formats.vector_bits as usize;
+    let never = |lane: &str, signal: &'static str| {
+        Change::within("rescale__rescaler", &format!("lane_0__{lane}"), move |k| [k.named(signal), k.constant(1, 0)])
+    };
+    let defects = vec![
+        // A word, an operand is not saturated; a half is not added; its carry, and whether a quad is valid, not heeded.
+        never("word", "lane_0__clipped"),
+        never("operand", "lane_0__overflow"),
+        Change::within("rescale__rescaler", "lane_0__half_up", move |k| [1, 0].map(|half| k.constant(word + 1, half))),
+        never("clipped", "lane_0__carry"),
+        Change::within("rescale__rescaler", "clipped3", |k| [k.named("valid2"), k.constant(1, 1)]),
     ];
-    Proof { generated: &generated, property: "rescale.v", given, defects: &defects, open_products: false }.run();
+    let hardware = Hardware::Engine(&model);
+    Proof { hardware, property: "rescale.v", given, defects, open_products: false }.run();
 }
 
 #[test]
 fn rows_that_wait_for_their_shift_come_out_in_order() {
-    let (generated, given, _) = widths();
-    let defects = [
-        ("replay__enable = replaying__q;", "replay__enable = 1'b0;"),
-        ("raw__write_address = rows__value;", "raw__write_address = ~rows__value;"),
-        ("enters = read__q || quad_valid && !collecting__q;", "enters = read__q || quad_valid;"),
+    let (model, given) = widths();
+    let defects = vec![
+        // The replay stands still; rows are written in the wrong order; raw rows pass unshifted.
+        Change::value("rescale", "replay__enable", |k| k.constant(1, 0)),
+        Change::value("rescale", "raw__write_address", |k| !k.named("rows__value")),
+        Change::value("rescale", "enters", |k| k.named("read__q") | k.named("quad_valid")),
     ];
-    Proof { generated: &generated, property: "replay.v", given, defects: &defects, open_products: false }.run();
+    let hardware = Hardware::Engine(&model);
+    Proof { hardware, property: "replay.v", given, defects, open_products: false }.run();
 }
 
 #[test]
 fn forces_that_wait_leave_in_order() {
-    let generated = &generate(&model("")).unwrap();
-    let places = format!("now_reserved != 5'd{QUEUE_PLACES}");
-    let more = format!("now_reserved != 5'd{}", QUEUE_PLACES + 1);
-    let defects = [
-        (places.as_str(), more.as_str()),
-        ("if (part_0) m_axis_tdata <=", "if (waits) m_axis_tdata <="),
-        ("= places[read[3:0]]", "= places[~read[3:0]]"),
-    ];
+    let model = model("");
     for bit in [0, 95] {
+        let queue = "forces__leaving";
+        let defects = vec![
+            // One place too many is promised; an offered word changes; words leave in the wrong order.
+            Change::value(queue, "room", |k| !k.named("now_reserved").is(QUEUE_PLACES as u64 + 1)),
+            Change::within(queue, "m_axis_tdata", |k| [k.named("moves") & k.named("waits"), k.named("waits")]),
+            Change::value(queue, "head", |k| k.array("places").read(!k.named("read").low(4))),
+        ];
         let given = vec![("PLACES", number(QUEUE_PLACES)), ("BIT", number(bit))];
-        Proof { generated, property: "queue.v", given, defects: &defects, open_products: false }.run();
+        let hardware = Hardware::Engine(&model);
+        Proof { hardware, property: "queue.v", given, defects, open_products: false }.run();
     }
 }
 
@@ -79,14 +87,16 @@ fn operand_vectors_stay_inside_their_memory() {
         ("VECTORS", number(vectors)),
         ("QUADS", number(quads)),
     ];
-    let (generated, defects) = (&generate(&model).unwrap(), &[("keep = valid && finished != 1'b1;", "keep = valid;")]);
-    Proof { generated, property: "operand_writer.v", given, defects, open_products: false }.run();
+    // Vectors are written beyond the last operand.
+    let defects = vec![Change::value("pass__operand_writer", "keep", |k| k.named("valid"))];
+    let hardware = Hardware::Engine(&model);
+    Proof { hardware, property: "operand_writer.v", given, defects, open_products: false }.run();
 }
 
 #[test]
 fn the_link_takes_and_gives_each_byte_once() {
     let model = model("");
-    let generated = &generate_board(&model).unwrap();
+    let hardware = Hardware::Board(&model);
     let [(_, _), (_, resultants), (_, forces)] = payloads(&model);
     let packer = vec![
         ("BLOCK", "@TOP@__link__packer".into()),
@@ -96,31 +106,35 @@ fn the_link_takes_and_gives_each_byte_once() {
         ("FORCES", number(forces)),
         ("FIRST", number(usize::from(ANSWER) + 1)),
     ];
-    let defects = [
-        ("index == (wanted ? 4'd11 : 4'd3)", "index == (wanted ? 4'd10 : 4'd3)"),
-        // Defects: a byte changes while it is offered; a byte is sent before the CRC has processed the last one.
-        ("if (!valid) content <= stage", "content <= stage"),
-        ("!crc_busy && (!wanted || word_valid)", "(!wanted || word_valid)"),
+    let defects = vec![
+        // A word ends a byte early; a byte changes while it is offered; a byte is sent before the CRC has processed the
+        // last one.
+        Change::within("link__packer", "at_end", |k| [11, 10].map(|last| k.constant(4, last))),
+        Change::within("link__packer", "content", |k| [!k.named("valid"), k.constant(1, 1)]),
+        Change::within("link__packer", "stands", |k| [!k.named("crc_busy"), k.constant(1, 1)]),
     ];
-    Proof { generated, property: "packer.v", given: packer, defects: &defects, open_products: false }.run();
+    Proof { hardware, property: "packer.v", given: packer, defects, open_products: false }.run();
     let both = vec![("ENCODER", "@TOP@__link__encoder".into()), ("DECODER", "@TOP@__link__decoder".into())];
-    let defects = [
-        ("data[0] ? 8'd219 : 8'd192", "data[0] ? 8'd192 : 8'd219"),
-        // Defect: an IDLE between an escape and the next byte ends the escape.
-        ("if (valid && !is_idle) escaped", "if (valid) escaped"),
+    let defects = vec![
+        // Two special bytes are taken for one another; an IDLE between an escape and the next byte ends the escape.
+        Change::within("link__decoder", "content", |k| [219, 192].map(|byte| k.constant(8, byte))),
+        Change::within("link__decoder", "escaped", |k| [k.named("valid") & !k.named("is_idle"), k.named("valid")]),
     ];
-    Proof { generated, property: "roundtrip.v", given: both, defects: &defects, open_products: false }.run();
+    Proof { hardware, property: "roundtrip.v", given: both, defects, open_products: false }.run();
 }
 
 #[test]
 fn sums_come_before_the_status() {
-    let generated = &generate_board(&model("")).unwrap();
     let given = vec![
         ("BLOCK", "@TOP@__link__resultants".into()),
         ("TAXELS", number(ROWS * COLS)),
         ("LAST", number(ROWS * COLS + STATUS_BEATS - 1)),
         ("MOST", number(ROWS.max(COLS) + 1)),
     ];
-    let defect = ("leaves && out == 2'd3", "leaves && out == 2'd2");
-    Proof { generated, property: "sums.v", given, defects: &[defect], open_products: false }.run();
+    // The status comes a word early.
+    let defects = vec![Change::within("link__resultants", "stage", |k| {
+        [3, 2].map(|word| k.named("leaves") & k.named("out").is(word))
+    })];
+    let hardware = Hardware::Board(&model(""));
+    Proof { hardware, property: "sums.v", given, defects, open_products: false }.run();
 }
