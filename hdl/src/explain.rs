@@ -4,8 +4,9 @@
 use dermis_golden::fixed::feature_costs::{features, Feature};
 use dermis_golden::fixed::{Cycles, Model};
 use serde::Serialize;
+use serde_json::json;
 
-use crate::generate::{usage, HdlError};
+use crate::generate::{usage, Generated, HdlError};
 use crate::usage::{total, Usage};
 
 /// A feature of the hardware.
@@ -39,6 +40,14 @@ pub struct Saved {
     pub luts: i64,
     /// Clock cycles from the last input beat to the last output beat, all subarrays searched.
     pub cycles: i64,
+}
+
+impl Generated {
+    /// Adds the list of features to the manifest, and updates the checksums.
+    pub fn add_explained(&mut self, explained: &[Explained]) {
+        self.manifest["features"] = json!(explained);
+        self.seal();
+    }
 }
 
 /// Every optional feature of the hardware, with its cost or saving in `model`.

@@ -18,7 +18,6 @@ use thiserror::Error;
 use crate::core_file::core_file;
 use crate::describe::port_comment;
 use crate::device::Tap;
-use crate::explain::Explained;
 use crate::language::{self, Attributes, Change, Hierarchy, KernelError};
 use crate::manifest::seal;
 use crate::primitives::MEMORY_FILE;
@@ -106,12 +105,6 @@ fn refused(model: &Model) -> Result<Vec<Refused>, HdlError> {
 }
 
 impl Generated {
-    /// Adds the list of features to the manifest, and updates the checksums.
-    pub fn add_explained(&mut self, explained: &[Explained]) {
-        self.manifest["features"] = json!(explained);
-        self.seal();
-    }
-
     /// Updates sizes and checksums in the manifest from the files ([`crate::manifest`]).
     pub(crate) fn seal(&mut self) {
         let text = seal(&mut self.manifest, &self.files);
