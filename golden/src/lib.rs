@@ -31,7 +31,7 @@
 //! ```text
 //! scene ─┬─ sensor ── influence ── matrices ───────────┐
 //!        └─ partition ─┐                               │
-//! frame ── quantise ── float::receive                  │
+//! frame ── quantise ── reception                  │
 //!    └──── gather ──── float::pass ── float::search ── float::force ── reconstruct
 //!                      v_ij           μ               fx, fy, fz      resultant, errors, flags
 //! ```
@@ -76,7 +76,6 @@ pub mod evidence;
 pub mod fixed;
 pub mod flags;
 pub mod float;
-pub mod folded;
 pub mod frame;
 pub mod gauss;
 pub mod generator;
@@ -90,10 +89,12 @@ pub mod noise;
 pub mod paper;
 pub mod partition;
 pub mod quantise;
+pub mod reception;
 pub mod reconstruct;
 pub mod scene;
 pub mod sensor;
 pub mod stability;
+pub mod symmetry;
 pub mod write;
 
 mod random;

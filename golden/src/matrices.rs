@@ -18,7 +18,7 @@
 //! | out: Cz⁺ | n × n | mm² (N per MPa) |
 //! | out: Ax, Ay | n × n | – |
 //!
-//! Everything is computed in the basis of mirror parities ([`crate::folded`]), a sixteenth of the work; the mirror
+//! Everything is computed in the basis of mirror parities ([`crate::symmetry::folded`]), a sixteenth of the work; the mirror
 //! symmetry of the array holds to the bit in every matrix, so folding it again is exact.
 
 pub mod cache;
@@ -28,10 +28,10 @@ mod masked;
 #[cfg(test)]
 mod tests;
 
-use crate::folded::{Basis, Operator, EVEN, ODD_X, ODD_Y};
 use crate::influence::Influence;
 use crate::scene::{Inversion, Medium, Scene};
 use crate::sensor::{Sensor, SensorError};
+use crate::symmetry::folded::{Basis, Operator, EVEN, ODD_X, ODD_Y};
 use cache::{CacheFile, CachedMatrices};
 use degree::{by_effect, by_radius, SERIES_TOLERANCE};
 use faer::Mat;

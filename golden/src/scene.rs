@@ -215,7 +215,7 @@ pub enum CoefficientCheck {
     /// No check.
     #[default]
     None,
-    /// The status of each subarray flags a changed coefficient word, see [`crate::fixed::check`].
+    /// The status of each subarray flags a changed coefficient word, see [`crate::fixed::plan::check`].
     Signature,
 }
 

@@ -1,7 +1,7 @@
 //! Which features a scene's hardware has, which it omits, and what each omission saves: the model of the scene with
 //! that feature added, minus the model of the scene.
 
-use dermis_golden::fixed::feature_costs::{features, Feature};
+use dermis_golden::fixed::plan::feature_costs::{features, Feature};
 use dermis_golden::fixed::{Cycles, Model};
 use serde::Serialize;
 

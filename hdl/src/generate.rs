@@ -3,11 +3,11 @@
 use std::collections::BTreeMap;
 
 use dermis_golden::board::EngineKind;
-use dermis_golden::fixed::resources::Memory;
-use dermis_golden::fixed::send::{
+use dermis_golden::fixed::plan::resources::Memory;
+use dermis_golden::fixed::plan::storage::word_bits;
+use dermis_golden::fixed::stages::send::{
     CASE_SHIFT, FLAG_COEFFICIENTS, FLAG_CONDITION, FLAG_FOUND, FLAG_FRAMING, FLAG_NO_CONTACT, STATUS_BEATS,
 };
-use dermis_golden::fixed::storage::word_bits;
 use dermis_golden::fixed::{Cycles, Dropped, Model};
 use dermis_golden::link::{c_header, LinkError};
 use dermis_golden::partition::Case;
@@ -243,7 +243,7 @@ fn cycles(model: &Model) -> serde_json::Value {
     json!({ "searched": of(true), "not_searched": of(false) })
 }
 
-/// Manifest entry of one of several cases; its cycles exclude the [`LATENCY`](dermis_golden::fixed::choose::LATENCY) of
+/// Manifest entry of one of several cases; its cycles exclude the [`LATENCY`](dermis_golden::fixed::stages::choose::LATENCY) of
 /// the choice.
 fn case(case: &Model) -> serde_json::Value {
     json!({

@@ -1,7 +1,7 @@
 //! The observed streams between the stages: names, Verilog expressions and word formats.
 
 use dermis_golden::board::EngineKind;
-use dermis_golden::fixed::formats::FORCE_BITS;
+use dermis_golden::fixed::words::formats::FORCE_BITS;
 use dermis_golden::fixed::Model;
 
 use crate::device::Tap;

@@ -3,7 +3,7 @@
 
 use std::collections::BTreeSet;
 
-use dermis_golden::fixed::choose::{FrameStats, CUT_SHIFT};
+use dermis_golden::fixed::stages::choose::{FrameStats, CUT_SHIFT};
 use dermis_golden::fixed::Model;
 use dermis_golden::partition::{Case, Grid};
 use dermis_golden::quantise::quantise;

@@ -1,9 +1,9 @@
 //! The coefficient check: no false alarm on the shipped frames, every tried flip of a bit in the coefficient memory
 //! flagged, no additional block RAM, multiplier or cycle; absent by default.
 
-use dermis_golden::fixed::check::undetected;
-use dermis_golden::fixed::send::{FLAG_COEFFICIENTS, STATUS_BEATS};
-use dermis_golden::fixed::storage::word_bits;
+use dermis_golden::fixed::plan::check::undetected;
+use dermis_golden::fixed::plan::storage::word_bits;
+use dermis_golden::fixed::stages::send::{FLAG_COEFFICIENTS, STATUS_BEATS};
 use dermis_golden::fixed::{Cycles, Model};
 use dermis_golden::flags::Flag;
 use dermis_golden::frame::Frame;

@@ -1,7 +1,7 @@
 //! Flipped bits under Verilator: every bit of state is found, faults that must be flagged are flagged, and a reset
 //! always recovers.
 
-use dermis_golden::fixed::storage::word_bits;
+use dermis_golden::fixed::plan::storage::word_bits;
 use dermis_golden::fixed::Model;
 use dermis_golden::scene::Scene;
 use dermis_sim::faults::state_bits::{state_elements, StorageClass};

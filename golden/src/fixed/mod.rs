@@ -8,36 +8,13 @@
 //! every stage passes on under the stage's name; tests compare it word for word with every simulation of the hardware.
 //! The difference from the floating-point model is measured by tests, never assumed.
 
-pub mod arith;
-pub mod check;
-pub mod choose;
-pub mod coefficients;
-pub mod cycles;
-pub mod fit_suggestions;
-pub mod fold;
-pub mod force;
-pub mod formats;
-pub mod normalise;
-pub mod pass;
-pub mod prepare;
-pub mod quads;
-pub mod receive;
-pub mod rescale;
-pub mod resources;
-pub mod resultants;
-pub mod schedule;
-pub mod search;
-pub mod send;
-pub mod serial;
-pub mod storage;
-pub mod unfold;
-
-mod cases;
-pub mod feature_costs;
+pub mod plan;
+pub mod stages;
+pub mod words;
 
 mod model;
 mod subarray;
 
-pub use cases::Dropped;
-pub use cycles::Cycles;
 pub use model::{FixedError, Model, Stage, Trace};
+pub use plan::cases::Dropped;
+pub use plan::cycles::Cycles;

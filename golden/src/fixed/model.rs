@@ -2,32 +2,32 @@
 
 use thiserror::Error;
 
-use super::cases::{shape, Dropped};
-use super::cycles::{Cycles, SHORTEST_SWEEP};
-use super::fit_suggestions::{fit_suggestions, Shortage};
-use super::force::Force;
-use super::formats::{Design, Formats, Quantised, LOG_FRACTION, MU_STEPS};
-use super::prepare::{Prepare, Scale};
-use super::quads::Quads;
-use super::receive::mask_dead;
-use super::resources::Resources;
-use super::resultants::{self, sums};
-use super::search::Best;
-use super::send::{Status, FLAG_COEFFICIENTS, FLAG_CONDITION, FLAG_FOUND, FLAG_NO_CONTACT, STATUS_BEATS};
-use super::storage::Storage;
+use super::plan::cases::{shape, Dropped};
+use super::plan::cycles::{Cycles, SHORTEST_SWEEP};
+use super::plan::fit_suggestions::{fit_suggestions, Shortage};
+use super::plan::resources::Resources;
+use super::plan::storage::Storage;
+use super::stages::force::Force;
+use super::stages::prepare::{Prepare, Scale};
+use super::stages::receive::mask_dead;
+use super::stages::resultants::{self, sums};
+use super::stages::search::Best;
+use super::stages::send::{Status, FLAG_COEFFICIENTS, FLAG_CONDITION, FLAG_FOUND, FLAG_NO_CONTACT, STATUS_BEATS};
 use super::subarray::SubarrayTrace;
+use super::words::formats::{Design, Formats, Quantised, LOG_FRACTION, MU_STEPS};
 use crate::board::{Board, BoardError, EngineKind};
 use crate::checks::Checks;
 use crate::errors::Errors;
 use crate::flags::{frame_flags, Flag};
-use crate::float::receive::{receive as receive_codes, Received};
 use crate::frame::{Forces, Frame, FrameError};
 use crate::input::{Input, InputError};
 use crate::matrices::{MatricesError, MAX_DEGREE};
 use crate::partition::{subarrays, Case, Grid, PartitionError, Subarray};
 use crate::quantise::{full_scale, largest_code, noise_floor_codes, quantise, Codes};
+use crate::reception::{receive as receive_codes, Received};
 use crate::reconstruct::{assemble, Reconstruction, Resultant, SubarrayResult};
 use crate::scene::{ForceOutput, Scene, SceneError};
+use crate::symmetry::quads::Quads;
 
 /// A scene without a bit-true model, or a frame without a result.
 #[derive(Debug, Error)]
@@ -118,7 +118,7 @@ pub struct Stage {
 pub struct Trace {
     /// Forces `[fx, fy, fz]` in force LSBs, row-major; with `output.forces = "resultants"` the sums of each subarray.
     pub beats: Vec<[i32; 3]>,
-    /// Status beats, three words each ([`super::send`]).
+    /// Status beats, three words each ([`super::stages::send`]).
     pub status: Vec<[i32; 3]>,
     /// The words of each stage, in pipeline order.
     pub stages: Vec<Stage>,

@@ -1,12 +1,12 @@
 //! One subarray: the stages from frame buffer to force memory.
 
-use super::formats::force_shift;
 use super::model::Model;
-use super::pass::{pass, swap, Operands};
-use super::receive::Received;
-use super::schedule::{is_transposed, schedule, EXPONENTS};
-use super::search::{search, Block, SearchResult};
-use super::{fold, force, normalise, receive, rescale, unfold};
+use super::stages::pass::{pass, swap, Operands};
+use super::stages::receive::Received;
+use super::stages::search::{search, Block, SearchResult};
+use super::stages::{fold, force, normalise, receive, rescale, unfold};
+use super::words::formats::force_shift;
+use super::words::schedule::{is_transposed, schedule, EXPONENTS};
 use crate::scene::Condition;
 
 /// The quads that a stage passes on.

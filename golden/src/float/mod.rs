@@ -2,7 +2,7 @@
 //!
 //! | stage | in | out |
 //! |---|---|---|
-//! | [`receive`] | codes of a subarray | condition, centroids |
+//! | [`receive`](crate::reception) | codes of a subarray | condition, centroids |
 //! | [`pass`] | b, matrices | v_ij, the polynomial p(μ) |
 //! | [`objective`] | p | its score |
 //! | [`search`] | v_ij, objective | μ |
@@ -20,6 +20,5 @@ pub mod force;
 pub mod objective;
 pub mod orthogonal;
 pub mod pass;
-pub mod receive;
 pub mod search;
 pub mod segment;

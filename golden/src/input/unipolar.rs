@@ -42,11 +42,11 @@
 use crate::float::objective::{Objective, Sparse};
 use crate::float::pass::Polynomial;
 use crate::float::search::search;
-use crate::folded::accumulate;
 use crate::frame::{Forces, Frame};
 use crate::influence::table;
 use crate::matrices::Matrices;
 use crate::scene::Scene;
+use crate::symmetry::folded::accumulate;
 use faer::linalg::matmul::matmul;
 use faer::linalg::solvers::Solve;
 use faer::{Accum, Col, Mat, Par, Side};

@@ -6,8 +6,8 @@ use thiserror::Error;
 use super::payload::{Identity, Sums};
 use super::{code_bytes, Kind, BEAT_BYTES, VERSION};
 use crate::board::EngineKind;
-use crate::fixed::coefficients::Blocks;
-use crate::fixed::send::STATUS_BEATS;
+use crate::fixed::stages::send::STATUS_BEATS;
+use crate::fixed::words::coefficients::Blocks;
 use crate::fixed::Model;
 use crate::scene::{Condition, ForceOutput};
 

@@ -28,10 +28,10 @@ use super::extra::{CaseChoice, RejectedCase};
 use super::golden::{CaseOutcome, EngineInput};
 use super::{Golden, Reconstruction};
 use crate::float::contacts::Contacts;
-use crate::float::receive::Received;
 use crate::float::segment::{segment, Segments, WIDTH};
 use crate::frame::{Forces, Frame};
 use crate::partition::{Case, Subarray};
+use crate::reception::Received;
 use crate::sensor::Sensor;
 
 /// Fraction of a contact's largest force from which a cell is part of it.
@@ -154,8 +154,8 @@ impl Golden {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::float::receive::receive;
     use crate::partition::subarrays;
+    use crate::reception::receive;
     use crate::scene::Condition;
 
     fn sensor() -> Sensor {

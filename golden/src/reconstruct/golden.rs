@@ -14,13 +14,13 @@ use crate::float::objective::taxels::Taxels;
 use crate::float::objective::{of_kind, Estimate, Objective, SearchInput};
 use crate::float::orthogonal::{truncation, Orthogonal, OrthogonalError};
 use crate::float::pass::Polynomial;
-use crate::float::receive::{receive, Received};
 use crate::frame::{Forces, Frame, FrameError};
 use crate::input::{Input, InputError};
 use crate::learned::{Learned, LearnedError};
 use crate::matrices::{Matrices, MatricesError, MAX_FLOAT_DEGREE};
 use crate::partition::{subarrays, Case, PartitionError, Subarray};
 use crate::quantise::{full_scale, noise_floor_codes, quantise};
+use crate::reception::{receive, Received};
 use crate::scene::{EstimatorKind, Form, Scene, SceneError};
 use thiserror::Error;
 

@@ -13,10 +13,10 @@
 use super::{extended, FormatErrors};
 use crate::errors::Errors;
 use crate::float::force::force;
-use crate::folded::accumulate;
 use crate::frame::{Forces, Frame};
 use crate::matrices::Matrices;
 use crate::scene::Scene;
+use crate::symmetry::folded::accumulate;
 
 /// Ratio of shear to load in units of mu_max, [x, y].
 const SHEAR: [f64; 2] = [0.6, -0.35];

@@ -2,7 +2,7 @@
 //!
 //! Four cycles: position and magnitude of a code, maxima, limit for a contact, choice.
 
-use dermis_golden::fixed::choose::{is_beside_boundary, quarters, CUT_SHIFT};
+use dermis_golden::fixed::stages::choose::{is_beside_boundary, quarters, CUT_SHIFT};
 use dermis_golden::fixed::Model;
 use dermis_golden::partition::Grid;
 use dermis_golden::scene::Condition;
@@ -185,7 +185,7 @@ fn differ<'k>([above, below]: [Expr<'k>; 2], grid: Grid) -> Expr<'k> {
 
 #[cfg(test)]
 mod tests {
-    use dermis_golden::fixed::choose::FrameStats;
+    use dermis_golden::fixed::stages::choose::FrameStats;
     use dermis_golden::scene::Scene;
 
     use super::*;

@@ -2,7 +2,7 @@
 //!
 //! One quad per cycle: frame buffer (2 cycles), `normalise` (1), butterfly (1), memory.
 
-use dermis_golden::fixed::resources::Holds;
+use dermis_golden::fixed::plan::resources::Holds;
 use dermis_golden::fixed::Model;
 use rust_hdl::prelude::*;
 

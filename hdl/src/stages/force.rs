@@ -1,6 +1,6 @@
 //! Stage `force`: p(μ*) by quad into a memory; from there, force words by taxel into the output queue.
 
-use dermis_golden::fixed::resources::Holds;
+use dermis_golden::fixed::plan::resources::Holds;
 use dermis_golden::fixed::Model;
 use rust_hdl::prelude::*;
 

@@ -4,7 +4,7 @@
 //! to operands: addresses (1 cycle, 3 with a column list), memories (2), selection of limb and parity (1); then the
 //! lanes.
 
-use dermis_golden::fixed::resources::{operand_vectors, Holds};
+use dermis_golden::fixed::plan::resources::{operand_vectors, Holds};
 use dermis_golden::fixed::Model;
 use rust_hdl::prelude::*;
 

@@ -4,7 +4,7 @@
 //! `tlast` drops the frame, and the next beat starts a new one; a missing `tlast` is only recorded. Both set `framing`
 //! until `reported`.
 
-use dermis_golden::fixed::resources::Holds;
+use dermis_golden::fixed::plan::resources::Holds;
 use dermis_golden::fixed::Model;
 use rust_hdl::prelude::*;
 

@@ -4,7 +4,7 @@
 //! rescaler with the measured shift. All later rows pass it directly, with the constant shift of an A pass. The two
 //! never overlap, because no A pass starts before v_00 is complete.
 
-use dermis_golden::fixed::resources::Holds;
+use dermis_golden::fixed::plan::resources::Holds;
 use dermis_golden::fixed::Model;
 use rust_hdl::prelude::*;
 

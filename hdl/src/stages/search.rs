@@ -6,10 +6,10 @@
 //! compares (6). Coarse sweeps follow one another without a gap; a halving is set up when the previous sweep has been
 //! compared. The last sweep only moves to the best position: its constant coefficients are p(μ*).
 
-use dermis_golden::fixed::cycles::{coarse_period, SET_UP, SHORTEST_SWEEP};
-use dermis_golden::fixed::quads::Quads;
-use dermis_golden::fixed::schedule::vectors;
+use dermis_golden::fixed::plan::cycles::{coarse_period, SET_UP, SHORTEST_SWEEP};
+use dermis_golden::fixed::words::schedule::vectors;
 use dermis_golden::fixed::Model;
+use dermis_golden::symmetry::quads::Quads;
 use rust_hdl::prelude::*;
 
 use crate::ports::{has_ports, ports};

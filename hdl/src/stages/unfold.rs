@@ -1,6 +1,6 @@
 //! Stage `unfold`: words of v_ij back to taxels, coefficient by coefficient into the search memory.
 
-use dermis_golden::fixed::schedule::{is_transposed, schedule, vectors};
+use dermis_golden::fixed::words::schedule::{is_transposed, schedule, vectors};
 use dermis_golden::fixed::Model;
 use rust_hdl::prelude::*;
 

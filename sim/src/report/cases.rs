@@ -1,6 +1,6 @@
 //! The cases of a scene whose hardware chooses among several per frame, as text.
 
-use dermis_golden::fixed::choose::LATENCY;
+use dermis_golden::fixed::stages::choose::LATENCY;
 use dermis_golden::fixed::{Cycles, Model};
 use dermis_hdl::Refused;
 

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use dermis_golden::fixed::cycles::lane_utilisation;
+use dermis_golden::fixed::plan::cycles::lane_utilisation;
 use dermis_golden::fixed::{Cycles, Model};
 use dermis_hdl::explain::{Explained, Saved};
 use dermis_hdl::usage::{total, Usage, STAGES};

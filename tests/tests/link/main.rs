@@ -4,7 +4,7 @@
 
 use std::ops::Deref;
 
-use dermis_golden::fixed::send::FLAG_FRAMING;
+use dermis_golden::fixed::stages::send::FLAG_FRAMING;
 use dermis_golden::fixed::{Cycles, Model};
 use dermis_golden::frame::Frame;
 use dermis_golden::link::{

@@ -26,11 +26,11 @@
 //!
 //! Each proof has seeded defects with which it must fail.
 
-use dermis_golden::fixed::quads::Quads;
-use dermis_golden::fixed::resources::count_bits;
-use dermis_golden::fixed::send::STATUS_BEATS;
+use dermis_golden::fixed::plan::resources::count_bits;
+use dermis_golden::fixed::stages::send::STATUS_BEATS;
 use dermis_golden::fixed::Model;
 use dermis_golden::scene::Scene;
+use dermis_golden::symmetry::quads::Quads;
 use dermis_hdl::generate;
 use dermis_hdl::link::generate_board;
 use dermis_hdl::primitives::FORCE_STEPS;

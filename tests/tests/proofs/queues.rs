@@ -1,8 +1,8 @@
 //! Proofs for the blocks between the streams: rounding of the rescaler, queues, and the link's output.
 
-use dermis_golden::fixed::formats::SEARCH_EXTRA_BITS;
-use dermis_golden::fixed::resources::{count_bits, operand_vectors};
-use dermis_golden::fixed::send::STATUS_BEATS;
+use dermis_golden::fixed::plan::resources::{count_bits, operand_vectors};
+use dermis_golden::fixed::stages::send::STATUS_BEATS;
+use dermis_golden::fixed::words::formats::SEARCH_EXTRA_BITS;
 use dermis_golden::link::{payloads, Counters, Identity, ANSWER};
 use dermis_hdl::link::generate_board;
 use dermis_hdl::primitives::QUEUE_PLACES;

@@ -2,11 +2,11 @@
 
 use super::*;
 use crate::float::objective::Sparse;
-use crate::folded::accumulate;
 use crate::frame::Contact;
 use crate::generator::generate;
 use crate::scene::Medium;
 use crate::sensor::Sensor;
+use crate::symmetry::folded::accumulate;
 
 fn sensor() -> Sensor {
     Sensor { rows: 16, cols: 16, pitch_x_mm: 3.0, pitch_y_mm: 3.0, thickness_mm: 3.0 }

@@ -1,8 +1,8 @@
 //! Quad address and lane of a taxel.
 
-use dermis_golden::fixed::quads::Quads;
 use dermis_golden::fixed::Model;
 use dermis_golden::partition::Grid;
+use dermis_golden::symmetry::quads::Quads;
 use rust_hdl::prelude::*;
 
 use crate::kernel_block;

@@ -1,8 +1,8 @@
 //! The MAC lanes with their coefficient memory and shift-out chains.
 
-use dermis_golden::fixed::check::{signature, POLYNOMIAL, START};
-use dermis_golden::fixed::formats::{Formats, MULTIPLIER_BITS};
-use dermis_golden::fixed::resources::Holds;
+use dermis_golden::fixed::plan::check::{signature, POLYNOMIAL, START};
+use dermis_golden::fixed::plan::resources::Holds;
+use dermis_golden::fixed::words::formats::{Formats, MULTIPLIER_BITS};
 use dermis_golden::fixed::Model;
 use rust_hdl::prelude::*;
 
@@ -292,7 +292,7 @@ impl Shape {
 
 #[cfg(test)]
 mod tests {
-    use dermis_golden::fixed::check::{parity, step};
+    use dermis_golden::fixed::plan::check::{parity, step};
 
     use super::*;
     use crate::language::testbench::{check, Reference};

@@ -1,8 +1,8 @@
 //! Force arithmetic: p(μ*) to force words, and the output beats with their status.
 
-use dermis_golden::fixed::cycles::ACCEPT;
-use dermis_golden::fixed::formats::{force_shift, FORCE_BITS, FORCE_SHIFT_MAX, MULTIPLIER_BITS, MU_ROUND};
-use dermis_golden::fixed::send::CASE_SHIFT;
+use dermis_golden::fixed::plan::cycles::ACCEPT;
+use dermis_golden::fixed::stages::send::CASE_SHIFT;
+use dermis_golden::fixed::words::formats::{force_shift, FORCE_BITS, FORCE_SHIFT_MAX, MULTIPLIER_BITS, MU_ROUND};
 use dermis_golden::fixed::Model;
 use rust_hdl::prelude::*;
 

@@ -1,7 +1,7 @@
 //! Schedule of the matrix passes as a table of instructions.
 
-use dermis_golden::fixed::resources::{operand_vectors, Holds};
-use dermis_golden::fixed::schedule::{schedule, Operand};
+use dermis_golden::fixed::plan::resources::{operand_vectors, Holds};
+use dermis_golden::fixed::words::schedule::{schedule, Operand};
 use dermis_golden::fixed::Model;
 use rust_hdl::prelude::*;
 

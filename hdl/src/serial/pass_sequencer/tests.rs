@@ -2,10 +2,10 @@
 
 use std::collections::BTreeMap;
 
-use dermis_golden::fixed::arith::{bit_length, magnitude_bits, round_shift, saturate};
-use dermis_golden::fixed::coefficients::FLIP_X;
+use dermis_golden::fixed::words::arith::{bit_length, magnitude_bits, round_shift, saturate};
 use dermis_golden::fixed::Model;
 use dermis_golden::scene::Scene;
+use dermis_golden::symmetry::parity::FLIP_X;
 
 use super::*;
 use crate::language::testbench::{check, random_word, Reference};

@@ -20,10 +20,10 @@
 //!
 //! Stage `force` thus shows the error of the arithmetic alone, stage `send` the error of arithmetic and search.
 
-use dermis_golden::fixed::arith::{bit_length, hadamard};
-use dermis_golden::fixed::formats::{Formats, MU_STEPS, SEARCH_EXTRA_BITS};
-use dermis_golden::fixed::schedule::{is_transposed, schedule, EXPONENTS};
-use dermis_golden::fixed::send::{Status, STATUS_BEATS};
+use dermis_golden::fixed::stages::send::{Status, STATUS_BEATS};
+use dermis_golden::fixed::words::arith::{bit_length, hadamard};
+use dermis_golden::fixed::words::formats::{Formats, MU_STEPS, SEARCH_EXTRA_BITS};
+use dermis_golden::fixed::words::schedule::{is_transposed, schedule, EXPONENTS};
 use dermis_golden::float::pass::Polynomial;
 use dermis_golden::quantise::full_scale;
 

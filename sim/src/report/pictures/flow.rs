@@ -10,8 +10,8 @@
 //! ```
 
 use anyhow::Result;
-use dermis_golden::fixed::formats::{FORCE_BITS, HALVINGS};
-use dermis_golden::fixed::search::COARSE_CENTRES;
+use dermis_golden::fixed::stages::search::COARSE_CENTRES;
+use dermis_golden::fixed::words::formats::{FORCE_BITS, HALVINGS};
 use dermis_golden::fixed::{Cycles, Model};
 use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, VPos};

@@ -4,7 +4,7 @@
 use std::time::Instant;
 
 use anyhow::Result;
-use dermis_golden::fixed::schedule::vectors;
+use dermis_golden::fixed::words::schedule::vectors;
 use dermis_golden::frame::Frame;
 use dermis_golden::matrices::cache;
 use dermis_golden::paper::conclusions;

@@ -2,8 +2,10 @@
 
 use std::collections::VecDeque;
 
-use dermis_golden::fixed::force::{force, mu_word};
-use dermis_golden::fixed::send::{FLAG_COEFFICIENTS, FLAG_CONDITION, FLAG_FOUND, FLAG_FRAMING, FLAG_NO_CONTACT};
+use dermis_golden::fixed::stages::force::{force, mu_word};
+use dermis_golden::fixed::stages::send::{
+    FLAG_COEFFICIENTS, FLAG_CONDITION, FLAG_FOUND, FLAG_FRAMING, FLAG_NO_CONTACT,
+};
 use dermis_golden::scene::Scene;
 
 use super::*;

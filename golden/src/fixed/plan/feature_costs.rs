@@ -2,9 +2,9 @@
 //!
 //! The number of lanes stays that of the scene, so that only the feature makes the difference.
 
-use super::formats::MULTIPLIER_BITS;
-use super::model::{FixedError, Model};
-use super::prepare::Scale;
+use crate::fixed::model::{FixedError, Model};
+use crate::fixed::stages::prepare::Scale;
+use crate::fixed::words::formats::MULTIPLIER_BITS;
 use crate::matrices::MAX_DEGREE;
 use crate::partition::{subarrays, Case};
 use crate::scene::{CoefficientCheck, ForceOutput, Scene, SearchSpec};

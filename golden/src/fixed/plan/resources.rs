@@ -18,13 +18,13 @@
 
 use serde::Serialize;
 
-use super::arith::{bit_length, signed_bits};
-use super::formats::{Formats, LaidOut, FORCE_BITS, HALVINGS, MULTIPLIER_BITS};
-use super::prepare::GAIN_BITS;
-use super::resultants::POSITION_BITS;
-use super::schedule::vectors;
 use super::storage::word_bits;
 use crate::board::Board;
+use crate::fixed::stages::prepare::GAIN_BITS;
+use crate::fixed::stages::resultants::POSITION_BITS;
+use crate::fixed::words::arith::{bit_length, signed_bits};
+use crate::fixed::words::formats::{Formats, LaidOut, FORCE_BITS, HALVINGS, MULTIPLIER_BITS};
+use crate::fixed::words::schedule::vectors;
 use crate::scene::{ForceOutput, Scene};
 
 /// Number of polynomial buffers between which the sweeps of the search alternate.

@@ -49,7 +49,7 @@ pub fn bit_length(x: u64) -> u32 {
 /// The four-point Hadamard butterfly `f_p = Σ_l (−1)^{p·l} x_l`, unnormalised: the words grow by two bits.
 ///
 /// Index `2·(row bit) + (column bit)`: on input the images of a taxel under the two mirrors, on output the parities.
-/// Applied twice it multiplies by four, which [`unfold`](super::unfold) takes into account.
+/// Applied twice it multiplies by four, which [`unfold`](crate::fixed::stages::unfold) takes into account.
 pub fn hadamard<T: Copy + Add<Output = T> + Sub<Output = T>>(x: [T; 4]) -> [T; 4] {
     let [a, b, c, d] = x;
     [a + b + c + d, a - b + c - d, a + b - c - d, a - b - c + d]

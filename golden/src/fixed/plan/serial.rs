@@ -16,15 +16,15 @@
 //! second port; the polynomial about the best centre stays in its own region until a better one is found.
 
 use super::cycles::Cycles;
-use super::formats::{Formats, LaidOut, Quantised, EPSILON_SHIFT, HALVINGS};
-use super::model::Model;
-use super::pass::coefficient;
 use super::resources::{count_bits, operand_vectors, Holds, Memory, Resources};
-use super::schedule::{schedule, Kind, Matrix, Operand, Product};
-use super::search::COARSE_CENTRES;
-use super::send::STATUS_BEATS;
 use super::storage::Storage;
 use crate::board::Board;
+use crate::fixed::model::Model;
+use crate::fixed::stages::pass::coefficient;
+use crate::fixed::stages::search::COARSE_CENTRES;
+use crate::fixed::stages::send::STATUS_BEATS;
+use crate::fixed::words::formats::{Formats, LaidOut, Quantised, EPSILON_SHIFT, HALVINGS};
+use crate::fixed::words::schedule::{schedule, Kind, Matrix, Operand, Product};
 
 /// Cycles per polynomial and sweep: one for each (i, j) with i, j ≤ 3, also beyond the degree.
 pub const SLOT: u64 = 16;
@@ -114,7 +114,7 @@ pub fn coefficients(formats: &Formats, quantised: &Quantised, kind: Kind) -> Vec
 }
 
 /// Layout and resources of the serial engine: every column is kept, one row is computed at a time.
-pub(super) fn fit(
+pub(in crate::fixed) fn fit(
     formats: &Formats,
     order: &[Matrix],
     quantised: &Quantised,
@@ -166,7 +166,7 @@ fn resources(f: &Formats, board: &Board) -> Resources {
 }
 
 /// Cycle counts of the serial engine for a frame whose subarray is `searched` or not.
-pub(super) fn cycles(model: &Model, searched: bool) -> Cycles {
+pub(in crate::fixed) fn cycles(model: &Model, searched: bool) -> Cycles {
     let formats = &model.formats;
     let quads = formats.quads as u64;
     let limbs = first_vector(formats) as u64;
@@ -190,7 +190,7 @@ fn passes(model: &Model) -> u64 {
 }
 
 /// Fraction of the cycles of the passes in which the lanes multiply; 0 to 1.
-pub(super) fn lane_utilisation(model: &Model) -> f64 {
+pub(in crate::fixed) fn lane_utilisation(model: &Model) -> f64 {
     let quads = model.formats.quads as u64;
     let products: usize = schedule(&model.formats).iter().map(Vec::len).sum();
     (products as u64 * quads * quads) as f64 / passes(model) as f64

@@ -16,13 +16,13 @@
 
 use serde::Serialize;
 
-use super::choose;
-use super::formats::HALVINGS;
-use super::model::Model;
-use super::schedule::schedule;
-use super::search::COARSE_CENTRES;
 use super::serial;
 use crate::board::EngineKind;
+use crate::fixed::model::Model;
+use crate::fixed::stages::choose;
+use crate::fixed::stages::search::COARSE_CENTRES;
+use crate::fixed::words::formats::HALVINGS;
+use crate::fixed::words::schedule::schedule;
 
 /// Cycles from the last input beat to the start of the frame.
 pub const ACCEPT: u64 = 3;

@@ -7,8 +7,8 @@
 
 use serde::Serialize;
 
-use super::coefficients::{FLIP_X, FLIP_Y};
 use super::formats::Formats;
+use crate::symmetry::parity::{FLIP_X, FLIP_Y};
 
 /// (i, j) of the v_ij up to degree 3, in order of computation.
 pub const EXPONENTS: [(u32, u32); 10] =

@@ -24,7 +24,7 @@ pub const FLAG_NO_CONTACT: u32 = 1 << 2;
 /// Flag bit: since the last frame sent, `tlast` came early or was missing and the frame concerned was dropped.
 pub const FLAG_FRAMING: u32 = 1 << 3;
 /// Flag bit: the coefficient memory does not hold the generated coefficients; only with `hardware.coefficient_check =
-/// "signature"` ([`super::check`]).
+/// "signature"` ([`crate::fixed::plan::check`]).
 pub const FLAG_COEFFICIENTS: u32 = 1 << 4;
 /// Position of the paper's case number, 2 bits, among the flags; 0 where a scene has one case.
 pub const CASE_SHIFT: u32 = 8;

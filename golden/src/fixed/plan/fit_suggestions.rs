@@ -11,7 +11,7 @@
 use std::fmt;
 
 use super::cycles::Cycles;
-use super::model::Model;
+use crate::fixed::model::Model;
 use crate::matrices::degree::{CUBIC_FROM, SERIES_TOLERANCE};
 use crate::matrices::{Matrices, MAX_DEGREE};
 use crate::partition::{Case, Grid};
@@ -66,7 +66,7 @@ impl fmt::Display for Shortage {
 }
 
 /// Of each kind of change, the first that alone makes the scene fit.
-pub(super) fn fit_suggestions(model: &Model) -> Vec<FitSuggestion> {
+pub(in crate::fixed) fn fit_suggestions(model: &Model) -> Vec<FitSuggestion> {
     let scene = &model.scene;
     let kinds = [
         lanes(scene).into_iter().find_map(suggestion),

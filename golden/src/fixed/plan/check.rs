@@ -7,7 +7,7 @@
 //! s ← (2 s mod 2³²) ⊕ (POLYNOMIAL where s ≥ 2³¹) ⊕ parity         START before the subarray's first word
 //! ```
 //! If it differs from the generated value after the last word, the subarray's status has
-//! [`FLAG_COEFFICIENTS`](super::send::FLAG_COEFFICIENTS). The forces are sent all the same.
+//! [`FLAG_COEFFICIENTS`](crate::fixed::stages::send::FLAG_COEFFICIENTS). The forces are sent all the same.
 //!
 //! Why a signature: a coefficient fills the 18 bits of a block RAM's word, so a parity bit per word of the lanes would
 //! cost another block RAM, or LUTs that grow with the number of words. A signature needs no memory and no cycle,
@@ -17,9 +17,9 @@
 //! Σ x^(T−t) modulo the polynomial. For a word read once or twice this is never zero; for more reads it can be, with a
 //! probability of 2⁻³²: [`undetected`] lists such words. The list of columns and the schedule are not covered.
 
-use super::formats::MULTIPLIER_BITS;
-use super::model::Model;
-use super::schedule::schedule;
+use crate::fixed::model::Model;
+use crate::fixed::words::formats::MULTIPLIER_BITS;
+use crate::fixed::words::schedule::schedule;
 use crate::scene::CoefficientCheck;
 
 /// The polynomial of CRC-32 without its highest power, x³².

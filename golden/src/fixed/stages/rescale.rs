@@ -5,9 +5,9 @@
 //! The operands of the next passes are the same words, 4 bits shorter: rounded, and clamped where rounding would exceed
 //! the word (an error of one LSB at most, not counted).
 
-use super::arith::{bit_length, magnitude_bits, round_shift, saturate};
-use super::formats::{Formats, SEARCH_EXTRA_BITS};
 use super::pass::Vector;
+use crate::fixed::words::arith::{bit_length, magnitude_bits, round_shift, saturate};
+use crate::fixed::words::formats::{Formats, SEARCH_EXTRA_BITS};
 
 /// Bit length of the largest raw v_00 of a subarray.
 pub fn raw_length(raw: &[[i64; 4]]) -> u32 {

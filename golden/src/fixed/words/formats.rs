@@ -25,16 +25,17 @@ use faer::Mat;
 use serde::Serialize;
 
 use super::arith::{bit_length, signed_bits};
-use super::coefficients::{parity_blocks, quantise, Blocks, Flipped, FLIP_X, FLIP_Y};
-use super::quads::Quads;
-use super::resources::Resources;
+use super::coefficients::{parity_blocks, quantise, Blocks, Flipped};
 use super::schedule::{products, vectors, Flips, Kind, Matrix, EXPONENTS};
-use super::serial;
-use super::storage::{storage_order, Storage};
-use super::FixedError;
 use crate::board::{Board, EngineKind};
+use crate::fixed::plan::resources::Resources;
+use crate::fixed::plan::serial;
+use crate::fixed::plan::storage::{storage_order, Storage};
+use crate::fixed::FixedError;
 use crate::matrices::Matrices;
 use crate::scene::Scene;
+use crate::symmetry::parity::{FLIP_X, FLIP_Y};
+use crate::symmetry::quads::Quads;
 
 /// Operand width of the multipliers in bits; a board with narrower multipliers has its own.
 pub const MULTIPLIER_BITS: u32 = 18;

@@ -4,10 +4,10 @@
 //! fills the word. The shift is exact; [`force`](super::force) takes the exponent back. For a subarray of zeros the
 //! shift is `input_bits − 1`, without effect.
 
-use super::arith::bit_length;
+use crate::fixed::words::arith::bit_length;
 
 /// The left shift, 0 to `input_bits − 1`, for a subarray; `magnitude` is the OR of its codes'
-/// [`magnitude_bits`](super::arith::magnitude_bits).
+/// [`magnitude_bits`](crate::fixed::words::arith::magnitude_bits).
 pub fn shift(magnitude: u64, input_bits: u32) -> u32 {
     input_bits - 1 - bit_length(magnitude)
 }
@@ -19,8 +19,8 @@ pub fn normalise(quads: &[[i64; 4]], shift: u32) -> Vec<[i64; 4]> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::arith::{magnitude_bits, range};
     use super::*;
+    use crate::fixed::words::arith::{magnitude_bits, range};
     use proptest::prelude::*;
 
     proptest! {

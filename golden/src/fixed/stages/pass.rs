@@ -10,10 +10,10 @@
 //! The product of the two low limbs, below 2^−22 of the largest result, is left out. The smaller low limb is stored
 //! shifted left (a, c), so that both mixed products have the same weight.
 
-use super::formats::{Formats, Quantised};
-use super::quads::Quads;
-use super::schedule::{Kind, Matrix, Operand, Product};
-use super::storage::blocks;
+use crate::fixed::plan::storage::blocks;
+use crate::fixed::words::formats::{Formats, Quantised};
+use crate::fixed::words::schedule::{Kind, Matrix, Operand, Product};
+use crate::symmetry::quads::Quads;
 
 /// A folded input or v_ij, four parities per quad.
 pub type Vector = Vec<[i64; 4]>;

@@ -31,7 +31,7 @@
 //! |---|---|
 //! | out | index of the case in the order built, case 0 first |
 
-use super::arith::magnitude_bits;
+use crate::fixed::words::arith::magnitude_bits;
 use crate::partition::Grid;
 use crate::scene::Condition;
 use crate::sensor::Sensor;

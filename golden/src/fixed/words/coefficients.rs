@@ -26,12 +26,8 @@
 
 use faer::Mat;
 
-use super::quads::Quads;
-
-/// Bit of the column parity, which Ax flips.
-pub const FLIP_X: usize = 1;
-/// Bit of the row parity, which Ay flips.
-pub const FLIP_Y: usize = 2;
+use crate::symmetry::parity::{has_entry, sign};
+use crate::symmetry::quads::Quads;
 
 /// The four Q × Q blocks of a folded matrix that flip the parity by `flip`; row-major, indexed by the target parity.
 #[derive(Clone, Debug, PartialEq)]
@@ -124,29 +120,13 @@ pub fn quantise(folded: &[Vec<Flipped<f64>>], bits: u32) -> Vec<Blocks> {
     folded.iter().map(blocks).collect()
 }
 
-/// Whether quad `index` has an entry of `parity`: odd parities vanish on the middle line of their mirror.
-pub fn has_entry(quads: Quads, index: usize, parity: usize) -> bool {
-    let counts = quads.lane_mask(index);
-    let own_column = counts & 0b0010 != 0;
-    let own_row = counts & 0b0100 != 0;
-    (own_column || parity & FLIP_X == 0) && (own_row || parity & FLIP_Y == 0)
-}
-
-/// Sign of image `lane` in `parity`: (−1)^(parity·lane).
-pub fn sign(parity: usize, lane: usize) -> f64 {
-    if (parity & lane).count_ones().is_multiple_of(2) {
-        1.0
-    } else {
-        -1.0
-    }
-}
-
 #[cfg(test)]
 mod tests {
-    use super::super::fold::fold;
     use super::*;
+    use crate::fixed::words::arith::hadamard;
     use crate::matrices::Matrices;
     use crate::sensor::Sensor;
+    use crate::symmetry::parity::{FLIP_X, FLIP_Y};
 
     /// Folding, multiplying by blocks and unfolding is the dense product, for even and odd sizes.
     #[test]
@@ -156,7 +136,7 @@ mod tests {
             let matrices = Matrices::new(&sensor, 0.6).expect("a small regular sensor");
             let quads = Quads { rows, cols };
             let x: Vec<i64> = (0..rows * cols).map(|t| ((t * t * 7 + 3 * t) % 41) as i64 - 20).collect();
-            let folded = fold(&quads.pack(&x));
+            let folded: Vec<[i64; 4]> = quads.pack(&x).into_iter().map(hadamard).collect();
             for (matrix, flip) in [(&matrices.cz_pinv, 0), (&matrices.ax, FLIP_X), (&matrices.ay, FLIP_Y)] {
                 let blocks = parity_blocks(quads, matrix, flip).parity;
                 for i in 0..quads.len() {
@@ -185,7 +165,7 @@ mod tests {
             let quads = Quads { rows, cols };
             let matrix = Mat::from_fn(n, n, |i, j| f64::from(((i * 31 + j * 17 + i * j) % 23) as u32) - 11.0);
             let x: Vec<i64> = (0..n).map(|t| ((t * t * 7 + 3 * t) % 41) as i64 - 20).collect();
-            let folded = fold(&quads.pack(&x));
+            let folded: Vec<[i64; 4]> = quads.pack(&x).into_iter().map(hadamard).collect();
             let flips: Vec<_> = (0..4).map(|flip| parity_blocks(quads, &matrix, flip)).collect();
             for i in 0..quads.len() {
                 let y = |target: usize| -> f64 {

@@ -9,7 +9,7 @@
 //! Signs are compared with the noise floor in codes: `c > floor`, `c < −floor`, as in the golden model on the same
 //! codes.
 
-use super::arith::magnitude_bits;
+use crate::fixed::words::arith::magnitude_bits;
 
 /// Magnitude and signs of a subarray's codes.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

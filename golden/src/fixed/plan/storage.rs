@@ -8,10 +8,10 @@
 //! On a square subarray of square pitch, Ay is Ax with x and y exchanged. At degree 1, where no v_ij adds both, Ay is
 //! not stored: v_01 is the Ax pass over the transposed v_00, and the result is transposed.
 
-use super::coefficients::Flipped;
-use super::formats::{Formats, Quantised, MULTIPLIER_BITS};
-use super::pass::coefficient;
-use super::schedule::{Kind, Matrix, Product};
+use crate::fixed::stages::pass::coefficient;
+use crate::fixed::words::coefficients::Flipped;
+use crate::fixed::words::formats::{Formats, Quantised, MULTIPLIER_BITS};
+use crate::fixed::words::schedule::{Kind, Matrix, Product};
 
 /// The kept columns, per matrix in storage order and per group of rows.
 #[derive(Clone, Debug, PartialEq)]

@@ -3,24 +3,24 @@
 //!
 //! All cases use the lanes, the search and the force unit of case 0. A case adds counter limits, addresses, its
 //! coefficients in the shared memory and a frame buffer. The result of a frame is to the bit that of the chosen case's
-//! model; [`choose`](super::choose) chooses it.
+//! model; [`choose`](crate::fixed::stages::choose) chooses it.
 //!
 //! Where the scene lists no cases, the largest set of cases that fits the board is built, and of equally large sets the
 //! one with the finest cases. A case left out is kept in [`Dropped`] with the resources of a design that includes it.
 
-use super::choose::{self, FrameStats};
 use super::cycles::SHORTEST_SWEEP;
-use super::formats::{derive, Shape};
-use super::model::{FixedError, Model, Stage, Trace};
-use super::prepare::Scale;
-use super::quads::Quads;
-use super::send::CASE_SHIFT;
 use crate::board::Board;
+use crate::fixed::model::{FixedError, Model, Stage, Trace};
+use crate::fixed::stages::choose::{self, FrameStats};
+use crate::fixed::stages::prepare::Scale;
+use crate::fixed::stages::send::CASE_SHIFT;
+use crate::fixed::words::formats::{derive, Shape};
 use crate::frame::Frame;
 use crate::matrices::{Matrices, MAX_DEGREE};
 use crate::partition::{subarrays, Case, Grid, Subarray};
 use crate::reconstruct::{CaseChoice, Reconstruction};
 use crate::scene::Scene;
+use crate::symmetry::quads::Quads;
 
 /// A case that divides the array but was left out, because a design with it exceeds the board.
 #[derive(Clone, Debug)]
@@ -33,7 +33,7 @@ pub struct Dropped {
 
 impl Model {
     /// The model of the cases that the scene lists, else of as many cases as fit the board, else of case 0 alone.
-    pub(super) fn of_choices(
+    pub(in crate::fixed) fn of_choices(
         scene: &Scene,
         scale: &Scale,
         degree: Option<usize>,
@@ -88,7 +88,7 @@ impl Model {
     }
 
     /// The model of `cases`; where there are several, case 0 is the first.
-    pub(super) fn of_shapes(
+    pub(in crate::fixed) fn of_shapes(
         scene: &Scene,
         scale: &Scale,
         board: &Board,
@@ -150,13 +150,13 @@ impl Model {
     }
 
     /// [`Model::run`] for a scene with several cases.
-    pub(super) fn run_chosen(&self, codes: &[i32]) -> Trace {
+    pub(in crate::fixed) fn run_chosen(&self, codes: &[i32]) -> Trace {
         let chosen = self.choose(&self.prepare.run(codes));
         let case = &self.built[chosen];
         let mut trace = case.run(codes);
         let words = vec![vec![chosen as i64]];
         trace.stages.insert(1, Stage { name: "choose", words });
-        for beat in trace.status.iter_mut().step_by(super::send::STATUS_BEATS) {
+        for beat in trace.status.iter_mut().step_by(crate::fixed::stages::send::STATUS_BEATS) {
             beat[2] |= (case.number() << CASE_SHIFT) as i32;
         }
         let cycles = &mut trace.cycles;
@@ -167,7 +167,7 @@ impl Model {
     }
 
     /// [`Model::decode`] for a scene with several cases.
-    pub(super) fn decode_chosen(
+    pub(in crate::fixed) fn decode_chosen(
         &self,
         readings: &[Frame],
         engine: &str,
@@ -187,7 +187,7 @@ impl Model {
 
 /// The subarrays of a case and their matrices; the polynomial has `degree` if given, else the degree that the series
 /// needs.
-pub(super) fn shape(scene: &Scene, case: Case, degree: Option<usize>) -> Result<Shape, FixedError> {
+pub(in crate::fixed) fn shape(scene: &Scene, case: Case, degree: Option<usize>) -> Result<Shape, FixedError> {
     let parts = subarrays(case, &scene.sensor)?;
     // Scenes with dead taxels have a single subarray.
     let dead = parts[0].local_indices(&scene.input.dead);

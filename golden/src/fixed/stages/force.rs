@@ -7,8 +7,8 @@
 //! the subarray's exponent together: rounded once, saturated to 32 bits, saturations counted. Where |fz| is below the
 //! threshold, all three are zero.
 
-use super::arith::{round_shift, saturate};
-use super::formats::{Formats, FORCE_BITS, MU_ROUND};
+use crate::fixed::words::arith::{round_shift, saturate};
+use crate::fixed::words::formats::{Formats, FORCE_BITS, MU_ROUND};
 
 /// The μ word of a search position (in mu_max/384): μ with `mu_fraction` fraction bits.
 pub fn mu_word(formats: &Formats, position: i32) -> i64 {
