@@ -48,18 +48,19 @@ pub struct Saved {
 pub fn explain(model: &Model) -> Result<Vec<Explained>, HdlError> {
     let own = needs(model)?;
     let explained = |feature: Feature| {
+        let Feature { name, setting, with_feature, without_feature } = feature;
+        let present = with_feature.is_none();
         let (mut saved, mut impossible) = (None, None);
-        match &feature.with_feature {
+        match with_feature {
             None => {}
             Some(Err(error)) => impossible = Some(error.to_string()),
-            Some(Ok(other)) => saved = Some(difference(&needs(other)?, &own)),
+            Some(Ok(plan)) => saved = Some(difference(&needs(&plan.into())?, &own)),
         }
-        let costs = match &feature.without_feature {
+        let costs = match without_feature {
             None => None,
-            Some(other) => Some(difference(&own, &needs(other)?)),
+            Some(plan) => Some(difference(&own, &needs(&plan.into())?)),
         };
-        let Feature { name, setting, with_feature, .. } = feature;
-        Ok(Explained { feature: name, setting, present: with_feature.is_none(), saved, costs, impossible })
+        Ok(Explained { feature: name, setting, present, saved, costs, impossible })
     };
     features(model).into_iter().map(explained).collect()
 }

@@ -18,7 +18,7 @@ const CHOICE_FIELD: u32 = 3;
 pub fn taps(model: &Model) -> Vec<Tap> {
     let serial = model.board.engine == EngineKind::Serial;
     let block = if serial { "search_sequencer" } else { "search" };
-    let f = &model.formats;
+    let f = model.formats();
     let tap = |name, valid: &str, data: &str, fields, field_bits| Tap {
         name,
         valid: format!("{{}}{valid}"),

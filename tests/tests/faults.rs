@@ -30,7 +30,7 @@ fn every_bit_is_found() {
     assert_eq!(bits(&|class| class != StorageClass::Register), listed);
     assert_eq!(
         bits(&|class| class == StorageClass::Rom),
-        hardware.model.storage.words() * word_bits(&hardware.model.formats)
+        hardware.model.storage().words() * word_bits(hardware.model.formats())
     );
     // Estimated without the registers inside memory blocks, and without memories in LUTs, such as the queue's.
     let estimated: usize = hardware.generated.usage.values().map(|usage| usage.flip_flops).sum();

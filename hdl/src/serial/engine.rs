@@ -68,7 +68,7 @@ pub struct Engine {
 impl Engine {
     /// The serial engine of `model`.
     pub fn new(model: &Model) -> Self {
-        let f = &model.formats;
+        let f = model.formats();
         let word = word_bits(f);
         let code = f.input_bits as usize;
         // `normalise` shifts codes left by `input_bits` − 1, then right by the length of the magnitude.

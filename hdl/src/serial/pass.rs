@@ -92,9 +92,9 @@ struct Tables {
 impl Pass {
     /// The lanes of `model`, with its coefficients.
     pub fn new(model: &Model) -> Self {
-        let f = &model.formats;
+        let f = model.formats();
         let bits = count_bits(f.quads);
-        let table = |kind| coefficients(f, &model.quantised, kind);
+        let table = |kind| coefficients(f, model.quantised(), kind);
         let low_bits = f.inverse_low_bits as usize;
         let tables = Tables {
             wide: WIDE.into_iter().flat_map(table).collect(),

@@ -54,7 +54,7 @@ struct Rule<'a> {
 impl Choose {
     /// For the cases of `model`.
     pub fn new(model: &Model) -> Self {
-        let bits = model.formats.input_bits as usize;
+        let bits = model.formats().input_bits as usize;
         Choose::with(&Rule {
             sensor: &model.scene.sensor,
             grids: model.grids(),

@@ -60,7 +60,7 @@ pub struct Pass {
 impl Pass {
     /// For the schedule and the coefficients of `model`.
     pub fn new(model: &Model) -> Self {
-        let formats = &model.formats;
+        let formats = model.formats();
         let quads = formats.quads;
         let pass_program = PassProgram::new(model);
         let lanes = Lanes::new(model);

@@ -58,7 +58,7 @@ pub struct Rescale {
 impl Rescale {
     /// With the widths of `model`.
     pub fn new(model: &Model) -> Self {
-        let formats = &model.formats;
+        let formats = model.formats();
         let quads: Vec<usize> = model.cases().iter().map(|case| case.formats.quads).collect();
         let acc = 4 * formats.acc_bits as usize;
         Rescale {

@@ -47,7 +47,7 @@ pub struct Unfold {
 impl Unfold {
     /// With the widths of `model`.
     pub fn new(model: &Model) -> Self {
-        let formats = &model.formats;
+        let formats = model.formats();
         let across = schedule(formats).iter().enumerate().filter(|(_, p)| is_transposed(p)).map(|(k, _)| k).collect();
         let quads: Vec<usize> = model.cases().iter().map(|case| case.formats.quads).collect();
         let bits = formats.vector_bits as usize;

@@ -128,8 +128,8 @@ fn receive_holds_whole_frames() {
 fn send_gives_whole_frames() {
     let model = prepared();
     let given = vec![
-        ("VALUES", number(4 * model.formats.search_bits[0] as usize)),
-        ("ADDRESS", number(count_bits(model.formats.quads))),
+        ("VALUES", number(4 * model.formats().search_bits[0] as usize)),
+        ("ADDRESS", number(count_bits(model.formats().quads))),
         ("LAST", number(ROWS * COLS + STATUS_BEATS - 1)),
         ("STEPS", number(FORCE_STEPS)),
         ("WIDTH", number(FORCE_STEPS + 10)),

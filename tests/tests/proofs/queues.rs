@@ -14,7 +14,7 @@ use super::{model, COLS, ROWS};
 /// Widths of the rescaler's words.
 fn widths() -> (Generated, Vec<(&'static str, String)>, usize) {
     let model = model("");
-    let f = &model.formats;
+    let f = model.formats();
     let given = vec![
         ("SHIFTS", number(count_bits(f.acc_bits as usize))),
         ("ACC", number(f.acc_bits as usize)),
@@ -71,7 +71,7 @@ fn forces_that_wait_leave_in_order() {
 #[test]
 fn operand_vectors_stay_inside_their_memory() {
     let model = model("");
-    let (vectors, quads) = (operand_vectors(model.formats.degree), model.formats.quads);
+    let (vectors, quads) = (operand_vectors(model.formats().degree), model.formats().quads);
     let finished = count_bits(vectors + 1);
     let given = vec![
         ("ADDRESS", number(count_bits(vectors * quads))),

@@ -1,193 +1,146 @@
-//! Scenes with several partition cases: one [`Model`] per case on shared hardware, and the choice between them per
-//! frame.
+//! The partition cases of a plan: that of the scene, or several on shared hardware of which each frame takes one.
 //!
-//! All cases use the lanes, the search and the force unit of case 0. A case adds counter limits, addresses, its
-//! coefficients in the shared memory and a frame buffer. The result of a frame is to the bit that of the chosen case's
-//! model; [`choose`](crate::fixed::stages::choose) chooses it.
+//! A case beyond the first adds counter limits, addresses, its coefficients in the shared memory and a frame buffer. The
+//! result of a frame is to the bit that of the chosen case alone; [`choose`](crate::fixed::stages::choose) chooses it.
 //!
 //! Where the scene lists no cases, the largest set of cases that fits the board is built, and of equally large sets the
 //! one with the finest cases. A case left out is kept in [`Dropped`] with the resources of a design that includes it.
 
+use super::contents::{CasePlan, Dropped, Plan};
 use super::cycles::SHORTEST_SWEEP;
-use crate::board::Board;
-use crate::fixed::model::{FixedError, Model, Stage, Trace};
-use crate::fixed::stages::choose::{self, FrameStats};
-use crate::fixed::stages::prepare::Scale;
-use crate::fixed::stages::send::CASE_SHIFT;
-use crate::fixed::words::formats::{derive, Shape};
-use crate::frame::Frame;
+use super::fit::{fit, Design};
+use super::widths::{widths, Shape};
+use crate::board::{Board, EngineKind};
+use crate::fixed::error::FixedError;
+use crate::fixed::stages::prepare::{Prepare, Scale};
 use crate::matrices::{Matrices, MAX_DEGREE};
-use crate::partition::{subarrays, Case, Grid, Subarray};
-use crate::reconstruct::{CaseChoice, Reconstruction};
+use crate::partition::{subarrays, Case, Subarray};
 use crate::scene::Scene;
 use crate::symmetry::quads::Quads;
 
-/// A case that divides the array but was left out, because a design with it exceeds the board.
-#[derive(Clone, Debug)]
-pub struct Dropped {
-    /// The case left out.
-    pub case: Case,
-    /// The design of the cases built and this one.
-    pub design: Model,
+/// The plan of a scene, whether it fits its board or not.
+///
+/// # Errors
+/// As [`Model::new`](crate::fixed::Model::new), except [`FixedError::DoesNotFit`].
+pub fn planned(scene: &Scene) -> Result<Plan, FixedError> {
+    planned_with(scene, Scale::new(scene)?, None)
 }
 
-impl Model {
-    /// The model of the cases that the scene lists, else of as many cases as fit the board, else of case 0 alone.
-    pub(in crate::fixed) fn of_choices(
-        scene: &Scene,
-        scale: &Scale,
-        degree: Option<usize>,
-        board: &Board,
-    ) -> Result<Model, FixedError> {
-        let listed = scene.partition.listed.is_some();
-        let mut choices = scene.partition.choices(&scene.sensor);
-        // A case with too few quads is an error only where the scene lists it or no other is left.
-        let large: Vec<Case> = choices.iter().copied().filter(|&case| is_large(scene, case)).collect();
-        if !listed && large.len() > 1 {
-            choices = large;
-        }
-        let short = |model: &Model| model.resources.shortages(&model.board);
-        // If case 0 alone exceeds the board, so does every set of cases, since all contain it.
-        let whole = shape(scene, Case::WHOLE, degree)?;
-        if !listed {
-            let alone = Model::of_shapes(scene, scale, board, vec![(Case::WHOLE, whole.clone())])?;
-            if !short(&alone).is_empty() {
-                return Ok(alone);
-            }
-        }
-        let mut shapes = vec![whole];
-        for &case in &choices[1..] {
-            shapes.push(shape(scene, case, degree)?);
-        }
-        let all: Vec<usize> = (0..choices.len()).collect();
-        let of = |subset: &[usize]| -> Result<Model, FixedError> {
-            let pick = |&at: &usize| (choices[at], shapes[at].clone());
-            Model::of_shapes(scene, scale, board, subset.iter().map(pick).collect())
-        };
-        if listed {
-            return of(&all);
-        }
-        let mut model = None;
-        for subset in subsets(choices.len()) {
-            let built = of(&subset)?;
-            let fits = short(&built).is_empty();
-            model = Some((built, subset));
-            if fits {
-                break;
-            }
-        }
-        let (mut model, subset) = model.ok_or(FixedError::Internal("no set of two cases to build"))?;
-        // If no two cases fit, the last set tried is returned, and [`Model::new`] reports what the board lacks.
-        if short(&model).is_empty() {
-            for &at in all.iter().filter(|at| !subset.contains(at)) {
-                let with: Vec<usize> = all.iter().copied().filter(|k| subset.contains(k) || *k == at).collect();
-                model.dropped.push(Dropped { case: choices[at], design: of(&with)? });
-            }
-        }
-        Ok(model)
+/// The plan with the given scale of the readings and, if given, degree of the polynomial.
+///
+/// # Errors
+/// As [`planned`].
+pub fn planned_with(scene: &Scene, scale: Scale, degree: Option<usize>) -> Result<Plan, FixedError> {
+    scene.require_supported()?;
+    let scene = &scene.for_hardware();
+    let board = Board::load(&scene.hardware.board)?;
+    if board.engine == EngineKind::Serial {
+        scene.require_serial()?;
     }
+    match scene.partition.case {
+        Case::Adaptive => several(scene, &scale, degree, &board),
+        case => of_shapes(scene, &scale, &board, vec![(case, shape(scene, case, degree)?)]),
+    }
+}
 
-    /// The model of `cases`; where there are several, case 0 is the first.
-    pub(in crate::fixed) fn of_shapes(
-        scene: &Scene,
-        scale: &Scale,
-        board: &Board,
-        cases: Vec<(Case, Shape)>,
-    ) -> Result<Model, FixedError> {
-        let (cases, shapes): (Vec<Case>, Vec<Shape>) = cases.into_iter().unzip();
-        let own = |case: Case| {
-            let mut scene = scene.clone();
-            scene.partition.case = case;
-            scene
-        };
-        let designs = derive(scene, &shapes, board)?;
-        let several = designs.len() > 1;
-        let mut models = Vec::with_capacity(designs.len());
-        for (&case, design) in cases.iter().zip(designs) {
-            if several && !is_large(scene, case) {
-                return Err(FixedError::SmallCase { case, quads: design.formats.quads });
-            }
-            models.push(Model::of_design(&own(case), scale, design, board)?);
-        }
-        if !several {
-            return models.pop().ok_or(FixedError::Internal("no case to build"));
-        }
-        let whole = models[0].clone();
-        Ok(Model { scene: scene.clone(), built: models, ..whole })
+/// The plan of the cases that the scene lists, else of as many cases as fit the board, else of case 0 alone.
+fn several(scene: &Scene, scale: &Scale, degree: Option<usize>, board: &Board) -> Result<Plan, FixedError> {
+    let listed = scene.partition.listed.is_some();
+    let mut choices = scene.partition.choices(&scene.sensor);
+    // A case with too few quads is an error only where the scene lists it or no other is left.
+    let large: Vec<Case> = choices.iter().copied().filter(|&case| is_large(scene, case)).collect();
+    if !listed && large.len() > 1 {
+        choices = large;
     }
-
-    /// The models of the cases built, case 0 first; for a scene with one case, this model alone.
-    pub fn cases(&self) -> &[Model] {
-        match self.built.is_empty() {
-            true => std::slice::from_ref(self),
-            false => &self.built,
+    let short = |plan: &Plan| plan.resources.shortages(&plan.board);
+    // If case 0 alone exceeds the board, so does every set of cases, since all contain it.
+    let whole = shape(scene, Case::WHOLE, degree)?;
+    if !listed {
+        let alone = of_shapes(scene, scale, board, vec![(Case::WHOLE, whole.clone())])?;
+        if !short(&alone).is_empty() {
+            return Ok(alone);
         }
     }
-
-    /// Whether the hardware has several cases and chooses one per frame.
-    pub fn chooses(&self) -> bool {
-        !self.built.is_empty()
+    let mut shapes = vec![whole];
+    for &case in &choices[1..] {
+        shapes.push(shape(scene, case, degree)?);
     }
-
-    /// The paper's number of the case, 0 to 3; 0 for a partition that the paper does not number.
-    pub fn number(&self) -> u32 {
-        (0..4).find(|&number| Case::numbered(number) == Some(self.scene.partition.case)).unwrap_or(0) as u32
+    let all: Vec<usize> = (0..choices.len()).collect();
+    let of = |subset: &[usize]| -> Result<Plan, FixedError> {
+        let pick = |&at: &usize| (choices[at], shapes[at].clone());
+        of_shapes(scene, scale, board, subset.iter().map(pick).collect())
+    };
+    if listed {
+        return of(&all);
     }
-
-    /// Subarrays along rows and columns of each case built, in the order of [`Model::cases`].
-    pub fn grids(&self) -> Vec<Grid> {
-        self.cases().iter().map(Model::grid).collect()
-    }
-
-    /// Index in [`Model::cases`] of the case chosen for a frame of `codes`: one per taxel, row-major, `input_bits`
-    /// wide.
-    pub fn choose(&self, codes: &[i32]) -> usize {
-        let mut seen = FrameStats::default();
-        for (index, &code) in codes.iter().enumerate() {
-            seen.add(&self.scene.sensor, index, code, self.noise_floor);
+    let mut plan = None;
+    for subset in subsets(choices.len()) {
+        let built = of(&subset)?;
+        let fits = short(&built).is_empty();
+        plan = Some((built, subset));
+        if fits {
+            break;
         }
-        seen.choose(&self.grids(), self.scene.partition.condition, self.noise_floor)
     }
-
-    /// [`Model::run`] for a scene with several cases.
-    pub(in crate::fixed) fn run_chosen(&self, codes: &[i32]) -> Trace {
-        let chosen = self.choose(&self.prepare.run(codes));
-        let case = &self.built[chosen];
-        let mut trace = case.run(codes);
-        let words = vec![vec![chosen as i64]];
-        trace.stages.insert(1, Stage { name: "choose", words });
-        for beat in trace.status.iter_mut().step_by(crate::fixed::stages::send::STATUS_BEATS) {
-            beat[2] |= (case.number() << CASE_SHIFT) as i32;
+    let (mut plan, subset) = plan.ok_or(FixedError::Internal("no set of two cases to build"))?;
+    // If no two cases fit, the last set tried is returned; whoever needs a design that fits asks what the board lacks.
+    if short(&plan).is_empty() {
+        for &at in all.iter().filter(|at| !subset.contains(at)) {
+            let with: Vec<usize> = all.iter().copied().filter(|k| subset.contains(k) || *k == at).collect();
+            plan.dropped.push(Dropped { case: choices[at], design: of(&with)? });
         }
-        let cycles = &mut trace.cycles;
-        for count in [&mut cycles.first_output, &mut cycles.latency, &mut cycles.total] {
-            *count += choose::LATENCY;
-        }
-        trace
     }
+    Ok(plan)
+}
 
-    /// [`Model::decode`] for a scene with several cases.
-    pub(in crate::fixed) fn decode_chosen(
-        &self,
-        readings: &[Frame],
-        engine: &str,
-        beats: &[[i32; 3]],
-        status: &[[i32; 3]],
-    ) -> Result<Reconstruction, FixedError> {
-        let number = status.first().map_or(0, |beat| beat[2] as u32 >> CASE_SHIFT & 3);
-        let case = self.built.iter().find(|case| case.number() == number);
-        let case = case.ok_or(FixedError::Internal("the status names a case that was not built"))?;
-        let mut result = case.decode(readings, engine, beats, status)?;
-        let reason = "the finest whose boundaries cut nothing, by the hardware's rule".to_string();
-        let case = case.scene.partition.case.to_string();
-        result.extra.taken = Some(CaseChoice { case, reason, refused: Vec::new() });
-        Ok(result)
+/// The plan of `cases`; where there are several, case 0 is the first.
+fn of_shapes(scene: &Scene, scale: &Scale, board: &Board, cases: Vec<(Case, Shape)>) -> Result<Plan, FixedError> {
+    let (cases, shapes): (Vec<Case>, Vec<Shape>) = cases.into_iter().unzip();
+    let (designs, resources) = fit(scene, &shapes, board, widths(scene, &shapes, board)?);
+    let force_exponent = designs[0].formats.force_exponent;
+    let mut scene = scene.clone();
+    let mut planned = Vec::with_capacity(cases.len());
+    for (&case, design) in cases.iter().zip(designs) {
+        let Design { formats, quantised, storage } = design;
+        if cases.len() > 1 && !is_large(&scene, case) {
+            return Err(FixedError::SmallCase { case, quads: formats.quads, least: SHORTEST_SWEEP });
+        }
+        planned.push(CasePlan { case, parts: subarrays(case, &scene.sensor)?, formats, quantised, storage });
     }
+    if let [only] = cases[..] {
+        scene.partition.case = only;
+    }
+    let full_scale = scene.input.full_scale_MPa;
+    if let (Some(field), None) = (scene.scaled_input(), full_scale) {
+        return Err(FixedError::NoFullScale { field, value: scene.field_value(field) });
+    }
+    let scaled = |field, value: f64, unit: &dyn Fn(f64) -> f64| match full_scale {
+        _ if value == 0.0 => Ok(0.0),
+        Some(full_scale) => Ok(value / unit(full_scale)),
+        None => Err(FixedError::NoFullScale { field, value: value.to_string() }),
+    };
+    let prepare = Prepare::new(&scene, scale.clone(), full_scale.unwrap_or(1.0));
+    let code_lsb = |full_scale: f64| full_scale / prepare.largest();
+    let noise_floor = scaled("search.noise_floor_MPa", scene.search.noise_floor_MPa, &code_lsb)?;
+    let force_lsb = |full_scale: f64| code_lsb(full_scale) * 2f64.powi(force_exponent);
+    let threshold = scaled("threshold.min_force_N", scene.threshold.min_force_N, &force_lsb)?;
+    Ok(Plan {
+        noise_floor: noise_floor.floor().min(f64::from(i32::MAX)) as i32,
+        threshold: threshold.ceil().min(f64::from(u32::MAX)) as i64,
+        prepare,
+        // Scenes with dead taxels have a single subarray.
+        dead: planned[0].parts[0].local_indices(&scene.input.dead),
+        resources,
+        board: board.clone(),
+        scene,
+        cases: planned,
+        dropped: Vec::new(),
+    })
 }
 
 /// The subarrays of a case and their matrices; the polynomial has `degree` if given, else the degree that the series
 /// needs.
-pub(in crate::fixed) fn shape(scene: &Scene, case: Case, degree: Option<usize>) -> Result<Shape, FixedError> {
+fn shape(scene: &Scene, case: Case, degree: Option<usize>) -> Result<Shape, FixedError> {
     let parts = subarrays(case, &scene.sensor)?;
     // Scenes with dead taxels have a single subarray.
     let dead = parts[0].local_indices(&scene.input.dead);

@@ -17,10 +17,9 @@
 //! Σ x^(T−t) modulo the polynomial. For a word read once or twice this is never zero; for more reads it can be, with a
 //! probability of 2⁻³²: [`undetected`] lists such words. The list of columns and the schedule are not covered.
 
-use crate::fixed::model::Model;
+use super::contents::CasePlan;
 use crate::fixed::words::formats::MULTIPLIER_BITS;
 use crate::fixed::words::schedule::schedule;
-use crate::scene::CoefficientCheck;
 
 /// The polynomial of CRC-32 without its highest power, x³².
 pub const POLYNOMIAL: u32 = 0x04c1_1db7;
@@ -39,8 +38,8 @@ pub fn parity(word: &[i64]) -> bool {
 }
 
 /// Addresses in the coefficient memory in the order in which the passes of a subarray of one case read them.
-pub fn read_addresses(model: &Model) -> Vec<usize> {
-    let (formats, storage) = (&model.formats, &model.storage);
+pub fn read_addresses(case: &CasePlan) -> Vec<usize> {
+    let (formats, storage) = (&case.formats, &case.storage);
     let of = |matrix, group| {
         let first = storage.address_of(matrix, group);
         first..first + storage.columns_of(matrix, group).len()
@@ -52,34 +51,28 @@ pub fn read_addresses(model: &Model) -> Vec<usize> {
 }
 
 /// The signature after all words that the passes of one subarray read.
-pub fn signature(model: &Model) -> u32 {
-    let words = model.storage.memory(&model.formats, &model.quantised);
+pub fn signature(case: &CasePlan) -> u32 {
+    let words = case.storage.memory(&case.formats, &case.quantised);
     let parities: Vec<bool> = words.iter().map(|word| parity(word)).collect();
-    read_addresses(model).into_iter().fold(START, |s, address| step(s, parities[address - model.storage.base]))
+    read_addresses(case).into_iter().fold(START, |s, address| step(s, parities[address - case.storage.base]))
 }
 
 /// Addresses of one case where a flipped bit would not change the signature: never read, or the changes cancel.
-pub fn undetected(model: &Model) -> Vec<usize> {
-    let mut changes = vec![0u32; model.storage.words()];
+pub fn undetected(case: &CasePlan) -> Vec<usize> {
+    let mut changes = vec![0u32; case.storage.words()];
     // The change of the signature that an inverted parity at this read causes at the end.
     let mut change = 1;
-    for address in read_addresses(model).into_iter().rev() {
-        changes[address - model.storage.base] ^= change;
+    for address in read_addresses(case).into_iter().rev() {
+        changes[address - case.storage.base] ^= change;
         change = step(change, false);
     }
-    (0..changes.len()).filter(|&index| changes[index] == 0).map(|index| index + model.storage.base).collect()
-}
-
-impl Model {
-    /// Whether the scene asks for the coefficient check.
-    pub fn has_coefficient_check(&self) -> bool {
-        self.scene.hardware.coefficient_check == CoefficientCheck::Signature
-    }
+    (0..changes.len()).filter(|&index| changes[index] == 0).map(|index| index + case.storage.base).collect()
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::fixed::plan::cases::planned;
     use crate::scene::Scene;
 
     #[test]
@@ -91,17 +84,17 @@ mod tests {
     #[test]
     fn no_word_of_the_shipped_scenes_is_unseen() {
         for name in ["sensor-1", "sensor-2", "sensor-3", "eight-by-eight"] {
-            let model = Model::new(&Scene::builtin(name).unwrap()).unwrap();
-            assert_eq!(undetected(&model), [0; 0], "{name}");
+            let plan = planned(&Scene::builtin(name).unwrap()).unwrap();
+            assert_eq!(undetected(plan.first()), [0; 0], "{name}");
         }
     }
 
     #[test]
     fn a_flipped_bit_changes_the_signature() {
-        let mut model = Model::new(&Scene::builtin("eight-by-eight").unwrap()).unwrap();
-        let right = signature(&model);
-        assert_eq!(signature(&model), right);
-        model.quantised.ax.flips[0].parity[2][5] ^= 4;
-        assert_ne!(signature(&model), right);
+        let mut plan = planned(&Scene::builtin("eight-by-eight").unwrap()).unwrap();
+        let right = signature(plan.first());
+        assert_eq!(signature(plan.first()), right);
+        plan.first_mut().quantised.ax.flips[0].parity[2][5] ^= 4;
+        assert_ne!(signature(plan.first()), right);
     }
 }

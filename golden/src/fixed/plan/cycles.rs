@@ -16,12 +16,13 @@
 
 use serde::Serialize;
 
+use super::contents::{CasePlan, Plan};
 use super::serial;
+use super::storage::Storage;
 use crate::board::EngineKind;
-use crate::fixed::model::Model;
 use crate::fixed::stages::choose;
 use crate::fixed::stages::search::COARSE_CENTRES;
-use crate::fixed::words::formats::HALVINGS;
+use crate::fixed::words::formats::{Formats, HALVINGS};
 use crate::fixed::words::schedule::schedule;
 
 /// Cycles from the last input beat to the start of the frame.
@@ -78,59 +79,80 @@ pub fn coarse_period(quads: u64) -> u64 {
 }
 
 impl Cycles {
-    /// The counts of a frame of `model` whose subarrays are all searched: the largest counts.
-    pub fn longest(model: &Model) -> Self {
-        Cycles::of(model, &vec![true; model.parts.len()])
+    /// The counts of a frame whose subarrays are all searched: the largest counts.
+    pub fn longest(plan: &Plan) -> Self {
+        Cycles::of(plan, &vec![true; plan.parts().len()])
     }
 
-    /// The counts of a frame of `model`; with several cases those of case 0. `searched[k]` says whether subarray k is
-    /// searched.
-    pub fn of(model: &Model, searched: &[bool]) -> Self {
-        if model.board.engine == EngineKind::Serial {
-            return serial::cycles(model, searched.contains(&true));
-        }
-        let taxels = model.scene.sensor.taxels() as u64;
-        let quads = model.formats.quads as u64;
-        let chained = COARSE_CENTRES.len() as u64 - 1;
-        let awaited = 1 + u64::from(HALVINGS);
-        let sweeps =
-            chained * coarse_period(quads) + awaited * (quads.max(SHORTEST_SWEEP) + SELECTION_LATENCY + SET_UP);
-        let search = |&searching: &bool| match model.searches() {
-            true => HAND_OVER + SET_UP + if searching { sweeps } else { 0 } + quads + LAST_SWEEP,
-            false => UNSEARCHED,
+    /// The counts of a frame; with several cases those of case 0 and of the choice between them. `searched[k]` says
+    /// whether subarray k is searched.
+    pub fn of(plan: &Plan, searched: &[bool]) -> Self {
+        Cycles::of_case(plan, plan.first(), searched).after_choice(plan)
+    }
+
+    /// The counts of a frame that `case` solves, all its subarrays searched, without the choice of the case.
+    pub fn longest_of_case(plan: &Plan, case: &CasePlan) -> Self {
+        Cycles::of_case(plan, case, &vec![true; case.parts.len()])
+    }
+
+    /// The counts of a frame that `case` solves, without the choice of the case; `searched[k]` says whether subarray k
+    /// is searched.
+    pub fn of_case(plan: &Plan, case: &CasePlan, searched: &[bool]) -> Self {
+        let taxels = plan.scene.sensor.taxels() as u64;
+        let beats = (plan.force_beats() + case.status_beats()) as u64;
+        let (first_output, interval) = match plan.board.engine {
+            EngineKind::Serial => (serial::first_output(&case.formats, searched.contains(&true)), serial::BEAT),
+            EngineKind::Parallel => (first_output(plan, case, searched), 1),
         };
-        // A subarray is handed to the search when its passes are complete and the search of the one before has ended.
-        let (mut complete, mut searched_at) = (0, 0);
-        for searching in searched {
-            complete += passes(model);
-            let handed_over = complete.max(searched_at);
-            searched_at = handed_over + search(searching);
-            complete = handed_over + NEXT;
+        let latency = first_output + (beats - 1) * interval;
+        Cycles { first_output, latency, total: (taxels << plan.prepare.average) + latency, interval }
+    }
+
+    /// The counts with those of the choice, where the hardware chooses among several cases.
+    pub(in crate::fixed) fn after_choice(mut self, plan: &Plan) -> Self {
+        if plan.chooses() {
+            for count in [&mut self.first_output, &mut self.latency, &mut self.total] {
+                *count += choose::LATENCY;
+            }
         }
-        // After a search the last subarray's values are sent while they are computed.
-        let early = if model.searches() { quads } else { 0 };
-        // Resultants are sent once the last force has been added.
-        let choice = if model.chooses() { choose::LATENCY } else { 0 };
-        let first_output =
-            choice + model.prepare.latency() + ACCEPT + searched_at - early + SEND + model.resultants_delay();
-        let latency = first_output + (model.force_beats() + model.status_beats()) as u64 - 1;
-        Cycles { first_output, latency, total: (taxels << model.prepare.average) + latency, interval: 1 }
+        self
     }
 }
 
-/// Cycles from a subarray's start to its last coefficient in the search memory.
-fn passes(model: &Model) -> u64 {
-    timeline(model).last_row + UNFOLD
+/// Cycles of the parallel engine from the last input beat to the first output beat.
+fn first_output(plan: &Plan, case: &CasePlan, searched: &[bool]) -> u64 {
+    let quads = case.formats.quads as u64;
+    let chained = COARSE_CENTRES.len() as u64 - 1;
+    let awaited = 1 + u64::from(HALVINGS);
+    let sweeps = chained * coarse_period(quads) + awaited * (quads.max(SHORTEST_SWEEP) + SELECTION_LATENCY + SET_UP);
+    let search = |&searching: &bool| match plan.searches() {
+        true => HAND_OVER + SET_UP + if searching { sweeps } else { 0 } + quads + LAST_SWEEP,
+        false => UNSEARCHED,
+    };
+    let passes = timeline(&case.formats, &case.storage).last_row + UNFOLD;
+    // A subarray is handed to the search when its passes are complete and the search of the one before has ended.
+    let (mut complete, mut searched_at) = (0, 0);
+    for searching in searched {
+        complete += passes;
+        let handed_over = complete.max(searched_at);
+        searched_at = handed_over + search(searching);
+        complete = handed_over + NEXT;
+    }
+    // After a search the last subarray's values are sent while they are computed.
+    let early = if plan.searches() { quads } else { 0 };
+    // Resultants are sent once the last force has been added.
+    plan.prepare.latency() + ACCEPT + searched_at - early + SEND + plan.resultants_delay()
 }
 
 /// Multiplications done by the lanes, as a fraction of those possible from a subarray's first product to its last; 0 to
 /// 1.
-pub fn lane_utilisation(model: &Model) -> f64 {
-    if model.board.engine == EngineKind::Serial {
-        return serial::lane_utilisation(model);
+pub fn lane_utilisation(plan: &Plan) -> f64 {
+    let CasePlan { formats, storage, .. } = plan.first();
+    if plan.board.engine == EngineKind::Serial {
+        return serial::lane_utilisation(formats);
     }
-    let Timeline { first_issue, last_issue, products, .. } = timeline(model);
-    let lanes = 4 * model.formats.lanes_per_parity as u64;
+    let Timeline { first_issue, last_issue, products, .. } = timeline(formats, storage);
+    let lanes = 4 * formats.lanes_per_parity as u64;
     products as f64 / ((last_issue + 1 - first_issue) * lanes) as f64
 }
 
@@ -144,8 +166,7 @@ struct Timeline {
     last_row: u64,
 }
 
-fn timeline(model: &Model) -> Timeline {
-    let (formats, storage) = (&model.formats, &model.storage);
+fn timeline(formats: &Formats, storage: &Storage) -> Timeline {
     let quads = formats.quads as u64;
     let last_rows = quads - (formats.groups as u64 - 1) * formats.lanes_per_parity as u64;
     let lanes = LANES + if storage.listed { COLUMNS } else { 0 };

@@ -2,7 +2,9 @@
 //!
 //! The number of lanes stays that of the scene, so that only the feature makes the difference.
 
-use crate::fixed::model::{FixedError, Model};
+use super::cases::{planned, planned_with};
+use super::contents::{CasePlan, Plan};
+use crate::fixed::error::FixedError;
 use crate::fixed::stages::prepare::Scale;
 use crate::fixed::words::formats::MULTIPLIER_BITS;
 use crate::matrices::MAX_DEGREE;
@@ -16,19 +18,19 @@ pub struct Feature {
     pub name: &'static str,
     /// The scene's setting, or the setting with which the feature was added.
     pub setting: String,
-    /// The model with the feature added, or why there is none; `None` if the scene has the feature.
-    pub with_feature: Option<Result<Model, FixedError>>,
-    /// The model without the feature, if the scene has it and its cost depends on the setting.
-    pub without_feature: Option<Model>,
+    /// The plan with the feature added, or why there is none; `None` if the scene has the feature.
+    pub with_feature: Option<Result<Plan, FixedError>>,
+    /// The plan without the feature, if the scene has it and its cost depends on the setting.
+    pub without_feature: Option<Plan>,
 }
 
 /// All optional features in pipeline order. A scene that would exceed its board with a feature added is counted all the
 /// same.
-pub fn features(model: &Model) -> Vec<Feature> {
-    let mut scene = model.scene.clone();
-    scene.fixed.lanes = Some(4 * model.formats.lanes_per_parity as u32);
-    if model.chooses() {
-        let built: Vec<u32> = model.cases().iter().map(Model::number).collect();
+pub fn features(plan: &Plan) -> Vec<Feature> {
+    let mut scene = plan.scene.clone();
+    scene.fixed.lanes = Some(4 * plan.formats().lanes_per_parity as u32);
+    if plan.chooses() {
+        let built: Vec<u32> = plan.cases().iter().map(CasePlan::number).collect();
         scene.partition.listed = Some([0, 1, 2, 3].map(|number| built.contains(&number)));
     }
     let scene = &scene;
@@ -39,12 +41,12 @@ pub fn features(model: &Model) -> Vec<Feature> {
         change(&mut changed);
         changed
     };
-    let plain = |scene: &Scene| Model::with_scale(scene, Scale::new(scene)?, None);
-    let scaled = |scene: &Scene, gains| Model::with_scale(scene, Scale::of_tare(taxels, gains), None);
+    let plain = planned;
+    let scaled = |scene: &Scene, gains| planned_with(scene, Scale::of_tare(taxels, gains), None);
     let full_scale = input.full_scale_MPa.unwrap_or(1.0);
 
     let mut all = Vec::new();
-    let mut add = |name, has: bool, setting: String, back: &dyn Fn() -> Result<Model, FixedError>| {
+    let mut add = |name, has: bool, setting: String, back: &dyn Fn() -> Result<Plan, FixedError>| {
         all.push(Feature { name, setting, with_feature: (!has).then(back), without_feature: None });
     };
     let set = |has: bool, own: String, back: &str| if has { own } else { back.to_string() };
@@ -60,18 +62,18 @@ pub fn features(model: &Model) -> Vec<Feature> {
     add("averaging", average, set(average, format!("{} frames", 1 << input.average), "2 frames"), &|| {
         plain(&with(&|s| s.input.average = 1))
     });
-    let parts = model.parts.len();
+    let parts = plan.parts().len();
     let quarters = Case::numbered(1).filter(|case| subarrays(*case, &scene.sensor).is_ok());
-    if model.chooses() {
+    if plan.chooses() {
         // The cases built stay the same, whatever else would fit.
-        let cases: Vec<String> = model.cases().iter().map(|case| case.scene.partition.case.to_string()).collect();
+        let cases: Vec<String> = plan.cases().iter().map(|case| case.case.to_string()).collect();
         add("choice of the case", true, format!("cases {} per frame", cases.join(", ")), &|| plain(scene));
     } else if parts > 1 {
         add("partition", true, format!("{parts} subarrays"), &|| plain(scene));
     } else if let Some(case) = quarters {
         add("partition", false, "2×2 subarrays".into(), &|| plain(&with(&|s| s.partition.case = case)));
     }
-    let degree = model.formats.degree;
+    let degree = plan.formats().degree;
     let mu_max = SearchSpec::default().mu_max;
     let own = format!("mu_max = {}", scene.search.mu_max);
     add("search", degree > 0, set(degree > 0, own, &format!("mu_max = {mu_max}")), &|| {
@@ -80,7 +82,7 @@ pub fn features(model: &Model) -> Vec<Feature> {
     if degree > 0 {
         let cubic = degree == MAX_DEGREE;
         add("polynomial of degree 3", cubic, "degree 3".into(), &|| {
-            Model::with_scale(scene, Scale::new(scene)?, Some(MAX_DEGREE))
+            planned_with(scene, Scale::new(scene)?, Some(MAX_DEGREE))
         });
     }
     let threshold = scene.threshold.min_force_N > 0.0;
@@ -90,7 +92,7 @@ pub fn features(model: &Model) -> Vec<Feature> {
         plain(&thresholded)
     });
     let dead = input.dead.len();
-    let flips = &model.formats.flips;
+    let flips = &plan.formats().flips;
     let own = format!(
         "{dead} {}; parity flips: {} of Cz⁺, {} of Ax, {} of Ay",
         if dead == 1 { "taxel" } else { "taxels" },
@@ -102,10 +104,10 @@ pub fn features(model: &Model) -> Vec<Feature> {
     add("dead taxels", dead > 0, set(dead > 0, own, "dead = [[0, 0]]"), &|| {
         plain(&with(&|s| s.input.dead = vec![[0, 0]]))
     });
-    add("coefficient check", model.has_coefficient_check(), "a signature of the words read".into(), &|| {
+    add("coefficient check", plan.has_coefficient_check(), "a signature of the words read".into(), &|| {
         plain(&with(&|s| s.hardware.coefficient_check = CoefficientCheck::Signature))
     });
-    let resultants = model.sends_resultants();
+    let resultants = plan.sends_resultants();
     add("resultants", resultants, "a force and its moments per subarray".into(), &|| {
         plain(&with(&|s| s.output.forces = ForceOutput::Resultants))
     });

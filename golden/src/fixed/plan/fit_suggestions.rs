@@ -1,4 +1,4 @@
-//! Changes that make a scene fit its board; the model of each changed scene is built, none is estimated.
+//! Changes that make a scene fit its board; each changed scene is planned, none is estimated.
 //!
 //! | change | tried |
 //! |---|---|
@@ -8,71 +8,37 @@
 //! | `search.mu_max` | the largest value with three decimals for a polynomial of lower degree, then 0 |
 //! | `fixed.prune_bits` | one bit fewer at a time |
 
-use std::fmt;
-
+use super::cases::planned;
+use super::contents::Plan;
 use super::cycles::Cycles;
-use crate::fixed::model::Model;
+use crate::fixed::error::{FitSuggestion, FixedError, Shortage};
 use crate::matrices::degree::{CUBIC_FROM, SERIES_TOLERANCE};
 use crate::matrices::{Matrices, MAX_DEGREE};
 use crate::partition::{Case, Grid};
 use crate::scene::Scene;
 use crate::sensor::MIN_SIDE;
 
-/// A change to a scene, and the resources of the changed scene.
-#[derive(Clone, Debug, PartialEq)]
-pub struct FitSuggestion {
-    /// The change as written in a scene file.
-    pub change: String,
-    /// Degree of the polynomial with the change.
-    pub degree: usize,
-    /// Matrix lanes with the change.
-    pub lanes: usize,
-    /// Block RAMs with the change.
-    pub block_rams: usize,
-    /// Multipliers with the change.
-    pub multipliers: usize,
-    /// Cycles from the last input beat to the last output beat with the change, all subarrays searched.
-    pub cycles: u64,
-}
-
-/// The resources by which a scene exceeds its board, and changes that make it fit.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Shortage {
-    /// The scene's name.
-    pub scene: String,
-    /// The board's name.
-    pub board: String,
-    /// Resources the board lacks: (name, required, available).
-    pub lacking: Vec<(&'static str, usize, usize)>,
-    /// Changes of which each alone makes the scene fit; empty if none was found.
-    pub suggestions: Vec<FitSuggestion>,
-}
-
-impl fmt::Display for Shortage {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let lacking = self.lacking.iter().map(|(what, needs, has)| format!("{needs} {what}, there are {has}"));
-        write!(f, "scene {} does not fit {}: it needs ", self.scene, self.board)?;
-        write!(f, "{}", lacking.collect::<Vec<_>>().join("; "))?;
-        if self.suggestions.is_empty() {
-            return write!(f, "; no finer partition, lower degree, pruning or number of lanes makes it fit");
-        }
-        write!(f, "; it fits with any one of:")?;
-        for FitSuggestion { change, degree, lanes, block_rams, multipliers, cycles } in &self.suggestions {
-            write!(f, "\n  {change}: {block_rams} block RAMs, {multipliers} multipliers, ")?;
-            write!(f, "{lanes} lanes, degree {degree}, {cycles} cycles")?;
-        }
-        Ok(())
+/// The plan, if its board has the resources.
+///
+/// # Errors
+/// [`FixedError::DoesNotFit`] with the resources the board lacks and the changes that make the scene fit.
+pub fn fitting(plan: Plan) -> Result<Plan, FixedError> {
+    let lacking = plan.resources.shortages(&plan.board);
+    if lacking.is_empty() {
+        return Ok(plan);
     }
+    let (board, scene) = (plan.board.name.clone(), plan.scene.name.clone());
+    Err(FixedError::DoesNotFit(Box::new(Shortage { scene, board, lacking, suggestions: fit_suggestions(&plan) })))
 }
 
 /// Of each kind of change, the first that alone makes the scene fit.
-pub(in crate::fixed) fn fit_suggestions(model: &Model) -> Vec<FitSuggestion> {
-    let scene = &model.scene;
+fn fit_suggestions(plan: &Plan) -> Vec<FitSuggestion> {
+    let scene = &plan.scene;
     let kinds = [
         lanes(scene).into_iter().find_map(suggestion),
         fewer_cases(scene).into_iter().find_map(suggestion),
         partitions(scene).into_iter().find_map(suggestion),
-        degrees(model).into_iter().find_map(suggestion),
+        degrees(plan).into_iter().find_map(suggestion),
         pruned(scene).find_map(suggestion),
     ];
     kinds.into_iter().flatten().collect()
@@ -82,14 +48,14 @@ pub(in crate::fixed) fn fit_suggestions(model: &Model) -> Vec<FitSuggestion> {
 type Change = (String, Scene);
 
 fn suggestion((change, scene): Change) -> Option<FitSuggestion> {
-    let model = Model::without_fit_check(&scene).ok()?;
-    model.resources.shortages(&model.board).is_empty().then(|| FitSuggestion {
+    let plan = planned(&scene).ok()?;
+    plan.resources.shortages(&plan.board).is_empty().then(|| FitSuggestion {
         change,
-        degree: model.formats.degree,
-        lanes: 4 * model.formats.lanes_per_parity,
-        block_rams: model.resources.block_rams(),
-        multipliers: model.resources.multipliers(),
-        cycles: Cycles::longest(&model).latency,
+        degree: plan.formats().degree,
+        lanes: 4 * plan.formats().lanes_per_parity,
+        block_rams: plan.resources.block_rams(),
+        multipliers: plan.resources.multipliers(),
+        cycles: Cycles::longest(&plan).latency,
     })
 }
 
@@ -142,9 +108,9 @@ fn partitions(scene: &Scene) -> Vec<Change> {
     grids.into_iter().map(change).collect()
 }
 
-fn degrees(model: &Model) -> Vec<Change> {
-    let scene = &model.scene;
-    let Ok(matrices) = Matrices::of(scene, &model.parts[0].sensor(&scene.sensor), MAX_DEGREE) else {
+fn degrees(plan: &Plan) -> Vec<Change> {
+    let scene = &plan.scene;
+    let Ok(matrices) = Matrices::of(scene, &plan.parts()[0].sensor(&scene.sensor), MAX_DEGREE) else {
         return Vec::new();
     };
     let radii = [CUBIC_FROM.min(SERIES_TOLERANCE.cbrt()), SERIES_TOLERANCE.sqrt()];

@@ -18,12 +18,12 @@
 
 use serde::Serialize;
 
-use super::storage::word_bits;
+use super::storage::{word_bits, LaidOut};
 use crate::board::Board;
 use crate::fixed::stages::prepare::GAIN_BITS;
 use crate::fixed::stages::resultants::POSITION_BITS;
 use crate::fixed::words::arith::{bit_length, signed_bits};
-use crate::fixed::words::formats::{Formats, LaidOut, FORCE_BITS, HALVINGS, MULTIPLIER_BITS};
+use crate::fixed::words::formats::{Formats, FORCE_BITS, HALVINGS, MULTIPLIER_BITS};
 use crate::fixed::words::schedule::vectors;
 use crate::scene::{ForceOutput, Scene};
 

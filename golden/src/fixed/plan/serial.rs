@@ -15,15 +15,12 @@
 //! The polynomials are stored in two single-port memories. A sweep reads one and writes the other, so neither needs a
 //! second port; the polynomial about the best centre stays in its own region until a better one is found.
 
-use super::cycles::Cycles;
 use super::resources::{count_bits, operand_vectors, Holds, Memory, Resources};
-use super::storage::Storage;
+use super::storage::{LaidOut, Storage};
 use crate::board::Board;
-use crate::fixed::model::Model;
-use crate::fixed::stages::pass::coefficient;
 use crate::fixed::stages::search::COARSE_CENTRES;
-use crate::fixed::stages::send::STATUS_BEATS;
-use crate::fixed::words::formats::{Formats, LaidOut, Quantised, EPSILON_SHIFT, HALVINGS};
+use crate::fixed::words::formats::{Formats, EPSILON_SHIFT, HALVINGS};
+use crate::fixed::words::quantised::{coefficient, Quantised};
 use crate::fixed::words::schedule::{schedule, Kind, Matrix, Operand, Product};
 
 /// Cycles per polynomial and sweep: one for each (i, j) with i, j ≤ 3, also beyond the degree.
@@ -92,13 +89,8 @@ pub const WIDE: [Kind; 3] = [Kind::InverseHigh, Kind::Ax, Kind::Ay];
 /// width of a quad's address.
 pub fn coefficients(formats: &Formats, quantised: &Quantised, kind: Kind) -> Vec<[i64; 4]> {
     let side = 1 << count_bits(formats.quads);
-    let blocks = match kind {
-        Kind::InverseHigh | Kind::InverseLow => &quantised.inverse,
-        Kind::Ax => &quantised.ax,
-        Kind::Ay => &quantised.ay,
-    };
     // The serial engine has no dead taxels: the only flip is that of the mirror symmetry.
-    let own = &blocks.flips[0].parity;
+    let own = &quantised.of_kind(kind).flips[0].parity;
     let word = |at: usize| {
         let (i, j) = (at / side, at % side);
         let inside = i < formats.quads && j < formats.quads;
@@ -114,7 +106,7 @@ pub fn coefficients(formats: &Formats, quantised: &Quantised, kind: Kind) -> Vec
 }
 
 /// Layout and resources of the serial engine: every column is kept, one row is computed at a time.
-pub(in crate::fixed) fn fit(
+pub(super) fn fit(
     formats: &Formats,
     order: &[Matrix],
     quantised: &Quantised,
@@ -165,35 +157,30 @@ fn resources(f: &Formats, board: &Board) -> Resources {
     Resources { memories, multipliers }
 }
 
-/// Cycle counts of the serial engine for a frame whose subarray is `searched` or not.
-pub(in crate::fixed) fn cycles(model: &Model, searched: bool) -> Cycles {
-    let formats = &model.formats;
+/// Cycles from the last input beat to the first output beat, for a frame whose subarray is `searched` or not.
+pub(super) fn first_output(formats: &Formats, searched: bool) -> u64 {
     let quads = formats.quads as u64;
     let limbs = first_vector(formats) as u64;
     let fold = limbs * (quads * QUAD + DRAIN);
-    let passes = passes(model);
     let sweep = 1 + polynomials(formats) as u64 * SLOT + SWEEP_TAIL;
     let sweeps = if searched { COARSE_CENTRES.len() as u64 + u64::from(HALVINGS) } else { 0 };
     let search = sweeps * (sweep + SELECTION) + sweep;
-    let first_output = START + fold + passes + search + MU_WORDS + FIRST_BEAT;
-    let beats = (model.scene.sensor.taxels() + STATUS_BEATS) as u64;
-    let latency = first_output + (beats - 1) * BEAT;
-    Cycles { first_output, latency, total: model.scene.sensor.taxels() as u64 + latency, interval: BEAT }
+    START + fold + passes(formats) + search + MU_WORDS + FIRST_BEAT
 }
 
 /// Cycles from the first product to the end of the last v_ij.
-fn passes(model: &Model) -> u64 {
-    let quads = model.formats.quads as u64;
+fn passes(formats: &Formats) -> u64 {
+    let quads = formats.quads as u64;
     let row = |products: &Vec<Product>| quads * (products.len() as u64 * quads + ROW_GAP);
     // v_00 is replayed between the passes; there is a drain after v_00, after its replay and after the last v_ij.
-    schedule(&model.formats).iter().map(row).sum::<u64>() + quads * QUAD + 3 * DRAIN
+    schedule(formats).iter().map(row).sum::<u64>() + quads * QUAD + 3 * DRAIN
 }
 
 /// Fraction of the cycles of the passes in which the lanes multiply; 0 to 1.
-pub(in crate::fixed) fn lane_utilisation(model: &Model) -> f64 {
-    let quads = model.formats.quads as u64;
-    let products: usize = schedule(&model.formats).iter().map(Vec::len).sum();
-    (products as u64 * quads * quads) as f64 / passes(model) as f64
+pub(super) fn lane_utilisation(formats: &Formats) -> f64 {
+    let quads = formats.quads as u64;
+    let products: usize = schedule(formats).iter().map(Vec::len).sum();
+    (products as u64 * quads * quads) as f64 / passes(formats) as f64
 }
 
 /// Cycles from the last input beat to the first quad, and from the last value to the forces.

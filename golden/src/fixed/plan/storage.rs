@@ -8,10 +8,9 @@
 //! On a square subarray of square pitch, Ay is Ax with x and y exchanged. At degree 1, where no v_ij adds both, Ay is
 //! not stored: v_01 is the Ax pass over the transposed v_00, and the result is transposed.
 
-use crate::fixed::stages::pass::coefficient;
-use crate::fixed::words::coefficients::Flipped;
-use crate::fixed::words::formats::{Formats, Quantised, MULTIPLIER_BITS};
-use crate::fixed::words::schedule::{Kind, Matrix, Product};
+use crate::fixed::words::formats::{Formats, MULTIPLIER_BITS};
+use crate::fixed::words::quantised::{coefficient, Quantised};
+use crate::fixed::words::schedule::{Matrix, Product};
 
 /// The kept columns, per matrix in storage order and per group of rows.
 #[derive(Clone, Debug, PartialEq)]
@@ -25,6 +24,17 @@ pub struct Storage {
     /// Whether the memory has a list of columns: columns are pruned, in this case or another, or some are read
     /// transposed.
     pub listed: bool,
+}
+
+/// A case with its lanes and its part of the coefficient memory.
+#[derive(Clone, Debug)]
+pub struct LaidOut {
+    /// Widths, lanes and groups of rows of the case.
+    pub formats: Formats,
+    /// The columns kept in the coefficient memory.
+    pub storage: Storage,
+    /// Number of subarrays.
+    pub parts: usize,
 }
 
 /// Row indices of one group.
@@ -48,7 +58,7 @@ impl Storage {
     /// which coefficients are negligible.
     pub fn new(limits: Vec<(Matrix, i64)>, quantised: &Quantised, quads: usize, per_parity: usize) -> Self {
         let kept = |matrix, limit, group| {
-            let blocks = blocks(quantised, matrix);
+            let blocks = quantised.blocks(matrix);
             let matters = |&j: &usize| {
                 blocks
                     .parity
@@ -119,7 +129,7 @@ impl Storage {
     pub fn zero_pruned(&self, quantised: &mut Quantised, quads: usize, per_parity: usize) {
         for (index, &matrix) in self.matrices.iter().enumerate() {
             for (group, kept) in self.columns[index].iter().enumerate() {
-                for block in blocks_mut(quantised, matrix).into_iter().flat_map(|blocks| &mut blocks.parity) {
+                for block in quantised.blocks_mut(matrix).into_iter().flat_map(|blocks| &mut blocks.parity) {
                     for i in rows(group, per_parity, quads) {
                         for j in (0..quads).filter(|j| kept.binary_search(j).is_err()) {
                             block[i * quads + j] = 0;
@@ -135,7 +145,7 @@ impl Storage {
     pub fn memory(&self, formats: &Formats, quantised: &Quantised) -> Vec<Vec<i64>> {
         let lanes = formats.lanes_per_parity;
         let word = |matrix: Matrix, group: usize, j: usize| -> Vec<i64> {
-            let own = blocks(quantised, matrix);
+            let own = quantised.blocks(matrix);
             (0..4)
                 .flat_map(|parity| (0..lanes).map(move |k| (parity, group * lanes + k)))
                 .map(|(parity, i)| match i < formats.quads {
@@ -152,28 +162,6 @@ impl Storage {
         }
         words
     }
-}
-
-/// The blocks of a stored matrix; both limbs of Cz⁺ keep the same columns.
-///
-/// # Panics
-/// If the matrix has no such flip; a schedule lists only flips that exist.
-pub fn blocks(quantised: &Quantised, matrix: Matrix) -> &Flipped<i64> {
-    let blocks = match matrix.kind {
-        Kind::InverseHigh | Kind::InverseLow => &quantised.inverse,
-        Kind::Ax => &quantised.ax,
-        Kind::Ay => &quantised.ay,
-    };
-    blocks.flips.iter().find(|own| own.flip == matrix.flip).expect("a flip of the schedule")
-}
-
-fn blocks_mut(quantised: &mut Quantised, matrix: Matrix) -> Option<&mut Flipped<i64>> {
-    let blocks = match matrix.kind {
-        Kind::InverseHigh | Kind::InverseLow => &mut quantised.inverse,
-        Kind::Ax => &mut quantised.ax,
-        Kind::Ay => &mut quantised.ay,
-    };
-    blocks.flips.iter_mut().find(|own| own.flip == matrix.flip)
 }
 
 /// Width of a word of the coefficient memory in bits.

@@ -10,9 +10,9 @@
 //! The product of the two low limbs, below 2^−22 of the largest result, is left out. The smaller low limb is stored
 //! shifted left (a, c), so that both mixed products have the same weight.
 
-use crate::fixed::plan::storage::blocks;
-use crate::fixed::words::formats::{Formats, Quantised};
-use crate::fixed::words::schedule::{Kind, Matrix, Operand, Product};
+use crate::fixed::words::formats::Formats;
+use crate::fixed::words::quantised::{coefficient, Quantised};
+use crate::fixed::words::schedule::{Matrix, Operand, Product};
 use crate::symmetry::quads::Quads;
 
 /// A folded input or v_ij, four parities per quad.
@@ -51,16 +51,6 @@ impl Operands {
     }
 }
 
-/// The 18-bit operand that a lane multiplies for coefficient `c` of a matrix of `kind`.
-pub fn coefficient(formats: &Formats, kind: Kind, c: i64) -> i64 {
-    let low = formats.inverse_low_bits;
-    match kind {
-        Kind::InverseHigh => c >> low,
-        Kind::InverseLow => (c & ((1 << low) - 1)) << (formats.limb_align - low),
-        Kind::Ax | Kind::Ay => c,
-    }
-}
-
 /// Accumulates all `products` of one v_ij: one accumulator per quad and parity, in row order.
 ///
 /// A transposed product reads its operand with x and y exchanged, and so is its result.
@@ -77,7 +67,7 @@ pub fn pass(
         let source = operands.get(product.operand);
         let align = if product.align { formats.limb_align } else { 0 };
         let Matrix { kind, flip } = product.matrix;
-        let own = blocks(quantised, product.matrix);
+        let own = quantised.blocks(product.matrix);
         let source = if product.transposed { &transpose(layout, source) } else { source };
         for (i, row) in accumulators.iter_mut().enumerate() {
             for (target, acc) in row.iter_mut().enumerate() {

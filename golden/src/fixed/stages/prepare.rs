@@ -14,8 +14,8 @@
 //!
 //! Without a table the gain is 1 and nothing is multiplied. Each sample is rounded once; the sum keeps all its bits.
 
+use crate::fixed::error::FixedError;
 use crate::fixed::words::arith::{round_shift, saturate};
-use crate::fixed::FixedError;
 use crate::frame::FrameError;
 use crate::input::calibration::Calibration;
 use crate::input::tare::Tare;
@@ -44,22 +44,22 @@ pub struct Prepare {
 
 /// Conversion of a scene's readings to MPa, in floating point.
 #[derive(Clone)]
-pub(in crate::fixed) struct Scale {
+pub struct Scale {
     table: Option<Calibration>,
     tare: Option<Vec<f64>>,
     /// Largest |gain|, 1 without a table.
-    pub(in crate::fixed) largest: f64,
+    pub largest: f64,
 }
 
 impl Scale {
     /// Readings with a tare frame of zeros and, with `gains`, a table of ones: to count resources without the files.
-    pub(in crate::fixed) fn of_tare(taxels: usize, gains: bool) -> Scale {
+    pub fn of_tare(taxels: usize, gains: bool) -> Scale {
         let table = gains.then(|| Calibration::identity(taxels));
         Scale { table, tare: Some(vec![0.0; taxels]), largest: 1.0 }
     }
 
     /// Reads the calibration table and the tare frame that the scene names.
-    pub(in crate::fixed) fn new(scene: &Scene) -> Result<Scale, FixedError> {
+    pub fn new(scene: &Scene) -> Result<Scale, FixedError> {
         let spec = &scene.input;
         let table = spec.calibration.as_ref().map(|path| Calibration::load(path, &scene.sensor)).transpose();
         let table = table.map_err(InputError::from)?;
@@ -71,7 +71,7 @@ impl Scale {
 
 impl Prepare {
     /// The stage of a scene; its largest word means `full_scale_MPa`.
-    pub(in crate::fixed) fn new(scene: &Scene, scale: Scale, full_scale_MPa: f64) -> Prepare {
+    pub fn new(scene: &Scene, scale: Scale, full_scale_MPa: f64) -> Prepare {
         let code_bits = scene.fixed.input_bits;
         let reading_per_MPa = 1.0 / scale.largest;
         let codes = |readings: &[f64]| quantise(readings, code_bits, full_scale_MPa * reading_per_MPa).codes;

@@ -10,6 +10,7 @@
 //! codes.
 
 use crate::fixed::words::arith::magnitude_bits;
+use crate::scene::Condition;
 
 /// Magnitude and signs of a subarray's codes.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -20,6 +21,16 @@ pub struct Received {
     pub positive: bool,
     /// Some code is below minus the noise floor.
     pub negative: bool,
+}
+
+impl Received {
+    /// Whether the subarray meets the scene's condition for a search.
+    pub fn meets(&self, condition: Condition) -> bool {
+        match condition {
+            Condition::Loaded => self.positive || self.negative,
+            Condition::BothSigns => self.positive && self.negative,
+        }
+    }
 }
 
 /// The codes of an array with 0 for each of the `dead` taxels (row-major indices).

@@ -25,8 +25,9 @@
 //! | Ax, Ay | −A·(4/3)·mu_max | `coef_bits` | 2^−`a_exponent` |
 
 use faer::Mat;
+use serde::Serialize;
 
-use crate::symmetry::parity::{has_entry, sign};
+use crate::symmetry::parity::{has_entry, sign, FLIP_X, FLIP_Y};
 use crate::symmetry::quads::Quads;
 
 /// The four Q × Q blocks of a folded matrix that flip the parity by `flip`; row-major, indexed by the target parity.
@@ -68,6 +69,30 @@ impl Blocks {
     /// The parity flips that are stored.
     pub fn flips(&self) -> Vec<usize> {
         self.flips.iter().map(|flipped| flipped.flip).collect()
+    }
+}
+
+/// The parity flips of each matrix; that of its mirror symmetry is the first, others exist only where the symmetry is
+/// broken.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+pub struct Flips {
+    /// Flips of Cz⁺.
+    pub inverse: Vec<usize>,
+    /// Flips of Ax.
+    pub ax: Vec<usize>,
+    /// Flips of Ay.
+    pub ay: Vec<usize>,
+}
+
+impl Flips {
+    /// The flips of an array without dead taxels.
+    pub fn symmetric() -> Flips {
+        Flips { inverse: vec![0], ax: vec![FLIP_X], ay: vec![FLIP_Y] }
+    }
+
+    /// Whether the mirror symmetry holds.
+    pub fn are_symmetric(&self) -> bool {
+        *self == Flips::symmetric()
     }
 }
 
@@ -126,7 +151,6 @@ mod tests {
     use crate::fixed::words::arith::hadamard;
     use crate::matrices::Matrices;
     use crate::sensor::Sensor;
-    use crate::symmetry::parity::{FLIP_X, FLIP_Y};
 
     /// Folding, multiplying by blocks and unfolding is the dense product, for even and odd sizes.
     #[test]

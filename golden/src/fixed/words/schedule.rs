@@ -5,10 +5,8 @@
 //! accumulator, which is rounded once. A matrix without the mirror symmetry has one product for each of its parity
 //! flips. Hardware and bit-true model read the same list.
 
-use serde::Serialize;
-
+use super::coefficients::Flips;
 use super::formats::Formats;
-use crate::symmetry::parity::{FLIP_X, FLIP_Y};
 
 /// (i, j) of the v_ij up to degree 3, in order of computation.
 pub const EXPONENTS: [(u32, u32); 10] =
@@ -39,30 +37,6 @@ pub struct Matrix {
     pub kind: Kind,
     /// Source parity = target parity XOR `flip`.
     pub flip: usize,
-}
-
-/// The parity flips of each matrix; that of its mirror symmetry is the first, others exist only where the symmetry is
-/// broken.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
-pub struct Flips {
-    /// Flips of Cz⁺.
-    pub inverse: Vec<usize>,
-    /// Flips of Ax.
-    pub ax: Vec<usize>,
-    /// Flips of Ay.
-    pub ay: Vec<usize>,
-}
-
-impl Flips {
-    /// The flips of an array without dead taxels.
-    pub fn symmetric() -> Flips {
-        Flips { inverse: vec![0], ax: vec![FLIP_X], ay: vec![FLIP_Y] }
-    }
-
-    /// Whether the mirror symmetry holds.
-    pub fn are_symmetric(&self) -> bool {
-        *self == Flips::symmetric()
-    }
 }
 
 /// A vector that a pass multiplies.

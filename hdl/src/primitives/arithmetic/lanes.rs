@@ -3,7 +3,7 @@
 use dermis_golden::fixed::plan::check::{signature, POLYNOMIAL, START};
 use dermis_golden::fixed::plan::resources::Holds;
 use dermis_golden::fixed::words::formats::{Formats, MULTIPLIER_BITS};
-use dermis_golden::fixed::Model;
+use dermis_golden::fixed::{CasePlan, Model};
 use rust_hdl::prelude::*;
 
 use crate::kernel_block;
@@ -81,8 +81,8 @@ struct Shape {
 impl Lanes {
     /// The lanes of `model`, with the coefficients of all its cases in one memory.
     pub fn new(model: &Model) -> Self {
-        let (formats, cases) = (&model.formats, model.cases());
-        let words = |case: &Model| case.storage.memory(&case.formats, &case.quantised);
+        let (formats, cases) = (model.formats(), model.cases());
+        let words = |case: &CasePlan| case.storage.memory(&case.formats, &case.quantised);
         Lanes::of(&Shape {
             per_parity: formats.lanes_per_parity,
             acc_bits: formats.acc_bits as usize,

@@ -77,13 +77,13 @@ impl Requests {
             condition,
             found,
             damaged: damaged && self.model.has_coefficient_check(),
-            score: if found { inputs[18].signed(0, self.model.formats.score_bits as usize) as i32 } else { 0 },
+            score: if found { inputs[18].signed(0, self.model.formats().score_bits as usize) as i32 } else { 0 },
             saturations: inputs[19].number() as u32,
         };
     }
 
     fn answer(&mut self, entry: Entry, inputs: &[Word]) -> [i32; 3] {
-        let f = &self.model.formats;
+        let f = self.model.formats();
         let (frame, part) = (&mut self.frame, self.parts[entry.part]);
         match entry.beat {
             0 => {
@@ -126,7 +126,7 @@ impl Reference for Requests {
     fn clock(&mut self, inputs: &[Word]) {
         let [rst, begin_frame, start, offer] = [0, 2, 3, 5].map(|k| inputs[k].number() == 1);
         if let Some(entry) = &mut self.pipe[READ_STEPS - 1] {
-            entry.value = inputs[9].signed(entry.lane, self.model.formats.search_bits[0] as usize);
+            entry.value = inputs[9].signed(entry.lane, self.model.formats().search_bits[0] as usize);
         }
         self.output = self.pipe.pop_back().unwrap().map(|entry| {
             if std::mem::take(&mut self.frame.counting) {
@@ -181,7 +181,7 @@ fn stimulus(model: &Model, block: &ForceUnit, cycles: usize) -> Vec<Vec<Word>> {
             Word::of_fields(&quad, v),
             random_word(&mut random, position_bits()),
             random_word(&mut random, position_bits()),
-            random.u64(..u64::from(model.formats.input_bits)).into(),
+            random.u64(..u64::from(model.formats().input_bits)).into(),
             random.u64(..1 << block.rescale.width()).into(),
             random.bool().into(),
             random.bool().into(),
