@@ -157,6 +157,16 @@ impl Frame {
         }
     }
 
+    /// The frame with 0 MPa on the taxels `dead`, [row, col], so that they affect neither the peak nor the condition.
+    pub fn mask_dead(mut self, dead: &[[usize; 2]]) -> Frame {
+        let cols = self.sensor.cols;
+        for [row, col] in dead {
+            // A frame of another sensor may lack the taxel; the frame is checked where it is used.
+            self.stress_MPa.get_mut(row * cols + col).into_iter().for_each(|b| *b = 0.0);
+        }
+        self
+    }
+
     /// Largest |b| in MPa.
     pub fn peak_MPa(&self) -> f64 {
         self.stress_MPa.iter().fold(0.0, |peak, b| b.abs().max(peak))

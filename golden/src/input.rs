@@ -168,6 +168,6 @@ impl Input {
                 *b = gain * (*b - zero);
             }
         }
-        self.spec.mask_dead(frame)
+        frame.mask_dead(&self.spec.dead)
     }
 }

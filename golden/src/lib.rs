@@ -71,6 +71,7 @@ pub mod baseline;
 pub mod board;
 pub mod bonded;
 pub mod checks;
+pub mod degree;
 pub mod errors;
 pub mod evidence;
 pub mod fixed;

@@ -11,9 +11,29 @@
 //! Decided on codes, in integers, so that all models decide alike: positions count half pitches, sums stay below 2^23 ·
 //! 2304 · 255 < 2^43. Feeds `search`, which runs only where the condition is met.
 
+use crate::frame::Frame;
 use crate::partition::Subarray;
-use crate::scene::Condition;
+use crate::quantise::Codes;
+use crate::scene::{Condition, Scene};
 use crate::sensor::Sensor;
+
+/// Full scale in MPa: the scene's, else the frame's largest |b|, else (all zero) 1 MPa.
+pub fn full_scale(scene: &Scene, frame: &Frame) -> f64 {
+    scene.input.full_scale_MPa.unwrap_or_else(|| {
+        let peak = frame.peak_MPa();
+        if peak > 0.0 {
+            peak
+        } else {
+            1.0
+        }
+    })
+}
+
+/// The scene's noise floor in LSBs, rounded down; a code counts if its magnitude is strictly larger.
+pub fn noise_floor_codes(scene: &Scene, codes: &Codes) -> i32 {
+    // The cast saturates.
+    (scene.search.noise_floor_MPa / codes.lsb_MPa()).floor() as i32
+}
 
 /// Sign, condition and centroids of one subarray's codes.
 #[derive(Clone, Debug, PartialEq)]
@@ -86,6 +106,7 @@ pub fn receive(sensor: &Sensor, part: &Subarray, codes: &[i32], floor: i32, cond
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::quantise::quantise;
     use proptest::prelude::*;
 
     fn sensor() -> Sensor {
@@ -121,6 +142,27 @@ mod tests {
         let codes = [i32::MAX, -i32::MAX, 1, 0];
         let received = receive(&sensor(), &RIGHT, &codes, i32::MAX, Condition::Loaded);
         assert!(!received.loaded && !received.positive && !received.negative);
+    }
+
+    #[test]
+    fn full_scale_falls_back_to_the_frame() {
+        let mut scene = Scene::builtin("sensor-1").unwrap();
+        let mut frame = Frame::eq2(&scene.sensor);
+        assert_eq!(full_scale(&scene, &frame), frame.peak_MPa());
+        frame.stress_MPa.fill(0.0);
+        assert_eq!(full_scale(&scene, &frame), 1.0);
+        scene.input.full_scale_MPa = Some(0.25);
+        assert_eq!(full_scale(&scene, &frame), 0.25);
+    }
+
+    #[test]
+    fn noise_floor_rounds_down_and_saturates() {
+        let mut scene = Scene::builtin("sensor-1").unwrap();
+        let codes = quantise(&[0.0], 8, 127.0);
+        for (floor, expected) in [(0.0, 0), (2.9, 2), (1e300, i32::MAX)] {
+            scene.search.noise_floor_MPa = floor;
+            assert_eq!(noise_floor_codes(&scene, &codes), expected);
+        }
     }
 
     proptest! {

@@ -16,6 +16,7 @@ mod bonded_tests;
 mod by_evidence;
 mod contacts;
 mod extra;
+mod figures;
 mod found_noise;
 mod golden;
 mod output;
@@ -35,6 +36,7 @@ use crate::frame::{Forces, Frame};
 use crate::partition::{Grid, Subarray};
 use crate::reception::Received;
 use crate::scene::Scene;
+use crate::sensor::Sensor;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeSet;
 
@@ -124,6 +126,18 @@ pub fn assemble(
 }
 
 impl Reconstruction {
+    /// The result with resultants in place of its forces: one per region if it has regions, else one per subarray.
+    pub(crate) fn with_resultants(mut self, sensor: &Sensor) -> Reconstruction {
+        let of = |taxels: &mut dyn Iterator<Item = usize>| Resultant::of(sensor, &self.forces_N, taxels);
+        let resultants = match &self.extra.regions {
+            Some(regions) => regions.iter().map(|region| of(&mut region.taxels.iter().copied())).collect(),
+            None => self.subarrays.iter().map(|own| of(&mut own.part().indices(sensor))).collect(),
+        };
+        self.extra.resultants = Some(resultants);
+        self.forces_N = Forces::default();
+        self
+    }
+
     /// Adds the figures of `checks` and the flags that they raise.
     pub(crate) fn add_checks(&mut self, scene: &Scene, checks: Checks) {
         self.checks = checks;

@@ -17,7 +17,7 @@ use dermis_golden::fixed::{FixedError, Model};
 use dermis_golden::frame::Frame;
 use dermis_golden::matrices::cache;
 use dermis_golden::partition::Case;
-use dermis_golden::quantise::full_scale;
+use dermis_golden::reception::full_scale;
 use dermis_golden::reconstruct::{Golden, Reconstruction};
 use dermis_golden::scene::Scene;
 use dermis_hdl::explain::explain;

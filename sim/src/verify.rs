@@ -15,7 +15,7 @@ use anyhow::Result;
 use dermis_golden::board::Board;
 use dermis_golden::fixed::Model;
 use dermis_golden::frame::Frame;
-use dermis_golden::quantise::full_scale;
+use dermis_golden::reception::full_scale;
 use dermis_golden::reconstruct::{Golden, Reconstruction};
 use dermis_golden::scene::Scene;
 

@@ -7,7 +7,7 @@ use crate::flags::Flag;
 use crate::generator::converter::Converter;
 use crate::generator::draws::{DrawOptions, DrawnFrame, Draws};
 use crate::reconstruct::{Golden, Reconstruction};
-use crate::scene::{EstimatorKind, Medium};
+use crate::scene::{EstimatorKind, Medium, Scene};
 
 fn scene(name: &str) -> Scene {
     let mut scene = Scene::builtin(name).unwrap();

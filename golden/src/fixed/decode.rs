@@ -13,8 +13,8 @@ use crate::errors::Errors;
 use crate::flags::{frame_flags, Flag};
 use crate::frame::{Forces, Frame};
 use crate::input::Input;
-use crate::quantise::noise_floor_codes;
-use crate::reception::{receive, Received};
+
+use crate::reception::{noise_floor_codes, receive, Received};
 use crate::reconstruct::{assemble, CaseChoice, Reconstruction, Resultant, SubarrayResult};
 
 impl Model {
@@ -110,7 +110,7 @@ impl Model {
             result.extra.taken = Some(CaseChoice { case: case.case.to_string(), reason, refused: Vec::new() });
         }
         let full_scale_share = input.full_scale_share(readings);
-        let checks = Checks { full_scale_share, ..Checks::of(&self.scene, frame, &result) };
+        let checks = Checks { full_scale_share, ..result.figures(&self.scene, frame) };
         result.add_checks(&self.scene, checks);
         Ok(result)
     }

@@ -10,7 +10,8 @@ use super::stages::prepare::Scale;
 use crate::frame::Frame;
 use crate::input::Input;
 use crate::matrices::MAX_DEGREE;
-use crate::quantise::{full_scale, largest_code, quantise, Codes};
+use crate::quantise::{largest_code, quantise, Codes};
+use crate::reception::full_scale;
 use crate::scene::Scene;
 
 /// The bit-true model of one scene: the stages, run by the [`Plan`] to which the model dereferences.
@@ -87,7 +88,7 @@ impl Model {
             || scene.scaled_input().is_some();
         if needs && scene.input.full_scale_MPa.is_none() {
             let gain = Scale::new(&scene)?.largest;
-            let peak = |frame: &Frame| scene.input.mask_dead(frame.clone()).peak_MPa();
+            let peak = |frame: &Frame| frame.clone().mask_dead(&scene.input.dead).peak_MPa();
             let largest = gain * frames.iter().map(peak).fold(0.0, f64::max);
             let codes = f64::from(largest_code(scene.fixed.input_bits));
             // The largest reading takes the code before the last, which would count as saturated. Frames of zeros fit

@@ -97,10 +97,10 @@ pub(crate) fn fill_clipped(matrices: &Matrices, b: Vec<f64>, mut clipped: Vec<us
         return Filled { stress_MPa: b, evaluations: 0 };
     }
     let (family, objective, sparse) = (stacked(matrices, &b, &clipped), TensionObjective { n }, Sparse::default());
-    let by_sparse = |b: &[f64]| search(&Polynomial::new(matrices, b), mu_max, &sparse);
+    let by_sparse = |b: &[f64]| search(&Polynomial::new(matrices, b), mu_max, &|p| sparse.score(p));
     let (mut best, mut evaluations) = (Filled { stress_MPa: b.clone(), evaluations: 0 }, 0);
     let mut highest = f64::NEG_INFINITY;
-    for start in [search(&family, mu_max, &objective), by_sparse(&b)] {
+    for start in [search(&family, mu_max, &|p| objective.score(p)), by_sparse(&b)] {
         let mut next = start;
         // Each iteration but the last has a higher score, so the loop ends.
         while let Some(found) = next {

@@ -10,24 +10,25 @@
 //! | out: forces | 3 × n | N |
 //! | out: regions | μ, centre, load, taxels | –, mm, N |
 
-use super::extra::regions;
 use super::golden::EngineInput;
 use super::{Golden, Reconstruction};
 use crate::float::contacts::{Contacts, MeasuredStress, Solver};
 use crate::float::force::threshold;
-use crate::float::objective::Sparse;
+use crate::float::objective::{Objective, Sparse};
 use crate::float::pass::Polynomial;
 use crate::float::search::search;
 use crate::float::segment::Segments;
-use crate::frame::Frame;
+use crate::frame::{Forces, Frame};
+use crate::reconstruct::Region;
 use crate::scene::Condition;
+use crate::sensor::Sensor;
 
 impl Golden {
     /// The contacts of a frame with their μ; `None` if no candidate is compressive.
     pub(super) fn find_contacts(&self, input: &EngineInput) -> Option<Contacts> {
         let (scene, matrices) = (&self.scene, self.matrices());
         let family = Polynomial::new(matrices, input.stress_MPa);
-        let found = search(&family, scene.search.mu_max, &Sparse::default())?;
+        let found = search(&family, scene.search.mu_max, &|p| Sparse::default().score(p))?;
         let (mu_max, p0) = (scene.search.mu_max, family.v(0, 0));
         let (b, noise_MPa) = (input.stress_MPa, input.noise_MPa);
         let stress = self.taxels.as_ref().map(|taxels| MeasuredStress { taxels, b, noise_MPa });
@@ -66,4 +67,29 @@ impl Golden {
         result.extra.converged = Some(contacts.converged);
         result
     }
+}
+
+/// The regions of a frame, from the solved contacts and the reported forces; `met[k]`: whether region k meets the
+/// condition.
+fn regions(sensor: &Sensor, contacts: &Contacts, met: &[bool], forces: &Forces) -> Vec<Region> {
+    let region = |k: usize| {
+        let taxels: Vec<usize> = (0..sensor.taxels()).filter(|&t| contacts.segments.labels[t] == k).collect();
+        let sum = |axis: &[f64]| taxels.iter().map(|&t| axis[t]).sum();
+        let (mut moment, mut weight) = ([0.0; 2], 0.0);
+        for &taxel in &taxels {
+            let at = sensor.position_mm(taxel / sensor.cols, taxel % sensor.cols);
+            let fz = forces.fz[taxel].max(0.0);
+            weight += fz;
+            moment = [moment[0] + fz * at[0], moment[1] + fz * at[1]];
+        }
+        Region {
+            centroid_condition: met[k],
+            mu: contacts.mu(k),
+            objective_value: contacts.found[k].map(|found| found.objective),
+            centre_mm: (weight > 0.0).then(|| moment.map(|sum| sum / weight)),
+            load_N: [sum(&forces.fx), sum(&forces.fy), sum(&forces.fz)],
+            taxels,
+        }
+    };
+    (0..contacts.segments.count).map(region).collect()
 }

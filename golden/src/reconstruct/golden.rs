@@ -19,8 +19,8 @@ use crate::input::{Input, InputError};
 use crate::learned::{Learned, LearnedError};
 use crate::matrices::{Matrices, MatricesError, MAX_FLOAT_DEGREE};
 use crate::partition::{subarrays, Case, PartitionError, Subarray};
-use crate::quantise::{full_scale, noise_floor_codes, quantise};
-use crate::reception::{receive, Received};
+use crate::quantise::quantise;
+use crate::reception::{full_scale, noise_floor_codes, receive, Received};
 use crate::scene::{EstimatorKind, Form, Scene, SceneError};
 use thiserror::Error;
 

@@ -8,12 +8,11 @@
 //! | `input.unipolar` | the tension of clipped taxels is estimated, [`crate::input::unipolar`] |
 //! | `output.forces` | resultants instead of forces per taxel |
 
-use super::output::resultants;
 use super::{Golden, GoldenError, Reconstruction};
 use crate::checks::Checks;
 use crate::float::force::force;
 use crate::float::pass::Polynomial;
-use crate::frame::{Forces, Frame};
+use crate::frame::Frame;
 use crate::input::unipolar::{fill_clipped, misfit, Unipolar};
 use crate::matrices::Matrices;
 use crate::partition::Subarray;
@@ -69,19 +68,13 @@ impl Golden {
         let checks = Checks {
             full_scale_share: self.input.full_scale_share(readings),
             load_ratio: if searched { self.load_ratio(&filled, &result) } else { None },
-            ..Checks::of(&self.scene, &frame, &result)
+            ..result.figures(&self.scene, &frame)
         };
         result.add_checks(&self.scene, checks);
-        Ok(self.with_output(result))
-    }
-
-    /// The result with the forces that `output.forces` asks for.
-    fn with_output(&self, mut result: Reconstruction) -> Reconstruction {
-        if self.scene.output.forces == ForceOutput::Resultants {
-            result.extra.resultants = Some(resultants(&self.scene.sensor, &result));
-            result.forces_N = Forces::default();
-        }
-        result
+        Ok(match self.scene.output.forces {
+            ForceOutput::Taxels => result,
+            ForceOutput::Resultants => result.with_resultants(&self.scene.sensor),
+        })
     }
 
     /// Σ fz over that of the stress without shear, Σ Cz⁺b after the threshold; `None` unless both press.

@@ -11,8 +11,8 @@
 use super::cases::planned;
 use super::contents::Plan;
 use super::cycles::Cycles;
+use crate::degree::{CUBIC_FROM, SERIES_TOLERANCE};
 use crate::fixed::error::{FitSuggestion, FixedError, Shortage};
-use crate::matrices::degree::{CUBIC_FROM, SERIES_TOLERANCE};
 use crate::matrices::{Matrices, MAX_DEGREE};
 use crate::partition::{Case, Grid};
 use crate::scene::Scene;

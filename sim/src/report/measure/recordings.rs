@@ -9,7 +9,7 @@ use anyhow::Result;
 use dermis_golden::fixed::{FixedError, Model};
 use dermis_golden::frame::Frame;
 use dermis_golden::import::Imported;
-use dermis_golden::quantise::full_scale;
+use dermis_golden::reception::full_scale;
 use dermis_golden::reconstruct::{Golden, Reconstruction};
 
 use super::clock;

@@ -25,7 +25,7 @@ use dermis_golden::fixed::words::arith::{bit_length, hadamard};
 use dermis_golden::fixed::words::formats::{Formats, MU_STEPS, SEARCH_EXTRA_BITS};
 use dermis_golden::fixed::words::schedule::{is_transposed, schedule, EXPONENTS};
 use dermis_golden::float::pass::Polynomial;
-use dermis_golden::quantise::full_scale;
+use dermis_golden::reception::full_scale;
 
 use super::{BitTrue, Measured};
 

@@ -22,13 +22,13 @@
 //! | 5 × 4, 2 | 0.17 | 1 | 16 %, 4.5 %, 3.2 % | 2 |
 //! | 8 × 8, 0.91 (`sensor-4`) | 0.018 | 1 | 87 % each: contacts within a cell show next to no shear | 1 |
 
-use super::{Matrices, MAX_DEGREE, MAX_RADIUS};
-use crate::float::objective::Sparse;
+use crate::float::objective::{Objective, Sparse};
 use crate::float::pass::Polynomial;
 use crate::float::search::search;
 use crate::frame::{Contact, Frame};
 use crate::generator::{generate, random_contacts, Draw, Shapes};
-use crate::scene::{Inversion, Medium};
+use crate::matrices::{Matrices, MatricesError, MAX_DEGREE, MAX_RADIUS};
+use crate::scene::{Inversion, Medium, Scene};
 use crate::sensor::Sensor;
 use std::collections::BTreeMap;
 use std::sync::Mutex;
@@ -46,8 +46,95 @@ const DRAWS: u64 = 6;
 /// μ_max for which the generator draws its ratios of shear to load.
 const DRAWN_FOR: f64 = 0.6;
 
+impl Matrices {
+    /// Computes the matrices of a (sub)array on a half-space with the exact inverse, for shear ratios up to `mu_max` (0
+    /// to 2); the degree is at most [`MAX_DEGREE`].
+    ///
+    /// ```
+    /// use dermis_golden::{frame::Frame, matrices::Matrices, scene::Scene};
+    ///
+    /// let scene = Scene::builtin("eight-by-eight")?;
+    /// let (matrices, b) = (Matrices::new(&scene.sensor, 0.6)?, Frame::shipped(&scene).remove(0).stress_MPa);
+    /// let product = |m: &faer::Mat<f64>, v: &[f64]| -> Vec<f64> {
+    ///     (0..64).map(|i| (0..64).map(|j| m[(i, j)] * v[j]).sum()).collect()
+    /// };
+    /// // The normal forces p = Cz⁺ b cause exactly the stress b.
+    /// let p = product(&matrices.cz_pinv, &b);
+    /// let stress = product(&matrices.cz, &p);
+    /// let peak = b.iter().fold(0.0f64, |peak, b| b.abs().max(peak));
+    /// assert!(stress.iter().zip(&b).all(|(s, b)| (s - b).abs() < 1e-13 * peak));
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    ///
+    /// # Errors
+    /// [`MatricesError`]; the size is checked before anything is allocated.
+    pub fn new(sensor: &Sensor, mu_max: f64) -> Result<Matrices, MatricesError> {
+        Matrices::solved(sensor, Medium::HalfSpace, mu_max, Inversion::EXACT)?.with_degree(
+            Medium::HalfSpace,
+            mu_max,
+            None,
+            MAX_DEGREE,
+        )
+    }
+
+    /// Computes the matrices of a subarray with the scene's medium, mu_max, inverse and degree; without `search.degree`
+    /// the degree is at most `most`.
+    ///
+    /// # Errors
+    /// As [`Matrices::new`].
+    pub fn of(scene: &Scene, subarray: &Sensor, most: usize) -> Result<Matrices, MatricesError> {
+        let search = &scene.search;
+        Matrices::solved(subarray, scene.medium, search.mu_max, scene.inversion())?.with_degree(
+            scene.medium,
+            search.mu_max,
+            search.degree,
+            most,
+        )
+    }
+
+    /// The matrices with the degree `set`, or the one that the series needs.
+    fn with_degree(
+        self,
+        medium: Medium,
+        mu_max: f64,
+        set: Option<usize>,
+        most: usize,
+    ) -> Result<Matrices, MatricesError> {
+        let radius = self.spectral_radius;
+        let degree = match set {
+            Some(degree) if radius < MAX_RADIUS => Some(if mu_max > 0.0 { degree } else { 0 }),
+            _ => by_radius(radius, mu_max, most).map(|least| match least {
+                1..MAX_DEGREE if least < most => by_effect(&self.sensor, medium, mu_max, self.inversion, least),
+                _ => least,
+            }),
+        };
+        match degree {
+            Some(degree) => Ok(Matrices { degree, ..self }),
+            None => Err(MatricesError::SlowSeries {
+                sensor: Box::new(self.sensor),
+                radius,
+                mu_max,
+                most,
+                suggested: largest_mu_max(radius / mu_max, most),
+            }),
+        }
+    }
+}
+
+/// The largest mu_max with three decimals for which degree `most` is enough; `per_mu` is r / mu_max.
+fn largest_mu_max(per_mu: f64, most: usize) -> f64 {
+    let radius = SERIES_TOLERANCE.powf(1.0 / (most as f64 + 1.0)).min(MAX_RADIUS);
+    let mu_max = (1e3 * radius / per_mu).floor() / 1e3;
+    // NaN or infinite rates allow no mu_max.
+    if mu_max.is_finite() {
+        mu_max
+    } else {
+        0.0
+    }
+}
+
 /// The smallest degree with r^(d+1) ≤ 0.035, at least 3 where r > 0.2; `None` if it exceeds `most`.
-pub(super) fn by_radius(r: f64, mu_max: f64, most: usize) -> Option<usize> {
+fn by_radius(r: f64, mu_max: f64, most: usize) -> Option<usize> {
     if mu_max == 0.0 {
         return Some(0);
     }
@@ -58,7 +145,7 @@ pub(super) fn by_radius(r: f64, mu_max: f64, most: usize) -> Option<usize> {
 
 /// The smallest degree from `least` on that finds the shear of the drawn contacts as well as degree 3 does; `least`
 /// where the contacts cannot be drawn.
-pub(super) fn by_effect(sensor: &Sensor, medium: Medium, mu_max: f64, inversion: Inversion, least: usize) -> usize {
+fn by_effect(sensor: &Sensor, medium: Medium, mu_max: f64, inversion: Inversion, least: usize) -> usize {
     static KNOWN: Mutex<BTreeMap<String, usize>> = Mutex::new(BTreeMap::new());
     let sensor = Sensor { rows: SIDE, cols: SIDE, ..sensor.clone() };
     // Debug prints the shortest text that reads back as the same number.
@@ -100,7 +187,7 @@ fn drawn(sensor: &Sensor, medium: Medium, mu_max: f64) -> Vec<Frame> {
 fn median_error(matrices: &Matrices, frames: &[Frame], mu_max: f64, d: usize) -> f64 {
     let error = |frame: &Frame| {
         let family = Polynomial::of_degree(matrices, &frame.stress_MPa, d);
-        let found = search(&family, mu_max, &Sparse::default())?;
+        let found = search(&family, mu_max, &|p| Sparse::default().score(p))?;
         let normal: f64 = family.eval(found.mu).iter().sum();
         let [x, y, _] = frame.resultant_N?;
         Some((found.mu[0] * normal - x).hypot(found.mu[1] * normal - y) / x.hypot(y))
@@ -113,11 +200,10 @@ fn median_error(matrices: &Matrices, frames: &[Frame], mu_max: f64, d: usize) ->
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scene::Scene;
 
     #[test]
     fn the_radius_alone_at_its_edges() {
-        let most = super::super::MAX_FLOAT_DEGREE;
+        let most = crate::matrices::MAX_FLOAT_DEGREE;
         assert_eq!(by_radius(0.5, 0.0, MAX_DEGREE), Some(0));
         assert_eq!(by_radius(0.0, 0.6, MAX_DEGREE), Some(1));
         assert_eq!(by_radius(0.187, 0.6, MAX_DEGREE), Some(1));
