@@ -102,7 +102,7 @@ impl Frame {
     /// errors.
     ///
     /// ```
-    /// use dermis_golden::{frame::Frame, reconstruct::Golden, scene::Scene};
+    /// use dermis_golden::{frame::Frame, float::Golden, scene::Scene};
     ///
     /// let scene = Scene::builtin("eight-by-eight")?;
     /// let mut stress_MPa = vec![0.0; scene.sensor.taxels()];

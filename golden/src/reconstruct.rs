@@ -1,4 +1,4 @@
-//! Reconstruct: the result format that all engines share, and the golden engine.
+//! Reconstruct: the result format that all engines share.
 //!
 //! [`Reconstruction`] serialises to the JSON of `dermis reconstruct --json`; forces are row-major over the whole array,
 //! errors are fractions with the sign of Eq. 3, `null` where undefined.
@@ -10,23 +10,13 @@
 //! | out: resultant | 3 | N |
 //! | out: error | 5 | fraction, where the frame has a resultant |
 
-mod adaptive;
-#[cfg(test)]
-mod bonded_tests;
-mod by_evidence;
-mod contacts;
 mod extra;
 mod figures;
 mod found_noise;
-mod golden;
 mod output;
-mod run;
-#[cfg(test)]
-mod tests;
 
-pub use extra::{CaseChoice, Extra, Region, RejectedCase};
+pub use extra::{CaseChoice, Extra, Region, RejectedCase, Unipolar};
 pub use found_noise::FOUND_NOISE_LIMIT;
-pub use golden::{Golden, GoldenError};
 pub use output::Resultant;
 
 use crate::checks::Checks;

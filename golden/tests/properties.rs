@@ -2,11 +2,12 @@
 //! several subarrays, and the difference between fixed and floating point.
 
 use dermis_golden::fixed::Model;
+use dermis_golden::float::Golden;
 use dermis_golden::frame::{Forces, Frame};
 use dermis_golden::generator::{generate, random_contacts, Draw, Shapes};
 use dermis_golden::partition::{subarrays, Case};
 use dermis_golden::quantise::largest_code;
-use dermis_golden::reconstruct::{Golden, Reconstruction};
+use dermis_golden::reconstruct::Reconstruction;
 use dermis_golden::scene::Scene;
 use proptest::prelude::*;
 

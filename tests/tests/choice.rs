@@ -5,10 +5,10 @@ use std::collections::BTreeSet;
 
 use dermis_golden::fixed::stages::choose::{FrameStats, CUT_SHIFT};
 use dermis_golden::fixed::Model;
+use dermis_golden::float::Golden;
 use dermis_golden::frame::Frame;
 use dermis_golden::partition::{Case, Grid};
 use dermis_golden::quantise::quantise;
-use dermis_golden::reconstruct::Golden;
 use dermis_golden::scene::Scene;
 use dermis_sim::compare::median;
 use dermis_sim::cosim::{run, DeviceUnderTest, Findings, Vector};

@@ -4,8 +4,8 @@
 //! `dermis study dead-taxels` prints the table of errors.
 
 use dermis_golden::fixed::Model;
+use dermis_golden::float::Golden;
 use dermis_golden::frame::Frame;
-use dermis_golden::reconstruct::Golden;
 use dermis_golden::scene::Scene;
 use dermis_sim::cosim::{run, DeviceUnderTest, Findings, Vector};
 use dermis_sim::drawn_frames::{DrawnFrames, Shapes};
@@ -121,7 +121,7 @@ fn fixed_is_near_golden() {
 #[test]
 fn mirrored_pairs_keep_a_symmetry() {
     let flips = |dead: &[[usize; 2]]| {
-        let flips = Model::new(&masked("sensor-1", dead)).unwrap().formats.flips;
+        let flips = Model::new(&masked("sensor-1", dead)).unwrap().formats().clone().flips;
         [flips.inverse.len(), flips.ax.len(), flips.ay.len()]
     };
     assert_eq!(flips(&[[4, 6]]), [4; 3]);

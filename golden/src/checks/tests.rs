@@ -2,10 +2,11 @@
 
 use super::*;
 use crate::fixed::Model;
+use crate::float::Golden;
 use crate::frame::Contact;
 use crate::frame::Frame;
 use crate::generator::generate;
-use crate::reconstruct::{Golden, Reconstruction};
+use crate::reconstruct::Reconstruction;
 use crate::scene::{EstimatorKind, Medium, ObjectiveKind};
 use crate::sensor::Sensor;
 

@@ -38,7 +38,7 @@ impl Model {
     /// Computes and quantises the scene's matrices and derives its formats.
     ///
     /// ```
-    /// use dermis_golden::{fixed::{Cycles, Model}, frame::Frame, reconstruct::Golden, scene::Scene};
+    /// use dermis_golden::{fixed::{Cycles, Model}, frame::Frame, float::Golden, scene::Scene};
     ///
     /// let scene = Scene::builtin("eight-by-eight")?;
     /// let frame = Frame::shipped(&scene).remove(0);

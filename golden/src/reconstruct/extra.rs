@@ -12,7 +12,6 @@
 
 use super::output::Resultant;
 use crate::evidence::ContactEstimate;
-use crate::input::unipolar::Unipolar;
 use serde::{Deserialize, Serialize};
 
 /// Optional fields of a result.
@@ -43,6 +42,20 @@ pub struct Extra {
     /// The forces of `output.forces = "resultants"`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub resultants: Option<Vec<Resultant>>,
+}
+
+/// Statistics of the estimated tension.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Unipolar {
+    /// Number of readings of zero or less.
+    pub clipped: usize,
+    /// Number of clipped readings for which tension was estimated.
+    pub pulled: usize,
+    /// Number of candidates for μ, over all subarrays.
+    pub evaluations: usize,
+    /// Root mean square difference of the known readings and the stress of the compressive forces, relative to the
+    /// peak.
+    pub misfit: f64,
 }
 
 /// The choice of a case for one frame.

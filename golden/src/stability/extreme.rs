@@ -28,10 +28,11 @@
 use crate::fixed::stages::send::{Status, FLAG_CONDITION, FLAG_FOUND, FLAG_FRAMING, FLAG_NO_CONTACT, STATUS_BEATS};
 use crate::fixed::{FixedError, Model};
 use crate::flags::Flag;
+use crate::float::{Golden, GoldenError};
 use crate::frame::{Contact, Frame};
 use crate::generator::{generate, GeneratorError};
 use crate::partition::{subarrays, Case};
-use crate::reconstruct::{Golden, GoldenError, Reconstruction};
+use crate::reconstruct::Reconstruction;
 use crate::scene::Scene;
 use serde::Serialize;
 

@@ -275,7 +275,7 @@ fn check_with(more: &str) {
         "name = \"solve\"\n[sensor]\nrows = 4\ncols = 4\npitch_x_mm = 4.0\npitch_y_mm = 3.0\nthickness_mm = 3.0\n\
          [hardware]\nboard = \"icebreaker\"\n{more}"
     );
-    let formats = Model::new(&Scene::parse(&text, "solve.toml").unwrap()).unwrap().formats;
+    let formats = Model::new(&Scene::parse(&text, "solve.toml").unwrap()).unwrap().formats().clone();
     let (acc, code) = (formats.acc_bits as usize, formats.input_bits as usize);
     let rounded = formats.input_bits.max(formats.vector_bits) as usize;
     let block = PassSequencer::new(&formats, acc.max(2 * code), rounded);

@@ -39,9 +39,9 @@
 //! | out: stress | taxels | MPa, at most 0 where it was clipped |
 //! | out: misfit | scalar | root mean square over the known readings, relative to the peak |
 
-use crate::float::objective::{Objective, Sparse};
-use crate::float::pass::Polynomial;
-use crate::float::search::search;
+use super::objective::{Objective, Sparse};
+use super::pass::Polynomial;
+use super::search::search;
 use crate::frame::{Forces, Frame};
 use crate::influence::table;
 use crate::matrices::Matrices;
@@ -50,7 +50,6 @@ use crate::symmetry::folded::accumulate;
 use faer::linalg::matmul::matmul;
 use faer::linalg::solvers::Solve;
 use faer::{Accum, Col, Mat, Par, Side};
-use serde::{Deserialize, Serialize};
 
 /// Maximum number of clipped taxels of a subarray that are filled; the work grows with its square.
 pub const MAX_CLIPPED: usize = 256;
@@ -60,20 +59,6 @@ const ROUNDS: i32 = 10;
 const SPARSE_SHARES: [f64; 2] = [1e-1, 1e-5];
 /// Ridge added to the unit diagonal of the normal equations: above their rounding, n ε.
 const RIDGE: f64 = 1e-13;
-
-/// Statistics of the estimated tension.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Unipolar {
-    /// Number of readings of zero or less.
-    pub clipped: usize,
-    /// Number of clipped readings for which tension was estimated.
-    pub pulled: usize,
-    /// Number of candidates for μ, over all subarrays.
-    pub evaluations: usize,
-    /// Root mean square difference of the known readings and the stress of the compressive forces, relative to the
-    /// peak.
-    pub misfit: f64,
-}
 
 /// The stress of a subarray with tension in place of its clipped readings.
 pub(crate) struct Filled {

@@ -24,14 +24,13 @@
 //! | in: per case, `receive` of its subarrays | parts | – |
 //! | out: reason for rejecting the case | text | – |
 
-use super::extra::{CaseChoice, RejectedCase};
-use super::golden::{CaseOutcome, EngineInput};
-use super::{Golden, Reconstruction};
-use crate::float::contacts::Contacts;
-use crate::float::segment::{segment, Segments, WIDTH};
+use super::contacts::Contacts;
+use super::golden::{CaseOutcome, EngineInput, Golden};
+use super::segment::{segment, Segments, WIDTH};
 use crate::frame::{Forces, Frame};
 use crate::partition::{Case, Subarray};
 use crate::reception::Received;
+use crate::reconstruct::{CaseChoice, Reconstruction, RejectedCase};
 use crate::sensor::Sensor;
 
 /// Fraction of a contact's largest force from which a cell is part of it.

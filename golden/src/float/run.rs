@@ -5,24 +5,25 @@
 //! |---|---|
 //! | `input.average` | [`Golden::run_averaged`]; [`Golden::run`] takes an averaged frame |
 //! | `input.calibration`, `input.tare` | readings to stress |
-//! | `input.unipolar` | the tension of clipped taxels is estimated, [`crate::input::unipolar`] |
+//! | `input.unipolar` | the tension of clipped taxels is estimated, `unipolar` |
 //! | `output.forces` | resultants instead of forces per taxel |
 
-use super::{Golden, GoldenError, Reconstruction};
+use super::force::force;
+use super::golden::{Golden, GoldenError};
+use super::pass::Polynomial;
+use super::unipolar::{fill_clipped, misfit};
 use crate::checks::Checks;
-use crate::float::force::force;
-use crate::float::pass::Polynomial;
 use crate::frame::Frame;
-use crate::input::unipolar::{fill_clipped, misfit, Unipolar};
 use crate::matrices::Matrices;
 use crate::partition::Subarray;
+use crate::reconstruct::{Reconstruction, Unipolar};
 use crate::scene::{ForceOutput, Scene};
 
 impl Golden {
     /// Reconstructs one frame; its values are readings if the scene has a calibration or tare file, else stress in MPa.
     ///
     /// ```
-    /// use dermis_golden::{frame::Frame, reconstruct::Golden, scene::Scene};
+    /// use dermis_golden::{frame::Frame, float::Golden, scene::Scene};
     ///
     /// let scene = Scene::builtin("sensor-1")?;
     /// let golden = Golden::new(&scene)?;
@@ -112,7 +113,7 @@ impl Golden {
     /// first.
     ///
     /// ```
-    /// use dermis_golden::{frame::Frame, generator::converter::Converter, reconstruct::Golden, scene::Scene};
+    /// use dermis_golden::{frame::Frame, generator::converter::Converter, float::Golden, scene::Scene};
     ///
     /// let mut scene = Scene::builtin("sensor-1")?;
     /// scene.input.average = 4;

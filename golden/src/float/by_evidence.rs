@@ -3,13 +3,13 @@
 //! The array is one subarray, whatever its contacts; its μ is the ratio of the resultants. Noise of zero means that the
 //! scene states none: it is found from the frame.
 
-use super::golden::{CaseOutcome, EngineInput};
-use super::{Golden, Reconstruction, SubarrayResult};
+use super::force::threshold;
+use super::golden::{CaseOutcome, EngineInput, Golden};
 use crate::checks::COUNTS_FROM;
 use crate::evidence::{ContactEstimate, Evidence};
-use crate::float::force::threshold;
 use crate::frame::Frame;
 use crate::partition::Subarray;
+use crate::reconstruct::{Reconstruction, SubarrayResult};
 
 impl Golden {
     /// Estimates the contacts of calibrated stress, clipped readings as they are.

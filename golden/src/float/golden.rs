@@ -1,4 +1,4 @@
-//! The golden engine: the stages of [`crate::float`] in order, for each subarray of the scene's partition.
+//! The golden engine: the stages in order, for each subarray of the scene's partition.
 //!
 //! | case | per frame |
 //! |---|---|
@@ -6,14 +6,13 @@
 //! | adaptive | the whole array first, to find the contacts; then the case that `adaptive` chooses |
 //! | contacts | the whole array first; then its regions, each with its own μ |
 
-use super::{assemble, Reconstruction, SubarrayResult};
+use super::force::{force, threshold};
+use super::objective::taxels::Taxels;
+use super::objective::{of_kind, Estimate, Objective, SearchInput};
+use super::orthogonal::{truncation, Orthogonal, OrthogonalError};
+use super::pass::Polynomial;
 use crate::evidence::Evidence;
 use crate::flags::{frame_flags, Flag};
-use crate::float::force::{force, threshold};
-use crate::float::objective::taxels::Taxels;
-use crate::float::objective::{of_kind, Estimate, Objective, SearchInput};
-use crate::float::orthogonal::{truncation, Orthogonal, OrthogonalError};
-use crate::float::pass::Polynomial;
 use crate::frame::{Forces, Frame, FrameError};
 use crate::input::{Input, InputError};
 use crate::learned::{Learned, LearnedError};
@@ -21,6 +20,7 @@ use crate::matrices::{Matrices, MatricesError, MAX_FLOAT_DEGREE};
 use crate::partition::{subarrays, Case, PartitionError, Subarray};
 use crate::quantise::quantise;
 use crate::reception::{full_scale, noise_floor_codes, receive, Received};
+use crate::reconstruct::{assemble, Reconstruction, SubarrayResult};
 use crate::scene::{EstimatorKind, Form, Scene, SceneError};
 use thiserror::Error;
 

@@ -10,16 +10,15 @@
 //! | out: forces | 3 × n | N |
 //! | out: regions | μ, centre, load, taxels | –, mm, N |
 
-use super::golden::EngineInput;
-use super::{Golden, Reconstruction};
-use crate::float::contacts::{Contacts, MeasuredStress, Solver};
-use crate::float::force::threshold;
-use crate::float::objective::{Objective, Sparse};
-use crate::float::pass::Polynomial;
-use crate::float::search::search;
-use crate::float::segment::Segments;
+use super::contacts::{Contacts, MeasuredStress, Solver};
+use super::force::threshold;
+use super::golden::{EngineInput, Golden};
+use super::objective::{Objective, Sparse};
+use super::pass::Polynomial;
+use super::search::search;
+use super::segment::Segments;
 use crate::frame::{Forces, Frame};
-use crate::reconstruct::Region;
+use crate::reconstruct::{Reconstruction, Region};
 use crate::scene::Condition;
 use crate::sensor::Sensor;
 

@@ -1,8 +1,8 @@
 //! The golden engine on frames of a bonded layer, computed by finite elements and by Fourier transforms.
 
 use crate::flags::Flag;
+use crate::float::Golden;
 use crate::frame::Frame;
-use crate::reconstruct::Golden;
 use crate::scene::{Medium, Scene};
 
 /// Targets for contacts inside the array: medians of the tangential and of the normal error.

@@ -1,8 +1,12 @@
 //! The golden engine on shipped frames, the JSON of its result, and extreme frames.
 
 use super::*;
-use crate::partition::{Case, Subarray};
+use crate::flags::Flag;
+use crate::frame::{Forces, Frame};
+use crate::partition::{Case, Grid, Subarray};
+use crate::reconstruct::{assemble, Reconstruction, SubarrayResult};
 use crate::scene::Condition;
+use crate::scene::Scene;
 use proptest::prelude::*;
 
 /// Targets on sensor 1: median tangential error, normal error of each frame.
