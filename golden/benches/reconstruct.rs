@@ -2,10 +2,10 @@
 
 use criterion::{criterion_group, criterion_main, Criterion};
 use dermis_golden::baseline::Baseline;
+use dermis_golden::float::Golden;
 use dermis_golden::frame::Frame;
 use dermis_golden::generator::{generate, random_contacts, Draw, Shapes};
 use dermis_golden::partition::Case;
-use dermis_golden::reconstruct::Golden;
 use dermis_golden::scene::{EstimatorKind, ObjectiveKind, Scene};
 use std::hint::black_box;
 

@@ -13,12 +13,12 @@ use crate::float::force::{force, threshold};
 use crate::float::objective::{Objective, Sparse};
 use crate::float::orthogonal::Orthogonal;
 use crate::float::pass::Polynomial;
-use crate::float::receive::receive;
+use crate::float::GoldenError;
 use crate::frame::{Forces, Frame};
 use crate::matrices::{Matrices, MAX_FLOAT_DEGREE};
 use crate::partition::{subarrays, Subarray};
-use crate::quantise::{full_scale, noise_floor_codes, quantise};
-use crate::reconstruct::GoldenError;
+use crate::quantise::quantise;
+use crate::reception::{full_scale, noise_floor_codes, receive};
 use crate::scene::Scene;
 use argmin::core::{CostFunction, Error, Executor};
 use argmin::solver::neldermead::NelderMead;
@@ -68,7 +68,7 @@ impl Baseline {
     /// Computes C† and I − C†C with the scene's `[inverse]`; takes seconds for subarrays of 20 × 20.
     ///
     /// # Errors
-    /// As [`crate::reconstruct::Golden::new`]; [`GoldenError::Orthogonal`] if a subarray has more than
+    /// As [`crate::float::Golden::new`]; [`GoldenError::Orthogonal`] if a subarray has more than
     /// [`crate::float::orthogonal::MAX_TAXELS`] taxels; [`GoldenError::Partition`] if the case depends on the frame.
     pub fn new(scene: &Scene) -> Result<Baseline, GoldenError> {
         scene.require_golden()?;
@@ -123,8 +123,8 @@ fn simplex(problem: Eq1Cost, mu_max: f64) -> [f64; 2] {
 mod tests {
     use super::*;
     use crate::errors::Errors;
+    use crate::float::Golden;
     use crate::partition::Case;
-    use crate::reconstruct::Golden;
     use crate::scene::InverseKind;
     use crate::stability::settings;
 

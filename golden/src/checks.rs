@@ -3,12 +3,12 @@
 //! | field | unit | flag | raised when | by |
 //! |---|---|---|---|---|
 //! | `full_scale_share` | – | `saturated` | a reading rounds to the last code of `input.full_scale_MPa` | [`Input`](crate::input::Input) |
-//! | `peak_MPa` | MPa | `implausible-stress` | above `input.plausible_MPa` | [`Checks::of`] |
-//! | `mu_share` | – | `mu-at-bound` | at least [`MU_AT_BOUND`] | [`Checks::of`] |
-//! | `border_share` | – | none; beside `load-outside` | – | [`Checks::of`] |
+//! | `peak_MPa` | MPa | `implausible-stress` | above `input.plausible_MPa` | [`Reconstruction::figures`](crate::reconstruct::Reconstruction::figures) |
+//! | `mu_share` | – | `mu-at-bound` | at least [`MU_AT_BOUND`] | [`Reconstruction::figures`](crate::reconstruct::Reconstruction::figures) |
+//! | `border_share` | – | none; beside `load-outside` | – | [`Reconstruction::figures`](crate::reconstruct::Reconstruction::figures) |
 //! | `load_ratio` | – | `load-mismatch` | off 1 by more than [`LOAD_MISMATCH`] | the golden engine |
 //! | `shape_misfit` | – | `shape-mismatch` | above 1 | the golden engine, with `patch` and `symmetric` |
-//! | `noise_MPa` | MPa | `shear-unreliable` | above [`FOUND_NOISE_LIMIT`](crate::reconstruct::FOUND_NOISE_LIMIT) of the peak, with `search` | the estimators `evidence` and `learned`, [`Reconstruction::find_noise`] |
+//! | `noise_MPa` | MPa | `shear-unreliable` | above [`FOUND_NOISE_LIMIT`](crate::reconstruct::FOUND_NOISE_LIMIT) of the peak, with `search` | the estimators `evidence` and `learned`, [`Reconstruction::find_noise`](crate::reconstruct::Reconstruction::find_noise) |
 //! | `misfit_probability` | – | `misfit` | below [`MISFIT`] | the same, where the noise is stated |
 //! | `noise_MPa` | MPa | `misfit` | above [`LOUD`] of the peak | the same, where the noise is not stated |
 //! | `shear_spread` | – | `shear-not-resolved` | above [`NOT_RESOLVED`] | the same |
@@ -19,10 +19,7 @@
 mod tests;
 
 use crate::flags::Flag;
-use crate::frame::Frame;
-use crate::reconstruct::Reconstruction;
 use crate::scene::Scene;
-use crate::sensor::Sensor;
 use serde::{Deserialize, Serialize};
 
 /// Share of `search.mu_max` from which on a μ counts as being at its bound. The search's last step is 1/384; a friction
@@ -79,18 +76,6 @@ pub struct Checks {
 }
 
 impl Checks {
-    /// The figures that follow from a result and its calibrated frame.
-    pub fn of(scene: &Scene, frame: &Frame, result: &Reconstruction) -> Checks {
-        Checks {
-            full_scale_share: None,
-            peak_MPa: frame.peak_MPa(),
-            mu_share: mu_share(scene, result),
-            border_share: border_share(&scene.sensor, &result.forces_N.fz),
-            load_ratio: None,
-            ..result.checks
-        }
-    }
-
     /// The figure behind a flag, in words; `None` for flags without one.
     pub fn figure(&self, flag: Flag) -> Option<String> {
         match flag {
@@ -141,35 +126,4 @@ impl Checks {
 
 fn noise_figure(noise_MPa: f64, peak_MPa: f64) -> String {
     format!("noise {:.3} % of the peak", 1e2 * noise_MPa / peak_MPa)
-}
-
-/// The largest |μ| over `mu_max` among the subarrays, or with `contacts` the regions, that carry a share of the load.
-fn mu_share(scene: &Scene, result: &Reconstruction) -> Option<f64> {
-    let mu_max = scene.search.mu_max;
-    let sum = |taxels: &mut dyn Iterator<Item = usize>| taxels.map(|k| result.forces_N.fz[k].abs()).sum::<f64>();
-    let has_forces = !result.forces_N.fz.is_empty();
-    let carried: Vec<([f64; 2], f64)> = match &result.extra.regions {
-        Some(regions) => regions.iter().map(|region| (region.mu, region.load_N[2].abs())).collect(),
-        None => {
-            let load = |index: usize| {
-                let part = result.subarrays[index].part();
-                match &result.extra.resultants {
-                    Some(all) if !has_forces => all[index].force_N[2].abs(),
-                    _ => sum(&mut part.indices(&scene.sensor)),
-                }
-            };
-            result.subarrays.iter().enumerate().map(|(index, own)| (own.mu, load(index))).collect()
-        }
-    };
-    let total: f64 = carried.iter().map(|(_, load)| load).sum();
-    let counts = carried.iter().filter(|(_, load)| *load > 0.0 && *load >= COUNTS_FROM * total);
-    counts.map(|([x, y], _)| x.hypot(*y) / mu_max).filter(|share| share.is_finite()).reduce(f64::max)
-}
-
-/// The share of Σ|fz| in the outermost rows and columns.
-fn border_share(sensor: &Sensor, fz: &[f64]) -> Option<f64> {
-    let total: f64 = fz.iter().map(|fz| fz.abs()).sum();
-    let inside = sensor.rows > 2 && sensor.cols > 2 && fz.len() == sensor.taxels();
-    let border = fz.iter().enumerate().filter(|(index, _)| sensor.is_border(*index)).map(|(_, fz)| fz.abs());
-    (inside && total > 0.0).then(|| border.sum::<f64>() / total)
 }

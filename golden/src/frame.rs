@@ -102,7 +102,7 @@ impl Frame {
     /// errors.
     ///
     /// ```
-    /// use dermis_golden::{frame::Frame, reconstruct::Golden, scene::Scene};
+    /// use dermis_golden::{frame::Frame, float::Golden, scene::Scene};
     ///
     /// let scene = Scene::builtin("eight-by-eight")?;
     /// let mut stress_MPa = vec![0.0; scene.sensor.taxels()];
@@ -155,6 +155,16 @@ impl Frame {
             stress_MPa: (0..sensor.taxels()).map(stress).collect(),
             notes: None,
         }
+    }
+
+    /// The frame with 0 MPa on the taxels `dead`, [row, col], so that they affect neither the peak nor the condition.
+    pub fn mask_dead(mut self, dead: &[[usize; 2]]) -> Frame {
+        let cols = self.sensor.cols;
+        for [row, col] in dead {
+            // A frame of another sensor may lack the taxel; the frame is checked where it is used.
+            self.stress_MPa.get_mut(row * cols + col).into_iter().for_each(|b| *b = 0.0);
+        }
+        self
     }
 
     /// Largest |b| in MPa.

@@ -11,7 +11,7 @@
 //! | `calibration = "table.csv"` | offset and gain of each taxel, [`calibration`] |
 //! | `tare = "zero.json"` | frames read without contact, in the readings' unit, [`tare`] |
 //! | `dead = [[row, col], …]` | taxels left out of the inverse, whatever they read: [`crate::matrices::Matrices::without`] |
-//! | `unipolar = true` | a reading of zero or less is only an upper bound of the stress, [`unipolar`] |
+//! | `unipolar = true` | a reading of zero or less is only an upper bound of the stress, filled by [`crate::float`] |
 //!
 //! Paths are relative to the scene's file. The known forces of a frame are passed through unchanged.
 
@@ -19,7 +19,6 @@ pub mod calibration;
 pub mod tare;
 #[cfg(test)]
 mod tests;
-pub mod unipolar;
 
 use crate::frame::{Frame, FrameError};
 use crate::scene::{InputSpec, Scene};
@@ -168,6 +167,6 @@ impl Input {
                 *b = gain * (*b - zero);
             }
         }
-        self.spec.mask_dead(frame)
+        frame.mask_dead(&self.spec.dead)
     }
 }

@@ -24,6 +24,7 @@
 //! | in: stress of one contact, noise | taxels | MPa |
 //! | out: μ with standard deviations | 2 | – |
 
+mod error;
 mod features;
 mod file;
 mod frames;
@@ -33,19 +34,17 @@ mod tests;
 mod training;
 mod window;
 
+pub use error::LearnedError;
 pub use file::Signature;
 pub use training::{Stage, Training};
 pub use window::{Place, Window};
 
-use crate::generator::GeneratorError;
 use crate::scene::Scene;
 use crate::sensor::Sensor;
-use crate::write::FileError;
 use faer::Mat;
-use features::{Features, Readings};
+use features::{effective_sigma, Features, Readings};
 use network::Network;
 use std::path::Path;
-use thiserror::Error;
 use window::MIRRORS;
 
 /// Largest file of a network in bytes.
@@ -83,76 +82,6 @@ pub struct OneContact<'a> {
     pub gain_spread: f64,
     /// Centre of pressure in mm from the array's centre.
     pub centre_mm: [f64; 2],
-}
-
-/// A network cannot be trained, read or used.
-#[derive(Debug, Error)]
-pub enum LearnedError {
-    /// The scene names no network.
-    #[error("scene {scene}: search.network is missing; search.estimator = learned needs a file made by dermis train")]
-    NoNetwork {
-        /// The scene's name.
-        scene: String,
-    },
-    /// The file cannot be read.
-    #[error("{file}: search.network cannot be read: {source}; dermis train makes it")]
-    Unreadable {
-        /// Its path.
-        file: String,
-        /// Error of the operating system.
-        source: std::io::Error,
-    },
-    /// The file is no network, or damaged.
-    #[error("{file}: not a network of this version: {reason}")]
-    Damaged {
-        /// Its path.
-        file: String,
-        /// What is wrong.
-        reason: String,
-    },
-    /// The network was trained for something else.
-    #[error("{file}: trained for {field} = {trained}, the scene has {scene}; train it anew with dermis train")]
-    Mismatch {
-        /// Its path.
-        file: String,
-        /// The scene's field.
-        field: &'static str,
-        /// The value it was trained for.
-        trained: String,
-        /// The scene's value.
-        scene: String,
-    },
-    /// An option of the training is out of range.
-    #[error("training: {field} = {value} is not allowed; it must be {allowed}")]
-    Option {
-        /// Name of the option.
-        field: &'static str,
-        /// Its value.
-        value: f64,
-        /// The allowed values, in words.
-        allowed: &'static str,
-    },
-    /// No frames can be drawn for the scene.
-    #[error(transparent)]
-    Frames(#[from] GeneratorError),
-    /// Cz has no singular value decomposition.
-    #[error("{sensor}: the singular value decomposition of Cz did not converge")]
-    NotConverged {
-        /// The window.
-        sensor: String,
-    },
-    /// Weights or loss are not finite.
-    #[error("training diverged at a rate of {rate}; take a smaller one")]
-    Diverged {
-        /// The rate.
-        rate: f64,
-    },
-    /// The signature cannot be written.
-    #[error("network file: {0}")]
-    Encode(String),
-    /// The file cannot be written.
-    #[error(transparent)]
-    File(#[from] FileError),
 }
 
 /// A finished training.
@@ -257,12 +186,6 @@ impl Learned {
         }
         found
     }
-}
-
-/// The noise that a network is told: σ, and the gains as if they were noise on every taxel alike; `square` is Σb² of `n`
-/// taxels.
-fn effective_sigma(sigma: f32, gain_spread: f32, square: f32, n: usize) -> f32 {
-    (sigma * sigma + gain_spread * gain_spread * square / n as f32).sqrt()
 }
 
 /// The bytes of a file.

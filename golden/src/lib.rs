@@ -15,7 +15,7 @@
 //! # Example
 //!
 //! ```
-//! use dermis_golden::{frame::Frame, reconstruct::Golden, scene::Scene};
+//! use dermis_golden::{frame::Frame, float::Golden, scene::Scene};
 //!
 //! let scene = Scene::builtin("sensor-1")?;
 //! let frame = Frame::shipped(&scene).remove(1);
@@ -31,7 +31,7 @@
 //! ```text
 //! scene ─┬─ sensor ── influence ── matrices ───────────┐
 //!        └─ partition ─┐                               │
-//! frame ── quantise ── float::receive                  │
+//! frame ── quantise ── reception                        │
 //!    └──── gather ──── float::pass ── float::search ── float::force ── reconstruct
 //!                      v_ij           μ               fx, fy, fz      resultant, errors, flags
 //! ```
@@ -44,14 +44,15 @@
 //! | [`frame`] | stress on every taxel, with known forces if there are any; JSON, CSV, frames shipped with the crate |
 //! | [`generator`] | frames computed from described or random contacts, with their exact forces |
 //! | [`import`] | recordings of real arrays as scene and frames |
-//! | [`input`] | averaging, calibration and dead taxels of a real sensor; stress that a unipolar sensor clips |
-//! | [`quantise`] | stress as the codes of a converter |
+//! | [`input`] | averaging, calibration and dead taxels of a real sensor |
+//! | [`quantise`], [`reception`] | stress as the codes of a converter; the condition for a search, and centroids |
 //! | [`influence`], [`bonded`] | stress of a loaded cell on a half-space and on a layer bonded to a rigid base |
-//! | [`matrices`], [`folded`] | Cz⁺, Ax, Ay of a subarray; the basis of mirror parities in which they are computed |
-//! | [`float`] | the stages in floating point: `receive`, `pass`, `search`, `force`, and the objectives |
+//! | [`matrices`], [`degree`] | Cz⁺, Ax, Ay of a subarray; how many terms the series in μ needs |
+//! | [`symmetry`] | mirror images of a taxel, and the basis of parities, in which matrices are computed and stored |
+//! | [`float`] | the stages in floating point, the objectives, and the golden engine that runs them |
 //! | [`evidence`] | forces and standard deviations for contacts of any shape under noise |
 //! | [`learned`] | shear by a small network that is trained on the scene's own physics |
-//! | [`reconstruct`] | the golden engine, and the result format of all engines |
+//! | [`reconstruct`] | the result format of all engines |
 //! | [`errors`], [`flags`], [`checks`] | errors relative to known forces; limitations of a result, and their figures |
 //! | [`fixed`] | the same stages in integers, bit for bit the hardware; formats, cycles, resources |
 //! | [`link`] | packets between a host and a board |
@@ -71,12 +72,12 @@ pub mod baseline;
 pub mod board;
 pub mod bonded;
 pub mod checks;
+pub mod degree;
 pub mod errors;
 pub mod evidence;
 pub mod fixed;
 pub mod flags;
 pub mod float;
-pub mod folded;
 pub mod frame;
 pub mod gauss;
 pub mod generator;
@@ -90,10 +91,12 @@ pub mod noise;
 pub mod paper;
 pub mod partition;
 pub mod quantise;
+pub mod reception;
 pub mod reconstruct;
 pub mod scene;
 pub mod sensor;
 pub mod stability;
+pub mod symmetry;
 pub mod write;
 
 mod random;

@@ -6,6 +6,7 @@
 #![doc = include_str!("link/format.md")]
 
 mod codes;
+mod error;
 mod format;
 mod header;
 mod identity;
@@ -18,9 +19,10 @@ mod sums;
 mod tests;
 
 pub use codes::{beats_of_bytes, code_bytes, codes_of_bytes, codes_to_bytes, BEAT_BYTES};
+pub use error::LinkError;
 pub use format::markdown;
 pub use header::c_header;
-pub use identity::{payloads, scene_hash, supports, LinkError};
+pub use identity::{payloads, scene_hash, supports};
 pub use link_kind::LinkKind;
 pub use packet::{Decoder, Packet, PacketError};
 pub use payload::{Beat, Counters, Field, Header, Identity, Sums};

@@ -9,7 +9,7 @@
 //! sin θ Cy) S where Cz is positive, and bounded by its 2-norm elsewhere. The norm is convex in (cos θ, sin θ) and even
 //! in both, so a few directions of one quadrant are enough: 9 miss at most 1 − cos(π/32) = 0.5 %.
 //!
-//! The degree follows from r and from its effect on drawn contacts ([`degree`]), unless the scene sets `search.degree`;
+//! The degree follows from r and from its effect on drawn contacts ([`crate::degree`]), unless the scene sets `search.degree`;
 //! it is at least 1 if mu_max > 0.
 //!
 //! | | shape | unit |
@@ -18,22 +18,20 @@
 //! | out: Cz⁺ | n × n | mm² (N per MPa) |
 //! | out: Ax, Ay | n × n | – |
 //!
-//! Everything is computed in the basis of mirror parities ([`crate::folded`]), a sixteenth of the work; the mirror
+//! Everything is computed in the basis of mirror parities ([`crate::symmetry::folded`]), a sixteenth of the work; the mirror
 //! symmetry of the array holds to the bit in every matrix, so folding it again is exact.
 
 pub mod cache;
-pub mod degree;
 mod inverse;
 mod masked;
 #[cfg(test)]
 mod tests;
 
-use crate::folded::{Basis, Operator, EVEN, ODD_X, ODD_Y};
 use crate::influence::Influence;
-use crate::scene::{Inversion, Medium, Scene};
+use crate::scene::{Inversion, Medium};
 use crate::sensor::{Sensor, SensorError};
+use crate::symmetry::folded::{Basis, Operator, EVEN, ODD_X, ODD_Y};
 use cache::{CacheFile, CachedMatrices};
-use degree::{by_effect, by_radius, SERIES_TOLERANCE};
 use faer::Mat;
 use inverse::{chain, Inverse};
 use thiserror::Error;
@@ -147,81 +145,13 @@ pub enum MatricesError {
 }
 
 impl Matrices {
-    /// Computes the matrices of a (sub)array on a half-space with the exact inverse, for shear ratios up to `mu_max` (0
-    /// to 2); the degree is at most [`MAX_DEGREE`].
-    ///
-    /// ```
-    /// use dermis_golden::{frame::Frame, matrices::Matrices, scene::Scene};
-    ///
-    /// let scene = Scene::builtin("eight-by-eight")?;
-    /// let (matrices, b) = (Matrices::new(&scene.sensor, 0.6)?, Frame::shipped(&scene).remove(0).stress_MPa);
-    /// let product = |m: &faer::Mat<f64>, v: &[f64]| -> Vec<f64> {
-    ///     (0..64).map(|i| (0..64).map(|j| m[(i, j)] * v[j]).sum()).collect()
-    /// };
-    /// // The normal forces p = Cz⁺ b cause exactly the stress b.
-    /// let p = product(&matrices.cz_pinv, &b);
-    /// let stress = product(&matrices.cz, &p);
-    /// let peak = b.iter().fold(0.0f64, |peak, b| b.abs().max(peak));
-    /// assert!(stress.iter().zip(&b).all(|(s, b)| (s - b).abs() < 1e-13 * peak));
-    /// # Ok::<(), Box<dyn std::error::Error>>(())
-    /// ```
-    ///
-    /// # Errors
-    /// [`MatricesError`]; the size is checked before anything is allocated.
-    pub fn new(sensor: &Sensor, mu_max: f64) -> Result<Matrices, MatricesError> {
-        Matrices::solved(sensor, Medium::HalfSpace, mu_max, Inversion::EXACT)?.with_degree(
-            Medium::HalfSpace,
-            mu_max,
-            None,
-            MAX_DEGREE,
-        )
-    }
-
-    /// Computes the matrices of a subarray with the scene's medium, mu_max, inverse and degree; without `search.degree`
-    /// the degree is at most `most`.
-    ///
-    /// # Errors
-    /// As [`Matrices::new`].
-    pub fn of(scene: &Scene, subarray: &Sensor, most: usize) -> Result<Matrices, MatricesError> {
-        let search = &scene.search;
-        Matrices::solved(subarray, scene.medium, search.mu_max, scene.inversion())?.with_degree(
-            scene.medium,
-            search.mu_max,
-            search.degree,
-            most,
-        )
-    }
-
-    /// The matrices with the degree `set`, or the one that the series needs.
-    fn with_degree(
-        self,
+    /// The matrices without a degree, which is 0; [`Matrices::of`] gives them the degree that the series needs.
+    pub(crate) fn solved(
+        sensor: &Sensor,
         medium: Medium,
         mu_max: f64,
-        set: Option<usize>,
-        most: usize,
+        inversion: Inversion,
     ) -> Result<Matrices, MatricesError> {
-        let radius = self.spectral_radius;
-        let degree = match set {
-            Some(degree) if radius < MAX_RADIUS => Some(if mu_max > 0.0 { degree } else { 0 }),
-            _ => by_radius(radius, mu_max, most).map(|least| match least {
-                1..MAX_DEGREE if least < most => by_effect(&self.sensor, medium, mu_max, self.inversion, least),
-                _ => least,
-            }),
-        };
-        match degree {
-            Some(degree) => Ok(Matrices { degree, ..self }),
-            None => Err(MatricesError::SlowSeries {
-                sensor: Box::new(self.sensor),
-                radius,
-                mu_max,
-                most,
-                suggested: largest_mu_max(radius / mu_max, most),
-            }),
-        }
-    }
-
-    /// The matrices without a degree, which is 0.
-    fn solved(sensor: &Sensor, medium: Medium, mu_max: f64, inversion: Inversion) -> Result<Matrices, MatricesError> {
         sensor.check()?;
         let boxed = || Box::new(sensor.clone());
         let n = sensor.taxels();
@@ -276,16 +206,4 @@ fn compute(basis: &Basis, [cx, cy, cz]: [&Mat<f64>; 3], mu_max: f64, inversion: 
     let spectral_radius = if shear { mu_max * inverse.largest_radius(&folded_cx, &folded_cy) } else { 0.0 };
     let numbers = [inverse.condition, inverse.rank, inverse.gain, spectral_radius];
     Some(CachedMatrices { numbers, operators: [cz_pinv, ax, ay] })
-}
-
-/// The largest mu_max with three decimals for which degree `most` is enough; `per_mu` is r / mu_max.
-fn largest_mu_max(per_mu: f64, most: usize) -> f64 {
-    let radius = SERIES_TOLERANCE.powf(1.0 / (most as f64 + 1.0)).min(MAX_RADIUS);
-    let mu_max = (1e3 * radius / per_mu).floor() / 1e3;
-    // NaN or infinite rates allow no mu_max.
-    if mu_max.is_finite() {
-        mu_max
-    } else {
-        0.0
-    }
 }

@@ -10,9 +10,6 @@
 //!
 //! Feeds `receive` of all models. Finite stress is assumed; frames are checked when loaded.
 
-use crate::frame::Frame;
-use crate::scene::Scene;
-
 /// The codes of one frame.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Codes {
@@ -61,24 +58,6 @@ pub fn quantise(stress_MPa: &[f64], bits: u32, full_scale_MPa: f64) -> Codes {
     }
 }
 
-/// Full scale in MPa: the scene's, else the frame's largest |b|, else (all zero) 1 MPa.
-pub fn full_scale(scene: &Scene, frame: &Frame) -> f64 {
-    scene.input.full_scale_MPa.unwrap_or_else(|| {
-        let peak = frame.peak_MPa();
-        if peak > 0.0 {
-            peak
-        } else {
-            1.0
-        }
-    })
-}
-
-/// The scene's noise floor in LSBs, rounded down; a code counts if its magnitude is strictly larger.
-pub fn noise_floor_codes(scene: &Scene, codes: &Codes) -> i32 {
-    // The cast saturates.
-    (scene.search.noise_floor_MPa / codes.lsb_MPa()).floor() as i32
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -91,27 +70,6 @@ mod tests {
         let clipped = [false, false, false, false, false, true, true];
         assert_eq!(codes.clipped, clipped);
         assert_eq!(codes.lsb_MPa(), 1.0);
-    }
-
-    #[test]
-    fn full_scale_falls_back_to_the_frame() {
-        let mut scene = Scene::builtin("sensor-1").unwrap();
-        let mut frame = Frame::eq2(&scene.sensor);
-        assert_eq!(full_scale(&scene, &frame), frame.peak_MPa());
-        frame.stress_MPa.fill(0.0);
-        assert_eq!(full_scale(&scene, &frame), 1.0);
-        scene.input.full_scale_MPa = Some(0.25);
-        assert_eq!(full_scale(&scene, &frame), 0.25);
-    }
-
-    #[test]
-    fn noise_floor_rounds_down_and_saturates() {
-        let mut scene = Scene::builtin("sensor-1").unwrap();
-        let codes = quantise(&[0.0], 8, 127.0);
-        for (floor, expected) in [(0.0, 0), (2.9, 2), (1e300, i32::MAX)] {
-            scene.search.noise_floor_MPa = floor;
-            assert_eq!(noise_floor_codes(&scene, &codes), expected);
-        }
     }
 
     proptest! {

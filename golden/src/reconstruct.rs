@@ -1,4 +1,4 @@
-//! Reconstruct: the result format that all engines share, and the golden engine.
+//! Reconstruct: the result format that all engines share.
 //!
 //! [`Reconstruction`] serialises to the JSON of `dermis reconstruct --json`; forces are row-major over the whole array,
 //! errors are fractions with the sign of Eq. 3, `null` where undefined.
@@ -10,31 +10,23 @@
 //! | out: resultant | 3 | N |
 //! | out: error | 5 | fraction, where the frame has a resultant |
 
-mod adaptive;
-#[cfg(test)]
-mod bonded_tests;
-mod by_evidence;
-mod contacts;
 mod extra;
+mod figures;
 mod found_noise;
-mod golden;
 mod output;
-mod run;
-#[cfg(test)]
-mod tests;
 
-pub use extra::{CaseChoice, Extra, Region, RejectedCase};
+pub use extra::{CaseChoice, Extra, Region, RejectedCase, Unipolar};
 pub use found_noise::FOUND_NOISE_LIMIT;
-pub use golden::{Golden, GoldenError};
 pub use output::Resultant;
 
 use crate::checks::Checks;
 use crate::errors::Errors;
 use crate::flags::Flag;
-use crate::float::receive::Received;
 use crate::frame::{Forces, Frame};
 use crate::partition::{Grid, Subarray};
+use crate::reception::Received;
 use crate::scene::Scene;
+use crate::sensor::Sensor;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeSet;
 
@@ -124,6 +116,18 @@ pub fn assemble(
 }
 
 impl Reconstruction {
+    /// The result with resultants in place of its forces: one per region if it has regions, else one per subarray.
+    pub(crate) fn with_resultants(mut self, sensor: &Sensor) -> Reconstruction {
+        let of = |taxels: &mut dyn Iterator<Item = usize>| Resultant::of(sensor, &self.forces_N, taxels);
+        let resultants = match &self.extra.regions {
+            Some(regions) => regions.iter().map(|region| of(&mut region.taxels.iter().copied())).collect(),
+            None => self.subarrays.iter().map(|own| of(&mut own.part().indices(sensor))).collect(),
+        };
+        self.extra.resultants = Some(resultants);
+        self.forces_N = Forces::default();
+        self
+    }
+
     /// Adds the figures of `checks` and the flags that they raise.
     pub(crate) fn add_checks(&mut self, scene: &Scene, checks: Checks) {
         self.checks = checks;

@@ -25,6 +25,7 @@
 
 mod error;
 pub mod inverse;
+mod inversion;
 mod load;
 mod parse;
 mod reader;
@@ -35,7 +36,6 @@ mod tests;
 pub use error::SceneError;
 pub use inverse::{InverseKind, InverseSpec, Inversion};
 
-use crate::frame::Frame;
 use crate::link::LinkKind;
 use crate::partition::{subarrays, Case};
 use crate::sensor::Sensor;
@@ -178,7 +178,7 @@ pub struct SearchSpec {
     pub noise_floor_MPa: f64,
     /// How Eq. 1 is computed.
     pub form: Form,
-    /// Degree of the series in μ, 1 to 8; `None` takes what the sensor needs, see [`crate::matrices::degree`].
+    /// Degree of the series in μ, 1 to 8; `None` takes what the sensor needs, see [`crate::degree`].
     pub degree: Option<usize>,
     /// Path of a trained network, relative to the working folder, or ending in `dermis:NAME`: one of the program's own.
     pub network: Option<PathBuf>,
@@ -215,7 +215,7 @@ pub enum CoefficientCheck {
     /// No check.
     #[default]
     None,
-    /// The status of each subarray flags a changed coefficient word, see [`crate::fixed::check`].
+    /// The status of each subarray flags a changed coefficient word, see [`crate::fixed::plan::check`].
     Signature,
 }
 
@@ -289,16 +289,6 @@ impl InputSpec {
     /// Whether a taxel, [row, col], is dead.
     pub fn is_dead(&self, taxel: [usize; 2]) -> bool {
         self.dead.binary_search(&taxel).is_ok()
-    }
-
-    /// The frame with 0 MPa on its dead taxels, so that they affect neither the peak nor the condition.
-    pub fn mask_dead(&self, mut frame: Frame) -> Frame {
-        let cols = frame.sensor.cols;
-        for [row, col] in &self.dead {
-            // A frame of another sensor may lack the taxel; the frame is checked where it is used.
-            frame.stress_MPa.get_mut(row * cols + col).into_iter().for_each(|b| *b = 0.0);
-        }
-        frame
     }
 }
 

@@ -26,15 +26,16 @@ mod tests;
 mod truth;
 
 pub use settings::{references, settings, Setting, MU_MAX};
+pub use truth::FormatErrors;
 
 use crate::fixed::Model;
 use crate::float::force::force;
 use crate::float::objective::{of_kind, SearchInput};
 use crate::float::pass::Polynomial;
+use crate::float::{Golden, GoldenError};
 use crate::frame::Forces;
 use crate::matrices::Matrices;
 use crate::partition::{subarrays, Case};
-use crate::reconstruct::{Golden, GoldenError};
 use crate::scene::{Medium, Scene};
 use crate::sensor::Sensor;
 use serde::Serialize;
@@ -46,19 +47,6 @@ const BITS_ADD: f64 = 0.01;
 const BITS: [u32; 2] = [8, 24];
 /// Bits by which Cz⁺ is wider than the input; the defaults are 20 and 24.
 const INVERSE_MORE: u32 = 4;
-
-/// Errors of one number format.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-pub struct FormatErrors {
-    /// Forward error ‖Cz⁺b₀ − p‖/‖p‖.
-    pub forward: f64,
-    /// Residual ‖b − C x‖/‖b‖.
-    pub residual: f64,
-    /// Normal error of the resultant; `None` if undefined.
-    pub normal: Option<f64>,
-    /// Tangential error of the resultant; `None` if undefined.
-    pub tangential: Option<f64>,
-}
 
 /// Properties of a scene's matrices.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]

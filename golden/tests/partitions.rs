@@ -1,8 +1,9 @@
 //! Accuracy of the partition cases on the shipped half-space frames with known forces.
 
+use dermis_golden::float::Golden;
 use dermis_golden::frame::Frame;
 use dermis_golden::partition::{Case, Grid};
-use dermis_golden::reconstruct::{Golden, Reconstruction};
+use dermis_golden::reconstruct::Reconstruction;
 use dermis_golden::scene::{Condition, Form, Scene};
 
 const SENSORS: [&str; 3] = ["sensor-1", "sensor-2", "sensor-3"];

@@ -2,11 +2,12 @@
 //! several subarrays, and the difference between fixed and floating point.
 
 use dermis_golden::fixed::Model;
+use dermis_golden::float::Golden;
 use dermis_golden::frame::{Forces, Frame};
 use dermis_golden::generator::{generate, random_contacts, Draw, Shapes};
 use dermis_golden::partition::{subarrays, Case};
 use dermis_golden::quantise::largest_code;
-use dermis_golden::reconstruct::{Golden, Reconstruction};
+use dermis_golden::reconstruct::Reconstruction;
 use dermis_golden::scene::Scene;
 use proptest::prelude::*;
 
@@ -162,12 +163,12 @@ proptest! {
         let norm = (0..n).map(row).fold(0.0, f64::max);
         let largest = (0..n).map(|i| matrices.cz_pinv[(i, i)]).fold(0.0, f64::max);
         let lsb = peak / f64::from(largest_code(scene.fixed.input_bits));
-        let coefficient = 0.5 * 2f64.powi(-model.formats.inverse_exponent)
+        let coefficient = 0.5 * 2f64.powi(-model.formats().inverse_exponent)
             + 4.0 * largest * 2f64.powi(-(scene.fixed.prune_bits as i32));
         let strongest = float.iter().fold(0.0f64, |most, f| most.max(f.abs()));
         // v_00 has vector_bits for its largest parity, the sum of up to four taxels; the rest is for the dropped low
         // products.
-        let word = 4.0 * 4.0 * strongest * 2f64.powi(-(model.formats.vector_bits as i32 - 2));
+        let word = 4.0 * 4.0 * strongest * 2f64.powi(-(model.formats().vector_bits as i32 - 2));
         let bound = norm * lsb + coefficient * n as f64 * peak + word;
         for (a, b) in float.iter().zip(&fixed) {
             prop_assert!((a - b).abs() <= bound, "{a} {b}, bound {bound}");

@@ -327,7 +327,7 @@ mod tests {
         let model = model(false);
         let fold = block(&model, "fold").unwrap();
         let port = |name: &str| fold.ports.iter().find(|port| port.name == name).unwrap();
-        assert_eq!(port("folded").bits, 4 * model.formats.fold_bits as usize);
+        assert_eq!(port("folded").bits, 4 * model.formats().fold_bits as usize);
         assert!(port("folded").output && !port("normalised").output);
         let error = block(&model, "choose").unwrap_err().to_string();
         assert!(error.contains("no block \"choose\"; its blocks: prepare, receive, normalise, fold"), "{error}");

@@ -156,7 +156,7 @@ pub struct Engine {
 impl Engine {
     /// The engine of `model`.
     pub fn new(model: &Model) -> Self {
-        let formats = &model.formats;
+        let formats = model.formats();
         let bits = formats.input_bits as usize;
         let counts: Vec<usize> = model.cases().iter().map(|case| case.parts.len()).collect();
         let which = count_bits(counts.len());

@@ -1,7 +1,7 @@
 //! Which features a scene's hardware has, which it omits, and what each omission saves: the model of the scene with
 //! that feature added, minus the model of the scene.
 
-use dermis_golden::fixed::feature_costs::{features, Feature};
+use dermis_golden::fixed::plan::feature_costs::{features, Feature};
 use dermis_golden::fixed::{Cycles, Model};
 use serde::Serialize;
 use serde_json::json;
@@ -57,18 +57,19 @@ impl Generated {
 pub fn explain(model: &Model) -> Result<Vec<Explained>, HdlError> {
     let own = needs(model)?;
     let explained = |feature: Feature| {
+        let Feature { name, setting, with_feature, without_feature } = feature;
+        let present = with_feature.is_none();
         let (mut saved, mut impossible) = (None, None);
-        match &feature.with_feature {
+        match with_feature {
             None => {}
             Some(Err(error)) => impossible = Some(error.to_string()),
-            Some(Ok(other)) => saved = Some(difference(&needs(other)?, &own)),
+            Some(Ok(plan)) => saved = Some(difference(&needs(&plan.into())?, &own)),
         }
-        let costs = match &feature.without_feature {
+        let costs = match without_feature {
             None => None,
-            Some(other) => Some(difference(&own, &needs(other)?)),
+            Some(plan) => Some(difference(&own, &needs(&plan.into())?)),
         };
-        let Feature { name, setting, with_feature, .. } = feature;
-        Ok(Explained { feature: name, setting, present: with_feature.is_none(), saved, costs, impossible })
+        Ok(Explained { feature: name, setting, present, saved, costs, impossible })
     };
     features(model).into_iter().map(explained).collect()
 }

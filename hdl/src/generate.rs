@@ -3,12 +3,12 @@
 use std::collections::BTreeMap;
 
 use dermis_golden::board::EngineKind;
-use dermis_golden::fixed::resources::Memory;
-use dermis_golden::fixed::send::{
+use dermis_golden::fixed::plan::resources::Memory;
+use dermis_golden::fixed::plan::storage::word_bits;
+use dermis_golden::fixed::stages::send::{
     CASE_SHIFT, FLAG_COEFFICIENTS, FLAG_CONDITION, FLAG_FOUND, FLAG_FRAMING, FLAG_NO_CONTACT, STATUS_BEATS,
 };
-use dermis_golden::fixed::storage::word_bits;
-use dermis_golden::fixed::{Cycles, Dropped, Model};
+use dermis_golden::fixed::{CasePlan, Cycles, Dropped, Model};
 use dermis_golden::link::{c_header, LinkError};
 use dermis_golden::partition::Case;
 use serde::Serialize;
@@ -96,9 +96,9 @@ pub struct Refused {
 /// The cases left out of `model`, with the resources they would need.
 fn refused(model: &Model) -> Result<Vec<Refused>, HdlError> {
     let refused = |dropped: &Dropped| {
-        let with: Vec<u32> = dropped.design.cases().iter().map(Model::number).collect();
+        let with: Vec<u32> = dropped.design.cases().iter().map(CasePlan::number).collect();
         let case = with.iter().copied().find(|number| Case::numbered(i64::from(*number)) == Some(dropped.case));
-        let needs = total(&usage(&dropped.design)?);
+        let needs = total(&usage(&Model::from(dropped.design.clone()))?);
         Ok(Refused { case: case.unwrap_or_default(), with, needs })
     };
     model.dropped.iter().map(refused).collect()
@@ -209,7 +209,7 @@ fn waivers(model: &Model) -> &'static str {
 }
 
 fn header(model: &Model, top: &str) -> String {
-    let (scene, f) = (&model.scene, &model.formats);
+    let (scene, f) = (&model.scene, model.formats());
     format!(
         "\
 // {top}: forces per taxel from normal stress, {sensor}.
@@ -239,21 +239,20 @@ fn header(model: &Model, top: &str) -> String {
 }
 
 /// Cycles of a frame of which all subarrays are searched, and of one of which none is.
-fn cycles(model: &Model) -> serde_json::Value {
-    let of = |searched: bool| Cycles::of(model, &vec![searched; model.parts.len()]);
-    json!({ "searched": of(true), "not_searched": of(false) })
+fn cycles(of: impl Fn(&[bool]) -> Cycles, parts: usize) -> serde_json::Value {
+    json!({ "searched": of(&vec![true; parts]), "not_searched": of(&vec![false; parts]) })
 }
 
-/// Manifest entry of one of several cases; its cycles exclude the [`LATENCY`](dermis_golden::fixed::choose::LATENCY) of
+/// Manifest entry of one of several cases; its cycles exclude the [`LATENCY`](dermis_golden::fixed::stages::choose::LATENCY) of
 /// the choice.
-fn case(case: &Model) -> serde_json::Value {
+fn case(model: &Model, case: &CasePlan) -> serde_json::Value {
     json!({
         "case": case.number(),
         "subarrays": case.parts.len(),
         "quads": case.formats.quads,
         "status_beats": case.status_beats(),
         "coefficient_words": case.storage.words(),
-        "cycles": cycles(case),
+        "cycles": cycles(|searched| Cycles::of_case(model, case, searched), case.parts.len()),
     })
 }
 
@@ -264,7 +263,7 @@ fn manifest(
     memories: &[PlacedMemory],
     dropped: &[Refused],
 ) -> serde_json::Value {
-    let (scene, f) = (&model.scene, &model.formats);
+    let (scene, f) = (&model.scene, model.formats());
     let full_scale = scene.input.full_scale_MPa;
     json!({
         "manifest_version": MANIFEST_VERSION,
@@ -310,8 +309,8 @@ fn manifest(
             "stages": usage,
             "memories": memories,
         },
-        "cycles": cycles(model),
-        "cases": model.chooses().then(|| model.cases().iter().map(case).collect::<Vec<_>>()),
+        "cycles": cycles(|searched| Cycles::of(model, searched), model.parts().len()),
+        "cases": model.chooses().then(|| model.cases().iter().map(|own| case(model, own)).collect::<Vec<_>>()),
         "dropped": model.chooses().then_some(dropped),
     })
 }

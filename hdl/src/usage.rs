@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use dermis_golden::board::Board;
-use dermis_golden::fixed::resources::Memory;
+use dermis_golden::fixed::plan::resources::Memory;
 use dermis_golden::fixed::Model;
 use serde::Serialize;
 

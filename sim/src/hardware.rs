@@ -111,7 +111,7 @@ impl Hardware {
             top: &generated.top,
             files: files.collect(),
             taps: &generated.taps,
-            input_bits: self.model.formats.code_bits,
+            input_bits: self.model.formats().code_bits,
             writable_state,
         };
         Verilated::new(&design, &self.cache)

@@ -25,7 +25,7 @@ use dermis_golden::fixed::Model;
 use dermis_golden::frame::Frame;
 use dermis_golden::input::Input;
 use dermis_golden::link::{Counters, Identity, Kind};
-use dermis_golden::quantise::full_scale;
+use dermis_golden::reception::full_scale;
 use dermis_golden::scene::Scene;
 use serialport::SerialPort;
 
@@ -110,7 +110,7 @@ impl<P: std::io::Read + std::io::Write> Session<P> {
     /// The readings to send for a frame, so that after the scene's own zero the tare frame has been subtracted once; 0
     /// for dead taxels.
     fn subtract_tare(&self, frame: &Frame) -> Frame {
-        self.model.scene.input.mask_dead(less(frame, self.offset.as_deref().unwrap_or_default()))
+        less(frame, self.offset.as_deref().unwrap_or_default()).mask_dead(&self.model.scene.input.dead)
     }
 
     /// Sends a frame; returns the readings sent, and the answer, compared with the model if requested.

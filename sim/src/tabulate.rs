@@ -20,11 +20,12 @@ use anyhow::Result;
 use dermis_golden::errors::Errors;
 use dermis_golden::fixed::Model;
 use dermis_golden::flags::Flag;
+use dermis_golden::float::Golden;
 use dermis_golden::frame::{Contact, Forces, Frame};
 use dermis_golden::paper::table_2;
 use dermis_golden::partition::{subarrays, Case, PartitionError};
-use dermis_golden::quantise::full_scale;
-use dermis_golden::reconstruct::{Golden, Reconstruction, Region};
+use dermis_golden::reception::full_scale;
+use dermis_golden::reconstruct::{Reconstruction, Region};
 use dermis_golden::scene::Scene;
 use serde::Serialize;
 

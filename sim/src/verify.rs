@@ -14,9 +14,10 @@ use std::path::Path;
 use anyhow::Result;
 use dermis_golden::board::Board;
 use dermis_golden::fixed::Model;
+use dermis_golden::float::Golden;
 use dermis_golden::frame::Frame;
-use dermis_golden::quantise::full_scale;
-use dermis_golden::reconstruct::{Golden, Reconstruction};
+use dermis_golden::reception::full_scale;
+use dermis_golden::reconstruct::Reconstruction;
 use dermis_golden::scene::Scene;
 
 use crate::compare::{comparable_forces, difference, Difference};

@@ -4,7 +4,7 @@
 //!
 //! `dermis study input-bits` prints the table.
 
-use dermis_golden::reconstruct::Golden;
+use dermis_golden::float::Golden;
 use dermis_sim::study::{input_bits, tangential};
 use dermis_tests::scene;
 

@@ -1,9 +1,9 @@
 //! The coefficient check: no false alarm on the shipped frames, every tried flip of a bit in the coefficient memory
 //! flagged, no additional block RAM, multiplier or cycle; absent by default.
 
-use dermis_golden::fixed::check::undetected;
-use dermis_golden::fixed::send::{FLAG_COEFFICIENTS, STATUS_BEATS};
-use dermis_golden::fixed::storage::word_bits;
+use dermis_golden::fixed::plan::check::undetected;
+use dermis_golden::fixed::plan::storage::word_bits;
+use dermis_golden::fixed::stages::send::{FLAG_COEFFICIENTS, STATUS_BEATS};
 use dermis_golden::fixed::{Cycles, Model};
 use dermis_golden::flags::Flag;
 use dermis_golden::frame::Frame;
@@ -83,11 +83,11 @@ fn every_tried_flip_is_told() {
         let vector = hardware.vector(&frames[..1]).unwrap();
         assert!(!tells(&hardware, &vector), "{name}: a false alarm");
         // Every word is read, and no flip is undetected.
-        let words = hardware.model.storage.words();
+        let words = hardware.model.storage().words();
         assert_eq!(undetected(&hardware.model), [0; 0], "{name}");
         let file = hardware.generated.files.iter().position(|file| file.name == "coefficients.hex").unwrap();
         let good = hardware.generated.files[file].text.clone();
-        let bits = word_bits(&hardware.model.formats);
+        let bits = word_bits(hardware.model.formats());
         let mut random = fastrand::Rng::with_seed(1);
         for _ in 0..FLIPS {
             let (word, bit) = (random.usize(..words), random.usize(..bits));

@@ -4,8 +4,8 @@
 //! `dermis study dead-taxels` prints the table of errors.
 
 use dermis_golden::fixed::Model;
+use dermis_golden::float::Golden;
 use dermis_golden::frame::Frame;
-use dermis_golden::reconstruct::Golden;
 use dermis_golden::scene::Scene;
 use dermis_sim::cosim::{run, DeviceUnderTest, Findings, Vector};
 use dermis_sim::drawn_frames::{DrawnFrames, Shapes};
@@ -121,7 +121,7 @@ fn fixed_is_near_golden() {
 #[test]
 fn mirrored_pairs_keep_a_symmetry() {
     let flips = |dead: &[[usize; 2]]| {
-        let flips = Model::new(&masked("sensor-1", dead)).unwrap().formats.flips;
+        let flips = Model::new(&masked("sensor-1", dead)).unwrap().formats().clone().flips;
         [flips.inverse.len(), flips.ax.len(), flips.ay.len()]
     };
     assert_eq!(flips(&[[4, 6]]), [4; 3]);
@@ -144,7 +144,7 @@ fn a_flipped_coefficient_of_a_broken_symmetry_is_found() {
     let vectors = [hardware.vector(&frames(&scene, 1)).unwrap()];
     assert!(compare(&hardware, &vectors).is_equal());
     // The memory has the columns of the symmetric flip of each matrix first; the next line is of another flip.
-    let quads = hardware.model.formats.quads;
+    let quads = hardware.model.formats().quads;
     let index = hardware.generated.files.iter().position(|file| file.name == "coefficients.hex").unwrap();
     let mut lines: Vec<String> = hardware.generated.files[index].text.lines().map(str::to_owned).collect();
     let last = lines[quads].pop().and_then(|digit| digit.to_digit(16)).unwrap();

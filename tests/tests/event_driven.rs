@@ -147,7 +147,7 @@ impl Device for Icarus {
 
 /// Runs the vectors under Icarus; what differs from the model, and which outputs were undefined.
 fn simulate(hardware: &Hardware, vectors: &[Vector], stimulus: Stimulus) -> (Findings, Vec<(u64, &'static str)>) {
-    let mut device = Icarus::new(&hardware.generated, hardware.model.formats.code_bits);
+    let mut device = Icarus::new(&hardware.generated, hardware.model.formats().code_bits);
     let dut = DeviceUnderTest { name: "icarus", device: &mut device, taps: &hardware.tap_names() };
     let (findings, _) = run(dut, vectors, stimulus);
     (findings, device.undefined.clone())

@@ -1,7 +1,7 @@
 //! Flipped bits under Verilator: every bit of state is found, faults that must be flagged are flagged, and a reset
 //! always recovers.
 
-use dermis_golden::fixed::storage::word_bits;
+use dermis_golden::fixed::plan::storage::word_bits;
 use dermis_golden::fixed::Model;
 use dermis_golden::scene::Scene;
 use dermis_sim::faults::state_bits::{state_elements, StorageClass};
@@ -30,7 +30,7 @@ fn every_bit_is_found() {
     assert_eq!(bits(&|class| class != StorageClass::Register), listed);
     assert_eq!(
         bits(&|class| class == StorageClass::Rom),
-        hardware.model.storage.words() * word_bits(&hardware.model.formats)
+        hardware.model.storage().words() * word_bits(hardware.model.formats())
     );
     // Estimated without the registers inside memory blocks, and without memories in LUTs, such as the queue's.
     let estimated: usize = hardware.generated.usage.values().map(|usage| usage.flip_flops).sum();

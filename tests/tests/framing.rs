@@ -2,7 +2,7 @@
 //! leaves nothing behind, the next complete frame is equal to the bit-true model to the bit, and its status has
 //! `FLAG_FRAMING`, once.
 
-use dermis_golden::fixed::send::FLAG_FRAMING;
+use dermis_golden::fixed::stages::send::FLAG_FRAMING;
 use dermis_golden::fixed::Model;
 use dermis_hdl::device::{Device, Inputs};
 use dermis_sim::hardware::{Hardware, Simulator};

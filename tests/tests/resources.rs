@@ -5,7 +5,7 @@
 use std::process::Command;
 use std::thread::scope;
 
-use dermis_golden::fixed::resources::Holds;
+use dermis_golden::fixed::plan::resources::Holds;
 use dermis_golden::fixed::Model;
 use dermis_golden::scene::Scene;
 use dermis_hdl::usage::total;

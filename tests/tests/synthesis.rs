@@ -29,12 +29,11 @@ fn read(generated: &Generated) {
 
 #[test]
 fn yosys_finds_clean_hardware() {
-    let model = Model::new(&scene("eight-by-eight").0).unwrap();
-    read(&generate(&model).unwrap());
+    let (mut scene, ..) = scene("eight-by-eight");
+    read(&generate(&Model::new(&scene).unwrap()).unwrap());
     for (_, link) in LinkKind::NAMES {
-        let mut model = model.clone();
-        model.scene.hardware.link = link;
-        read(&generate_board(&model).unwrap());
+        scene.hardware.link = link;
+        read(&generate_board(&Model::new(&scene).unwrap()).unwrap());
     }
 }
 

@@ -2,10 +2,13 @@
 
 use super::*;
 use crate::fixed::Model;
+use crate::float::Golden;
 use crate::frame::Contact;
+use crate::frame::Frame;
 use crate::generator::generate;
-use crate::reconstruct::Golden;
+use crate::reconstruct::Reconstruction;
 use crate::scene::{EstimatorKind, Medium, ObjectiveKind};
+use crate::sensor::Sensor;
 
 fn press(sensor: &Sensor, radius_mm: f64, normal_N: f64, tangential_N: [f64; 2]) -> Frame {
     let contact = Contact {
@@ -114,7 +117,7 @@ fn a_subarray_without_load_does_not_count_for_mu() {
     let mut result = run(&scene, &frame);
     result.subarrays.iter_mut().for_each(|part| part.mu = [0.6, 0.0]);
     result.subarrays[0].mu = [0.3, 0.0];
-    assert_eq!(Checks::of(&scene, &frame, &result).mu_share, Some(0.5));
+    assert_eq!(result.figures(&scene, &frame).mu_share, Some(0.5));
 }
 
 /// Counts of a 10-bit converter taken for MPa.

@@ -8,14 +8,16 @@
 //! | in: b | taxels | of its peak |
 //! | out: [`Estimate`] | – | N per MPa of the peak |
 
-pub(super) mod advice;
+mod advice;
 
 use super::ascent::{ascend, Top};
 use super::contact::forces;
 use super::envelope::{envelope, from_stress};
+use super::estimate::{ContactEstimate, Estimate};
+use super::estimator::Evidence;
 use super::model::{Design, Products, Readings};
 use super::prior::factor;
-use super::{clipped, noise, ContactEstimate, Estimate, Evidence};
+use super::{clipped, noise};
 use crate::float::segment::{neighbours, segment, WIDTH};
 use crate::frame::Forces;
 use faer::linalg::matmul::matmul;

@@ -4,10 +4,11 @@
 use super::*;
 use crate::checks::NOT_RESOLVED;
 use crate::flags::Flag;
+use crate::float::Golden;
 use crate::generator::converter::Converter;
 use crate::generator::draws::{DrawOptions, DrawnFrame, Draws};
-use crate::reconstruct::{Golden, Reconstruction};
-use crate::scene::{EstimatorKind, Medium};
+use crate::reconstruct::Reconstruction;
+use crate::scene::{EstimatorKind, Medium, Scene};
 
 fn scene(name: &str) -> Scene {
     let mut scene = Scene::builtin(name).unwrap();

@@ -1,43 +1,36 @@
 //! The bit-true model: the hardware's arithmetic in integers, stage by stage.
 //!
 //! ```text
-//! codes → receive → normalise → fold → pass → rescale → unfold → search → force → send → beats, status
-//!                                  ↑______________|  v_ij of the next degree
+//! codes → prepare → receive → choose → normalise → fold → pass → rescale → unfold → search → force → send → beats, status
+//!                                                          ↑______________|  v_ij of the next degree
 //! ```
-//! Each stage is one file here and one file of the same name in the hardware description. The [`Trace`] keeps what
-//! every stage passes on under the stage's name; tests compare it word for word with every simulation of the hardware.
-//! The difference from the floating-point model is measured by tests, never assumed.
+//! Each stage is one file in [`stages`] and one file of the same name in the hardware description. The [`Trace`] keeps
+//! what every stage passes on under the stage's name; tests compare it word for word with every simulation of the
+//! hardware. The difference from the floating-point model is measured by tests, never assumed.
+//!
+//! # Rooms
+//!
+//! Each uses only those above it.
+//!
+//! | room | content |
+//! |---|---|
+//! | [`words`] | integer arithmetic, formats of the words, quantised matrices, order of the products |
+//! | [`stages`] | the stages, plain functions of words |
+//! | [`plan`] | from scene and board: widths, lanes, memories, multipliers, cycles, partition cases |
+//! | [`Model`] | runs the stages by the plan, and decodes what the hardware sends |
 
-pub mod arith;
-pub mod check;
-pub mod choose;
-pub mod coefficients;
-pub mod cycles;
-pub mod fit_suggestions;
-pub mod fold;
-pub mod force;
-pub mod formats;
-pub mod normalise;
-pub mod pass;
-pub mod prepare;
-pub mod quads;
-pub mod receive;
-pub mod rescale;
-pub mod resources;
-pub mod resultants;
-pub mod schedule;
-pub mod search;
-pub mod send;
-pub mod serial;
-pub mod storage;
-pub mod unfold;
+pub mod plan;
+pub mod stages;
+pub mod words;
 
-mod cases;
-pub mod feature_costs;
-
+mod decode;
+mod error;
 mod model;
+mod run;
 mod subarray;
 
-pub use cases::Dropped;
-pub use cycles::Cycles;
-pub use model::{FixedError, Model, Stage, Trace};
+pub use error::{FitSuggestion, FixedError, Shortage};
+pub use model::Model;
+pub use plan::contents::{CasePlan, Dropped, Plan};
+pub use plan::cycles::Cycles;
+pub use run::{Stage, Trace};

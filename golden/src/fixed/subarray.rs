@@ -1,13 +1,11 @@
 //! One subarray: the stages from frame buffer to force memory.
 
-use super::formats::force_shift;
-use super::model::Model;
-use super::pass::{pass, swap, Operands};
-use super::receive::Received;
-use super::schedule::{is_transposed, schedule, EXPONENTS};
-use super::search::{search, Block, SearchResult};
-use super::{fold, force, normalise, receive, rescale, unfold};
-use crate::scene::Condition;
+use super::plan::contents::{CasePlan, Plan};
+use super::stages::pass::{pass, swap, Operands};
+use super::stages::search::{search, Block, SearchResult};
+use super::stages::{fold, force, normalise, receive, rescale, unfold};
+use super::words::formats::force_shift;
+use super::words::schedule::{is_transposed, schedule, EXPONENTS};
 
 /// The quads that a stage passes on.
 type QuadStream = Vec<[i64; 4]>;
@@ -39,11 +37,11 @@ pub struct SubarrayTrace {
 
 impl SubarrayTrace {
     /// Computes the subarray with these `codes`, row-major in it.
-    pub fn new(model: &Model, codes: &[i32]) -> Self {
-        let formats = &model.formats;
-        let layout = model.layout();
-        let received = receive::receive(codes, model.noise_floor);
-        let condition = condition(model, &received);
+    pub fn new(plan: &Plan, case: &CasePlan, codes: &[i32]) -> Self {
+        let CasePlan { formats, quantised, .. } = case;
+        let layout = case.layout();
+        let received = receive::receive(codes, plan.noise_floor);
+        let condition = received.meets(plan.scene.partition.condition);
         let samples: Vec<i64> = codes.iter().map(|&code| i64::from(code)).collect();
         let left = normalise::shift(received.magnitude, formats.input_bits);
         let normalised = normalise::normalise(&layout.pack(&samples), left);
@@ -54,7 +52,7 @@ impl SubarrayTrace {
         let (mut right, mut saturations) = (0, 0);
         let mut polynomials = vec![[[0i64; 10]; 4]; formats.quads];
         for (k, products) in schedule(formats).iter().enumerate() {
-            let accumulators = pass(formats, &model.quantised, layout, products, &operands);
+            let accumulators = pass(formats, quantised, layout, products, &operands);
             if k == 0 {
                 right = rescale::shift(formats, rescale::raw_length(&accumulators));
             }
@@ -78,7 +76,7 @@ impl SubarrayTrace {
             rescaled.extend(words);
             unfolded.extend(taxels);
         }
-        let searching = condition && model.searches();
+        let searching = condition && plan.searches();
         let found = search(layout, Block::new(layout, polynomials), searching);
         SubarrayTrace {
             condition,
@@ -94,19 +92,12 @@ impl SubarrayTrace {
         }
     }
 
-    /// Forces of the subarray's taxels, row-major in it.
-    pub fn forces(&self, model: &Model) -> Vec<force::Force> {
-        let formats = &model.formats;
+    /// Forces of the subarray's taxels, row-major in it; `threshold` is in force LSBs.
+    pub fn forces(&self, case: &CasePlan, threshold: i64) -> Vec<force::Force> {
+        let formats = &case.formats;
         let mu = self.found.position.map(|x| force::mu_word(formats, x));
         let shift = force_shift(formats, self.normalise, self.rescale);
-        let values = model.layout().unpack(&self.found.values);
-        values.into_iter().map(|value| force::force(formats, value, mu, shift, model.threshold)).collect()
-    }
-}
-
-fn condition(model: &Model, received: &Received) -> bool {
-    match model.scene.partition.condition {
-        Condition::Loaded => received.positive || received.negative,
-        Condition::BothSigns => received.positive && received.negative,
+        let values = case.layout().unpack(&self.found.values);
+        values.into_iter().map(|value| force::force(formats, value, mu, shift, threshold)).collect()
     }
 }

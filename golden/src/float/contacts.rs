@@ -203,7 +203,7 @@ impl Solver<'_> {
             for region in (0..state.segments.count).filter(|&k| searched[k]) {
                 let family = self.family(state, region);
                 let [x, y] = state.mu(region);
-                state.found[region] = search(&family, self.mu_max, self.objective);
+                state.found[region] = search(&family, self.mu_max, &|p| self.objective.score(p));
                 let mu = state.mu(region);
                 moved = moved.max((mu[0] - x).hypot(mu[1] - y));
                 state.p = family.eval(mu);

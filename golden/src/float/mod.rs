@@ -2,7 +2,7 @@
 //!
 //! | stage | in | out |
 //! |---|---|---|
-//! | [`receive`] | codes of a subarray | condition, centroids |
+//! | [`receive`](crate::reception) | codes of a subarray | condition, centroids |
 //! | [`pass`] | b, matrices | v_ij, the polynomial p(μ) |
 //! | [`objective`] | p | its score |
 //! | [`search`] | v_ij, objective | μ |
@@ -14,12 +14,28 @@
 //!
 //! The hardware's `normalise`, `fold` and `unfold` have no counterpart here: floating point has its own exponents, and
 //! folding is an exact change of basis.
+//!
+//! The driver: [`Golden`] runs the stages for each subarray of a scene (`golden`), between the input and the output
+//! options (`run`, with `unipolar` for readings that a sensor clips). `adaptive` and `by_contacts` have the partitions that depend on the frame, `by_evidence` the
+//! estimators that take the place of the search.
 
 pub mod contacts;
 pub mod force;
 pub mod objective;
 pub mod orthogonal;
 pub mod pass;
-pub mod receive;
 pub mod search;
 pub mod segment;
+
+mod adaptive;
+#[cfg(test)]
+mod bonded_tests;
+mod by_contacts;
+mod by_evidence;
+mod golden;
+#[cfg(test)]
+mod golden_tests;
+mod run;
+mod unipolar;
+
+pub use golden::{Golden, GoldenError};

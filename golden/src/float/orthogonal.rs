@@ -17,10 +17,10 @@
 //!
 //! 3n² + 9n² multiplications for one x, against n²/4 for one term of the series: for verification, not for speed.
 
-use crate::folded::accumulate;
 use crate::frame::Forces;
 use crate::matrices::Matrices;
 use crate::sensor::Sensor;
+use crate::symmetry::folded::accumulate;
 use faer::Mat;
 use thiserror::Error;
 

@@ -11,7 +11,6 @@
 //!
 //! Positions are integers, so that every model has the same disc. At most 29 + 7·8 = 85 evaluations.
 
-use super::objective::Objective;
 use super::pass::Polynomial;
 
 /// Halvings after the grid.
@@ -34,16 +33,13 @@ pub struct SearchResult {
     pub evaluations: usize,
 }
 
+/// The score of the normal forces of a candidate in N, `None` unless it is admissible.
+pub type Score<'a> = &'a dyn Fn(&[f64]) -> Option<f64>;
+
 /// Finds the best μ with |μ| ≤ `mu_max`; `None` if no candidate of the grid has a score, that is Σp ≤ 0 for all.
-pub fn search(family: &Polynomial, mu_max: f64, objective: &dyn Objective) -> Option<SearchResult> {
-    let mut grid = GridSearch {
-        family,
-        mu_max,
-        objective,
-        p: vec![0.0; family.coefficients[0].len()],
-        evaluations: 0,
-        best: None,
-    };
+pub fn search(family: &Polynomial, mu_max: f64, score: Score) -> Option<SearchResult> {
+    let mut grid =
+        GridSearch { family, mu_max, score, p: vec![0.0; family.coefficients[0].len()], evaluations: 0, best: None };
     if mu_max == 0.0 {
         // Every candidate is the centre.
         grid.try_position([0, 0]);
@@ -73,7 +69,7 @@ pub fn search(family: &Polynomial, mu_max: f64, objective: &dyn Objective) -> Op
 struct GridSearch<'a> {
     family: &'a Polynomial,
     mu_max: f64,
-    objective: &'a dyn Objective,
+    score: Score<'a>,
     /// Normal forces of the current candidate.
     p: Vec<f64>,
     evaluations: usize,
@@ -93,7 +89,7 @@ impl GridSearch<'_> {
         }
         self.evaluations += 1;
         self.family.eval_into(self.mu(position), &mut self.p);
-        let score = self.objective.score(&self.p).filter(|score| score.is_finite());
+        let score = (self.score)(&self.p).filter(|score| score.is_finite());
         if let Some(score) = score {
             if self.best.is_none_or(|(_, best)| score > best) {
                 self.best = Some((position, score));
@@ -121,15 +117,8 @@ mod tests {
         Polynomial { degree: 1, coefficients }
     }
 
-    struct Score<F>(F);
-    impl<F: Fn(f64, f64) -> Option<f64>> Objective for Score<F> {
-        fn score(&self, p: &[f64]) -> Option<f64> {
-            (self.0)(p[1], p[2])
-        }
-    }
-
     fn run(mu_max: f64, score: impl Fn(f64, f64) -> Option<f64>) -> Option<SearchResult> {
-        search(&mu_itself(), mu_max, &Score(score))
+        search(&mu_itself(), mu_max, &|p| score(p[1], p[2]))
     }
 
     #[test]

@@ -4,6 +4,9 @@ use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 
+/// First bytes of a NumPy file.
+pub(super) const NPY_MAGIC: &[u8] = b"\x93NUMPY";
+
 /// Format of a recording.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
@@ -37,7 +40,7 @@ impl Format {
     pub fn of(file: &str, bytes: &[u8]) -> Option<Format> {
         /// Headers are within this many bytes.
         const HEAD: usize = 4096;
-        if bytes.starts_with(super::npy::MAGIC) {
+        if bytes.starts_with(NPY_MAGIC) {
             return Some(Format::Npy);
         }
         let head = String::from_utf8_lossy(&bytes[..bytes.len().min(HEAD)]);

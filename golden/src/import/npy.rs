@@ -10,11 +10,8 @@
 //! Python literals: three fields of fixed kinds need no recursion and no allocation that a damaged header can inflate.
 
 use super::error::{ImportError, Source};
-use super::format::Format;
+use super::format::{Format, NPY_MAGIC};
 use super::recording::{is_reading, RawFrame, Recording, LARGEST_SIDE};
-
-/// First bytes of a file.
-pub(super) const MAGIC: &[u8] = b"\x93NUMPY";
 
 /// Kind of a value.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -75,7 +72,7 @@ pub(super) fn parse(bytes: &[u8], size: Option<[usize; 2]>, source: &Source) -> 
 
 /// Text of the header, and the bytes behind it.
 fn split(bytes: &[u8]) -> Option<(String, &[u8])> {
-    let rest = bytes.strip_prefix(MAGIC)?;
+    let rest = bytes.strip_prefix(NPY_MAGIC)?;
     let (version, rest) = rest.split_at_checked(2)?;
     let (length, rest) = match version[0] {
         1 => rest.split_at_checked(2).map(|(l, rest)| (usize::from(u16::from_le_bytes([l[0], l[1]])), rest))?,

@@ -1,7 +1,7 @@
 //! The formats on excerpts of real recordings (`data/recordings`), on arrays that NumPy wrote, and on damaged files.
 
 use super::*;
-use crate::reconstruct::Golden;
+use crate::float::Golden;
 
 const ISCAN: &[u8] = include_bytes!("../../data/recordings/iscan-finger.csv");
 const FSCAN: &[u8] = include_bytes!("../../data/recordings/fscan-walk.asf");

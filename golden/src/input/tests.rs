@@ -1,8 +1,9 @@
 //! Input options on frames with known forces, and invalid tables.
 
 use super::*;
+use crate::float::Golden;
 use crate::generator::converter::Converter;
-use crate::reconstruct::{Golden, Reconstruction};
+use crate::reconstruct::Reconstruction;
 use crate::scene::{ForceOutput, Scene};
 use crate::sensor::Sensor;
 

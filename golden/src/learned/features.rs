@@ -14,7 +14,7 @@
 //! | in: b, mask, σ of each frame | n × frames, frames | MPa |
 //! | out: inputs | 4n + 1 × frames | – |
 
-use super::LearnedError;
+use super::error::LearnedError;
 use crate::influence::Influence;
 use crate::scene::Medium;
 use crate::sensor::Sensor;
@@ -100,6 +100,12 @@ impl Features {
 
 fn norm<'a>(values: impl Iterator<Item = &'a f32>) -> f32 {
     values.map(|value| value * value).sum::<f32>().sqrt()
+}
+
+/// The noise that a network is told: σ, and the gains as if they were noise on every taxel alike; `square` is Σb² of `n`
+/// taxels.
+pub(super) fn effective_sigma(sigma: f32, gain_spread: f32, square: f32, n: usize) -> f32 {
+    (sigma * sigma + gain_spread * gain_spread * square / n as f32).sqrt()
 }
 
 #[cfg(test)]

@@ -15,9 +15,9 @@
 //! | in, out: network, signature | – | – |
 //! | out, in: bytes | about 1.5 per weight | – |
 
+use super::error::LearnedError;
 use super::network::{Layer, Network, OUTPUTS};
 use super::window::Window;
-use super::LearnedError;
 use crate::scene::{Medium, Scene};
 use faer::Mat;
 use serde::{Deserialize, Serialize};

@@ -19,7 +19,7 @@
 //! | in: scene | – | – |
 //! | out: readings, μ | window × frames, 2 × frames | MPa, of mu_max |
 
-use super::features::Readings;
+use super::features::{effective_sigma, Readings};
 use super::window::{Place, Window, MIRRORS};
 use crate::generator::draws::{DrawOptions, Draws, Shape};
 use crate::generator::support::{Kernels, Support};
@@ -147,7 +147,7 @@ impl Frames {
             square += b * b;
             into.b[(image, at)] = if self.unipolar { b.max(0.0) } else { b };
         }
-        into.sigma.push(super::effective_sigma(sigma, gains, square, n));
+        into.sigma.push(effective_sigma(sigma, gains, square, n));
     }
 }
 

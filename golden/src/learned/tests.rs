@@ -1,7 +1,7 @@
 use super::*;
+use crate::float::Golden;
 use crate::generator::draws::{DrawOptions, Draws};
 use crate::noise::{shape_study, Candidate, ShapeStudy};
-use crate::reconstruct::Golden;
 use crate::scene::EstimatorKind;
 
 fn scene(name: &str) -> Scene {

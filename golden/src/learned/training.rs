@@ -15,11 +15,11 @@
 //! | in: scene, options | – | – |
 //! | out: network, mean loss of the first and of the last steps | – | – |
 
+use super::error::LearnedError;
 use super::features::Features;
 use super::frames::Frames;
 use super::network::{Network, LN_SIGMA, OUTPUTS};
 use super::window::Window;
-use super::LearnedError;
 use crate::random::Random;
 use crate::scene::Scene;
 use faer::linalg::matmul::matmul;

@@ -73,7 +73,7 @@ frames may be in flight at a time.
             at += field.bytes;
         }
     }
-    text + "\nThe board ignores the bits of a code above `input_bits`. Status beats are described in stage [`send`](crate::fixed::send).\n"
+    text + "\nThe board ignores the bits of a code above `input_bits`. Status beats are described in stage [`send`](crate::fixed::stages::send).\n"
 }
 
 /// How a special byte is escaped in a packet.

@@ -1,78 +1,28 @@
 //! Identity of a board: the scene for which its bitstream was generated.
 
 use serde_json::json;
-use thiserror::Error;
 
+use super::error::LinkError;
 use super::payload::{Identity, Sums};
 use super::{code_bytes, Kind, BEAT_BYTES, VERSION};
 use crate::board::EngineKind;
-use crate::fixed::coefficients::Blocks;
-use crate::fixed::send::STATUS_BEATS;
-use crate::fixed::Model;
+use crate::fixed::stages::send::STATUS_BEATS;
+use crate::fixed::words::coefficients::Blocks;
+use crate::fixed::Plan;
 use crate::scene::{Condition, ForceOutput};
 
 /// All requests.
 const REQUESTS: [Kind; 4] = [Kind::Identify, Kind::ReadCounters, Kind::FrameForResultants, Kind::FrameForForces];
 
-/// A scene or board cannot have a link.
-#[derive(Clone, Debug, PartialEq, Error)]
-pub enum LinkError {
-    /// The engine of the scene does not send one force per taxel and a fixed number of status beats for each frame.
-    #[error(
-        "{field} = {value}: a board's link does not support it; it needs one frame per answer, one force per taxel and the \
-         same subarrays in every frame"
-    )]
-    Unsupported {
-        /// The scene's field.
-        field: &'static str,
-        /// Its value.
-        value: String,
-    },
-    /// A payload is longer than its length field allows.
-    #[error("scene {scene}: {what} of {taxels} taxels take {bytes} bytes, a packet holds 65535")]
-    TooLong {
-        /// The scene's name.
-        scene: String,
-        /// The kind of payload.
-        what: &'static str,
-        /// Number of taxels.
-        taxels: usize,
-        /// Length of the payload in bytes.
-        bytes: usize,
-    },
-    /// The bit rate is too high for the board's clock.
-    #[error("constraints/{board}.toml: {field} = {value}: the clock of {clock_MHz} MHz takes at most {most}")]
-    TooFast {
-        /// The board's name.
-        board: String,
-        /// Field of its file.
-        field: &'static str,
-        /// Its bit rate in the field's unit.
-        value: f64,
-        /// The engine's clock.
-        clock_MHz: f64,
-        /// The highest bit rate in the field's unit.
-        most: f64,
-    },
-    /// The scene asks for SPI on a board without pins for it.
-    #[error(
-        "hardware.link = \"spi\": board {board} has no pins for it (no spi_MHz in constraints/{board}.toml); it has \"uart\""
-    )]
-    NoPins {
-        /// The board's name.
-        board: String,
-    },
-}
-
 impl Identity {
-    /// The identity of the hardware of `model`.
+    /// The identity of the hardware of `plan`.
     ///
     /// # Errors
     /// [`LinkError`]: the scene averages, sends resultants only or chooses its case per frame; a payload is too long;
     /// the board lacks the link or its clock is too slow for the bit rate.
-    pub fn of(model: &Model) -> Result<Identity, LinkError> {
-        let (sensor, board) = (&model.scene.sensor, &model.board);
-        let scene = &model.scene;
+    pub fn of(plan: &Plan) -> Result<Identity, LinkError> {
+        let (sensor, board) = (&plan.scene.sensor, &plan.board);
+        let scene = &plan.scene;
         let refuse = |field, value: String| Err(LinkError::Unsupported { field, value });
         if scene.input.average > 0 {
             return refuse("input.average", scene.input.average.to_string());
@@ -80,24 +30,24 @@ impl Identity {
         if scene.output.forces != ForceOutput::Taxels {
             return refuse("output.forces", "\"resultants\"".to_owned());
         }
-        if model.chooses() {
+        if plan.chooses() {
             return refuse("partition.case", scene.partition.case.to_string());
         }
-        let payloads = payloads(model);
+        let payloads = payloads(plan);
         if let Some((what, bytes)) = payloads.into_iter().find(|(_, bytes)| *bytes > usize::from(u16::MAX)) {
-            return Err(LinkError::TooLong { scene: model.scene.name.clone(), what, taxels: sensor.taxels(), bytes });
+            return Err(LinkError::TooLong { scene: plan.scene.name.clone(), what, taxels: sensor.taxels(), bytes });
         }
         // Rows, columns and subarrays are fewer than the taxels, whose codes fit a packet.
         Ok(Identity {
             version: VERSION,
             rows: sensor.rows as u16,
             cols: sensor.cols as u16,
-            input_bits: model.formats.code_bits as u8,
+            input_bits: plan.formats().code_bits as u8,
             status_beats: STATUS_BEATS as u8,
-            scene: scene_hash(model),
+            scene: scene_hash(plan),
             clock_hz: (board.clock_MHz * 1e6).round() as u32,
             bit_rate: scene.hardware.link.bit_rate(board)?,
-            subarrays: model.parts.len() as u16,
+            subarrays: plan.parts().len() as u16,
             left_out: REQUESTS.into_iter().filter(|&kind| !supports(board.engine, kind)).map(bit).sum(),
         })
     }
@@ -120,11 +70,11 @@ fn bit(kind: Kind) -> u16 {
 }
 
 /// Length in bytes of a frame's codes, of its resultants and of its forces, each with a name.
-pub fn payloads(model: &Model) -> [(&'static str, usize); 3] {
-    let taxels = model.scene.sensor.taxels();
-    let status = model.status_beats() * BEAT_BYTES;
+pub fn payloads(plan: &Plan) -> [(&'static str, usize); 3] {
+    let taxels = plan.scene.sensor.taxels();
+    let status = plan.status_beats() * BEAT_BYTES;
     [
-        ("codes", code_bytes(model.formats.code_bits) * taxels),
+        ("codes", code_bytes(plan.formats().code_bits) * taxels),
         ("resultants", Sums::BYTES + status),
         ("forces", BEAT_BYTES * taxels + status),
     ]
@@ -133,24 +83,24 @@ pub fn payloads(model: &Model) -> [(&'static str, usize); 3] {
 /// CRC-32 over everything that determines the bits of the answers: this program's version, array, subarrays, formats,
 /// condition, noise floor and threshold in codes, zeros and gains of the taxels, dead taxels, and the quantised
 /// matrices with the columns kept. The names of scene and board and the clock are not included.
-pub fn scene_hash(model: &Model) -> u32 {
-    let sensor = &model.scene.sensor;
+pub fn scene_hash(plan: &Plan) -> u32 {
+    let sensor = &plan.scene.sensor;
     let text = json!({
         "version": env!("CARGO_PKG_VERSION"),
         "array": [sensor.rows, sensor.cols],
-        "subarrays": model.grid(),
-        "formats": model.formats,
-        "both_signs": model.scene.partition.condition == Condition::BothSigns,
-        "noise_floor": model.noise_floor,
-        "threshold": model.threshold,
-        "columns": model.storage.columns,
-        "zero": model.prepare.zero,
-        "gain": model.prepare.gain,
+        "subarrays": plan.grid(),
+        "formats": plan.formats(),
+        "both_signs": plan.scene.partition.condition == Condition::BothSigns,
+        "noise_floor": plan.noise_floor,
+        "threshold": plan.threshold,
+        "columns": plan.storage().columns,
+        "zero": plan.prepare.zero,
+        "gain": plan.prepare.gain,
     });
     let mut hash = crc32fast::Hasher::new();
     hash.update(text.to_string().as_bytes());
-    model.dead.iter().for_each(|taxel| hash.update(&(*taxel as u64).to_le_bytes()));
-    let quantised = &model.quantised;
+    plan.dead.iter().for_each(|taxel| hash.update(&(*taxel as u64).to_le_bytes()));
+    let quantised = plan.quantised();
     let coefficients = |blocks: &Blocks, hash: &mut crc32fast::Hasher| {
         blocks.coefficients().for_each(|coefficient| hash.update(&coefficient.to_le_bytes()));
     };

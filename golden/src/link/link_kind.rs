@@ -1,6 +1,7 @@
 //! The physical link that carries the packets' bytes between host and board.
 
-use super::{LinkError, OVERHEAD};
+use super::error::LinkError;
+use super::OVERHEAD;
 use crate::board::Board;
 
 /// Minimum clock cycles per bit of the UART: the receiver takes the majority of three samples.

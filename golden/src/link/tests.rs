@@ -89,7 +89,7 @@ fn the_hash_tells_scenes_apart_and_clocks_not() {
     let model = |change: &dyn Fn(&mut Scene)| {
         let mut scene = Scene::builtin("eight-by-eight").unwrap();
         change(&mut scene);
-        crate::fixed::Model::new(&scene).unwrap()
+        crate::fixed::plan::cases::planned(&scene).unwrap()
     };
     let plain = model(&|_| ());
     let mut faster = model(&|scene| scene.name = "other".into());
@@ -123,7 +123,7 @@ fn the_hash_tells_scenes_apart_and_clocks_not() {
 fn the_boards_clock_and_pins_limit_the_spi() {
     let mut scene = Scene::builtin("eight-by-eight").unwrap();
     scene.hardware.link = LinkKind::Spi;
-    let mut model = crate::fixed::Model::new(&scene).unwrap();
+    let mut model = crate::fixed::plan::cases::planned(&scene).unwrap();
     assert_eq!(Identity::of(&model).unwrap().bit_rate, 25_000_000);
     let mut of = |spi_MHz| {
         model.board.spi_MHz = spi_MHz;
@@ -139,7 +139,7 @@ fn the_boards_clock_and_pins_limit_the_spi() {
 
 #[test]
 fn scenes_that_the_link_does_not_fit_are_refused_by_field() {
-    let plain = crate::fixed::Model::new(&Scene::builtin("eight-by-eight").unwrap()).unwrap();
+    let plain = crate::fixed::plan::cases::planned(&Scene::builtin("eight-by-eight").unwrap()).unwrap();
     let refused = |change: &dyn Fn(&mut Scene)| {
         let mut model = plain.clone();
         change(&mut model.scene);
@@ -154,7 +154,7 @@ fn scenes_that_the_link_does_not_fit_are_refused_by_field() {
 
 #[test]
 fn time_on_the_wire_by_hand() {
-    let model = crate::fixed::Model::new(&Scene::builtin("eight-by-eight").unwrap()).unwrap();
+    let model = crate::fixed::plan::cases::planned(&Scene::builtin("eight-by-eight").unwrap()).unwrap();
     assert_eq!(payloads(&model), [("codes", 192), ("resultants", 48 + 36), ("forces", 768 + 36)]);
     // 290 payload bytes and 10 more, at 300 000 and 3 125 000 bytes a second.
     assert_eq!(LinkKind::Uart.wire_ms(290, 3_000_000), 1.0);

@@ -10,9 +10,9 @@
 //! with the versions of the layout and of this crate; the file's name is its CRC-32 and length. A file with another
 //! key, truncated or damaged is ignored: the matrices are computed and written again.
 
-use crate::folded::{Block, Operator};
 use crate::scene::{Inversion, Medium};
 use crate::sensor::Sensor;
+use crate::symmetry::folded::{Block, Operator};
 use crate::write::write;
 use faer::Mat;
 use std::fs;

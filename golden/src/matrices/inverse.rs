@@ -3,8 +3,8 @@
 //! Cz = U diag(λ) Uᵀ for each block of the folded basis; Cz⁺ = U diag(f(λ)) Uᵀ with the scene's f
 //! ([`crate::scene::inverse`]).
 
-use crate::folded::{Block, Operator};
 use crate::scene::Inversion;
+use crate::symmetry::folded::{Block, Operator};
 use faer::linalg::matmul::matmul;
 use faer::{Accum, Mat, Par, Side};
 use std::f64::consts::FRAC_PI_2;

@@ -21,8 +21,8 @@
 
 use super::inverse::product;
 use super::{FoldedMatrices, Matrices, MatricesError};
-use crate::folded::{Basis, Operator};
 use crate::sensor::Sensor;
+use crate::symmetry::folded::{Basis, Operator};
 use faer::linalg::solvers::Solve;
 use faer::Mat;
 

@@ -11,7 +11,7 @@
 //! | shear over load | 0.1 … 0.5, any direction |
 
 use crate::float::objective::disc::Disc;
-use crate::float::objective::patch::Ellipse;
+use crate::float::objective::ellipse::Ellipse;
 use crate::float::objective::taxels::Taxels;
 use crate::random::Random;
 use crate::scene::Medium;

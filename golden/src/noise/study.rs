@@ -3,10 +3,10 @@
 use super::bound::Bound;
 use super::contact::{ContactStress, HertzContact};
 use super::statistic::quantile;
+use crate::float::{Golden, GoldenError};
 use crate::frame::{Frame, FrameError};
 use crate::generator::GeneratorError;
 use crate::random::Random;
-use crate::reconstruct::{Golden, GoldenError};
 use crate::scene::{EstimatorKind, ObjectiveKind, Scene};
 use nalgebra::Vector2;
 use serde::Serialize;

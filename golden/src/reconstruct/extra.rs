@@ -12,10 +12,6 @@
 
 use super::output::Resultant;
 use crate::evidence::ContactEstimate;
-use crate::float::contacts::Contacts;
-use crate::frame::Forces;
-use crate::input::unipolar::Unipolar;
-use crate::sensor::Sensor;
 use serde::{Deserialize, Serialize};
 
 /// Optional fields of a result.
@@ -46,6 +42,20 @@ pub struct Extra {
     /// The forces of `output.forces = "resultants"`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub resultants: Option<Vec<Resultant>>,
+}
+
+/// Statistics of the estimated tension.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Unipolar {
+    /// Number of readings of zero or less.
+    pub clipped: usize,
+    /// Number of clipped readings for which tension was estimated.
+    pub pulled: usize,
+    /// Number of candidates for μ, over all subarrays.
+    pub evaluations: usize,
+    /// Root mean square difference of the known readings and the stress of the compressive forces, relative to the
+    /// peak.
+    pub misfit: f64,
 }
 
 /// The choice of a case for one frame.
@@ -83,29 +93,4 @@ pub struct Region {
     pub load_N: [f64; 3],
     /// Row-major indices in the array of the region's taxels, ascending.
     pub taxels: Vec<usize>,
-}
-
-/// The regions of a frame, from the solved contacts and the reported forces; `met[k]`: whether region k meets the
-/// condition.
-pub fn regions(sensor: &Sensor, contacts: &Contacts, met: &[bool], forces: &Forces) -> Vec<Region> {
-    let region = |k: usize| {
-        let taxels: Vec<usize> = (0..sensor.taxels()).filter(|&t| contacts.segments.labels[t] == k).collect();
-        let sum = |axis: &[f64]| taxels.iter().map(|&t| axis[t]).sum();
-        let (mut moment, mut weight) = ([0.0; 2], 0.0);
-        for &taxel in &taxels {
-            let at = sensor.position_mm(taxel / sensor.cols, taxel % sensor.cols);
-            let fz = forces.fz[taxel].max(0.0);
-            weight += fz;
-            moment = [moment[0] + fz * at[0], moment[1] + fz * at[1]];
-        }
-        Region {
-            centroid_condition: met[k],
-            mu: contacts.mu(k),
-            objective_value: contacts.found[k].map(|found| found.objective),
-            centre_mm: (weight > 0.0).then(|| moment.map(|sum| sum / weight)),
-            load_N: [sum(&forces.fx), sum(&forces.fy), sum(&forces.fz)],
-            taxels,
-        }
-    };
-    (0..contacts.segments.count).map(region).collect()
 }

@@ -28,7 +28,7 @@ impl Reconstruction {
     /// estimator `evidence` refuses.
     ///
     /// ```
-    /// use dermis_golden::{flags::Flag, frame::Frame, generator::converter::Converter, reconstruct::Golden};
+    /// use dermis_golden::{flags::Flag, frame::Frame, generator::converter::Converter, float::Golden};
     /// use dermis_golden::scene::Scene;
     ///
     /// let scene = Scene::builtin("sensor-1")?.for_hardware();

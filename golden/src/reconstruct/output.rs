@@ -8,7 +8,7 @@
 //! | out: force | 3 per subarray, or per region of `partition.case = "contacts"` | N |
 //! | out: centre | 2, `None` without compressive forces | mm from the array's centre |
 
-use super::Reconstruction;
+use crate::frame::Forces;
 use crate::sensor::Sensor;
 use serde::{Deserialize, Serialize};
 
@@ -21,26 +21,18 @@ pub struct Resultant {
     pub centre_mm: Option<[f64; 2]>,
 }
 
-/// The resultants of a result: one per region if it has regions, else one per subarray.
-pub(super) fn resultants(sensor: &Sensor, result: &Reconstruction) -> Vec<Resultant> {
-    match &result.extra.regions {
-        Some(regions) => {
-            regions.iter().map(|region| resultant(sensor, result, region.taxels.iter().copied())).collect()
+impl Resultant {
+    /// The resultant of `forces`, row-major over the array, on some of its taxels.
+    pub(super) fn of(sensor: &Sensor, forces: &Forces, taxels: impl Iterator<Item = usize>) -> Resultant {
+        let (mut force_N, mut pressed, mut moment) = ([0.0; 3], 0.0, [0.0; 2]);
+        for k in taxels {
+            let own = [forces.fx[k], forces.fy[k], forces.fz[k]];
+            (0..3).for_each(|axis| force_N[axis] += own[axis]);
+            let load = own[2].max(0.0);
+            let place = sensor.position_mm(k / sensor.cols, k % sensor.cols);
+            pressed += load;
+            (0..2).for_each(|axis| moment[axis] += load * place[axis]);
         }
-        None => result.subarrays.iter().map(|own| resultant(sensor, result, own.part().indices(sensor))).collect(),
+        Resultant { force_N, centre_mm: (pressed > 0.0).then(|| moment.map(|m| m / pressed)) }
     }
-}
-
-fn resultant(sensor: &Sensor, result: &Reconstruction, taxels: impl Iterator<Item = usize>) -> Resultant {
-    let forces = &result.forces_N;
-    let (mut force_N, mut pressed, mut moment) = ([0.0; 3], 0.0, [0.0; 2]);
-    for k in taxels {
-        let own = [forces.fx[k], forces.fy[k], forces.fz[k]];
-        (0..3).for_each(|axis| force_N[axis] += own[axis]);
-        let load = own[2].max(0.0);
-        let place = sensor.position_mm(k / sensor.cols, k % sensor.cols);
-        pressed += load;
-        (0..2).for_each(|axis| moment[axis] += load * place[axis]);
-    }
-    Resultant { force_N, centre_mm: (pressed > 0.0).then(|| moment.map(|m| m / pressed)) }
 }

@@ -1,7 +1,7 @@
 //! Extreme: frames at the limits of a sensor, and the result of each model.
 //!
 //! [`frames`] generates them for any scene; [`outcome`] runs both models. "Status" is the hardware's own
-//! ([`crate::fixed::send`]), flags are those of the result ([`crate::flags`]).
+//! ([`crate::fixed::stages::send`]), flags are those of the result ([`crate::flags`]).
 //!
 //! | frame | result | flags |
 //! |---|---|---|
@@ -25,13 +25,14 @@
 //! words report what only the engine knows: condition met, candidate found, no contact, saturations of its own
 //! arithmetic, and the framing of its input.
 
-use crate::fixed::send::{Status, FLAG_CONDITION, FLAG_FOUND, FLAG_FRAMING, FLAG_NO_CONTACT, STATUS_BEATS};
+use crate::fixed::stages::send::{Status, FLAG_CONDITION, FLAG_FOUND, FLAG_FRAMING, FLAG_NO_CONTACT, STATUS_BEATS};
 use crate::fixed::{FixedError, Model};
 use crate::flags::Flag;
+use crate::float::{Golden, GoldenError};
 use crate::frame::{Contact, Frame};
 use crate::generator::{generate, GeneratorError};
 use crate::partition::{subarrays, Case};
-use crate::reconstruct::{Golden, GoldenError, Reconstruction};
+use crate::reconstruct::Reconstruction;
 use crate::scene::Scene;
 use serde::Serialize;
 

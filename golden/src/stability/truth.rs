@@ -10,13 +10,27 @@
 //! | in: frame | known forces and their stress for one shear, if given | N, MPa |
 //! | out: two frames | taxels | MPa, forces in N |
 
-use super::{extended, FormatErrors};
+use super::extended;
 use crate::errors::Errors;
 use crate::float::force::force;
-use crate::folded::accumulate;
 use crate::frame::{Forces, Frame};
 use crate::matrices::Matrices;
 use crate::scene::Scene;
+use crate::symmetry::folded::accumulate;
+use serde::Serialize;
+
+/// Errors of one number format.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct FormatErrors {
+    /// Forward error ‖Cz⁺b₀ − p‖/‖p‖.
+    pub forward: f64,
+    /// Residual ‖b − C x‖/‖b‖.
+    pub residual: f64,
+    /// Normal error of the resultant; `None` if undefined.
+    pub normal: Option<f64>,
+    /// Tangential error of the resultant; `None` if undefined.
+    pub tangential: Option<f64>,
+}
 
 /// Ratio of shear to load in units of mu_max, [x, y].
 const SHEAR: [f64; 2] = [0.6, -0.35];

@@ -80,7 +80,7 @@ impl Shape {
     /// The shape of the scene of `model`.
     pub fn of(model: &Model) -> Self {
         let sensor = &model.scene.sensor;
-        let (input_bits, status_beats) = (model.formats.code_bits, model.status_beats());
+        let (input_bits, status_beats) = (model.formats().code_bits, model.status_beats());
         let resultants = supports(model.board.engine, Kind::FrameForResultants);
         let frames = match model.board.engine {
             EngineKind::Parallel => 4,

@@ -1,8 +1,8 @@
 //! Memories of the polynomials: two single-port banks, one read while the other is written.
 
-use dermis_golden::fixed::formats::Formats;
-use dermis_golden::fixed::resources::Holds;
-use dermis_golden::fixed::serial::{polynomials, word_bits};
+use dermis_golden::fixed::plan::resources::Holds;
+use dermis_golden::fixed::plan::serial::{polynomials, word_bits};
+use dermis_golden::fixed::words::formats::Formats;
 use rust_hdl::prelude::*;
 
 use crate::kernel_block;

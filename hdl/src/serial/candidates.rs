@@ -9,8 +9,8 @@
 //! ```
 //! One candidate leaves in each of the cycles 1, 4, 5, 13, 14, 15 and, of the previous polynomial, 0, 2, 3.
 
-use dermis_golden::fixed::formats::Formats;
-use dermis_golden::fixed::serial::word_bits;
+use dermis_golden::fixed::plan::serial::word_bits;
+use dermis_golden::fixed::words::formats::Formats;
 use rust_hdl::prelude::*;
 
 use super::one_of;

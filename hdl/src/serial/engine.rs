@@ -2,8 +2,8 @@
 //!
 //! One frame at a time. While it is computed and sent, the next is received as soon as the frame buffer has been read.
 
-use dermis_golden::fixed::resources::Holds;
-use dermis_golden::fixed::serial::{floor_bits, product_bits, word_bits, SLOT};
+use dermis_golden::fixed::plan::resources::Holds;
+use dermis_golden::fixed::plan::serial::{floor_bits, product_bits, word_bits, SLOT};
 use dermis_golden::fixed::Model;
 use dermis_golden::scene::Condition;
 use rust_hdl::prelude::*;
@@ -68,7 +68,7 @@ pub struct Engine {
 impl Engine {
     /// The serial engine of `model`.
     pub fn new(model: &Model) -> Self {
-        let f = &model.formats;
+        let f = model.formats();
         let word = word_bits(f);
         let code = f.input_bits as usize;
         // `normalise` shifts codes left by `input_bits` − 1, then right by the length of the magnitude.

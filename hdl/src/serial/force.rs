@@ -1,4 +1,4 @@
-//! Stages `force` and `send`: one product at a time, a beat every [`BEAT`](dermis_golden::fixed::serial::BEAT) cycles.
+//! Stages `force` and `send`: one product at a time, a beat every [`BEAT`](dermis_golden::fixed::plan::serial::BEAT) cycles.
 //!
 //! ```text
 //! phase  0 order | 1 bank | 2 … 4 factors μ1, μ2, 1 | 3 … 5 products | 4 … 6 rounder | 8 … 10 forces
@@ -8,9 +8,9 @@
 //! Before the first beat both μ words are computed in the same way; after the last force the status words take the
 //! place of the forces.
 
-use dermis_golden::fixed::formats::{Formats, FORCE_BITS, FORCE_SHIFT_MAX, MU_ROUND};
-use dermis_golden::fixed::send::STATUS_BEATS;
-use dermis_golden::fixed::serial::{polynomials, word_bits, BEAT, FACTOR_BITS, FIRST_BEAT, MU_WORDS};
+use dermis_golden::fixed::plan::serial::{polynomials, word_bits, BEAT, FACTOR_BITS, FIRST_BEAT, MU_WORDS};
+use dermis_golden::fixed::stages::send::STATUS_BEATS;
+use dermis_golden::fixed::words::formats::{Formats, FORCE_BITS, FORCE_SHIFT_MAX, MU_ROUND};
 use rust_hdl::prelude::*;
 
 use super::pass_sequencer::SATURATION_BITS;

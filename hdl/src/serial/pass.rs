@@ -10,9 +10,9 @@
 //! fourth cycle after the `last` product, and are cleared with the fourth; the first product of the next row follows
 //! the last one by five cycles at the earliest.
 
-use dermis_golden::fixed::resources::{operand_vectors, Holds};
-use dermis_golden::fixed::schedule::Kind;
-use dermis_golden::fixed::serial::{coefficients, first_vector, OPERAND_BITS, WIDE};
+use dermis_golden::fixed::plan::resources::{operand_vectors, Holds};
+use dermis_golden::fixed::plan::serial::{coefficients, first_vector, OPERAND_BITS, WIDE};
+use dermis_golden::fixed::words::schedule::Kind;
 use dermis_golden::fixed::Model;
 use rust_hdl::prelude::*;
 
@@ -92,9 +92,9 @@ struct Tables {
 impl Pass {
     /// The lanes of `model`, with its coefficients.
     pub fn new(model: &Model) -> Self {
-        let f = &model.formats;
+        let f = model.formats();
         let bits = count_bits(f.quads);
-        let table = |kind| coefficients(f, &model.quantised, kind);
+        let table = |kind| coefficients(f, model.quantised(), kind);
         let low_bits = f.inverse_low_bits as usize;
         let tables = Tables {
             wide: WIDE.into_iter().flat_map(table).collect(),

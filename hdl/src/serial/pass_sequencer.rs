@@ -8,10 +8,10 @@
 //! ```
 //! Each step ends with [`DRAIN`] cycles, in which its last words reach their memory.
 
-use dermis_golden::fixed::formats::{Formats, SEARCH_EXTRA_BITS};
-use dermis_golden::fixed::resources::operand_vectors;
-use dermis_golden::fixed::schedule::{schedule, Kind, Product};
-use dermis_golden::fixed::serial::{first_vector, operand_index, DRAIN, OPERAND_BITS, ROW_GAP, WIDE};
+use dermis_golden::fixed::plan::resources::operand_vectors;
+use dermis_golden::fixed::plan::serial::{first_vector, operand_index, DRAIN, OPERAND_BITS, ROW_GAP, WIDE};
+use dermis_golden::fixed::words::formats::{Formats, SEARCH_EXTRA_BITS};
+use dermis_golden::fixed::words::schedule::{schedule, Kind, Product};
 use rust_hdl::prelude::*;
 
 use super::rounder::SHIFT_BITS;

@@ -2,8 +2,8 @@
 //!
 //! As in the parallel engine ([`crate::stages::Receive`]), with a buffer of single taxels in place of quads.
 
-use dermis_golden::fixed::formats::Formats;
-use dermis_golden::fixed::resources::Holds;
+use dermis_golden::fixed::plan::resources::Holds;
+use dermis_golden::fixed::words::formats::Formats;
 use rust_hdl::prelude::*;
 
 use crate::primitives::{count_bits, Counter, Dff, FrameStats, Ram};

@@ -1,6 +1,6 @@
 //! The barrel shifter of the serial engine: right shift, rounding half up, saturation.
 
-use dermis_golden::fixed::formats::FORCE_BITS;
+use dermis_golden::fixed::words::formats::FORCE_BITS;
 use rust_hdl::prelude::*;
 
 use crate::kernel_block;
@@ -86,7 +86,7 @@ fn kernel(bits: usize, narrow: usize) -> Kernel {
 
 #[cfg(test)]
 mod tests {
-    use dermis_golden::fixed::arith::{round_shift, saturate};
+    use dermis_golden::fixed::words::arith::{round_shift, saturate};
 
     use super::*;
     use crate::language::testbench::{check, Reference};

@@ -6,9 +6,9 @@
 //! The sum polynomial comes first. Its value is Σp itself: ⌊Σp / 2^20⌋ is stored as the candidate's floor, and its
 //! total starts at −n log2 Σp.
 
-use dermis_golden::fixed::formats::{Formats, EPSILON_SHIFT, LOG_FRACTION};
-use dermis_golden::fixed::search::log_table;
-use dermis_golden::fixed::serial::{floor_bits, word_bits};
+use dermis_golden::fixed::plan::serial::{floor_bits, word_bits};
+use dermis_golden::fixed::stages::search::log_table;
+use dermis_golden::fixed::words::formats::{Formats, EPSILON_SHIFT, LOG_FRACTION};
 use rust_hdl::prelude::*;
 
 use super::{bits_of, one_of};
@@ -171,7 +171,7 @@ fn kernel(sizes: Sizes) -> Kernel {
 
 #[cfg(test)]
 mod tests {
-    use dermis_golden::fixed::search::log2;
+    use dermis_golden::fixed::stages::search::log2;
 
     use super::*;
     use crate::language::testbench::{check, Reference};

@@ -12,9 +12,9 @@
 //! The disc test needs no product: x² + y² − r² is updated, times four at a halving, and by ±2x + 1 from one candidate
 //! to the next.
 
-use dermis_golden::fixed::formats::{Formats, HALVINGS};
-use dermis_golden::fixed::search::{CENTRE, COARSE_CENTRES};
-use dermis_golden::fixed::serial::{polynomials, SELECTION, SLOT, SWEEP_TAIL, TRANSPOSE};
+use dermis_golden::fixed::plan::serial::{polynomials, SELECTION, SLOT, SWEEP_TAIL, TRANSPOSE};
+use dermis_golden::fixed::stages::search::{CENTRE, COARSE_CENTRES};
+use dermis_golden::fixed::words::formats::{Formats, HALVINGS};
 use rust_hdl::prelude::*;
 
 use crate::kernel_block;

@@ -1,8 +1,8 @@
 //! Stage `unfold`: words from the butterfly to the coefficients of the taxels' polynomials, and their sum.
 
-use dermis_golden::fixed::formats::Formats;
-use dermis_golden::fixed::schedule::{vectors, EXPONENTS};
-use dermis_golden::fixed::serial::{polynomials, word_bits};
+use dermis_golden::fixed::plan::serial::{polynomials, word_bits};
+use dermis_golden::fixed::words::formats::Formats;
+use dermis_golden::fixed::words::schedule::{vectors, EXPONENTS};
 use rust_hdl::prelude::*;
 
 use super::{bits_of, one_of};
@@ -139,7 +139,7 @@ fn kernel(sizes: Sizes) -> Kernel {
 
 #[cfg(test)]
 mod tests {
-    use dermis_golden::fixed::arith::round_shift;
+    use dermis_golden::fixed::words::arith::round_shift;
 
     use super::*;
     use crate::language::testbench::{check, Reference};

@@ -64,7 +64,7 @@ impl Banks {
         let cases = model.cases();
         let mut block = Banks {
             ports: ReceivePorts::new(cases),
-            banks: cases.iter().enumerate().map(|(index, case)| Receive::new(case, index)).collect(),
+            banks: (0..cases.len()).map(|case| Receive::new(model, case)).collect(),
             choose: Choose::new(model),
             kernel: Body::default(),
         };

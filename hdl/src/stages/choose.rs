@@ -2,7 +2,7 @@
 //!
 //! Four cycles: position and magnitude of a code, maxima, limit for a contact, choice.
 
-use dermis_golden::fixed::choose::{is_beside_boundary, quarters, CUT_SHIFT};
+use dermis_golden::fixed::stages::choose::{is_beside_boundary, quarters, CUT_SHIFT};
 use dermis_golden::fixed::Model;
 use dermis_golden::partition::Grid;
 use dermis_golden::scene::Condition;
@@ -54,7 +54,7 @@ struct Rule<'a> {
 impl Choose {
     /// For the cases of `model`.
     pub fn new(model: &Model) -> Self {
-        let bits = model.formats.input_bits as usize;
+        let bits = model.formats().input_bits as usize;
         Choose::with(&Rule {
             sensor: &model.scene.sensor,
             grids: model.grids(),
@@ -185,7 +185,7 @@ fn differ<'k>([above, below]: [Expr<'k>; 2], grid: Grid) -> Expr<'k> {
 
 #[cfg(test)]
 mod tests {
-    use dermis_golden::fixed::choose::FrameStats;
+    use dermis_golden::fixed::stages::choose::FrameStats;
     use dermis_golden::scene::Scene;
 
     use super::*;

@@ -2,7 +2,7 @@
 //!
 //! One quad per cycle: frame buffer (2 cycles), `normalise` (1), butterfly (1), memory.
 
-use dermis_golden::fixed::resources::Holds;
+use dermis_golden::fixed::plan::resources::Holds;
 use dermis_golden::fixed::Model;
 use rust_hdl::prelude::*;
 
@@ -59,7 +59,7 @@ pub struct Fold {
 impl Fold {
     /// With the widths of `model`.
     pub fn new(model: &Model) -> Self {
-        let bits = model.formats.input_bits as usize;
+        let bits = model.formats().input_bits as usize;
         let limits: Vec<usize> = model.cases().iter().map(|case| case.formats.quads).collect();
         let frame_quads = frame_quads(model.cases());
         let quads = largest(&limits);

@@ -1,6 +1,6 @@
 //! Stage `force`: p(μ*) by quad into a memory; from there, force words by taxel into the output queue.
 
-use dermis_golden::fixed::resources::Holds;
+use dermis_golden::fixed::plan::resources::Holds;
 use dermis_golden::fixed::Model;
 use rust_hdl::prelude::*;
 
@@ -81,7 +81,7 @@ pub struct Force {
 impl Force {
     /// With the widths of `model`.
     pub fn new(model: &Model) -> Self {
-        let formats = &model.formats;
+        let formats = model.formats();
         let quads = frame_quads(model.cases());
         let (address, value) = (count_bits(quads), 4 * formats.search_bits[0] as usize);
         let unit = ForceUnit::new(model);

@@ -63,7 +63,7 @@ fn kernel(bits: usize) -> Kernel {
 
 #[cfg(test)]
 mod tests {
-    use dermis_golden::fixed::normalise;
+    use dermis_golden::fixed::stages::normalise;
 
     use super::*;
     use crate::language::testbench::{check, random_words, Reference};

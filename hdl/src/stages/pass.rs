@@ -4,7 +4,7 @@
 //! to operands: addresses (1 cycle, 3 with a column list), memories (2), selection of limb and parity (1); then the
 //! lanes.
 
-use dermis_golden::fixed::resources::{operand_vectors, Holds};
+use dermis_golden::fixed::plan::resources::{operand_vectors, Holds};
 use dermis_golden::fixed::Model;
 use rust_hdl::prelude::*;
 
@@ -60,7 +60,7 @@ pub struct Pass {
 impl Pass {
     /// For the schedule and the coefficients of `model`.
     pub fn new(model: &Model) -> Self {
-        let formats = &model.formats;
+        let formats = model.formats();
         let quads = formats.quads;
         let pass_program = PassProgram::new(model);
         let lanes = Lanes::new(model);

@@ -37,7 +37,7 @@ pub struct Prepare {
 impl Prepare {
     /// With the input options of `model`.
     pub fn new(model: &Model) -> Self {
-        let (formats, taxels) = (&model.formats, model.scene.sensor.taxels());
+        let (formats, taxels) = (model.formats(), model.scene.sensor.taxels());
         let bits = formats.code_bits as usize;
         Prepare {
             clk: Default::default(),

@@ -4,8 +4,8 @@
 //! `tlast` drops the frame, and the next beat starts a new one; a missing `tlast` is only recorded. Both set `framing`
 //! until `reported`.
 
-use dermis_golden::fixed::resources::Holds;
-use dermis_golden::fixed::Model;
+use dermis_golden::fixed::plan::resources::Holds;
+use dermis_golden::fixed::{CasePlan, Model};
 use rust_hdl::prelude::*;
 
 use crate::ports::{has_ports, ports};
@@ -87,7 +87,7 @@ ports! {
 
 impl ReceivePorts {
     /// For frames that are read in the layout of any of `cases`.
-    pub(super) fn new(cases: &[Model]) -> Self {
+    pub(super) fn new(cases: &[CasePlan]) -> Self {
         let bits = cases[0].formats.input_bits as usize;
         let parts: Vec<usize> = cases.iter().map(|case| case.parts.len()).collect();
         ReceivePorts {
@@ -117,15 +117,16 @@ impl ReceivePorts {
 has_ports!(Receive: ReceivePorts);
 
 impl Receive {
-    /// For frames in the layout of `model`, which is the case of index `case`.
+    /// For frames in the layout of the case of index `case`.
     pub fn new(model: &Model, case: usize) -> Self {
-        let bits = model.formats.input_bits as usize;
-        let count = model.parts.len();
-        let quads = count * model.formats.quads;
+        let own = &model.cases()[case];
+        let bits = own.formats.input_bits as usize;
+        let count = own.parts.len();
+        let quads = count * own.formats.quads;
         let taxels = model.scene.sensor.taxels();
         Receive {
-            ports: ReceivePorts::new(std::slice::from_ref(model)),
-            scan: Scan::new(std::slice::from_ref(model)),
+            ports: ReceivePorts::new(std::slice::from_ref(own)),
+            scan: Scan::new(std::slice::from_ref(own)),
             dead_taxels: DeadTaxelMask::new(bits, taxels, &model.dead),
             broadcast: LaneBroadcast::new(bits),
             frame: Ram::new(quads, 4, bits).holding((0..4).map(|lane| Holds::Frame { case, lane })).registered(),

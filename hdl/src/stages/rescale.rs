@@ -4,7 +4,7 @@
 //! rescaler with the measured shift. All later rows pass it directly, with the constant shift of an A pass. The two
 //! never overlap, because no A pass starts before v_00 is complete.
 
-use dermis_golden::fixed::resources::Holds;
+use dermis_golden::fixed::plan::resources::Holds;
 use dermis_golden::fixed::Model;
 use rust_hdl::prelude::*;
 
@@ -58,7 +58,7 @@ pub struct Rescale {
 impl Rescale {
     /// With the widths of `model`.
     pub fn new(model: &Model) -> Self {
-        let formats = &model.formats;
+        let formats = model.formats();
         let quads: Vec<usize> = model.cases().iter().map(|case| case.formats.quads).collect();
         let acc = 4 * formats.acc_bits as usize;
         Rescale {

@@ -1,7 +1,7 @@
 //! Sums per subarray in place of a force per taxel.
 
-use dermis_golden::fixed::formats::FORCE_BITS;
-use dermis_golden::fixed::resultants::{BEATS, POSITION_BITS, SUMS, SUM_BITS};
+use dermis_golden::fixed::stages::resultants::{BEATS, POSITION_BITS, SUMS, SUM_BITS};
+use dermis_golden::fixed::words::formats::FORCE_BITS;
 use dermis_golden::partition::Grid;
 use dermis_golden::sensor::Sensor;
 use rust_hdl::prelude::*;
@@ -218,7 +218,7 @@ fn sums(sensor: &Sensor, parts: Grid) -> Kernel {
 
 #[cfg(test)]
 mod tests {
-    use dermis_golden::fixed::resultants::{beats, half_pitches};
+    use dermis_golden::fixed::stages::resultants::{beats, half_pitches};
     use dermis_golden::scene::Scene;
 
     use super::*;

@@ -6,10 +6,10 @@
 //! compares (6). Coarse sweeps follow one another without a gap; a halving is set up when the previous sweep has been
 //! compared. The last sweep only moves to the best position: its constant coefficients are p(μ*).
 
-use dermis_golden::fixed::cycles::{coarse_period, SET_UP, SHORTEST_SWEEP};
-use dermis_golden::fixed::quads::Quads;
-use dermis_golden::fixed::schedule::vectors;
-use dermis_golden::fixed::Model;
+use dermis_golden::fixed::plan::cycles::{coarse_period, SET_UP, SHORTEST_SWEEP};
+use dermis_golden::fixed::words::schedule::vectors;
+use dermis_golden::fixed::{CasePlan, Model};
+use dermis_golden::symmetry::quads::Quads;
 use rust_hdl::prelude::*;
 
 use crate::ports::{has_ports, ports};
@@ -113,7 +113,7 @@ ports! {
 impl SearchPorts {
     /// With the widths of `model`.
     pub(super) fn new(model: &Model) -> Self {
-        let formats = &model.formats;
+        let formats = model.formats();
         SearchPorts {
             clk: Default::default(),
             rst: Default::default(),
@@ -144,9 +144,9 @@ has_ports!(Search: SearchPorts);
 impl Search {
     /// With the widths of `model`.
     pub fn new(model: &Model) -> Self {
-        let formats = &model.formats;
+        let formats = model.formats();
         let quads = formats.quads;
-        let layouts: Vec<Quads> = model.cases().iter().map(Model::layout).collect();
+        let layouts: Vec<Quads> = model.cases().iter().map(CasePlan::layout).collect();
         let limits: Vec<usize> = layouts.iter().map(Quads::len).collect();
         let periods: Vec<usize> = limits.iter().map(|&quads| coarse_period(quads as u64) as usize - 1).collect();
         let taxel_counts: Vec<usize> = layouts.iter().map(|layout| layout.rows * layout.cols).collect();

@@ -1,6 +1,6 @@
 //! Stage `send`: requests the forces row-major, then each subarray's status beats, while the output queue has room.
 
-use dermis_golden::fixed::send::STATUS_BEATS;
+use dermis_golden::fixed::stages::send::STATUS_BEATS;
 use dermis_golden::fixed::Model;
 use rust_hdl::prelude::*;
 

@@ -1,6 +1,6 @@
 //! Stage `unfold`: words of v_ij back to taxels, coefficient by coefficient into the search memory.
 
-use dermis_golden::fixed::schedule::{is_transposed, schedule, vectors};
+use dermis_golden::fixed::words::schedule::{is_transposed, schedule, vectors};
 use dermis_golden::fixed::Model;
 use rust_hdl::prelude::*;
 
@@ -47,7 +47,7 @@ pub struct Unfold {
 impl Unfold {
     /// With the widths of `model`.
     pub fn new(model: &Model) -> Self {
-        let formats = &model.formats;
+        let formats = model.formats();
         let across = schedule(formats).iter().enumerate().filter(|(_, p)| is_transposed(p)).map(|(k, _)| k).collect();
         let quads: Vec<usize> = model.cases().iter().map(|case| case.formats.quads).collect();
         let bits = formats.vector_bits as usize;

@@ -1,6 +1,8 @@
 //! Classifies a fault by what a receiver of the output stream can notice.
 
-use dermis_golden::fixed::send::{Status, FLAG_COEFFICIENTS, FLAG_CONDITION, FLAG_FOUND, FLAG_FRAMING, STATUS_BEATS};
+use dermis_golden::fixed::stages::send::{
+    Status, FLAG_COEFFICIENTS, FLAG_CONDITION, FLAG_FOUND, FLAG_FRAMING, STATUS_BEATS,
+};
 
 use crate::drive::{Beat, Recording};
 use crate::stress::Sample;

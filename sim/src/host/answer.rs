@@ -5,8 +5,10 @@ use std::time::SystemTime;
 
 use anyhow::Result;
 use dermis_golden::checks::Checks;
-use dermis_golden::fixed::formats::MU_STEPS;
-use dermis_golden::fixed::send::{Status, FLAG_CONDITION, FLAG_FOUND, FLAG_FRAMING, FLAG_NO_CONTACT, STATUS_BEATS};
+use dermis_golden::fixed::stages::send::{
+    Status, FLAG_CONDITION, FLAG_FOUND, FLAG_FRAMING, FLAG_NO_CONTACT, STATUS_BEATS,
+};
+use dermis_golden::fixed::words::formats::MU_STEPS;
 use dermis_golden::fixed::Model;
 use dermis_golden::flags::{frame_flags, Flag};
 use dermis_golden::frame::{Forces, Frame};

@@ -64,7 +64,7 @@ impl<P: Read + Write> Client<P> {
             port: port(),
             has: describe(has.rows.into(), has.cols.into(), has.input_bits.into(), has.scene),
             scene: model.scene.name.clone(),
-            wants: describe(sensor.rows, sensor.cols, model.formats.code_bits, wants),
+            wants: describe(sensor.rows, sensor.cols, model.formats().code_bits, wants),
         })
     }
 
@@ -84,7 +84,7 @@ impl<P: Read + Write> Client<P> {
     /// No answer.
     pub fn frame(&mut self, model: &Model, codes: &[i32], forces: bool) -> Result<Answer, HostError> {
         let kind = if forces { Kind::FrameForForces } else { Kind::FrameForResultants };
-        let bytes = self.request(kind, codes_to_bytes(codes, model.formats.code_bits))?;
+        let bytes = self.request(kind, codes_to_bytes(codes, model.formats().code_bits))?;
         let wrong = HostError::Answer { port: self.name.clone(), what: kind.answer().name(), bytes: bytes.len() };
         Answer::of_bytes(model, &bytes, forces).ok_or(wrong)
     }

@@ -1,7 +1,7 @@
 //! The cases of a scene whose hardware chooses among several per frame, as text.
 
-use dermis_golden::fixed::choose::LATENCY;
-use dermis_golden::fixed::{Cycles, Model};
+use dermis_golden::fixed::stages::choose::LATENCY;
+use dermis_golden::fixed::{CasePlan, Cycles, Model};
 use dermis_hdl::Refused;
 
 use super::table::markdown;
@@ -12,8 +12,8 @@ pub fn cases(model: &Model, refused: &[Refused]) -> String {
     if !model.chooses() {
         return String::new();
     }
-    let row = |case: &Model| {
-        let latency = Cycles::longest(case).latency + LATENCY;
+    let row = |case: &CasePlan| {
+        let latency = Cycles::longest_of_case(model, case).latency + LATENCY;
         let cells = [case.parts.len(), case.formats.quads, case.storage.words(), case.status_beats(), latency as usize];
         [vec![case.number().to_string()], cells.map(|cell| cell.to_string()).to_vec()].concat()
     };

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use dermis_golden::fixed::cycles::lane_utilisation;
+use dermis_golden::fixed::plan::cycles::lane_utilisation;
 use dermis_golden::fixed::{Cycles, Model};
 use dermis_hdl::explain::{Explained, Saved};
 use dermis_hdl::usage::{total, Usage, STAGES};
@@ -25,7 +25,7 @@ pub fn resources(model: &Model, usage: &BTreeMap<String, Usage>) -> String {
         "* estimated\n{}: {} lanes, {:.0} % busy during the passes; {latency} cycles from last input to last output \
          beat\n",
         board.name,
-        4 * model.formats.lanes_per_parity,
+        4 * model.formats().lanes_per_parity,
         100.0 * lane_utilisation(model),
     ));
     text

@@ -49,7 +49,7 @@ pub(crate) fn shipped_samples(model: &Model, frames: &[Frame]) -> Result<Vec<Sam
 pub(crate) fn synthetic_samples(model: &Model, random: &mut fastrand::Rng) -> Vec<Sample> {
     let taxels = model.scene.sensor.taxels();
     let count = taxels << model.scene.input.average;
-    let most = (1i32 << (model.formats.code_bits - 1)) - 1;
+    let most = (1i32 << (model.formats().code_bits - 1)) - 1;
     let mut noise = |most: i32| (0..count).map(|_| random.i32(-most - 1..=most)).collect::<Vec<_>>();
     let alone = (0..count).map(|index| if index % taxels == taxels / 2 { most / 3 } else { 0 }).collect();
     let all = [vec![0; count], vec![most; count], vec![-most - 1; count], noise(most), noise(7), alone];

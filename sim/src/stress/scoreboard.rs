@@ -6,7 +6,7 @@
 
 use std::collections::VecDeque;
 
-use dermis_golden::fixed::send::{FLAG_FRAMING, STATUS_BEATS};
+use dermis_golden::fixed::stages::send::{FLAG_FRAMING, STATUS_BEATS};
 use serde::Serialize;
 
 use super::{Outcome, Sample};

@@ -2,9 +2,10 @@
 //! `contacts`, which has one per contact, on drawn frames of two to four contacts.
 
 use anyhow::{ensure, Result};
+use dermis_golden::float::Golden;
 use dermis_golden::frame::Frame;
 use dermis_golden::partition::Case;
-use dermis_golden::reconstruct::{Golden, Reconstruction};
+use dermis_golden::reconstruct::Reconstruction;
 use dermis_golden::scene::Scene;
 
 use crate::compare::{median, quantile};

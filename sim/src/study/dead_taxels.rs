@@ -2,7 +2,8 @@
 
 use anyhow::{ensure, Result};
 use dermis_golden::fixed::{Cycles, Model};
-use dermis_golden::reconstruct::{Golden, Reconstruction};
+use dermis_golden::float::Golden;
+use dermis_golden::reconstruct::Reconstruction;
 use dermis_golden::scene::Scene;
 
 use super::{one_contact, tangential};

@@ -3,9 +3,11 @@
 
 use anyhow::Result;
 use dermis_golden::fixed::Model;
+use dermis_golden::float::Golden;
 use dermis_golden::frame::Frame;
-use dermis_golden::quantise::{full_scale, quantise};
-use dermis_golden::reconstruct::{Golden, Reconstruction};
+use dermis_golden::quantise::quantise;
+use dermis_golden::reception::full_scale;
+use dermis_golden::reconstruct::Reconstruction;
 use dermis_golden::scene::Scene;
 
 use super::{one_contact, tangential};

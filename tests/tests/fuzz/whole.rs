@@ -3,8 +3,9 @@
 use std::time::{Duration, Instant};
 
 use dermis_golden::fixed::Model;
+use dermis_golden::float::Golden;
 use dermis_golden::frame::Frame;
-use dermis_golden::reconstruct::{Golden, Reconstruction};
+use dermis_golden::reconstruct::Reconstruction;
 use dermis_golden::scene::Scene;
 use fastrand::Rng;
 

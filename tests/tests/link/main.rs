@@ -4,7 +4,7 @@
 
 use std::ops::Deref;
 
-use dermis_golden::fixed::send::FLAG_FRAMING;
+use dermis_golden::fixed::stages::send::FLAG_FRAMING;
 use dermis_golden::fixed::{Cycles, Model};
 use dermis_golden::frame::Frame;
 use dermis_golden::link::{
@@ -56,7 +56,7 @@ struct Questions {
 
 impl Questions {
     fn frame(&self, index: usize, kind: Kind, sequence: u8) -> Packet {
-        Packet { kind, sequence, payload: codes_to_bytes(&self.codes[index], self.model.formats.input_bits) }
+        Packet { kind, sequence, payload: codes_to_bytes(&self.codes[index], self.model.formats().input_bits) }
     }
 
     /// The model's answer to a frame.
@@ -267,7 +267,7 @@ fn small(text: &str) -> Questions {
     let lengths = "pitch_x_mm = 3.0\npitch_y_mm = 4.0\nthickness_mm = 3.0\n";
     let text = format!("[search]\nmu_max = 0.05\n[sensor]\n{lengths}{text}");
     let model = Model::new(&Scene::parse(&text, "small").unwrap()).unwrap();
-    let (taxels, bits) = (model.scene.sensor.taxels(), model.formats.input_bits);
+    let (taxels, bits) = (model.scene.sensor.taxels(), model.formats().input_bits);
     let largest = (1i32 << (bits - 1)) - 1;
     let codes = vec![
         vec![largest; taxels],

@@ -26,11 +26,11 @@
 //!
 //! Each proof has seeded defects with which it must fail.
 
-use dermis_golden::fixed::quads::Quads;
-use dermis_golden::fixed::resources::count_bits;
-use dermis_golden::fixed::send::STATUS_BEATS;
+use dermis_golden::fixed::plan::resources::count_bits;
+use dermis_golden::fixed::stages::send::STATUS_BEATS;
 use dermis_golden::fixed::Model;
 use dermis_golden::scene::Scene;
+use dermis_golden::symmetry::quads::Quads;
 use dermis_hdl::language::Change;
 use dermis_hdl::primitives::FORCE_STEPS;
 
@@ -134,8 +134,8 @@ fn receive_holds_whole_frames() {
 fn send_gives_whole_frames() {
     let model = prepared();
     let given = vec![
-        ("VALUES", number(4 * model.formats.search_bits[0] as usize)),
-        ("ADDRESS", number(count_bits(model.formats.quads))),
+        ("VALUES", number(4 * model.formats().search_bits[0] as usize)),
+        ("ADDRESS", number(count_bits(model.formats().quads))),
         ("LAST", number(ROWS * COLS + STATUS_BEATS - 1)),
         ("STEPS", number(FORCE_STEPS)),
         ("WIDTH", number(FORCE_STEPS + 10)),

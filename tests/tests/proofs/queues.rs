@@ -1,8 +1,8 @@
 //! Proofs for the blocks between the streams: rounding of the rescaler, queues, and the link's output.
 
-use dermis_golden::fixed::formats::SEARCH_EXTRA_BITS;
-use dermis_golden::fixed::resources::{count_bits, operand_vectors};
-use dermis_golden::fixed::send::STATUS_BEATS;
+use dermis_golden::fixed::plan::resources::{count_bits, operand_vectors};
+use dermis_golden::fixed::stages::send::STATUS_BEATS;
+use dermis_golden::fixed::words::formats::SEARCH_EXTRA_BITS;
 use dermis_golden::fixed::Model;
 use dermis_golden::link::{payloads, Counters, Identity, ANSWER};
 use dermis_hdl::language::Change;
@@ -14,7 +14,7 @@ use super::{model, COLS, ROWS};
 /// A model, and the widths of its rescaler's words.
 fn widths() -> (Model, Vec<(&'static str, String)>) {
     let model = model("");
-    let f = &model.formats;
+    let f = model.formats();
     let given = vec![
         ("SHIFTS", number(count_bits(f.acc_bits as usize))),
         ("ACC", number(f.acc_bits as usize)),
@@ -30,7 +30,7 @@ fn widths() -> (Model, Vec<(&'static str, String)>) {
 #[test]
 fn rescaled_words_are_rounded_and_held_to_their_range() {
     let (model, given) = widths();
-    let word = model.formats.vector_bits as usize;
+    let word = model.formats().vector_bits as usize;
     let never = |lane: &str, signal: &'static str| {
         Change::within("rescale__rescaler", &format!("lane_0__{lane}"), move |k| [k.named(signal), k.constant(1, 0)])
     };
@@ -79,7 +79,7 @@ fn forces_that_wait_leave_in_order() {
 #[test]
 fn operand_vectors_stay_inside_their_memory() {
     let model = model("");
-    let (vectors, quads) = (operand_vectors(model.formats.degree), model.formats.quads);
+    let (vectors, quads) = (operand_vectors(model.formats().degree), model.formats().quads);
     let finished = count_bits(vectors + 1);
     let given = vec![
         ("ADDRESS", number(count_bits(vectors * quads))),

@@ -18,6 +18,7 @@
 //! | out: the same at the new μ | – | – |
 
 use super::{Fit, Found};
+use crate::evidence::estimator::Adviser;
 use crate::learned::{Gaussian, Learned, OneContact};
 use faer::linalg::solvers::{DenseSolveCore, Solve};
 use faer::{Col, Mat, Side};
@@ -27,14 +28,6 @@ const ROUNDS: usize = 2;
 
 /// Share of the evidence's precision that is counted.
 const OWN: f64 = 0.5;
-
-/// A network, and whether the evidence has a say.
-pub(in crate::evidence) struct Adviser {
-    /// The network.
-    pub network: Learned,
-    /// Whether its μ is combined with the evidence's.
-    pub combined: bool,
-}
 
 impl Fit<'_> {
     /// The contacts `found` at the μ that `adviser` gives them; `None` if the model is not representable.

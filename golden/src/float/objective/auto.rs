@@ -17,24 +17,15 @@
 //!
 //! σ is the noise after averaging. If the scene states too small a σ, a noisy frame is taken for one of another shape.
 
-use super::{Estimate, Objective, Patch, SearchInput, Sparse, Symmetric};
+use super::estimate::{Estimate, Objective, SearchInput};
+use super::fit::misfit_limit;
+use super::patch::Patch;
+use super::sparse::Sparse;
+use super::symmetric::Symmetric;
 use crate::flags::SPARSE_NOISE_LIMIT;
 use crate::float::search::SearchResult;
 use crate::scene::Medium;
 use crate::sensor::Sensor;
-
-/// Error of the quadratures of the fit and of simulated frames, relative to the peak.
-const OWN_ERROR: f64 = 1.5e-4;
-/// Standard deviations of χ² up to which a misfit counts as noise.
-const DEVIATIONS: f64 = 4.0;
-
-/// Largest squared misfit in MPa² with which a fit explains b.
-pub(crate) fn misfit_limit(b: &[f64], noise_MPa: f64) -> f64 {
-    let peak = b.iter().fold(0.0f64, |peak, b| b.abs().max(peak));
-    let n = b.len() as f64;
-    let variance = noise_MPa.powi(2) + (OWN_ERROR * peak).powi(2);
-    n * variance * (1.0 + DEVIATIONS * (2.0 / n).sqrt())
-}
 
 /// The objective `auto`.
 #[derive(Clone, Debug)]

@@ -2,7 +2,7 @@
 //!
 //! Π = −Σ min(p, 0)²/(Σp)², at most 0. It is flat around its maximum, so it hardly depends on the shear: a baseline.
 
-use super::Objective;
+use super::estimate::Objective;
 
 /// The objective `compressive`.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

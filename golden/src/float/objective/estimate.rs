@@ -1,4 +1,4 @@
-//! Estimate: input and result of an objective's search for μ in one subarray.
+//! Objective: what every objective does, with the input and result of its search for μ in one subarray.
 //!
 //! | | shape | unit |
 //! |---|---|---|
@@ -6,12 +6,25 @@
 //! | out: μ, its objective, evaluations | 2, scalar, count | –, of the objective, – |
 //! | out: load | scalar | N, where the objective knows it more accurately than Σp |
 
-use super::misfit_limit;
+use super::fit::misfit_limit;
 use crate::float::pass::Polynomial;
-use crate::float::search::{SearchResult, RADIUS};
+use crate::float::search::{search, SearchResult, RADIUS};
 use crate::sensor::Sensor;
 
-/// One subarray in one frame: the input of [`Objective::find`](super::Objective::find).
+/// A score for candidates; the search takes the largest.
+pub trait Objective {
+    /// Score of the normal forces `p` in N; `None` unless Σp is above zero and finite.
+    fn score(&self, p: &[f64]) -> Option<f64>;
+
+    /// The best μ of a subarray, `None` if no candidate has a score. By default the shared search over the scores; an
+    /// objective may have its own method.
+    fn find(&self, input: &SearchInput) -> Option<Estimate> {
+        let found = search(input.family, input.mu_max, &|p| self.score(p))?;
+        Some(Estimate { found, load_N: None })
+    }
+}
+
+/// One subarray in one frame: the input of [`Objective::find`].
 #[derive(Clone, Copy, Debug)]
 pub struct SearchInput<'a> {
     /// The subarray as a sensor; positions are relative to its own centre.

@@ -35,6 +35,11 @@ const MAX_LAMBDA: f64 = 1e8;
 /// Relative ridge on the diagonal of the normal equations, so that indistinguishable loads stay finite.
 const RIDGE: f64 = 1e-13;
 
+/// Error of the quadratures of the fit and of simulated frames, relative to the peak.
+const OWN_ERROR: f64 = 1.5e-4;
+/// Standard deviations of χ² up to which a misfit counts as noise.
+const DEVIATIONS: f64 = 4.0;
+
 /// A stress model that is linear in its loads.
 pub(super) trait Model {
     /// Stress of unit loads: m columns of n.
@@ -86,6 +91,14 @@ impl Projection {
         slopes -= &self.columns * inside;
         slopes
     }
+}
+
+/// Largest squared misfit in MPa² with which a fit explains b.
+pub(crate) fn misfit_limit(b: &[f64], noise_MPa: f64) -> f64 {
+    let peak = b.iter().fold(0.0f64, |peak, b| b.abs().max(peak));
+    let n = b.len() as f64;
+    let variance = noise_MPa.powi(2) + (OWN_ERROR * peak).powi(2);
+    n * variance * (1.0 + DEVIATIONS * (2.0 / n).sqrt())
 }
 
 /// Squared misfit of the best loads at one θ; `None` where the columns are linearly dependent.

@@ -15,8 +15,8 @@
 //! is largest, or the ellipse there is split in two; at most twice and as long as the misfit halves.
 
 use super::disc::Disc;
+use super::ellipse::{node_position, Ellipse, COARSE_NODES, FINE_NODES, PARAMETERS};
 use super::fit::{fit, Effort, Fit, Model, QUICK, STEADY};
-use super::patch::{node_position, Ellipse, COARSE_NODES, FINE_NODES, PARAMETERS};
 use super::taxels::Taxels;
 use crate::float::segment::{Segments, WIDTH};
 use crate::sensor::Sensor;

@@ -26,11 +26,11 @@
 //! | out: load | scalar | N | above 0 |
 
 use super::disc::Disc;
-use super::fit::{fit, Fit, THOROUGH};
-use super::patch::WIDE_NODES;
+use super::ellipse::WIDE_NODES;
+use super::estimate::{Estimate, Objective, SearchInput};
+use super::fit::{fit, misfit_limit, Fit, THOROUGH};
 use super::symmetric_pressure::SymmetricPressure;
 use super::taxels::Taxels;
-use super::{misfit_limit, Estimate, Objective, SearchInput};
 use crate::float::search::search;
 use crate::scene::Medium;
 use crate::sensor::Sensor;
@@ -138,7 +138,7 @@ impl Objective for Symmetric {
     }
 
     fn find(&self, input: &SearchInput) -> Option<Estimate> {
-        let found = search(input.family, input.mu_max, self)?;
+        let found = search(input.family, input.mu_max, &|p| self.score(p))?;
         let [x, y] = self.peak(&input.family.eval(found.mu));
         let Some(fit) = self.refine(input, [x, y, found.mu[0], found.mu[1]]) else {
             return Some(Estimate { found, load_N: None });

@@ -8,8 +8,8 @@
 //! | out: stress of each coefficient of e, derivatives | 4 × n, 7 × n | MPa |
 
 use super::disc::Disc;
+use super::ellipse::{confine_ellipse, node_position};
 use super::fit::Model;
-use super::patch::{confine_ellipse, node_position};
 use super::taxels::Taxels;
 use nalgebra::{DMatrix, DVector};
 

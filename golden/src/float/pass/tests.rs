@@ -2,11 +2,11 @@
 
 use super::*;
 use crate::float::objective::{Objective, Sparse};
-use crate::folded::accumulate;
 use crate::frame::Frame;
 use crate::reference::values;
 use crate::scene::Scene;
 use crate::stability::references;
+use crate::symmetry::folded::accumulate;
 
 /// Against numpy: both round a solve of condition 20; the stress has 9 digits and is the same.
 const REFERENCE: f64 = 1e-9;

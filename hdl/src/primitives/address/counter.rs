@@ -1,6 +1,6 @@
 //! A counter from 0 to `limit − 1` that wraps.
 
-pub use dermis_golden::fixed::resources::count_bits;
+pub use dermis_golden::fixed::plan::resources::count_bits;
 use rust_hdl::prelude::*;
 
 use crate::kernel_block;

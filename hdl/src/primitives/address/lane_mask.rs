@@ -1,6 +1,6 @@
 //! Lane mask of a quad: which lanes hold distinct taxels.
 
-use dermis_golden::fixed::quads::Quads;
+use dermis_golden::symmetry::quads::Quads;
 use rust_hdl::prelude::*;
 
 use crate::kernel_block;

@@ -1,8 +1,8 @@
 //! Quad address and lane of a taxel.
 
-use dermis_golden::fixed::quads::Quads;
-use dermis_golden::fixed::Model;
+use dermis_golden::fixed::CasePlan;
 use dermis_golden::partition::Grid;
+use dermis_golden::symmetry::quads::Quads;
 use rust_hdl::prelude::*;
 
 use crate::kernel_block;
@@ -42,7 +42,7 @@ kernel_block!(QuadAddress, inputs [which, row, col, part_row, part_col], outputs
 
 impl QuadAddress {
     /// For the layout and the grid of each of `cases`.
-    pub fn new(cases: &[Model]) -> Self {
+    pub fn new(cases: &[CasePlan]) -> Self {
         let places: Vec<(Quads, Grid)> = cases.iter().map(|case| (case.layout(), case.grid())).collect();
         QuadAddress::of(&places, frame_quads(cases))
     }
@@ -69,7 +69,7 @@ impl QuadAddress {
 }
 
 /// Quads of a frame over all subarrays, in the case that has most.
-pub fn frame_quads(cases: &[Model]) -> usize {
+pub fn frame_quads(cases: &[CasePlan]) -> usize {
     largest(&cases.iter().map(|case| case.parts.len() * case.formats.quads).collect::<Vec<_>>())
 }
 

@@ -1,6 +1,6 @@
 //! Counter over the taxels of the array, row by row, with quad address and lane of each.
 
-use dermis_golden::fixed::Model;
+use dermis_golden::fixed::CasePlan;
 use rust_hdl::prelude::*;
 
 use crate::primitives::address::counter::count_bits;
@@ -40,8 +40,8 @@ pub struct Scan {
 
 impl Scan {
     /// For the subarrays of each of `cases`.
-    pub fn new(cases: &[Model]) -> Self {
-        let each = |of: &dyn Fn(&Model) -> usize| CaseCounter::new(&cases.iter().map(of).collect::<Vec<_>>());
+    pub fn new(cases: &[CasePlan]) -> Self {
+        let each = |of: &dyn Fn(&CasePlan) -> usize| CaseCounter::new(&cases.iter().map(of).collect::<Vec<_>>());
         let quad_address = QuadAddress::new(cases);
         Scan {
             clk: Default::default(),

@@ -1,9 +1,9 @@
 //! The MAC lanes with their coefficient memory and shift-out chains.
 
-use dermis_golden::fixed::check::{signature, POLYNOMIAL, START};
-use dermis_golden::fixed::formats::{Formats, MULTIPLIER_BITS};
-use dermis_golden::fixed::resources::Holds;
-use dermis_golden::fixed::Model;
+use dermis_golden::fixed::plan::check::{signature, POLYNOMIAL, START};
+use dermis_golden::fixed::plan::resources::Holds;
+use dermis_golden::fixed::words::formats::{Formats, MULTIPLIER_BITS};
+use dermis_golden::fixed::{CasePlan, Model};
 use rust_hdl::prelude::*;
 
 use crate::kernel_block;
@@ -81,8 +81,8 @@ struct Shape {
 impl Lanes {
     /// The lanes of `model`, with the coefficients of all its cases in one memory.
     pub fn new(model: &Model) -> Self {
-        let (formats, cases) = (&model.formats, model.cases());
-        let words = |case: &Model| case.storage.memory(&case.formats, &case.quantised);
+        let (formats, cases) = (model.formats(), model.cases());
+        let words = |case: &CasePlan| case.storage.memory(&case.formats, &case.quantised);
         Lanes::of(&Shape {
             per_parity: formats.lanes_per_parity,
             acc_bits: formats.acc_bits as usize,
@@ -292,7 +292,7 @@ impl Shape {
 
 #[cfg(test)]
 mod tests {
-    use dermis_golden::fixed::check::{parity, step};
+    use dermis_golden::fixed::plan::check::{parity, step};
 
     use super::*;
     use crate::language::testbench::{check, Reference};

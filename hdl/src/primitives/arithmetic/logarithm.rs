@@ -6,8 +6,8 @@
 //! first function computes which nibbles are non-zero before it moves any, so that a decision does not wait for the
 //! previous move.
 
-use dermis_golden::fixed::formats::{LOG_FRACTION, LOG_TABLE_BITS};
-use dermis_golden::fixed::search::log_table;
+use dermis_golden::fixed::stages::search::log_table;
+use dermis_golden::fixed::words::formats::{LOG_FRACTION, LOG_TABLE_BITS};
 
 use crate::language::{concat, Builder, Expr};
 
@@ -69,7 +69,7 @@ pub fn logarithm<'k>(k: &'k Builder, name: &str, located: Expr<'k>) -> Expr<'k> 
 
 #[cfg(test)]
 mod tests {
-    use dermis_golden::fixed::search::log2;
+    use dermis_golden::fixed::stages::search::log2;
 
     use super::*;
     use crate::language::testbench::{check, Pipeline};

@@ -1,6 +1,6 @@
 //! Accumulators to words: shift, round, saturate, count saturations.
 
-use dermis_golden::fixed::formats::{Formats, SEARCH_EXTRA_BITS};
+use dermis_golden::fixed::words::formats::{Formats, SEARCH_EXTRA_BITS};
 use rust_hdl::prelude::*;
 
 use crate::kernel_block;
@@ -133,7 +133,7 @@ impl Shape {
 
 #[cfg(test)]
 mod tests {
-    use dermis_golden::fixed::arith::{round_shift, saturate};
+    use dermis_golden::fixed::words::arith::{round_shift, saturate};
 
     use super::*;
     use crate::language::testbench::{check, random_word, Reference};

@@ -1,6 +1,6 @@
 //! Parities of a v_ij back to taxels, scaled to the units of the search.
 
-use dermis_golden::fixed::schedule::EXPONENTS;
+use dermis_golden::fixed::words::schedule::EXPONENTS;
 use rust_hdl::prelude::*;
 
 use crate::kernel_block;
@@ -70,7 +70,7 @@ fn kernel(bits: usize, vectors: usize) -> Kernel {
 
 #[cfg(test)]
 mod tests {
-    use dermis_golden::fixed::arith::{hadamard, round_shift};
+    use dermis_golden::fixed::words::arith::{hadamard, round_shift};
 
     use super::*;
     use crate::language::testbench::{check, random_word, Pipeline};

@@ -1,6 +1,6 @@
 //! Sums of 2^k frames, taxel by taxel.
 
-use dermis_golden::fixed::resources::Holds;
+use dermis_golden::fixed::plan::resources::Holds;
 use rust_hdl::prelude::*;
 
 use crate::kernel_block;

@@ -1,7 +1,7 @@
 //! Codes to stress: subtracts the zero and multiplies by the gain of each taxel, from a table in a memory file.
 
-use dermis_golden::fixed::prepare::{Prepare, GAIN_BITS, GAIN_FRACTION};
-use dermis_golden::fixed::resources::Holds;
+use dermis_golden::fixed::plan::resources::Holds;
+use dermis_golden::fixed::stages::prepare::{Prepare, GAIN_BITS, GAIN_FRACTION};
 use rust_hdl::prelude::*;
 
 use crate::kernel_block;
@@ -138,7 +138,7 @@ fn kernel(zero: &[i32], gain: Option<&[i32]>, taxels: usize, bits: usize) -> Ker
 mod tests {
     use std::collections::VecDeque;
 
-    use dermis_golden::fixed::arith::{round_shift, saturate};
+    use dermis_golden::fixed::words::arith::{round_shift, saturate};
 
     use super::*;
     use crate::language::testbench::{check, random_word, Reference};

@@ -83,7 +83,7 @@ fn kernel(bits: usize, floor: i64, parts: usize) -> Kernel {
 
 #[cfg(test)]
 mod tests {
-    use dermis_golden::fixed::arith::magnitude_bits;
+    use dermis_golden::fixed::words::arith::magnitude_bits;
 
     use super::*;
     use crate::language::testbench::{check, random_words, Reference};

@@ -1,6 +1,6 @@
 //! Simple dual-port memory: one write port with an enable per field, one read port with one or two registers.
 
-use dermis_golden::fixed::resources::Holds;
+use dermis_golden::fixed::plan::resources::Holds;
 use rust_hdl::prelude::*;
 
 use crate::kernel_block;

@@ -1,9 +1,9 @@
 //! Force arithmetic: p(μ*) to force words, and the output beats with their status.
 
-use dermis_golden::fixed::cycles::ACCEPT;
-use dermis_golden::fixed::formats::{force_shift, FORCE_BITS, FORCE_SHIFT_MAX, MULTIPLIER_BITS, MU_ROUND};
-use dermis_golden::fixed::send::CASE_SHIFT;
-use dermis_golden::fixed::Model;
+use dermis_golden::fixed::plan::cycles::ACCEPT;
+use dermis_golden::fixed::stages::send::CASE_SHIFT;
+use dermis_golden::fixed::words::formats::{force_shift, FORCE_BITS, FORCE_SHIFT_MAX, MULTIPLIER_BITS, MU_ROUND};
+use dermis_golden::fixed::{CasePlan, Model};
 use rust_hdl::prelude::*;
 
 use crate::kernel_block;
@@ -141,9 +141,9 @@ struct Shape {
 impl ForceUnit {
     /// With the widths, subarrays and case numbers of `model`.
     pub fn new(model: &Model) -> Self {
-        let f = &model.formats;
+        let f = model.formats();
         // The status names the case only where it is chosen per frame.
-        let number = |case: &Model| if model.chooses() { case.number() as usize } else { 0 };
+        let number = |case: &CasePlan| if model.chooses() { case.number() as usize } else { 0 };
         let shape = Shape {
             value_bits: f.search_bits[0] as usize,
             normalise_bits: count_bits(f.input_bits as usize),

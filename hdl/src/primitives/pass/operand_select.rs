@@ -1,6 +1,6 @@
 //! Operands of the MAC lanes: a limb of the input or a v_ij, its parities permuted as the matrix needs them.
 
-use dermis_golden::fixed::formats::{Formats, MULTIPLIER_BITS};
+use dermis_golden::fixed::words::formats::{Formats, MULTIPLIER_BITS};
 use rust_hdl::prelude::*;
 
 use crate::kernel_block;

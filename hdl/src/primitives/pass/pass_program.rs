@@ -1,8 +1,8 @@
 //! Schedule of the matrix passes as a table of instructions.
 
-use dermis_golden::fixed::resources::{operand_vectors, Holds};
-use dermis_golden::fixed::schedule::{schedule, Operand};
-use dermis_golden::fixed::Model;
+use dermis_golden::fixed::plan::resources::{operand_vectors, Holds};
+use dermis_golden::fixed::words::schedule::{schedule, Operand};
+use dermis_golden::fixed::{CasePlan, Model};
 use rust_hdl::prelude::*;
 
 use crate::kernel_block;
@@ -39,9 +39,9 @@ pub struct Step {
     pub needs: usize,
 }
 
-/// The steps of one case's `model`: for each v_ij, for each group of rows, its products.
-pub fn unroll(model: &Model) -> Vec<Step> {
-    let (formats, storage) = (&model.formats, &model.storage);
+/// The steps of one case: for each v_ij, for each group of rows, its products.
+pub fn unroll(case: &CasePlan) -> Vec<Step> {
+    let CasePlan { formats, storage, .. } = case;
     let mut steps = Vec::new();
     for products in schedule(formats) {
         for group in 0..formats.groups {
@@ -150,9 +150,9 @@ struct Shape {
 impl PassProgram {
     /// The schedule of `model`.
     pub fn new(model: &Model) -> Self {
-        let (formats, cases) = (&model.formats, model.cases());
-        let pair = |case: &Model, j| [j, if formats.shared_a { case.layout().transposed(j) } else { j }];
-        let pairs = |case: &Model| case.storage.column_list().iter().map(|&j| pair(case, j)).collect::<Vec<_>>();
+        let (formats, cases) = (model.formats(), model.cases());
+        let pair = |case: &CasePlan, j| [j, if formats.shared_a { case.layout().transposed(j) } else { j }];
+        let pairs = |case: &CasePlan| case.storage.column_list().iter().map(|&j| pair(case, j)).collect::<Vec<_>>();
         PassProgram::of(&Shape {
             steps: cases.iter().map(unroll).collect(),
             list: cases.iter().filter(|case| case.storage.listed).flat_map(pairs).collect(),

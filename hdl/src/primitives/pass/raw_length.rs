@@ -1,6 +1,6 @@
 //! Block exponent of v_00: the right shift that brings its largest accumulator to a full word.
 
-use dermis_golden::fixed::formats::Formats;
+use dermis_golden::fixed::words::formats::Formats;
 use rust_hdl::prelude::*;
 
 use crate::kernel_block;
@@ -68,7 +68,7 @@ fn kernel(acc: usize, word: usize) -> Kernel {
 
 #[cfg(test)]
 mod tests {
-    use dermis_golden::fixed::arith::{bit_length, magnitude_bits};
+    use dermis_golden::fixed::words::arith::{bit_length, magnitude_bits};
 
     use super::*;
     use crate::language::testbench::{check, Reference};

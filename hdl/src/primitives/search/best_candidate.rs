@@ -1,6 +1,6 @@
 //! After a sweep: compares its nine candidates with each other and with the best so far.
 
-use dermis_golden::fixed::formats::Formats;
+use dermis_golden::fixed::words::formats::Formats;
 use rust_hdl::prelude::*;
 
 use crate::kernel_block;

@@ -1,6 +1,6 @@
 //! Values of p at the nine candidates of the 3×3 grid about the centre.
 
-use dermis_golden::fixed::schedule::EXPONENTS;
+use dermis_golden::fixed::words::schedule::EXPONENTS;
 use rust_hdl::prelude::*;
 
 use crate::kernel_block;
@@ -87,7 +87,7 @@ fn nine<'k>(k: &'k Builder, layout: &PolynomialWord, word: Expr<'k>, lane: usize
 
 #[cfg(test)]
 mod tests {
-    use dermis_golden::fixed::search::candidates;
+    use dermis_golden::fixed::stages::search::candidates;
 
     use super::*;
     use crate::language::testbench::{check, random_words, Pipeline};

@@ -1,6 +1,6 @@
 //! Layout of polynomials in a word: coefficient by coefficient, each for all lanes.
 
-use dermis_golden::fixed::search::Polynomial;
+use dermis_golden::fixed::stages::search::Polynomial;
 
 use crate::language::{concat, Expr};
 use crate::wire::Word;

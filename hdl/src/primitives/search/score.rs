@@ -1,6 +1,6 @@
 //! Sparse objective over one sweep: Σ log2(|p| + ⌊Σp / 2^20⌋) for nine candidates in parallel.
 
-use dermis_golden::fixed::formats::{Formats, EPSILON_SHIFT};
+use dermis_golden::fixed::words::formats::{Formats, EPSILON_SHIFT};
 use rust_hdl::prelude::*;
 
 use crate::kernel_block;
@@ -112,7 +112,7 @@ fn kernel(v: usize, s: usize, t: usize) -> Kernel {
 
 #[cfg(test)]
 mod tests {
-    use dermis_golden::fixed::search::log2;
+    use dermis_golden::fixed::stages::search::log2;
 
     use super::*;
     use crate::language::testbench::{check, random_word, Reference};

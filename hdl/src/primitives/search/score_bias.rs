@@ -1,6 +1,6 @@
 //! Bias of each candidate's score, n·log2 Σp, and whether the candidate is eligible.
 
-use dermis_golden::fixed::formats::Formats;
+use dermis_golden::fixed::words::formats::Formats;
 use rust_hdl::prelude::*;
 
 use crate::kernel_block;
@@ -175,7 +175,7 @@ fn kernel(s: usize, taxels: &[usize]) -> Kernel {
 
 #[cfg(test)]
 mod tests {
-    use dermis_golden::fixed::search::log2;
+    use dermis_golden::fixed::stages::search::log2;
 
     use super::*;
     use crate::language::testbench::{check, Reference};

@@ -1,7 +1,7 @@
 //! Search sequencer: the order of sweeps, centres and buffers.
 
-use dermis_golden::fixed::formats::HALVINGS;
-use dermis_golden::fixed::search::COARSE_CENTRES;
+use dermis_golden::fixed::stages::search::COARSE_CENTRES;
+use dermis_golden::fixed::words::formats::HALVINGS;
 use rust_hdl::prelude::*;
 
 use crate::kernel_block;

@@ -1,6 +1,6 @@
 //! Search memory: every taxel's polynomial, about up to three centres.
 
-use dermis_golden::fixed::resources::Holds;
+use dermis_golden::fixed::plan::resources::Holds;
 use rust_hdl::prelude::*;
 
 use crate::kernel_block;

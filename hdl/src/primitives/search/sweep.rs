@@ -1,7 +1,7 @@
 //! Description of a sweep of the search: the word that travels beside its totals to their comparison.
 
-pub use dermis_golden::fixed::resources::position_bits;
-use dermis_golden::fixed::resources::SEARCH_BUFFERS;
+pub use dermis_golden::fixed::plan::resources::position_bits;
+use dermis_golden::fixed::plan::resources::SEARCH_BUFFERS;
 
 use crate::language::Expr;
 #[cfg(test)]

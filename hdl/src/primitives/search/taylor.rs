@@ -1,6 +1,6 @@
 //! Taylor shift: moves the polynomials' centre by a grid step and halves the step, with additions and shifts only.
 
-use dermis_golden::fixed::schedule::EXPONENTS;
+use dermis_golden::fixed::words::schedule::EXPONENTS;
 use rust_hdl::prelude::*;
 
 use crate::kernel_block;
@@ -136,7 +136,7 @@ fn binomial(n: u32, k: u32) -> u32 {
 
 #[cfg(test)]
 mod tests {
-    use dermis_golden::fixed::search::{halve, taylor_shift};
+    use dermis_golden::fixed::stages::search::{halve, taylor_shift};
 
     use super::*;
     use crate::language::testbench::{check, random_word, Pipeline};

@@ -1,6 +1,6 @@
 //! The beats of a frame against plain integers.
 
-use dermis_golden::fixed::send::{FLAG_CONDITION, FLAG_FOUND, FLAG_FRAMING, FLAG_NO_CONTACT};
+use dermis_golden::fixed::stages::send::{FLAG_CONDITION, FLAG_FOUND, FLAG_FRAMING, FLAG_NO_CONTACT};
 
 use super::*;
 use crate::language::testbench::{check, Reference};

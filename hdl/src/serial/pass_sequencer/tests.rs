@@ -2,10 +2,10 @@
 
 use std::collections::BTreeMap;
 
-use dermis_golden::fixed::arith::{bit_length, magnitude_bits, round_shift, saturate};
-use dermis_golden::fixed::coefficients::FLIP_X;
+use dermis_golden::fixed::words::arith::{bit_length, magnitude_bits, round_shift, saturate};
 use dermis_golden::fixed::Model;
 use dermis_golden::scene::Scene;
+use dermis_golden::symmetry::parity::FLIP_X;
 
 use super::*;
 use crate::language::testbench::{check, random_word, Reference};
@@ -275,7 +275,7 @@ fn check_with(more: &str) {
         "name = \"solve\"\n[sensor]\nrows = 4\ncols = 4\npitch_x_mm = 4.0\npitch_y_mm = 3.0\nthickness_mm = 3.0\n\
          [hardware]\nboard = \"icebreaker\"\n{more}"
     );
-    let formats = Model::new(&Scene::parse(&text, "solve.toml").unwrap()).unwrap().formats;
+    let formats = Model::new(&Scene::parse(&text, "solve.toml").unwrap()).unwrap().formats().clone();
     let (acc, code) = (formats.acc_bits as usize, formats.input_bits as usize);
     let rounded = formats.input_bits.max(formats.vector_bits) as usize;
     let block = PassSequencer::new(&formats, acc.max(2 * code), rounded);

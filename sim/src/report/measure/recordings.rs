@@ -7,10 +7,11 @@ use std::time::Instant;
 
 use anyhow::Result;
 use dermis_golden::fixed::{FixedError, Model};
+use dermis_golden::float::Golden;
 use dermis_golden::frame::Frame;
 use dermis_golden::import::Imported;
-use dermis_golden::quantise::full_scale;
-use dermis_golden::reconstruct::{Golden, Reconstruction};
+use dermis_golden::reception::full_scale;
+use dermis_golden::reconstruct::Reconstruction;
 
 use super::clock;
 use crate::compare::{comparable_forces, difference, median, Difference};

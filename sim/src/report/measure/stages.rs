@@ -20,12 +20,12 @@
 //!
 //! Stage `force` thus shows the error of the arithmetic alone, stage `send` the error of arithmetic and search.
 
-use dermis_golden::fixed::arith::{bit_length, hadamard};
-use dermis_golden::fixed::formats::{Formats, MU_STEPS, SEARCH_EXTRA_BITS};
-use dermis_golden::fixed::schedule::{is_transposed, schedule, EXPONENTS};
-use dermis_golden::fixed::send::{Status, STATUS_BEATS};
+use dermis_golden::fixed::stages::send::{Status, STATUS_BEATS};
+use dermis_golden::fixed::words::arith::{bit_length, hadamard};
+use dermis_golden::fixed::words::formats::{Formats, MU_STEPS, SEARCH_EXTRA_BITS};
+use dermis_golden::fixed::words::schedule::{is_transposed, schedule, EXPONENTS};
 use dermis_golden::float::pass::Polynomial;
-use dermis_golden::quantise::full_scale;
+use dermis_golden::reception::full_scale;
 
 use super::{BitTrue, Measured};
 
@@ -83,7 +83,7 @@ impl ComparedWords {
 pub fn stages(measured: &Measured, index: usize) -> Vec<StageRow> {
     let Ok(bit_true) = &measured.bit_true else { return Vec::new() };
     let reference = FloatReference::new(measured, bit_true, index);
-    let f = &bit_true.model.formats;
+    let f = &bit_true.model.formats();
     let sum = |pick: fn(&Status) -> u32| reference.status.iter().map(pick).sum::<u32>();
     let bits = [
         ("receive", f.code_bits, 0),
@@ -142,19 +142,19 @@ impl<'a> FloatReference<'a> {
         let (model, frame) = (&bit_true.model, &measured.frames[index]);
         let beats = &bit_true.traces[index].status;
         let stress = |part: &dermis_golden::partition::Subarray| part.gather(&model.scene.sensor, &frame.stress_MPa);
-        let family = |b: Vec<f64>| Polynomial::of_degree(measured.engine.matrices(), &b, model.formats.degree);
+        let family = |b: Vec<f64>| Polynomial::of_degree(measured.engine.matrices(), &b, model.formats().degree);
         FloatReference {
             measured,
             bit_true,
             index,
             status: beats.chunks(STATUS_BEATS).filter_map(Status::of_beats).collect(),
             code_MPa: full_scale(&model.scene, frame) / model.prepare.largest(),
-            families: model.parts.iter().map(|part| family(stress(part))).collect(),
+            families: model.parts().iter().map(|part| family(stress(part))).collect(),
         }
     }
 
     fn formats(&self) -> &Formats {
-        &self.bit_true.model.formats
+        self.bit_true.model.formats()
     }
 
     /// The words of a stage, of all subarrays in order; four fields per quad.
@@ -216,7 +216,7 @@ impl<'a> FloatReference<'a> {
         let raw = code * 2f64.powi(f.raw_shift as i32 - f.inverse_exponent);
         let word = raw * 2f64.powi(status.rescale as i32);
         let stress = || {
-            let b = model.parts[part].gather(&scene.sensor, &self.measured.frames[self.index].stress_MPa);
+            let b = model.parts()[part].gather(&scene.sensor, &self.measured.frames[self.index].stress_MPa);
             layout.pack(&b).into_iter()
         };
         let family = &self.families[part];

@@ -100,7 +100,7 @@ fn point(model: &Model, own: &Model, field: &'static str, value: String, frames:
         case: own.scene.partition.case.to_string(),
         field,
         value,
-        own: model.scene == own.scene && model.formats == own.formats,
+        own: model.scene == own.scene && model.formats() == own.formats(),
         tangential: median(errors.iter().filter_map(|e| e.tangential).collect()),
         normal: median(errors.iter().filter_map(|e| e.normal).collect()),
         cycles: Cycles::longest(model).total,

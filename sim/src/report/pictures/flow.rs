@@ -10,8 +10,8 @@
 //! ```
 
 use anyhow::Result;
-use dermis_golden::fixed::formats::{FORCE_BITS, HALVINGS};
-use dermis_golden::fixed::search::COARSE_CENTRES;
+use dermis_golden::fixed::stages::search::COARSE_CENTRES;
+use dermis_golden::fixed::words::formats::{FORCE_BITS, HALVINGS};
 use dermis_golden::fixed::{Cycles, Model};
 use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, VPos};
@@ -52,7 +52,7 @@ pub fn data_flow(model: &Model) -> Result<String> {
         for (place, stage) in stages(model) {
             draw(area, place, &stage)?;
         }
-        let formats = &model.formats;
+        let formats = model.formats();
         let bits = |bits: u32| format!("{bits} bits");
         for (row, col, words) in [
             (0, 0, bits(formats.code_bits)),
@@ -83,7 +83,7 @@ pub fn data_flow(model: &Model) -> Result<String> {
 
 /// The stages in order.
 fn stages(model: &Model) -> Vec<(Place, Stage)> {
-    let (formats, sensor) = (&model.formats, &model.scene.sensor);
+    let (formats, sensor) = (model.formats(), &model.scene.sensor);
     let (taxels, quads) = (sensor.taxels(), formats.quads);
     let sweeps = format!("{} coarse sweeps,", COARSE_CENTRES.len());
     let stage = |name, colour, lines: &[String]| Stage { name, lines: lines.to_vec(), colour };
@@ -162,7 +162,7 @@ fn arrow(area: &Area, points: &[(i32, i32)], colour: &RGBColor) -> Result<()> {
 /// What the colours are, and how long it takes.
 fn legend(area: &Area, model: &Model) -> Result<()> {
     let top = corner((3, 0)).1 - 12;
-    let parts = model.parts.len();
+    let parts = model.parts().len();
     let subarrays = match parts {
         1 => "of the subarray, here the whole array (case 0)".to_owned(),
         more => format!("of one of {more} subarrays: while it is searched, the next one's products are made"),

@@ -1,8 +1,8 @@
 //! Stress and forces of a frame: truth, golden and bit-true model, side by side on the same scale.
 
 use anyhow::Result;
+use dermis_golden::float::Golden;
 use dermis_golden::frame::Forces;
-use dermis_golden::reconstruct::Golden;
 use dermis_golden::scene::EstimatorKind;
 
 use super::super::document::{Item, Picture, Section};

@@ -4,12 +4,12 @@
 use std::time::Instant;
 
 use anyhow::Result;
-use dermis_golden::fixed::schedule::vectors;
+use dermis_golden::fixed::words::schedule::vectors;
+use dermis_golden::float::Golden;
 use dermis_golden::frame::Frame;
 use dermis_golden::matrices::cache;
 use dermis_golden::paper::conclusions;
 use dermis_golden::partition::Case;
-use dermis_golden::reconstruct::Golden;
 
 use super::super::document::{count, empty_cell, percent, seconds, text_cell, Cell, Item, Picture, Section, Table};
 use super::super::measure::{Engine, Measured, Options};

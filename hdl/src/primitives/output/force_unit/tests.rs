@@ -2,19 +2,23 @@
 
 use std::collections::VecDeque;
 
-use dermis_golden::fixed::force::{force, mu_word};
-use dermis_golden::fixed::send::{FLAG_COEFFICIENTS, FLAG_CONDITION, FLAG_FOUND, FLAG_FRAMING, FLAG_NO_CONTACT};
+use dermis_golden::fixed::plan::cases;
+use dermis_golden::fixed::stages::force::{force, mu_word};
+use dermis_golden::fixed::stages::send::{
+    FLAG_COEFFICIENTS, FLAG_CONDITION, FLAG_FOUND, FLAG_FRAMING, FLAG_NO_CONTACT,
+};
+use dermis_golden::fixed::Plan;
 use dermis_golden::scene::Scene;
 
 use super::*;
 use crate::language::testbench::{check, random_word, Reference};
 use crate::wire::Word;
 
-fn model(side: usize, more: &str) -> Model {
+fn planned(side: usize, more: &str) -> Plan {
     let text = format!(
         "name = \"force\"\n[sensor]\nrows = {side}\ncols = {side}\npitch_x_mm = 4.0\npitch_y_mm = 4.0\nthickness_mm = 3.0\n{more}"
     );
-    Model::new(&Scene::parse(&text, "force.toml").unwrap()).unwrap()
+    cases::planned(&Scene::parse(&text, "force.toml").unwrap()).unwrap()
 }
 
 /// A request, and its value once it has been read.
@@ -75,13 +79,13 @@ impl Requests {
             condition,
             found,
             damaged: damaged && self.model.has_coefficient_check(),
-            score: if found { inputs[18].signed(0, self.model.formats.score_bits as usize) as i32 } else { 0 },
+            score: if found { inputs[18].signed(0, self.model.formats().score_bits as usize) as i32 } else { 0 },
             saturations: inputs[19].number() as u32,
         };
     }
 
     fn answer(&mut self, entry: Entry, inputs: &[Word]) -> [i32; 3] {
-        let f = &self.model.formats;
+        let f = self.model.formats();
         let (frame, part) = (&mut self.frame, self.parts[entry.part]);
         match entry.beat {
             0 => {
@@ -124,7 +128,7 @@ impl Reference for Requests {
     fn clock(&mut self, inputs: &[Word]) {
         let [rst, begin_frame, start, offer] = [0, 2, 3, 5].map(|k| inputs[k].number() == 1);
         if let Some(entry) = &mut self.pipe[READ_STEPS - 1] {
-            entry.value = inputs[9].signed(entry.lane, self.model.formats.search_bits[0] as usize);
+            entry.value = inputs[9].signed(entry.lane, self.model.formats().search_bits[0] as usize);
         }
         self.output = self.pipe.pop_back().unwrap().map(|entry| {
             if std::mem::take(&mut self.frame.counting) {
@@ -179,7 +183,7 @@ fn stimulus(model: &Model, block: &ForceUnit, cycles: usize) -> Vec<Vec<Word>> {
             Word::of_fields(&quad, v),
             random_word(&mut random, position_bits()),
             random_word(&mut random, position_bits()),
-            random.u64(..u64::from(model.formats.input_bits)).into(),
+            random.u64(..u64::from(model.formats().input_bits)).into(),
             random.u64(..1 << block.rescale.width()).into(),
             random.bool().into(),
             random.bool().into(),
@@ -194,8 +198,9 @@ fn stimulus(model: &Model, block: &ForceUnit, cycles: usize) -> Vec<Vec<Word>> {
 }
 
 fn is_the_model_s(side: usize, more: &str, threshold: i64) {
-    let mut model = model(side, more);
-    model.threshold = threshold;
+    let mut plan = planned(side, more);
+    plan.threshold = threshold;
+    let model = Model::from(plan);
     let block = ForceUnit::new(&model);
     check(block.kernel.kernel(), &stimulus(&model, &block, 6000), &mut Requests::new(model));
 }

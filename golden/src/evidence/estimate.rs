@@ -1,0 +1,37 @@
+//! What the evidence says of one frame.
+
+use crate::frame::Forces;
+use serde::{Deserialize, Serialize};
+
+/// One contact.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct ContactEstimate {
+    /// Centre of pressure in mm from the array's centre.
+    pub centre_mm: [f64; 2],
+    /// Ratio of shear to normal force, [x, y].
+    pub mu: [f64; 2],
+    /// Force in N, [x, y, normal].
+    pub force_N: [f64; 3],
+    /// Standard deviation of the force in N, [x, y, normal].
+    pub sigma_N: [f64; 3],
+    /// Covariance of μ, [xx, xy, yy].
+    pub mu_covariance: [f64; 3],
+}
+
+/// What one frame says.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Estimate {
+    /// The contacts; none without a reading above zero.
+    pub contacts: Vec<ContactEstimate>,
+    /// Force on each taxel in N.
+    pub forces_N: Forces,
+    /// Standard deviation of the noise in MPa, as it was given or as it was found.
+    pub noise_MPa: f64,
+    /// Probability that noise of the given size leaves as much unexplained; `None` where the noise was found from the
+    /// frame itself.
+    pub misfit_probability: Option<f64>,
+    /// Rounds until μ stood still.
+    pub rounds: usize,
+    /// Number of coefficients r of the pressures.
+    pub rank: usize,
+}

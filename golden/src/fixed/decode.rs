@@ -1,0 +1,139 @@
+//! Decode: the words of a device, or of this model, as a result in physical units.
+
+use super::error::FixedError;
+use super::model::Model;
+use super::plan::contents::CasePlan;
+use super::stages::resultants;
+use super::stages::send::{
+    Status, CASE_SHIFT, FLAG_COEFFICIENTS, FLAG_CONDITION, FLAG_FOUND, FLAG_NO_CONTACT, STATUS_BEATS,
+};
+use super::words::formats::{LOG_FRACTION, MU_STEPS};
+use crate::checks::Checks;
+use crate::errors::Errors;
+use crate::flags::{frame_flags, Flag};
+use crate::frame::{Forces, Frame};
+use crate::input::Input;
+
+use crate::reception::{noise_floor_codes, receive, Received};
+use crate::reconstruct::{assemble, CaseChoice, Reconstruction, Resultant, SubarrayResult};
+
+impl Model {
+    /// Reconstructs one frame; for scenes with `input.average = 0`.
+    ///
+    /// # Errors
+    /// As [`Model::stress`].
+    pub fn reconstruct(&self, frame: &Frame) -> Result<Reconstruction, FixedError> {
+        self.reconstruct_averaged(std::slice::from_ref(frame))
+    }
+
+    /// Reconstructs the mean of 2^average frames.
+    ///
+    /// # Errors
+    /// As [`Model::stress`].
+    pub fn reconstruct_averaged(&self, frames: &[Frame]) -> Result<Reconstruction, FixedError> {
+        let trace = self.run(&self.readings(frames)?);
+        self.decode(frames, "fixed", &trace.beats, &trace.status)
+    }
+
+    /// Converts the words that a device sent for the [`Model::readings`] of `readings`, the frames of one
+    /// reconstruction, to physical units; `engine` names the device in the result.
+    ///
+    /// # Errors
+    /// [`FixedError::Beats`] if forces or status are incomplete; errors of the frames as in [`Model::stress`].
+    pub fn decode(
+        &self,
+        readings: &[Frame],
+        engine: &str,
+        beats: &[[i32; 3]],
+        status: &[[i32; 3]],
+    ) -> Result<Reconstruction, FixedError> {
+        let case = self.case_of(status)?;
+        let input = Input::new(&self.scene)?;
+        let frame = &input.calibrate(&input.average(&self.scene, readings)?);
+        let codes = self.codes(frame)?;
+        if beats.len() != self.force_beats() {
+            return Err(FixedError::Beats { what: "forces", got: beats.len(), expected: self.force_beats() });
+        }
+        let expected = case.status_beats();
+        if status.len() != expected {
+            return Err(FixedError::Beats { what: "status", got: status.len(), expected });
+        }
+        let lsb = self.force_lsb_N(codes.full_scale_MPa);
+        let axis = |axis: usize| beats.iter().map(|beat| f64::from(beat[axis]) * lsb).collect();
+        let forces = match self.sends_resultants() {
+            false => Forces { fx: axis(0), fy: axis(1), fz: axis(2) },
+            true => Forces::default(),
+        };
+        let resultants = self.sends_resultants().then(|| self.resultants(beats, lsb));
+        let sum = |all: &Vec<Resultant>| [0, 1, 2].map(|k| all.iter().map(|r| r.force_N[k]).sum::<f64>());
+        let resultant_N = resultants.as_ref().map_or_else(|| forces.resultant(), sum);
+
+        if !resultant_N.iter().all(|sum| sum.is_finite()) {
+            return Err(FixedError::TooStrong { frame: frame.id.clone(), peak_MPa: frame.peak_MPa() });
+        }
+        let step = self.scene.search.mu_max / MU_STEPS as f64;
+        let sensor = &self.scene.sensor;
+        let mut flags = frame_flags(&self.scene, frame, &codes, input.noise_MPa());
+        let mut subarrays = Vec::with_capacity(case.parts.len());
+        for (part, beats) in case.parts.iter().zip(status.chunks(STATUS_BEATS)) {
+            let Some(status) = Status::of_beats(beats) else { continue };
+            let own = part.gather(sensor, &codes.codes);
+            let floor = noise_floor_codes(&self.scene, &codes);
+            let received = receive(sensor, part, &own, floor, self.scene.partition.condition);
+            let met = status.flags & FLAG_CONDITION != 0;
+            let found = status.flags & FLAG_FOUND != 0;
+            if met && self.searches() && !found {
+                flags.push(Flag::NoCompression);
+            }
+            if status.rescale_saturations + status.force_saturations > 0 {
+                flags.push(Flag::Saturated);
+            }
+            if status.flags & FLAG_COEFFICIENTS != 0 {
+                flags.push(Flag::CoefficientsDamaged);
+            }
+            let received = Received { condition_met: met, ..received };
+            let mu = status.position.map(|x| f64::from(x) * step);
+            let score = found.then(|| -f64::from(status.score) / f64::from(1u32 << LOG_FRACTION));
+            subarrays.push(SubarrayResult::new(part, &received, mu, score));
+        }
+        let mut result = assemble(&self.scene, frame, engine, subarrays, forces, flags);
+        if self.sends_resultants() {
+            // Without forces per taxel only the device knows whether there is a contact.
+            let none = status.iter().step_by(STATUS_BEATS).all(|beat| beat[2] as u32 & FLAG_NO_CONTACT != 0);
+            result.flags.retain(|flag| none || *flag != Flag::NoContact);
+            result.resultant_N = resultant_N;
+            result.error = frame.resultant_N.map(|truth| Errors::new(truth, resultant_N));
+            result.extra.resultants = resultants;
+        }
+        if self.chooses() {
+            let reason = "the finest whose boundaries cut nothing, by the hardware's rule".to_string();
+            result.extra.taken = Some(CaseChoice { case: case.case.to_string(), reason, refused: Vec::new() });
+        }
+        let full_scale_share = input.full_scale_share(readings);
+        let checks = Checks { full_scale_share, ..result.figures(&self.scene, frame) };
+        result.add_checks(&self.scene, checks);
+        Ok(result)
+    }
+
+    /// The case that a frame's status names; of a scene with one case, that case.
+    fn case_of(&self, status: &[[i32; 3]]) -> Result<&CasePlan, FixedError> {
+        if !self.chooses() {
+            return Ok(self.first());
+        }
+        let number = status.first().map_or(0, |beat| beat[2] as u32 >> CASE_SHIFT & 3);
+        let case = self.cases().iter().find(|case| case.number() == number);
+        case.ok_or(FixedError::Internal("the status names a case that was not built"))
+    }
+
+    /// The resultants in a device's beats; one LSB of a force word is `lsb_N`.
+    fn resultants(&self, beats: &[[i32; 3]], lsb_N: f64) -> Vec<Resultant> {
+        let sensor = &self.scene.sensor;
+        let half_pitch = [sensor.pitch_x_mm / 2.0, sensor.pitch_y_mm / 2.0];
+        let resultant = |beats: &[[i32; 3]]| {
+            let [fx, fy, fz, pressed, x, y] = resultants::of_beats(beats).unwrap_or_default().map(|sum| sum as f64);
+            let centre = [x * half_pitch[0] / pressed, y * half_pitch[1] / pressed];
+            Resultant { force_N: [fx, fy, fz].map(|f| f * lsb_N), centre_mm: (pressed > 0.0).then_some(centre) }
+        };
+        beats.chunks(resultants::BEATS).map(resultant).collect()
+    }
+}

@@ -1,0 +1,179 @@
+//! The partition cases of a plan: that of the scene, or several on shared hardware of which each frame takes one.
+//!
+//! A case beyond the first adds counter limits, addresses, its coefficients in the shared memory and a frame buffer. The
+//! result of a frame is to the bit that of the chosen case alone; [`choose`](crate::fixed::stages::choose) chooses it.
+//!
+//! Where the scene lists no cases, the largest set of cases that fits the board is built, and of equally large sets the
+//! one with the finest cases. A case left out is kept in [`Dropped`] with the resources of a design that includes it.
+
+use super::contents::{CasePlan, Dropped, Plan};
+use super::cycles::SHORTEST_SWEEP;
+use super::fit::{fit, Design};
+use super::widths::{widths, Shape};
+use crate::board::{Board, EngineKind};
+use crate::fixed::error::FixedError;
+use crate::fixed::stages::prepare::{Prepare, Scale};
+use crate::matrices::{Matrices, MAX_DEGREE};
+use crate::partition::{subarrays, Case, Subarray};
+use crate::scene::Scene;
+use crate::symmetry::quads::Quads;
+
+/// The plan of a scene, whether it fits its board or not.
+///
+/// # Errors
+/// As [`Model::new`](crate::fixed::Model::new), except [`FixedError::DoesNotFit`].
+pub fn planned(scene: &Scene) -> Result<Plan, FixedError> {
+    planned_with(scene, Scale::new(scene)?, None)
+}
+
+/// The plan with the given scale of the readings and, if given, degree of the polynomial.
+///
+/// # Errors
+/// As [`planned`].
+pub fn planned_with(scene: &Scene, scale: Scale, degree: Option<usize>) -> Result<Plan, FixedError> {
+    scene.require_supported()?;
+    let scene = &scene.for_hardware();
+    let board = Board::load(&scene.hardware.board)?;
+    if board.engine == EngineKind::Serial {
+        scene.require_serial()?;
+    }
+    match scene.partition.case {
+        Case::Adaptive => several(scene, &scale, degree, &board),
+        case => of_shapes(scene, &scale, &board, vec![(case, shape(scene, case, degree)?)]),
+    }
+}
+
+/// The plan of the cases that the scene lists, else of as many cases as fit the board, else of case 0 alone.
+fn several(scene: &Scene, scale: &Scale, degree: Option<usize>, board: &Board) -> Result<Plan, FixedError> {
+    let listed = scene.partition.listed.is_some();
+    let mut choices = scene.partition.choices(&scene.sensor);
+    // A case with too few quads is an error only where the scene lists it or no other is left.
+    let large: Vec<Case> = choices.iter().copied().filter(|&case| is_large(scene, case)).collect();
+    if !listed && large.len() > 1 {
+        choices = large;
+    }
+    let short = |plan: &Plan| plan.resources.shortages(&plan.board);
+    // If case 0 alone exceeds the board, so does every set of cases, since all contain it.
+    let whole = shape(scene, Case::WHOLE, degree)?;
+    if !listed {
+        let alone = of_shapes(scene, scale, board, vec![(Case::WHOLE, whole.clone())])?;
+        if !short(&alone).is_empty() {
+            return Ok(alone);
+        }
+    }
+    let mut shapes = vec![whole];
+    for &case in &choices[1..] {
+        shapes.push(shape(scene, case, degree)?);
+    }
+    let all: Vec<usize> = (0..choices.len()).collect();
+    let of = |subset: &[usize]| -> Result<Plan, FixedError> {
+        let pick = |&at: &usize| (choices[at], shapes[at].clone());
+        of_shapes(scene, scale, board, subset.iter().map(pick).collect())
+    };
+    if listed {
+        return of(&all);
+    }
+    let mut plan = None;
+    for subset in subsets(choices.len()) {
+        let built = of(&subset)?;
+        let fits = short(&built).is_empty();
+        plan = Some((built, subset));
+        if fits {
+            break;
+        }
+    }
+    let (mut plan, subset) = plan.ok_or(FixedError::Internal("no set of two cases to build"))?;
+    // If no two cases fit, the last set tried is returned; whoever needs a design that fits asks what the board lacks.
+    if short(&plan).is_empty() {
+        for &at in all.iter().filter(|at| !subset.contains(at)) {
+            let with: Vec<usize> = all.iter().copied().filter(|k| subset.contains(k) || *k == at).collect();
+            plan.dropped.push(Dropped { case: choices[at], design: of(&with)? });
+        }
+    }
+    Ok(plan)
+}
+
+/// The plan of `cases`; where there are several, case 0 is the first.
+fn of_shapes(scene: &Scene, scale: &Scale, board: &Board, cases: Vec<(Case, Shape)>) -> Result<Plan, FixedError> {
+    let (cases, shapes): (Vec<Case>, Vec<Shape>) = cases.into_iter().unzip();
+    let (designs, resources) = fit(scene, &shapes, board, widths(scene, &shapes, board)?);
+    let force_exponent = designs[0].formats.force_exponent;
+    let mut scene = scene.clone();
+    let mut planned = Vec::with_capacity(cases.len());
+    for (&case, design) in cases.iter().zip(designs) {
+        let Design { formats, quantised, storage } = design;
+        if cases.len() > 1 && !is_large(&scene, case) {
+            return Err(FixedError::SmallCase { case, quads: formats.quads, least: SHORTEST_SWEEP });
+        }
+        planned.push(CasePlan { case, parts: subarrays(case, &scene.sensor)?, formats, quantised, storage });
+    }
+    if let [only] = cases[..] {
+        scene.partition.case = only;
+    }
+    let full_scale = scene.input.full_scale_MPa;
+    if let (Some(field), None) = (scene.scaled_input(), full_scale) {
+        return Err(FixedError::NoFullScale { field, value: scene.field_value(field) });
+    }
+    let scaled = |field, value: f64, unit: &dyn Fn(f64) -> f64| match full_scale {
+        _ if value == 0.0 => Ok(0.0),
+        Some(full_scale) => Ok(value / unit(full_scale)),
+        None => Err(FixedError::NoFullScale { field, value: value.to_string() }),
+    };
+    let prepare = Prepare::new(&scene, scale.clone(), full_scale.unwrap_or(1.0));
+    let code_lsb = |full_scale: f64| full_scale / prepare.largest();
+    let noise_floor = scaled("search.noise_floor_MPa", scene.search.noise_floor_MPa, &code_lsb)?;
+    let force_lsb = |full_scale: f64| code_lsb(full_scale) * 2f64.powi(force_exponent);
+    let threshold = scaled("threshold.min_force_N", scene.threshold.min_force_N, &force_lsb)?;
+    Ok(Plan {
+        noise_floor: noise_floor.floor().min(f64::from(i32::MAX)) as i32,
+        threshold: threshold.ceil().min(f64::from(u32::MAX)) as i64,
+        prepare,
+        // Scenes with dead taxels have a single subarray.
+        dead: planned[0].parts[0].local_indices(&scene.input.dead),
+        resources,
+        board: board.clone(),
+        scene,
+        cases: planned,
+        dropped: Vec::new(),
+    })
+}
+
+/// The subarrays of a case and their matrices; the polynomial has `degree` if given, else the degree that the series
+/// needs.
+fn shape(scene: &Scene, case: Case, degree: Option<usize>) -> Result<Shape, FixedError> {
+    let parts = subarrays(case, &scene.sensor)?;
+    // Scenes with dead taxels have a single subarray.
+    let dead = parts[0].local_indices(&scene.input.dead);
+    let mut matrices = Matrices::of(scene, &parts[0].sensor(&scene.sensor), MAX_DEGREE)?.without(&dead)?;
+    matrices.degree = degree.unwrap_or(matrices.degree);
+    Ok(Shape { matrices, parts: parts.len() })
+}
+
+/// Whether every subarray has the [`SHORTEST_SWEEP`] quads that a search shared by several cases needs.
+fn is_large(scene: &Scene, case: Case) -> bool {
+    let quads = |part: &Subarray| Quads { rows: part.rows, cols: part.cols }.len() as u64;
+    subarrays(case, &scene.sensor).is_ok_and(|parts| parts.iter().all(|part| quads(part) >= SHORTEST_SWEEP))
+}
+
+/// All subsets of `count` cases with case 0 and at least one other, as indices: the largest first, then those with the
+/// finest cases.
+fn subsets(count: usize) -> Vec<Vec<usize>> {
+    let of = |bits: usize| std::iter::once(0).chain((1..count).filter(move |k| bits >> k & 1 == 1));
+    let mut all: Vec<Vec<usize>> = (2..1usize << count).step_by(2).map(|bits| of(bits).collect()).collect();
+    all.sort_by(|a, b| b.len().cmp(&a.len()).then(a.cmp(b)));
+    all
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_largest_subsets_come_first() {
+        assert_eq!(subsets(2), [vec![0, 1]]);
+        let four = subsets(4);
+        assert_eq!(four.len(), 7);
+        assert_eq!(four[..3], [vec![0, 1, 2, 3], vec![0, 1, 2], vec![0, 1, 3]]);
+        assert_eq!(four[6], [0, 3]);
+    }
+}

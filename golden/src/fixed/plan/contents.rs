@@ -1,0 +1,195 @@
+//! What a plan contains: everything about a scene's hardware that is known before a frame arrives.
+
+use super::resources::Resources;
+use super::storage::Storage;
+use crate::board::Board;
+use crate::fixed::stages::choose::FrameStats;
+use crate::fixed::stages::prepare::Prepare;
+use crate::fixed::stages::resultants;
+use crate::fixed::stages::send::STATUS_BEATS;
+use crate::fixed::words::formats::Formats;
+use crate::fixed::words::quantised::Quantised;
+use crate::partition::{Case, Grid, Subarray};
+use crate::scene::{CoefficientCheck, ForceOutput, Scene};
+use crate::symmetry::quads::Quads;
+
+/// The hardware of one scene. What differs between partition cases is in [`CasePlan`]; the methods without a case give
+/// that of the first, which with several cases is case 0, the whole array.
+#[derive(Clone, Debug)]
+pub struct Plan {
+    /// The scene.
+    pub scene: Scene,
+    /// The board.
+    pub board: Board,
+    /// Calibration and averaging of the input.
+    pub prepare: Prepare,
+    /// Noise floor in LSBs of a frame buffer word, rounded down.
+    pub noise_floor: i32,
+    /// `threshold.min_force_N` in force LSBs, rounded up.
+    pub threshold: i64,
+    /// Dead taxels, row-major in the array, ascending.
+    pub dead: Vec<usize>,
+    /// Memories and multipliers.
+    pub resources: Resources,
+    /// Cases that divide the array but were left out; empty if the scene lists its cases.
+    pub dropped: Vec<Dropped>,
+    /// At least one.
+    pub(super) cases: Vec<CasePlan>,
+}
+
+/// What one partition case adds to the hardware. All cases use the lanes, the search and the force unit of the first.
+#[derive(Clone, Debug)]
+pub struct CasePlan {
+    /// The case.
+    pub case: Case,
+    /// The subarrays, row-major.
+    pub parts: Vec<Subarray>,
+    /// Widths and scales, the same in all cases but for quads, lanes and groups.
+    pub formats: Formats,
+    /// Quantised matrices.
+    pub quantised: Quantised,
+    /// The case's part of the coefficient memory.
+    pub storage: Storage,
+}
+
+/// A case that divides the array but was left out, because a design with it exceeds the board.
+#[derive(Clone, Debug)]
+pub struct Dropped {
+    /// The case left out.
+    pub case: Case,
+    /// The design of the cases built and this one.
+    pub design: Plan,
+}
+
+impl Plan {
+    /// The cases built, case 0 first if there are several.
+    pub fn cases(&self) -> &[CasePlan] {
+        &self.cases
+    }
+
+    /// The first case.
+    pub fn first(&self) -> &CasePlan {
+        &self.cases[0]
+    }
+
+    /// The first case, to change what it holds.
+    pub fn first_mut(&mut self) -> &mut CasePlan {
+        &mut self.cases[0]
+    }
+
+    /// Widths and scales.
+    pub fn formats(&self) -> &Formats {
+        &self.first().formats
+    }
+
+    /// Quantised matrices.
+    pub fn quantised(&self) -> &Quantised {
+        &self.first().quantised
+    }
+
+    /// The coefficient memory's layout.
+    pub fn storage(&self) -> &Storage {
+        &self.first().storage
+    }
+
+    /// The subarrays, row-major.
+    pub fn parts(&self) -> &[Subarray] {
+        &self.first().parts
+    }
+
+    /// The quad layout of a subarray.
+    pub fn layout(&self) -> Quads {
+        self.first().layout()
+    }
+
+    /// Number of subarrays along the rows and along the columns.
+    pub fn grid(&self) -> Grid {
+        self.first().grid()
+    }
+
+    /// Number of status beats of a frame: [`STATUS_BEATS`] per subarray, in the order of the subarrays.
+    pub fn status_beats(&self) -> usize {
+        self.first().status_beats()
+    }
+
+    /// Whether the hardware has several cases and chooses one per frame.
+    pub fn chooses(&self) -> bool {
+        self.cases.len() > 1
+    }
+
+    /// Subarrays along rows and columns of each case built, in the order of [`Plan::cases`].
+    pub fn grids(&self) -> Vec<Grid> {
+        self.cases.iter().map(CasePlan::grid).collect()
+    }
+
+    /// Index in [`Plan::cases`] of the case chosen for a frame of `codes`: one per taxel, row-major, `input_bits`
+    /// wide.
+    pub fn choose(&self, codes: &[i32]) -> usize {
+        let mut seen = FrameStats::default();
+        for (index, &code) in codes.iter().enumerate() {
+            seen.add(&self.scene.sensor, index, code, self.noise_floor);
+        }
+        seen.choose(&self.grids(), self.scene.partition.condition, self.noise_floor)
+    }
+
+    /// Whether the hardware has a μ search, that is `search.mu_max` is above 0.
+    pub fn searches(&self) -> bool {
+        self.formats().degree > 0
+    }
+
+    /// Whether the scene asks for the coefficient check.
+    pub fn has_coefficient_check(&self) -> bool {
+        self.scene.hardware.coefficient_check == CoefficientCheck::Signature
+    }
+
+    /// Whether the output is one resultant per subarray instead of a force per taxel.
+    pub fn sends_resultants(&self) -> bool {
+        self.scene.output.forces == ForceOutput::Resultants
+    }
+
+    /// Number of output beats of a frame before its status.
+    pub fn force_beats(&self) -> usize {
+        match self.sends_resultants() {
+            false => self.scene.sensor.taxels(),
+            true => resultants::BEATS * self.parts().len(),
+        }
+    }
+
+    /// Cycles by which the first beat of resultants is later than the first beat of forces would be.
+    pub(in crate::fixed) fn resultants_delay(&self) -> u64 {
+        match self.sends_resultants() {
+            false => 0,
+            true => self.scene.sensor.taxels() as u64 - 1 + resultants::LATENCY,
+        }
+    }
+
+    /// N per LSB of a force word, for codes whose largest value means `full_scale_MPa`.
+    pub fn force_lsb_N(&self, full_scale_MPa: f64) -> f64 {
+        full_scale_MPa / self.prepare.largest() * 2f64.powi(self.formats().force_exponent)
+    }
+}
+
+impl CasePlan {
+    /// The quad layout of a subarray.
+    pub fn layout(&self) -> Quads {
+        let Subarray { rows, cols, .. } = self.parts[0];
+        Quads { rows, cols }
+    }
+
+    /// Number of subarrays along the rows and along the columns.
+    pub fn grid(&self) -> Grid {
+        let Quads { rows, cols } = self.layout();
+        let (last_row, last_col) = self.parts.last().map_or((0, 0), |part| (part.row0, part.col0));
+        Grid { rows: last_row / rows + 1, cols: last_col / cols + 1 }
+    }
+
+    /// The paper's number of the case, 0 to 3; 0 for a partition that the paper does not number.
+    pub fn number(&self) -> u32 {
+        (0..4).find(|&number| Case::numbered(number) == Some(self.case)).unwrap_or(0) as u32
+    }
+
+    /// Number of status beats of a frame: [`STATUS_BEATS`] per subarray, in the order of the subarrays.
+    pub fn status_beats(&self) -> usize {
+        STATUS_BEATS * self.parts.len()
+    }
+}

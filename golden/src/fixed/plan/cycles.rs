@@ -1,0 +1,196 @@
+//! Cycle counts of the parallel engine at full speed: one input beat per cycle, output always ready. The serial
+//! engine's are in [`serial`].
+//!
+//! The latency of each stage is a named constant here and a pipeline in the hardware; the co-simulation asserts that
+//! both agree to the cycle. With Q quads, G groups of rows, K rows in the last group:
+//! ```text
+//! fold     Q + 6                                from the last input beat to the first product
+//! pass     the kept columns of each product, at most Q, waiting until a step's operand has been finished
+//! rescale  v_00 is replayed once its exponent is known: Q more
+//! search   7 coarse sweeps of Q, at least (Q + 19)/2; the eighth and 7 halvings of Q + 22; one of Q + 7
+//!          (the last alone when nothing is searched)
+//! next     1 from a subarray's completion to the passes of the one after it, which go on while it is searched
+//! choose   2, where the case is chosen per frame
+//! send     begins with the last subarray's first value: 9 to the first beat, then one beat a cycle
+//! ```
+
+use serde::Serialize;
+
+use super::contents::{CasePlan, Plan};
+use super::serial;
+use super::storage::Storage;
+use crate::board::EngineKind;
+use crate::fixed::stages::choose;
+use crate::fixed::stages::search::COARSE_CENTRES;
+use crate::fixed::words::formats::{Formats, HALVINGS};
+use crate::fixed::words::schedule::schedule;
+
+/// Cycles from the last input beat to the start of the frame.
+pub const ACCEPT: u64 = 3;
+/// Latency of `fold` beyond its Q quads: start, frame buffer, normalise, butterfly, memory.
+const FOLD: u64 = 6;
+/// Cycles from the issue of a product to the first row of its accumulators: addresses 1, memories 2, selection 1, lanes
+/// 5.
+const LANES: u64 = 9;
+/// Additional cycles where columns are left out: the list of columns is a memory of its own.
+const COLUMNS: u64 = 2;
+/// Cycles from a row until it can be read as an operand: rescaler, operand memory.
+const OPERAND: u64 = 5;
+/// Cycles from the last raw row of v_00 to its first replayed row.
+const REPLAY: u64 = 3;
+/// Cycles from the last row to the start of the search: rescaler, unfold, memory.
+const UNFOLD: u64 = 6;
+/// Cycles from the start of a sweep to its best candidate, beyond its Q quads: memory 2, Taylor shift 4, candidates 2,
+/// score 6, comparison 6.
+const SELECTION_LATENCY: u64 = 20;
+/// Cycles from the completion of a subarray's passes to the start of its search.
+const HAND_OVER: u64 = 2;
+/// Cycles from the start of the search, or from a best candidate that the next sweep depends on, to the next sweep.
+pub const SET_UP: u64 = 3;
+/// Shortest sweep that is scored, in quads: its score bias is computed meanwhile.
+pub const SHORTEST_SWEEP: u64 = 4;
+/// Latency of the last sweep beyond its Q quads.
+const LAST_SWEEP: u64 = 7;
+/// Cycles from a subarray's values to the sending of them, where nothing is searched.
+const UNSEARCHED: u64 = 3;
+/// Cycles from the hand-over of a subarray to the search until the passes of the next one start.
+const NEXT: u64 = 1;
+/// Cycles from the last subarray's first value, Q cycles before the end of its values, to the first output beat.
+const SEND: u64 = 13;
+
+/// Duration of a frame in clock cycles.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+pub struct Cycles {
+    /// Cycles from the last input beat to the first output beat.
+    pub first_output: u64,
+    /// Cycles from the last input beat to the last output beat, status included.
+    pub latency: u64,
+    /// Cycles from the first input beat to the last output beat, both included.
+    pub total: u64,
+    /// Cycles from one output beat to the next.
+    pub interval: u64,
+}
+
+/// Cycles from the start of a coarse sweep over `quads` quads to the start of the next. The best candidate of a sweep
+/// is known before the sweep after the next, which may overwrite its source.
+pub fn coarse_period(quads: u64) -> u64 {
+    let quads = quads.max(SHORTEST_SWEEP);
+    quads.max((quads + SELECTION_LATENCY).div_ceil(2))
+}
+
+impl Cycles {
+    /// The counts of a frame whose subarrays are all searched: the largest counts.
+    pub fn longest(plan: &Plan) -> Self {
+        Cycles::of(plan, &vec![true; plan.parts().len()])
+    }
+
+    /// The counts of a frame; with several cases those of case 0 and of the choice between them. `searched[k]` says
+    /// whether subarray k is searched.
+    pub fn of(plan: &Plan, searched: &[bool]) -> Self {
+        Cycles::of_case(plan, plan.first(), searched).after_choice(plan)
+    }
+
+    /// The counts of a frame that `case` solves, all its subarrays searched, without the choice of the case.
+    pub fn longest_of_case(plan: &Plan, case: &CasePlan) -> Self {
+        Cycles::of_case(plan, case, &vec![true; case.parts.len()])
+    }
+
+    /// The counts of a frame that `case` solves, without the choice of the case; `searched[k]` says whether subarray k
+    /// is searched.
+    pub fn of_case(plan: &Plan, case: &CasePlan, searched: &[bool]) -> Self {
+        let taxels = plan.scene.sensor.taxels() as u64;
+        let beats = (plan.force_beats() + case.status_beats()) as u64;
+        let (first_output, interval) = match plan.board.engine {
+            EngineKind::Serial => (serial::first_output(&case.formats, searched.contains(&true)), serial::BEAT),
+            EngineKind::Parallel => (first_output(plan, case, searched), 1),
+        };
+        let latency = first_output + (beats - 1) * interval;
+        Cycles { first_output, latency, total: (taxels << plan.prepare.average) + latency, interval }
+    }
+
+    /// The counts with those of the choice, where the hardware chooses among several cases.
+    pub(in crate::fixed) fn after_choice(mut self, plan: &Plan) -> Self {
+        if plan.chooses() {
+            for count in [&mut self.first_output, &mut self.latency, &mut self.total] {
+                *count += choose::LATENCY;
+            }
+        }
+        self
+    }
+}
+
+/// Cycles of the parallel engine from the last input beat to the first output beat.
+fn first_output(plan: &Plan, case: &CasePlan, searched: &[bool]) -> u64 {
+    let quads = case.formats.quads as u64;
+    let chained = COARSE_CENTRES.len() as u64 - 1;
+    let awaited = 1 + u64::from(HALVINGS);
+    let sweeps = chained * coarse_period(quads) + awaited * (quads.max(SHORTEST_SWEEP) + SELECTION_LATENCY + SET_UP);
+    let search = |&searching: &bool| match plan.searches() {
+        true => HAND_OVER + SET_UP + if searching { sweeps } else { 0 } + quads + LAST_SWEEP,
+        false => UNSEARCHED,
+    };
+    let passes = timeline(&case.formats, &case.storage).last_row + UNFOLD;
+    // A subarray is handed to the search when its passes are complete and the search of the one before has ended.
+    let (mut complete, mut searched_at) = (0, 0);
+    for searching in searched {
+        complete += passes;
+        let handed_over = complete.max(searched_at);
+        searched_at = handed_over + search(searching);
+        complete = handed_over + NEXT;
+    }
+    // After a search the last subarray's values are sent while they are computed.
+    let early = if plan.searches() { quads } else { 0 };
+    // Resultants are sent once the last force has been added.
+    plan.prepare.latency() + ACCEPT + searched_at - early + SEND + plan.resultants_delay()
+}
+
+/// Multiplications done by the lanes, as a fraction of those possible from a subarray's first product to its last; 0 to
+/// 1.
+pub fn lane_utilisation(plan: &Plan) -> f64 {
+    let CasePlan { formats, storage, .. } = plan.first();
+    if plan.board.engine == EngineKind::Serial {
+        return serial::lane_utilisation(formats);
+    }
+    let Timeline { first_issue, last_issue, products, .. } = timeline(formats, storage);
+    let lanes = 4 * formats.lanes_per_parity as u64;
+    products as f64 / ((last_issue + 1 - first_issue) * lanes) as f64
+}
+
+/// Timing of a subarray's products, in cycles from its start.
+struct Timeline {
+    first_issue: u64,
+    last_issue: u64,
+    /// Multiplications done; in the last group of rows some lanes may be idle.
+    products: u64,
+    /// Cycle in which the last row leaves the lanes.
+    last_row: u64,
+}
+
+fn timeline(formats: &Formats, storage: &Storage) -> Timeline {
+    let quads = formats.quads as u64;
+    let last_rows = quads - (formats.groups as u64 - 1) * formats.lanes_per_parity as u64;
+    let lanes = LANES + if storage.listed { COLUMNS } else { 0 };
+    let first_issue = quads + FOLD;
+    let (mut now, mut products_done) = (first_issue, 0);
+    let mut finished: Vec<u64> = Vec::new();
+    let mut last_row = 0;
+    for (k, products) in schedule(formats).iter().enumerate() {
+        for group in 0..formats.groups {
+            for product in products {
+                if k > 0 {
+                    now = now.max(finished[product.operand_index()]);
+                }
+                let columns = storage.columns_of(product.matrix, group).len() as u64;
+                let rows = if group + 1 == formats.groups { last_rows } else { formats.lanes_per_parity as u64 };
+                products_done += 4 * columns * rows;
+                now += columns;
+            }
+        }
+        last_row = now - 1 + lanes + last_rows - 1;
+        if k == 0 {
+            last_row += REPLAY - 1 + quads;
+        }
+        finished.push(last_row + OPERAND);
+    }
+    Timeline { first_issue, last_issue: now - 1, products: products_done, last_row }
+}

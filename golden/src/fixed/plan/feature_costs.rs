@@ -1,0 +1,119 @@
+//! Cost of each optional feature: the scene's design with the feature added, or without it.
+//!
+//! The number of lanes stays that of the scene, so that only the feature makes the difference.
+
+use super::cases::{planned, planned_with};
+use super::contents::{CasePlan, Plan};
+use crate::fixed::error::FixedError;
+use crate::fixed::stages::prepare::Scale;
+use crate::fixed::words::formats::MULTIPLIER_BITS;
+use crate::matrices::MAX_DEGREE;
+use crate::partition::{subarrays, Case};
+use crate::scene::{CoefficientCheck, ForceOutput, Scene, SearchSpec};
+
+/// An optional feature of the hardware.
+#[derive(Debug)]
+pub struct Feature {
+    /// Name of the feature.
+    pub name: &'static str,
+    /// The scene's setting, or the setting with which the feature was added.
+    pub setting: String,
+    /// The plan with the feature added, or why there is none; `None` if the scene has the feature.
+    pub with_feature: Option<Result<Plan, FixedError>>,
+    /// The plan without the feature, if the scene has it and its cost depends on the setting.
+    pub without_feature: Option<Plan>,
+}
+
+/// All optional features in pipeline order. A scene that would exceed its board with a feature added is counted all the
+/// same.
+pub fn features(plan: &Plan) -> Vec<Feature> {
+    let mut scene = plan.scene.clone();
+    scene.fixed.lanes = Some(4 * plan.formats().lanes_per_parity as u32);
+    if plan.chooses() {
+        let built: Vec<u32> = plan.cases().iter().map(CasePlan::number).collect();
+        scene.partition.listed = Some([0, 1, 2, 3].map(|number| built.contains(&number)));
+    }
+    let scene = &scene;
+    let taxels = scene.sensor.taxels();
+    let input = &scene.input;
+    let with = |change: &dyn Fn(&mut Scene)| {
+        let mut changed = scene.clone();
+        change(&mut changed);
+        changed
+    };
+    let plain = planned;
+    let scaled = |scene: &Scene, gains| planned_with(scene, Scale::of_tare(taxels, gains), None);
+    let full_scale = input.full_scale_MPa.unwrap_or(1.0);
+
+    let mut all = Vec::new();
+    let mut add = |name, has: bool, setting: String, back: &dyn Fn() -> Result<Plan, FixedError>| {
+        all.push(Feature { name, setting, with_feature: (!has).then(back), without_feature: None });
+    };
+    let set = |has: bool, own: String, back: &str| if has { own } else { back.to_string() };
+
+    let (table, tare) = (input.calibration.is_some(), input.calibration.is_some() || input.tare.is_some());
+    add("tare frame", tare, "a zero per taxel".into(), &|| {
+        scaled(&with(&|s| (s.input.tare, s.input.full_scale_MPa) = (Some("".into()), Some(full_scale))), false)
+    });
+    add("calibration table", table, format!("a zero and a gain of {MULTIPLIER_BITS} bits per taxel"), &|| {
+        scaled(&with(&|s| (s.input.calibration, s.input.full_scale_MPa) = (Some("".into()), Some(full_scale))), true)
+    });
+    let average = input.average > 0;
+    add("averaging", average, set(average, format!("{} frames", 1 << input.average), "2 frames"), &|| {
+        plain(&with(&|s| s.input.average = 1))
+    });
+    let parts = plan.parts().len();
+    let quarters = Case::numbered(1).filter(|case| subarrays(*case, &scene.sensor).is_ok());
+    if plan.chooses() {
+        // The cases built stay the same, whatever else would fit.
+        let cases: Vec<String> = plan.cases().iter().map(|case| case.case.to_string()).collect();
+        add("choice of the case", true, format!("cases {} per frame", cases.join(", ")), &|| plain(scene));
+    } else if parts > 1 {
+        add("partition", true, format!("{parts} subarrays"), &|| plain(scene));
+    } else if let Some(case) = quarters {
+        add("partition", false, "2×2 subarrays".into(), &|| plain(&with(&|s| s.partition.case = case)));
+    }
+    let degree = plan.formats().degree;
+    let mu_max = SearchSpec::default().mu_max;
+    let own = format!("mu_max = {}", scene.search.mu_max);
+    add("search", degree > 0, set(degree > 0, own, &format!("mu_max = {mu_max}")), &|| {
+        plain(&with(&|s| s.search.mu_max = mu_max))
+    });
+    if degree > 0 {
+        let cubic = degree == MAX_DEGREE;
+        add("polynomial of degree 3", cubic, "degree 3".into(), &|| {
+            planned_with(scene, Scale::new(scene)?, Some(MAX_DEGREE))
+        });
+    }
+    let threshold = scene.threshold.min_force_N > 0.0;
+    let own = format!("{} N", scene.threshold.min_force_N);
+    add("threshold", threshold, set(threshold, own, "1 mN"), &|| {
+        let thresholded = with(&|s| (s.threshold.min_force_N, s.input.full_scale_MPa) = (1e-3, Some(full_scale)));
+        plain(&thresholded)
+    });
+    let dead = input.dead.len();
+    let flips = &plan.formats().flips;
+    let own = format!(
+        "{dead} {}; parity flips: {} of Cz⁺, {} of Ax, {} of Ay",
+        if dead == 1 { "taxel" } else { "taxels" },
+        flips.inverse.len(),
+        flips.ax.len(),
+        flips.ay.len()
+    );
+    // A dead taxel in a corner breaks every symmetry.
+    add("dead taxels", dead > 0, set(dead > 0, own, "dead = [[0, 0]]"), &|| {
+        plain(&with(&|s| s.input.dead = vec![[0, 0]]))
+    });
+    add("coefficient check", plan.has_coefficient_check(), "a signature of the words read".into(), &|| {
+        plain(&with(&|s| s.hardware.coefficient_check = CoefficientCheck::Signature))
+    });
+    let resultants = plan.sends_resultants();
+    add("resultants", resultants, "a force and its moments per subarray".into(), &|| {
+        plain(&with(&|s| s.output.forces = ForceOutput::Resultants))
+    });
+    if dead > 0 {
+        let alive = plain(&with(&|s| s.input.dead.clear())).ok();
+        all.iter_mut().filter(|feature| feature.name == "dead taxels").for_each(|f| f.without_feature = alive.clone());
+    }
+    all
+}

@@ -1,0 +1,99 @@
+//! Lanes and memories: how many rows of a matrix are computed at a time, and in which memories its coefficients stand.
+
+use super::resources::Resources;
+use super::serial;
+use super::storage::{storage_order, LaidOut, Storage};
+use super::widths::{Shape, Widths};
+use crate::board::{Board, EngineKind};
+use crate::fixed::words::formats::{Formats, MULTIPLIER_BITS};
+use crate::fixed::words::quantised::Quantised;
+use crate::fixed::words::schedule::{schedule, Kind, Matrix};
+use crate::scene::Scene;
+
+/// Fewest lanes per parity; with fewer, the lanes would wait for the accumulators to be shifted out.
+const MIN_LANES: usize = 4;
+
+/// What is derived from a scene's matrices for one case.
+pub struct Design {
+    /// Widths, lanes and groups of rows.
+    pub formats: Formats,
+    /// The matrices as stored, pruned coefficients zero.
+    pub quantised: Quantised,
+    /// The coefficient memory's layout.
+    pub storage: Storage,
+}
+
+/// Lays out the coefficient memory of a scene's cases and counts the resources, whether `board` has them or not.
+pub fn fit(scene: &Scene, shapes: &[Shape], board: &Board, widths: Widths) -> (Vec<Design>, Resources) {
+    let Widths { formats, quantised } = widths;
+    let order = storage_order(&schedule(&formats));
+    let (laid_out, resources) = match board.engine {
+        EngineKind::Serial => serial::fit(&formats, &order, &quantised[0], board),
+        EngineKind::Parallel => parallel(&formats, &order, &quantised, scene, shapes, board),
+    };
+    let design = |((laid_out, mut quantised), shape): ((LaidOut, Quantised), &Shape)| {
+        let LaidOut { formats, storage, .. } = laid_out;
+        storage.zero_pruned(&mut quantised, shape.quads().len(), formats.lanes_per_parity);
+        Design { formats, quantised, storage }
+    };
+    (laid_out.into_iter().zip(quantised).zip(shapes).map(design).collect(), resources)
+}
+
+/// Lanes and memories of the parallel engine: the scene's number of lanes, else the most for which there is block RAM. Block RAM is
+/// preferred to distributed RAM, since a deep distributed RAM is the longest path of its design.
+fn parallel(
+    formats: &Formats,
+    matrices: &[Matrix],
+    quantised: &[Quantised],
+    scene: &Scene,
+    shapes: &[Shape],
+    board: &Board,
+) -> (Vec<LaidOut>, Resources) {
+    let (quads, prune_bits) = (formats.quads, scene.fixed.prune_bits);
+    let largest = |quantised: &Quantised| quantised.inverse.coefficients().map(|c| c.abs()).max().unwrap_or(0);
+    let threshold = |quantised: &Quantised, matrix: Matrix| match matrix.kind {
+        Kind::InverseHigh | Kind::InverseLow => largest(quantised) >> prune_bits,
+        Kind::Ax => 2f64.powi(quantised.ax.exponent - prune_bits as i32) as i64,
+        Kind::Ay => 2f64.powi(quantised.ay.exponent - prune_bits as i32) as i64,
+    };
+    let with = |groups: usize| {
+        let lanes_per_parity = quads.div_ceil(groups);
+        let lay_out = |(quantised, shape): (&Quantised, &Shape)| {
+            let quads = shape.quads().len();
+            let formats =
+                Formats { quads, lanes_per_parity, groups: quads.div_ceil(lanes_per_parity), ..formats.clone() };
+            let limits = matrices.iter().map(|&matrix| (matrix, threshold(quantised, matrix))).collect();
+            let storage = Storage::new(limits, quantised, quads, lanes_per_parity);
+            LaidOut { formats, storage, parts: shape.parts }
+        };
+        let mut laid_out: Vec<LaidOut> = quantised.iter().zip(shapes).map(lay_out).collect();
+        Storage::share(laid_out.iter_mut().map(|case| (&mut case.storage, case.formats.clone())));
+        let [first, second] = board.distributed_words.map(|shallow| Resources::new(&laid_out, scene, board, shallow));
+        let resources = if first.fits(board) { first } else { second };
+        (laid_out, resources)
+    };
+    let product = board.multipliers_for(MULTIPLIER_BITS, MULTIPLIER_BITS);
+    // The multipliers of the other blocks do not depend on the number of lanes.
+    let all = with(1);
+    let others = all.1.multipliers() - 4 * quads * product;
+    let left = (board.multipliers as usize).saturating_sub(others);
+    let least = MIN_LANES.min(quads);
+    let per_parity = match scene.fixed.lanes {
+        Some(lanes) => (lanes as usize / 4).clamp(1, quads)..=(lanes as usize / 4).clamp(1, quads),
+        None => least..=(left / (4 * product)).clamp(least, quads),
+    };
+    let mut groups: Vec<usize> = per_parity.rev().map(|lanes| quads.div_ceil(lanes)).collect();
+    groups.dedup();
+    // Where nothing fits, the design with the fewest block RAMs.
+    let mut leanest: Option<(Vec<LaidOut>, Resources)> = None;
+    for groups in groups {
+        let design = with(groups);
+        if design.1.fits(board) {
+            return design;
+        }
+        if leanest.as_ref().is_none_or(|leanest| design.1.block_rams() < leanest.1.block_rams()) {
+            leanest = Some(design);
+        }
+    }
+    leanest.unwrap_or(all)
+}

@@ -1,0 +1,263 @@
+//! Memories and multipliers of the hardware, counted as the synthesiser counts them.
+//!
+//! Every memory of more than one word is listed by its name in the Verilog, where an attribute carries the choice:
+//! block RAM, of the board's shape that takes the fewest, or distributed RAM for few words. Both counts are exact;
+//! tests compare them with Yosys.
+//!
+//! | stage | memory | words × bits |
+//! |---|---|---|
+//! | prepare | zero and gain; sums of several frames | taxels × `code_bits` and 18; taxels × `input_bits` |
+//! | receive | frame buffer of each case, four lanes | subarrays · Q × `input_bits` |
+//! | fold | input of the passes | Q × 4 · `fold_bits` |
+//! | pass | v_ij as operands, except those of the highest degree | their number · Q × 4 · `data_bits` |
+//! | pass | coefficients; list of their columns | words × 18 · lanes; words × address, twice where Ax is used for Ay |
+//! | rescale | raw v_00 | Q × 4 · `acc_bits` |
+//! | search | polynomials, one memory per coefficient | 3 buffers of Q × 4 · `search_bits` |
+//! | search | the next subarray's, where there are several | Q × 4 · `search_bits` |
+//! | force | p(μ*) | subarrays · Q × 4 · `search_bits` |
+
+use serde::Serialize;
+
+use super::storage::{word_bits, LaidOut};
+use crate::board::Board;
+use crate::fixed::stages::prepare::GAIN_BITS;
+use crate::fixed::stages::resultants::POSITION_BITS;
+use crate::fixed::words::arith::{bit_length, signed_bits};
+use crate::fixed::words::formats::{Formats, FORCE_BITS, HALVINGS, MULTIPLIER_BITS};
+use crate::fixed::words::schedule::vectors;
+use crate::scene::{ForceOutput, Scene};
+
+/// Number of polynomial buffers between which the sweeps of the search alternate.
+pub const SEARCH_BUFFERS: usize = 3;
+
+/// What a memory holds; the hardware's memories carry it as a label.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Holds {
+    /// Zero and gain of each taxel.
+    Calibration,
+    /// Sums of the frames that are averaged.
+    Average,
+    /// One lane of the quads of a frame, in the layout of a case.
+    Frame {
+        /// Index of the case.
+        case: usize,
+        /// Lane of the quad.
+        lane: usize,
+    },
+    /// Taxel of each place, and place of each taxel.
+    TaxelOrder,
+    /// Folded input.
+    Folded,
+    /// Operand vectors of the passes, one memory or one per lane.
+    Operands(usize),
+    /// Coefficients of the matrices.
+    Coefficients,
+    /// Low limbs of the coefficients of Cz⁺.
+    LowCoefficients,
+    /// Columns of the coefficients that are not left out.
+    Columns,
+    /// Accumulators that wait for their shift.
+    Raw,
+    /// Coefficient of this index of the polynomials, in the buffers of the search.
+    Polynomials(usize),
+    /// The same at the start of the search.
+    Start(usize),
+    /// Bank of polynomials of the serial search, 0 or 1.
+    Bank(usize),
+    /// Transposed polynomial of the serial search.
+    Transposed,
+    /// Floors of the logarithms.
+    Floors,
+    /// Totals of the candidates.
+    Totals,
+    /// Values p(μ*).
+    Values,
+}
+
+impl std::fmt::Display for Holds {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Holds::Calibration => write!(f, "calibration"),
+            Holds::Average => write!(f, "average"),
+            Holds::Frame { case, lane } => write!(f, "frame, case {case}, lane {lane}"),
+            Holds::TaxelOrder => write!(f, "taxel order"),
+            Holds::Folded => write!(f, "folded input"),
+            Holds::Operands(lane) => write!(f, "operands {lane}"),
+            Holds::Coefficients => write!(f, "coefficients"),
+            Holds::LowCoefficients => write!(f, "low coefficients"),
+            Holds::Columns => write!(f, "columns"),
+            Holds::Raw => write!(f, "raw words"),
+            Holds::Polynomials(index) => write!(f, "polynomials, coefficient {index}"),
+            Holds::Start(index) => write!(f, "polynomials at the start, coefficient {index}"),
+            Holds::Bank(bank) => write!(f, "polynomials, bank {bank}"),
+            Holds::Transposed => write!(f, "transposed polynomial"),
+            Holds::Floors => write!(f, "floors"),
+            Holds::Totals => write!(f, "totals"),
+            Holds::Values => write!(f, "values"),
+        }
+    }
+}
+
+impl Serialize for Holds {
+    fn serialize<S: serde::Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.collect_str(self)
+    }
+}
+
+/// A memory that the hardware needs.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+pub struct Memory {
+    /// What it holds; each occurs once.
+    pub holds: Holds,
+    /// Number of words.
+    pub words: usize,
+    /// Width of a word in bits.
+    pub bits: usize,
+    /// Number of block RAMs; 0 for distributed RAM.
+    pub block_rams: usize,
+    /// Number of single-port RAMs.
+    #[serde(skip_serializing_if = "is_zero")]
+    pub large_rams: usize,
+}
+
+fn is_zero(count: &usize) -> bool {
+    *count == 0
+}
+
+/// Memories and multipliers that a design needs.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+pub struct Resources {
+    /// Every memory, in pipeline order.
+    pub memories: Vec<Memory>,
+    /// Multipliers of each stage that can have some: (stage, count).
+    pub multipliers: Vec<(&'static str, usize)>,
+}
+
+/// Width in bits of a count below `limit`, at least one.
+pub fn count_bits(limit: usize) -> usize {
+    bit_length(limit.saturating_sub(1) as u64).max(1) as usize
+}
+
+/// Width in bits of a search position: three grid steps and one candidate beyond, after all halvings.
+pub fn position_bits() -> usize {
+    signed_bits(4 << HALVINGS) as usize
+}
+
+/// Number of v_ij that later passes read: all but those of the highest degree.
+pub fn operand_vectors(degree: usize) -> usize {
+    degree.checked_sub(1).map_or(0, vectors)
+}
+
+impl Resources {
+    /// The resources of a scene's cases on `board`; where there are several, the whole array's is the first. Memories
+    /// of at most `shallow` words go into distributed RAM.
+    pub fn new(cases: &[LaidOut], scene: &Scene, board: &Board, shallow: usize) -> Self {
+        let f = &cases[0].formats;
+        // Shared memories are sized for the largest case; the coefficients of all cases add up.
+        let quads = f.quads;
+        let words = cases.iter().map(|case| case.storage.words()).sum();
+        let listed = cases.iter().any(|case| case.storage.listed);
+        let frame_quads = |case: &LaidOut| case.parts * case.formats.quads;
+        let several = cases.iter().any(|case| case.parts > 1);
+        let quad = |bits: u32| 4 * bits as usize;
+        let memory = |holds: Holds, words: usize, bits: usize, rom: bool| Memory {
+            holds,
+            words,
+            bits,
+            block_rams: if rom || words > shallow { board.block_rams_for(words, bits) } else { 0 },
+            large_rams: 0,
+        };
+        let ram = |holds, words, bits| memory(holds, words, bits, false);
+        let (input, taxels) = (&scene.input, scene.sensor.taxels());
+        let mut memories = Vec::new();
+        if input.calibration.is_some() || input.tare.is_some() {
+            let gain = if input.calibration.is_some() { GAIN_BITS } else { 0 };
+            memories.push(memory(Holds::Calibration, taxels, (f.code_bits + gain) as usize, true));
+        }
+        if input.average > 0 {
+            memories.push(memory(Holds::Average, taxels, f.input_bits as usize, false));
+        }
+        for (index, case) in cases.iter().enumerate() {
+            let lane = |lane| ram(Holds::Frame { case: index, lane }, frame_quads(case), f.input_bits as usize);
+            memories.extend((0..4).map(lane));
+        }
+        memories.push(ram(Holds::Folded, quads, quad(f.fold_bits)));
+        if f.degree > 0 {
+            memories.push(ram(Holds::Operands(0), operand_vectors(f.degree) * quads, quad(f.data_bits)));
+        }
+        memories.push(memory(Holds::Coefficients, words, word_bits(f), true));
+        if listed {
+            // The transposed address as well, if it is read.
+            let addresses = if f.shared_a { 2 } else { 1 };
+            memories.push(memory(Holds::Columns, words, addresses * count_bits(quads), true));
+        }
+        memories.push(ram(Holds::Raw, quads, quad(f.acc_bits)));
+        for (k, &bits) in f.search_bits.iter().enumerate().filter(|_| f.degree > 0) {
+            memories.push(ram(Holds::Polynomials(k), SEARCH_BUFFERS * quads, quad(bits)));
+            if several {
+                memories.push(ram(Holds::Start(k), quads, quad(bits)));
+            }
+        }
+        memories.push(ram(Holds::Values, cases.iter().map(frame_quads).max().unwrap_or(0), quad(f.search_bits[0])));
+        let calibrate = match input.calibration {
+            Some(_) => board.multipliers_for(f.code_bits + 1, GAIN_BITS),
+            None => 0,
+        };
+        let multipliers = vec![
+            ("prepare", calibrate),
+            ("pass", 4 * f.lanes_per_parity * board.multipliers_for(MULTIPLIER_BITS, MULTIPLIER_BITS)),
+            ("force", force_multipliers(f, board)),
+            ("resultants", resultant_multipliers(scene, board)),
+        ];
+        Resources { memories, multipliers }
+    }
+
+    /// Number of block RAMs of all memories.
+    pub fn block_rams(&self) -> usize {
+        self.memories.iter().map(|memory| memory.block_rams).sum()
+    }
+
+    /// Number of single-port RAMs of all memories.
+    pub fn large_rams(&self) -> usize {
+        self.memories.iter().map(|memory| memory.large_rams).sum()
+    }
+
+    /// Number of multipliers of all blocks.
+    pub fn multipliers(&self) -> usize {
+        self.multipliers.iter().map(|(_, count)| count).sum()
+    }
+
+    /// Resources the board lacks: (name, required, available).
+    pub fn shortages(&self, board: &Board) -> Vec<(&'static str, usize, usize)> {
+        let all = [
+            ("block RAMs", self.block_rams(), board.block_rams as usize),
+            ("single-port RAMs", self.large_rams(), board.large_rams as usize),
+            ("multipliers", self.multipliers(), board.multipliers as usize),
+        ];
+        all.into_iter().filter(|(_, needs, has)| needs > has).collect()
+    }
+
+    /// Whether `board` has the block RAMs and one more, for the packet counters of the link.
+    pub fn fits(&self, board: &Board) -> bool {
+        self.block_rams() < board.block_rams as usize
+    }
+}
+
+/// Number of multipliers of the resultants: X fz⁺ and Y fz⁺.
+pub fn resultant_multipliers(scene: &Scene, board: &Board) -> usize {
+    match scene.output.forces {
+        ForceOutput::Taxels => 0,
+        ForceOutput::Resultants => 2 * board.multipliers_for(FORCE_BITS, POSITION_BITS + 1),
+    }
+}
+
+/// Number of multipliers of the force unit: μ1 and μ2 from their positions, and both times p; none without a search.
+pub fn force_multipliers(formats: &Formats, board: &Board) -> usize {
+    if formats.degree == 0 {
+        return 0;
+    }
+    let step = signed_bits(formats.mu_step.unsigned_abs());
+    // A multiplication by a power of two is wiring.
+    let words = if formats.mu_step.count_ones() == 1 { 0 } else { board.multipliers_for(position_bits() as u32, step) };
+    2 * words + 2 * board.multipliers_for(formats.search_bits[0], MULTIPLIER_BITS)
+}

@@ -1,0 +1,170 @@
+//! The coefficient memory: which columns of which matrix are kept for each group of rows, and in which order.
+//!
+//! A lane holds one row of each group. Far from the diagonal the coefficients of a whole group are negligible, so a
+//! column is left out (pruned) for a group if all its coefficients are below 2^−`prune_bits`: of the largest
+//! coefficient for Cz⁺, of one for the scaled A, whose entries multiply v_ij of the size of v_00. Pruned coefficients
+//! are zero in the bit-true model as well; a kept column keeps all its bits. Small arrays keep every column.
+//!
+//! On a square subarray of square pitch, Ay is Ax with x and y exchanged. At degree 1, where no v_ij adds both, Ay is
+//! not stored: v_01 is the Ax pass over the transposed v_00, and the result is transposed.
+
+use crate::fixed::words::formats::{Formats, MULTIPLIER_BITS};
+use crate::fixed::words::quantised::{coefficient, Quantised};
+use crate::fixed::words::schedule::{Matrix, Product};
+
+/// The kept columns, per matrix in storage order and per group of rows.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Storage {
+    /// The stored matrices, in storage order.
+    pub matrices: Vec<Matrix>,
+    /// `columns[matrix][group]`: kept columns, ascending.
+    pub columns: Vec<Vec<Vec<usize>>>,
+    /// Address of the case's first word; several cases share one memory.
+    pub base: usize,
+    /// Whether the memory has a list of columns: columns are pruned, in this case or another, or some are read
+    /// transposed.
+    pub listed: bool,
+}
+
+/// A case with its lanes and its part of the coefficient memory.
+#[derive(Clone, Debug)]
+pub struct LaidOut {
+    /// Widths, lanes and groups of rows of the case.
+    pub formats: Formats,
+    /// The columns kept in the coefficient memory.
+    pub storage: Storage,
+    /// Number of subarrays.
+    pub parts: usize,
+}
+
+/// Row indices of one group.
+fn rows(group: usize, per_parity: usize, quads: usize) -> std::ops::Range<usize> {
+    group * per_parity..((group + 1) * per_parity).min(quads)
+}
+
+/// The matrices of a schedule in the order of their first use.
+pub fn storage_order(schedule: &[Vec<Product>]) -> Vec<Matrix> {
+    let mut order = Vec::new();
+    for product in schedule.iter().flatten() {
+        if !order.contains(&product.matrix) {
+            order.push(product.matrix);
+        }
+    }
+    order
+}
+
+impl Storage {
+    /// Chooses the kept columns for `per_parity` lanes per parity; `limits` has for each matrix the size in LSBs below
+    /// which coefficients are negligible.
+    pub fn new(limits: Vec<(Matrix, i64)>, quantised: &Quantised, quads: usize, per_parity: usize) -> Self {
+        let kept = |matrix, limit, group| {
+            let blocks = quantised.blocks(matrix);
+            let matters = |&j: &usize| {
+                blocks
+                    .parity
+                    .iter()
+                    .any(|block| rows(group, per_parity, quads).any(|i| block[i * quads + j].abs() >= limit))
+            };
+            // A group without kept columns still needs one, to accumulate zeros.
+            let columns: Vec<usize> = (0..quads).filter(matters).collect();
+            if columns.is_empty() {
+                vec![0]
+            } else {
+                columns
+            }
+        };
+        let groups = quads.div_ceil(per_parity);
+        let of = |&(matrix, limit): &(Matrix, i64)| (0..groups).map(|group| kept(matrix, limit, group)).collect();
+        let columns = limits.iter().map(of).collect();
+        let matrices = limits.into_iter().map(|(matrix, _)| matrix).collect();
+        Storage { matrices, columns, base: 0, listed: false }
+    }
+
+    /// Puts the cases of a scene into one memory, one after the other, with a list of columns if one of them needs it.
+    pub fn share<'a>(cases: impl Iterator<Item = (&'a mut Storage, Formats)>) {
+        let mut cases: Vec<(&mut Storage, Formats)> = cases.collect();
+        let listed = cases.iter().any(|(storage, formats)| formats.shared_a || storage.is_pruned(formats.quads));
+        let mut base = 0;
+        for (storage, _) in &mut cases {
+            (storage.base, storage.listed) = (base, listed);
+            base += storage.words();
+        }
+    }
+
+    /// The kept columns of a matrix for a group of rows, ascending.
+    pub fn columns_of(&self, matrix: Matrix, group: usize) -> &[usize] {
+        self.matrices.iter().position(|&m| m == matrix).map_or(&[], |index| &self.columns[index][group])
+    }
+
+    /// Address of the first word of (matrix, group); one word per kept column follows.
+    pub fn address_of(&self, matrix: Matrix, group: usize) -> usize {
+        let mut address = self.base;
+        for (index, groups) in self.columns.iter().enumerate() {
+            for (g, columns) in groups.iter().enumerate() {
+                if (self.matrices[index], g) == (matrix, group) {
+                    return address;
+                }
+                address += columns.len();
+            }
+        }
+        address
+    }
+
+    /// Number of words of the case.
+    pub fn words(&self) -> usize {
+        self.columns.iter().flatten().map(Vec::len).sum()
+    }
+
+    /// Whether any column was pruned; `quads` is the number of columns of a matrix.
+    pub fn is_pruned(&self, quads: usize) -> bool {
+        self.columns.iter().flatten().any(|columns| columns.len() < quads)
+    }
+
+    /// The column of each word of the case.
+    pub fn column_list(&self) -> Vec<usize> {
+        self.columns.iter().flatten().flatten().copied().collect()
+    }
+
+    /// Sets the pruned coefficients to zero, so that the model multiplies by what the memory holds.
+    pub fn zero_pruned(&self, quantised: &mut Quantised, quads: usize, per_parity: usize) {
+        for (index, &matrix) in self.matrices.iter().enumerate() {
+            for (group, kept) in self.columns[index].iter().enumerate() {
+                for block in quantised.blocks_mut(matrix).into_iter().flat_map(|blocks| &mut blocks.parity) {
+                    for i in rows(group, per_parity, quads) {
+                        for j in (0..quads).filter(|j| kept.binary_search(j).is_err()) {
+                            block[i * quads + j] = 0;
+                        }
+                    }
+                }
+            }
+        }
+    }
+
+    /// The words of the case: one coefficient per lane, lane `parity·lanes_per_parity + k` for row
+    /// `group·lanes_per_parity + k`; rows past the last are zero.
+    pub fn memory(&self, formats: &Formats, quantised: &Quantised) -> Vec<Vec<i64>> {
+        let lanes = formats.lanes_per_parity;
+        let word = |matrix: Matrix, group: usize, j: usize| -> Vec<i64> {
+            let own = quantised.blocks(matrix);
+            (0..4)
+                .flat_map(|parity| (0..lanes).map(move |k| (parity, group * lanes + k)))
+                .map(|(parity, i)| match i < formats.quads {
+                    true => coefficient(formats, matrix.kind, own.parity[parity][i * formats.quads + j]),
+                    false => 0,
+                })
+                .collect()
+        };
+        let mut words = Vec::with_capacity(self.words());
+        for (index, &matrix) in self.matrices.iter().enumerate() {
+            for (group, columns) in self.columns[index].iter().enumerate() {
+                words.extend(columns.iter().map(|&j| word(matrix, group, j)));
+            }
+        }
+        words
+    }
+}
+
+/// Width of a word of the coefficient memory in bits.
+pub fn word_bits(formats: &Formats) -> usize {
+    4 * formats.lanes_per_parity * MULTIPLIER_BITS as usize
+}

@@ -1,0 +1,230 @@
+//! The widths and scales of a scene's pipeline, from the norms of its quantised matrices.
+//!
+//! The largest input times the ∞-norm of the matrix it is multiplied by is the largest output of a stage;
+//! [`formats`](crate::fixed::words::formats) has the table of the words.
+
+use faer::Mat;
+
+use crate::board::{Board, EngineKind};
+use crate::fixed::error::FixedError;
+use crate::fixed::words::arith::{bit_length, signed_bits};
+use crate::fixed::words::coefficients::{parity_blocks, quantise, Blocks, Flipped, Flips};
+use crate::fixed::words::formats::{
+    Formats, FORCE_BITS, LOG_FRACTION, MULTIPLIER_BITS, MU_ROUND, MU_STEPS, SEARCH_EXTRA_BITS,
+};
+use crate::fixed::words::quantised::Quantised;
+use crate::fixed::words::schedule::{vectors, EXPONENTS};
+use crate::matrices::Matrices;
+use crate::scene::Scene;
+use crate::symmetry::parity::{FLIP_X, FLIP_Y};
+use crate::symmetry::quads::Quads;
+
+/// Largest grid coordinate that coarse tiles and candidates beyond the disc reach.
+const REACH: u64 = 4;
+
+/// The subarrays of a case: their common matrices and their number.
+#[derive(Clone, Debug)]
+pub struct Shape {
+    /// Matrices of one subarray.
+    pub matrices: Matrices,
+    /// Number of subarrays.
+    pub parts: usize,
+}
+
+impl Shape {
+    /// The quad layout of a subarray.
+    pub fn quads(&self) -> Quads {
+        Quads { rows: self.matrices.sensor.rows, cols: self.matrices.sensor.cols }
+    }
+}
+
+/// The widths of all words, and the matrices in these widths.
+pub struct Widths {
+    /// Widths and scales, the same in all cases but for quads, lanes and groups.
+    pub formats: Formats,
+    /// The matrices of each case on one scale.
+    pub quantised: Vec<Quantised>,
+}
+
+/// Quantises the matrices of a scene's cases and derives the widths of all words; `board` has the multipliers. Where
+/// there are several cases the whole array's is the first. They share the hardware: every word has the width and scale
+/// that serves all of them. The formats are those of the first case with a lane for each row.
+///
+/// # Errors
+/// [`FixedError::Format`] if a word needs more than the 48-bit accumulator, or a norm of A more headroom than the data
+/// word has.
+pub fn widths(scene: &Scene, shapes: &[Shape], board: &Board) -> Result<Widths, FixedError> {
+    let spec = &scene.fixed;
+    let largest = shapes.first().ok_or(FixedError::Internal("a scene has a case"))?;
+    let degree = shapes.iter().map(|shape| shape.matrices.degree).max().unwrap_or(0);
+    // Narrower multipliers have narrower operands; the remaining bits of inverse and input go into low limbs.
+    let operand_bits = MULTIPLIER_BITS.min(board.multiplier_bits);
+    let (data_bits, coef_bits) = (spec.data_bits.min(operand_bits), spec.coef_bits.min(operand_bits));
+    let quantised = quantised(scene, shapes, coef_bits)?;
+    // The largest of a bound over all cases.
+    let bound = |of: &dyn Fn(&Quantised, usize) -> u64| {
+        let each = quantised.iter().zip(shapes).map(|(quantised, shape)| of(quantised, shape.quads().len()));
+        each.max().unwrap_or(0)
+    };
+    // The same in all cases: a scene with dead taxels, which break the symmetry, has one case and one subarray.
+    let Quantised { inverse, ax, ay } = &quantised[0];
+    let flips = Flips { inverse: inverse.flips(), ax: ax.flips(), ay: ay.flips() };
+
+    let sensor = &largest.matrices.sensor;
+    // Where all subarrays are square, one matrix is used for both axes.
+    let square = sensor.rows == sensor.cols && sensor.pitch_x_mm == sensor.pitch_y_mm;
+    let serial = board.engine == EngineKind::Serial;
+    let shared_a = !serial && degree == 1 && square && shapes.len() == 1 && flips.are_symmetric();
+
+    let input_bits = spec.input_bits + scene.input.average;
+    let fold_bits = input_bits + 2;
+    let input_low_bits = fold_bits.saturating_sub(operand_bits);
+    if input_low_bits >= operand_bits {
+        return Err(FixedError::Format { what: "folded input", needs: fold_bits, has: 2 * operand_bits - 1 });
+    }
+    let inverse_low_bits = spec.inverse_bits.saturating_sub(operand_bits);
+    let limb_align = input_low_bits.max(inverse_low_bits);
+    let raw_shift = input_low_bits.min(inverse_low_bits);
+
+    // v_00 in units of 2^raw_shift: the folded input reaches 2^(fold_bits − 1); one unit more for each dropped low·low
+    // product.
+    let raw_bound = bound(&|quantised, count| {
+        let dropped = (count * flips.inverse.len()) as u64;
+        ((u128::from(quantised.inverse.norm(count)) << (fold_bits - 1)) >> raw_shift) as u64 + 2 * dropped
+    });
+    let a_bound = bound(&|quantised, count| (quantised.ax.norm(count) + quantised.ay.norm(count)) << (data_bits - 1));
+    let acc_bits = signed_bits(raw_bound.max(a_bound));
+    if acc_bits > 48 {
+        return Err(FixedError::Format { what: "accumulator", needs: acc_bits, has: 48 });
+    }
+    // Scales are the same in all cases.
+    let (inverse_exponent, a_exponent) = (quantised[0].inverse.exponent, quantised[0].ax.exponent);
+    let vector_bits = data_bits + SEARCH_EXTRA_BITS;
+    let a_shift = if degree == 0 { 0 } else { a_exponent - SEARCH_EXTRA_BITS as i32 };
+    let a_shift = u32::try_from(a_shift).map_err(|_| FixedError::Format {
+        what: "scaled A (mu_max too large for this sensor)",
+        needs: SEARCH_EXTRA_BITS,
+        has: a_exponent.max(0) as u32,
+    })?;
+
+    let each = quantised.iter().zip(shapes);
+    let growths: Vec<Vec<f64>> =
+        each.map(|(q, shape)| growth(&q.ax, &q.ay, shape.quads().len(), EXPONENTS.len())).collect();
+    let growth = |k: usize| growths.iter().map(|growth| growth[k]).fold(0.0, f64::max);
+    let taxel_max = 1u64 << (vector_bits + 1);
+    let used = vectors(degree);
+    let coefficients: Vec<u64> = (0..used)
+        .map(|k| {
+            let (i, j) = EXPONENTS[k];
+            ((taxel_max as f64 * growth(k).min(1.0)) / 4f64.powi((i + j) as i32)).ceil() as u64 + 1
+        })
+        .collect();
+    let shifted: Vec<u64> = (0..used).map(|k| reach(&coefficients, k)).collect();
+    let taxels = (sensor.rows * sensor.cols) as u64;
+    // Without a search v_00 keeps its unfolded width.
+    let search_bits: Vec<u32> = match degree {
+        0 => vec![vector_bits + 2],
+        _ => shifted.iter().map(|&bound| signed_bits(bound)).collect(),
+    };
+    let sum_bits: Vec<u32> = shifted.iter().map(|&bound| signed_bits(bound * taxels)).collect();
+
+    // A logarithm is below 2^6; the difference of two sums of `taxels` of them needs a sign.
+    let score_bits = signed_bits(taxels << (6 + LOG_FRACTION));
+    // 18 bits of μ; fz, with its factor 1, needs no more fraction than that.
+    let mu_fraction = (f64::from((1 << 17) - 1) / scene.search.mu_max).log2().floor().min(17.0) as u32;
+    let mu_step = (scene.search.mu_max / MU_STEPS as f64 * 2f64.powi((mu_fraction + MU_ROUND) as i32)).round() as i64;
+
+    let raw_length_max = bit_length(raw_bound);
+    let rescale_max = raw_length_max.saturating_sub(vector_bits - 1);
+    let headroom = FORCE_BITS - search_bits[0];
+    let count = largest.quads().len();
+    let formats = Formats {
+        degree,
+        quads: count,
+        lanes_per_parity: count,
+        groups: 1,
+        shared_a,
+        flips,
+        code_bits: spec.input_bits,
+        input_bits,
+        fold_bits,
+        input_low_bits,
+        inverse_bits: spec.inverse_bits,
+        inverse_low_bits,
+        limb_align,
+        raw_shift,
+        inverse_exponent,
+        coef_bits,
+        a_exponent,
+        acc_bits,
+        raw_length_max,
+        data_bits,
+        vector_bits,
+        a_shift,
+        search_bits,
+        sum_bits,
+        score_bits,
+        mu_fraction,
+        mu_step,
+        // Taxels are in quarters of a vector's LSB; the largest rescale must still fit the force word.
+        force_exponent: raw_shift as i32 - inverse_exponent - 2 + rescale_max as i32 - headroom as i32,
+    };
+    Ok(Widths { formats, quantised })
+}
+
+/// The matrices of all cases as stored, on one scale.
+fn quantised(scene: &Scene, shapes: &[Shape], coef_bits: u32) -> Result<Vec<Quantised>, FixedError> {
+    let spec = &scene.fixed;
+    let scale = -4.0 / 3.0 * scene.search.mu_max;
+    // A dead taxel breaks the mirror symmetry: then every flip is tried, that of the symmetry first.
+    let looked_at = if scene.input.dead.is_empty() { 1 } else { 4 };
+    let folded = |shape: &Shape, matrix: &Mat<f64>, own: usize, scale: f64| -> Vec<Flipped<f64>> {
+        let scaled = |Flipped { flip, parity }| {
+            let parity: [Vec<f64>; 4] = parity;
+            Flipped { flip, parity: parity.map(|block| block.iter().map(|c| c * scale).collect()) }
+        };
+        (0..looked_at).map(|other| scaled(parity_blocks(shape.quads(), matrix, own ^ other))).collect()
+    };
+    let inverses: Vec<_> = shapes.iter().map(|shape| folded(shape, &shape.matrices.cz_pinv, 0, 1.0)).collect();
+    let pair = |shape: &Shape| {
+        [folded(shape, &shape.matrices.ax, FLIP_X, scale), folded(shape, &shape.matrices.ay, FLIP_Y, scale)]
+    };
+    let pairs: Vec<_> = shapes.iter().flat_map(pair).collect();
+    let mut inverses = quantise(&inverses, spec.inverse_bits).into_iter();
+    let mut pairs = quantise(&pairs, coef_bits).into_iter();
+    let mut next = || Some(Quantised { inverse: inverses.next()?, ax: pairs.next()?, ay: pairs.next()? });
+    shapes.iter().map(|_| next().ok_or(FixedError::Internal("as many matrices out as in"))).collect()
+}
+
+/// Bounds of ‖v_ij‖∞ / ‖v_00‖∞ from the ∞-norms of the stored A.
+fn growth(ax: &Blocks, ay: &Blocks, quads: usize, count: usize) -> Vec<f64> {
+    let unit = 2f64.powi(-ax.exponent);
+    let (x, y) = (ax.norm(quads) as f64 * unit, ay.norm(quads) as f64 * unit);
+    let mut bounds: Vec<f64> = Vec::with_capacity(count);
+    for &(i, j) in &EXPONENTS[..count] {
+        let of = |i: u32, j: u32| EXPONENTS.iter().position(|&e| e == (i, j)).and_then(|k| bounds.get(k).copied());
+        let bound = match (i, j) {
+            (0, 0) => 1.0,
+            _ => {
+                let left = i.checked_sub(1).and_then(|i| of(i, j)).unwrap_or(0.0);
+                let below = j.checked_sub(1).and_then(|j| of(i, j)).unwrap_or(0.0);
+                x * left + y * below
+            }
+        };
+        bounds.push(bound);
+    }
+    bounds
+}
+
+/// Bound of coefficient k after the centre has moved anywhere within ±[`REACH`]: Σ |v_ij| C(i, k) C(j, l)
+/// REACH^(i−k+j−l).
+fn reach(stored: &[u64], k: usize) -> u64 {
+    let (ki, kj) = EXPONENTS[k];
+    let choose = |n: u32, k: u32| (0..k).fold(1u64, |c, t| c * u64::from(n - t) / u64::from(t + 1));
+    stored
+        .iter()
+        .zip(EXPONENTS)
+        .filter(|(_, (i, j))| *i >= ki && *j >= kj)
+        .map(|(&bound, (i, j))| bound * choose(i, ki) * choose(j, kj) * REACH.pow(i - ki + j - kj))
+        .sum()
+}

@@ -1,0 +1,119 @@
+//! Run: a frame's codes through all stages, in the order of the hardware.
+//!
+//! ```text
+//! prepare ── receive ── choose ── each subarray of the chosen case ── force ── send
+//! ```
+
+use super::model::Model;
+use super::plan::cycles::Cycles;
+use super::stages::force::Force;
+use super::stages::receive::mask_dead;
+use super::stages::resultants::{self, sums};
+use super::stages::search::Best;
+use super::stages::send::{Status, CASE_SHIFT, FLAG_CONDITION, FLAG_FOUND, FLAG_NO_CONTACT};
+use super::subarray::SubarrayTrace;
+use crate::board::EngineKind;
+use crate::partition::Subarray;
+
+/// The words that one stage passed on for a frame, in the hardware's order.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Stage {
+    /// The stage's name, that of the tap in the hardware.
+    pub name: &'static str,
+    /// Words, each a list of signed fields.
+    pub words: Vec<Vec<i64>>,
+}
+
+/// Everything the hardware computes for one frame.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Trace {
+    /// Forces `[fx, fy, fz]` in force LSBs, row-major; with `output.forces = "resultants"` the sums of each subarray.
+    pub beats: Vec<[i32; 3]>,
+    /// Status beats, three words each ([`send`](super::stages::send)).
+    pub status: Vec<[i32; 3]>,
+    /// The words of each stage, in pipeline order.
+    pub stages: Vec<Stage>,
+    /// Cycle counts of the frame at full speed.
+    pub cycles: Cycles,
+}
+
+/// Stages that pass on single words, not quads, in the serial engine.
+const SINGLE_WORDS: [&str; 4] = ["normalise", "rescale", "unfold", "force"];
+
+impl Model {
+    /// Computes one reconstruction from its `codes`, `code_bits` wide: 2^average frames, each row-major over the array.
+    pub fn run(&self, codes: &[i32]) -> Trace {
+        let codes = &mask_dead(&self.prepare.run(codes), &self.dead);
+        let chosen = self.choose(codes);
+        let case = &self.cases()[chosen];
+        let sensor = &self.scene.sensor;
+        let solve = |part: &Subarray| SubarrayTrace::new(self, case, &part.gather(sensor, codes));
+        let solved: Vec<SubarrayTrace> = case.parts.iter().map(solve).collect();
+        let searched: Vec<bool> = solved.iter().map(|s| s.condition && self.searches()).collect();
+        let cycles = Cycles::of_case(self, case, &searched);
+        let number = if self.chooses() { case.number() } else { 0 };
+
+        let mut forces = vec![Force::default(); sensor.taxels()];
+        for (part, solved) in case.parts.iter().zip(&solved) {
+            part.scatter(sensor, &solved.forces(case, self.threshold), &mut forces);
+        }
+        let contact = forces.iter().any(|f| f.words[2] != 0);
+        let force_saturations = forces.iter().map(|f| f.saturations).sum();
+        let flag = |set: bool, bit: u32| if set { bit } else { 0 };
+        let status = solved.iter().flat_map(|s| {
+            let status = Status {
+                position: s.found.position,
+                flags: flag(s.condition, FLAG_CONDITION)
+                    | flag(s.found.score.is_some(), FLAG_FOUND)
+                    | flag(!contact, FLAG_NO_CONTACT)
+                    | number << CASE_SHIFT,
+                score: s.found.score.unwrap_or(0) as i32,
+                rescale: s.rescale,
+                normalise: s.normalise,
+                rescale_saturations: s.saturations,
+                force_saturations,
+                cycles: (cycles.first_output - self.prepare.latency() - self.resultants_delay()) as u32,
+            };
+            status.beats()
+        });
+        let status = status.collect();
+        let quads = |name, stream: fn(&SubarrayTrace) -> &[[i64; 4]]| Stage {
+            name,
+            words: solved.iter().flat_map(stream).map(|quad| quad.to_vec()).collect(),
+        };
+        let sweeps = solved.iter().flat_map(|s| &s.found.sweeps);
+        let candidate =
+            |b: &Best| vec![i64::from(b.position[0]), i64::from(b.position[1]), b.score, i64::from(b.taken)];
+        let mut stages = vec![
+            Stage { name: "receive", words: codes.iter().map(|&code| vec![i64::from(code)]).collect() },
+            Stage { name: "choose", words: vec![vec![chosen as i64]] },
+            quads("normalise", |s| &s.normalised),
+            quads("fold", |s| &s.folded),
+            quads("pass", |s| &s.passed),
+            quads("rescale", |s| &s.rescaled),
+            quads("unfold", |s| &s.unfolded),
+            Stage { name: "search", words: sweeps.map(candidate).collect() },
+            quads("force", |s| &s.found.values),
+        ];
+        stages.retain(|stage| self.chooses() || stage.name != "choose");
+        Trace {
+            beats: match self.sends_resultants() {
+                false => forces.iter().map(|f| f.words).collect(),
+                true => case.parts.iter().flat_map(|part| resultants::beats(&sums(sensor, part, &forces))).collect(),
+            },
+            status,
+            stages: as_engine_streams(self.board.engine, stages),
+            cycles: cycles.after_choice(self),
+        }
+    }
+}
+
+/// The stages as the board's engine passes them on: the serial engine's single shifter passes on words, not quads.
+fn as_engine_streams(engine: EngineKind, mut stages: Vec<Stage>) -> Vec<Stage> {
+    if engine == EngineKind::Serial {
+        for stage in stages.iter_mut().filter(|stage| SINGLE_WORDS.contains(&stage.name)) {
+            stage.words = stage.words.iter().flatten().map(|&word| vec![word]).collect();
+        }
+    }
+    stages
+}

@@ -1,0 +1,92 @@
+//! Stage `pass`: matrix-vector products on the MAC lanes.
+//!
+//! `4·lanes_per_parity` lanes multiply the four parities of one broadcast quad per cycle by coefficients, each lane for
+//! one row; rows beyond the lanes follow in groups. All products of a v_ij are added up in the accumulator before it is
+//! rounded.
+//! ```text
+//! v_00:  acc = Σ_j 2^limb_align Ch fh + Ch (fl·2^a) + (Cl·2^c) fh       Cz⁺ = 2^kc Ch + Cl,  f = 2^kf fh + fl
+//! v_ij:  acc = Σ_j (−Ay')·v_{i,j−1} + (−Ax')·v_{i−1,j}                  A' = A·(4/3)·mu_max
+//! ```
+//! The product of the two low limbs, below 2^−22 of the largest result, is left out. The smaller low limb is stored
+//! shifted left (a, c), so that both mixed products have the same weight.
+
+use crate::fixed::words::formats::Formats;
+use crate::fixed::words::quantised::{coefficient, Quantised};
+use crate::fixed::words::schedule::{Matrix, Operand, Product};
+use crate::symmetry::quads::Quads;
+
+/// A folded input or v_ij, four parities per quad.
+pub type Vector = Vec<[i64; 4]>;
+
+/// The operands of the passes.
+#[derive(Clone, Debug, Default)]
+pub struct Operands {
+    /// High limbs of the folded input.
+    pub input_high: Vector,
+    /// Low limbs of the folded input, shifted left by `limb_align − input_low_bits`.
+    pub input_low: Vector,
+    /// Finished v_ij, `data_bits` wide.
+    pub vectors: Vec<Vector>,
+}
+
+impl Operands {
+    /// Splits a folded input into limbs.
+    pub fn of_input(folded: &[[i64; 4]], formats: &Formats) -> Self {
+        let low = formats.input_low_bits;
+        let mask = (1 << low) - 1;
+        let align = formats.limb_align - low;
+        Operands {
+            input_high: folded.iter().map(|quad| quad.map(|f| f >> low)).collect(),
+            input_low: folded.iter().map(|quad| quad.map(|f| (f & mask) << align)).collect(),
+            vectors: Vec::new(),
+        }
+    }
+
+    fn get(&self, operand: Operand) -> &Vector {
+        match operand {
+            Operand::InputHigh => &self.input_high,
+            Operand::InputLow => &self.input_low,
+            Operand::Vector(index) => &self.vectors[index],
+        }
+    }
+}
+
+/// Accumulates all `products` of one v_ij: one accumulator per quad and parity, in row order.
+///
+/// A transposed product reads its operand with x and y exchanged, and so is its result.
+pub fn pass(
+    formats: &Formats,
+    quantised: &Quantised,
+    layout: Quads,
+    products: &[Product],
+    operands: &Operands,
+) -> Vector {
+    let quads = formats.quads;
+    let mut accumulators = vec![[0i64; 4]; quads];
+    for product in products {
+        let source = operands.get(product.operand);
+        let align = if product.align { formats.limb_align } else { 0 };
+        let Matrix { kind, flip } = product.matrix;
+        let own = quantised.blocks(product.matrix);
+        let source = if product.transposed { &transpose(layout, source) } else { source };
+        for (i, row) in accumulators.iter_mut().enumerate() {
+            for (target, acc) in row.iter_mut().enumerate() {
+                for (j, quad) in source.iter().enumerate() {
+                    let c = coefficient(formats, kind, own.parity[target][i * quads + j]);
+                    *acc += (c * quad[target ^ flip]) << align;
+                }
+            }
+        }
+    }
+    accumulators
+}
+
+/// A quad vector with x and y exchanged, of a square subarray: quad (r, c) from quad (c, r), lanes 1 and 2 swapped.
+pub fn transpose(layout: Quads, quads: &[[i64; 4]]) -> Vector {
+    (0..quads.len()).map(|address| swap(quads[layout.transposed(address)])).collect()
+}
+
+/// A quad with its two mirrors exchanged.
+pub fn swap([a, b, c, d]: [i64; 4]) -> [i64; 4] {
+    [a, c, b, d]
+}

@@ -1,0 +1,95 @@
+//! Stage `send`: forces, then status, on the output stream.
+//!
+//! Forces are sent row-major over the array, one beat per taxel, `{fz, fy, fx}`; then [`STATUS_BEATS`] beats for each
+//! subarray of the chosen case, row-major. Saturations of `force`, the contact flag and the cycles are those of the
+//! whole frame, the same for every subarray:
+//!
+//! | beat | fx word | fy word | fz word |
+//! |---|---|---|---|
+//! | 0 | μ1 in mu_max/384 | μ2 in mu_max/384 | flags, see [`Status`] |
+//! | 1 | score, 2^−6 | right shift of `rescale` | left shift of `normalise` |
+//! | 2 | saturations of `rescale` | saturations of `force` | cycles to the first output beat, see [`Status::cycles`] |
+
+use serde::Serialize;
+
+/// Status beats per subarray after the forces.
+pub const STATUS_BEATS: usize = 3;
+
+/// Flag bit: the centroid condition of the scene is met.
+pub const FLAG_CONDITION: u32 = 1;
+/// Flag bit: the search found a candidate with Σp > 0.
+pub const FLAG_FOUND: u32 = 1 << 1;
+/// Flag bit: no taxel's |fz| reaches the threshold, or all are zero.
+pub const FLAG_NO_CONTACT: u32 = 1 << 2;
+/// Flag bit: since the last frame sent, `tlast` came early or was missing and the frame concerned was dropped.
+pub const FLAG_FRAMING: u32 = 1 << 3;
+/// Flag bit: the coefficient memory does not hold the generated coefficients; only with `hardware.coefficient_check =
+/// "signature"` ([`crate::fixed::plan::check`]).
+pub const FLAG_COEFFICIENTS: u32 = 1 << 4;
+/// Position of the paper's case number, 2 bits, among the flags; 0 where a scene has one case.
+pub const CASE_SHIFT: u32 = 8;
+
+/// The decoded status of a subarray in one frame.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+pub struct Status {
+    /// μ* in units of mu_max / 384.
+    pub position: [i32; 2],
+    /// OR of the `FLAG_*` bits; with several cases, also the paper's number of the chosen case from bit [`CASE_SHIFT`]
+    /// on.
+    pub flags: u32,
+    /// Score at μ* in LSBs of 2^−6 bit, 0 if the search found nothing.
+    pub score: i32,
+    /// Right shift of `rescale`.
+    pub rescale: u32,
+    /// Left shift of `normalise`.
+    pub normalise: u32,
+    /// Number of words saturated in `rescale`.
+    pub rescale_saturations: u32,
+    /// Number of force words saturated.
+    pub force_saturations: u32,
+    /// Cycles to the first output beat, from the frame's last beat into `receive`; for a frame that waited in the
+    /// buffer, from the cycle before its computation started.
+    pub cycles: u32,
+}
+
+impl Status {
+    /// The status as beats `[fx, fy, fz]`.
+    pub fn beats(&self) -> [[i32; 3]; STATUS_BEATS] {
+        [
+            [self.position[0], self.position[1], self.flags as i32],
+            [self.score, self.rescale as i32, self.normalise as i32],
+            [self.rescale_saturations as i32, self.force_saturations as i32, self.cycles as i32],
+        ]
+    }
+
+    /// The status from its beats; `None` unless there are [`STATUS_BEATS`] of them.
+    pub fn of_beats(beats: &[[i32; 3]]) -> Option<Self> {
+        let &[[x, y, flags], [score, rescale, normalise], [rescale_saturations, force_saturations, cycles]] = beats
+        else {
+            return None;
+        };
+        Some(Status {
+            position: [x, y],
+            flags: flags as u32,
+            score,
+            rescale: rescale as u32,
+            normalise: normalise as u32,
+            rescale_saturations: rescale_saturations as u32,
+            force_saturations: force_saturations as u32,
+            cycles: cycles as u32,
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn beats_read_back() {
+        let status =
+            Status { position: [-3, 384], flags: 5, score: -70_000, rescale: 20, normalise: 3, ..Status::default() };
+        assert_eq!(Status::of_beats(&status.beats()), Some(status));
+        assert_eq!(Status::of_beats(&[[0; 3]]), None);
+    }
+}

@@ -1,0 +1,117 @@
+//! The order of the matrix passes: which product feeds which v_ij.
+//!
+//! v_00 = Cz⁺ b comes first, in limbs; then v_ij = −(Ax v_{i−1,j} + Ay v_{i,j−1}) by rising degree, so that every
+//! operand is finished as early as possible before it is needed. All products of a v_ij are added up in one
+//! accumulator, which is rounded once. A matrix without the mirror symmetry has one product for each of its parity
+//! flips. Hardware and bit-true model read the same list.
+
+use super::coefficients::Flips;
+use super::formats::Formats;
+
+/// (i, j) of the v_ij up to degree 3, in order of computation.
+pub const EXPONENTS: [(u32, u32); 10] =
+    [(0, 0), (1, 0), (0, 1), (2, 0), (1, 1), (0, 2), (3, 0), (2, 1), (1, 2), (0, 3)];
+
+/// Number of v_ij for a polynomial of `degree`.
+pub fn vectors(degree: usize) -> usize {
+    (degree + 1) * (degree + 2) / 2
+}
+
+/// Contents of a matrix in the coefficient memory.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Kind {
+    /// High limb of Cz⁺.
+    InverseHigh,
+    /// Low limb of Cz⁺.
+    InverseLow,
+    /// −Ax·(4/3)·mu_max.
+    Ax,
+    /// −Ay·(4/3)·mu_max.
+    Ay,
+}
+
+/// A matrix in the coefficient memory: the blocks of one parity flip.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Matrix {
+    /// What the matrix contains.
+    pub kind: Kind,
+    /// Source parity = target parity XOR `flip`.
+    pub flip: usize,
+}
+
+/// A vector that a pass multiplies.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Operand {
+    /// High limb of the folded input.
+    InputHigh,
+    /// Low limb of the folded input.
+    InputLow,
+    /// v_ij, by its index in [`EXPONENTS`].
+    Vector(usize),
+}
+
+/// One matrix-vector product.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Product {
+    /// The matrix.
+    pub matrix: Matrix,
+    /// The vector.
+    pub operand: Operand,
+    /// Whether the product, one of two high limbs, is shifted left by `formats.limb_align` bits.
+    pub align: bool,
+    /// Whether operand and result have x and y exchanged.
+    pub transposed: bool,
+}
+
+/// The products of every v_ij, in order of [`EXPONENTS`].
+pub fn schedule(formats: &Formats) -> Vec<Vec<Product>> {
+    let limbs = (formats.input_low_bits > 0, formats.inverse_low_bits > 0);
+    products(formats.degree, limbs, formats.shared_a, &formats.flips)
+}
+
+/// The products for a polynomial of `degree`; `limbs`: whether the input and Cz⁺ have a low limb; `shared_a`: whether
+/// Ax is used for Ay; `flips` of the matrices.
+pub fn products(degree: usize, limbs: (bool, bool), shared_a: bool, flips: &Flips) -> Vec<Vec<Product>> {
+    let of = |kind, flips: &[usize], operand, align, transposed| -> Vec<Product> {
+        let product = |&flip| Product { matrix: Matrix { kind, flip }, operand, align, transposed };
+        flips.iter().map(product).collect()
+    };
+    let mut first = of(Kind::InverseHigh, &flips.inverse, Operand::InputHigh, true, false);
+    if limbs.0 {
+        first.extend(of(Kind::InverseHigh, &flips.inverse, Operand::InputLow, false, false));
+    }
+    if limbs.1 {
+        first.extend(of(Kind::InverseLow, &flips.inverse, Operand::InputHigh, false, false));
+    }
+    let index = |i, j| EXPONENTS.iter().position(|&e| e == (i, j));
+    let mut all = vec![first];
+    for &(i, j) in EXPONENTS[..vectors(degree)].iter().skip(1) {
+        let mut products = Vec::new();
+        if let Some(source) = j.checked_sub(1).and_then(|below| index(i, below)) {
+            let (kind, flips) = if shared_a { (Kind::Ax, &flips.ax) } else { (Kind::Ay, &flips.ay) };
+            products.extend(of(kind, flips, Operand::Vector(source), false, shared_a));
+        }
+        if let Some(source) = i.checked_sub(1).and_then(|left| index(left, j)) {
+            products.extend(of(Kind::Ax, &flips.ax, Operand::Vector(source), false, false));
+        }
+        // The older operand first: its pass hides the latency of the younger one.
+        products.sort_by_key(Product::operand_index);
+        all.push(products);
+    }
+    all
+}
+
+/// Whether the result of these products has x and y exchanged.
+pub fn is_transposed(products: &[Product]) -> bool {
+    products.iter().any(|product| product.transposed)
+}
+
+impl Product {
+    /// Index of the operand's v_ij; 0 for the limbs of the input.
+    pub fn operand_index(&self) -> usize {
+        match self.operand {
+            Operand::Vector(index) => index,
+            Operand::InputHigh | Operand::InputLow => 0,
+        }
+    }
+}

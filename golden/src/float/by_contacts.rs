@@ -1,0 +1,94 @@
+//! Contacts: the result of `partition.case = "contacts"`, one region and one μ for each contact.
+//!
+//! ```text
+//! whole array, one μ ── float::contacts ── regions, their μ and p ── Eq. 1, threshold ── forces, load of each region
+//! ```
+//!
+//! | | shape | unit |
+//! |---|---|---|
+//! | in: frame | n | MPa |
+//! | out: forces | 3 × n | N |
+//! | out: regions | μ, centre, load, taxels | –, mm, N |
+
+use super::contacts::{Contacts, MeasuredStress, Solver};
+use super::force::threshold;
+use super::golden::{EngineInput, Golden};
+use super::objective::{Objective, Sparse};
+use super::pass::Polynomial;
+use super::search::search;
+use super::segment::Segments;
+use crate::frame::{Forces, Frame};
+use crate::reconstruct::{Reconstruction, Region};
+use crate::scene::Condition;
+use crate::sensor::Sensor;
+
+impl Golden {
+    /// The contacts of a frame with their μ; `None` if no candidate is compressive.
+    pub(super) fn find_contacts(&self, input: &EngineInput) -> Option<Contacts> {
+        let (scene, matrices) = (&self.scene, self.matrices());
+        let family = Polynomial::new(matrices, input.stress_MPa);
+        let found = search(&family, scene.search.mu_max, &|p| Sparse::default().score(p))?;
+        let (mu_max, p0) = (scene.search.mu_max, family.v(0, 0));
+        let (b, noise_MPa) = (input.stress_MPa, input.noise_MPa);
+        let stress = self.taxels.as_ref().map(|taxels| MeasuredStress { taxels, b, noise_MPa });
+        let searched = |segments: &Segments, region: usize| self.meets_condition(input, segments, region);
+        let solver = Solver { matrices, mu_max, objective: &Sparse::default(), p0, stress, searched: &searched };
+        Some(solver.solve(&family, found))
+    }
+
+    /// Whether the taxels of a region meet the scene's condition.
+    fn meets_condition(&self, input: &EngineInput, segments: &Segments, region: usize) -> bool {
+        let own = || (0..input.codes.len()).filter(move |&k| segments.labels[k] == region).map(|k| input.codes[k]);
+        let (above, below) = (own().any(|code| code > input.floor), own().any(|code| code < -input.floor));
+        match self.scene.partition.condition {
+            Condition::Loaded => above || below,
+            Condition::BothSigns => above && below,
+        }
+    }
+
+    /// Reconstructs a frame with one region per contact.
+    pub(super) fn contacts(&self, frame: &Frame, input: &EngineInput) -> Reconstruction {
+        let scene = &self.scene;
+        let mut outcome = self.subarrays(input, self.whole());
+        let Some(contacts) = self.find_contacts(input) else {
+            return self.finish(frame, outcome);
+        };
+        let (x, truncation) = self.whole().apply_form(input.stress_MPa, contacts.forces());
+        outcome.truncation = truncation.into_iter().collect();
+        let forces = threshold(x, scene.threshold.min_force_N);
+        let met: Vec<bool> =
+            (0..contacts.segments.count).map(|k| self.meets_condition(input, &contacts.segments, k)).collect();
+        let own = regions(&scene.sensor, &contacts, &met, &forces);
+        outcome.forces = forces;
+        let mut result = self.finish(frame, outcome);
+        result.extra.regions = Some(own);
+        result.extra.sweeps = Some(contacts.sweeps);
+        result.extra.converged = Some(contacts.converged);
+        result
+    }
+}
+
+/// The regions of a frame, from the solved contacts and the reported forces; `met[k]`: whether region k meets the
+/// condition.
+fn regions(sensor: &Sensor, contacts: &Contacts, met: &[bool], forces: &Forces) -> Vec<Region> {
+    let region = |k: usize| {
+        let taxels: Vec<usize> = (0..sensor.taxels()).filter(|&t| contacts.segments.labels[t] == k).collect();
+        let sum = |axis: &[f64]| taxels.iter().map(|&t| axis[t]).sum();
+        let (mut moment, mut weight) = ([0.0; 2], 0.0);
+        for &taxel in &taxels {
+            let at = sensor.position_mm(taxel / sensor.cols, taxel % sensor.cols);
+            let fz = forces.fz[taxel].max(0.0);
+            weight += fz;
+            moment = [moment[0] + fz * at[0], moment[1] + fz * at[1]];
+        }
+        Region {
+            centroid_condition: met[k],
+            mu: contacts.mu(k),
+            objective_value: contacts.found[k].map(|found| found.objective),
+            centre_mm: (weight > 0.0).then(|| moment.map(|sum| sum / weight)),
+            load_N: [sum(&forces.fx), sum(&forces.fy), sum(&forces.fz)],
+            taxels,
+        }
+    };
+    (0..contacts.segments.count).map(region).collect()
+}

@@ -1,0 +1,47 @@
+//! By evidence: a frame estimated by [`crate::evidence`], as a result of the golden engine.
+//!
+//! The array is one subarray, whatever its contacts; its μ is the ratio of the resultants. Noise of zero means that the
+//! scene states none: it is found from the frame.
+
+use super::force::threshold;
+use super::golden::{CaseOutcome, EngineInput, Golden};
+use crate::checks::COUNTS_FROM;
+use crate::evidence::{ContactEstimate, Evidence};
+use crate::frame::Frame;
+use crate::partition::Subarray;
+use crate::reconstruct::{Reconstruction, SubarrayResult};
+
+impl Golden {
+    /// Estimates the contacts of calibrated stress, clipped readings as they are.
+    pub(super) fn by_evidence(&self, evidence: &Evidence, frame: &Frame, input: &EngineInput) -> Reconstruction {
+        let (rows, cols) = (self.scene.sensor.rows, self.scene.sensor.cols);
+        let part = Subarray { row0: 0, col0: 0, rows, cols };
+        let received = self.receive(input, &part);
+        let estimate = evidence.solve(input.stress_MPa, (input.noise_MPa > 0.0).then_some(input.noise_MPa));
+        let forces = threshold(estimate.forces_N, self.scene.threshold.min_force_N);
+        let [x, y, normal] = forces.resultant();
+        let mu = if normal > 0.0 { [x / normal, y / normal] } else { [0.0; 2] };
+        let subarrays = vec![SubarrayResult::new(&part, &received, mu, None)];
+        let mut result = self.finish(frame, CaseOutcome { subarrays, forces, ..CaseOutcome::default() });
+        result.checks.noise_MPa = Some(estimate.noise_MPa);
+        result.checks.misfit_probability = estimate.misfit_probability;
+        result.checks.shear_spread = shear_spread(&estimate.contacts);
+        result.extra.contacts = Some(estimate.contacts);
+        result
+    }
+}
+
+/// Standard deviation of the shear over its size, the largest of all contacts with a share of the load. Below a
+/// hundredth of the normal force a shear counts as none, and its standard deviation is taken over that.
+fn shear_spread(contacts: &[ContactEstimate]) -> Option<f64> {
+    let total: f64 = contacts.iter().map(|contact| contact.force_N[2]).sum();
+    let spread = |contact: &ContactEstimate| {
+        let ([x, y, normal], [sx, sy, _]) = (contact.force_N, contact.sigma_N);
+        sx.hypot(sy) / x.hypot(y).max(NO_SHEAR * normal)
+    };
+    let counts = contacts.iter().filter(|contact| contact.force_N[2] >= COUNTS_FROM * total);
+    counts.map(spread).filter(|spread| spread.is_finite()).reduce(f64::max)
+}
+
+/// Share of the normal force below which a shear counts as none.
+const NO_SHEAR: f64 = 0.01;

@@ -1,0 +1,53 @@
+//! Errors of a board's link.
+
+use thiserror::Error;
+
+/// A scene or board cannot have a link.
+#[derive(Clone, Debug, PartialEq, Error)]
+pub enum LinkError {
+    /// The engine of the scene does not send one force per taxel and a fixed number of status beats for each frame.
+    #[error(
+        "{field} = {value}: a board's link does not support it; it needs one frame per answer, one force per taxel and the \
+         same subarrays in every frame"
+    )]
+    Unsupported {
+        /// The scene's field.
+        field: &'static str,
+        /// Its value.
+        value: String,
+    },
+    /// A payload is longer than its length field allows.
+    #[error("scene {scene}: {what} of {taxels} taxels take {bytes} bytes, a packet holds 65535")]
+    TooLong {
+        /// The scene's name.
+        scene: String,
+        /// The kind of payload.
+        what: &'static str,
+        /// Number of taxels.
+        taxels: usize,
+        /// Length of the payload in bytes.
+        bytes: usize,
+    },
+    /// The bit rate is too high for the board's clock.
+    #[error("constraints/{board}.toml: {field} = {value}: the clock of {clock_MHz} MHz takes at most {most}")]
+    TooFast {
+        /// The board's name.
+        board: String,
+        /// Field of its file.
+        field: &'static str,
+        /// Its bit rate in the field's unit.
+        value: f64,
+        /// The engine's clock.
+        clock_MHz: f64,
+        /// The highest bit rate in the field's unit.
+        most: f64,
+    },
+    /// The scene asks for SPI on a board without pins for it.
+    #[error(
+        "hardware.link = \"spi\": board {board} has no pins for it (no spi_MHz in constraints/{board}.toml); it has \"uart\""
+    )]
+    NoPins {
+        /// The board's name.
+        board: String,
+    },
+}
