@@ -9,8 +9,8 @@
 //! sin θ Cy) S where Cz is positive, and bounded by its 2-norm elsewhere. The norm is convex in (cos θ, sin θ) and even
 //! in both, so a few directions of one quadrant are enough: 9 miss at most 1 − cos(π/32) = 0.5 %.
 //!
-//! The degree follows from r and from its effect on drawn contacts ([`crate::degree`]), unless the scene sets `search.degree`;
-//! it is at least 1 if mu_max > 0.
+//! The degree follows from r and from its effect on drawn contacts ([`crate::degree`]), unless the scene sets
+//! `search.degree`; it is at least 1 if mu_max > 0.
 //!
 //! | | shape | unit |
 //! |---|---|---|
@@ -18,8 +18,8 @@
 //! | out: Cz⁺ | n × n | mm² (N per MPa) |
 //! | out: Ax, Ay | n × n | – |
 //!
-//! Everything is computed in the basis of mirror parities ([`crate::symmetry::folded`]), a sixteenth of the work; the mirror
-//! symmetry of the array holds to the bit in every matrix, so folding it again is exact.
+//! Everything is computed in the basis of mirror parities ([`crate::symmetry::folded`]), a sixteenth of the work; the
+//! mirror symmetry of the array holds to the bit in every matrix, so folding it again is exact.
 
 pub mod cache;
 mod inverse;

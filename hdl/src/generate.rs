@@ -242,8 +242,8 @@ fn cycles(of: impl Fn(&[bool]) -> Cycles, parts: usize) -> serde_json::Value {
     json!({ "searched": of(&vec![true; parts]), "not_searched": of(&vec![false; parts]) })
 }
 
-/// Manifest entry of one of several cases; its cycles exclude the [`LATENCY`](dermis_golden::fixed::stages::choose::LATENCY) of
-/// the choice.
+/// Manifest entry of one of several cases; its cycles exclude the
+/// [`LATENCY`](dermis_golden::fixed::stages::choose::LATENCY) of the choice.
 fn case(model: &Model, case: &CasePlan) -> serde_json::Value {
     json!({
         "case": case.number(),

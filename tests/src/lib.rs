@@ -21,6 +21,7 @@
 //! | `synthesis` | Yosys reads the Verilog without latch or undriven signal |
 //! | `scenes` | the same equality for scenes of other shapes, degrees, words and conditions |
 //! | `scale` | the largest array, and a thousand random frames with stalls on both streams |
+//! | `circles` | no two modules of the golden crate use one another, directly or through others |
 //! | `words` | no file has a phrase of `tests/words.txt` |
 //! | `lint` | the generated Verilog is clean under Verilator with its waivers, and every waiver is needed |
 #![deny(missing_docs)]

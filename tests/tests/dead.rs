@@ -121,7 +121,8 @@ fn fixed_is_near_golden() {
 #[test]
 fn mirrored_pairs_keep_a_symmetry() {
     let flips = |dead: &[[usize; 2]]| {
-        let flips = Model::new(&masked("sensor-1", dead)).unwrap().formats().clone().flips;
+        let model = Model::new(&masked("sensor-1", dead)).unwrap();
+        let flips = &model.formats().flips;
         [flips.inverse.len(), flips.ax.len(), flips.ay.len()]
     };
     assert_eq!(flips(&[[4, 6]]), [4; 3]);

@@ -45,7 +45,7 @@ fn dead_taxels_cost_what_two_builds_differ_by() {
     assert_eq!(costs.flip_flops, with.flip_flops as i64 - without.flip_flops as i64);
     let cycles = |model: &Model| Cycles::of(model, &[true]).latency as i64;
     assert_eq!(costs.cycles, cycles(&dead) - cycles(&alive));
-    assert_eq!(dead.storage.words(), 4 * alive.storage.words());
+    assert_eq!(dead.storage().words(), 4 * alive.storage().words());
     assert!(saved("[fixed]\nlanes = 36\n", "dead taxels")[2] > 0);
 }
 

@@ -66,7 +66,7 @@ fn frames(scene: &Scene) -> Vec<Frame> {
 fn the_scenes_have_the_limbs_they_are_here_for() {
     for (name, limbs) in [("narrow", [false, false]), ("16-bit", [false, true]), ("odd", [true, true])] {
         let (_, text) = SCENES.iter().find(|(n, _)| *n == name).unwrap();
-        let formats = Model::new(&parse(name, text)).unwrap().formats;
+        let formats = Model::new(&parse(name, text)).unwrap().formats().clone();
         assert_eq!([formats.input_low_bits > 0, formats.inverse_low_bits > 0], limbs, "{name}");
     }
 }

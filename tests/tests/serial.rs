@@ -120,7 +120,7 @@ fn a_wrong_coefficient_is_found() {
     let (scene, _) = scene("eight-by-eight");
     let right = Model::new(&on_board(scene)).unwrap();
     let mut wrong = right.clone();
-    wrong.quantised.ax.flips[0].parity[2][5] ^= 1;
+    wrong.first_mut().quantised.ax.flips[0].parity[2][5] ^= 1;
     let file = |model: &Model| {
         generate(model).unwrap().files.iter().find(|f| f.name == "coefficients.hex").unwrap().text.clone()
     };

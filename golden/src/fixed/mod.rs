@@ -1,8 +1,9 @@
 //! The bit-true model: the hardware's arithmetic in integers, stage by stage.
 //!
 //! ```text
-//! codes → prepare → receive → choose → normalise → fold → pass → rescale → unfold → search → force → send → beats, status
-//!                                                          ↑______________|  v_ij of the next degree
+//! codes → prepare → receive → choose
+//!       → normalise → fold → pass → rescale → unfold → search → force → send → beats, status
+//!                             ↑________|  v_ij of the next degree
 //! ```
 //! Each stage is one file in [`stages`] and one file of the same name in the hardware description. The [`Trace`] keeps
 //! what every stage passes on under the stage's name; tests compare it word for word with every simulation of the

@@ -1,6 +1,6 @@
 //! The bit-true model of one scene: its plan, and the codes of a frame.
 
-use std::ops::Deref;
+use std::ops::{Deref, DerefMut};
 
 use super::error::FixedError;
 use super::plan::cases::{planned, planned_with};
@@ -25,6 +25,12 @@ impl Deref for Model {
 
     fn deref(&self) -> &Plan {
         &self.plan
+    }
+}
+
+impl DerefMut for Model {
+    fn deref_mut(&mut self) -> &mut Plan {
+        &mut self.plan
     }
 }
 

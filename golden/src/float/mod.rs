@@ -16,8 +16,8 @@
 //! folding is an exact change of basis.
 //!
 //! The driver: [`Golden`] runs the stages for each subarray of a scene (`golden`), between the input and the output
-//! options (`run`, with `unipolar` for readings that a sensor clips). `adaptive` and `by_contacts` have the partitions that depend on the frame, `by_evidence` the
-//! estimators that take the place of the search.
+//! options (`run`, with `unipolar` for readings that a sensor clips). `adaptive` and `by_contacts` have the partitions
+//! that depend on the frame, `by_evidence` the estimators that take the place of the search.
 
 pub mod contacts;
 pub mod force;

@@ -11,8 +11,9 @@
 //! | in: b | n | MPa |
 //! | out: v_ij | (d + 1)(d + 2)/2 of n | N |
 //!
-//! 1 + d(d + 1) matrix-vector products of n²/4 multiplications in the basis of mirror parities ([`crate::symmetry::folded`]). The
-//! remainder of the series is of the order r^(d+1) ([`crate::matrices`]). Feeds `search` and `force`.
+//! 1 + d(d + 1) matrix-vector products of n²/4 multiplications in the basis of mirror parities
+//! ([`crate::symmetry::folded`]). The remainder of the series is of the order r^(d+1) ([`crate::matrices`]). Feeds
+//! `search` and `force`.
 
 #[cfg(test)]
 mod tests;

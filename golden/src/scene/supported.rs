@@ -17,9 +17,9 @@
 //! layer 1.5. "auto" takes "evidence" for these scenes and "search" for the others.
 //!
 //! Dead taxels in hardware: Cz⁺, Ax and Ay are multiplied by Π ([`crate::matrices::Matrices::without`]). The broken
-//! mirror symmetry takes up to four products instead of one ([`crate::fixed::words::coefficients`]). A subarray with a dead
-//! taxel needs its own matrices, while the subarrays of the engine share theirs: with several subarrays, dead taxels
-//! are rejected.
+//! mirror symmetry takes up to four products instead of one ([`crate::fixed::words::coefficients`]). A subarray with a
+//! dead taxel needs its own matrices, while the subarrays of the engine share theirs: with several subarrays, dead
+//! taxels are rejected.
 //!
 //! Fields not listed are the same for both. Rules are checked in the order of the table, so a scene with several
 //! rejected values always reports the same one.

@@ -1,4 +1,5 @@
-//! Stages `force` and `send`: one product at a time, a beat every [`BEAT`](dermis_golden::fixed::plan::serial::BEAT) cycles.
+//! Stages `force` and `send`: one product at a time, a beat every
+//! [`BEAT`](dermis_golden::fixed::plan::serial::BEAT) cycles.
 //!
 //! ```text
 //! phase  0 order | 1 bank | 2 … 4 factors μ1, μ2, 1 | 3 … 5 products | 4 … 6 rounder | 8 … 10 forces

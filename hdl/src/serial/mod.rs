@@ -1,7 +1,7 @@
 //! The serial engine: the arithmetic of the parallel engine for a device of a few thousand logic cells.
 //!
-//! Schedule, cycle counts and memories are described in [`dermis_golden::fixed::plan::serial`]; the docs of each block say
-//! what it does in which cycle. The ports are those of the parallel [`Engine`](crate::engine::Engine), so that test
+//! Schedule, cycle counts and memories are described in [`dermis_golden::fixed::plan::serial`]; the docs of each block
+//! say what it does in which cycle. The ports are those of the parallel [`Engine`](crate::engine::Engine), so that test
 //! bench, link and host are the same.
 //!
 //! ```text

@@ -10,8 +10,8 @@ use crate::wire::Wire;
 /// ```text
 /// word, valid (four of a quad) --> four accumulators --> mixed, one after the other
 /// ```
-/// Accumulator p adds (−1)^{p·l} times word l, as [`hadamard`](dermis_golden::fixed::words::arith::hadamard). The first sum
-/// leaves in the cycle after the last word; the next quad may start when the fourth has left.
+/// Accumulator p adds (−1)^{p·l} times word l, as [`hadamard`](dermis_golden::fixed::words::arith::hadamard). The first
+/// sum leaves in the cycle after the last word; the next quad may start when the fourth has left.
 #[derive(LogicBlock)]
 pub struct SerialButterfly {
     /// Clock; registers change on its rising edge.

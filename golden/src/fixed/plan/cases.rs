@@ -1,7 +1,8 @@
 //! The partition cases of a plan: that of the scene, or several on shared hardware of which each frame takes one.
 //!
-//! A case beyond the first adds counter limits, addresses, its coefficients in the shared memory and a frame buffer. The
-//! result of a frame is to the bit that of the chosen case alone; [`choose`](crate::fixed::stages::choose) chooses it.
+//! A case beyond the first adds counter limits, addresses, its coefficients in the shared memory and a frame buffer.
+//! The result of a frame is to the bit that of the chosen case alone; [`choose`](crate::fixed::stages::choose) chooses
+//! it.
 //!
 //! Where the scene lists no cases, the largest set of cases that fits the board is built, and of equally large sets the
 //! one with the finest cases. A case left out is kept in [`Dropped`] with the resources of a design that includes it.

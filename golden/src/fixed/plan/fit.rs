@@ -39,8 +39,8 @@ pub fn fit(scene: &Scene, shapes: &[Shape], board: &Board, widths: Widths) -> (V
     (laid_out.into_iter().zip(quantised).zip(shapes).map(design).collect(), resources)
 }
 
-/// Lanes and memories of the parallel engine: the scene's number of lanes, else the most for which there is block RAM. Block RAM is
-/// preferred to distributed RAM, since a deep distributed RAM is the longest path of its design.
+/// Lanes and memories of the parallel engine: the scene's number of lanes, else the most for which there is block RAM.
+/// Block RAM is preferred to distributed RAM, since a deep distributed RAM is the longest path of its design.
 fn parallel(
     formats: &Formats,
     matrices: &[Matrix],

@@ -154,7 +154,7 @@ impl<'a> FloatReference<'a> {
     }
 
     fn formats(&self) -> &Formats {
-        &self.bit_true.model.formats()
+        self.bit_true.model.formats()
     }
 
     /// The words of a stage, of all subarrays in order; four fields per quad.

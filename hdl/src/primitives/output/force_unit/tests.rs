@@ -2,23 +2,21 @@
 
 use std::collections::VecDeque;
 
-use dermis_golden::fixed::plan::cases;
 use dermis_golden::fixed::stages::force::{force, mu_word};
 use dermis_golden::fixed::stages::send::{
     FLAG_COEFFICIENTS, FLAG_CONDITION, FLAG_FOUND, FLAG_FRAMING, FLAG_NO_CONTACT,
 };
-use dermis_golden::fixed::Plan;
 use dermis_golden::scene::Scene;
 
 use super::*;
 use crate::language::testbench::{check, random_word, Reference};
 use crate::wire::Word;
 
-fn planned(side: usize, more: &str) -> Plan {
+fn model(side: usize, more: &str) -> Model {
     let text = format!(
         "name = \"force\"\n[sensor]\nrows = {side}\ncols = {side}\npitch_x_mm = 4.0\npitch_y_mm = 4.0\nthickness_mm = 3.0\n{more}"
     );
-    cases::planned(&Scene::parse(&text, "force.toml").unwrap()).unwrap()
+    Model::new(&Scene::parse(&text, "force.toml").unwrap()).unwrap()
 }
 
 /// A request, and its value once it has been read.
@@ -198,9 +196,8 @@ fn stimulus(model: &Model, block: &ForceUnit, cycles: usize) -> Vec<Vec<Word>> {
 }
 
 fn is_the_model_s(side: usize, more: &str, threshold: i64) {
-    let mut plan = planned(side, more);
-    plan.threshold = threshold;
-    let model = Model::from(plan);
+    let mut model = model(side, more);
+    model.threshold = threshold;
     let block = ForceUnit::new(&model);
     check(block.kernel.kernel(), &stimulus(&model, &block, 6000), &mut Requests::new(model));
 }
