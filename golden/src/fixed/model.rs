@@ -107,7 +107,7 @@ impl Model {
     /// The stress that [`Model::reconstruct_averaged`] reconstructs: the calibrated mean of 2^average frames, in MPa.
     ///
     /// # Errors
-    /// [`InputError`] unless there are 2^average frames, all of the scene's sensor.
+    /// [`InputError`](crate::input::InputError) unless there are 2^average frames, all of the scene's sensor.
     pub fn stress(&self, frames: &[Frame]) -> Result<Frame, FixedError> {
         let input = Input::new(&self.scene)?;
         Ok(input.calibrate(&input.average(&self.scene, frames)?))
@@ -126,7 +126,7 @@ impl Model {
     /// The codes of a frame of stress, from a converter without input options.
     ///
     /// # Errors
-    /// [`FrameError`] if the frame's sensor is not the scene's.
+    /// [`FrameError`](crate::frame::FrameError) if the frame's sensor is not the scene's.
     pub fn codes(&self, frame: &Frame) -> Result<Codes, FixedError> {
         frame.check(&self.scene)?;
         Ok(quantise(&frame.stress_MPa, self.formats().code_bits, full_scale(&self.scene, frame)))

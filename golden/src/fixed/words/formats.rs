@@ -94,7 +94,7 @@ pub struct Formats {
     pub vector_bits: u32,
     /// Right shift from the accumulator of an A pass to a v_ij.
     pub a_shift: u32,
-    /// Width of each v_ij in the search memory, in order of [`EXPONENTS`].
+    /// Width of each v_ij in the search memory, in order of [`EXPONENTS`](super::schedule::EXPONENTS).
     pub search_bits: Vec<u32>,
     /// Width of Σ over taxels of each v_ij.
     pub sum_bits: Vec<u32>,

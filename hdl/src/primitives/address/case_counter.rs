@@ -7,7 +7,7 @@ use crate::language::{Body, Builder, Expr};
 use crate::primitives::address::counter::{count_bits, kernel};
 use crate::wire::Wire;
 
-/// As [`Counter`](super::Counter), with the limit of case `which`. When `which` changes, the count must be below the
+/// As [`Counter`](super::counter::Counter), with the limit of case `which`. When `which` changes, the count must be below the
 /// new limit, or be cleared before it is enabled again.
 #[derive(LogicBlock)]
 pub struct CaseCounter {

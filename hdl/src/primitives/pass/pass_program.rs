@@ -107,10 +107,10 @@ pub struct PassProgram {
     /// Address in the operand memory, and in its low bits in the input memory; [`latency`](PassProgram::latency) cycles after
     /// `column`.
     pub operand_address: Wire<Out>,
-    /// Operand selection as in [`OperandSelect`](super::OperandSelect): kind, flip, exchange, from bit 0; with the
+    /// Operand selection as in [`OperandSelect`](super::operand_select::OperandSelect): kind, flip, exchange, from bit 0; with the
     /// addresses.
     pub source: Wire<Out>,
-    /// Control of [`Lanes`](super::Lanes) from bit 0: align, first, last product of an accumulation; with the
+    /// Control of [`Lanes`](crate::primitives::arithmetic::lanes::Lanes) from bit 0: align, first, last product of an accumulation; with the
     /// coefficient check also first product of a subarray; with the addresses.
     pub control: Wire<Out>,
     kernel: Body,

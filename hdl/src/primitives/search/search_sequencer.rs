@@ -42,7 +42,7 @@ pub struct SearchSequencer {
     pub best_x: Wire<In>,
     /// Best position, y, in grid steps, signed.
     pub best_y: Wire<In>,
-    /// Move of the sweep, as in [`Taylor`](super::Taylor): x in bits 1:0, y in bits 3:2, halving in bit 4.
+    /// Move of the sweep, as in [`Taylor`](super::taylor::Taylor): x in bits 1:0, y in bits 3:2, halving in bit 4.
     pub step: Wire<Out>,
     /// The sweep is the last: it only moves to the best position.
     pub last: Signal<Out, Bit>,
