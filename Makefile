@@ -15,7 +15,7 @@ PACKAGES   = verilator iverilog yosys nextpnr-ice40 fpga-icestorm g++ make chrom
 QUICK     ?=
 
 .DEFAULT_GOAL := help
-.PHONY: help setup tools program run test fmt clippy unit lint quick docs bench build cosim bitstream report guide netlist fuzz stress train clean
+.PHONY: help setup tools program run test fmt clippy unit lint quick docs bench build cosim bitstream report guide netlist fuzz stress nightly train clean
 
 help: ## list the targets
 	@sed -n 's/^\([a-z]*\):.*## /\1	/p' $(MAKEFILE_LIST) | expand -t 10
@@ -36,7 +36,7 @@ program: setup
 run: program ## co-simulate SCENES on their shipped frames and print the table
 	$(DERMIS) --build-dir $(BUILD) table --cosim $(SCENES)
 
-test: setup fmt clippy unit lint quick docs ## run all checks, as .ci/run does
+test: setup fmt clippy unit quick docs ## run all checks, as .ci/run does
 
 fmt: ## check the formatting
 	@echo '== fmt'
@@ -50,14 +50,9 @@ unit: setup ## run all tests: unit, command line, co-simulation
 	@echo '== unit'
 	$(CARGO) test --workspace
 
-lint: setup ## check wording against tests/words.txt, lint the generated Verilog with its waivers
+lint: setup ## check wording against tests/words.txt, lint the generated Verilog with its waivers; part of unit
 	@echo '== lint'
-	$(CARGO) test --quiet --workspace --test words
-	@set -e; for scene in $(SCENES); do \
-	  $(CARGO) run --quiet --bin dermis -- build $$scene --out $(BUILD)/$$scene/rtl >/dev/null; \
-	  (cd $(BUILD)/$$scene/rtl && $(VERILATOR) --lint-only -Wall *.vlt *.v); \
-	  echo "$$scene: verilator --lint-only -Wall is clean"; \
-	done
+	$(CARGO) test --workspace --test words --test lint
 
 quick: setup ## write the short report to build/report-quick
 	@echo '== quick report'
@@ -96,6 +91,8 @@ fuzz: ## run 10^7 mutated inputs through the file readers, 10^5 frames through b
 
 stress: ## stress the streams: 4*10^6 cycles each of stalls, wrong tlast and resets
 	DERMIS_STRESS_CYCLES=4000000 $(CARGO) test --release -p dermis-tests --test streams -- --nocapture
+
+nightly: netlist fuzz stress ## run the long variants of the tests, one after the other
 
 train: program ## train the network of SCENE for search.estimator = "learned" (a quarter of an hour)
 	mkdir -p $(BUILD)

@@ -12,12 +12,15 @@
 //! A path that is no regular file, such as a pipe or `/dev/stdout`, is written to directly: it has no old content to
 //! keep.
 
-use std::fs::{self, File, OpenOptions};
-use std::io::{Error, ErrorKind, Write};
+use std::fs::{self, Permissions};
+use std::io::{Error, Write};
+use std::os::unix::fs::PermissionsExt;
 use std::path::{Path, PathBuf};
-use std::sync::atomic::{AtomicUsize, Ordering};
 
 use thiserror::Error;
+
+/// Permissions of a new file before the process's mask.
+const NEW_FILE: u32 = 0o666;
 
 /// A file or folder could not be read or written; a failed write leaves its old content.
 #[derive(Debug, Error)]
@@ -54,38 +57,25 @@ fn replace(path: &Path, bytes: &[u8]) -> Result<(), Error> {
         Some(folder) if !folder.as_os_str().is_empty() => folder,
         _ => Path::new("."),
     };
-    let (mut file, part) = new_file(folder)?;
-    let whole = file.write_all(bytes).and_then(|()| match fs::metadata(&target) {
-        Ok(found) => file.set_permissions(found.permissions()),
-        Err(_) => Ok(()),
-    });
-    let done = whole.and_then(|()| file.sync_all()).and_then(|()| fs::rename(&part, &target));
-    if done.is_err() {
-        // If this fails as well, the first error is the one to report.
-        let _ = fs::remove_file(&part);
+    // A missing folder is reported without the name of the temporary file.
+    fs::metadata(folder)?;
+    // Deleted when dropped, unless it became the target.
+    let mut part = tempfile::Builder::new()
+        .prefix(".dermis-")
+        .permissions(Permissions::from_mode(NEW_FILE))
+        .tempfile_in(folder)?;
+    part.write_all(bytes)?;
+    if let Ok(found) = fs::metadata(&target) {
+        part.as_file().set_permissions(found.permissions())?;
     }
-    done
-}
-
-/// Creates a new file with an unused name.
-fn new_file(folder: &Path) -> Result<(File, PathBuf), Error> {
-    static NUMBER: AtomicUsize = AtomicUsize::new(0);
-    loop {
-        let number = NUMBER.fetch_add(1, Ordering::Relaxed);
-        let part = folder.join(format!(".dermis-{}-{number}", std::process::id()));
-        match OpenOptions::new().write(true).create_new(true).open(&part) {
-            // Left behind by an earlier process with the same id.
-            Err(error) if error.kind() == ErrorKind::AlreadyExists => continue,
-            opened => return Ok((opened?, part)),
-        }
-    }
+    part.as_file().sync_all()?;
+    part.persist(&target)?;
+    Ok(())
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use std::fs::Permissions;
-    use std::os::unix::fs::PermissionsExt;
 
     fn names(folder: &Path) -> Vec<String> {
         let mut names: Vec<String> =

@@ -13,7 +13,7 @@ use rust_hdl::prelude::*;
 use serde::Serialize;
 use thiserror::Error;
 
-use crate::generate::HdlError;
+use crate::error::HdlError;
 use crate::language::{Attributes, Hierarchy, SEPARATOR};
 use crate::simulate::{design, Design};
 use crate::wire::Word;

@@ -5,10 +5,11 @@
 //!  s_axis -->  |  frame buffer         |      ^________|  v_ij             |                  |--> m_axis
 //!              '--- magnitude, signs --'                                   '--- μ, score -----'
 //! ```
-//! Three overlaps shorten the frame interval:
-//! - While one subarray is searched, the v_ij of the next are computed.
+//! Overlaps shorten the frame interval:
 //! - While a frame is computed, the next is received; the frame buffer is free as soon as `fold` has read it.
-//! - While a frame is sent, the first v_ij of the next are computed; they wait until that frame has been sent.
+//! - While one subarray is searched, the v_ij of the next are computed, or those of the next frame's first.
+//! - While a frame is sent, the next is searched. Only its values wait until the first one has been sent; where there are
+//!   several subarrays, its search does.
 //!
 //! Without a search there is no memory in which v_ij could wait: then a frame starts when the previous one has been
 //! sent. Where the case is chosen per frame, it is chosen while the frame is received. [`ReceiveStage`] and [`SearchStage`] are
@@ -19,7 +20,7 @@ use dermis_golden::scene::Condition;
 use rust_hdl::prelude::*;
 
 use crate::ports::one_of;
-use crate::primitives::{count_bits, largest, BitDelay, CaseCounter, Counter, Dff, EnableRegister, CYCLE_BITS};
+use crate::primitives::{count_bits, largest, BitDelay, CaseCounter, Dff, EnableRegister, FrameCycles};
 use crate::stages::{
     Banks, Fold, Force, Normalise, Pass, Prepare, Receive, ReceivePorts, Rescale, Resultants, Search, SearchPorts,
     Send, Unfold, Unsearched,
@@ -117,8 +118,6 @@ pub struct Engine {
     send: Send,
     resultants: Resultants,
     begins: BitDelay,
-    begun: BitDelay,
-    waits: BitDelay,
     computing: Dff,
     first: Dff,
     filled: Dff,
@@ -128,26 +127,31 @@ pub struct Engine {
     framing: Dff,
     searched_condition: Dff,
     searched_last: Dff,
+    searched_framing: Dff,
     sent_framing: Dff,
     frame_case: EnableRegister,
+    searched_case: EnableRegister,
     sent_case: EnableRegister,
     searched_part: EnableRegister,
     searched_normalise: EnableRegister,
     searched_rescale: EnableRegister,
     searched_saturations: EnableRegister,
     searched_damaged: EnableRegister,
-    cycles: Counter,
+    frame_cycles: FrameCycles,
     part: CaseCounter,
     again: BitDelay,
     handed: BitDelay,
     seeks: BitDelay,
     opens: BitDelay,
-    finish: BitDelay,
     both_signs: Constant<Bit>,
     ahead: Constant<Bit>,
+    single: Constant<Bit>,
     pub(crate) begin_frame: Signal<Local, Bit>,
     start: Signal<Local, Bit>,
+    leaves: Signal<Local, Bit>,
+    passed: Signal<Local, Bit>,
     complete: Signal<Local, Bit>,
+    unsent: Signal<Local, Bit>,
     behind: Signal<Local, Bit>,
     hand_over: Signal<Local, Bit>,
     begin_send: Signal<Local, Bit>,
@@ -183,8 +187,6 @@ impl Engine {
             send: Send::new(model),
             resultants: Resultants::new(model.sends_resultants(), &model.scene.sensor, model.grid()),
             begins: BitDelay::new(1),
-            begun: BitDelay::new(1),
-            waits: BitDelay::new(1),
             computing: Default::default(),
             first: Default::default(),
             filled: Default::default(),
@@ -194,8 +196,10 @@ impl Engine {
             framing: Default::default(),
             searched_condition: Default::default(),
             searched_last: Default::default(),
+            searched_framing: Default::default(),
             sent_framing: Default::default(),
             frame_case: EnableRegister::new(which).constant(!model.chooses()),
+            searched_case: EnableRegister::new(which).constant(!model.chooses()),
             sent_case: EnableRegister::new(which).constant(!model.chooses()),
             searched_part: EnableRegister::new(count_bits(largest(&counts))),
             searched_normalise: EnableRegister::new(normalise.shift.width()),
@@ -204,19 +208,21 @@ impl Engine {
             searched_damaged: EnableRegister::new(1).constant(!model.has_coefficient_check()),
             normalise,
             rescale,
-            cycles: Counter::new(1 << CYCLE_BITS),
+            frame_cycles: Default::default(),
             part: CaseCounter::new(&counts),
             again: BitDelay::new(1),
             handed: BitDelay::new(1),
             seeks: BitDelay::new(1),
             opens: BitDelay::new(1),
-            // By then the first output beat has sampled `cycles`.
-            finish: BitDelay::new(9),
             both_signs: Constant::new(model.scene.partition.condition == Condition::BothSigns),
             ahead: Constant::new(model.searches()),
+            single: Constant::new(counts.iter().all(|&count| count == 1)),
             begin_frame: Default::default(),
             start: Default::default(),
+            leaves: Default::default(),
+            passed: Default::default(),
             complete: Default::default(),
+            unsent: Default::default(),
             behind: Default::default(),
             hand_over: Default::default(),
             begin_send: Default::default(),
@@ -240,7 +246,7 @@ impl Logic for Engine {
         self.search.clk.next = self.clk.val();
         self.forces.clk.next = self.clk.val();
         self.send.clk.next = self.clk.val();
-        self.cycles.clk.next = self.clk.val();
+        self.frame_cycles.clk.next = self.clk.val();
         self.part.clk.next = self.clk.val();
         self.again.clk.next = self.clk.val();
         self.again.rst.next = self.rst.val();
@@ -250,14 +256,9 @@ impl Logic for Engine {
         self.seeks.rst.next = self.rst.val();
         self.opens.clk.next = self.clk.val();
         self.opens.rst.next = self.rst.val();
-        self.finish.clk.next = self.clk.val();
-        self.finish.rst.next = self.rst.val();
         self.begins.clk.next = self.clk.val();
         self.begins.rst.next = self.rst.val();
-        self.begun.clk.next = self.clk.val();
-        self.begun.rst.next = self.rst.val();
-        self.waits.clk.next = self.clk.val();
-        self.waits.rst.next = self.rst.val();
+        self.frame_cycles.rst.next = self.rst.val();
         self.computing.clk.next = self.clk.val();
         self.first.clk.next = self.clk.val();
         self.filled.clk.next = self.clk.val();
@@ -267,8 +268,10 @@ impl Logic for Engine {
         self.framing.clk.next = self.clk.val();
         self.searched_condition.clk.next = self.clk.val();
         self.searched_last.clk.next = self.clk.val();
+        self.searched_framing.clk.next = self.clk.val();
         self.sent_framing.clk.next = self.clk.val();
         self.frame_case.clk.next = self.clk.val();
+        self.searched_case.clk.next = self.clk.val();
         self.sent_case.clk.next = self.clk.val();
         self.searched_part.clk.next = self.clk.val();
         self.searched_normalise.clk.next = self.clk.val();
@@ -286,52 +289,64 @@ impl Logic for Engine {
         self.resultants.clk.next = self.clk.val();
         self.resultants.rst.next = self.rst.val();
 
-        comment!("A frame starts: buffer full, previous frame computed");
+        comment!("A frame starts: buffer full, previous frame out of the passes");
         self.begins.d.next = self.receive.full.val()
             & !self.begins.q.val()
             & !self.computing.q.val()
             & (!self.sending.q.val() | self.ahead.val());
         self.begin_frame.next = self.begins.q.val();
-        self.computing.d.next =
-            (self.begin_frame.val() | (self.computing.q.val() & !self.finish.q.val())) & !self.rst.val();
 
-        comment!("Case of the frame being computed, case of the frame being sent");
+        comment!("Case of the frame in the passes, searched, sent");
         self.frame_case.keep.next = self.begin_frame.val();
         self.frame_case.word.next = self.receive.which.val();
         self.fold.which.next = self.frame_case.kept.val();
         self.pass.which.next = self.frame_case.kept.val();
         self.rescale.which.next = self.frame_case.kept.val();
         self.unfold.which.next = self.frame_case.kept.val();
-        self.search.which.next = self.frame_case.kept.val();
+        self.search.fill_which.next = self.frame_case.kept.val();
+        self.search.which.next = self.searched_case.kept.val();
         self.part.which.next = self.frame_case.kept.val();
         self.forces.which.next = self.sent_case.kept.val();
         self.send.which.next = self.sent_case.kept.val();
 
         comment!("A subarray goes to the search when the search is idle;");
-        comment!("the first of a frame also waits for the previous send");
+        comment!("the first of several also waits for the previous send");
         self.begin_send.next = self.search.values_begin.val() & self.searched_last.q.val();
         self.sent_case.keep.next = self.begin_send.val();
-        self.sent_case.word.next = self.frame_case.kept.val();
+        self.sent_case.word.next = self.searched_case.kept.val();
         self.sending.d.next =
             (self.begin_send.val() | (self.sending.q.val() & !self.send.done.val())) & !self.rst.val();
         self.complete.next = self.filled.q.val() | self.unfold.done.val();
-        self.behind.next = self.first.q.val() & self.sending.q.val() & !self.send.done.val();
+        self.unsent.next = self.sending.q.val() & !self.send.done.val();
+        self.behind.next = self.first.q.val() & self.unsent.val() & !self.single.val();
         self.hand_over.next =
             self.complete.val() & !self.behind.val() & (!self.searching.q.val() | self.search.done.val());
+        self.leaves.next = self.hand_over.val() & self.part.last.val();
+        self.passed.next = self.search.done.val() & self.searched_last.q.val();
+        if self.ahead.val() {
+            self.passed.next = self.leaves.val();
+        }
+        self.computing.d.next =
+            (self.begin_frame.val() | (self.computing.q.val() & !self.passed.val())) & !self.rst.val();
+        self.searched_case.keep.next = self.hand_over.val();
+        self.searched_case.word.next = self.frame_case.kept.val();
         self.handed.d.next = self.hand_over.val();
         self.opens.d.next = self.hand_over.val() & self.first.q.val();
         self.filled.d.next = self.complete.val() & !self.hand_over.val() & !self.rst.val();
         self.searching.d.next =
             (self.hand_over.val() | (self.searching.q.val() & !self.search.done.val())) & !self.rst.val();
         self.first.d.next = self.begin_frame.val() | (self.first.q.val() & !self.hand_over.val());
-        self.finish.d.next = self.search.done.val() & self.searched_last.q.val();
         self.searched_condition.d.next = self.searched_condition.q.val();
         self.searched_last.d.next = self.searched_last.q.val();
+        self.searched_framing.d.next = self.searched_framing.q.val();
         self.sent_framing.d.next = self.sent_framing.q.val();
+        if self.begin_send.val() {
+            self.sent_framing.d.next = self.searched_framing.q.val();
+        }
         if self.hand_over.val() {
             self.searched_condition.d.next = self.condition.q.val();
             self.searched_last.d.next = self.part.last.val();
-            self.sent_framing.d.next = self.framing.q.val();
+            self.searched_framing.d.next = self.framing.q.val();
         }
         self.searched_part.keep.next = self.hand_over.val();
         self.searched_part.word.next = self.part.value.val();
@@ -350,12 +365,11 @@ impl Logic for Engine {
         self.part.enable.next = self.hand_over.val();
         self.again.d.next = self.hand_over.val() & !self.part.last.val();
         self.start.next = self.begin_frame.val() | self.again.q.val();
-        comment!("Stalls behind the previous frame are excluded");
-        comment!("Registered once to shorten the route to the counter");
-        self.begun.d.next = self.begin_frame.val();
-        self.waits.d.next = self.complete.val() & self.behind.val();
-        self.cycles.clear.next = self.begun.q.val();
-        self.cycles.enable.next = !self.waits.q.val();
+        comment!("Waiting for the previous frame is not counted");
+        self.frame_cycles.begin_frame.next = self.begin_frame.val();
+        self.frame_cycles.waits.next = self.complete.val() & self.first.q.val() & !self.hand_over.val();
+        self.frame_cycles.hand_over.next = self.leaves.val();
+        self.frame_cycles.stands.next = self.search.stands.val();
         self.condition.d.next = self.condition.q.val();
         self.framing.d.next = self.framing.q.val();
         if self.start.val() {
@@ -396,6 +410,7 @@ impl Logic for Engine {
         self.rescale.start.next = self.start.val();
         self.rescale.quad.next = self.pass.quad.val();
         self.rescale.quad_valid.next = self.pass.quad_valid.val();
+        self.rescale.quad_soon.next = self.pass.quad_soon.val();
         self.pass.vector_quad.next = self.rescale.operands.val();
         self.pass.vector_valid.next = self.rescale.operands_valid.val();
         self.unfold.start.next = self.start.val();
@@ -410,6 +425,7 @@ impl Logic for Engine {
         self.seeks.d.next = self.handed.q.val();
         self.search.start.next = self.seeks.q.val();
         self.search.enabled.next = self.searched_condition.q.val();
+        self.search.ready.next = !self.unsent.val() | !self.single.val();
 
         comment!("search -> force -> send");
         self.forces.values.next = self.search.values.val();
@@ -417,6 +433,9 @@ impl Logic for Engine {
         self.forces.begin_frame.next = self.begin_frame.val();
         if self.ahead.val() {
             self.forces.begin_frame.next = self.opens.q.val();
+            if self.single.val() {
+                self.forces.begin_frame.next = self.search.settled.val();
+            }
         }
         self.forces.start.next = self.search.settled.val();
         self.forces.part.next = self.searched_part.kept.val();
@@ -430,7 +449,7 @@ impl Logic for Engine {
         self.forces.damaged.next = self.searched_damaged.kept.val();
         self.forces.condition.next = self.searched_condition.q.val();
         self.forces.framing.next = self.sent_framing.q.val();
-        self.forces.cycles.next = self.cycles.value.val();
+        self.forces.cycles.next = self.frame_cycles.cycles.val();
         self.send.start.next = self.begin_send.val();
         self.send.room.next = self.forces.room.val();
         self.forces.offer.next = self.send.offer.val();

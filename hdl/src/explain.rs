@@ -6,7 +6,8 @@ use dermis_golden::fixed::{Cycles, Model};
 use serde::Serialize;
 use serde_json::json;
 
-use crate::generate::{usage, Generated, HdlError};
+use crate::error::HdlError;
+use crate::generate::{usage, Generated};
 use crate::usage::{total, Usage};
 
 /// A feature of the hardware.

@@ -3,65 +3,28 @@
 use std::collections::BTreeMap;
 
 use dermis_golden::board::EngineKind;
+use dermis_golden::fixed::plan::interval::frame_interval;
 use dermis_golden::fixed::plan::resources::Memory;
 use dermis_golden::fixed::plan::storage::word_bits;
 use dermis_golden::fixed::stages::send::{
     CASE_SHIFT, FLAG_COEFFICIENTS, FLAG_CONDITION, FLAG_FOUND, FLAG_FRAMING, FLAG_NO_CONTACT, STATUS_BEATS,
 };
 use dermis_golden::fixed::{CasePlan, Cycles, Dropped, Model};
-use dermis_golden::link::{c_header, LinkError};
+use dermis_golden::link::c_header;
 use dermis_golden::partition::Case;
 use serde::Serialize;
 use serde_json::json;
-use thiserror::Error;
 
 use crate::core_file::core_file;
 use crate::describe::port_comment;
 use crate::device::Tap;
-use crate::language::{self, Attributes, Change, Hierarchy, KernelError};
-use crate::manifest::seal;
+use crate::error::HdlError;
+use crate::language::{self, Attributes, Change, Hierarchy};
+use crate::manifest::{seal, GeneratedFile, MANIFEST, MANIFEST_VERSION};
 use crate::primitives::MEMORY_FILE;
 use crate::simulate::design;
 use crate::taps::taps;
 use crate::usage::{stages, total, PlacedMemory, Usage};
-
-/// `manifest_version`: version of the generated files' meaning; a reader rejects any other.
-pub(crate) const MANIFEST_VERSION: u32 = 1;
-/// File name of the manifest.
-pub(crate) const MANIFEST: &str = "manifest.json";
-
-/// Why no hardware can be generated from a model.
-#[derive(Debug, Error)]
-pub enum HdlError {
-    /// The scene omits a feature that a board's top module always has.
-    #[error("{field} = {value}: a board without {what} is not available yet")]
-    Unsupported {
-        /// Field of the scene.
-        field: &'static str,
-        /// Its value.
-        value: String,
-        /// The feature that would be omitted.
-        what: &'static str,
-    },
-    /// The scene's link cannot be built.
-    #[error(transparent)]
-    Link(#[from] LinkError),
-    /// A block's kernel is not sound; a defect of this crate.
-    #[error("internal: {0}")]
-    Kernel(#[from] KernelError),
-    /// The description fails rust-hdl's checks; a defect of this crate.
-    #[error("internal: the hardware description does not pass its checks: {0}")]
-    Check(String),
-}
-
-/// A file of the generated hardware.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct GeneratedFile {
-    /// File name without folder.
-    pub name: String,
-    /// Content.
-    pub text: String,
-}
 
 /// The generated hardware of one scene.
 #[derive(Clone, Debug)]
@@ -140,7 +103,7 @@ pub fn generate_changed(model: &Model, changes: &[Change]) -> Result<Generated, 
     let file = |name: String, text: String| GeneratedFile { name, text };
     let hierarchy = Hierarchy::of(&*engine).changed(changes)?;
     let memories = placed(&hierarchy, model)?;
-    let verilog = header(model, &top) + &hierarchy.verilog(&top, &attributes(&memories, model), &port_comment);
+    let verilog = header(model, &top) + &hierarchy.verilog(&top, &attributes(&memories), &port_comment);
     let usage = stages(model, &hierarchy, &memories);
     let dropped = refused(model)?;
     let manifest = manifest(model, &top, &usage, &memories, &dropped);
@@ -179,17 +142,14 @@ pub(crate) fn placed(hierarchy: &Hierarchy, model: &Model) -> Result<Vec<PlacedM
 }
 
 /// The `ram_style` attribute of every memory.
-pub(crate) fn attributes(memories: &[PlacedMemory], model: &Model) -> Attributes {
+pub(crate) fn attributes(memories: &[PlacedMemory]) -> Attributes {
     let attribute = |memory: &PlacedMemory| {
         let style = match (memory.planned.large_rams, memory.planned.block_rams) {
             (0, 0) => "distributed",
             (0, _) => "block",
             _ => "huge",
         };
-        // The serial engine never reads a word in the cycle that writes it, so no logic is needed to define what it
-        // would read.
-        let check = if model.board.engine == EngineKind::Serial { ", no_rw_check" } else { "" };
-        ((memory.block.clone(), memory.array.clone()), format!("ram_style = \"{style}\"{check}"))
+        ((memory.block.clone(), memory.array.clone()), format!("ram_style = \"{style}\""))
     };
     memories.iter().map(attribute).collect()
 }
@@ -253,6 +213,7 @@ fn case(model: &Model, case: &CasePlan) -> serde_json::Value {
         "status_beats": case.status_beats(),
         "coefficient_words": case.storage.words(),
         "cycles": cycles(|searched| Cycles::of_case(model, case, searched), case.parts.len()),
+        "frame_interval": frame_interval(model, case),
     })
 }
 
@@ -310,6 +271,7 @@ fn manifest(
             "memories": memories,
         },
         "cycles": cycles(|searched| Cycles::of(model, searched), model.parts().len()),
+        "frame_interval": frame_interval(model, model.first()),
         "cases": model.chooses().then(|| model.cases().iter().map(|own| case(model, own)).collect::<Vec<_>>()),
         "dropped": model.chooses().then_some(dropped),
     })

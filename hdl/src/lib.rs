@@ -39,10 +39,13 @@ pub mod usage;
 pub mod wire;
 
 mod core_file;
+mod error;
 mod generate;
 mod ports;
 mod simulate;
 mod taps;
 
-pub use generate::{generate, generate_changed, Generated, GeneratedFile, HdlError, Refused};
+pub use error::HdlError;
+pub use generate::{generate, generate_changed, Generated, Refused};
+pub use manifest::GeneratedFile;
 pub use simulate::simulator;

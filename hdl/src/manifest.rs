@@ -15,12 +15,24 @@ use serde::{Deserialize, Serialize};
 use serde_json::{json, Value};
 use thiserror::Error;
 
-use crate::generate::{GeneratedFile, MANIFEST, MANIFEST_VERSION};
+/// `manifest_version`: version of the generated files' meaning; a reader rejects any other.
+pub(crate) const MANIFEST_VERSION: u32 = 1;
+/// File name of the manifest.
+pub(crate) const MANIFEST: &str = "manifest.json";
 
 /// Largest manifest that is read, in bytes; the largest scene's takes 30 kB.
 const LARGEST: u64 = 4 << 20;
 /// Largest generated file that is read, in bytes; the largest scene's Verilog takes 2 MB.
 const LARGEST_FILE: u64 = 256 << 20;
+
+/// A file of the generated hardware.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct GeneratedFile {
+    /// File name without folder.
+    pub name: String,
+    /// Content.
+    pub text: String,
+}
 
 /// Size and checksum of a generated file.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]

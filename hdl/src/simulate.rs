@@ -5,7 +5,7 @@ use dermis_golden::fixed::Model;
 use rust_hdl::prelude::*;
 
 use crate::device::{Device, Inputs, Outputs};
-use crate::generate::HdlError;
+use crate::error::HdlError;
 use crate::language::Hierarchy;
 use crate::primitives::{CALIBRATION_FILE, COLUMN_FILE, MEMORY_FILE};
 use crate::taps::{words, Observed};

@@ -13,8 +13,8 @@ use std::time::{Duration, Instant};
 use dermis_golden::fixed::Model;
 use dermis_golden::frame::Frame;
 use dermis_golden::scene::Scene;
-use dermis_sim::drive::{record, InputFrame, Stimulus};
-use dermis_sim::hardware::{Hardware, Simulator};
+use dermis_sim::cosim::drive::{record, InputFrame, Stimulus};
+use dermis_sim::cosim::hardware::{Hardware, Simulator};
 
 /// Runs of each simulator, of which the fastest counts.
 const RUNS: usize = 20;

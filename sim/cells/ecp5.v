@@ -39,9 +39,9 @@ module MULT18X18D (
     REG_OUTPUT_CLK == "NONE" ? product[35:0] : product_register;
 endmodule
 
-// A block RAM of 18 kbit as 1024 words of two bytes of nine bits, without output registers and resets.
+// A block RAM of 18 kbit as 1024 words of two bytes of nine bits, with optional output registers, without resets.
 // Words of 1, 2 and 4 bits use eight of a byte's nine bits. Words of 36 bits use the data pins of both ports: port A
-// writes them, port B reads them.
+// writes them, port B reads them, and both ports' output registers are to have the same clock and enable.
 module DP16KD (
   input DIA0, DIA1, DIA2, DIA3, DIA4, DIA5, DIA6, DIA7, DIA8, DIA9, DIA10, DIA11, DIA12, DIA13, DIA14, DIA15, DIA16, DIA17,
   input ADA0, ADA1, ADA2, ADA3, ADA4, ADA5, ADA6, ADA7, ADA8, ADA9, ADA10, ADA11, ADA12, ADA13,
@@ -152,9 +152,12 @@ module DP16KD (
     ADB0};
   reg [17:0] read_a = 18'd0, read_b = 18'd0;
   assign {DOA17, DOA16, DOA15, DOA14, DOA13, DOA12, DOA11, DOA10, DOA9, DOA8, DOA7, DOA6, DOA5, DOA4, DOA3, DOA2, DOA1,
-    DOA0} = read_a;
+    DOA0} = REGMODE_A == "OUTREG" ? registered_a : read_a;
   assign {DOB17, DOB16, DOB15, DOB14, DOB13, DOB12, DOB11, DOB10, DOB9, DOB8, DOB7, DOB6, DOB5, DOB4, DOB3, DOB2, DOB1,
-    DOB0} = read_b;
+    DOB0} = REGMODE_B == "OUTREG" ? registered_b : read_b;
+  reg [17:0] registered_a = 18'd0, registered_b = 18'd0;
+  always @(posedge CLKA) if (OCEA) registered_a <= read_a;
+  always @(posedge CLKB) if (OCEB) registered_b <= read_b;
 
   // The narrow word at `address`, out of the 18-bit word that holds it.
   function [17:0] narrow(input integer width, input [13:0] address, input [17:0] word);

@@ -1,4 +1,4 @@
-// Appended to shim.cpp in libraries whose registers and memories can be changed from outside (sim/src/verilator.rs).
+// Appended to shim.cpp in libraries whose registers and memories can be changed from outside (sim/src/cosim/verilator.rs).
 #include "verilated_syms.h"
 
 extern "C" {

@@ -1,6 +1,6 @@
-// C entry points of a verilated bench, loaded by sim/src/verilator.rs.
+// C entry points of a verilated bench, loaded by sim/src/cosim/verilator.rs.
 //
-// The generated module `bench` packs every pin into two vectors (layout: sim/src/bench.rs), so this
+// The generated module `bench` packs every pin into two vectors (layout: sim/src/cosim/bench.rs), so this
 // file is the same for every design:
 //   in  [63:0]       rst, s_axis_*, m_axis_tready
 //   out [32*N-1:0]   s_axis_tready, m_axis_*, taps; N >= 4, hence always an array of 32-bit words

@@ -54,6 +54,25 @@ fn checksum(path: &Path) -> io::Result<String> {
     Ok(format!("{:08x}\n", crc32fast::hash(&fs::read(path)?)))
 }
 
+/// FNV-1a of all names, texts and the tool's version, 128 bits in hexadecimal.
+pub(crate) fn fingerprint(sources: &[(&str, &str)], version: &str) -> String {
+    const OFFSET: u128 = 0x6c62_272e_07bb_0142_62b8_2175_6295_c58d;
+    const PRIME: u128 = 0x0000_0000_0100_0000_0000_0000_0000_013b;
+    let mut hash = OFFSET;
+    let mut add = |text: &str| {
+        // The terminating zero distinguishes ("ab", "c") from ("a", "bc").
+        for byte in text.bytes().chain([0]) {
+            hash = (hash ^ u128::from(byte)).wrapping_mul(PRIME);
+        }
+    };
+    add(version);
+    for (name, text) in sources {
+        add(name);
+        add(text);
+    }
+    format!("{hash:032x}")
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -1,9 +1,11 @@
 //! Runs a list of tasks on several threads until one fails or the user interrupts.
 
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::Arc;
 
 use anyhow::Result;
+use rayon::prelude::*;
+use rayon::ThreadPoolBuilder;
 use signal_hook::consts::{SIGINT, SIGTERM};
 use signal_hook::flag;
 use thiserror::Error;
@@ -50,10 +52,10 @@ impl Interrupt {
 }
 
 /// Runs `work` on all tasks with `jobs` threads (at least one); the results are in the tasks' order. `what` names the
-/// progress bar.
+/// progress bar. After a failure no further task is started.
 ///
 /// # Errors
-/// The error of the first failed task in list order; [`Interrupted`].
+/// The error of the first task, in list order, that was started and failed; [`Interrupted`]; no threads.
 pub fn parallel<T: Send, R: Send>(
     what: &str,
     tasks: Vec<T>,
@@ -62,25 +64,21 @@ pub fn parallel<T: Send, R: Send>(
     work: impl Fn(T) -> Result<R> + Sync,
 ) -> Result<Vec<R>> {
     let bar = Progress::steps(what, tasks.len() as u64);
-    let tasks: Vec<Mutex<Option<T>>> = tasks.into_iter().map(|task| Mutex::new(Some(task))).collect();
-    let results: Vec<Mutex<Option<Result<R>>>> = tasks.iter().map(|_| Mutex::new(None)).collect();
-    let (next, done, failed) = (AtomicUsize::new(0), AtomicUsize::new(0), AtomicBool::new(false));
-    let take = |index: usize| tasks[index].lock().unwrap_or_else(PoisonError::into_inner).take();
-    let worker = || {
-        while !failed.load(Ordering::Relaxed) && interrupt.check().is_ok() {
-            let index = next.fetch_add(1, Ordering::Relaxed);
-            let Some(task) = tasks.get(index).and_then(|_| take(index)) else { break };
-            let result = work(task);
-            failed.fetch_or(result.is_err(), Ordering::Relaxed);
-            *results[index].lock().unwrap_or_else(PoisonError::into_inner) = Some(result);
-            bar.set(done.fetch_add(1, Ordering::Relaxed) as u64 + 1);
+    let (done, failed) = (AtomicUsize::new(0), AtomicBool::new(false));
+    let one = |task| {
+        if failed.load(Ordering::Relaxed) || interrupt.check().is_err() {
+            return None;
         }
+        let result = work(task);
+        failed.fetch_or(result.is_err(), Ordering::Relaxed);
+        bar.set(done.fetch_add(1, Ordering::Relaxed) as u64 + 1);
+        Some(result)
     };
-    std::thread::scope(|scope| (0..jobs.max(1)).for_each(|_| drop(scope.spawn(worker))));
+    let threads = ThreadPoolBuilder::new().num_threads(jobs.max(1)).build()?;
+    let results: Vec<Option<Result<R>>> = threads.install(|| tasks.into_par_iter().with_max_len(1).map(one).collect());
     interrupt.check()?;
-    let results = results.into_iter().map(|result| result.into_inner().unwrap_or_else(PoisonError::into_inner));
-    // Tasks without a result were not started: they come after a failed one, whose error `collect` returns first.
-    results.flatten().collect()
+    // A task without a result was not started, as another one has failed, whose error `collect` returns.
+    results.into_iter().flatten().collect()
 }
 
 #[cfg(test)]

@@ -1,6 +1,6 @@
-//! The `dermis` program: calls [`dermis_sim::cli`].
+//! The `dermis` program: calls [`dermis_sim::commands`].
 use std::process::ExitCode;
 
 fn main() -> ExitCode {
-    dermis_sim::cli::main()
+    dermis_sim::commands::main()
 }

@@ -7,7 +7,7 @@ use std::fs;
 use std::path::Path;
 use std::process::Command;
 
-use dermis_sim::bitstream::baseline::Baselines;
+use dermis_sim::flow::baseline::Baselines;
 
 /// Synchronisation word of an iCE40 bitstream.
 const PREAMBLE: [u8; 4] = [0x7e, 0xaa, 0x99, 0x7e];

@@ -93,7 +93,19 @@ fn reconstruct_without_reference_has_null_errors() {
 #[test]
 fn cosim() {
     let text = dermis(&["cosim", "eight-by-eight", "--frame", "eq2", "--json"]);
-    let top = ["scene", "frames", "equal", "mismatches", "cycles", "total_cycles", "clock_MHz", "time_us", "budget_us"];
+    let top = [
+        "scene",
+        "frames",
+        "equal",
+        "mismatches",
+        "cycles",
+        "total_cycles",
+        "frame_interval",
+        "planned_interval",
+        "clock_MHz",
+        "time_us",
+        "budget_us",
+    ];
     assert_eq!(fields(&text, 1), top);
     assert_eq!(fields(&text, 2), ["min", "median", "max", "min", "median", "max", "median", "max"]);
     let value: Value = serde_json::from_str(&text).unwrap();

@@ -5,7 +5,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
-use dermis_sim::guide_pages::{page_names, GUIDE};
+use dermis_sim::commands::guide_pages::{page_names, GUIDE};
 use roxmltree::Document;
 
 fn root() -> PathBuf {

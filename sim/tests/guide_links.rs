@@ -12,7 +12,7 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use dermis_sim::cli::check_arguments;
+use dermis_sim::commands::check_arguments;
 
 /// Longest README in lines: one page.
 const README_LINES: usize = 140;

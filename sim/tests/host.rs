@@ -9,9 +9,9 @@ use std::time::Duration;
 use dermis_golden::fixed::Model;
 use dermis_golden::frame::Frame;
 use dermis_golden::scene::Scene;
-use dermis_sim::board::{ChannelFaults, NoisyChannel, PseudoTerminal};
-use dermis_sim::hardware::Hardware;
-use dermis_sim::host::{open, Session};
+use dermis_sim::cosim::hardware::Hardware;
+use dermis_sim::link::{open, Session};
+use dermis_sim::link::{ChannelFaults, NoisyChannel, PseudoTerminal};
 
 /// Eight clock cycles per bit, to keep the simulation short.
 const BAUD: u32 = 12_500_000;
@@ -24,10 +24,8 @@ fn model() -> Model {
 
 fn board(to_board: ChannelFaults, to_host: ChannelFaults) -> PseudoTerminal {
     let build = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../build");
-    Hardware::new(model(), &build)
-        .unwrap()
-        .terminal_with_channels(NoisyChannel::new(to_board), NoisyChannel::new(to_host))
-        .unwrap()
+    let hardware = Hardware::new(model(), &build).unwrap();
+    PseudoTerminal::with_channels(&hardware, NoisyChannel::new(to_board), NoisyChannel::new(to_host)).unwrap()
 }
 
 #[test]
@@ -131,7 +129,7 @@ fn the_host_sums_the_forces_of_a_board_that_does_not() {
     scene.hardware.board = "icebreaker".to_string();
     let model = Model::new(&scene).unwrap();
     let build = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../build");
-    let terminal = Hardware::new(model.clone(), &build).unwrap().terminal().unwrap();
+    let terminal = PseudoTerminal::of(&Hardware::new(model.clone(), &build).unwrap()).unwrap();
     let baud = model.board.uart_baud;
     let client = open(&terminal.path().to_string_lossy(), baud, Duration::from_millis(5000)).unwrap();
     let mut session = Session::new(client, model, None, false, true).unwrap();

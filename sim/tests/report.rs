@@ -6,6 +6,8 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use std::time::Duration;
 
+use dermis_golden::fixed::{Cycles, Model};
+use dermis_golden::scene::Scene;
 use serde_json::Value;
 
 fn dermis(work: &Path, args: &[&str]) -> Command {
@@ -63,7 +65,9 @@ fn all_formats_agree() {
     let at = |name: &str| head.iter().position(|head| *head == name).unwrap();
     assert_eq!((rows.len(), &rows[0][at("take case")]), (1, &Value::from("0 (1×1)")));
     let (cycles, us) = (rows[0][at("cycles")].as_f64().unwrap(), rows[0][at("µs")].as_f64().unwrap());
-    assert_eq!((cycles, us), (945.0, 9.45));
+    let model = Model::new(&Scene::builtin("eight-by-eight").unwrap()).unwrap();
+    let planned = Cycles::longest(&model).total;
+    assert_eq!((cycles, us), (planned as f64, model.board.microseconds(planned)));
     assert_eq!(rows[0][at("cycles from")], "co-simulation");
     // Every engine has a time; the hardware's is its cycles at 100 MHz.
     let (head, rows) = table(&report, "time");

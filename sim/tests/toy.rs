@@ -6,9 +6,9 @@ use std::path::PathBuf;
 
 use dermis_golden::fixed::{Cycles, Stage, Trace};
 use dermis_hdl::device::{Device, Inputs, Outputs, Tap, TapSignal};
+use dermis_sim::cosim::drive::{record, InputFrame, Stimulus, Times};
+use dermis_sim::cosim::verilator::{Design, Verilated, VerilatorError};
 use dermis_sim::cosim::{compare_recording, run, DeviceUnderTest, Findings, Vector, KEPT_PER_FRAME};
-use dermis_sim::drive::{record, InputFrame, Stimulus, Times};
-use dermis_sim::verilator::{Design, Verilated, VerilatorError};
 
 const TOY: &str = include_str!("toy/toy.v");
 const GAIN: i64 = 3;

@@ -1,11 +1,12 @@
 // A word is its accumulator / 2^shift, rounded half up and saturated; an operand likewise of its word; saturated words
 // are counted, up to the counter's end.
-module proof(input clk, input clear, input valid, input measured, input [@SHIFTS@-1:0] shift, input [4*@ACC@-1:0] quad);
+module proof(input clk, input clear, input valid, input measured, input [@SHIFTS@-1:0] shift, input [4*@ACC@-1:0] raw,
+             input [4*@LANE@-1:0] quad);
   wire [4*@WORD@-1:0] words;
   wire [4*@DATA@-1:0] operands;
   wire [15:0] saturations;
   @TOP@__rescale__rescaler block(
-    .clk(clk), .clear(clear), .valid(valid), .measured(measured), .shift(shift), .quad(quad),
+    .clk(clk), .clear(clear), .valid(valid), .measured(measured), .shift(shift), .raw(raw), .quad(quad),
     .words(words), .operands(operands), .saturations(saturations)
   );
   localparam signed [@ACC@+1:0] MOST = (1 << (@WORD@ - 1)) - 1;
@@ -14,7 +15,8 @@ module proof(input clk, input clear, input valid, input measured, input [@SHIFTS
   reg [@SHIFTS@-1:0] amount;
   reg [4*@ACC@-1:0] came;
   reg comes;
-  always @(posedge clk) {amount, came, comes} <= {measured ? shift : @SHIFTS@'d@A_SHIFT@, quad, valid};
+  wire [4*@ACC@-1:0] extended;
+  always @(posedge clk) {amount, came, comes} <= {measured ? shift : @SHIFTS@'d@A_SHIFT@, measured ? raw : extended, valid};
   reg [2:0] age = 3'd0;
   always @(posedge clk) if (age != 3'd4) age <= age + 3'd1;
   reg counts, known = 1'b0;
@@ -25,6 +27,7 @@ module proof(input clk, input clear, input valid, input measured, input [@SHIFTS
   genvar l;
   generate
     for (l = 0; l < 4; l = l + 1) begin : lane
+      assign extended[l * @ACC@ +: @ACC@] = $signed(quad[l * @LANE@ +: @LANE@]);
       wire signed [@ACC@:0] acc = {came[l * @ACC@ + @ACC@ - 1], came[l * @ACC@ +: @ACC@]};
       // The quotient rounded down, and the bit that is set if the remainder is a half or more.
       wire signed [@ACC@:0] floor = acc >>> amount;

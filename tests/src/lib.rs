@@ -1,10 +1,11 @@
-//! Shared by the tests of this crate: scenes, their shipped frames, and the folder of built libraries.
+//! Shared by the tests of this crate: scenes, their shipped frames, the folder of built libraries, committed figures
+//! ([`baseline`]), and tools on generated files ([`tools`]).
 //!
 //! | test | claims |
 //! |---|---|
-//! | `equality` | generated Verilog = rust-hdl's simulation = bit-true model, on every shipped frame; cycle budgets |
+//! | `equality` | generated Verilog = rust-hdl's simulation = bit-true model, on every shipped frame; cycles against a committed table |
 //! | `event_driven` | every word and cycle under Icarus; no X after a reset; undefined registers found |
-//! | `accuracy` | golden model against known forces, bit-true against golden model |
+//! | `accuracy` | golden model against known forces, bit-true against golden model, both against a committed table |
 //! | `dead` | dead taxels: the same equality, independence of their readings, agreement with the golden model |
 //! | `flipped_bit` | one wrong bit in a coefficient, a vector or the expected output is found |
 //! | `choice` | several cases in one design: equality in mixed order, wrong constants found, benefit of the choice |
@@ -21,10 +22,13 @@
 //! | `synthesis` | Yosys reads the Verilog without latch or undriven signal |
 //! | `scenes` | the same equality for scenes of other shapes, degrees, words and conditions |
 //! | `scale` | the largest array, and a thousand random frames with stalls on both streams |
-//! | `circles` | no two modules of the golden crate use one another, directly or through others |
+//! | `circles` | no two modules of a crate use one another, directly or through others; rooms are in order |
 //! | `words` | no file has a phrase of `tests/words.txt` |
 //! | `lint` | the generated Verilog is clean under Verilator with its waivers, and every waiver is needed |
 #![deny(missing_docs)]
+
+pub mod baseline;
+pub mod tools;
 
 use std::path::PathBuf;
 
@@ -33,8 +37,8 @@ use dermis_golden::frame::Frame;
 use dermis_golden::scene::Scene;
 use dermis_hdl::generate;
 
-/// Scenes verified on the shipped frames, with the limit of cycles from the last input to the last output beat.
-pub const SCENES: [(&str, u64); 2] = [("sensor-1", 1_400), ("eight-by-eight", 900)];
+/// Scenes verified on the shipped frames.
+pub const SCENES: [&str; 2] = ["sensor-1", "eight-by-eight"];
 
 /// A built-in scene and its shipped half-space frames.
 ///
@@ -68,4 +72,14 @@ pub fn build_dir() -> PathBuf {
 /// If the variable is not a number.
 pub fn wanted(variable: &str, short: u64) -> u64 {
     std::env::var(variable).map_or(short, |text| text.parse().unwrap_or_else(|_| panic!("{variable}: a number")))
+}
+
+/// Asserts that no frame took more cycles from the last input to the last output beat than `baselines/cycles.csv` has for
+/// this `line`.
+///
+/// # Panics
+/// If one took more.
+pub fn check_cycles(line: &str, latencies: impl Iterator<Item = Option<u64>>) {
+    let slowest = latencies.map(|latency| latency.expect("a complete frame")).max().expect("a frame");
+    baseline::check("cycles", &[(line.to_owned(), slowest as f64)], |was, is, _| is <= was);
 }

@@ -13,10 +13,10 @@ use dermis_golden::scene::Scene;
 use dermis_hdl::generate_changed;
 use dermis_hdl::language::Change;
 use dermis_sim::compare::median;
+use dermis_sim::cosim::drive::Stimulus;
+use dermis_sim::cosim::hardware::{Hardware, Simulator};
 use dermis_sim::cosim::{run, DeviceUnderTest, Findings, Vector};
 use dermis_sim::drawn_frames::{DrawnFrames, Shapes};
-use dermis_sim::drive::Stimulus;
-use dermis_sim::hardware::{Hardware, Simulator};
 use dermis_tests::build_dir;
 
 /// Number of frames of one run.

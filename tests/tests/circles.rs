@@ -1,4 +1,4 @@
-//! No module of the golden crate uses a module that uses it, directly or through others.
+//! No module of a crate uses a module that uses it, directly or through others.
 //!
 //! An arrow leads from a module to each module that defines what it uses. It is read from the `use` declarations and
 //! from the paths in the code:
@@ -289,7 +289,7 @@ impl Modules {
     }
 }
 
-/// Names and texts of the modules in a folder of sources.
+/// Names and texts of the modules in a folder of sources; a program's `main.rs` is no module of the crate.
 fn read(folder: &Path, name: &Name, into: &mut Vec<(Name, String)>) {
     for entry in fs::read_dir(folder).unwrap().map(Result::unwrap) {
         let path = entry.path();
@@ -297,44 +297,84 @@ fn read(folder: &Path, name: &Name, into: &mut Vec<(Name, String)>) {
         let inner = [name.as_slice(), std::slice::from_ref(&stem)].concat();
         if path.is_dir() {
             read(&path, &inner, into);
-        } else if path.extension().is_some_and(|extension| extension == "rs") {
+        } else if path.extension().is_some_and(|extension| extension == "rs") && stem != "main" {
             let own = if ["lib", "mod"].contains(&stem.as_str()) { name.clone() } else { inner };
             into.push((own, fs::read_to_string(&path).unwrap()));
         }
     }
 }
 
-/// The modules of the golden crate.
-fn golden() -> Modules {
+/// The modules of the crate in `folder`.
+fn modules(crate_name: &'static str, folder: &str) -> Modules {
     let mut texts = Vec::new();
-    read(&Path::new(env!("CARGO_MANIFEST_DIR")).join("../golden/src"), &Vec::new(), &mut texts);
-    Modules::new("dermis_golden", texts.into_iter())
+    read(&Path::new(env!("CARGO_MANIFEST_DIR")).join("..").join(folder).join("src"), &Vec::new(), &mut texts);
+    Modules::new(crate_name, texts.into_iter())
 }
 
-#[test]
-fn golden_has_none() {
-    let modules = golden();
-    assert!(modules.modules.len() > 150, "{} modules", modules.modules.len());
+/// The modules of the golden crate.
+fn golden() -> Modules {
+    modules("dermis_golden", "golden")
+}
+
+/// Asserts that a crate of at least `least` modules has no circle.
+fn none(modules: &Modules, least: usize) {
+    assert!(modules.modules.len() >= least, "{} modules", modules.modules.len());
     let circles: Vec<String> = modules.circles().into_iter().collect();
     assert!(circles.is_empty(), "modules that use one another:\n{}", circles.join("\n"));
 }
 
-/// The bit-true model's rooms use only those before them, the files beside the rooms all of them.
 #[test]
-fn the_rooms_of_fixed_are_in_order() {
-    let room = |name: &Name| match name.first().map(String::as_str) {
-        Some("fixed") => {
-            ["words", "error", "stages", "plan"].iter().position(|room| name.get(1).is_some_and(|own| own == room))
-        }
-        _ => None,
+fn golden_has_none() {
+    none(&golden(), 150);
+}
+
+#[test]
+fn hdl_has_none() {
+    none(&modules("dermis_hdl", "hdl"), 100);
+}
+
+#[test]
+fn sim_has_none() {
+    none(&modules("dermis_sim", "sim"), 100);
+}
+
+/// Asserts that each of `rooms`, folders or files in `parent`, uses only itself and those before it, and what stands
+/// beside the rooms no room; with `above`, everything else may use all of them.
+fn in_order(modules: &Modules, parent: &[&str], rooms: &[&str], above: bool) {
+    let parent: Name = parent.iter().map(ToString::to_string).collect();
+    let inner =
+        |name: &Name| name.strip_prefix(parent.as_slice()).map(<[String]>::to_vec).filter(|inner| !inner.is_empty());
+    let rank = |inner: &Name| match rooms.iter().position(|room| *room == inner[0]) {
+        Some(room) => room + 1,
+        None if above => rooms.len() + 1,
+        None => 0,
     };
-    let modules = golden();
-    for from in modules.modules.keys().filter(|name| room(name).is_some()) {
-        for (to, path) in modules.arrows(from).iter().filter(|(to, _)| to.first().is_some_and(|first| first == "fixed"))
-        {
-            assert!(room(to).is_some_and(|to| Some(to) <= room(from)), "{} uses {path}", from.join("::"));
+    let used = |room: &&&str| modules.modules.keys().filter_map(inner).any(|inner| inner[0] == ***room);
+    assert_eq!(rooms.iter().filter(used).count(), rooms.len(), "a room of {rooms:?} is empty");
+    for (from, own) in modules.modules.keys().filter_map(|name| Some((name, inner(name)?))) {
+        for (to, path) in modules.arrows(from).iter().filter_map(|(to, path)| Some((inner(to)?, path))) {
+            assert!(rank(&to) <= rank(&own), "{} uses {path}", from.join("::"));
         }
     }
+}
+
+#[test]
+fn the_rooms_of_fixed_are_in_order() {
+    in_order(&golden(), &["fixed"], &["words", "error", "stages", "plan"], true);
+}
+
+#[test]
+fn the_rooms_of_sim_are_in_order() {
+    in_order(&modules("dermis_sim", "sim"), &[], &["flow", "cosim", "link", "report", "commands"], false);
+}
+
+#[test]
+#[should_panic(expected = "b uses crate::c::C")]
+fn a_room_that_uses_a_later_one_is_found() {
+    let name = |name: &str| vec![name.to_owned()];
+    let texts = [("a", ""), ("b", "use crate::a::A; use crate::c::C;"), ("c", "use crate::a::A;")];
+    let texts = texts.into_iter().map(|(own, text)| (name(own), text.to_owned()));
+    in_order(&Modules::new("seeded", texts), &[], &["b", "c"], false);
 }
 
 /// The circles of modules given as `(name, text)`.

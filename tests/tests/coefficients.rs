@@ -9,10 +9,10 @@ use dermis_golden::flags::Flag;
 use dermis_golden::frame::Frame;
 use dermis_golden::scene::{CoefficientCheck, Scene};
 use dermis_hdl::{generate, usage::total};
+use dermis_sim::cosim::drive::{record, InputFrame, Stimulus};
+use dermis_sim::cosim::hardware::{Hardware, Simulator};
+use dermis_sim::cosim::verify::verify;
 use dermis_sim::cosim::Vector;
-use dermis_sim::drive::{record, InputFrame, Stimulus};
-use dermis_sim::hardware::{Hardware, Simulator};
-use dermis_sim::verify::verify;
 use dermis_tests::{build_dir, scene, verilog_code, SCENES};
 
 /// Number of flips tried in each scene.
@@ -42,7 +42,7 @@ fn assert_equal(scene: &Scene, frames: &[Frame]) {
 
 #[test]
 fn no_false_alarm() {
-    for (name, _) in SCENES {
+    for name in SCENES {
         let (scene, frames) = checked(name);
         assert_equal(&scene, &frames);
     }
@@ -77,7 +77,7 @@ fn tells(hardware: &Hardware, vector: &Vector) -> bool {
 
 #[test]
 fn every_tried_flip_is_told() {
-    for (name, _) in SCENES {
+    for name in SCENES {
         let (scene, frames) = checked(name);
         let mut hardware = Hardware::new(Model::for_frames(&scene, &frames).unwrap(), &build_dir()).unwrap();
         let vector = hardware.vector(&frames[..1]).unwrap();

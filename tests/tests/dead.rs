@@ -7,12 +7,12 @@ use dermis_golden::fixed::Model;
 use dermis_golden::float::Golden;
 use dermis_golden::frame::Frame;
 use dermis_golden::scene::Scene;
+use dermis_sim::cosim::drive::Stimulus;
+use dermis_sim::cosim::hardware::{Hardware, Simulator};
+use dermis_sim::cosim::verify::verify;
 use dermis_sim::cosim::{run, DeviceUnderTest, Findings, Vector};
 use dermis_sim::drawn_frames::{DrawnFrames, Shapes};
-use dermis_sim::drive::Stimulus;
-use dermis_sim::hardware::{Hardware, Simulator};
-use dermis_sim::study::dead_taxels::{self, LINES as SCENES};
-use dermis_sim::verify::verify;
+use dermis_sim::report::study::dead_taxels::{self, LINES as SCENES};
 use dermis_tests::build_dir;
 
 /// Bound of the bit-true model's additional median tangential error at 20 bits; as for whole arrays.

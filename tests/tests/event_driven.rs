@@ -10,10 +10,11 @@ use dermis_golden::fixed::Model;
 use dermis_hdl::device::{Device, Inputs, Outputs, Tap};
 use dermis_hdl::language::Change;
 use dermis_hdl::{generate_changed, Generated};
-use dermis_sim::bench::{valid, word};
+use dermis_sim::cosim::bench::{valid, word};
+use dermis_sim::cosim::drive::Stimulus;
+use dermis_sim::cosim::hardware::Hardware;
 use dermis_sim::cosim::{run, DeviceUnderTest, Findings, Vector};
-use dermis_sim::drive::Stimulus;
-use dermis_sim::hardware::Hardware;
+use dermis_tests::tools::folder_of;
 use dermis_tests::{build_dir, scene};
 use tempfile::TempDir;
 
@@ -73,10 +74,9 @@ struct Icarus {
 
 impl Icarus {
     fn new(generated: &Generated, code_bits: u32) -> Self {
-        let folder = tempfile::tempdir().unwrap();
-        let write = |name: &str, text: &str| std::fs::write(folder.path().join(name), text).unwrap();
-        generated.files.iter().for_each(|file| write(&file.name, &file.text));
-        write("bench.v", &bench(&generated.top, code_bits, &generated.taps));
+        let folder = folder_of(generated);
+        let bench = bench(&generated.top, code_bits, &generated.taps);
+        std::fs::write(folder.path().join("bench.v"), bench).unwrap();
         let is_verilog = |name: &&str| Path::new(name).extension().is_some_and(|end| end == "v");
         let sources = generated.files.iter().map(|file| file.name.as_str()).filter(is_verilog);
         let built = Command::new("iverilog")

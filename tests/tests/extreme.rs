@@ -5,9 +5,9 @@ use dermis_golden::fixed::Model;
 use dermis_golden::partition::Case;
 use dermis_golden::scene::Scene;
 use dermis_golden::stability::extreme::frames;
+use dermis_sim::cosim::drive::Stimulus;
+use dermis_sim::cosim::hardware::{Hardware, Simulator};
 use dermis_sim::cosim::{run, DeviceUnderTest, Vector};
-use dermis_sim::drive::Stimulus;
-use dermis_sim::hardware::{Hardware, Simulator};
 use dermis_tests::build_dir;
 
 /// The frames with the scene's own partition, as codes with their own full scales.

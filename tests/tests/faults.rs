@@ -4,9 +4,9 @@
 use dermis_golden::fixed::plan::storage::word_bits;
 use dermis_golden::fixed::Model;
 use dermis_golden::scene::Scene;
-use dermis_sim::faults::state_bits::{state_elements, StorageClass};
-use dermis_sim::faults::{inject_faults, Shares};
-use dermis_sim::hardware::Hardware;
+use dermis_sim::cosim::faults::state_bits::{state_elements, StorageClass};
+use dermis_sim::cosim::faults::{inject_faults, Shares};
+use dermis_sim::cosim::hardware::Hardware;
 use dermis_sim::report;
 use dermis_tests::build_dir;
 
@@ -55,7 +55,7 @@ fn outcomes_add_up_and_a_reset_helps() {
     let coefficients = of(StorageClass::Rom, "pass");
     assert!(4 * coefficients.silent > coefficients.flips && coefficients.detected == 0, "{coefficients:?}");
     // State of the handshake: a flip hangs the design or breaks the length of a frame.
-    let control = ["send", "engine", "receive"].map(|stage| of(StorageClass::Register, stage));
+    let control = ["send", "search", "engine", "receive"].map(|stage| of(StorageClass::Register, stage));
     assert!(control.iter().any(|row| row.hang > 0) && control.iter().any(|row| row.detected > 0), "{control:?}");
     let shares = Shares::of(&rows, StorageClass::Rom).unwrap();
     assert!((shares.harmless + shares.detected + shares.hang + shares.silent - 1.0).abs() < 1e-9, "{shares:?}");

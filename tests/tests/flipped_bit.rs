@@ -2,9 +2,9 @@
 //! stage concerned.
 
 use dermis_golden::fixed::Model;
+use dermis_sim::cosim::drive::Stimulus;
+use dermis_sim::cosim::hardware::{Hardware, Simulator};
 use dermis_sim::cosim::{run, DeviceUnderTest, Findings, Vector};
-use dermis_sim::drive::Stimulus;
-use dermis_sim::hardware::{Hardware, Simulator};
 use dermis_tests::{build_dir, scene};
 
 fn setup() -> (Hardware, Vec<Vector>) {

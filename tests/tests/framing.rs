@@ -5,7 +5,7 @@
 use dermis_golden::fixed::stages::send::FLAG_FRAMING;
 use dermis_golden::fixed::Model;
 use dermis_hdl::device::{Device, Inputs};
-use dermis_sim::hardware::{Hardware, Simulator};
+use dermis_sim::cosim::hardware::{Hardware, Simulator};
 use dermis_tests::{build_dir, scene};
 
 /// Limit of cycles, far more than a frame takes.

@@ -1,7 +1,6 @@
 //! The generated Verilog is clean under `verilator --lint-only -Wall` with its waiver file; every waiver is needed and
 //! has its reason.
 
-use std::path::Path;
 use std::process::Command;
 
 use dermis_golden::fixed::Model;
@@ -10,17 +9,16 @@ use dermis_golden::partition::Case;
 use dermis_golden::scene::Condition;
 use dermis_hdl::link::generate_board;
 use dermis_hdl::{generate, Generated};
+use dermis_tests::tools::folder_of;
 use dermis_tests::{scene, SCENES};
 
-fn lint(folder: &Path, generated: &Generated) -> Result<(), String> {
-    for file in &generated.files {
-        std::fs::write(folder.join(&file.name), &file.text).unwrap();
-    }
+fn lint(generated: &Generated) -> Result<(), String> {
+    let folder = folder_of(generated);
     let of = |end: &str| -> Vec<&str> {
         generated.files.iter().map(|f| f.name.as_str()).filter(|n| n.ends_with(end)).collect()
     };
     let output = Command::new("verilator")
-        .current_dir(folder)
+        .current_dir(folder.path())
         .args(["--lint-only", "-Wall", "--top-module", &generated.top])
         .args(of(".vlt"))
         .args(of(".v"))
@@ -31,13 +29,12 @@ fn lint(folder: &Path, generated: &Generated) -> Result<(), String> {
 
 #[test]
 fn generated_verilog_is_clean_and_needs_each_waiver() {
-    let own = SCENES.map(|(name, _)| (name, None));
+    let own = SCENES.map(|name| (name, None));
     for (name, board) in own.into_iter().chain([("eight-by-eight", Some("icebreaker"))]) {
         let mut scene = scene(name).0;
         scene.hardware.board = board.map_or(scene.hardware.board, str::to_string);
         let mut generated = generate(&Model::new(&scene).unwrap()).unwrap();
-        let folder = tempfile::tempdir().unwrap();
-        lint(folder.path(), &generated).unwrap_or_else(|log| panic!("{name}: {log}"));
+        lint(&generated).unwrap_or_else(|log| panic!("{name}: {log}"));
         let Some(index) = generated.files.iter().position(|f| f.name.ends_with(".vlt")) else {
             continue;
         };
@@ -49,7 +46,7 @@ fn generated_verilog_is_clean_and_needs_each_waiver() {
             assert!(above.is_some_and(|l| l.starts_with("//")), "{name}: no reason above: {line}");
             let without = lines.iter().enumerate().filter(|(n, _)| *n != number).map(|(_, l)| *l);
             generated.files[index].text = without.collect::<Vec<_>>().join("\n") + "\n";
-            assert!(lint(folder.path(), &generated).is_err(), "{name}: nothing needs: {line}");
+            assert!(lint(&generated).is_err(), "{name}: nothing needs: {line}");
         }
     }
 }
@@ -59,33 +56,30 @@ fn dead_taxels_are_clean_with_the_same_waivers() {
     let (mut scene, _) = scene("eight-by-eight");
     scene.input.dead = vec![[0, 0], [3, 4]];
     let generated = generate(&Model::new(&scene).unwrap()).unwrap();
-    let folder = tempfile::tempdir().unwrap();
-    lint(folder.path(), &generated).unwrap_or_else(|log| panic!("{log}"));
+    lint(&generated).unwrap_or_else(|log| panic!("{log}"));
 }
 
 #[test]
 fn a_choice_of_cases_is_clean_with_the_engines_waivers() {
-    for (name, _) in SCENES {
+    for name in SCENES {
         let mut scene = scene(name).0;
         for condition in [Condition::Loaded, Condition::BothSigns] {
             scene.partition.case = Case::Adaptive;
             scene.partition.condition = condition;
             let generated = generate(&Model::new(&scene).unwrap()).unwrap();
-            let folder = tempfile::tempdir().unwrap();
-            lint(folder.path(), &generated).unwrap_or_else(|log| panic!("{name}: {log}"));
+            lint(&generated).unwrap_or_else(|log| panic!("{name}: {log}"));
         }
     }
 }
 
 #[test]
 fn a_board_is_clean_with_the_engines_waivers() {
-    for (name, _) in SCENES {
+    for name in SCENES {
         for (_, link) in LinkKind::NAMES {
             let mut scene = scene(name).0;
             scene.hardware.link = link;
             let generated = generate_board(&Model::new(&scene).unwrap()).unwrap();
-            let folder = tempfile::tempdir().unwrap();
-            lint(folder.path(), &generated).unwrap_or_else(|log| panic!("{name}, {link:?}: {log}"));
+            lint(&generated).unwrap_or_else(|log| panic!("{name}, {link:?}: {log}"));
         }
     }
 }

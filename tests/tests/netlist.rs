@@ -4,10 +4,10 @@
 use dermis_golden::fixed::Model;
 use dermis_golden::frame::Frame;
 use dermis_golden::scene::Scene;
+use dermis_sim::cosim::drive::Stimulus;
+use dermis_sim::cosim::hardware::{Hardware, Simulator};
 use dermis_sim::cosim::{run, DeviceUnderTest, Findings, Vector};
 use dermis_sim::drawn_frames::{DrawnFrames, Shapes};
-use dermis_sim::drive::Stimulus;
-use dermis_sim::hardware::{Hardware, Simulator};
 use dermis_tests::build_dir;
 
 /// Small enough for synthesis and compilation within a minute. Without a search nine tenths of the cells are gone;

@@ -2,7 +2,6 @@
 //!
 //! The counts are compared exactly: an error of one is found.
 
-use std::process::Command;
 use std::thread::scope;
 
 use dermis_golden::fixed::plan::resources::Holds;
@@ -10,24 +9,14 @@ use dermis_golden::fixed::Model;
 use dermis_golden::scene::Scene;
 use dermis_hdl::usage::total;
 use dermis_hdl::{generate, Generated};
+use dermis_tests::tools::cells;
 
 /// Largest relative error of the estimated flip-flops and LUTs; the largest of these scenes is 7 %.
 const NEAR: f64 = 0.15;
 
 /// Runs Yosys to the end of a `synth_ecp5` stage and returns the counts of cells by type.
 fn synthesise(generated: &Generated, until: &str) -> impl Fn(&str) -> usize {
-    let folder = tempfile::tempdir().unwrap();
-    for file in &generated.files {
-        std::fs::write(folder.path().join(&file.name), &file.text).unwrap();
-    }
-    let top = &generated.top;
-    let script = format!("read_verilog {top}.v; synth_ecp5 -top {top} -run begin:{until}; tee -o stat.json stat -json");
-    let output = Command::new("yosys").current_dir(folder.path()).args(["-q", "-p", &script]).output().unwrap();
-    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
-    let text = std::fs::read_to_string(folder.path().join("stat.json")).unwrap();
-    let stat: serde_json::Value = serde_json::from_str(&text).unwrap();
-    let cells = stat["design"]["num_cells_by_type"].clone();
-    move |cell| cells[cell].as_u64().unwrap_or(0) as usize
+    cells(generated, &format!("synth_ecp5 -run begin:{until}"))
 }
 
 fn small(name: &str, more: &str) -> Model {

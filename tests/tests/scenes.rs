@@ -6,15 +6,17 @@
 use dermis_golden::fixed::Model;
 use dermis_golden::frame::Frame;
 use dermis_golden::scene::Scene;
+use dermis_sim::cosim::drive::Stimulus;
+use dermis_sim::cosim::hardware::{Hardware, Simulator};
+use dermis_sim::cosim::verify::verify;
 use dermis_sim::cosim::{run, DeviceUnderTest};
-use dermis_sim::drive::Stimulus;
-use dermis_sim::hardware::{Hardware, Simulator};
-use dermis_sim::verify::verify;
 use dermis_tests::build_dir;
 use proptest::prelude::*;
 
 /// Name, and the difference from a default scene of 6×6 taxels.
-const SCENES: [(&str, &str); 11] = [
+const SCENES: [(&str, &str); 12] = [
+    // One quad: a longer pause between accumulations.
+    ("2x2", "[sensor]\nrows = 2\ncols = 2\npitch_x_mm = 4.0\npitch_y_mm = 4.0\nthickness_mm = 3.0\n"),
     // Two quads: sweeps shorter than the pipeline that follows them.
     ("2x3", "[sensor]\nrows = 2\ncols = 3\npitch_x_mm = 4.0\npitch_y_mm = 4.0\nthickness_mm = 3.0\n"),
     // Six subarrays in turn, odd rows.

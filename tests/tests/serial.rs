@@ -1,15 +1,16 @@
 //! The serial engine: equal to the bit-true model in every stage, beat and cycle, in rust-hdl and under Verilator;
 //! scenes that it does not support are rejected by field.
 
-use std::process::Command;
-
 use dermis_golden::fixed::{Cycles, Model};
 use dermis_golden::frame::Frame;
 use dermis_golden::scene::Scene;
 use dermis_hdl::generate;
+use dermis_sim::cosim::drive::Stimulus;
+use dermis_sim::cosim::hardware::{Hardware, Simulator};
+use dermis_sim::cosim::verify::verify;
+use dermis_sim::cosim::{run, DeviceUnderTest, Vector};
 use dermis_sim::drawn_frames::{DrawnFrames, Shapes};
-use dermis_sim::hardware::Simulator;
-use dermis_sim::verify::verify;
+use dermis_tests::tools::cells;
 use dermis_tests::{build_dir, scene};
 
 const BOARD: &str = "icebreaker";
@@ -98,34 +99,28 @@ fn memories_and_multipliers_are_those_of_yosys() {
     let (scene, _) = scene("eight-by-eight");
     let model = Model::new(&on_board(scene)).unwrap();
     let generated = generate(&model).unwrap();
-    let folder = tempfile::tempdir().unwrap();
-    for file in &generated.files {
-        std::fs::write(folder.path().join(&file.name), &file.text).unwrap();
-    }
-    let top = &generated.top;
-    let script =
-        format!("read_verilog {top}.v; synth_ice40 -dsp -top {top} -run begin:map_ffram; tee -o stat.json stat -json");
-    let output = Command::new("yosys").current_dir(folder.path()).args(["-q", "-p", &script]).output().unwrap();
-    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
-    let text = std::fs::read_to_string(folder.path().join("stat.json")).unwrap();
-    let stat: serde_json::Value = serde_json::from_str(&text).unwrap();
-    let cells = ["SB_RAM40_4K", "SB_SPRAM256KA", "SB_MAC16"]
-        .map(|cell| stat["design"]["num_cells_by_type"][cell].as_u64().unwrap_or(0) as usize);
+    let cells = cells(&generated, "synth_ice40 -dsp -run begin:map_ffram");
+    let cells = ["SB_RAM40_4K", "SB_SPRAM256KA", "SB_MAC16"].map(cells);
     let resources = &model.resources;
     assert_eq!(cells, [resources.block_rams(), resources.large_rams(), resources.multipliers()]);
 }
 
 #[test]
 fn a_wrong_coefficient_is_found() {
-    let (scene, _) = scene("eight-by-eight");
+    let (scene, frames) = scene("eight-by-eight");
     let right = Model::new(&on_board(scene)).unwrap();
     let mut wrong = right.clone();
     wrong.first_mut().quantised.ax.flips[0].parity[2][5] ^= 1;
-    let file = |model: &Model| {
-        generate(model).unwrap().files.iter().find(|f| f.name == "coefficients.hex").unwrap().text.clone()
+    let [right, wrong] = [right, wrong].map(|model| Hardware::new(model, &build_dir()).unwrap());
+    let vectors: Vec<Vector> = frames.iter().map(|frame| right.vector(std::slice::from_ref(frame)).unwrap()).collect();
+    let findings = |hardware: &Hardware| {
+        let mut device = hardware.device(Simulator::Verilator).unwrap();
+        let dut = DeviceUnderTest { name: "verilator", device: device.as_mut(), taps: &hardware.tap_names() };
+        run(dut, &vectors, Stimulus::FullSpeed).0
     };
-    let (right, wrong) = (file(&right), file(&wrong));
-    assert_eq!(right.lines().zip(wrong.lines()).filter(|(a, b)| a != b).count(), 1);
+    assert!(findings(&right).is_equal());
+    // The first words that differ are those that the coefficient enters.
+    assert_eq!(findings(&wrong).kept.first().map(|first| first.stage.as_str()), Some("pass"));
 }
 
 #[test]

@@ -7,9 +7,9 @@ use dermis_golden::frame::Frame;
 use dermis_golden::scene::Scene;
 use dermis_hdl::generate_changed;
 use dermis_hdl::language::Change;
-use dermis_sim::hardware::Hardware;
+use dermis_sim::cosim::hardware::Hardware;
+use dermis_sim::cosim::stress::{stress, Outcome};
 use dermis_sim::report;
-use dermis_sim::stress::{stress, Outcome};
 use dermis_tests::{build_dir, scene, wanted};
 
 /// A few taxels, so that a reset at every cycle of a frame takes a second.

@@ -1,11 +1,12 @@
 //! One subarray: the stages from frame buffer to force memory.
 
 use super::plan::contents::{CasePlan, Plan};
-use super::stages::pass::{pass, swap, Operands};
+use super::stages::pass::{join_limbs, pass, swap, Operands};
 use super::stages::search::{search, Block, SearchResult};
 use super::stages::{fold, force, normalise, receive, rescale, unfold};
 use super::words::formats::force_shift;
-use super::words::schedule::{is_transposed, schedule, EXPONENTS};
+use super::words::schedule::{by_limbs, is_transposed, schedule, EXPONENTS};
+use crate::board::EngineKind;
 
 /// The quads that a stage passes on.
 type QuadStream = Vec<[i64; 4]>;
@@ -27,7 +28,7 @@ pub struct SubarrayTrace {
     pub normalised: QuadStream,
     /// Output of `fold`.
     pub folded: QuadStream,
-    /// Output of `pass`.
+    /// Output of `pass`: one quad per row and accumulation.
     pub passed: QuadStream,
     /// Output of `rescale`.
     pub rescaled: QuadStream,
@@ -52,7 +53,9 @@ impl SubarrayTrace {
         let (mut right, mut saturations) = (0, 0);
         let mut polynomials = vec![[[0i64; 10]; 4]; formats.quads];
         for (k, products) in schedule(formats).iter().enumerate() {
-            let accumulators = pass(formats, quantised, layout, products, &operands);
+            let limbs: Vec<QuadStream> =
+                by_limbs(products).iter().map(|part| pass(formats, quantised, layout, part, &operands)).collect();
+            let accumulators = join_limbs(formats, &limbs);
             if k == 0 {
                 right = rescale::shift(formats, rescale::raw_length(&accumulators));
             }
@@ -72,7 +75,10 @@ impl SubarrayTrace {
                     w[k] = value;
                 }
             }
-            passed.extend(accumulators);
+            match plan.board.engine {
+                EngineKind::Parallel => passed.extend(limbs.concat()),
+                EngineKind::Serial => passed.extend(accumulators),
+            }
             rescaled.extend(words);
             unfolded.extend(taxels);
         }

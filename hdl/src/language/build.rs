@@ -139,7 +139,7 @@ impl Builder {
             }
         };
         if input.is_none() {
-            self.width_error(Expr { builder: self, id }, format!("{what} is an input of one bit"));
+            self.expression(id).width_error(format!("{what} is an input of one bit"));
         }
         input
     }
@@ -168,14 +168,7 @@ impl Builder {
 
     /// An unsigned constant of `bits` bits.
     pub fn constant(&self, bits: usize, value: u64) -> Expr<'_> {
-        let mut limbs = vec![0; bits.div_ceil(64)];
-        limbs[0] = value;
-        let fits = bits >= 64 || value >> bits == 0;
-        let constant = self.node(Node::Constant(limbs), Type::unsigned(bits));
-        if !fits {
-            self.width_error(constant, format!("{value} needs more bits"));
-        }
-        constant
+        Expr::constant_of(&self.kernel, bits, value)
     }
 
     /// A two's complement constant of `bits` bits, at most 64.
@@ -183,7 +176,7 @@ impl Builder {
         let shift = 64 - bits.min(64);
         let constant = self.constant(bits, (value as u64) << shift >> shift).signed();
         if value << shift >> shift != value {
-            self.width_error(constant, format!("{value} needs more bits"));
+            constant.width_error(format!("{value} needs more bits"));
         }
         constant
     }
@@ -192,7 +185,7 @@ impl Builder {
     pub fn when<'k>(&'k self, condition: Expr<'k>, body: impl FnOnce()) {
         let mut all = condition.bit("condition");
         if let Some(&outer) = self.conditions.borrow().last() {
-            all = Expr { builder: self, id: outer } & all;
+            all = self.expression(outer) & all;
         }
         self.conditions.borrow_mut().push(all.id);
         body();
@@ -256,19 +249,19 @@ impl Builder {
     }
 
     pub(crate) fn node(&self, node: Node, ty: Type) -> Expr<'_> {
-        Expr { builder: self, id: self.kernel.borrow_mut().intern(node, ty) }
+        Expr::of(&self.kernel, node, ty)
     }
 
     pub(crate) fn fail(&self, error: KernelError) {
-        self.kernel.borrow_mut().errors.push(error);
+        self.kernel.borrow_mut().fail(error);
     }
 
     pub(crate) fn block(&self) -> String {
         self.kernel.borrow().block.clone()
     }
 
-    pub(crate) fn width_error(&self, expression: Expr, reason: String) {
-        self.fail(KernelError::Width { block: self.block(), expression: expression.to_string(), reason });
+    fn expression(&self, id: NodeId) -> Expr<'_> {
+        Expr { kernel: &self.kernel, id }
     }
 
     fn check_name(&self, name: &str) -> String {
@@ -298,7 +291,7 @@ impl Builder {
         kernel.signals.push(Signal { name, ty, role, value: None, guards: Vec::new(), comment: None, output: false });
         let signal = kernel.signals.len() - 1;
         let id = kernel.intern(Node::Signal(signal), ty);
-        Net { builder: self, signal, value: Expr { builder: self, id } }
+        Net { builder: self, signal, value: Expr { kernel: &self.kernel, id } }
     }
 }
 
@@ -327,7 +320,7 @@ impl<'k> Net<'k> {
             }
             Some(condition) => {
                 let otherwise = before.unwrap_or(self.value.id);
-                let at = |id| Expr { builder: self.builder, id };
+                let at = |id| self.builder.expression(id);
                 at(condition).mux(value, at(otherwise))
             }
         };
@@ -383,7 +376,7 @@ impl<'k> MemoryPort<'k> {
     /// Writes `data` to `address` at the clock edge if `enable` is 1.
     pub fn write(&self, enable: Expr<'k>, address: Expr<'k>, data: Expr<'k>) {
         if data.ty().bits != self.bits {
-            self.builder.width_error(data, format!("a word of the memory has {} bits", self.bits));
+            data.width_error(format!("a word of the memory has {} bits", self.bits));
         }
         let write = Write { enable: enable.bit("write enable").id, address: address.id, data: data.id };
         self.builder.kernel.borrow_mut().memories[self.memory].writes.push(write);

@@ -2,8 +2,6 @@
 
 use thiserror::Error;
 
-use super::kernel::Type;
-
 /// A defect of a block's description; names block, signal, expression.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 pub enum KernelError {
@@ -109,10 +107,4 @@ pub enum KernelError {
         /// The kernel's signal of that name.
         found: String,
     },
-}
-
-impl std::fmt::Display for Type {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        write!(f, "{}{}", if self.signed { "s" } else { "u" }, self.bits)
-    }
 }

@@ -13,12 +13,12 @@
 //!
 //! No operator loses a bit by itself: what is meant to be cut off is cut by [`Expr::low`] or [`Expr::slice`].
 
+use std::cell::RefCell;
 use std::fmt::{Display, Formatter};
 use std::ops::{Add, BitAnd, BitOr, BitXor, Mul, Not, Sub};
 
-use super::build::Builder;
 use super::error::KernelError;
-use super::kernel::{Binary, Node, NodeId, SignalId, Type, Unary};
+use super::kernel::{Binary, Kernel, Node, NodeId, SignalId, Type, Unary};
 
 /// Widest operand of a sum, product, comparison by size or shift by a signal.
 pub const ARITHMETIC_BITS: usize = 127;
@@ -26,20 +26,20 @@ pub const ARITHMETIC_BITS: usize = 127;
 /// An expression of a kernel under construction.
 #[derive(Clone, Copy, Debug)]
 pub struct Expr<'k> {
-    pub(crate) builder: &'k Builder,
-    pub(crate) id: NodeId,
+    pub(super) kernel: &'k RefCell<Kernel>,
+    pub(super) id: NodeId,
 }
 
 impl Display for Expr<'_> {
     fn fmt(&self, f: &mut Formatter<'_>) -> std::fmt::Result {
-        f.write_str(&self.builder.kernel.borrow().describe(self.id))
+        f.write_str(&self.kernel.borrow().describe(self.id))
     }
 }
 
 impl<'k> Expr<'k> {
     /// Width and signedness.
     pub fn ty(&self) -> Type {
-        self.builder.kernel.borrow().ty(self.id)
+        self.kernel.borrow().ty(self.id)
     }
 
     /// Width in bits.
@@ -47,13 +47,48 @@ impl<'k> Expr<'k> {
         self.ty().bits
     }
 
+    /// The expression of `node` in the kernel under construction.
+    pub(super) fn of(kernel: &'k RefCell<Kernel>, node: Node, ty: Type) -> Self {
+        let id = kernel.borrow_mut().intern(node, ty);
+        Expr { kernel, id }
+    }
+
+    /// The unsigned constant `value` of `bits` bits in the kernel under construction.
+    pub(super) fn constant_of(kernel: &'k RefCell<Kernel>, bits: usize, value: u64) -> Self {
+        let mut limbs = vec![0; bits.div_ceil(64)];
+        limbs[0] = value;
+        let constant = Expr::of(kernel, Node::Constant(limbs), Type::unsigned(bits));
+        if bits < 64 && value >> bits != 0 {
+            constant.width_error(format!("{value} needs more bits"));
+        }
+        constant
+    }
+
     fn node(self, node: Node, ty: Type) -> Self {
-        self.builder.node(node, ty)
+        Expr::of(self.kernel, node, ty)
+    }
+
+    /// The unsigned constant `value` of `bits` bits.
+    fn number(self, bits: usize, value: u64) -> Self {
+        Expr::constant_of(self.kernel, bits, value)
+    }
+
+    fn block(self) -> String {
+        self.kernel.borrow().block.clone()
+    }
+
+    fn fail(self, error: KernelError) {
+        self.kernel.borrow_mut().fail(error);
+    }
+
+    /// Records that the expression has an impossible width.
+    pub(super) fn width_error(self, reason: String) {
+        self.kernel.borrow_mut().width_error(self.id, reason);
     }
 
     /// The node, if it is a constant.
     fn constant(self) -> Option<Vec<u64>> {
-        match &self.builder.kernel.borrow().nodes[self.id].0 {
+        match &self.kernel.borrow().nodes[self.id].0 {
             Node::Constant(limbs) => Some(limbs.clone()),
             _ => None,
         }
@@ -87,7 +122,7 @@ impl<'k> Expr<'k> {
     pub fn extend(self, bits: usize) -> Self {
         let ty = self.ty();
         if bits < ty.bits {
-            self.builder.width_error(self, format!("{} bits cannot be extended to {bits}", ty.bits));
+            self.width_error(format!("{} bits cannot be extended to {bits}", ty.bits));
             return self;
         }
         match bits == ty.bits {
@@ -100,11 +135,11 @@ impl<'k> Expr<'k> {
     pub fn slice(self, low: usize, bits: usize) -> Self {
         let ty = self.ty();
         if bits == 0 || low + bits > ty.bits {
-            self.builder.width_error(self, format!("bits {low} to {} of {}", low + bits, ty.bits));
-            return self.builder.constant(bits.max(1), 0);
+            self.width_error(format!("bits {low} to {} of {}", low + bits, ty.bits));
+            return self.number(bits.max(1), 0);
         }
-        let inner = self.builder.kernel.borrow().nodes[self.id].0.clone();
-        let at = |id| Expr { builder: self.builder, id };
+        let inner = self.kernel.borrow().nodes[self.id].0.clone();
+        let at = |id| Expr { kernel: self.kernel, id };
         match inner {
             _ if low == 0 && bits == ty.bits => self.unsigned(),
             Node::Slice(from, offset) => at(from).slice(offset + low, bits),
@@ -122,12 +157,12 @@ impl<'k> Expr<'k> {
 
     /// This unsigned number plus `number`, modulo two to the power of its width.
     pub fn plus(self, number: u64) -> Self {
-        (self + self.builder.constant(self.bits(), number)).low(self.bits())
+        (self + self.number(self.bits(), number)).low(self.bits())
     }
 
     /// This unsigned number minus `number`, modulo two to the power of its width.
     pub fn minus(self, number: u64) -> Self {
-        (self - self.builder.constant(self.bits(), number)).low(self.bits())
+        (self - self.number(self.bits(), number)).low(self.bits())
     }
 
     /// The low `bits` bits, unsigned; of a sum or difference the number modulo 2^bits.
@@ -166,8 +201,8 @@ impl<'k> Expr<'k> {
     /// `self` if it has one bit; otherwise an error.
     pub(crate) fn bit(self, what: &str) -> Self {
         if self.bits() != 1 {
-            self.builder.width_error(self, format!("a {what} of {} bits", self.bits()));
-            return self.builder.constant(1, 0);
+            self.width_error(format!("a {what} of {} bits", self.bits()));
+            return self.number(1, 0);
         }
         self
     }
@@ -183,17 +218,17 @@ impl<'k> Expr<'k> {
 
     /// The value of the first of `arms` whose number equals this, else `default`.
     pub fn case(self, arms: &[(u64, Expr<'k>)], default: Expr<'k>) -> Self {
-        arms.iter().rev().fold(default, |other, &(number, value)| {
-            self.equals(self.builder.constant(self.bits(), number)).mux(value, other)
-        })
+        arms.iter()
+            .rev()
+            .fold(default, |other, &(number, value)| self.equals(self.number(self.bits(), number)).mux(value, other))
     }
 
     /// The entry of `table` at this unsigned index, of `bits` bits, without sign; as many entries as indices.
     pub fn table(self, bits: usize, table: &[u64]) -> Self {
-        let mut entries: Vec<Expr<'k>> = table.iter().map(|&entry| self.builder.constant(bits, entry)).collect();
+        let mut entries: Vec<Expr<'k>> = table.iter().map(|&entry| self.number(bits, entry)).collect();
         if entries.len() != 1 << self.bits() {
-            self.builder.width_error(self, format!("a table of {} entries", entries.len()));
-            return self.builder.constant(bits, 0);
+            self.width_error(format!("a table of {} entries", entries.len()));
+            return self.number(bits, 0);
         }
         for bit in 0..self.bits() {
             entries = entries
@@ -216,7 +251,7 @@ impl<'k> Expr<'k> {
 
     /// Whether this unsigned number is `number`.
     pub fn is(self, number: u64) -> Self {
-        self.equals(self.builder.constant(self.bits(), number))
+        self.equals(self.number(self.bits(), number))
     }
 
     /// Whether this number is less than `other`.
@@ -256,7 +291,7 @@ impl<'k> Expr<'k> {
         if by == 0 {
             return self;
         }
-        let shifted = self.unsigned().concat(self.builder.constant(by, 0));
+        let shifted = self.unsigned().concat(self.number(by, 0));
         shifted.cast(self.ty().signed)
     }
 
@@ -270,7 +305,7 @@ impl<'k> Expr<'k> {
         if by == 0 {
             return self;
         }
-        let half = self.builder.constant(by + 1, 1 << (by - 1)).cast(self.ty().signed);
+        let half = self.number(by + 1, 1 << (by - 1)).cast(self.ty().signed);
         (self + half).shift_right(by)
     }
 
@@ -299,8 +334,8 @@ impl<'k> Expr<'k> {
     }
 
     fn mixed(self, node: Expr<'k>) {
-        let (block, expression) = (self.builder.block(), node.to_string());
-        self.builder.fail(KernelError::MixedSigns { block, expression });
+        let (block, expression) = (self.block(), node.to_string());
+        self.fail(KernelError::MixedSigns { block, expression });
     }
 
     fn same_signs(self, other: Expr<'k>, node: Expr<'k>) {
@@ -312,7 +347,7 @@ impl<'k> Expr<'k> {
     fn arithmetic(self, other: Expr<'k>) {
         let widest = self.bits().max(other.bits());
         if widest > ARITHMETIC_BITS {
-            self.builder.width_error(self, format!("{widest} bits, at most {ARITHMETIC_BITS} in arithmetic"));
+            self.width_error(format!("{widest} bits, at most {ARITHMETIC_BITS} in arithmetic"));
         }
     }
 
@@ -326,7 +361,7 @@ impl<'k> Expr<'k> {
     fn bitwise(self, operator: Binary, other: Expr<'k>) -> Self {
         let node = self.node(Node::Binary(operator, self.id, other.id), Type::unsigned(self.bits()));
         if self.bits() != other.bits() {
-            self.builder.width_error(node, format!("operands of {} and {} bits", self.bits(), other.bits()));
+            node.width_error(format!("operands of {} and {} bits", self.bits(), other.bits()));
         }
         if self.ty().signed || other.ty().signed {
             self.mixed(node);
@@ -337,19 +372,19 @@ impl<'k> Expr<'k> {
     /// The value with the width of `signal`.
     pub(crate) fn assigned_to(self, signal: SignalId) -> Self {
         let (name, to) = {
-            let kernel = self.builder.kernel.borrow();
+            let kernel = self.kernel.borrow();
             (kernel.signals[signal].name.clone(), kernel.signals[signal].ty)
         };
         let ty = self.ty();
-        let (block, expression) = (self.builder.block(), self.to_string());
+        let (block, expression) = (self.block(), self.to_string());
         if ty.signed != to.signed {
-            self.builder.fail(KernelError::MixedSigns { block, expression: format!("{name} = {expression}") });
-            return self.builder.constant(to.bits, 0).cast(to.signed);
+            self.fail(KernelError::MixedSigns { block, expression: format!("{name} = {expression}") });
+            return self.number(to.bits, 0).cast(to.signed);
         }
         if ty.bits > to.bits {
             let (bits, room) = (ty.bits, to.bits);
-            self.builder.fail(KernelError::LostBits { block, signal: name, expression, bits, room });
-            return self.builder.constant(to.bits, 0).cast(to.signed);
+            self.fail(KernelError::LostBits { block, signal: name, expression, bits, room });
+            return self.number(to.bits, 0).cast(to.signed);
         }
         self.extend(to.bits)
     }

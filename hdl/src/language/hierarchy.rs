@@ -16,10 +16,7 @@ use super::error::KernelError;
 use super::kernel::{Kernel, Role};
 use super::keywords::is_keyword;
 use super::verilog::range;
-use super::wiring::{wiring, Pin};
-
-/// Between the levels of the name of a module or a net. Not rust-hdl's `$`, which Tcl, XDC and VHDL do not take.
-pub const SEPARATOR: &str = "__";
+use super::wiring::{wiring, Pin, SEPARATOR};
 
 thread_local! {
     /// The kernels of bodies that a probe has visited since its last scope began or ended.

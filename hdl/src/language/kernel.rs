@@ -25,6 +25,12 @@ impl Type {
     }
 }
 
+impl std::fmt::Display for Type {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "{}{}", if self.signed { "s" } else { "u" }, self.bits)
+    }
+}
+
 /// Index of a node in [`Kernel::nodes`].
 pub(crate) type NodeId = usize;
 /// Index of a signal in [`Kernel::signals`].
@@ -260,6 +266,17 @@ impl Kernel {
         self.nodes.push((node.clone(), ty));
         self.interned.insert((node, ty), self.nodes.len() - 1);
         self.nodes.len() - 1
+    }
+
+    /// Records a defect.
+    pub(crate) fn fail(&mut self, error: KernelError) {
+        self.errors.push(error);
+    }
+
+    /// Records an operand of impossible width.
+    pub(crate) fn width_error(&mut self, node: NodeId, reason: String) {
+        let expression = self.describe(node);
+        self.fail(KernelError::Width { block: self.block.clone(), expression, reason });
     }
 
     /// Every output that depends on inputs in the same cycle, with their names.

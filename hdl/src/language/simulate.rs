@@ -26,6 +26,8 @@ struct Collision {
     memory: usize,
     address: usize,
     bits: usize,
+    /// Condition under which the register takes the word; always without one.
+    enable: Option<usize>,
 }
 
 /// A write port in slots.
@@ -81,9 +83,14 @@ impl Simulation {
             slots[node(own)] = sign(register.initial.unwrap_or(0));
             let reset = register.reset.map(|(condition, value)| (node(condition), sign(value)));
             let limbs = limbs(of.ty.bits) as usize;
-            let collides = match kernel.nodes[next].0 {
+            // A register with an enable takes the word or keeps its own.
+            let (enable, taken) = match kernel.nodes[next].0 {
+                Node::Mux(enable, taken, kept) if kept == own => (Some(node(enable)), taken),
+                _ => (None, next),
+            };
+            let collides = match kernel.nodes[taken].0 {
                 Node::Read { memory, address } if kernel.memories[memory].unchecked => {
-                    Some(Collision { memory, address: node(address), bits: of.ty.bits })
+                    Some(Collision { memory, address: node(address), bits: of.ty.bits, enable })
                 }
                 _ => None,
             };
@@ -171,7 +178,8 @@ impl Simulation {
                 }
                 _ => own.copy_from_slice(&slots[transition.next..][..transition.limbs]),
             }
-            if let Some(Collision { memory, address, bits }) = transition.collides {
+            let taken = |collision: &&Collision| collision.enable.is_none_or(|enable| slots[enable] != 0);
+            if let Some(&Collision { memory, address, bits, .. }) = transition.collides.as_ref().filter(taken) {
                 let written = |write: &WritePort| {
                     write.memory == memory && slots[write.enable] != 0 && slots[write.address] == slots[address]
                 };

@@ -10,8 +10,10 @@ use rust_hdl::core::ast::{
 use super::build::{Builder, Net};
 use super::error::KernelError;
 use super::expression::Expr;
-use super::hierarchy::SEPARATOR;
 use super::kernel::{Kernel, Type};
+
+/// Between the levels of the name of a module or a net. Not rust-hdl's `$`, which Tcl, XDC and VHDL do not take.
+pub const SEPARATOR: &str = "__";
 
 /// A signal of a block as it stands in the block's module: a port, a port of a block inside, or a signal of its own.
 #[derive(Clone, Debug)]

@@ -1,10 +1,14 @@
 //! A board's top module: an engine behind its link.
 
+use dermis_golden::board::EngineKind;
 use dermis_golden::fixed::Model;
-use dermis_golden::link::{Identity, LinkError};
+use dermis_golden::link::{Identity, LinkError, LinkKind};
 use rust_hdl::prelude::*;
 
-use super::{Board, BoardOutputs, Lamps, PacketLink, PowerOn, Shape, SpiSlave, Uart};
+use super::board::{Board, BoardOutputs};
+use super::{Lamps, PacketLink, PowerOn, Shape, SpiSlave, Uart};
+use crate::error::HdlError;
+use crate::language::Hierarchy;
 use crate::primitives::Dff;
 use crate::{engine, serial};
 
@@ -153,3 +157,26 @@ macro_rules! boards {
 
 boards!(BoardTop, SpiBoardTop, engine::Engine);
 boards!(SerialBoardTop, SerialSpiBoardTop, serial::Engine);
+
+/// The board of `model`, after rust-hdl's checks.
+pub(super) fn board_top(model: &Model) -> Result<Box<dyn Board>, HdlError> {
+    if !model.searches() {
+        return Err(HdlError::Unsupported {
+            field: "search.mu_max",
+            value: model.scene.search.mu_max.to_string(),
+            what: "a μ search",
+        });
+    }
+    match (model.board.engine, model.scene.hardware.link) {
+        (EngineKind::Parallel, LinkKind::Uart) => checked(BoardTop::new(model)?),
+        (EngineKind::Parallel, LinkKind::Spi) => checked(SpiBoardTop::new(model)?),
+        (EngineKind::Serial, LinkKind::Uart) => checked(SerialBoardTop::new(model)?),
+        (EngineKind::Serial, LinkKind::Spi) => checked(SerialSpiBoardTop::new(model)?),
+    }
+}
+
+fn checked<B: Board + 'static>(top: B) -> Result<Box<dyn Board>, HdlError> {
+    Hierarchy::of(&top).check()?;
+    check_all(&top).map_err(|error| HdlError::Check(format!("{error:?}")))?;
+    Ok(Box::new(top))
+}

@@ -1,38 +1,15 @@
 //! Generation of a board's top module as files.
 
-use dermis_golden::board::EngineKind;
 use dermis_golden::fixed::Model;
 use dermis_golden::link::{slip::IDLE, LinkKind};
-use rust_hdl::prelude::*;
 use serde_json::json;
 
-use super::{Board, BoardTop, SerialBoardTop, SerialSpiBoardTop, SpiBoardTop};
+use super::board_top::board_top;
 use crate::describe::{comments, port_comment};
-use crate::generate::{attributes, placed, top_name, Generated, GeneratedFile, HdlError};
+use crate::error::HdlError;
+use crate::generate::{attributes, placed, top_name, Generated};
 use crate::language::{Change, Hierarchy};
-
-/// The board of `model`, after rust-hdl's checks.
-pub(super) fn board_top(model: &Model) -> Result<Box<dyn Board>, HdlError> {
-    if !model.searches() {
-        return Err(HdlError::Unsupported {
-            field: "search.mu_max",
-            value: model.scene.search.mu_max.to_string(),
-            what: "a μ search",
-        });
-    }
-    match (model.board.engine, model.scene.hardware.link) {
-        (EngineKind::Parallel, LinkKind::Uart) => checked(BoardTop::new(model)?),
-        (EngineKind::Parallel, LinkKind::Spi) => checked(SpiBoardTop::new(model)?),
-        (EngineKind::Serial, LinkKind::Uart) => checked(SerialBoardTop::new(model)?),
-        (EngineKind::Serial, LinkKind::Spi) => checked(SerialSpiBoardTop::new(model)?),
-    }
-}
-
-fn checked<B: Board + 'static>(top: B) -> Result<Box<dyn Board>, HdlError> {
-    Hierarchy::of(&top).check()?;
-    check_all(&top).map_err(|error| HdlError::Check(format!("{error:?}")))?;
-    Ok(Box::new(top))
-}
+use crate::manifest::GeneratedFile;
 
 /// The link in the header comment of the top module: its name, and its pins.
 fn link_text(link: LinkKind, bit_rate: u32) -> (&'static str, String) {
@@ -82,7 +59,7 @@ pub fn generate_board_changed(model: &Model, changes: &[Change]) -> Result<Gener
         ("engine", _) => port_comment("", port),
         (_, own) => port_comment(own?, port),
     };
-    let verilog = hierarchy.verilog(&top, &attributes(&memories, model), &comment);
+    let verilog = hierarchy.verilog(&top, &attributes(&memories), &comment);
     let link = model.scene.hardware.link;
     let (behind, pins) = link_text(link, link.bit_rate(&model.board)?);
     let text = format!(

@@ -12,6 +12,7 @@
 //! `board_top`, `packet_link` and `uart` connect blocks by `#[hdl_gen]`; each other block is one
 //! [kernel](crate::language).
 
+mod board;
 mod board_top;
 mod counter_ram;
 mod crc;
@@ -34,6 +35,7 @@ mod uart;
 mod uart_receiver;
 mod uart_transmitter;
 
+pub use board::{Board, BoardDevice, BoardOutputs};
 pub use board_top::{BoardTop, SerialBoardTop, SerialSpiBoardTop, SpiBoardTop};
 pub use counter_ram::CounterRam;
 pub use crc::Crc;
@@ -46,7 +48,7 @@ pub use parser::Parser;
 pub use power_on::PowerOn;
 pub use requests::Requests;
 pub use resultants::Resultants;
-pub use simulate::{board_simulator, Board, BoardDevice, BoardOutputs};
+pub use simulate::board_simulator;
 pub use slip_decoder::SlipDecoder;
 pub use slip_encoder::SlipEncoder;
 pub use sources::Sources;

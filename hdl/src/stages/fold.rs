@@ -28,7 +28,7 @@ pub struct Fold {
     /// Address of the quad to read from the frame buffer, over all subarrays; steps in every cycle after `start` until
     /// the subarray is read.
     pub quad_address: Wire<Out>,
-    /// The frame's last quad is being read: the frame buffer is free from the next cycle.
+    /// The frame's last quad was read in the cycle before: the frame buffer is free.
     pub free: Signal<Out, Bit>,
     /// Four normalised codes, `input_bits` each, signed; three cycles after `quad_address`.
     pub normalised: Wire<In>,
@@ -50,6 +50,7 @@ pub struct Fold {
     normalised_later: BitDelay,
     folded_later: BitDelay,
     finish: BitDelay,
+    frees: BitDelay,
     address: Delay,
     butterfly: Butterfly,
     memory: Ram,
@@ -86,6 +87,7 @@ impl Fold {
             normalised_later: BitDelay::new(3),
             folded_later: BitDelay::new(1),
             finish: BitDelay::new(5),
+            frees: BitDelay::new(1),
             address: Delay::new(address, 4),
             butterfly: Butterfly::new(bits),
             memory: Ram::new(quads, 1, 4 * (bits + 2)).holding([Holds::Folded]).registered(),
@@ -103,12 +105,14 @@ impl Logic for Fold {
         self.normalised_later.clk.next = self.clk.val();
         self.folded_later.clk.next = self.clk.val();
         self.finish.clk.next = self.clk.val();
+        self.frees.clk.next = self.clk.val();
         self.address.clk.next = self.clk.val();
         self.butterfly.clk.next = self.clk.val();
         self.memory.clk.next = self.clk.val();
         self.normalised_later.rst.next = self.rst.val();
         self.folded_later.rst.next = self.rst.val();
         self.finish.rst.next = self.rst.val();
+        self.frees.rst.next = self.rst.val();
 
         self.quads.which.next = self.which.val();
         self.quads.clear.next = self.start.val();
@@ -118,7 +122,9 @@ impl Logic for Fold {
         self.frame_quads.clear.next = self.begin_frame.val();
         self.frame_quads.enable.next = self.running.q.val();
         self.quad_address.next = self.frame_quads.value.val();
-        self.free.next = self.ending.val() & self.last_part.val();
+        comment!("Registered: the frame buffer is far away");
+        self.frees.d.next = self.ending.val() & self.last_part.val();
+        self.free.next = self.frees.q.val();
 
         self.normalised_later.d.next = self.running.q.val();
         self.folded_later.d.next = self.normalised_later.q.val();

@@ -1,6 +1,7 @@
 //! Stage `pass`: the matrix-vector products of a subarray, one after the other on the MAC lanes.
 //!
-//! The schedule issues one column per cycle and stalls only where the operand of a step is not complete yet. From issue
+//! The schedule issues one column per cycle. It waits for one cycle after each accumulation and where the operand of a
+//! step is not complete yet; where quads are written and read in order, until its first quad has been written. From issue
 //! to operands: addresses (1 cycle, 3 with a column list), memories (2), selection of limb and parity (1); then the
 //! lanes.
 
@@ -33,10 +34,12 @@ pub struct Pass {
     pub vector_quad: Wire<In>,
     /// `vector_quad` holds a quad.
     pub vector_valid: Signal<In, Bit>,
-    /// Accumulators of one row for the four parities, `acc_bits` each, signed; valid with `quad_valid`.
+    /// Accumulators of one row for the four parities, `lane_bits` each, signed; valid with `quad_valid`.
     pub quad: Wire<Out>,
     /// `quad` holds a row.
     pub quad_valid: Signal<Out, Bit>,
+    /// `quad` holds a row two cycles later.
+    pub quad_soon: Signal<Out, Bit>,
     /// The coefficient signature of the subarray is wrong, 1 bit; valid with its last row.
     pub damaged: Wire<Out>,
     column: Counter,
@@ -76,8 +79,9 @@ impl Pass {
             input_quad: Wire::new(4 * formats.fold_bits as usize),
             vector_quad: Wire::new(parity_bits),
             vector_valid: Default::default(),
-            quad: Wire::new(4 * formats.acc_bits as usize),
+            quad: Wire::new(4 * formats.lane_bits as usize),
             quad_valid: Default::default(),
+            quad_soon: Default::default(),
             damaged: Wire::new(1),
             column: Counter::new(quads),
             running: Default::default(),
@@ -88,6 +92,7 @@ impl Pass {
             operand_writer: OperandWriter::new(
                 operands,
                 &model.cases().iter().map(|case| case.formats.quads).collect::<Vec<_>>(),
+                model.first().storage.streamed,
             ),
             source: Delay::new(SOURCE_BITS, 2),
             control: Delay::new(control_bits(model), 3),
@@ -158,6 +163,7 @@ impl Logic for Pass {
         self.lanes.control.next = self.control.q.val();
         self.quad.next = self.lanes.quad.val();
         self.quad_valid.next = self.lanes.quad_valid.val();
+        self.quad_soon.next = self.lanes.quad_soon.val();
         self.damaged.next = self.lanes.damaged.val();
     }
 }

@@ -1,6 +1,7 @@
 //! Stage `rescale`: accumulators to words of v_ij; v_00 after its block exponent has been measured.
 //!
-//! The first Q rows of a subarray are raw v_00: they wait in a memory while their magnitude is measured, then pass the
+//! The first rows of a subarray are raw v_00: Q rows of the low limbs wait in a memory until the Q rows of the high limbs
+//! are added to them, as they are read and written again. The magnitudes of the sums are measured, then they pass the
 //! rescaler with the measured shift. All later rows pass it directly, with the constant shift of an A pass. The two
 //! never overlap, because no A pass starts before v_00 is complete.
 
@@ -9,7 +10,7 @@ use dermis_golden::fixed::Model;
 use rust_hdl::prelude::*;
 
 use crate::primitives::{
-    count_bits, largest, shift_bits, BitDelay, CaseCounter, Dff, Ram, RawLength, Rescaler, SATURATION_BITS,
+    count_bits, largest, shift_bits, BitDelay, CaseCounter, Dff, LimbSum, Ram, RawLength, Rescaler, SATURATION_BITS,
 };
 use crate::wire::Wire;
 
@@ -24,10 +25,12 @@ pub struct Rescale {
     pub which: Wire<In>,
     /// A new subarray.
     pub start: Signal<In, Bit>,
-    /// Accumulators of one row for the four parities, `acc_bits` each, signed; valid with `quad_valid`.
+    /// Accumulators of one row for the four parities, `lane_bits` each, signed; valid with `quad_valid`.
     pub quad: Wire<In>,
     /// `quad` holds a row.
     pub quad_valid: Signal<In, Bit>,
+    /// `quad` holds a row two cycles later.
+    pub quad_soon: Signal<In, Bit>,
     /// Four parities of a v_ij, `vector_bits` each, signed; valid with `words_valid`.
     pub words: Wire<Out>,
     /// `words` holds a quad.
@@ -43,8 +46,9 @@ pub struct Rescale {
     collecting: Dff,
     replaying: Dff,
     rows: CaseCounter,
-    replay: CaseCounter,
+    reads: CaseCounter,
     raw: Ram,
+    limb_sum: LimbSum,
     length: RawLength,
     rescaler: Rescaler,
     started: BitDelay,
@@ -52,6 +56,7 @@ pub struct Rescale {
     words_later: BitDelay,
     operands_later: BitDelay,
     collected: Signal<Local, Bit>,
+    complete: Signal<Local, Bit>,
     enters: Signal<Local, Bit>,
 }
 
@@ -66,8 +71,9 @@ impl Rescale {
             rst: Default::default(),
             which: Wire::new(count_bits(quads.len())),
             start: Default::default(),
-            quad: Wire::new(acc),
+            quad: Wire::new(4 * formats.lane_bits as usize),
             quad_valid: Default::default(),
+            quad_soon: Default::default(),
             words: Wire::new(4 * formats.vector_bits as usize),
             words_valid: Default::default(),
             operands: Wire::new(4 * formats.data_bits as usize),
@@ -77,8 +83,9 @@ impl Rescale {
             collecting: Default::default(),
             replaying: Default::default(),
             rows: CaseCounter::new(&quads),
-            replay: CaseCounter::new(&quads),
+            reads: CaseCounter::new(&quads),
             raw: Ram::new(largest(&quads), 1, acc).holding([Holds::Raw]).registered(),
+            limb_sum: LimbSum::new(formats),
             length: RawLength::new(formats),
             rescaler: Rescaler::new(formats),
             started: BitDelay::new(1),
@@ -86,6 +93,7 @@ impl Rescale {
             words_later: BitDelay::new(3),
             operands_later: BitDelay::new(1),
             collected: Default::default(),
+            complete: Default::default(),
             enters: Default::default(),
         }
     }
@@ -97,8 +105,9 @@ impl Logic for Rescale {
         self.collecting.clk.next = self.clk.val();
         self.replaying.clk.next = self.clk.val();
         self.rows.clk.next = self.clk.val();
-        self.replay.clk.next = self.clk.val();
+        self.reads.clk.next = self.clk.val();
         self.raw.clk.next = self.clk.val();
+        self.limb_sum.clk.next = self.clk.val();
         self.length.clk.next = self.clk.val();
         self.rescaler.clk.next = self.clk.val();
         self.read.clk.next = self.clk.val();
@@ -113,27 +122,33 @@ impl Logic for Rescale {
         comment!("Registered; the first row comes many cycles later");
         self.started.d.next = self.start.val();
         self.collected.next = self.collecting.q.val() & self.quad_valid.val();
+        self.complete.next = self.collected.val() & self.limb_sum.complete.val();
         self.collecting.d.next = (self.started.q.val()
-            | (self.collecting.q.val() & !(self.quad_valid.val() & self.rows.last.val())))
+            | (self.collecting.q.val() & !(self.complete.val() & self.rows.last.val())))
             & !self.rst.val();
         self.rows.which.next = self.which.val();
-        self.replay.which.next = self.which.val();
+        self.reads.which.next = self.which.val();
         self.rows.clear.next = self.started.q.val();
         self.rows.enable.next = self.collected.val();
         self.raw.write.next = self.collected.val().into();
         self.raw.write_address.next = self.rows.value.val();
-        self.raw.write_data.next = self.quad.val();
+        self.raw.write_data.next = self.limb_sum.sum.val();
+        self.limb_sum.clear.next = self.started.q.val();
+        self.limb_sum.last.next = self.collected.val() & self.rows.last.val();
+        self.limb_sum.quad.next = self.quad.val();
+        self.limb_sum.low.next = self.raw.read_data.val();
         self.length.clear.next = self.started.q.val();
-        self.length.accept.next = self.collected.val();
-        self.length.quad.next = self.quad.val();
+        self.length.accept.next = self.complete.val();
+        self.length.quad.next = self.limb_sum.sum.val();
 
-        self.replaying.d.next = ((self.collected.val() & self.rows.last.val())
-            | (self.replaying.q.val() & !self.replay.last.val()))
+        self.replaying.d.next = ((self.complete.val() & self.rows.last.val())
+            | (self.replaying.q.val() & !self.reads.last.val()))
             & !self.rst.val();
-        self.replay.clear.next = self.started.q.val();
-        self.replay.enable.next = self.replaying.q.val();
+        comment!("Read two cycles before its high limbs come, and again");
+        self.reads.clear.next = self.started.q.val();
+        self.reads.enable.next = self.replaying.q.val() | (self.collecting.q.val() & self.quad_soon.val());
         self.raw.read.next = true;
-        self.raw.read_address.next = self.replay.value.val();
+        self.raw.read_address.next = self.reads.value.val();
         self.read.d.next = self.replaying.q.val();
 
         self.enters.next = self.read.q.val() | (self.quad_valid.val() & !self.collecting.q.val());
@@ -141,10 +156,8 @@ impl Logic for Rescale {
         self.rescaler.valid.next = self.enters.val();
         self.rescaler.measured.next = self.read.q.val();
         self.rescaler.shift.next = self.length.shift.val();
+        self.rescaler.raw.next = self.raw.read_data.val();
         self.rescaler.quad.next = self.quad.val();
-        if self.read.q.val() {
-            self.rescaler.quad.next = self.raw.read_data.val();
-        }
         self.words_later.d.next = self.enters.val();
         self.operands_later.d.next = self.words_later.q.val();
         self.words.next = self.rescaler.words.val();

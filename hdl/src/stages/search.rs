@@ -61,6 +61,9 @@ pub struct Search {
     moved_address: Delay,
     scored_address: Delay,
     set_up: Dff,
+    standing: Dff,
+    due: Signal<Local, Bit>,
+    held: Signal<Local, Bit>,
     quad_end: Signal<Local, Bit>,
 }
 
@@ -71,8 +74,10 @@ ports! {
         pub clk: Signal<In, Clock>,
         /// Synchronous reset, active high.
         pub rst: Signal<In, Bit>,
-        /// Index of the case; constant while a frame is computed.
+        /// Index of the case of the frame that is searched; constant until its values have been output.
         pub which: Wire<In>,
+        /// Index of the case of the frame that is written; constant until its last coefficient.
+        pub fill_which: Wire<In>,
         /// One coefficient of four taxels, signed; valid with `fill`.
         pub fill_quad: Wire<In>,
         /// `fill_quad` holds a coefficient.
@@ -85,6 +90,10 @@ ports! {
         pub start: Signal<In, Bit>,
         /// The subarray is searched, else p(0) is the result; valid with `start`.
         pub enabled: Signal<In, Bit>,
+        /// Values may be output; the last sweep waits for it.
+        pub ready: Signal<In, Bit>,
+        /// The last sweep waits in this cycle.
+        pub stands: Signal<Out, Bit>,
         /// Four values p(μ*), `search_bits[0]` each, signed; valid with `values_valid`.
         pub values: Wire<Out>,
         /// `values` holds a quad.
@@ -118,12 +127,15 @@ impl SearchPorts {
             clk: Default::default(),
             rst: Default::default(),
             which: Wire::new(count_bits(model.cases().len())),
+            fill_which: Wire::new(count_bits(model.cases().len())),
             fill_quad: Wire::new(4 * (formats.vector_bits as usize + 2)),
             fill: Default::default(),
             fill_index: Wire::new(count_bits(vectors(formats.degree))),
             fill_address: Wire::new(count_bits(formats.quads)),
             start: Default::default(),
             enabled: Default::default(),
+            ready: Default::default(),
+            stands: Default::default(),
             values: Wire::new(4 * formats.search_bits[0] as usize),
             values_valid: Default::default(),
             settled: Default::default(),
@@ -150,8 +162,6 @@ impl Search {
         let limits: Vec<usize> = layouts.iter().map(Quads::len).collect();
         let periods: Vec<usize> = limits.iter().map(|&quads| coarse_period(quads as u64) as usize - 1).collect();
         let taxel_counts: Vec<usize> = layouts.iter().map(|layout| layout.rows * layout.cols).collect();
-        // One subarray is filled while another is searched.
-        let apart = model.cases().iter().any(|case| case.parts.len() > 1);
         // Zero where there are several cases: none of them has so few quads.
         let padding = (SHORTEST_SWEEP as usize).saturating_sub(quads);
         let address = count_bits(quads);
@@ -165,12 +175,12 @@ impl Search {
             bias: ScoreBias::new(formats, &taxel_counts),
             best: BestCandidate::new(formats, largest(&taxel_counts)),
             constants: Slice::new(taxels.bits(), value),
-            store: Store::new(taxels.clone(), quads, fill_bits, apart),
+            store: Store::new(taxels.clone(), quads, fill_bits),
             taylor: Taylor::new(&taxels),
             candidates: Candidates::new(&taxels),
             scores: Score::new(formats),
             lane_mask: LaneMask::new(&layouts),
-            sum: Sum::new(&sums, quads, fill_bits, apart),
+            sum: Sum::new(&sums, quads, fill_bits),
             sum_taylor: Taylor::new(&sums),
             sum_candidates: Candidates::new(&sums),
             fill_mask: LaneMask::new(&layouts),
@@ -199,6 +209,9 @@ impl Search {
             moved_address: Delay::new(address, MOVED),
             scored_address: Delay::new(address, CANDIDATES_LATENCY),
             set_up: Default::default(),
+            standing: Default::default(),
+            due: Default::default(),
+            held: Default::default(),
             quad_end: Default::default(),
         }
     }
@@ -225,6 +238,7 @@ impl Logic for Search {
         self.quads.clk.next = self.clk.val();
         self.counting.clk.next = self.clk.val();
         self.set_up.clk.next = self.clk.val();
+        self.standing.clk.next = self.clk.val();
         self.trial.clk.next = self.clk.val();
         self.trial.rst.next = self.rst.val();
         self.outcome.clk.next = self.clk.val();
@@ -257,7 +271,7 @@ impl Logic for Search {
 
         self.bias.which.next = self.which.val();
         self.lane_mask.which.next = self.which.val();
-        self.fill_mask.which.next = self.which.val();
+        self.fill_mask.which.next = self.fill_which.val();
         self.quads.which.next = self.which.val();
         self.period.which.next = self.which.val();
 
@@ -278,9 +292,13 @@ impl Logic for Search {
         self.sequencer.enabled.next = self.enabled.val();
         self.best.begin_frame.next = self.start.val();
         self.began.d.next = self.start.val();
-        self.set_up.d.next =
-            (self.began.q.val() | self.compared_later.q.val() | (self.sequencer.chains.val() & self.period.last.val()))
-                & !self.rst.val();
+        self.due.next = self.began.q.val() | self.compared_later.q.val() | self.standing.q.val();
+        self.held.next = self.due.val() & self.sequencer.next_last.val() & !self.ready.val();
+        self.standing.d.next = self.held.val() & !self.rst.val();
+        self.stands.next = self.held.val();
+        self.set_up.d.next = ((self.due.val() & !self.held.val())
+            | (self.sequencer.chains.val() & self.period.last.val()))
+            & !self.rst.val();
         self.compared_later.d.next = self.best.done.val() & self.best.closes.val();
         self.period.clear.next = self.set_up.q.val();
         self.period.enable.next = true;

@@ -26,9 +26,9 @@ kernel_block!(
     Unsearched,
     ports SearchPorts,
     clock clk,
-    inputs [rst, which, fill_quad, fill, fill_index, fill_address, start, enabled],
+    inputs [rst, which, fill_which, fill_quad, fill, fill_index, fill_address, start, enabled, ready],
     outputs [
-        values, values_valid, settled, values_begin, done, best_x, best_y, score, found, compared, taken,
+        values, values_valid, settled, values_begin, done, best_x, best_y, score, found, compared, taken, stands,
     ]
 );
 
@@ -48,9 +48,11 @@ fn kernel(ports: &SearchPorts) -> Kernel {
     let k = Builder::new("unsearched");
     let (rst, start) = (k.input("rst", 1), k.input("start", 1));
     k.input("which", ports.which.width());
+    k.input("fill_which", ports.fill_which.width());
     k.input("fill_index", ports.fill_index.width());
     k.input("fill_address", ports.fill_address.width());
     k.input("enabled", 1);
+    k.input("ready", 1);
     k.wire("values", k.input("fill_quad", ports.fill_quad.width()));
     k.wire("values_valid", k.input("fill", 1));
     let began = k.delay("began", start & !rst);
@@ -64,6 +66,7 @@ fn kernel(ports: &SearchPorts) -> Kernel {
         ("found", 1),
         ("compared", 1),
         ("taken", 1),
+        ("stands", 1),
     ] {
         k.wire(name, k.constant(bits, 0));
     }
@@ -87,8 +90,8 @@ mod tests {
     impl Reference for Passed {
         fn outputs(&mut self, inputs: &[Word]) -> Vec<Option<Word>> {
             let of = |name: &String| match name.as_str() {
-                "values" => Some(inputs[6]),
-                "values_valid" => Some(inputs[7]),
+                "values" => Some(inputs[8]),
+                "values_valid" => Some(inputs[9]),
                 "settled" | "values_begin" | "done" => self.began.map(Word::from),
                 _ => Some(Word::default()),
             };
@@ -106,8 +109,19 @@ mod tests {
         scene.search.mu_max = 0.0;
         let block = Unsearched::new(&Model::new(&scene).unwrap());
         let kernel = block.kernel.kernel();
-        let widths = ["rst", "start", "which", "fill_index", "fill_address", "enabled", "fill_quad", "fill"]
-            .map(|name| kernel.signals().find(|(own, _)| *own == name).unwrap().1.bits);
+        let widths = [
+            "rst",
+            "start",
+            "which",
+            "fill_which",
+            "fill_index",
+            "fill_address",
+            "enabled",
+            "ready",
+            "fill_quad",
+            "fill",
+        ]
+        .map(|name| kernel.signals().find(|(own, _)| *own == name).unwrap().1.bits);
         let outputs = kernel.signals.iter().filter(|signal| signal.output).map(|signal| signal.name.clone()).collect();
         check(kernel, &random_words(1000, &widths), &mut Passed { began: None, outputs });
     }

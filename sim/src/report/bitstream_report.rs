@@ -7,9 +7,9 @@ use serde::Serialize;
 
 use super::table::markdown;
 use super::BUDGET_US;
-use crate::bitstream::baseline::Baseline;
-use crate::bitstream::dsp_register_packing::PackedRegisters;
-use crate::bitstream::timing::Fmax;
+use crate::flow::baseline::Baseline;
+use crate::flow::bitstream::Made;
+use crate::flow::timing::Fmax;
 
 /// A scene on its board: cells, clocks, and the time of a frame.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -57,6 +57,8 @@ pub struct BitstreamReport {
     /// Number of operands and of products whose registers were moved into multipliers.
     #[serde(rename = "absorbed")]
     pub packed_registers: [usize; 2],
+    /// Number of block RAMs whose output registers are used.
+    pub registered_block_rams: usize,
     /// The link's own clock with its pin, if the link has one.
     pub link_clock: Option<(&'static str, Fmax)>,
     /// Path of the bitstream; none if a clock is missed.
@@ -68,17 +70,12 @@ pub struct BitstreamReport {
 
 impl BitstreamReport {
     /// Summary of a run of place and route.
-    pub fn new(
-        model: &Model,
-        achieved: Baseline,
-        packed: PackedRegisters,
-        link_clock: Option<(&'static str, Fmax)>,
-        bitstream: Option<PathBuf>,
-        failures: Vec<String>,
-    ) -> Self {
+    pub fn new(model: &Model, made: Made) -> Self {
+        let Made { achieved, packed, link_clock, bitstream, failures } = made;
         BitstreamReport {
             summary: Summary::new(model, achieved),
             packed_registers: [packed.operands, packed.products],
+            registered_block_rams: packed.block_rams,
             link_clock,
             bitstream,
             failures,
@@ -138,7 +135,8 @@ fn row(summary: &Summary) -> Vec<String> {
 pub fn bitstream(report: &BitstreamReport) -> String {
     let mut text = summaries(std::slice::from_ref(&report.summary));
     let [operands, products] = report.packed_registers;
-    text.push_str(&format!("registers moved into multipliers: {operands} operands, {products} products\n"));
+    text.push_str(&format!("registers moved into multipliers: {operands} operands, {products} products; "));
+    text.push_str(&format!("behind {} block RAMs\n", report.registered_block_rams));
     if let Some((pin, clock)) = &report.link_clock {
         text.push_str(&format!("{pin}: {:.1} MHz, required {} MHz\n", clock.achieved, clock.constraint));
     }

@@ -6,9 +6,9 @@ use serde::Serialize;
 
 use super::csv::quoted;
 use super::table::{markdown, percent};
+use super::tabulate::ErrorRow;
 use super::Format;
 use crate::compare::{median, quantile};
-use crate::tabulate::ErrorRow;
 
 /// The rows in one format: fractions in CSV and JSON, percent in Markdown.
 ///
@@ -214,9 +214,9 @@ fn csv(rows: &[ErrorRow]) -> String {
 #[cfg(test)]
 mod tests {
     use super::super::csv_reader;
+    use super::super::tabulate::{BitTrueErrors, SubarrayRow};
     use super::*;
     use crate::compare::Difference;
-    use crate::tabulate::{BitTrueErrors, SubarrayRow};
     use dermis_golden::flags::Flag;
     use serde_json::Value;
 

@@ -1,8 +1,8 @@
 //! The table of `dermis faults`.
 
 use super::table::{aligned, percent};
-use crate::faults::state_bits::CLASSES;
-use crate::faults::{Row, Shares, LARGE};
+use crate::cosim::faults::state_bits::CLASSES;
+use crate::cosim::faults::{Row, Shares, LARGE};
 
 /// One row per storage class and stage; then the shares of each class, with its stages weighted by their bits.
 pub fn faults(rows: &[Row]) -> String {

@@ -22,7 +22,7 @@ use super::measure::{measure, Options};
 use super::pictures::{data_flow, force_field, waveform, Outline, FLOW_SCENE};
 use super::sections::time_pictures;
 use super::style::standalone;
-use crate::block::timing::{self, timing};
+use crate::cosim::block_timing::{timing, traces, SCENE};
 use crate::jobs::Interrupt;
 use crate::progress::Progress;
 
@@ -50,14 +50,14 @@ impl PictureFile {
 /// A picture that cannot be written.
 pub fn fixed_pictures(build: &Path) -> Result<Vec<PictureFile>> {
     let mut files = vec![flow()?, feet()?];
-    let scene = Scene::builtin(timing::SCENE)?;
-    let stages = timing::traces(&scene, build)?;
+    let scene = Scene::builtin(SCENE)?;
+    let stages = traces(&scene, build)?;
     for stage in stages.iter().filter(|trace| !trace.block.instance.contains(SEPARATOR)) {
         files.push(timing_picture(&scene.name, stage)?);
     }
     let mut choosing = scene;
     choosing.partition.case = Case::Adaptive;
-    for stage in timing::traces(&choosing, build)?.iter().filter(|trace| trace.block.name == "choose") {
+    for stage in traces(&choosing, build)?.iter().filter(|trace| trace.block.name == "choose") {
         files.push(timing_picture(&choosing.name, stage)?);
     }
     Ok(files)

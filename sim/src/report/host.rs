@@ -4,7 +4,7 @@ use dermis_golden::fixed::Model;
 use dermis_golden::link::{payloads, supports, Kind, LinkKind};
 
 use super::table::{aligned, significant_digits};
-use crate::host::{Answer, PhysicalAnswer};
+use crate::link::{Answer, PhysicalAnswer};
 
 /// The resultants of one frame.
 pub fn resultants(frame: &str, physical: &PhysicalAnswer, answer: &Answer) -> String {

@@ -1,7 +1,7 @@
 //! The table of `dermis stress`.
 
 use super::table::aligned;
-use crate::stress::Outcome;
+use crate::cosim::stress::Outcome;
 
 /// One row per experiment, and the violations below.
 pub fn stress(outcomes: &[Outcome]) -> String {

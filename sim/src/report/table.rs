@@ -4,7 +4,7 @@ use dermis_golden::reconstruct::Reconstruction;
 
 use super::{CosimReport, BUDGET_US};
 use crate::compare::median;
-use crate::verify::{FrameResult, Verified};
+use crate::cosim::verify::{FrameResult, Verified};
 
 /// Number of mismatches printed; `--json` contains more.
 const PRINTED: usize = 16;
@@ -71,6 +71,14 @@ fn summary(verified: &Verified) -> String {
             BUDGET_US as f64 - time,
         ));
     }
+    if let Some(interval) = verified.frame_interval {
+        let clock = verified.board.clock_MHz;
+        text.push_str(&format!(
+            "frames back to back: at most {interval} cycles from one to the next (planned {}), {:.0} frames per second\n",
+            verified.planned_interval,
+            clock * 1e6 / interval as f64,
+        ));
+    }
     text
 }
 
@@ -86,6 +94,7 @@ pub fn scenes(all: &[Verified]) -> String {
         "RTL = fixed",
         "latency, cycles",
         "total, cycles",
+        "interval, cycles",
         "MHz",
         "µs",
         "margin to 1 ms",
@@ -105,6 +114,7 @@ pub fn scenes(all: &[Verified]) -> String {
             equality_cell(verified, report.equal),
             count(report.cycles.max),
             count(report.total_cycles.max),
+            count(report.frame_interval),
             report.clock_MHz.to_string(),
             time.map_or("-".into(), |t| format!("{t:.2}")),
             time.map_or("-".into(), |t| format!("{:.2} µs", BUDGET_US as f64 - t)),
@@ -112,7 +122,8 @@ pub fn scenes(all: &[Verified]) -> String {
     });
     let mut text = markdown(&head, rows.collect());
     text.push_str(
-        "\ne_t, e_n: tangential and normal error of the resultant, median over the frames; cycles: the slowest frame\n",
+        "\ne_t, e_n: tangential and normal error of the resultant, median over the frames; cycles: the slowest frame; \
+         interval: frames back to back\n",
     );
     text
 }

@@ -12,8 +12,8 @@ use dermis_golden::link::{
 };
 use dermis_golden::scene::Scene;
 use dermis_hdl::link::{BoardDevice, BoardOutputs};
-use dermis_sim::board::{HostUart, UartSymbol};
-use dermis_sim::hardware::{Hardware, Simulator};
+use dermis_sim::cosim::hardware::{Hardware, Simulator};
+use dermis_sim::link::{HostUart, UartSymbol};
 use dermis_tests::{build_dir, scene};
 
 mod spi;

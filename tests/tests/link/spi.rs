@@ -6,8 +6,9 @@ use dermis_golden::link::{Counters, Decoder, Identity, Kind, LinkKind, Packet, P
 use dermis_golden::scene::Scene;
 use dermis_hdl::language::Change;
 use dermis_hdl::link::{generate_board, generate_board_changed, BoardDevice};
-use dermis_sim::board::{SpiController, VerilatedBoard};
-use dermis_sim::hardware::Simulator;
+use dermis_sim::cosim::hardware::Simulator;
+use dermis_sim::cosim::VerilatedBoard;
+use dermis_sim::link::SpiController;
 use dermis_tests::{build_dir, scene};
 
 use super::{device, shipped, small, Questions, RESET, SINGLE_BYTE, TWO_SUBARRAYS};

@@ -48,9 +48,14 @@ const ZEROS: [i32; ROWS * COLS] = [13, -25, 38, 0, 114, -114];
 
 /// Narrow words and a small array: the control logic does not depend on them.
 fn model(more: &str) -> Model {
+    with_inverse(8, more)
+}
+
+/// The same with Cz⁺ of `bits` bits.
+fn with_inverse(bits: u32, more: &str) -> Model {
     let text = format!(
         "name = \"proofs\"\n[sensor]\nrows = {ROWS}\ncols = {COLS}\npitch_x_mm = 4.0\npitch_y_mm = 4.0\n\
-         thickness_mm = 3.0\n[fixed]\ninput_bits = 8\ndata_bits = 12\ncoef_bits = 8\ninverse_bits = 8\n\
+         thickness_mm = 3.0\n[fixed]\ninput_bits = 8\ndata_bits = 12\ncoef_bits = 8\ninverse_bits = {bits}\n\
          [search]\nmu_max = 0.05\n{more}"
     );
     let folder = tempfile::tempdir().unwrap();

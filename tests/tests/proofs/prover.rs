@@ -7,6 +7,7 @@ use dermis_golden::fixed::Model;
 use dermis_hdl::language::Change;
 use dermis_hdl::link::generate_board_changed;
 use dermis_hdl::{generate_changed, Generated};
+use dermis_tests::tools::{folder_of, yosys};
 
 /// What is proved.
 #[derive(Clone, Copy)]
@@ -57,9 +58,7 @@ fn proved(folder: &Path, top: &str, open_products: bool) -> bool {
          techmap; opt -fast; memory_map; simplemap; dffunmap; abc -g AND -fast; opt_clean; \
          write_aiger -I -B -zinit -no-startoffset proof.aig"
     );
-    let output = Command::new("yosys").current_dir(folder).args(["-q", "-p", &to_gates]).output();
-    let output = output.expect("yosys is installed (make setup)");
-    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    yosys(folder, &to_gates).unwrap_or_else(|error| panic!("{error}"));
     // Signals that are always equal are merged first, which makes the problem smaller by a third.
     let text = abc(folder, "read_aiger proof.aig; fold; strash; scorr; dc2; scorr; write_aiger small.aig");
     let header = std::fs::read(folder.join("small.aig")).unwrap_or_default();
@@ -94,9 +93,8 @@ fn abc(folder: &Path, commands: &str) -> String {
 impl Proof<'_> {
     /// Proves the property, then checks that it fails with each of the defects.
     pub fn run(self) {
-        let folder = tempfile::tempdir().unwrap();
-        let Generated { top, files, .. } = &self.hardware.generate(&[]);
-        files.iter().for_each(|file| std::fs::write(folder.path().join(&file.name), &file.text).unwrap());
+        let generated = &self.hardware.generate(&[]);
+        let (folder, top) = (folder_of(generated), &generated.top);
         let property = Path::new(env!("CARGO_MANIFEST_DIR")).join("proofs").join(self.property);
         let mut text = std::fs::read_to_string(&property).unwrap();
         for (name, value) in &self.given {

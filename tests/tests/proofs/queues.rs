@@ -9,27 +9,28 @@ use dermis_hdl::language::Change;
 use dermis_hdl::primitives::QUEUE_PLACES;
 
 use super::prover::{number, Hardware, Proof};
-use super::{model, COLS, ROWS};
+use super::{model, with_inverse, COLS, ROWS};
 
-/// A model, and the widths of its rescaler's words.
-fn widths() -> (Model, Vec<(&'static str, String)>) {
-    let model = model("");
+/// The widths of a model's rescaler.
+fn widths(model: &Model) -> Vec<(&'static str, String)> {
     let f = model.formats();
-    let given = vec![
+    vec![
         ("SHIFTS", number(count_bits(f.acc_bits as usize))),
         ("ACC", number(f.acc_bits as usize)),
+        ("LANE", number(f.lane_bits as usize)),
+        ("ALIGN", number(f.limb_align as usize)),
         ("WORD", number(f.vector_bits as usize)),
         ("DATA", number(f.data_bits as usize)),
         ("A_SHIFT", number(f.a_shift as usize)),
         ("LESS", number(SEARCH_EXTRA_BITS as usize)),
         ("ROWS", number(f.quads)),
-    ];
-    (model, given)
+    ]
 }
 
 #[test]
 fn rescaled_words_are_rounded_and_held_to_their_range() {
-    let (model, given) = widths();
+    let model = model("");
+    let given = widths(&model);
     let word = model.formats().vector_bits as usize;
     let never = |lane: &str, signal: &'static str| {
         Change::within("rescale__rescaler", &format!("lane_0__{lane}"), move |k| [k.named(signal), k.constant(1, 0)])
@@ -48,15 +49,26 @@ fn rescaled_words_are_rounded_and_held_to_their_range() {
 
 #[test]
 fn rows_that_wait_for_their_shift_come_out_in_order() {
-    let (model, given) = widths();
-    let defects = vec![
-        // The replay stands still; rows are written in the wrong order; raw rows pass unshifted.
-        Change::value("rescale", "replay__enable", |k| k.constant(1, 0)),
-        Change::value("rescale", "raw__write_address", |k| !k.named("rows__value")),
-        Change::value("rescale", "enters", |k| k.named("read__q") | k.named("quad_valid")),
-    ];
-    let hardware = Hardware::Engine(&model);
-    Proof { hardware, property: "replay.v", given, defects, open_products: false }.run();
+    // Without and with low limbs.
+    for (inverse_bits, limbs) in [(8, 1), (20, 2)] {
+        let model = with_inverse(inverse_bits, "");
+        let given = [widths(&model), vec![("LIMBS", number(limbs))]].concat();
+        let mut defects = vec![
+            // The replay stands still; rows are written in the wrong order; raw rows pass unshifted.
+            Change::value("rescale", "reads__enable", |k| k.named("collecting__q") & k.named("quad_soon")),
+            Change::value("rescale", "raw__write_address", |k| !k.named("rows__value")),
+            Change::value("rescale", "enters", |k| k.named("read__q") | k.named("quad_valid")),
+        ];
+        if limbs == 2 {
+            // High limbs are not added; rows of the low limbs are read too late.
+            defects.push(Change::value("rescale__limb_sum", "sum", |k| k.named("low")));
+            defects.push(Change::value("rescale", "reads__enable", |k| {
+                k.named("replaying__q") | k.named("collecting__q") & k.named("quad_valid")
+            }));
+        }
+        let hardware = Hardware::Engine(&model);
+        Proof { hardware, property: "replay.v", given, defects, open_products: false }.run();
+    }
 }
 
 #[test]
@@ -86,6 +98,7 @@ fn operand_vectors_stay_inside_their_memory() {
         ("FINISHED", number(finished)),
         ("VECTORS", number(vectors)),
         ("QUADS", number(quads)),
+        ("BEGUN", number(if model.first().storage.streamed { quads - 1 } else { 0 })),
     ];
     // Vectors are written beyond the last operand.
     let defects = vec![Change::value("pass__operand_writer", "keep", |k| k.named("valid"))];

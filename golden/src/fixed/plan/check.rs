@@ -19,7 +19,7 @@
 
 use super::contents::CasePlan;
 use crate::fixed::words::formats::MULTIPLIER_BITS;
-use crate::fixed::words::schedule::schedule;
+use crate::fixed::words::schedule::accumulations;
 
 /// The polynomial of CRC-32 without its highest power, x³².
 pub const POLYNOMIAL: u32 = 0x04c1_1db7;
@@ -44,7 +44,7 @@ pub fn read_addresses(case: &CasePlan) -> Vec<usize> {
         let first = storage.address_of(matrix, group);
         first..first + storage.columns_of(matrix, group).len()
     };
-    let steps = schedule(formats).into_iter().flat_map(|products| {
+    let steps = accumulations(formats).into_iter().flat_map(|(_, products)| {
         (0..formats.groups).flat_map(move |group| products.clone().into_iter().map(move |p| (p.matrix, group)))
     });
     steps.flat_map(|(matrix, group)| of(matrix, group)).collect()

@@ -5,7 +5,8 @@
 //! both agree to the cycle. With Q quads, G groups of rows, K rows in the last group:
 //! ```text
 //! fold     Q + 6                                from the last input beat to the first product
-//! pass     the kept columns of each product, at most Q, waiting until a step's operand has been finished
+//! pass     the kept columns of each product, at most Q, waiting until a step's operand has been finished, or, where
+//!          it is read as it is written, begun; a pause after each accumulation
 //! rescale  v_00 is replayed once its exponent is known: Q more
 //! search   7 coarse sweeps of Q, at least (Q + 19)/2; the eighth and 7 halvings of Q + 22; one of Q + 7
 //!          (the last alone when nothing is searched)
@@ -23,15 +24,15 @@ use crate::board::EngineKind;
 use crate::fixed::stages::choose;
 use crate::fixed::stages::search::COARSE_CENTRES;
 use crate::fixed::words::formats::{Formats, HALVINGS};
-use crate::fixed::words::schedule::schedule;
+use crate::fixed::words::schedule::accumulations;
 
 /// Cycles from the last input beat to the start of the frame.
 pub const ACCEPT: u64 = 3;
 /// Latency of `fold` beyond its Q quads: start, frame buffer, normalise, butterfly, memory.
 const FOLD: u64 = 6;
 /// Cycles from the issue of a product to the first row of its accumulators: addresses 1, memories 2, selection 1, lanes
-/// 5.
-const LANES: u64 = 9;
+/// 4.
+const LANES: u64 = 8;
 /// Additional cycles where columns are left out: the list of columns is a memory of its own.
 const COLUMNS: u64 = 2;
 /// Cycles from a row until it can be read as an operand: rescaler, operand memory.
@@ -54,9 +55,11 @@ const LAST_SWEEP: u64 = 7;
 /// Cycles from a subarray's values to the sending of them, where nothing is searched.
 const UNSEARCHED: u64 = 3;
 /// Cycles from the hand-over of a subarray to the search until the passes of the next one start.
-const NEXT: u64 = 1;
+pub(super) const NEXT: u64 = 1;
 /// Cycles from the last subarray's first value, Q cycles before the end of its values, to the first output beat.
-const SEND: u64 = 13;
+pub(super) const SEND: u64 = 13;
+/// Cycles from the start of a subarray, beyond its Q quads, until the frame buffer is free.
+pub(super) const FOLDED: u64 = 2;
 
 /// Duration of a frame in clock cycles.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
@@ -122,26 +125,36 @@ impl Cycles {
 /// Cycles of the parallel engine from the last input beat to the first output beat.
 fn first_output(plan: &Plan, case: &CasePlan, searched: &[bool]) -> u64 {
     let quads = case.formats.quads as u64;
-    let chained = COARSE_CENTRES.len() as u64 - 1;
-    let awaited = 1 + u64::from(HALVINGS);
-    let sweeps = chained * coarse_period(quads) + awaited * (quads.max(SHORTEST_SWEEP) + SELECTION_LATENCY + SET_UP);
-    let search = |&searching: &bool| match plan.searches() {
-        true => HAND_OVER + SET_UP + if searching { sweeps } else { 0 } + quads + LAST_SWEEP,
-        false => UNSEARCHED,
-    };
-    let passes = timeline(&case.formats, &case.storage).last_row + UNFOLD;
+    let passes = passes(case);
     // A subarray is handed to the search when its passes are complete and the search of the one before has ended.
     let (mut complete, mut searched_at) = (0, 0);
-    for searching in searched {
+    for &searching in searched {
         complete += passes;
         let handed_over = complete.max(searched_at);
-        searched_at = handed_over + search(searching);
+        searched_at = handed_over + search(plan, case, searching);
         complete = handed_over + NEXT;
     }
     // After a search the last subarray's values are sent while they are computed.
     let early = if plan.searches() { quads } else { 0 };
     // Resultants are sent once the last force has been added.
     plan.prepare.latency() + ACCEPT + searched_at - early + SEND + plan.resultants_delay()
+}
+
+/// Cycles from the start of a subarray until its passes are complete.
+pub(super) fn passes(case: &CasePlan) -> u64 {
+    timeline(&case.formats, &case.storage).last_row + UNFOLD
+}
+
+/// Cycles from the hand-over of a subarray to the end of its values; `searching`: it is searched.
+pub(super) fn search(plan: &Plan, case: &CasePlan, searching: bool) -> u64 {
+    let quads = case.formats.quads as u64;
+    let chained = COARSE_CENTRES.len() as u64 - 1;
+    let awaited = 1 + u64::from(HALVINGS);
+    let sweeps = chained * coarse_period(quads) + awaited * (quads.max(SHORTEST_SWEEP) + SELECTION_LATENCY + SET_UP);
+    match plan.searches() {
+        true => HAND_OVER + SET_UP + if searching { sweeps } else { 0 } + quads + LAST_SWEEP,
+        false => UNSEARCHED,
+    }
 }
 
 /// Multiplications done by the lanes, as a fraction of those possible from a subarray's first product to its last; 0 to
@@ -171,13 +184,15 @@ fn timeline(formats: &Formats, storage: &Storage) -> Timeline {
     let last_rows = quads - (formats.groups as u64 - 1) * formats.lanes_per_parity as u64;
     let lanes = LANES + if storage.listed { COLUMNS } else { 0 };
     let first_issue = quads + FOLD;
-    let (mut now, mut products_done) = (first_issue, 0);
+    // `free` is the first cycle in which a product can be issued.
+    let (mut now, mut free, mut products_done) = (first_issue, first_issue, 0);
     let mut finished: Vec<u64> = Vec::new();
     let mut last_row = 0;
-    for (k, products) in schedule(formats).iter().enumerate() {
+    for (k, products) in &accumulations(formats) {
         for group in 0..formats.groups {
+            now = free;
             for product in products {
-                if k > 0 {
+                if *k > 0 {
                     now = now.max(finished[product.operand_index()]);
                 }
                 let columns = storage.columns_of(product.matrix, group).len() as u64;
@@ -185,12 +200,16 @@ fn timeline(formats: &Formats, storage: &Storage) -> Timeline {
                 products_done += 4 * columns * rows;
                 now += columns;
             }
+            free = now + storage.pause as u64;
         }
         last_row = now - 1 + lanes + last_rows - 1;
-        if k == 0 {
+        if *k == 0 {
             last_row += REPLAY - 1 + quads;
         }
-        finished.push(last_row + OPERAND);
+        // The accumulation of the high limbs completes v_00.
+        finished.truncate(*k);
+        let read_from = if storage.streamed { last_row + 1 - quads } else { last_row };
+        finished.push(read_from + OPERAND);
     }
     Timeline { first_issue, last_issue: now - 1, products: products_done, last_row }
 }

@@ -15,6 +15,7 @@
 //! | [`contents`] | the plan itself, and what it has for each case |
 //! | [`cases`] | which partition cases share the hardware |
 //! | [`cycles`] | duration of a frame |
+//! | [`interval`] | cycles from one frame to the next |
 //! | [`check`] | the signature of the coefficient memory |
 //! | [`feature_costs`] | the plan with each optional feature added, or without it |
 //! | [`fit_suggestions`] | changes that make a scene fit its board |
@@ -26,6 +27,7 @@ pub mod cycles;
 pub mod feature_costs;
 pub mod fit;
 pub mod fit_suggestions;
+pub mod interval;
 pub mod resources;
 pub mod serial;
 pub mod storage;

@@ -13,7 +13,7 @@
 //! | pass | coefficients; list of their columns | words × 18 · lanes; words × address, twice where Ax is used for Ay |
 //! | rescale | raw v_00 | Q × 4 · `acc_bits` |
 //! | search | polynomials, one memory per coefficient | 3 buffers of Q × 4 · `search_bits` |
-//! | search | the next subarray's, where there are several | Q × 4 · `search_bits` |
+//! | search | the next subarray's or frame's | Q × 4 · `search_bits` |
 //! | force | p(μ*) | subarrays · Q × 4 · `search_bits` |
 
 use serde::Serialize;
@@ -158,7 +158,6 @@ impl Resources {
         let words = cases.iter().map(|case| case.storage.words()).sum();
         let listed = cases.iter().any(|case| case.storage.listed);
         let frame_quads = |case: &LaidOut| case.parts * case.formats.quads;
-        let several = cases.iter().any(|case| case.parts > 1);
         let quad = |bits: u32| 4 * bits as usize;
         let memory = |holds: Holds, words: usize, bits: usize, rom: bool| Memory {
             holds,
@@ -194,9 +193,7 @@ impl Resources {
         memories.push(ram(Holds::Raw, quads, quad(f.acc_bits)));
         for (k, &bits) in f.search_bits.iter().enumerate().filter(|_| f.degree > 0) {
             memories.push(ram(Holds::Polynomials(k), SEARCH_BUFFERS * quads, quad(bits)));
-            if several {
-                memories.push(ram(Holds::Start(k), quads, quad(bits)));
-            }
+            memories.push(ram(Holds::Start(k), quads, quad(bits)));
         }
         memories.push(ram(Holds::Values, cases.iter().map(frame_quads).max().unwrap_or(0), quad(f.search_bits[0])));
         let calibrate = match input.calibration {

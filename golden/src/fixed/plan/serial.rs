@@ -168,6 +168,11 @@ pub(super) fn first_output(formats: &Formats, searched: bool) -> u64 {
     START + fold + passes(formats) + search + MU_WORDS + FIRST_BEAT
 }
 
+/// Cycles from one frame to the next, which is received while the `beats` output beats of the first one leave.
+pub(super) fn frame_interval(formats: &Formats, beats: u64) -> u64 {
+    first_output(formats, true) + (beats - 1) * BEAT
+}
+
 /// Cycles from the first product to the end of the last v_ij.
 fn passes(formats: &Formats) -> u64 {
     let quads = formats.quads as u64;

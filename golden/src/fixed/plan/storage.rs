@@ -24,6 +24,12 @@ pub struct Storage {
     /// Whether the memory has a list of columns: columns are pruned, in this case or another, or some are read
     /// transposed.
     pub listed: bool,
+    /// Whether a pass reads a v_ij while it is still being written: its quads are written and read in order, one per
+    /// cycle. So it is where all rows have a lane and no column is listed, in all cases.
+    pub streamed: bool,
+    /// Cycles without a product after each accumulation. In the first the accumulators of the lanes are cleared; where a
+    /// case has a single quad, a second lets the row of low limbs be written before it is read for the high limbs.
+    pub pause: usize,
 }
 
 /// A case with its lanes and its part of the coefficient memory.
@@ -65,28 +71,29 @@ impl Storage {
                     .iter()
                     .any(|block| rows(group, per_parity, quads).any(|i| block[i * quads + j].abs() >= limit))
             };
-            // A group without kept columns still needs one, to accumulate zeros.
-            let columns: Vec<usize> = (0..quads).filter(matters).collect();
-            if columns.is_empty() {
-                vec![0]
-            } else {
-                columns
-            }
+            // At least as many columns as a group has rows: the rows of an accumulation leave before the next one ends.
+            let mut columns: Vec<usize> = (0..quads).filter(matters).collect();
+            let others: Vec<usize> = (0..quads).filter(|j| !columns.contains(j)).collect();
+            columns.extend(others.into_iter().take(per_parity.saturating_sub(columns.len())));
+            columns.sort_unstable();
+            columns
         };
         let groups = quads.div_ceil(per_parity);
         let of = |&(matrix, limit): &(Matrix, i64)| (0..groups).map(|group| kept(matrix, limit, group)).collect();
         let columns = limits.iter().map(of).collect();
         let matrices = limits.into_iter().map(|(matrix, _)| matrix).collect();
-        Storage { matrices, columns, base: 0, listed: false }
+        Storage { matrices, columns, base: 0, listed: false, streamed: false, pause: 1 }
     }
 
     /// Puts the cases of a scene into one memory, one after the other, with a list of columns if one of them needs it.
     pub fn share<'a>(cases: impl Iterator<Item = (&'a mut Storage, Formats)>) {
         let mut cases: Vec<(&mut Storage, Formats)> = cases.collect();
         let listed = cases.iter().any(|(storage, formats)| formats.shared_a || storage.is_pruned(formats.quads));
+        let streamed = !listed && cases.iter().all(|(_, formats)| formats.groups == 1);
+        let pause = if cases.iter().any(|(_, formats)| formats.quads == 1) { 2 } else { 1 };
         let mut base = 0;
         for (storage, _) in &mut cases {
-            (storage.base, storage.listed) = (base, listed);
+            (storage.base, storage.listed, storage.streamed, storage.pause) = (base, listed, streamed, pause);
             base += storage.words();
         }
     }

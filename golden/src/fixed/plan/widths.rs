@@ -97,6 +97,17 @@ pub fn widths(scene: &Scene, shapes: &[Shape], board: &Board) -> Result<Widths, 
     if acc_bits > 48 {
         return Err(FixedError::Format { what: "accumulator", needs: acc_bits, has: 48 });
     }
+    // The lanes add up the products of the low limbs and those of the high limbs of v_00 each on their own.
+    let (high_input, products) =
+        (1u64 << (fold_bits - 1 - input_low_bits), |count| (count * flips.inverse.len()) as u64);
+    let high_norm =
+        |quantised: &Quantised, count| (quantised.inverse.norm(count) >> inverse_low_bits) + products(count);
+    let lane_bound = bound(&|quantised, count| {
+        let of_input = if input_low_bits > 0 { high_norm(quantised, count) << limb_align } else { 0 };
+        let of_inverse = if inverse_low_bits > 0 { (products(count) * high_input) << limb_align } else { 0 };
+        (high_norm(quantised, count) * high_input).max(of_input + of_inverse)
+    });
+    let lane_bits = signed_bits(lane_bound.max(a_bound)).min(acc_bits);
     // Scales are the same in all cases.
     let (inverse_exponent, a_exponent) = (quantised[0].inverse.exponent, quantised[0].ax.exponent);
     let vector_bits = data_bits + SEARCH_EXTRA_BITS;
@@ -157,6 +168,7 @@ pub fn widths(scene: &Scene, shapes: &[Shape], board: &Board) -> Result<Widths, 
         coef_bits,
         a_exponent,
         acc_bits,
+        lane_bits,
         raw_length_max,
         data_bits,
         vector_bits,

@@ -1,14 +1,15 @@
 //! Stage `pass`: matrix-vector products on the MAC lanes.
 //!
 //! `4·lanes_per_parity` lanes multiply the four parities of one broadcast quad per cycle by coefficients, each lane for
-//! one row; rows beyond the lanes follow in groups. All products of a v_ij are added up in the accumulator before it is
-//! rounded.
+//! one row; rows beyond the lanes follow in groups. All products of a v_ij are added up before they are rounded.
 //! ```text
-//! v_00:  acc = Σ_j 2^limb_align Ch fh + Ch (fl·2^a) + (Cl·2^c) fh       Cz⁺ = 2^kc Ch + Cl,  f = 2^kf fh + fl
+//! v_00:  low = Σ_j Ch (fl·2^a) + (Cl·2^c) fh,  high = Σ_j Ch fh         Cz⁺ = 2^kc Ch + Cl,  f = 2^kf fh + fl
+//!        acc = low + 2^limb_align high
 //! v_ij:  acc = Σ_j (−Ay')·v_{i,j−1} + (−Ax')·v_{i−1,j}                  A' = A·(4/3)·mu_max
 //! ```
 //! The product of the two low limbs, below 2^−22 of the largest result, is left out. The smaller low limb is stored
-//! shifted left (a, c), so that both mixed products have the same weight.
+//! shifted left (a, c), so that both mixed products have the same weight. Where neither factor has a low limb, v_00 is
+//! the sum of the high limbs.
 
 use crate::fixed::words::formats::Formats;
 use crate::fixed::words::quantised::{coefficient, Quantised};
@@ -51,7 +52,7 @@ impl Operands {
     }
 }
 
-/// Accumulates all `products` of one v_ij: one accumulator per quad and parity, in row order.
+/// Adds up `products` of one v_ij without a shift: one accumulator per quad and parity, in row order.
 ///
 /// A transposed product reads its operand with x and y exchanged, and so is its result.
 pub fn pass(
@@ -65,20 +66,31 @@ pub fn pass(
     let mut accumulators = vec![[0i64; 4]; quads];
     for product in products {
         let source = operands.get(product.operand);
-        let align = if product.align { formats.limb_align } else { 0 };
         let Matrix { kind, flip } = product.matrix;
         let own = quantised.blocks(product.matrix);
         let source = if product.transposed { &transpose(layout, source) } else { source };
         for (i, row) in accumulators.iter_mut().enumerate() {
             for (target, acc) in row.iter_mut().enumerate() {
                 for (j, quad) in source.iter().enumerate() {
-                    let c = coefficient(formats, kind, own.parity[target][i * quads + j]);
-                    *acc += (c * quad[target ^ flip]) << align;
+                    *acc += coefficient(formats, kind, own.parity[target][i * quads + j]) * quad[target ^ flip];
                 }
             }
         }
     }
     accumulators
+}
+
+/// The accumulators of a v_ij from those of its limbs, of which the last are the high ones.
+pub fn join_limbs(formats: &Formats, limbs: &[Vector]) -> Vector {
+    match limbs {
+        [low, high] => {
+            let join = |(low, high): (&[i64; 4], &[i64; 4])| {
+                [0, 1, 2, 3].map(|parity| low[parity] + (high[parity] << formats.limb_align))
+            };
+            low.iter().zip(high).map(join).collect()
+        }
+        _ => limbs.concat(),
+    }
 }
 
 /// A quad vector with x and y exchanged, of a square subarray: quad (r, c) from quad (c, r), lanes 1 and 2 swapped.

@@ -12,6 +12,7 @@
 //! | parity of the input | `fold_bits` = `input_bits` + 2 | 22 | as the code |
 //! | Cz⁺ | `inverse_bits` | 24 | 2^−`inverse_exponent` N/MPa |
 //! | Ax, Ay | `coef_bits` | 18 | 2^−`a_exponent` |
+//! | accumulator of a lane | `lane_bits` | 38 | as below, or v_00: 2^`limb_align` times that |
 //! | accumulator | `acc_bits` | 42 | v_00: 2^`raw_shift` · code · Cz⁺ |
 //! | v_ij, parities | `vector_bits` = `data_bits` + 4 | 22 | accumulator · 2^rescale |
 //! | v_ij, operand of a pass | `data_bits` | 18 | 16 LSBs of the above |
@@ -84,8 +85,11 @@ pub struct Formats {
     pub coef_bits: u32,
     /// LSB of −A·(4/3)·mu_max is 2^−`a_exponent`.
     pub a_exponent: i32,
-    /// Width of an accumulator.
+    /// Width of an accumulator with all products of a v_ij.
     pub acc_bits: u32,
+    /// Width of an accumulator of the parallel engine's lanes, which has the products of v_00 without low limbs or
+    /// those with one.
+    pub lane_bits: u32,
     /// Largest bit length of a raw v_00.
     pub raw_length_max: u32,
     /// Width of an operand of the passes.

@@ -1,9 +1,13 @@
 //! The order of the matrix passes: which product feeds which v_ij.
 //!
 //! v_00 = Cz⁺ b comes first, in limbs; then v_ij = −(Ax v_{i−1,j} + Ay v_{i,j−1}) by rising degree, so that every
-//! operand is finished as early as possible before it is needed. All products of a v_ij are added up in one
-//! accumulator, which is rounded once. A matrix without the mirror symmetry has one product for each of its parity
-//! flips. Hardware and bit-true model read the same list.
+//! operand is finished as early as possible before it is needed. All products of a v_ij are added up before they are
+//! rounded, once. A matrix without the mirror symmetry has one product for each of its parity flips. Hardware and
+//! bit-true model read the same list.
+//!
+//! The lanes of the parallel engine are plain multiply-accumulators and shift nothing: the products of v_00 with a low
+//! limb are one [accumulation](accumulations), those of the high limbs another, and their rows are added once, in front
+//! of `rescale`. The serial engine has one accumulator of each parity and shifts in front of it.
 
 use super::coefficients::Flips;
 use super::formats::Formats;
@@ -67,6 +71,19 @@ pub struct Product {
 pub fn schedule(formats: &Formats) -> Vec<Vec<Product>> {
     let limbs = (formats.input_low_bits > 0, formats.inverse_low_bits > 0);
     products(formats.degree, limbs, formats.shared_a, &formats.flips)
+}
+
+/// The products of every accumulation of the parallel engine's lanes, with the index of their v_ij in [`EXPONENTS`]; of
+/// v_00 that of the low limbs comes first.
+pub fn accumulations(formats: &Formats) -> Vec<(usize, Vec<Product>)> {
+    let of = |(k, products): (usize, Vec<Product>)| by_limbs(&products).into_iter().map(move |part| (k, part));
+    schedule(formats).into_iter().enumerate().flat_map(of).collect()
+}
+
+/// The products of one v_ij by their shift: those of low limbs, if there are any, then the others.
+pub fn by_limbs(products: &[Product]) -> Vec<Vec<Product>> {
+    let (high, low): (Vec<Product>, Vec<Product>) = products.iter().partition(|product| product.align);
+    [low, high].into_iter().filter(|part| !part.is_empty()).collect()
 }
 
 /// The products for a polynomial of `degree`; `limbs`: whether the input and Cz⁺ have a low limb; `shared_a`: whether

@@ -17,7 +17,7 @@ pub struct CaseCounter {
     pub which: Wire<In>,
     /// Sets the count to 0 at the clock edge, with priority over `enable`.
     pub clear: Signal<In, Bit>,
-    /// PassProgram the count at the clock edge; from the last value to 0.
+    /// Advances the count at the clock edge; from the last value to 0.
     pub enable: Signal<In, Bit>,
     /// The count, unsigned.
     pub value: Wire<Out>,

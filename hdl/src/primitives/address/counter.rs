@@ -18,7 +18,7 @@ pub struct Counter {
     pub clk: Signal<In, Clock>,
     /// Sets the count to 0 at the clock edge, with priority over `enable`.
     pub clear: Signal<In, Bit>,
-    /// PassProgram the count at the clock edge.
+    /// Advances the count at the clock edge.
     pub enable: Signal<In, Bit>,
     /// The count, 0..`limit`, unsigned.
     pub value: Wire<Out>,
@@ -30,7 +30,7 @@ pub struct Counter {
 kernel_block!(Counter, clock clk, inputs [clear, enable], outputs [value, last]);
 
 impl Counter {
-    /// LaneMask 0..`limit`; a `limit` of 0 is taken as 1.
+    /// Counts 0..`limit`; a `limit` of 0 is taken as 1.
     pub fn new(limit: usize) -> Self {
         let block = Counter {
             clk: Default::default(),

@@ -7,7 +7,7 @@ use crate::primitives::address::counter::count_bits;
 use crate::primitives::{CaseCounter, QuadAddress};
 use crate::wire::Wire;
 
-/// LaneMask the taxels of the whole array row-major, across all subarrays, one per `enable`. The outputs are
+/// Visits the taxels of the whole array row-major, across all subarrays, one per `enable`. The outputs are
 /// combinational from the count.
 #[derive(LogicBlock)]
 pub struct Scan {
@@ -17,7 +17,7 @@ pub struct Scan {
     pub which: Wire<In>,
     /// Back to the first taxel, with priority over `enable`.
     pub clear: Signal<In, Bit>,
-    /// PassProgram to the next taxel at the clock edge; after the last to the first.
+    /// Advances to the next taxel at the clock edge; after the last to the first.
     pub enable: Signal<In, Bit>,
     /// The current taxel is the array's last.
     pub last: Signal<Out, Bit>,

@@ -9,7 +9,8 @@ use crate::primitives::address::counter::count_bits;
 use crate::primitives::arithmetic::half_up::rounded;
 use crate::wire::Wire;
 
-/// A quad of accumulators, shifted right by `shift` if `measured`, otherwise by the constant shift of an A pass.
+/// A quad of accumulators: if `measured`, `raw` shifted right by `shift`, otherwise `quad` by the constant shift of an A
+/// pass.
 ///
 /// `words` follow three cycles later, `operands` (the same rounded and saturated to `data_bits`) four. `saturations`
 /// counts the saturated words of valid quads since `clear`; it includes a quad two cycles after its `words`.
@@ -19,17 +20,19 @@ pub struct Rescaler {
     pub clk: Signal<In, Clock>,
     /// Sets `saturations` to 0.
     pub clear: Signal<In, Bit>,
-    /// `quad` holds a row; otherwise its saturations are not counted.
+    /// There is a row; otherwise its saturations are not counted.
     pub valid: Signal<In, Bit>,
-    /// Shift this quad by `shift`, not by the constant.
+    /// The row is `raw`, to be shifted by `shift`.
     pub measured: Signal<In, Bit>,
     /// Measured right shift; valid with `measured`.
     pub shift: Wire<In>,
-    /// Four accumulators, `acc_bits` each, signed.
+    /// Four accumulators of v_00, `acc_bits` each, signed; valid with `measured`.
+    pub raw: Wire<In>,
+    /// Four accumulators of an A pass, `lane_bits` each, signed.
     pub quad: Wire<In>,
-    /// Four v_ij, `vector_bits` each, signed; three cycles after `quad`.
+    /// Four v_ij, `vector_bits` each, signed; three cycles after the row.
     pub words: Wire<Out>,
-    /// Four operands, `data_bits` each, signed; four cycles after `quad`.
+    /// Four operands, `data_bits` each, signed; four cycles after the row.
     pub operands: Wire<Out>,
     /// Number of saturated words, 16 bits; stays at the largest count.
     pub saturations: Wire<Out>,
@@ -39,7 +42,7 @@ pub struct Rescaler {
 kernel_block!(
     Rescaler,
     clock clk,
-    inputs [clear, valid, measured, shift, quad],
+    inputs [clear, valid, measured, shift, raw, quad],
     outputs [words, operands, saturations]
 );
 
@@ -50,6 +53,8 @@ pub const SATURATION_BITS: usize = 16;
 #[derive(Clone, Copy)]
 struct Shape {
     acc: usize,
+    /// Width of an accumulator of an A pass.
+    lane: usize,
     word: usize,
     data: usize,
     /// Shift of an A pass.
@@ -61,6 +66,7 @@ impl Rescaler {
     pub fn new(formats: &Formats) -> Self {
         let shape = Shape {
             acc: formats.acc_bits as usize,
+            lane: formats.lane_bits as usize,
             word: formats.vector_bits as usize,
             data: formats.data_bits as usize,
             a_shift: formats.a_shift,
@@ -75,7 +81,8 @@ impl Rescaler {
             valid: Default::default(),
             measured: Default::default(),
             shift: Wire::new(count_bits(shape.acc)),
-            quad: Wire::new(4 * shape.acc),
+            raw: Wire::new(4 * shape.acc),
+            quad: Wire::new(4 * shape.lane),
             words: Wire::new(4 * shape.word),
             operands: Wire::new(4 * shape.data),
             saturations: Wire::new(SATURATION_BITS),
@@ -89,8 +96,11 @@ impl Shape {
     fn kernel(self) -> Kernel {
         let k = Builder::new("rescaler");
         let [clear, valid, measured] = ["clear", "valid", "measured"].map(|name| k.input(name, 1));
-        let (shift, quad) = (k.input("shift", count_bits(self.acc)), k.input("quad", 4 * self.acc));
-        let taken = k.delay("taken", quad);
+        let shift = k.input("shift", count_bits(self.acc));
+        let (raw, quad) = (k.input("raw", 4 * self.acc), k.input("quad", 4 * self.lane));
+        let extended = |lane: usize| quad.slice(lane * self.lane, self.lane).signed().extend(self.acc);
+        let row = measured.mux(raw, concat(&[3, 2, 1, 0].map(extended)));
+        let taken = k.delay("taken", row);
         let valid2 = k.delay("valid2", k.delay("valid1", valid));
         let amount = measured.mux(shift, k.constant(shift.bits(), self.a_shift.into()));
         let lane = |lane: usize| {
@@ -139,7 +149,7 @@ mod tests {
     use crate::language::testbench::{check, random_word, Reference};
     use crate::wire::Word;
 
-    const SHAPE: Shape = Shape { acc: 45, word: 18 + SEARCH_EXTRA_BITS as usize, data: 18, a_shift: 9 };
+    const SHAPE: Shape = Shape { acc: 45, lane: 41, word: 18 + SEARCH_EXTRA_BITS as usize, data: 18, a_shift: 9 };
 
     /// The quads on their way with their shift, and the counts.
     #[derive(Default)]
@@ -174,8 +184,11 @@ mod tests {
             self.words = rounded.map(|(quad, _)| quad.map(|(word, _)| word));
             self.clipped = rounded.map(|(quad, valid)| quad.iter().filter(|(_, clipped)| *clipped && valid).count());
             self.shifted = self.taken.map(|(quad, shift, valid)| (quad.map(|value| round_shift(value, shift)), valid));
-            let shift = if inputs[2].number() == 1 { inputs[3].number() as u32 } else { SHAPE.a_shift };
-            let quad = [0, 1, 2, 3].map(|lane| inputs[4].signed(lane, SHAPE.acc));
+            let (shift, row, bits) = match inputs[2].number() {
+                1 => (inputs[3].number() as u32, inputs[4], SHAPE.acc),
+                _ => (SHAPE.a_shift, inputs[5], SHAPE.lane),
+            };
+            let quad = [0, 1, 2, 3].map(|lane| row.signed(lane, bits));
             self.taken = Some((quad, shift, inputs[1].number() == 1));
         }
     }
@@ -185,16 +198,16 @@ mod tests {
         let mut random = fastrand::Rng::with_seed(12);
         let mut inputs = |cycle: usize| {
             // Accumulators of all lengths, and some that round to just beyond the range.
-            let length = random.u32(1..SHAPE.acc as u32);
             let shift = random.u64(..SHAPE.acc as u64 - 1);
-            let mut code = || match random.u8(..4) {
-                0 => random_word(&mut random, SHAPE.acc).signed(0, SHAPE.acc),
+            let mut code = |bits: usize| match random.u8(..4) {
+                0 => random_word(&mut random, bits).signed(0, bits),
                 1 => ((1 << (SHAPE.word - 1)) << SHAPE.a_shift) - random.i64(..1 << SHAPE.a_shift),
-                _ => random.i64(-(1 << (length - 1))..1 << (length - 1)),
+                _ => random_word(&mut random, bits).signed(0, bits) >> random.u32(..bits as u32),
             };
-            let quad = Word::of_fields(&[(); 4].map(|()| code()), SHAPE.acc);
+            let mut quad = |bits: usize| Word::of_fields(&[(); 4].map(|()| code(bits)), bits);
+            let (raw, quad) = (quad(SHAPE.acc), quad(SHAPE.lane));
             let clear = cycle < 6 || random.u16(..500) == 0;
-            vec![clear.into(), random.bool().into(), random.bool().into(), shift.into(), quad]
+            vec![clear.into(), random.bool().into(), random.bool().into(), shift.into(), raw, quad]
         };
         let stimulus: Vec<Vec<Word>> = (0..5000).map(&mut inputs).collect();
         check(Rescaler::of(SHAPE).kernel.kernel(), &stimulus, &mut Quads::default());

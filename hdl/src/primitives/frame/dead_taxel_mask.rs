@@ -7,7 +7,7 @@ use crate::language::{Body, Builder, Kernel, Type};
 use crate::primitives::address::counter::count_bits;
 use crate::wire::Wire;
 
-/// LaneMask the taxels of a frame; `kept` is `word`, or 0 if the current taxel is dead. Combinational from `word` to
+/// Counts the taxels of a frame; `kept` is `word`, or 0 if the current taxel is dead. Combinational from `word` to
 /// `kept`: the comparison with the list of dead taxels is registered a cycle ahead.
 #[derive(LogicBlock)]
 pub struct DeadTaxelMask {

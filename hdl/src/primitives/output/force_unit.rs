@@ -12,6 +12,7 @@ use crate::primitives::address::case_counter::{largest, value_by_case};
 use crate::primitives::address::counter::count_bits;
 use crate::primitives::arithmetic::half_up::saturate;
 use crate::primitives::arithmetic::rescaler::SATURATION_BITS;
+use crate::primitives::output::frame_cycles::{COUNT_DELAY, CYCLE_BITS};
 use crate::primitives::pass::raw_length::shift_bits;
 use crate::primitives::search::sweep::position_bits;
 use crate::primitives::stream::queue::LATENCY as LEAVING;
@@ -98,11 +99,9 @@ const PRODUCT_STEPS: usize = 2;
 const ASKED: usize = STEPS - 1;
 /// Bits of the unsigned low part of p: a multiplier operand without its sign bit.
 const LOW: usize = MULTIPLIER_BITS as usize - 1;
-/// Cycles of a frame outside its counter: before the counter is cleared, two cycles after the frame starts, and from
-/// its sampling to the first beat behind the queue.
-const UNCOUNTED: u32 = ACCEPT as u32 + 3 + LEAVING as u32;
-/// Width of the cycle counter, in bits.
-pub const CYCLE_BITS: usize = 24;
+/// Cycles of a frame outside its counter: before it counts, one cycle and its delay after the frame starts, and from its
+/// sampling to the first beat behind the queue.
+const UNCOUNTED: u32 = ACCEPT as u32 + 2 + COUNT_DELAY as u32 - 1 + LEAVING as u32;
 
 /// Width of a word of a beat, in bits.
 const WORD: usize = FORCE_BITS as usize;

@@ -1,4 +1,5 @@
-//! What leaves: forces, sums of forces, status.
+//! What leaves: forces, sums of forces, status, cycle counts.
 
 pub(crate) mod force_unit;
+pub(crate) mod frame_cycles;
 pub(crate) mod status_code;

@@ -1,5 +1,6 @@
-//! The matrix passes: their program, their operands, how long their rows are.
+//! The matrix passes: their program, their operands, the sum of their limbs and how long it is.
 
+pub(crate) mod limb_sum;
 pub(crate) mod operand_select;
 pub(crate) mod operand_writer;
 pub(crate) mod pass_program;

@@ -8,8 +8,8 @@ use crate::primitives::address::case_counter::{largest, value_by_case};
 use crate::primitives::address::counter::count_bits;
 use crate::wire::Wire;
 
-/// LaneMask the quads of the v_ij as they arrive: the write address of the current quad, whether it is an operand of a
-/// later pass and has to be written, and how many vectors are complete.
+/// Counts the quads of the v_ij as they arrive: the write address of the current quad, whether it is an operand of a
+/// later pass and has to be written, and how many vectors can be read: those that are complete, or, `streamed`, begun.
 #[derive(LogicBlock)]
 pub struct OperandWriter {
     /// Clock; registers change on its rising edge.
@@ -24,7 +24,7 @@ pub struct OperandWriter {
     pub address: Wire<Out>,
     /// Write enable: the quad is an operand of a later pass. Combinational from `valid`.
     pub keep: Signal<Out, Bit>,
-    /// Number of complete operand vectors of this subarray.
+    /// Number of operand vectors of this subarray that can be read.
     pub finished: Wire<Out>,
     kernel: Body,
 }
@@ -32,8 +32,9 @@ pub struct OperandWriter {
 kernel_block!(OperandWriter, clock clk, inputs [which, clear, valid], outputs [address, keep, finished]);
 
 impl OperandWriter {
-    /// `vectors` operand vectors per subarray, of `quads[case]` quads each.
-    pub fn new(vectors: usize, quads: &[usize]) -> Self {
+    /// `vectors` operand vectors per subarray, of `quads[case]` quads each; `streamed`: a vector is read from its first
+    /// quad on, one quad per cycle, while one quad per cycle is written.
+    pub fn new(vectors: usize, quads: &[usize], streamed: bool) -> Self {
         let block = OperandWriter {
             clk: Default::default(),
             which: Wire::new(count_bits(quads.len())),
@@ -44,11 +45,11 @@ impl OperandWriter {
             finished: Wire::new(count_bits(vectors + 1)),
             kernel: Body::default(),
         };
-        block.bind(kernel(vectors, quads))
+        block.bind(kernel(vectors, quads, streamed))
     }
 }
 
-fn kernel(vectors: usize, quads: &[usize]) -> Kernel {
+fn kernel(vectors: usize, quads: &[usize], streamed: bool) -> Kernel {
     let k = Builder::new("operand_writer");
     let which = k.input("which", count_bits(quads.len()));
     let (clear, valid) = (k.input("clear", 1), k.input("valid", 1));
@@ -67,11 +68,21 @@ fn kernel(vectors: usize, quads: &[usize]) -> Kernel {
     let finished = k.state("finished", Type::unsigned(finished_bits), clear, 0);
     let ends: Vec<usize> = quads.iter().map(|quads| quads - 1).collect();
     let last_quad = k.wire("last_quad", quad.equals(value_by_case(&k, which, &ends, quad.bits())));
-    let keep = k.wire("keep", valid & !finished.is(vectors as u64));
+    let all = finished.is(vectors as u64);
+    let full = match streamed {
+        true => {
+            let full = k.state("full", Type::unsigned(1), clear, 0);
+            k.when(valid & last_quad & all, || full.set(k.constant(1, 1)));
+            *full
+        }
+        false => all,
+    };
+    let keep = k.wire("keep", valid & !full);
     k.when(keep, || {
         quad.set(last_quad.mux(k.constant(quad.bits(), 0), quad.plus(1)));
         k.when(!address.is(most as u64 - 1), || address.set(address.plus(1)));
-        k.when(last_quad, || finished.set(finished.plus(1)));
+        let readable = if streamed { quad.is(0) } else { last_quad };
+        k.when(readable, || finished.set(finished.plus(1)));
     });
     k.finish()
 }
@@ -86,23 +97,28 @@ mod tests {
     const QUADS: [usize; 2] = [5, 3];
 
     /// The number of quads written; undefined before the first `clear`.
-    struct Count(Option<usize>);
+    struct Count {
+        quads: Option<usize>,
+        streamed: bool,
+    }
 
     impl Reference for Count {
         fn outputs(&mut self, inputs: &[Word]) -> Vec<Option<Word>> {
             let quads = QUADS[inputs[0].number() as usize];
-            let keep = self.0.map(|seen| inputs[2].number() == 1 && seen < VECTORS * quads);
+            let keep = self.quads.map(|seen| inputs[2].number() == 1 && seen < VECTORS * quads);
             vec![
-                self.0.filter(|_| keep == Some(true)).map(|seen| Word::from(seen as u64)),
-                self.0.map(|seen| Word::from((seen / quads) as u64)),
+                self.quads.filter(|_| keep == Some(true)).map(|seen| Word::from(seen as u64)),
+                self.quads
+                    .map(|seen| if self.streamed { seen.div_ceil(quads) } else { seen / quads } as u64)
+                    .map(Word::from),
                 keep.map(Word::from),
             ]
         }
 
         fn clock(&mut self, inputs: &[Word]) {
             let keeps = self.outputs(inputs)[2].map(|keep| keep.number() as usize);
-            self.0 = match inputs[1].number() {
-                0 => self.0.zip(keeps).map(|(seen, keep)| seen + keep),
+            self.quads = match inputs[1].number() {
+                0 => self.quads.zip(keeps).map(|(seen, keep)| seen + keep),
                 _ => Some(0),
             };
         }
@@ -119,7 +135,10 @@ mod tests {
             case = if clear { random.u64(..2) } else { case };
             inputs
         });
-        let block = OperandWriter::new(VECTORS, &QUADS);
-        check(block.kernel.kernel(), &stimulus.collect::<Vec<_>>(), &mut Count(None));
+        let stimulus: Vec<_> = stimulus.collect();
+        for streamed in [false, true] {
+            let block = OperandWriter::new(VECTORS, &QUADS, streamed);
+            check(block.kernel.kernel(), &stimulus, &mut Count { quads: None, streamed });
+        }
     }
 }

@@ -1,7 +1,7 @@
 //! Schedule of the matrix passes as a table of instructions.
 
 use dermis_golden::fixed::plan::resources::{operand_vectors, Holds};
-use dermis_golden::fixed::words::schedule::{schedule, Operand};
+use dermis_golden::fixed::words::schedule::{accumulations, Operand};
 use dermis_golden::fixed::{CasePlan, Model};
 use rust_hdl::prelude::*;
 
@@ -25,25 +25,21 @@ pub struct Step {
     pub flip: u64,
     /// The operand is read with x and y exchanged.
     pub transposed: bool,
-    /// The product is of two high limbs and is shifted left.
-    pub align: bool,
-    /// First product of an accumulation.
-    pub first: bool,
     /// Last product of an accumulation.
     pub last: bool,
     /// First step of a subarray.
     pub opens: bool,
     /// Last step of a subarray.
     pub ends: bool,
-    /// Number of operand vectors that must be complete before this step.
+    /// Number of operand vectors that must be readable before this step.
     pub needs: usize,
 }
 
-/// The steps of one case: for each v_ij, for each group of rows, its products.
+/// The steps of one case: for each accumulation, for each group of rows, its products.
 pub fn unroll(case: &CasePlan) -> Vec<Step> {
     let CasePlan { formats, storage, .. } = case;
     let mut steps = Vec::new();
-    for products in schedule(formats) {
+    for (_, products) in accumulations(formats) {
         for group in 0..formats.groups {
             for (index, product) in products.iter().enumerate() {
                 let (kind, operand, needs) = match product.operand {
@@ -58,8 +54,6 @@ pub fn unroll(case: &CasePlan) -> Vec<Step> {
                     kind,
                     flip: product.matrix.flip as u64,
                     transposed: product.transposed,
-                    align: product.align,
-                    first: index == 0,
                     last: index + 1 == products.len(),
                     opens: steps.is_empty(),
                     ends: false,
@@ -77,8 +71,8 @@ pub fn unroll(case: &CasePlan) -> Vec<Step> {
 /// Position in the step's columns in; addresses and control out, one cycle later, or three where a column list is read.
 ///
 /// `start` loads the first step of case `which`, `advance` the next one, both at the clock edge. `ready` (the step's
-/// operand is complete), `last` (its last column) and `ends` (the last step of the case, after which the first follows)
-/// are combinational.
+/// operand can be read, and the pause after an accumulation is over), `last` (its last column) and `ends` (the last step
+/// of the case, after which the first follows) are combinational.
 ///
 /// The current instruction is in a register. The table is always read at the next instruction, because `advance`
 /// settles late in the cycle.
@@ -94,9 +88,9 @@ pub struct PassProgram {
     pub advance: Signal<In, Bit>,
     /// Position in the step's columns.
     pub column: Wire<In>,
-    /// Number of complete operand vectors of this subarray.
+    /// Number of operand vectors of this subarray that can be read.
     pub finished: Wire<In>,
-    /// The step's operand is complete.
+    /// The step's operand can be read, and the pause after an accumulation is over.
     pub ready: Signal<Out, Bit>,
     /// `column` is the step's last.
     pub last: Signal<Out, Bit>,
@@ -110,7 +104,7 @@ pub struct PassProgram {
     /// Operand selection as in [`OperandSelect`](super::operand_select::OperandSelect): kind, flip, exchange, from bit 0; with the
     /// addresses.
     pub source: Wire<Out>,
-    /// Control of [`Lanes`](crate::primitives::arithmetic::lanes::Lanes) from bit 0: align, first, last product of an accumulation; with the
+    /// Control of [`Lanes`](crate::primitives::arithmetic::lanes::Lanes) from bit 0: last product of an accumulation; with the
     /// coefficient check also first product of a subarray; with the addresses.
     pub control: Wire<Out>,
     kernel: Body,
@@ -127,7 +121,7 @@ kernel_block!(
 pub const COLUMN_FILE: &str = "columns.hex";
 /// Width of `control`, in bits.
 pub fn control_bits(model: &Model) -> usize {
-    3 + usize::from(model.has_coefficient_check())
+    1 + usize::from(model.has_coefficient_check())
 }
 /// Width of `source`, in bits.
 pub const SOURCE_BITS: usize = 5;
@@ -140,6 +134,8 @@ struct Shape {
     list: Vec<[usize; 2]>,
     /// Some step reads its operand transposed.
     across: bool,
+    /// Cycles without a product after each accumulation, 1 or 2.
+    pause: usize,
     /// Words of the coefficient memory, quads of a subarray, operand vectors.
     words: usize,
     quads: usize,
@@ -157,6 +153,7 @@ impl PassProgram {
             steps: cases.iter().map(unroll).collect(),
             list: cases.iter().filter(|case| case.storage.listed).flat_map(pairs).collect(),
             across: formats.shared_a,
+            pause: model.first().storage.pause,
             words: cases.iter().map(|case| case.storage.words()).sum(),
             quads: formats.quads,
             vectors: operand_vectors(formats.degree),
@@ -199,21 +196,21 @@ impl PassProgram {
 }
 
 impl Shape {
-    /// Widths of the fields of an instruction, from bit 0: align, first, last, kind and flip and transposed as in
+    /// Widths of the fields of an instruction, from bit 0: last, kind and flip and transposed as in
     /// `source`, ends, final column, needs, operand, coefficients.
-    fn fields(&self) -> [usize; 9] {
+    fn fields(&self) -> [usize; 7] {
         let (columns, needs) = (count_bits(self.quads), count_bits(self.vectors + 1));
         let operand = count_bits(self.vectors.max(1) * self.quads);
-        [1, 1, 1, SOURCE_BITS, 1, columns, needs, operand, count_bits(self.words)]
+        [1, SOURCE_BITS, 1, columns, needs, operand, count_bits(self.words)]
     }
 
     /// The instruction of `step`.
     fn word(&self, step: &Step) -> u64 {
         let source = step.kind | step.flip << 2 | u64::from(step.transposed) << 4;
-        let [align, first, last, ends] = [step.align, step.first, step.last, step.ends].map(u64::from);
+        let [last, ends] = [step.last, step.ends].map(u64::from);
         let numbers = [step.columns - 1, step.needs, step.operand, step.coefficients].map(|number| number as u64);
         let [columns, needs, operand, coefficients] = numbers;
-        let all = [align, first, last, source, ends, columns, needs, operand, coefficients];
+        let all = [last, source, ends, columns, needs, operand, coefficients];
         all.into_iter().zip(self.fields()).rev().fold(0, |word, (field, bits)| word << bits | field)
     }
 
@@ -237,12 +234,12 @@ impl Shape {
         let k = Builder::new("pass_program");
         let which = k.input("which", count_bits(self.steps.len()));
         let (start, advance) = (k.input("start", 1), k.input("advance", 1));
-        let (column, finished) = (k.input("column", count_bits(self.quads)), k.input("finished", self.fields()[6]));
+        let (column, finished) = (k.input("column", count_bits(self.quads)), k.input("finished", self.fields()[4]));
         let step = k.register("step", Type::unsigned(count_bits(largest_of(&self.steps))));
-        let names = ["align", "first", "last_product", "selects", "ends", "final_column", "needs", "o_base", "c_base"];
+        let names = ["last_product", "selects", "ends", "final_column", "needs", "o_base", "c_base"];
         let registers: Vec<Net> =
             names.iter().zip(self.fields()).map(|(name, bits)| k.register(name, Type::unsigned(bits))).collect();
-        let &[align, first, last_product, selects, ends, final_column, needs, o_base, c_base] = &registers[..] else {
+        let &[last_product, selects, ends, final_column, needs, o_base, c_base] = &registers[..] else {
             unreachable!("one register per field")
         };
         let asked = k.wire("asked", (start | *ends).mux(k.constant(step.bits(), 0), step.plus(1)));
@@ -255,10 +252,16 @@ impl Shape {
                 at += register.bits();
             }
         });
-        k.wire("ready", !finished.less(*needs));
+        let ended = advance & *last_product;
+        let pauses = (1..=self.pause).scan(ended, |ended, number| {
+            *ended = k.delay(&format!("pause_{number}"), *ended);
+            Some(*ended)
+        });
+        let pauses = pauses.reduce(|one, other| one | other).unwrap_or(k.constant(1, 0));
+        k.wire("ready", !(pauses | finished.less(*needs)));
         let last = k.wire("last", column.equals(*final_column));
-        let opens = (self.control_bits == 4).then(|| step.is(0) & column.is(0));
-        let flags: Vec<Expr> = opens.into_iter().chain([*last_product & last, *first & column.is(0), *align]).collect();
+        let opens = (self.control_bits == 2).then(|| step.is(0) & column.is(0));
+        let flags: Vec<Expr> = opens.into_iter().chain([*last_product & last]).collect();
         let flags = k.wire("flags", concat(&flags));
         self.addresses(&k, column, [*c_base, *o_base], *selects, flags);
         k.finish()
@@ -312,7 +315,7 @@ impl Shape {
     }
 }
 
-/// PassProgram of the case that has most.
+/// Number of steps of the case that has most.
 fn largest_of(steps: &[Vec<Step>]) -> usize {
     steps.iter().map(Vec::len).max().unwrap_or(1)
 }
@@ -338,8 +341,6 @@ mod tests {
             kind: random.u64(..3),
             flip: random.u64(..4),
             transposed: random.bool(),
-            align: random.bool(),
-            first: random.bool(),
             last: random.bool(),
             opens: index == 0,
             ends: index + 1 == count,
@@ -348,13 +349,24 @@ mod tests {
         let steps = [5, 3].map(|count| (0..count).map(|index| step(index, count)).collect()).into();
         let list = (0..47).map(|_| [random.usize(..QUADS), random.usize(..QUADS)]).collect();
         let list = if listed { list } else { Vec::new() };
-        Shape { steps, list, across: listed, words: 47, quads: QUADS, vectors: VECTORS, control_bits }
+        Shape {
+            steps,
+            list,
+            across: listed,
+            pause: 1 + usize::from(listed),
+            words: 47,
+            quads: QUADS,
+            vectors: VECTORS,
+            control_bits,
+        }
     }
 
     /// The step in execution, its index, the outputs on their way.
     struct Program {
         shape: Shape,
         now: Option<(Step, usize)>,
+        /// Whether each of the cycles of the pause before ended an accumulation.
+        ended: VecDeque<Option<bool>>,
         pipe: VecDeque<[Option<Word>; 4]>,
     }
 
@@ -365,10 +377,9 @@ mod tests {
             let address = step.coefficients + column;
             let quad = self.shape.list.get(address).map_or(column, |pair| pair[usize::from(step.transposed)]);
             let source = step.kind | step.flip << 2 | u64::from(step.transposed) << 4;
-            let first = step.first && column == 0;
             let last = step.last && column + 1 == step.columns;
-            let opens = step.opens && column == 0 && self.shape.control_bits == 4;
-            let control = [opens, last, first, step.align].iter().fold(0, |word, &bit| word << 1 | u64::from(bit));
+            let opens = step.opens && column == 0 && self.shape.control_bits == 2;
+            let control = u64::from(opens) << 1 | u64::from(last);
             [address as u64, (step.operand + quad) as u64, source, control].map(|word| Some(Word::from(word)))
         }
     }
@@ -377,8 +388,12 @@ mod tests {
         fn outputs(&mut self, inputs: &[Word]) -> Vec<Option<Word>> {
             let [column, finished] = [3, 4].map(|k| inputs[k].number() as usize);
             let of = |of: &dyn Fn(&Step) -> bool| self.now.map(|(step, _)| Word::from(of(&step)));
-            let flags =
-                [of(&|step| step.ends), of(&|step| finished >= step.needs), of(&|step| column + 1 == step.columns)];
+            let pauses = self.ended.contains(&Some(true));
+            let flags = [
+                of(&|step| step.ends),
+                of(&|step| finished >= step.needs && !pauses),
+                of(&|step| column + 1 == step.columns),
+            ];
             flags.into_iter().chain(self.pipe[0]).collect()
         }
 
@@ -387,6 +402,8 @@ mod tests {
             let [start, advance] = [1, 2].map(|k| inputs[k].number() == 1);
             self.pipe.push_back(self.put(column));
             self.pipe.pop_front();
+            self.ended.push_back(self.now.map(|(step, _)| advance && step.last));
+            self.ended.pop_front();
             if start {
                 self.now = Some((self.shape.steps[case][0], 0));
             } else if let Some((step, index)) = self.now.filter(|_| advance) {
@@ -406,14 +423,18 @@ mod tests {
                 case = random.u64(..2);
             }
             let (column, finished) = (random.u64(..QUADS as u64), random.u64(..=VECTORS as u64));
-            vec![case.into(), start.into(), (random.u8(..3) == 0).into(), column.into(), finished.into()]
+            vec![case.into(), start.into(), (cycle > 4 && random.u8(..3) == 0).into(), column.into(), finished.into()]
         };
         let stimulus: Vec<Vec<Word>> = (0..3000).map(inputs).collect();
-        for (listed, control_bits) in [(false, 3), (true, 4)] {
+        for (listed, control_bits) in [(false, 1), (true, 2)] {
             let shape = shape(listed, control_bits);
             let block = PassProgram::of(&shape);
             let pipe = vec![[None; 4]; block.latency()].into();
-            check(block.kernel.kernel(), &stimulus, &mut Program { shape, now: None, pipe });
+            check(
+                block.kernel.kernel(),
+                &stimulus,
+                &mut Program { ended: vec![None; shape.pause].into(), shape, now: None, pipe },
+            );
         }
     }
 }

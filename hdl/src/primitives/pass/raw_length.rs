@@ -9,18 +9,18 @@ use crate::primitives::address::counter::count_bits;
 use crate::primitives::arithmetic::leading_one::by_leading_one;
 use crate::wire::Wire;
 
-/// ORs the magnitudes of the raw quads; `shift` is valid two cycles after the last of them.
+/// ORs the magnitudes of the raw quads; `shift` is valid three cycles after the last of them.
 #[derive(LogicBlock)]
 pub struct RawLength {
     /// Clock; registers change on its rising edge.
     pub clk: Signal<In, Clock>,
-    /// Clears the OR for a new subarray, with priority over `accept`.
+    /// Clears the OR for a new subarray, and the quad of the cycle before with it.
     pub clear: Signal<In, Bit>,
     /// `quad` is valid and taken in.
     pub accept: Signal<In, Bit>,
     /// Four accumulators, `acc_bits` each, signed.
     pub quad: Wire<In>,
-    /// Right shift for `rescale`, of the quads so far; two cycles later.
+    /// Right shift for `rescale`, of the quads so far; three cycles later.
     pub shift: Wire<Out>,
     kernel: Body,
 }
@@ -54,14 +54,15 @@ impl RawLength {
 fn kernel(acc: usize, word: usize) -> Kernel {
     let k = Builder::new("raw_length");
     let [clear, accept] = ["clear", "accept"].map(|name| k.input(name, 1));
-    let (quad, full) = (k.input("quad", 4 * acc), word - 1);
+    // The quad comes from an adder.
+    let (quad, full) = (k.delay("taken", k.input("quad", 4 * acc)), word - 1);
     let seen = k.state("seen", Type::unsigned(acc - 1), clear, 0);
     let magnitude = |lane: usize| {
         let (low, sign) = (quad.slice(lane * acc, acc - 1), quad.at(lane * acc + acc - 1));
         k.wire(&format!("m{lane}"), low ^ sign.repeat(acc - 1))
     };
     let all = (0..4).map(magnitude).fold(*seen, |all, magnitude| all | magnitude);
-    k.when(accept, || seen.set(all));
+    k.when(k.delay("accepted", accept), || seen.set(all));
     k.delay("shift", by_leading_one(&k, *seen, full..acc - 1, count_bits(acc), |bit| bit + 1 - full));
     k.finish()
 }
@@ -77,9 +78,10 @@ mod tests {
     const ACC: usize = 40;
     const WORD: usize = 24;
 
-    /// The OR of the magnitudes since `clear`, and the shift one cycle later.
+    /// The quad of the cycle before, the OR of the magnitudes since `clear`, and the shift one cycle later.
     #[derive(Default)]
     struct Seen {
+        before: Option<(bool, u64)>,
         seen: Option<u64>,
         shift: Option<u32>,
     }
@@ -91,12 +93,10 @@ mod tests {
 
         fn clock(&mut self, inputs: &[Word]) {
             self.shift = self.seen.map(|seen| bit_length(seen).saturating_sub(WORD as u32 - 1));
+            let heeded = self.seen.zip(self.before).map(|(seen, (accept, all))| if accept { seen | all } else { seen });
+            self.seen = if inputs[0].number() == 1 { Some(0) } else { heeded };
             let all = (0..4).fold(0, |all, lane| all | magnitude_bits(inputs[2].signed(lane, ACC)));
-            self.seen = match [inputs[0].number(), inputs[1].number()] {
-                [1, _] => Some(0),
-                [_, 1] => self.seen.map(|seen| seen | all),
-                _ => self.seen,
-            };
+            self.before = Some((inputs[1].number() == 1, all));
         }
     }
 

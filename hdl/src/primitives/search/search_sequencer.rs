@@ -48,6 +48,8 @@ pub struct SearchSequencer {
     pub last: Signal<Out, Bit>,
     /// The next sweep is a halving.
     pub next_halves: Signal<Out, Bit>,
+    /// The next sweep is the last.
+    pub next_last: Signal<Out, Bit>,
     /// The next sweep may be set up without waiting for the comparison of this one.
     pub chains: Signal<Out, Bit>,
     /// Buffer to read.
@@ -67,7 +69,7 @@ kernel_block!(
     SearchSequencer,
     clock clk,
     inputs [rst, begin_frame, enabled, set_up, compared, improved, compared_sweep, best_x, best_y],
-    outputs [step, last, next_halves, chains, source, next_base, target, sweep, radius]
+    outputs [step, last, next_halves, next_last, chains, source, next_base, target, sweep, radius]
 );
 
 /// Number of sweeps whose candidates are compared.
@@ -95,6 +97,7 @@ impl SearchSequencer {
             step: Wire::new(5),
             last: Default::default(),
             next_halves: Default::default(),
+            next_last: Default::default(),
             chains: Default::default(),
             source: Wire::new(BUFFER_BITS),
             next_base: Wire::new(base_bits(quads)),
@@ -159,6 +162,7 @@ fn kernel(quads: usize) -> Kernel {
     let at_last_coarse = k.wire("at_last_coarse", count.is(final_coarse));
     let closing = k.wire("closing", !*is_coarse | at_last_coarse);
     k.wire("next_halves", *is_halving);
+    let next_last = k.wire("next_last", !*is_coarse & !*is_halving);
     k.comment(
         "A coarse sweep set up in the cycle of `compared` already uses its result for the choice of buffers; a halving",
     );
@@ -216,7 +220,7 @@ fn kernel(quads: usize) -> Kernel {
     });
     k.when(set_up & !begin_frame, || {
         step.set(concat(&[*is_halving, go_y, go_x]));
-        last.set(!*is_coarse & !*is_halving);
+        last.set(next_last);
         source.set(base_buffer);
     });
     k.when(keeps, || kept.set(compared_sweep));
@@ -308,6 +312,7 @@ mod tests {
                 begun(number(self.target)),
                 begun(Word::from(self.radius as u64)),
                 begun((COARSE_CENTRES.len()..COMPARED).contains(&self.count).into()),
+                begun((self.count >= COMPARED).into()),
                 begun(Sweep { buffer: self.target, ..self.sweep }.word()),
                 self.next_base.map(number),
             ]

@@ -53,9 +53,8 @@ kernel_block!(
 );
 
 impl Sum {
-    /// Sums in `layout` (one lane) over `quads` quads, of coefficients of `fill_bits` bits; `apart` says whether one
-    /// subarray is filled while another is searched.
-    pub fn new(layout: &PolynomialWord, quads: usize, fill_bits: usize, apart: bool) -> Self {
+    /// Sums in `layout` (one lane) over `quads` quads, of coefficients of `fill_bits` bits.
+    pub fn new(layout: &PolynomialWord, quads: usize, fill_bits: usize) -> Self {
         let block = Sum {
             clk: Default::default(),
             fill: Default::default(),
@@ -71,16 +70,7 @@ impl Sum {
             write_data: Wire::new(layout.bits()),
             kernel: Body::default(),
         };
-        block.bind(kernel(layout, quads, fill_bits, apart))
-    }
-}
-
-/// Number of the buffer that holds the sums about μ = 0.
-fn start(apart: bool) -> usize {
-    if apart {
-        START
-    } else {
-        0
+        block.bind(kernel(layout, quads, fill_bits))
     }
 }
 
@@ -93,7 +83,7 @@ struct Addition<'k> {
     added: Expr<'k>,
 }
 
-fn kernel(layout: &PolynomialWord, quads: usize, bits: usize, apart: bool) -> Kernel {
+fn kernel(layout: &PolynomialWord, quads: usize, bits: usize) -> Kernel {
     let k = Builder::new("sum");
     let (fill, fill_address) = (k.input("fill", 1), k.input("fill_address", count_bits(quads)));
     let fill_index = k.input("fill_index", count_bits(layout.widths.len()));
@@ -126,14 +116,14 @@ fn kernel(layout: &PolynomialWord, quads: usize, bits: usize, apart: bool) -> Ke
             let writes: Vec<Net> = (0..BUFFERS).map(|b| own(&format!("writes_{b}"), written[b])).collect();
             let data = layout.coefficient(write_data, n, 0);
             let buffer = |b: usize| k.register(&format!("buffer_{b}"), Type::signed(layout.widths[n]));
-            let buffers: Vec<Net> = (0..BUFFERS + usize::from(apart)).map(buffer).collect();
+            let buffers: Vec<Net> = (0..=BUFFERS).map(buffer).collect();
             let others: Vec<(u64, Expr)> = (1..).zip(buffers[1..].iter().map(Net::get)).collect();
             let word = k.register("word", Type::signed(layout.widths[n]));
             k.when(*reads, || word.set(from.case(&others, *buffers[0])));
             for (writes, buffer) in writes.iter().zip(&buffers) {
                 k.when(writes.get(), || buffer.set(data));
             }
-            add(&k, addition, n, buffers[start(apart)]);
+            add(&k, addition, n, buffers[START]);
             word.get()
         })
     };
@@ -171,21 +161,11 @@ mod tests {
     /// The buffers' coefficients, undefined before they are written; reads, writes and additions on their way.
     struct Buffers {
         layout: PolynomialWord,
-        apart: bool,
         buffers: [[Option<i64>; WIDTHS.len()]; BUFFERS + 1],
         word: [Option<i64>; WIDTHS.len()],
         added: [Option<Added>; 2],
         reads: Option<usize>,
         writes: Option<usize>,
-    }
-
-    impl Buffers {
-        fn buffer(&self, word: &Word) -> usize {
-            match word.number() as usize {
-                START => start(self.apart),
-                other => other,
-            }
-        }
     }
 
     impl Reference for Buffers {
@@ -209,26 +189,26 @@ mod tests {
                 let data = self.layout.get(&inputs[9], 0);
                 self.buffers[buffer] = std::array::from_fn(|n| Some(data[n]));
             }
-            let start = start(self.apart);
             if let Some(Added { index, first, sum }) = self.added[0].filter(|added| added.index < WIDTHS.len()) {
-                let old = if first { Some(0) } else { before[start][index] };
+                let old = if first { Some(0) } else { before[START][index] };
                 let bits = WIDTHS[index];
-                self.buffers[start][index] = old.map(|old| (old + sum) << (64 - bits) >> (64 - bits));
+                self.buffers[START][index] = old.map(|old| (old + sum) << (64 - bits) >> (64 - bits));
             }
             let counted = |lane: &usize| inputs[3].field(*lane, 1) == 1;
             let sum = (0..LANES).filter(counted).map(|lane| inputs[4].signed(lane, FILL_BITS)).sum();
             let (index, first) = (inputs[2].number() as usize, inputs[1].number() == 0);
             let enters = (inputs[0].number() == 1).then_some(Added { index, first, sum });
             self.added = [self.added[1], enters];
-            self.reads = (inputs[5].number() == 1).then(|| self.buffer(&inputs[6]));
+            self.reads = (inputs[5].number() == 1).then(|| inputs[6].number() as usize);
             // Sweeps never write START.
             self.writes = (inputs[7].number() == 1).then(|| inputs[8].number() as usize);
         }
     }
 
-    fn adds_and_keeps_buffers_apart(apart: bool) {
+    #[test]
+    fn sums_are_those_of_integers_in_each_buffer() {
         let layout = PolynomialWord::new(1, &WIDTHS);
-        let block = Sum::new(&layout, QUADS, FILL_BITS, apart);
+        let block = Sum::new(&layout, QUADS, FILL_BITS);
         let mut random = fastrand::Rng::with_seed(8);
         let inputs = |_| {
             vec![
@@ -247,7 +227,6 @@ mod tests {
         let stimulus: Vec<Vec<Word>> = (0..3000).map(inputs).collect();
         let mut reference = Buffers {
             layout,
-            apart,
             buffers: Default::default(),
             word: Default::default(),
             added: Default::default(),
@@ -255,11 +234,5 @@ mod tests {
             writes: None,
         };
         check(block.kernel.kernel(), &stimulus, &mut reference);
-    }
-
-    #[test]
-    fn sums_are_those_of_integers_in_each_buffer() {
-        adds_and_keeps_buffers_apart(true);
-        adds_and_keeps_buffers_apart(false);
     }
 }

@@ -3,7 +3,7 @@
 use dermis_golden::board::Board;
 use dermis_golden::scene::Scene;
 
-use crate::bitstream::baseline::Baselines;
+use crate::flow::baseline::Baselines;
 
 /// A clock with its origin.
 #[derive(Clone, Debug, PartialEq)]

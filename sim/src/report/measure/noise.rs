@@ -5,7 +5,7 @@ use dermis_golden::noise::{shape_study, Candidate, ShapeRow, ShapeStudy};
 use dermis_golden::partition::Case;
 use dermis_golden::scene::{EstimatorKind, ObjectiveKind};
 
-use super::{Measured, Options};
+use super::measured::{Measured, Options};
 use crate::progress::Progress;
 
 /// Number of drawn frames: quick, full variant.

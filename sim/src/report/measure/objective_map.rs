@@ -8,7 +8,7 @@ use dermis_golden::fixed::words::formats::{HALVINGS, MU_STEPS};
 use dermis_golden::float::objective::{Objective, Sparse};
 use dermis_golden::float::pass::Polynomial;
 
-use super::Measured;
+use super::measured::Measured;
 
 /// Grid points from the centre to mu_max along an axis.
 pub const HALF: i32 = 20;

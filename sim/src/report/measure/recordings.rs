@@ -13,7 +13,7 @@ use dermis_golden::import::Imported;
 use dermis_golden::reception::full_scale;
 use dermis_golden::reconstruct::Reconstruction;
 
-use super::clock;
+use super::clock::clock;
 use crate::compare::{comparable_forces, difference, median, Difference};
 use crate::jobs::Interrupt;
 

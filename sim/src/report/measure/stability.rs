@@ -5,7 +5,7 @@ use dermis_golden::partition::Case;
 use dermis_golden::scene::InverseKind;
 use dermis_golden::stability::{self, extreme, settings, Setting};
 
-use super::{Measured, Options};
+use super::measured::{Measured, Options};
 use crate::jobs::parallel;
 
 /// Largest scene, in taxels, whose extreme frames are measured, as each frame needs its own model.

@@ -20,14 +20,16 @@
 //!
 //! Stage `force` thus shows the error of the arithmetic alone, stage `send` the error of arithmetic and search.
 
+use dermis_golden::board::EngineKind;
+use dermis_golden::fixed::stages::pass::join_limbs;
 use dermis_golden::fixed::stages::send::{Status, STATUS_BEATS};
 use dermis_golden::fixed::words::arith::{bit_length, hadamard};
 use dermis_golden::fixed::words::formats::{Formats, MU_STEPS, SEARCH_EXTRA_BITS};
-use dermis_golden::fixed::words::schedule::{is_transposed, schedule, EXPONENTS};
+use dermis_golden::fixed::words::schedule::{by_limbs, is_transposed, schedule, EXPONENTS};
 use dermis_golden::float::pass::Polynomial;
 use dermis_golden::reception::full_scale;
 
-use super::{BitTrue, Measured};
+use super::measured::{BitTrue, Measured};
 
 /// One stage of one frame.
 #[derive(Clone, Debug, PartialEq)]
@@ -176,12 +178,23 @@ impl<'a> FloatReference<'a> {
                 let words = self.words(stage);
                 let own = words.len() / self.status.len().max(1);
                 for (part, words) in words.chunks(own.max(1)).enumerate() {
+                    let words = if stage == "pass" { self.joined(words) } else { words.to_vec() };
                     let values = self.quads(stage, part);
                     words.iter().zip(values).for_each(|(words, values)| compared.add_quad(words, values));
                 }
             }
         }
         compared
+    }
+
+    /// The rows of `pass` of one subarray, those of v_00 with all their limbs.
+    fn joined(&self, words: &[Vec<i64>]) -> Vec<Vec<i64>> {
+        let (f, engine) = (self.formats(), self.bit_true.model.board.engine);
+        let limbs = if engine == EngineKind::Parallel { by_limbs(&schedule(f)[0]).len() } else { 1 };
+        let quads: Vec<[i64; 4]> = words.iter().map(|word| [0, 1, 2, 3].map(|parity| word[parity])).collect();
+        let (first, later) = quads.split_at(limbs * f.quads);
+        let first = join_limbs(f, &first.chunks(f.quads).map(<[_]>::to_vec).collect::<Vec<_>>());
+        first.iter().chain(later).map(|quad| quad.to_vec()).collect()
     }
 
     /// Adds μ of every subarray that was searched.

@@ -6,7 +6,7 @@ use dermis_golden::frame::Frame;
 use dermis_golden::partition::Case;
 use dermis_golden::scene::Scene;
 
-use super::Options;
+use super::measured::Options;
 use crate::compare::median;
 use crate::jobs::parallel;
 

@@ -1,11 +1,9 @@
 //! Times per frame on the CPU: three repeats over the frames, one engine at a time.
 
-use std::collections::BTreeMap;
 use std::time::{Duration, Instant};
 
 use anyhow::Result;
 
-use super::{Engine, Measured};
 use crate::compare::median;
 
 /// Number of repeats of every engine.
@@ -43,38 +41,6 @@ impl Timing {
         }
         Ok(Timing { repeats })
     }
-}
-
-/// Measures every CPU engine that supports the case.
-pub(super) fn time(measured: &Measured) -> Result<BTreeMap<Engine, Timing>> {
-    let frames = &measured.frames;
-    let mut times = BTreeMap::new();
-    times.insert(
-        Engine::Golden,
-        Timing::of(frames.len(), |k| {
-            measured.engine.run(&frames[k])?;
-            Ok(())
-        })?,
-    );
-    if let Ok(bit_true) = &measured.bit_true {
-        times.insert(
-            Engine::Fixed,
-            Timing::of(frames.len(), |k| {
-                bit_true.model.reconstruct(&frames[k])?;
-                Ok(())
-            })?,
-        );
-    }
-    if let Some(literal) = &measured.literal {
-        times.insert(
-            Engine::Baseline,
-            Timing::of(frames.len(), |k| {
-                literal.run(&frames[k])?;
-                Ok(())
-            })?,
-        );
-    }
-    Ok(times)
 }
 
 #[cfg(test)]

@@ -12,7 +12,7 @@ use plotters::style::text_anchor::{HPos, VPos};
 
 use super::super::style::{GRID, INK, SERIES};
 use super::{label, note, sized, Area};
-use crate::block::timing::{Lane, Timing};
+use crate::cosim::block_timing::{Lane, Timing};
 
 const WIDTH: u32 = 720;
 /// Width of the names.

@@ -15,7 +15,7 @@ use dermis_hdl::usage::{total, Usage};
 use super::super::document::{count, decimal, empty_cell, percent, seconds, text_cell, Cell, Item, Section, Table};
 use super::super::measure::{clock, formats, Clock, ContactCount, Engine, FormatRow, Measured, Options};
 use super::super::BUDGET_US;
-use super::{case_text, scenes};
+use super::lookup::{case_text, scenes};
 use crate::drawn_frames::{DrawnFrames, Shapes};
 use crate::jobs::parallel;
 

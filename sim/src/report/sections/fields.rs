@@ -8,7 +8,8 @@ use dermis_golden::scene::EstimatorKind;
 use super::super::document::{Item, Picture, Section};
 use super::super::measure::Measured;
 use super::super::pictures::{force_field, stress_map, Outline};
-use super::{case_text, illustrated_frame, Choice};
+use super::choice::Choice;
+use super::lookup::{case_text, illustrated_frame};
 
 /// The section with maps of stress and forces.
 ///

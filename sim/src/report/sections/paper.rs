@@ -16,8 +16,9 @@ use super::super::measure::{Engine, Measured, Options};
 use super::super::pictures::{bars, force_field, stress_map, Bars, Outline};
 use super::super::style::SERIES;
 use super::fields::field_pictures;
+use super::lookup::{case_text, find, scenes};
 use super::published::{table_two, times};
-use super::{case_text, find, ratios, scenes};
+use super::ratios;
 use crate::compare::median;
 use crate::progress::Progress;
 

@@ -7,7 +7,7 @@ use dermis_golden::sensor::Sensor;
 
 use super::super::document::{empty_cell, median_percent, percent, seconds, text_cell, Cell, Item, Section, Table};
 use super::super::measure::{Engine, Measured};
-use super::{case_text, find};
+use super::lookup::{case_text, find};
 
 /// The section with Table 2 and the published run times.
 pub fn published(measured: &[Measured]) -> Section {

@@ -6,7 +6,7 @@ use super::super::document::{decimal, text_cell, Cell, Item, Picture, Section, T
 use super::super::measure::{ContactCount, Measured};
 use super::super::pictures::{bars, Bars};
 use super::super::style::SERIES;
-use super::{case_text, illustrated_frame, scenes};
+use super::lookup::{case_text, illustrated_frame, scenes};
 
 /// The section with the friction ratios.
 ///

@@ -8,7 +8,8 @@ use super::super::document::{count, text_cell, Cell, Item, Picture, Section, Tab
 use super::super::measure::{BitTrue, Measured, Options};
 use super::super::pictures::{bars, Bars};
 use super::super::style::SERIES;
-use super::{case_text, Choice};
+use super::choice::Choice;
+use super::lookup::case_text;
 use crate::jobs::parallel;
 
 /// The section with resources; the quick variant lists the features left out for the first scene only.

@@ -6,7 +6,8 @@ use super::super::document::{count, decimal, percent, percent_text, text_cell, C
 use super::super::measure::{stages as trace, Measured, StageRow};
 use super::super::pictures::{bars, Bars};
 use super::super::style::SERIES;
-use super::{scenes, Choice};
+use super::choice::Choice;
+use super::lookup::scenes;
 
 /// The section with the differences of all stages.
 ///

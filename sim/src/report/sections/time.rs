@@ -9,7 +9,7 @@ use super::super::measure::{Engine, Measured, Point};
 use super::super::pictures::{scatter, Guide, Scatter, Series};
 use super::super::style::SERIES;
 use super::super::BUDGET_US;
-use super::{case_text, scenes};
+use super::lookup::{case_text, scenes};
 
 /// The section with error against run time.
 ///

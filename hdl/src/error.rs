@@ -1,0 +1,30 @@
+//! Why a scene has no hardware.
+
+use dermis_golden::link::LinkError;
+use thiserror::Error;
+
+use crate::language::KernelError;
+
+/// Why no hardware can be generated from a model.
+#[derive(Debug, Error)]
+pub enum HdlError {
+    /// The scene omits a feature that a board's top module always has.
+    #[error("{field} = {value}: a board without {what} is not available yet")]
+    Unsupported {
+        /// Field of the scene.
+        field: &'static str,
+        /// Its value.
+        value: String,
+        /// The feature that would be omitted.
+        what: &'static str,
+    },
+    /// The scene's link cannot be built.
+    #[error(transparent)]
+    Link(#[from] LinkError),
+    /// A block's kernel is not sound; a defect of this crate.
+    #[error("internal: {0}")]
+    Kernel(#[from] KernelError),
+    /// The description fails rust-hdl's checks; a defect of this crate.
+    #[error("internal: the hardware description does not pass its checks: {0}")]
+    Check(String),
+}

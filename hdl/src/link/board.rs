@@ -1,0 +1,40 @@
+//! A board's pins, independent of the simulator.
+
+#[cfg(doc)]
+use dermis_golden::link::LinkKind;
+use rust_hdl::prelude::*;
+
+/// A board's output pins.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct BoardOutputs {
+    /// Output pin of the link, [`LinkKind::output`].
+    pub to_host: bool,
+    /// LED: blinks while the clock runs.
+    pub alive: bool,
+    /// LED: lit while packets are received, computed or sent.
+    pub busy: bool,
+    /// LED: lit after a packet was dropped.
+    pub error: bool,
+}
+
+/// A simulated board. The input pins of its link are bits, from bit 0 in the order of [`LinkKind::inputs`].
+pub trait BoardDevice: Send {
+    /// Applies the link's inputs and the clock level, settles all signals and returns the outputs. The order of two
+    /// clocks that change in the same call is undefined.
+    fn settle(&mut self, inputs: u64, clock: bool) -> BoardOutputs;
+
+    /// One clock cycle: applies the inputs, samples the outputs, then the rising edge.
+    fn cycle(&mut self, inputs: u64) -> BoardOutputs {
+        let outputs = self.settle(inputs, false);
+        self.settle(inputs, true);
+        outputs
+    }
+}
+
+/// Operations on a board top that simulation and generation need, the same for all engines and links.
+pub trait Board: Block + Send {
+    /// Applies the link's inputs and the clock level to the pins.
+    fn drive(&mut self, inputs: u64, clock: bool);
+    /// Samples the output pins.
+    fn outputs(&self) -> BoardOutputs;
+}

@@ -1,0 +1,117 @@
+//! Cycle counts of the frame whose passes run and of the frame that is searched and sent.
+
+use rust_hdl::prelude::*;
+
+use crate::kernel_block;
+use crate::language::{Body, Builder, Kernel, Type};
+use crate::wire::Wire;
+
+/// Counts from `begin_frame`; at `hand_over`, when the frame leaves the passes, the count moves to `cycles` and goes on
+/// there, so that the next frame can begin. Cycles in which a frame waits for the one before it are not counted.
+///
+/// All inputs take effect `COUNT_DELAY` cycles later: the first beat of the frame before has been sent by then.
+#[derive(LogicBlock)]
+pub struct FrameCycles {
+    /// Clock; registers change on its rising edge.
+    pub clk: Signal<In, Clock>,
+    /// Synchronous reset, active high; clears what is on its way.
+    pub rst: Signal<In, Bit>,
+    /// A frame begins.
+    pub begin_frame: Signal<In, Bit>,
+    /// The frame in the passes waits for the one before.
+    pub waits: Signal<In, Bit>,
+    /// The last subarray of the frame goes to the search.
+    pub hand_over: Signal<In, Bit>,
+    /// The frame that is searched waits for the one before.
+    pub stands: Signal<In, Bit>,
+    /// Cycles of the frame that is searched and sent, without the first ones, unsigned.
+    pub cycles: Wire<Out>,
+    kernel: Body,
+}
+
+kernel_block!(FrameCycles, clock clk, inputs [rst, begin_frame, waits, hand_over, stands], outputs [cycles]);
+
+/// Width of the cycle counts, in bits.
+pub const CYCLE_BITS: usize = 24;
+/// Cycles from an event to its effect on the counts.
+pub const COUNT_DELAY: usize = 10;
+
+impl Default for FrameCycles {
+    /// Counts modulo 2^[`CYCLE_BITS`].
+    fn default() -> Self {
+        let block = FrameCycles {
+            clk: Default::default(),
+            rst: Default::default(),
+            begin_frame: Default::default(),
+            waits: Default::default(),
+            hand_over: Default::default(),
+            stands: Default::default(),
+            cycles: Wire::new(CYCLE_BITS),
+            kernel: Body::default(),
+        };
+        block.bind(kernel())
+    }
+}
+
+fn kernel() -> Kernel {
+    let k = Builder::new("frame_cycles");
+    let rst = k.input("rst", 1);
+    let later = |name: &str| {
+        (1..COUNT_DELAY).fold(k.input(name, 1), |value, number| {
+            let register = k.state(&format!("{name}_{number}"), Type::unsigned(1), rst, 0);
+            register.set(value);
+            *register
+        })
+    };
+    let [begin_frame, waits, hand_over, stands] = ["begin_frame", "waits", "hand_over", "stands"].map(later);
+    let passing = k.state("passing", Type::unsigned(CYCLE_BITS), begin_frame, 0);
+    let next = k.wire("next", waits.mux(*passing, passing.plus(1)));
+    passing.set(next);
+    let cycles = k.register("cycles", Type::unsigned(CYCLE_BITS));
+    k.when(!stands, || cycles.set(cycles.plus(1)));
+    k.when(hand_over, || cycles.set(next));
+    k.finish()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::language::testbench::{check, Reference};
+    use crate::wire::Word;
+
+    /// Counts with the inputs on their way; undefined before the first frame.
+    struct Counts {
+        pipe: Vec<[bool; 4]>,
+        passing: Option<u64>,
+        cycles: Option<u64>,
+    }
+
+    impl Reference for Counts {
+        fn outputs(&mut self, _: &[Word]) -> Vec<Option<Word>> {
+            vec![self.cycles.map(Word::from)]
+        }
+
+        fn clock(&mut self, inputs: &[Word]) {
+            let [rst, now @ ..] = [0, 1, 2, 3, 4].map(|k| inputs[k].number() == 1);
+            self.pipe.push(now);
+            let [begin_frame, waits, hand_over, stands] = self.pipe.remove(0);
+            let next = self.passing.map(|count| count + u64::from(!waits));
+            self.cycles = if hand_over { next } else { self.cycles.map(|count| count + u64::from(!stands)) };
+            self.passing = if begin_frame { Some(0) } else { next };
+            if rst {
+                self.pipe.iter_mut().for_each(|events| *events = [false; 4]);
+            }
+        }
+    }
+
+    #[test]
+    fn a_frame_is_counted_while_the_next_begins() {
+        let mut random = fastrand::Rng::with_seed(5);
+        let mut bit = |of: u8| Word::from(random.u8(..of) == 0);
+        let inputs = |cycle: usize| vec![Word::from(cycle < 3), bit(40), bit(4), bit(40), bit(4)];
+        let mut stimulus: Vec<Vec<Word>> = (0..3000).map(inputs).collect();
+        stimulus[1500][0] = true.into();
+        let pipe = vec![[false; 4]; COUNT_DELAY - 1];
+        check(FrameCycles::default().kernel.kernel(), &stimulus, &mut Counts { pipe, passing: None, cycles: None });
+    }
+}

@@ -1,0 +1,83 @@
+//! `dermis bitstream`: makes the bitstream of a scene for its board with open tools.
+
+use std::path::Path;
+
+use anyhow::{ensure, Result};
+use clap::Args;
+use dermis_golden::fixed::Model;
+use dermis_golden::scene::Scene;
+
+use crate::flow::baseline::{Baselines, FILE};
+use crate::flow::bitstream::{make, Effort};
+use crate::progress::Progress;
+use crate::report::{self, BitstreamReport, Summary};
+
+/// Arguments of `dermis bitstream`.
+#[derive(Args, Debug)]
+#[command(after_help = "Examples:
+  dermis bitstream eight-by-eight
+  dermis bitstream eight-by-eight --board icebreaker
+  dermis bitstream sensor-1 --seeds 5 --jobs 2 --update-baselines
+  dermis bitstream --committed --board ulx3s-85f")]
+pub struct Arguments {
+    /// Built-in name or path of a scene.
+    #[arg(required_unless_present = "committed")]
+    scene: Option<String>,
+    /// Board to use instead of the scene's: the name of a file in constraints.
+    #[arg(long, value_name = "NAME")]
+    board: Option<String>,
+    /// Number of place-and-route seeds; default: from the board's file.
+    #[arg(long, value_parser = clap::value_parser!(u32).range(1..))]
+    seeds: Option<u32>,
+    /// Number of seeds to run in parallel; each takes a core and about 1 GB of memory.
+    #[arg(long, default_value_t = 2, value_parser = clap::value_parser!(u32).range(1..))]
+    jobs: u32,
+    /// If the clock is met, write the results into constraints/baselines.json instead of comparing with it.
+    #[arg(long)]
+    update_baselines: bool,
+    /// Print the result as JSON and nothing else.
+    #[arg(long)]
+    json: bool,
+    /// Print the table of constraints/baselines.json, of SCENE or all built-in ones, and run no tool.
+    #[arg(long, conflicts_with_all = ["seeds", "jobs", "update_baselines", "json"])]
+    committed: bool,
+}
+
+/// Makes the bitstream: the text for stdout, and whether the clock is met without a regression against the baseline.
+///
+/// # Errors
+/// An invalid scene or board; a tool that is missing or failed.
+pub fn run(arguments: &Arguments, build_dir: &Path) -> Result<(String, bool)> {
+    let Some(scene) = arguments.scene.as_ref().filter(|_| !arguments.committed) else {
+        return Ok((committed(arguments.scene.as_deref(), arguments.board.as_deref())?, true));
+    };
+    let mut scene = Scene::load(scene)?;
+    if let Some(board) = &arguments.board {
+        scene.hardware.board.clone_from(board);
+    }
+    let model = Model::new(&scene)?;
+    let Arguments { seeds, jobs, update_baselines, .. } = *arguments;
+    let made = make(&model, build_dir, Effort { seeds, jobs, update_baselines })?;
+    let report = BitstreamReport::new(&model, made);
+    let good = report.is_good();
+    Ok((if arguments.json { serde_json::to_string(&report)? + "\n" } else { report::bitstream(&report) }, good))
+}
+
+/// The table of the committed baselines of built-in scenes, of one scene or board where that is named; the tests' own
+/// scenes are left out.
+fn committed(scene: Option<&str>, board: Option<&str>) -> Result<String> {
+    let _progress = Progress::start("models of the baselines");
+    let mut all = Vec::new();
+    for (on, scenes) in Baselines::committed().0 {
+        for (name, baseline) in scenes {
+            let named = scene.is_none_or(|scene| scene == name) && board.is_none_or(|board| board == on);
+            if named && Scene::builtin_names().contains(&name.as_str()) {
+                let mut scene = Scene::builtin(&name)?;
+                scene.hardware.board.clone_from(&on);
+                all.push(Summary::new(&Model::new(&scene)?, baseline));
+            }
+        }
+    }
+    ensure!(!all.is_empty(), "{FILE}: no baseline of scene {scene:?} on board {board:?}");
+    Ok(report::summaries(&all))
+}

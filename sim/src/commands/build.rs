@@ -1,0 +1,79 @@
+//! `dermis build`: generates the Verilog of a scene.
+
+use std::path::{Path, PathBuf};
+
+use anyhow::{anyhow, Result};
+use clap::Args;
+use dermis_golden::fixed::Model;
+use dermis_golden::scene::Scene;
+use dermis_golden::write::write;
+use dermis_hdl::explain::explain;
+use dermis_hdl::generate;
+use dermis_hdl::link::generate_board;
+
+use super::inputs::{note_estimator, BoardOverride};
+use crate::progress::Progress;
+use crate::report;
+
+/// Arguments of `dermis build`.
+#[derive(Args, Debug)]
+#[command(after_help = "Examples:
+  dermis build sensor-1 --out rtl
+  dermis build sensor-4 --explain
+  dermis build sensor-1 --board                      engine, link and packets, ready for place and route
+  dermis build eight-by-eight --target-board icebreaker     the serial engine, for small devices")]
+pub struct Arguments {
+    /// Built-in name or path of a scene.
+    scene: String,
+    /// Folder for the files; default: `<build-dir>/<scene>/rtl`.
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
+    /// Print which optional features the scene uses, which are left out, and what that saves.
+    #[arg(long)]
+    explain: bool,
+    /// Generate the board top (engine, link and packets) instead of the engine alone.
+    #[arg(long)]
+    board: bool,
+    #[command(flatten)]
+    target: BoardOverride,
+}
+
+/// Runs the command: the list of the files and the resource tables.
+///
+/// # Errors
+/// A scene that cannot be loaded or has no hardware, files that cannot be written.
+pub fn run(arguments: &Arguments, build_dir: &Path) -> Result<String> {
+    let Arguments { scene, out, explain, board, target } = arguments;
+    let scene = target.apply(Scene::load(scene)?);
+    let folder = if *board { "board" } else { "rtl" };
+    let out = out.clone().unwrap_or_else(|| build_dir.join(&scene.name).join(folder));
+    build(&scene, &out, *board, *explain)
+}
+
+/// Writes the generated files, each completely or not at all; returns their list and the resource tables.
+fn build(scene: &Scene, out: &Path, board: bool, with_features: bool) -> Result<String> {
+    // Large matrices take seconds; a design that does not fit takes longer, while other settings are tried.
+    note_estimator(scene);
+    let progress = Progress::start(&format!("{}: model and Verilog", scene.name));
+    let model = Model::new(scene)?;
+    let mut generated = if board { generate_board(&model)? } else { generate(&model)? };
+    let explained = explain(&model)?;
+    generated.add_explained(&explained);
+    drop(progress);
+    std::fs::create_dir_all(out).map_err(|e| anyhow!("{}: {e}", out.display()))?;
+    let mut text = String::new();
+    for file in &generated.files {
+        let path = out.join(&file.name);
+        write(&path, file.text.as_bytes())?;
+        text.push_str(&format!("{} ({} bytes)\n", path.display(), file.text.len()));
+    }
+    text.push_str(&report::resources(&model, &generated.usage));
+    text.push_str(&report::cases(&model, &generated.dropped));
+    if board {
+        text.push_str(&report::wire_times(&model));
+    }
+    if with_features {
+        text.push_str(&report::features(&explained));
+    }
+    Ok(text)
+}

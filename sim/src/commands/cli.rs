@@ -1,0 +1,238 @@
+//! The `dermis` command line: arguments, commands, exit codes.
+//!
+//! | exit code | when |
+//! |---|---|
+//! | 0 | success; every comparison was equal |
+//! | 1 | hardware and model differ, a tool failed on generated files, or an internal check failed |
+//! | 2 | an argument or input is wrong, a file cannot be used, or a needed program is not installed |
+//! | 130 | interrupted by SIGINT or SIGTERM |
+
+use std::io::{ErrorKind, Write};
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+use anyhow::{anyhow, Result};
+use clap::{Parser, Subcommand};
+use dermis_golden::fixed::{FixedError, Model};
+use dermis_golden::matrices::cache;
+use dermis_golden::scene::Scene;
+use dermis_hdl::{manifest, HdlError};
+
+use super::inputs::BoardOverride;
+use crate::cosim::hardware::{DeviceTimeout, Hardware};
+use crate::cosim::verilator::VerilatorError;
+use crate::flow::tools::ToolError;
+use crate::jobs::Interrupted;
+use crate::link::{HostError, PseudoTerminal};
+
+/// Reconstruct a 3-D force per taxel from the normal stress on a tactile array, in generated hardware within 1 ms.
+#[derive(Parser, Debug)]
+#[command(name = "dermis", version, arg_required_else_help = true, after_help = EXAMPLES)]
+struct Arguments {
+    /// Folder for build products and caches.
+    #[arg(long, global = true, value_name = "DIR", default_value = "build")]
+    build_dir: PathBuf,
+    #[command(subcommand)]
+    command: Command,
+}
+
+const EXAMPLES: &str = "Examples:
+  dermis reconstruct sensor-1                        the scene's first shipped frame, golden model
+  dermis reconstruct --frame press.json --json       scene from the sensor in the frame file
+  dermis reconstruct sensor-1 --engine rtl           the same in the generated hardware, under Verilator
+  dermis build eight-by-eight --out rtl              Verilog, memory files, manifest.json
+  dermis bitstream eight-by-eight                    synthesis, place and route for its board
+  dermis host --port /dev/ttyUSB0 press.json         send a frame to a board, print the resultants
+  dermis block fold                                  ports of a stage: width, meaning, validity
+  dermis cosim sensor-1                              all shipped frames, model against hardware
+  dermis table                                       errors of all scenes, next to the paper's
+  dermis noise sensor-1                              errors under noise, next to the Cramér–Rao bound
+  dermis train sensor-1                              a network for search.estimator = \"learned\"
+  dermis report                                      HTML page: recommended cases and formats, error against time
+  dermis generate sensor-3 --random 2 --out two.json  a frame with known forces
+  dermis import walk.asf                             scene and frames of a recording of a real array
+  dermis stability --plot stability.svg              error against the condition number
+  dermis stress                                      gaps, wrong tlast and resets on sensor-1
+  dermis faults                                      1000 bit flips in ROM, RAM and registers of sensor-1";
+
+#[derive(Subcommand, Debug)]
+enum Command {
+    /// Reconstruct the forces of one frame.
+    Reconstruct(super::reconstruct::Arguments),
+    /// Generate the Verilog of a scene.
+    Build(super::build::Arguments),
+    /// Make the bitstream of a scene for its board with open tools.
+    Bitstream(super::bitstream::Arguments),
+    /// Check the files of a generated folder against manifest.json, and manifest.json against its checksum.
+    #[command(after_help = "Example:
+  dermis check build/sensor-1/rtl")]
+    Check {
+        /// Folder written by `dermis build`.
+        folder: PathBuf,
+    },
+    /// Send frames to a board and receive forces.
+    Host(super::host::Arguments),
+    /// Simulate a board on a pseudo-terminal, to run `dermis host` without hardware.
+    #[command(after_help = "Example:
+  dermis board eight-by-eight       prints the port for `dermis host --port`, and runs until interrupted")]
+    Board {
+        /// Built-in name or path of a scene.
+        scene: String,
+        #[command(flatten)]
+        target: BoardOverride,
+    },
+    /// Print the ports of a block, its Verilog, or draw its timing.
+    Block(super::block::Arguments),
+    /// Compare simulated hardware with the bit-true model, stage by stage and cycle by cycle.
+    Cosim(super::cosim::Arguments),
+    /// Measure errors and times of all engines and write an HTML page with tables and pictures.
+    Report(super::report::Arguments),
+    /// Generate a frame with known forces from contact descriptions.
+    Generate(super::generate::Arguments),
+    /// Make a scene and frames from a recording of a real pressure array.
+    Import(super::import::Arguments),
+    /// Measure errors of double, single and fixed point against the condition number, or on extreme frames.
+    Stability(super::stability::Arguments),
+    /// Test the simulated hardware's AXI streams with gaps, back-pressure, wrong tlast and resets.
+    Stress(super::stress::Arguments),
+    /// Flip single bits of the simulated hardware and count harmless, detected, hanging and silent faults.
+    Faults(super::faults::Arguments),
+    /// Print a comparison of the guide: input bits, dead taxels, several contacts, links.
+    Study(super::study::Arguments),
+    /// Write the tables and pictures of README.md and the guide with the commands named there, or report stale ones.
+    Guide(super::guide_pages::Arguments),
+    /// Print the errors of scenes in the paper's cases on their shipped frames, next to the paper's.
+    Table(super::table::Arguments),
+    /// Train a network for search.estimator = "learned" on frames drawn from the scene's own physics.
+    Train(super::train::Arguments),
+    /// Measure the errors under noise, next to the Cramér–Rao bound; any shape, several contacts, wrong scenes.
+    Noise(super::noise::Arguments),
+}
+
+/// Parses the process's arguments and runs the command.
+pub fn main() -> ExitCode {
+    let arguments = Arguments::parse();
+    let outcome = run(&arguments).and_then(|(text, good)| print(&text).map(|()| good));
+    match outcome {
+        Ok(true) => ExitCode::SUCCESS,
+        Ok(false) => ExitCode::from(1),
+        Err(error) => {
+            eprintln!("error: {error}");
+            ExitCode::from(exit_code(&error))
+        }
+    }
+}
+
+/// Checks that the program takes these arguments, without running anything; the first one is the program's name.
+///
+/// # Errors
+/// What the program would print: an unknown command or option, a value or argument that is missing or wrong.
+pub fn check_arguments<'a>(words: impl IntoIterator<Item = &'a str>) -> Result<(), clap::Error> {
+    Arguments::try_parse_from(words).map(drop)
+}
+
+/// The exit code of an error: 1 for internal errors and for tools that fail on generated files, 2 for wrong input,
+/// unusable files and missing programs, 130 for an interruption.
+fn exit_code(error: &anyhow::Error) -> u8 {
+    if error.is::<Interrupted>() {
+        return 130;
+    }
+    let tool = matches!(
+        error.downcast_ref::<VerilatorError>(),
+        Some(VerilatorError::Build { .. } | VerilatorError::Library { .. })
+    );
+    let hardware = error.is::<DeviceTimeout>() || matches!(error.downcast_ref::<HdlError>(), Some(HdlError::Check(_)));
+    let model = matches!(error.downcast_ref::<FixedError>(), Some(FixedError::Internal(_) | FixedError::Beats { .. }));
+    let board = matches!(error.downcast_ref::<HostError>(), Some(HostError::Answer { .. }));
+    let flow = matches!(
+        error.downcast_ref::<ToolError>(),
+        Some(ToolError::Failed { .. } | ToolError::Late { .. } | ToolError::Output { .. })
+    );
+    if tool || hardware || model || board || flow {
+        1
+    } else {
+        2
+    }
+}
+
+/// Runs the command: the text for stdout, and whether every comparison was equal.
+fn run(arguments: &Arguments) -> Result<(String, bool)> {
+    let build_dir = &arguments.build_dir;
+    cache::set_folder(Some(&build_dir.join("matrices")));
+    match &arguments.command {
+        Command::Reconstruct(arguments) => Ok((super::reconstruct::run(arguments, build_dir)?, true)),
+        Command::Build(arguments) => Ok((super::build::run(arguments, build_dir)?, true)),
+        Command::Cosim(arguments) => super::cosim::run(arguments, build_dir),
+        Command::Bitstream(arguments) => super::bitstream::run(arguments, build_dir),
+        Command::Check { folder } => {
+            let files = manifest::check(folder)?;
+            Ok((format!("{}: {files} files match manifest.json\n", folder.display()), true))
+        }
+        Command::Block(arguments) => Ok((super::block::run(arguments, build_dir)?, true)),
+        Command::Host(arguments) => super::host::run(arguments),
+        Command::Board { scene, target } => {
+            let scene = target.apply(Scene::load(scene)?);
+            let terminal = PseudoTerminal::of(&Hardware::new(Model::new(&scene)?, build_dir)?)?;
+            print(&format!("{}\n", terminal.path().display()))?;
+            terminal.wait()?;
+            Ok((String::new(), true))
+        }
+        Command::Report(arguments) => super::report::run(arguments, build_dir),
+        Command::Generate(arguments) => Ok((super::generate::run(arguments)?, true)),
+        Command::Import(arguments) => Ok((super::import::run(arguments, build_dir)?, true)),
+        Command::Stability(arguments) => Ok((super::stability::run(arguments)?, true)),
+        Command::Faults(arguments) => super::faults::run(arguments, build_dir),
+        Command::Stress(arguments) => super::stress::run(arguments, build_dir),
+        Command::Study(arguments) => Ok((super::study::run(arguments)?, true)),
+        Command::Guide(arguments) => super::guide_pages::run(arguments, build_dir),
+        Command::Table(arguments) => super::table::run(arguments, build_dir),
+        Command::Train(arguments) => super::train::run(arguments),
+        Command::Noise(arguments) => Ok((super::noise::run(arguments)?, true)),
+    }
+}
+
+/// Writes to stdout; a closed pipe is not an error.
+fn print(text: &str) -> Result<()> {
+    match std::io::stdout().lock().write_all(text.as_bytes()) {
+        Err(error) if error.kind() != ErrorKind::BrokenPipe => Err(anyhow!("standard output: {error}")),
+        _ => Ok(()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use dermis_golden::board::Board;
+    use dermis_golden::write::FileError;
+
+    #[test]
+    fn internal_errors_exit_with_1_and_input_errors_with_2() {
+        let io = |kind| VerilatorError::File(FileError { path: "build".into(), source: ErrorKind::into(kind) });
+        let stuck = DeviceTimeout { frame: "press".into(), cycle: 7, rule: "no transfer".into() };
+        let answer = HostError::Answer { port: "p".into(), what: "forces", bytes: 7 };
+        let internal: [anyhow::Error; 7] = [
+            VerilatorError::Build { design: "d".into(), folder: "f".into(), log: "l".into() }.into(),
+            VerilatorError::Library { path: "l".into(), reason: "r".into() }.into(),
+            HdlError::Check("loop".into()).into(),
+            FixedError::Internal("limbs").into(),
+            FixedError::Beats { what: "forces", got: 1, expected: 2 }.into(),
+            stuck.into(),
+            answer.into(),
+        ];
+        let version = HostError::Version { port: "p".into(), has: 2, wants: 1 };
+        let input: [anyhow::Error; 7] = [
+            VerilatorError::Missing.into(),
+            VerilatorError::MissingTool { program: "make" }.into(),
+            io(ErrorKind::PermissionDenied).into(),
+            FixedError::Board(Board::load("none").unwrap_err()).into(),
+            FixedError::NoFullScale { field: "threshold.min_force_N", value: "1".into() }.into(),
+            version.into(),
+            anyhow!("rtl: File exists"),
+        ];
+        for (errors, code) in [(internal, 1), (input, 2)] {
+            for error in errors {
+                assert_eq!(exit_code(&error), code, "{error}");
+            }
+        }
+    }
+}

@@ -1,0 +1,82 @@
+//! `dermis cosim`: compares simulated hardware with the bit-true model.
+
+use std::path::Path;
+
+use anyhow::Result;
+use clap::{Args, ValueEnum};
+
+use super::inputs::{resolve, BoardOverride};
+use crate::cosim::hardware::Simulator;
+use crate::cosim::verify::verify;
+use crate::cosim::waves::waves;
+use crate::report::{self, CosimReport};
+
+/// Arguments of `dermis cosim`.
+#[derive(Args, Debug)]
+#[command(after_help = "Examples:
+  dermis cosim sensor-1
+  dermis cosim sensor-1 --frame a.json --frame b.csv --json
+  dermis cosim eight-by-eight --device rust-hdl
+  dermis cosim eight-by-eight --device netlist       the netlist after synthesis (minutes)
+  dermis cosim eight-by-eight --target-board icebreaker     the serial engine, for small devices
+  dermis cosim sensor-1 --device verilator --waves   with a VCD file, prints the GTKWave command")]
+pub struct Arguments {
+    /// Built-in name or path of a scene; optional if the first frame file contains its sensor.
+    scene: Option<String>,
+    /// Frame file (.json, .csv) or `eq2`, repeatable; default: all shipped frames of the scene.
+    #[arg(long = "frame", value_name = "FILE")]
+    frames: Vec<String>,
+    /// Print the report as JSON and nothing else.
+    #[arg(long)]
+    json: bool,
+    /// Simulator of the hardware.
+    #[arg(long, value_enum, default_value = "both")]
+    device: DeviceChoice,
+    /// Write pins and stages of the full-speed run to `<build-dir>/<scene>/waves` as VCD, with a GTKWave signal list.
+    #[arg(long, conflicts_with = "json")]
+    waves: bool,
+    #[command(flatten)]
+    target: BoardOverride,
+}
+
+#[derive(ValueEnum, Clone, Copy, Debug)]
+enum DeviceChoice {
+    /// The generated Verilog, under Verilator.
+    Verilator,
+    /// The same design in rust-hdl's own simulator.
+    RustHdl,
+    /// Verilator, then rust-hdl.
+    Both,
+    /// The netlist synthesised for the board, under Verilator: compares beats and cycles, not stages; takes minutes.
+    Netlist,
+}
+
+impl DeviceChoice {
+    fn simulators(self) -> &'static [Simulator] {
+        match self {
+            DeviceChoice::Verilator => &[Simulator::Verilator],
+            DeviceChoice::RustHdl => &[Simulator::RustHdl],
+            DeviceChoice::Both => &[Simulator::Verilator, Simulator::RustHdl],
+            DeviceChoice::Netlist => &[Simulator::Netlist],
+        }
+    }
+}
+
+/// Runs the command: the report, and whether every comparison was equal.
+///
+/// # Errors
+/// Wrong input, a scene without hardware, no Verilator.
+pub fn run(arguments: &Arguments, build_dir: &Path) -> Result<(String, bool)> {
+    let Arguments { scene, frames, json, device, waves: with_waves, target } = arguments;
+    let (scene, frames) = resolve(scene.as_deref(), frames)?;
+    let scene = target.apply(scene);
+    let verified = verify(&scene, &frames, device.simulators(), build_dir)?;
+    let mut text =
+        if *json { serde_json::to_string(&CosimReport::new(&verified))? + "\n" } else { report::cosim(&verified) };
+    if *with_waves {
+        let folder = build_dir.join(&scene.name).join("waves");
+        let command = waves(&scene, &frames, device.simulators()[0], build_dir, &folder)?;
+        text.push_str(&format!("waveforms: {command}\n"));
+    }
+    Ok((text, verified.findings.is_equal()))
+}

@@ -1,0 +1,110 @@
+//! Scene and frames from the command line's SCENE and `--frame` arguments.
+//!
+//! | SCENE | `--frame` | gives |
+//! |---|---|---|
+//! | given | files, `eq2` | the scene, those frames |
+//! | given | none | the scene, its shipped frames |
+//! | none | files | the built-in scene with the first file's sensor, else the default scene of that sensor |
+//!
+//! One reconstruction takes 2^k frames, where k is the scene's `input.average`.
+
+use anyhow::{bail, Result};
+use clap::Args;
+use dermis_golden::frame::Frame;
+use dermis_golden::scene::Scene;
+
+/// `--frame` value for the stress of the paper's Eq. 2.
+pub const EQ2: &str = "eq2";
+
+/// The option `--target-board`, which replaces a scene's board.
+#[derive(Args, Clone, Debug, Default)]
+pub struct BoardOverride {
+    /// Board to use instead of the scene's: the name of a file in constraints.
+    #[arg(long, value_name = "NAME")]
+    target_board: Option<String>,
+}
+
+impl BoardOverride {
+    /// The scene with that board; unchanged where the option is absent.
+    pub fn apply(&self, mut scene: Scene) -> Scene {
+        scene.hardware.board = self.target_board.clone().unwrap_or(scene.hardware.board);
+        scene
+    }
+}
+
+/// One line on standard error where the hardware takes another estimator than the scene.
+pub(super) fn note_estimator(scene: &Scene) {
+    let (golden, hardware) = (scene.estimator(), scene.for_hardware().estimator());
+    if golden != hardware {
+        let (golden, hardware) = (golden.name(), hardware.name());
+        eprintln!("{}: the hardware has no estimator {golden} and takes {hardware} with sparse", scene.name);
+    }
+}
+
+/// Loads the scene and its frames, at least one.
+///
+/// # Errors
+/// Unknown scene, unreadable frame, a frame of another sensor, neither scene nor sensor given, no frames.
+pub fn resolve(scene: Option<&str>, frames: &[String]) -> Result<(Scene, Vec<Frame>)> {
+    let scene = match (scene, frames.first().map(String::as_str)) {
+        (Some(scene), _) => Scene::load(scene)?,
+        (None, Some(first)) if first != EQ2 => scene_of_frame(first)?,
+        (None, Some(_)) => bail!("--frame {EQ2} defines no sensor: name a scene"),
+        (None, None) => bail!(
+            "name a scene ({}, or a file), or a frame file that contains its sensor",
+            Scene::builtin_names().join(", ")
+        ),
+    };
+    let frames = if frames.is_empty() {
+        let shipped = Frame::shipped(&scene);
+        if shipped.is_empty() {
+            bail!("scene {}: no frame is shipped for {}: give one with --frame", scene.name, scene.sensor);
+        }
+        shipped
+    } else {
+        frames.iter().map(|path| load(path, &scene)).collect::<Result<_>>()?
+    };
+    Ok((scene, frames))
+}
+
+/// Loads the scene and the 2^k frames of one reconstruction; without `--frame` and averaging, the first shipped frame.
+///
+/// # Errors
+/// As [`resolve`]; a number of frames other than 2^k.
+pub fn resolve_one(scene: Option<&str>, files: &[String]) -> Result<(Scene, Vec<Frame>)> {
+    let named = scene;
+    let (scene, mut frames) = resolve(named, files)?;
+    let average = scene.input.average;
+    let wanted = 1usize << average;
+    if files.is_empty() && wanted == 1 {
+        frames.truncate(1);
+    } else if files.len() != wanted {
+        let (origin, got) = (named.unwrap_or(&scene.name), files.len());
+        bail!(
+            "{origin}: input.average = {average}: the number of --frame options must be 2^{average} = {wanted}, \
+               got {got}"
+        );
+    }
+    Ok((scene, frames))
+}
+
+fn load(path: &str, scene: &Scene) -> Result<Frame> {
+    if path == EQ2 {
+        return Ok(Frame::eq2(&scene.sensor));
+    }
+    let frame = Frame::load(path, Some(scene))?;
+    frame.check(scene)?;
+    Ok(frame)
+}
+
+/// The built-in scene with the sensor in a frame file, else the default scene of that sensor.
+fn scene_of_frame(path: &str) -> Result<Scene> {
+    let sensor = Frame::load(path, None)?.sensor;
+    for name in Scene::builtin_names() {
+        let scene = Scene::builtin(name)?;
+        if scene.sensor == sensor {
+            return Ok(scene);
+        }
+    }
+    Ok(Scene::of_sensor(&sensor, "frame"))
+}

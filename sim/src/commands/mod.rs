@@ -1,0 +1,45 @@
+//! The `dermis` command line: arguments, commands, exit codes. Each command reads its inputs, calls what does the work
+//! and prints the result.
+//!
+//! | module | does |
+//! |---|---|
+//! | [`bitstream`] | `dermis bitstream`: synthesis, place and route, compared with committed baselines |
+//! | [`block`] | `dermis block`: ports, Verilog and drawn timing of the blocks |
+//! | [`build`] | `dermis build`: generates the Verilog of a scene |
+//! | [`cosim`] | `dermis cosim`: compares simulated hardware with the bit-true model |
+//! | [`mod@faults`] | `dermis faults`: flips single bits and counts the outcomes |
+//! | [`mod@generate`] | `dermis generate`: frames with known forces from described contacts |
+//! | [`guide_pages`] | `dermis guide`: tables and pictures of README and guide, made by the commands named there |
+//! | [`host`] | `dermis host`: sends frames to a board over a serial port and reads back forces |
+//! | [`mod@import`] | `dermis import`: recordings of real arrays as scene and frames |
+//! | [`inputs`] | scene and frames from command-line arguments |
+//! | [`mod@noise`] | `dermis noise`: errors under noise beside the Cramér–Rao bound |
+//! | [`reconstruct`] | `dermis reconstruct`: the forces of one frame, by a model or the hardware |
+//! | [`mod@report`] | `dermis report`: measures, assembles the sections, writes the files |
+//! | [`stability`] | `dermis stability`: errors against condition number, extreme frames |
+//! | [`mod@stress`] | `dermis stress`: both streams under gaps, wrong `tlast` and resets |
+//! | [`mod@study`] | `dermis study`: comparisons shown in the guide |
+//! | [`table`] | `dermis table`: errors of scenes in the paper's cases |
+//! | [`train`] | `dermis train`: a network for the learned estimator |
+
+pub mod bitstream;
+pub mod block;
+pub mod build;
+mod cli;
+pub mod cosim;
+pub mod faults;
+pub mod generate;
+pub mod guide_pages;
+pub mod host;
+pub mod import;
+pub mod inputs;
+pub mod noise;
+pub mod reconstruct;
+pub mod report;
+pub mod stability;
+pub mod stress;
+pub mod study;
+pub mod table;
+pub mod train;
+
+pub use cli::{check_arguments, main};

@@ -1,0 +1,85 @@
+//! `dermis table`: errors of scenes in the paper's cases, or a co-simulation with one line per scene.
+
+use std::path::Path;
+
+use anyhow::Result;
+use clap::Args;
+use dermis_golden::partition::Case;
+use dermis_golden::scene::Scene;
+
+use super::inputs::resolve;
+use crate::cosim::hardware::Simulator;
+use crate::cosim::verify::{verify, Verified};
+use crate::drawn_frames::DrawnFrames;
+use crate::progress::Progress;
+use crate::report::tabulate::tabulate;
+use crate::report::{self, Format};
+
+/// Arguments of `dermis table`.
+#[derive(Args, Debug)]
+#[command(after_help = "Examples:
+  dermis table                                       every built-in scene, cases 0 to 3
+  dermis table sensor-1 --case 0 --format csv
+  dermis table sensor-3 --case adaptive --case contacts --case 4x2
+  dermis table sensor-3 --case contacts --fresh 40 --contacts 2 --contacts 3 --shapes other
+  dermis table sensor-1 eight-by-eight --cosim       co-simulate, one line per scene")]
+pub struct Arguments {
+    /// Built-in names or paths of scenes; default: all built-in ones.
+    #[arg(required_if_eq("cosim", "true"))]
+    scenes: Vec<String>,
+    /// Case, repeatable: 0 to 3, ROWSxCOLS, adaptive, contacts; default: 0 to 3.
+    #[arg(long = "case", value_name = "CASE")]
+    cases: Vec<Case>,
+    #[command(flatten)]
+    drawn: DrawnFrames,
+    /// Output format.
+    #[arg(long, value_enum, default_value = "markdown", conflicts_with = "cosim")]
+    format: Format,
+    /// Co-simulate the hardware and print one line per scene instead of the errors.
+    #[arg(long, conflicts_with_all = ["cases", "frames"])]
+    cosim: bool,
+}
+
+/// Runs the command: the table, and whether every comparison was equal.
+///
+/// # Errors
+/// A scene that cannot be loaded or is refused; for the co-simulation no Verilator.
+pub fn run(arguments: &Arguments, build_dir: &Path) -> Result<(String, bool)> {
+    let Arguments { scenes, cases, drawn, format, cosim } = arguments;
+    if !cosim {
+        return Ok((table(scenes, cases, drawn, *format)?, true));
+    }
+    let verify = |name: &String| -> Result<Verified> {
+        let (scene, frames) = resolve(Some(name), &[])?;
+        verify(&scene, &frames, &[Simulator::Verilator, Simulator::RustHdl], build_dir)
+    };
+    let all = scenes.iter().map(verify).collect::<Result<Vec<_>>>()?;
+    let equal = all.iter().all(|v| v.findings.is_equal());
+    Ok((report::scenes(&all), equal))
+}
+
+/// The error table of the named scenes, or of all built-in ones.
+fn table(scenes: &[String], cases: &[Case], drawn: &DrawnFrames, format: Format) -> Result<String> {
+    let builtin = || Scene::builtin_names().into_iter().map(str::to_owned).collect();
+    let scenes: Vec<String> = if scenes.is_empty() { builtin() } else { scenes.to_vec() };
+    let numbered: Vec<Case> = (0..4).filter_map(Case::numbered).collect();
+    let cases = if cases.is_empty() { &numbered } else { cases };
+    let mut rows = Vec::new();
+    for name in &scenes {
+        let (scene, frames) = if drawn.frames > 0 {
+            let scene = Scene::load(name)?;
+            let frames = drawn.draw(&scene)?;
+            (scene, frames)
+        } else {
+            resolve(Some(name), &[])?
+        };
+        let bar = Progress::steps(&format!("{}: errors", scene.name), (cases.len() * frames.len()) as u64);
+        let mut done = 0;
+        let mut step = || {
+            done += 1;
+            bar.set(done);
+        };
+        rows.extend(tabulate(&scene, cases, &frames, &mut step)?);
+    }
+    report::errors(&rows, format)
+}

@@ -1,0 +1,243 @@
+//! Compares the recording of a device with the bit-true model, stage by stage and beat by beat, without tolerance.
+//!
+//! Compared are every tap's words, every force beat, every status beat and the handshake in every cycle; at full speed
+//! also the two cycle counts and the cycle of every output beat: beat k leaves `first_output + k·interval` cycles after
+//! the last input beat. Mismatches are listed in hardware order, the first differing stage first.
+//!
+//! | in | out |
+//! |---|---|
+//! | [`Vector`]s: codes and the model's [`Trace`] | [`Findings`]: the first [`Mismatch`]es of each frame and their total number |
+//! | a [`Device`] with its tap names | [`Times`] of every frame |
+
+use dermis_golden::fixed::{Cycles, Trace};
+use dermis_hdl::device::Device;
+
+use super::drive::{record, Beat, InputFrame, Recording, Stimulus, Times};
+use super::findings::{Findings, Mismatch, KEPT_PER_FRAME};
+
+/// Shortest watchdog, in cycles without a transfer.
+const WATCHDOG_MIN: u64 = 10_000;
+
+/// Test vector: the codes of one reconstruction and the bit-true model's results.
+#[derive(Clone, Debug)]
+pub struct Vector {
+    /// Frame name for messages.
+    pub frame: String,
+    /// Columns of the array, from which messages compute a taxel's row and column.
+    pub cols: usize,
+    /// Codes of all frames in order, each row-major.
+    pub codes: Vec<i32>,
+    /// Taxels per frame.
+    pub taxels: usize,
+    /// The model's stages, beats, status and cycle counts.
+    pub expected: Trace,
+}
+
+impl Vector {
+    /// The vector without the model's stages, for a device without taps: only beats and cycles are compared.
+    pub fn without_stages(&self) -> Vector {
+        let mut vector = self.clone();
+        vector.expected.stages.clear();
+        vector
+    }
+}
+
+/// A device with its name and its taps.
+pub struct DeviceUnderTest<'a> {
+    /// Name in messages: `verilator`, `rust-hdl`.
+    pub name: &'a str,
+    /// The device.
+    pub device: &'a mut dyn Device,
+    /// Stage name of every tap, in the order of [`dermis_hdl::device::Outputs::taps`].
+    pub taps: &'a [&'static str],
+}
+
+/// Sends the vectors through a device and compares; returns the findings and the times of each vector.
+pub fn run(dut: DeviceUnderTest, vectors: &[Vector], stimulus: Stimulus) -> (Findings, Vec<Times>) {
+    let inputs: Vec<InputFrame> = vectors
+        .iter()
+        .map(|v| InputFrame {
+            codes: &v.codes,
+            taxels: v.taxels,
+            beats: v.expected.beats.len() + v.expected.status.len(),
+        })
+        .collect();
+    let longest = vectors.iter().map(|v| v.expected.cycles.total).max().unwrap_or(0);
+    let watchdog = WATCHDOG_MIN.max(4 * longest);
+    let recording = record(dut.device, dut.taps.len(), &inputs, stimulus, watchdog);
+    let exact = stimulus == Stimulus::FullSpeed;
+    let label = format!("{}, {stimulus}", dut.name);
+    (compare_recording(&label, dut.taps, vectors, &recording, exact), recording.times)
+}
+
+/// Compares a recording with the model; with `exact` also the cycle counts and the cycle of every output beat. `run`
+/// names the run in messages.
+pub fn compare_recording(
+    run: &str,
+    taps: &[&'static str],
+    vectors: &[Vector],
+    recording: &Recording,
+    exact: bool,
+) -> Findings {
+    let mut findings = Findings::default();
+    let mut beats = recording.beats.iter();
+    let mut streams: Vec<_> = recording.taps.iter().map(|words| words.iter()).collect();
+    let mut beats_before = 0;
+    for (number, vector) in vectors.iter().enumerate() {
+        let mut comparison = FrameComparison { run, vector, number, findings: Findings::default() };
+        let beats_after = beats_before + vector.expected.beats.len() + vector.expected.status.len();
+        let last = number + 1 == vectors.len();
+        let here = |beat: usize| beat >= beats_before && (beat < beats_after || last);
+        // First in the list: a watchdog timeout explains all missing words after it.
+        for timeout in recording.timeout.iter().filter(|t| here(t.beat)) {
+            comparison.add_violation(
+                "watchdog",
+                timeout.beat - beats_before,
+                Some(timeout.cycle),
+                timeout.rule.clone(),
+            );
+        }
+        comparison.compare_stage_names(taps);
+        for stage in &vector.expected.stages {
+            let Some(tap) = taps.iter().position(|name| *name == stage.name) else {
+                continue;
+            };
+            for (index, expected) in stage.words.iter().enumerate() {
+                let got = streams[tap].next().map(|w| (w.cycle, w.fields.clone()));
+                comparison.compare_word(stage.name, index, Some(expected.clone()), got);
+            }
+        }
+        for (stage, words) in [("forces", &vector.expected.beats), ("status", &vector.expected.status)] {
+            for (index, expected) in words.iter().enumerate() {
+                let got = beats.next().map(|b| (b.cycle, b.data.map(i64::from).to_vec()));
+                comparison.compare_word(stage, index, Some(expected.map(i64::from).to_vec()), got);
+            }
+        }
+        if last {
+            // Words beyond all expected ones are reported with the last frame.
+            for (stream, name) in streams.iter_mut().zip(taps) {
+                for (extra, word) in stream.enumerate() {
+                    comparison.compare_word(name, extra, None, Some((word.cycle, word.fields.clone())));
+                }
+            }
+        }
+        for violation in recording.violations.iter().filter(|v| here(v.beat)) {
+            comparison.add_violation(
+                "handshake",
+                violation.beat - beats_before,
+                Some(violation.cycle),
+                violation.rule.clone(),
+            );
+        }
+        if exact {
+            let times = &recording.times[number];
+            comparison.compare_cycle_counts(vector.expected.cycles, times);
+            let end = beats_after.min(recording.beats.len());
+            comparison.compare_beat_cycles(vector.expected.cycles, times, &recording.beats[beats_before.min(end)..end]);
+        }
+        beats_before = beats_after;
+        findings.extend(comparison.findings);
+    }
+    findings
+}
+
+/// Comparison of one frame, with its findings so far.
+struct FrameComparison<'a> {
+    run: &'a str,
+    vector: &'a Vector,
+    /// Index of the frame.
+    number: usize,
+    findings: Findings,
+}
+
+impl FrameComparison<'_> {
+    fn add_mismatch(&mut self, make: impl FnOnce(String, String) -> Mismatch) {
+        self.findings.count += 1;
+        self.findings.unequal.insert(self.number);
+        if self.findings.kept.len() < KEPT_PER_FRAME {
+            self.findings.kept.push(make(self.run.to_owned(), self.vector.frame.clone()));
+        }
+    }
+
+    /// Compares one word; at most one of the two is missing.
+    fn compare_word(&mut self, stage: &str, index: usize, expected: Option<Vec<i64>>, got: Option<(u64, Vec<i64>)>) {
+        let (cycle, got) = got.unzip();
+        if expected == got {
+            return;
+        }
+        // Only in these streams is the word's index a taxel; other stages may have as many words by coincidence.
+        let forces = stage == "forces" && self.vector.expected.beats.len() == self.vector.taxels;
+        let per_taxel = (stage == "receive" || forces) && expected.is_some();
+        let cols = self.vector.cols;
+        let taxel = per_taxel.then(|| [index / cols, index % cols]);
+        self.add_mismatch(|run, frame| Mismatch {
+            run,
+            frame,
+            stage: stage.into(),
+            index,
+            taxel,
+            cycle,
+            expected,
+            got,
+            rule: None,
+        });
+    }
+
+    fn add_violation(&mut self, stage: &str, index: usize, cycle: Option<u64>, rule: String) {
+        self.add_mismatch(|run, frame| Mismatch {
+            run,
+            frame,
+            stage: stage.into(),
+            index,
+            taxel: None,
+            cycle,
+            expected: None,
+            got: None,
+            rule: Some(rule),
+        });
+    }
+
+    /// Checks that the device's taps and the model's stages have the same names.
+    fn compare_stage_names(&mut self, taps: &[&'static str]) {
+        let stages: Vec<&str> = self.vector.expected.stages.iter().map(|s| s.name).collect();
+        for name in taps.iter().filter(|t| !stages.contains(t)) {
+            self.add_violation(name, 0, None, "the hardware has a tap for which the model has no stage".into());
+        }
+        for name in stages.iter().filter(|s| !taps.contains(s)) {
+            self.add_violation(name, 0, None, "the model has a stage for which the hardware has no tap".into());
+        }
+    }
+
+    /// Checks the cycle of every output beat: beat k is due at last input + `first_output` + k·`interval`.
+    fn compare_beat_cycles(&mut self, expected: Cycles, times: &Times, beats: &[Beat]) {
+        let Some(last_in) = times.last_in else {
+            return;
+        };
+        for (index, beat) in beats.iter().enumerate() {
+            let due = last_in + expected.first_output + index as u64 * expected.interval;
+            if beat.cycle != due {
+                self.add_violation(
+                    "cycles",
+                    index,
+                    Some(beat.cycle),
+                    format!("output beat {index} was due in cycle {due}"),
+                );
+            }
+        }
+    }
+
+    fn compare_cycle_counts(&mut self, expected: Cycles, times: &Times) {
+        let pairs = [("latency", expected.latency, times.latency()), ("total", expected.total, times.total())];
+        for (index, (name, due, got)) in pairs.into_iter().enumerate() {
+            if got != Some(due) {
+                let got = got.map_or("no end".to_owned(), |g| g.to_string());
+                self.add_violation(
+                    "cycles",
+                    index,
+                    times.last_out,
+                    format!("{name}: expected {due} cycles, got {got}"),
+                );
+            }
+        }
+    }
+}

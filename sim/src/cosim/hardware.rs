@@ -1,0 +1,189 @@
+//! The generated hardware of one scene, and its simulations.
+//!
+//! | in | out |
+//! |---|---|
+//! | bit-true [`Model`] | Verilog, taps and manifest ([`Generated`]) |
+//! | [`Simulator`] | a [`Device`] |
+
+use std::borrow::Cow;
+use std::path::{Path, PathBuf};
+
+use anyhow::Result;
+use dermis_golden::fixed::Model;
+use dermis_golden::frame::Frame;
+use dermis_golden::reconstruct::Reconstruction;
+use dermis_hdl::device::{Device, Tap};
+use dermis_hdl::link::{board_simulator, generate_board, BoardDevice};
+use dermis_hdl::{generate, simulator, Generated};
+use thiserror::Error;
+
+use super::against_model::Vector;
+use super::board::VerilatedBoard;
+use super::drive::{record, InputFrame, Stimulus};
+use super::verilator::{Design, Verilated, VerilatorError};
+use crate::flow::netlist::netlist;
+
+/// Cycles without a transfer after which a reconstruction is aborted; far above any scene's latency.
+const WATCHDOG: u64 = 1_000_000;
+
+/// The simulated hardware stopped transferring beats: a defect of this program.
+#[derive(Clone, Debug, PartialEq, Eq, Error)]
+#[error("frame {frame}, cycle {cycle}: {rule}")]
+pub struct DeviceTimeout {
+    /// Frame name.
+    pub frame: String,
+    /// Cycle in which the watchdog ended the run.
+    pub cycle: u64,
+    /// The transfer that was awaited, as text.
+    pub rule: String,
+}
+
+/// Simulator of the hardware.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Simulator {
+    /// The generated Verilog, under Verilator.
+    Verilator,
+    /// The same design in rust-hdl's own simulator.
+    RustHdl,
+    /// The netlist synthesised for the scene's board, under Verilator.
+    Netlist,
+}
+
+impl Simulator {
+    /// Name in messages.
+    pub fn name(self) -> &'static str {
+        match self {
+            Simulator::Verilator => "verilator",
+            Simulator::RustHdl => "rust-hdl",
+            Simulator::Netlist => "netlist",
+        }
+    }
+}
+
+/// A scene's model and the hardware generated from it.
+pub struct Hardware {
+    /// The bit-true model.
+    pub model: Model,
+    /// Verilog, memory files, taps, manifest.
+    pub generated: Generated,
+    /// Cache folder of Verilator libraries and netlists.
+    cache: PathBuf,
+}
+
+impl Hardware {
+    /// Generates the hardware of `model`; caches lie in the folder `build`.
+    ///
+    /// # Errors
+    /// A design that the generator refuses.
+    pub fn new(model: Model, build: &Path) -> Result<Self> {
+        let generated = generate(&model)?;
+        Ok(Hardware { model, generated, cache: build.join("verilator") })
+    }
+
+    /// Starts a simulation.
+    ///
+    /// # Errors
+    /// No Verilator, a design that a simulator refuses, or files that cannot be written.
+    pub fn device(&self, simulator: Simulator) -> Result<Box<dyn Device>> {
+        Ok(match simulator {
+            Simulator::Verilator => Box::new(self.verilated(&self.generated, false)?),
+            Simulator::RustHdl => self::simulator(&self.model)?,
+            Simulator::Netlist => {
+                let netlist = netlist(&self.generated, self.model.board.family, &self.cache)?;
+                Box::new(self.verilated(&netlist, false)?)
+            }
+        })
+    }
+
+    /// Starts a Verilator simulation in which every bit of a register or memory can be flipped.
+    ///
+    /// # Errors
+    /// As [`Hardware::device`].
+    pub fn device_with_writable_state(&self) -> Result<Verilated, VerilatorError> {
+        self.verilated(&self.generated, true)
+    }
+
+    fn verilated(&self, generated: &Generated, writable_state: bool) -> Result<Verilated, VerilatorError> {
+        let files = generated.files.iter().map(|f| (f.name.as_str(), f.text.as_str()));
+        let design = Design {
+            top: &generated.top,
+            files: files.collect(),
+            taps: &generated.taps,
+            input_bits: self.model.formats().code_bits,
+            writable_state,
+        };
+        Verilated::new(&design, &self.cache)
+    }
+
+    /// Starts a simulation of the whole board; [`Simulator::Netlist`] simulates its Verilog.
+    ///
+    /// # Errors
+    /// As [`Hardware::device`]; a scene whose board has no link.
+    pub fn board(&self, simulator: Simulator) -> Result<Box<dyn BoardDevice>> {
+        Ok(match simulator {
+            Simulator::RustHdl => board_simulator(&self.model)?,
+            _ => {
+                let link = self.model.scene.hardware.link;
+                Box::new(VerilatedBoard::new(&generate_board(&self.model)?, link, &self.cache)?)
+            }
+        })
+    }
+
+    /// The taps that a simulator has; a netlist has none.
+    pub fn taps(&self, simulator: Simulator) -> &[Tap] {
+        match simulator {
+            Simulator::Netlist => &[],
+            Simulator::Verilator | Simulator::RustHdl => &self.generated.taps,
+        }
+    }
+
+    /// The names of a simulator's taps, and `vectors` reduced to what that simulator can be compared by.
+    pub fn observable<'a>(
+        &self,
+        simulator: Simulator,
+        vectors: &'a [Vector],
+    ) -> (Vec<&'static str>, Cow<'a, [Vector]>) {
+        let taps = self.taps(simulator);
+        let vectors = match taps {
+            [] => vectors.iter().map(Vector::without_stages).collect(),
+            _ => Cow::Borrowed(vectors),
+        };
+        (taps.iter().map(|tap| tap.name).collect(), vectors)
+    }
+
+    /// Stage names of the taps, in the order of a device's outputs.
+    pub fn tap_names(&self) -> Vec<&'static str> {
+        self.generated.taps.iter().map(|tap| tap.name).collect()
+    }
+
+    /// The test vector of one reconstruction: codes of its frames and the bit-true model's results.
+    ///
+    /// # Errors
+    /// A frame of another sensor, or a number of frames that the scene does not average.
+    pub fn vector(&self, frames: &[Frame]) -> Result<Vector> {
+        let codes = self.model.readings(frames)?;
+        let expected = self.model.run(&codes);
+        let sensor = &self.model.scene.sensor;
+        let frame = frames.first().map_or_else(String::new, |frame| frame.id.clone());
+        Ok(Vector { frame, cols: sensor.cols, taxels: sensor.taxels(), codes, expected })
+    }
+
+    /// Reconstructs the mean of the frames in the verilated hardware (engine `rtl`).
+    ///
+    /// # Errors
+    /// As [`Hardware::device`]; [`DeviceTimeout`].
+    pub fn reconstruct(&self, frames: &[Frame]) -> Result<Reconstruction> {
+        let vector = self.vector(frames)?;
+        let forces = vector.expected.beats.len();
+        let inputs =
+            [InputFrame { codes: &vector.codes, taxels: vector.taxels, beats: forces + vector.expected.status.len() }];
+        let mut device = self.device(Simulator::Verilator)?;
+        let recording = record(device.as_mut(), 0, &inputs, Stimulus::FullSpeed, WATCHDOG);
+        if let Some(timeout) = recording.timeout {
+            return Err(DeviceTimeout { frame: vector.frame, cycle: timeout.cycle, rule: timeout.rule }.into());
+        }
+        let beats: Vec<[i32; 3]> = recording.beats.iter().map(|beat| beat.data).collect();
+        let (forces, status) = beats.split_at(forces.min(beats.len()));
+        Ok(self.model.decode(frames, "rtl", forces, status)?)
+    }
+}

@@ -1,0 +1,39 @@
+//! Co-simulation: the generated hardware under its simulators, compared with the bit-true model and disturbed.
+//!
+//! ```text
+//! frame -> codes --+--> bit-true model ------------> Trace ----+
+//!                  |                                           +--> compare_recording -> Findings
+//!                  +--> drive -> Device (Verilator,            |
+//!                                rust-hdl) -> Recording -------+
+//! ```
+//!
+//! | module | does |
+//! |---|---|
+//! | [`mod@bench`] | the Verilog wrapper that packs pins and taps into two vectors |
+//! | [`verilator`] | builds, caches and loads a verilated design as a [`Device`](dermis_hdl::device::Device) |
+//! | [`drive`] | sends frames into a device and records every transfer with its cycle |
+//! | [`run`], [`compare_recording`] | compare a recording with the bit-true model |
+//! | [`hardware`] | a scene's generated hardware and its simulators |
+//! | [`VerilatedBoard`] | a board's top module under Verilator |
+//! | [`verify`] | one scene's frames through all three models |
+//! | [`faults`] | flips single bits and classifies the effect |
+//! | [`stress`] | both streams under gaps, wrong `tlast` and resets |
+//! | [`block_timing`] | the cycles of a frame in which a block's handshakes change |
+//! | [`waves`] | a run as a waveform file |
+
+mod against_model;
+pub mod bench;
+pub mod block_timing;
+mod board;
+pub mod drive;
+pub mod faults;
+mod findings;
+pub mod hardware;
+pub mod stress;
+pub mod verify;
+pub mod verilator;
+pub mod waves;
+
+pub use against_model::{compare_recording, run, DeviceUnderTest, Vector};
+pub use board::VerilatedBoard;
+pub use findings::{Findings, Mismatch, KEPT_PER_FRAME};

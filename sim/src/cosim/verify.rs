@@ -1,0 +1,164 @@
+//! Co-simulation of one scene: every frame through the golden model, the bit-true model and the simulated hardware,
+//! with their differences.
+//!
+//! ```text
+//! frame -> golden ------------------------------> Reconstruction --+
+//!       -> bit-true model --> Trace, Reconstruction ---------------+--> FrameResult
+//!       -> Verilator: full speed, back to back, with stalls --> Findings, Times -+
+//!       -> rust-hdl: full speed ----------------> Findings --------+
+//!       -> netlist, on request: full speed -----> Findings --------+
+//! ```
+
+use std::path::Path;
+
+use anyhow::Result;
+use dermis_golden::board::Board;
+use dermis_golden::fixed::plan::interval::frame_interval;
+use dermis_golden::fixed::Model;
+use dermis_golden::float::Golden;
+use dermis_golden::frame::Frame;
+use dermis_golden::reception::full_scale;
+use dermis_golden::reconstruct::Reconstruction;
+use dermis_golden::scene::Scene;
+
+use super::against_model::{run, DeviceUnderTest, Vector};
+use super::drive::{Stimulus, Times};
+use super::findings::Findings;
+use super::hardware::{Hardware, Simulator};
+use crate::compare::{comparable_forces, difference, Difference};
+use crate::progress::Progress;
+
+/// Seed of the stalls, fixed so that runs are reproducible.
+const SEED: u64 = 1;
+
+/// Result of one frame, or of the mean of several.
+#[derive(Clone, Debug)]
+pub struct FrameResult {
+    /// Frame name.
+    pub frame: String,
+    /// Stress of the largest code, MPa.
+    pub full_scale_MPa: f64,
+    /// The floating-point result.
+    pub golden: Reconstruction,
+    /// The bit-true result; the hardware's as well where `equal` is set.
+    pub fixed: Reconstruction,
+    /// Difference of `fixed` from `golden`.
+    pub difference: Difference,
+    /// Whether every run equalled the bit-true model on this frame.
+    pub equal: bool,
+    /// Cycles at full speed.
+    pub times: Times,
+}
+
+/// Result of one scene.
+#[derive(Clone, Debug)]
+pub struct Verified {
+    /// The scene.
+    pub scene: Scene,
+    /// Its board.
+    pub board: Board,
+    /// Results of the frames, in the given order.
+    pub rows: Vec<FrameResult>,
+    /// Mismatches of all runs.
+    pub findings: Findings,
+    /// Longest distance of two frames' last output beats where frames follow one another without a gap, in cycles;
+    /// `None` without Verilator or with fewer than three frames.
+    pub frame_interval: Option<u64>,
+    /// The same by the model, for frames of which every subarray is searched.
+    pub planned_interval: u64,
+    /// Labels of the runs, for example `verilator, full speed`.
+    pub runs: Vec<String>,
+    /// Whether at least one run simulated the generated Verilog or its netlist.
+    pub verilog: bool,
+}
+
+/// Co-simulates `frames` (at least one) on the given simulators; cycles are those of the first simulator.
+///
+/// # Errors
+/// A scene that cannot be built, a frame of another sensor, no Verilator.
+pub fn verify(scene: &Scene, frames: &[Frame], simulators: &[Simulator], build: &Path) -> Result<Verified> {
+    let board = Board::load(&scene.hardware.board)?;
+    let hardware = Hardware::new(Model::for_frames(scene, frames)?, build)?;
+    // The model's scene has the full scale filled in, so that all models use the same codes.
+    let golden = Golden::new(&hardware.model.scene)?;
+    let vectors =
+        frames.chunks(1 << scene.input.average).map(|frames| hardware.vector(frames)).collect::<Result<Vec<_>>>()?;
+
+    let mut verified = Verified {
+        scene: scene.clone(),
+        board,
+        rows: Vec::new(),
+        findings: Findings::default(),
+        frame_interval: None,
+        planned_interval: frame_interval(&hardware.model, hardware.model.first()),
+        runs: Vec::new(),
+        verilog: simulators.iter().any(|&simulator| simulator != Simulator::RustHdl),
+    };
+    let mut times: Vec<Times> = Vec::new();
+    for &simulator in simulators {
+        let seen = simulate(&hardware, simulator, &vectors, &mut verified)?;
+        if times.is_empty() {
+            times = seen;
+        }
+    }
+    for (index, ((frames, vector), times)) in
+        frames.chunks(1 << scene.input.average).zip(&vectors).zip(times).enumerate()
+    {
+        let frame = &hardware.model.stress(frames)?;
+        let full_scale_MPa = full_scale(&hardware.model.scene, frame);
+        let golden = golden.run_averaged(frames)?;
+        let fixed = hardware.model.decode(frames, "fixed", &vector.expected.beats, &vector.expected.status)?;
+        let lsb_N = hardware.model.force_lsb_N(full_scale_MPa);
+        verified.rows.push(FrameResult {
+            frame: frame.id.clone(),
+            full_scale_MPa,
+            difference: difference(&comparable_forces(&golden), &comparable_forces(&fixed), lsb_N),
+            golden,
+            fixed,
+            equal: !verified.findings.unequal.contains(&index),
+            times,
+        });
+    }
+    Ok(verified)
+}
+
+/// Runs the vectors on one simulator at full speed, and with stalls under Verilator; returns the times at full speed.
+fn simulate(
+    hardware: &Hardware,
+    simulator: Simulator,
+    vectors: &[Vector],
+    verified: &mut Verified,
+) -> Result<Vec<Times>> {
+    let stimuli: &[Stimulus] = match simulator {
+        Simulator::Verilator => &[Stimulus::FullSpeed, Stimulus::BackToBack, Stimulus::Stalls { seed: SEED }],
+        Simulator::RustHdl | Simulator::Netlist => &[Stimulus::FullSpeed],
+    };
+    let mut device = hardware.device(simulator)?;
+    let (taps, vectors) = hardware.observable(simulator, vectors);
+    let mut full_speed = Vec::new();
+    for &stimulus in stimuli {
+        let label = format!("{}, {stimulus}", simulator.name());
+        let _progress = Progress::start(&format!("{}: {label}", verified.scene.name));
+        let dut = DeviceUnderTest { name: simulator.name(), device: device.as_mut(), taps: &taps };
+        let (findings, times) = run(dut, &vectors, stimulus);
+        verified.findings.extend(findings);
+        verified.runs.push(label);
+        match stimulus {
+            Stimulus::FullSpeed => full_speed = times,
+            Stimulus::BackToBack => verified.frame_interval = longest_interval(&times),
+            Stimulus::Stalls { .. } => {}
+        }
+    }
+    Ok(full_speed)
+}
+
+/// The longest distance of two frames' last output beats, from the second frame on: the first finds an idle device.
+fn longest_interval(times: &[Times]) -> Option<u64> {
+    times
+        .iter()
+        .skip(1)
+        .zip(times.iter().skip(2))
+        .map(|(one, next)| Some(next.last_out? - one.last_out?))
+        .max()
+        .flatten()
+}

@@ -1,0 +1,300 @@
+//! A design under Verilator as a [`Device`].
+//!
+//! ```text
+//! Verilog + bench.v + shim.cpp --verilator--> build/verilator/<fingerprint>/libbench.so --> Device
+//! memory files ----------------------------------------- read when the device starts ----^
+//! ```
+//!
+//! The cache key is a fingerprint of all Verilog, waiver and shim texts and of Verilator's version; memory files are
+//! read at start and need no rebuild. Libraries are built in a staging folder and renamed when complete
+//! (`artifact_cache`).
+
+use std::ffi::{c_char, c_void, CString};
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+use std::sync::Mutex;
+
+use dermis_golden::write::{write, FileError};
+use dermis_hdl::device::{Device, Inputs, Outputs, Tap};
+use libloading::Library;
+use thiserror::Error;
+
+use super::bench::{Layout, INSTANCE};
+use crate::artifact_cache::{self, fingerprint};
+use crate::progress::Progress;
+
+/// The product of a built folder.
+const LIBRARY: &str = "libbench.so";
+/// The C++ side, compiled into every library.
+const SHIM: &str = include_str!("../../shim/shim.cpp");
+/// Addition to [`SHIM`] for libraries in which bits can be flipped.
+const FAULTS: &str = include_str!("../../shim/faults.cpp");
+/// File name of Verilator's XML listing of such a design, beside the library.
+const LISTING: &str = "listing.xml";
+/// Seed of the random start values of registers without an initial value; these show a missing reset.
+const RESET_SEED: i32 = 20_240_501;
+/// Lines of a failed tool's output that an error repeats.
+const LOG_LINES: usize = 20;
+
+/// Why a design could not be simulated.
+#[derive(Debug, Error)]
+pub enum VerilatorError {
+    /// Verilator is not installed.
+    #[error("verilator is not installed; on Debian: sudo apt-get install verilator g++ make")]
+    Missing,
+    /// A program that Verilator calls is not installed.
+    #[error("verilator needs {program}, which is not installed; on Debian: sudo apt-get install g++ make")]
+    MissingTool {
+        /// The program.
+        program: &'static str,
+    },
+    /// Verilator or the compiler failed.
+    #[error("verilator refused {design} (folder {folder}):\n{log}")]
+    Build {
+        /// Name of the top module.
+        design: String,
+        /// Folder with the sources.
+        folder: PathBuf,
+        /// First lines of its output.
+        log: String,
+    },
+    /// A file or folder could not be used.
+    #[error(transparent)]
+    File(#[from] FileError),
+    /// The built library cannot be loaded or does not match its bench.
+    #[error("{path}: {reason}")]
+    Library {
+        /// The library.
+        path: PathBuf,
+        /// What is wrong with it.
+        reason: String,
+    },
+}
+
+/// A design to compile.
+#[derive(Clone, Debug)]
+pub struct Design<'a> {
+    /// Name of the top module.
+    pub top: &'a str,
+    /// File names without folder, and their texts: Verilog (`.v`), waivers (`.vlt`), memory files (all others).
+    pub files: Vec<(&'a str, &'a str)>,
+    /// Taps to observe.
+    pub taps: &'a [Tap],
+    /// Width of `s_axis_tdata`, 1..=32.
+    pub input_bits: u32,
+    /// Whether bits of registers and memories can be flipped; the simulation is slower then.
+    pub writable_state: bool,
+}
+
+/// `dermis_flip` of the shim: model, scope, signal, word, bit; returns 0 if there is no such bit.
+type Flip = unsafe extern "C" fn(*mut c_void, *const c_char, *const c_char, u64, u64) -> i32;
+
+/// A running verilated design, with its pins packed into two vectors.
+pub(crate) struct VerilatedBench {
+    handle: *mut c_void,
+    cycle: unsafe extern "C" fn(*mut c_void, u64, *mut u32),
+    free: unsafe extern "C" fn(*mut c_void),
+    flip: Option<Flip>,
+    words: Vec<u32>,
+    path: PathBuf,
+    /// Keeps the code of the function pointers loaded; dropped after `drop` has freed the model.
+    _library: Library,
+}
+
+// SAFETY: nothing else has the handle, and the library keeps no state of a running model outside it.
+unsafe impl Send for VerilatedBench {}
+
+impl VerilatedBench {
+    /// Builds the design with its `bench` (Verilog text), or takes it from `cache`, and starts it. `words` is the
+    /// length of the bench's vector `out` in 32-bit words.
+    pub(crate) fn new(design: &Design, bench: &str, words: usize, cache: &Path) -> Result<Self, VerilatorError> {
+        let path = library(design, bench, cache)?;
+        let fail = |reason: String| VerilatorError::Library { path: path.clone(), reason };
+        // SAFETY: the library was built from this module's shim, whose symbols have these types and
+        // whose constructors have no side effects; the layout is checked before the first cycle.
+        unsafe {
+            let library = Library::new(&path).map_err(|e| fail(e.to_string()))?;
+            let symbol = |e: libloading::Error| fail(e.to_string());
+            let bytes = *library.get::<extern "C" fn() -> u32>(b"dermis_out_bytes").map_err(symbol)?;
+            let start =
+                *library.get::<extern "C" fn(*const c_char, i32) -> *mut c_void>(b"dermis_new").map_err(symbol)?;
+            let cycle = *library.get(b"dermis_cycle").map_err(symbol)?;
+            let free = *library.get(b"dermis_free").map_err(symbol)?;
+            let flip = if design.writable_state { Some(*library.get(b"dermis_flip").map_err(symbol)?) } else { None };
+            if bytes() as usize != 4 * words {
+                return Err(fail(format!("{} output bytes, {} expected", bytes(), 4 * words)));
+            }
+            let memories = memory_folder(design)?;
+            let folder = CString::new(memories.path().to_string_lossy().as_bytes()).map_err(|e| fail(e.to_string()))?;
+            let handle = start(folder.as_ptr(), RESET_SEED);
+            Ok(VerilatedBench {
+                handle,
+                cycle,
+                free,
+                flip,
+                words: vec![0; words],
+                path: path.clone(),
+                _library: library,
+            })
+        }
+    }
+
+    /// One clock cycle: `in` applied, `out` sampled before the rising edge.
+    pub(crate) fn cycle(&mut self, inputs: u64) -> &[u32] {
+        // SAFETY: `handle` lives until drop, `words` has the length checked in `new`.
+        unsafe { (self.cycle)(self.handle, inputs, self.words.as_mut_ptr()) };
+        &self.words
+    }
+}
+
+impl VerilatedBench {
+    /// Flips a bit; false if there is no such bit.
+    fn flip(&mut self, scope: &str, signal: &str, word: usize, bit: usize) -> bool {
+        let names = [scope, signal].map(|name| CString::new(name).ok());
+        let (Some(flip), [Some(scope), Some(signal)]) = (self.flip, &names) else { return false };
+        // SAFETY: `handle` lives until drop; the library checks the names, the word and the bit.
+        unsafe { flip(self.handle, scope.as_ptr(), signal.as_ptr(), word as u64, bit as u64) != 0 }
+    }
+}
+
+impl Drop for VerilatedBench {
+    fn drop(&mut self) {
+        // SAFETY: the only call, with the handle that `dermis_new` returned.
+        unsafe { (self.free)(self.handle) };
+    }
+}
+
+/// A running verilated engine.
+pub struct Verilated {
+    layout: Layout,
+    bench: VerilatedBench,
+}
+
+impl Verilated {
+    /// Builds `design`, or takes it from `cache` (usually `build/verilator`), and starts it.
+    ///
+    /// # Errors
+    /// [`VerilatorError`]: no Verilator, a design it refuses, or files that cannot be written.
+    pub fn new(design: &Design, cache: &Path) -> Result<Self, VerilatorError> {
+        let layout = Layout::new(design.input_bits, design.taps);
+        let bench = VerilatedBench::new(design, &layout.verilog(design.top), layout.out_words(), cache)?;
+        Ok(Verilated { layout, bench })
+    }
+
+    /// Flips a bit of a word of a register or memory before the next cycle; false if there is no such bit or the design
+    /// has no `writable_state`. `scope` is the instance path from the design's top, separated by dots.
+    pub fn flip(&mut self, scope: &str, signal: &str, word: usize, bit: usize) -> bool {
+        // The shim also names its model "bench".
+        let path = format!("bench.{INSTANCE}{}{scope}", if scope.is_empty() { "" } else { "." });
+        self.bench.flip(&path, signal, word, bit)
+    }
+
+    /// Verilator's XML listing of a design with `writable_state`: modules, variables, assignments.
+    ///
+    /// # Errors
+    /// [`VerilatorError::File`]: there is no listing.
+    pub fn listing(&self) -> Result<String, VerilatorError> {
+        let path = self.bench.path.with_file_name(LISTING);
+        Ok(fs::read_to_string(&path).map_err(FileError::at(&path))?)
+    }
+}
+
+impl Device for Verilated {
+    fn cycle(&mut self, inputs: &Inputs) -> Outputs {
+        self.layout.unpack(self.bench.cycle(self.layout.pack(inputs)))
+    }
+}
+
+/// First line of `verilator --version`.
+///
+/// # Errors
+/// [`VerilatorError::Missing`]: Verilator cannot be started.
+pub fn version() -> Result<String, VerilatorError> {
+    let output = Command::new("verilator").arg("--version").output().map_err(|_| VerilatorError::Missing)?;
+    Ok(String::from_utf8_lossy(&output.stdout).lines().next().unwrap_or_default().to_owned())
+}
+
+/// Writes the design's memory files into a temporary folder, from which the shim lets `$readmemh` read them.
+fn memory_folder(design: &Design) -> Result<tempfile::TempDir, VerilatorError> {
+    let folder = tempfile::tempdir().map_err(FileError::at(&std::env::temp_dir()))?;
+    for (name, text) in design.files.iter().filter(|(name, _)| !is_source(name)) {
+        write(&folder.path().join(name), text.as_bytes())?;
+    }
+    Ok(folder)
+}
+
+/// Whether Verilator compiles the file; all others are read at run time.
+fn is_source(name: &str) -> bool {
+    name.ends_with(".v") || name.ends_with(".vlt")
+}
+
+/// Allows one build at a time in a process, so that a second caller for the same design finds it built.
+static BUILDING: Mutex<()> = Mutex::new(());
+
+/// Path of the design's library, built when the cache does not hold it.
+fn library(design: &Design, bench: &str, cache: &Path) -> Result<PathBuf, VerilatorError> {
+    let mut sources: Vec<(&str, &str)> = design.files.iter().filter(|(name, _)| is_source(name)).copied().collect();
+    // Waivers come first: Verilator applies them only to files read afterwards.
+    sources.sort_by_key(|(name, _)| !name.ends_with(".vlt"));
+    let shim = if design.writable_state { [SHIM, FAULTS].concat() } else { SHIM.to_owned() };
+    sources.extend([("bench.v", bench), ("shim.cpp", &shim)]);
+    let folder = cache.join(fingerprint(&sources, &version()?));
+    let ready = folder.join(LIBRARY);
+    let _one = BUILDING.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
+    if !artifact_cache::is_intact(&folder, LIBRARY) {
+        build(design, &sources, &folder)?;
+    }
+    Ok(ready.canonicalize().map_err(FileError::at(&ready))?)
+}
+
+/// Builds the library and publishes it as `folder`.
+fn build(design: &Design, sources: &[(&str, &str)], folder: &Path) -> Result<(), VerilatorError> {
+    let work = artifact_cache::staging_folder(folder)?;
+    for (name, text) in sources {
+        write(&work.path().join(name), text.as_bytes())?;
+    }
+    let _progress = Progress::start(&format!("verilating {}", design.top));
+    let verilate = |arguments: &[&str], sources: &[(&str, &str)]| {
+        Command::new("verilator")
+            .current_dir(work.path())
+            .args(["--top-module", "bench"])
+            .args(arguments)
+            .args(sources.iter().map(|(name, _)| *name))
+            .output()
+            .map_err(|_| VerilatorError::Missing)
+    };
+    let product = format!("../{LIBRARY}");
+    let mut library = [
+        &["--cc", "--exe", "--build", "-j", "2", "--prefix", "Vbench", "--x-initial", "unique", "--x-assign"][..],
+        &["unique", "-O3", "-CFLAGS", "-fPIC -O1", "-LDFLAGS", "-shared -Wl,--wrap=fopen", "-o", &product],
+    ]
+    .concat();
+    let mut output = None;
+    if design.writable_state {
+        library.push("--public-flat-rw");
+        output = Some(verilate(&["--xml-only", "--xml-output", LISTING], &sources[..sources.len() - 1])?);
+    }
+    let output = match output {
+        Some(listed) if !listed.status.success() => listed,
+        _ => verilate(&library, sources)?,
+    };
+    if !output.status.success() {
+        if let Some(program) = ["make", "g++"].into_iter().find(|program| !is_installed(program)) {
+            return Err(VerilatorError::MissingTool { program });
+        }
+        let text = [output.stderr, output.stdout].concat();
+        let text = String::from_utf8_lossy(&text);
+        let log: Vec<&str> = text.lines().take(LOG_LINES).collect();
+        // Kept, so that the user can inspect the folder named in the error.
+        return Err(VerilatorError::Build { design: design.top.into(), folder: work.keep(), log: log.join("\n") });
+    }
+    // Deletes the object files, which are ten times as large as library and sources.
+    let objects = work.path().join("obj_dir");
+    fs::remove_dir_all(&objects).map_err(FileError::at(&objects))?;
+    Ok(artifact_cache::publish(work, folder, LIBRARY)?)
+}
+
+fn is_installed(program: &str) -> bool {
+    Command::new(program).arg("--version").output().is_ok()
+}

@@ -1,0 +1,221 @@
+//! Makes a bitstream.
+
+use std::path::{Path, PathBuf};
+
+use anyhow::{anyhow, Result};
+use dermis_golden::board::Board;
+use dermis_golden::fixed::Model;
+use dermis_golden::scene::Scene;
+use dermis_golden::write::write;
+use dermis_hdl::link::generate_board;
+
+use super::baseline::{Baseline, Baselines, FILE};
+use super::family::{flow, pack_arguments, place_arguments, Flow, YOSYS};
+use super::floor_plan;
+use super::register_packing::PackedRegisters;
+use super::synthesis::{self, NETLIST};
+use super::timing::{Fmax, Placed};
+use super::tools::ToolError;
+use crate::compare::median;
+use crate::jobs::{parallel, Interrupt};
+use crate::progress::Progress;
+
+/// Name of the outermost module, in `constraints/<board>.v`, which instantiates the board top.
+const TOP: &str = "board";
+
+/// A scene placed and routed for its board.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Made {
+    /// Cells of the best seed and clocks of all seeds.
+    pub achieved: Baseline,
+    /// Registers that were moved into multipliers.
+    pub packed: PackedRegisters,
+    /// The link's own clock with its pin, if the link has one.
+    pub link_clock: Option<(&'static str, Fmax)>,
+    /// Path of the bitstream; none if a clock is missed.
+    pub bitstream: Option<PathBuf>,
+    /// Missed clocks and regressions against the baseline.
+    pub failures: Vec<String>,
+}
+
+/// How to place and route.
+#[derive(Clone, Copy, Debug)]
+pub struct Effort {
+    /// Number of seeds; `None`: from the board's file.
+    pub seeds: Option<u32>,
+    /// Number of seeds in parallel.
+    pub jobs: u32,
+    /// If the clock is met, write the results into the baselines instead of comparing with them.
+    pub update_baselines: bool,
+}
+
+/// Makes the bitstream of `model` in the folder `<build_dir>/<scene>/<board>`.
+///
+/// # Errors
+/// [`ToolError`]: a tool is missing or failed; no seed that could be routed, a clock that differs from the board's file.
+pub fn make(model: &Model, build_dir: &Path, effort: Effort) -> Result<Made> {
+    let (scene, board) = (&model.scene, &model.board);
+    let flow = flow(board.family);
+    for tool in [YOSYS, flow.place, flow.pack] {
+        tool.version()?;
+    }
+    let folder = build_dir.join(&scene.name).join(&board.name);
+    let packed = synthesise(model, &folder)?;
+    let seeds = effort.seeds.unwrap_or(board.seeds);
+    let placed = place(model, &flow, &folder, seeds, effort.jobs)?;
+    let better =
+        |a: &Placed, b: &Placed| a.is_met().cmp(&b.is_met()).then(a.engine.achieved.total_cmp(&b.engine.achieved));
+    let (best_seed, best) = placed.iter().max_by(|(_, a), (_, b)| better(a, b)).ok_or_else(|| {
+        anyhow!("{}: none of {seeds} seeds could be placed and routed; logs in {}", scene.name, folder.display())
+    })?;
+    check_constraints(board, best)?;
+    let product = format!("{}.{}", scene.name, flow.bitstream);
+    let achieved = summarise_seeds(&flow, &placed, best);
+    let of = |(name, clock): (&str, Fmax)| format!("{name} {:.1} MHz of {} MHz", clock.achieved, clock.constraint);
+    let mut failures: Vec<String> = best.clocks().filter(|(_, clock)| !clock.is_met()).map(of).collect();
+    let met = failures.is_empty();
+    if met {
+        let arguments = pack_arguments(board.family, &format!("{}.config", seed_prefix(*best_seed)), &product);
+        flow.pack.run(&folder, &arguments, "pack.log", synthesis::MINUTES)?;
+    }
+    failures.extend(compare_or_update_baselines(effort.update_baselines && met, board, scene, &achieved)?);
+    Ok(Made { achieved, packed, link_clock: best.link, bitstream: met.then(|| folder.join(product)), failures })
+}
+
+/// Checks that the clock constraints seen by place and route are those of the board's file.
+fn check_constraints(board: &Board, placed: &Placed) -> Result<()> {
+    let differs = |has: f64, wants: f64| (has / wants - 1.0).abs() > 1e-3;
+    let (file, has, wants) = (&board.name, placed.engine.constraint, board.clock_MHz);
+    if differs(has, wants) {
+        return Err(anyhow!("constraints/{file}.v: its PLL gives {has} MHz, {file}.toml says clock_MHz = {wants}"));
+    }
+    if let (Some((pin, clock)), Some(wants)) = (placed.link, board.spi_MHz) {
+        let (pins, has) = (board.family.pin_file_extension(), clock.constraint);
+        if differs(has, wants) {
+            let pins = format!("constraints/{file}.{pins}: {pin} is constrained to {has} MHz");
+            return Err(anyhow!("{pins}, {file}.toml says spi_MHz = {wants}"));
+        }
+    }
+    Ok(())
+}
+
+/// Synthesises the board's Verilog to the netlist for place and route.
+fn synthesise(model: &Model, folder: &Path) -> Result<PackedRegisters> {
+    let _progress = Progress::start(&format!("{}: synthesis", model.scene.name));
+    let generated = generate_board(model)?;
+    let board_files = model.board.files()?;
+    std::fs::create_dir_all(folder).map_err(ToolError::io(folder))?;
+    let own = generated.files.iter().map(|file| (&file.name, file.text.as_str()));
+    for (name, text) in own.chain(board_files.iter().map(|(name, text)| (name, *text))) {
+        let path = folder.join(name);
+        write(&path, text.as_bytes())?;
+    }
+    let link = model.scene.hardware.link.name().to_uppercase();
+    let (top, board) = (&generated.top, &model.board.name);
+    let read = format!("-D DERMIS_TOP={top} -D DERMIS_{link} {board}.v {top}.v");
+    let packed = synthesis::synthesise(folder, model.board.family, &read, TOP)?;
+    if let Some(blocks) = &model.board.multiplier_blocks {
+        synthesis::edit(folder, |netlist| floor_plan::assign_sites(netlist, TOP, blocks))?;
+    }
+    Ok(packed)
+}
+
+/// Places and routes with seeds 1 … `seeds`, `jobs` at a time; returns the seeds that completed.
+fn place(model: &Model, flow: &Flow, folder: &Path, seeds: u32, jobs: u32) -> Result<Vec<(u32, Placed)>> {
+    let what = format!("{}: place and route", model.board.name);
+    let place = |seed| match place_seed(model, flow, folder, seed) {
+        // A seed that does not converge is skipped as long as there are others.
+        Err(ToolError::Late { .. } | ToolError::Failed { .. }) if seeds > 1 => Ok(None),
+        placed => Ok(Some((seed, placed?))),
+    };
+    let placed = parallel(&what, (1..=seeds).collect(), jobs as usize, &Interrupt::default(), place)?;
+    Ok(placed.into_iter().flatten().collect())
+}
+
+/// Prefix of a seed's files.
+fn seed_prefix(seed: u32) -> String {
+    format!("seed{seed}")
+}
+
+/// Places and routes one seed with the first of the board's placers that converges.
+fn place_seed(model: &Model, flow: &Flow, folder: &Path, seed: u32) -> Result<Placed, ToolError> {
+    let board = &model.board;
+    let name = seed_prefix(seed);
+    let mut last = Err(ToolError::Missing { tool: flow.place.name });
+    for placer in &board.placers {
+        let arguments = place_arguments(board, NETLIST, seed, placer, &name);
+        last = flow.place.run(folder, &arguments, &format!("{name}.{placer}.log"), board.place_minutes);
+        if last.is_ok() {
+            break;
+        }
+    }
+    last?;
+    let report = folder.join(format!("{name}.report.json"));
+    Placed::read(&report, synthesis::cells(folder, TOP)?, model.scene.hardware.link.clock())
+}
+
+/// Clock figures over all seeds, and the cells of the `best`.
+fn summarise_seeds(flow: &Flow, placed: &[(u32, Placed)], best: &Placed) -> Baseline {
+    // The median is taken of periods: of an even number of seeds it is then the slower of the two middle ones.
+    let periods = || placed.iter().map(|(_, placed)| 1.0 / placed.engine.achieved);
+    let rounded = |clock: f64| (clock * 10.0).round() / 10.0;
+    Baseline {
+        luts: best.count(flow.lut),
+        flip_flops: best.count(flow.flip_flop),
+        multipliers: best.count(flow.multiplier),
+        block_rams: best.count(flow.block_ram),
+        best_MHz: rounded(best.engine.achieved),
+        median_MHz: rounded(median(periods().collect()).map_or(best.engine.achieved, |period| 1.0 / period)),
+        worst_MHz: rounded(1.0 / periods().fold(0.0, f64::max)),
+        seeds: placed.len() as u32,
+    }
+}
+
+/// Writes the baseline, or returns the regressions against it.
+fn compare_or_update_baselines(update: bool, board: &Board, scene: &Scene, achieved: &Baseline) -> Result<Vec<String>> {
+    let path = Path::new(FILE);
+    let mut all = Baselines::read(path)?;
+    if update {
+        all.0.entry(board.name.clone()).or_default().insert(scene.name.clone(), achieved.clone());
+        all.write(path)?;
+        return Ok(Vec::new());
+    }
+    Ok(all.get(&board.name, &scene.name).map_or_else(Vec::new, |was| was.regressions(achieved)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::collections::BTreeMap;
+
+    fn placed(achieved: f64) -> Placed {
+        Placed { engine: Fmax { achieved, constraint: 100.0 }, link: None, cells: BTreeMap::new() }
+    }
+
+    #[test]
+    fn the_median_of_two_seeds_is_the_slower_one() {
+        let seeds = [(1, placed(94.52)), (2, placed(107.2)), (3, placed(101.0))];
+        let clocks = |seeds: &[(u32, Placed)]| {
+            let achieved = summarise_seeds(&flow(dermis_golden::board::Family::Ecp5), seeds, &seeds[1].1);
+            [achieved.best_MHz, achieved.median_MHz, achieved.worst_MHz]
+        };
+        assert_eq!(clocks(&seeds), [107.2, 101.0, 94.5]);
+        assert_eq!(clocks(&seeds[..2]), [107.2, 94.5, 94.5]);
+    }
+
+    #[test]
+    fn a_clock_constraint_that_differs_from_the_board_file_is_an_error() {
+        let board = Board::load("icebreaker").unwrap();
+        let check = |engine: f64, link: f64| {
+            let clock = |constraint| Fmax { achieved: 99.0, constraint };
+            let link = Some(("spi_sclk", clock(link)));
+            let placed = Placed { engine: clock(engine), link, cells: BTreeMap::new() };
+            check_constraints(&board, &placed).map_err(|error| error.to_string())
+        };
+        assert_eq!(check(25.505, 25.0), Ok(()));
+        let wanted = "constraints/icebreaker.v: its PLL gives 12 MHz, icebreaker.toml says clock_MHz = 25.5";
+        assert_eq!(check(12.0, 25.0), Err(wanted.to_string()));
+        let wanted = "constraints/icebreaker.pcf: spi_sclk is constrained to 12 MHz, icebreaker.toml says spi_MHz = 25";
+        assert_eq!(check(25.5, 12.0), Err(wanted.to_string()));
+    }
+}

@@ -1,0 +1,149 @@
+//! Requests and answers over a port, with repetition after lost or damaged packets.
+
+use std::io::{ErrorKind, Read, Write};
+use std::time::{Duration, Instant};
+
+use dermis_golden::fixed::Model;
+use dermis_golden::link::{codes_to_bytes, Counters, Decoder, Identity, Kind, Packet, VERSION};
+
+use super::answer::Answer;
+use super::error::HostError;
+
+/// Number of times a request is sent before it fails.
+const ATTEMPTS: u32 = 8;
+
+/// Transmission errors that were corrected by repetition.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct LinkErrors {
+    /// Number of requests sent again.
+    pub repeated: u64,
+    /// Number of answers, or fragments of them, that failed their check.
+    pub damaged: u64,
+}
+
+/// A board behind a port. Reads of the port must time out after a few milliseconds.
+pub struct Client<P> {
+    port: P,
+    name: String,
+    timeout: Duration,
+    decoder: Decoder,
+    sequence: u8,
+    /// Transmission errors so far.
+    pub link_errors: LinkErrors,
+}
+
+impl<P: Read + Write> Client<P> {
+    /// A board behind `port`, named `name` in messages; requests are repeated after `timeout` without an answer.
+    pub fn new(port: P, name: &str, timeout: Duration) -> Self {
+        let (decoder, link_errors) = (Decoder::default(), LinkErrors::default());
+        Client { port, name: name.to_owned(), timeout, decoder, sequence: 0, link_errors }
+    }
+
+    /// Reads the board's identification and checks that it was built for `model`.
+    ///
+    /// # Errors
+    /// No answer, another version, another scene.
+    pub fn identify(&mut self, model: &Model) -> Result<Identity, HostError> {
+        let bytes = self.request(Kind::Identify, Vec::new())?;
+        let port = || self.name.clone();
+        // All versions of the packets start with the version.
+        let has = bytes.first_chunk().map(|version| u16::from_le_bytes(*version));
+        if let Some(has) = has.filter(|&has| has != VERSION) {
+            return Err(HostError::Version { port: port(), has, wants: VERSION });
+        }
+        let wrong = HostError::Answer { port: port(), what: "identity", bytes: bytes.len() };
+        let has = Identity::of_bytes(&bytes).ok_or(wrong)?;
+        let sensor = &model.scene.sensor;
+        let wants = dermis_golden::link::scene_hash(model);
+        if has.scene == wants {
+            return Ok(has);
+        }
+        let describe = |rows: usize, cols: usize, bits: u32, hash: u32| {
+            format!("{rows}×{cols} taxels, {bits} bit codes, hash {hash:08x}")
+        };
+        Err(HostError::OtherScene {
+            port: port(),
+            has: describe(has.rows.into(), has.cols.into(), has.input_bits.into(), has.scene),
+            scene: model.scene.name.clone(),
+            wants: describe(sensor.rows, sensor.cols, model.formats().code_bits, wants),
+        })
+    }
+
+    /// Reads the board's packet counters.
+    ///
+    /// # Errors
+    /// No answer.
+    pub fn counters(&mut self) -> Result<Counters, HostError> {
+        let bytes = self.request(Kind::ReadCounters, Vec::new())?;
+        let wrong = HostError::Answer { port: self.name.clone(), what: "counters", bytes: bytes.len() };
+        Counters::of_bytes(&bytes).ok_or(wrong)
+    }
+
+    /// Sends a frame and waits for its forces or resultants.
+    ///
+    /// # Errors
+    /// No answer.
+    pub fn frame(&mut self, model: &Model, codes: &[i32], forces: bool) -> Result<Answer, HostError> {
+        let kind = if forces { Kind::FrameForForces } else { Kind::FrameForResultants };
+        let bytes = self.request(kind, codes_to_bytes(codes, model.formats().code_bits))?;
+        let wrong = HostError::Answer { port: self.name.clone(), what: kind.answer().name(), bytes: bytes.len() };
+        Answer::of_bytes(model, &bytes, forces).ok_or(wrong)
+    }
+
+    /// Sends a request, repeatedly if necessary, until it is answered.
+    fn request(&mut self, kind: Kind, payload: Vec<u8>) -> Result<Vec<u8>, HostError> {
+        let mut packet = Packet { kind, sequence: self.sequence, payload };
+        for attempt in 0..ATTEMPTS {
+            self.link_errors.repeated += u64::from(attempt > 0);
+            // A new number per attempt, so that a late answer to an earlier attempt is not taken for this one's.
+            self.sequence = self.sequence.wrapping_add(1);
+            packet.sequence = self.sequence;
+            self.port.write_all(&packet.to_wire()).map_err(|error| self.port_error(&error))?;
+            self.port.flush().map_err(|error| self.port_error(&error))?;
+            if let Some(payload) = self.wait(kind.answer())? {
+                return Ok(payload);
+            }
+        }
+        let milliseconds = self.timeout.as_millis();
+        Err(HostError::NoAnswer { port: self.name.clone(), what: kind.name(), attempts: ATTEMPTS, milliseconds })
+    }
+
+    /// The answer's payload; `None` after the timeout or a damaged answer.
+    fn wait(&mut self, kind: Kind) -> Result<Option<Vec<u8>>, HostError> {
+        let mut buffer = [0; 4096];
+        let mut last_heard = Instant::now();
+        while last_heard.elapsed() < self.timeout {
+            let count = match self.port.read(&mut buffer) {
+                Ok(count) => count,
+                Err(error) if matches!(error.kind(), ErrorKind::TimedOut | ErrorKind::WouldBlock) => 0,
+                Err(error) if error.kind() == ErrorKind::Interrupted => 0,
+                Err(error) => return Err(self.port_error(&error)),
+            };
+            if count > 0 {
+                last_heard = Instant::now();
+            }
+            let mut damaged = false;
+            for &byte in &buffer[..count] {
+                match self.decoder.next(byte) {
+                    Some(Ok(packet)) if packet.kind == kind && packet.sequence == self.sequence => {
+                        return Ok(Some(packet.payload));
+                    }
+                    // A late answer to an earlier attempt.
+                    Some(Ok(_)) | None => (),
+                    Some(Err(_)) => {
+                        self.link_errors.damaged += 1;
+                        damaged = true;
+                    }
+                }
+            }
+            if damaged {
+                return Ok(None);
+            }
+        }
+        Ok(None)
+    }
+
+    fn port_error(&self, error: &std::io::Error) -> HostError {
+        HostError::Port { port: self.name.clone(), reason: error.to_string() }
+    }
+}

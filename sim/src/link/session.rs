@@ -1,0 +1,114 @@
+//! A connection to an identified board, with the model of its scene.
+
+use std::time::Duration;
+
+use anyhow::Result;
+use dermis_golden::fixed::Model;
+use dermis_golden::frame::Frame;
+use dermis_golden::input::Input;
+use dermis_golden::link::{Identity, Kind};
+use serialport::SerialPort;
+
+use super::answer::Answer;
+use super::client::Client;
+use super::error::HostError;
+
+/// Longest wait of a read of the port for a byte.
+const READ_TIMEOUT: Duration = Duration::from_millis(10);
+
+/// A connection to an identified board, with the model of its scene.
+pub struct Session<P> {
+    /// The board.
+    pub client: Client<P>,
+    /// The bit-true model.
+    pub model: Model,
+    /// The board's identification.
+    pub identity: Identity,
+    /// Subtracted from each reading before it is sent: the tare frame, less the zero that the board subtracts.
+    offset: Option<Vec<f64>>,
+    forces: bool,
+    check: bool,
+}
+
+impl<P: std::io::Read + std::io::Write> Session<P> {
+    /// Identifies the board and checks that it was built for `model`.
+    ///
+    /// # Errors
+    /// No answer, another packet version, another scene.
+    pub fn new(mut client: Client<P>, model: Model, tare: Option<&Frame>, forces: bool, check: bool) -> Result<Self> {
+        let identity = client.identify(&model)?;
+        let input = Input::new(&model.scene)?;
+        let offset = tare.map(|tare| offset(&input, tare));
+        Ok(Session { client, model, identity, offset, forces, check })
+    }
+
+    /// The readings to send for a frame, so that after the scene's own zero the tare frame has been subtracted once; 0
+    /// for dead taxels.
+    fn subtract_tare(&self, frame: &Frame) -> Frame {
+        less(frame, self.offset.as_deref().unwrap_or_default()).mask_dead(&self.model.scene.input.dead)
+    }
+
+    /// Sends a frame; returns the readings sent, and the answer, compared with the model if requested.
+    ///
+    /// # Errors
+    /// A frame of another sensor, no answer.
+    pub fn request(&mut self, frame: &Frame) -> Result<(Frame, Answer)> {
+        let frame = self.subtract_tare(frame);
+        let codes = self.model.readings(std::slice::from_ref(&frame))?;
+        // A board that cannot sum forces sends them all, and the host sums them.
+        let forces = self.forces || !self.identity.supports(Kind::FrameForResultants);
+        let mut answer = self.client.frame(&self.model, &codes, forces)?;
+        if self.check {
+            answer.difference = Some(answer.compare_with_model(&self.model, &codes));
+        }
+        answer.beats = answer.beats.filter(|_| self.forces);
+        Ok((frame, answer))
+    }
+}
+
+/// What to subtract from readings before a board subtracts the zero of its own `input`, so that `tare` is subtracted in
+/// total.
+fn offset(input: &Input, tare: &Frame) -> Vec<f64> {
+    less(tare, input.zero().unwrap_or_default()).stress_MPa
+}
+
+/// The frame minus `offset`, an empty one being zero.
+fn less(frame: &Frame, offset: &[f64]) -> Frame {
+    let mut frame = frame.clone();
+    frame.stress_MPa.iter_mut().zip(offset).for_each(|(reading, offset)| *reading -= offset);
+    frame
+}
+
+/// Opens a serial port at `baud` bit/s; requests are repeated after `timeout` without an answer.
+///
+/// # Errors
+/// A port that does not exist, is in use, or does not support the bit rate.
+pub fn open(port: &str, baud: u32, timeout: Duration) -> Result<Client<Box<dyn SerialPort>>, HostError> {
+    let opened = serialport::new(port, baud).timeout(READ_TIMEOUT).open();
+    let opened = opened.map_err(|error| HostError::Port { port: port.to_owned(), reason: error.to_string() })?;
+    Ok(Client::new(opened, port, timeout))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use dermis_golden::scene::Scene;
+
+    #[test]
+    fn a_tare_of_the_host_takes_the_place_of_the_scenes() {
+        let folder = tempfile::tempdir().unwrap();
+        let mut scene = Scene::builtin("eight-by-eight").unwrap();
+        let reads = |value: f64| Frame::from_stress("reads", &scene.sensor, vec![value; 64]).unwrap();
+        let (own, later, pressed) = (reads(0.25), reads(0.5), reads(0.75));
+        let path = folder.path().join("zero.json");
+        std::fs::write(&path, own.to_json()).unwrap();
+        let sent = |scene: &Scene| {
+            let model = Model::new(scene).unwrap();
+            let sent = less(&pressed, &offset(&Input::new(scene).unwrap(), &later));
+            model.stress(&[sent]).unwrap().stress_MPa
+        };
+        assert_eq!(sent(&scene), vec![0.25; 64]);
+        (scene.input.tare, scene.input.full_scale_MPa) = (Some(path), Some(1.0));
+        assert_eq!(sent(&scene), vec![0.25; 64]);
+    }
+}

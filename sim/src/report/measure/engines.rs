@@ -1,0 +1,145 @@
+//! Runs all engines on the frames of scenes and cases.
+
+use std::collections::BTreeMap;
+
+use anyhow::{anyhow, Result};
+use dermis_golden::baseline::Baseline;
+use dermis_golden::fixed::{FixedError, Model, Trace};
+use dermis_golden::float::Golden;
+use dermis_golden::frame::Frame;
+use dermis_golden::partition::{subarrays, Case};
+use dermis_golden::scene::Scene;
+use dermis_hdl::generate;
+
+use super::measured::{BitTrue, ContactCount, Engine, Measured, Options};
+use super::timing::Timing;
+use crate::cosim::hardware::Simulator;
+use crate::cosim::verify::verify;
+use crate::jobs::parallel;
+use crate::progress::Progress;
+
+/// Largest subarray, in taxels, of the cases measured by the quick variant.
+const QUICK_TAXELS: usize = 1200;
+/// Largest subarray, in taxels, for which the quick variant runs the literal baseline, which takes seconds per frame
+/// beyond.
+const QUICK_LITERAL: usize = 200;
+
+/// Measures scenes in cases on their shipped frames, in the order given; cases that do not divide an array are skipped.
+///
+/// # Errors
+/// A scene that the golden model refuses or that has no shipped frames, no Verilator, an interruption.
+pub fn measure(scenes: &[Scene], cases: &[Case], options: &Options) -> Result<Vec<Measured>> {
+    let mut tasks = Vec::new();
+    for scene in scenes {
+        let frames = Frame::shipped(scene);
+        if frames.is_empty() {
+            return Err(anyhow!("scene {}: no frame is shipped for {}", scene.name, scene.sensor));
+        }
+        for &case in cases {
+            let mut scene = scene.clone();
+            (scene.partition.case, scene.partition.condition) = (case, options.condition);
+            let largest = match case {
+                // One μ per contact over the whole array; equal to case 0 for a single contact.
+                Case::Contacts if !frames.iter().any(|frame| ContactCount::of(frame) == ContactCount::Several) => None,
+                Case::Contacts | Case::Adaptive => Some(scene.sensor.taxels()),
+                Case::Grid(_) => subarrays(case, &scene.sensor).ok().map(|parts| parts[0].rows * parts[0].cols),
+            };
+            if largest.is_some_and(|taxels| !(options.quick && taxels > QUICK_TAXELS)) {
+                tasks.push((scene, frames.clone()));
+            }
+        }
+    }
+    let mut all =
+        parallel("engines and co-simulations", tasks, options.jobs, &options.interrupt, |(scene, frames)| {
+            prepare(scene, frames, options)
+        })?;
+    let bar = Progress::steps("timing", all.len() as u64);
+    for (done, measured) in all.iter_mut().enumerate() {
+        options.interrupt.check()?;
+        measured.times = time(measured)?;
+        bar.set(done as u64 + 1);
+    }
+    Ok(all)
+}
+
+fn prepare(scene: Scene, frames: Vec<Frame>, options: &Options) -> Result<Measured> {
+    let engine = Golden::new(&scene.for_hardware())?;
+    let golden = frames.iter().map(|frame| engine.run(frame)).collect::<Result<Vec<_>, _>>()?;
+    let bit_true = match Model::for_frames(&scene, &frames) {
+        Ok(model) => Ok(bit_true(model, &frames, options)?),
+        Err(error @ (FixedError::DoesNotFit(_) | FixedError::Scene(_) | FixedError::Format { .. })) => {
+            Err(error.to_string().lines().next().unwrap_or_default().to_owned())
+        }
+        Err(error) => return Err(error.into()),
+    };
+    let too_slow = options.quick && engine.matrices().sensor.taxels() > QUICK_LITERAL;
+    let literal = match too_slow {
+        true => Err("left out of the quick variant".to_owned()),
+        false => Baseline::new(&scene).map_err(|error| error.to_string()),
+    };
+    let (literal, baseline) = match literal {
+        Err(reason) => (None, Err(reason)),
+        Ok(literal) => {
+            let forces = frames.iter().map(|frame| literal.run(frame)).collect::<Result<Vec<_>, _>>()?;
+            (Some(literal), Ok(forces))
+        }
+    };
+    Ok(Measured { scene, frames, engine, golden, bit_true, baseline, times: BTreeMap::new(), literal })
+}
+
+fn bit_true(model: Model, frames: &[Frame], options: &Options) -> Result<BitTrue> {
+    let traces = frames.iter().map(|frame| Ok(model.run(&model.readings(std::slice::from_ref(frame))?)));
+    let traces: Vec<Trace> = traces.collect::<Result<_, FixedError>>()?;
+    let decoded = frames
+        .iter()
+        .zip(&traces)
+        .map(|(frame, t)| model.decode(std::slice::from_ref(frame), "fixed", &t.beats, &t.status));
+    let results = decoded.collect::<Result<Vec<_>, _>>()?;
+    let usage = generate(&model)?.usage;
+    let slowest = traces.iter().map(|trace| trace.cycles.total).max().unwrap_or(0);
+    let mut bit_true = BitTrue { results, traces, equal: None, cycles: slowest, usage, model };
+    if is_simulated(&bit_true.model.scene, options) {
+        let verified = verify(&bit_true.model.scene, frames, &[Simulator::Verilator], &options.build)?;
+        bit_true.equal = Some(verified.findings.is_equal());
+        bit_true.cycles = verified.rows.iter().filter_map(|row| row.times.total()).max().unwrap_or(slowest);
+    }
+    Ok(bit_true)
+}
+
+/// The quick variant co-simulates the two scenes of `make run`.
+fn is_simulated(scene: &Scene, options: &Options) -> bool {
+    let first = scene.partition.case == Case::WHOLE && ["sensor-1", "eight-by-eight"].contains(&scene.name.as_str());
+    options.simulate && (!options.quick || first)
+}
+
+/// Measures every CPU engine that supports the case.
+fn time(measured: &Measured) -> Result<BTreeMap<Engine, Timing>> {
+    let frames = &measured.frames;
+    let mut times = BTreeMap::new();
+    times.insert(
+        Engine::Golden,
+        Timing::of(frames.len(), |k| {
+            measured.engine.run(&frames[k])?;
+            Ok(())
+        })?,
+    );
+    if let Ok(bit_true) = &measured.bit_true {
+        times.insert(
+            Engine::Fixed,
+            Timing::of(frames.len(), |k| {
+                bit_true.model.reconstruct(&frames[k])?;
+                Ok(())
+            })?,
+        );
+    }
+    if let Some(literal) = &measured.literal {
+        times.insert(
+            Engine::Baseline,
+            Timing::of(frames.len(), |k| {
+                literal.run(&frames[k])?;
+                Ok(())
+            })?,
+        );
+    }
+    Ok(times)
+}

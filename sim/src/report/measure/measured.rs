@@ -1,0 +1,193 @@
+//! What is measured of a scene in one case.
+
+use std::collections::BTreeMap;
+use std::path::PathBuf;
+
+use anyhow::Result;
+use dermis_golden::baseline::Baseline;
+use dermis_golden::errors::Errors;
+use dermis_golden::fixed::{Model, Trace};
+use dermis_golden::float::Golden;
+use dermis_golden::frame::{Forces, Frame};
+use dermis_golden::partition::Case;
+use dermis_golden::reconstruct::Reconstruction;
+use dermis_golden::scene::{Condition, Scene};
+use dermis_hdl::usage::Usage;
+
+use super::clock::clock;
+use super::timing::Timing;
+use crate::compare::median;
+use crate::jobs::Interrupt;
+
+/// Options of a measurement.
+#[derive(Clone, Debug)]
+pub struct Options {
+    /// Quick variant: two co-simulations, fewer drawn frames and sweeps, subarrays of at most 1200 taxels, literal
+    /// baseline up to 200 taxels.
+    pub quick: bool,
+    /// Number of cases prepared in parallel.
+    pub jobs: usize,
+    /// Folder for build products and caches.
+    pub build: PathBuf,
+    /// Condition under which a subarray is searched.
+    pub condition: Condition,
+    /// Whether hardware is co-simulated; otherwise the bit-true model's cycle counts are used.
+    pub simulate: bool,
+    /// Set by SIGINT or SIGTERM.
+    pub interrupt: Interrupt,
+}
+
+/// An implementation of the reconstruction.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Engine {
+    /// Eq. 1 with dense matrices and a simplex search, on the CPU.
+    Baseline,
+    /// Floating point, on the CPU.
+    Golden,
+    /// The bit-true model, on the CPU.
+    Fixed,
+    /// The generated hardware.
+    Hardware,
+}
+
+impl Engine {
+    /// All engines, in the order of tables.
+    pub const ALL: [Engine; 4] = [Engine::Baseline, Engine::Golden, Engine::Fixed, Engine::Hardware];
+
+    /// Name in tables and legends.
+    pub fn name(self) -> &'static str {
+        match self {
+            Engine::Baseline => "literal Eq. 1, CPU",
+            Engine::Golden => "golden, CPU",
+            Engine::Fixed => "bit-true, CPU",
+            Engine::Hardware => "hardware",
+        }
+    }
+}
+
+/// Results of the bit-true model, and of the hardware, for a case.
+#[derive(Debug)]
+pub struct BitTrue {
+    /// The model.
+    pub model: Model,
+    /// Its result for every frame.
+    pub results: Vec<Reconstruction>,
+    /// The outputs of its stages, for every frame.
+    pub traces: Vec<Trace>,
+    /// Whether the verilated hardware equalled it in every bit and cycle; `None` if not simulated.
+    pub equal: Option<bool>,
+    /// Cycles from the first input beat to the last output beat of the slowest frame, co-simulated if possible, else
+    /// from the model.
+    pub cycles: u64,
+    /// Resources of each stage.
+    pub usage: BTreeMap<String, Usage>,
+}
+
+/// Measurements of a scene in one case.
+pub struct Measured {
+    /// The scene, with the case in its fields.
+    pub scene: Scene,
+    /// The frames, at least one.
+    pub frames: Vec<Frame>,
+    /// The floating-point model.
+    pub engine: Golden,
+    /// Its result for every frame.
+    pub golden: Vec<Reconstruction>,
+    /// Results of the bit-true model and the hardware, or the reason why there is no hardware.
+    pub bit_true: Result<BitTrue, String>,
+    /// The literal baseline's forces for every frame, or the reason why it was not run.
+    pub baseline: Result<Vec<Forces>, String>,
+    /// Times per frame on the CPU.
+    pub times: BTreeMap<Engine, Timing>,
+    pub(super) literal: Option<Baseline>,
+}
+
+/// Whether a frame has one contact or several.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum ContactCount {
+    /// One contact, or none described.
+    One,
+    /// Several contacts, whose shears may differ.
+    Several,
+}
+
+impl ContactCount {
+    /// The contact count of a frame.
+    pub fn of(frame: &Frame) -> ContactCount {
+        if frame.contacts.len() > 1 {
+            ContactCount::Several
+        } else {
+            ContactCount::One
+        }
+    }
+
+    /// Name in tables.
+    pub fn name(self) -> &'static str {
+        match self {
+            ContactCount::One => "one",
+            ContactCount::Several => "several",
+        }
+    }
+}
+
+/// Errors and time of an engine on one scene and case.
+#[derive(Clone, Debug)]
+pub struct Point {
+    /// The case.
+    pub case: Case,
+    /// The engine.
+    pub engine: Engine,
+    /// Tangential error of the resultant, median over the frames.
+    pub tangential: Option<f64>,
+    /// Normal error of the resultant, median over the frames.
+    pub normal: Option<f64>,
+    /// Time per frame in s.
+    pub seconds: f64,
+}
+
+impl Measured {
+    /// Errors of an engine's resultants, one per frame.
+    pub fn errors(&self, engine: Engine) -> Vec<Option<Errors>> {
+        let own = |forces: &Vec<Forces>| {
+            let pairs = self.frames.iter().zip(forces);
+            pairs.map(|(frame, forces)| Some(Errors::new(frame.resultant_N?, forces.resultant()))).collect()
+        };
+        let of = |results: &[Reconstruction]| results.iter().map(|result| result.error).collect();
+        match engine {
+            Engine::Baseline => self.baseline.as_ref().map(own).unwrap_or_default(),
+            Engine::Golden => of(&self.golden),
+            Engine::Fixed | Engine::Hardware => self.bit_true.as_ref().map(|i| of(&i.results)).unwrap_or_default(),
+        }
+    }
+
+    /// Errors and time of an engine; `None` if it does not support the case.
+    pub fn point(&self, engine: Engine) -> Option<Point> {
+        self.point_over(engine, |_| true)
+    }
+
+    /// The same over the frames selected by `keep`.
+    pub fn point_over(&self, engine: Engine, keep: impl Fn(&Frame) -> bool) -> Option<Point> {
+        let seconds = match engine {
+            Engine::Hardware => {
+                let bit_true = self.bit_true.as_ref().ok()?;
+                clock(&bit_true.model.board, &self.scene).seconds(bit_true.cycles)
+            }
+            cpu => self.times.get(&cpu)?.seconds(),
+        };
+        let kept = self.frames.iter().zip(self.errors(engine)).filter(|(frame, _)| keep(frame));
+        let errors: Vec<Option<Errors>> = kept.map(|(_, errors)| errors).collect();
+        let over = |value: fn(&Errors) -> Option<f64>| median(errors.iter().flatten().filter_map(value).collect());
+        Some(Point {
+            case: self.scene.partition.case,
+            engine,
+            tangential: over(|e| e.tangential),
+            normal: over(|e| e.normal),
+            seconds,
+        })
+    }
+
+    /// Index of the frame with the id `id`, else 0.
+    pub fn frame(&self, id: &str) -> usize {
+        self.frames.iter().position(|frame| frame.id == id).unwrap_or(0)
+    }
+}

@@ -1,0 +1,36 @@
+//! Measurements of the report: all engines on the same frames of each scene and case, their errors and times.
+//!
+//! ```text
+//! scene × case ─┬─ literal baseline, CPU ─┐
+//!               ├─ golden, CPU ───────────┼─> errors, forces, time of a frame
+//!               ├─ bit-true, CPU ─────────┤
+//!               └─ hardware: co-simulation ── cycles / clock
+//! ```
+//!
+//! First all results are computed and compared, several cases in parallel; then the CPU engines are timed one after the
+//! other, with no other work in parallel.
+
+mod clock;
+mod engines;
+mod formats;
+mod machine;
+mod measured;
+mod noise;
+mod objective_map;
+mod recordings;
+mod stability;
+mod stages;
+mod sweep;
+mod timing;
+
+pub use clock::{clock, Clock};
+pub use engines::measure;
+pub use formats::{formats, FormatRow};
+pub use machine::machine;
+pub use measured::{BitTrue, ContactCount, Engine, Measured, Options, Point};
+pub use noise::noise;
+pub use objective_map::{objective_map, ObjectiveMap};
+pub use recordings::{recorded, Recorded, MOST_FRAMES};
+pub use stability::{conditions, extremes};
+pub use stages::{stages, StageRow};
+pub use sweep::{sweep, SweepPoint};

@@ -1,0 +1,16 @@
+//! Comparisons that the guide shows, each one table.
+//!
+//! | study | compares |
+//! |---|---|
+//! | [`input_bits`] | golden and bit-true model at 20 and 16 bits of input |
+//! | [`dead_taxels`] | errors and latency with taxels that are left out |
+//! | [`contacts`] | case 0, `adaptive` and `contacts` on frames of several contacts |
+//! | [`link_times`] | time of a frame's packets on each link |
+
+pub mod contacts;
+pub mod dead_taxels;
+mod drawn;
+pub mod input_bits;
+pub mod link_times;
+
+pub use drawn::{one_contact, tangential, FRAMES};
