@@ -48,7 +48,7 @@ clippy: ## lint the Rust code, warnings are errors
 
 unit: setup ## run all tests: unit, command line, co-simulation
 	@echo '== unit'
-	$(CARGO) test --workspace
+	$(CARGO) test --workspace --no-fail-fast
 
 lint: setup ## check wording against tests/words.txt, lint the generated Verilog with its waivers; part of unit
 	@echo '== lint'
