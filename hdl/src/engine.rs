@@ -8,8 +8,9 @@
 //! Overlaps shorten the frame interval:
 //! - While a frame is computed, the next is received; the frame buffer is free as soon as `fold` has read it.
 //! - While one subarray is searched, the v_ij of the next are computed, or those of the next frame's first.
-//! - While a frame is sent, the next is searched. Only its values wait until the first one has been sent; where there are
-//!   several subarrays, its search does.
+//! - While a frame is sent, the next is searched. Only its values wait until the first one has been sent. Where there are
+//!   several subarrays, or where the frame is not searched, its v_ij wait: nothing may stand before their first sweep,
+//!   because the v_ij of the next frame are written over them.
 //!
 //! Without a search there is no memory in which v_ij could wait: then a frame starts when the previous one has been
 //! sent. Where the case is chosen per frame, it is chosen while the frame is received. [`ReceiveStage`] and [`SearchStage`] are
@@ -310,7 +311,8 @@ impl Logic for Engine {
         self.send.which.next = self.sent_case.kept.val();
 
         comment!("A subarray goes to the search when the search is idle;");
-        comment!("the first of several also waits for the previous send");
+        comment!("the first of several also waits for the previous send,");
+        comment!("as does one that is not searched: its last sweep comes first");
         self.begin_send.next = self.search.values_begin.val() & self.searched_last.q.val();
         self.sent_case.keep.next = self.begin_send.val();
         self.sent_case.word.next = self.searched_case.kept.val();
@@ -318,7 +320,7 @@ impl Logic for Engine {
             (self.begin_send.val() | (self.sending.q.val() & !self.send.done.val())) & !self.rst.val();
         self.complete.next = self.filled.q.val() | self.unfold.done.val();
         self.unsent.next = self.sending.q.val() & !self.send.done.val();
-        self.behind.next = self.first.q.val() & self.unsent.val() & !self.single.val();
+        self.behind.next = self.first.q.val() & self.unsent.val() & (!self.single.val() | !self.condition.q.val());
         self.hand_over.next =
             self.complete.val() & !self.behind.val() & (!self.searching.q.val() | self.search.done.val());
         self.leaves.next = self.hand_over.val() & self.part.last.val();

@@ -89,7 +89,7 @@ impl Storage {
     pub fn share<'a>(cases: impl Iterator<Item = (&'a mut Storage, Formats)>) {
         let mut cases: Vec<(&mut Storage, Formats)> = cases.collect();
         let listed = cases.iter().any(|(storage, formats)| formats.shared_a || storage.is_pruned(formats.quads));
-        let streamed = !listed && cases.iter().all(|(_, formats)| formats.groups == 1);
+        let streamed = !listed && cases.iter().all(|(_, formats)| formats.groups == 1 && formats.quads > 1);
         let pause = if cases.iter().any(|(_, formats)| formats.quads == 1) { 2 } else { 1 };
         let mut base = 0;
         for (storage, _) in &mut cases {

@@ -32,8 +32,8 @@ pub struct OperandWriter {
 kernel_block!(OperandWriter, clock clk, inputs [which, clear, valid], outputs [address, keep, finished]);
 
 impl OperandWriter {
-    /// `vectors` operand vectors per subarray, of `quads[case]` quads each; `streamed`: a vector is read from its first
-    /// quad on, one quad per cycle, while one quad per cycle is written.
+    /// `vectors` operand vectors per subarray, of `quads[case]` quads each; `streamed`, only with two quads or more: a
+    /// vector is read from its first quad on, one quad per cycle, while one quad per cycle is written.
     pub fn new(vectors: usize, quads: &[usize], streamed: bool) -> Self {
         let block = OperandWriter {
             clk: Default::default(),

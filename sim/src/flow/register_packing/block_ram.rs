@@ -6,10 +6,8 @@
 
 use serde_json::{json, Value};
 
-use super::Design;
+use super::{Design, BLOCK_RAM};
 
-/// Yosys's cell of an ECP5 block RAM.
-pub const BLOCK_RAM: &str = "DP16KD";
 /// Outputs of a port.
 const OUTPUTS: usize = 18;
 

@@ -19,8 +19,10 @@ use std::collections::{BTreeSet, HashMap};
 
 use serde_json::{json, Map, Value};
 
-use block_ram::BLOCK_RAM;
-pub use multiplier::MULTIPLIER;
+/// Yosys's cell of an ECP5 multiplier.
+pub const MULTIPLIER: &str = "MULT18X18D";
+/// Yosys's cell of an ECP5 block RAM.
+const BLOCK_RAM: &str = "DP16KD";
 
 /// A net's number in Yosys's JSON.
 type Net = u64;

@@ -6,10 +6,8 @@
 
 use serde_json::{json, Value};
 
-use super::{Design, Net, Register};
+use super::{Design, Net, Register, MULTIPLIER};
 
-/// Yosys's cell of an ECP5 multiplier.
-pub const MULTIPLIER: &str = "MULT18X18D";
 /// Bits of a multiplier's operand.
 const OPERAND: usize = 18;
 /// Names of the operands.
