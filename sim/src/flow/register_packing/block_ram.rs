@@ -6,8 +6,10 @@
 
 use serde_json::{json, Value};
 
-use super::{Design, BLOCK_RAM};
+use super::design::Design;
 
+/// Yosys's cell of an ECP5 block RAM.
+pub const BLOCK_RAM: &str = "DP16KD";
 /// Outputs of a port.
 const OUTPUTS: usize = 18;
 

@@ -6,8 +6,10 @@
 
 use serde_json::{json, Value};
 
-use super::{Design, Net, Register, MULTIPLIER};
+use super::design::{Design, Net, Register};
 
+/// Yosys's cell of an ECP5 multiplier.
+pub const MULTIPLIER: &str = "MULT18X18D";
 /// Bits of a multiplier's operand.
 const OPERAND: usize = 18;
 /// Names of the operands.
