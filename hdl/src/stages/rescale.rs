@@ -10,7 +10,8 @@ use dermis_golden::fixed::Model;
 use rust_hdl::prelude::*;
 
 use crate::primitives::{
-    count_bits, largest, shift_bits, BitDelay, CaseCounter, Dff, LimbSum, Ram, RawLength, Rescaler, SATURATION_BITS,
+    count_bits, largest, shift_bits, BitDelay, CaseCounter, Delay, Dff, LimbSum, Ram, RawLength, Rescaler,
+    SATURATION_BITS,
 };
 use crate::wire::Wire;
 
@@ -52,6 +53,10 @@ pub struct Rescale {
     length: RawLength,
     rescaler: Rescaler,
     started: BitDelay,
+    writes: BitDelay,
+    measures: BitDelay,
+    ends: BitDelay,
+    row: Delay,
     read: BitDelay,
     words_later: BitDelay,
     operands_later: BitDelay,
@@ -89,6 +94,10 @@ impl Rescale {
             length: RawLength::new(formats),
             rescaler: Rescaler::new(formats),
             started: BitDelay::new(1),
+            writes: BitDelay::new(1),
+            measures: BitDelay::new(1),
+            ends: BitDelay::new(1),
+            row: Delay::new(count_bits(largest(&quads)), 1),
             read: BitDelay::new(2),
             words_later: BitDelay::new(3),
             operands_later: BitDelay::new(1),
@@ -115,6 +124,13 @@ impl Logic for Rescale {
         self.operands_later.clk.next = self.clk.val();
         self.started.clk.next = self.clk.val();
         self.started.rst.next = self.rst.val();
+        self.writes.clk.next = self.clk.val();
+        self.writes.rst.next = self.rst.val();
+        self.measures.clk.next = self.clk.val();
+        self.measures.rst.next = self.rst.val();
+        self.ends.clk.next = self.clk.val();
+        self.ends.rst.next = self.rst.val();
+        self.row.clk.next = self.clk.val();
         self.read.rst.next = self.rst.val();
         self.words_later.rst.next = self.rst.val();
         self.operands_later.rst.next = self.rst.val();
@@ -130,20 +146,24 @@ impl Logic for Rescale {
         self.reads.which.next = self.which.val();
         self.rows.clear.next = self.started.q.val();
         self.rows.enable.next = self.collected.val();
-        self.raw.write.next = self.collected.val().into();
-        self.raw.write_address.next = self.rows.value.val();
+        comment!("The sum of a row is registered");
+        self.writes.d.next = self.collected.val();
+        self.measures.d.next = self.complete.val();
+        self.ends.d.next = self.complete.val() & self.rows.last.val();
+        self.row.d.next = self.rows.value.val();
+        self.raw.write.next = self.writes.q.val().into();
+        self.raw.write_address.next = self.row.q.val();
         self.raw.write_data.next = self.limb_sum.sum.val();
         self.limb_sum.clear.next = self.started.q.val();
         self.limb_sum.last.next = self.collected.val() & self.rows.last.val();
         self.limb_sum.quad.next = self.quad.val();
         self.limb_sum.low.next = self.raw.read_data.val();
         self.length.clear.next = self.started.q.val();
-        self.length.accept.next = self.complete.val();
+        self.length.accept.next = self.measures.q.val();
         self.length.quad.next = self.limb_sum.sum.val();
 
-        self.replaying.d.next = ((self.complete.val() & self.rows.last.val())
-            | (self.replaying.q.val() & !self.reads.last.val()))
-            & !self.rst.val();
+        self.replaying.d.next =
+            (self.ends.q.val() | (self.replaying.q.val() & !self.reads.last.val())) & !self.rst.val();
         comment!("Read two cycles before its high limbs come, and again");
         self.reads.clear.next = self.started.q.val();
         self.reads.enable.next = self.replaying.q.val() | (self.collecting.q.val() & self.quad_soon.val());

@@ -1,6 +1,6 @@
 //! Stage `search`: the μ search over the polynomials of all taxels, sweep by sweep.
 //!
-//! `sequencer` sets up a sweep. One quad per cycle passes memory (2 cycles), Taylor shift (4) and goes back to memory, and
+//! `sequencer` sets up a sweep. One quad per cycle passes memory (3 cycles), Taylor shift (4) and goes back to memory, and
 //! passes candidates (2) and score (6). The sum polynomial passes the same blocks beside the first quad and is held, so
 //! that Σp is available when the first taxel is scored. `bias` computes the bias of the scores from it, `best`
 //! compares (6). Coarse sweeps follow one another without a gap; a halving is set up when the previous sweep has been

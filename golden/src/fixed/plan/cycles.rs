@@ -8,7 +8,7 @@
 //! pass     the kept columns of each product, at most Q, waiting until a step's operand has been finished, or, where
 //!          it is read as it is written, begun; a pause after each accumulation
 //! rescale  v_00 is replayed once its exponent is known: Q more
-//! search   7 coarse sweeps of Q, at least (Q + 19)/2; the eighth and 7 halvings of Q + 22; one of Q + 7
+//! search   7 coarse sweeps of Q, at least (Q + 21)/2; the eighth and 7 halvings of Q + 24; one of Q + 8
 //!          (the last alone when nothing is searched)
 //! next     1 from a subarray's completion to the passes of the one after it, which go on while it is searched
 //! choose   2, where the case is chosen per frame
@@ -38,12 +38,12 @@ const COLUMNS: u64 = 2;
 /// Cycles from a row until it can be read as an operand: rescaler, operand memory.
 const OPERAND: u64 = 5;
 /// Cycles from the last raw row of v_00 to its first replayed row.
-const REPLAY: u64 = 3;
+const REPLAY: u64 = 4;
 /// Cycles from the last row to the start of the search: rescaler, unfold, memory.
 const UNFOLD: u64 = 6;
-/// Cycles from the start of a sweep to its best candidate, beyond its Q quads: memory 2, Taylor shift 4, candidates 2,
+/// Cycles from the start of a sweep to its best candidate, beyond its Q quads: memory 3, Taylor shift 4, candidates 2,
 /// score 6, comparison 6.
-const SELECTION_LATENCY: u64 = 20;
+const SELECTION_LATENCY: u64 = 21;
 /// Cycles from the completion of a subarray's passes to the start of its search.
 const HAND_OVER: u64 = 2;
 /// Cycles from the start of the search, or from a best candidate that the next sweep depends on, to the next sweep.
@@ -51,7 +51,7 @@ pub const SET_UP: u64 = 3;
 /// Shortest sweep that is scored, in quads: its score bias is computed meanwhile.
 pub const SHORTEST_SWEEP: u64 = 4;
 /// Latency of the last sweep beyond its Q quads.
-const LAST_SWEEP: u64 = 7;
+const LAST_SWEEP: u64 = 8;
 /// Cycles from a subarray's values to the sending of them, where nothing is searched.
 const UNSEARCHED: u64 = 3;
 /// Cycles from the hand-over of a subarray to the search until the passes of the next one start.

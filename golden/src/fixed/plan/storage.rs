@@ -12,6 +12,10 @@ use crate::fixed::words::formats::{Formats, MULTIPLIER_BITS};
 use crate::fixed::words::quantised::{coefficient, Quantised};
 use crate::fixed::words::schedule::{Matrix, Product};
 
+/// Least number of cycles from a quad's row of low limbs to its row of high limbs: the first is written one cycle after
+/// it arrives, and read two before the other does.
+const BETWEEN: usize = 4;
+
 /// The kept columns, per matrix in storage order and per group of rows.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Storage {
@@ -28,7 +32,7 @@ pub struct Storage {
     /// cycle. So it is where all rows have a lane and no column is listed, in all cases.
     pub streamed: bool,
     /// Cycles without a product after each accumulation. In the first the accumulators of the lanes are cleared; where a
-    /// case has a single quad, a second lets the row of low limbs be written before it is read for the high limbs.
+    /// case has one quad or two, more let the row of low limbs be written before it is read for the high limbs.
     pub pause: usize,
 }
 
@@ -90,7 +94,8 @@ impl Storage {
         let mut cases: Vec<(&mut Storage, Formats)> = cases.collect();
         let listed = cases.iter().any(|(storage, formats)| formats.shared_a || storage.is_pruned(formats.quads));
         let streamed = !listed && cases.iter().all(|(_, formats)| formats.groups == 1 && formats.quads > 1);
-        let pause = if cases.iter().any(|(_, formats)| formats.quads == 1) { 2 } else { 1 };
+        let least = cases.iter().map(|(_, formats)| formats.quads).min().unwrap_or(BETWEEN);
+        let pause = BETWEEN.saturating_sub(least).max(1);
         let mut base = 0;
         for (storage, _) in &mut cases {
             (storage.base, storage.listed, storage.streamed, storage.pause) = (base, listed, streamed, pause);

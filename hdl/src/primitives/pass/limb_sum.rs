@@ -23,9 +23,9 @@ pub struct LimbSum {
     pub quad: Wire<In>,
     /// The row as written before, of the low limbs, `acc_bits` each, signed; valid with a row of the high limbs.
     pub low: Wire<In>,
-    /// The row to write, `acc_bits` each, signed; combinational.
+    /// The row to write, `acc_bits` each, signed; one cycle after `quad`.
     pub sum: Wire<Out>,
-    /// `sum` has all products of v_00, not those of its low limbs only.
+    /// The sum of `quad` has all products of v_00, not those of its low limbs only.
     pub complete: Signal<Out, Bit>,
     kernel: Body,
 }
@@ -74,7 +74,7 @@ impl Shape {
         let plain = |parity: usize| quad.slice(parity * self.lane, self.lane).signed().extend(self.acc);
         if self.align == 0 {
             k.wire("complete", k.constant(1, 1));
-            k.wire("sum", concat(&[3, 2, 1, 0].map(plain)));
+            k.delay("sum", concat(&[3, 2, 1, 0].map(plain)));
             return k.finish();
         }
         let complete = k.state("complete", Type::unsigned(1), clear, 0);
@@ -86,7 +86,7 @@ impl Shape {
                 .low(self.acc - self.align);
             complete.mux(upper.concat(low.low(self.align)), high.unsigned())
         };
-        k.wire("sum", concat(&[3, 2, 1, 0].map(of)));
+        k.delay("sum", concat(&[3, 2, 1, 0].map(of)));
         k.finish()
     }
 }
@@ -103,20 +103,22 @@ mod tests {
     struct Rows {
         shape: Shape,
         complete: Option<bool>,
+        sum: Option<Word>,
     }
 
     impl Reference for Rows {
-        fn outputs(&mut self, inputs: &[Word]) -> Vec<Option<Word>> {
+        fn outputs(&mut self, _: &[Word]) -> Vec<Option<Word>> {
+            vec![self.complete.map(Word::from), self.sum]
+        }
+
+        fn clock(&mut self, inputs: &[Word]) {
             let Shape { lane, acc, align } = self.shape;
             let [quad, low] = [(2, lane), (3, acc)].map(|(k, bits)| [0, 1, 2, 3].map(|n| inputs[k].signed(n, bits)));
             let sums = [0, 1, 2, 3].map(|n| match self.complete {
                 Some(true) if align > 0 => (low[n] + (quad[n] << align)) << (64 - acc) >> (64 - acc),
                 _ => quad[n],
             });
-            vec![self.complete.map(Word::from), self.complete.map(|_| Word::of_fields(&sums, acc))]
-        }
-
-        fn clock(&mut self, inputs: &[Word]) {
+            self.sum = self.complete.map(|_| Word::of_fields(&sums, acc));
             self.complete = match [inputs[0].number(), inputs[1].number()] {
                 _ if self.shape.align == 0 => Some(true),
                 [1, _] => Some(false),
@@ -140,7 +142,7 @@ mod tests {
             let stimulus: Vec<Vec<Word>> = (0..3000).map(&mut inputs).collect();
             let shape = Shape { align, ..SHAPE };
             let complete = (align == 0).then_some(true);
-            check(LimbSum::of(shape).kernel.kernel(), &stimulus, &mut Rows { shape, complete });
+            check(LimbSum::of(shape).kernel.kernel(), &stimulus, &mut Rows { shape, complete, sum: None });
         }
     }
 }

@@ -12,7 +12,7 @@ use crate::wire::Wire;
 
 /// Buffers of quads of polynomials. `fill` writes one coefficient of a quad into buffer `START`; `write` writes a whole
 /// quad into one of the others. Both take effect one cycle later, through registers beside the memory. `read_data`
-/// follows its address by two cycles: the read register of the memory and an output register.
+/// follows its address by three cycles: read register and output register of the memory, and the choice of the memory.
 ///
 /// `START` is a memory of its own, because one subarray or frame is filled while another is searched.
 ///
@@ -65,7 +65,7 @@ kernel_block!(
 );
 
 /// Cycles from `read_address` to `read_data`.
-pub const LATENCY: usize = 2;
+pub const LATENCY: usize = 3;
 
 /// First address of `buffer` in the memory, where buffers of `quads` quads follow each other without gaps.
 pub fn base(buffer: usize, quads: usize) -> usize {
@@ -117,7 +117,7 @@ fn kernel(layout: &PolynomialWord, quads: usize, fill_bits: usize) -> Kernel {
     let bases: Vec<(u64, Expr)> = (1..BUFFERS).map(|b| (b as u64, k.constant(bits, base(b, quads) as u64))).collect();
     let write_base = k.delay("write_base", write_buffer.case(&bases, k.constant(bits, 0)));
     let write_to = k.wire("write_to", (write_base + write_address).low(bits));
-    let from_start = k.delay("from_start", read_buffer.is(START as u64));
+    let from_start = k.delay("from_start", k.delay("from_start_1", read_buffer.is(START as u64)));
     k.comment(
         "Read and write addresses are registers of each coefficient, because the memories are placed far apart; the",
     );
@@ -134,18 +134,23 @@ fn kernel(layout: &PolynomialWord, quads: usize, fill_bits: usize) -> Kernel {
         let filled = concat(&[3, 2, 1, 0].map(filled));
         let fills = fill_index.is(index as u64);
         let whole = write_data.slice(layout.offset(index), all);
-        let read = k.delay(&format!("read{index}"), place.read(*from));
+        let read = registered(&k, &format!("read{index}"), place.read(*from));
         let start = format!("start{index}");
         let own = k.memory(&start, quads, all, Contents::Undefined).unchecked();
         let own = own.holds(Holds::Start(index));
         write_port(&k, (&start, own), [fill & fills, fill_address, filled]);
         write_port(&k, (&memory, place), [write, write_to, whole]);
-        let read_start = k.delay(&format!("read_start{index}"), own.read(read_address));
+        let read_start = registered(&k, &format!("read_start{index}"), own.read(read_address));
         k.delay(&format!("shown{index}"), from_start.mux(read_start, read))
     };
     let shown: Vec<Expr> = (0..layout.widths.len()).map(coefficient).collect();
     k.wire("read_data", concat(&shown.into_iter().rev().collect::<Vec<_>>()));
     k.finish()
+}
+
+/// Read register of a memory and its output register.
+fn registered<'k>(k: &'k Builder, name: &str, read: Expr<'k>) -> Expr<'k> {
+    k.delay(&format!("{name}_out"), k.delay(name, read))
 }
 
 /// Writes the memory of this name one cycle after it is asked to: enable, address, data.
@@ -216,8 +221,9 @@ mod tests {
         asked: Vec<(usize, usize, usize, u64)>,
         from: Option<usize>,
         write_base: usize,
-        from_start: bool,
+        from_start: [bool; 2],
         read: [[Option<u64>; 2]; 2],
+        out: [[Option<u64>; 2]; 2],
         shown: [Option<u64>; 2],
     }
 
@@ -235,7 +241,8 @@ mod tests {
         fn clock(&mut self, inputs: &[Word]) {
             let number = |k: usize| inputs[k].number() as usize;
             let bit = |k: usize| number(k) == 1;
-            self.shown = self.read[usize::from(self.from_start)];
+            self.shown = self.out[usize::from(self.from_start[1])];
+            self.out = self.read;
             let from = [self.from, Some(number(9))];
             for (memory, k) in [(0, 0), (0, 1), (1, 0), (1, 1)] {
                 let collides =
@@ -265,7 +272,7 @@ mod tests {
                 (false, steps) => self.from.map(|at| (at + usize::from(steps)) % end),
             };
             self.write_base = base(number(5), QUADS);
-            self.from_start = number(8) == START;
+            self.from_start = [number(8) == START, self.from_start[0]];
         }
     }
 
@@ -283,8 +290,9 @@ mod tests {
             asked: Vec::new(),
             from: None,
             write_base: 0,
-            from_start: false,
+            from_start: Default::default(),
             read: Default::default(),
+            out: Default::default(),
             shown: Default::default(),
         };
         check(store.kernel.kernel(), &stimulus, &mut buffers);

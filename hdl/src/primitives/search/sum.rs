@@ -10,7 +10,7 @@ use crate::primitives::search::sweep::{BUFFERS, BUFFER_BITS, START};
 use crate::wire::Wire;
 
 /// Adds the counted lanes of each `fill` to the sum of buffer `START`, three cycles later; quad 0 restarts a
-/// coefficient. `read` puts a buffer's sum on `word` after the same two cycles as the search memory, where it is held;
+/// coefficient. `read` puts a buffer's sum on `word` after the same three cycles as the search memory, where it is held;
 /// `write` replaces a buffer's sum by the `write_data` of the next cycle. As in the search memory, `START` is buffer 0
 /// unless one subarray is filled while another is searched.
 #[derive(LogicBlock)]
@@ -31,7 +31,7 @@ pub struct Sum {
     pub read: Signal<In, Bit>,
     /// Buffer to read; valid with `read`.
     pub read_buffer: Wire<In>,
-    /// The sum read last, in the layout of the sums; two cycles after `read`.
+    /// The sum read last, in the layout of the sums; three cycles after `read`.
     pub word: Wire<Out>,
     /// Replace the sum of `write_buffer`.
     pub write: Signal<In, Bit>,
@@ -91,6 +91,7 @@ fn kernel(layout: &PolynomialWord, quads: usize, bits: usize) -> Kernel {
     let (read, read_buffer) = (k.input("read", 1), k.input("read_buffer", BUFFER_BITS));
     let (write, write_buffer) = (k.input("write", 1), k.input("write_buffer", BUFFER_BITS));
     let write_data = k.input("write_data", layout.bits());
+    let (read, read_buffer) = (k.delay("read_1", read), k.delay("read_buffer_1", read_buffer));
     let term = |lane: usize| {
         let counted = fill_mask.at(lane).mux(fill_quad.slice(lane * bits, bits), k.constant(bits, 0));
         k.delay(&format!("term_{lane}"), counted.signed())
@@ -164,7 +165,7 @@ mod tests {
         buffers: [[Option<i64>; WIDTHS.len()]; BUFFERS + 1],
         word: [Option<i64>; WIDTHS.len()],
         added: [Option<Added>; 2],
-        reads: Option<usize>,
+        reads: [Option<usize>; 2],
         writes: Option<usize>,
     }
 
@@ -181,7 +182,7 @@ mod tests {
         }
 
         fn clock(&mut self, inputs: &[Word]) {
-            if let Some(buffer) = self.reads.take() {
+            if let Some(buffer) = self.reads[0] {
                 self.word = self.buffers[buffer];
             }
             let before = self.buffers;
@@ -199,7 +200,7 @@ mod tests {
             let (index, first) = (inputs[2].number() as usize, inputs[1].number() == 0);
             let enters = (inputs[0].number() == 1).then_some(Added { index, first, sum });
             self.added = [self.added[1], enters];
-            self.reads = (inputs[5].number() == 1).then(|| inputs[6].number() as usize);
+            self.reads = [self.reads[1], (inputs[5].number() == 1).then(|| inputs[6].number() as usize)];
             // Sweeps never write START.
             self.writes = (inputs[7].number() == 1).then(|| inputs[8].number() as usize);
         }
@@ -230,7 +231,7 @@ mod tests {
             buffers: Default::default(),
             word: Default::default(),
             added: Default::default(),
-            reads: None,
+            reads: Default::default(),
             writes: None,
         };
         check(block.kernel.kernel(), &stimulus, &mut reference);
