@@ -7,7 +7,7 @@ use rust_hdl::prelude::*;
 use crate::device::{Device, Inputs, Outputs};
 use crate::error::HdlError;
 use crate::language::Hierarchy;
-use crate::primitives::{CALIBRATION_FILE, COLUMN_FILE, MEMORY_FILE};
+use crate::primitives::{CALIBRATION_FILE, COLUMN_FILE};
 use crate::taps::{words, Observed};
 use crate::wire::Word;
 use crate::{engine, serial};
@@ -66,7 +66,7 @@ macro_rules! design {
 design!(engine::Engine, |engine: &engine::Engine| {
     let columns = engine.pass.pass_program.column_file().map(|text| (COLUMN_FILE, text));
     let table = engine.prepare.calibrate.table_file().map(|text| (CALIBRATION_FILE, text));
-    [(MEMORY_FILE, engine.pass.lanes.memory_file())].into_iter().chain(columns).chain(table).collect()
+    engine.pass.lanes.memory_files().into_iter().chain(columns).chain(table).collect()
 });
 
 design!(serial::Engine, |engine: &serial::Engine| engine.pass.memory_files());

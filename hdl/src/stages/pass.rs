@@ -51,7 +51,6 @@ pub struct Pass {
     source: Delay,
     control: Delay,
     valid: BitDelay,
-    address: Delay,
     select: OperandSelect,
     /// The MAC lanes.
     pub lanes: Lanes,
@@ -97,7 +96,6 @@ impl Pass {
             source: Delay::new(SOURCE_BITS, 2),
             control: Delay::new(control_bits(model), 3),
             valid: BitDelay::new(3 + pass_program.latency()),
-            address: Delay::new(pass_program.coefficient_address.width(), 1),
             select: OperandSelect::new(formats),
             pass_program,
             lanes,
@@ -118,7 +116,6 @@ impl Logic for Pass {
         self.source.clk.next = self.clk.val();
         self.control.clk.next = self.clk.val();
         self.valid.clk.next = self.clk.val();
-        self.address.clk.next = self.clk.val();
         self.select.clk.next = self.clk.val();
         self.lanes.clk.next = self.clk.val();
         self.valid.rst.next = self.rst.val();
@@ -156,8 +153,7 @@ impl Logic for Pass {
         self.control.d.next = self.pass_program.control.val();
         self.valid.d.next = self.issue.val();
 
-        self.address.d.next = self.pass_program.coefficient_address.val();
-        self.lanes.address.next = self.address.q.val();
+        self.lanes.address.next = self.pass_program.coefficient_address.val();
         self.lanes.operands.next = self.select.operands.val();
         self.lanes.valid.next = self.valid.q.val();
         self.lanes.control.next = self.control.q.val();

@@ -40,7 +40,8 @@ pub fn fit(scene: &Scene, shapes: &[Shape], board: &Board, widths: Widths) -> (V
 }
 
 /// Lanes and memories of the parallel engine: the scene's number of lanes, else the most for which there is block RAM.
-/// Block RAM is preferred to distributed RAM, since a deep distributed RAM is the longest path of its design.
+/// Block RAM is preferred to distributed RAM, since a deep distributed RAM is the longest path of its design. With the same
+/// number of lanes, one memory is preferred to one of its own for the low limbs of Cz⁺.
 fn parallel(
     formats: &Formats,
     matrices: &[Matrix],
@@ -56,14 +57,18 @@ fn parallel(
         Kind::Ax => 2f64.powi(quantised.ax.exponent - prune_bits as i32) as i64,
         Kind::Ay => 2f64.powi(quantised.ay.exponent - prune_bits as i32) as i64,
     };
-    let with = |groups: usize| {
+    let narrow_may = formats.inverse_low_bits > 0 && shapes.len() == 1;
+    let with = |groups: usize, narrow: bool| {
         let lanes_per_parity = quads.div_ceil(groups);
         let lay_out = |(quantised, shape): (&Quantised, &Shape)| {
             let quads = shape.quads().len();
             let formats =
                 Formats { quads, lanes_per_parity, groups: quads.div_ceil(lanes_per_parity), ..formats.clone() };
-            let limits = matrices.iter().map(|&matrix| (matrix, threshold(quantised, matrix))).collect();
+            let mut order = matrices.to_vec();
+            order.sort_by_key(|matrix| narrow && matrix.kind == Kind::InverseLow);
+            let limits = order.into_iter().map(|matrix| (matrix, threshold(quantised, matrix))).collect();
             let storage = Storage::new(limits, quantised, quads, lanes_per_parity);
+            let storage = if narrow { storage.with_narrow() } else { storage };
             LaidOut { formats, storage, parts: shape.parts }
         };
         let mut laid_out: Vec<LaidOut> = quantised.iter().zip(shapes).map(lay_out).collect();
@@ -74,7 +79,7 @@ fn parallel(
     };
     let product = board.multipliers_for(MULTIPLIER_BITS, MULTIPLIER_BITS);
     // The multipliers of the other blocks do not depend on the number of lanes.
-    let all = with(1);
+    let all = with(1, false);
     let others = all.1.multipliers() - 4 * quads * product;
     let left = (board.multipliers as usize).saturating_sub(others);
     let least = MIN_LANES.min(quads);
@@ -86,8 +91,10 @@ fn parallel(
     groups.dedup();
     // Where nothing fits, the design with the fewest block RAMs.
     let mut leanest: Option<(Vec<LaidOut>, Resources)> = None;
-    for groups in groups {
-        let design = with(groups);
+    let memories =
+        |groups| [false, true].into_iter().take(1 + usize::from(narrow_may)).map(move |narrow| (groups, narrow));
+    for (groups, narrow) in groups.into_iter().flat_map(memories) {
+        let design = with(groups, narrow);
         if design.1.fits(board) {
             return design;
         }

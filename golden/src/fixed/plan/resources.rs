@@ -11,6 +11,7 @@
 //! | fold | input of the passes | Q × 4 · `fold_bits` |
 //! | pass | v_ij as operands, except those of the highest degree | their number · Q × 4 · `data_bits` |
 //! | pass | coefficients; list of their columns | words × 18 · lanes; words × address, twice where Ax is used for Ay |
+//! | pass | low limbs of Cz⁺, where the words would not fit otherwise | a power of two × `limb_align` · lanes |
 //! | rescale | raw v_00 | Q × 4 · `acc_bits` |
 //! | search | polynomials, one memory per coefficient | 3 buffers of Q × 4 · `search_bits` |
 //! | search | the next subarray's or frame's | Q × 4 · `search_bits` |
@@ -18,7 +19,7 @@
 
 use serde::Serialize;
 
-use super::storage::{word_bits, LaidOut};
+use super::storage::{word_bits, LaidOut, Storage};
 use crate::board::Board;
 use crate::fixed::stages::prepare::GAIN_BITS;
 use crate::fixed::stages::resultants::POSITION_BITS;
@@ -155,7 +156,8 @@ impl Resources {
         let f = &cases[0].formats;
         // Shared memories are sized for the largest case; the coefficients of all cases add up.
         let quads = f.quads;
-        let words = cases.iter().map(|case| case.storage.words()).sum();
+        let sum = |words: fn(&Storage) -> usize| cases.iter().map(|case| words(&case.storage)).sum::<usize>();
+        let [words, wide, narrow] = [Storage::words, Storage::wide_words, Storage::narrow_words].map(sum);
         let listed = cases.iter().any(|case| case.storage.listed);
         let frame_quads = |case: &LaidOut| case.parts * case.formats.quads;
         let quad = |bits: u32| 4 * bits as usize;
@@ -184,7 +186,11 @@ impl Resources {
         if f.degree > 0 {
             memories.push(ram(Holds::Operands(0), operand_vectors(f.degree) * quads, quad(f.data_bits)));
         }
-        memories.push(memory(Holds::Coefficients, words, word_bits(f), true));
+        memories.push(memory(Holds::Coefficients, wide, word_bits(f), true));
+        if narrow > 0 {
+            let bits = 4 * f.lanes_per_parity * f.limb_align as usize;
+            memories.push(memory(Holds::LowCoefficients, narrow, bits, true));
+        }
         if listed {
             // The transposed address as well, if it is read.
             let addresses = if f.shared_a { 2 } else { 1 };

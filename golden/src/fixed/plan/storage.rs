@@ -5,12 +5,15 @@
 //! coefficient for Cz⁺, of one for the scaled A, whose entries multiply v_ij of the size of v_00. Pruned coefficients
 //! are zero in the bit-true model as well; a kept column keeps all its bits. Small arrays keep every column.
 //!
+//! A lane's word has the width of a multiplier's operand, 18 bits. The low limbs of Cz⁺ are a few bits wide; where the words
+//! would not fit the board's block RAMs otherwise, they stand in a narrow memory of their own, as the last words.
+//!
 //! On a square subarray of square pitch, Ay is Ax with x and y exchanged. At degree 1, where no v_ij adds both, Ay is
 //! not stored: v_01 is the Ax pass over the transposed v_00, and the result is transposed.
 
 use crate::fixed::words::formats::{Formats, MULTIPLIER_BITS};
 use crate::fixed::words::quantised::{coefficient, Quantised};
-use crate::fixed::words::schedule::{Matrix, Product};
+use crate::fixed::words::schedule::{Kind, Matrix, Product};
 
 /// Least number of cycles from a quad's row of low limbs to its row of high limbs: the first is written one cycle after
 /// it arrives, and read two before the other does.
@@ -34,6 +37,9 @@ pub struct Storage {
     /// Cycles without a product after each accumulation. In the first the accumulators of the lanes are cleared; where a
     /// case has one quad or two, more let the row of low limbs be written before it is read for the high limbs.
     pub pause: usize,
+    /// Number of words, the last ones, that are in a memory of their own, of `limb_align` bits per lane: all those of the
+    /// low limbs of Cz⁺, or none.
+    pub narrow: usize,
 }
 
 /// A case with its lanes and its part of the coefficient memory.
@@ -86,7 +92,28 @@ impl Storage {
         let of = |&(matrix, limit): &(Matrix, i64)| (0..groups).map(|group| kept(matrix, limit, group)).collect();
         let columns = limits.iter().map(of).collect();
         let matrices = limits.into_iter().map(|(matrix, _)| matrix).collect();
-        Storage { matrices, columns, base: 0, listed: false, streamed: false, pause: 1 }
+        Storage { matrices, columns, base: 0, listed: false, streamed: false, pause: 1, narrow: 0 }
+    }
+
+    /// With the low limbs of Cz⁺, which must be the last matrices, in a memory of their own.
+    pub fn with_narrow(self) -> Self {
+        let low = self.matrices.iter().zip(&self.columns).filter(|(matrix, _)| matrix.kind == Kind::InverseLow);
+        let narrow = low.flat_map(|(_, groups)| groups).map(Vec::len).sum();
+        Storage { narrow, ..self }
+    }
+
+    /// Number of words of the coefficient memory: those that are not in the narrow one, and, beside that, a word of zeros,
+    /// which is read where the narrow one is.
+    pub fn wide_words(&self) -> usize {
+        self.words() - self.narrow + usize::from(self.narrow > 0)
+    }
+
+    /// Number of words of the narrow memory, a power of two, or 0: a word stands at the lower bits of its address.
+    pub fn narrow_words(&self) -> usize {
+        match self.narrow {
+            0 => 0,
+            words => words.next_power_of_two(),
+        }
     }
 
     /// Puts the cases of a scene into one memory, one after the other, with a list of columns if one of them needs it.

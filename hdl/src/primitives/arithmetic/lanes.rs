@@ -7,7 +7,7 @@ use dermis_golden::fixed::{CasePlan, Model};
 use rust_hdl::prelude::*;
 
 use crate::kernel_block;
-use crate::language::{concat, Body, Builder, Contents, Expr, Kernel, Net, Type};
+use crate::language::{concat, Body, Builder, Contents, Expr, Kernel, MemoryPort, Net, Type};
 use crate::primitives::address::case_counter::{largest, value_by_case};
 use crate::primitives::address::counter::count_bits;
 use crate::primitives::pass::pass_program::control_bits;
@@ -16,15 +16,18 @@ use crate::wire::Wire;
 const M: usize = MULTIPLIER_BITS as usize;
 
 /// ```text
-/// address --> memory --> register --> a \
-///                                        * --> product --> accumulator --> chain --> quad
-/// operands -----------------------> b   /
+/// address --> register --> memory --> register --> a \
+///                                                     * --> product --> accumulator --> chain --> quad
+/// operands ------------------------------------> b   /
 /// ```
 /// A lane is a multiply-accumulator with synchronous clear, as the multiplier blocks of most FPGAs have it. A memory word
-/// holds one coefficient per lane. `operands`, `valid` and `control` belong to the address of two cycles earlier. After
+/// holds one coefficient per lane. `operands`, `valid` and `control` belong to the address of three cycles earlier. After
 /// the last product of an accumulation its rows leave one per cycle: `lanes_per_parity` quads, fewer in the last group,
 /// the first of them four cycles after the `control` of that product. In the cycle after that product `valid` must be
 /// low, because the accumulators are cleared when its product has been added.
+///
+/// Where low limbs are in a memory of their own, both memories are read and their words combined; the other one then has
+/// a word of zeros.
 #[derive(LogicBlock)]
 pub struct Lanes {
     /// Clock; registers change on its rising edge.
@@ -33,7 +36,7 @@ pub struct Lanes {
     pub rst: Signal<In, Bit>,
     /// Index of the case.
     pub which: Wire<In>,
-    /// Address in the coefficient memory, two cycles before its operands.
+    /// Address in the coefficient memory, three cycles before its operands.
     pub address: Wire<In>,
     /// Four operands, one per parity, 18 bits each, signed.
     pub operands: Wire<In>,
@@ -56,6 +59,8 @@ pub struct Lanes {
 
 /// File of the coefficient memory, one line per word.
 pub const MEMORY_FILE: &str = "coefficients.hex";
+/// File of the memory of low limbs, one line per word.
+pub const LOW_FILE: &str = "low_coefficients.hex";
 
 kernel_block!(
     Lanes,
@@ -76,6 +81,8 @@ struct Shape {
     last_rows: Vec<usize>,
     /// Coefficients of each word, one per lane.
     memory: Vec<Vec<i64>>,
+    /// The last so many words are in a memory of their own, with so many bits per lane.
+    narrow: (usize, usize),
     /// Expected signatures of the cases, with the coefficient check.
     signatures: Option<Vec<u32>>,
     control_bits: usize,
@@ -92,6 +99,7 @@ impl Lanes {
             groups: cases.iter().map(|case| case.formats.groups).collect(),
             last_rows: cases.iter().map(|case| last_rows(&case.formats)).collect(),
             memory: cases.iter().flat_map(words).collect(),
+            narrow: (model.first().storage.narrow, formats.limb_align as usize),
             signatures: model.has_coefficient_check().then(|| cases.iter().map(signature).collect()),
             control_bits: control_bits(model),
         })
@@ -115,9 +123,11 @@ impl Lanes {
         block.bind(shape.kernel())
     }
 
-    /// Content of [`MEMORY_FILE`] for `$readmemh`, lane 0 in the least significant bits.
-    pub fn memory_file(&self) -> String {
-        self.kernel.kernel().memory_files().into_iter().map(|(_, text)| text).collect()
+    /// Name and content for `$readmemh` of [`MEMORY_FILE`], and of [`LOW_FILE`] if there is one; lane 0 in the least
+    /// significant bits.
+    pub fn memory_files(&self) -> Vec<(&'static str, String)> {
+        let texts = self.kernel.kernel().memory_files().into_iter().map(|(_, text)| text);
+        [MEMORY_FILE, LOW_FILE].into_iter().zip(texts).collect()
     }
 }
 
@@ -126,12 +136,12 @@ fn last_rows(formats: &Formats) -> usize {
     formats.quads - (formats.groups - 1) * formats.lanes_per_parity
 }
 
-/// A word of the memory as limbs of 64 bits, lane 0 lowest.
-fn limbs(coefficients: &[i64]) -> Vec<u64> {
-    let mut limbs = vec![0; (coefficients.len() * M).div_ceil(64)];
+/// A word of a memory of `bits` bits per lane as limbs of 64 bits, lane 0 lowest.
+fn limbs(coefficients: &[i64], bits: usize) -> Vec<u64> {
+    let mut limbs = vec![0; (coefficients.len() * bits).div_ceil(64)];
     for (lane, &coefficient) in coefficients.iter().enumerate() {
-        for bit in (0..M).filter(|bit| coefficient >> bit & 1 == 1) {
-            let at = lane * M + bit;
+        for bit in (0..bits).filter(|bit| coefficient >> bit & 1 == 1) {
+            let at = lane * bits + bit;
             limbs[at / 64] |= 1 << (at % 64);
         }
     }
@@ -158,16 +168,12 @@ fn own_copy<'k>(k: &'k Builder, name: &str, value: Expr<'k>) -> Expr<'k> {
 
 impl Shape {
     fn kernel(&self) -> Kernel {
-        let (lanes, bit) = (4 * self.per_parity, Type::unsigned(1));
+        let bit = Type::unsigned(1);
         let k = Builder::new("lanes");
         let (rst, which) = (k.input("rst", 1), k.input("which", count_bits(self.groups.len())));
         let (address, operands) = (k.input("address", count_bits(self.memory.len())), k.input("operands", 4 * M));
         let (valid, control) = (k.input("valid", 1), k.input("control", self.control_bits));
-        let words = self.memory.iter().map(|word| limbs(word)).collect();
-        let contents = Contents::File { name: MEMORY_FILE.to_owned(), words };
-        let memory = k.memory("memory", self.memory.len(), lanes * M, contents).holds(Holds::Coefficients);
-        let word = k.delay("word", memory.read(address));
-        let coefficients = k.delay("coefficients", word);
+        let coefficients = self.coefficients(&k, address);
 
         let later = |name: &str, value| {
             let state = k.state(name, bit, rst, 0);
@@ -191,6 +197,44 @@ impl Shape {
         let heads: Vec<Expr> = (0..4).rev().map(|parity| self.parity(&k, rst, parity, shared)).collect();
         k.wire("quad", concat(&heads));
         k.finish()
+    }
+
+    /// One coefficient per lane, three cycles after its address.
+    fn coefficients<'k>(&self, k: &'k Builder, address: Expr<'k>) -> Expr<'k> {
+        let (lanes, (narrow, low)) = (4 * self.per_parity, self.narrow);
+        let (wide_words, low_words) = self.memory.split_at(self.memory.len() - narrow);
+        let file = |name: &str, words| Contents::File { name: name.to_owned(), words };
+        let read =
+            |name: &str, memory: MemoryPort<'k>, at| k.delay(name, k.delay(&format!("{name}_read"), memory.read(at)));
+        let mut words: Vec<Vec<u64>> = wide_words.iter().map(|word| limbs(word, M)).collect();
+        if narrow == 0 {
+            let memory =
+                k.memory("memory", words.len(), lanes * M, file(MEMORY_FILE, words)).holds(Holds::Coefficients);
+            return read("coefficients", memory, k.delay("at", address));
+        }
+        let zeros = wide_words.len();
+        words.push(limbs(&vec![0; lanes], M));
+        let memory = k.memory("memory", words.len(), lanes * M, file(MEMORY_FILE, words)).holds(Holds::Coefficients);
+        k.comment("The low limbs stand at the lower bits of their addresses.");
+        let depth = narrow.next_power_of_two();
+        let mut words = vec![limbs(&vec![0; lanes], low); depth];
+        for (index, word) in low_words.iter().enumerate() {
+            words[(zeros + index) % depth] = limbs(word, low);
+        }
+        let short = k.memory("low_memory", depth, lanes * low, file(LOW_FILE, words)).holds(Holds::LowCoefficients);
+        let is_low = k.wire("is_low", !address.less(k.constant(address.bits(), zeros as u64)));
+        let bits = count_bits(zeros + 1);
+        let at = k.delay("at", is_low.mux(k.constant(bits, zeros as u64), address.low(bits)));
+        let low_at = k.delay("low_at", address.low(count_bits(depth)));
+        let (word, short) = (read("word", memory, at), read("low_word", short, low_at));
+        let shows = k.delay("shows_1", k.delay("shows", is_low));
+        let lane = |lane: usize| {
+            // One copy per lane, to limit fan-out; the attribute keeps synthesis from merging them.
+            let shows = k.scope(&format!("lane_{lane}"), || own_copy(k, "shows", shows));
+            let (own, low_bits) = (word.slice(lane * M, M), short.slice(lane * low, low));
+            own.slice(low, M - low).concat(own.low(low) | (low_bits & shows.repeat(low)))
+        };
+        k.wire("coefficients", concat(&(0..lanes).rev().map(lane).collect::<Vec<_>>()))
     }
 
     /// Rows that leave after the present group; a counter of the groups where there are several.
@@ -295,6 +339,7 @@ mod tests {
             groups: vec![1, 2],
             last_rows: vec![2, 1],
             memory,
+            narrow: (0, 0),
             signatures: Some(vec![0x1234_5678, 0xabcd_ef01]),
             control_bits: 2,
         }
@@ -313,7 +358,7 @@ mod tests {
         shape: Shape,
         /// The products of one, two and three cycles ago.
         pipe: [Beat; 3],
-        addresses: [usize; 2],
+        addresses: [usize; 3],
         /// `None` before the first reset.
         accumulators: Option<Vec<i64>>,
         chain: Option<Vec<i64>>,
@@ -379,10 +424,10 @@ mod tests {
             self.pipe[2] = Beat {
                 valid: inputs[4].number() == 1 && !rst,
                 control: inputs[5].number(),
-                word: self.addresses[1],
+                word: self.addresses[2],
                 operands: inputs[3],
             };
-            self.addresses = [inputs[2].number() as usize, self.addresses[0]];
+            self.addresses = [inputs[2].number() as usize, self.addresses[0], self.addresses[1]];
             if rst {
                 self.pipe.iter_mut().for_each(|beat| beat.valid = false);
                 (self.left, self.group, self.leaves) = (0, 0, Some([false; 3]));
@@ -424,12 +469,23 @@ mod tests {
 
     #[test]
     fn rows_of_sums_leave_and_the_signature_is_the_model_s() {
-        let shape = shape();
+        is_equal(shape());
+    }
+
+    #[test]
+    fn low_limbs_may_be_in_a_memory_of_their_own() {
+        let mut shape = shape();
+        shape.narrow = (7, 5);
+        shape.memory[13..].iter_mut().flatten().for_each(|coefficient| *coefficient &= 31);
+        is_equal(shape);
+    }
+
+    fn is_equal(shape: Shape) {
         let block = Lanes::of(&shape);
         let stimulus = stimulus(&shape, 6000);
         let mut reference = Integers {
             pipe: Default::default(),
-            addresses: [0; 2],
+            addresses: [0; 3],
             accumulators: None,
             chain: None,
             left: 0,
@@ -444,7 +500,7 @@ mod tests {
     #[test]
     fn a_line_of_the_memory_file_has_lane_0_lowest() {
         let block = Lanes::of(&Shape { memory: vec![[-1, 0, 1].repeat(4); 2], ..shape() });
-        let text = block.memory_file();
+        let [(_, text)] = &block.memory_files()[..] else { panic!("one file") };
         // All digits of 12 lanes of 18 bits; −1, 1, 0 and −1 in the lowest four.
         assert_eq!(text.lines().count(), 2);
         assert!(text.lines().all(|line| line.len() == 54 && line.ends_with("c000100003ffff")), "{text}");
