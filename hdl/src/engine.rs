@@ -8,6 +8,7 @@
 //! Overlaps shorten the frame interval:
 //! - While a frame is computed, the next is received; the frame buffer is free as soon as `fold` has read it.
 //! - While one subarray is searched, the v_ij of the next are computed, or those of the next frame's first.
+//! - Subarrays whose values are complete are sent while the next ones are searched.
 //! - While a frame is sent, the next is searched. Only its values wait until the first one has been sent. Where there are
 //!   several subarrays, or where the frame is not searched, its v_ij wait: nothing may stand before their first sweep,
 //!   because the v_ij of the next frame are written over them.
@@ -127,6 +128,7 @@ pub struct Engine {
     condition: Dff,
     framing: Dff,
     searched_condition: Dff,
+    searched_first: Dff,
     searched_last: Dff,
     searched_framing: Dff,
     sent_framing: Dff,
@@ -196,6 +198,7 @@ impl Engine {
             condition: Default::default(),
             framing: Default::default(),
             searched_condition: Default::default(),
+            searched_first: Default::default(),
             searched_last: Default::default(),
             searched_framing: Default::default(),
             sent_framing: Default::default(),
@@ -268,6 +271,7 @@ impl Logic for Engine {
         self.condition.clk.next = self.clk.val();
         self.framing.clk.next = self.clk.val();
         self.searched_condition.clk.next = self.clk.val();
+        self.searched_first.clk.next = self.clk.val();
         self.searched_last.clk.next = self.clk.val();
         self.searched_framing.clk.next = self.clk.val();
         self.sent_framing.clk.next = self.clk.val();
@@ -313,7 +317,7 @@ impl Logic for Engine {
         comment!("A subarray goes to the search when the search is idle;");
         comment!("the first of several also waits for the previous send,");
         comment!("as does one that is not searched: its last sweep comes first");
-        self.begin_send.next = self.search.values_begin.val() & self.searched_last.q.val();
+        self.begin_send.next = self.search.values_begin.val() & self.searched_first.q.val();
         self.sent_case.keep.next = self.begin_send.val();
         self.sent_case.word.next = self.searched_case.kept.val();
         self.sending.d.next =
@@ -339,6 +343,7 @@ impl Logic for Engine {
             (self.hand_over.val() | (self.searching.q.val() & !self.search.done.val())) & !self.rst.val();
         self.first.d.next = self.begin_frame.val() | (self.first.q.val() & !self.hand_over.val());
         self.searched_condition.d.next = self.searched_condition.q.val();
+        self.searched_first.d.next = self.searched_first.q.val();
         self.searched_last.d.next = self.searched_last.q.val();
         self.searched_framing.d.next = self.searched_framing.q.val();
         self.sent_framing.d.next = self.sent_framing.q.val();
@@ -347,6 +352,7 @@ impl Logic for Engine {
         }
         if self.hand_over.val() {
             self.searched_condition.d.next = self.condition.q.val();
+            self.searched_first.d.next = self.first.q.val();
             self.searched_last.d.next = self.part.last.val();
             self.searched_framing.d.next = self.framing.q.val();
         }
@@ -370,7 +376,7 @@ impl Logic for Engine {
         comment!("Waiting for the previous frame is not counted");
         self.frame_cycles.begin_frame.next = self.begin_frame.val();
         self.frame_cycles.waits.next = self.complete.val() & self.first.q.val() & !self.hand_over.val();
-        self.frame_cycles.hand_over.next = self.leaves.val();
+        self.frame_cycles.hand_over.next = self.hand_over.val() & self.first.q.val();
         self.frame_cycles.stands.next = self.search.stands.val();
         self.condition.d.next = self.condition.q.val();
         self.framing.d.next = self.framing.q.val();
@@ -453,6 +459,7 @@ impl Logic for Engine {
         self.forces.framing.next = self.sent_framing.q.val();
         self.forces.cycles.next = self.frame_cycles.cycles.val();
         self.send.start.next = self.begin_send.val();
+        self.send.begins.next = self.search.values_begin.val();
         self.send.room.next = self.forces.room.val();
         self.forces.offer.next = self.send.offer.val();
         self.forces.beat.next = self.send.beat.val();

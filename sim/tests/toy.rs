@@ -58,6 +58,7 @@ fn vectors() -> Vec<Vector> {
                     Stage { name: "scale", words: scaled },
                 ],
                 cycles: CYCLES,
+                beat_cycles: (1..=7).collect(),
             },
         }
     };

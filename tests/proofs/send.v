@@ -25,7 +25,7 @@ module proof(
   // Assumed of the engine: a frame starts when the previous one has been sent.
   wire begins = start_it && !within;
   @TOP@__send send(
-    .clk(clk), .rst(rst), .start(begins), .room(may), .m_axis_tvalid(m_valid), .m_axis_tready(1'b1),
+    .clk(clk), .rst(rst), .start(begins), .begins(begins), .room(may), .m_axis_tvalid(m_valid), .m_axis_tready(1'b1),
     .m_axis_tlast(m_last), .offer(offer), .beat(beat), .part(part), .address(address), .lane(lane), .done(done)
   );
   @TOP@__forces forces(

@@ -5,7 +5,8 @@
 //! ```
 
 use super::model::Model;
-use super::plan::cycles::Cycles;
+use super::plan::cycles::{BeatCycles, Cycles};
+use super::stages::choose;
 use super::stages::force::Force;
 use super::stages::receive::mask_dead;
 use super::stages::resultants::{self, sums};
@@ -35,6 +36,8 @@ pub struct Trace {
     pub stages: Vec<Stage>,
     /// Cycle counts of the frame at full speed.
     pub cycles: Cycles,
+    /// Cycles from the last input beat to each output beat, status included, at full speed.
+    pub beat_cycles: Vec<u64>,
 }
 
 /// Stages that pass on single words, not quads, in the serial engine.
@@ -51,6 +54,7 @@ impl Model {
         let solved: Vec<SubarrayTrace> = case.parts.iter().map(solve).collect();
         let searched: Vec<bool> = solved.iter().map(|s| s.condition && self.searches()).collect();
         let cycles = Cycles::of_case(self, case, &searched);
+        let sending = BeatCycles::new(self, case, &searched);
         let number = if self.chooses() { case.number() } else { 0 };
 
         let mut forces = vec![Force::default(); sensor.taxels()];
@@ -72,7 +76,7 @@ impl Model {
                 normalise: s.normalise,
                 rescale_saturations: s.saturations,
                 force_saturations,
-                cycles: (cycles.first_output - self.prepare.latency() - self.resultants_delay()) as u32,
+                cycles: sending.counted as u32,
             };
             status.beats()
         });
@@ -95,6 +99,7 @@ impl Model {
             Stage { name: "search", words: sweeps.map(candidate).collect() },
             quads("force", |s| &s.found.values),
         ];
+        let choice = if self.chooses() { choose::LATENCY } else { 0 };
         stages.retain(|stage| self.chooses() || stage.name != "choose");
         Trace {
             beats: match self.sends_resultants() {
@@ -104,6 +109,7 @@ impl Model {
             status,
             stages: as_engine_streams(self.board.engine, stages),
             cycles: cycles.after_choice(self),
+            beat_cycles: sending.beats.into_iter().map(|beat| beat + choice).collect(),
         }
     }
 }

@@ -38,6 +38,7 @@ pub use memory::enable_register::EnableRegister;
 pub use memory::ram::Ram;
 pub use output::force_unit::{ForceUnit, STEPS as FORCE_STEPS};
 pub use output::frame_cycles::{FrameCycles, CYCLE_BITS};
+pub use output::parts_begun::PartsBegun;
 pub use output::status_code::StatusCode;
 pub use pass::limb_sum::LimbSum;
 pub use pass::operand_select::OperandSelect;

@@ -1,13 +1,14 @@
-//! Stage `send`: requests the forces row-major, then each subarray's status beats, while the output queue has room.
+//! Stage `send`: requests the forces row-major, then each subarray's status beats, while the output queue has room. A
+//! taxel waits until the values of its subarray begin, so that the upper subarrays leave while the lower ones are searched.
 
 use dermis_golden::fixed::stages::send::STATUS_BEATS;
 use dermis_golden::fixed::Model;
 use rust_hdl::prelude::*;
 
-use crate::primitives::{count_bits, largest, BitDelay, CaseCounter, Counter, Dff, Scan, StatusCode};
+use crate::primitives::{count_bits, largest, BitDelay, CaseCounter, Counter, Dff, PartsBegun, Scan, StatusCode};
 use crate::wire::Wire;
 
-/// From `start`, one beat is requested in each cycle with `room`: all taxels, then the status beats.
+/// From the first subarray's values on, one beat is requested in each cycle with `room`: all taxels, then the status beats.
 #[derive(LogicBlock)]
 pub struct Send {
     /// Clock; registers change on its rising edge.
@@ -16,8 +17,10 @@ pub struct Send {
     pub rst: Signal<In, Bit>,
     /// Index of the case of the frame being sent; constant until its last beat.
     pub which: Wire<In>,
-    /// The first values are available: start requesting beats.
+    /// The frame's first values are available: start requesting beats.
     pub start: Signal<In, Bit>,
+    /// The first values of a subarray are available; with `start` those of the first.
+    pub begins: Signal<In, Bit>,
     /// A beat is offered on the output, monitored for the end of the frame.
     pub m_axis_tvalid: Signal<In, Bit>,
     /// The receiver accepts a beat in this cycle.
@@ -42,6 +45,7 @@ pub struct Send {
     words: Counter,
     parts: CaseCounter,
     code: StatusCode,
+    begun: PartsBegun,
     sending: Dff,
     status: Dff,
     out: BitDelay,
@@ -61,6 +65,7 @@ impl Send {
             rst: Default::default(),
             which: Wire::new(count_bits(counts.len())),
             start: Default::default(),
+            begins: Default::default(),
             m_axis_tvalid: Default::default(),
             m_axis_tready: Default::default(),
             m_axis_tlast: Default::default(),
@@ -75,6 +80,7 @@ impl Send {
             words: Counter::new(STATUS_BEATS),
             parts: CaseCounter::new(&counts),
             code: StatusCode::new(count_bits(count)),
+            begun: PartsBegun::new(count),
             sending: Default::default(),
             status: Default::default(),
             out: BitDelay::new(1),
@@ -93,10 +99,14 @@ impl Logic for Send {
         self.parts.clk.next = self.clk.val();
         self.sending.clk.next = self.clk.val();
         self.status.clk.next = self.clk.val();
+        self.begun.clk.next = self.clk.val();
 
         self.scan.which.next = self.which.val();
         self.parts.which.next = self.which.val();
-        self.step.next = self.sending.q.val() & self.room.val();
+        self.begun.begins.next = self.begins.val();
+        self.begun.first.next = self.start.val();
+        self.begun.part.next = self.scan.part.val();
+        self.step.next = self.sending.q.val() & self.room.val() & (self.status.q.val() | self.begun.open.val());
         self.at_end.next = self.step.val() & !self.status.q.val() & self.scan.last.val();
         self.finish.next = self.step.val() & self.status.q.val() & self.words.last.val() & self.parts.last.val();
         self.offer.next = self.step.val();

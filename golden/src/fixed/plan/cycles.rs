@@ -12,7 +12,8 @@
 //!          (the last alone when nothing is searched)
 //! next     1 from a subarray's completion to the passes of the one after it, which go on while it is searched
 //! choose   2, where the case is chosen per frame
-//! send     begins with the last subarray's first value: 9 to the first beat, then one beat a cycle
+//! send     begins with the first subarray's first value: 9 to the first beat, then one beat a cycle; a beat waits for the
+//!          first value of its subarray
 //! ```
 
 use serde::Serialize;
@@ -56,7 +57,7 @@ const LAST_SWEEP: u64 = 8;
 const UNSEARCHED: u64 = 3;
 /// Cycles from the hand-over of a subarray to the search until the passes of the next one start.
 pub(super) const NEXT: u64 = 1;
-/// Cycles from the last subarray's first value, Q cycles before the end of its values, to the first output beat.
+/// Cycles from a subarray's first value, Q cycles before the end of its values, to the output of a force of it.
 pub(super) const SEND: u64 = 13;
 /// Cycles from the start of a subarray, beyond its Q quads, until the frame buffer is free.
 pub(super) const FOLDED: u64 = 2;
@@ -70,7 +71,7 @@ pub struct Cycles {
     pub latency: u64,
     /// Cycles from the first input beat to the last output beat, both included.
     pub total: u64,
-    /// Cycles from one output beat to the next.
+    /// Least number of cycles from one output beat to the next.
     pub interval: u64,
 }
 
@@ -101,14 +102,11 @@ impl Cycles {
     /// The counts of a frame that `case` solves, without the choice of the case; `searched[k]` says whether subarray k
     /// is searched.
     pub fn of_case(plan: &Plan, case: &CasePlan, searched: &[bool]) -> Self {
-        let taxels = plan.scene.sensor.taxels() as u64;
-        let beats = (plan.force_beats() + case.status_beats()) as u64;
-        let (first_output, interval) = match plan.board.engine {
-            EngineKind::Serial => (serial::first_output(&case.formats, searched.contains(&true)), serial::BEAT),
-            EngineKind::Parallel => (first_output(plan, case, searched), 1),
-        };
-        let latency = first_output + (beats - 1) * interval;
-        Cycles { first_output, latency, total: (taxels << plan.prepare.average) + latency, interval }
+        let taxels = (plan.scene.sensor.taxels() as u64) << plan.prepare.average;
+        let interval = if plan.board.engine == EngineKind::Serial { serial::BEAT } else { 1 };
+        let beats = BeatCycles::new(plan, case, searched).beats;
+        let [first_output, latency] = [beats.first(), beats.last()].map(|beat| beat.copied().unwrap_or(0));
+        Cycles { first_output, latency, total: taxels + latency, interval }
     }
 
     /// The counts with those of the choice, where the hardware chooses among several cases.
@@ -122,22 +120,67 @@ impl Cycles {
     }
 }
 
-/// Cycles of the parallel engine from the last input beat to the first output beat.
-fn first_output(plan: &Plan, case: &CasePlan, searched: &[bool]) -> u64 {
-    let quads = case.formats.quads as u64;
+/// When a frame's output beats leave, at full speed, without the choice of the case.
+pub(in crate::fixed) struct BeatCycles {
+    /// Cycles that the status states: from the arrival of the last code behind `prepare` to the first force.
+    pub counted: u64,
+    /// Cycles from the last input beat to each output beat, status included.
+    pub beats: Vec<u64>,
+}
+
+impl BeatCycles {
+    /// Of a frame that `case` solves; `searched[k]` says whether subarray k is searched.
+    pub fn new(plan: &Plan, case: &CasePlan, searched: &[bool]) -> Self {
+        let count = plan.force_beats() + case.status_beats();
+        if plan.board.engine == EngineKind::Serial {
+            let first = serial::first_output(&case.formats, searched.contains(&true));
+            let beats = (0..count as u64).map(|beat| first + beat * serial::BEAT).collect();
+            return BeatCycles { counted: first - plan.prepare.latency(), beats };
+        }
+        let forces = forces(plan, case, &values(plan, case, searched));
+        let [first, last] = [forces.first(), forces.last()].map(|force| force.copied().unwrap_or(0) + ACCEPT + SEND);
+        let before = plan.prepare.latency();
+        let beats = match plan.sends_resultants() {
+            // They are sent once the last force has been added.
+            true => (before + last + 1 + plan.resultants_delay() - forces.len() as u64..).take(count).collect(),
+            false => {
+                let forces = forces.iter().map(|force| before + force + ACCEPT + SEND);
+                forces.chain(before + last + 1..).take(count).collect()
+            }
+        };
+        BeatCycles { counted: first, beats }
+    }
+}
+
+/// Cycles from the start of a frame to the first value of each subarray.
+fn values(plan: &Plan, case: &CasePlan, searched: &[bool]) -> Vec<u64> {
     let passes = passes(case);
+    // After a search the values are sent while they are computed.
+    let early = if plan.searches() { case.formats.quads as u64 } else { 0 };
     // A subarray is handed to the search when its passes are complete and the search of the one before has ended.
     let (mut complete, mut searched_at) = (0, 0);
-    for &searching in searched {
+    let value = |&searching: &bool| {
         complete += passes;
         let handed_over = complete.max(searched_at);
         searched_at = handed_over + search(plan, case, searching);
         complete = handed_over + NEXT;
-    }
-    // After a search the last subarray's values are sent while they are computed.
-    let early = if plan.searches() { quads } else { 0 };
-    // Resultants are sent once the last force has been added.
-    plan.prepare.latency() + ACCEPT + searched_at - early + SEND + plan.resultants_delay()
+        searched_at - early
+    };
+    searched.iter().map(value).collect()
+}
+
+/// The cycle in which each force is requested, row-major, where the first values of the subarrays come in the cycles
+/// `values`: one per cycle, none before the values of its subarray.
+pub(super) fn forces(plan: &Plan, case: &CasePlan, values: &[u64]) -> Vec<u64> {
+    let (sensor, layout, grid) = (&plan.scene.sensor, case.layout(), case.grid());
+    let mut free = 0;
+    let taxel = |index: usize| {
+        let (row, col) = (index / sensor.cols, index % sensor.cols);
+        let begun = values[row / layout.rows * grid.cols + col / layout.cols];
+        free = begun.max(free) + 1;
+        free - 1
+    };
+    (0..sensor.taxels()).map(taxel).collect()
 }
 
 /// Cycles from the start of a subarray until its passes are complete.

@@ -11,7 +11,7 @@
 //! The timing follows the hardware cycle by cycle; the co-simulation compares.
 
 use super::contents::{CasePlan, Plan};
-use super::cycles::{passes, search, ACCEPT, FOLDED, NEXT, SEND};
+use super::cycles::{forces, passes, search, ACCEPT, FOLDED, NEXT, SEND};
 use super::serial;
 use crate::board::EngineKind;
 
@@ -43,6 +43,7 @@ fn parallel(plan: &Plan, case: &CasePlan) -> u64 {
     let mut interval = 0;
     for _ in 0..SETTLED {
         let (mut start, mut handed_over) = (begin, 0);
+        let mut values = Vec::with_capacity(parts);
         for part in 0..parts {
             // A whole array's values wait for the force memory, the search of several subarrays does.
             let free = if part == 0 && parts > 1 { sent } else { 0 };
@@ -51,12 +52,14 @@ fn parallel(plan: &Plan, case: &CasePlan) -> u64 {
             if part == 0 && parts == 1 {
                 searched = searched.max(sent + quads);
             }
+            values.push(searched - early);
             if part + 1 < parts {
                 start = handed_over + NEXT;
             }
         }
         let before = sent;
-        sent = searched - early + SEND + beats(plan, case);
+        let forces = forces(plan, case, &values).last().map_or(0, |last| last + 1);
+        sent = forces + SEND + case.status_beats() as u64;
         interval = sent - before;
         let received = start + quads + FOLDED + taxels + ACCEPT + plan.prepare.latency();
         let passed = if plan.searches() { handed_over } else { sent };

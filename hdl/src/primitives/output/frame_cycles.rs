@@ -6,8 +6,8 @@ use crate::kernel_block;
 use crate::language::{Body, Builder, Kernel, Type};
 use crate::wire::Wire;
 
-/// Counts from `begin_frame`; at `hand_over`, when the frame leaves the passes, the count moves to `cycles` and goes on
-/// there, so that the next frame can begin. Cycles in which a frame waits for the one before it are not counted.
+/// Counts from `begin_frame`; at `hand_over`, when the frame's first subarray leaves the passes, the count moves to `cycles`
+/// and goes on there, so that the next frame can begin. Cycles in which a frame waits for the one before it are not counted.
 ///
 /// All inputs take effect `COUNT_DELAY` cycles later: the first beat of the frame before has been sent by then.
 #[derive(LogicBlock)]
@@ -20,7 +20,7 @@ pub struct FrameCycles {
     pub begin_frame: Signal<In, Bit>,
     /// The frame in the passes waits for the one before.
     pub waits: Signal<In, Bit>,
-    /// The last subarray of the frame goes to the search.
+    /// The first subarray of the frame goes to the search.
     pub hand_over: Signal<In, Bit>,
     /// The frame that is searched waits for the one before.
     pub stands: Signal<In, Bit>,

@@ -20,6 +20,8 @@ pub(crate) struct Sample {
     pub forces: usize,
     /// Cycle counts at full speed.
     pub cycles: Cycles,
+    /// Cycles from the last input beat to each output beat, at full speed.
+    pub beat_cycles: Vec<u64>,
 }
 
 impl Sample {
@@ -27,7 +29,14 @@ impl Sample {
         let trace = model.run(&codes);
         let forces = trace.beats.len();
         let beats = [trace.beats, trace.status].concat();
-        Sample { codes, taxels: model.scene.sensor.taxels(), beats, forces, cycles: trace.cycles }
+        Sample {
+            codes,
+            taxels: model.scene.sensor.taxels(),
+            beats,
+            forces,
+            cycles: trace.cycles,
+            beat_cycles: trace.beat_cycles,
+        }
     }
 
     /// Whether any force is not zero.

@@ -90,9 +90,10 @@ impl<'a> Scoreboard<'a> {
         let Some(frame) = self.pending.front() else {
             return self.violate(cycle, "an output beat without a frame".to_owned());
         };
-        let Sample { beats, forces, cycles, .. } = &self.samples[frame.sample];
-        let (index, flagged, first_due) =
-            (self.delivered, frame.flagged, frame.timed.map(|at| at + cycles.first_output));
+        let Sample { beats, forces, beat_cycles, .. } = &self.samples[frame.sample];
+        let (index, flagged) = (self.delivered, frame.flagged);
+        let due = frame.timed.map(|at| at + beat_cycles[index]);
+        let timed = due.is_some();
         let mut wanted = beats[index];
         if flagged && index >= *forces && (index - forces).is_multiple_of(STATUS_BEATS) {
             wanted[2] |= FLAG_FRAMING as i32;
@@ -104,13 +105,13 @@ impl<'a> Scoreboard<'a> {
         if last != at_end {
             self.violate(cycle, format!("beat {index}: tlast is {last}"));
         }
-        if let Some(due) = first_due.map(|first| first + index as u64).filter(|due| *due != cycle) {
+        if let Some(due) = due.filter(|due| *due != cycle) {
             self.violate(cycle, format!("beat {index} was due in cycle {due}"));
         }
         self.delivered += 1;
         if at_end {
             self.outcome.frames_out += 1;
-            self.outcome.timed += u64::from(first_due.is_some());
+            self.outcome.timed += u64::from(timed);
             self.outcome.flagged += u64::from(flagged);
             self.pending.pop_front();
             self.delivered = 0;
