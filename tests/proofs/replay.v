@@ -13,11 +13,13 @@ module proof(input clk, input again, input begin_it, input offered, input sample
   reg within, began, next, quad_valid;
   // Rows announced and come, of both limbs; words of v_00 and later ones gone.
   reg [7:0] announced, came, went, since;
+  // The same a cycle before.
+  reg [7:0] came_before;
   // Assumed of the engine: no frame starts before the previous one's rows have left, no row is announced in the cycle
-  // after the start, none of the high limbs before its low limbs have come, no later row before all of v_00 has left.
+  // after the start, none of the high limbs before its low limbs have been written, no later row before all of v_00 has left.
   wire start = begin_it && (!within || (announced == came && came - LOW == went && came != 8'd0));
   wire quad_soon = offered && within && !start && !began
-                 && (LOW == 0 || announced < LOW || announced >= RAW || came > announced - LOW)
+                 && (LOW == 0 || announced < LOW || announced >= RAW || came_before > announced - LOW)
                  && (announced < RAW || (went >= ROWS && announced < RAW + 8'd3));
   // The lowest bit represents all bits of a limb, which take the same path; so nothing is carried where limbs are added.
   wire [4*@LANE@-1:0] quad = {4{{(@LANE@-1){1'b0}}, sample}};
@@ -40,6 +42,7 @@ module proof(input clk, input again, input begin_it, input offered, input sample
   always @(posedge clk) begin
     words_before <= words_valid && !rst;
     began <= start && !rst;
+    came_before <= rst || start ? 8'd0 : came;
     {quad_valid, next} <= rst ? 2'd0 : {next, quad_soon};
     if (rst) {within, announced, came, went, since} <= 33'd0;
     else begin

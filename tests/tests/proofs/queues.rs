@@ -56,7 +56,7 @@ fn rows_that_wait_for_their_shift_come_out_in_order() {
         let mut defects = vec![
             // The replay stands still; rows are written in the wrong order; raw rows pass unshifted.
             Change::value("rescale", "reads__enable", |k| k.named("collecting__q") & k.named("quad_soon")),
-            Change::value("rescale", "raw__write_address", |k| !k.named("rows__value")),
+            Change::value("rescale", "raw__write_address", |k| !k.named("row__q")),
             Change::value("rescale", "enters", |k| k.named("read__q") | k.named("quad_valid")),
         ];
         if limbs == 2 {
