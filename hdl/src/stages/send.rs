@@ -45,7 +45,7 @@ pub struct Send {
     words: Counter,
     parts: CaseCounter,
     code: StatusCode,
-    begun: PartsBegun,
+    released: PartsBegun,
     sending: Dff,
     status: Dff,
     out: BitDelay,
@@ -80,7 +80,7 @@ impl Send {
             words: Counter::new(STATUS_BEATS),
             parts: CaseCounter::new(&counts),
             code: StatusCode::new(count_bits(count)),
-            begun: PartsBegun::new(count),
+            released: PartsBegun::new(count),
             sending: Default::default(),
             status: Default::default(),
             out: BitDelay::new(1),
@@ -99,14 +99,14 @@ impl Logic for Send {
         self.parts.clk.next = self.clk.val();
         self.sending.clk.next = self.clk.val();
         self.status.clk.next = self.clk.val();
-        self.begun.clk.next = self.clk.val();
+        self.released.clk.next = self.clk.val();
 
         self.scan.which.next = self.which.val();
         self.parts.which.next = self.which.val();
-        self.begun.begins.next = self.begins.val();
-        self.begun.first.next = self.start.val();
-        self.begun.part.next = self.scan.part.val();
-        self.step.next = self.sending.q.val() & self.room.val() & (self.status.q.val() | self.begun.open.val());
+        self.released.begins.next = self.begins.val();
+        self.released.first.next = self.start.val();
+        self.released.part.next = self.scan.part.val();
+        self.step.next = self.sending.q.val() & self.room.val() & (self.status.q.val() | self.released.open.val());
         self.at_end.next = self.step.val() & !self.status.q.val() & self.scan.last.val();
         self.finish.next = self.step.val() & self.status.q.val() & self.words.last.val() & self.parts.last.val();
         self.offer.next = self.step.val();

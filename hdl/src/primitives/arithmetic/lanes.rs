@@ -123,8 +123,8 @@ impl Lanes {
         block.bind(shape.kernel())
     }
 
-    /// Name and content for `$readmemh` of [`MEMORY_FILE`], and of the memory of low limbs if there is one; lane 0 in the least
-    /// significant bits.
+    /// Name and content for `$readmemh` of [`MEMORY_FILE`], and of the memory of low limbs if there is one; lane 0 in
+    /// the least significant bits.
     pub fn memory_files(&self) -> Vec<(&'static str, String)> {
         let texts = self.kernel.kernel().memory_files().into_iter().map(|(_, text)| text);
         [MEMORY_FILE, LOW_FILE].into_iter().zip(texts).collect()
