@@ -412,7 +412,7 @@ impl Logic for Engine {
         self.fold.normalised.next = self.normalise.shifted.val();
 
         comment!("fold -> pass -> rescale -> unfold, and back to pass");
-        self.pass.start.next = self.fold.done.val();
+        self.pass.start.next = self.fold.readable.val();
         self.fold.read_address.next = self.pass.input_address.val();
         self.pass.input_quad.next = self.fold.read_quad.val();
         self.rescale.start.next = self.start.val();

@@ -18,6 +18,7 @@ mod search;
 mod stream;
 
 pub use address::case_counter::{expression_by_case, largest, CaseCounter};
+pub use address::case_equal::CaseEqual;
 pub use address::counter::{count_bits, Counter};
 pub use address::lane_mask::LaneMask;
 pub use address::quad_address::{frame_quads, QuadAddress};

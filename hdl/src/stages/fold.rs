@@ -1,12 +1,12 @@
 //! Stage `fold`: the frame's normalised quads to parities, into the input memory of the passes.
 //!
-//! One quad per cycle: frame buffer (2 cycles), `normalise` (1), butterfly (1), memory.
+//! One quad per cycle: frame buffer (2 cycles), `normalise` (2), butterfly (1), memory.
 
 use dermis_golden::fixed::plan::resources::Holds;
 use dermis_golden::fixed::Model;
 use rust_hdl::prelude::*;
 
-use crate::primitives::{count_bits, frame_quads, largest, BitDelay, Butterfly, CaseCounter, Counter, Delay, Dff, Ram};
+use crate::primitives::{count_bits, frame_quads, largest, BitDelay, Butterfly, CaseCounter, CaseEqual, Counter, Delay, Dff, Ram};
 use crate::wire::Wire;
 
 /// Reads the quads of a subarray from the frame buffer; they pass `normalise` and the butterfly on their way to the
@@ -30,7 +30,7 @@ pub struct Fold {
     pub quad_address: Wire<Out>,
     /// The frame's last quad was read in the cycle before: the frame buffer is free.
     pub free: Signal<Out, Bit>,
-    /// Four normalised codes, `input_bits` each, signed; three cycles after `quad_address`.
+    /// Four normalised codes, `input_bits` each, signed; four cycles after `quad_address`.
     pub normalised: Wire<In>,
     /// `normalised` holds a quad.
     pub normalised_valid: Signal<Out, Bit>,
@@ -38,18 +38,19 @@ pub struct Fold {
     pub folded: Wire<Out>,
     /// `folded` holds a quad.
     pub folded_valid: Signal<Out, Bit>,
-    /// The input memory holds the subarray; high for one cycle.
-    pub done: Signal<Out, Bit>,
+    /// The products may begin: what they read next is in the input memory; high for one cycle.
+    pub readable: Signal<Out, Bit>,
     /// Address of the quad to read from the input memory; sampled in every cycle.
     pub read_address: Wire<In>,
     /// Four parities of that quad, signed; two cycles after `read_address`.
     pub read_quad: Wire<Out>,
     quads: CaseCounter,
+    lead: CaseEqual,
     frame_quads: Counter,
     running: Dff,
     normalised_later: BitDelay,
     folded_later: BitDelay,
-    finish: BitDelay,
+    begins: BitDelay,
     frees: BitDelay,
     address: Delay,
     butterfly: Butterfly,
@@ -63,6 +64,7 @@ impl Fold {
         let bits = model.formats().input_bits as usize;
         let limits: Vec<usize> = model.cases().iter().map(|case| case.formats.quads).collect();
         let frame_quads = frame_quads(model.cases());
+        let leads: Vec<usize> = model.cases().iter().map(|case| case.storage.lead).collect();
         let quads = largest(&limits);
         let address = count_bits(quads);
         Fold {
@@ -78,17 +80,18 @@ impl Fold {
             normalised_valid: Default::default(),
             folded: Wire::new(4 * (bits + 2)),
             folded_valid: Default::default(),
-            done: Default::default(),
+            readable: Default::default(),
             read_address: Wire::new(address),
             read_quad: Wire::new(4 * (bits + 2)),
             quads: CaseCounter::new(&limits),
+            lead: CaseEqual::new(&leads, address),
             frame_quads: Counter::new(frame_quads),
             running: Default::default(),
-            normalised_later: BitDelay::new(3),
+            normalised_later: BitDelay::new(4),
             folded_later: BitDelay::new(1),
-            finish: BitDelay::new(5),
+            begins: BitDelay::new(6),
             frees: BitDelay::new(1),
-            address: Delay::new(address, 4),
+            address: Delay::new(address, 5),
             butterfly: Butterfly::new(bits),
             memory: Ram::new(quads, 1, 4 * (bits + 2)).holding([Holds::Folded]).registered(),
             ending: Default::default(),
@@ -104,17 +107,19 @@ impl Logic for Fold {
         self.running.clk.next = self.clk.val();
         self.normalised_later.clk.next = self.clk.val();
         self.folded_later.clk.next = self.clk.val();
-        self.finish.clk.next = self.clk.val();
+        self.begins.clk.next = self.clk.val();
         self.frees.clk.next = self.clk.val();
         self.address.clk.next = self.clk.val();
         self.butterfly.clk.next = self.clk.val();
         self.memory.clk.next = self.clk.val();
         self.normalised_later.rst.next = self.rst.val();
         self.folded_later.rst.next = self.rst.val();
-        self.finish.rst.next = self.rst.val();
+        self.begins.rst.next = self.rst.val();
         self.frees.rst.next = self.rst.val();
 
         self.quads.which.next = self.which.val();
+        self.lead.which.next = self.which.val();
+        self.lead.value.next = self.quads.value.val();
         self.quads.clear.next = self.start.val();
         self.quads.enable.next = self.running.q.val();
         self.ending.next = self.running.q.val() & self.quads.last.val();
@@ -140,7 +145,8 @@ impl Logic for Fold {
         self.memory.read.next = true;
         self.memory.read_address.next = self.read_address.val();
         self.read_quad.next = self.memory.read_data.val();
-        self.finish.d.next = self.ending.val();
-        self.done.next = self.finish.q.val();
+        comment!("Products read the input while it is written");
+        self.begins.d.next = self.running.q.val() & self.lead.equal.val();
+        self.readable.next = self.begins.q.val();
     }
 }

@@ -8,7 +8,7 @@ use crate::primitives::{by_leading_one, count_bits};
 use crate::wire::Wire;
 
 /// `start` computes the shift from `magnitude`; it is valid two cycles later, before the first quad arrives. Quads are
-/// then shifted one per cycle, each with a latency of one cycle.
+/// then registered and shifted, one per cycle: the frame buffer may lie far from the shifter.
 #[derive(LogicBlock)]
 pub struct Normalise {
     /// Clock; registers change on its rising edge.
@@ -19,7 +19,7 @@ pub struct Normalise {
     pub magnitude: Wire<In>,
     /// Four codes, `bits` each, signed; one quad per cycle.
     pub quad: Wire<In>,
-    /// Four shifted codes, `bits` each, signed; one cycle after `quad`.
+    /// Four shifted codes, `bits` each, signed; two cycles after `quad`.
     pub shifted: Wire<Out>,
     /// The left shift; from two cycles after `start` until the next one.
     pub shift: Wire<Out>,
@@ -56,7 +56,8 @@ fn kernel(bits: usize) -> Kernel {
     let left = k.delay("left", none | first);
     let started = k.delay("started", start);
     k.when(started, || shift.set(left));
-    let lanes: Vec<Expr> = (0..4).rev().map(|lane| quad.slice(lane * bits, bits).shift_left_by(*shift)).collect();
+    let near = k.delay("near", quad);
+    let lanes: Vec<Expr> = (0..4).rev().map(|lane| near.slice(lane * bits, bits).shift_left_by(*shift)).collect();
     k.delay("shifted", concat(&lanes));
     k.finish()
 }
@@ -76,6 +77,7 @@ mod tests {
     struct Shifts {
         computed: Option<u32>,
         shift: Option<u32>,
+        codes: Option<[i64; 4]>,
         shifted: Option<Word>,
     }
 
@@ -85,8 +87,9 @@ mod tests {
         }
 
         fn clock(&mut self, inputs: &[Word]) {
-            let codes = [0, 1, 2, 3].map(|lane| inputs[2].signed(lane, BITS));
-            self.shifted = self.shift.map(|shift| Word::of_fields(&codes.map(|code| code << shift), BITS));
+            let shift = |(shift, codes): (u32, [i64; 4])| Word::of_fields(&codes.map(|code| code << shift), BITS);
+            self.shifted = self.shift.zip(self.codes).map(shift);
+            self.codes = Some([0, 1, 2, 3].map(|lane| inputs[2].signed(lane, BITS)));
             self.shift = self.computed.take().or(self.shift);
             self.computed = (inputs[0].number() == 1).then(|| normalise::shift(inputs[1].number(), BITS as u32));
         }

@@ -4,7 +4,8 @@
 //! The latency of each stage is a named constant here and a pipeline in the hardware; the co-simulation asserts that
 //! both agree to the cycle. With Q quads, G groups of rows, K rows in the last group:
 //! ```text
-//! fold     Q + 6                                from the last input beat to the first product
+//! fold     8                                    from the start of a subarray to the first product: the passes read the
+//!          input while it is written, later by as many quads as products with left-out columns are ahead
 //! pass     the kept columns of each product, at most Q, waiting until a step's operand has been finished, or, where
 //!          it is read as it is written, begun; a pause after each accumulation
 //! rescale  v_00 is replayed once its exponent is known: Q more
@@ -29,8 +30,8 @@ use crate::fixed::words::schedule::accumulations;
 
 /// Cycles from the last input beat to the start of the frame.
 pub const ACCEPT: u64 = 3;
-/// Latency of `fold` beyond its Q quads: start, frame buffer, normalise, butterfly, memory.
-const FOLD: u64 = 6;
+/// Latency of `fold` for the first quad: start, frame buffer, normalise, butterfly, memory.
+const FOLD: u64 = 8;
 /// Cycles from the issue of a product to the first row of its accumulators: addresses 1, memories 2, selection 1, lanes
 /// 4.
 const LANES: u64 = 8;
@@ -226,7 +227,7 @@ fn timeline(formats: &Formats, storage: &Storage) -> Timeline {
     let quads = formats.quads as u64;
     let last_rows = quads - (formats.groups as u64 - 1) * formats.lanes_per_parity as u64;
     let lanes = LANES + if storage.listed { COLUMNS } else { 0 };
-    let first_issue = quads + FOLD;
+    let first_issue = FOLD + storage.lead as u64;
     // `free` is the first cycle in which a product can be issued.
     let (mut now, mut free, mut products_done) = (first_issue, first_issue, 0);
     let mut finished: Vec<u64> = Vec::new();

@@ -13,7 +13,7 @@
 
 use crate::fixed::words::formats::{Formats, MULTIPLIER_BITS};
 use crate::fixed::words::quantised::{coefficient, Quantised};
-use crate::fixed::words::schedule::{Kind, Matrix, Product};
+use crate::fixed::words::schedule::{accumulations, Kind, Matrix, Product};
 
 /// Least number of cycles from a quad's row of low limbs to its row of high limbs: the first is written one cycle after
 /// it arrives, and read two before the other does.
@@ -37,6 +37,9 @@ pub struct Storage {
     /// Cycles without a product after each accumulation. In the first the accumulators of the lanes are cleared; where a
     /// case has one quad or two, more let the row of low limbs be written before it is read for the high limbs.
     pub pause: usize,
+    /// Number of quads of the input that must be written, beside the first, before the first product is issued: the input is
+    /// written one quad per cycle and read at most as fast, but a product whose first columns are left out begins further on.
+    pub lead: usize,
     /// Number of words, the last ones, that are in a memory of their own, of `limb_align` bits per lane: all those of the
     /// low limbs of Cz⁺, or none.
     pub narrow: usize,
@@ -92,7 +95,7 @@ impl Storage {
         let of = |&(matrix, limit): &(Matrix, i64)| (0..groups).map(|group| kept(matrix, limit, group)).collect();
         let columns = limits.iter().map(of).collect();
         let matrices = limits.into_iter().map(|(matrix, _)| matrix).collect();
-        Storage { matrices, columns, base: 0, listed: false, streamed: false, pause: 1, narrow: 0 }
+        Storage { matrices, columns, base: 0, listed: false, streamed: false, pause: 1, lead: 0, narrow: 0 }
     }
 
     /// With the low limbs of Cz⁺, which must be the last matrices, in a memory of their own.
@@ -124,10 +127,25 @@ impl Storage {
         let least = cases.iter().map(|(_, formats)| formats.quads).min().unwrap_or(BETWEEN);
         let pause = BETWEEN.saturating_sub(least).max(1);
         let mut base = 0;
-        for (storage, _) in &mut cases {
+        for (storage, formats) in &mut cases {
+            storage.lead = storage.lead_of_input(formats);
             (storage.base, storage.listed, storage.streamed, storage.pause) = (base, listed, streamed, pause);
             base += storage.words();
         }
+    }
+
+    /// How far the products with the input are ahead of one that reads its quads in order, one per cycle from the first.
+    fn lead_of_input(&self, formats: &Formats) -> usize {
+        let (mut issued, mut lead) = (0, 0);
+        for (_, products) in accumulations(formats).iter().filter(|(vector, _)| *vector == 0) {
+            for group in 0..formats.groups {
+                for &column in products.iter().flat_map(|product| self.columns_of(product.matrix, group)) {
+                    lead = column.saturating_sub(issued).max(lead);
+                    issued += 1;
+                }
+            }
+        }
+        lead
     }
 
     /// The kept columns of a matrix for a group of rows, ascending.
