@@ -219,7 +219,7 @@ impl Engine {
             seeks: BitDelay::new(1),
             opens: BitDelay::new(1),
             both_signs: Constant::new(model.scene.partition.condition == Condition::BothSigns),
-            ahead: Constant::new(model.searches()),
+            ahead: Constant::new(model.resources.overlaps),
             single: Constant::new(counts.iter().all(|&count| count == 1)),
             begin_frame: Default::default(),
             start: Default::default(),

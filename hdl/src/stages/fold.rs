@@ -6,7 +6,9 @@ use dermis_golden::fixed::plan::resources::Holds;
 use dermis_golden::fixed::Model;
 use rust_hdl::prelude::*;
 
-use crate::primitives::{count_bits, frame_quads, largest, BitDelay, Butterfly, CaseCounter, CaseEqual, Counter, Delay, Dff, Ram};
+use crate::primitives::{
+    count_bits, frame_quads, largest, BitDelay, Butterfly, CaseCounter, CaseEqual, Counter, Delay, Dff, Ram,
+};
 use crate::wire::Wire;
 
 /// Reads the quads of a subarray from the frame buffer; they pass `normalise` and the butterfly on their way to the

@@ -175,7 +175,7 @@ impl Search {
             bias: ScoreBias::new(formats, &taxel_counts),
             best: BestCandidate::new(formats, largest(&taxel_counts)),
             constants: Slice::new(taxels.bits(), value),
-            store: Store::new(taxels.clone(), quads, fill_bits),
+            store: Store::new(taxels.clone(), quads, fill_bits, model.resources.overlaps),
             taylor: Taylor::new(&taxels),
             candidates: Candidates::new(&taxels),
             scores: Score::new(formats),

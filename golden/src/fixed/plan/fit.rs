@@ -73,8 +73,7 @@ fn parallel(
         };
         let mut laid_out: Vec<LaidOut> = quantised.iter().zip(shapes).map(lay_out).collect();
         Storage::share(laid_out.iter_mut().map(|case| (&mut case.storage, case.formats.clone())));
-        let [first, second] = board.distributed_words.map(|shallow| Resources::new(&laid_out, scene, board, shallow));
-        let resources = if first.fits(board) { first } else { second };
+        let resources = Resources::new(&laid_out, scene, board);
         (laid_out, resources)
     };
     let product = board.multipliers_for(MULTIPLIER_BITS, MULTIPLIER_BITS);

@@ -6,6 +6,7 @@
 //! input    T, from the last quad that fold has read
 //! pass     the passes of all subarrays, waiting where the search is busy
 //! search   one subarray after the other
+//! frame    all of these, one after the other, where block RAM is too short for frames that overlap
 //! send     T and the status beats; before a frame of several subarrays is searched, or its values leave a whole array
 //! ```
 //! The timing follows the hardware cycle by cycle; the co-simulation compares.
@@ -62,7 +63,7 @@ fn parallel(plan: &Plan, case: &CasePlan) -> u64 {
         sent = forces + SEND + case.status_beats() as u64;
         interval = sent - before;
         let received = start + quads + FOLDED + taxels + ACCEPT + plan.prepare.latency();
-        let passed = if plan.searches() { handed_over } else { sent };
+        let passed = if plan.resources.overlaps { handed_over } else { sent };
         begin = received.max(passed + BEGIN);
     }
     interval

@@ -14,7 +14,7 @@
 //! | pass | low limbs of Cz⁺, where the words would not fit otherwise | a power of two × `limb_align` · lanes |
 //! | rescale | raw v_00 | Q × 4 · `acc_bits` |
 //! | search | polynomials, one memory per coefficient | 3 buffers of Q × 4 · `search_bits` |
-//! | search | the next subarray's or frame's | Q × 4 · `search_bits` |
+//! | search | the next subarray's, or the next frame's where block RAM suffices | Q × 4 · `search_bits` |
 //! | force | p(μ*) | subarrays · Q × 4 · `search_bits` |
 
 use serde::Serialize;
@@ -75,6 +75,13 @@ pub enum Holds {
     Values,
 }
 
+impl Holds {
+    /// Whether the content is part of the design, which only a block RAM can have.
+    fn is_rom(self) -> bool {
+        matches!(self, Holds::Calibration | Holds::Coefficients | Holds::LowCoefficients | Holds::Columns)
+    }
+}
+
 impl std::fmt::Display for Holds {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         match self {
@@ -132,6 +139,9 @@ pub struct Resources {
     pub memories: Vec<Memory>,
     /// Multipliers of each stage that can have some: (stage, count).
     pub multipliers: Vec<(&'static str, usize)>,
+    /// Whether the search has a memory for the polynomials of the next subarray or frame, so that its passes run while the
+    /// one before is searched.
+    pub overlaps: bool,
 }
 
 /// Width in bits of a count below `limit`, at least one.
@@ -150,9 +160,21 @@ pub fn operand_vectors(degree: usize) -> usize {
 }
 
 impl Resources {
-    /// The resources of a scene's cases on `board`; where there are several, the whole array's is the first. Memories
-    /// of at most `shallow` words go into distributed RAM.
-    pub fn new(cases: &[LaidOut], scene: &Scene, board: &Board, shallow: usize) -> Self {
+    /// The resources of a scene's cases on `board`; where there are several, the whole array's is the first. Memories of few
+    /// words go into distributed RAM. Where block RAM is short, frames do not overlap; where it still is, more memories go
+    /// into distributed RAM.
+    pub fn new(cases: &[LaidOut], scene: &Scene, board: &Board) -> Self {
+        let [always, if_short] = board.distributed_words;
+        let with = |overlaps| Resources::with_distributed(cases, scene, board, always, overlaps);
+        // Of several subarrays the next one is always computed while one is searched; between frames it may be left out.
+        let whole = cases.iter().all(|case| case.parts == 1);
+        let all = if whole { vec![with(true), with(false)] } else { vec![with(true)] };
+        let fitting = all.iter().find(|resources| resources.fits(board));
+        fitting.or(all.last()).cloned().unwrap_or_else(|| with(true)).relieved(board, if_short)
+    }
+
+    /// The resources with memories of at most `shallow` words in distributed RAM.
+    fn with_distributed(cases: &[LaidOut], scene: &Scene, board: &Board, shallow: usize, overlaps: bool) -> Self {
         let f = &cases[0].formats;
         // Shared memories are sized for the largest case; the coefficients of all cases add up.
         let quads = f.quads;
@@ -161,47 +183,48 @@ impl Resources {
         let listed = cases.iter().any(|case| case.storage.listed);
         let frame_quads = |case: &LaidOut| case.parts * case.formats.quads;
         let quad = |bits: u32| 4 * bits as usize;
-        let memory = |holds: Holds, words: usize, bits: usize, rom: bool| Memory {
+        let memory = |holds: Holds, words: usize, bits: usize| Memory {
             holds,
             words,
             bits,
-            block_rams: if rom || words > shallow { board.block_rams_for(words, bits) } else { 0 },
+            block_rams: if holds.is_rom() || words > shallow { board.block_rams_for(words, bits) } else { 0 },
             large_rams: 0,
         };
-        let ram = |holds, words, bits| memory(holds, words, bits, false);
         let (input, taxels) = (&scene.input, scene.sensor.taxels());
         let mut memories = Vec::new();
         if input.calibration.is_some() || input.tare.is_some() {
             let gain = if input.calibration.is_some() { GAIN_BITS } else { 0 };
-            memories.push(memory(Holds::Calibration, taxels, (f.code_bits + gain) as usize, true));
+            memories.push(memory(Holds::Calibration, taxels, (f.code_bits + gain) as usize));
         }
         if input.average > 0 {
-            memories.push(memory(Holds::Average, taxels, f.input_bits as usize, false));
+            memories.push(memory(Holds::Average, taxels, f.input_bits as usize));
         }
         for (index, case) in cases.iter().enumerate() {
-            let lane = |lane| ram(Holds::Frame { case: index, lane }, frame_quads(case), f.input_bits as usize);
+            let lane = |lane| memory(Holds::Frame { case: index, lane }, frame_quads(case), f.input_bits as usize);
             memories.extend((0..4).map(lane));
         }
-        memories.push(ram(Holds::Folded, quads, quad(f.fold_bits)));
+        memories.push(memory(Holds::Folded, quads, quad(f.fold_bits)));
         if f.degree > 0 {
-            memories.push(ram(Holds::Operands(0), operand_vectors(f.degree) * quads, quad(f.data_bits)));
+            memories.push(memory(Holds::Operands(0), operand_vectors(f.degree) * quads, quad(f.data_bits)));
         }
-        memories.push(memory(Holds::Coefficients, wide, word_bits(f), true));
+        memories.push(memory(Holds::Coefficients, wide, word_bits(f)));
         if narrow > 0 {
             let bits = 4 * f.lanes_per_parity * f.limb_align as usize;
-            memories.push(memory(Holds::LowCoefficients, narrow, bits, true));
+            memories.push(memory(Holds::LowCoefficients, narrow, bits));
         }
         if listed {
             // The transposed address as well, if it is read.
             let addresses = if f.shared_a { 2 } else { 1 };
-            memories.push(memory(Holds::Columns, words, addresses * count_bits(quads), true));
+            memories.push(memory(Holds::Columns, words, addresses * count_bits(quads)));
         }
-        memories.push(ram(Holds::Raw, quads, quad(f.acc_bits)));
+        memories.push(memory(Holds::Raw, quads, quad(f.acc_bits)));
         for (k, &bits) in f.search_bits.iter().enumerate().filter(|_| f.degree > 0) {
-            memories.push(ram(Holds::Polynomials(k), SEARCH_BUFFERS * quads, quad(bits)));
-            memories.push(ram(Holds::Start(k), quads, quad(bits)));
+            memories.push(memory(Holds::Polynomials(k), SEARCH_BUFFERS * quads, quad(bits)));
+            if overlaps {
+                memories.push(memory(Holds::Start(k), quads, quad(bits)));
+            }
         }
-        memories.push(ram(Holds::Values, cases.iter().map(frame_quads).max().unwrap_or(0), quad(f.search_bits[0])));
+        memories.push(memory(Holds::Values, cases.iter().map(frame_quads).max().unwrap_or(0), quad(f.search_bits[0])));
         let calibrate = match input.calibration {
             Some(_) => board.multipliers_for(f.code_bits + 1, GAIN_BITS),
             None => 0,
@@ -212,7 +235,32 @@ impl Resources {
             ("force", force_multipliers(f, board)),
             ("resultants", resultant_multipliers(scene, board)),
         ];
-        Resources { memories, multipliers }
+        Resources { memories, multipliers, overlaps: overlaps && f.degree > 0 }
+    }
+
+    /// With memories of at most `shallow` words in distributed RAM until the block RAMs suffice: those first that take the
+    /// fewest LUTs for each block RAM.
+    fn relieved(mut self, board: &Board, shallow: usize) -> Self {
+        // A LUT holds a bit of 16 words.
+        let luts = |memory: &Memory| memory.words.div_ceil(16) * memory.bits;
+        let may_move = |memory: &Memory| memory.block_rams > 0 && memory.words <= shallow && !memory.holds.is_rom();
+        let mut order: Vec<usize> = (0..self.memories.len()).filter(|&k| may_move(&self.memories[k])).collect();
+        order.sort_by_key(|&k| luts(&self.memories[k]) / self.memories[k].block_rams);
+        let mut moved = Vec::new();
+        for k in order {
+            if self.fits(board) {
+                break;
+            }
+            moved.push((k, std::mem::take(&mut self.memories[k].block_rams)));
+        }
+        // The last ones may have been large enough to make some of the others unnecessary.
+        for (k, block_rams) in moved {
+            self.memories[k].block_rams = block_rams;
+            if !self.fits(board) {
+                self.memories[k].block_rams = 0;
+            }
+        }
+        self
     }
 
     /// Number of block RAMs of all memories.

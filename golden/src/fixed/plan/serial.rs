@@ -154,7 +154,7 @@ fn resources(f: &Formats, board: &Board) -> Resources {
         ("pass", 4 * board.multipliers_for(OPERAND_BITS, OPERAND_BITS)),
         ("force", board.multipliers_for(f.search_bits[0], FACTOR_BITS)),
     ];
-    Resources { memories, multipliers }
+    Resources { memories, multipliers, overlaps: false }
 }
 
 /// Cycles from the last input beat to the first output beat, for a frame whose subarray is `searched` or not.

@@ -14,7 +14,8 @@ use crate::wire::Wire;
 /// quad into one of the others. Both take effect one cycle later, through registers beside the memory. `read_data`
 /// follows its address by three cycles: read register and output register of the memory, and the choice of the memory.
 ///
-/// `START` is a memory of its own, because one subarray or frame is filled while another is searched.
+/// Where one subarray or frame is filled while another is searched, `START` is a memory of its own; otherwise it is another
+/// name of buffer 0, and `fill` and `write` never coincide.
 ///
 /// Read-during-write data is undefined and unused: a sweep writes quads that it read several cycles earlier, or a
 /// buffer that is not being read. So block RAM needs no bypass. In simulation such a read returns the complement of the
@@ -78,8 +79,9 @@ pub fn base_bits(quads: usize) -> usize {
 }
 
 impl Store {
-    /// `quads` quads of polynomials in `layout`, filled with coefficients of `fill_bits` bits.
-    pub fn new(layout: PolynomialWord, quads: usize, fill_bits: usize) -> Self {
+    /// `quads` quads of polynomials in `layout`, filled with coefficients of `fill_bits` bits; `apart` says whether one
+    /// subarray or frame is filled while another is searched.
+    pub fn new(layout: PolynomialWord, quads: usize, fill_bits: usize, apart: bool) -> Self {
         let address = count_bits(quads);
         let block = Store {
             clk: Default::default(),
@@ -99,11 +101,11 @@ impl Store {
             read_data: Wire::new(layout.bits()),
             kernel: Body::default(),
         };
-        block.bind(kernel(&layout, quads, fill_bits))
+        block.bind(kernel(&layout, quads, fill_bits, apart))
     }
 }
 
-fn kernel(layout: &PolynomialWord, quads: usize, fill_bits: usize) -> Kernel {
+fn kernel(layout: &PolynomialWord, quads: usize, fill_bits: usize, apart: bool) -> Kernel {
     let k = Builder::new("store");
     let (quad_bits, bits) = (count_bits(quads), base_bits(quads));
     let (fill, fill_index) = (k.input("fill", 1), k.input("fill_index", count_bits(layout.widths.len())));
@@ -116,8 +118,10 @@ fn kernel(layout: &PolynomialWord, quads: usize, fill_bits: usize) -> Kernel {
 
     let bases: Vec<(u64, Expr)> = (1..BUFFERS).map(|b| (b as u64, k.constant(bits, base(b, quads) as u64))).collect();
     let write_base = k.delay("write_base", write_buffer.case(&bases, k.constant(bits, 0)));
-    let write_to = k.wire("write_to", (write_base + write_address).low(bits));
-    let from_start = k.delay("from_start", k.delay("from_start_1", read_buffer.is(START as u64)));
+    let to_buffer = k.wire("to_buffer", (write_base + write_address).low(bits));
+    let write_to = if apart { to_buffer } else { fill.mux(fill_address, to_buffer) };
+    let write_to = k.wire("write_to", write_to);
+    let from_start = apart.then(|| k.delay("from_start", k.delay("from_start_1", read_buffer.is(START as u64))));
     k.comment(
         "Read and write addresses are registers of each coefficient, because the memories are placed far apart; the",
     );
@@ -135,13 +139,21 @@ fn kernel(layout: &PolynomialWord, quads: usize, fill_bits: usize) -> Kernel {
         let fills = fill_index.is(index as u64);
         let whole = write_data.slice(layout.offset(index), all);
         let read = registered(&k, &format!("read{index}"), place.read(*from));
-        let start = format!("start{index}");
-        let own = k.memory(&start, quads, all, Contents::Undefined).unchecked();
-        let own = own.holds(Holds::Start(index));
-        write_port(&k, (&start, own), [fill & fills, fill_address, filled]);
-        write_port(&k, (&memory, place), [write, write_to, whole]);
-        let read_start = registered(&k, &format!("read_start{index}"), own.read(read_address));
-        k.delay(&format!("shown{index}"), from_start.mux(read_start, read))
+        let shown = match from_start {
+            Some(from_start) => {
+                let start = format!("start{index}");
+                let own = k.memory(&start, quads, all, Contents::Undefined).unchecked();
+                let own = own.holds(Holds::Start(index));
+                write_port(&k, (&start, own), [fill & fills, fill_address, filled]);
+                write_port(&k, (&memory, place), [write, write_to, whole]);
+                from_start.mux(registered(&k, &format!("read_start{index}"), own.read(read_address)), read)
+            }
+            None => {
+                write_port(&k, (&memory, place), [fill.mux(fills, write), write_to, fill.mux(filled, whole)]);
+                read
+            }
+        };
+        k.delay(&format!("shown{index}"), shown)
     };
     let shown: Vec<Expr> = (0..layout.widths.len()).map(coefficient).collect();
     k.wire("read_data", concat(&shown.into_iter().rev().collect::<Vec<_>>()));
@@ -174,7 +186,7 @@ mod tests {
     const BITS: usize = 5;
 
     fn store() -> Store {
-        let mut store = Store::new(PolynomialWord { lanes: 4, widths: vec![BITS] }, 3, BITS);
+        let mut store = Store::new(PolynomialWord { lanes: 4, widths: vec![BITS] }, 3, BITS, false);
         store.connect_all();
         store
     }
@@ -216,6 +228,7 @@ mod tests {
 
     /// Memory by name (that of the buffers, `START`) and coefficient; what is undefined is `None`.
     struct Buffers {
+        apart: bool,
         content: [[Vec<Option<u64>>; 2]; 2],
         /// Memory, coefficient, address, data of the writes asked for.
         asked: Vec<(usize, usize, usize, u64)>,
@@ -241,7 +254,7 @@ mod tests {
         fn clock(&mut self, inputs: &[Word]) {
             let number = |k: usize| inputs[k].number() as usize;
             let bit = |k: usize| number(k) == 1;
-            self.shown = self.out[usize::from(self.from_start[1])];
+            self.shown = self.out[usize::from(self.apart && self.from_start[1])];
             self.out = self.read;
             let from = [self.from, Some(number(9))];
             for (memory, k) in [(0, 0), (0, 1), (1, 0), (1, 1)] {
@@ -260,9 +273,9 @@ mod tests {
                 if bit(0) && number(1) == k {
                     let lanes: [i64; 4] = std::array::from_fn(|lane| inputs[3].signed(lane, FILL));
                     let data = Word::of_fields(&lanes, width).field(0, 4 * width);
-                    self.asked.push((1, k, number(2), data));
+                    self.asked.push((usize::from(self.apart), k, number(2), data));
                 }
-                if bit(4) {
+                if bit(4) && (self.apart || !bit(0)) {
                     let data = inputs[7].field(k * 4 * WIDTHS[0], 4 * width);
                     self.asked.push((0, k, (self.write_base + number(6)) % end, data));
                 }
@@ -284,17 +297,20 @@ mod tests {
         let mut stimulus = random_words(20000, &widths);
         // The base of the first write is not yet known.
         stimulus[0][4] = Word::default();
-        let store = Store::new(layout.clone(), QUADS, FILL);
-        let mut buffers = Buffers {
-            content: [BUFFERS * QUADS, QUADS].map(|quads| [vec![None; quads], vec![None; quads]]),
-            asked: Vec::new(),
-            from: None,
-            write_base: 0,
-            from_start: Default::default(),
-            read: Default::default(),
-            out: Default::default(),
-            shown: Default::default(),
-        };
-        check(store.kernel.kernel(), &stimulus, &mut buffers);
+        for apart in [false, true] {
+            let store = Store::new(layout.clone(), QUADS, FILL, apart);
+            let mut buffers = Buffers {
+                apart,
+                content: [BUFFERS * QUADS, QUADS].map(|quads| [vec![None; quads], vec![None; quads]]),
+                asked: Vec::new(),
+                from: None,
+                write_base: 0,
+                from_start: Default::default(),
+                read: Default::default(),
+                out: Default::default(),
+                shown: Default::default(),
+            };
+            check(store.kernel.kernel(), &stimulus, &mut buffers);
+        }
     }
 }
