@@ -14,7 +14,7 @@ use dermis_tests::build_dir;
 use proptest::prelude::*;
 
 /// Name, and the difference from a default scene of 6×6 taxels.
-const SCENES: [(&str, &str); 12] = [
+const SCENES: [(&str, &str); 14] = [
     // One quad: a longer pause between accumulations.
     ("2x2", "[sensor]\nrows = 2\ncols = 2\npitch_x_mm = 4.0\npitch_y_mm = 4.0\nthickness_mm = 3.0\n"),
     // Two quads: sweeps shorter than the pipeline that follows them.
@@ -37,6 +37,10 @@ const SCENES: [(&str, &str); 12] = [
     ("narrow", "[fixed]\ninput_bits = 8\ndata_bits = 12\ncoef_bits = 8\ninverse_bits = 8\n"),
     // A low limb of Cz⁺ and none of the input.
     ("16-bit", "[fixed]\ninput_bits = 16\ndata_bits = 16\ncoef_bits = 16\ninverse_bits = 24\n"),
+    // Two taxels per cycle in the search, in two subarrays.
+    ("two-taxels", "[hardware]\nsearch_width = 2\n[partition]\ncase = 2\n"),
+    // One taxel per cycle, among them copies on middle lines.
+    ("one-taxel", "[sensor]\nrows = 5\ncols = 7\npitch_x_mm = 2.0\npitch_y_mm = 4.0\nthickness_mm = 3.0\n[hardware]\nsearch_width = 1\n"),
     (
         "thresholds",
         "[partition]\ncondition = \"both-signs\"\n[threshold]\nmin_force_N = 0.05\n[search]\nnoise_floor_MPa = 0.001\n\
@@ -75,13 +79,22 @@ fn the_scenes_have_the_limbs_they_are_here_for() {
 
 #[test]
 fn unlike_scenes_are_equal() {
+    let mut intervals = 0;
     for (name, text) in SCENES {
         let scene = parse(name, text);
         let simulators = [Simulator::Verilator, Simulator::RustHdl];
-        let verified = verify(&scene, &frames(&scene), &simulators, &build_dir()).unwrap();
+        // As many averaged frames as others: the interval is measured from the second one on.
+        let frames = vec![frames(&scene); 1 << scene.input.average].concat();
+        let verified = verify(&scene, &frames, &simulators, &build_dir()).unwrap();
         let first: Vec<String> = verified.findings.kept.iter().take(3).map(ToString::to_string).collect();
         assert!(verified.findings.is_equal(), "{name}: {first:#?}");
+        // Planned for frames of which every subarray is searched.
+        if verified.rows.iter().all(|row| row.fixed.subarrays.iter().all(|part| part.centroid_condition)) {
+            assert_eq!(verified.frame_interval, Some(verified.planned_interval), "{name}");
+            intervals += 1;
+        }
     }
+    assert_eq!(intervals, SCENES.len() - 1, "all but the one with thresholds");
 }
 
 proptest! {
@@ -92,6 +105,7 @@ proptest! {
         (rows, cols) in (2usize..9, 2usize..9),
         mu_max in 0.02f64..0.6,
         (input_bits, data_bits, coef_bits, inverse_bits) in (8u32..=20, 12u32..=18, 8u32..=18, 18u32..=26),
+        search_width in prop::sample::select(vec![4, 2, 1]),
         seed in any::<u64>(),
     ) {
         let sensor = format!(
@@ -99,7 +113,7 @@ proptest! {
         );
         let fixed = format!(
             "[fixed]\ninput_bits = {input_bits}\ndata_bits = {data_bits}\ncoef_bits = {coef_bits}\n\
-             inverse_bits = {inverse_bits}\n[search]\nmu_max = {mu_max}\n"
+             inverse_bits = {inverse_bits}\n[search]\nmu_max = {mu_max}\n[hardware]\nsearch_width = {search_width}\n"
         );
         let model = Model::new(&parse("random", &(sensor + &fixed))).unwrap();
         let hardware = Hardware::new(model, &build_dir()).unwrap();

@@ -1,20 +1,21 @@
 //! Frame interval: cycles from one frame to the next where frames follow one another without a gap, every subarray is
 //! searched and the receiver is always ready.
 //!
-//! The longest of these decides, with T beats per frame and Q quads per subarray:
+//! The longest of these decides, with T taxels, Q quads per subarray, S steps of a sweep and 2^k frames averaged:
 //! ```text
-//! input    T, from the last quad that fold has read
+//! input    2^k T, or T from the last quad that fold has read
 //! pass     the passes of all subarrays, waiting where the search is busy
 //! search   one subarray after the other
 //! frame    all of these, one after the other, where block RAM is too short for frames that overlap
-//! send     T and the status beats; before a frame of several subarrays is searched, or its values leave a whole array
+//! send     T and the status beats; the first search of several subarrays waits for it, of one only the last sweep
 //! ```
 //! The timing follows the hardware cycle by cycle; the co-simulation compares.
 
 use super::contents::{CasePlan, Plan};
-use super::cycles::{forces, passes, search, ACCEPT, FOLDED, NEXT, SEND};
+use super::cycles::{early_values, forces, passes, search, split_latency, ACCEPT, FOLDED, NEXT, SEND};
 use super::serial;
 use crate::board::EngineKind;
+use crate::fixed::stages::{choose, resultants};
 
 /// Cycles from the hand-over of a frame's last subarray, or from the end of the last frame, to the next frame.
 const BEGIN: u64 = 2;
@@ -24,34 +25,42 @@ const SETTLED: usize = 8;
 /// Cycles from one frame's last output beat to that of the next, both solved by `case`.
 pub fn frame_interval(plan: &Plan, case: &CasePlan) -> u64 {
     match plan.board.engine {
-        EngineKind::Serial => serial::frame_interval(&case.formats, beats(plan, case)),
+        EngineKind::Serial => {
+            let beats = plan.scene.sensor.taxels() + case.status_beats();
+            serial::frame_interval(&case.formats, beats as u64)
+        }
         EngineKind::Parallel => parallel(plan, case),
     }
 }
 
-/// Beats that the force stage sends for a frame; sums of forces are formed behind it.
-fn beats(plan: &Plan, case: &CasePlan) -> u64 {
-    (plan.scene.sensor.taxels() + case.status_beats()) as u64
-}
-
 fn parallel(plan: &Plan, case: &CasePlan) -> u64 {
-    let taxels = (plan.scene.sensor.taxels() as u64) << plan.prepare.average;
+    let taxels = plan.scene.sensor.taxels() as u64;
     let (passes, search) = (passes(case), search(plan, case, true));
     let (quads, parts) = (case.formats.quads as u64, case.parts.len());
-    let early = if plan.searches() { quads } else { 0 };
-    // When the search ended, the last frame's forces had been sent, the next frame can begin.
-    let (mut searched, mut sent, mut begin) = (0, 0, 0);
+    let early = early_values(plan, case);
+    // From the end of a send to the end of the values of a search whose last sweep waited for it.
+    let last_sweep = case.formats.sweep_steps(case.formats.quads) as u64 + split_latency(&case.formats);
+    // Where the case is chosen per frame, a whole array waits as several subarrays do.
+    let whole = plan.cases().iter().all(|case| case.parts.len() == 1);
+    let choice = if plan.chooses() { choose::LATENCY } else { 0 };
+    // Sums of forces leave between the last force and the status.
+    let sums = match plan.sends_resultants() {
+        true => resultants::LATENCY - 1 + (resultants::BEATS * parts) as u64,
+        false => 0,
+    };
+    // When the last frame's last code arrived, its search ended, its forces had been sent, the next frame can begin.
+    let (mut received, mut searched, mut sent, mut begin) = (0, 0, 0, 0);
     let mut interval = 0;
     for _ in 0..SETTLED {
         let (mut start, mut handed_over) = (begin, 0);
         let mut values = Vec::with_capacity(parts);
         for part in 0..parts {
             // A whole array's values wait for the force memory, the search of several subarrays does.
-            let free = if part == 0 && parts > 1 { sent } else { 0 };
+            let free = if part == 0 && !whole { sent } else { 0 };
             handed_over = (start + passes).max(searched).max(free);
             searched = handed_over + search;
-            if part == 0 && parts == 1 {
-                searched = searched.max(sent + quads);
+            if whole {
+                searched = searched.max(sent + last_sweep);
             }
             values.push(searched - early);
             if part + 1 < parts {
@@ -60,11 +69,12 @@ fn parallel(plan: &Plan, case: &CasePlan) -> u64 {
         }
         let before = sent;
         let forces = forces(plan, case, &values).last().map_or(0, |last| last + 1);
-        sent = forces + SEND + case.status_beats() as u64;
+        sent = forces + SEND + sums + case.status_beats() as u64;
         interval = sent - before;
-        let received = start + quads + FOLDED + taxels + ACCEPT + plan.prepare.latency();
+        // Codes that are averaged are taken while the frame buffer is full, the sums are not.
+        received = (received + (taxels << plan.prepare.average)).max(start + quads + FOLDED + taxels - 1);
         let passed = if plan.resources.overlaps { handed_over } else { sent };
-        begin = received.max(passed + BEGIN);
+        begin = (received + ACCEPT + choice).max(passed + BEGIN);
     }
     interval
 }
