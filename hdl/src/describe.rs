@@ -38,7 +38,7 @@ macro_rules! entries {
 }
 
 /// The stages in the order of the data flow, then blocks that the guide takes as examples.
-const ENTRIES: [Entry; 13] = entries! {
+static ENTRIES: [Entry; 13] = entries! {
     "prepare" "prepare" "stages/prepare.rs",
     "receive" "receive" "stages/receive.rs",
     "choose" "receive__choose" "stages/choose.rs",
@@ -52,6 +52,24 @@ const ENTRIES: [Entry; 13] = entries! {
     "send" "send" "stages/send.rs",
     "resultants" "resultants" "stages/resultants.rs",
     "butterfly" "fold__butterfly" "primitives/arithmetic/butterfly.rs",
+};
+
+/// The blocks of the serial engine whose ports carry comments in the Verilog.
+static SERIAL: [Entry; 14] = entries! {
+    "receive" "receive" "serial/receive.rs",
+    "reorder" "reorder" "serial/taxel_reorder.rs",
+    "pass_sequencer" "pass_sequencer" "serial/pass_sequencer.rs",
+    "rounder" "rounder" "serial/rounder.rs",
+    "butterfly" "butterfly" "serial/serial_butterfly.rs",
+    "pass" "pass" "serial/pass.rs",
+    "unfold" "unfold" "serial/unfold.rs",
+    "banks" "banks" "serial/banks.rs",
+    "search_sequencer" "search_sequencer" "serial/search_sequencer.rs",
+    "along_x" "along_x" "serial/horner.rs",
+    "along_y" "along_y" "serial/horner.rs",
+    "coefficient_shift" "coefficient_shift" "serial/coefficient_shift.rs",
+    "candidates" "candidates" "serial/candidates.rs",
+    "forces" "forces" "serial/force.rs",
 };
 
 /// Why a block cannot be described.
@@ -109,16 +127,17 @@ pub struct BlockText {
 }
 
 /// Ports of the described blocks at one moment.
-#[derive(Default)]
 struct Ports {
+    entries: &'static [Entry],
     path: Vec<String>,
     /// By instance: name, direction, width, value.
     found: BTreeMap<&'static str, Vec<(String, bool, usize, Word)>>,
 }
 
 impl Ports {
-    fn of(engine: &dyn Design) -> Self {
-        let mut ports = Ports::default();
+    /// Of the blocks `entries` of `engine`.
+    fn of(engine: &dyn Design, entries: &'static [Entry]) -> Self {
+        let mut ports = Ports { entries, path: Vec::new(), found: BTreeMap::new() };
         engine.accept("top", &mut ports);
         ports
     }
@@ -140,7 +159,7 @@ impl Probe for Ports {
             _ => return,
         };
         let instance = self.path.get(1..).unwrap_or_default().join(SEPARATOR);
-        let Some(entry) = ENTRIES.iter().find(|entry| entry.instance == instance) else { return };
+        let Some(entry) = self.entries.iter().find(|entry| entry.instance == instance) else { return };
         let port = (name.to_owned(), output, signal.bits(), value(signal));
         self.found.entry(entry.instance).or_default().push(port);
     }
@@ -165,7 +184,7 @@ fn value(signal: &dyn Atom) -> Word {
 /// # Errors
 /// [`DescribeError::Serial`]; an engine that cannot be built.
 pub fn blocks(model: &Model) -> Result<Vec<BlockText>, DescribeError> {
-    Ok(describe(Ports::of(&*engine(model)?)))
+    Ok(describe(Ports::of(&*engine(model)?, &ENTRIES)))
 }
 
 /// The block `name` of the engine of `model`.
@@ -186,16 +205,23 @@ pub fn block(model: &Model, name: &str) -> Result<BlockText, DescribeError> {
 pub fn block_verilog(model: &Model, name: &str) -> Result<String, DescribeError> {
     let block = block(model, name)?;
     let hierarchy = Hierarchy::of(&*engine(model)?);
-    let text = hierarchy.module(block.instance, ENGINE, &Attributes::new(), &port_comment).unwrap_or_default();
+    let text = hierarchy
+        .module(block.instance, ENGINE, &Attributes::new(), &port_comments(EngineKind::Parallel))
+        .unwrap_or_default();
     Ok(format!("// {}\n{text}", block.purpose))
 }
 
-/// What the Verilog says of a port of a described block, or of the engine, whose path is empty: meaning, and when it is
-/// valid.
-pub(crate) fn port_comment(path: &str, port: &str) -> Option<String> {
-    let own = || ENTRIES.iter().find(|entry| entry.instance == path).map(|entry| entry.source);
-    let source = if path.is_empty() { Some(include_str!("engine.rs")) } else { own() };
-    comments(source?).remove(port)
+/// What the Verilog says of a port by the path of its block in the engine, and by its name: meaning, and when it is valid.
+/// The engine's own path is empty.
+pub(crate) fn port_comments(engine: EngineKind) -> impl Fn(&str, &str) -> Option<String> {
+    let (top, entries): (_, &[Entry]) = match engine {
+        EngineKind::Parallel => (include_str!("engine.rs"), &ENTRIES),
+        EngineKind::Serial => (include_str!("serial/engine.rs"), &SERIAL),
+    };
+    move |path, port| {
+        let own = || entries.iter().find(|entry| entry.instance == path).map(|entry| entry.source);
+        comments(if path.is_empty() { Some(top) } else { own() }?).remove(port)
+    }
 }
 
 /// The Rust source of a block, its test included.
@@ -273,7 +299,8 @@ impl Recorder {
     /// As [`blocks`].
     pub fn new(model: &Model) -> Result<Self, DescribeError> {
         let engine = engine(model)?;
-        let traces = describe(Ports::of(&*engine)).into_iter().map(|block| Trace { block, cycles: Vec::new() });
+        let traces =
+            describe(Ports::of(&*engine, &ENTRIES)).into_iter().map(|block| Trace { block, cycles: Vec::new() });
         Ok(Recorder { traces: traces.collect(), engine })
     }
 
@@ -287,7 +314,7 @@ impl crate::device::Device for Recorder {
     fn cycle(&mut self, inputs: &crate::device::Inputs) -> crate::device::Outputs {
         let Recorder { engine, traces } = self;
         crate::simulate::cycle(&mut **engine, inputs, |engine| {
-            let mut ports = Ports::of(engine);
+            let mut ports = Ports::of(engine, &ENTRIES);
             for trace in traces {
                 let values = ports.found.remove(trace.block.instance).unwrap_or_default();
                 trace.cycles.push(values.into_iter().map(|(.., value)| value).collect());
@@ -331,6 +358,32 @@ mod tests {
         assert!(port("folded").output && !port("normalised").output);
         let error = block(&model, "choose").unwrap_err().to_string();
         assert!(error.contains("no block \"choose\"; its blocks: prepare, receive, normalise, fold"), "{error}");
+    }
+
+    #[test]
+    fn ports_of_either_engine_have_the_comments_of_its_own_blocks() {
+        for (engine, entries) in [(EngineKind::Parallel, &ENTRIES as &[_]), (EngineKind::Serial, &SERIAL)] {
+            let mut model = model(true);
+            if engine == EngineKind::Serial {
+                let mut scene = Scene::builtin("eight-by-eight").unwrap();
+                scene.hardware.board = "icebreaker".into();
+                model = Model::new(&scene).unwrap();
+            }
+            let (comment, ports) = (port_comments(engine), Ports::of(&*design(&model).unwrap(), entries));
+            for entry in entries {
+                for (name, ..) in &ports.found[entry.instance] {
+                    assert!(
+                        comment(entry.instance, name).is_some_and(|text| !text.is_empty()),
+                        "{} {name}",
+                        entry.name
+                    );
+                }
+            }
+        }
+        // The same instance and port, in different words.
+        let [parallel, serial] =
+            [EngineKind::Parallel, EngineKind::Serial].map(|e| port_comments(e)("unfold", "address"));
+        assert!(parallel.is_some() && serial.is_some() && parallel != serial, "{parallel:?} {serial:?}");
     }
 
     #[test]

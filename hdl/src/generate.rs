@@ -16,7 +16,7 @@ use serde::Serialize;
 use serde_json::json;
 
 use crate::core_file::core_file;
-use crate::describe::port_comment;
+use crate::describe::port_comments;
 use crate::device::Tap;
 use crate::error::HdlError;
 use crate::language::{self, Attributes, Change, Hierarchy};
@@ -103,7 +103,8 @@ pub fn generate_changed(model: &Model, changes: &[Change]) -> Result<Generated, 
     let file = |name: String, text: String| GeneratedFile { name, text };
     let hierarchy = Hierarchy::of(&*engine).changed(changes)?;
     let memories = placed(&hierarchy, model)?;
-    let verilog = header(model, &top) + &hierarchy.verilog(&top, &attributes(&memories), &port_comment);
+    let verilog =
+        header(model, &top) + &hierarchy.verilog(&top, &attributes(&memories), &port_comments(model.board.engine));
     let usage = stages(model, &hierarchy, &memories);
     let dropped = refused(model)?;
     let manifest = manifest(model, &top, &usage, &memories, &dropped);

@@ -5,7 +5,7 @@ use dermis_golden::link::{slip::IDLE, LinkKind};
 use serde_json::json;
 
 use super::board_top::board_top;
-use crate::describe::{comments, port_comment};
+use crate::describe::{comments, port_comments};
 use crate::error::HdlError;
 use crate::generate::{attributes, placed, top_name, Generated};
 use crate::language::{Change, Hierarchy};
@@ -54,10 +54,11 @@ pub fn generate_board_changed(model: &Model, changes: &[Change]) -> Result<Gener
     let top = format!("{}_board", top_name(&model.scene.name));
     let hierarchy = Hierarchy::of(&*board).changed(changes)?;
     let memories = placed(&hierarchy, model)?;
+    let of_engine = port_comments(model.board.engine);
     let comment = |path: &str, port: &str| match (path, path.strip_prefix("engine__")) {
         ("", _) => comments(include_str!("board_top.rs")).remove(port),
-        ("engine", _) => port_comment("", port),
-        (_, own) => port_comment(own?, port),
+        ("engine", _) => of_engine("", port),
+        (_, own) => of_engine(own?, port),
     };
     let verilog = hierarchy.verilog(&top, &attributes(&memories), &comment);
     let link = model.scene.hardware.link;
