@@ -8,7 +8,7 @@
 //!
 //! What is derived from what:
 //! - *Kernels of the [`language`]*, the blocks with a field `kernel`: rust-hdl's simulation, the body of the Verilog
-//!   module, the waveform's names and the estimate of the logic come from one graph of typed expressions. Each is tested
+//!   module, memories and the estimate of the logic come from one graph of typed expressions. Each is tested
 //!   against plain integers in its own simulation and under Verilator, every output, every cycle.
 //! - *`#[hdl_gen]` blocks*, which connect others: engines, most stages and the link's top levels. rust-hdl simulates
 //!   them, and the assignments that it reads off the same Rust become a kernel too ([`language::Hierarchy`]), from which

@@ -1,6 +1,6 @@
 //! Stage `pass`: the matrix-vector products of a subarray, one after the other on the MAC lanes.
 //!
-//! The schedule issues one column per cycle. It waits for one cycle after each accumulation and where the operand of a
+//! The schedule issues one column per cycle. It waits for one to three cycles after each accumulation and where the operand of a
 //! step is not complete yet; where quads are written and read in order, until its first quad has been written. From issue
 //! to operands: addresses (1 cycle, 3 with a column list), memories (2), selection of limb and parity (1); then the
 //! lanes.
@@ -24,7 +24,7 @@ pub struct Pass {
     pub rst: Signal<In, Bit>,
     /// Index of the case; constant while a frame is computed.
     pub which: Wire<In>,
-    /// The input memory holds a subarray: start its products.
+    /// The products of a subarray may begin; its input is still being written.
     pub start: Signal<In, Bit>,
     /// Address of the quad to read from the input memory; in every cycle of a product with the input.
     pub input_address: Wire<Out>,

@@ -94,7 +94,7 @@ pub fn scenes(all: &[Verified]) -> String {
         "RTL = fixed",
         "latency, cycles",
         "total, cycles",
-        "interval, cycles",
+        "frame interval, cycles",
         "MHz",
         "µs",
         "margin to 1 ms",
@@ -123,7 +123,7 @@ pub fn scenes(all: &[Verified]) -> String {
     let mut text = markdown(&head, rows.collect());
     text.push_str(
         "\ne_t, e_n: tangential and normal error of the resultant, median over the frames; cycles: the slowest frame; \
-         interval: frames back to back\n",
+         frame interval: frames back to back\n",
     );
     text
 }

@@ -39,9 +39,9 @@ pub fn fit(scene: &Scene, shapes: &[Shape], board: &Board, widths: Widths) -> (V
     (laid_out.into_iter().zip(quantised).zip(shapes).map(design).collect(), resources)
 }
 
-/// Lanes and memories of the parallel engine: the scene's number of lanes, else the most for which there is block RAM.
-/// Block RAM is preferred to distributed RAM, since a deep distributed RAM is the longest path of its design. With the same
-/// number of lanes, one memory is preferred to one of its own for the low limbs of Cz⁺.
+/// Lanes and memories of the parallel engine: the scene's number of lanes, else the most with which the memories fit, if
+/// need be without frames that overlap or with some memories in distributed RAM. With the same number of lanes, one
+/// coefficient memory is preferred to one of its own for the low limbs of Cz⁺.
 fn parallel(
     formats: &Formats,
     matrices: &[Matrix],

@@ -24,7 +24,7 @@ pub struct FrameCycles {
     pub hand_over: Signal<In, Bit>,
     /// The frame that is searched waits for the one before.
     pub stands: Signal<In, Bit>,
-    /// Cycles of the frame that is searched and sent, without the first ones, unsigned.
+    /// Cycles of the frame that is searched and sent, without the constant number that the force unit adds, unsigned.
     pub cycles: Wire<Out>,
     kernel: Body,
 }

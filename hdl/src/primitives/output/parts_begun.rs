@@ -8,7 +8,7 @@ use crate::primitives::address::counter::count_bits;
 use crate::wire::Wire;
 
 /// Counts the subarrays of a frame whose values have begun; `open` where `part` is one of them, combinational from `part`.
-/// A taxel is written and read at the same rate in the same order, so that it may be requested from then on.
+/// The values are written in an order and at a rate in which each is there when `send` requests it row-major, from then on.
 #[derive(LogicBlock)]
 pub struct PartsBegun {
     /// Clock; registers change on its rising edge.

@@ -134,7 +134,7 @@ struct Shape {
     list: Vec<[usize; 2]>,
     /// Some step reads its operand transposed.
     across: bool,
-    /// Cycles without a product after each accumulation, 1 or 2.
+    /// Cycles without a product after each accumulation, 1 to 3.
     pause: usize,
     /// Words of the coefficient memory, quads of a subarray, operand vectors.
     words: usize,
