@@ -80,6 +80,9 @@ pub struct Board {
     pub block_rams: u32,
     /// Configurations of a block RAM with a read and a write port: [words, bits].
     pub block_ram_shapes: Vec<[usize; 2]>,
+    /// Taxels that the search of the parallel engine computes per cycle, 4, 2 or 1, unless the scene says it.
+    #[serde(default = "full_search_width")]
+    pub search_width: usize,
     /// Largest memory in words that goes into distributed RAM: always, and if block RAM is short.
     pub distributed_words: [usize; 2],
     /// Number of single-port RAMs.
@@ -98,6 +101,11 @@ pub struct Board {
     pub placers: Vec<String>,
     /// Time limit of one try of place and route, min, > 0.
     pub place_minutes: u32,
+}
+
+/// A whole quad.
+fn full_search_width() -> usize {
+    4
 }
 
 /// Positions of the multipliers of an ECP5: a block of four in each of these rows of each of these columns.
@@ -223,6 +231,9 @@ impl Board {
             let has = board.multipliers;
             return Err(invalid(format!("multiplier_blocks: has {placed} multipliers, multipliers = {has}")));
         }
+        if ![4, 2, 1].contains(&board.search_width) {
+            return Err(invalid(format!("search_width = {}: must be 4, 2 or 1", board.search_width)));
+        }
         if board.multiplier_bits < 2 {
             return Err(invalid(format!("multiplier_bits = {}: must be at least 2", board.multiplier_bits)));
         }
@@ -294,6 +305,15 @@ mod tests {
         let text = FILES.get_file("ulx3s-85f.toml").unwrap().contents_utf8().unwrap();
         let error = Board::parse("x", &text.replace("clock_MHz = 100.0", "clock_MHz = 0.0")).unwrap_err();
         assert_eq!(error.to_string(), "constraints/x.toml: clock_MHz = 0: must be positive");
+    }
+
+    #[test]
+    fn a_search_width_that_divides_no_quad_is_refused() {
+        let text = FILES.get_file("ulx3s-85f.toml").unwrap().contents_utf8().unwrap();
+        let with = |width: usize| Board::parse("x", &format!("search_width = {width}\n{text}"));
+        assert_eq!(with(2).unwrap().search_width, 2);
+        let error = with(3).unwrap_err().to_string();
+        assert_eq!(error, "constraints/x.toml: search_width = 3: must be 4, 2 or 1");
     }
 
     #[test]

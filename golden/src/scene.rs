@@ -19,6 +19,7 @@
 //! | `[fixed]` | `input_bits` (20; 8 … 24), `data_bits` (18; 12 … 18), `coef_bits` (18; 8 … 18) |
 //! | | `inverse_bits` (24; `coef_bits` … 32), `prune_bits` (20; 8 … 31), `lanes` (as many as fit; 4, 8 … 1024) |
 //! | `[hardware]` | `board` ("ulx3s-85f"), `link` ("uart"; "spi"), `coefficient_check` ("none"; "signature") |
+//! | | `search_width` (the board's; 4, 2, 1) |
 //! | `[input]` | `full_scale_MPa` (the frame's peak), `average` (0 … 12), `calibration`, `tare` (files), `dead` |
 //! | | (\[row, col\] each), `unipolar` (false), `gain_spread` (0; 0 … 1), `plausible_MPa` (10) |
 //! | `[output]` | `forces` ("taxels"; "resultants") |
@@ -228,6 +229,8 @@ pub struct HardwareSpec {
     pub link: LinkKind,
     /// Whether the coefficient memory is checked.
     pub coefficient_check: CoefficientCheck,
+    /// Taxels that the search computes per cycle: 4, 2 or 1; `None` takes the board's.
+    pub search_width: Option<usize>,
 }
 
 /// Table `[input]`; its meaning is in [`crate::input`].
@@ -342,7 +345,12 @@ impl Default for FixedSpec {
 
 impl Default for HardwareSpec {
     fn default() -> Self {
-        HardwareSpec { board: "ulx3s-85f".to_string(), link: LinkKind::Uart, coefficient_check: CoefficientCheck::None }
+        HardwareSpec {
+            board: "ulx3s-85f".to_string(),
+            link: LinkKind::Uart,
+            coefficient_check: CoefficientCheck::None,
+            search_width: None,
+        }
     }
 }
 

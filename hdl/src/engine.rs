@@ -9,16 +9,17 @@
 //! - While a frame is computed, the next is received; the frame buffer is free as soon as `fold` has read it.
 //! - While one subarray is searched, the v_ij of the next are computed, or those of the next frame's first.
 //! - Subarrays whose values are complete are sent while the next ones are searched.
-//! - While a frame is sent, the next is searched. Only its values wait until the first one has been sent. Where there are
-//!   several subarrays, or where the frame is not searched, its v_ij wait: nothing may stand before their first sweep,
-//!   because the v_ij of the next frame are written over them.
+//! - While a frame is sent, the next is searched. Of a single subarray that is searched, only the last sweep waits until the
+//!   previous frame has been sent. Several subarrays, and one that is not searched, are handed over only then: their first
+//!   sweep reads the memory that the next frame is written to, and must not wait.
 //!
-//! Without a search there is no memory in which v_ij could wait: then a frame starts when the previous one has been
-//! sent. Where the case is chosen per frame, it is chosen while the frame is received. [`ReceiveStage`] and [`SearchStage`] are
+//! Without a search, and where block RAM is too short for a memory of the next frame, a frame starts when the previous
+//! one has been sent. Where the case is chosen per frame, it is chosen while the frame is received. [`ReceiveStage`] and [`SearchStage`] are
 //! the stages that differ.
 
 use dermis_golden::fixed::Model;
 use dermis_golden::scene::Condition;
+use dermis_golden::symmetry::quads::Quads;
 use rust_hdl::prelude::*;
 
 use crate::ports::one_of;
@@ -64,6 +65,14 @@ one_of! {
 }
 
 impl SearchStage {
+    /// Values that are output in a cycle.
+    pub(crate) fn width(&self) -> usize {
+        match self {
+            SearchStage::Search(search) => search.width(),
+            SearchStage::Unsearched(_) => Quads::LANES,
+        }
+    }
+
     fn new(model: &Model) -> Self {
         match model.searches() {
             true => SearchStage::Search(Box::new(Search::new(model))),
@@ -316,7 +325,8 @@ impl Logic for Engine {
 
         comment!("A subarray goes to the search when the search is idle;");
         comment!("the first of several also waits for the previous send,");
-        comment!("as does one that is not searched: its last sweep comes first");
+        comment!("as does one that is not searched: its only sweep reads");
+        comment!("the memory that the next frame is written to");
         self.begin_send.next = self.search.values_begin.val() & self.searched_first.q.val();
         self.sent_case.keep.next = self.begin_send.val();
         self.sent_case.word.next = self.searched_case.kept.val();

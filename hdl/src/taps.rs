@@ -113,11 +113,11 @@ pub(crate) fn words(design: &dyn Observed) -> Vec<Option<Vec<i64>>> {
 
 /// Declares the streams of an engine, one a line: `name: valid signals => [signals of the word; fields in each]`. `as`
 /// gives the fields a width other than that of their signals; `if` names the method that says whether the engine has the
-/// stream.
+/// stream, and `by` the method that says how many fields there are.
 macro_rules! streams {
     ($engine:ty {$(
         $name:ident $(if $($chosen:ident).+)?: $($($valid:ident).+)&+
-            => [$($sign:ident $($part:ident).+),+ $(; $count:literal)?] $(as $bits:ident)?,
+            => [$($sign:ident $($part:ident).+),+ $(; $count:literal)? $(; by $($counted:ident).+)?] $(as $bits:ident)?,
     )+}) => {
         impl Observed for $engine {
             fn streams(&self, visit: &mut dyn FnMut(&Stream)) {
@@ -130,7 +130,7 @@ macro_rules! streams {
                             signed: is_signed!($sign),
                             signal: &self.$($part).+,
                         }),+],
-                        count: [1, $($count)?].into_iter().product(),
+                        count: [1, $($count,)? $(self.$($counted).+(),)?].into_iter().product(),
                         field_bits: [$($bits)?].first().copied(),
                     });
                 })+
@@ -159,7 +159,7 @@ streams!(engine::Engine {
     unfold: unfold.taxels_valid => [signed unfold.taxels; 4],
     search: search.compared
         => [signed search.best_x, signed search.best_y, signed search.score, unsigned search.taken] as SEARCH_FIELD,
-    force: search.values_valid => [signed search.values; 4],
+    force: search.values_valid => [signed search.values; by search.width],
 });
 
 streams!(serial::Engine {

@@ -99,6 +99,7 @@ impl Model {
             Stage { name: "search", words: sweeps.map(candidate).collect() },
             quads("force", |s| &s.found.values),
         ];
+        split_values(&mut stages, self.formats().search_width);
         let choice = if self.chooses() { choose::LATENCY } else { 0 };
         stages.retain(|stage| self.chooses() || stage.name != "choose");
         Trace {
@@ -111,6 +112,13 @@ impl Model {
             cycles: cycles.after_choice(self),
             beat_cycles: sending.beats.into_iter().map(|beat| beat + choice).collect(),
         }
+    }
+}
+
+/// The values of stage `force` as a search of `width` taxels per cycle passes them on.
+fn split_values(stages: &mut [Stage], width: usize) {
+    for stage in stages.iter_mut().filter(|stage| stage.name == "force") {
+        stage.words = stage.words.iter().flat_map(|quad| quad.chunks(width).map(<[i64]>::to_vec)).collect();
     }
 }
 

@@ -25,7 +25,7 @@ const SCHEMA: [(&str, &[&str]); 11] = [
     ("inverse", &["kind", "level"]),
     ("threshold", &["min_force_N"]),
     ("fixed", &["input_bits", "data_bits", "coef_bits", "inverse_bits", "prune_bits", "lanes"]),
-    ("hardware", &["board", "link", "coefficient_check"]),
+    ("hardware", &["board", "link", "coefficient_check", "search_width"]),
     (
         "input",
         &["full_scale_MPa", "average", "calibration", "tare", "dead", "unipolar", "gain_spread", "plausible_MPa"],
@@ -38,6 +38,8 @@ const DEFAULT_POISSON: f64 = 0.48;
 const LEAST_MU_MAX: f64 = 0.001;
 /// Largest mu_max, above the friction of any elastic cover.
 const LARGEST_MU_MAX: f64 = 2.0;
+/// Taxels per cycle that the search can have: a quad or a part of it.
+const SEARCH_WIDTHS: [usize; 3] = [4, 2, 1];
 /// Longest scene name in characters; the name becomes part of file names and reports.
 const LONGEST_NAME: usize = 64;
 
@@ -291,7 +293,13 @@ fn hardware(reader: &Reader) -> Result<HardwareSpec, SceneError> {
         board,
         link: reader.choice("hardware.link", &LinkKind::NAMES)?,
         coefficient_check: reader.choice("hardware.coefficient_check", &checks)?,
+        search_width: search_width(reader)?,
     })
+}
+
+fn search_width(reader: &Reader) -> Result<Option<usize>, SceneError> {
+    let read = |value: &Value| usize::try_from(value.as_integer()?).ok().filter(|width| SEARCH_WIDTHS.contains(width));
+    reader.typed("hardware.search_width", read, "4, 2 or 1")
 }
 
 fn input(reader: &Reader, origin: &str, sensor: &Sensor) -> Result<InputSpec, SceneError> {

@@ -138,6 +138,12 @@ impl Scene {
                 none,
             ),
             rule(
+                self.hardware.search_width.is_some(),
+                "hardware.search_width",
+                self.hardware.search_width.unwrap_or_default().to_string(),
+                none,
+            ),
+            rule(
                 self.fixed.lanes.is_some_and(|lanes| lanes != 4),
                 "fixed.lanes",
                 self.fixed.lanes.unwrap_or_default().to_string(),

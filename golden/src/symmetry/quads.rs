@@ -27,6 +27,9 @@ pub struct QuadLocation {
 }
 
 impl Quads {
+    /// Lanes of a quad.
+    pub const LANES: usize = 4;
+
     /// Rows of quads, ⌈rows/2⌉.
     pub fn quad_rows(&self) -> usize {
         self.rows.div_ceil(2)
@@ -68,6 +71,16 @@ impl Quads {
         let row = if lane & 2 == 0 { row } else { self.rows - 1 - row };
         let col = if lane & 1 == 0 { col } else { self.cols - 1 - col };
         row * self.cols + col
+    }
+
+    /// Cycles from the first of the quads in order, each in steps of `width` lanes, one step a cycle, until the subarray's
+    /// taxels can be read row-major, one a cycle, none before its step: 0 for whole quads.
+    pub fn row_major_delay(&self, width: usize) -> usize {
+        let late = |taxel: usize| {
+            let QuadLocation { address, lane, .. } = self.locate(taxel / self.cols, taxel % self.cols);
+            ((Quads::LANES * address + lane) / width).saturating_sub(taxel)
+        };
+        (0..self.rows * self.cols).map(late).max().unwrap_or(0)
     }
 
     /// Address of the quad with row and column exchanged, in a square layout.
@@ -129,6 +142,33 @@ mod tests {
                 }
             }
             assert!(counted.iter().all(|&n| n == 1), "{rows}×{cols}");
+        }
+    }
+
+    #[test]
+    fn taxels_are_read_after_their_steps_and_no_later_than_needed() {
+        // By hand: quad 3 of 4×4 is taxel (1, 1), the sixth; with one lane per step it is step 12.
+        let quads = Quads { rows: 4, cols: 4 };
+        assert_eq!([4, 2, 1].map(|width| quads.row_major_delay(width)), [0, 1, 7]);
+        for (rows, cols) in [(2, 2), (3, 4), (5, 7), (10, 10)] {
+            let quads = Quads { rows, cols };
+            for width in [4, 2, 1] {
+                let delay = quads.row_major_delay(width);
+                // Steps one by one, then the taxels from `delay` on.
+                let mut written = vec![None; rows * cols];
+                for step in 0..quads.len() * (Quads::LANES / width) {
+                    for lane in step * width..(step + 1) * width {
+                        let (address, lane) = (lane / Quads::LANES, lane % Quads::LANES);
+                        let taxel = quads.taxel(address, lane);
+                        if quads.locate(taxel / cols, taxel % cols).lane == lane {
+                            written[taxel] = Some(step);
+                        }
+                    }
+                }
+                let spare = (0..rows * cols).map(|taxel| (delay + taxel).checked_sub(written[taxel].unwrap()));
+                let least = spare.min().unwrap();
+                assert!(least.is_some() && (delay == 0 || least == Some(0)), "{rows}×{cols}, {width}: {least:?}");
+            }
         }
     }
 

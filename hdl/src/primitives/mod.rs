@@ -52,7 +52,7 @@ pub use search::polynomial_word::PolynomialWord;
 pub use search::score::{Score, LATENCY as SCORE_LATENCY};
 pub use search::score_bias::ScoreBias;
 pub use search::search_sequencer::SearchSequencer;
-pub use search::store::{Store, LATENCY as STORE_LATENCY};
+pub use search::store::{latency as store_latency, Store};
 pub use search::sum::Sum;
 pub use search::sweep::{position_bits, BUFFER_BITS};
 pub use search::taylor::{Taylor, LATENCY as TAYLOR_LATENCY};

@@ -1,4 +1,4 @@
-//! Stage `force`: p(μ*) by quad into a memory; from there, force words by taxel into the output queue.
+//! Stage `force`: p(μ*) by step of the search into a memory; from there, force words by taxel into the output queue.
 
 use dermis_golden::fixed::plan::resources::Holds;
 use dermis_golden::fixed::Model;
@@ -10,7 +10,7 @@ use crate::primitives::{
 };
 use crate::wire::Wire;
 
-/// Values in by quad; beats out in the order in which `send` requests them.
+/// Values in by step, a quad or a part of it; beats out in the order in which `send` requests them.
 #[derive(LogicBlock)]
 pub struct Force {
     /// Clock; registers change on its rising edge.
@@ -19,9 +19,9 @@ pub struct Force {
     pub rst: Signal<In, Bit>,
     /// Index of the case of the frame being sent; constant until its last beat.
     pub which: Wire<In>,
-    /// Four values p(μ*), `search_bits[0]` each, signed; valid with `values_valid`.
+    /// `search_width` values p(μ*), `search_bits[0]` each, signed; valid with `values_valid`.
     pub values: Wire<In>,
-    /// `values` holds a quad.
+    /// `values` holds a step.
     pub values_valid: Signal<In, Bit>,
     /// A new frame: its first values come next.
     pub begin_frame: Signal<In, Bit>,
@@ -37,9 +37,9 @@ pub struct Force {
     pub beat: Wire<In>,
     /// Index of the beat's subarray; valid with `offer`.
     pub beat_part: Wire<In>,
-    /// Address of the taxel's quad; valid with `offer`.
+    /// Address of the memory word with the taxel; valid with `offer`.
     pub address: Wire<In>,
-    /// Lane of the taxel; valid with `offer`.
+    /// Lane of the taxel in the word; valid with `offer`.
     pub lane: Wire<In>,
     /// μ1 in grid steps of the last level, signed; valid with `start`.
     pub position_x: Wire<In>,
@@ -82,8 +82,8 @@ impl Force {
     /// With the widths of `model`.
     pub fn new(model: &Model) -> Self {
         let formats = model.formats();
-        let quads = frame_quads(model.cases());
-        let (address, value) = (count_bits(quads), 4 * formats.search_bits[0] as usize);
+        let words = formats.sweep_steps(frame_quads(model.cases()));
+        let (address, value) = (count_bits(words), formats.search_width * formats.search_bits[0] as usize);
         let unit = ForceUnit::new(model);
         Force {
             clk: Default::default(),
@@ -115,9 +115,9 @@ impl Force {
             m_axis_tready: Default::default(),
             m_axis_tlast: Default::default(),
             m_axis_tdata: Wire::new(unit.beat_data.width()),
-            quads: Counter::new(quads),
+            quads: Counter::new(words),
             asked: Delay::new(address, 1),
-            store: Ram::new(quads, 1, value).holding([Holds::Values]).registered(),
+            store: Ram::new(words, 1, value).holding([Holds::Values]).registered(),
             leaving: Queue::new(unit.beat_data.width()),
             unit,
         }

@@ -6,6 +6,7 @@
 
 use dermis_golden::fixed::plan::resources::Holds;
 use dermis_golden::fixed::{CasePlan, Model};
+use dermis_golden::symmetry::quads::Quads;
 use rust_hdl::prelude::*;
 
 use crate::ports::{has_ports, ports};
@@ -126,7 +127,7 @@ impl Receive {
         let taxels = model.scene.sensor.taxels();
         Receive {
             ports: ReceivePorts::new(std::slice::from_ref(own)),
-            scan: Scan::new(std::slice::from_ref(own)),
+            scan: Scan::new(std::slice::from_ref(own), Quads::LANES),
             dead_taxels: DeadTaxelMask::new(bits, taxels, &model.dead),
             broadcast: LaneBroadcast::new(bits),
             frame: Ram::new(quads, 4, bits).holding((0..4).map(|lane| Holds::Frame { case, lane })).registered(),

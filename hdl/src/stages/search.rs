@@ -1,12 +1,12 @@
 //! Stage `search`: the μ search over the polynomials of all taxels, sweep by sweep.
 //!
-//! `sequencer` sets up a sweep. One quad per cycle passes memory (3 cycles), Taylor shift (4) and goes back to memory, and
-//! passes candidates (2) and score (6). The sum polynomial passes the same blocks beside the first quad and is held, so
-//! that Σp is available when the first taxel is scored. `bias` computes the bias of the scores from it, `best`
+//! `sequencer` sets up a sweep. One step per cycle, a quad or a part of it, passes memory (3 cycles, 4 where a quad takes
+//! several steps), Taylor shift (4) and goes back to memory, and passes candidates (2) and score (6). The sum polynomial
+//! passes the same blocks beside the first step and is held, so that Σp is available when the first taxel is scored. `bias` computes the bias of the scores from it, `best`
 //! compares (6). Coarse sweeps follow one another without a gap; a halving is set up when the previous sweep has been
 //! compared. The last sweep only moves to the best position: its constant coefficients are p(μ*).
 
-use dermis_golden::fixed::plan::cycles::{coarse_period, SET_UP, SHORTEST_SWEEP};
+use dermis_golden::fixed::plan::cycles::{coarse_period, values_delay, SET_UP, SHORTEST_SWEEP};
 use dermis_golden::fixed::words::schedule::vectors;
 use dermis_golden::fixed::{CasePlan, Model};
 use dermis_golden::symmetry::quads::Quads;
@@ -14,16 +14,13 @@ use rust_hdl::prelude::*;
 
 use crate::ports::{has_ports, ports};
 use crate::primitives::{
-    count_bits, largest, position_bits, BestCandidate, BitDelay, Candidates, CaseCounter, Delay, Dff, LaneMask,
-    PolynomialWord, Score, ScoreBias, SearchSequencer, Slice, Store, Sum, Taylor, BUFFER_BITS, CANDIDATES_LATENCY,
-    SCORE_LATENCY, STORE_LATENCY, TAYLOR_LATENCY,
+    count_bits, largest, position_bits, store_latency, BestCandidate, BitDelay, Candidates, CaseCounter, Delay, Dff,
+    LaneMask, PolynomialWord, Score, ScoreBias, SearchSequencer, Slice, Store, Sum, Taylor, BUFFER_BITS,
+    CANDIDATES_LATENCY, SCORE_LATENCY, TAYLOR_LATENCY,
 };
 use crate::wire::Wire;
 
-/// Cycles from a quad's address to its shifted polynomials.
-const MOVED: usize = STORE_LATENCY + TAYLOR_LATENCY;
-
-/// Polynomials in by coefficient, p(μ*) out by quad.
+/// Polynomials in by coefficient, p(μ*) out by step.
 #[derive(LogicBlock)]
 pub struct Search {
     ports: SearchPorts,
@@ -94,13 +91,14 @@ ports! {
         pub ready: Signal<In, Bit>,
         /// The last sweep waits in this cycle.
         pub stands: Signal<Out, Bit>,
-        /// Four values p(μ*), `search_bits[0]` each, signed; valid with `values_valid`.
+        /// `search_width` values p(μ*), `search_bits[0]` each, signed; valid with `values_valid`.
         pub values: Wire<Out>,
-        /// `values` holds a quad.
+        /// `values` holds a step: the next ones of a quad, quad by quad.
         pub values_valid: Signal<Out, Bit>,
         /// μ*, `score` and `found` are final; high for one cycle, before the values.
         pub settled: Signal<Out, Bit>,
-        /// High in the cycle of the first values.
+        /// High for one cycle, from which on the values can be read row-major, one a cycle: that of the first values where a
+        /// step is a quad.
         pub values_begin: Signal<Out, Bit>,
         /// All values have been output; high for one cycle.
         pub done: Signal<Out, Bit>,
@@ -136,7 +134,7 @@ impl SearchPorts {
             enabled: Default::default(),
             ready: Default::default(),
             stands: Default::default(),
-            values: Wire::new(4 * formats.search_bits[0] as usize),
+            values: Wire::new(formats.search_width * formats.search_bits[0] as usize),
             values_valid: Default::default(),
             settled: Default::default(),
             values_begin: Default::default(),
@@ -154,21 +152,30 @@ impl SearchPorts {
 has_ports!(Search: SearchPorts);
 
 impl Search {
+    /// Taxels that are computed in a cycle.
+    pub(crate) fn width(&self) -> usize {
+        self.lane_mask.mask.width()
+    }
+
     /// With the widths of `model`.
     pub fn new(model: &Model) -> Self {
         let formats = model.formats();
         let quads = formats.quads;
         let layouts: Vec<Quads> = model.cases().iter().map(CasePlan::layout).collect();
-        let limits: Vec<usize> = layouts.iter().map(Quads::len).collect();
-        let periods: Vec<usize> = limits.iter().map(|&quads| coarse_period(quads as u64) as usize - 1).collect();
+        let width = formats.search_width;
+        let limits: Vec<usize> = layouts.iter().map(|layout| formats.sweep_steps(layout.len())).collect();
+        let periods: Vec<usize> =
+            layouts.iter().map(|layout| coarse_period(formats, layout.len()) as usize - 1).collect();
         let taxel_counts: Vec<usize> = layouts.iter().map(|layout| layout.rows * layout.cols).collect();
         // Zero where there are several cases: none of them has so few quads.
-        let padding = (SHORTEST_SWEEP as usize).saturating_sub(quads);
-        let address = count_bits(quads);
+        let padding = (SHORTEST_SWEEP as usize).saturating_sub(formats.sweep_steps(quads));
+        let step = count_bits(formats.sweep_steps(quads));
         let fill_bits = formats.vector_bits as usize + 2;
-        let taxels = PolynomialWord::new(4, &formats.search_bits);
+        let taxels = PolynomialWord::new(width, &formats.search_bits);
         let sums = PolynomialWord::new(1, &formats.sum_bits);
-        let value = 4 * formats.search_bits[0] as usize;
+        let value = width * formats.search_bits[0] as usize;
+        // Cycles from the address of a step to its shifted polynomials.
+        let moved = store_latency(formats) + TAYLOR_LATENCY;
         Search {
             ports: SearchPorts::new(model),
             sequencer: SearchSequencer::new(quads),
@@ -179,11 +186,11 @@ impl Search {
             taylor: Taylor::new(&taxels),
             candidates: Candidates::new(&taxels),
             scores: Score::new(formats),
-            lane_mask: LaneMask::new(&layouts),
+            lane_mask: LaneMask::new(&layouts, width),
             sum: Sum::new(&sums, quads, fill_bits),
             sum_taylor: Taylor::new(&sums),
             sum_candidates: Candidates::new(&sums),
-            fill_mask: LaneMask::new(&layouts),
+            fill_mask: LaneMask::new(&layouts, Quads::LANES),
             quads: CaseCounter::new(&limits),
             period: CaseCounter::new(&periods),
             counting: Default::default(),
@@ -192,22 +199,22 @@ impl Search {
             began: BitDelay::new(SET_UP as usize - 1),
             compared_later: BitDelay::new(SET_UP as usize - 1),
             go: BitDelay::new(1),
-            moved: BitDelay::new(MOVED - 1),
-            sum_moved: BitDelay::new(MOVED - 1),
+            moved: BitDelay::new(moved - 1),
+            sum_moved: BitDelay::new(moved - 1),
             trial: BitDelay::new(1),
             outcome: BitDelay::new(1),
-            sum_outcome: BitDelay::new(1),
+            sum_outcome: BitDelay::of_pulse(1 + values_delay(model.cases())),
             scored: BitDelay::new(CANDIDATES_LATENCY),
-            first: BitDelay::new(MOVED + CANDIDATES_LATENCY),
-            // One cycle after the first quad's candidates, so that a sweep is compared before the next is weighed.
-            bias_start: BitDelay::new(MOVED + CANDIDATES_LATENCY + 1),
-            totals: BitDelay::new(MOVED + CANDIDATES_LATENCY + SCORE_LATENCY + padding),
-            finish: BitDelay::new(MOVED + 1),
-            step: Delay::new(5, STORE_LATENCY),
+            first: BitDelay::new(moved + CANDIDATES_LATENCY),
+            // One cycle after the first step's candidates, so that a sweep is compared before the next is weighed.
+            bias_start: BitDelay::new(moved + CANDIDATES_LATENCY + 1),
+            totals: BitDelay::new(moved + CANDIDATES_LATENCY + SCORE_LATENCY + padding),
+            finish: BitDelay::new(moved + 1),
+            step: Delay::new(5, store_latency(formats)),
             // The target buffer is known one cycle after the set-up and needed one cycle before the write.
-            target: Delay::new(BUFFER_BITS, MOVED - 2),
-            moved_address: Delay::new(address, MOVED),
-            scored_address: Delay::new(address, CANDIDATES_LATENCY),
+            target: Delay::new(BUFFER_BITS, moved - 2),
+            moved_address: Delay::new(step, moved),
+            scored_address: Delay::new(step, CANDIDATES_LATENCY),
             set_up: Default::default(),
             standing: Default::default(),
             due: Default::default(),

@@ -1,5 +1,6 @@
-//! Stage `send`: requests the forces row-major, then each subarray's status beats, while the output queue has room. A
-//! taxel waits until the values of its subarray begin, so that the upper subarrays leave while the lower ones are searched.
+//! Stage `send`: requests the forces row-major, then each subarray's status beats, while the output queue has room.
+//!
+//! A taxel waits until the values of its subarray begin, so that the upper subarrays leave while the lower ones are searched.
 
 use dermis_golden::fixed::stages::send::STATUS_BEATS;
 use dermis_golden::fixed::Model;
@@ -35,9 +36,9 @@ pub struct Send {
     pub beat: Wire<Out>,
     /// Index of the beat's subarray; valid with `offer`.
     pub part: Wire<Out>,
-    /// Address of the taxel's quad; valid with `offer`.
+    /// Address of the memory word with the taxel; valid with `offer`.
     pub address: Wire<Out>,
-    /// Lane of the taxel; valid with `offer`.
+    /// Lane of the taxel in the word; valid with `offer`.
     pub lane: Wire<Out>,
     /// The frame's last beat was accepted one cycle ago; high for one cycle.
     pub done: Signal<Out, Bit>,
@@ -59,7 +60,7 @@ impl Send {
     pub fn new(model: &Model) -> Self {
         let counts: Vec<usize> = model.cases().iter().map(|case| case.parts.len()).collect();
         let count = largest(&counts);
-        let scan = Scan::new(model.cases());
+        let scan = Scan::new(model.cases(), model.formats().search_width);
         Send {
             clk: Default::default(),
             rst: Default::default(),

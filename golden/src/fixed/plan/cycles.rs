@@ -9,11 +9,12 @@
 //! pass     the kept columns of each product, at most Q, waiting until a step's operand has been finished, or, where
 //!          it is read as it is written, begun; a pause after each accumulation
 //! rescale  v_00 is replayed once its exponent is known: Q more
-//! search   7 coarse sweeps of Q, at least (Q + 21)/2; the eighth and 7 halvings of Q + 24; one of Q + 8
+//! search   with S = 4 Q / W steps for W taxels per cycle, and a cycle more in each latency below for W < 4:
+//!          7 coarse sweeps of S, at least (S + 21)/2; the eighth and 7 halvings of S + 24; one of S + 8
 //!          (the last alone when nothing is searched)
 //! next     1 from a subarray's completion to the passes of the one after it, which go on while it is searched
 //! choose   2, where the case is chosen per frame
-//! send     begins with the first subarray's first value: 9 to the first beat, then one beat a cycle; a beat waits for the
+//! send     begins with the first subarray's values: 13 to the first beat, then one beat a cycle; a beat waits for the
 //!          first value of its subarray
 //! ```
 
@@ -27,6 +28,7 @@ use crate::fixed::stages::choose;
 use crate::fixed::stages::search::COARSE_CENTRES;
 use crate::fixed::words::formats::{Formats, HALVINGS};
 use crate::fixed::words::schedule::accumulations;
+use crate::symmetry::quads::Quads;
 
 /// Cycles from the last input beat to the start of the frame.
 pub const ACCEPT: u64 = 3;
@@ -43,22 +45,24 @@ const OPERAND: u64 = 5;
 const REPLAY: u64 = 4;
 /// Cycles from the last row to the start of the search: rescaler, unfold, memory.
 const UNFOLD: u64 = 6;
-/// Cycles from the start of a sweep to its best candidate, beyond its Q quads: memory 3, Taylor shift 4, candidates 2,
+/// Cycles for the choice of a step's taxels, where a quad takes several.
+const SPLIT: u64 = 1;
+/// Cycles from the start of a sweep to its best candidate, beyond its steps: memory 3, Taylor shift 4, candidates 2,
 /// score 6, comparison 6.
 const SELECTION_LATENCY: u64 = 21;
 /// Cycles from the completion of a subarray's passes to the start of its search.
 const HAND_OVER: u64 = 2;
 /// Cycles from the start of the search, or from a best candidate that the next sweep depends on, to the next sweep.
 pub const SET_UP: u64 = 3;
-/// Shortest sweep that is scored, in quads: its score bias is computed meanwhile.
+/// Shortest sweep that is scored, in steps: its score bias is computed meanwhile.
 pub const SHORTEST_SWEEP: u64 = 4;
-/// Latency of the last sweep beyond its Q quads.
+/// Latency of the last sweep beyond its steps.
 const LAST_SWEEP: u64 = 8;
 /// Cycles from a subarray's values to the sending of them, where nothing is searched.
 const UNSEARCHED: u64 = 3;
 /// Cycles from the hand-over of a subarray to the search until the passes of the next one start.
 pub(super) const NEXT: u64 = 1;
-/// Cycles from a subarray's first value, Q cycles before the end of its values, to the output of a force of it.
+/// Cycles from the beginning of a subarray's values to the output of a force of it.
 pub(super) const SEND: u64 = 13;
 /// Cycles from the start of a subarray, beyond its Q quads, until the frame buffer is free.
 pub(super) const FOLDED: u64 = 2;
@@ -76,11 +80,25 @@ pub struct Cycles {
     pub interval: u64,
 }
 
+/// Cycles by which a search of fewer taxels per cycle is later than one of whole quads.
+pub fn split_latency(formats: &Formats) -> u64 {
+    match formats.search_width {
+        Quads::LANES => 0,
+        _ => SPLIT,
+    }
+}
+
 /// Cycles from the start of a coarse sweep over `quads` quads to the start of the next. The best candidate of a sweep
 /// is known before the sweep after the next, which may overwrite its source.
-pub fn coarse_period(quads: u64) -> u64 {
-    let quads = quads.max(SHORTEST_SWEEP);
-    quads.max((quads + SELECTION_LATENCY).div_ceil(2))
+pub fn coarse_period(formats: &Formats, quads: usize) -> u64 {
+    let steps = (formats.sweep_steps(quads) as u64).max(SHORTEST_SWEEP);
+    steps.max((steps + SELECTION_LATENCY + split_latency(formats)).div_ceil(2))
+}
+
+/// Cycles from a subarray's first value to the beginning of the values for those that read them row-major: no taxel is
+/// read before its value.
+pub fn values_delay(cases: &[CasePlan]) -> usize {
+    cases.iter().map(|case| case.layout().row_major_delay(case.formats.search_width)).max().unwrap_or(0)
 }
 
 impl Cycles {
@@ -156,8 +174,7 @@ impl BeatCycles {
 /// Cycles from the start of a frame to the first value of each subarray.
 fn values(plan: &Plan, case: &CasePlan, searched: &[bool]) -> Vec<u64> {
     let passes = passes(case);
-    // After a search the values are sent while they are computed.
-    let early = if plan.searches() { case.formats.quads as u64 } else { 0 };
+    let early = early_values(plan, case);
     // A subarray is handed to the search when its passes are complete and the search of the one before has ended.
     let (mut complete, mut searched_at) = (0, 0);
     let value = |&searching: &bool| {
@@ -168,6 +185,14 @@ fn values(plan: &Plan, case: &CasePlan, searched: &[bool]) -> Vec<u64> {
         searched_at - early
     };
     searched.iter().map(value).collect()
+}
+
+/// Cycles from the beginning of a subarray's values to their end: after a search they are sent while they are computed.
+pub(super) fn early_values(plan: &Plan, case: &CasePlan) -> u64 {
+    match plan.searches() {
+        true => (case.formats.sweep_steps(case.formats.quads) - values_delay(plan.cases())) as u64,
+        false => 0,
+    }
 }
 
 /// The cycle in which each force is requested, row-major, where the first values of the subarrays come in the cycles
@@ -191,12 +216,14 @@ pub(super) fn passes(case: &CasePlan) -> u64 {
 
 /// Cycles from the hand-over of a subarray to the end of its values; `searching`: it is searched.
 pub(super) fn search(plan: &Plan, case: &CasePlan, searching: bool) -> u64 {
-    let quads = case.formats.quads as u64;
+    let CasePlan { formats, .. } = case;
+    let (steps, split) = (formats.sweep_steps(formats.quads) as u64, split_latency(formats));
     let chained = COARSE_CENTRES.len() as u64 - 1;
     let awaited = 1 + u64::from(HALVINGS);
-    let sweeps = chained * coarse_period(quads) + awaited * (quads.max(SHORTEST_SWEEP) + SELECTION_LATENCY + SET_UP);
+    let scored = steps.max(SHORTEST_SWEEP) + SELECTION_LATENCY + split;
+    let sweeps = chained * coarse_period(formats, formats.quads) + awaited * (scored + SET_UP);
     match plan.searches() {
-        true => HAND_OVER + SET_UP + if searching { sweeps } else { 0 } + quads + LAST_SWEEP,
+        true => HAND_OVER + SET_UP + if searching { sweeps } else { 0 } + steps + LAST_SWEEP + split,
         false => UNSEARCHED,
     }
 }

@@ -4,12 +4,14 @@
 
 use super::cases::{planned, planned_with};
 use super::contents::{CasePlan, Plan};
+use crate::board::EngineKind;
 use crate::fixed::error::FixedError;
 use crate::fixed::stages::prepare::Scale;
 use crate::fixed::words::formats::MULTIPLIER_BITS;
 use crate::matrices::MAX_DEGREE;
 use crate::partition::{subarrays, Case};
 use crate::scene::{CoefficientCheck, ForceOutput, Scene, SearchSpec};
+use crate::symmetry::quads::Quads;
 
 /// An optional feature of the hardware.
 #[derive(Debug)]
@@ -85,6 +87,14 @@ pub fn features(plan: &Plan) -> Vec<Feature> {
             planned_with(scene, Scale::new(scene)?, Some(MAX_DEGREE))
         });
     }
+    let width = plan.formats().search_width;
+    // The serial engine searches one taxel at a time, whatever the scene says.
+    let chosen = degree > 0 && plan.board.engine == EngineKind::Parallel;
+    if chosen {
+        add("search width", width == Quads::LANES, format!("{} taxels per cycle", Quads::LANES), &|| {
+            plain(&with(&|s| s.hardware.search_width = Some(Quads::LANES)))
+        });
+    }
     let threshold = scene.threshold.min_force_N > 0.0;
     let own = format!("{} N", scene.threshold.min_force_N);
     add("threshold", threshold, set(threshold, own, "1 mN"), &|| {
@@ -111,9 +121,15 @@ pub fn features(plan: &Plan) -> Vec<Feature> {
     add("resultants", resultants, "a force and its moments per subarray".into(), &|| {
         plain(&with(&|s| s.output.forces = ForceOutput::Resultants))
     });
+    let mut without = |name: &str, change: &dyn Fn(&mut Scene)| {
+        let plan = plain(&with(change)).ok();
+        all.iter_mut().filter(|feature| feature.name == name).for_each(|f| f.without_feature = plan.clone());
+    };
     if dead > 0 {
-        let alive = plain(&with(&|s| s.input.dead.clear())).ok();
-        all.iter_mut().filter(|feature| feature.name == "dead taxels").for_each(|f| f.without_feature = alive.clone());
+        without("dead taxels", &|s| s.input.dead.clear());
+    }
+    if chosen && width == Quads::LANES {
+        without("search width", &|s| s.hardware.search_width = Some(1));
     }
     all
 }

@@ -15,7 +15,7 @@
 //! | rescale | raw v_00 | Q × 4 · `acc_bits` |
 //! | search | polynomials, one memory per coefficient | 3 buffers of Q × 4 · `search_bits` |
 //! | search | the next subarray's, or the next frame's where block RAM suffices | Q × 4 · `search_bits` |
-//! | force | p(μ*) | subarrays · Q × 4 · `search_bits` |
+//! | force | p(μ*) | subarrays · 4 Q / W × W · `search_bits`, W the taxels per cycle of the search |
 
 use serde::Serialize;
 
@@ -224,7 +224,8 @@ impl Resources {
                 memories.push(memory(Holds::Start(k), quads, quad(bits)));
             }
         }
-        memories.push(memory(Holds::Values, cases.iter().map(frame_quads).max().unwrap_or(0), quad(f.search_bits[0])));
+        let values = f.sweep_steps(cases.iter().map(frame_quads).max().unwrap_or(0));
+        memories.push(memory(Holds::Values, values, f.search_width * f.search_bits[0] as usize));
         let calibrate = match input.calibration {
             Some(_) => board.multipliers_for(f.code_bits + 1, GAIN_BITS),
             None => 0,

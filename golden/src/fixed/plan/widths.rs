@@ -154,6 +154,7 @@ pub fn widths(scene: &Scene, shapes: &[Shape], board: &Board) -> Result<Widths, 
         quads: count,
         lanes_per_parity: count,
         groups: 1,
+        search_width: search_width(scene, board, degree, count),
         shared_a,
         flips,
         code_bits: spec.input_bits,
@@ -182,6 +183,15 @@ pub fn widths(scene: &Scene, shapes: &[Shape], board: &Board) -> Result<Widths, 
         force_exponent: raw_shift as i32 - inverse_exponent - 2 + rescale_max as i32 - headroom as i32,
     };
     Ok(Widths { formats, quantised })
+}
+
+/// Taxels that the search computes per cycle: the scene's number, else the board's. What is not searched passes on in
+/// quads, and one quad alone is not worth a step for each of its taxels.
+fn search_width(scene: &Scene, board: &Board, degree: usize, quads: usize) -> usize {
+    match degree > 0 && quads > 1 {
+        true => scene.hardware.search_width.unwrap_or(board.search_width),
+        false => Quads::LANES,
+    }
 }
 
 /// The matrices of all cases as stored, on one scale.

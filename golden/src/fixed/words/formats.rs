@@ -12,7 +12,7 @@
 //! | parity of the input | `fold_bits` = `input_bits` + 2 | 22 | as the code |
 //! | Cz⁺ | `inverse_bits` | 24 | 2^−`inverse_exponent` N/MPa |
 //! | Ax, Ay | `coef_bits` | 18 | 2^−`a_exponent` |
-//! | accumulator of a lane | `lane_bits` | 38 | as below, or v_00: 2^`limb_align` times that |
+//! | accumulator of a lane | `lane_bits` | 37 | as below, or v_00: 2^`limb_align` times that |
 //! | accumulator | `acc_bits` | 42 | v_00: 2^`raw_shift` · code · Cz⁺ |
 //! | v_ij, parities | `vector_bits` = `data_bits` + 4 | 22 | accumulator · 2^rescale |
 //! | v_ij, operand of a pass | `data_bits` | 18 | 16 LSBs of the above |
@@ -25,6 +25,7 @@
 use serde::Serialize;
 
 use super::coefficients::Flips;
+use crate::symmetry::quads::Quads;
 
 /// Operand width of the multipliers in bits; a board with narrower multipliers has its own.
 pub const MULTIPLIER_BITS: u32 = 18;
@@ -58,6 +59,8 @@ pub struct Formats {
     pub lanes_per_parity: usize,
     /// Groups of `lanes_per_parity` rows that a pass computes one after the other.
     pub groups: usize,
+    /// Taxels that the search computes per cycle, W: 4, 2 or 1; 4 without a search.
+    pub search_width: usize,
     /// Ay is Ax with x and y exchanged and is not stored.
     pub shared_a: bool,
     /// Parity flips of the matrices; serialised where the mirror symmetry is broken.
@@ -110,6 +113,13 @@ pub struct Formats {
     pub mu_step: i64,
     /// LSB of a force word is 2^`force_exponent` · code LSB in MPa · 1 N/MPa.
     pub force_exponent: i32,
+}
+
+impl Formats {
+    /// Steps of a sweep of the search over `quads` quads, one per cycle: `search_width` taxels each.
+    pub fn sweep_steps(&self, quads: usize) -> usize {
+        quads * (Quads::LANES / self.search_width)
+    }
 }
 
 /// The right shift of the force stage for a subarray shifted left by `normalise` and right by `rescale`: the fraction

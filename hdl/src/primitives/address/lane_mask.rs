@@ -1,4 +1,4 @@
-//! Lane mask of a quad: which lanes hold distinct taxels.
+//! Lane mask of a quad, or of a part of it: which lanes hold distinct taxels.
 
 use dermis_golden::symmetry::quads::Quads;
 use rust_hdl::prelude::*;
@@ -9,12 +9,13 @@ use crate::primitives::address::counter::count_bits;
 use crate::wire::Wire;
 
 /// Quad address to lane mask; combinational. All four lanes count, except that of each pair of copies on the middle
-/// line of an odd row or column count only one does.
+/// line of an odd row or column count only one does. Where a quad takes several steps, the address is followed by the index
+/// of the step.
 #[derive(LogicBlock)]
 pub struct LaneMask {
     /// Index of the case.
     pub which: Wire<In>,
-    /// Quad address in the subarray.
+    /// Address of the step in the subarray.
     pub address: Wire<In>,
     /// One bit per lane: the lane is counted.
     pub mask: Wire<Out>,
@@ -23,34 +24,34 @@ pub struct LaneMask {
 
 kernel_block!(LaneMask, inputs [which, address], outputs [mask]);
 
-/// Lanes of a quad.
-const LANES: usize = 4;
-
 impl LaneMask {
-    /// `layouts[case]` is the quad layout of the subarrays of each case.
-    pub fn new(layouts: &[Quads]) -> Self {
-        let quads = layouts.iter().map(Quads::len).max().unwrap_or(1);
+    /// `layouts[case]` is the quad layout of the subarrays of each case; a step has `lanes` lanes.
+    pub fn new(layouts: &[Quads], lanes: usize) -> Self {
+        let steps = layouts.iter().map(Quads::len).max().unwrap_or(1) * (Quads::LANES / lanes);
         let block = LaneMask {
             which: Wire::new(count_bits(layouts.len())),
-            address: Wire::new(count_bits(quads)),
-            mask: Wire::new(LANES),
+            address: Wire::new(count_bits(steps)),
+            mask: Wire::new(lanes),
             kernel: Body::default(),
         };
-        block.bind(kernel(layouts, count_bits(quads)))
+        block.bind(kernel(layouts, lanes, count_bits(steps)))
     }
 }
 
-/// The mask at an address of `bits` bits; where a case has no quad, all lanes.
-fn kernel(layouts: &[Quads], bits: usize) -> Kernel {
+/// The mask of step `step` of `lanes` lanes; where a case has no quad, all lanes.
+fn mask(layout: Option<&Quads>, lanes: usize, step: usize) -> u64 {
+    let (address, first) = (step * lanes / Quads::LANES, step * lanes % Quads::LANES);
+    let layout = layout.filter(|layout| address < layout.len());
+    layout.map_or(u64::MAX, |layout| u64::from(layout.lane_mask(address)) >> first) & ((1 << lanes) - 1)
+}
+
+/// With an address of `bits` bits.
+fn kernel(layouts: &[Quads], lanes: usize, bits: usize) -> Kernel {
     let k = Builder::combinational("lane_mask");
     let (which, address) = (k.input("which", count_bits(layouts.len())), k.input("address", bits));
-    let mask = |case: usize, address: usize| {
-        let layout = layouts.get(case).filter(|layout| address < layout.len());
-        layout.map_or((1 << LANES) - 1, |layout| u64::from(layout.lane_mask(address)))
-    };
-    let masks = (0..1 << which.bits()).flat_map(|case| (0..1 << bits).map(move |address| mask(case, address)));
-    let masks: Vec<u64> = masks.collect();
-    k.wire("mask", which.concat(address).table(LANES, &masks));
+    let cases = (0..1 << which.bits()).map(|case| layouts.get(case));
+    let masks = cases.flat_map(|layout| (0..1 << bits).map(move |step| mask(layout, lanes, step)));
+    k.wire("mask", which.concat(address).table(lanes, &masks.collect::<Vec<u64>>()));
     k.finish()
 }
 
@@ -64,14 +65,26 @@ mod tests {
     fn copies_on_a_middle_line_count_once() {
         for sizes in [vec![(8, 8)], vec![(5, 7)], vec![(10, 5), (5, 5), (10, 3)]] {
             let layouts: Vec<Quads> = sizes.iter().map(|&(rows, cols)| Quads { rows, cols }).collect();
-            let block = LaneMask::new(&layouts);
-            let of = |inputs: &[Word]| {
-                let (case, address) = (inputs[0].number() as usize, inputs[1].number() as usize);
-                let layout = layouts.get(case).filter(|layout| address < layout.len());
-                vec![Some(Word::from(layout.map_or(15, |layout| u64::from(layout.lane_mask(address)))))]
-            };
-            let widths = [block.which.width(), block.address.width()];
-            check(block.kernel.kernel(), &random_words(1000, &widths), &mut Pipeline::new(0, 1, of));
+            for lanes in [4, 2, 1] {
+                let block = LaneMask::new(&layouts, lanes);
+                let of = |inputs: &[Word]| {
+                    let (case, step) = (inputs[0].number() as usize, inputs[1].number() as usize);
+                    // Lane by lane: a copy is a taxel that another lane of the quad holds too, of which the first counts.
+                    let counts = |lane: usize| {
+                        let (address, lane) = (step * lanes / 4, step * lanes % 4 + lane);
+                        let layout = layouts.get(case).filter(|layout| address < layout.len());
+                        let first = |layout: &Quads| {
+                            let taxel = layout.taxel(address, lane);
+                            (0..lane).all(|other| layout.taxel(address, other) != taxel)
+                        };
+                        layout.is_none_or(first)
+                    };
+                    let mask: u64 = (0..lanes).map(|lane| u64::from(counts(lane)) << lane).sum();
+                    vec![Some(Word::from(mask))]
+                };
+                let widths = [block.which.width(), block.address.width()];
+                check(block.kernel.kernel(), &random_words(1000, &widths), &mut Pipeline::new(0, 1, of));
+            }
         }
     }
 }

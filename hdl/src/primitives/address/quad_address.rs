@@ -12,9 +12,10 @@ use crate::primitives::address::constant_product::times;
 use crate::primitives::address::counter::count_bits;
 use crate::wire::Wire;
 
-/// Row and column of a taxel in its subarray, and of the subarray in the array, to quad address, lane and write mask;
+/// Row and column of a taxel in its subarray, and of the subarray in the array, to address, lane and write mask;
 /// combinational. Subarrays follow each other row-major, each with all its quads. A taxel on the middle line of an odd
-/// count is written to several lanes.
+/// count is written to several lanes. A memory word holds the four lanes of a quad or, where it holds fewer, the lanes of a
+/// quad follow one another.
 #[derive(LogicBlock)]
 pub struct QuadAddress {
     /// Index of the case.
@@ -27,11 +28,11 @@ pub struct QuadAddress {
     pub part_row: Wire<In>,
     /// Column of the subarray in the grid.
     pub part_col: Wire<In>,
-    /// Quad address in the frame buffer, over all subarrays.
+    /// Address of the word, over all subarrays.
     pub address: Wire<Out>,
     /// Index of the subarray, row-major.
     pub part: Wire<Out>,
-    /// Lane the taxel is read from: `{lower half, right half}`, 2 bits.
+    /// Lane of the word that the taxel is read from; of a whole quad `{lower half, right half}`. 2 bits.
     pub lane: Wire<Out>,
     /// Lanes the taxel is written to, one bit each.
     pub mask: Wire<Out>,
@@ -41,13 +42,13 @@ pub struct QuadAddress {
 kernel_block!(QuadAddress, inputs [which, row, col, part_row, part_col], outputs [address, part, lane, mask]);
 
 impl QuadAddress {
-    /// For the layout and the grid of each of `cases`.
-    pub fn new(cases: &[CasePlan]) -> Self {
+    /// For the layout and the grid of each of `cases`, with `lanes` lanes in a memory word.
+    pub fn new(cases: &[CasePlan], lanes: usize) -> Self {
         let places: Vec<(Quads, Grid)> = cases.iter().map(|case| (case.layout(), case.grid())).collect();
-        QuadAddress::of(&places, frame_quads(cases))
+        QuadAddress::of(&places, frame_quads(cases), lanes)
     }
 
-    fn of(cases: &[(Quads, Grid)], frame_quads: usize) -> Self {
+    fn of(cases: &[(Quads, Grid)], frame_quads: usize, lanes: usize) -> Self {
         let wire =
             |of: fn(&(Quads, Grid)) -> usize| Wire::new(count_bits(largest(&cases.iter().map(of).collect::<Vec<_>>())));
         let parts = cases.iter().map(|(_, grid)| grid.rows * grid.cols).max().unwrap_or(1);
@@ -58,12 +59,12 @@ impl QuadAddress {
             part: Wire::new(count_bits(parts)),
             row: wire(|(layout, _)| layout.rows),
             col: wire(|(layout, _)| layout.cols),
-            address: Wire::new(count_bits(frame_quads)),
+            address: Wire::new(count_bits(frame_quads * (Quads::LANES / lanes))),
             lane: Wire::new(2),
             mask: Wire::new(4),
             kernel: Body::default(),
         };
-        let kernel = block.kernel_of(cases);
+        let kernel = block.kernel_of(cases, frame_quads, lanes);
         block.bind(kernel)
     }
 }
@@ -85,12 +86,12 @@ struct Place<'k> {
 }
 
 impl QuadAddress {
-    fn kernel_of(&self, cases: &[(Quads, Grid)]) -> Kernel {
+    fn kernel_of(&self, cases: &[(Quads, Grid)], frame_quads: usize, lanes: usize) -> Kernel {
         let k = Builder::combinational("quad_address");
         let which = k.input("which", self.which.width());
         let (row, col) = (k.input("row", self.row.width()), k.input("col", self.col.width()));
         let part = [k.input("part_row", self.part_row.width()), k.input("part_col", self.part_col.width())];
-        let (address_bits, part_bits) = (self.address.width(), self.part.width());
+        let (address_bits, part_bits) = (count_bits(frame_quads), self.part.width());
         let place = |&(layout, grid): &(Quads, Grid)| {
             let (lower, near_row, both_rows) = fold(&k, row, layout.rows);
             let (right, near_col, both_cols) = fold(&k, col, layout.cols);
@@ -107,13 +108,25 @@ impl QuadAddress {
             let each: Vec<Expr> = places.iter().map(of).collect();
             expression_by_case(which, &each).unwrap_or(k.constant(bits, 0))
         };
-        k.wire("address", chosen(|place| place.address, address_bits));
+        let quad = chosen(|place| place.address, address_bits);
+        let (lower, right) = (chosen(|place| place.lower, 1), chosen(|place| place.right, 1));
+        // The lane of the quad is the index of the word in it, followed by the lane of the word.
+        let address = match lanes {
+            1 => quad.concat(lower).concat(right),
+            2 => quad.concat(lower),
+            _ => quad,
+        };
+        k.wire("address", address);
         k.wire("part", chosen(|place| place.part, part_bits));
-        let lower = k.wire("lower", chosen(|place| place.lower, 1));
-        let right = k.wire("right", chosen(|place| place.right, 1));
+        let (lower, right) = (k.wire("lower", lower), k.wire("right", right));
         let both_rows = k.wire("both_rows", chosen(|place| place.both_rows, 1));
         let both_cols = k.wire("both_cols", chosen(|place| place.both_cols, 1));
-        k.wire("lane", lower.concat(right));
+        let lane = match lanes {
+            1 => k.constant(2, 0),
+            2 => right.extend(2),
+            _ => lower.concat(right),
+        };
+        k.wire("lane", lane);
         let (rows, cols) = ([lower | both_rows, !lower | both_rows], [right | both_cols, !right | both_cols]);
         k.wire("mask", concat(&[rows[0] & cols[0], rows[0] & cols[1], rows[1] & cols[0], rows[1] & cols[1]]));
         k.finish()
@@ -147,25 +160,27 @@ mod tests {
                 .collect();
             let largest = |of: fn(&(Quads, Grid)) -> usize| cases.iter().map(of).max().unwrap();
             let frame = largest(|(layout, grid)| layout.len() * grid.rows * grid.cols);
-            let mirror = QuadAddress::of(&cases, frame);
-            let mut random = fastrand::Rng::with_seed(20);
-            let mut taxel = || {
-                let which = random.usize(..cases.len());
-                let (layout, grid) = cases[which];
-                let limits = [layout.rows, layout.cols, grid.rows, grid.cols];
-                let place = limits.map(|limit| Word::from(random.u64(..limit as u64)));
-                [Word::from(which as u64)].into_iter().chain(place).collect()
-            };
-            let stimulus: Vec<Vec<Word>> = (0..20000).map(|_| taxel()).collect();
-            let of = |inputs: &[Word]| {
-                let [which, row, col, part_row, part_col] = [0, 1, 2, 3, 4].map(|k| inputs[k].number() as usize);
-                let (layout, grid) = cases[which];
-                let (place, part) = (layout.locate(row, col), part_row * grid.cols + part_col);
-                let address = part * layout.len() + place.address;
-                let mask = usize::from(place.mask);
-                [address, part, place.lane, mask].map(|value| Some(Word::from(value as u64))).into()
-            };
-            check(mirror.kernel.kernel(), &stimulus, &mut Pipeline::new(0, 4, of));
+            for lanes in [4, 2, 1] {
+                let mirror = QuadAddress::of(&cases, frame, lanes);
+                let mut random = fastrand::Rng::with_seed(20);
+                let mut taxel = || {
+                    let which = random.usize(..cases.len());
+                    let (layout, grid) = cases[which];
+                    let limits = [layout.rows, layout.cols, grid.rows, grid.cols];
+                    let place = limits.map(|limit| Word::from(random.u64(..limit as u64)));
+                    [Word::from(which as u64)].into_iter().chain(place).collect()
+                };
+                let stimulus: Vec<Vec<Word>> = (0..20000).map(|_| taxel()).collect();
+                let of = |inputs: &[Word]| {
+                    let [which, row, col, part_row, part_col] = [0, 1, 2, 3, 4].map(|k| inputs[k].number() as usize);
+                    let (layout, grid) = cases[which];
+                    let (place, part) = (layout.locate(row, col), part_row * grid.cols + part_col);
+                    let taxel = 4 * (part * layout.len() + place.address) + place.lane;
+                    let mask = usize::from(place.mask);
+                    [taxel / lanes, part, taxel % lanes, mask].map(|value| Some(Word::from(value as u64))).into()
+                };
+                check(mirror.kernel.kernel(), &stimulus, &mut Pipeline::new(0, 4, of));
+            }
         }
     }
 }

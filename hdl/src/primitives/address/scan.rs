@@ -21,11 +21,11 @@ pub struct Scan {
     pub enable: Signal<In, Bit>,
     /// The current taxel is the array's last.
     pub last: Signal<Out, Bit>,
-    /// Quad address of the current taxel, over all subarrays.
+    /// Address of the current taxel's word, over all subarrays.
     pub address: Wire<Out>,
     /// Index of the current taxel's subarray.
     pub part: Wire<Out>,
-    /// Lane the current taxel is read from, 2 bits.
+    /// Lane of the word the current taxel is read from, 2 bits.
     pub lane: Wire<Out>,
     /// Lanes the current taxel is written to, one bit each.
     pub mask: Wire<Out>,
@@ -39,10 +39,10 @@ pub struct Scan {
 }
 
 impl Scan {
-    /// For the subarrays of each of `cases`.
-    pub fn new(cases: &[CasePlan]) -> Self {
+    /// For the subarrays of each of `cases`, with `lanes` lanes in a memory word.
+    pub fn new(cases: &[CasePlan], lanes: usize) -> Self {
         let each = |of: &dyn Fn(&CasePlan) -> usize| CaseCounter::new(&cases.iter().map(of).collect::<Vec<_>>());
-        let quad_address = QuadAddress::new(cases);
+        let quad_address = QuadAddress::new(cases, lanes);
         Scan {
             clk: Default::default(),
             which: Wire::new(count_bits(cases.len())),

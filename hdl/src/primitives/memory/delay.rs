@@ -4,6 +4,7 @@ use rust_hdl::prelude::*;
 
 use crate::kernel_block;
 use crate::language::{Body, Builder, Kernel, Type};
+use crate::primitives::address::counter::count_bits;
 use crate::wire::Wire;
 
 /// A word delayed by `depth` cycles. Data, therefore without reset.
@@ -56,6 +57,19 @@ kernel_block!(BitDelay, clock clk, inputs [rst, d], outputs [q]);
 impl BitDelay {
     /// Delays by `depth` ≥ 1 cycles.
     pub fn new(depth: usize) -> Self {
+        BitDelay::of(bit_kernel(depth))
+    }
+
+    /// Delays pulses of one cycle, more than `depth` ≥ 1 cycles apart, by `depth` cycles: a counter where a shift register
+    /// would be longer.
+    pub fn of_pulse(depth: usize) -> Self {
+        match depth <= LONGEST_SHIFT {
+            true => BitDelay::new(depth),
+            false => BitDelay::of(pulse_kernel(depth)),
+        }
+    }
+
+    fn of(kernel: Kernel) -> Self {
         let block = BitDelay {
             clk: Default::default(),
             rst: Default::default(),
@@ -63,9 +77,12 @@ impl BitDelay {
             q: Default::default(),
             kernel: Body::default(),
         };
-        block.bind(bit_kernel(depth))
+        block.bind(kernel)
     }
 }
+
+/// Longest delay of a pulse for which a shift register is used.
+const LONGEST_SHIFT: usize = 8;
 
 fn bit_kernel(depth: usize) -> Kernel {
     let k = Builder::new("bit_delay");
@@ -76,6 +93,23 @@ fn bit_kernel(depth: usize) -> Kernel {
         register.set(value);
         value = *register;
     }
+    k.finish()
+}
+
+/// A pulse starts a counter, whose end is the delayed pulse.
+fn pulse_kernel(depth: usize) -> Kernel {
+    let k = Builder::new("pulse_delay");
+    let (rst, d) = (k.input("rst", 1), k.input("d", 1));
+    let count = Type::unsigned(count_bits(depth));
+    let (left, runs, q) = (
+        k.register("left", count),
+        k.state("runs", Type::unsigned(1), rst, 0),
+        k.state("q", Type::unsigned(1), rst, 0),
+    );
+    let ends = k.wire("ends", *runs & left.is(1));
+    left.set(d.mux(k.constant(count.bits, depth as u64 - 1), (*left - k.constant(count.bits, 1)).low(count.bits)));
+    runs.set(d | (*runs & !ends));
+    q.set(ends);
     k.finish()
 }
 
@@ -115,6 +149,23 @@ mod tests {
             let mut stimulus = random_words(1000, &[1, 1]);
             stimulus.iter_mut().enumerate().for_each(|(cycle, inputs)| inputs[0] = (cycle % 17 == 0).into());
             let block = BitDelay::new(depth);
+            check(block.kernel.kernel(), &stimulus, &mut Bits(vec![None; depth].into()));
+        }
+    }
+
+    #[test]
+    fn pulses_come_later_and_a_reset_clears_them() {
+        for depth in [3, 9, 16, 53] {
+            let mut random = fastrand::Rng::with_seed(depth as u64);
+            let mut idle = 0;
+            let mut inputs = |cycle: usize| {
+                let rst = cycle < 2 || random.usize(..5 * depth) == 0;
+                let pulse = !rst && idle > depth && random.u8(..4) == 0;
+                idle = if pulse { 0 } else { idle + 1 };
+                vec![rst.into(), pulse.into()]
+            };
+            let stimulus: Vec<Vec<Word>> = (0..4000).map(&mut inputs).collect();
+            let block = BitDelay::of_pulse(depth);
             check(block.kernel.kernel(), &stimulus, &mut Bits(vec![None; depth].into()));
         }
     }

@@ -44,9 +44,9 @@ pub struct ForceUnit {
     pub beat: Wire<In>,
     /// Index of the beat's subarray; valid with `offer`.
     pub beat_part: Wire<In>,
-    /// Lane of the taxel in its quad; valid with `offer`.
+    /// Lane of the taxel in its word; valid with `offer`.
     pub lane: Wire<In>,
-    /// Four values p(μ*), `search_bits[0]` each, signed; three cycles after `offer`.
+    /// `search_width` values p(μ*), `search_bits[0]` each, signed; three cycles after `offer`.
     pub quad: Wire<In>,
     /// μ1 in grid steps of the last level, signed; valid with `start`.
     pub position_x: Wire<In>,
@@ -115,6 +115,8 @@ const SHIFT_BITS: usize = 6;
 /// Widths and constants of the unit.
 #[derive(Clone, Debug)]
 struct Shape {
+    /// Values p(μ*) in a word.
+    lanes: usize,
     /// Bits of p(μ*), of the exponents, of the score.
     value_bits: usize,
     normalise_bits: usize,
@@ -144,6 +146,7 @@ impl ForceUnit {
         // The status names the case only where it is chosen per frame.
         let number = |case: &CasePlan| if model.chooses() { case.number() as usize } else { 0 };
         let shape = Shape {
+            lanes: f.search_width,
             value_bits: f.search_bits[0] as usize,
             normalise_bits: count_bits(f.input_bits as usize),
             rescale_bits: shift_bits(f),
@@ -169,7 +172,7 @@ impl ForceUnit {
             offer: Default::default(),
             beat: Wire::new(2),
             lane: Wire::new(2),
-            quad: Wire::new(4 * shape.value_bits),
+            quad: Wire::new(shape.lanes * shape.value_bits),
             position_x: Wire::new(position_bits()),
             position_y: Wire::new(position_bits()),
             normalise: Wire::new(shape.normalise_bits),
@@ -239,7 +242,7 @@ impl Shape {
         let (begin_frame, start) = (k.input("begin_frame", 1), k.input("start", 1));
         let (part, offer, beat) = (k.input("part", part_bits), k.input("offer", 1), k.input("beat", 2));
         let (beat_part, lane) = (k.input("beat_part", part_bits), k.input("lane", 2));
-        let quad = k.input("quad", 4 * v);
+        let quad = k.input("quad", self.lanes * v);
         let [position_x, position_y] = ["position_x", "position_y"].map(|name| k.input(name, position_bits()).signed());
         let normalise = k.input("normalise", self.normalise_bits);
         let rescale = k.input("rescale", self.rescale_bits);
@@ -275,9 +278,13 @@ impl Shape {
         let shift = k.delay("shift", shifts.read(part_after(READ_STEPS + PRODUCT_STEPS)));
 
         let of_lane = |lane: usize| quad.slice(lane * v, v);
-        let high = lane_value.at(0).mux(of_lane(3), of_lane(2));
-        let low = lane_value.at(0).mux(of_lane(1), of_lane(0));
-        let value = k.delay("value", lane_value.at(1).mux(high, low).signed());
+        let pair = |first: usize| lane_value.at(0).mux(of_lane(first + 1), of_lane(first));
+        let value = match self.lanes {
+            1 => of_lane(0),
+            2 => pair(0),
+            _ => lane_value.at(1).mux(pair(2), pair(0)),
+        };
+        let value = k.delay("value", value.signed());
         let later = k.delay("value_2", k.delay("value_1", value));
         let doubled = later.shift_left(self.fraction + 1).extend(v + MU_BITS + 1);
         let z = k.delay("moved_z", doubled.shift_right_by(shift));

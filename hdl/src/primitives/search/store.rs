@@ -1,6 +1,9 @@
 //! Search memory: every taxel's polynomial, about up to three centres.
 
+use dermis_golden::fixed::plan::cycles::split_latency;
 use dermis_golden::fixed::plan::resources::Holds;
+use dermis_golden::fixed::words::formats::Formats;
+use dermis_golden::symmetry::quads::Quads;
 use rust_hdl::prelude::*;
 
 use crate::kernel_block;
@@ -10,9 +13,13 @@ use crate::primitives::search::polynomial_word::PolynomialWord;
 use crate::primitives::search::sweep::{BUFFERS, BUFFER_BITS, START};
 use crate::wire::Wire;
 
-/// Buffers of quads of polynomials. `fill` writes one coefficient of a quad into buffer `START`; `write` writes a whole
-/// quad into one of the others. Both take effect one cycle later, through registers beside the memory. `read_data`
+/// Buffers of quads of polynomials. `fill` writes one coefficient of a quad into buffer `START`; `write` writes whole
+/// polynomials into one of the others. Both take effect one cycle later, through registers beside the memory. `read_data`
 /// follows its address by three cycles: read register and output register of the memory, and the choice of the memory.
+///
+/// A step is the part of a quad that the search computes in a cycle: all of it, or two or four steps make a quad. The
+/// address of a step is that of the quad followed by the index of the step. Then `read_data` comes a cycle later, and a
+/// quad is written with its last step.
 ///
 /// Where one subarray or frame is filled while another is searched, `START` is a memory of its own; otherwise it is another
 /// name of buffer 0, and `fill` and `write` never coincide.
@@ -32,25 +39,25 @@ pub struct Store {
     pub fill_address: Wire<In>,
     /// The coefficient of four taxels, signed; valid with `fill`.
     pub fill_quad: Wire<In>,
-    /// Write `write_data` to quad `write_address`.
+    /// Write `write_data` to step `write_address`; the steps of a quad follow one another.
     pub write: Signal<In, Bit>,
     /// Buffer to write; valid one cycle before `write`.
     pub write_buffer: Wire<In>,
-    /// Address of the quad; valid with `write`.
+    /// Address of the step; valid with `write`.
     pub write_address: Wire<In>,
-    /// A quad of polynomials; valid with `write`.
+    /// The polynomials of a step; valid with `write`.
     pub write_data: Wire<In>,
     /// Buffer to read; valid with `read_address`.
     pub read_buffer: Wire<In>,
-    /// Address of the quad to read: 0 in the cycle after `begins`, then one more after each cycle with `counts`.
+    /// Address of the step to read: 0 in the cycle after `begins`, then one more after each cycle with `counts`.
     pub read_address: Wire<In>,
     /// A buffer is read from the next cycle on; loads `next_base` into the read addresses.
     pub begins: Signal<In, Bit>,
-    /// The read addresses step to the next quad.
+    /// The read addresses advance to the next step.
     pub counts: Signal<In, Bit>,
     /// First address of that buffer in the memory (`base`); valid with `begins`.
     pub next_base: Wire<In>,
-    /// A quad of polynomials, [`LATENCY`] cycles after `read_address`.
+    /// The polynomials of a step, [`latency`] cycles after `read_address`.
     pub read_data: Wire<Out>,
     kernel: Body,
 }
@@ -65,8 +72,13 @@ kernel_block!(
     outputs [read_data]
 );
 
-/// Cycles from `read_address` to `read_data`.
-pub const LATENCY: usize = 3;
+/// Cycles from `read_address` to `read_data`, where a step is a quad.
+const LATENCY: usize = 3;
+
+/// Cycles from `read_address` to `read_data`; `formats` says how many taxels a step has.
+pub fn latency(formats: &Formats) -> usize {
+    LATENCY + split_latency(formats) as usize
+}
 
 /// First address of `buffer` in the memory, where buffers of `quads` quads follow each other without gaps.
 pub fn base(buffer: usize, quads: usize) -> usize {
@@ -79,42 +91,63 @@ pub fn base_bits(quads: usize) -> usize {
 }
 
 impl Store {
-    /// `quads` quads of polynomials in `layout`, filled with coefficients of `fill_bits` bits; `apart` says whether one
-    /// subarray or frame is filled while another is searched.
-    pub fn new(layout: PolynomialWord, quads: usize, fill_bits: usize, apart: bool) -> Self {
-        let address = count_bits(quads);
+    /// `quads` quads of polynomials, filled with coefficients of `fill_bits` bits; `step` is the layout of the polynomials
+    /// of a step, `apart` says whether one subarray or frame is filled while another is searched.
+    pub fn new(step: PolynomialWord, quads: usize, fill_bits: usize, apart: bool) -> Self {
+        let (address, steps) = (count_bits(quads), count_bits(quads * steps(&step)));
         let block = Store {
             clk: Default::default(),
             fill: Default::default(),
-            fill_index: Wire::new(count_bits(layout.widths.len())),
+            fill_index: Wire::new(count_bits(step.widths.len())),
             fill_address: Wire::new(address),
             fill_quad: Wire::new(4 * fill_bits),
             write: Default::default(),
             write_buffer: Wire::new(BUFFER_BITS),
-            write_address: Wire::new(address),
-            write_data: Wire::new(layout.bits()),
+            write_address: Wire::new(steps),
+            write_data: Wire::new(step.bits()),
             read_buffer: Wire::new(BUFFER_BITS),
-            read_address: Wire::new(address),
+            read_address: Wire::new(steps),
             begins: Default::default(),
             counts: Default::default(),
             next_base: Wire::new(base_bits(quads)),
-            read_data: Wire::new(layout.bits()),
+            read_data: Wire::new(step.bits()),
             kernel: Body::default(),
         };
-        block.bind(kernel(&layout, quads, fill_bits, apart))
+        block.bind(kernel(&step, quads, fill_bits, apart))
     }
 }
 
-fn kernel(layout: &PolynomialWord, quads: usize, fill_bits: usize, apart: bool) -> Kernel {
+/// Steps of a quad.
+fn steps(step: &PolynomialWord) -> usize {
+    Quads::LANES / step.lanes
+}
+
+/// Address of the quad and index of the step, where a quad has several, of a step's `address`.
+fn split<'k>(address: Expr<'k>, steps: usize) -> (Expr<'k>, Option<Expr<'k>>) {
+    match steps.trailing_zeros() as usize {
+        0 => (address, None),
+        bits => (address.slice(bits, address.bits() - bits), Some(address.low(bits))),
+    }
+}
+
+fn kernel(step: &PolynomialWord, quads: usize, fill_bits: usize, apart: bool) -> Kernel {
     let k = Builder::new("store");
-    let (quad_bits, bits) = (count_bits(quads), base_bits(quads));
+    let layout = &PolynomialWord { lanes: Quads::LANES, widths: step.widths.clone() };
+    let (quad_bits, bits, step_bits) = (count_bits(quads), base_bits(quads), count_bits(quads * steps(step)));
     let (fill, fill_index) = (k.input("fill", 1), k.input("fill_index", count_bits(layout.widths.len())));
     let (fill_address, fill_quad) = (k.input("fill_address", quad_bits), k.input("fill_quad", 4 * fill_bits));
     let (write, write_buffer) = (k.input("write", 1), k.input("write_buffer", BUFFER_BITS));
-    let (write_address, write_data) = (k.input("write_address", quad_bits), k.input("write_data", layout.bits()));
-    let (read_buffer, read_address) = (k.input("read_buffer", BUFFER_BITS), k.input("read_address", quad_bits));
+    let (write_address, write_data) = (k.input("write_address", step_bits), k.input("write_data", step.bits()));
+    let (read_buffer, read_address) = (k.input("read_buffer", BUFFER_BITS), k.input("read_address", step_bits));
     let (begins, counts) = (k.input("begins", 1), k.input("counts", 1));
     let next_base = k.input("next_base", bits);
+    let (write_address, written) = split(write_address, steps(step));
+    let (read_address, shows) = split(read_address, steps(step));
+    let (counts, whole) = match (shows, written) {
+        (Some(shows), Some(written)) => (counts & shows.all(), write & written.all()),
+        _ => (counts, write),
+    };
+    let shows = shows.map(|shows| (0..LATENCY).fold(shows, |shows, n| k.delay(&format!("shows_{n}"), shows)));
 
     let bases: Vec<(u64, Expr)> = (1..BUFFERS).map(|b| (b as u64, k.constant(bits, base(b, quads) as u64))).collect();
     let write_base = k.delay("write_base", write_buffer.case(&bases, k.constant(bits, 0)));
@@ -137,7 +170,17 @@ fn kernel(layout: &PolynomialWord, quads: usize, fill_bits: usize, apart: bool) 
         let filled = |lane: usize| fill_quad.slice(lane * fill_bits, fill_bits).signed().resize(width).unsigned();
         let filled = concat(&[3, 2, 1, 0].map(filled));
         let fills = fill_index.is(index as u64);
-        let whole = write_data.slice(layout.offset(index), all);
+        let last = write_data.slice(step.offset(index), step.lanes * width);
+        let before = |at: usize| {
+            let held = k.register(&format!("held{index}_{at}"), last.ty());
+            if let Some(written) = written {
+                k.when(write & written.is(at as u64), || held.set(last));
+            }
+            *held
+        };
+        let mut quad: Vec<Expr> = (0..steps(step) - 1).map(before).collect();
+        quad.push(last);
+        let quad = concat(&quad.into_iter().rev().collect::<Vec<_>>());
         let read = registered(&k, &format!("read{index}"), place.read(*from));
         let shown = match from_start {
             Some(from_start) => {
@@ -145,15 +188,23 @@ fn kernel(layout: &PolynomialWord, quads: usize, fill_bits: usize, apart: bool) 
                 let own = k.memory(&start, quads, all, Contents::Undefined).unchecked();
                 let own = own.holds(Holds::Start(index));
                 write_port(&k, (&start, own), [fill & fills, fill_address, filled]);
-                write_port(&k, (&memory, place), [write, write_to, whole]);
+                write_port(&k, (&memory, place), [whole, write_to, quad]);
                 from_start.mux(registered(&k, &format!("read_start{index}"), own.read(read_address)), read)
             }
             None => {
-                write_port(&k, (&memory, place), [fill.mux(fills, write), write_to, fill.mux(filled, whole)]);
+                write_port(&k, (&memory, place), [fill.mux(fills, whole), write_to, fill.mux(filled, quad)]);
                 read
             }
         };
-        k.delay(&format!("shown{index}"), shown)
+        let shown = k.delay(&format!("shown{index}"), shown);
+        match shows {
+            None => shown,
+            Some(shows) => {
+                let part = |at: usize| shown.slice(at * step.lanes * width, step.lanes * width);
+                let later: Vec<(u64, Expr)> = (1..steps(step)).map(|at| (at as u64, part(at))).collect();
+                k.delay(&format!("step{index}"), shows.case(&later, part(0)))
+            }
+        }
     };
     let shown: Vec<Expr> = (0..layout.widths.len()).map(coefficient).collect();
     k.wire("read_data", concat(&shown.into_iter().rev().collect::<Vec<_>>()));
@@ -229,6 +280,8 @@ mod tests {
     /// Memory by name (that of the buffers, `START`) and coefficient; what is undefined is `None`.
     struct Buffers {
         apart: bool,
+        /// Lanes of a step.
+        lanes: usize,
         content: [[Vec<Option<u64>>; 2]; 2],
         /// Memory, coefficient, address, data of the writes asked for.
         asked: Vec<(usize, usize, usize, u64)>,
@@ -238,25 +291,37 @@ mod tests {
         read: [[Option<u64>; 2]; 2],
         out: [[Option<u64>; 2]; 2],
         shown: [Option<u64>; 2],
+        /// Steps of a quad that were written last, by coefficient.
+        held: [[Option<u64>; 4]; 2],
+        /// Indices of the steps read, and the step chosen last.
+        shows: [usize; LATENCY],
+        step: [Option<u64>; 2],
     }
 
     impl Reference for Buffers {
         fn outputs(&mut self, _: &[Word]) -> Vec<Option<Word>> {
+            let lanes = self.lanes;
             let word = |low: u64, high: u64| {
                 let mut word = Word::default();
-                word.set(0, 4 * WIDTHS[0], low);
-                word.set(4 * WIDTHS[0], 4 * WIDTHS[1], high);
+                word.set(0, lanes * WIDTHS[0], low);
+                word.set(lanes * WIDTHS[0], lanes * WIDTHS[1], high);
                 word
             };
-            vec![self.shown[0].zip(self.shown[1]).map(|(low, high)| word(low, high))]
+            let shown = if lanes == 4 { self.shown } else { self.step };
+            vec![shown[0].zip(shown[1]).map(|(low, high)| word(low, high))]
         }
 
         fn clock(&mut self, inputs: &[Word]) {
             let number = |k: usize| inputs[k].number() as usize;
             let bit = |k: usize| number(k) == 1;
+            let (lanes, steps) = (self.lanes, 4 / self.lanes);
+            self.step = std::array::from_fn(|k| {
+                let bits = lanes * WIDTHS[k];
+                self.shown[k].map(|quad| quad >> (self.shows[LATENCY - 1] * bits) & ((1 << bits) - 1))
+            });
             self.shown = self.out[usize::from(self.apart && self.from_start[1])];
             self.out = self.read;
-            let from = [self.from, Some(number(9))];
+            let from = [self.from, Some(number(9) / steps)];
             for (memory, k) in [(0, 0), (0, 1), (1, 0), (1, 1)] {
                 let collides =
                     |&(m, c, at, _): &(usize, usize, usize, u64)| (m, c, Some(at)) == (memory, k, from[memory]);
@@ -275,15 +340,22 @@ mod tests {
                     let data = Word::of_fields(&lanes, width).field(0, 4 * width);
                     self.asked.push((usize::from(self.apart), k, number(2), data));
                 }
-                if bit(4) && (self.apart || !bit(0)) {
-                    let data = inputs[7].field(k * 4 * WIDTHS[0], 4 * width);
-                    self.asked.push((0, k, (self.write_base + number(6)) % end, data));
+                if bit(4) {
+                    self.held[k][number(6) % steps] = Some(inputs[7].field(k * lanes * WIDTHS[0], lanes * width));
+                }
+                if bit(4) && number(6) % steps == steps - 1 && (self.apart || !bit(0)) {
+                    let of_step = |at: usize| self.held[k][at].map(|part| part << (at * lanes * width));
+                    // The test writes every step before the last one first.
+                    let data = (0..steps).map(|at| of_step(at).unwrap_or(0)).sum();
+                    self.asked.push((0, k, (self.write_base + number(6) / steps) % end, data));
                 }
             }
-            self.from = match (bit(10), bit(11)) {
-                (true, _) => Some(number(12)),
-                (false, steps) => self.from.map(|at| (at + usize::from(steps)) % end),
+            let advances = bit(11) && number(9) % steps == steps - 1;
+            self.from = match bit(10) {
+                true => Some(number(12)),
+                false => self.from.map(|at| (at + usize::from(advances)) % end),
             };
+            self.shows = [number(9) % steps, self.shows[0], self.shows[1]];
             self.write_base = base(number(5), QUADS);
             self.from_start = [number(8) == START, self.from_start[0]];
         }
@@ -291,16 +363,20 @@ mod tests {
 
     #[test]
     fn quads_are_read_where_they_were_written() {
-        let layout = PolynomialWord { lanes: 4, widths: WIDTHS.into() };
-        let (quad, bits) = (count_bits(QUADS), base_bits(QUADS));
-        let widths = [1, 1, quad, 4 * FILL, 1, BUFFER_BITS, quad, layout.bits(), BUFFER_BITS, quad, 1, 1, bits];
-        let mut stimulus = random_words(20000, &widths);
-        // The base of the first write is not yet known.
-        stimulus[0][4] = Word::default();
-        for apart in [false, true] {
+        for (lanes, apart) in [(4, false), (4, true), (2, true), (1, false), (1, true)] {
+            let layout = PolynomialWord { lanes, widths: WIDTHS.into() };
+            let (quad, step, bits) = (count_bits(QUADS), count_bits(QUADS * (4 / lanes)), base_bits(QUADS));
+            let widths = [1, 1, quad, 4 * FILL, 1, BUFFER_BITS, step, layout.bits(), BUFFER_BITS, step, 1, 1, bits];
+            let mut stimulus = random_words(20000, &widths);
+            for (cycle, inputs) in stimulus.iter_mut().enumerate().take(4) {
+                // The base of the first write is not yet known; every step of a quad is written before the last one.
+                inputs[4] = Word::from(cycle > 0 && lanes < 4);
+                inputs[6] = Word::from(cycle.saturating_sub(1) as u64 % (4 / lanes as u64));
+            }
             let store = Store::new(layout.clone(), QUADS, FILL, apart);
             let mut buffers = Buffers {
                 apart,
+                lanes,
                 content: [BUFFERS * QUADS, QUADS].map(|quads| [vec![None; quads], vec![None; quads]]),
                 asked: Vec::new(),
                 from: None,
@@ -309,6 +385,9 @@ mod tests {
                 read: Default::default(),
                 out: Default::default(),
                 shown: Default::default(),
+                held: Default::default(),
+                shows: Default::default(),
+                step: Default::default(),
             };
             check(store.kernel.kernel(), &stimulus, &mut buffers);
         }

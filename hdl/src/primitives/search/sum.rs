@@ -11,8 +11,7 @@ use crate::wire::Wire;
 
 /// Adds the counted lanes of each `fill` to the sum of buffer `START`, three cycles later; quad 0 restarts a
 /// coefficient. `read` puts a buffer's sum on `word` after the same three cycles as the search memory, where it is held;
-/// `write` replaces a buffer's sum by the `write_data` of the next cycle. As in the search memory, `START` is buffer 0
-/// unless one subarray is filled while another is searched.
+/// `write` replaces a buffer's sum by the `write_data` of the next cycle.
 #[derive(LogicBlock)]
 pub struct Sum {
     /// Clock; registers change on its rising edge.
