@@ -7,6 +7,8 @@ use std::fs;
 use std::path::Path;
 use std::process::Command;
 
+use dermis_golden::fixed::Model;
+use dermis_golden::scene::Scene;
 use dermis_sim::flow::baseline::Baselines;
 
 /// Synchronisation word of an iCE40 bitstream.
@@ -31,6 +33,22 @@ fn makes_a_bitstream_without_regression(name: &str) {
     assert!(Baselines::committed().get("icebreaker", name).is_some(), "constraints/baselines.json");
     let bitstream = fs::read(build.path().join(format!("{name}/icebreaker/{name}.bin"))).unwrap();
     assert!(bitstream.windows(PREAMBLE.len()).any(|window| window == PREAMBLE));
+}
+
+/// Block RAMs of the link: the packet counters.
+const LINK_BLOCK_RAMS: usize = 1;
+
+/// Place and route of these takes too long for a test; a baseline of other hardware shows by its exact counts.
+#[test]
+fn the_baselines_of_large_scenes_are_of_the_hardware_generated_now() {
+    let (board, baselines) = ("ulx3s-85f", Baselines::committed());
+    for name in ["eight-by-eight", "sensor-1", "sensor-2", "sensor-3", "sensor-4"] {
+        let baseline = baselines.get(board, name).expect(name);
+        let model = Model::new(&Scene::builtin(name).unwrap()).unwrap();
+        assert_eq!(model.board.name, board);
+        let planned = [model.resources.multipliers(), model.resources.block_rams() + LINK_BLOCK_RAMS];
+        assert_eq!([baseline.multipliers, baseline.block_rams].map(|count| count as usize), planned, "{name}");
+    }
 }
 
 #[test]

@@ -10,10 +10,9 @@ use dermis_golden::scene::Scene;
 use dermis_sim::cosim::drive::Stimulus;
 use dermis_sim::cosim::hardware::{Hardware, Simulator};
 use dermis_sim::cosim::verify::verify;
-use dermis_sim::cosim::{run, DeviceUnderTest, Findings, Vector};
 use dermis_sim::drawn_frames::{DrawnFrames, Shapes};
 use dermis_sim::report::study::dead_taxels::{self, LINES as SCENES};
-use dermis_tests::build_dir;
+use dermis_tests::{assert_equal, build_dir, compare};
 
 /// Bound of the bit-true model's additional median tangential error at 20 bits; as for whole arrays.
 const FIXED_ADDS: f64 = 0.02;
@@ -44,8 +43,7 @@ fn drawn_frames_are_equal_on_every_simulator() {
         let simulators = [Simulator::RustHdl, Simulator::Verilator];
         let simulators = if dead.len() > 1 { &simulators[..] } else { &simulators[..1] };
         let verified = verify(&scene, &frames(&scene, 4), simulators, &build_dir()).unwrap();
-        let first: Vec<String> = verified.findings.kept.iter().take(3).map(ToString::to_string).collect();
-        assert!(verified.findings.is_equal(), "{}: {first:#?}", scene.name);
+        assert_equal(&verified.findings, &scene.name);
     }
 }
 
@@ -66,8 +64,7 @@ fn unlike_scenes_are_equal() {
         );
         let scene = Scene::parse(&text, name).unwrap();
         let verified = verify(&scene, &frames(&scene, 4), &[Simulator::RustHdl], &build_dir()).unwrap();
-        let first: Vec<String> = verified.findings.kept.iter().take(3).map(ToString::to_string).collect();
-        assert!(verified.findings.is_equal(), "{name}: {first:#?}");
+        assert_equal(&verified.findings, name);
     }
 }
 
@@ -131,19 +128,14 @@ fn mirrored_pairs_keep_a_symmetry() {
     assert_eq!(flips(&[]), [1; 3]);
 }
 
-fn compare(hardware: &Hardware, vectors: &[Vector]) -> Findings {
-    let mut device = hardware.device(Simulator::Verilator).unwrap();
-    let dut = DeviceUnderTest { name: "verilator", device: device.as_mut(), taps: &hardware.tap_names() };
-    run(dut, vectors, Stimulus::FullSpeed).0
-}
-
 #[test]
 fn a_flipped_coefficient_of_a_broken_symmetry_is_found() {
     let (name, dead) = SCENES[1];
     let scene = masked(name, dead);
     let mut hardware = Hardware::new(Model::new(&scene).unwrap(), &build_dir()).unwrap();
     let vectors = [hardware.vector(&frames(&scene, 1)).unwrap()];
-    assert!(compare(&hardware, &vectors).is_equal());
+    let found = |hardware: &Hardware| compare(hardware, Simulator::Verilator, &vectors, Stimulus::FullSpeed);
+    assert!(found(&hardware).is_equal());
     // The memory has the columns of the symmetric flip of each matrix first; the next line is of another flip.
     let quads = hardware.model.formats().quads;
     let index = hardware.generated.files.iter().position(|file| file.name == "coefficients.hex").unwrap();
@@ -151,6 +143,6 @@ fn a_flipped_coefficient_of_a_broken_symmetry_is_found() {
     let last = lines[quads].pop().and_then(|digit| digit.to_digit(16)).unwrap();
     lines[quads].push(char::from_digit(last ^ 1, 16).unwrap());
     hardware.generated.files[index].text = lines.join("\n") + "\n";
-    let findings = compare(&hardware, &vectors);
+    let findings = found(&hardware);
     assert_eq!(findings.kept.first().map(|finding| finding.stage.as_str()), Some("pass"));
 }

@@ -8,12 +8,11 @@ use dermis_golden::scene::Scene;
 use dermis_sim::cosim::hardware::Simulator;
 use dermis_sim::cosim::verify::{verify, Verified};
 use dermis_sim::report;
-use dermis_tests::{build_dir, check_cycles, scene, SCENES};
+use dermis_tests::{assert_equal, build_dir, check_cycles, scene, SCENES};
 
 fn check(scene: &Scene, frames: &[Frame]) -> Verified {
     let verified = verify(scene, frames, &[Simulator::Verilator, Simulator::RustHdl], &build_dir()).unwrap();
-    let first: Vec<String> = verified.findings.kept.iter().take(3).map(ToString::to_string).collect();
-    assert!(verified.findings.is_equal(), "{}: {first:#?}", scene.name);
+    assert_equal(&verified.findings, &scene.name);
     verified
 }
 

@@ -7,8 +7,8 @@ use dermis_golden::scene::Scene;
 use dermis_golden::stability::extreme::frames;
 use dermis_sim::cosim::drive::Stimulus;
 use dermis_sim::cosim::hardware::{Hardware, Simulator};
-use dermis_sim::cosim::{run, DeviceUnderTest, Vector};
-use dermis_tests::build_dir;
+use dermis_sim::cosim::Vector;
+use dermis_tests::{assert_equal, build_dir, compare};
 
 /// The frames with the scene's own partition, as codes with their own full scales.
 fn vectors(scene: &Scene, hardware: &Hardware) -> Vec<Vector> {
@@ -32,18 +32,14 @@ fn check(scene: &Scene, least: usize) {
     let hardware = Hardware::new(Model::new(scene).unwrap(), &build_dir()).unwrap();
     let vectors = vectors(scene, &hardware);
     assert!(vectors.len() >= least, "{} frames", vectors.len());
-    let taps = hardware.tap_names();
     let runs = [
         (Simulator::Verilator, Stimulus::FullSpeed),
         (Simulator::Verilator, Stimulus::Stalls { seed: 5 }),
         (Simulator::RustHdl, Stimulus::FullSpeed),
     ];
     for (simulator, stimulus) in runs {
-        let mut device = hardware.device(simulator).unwrap();
-        let dut = DeviceUnderTest { name: simulator.name(), device: device.as_mut(), taps: &taps };
-        let (findings, _) = run(dut, &vectors, stimulus);
-        let first: Vec<String> = findings.kept.iter().take(3).map(ToString::to_string).collect();
-        assert!(findings.is_equal(), "{}, {}: {first:#?}", scene.name, simulator.name());
+        let findings = compare(&hardware, simulator, &vectors, stimulus);
+        assert_equal(&findings, format!("{}, {}", scene.name, simulator.name()));
     }
 }
 

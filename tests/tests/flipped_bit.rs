@@ -4,8 +4,8 @@
 use dermis_golden::fixed::Model;
 use dermis_sim::cosim::drive::Stimulus;
 use dermis_sim::cosim::hardware::{Hardware, Simulator};
-use dermis_sim::cosim::{run, DeviceUnderTest, Findings, Vector};
-use dermis_tests::{build_dir, scene};
+use dermis_sim::cosim::{Findings, Vector};
+use dermis_tests::{build_dir, compare, scene};
 
 fn setup() -> (Hardware, Vec<Vector>) {
     let (scene, frames) = scene("eight-by-eight");
@@ -15,9 +15,7 @@ fn setup() -> (Hardware, Vec<Vector>) {
 }
 
 fn check(hardware: &Hardware, vectors: &[Vector]) -> Findings {
-    let mut device = hardware.device(Simulator::Verilator).unwrap();
-    let dut = DeviceUnderTest { name: "verilator", device: device.as_mut(), taps: &hardware.tap_names() };
-    run(dut, vectors, Stimulus::FullSpeed).0
+    compare(hardware, Simulator::Verilator, vectors, Stimulus::FullSpeed)
 }
 
 /// Flips bit 0 of the first non-zero hexadecimal word in the middle of a memory file.

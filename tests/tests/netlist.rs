@@ -6,9 +6,9 @@ use dermis_golden::frame::Frame;
 use dermis_golden::scene::Scene;
 use dermis_sim::cosim::drive::Stimulus;
 use dermis_sim::cosim::hardware::{Hardware, Simulator};
-use dermis_sim::cosim::{run, DeviceUnderTest, Findings, Vector};
+use dermis_sim::cosim::{Findings, Vector};
 use dermis_sim::drawn_frames::{DrawnFrames, Shapes};
-use dermis_tests::build_dir;
+use dermis_tests::{build_dir, compare};
 
 /// Small enough for synthesis and compilation within a minute. Without a search nine tenths of the cells are gone;
 /// limbs, matrix passes and force unit remain.
@@ -25,12 +25,8 @@ fn setup(board: &str, mu_max: &str) -> (Hardware, Vec<Frame>) {
 }
 
 fn findings(hardware: &Hardware, frames: &[Frame], simulator: Simulator) -> Findings {
-    let mut device = hardware.device(simulator).unwrap();
     let vectors = frames.iter().map(|frame| hardware.vector(std::slice::from_ref(frame)).unwrap());
-    let vectors: Vec<Vector> = vectors.collect();
-    let (taps, vectors) = hardware.observable(simulator, &vectors);
-    let dut = DeviceUnderTest { name: simulator.name(), device: device.as_mut(), taps: &taps };
-    run(dut, &vectors, Stimulus::FullSpeed).0
+    compare(hardware, simulator, &vectors.collect::<Vec<Vector>>(), Stimulus::FullSpeed)
 }
 
 #[test]

@@ -9,8 +9,7 @@ use dermis_golden::scene::Scene;
 use dermis_sim::cosim::drive::Stimulus;
 use dermis_sim::cosim::hardware::{Hardware, Simulator};
 use dermis_sim::cosim::verify::verify;
-use dermis_sim::cosim::{run, DeviceUnderTest};
-use dermis_tests::build_dir;
+use dermis_tests::{assert_equal, build_dir, compare};
 use proptest::prelude::*;
 
 /// Name, and the difference from a default scene of 6×6 taxels.
@@ -86,8 +85,7 @@ fn unlike_scenes_are_equal() {
         // As many averaged frames as others: the interval is measured from the second one on.
         let frames = vec![frames(&scene); 1 << scene.input.average].concat();
         let verified = verify(&scene, &frames, &simulators, &build_dir()).unwrap();
-        let first: Vec<String> = verified.findings.kept.iter().take(3).map(ToString::to_string).collect();
-        assert!(verified.findings.is_equal(), "{name}: {first:#?}");
+        assert_equal(&verified.findings, name);
         // Planned for frames of which every subarray is searched.
         if verified.rows.iter().all(|row| row.fixed.subarrays.iter().all(|part| part.centroid_condition)) {
             assert_eq!(verified.frame_interval, Some(verified.planned_interval), "{name}");
@@ -133,9 +131,7 @@ proptest! {
             .collect();
         let expected = hardware.model.run(&codes);
         let vectors = [dermis_sim::cosim::Vector { frame: "random".into(), cols, taxels: codes.len(), codes, expected }];
-        let mut device = hardware.device(Simulator::RustHdl).unwrap();
-        let dut = DeviceUnderTest { name: "rust-hdl", device: device.as_mut(), taps: &hardware.tap_names() };
-        let (findings, _) = run(dut, &vectors, Stimulus::FullSpeed);
+        let findings = compare(&hardware, Simulator::RustHdl, &vectors, Stimulus::FullSpeed);
         prop_assert!(findings.is_equal(), "{:?}", findings.kept.first().map(ToString::to_string));
     }
 }
@@ -183,8 +179,7 @@ fn calibrated_readings_are_equal_and_give_the_forces_of_the_stress() {
         }
         let simulators = [Simulator::Verilator, Simulator::RustHdl];
         let verified = verify(&scene, &readings, &simulators, &build_dir()).unwrap();
-        let first: Vec<String> = verified.findings.kept.iter().take(3).map(ToString::to_string).collect();
-        assert!(verified.findings.is_equal(), "{name}: {first:#?}");
+        assert_equal(&verified.findings, name);
         // Rounding to codes with a scale up to a few times coarser, through an inverse of condition 10².
         for (row, frame) in verified.rows.iter().zip(&stress) {
             let (own, wanted) = (&row.fixed.resultant_N, &exact.reconstruct(frame).unwrap().resultant_N);

@@ -8,10 +8,10 @@ use dermis_hdl::generate;
 use dermis_sim::cosim::drive::Stimulus;
 use dermis_sim::cosim::hardware::{Hardware, Simulator};
 use dermis_sim::cosim::verify::verify;
-use dermis_sim::cosim::{run, DeviceUnderTest, Vector};
+use dermis_sim::cosim::Vector;
 use dermis_sim::drawn_frames::{DrawnFrames, Shapes};
 use dermis_tests::tools::cells;
-use dermis_tests::{build_dir, scene};
+use dermis_tests::{assert_equal, build_dir, compare, scene};
 
 const BOARD: &str = "icebreaker";
 const BOTH: &[Simulator] = &[Simulator::Verilator, Simulator::RustHdl];
@@ -23,8 +23,7 @@ fn on_board(mut scene: Scene) -> Scene {
 
 fn check(scene: &Scene, frames: &[Frame], simulators: &[Simulator]) {
     let verified = verify(scene, frames, simulators, &build_dir()).unwrap();
-    let first: Vec<String> = verified.findings.kept.iter().take(3).map(ToString::to_string).collect();
-    assert!(verified.findings.is_equal(), "{}: {first:#?}", scene.name);
+    assert_equal(&verified.findings, &scene.name);
 }
 
 fn sensor(rows: usize, cols: usize, more: &str) -> Scene {
@@ -113,11 +112,7 @@ fn a_wrong_coefficient_is_found() {
     wrong.first_mut().quantised.ax.flips[0].parity[2][5] ^= 1;
     let [right, wrong] = [right, wrong].map(|model| Hardware::new(model, &build_dir()).unwrap());
     let vectors: Vec<Vector> = frames.iter().map(|frame| right.vector(std::slice::from_ref(frame)).unwrap()).collect();
-    let findings = |hardware: &Hardware| {
-        let mut device = hardware.device(Simulator::Verilator).unwrap();
-        let dut = DeviceUnderTest { name: "verilator", device: device.as_mut(), taps: &hardware.tap_names() };
-        run(dut, &vectors, Stimulus::FullSpeed).0
-    };
+    let findings = |hardware: &Hardware| compare(hardware, Simulator::Verilator, &vectors, Stimulus::FullSpeed);
     assert!(findings(&right).is_equal());
     // The first words that differ are those that the coefficient enters.
     assert_eq!(findings(&wrong).kept.first().map(|first| first.stage.as_str()), Some("pass"));

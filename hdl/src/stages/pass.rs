@@ -24,7 +24,7 @@ pub struct Pass {
     pub rst: Signal<In, Bit>,
     /// Index of the case; constant while a frame is computed.
     pub which: Wire<In>,
-    /// The products of a subarray may begin; its input is still being written.
+    /// The products of a subarray may begin while its input is still being written.
     pub start: Signal<In, Bit>,
     /// Address of the quad to read from the input memory; in every cycle of a product with the input.
     pub input_address: Wire<Out>,
