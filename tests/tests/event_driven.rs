@@ -153,8 +153,9 @@ fn simulate(hardware: &Hardware, vectors: &[Vector], stimulus: Stimulus) -> (Fin
     (findings, device.undefined.clone())
 }
 
-fn setup(frames: usize) -> (Hardware, Vec<Vector>) {
-    let (scene, shipped) = scene("eight-by-eight");
+fn setup(frames: usize, search_width: usize) -> (Hardware, Vec<Vector>) {
+    let (mut scene, shipped) = scene("eight-by-eight");
+    scene.hardware.search_width = Some(search_width);
     let hardware = Hardware::new(Model::new(&scene).unwrap(), &build_dir()).unwrap();
     let vector = |frame| hardware.vector(std::slice::from_ref(frame)).unwrap();
     let vectors = shipped.iter().take(frames).map(vector).collect();
@@ -163,8 +164,10 @@ fn setup(frames: usize) -> (Hardware, Vec<Vector>) {
 
 #[test]
 fn words_and_cycles_are_those_of_the_model_and_nothing_is_undefined() {
-    let (hardware, vectors) = setup(3);
-    for stimulus in [Stimulus::FullSpeed, Stimulus::Stalls { seed: 1 }] {
+    for (frames, search_width, stimulus) in
+        [(3, 4, Stimulus::FullSpeed), (3, 4, Stimulus::Stalls { seed: 1 }), (1, 1, Stimulus::FullSpeed)]
+    {
+        let (hardware, vectors) = setup(frames, search_width);
         let (findings, undefined) = simulate(&hardware, &vectors, stimulus);
         assert_equal(&findings, stimulus);
         assert!(undefined.is_empty(), "{stimulus}: {} {:?}", undefined.len(), &undefined[..undefined.len().min(9)]);
@@ -175,7 +178,7 @@ fn words_and_cycles_are_those_of_the_model_and_nothing_is_undefined() {
 /// start value shows as correct; the data of a queue place that has not been written.
 #[test]
 fn an_undefined_register_is_found() {
-    let (mut hardware, vectors) = setup(1);
+    let (mut hardware, vectors) = setup(1, 4);
     let queue = "forces__leaving";
     let unwritten = |k: &'static str| Change::value(queue, k, |k| k.array("places").read(!k.named("read").low(4)));
     let defects = [(Change::undefined(queue, "m_axis_tvalid"), "valid"), (unwritten("head"), "data")];

@@ -60,6 +60,16 @@ fn dead_taxels_are_clean_with_the_same_waivers() {
 }
 
 #[test]
+fn a_narrower_search_is_clean_with_the_same_waivers() {
+    for width in [2, 1] {
+        let (mut scene, _) = scene("eight-by-eight");
+        scene.hardware.search_width = Some(width);
+        let generated = generate(&Model::new(&scene).unwrap()).unwrap();
+        lint(&generated).unwrap_or_else(|log| panic!("{width}: {log}"));
+    }
+}
+
+#[test]
 fn a_choice_of_cases_is_clean_with_the_engines_waivers() {
     for name in SCENES {
         let mut scene = scene(name).0;
