@@ -49,11 +49,27 @@ fn dead_taxels_cost_what_two_builds_differ_by() {
     assert!(saved("[fixed]\nlanes = 36\n", "dead taxels")[2] > 0);
 }
 
+/// The width in use states its cost over the narrowest; a narrower one what the widest would cost.
+#[test]
+fn the_search_width_costs_what_two_builds_differ_by() {
+    let lanes = "[fixed]\nlanes = 36\n";
+    let (wide, narrow) = (model(lanes), model(&format!("{lanes}[hardware]\nsearch_width = 1\n")));
+    let [with, without] = [&wide, &narrow].map(|model| total(&generate(model).unwrap().usage));
+    let own = explain(&wide).unwrap().into_iter().find(|e| e.feature == "search width").unwrap();
+    let other = explain(&narrow).unwrap().into_iter().find(|e| e.feature == "search width").unwrap();
+    assert!(own.present && !other.present);
+    for costs in [own.costs.unwrap(), other.saved.unwrap()] {
+        assert_eq!(costs.luts, with.luts as i64 - without.luts as i64);
+        assert_eq!(costs.cycles, Cycles::longest(&wide).latency as i64 - Cycles::longest(&narrow).latency as i64);
+        assert!(costs.luts > 5000 && costs.cycles < 0, "{costs:?}");
+    }
+}
+
 #[test]
 fn what_the_scene_has_is_not_left_out() {
     let all = explain(&model("[input]\naverage = 2\nfull_scale_MPa = 1.0\n[threshold]\nmin_force_N = 0.1\n")).unwrap();
     let present: Vec<&str> = all.iter().filter(|e| e.present).map(|e| e.feature).collect();
-    assert_eq!(present, ["averaging", "search", "polynomial of degree 3", "threshold"]);
+    assert_eq!(present, ["averaging", "search", "polynomial of degree 3", "search width", "threshold"]);
 }
 
 #[test]
