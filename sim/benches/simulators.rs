@@ -2,10 +2,11 @@
 //!
 //! ```text
 //! make bench, or: cargo bench --package dermis-sim --bench simulators
-//! sensor-1: rust-hdl 70.65 ms, verilator 3.93 ms, ratio 17.98     fastest of several runs each
+//! sensor-1: rust-hdl 149.63 ms, verilator 3.23 ms, ratio 46.32    fastest of several runs each
 //! ```
 //! The ratio is compared across versions, because it depends less on the machine. With every block written twice, by hand,
-//! it is 17.98 for sensor-1 and 27.27 for eight-by-eight (two cores, Verilator 5.006).
+//! it is 17.98 for sensor-1 and 27.27 for eight-by-eight (two cores, Verilator 5.006); with one kernel per block 46.32 and
+//! 46.92. At most three times the first figures is wanted.
 
 use std::path::PathBuf;
 use std::time::{Duration, Instant};

@@ -27,6 +27,7 @@
 use super::{CoefficientCheck, EstimatorKind, ForceOutput, Form, Medium, ObjectiveKind, Scene, SceneError};
 use crate::matrices::MAX_DEGREE;
 use crate::partition::Case;
+use crate::symmetry::quads::Quads;
 
 /// A value and whether it is rejected.
 pub(super) struct Rule {
@@ -73,6 +74,12 @@ impl Scene {
                 "output.forces",
                 "resultants".to_string(),
                 "taxels, with adaptive",
+            ),
+            rule(
+                several && self.hardware.search_width.is_some_and(|width| width < Quads::LANES),
+                "hardware.search_width",
+                self.hardware.search_width.unwrap_or_default().to_string(),
+                "4, with adaptive",
             ),
             rule(
                 search.objective != ObjectiveKind::Sparse,

@@ -244,6 +244,10 @@ fn choices_not_built_yet_say_so() {
             "input.dead = [[0, 1]]; available: none, or partition.case = 0",
         ),
         ("[input]\ndead = [[0, 1]]\n[partition]\ncases = [0, 1]", "input.dead = [[0, 1]]; available: none, or"),
+        (
+            "[partition]\ncase = \"adaptive\"\n[hardware]\nsearch_width = 2",
+            "hardware.search_width = 2; available: 4, with adaptive",
+        ),
         ("[input]\nunipolar = true", "input.unipolar"),
         ("[search]\ndegree = 4", "search.degree"),
         ("[search]\nobjective = \"auto\"", "search.objective = auto; available: sparse"),

@@ -203,7 +203,7 @@ impl Search {
             sum_moved: BitDelay::new(moved - 1),
             trial: BitDelay::new(1),
             outcome: BitDelay::new(1),
-            sum_outcome: BitDelay::of_pulse(1 + values_delay(model.cases())),
+            sum_outcome: BitDelay::of_pulse(1 + values_delay(model.first())),
             scored: BitDelay::new(CANDIDATES_LATENCY),
             first: BitDelay::new(moved + CANDIDATES_LATENCY),
             // One cycle after the first step's candidates, so that a sweep is compared before the next is weighed.

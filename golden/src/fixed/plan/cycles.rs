@@ -97,8 +97,8 @@ pub fn coarse_period(formats: &Formats, quads: usize) -> u64 {
 
 /// Cycles from a subarray's first value to the beginning of the values for those that read them row-major: no taxel is
 /// read before its value.
-pub fn values_delay(cases: &[CasePlan]) -> usize {
-    cases.iter().map(|case| case.layout().row_major_delay(case.formats.search_width)).max().unwrap_or(0)
+pub fn values_delay(case: &CasePlan) -> usize {
+    case.layout().row_major_delay(case.formats.search_width)
 }
 
 impl Cycles {
@@ -190,7 +190,7 @@ fn values(plan: &Plan, case: &CasePlan, searched: &[bool]) -> Vec<u64> {
 /// Cycles from the beginning of a subarray's values to their end: after a search they are sent while they are computed.
 pub(super) fn early_values(plan: &Plan, case: &CasePlan) -> u64 {
     match plan.searches() {
-        true => (case.formats.sweep_steps(case.formats.quads) - values_delay(plan.cases())) as u64,
+        true => (case.formats.sweep_steps(case.formats.quads) - values_delay(case)) as u64,
         false => 0,
     }
 }

@@ -88,8 +88,8 @@ pub fn features(plan: &Plan) -> Vec<Feature> {
         });
     }
     let width = plan.formats().search_width;
-    // The serial engine searches one taxel at a time, whatever the scene says.
-    let chosen = degree > 0 && plan.board.engine == EngineKind::Parallel;
+    // The serial engine searches one taxel at a time; where the case is chosen per frame, it is four.
+    let chosen = degree > 0 && !plan.chooses() && plan.board.engine == EngineKind::Parallel;
     if chosen {
         add("search width", width == Quads::LANES, format!("{} taxels per cycle", Quads::LANES), &|| {
             plain(&with(&|s| s.hardware.search_width = Some(Quads::LANES)))

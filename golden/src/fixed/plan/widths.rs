@@ -154,7 +154,7 @@ pub fn widths(scene: &Scene, shapes: &[Shape], board: &Board) -> Result<Widths, 
         quads: count,
         lanes_per_parity: count,
         groups: 1,
-        search_width: search_width(scene, board, degree, count),
+        search_width: search_width(scene, board, degree, shapes),
         shared_a,
         flips,
         code_bits: spec.input_bits,
@@ -186,11 +186,12 @@ pub fn widths(scene: &Scene, shapes: &[Shape], board: &Board) -> Result<Widths, 
 }
 
 /// Taxels that the search computes per cycle: the scene's number, else the board's. What is not searched passes on in
-/// quads, and one quad alone is not worth a step for each of its taxels.
-fn search_width(scene: &Scene, board: &Board, degree: usize, quads: usize) -> usize {
-    match degree > 0 && quads > 1 {
-        true => scene.hardware.search_width.unwrap_or(board.search_width),
-        false => Quads::LANES,
+/// quads; one quad alone is not worth a step for each of its taxels; where the case is chosen per frame, the values of all
+/// cases begin alike.
+fn search_width(scene: &Scene, board: &Board, degree: usize, shapes: &[Shape]) -> usize {
+    match shapes {
+        [only] if degree > 0 && only.quads().len() > 1 => scene.hardware.search_width.unwrap_or(board.search_width),
+        _ => Quads::LANES,
     }
 }
 
