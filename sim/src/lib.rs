@@ -1,8 +1,8 @@
 //! Simulation, board flow and reports of the generated hardware, and the `dermis` command line.
 //!
-//! Five rooms; each uses only those above it and the files beside the rooms.
+//! Five folders; each uses only those above it and the files beside the folders.
 //!
-//! | room | holds |
+//! | folder | holds |
 //! |---|---|
 //! | [`flow`] | board flow: netlist and bitstream with open tools, compared with committed baselines |
 //! | [`cosim`] | co-simulation: the hardware under Verilator and rust-hdl, compared with the bit-true model, stressed, with faults |

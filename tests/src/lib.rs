@@ -22,7 +22,7 @@
 //! | `synthesis` | Yosys reads the Verilog without latch or undriven signal |
 //! | `scenes` | the same equality for scenes of other shapes, degrees, words and conditions |
 //! | `scale` | the largest array, and a thousand random frames with stalls on both streams |
-//! | `circles` | no two modules of a crate use one another, directly or through others; rooms are in order |
+//! | `circles` | no two modules of a crate use one another, directly or through others; layers are in order |
 //! | `words` | no file has a phrase of `tests/words.txt` |
 //! | `lint` | the generated Verilog is clean under Verilator with its waivers, and every waiver is needed |
 #![deny(missing_docs)]

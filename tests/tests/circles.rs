@@ -338,19 +338,19 @@ fn sim_has_none() {
     none(&modules("dermis_sim", "sim"), 100);
 }
 
-/// Asserts that each of `rooms`, folders or files in `parent`, uses only itself and those before it, and what stands
-/// beside the rooms no room; with `above`, everything else may use all of them.
-fn in_order(modules: &Modules, parent: &[&str], rooms: &[&str], above: bool) {
+/// Asserts that each of `layers`, folders or files in `parent`, uses only itself and those before it, and what stands
+/// beside the layers no layer; with `above`, everything else may use all of them.
+fn in_order(modules: &Modules, parent: &[&str], layers: &[&str], above: bool) {
     let parent: Name = parent.iter().map(ToString::to_string).collect();
     let inner =
         |name: &Name| name.strip_prefix(parent.as_slice()).map(<[String]>::to_vec).filter(|inner| !inner.is_empty());
-    let rank = |inner: &Name| match rooms.iter().position(|room| *room == inner[0]) {
-        Some(room) => room + 1,
-        None if above => rooms.len() + 1,
+    let rank = |inner: &Name| match layers.iter().position(|layer| *layer == inner[0]) {
+        Some(layer) => layer + 1,
+        None if above => layers.len() + 1,
         None => 0,
     };
-    let used = |room: &&&str| modules.modules.keys().filter_map(inner).any(|inner| inner[0] == ***room);
-    assert_eq!(rooms.iter().filter(used).count(), rooms.len(), "a room of {rooms:?} is empty");
+    let used = |layer: &&&str| modules.modules.keys().filter_map(inner).any(|inner| inner[0] == ***layer);
+    assert_eq!(layers.iter().filter(used).count(), layers.len(), "a layer of {layers:?} is empty");
     for (from, own) in modules.modules.keys().filter_map(|name| Some((name, inner(name)?))) {
         for (to, path) in modules.arrows(from).iter().filter_map(|(to, path)| Some((inner(to)?, path))) {
             assert!(rank(&to) <= rank(&own), "{} uses {path}", from.join("::"));
@@ -359,18 +359,18 @@ fn in_order(modules: &Modules, parent: &[&str], rooms: &[&str], above: bool) {
 }
 
 #[test]
-fn the_rooms_of_fixed_are_in_order() {
+fn the_layers_of_fixed_are_in_order() {
     in_order(&golden(), &["fixed"], &["words", "error", "stages", "plan"], true);
 }
 
 #[test]
-fn the_rooms_of_sim_are_in_order() {
+fn the_layers_of_sim_are_in_order() {
     in_order(&modules("dermis_sim", "sim"), &[], &["flow", "cosim", "link", "report", "commands"], false);
 }
 
 #[test]
 #[should_panic(expected = "b uses crate::c::C")]
-fn a_room_that_uses_a_later_one_is_found() {
+fn a_layer_that_uses_a_later_one_is_found() {
     let name = |name: &str| vec![name.to_owned()];
     let texts = [("a", ""), ("b", "use crate::a::A; use crate::c::C;"), ("c", "use crate::a::A;")];
     let texts = texts.into_iter().map(|(own, text)| (name(own), text.to_owned()));

@@ -9,11 +9,11 @@
 //! what every stage passes on under the stage's name; tests compare it word for word with every simulation of the
 //! hardware. The difference from the floating-point model is measured by tests, never assumed.
 //!
-//! # Rooms
+//! # Layers
 //!
 //! Each uses only those above it.
 //!
-//! | room | content |
+//! | layer | content |
 //! |---|---|
 //! | [`words`] | integer arithmetic, formats of the words, quantised matrices, order of the products |
 //! | [`stages`] | the stages, plain functions of words |

@@ -19,7 +19,7 @@ pub struct Unfold {
     pub clk: Signal<In, Clock>,
     /// Synchronous reset, active high.
     pub rst: Signal<In, Bit>,
-    /// A new frame.
+    /// A frame starts: the words of v_00 come next.
     pub start: Signal<In, Bit>,
     /// A word from the butterfly, signed; places in order.
     pub mixed: Wire<In>,

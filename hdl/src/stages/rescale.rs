@@ -24,7 +24,7 @@ pub struct Rescale {
     pub rst: Signal<In, Bit>,
     /// Index of the case; constant while a frame is computed.
     pub which: Wire<In>,
-    /// A new subarray.
+    /// A subarray starts: v_00 comes next, and its saturations are counted from 0.
     pub start: Signal<In, Bit>,
     /// Accumulators of one row for the four parities, `lane_bits` each, signed; valid with `quad_valid`.
     pub quad: Wire<In>,

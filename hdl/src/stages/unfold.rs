@@ -16,7 +16,7 @@ pub struct Unfold {
     pub rst: Signal<In, Bit>,
     /// Index of the case; constant while a frame is computed.
     pub which: Wire<In>,
-    /// A new subarray.
+    /// A subarray starts: the words of v_00 come next.
     pub start: Signal<In, Bit>,
     /// Four parities of a v_ij, `vector_bits` each, signed; valid with `words_valid`.
     pub words: Wire<In>,

@@ -12,7 +12,7 @@ use crate::wire::Wire;
 pub struct Delay {
     /// Clock; registers change on its rising edge.
     pub clk: Signal<In, Clock>,
-    /// Input word.
+    /// The word that `q` shows `depth` cycles later.
     pub d: Wire<In>,
     /// The word that was on `d` `depth` cycles earlier.
     pub q: Wire<Out>,
@@ -45,7 +45,7 @@ pub struct BitDelay {
     pub clk: Signal<In, Clock>,
     /// Synchronous reset, active high.
     pub rst: Signal<In, Bit>,
-    /// Input bit.
+    /// The bit that `q` shows `depth` cycles later.
     pub d: Signal<In, Bit>,
     /// The bit that was on `d` `depth` cycles earlier.
     pub q: Signal<Out, Bit>,

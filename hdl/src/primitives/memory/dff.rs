@@ -10,7 +10,7 @@ use crate::language::{Body, Builder, Type};
 pub struct Dff {
     /// Clock; the register changes on its rising edge.
     pub clk: Signal<In, Clock>,
-    /// The bit.
+    /// The bit that `q` shows in the next cycle.
     pub d: Signal<In, Bit>,
     /// The bit of the cycle before.
     pub q: Signal<Out, Bit>,

@@ -13,7 +13,7 @@ pub struct EnableRegister {
     pub clk: Signal<In, Clock>,
     /// Enable: store `word` at the clock edge.
     pub keep: Signal<In, Bit>,
-    /// Input word.
+    /// The word to store; valid with `keep`.
     pub word: Wire<In>,
     /// Stored word, from the cycle after `keep`; undefined before the first.
     pub kept: Wire<Out>,

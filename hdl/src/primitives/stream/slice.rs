@@ -9,7 +9,7 @@ use crate::wire::Wire;
 /// The least significant bits of a wider word; combinational.
 #[derive(LogicBlock)]
 pub struct Slice {
-    /// Input word.
+    /// The word of which the low bits are shown.
     pub word: Wire<In>,
     /// Its low bits.
     pub low: Wire<Out>,
