@@ -58,7 +58,7 @@ pub fn data_flow(model: &Model) -> Result<String> {
             (0, 0, bits(formats.code_bits)),
             (0, 1, bits(formats.input_bits)),
             (0, 2, bits(formats.input_bits)),
-            (1, 0, bits(formats.acc_bits)),
+            (1, 0, bits(formats.lane_bits)),
             (1, 1, bits(formats.vector_bits)),
             (1, 2, bits(formats.search_bits[0])),
             (2, 0, format!("3 × {FORCE_BITS}")),
