@@ -26,6 +26,8 @@ use include_dir::{include_dir, Dir};
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
+use crate::symmetry::quads::Quads;
+
 static FILES: Dir = include_dir!("$CARGO_MANIFEST_DIR/../constraints");
 
 /// The engine of a board; both do the same arithmetic with different schedules.
@@ -80,7 +82,7 @@ pub struct Board {
     pub block_rams: u32,
     /// Configurations of a block RAM with a read and a write port: [words, bits].
     pub block_ram_shapes: Vec<[usize; 2]>,
-    /// Taxels that the search of the parallel engine computes per cycle, 4, 2 or 1, unless the scene says it.
+    /// Taxels that the search of the parallel engine computes per cycle, one of [`SEARCH_WIDTHS`], unless the scene says it.
     #[serde(default = "full_search_width")]
     pub search_width: usize,
     /// Largest memory in words that goes into distributed RAM: always, and if block RAM is short.
@@ -103,9 +105,11 @@ pub struct Board {
     pub place_minutes: u32,
 }
 
-/// A whole quad.
+/// Taxels per cycle that the search of the parallel engine can compute, the default first: a quad or a part of it.
+pub const SEARCH_WIDTHS: [usize; 3] = [Quads::LANES, 2, 1];
+
 fn full_search_width() -> usize {
-    4
+    SEARCH_WIDTHS[0]
 }
 
 /// Positions of the multipliers of an ECP5: a block of four in each of these rows of each of these columns.
@@ -231,7 +235,7 @@ impl Board {
             let has = board.multipliers;
             return Err(invalid(format!("multiplier_blocks: has {placed} multipliers, multipliers = {has}")));
         }
-        if ![4, 2, 1].contains(&board.search_width) {
+        if !SEARCH_WIDTHS.contains(&board.search_width) {
             return Err(invalid(format!("search_width = {}: must be 4, 2 or 1", board.search_width)));
         }
         if board.multiplier_bits < 2 {

@@ -6,7 +6,7 @@ use super::{
     InverseSpec, Medium, ObjectiveKind, OutputSpec, PartitionSpec, Scene, SceneError, SearchSpec, ThresholdSpec,
     PLAUSIBLE_MPA,
 };
-use crate::board::Board;
+use crate::board::{Board, SEARCH_WIDTHS};
 use crate::link::LinkKind;
 use crate::matrices::MAX_FLOAT_DEGREE;
 use crate::partition::{subarrays, Case, Grid};
@@ -38,8 +38,6 @@ const DEFAULT_POISSON: f64 = 0.48;
 const LEAST_MU_MAX: f64 = 0.001;
 /// Largest mu_max, above the friction of any elastic cover.
 const LARGEST_MU_MAX: f64 = 2.0;
-/// Taxels per cycle that the search can have: a quad or a part of it.
-const SEARCH_WIDTHS: [usize; 3] = [4, 2, 1];
 /// Longest scene name in characters; the name becomes part of file names and reports.
 const LONGEST_NAME: usize = 64;
 

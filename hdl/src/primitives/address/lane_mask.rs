@@ -9,8 +9,8 @@ use crate::primitives::address::counter::count_bits;
 use crate::wire::Wire;
 
 /// Quad address to lane mask; combinational. All four lanes count, except that of each pair of copies on the middle
-/// line of an odd row or column count only one does. Where a quad takes several steps, the address is followed by the index
-/// of the step.
+/// line of an odd row or column count only one does. Where a quad takes several steps, the address is
+/// `{quad, step}`.
 #[derive(LogicBlock)]
 pub struct LaneMask {
     /// Index of the case.

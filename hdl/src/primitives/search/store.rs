@@ -17,9 +17,9 @@ use crate::wire::Wire;
 /// polynomials into one of the others. Both take effect one cycle later, through registers beside the memory. `read_data`
 /// follows its address by three cycles: read register and output register of the memory, and the choice of the memory.
 ///
-/// A step is the part of a quad that the search computes in a cycle: all of it, or two or four steps make a quad. The
-/// address of a step is that of the quad followed by the index of the step. Then `read_data` comes a cycle later, and a
-/// quad is written with its last step.
+/// A step is the part of a quad that the search computes in a cycle: all of it, a half or a quarter. Addresses of steps are
+/// `{quad, step}`. Where a quad takes several steps, `read_data` has one more cycle of latency, and the memory is written
+/// with a quad's last step.
 ///
 /// Where one subarray or frame is filled while another is searched, `START` is a memory of its own; otherwise it is another
 /// name of buffer 0, and `fill` and `write` never coincide.
