@@ -36,6 +36,7 @@ pub mod primitives;
 pub mod serial;
 pub mod stages;
 pub mod usage;
+pub mod verilator;
 pub mod wire;
 
 mod core_file;

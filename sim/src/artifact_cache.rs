@@ -1,15 +1,30 @@
 //! Cache of built folders: a folder appears complete or not at all.
 //!
 //! It is built in a staging folder beside its final path and renamed when complete, so that neither an interruption nor
-//! a second process that builds the same folder leaves a partial one. The product's CRC-32 is stored next to it: a
-//! product that has been damaged since does not match and is built again.
+//! a second process that builds the same folder leaves a partial one. A [`lock`] saves the second one from building it
+//! again. The product's CRC-32 is stored next to it: a product that has been damaged since does not match and is built
+//! again.
 
-use std::fs;
+use std::fs::{self, File};
 use std::io;
 use std::path::{Path, PathBuf};
 
 use dermis_golden::write::{write, FileError};
 use tempfile::TempDir;
+
+/// Locks `folder` until the value is dropped: whoever wants to build the same one meanwhile, in this process or another,
+/// waits, and then finds it built.
+///
+/// # Errors
+/// [`FileError`]: the lock, a file beside the folder, cannot be created.
+pub(crate) fn lock(folder: &Path) -> Result<File, FileError> {
+    let path = folder.with_extension("lock");
+    let cache = folder.parent().unwrap_or(folder);
+    fs::create_dir_all(cache).map_err(FileError::at(cache))?;
+    let lock = File::create(&path).map_err(FileError::at(&path))?;
+    lock.lock().map_err(FileError::at(&path))?;
+    Ok(lock)
+}
 
 /// A temporary folder beside `folder` to build in, deleted when dropped.
 ///

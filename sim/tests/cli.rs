@@ -110,7 +110,7 @@ fn rtl_in(work: &Path) -> (Option<i32>, String) {
 #[test]
 fn without_verilator_the_message_says_how_to_get_it() {
     let work = tempfile::tempdir().unwrap();
-    let wanted = "error: verilator is not installed; on Debian: sudo apt-get install verilator g++ make\n";
+    let wanted = "error: verilator is not installed; on Debian: sudo apt-get install verilator g++\n";
     assert_eq!(rtl_in(work.path()), (Some(2), NOTE.to_owned() + wanted));
 }
 
@@ -120,7 +120,7 @@ fn without_a_compiler_the_message_says_what_is_missing() {
     // A stand-in for Verilator that fails to build; PATH contains nothing else.
     let script = "#!/bin/sh\n[ \"$1\" = --version ] && echo Verilator 0 && exit 0\nexit 127\n";
     fake::program(work.path(), "verilator", script);
-    let wanted = "error: verilator needs make, which is not installed; on Debian: sudo apt-get install g++ make\n";
+    let wanted = "error: verilator needs g++, which is not installed; on Debian: sudo apt-get install g++\n";
     assert_eq!(rtl_in(work.path()), (Some(2), NOTE.to_owned() + wanted));
 }
 

@@ -2,7 +2,6 @@
 //! cycle.
 
 mod program;
-mod runtime;
 
 use std::collections::VecDeque;
 

@@ -222,7 +222,7 @@ mod tests {
         let version = HostError::Version { port: "p".into(), has: 2, wants: 1 };
         let input: [anyhow::Error; 7] = [
             VerilatorError::Missing.into(),
-            VerilatorError::MissingTool { program: "make" }.into(),
+            VerilatorError::MissingCompiler.into(),
             io(ErrorKind::PermissionDenied).into(),
             FixedError::Board(Board::load("none").unwrap_err()).into(),
             FixedError::NoFullScale { field: "threshold.min_force_N", value: "1".into() }.into(),

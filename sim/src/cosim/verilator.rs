@@ -13,10 +13,11 @@ use std::ffi::{c_char, c_void, CString};
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
-use std::sync::Mutex;
+use std::sync::OnceLock;
 
 use dermis_golden::write::{write, FileError};
 use dermis_hdl::device::{Device, Inputs, Outputs, Tap};
+use dermis_hdl::verilator::{Runtime, OBJECTS};
 use libloading::Library;
 use thiserror::Error;
 
@@ -28,12 +29,18 @@ use crate::progress::Progress;
 const LIBRARY: &str = "libbench.so";
 /// The C++ side, compiled into every library.
 const SHIM: &str = include_str!("../../shim/shim.cpp");
+/// Its file name.
+const SHIM_FILE: &str = "shim.cpp";
 /// Addition to [`SHIM`] for libraries in which bits can be flipped.
 const FAULTS: &str = include_str!("../../shim/faults.cpp");
 /// File name of Verilator's XML listing of such a design, beside the library.
 const LISTING: &str = "listing.xml";
 /// Seed of the random start values of registers without an initial value; these show a missing reset.
 const RESET_SEED: i32 = 20_240_501;
+/// Arguments of the compiler: longer simulations are worth a second of optimisation.
+const ARGUMENTS: [&str; 2] = ["-O1", "-fPIC"];
+/// Arguments of the linker.
+const LINK: [&str; 2] = ["-shared", "-Wl,--wrap=fopen"];
 /// Lines of a failed tool's output that an error repeats.
 const LOG_LINES: usize = 20;
 
@@ -41,14 +48,11 @@ const LOG_LINES: usize = 20;
 #[derive(Debug, Error)]
 pub enum VerilatorError {
     /// Verilator is not installed.
-    #[error("verilator is not installed; on Debian: sudo apt-get install verilator g++ make")]
+    #[error("verilator is not installed; on Debian: sudo apt-get install verilator g++")]
     Missing,
-    /// A program that Verilator calls is not installed.
-    #[error("verilator needs {program}, which is not installed; on Debian: sudo apt-get install g++ make")]
-    MissingTool {
-        /// The program.
-        program: &'static str,
-    },
+    /// The compiler of what Verilator writes is not installed.
+    #[error("verilator needs g++, which is not installed; on Debian: sudo apt-get install g++")]
+    MissingCompiler,
     /// Verilator or the compiler failed.
     #[error("verilator refused {design} (folder {folder}):\n{log}")]
     Build {
@@ -206,13 +210,18 @@ impl Device for Verilated {
     }
 }
 
-/// First line of `verilator --version`.
+/// First line of `verilator --version`, asked once: a device that is in the cache starts faster than Verilator answers.
 ///
 /// # Errors
 /// [`VerilatorError::Missing`]: Verilator cannot be started.
-pub fn version() -> Result<String, VerilatorError> {
+pub fn version() -> Result<&'static str, VerilatorError> {
+    static VERSION: OnceLock<String> = OnceLock::new();
+    if let Some(version) = VERSION.get() {
+        return Ok(version);
+    }
     let output = Command::new("verilator").arg("--version").output().map_err(|_| VerilatorError::Missing)?;
-    Ok(String::from_utf8_lossy(&output.stdout).lines().next().unwrap_or_default().to_owned())
+    let version = String::from_utf8_lossy(&output.stdout).lines().next().unwrap_or_default().to_owned();
+    Ok(VERSION.get_or_init(|| version))
 }
 
 /// Writes the design's memory files into a temporary folder, from which the shim lets `$readmemh` read them.
@@ -229,72 +238,63 @@ fn is_source(name: &str) -> bool {
     name.ends_with(".v") || name.ends_with(".vlt")
 }
 
-/// Allows one build at a time in a process, so that a second caller for the same design finds it built.
-static BUILDING: Mutex<()> = Mutex::new(());
-
 /// Path of the design's library, built when the cache does not hold it.
 fn library(design: &Design, bench: &str, cache: &Path) -> Result<PathBuf, VerilatorError> {
     let mut sources: Vec<(&str, &str)> = design.files.iter().filter(|(name, _)| is_source(name)).copied().collect();
     // Waivers come first: Verilator applies them only to files read afterwards.
     sources.sort_by_key(|(name, _)| !name.ends_with(".vlt"));
     let shim = if design.writable_state { [SHIM, FAULTS].concat() } else { SHIM.to_owned() };
-    sources.extend([("bench.v", bench), ("shim.cpp", &shim)]);
-    let folder = cache.join(fingerprint(&sources, &version()?));
+    sources.extend([("bench.v", bench), (SHIM_FILE, &shim)]);
+    let folder = cache.join(fingerprint(&sources, version()?));
     let ready = folder.join(LIBRARY);
-    let _one = BUILDING.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
+    let _lock = artifact_cache::lock(&folder)?;
     if !artifact_cache::is_intact(&folder, LIBRARY) {
-        build(design, &sources, &folder)?;
+        build(design, &sources, &folder, cache)?;
     }
     Ok(ready.canonicalize().map_err(FileError::at(&ready))?)
 }
 
 /// Builds the library and publishes it as `folder`.
-fn build(design: &Design, sources: &[(&str, &str)], folder: &Path) -> Result<(), VerilatorError> {
+fn build(design: &Design, sources: &[(&str, &str)], folder: &Path, cache: &Path) -> Result<(), VerilatorError> {
     let work = artifact_cache::staging_folder(folder)?;
     for (name, text) in sources {
         write(&work.path().join(name), text.as_bytes())?;
     }
     let _progress = Progress::start(&format!("verilating {}", design.top));
-    let verilate = |arguments: &[&str], sources: &[(&str, &str)]| {
-        Command::new("verilator")
-            .current_dir(work.path())
-            .args(["--top-module", "bench"])
-            .args(arguments)
-            .args(sources.iter().map(|(name, _)| *name))
-            .output()
-            .map_err(|_| VerilatorError::Missing)
-    };
-    let product = format!("../{LIBRARY}");
-    let mut library = [
-        &["--cc", "--exe", "--build", "-j", "2", "--prefix", "Vbench", "--x-initial", "unique", "--x-assign"][..],
-        &["unique", "-O3", "-CFLAGS", "-fPIC -O1", "-LDFLAGS", "-shared -Wl,--wrap=fopen", "-o", &product],
-    ]
-    .concat();
-    let mut output = None;
-    if design.writable_state {
-        library.push("--public-flat-rw");
-        output = Some(verilate(&["--xml-only", "--xml-output", LISTING], &sources[..sources.len() - 1])?);
-    }
-    let output = match output {
-        Some(listed) if !listed.status.success() => listed,
-        _ => verilate(&library, sources)?,
-    };
-    if !output.status.success() {
-        if let Some(program) = ["make", "g++"].into_iter().find(|program| !is_installed(program)) {
-            return Err(VerilatorError::MissingTool { program });
+    if let Err(log) = compile(design, sources, work.path(), cache) {
+        if Command::new("g++").arg("--version").output().is_err() {
+            return Err(VerilatorError::MissingCompiler);
         }
-        let text = [output.stderr, output.stdout].concat();
-        let text = String::from_utf8_lossy(&text);
-        let log: Vec<&str> = text.lines().take(LOG_LINES).collect();
+        let log: Vec<&str> = log.lines().take(LOG_LINES).collect();
         // Kept, so that the user can inspect the folder named in the error.
         return Err(VerilatorError::Build { design: design.top.into(), folder: work.keep(), log: log.join("\n") });
     }
-    // Deletes the object files, which are ten times as large as library and sources.
-    let objects = work.path().join("obj_dir");
+    // Deletes the C++ files, which are larger than library and sources.
+    let objects = work.path().join(OBJECTS);
     fs::remove_dir_all(&objects).map_err(FileError::at(&objects))?;
     Ok(artifact_cache::publish(work, folder, LIBRARY)?)
 }
 
-fn is_installed(program: &str) -> bool {
-    Command::new(program).arg("--version").output().is_ok()
+/// Translates the Verilog of `sources` in the folder `work`, and compiles that; the output of what failed, if anything.
+fn compile(design: &Design, sources: &[(&str, &str)], work: &Path, cache: &Path) -> Result<(), String> {
+    let verilog = sources.iter().map(|(name, _)| *name).filter(|name| is_source(name));
+    let verilate = |arguments: &[&str]| {
+        let mut verilator = Command::new("verilator");
+        succeed(verilator.current_dir(work).args(["--top-module", "bench"]).args(arguments).args(verilog.clone()))
+    };
+    let mut translate = vec!["--cc", "--prefix", "Vbench", "--x-initial", "unique", "--x-assign", "unique", "-O3"];
+    if design.writable_state {
+        translate.push("--public-flat-rw");
+        verilate(&["--xml-only", "--xml-output", LISTING])?;
+    }
+    verilate(&translate)?;
+    let runtime = Runtime::new(&ARGUMENTS, cache).map_err(|error| error.to_string())?;
+    succeed(runtime.compile(work, &[SHIM_FILE], LIBRARY).map_err(|error| error.to_string())?.args(LINK))
+}
+
+/// Runs a program to its end; what it wrote if it failed.
+fn succeed(command: &mut Command) -> Result<(), String> {
+    let output = command.output().map_err(|error| format!("{:?}: {error}", command.get_program()))?;
+    let log = || String::from_utf8_lossy(&[output.stderr, output.stdout].concat()).into_owned();
+    output.status.success().then_some(()).ok_or_else(log)
 }

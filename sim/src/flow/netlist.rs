@@ -52,6 +52,7 @@ pub fn netlist(generated: &Generated, family: Family, cache: &Path) -> Result<Ge
     let version = format!("{family:?} {}", YOSYS.version()?);
     let folder = cache.join(format!("netlist-{}", fingerprint(&texts, &version)));
     let path = folder.join(VERILOG);
+    let _lock = artifact_cache::lock(&folder)?;
     if !artifact_cache::is_intact(&folder, VERILOG) {
         make(&read, &generated.top, family, &folder)?;
     }

@@ -3,9 +3,26 @@
 use std::fmt::Write as _;
 use std::io::Write as _;
 use std::process::{Command, Stdio};
+use std::sync::LazyLock;
 
-use super::runtime::{self, succeed};
 use super::{ports, Kernel, Type, Word};
+use crate::verilator::Runtime;
+
+/// Verilator's runtime. For models of a few hundred lines, optimising takes longer than it saves.
+static RUNTIME: LazyLock<Runtime> = LazyLock::new(|| {
+    // target/debug/deps/<test program>
+    let program = std::env::current_exe().unwrap();
+    let cache = program.ancestors().nth(2).unwrap().join("verilator-runtime");
+    Runtime::new(&["-O0"], &cache).unwrap_or_else(|error| panic!("{error} (make setup)"))
+});
+
+/// Runs a program to its end and returns what it wrote; panics with that if it fails.
+fn succeed(command: &mut Command) -> String {
+    let run = command.output().unwrap_or_else(|e| panic!("{:?}: {e} (make setup)", command.get_program()));
+    let log = String::from_utf8_lossy(&[run.stdout, run.stderr].concat()).into_owned();
+    assert!(run.status.success(), "{command:?}: {log}");
+    log
+}
 
 /// The kernel as a module, and a bench with one vector for all inputs and one for all outputs, field 0 lowest.
 fn modules(kernel: &Kernel) -> String {
@@ -83,21 +100,7 @@ pub(crate) fn verilated(kernel: &Kernel, stimulus: &[Vec<Word>]) -> Vec<Vec<Word
     verilator.args(["--x-initial", "unique", "-Wall", "-Wno-fatal", "-Wno-DECLFILENAME", "-Wno-MULTITOP"]);
     let log = succeed(verilator.args(["-Wno-UNUSEDSIGNAL", "bench.v"]));
     assert!(!log.contains("%Warning"), "{log}\n{}", modules(kernel));
-    // One translation unit: the headers are read once.
-    let mut unit = String::new();
-    for entry in std::fs::read_dir(folder.path().join("obj_dir")).unwrap() {
-        let name = entry.unwrap().file_name().into_string().unwrap();
-        if name.ends_with(".cpp") {
-            let _ = writeln!(unit, "#include \"{name}\"");
-        }
-    }
-    file("unit.cpp", &[&unit, MAIN].concat());
-    succeed(
-        runtime::compiler()
-            .current_dir(folder.path())
-            .args(["-Iobj_dir", "-o", "bench", "unit.cpp"])
-            .args(runtime::objects()),
-    );
+    succeed(&mut RUNTIME.compile(folder.path(), &["main.cpp"], "bench").unwrap());
     let mut run = Command::new(folder.path().join("bench"))
         .current_dir(folder.path())
         .stdin(Stdio::piped())

@@ -8,6 +8,6 @@ pub fn machine() -> String {
     let name = info.lines().find_map(|line| line.strip_prefix("model name")?.split_once(": "));
     let name = name.map_or("an unnamed processor", |(_, name)| name.trim());
     let cores = available_parallelism().map_or(1, usize::from);
-    let verilator = crate::cosim::verilator::version().unwrap_or_else(|_| "no Verilator".into());
+    let verilator = crate::cosim::verilator::version().unwrap_or("no Verilator").to_owned();
     format!("Measured by dermis {} on {cores} cores of {name}; {verilator}.", env!("CARGO_PKG_VERSION"))
 }
