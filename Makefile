@@ -52,7 +52,7 @@ unit: setup ## run all tests: unit, command line, co-simulation
 
 lint: setup ## check wording against tests/words.txt, lint the generated Verilog with its waivers; part of unit
 	@echo '== lint'
-	$(CARGO) test --workspace --test words --test lint
+	$(CARGO) test -p dermis-tests --test integration -- words:: lint::
 
 quick: setup ## write the short report to build/report-quick
 	@echo '== quick report'
@@ -84,13 +84,13 @@ guide: program ## write the tables and pictures of README and guide (20 minutes)
 	$(DERMIS) --build-dir $(BUILD) guide --pictures
 
 netlist: setup ## co-simulate the synthesised netlist of a small scene with search (several minutes)
-	$(CARGO) test --release -p dermis-tests --test netlist -- --include-ignored
+	$(CARGO) test --release -p dermis-tests --test integration -- netlist:: --include-ignored
 
 fuzz: ## run 10^7 mutated inputs through the file readers, 10^5 frames through both models
 	DERMIS_FUZZ_INPUTS=10000000 DERMIS_FUZZ_RUNS=100000 $(CARGO) test --release -p dermis-tests --test fuzz -- --nocapture
 
 stress: ## stress the streams: 4*10^6 cycles each of stalls, wrong tlast and resets
-	DERMIS_STRESS_CYCLES=4000000 $(CARGO) test --release -p dermis-tests --test streams -- --nocapture
+	DERMIS_STRESS_CYCLES=4000000 $(CARGO) test --release -p dermis-tests --test integration -- streams:: --nocapture
 
 nightly: netlist fuzz stress ## run the long variants of the tests, one after the other
 

@@ -11,8 +11,8 @@
 //!
 //! This is the hardware's rule. The golden model's `adaptive` ([`crate::reconstruct`]) first finds the contacts, solves
 //! every case and takes the one nearest to them, which hardware cannot do before it has solved the frame. Median e_t of
-//! 60 drawn frames solved by the floating-point model (`cargo test --release -p dermis-tests --test choice --
-//! --nocapture the_choice`, which also prints the other shares):
+//! 60 drawn frames solved by the floating-point model (`cargo test --release -p dermis-tests --test integration
+//! the_choice_is_measured -- --nocapture`, which also prints the other shares):
 //!
 //! | scene | contacts | case 0 | 1 | 2 | 3 | hardware's rule | golden `adaptive` |
 //! |---|---|---:|---:|---:|---:|---:|---:|

@@ -121,6 +121,6 @@ fn a_phrase_is_found_with_its_line_whatever_its_case_and_line_breaks() {
     assert_eq!(lines("x\n    //! it is told a\n    //! moon late.\n"), [2]);
     assert_eq!(lines("## `make` is a moon late\n"), [1]);
     // Another word, and another place.
-    assert_eq!(lines("/// a moon later\n/// extra moon late\n"), []);
+    assert_eq!(lines("/// a moon later\n/// extra moon late\n"), [0usize; 0]);
     assert_eq!(lines("/// Dolor.\npub a: u8, // dolor.\n/// Dolor. And more.\nlet a = \"Dolor.\";\nDolor.\n"), [1, 2]);
 }

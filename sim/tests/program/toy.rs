@@ -10,7 +10,7 @@ use dermis_sim::cosim::drive::{record, InputFrame, Stimulus, Times};
 use dermis_sim::cosim::verilator::{Design, Verilated, VerilatorError};
 use dermis_sim::cosim::{compare_recording, run, DeviceUnderTest, Findings, Vector, KEPT_PER_FRAME};
 
-const TOY: &str = include_str!("toy/toy.v");
+const TOY: &str = include_str!("../toy/toy.v");
 const GAIN: i64 = 3;
 /// One beat per cycle from the cycle after the last code: 6 forces and 1 status.
 const CYCLES: Cycles = Cycles { first_output: 1, latency: 7, total: 13, interval: 1 };

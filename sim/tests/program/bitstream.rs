@@ -1,8 +1,6 @@
 //! Small scenes from scene file to bitstream with the real tools, without regression against their committed baselines;
 //! and a scene that misses its clock. Large scenes take minutes to hours: `make bitstream`.
 
-mod fake;
-
 use std::fs;
 use std::path::Path;
 use std::process::Command;
@@ -10,6 +8,8 @@ use std::process::Command;
 use dermis_golden::fixed::Model;
 use dermis_golden::scene::Scene;
 use dermis_sim::flow::baseline::Baselines;
+
+use crate::fake;
 
 /// Synchronisation word of an iCE40 bitstream.
 const PREAMBLE: [u8; 4] = [0x7e, 0xaa, 0x99, 0x7e];

@@ -10,13 +10,13 @@
 //! --- stdout             lines that stdout must contain
 //! --- stderr             the complete stderr
 //! ```
-//! `DERMIS_ACCEPT=1 cargo test -p dermis-sim --test cli` rewrites the expected stderr of all cases.
-
-mod fake;
+//! `DERMIS_ACCEPT=1 cargo test -p dermis-sim --test program cli::` rewrites the expected stderr of all cases.
 
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
+
+use crate::fake;
 
 struct Case {
     path: PathBuf,

@@ -9,20 +9,20 @@ use std::process::Command;
 
 use rayon::prelude::*;
 
-/// Examples that are not run here.
+/// Examples that are not run here; some are covered by other tests, named by their file.
 const NOT_RUN: [(&str, &str); 36] = [
     ("dermis host --port /dev/ttyUSB0 press.json", BOARD),
     ("dermis host --port /dev/ttyUSB0 --scene sensor-1", BOARD),
     ("dermis host --port /dev/ttyUSB0 --forces --check press.json", BOARD),
     ("dermis host --port /dev/ttyUSB0 --scene sensor-1 --tare zero.json --stream <frames >answers", BOARD),
     ("dermis host --port /dev/ttyUSB1 --scene eight-by-eight --target-board icebreaker", BOARD),
-    ("dermis board eight-by-eight", "runs until interrupted; tests/link.rs talks to one"),
+    ("dermis board eight-by-eight", "runs until interrupted; host.rs talks to one"),
     ("dermis table", "every scene: minutes"),
     ("dermis table sensor-3 --case contacts --fresh 40 --contacts 2 --contacts 3 --shapes other", "a minute"),
     ("dermis table sensor-1 eight-by-eight --cosim", "make run"),
     ("dermis faults", "a minute or two; the same for eight-by-eight is run"),
-    ("dermis cosim sensor-1", "tests/equality.rs"),
-    ("dermis cosim eight-by-eight --target-board icebreaker", "tests/serial.rs"),
+    ("dermis cosim sensor-1", "equality.rs"),
+    ("dermis cosim eight-by-eight --target-board icebreaker", "serial.rs"),
     ("dermis noise sensor-1", "200 draws of five objectives: minutes"),
     ("dermis noise sensor-2 --objective patch --objective auto --draws 1000 --format csv", "minutes"),
     ("dermis noise sensor-1 --frames 1 --medians", "200 draws of five objectives: minutes"),
@@ -32,8 +32,8 @@ const NOT_RUN: [(&str, &str); 36] = [
     ("dermis train sensor-1", "a quarter of an hour; the short one is run"),
     ("dermis train my-scene.toml", "a quarter of an hour"),
     ("dermis train my-scene.toml --hidden 96,48 --steps 10000 --out small.network", "minutes"),
-    ("dermis study input-bits", "a minute; tests/accuracy.rs measures the same"),
-    ("dermis study contacts ellipses", "a minute; tests/guide.rs"),
+    ("dermis study input-bits", "a minute; accuracy.rs measures the same"),
+    ("dermis study contacts ellipses", "a minute; guide.rs"),
     ("dermis guide", PAGES),
     ("dermis guide --only stability", PAGES),
     ("dermis guide --check", PAGES),
@@ -46,11 +46,11 @@ const NOT_RUN: [(&str, &str); 36] = [
     ("dermis bitstream eight-by-eight", PLACED),
     ("dermis bitstream eight-by-eight --board icebreaker", PLACED),
     ("dermis bitstream sensor-1 --seeds 5 --jobs 2 --update-baselines", PLACED),
-    ("dermis cosim eight-by-eight --device netlist", "synthesis takes minutes; tests/netlist.rs"),
+    ("dermis cosim eight-by-eight --device netlist", "synthesis takes minutes; netlist.rs"),
 ];
-const IMPORTED: &str = "needs an imported recording; tests/report.rs";
+const IMPORTED: &str = "needs an imported recording; report.rs";
 const BOARD: &str = "needs a board on a serial port";
-const PAGES: &str = "needs the repository's pages; tests/guide.rs";
+const PAGES: &str = "needs the repository's pages; guide.rs";
 const PLACED: &str = "place and route takes from minutes to hours; make bitstream";
 
 fn program() -> &'static Path {

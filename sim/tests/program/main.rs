@@ -1,0 +1,16 @@
+//! Tests of the program `dermis`, run as its user does, of its pages, and of the bench of the co-simulation (`toy`).
+//!
+//! One program, so that it is linked once and its tests fill all processors to the end.
+
+mod bitstream;
+mod cli;
+mod contract;
+mod examples;
+mod fake;
+mod guide;
+mod guide_links;
+mod host;
+mod page;
+mod report;
+mod toy;
+mod writes;
