@@ -1,13 +1,14 @@
 //! Input: from the readings of a real sensor to stress.
 //!
 //! ```text
-//! 2^k frames ── average ── calibrate ── (unipolar: tension for clipped readings) ── stress ── engine ── forces
+//!    frames ── average ── calibrate ── (unipolar: tension for clipped readings) ── stress ── engine ── forces
 //!                          b = gain · (reading − zero),  zero = the tare frame, else the table's offset
 //! ```
 //!
 //! | `[input]` | meaning |
 //! |---|---|
 //! | `average = k` | 2^k frames are averaged into one; the additional bits are kept |
+//! | `mean = "sliding"` | every frame gives a result, the mean of all so far, in which older ones fade: [`sliding`] |
 //! | `calibration = "table.csv"` | offset and gain of each taxel, [`calibration`] |
 //! | `tare = "zero.json"` | frames read without contact, in the readings' unit, [`tare`] |
 //! | `dead = [[row, col], …]` | taxels left out of the inverse, whatever they read: [`crate::matrices::Matrices::without`] |
@@ -16,6 +17,7 @@
 //! Paths are relative to the scene's file. The known forces of a frame are passed through unchanged.
 
 pub mod calibration;
+pub mod sliding;
 pub mod tare;
 #[cfg(test)]
 mod tests;
@@ -29,13 +31,12 @@ use thiserror::Error;
 /// A scene's input options with their files loaded.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Input {
-    frames: usize,
     /// Zero and gain of each taxel, if the scene has a table or a tare frame.
     scale: Option<(Vec<f64>, Vec<f64>)>,
-    /// Standard deviation of the calibrated mean of 2^k frames in MPa as the scene states it, else 0.
+    /// Standard deviation of a calibrated frame in MPa as the scene states it, else 0.
     stated_noise_MPa: f64,
-    /// The same of each taxel, from tare frames; `None` where the scene states it.
-    taxel_noise_MPa: Option<Vec<f64>>,
+    /// The same of each taxel, from tare frames, and the number of those; `None` where the scene states it.
+    taxel_noise_MPa: Option<(Vec<f64>, usize)>,
     spec: InputSpec,
 }
 
@@ -69,11 +70,10 @@ impl Input {
     /// [`InputError`] if the table or tare frame cannot be read or does not fit the sensor.
     pub fn new(scene: &Scene) -> Result<Input, InputError> {
         let spec = &scene.input;
-        let (frames, spec) = (1 << spec.average, spec.clone());
         let table = spec.calibration.as_ref().map(|path| Calibration::load(path, &scene.sensor)).transpose()?;
         let tare = spec.tare.as_ref().map(|path| Tare::load(path, scene)).transpose()?;
-        let stated_noise_MPa = scene.search.noise_floor_MPa * spec.noise_share();
-        let input = Input { frames, scale: None, stated_noise_MPa, taxel_noise_MPa: None, spec };
+        let stated_noise_MPa = scene.search.noise_floor_MPa;
+        let input = Input { scale: None, stated_noise_MPa, taxel_noise_MPa: None, spec: spec.clone() };
         if table.is_none() && tare.is_none() {
             return Ok(input);
         }
@@ -81,55 +81,68 @@ impl Input {
         let Some(Tare { zero, spread, frames: taken }) = tare else {
             return Ok(Input { scale: Some((offset, gain)), ..input });
         };
-        // The zero has noise of its own, that of a mean of the tare frames.
-        let share = (1.0 / frames as f64 + 1.0 / taken as f64).sqrt();
-        let noise = |spread: Vec<f64>| spread.iter().zip(&gain).map(|(s, gain)| share * s * gain.abs()).collect();
+        let noise = |spread: Vec<f64>| (spread.iter().zip(&gain).map(|(s, gain)| s * gain.abs()).collect(), taken);
         let taxel_noise_MPa = spread.filter(|_| stated_noise_MPa == 0.0).map(noise);
         Ok(Input { taxel_noise_MPa, scale: Some((zero, gain)), ..input })
     }
 
-    /// Standard deviation in MPa of a taxel of a calibrated mean of 2^k frames: as the scene states it, else as the tare
-    /// frames show it, the root mean square over the taxels; 0 if neither does.
+    /// Standard deviation in MPa of a taxel of a calibrated mean, of a sliding one of many frames: as the scene states it,
+    /// else as the tare frames show it, the root mean square over the taxels; 0 if neither does.
     pub fn noise_MPa(&self) -> f64 {
+        self.noise_of_mean_MPa(usize::MAX)
+    }
+
+    /// The same for the mean of the `frames` frames so far, at least one; a block always has its 2^k.
+    pub fn noise_of_mean_MPa(&self, frames: usize) -> f64 {
+        let share = self.spec.variance_share(frames);
         match &self.taxel_noise_MPa {
-            Some(noise) => (noise.iter().map(|noise| noise * noise).sum::<f64>() / noise.len() as f64).sqrt(),
-            None => self.stated_noise_MPa,
+            // The zero has noise of its own, that of a mean of the tare frames.
+            Some((noise, taken)) => root_mean_square(noise) * (share + 1.0 / *taken as f64).sqrt(),
+            None => self.stated_noise_MPa * share.sqrt(),
         }
     }
 
     /// The noise of each taxel over that of [`Input::noise_MPa`], where tare frames show it and the scene does not state
     /// it; row-major.
     pub fn noise_shares(&self) -> Option<Vec<f64>> {
-        let mean = self.noise_MPa();
-        self.taxel_noise_MPa.as_ref().map(|noise| noise.iter().map(|noise| noise / mean).collect())
+        let (noise, _) = self.taxel_noise_MPa.as_ref()?;
+        let mean = root_mean_square(noise);
+        Some(noise.iter().map(|noise| noise / mean).collect())
     }
 
-    /// Number of frames that are averaged into one, 2^k.
-    pub fn frames(&self) -> usize {
-        self.frames
-    }
-
-    /// The mean of 2^k frames, each checked against the scene; id and known forces are those of the first.
+    /// The mean of frames, each checked against the scene. Of a block of 2^k frames, id and known forces are those of the
+    /// first; of a sliding mean, of all frames since the start, those of the last.
     ///
     /// # Errors
-    /// [`InputError::Count`] unless there are 2^k frames, [`InputError::Frame`] if one is not of the scene's sensor.
+    /// [`InputError::Count`] unless there are 2^k frames, of a sliding mean at least one; [`InputError::Frame`] if one is
+    /// not of the scene's sensor.
     pub fn average(&self, scene: &Scene, frames: &[Frame]) -> Result<Frame, InputError> {
-        let [first, ..] = frames else { return Err(self.miscounted(scene, 0)) };
-        if frames.len() != self.frames {
-            return Err(self.miscounted(scene, frames.len()));
-        }
+        let (average, wanted, got) = (self.spec.average, self.spec.frames_per_result(), frames.len());
+        let ([first, ..], [.., last]) = (frames, frames) else {
+            return Err(InputError::Count { scene: scene.name.clone(), average, wanted, got });
+        };
         frames.iter().try_for_each(|frame| frame.check(scene))?;
+        if self.spec.slides() {
+            let mut mean = vec![0.0; first.stress_MPa.len()];
+            for (number, frame) in (1..).zip(frames) {
+                sliding::add(&mut mean, &frame.stress_MPa, number, average);
+            }
+            return Ok(Frame { stress_MPa: mean, ..last.clone() });
+        }
+        if got != wanted {
+            return Err(InputError::Count { scene: scene.name.clone(), average, wanted, got });
+        }
         let mut mean = first.clone();
         for (index, b) in mean.stress_MPa.iter_mut().enumerate() {
             // Divided before adding, so that the sum does not overflow.
-            *b = frames.iter().map(|frame| frame.stress_MPa[index] / frames.len() as f64).sum();
+            *b = frames.iter().map(|frame| frame.stress_MPa[index] / got as f64).sum();
         }
         Ok(mean)
     }
 
-    fn miscounted(&self, scene: &Scene, got: usize) -> InputError {
-        let average = self.frames.trailing_zeros();
-        InputError::Count { scene: scene.name.clone(), average, wanted: self.frames, got }
+    /// Number of frames that a sliding mean of `frames` frames holds, by its noise; `None` where the mean does not slide.
+    pub fn frames_held(&self, frames: usize) -> Option<usize> {
+        self.spec.slides().then(|| frames.min(sliding::most_frames(self.spec.average)))
     }
 
     /// The zero of each taxel in the readings' unit, row-major: the scene's tare frame, else the table's offset.
@@ -169,4 +182,8 @@ impl Input {
         }
         frame.mask_dead(&self.spec.dead)
     }
+}
+
+fn root_mean_square(values: &[f64]) -> f64 {
+    (values.iter().map(|value| value * value).sum::<f64>() / values.len() as f64).sqrt()
 }

@@ -20,8 +20,9 @@
 //! | | `inverse_bits` (24; `coef_bits` … 32), `prune_bits` (20; 8 … 31), `lanes` (as many as fit; 4, 8 … 1024) |
 //! | `[hardware]` | `board` ("ulx3s-85f"), `link` ("uart"; "spi"), `coefficient_check` ("none"; "signature") |
 //! | | `search_width` (the board's; 4, 2, 1) |
-//! | `[input]` | `full_scale_MPa` (the frame's peak), `average` (0 … 12), `calibration`, `tare` (files), `dead` |
-//! | | (\[row, col\] each), `unipolar` (false), `gain_spread` (0; 0 … 1), `plausible_MPa` (10) |
+//! | `[input]` | `full_scale_MPa` (the frame's peak), `average` (0 … 12), `mean` ("block"; "sliding") |
+//! | | `calibration`, `tare` (files), `dead` (\[row, col\] each), `unipolar` (false), `gain_spread` (0; 0 … 1) |
+//! | | `plausible_MPa` (10) |
 //! | `[output]` | `forces` ("taxels"; "resultants") |
 
 mod error;
@@ -37,6 +38,7 @@ mod tests;
 pub use error::SceneError;
 pub use inverse::{InverseKind, InverseSpec, Inversion};
 
+use crate::input::sliding;
 use crate::link::LinkKind;
 use crate::partition::{subarrays, Case};
 use crate::sensor::Sensor;
@@ -233,6 +235,17 @@ pub struct HardwareSpec {
     pub search_width: Option<usize>,
 }
 
+/// How frames are averaged.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum MeanKind {
+    /// 2^average frames give one result.
+    #[default]
+    Block,
+    /// Every frame gives a result, of the frames so far, of which older ones count less: [`crate::input::sliding`].
+    Sliding,
+}
+
 /// Table `[input]`; its meaning is in [`crate::input`].
 #[derive(Clone, Debug, PartialEq)]
 pub struct InputSpec {
@@ -240,6 +253,8 @@ pub struct InputSpec {
     pub full_scale_MPa: Option<f64>,
     /// 2^average frames are averaged; 0 to 12.
     pub average: u32,
+    /// How they are averaged.
+    pub mean: MeanKind,
     /// Path of the table of offsets and gains, relative to the working folder.
     pub calibration: Option<PathBuf>,
     /// Path of a frame read without contact, relative to the working folder.
@@ -284,9 +299,39 @@ impl PartitionSpec {
 }
 
 impl InputSpec {
-    /// Noise of the mean of 2^average frames relative to that of a single frame: 2^(−average/2).
+    /// Noise of a mean relative to that of a single frame: 2^(−average/2) of a block, 1/√(2^(average+1) − 1) of a sliding
+    /// mean of many frames.
     pub fn noise_share(&self) -> f64 {
-        2f64.powf(-f64::from(self.average) / 2.0)
+        self.variance_share(usize::MAX).sqrt()
+    }
+
+    /// Variance of a mean relative to that of a single frame: of a block, or of a sliding mean of `frames` frames.
+    pub(crate) fn variance_share(&self, frames: usize) -> f64 {
+        match self.mean {
+            MeanKind::Block => 0.5f64.powi(self.average as i32),
+            MeanKind::Sliding => sliding::variance(frames, self.average),
+        }
+    }
+
+    /// Number of frames that arrive for each result.
+    pub fn frames_per_result(&self) -> usize {
+        match self.mean {
+            MeanKind::Block => 1 << self.average,
+            MeanKind::Sliding => 1,
+        }
+    }
+
+    /// Whether the mean slides.
+    pub fn slides(&self) -> bool {
+        self.mean == MeanKind::Sliding
+    }
+
+    /// The frames of each result, where `frames` arrive after a reset: blocks of 2^average of them, or all up to each.
+    pub fn frames_of_results<'a, T>(&self, frames: &'a [T]) -> Vec<&'a [T]> {
+        match self.mean {
+            MeanKind::Block => frames.chunks(self.frames_per_result()).collect(),
+            MeanKind::Sliding => (1..=frames.len()).map(|count| &frames[..count]).collect(),
+        }
     }
 
     /// Whether a taxel, [row, col], is dead.
@@ -300,6 +345,7 @@ impl Default for InputSpec {
         InputSpec {
             full_scale_MPa: None,
             average: 0,
+            mean: MeanKind::default(),
             calibration: None,
             tare: None,
             dead: Vec::new(),

@@ -149,6 +149,9 @@ pub struct Engine {
     searched_rescale: EnableRegister,
     searched_saturations: EnableRegister,
     searched_damaged: EnableRegister,
+    received_frames: EnableRegister,
+    frame_frames: EnableRegister,
+    searched_frames: EnableRegister,
     frame_cycles: FrameCycles,
     part: CaseCounter,
     again: BitDelay,
@@ -176,8 +179,9 @@ impl Engine {
         let bits = formats.input_bits as usize;
         let counts: Vec<usize> = model.cases().iter().map(|case| case.parts.len()).collect();
         let which = count_bits(counts.len());
-        let (normalise, rescale) = (Normalise::new(bits), Rescale::new(model));
+        let (prepare, normalise, rescale) = (Prepare::new(model), Normalise::new(bits), Rescale::new(model));
         let force = Force::new(model);
+        let frames = || EnableRegister::new(prepare.frames.width()).constant(!model.prepare.slides());
         let mut engine = Engine {
             clk: Default::default(),
             rst: Default::default(),
@@ -189,7 +193,6 @@ impl Engine {
             m_axis_tvalid: Default::default(),
             m_axis_tready: Default::default(),
             m_axis_tlast: Default::default(),
-            prepare: Prepare::new(model),
             receive: ReceiveStage::new(model),
             fold: Fold::new(model),
             pass: Pass::new(model),
@@ -219,6 +222,10 @@ impl Engine {
             searched_rescale: EnableRegister::new(rescale.shift.width()),
             searched_saturations: EnableRegister::new(rescale.saturations.width()),
             searched_damaged: EnableRegister::new(1).constant(!model.has_coefficient_check()),
+            received_frames: frames(),
+            frame_frames: frames(),
+            searched_frames: frames(),
+            prepare,
             normalise,
             rescale,
             frame_cycles: Default::default(),
@@ -292,6 +299,9 @@ impl Logic for Engine {
         self.searched_rescale.clk.next = self.clk.val();
         self.searched_saturations.clk.next = self.clk.val();
         self.searched_damaged.clk.next = self.clk.val();
+        self.received_frames.clk.next = self.clk.val();
+        self.frame_frames.clk.next = self.clk.val();
+        self.searched_frames.clk.next = self.clk.val();
         self.receive.rst.next = self.rst.val();
         self.fold.rst.next = self.rst.val();
         self.pass.rst.next = self.rst.val();
@@ -377,6 +387,15 @@ impl Logic for Engine {
         self.searched_saturations.word.next = self.rescale.saturations.val();
         self.searched_damaged.keep.next = self.handed.q.val();
         self.searched_damaged.word.next = self.pass.damaged.val();
+
+        comment!("Frames in the sliding mean: of the frame received, in the passes, searched");
+        self.received_frames.keep.next = self.receive.accept.val();
+        self.received_frames.word.next = self.prepare.frames.val();
+        self.frame_frames.keep.next = self.begin_frame.val();
+        self.frame_frames.word.next = self.received_frames.kept.val();
+        self.searched_frames.keep.next = self.hand_over.val();
+        self.searched_frames.word.next = self.frame_frames.kept.val();
+        self.forces.frames.next = self.searched_frames.kept.val();
 
         comment!("Then the next subarray starts");
         self.part.clear.next = self.rst.val();

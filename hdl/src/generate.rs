@@ -7,7 +7,8 @@ use dermis_golden::fixed::plan::interval::frame_interval;
 use dermis_golden::fixed::plan::resources::Memory;
 use dermis_golden::fixed::plan::storage::word_bits;
 use dermis_golden::fixed::stages::send::{
-    CASE_SHIFT, FLAG_COEFFICIENTS, FLAG_CONDITION, FLAG_FOUND, FLAG_FRAMING, FLAG_NO_CONTACT, STATUS_BEATS,
+    CASE_SHIFT, FLAG_COEFFICIENTS, FLAG_CONDITION, FLAG_FOUND, FLAG_FRAMING, FLAG_NO_CONTACT, FRAMES_SHIFT,
+    STATUS_BEATS,
 };
 use dermis_golden::fixed::{CasePlan, Cycles, Dropped, Model};
 use dermis_golden::link::c_header;
@@ -238,6 +239,7 @@ fn manifest(
         "input": {
             "bits": f.code_bits,
             "average": model.prepare.average,
+            "mean": model.prepare.mean,
             "full_scale_readings": full_scale.map(|full_scale| full_scale * model.prepare.reading_per_MPa),
             "full_scale_MPa": full_scale,
             "noise_floor_codes": model.noise_floor,
@@ -257,6 +259,7 @@ fn manifest(
                 "framing": FLAG_FRAMING,
                 "coefficients": model.has_coefficient_check().then_some(FLAG_COEFFICIENTS),
                 "case_shift": model.chooses().then_some(CASE_SHIFT),
+                "frames_shift": model.prepare.slides().then_some(FRAMES_SHIFT),
             },
         },
         "sizes": {

@@ -5,7 +5,7 @@ use super::model::Model;
 use super::plan::contents::CasePlan;
 use super::stages::resultants;
 use super::stages::send::{
-    Status, CASE_SHIFT, FLAG_COEFFICIENTS, FLAG_CONDITION, FLAG_FOUND, FLAG_NO_CONTACT, STATUS_BEATS,
+    Status, CASE_SHIFT, FLAG_COEFFICIENTS, FLAG_CONDITION, FLAG_FOUND, FLAG_NO_CONTACT, FRAMES_SHIFT, STATUS_BEATS,
 };
 use super::words::formats::{LOG_FRACTION, MU_STEPS};
 use crate::checks::Checks;
@@ -18,7 +18,7 @@ use crate::reception::{noise_floor_codes, receive, Received};
 use crate::reconstruct::{assemble, CaseChoice, Reconstruction, Resultant, SubarrayResult};
 
 impl Model {
-    /// Reconstructs one frame; for scenes with `input.average = 0`.
+    /// Reconstructs one frame; for scenes with `input.average = 0`, or the first frame of a sliding mean.
     ///
     /// # Errors
     /// As [`Model::stress`].
@@ -26,7 +26,7 @@ impl Model {
         self.reconstruct_averaged(std::slice::from_ref(frame))
     }
 
-    /// Reconstructs the mean of 2^average frames.
+    /// Reconstructs the mean of 2^average frames, or the sliding mean of all frames since a reset.
     ///
     /// # Errors
     /// As [`Model::stress`].
@@ -73,7 +73,7 @@ impl Model {
         }
         let step = self.scene.search.mu_max / MU_STEPS as f64;
         let sensor = &self.scene.sensor;
-        let mut flags = frame_flags(&self.scene, frame, &codes, input.noise_MPa());
+        let mut flags = frame_flags(&self.scene, frame, &codes, input.noise_of_mean_MPa(readings.len()));
         let mut subarrays = Vec::with_capacity(case.parts.len());
         for (part, beats) in case.parts.iter().zip(status.chunks(STATUS_BEATS)) {
             let Some(status) = Status::of_beats(beats) else { continue };
@@ -104,6 +104,10 @@ impl Model {
             result.resultant_N = resultant_N;
             result.error = frame.resultant_N.map(|truth| Errors::new(truth, resultant_N));
             result.extra.resultants = resultants;
+        }
+        if self.prepare.slides() {
+            // As the device says, which alone knows of its resets.
+            result.extra.mean_frames = status.first().map(|beat| (beat[2] as u32 >> FRAMES_SHIFT) as usize);
         }
         if self.chooses() {
             let reason = "the finest whose boundaries cut nothing, by the hardware's rule".to_string();

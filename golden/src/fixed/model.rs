@@ -104,10 +104,12 @@ impl Model {
         Model::new(&scene)
     }
 
-    /// The stress that [`Model::reconstruct_averaged`] reconstructs: the calibrated mean of 2^average frames, in MPa.
+    /// The stress that [`Model::reconstruct_averaged`] reconstructs: the calibrated mean of 2^average frames, or the sliding
+    /// one of all frames, in MPa.
     ///
     /// # Errors
-    /// [`InputError`](crate::input::InputError) unless there are 2^average frames, all of the scene's sensor.
+    /// [`InputError`](crate::input::InputError) unless there are 2^average frames, of a sliding mean at least one, all of
+    /// the scene's sensor.
     pub fn stress(&self, frames: &[Frame]) -> Result<Frame, FixedError> {
         let input = Input::new(&self.scene)?;
         Ok(input.calibrate(&input.average(&self.scene, frames)?))

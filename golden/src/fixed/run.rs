@@ -8,10 +8,11 @@ use super::model::Model;
 use super::plan::cycles::{BeatCycles, Cycles};
 use super::stages::choose;
 use super::stages::force::Force;
+use super::stages::prepare::Prepared;
 use super::stages::receive::mask_dead;
 use super::stages::resultants::{self, sums};
 use super::stages::search::Best;
-use super::stages::send::{Status, CASE_SHIFT, FLAG_CONDITION, FLAG_FOUND, FLAG_NO_CONTACT};
+use super::stages::send::{Status, CASE_SHIFT, FLAG_CONDITION, FLAG_FOUND, FLAG_NO_CONTACT, FRAMES_SHIFT};
 use super::subarray::SubarrayTrace;
 use crate::board::EngineKind;
 use crate::partition::Subarray;
@@ -44,9 +45,15 @@ pub struct Trace {
 const SINGLE_WORDS: [&str; 4] = ["normalise", "rescale", "unfold", "force"];
 
 impl Model {
-    /// Computes one reconstruction from its `codes`, `code_bits` wide: 2^average frames, each row-major over the array.
+    /// Computes one reconstruction from its `codes`, `code_bits` wide: 2^average frames, each row-major over the array;
+    /// with a sliding mean all frames since a reset.
     pub fn run(&self, codes: &[i32]) -> Trace {
-        let codes = &mask_dead(&self.prepare.run(codes), &self.dead);
+        self.run_prepared(&self.prepare.run(codes))
+    }
+
+    /// Computes one reconstruction from the words of the frame buffer.
+    pub fn run_prepared(&self, prepared: &Prepared) -> Trace {
+        let codes = &mask_dead(&prepared.words, &self.dead);
         let chosen = self.choose(codes);
         let case = &self.cases()[chosen];
         let sensor = &self.scene.sensor;
@@ -56,6 +63,7 @@ impl Model {
         let cycles = Cycles::of_case(self, case, &searched);
         let sending = BeatCycles::new(self, case, &searched);
         let number = if self.chooses() { case.number() } else { 0 };
+        let frames = if self.prepare.slides() { prepared.frames as u32 } else { 0 };
 
         let mut forces = vec![Force::default(); sensor.taxels()];
         for (part, solved) in case.parts.iter().zip(&solved) {
@@ -70,7 +78,8 @@ impl Model {
                 flags: flag(s.condition, FLAG_CONDITION)
                     | flag(s.found.score.is_some(), FLAG_FOUND)
                     | flag(!contact, FLAG_NO_CONTACT)
-                    | number << CASE_SHIFT,
+                    | number << CASE_SHIFT
+                    | frames << FRAMES_SHIFT,
                 score: s.found.score.unwrap_or(0) as i32,
                 rescale: s.rescale,
                 normalise: s.normalise,

@@ -3,7 +3,7 @@
 //!
 //! | option | here |
 //! |---|---|
-//! | `input.average` | [`Golden::run_averaged`]; [`Golden::run`] takes an averaged frame |
+//! | `input.average`, `input.mean` | [`Golden::run_averaged`]; [`Golden::run`] takes an averaged frame |
 //! | `input.calibration`, `input.tare` | readings to stress |
 //! | `input.unipolar` | the tension of clipped taxels is estimated, `unipolar` |
 //! | `output.forces` | resultants instead of forces per taxel |
@@ -110,7 +110,7 @@ impl Golden {
     }
 
     /// Averages 2^k frames, k the scene's `input.average`, and reconstructs their mean; known forces are those of the
-    /// first.
+    /// first. With a sliding mean the frames are all those since the start, and known forces those of the last.
     ///
     /// ```
     /// use dermis_golden::{frame::Frame, generator::converter::Converter, float::Golden, scene::Scene};
@@ -131,13 +131,15 @@ impl Golden {
     /// As [`Golden::run`]; [`GoldenError::Input`] unless there are 2^k frames.
     pub fn run_averaged(&self, frames: &[Frame]) -> Result<Reconstruction, GoldenError> {
         let mean = self.input.average(&self.scene, frames)?;
-        self.run_readings(frames, &mean, self.input.noise_MPa())
+        let mut result = self.run_readings(frames, &mean, self.input.noise_of_mean_MPa(frames.len()))?;
+        result.extra.mean_frames = self.input.frames_held(frames.len());
+        Ok(result)
     }
 
     /// The stress in MPa that [`Golden::run_averaged`] reconstructs: the calibrated mean of 2^k frames.
     ///
     /// # Errors
-    /// [`GoldenError::Input`] unless there are 2^k frames, all of the scene's sensor.
+    /// [`GoldenError::Input`] unless there are 2^k frames, of a sliding mean at least one, all of the scene's sensor.
     pub fn stress(&self, frames: &[Frame]) -> Result<Frame, GoldenError> {
         Ok(self.input.calibrate(&self.input.average(&self.scene, frames)?))
     }

@@ -8,6 +8,7 @@
 //! | `unipolar` | `input.unipolar = true` | clipped and filled taxels, evaluations, misfit |
 //! | `resultants` | `output.forces = "resultants"` | force and centre of pressure per subarray or contact |
 //! | `contacts` | `search.estimator = "evidence"` | centre, μ, force and standard deviation of each contact |
+//! | `mean_frames` | `input.mean = "sliding"` | number of frames that the mean holds |
 //! | `sweeps`, `converged` | `partition.case = "contacts"` | convergence of the search over the regions |
 
 use super::output::Resultant;
@@ -39,6 +40,9 @@ pub struct Extra {
     /// Statistics of the tension estimated for `input.unipolar`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub unipolar: Option<Unipolar>,
+    /// Number of frames that a sliding mean holds: as many of equal weight have its noise.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub mean_frames: Option<usize>,
     /// The forces of `output.forces = "resultants"`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub resultants: Option<Vec<Resultant>>,

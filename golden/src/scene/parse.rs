@@ -3,8 +3,8 @@
 use super::reader::Reader;
 use super::{
     CoefficientCheck, Condition, EstimatorKind, FixedSpec, ForceOutput, Form, HardwareSpec, InputSpec, InverseKind,
-    InverseSpec, Medium, ObjectiveKind, OutputSpec, PartitionSpec, Scene, SceneError, SearchSpec, ThresholdSpec,
-    PLAUSIBLE_MPA,
+    InverseSpec, MeanKind, Medium, ObjectiveKind, OutputSpec, PartitionSpec, Scene, SceneError, SearchSpec,
+    ThresholdSpec, PLAUSIBLE_MPA,
 };
 use crate::board::{Board, SEARCH_WIDTHS};
 use crate::link::LinkKind;
@@ -28,7 +28,17 @@ const SCHEMA: [(&str, &[&str]); 11] = [
     ("hardware", &["board", "link", "coefficient_check", "search_width"]),
     (
         "input",
-        &["full_scale_MPa", "average", "calibration", "tare", "dead", "unipolar", "gain_spread", "plausible_MPa"],
+        &[
+            "full_scale_MPa",
+            "average",
+            "mean",
+            "calibration",
+            "tare",
+            "dead",
+            "unipolar",
+            "gain_spread",
+            "plausible_MPa",
+        ],
     ),
     ("output", &["forces"]),
 ];
@@ -304,10 +314,12 @@ fn input(reader: &Reader, origin: &str, sensor: &Sensor) -> Result<InputSpec, Sc
     let spread = reader.number("input.gain_spread", |spread| (0.0..=1.0).contains(&spread), "a number from 0 to 1")?;
     let full_scale_MPa = reader.number("input.full_scale_MPa", |mpa| mpa > 0.0, "a number above 0")?;
     let plausible_MPa = reader.number("input.plausible_MPa", |mpa| mpa > 0.0, "a number above 0")?;
+    // In range, so that the cast keeps the value.
+    let average = reader.integer("input.average", 0..=12, Some(0))? as u32;
     Ok(InputSpec {
         full_scale_MPa,
-        // In range, so that the cast keeps the value.
-        average: reader.integer("input.average", 0..=12, Some(0))? as u32,
+        average,
+        mean: mean(reader, average)?,
         calibration: file(reader, origin, "input.calibration")?,
         tare: file(reader, origin, "input.tare")?,
         dead: dead(reader, sensor)?,
@@ -315,6 +327,18 @@ fn input(reader: &Reader, origin: &str, sensor: &Sensor) -> Result<InputSpec, Sc
         gain_spread: spread.unwrap_or(0.0),
         plausible_MPa: plausible_MPa.unwrap_or(PLAUSIBLE_MPA),
     })
+}
+
+/// A sliding mean of one frame is no mean.
+fn mean(reader: &Reader, average: u32) -> Result<MeanKind, SceneError> {
+    let path = "input.mean";
+    let kind = reader.choice(path, &[("block", MeanKind::Block), ("sliding", MeanKind::Sliding)])?;
+    match (reader.value(path), average) {
+        (Some(value), 0) if kind == MeanKind::Sliding => {
+            Err(reader.wrong(path, value, "\"block\", or input.average from 1 to 12"))
+        }
+        _ => Ok(kind),
+    }
 }
 
 /// A path relative to the folder of the scene's file.

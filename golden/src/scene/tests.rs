@@ -60,6 +60,7 @@ fn every_field_is_read() {
         [input]
         full_scale_MPa = 0.25
         average = 6
+        mean = "sliding"
         calibration = "table.csv"
         tare = "zero.json"
         dead = [[3, 4], [0, 9], [3, 4]]
@@ -85,6 +86,7 @@ fn every_field_is_read() {
     let input = InputSpec {
         full_scale_MPa: Some(0.25),
         average: 6,
+        mean: MeanKind::Sliding,
         calibration: Some("table.csv".into()),
         tare: Some("zero.json".into()),
         dead: vec![[0, 9], [3, 4]],
@@ -148,6 +150,14 @@ fn wrong_values_name_what_is_allowed() {
         ("[hardware]\nboard = \"ulx4m\"", "\"icebreaker\" or \"ulx3s-85f\""),
         ("[input]\nfull_scale_MPa = 0", "above 0"),
         ("[input]\naverage = 13", "from 0 to 12"),
+        (
+            "[input]\naverage = 2\nmean = \"box\"",
+            "input.mean = \"box\" is not allowed; it must be \"block\" or \"sliding\"",
+        ),
+        (
+            "[input]\nmean = \"sliding\"",
+            "input.mean = \"sliding\" is not allowed; it must be \"block\", or input.average from",
+        ),
         ("[input]\ndead = [[0, 10]]", "a list of [row, col], row 0 to 9, col 0 to 9"),
         ("[input]\ndead = [3]", "a list of [row, col]"),
         ("[input]\nunipolar = 1", "true or false"),

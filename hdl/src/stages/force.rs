@@ -57,6 +57,8 @@ pub struct Force {
     pub framing: Signal<In, Bit>,
     /// The coefficient signature is wrong, 1 bit; valid with `start`.
     pub damaged: Wire<In>,
+    /// Number of frames in a sliding mean, otherwise one bit, 0; valid with `start`.
+    pub frames: Wire<In>,
     /// Score of the best candidate, signed, 2^−6; valid with `start`.
     pub score: Wire<In>,
     /// Words saturated by `rescale`; valid with `start`.
@@ -108,6 +110,7 @@ impl Force {
             found: Default::default(),
             framing: Default::default(),
             damaged: Wire::new(1),
+            frames: Wire::new(unit.frames.width()),
             score: Wire::new(formats.score_bits as usize),
             saturations: Wire::new(SATURATION_BITS),
             cycles: Wire::new(CYCLE_BITS),
@@ -160,6 +163,7 @@ impl Logic for Force {
         self.unit.found.next = self.found.val();
         self.unit.framing.next = self.framing.val();
         self.unit.damaged.next = self.damaged.val();
+        self.unit.frames.next = self.frames.val();
         self.unit.score.next = self.score.val();
         self.unit.saturations.next = self.saturations.val();
         self.unit.cycles.next = self.cycles.val();

@@ -29,6 +29,8 @@ pub struct Prepare {
     pub m_axis_tready: Signal<In, Bit>,
     /// The word is the last of its frame; valid with `m_axis_tvalid`.
     pub m_axis_tlast: Signal<Out, Bit>,
+    /// Number of frames in a sliding mean; valid with `m_axis_tvalid`. Otherwise one bit, 0.
+    pub frames: Wire<Out>,
     /// Zero and gain of each taxel.
     pub calibrate: Calibrate,
     average: Average,
@@ -39,6 +41,7 @@ impl Prepare {
     pub fn new(model: &Model) -> Self {
         let (formats, taxels) = (model.formats(), model.scene.sensor.taxels());
         let bits = formats.code_bits as usize;
+        let average = Average::new(taxels, bits, model.prepare.average, model.prepare.mean);
         Prepare {
             clk: Default::default(),
             rst: Default::default(),
@@ -50,8 +53,9 @@ impl Prepare {
             m_axis_tvalid: Default::default(),
             m_axis_tready: Default::default(),
             m_axis_tlast: Default::default(),
+            frames: Wire::new(average.frames.width()),
             calibrate: Calibrate::new(&model.prepare, taxels, bits),
-            average: Average::new(taxels, bits, model.prepare.average),
+            average,
         }
     }
 }
@@ -75,5 +79,6 @@ impl Logic for Prepare {
         self.m_axis_tvalid.next = self.average.m_axis_tvalid.val();
         self.m_axis_tlast.next = self.average.m_axis_tlast.val();
         self.average.m_axis_tready.next = self.m_axis_tready.val();
+        self.frames.next = self.average.frames.val();
     }
 }

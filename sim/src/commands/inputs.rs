@@ -6,7 +6,7 @@
 //! | given | none | the scene, its shipped frames |
 //! | none | files | the built-in scene with the first file's sensor, else the default scene of that sensor |
 //!
-//! One reconstruction takes 2^k frames, where k is the scene's `input.average`.
+//! One reconstruction takes 2^k frames, where k is the scene's `input.average`; with a sliding mean any number.
 
 use anyhow::{bail, Result};
 use clap::Args;
@@ -67,18 +67,18 @@ pub fn resolve(scene: Option<&str>, frames: &[String]) -> Result<(Scene, Vec<Fra
     Ok((scene, frames))
 }
 
-/// Loads the scene and the 2^k frames of one reconstruction; without `--frame` and averaging, the first shipped frame.
+/// Loads the scene and the frames of one reconstruction, 2^k or all of a sliding mean; without `--frame`, where one frame
+/// gives a result, the first shipped frame.
 ///
 /// # Errors
 /// As [`resolve`]; a number of frames other than 2^k.
 pub fn resolve_one(scene: Option<&str>, files: &[String]) -> Result<(Scene, Vec<Frame>)> {
     let named = scene;
     let (scene, mut frames) = resolve(named, files)?;
-    let average = scene.input.average;
-    let wanted = 1usize << average;
+    let (average, wanted) = (scene.input.average, scene.input.frames_per_result());
     if files.is_empty() && wanted == 1 {
         frames.truncate(1);
-    } else if files.len() != wanted {
+    } else if !scene.input.slides() && files.len() != wanted {
         let (origin, got) = (named.unwrap_or(&scene.name), files.len());
         bail!(
             "{origin}: input.average = {average}: the number of --frame options must be 2^{average} = {wanted}, \

@@ -28,7 +28,7 @@ pub struct Arguments {
     /// Built-in name or path of a scene; optional if the frame file contains its sensor.
     scene: Option<String>,
     /// Frame file (.json, .csv) or `eq2`; default: the scene's first shipped frame. Repeat it 2^k times if the
-    /// scene has input.average = k.
+    /// scene has input.average = k, any number of times with input.mean = "sliding".
     #[arg(long = "frame", value_name = "FILE")]
     frames: Vec<String>,
     /// Model or hardware that computes the forces.

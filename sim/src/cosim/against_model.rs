@@ -24,7 +24,7 @@ pub struct Vector {
     pub frame: String,
     /// Columns of the array, from which messages compute a taxel's row and column.
     pub cols: usize,
-    /// Codes of all frames in order, each row-major.
+    /// Codes of all frames sent, in order, each row-major.
     pub codes: Vec<i32>,
     /// Taxels per frame.
     pub taxels: usize,
@@ -33,6 +33,12 @@ pub struct Vector {
 }
 
 impl Vector {
+    /// What is sent, and how many beats answer it.
+    pub fn input(&self) -> InputFrame<'_> {
+        let beats = self.expected.beats.len() + self.expected.status.len();
+        InputFrame { codes: &self.codes, taxels: self.taxels, beats }
+    }
+
     /// The vector without the model's stages, for a device without taps: only beats and cycles are compared.
     pub fn without_stages(&self) -> Vector {
         let mut vector = self.clone();
@@ -53,14 +59,7 @@ pub struct DeviceUnderTest<'a> {
 
 /// Sends the vectors through a device and compares; returns the findings and the times of each vector.
 pub fn run(dut: DeviceUnderTest, vectors: &[Vector], stimulus: Stimulus) -> (Findings, Vec<Times>) {
-    let inputs: Vec<InputFrame> = vectors
-        .iter()
-        .map(|v| InputFrame {
-            codes: &v.codes,
-            taxels: v.taxels,
-            beats: v.expected.beats.len() + v.expected.status.len(),
-        })
-        .collect();
+    let inputs: Vec<InputFrame> = vectors.iter().map(Vector::input).collect();
     let longest = vectors.iter().map(|v| v.expected.cycles.total).max().unwrap_or(0);
     let watchdog = WATCHDOG_MIN.max(4 * longest);
     let recording = record(dut.device, dut.taps.len(), &inputs, stimulus, watchdog);

@@ -49,7 +49,7 @@ pub struct Timing {
 /// # Errors
 /// A scene without frames or with the serial engine.
 pub fn traces(scene: &Scene, build: &Path) -> Result<Vec<Trace>> {
-    let (shipped, wanted) = (Frame::shipped(scene), 1 << scene.input.average);
+    let (shipped, wanted) = (Frame::shipped(scene), scene.input.frames_per_result());
     let Some(frames) = shipped.get(..wanted) else {
         bail!("{}: {} frames are shipped for its sensor, wanted {wanted}", scene.name, shipped.len());
     };

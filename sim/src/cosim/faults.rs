@@ -109,6 +109,7 @@ pub fn inject_faults(hardware: &Hardware, frames: &[Frame], count: usize, seed: 
         let Some((index, word, bit)) = draw(&elements, run, &mut random) else { continue };
         let element = &elements[index];
         let [first, second, after] = [(); 3].map(|()| &pool[random.usize(..pool.len())]);
+        let second = &second.behind(&hardware.model, first);
         let flip_cycle = random.u64(..first.cycles.total);
         let mut injector = FaultInjector::new(&mut device, StateBit { element, word, bit }, flip_cycle);
         let frames = [first, second].map(input_frame);

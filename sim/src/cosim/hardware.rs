@@ -156,7 +156,8 @@ impl Hardware {
         self.generated.taps.iter().map(|tap| tap.name).collect()
     }
 
-    /// The test vector of one reconstruction: codes of its frames and the bit-true model's results.
+    /// The test vector of one reconstruction: codes of its frames and the bit-true model's results. With a sliding mean
+    /// these are all frames since the reset, of which the last is sent.
     ///
     /// # Errors
     /// A frame of another sensor, or a number of frames that the scene does not average.
@@ -164,26 +165,36 @@ impl Hardware {
         let codes = self.model.readings(frames)?;
         let expected = self.model.run(&codes);
         let sensor = &self.model.scene.sensor;
-        let frame = frames.first().map_or_else(String::new, |frame| frame.id.clone());
+        let before = frames.len() - self.model.scene.input.frames_per_result();
+        let frame = frames.get(before).map_or_else(String::new, |frame| frame.id.clone());
+        let codes = codes[before * sensor.taxels()..].to_vec();
         Ok(Vector { frame, cols: sensor.cols, taxels: sensor.taxels(), codes, expected })
     }
 
-    /// Reconstructs the mean of the frames in the verilated hardware (engine `rtl`).
+    /// The test vectors of frames that follow one another after a reset.
+    ///
+    /// # Errors
+    /// As [`Hardware::vector`].
+    pub fn vectors(&self, frames: &[Frame]) -> Result<Vec<Vector>> {
+        self.model.scene.input.frames_of_results(frames).into_iter().map(|frames| self.vector(frames)).collect()
+    }
+
+    /// Reconstructs the mean of the frames in the verilated hardware (engine `rtl`); the result after the last one.
     ///
     /// # Errors
     /// As [`Hardware::device`]; [`DeviceTimeout`].
     pub fn reconstruct(&self, frames: &[Frame]) -> Result<Reconstruction> {
-        let vector = self.vector(frames)?;
-        let forces = vector.expected.beats.len();
-        let inputs =
-            [InputFrame { codes: &vector.codes, taxels: vector.taxels, beats: forces + vector.expected.status.len() }];
+        let vectors = self.vectors(frames)?;
+        let inputs: Vec<InputFrame> = vectors.iter().map(Vector::input).collect();
         let mut device = self.device(Simulator::Verilator)?;
         let recording = record(device.as_mut(), 0, &inputs, Stimulus::FullSpeed, WATCHDOG);
         if let Some(timeout) = recording.timeout {
-            return Err(DeviceTimeout { frame: vector.frame, cycle: timeout.cycle, rule: timeout.rule }.into());
+            let frame = frames.last().map_or_else(String::new, |frame| frame.id.clone());
+            return Err(DeviceTimeout { frame, cycle: timeout.cycle, rule: timeout.rule }.into());
         }
-        let beats: Vec<[i32; 3]> = recording.beats.iter().map(|beat| beat.data).collect();
-        let (forces, status) = beats.split_at(forces.min(beats.len()));
+        let before: usize = inputs.iter().rev().skip(1).map(|input| input.beats).sum();
+        let beats: Vec<[i32; 3]> = recording.beats.iter().skip(before).map(|beat| beat.data).collect();
+        let (forces, status) = beats.split_at(self.model.force_beats().min(beats.len()));
         Ok(self.model.decode(frames, "rtl", forces, status)?)
     }
 }

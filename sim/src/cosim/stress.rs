@@ -38,7 +38,7 @@ pub fn stress(hardware: &Hardware, frames: &[Frame], cycles: u64, seed: u64) -> 
     let mut device = hardware.device(Simulator::Verilator)?;
     let mut outcomes = Vec::new();
     for experiment in ["stalls", "tlast", "reset"] {
-        let mut bench = Testbench::new(device.as_mut(), &samples);
+        let mut bench = Testbench::new(device.as_mut(), &hardware.model, &samples);
         bench.reset(RESET_CYCLES, &mut random);
         match experiment {
             "stalls" => stalls(&mut bench, &mut random, cycles),

@@ -81,8 +81,7 @@ pub fn verify(scene: &Scene, frames: &[Frame], simulators: &[Simulator], build: 
     let hardware = Hardware::new(Model::for_frames(scene, frames)?, build)?;
     // The model's scene has the full scale filled in, so that all models use the same codes.
     let golden = Golden::new(&hardware.model.scene)?;
-    let vectors =
-        frames.chunks(1 << scene.input.average).map(|frames| hardware.vector(frames)).collect::<Result<Vec<_>>>()?;
+    let vectors = hardware.vectors(frames)?;
 
     let mut verified = Verified {
         scene: scene.clone(),
@@ -101,9 +100,8 @@ pub fn verify(scene: &Scene, frames: &[Frame], simulators: &[Simulator], build: 
             times = seen;
         }
     }
-    for (index, ((frames, vector), times)) in
-        frames.chunks(1 << scene.input.average).zip(&vectors).zip(times).enumerate()
-    {
+    let frames = scene.input.frames_of_results(frames);
+    for (index, ((frames, vector), times)) in frames.into_iter().zip(&vectors).zip(times).enumerate() {
         let frame = &hardware.model.stress(frames)?;
         let full_scale_MPa = full_scale(&hardware.model.scene, frame);
         let golden = golden.run_averaged(frames)?;

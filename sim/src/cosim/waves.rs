@@ -177,8 +177,7 @@ pub fn waves(scene: &Scene, frames: &[Frame], simulator: Simulator, build: &Path
     let hardware = Hardware::new(Model::for_frames(scene, frames)?, build)?;
     let at = |path: &Path, error: std::io::Error| anyhow!("{}: {error}", path.display());
     std::fs::create_dir_all(folder).map_err(|e| at(folder, e))?;
-    let vectors = frames.chunks(1 << scene.input.average).map(|frames| hardware.vector(frames));
-    let vectors = vectors.collect::<Result<Vec<_>>>()?;
+    let vectors = hardware.vectors(frames)?;
     let taps = hardware.taps(simulator);
     let (names, vectors) = hardware.observable(simulator, &vectors);
     let _progress = Progress::start(&format!("{}: waveforms", scene.name));

@@ -29,6 +29,9 @@ fn lines(text: &mut String, result: &Reconstruction, full_scale_MPa: f64) -> std
     let [x1, x2, x3] = result.resultant_N.map(|x| sign(x).to_owned() + &significant_digits(x, largest));
     writeln!(text, "{}, frame {}, engine {}", result.scene, result.frame, result.engine)?;
     writeln!(text, "full scale      {} MPa", significant_digits(full_scale_MPa, full_scale_MPa))?;
+    if let Some(frames) = result.extra.mean_frames {
+        writeln!(text, "sliding mean    {frames} frames")?;
+    }
     writeln!(text, "resultant, N    x {x1}   y {x2}   normal {x3}")?;
     if let Some(e) = &result.error {
         let axes = [e.x1, e.x2, e.x3].map(percent);

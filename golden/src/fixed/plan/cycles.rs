@@ -121,11 +121,11 @@ impl Cycles {
     /// The counts of a frame that `case` solves, without the choice of the case; `searched[k]` says whether subarray k
     /// is searched.
     pub fn of_case(plan: &Plan, case: &CasePlan, searched: &[bool]) -> Self {
-        let taxels = (plan.scene.sensor.taxels() as u64) << plan.prepare.average;
+        let codes = (plan.scene.sensor.taxels() * plan.scene.input.frames_per_result()) as u64;
         let interval = if plan.board.engine == EngineKind::Serial { serial::BEAT } else { 1 };
         let beats = BeatCycles::new(plan, case, searched).beats;
         let [first_output, latency] = [beats.first(), beats.last()].map(|beat| beat.copied().unwrap_or(0));
-        Cycles { first_output, latency, total: taxels + latency, interval }
+        Cycles { first_output, latency, total: codes + latency, interval }
     }
 
     /// The counts with those of the choice, where the hardware chooses among several cases.

@@ -8,9 +8,10 @@ use crate::board::EngineKind;
 use crate::fixed::error::FixedError;
 use crate::fixed::stages::prepare::Scale;
 use crate::fixed::words::formats::MULTIPLIER_BITS;
+use crate::input::sliding::most_frames;
 use crate::matrices::MAX_DEGREE;
 use crate::partition::{subarrays, Case};
-use crate::scene::{CoefficientCheck, ForceOutput, Scene, SearchSpec};
+use crate::scene::{CoefficientCheck, ForceOutput, MeanKind, Scene, SearchSpec};
 use crate::symmetry::quads::Quads;
 
 /// An optional feature of the hardware.
@@ -60,9 +61,11 @@ pub fn features(plan: &Plan) -> Vec<Feature> {
     add("calibration table", table, format!("a zero and a gain of {MULTIPLIER_BITS} bits per taxel"), &|| {
         scaled(&with(&|s| (s.input.calibration, s.input.full_scale_MPa) = (Some("".into()), Some(full_scale))), true)
     });
-    let average = input.average > 0;
-    add("averaging", average, set(average, format!("{} frames", 1 << input.average), "2 frames"), &|| {
-        plain(&with(&|s| s.input.average = 1))
+    let (average, slides, power) = (input.average > 0, input.slides(), input.average.max(1));
+    let frames = if slides { most_frames(power) } else { 1 << power };
+    add("averaging", average, format!("{frames} frames"), &|| plain(&with(&|s| s.input.average = power)));
+    add("sliding mean", slides, format!("gains from 1 to 2^−{power}"), &|| {
+        plain(&with(&|s| (s.input.average, s.input.mean) = (power, MeanKind::Sliding)))
     });
     let parts = plan.parts().len();
     let quarters = Case::numbered(1).filter(|case| subarrays(*case, &scene.sensor).is_ok());
@@ -125,6 +128,9 @@ pub fn features(plan: &Plan) -> Vec<Feature> {
         let plan = plain(&with(change)).ok();
         all.iter_mut().filter(|feature| feature.name == name).for_each(|f| f.without_feature = plan.clone());
     };
+    if slides {
+        without("sliding mean", &|s| s.input.mean = MeanKind::Block);
+    }
     if dead > 0 {
         without("dead taxels", &|s| s.input.dead.clear());
     }

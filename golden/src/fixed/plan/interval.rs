@@ -1,7 +1,8 @@
 //! Frame interval: cycles from one frame to the next where frames follow one another without a gap, every subarray is
 //! searched and the receiver is always ready.
 //!
-//! The longest of these decides, with T taxels, Q quads per subarray, S steps of a sweep and 2^k frames averaged:
+//! The longest of these decides, with T taxels, Q quads per subarray, S steps of a sweep and blocks of 2^k frames, one frame
+//! where the mean slides:
 //! ```text
 //! input    2^k T, or T from the last quad that fold has read
 //! pass     the passes of all subarrays, waiting where the search is busy
@@ -72,7 +73,8 @@ fn parallel(plan: &Plan, case: &CasePlan) -> u64 {
         sent = forces + SEND + sums + case.status_beats() as u64;
         interval = sent - before;
         // Codes that are averaged are taken while the frame buffer is full, the sums are not.
-        received = (received + (taxels << plan.prepare.average)).max(start + quads + FOLDED + taxels - 1);
+        received =
+            (received + taxels * plan.scene.input.frames_per_result() as u64).max(start + quads + FOLDED + taxels - 1);
         let passed = if plan.resources.overlaps { handed_over } else { sent };
         begin = (received + ACCEPT + choice).max(passed + BEGIN);
     }

@@ -6,7 +6,7 @@
 //!
 //! | stage | memory | words × bits |
 //! |---|---|---|
-//! | prepare | zero and gain; sums of several frames | taxels × `code_bits` and 18; taxels × `input_bits` |
+//! | prepare | zero and gain; sums of several frames, or their sliding mean | taxels × `code_bits` and 18; taxels × `input_bits` |
 //! | receive | frame buffer of each case, four lanes | subarrays · Q × `input_bits` |
 //! | fold | input of the passes | Q × 4 · `fold_bits` |
 //! | pass | v_ij as operands, except those of the highest degree | their number · Q × 4 · `data_bits` |
@@ -36,7 +36,7 @@ pub const SEARCH_BUFFERS: usize = 3;
 pub enum Holds {
     /// Zero and gain of each taxel.
     Calibration,
-    /// Sums of the frames that are averaged.
+    /// Sums of the frames that are averaged, or their sliding mean.
     Average,
     /// One lane of the quads of a frame, in the layout of a case.
     Frame {

@@ -3,6 +3,7 @@
 //! ```text
 //! code ── calibrate ── average ── receive        s = ⌊gain·(code − zero) / 2^16 + 1/2⌋,  held to code_bits
 //!         zero, gain    Σ of 2^k frames           b = Σ s: k bits more, the same full scale
+//!                       or sliding mean           b ← b + ⌊(2^k s − b) / 2^g + 1/2⌋: likewise
 //! ```
 //! | word | bits | LSB |
 //! |---|---|---|
@@ -12,16 +13,19 @@
 //! | s | `code_bits` | full scale / (2^(code_bits − 1) − 1) |
 //! | b | `input_bits` = `code_bits` + k | that over 2^k |
 //!
-//! Without a table the gain is 1 and nothing is multiplied. Each sample is rounded once; the sum keeps all its bits.
+//! Without a table the gain is 1 and nothing is multiplied. Each sample is rounded once; the sum keeps all its bits. A
+//! sliding mean ([`sliding`], with g) is rounded to its k more bits with every frame, which adds as much noise as the
+//! converter's own rounding; the first frame, and constant readings from then on, it holds exactly.
 
 use crate::fixed::error::FixedError;
 use crate::fixed::words::arith::{round_shift, saturate};
 use crate::frame::FrameError;
 use crate::input::calibration::Calibration;
+use crate::input::sliding::{gain_shift, most_frames};
 use crate::input::tare::Tare;
 use crate::input::InputError;
 use crate::quantise::{largest_code, quantise};
-use crate::scene::Scene;
+use crate::scene::{MeanKind, Scene};
 
 /// Fraction bits of a gain word.
 pub const GAIN_FRACTION: u32 = 16;
@@ -35,11 +39,23 @@ pub struct Prepare {
     pub zero: Option<Vec<i32>>,
     /// Gain word of each taxel, 2^−16 per LSB, if the scene has a table.
     pub gain: Option<Vec<i32>>,
-    /// 2^average frames are added up.
+    /// k: 2^average frames are added up, or the last gain of a sliding mean is 2^−average.
     pub average: u32,
+    /// How frames are averaged.
+    pub mean: MeanKind,
     /// Reading per MPa at the largest gain, in the readings' unit: 1 / (largest |gain|).
     pub reading_per_MPa: f64,
     code_bits: u32,
+    taxels: usize,
+}
+
+/// What the stage has made of the frames so far: the words of the frame buffer.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Prepared {
+    /// A word per taxel, row-major.
+    pub words: Vec<i32>,
+    /// Number of frames in them; of a sliding mean it stops at [`most_frames`].
+    pub frames: usize,
 }
 
 /// Conversion of a scene's readings to MPa, in floating point.
@@ -82,8 +98,10 @@ impl Prepare {
             zero: scale.tare.as_deref().or(offset).map(codes),
             gain: scale.table.as_ref().map(|table| table.gain.iter().map(word).collect()),
             average: scene.input.average,
+            mean: scene.input.mean,
             reading_per_MPa,
             code_bits,
+            taxels: scene.sensor.taxels(),
         }
     }
 
@@ -103,14 +121,44 @@ impl Prepare {
         saturate(scaled, self.code_bits).0
     }
 
-    /// Calibrates and adds up 2^average frames of codes, given frame after frame; the result is one row-major frame.
-    pub fn run(&self, codes: &[i32]) -> Vec<i32> {
-        let taxels = codes.len() >> self.average;
-        let mut sums = vec![0; taxels];
-        for (index, &code) in codes.iter().enumerate() {
-            sums[index % taxels] += self.calibrate(index % taxels, code) as i32;
+    /// No frames yet.
+    pub fn empty(&self) -> Prepared {
+        Prepared { words: vec![0; self.taxels], frames: 0 }
+    }
+
+    /// Calibrates frames of codes and adds them to `prepared`, frame after frame, each row-major.
+    pub fn add(&self, prepared: &mut Prepared, codes: &[i32]) {
+        for frame in codes.chunks(self.taxels) {
+            let shift = match self.mean {
+                MeanKind::Block => None,
+                MeanKind::Sliding => Some(gain_shift(prepared.frames + 1, self.average)),
+            };
+            for (taxel, (word, &code)) in prepared.words.iter_mut().zip(frame).enumerate() {
+                let sample = self.calibrate(taxel, code);
+                let added = match shift {
+                    None => sample,
+                    Some(shift) => round_shift((sample << self.average) - i64::from(*word), shift),
+                };
+                // A sum, or a word between two of `input_bits`, which the formats hold below 32.
+                *word += added as i32;
+            }
+            prepared.frames += 1;
+            if self.slides() {
+                prepared.frames = prepared.frames.min(most_frames(self.average));
+            }
         }
-        sums
+    }
+
+    /// The words after all `codes` since a reset: 2^average frames, or any number with a sliding mean.
+    pub fn run(&self, codes: &[i32]) -> Prepared {
+        let mut prepared = self.empty();
+        self.add(&mut prepared, codes);
+        prepared
+    }
+
+    /// Whether the mean slides.
+    pub fn slides(&self) -> bool {
+        self.mean == MeanKind::Sliding
     }
 
     /// Latency in cycles between the input stream and `receive`.
@@ -120,13 +168,19 @@ impl Prepare {
             (_, None) => 2,
             (_, Some(_)) => 4,
         };
-        calibrate + if self.average > 0 { 2 } else { 0 }
+        let average = match self.mean {
+            MeanKind::Block if self.average == 0 => 0,
+            MeanKind::Block => 2,
+            MeanKind::Sliding => 3,
+        };
+        calibrate + average
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::random::Random;
 
     #[test]
     fn by_hand() {
@@ -135,10 +189,55 @@ mod tests {
             zero: Some(vec![10, -3]),
             gain: Some(vec![half, 2 * half]),
             average: 1,
+            mean: MeanKind::Block,
             reading_per_MPa: 1.0,
             code_bits: 8,
+            taxels: 2,
         };
         // (15 − 10)/2 = 2.5 rounds to 3; 127 + 3 is held to 127.
-        assert_eq!(prepare.run(&[15, 127, 10, -128]), [3, 127 - 125]);
+        assert_eq!(prepare.run(&[15, 127, 10, -128]), Prepared { words: vec![3, 127 - 125], frames: 2 });
+        let sliding = Prepare { zero: None, gain: None, average: 2, mean: MeanKind::Sliding, taxels: 1, ..prepare };
+        let mut words = sliding.empty();
+        let mut after = |code: i32| {
+            sliding.add(&mut words, &[code]);
+            (words.words[0], words.frames)
+        };
+        // 4 · 10; + (4 · 13 − 40)/2; + (4 · −5 − 46)/4 = −16.5 rounds to −16; + (0 − 30)/4 = −7.5 to −7.
+        assert_eq!([10, 13, -5, 0].map(&mut after), [(40, 1), (46, 2), (30, 3), (23, 4)]);
+        assert_eq!([127; 4].map(&mut after).map(|(_, frames)| frames), [5, 6, 7, 7]);
+    }
+
+    /// A constant reading is held exactly from the first frame on; noise falls to σ²/(2^(k+1) − 1), where σ² is that of
+    /// the readings and twice that of rounding, 1/12 each.
+    #[test]
+    fn a_sliding_mean_has_the_stated_noise() {
+        let mut random = Random::new(22);
+        for (average, spread) in [(2, 0.0), (3, 1.0), (5, 4.0), (8, 30.0)] {
+            let taxels = 2000;
+            let prepare = Prepare { average, mean: MeanKind::Sliding, code_bits: 20, taxels, ..Prepare::default() };
+            let level = 1000.3;
+            let mut words = prepare.empty();
+            let most = most_frames(average);
+            for _ in 0..5 * most {
+                // Offsets that differ between taxels: the rounding of the converter is noise.
+                let reads = |taxel: usize| level + taxel as f64 / taxels as f64 + spread * random.normal();
+                let codes: Vec<i32> = (0..taxels).map(reads).map(|read| read.round() as i32).collect();
+                prepare.add(&mut words, &codes);
+            }
+            let off = |(taxel, word): (usize, &i32)| {
+                f64::from(*word) / f64::from(1 << average) - level - taxel as f64 / taxels as f64
+            };
+            let errors: Vec<f64> = words.words.iter().enumerate().map(off).collect();
+            let mean = errors.iter().sum::<f64>() / taxels as f64;
+            let variance = errors.iter().map(|error| error * error).sum::<f64>() / taxels as f64;
+            if spread == 0.0 {
+                assert!(errors.iter().all(|error| error.abs() <= 0.5), "constant readings");
+                continue;
+            }
+            let wanted = (spread * spread + 2.0 / 12.0) / most as f64;
+            // 2000 draws estimate a variance to √(2/2000) = 3 % and the mean to σ/√2000; four times that.
+            assert!((variance / wanted - 1.0).abs() < 0.13, "{average}: {variance} {wanted}");
+            assert!(mean.abs() < 4.0 * (wanted / taxels as f64).sqrt(), "{average}: {mean}");
+        }
     }
 }

@@ -28,6 +28,8 @@ pub const FLAG_FRAMING: u32 = 1 << 3;
 pub const FLAG_COEFFICIENTS: u32 = 1 << 4;
 /// Position of the paper's case number, 2 bits, among the flags; 0 where a scene has one case.
 pub const CASE_SHIFT: u32 = 8;
+/// Position of the number of frames in a sliding mean, 13 bits, among the flags; 0 where the mean does not slide.
+pub const FRAMES_SHIFT: u32 = 16;
 
 /// The decoded status of a subarray in one frame.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
@@ -35,7 +37,7 @@ pub struct Status {
     /// μ* in units of mu_max / 384.
     pub position: [i32; 2],
     /// OR of the `FLAG_*` bits; with several cases, also the paper's number of the chosen case from bit [`CASE_SHIFT`]
-    /// on.
+    /// on; with a sliding mean, the number of frames that it holds from bit [`FRAMES_SHIFT`] on.
     pub flags: u32,
     /// Score at μ* in LSBs of 2^−6 bit, 0 if the search found nothing.
     pub score: i32,

@@ -1,8 +1,10 @@
-//! Sums of 2^k frames, taxel by taxel.
+//! Sums of 2^k frames, taxel by taxel, or their sliding mean.
 
 use dermis_golden::fixed::plan::resources::Holds;
+use dermis_golden::scene::MeanKind;
 use rust_hdl::prelude::*;
 
+use super::sliding_mean;
 use crate::kernel_block;
 use crate::language::{Body, Builder, Contents, Kernel, Type};
 use crate::primitives::address::counter::count_bits;
@@ -15,9 +17,9 @@ use crate::wire::Wire;
 /// The sums have their own memory, so that frames arrive while the frame buffer is still being read. An early `tlast`
 /// in any of the frames restarts the sum; its partial sum leaves as a beat with `tlast`, at which `receive` drops the
 /// frame and sets `framing`. If `tlast` is missing in any of the frames, it is missing on the sum's last beat too. With
-/// k = 0 the stream passes through.
+/// k = 0 the stream passes through. [`sliding_mean`] describes the same block with a sliding mean.
 ///
-/// Latency two cycles; all registers advance together while the output is free.
+/// Latency two cycles, of a sliding mean three; all registers advance together while the output is free.
 #[derive(LogicBlock)]
 pub struct Average {
     /// Clock; registers change on its rising edge.
@@ -40,6 +42,8 @@ pub struct Average {
     pub m_axis_tready: Signal<In, Bit>,
     /// The beat is the last of the sums; valid with `m_axis_tvalid`.
     pub m_axis_tlast: Signal<Out, Bit>,
+    /// Number of frames in a sliding mean, up to 2^(k+1) − 1; valid with `m_axis_tvalid`. Otherwise one bit, 0.
+    pub frames: Wire<Out>,
     kernel: Body,
 }
 
@@ -47,12 +51,13 @@ kernel_block!(
     Average,
     clock clk,
     inputs [rst, s_axis_tdata, s_axis_tvalid, s_axis_tlast, m_axis_tready],
-    outputs [s_axis_tready, m_axis_tdata, m_axis_tvalid, m_axis_tlast]
+    outputs [s_axis_tready, m_axis_tdata, m_axis_tvalid, m_axis_tlast, frames]
 );
 
 impl Average {
-    /// Sums words of `bits` bits of `taxels` taxels over 2^`power` frames.
-    pub fn new(taxels: usize, bits: usize, power: u32) -> Self {
+    /// Sums words of `bits` bits of `taxels` taxels over 2^`power` frames, or gives 2^`power` times their sliding mean.
+    pub fn new(taxels: usize, bits: usize, power: u32, mean: MeanKind) -> Self {
+        let slides = mean == MeanKind::Sliding;
         let block = Average {
             clk: Default::default(),
             rst: Default::default(),
@@ -64,10 +69,16 @@ impl Average {
             m_axis_tvalid: Default::default(),
             m_axis_tready: Default::default(),
             m_axis_tlast: Default::default(),
+            frames: Wire::new(if slides { sliding_mean::frames_bits(power) } else { 1 }),
             kernel: Body::default(),
         };
         block.bind(match power {
-            0 => wires("average", bits, "No averaging: the stream passes through."),
+            _ if slides => sliding_mean::kernel(taxels, bits, power),
+            0 => {
+                let k = wires("average", bits, "No averaging: the stream passes through.");
+                k.wire("frames", k.constant(1, 0));
+                k.finish()
+            }
             _ => kernel(taxels, bits, power as usize),
         })
     }
@@ -120,6 +131,7 @@ fn kernel(taxels: usize, bits: usize, power: usize) -> Kernel {
         last_out.set(*held_last);
     });
     sums.write(moves & *held, *held_taxel, sum);
+    k.wire("frames", zero(1));
     k.finish()
 }
 
@@ -173,6 +185,7 @@ mod tests {
                 self.offered.map(|(sum, _)| Word::of_fields(&[sum], BITS + POWER as usize)),
                 self.offered.map(|(_, last)| Word::from(last)),
                 self.reset.then(|| Word::from(moves && !rst)),
+                Some(Word::from(0)),
             ]
         }
 
@@ -206,7 +219,7 @@ mod tests {
                 inputs
             })
             .collect();
-        let average = Average::new(TAXELS, BITS, POWER);
+        let average = Average::new(TAXELS, BITS, POWER, MeanKind::Block);
         check(average.kernel.kernel(), &stimulus, &mut Sums::default());
     }
 }

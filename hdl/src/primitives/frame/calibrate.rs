@@ -71,7 +71,7 @@ impl Calibrate {
             kernel: Body::default(),
         };
         block.bind(match zero {
-            None => wires("calibrate", bits, "No zero and no gain: the stream passes through."),
+            None => wires("calibrate", bits, "No zero and no gain: the stream passes through.").finish(),
             Some(zero) => kernel(zero, gain, taxels, bits),
         })
     }

@@ -1,7 +1,7 @@
 //! Force arithmetic: p(μ*) to force words, and the output beats with their status.
 
 use dermis_golden::fixed::plan::cycles::ACCEPT;
-use dermis_golden::fixed::stages::send::CASE_SHIFT;
+use dermis_golden::fixed::stages::send::{CASE_SHIFT, FRAMES_SHIFT};
 use dermis_golden::fixed::words::formats::{force_shift, FORCE_BITS, FORCE_SHIFT_MAX, MULTIPLIER_BITS, MU_ROUND};
 use dermis_golden::fixed::{CasePlan, Model};
 use rust_hdl::prelude::*;
@@ -12,6 +12,7 @@ use crate::primitives::address::case_counter::{largest, value_by_case};
 use crate::primitives::address::counter::count_bits;
 use crate::primitives::arithmetic::half_up::saturate;
 use crate::primitives::arithmetic::rescaler::SATURATION_BITS;
+use crate::primitives::frame::sliding_mean::frames_bits;
 use crate::primitives::output::frame_cycles::{COUNT_DELAY, CYCLE_BITS};
 use crate::primitives::pass::raw_length::shift_bits;
 use crate::primitives::search::sweep::position_bits;
@@ -64,6 +65,8 @@ pub struct ForceUnit {
     pub framing: Signal<In, Bit>,
     /// The coefficient signature is wrong, 1 bit; valid with `start`.
     pub damaged: Wire<In>,
+    /// Number of frames in a sliding mean, otherwise one bit, 0; valid with `start`.
+    pub frames: Wire<In>,
     /// Score of the best candidate, signed, 2^−6; valid with `start`.
     pub score: Wire<In>,
     /// Words saturated by `rescale`; valid with `start`.
@@ -84,7 +87,7 @@ kernel_block!(
     clock clk,
     inputs [
         rst, which, begin_frame, start, part, offer, beat, beat_part, lane, quad, position_x, position_y, normalise,
-        rescale, condition, found, framing, damaged, score, saturations, cycles,
+        rescale, condition, found, framing, damaged, frames, score, saturations, cycles,
     ],
     outputs [valid, last, beat_data]
 );
@@ -134,6 +137,8 @@ struct Shape {
     threshold: u64,
     /// The scene has the coefficient check.
     checks: bool,
+    /// Bits of the number of frames in a sliding mean; `None` where the mean does not slide.
+    frames_bits: Option<usize>,
     /// Subarrays and number of each case.
     counts: Vec<usize>,
     numbers: Vec<usize>,
@@ -157,6 +162,7 @@ impl ForceUnit {
             base_shift: force_shift(f, 0, 0).into(),
             threshold: model.threshold.clamp(0, 1 << WORD) as u64,
             checks: model.has_coefficient_check(),
+            frames_bits: model.prepare.slides().then(|| frames_bits(model.prepare.average)),
             counts: model.cases().iter().map(|case| case.parts.len()).collect(),
             numbers: model.cases().iter().map(number).collect(),
         };
@@ -181,6 +187,7 @@ impl ForceUnit {
             found: Default::default(),
             framing: Default::default(),
             damaged: Wire::new(1),
+            frames: Wire::new(shape.frames_bits.unwrap_or(1)),
             score: Wire::new(shape.score_bits),
             saturations: Wire::new(SATURATION_BITS),
             cycles: Wire::new(CYCLE_BITS),
@@ -248,6 +255,7 @@ impl Shape {
         let rescale = k.input("rescale", self.rescale_bits);
         let (condition, found) = (k.input("condition", 1), k.input("found", 1));
         let (framing, damaged) = (k.input("framing", 1), k.input("damaged", 1));
+        let frames = k.input("frames", self.frames_bits.unwrap_or(1));
         let score = k.input("score", self.score_bits).signed();
         let (saturations, cycles) = (k.input("saturations", SATURATION_BITS), k.input("cycles", CYCLE_BITS));
 
@@ -326,7 +334,14 @@ impl Shape {
         let start_count = force_saturations.extend(SATURATION_BITS + 1);
         let count = clips.fold(start_count, |count, clips| (count + clips).low(SATURATION_BITS + 1));
         let count = k.wire("count", count);
-        let case = value_by_case(&k, which, &self.numbers, WORD - CASE_SHIFT as usize);
+        let case = |below: u32| value_by_case(&k, which, &self.numbers, (below - CASE_SHIFT) as usize);
+        let case = match self.frames_bits {
+            None => case(FORCE_BITS),
+            Some(_) => {
+                let frames = kept.status("frames_held", frames).extend(WORD - FRAMES_SHIFT as usize);
+                frames.concat(case(FRAMES_SHIFT))
+            }
+        };
         let flags = [
             case,
             k.constant(CASE_SHIFT as usize - FLAGS, 0),

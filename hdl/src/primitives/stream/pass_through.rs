@@ -1,10 +1,10 @@
 //! A stage that the scene omits: its stream passes through on wires.
 
-use crate::language::{Builder, Kernel};
+use crate::language::Builder;
 
-/// The kernel of `block` that connects `m_axis` to `s_axis`, of `bits` bits each; `why` is a comment that says what is
+/// A kernel of `block` that connects `m_axis` to `s_axis`, of `bits` bits each; `why` is a comment that says what is
 /// omitted, on one line.
-pub fn wires(block: &str, bits: usize, why: &str) -> Kernel {
+pub fn wires(block: &str, bits: usize, why: &str) -> Builder {
     let k = Builder::new(block);
     k.comment(why);
     k.input("rst", 1);
@@ -13,5 +13,5 @@ pub fn wires(block: &str, bits: usize, why: &str) -> Kernel {
     for (from, to, bits) in streams.into_iter().chain(handshake) {
         k.wire(to, k.input(from, bits));
     }
-    k.finish()
+    k
 }

@@ -62,7 +62,8 @@ impl RegisterSlice {
         };
         block.bind(match wanted {
             true => kernel(bits),
-            false => wires("register_slice", bits, "No register slice: sender and receiver are placed close together."),
+            false => wires("register_slice", bits, "No register slice: sender and receiver are placed close together.")
+                .finish(),
         })
     }
 }

@@ -1,13 +1,15 @@
 //! Input frames of the experiments with the model's results: a scene's shipped frames and synthetic ones.
 
 use anyhow::Result;
+use dermis_golden::fixed::stages::prepare::Prepared;
 use dermis_golden::fixed::{Cycles, Model};
 use dermis_golden::frame::Frame;
 
 /// Largest number of shipped frames used.
 const SHIPPED: usize = 4;
 
-/// The codes of one reconstruction and the bit-true model's results.
+/// The codes of one reconstruction and the bit-true model's results; with a sliding mean those of the first frame after a
+/// reset.
 #[derive(Clone, Debug)]
 pub(crate) struct Sample {
     /// Codes of all frames in order, each row-major.
@@ -26,7 +28,13 @@ pub(crate) struct Sample {
 
 impl Sample {
     fn new(model: &Model, codes: Vec<i32>) -> Sample {
-        let trace = model.run(&codes);
+        Sample::after(model, codes, &mut model.prepare.empty())
+    }
+
+    /// With the results of `codes` after the frames in a sliding mean, which are then in it too.
+    pub(crate) fn after(model: &Model, codes: Vec<i32>, mean: &mut Prepared) -> Sample {
+        model.prepare.add(mean, &codes);
+        let trace = model.run_prepared(mean);
         let forces = trace.beats.len();
         let beats = [trace.beats, trace.status].concat();
         Sample {
@@ -36,6 +44,14 @@ impl Sample {
             forces,
             cycles: trace.cycles,
             beat_cycles: trace.beat_cycles,
+        }
+    }
+
+    /// The same codes as the second reconstruction after a reset, behind `first`.
+    pub(crate) fn behind(&self, model: &Model, first: &Sample) -> Sample {
+        match model.prepare.slides() {
+            false => self.clone(),
+            true => Sample::after(model, self.codes.clone(), &mut model.prepare.run(&first.codes)),
         }
     }
 
@@ -50,14 +66,14 @@ impl Sample {
 /// # Errors
 /// A frame of another sensor.
 pub(crate) fn shipped_samples(model: &Model, frames: &[Frame]) -> Result<Vec<Sample>> {
-    let whole = frames.chunks_exact(1 << model.scene.input.average).take(SHIPPED);
+    let whole = frames.chunks_exact(model.scene.input.frames_per_result()).take(SHIPPED);
     whole.map(|frames| Ok(Sample::new(model, model.readings(frames)?))).collect()
 }
 
 /// Synthetic samples: zeros, all codes at either end of their range, noise of two amplitudes, a single loaded taxel.
 pub(crate) fn synthetic_samples(model: &Model, random: &mut fastrand::Rng) -> Vec<Sample> {
     let taxels = model.scene.sensor.taxels();
-    let count = taxels << model.scene.input.average;
+    let count = taxels * model.scene.input.frames_per_result();
     let most = (1i32 << (model.formats().code_bits - 1)) - 1;
     let mut noise = |most: i32| (0..count).map(|_| random.i32(-most - 1..=most)).collect::<Vec<_>>();
     let alone = (0..count).map(|index| if index % taxels == taxels / 2 { most / 3 } else { 0 }).collect();

@@ -2,11 +2,14 @@
 //!
 //! A frame is complete with its last taxel. An earlier `tlast` drops the frame's codes; a missing `tlast` on the last
 //! taxel changes nothing. Both set [`FLAG_FRAMING`] in all subarrays of the next complete frame, which may be the same
-//! frame. A reset clears the flag.
+//! frame. A reset clears the flag. A sliding mean holds the complete frames since the last early `tlast` or reset.
 
+use std::borrow::Cow;
 use std::collections::VecDeque;
 
+use dermis_golden::fixed::stages::prepare::Prepared;
 use dermis_golden::fixed::stages::send::{FLAG_FRAMING, STATUS_BEATS};
+use dermis_golden::fixed::Model;
 
 use super::outcome::{Outcome, Violation};
 use super::samples::Sample;
@@ -17,8 +20,8 @@ const REPORTED_VIOLATIONS: usize = 8;
 const VIOLATION_LIMIT: u64 = 100;
 
 /// A complete frame that has not left yet.
-struct PendingFrame {
-    sample: usize,
+struct PendingFrame<'a> {
+    sample: Cow<'a, Sample>,
     flagged: bool,
     /// Cycle of its last code, if the cycles of its beats are checked.
     timed: Option<u64>,
@@ -26,21 +29,26 @@ struct PendingFrame {
 
 /// Input beats accepted so far and output beats due.
 pub(super) struct Scoreboard<'a> {
+    model: &'a Model,
     samples: &'a [Sample],
+    /// The frames in a sliding mean.
+    mean: Prepared,
     /// Codes accepted of the current frame.
     accepted: usize,
     /// Whether a `tlast` was wrong since the last complete frame.
     framing_error: bool,
-    pending: VecDeque<PendingFrame>,
+    pending: VecDeque<PendingFrame<'a>>,
     /// Beats delivered of the oldest pending frame.
     delivered: usize,
     pub(super) outcome: Outcome,
 }
 
 impl<'a> Scoreboard<'a> {
-    pub(super) fn new(samples: &'a [Sample]) -> Self {
+    pub(super) fn new(model: &'a Model, samples: &'a [Sample]) -> Self {
         Scoreboard {
+            model,
             samples,
+            mean: model.prepare.empty(),
             accepted: 0,
             framing_error: false,
             pending: VecDeque::new(),
@@ -76,10 +84,15 @@ impl<'a> Scoreboard<'a> {
         if last && !at_end {
             self.outcome.cut += 1;
             self.accepted = 0;
+            self.mean = self.model.prepare.empty();
         }
         if at_end && self.accepted == codes.len() {
             self.outcome.frames_in += 1;
             let flagged = std::mem::take(&mut self.framing_error);
+            let sample = match self.model.prepare.slides() {
+                false => Cow::Borrowed(&self.samples[sample]),
+                true => Cow::Owned(Sample::after(self.model, codes.clone(), &mut self.mean)),
+            };
             self.pending.push_back(PendingFrame { sample, flagged, timed: alone.then_some(cycle) });
             self.accepted = 0;
         }
@@ -90,7 +103,7 @@ impl<'a> Scoreboard<'a> {
         let Some(frame) = self.pending.front() else {
             return self.violate(cycle, "an output beat without a frame".to_owned());
         };
-        let Sample { beats, forces, beat_cycles, .. } = &self.samples[frame.sample];
+        let Sample { beats, forces, beat_cycles, .. } = &*frame.sample;
         let (index, flagged) = (self.delivered, frame.flagged);
         let due = frame.timed.map(|at| at + beat_cycles[index]);
         let timed = due.is_some();
@@ -122,6 +135,7 @@ impl<'a> Scoreboard<'a> {
     pub(super) fn reset(&mut self) {
         self.outcome.frames_in -= self.pending.len() as u64;
         (self.accepted, self.delivered, self.framing_error) = (0, 0, false);
+        self.mean = self.model.prepare.empty();
         self.pending.clear();
     }
 }

@@ -1,5 +1,6 @@
 //! Test bench of the stress experiments: a device between sender and receiver, checked in every cycle.
 
+use dermis_golden::fixed::Model;
 use dermis_hdl::device::{Device, Inputs};
 
 use super::super::drive::{StabilityCheck, STABILITY_RULE};
@@ -72,9 +73,9 @@ pub(crate) struct Testbench<'a> {
 }
 
 impl<'a> Testbench<'a> {
-    pub(crate) fn new(device: &'a mut dyn Device, samples: &'a [Sample]) -> Self {
+    pub(crate) fn new(device: &'a mut dyn Device, model: &'a Model, samples: &'a [Sample]) -> Self {
         let longest = samples.iter().map(|sample| sample.cycles.total).max().unwrap_or(0);
-        let scoreboard = Scoreboard::new(samples);
+        let scoreboard = Scoreboard::new(model, samples);
         let watchdog = WATCHDOG + 4 * longest;
         Testbench {
             device,

@@ -37,6 +37,7 @@ struct Part {
     condition: bool,
     found: bool,
     damaged: bool,
+    frames: u32,
     score: i32,
     saturations: u32,
 }
@@ -77,8 +78,9 @@ impl Requests {
             condition,
             found,
             damaged: damaged && self.model.has_coefficient_check(),
-            score: if found { inputs[18].signed(0, self.model.formats().score_bits as usize) as i32 } else { 0 },
-            saturations: inputs[19].number() as u32,
+            frames: if self.model.prepare.slides() { inputs[18].number() as u32 } else { 0 },
+            score: if found { inputs[19].signed(0, self.model.formats().score_bits as usize) as i32 } else { 0 },
+            saturations: inputs[20].number() as u32,
         };
     }
 
@@ -103,7 +105,8 @@ impl Requests {
                     | flag(!frame.contact, FLAG_NO_CONTACT)
                     | flag(inputs[16].number() == 1, FLAG_FRAMING)
                     | flag(part.damaged, FLAG_COEFFICIENTS)
-                    | number << CASE_SHIFT;
+                    | number << CASE_SHIFT
+                    | part.frames << FRAMES_SHIFT;
                 let position = if self.model.searches() { part.position } else { [0; 2] };
                 [position[0], position[1], flags as i32]
             }
@@ -130,7 +133,7 @@ impl Reference for Requests {
         }
         self.output = self.pipe.pop_back().unwrap().map(|entry| {
             if std::mem::take(&mut self.frame.counting) {
-                self.frame.cycles = (inputs[20].number() as u32 + UNCOUNTED) % (1 << CYCLE_BITS);
+                self.frame.cycles = (inputs[21].number() as u32 + UNCOUNTED) % (1 << CYCLE_BITS);
             }
             let words = self.answer(entry, inputs).map(i64::from);
             let ends = self.model.cases()[inputs[1].number() as usize].parts.len();
@@ -187,6 +190,7 @@ fn stimulus(model: &Model, block: &ForceUnit, cycles: usize) -> Vec<Vec<Word>> {
             random.bool().into(),
             random.bool().into(),
             random.bool().into(),
+            random_word(&mut random, block.frames.width()),
             random_word(&mut random, block.score.width()),
             random_word(&mut random, SATURATION_BITS),
             random_word(&mut random, CYCLE_BITS),
@@ -206,6 +210,8 @@ fn is_the_model_s(side: usize, more: &str, threshold: i64) {
 fn beats_are_those_of_the_model() {
     is_the_model_s(4, "[search]\nmu_max = 0.05\n[partition]\nrows = 2\ncols = 1\n", 1000);
     is_the_model_s(4, "[search]\nmu_max = 0.0\n", 0);
+    let sliding = "[input]\naverage = 3\nmean = \"sliding\"\n";
+    is_the_model_s(4, &format!("[search]\nmu_max = 0.05\n{sliding}[partition]\nrows = 2\ncols = 1\n"), 1000);
     let cases = "[search]\nmu_max = 0.1\ndegree = 1\n[partition]\ncases = [0, 1, 3]\n";
     is_the_model_s(8, &format!("{cases}[hardware]\ncoefficient_check = \"signature\"\n"), 1 << 20);
 }

@@ -1,0 +1,196 @@
+//! The kernel of [`Average`](super::average::Average) with a sliding mean: every frame gives 2^k times the mean of the
+//! frames so far, in which older ones fade.
+//!
+//! ```text
+//! s_axis --> read mean, hold word --> (2^k word − mean) >> g --> add, round --> memory and m_axis
+//! ```
+//! g grows with the number of frames ([`gain_shift`]), so that the first frame after a reset is its own mean. An early
+//! `tlast` leaves with its beat, at which `receive` drops the frame; some taxels hold its words by then, so the mean
+//! starts again with the next frame. A missing `tlast` is missing behind the mean too, and changes nothing else.
+
+use dermis_golden::fixed::plan::resources::Holds;
+use dermis_golden::input::sliding::gain_shift;
+
+use crate::language::{Builder, Contents, Expr, Kernel, Type};
+use crate::primitives::address::counter::count_bits;
+
+/// Width of the number of frames in the mean, which stops where all its bits are set.
+pub fn frames_bits(power: u32) -> usize {
+    power as usize + 1
+}
+
+/// For words of `bits` bits of `taxels` taxels, at least three; the last gain is 2^−`power`.
+pub fn kernel(taxels: usize, bits: usize, power: u32) -> Kernel {
+    let k = Builder::new("average");
+    let (bit, index, wide) = (Type::unsigned(1), Type::unsigned(count_bits(taxels)), bits + power as usize);
+    let (shift, count) = (Type::unsigned(count_bits(power as usize + 1)), Type::unsigned(frames_bits(power)));
+    let (rst, data) = (k.input("rst", 1), k.input("s_axis_tdata", bits));
+    let [offered, tlast, ready] = ["s_axis_tvalid", "s_axis_tlast", "m_axis_tready"].map(|name| k.input(name, 1));
+    let means = k.memory("means", taxels, wide, Contents::Undefined).holds(Holds::Average);
+    k.comment("Place of the next word, g of its frame, whole frames in the mean.");
+    let taxel = k.state("taxel", index, rst, 0);
+    let gain = k.state("gain", shift, rst, 0);
+    let whole = k.state("whole", count, rst, 0);
+    let [held, added, valid] = ["held", "added", "m_axis_tvalid"].map(|name| k.state(name, bit, rst, 0));
+    let (word, sofar) = (k.register("word", Type::signed(bits)), k.register("sofar", Type::signed(wide)));
+    let (held_taxel, added_taxel) = (k.register("held_taxel", index), k.register("added_taxel", index));
+    let held_gain = k.register("held_gain", shift);
+    let [held_last, added_last, last_out] =
+        ["held_last", "added_last", "m_axis_tlast"].map(|name| k.register(name, bit));
+    let [held_frames, added_frames, frames] =
+        ["held_frames", "added_frames", "frames"].map(|name| k.register(name, count));
+    let (mean, mean_out) = (k.register("mean", Type::signed(wide)), k.register("m_axis_tdata", Type::unsigned(wide)));
+    let moved = k.register("moved", Type::signed(wide + 2));
+
+    let at_end = k.wire("at_end", taxel.is(taxels as u64 - 1));
+    let early = k.wire("early", tlast & !at_end);
+    let next = k.wire("next", whole.all().mux(*whole, whole.plus(1)));
+    let rises = k.wire("rises", rises(&k, *whole, power));
+    k.comment("Of the first frame nothing has been stored.");
+    let stored = k.wire("stored", held_gain.is(0).mux(k.signed_constant(wide, 0), *sofar));
+    let difference = word.shift_left(power as usize) - stored;
+    let half = (mean.unsigned().concat(k.constant(1, 1)).signed() + *moved).slice(1, wide);
+    let result = k.wire("result", half);
+    let moves = k.wire("moves", !*valid | ready);
+    k.wire("s_axis_tready", moves & !rst);
+    k.when(moves, || {
+        k.when(offered, || {
+            taxel.set((early | at_end).mux(k.constant(taxel.bits(), 0), taxel.plus(1)));
+            k.when(at_end, || {
+                whole.set(next);
+                gain.set((*gain + rises).low(gain.bits()));
+            });
+            k.when(early, || {
+                whole.set(k.constant(whole.bits(), 0));
+                gain.set(k.constant(gain.bits(), 0));
+            });
+        });
+        held.set(offered);
+        word.set(data.signed());
+        sofar.set(means.read(*taxel).signed());
+        held_taxel.set(*taxel);
+        held_gain.set(*gain);
+        held_last.set(tlast);
+        held_frames.set(next);
+        added.set(*held);
+        mean.set(stored);
+        moved.set(difference.shift_left(1).shift_right_by(*held_gain));
+        added_taxel.set(*held_taxel);
+        added_last.set(*held_last);
+        added_frames.set(*held_frames);
+        valid.set(*added);
+        mean_out.set(result);
+        last_out.set(*added_last);
+        frames.set(*added_frames);
+    });
+    means.write(moves & *added, *added_taxel, result);
+    k.finish()
+}
+
+/// Whether g grows by one from the frame after `whole` frames to the frame after that.
+fn rises<'k>(k: &'k Builder, whole: Expr<'k>, power: u32) -> Expr<'k> {
+    let grows = |whole: &usize| gain_shift(whole + 2, power) > gain_shift(whole + 1, power);
+    (0..1 << power).filter(grows).fold(k.constant(1, 0), |any, number| any | whole.is(number as u64))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::language::testbench::{check, random_word, Reference};
+    use crate::wire::Word;
+
+    const TAXELS: usize = 4;
+    const BITS: usize = 9;
+
+    /// A word on its way through the block: mean, `tlast`, number of frames.
+    type Beat = (i64, bool, u64);
+
+    /// Means, the taxel and number of the next word's frame, the beats in the block, the first to leave last.
+    struct Means {
+        power: u32,
+        means: [i64; TAXELS],
+        taxel: usize,
+        frames: u64,
+        inside: [Option<Beat>; 3],
+        reset: bool,
+    }
+
+    impl Means {
+        fn new(power: u32) -> Self {
+            Means { power, means: [0; TAXELS], taxel: 0, frames: 0, inside: [None; 3], reset: false }
+        }
+
+        fn add(&mut self, word: i64, tlast: bool) -> Beat {
+            let number = self.frames + 1;
+            // The power of two nearest to the number, of two the larger.
+            let far = |shift: &u32| (1i64 << shift).abs_diff(number as i64);
+            let shift = (0..=self.power).rev().min_by_key(far).unwrap();
+            let mean = self.means[self.taxel];
+            let twice = 2 * ((word << self.power) - mean);
+            let mean = if number == 1 { word << self.power } else { mean + ((twice >> shift) + 1).div_euclid(2) };
+            self.means[self.taxel] = mean;
+            let whole = self.taxel + 1 == TAXELS;
+            self.taxel = if whole || tlast { 0 } else { self.taxel + 1 };
+            let most = (2 << self.power) - 1;
+            if whole {
+                self.frames += 1;
+            } else if tlast {
+                self.frames = 0;
+            }
+            (mean, tlast, number.min(most))
+        }
+
+        fn moves(&self, ready: bool) -> bool {
+            self.inside[2].is_none() || ready
+        }
+    }
+
+    impl Reference for Means {
+        fn outputs(&mut self, inputs: &[Word]) -> Vec<Option<Word>> {
+            let [rst, ready] = [0, 4].map(|k| inputs[k].number() == 1);
+            let beat = self.inside[2];
+            vec![
+                self.reset.then(|| Word::from(beat.is_some())),
+                beat.map(|(_, last, _)| Word::from(last)),
+                beat.map(|(.., frames)| Word::from(frames)),
+                beat.map(|(mean, ..)| Word::of_fields(&[mean], BITS + self.power as usize)),
+                self.reset.then(|| Word::from(self.moves(ready) && !rst)),
+            ]
+        }
+
+        fn clock(&mut self, inputs: &[Word]) {
+            let [rst, valid, tlast, ready] = [0, 2, 3, 4].map(|k| inputs[k].number() == 1);
+            if self.moves(ready) {
+                let taken = (valid && !rst).then(|| self.add(inputs[1].signed(0, BITS), tlast));
+                self.inside = [taken, self.inside[0], self.inside[1]];
+            }
+            if rst {
+                *self = Means { means: self.means, reset: true, ..Means::new(self.power) };
+            }
+        }
+    }
+
+    /// Stalls on both sides, resets, early and missing `tlast`; most runs of frames are long enough for the last gain.
+    #[test]
+    fn every_frame_gives_the_mean_so_far() {
+        for power in [1, 2, 4] {
+            let mut random = fastrand::Rng::with_seed(power.into());
+            let mut means = Means::new(power);
+            let mut most = 0;
+            let stimulus: Vec<Vec<Word>> = (0..6000)
+                .map(|cycle| {
+                    let rst = cycle < 3 || random.u16(..900) == 0;
+                    let tlast = if random.u8(..200) == 0 { random.bool() } else { means.taxel + 1 == TAXELS };
+                    let word = random_word(&mut random, BITS);
+                    let [offered, ready] = [(); 2].map(|()| Word::from(random.u8(..8) > 0));
+                    let inputs = vec![rst.into(), word, offered, tlast.into(), ready];
+                    means.clock(&inputs);
+                    most = most.max(means.frames);
+                    inputs
+                })
+                .collect();
+            assert!(most > 2 << power, "{most} frames");
+            check(&kernel(TAXELS, BITS, power), &stimulus, &mut Means::new(power));
+        }
+    }
+}
