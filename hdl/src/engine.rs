@@ -388,7 +388,8 @@ impl Logic for Engine {
         self.searched_damaged.keep.next = self.handed.q.val();
         self.searched_damaged.word.next = self.pass.damaged.val();
 
-        comment!("Frames in the sliding mean: of the frame received, in the passes, searched");
+        comment!("Frames in a sliding mean follow their frame:");
+        comment!("received, in the passes, searched");
         self.received_frames.keep.next = self.receive.accept.val();
         self.received_frames.word.next = self.prepare.frames.val();
         self.frame_frames.keep.next = self.begin_frame.val();

@@ -65,6 +65,22 @@ fn the_search_width_costs_what_two_builds_differ_by() {
     }
 }
 
+/// Against a block of as many frames; without any averaging, what the shortest sliding mean would cost.
+#[test]
+fn a_sliding_mean_costs_what_two_builds_differ_by() {
+    let input = |mean: &str| model(&format!("[fixed]\nlanes = 36\n[input]\naverage = 3\nmean = \"{mean}\"\n"));
+    let (sliding, block) = (input("sliding"), input("block"));
+    let [with, without] = [&sliding, &block].map(|model| total(&generate(model).unwrap().usage));
+    let of = |model: &Model| explain(model).unwrap().into_iter().find(|e| e.feature == "sliding mean").unwrap();
+    assert!(of(&sliding).present && !of(&block).present);
+    for costs in [of(&sliding).costs.unwrap(), of(&block).saved.unwrap()] {
+        assert_eq!(costs.luts, with.luts as i64 - without.luts as i64);
+        assert_eq!((costs.block_rams, costs.cycles), (0, 1));
+        assert!((50..400).contains(&costs.luts), "{costs:?}");
+    }
+    assert!(saved("[fixed]\nlanes = 36\n", "sliding mean")[0] > 0);
+}
+
 #[test]
 fn what_the_scene_has_is_not_left_out() {
     let all = explain(&model("[input]\naverage = 2\nfull_scale_MPa = 1.0\n[threshold]\nmin_force_N = 0.1\n")).unwrap();
@@ -76,9 +92,11 @@ fn what_the_scene_has_is_not_left_out() {
 fn absent_stages_leave_no_logic() {
     let verilog = |more: &str| verilog_code(&model(more).scene);
     let bare = verilog("[search]\nmu_max = 0\n");
-    for word in ["taylor", "candidates", "sums [", "entries [", "x__mu [", "below <="] {
+    for word in ["taylor", "candidates", "sums [", "means [", "frames_held [", "entries [", "x__mu [", "below <="] {
         assert!(!bare.contains(word), "{word}");
     }
+    let sliding = verilog("[search]\nmu_max = 0\n[input]\naverage = 2\nmean = \"sliding\"\n");
+    assert!(sliding.contains("means [") && sliding.contains("frames_held ["));
     let full = verilog("[input]\naverage = 2\nfull_scale_MPa = 1.0\n[threshold]\nmin_force_N = 0.1\n");
     for word in ["taylor", "candidates", "sums [", "x__mu [", "below <="] {
         assert!(full.contains(word), "{word}");

@@ -29,8 +29,8 @@ fn block_rams_and_multipliers_are_those_of_yosys() {
     let models = [
         // ROMs of the input options, sums of frames, no search.
         small("no-search", "[search]\nmu_max = 0\n[fixed]\nlanes = 16\n[input]\naverage = 2\n"),
-        // Six subarrays, groups of rows, a list of columns.
-        small("partition", "[partition]\nrows = 2\ncols = 3\n[fixed]\nlanes = 16\nprune_bits = 10\n"),
+        // Six subarrays, groups of rows, a list of columns, a sliding mean.
+        small("partition", "[partition]\nrows = 2\ncols = 3\n[fixed]\nlanes = 16\nprune_bits = 10\n[input]\naverage = 3\nmean = \"sliding\"\n"),
         // Three flips more of every matrix, columns left out.
         small(
             "dead",

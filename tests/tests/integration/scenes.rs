@@ -13,7 +13,7 @@ use dermis_tests::{assert_equal, build_dir, compare};
 use proptest::prelude::*;
 
 /// Name, and the difference from a default scene of 6×6 taxels.
-const SCENES: [(&str, &str); 14] = [
+const SCENES: [(&str, &str); 16] = [
     // One quad: a longer pause between accumulations.
     ("2x2", "[sensor]\nrows = 2\ncols = 2\npitch_x_mm = 4.0\npitch_y_mm = 4.0\nthickness_mm = 3.0\n"),
     // Two quads: sweeps shorter than the pipeline that follows them.
@@ -30,6 +30,17 @@ const SCENES: [(&str, &str); 14] = [
     ("resultants", "[output]\nforces = \"resultants\"\n[partition]\nrows = 3\ncols = 2\n"),
     // Sums of two frames, which overflow no word.
     ("averaged", "[input]\naverage = 1\n"),
+    // A sliding mean of as few taxels as there can be: a word is read again soon after it was written.
+    (
+        "sliding",
+        "[sensor]\nrows = 2\ncols = 2\npitch_x_mm = 4.0\npitch_y_mm = 4.0\nthickness_mm = 3.0\n[input]\naverage = 2\n\
+         mean = \"sliding\"\n",
+    ),
+    // The same in the status of several subarrays.
+    (
+        "sliding-resultants",
+        "[input]\naverage = 1\nmean = \"sliding\"\n[output]\nforces = \"resultants\"\n[partition]\nrows = 3\ncols = 2\n",
+    ),
     // No search, in two subarrays.
     ("no-search", "[search]\nmu_max = 0\n[partition]\ncase = 2\n"),
     // No limbs, the smallest words.

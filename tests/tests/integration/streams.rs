@@ -74,6 +74,9 @@ fn a_choice_of_cases_recovers() {
 fn sums_without_a_search_and_averaged_frames_recover() {
     let averaged = "[search]\nmu_max = 0.0\n[input]\naverage = 1\n";
     check(&small(4, 4, averaged), &[], 100_000);
+    // The mean starts again after a reset and after a frame cut short.
+    let sliding = "[search]\nmu_max = 0.0\n[input]\naverage = 2\nmean = \"sliding\"\n";
+    check(&small(4, 4, sliding), &[], 100_000);
     let sums = check(&unsearched(), &[], 200_000);
     assert_eq!(sums[2].resets, sums[2].possible_reset_cycles);
 }
