@@ -4,7 +4,7 @@ use super::*;
 use crate::float::Golden;
 use crate::generator::converter::Converter;
 use crate::reconstruct::Reconstruction;
-use crate::scene::{ForceOutput, Scene};
+use crate::scene::{ForceOutput, MeanKind, Scene};
 use crate::sensor::Sensor;
 
 fn scene(name: &str) -> Scene {
@@ -140,6 +140,39 @@ fn averages_lower_the_noise_by_the_root_of_their_count() {
     assert!((deviation / 0.00125 - 1.0).abs() < 0.28, "{deviation}");
     let error = Golden::new(&scene.for_hardware()).unwrap().run_averaged(&frames[1..]).unwrap_err().to_string();
     assert_eq!(error, "scene sensor-1: input.average = 6 takes 64 frames at a time, got 63");
+    assert!(input.average(&scene, &[]).is_err());
+}
+
+/// Of 15 frames, at which the count stops, and of fewer; the result has the last frame's name and the count.
+#[test]
+fn a_sliding_mean_has_the_noise_of_its_frames() {
+    let mut scene = scene("sensor-1");
+    (scene.input.average, scene.input.mean) = (3, MeanKind::Sliding);
+    scene.search.noise_floor_MPa = 1e-3;
+    let input = Input::new(&scene).unwrap();
+    let frame = hertz();
+    let noisy = |seed| Converter { noise: 0.01, seed, ..Default::default() }.convert(&frame).unwrap();
+    let frames: Vec<Frame> = (0..40).map(noisy).collect();
+    assert_eq!(input.average(&scene, &frames[..1]).unwrap(), frames[0]);
+    let constant = vec![frame.clone(); 20];
+    let near = |(a, b): (&f64, &f64)| (a - b).abs() <= 1e-15;
+    assert!(input.average(&scene, &constant).unwrap().stress_MPa.iter().zip(&frame.stress_MPa).all(near));
+    for (count, variance) in [(2, 0.5), (3, 0.34375), (40, 1.0 / 15.0)] {
+        let mean = input.average(&scene, &frames[..count]).unwrap();
+        let squares = mean.stress_MPa.iter().zip(&frame.stress_MPa).map(|(a, b)| (a - b).powi(2)).sum::<f64>();
+        let deviation = (squares / 100.0).sqrt() / frame.peak_MPa();
+        // 100 draws estimate a deviation to 1/√200 = 7 %; four times that.
+        assert!((deviation / (0.01 * f64::sqrt(variance)) - 1.0).abs() < 0.28, "{count}: {deviation}");
+        assert!((input.noise_of_mean_MPa(count) / (1e-3 * f64::sqrt(variance)) - 1.0).abs() < 0.01, "{count}");
+    }
+    let mut newest = frames.clone();
+    newest[39].id = "newest".to_string();
+    let golden = Golden::new(&scene.for_hardware()).unwrap();
+    let model = Model::for_frames(&scene, &newest).unwrap();
+    for result in [golden.run_averaged(&newest).unwrap(), model.reconstruct_averaged(&newest).unwrap()] {
+        assert_eq!((result.frame.as_str(), result.extra.mean_frames), ("newest", Some(15)));
+    }
+    assert_eq!(golden.run_averaged(&newest[..4]).unwrap().extra.mean_frames, Some(4));
     assert!(input.average(&scene, &[]).is_err());
 }
 

@@ -7,6 +7,7 @@
 //! | `stream.v`: an offered beat stays valid and unchanged | `prepare`, `resultants`, the link's relay |
 //! | `calibrate.v`: each beat leaves once, in order, saturated | `calibrate` |
 //! | `average.v`: as many sums as taxels, tlast on the last | `average` |
+//! | `sliding_mean.v`: each beat leaves once, with tlast and the number of frames | `average` with a sliding mean |
 //! | `receive.v`: a frame is stored completely at its address; tlast is checked; dead taxels become 0 | `receive` |
 //! | `send.v`: a frame has all its beats, none is sent outside a frame | `send`, `force` |
 //! | `queue.v`: beats leave in order and unchanged, an offered beat stays | `force`'s queue |
@@ -112,6 +113,19 @@ fn average_gives_as_many_sums_as_taxels() {
     let defects =
         vec![Change::within("prepare__average", "m_axis_tvalid", |k| [k.named("held_leaves"), k.constant(1, 1)])];
     Proof { hardware, property: "average.v", given, defects, open_products: false }.run();
+}
+
+#[test]
+fn a_sliding_mean_loses_nothing_and_counts_its_frames() {
+    let model = model("[input]\naverage = 1\nmean = \"sliding\"\n");
+    let given = vec![("BITS", number(8)), ("LAST", number(ROWS * COLS - 1))];
+    // A stall is ignored; the count starts again after its largest number.
+    let defects = vec![
+        Change::value("prepare__average", "moves", |k| k.constant(1, 1)),
+        Change::value("prepare__average", "next", |k| k.named("whole").plus(1)),
+    ];
+    let hardware = Hardware::Engine(&model);
+    Proof { hardware, property: "sliding_mean.v", given, defects, open_products: false }.run();
 }
 
 #[test]
