@@ -1,6 +1,7 @@
 //! Input options on frames with known forces, and invalid tables.
 
 use super::*;
+use crate::fixed::Model;
 use crate::float::Golden;
 use crate::generator::converter::Converter;
 use crate::reconstruct::Reconstruction;

@@ -17,7 +17,7 @@ use crate::wire::Wire;
 /// The sums have their own memory, so that frames arrive while the frame buffer is still being read. An early `tlast`
 /// in any of the frames restarts the sum; its partial sum leaves as a beat with `tlast`, at which `receive` drops the
 /// frame and sets `framing`. If `tlast` is missing in any of the frames, it is missing on the sum's last beat too. With
-/// k = 0 the stream passes through. [`sliding_mean`] describes the same block with a sliding mean.
+/// k = 0 the stream passes through. Module `sliding_mean` has the kernel of a sliding mean.
 ///
 /// Latency two cycles, of a sliding mean three; all registers advance together while the output is free.
 #[derive(LogicBlock)]

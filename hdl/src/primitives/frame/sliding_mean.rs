@@ -90,5 +90,6 @@ pub fn kernel(taxels: usize, bits: usize, power: u32) -> Kernel {
 /// Whether g grows by one from the frame after `whole` frames to the frame after that.
 fn rises<'k>(k: &'k Builder, whole: Expr<'k>, power: u32) -> Expr<'k> {
     let grows = |whole: &usize| gain_shift(whole + 2, power) > gain_shift(whole + 1, power);
-    (0..1 << power).filter(grows).fold(k.constant(1, 0), |any, number| any | whole.is(number as u64))
+    let numbers = (0..1 << power).filter(grows).map(|number| whole.is(number as u64));
+    numbers.reduce(|any, one| any | one).unwrap_or(k.constant(1, 0))
 }
