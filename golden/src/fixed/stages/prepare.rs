@@ -3,7 +3,7 @@
 //! ```text
 //! code ── calibrate ── average ── receive        s = ⌊gain·(code − zero) / 2^16 + 1/2⌋,  held to code_bits
 //!         zero, gain    Σ of 2^k frames           b = Σ s: k bits more, the same full scale
-//!                       or sliding mean           b ← b + ⌊(2^k s − b) / 2^g + 1/2⌋: likewise
+//!                       or sliding mean           b ← b + ⌊(2^k s − b − c) / 2^g + 1/2⌋: likewise
 //! ```
 //! | word | bits | LSB |
 //! |---|---|---|
@@ -15,13 +15,14 @@
 //!
 //! Without a table the gain is 1 and nothing is multiplied. Each sample is rounded once; the sum keeps all its bits. A
 //! sliding mean ([`sliding`], with g) is rounded to its k more bits with every frame, which adds as much noise as the
-//! converter's own rounding; the first frame, and constant readings from then on, it holds exactly.
+//! converter's own rounding; the first frame, and constant readings from then on, it holds exactly. c is 1 in every second
+//! frame, which rounds halves down in place of up, so that they do not add up to a bias.
 
 use crate::fixed::error::FixedError;
 use crate::fixed::words::arith::{round_shift, saturate};
 use crate::frame::FrameError;
 use crate::input::calibration::Calibration;
-use crate::input::sliding::{gain_shift, most_frames};
+use crate::input::sliding::gain_shift;
 use crate::input::tare::Tare;
 use crate::input::InputError;
 use crate::quantise::{largest_code, quantise};
@@ -54,7 +55,7 @@ pub struct Prepare {
 pub struct Prepared {
     /// A word per taxel, row-major.
     pub words: Vec<i32>,
-    /// Number of frames in them; of a sliding mean it stops at [`most_frames`].
+    /// Number of frames in them.
     pub frames: usize,
 }
 
@@ -133,19 +134,17 @@ impl Prepare {
                 MeanKind::Block => None,
                 MeanKind::Sliding => Some(gain_shift(prepared.frames + 1, self.average)),
             };
+            let half_down = (prepared.frames % 2) as i64;
             for (taxel, (word, &code)) in prepared.words.iter_mut().zip(frame).enumerate() {
                 let sample = self.calibrate(taxel, code);
                 let added = match shift {
                     None => sample,
-                    Some(shift) => round_shift((sample << self.average) - i64::from(*word), shift),
+                    Some(shift) => round_shift((sample << self.average) - i64::from(*word) - half_down, shift),
                 };
                 // A sum, or a word between two of `input_bits`, which the formats hold below 32.
                 *word += added as i32;
             }
             prepared.frames += 1;
-            if self.slides() {
-                prepared.frames = prepared.frames.min(most_frames(self.average));
-            }
         }
     }
 
@@ -180,6 +179,7 @@ impl Prepare {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::input::sliding::most_frames;
     use crate::random::Random;
 
     #[test]
@@ -202,9 +202,8 @@ mod tests {
             sliding.add(&mut words, &[code]);
             (words.words[0], words.frames)
         };
-        // 4 · 10; + (4 · 13 − 40)/2; + (4 · −5 − 46)/4 = −16.5 rounds to −16; + (0 − 30)/4 = −7.5 to −7.
-        assert_eq!([10, 13, -5, 0].map(&mut after), [(40, 1), (46, 2), (30, 3), (23, 4)]);
-        assert_eq!([127; 4].map(&mut after).map(|(_, frames)| frames), [5, 6, 7, 7]);
+        // 4 · 10; + (4 · 13 − 40 − 1)/2 = 5.5 to 6; + (4 · −5 − 46)/4 = −16.5 rounds to −16; + (0 − 30 − 1)/4 = −7.75 to −8.
+        assert_eq!([10, 13, -5, 0].map(&mut after), [(40, 1), (46, 2), (30, 3), (22, 4)]);
     }
 
     /// Noise falls to σ²/(2^(k+1) − 1), where σ² is that of the readings and twice that of rounding, 1/12 each.

@@ -2,9 +2,10 @@
 //! frames so far, in which older ones fade.
 //!
 //! ```text
-//! s_axis --> read mean, hold word --> (2^k word − mean) >> g --> add, round --> memory and m_axis
+//! s_axis --> read mean, hold word --> (2^k word − mean − c) >> g --> add, round --> memory and m_axis
 //! ```
-//! g grows with the number of frames ([`gain_shift`]), so that the first frame after a reset is its own mean. An early
+//! g grows with the number of frames ([`gain_shift`]), so that the first frame after a reset is its own mean. c is 1 in
+//! every second frame: halves are rounded up and down in turn. An early
 //! `tlast` leaves with its beat, at which `receive` drops the frame; some taxels hold its words by then, so the mean
 //! starts again with the next frame. A missing `tlast` is missing behind the mean too, and changes nothing else.
 
@@ -27,14 +28,16 @@ pub fn kernel(taxels: usize, bits: usize, power: u32) -> Kernel {
     let (rst, data) = (k.input("rst", 1), k.input("s_axis_tdata", bits));
     let [offered, tlast, ready] = ["s_axis_tvalid", "s_axis_tlast", "m_axis_tready"].map(|name| k.input(name, 1));
     let means = k.memory("means", taxels, wide, Contents::Undefined).holds(Holds::Average);
-    k.comment("Place of the next word, g of its frame, whole frames in the mean.");
+    k.comment("Place of the next word, g and c of its frame, whole frames in the mean.");
     let taxel = k.state("taxel", index, rst, 0);
     let gain = k.state("gain", shift, rst, 0);
+    let odd = k.state("odd", bit, rst, 0);
     let whole = k.state("whole", count, rst, 0);
     let [held, added, valid] = ["held", "added", "m_axis_tvalid"].map(|name| k.state(name, bit, rst, 0));
     let (word, sofar) = (k.register("word", Type::signed(bits)), k.register("sofar", Type::signed(wide)));
     let (held_taxel, added_taxel) = (k.register("held_taxel", index), k.register("added_taxel", index));
     let held_gain = k.register("held_gain", shift);
+    let held_odd = k.register("held_odd", bit);
     let [held_last, added_last, last_out] =
         ["held_last", "added_last", "m_axis_tlast"].map(|name| k.register(name, bit));
     let [held_frames, added_frames, frames] =
@@ -48,7 +51,8 @@ pub fn kernel(taxels: usize, bits: usize, power: u32) -> Kernel {
     let rises = k.wire("rises", rises(&k, *whole, power));
     k.comment("Of the first frame nothing has been stored.");
     let stored = k.wire("stored", held_gain.is(0).mux(k.signed_constant(wide, 0), *sofar));
-    let difference = word.shift_left(power as usize) - stored;
+    // 2 (2^k word − mean) − c, which the shift rounds down to the same as 2 (2^k word − mean − c): g is 0 only with c = 0.
+    let difference = word.shift_left(power as usize + 1) - stored.unsigned().concat(*held_odd).signed();
     let half = (mean.unsigned().concat(k.constant(1, 1)).signed() + *moved).slice(1, wide);
     let result = k.wire("result", half);
     let moves = k.wire("moves", !*valid | ready);
@@ -58,10 +62,12 @@ pub fn kernel(taxels: usize, bits: usize, power: u32) -> Kernel {
             taxel.set((early | at_end).mux(k.constant(taxel.bits(), 0), taxel.plus(1)));
             k.when(at_end, || {
                 whole.set(next);
+                odd.set(!*odd);
                 gain.set((*gain + rises).low(gain.bits()));
             });
             k.when(early, || {
                 whole.set(k.constant(whole.bits(), 0));
+                odd.set(k.constant(1, 0));
                 gain.set(k.constant(gain.bits(), 0));
             });
         });
@@ -70,11 +76,12 @@ pub fn kernel(taxels: usize, bits: usize, power: u32) -> Kernel {
         sofar.set(means.read(*taxel).signed());
         held_taxel.set(*taxel);
         held_gain.set(*gain);
+        held_odd.set(*odd);
         held_last.set(tlast);
         held_frames.set(next);
         added.set(*held);
         mean.set(stored);
-        moved.set(difference.shift_left(1).shift_right_by(*held_gain));
+        moved.set(difference.shift_right_by(*held_gain));
         added_taxel.set(*held_taxel);
         added_last.set(*held_last);
         added_frames.set(*held_frames);

@@ -111,7 +111,7 @@ impl Means {
         let far = |shift: &u32| (1i64 << shift).abs_diff(number as i64);
         let shift = (0..=self.power).rev().min_by_key(far).unwrap();
         let mean = self.means[self.taxel];
-        let twice = 2 * ((word << self.power) - mean);
+        let twice = 2 * ((word << self.power) - mean - (number as i64 - 1) % 2);
         let mean = if number == 1 { word << self.power } else { mean + ((twice >> shift) + 1).div_euclid(2) };
         self.means[self.taxel] = mean;
         let whole = self.taxel + 1 == TAXELS;
