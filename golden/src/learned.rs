@@ -5,23 +5,23 @@
 //! hides the exact shape of the pressure it is better than what is computed for one frame; without noise it is not.
 //!
 //! ```text
-//! b, mask, σ ── window ── features ── network ── μ1, μ2 and their σ ── evidence at that μ: forces, misfit, flags
+//! b, mask ── window ── features ── network ── μ1, μ2 and their σ ── evidence at that μ: forces, misfit, flags
 //! training:  frames ── features ── network ── loss ── Adam        file: weights of 12 bits, signature
 //! ```
 //!
 //! | file | step |
 //! |---|---|
-//! | `window` | the taxels that are read, mirror images |
-//! | `features` | stress over its norm, two deconvolutions, mask, noise |
-//! | `network` | layers |
+//! | `window` | the taxels that are read |
+//! | `features` | stress over a power of two, two deconvolutions, mask; in parities |
+//! | `network` | layers with the mirror symmetry |
 //! | `frames`, `training` | drawn frames; loss and Adam |
 //! | `file` | bytes, signature |
 //!
-//! The four mirror images of a window are asked, and their answers, mirrored back, averaged.
+//! A mirrored frame has the mirrored μ because no layer can do otherwise; in parities that costs a quarter of the products.
 //!
 //! | | shape | unit |
 //! |---|---|---|
-//! | in: stress of one contact, noise | taxels | MPa |
+//! | in: stress of one contact | taxels | MPa |
 //! | out: μ with standard deviations | 2 | – |
 
 mod error;
@@ -41,11 +41,11 @@ pub use window::{Place, Window};
 
 use crate::scene::Scene;
 use crate::sensor::Sensor;
+use crate::symmetry::quads::Quads;
 use faer::Mat;
-use features::{effective_sigma, Features, Readings};
+use features::{Features, Readings};
 use network::Network;
 use std::path::Path;
-use window::MIRRORS;
 
 /// Largest file of a network in bytes.
 const LARGEST_FILE: u64 = 64 << 20;
@@ -76,10 +76,6 @@ pub struct OneContact<'a> {
     pub b: &'a [f64],
     /// Which taxels are not dead.
     pub alive: &'a [bool],
-    /// Standard deviation of the noise, in the unit of `b`.
-    pub sigma: f64,
-    /// Standard deviation of the gains.
-    pub gain_spread: f64,
     /// Centre of pressure in mm from the array's centre.
     pub centre_mm: [f64; 2],
 }
@@ -134,7 +130,7 @@ impl Learned {
     pub fn from_bytes(scene: &Scene, bytes: &[u8], file: &str) -> Result<Learned, LearnedError> {
         let (network, signature) = file::decode(bytes, file)?;
         signature.check(scene, file)?;
-        let features = Features::new(&signature.window.sensor(&scene.sensor), scene.medium)?;
+        let features = Features::new(&signature.window, &scene.sensor, scene.medium)?;
         Ok(Learned { signature, sensor: scene.sensor.clone(), features, network })
     }
 
@@ -145,7 +141,7 @@ impl Learned {
 
     /// Number of weights.
     pub fn weights(&self) -> usize {
-        self.network.widths().windows(2).map(|pair| pair[0] * pair[1]).sum()
+        self.network.widths().windows(2).map(|pair| Quads::LANES * pair[0] * pair[1]).sum()
     }
 
     /// μ of one contact.
@@ -154,32 +150,17 @@ impl Learned {
         let n = window.taxels();
         let origin = window.origin(&self.sensor, contact.centre_mm);
         let taxels = window.taxels_of(&self.sensor, origin);
-        let images = MIRRORS.len();
-        let mut readings =
-            Readings { b: Mat::zeros(n, images), masked: Mat::zeros(n, images), sigma: Vec::with_capacity(images) };
-        let mut square = 0.0;
+        let mut readings = Readings { b: Mat::zeros(n, 1), masked: Mat::zeros(n, 1) };
         for (own, taxel) in taxels.iter().enumerate() {
             let b = taxel.filter(|taxel| contact.alive[*taxel]).map(|taxel| contact.b[taxel]);
             // A unipolar array reads no tension, also where that of another contact was taken out.
             let b = b.map(|b| if self.signature.unipolar { b.max(0.0) } else { b } as f32);
-            square += b.map_or(0.0, |b| b * b);
-            for (k, across) in MIRRORS.iter().enumerate() {
-                let image = window.mirrored(own, *across);
-                readings.b[(image, k)] = b.unwrap_or(0.0);
-                readings.masked[(image, k)] = if b.is_some() { 0.0 } else { 1.0 };
-            }
+            readings.b[(own, 0)] = b.unwrap_or(0.0);
+            readings.masked[(own, 0)] = if b.is_some() { 0.0 } else { 1.0 };
         }
-        let sigma = effective_sigma(contact.sigma as f32, contact.gain_spread as f32, square, n);
-        readings.sigma.resize(images, sigma);
-        let answers = self.network.outputs(self.features.of(&readings));
-        let mut found = Gaussian { mean: [0.0; 2], sigma: [0.0; 2] };
-        let share = self.signature.mu_max / images as f64;
-        for ((mean, sigma), across) in answers.iter().zip(&MIRRORS) {
-            for axis in [0, 1] {
-                found.mean[axis] += share * if across[axis] { -mean[axis] } else { mean[axis] };
-                found.sigma[axis] += share * sigma[axis];
-            }
-        }
+        let (mean, sigma) = self.network.shear(self.features.of(&readings))[0];
+        let of_scene = |values: [f64; 2]| values.map(|value| value * self.signature.mu_max);
+        let mut found = Gaussian { mean: of_scene(mean), sigma: of_scene(sigma) };
         let size = found.mean[0].hypot(found.mean[1]);
         if size > self.signature.mu_max {
             found.mean = found.mean.map(|mu| mu * self.signature.mu_max / size);

@@ -1,10 +1,13 @@
 //! File: a trained network with the physics it was trained for.
 //!
 //! ```text
-//! "dermis network 1\n"     magic and version
-//! JSON, "\n"               signature and widths
-//! per layer, row by row    scale (f32), bias (f32), weights of 12 bits, two in three bytes
-//! CRC-32                   of all before it
+//! "dermis network 2\n"       magic and version
+//! JSON, "\n"                 signature and widths
+//! per layer: largest output (f32)
+//!            row by row      bias (f32)
+//!            parity by parity, row by row
+//!                            scale (f32), weights of 12 bits, two in three bytes
+//! CRC-32                     of all before it
 //! ```
 //!
 //! Numbers are little-endian. A weight is its row's scale times a whole number of −2047 … 2047; a pair (u, v) of them, 2048
@@ -16,14 +19,15 @@
 //! | out, in: bytes | about 1.5 per weight | – |
 
 use super::error::LearnedError;
-use super::network::{Layer, Network, OUTPUTS};
+use super::features::Features;
+use super::network::{Layer, Network, OUTPUT_CHANNELS};
 use super::window::Window;
 use crate::scene::{Medium, Scene};
-use faer::Mat;
+use faer::{Mat, RowRef};
 use serde::{Deserialize, Serialize};
 
 /// Magic and version.
-const MAGIC: &[u8] = b"dermis network 1\n";
+const MAGIC: &[u8] = b"dermis network 2\n";
 /// Largest whole number of a weight.
 const LARGEST: f32 = 2047.0;
 /// Added to a weight's number.
@@ -101,15 +105,16 @@ pub(super) fn encode(network: &Network, signature: &Signature) -> Result<Vec<u8>
     bytes.extend(serde_json::to_vec(&head).map_err(|error| LearnedError::Encode(error.to_string()))?);
     bytes.push(b'\n');
     for layer in &network.layers {
-        for (row, bias) in layer.bias.iter().enumerate() {
-            let scale = scale(layer, row);
+        bytes.extend(layer.largest.to_le_bytes());
+        bytes.extend(layer.bias.iter().flat_map(|bias| bias.to_le_bytes()));
+        for (weights, row) in layer.weights.iter().flat_map(|weights| weights.row_iter().map(move |row| (weights, row))) {
+            let scale = scale(row);
             bytes.extend(scale.to_le_bytes());
-            bytes.extend(bias.to_le_bytes());
-            let number = |col: usize| match col < layer.weights.ncols() && scale > 0.0 {
-                true => ((layer.weights[(row, col)] / scale).round() as i32 + ZERO) as u32,
+            let number = |col: usize| match col < weights.ncols() && scale > 0.0 {
+                true => ((row[col] / scale).round() as i32 + ZERO) as u32,
                 false => ZERO as u32,
             };
-            for col in (0..layer.weights.ncols()).step_by(2) {
+            for col in (0..weights.ncols()).step_by(2) {
                 bytes.extend(&(number(col) | number(col + 1) << 12).to_le_bytes()[..3]);
             }
         }
@@ -120,14 +125,14 @@ pub(super) fn encode(network: &Network, signature: &Signature) -> Result<Vec<u8>
 }
 
 /// The scale of a row's weights.
-fn scale(layer: &Layer, row: usize) -> f32 {
-    layer.weights.row(row).iter().fold(0.0f32, |most, weight| weight.abs().max(most)) / LARGEST
+fn scale(row: RowRef<f32>) -> f32 {
+    row.iter().fold(0.0f32, |most, weight| weight.abs().max(most)) / LARGEST
 }
 
 /// Network and signature of a file's bytes; `file` names it in errors.
 pub(super) fn decode(bytes: &[u8], file: &str) -> Result<(Network, Signature), LearnedError> {
     let damaged = |reason: &str| LearnedError::Damaged { file: file.to_owned(), reason: reason.to_owned() };
-    let body = bytes.strip_prefix(MAGIC).ok_or_else(|| damaged("it does not begin with \"dermis network 1\""))?;
+    let body = bytes.strip_prefix(MAGIC).ok_or_else(|| damaged("it does not begin with \"dermis network 2\""))?;
     let (checked, crc) = bytes.split_last_chunk::<4>().ok_or_else(|| damaged("it is too short"))?;
     if crc32fast::hash(checked) != u32::from_le_bytes(*crc) {
         return Err(damaged("its check sum does not fit"));
@@ -138,9 +143,7 @@ pub(super) fn decode(bytes: &[u8], file: &str) -> Result<(Network, Signature), L
     if widths.len() < 2 || widths.iter().any(|width| !(1..=WIDEST).contains(width)) {
         return Err(damaged("its widths are out of range"));
     }
-    if widths.first() != Some(&super::features::Features::inputs(head.signature.window.taxels()))
-        || widths.last() != Some(&OUTPUTS)
-    {
+    if widths.first() != Some(&Features::channels(&head.signature.window)) || widths.last() != Some(&OUTPUT_CHANNELS) {
         return Err(damaged("its widths do not fit its window"));
     }
     let mut rest = &body[end + 1..body.len() - 4];
@@ -155,28 +158,28 @@ pub(super) fn decode(bytes: &[u8], file: &str) -> Result<(Network, Signature), L
 }
 
 fn layer(rest: &mut &[u8], inputs: usize, outputs: usize) -> Option<Layer> {
-    let mut weights = Mat::zeros(outputs, inputs);
-    let mut bias = Vec::with_capacity(outputs);
     let float = |rest: &mut &[u8]| {
         let (head, tail) = rest.split_first_chunk::<4>()?;
         *rest = tail;
         Some(f32::from_le_bytes(*head)).filter(|value| value.is_finite())
     };
-    for row in 0..outputs {
+    let largest = float(rest)?;
+    let bias = (0..outputs).map(|_| float(rest)).collect::<Option<Vec<f32>>>()?;
+    let mut weights = std::array::from_fn(|_| Mat::zeros(outputs, inputs));
+    for (parity, row) in (0..weights.len()).flat_map(|parity| (0..outputs).map(move |row| (parity, row))) {
         let scale = float(rest)?;
-        bias.push(float(rest)?);
         for col in (0..inputs).step_by(2) {
             let ([a, b, c], tail) = rest.split_first_chunk::<3>()?;
             *rest = tail;
             let pair = u32::from_le_bytes([*a, *b, *c, 0]);
             let weight = |number: u32| scale * (number as i32 - ZERO) as f32;
-            weights[(row, col)] = weight(pair & 0xfff);
+            weights[parity][(row, col)] = weight(pair & 0xfff);
             if col + 1 < inputs {
-                weights[(row, col + 1)] = weight(pair >> 12);
+                weights[parity][(row, col + 1)] = weight(pair >> 12);
             }
         }
     }
-    Some(Layer { weights, bias })
+    Some(Layer { weights, bias, largest })
 }
 
 #[cfg(test)]
@@ -187,7 +190,7 @@ mod tests {
     fn network() -> (Network, Signature) {
         let mut scene = Scene::builtin("sensor-1").unwrap();
         (scene.sensor.rows, scene.sensor.cols) = (2, 2);
-        (Network::random(&[17, 5, OUTPUTS], &mut Random::new(1)), Signature::of(&scene))
+        (Network::random(&[5, 5, OUTPUT_CHANNELS], &mut Random::new(1)), Signature::of(&scene))
     }
 
     #[test]
@@ -197,15 +200,15 @@ mod tests {
         let (read, own) = decode(&bytes, "f").unwrap();
         assert_eq!(own, signature);
         for (a, b) in network.layers.iter().zip(&read.layers) {
-            assert_eq!(a.bias, b.bias);
-            for row in 0..a.bias.len() {
-                let step = scale(a, row);
-                let near = |col: usize| (a.weights[(row, col)] - b.weights[(row, col)]).abs() <= 0.51 * step;
-                assert!((0..a.weights.ncols()).all(near));
+            assert_eq!((&a.bias, a.largest), (&b.bias, b.largest));
+            for (a, b) in a.weights.iter().zip(&b.weights) {
+                for (a, b) in a.row_iter().zip(b.row_iter()) {
+                    assert!((0..a.ncols()).all(|col| (a[col] - b[col]).abs() <= 0.51 * scale(a)));
+                }
             }
         }
         // Weights that are whole numbers of the scale stay as they are.
-        assert_eq!(decode(&encode(&read, &own).unwrap(), "f").unwrap().0.widths(), [17, 5, 4]);
+        assert_eq!(decode(&encode(&read, &own).unwrap(), "f").unwrap().0.widths(), [5, 5, 2]);
     }
 
     #[test]

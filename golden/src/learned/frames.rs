@@ -7,7 +7,7 @@
 //! |---|---|
 //! | contacts | [`Draws`], all shapes in turn; one, or in windows around contacts one to four |
 //! | μ | 0 … 0.85 mu_max, any direction |
-//! | mirror image | none, x, y, both |
+//! | load | times 1 … 2, its logarithm evenly |
 //! | share of the others' stress that is left | 1 in half of the frames, −0.1 … 0.1 in the other half |
 //! | σ of the noise | 0.005 … 2 % of max \|b\|, its logarithm evenly |
 //! | gain spread | none in half of the frames, 0.2 … 3 % in the other half |
@@ -19,8 +19,8 @@
 //! | in: scene | – | – |
 //! | out: readings, μ | window × frames, 2 × frames | MPa, of mu_max |
 
-use super::features::{effective_sigma, Readings};
-use super::window::{Place, Window, MIRRORS};
+use super::features::Readings;
+use super::window::{Place, Window};
 use crate::generator::draws::{DrawOptions, Draws, Shape};
 use crate::generator::support::{Kernels, Support};
 use crate::generator::GeneratorError;
@@ -101,30 +101,29 @@ impl Frames {
     /// Mixes `frames` frames: their readings, and μ in units of mu_max.
     pub fn mix(&self, frames: usize, random: &mut Random) -> (Readings, Mat<f32>) {
         let n = self.window.taxels();
-        let mut readings =
-            Readings { b: Mat::zeros(n, frames), masked: Mat::zeros(n, frames), sigma: Vec::with_capacity(frames) };
+        let mut readings = Readings { b: Mat::zeros(n, frames), masked: Mat::zeros(n, frames) };
         let mut truth = Mat::zeros(2, frames);
         for frame in 0..frames {
             let at = (random.between(0.0, self.items.len() as f64) as usize).min(self.items.len() - 1);
             let (size, towards) = (random.between(0.0, RATIO), random.between(0.0, TAU));
             let mu = [size * towards.cos(), size * towards.sin()];
-            let across = MIRRORS[random.between(0.0, 4.0) as usize % 4];
-            self.frame(&self.items[at], mu, across, frame, &mut readings, random);
+            self.frame(&self.items[at], mu, frame, &mut readings, random);
             for axis in [0, 1] {
-                truth[(axis, frame)] = (if across[axis] { -mu[axis] } else { mu[axis] }) as f32;
+                truth[(axis, frame)] = mu[axis] as f32;
             }
         }
         (readings, truth)
     }
 
-    /// One frame of a contact with μ in units of mu_max, mirrored.
-    fn frame(&self, item: &Item, mu: [f64; 2], across: [bool; 2], at: usize, into: &mut Readings, random: &mut Random) {
+    /// One frame of a contact with μ in units of mu_max.
+    fn frame(&self, item: &Item, mu: [f64; 2], at: usize, into: &mut Readings, random: &mut Random) {
         let n = self.window.taxels();
         let [x, y] = mu.map(|mu| (mu * self.mu_max) as f32);
         let left = if random.coin() { 1.0 } else { random.between(-LEFT, LEFT) as f32 };
         let other = |t: usize| item.others.get(t).map_or(0.0, |other| left * other);
+        let load = random.between(0.0, 1.0).exp2() as f32;
         let exact: Vec<f32> =
-            (0..n).map(|t| item.axes[2][t] + x * item.axes[0][t] + y * item.axes[1][t] + other(t)).collect();
+            (0..n).map(|t| load * (item.axes[2][t] + x * item.axes[0][t] + y * item.axes[1][t] + other(t))).collect();
         let own_peak = exact.iter().fold(0.0f32, |peak, b| b.abs().max(peak));
         let log = |[low, high]: [f64; 2], random: &mut Random| random.between(low.ln(), high.ln()).exp() as f32;
         let sigma = own_peak * log(NOISE, random);
@@ -135,19 +134,15 @@ impl Frames {
                 masked[(random.between(0.0, n as f64) as usize).min(n - 1)] = true;
             }
         }
-        let mut square = 0.0;
         for t in 0..n {
-            let image = self.window.mirrored(t, across);
             if masked[t] {
-                into.masked[(image, at)] = 1.0;
+                into.masked[(t, at)] = 1.0;
                 continue;
             }
             let gain = if gains > 0.0 { 1.0 + gains * random.normal() as f32 } else { 1.0 };
             let b = gain * exact[t] + sigma * random.normal() as f32;
-            square += b * b;
-            into.b[(image, at)] = if self.unipolar { b.max(0.0) } else { b };
+            into.b[(t, at)] = if self.unipolar { b.max(0.0) } else { b };
         }
-        into.sigma.push(effective_sigma(sigma, gains, square, n));
     }
 }
 

@@ -1,30 +1,56 @@
-//! Network: layers of products and ReLU, from the inputs to μ and its standard deviations.
+//! Network: layers of products and ReLU that keep the mirror symmetry, from the inputs to μ and its standard deviations.
 //!
 //! ```text
-//! a₀ = inputs        a_k = max(0, W_k a_{k−1} + c_k)        outputs = W_last a + c_last
+//! in parities:  y_t = W_t a_t + c (even parity only)        in mirror images:  a = max(0, y)
+//! outputs:      μ1 from the parity odd in x, μ2 from that odd in y, ln σ1 and ln σ2 from the even one
 //! ```
+//!
+//! Every channel has one number for each of the four mirror images. A layer that treats mirrored inputs alike is block
+//! diagonal in parities, as Cz is: a quarter of the weights and of the products of a layer without the symmetry, and a
+//! mirrored frame has the mirrored μ, exactly. ReLU acts on the images; the transform between them is orthonormal and its own
+//! inverse.
 //!
 //! | | shape | unit |
 //! |---|---|---|
-//! | in: inputs | width × frames | – |
+//! | in: inputs of each parity | channels × frames | – |
 //! | out: μ1, μ2, ln σ1, ln σ2 | 4 × frames | of mu_max |
 
 use crate::random::Random;
+use crate::symmetry::folded::{EVEN, ODD_X, ODD_Y};
+use crate::symmetry::parity::sign;
 use faer::linalg::matmul::matmul;
 use faer::{Accum, Mat, Par};
 
+/// Channels of the last layer.
+pub(super) const OUTPUT_CHANNELS: usize = 2;
 /// Number of outputs.
 pub(super) const OUTPUTS: usize = 4;
+/// Parity and channel of each output.
+pub(super) const PLACES: [(usize, usize); OUTPUTS] = [(ODD_X, 0), (ODD_Y, 0), (EVEN, 0), (EVEN, 1)];
 /// Range of ln σ, σ in units of mu_max.
 pub(super) const LN_SIGMA: [f32; 2] = [-7.0, 0.5];
+
+/// Channels × frames for each parity, or for each mirror image.
+pub(super) type Parities = [Mat<f32>; 4];
+
+/// Mirror images from parities, and back: ½ Σ sign · entry.
+pub(super) fn exchanged(of: &Parities) -> Parities {
+    std::array::from_fn(|to| {
+        Mat::from_fn(of[0].nrows(), of[0].ncols(), |row, col| {
+            (0..4).map(|from| 0.5 * sign(to, from) as f32 * of[from][(row, col)]).sum()
+        })
+    })
+}
 
 /// One layer.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Layer {
-    /// Outputs × inputs.
-    pub weights: Mat<f32>,
-    /// One for each output.
+    /// For each parity, outputs × inputs.
+    pub weights: Parities,
+    /// Of the even parity, one for each output.
     pub bias: Vec<f32>,
+    /// Largest output of any image on the frames of [`Network::measure`]; it sets the scale of fixed-point words.
+    pub largest: f32,
 }
 
 /// The layers in order.
@@ -34,44 +60,76 @@ pub(super) struct Network {
     pub layers: Vec<Layer>,
 }
 
+/// What a layer passes on.
+pub(super) struct Activation {
+    /// Channels × frames of each mirror image, after ReLU; `None` for the inputs and the outputs.
+    pub images: Option<Parities>,
+    /// The same in parities.
+    pub parities: Parities,
+}
+
 impl Layer {
-    fn apply(&self, inputs: &Mat<f32>) -> Mat<f32> {
-        let mut outputs = Mat::from_fn(self.bias.len(), inputs.ncols(), |row, _| self.bias[row]);
-        matmul(&mut outputs, Accum::Add, &self.weights, inputs, 1.0, Par::Seq);
-        outputs
+    fn apply(&self, inputs: &Parities) -> Parities {
+        std::array::from_fn(|parity| {
+            let bias = |row: usize| if parity == EVEN { self.bias[row] } else { 0.0 };
+            let mut outputs = Mat::from_fn(self.bias.len(), inputs[parity].ncols(), |row, _| bias(row));
+            matmul(&mut outputs, Accum::Add, &self.weights[parity], &inputs[parity], 1.0, Par::Seq);
+            outputs
+        })
     }
 }
 
 impl Network {
-    /// A network with random weights of variance 2/inputs; `widths` are those of the inputs and of every layer.
+    /// A network with random weights of variance 2/inputs; `widths` are the channels of the inputs and of every layer.
     pub fn random(widths: &[usize], random: &mut Random) -> Network {
         let layer = |pair: &[usize]| {
             let spread = (2.0 / pair[0] as f64).sqrt();
-            let weights = Mat::from_fn(pair[1], pair[0], |_, _| (spread * random.normal()) as f32);
-            Layer { weights, bias: vec![0.0; pair[1]] }
+            let mut weights = |_| Mat::from_fn(pair[1], pair[0], |_, _| (spread * random.normal()) as f32);
+            Layer { weights: std::array::from_fn(&mut weights), bias: vec![0.0; pair[1]], largest: 0.0 }
         };
         Network { layers: widths.windows(2).map(layer).collect() }
     }
 
-    /// The activations of every layer, the inputs first and the outputs last.
-    pub fn activations(&self, inputs: Mat<f32>) -> Vec<Mat<f32>> {
-        let mut all = vec![inputs];
+    /// What every layer passes on, the inputs first and the outputs last.
+    pub fn activations(&self, inputs: Parities) -> Vec<Activation> {
+        let mut all = vec![Activation { images: None, parities: inputs }];
         for (k, layer) in self.layers.iter().enumerate() {
-            let mut next = layer.apply(&all[k]);
-            if k + 1 < self.layers.len() {
-                for column in next.col_iter_mut() {
-                    column.iter_mut().for_each(|a| *a = a.max(0.0));
+            let next = layer.apply(&all[k].parities);
+            all.push(match k + 1 < self.layers.len() {
+                true => {
+                    let images = exchanged(&next).map(|mut images| {
+                        images.col_iter_mut().for_each(|column| column.iter_mut().for_each(|a| *a = a.max(0.0)));
+                        images
+                    });
+                    Activation { parities: exchanged(&images), images: Some(images) }
                 }
-            }
-            all.push(next);
+                false => Activation { images: None, parities: next },
+            });
         }
         all
     }
 
-    /// μ and σ of each frame in units of mu_max, [x, y].
-    pub fn outputs(&self, inputs: Mat<f32>) -> Vec<([f64; 2], [f64; 2])> {
+    /// Sets the largest output of each layer from frames with these inputs.
+    pub fn measure(&mut self, inputs: Parities) {
         let all = self.activations(inputs);
-        let last = &all[all.len() - 1];
+        for (layer, activation) in self.layers.iter_mut().zip(&all[1..]) {
+            let outputs = activation.images.as_ref().unwrap_or(&activation.parities);
+            layer.largest = outputs.iter().map(|outputs| outputs.norm_max()).fold(0.0, f32::max);
+        }
+    }
+
+    /// The outputs of each frame, from the last layer's parities.
+    pub fn outputs(last: &Parities) -> Mat<f32> {
+        Mat::from_fn(OUTPUTS, last[0].ncols(), |output, frame| {
+            let (parity, channel) = PLACES[output];
+            last[parity][(channel, frame)]
+        })
+    }
+
+    /// μ and σ of each frame in units of mu_max, [x, y].
+    pub fn shear(&self, inputs: Parities) -> Vec<([f64; 2], [f64; 2])> {
+        let all = self.activations(inputs);
+        let last = Network::outputs(&all[all.len() - 1].parities);
         let sigma = |ln: f32| f64::from(ln.clamp(LN_SIGMA[0], LN_SIGMA[1])).exp();
         let of = |frame: usize| {
             let at = |k: usize| last[(k, frame)];
@@ -80,9 +138,9 @@ impl Network {
         (0..last.ncols()).map(of).collect()
     }
 
-    /// Widths of the inputs and of every layer.
+    /// Channels of the inputs and of every layer.
     pub fn widths(&self) -> Vec<usize> {
-        let first = self.layers.first().map(|layer| layer.weights.ncols());
+        let first = self.layers.first().map(|layer| layer.weights[EVEN].ncols());
         first.into_iter().chain(self.layers.iter().map(|layer| layer.bias.len())).collect()
     }
 }
@@ -91,19 +149,48 @@ impl Network {
 mod tests {
     use super::*;
 
+    /// Inputs of one frame from their mirror images.
+    fn frame(images: [&[f32]; 4]) -> Parities {
+        exchanged(&images.map(|image| Mat::from_fn(image.len(), 1, |row, _| image[row])))
+    }
+
     #[test]
     fn two_layers_by_hand() {
-        let layer = |rows: &[[f32; 2]], bias: &[f32]| Layer {
-            weights: Mat::from_fn(rows.len(), 2, |i, j| rows[i][j]),
-            bias: bias.to_vec(),
-        };
-        let hidden = layer(&[[1.0, -1.0], [2.0, 0.5]], &[0.0, -1.0]);
-        let last = layer(&[[1.0, 0.0], [0.0, 1.0], [-100.0, 0.0], [0.0, 0.0]], &[0.0, 0.5, 0.0, 0.0]);
+        let all = |weights: Mat<f32>| [weights.clone(), weights.clone(), weights.clone(), weights];
+        let mat = |rows: [[f32; 2]; 2]| Mat::from_fn(2, 2, |i, j| rows[i][j]);
+        // Equal weights of all parities act on every image alone. The bias of an image is half of that of the parity.
+        let hidden = Layer { weights: all(mat([[1.0, -1.0], [2.0, 0.5]])), bias: vec![0.0, -2.0], largest: 0.0 };
+        let last = Layer { weights: all(mat([[1.0, 0.0], [0.0, 1.0]])), bias: vec![0.0, 1.0], largest: 0.0 };
         let network = Network { layers: vec![hidden, last] };
-        assert_eq!(network.widths(), [2, 2, 4]);
-        // Hidden: max(0, 3 − 1) = 2 and max(0, 6 + 0.5 − 1) = 5.5; then max(0, 1 − 2) = 0 and 2.
-        let found = network.outputs(Mat::from_fn(2, 2, |i, j| [[3.0, 1.0], [1.0, 2.0]][j][i]));
-        assert_eq!(found[0], ([2.0, 6.0], [f64::from(LN_SIGMA[0]).exp(), 1.0]));
-        assert_eq!(found[1], ([0.0, 2.5], [1.0, 1.0]));
+        assert_eq!(network.widths(), [2, 2, 2]);
+        let mut measured = network.clone();
+        // Images after ReLU: (2, 5.5), (0, 2), (0, 0), (0, 0).
+        let images: [&[f32]; 4] = [&[3.0, 1.0], &[1.0, 2.0], &[0.0, 0.0], &[-1.0, 0.0]];
+        let found = network.shear(frame(images));
+        // Halved sums with the signs of the parities; ln σ = 1 and 4.75, the latter out of range.
+        assert_eq!(found[0].0, [1.0, 1.0]);
+        assert_eq!(found[0].1, [f64::from(LN_SIGMA[1]).exp(); 2]);
+        measured.measure(frame(images));
+        assert_eq!([0, 1].map(|k| measured.layers[k].largest), [5.5, 4.75]);
+        let swapped = network.shear(frame([images[1], images[0], images[3], images[2]]));
+        assert_eq!(swapped[0].0, [-1.0, 1.0]);
+    }
+
+    #[test]
+    fn a_mirrored_frame_has_the_mirrored_shear() {
+        let network = Network::random(&[5, 7, 6, OUTPUT_CHANNELS], &mut Random::new(3));
+        let mut random = Random::new(8);
+        let images: [Vec<f32>; 4] = std::array::from_fn(|_| (0..5).map(|_| random.normal() as f32).collect());
+        let of = |across: usize| network.shear(frame(std::array::from_fn(|lane| &images[lane ^ across][..])))[0];
+        let straight = of(0);
+        assert!(straight.0.iter().all(|mu| mu.abs() > 1e-3));
+        for across in 1..4 {
+            let mirrored = of(across);
+            for axis in [0, 1] {
+                let sign = if across >> axis & 1 == 1 { -1.0 } else { 1.0 };
+                assert!((mirrored.0[axis] - sign * straight.0[axis]).abs() < 1e-5, "{across} {axis}");
+                assert!((mirrored.1[axis] - straight.1[axis]).abs() < 1e-5, "{across} {axis}");
+            }
+        }
     }
 }

@@ -1,4 +1,4 @@
-//! Window: the rectangle of taxels that a network reads, where it lies on an array, and its mirror images.
+//! Window: the rectangle of taxels that a network reads, and where it lies on an array.
 //!
 //! An array of at most [`WHOLE_UP_TO`] taxels is one window. On a larger one the window has a contact in its middle; it may
 //! reach beyond the array, where its readings are 0 and its mask is too.
@@ -9,6 +9,7 @@
 //! | out: taxel of the array for each taxel of the window | window | index, or none |
 
 use crate::sensor::Sensor;
+use crate::symmetry::quads::Quads;
 use serde::{Deserialize, Serialize};
 use std::fmt;
 
@@ -55,6 +56,11 @@ impl Window {
         self.rows * self.cols
     }
 
+    /// Its quads of mirror images.
+    pub(super) fn quads(&self) -> Quads {
+        Quads { rows: self.rows, cols: self.cols }
+    }
+
     /// The window as an array of its own.
     pub(super) fn sensor(&self, sensor: &Sensor) -> Sensor {
         Sensor { rows: self.rows, cols: self.cols, ..sensor.clone() }
@@ -98,14 +104,6 @@ impl Window {
             middle(row0, self.rows, sensor.rows, sensor.pitch_y_mm),
         ]
     }
-
-    /// The taxel whose mirror image a taxel is; `across` says which axes, [x, y], are mirrored.
-    pub(super) fn mirrored(&self, taxel: usize, across: [bool; 2]) -> usize {
-        let (row, col) = (taxel / self.cols, taxel % self.cols);
-        let row = if across[1] { self.rows - 1 - row } else { row };
-        let col = if across[0] { self.cols - 1 - col } else { col };
-        row * self.cols + col
-    }
 }
 
 impl fmt::Display for Window {
@@ -117,9 +115,6 @@ impl fmt::Display for Window {
         write!(f, "{place} of {} × {}", self.rows, self.cols)
     }
 }
-
-/// The four mirror images: which axes, [x, y], are mirrored.
-pub(super) const MIRRORS: [[bool; 2]; 4] = [[false, false], [true, false], [false, true], [true, true]];
 
 #[cfg(test)]
 mod tests {
@@ -153,15 +148,5 @@ mod tests {
         // The corner's window has its upper left part beyond the array.
         let corner = window.taxels_of(&array, window.origin(&array, array.position_mm(0, 0)));
         assert_eq!(corner.iter().flatten().count(), 5 * 6);
-    }
-
-    #[test]
-    fn mirror_images_return() {
-        let window = Window::of(&sensor(20, 21));
-        for across in MIRRORS {
-            let twice = |taxel| window.mirrored(window.mirrored(taxel, across), across);
-            assert!((0..window.taxels()).all(|taxel| twice(taxel) == taxel));
-        }
-        assert_eq!(window.mirrored(0, [true, false]), 10);
     }
 }

@@ -60,8 +60,6 @@ impl Fit<'_> {
         network.shear(&OneContact {
             b: &b,
             alive: &self.scene.alive,
-            sigma: self.sigma,
-            gain_spread: self.scene.gain_spread,
             centre_mm: self.centre_mm(&found.regions.cells[contact]),
         })
     }
