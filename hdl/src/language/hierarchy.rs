@@ -142,11 +142,13 @@ impl Hierarchy {
     /// Finds a combinational loop through several blocks.
     fn loops(&self) -> Result<(), KernelError> {
         let mut sources: BTreeMap<Net, Vec<Net>> = BTreeMap::new();
-        for (path, module) in &self.modules {
-            let Some(kernel) = &module.kernel else { continue };
+        // The block that drives a net, its kernel, and the net's name in it.
+        let mut drivers: BTreeMap<Net, (&str, &Kernel, &str)> = BTreeMap::new();
+        for (path, kernel) in self.kernels() {
             for (output, inputs) in kernel.combinational() {
-                let of = |name: &str| module.net(path, name);
+                let of = |name: &str| self.modules[path].net(path, name);
                 sources.entry(of(output)).or_default().extend(inputs.into_iter().map(of));
+                drivers.insert(of(output), (path, kernel, output));
             }
         }
         // Nets whose sources are all known to be free of loops, and those on the way to the current one.
@@ -163,8 +165,13 @@ impl Hierarchy {
                 if let Some(first) = open.iter().position(|(net, _)| *net == source) {
                     let through: Vec<String> =
                         open[first..].iter().map(|((path, name), _)| called(path, name)).collect();
-                    let (block, signals) = (source.0.clone(), through.join(", "));
-                    return Err(KernelError::Loop { block, signals, expression: source.1.clone() });
+                    let (block, kernel, signal) = drivers[source];
+                    return Err(KernelError::Loop {
+                        block: block.to_owned(),
+                        signal: signal.to_owned(),
+                        through: through.join(", "),
+                        expression: kernel.value_of(signal),
+                    });
                 }
                 open.push((source, 0));
             }
