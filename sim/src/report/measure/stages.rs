@@ -50,7 +50,7 @@ pub struct StageRow {
     pub max_share: f64,
     /// RMS difference over the stage's largest value.
     pub rms_share: f64,
-    /// Bits needed by the largest word, sign included.
+    /// Bits needed by the largest word of the stage, sign included.
     pub used_bits: u32,
     /// Width of the word in bits.
     pub has_bits: u32,
@@ -87,11 +87,15 @@ pub fn stages(measured: &Measured, index: usize) -> Vec<StageRow> {
     let reference = FloatReference::new(measured, bit_true, index);
     let f = &bit_true.model.formats();
     let sum = |pick: fn(&Status) -> u32| reference.status.iter().map(pick).sum::<u32>();
+    let accumulator = match bit_true.model.board.engine {
+        EngineKind::Parallel => f.lane_bits,
+        EngineKind::Serial => f.acc_bits,
+    };
     let bits = [
         ("receive", f.code_bits, 0),
         ("normalise", f.input_bits, 0),
         ("fold", f.fold_bits, 0),
-        ("pass", f.acc_bits, 0),
+        ("pass", accumulator, 0),
         ("rescale", f.vector_bits, sum(|status| status.rescale_saturations)),
         ("unfold", f.vector_bits + 2, 0),
         ("search", bit_length(MU_STEPS as u64) + 1, 0),
@@ -109,7 +113,12 @@ pub fn stages(measured: &Measured, index: usize) -> Vec<StageRow> {
             .fold(0.0, |peak: f64, (value, lsb)| peak.max((value * lsb).abs()));
         let share = |value: f64| if peak > 0.0 { value / peak } else { 0.0 };
         let rms = |squares: f64| (squares / compared.words.len().max(1) as f64).sqrt();
-        let used = compared.words.iter().map(|word| bit_length((word ^ (word >> 63)) as u64) + 1).max();
+        // Compared is the sum of both limbs; the words of the stage are those of each.
+        let words = match stage {
+            "pass" => reference.words(stage).concat(),
+            _ => compared.words.clone(),
+        };
+        let used = words.iter().map(|word| bit_length((word ^ (word >> 63)) as u64) + 1).max();
         StageRow {
             scene: measured.scene.name.clone(),
             case: measured.scene.partition.case.to_string(),
@@ -315,5 +324,11 @@ mod tests {
             assert!(stage == "search" || row.rms_share < 0.25, "{what}");
         }
         assert!(rows.iter().filter(|row| row.stage == "pass").all(|row| row.rms_lsb > 0.0));
+        // The lanes' accumulators are narrower than the sum of both limbs.
+        for measured in &measured {
+            let formats = measured.bit_true.as_ref().unwrap().model.formats();
+            let pass = stages(measured, 0).into_iter().find(|row| row.stage == "pass").unwrap();
+            assert!(pass.has_bits == formats.lane_bits && pass.has_bits < formats.acc_bits, "{pass:?}");
+        }
     }
 }
