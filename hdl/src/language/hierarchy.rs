@@ -95,6 +95,17 @@ impl Hierarchy {
         self.modules.iter().filter_map(|(path, module)| Some((path.as_str(), module.kernel.as_deref()?)))
     }
 
+    /// Path, scope and kernel of every block, the top first, each followed by the blocks inside it in their order. The
+    /// scope is the instances from the top, separated by dots, as simulators name it.
+    pub fn scopes(&self) -> Vec<(&str, String, &Kernel)> {
+        let (mut all, mut open) = (Vec::new(), vec![String::new()]);
+        while let Some((path, module)) = open.pop().and_then(|path| self.modules.get_key_value(&path)) {
+            all.extend(module.kernel.as_deref().map(|kernel| (path.as_str(), module.path.join("."), kernel)));
+            open.extend(module.children.iter().rev().map(|(instance, _)| called(path, instance)));
+        }
+        all
+    }
+
     /// # Errors
     /// The first defect of one of the kernels.
     pub fn check(&self) -> Result<(), KernelError> {

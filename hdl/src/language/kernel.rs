@@ -1,6 +1,6 @@
 //! The expression graph of a block: nodes in one arena, signals, memories.
 
-use std::collections::HashMap;
+use std::collections::{BTreeSet, HashMap};
 
 use super::error::KernelError;
 
@@ -208,6 +208,13 @@ pub struct Memory {
     pub(crate) writes: Vec<Write>,
 }
 
+impl Memory {
+    /// Whether it has a write port.
+    pub fn is_written(&self) -> bool {
+        !self.writes.is_empty()
+    }
+}
+
 /// What is wrong with an expression.
 #[derive(Clone, Debug)]
 pub(crate) enum Defect {
@@ -263,6 +270,11 @@ impl Kernel {
     /// Name and type of every signal: ports, wires, registers.
     pub fn signals(&self) -> impl Iterator<Item = (&str, Type)> {
         self.signals.iter().map(|signal| (signal.name.as_str(), signal.ty))
+    }
+
+    /// Name and width of every register.
+    pub fn register_widths(&self) -> impl Iterator<Item = (&str, usize)> {
+        self.registers().map(|(_, signal, _)| (signal.name.as_str(), signal.ty.bits))
     }
 
     pub(crate) fn ty(&self, node: NodeId) -> Type {
@@ -344,6 +356,15 @@ impl Kernel {
                 return Some(node);
             }
         })
+    }
+
+    /// Names of the inputs that nothing reads.
+    pub(crate) fn unread(&self) -> BTreeSet<&str> {
+        let values: Vec<NodeId> = self.signals.iter().filter_map(|signal| signal.value).collect();
+        let read: BTreeSet<NodeId> = self.within(&[values, self.edge_roots()].concat()).collect();
+        let is_read = |id: SignalId| read.iter().any(|&node| self.nodes[node].0 == Node::Signal(id));
+        let inputs = self.signals.iter().enumerate().filter(|(_, signal)| signal.role == Role::Input);
+        inputs.filter(|(id, _)| !is_read(*id)).map(|(_, signal)| signal.name.as_str()).collect()
     }
 
     pub(crate) fn signal_of(&self, name: &str) -> Option<SignalId> {

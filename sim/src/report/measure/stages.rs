@@ -12,13 +12,13 @@
 //! | rescale | the same | a 2^r = w |
 //! | unfold | v_ij (mu_max/3)^(i+j) per taxel | w/4 |
 //! | search | the golden model's μ | mu_max/384 |
-//! | force | p at the bit-true model's μ | w/4 |
+//! | forces | p at the bit-true model's μ | w/4 |
 //! | send | the golden model's forces | that of the force word |
 //!
 //! Shares are relative to the frame's largest value in physical units, so that a subarray with little load, in whose
 //! small LSB rounding looks large, does not dominate.
 //!
-//! Stage `force` thus shows the error of the arithmetic alone, stage `send` the error of arithmetic and search.
+//! Stage `forces` thus shows the error of the arithmetic alone, stage `send` the error of arithmetic and search.
 
 use dermis_golden::board::EngineKind;
 use dermis_golden::fixed::stages::pass::join_limbs;
@@ -99,7 +99,7 @@ pub fn stages(measured: &Measured, index: usize) -> Vec<StageRow> {
         ("rescale", f.vector_bits, sum(|status| status.rescale_saturations)),
         ("unfold", f.vector_bits + 2, 0),
         ("search", bit_length(MU_STEPS as u64) + 1, 0),
-        ("force", f.search_bits[0], 0),
+        ("forces", f.search_bits[0], 0),
         ("send", 32, reference.status.first().map_or(0, |status| status.force_saturations)),
     ];
     let row = |(stage, has_bits, saturations)| {
@@ -245,7 +245,7 @@ impl<'a> FloatReference<'a> {
         match stage {
             "normalise" => return stress().map(|quad| in_lsb(quad, code)).collect(),
             "fold" => return stress().map(|quad| in_lsb(hadamard(quad), code)).collect(),
-            "force" => {
+            "forces" => {
                 let step = scene.search.mu_max / MU_STEPS as f64;
                 let p = family.eval(status.position.map(|position| f64::from(position) * step));
                 return layout.pack(&p).into_iter().map(|quad| in_lsb(quad, word / 4.0)).collect();

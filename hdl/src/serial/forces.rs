@@ -1,4 +1,4 @@
-//! Stages `force` and `send`: one product at a time, a beat every
+//! Stages `forces` and `send`: one product at a time, a beat every
 //! [`BEAT`](dermis_golden::fixed::plan::serial::BEAT) cycles.
 //!
 //! ```text
@@ -33,7 +33,7 @@ const CYCLES: usize = 20;
 
 /// Values in, beats out; timing in the module docs.
 #[derive(LogicBlock)]
-pub struct Force {
+pub struct Forces {
     /// Clock; registers change on its rising edge.
     pub clk: Signal<In, Clock>,
     /// Synchronous reset, active high.
@@ -90,7 +90,7 @@ pub struct Force {
 }
 
 kernel_block!(
-    Force,
+    Forces,
     clock clk,
     inputs [
         rst, start, place, value, best_x, best_y, score, found, condition, framing, normalise, rescale, saturations,
@@ -116,7 +116,7 @@ struct Sizes {
     taxels: u64,
 }
 
-impl Force {
+impl Forces {
     /// With the widths of `formats`; `threshold` is in force LSBs, the rounder takes words of `unrounded` bits.
     pub fn new(formats: &Formats, threshold: i64, unrounded: usize) -> Self {
         let f = formats;
@@ -135,7 +135,7 @@ impl Force {
             threshold,
             taxels: 4 * f.quads as u64,
         };
-        let block = Force {
+        let block = Forces {
             clk: Default::default(),
             rst: Default::default(),
             start: Default::default(),
@@ -208,7 +208,7 @@ impl<'k> Status<'k> {
 
 fn kernel(sizes: Sizes) -> Kernel {
     let Sizes { places, value: value_bits, .. } = sizes;
-    let k = Builder::new("force");
+    let k = Builder::new("forces");
     let (rst, start) = (k.input("rst", 1), k.input("start", 1));
     let (place, value) = (k.input("place", places), k.input("value", sizes.word));
     let best = ["best_x", "best_y"].map(|name| k.input(name, position_bits()));
