@@ -373,7 +373,7 @@ impl Logic for Engine {
         self.frame_cycles.begin_frame.next = self.begin_frame.val();
         self.frame_cycles.waits.next = self.complete.val() & self.first.q.val() & !self.hand_over.val();
         self.frame_cycles.hand_over.next = self.hand_over.val() & self.first.q.val();
-        self.frame_cycles.stands.next = self.search.stands.val();
+        self.frame_cycles.stalled.next = self.search.stalled.val();
         self.condition.d.next = self.condition.q.val();
         self.framing.d.next = self.framing.q.val();
         if self.start.val() {

@@ -182,11 +182,11 @@ impl Logic for Engine {
         self.pass_sequencer.clipped.next = self.rounder.clipped.val();
         self.pass_sequencer.round_done.next = self.rounder.done.val();
 
-        comment!("Mixer, shared by fold and unfold");
+        comment!("Butterfly, shared by fold and unfold");
         self.butterfly.word.next = self.shifted.low.val();
-        self.butterfly.valid.next = self.pass_sequencer.mix.val();
-        self.pass_sequencer.mixed.next = self.butterfly.mixed.val();
-        self.pass_sequencer.mixed_valid.next = self.butterfly.mixed_valid.val();
+        self.butterfly.valid.next = self.pass_sequencer.transform.val();
+        self.pass_sequencer.transformed.next = self.butterfly.transformed.val();
+        self.pass_sequencer.transformed_valid.next = self.butterfly.transformed_valid.val();
 
         comment!("Matrix passes");
         self.pass.valid.next = self.pass_sequencer.issue.val();
@@ -211,8 +211,8 @@ impl Logic for Engine {
 
         comment!("Polynomials: unfold, search, banks");
         self.unfold.start.next = self.begin_frame.val();
-        self.unfold.mixed.next = self.butterfly.mixed.val();
-        self.unfold.valid.next = self.butterfly.mixed_valid.val() & self.pass_sequencer.unfolding.val();
+        self.unfold.transformed.next = self.butterfly.transformed.val();
+        self.unfold.valid.next = self.butterfly.transformed_valid.val() & self.pass_sequencer.unfolding.val();
         self.search_sequencer.filling.next = self.pass_sequencer.busy.val();
         self.search_sequencer.start.next = self.pass_sequencer.done.val();
         self.search_sequencer.enabled.next = self.condition.q.val();

@@ -40,11 +40,11 @@ pub struct Forces {
     pub rst: Signal<In, Bit>,
     /// All values are in the bank: start sending.
     pub start: Signal<In, Bit>,
-    /// Row-major index of the taxel to read.
+    /// Row-major index of the taxel to read; valid from the cycle after `start` until the frame's last force.
     pub index: Wire<Out>,
-    /// Place 4·quad + lane of that taxel, one cycle after `index`.
+    /// Place 4·quad + lane of that taxel; one cycle after `index`.
     pub place: Wire<In>,
-    /// Index of the taxel's polynomial, combinational from `place`.
+    /// Index of the taxel's polynomial; combinational from `place`.
     pub wanted: Wire<Out>,
     /// Value p(μ*) of the taxel, signed; one cycle after `wanted`.
     pub value: Wire<In>,
@@ -68,9 +68,9 @@ pub struct Forces {
     pub saturations: Wire<In>,
     /// A frame starts: its cycle count restarts.
     pub frame_begin: Signal<In, Bit>,
-    /// Product for the rounder, signed.
+    /// Product for the rounder, signed; its force word is on `rounded` four cycles later.
     pub product: Wire<Out>,
-    /// Right shift for the rounder.
+    /// Right shift for the rounder; valid with `product`.
     pub round_shift: Wire<Out>,
     /// Word from the rounder, 32 bits signed; four cycles after `product`.
     pub rounded: Wire<In>,

@@ -129,14 +129,7 @@ impl VerilatedBench {
             let memories = memory_folder(design)?;
             let folder = CString::new(memories.path().to_string_lossy().as_bytes()).map_err(|e| fail(e.to_string()))?;
             let handle = start(folder.as_ptr(), RESET_SEED);
-            Ok(VerilatedBench {
-                handle,
-                cycle,
-                free,
-                flip,
-                words: vec![0; words],
-                _library: library,
-            })
+            Ok(VerilatedBench { handle, cycle, free, flip, words: vec![0; words], _library: library })
         }
     }
 
