@@ -253,11 +253,21 @@ pub(crate) fn comments(source: &str) -> BTreeMap<&str, String> {
         }
         let field = line.strip_prefix("pub ").and_then(|field| field.split_once(": "));
         if let Some((name, _)) = field.filter(|(_, ty)| ty.starts_with("Signal<") || ty.starts_with("Wire<")) {
-            found.insert(name, std::mem::take(&mut comment));
+            found.insert(name, without_links(&comment));
         }
         comment.clear();
     }
     found
+}
+
+/// A comment without the targets of its links, which mean nothing outside the docs of the crate.
+fn without_links(comment: &str) -> String {
+    let mut parts = comment.split("](");
+    let mut text = parts.next().unwrap_or_default().to_owned();
+    for part in parts {
+        text.push_str(part.split_once(')').map_or(part, |(_, behind)| behind));
+    }
+    text.replace("[`", "`")
 }
 
 /// A run's values of a block's ports.
@@ -332,6 +342,12 @@ mod tests {
                 assert!(!port.meaning.is_empty() && !port.valid.is_empty(), "{}: {port:?}", block.name);
             }
         }
+    }
+
+    #[test]
+    fn comments_have_no_links() {
+        let source = "/// As `a` of\n/// [`Ram`](super::Ram), or [`b`](B); then.\npub port: Wire<Out>,\n";
+        assert_eq!(comments(source)["port"], "As `a` of `Ram`, or `b`; then.");
     }
 
     #[test]
