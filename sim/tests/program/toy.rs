@@ -22,7 +22,7 @@ fn taps() -> Vec<Tap> {
         name,
         valid: vec![valid.into()],
         word: vec![TapSignal { name: word.into(), bits, signed: true }],
-        fields: 1,
+        fields: vec!["d"],
         field_bits: bits,
     };
     vec![tap("receive", "take", "s_axis_tdata", 12), tap("scale", "scale_valid", "scaled", 32)]
