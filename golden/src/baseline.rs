@@ -9,7 +9,7 @@
 //! | in: frame | n, case 0 to 3 or rows × columns | MPa |
 //! | out: forces | 3 × n | N |
 
-use crate::float::force::{force, threshold};
+use crate::float::forces::{force, threshold};
 use crate::float::objective::{Objective, Sparse};
 use crate::float::orthogonal::Orthogonal;
 use crate::float::pass::Polynomial;

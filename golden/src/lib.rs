@@ -32,7 +32,7 @@
 //! scene ─┬─ sensor ── influence ── matrices ───────────┐
 //!        └─ partition ─┐                               │
 //! frame ── quantise ── reception                        │
-//!    └──── gather ──── float::pass ── float::search ── float::force ── reconstruct
+//!    └──── gather ──── float::pass ── float::search ── float::forces ─ reconstruct
 //!                      v_ij           μ               fx, fy, fz      resultant, errors, flags
 //! ```
 //!

@@ -29,7 +29,7 @@ pub use settings::{references, settings, Setting, MU_MAX};
 pub use truth::FormatErrors;
 
 use crate::fixed::Model;
-use crate::float::force::force;
+use crate::float::forces::force;
 use crate::float::objective::{of_kind, SearchInput};
 use crate::float::pass::Polynomial;
 use crate::float::{Golden, GoldenError};

@@ -15,7 +15,8 @@ use thiserror::Error;
 
 use crate::error::HdlError;
 use crate::language::{Attributes, Hierarchy, SEPARATOR};
-use crate::simulate::{design, Design};
+use crate::simulate::{design, stages, Design};
+use crate::stage_list::PORTS;
 use crate::wire::Word;
 
 /// What a single bit says about its validity when its comment does not.
@@ -24,53 +25,35 @@ const ALWAYS: &str = "in every cycle";
 /// Name of the engine's module where the scene does not matter.
 const ENGINE: &str = "engine";
 
-/// A block: name, instances from the engine on, source.
+/// A described block: instances from the engine on, source.
+#[derive(Clone, Copy)]
 struct Entry {
-    name: &'static str,
     instance: &'static str,
     source: &'static str,
 }
 
-macro_rules! entries {
-    ($($name:literal $instance:literal $file:literal,)+) => {
-        [$(Entry { name: $name, instance: $instance, source: include_str!($file) },)+]
-    };
+impl Entry {
+    /// Name of the stage or block: that of the last instance.
+    fn name(&self) -> &'static str {
+        self.instance.rsplit(SEPARATOR).next().unwrap_or_default()
+    }
 }
 
-/// The stages in the order of the data flow, then blocks that the guide takes as examples.
-static ENTRIES: [Entry; 13] = entries! {
-    "prepare" "prepare" "stages/prepare.rs",
-    "receive" "receive" "stages/receive.rs",
-    "choose" "receive__choose" "stages/choose.rs",
-    "normalise" "normalise" "stages/normalise.rs",
-    "fold" "fold" "stages/fold.rs",
-    "pass" "pass" "stages/pass.rs",
-    "rescale" "rescale" "stages/rescale.rs",
-    "unfold" "unfold" "stages/unfold.rs",
-    "search" "search" "stages/search.rs",
-    "force" "forces" "stages/force.rs",
-    "send" "send" "stages/send.rs",
-    "resultants" "resultants" "stages/resultants.rs",
-    "butterfly" "fold__butterfly" "primitives/arithmetic/butterfly.rs",
-};
+/// Blocks inside stages of the parallel engine that the guide takes as examples.
+const INSIDE: [Entry; 2] = [
+    Entry { instance: "receive__choose", source: include_str!("stages/choose.rs") },
+    Entry { instance: "fold__butterfly", source: include_str!("primitives/arithmetic/butterfly.rs") },
+];
 
-/// The blocks of the serial engine whose ports carry comments in the Verilog.
-static SERIAL: [Entry; 14] = entries! {
-    "receive" "receive" "serial/receive.rs",
-    "reorder" "reorder" "serial/taxel_reorder.rs",
-    "pass_sequencer" "pass_sequencer" "serial/pass_sequencer.rs",
-    "rounder" "rounder" "serial/rounder.rs",
-    "butterfly" "butterfly" "serial/serial_butterfly.rs",
-    "pass" "pass" "serial/pass.rs",
-    "unfold" "unfold" "serial/unfold.rs",
-    "banks" "banks" "serial/banks.rs",
-    "search_sequencer" "search_sequencer" "serial/search_sequencer.rs",
-    "along_x" "along_x" "serial/horner.rs",
-    "along_y" "along_y" "serial/horner.rs",
-    "coefficient_shift" "coefficient_shift" "serial/coefficient_shift.rs",
-    "candidates" "candidates" "serial/candidates.rs",
-    "forces" "forces" "serial/force.rs",
-};
+/// The blocks of an engine whose ports have comments: the stages in the order of the data flow, then those inside.
+fn entries(engine: EngineKind) -> Vec<Entry> {
+    let stages = stages(engine).iter().map(|stage| Entry { instance: stage.name, source: stage.source });
+    let inside: &[Entry] = match engine {
+        EngineKind::Parallel => &INSIDE,
+        EngineKind::Serial => &[],
+    };
+    stages.chain(inside.iter().copied()).collect()
+}
 
 /// Why a block cannot be described.
 #[derive(Debug, Error)]
@@ -127,23 +110,23 @@ pub struct BlockText {
 }
 
 /// Ports of the described blocks at one moment.
-struct Ports {
-    entries: &'static [Entry],
+struct Ports<'a> {
+    entries: &'a [Entry],
     path: Vec<String>,
     /// By instance: name, direction, width, value.
     found: BTreeMap<&'static str, Vec<(String, bool, usize, Word)>>,
 }
 
-impl Ports {
+impl<'a> Ports<'a> {
     /// Of the blocks `entries` of `engine`.
-    fn of(engine: &dyn Design, entries: &'static [Entry]) -> Self {
+    fn of(engine: &dyn Design, entries: &'a [Entry]) -> Self {
         let mut ports = Ports { entries, path: Vec::new(), found: BTreeMap::new() };
         engine.accept("top", &mut ports);
         ports
     }
 }
 
-impl Probe for Ports {
+impl Probe for Ports<'_> {
     fn visit_start_scope(&mut self, name: &str, _node: &dyn Block) {
         self.path.push(name.to_owned());
     }
@@ -184,7 +167,7 @@ fn value(signal: &dyn Atom) -> Word {
 /// # Errors
 /// [`DescribeError::Serial`]; an engine that cannot be built.
 pub fn blocks(model: &Model) -> Result<Vec<BlockText>, DescribeError> {
-    Ok(describe(Ports::of(&*engine(model)?, &ENTRIES)))
+    Ok(describe(Ports::of(&*engine(model)?, &entries(EngineKind::Parallel))))
 }
 
 /// The block `name` of the engine of `model`.
@@ -214,13 +197,10 @@ pub fn block_verilog(model: &Model, name: &str) -> Result<String, DescribeError>
 /// What the Verilog says of a port by the path of its block in the engine, and by its name: meaning, and when it is valid.
 /// The engine's own path is empty.
 pub(crate) fn port_comments(engine: EngineKind) -> impl Fn(&str, &str) -> Option<String> {
-    let (top, entries): (_, &[Entry]) = match engine {
-        EngineKind::Parallel => (include_str!("engine.rs"), &ENTRIES),
-        EngineKind::Serial => (include_str!("serial/engine.rs"), &SERIAL),
-    };
+    let entries = entries(engine);
     move |path, port| {
         let own = || entries.iter().find(|entry| entry.instance == path).map(|entry| entry.source);
-        comments(if path.is_empty() { Some(top) } else { own() }?).remove(port)
+        comments(if path.is_empty() { Some(PORTS) } else { own() }?).remove(port)
     }
 }
 
@@ -230,7 +210,10 @@ pub(crate) fn port_comments(engine: EngineKind) -> impl Fn(&str, &str) -> Option
 /// As [`fn@block`].
 pub fn block_source(model: &Model, name: &str) -> Result<&'static str, DescribeError> {
     let block = block(model, name)?;
-    Ok(ENTRIES.iter().find(|entry| entry.name == block.name).map_or("", |entry| entry.source))
+    Ok(entries(EngineKind::Parallel)
+        .iter()
+        .find(|entry| entry.instance == block.instance)
+        .map_or("", |entry| entry.source))
 }
 
 fn engine(model: &Model) -> Result<Box<dyn Design>, DescribeError> {
@@ -253,9 +236,9 @@ fn describe(mut ports: Ports) -> Vec<BlockText> {
         };
         let ports = ports.found.remove(entry.instance)?.into_iter().map(text).collect();
         let purpose = entry.source.lines().next().and_then(|line| line.strip_prefix("//! ")).unwrap_or_default();
-        Some(BlockText { name: entry.name, instance: entry.instance, purpose: purpose.to_owned(), ports })
+        Some(BlockText { name: entry.name(), instance: entry.instance, purpose: purpose.to_owned(), ports })
     };
-    ENTRIES.iter().filter_map(described).collect()
+    ports.entries.iter().filter_map(described).collect()
 }
 
 /// The comments of the public fields of a source that are signals, by name.
@@ -270,11 +253,21 @@ pub(crate) fn comments(source: &str) -> BTreeMap<&str, String> {
         }
         let field = line.strip_prefix("pub ").and_then(|field| field.split_once(": "));
         if let Some((name, _)) = field.filter(|(_, ty)| ty.starts_with("Signal<") || ty.starts_with("Wire<")) {
-            found.insert(name, std::mem::take(&mut comment));
+            found.insert(name, without_links(&comment));
         }
         comment.clear();
     }
     found
+}
+
+/// A comment without the targets of its links, which mean nothing outside the docs of the crate.
+fn without_links(comment: &str) -> String {
+    let mut parts = comment.split("](");
+    let mut text = parts.next().unwrap_or_default().to_owned();
+    for part in parts {
+        text.push_str(part.split_once(')').map_or(part, |(_, behind)| behind));
+    }
+    text.replace("[`", "`")
 }
 
 /// A run's values of a block's ports.
@@ -289,6 +282,7 @@ pub struct Trace {
 /// The engine in rust-hdl's simulation, with the ports of the described blocks recorded in every cycle.
 pub struct Recorder {
     engine: Box<dyn Design>,
+    entries: Vec<Entry>,
     traces: Vec<Trace>,
 }
 
@@ -299,9 +293,10 @@ impl Recorder {
     /// As [`blocks`].
     pub fn new(model: &Model) -> Result<Self, DescribeError> {
         let engine = engine(model)?;
-        let traces =
-            describe(Ports::of(&*engine, &ENTRIES)).into_iter().map(|block| Trace { block, cycles: Vec::new() });
-        Ok(Recorder { traces: traces.collect(), engine })
+        let entries = entries(EngineKind::Parallel);
+        let blocks = describe(Ports::of(&*engine, &entries));
+        let traces = blocks.into_iter().map(|block| Trace { block, cycles: Vec::new() }).collect();
+        Ok(Recorder { engine, entries, traces })
     }
 
     /// What was recorded, one trace per block.
@@ -312,9 +307,9 @@ impl Recorder {
 
 impl crate::device::Device for Recorder {
     fn cycle(&mut self, inputs: &crate::device::Inputs) -> crate::device::Outputs {
-        let Recorder { engine, traces } = self;
+        let Recorder { engine, entries, traces } = self;
         crate::simulate::cycle(&mut **engine, inputs, |engine| {
-            let mut ports = Ports::of(engine, &ENTRIES);
+            let mut ports = Ports::of(engine, entries);
             for trace in traces {
                 let values = ports.found.remove(trace.block.instance).unwrap_or_default();
                 trace.cycles.push(values.into_iter().map(|(.., value)| value).collect());
@@ -340,13 +335,19 @@ mod tests {
     #[test]
     fn every_port_has_its_meaning_and_says_when_it_is_valid() {
         let all = blocks(&model(true)).unwrap();
-        assert_eq!(all.len(), ENTRIES.len());
+        assert_eq!(all.len(), entries(EngineKind::Parallel).len());
         for block in &all {
             assert!(!block.purpose.is_empty() && block.ports.len() >= 3, "{block:?}");
             for port in &block.ports {
                 assert!(!port.meaning.is_empty() && !port.valid.is_empty(), "{}: {port:?}", block.name);
             }
         }
+    }
+
+    #[test]
+    fn comments_have_no_links() {
+        let source = "/// As `a` of\n/// [`Ram`](super::Ram), or [`b`](B); then.\npub port: Wire<Out>,\n";
+        assert_eq!(comments(source)["port"], "As `a` of `Ram`, or `b`; then.");
     }
 
     #[test]
@@ -362,20 +363,21 @@ mod tests {
 
     #[test]
     fn ports_of_either_engine_have_the_comments_of_its_own_blocks() {
-        for (engine, entries) in [(EngineKind::Parallel, &ENTRIES as &[_]), (EngineKind::Serial, &SERIAL)] {
+        for engine in [EngineKind::Parallel, EngineKind::Serial] {
             let mut model = model(true);
             if engine == EngineKind::Serial {
                 let mut scene = Scene::builtin("eight-by-eight").unwrap();
                 scene.hardware.board = "icebreaker".into();
                 model = Model::new(&scene).unwrap();
             }
-            let (comment, ports) = (port_comments(engine), Ports::of(&*design(&model).unwrap(), entries));
-            for entry in entries {
+            let entries = entries(engine);
+            let (comment, ports) = (port_comments(engine), Ports::of(&*design(&model).unwrap(), &entries));
+            for entry in &entries {
                 for (name, ..) in &ports.found[entry.instance] {
                     assert!(
                         comment(entry.instance, name).is_some_and(|text| !text.is_empty()),
                         "{} {name}",
-                        entry.name
+                        entry.instance
                     );
                 }
             }

@@ -48,8 +48,8 @@ pub struct Tap {
     pub valid: Vec<String>,
     /// Signals whose fields form the word, the first fields first; each holds the same number of fields.
     pub word: Vec<TapSignal>,
-    /// Number of fields in a word.
-    pub fields: usize,
+    /// Names of the fields in a word.
+    pub fields: Vec<&'static str>,
     /// Width of each field in bits, two's complement, 1..=64.
     pub field_bits: u32,
 }
@@ -57,7 +57,7 @@ pub struct Tap {
 impl Tap {
     /// Width of a word in bits.
     pub fn bits(&self) -> usize {
-        self.fields * self.field_bits as usize
+        self.fields.len() * self.field_bits as usize
     }
 }
 

@@ -1,7 +1,7 @@
 //! The parallel engine: all stages connected, one subarray after the other through the same matrices.
 //!
 //! ```text
-//! prepare -> receive -> normalise -> fold -> pass -> rescale -> unfold -> search -> force -> send
+//! prepare -> receive -> normalise -> fold -> pass -> rescale -> unfold -> search -> forces -> send
 //!  s_axis -->  |  frame buffer         |      ^________|  v_ij             |                  |--> m_axis
 //!              '--- magnitude, signs --'                                   '--- μ, score -----'
 //! ```
@@ -24,8 +24,9 @@ use rust_hdl::prelude::*;
 
 use crate::ports::one_of;
 use crate::primitives::{count_bits, largest, BitDelay, CaseCounter, Dff, EnableRegister, FrameCycles};
+use crate::stage_list::engine;
 use crate::stages::{
-    Banks, Fold, Force, Normalise, Pass, Prepare, Receive, ReceivePorts, Rescale, Resultants, Search, SearchPorts,
+    Banks, Fold, Forces, Normalise, Pass, Prepare, Receive, ReceivePorts, Rescale, Resultants, Search, SearchPorts,
     Send, Unfold, Unsearched,
 };
 use crate::wire::Wire;
@@ -81,95 +82,80 @@ impl SearchStage {
     }
 }
 
-/// The parallel engine, the top module of the generated hardware.
-///
-/// ```text
-///                +---------+
-///  s_axis_t* --> | engine  | --> m_axis_t*
-///      clk, rst  +---------+
-/// ```
-/// | port | direction | width | meaning |
-/// |---|---|---|---|
-/// | `s_axis_tdata` | in | `code_bits` | a taxel's code, two's complement; row-major, frame after frame |
-/// | `m_axis_tdata` | out | 96 | `{fz, fy, fx}`, 32 bits signed each, row-major; then the status beats |
-/// | `…tvalid`, `…tready`, `…tlast` | | 1 | AXI-Stream handshake; `tlast` on a frame's last beat |
-///
-/// Reset is synchronous; it clears all control registers, not the data.
-#[derive(LogicBlock)]
-pub struct Engine {
-    /// Clock; registers change on its rising edge.
-    pub clk: Signal<In, Clock>,
-    /// Synchronous reset, active high.
-    pub rst: Signal<In, Bit>,
-    /// A taxel's code, `code_bits` wide, two's complement; valid with `s_axis_tvalid`.
-    pub s_axis_tdata: Wire<In>,
-    /// A beat is offered on `s_axis_tdata`; the sender holds it until `s_axis_tready`.
-    pub s_axis_tvalid: Signal<In, Bit>,
-    /// The block accepts a beat in this cycle.
-    pub s_axis_tready: Signal<Out, Bit>,
-    /// The beat is the last of its frame; valid with `s_axis_tvalid`.
-    pub s_axis_tlast: Signal<In, Bit>,
-    /// `{fz, fy, fx}`, 32 bits signed each, or a status beat; valid with `m_axis_tvalid`.
-    pub m_axis_tdata: Wire<Out>,
-    /// A beat is offered on `m_axis_tdata`; it is held until `m_axis_tready`.
-    pub m_axis_tvalid: Signal<Out, Bit>,
-    /// The receiver accepts a beat in this cycle.
-    pub m_axis_tready: Signal<In, Bit>,
-    /// The beat is the last of its frame; valid with `m_axis_tvalid`.
-    pub m_axis_tlast: Signal<Out, Bit>,
-    pub(crate) prepare: Prepare,
-    pub(crate) receive: ReceiveStage,
-    pub(crate) normalise: Normalise,
-    pub(crate) fold: Fold,
-    pub(crate) pass: Pass,
-    pub(crate) rescale: Rescale,
-    pub(crate) unfold: Unfold,
-    pub(crate) search: SearchStage,
-    pub(crate) forces: Force,
-    send: Send,
-    resultants: Resultants,
-    begins: BitDelay,
-    computing: Dff,
-    first: Dff,
-    filled: Dff,
-    searching: Dff,
-    sending: Dff,
-    condition: Dff,
-    framing: Dff,
-    searched_condition: Dff,
-    searched_first: Dff,
-    searched_last: Dff,
-    searched_framing: Dff,
-    sent_framing: Dff,
-    frame_case: EnableRegister,
-    searched_case: EnableRegister,
-    sent_case: EnableRegister,
-    searched_part: EnableRegister,
-    searched_normalise: EnableRegister,
-    searched_rescale: EnableRegister,
-    searched_saturations: EnableRegister,
-    searched_damaged: EnableRegister,
-    received_frames: EnableRegister,
-    frame_frames: EnableRegister,
-    searched_frames: EnableRegister,
-    frame_cycles: FrameCycles,
-    part: CaseCounter,
-    again: BitDelay,
-    handed: BitDelay,
-    seeks: BitDelay,
-    opens: BitDelay,
-    both_signs: Constant<Bit>,
-    ahead: Constant<Bit>,
-    single: Constant<Bit>,
-    pub(crate) begin_frame: Signal<Local, Bit>,
-    start: Signal<Local, Bit>,
-    leaves: Signal<Local, Bit>,
-    passed: Signal<Local, Bit>,
-    complete: Signal<Local, Bit>,
-    unsent: Signal<Local, Bit>,
-    behind: Signal<Local, Bit>,
-    hand_over: Signal<Local, Bit>,
-    begin_send: Signal<Local, Bit>,
+engine! {
+    /// The parallel engine, the top module of the generated hardware.
+    ///
+    /// ```text
+    ///                +---------+
+    ///  s_axis_t* --> | engine  | --> m_axis_t*
+    ///      clk, rst  +---------+
+    /// ```
+    /// | port | direction | width | meaning |
+    /// |---|---|---|---|
+    /// | `s_axis_tdata` | in | `code_bits` | a taxel's code, two's complement; row-major, frame after frame |
+    /// | `m_axis_tdata` | out | 96 | `{fz, fy, fx}`, 32 bits signed each, row-major; then the status beats |
+    /// | `…tvalid`, `…tready`, `…tlast` | | 1 | AXI-Stream handshake; `tlast` on a frame's last beat |
+    ///
+    /// Reset is synchronous; it clears all control registers, not the data.
+    pub struct Engine {
+        stages {
+            prepare: Prepare => "stages/prepare.rs",
+            receive: ReceiveStage => "stages/receive.rs",
+            normalise: Normalise => "stages/normalise.rs",
+            fold: Fold => "stages/fold.rs",
+            pass: Pass => "stages/pass.rs",
+            rescale: Rescale => "stages/rescale.rs",
+            unfold: Unfold => "stages/unfold.rs",
+            search: SearchStage => "stages/search.rs",
+            forces: Forces => "stages/forces.rs",
+            send: Send => "stages/send.rs",
+            resultants: Resultants => "stages/resultants.rs",
+        }
+        control {
+            begins: BitDelay,
+            computing: Dff,
+            first: Dff,
+            filled: Dff,
+            searching: Dff,
+            sending: Dff,
+            condition: Dff,
+            framing: Dff,
+            searched_condition: Dff,
+            searched_first: Dff,
+            searched_last: Dff,
+            searched_framing: Dff,
+            sent_framing: Dff,
+            frame_case: EnableRegister,
+            searched_case: EnableRegister,
+            sent_case: EnableRegister,
+            searched_part: EnableRegister,
+            searched_normalise: EnableRegister,
+            searched_rescale: EnableRegister,
+            searched_saturations: EnableRegister,
+            searched_damaged: EnableRegister,
+            received_frames: EnableRegister,
+            frame_frames: EnableRegister,
+            searched_frames: EnableRegister,
+            frame_cycles: FrameCycles,
+            part: CaseCounter,
+            again: BitDelay,
+            handed: BitDelay,
+            seeks: BitDelay,
+            opens: BitDelay,
+            both_signs: Constant<Bit>,
+            ahead: Constant<Bit>,
+            single: Constant<Bit>,
+            begin_frame: Signal<Local, Bit>,
+            start: Signal<Local, Bit>,
+            leaves: Signal<Local, Bit>,
+            passed: Signal<Local, Bit>,
+            complete: Signal<Local, Bit>,
+            unsent: Signal<Local, Bit>,
+            behind: Signal<Local, Bit>,
+            hand_over: Signal<Local, Bit>,
+            begin_send: Signal<Local, Bit>,
+        }
+    }
 }
 
 impl Engine {
@@ -180,7 +166,7 @@ impl Engine {
         let counts: Vec<usize> = model.cases().iter().map(|case| case.parts.len()).collect();
         let which = count_bits(counts.len());
         let (prepare, normalise, rescale) = (Prepare::new(model), Normalise::new(bits), Rescale::new(model));
-        let force = Force::new(model);
+        let forces = Forces::new(model);
         let frames = || EnableRegister::new(prepare.frames.width()).constant(!model.prepare.slides());
         let mut engine = Engine {
             clk: Default::default(),
@@ -189,7 +175,7 @@ impl Engine {
             s_axis_tvalid: Default::default(),
             s_axis_tready: Default::default(),
             s_axis_tlast: Default::default(),
-            m_axis_tdata: Wire::new(force.m_axis_tdata.width()),
+            m_axis_tdata: Wire::new(forces.m_axis_tdata.width()),
             m_axis_tvalid: Default::default(),
             m_axis_tready: Default::default(),
             m_axis_tlast: Default::default(),
@@ -198,7 +184,7 @@ impl Engine {
             pass: Pass::new(model),
             unfold: Unfold::new(model),
             search: SearchStage::new(model),
-            forces: force,
+            forces,
             send: Send::new(model),
             resultants: Resultants::new(model.sends_resultants(), &model.scene.sensor, model.grid()),
             begins: BitDelay::new(1),
@@ -407,7 +393,7 @@ impl Logic for Engine {
         self.frame_cycles.begin_frame.next = self.begin_frame.val();
         self.frame_cycles.waits.next = self.complete.val() & self.first.q.val() & !self.hand_over.val();
         self.frame_cycles.hand_over.next = self.hand_over.val() & self.first.q.val();
-        self.frame_cycles.stands.next = self.search.stands.val();
+        self.frame_cycles.stalled.next = self.search.stalled.val();
         self.condition.d.next = self.condition.q.val();
         self.framing.d.next = self.framing.q.val();
         if self.start.val() {
@@ -465,7 +451,7 @@ impl Logic for Engine {
         self.search.enabled.next = self.searched_condition.q.val();
         self.search.ready.next = !self.unsent.val() | !self.single.val();
 
-        comment!("search -> force -> send");
+        comment!("search -> forces -> send");
         self.forces.values.next = self.search.values.val();
         self.forces.values_valid.next = self.search.values_valid.val();
         self.forces.begin_frame.next = self.begin_frame.val();

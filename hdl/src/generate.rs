@@ -1,8 +1,8 @@
 //! Generation of the engine as files: Verilog, memory files, lint waivers, core file, manifest, C header.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
+use std::fmt::Write as _;
 
-use dermis_golden::board::EngineKind;
 use dermis_golden::fixed::plan::interval::frame_interval;
 use dermis_golden::fixed::plan::resources::Memory;
 use dermis_golden::fixed::plan::storage::word_bits;
@@ -23,9 +23,10 @@ use crate::error::HdlError;
 use crate::language::{self, Attributes, Change, Hierarchy};
 use crate::manifest::{seal, GeneratedFile, MANIFEST, MANIFEST_VERSION};
 use crate::primitives::MEMORY_FILE;
-use crate::simulate::design;
+use crate::simulate::{design, stages};
+use crate::state::{state_elements, StateElement};
 use crate::taps::taps;
-use crate::usage::{stages, total, PlacedMemory, Usage};
+use crate::usage::{by_stage, total, PlacedMemory, StageUsage, Usage};
 
 /// The generated hardware of one scene.
 #[derive(Clone, Debug)]
@@ -38,10 +39,12 @@ pub struct Generated {
     pub memories: Vec<PlacedMemory>,
     /// The observed streams between the stages; none for a board.
     pub taps: Vec<Tap>,
+    /// Registers and memories of the engine.
+    pub state: Vec<StateElement>,
     /// Content of `manifest.json`.
     pub manifest: serde_json::Value,
     /// Resources by stage.
-    pub usage: BTreeMap<String, Usage>,
+    pub usage: StageUsage,
     /// The cases left out of a scene that does not list its cases.
     pub dropped: Vec<Refused>,
 }
@@ -80,10 +83,10 @@ impl Generated {
 ///
 /// # Errors
 /// As [`generate`].
-pub(crate) fn usage(model: &Model) -> Result<BTreeMap<String, Usage>, HdlError> {
+pub(crate) fn usage(model: &Model) -> Result<StageUsage, HdlError> {
     let engine = design(model)?;
     let hierarchy = Hierarchy::of(&*engine);
-    Ok(stages(model, &hierarchy, &placed(&hierarchy, model)?))
+    Ok(by_stage(model, &hierarchy, &placed(&hierarchy, model)?))
 }
 
 /// Generates the hardware of `model`. The same model always gives the same bytes.
@@ -106,12 +109,14 @@ pub fn generate_changed(model: &Model, changes: &[Change]) -> Result<Generated, 
     let memories = placed(&hierarchy, model)?;
     let verilog =
         header(model, &top) + &hierarchy.verilog(&top, &attributes(&memories), &port_comments(model.board.engine));
-    let usage = stages(model, &hierarchy, &memories);
+    let usage = by_stage(model, &hierarchy, &memories);
     let dropped = refused(model)?;
     let manifest = manifest(model, &top, &usage, &memories, &dropped);
+    let taps = taps(&*engine);
+    let state = state_elements(&hierarchy, stages(model.board.engine), &memories);
     let mut files = vec![
         file(format!("{top}.v"), verilog),
-        file(format!("{top}.vlt"), waivers(model).to_string()),
+        file(format!("{top}.vlt"), waivers(&hierarchy, &taps)),
         file(MANIFEST.to_string(), format!("{manifest:#}\n")),
         file("dermis_link.h".to_string(), c_header()),
     ];
@@ -119,7 +124,7 @@ pub fn generate_changed(model: &Model, changes: &[Change]) -> Result<Generated, 
     let names: Vec<&str> = files.iter().map(|file| file.name.as_str()).collect();
     let core = core_file(&top, &model.scene.name, &names);
     files.push(file(format!("{top}.core"), core));
-    let mut generated = Generated { top, files, memories, taps: taps(&*engine), manifest, usage, dropped };
+    let mut generated = Generated { top, files, memories, taps, state, manifest, usage, dropped };
     generated.seal();
     Ok(generated)
 }
@@ -162,12 +167,18 @@ pub(crate) fn top_name(scene: &str) -> String {
     format!("dermis_{}", scene.chars().map(tame).collect::<String>())
 }
 
-/// Waivers of Verilator warnings.
-fn waivers(model: &Model) -> &'static str {
-    match model.board.engine {
-        EngineKind::Parallel => include_str!("waivers.vlt"),
-        EngineKind::Serial => include_str!("serial/waivers.vlt"),
+/// Waivers of Verilator warnings: those that hold for every scene, and the signals of the taps that only a test bench reads.
+fn waivers(hierarchy: &Hierarchy, taps: &[Tap]) -> String {
+    let unread: BTreeSet<&str> =
+        hierarchy.kernels().find(|(path, _)| path.is_empty()).map_or_else(BTreeSet::new, |(_, top)| top.unread());
+    let signals = taps.iter().flat_map(|tap| tap.valid.iter().chain(tap.word.iter().map(|signal| &signal.name)));
+    let observed: BTreeSet<&str> = signals.map(String::as_str).filter(|name| unread.contains(name)).collect();
+    let mut text = include_str!("waivers.vlt").to_owned();
+    text.push_str("// \"Signal is not used\": taps that the test bench observes; synthesis removes them.\n");
+    for name in observed {
+        let _ = writeln!(text, "lint_off -rule UNUSEDSIGNAL -file \"*.v\" -match \"Signal is not used: '{name}'\"");
     }
+    text
 }
 
 fn header(model: &Model, top: &str) -> String {
@@ -222,7 +233,7 @@ fn case(model: &Model, case: &CasePlan) -> serde_json::Value {
 fn manifest(
     model: &Model,
     top: &str,
-    usage: &BTreeMap<String, Usage>,
+    usage: &StageUsage,
     memories: &[PlacedMemory],
     dropped: &[Refused],
 ) -> serde_json::Value {
@@ -271,7 +282,7 @@ fn manifest(
         },
         "resources": {
             "total": total(usage),
-            "stages": usage,
+            "stages": usage.iter().copied().collect::<BTreeMap<_, _>>(),
             "memories": memories,
         },
         "cycles": cycles(|searched| Cycles::of(model, searched), model.parts().len()),

@@ -1,7 +1,7 @@
 //! Dermis in hardware: the fixed-point pipeline as a rust-hdl description, from which the Verilog is generated.
 //!
 //! ```text
-//! codes → prepare → receive → normalise → fold → pass → rescale → unfold → search → force → send → beats, status
+//! codes → prepare → receive → normalise → fold → pass → rescale → unfold → search → forces → send → beats, status
 //! ```
 //! [`engine`] connects the [`stages`], built from [`primitives`]; [`serial`] is the engine for small devices; [`link`]
 //! puts either behind a UART or an SPI. All widths come from the formats of the bit-true model.
@@ -35,6 +35,7 @@ pub mod manifest;
 pub mod primitives;
 pub mod serial;
 pub mod stages;
+pub mod state;
 pub mod usage;
 pub mod verilator;
 pub mod wire;
@@ -44,6 +45,7 @@ mod error;
 mod generate;
 mod ports;
 mod simulate;
+mod stage_list;
 mod taps;
 
 pub use error::HdlError;

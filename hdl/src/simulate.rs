@@ -8,6 +8,7 @@ use crate::device::{Device, Inputs, Outputs};
 use crate::error::HdlError;
 use crate::language::Hierarchy;
 use crate::primitives::{CALIBRATION_FILE, COLUMN_FILE};
+use crate::stage_list::Stage;
 use crate::taps::{words, Observed};
 use crate::wire::Word;
 use crate::{engine, serial};
@@ -70,6 +71,14 @@ design!(engine::Engine, |engine: &engine::Engine| {
 });
 
 design!(serial::Engine, |engine: &serial::Engine| engine.pass.memory_files());
+
+/// The stages of an engine in the order of the data flow.
+pub(crate) fn stages(engine: EngineKind) -> &'static [Stage] {
+    match engine {
+        EngineKind::Parallel => engine::Engine::STAGES,
+        EngineKind::Serial => serial::Engine::STAGES,
+    }
+}
 
 /// The engine of `model`, after rust-hdl's checks.
 pub(crate) fn design(model: &Model) -> Result<Box<dyn Design>, HdlError> {

@@ -14,6 +14,12 @@ const SEARCH_FIELD: u32 = 32;
 /// Field width of the tap of `choose`, in bits: the index of a case, and a sign bit.
 const CHOICE_FIELD: u32 = 3;
 
+/// Fields of a quad of taxels, by the quadrant of the subarray they lie in.
+const TAXELS: [&str; 4] = ["upper_left", "upper_right", "lower_left", "lower_right"];
+
+/// Fields of a quad of parities, along the rows and along the columns.
+const PARITIES: [&str; 4] = ["even_even", "even_odd", "odd_even", "odd_odd"];
+
 /// A signal whose width and value can be read.
 pub(crate) trait Signalled: Atom {
     /// The current value, zero beyond the width.
@@ -54,8 +60,8 @@ pub(crate) struct Stream<'a> {
     valid: &'a [(&'a Path, bool)],
     /// Signals of the word, the first fields first.
     parts: &'a [Part<'a>],
-    /// Fields in each of `parts`.
-    count: usize,
+    /// Names of the fields in each of `parts`; none if each is one field of the signal's own name.
+    fields: &'a [&'static str],
     /// Width of a field in bits, if not that of the signal's fields.
     field_bits: Option<u32>,
 }
@@ -68,24 +74,31 @@ impl Stream<'_> {
             TapSignal { name: name(path), bits: signal.bits() as u32, signed }
         };
         let word: Vec<TapSignal> = self.parts.iter().map(signal).collect();
+        let own = self.parts.iter().filter_map(|part| part.path.last().copied());
+        let fields: Vec<&str> = if self.fields.is_empty() { own.collect() } else { self.fields.to_vec() };
         Tap {
             name: self.name,
             valid: self.valid.iter().map(|(path, _)| name(path)).collect(),
-            fields: self.count * word.len(),
-            field_bits: self.field_bits.unwrap_or(word[0].bits / self.count as u32),
+            field_bits: self.field_bits.unwrap_or(word[0].bits / self.count() as u32),
+            fields,
             word,
         }
+    }
+
+    /// Fields in each signal of the word.
+    fn count(&self) -> usize {
+        self.fields.len().max(1)
     }
 
     /// The fields of the word that passes in this cycle.
     fn sample(&self) -> Option<Vec<i64>> {
         let fields = |part: &Part| {
-            let (word, bits, signed) = (part.signal.word(), part.signal.bits() / self.count, part.signed);
+            let (word, bits, signed) = (part.signal.word(), part.signal.bits() / self.count(), part.signed);
             let field = move |index| match signed {
                 true => word.signed(index, bits),
                 false => word.field(index * bits, bits) as i64,
             };
-            (0..self.count).map(field)
+            (0..self.count()).map(field)
         };
         self.valid.iter().all(|(_, high)| *high).then(|| self.parts.iter().flat_map(fields).collect())
     }
@@ -111,13 +124,13 @@ pub(crate) fn words(design: &dyn Observed) -> Vec<Option<Vec<i64>>> {
     words
 }
 
-/// Declares the streams of an engine, one a line: `name: valid signals => [signals of the word; fields in each]`. `as`
-/// gives the fields a width other than that of their signals; `if` names the method that says whether the engine has the
-/// stream, and `by` the method that says how many fields there are.
+/// Declares the streams of an engine, one a line: `name: valid signals => [signals of the word; names of the fields in
+/// each]`. `as` gives the fields a width other than that of their signals; `if` names the method that says whether the
+/// engine has the stream, and `by` the method that says how many of the fields there are.
 macro_rules! streams {
     ($engine:ty {$(
         $name:ident $(if $($chosen:ident).+)?: $($($valid:ident).+)&+
-            => [$($sign:ident $($part:ident).+),+ $(; $count:literal)? $(; by $($counted:ident).+)?] $(as $bits:ident)?,
+            => [$($sign:ident $($part:ident).+),+ $(; $fields:ident $(by $($counted:ident).+)?)?] $(as $bits:ident)?,
     )+}) => {
         impl Observed for $engine {
             fn streams(&self, visit: &mut dyn FnMut(&Stream)) {
@@ -130,12 +143,25 @@ macro_rules! streams {
                             signed: is_signed!($sign),
                             signal: &self.$($part).+,
                         }),+],
-                        count: [1, $($count,)? $(self.$($counted).+(),)?].into_iter().product(),
+                        fields: fields!(self $($fields $($($counted).+)?)?),
                         field_bits: [$($bits)?].first().copied(),
                     });
                 })+
             }
         }
+    };
+}
+
+/// Names of the fields in each signal of a word.
+macro_rules! fields {
+    ($engine:ident) => {
+        &[]
+    };
+    ($engine:ident $fields:ident) => {
+        &$fields
+    };
+    ($engine:ident $fields:ident $($counted:ident).+) => {
+        &$fields[..$engine.$($counted).+()]
     };
 }
 
@@ -152,26 +178,26 @@ macro_rules! is_signed {
 streams!(engine::Engine {
     receive: receive.accept => [signed receive.taken_word],
     choose if receive.chooses: begin_frame => [unsigned receive.which] as CHOICE_FIELD,
-    normalise: fold.normalised_valid => [signed normalise.shifted; 4],
-    fold: fold.folded_valid => [signed fold.folded; 4],
-    pass: pass.quad_valid => [signed pass.quad; 4],
-    rescale: rescale.words_valid => [signed rescale.words; 4],
-    unfold: unfold.taxels_valid => [signed unfold.taxels; 4],
+    normalise: fold.normalised_valid => [signed normalise.shifted; TAXELS],
+    fold: fold.folded_valid => [signed fold.folded; PARITIES],
+    pass: pass.quad_valid => [signed pass.quad; PARITIES],
+    rescale: rescale.words_valid => [signed rescale.words; PARITIES],
+    unfold: unfold.taxels_valid => [signed unfold.taxels; TAXELS],
     search: search.compared
         => [signed search.best_x, signed search.best_y, signed search.score, unsigned search.taken] as SEARCH_FIELD,
-    force: search.values_valid => [signed search.values; by search.width],
+    forces: search.values_valid => [signed search.values; TAXELS by search.width],
 });
 
 streams!(serial::Engine {
     receive: receive.accept => [signed receive.s_axis_tdata],
     normalise: pass_sequencer.normalised_valid => [signed rounder.rounded],
-    fold: butterfly.quad_valid & pass_sequencer.folding => [signed butterfly.quad; 4],
-    pass: pass.quad_valid => [signed pass.quad; 4],
+    fold: butterfly.quad_valid & pass_sequencer.folding => [signed butterfly.quad; PARITIES],
+    pass: pass.quad_valid => [signed pass.quad; PARITIES],
     rescale: pass_sequencer.rescaled_valid => [signed rounder.rounded],
     unfold: unfold.taxel_valid => [signed unfold.taxel],
     search: search_sequencer.compared
         => [signed search_sequencer.best_x, signed search_sequencer.best_y, signed search_sequencer.score, unsigned search_sequencer.taken] as SEARCH_FIELD,
-    force: search_sequencer.value_valid => [signed coefficient_shift.value],
+    forces: search_sequencer.value_valid => [signed coefficient_shift.value],
 });
 
 #[cfg(test)]
@@ -198,7 +224,7 @@ mod tests {
         let (_, top) = hierarchy.kernels().find(|(path, _)| path.is_empty()).unwrap();
         let bits = |name: &str| top.signal_of(name).map(|id| top.signals[id].ty.bits as u32);
         for tap in &taps {
-            let each = (tap.fields / tap.word.len()) as u32;
+            let each = (tap.fields.len() / tap.word.len()) as u32;
             assert!(tap.valid.iter().all(|name| bits(name) == Some(1)), "{tap:?}");
             for signal in &tap.word {
                 assert_eq!(bits(&signal.name), Some(signal.bits), "{}", signal.name);
@@ -217,10 +243,12 @@ mod tests {
 
     #[test]
     fn signals_are_in_the_top_module() {
-        const STAGES: [&str; 8] = ["receive", "normalise", "fold", "pass", "rescale", "unfold", "search", "force"];
+        const STAGES: [&str; 8] = ["receive", "normalise", "fold", "pass", "rescale", "unfold", "search", "forces"];
         let parallel = checked(&model(|_| {}));
         assert_eq!(names(&parallel), STAGES);
         assert_eq!(parallel[0].valid, ["receive__accept"]);
+        assert_eq!((&parallel[0].fields[..], &parallel[2].fields[..]), (&["taken_word"][..], &PARITIES[..]));
+        assert_eq!(parallel[6].fields, ["best_x", "best_y", "score", "taken"]);
         let serial = model(|scene| scene.hardware.board = "icebreaker".into());
         assert_eq!(serial.board.engine, EngineKind::Serial);
         let serial = checked(&serial);

@@ -1,45 +1,13 @@
 //! Resources of a generated design by stage: block RAMs and multipliers exact, flip-flops and LUTs estimated.
 
-use std::collections::BTreeMap;
-
 use dermis_golden::board::Board;
 use dermis_golden::fixed::plan::resources::Memory;
 use dermis_golden::fixed::Model;
 use serde::Serialize;
 
 use crate::language::{distributed_luts, Hierarchy, SEPARATOR};
-
-/// Instance names of the stages, in pipeline order: parallel engine, then serial engine. Blocks outside any stage count
-/// as `engine`.
-pub const STAGES: [&str; 27] = [
-    "prepare",
-    "receive",
-    "normalise",
-    "fold",
-    "pass",
-    "rescale",
-    "unfold",
-    "search",
-    "forces",
-    "send",
-    "resultants",
-    "reorder",
-    "pass_sequencer",
-    "rounder",
-    "butterfly",
-    "raw",
-    "banks",
-    "search_sequencer",
-    "along_x",
-    "transposed",
-    "along_y",
-    "coefficient_shift",
-    "candidates",
-    "score",
-    "floors",
-    "totals",
-    "engine",
-];
+use crate::simulate;
+use crate::stage_list::{Stage, CONTROL};
 
 /// Resources of a part of the design.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
@@ -95,16 +63,23 @@ impl std::ops::AddAssign for Usage {
     }
 }
 
+/// Usage by stage in the order of the data flow; last that of the blocks outside any stage, as `engine`.
+pub type StageUsage = Vec<(&'static str, Usage)>;
+
 /// The stage of the block with instance path `block`; `engine` if it belongs to none.
-pub fn stage(block: &str) -> &str {
-    block.split(SEPARATOR).next().filter(|stage| STAGES.contains(stage)).unwrap_or("engine")
+pub(crate) fn stage(stages: &[Stage], block: &str) -> &'static str {
+    let instance = block.split(SEPARATOR).next();
+    stages.iter().find(|stage| Some(stage.name) == instance).map_or(CONTROL, |stage| stage.name)
 }
 
-/// Usage of each stage by its instance name; blocks outside any stage under `engine`.
-pub(crate) fn stages(model: &Model, hierarchy: &Hierarchy, memories: &[PlacedMemory]) -> BTreeMap<String, Usage> {
-    let mut all: BTreeMap<String, Usage> = BTreeMap::new();
+/// Usage of each stage of the engine of `model`.
+pub(crate) fn by_stage(model: &Model, hierarchy: &Hierarchy, memories: &[PlacedMemory]) -> StageUsage {
+    let list = simulate::stages(model.board.engine);
+    let names = list.iter().map(|stage| stage.name).chain([CONTROL]);
+    let mut all: StageUsage = names.map(|name| (name, Usage::default())).collect();
     let mut add = |block: &str, usage: Usage| {
-        *all.entry(stage(block).to_string()).or_default() += usage;
+        let own = stage(list, block);
+        all.iter_mut().filter(|(name, _)| *name == own).for_each(|(_, sum)| *sum += usage);
     };
     for (block, kernel) in hierarchy.kernels() {
         let own = memories.iter().filter(|memory| memory.block == block).map(|memory| memory.array.as_str());
@@ -115,16 +90,15 @@ pub(crate) fn stages(model: &Model, hierarchy: &Hierarchy, memories: &[PlacedMem
         add(block, Usage { block_rams: planned.block_rams, luts: luts_of(planned), ..Usage::default() });
     }
     for &(stage, multipliers) in &model.resources.multipliers {
-        // Verilog keeps the word `force` for itself.
-        add(if stage == "force" { "forces" } else { stage }, Usage { multipliers, ..Usage::default() });
+        add(stage, Usage { multipliers, ..Usage::default() });
     }
     all
 }
 
 /// The sum over all stages.
-pub fn total(stages: &BTreeMap<String, Usage>) -> Usage {
+pub fn total(stages: &StageUsage) -> Usage {
     let mut sum = Usage::default();
-    stages.values().for_each(|&usage| sum += usage);
+    stages.iter().for_each(|&(_, usage)| sum += usage);
     sum
 }
 

@@ -50,7 +50,7 @@ pages! {
     "architecture/rescale.md" rescale,
     "architecture/unfold.md" unfold,
     "architecture/search.md" search,
-    "architecture/force.md" force,
+    "architecture/forces.md" forces,
     "architecture/send.md" send,
     "architecture/resultants.md" resultants,
     "architecture/blocks.md" blocks,

@@ -2,7 +2,7 @@
 //!
 //! ```text
 //! codes → prepare → receive → choose
-//!       → normalise → fold → pass → rescale → unfold → search → force → send → beats, status
+//!       → normalise → fold → pass → rescale → unfold → search → forces → send → beats, status
 //!                             ↑________|  v_ij of the next degree
 //! ```
 //! Each stage is one file in [`stages`] and one file of the same name in the hardware description. The [`Trace`] keeps

@@ -7,7 +7,7 @@
 use super::model::Model;
 use super::plan::cycles::{BeatCycles, Cycles};
 use super::stages::choose;
-use super::stages::force::Force;
+use super::stages::forces::Force;
 use super::stages::prepare::Prepared;
 use super::stages::receive::mask_dead;
 use super::stages::resultants::{self, sums};
@@ -43,7 +43,7 @@ pub struct Trace {
 }
 
 /// Stages that pass on single words, not quads, in the serial engine.
-const SINGLE_WORDS: [&str; 4] = ["normalise", "rescale", "unfold", "force"];
+const SINGLE_WORDS: [&str; 4] = ["normalise", "rescale", "unfold", "forces"];
 
 impl Model {
     /// Computes one reconstruction from its `codes`, `code_bits` wide: 2^average frames, each row-major over the array;
@@ -110,7 +110,7 @@ impl Model {
             quads("rescale", |s| &s.rescaled),
             quads("unfold", |s| &s.unfolded),
             Stage { name: "search", words: sweeps.map(candidate).collect() },
-            quads("force", |s| &s.found.values),
+            quads("forces", |s| &s.found.values),
         ];
         split_values(&mut stages, self.formats().search_width);
         let choice = if self.chooses() { choose::LATENCY } else { 0 };
@@ -128,9 +128,9 @@ impl Model {
     }
 }
 
-/// The values of stage `force` as a search of `width` taxels per cycle passes them on.
+/// The values of stage `forces` as a search of `width` taxels per cycle passes them on.
 fn split_values(stages: &mut [Stage], width: usize) {
-    for stage in stages.iter_mut().filter(|stage| stage.name == "force") {
+    for stage in stages.iter_mut().filter(|stage| stage.name == "forces") {
         stage.words = stage.words.iter().flat_map(|quad| quad.chunks(width).map(<[i64]>::to_vec)).collect();
     }
 }

@@ -3,7 +3,7 @@
 use super::plan::contents::{CasePlan, Plan};
 use super::stages::pass::{join_limbs, pass, swap, Operands};
 use super::stages::search::{search, Block, SearchResult};
-use super::stages::{fold, force, normalise, receive, rescale, unfold};
+use super::stages::{fold, forces, normalise, receive, rescale, unfold};
 use super::words::formats::force_shift;
 use super::words::schedule::{by_limbs, is_transposed, schedule, EXPONENTS};
 use crate::board::EngineKind;
@@ -99,11 +99,11 @@ impl SubarrayTrace {
     }
 
     /// Forces of the subarray's taxels, row-major in it; `threshold` is in force LSBs.
-    pub fn forces(&self, case: &CasePlan, threshold: i64) -> Vec<force::Force> {
+    pub fn forces(&self, case: &CasePlan, threshold: i64) -> Vec<forces::Force> {
         let formats = &case.formats;
-        let mu = self.found.position.map(|x| force::mu_word(formats, x));
+        let mu = self.found.position.map(|x| forces::mu_word(formats, x));
         let shift = force_shift(formats, self.normalise, self.rescale);
         let values = case.layout().unpack(&self.found.values);
-        values.into_iter().map(|value| force::force(formats, value, mu, shift, threshold)).collect()
+        values.into_iter().map(|value| forces::force(formats, value, mu, shift, threshold)).collect()
     }
 }

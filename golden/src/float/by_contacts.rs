@@ -11,7 +11,7 @@
 //! | out: regions | μ, centre, load, taxels | –, mm, N |
 
 use super::contacts::{Contacts, MeasuredStress, Solver};
-use super::force::threshold;
+use super::forces::threshold;
 use super::golden::{EngineInput, Golden};
 use super::objective::{Objective, Sparse};
 use super::pass::Polynomial;

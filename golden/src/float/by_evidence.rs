@@ -3,7 +3,7 @@
 //! The array is one subarray, whatever its contacts; its μ is the ratio of the resultants. Noise of zero means that the
 //! scene states none: it is found from the frame.
 
-use super::force::threshold;
+use super::forces::threshold;
 use super::golden::{CaseOutcome, EngineInput, Golden};
 use crate::checks::COUNTS_FROM;
 use crate::evidence::{ContactEstimate, Evidence};

@@ -6,7 +6,7 @@
 //! | adaptive | the whole array first, to find the contacts; then the case that `adaptive` chooses |
 //! | contacts | the whole array first; then its regions, each with its own μ |
 
-use super::force::{force, threshold};
+use super::forces::{force, threshold};
 use super::objective::taxels::Taxels;
 use super::objective::{of_kind, Estimate, Objective, SearchInput};
 use super::orthogonal::{truncation, Orthogonal, OrthogonalError};

@@ -6,7 +6,7 @@
 //! | [`pass`] | b, matrices | v_ij, the polynomial p(μ) |
 //! | [`objective`] | p | its score |
 //! | [`search`] | v_ij, objective | μ |
-//! | [`force`] | p(μ), μ | fx, fy, fz |
+//! | [`forces`] | p(μ), μ | fx, fy, fz |
 //!
 //! With `partition.case = "contacts"` there are two more: [`segment`] assigns a region to each contact, [`contacts`]
 //! finds the μ of each region.
@@ -20,7 +20,7 @@
 //! that depend on the frame, `by_evidence` the estimators that take the place of the search.
 
 pub mod contacts;
-pub mod force;
+pub mod forces;
 pub mod objective;
 pub mod orthogonal;
 pub mod pass;

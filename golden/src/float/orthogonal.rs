@@ -114,7 +114,7 @@ pub fn truncation(x: &Forces, w: &Forces) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::float::force::force;
+    use crate::float::forces::force;
     use crate::float::pass::{solve_direct, Polynomial};
     use crate::frame::Frame;
     use crate::scene::Scene;

@@ -13,7 +13,7 @@
 //!
 //! 1 + d(d + 1) matrix-vector products of n²/4 multiplications in the basis of mirror parities
 //! ([`crate::symmetry::folded`]). The remainder of the series is of the order r^(d+1) ([`crate::matrices`]). Feeds
-//! `search` and `force`.
+//! `search` and `forces`.
 
 #[cfg(test)]
 mod tests;

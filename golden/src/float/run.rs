@@ -8,7 +8,7 @@
 //! | `input.unipolar` | the tension of clipped taxels is estimated, `unipolar` |
 //! | `output.forces` | resultants instead of forces per taxel |
 
-use super::force::force;
+use super::forces::force;
 use super::golden::{Golden, GoldenError};
 use super::pass::Polynomial;
 use super::unipolar::{fill_clipped, misfit};

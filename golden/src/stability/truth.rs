@@ -12,7 +12,7 @@
 
 use super::extended;
 use crate::errors::Errors;
-use crate::float::force::force;
+use crate::float::forces::force;
 use crate::frame::{Forces, Frame};
 use crate::matrices::Matrices;
 use crate::scene::Scene;

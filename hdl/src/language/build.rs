@@ -94,9 +94,11 @@ impl Builder {
 
     /// A register that takes `value` at the clock edge while `reset` is 1; in a domain of its own, at once.
     pub fn state<'k>(&'k self, name: &str, ty: Type, reset: Expr<'k>, value: u64) -> Net<'k> {
-        let (condition, domain) = (reset.bit("reset").id, self.domain.get());
+        let (condition, domain) = (reset.id, self.domain.get());
         if domain.is_some() {
             self.input_of(condition, "an asynchronous reset");
+        } else if reset.bits() != 1 {
+            reset.width_error(format!("a reset of {} bits", reset.bits()));
         }
         self.declare(
             name,
@@ -183,7 +185,7 @@ impl Builder {
 
     /// Makes the assignments of `body` under `condition`; outside, and where it is 0, registers keep what they have.
     pub fn when<'k>(&'k self, condition: Expr<'k>, body: impl FnOnce()) {
-        let mut all = condition.bit("condition");
+        let mut all = condition;
         if let Some(&outer) = self.conditions.borrow().last() {
             all = self.expression(outer) & all;
         }
@@ -378,7 +380,10 @@ impl<'k> MemoryPort<'k> {
         if data.ty().bits != self.bits {
             data.width_error(format!("a word of the memory has {} bits", self.bits));
         }
-        let write = Write { enable: enable.bit("write enable").id, address: address.id, data: data.id };
+        if enable.bits() != 1 {
+            enable.width_error(format!("a write enable of {} bits", enable.bits()));
+        }
+        let write = Write { enable: enable.id, address: address.id, data: data.id };
         self.builder.kernel.borrow_mut().memories[self.memory].writes.push(write);
     }
 

@@ -91,7 +91,7 @@ impl Change {
             Kind::Value(value) => {
                 let builder = Builder::over(kernel.clone());
                 let node = value(&builder).assigned_to(id).id;
-                let mut changed = builder.finish();
+                let mut changed = builder.kernel.into_inner();
                 changed.drive(id, node);
                 changed
             }
@@ -99,7 +99,7 @@ impl Change {
                 let builder = Builder::over(kernel.clone());
                 let [from, to] = pair(&builder);
                 let (from, to) = (from.id, to.id);
-                let mut changed = builder.finish();
+                let mut changed = builder.kernel.into_inner();
                 if changed.ty(from) != changed.ty(to) {
                     return Err(self.refused("would change in type"));
                 }

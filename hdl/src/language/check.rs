@@ -1,7 +1,7 @@
 //! Checks of a finished kernel, and expressions as text for messages.
 
 use super::error::KernelError;
-use super::kernel::{Binary, Kernel, Node, NodeId, Role, Unary};
+use super::kernel::{Binary, Defect, Kernel, Node, NodeId, Role, Unary};
 
 /// Nesting after which an expression in a message is abbreviated.
 const DEPTH: usize = 4;
@@ -9,6 +9,9 @@ const DEPTH: usize = 4;
 impl Kernel {
     /// Adds what is wrong with the finished kernel to its errors.
     pub(crate) fn check(&mut self) {
+        let defects: Vec<KernelError> =
+            std::mem::take(&mut self.defects).into_iter().map(|(node, defect)| self.defective(node, defect)).collect();
+        self.errors.splice(..0, defects);
         let unassigned = |signal: &&super::kernel::Signal| signal.value.is_none() && signal.role != Role::Input;
         let unassigned: Vec<String> =
             self.signals.iter().filter(unassigned).map(|signal| signal.name.clone()).collect();
@@ -17,12 +20,27 @@ impl Kernel {
             .extend(unassigned.into_iter().map(|signal| KernelError::Unassigned { block: block.clone(), signal }));
         let roots: Vec<NodeId> = self.signals.iter().filter_map(|signal| signal.value).collect();
         if let Err(wires) = self.order(&[roots, self.edge_roots()].concat()) {
-            let signals: Vec<&str> = wires.iter().map(|&wire| self.signals[wire].name.as_str()).collect();
-            let signals = signals.join(", ");
-            let value = wires.first().and_then(|&wire| self.signals[wire].value);
-            let expression = value.map(|value| self.describe(value)).unwrap_or_default();
-            self.errors.push(KernelError::Loop { block, signals, expression });
+            let names: Vec<&str> = wires.iter().map(|&wire| self.signals[wire].name.as_str()).collect();
+            let (signal, through) = (names.first().copied().unwrap_or_default().to_owned(), names.join(", "));
+            let expression = self.value_of(&signal);
+            self.errors.push(KernelError::Loop { block, signal, through, expression });
         }
+    }
+
+    /// The error of a defect in the expression `node`.
+    fn defective(&self, node: NodeId, defect: Defect) -> KernelError {
+        let (block, expression) = (self.block.clone(), self.describe(node));
+        let signal = self.taker_of(node).unwrap_or("(none)").to_owned();
+        match defect {
+            Defect::MixedSigns => KernelError::MixedSigns { block, signal, expression },
+            Defect::Width(reason) => KernelError::Width { block, signal, expression, reason },
+        }
+    }
+
+    /// The value of the signal `name` as text for a message; empty if it has none.
+    pub(crate) fn value_of(&self, name: &str) -> String {
+        let value = self.signal_of(name).and_then(|id| self.signals[id].value);
+        value.map(|value| self.describe(value)).unwrap_or_default()
     }
 
     /// The expression of `node` as text for a message.

@@ -6,10 +6,12 @@ use thiserror::Error;
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 pub enum KernelError {
     /// Signed and unsigned operands, or a value of the other signedness than its signal.
-    #[error("block {block}: `{expression}` mixes signed and unsigned")]
+    #[error("block {block}, signal {signal}: `{expression}` mixes signed and unsigned")]
     MixedSigns {
         /// Name of the block.
         block: String,
+        /// Name of the signal or memory that takes the value.
+        signal: String,
         /// The expression.
         expression: String,
     },
@@ -28,10 +30,12 @@ pub enum KernelError {
         room: usize,
     },
     /// Operands of widths that the operator cannot take.
-    #[error("block {block}: `{expression}`: {reason}")]
+    #[error("block {block}, signal {signal}: `{expression}`: {reason}")]
     Width {
         /// Name of the block.
         block: String,
+        /// Name of the signal or memory that takes the value.
+        signal: String,
         /// The expression.
         expression: String,
         /// What is wrong with its widths.
@@ -56,13 +60,15 @@ pub enum KernelError {
         expression: String,
     },
     /// A wire depends on itself in the same cycle.
-    #[error("block {block}: combinational loop through {signals}: `{expression}`")]
+    #[error("block {block}, signal {signal}: combinational loop through {through}: `{expression}`")]
     Loop {
-        /// Name of the block.
+        /// Name or path of the block.
         block: String,
-        /// Names of its wires, separated by commas.
-        signals: String,
-        /// Value of the first of them.
+        /// A wire of the loop in that block.
+        signal: String,
+        /// All wires of the loop, separated by commas.
+        through: String,
+        /// Value of `signal`.
         expression: String,
     },
     /// A name that is used twice or is no Verilog identifier.

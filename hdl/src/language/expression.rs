@@ -18,7 +18,7 @@ use std::fmt::{Display, Formatter};
 use std::ops::{Add, BitAnd, BitOr, BitXor, Mul, Not, Sub};
 
 use super::error::KernelError;
-use super::kernel::{Binary, Kernel, Node, NodeId, SignalId, Type, Unary};
+use super::kernel::{Binary, Defect, Kernel, Node, NodeId, SignalId, Type, Unary};
 
 /// Widest operand of a sum, product, comparison by size or shift by a signal.
 pub const ARITHMETIC_BITS: usize = 127;
@@ -83,7 +83,12 @@ impl<'k> Expr<'k> {
 
     /// Records that the expression has an impossible width.
     pub(super) fn width_error(self, reason: String) {
-        self.kernel.borrow_mut().width_error(self.id, reason);
+        self.defect(Defect::Width(reason));
+    }
+
+    /// Records a defect. The expression stays what it is, so that the signal that takes it can be named.
+    fn defect(self, defect: Defect) {
+        self.kernel.borrow_mut().defects.push((self.id, defect));
     }
 
     /// The node, if it is a constant.
@@ -121,22 +126,23 @@ impl<'k> Expr<'k> {
     /// The same number with `bits` bits, by zeros or by its sign.
     pub fn extend(self, bits: usize) -> Self {
         let ty = self.ty();
-        if bits < ty.bits {
-            self.width_error(format!("{} bits cannot be extended to {bits}", ty.bits));
+        if bits == ty.bits {
             return self;
         }
-        match bits == ty.bits {
-            true => self,
-            false => self.node(Node::Extend(self.id), Type { bits, ..ty }),
+        let node = self.node(Node::Extend(self.id), Type { bits, ..ty });
+        if bits < ty.bits {
+            node.width_error(format!("{} bits cannot be extended to {bits}", ty.bits));
         }
+        node
     }
 
     /// Bits `low` to `low + bits − 1`, unsigned.
     pub fn slice(self, low: usize, bits: usize) -> Self {
         let ty = self.ty();
         if bits == 0 || low + bits > ty.bits {
-            self.width_error(format!("bits {low} to {} of {}", low + bits, ty.bits));
-            return self.number(bits.max(1), 0);
+            let node = self.node(Node::Slice(self.id, low), Type::unsigned(bits.max(1)));
+            node.width_error(format!("{bits} bits from bit {low} on, of {}", ty.bits));
+            return node;
         }
         let inner = self.kernel.borrow().nodes[self.id].0.clone();
         let at = |id| Expr { kernel: self.kernel, id };
@@ -198,20 +204,13 @@ impl<'k> Expr<'k> {
         concat(&[self, low])
     }
 
-    /// `self` if it has one bit; otherwise an error.
-    pub(crate) fn bit(self, what: &str) -> Self {
-        if self.bits() != 1 {
-            self.width_error(format!("a {what} of {} bits", self.bits()));
-            return self.number(1, 0);
-        }
-        self
-    }
-
     /// `when` if this bit is 1, else `otherwise`.
     pub fn mux(self, when: Expr<'k>, otherwise: Expr<'k>) -> Self {
-        let condition = self.bit("condition");
         let (a, b) = when.same_width(otherwise);
-        let node = self.node(Node::Mux(condition.id, a.id, b.id), a.ty());
+        let node = self.node(Node::Mux(self.id, a.id, b.id), a.ty());
+        if self.bits() != 1 {
+            node.width_error(format!("a condition of {} bits", self.bits()));
+        }
         when.same_signs(otherwise, node);
         node
     }
@@ -226,15 +225,16 @@ impl<'k> Expr<'k> {
     /// The entry of `table` at this unsigned index, of `bits` bits, without sign; as many entries as indices.
     pub fn table(self, bits: usize, table: &[u64]) -> Self {
         let mut entries: Vec<Expr<'k>> = table.iter().map(|&entry| self.number(bits, entry)).collect();
-        if entries.len() != 1 << self.bits() {
-            self.width_error(format!("a table of {} entries", entries.len()));
-            return self.number(bits, 0);
-        }
+        let indices = 1 << self.bits();
+        entries.resize(indices, self.number(bits, 0));
         for bit in 0..self.bits() {
             entries = entries
                 .chunks(2)
                 .map(|pair| if pair[0].id == pair[1].id { pair[0] } else { self.at(bit).mux(pair[1], pair[0]) })
                 .collect();
+        }
+        if table.len() != indices {
+            entries[0].width_error(format!("a table of {} entries for {indices} indices", table.len()));
         }
         entries[0]
     }
@@ -256,8 +256,9 @@ impl<'k> Expr<'k> {
 
     /// Whether this number is less than `other`.
     pub fn less(self, other: Expr<'k>) -> Self {
-        self.arithmetic(other);
-        self.compare(Binary::Less, other)
+        let node = self.compare(Binary::Less, other);
+        node.arithmetic(self.bits().max(other.bits()));
+        node
     }
 
     fn compare(self, operator: Binary, other: Expr<'k>) -> Self {
@@ -321,9 +322,9 @@ impl<'k> Expr<'k> {
 
     fn shift(self, operator: Binary, by: Expr<'k>) -> Self {
         let node = self.node(Node::Binary(operator, self.id, by.id), self.ty());
-        self.arithmetic(node);
+        node.arithmetic(self.bits());
         if by.ty().signed {
-            self.mixed(node);
+            node.defect(Defect::MixedSigns);
         }
         node
     }
@@ -333,19 +334,14 @@ impl<'k> Expr<'k> {
         (self.extend(bits), other.extend(bits))
     }
 
-    fn mixed(self, node: Expr<'k>) {
-        let (block, expression) = (self.block(), node.to_string());
-        self.fail(KernelError::MixedSigns { block, expression });
-    }
-
     fn same_signs(self, other: Expr<'k>, node: Expr<'k>) {
         if self.ty().signed != other.ty().signed {
-            self.mixed(node);
+            node.defect(Defect::MixedSigns);
         }
     }
 
-    fn arithmetic(self, other: Expr<'k>) {
-        let widest = self.bits().max(other.bits());
+    /// Checks the width of the widest operand of this arithmetic expression.
+    fn arithmetic(self, widest: usize) {
         if widest > ARITHMETIC_BITS {
             self.width_error(format!("{widest} bits, at most {ARITHMETIC_BITS} in arithmetic"));
         }
@@ -353,7 +349,7 @@ impl<'k> Expr<'k> {
 
     fn binary(self, operator: Binary, other: Expr<'k>, ty: Type) -> Self {
         let node = self.node(Node::Binary(operator, self.id, other.id), ty);
-        self.arithmetic(node);
+        node.arithmetic(node.bits());
         self.same_signs(other, node);
         node
     }
@@ -364,7 +360,7 @@ impl<'k> Expr<'k> {
             node.width_error(format!("operands of {} and {} bits", self.bits(), other.bits()));
         }
         if self.ty().signed || other.ty().signed {
-            self.mixed(node);
+            node.defect(Defect::MixedSigns);
         }
         node
     }
@@ -378,7 +374,11 @@ impl<'k> Expr<'k> {
         let ty = self.ty();
         let (block, expression) = (self.block(), self.to_string());
         if ty.signed != to.signed {
-            self.fail(KernelError::MixedSigns { block, expression: format!("{name} = {expression}") });
+            self.fail(KernelError::MixedSigns {
+                block,
+                signal: name.clone(),
+                expression: format!("{name} = {expression}"),
+            });
             return self.number(to.bits, 0).cast(to.signed);
         }
         if ty.bits > to.bits {

@@ -95,6 +95,17 @@ impl Hierarchy {
         self.modules.iter().filter_map(|(path, module)| Some((path.as_str(), module.kernel.as_deref()?)))
     }
 
+    /// Path, scope and kernel of every block, the top first, each followed by the blocks inside it in their order. The
+    /// scope is the instances from the top, separated by dots, as simulators name it.
+    pub fn scopes(&self) -> Vec<(&str, String, &Kernel)> {
+        let (mut all, mut open) = (Vec::new(), vec![String::new()]);
+        while let Some((path, module)) = open.pop().and_then(|path| self.modules.get_key_value(&path)) {
+            all.extend(module.kernel.as_deref().map(|kernel| (path.as_str(), module.path.join("."), kernel)));
+            open.extend(module.children.iter().rev().map(|(instance, _)| called(path, instance)));
+        }
+        all
+    }
+
     /// # Errors
     /// The first defect of one of the kernels.
     pub fn check(&self) -> Result<(), KernelError> {
@@ -142,11 +153,13 @@ impl Hierarchy {
     /// Finds a combinational loop through several blocks.
     fn loops(&self) -> Result<(), KernelError> {
         let mut sources: BTreeMap<Net, Vec<Net>> = BTreeMap::new();
-        for (path, module) in &self.modules {
-            let Some(kernel) = &module.kernel else { continue };
+        // The block that drives a net, its kernel, and the net's name in it.
+        let mut drivers: BTreeMap<Net, (&str, &Kernel, &str)> = BTreeMap::new();
+        for (path, kernel) in self.kernels() {
             for (output, inputs) in kernel.combinational() {
-                let of = |name: &str| module.net(path, name);
+                let of = |name: &str| self.modules[path].net(path, name);
                 sources.entry(of(output)).or_default().extend(inputs.into_iter().map(of));
+                drivers.insert(of(output), (path, kernel, output));
             }
         }
         // Nets whose sources are all known to be free of loops, and those on the way to the current one.
@@ -163,8 +176,13 @@ impl Hierarchy {
                 if let Some(first) = open.iter().position(|(net, _)| *net == source) {
                     let through: Vec<String> =
                         open[first..].iter().map(|((path, name), _)| called(path, name)).collect();
-                    let (block, signals) = (source.0.clone(), through.join(", "));
-                    return Err(KernelError::Loop { block, signals, expression: source.1.clone() });
+                    let (block, kernel, signal) = drivers[source];
+                    return Err(KernelError::Loop {
+                        block: block.to_owned(),
+                        signal: signal.to_owned(),
+                        through: through.join(", "),
+                        expression: kernel.value_of(signal),
+                    });
                 }
                 open.push((source, 0));
             }

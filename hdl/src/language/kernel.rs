@@ -1,6 +1,6 @@
 //! The expression graph of a block: nodes in one arena, signals, memories.
 
-use std::collections::HashMap;
+use std::collections::{BTreeSet, HashMap};
 
 use super::error::KernelError;
 
@@ -208,6 +208,22 @@ pub struct Memory {
     pub(crate) writes: Vec<Write>,
 }
 
+impl Memory {
+    /// Whether it has a write port.
+    pub fn is_written(&self) -> bool {
+        !self.writes.is_empty()
+    }
+}
+
+/// What is wrong with an expression.
+#[derive(Clone, Debug)]
+pub(crate) enum Defect {
+    /// Signed and unsigned operands.
+    MixedSigns,
+    /// Operands of these widths are impossible.
+    Width(String),
+}
+
 /// What is printed in which order.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) enum Item {
@@ -229,6 +245,8 @@ pub struct Kernel {
     pub(crate) memories: Vec<Memory>,
     pub(crate) items: Vec<Item>,
     pub(crate) errors: Vec<KernelError>,
+    /// Defects of expressions whose signals are not known before the kernel is finished.
+    pub(crate) defects: Vec<(NodeId, Defect)>,
     /// The kernel only connects blocks: a linter shall see which of their outputs nobody reads.
     pub(crate) connects: bool,
 }
@@ -244,7 +262,7 @@ impl Kernel {
         &self.memories
     }
 
-    /// Defects of the description, in the order in which they were found; empty if there are none.
+    /// Defects of the description: first those of expressions, from which others follow; empty if there are none.
     pub fn errors(&self) -> &[KernelError] {
         &self.errors
     }
@@ -252,6 +270,11 @@ impl Kernel {
     /// Name and type of every signal: ports, wires, registers.
     pub fn signals(&self) -> impl Iterator<Item = (&str, Type)> {
         self.signals.iter().map(|signal| (signal.name.as_str(), signal.ty))
+    }
+
+    /// Name and width of every register.
+    pub fn register_widths(&self) -> impl Iterator<Item = (&str, usize)> {
+        self.registers().map(|(_, signal, _)| (signal.name.as_str(), signal.ty.bits))
     }
 
     pub(crate) fn ty(&self, node: NodeId) -> Type {
@@ -271,12 +294,6 @@ impl Kernel {
     /// Records a defect.
     pub(crate) fn fail(&mut self, error: KernelError) {
         self.errors.push(error);
-    }
-
-    /// Records an operand of impossible width.
-    pub(crate) fn width_error(&mut self, node: NodeId, reason: String) {
-        let expression = self.describe(node);
-        self.fail(KernelError::Width { block: self.block.clone(), expression, reason });
     }
 
     /// Every output that depends on inputs in the same cycle, with their names.
@@ -303,6 +320,51 @@ impl Kernel {
             open.extend(self.nodes[node].0.operands());
         }
         found
+    }
+
+    /// Name of the first signal or memory whose value, reset or write contains `node`. If there is none, that of the
+    /// first signal in `node`.
+    pub(crate) fn taker_of(&self, node: NodeId) -> Option<&str> {
+        let signals = self.signals.iter().map(|signal| {
+            let reset = match &signal.role {
+                Role::Register(Register { reset: Some((condition, _)), .. }) => Some(*condition),
+                _ => None,
+            };
+            (signal.name.as_str(), signal.value.into_iter().chain(reset).collect())
+        });
+        let memories = self.memories.iter().map(|memory| {
+            let roots = memory.writes.iter().flat_map(|write| [write.enable, write.address, write.data]);
+            (memory.name.as_str(), roots.collect())
+        });
+        let mut values = signals.chain(memories);
+        let taker = values.find(|(_, roots): &(_, Vec<NodeId>)| self.within(roots).any(|inner| inner == node));
+        taker.map(|(name, _)| name).or_else(|| {
+            self.within(&[node]).find_map(|inner| match self.nodes[inner].0 {
+                Node::Signal(signal) => Some(self.signals[signal].name.as_str()),
+                _ => None,
+            })
+        })
+    }
+
+    /// The nodes of these expressions, down to the signals that they read.
+    fn within(&self, roots: &[NodeId]) -> impl Iterator<Item = NodeId> + '_ {
+        let (mut open, mut seen) = (roots.to_vec(), vec![false; self.nodes.len()]);
+        std::iter::from_fn(move || loop {
+            let node = open.pop()?;
+            if !std::mem::replace(&mut seen[node], true) {
+                open.extend(self.nodes[node].0.operands());
+                return Some(node);
+            }
+        })
+    }
+
+    /// Names of the inputs that nothing reads.
+    pub(crate) fn unread(&self) -> BTreeSet<&str> {
+        let values: Vec<NodeId> = self.signals.iter().filter_map(|signal| signal.value).collect();
+        let read: BTreeSet<NodeId> = self.within(&[values, self.edge_roots()].concat()).collect();
+        let is_read = |id: SignalId| read.iter().any(|&node| self.nodes[node].0 == Node::Signal(id));
+        let inputs = self.signals.iter().enumerate().filter(|(_, signal)| signal.role == Role::Input);
+        inputs.filter(|(id, _)| !is_read(*id)).map(|(_, signal)| signal.name.as_str()).collect()
     }
 
     pub(crate) fn signal_of(&self, name: &str) -> Option<SignalId> {

@@ -1,3 +1,5 @@
+mod errors;
+
 use super::testbench::{check, random_words, simulated, verilated, Reference};
 use super::*;
 use crate::wire::Word;
@@ -5,105 +7,6 @@ use crate::wire::Word;
 /// Makes all of `names` driven ports of a finished kernel.
 fn bound(kernel: Kernel, outputs: &[(&str, usize)]) -> Kernel {
     Body::new(kernel, &[], outputs).kernel().clone()
-}
-
-fn first_error(builder: Builder) -> String {
-    let kernel = builder.finish();
-    kernel.errors().first().expect("an error").to_string()
-}
-
-#[test]
-fn each_error_names_block_signal_and_expression() {
-    let k = Builder::new("b");
-    let (a, s) = (k.input("a", 4), k.input("s", 4).signed());
-    k.wire("y", a + s);
-    assert_eq!(first_error(k), "block b: `(a + s4(s))` mixes signed and unsigned");
-
-    let k = Builder::new("b");
-    let a = k.input("a", 4);
-    k.register("r", Type::unsigned(4)).set(a + a);
-    assert_eq!(first_error(k), "block b, signal r: `(a + a)` has 5 bits, the signal 4");
-
-    let k = Builder::new("b");
-    let a = k.input("a", 4);
-    k.register("r", Type::signed(4)).set(a);
-    assert_eq!(first_error(k), "block b: `r = a` mixes signed and unsigned");
-
-    let k = Builder::new("b");
-    k.net("n", Type::unsigned(1));
-    assert_eq!(first_error(k), "block b, signal n: not assigned");
-
-    let k = Builder::new("b");
-    let c = k.input("c", 1);
-    let n = k.net("n", Type::unsigned(1));
-    k.when(c, || n.set(c));
-    assert_eq!(first_error(k), "block b, signal n: not assigned");
-
-    let k = Builder::new("b");
-    let a = k.input("a", 4);
-    let r = k.register("r", Type::unsigned(4));
-    r.set(a);
-    r.set(!a);
-    assert_eq!(first_error(k), "block b, signal r: assigned twice, the second time `~a`");
-
-    let k = Builder::new("b");
-    let (a, c) = (k.input("a", 4), k.input("c", 1));
-    let r = k.register("r", Type::unsigned(4));
-    k.when(c, || r.set(a));
-    k.when(c, || r.set(!a));
-    assert_eq!(first_error(k), "block b, signal r: assigned twice, the second time `~a`");
-
-    let k = Builder::new("b");
-    let c = k.input("c", 1);
-    let (m, n) = (k.net("m", Type::unsigned(1)), k.net("n", Type::unsigned(1)));
-    m.set(n.get() & c);
-    n.set(!m.get());
-    assert_eq!(first_error(k), "block b: combinational loop through n, m: `~m`");
-
-    let k = Builder::new("b");
-    let (a, c) = (k.input("a", 4), k.input("c", 3));
-    k.wire("y", a & c);
-    assert_eq!(first_error(k), "block b: `(a & c)`: operands of 4 and 3 bits");
-
-    let k = Builder::new("b");
-    let a = k.input("a", 4);
-    k.wire("y", a.slice(2, 3));
-    assert_eq!(first_error(k), "block b: `a`: bits 2 to 5 of 4");
-
-    let k = Builder::new("b");
-    k.constant(3, 8);
-    assert_eq!(first_error(k), "block b: `3'd8`: 8 needs more bits");
-
-    let k = Builder::new("b");
-    let (a, c) = (k.input("a", 1), k.input("c", 1));
-    k.falling(c, || k.state("r", Type::unsigned(1), !a, 0).set(a));
-    assert_eq!(first_error(k), "block b: `~a`: an asynchronous reset is an input of one bit");
-
-    let k = Builder::new("b");
-    let a = k.input("a", 2);
-    k.rising(a, || k.register("r", Type::unsigned(2)).set(a));
-    assert_eq!(first_error(k), "block b: `a`: a clock is an input of one bit");
-
-    for (name, reason) in
-        [("a", "the name is used twice"), ("a$b", "not a Verilog identifier"), ("reg", "a keyword of Verilog")]
-    {
-        let k = Builder::new("b");
-        k.input("a", 4);
-        k.input(name, 1);
-        assert_eq!(first_error(k), format!("block b, signal {name}: {reason}"));
-    }
-    let k = Builder::new("b");
-    k.input("a", 4);
-    let body = Body::new(k.finish(), &[("a", 5), ("x", 1)], &[("a", 4)]);
-    let errors: Vec<String> = body.kernel().errors().iter().map(ToString::to_string).collect();
-    assert_eq!(
-        errors,
-        [
-            "block b, port a of 5 bits: the kernel's signal has 4 bits",
-            "block b, port x of 1 bits: the kernel has no such signal",
-            "block b, port a of 4 bits: the kernel's signal has another direction"
-        ]
-    );
 }
 
 /// An operator, its inputs' widths, and the same in integers: operands are unsigned, or signed if so marked.

@@ -146,7 +146,13 @@ impl<'k> Wiring<'k> {
                     self.builder.constant(1, 0)
                 })
             }
-            VerilogExpression::Literal(literal) => self.builder.constant(width(literal), literal.as_usize() as u64),
+            VerilogExpression::Literal(literal) => {
+                let (bits, value) = number(literal).unwrap_or_else(|| {
+                    self.fail(&literal.to_string(), "is not an unsigned constant of at most 64 bits");
+                    (1, 0)
+                });
+                self.builder.constant(bits, value)
+            }
             VerilogExpression::Paren(inner) => self.value(inner),
             VerilogExpression::Unary(VerilogOpUnary::Not, inner) => !self.value(inner),
             VerilogExpression::Binary(a, operator, b) => {
@@ -183,7 +189,48 @@ fn plain(path: &str) -> String {
     name.strip_suffix("__next").map(str::to_owned).unwrap_or(name)
 }
 
-/// Width of a literal, which rust-hdl tells in its text only.
-fn width(literal: &VerilogLiteral) -> usize {
-    literal.to_string().split('\'').next().and_then(|bits| bits.parse().ok()).unwrap_or(1)
+/// Width and value of an unsigned literal of at most 64 bits. rust-hdl keeps both to itself and gives them as text:
+/// `4'h9`, `3'b101`.
+fn number(literal: &VerilogLiteral) -> Option<(usize, u64)> {
+    let text = literal.to_string();
+    let (bits, digits) = text.split_once('\'')?;
+    let value = match digits.split_at_checked(1)? {
+        ("b", digits) => u64::from_str_radix(digits, 2),
+        ("h", digits) => u64::from_str_radix(digits, 16),
+        _ => return None,
+    };
+    Some((bits.parse().ok()?, value.ok()?))
+}
+
+#[cfg(test)]
+mod tests {
+    use rust_hdl::prelude::*;
+
+    use super::*;
+
+    #[test]
+    fn literals_have_their_width_or_are_an_error() {
+        let literals: [(VerilogLiteral, Option<(usize, u64)>); 6] = [
+            (true.into(), Some((1, 1))),
+            (Bits::<3>::from(5).into(), Some((3, 5))),
+            (Bits::<24>::from(9).into(), Some((24, 9))),
+            (u64::MAX.into(), Some((64, u64::MAX))),
+            ((1u128 << 64).into(), None),
+            (Signed::<4>::from(-3).into(), None),
+        ];
+        for (literal, expected) in literals {
+            assert_eq!(number(&literal), expected, "{literal}");
+        }
+        let pin = Pin { name: "y".to_owned(), bits: 4, driven: true, value: None };
+        let errors = |literal: VerilogLiteral| {
+            let assigned = VerilogExpression::Signal("y".to_owned());
+            let code = [VerilogStatement::Assignment(assigned, VerilogExpression::Literal(literal))];
+            let kernel = wiring("b", std::slice::from_ref(&pin), &[], &code.to_vec());
+            kernel.errors().iter().map(ToString::to_string).collect::<Vec<_>>()
+        };
+        assert_eq!(errors(Bits::<4>::from(9).into()), [""; 0]);
+        assert_eq!(errors(Bits::<5>::from(9).into()), ["block b, signal y: `5'd9` has 5 bits, the signal 4"]);
+        let negative = "block b: `4'h-3` is not an unsigned constant of at most 64 bits";
+        assert_eq!(errors(Signed::<4>::from(-3).into()), [negative]);
+    }
 }

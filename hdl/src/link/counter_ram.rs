@@ -22,15 +22,16 @@ pub struct CounterRam {
     pub rst: Signal<In, Bit>,
     /// A packet was accepted in this cycle.
     pub taken: Signal<In, Bit>,
-    /// A packet was dropped in this cycle, one bit per cause: framing, CRC, unknown type, length.
+    /// One bit per cause for which a packet is dropped: framing, CRC, unknown type, length; each high for the cycle of
+    /// its event.
     pub fault: Wire<In>,
     /// A packet was dropped in this cycle because earlier ones are not answered yet.
     pub overrun: Signal<In, Bit>,
     /// Counting is postponed.
     pub hold: Signal<In, Bit>,
-    /// Entry to read, 5 bits.
+    /// Entry to read, 5 bits; taken while no event is being counted.
     pub address: Wire<In>,
-    /// The entry, 16 bits, one cycle after `address`.
+    /// The entry, 16 bits; one cycle after `address`, while `entry_valid` is high.
     pub entry: Wire<Out>,
     /// `entry` is that of `address`, and no counter is changing.
     pub entry_valid: Signal<Out, Bit>,

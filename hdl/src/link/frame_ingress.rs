@@ -26,7 +26,7 @@ pub struct FrameIngress {
     pub frame_begin: Signal<In, Bit>,
     /// `content` is a byte of the payload.
     pub payload: Signal<In, Bit>,
-    /// A byte of the packet, 8 bits.
+    /// A byte of the packet, 8 bits; valid with `payload`.
     pub content: Wire<In>,
     /// The frame's packet is complete and correct; high for one cycle.
     pub good: Signal<In, Bit>,

@@ -27,13 +27,13 @@ pub struct Packer {
     pub offered_source: Wire<In>,
     /// The offered answer starts in this cycle.
     pub begun: Signal<Out, Bit>,
-    /// Source of the answer being sent.
+    /// Source of the answer being sent, 2 bits; valid from the cycle after `begun` until the answer's last byte.
     pub source: Wire<Out>,
     /// Words of the payload are needed.
     pub wanted: Signal<Out, Bit>,
-    /// Byte of the word, of the header or of the CRC that is next.
+    /// Byte of the word, of the header or of the CRC that is next, 4 bits; that of a word while `wanted` is high.
     pub index: Wire<Out>,
-    /// That byte of the word, from its source.
+    /// That byte of the word, from its source, 8 bits; valid with `word_valid`.
     pub octet: Wire<In>,
     /// The word is valid.
     pub word_valid: Signal<In, Bit>,
@@ -49,7 +49,7 @@ pub struct Packer {
     pub crc_octet: Wire<Out>,
     /// The CRC takes `crc_octet` in this cycle.
     pub crc_load: Signal<Out, Bit>,
-    /// Lowest byte of the CRC.
+    /// Lowest byte of the CRC; valid while `crc_busy` is low.
     pub crc_low: Wire<In>,
     /// The CRC is processing a byte.
     pub crc_busy: Signal<In, Bit>,

@@ -148,7 +148,7 @@ mod tests {
     use crate::language::testbench::{check, simulated, Reference};
     use crate::wire::Word;
 
-    /// Collects a packet and judges it as a whole.
+    /// Collects a packet and checks it as a whole.
     #[derive(Default)]
     struct Packet {
         frame_bytes: usize,
@@ -174,7 +174,7 @@ mod tests {
         }
 
         /// 0 if the packet is correct, else the bit of its fault; none without a packet.
-        fn judge(&self, crc_right: bool) -> Option<u64> {
+        fn verdict_of(&self, crc_right: bool) -> Option<u64> {
             let whole = self.bytes.len();
             if self.lost {
                 return Some(FRAMING);
@@ -218,7 +218,7 @@ mod tests {
             let [rst, _, valid, ends, spoiled, right] = [0, 1, 2, 3, 4, 5].map(|k| inputs[k].number() == 1);
             self.verdict = None;
             if ends {
-                self.verdict = self.judge(right);
+                self.verdict = self.verdict_of(right);
             } else {
                 self.lost |= spoiled;
                 if valid {
@@ -277,7 +277,7 @@ mod tests {
     }
 
     #[test]
-    fn packets_are_judged_as_a_whole() {
+    fn packets_are_checked_as_a_whole() {
         for frame_bytes in [6, 300] {
             let all = stimulus(if frame_bytes > 100 { 60 } else { 800 }, frame_bytes);
             let block = Body::new(

@@ -14,19 +14,19 @@ use crate::wire::Wire;
 pub struct Sources {
     /// Clock; registers change on its rising edge.
     pub clk: Signal<In, Clock>,
-    /// Source of the answer being sent, 2 bits.
+    /// Source of the answer being sent, 2 bits; valid from the cycle after `begun` until the answer's last byte.
     pub source: Wire<In>,
     /// An answer starts in this cycle.
     pub begun: Signal<In, Bit>,
     /// Words of the payload are needed.
     pub wanted: Signal<In, Bit>,
-    /// Byte of the word that is needed.
+    /// Byte of the word that is needed, 4 bits; valid while `wanted` is high.
     pub index: Wire<In>,
     /// The last byte of a word is accepted in this cycle.
     pub taken: Signal<In, Bit>,
-    /// Entry of the counter RAM to read.
+    /// Entry of the counter RAM to read, 5 bits; valid in every cycle, one cycle ahead of `entry`.
     pub address: Wire<Out>,
-    /// The entry, two bytes.
+    /// The entry, two bytes; valid with `entry_valid`.
     pub entry: Wire<In>,
     /// `entry` is that of `address`.
     pub entry_valid: Signal<In, Bit>,

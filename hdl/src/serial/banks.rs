@@ -18,9 +18,9 @@ pub struct Banks {
     pub clk: Signal<In, Clock>,
     /// Read the odd bank and write the even one; if low, the other way round.
     pub odd: Signal<In, Bit>,
-    /// Address to read.
+    /// Address to read; taken in every cycle.
     pub read_address: Wire<In>,
-    /// The word read, one cycle after `read_address`.
+    /// The word read; one cycle after `read_address` and `odd`.
     pub word: Wire<Out>,
     /// Write `data` in this cycle.
     pub write: Signal<In, Bit>,

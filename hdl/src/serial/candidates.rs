@@ -23,15 +23,16 @@ use crate::wire::Wire;
 pub struct Candidates {
     /// Clock; registers change on its rising edge.
     pub clk: Signal<In, Clock>,
-    /// A coefficient, signed.
+    /// A coefficient, signed; that of `cycle`, taken in every cycle.
     pub word: Wire<In>,
-    /// Cycle of the polynomial, 4i + j.
+    /// Cycle of the polynomial, 4i + j; valid in every cycle.
     pub cycle: Wire<In>,
-    /// Bit 0: the polynomial that arrives is to be evaluated; bit 1: so was the previous one.
+    /// Bit 0, the polynomial that arrives is to be evaluated, bit 1, so was the previous one; valid in every cycle.
     pub present: Wire<In>,
-    /// Bit 0: the polynomial that arrives is the sum polynomial; bit 1: the previous one was.
+    /// Bit 0, the polynomial that arrives is the sum polynomial, bit 1, the previous one was; valid with the bits of
+    /// `present`.
     pub sums: Wire<In>,
-    /// A candidate's value p, signed.
+    /// A candidate's value p, signed; valid with `valid`.
     pub value: Wire<Out>,
     /// Index of the candidate, 3(y + 1) + x + 1; valid with `valid`.
     pub index: Wire<Out>,

@@ -11,13 +11,13 @@ use crate::wire::Wire;
 pub struct CoefficientShift {
     /// Clock; registers change on its rising edge.
     pub clk: Signal<In, Clock>,
-    /// A coefficient, signed.
+    /// A coefficient, signed; taken in every cycle.
     pub word: Wire<In>,
-    /// Right shift, 2 bits.
+    /// Right shift, 2 bits; valid with `word`.
     pub halvings: Wire<In>,
     /// The shifted coefficient, signed; one cycle later.
     pub halved: Wire<Out>,
-    /// Low bits of `halved`: a taxel's value p(μ*), signed.
+    /// Low bits of `halved`, a taxel's value p(μ*), signed; one cycle after `word`.
     pub value: Wire<Out>,
     kernel: Body,
 }

@@ -9,60 +9,46 @@ use dermis_golden::scene::Condition;
 use rust_hdl::prelude::*;
 
 use super::{
-    Banks, Candidates, CoefficientShift, Force, Horner, Pass, PassSequencer, Receive, Rounder, Score, SearchSequencer,
+    Banks, Candidates, CoefficientShift, Forces, Horner, Pass, PassSequencer, Receive, Rounder, Score, SearchSequencer,
     SerialButterfly, TaxelReorder, Unfold,
 };
 use crate::primitives::{Dff, Ram, Slice};
+use crate::stage_list::engine;
 use crate::wire::Wire;
 
-/// The serial engine, with the ports of the parallel [`Engine`](crate::engine::Engine).
-#[derive(LogicBlock)]
-pub struct Engine {
-    /// Clock; registers change on its rising edge.
-    pub clk: Signal<In, Clock>,
-    /// Synchronous reset, active high.
-    pub rst: Signal<In, Bit>,
-    /// A taxel's code, `code_bits` wide, two's complement; valid with `s_axis_tvalid`.
-    pub s_axis_tdata: Wire<In>,
-    /// A beat is offered on `s_axis_tdata`; the sender holds it until `s_axis_tready`.
-    pub s_axis_tvalid: Signal<In, Bit>,
-    /// The block accepts a beat in this cycle.
-    pub s_axis_tready: Signal<Out, Bit>,
-    /// The beat is the last of its frame; valid with `s_axis_tvalid`.
-    pub s_axis_tlast: Signal<In, Bit>,
-    /// `{fz, fy, fx}`, 32 bits signed each, or a status beat; valid with `m_axis_tvalid`.
-    pub m_axis_tdata: Wire<Out>,
-    /// A beat is offered on `m_axis_tdata`; it is held until `m_axis_tready`.
-    pub m_axis_tvalid: Signal<Out, Bit>,
-    /// The receiver accepts a beat in this cycle.
-    pub m_axis_tready: Signal<In, Bit>,
-    /// The beat is the last of its frame; valid with `m_axis_tvalid`.
-    pub m_axis_tlast: Signal<Out, Bit>,
-    pub(crate) receive: Receive,
-    reorder: TaxelReorder,
-    pub(crate) pass_sequencer: PassSequencer,
-    pub(crate) rounder: Rounder,
-    pub(crate) shifted: Slice,
-    pub(crate) butterfly: SerialButterfly,
-    pub(crate) pass: Pass,
-    raw: Ram,
-    pub(crate) unfold: Unfold,
-    banks: Banks,
-    pub(crate) search_sequencer: SearchSequencer,
-    along_x: Horner,
-    transposed: Ram,
-    along_y: Horner,
-    pub(crate) coefficient_shift: CoefficientShift,
-    candidates: Candidates,
-    score: Score,
-    floors: Ram,
-    totals: Ram,
-    forces: Force,
-    computing: Dff,
-    condition: Dff,
-    framing: Dff,
-    both_signs: Constant<Bit>,
-    begin_frame: Signal<Local, Bit>,
+engine! {
+    /// The serial engine, with the ports of the parallel [`Engine`](crate::engine::Engine).
+    pub struct Engine {
+        stages {
+            receive: Receive => "receive.rs",
+            reorder: TaxelReorder => "taxel_reorder.rs",
+            pass_sequencer: PassSequencer => "pass_sequencer.rs",
+            rounder: Rounder => "rounder.rs",
+            butterfly: SerialButterfly => "serial_butterfly.rs",
+            pass: Pass => "pass.rs",
+            raw: Ram => "../primitives/memory/ram.rs",
+            unfold: Unfold => "unfold.rs",
+            banks: Banks => "banks.rs",
+            search_sequencer: SearchSequencer => "search_sequencer.rs",
+            along_x: Horner => "horner.rs",
+            transposed: Ram => "../primitives/memory/ram.rs",
+            along_y: Horner => "horner.rs",
+            coefficient_shift: CoefficientShift => "coefficient_shift.rs",
+            candidates: Candidates => "candidates.rs",
+            score: Score => "score.rs",
+            floors: Ram => "../primitives/memory/ram.rs",
+            totals: Ram => "../primitives/memory/ram.rs",
+            forces: Forces => "forces.rs",
+        }
+        control {
+            shifted: Slice,
+            computing: Dff,
+            condition: Dff,
+            framing: Dff,
+            both_signs: Constant<Bit>,
+            begin_frame: Signal<Local, Bit>,
+        }
+    }
 }
 
 impl Engine {
@@ -74,7 +60,7 @@ impl Engine {
         // `normalise` shifts codes left by `input_bits` − 1, then right by the length of the magnitude.
         let unrounded = (f.acc_bits as usize).max(2 * code).max(product_bits(f));
         let rounded = f.input_bits.max(f.vector_bits) as usize;
-        let force = Force::new(f, model.threshold, unrounded);
+        let forces = Forces::new(f, model.threshold, unrounded);
         let mut engine = Engine {
             clk: Default::default(),
             rst: Default::default(),
@@ -82,7 +68,7 @@ impl Engine {
             s_axis_tvalid: Default::default(),
             s_axis_tready: Default::default(),
             s_axis_tlast: Default::default(),
-            m_axis_tdata: Wire::new(force.m_axis_tdata.width()),
+            m_axis_tdata: Wire::new(forces.m_axis_tdata.width()),
             m_axis_tvalid: Default::default(),
             m_axis_tready: Default::default(),
             m_axis_tlast: Default::default(),
@@ -105,7 +91,7 @@ impl Engine {
             score: Score::new(f),
             floors: Ram::new(SLOT as usize, 1, floor_bits(f)).holding([Holds::Floors]),
             totals: Ram::new(SLOT as usize, 1, f.score_bits as usize + 1).holding([Holds::Totals]),
-            forces: force,
+            forces,
             computing: Default::default(),
             condition: Default::default(),
             framing: Default::default(),
@@ -179,7 +165,7 @@ impl Logic for Engine {
         }
         self.receive.read_address.next = self.reorder.place.val();
 
-        comment!("Rounder, shared by normalise, rescale and force");
+        comment!("Rounder, shared by normalise, rescale and forces");
         self.pass_sequencer.start.next = self.begin_frame.val();
         self.pass_sequencer.magnitude.next = self.receive.magnitude.val();
         self.pass_sequencer.code.next = self.receive.word.val();
@@ -196,11 +182,11 @@ impl Logic for Engine {
         self.pass_sequencer.clipped.next = self.rounder.clipped.val();
         self.pass_sequencer.round_done.next = self.rounder.done.val();
 
-        comment!("Mixer, shared by fold and unfold");
+        comment!("Butterfly, shared by fold and unfold");
         self.butterfly.word.next = self.shifted.low.val();
-        self.butterfly.valid.next = self.pass_sequencer.mix.val();
-        self.pass_sequencer.mixed.next = self.butterfly.mixed.val();
-        self.pass_sequencer.mixed_valid.next = self.butterfly.mixed_valid.val();
+        self.butterfly.valid.next = self.pass_sequencer.transform.val();
+        self.pass_sequencer.transformed.next = self.butterfly.transformed.val();
+        self.pass_sequencer.transformed_valid.next = self.butterfly.transformed_valid.val();
 
         comment!("Matrix passes");
         self.pass.valid.next = self.pass_sequencer.issue.val();
@@ -225,8 +211,8 @@ impl Logic for Engine {
 
         comment!("Polynomials: unfold, search, banks");
         self.unfold.start.next = self.begin_frame.val();
-        self.unfold.mixed.next = self.butterfly.mixed.val();
-        self.unfold.valid.next = self.butterfly.mixed_valid.val() & self.pass_sequencer.unfolding.val();
+        self.unfold.transformed.next = self.butterfly.transformed.val();
+        self.unfold.valid.next = self.butterfly.transformed_valid.val() & self.pass_sequencer.unfolding.val();
         self.search_sequencer.filling.next = self.pass_sequencer.busy.val();
         self.search_sequencer.start.next = self.pass_sequencer.done.val();
         self.search_sequencer.enabled.next = self.condition.q.val();

@@ -18,17 +18,18 @@ use crate::wire::Wire;
 pub struct Horner {
     /// Clock; registers change on its rising edge.
     pub clk: Signal<In, Clock>,
-    /// Coefficient 3 − `element` of the polynomial that enters, signed.
+    /// Coefficient 3 − `element` of the polynomial that enters, signed; taken in every cycle.
     pub word: Wire<In>,
-    /// Cycle of the polynomial, 0..=3.
+    /// Cycle of the polynomial, 0..=3; valid in every cycle.
     pub element: Wire<In>,
-    /// Degree of the polynomial that enters.
+    /// Degree of the polynomial that enters; valid with `word`.
     pub top: Wire<In>,
     /// The centre moves.
     pub moves: Signal<In, Bit>,
     /// By −1 instead of +1; valid with `moves`.
     pub down: Signal<In, Bit>,
-    /// Coefficient `element` of the previous polynomial about the new centre, signed.
+    /// Coefficient `element` of the previous polynomial about the new centre, signed; combinational from `element`, in
+    /// the four cycles after that polynomial's last coefficient.
     pub moved: Wire<Out>,
     kernel: Body,
 }

@@ -5,19 +5,19 @@
 //! bench, link and host are the same.
 //!
 //! ```text
-//! receive -> rounder -> butterfly -> pass -> raw -> rounder -> butterfly -> unfold -> banks -> force -> rounder -> m_axis
+//! receive -> rounder -> butterfly -> pass -> raw -> rounder -> butterfly -> unfold -> banks -> forces -> rounder -> m_axis
 //!            normalise  fold                        rescale    unfold                  ^
 //!                                                                                      '-> along_x, transposed, along_y,
 //!                                                                                          candidates, score
 //! ```
-//! [`PassSequencer`] sequences the blocks up to `unfold`, [`SearchSequencer`] the search, [`Force`] the output. [`Engine`]
+//! [`PassSequencer`] sequences the blocks up to `unfold`, [`SearchSequencer`] the search, [`Forces`] the output. [`Engine`]
 //! and [`Receive`] connect blocks by `#[hdl_gen]`; each other block is one [kernel](crate::language).
 
 mod banks;
 mod candidates;
 mod coefficient_shift;
 mod engine;
-mod force;
+mod forces;
 mod horner;
 mod pass;
 mod pass_sequencer;
@@ -33,7 +33,7 @@ pub use banks::Banks;
 pub use candidates::Candidates;
 pub use coefficient_shift::CoefficientShift;
 pub use engine::Engine;
-pub use force::Force;
+pub use forces::Forces;
 pub use horner::Horner;
 pub use pass::{Pass, LOW_FILE, WIDE_FILE};
 pub use pass_sequencer::PassSequencer;

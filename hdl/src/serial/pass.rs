@@ -60,7 +60,7 @@ pub struct Pass {
     pub quad: Wire<Out>,
     /// The accumulators hold a row; the first leaves in this cycle.
     pub quad_valid: Signal<Out, Bit>,
-    /// One accumulator, `acc_bits` wide, signed.
+    /// One accumulator, `acc_bits` wide, signed; valid with `word_valid`.
     pub word: Wire<Out>,
     /// `word` is valid.
     pub word_valid: Signal<Out, Bit>,

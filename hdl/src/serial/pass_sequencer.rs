@@ -39,11 +39,11 @@ pub struct PassSequencer {
     pub start: Signal<In, Bit>,
     /// OR of the frame's magnitudes; valid with `start`.
     pub magnitude: Wire<In>,
-    /// Place of the taxel to read.
+    /// Place of the taxel to read; valid while `busy` is high and the input is folded.
     pub index: Wire<Out>,
     /// Its code, signed; two cycles after `index`.
     pub code: Wire<In>,
-    /// An accumulator of the passes, `acc_bits` wide, signed.
+    /// An accumulator of the passes, `acc_bits` wide, signed; valid with `row_valid`.
     pub row_word: Wire<In>,
     /// `row_word` is valid.
     pub row_valid: Signal<In, Bit>,
@@ -51,28 +51,28 @@ pub struct PassSequencer {
     pub raw_write: Signal<Out, Bit>,
     /// Address in the raw memory; valid with `raw_write`.
     pub raw_write_address: Wire<Out>,
-    /// Address of the raw word to read.
+    /// Address of the raw word to read; valid while `rescale` replays v_00, step 4.
     pub raw_read_address: Wire<Out>,
-    /// The raw word, one cycle after `raw_read_address`.
+    /// The raw word; one cycle after `raw_read_address`.
     pub raw_word: Wire<In>,
-    /// Word for the rounder, signed.
+    /// Word for the rounder, signed; valid with `round`.
     pub unrounded: Wire<Out>,
     /// Right shift for the rounder; valid with `round`.
     pub round_shift: Wire<Out>,
     /// `unrounded` is valid.
     pub round: Signal<Out, Bit>,
-    /// Word from the rounder, signed.
+    /// Word from the rounder, signed; valid with `round_done`.
     pub rounded: Wire<In>,
     /// `rounded` was saturated.
     pub clipped: Signal<In, Bit>,
     /// `rounded` is valid.
     pub round_done: Signal<In, Bit>,
     /// `rounded` goes to the butterfly in this cycle.
-    pub mix: Signal<Out, Bit>,
-    /// Word from the butterfly, signed.
-    pub mixed: Wire<In>,
-    /// `mixed` is valid.
-    pub mixed_valid: Signal<In, Bit>,
+    pub transform: Signal<Out, Bit>,
+    /// Word from the butterfly, signed; valid with `transformed_valid`.
+    pub transformed: Wire<In>,
+    /// `transformed` is valid.
+    pub transformed_valid: Signal<In, Bit>,
     /// A product is issued to `pass` in this cycle.
     pub issue: Signal<Out, Bit>,
     /// The product is the last of its row; valid with `issue`.
@@ -109,7 +109,7 @@ pub struct PassSequencer {
     pub normalise: Wire<Out>,
     /// Right shift of `rescale`; valid from step 4 until the next `start`.
     pub rescale: Wire<Out>,
-    /// Number of words saturated by `rescale`, 16 bits.
+    /// Number of words saturated by `rescale`, 16 bits; complete from `done` until the next `start`.
     pub saturations: Wire<Out>,
     /// The sequence is running; rounder and butterfly are in use.
     pub busy: Signal<Out, Bit>,
@@ -122,10 +122,10 @@ kernel_block!(
     PassSequencer,
     clock clk,
     inputs [
-        rst, start, magnitude, code, row_word, row_valid, raw_word, rounded, clipped, round_done, mixed, mixed_valid
+        rst, start, magnitude, code, row_word, row_valid, raw_word, rounded, clipped, round_done, transformed, transformed_valid
     ],
     outputs [
-        index, raw_write, raw_write_address, raw_read_address, unrounded, round_shift, round, mix, issue, last, address,
+        index, raw_write, raw_write_address, raw_read_address, unrounded, round_shift, round, transform, issue, last, address,
         low, operand_address, flip, align, write, write_address, write_lane, write_data, normalised_valid, folding,
         rescaled_valid, unfolding, free, normalise, rescale, saturations, busy, done
     ]
@@ -168,9 +168,9 @@ impl PassSequencer {
             rounded: Wire::new(rounded),
             clipped: Default::default(),
             round_done: Default::default(),
-            mix: Default::default(),
-            mixed: Wire::new(rounded + 2),
-            mixed_valid: Default::default(),
+            transform: Default::default(),
+            transformed: Wire::new(rounded + 2),
+            transformed_valid: Default::default(),
             issue: Default::default(),
             last: Default::default(),
             address: Wire::new(2 + 2 * quads),
@@ -231,7 +231,7 @@ fn build<'k>(k: &'k Builder, f: &Formats, program: &[Instruction], unrounded: us
     let (code, row_word, row_valid) = (k.input("code", code_bits), k.input("row_word", acc), k.input("row_valid", 1));
     let (raw_word, rounded) = (k.input("raw_word", acc), k.input("rounded", rounded_bits));
     let (clipped, round_done) = (k.input("clipped", 1), k.input("round_done", 1));
-    let (mixed, mixed_valid) = (k.input("mixed", rounded_bits + 2), k.input("mixed_valid", 1));
+    let (transformed, transformed_valid) = (k.input("transformed", rounded_bits + 2), k.input("transformed_valid", 1));
 
     let register = |name: &str, bits: usize| k.register(name, Type::unsigned(bits));
     let zero = |bits: usize| k.constant(bits, 0);
@@ -268,7 +268,7 @@ fn build<'k>(k: &'k Builder, f: &Formats, program: &[Instruction], unrounded: us
     let row_last = k.wire("row_last", set(&|i| i.last));
     let next_product = k.wire("next_product", product.plus(1));
     let place = k.wire("place", quad.concat(phase.low(2)).low(words));
-    let folded = k.wire("folded", row_folding & mixed_valid);
+    let folded = k.wire("folded", row_folding & transformed_valid);
     let row_magnitude = k.wire("row_magnitude", row_word.low(acc - 1) ^ row_word.top().repeat(acc - 1));
     k.comment("Binary search for the leading one.");
     let (mut rest, mut leading) = (seen.resize(64), Vec::new());
@@ -361,9 +361,9 @@ fn build<'k>(k: &'k Builder, f: &Formats, program: &[Instruction], unrounded: us
     let nearest = (rounded.slice(extra, data) + rounded.at(half)).low(data);
     let nearest = k.wire("nearest", overflows.mux(most, nearest));
     let wide = |word: Expr<'k>, bits: usize| word.signed().resize(bits).unsigned();
-    let high_limb = wide(mixed.slice(low, (mixed.bits() - low).min(operands)), operands);
+    let high_limb = wide(transformed.slice(low, (transformed.bits() - low).min(operands)), operands);
     let align = (f.limb_align as usize).saturating_sub(low);
-    let low_limb = if low == 0 { high_limb } else { mixed.low(low).shift_left(align).resize(operands) };
+    let low_limb = if low == 0 { high_limb } else { transformed.low(low).shift_left(align).resize(operands) };
 
     k.wire("index", place);
     k.wire("raw_read_address", place);
@@ -375,7 +375,7 @@ fn build<'k>(k: &'k Builder, f: &Formats, program: &[Instruction], unrounded: us
     k.wire("round_shift", from(*rescale, k.constant(SHIFT_BITS, u64::from(f.a_shift)), *length));
     k.wire("round", from(*replayed, row_valid, read.at(1)));
     let busy = k.wire("busy", step.any());
-    k.wire("mix", round_done & busy);
+    k.wire("transform", round_done & busy);
     k.wire("issue", multiplies & !*draining & gap.is(0));
     k.wire("last", row_last & last_column);
     k.wire("address", concat(&[field(2, &|i| i.matrix), *quad, *column]));

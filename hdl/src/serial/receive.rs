@@ -36,7 +36,7 @@ pub struct Receive {
     pub full: Signal<Out, Bit>,
     /// The frame has been read: the buffer may be overwritten.
     pub free: Signal<In, Bit>,
-    /// Row-major index of the taxel to read.
+    /// Row-major index of the taxel to read; taken in every cycle.
     pub read_address: Wire<In>,
     /// Its code, signed; one cycle after `read_address`.
     pub word: Wire<Out>,

@@ -20,7 +20,7 @@ const WIDE: usize = FORCE_BITS as usize;
 pub struct Rounder {
     /// Clock; registers change on its rising edge.
     pub clk: Signal<In, Clock>,
-    /// Word to shift, signed.
+    /// Word to shift, signed; taken in every cycle.
     pub word: Wire<In>,
     /// Right shift; valid with `word`.
     pub shift: Wire<In>,

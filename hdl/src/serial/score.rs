@@ -28,7 +28,7 @@ pub struct Score {
     pub clk: Signal<In, Clock>,
     /// Synchronous reset, active high.
     pub rst: Signal<In, Bit>,
-    /// A candidate's value p, signed.
+    /// A candidate's value p, signed; valid with `valid`.
     pub value: Wire<In>,
     /// Index of the candidate; valid with `valid`.
     pub index: Wire<In>,
@@ -36,7 +36,7 @@ pub struct Score {
     pub valid: Signal<In, Bit>,
     /// `value` is Σp; valid with `valid`.
     pub sum: Signal<In, Bit>,
-    /// The candidate's floor ⌊Σp / 2^20⌋, one cycle after `index`.
+    /// The candidate's floor ⌊Σp / 2^20⌋; one cycle after `index`.
     pub floor: Wire<In>,
     /// Write `floor_data`.
     pub floor_write: Signal<Out, Bit>,
@@ -44,7 +44,7 @@ pub struct Score {
     pub floor_index: Wire<Out>,
     /// Floor to write, 0 if Σp ≤ 0; valid with `floor_write`.
     pub floor_data: Wire<Out>,
-    /// Index of the candidate whose total is read.
+    /// Index of the candidate whose total is read; one cycle ahead of `total`.
     pub read_index: Wire<Out>,
     /// `{Σp > 0, total}`, total signed, 2^−6; one cycle after `read_index`.
     pub total: Wire<In>,
@@ -152,8 +152,8 @@ fn kernel(sizes: Sizes) -> Kernel {
     let room = score - LOG_BITS;
     let multiples =
         (0..room).filter(|shift| taxels >> shift & 1 == 1).map(|shift| late.shift_left(shift).extend(score));
-    let weighed = multiples.reduce(|a, b| (a + b).low(score)).unwrap_or(k.constant(score, 0));
-    let weighed = k.wire("weighed", weighed);
+    let weighted = multiples.reduce(|a, b| (a + b).low(score)).unwrap_or(k.constant(score, 0));
+    let weighted = k.wire("weighted", weighted);
     let grown = k.wire("grown", (total.low(score) + *late).low(score));
     let [first, .., last] = kinds;
     k.wire("floor_write", first.at(2) & first.at(1));
@@ -164,7 +164,7 @@ fn kernel(sizes: Sizes) -> Kernel {
     k.wire("read_index", *indices[3]);
     k.wire("write", last.at(2));
     k.wire("write_index", *indices[4]);
-    let negated = (k.constant(score, 0) - weighed).low(score);
+    let negated = (k.constant(score, 0) - weighted).low(score);
     k.wire("write_data", last.at(1).mux(last.at(0).concat(negated), total.at(score).concat(grown)));
     k.finish()
 }

@@ -49,43 +49,44 @@ pub struct SearchSequencer {
     pub start: Signal<In, Bit>,
     /// Search; otherwise p(0) is the result. Valid with `start`.
     pub enabled: Signal<In, Bit>,
-    /// Index of the polynomial whose value is read when no sweep runs.
+    /// Index of the polynomial whose value is read; taken while no sweep runs.
     pub wanted: Wire<In>,
     /// The odd bank is read.
     pub odd: Signal<Out, Bit>,
-    /// `{region, polynomial, coefficient}` to read.
+    /// `{region, polynomial, coefficient}` to read; valid in every cycle.
     pub read_address: Wire<Out>,
-    /// Chain along x: cycle of the polynomial.
+    /// Chain along x, cycle of the polynomial; valid during a sweep.
     pub x_element: Wire<Out>,
-    /// Chain along x: degree in x.
+    /// Chain along x, degree in x; valid with `x_element`.
     pub x_top: Wire<Out>,
     /// Chain along x: the centre moves.
     pub x_moves: Signal<Out, Bit>,
     /// Chain along x: by −1.
     pub x_down: Signal<Out, Bit>,
-    /// Address in the transpose memory to write.
+    /// Address in the transpose memory to write; valid during a sweep.
     pub turn_write: Wire<Out>,
-    /// Address in the transpose memory to read.
+    /// Address in the transpose memory to read; valid during a sweep.
     pub turn_read: Wire<Out>,
-    /// Chain along y: cycle of the polynomial.
+    /// Chain along y, cycle of the polynomial; valid during a sweep.
     pub y_element: Wire<Out>,
-    /// Chain along y: degree in y.
+    /// Chain along y, degree in y; valid with `y_element`.
     pub y_top: Wire<Out>,
     /// Chain along y: the centre moves.
     pub y_moves: Signal<Out, Bit>,
     /// Chain along y: by −1.
     pub y_down: Signal<Out, Bit>,
-    /// Right shift i + j of the coefficient that leaves the chain along y, in a halving; otherwise 0.
+    /// Right shift i + j of the coefficient that leaves the chain along y in a halving, otherwise 0; valid during a
+    /// sweep.
     pub halvings: Wire<Out>,
     /// Write the shifted coefficient to the bank that is not read.
     pub write: Signal<Out, Bit>,
     /// `{region, polynomial, coefficient}` to write; valid with `write`.
     pub write_address: Wire<Out>,
-    /// Cycle 4i + j of the coefficient that goes to the candidates.
+    /// Cycle 4i + j of the coefficient that goes to the candidates; valid during a sweep.
     pub cycle: Wire<Out>,
-    /// As `present` of [`Candidates`](super::Candidates).
+    /// As `present` of [`Candidates`](super::Candidates); valid with `cycle`, zero while no sweep runs.
     pub present: Wire<Out>,
-    /// As `sums` of [`Candidates`](super::Candidates).
+    /// As `sums` of [`Candidates`](super::Candidates); valid with the bits of `present`.
     pub sums: Wire<Out>,
     /// The coefficient written is a taxel's value p(μ*).
     pub value_valid: Signal<Out, Bit>,
@@ -93,13 +94,14 @@ pub struct SearchSequencer {
     pub comparing: Signal<Out, Bit>,
     /// Index of the candidate whose total is read; valid with `comparing`.
     pub candidate: Wire<Out>,
-    /// `{Σp > 0, total}`, one cycle after `candidate`.
+    /// `{Σp > 0, total}`; one cycle after `candidate`.
     pub total: Wire<In>,
-    /// Best position, x, in grid steps of the level, signed.
+    /// Best position, x, in grid steps of the level, signed; valid with `compared`, and final from `done` until the
+    /// next `start`.
     pub best_x: Wire<Out>,
-    /// Best position, y, in grid steps of the level, signed.
+    /// Best position, y, in grid steps of the level, signed; as `best_x`.
     pub best_y: Wire<Out>,
-    /// Score of the best candidate, signed, 2^−6.
+    /// Score of the best candidate, signed, 2^−6; as `best_x`.
     pub score: Wire<Out>,
     /// A candidate was found in the coarse grid.
     pub found: Signal<Out, Bit>,

@@ -8,7 +8,7 @@ use crate::language::{concat, Body, Builder, Kernel, Type};
 use crate::wire::Wire;
 
 /// ```text
-/// word, valid (four of a quad) --> four accumulators --> mixed, one after the other
+/// word, valid (four of a quad) --> four accumulators --> transformed, one after the other
 /// ```
 /// Accumulator p adds (−1)^{p·l} times word l, as [`hadamard`](dermis_golden::fixed::words::arith::hadamard). The first
 /// sum leaves in the cycle after the last word; the next quad may start when the fourth has left.
@@ -18,7 +18,7 @@ pub struct SerialButterfly {
     pub clk: Signal<In, Clock>,
     /// Synchronous reset, active high.
     pub rst: Signal<In, Bit>,
-    /// A word of a quad, signed; lanes in order.
+    /// A word of a quad, signed, lanes in order; valid with `valid`.
     pub word: Wire<In>,
     /// `word` is valid.
     pub valid: Signal<In, Bit>,
@@ -26,10 +26,10 @@ pub struct SerialButterfly {
     pub quad: Wire<Out>,
     /// The first of the four sums leaves in this cycle.
     pub quad_valid: Signal<Out, Bit>,
-    /// One sum, two bits wider than a word, signed.
-    pub mixed: Wire<Out>,
-    /// `mixed` is valid.
-    pub mixed_valid: Signal<Out, Bit>,
+    /// One sum, two bits wider than a word, signed; valid with `transformed_valid`.
+    pub transformed: Wire<Out>,
+    /// `transformed` is valid.
+    pub transformed_valid: Signal<Out, Bit>,
     kernel: Body,
 }
 
@@ -37,7 +37,7 @@ kernel_block!(
     SerialButterfly,
     clock clk,
     inputs [rst, word, valid],
-    outputs [quad, quad_valid, mixed, mixed_valid]
+    outputs [quad, quad_valid, transformed, transformed_valid]
 );
 
 impl SerialButterfly {
@@ -50,8 +50,8 @@ impl SerialButterfly {
             valid: Default::default(),
             quad: Wire::new(4 * (bits + 2)),
             quad_valid: Default::default(),
-            mixed: Wire::new(bits + 2),
-            mixed_valid: Default::default(),
+            transformed: Wire::new(bits + 2),
+            transformed_valid: Default::default(),
             kernel: Body::default(),
         };
         block.bind(kernel(bits))
@@ -81,8 +81,8 @@ fn kernel(bits: usize) -> Kernel {
     let [sum0, sum1, sum2, sum3] = sums.map(|sum| sum.get());
     k.wire("quad", concat(&[sum3, sum2, sum1, sum0]));
     k.wire("quad_valid", *giving & given.is(0));
-    k.wire("mixed", given.case(&[(0, sum0), (1, sum1), (2, sum2)], sum3).unsigned());
-    k.wire("mixed_valid", *giving);
+    k.wire("transformed", given.case(&[(0, sum0), (1, sum1), (2, sum2)], sum3).unsigned());
+    k.wire("transformed_valid", *giving);
     k.finish()
 }
 

@@ -17,7 +17,7 @@ pub struct TaxelReorder {
     pub clk: Signal<In, Clock>,
     /// From row-major to place; if low, from place to row-major.
     pub back: Signal<In, Bit>,
-    /// Row-major index, or place.
+    /// Row-major index, or place; valid with `back`.
     pub index: Wire<In>,
     /// Place, or row-major index; one cycle later.
     pub place: Wire<Out>,

@@ -21,11 +21,11 @@ pub struct Unfold {
     pub rst: Signal<In, Bit>,
     /// A frame starts: the words of v_00 come next.
     pub start: Signal<In, Bit>,
-    /// A word from the butterfly, signed; places in order.
-    pub mixed: Wire<In>,
-    /// `mixed` is valid.
+    /// A word from the butterfly, signed, places in order; valid with `valid`.
+    pub transformed: Wire<In>,
+    /// `transformed` is valid.
     pub valid: Signal<In, Bit>,
-    /// A taxel's coefficient, `vector_bits` + 2 wide, signed.
+    /// A taxel's coefficient, `vector_bits` + 2 wide, signed; valid with `taxel_valid`.
     pub taxel: Wire<Out>,
     /// `taxel` is valid.
     pub taxel_valid: Signal<Out, Bit>,
@@ -41,15 +41,15 @@ pub struct Unfold {
 kernel_block!(
     Unfold,
     clock clk,
-    inputs [rst, start, mixed, valid],
+    inputs [rst, start, transformed, valid],
     outputs [taxel, taxel_valid, write, address, data]
 );
 
 impl Unfold {
-    /// With the widths of `formats`; words from the butterfly have `mixed` bits.
-    pub fn new(formats: &Formats, mixed: usize) -> Self {
+    /// With the widths of `formats`; words from the butterfly have `transformed` bits.
+    pub fn new(formats: &Formats, transformed: usize) -> Self {
         let sizes = Sizes {
-            mixed,
+            transformed,
             taxel: formats.vector_bits as usize + 2,
             data: word_bits(formats),
             place: count_bits(polynomials(formats)),
@@ -60,7 +60,7 @@ impl Unfold {
             clk: Default::default(),
             rst: Default::default(),
             start: Default::default(),
-            mixed: Wire::new(mixed),
+            transformed: Wire::new(transformed),
             valid: Default::default(),
             taxel: Wire::new(sizes.taxel),
             taxel_valid: Default::default(),
@@ -76,7 +76,7 @@ impl Unfold {
 /// Widths of the words and of a polynomial's number; numbers of taxels and of the v_ij.
 #[derive(Clone, Copy)]
 struct Sizes {
-    mixed: usize,
+    transformed: usize,
     taxel: usize,
     data: usize,
     place: usize,
@@ -94,7 +94,7 @@ fn kernel(sizes: Sizes) -> Kernel {
     let Sizes { taxel, data, place, .. } = sizes;
     let k = Builder::new("unfold");
     let (rst, start) = (k.input("rst", 1), k.input("start", 1));
-    let (mixed, valid) = (k.input("mixed", sizes.mixed), k.input("valid", 1));
+    let (transformed, valid) = (k.input("transformed", sizes.transformed), k.input("valid", 1));
     let bits = count_bits(sizes.vectors + 1);
     let begins = k.wire("begins", start | rst);
     let word = k.register("word", Type::unsigned(taxel));
@@ -113,7 +113,7 @@ fn kernel(sizes: Sizes) -> Kernel {
     };
     let degree = k.wire("degree", of(&|vector| (EXPONENTS[vector].0 + EXPONENTS[vector].1) as usize, 2));
     k.comment("An extra bit on the right keeps the half LSB for the rounding.");
-    let doubled = mixed.concat(k.constant(1, 0)).signed();
+    let doubled = transformed.concat(k.constant(1, 0)).signed();
     let half = k.wire("half", doubled.shift_right_by(degree.concat(k.constant(1, 0))).unsigned().plus(1));
     let wider = k.wire("wider", word.signed().extend(data).unsigned());
     word.set(half.slice(1, taxel));
@@ -145,7 +145,7 @@ mod tests {
     use crate::language::testbench::{check, Reference};
     use crate::wire::Word;
 
-    const SIZES: Sizes = Sizes { mixed: 22, taxel: 22, data: 27, place: 4, taxels: 12, vectors: 10 };
+    const SIZES: Sizes = Sizes { transformed: 22, taxel: 22, data: 27, place: 4, taxels: 12, vectors: 10 };
 
     /// Words of the vector so far; whether the last one has just come, or the sum is written.
     #[derive(Default)]
@@ -183,7 +183,7 @@ mod tests {
             self.new = valid;
             if valid {
                 let (i, j) = EXPONENTS[self.vector % EXPONENTS.len()];
-                self.words.push(round_shift(inputs[2].signed(0, SIZES.mixed), 2 * (i + j)));
+                self.words.push(round_shift(inputs[2].signed(0, SIZES.transformed), 2 * (i + j)));
             }
             if rst || start {
                 *self = Vectors { reset: self.reset || rst, ..Vectors::default() };
@@ -196,7 +196,7 @@ mod tests {
     fn coefficients_and_their_sum_have_their_places() {
         let mut random = fastrand::Rng::with_seed(25);
         let cycle = |rst: bool, start: bool, valid: bool, word: i64| {
-            vec![Word::from(rst), Word::from(start), Word::of_fields(&[word], SIZES.mixed), Word::from(valid)]
+            vec![Word::from(rst), Word::from(start), Word::of_fields(&[word], SIZES.transformed), Word::from(valid)]
         };
         let mut all = vec![cycle(true, false, false, 0); 2];
         for _ in 0..25 {

@@ -1,7 +1,7 @@
 //! The stages of the pipeline, one file each, named as in the bit-true model. A stage starts on the `done` pulse of the
 //! one before.
 //!
-//! `prepare`, `receive`, `fold`, `pass`, `rescale`, `unfold`, `search`, `force` and `send` connect
+//! `prepare`, `receive`, `fold`, `pass`, `rescale`, `unfold`, `search`, `forces` and `send` connect
 //! [primitives](crate::primitives) by `#[hdl_gen]`: single-bit control and connections. `normalise`, `choose`, `banks`,
 //! `unsearched` and `resultants` are [kernels](crate::language).
 //!
@@ -11,7 +11,7 @@
 mod banks;
 mod choose;
 mod fold;
-mod force;
+mod forces;
 mod normalise;
 mod pass;
 mod prepare;
@@ -26,7 +26,7 @@ mod unsearched;
 pub use banks::Banks;
 pub use choose::Choose;
 pub use fold::Fold;
-pub use force::Force;
+pub use forces::Forces;
 pub use normalise::Normalise;
 pub use pass::Pass;
 pub use prepare::Prepare;

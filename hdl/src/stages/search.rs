@@ -58,9 +58,9 @@ pub struct Search {
     moved_address: Delay,
     scored_address: Delay,
     set_up: Dff,
-    standing: Dff,
+    stalled_before: Dff,
     due: Signal<Local, Bit>,
-    held: Signal<Local, Bit>,
+    stall: Signal<Local, Bit>,
     quad_end: Signal<Local, Bit>,
 }
 
@@ -90,7 +90,7 @@ ports! {
         /// Values may be output; the last sweep waits for it.
         pub ready: Signal<In, Bit>,
         /// The last sweep waits in this cycle.
-        pub stands: Signal<Out, Bit>,
+        pub stalled: Signal<Out, Bit>,
         /// `search_width` values p(μ*), `search_bits[0]` each, signed; valid with `values_valid`.
         pub values: Wire<Out>,
         /// `values` holds a step: the next ones of a quad, quad by quad.
@@ -133,7 +133,7 @@ impl SearchPorts {
             start: Default::default(),
             enabled: Default::default(),
             ready: Default::default(),
-            stands: Default::default(),
+            stalled: Default::default(),
             values: Wire::new(formats.search_width * formats.search_bits[0] as usize),
             values_valid: Default::default(),
             settled: Default::default(),
@@ -206,7 +206,7 @@ impl Search {
             sum_outcome: BitDelay::of_pulse(1 + values_delay(model.first())),
             scored: BitDelay::new(CANDIDATES_LATENCY),
             first: BitDelay::new(moved + CANDIDATES_LATENCY),
-            // One cycle after the first step's candidates, so that a sweep is compared before the next is weighed.
+            // One cycle after the first step's candidates, so that a sweep is compared before the next is weighted.
             bias_start: BitDelay::new(moved + CANDIDATES_LATENCY + 1),
             totals: BitDelay::new(moved + CANDIDATES_LATENCY + SCORE_LATENCY + padding),
             finish: BitDelay::new(moved + 1),
@@ -216,9 +216,9 @@ impl Search {
             moved_address: Delay::new(step, moved),
             scored_address: Delay::new(step, CANDIDATES_LATENCY),
             set_up: Default::default(),
-            standing: Default::default(),
+            stalled_before: Default::default(),
             due: Default::default(),
-            held: Default::default(),
+            stall: Default::default(),
             quad_end: Default::default(),
         }
     }
@@ -245,7 +245,7 @@ impl Logic for Search {
         self.quads.clk.next = self.clk.val();
         self.counting.clk.next = self.clk.val();
         self.set_up.clk.next = self.clk.val();
-        self.standing.clk.next = self.clk.val();
+        self.stalled_before.clk.next = self.clk.val();
         self.trial.clk.next = self.clk.val();
         self.trial.rst.next = self.rst.val();
         self.outcome.clk.next = self.clk.val();
@@ -299,11 +299,11 @@ impl Logic for Search {
         self.sequencer.enabled.next = self.enabled.val();
         self.best.begin_frame.next = self.start.val();
         self.began.d.next = self.start.val();
-        self.due.next = self.began.q.val() | self.compared_later.q.val() | self.standing.q.val();
-        self.held.next = self.due.val() & self.sequencer.next_last.val() & !self.ready.val();
-        self.standing.d.next = self.held.val() & !self.rst.val();
-        self.stands.next = self.held.val();
-        self.set_up.d.next = ((self.due.val() & !self.held.val())
+        self.due.next = self.began.q.val() | self.compared_later.q.val() | self.stalled_before.q.val();
+        self.stall.next = self.due.val() & self.sequencer.next_last.val() & !self.ready.val();
+        self.stalled_before.d.next = self.stall.val() & !self.rst.val();
+        self.stalled.next = self.stall.val();
+        self.set_up.d.next = ((self.due.val() & !self.stall.val())
             | (self.sequencer.chains.val() & self.period.last.val()))
             & !self.rst.val();
         self.compared_later.d.next = self.best.done.val() & self.best.closes.val();
@@ -375,7 +375,7 @@ impl Logic for Search {
         self.best.totals.next = self.scores.totals.val();
         self.best.weights.next = self.bias.weights.val();
         self.best.eligible.next = self.bias.eligible.val();
-        self.best.sweep.next = self.bias.weighed.val();
+        self.best.sweep.next = self.bias.weighted_sweep.val();
 
         comment!("The constant terms of the last sweep are the values");
         self.constants.word.next = self.taylor.moved.val();

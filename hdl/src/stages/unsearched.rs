@@ -28,7 +28,7 @@ kernel_block!(
     clock clk,
     inputs [rst, which, fill_which, fill_quad, fill, fill_index, fill_address, start, enabled, ready],
     outputs [
-        values, values_valid, settled, values_begin, done, best_x, best_y, score, found, compared, taken, stands,
+        values, values_valid, settled, values_begin, done, best_x, best_y, score, found, compared, taken, stalled,
     ]
 );
 
@@ -66,7 +66,7 @@ fn kernel(ports: &SearchPorts) -> Kernel {
         ("found", 1),
         ("compared", 1),
         ("taken", 1),
-        ("stands", 1),
+        ("stalled", 1),
     ] {
         k.wire(name, k.constant(bits, 0));
     }

@@ -9,11 +9,11 @@ use dermis_golden::fixed::Model;
 use dermis_golden::frame::Frame;
 use dermis_golden::scene::Scene;
 
-use crate::cosim::faults::state_bits::{StorageClass, CLASSES};
 use crate::cosim::faults::{inject_faults, Row};
 use crate::cosim::hardware::Hardware;
 use crate::report;
 use crate::run_log::{RunLog, TargetCounts};
+use dermis_hdl::state::{StorageClass, CLASSES};
 
 /// Arguments of `dermis faults`.
 #[derive(Args, Debug)]

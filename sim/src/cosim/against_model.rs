@@ -105,7 +105,7 @@ pub fn compare_recording(
                 comparison.compare_word(stage.name, index, Some(expected.clone()), got);
             }
         }
-        for (stage, words) in [("forces", &vector.expected.beats), ("status", &vector.expected.status)] {
+        for (stage, words) in [("beats", &vector.expected.beats), ("status", &vector.expected.status)] {
             for (index, expected) in words.iter().enumerate() {
                 let got = beats.next().map(|b| (b.cycle, b.data.map(i64::from).to_vec()));
                 comparison.compare_word(stage, index, Some(expected.map(i64::from).to_vec()), got);
@@ -168,7 +168,7 @@ impl FrameComparison<'_> {
             return;
         }
         // Only in these streams is the word's index a taxel; other stages may have as many words by coincidence.
-        let forces = stage == "forces" && self.vector.expected.beats.len() == self.vector.taxels;
+        let forces = stage == "beats" && self.vector.expected.beats.len() == self.vector.taxels;
         let per_taxel = (stage == "receive" || forces) && expected.is_some();
         let cols = self.vector.cols;
         let taxel = per_taxel.then(|| [index / cols, index % cols]);

@@ -76,7 +76,7 @@ impl Layout {
                  wire tap{index}_valid = {valid};\n  wire [{top_bit}:0] tap{index}_data = {data};\n  \
                  assign out[{last}:{first}] = {{{zeros}tap{index}_data, 31'd0, tap{index}_valid}};",
                 name = tap.name,
-                fields = tap.fields,
+                fields = tap.fields.len(),
                 width = tap.field_bits,
                 valid = valid(tap, "dut"),
                 data = word(tap, "dut"),
@@ -102,7 +102,7 @@ impl Layout {
         let taps = self.taps.iter().zip(&self.offsets).map(|(tap, &offset)| {
             (words[offset] & 1 == 1).then(|| {
                 let data = &words[offset + 1..];
-                (0..tap.fields).map(|i| field(data, i * tap.field_bits as usize, tap.field_bits)).collect()
+                (0..tap.fields.len()).map(|i| field(data, i * tap.field_bits as usize, tap.field_bits)).collect()
             })
         });
         Outputs {
@@ -149,7 +149,7 @@ mod tests {
 
     fn tap(name: &'static str, fields: usize, field_bits: u32) -> Tap {
         let word = vec![TapSignal { name: "d".into(), bits: fields as u32 * field_bits, signed: true }];
-        Tap { name, valid: vec!["v".into()], word, fields, field_bits }
+        Tap { name, valid: vec!["v".into()], word, fields: vec!["f"; fields], field_bits }
     }
 
     #[test]
@@ -158,7 +158,7 @@ mod tests {
         let signal = |name: &str, bits, signed| TapSignal { name: name.into(), bits, signed };
         let word_of = vec![signal("x", 11, true), signal("y", 32, true), signal("taken", 1, false)];
         let valid_of = vec!["m__valid".into(), "l__folding".into()];
-        let tap = Tap { name: "a", valid: valid_of, word: word_of, fields: 3, field_bits: 32 };
+        let tap = Tap { name: "a", valid: valid_of, word: word_of, fields: vec!["x", "y", "z"], field_bits: 32 };
         assert_eq!(valid(&tap, "dut"), "dut.m__valid && dut.l__folding");
         assert_eq!(word(&tap, "dut"), "{31'd0, dut.taken, dut.y, {21{dut.x[10]}}, dut.x}");
     }

@@ -18,22 +18,20 @@
 
 mod bit_flip;
 mod classify;
-pub mod state_bits;
 
 use std::collections::{BTreeMap, BTreeSet};
 
 use anyhow::{bail, Result};
 use dermis_golden::frame::Frame;
+use dermis_hdl::state::{StateElement, StorageClass, CLASSES};
 use serde::Serialize;
 
-use super::bench::INSTANCE;
 use super::drive::{record, InputFrame, Stimulus};
 use super::hardware::Hardware;
 use super::stress::{shipped_samples, synthetic_samples, Sample};
 use crate::progress::Progress;
 use bit_flip::{FaultInjector, StateBit};
 use classify::{classify, Outcome};
-use state_bits::{state_elements, StateElement, StorageClass, CLASSES};
 
 /// Relative force error above which a silent fault counts as large.
 pub const LARGE: f64 = 0.01;
@@ -44,7 +42,7 @@ pub struct Row {
     /// ROM, RAM or registers.
     pub class: StorageClass,
     /// Stage name.
-    pub stage: String,
+    pub stage: &'static str,
     /// Number of registers and memories.
     pub signals: usize,
     /// Number of their bits.
@@ -84,11 +82,10 @@ pub fn inject_faults(hardware: &Hardware, frames: &[Frame], count: usize, seed: 
     }
     pool.retain(Sample::has_force);
     let mut device = hardware.device_with_writable_state()?;
-    let memories = &hardware.generated.memories;
-    let elements = state_elements(&device.listing()?, INSTANCE, memories)?;
+    let elements = &hardware.generated.state;
     let longest = pool.iter().map(|sample| sample.cycles.total).max().unwrap_or(0);
-    let mut rows: BTreeMap<(StorageClass, String), Row> = BTreeMap::new();
-    for element in &elements {
+    let mut rows: BTreeMap<(StorageClass, &str), Row> = BTreeMap::new();
+    for element in elements {
         // Flips a bit twice, which leaves it unchanged: shows that it can be flipped.
         if ![(); 2].iter().all(|()| device.flip(&element.scope, &element.signal, element.words - 1, element.bits - 1)) {
             bail!(
@@ -99,14 +96,14 @@ pub fn inject_faults(hardware: &Hardware, frames: &[Frame], count: usize, seed: 
                 element.bits - 1
             );
         }
-        let row = rows.entry((element.class, element.stage.clone())).or_insert_with(|| Row::new(element));
+        let row = rows.entry((element.class, element.stage)).or_insert_with(|| Row::new(element));
         (row.signals, row.bits) = (row.signals + 1, row.bits + element.words * element.bits);
     }
     let mut flipped = BTreeSet::new();
     let bar = Progress::steps("faults", count as u64);
     for run in 0..count {
         bar.set(run as u64);
-        let Some((index, word, bit)) = draw(&elements, run, &mut random) else { continue };
+        let Some((index, word, bit)) = draw(elements, run, &mut random) else { continue };
         let element = &elements[index];
         let [first, second, after] = [(); 3].map(|()| &pool[random.usize(..pool.len())]);
         let second = &second.behind(&hardware.model, first);
@@ -120,7 +117,7 @@ pub fn inject_faults(hardware: &Hardware, frames: &[Frame], count: usize, seed: 
         }
         let again = record(&mut device, 0, &[input_frame(after)], Stimulus::FullSpeed, 4 * longest);
         let recovered = classify(&again, &[after]) == Outcome::Harmless;
-        if let Some(row) = rows.get_mut(&(element.class, element.stage.clone())) {
+        if let Some(row) = rows.get_mut(&(element.class, element.stage)) {
             row.add(outcome, recovered, flipped.insert((index, word, bit)));
         }
     }
@@ -132,11 +129,9 @@ pub fn inject_faults(hardware: &Hardware, frames: &[Frame], count: usize, seed: 
 fn draw(elements: &[StateElement], run: usize, random: &mut fastrand::Rng) -> Option<(usize, usize, usize)> {
     let class = CLASSES[run % CLASSES.len()];
     let stages: BTreeSet<&str> =
-        elements.iter().filter(|element| element.class == class).map(|element| element.stage.as_str()).collect();
+        elements.iter().filter(|element| element.class == class).map(|element| element.stage).collect();
     let stage = stages.iter().nth(run / CLASSES.len() % stages.len().max(1))?;
-    let own = || {
-        elements.iter().enumerate().filter(|(_, element)| (element.class, element.stage.as_str()) == (class, *stage))
-    };
+    let own = || elements.iter().enumerate().filter(|(_, element)| (element.class, element.stage) == (class, *stage));
     let mut left = random.usize(..own().map(|(_, element)| element.words * element.bits).sum::<usize>());
     for (index, element) in own() {
         if left < element.words * element.bits {
@@ -155,7 +150,7 @@ impl Row {
     fn new(element: &StateElement) -> Row {
         Row {
             class: element.class,
-            stage: element.stage.clone(),
+            stage: element.stage,
             signals: 0,
             bits: 0,
             flips: 0,

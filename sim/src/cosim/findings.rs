@@ -15,7 +15,7 @@ pub struct Mismatch {
     pub run: String,
     /// Frame name.
     pub frame: String,
-    /// Stage name; `forces` and `status` for the output beats, `handshake`, `cycles`, `watchdog`.
+    /// Stage name; `beats` and `status` for the output, `handshake`, `cycles`, `watchdog`.
     pub stage: String,
     /// Index of the word in the stage's stream of this frame.
     pub index: usize,

@@ -33,8 +33,6 @@ const SHIM: &str = include_str!("../../shim/shim.cpp");
 const SHIM_FILE: &str = "shim.cpp";
 /// Addition to [`SHIM`] for libraries in which bits can be flipped.
 const FAULTS: &str = include_str!("../../shim/faults.cpp");
-/// File name of Verilator's XML listing of such a design, beside the library.
-const LISTING: &str = "listing.xml";
 /// Seed of the random start values of registers without an initial value; these show a missing reset.
 const RESET_SEED: i32 = 20_240_501;
 /// Arguments of the compiler: longer simulations are worth a second of optimisation.
@@ -101,7 +99,6 @@ pub(crate) struct VerilatedBench {
     free: unsafe extern "C" fn(*mut c_void),
     flip: Option<Flip>,
     words: Vec<u32>,
-    path: PathBuf,
     /// Keeps the code of the function pointers loaded; dropped after `drop` has freed the model.
     _library: Library,
 }
@@ -132,15 +129,7 @@ impl VerilatedBench {
             let memories = memory_folder(design)?;
             let folder = CString::new(memories.path().to_string_lossy().as_bytes()).map_err(|e| fail(e.to_string()))?;
             let handle = start(folder.as_ptr(), RESET_SEED);
-            Ok(VerilatedBench {
-                handle,
-                cycle,
-                free,
-                flip,
-                words: vec![0; words],
-                path: path.clone(),
-                _library: library,
-            })
+            Ok(VerilatedBench { handle, cycle, free, flip, words: vec![0; words], _library: library })
         }
     }
 
@@ -192,15 +181,6 @@ impl Verilated {
         // The shim also names its model "bench".
         let path = format!("bench.{INSTANCE}{}{scope}", if scope.is_empty() { "" } else { "." });
         self.bench.flip(&path, signal, word, bit)
-    }
-
-    /// Verilator's XML listing of a design with `writable_state`: modules, variables, assignments.
-    ///
-    /// # Errors
-    /// [`VerilatorError::File`]: there is no listing.
-    pub fn listing(&self) -> Result<String, VerilatorError> {
-        let path = self.bench.path.with_file_name(LISTING);
-        Ok(fs::read_to_string(&path).map_err(FileError::at(&path))?)
     }
 }
 
@@ -278,16 +258,13 @@ fn build(design: &Design, sources: &[(&str, &str)], folder: &Path, cache: &Path)
 /// Translates the Verilog of `sources` in the folder `work`, and compiles that; the output of what failed, if anything.
 fn compile(design: &Design, sources: &[(&str, &str)], work: &Path, cache: &Path) -> Result<(), String> {
     let verilog = sources.iter().map(|(name, _)| *name).filter(|name| is_source(name));
-    let verilate = |arguments: &[&str]| {
-        let mut verilator = Command::new("verilator");
-        succeed(verilator.current_dir(work).args(["--top-module", "bench"]).args(arguments).args(verilog.clone()))
-    };
-    let mut translate = vec!["--cc", "--prefix", "Vbench", "--x-initial", "unique", "--x-assign", "unique", "-O3"];
+    let mut verilator = Command::new("verilator");
+    verilator.current_dir(work).args(["--top-module", "bench", "--cc", "--prefix", "Vbench", "-O3"]);
+    verilator.args(["--x-initial", "unique", "--x-assign", "unique"]);
     if design.writable_state {
-        translate.push("--public-flat-rw");
-        verilate(&["--xml-only", "--xml-output", LISTING])?;
+        verilator.arg("--public-flat-rw");
     }
-    verilate(&translate)?;
+    succeed(verilator.args(verilog))?;
     let runtime = Runtime::new(&ARGUMENTS, cache).map_err(|error| error.to_string())?;
     succeed(runtime.compile(work, &[SHIM_FILE], LIBRARY).map_err(|error| error.to_string())?.args(LINK))
 }

@@ -1,11 +1,11 @@
 //! Waveforms: a run as a VCD file, and a GTKWave list of its signals.
 //!
-//! Recorded are the engine's pins and the taps of all stages, with their words split into named fields.
+//! Recorded are the engine's pins and the taps of all stages, with their words split into the fields that the taps name.
 //!
 //! ```text
 //! dermis.clk
 //! dermis.input.{valid, ready, last, code}        dermis.output.{valid, ready, last, fx, fy, fz}
-//! dermis.fold.{valid, even_even, …}              dermis.search.{valid, x, y, score, taken}
+//! dermis.fold.{valid, even_even, …}              dermis.search.{valid, best_x, best_y, score, taken}
 //! ```
 //! A netlist has no taps, so that only its pins are recorded. A stage's fields keep their last word while its `valid`
 //! is low. Values are sampled before the rising edge that ends a cycle and drawn over that whole cycle, one period of
@@ -28,22 +28,6 @@ use super::drive::Stimulus;
 use super::hardware::{Hardware, Simulator};
 use crate::progress::Progress;
 use dermis_golden::write::write;
-
-/// Taxels of a quad, by the quadrant of the subarray they lie in.
-const TAXELS: [&str; 4] = ["upper_left", "upper_right", "lower_left", "lower_right"];
-/// Parities of a quad, along the rows and along the columns.
-const PARITIES: [&str; 4] = ["even_even", "even_odd", "odd_even", "odd_odd"];
-
-/// Names of the fields of a stage's word.
-fn fields(stage: &str) -> &'static [&'static str] {
-    match stage {
-        "receive" => &["code"],
-        "choose" => &["case"],
-        "normalise" | "unfold" | "force" => &TAXELS,
-        "search" => &["x", "y", "score", "taken"],
-        _ => &PARITIES,
-    }
-}
 
 /// A signal in the VCD file, with the last value written.
 struct Signal {
@@ -95,7 +79,7 @@ impl<W: Write> Waves<W> {
         for tap in taps {
             writer.add_module(tap.name)?;
             let mut stream = vec![signal(&mut writer, "valid", 1)?];
-            for name in fields(tap.name).iter().take(tap.fields) {
+            for name in &tap.fields {
                 stream.push(signal(&mut writer, name, tap.field_bits)?);
             }
             writer.upscope()?;
@@ -223,7 +207,7 @@ fn signal_list(vcd: &Path, taps: &[Tap]) -> String {
         group(scope, &mut pins.iter().copied());
     }
     for tap in taps {
-        let words = fields(tap.name).iter().take(tap.fields).map(|field| (*field, tap.field_bits));
+        let words = tap.fields.iter().map(|field| (*field, tap.field_bits));
         group(tap.name, &mut [("valid", 1)].into_iter().chain(words));
     }
     text
@@ -293,7 +277,7 @@ mod tests {
         let model = Model::new(&scene).unwrap();
         let trace = model.run(&model.readings(frames).unwrap());
         let stage = |name: &str| &trace.stages.iter().find(|stage| stage.name == name).unwrap().words;
-        assert_eq!(values["dermis.search.x"].last(), Some(&stage("search").last().unwrap()[0]));
+        assert_eq!(values["dermis.search.best_x"].last(), Some(&stage("search").last().unwrap()[0]));
         let mut folded: Vec<i64> = stage("fold").iter().map(|word| word[3]).collect();
         folded.dedup();
         assert_eq!(values["dermis.fold.odd_odd"], folded);

@@ -1,8 +1,8 @@
 //! The table of `dermis faults`.
 
 use super::table::{aligned, percent};
-use crate::cosim::faults::state_bits::CLASSES;
 use crate::cosim::faults::{Row, Shares, LARGE};
+use dermis_hdl::state::CLASSES;
 
 /// One row per storage class and stage; then the shares of each class, with its stages weighted by their bits.
 pub fn faults(rows: &[Row]) -> String {
@@ -33,7 +33,7 @@ pub fn faults(rows: &[Row]) -> String {
             row.silent,
             row.large,
         ];
-        let mut cells = vec![row.class.name().to_owned(), row.stage.clone()];
+        let mut cells = vec![row.class.name().to_owned(), row.stage.to_owned()];
         cells.extend(counts.iter().map(usize::to_string));
         cells.extend([percent((row.silent > 0).then_some(row.largest_error)), row.not_recovered.to_string()]);
         cells

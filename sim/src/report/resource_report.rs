@@ -1,22 +1,19 @@
 //! Resources of a generated design and its optional features, as text.
 
-use std::collections::BTreeMap;
-
 use dermis_golden::fixed::plan::cycles::lane_utilisation;
 use dermis_golden::fixed::{Cycles, Model};
 use dermis_hdl::explain::{Explained, Saved};
-use dermis_hdl::usage::{total, Usage, STAGES};
+use dermis_hdl::usage::{total, StageUsage, Usage};
 
 use super::table::{aligned, markdown};
 
 /// A table of the resources of each stage and their share of the board, with lanes and cycles.
-pub fn resources(model: &Model, usage: &BTreeMap<String, Usage>) -> String {
+pub fn resources(model: &Model, usage: &StageUsage) -> String {
     let board = &model.board;
     let row = |name: &str, cells: [String; 4]| [vec![name.to_string()], cells.to_vec()].concat();
     let line = |name: &str, u: &Usage| row(name, u.counts().map(|count| count.to_string()));
     let all = total(usage);
-    let present = STAGES.iter().filter_map(|stage| usage.get(*stage).map(|usage| line(stage, usage)));
-    let mut rows: Vec<Vec<String>> = present.collect();
+    let mut rows: Vec<Vec<String>> = usage.iter().map(|(stage, usage)| line(stage, usage)).collect();
     rows.push(line("all", &all));
     rows.push(row("of board", all.shares(board).map(|share| format!("{share:.0} %"))));
     let mut text = markdown(&["stage", "block RAMs", "multipliers", "flip-flops*", "LUTs*"], rows);

@@ -22,7 +22,7 @@ fn taps() -> Vec<Tap> {
         name,
         valid: vec![valid.into()],
         word: vec![TapSignal { name: word.into(), bits, signed: true }],
-        fields: 1,
+        fields: vec!["d"],
         field_bits: bits,
     };
     vec![tap("receive", "take", "s_axis_tdata", 12), tap("scale", "scale_valid", "scaled", 32)]
@@ -105,7 +105,7 @@ fn flipped_bit_in_the_expected_output_is_found_with_its_cycle() {
     assert_eq!(findings.count, 1);
     let (last_out, text) = (times[0].last_out.unwrap(), findings.kept[0].to_string());
     let wanted = format!(
-        "toy, full speed: frame ramp, stage forces, word 5 (taxel 1,2), cycle {}: expected [15, 5, 4], got [15, 5, 5]",
+        "toy, full speed: frame ramp, stage beats, word 5 (taxel 1,2), cycle {}: expected [15, 5, 4], got [15, 5, 5]",
         last_out - 1
     );
     assert_eq!(text, wanted);

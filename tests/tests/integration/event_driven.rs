@@ -133,7 +133,7 @@ impl Device for Icarus {
         };
         let tap = |(tap, pair): (&Tap, &[&str])| {
             let word = |index| field(pair[1], index, tap.field_bits as usize);
-            (pair[0] == "1").then(|| (0..tap.fields).map(word).collect())
+            (pair[0] == "1").then(|| (0..tap.fields.len()).map(word).collect())
         };
         Outputs {
             s_ready: ready == "1",

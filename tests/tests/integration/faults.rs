@@ -4,7 +4,7 @@
 use dermis_golden::fixed::plan::storage::word_bits;
 use dermis_golden::fixed::Model;
 use dermis_golden::scene::Scene;
-use dermis_sim::cosim::faults::state_bits::{state_elements, StorageClass};
+use dermis_hdl::state::StorageClass;
 use dermis_sim::cosim::faults::{inject_faults, Shares};
 use dermis_sim::cosim::hardware::Hardware;
 use dermis_sim::report;
@@ -20,9 +20,7 @@ fn hardware() -> Hardware {
 #[test]
 fn every_bit_is_found() {
     let hardware = hardware();
-    let listing = hardware.device_with_writable_state().unwrap().listing().unwrap();
-    let memories = &hardware.generated.memories;
-    let all = state_elements(&listing, "bench.dut", memories).unwrap();
+    let (memories, all) = (&hardware.generated.memories, &hardware.generated.state);
     let bits = |wanted: &dyn Fn(StorageClass) -> bool| -> usize {
         all.iter().filter(|element| wanted(element.class)).map(|element| element.words * element.bits).sum()
     };
@@ -33,7 +31,7 @@ fn every_bit_is_found() {
         hardware.model.storage().words() * word_bits(hardware.model.formats())
     );
     // Estimated without the registers inside memory blocks, and without memories in LUTs, such as the queue's.
-    let estimated: usize = hardware.generated.usage.values().map(|usage| usage.flip_flops).sum();
+    let estimated: usize = hardware.generated.usage.iter().map(|(_, usage)| usage.flip_flops).sum();
     let flip_flops = all.iter().filter(|element| element.class == StorageClass::Register && element.words == 1);
     let registers: usize = flip_flops.map(|element| element.bits).sum();
     println!("{registers} bits of registers, {estimated} flip-flops estimated");

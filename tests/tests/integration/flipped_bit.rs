@@ -62,6 +62,6 @@ fn in_the_expected_output() {
     let findings = check(&hardware, &vectors);
     assert_eq!(findings.count, 1);
     let first = &findings.kept[0];
-    assert_eq!((first.stage.as_str(), first.taxel), ("forces", Some([7, 7])));
+    assert_eq!((first.stage.as_str(), first.taxel), ("beats", Some([7, 7])));
     assert!(first.cycle.is_some() && first.expected != first.got);
 }

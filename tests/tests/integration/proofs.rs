@@ -9,8 +9,8 @@
 //! | `average.v`: as many sums as taxels, tlast on the last | `average` |
 //! | `sliding_mean.v`: each beat leaves once, with tlast and the number of frames | `average` with a sliding mean |
 //! | `receive.v`: a frame is stored completely at its address; tlast is checked; dead taxels become 0 | `receive` |
-//! | `send.v`: a frame has all its beats, none is sent outside a frame | `send`, `force` |
-//! | `queue.v`: beats leave in order and unchanged, an offered beat stays | `force`'s queue |
+//! | `send.v`: a frame has all its beats, none is sent outside a frame | `send`, `forces` |
+//! | `queue.v`: beats leave in order and unchanged, an offered beat stays | `forces`' queue |
 //! | `counter.v`: a count is below its limit | counters |
 //! | `frame_ingress.v`: an offered code stays; one complete frame per accepted packet and no other | `frame_ingress` |
 //! | `slip.v`: each byte is sent once and can be decoded | the link's encoder |

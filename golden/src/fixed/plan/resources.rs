@@ -233,7 +233,7 @@ impl Resources {
         let multipliers = vec![
             ("prepare", calibrate),
             ("pass", 4 * f.lanes_per_parity * board.multipliers_for(MULTIPLIER_BITS, MULTIPLIER_BITS)),
-            ("force", force_multipliers(f, board)),
+            ("forces", force_multipliers(f, board)),
             ("resultants", resultant_multipliers(scene, board)),
         ];
         Resources { memories, multipliers, overlaps: overlaps && f.degree > 0 }

@@ -152,7 +152,7 @@ fn resources(f: &Formats, board: &Board) -> Resources {
     memories.push(memory(Holds::Totals, SLOT as usize, f.score_bits as usize + 1));
     let multipliers = vec![
         ("pass", 4 * board.multipliers_for(OPERAND_BITS, OPERAND_BITS)),
-        ("force", board.multipliers_for(f.search_bits[0], FACTOR_BITS)),
+        ("forces", board.multipliers_for(f.search_bits[0], FACTOR_BITS)),
     ];
     Resources { memories, multipliers, overlaps: false }
 }

@@ -2,7 +2,7 @@
 
 pub mod choose;
 pub mod fold;
-pub mod force;
+pub mod forces;
 pub mod normalise;
 pub mod pass;
 pub mod prepare;

@@ -1,7 +1,7 @@
 //! Stage `normalise`: block floating point on the input.
 //!
 //! Every code of a subarray is shifted left by the same `s = input_bits − 1 − length(max |c|)`, so that the largest one
-//! fills the word. The shift is exact; [`force`](super::force) takes the exponent back. For a subarray of zeros the
+//! fills the word. The shift is exact; [`forces`](super::forces) takes the exponent back. For a subarray of zeros the
 //! shift is `input_bits − 1`, without effect.
 
 use crate::fixed::words::arith::bit_length;

@@ -8,7 +8,7 @@
 //! Exact 64-bit integers, sent as two words with the low one first: [`BEATS`] beats per subarray, row-major, before the
 //! status. The host divides.
 
-use super::force::Force;
+use super::forces::Force;
 use crate::partition::Subarray;
 use crate::sensor::Sensor;
 

@@ -1,14 +1,14 @@
 //! Stage `send`: forces, then status, on the output stream.
 //!
 //! Forces are sent row-major over the array, one beat per taxel, `{fz, fy, fx}`; then [`STATUS_BEATS`] beats for each
-//! subarray of the chosen case, row-major. Saturations of `force`, the contact flag and the cycles are those of the
+//! subarray of the chosen case, row-major. Saturations of `forces`, the contact flag and the cycles are those of the
 //! whole frame, the same for every subarray:
 //!
 //! | beat | fx word | fy word | fz word |
 //! |---|---|---|---|
 //! | 0 | μ1 in mu_max/384 | μ2 in mu_max/384 | flags, see [`Status`] |
 //! | 1 | score, 2^−6 | right shift of `rescale` | left shift of `normalise` |
-//! | 2 | saturations of `rescale` | saturations of `force` | cycles to the first output beat, see [`Status::cycles`] |
+//! | 2 | saturations of `rescale` | saturations of `forces` | cycles to the first output beat, see [`Status::cycles`] |
 
 use serde::Serialize;
 

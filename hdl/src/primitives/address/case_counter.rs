@@ -13,13 +13,13 @@ use crate::wire::Wire;
 pub struct CaseCounter {
     /// Clock; registers change on its rising edge.
     pub clk: Signal<In, Clock>,
-    /// Index of the case.
+    /// Index of the case; where it changes, the count is below the new limit or is cleared before `enable`.
     pub which: Wire<In>,
     /// Sets the count to 0 at the clock edge, with priority over `enable`.
     pub clear: Signal<In, Bit>,
     /// Advances the count at the clock edge; from the last value to 0.
     pub enable: Signal<In, Bit>,
-    /// The count, unsigned.
+    /// The count, unsigned; valid from the first `clear` on.
     pub value: Wire<Out>,
     /// The count is at its last value, the limit of the case − 1; combinational.
     pub last: Signal<Out, Bit>,

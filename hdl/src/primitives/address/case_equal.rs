@@ -11,9 +11,9 @@ use crate::wire::Wire;
 /// Tells whether a count is that of the case; combinational.
 #[derive(LogicBlock)]
 pub struct CaseEqual {
-    /// Index of the case.
+    /// Index of the case; valid with `value`.
     pub which: Wire<In>,
-    /// The count, unsigned.
+    /// The count, unsigned; compared in the same cycle.
     pub value: Wire<In>,
     /// `value` is that of case `which`; combinational.
     pub equal: Signal<Out, Bit>,

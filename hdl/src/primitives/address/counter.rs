@@ -20,7 +20,7 @@ pub struct Counter {
     pub clear: Signal<In, Bit>,
     /// Advances the count at the clock edge.
     pub enable: Signal<In, Bit>,
-    /// The count, 0..`limit`, unsigned.
+    /// The count, 0..`limit`, unsigned; valid from the first `clear` on.
     pub value: Wire<Out>,
     /// The count is `limit − 1`; combinational.
     pub last: Signal<Out, Bit>,

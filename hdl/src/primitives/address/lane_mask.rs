@@ -13,11 +13,11 @@ use crate::wire::Wire;
 /// `{quad, step}`.
 #[derive(LogicBlock)]
 pub struct LaneMask {
-    /// Index of the case.
+    /// Index of the case; valid with `address`.
     pub which: Wire<In>,
-    /// Address of the step in the subarray.
+    /// Address of the step in the subarray; taken in the same cycle.
     pub address: Wire<In>,
-    /// One bit per lane: the lane is counted.
+    /// One bit per lane, which is counted; combinational from `address`.
     pub mask: Wire<Out>,
     kernel: Body,
 }

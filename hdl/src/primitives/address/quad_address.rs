@@ -18,23 +18,23 @@ use crate::wire::Wire;
 /// quad follow one another.
 #[derive(LogicBlock)]
 pub struct QuadAddress {
-    /// Index of the case.
+    /// Index of the case; valid with `row`.
     pub which: Wire<In>,
-    /// Row of the taxel in its subarray.
+    /// Row of the taxel in its subarray; taken in the same cycle.
     pub row: Wire<In>,
-    /// Column of the taxel in its subarray.
+    /// Column of the taxel in its subarray; valid with `row`.
     pub col: Wire<In>,
-    /// Row of the subarray in the grid of subarrays.
+    /// Row of the subarray in the grid of subarrays; valid with `row`.
     pub part_row: Wire<In>,
-    /// Column of the subarray in the grid.
+    /// Column of the subarray in the grid; valid with `row`.
     pub part_col: Wire<In>,
-    /// Address of the word, over all subarrays.
+    /// Address of the word, over all subarrays; combinational.
     pub address: Wire<Out>,
-    /// Index of the subarray, row-major.
+    /// Index of the subarray, row-major; combinational.
     pub part: Wire<Out>,
-    /// Lane of the word that the taxel is read from; of a whole quad `{lower half, right half}`. 2 bits.
+    /// Lane of the word that the taxel is read from, 2 bits, of a whole quad `{lower half, right half}`; combinational.
     pub lane: Wire<Out>,
-    /// Lanes the taxel is written to, one bit each.
+    /// Lanes the taxel is written to, one bit each; combinational.
     pub mask: Wire<Out>,
     kernel: Body,
 }

@@ -13,7 +13,7 @@ use crate::wire::Wire;
 pub struct Scan {
     /// Clock; registers change on its rising edge.
     pub clk: Signal<In, Clock>,
-    /// Index of the case.
+    /// Index of the case; constant from the first taxel to the last.
     pub which: Wire<In>,
     /// Back to the first taxel, with priority over `enable`.
     pub clear: Signal<In, Bit>,
@@ -21,13 +21,14 @@ pub struct Scan {
     pub enable: Signal<In, Bit>,
     /// The current taxel is the array's last.
     pub last: Signal<Out, Bit>,
-    /// Address of the current taxel's word, over all subarrays.
+    /// Address of the current taxel's word, over all subarrays; combinational from the count, valid from the first
+    /// `clear` on.
     pub address: Wire<Out>,
-    /// Index of the current taxel's subarray.
+    /// Index of the current taxel's subarray; valid with `address`.
     pub part: Wire<Out>,
-    /// Lane of the word the current taxel is read from, 2 bits.
+    /// Lane of the word the current taxel is read from, 2 bits; valid with `address`.
     pub lane: Wire<Out>,
-    /// Lanes the current taxel is written to, one bit each.
+    /// Lanes the current taxel is written to, one bit each; valid with `address`.
     pub mask: Wire<Out>,
     col: CaseCounter,
     part_col: CaseCounter,

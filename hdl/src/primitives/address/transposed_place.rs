@@ -12,15 +12,15 @@ use crate::wire::Wire;
 /// Combinational.
 #[derive(LogicBlock)]
 pub struct TransposedPlace {
-    /// Index of the v_ij.
+    /// Index of the v_ij; valid with `address` and `quad`.
     pub index: Wire<In>,
-    /// The quad's address as computed.
+    /// The quad's address as computed; taken in the same cycle.
     pub address: Wire<In>,
-    /// Its four taxels as computed.
+    /// Its four taxels as computed, signed; taken in the same cycle.
     pub quad: Wire<In>,
-    /// The quad's address in the subarray.
+    /// The quad's address in the subarray; combinational from `address`.
     pub placed: Wire<Out>,
-    /// Its four taxels in lane order.
+    /// Its four taxels in lane order, signed; combinational from `quad`.
     pub taxels: Wire<Out>,
     kernel: Body,
 }

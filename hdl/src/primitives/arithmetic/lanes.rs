@@ -34,18 +34,18 @@ pub struct Lanes {
     pub clk: Signal<In, Clock>,
     /// Synchronous reset, active high; clears the control pipeline and, two cycles later, the accumulators.
     pub rst: Signal<In, Bit>,
-    /// Index of the case.
+    /// Index of the case; constant from a frame's first product to its last row.
     pub which: Wire<In>,
-    /// Address in the coefficient memory, three cycles before its operands.
+    /// Address in the coefficient memory; three cycles before `valid` of its product.
     pub address: Wire<In>,
-    /// Four operands, one per parity, 18 bits each, signed.
+    /// Four operands, one per parity, 18 bits each, signed; valid with `valid`.
     pub operands: Wire<In>,
     /// `operands` and `control` are valid: one product per lane to accumulate.
     pub valid: Signal<In, Bit>,
     /// From bit 0: last product of an accumulation; with the coefficient check also first product of a subarray. Valid
     /// with `valid`.
     pub control: Wire<In>,
-    /// Accumulators of one row for the four parities, `lane_bits` each, signed.
+    /// Accumulators of one row for the four parities, `lane_bits` each, signed; valid with `quad_valid`.
     pub quad: Wire<Out>,
     /// `quad` holds a row.
     pub quad_valid: Signal<Out, Bit>,

@@ -28,13 +28,14 @@ pub struct Rescaler {
     pub shift: Wire<In>,
     /// Four accumulators of v_00, `acc_bits` each, signed; valid with `measured`.
     pub raw: Wire<In>,
-    /// Four accumulators of an A pass, `lane_bits` each, signed.
+    /// Four accumulators of an A pass, `lane_bits` each, signed; valid with `valid` while `measured` is low.
     pub quad: Wire<In>,
     /// Four v_ij, `vector_bits` each, signed; three cycles after the row.
     pub words: Wire<Out>,
     /// Four operands, `data_bits` each, signed; four cycles after the row.
     pub operands: Wire<Out>,
-    /// Number of saturated words, 16 bits; stays at the largest count.
+    /// Number of saturated words since `clear`, 16 bits, stays at the largest count; includes a row five cycles after
+    /// it.
     pub saturations: Wire<Out>,
     kernel: Body,
 }

@@ -13,9 +13,9 @@ use crate::wire::Wire;
 pub struct Unfolder {
     /// Clock; registers change on its rising edge.
     pub clk: Signal<In, Clock>,
-    /// Four parities of a v_ij, signed.
+    /// Four parities of a v_ij, signed; taken in every cycle.
     pub quad: Wire<In>,
-    /// Index of the v_ij, one cycle after `quad`.
+    /// Index of the v_ij; one cycle after its `quad`.
     pub index: Wire<In>,
     /// Four taxels, two bits wider, signed; two cycles after `quad`.
     pub taxels: Wire<Out>,

@@ -17,7 +17,7 @@ pub struct DeadTaxelMask {
     pub clear: Signal<In, Bit>,
     /// `word` is accepted; the next taxel follows.
     pub enable: Signal<In, Bit>,
-    /// The current taxel's word, `bits` wide.
+    /// The current taxel's word, `bits` wide; valid with `enable`.
     pub word: Wire<In>,
     /// `word`, or 0 for a dead taxel; same cycle.
     pub kept: Wire<Out>,

@@ -18,13 +18,14 @@ pub struct FrameStats {
     pub clear: Signal<In, Bit>,
     /// `code` and `part` are valid and taken in.
     pub accept: Signal<In, Bit>,
-    /// A code, `bits` wide, two's complement.
+    /// A code, `bits` wide, two's complement; valid with `accept`.
     pub code: Wire<In>,
-    /// Index of the code's subarray.
+    /// Index of the code's subarray; valid with `accept`.
     pub part: Wire<In>,
     /// Index of the subarray on the outputs; combinational.
     pub select: Wire<In>,
-    /// OR of the ones' complement magnitudes of subarray `select`, one bit narrower than a code.
+    /// OR of the ones' complement magnitudes of subarray `select`, one bit narrower than a code; includes a code from
+    /// the cycle after its `accept`.
     pub magnitude: Wire<Out>,
     /// A code of subarray `select` was above the noise floor.
     pub positive: Signal<Out, Bit>,

@@ -12,9 +12,9 @@ use crate::wire::Wire;
 pub struct Delay {
     /// Clock; registers change on its rising edge.
     pub clk: Signal<In, Clock>,
-    /// The word that `q` shows `depth` cycles later.
+    /// The word that `q` shows `depth` cycles later; taken in every cycle.
     pub d: Wire<In>,
-    /// The word that was on `d` `depth` cycles earlier.
+    /// The word that was on `d`; `depth` cycles later.
     pub q: Wire<Out>,
     kernel: Body,
 }

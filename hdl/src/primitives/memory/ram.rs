@@ -18,7 +18,7 @@ use crate::wire::Wire;
 pub struct Ram {
     /// Clock; registers change on its rising edge.
     pub clk: Signal<In, Clock>,
-    /// Write enable, one bit per field.
+    /// Write enable, one bit per field; taken in every cycle.
     pub write: Wire<In>,
     /// Address of the word to write; valid with `write`.
     pub write_address: Wire<In>,
@@ -26,9 +26,9 @@ pub struct Ram {
     pub write_data: Wire<In>,
     /// Enable of the read registers.
     pub read: Signal<In, Bit>,
-    /// Address of the word to read.
+    /// Address of the word to read; taken while `read` is high.
     pub read_address: Wire<In>,
-    /// The word read, one cycle after `read_address`, or two if [`registered`](Ram::registered).
+    /// The word read; one cycle after `read_address`, or two if [`registered`](Ram::registered).
     pub read_data: Wire<Out>,
     kernel: Body,
     _shape: Shape,

@@ -31,7 +31,7 @@ pub struct ForceUnit {
     pub clk: Signal<In, Clock>,
     /// Synchronous reset, active high; clears the control pipeline only.
     pub rst: Signal<In, Bit>,
-    /// Index of the case of the frame being sent.
+    /// Index of the case of the frame being sent; constant from its first `offer` to its last beat.
     pub which: Wire<In>,
     /// A new frame: clears its counts, the contact flag and the saturations.
     pub begin_frame: Signal<In, Bit>,

@@ -23,13 +23,14 @@ pub struct FrameCycles {
     /// The first subarray of the frame goes to the search.
     pub hand_over: Signal<In, Bit>,
     /// The frame that is searched waits for the one before.
-    pub stands: Signal<In, Bit>,
-    /// Cycles of the frame that is searched and sent, without the constant number that the force unit adds, unsigned.
+    pub stalled: Signal<In, Bit>,
+    /// Cycles of the frame that is searched and sent, without the constant number that the force unit adds, unsigned;
+    /// from `COUNT_DELAY` cycles after `hand_over` until that of the next frame.
     pub cycles: Wire<Out>,
     kernel: Body,
 }
 
-kernel_block!(FrameCycles, clock clk, inputs [rst, begin_frame, waits, hand_over, stands], outputs [cycles]);
+kernel_block!(FrameCycles, clock clk, inputs [rst, begin_frame, waits, hand_over, stalled], outputs [cycles]);
 
 /// Width of the cycle counts, in bits.
 pub const CYCLE_BITS: usize = 24;
@@ -45,7 +46,7 @@ impl Default for FrameCycles {
             begin_frame: Default::default(),
             waits: Default::default(),
             hand_over: Default::default(),
-            stands: Default::default(),
+            stalled: Default::default(),
             cycles: Wire::new(CYCLE_BITS),
             kernel: Body::default(),
         };
@@ -63,12 +64,12 @@ fn kernel() -> Kernel {
             *register
         })
     };
-    let [begin_frame, waits, hand_over, stands] = ["begin_frame", "waits", "hand_over", "stands"].map(later);
+    let [begin_frame, waits, hand_over, stalled] = ["begin_frame", "waits", "hand_over", "stalled"].map(later);
     let passing = k.state("passing", Type::unsigned(CYCLE_BITS), begin_frame, 0);
     let next = k.wire("next", waits.mux(*passing, passing.plus(1)));
     passing.set(next);
     let cycles = k.register("cycles", Type::unsigned(CYCLE_BITS));
-    k.when(!stands, || cycles.set(cycles.plus(1)));
+    k.when(!stalled, || cycles.set(cycles.plus(1)));
     k.when(hand_over, || cycles.set(next));
     k.finish()
 }
@@ -94,9 +95,9 @@ mod tests {
         fn clock(&mut self, inputs: &[Word]) {
             let [rst, now @ ..] = [0, 1, 2, 3, 4].map(|k| inputs[k].number() == 1);
             self.pipe.push(now);
-            let [begin_frame, waits, hand_over, stands] = self.pipe.remove(0);
+            let [begin_frame, waits, hand_over, stalled] = self.pipe.remove(0);
             let next = self.passing.map(|count| count + u64::from(!waits));
-            self.cycles = if hand_over { next } else { self.cycles.map(|count| count + u64::from(!stands)) };
+            self.cycles = if hand_over { next } else { self.cycles.map(|count| count + u64::from(!stalled)) };
             self.passing = if begin_frame { Some(0) } else { next };
             if rst {
                 self.pipe.iter_mut().for_each(|events| *events = [false; 4]);

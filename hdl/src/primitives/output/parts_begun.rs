@@ -17,7 +17,7 @@ pub struct PartsBegun {
     pub begins: Signal<In, Bit>,
     /// It is the frame's first; valid with `begins`.
     pub first: Signal<In, Bit>,
-    /// Index of a subarray.
+    /// Index of a subarray; taken in the same cycle.
     pub part: Wire<In>,
     /// Its values have begun in an earlier cycle.
     pub open: Signal<Out, Bit>,

@@ -12,15 +12,15 @@ use crate::wire::Wire;
 pub struct StatusCode {
     /// The status is being requested.
     pub status: Signal<In, Bit>,
-    /// Index of the status beat within its subarray, 0 to 2, 2 bits.
+    /// Index of the status beat within its subarray, 0 to 2, 2 bits; valid with `status`.
     pub word: Wire<In>,
-    /// Subarray whose status is requested.
+    /// Subarray whose status is requested; valid with `status`.
     pub status_part: Wire<In>,
-    /// Subarray of the scanned taxel.
+    /// Subarray of the scanned taxel; valid while `status` is low.
     pub scan_part: Wire<In>,
-    /// 0: a force, 1 … 3: a status beat.
+    /// 0: a force, 1 … 3: a status beat; combinational.
     pub beat: Wire<Out>,
-    /// Index of the beat's subarray.
+    /// Index of the beat's subarray; combinational.
     pub part: Wire<Out>,
     kernel: Body,
 }

@@ -19,7 +19,7 @@ pub struct LimbSum {
     pub clear: Signal<In, Bit>,
     /// `quad` is the last row of an accumulation.
     pub last: Signal<In, Bit>,
-    /// Accumulators of one row for the four parities, `lane_bits` each, signed.
+    /// Accumulators of one row for the four parities, `lane_bits` each, signed; taken in every cycle.
     pub quad: Wire<In>,
     /// The row as written before, of the low limbs, `acc_bits` each, signed; valid with a row of the high limbs.
     pub low: Wire<In>,

@@ -13,14 +13,14 @@ use crate::wire::Wire;
 pub struct OperandSelect {
     /// Clock; registers change on its rising edge.
     pub clk: Signal<In, Clock>,
-    /// Four parities of the folded input, `fold_bits` each, signed.
+    /// Four parities of the folded input, `fold_bits` each, signed; taken in every cycle.
     pub input_quad: Wire<In>,
-    /// Four parities of a v_ij, `data_bits` each, signed.
+    /// Four parities of a v_ij, `data_bits` each, signed; taken in every cycle.
     pub vector_quad: Wire<In>,
-    /// Selection, valid with the quads. Bits 1:0, kind: 0 = v_ij, 1 = high limb of the input, 2 = low limb. Bits 3:2,
-    /// flip: lane group t gets parity t XOR flip. Bit 4: parities 1 and 2 (x and y) are exchanged first.
+    /// Selection: bits 1:0 kind, 0 = v_ij, 1 = high limb of the input, 2 = low limb, bits 3:2 flip, lane group t gets
+    /// parity t XOR flip, bit 4 parities 1 and 2 (x and y) are exchanged first; valid with the quads.
     pub source: Wire<In>,
-    /// Operand of each lane group, four times 18 bits, signed; one cycle later.
+    /// Operand of each lane group, four times 18 bits, signed; one cycle after the quads.
     pub operands: Wire<Out>,
     kernel: Body,
 }

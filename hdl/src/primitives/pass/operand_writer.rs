@@ -14,7 +14,7 @@ use crate::wire::Wire;
 pub struct OperandWriter {
     /// Clock; registers change on its rising edge.
     pub clk: Signal<In, Clock>,
-    /// Index of the case.
+    /// Index of the case; constant from the cycle after `clear` until the next.
     pub which: Wire<In>,
     /// Restarts the counts for the next subarray, with priority over `valid`.
     pub clear: Signal<In, Bit>,
@@ -24,7 +24,8 @@ pub struct OperandWriter {
     pub address: Wire<Out>,
     /// Write enable: the quad is an operand of a later pass. Combinational from `valid`.
     pub keep: Signal<Out, Bit>,
-    /// Number of operand vectors of this subarray that can be read.
+    /// Number of operand vectors of this subarray that can be read; includes a vector from the cycle after the `valid`
+    /// that makes it readable.
     pub finished: Wire<Out>,
     kernel: Body,
 }

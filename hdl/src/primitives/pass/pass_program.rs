@@ -80,15 +80,15 @@ pub fn unroll(case: &CasePlan) -> Vec<Step> {
 pub struct PassProgram {
     /// Clock; registers change on its rising edge.
     pub clk: Signal<In, Clock>,
-    /// Index of the case.
+    /// Index of the case; valid with `start`, constant until the frame's last step.
     pub which: Wire<In>,
     /// Load the first step at the clock edge.
     pub start: Signal<In, Bit>,
     /// Load the next step at the clock edge.
     pub advance: Signal<In, Bit>,
-    /// Position in the step's columns.
+    /// Position in the step's columns; taken in every cycle.
     pub column: Wire<In>,
-    /// Number of operand vectors of this subarray that can be read.
+    /// Number of operand vectors of this subarray that can be read; taken in every cycle.
     pub finished: Wire<In>,
     /// The step's operand can be read, and the pause after an accumulation is over.
     pub ready: Signal<Out, Bit>,

@@ -18,7 +18,7 @@ pub struct RawLength {
     pub clear: Signal<In, Bit>,
     /// `quad` is valid and taken in.
     pub accept: Signal<In, Bit>,
-    /// Four accumulators, `acc_bits` each, signed.
+    /// Four accumulators, `acc_bits` each, signed; valid with `accept`.
     pub quad: Wire<In>,
     /// Right shift for `rescale`, of the quads so far; three cycles later.
     pub shift: Wire<Out>,

@@ -43,11 +43,12 @@ pub struct BestCandidate {
     pub closes: Signal<Out, Bit>,
     /// Word of the sweep just compared; valid with `done`.
     pub compared: Wire<Out>,
-    /// Best position, x, in grid steps of the level, signed.
+    /// Best position, x, in grid steps of the level, signed; valid with `done` and from then on until the next `done`,
+    /// `halve` or `begin_frame` takes effect.
     pub best_x: Wire<Out>,
-    /// Best position, y, in grid steps of the level, signed.
+    /// Best position, y, in grid steps of the level, signed; as `best_x`.
     pub best_y: Wire<Out>,
-    /// Score of the best candidate, signed, 2^−6.
+    /// Score of the best candidate, signed, 2^−6; as `best_x`.
     pub score: Wire<Out>,
     /// A candidate was taken at this level.
     pub taken: Signal<Out, Bit>,
@@ -219,15 +220,16 @@ fn kernel(t: usize, w: usize) -> Kernel {
         (totals.slice(n * t, t) - weight.low(w.min(t))).low(t)
     };
     let scores = k.delay("scores", concat(&(0..9).rev().map(difference).collect::<Vec<_>>()));
-    let (fits, held) = (k.register("fits", Type::unsigned(9)), k.register("held", Type::unsigned(sweep_bits())));
+    let (fits, own_sweep) =
+        (k.register("fits", Type::unsigned(9)), k.register("own_sweep", Type::unsigned(sweep_bits())));
     k.when(start, || {
         fits.set(eligible);
-        held.set(sweep);
+        own_sweep.set(sweep);
     });
-    let fields = Fields::of(*held);
-    let centre = [("held_centre_x", fields.centre[0]), ("held_centre_y", fields.centre[1])];
+    let fields = Fields::of(*own_sweep);
+    let centre = [("own_centre_x", fields.centre[0]), ("own_centre_y", fields.centre[1])];
     let centre = centre.map(|(name, value)| k.wire(name, value));
-    let coarse = k.wire("held_coarse", fields.coarse);
+    let coarse = k.wire("own_coarse", fields.coarse);
 
     k.comment("The eight around the centre keep their order: four pairs, then the four before and the four after it.");
     let leaf = |n: usize| {
@@ -271,7 +273,7 @@ fn kernel(t: usize, w: usize) -> Kernel {
     improved.set(take);
     k.when(ends, || {
         closes.set(fields.closes);
-        compared.set(*held);
+        compared.set(*own_sweep);
     });
     // A new search has priority over a new level, and that over a result.
     k.when(take & !halve, || {

@@ -17,7 +17,7 @@ pub struct Candidates {
     pub clk: Signal<In, Clock>,
     /// One polynomial per lane, in the layout given; a new word may come each cycle.
     pub word: Wire<In>,
-    /// Nine signed values per lane, [`LATENCY`] cycles after `word`.
+    /// Nine signed values per lane; [`LATENCY`] cycles after `word`.
     pub values: Wire<Out>,
     kernel: Body,
 }
@@ -43,7 +43,7 @@ impl Candidates {
 fn kernel(layout: &PolynomialWord) -> Kernel {
     let k = Builder::new("candidates");
     let word = k.input("word", layout.bits());
-    let lane = |lane| k.scope(&format!("lane_{lane}"), || nine(&k, layout, word, lane));
+    let lane = |lane| k.scope(&format!("lane_{lane}"), || values_of_lane(&k, layout, word, lane));
     let values: Vec<Expr> = (0..layout.lanes).flat_map(lane).collect();
     k.wire("values", concat(&values.into_iter().rev().collect::<Vec<_>>()));
     k.finish()
@@ -59,7 +59,7 @@ fn at_three<'k>(constant: Expr<'k>, even: Expr<'k>, odd: Option<Expr<'k>>) -> [E
 }
 
 /// The nine values of one lane, row-major.
-fn nine<'k>(k: &'k Builder, layout: &PolynomialWord, word: Expr<'k>, lane: usize) -> Vec<Expr<'k>> {
+fn values_of_lane<'k>(k: &'k Builder, layout: &PolynomialWord, word: Expr<'k>, lane: usize) -> Vec<Expr<'k>> {
     let bits = layout.widths[0];
     let coefficient = |exponents: (u32, u32)| {
         let index = EXPONENTS.iter().position(|&e| e == exponents).filter(|&index| index < layout.widths.len());
@@ -97,11 +97,11 @@ mod tests {
         let layout = PolynomialWord::new(lanes, widths);
         let block = Candidates::new(&layout);
         let bits = widths[0] as usize;
-        let nine = |inputs: &[Word]| {
+        let expected = |inputs: &[Word]| {
             let values: Vec<i64> = (0..lanes).flat_map(|lane| candidates(&layout.get(&inputs[0], lane))).collect();
             vec![Some(Word::of_fields(&values, bits))]
         };
-        check(block.kernel.kernel(), &random_words(500, &[layout.bits()]), &mut Pipeline::new(LATENCY, 1, nine));
+        check(block.kernel.kernel(), &random_words(500, &[layout.bits()]), &mut Pipeline::new(LATENCY, 1, expected));
     }
 
     /// Degrees 3, 2 and 1; words of all widths, so that sums wrap.

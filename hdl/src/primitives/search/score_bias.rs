@@ -22,7 +22,7 @@ pub struct ScoreBias {
     pub clk: Signal<In, Clock>,
     /// Synchronous reset, active high; clears the control pipeline only.
     pub rst: Signal<In, Bit>,
-    /// Index of the case.
+    /// Index of the case; constant while a frame is searched.
     pub which: Wire<In>,
     /// Start with the nine candidates of `sweep`.
     pub start: Signal<In, Bit>,
@@ -32,12 +32,12 @@ pub struct ScoreBias {
     pub radius: Wire<In>,
     /// Nine Σp, `sum_bits[0]` each, signed; valid with `start` and for three more cycles.
     pub sums: Wire<In>,
-    /// Nine n·log2 Σp, unsigned, 2^−6.
+    /// Nine n·log2 Σp, unsigned, 2^−6; valid eight cycles after `start`, until those of the next sweep.
     pub weights: Wire<Out>,
-    /// Nine bits: Σp > 0 and inside the disc.
+    /// Nine bits, each Σp > 0 and inside the disc; valid with `weights`.
     pub eligible: Wire<Out>,
-    /// Word of the sweep the results belong to.
-    pub weighed: Wire<Out>,
+    /// Word of the sweep the results belong to; valid with `weights`.
+    pub weighted_sweep: Wire<Out>,
     kernel: Body,
 }
 
@@ -45,7 +45,7 @@ kernel_block!(
     ScoreBias,
     clock clk,
     inputs [rst, which, start, sweep, radius, sums],
-    outputs [weights, eligible, weighed]
+    outputs [weights, eligible, weighted_sweep]
 );
 
 /// Width of n·log2 Σp for subarrays of `taxels` taxels, in bits.
@@ -75,7 +75,7 @@ impl ScoreBias {
             sums: Wire::new(9 * sum_bits),
             weights: Wire::new(9 * weight_bits(largest(taxels))),
             eligible: Wire::new(9),
-            weighed: Wire::new(sweep_bits()),
+            weighted_sweep: Wire::new(sweep_bits()),
             kernel: Body::default(),
         };
         block.bind(kernel(sum_bits, taxels))
@@ -103,10 +103,10 @@ fn kernel(s: usize, taxels: &[usize]) -> Kernel {
     let (bit, zero) = (Type::unsigned(1), k.constant(1, 0));
     let running = k.state("running", bit, rst, 0);
     let valid = k.state("valid", Type::unsigned(4), rst, 0);
-    let (held, held_radius) = (k.register("held", sweep.ty()), k.register("held_radius", radius.ty()));
+    let (own_sweep, own_radius) = (k.register("own_sweep", sweep.ty()), k.register("own_radius", radius.ty()));
     k.when(start, || {
-        held.set(sweep);
-        held_radius.set(radius);
+        own_sweep.set(sweep);
+        own_radius.set(radius);
     });
     let row = k.register("row", Type::unsigned(2));
     row.set(start.mux(k.constant(2, 0), row.plus(1)));
@@ -124,7 +124,7 @@ fn kernel(s: usize, taxels: &[usize]) -> Kernel {
         "|c + u|² = |c|² + 2 (ux cx + uy cy) + |ux| + |uy|, so the disc needs no multiplier. One carry chain per",
     );
     k.comment("cycle, the comparison in a third cycle. Rows in order uy = −1, 0, 1.");
-    let fields = Fields::of(*held);
+    let fields = Fields::of(*own_sweep);
     let twice = [("twice_x", fields.centre[0]), ("twice_y", fields.centre[1])];
     let [twice_x, twice_y] = twice.map(|(name, value)| k.wire(name, value.shift_left(1).resize(q).unsigned()));
     let below = (fields.square - twice_y).low(q).plus(1);
@@ -142,7 +142,7 @@ fn kernel(s: usize, taxels: &[usize]) -> Kernel {
             let sum_of = |row: usize| sums.slice((3 * row + column) * s, s);
             let sum = k.delay("sum", row.is(0).mux(sum_of(0), row.is(1).mux(sum_of(1), sum_of(2))));
             let presses = k.delay("presses", !sum.top() & sum.any());
-            let fits = k.delay("fits", presses & !held_radius.less(distance));
+            let fits = k.delay("fits", presses & !own_radius.less(distance));
             let fits = k.delay("fits_later", fits);
             let located = k.delay("located", locate(&k, "locate", sum));
             let log = k.delay("log", logarithm(&k, "log", located));
@@ -168,8 +168,8 @@ fn kernel(s: usize, taxels: &[usize]) -> Kernel {
     results.sort_by_key(|&(n, _)| std::cmp::Reverse(n));
     k.wire("weights", concat(&results.iter().map(|(_, (weight, _))| weight.get()).collect::<Vec<_>>()));
     k.wire("eligible", concat(&results.iter().map(|(_, (_, eligible))| eligible.get()).collect::<Vec<_>>()));
-    let weighed = k.register("weighed", sweep.ty());
-    k.when(writes & row5.is(2), || weighed.set(*held));
+    let weighted_sweep = k.register("weighted_sweep", sweep.ty());
+    k.when(writes & row5.is(2), || weighted_sweep.set(*own_sweep));
     k.finish()
 }
 
@@ -242,7 +242,7 @@ mod tests {
     /// Sweeps at any distance of at least the results', inputs stable.
     fn stimulus(cycles: usize) -> Vec<Vec<Word>> {
         let mut random = fastrand::Rng::with_seed(6);
-        let (mut busy, mut held): (usize, Vec<Word>) = (0, Vec::new());
+        let (mut busy, mut given): (usize, Vec<Word>) = (0, Vec::new());
         let inputs = |cycle: usize| {
             let rst = cycle < 2 || random.u16(..300) == 0;
             let start = !rst && busy == 0 && random.bool();
@@ -257,9 +257,9 @@ mod tests {
                 let sum = |_| random.i64(..) >> random.usize(64 - SUM_BITS..64);
                 let sums: Vec<i64> = (0..9).map(sum).collect();
                 let which = random.u64(..TAXELS.len() as u64);
-                held = vec![which.into(), sweep.word(), radius.into(), Word::of_fields(&sums, SUM_BITS)];
+                given = vec![which.into(), sweep.word(), radius.into(), Word::of_fields(&sums, SUM_BITS)];
             }
-            vec![rst.into(), held[0], start.into(), held[1], held[2], held[3]]
+            vec![rst.into(), given[0], start.into(), given[1], given[2], given[3]]
         };
         (0..cycles).map(inputs).collect()
     }

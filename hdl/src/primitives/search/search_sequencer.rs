@@ -38,11 +38,13 @@ pub struct SearchSequencer {
     pub improved: Signal<In, Bit>,
     /// Word of that sweep; valid with `compared`.
     pub compared_sweep: Wire<In>,
-    /// Best position, x, in grid steps, signed.
+    /// Best position, x, in grid steps, signed; constant in the two cycles before a halving or the last sweep is set
+    /// up.
     pub best_x: Wire<In>,
-    /// Best position, y, in grid steps, signed.
+    /// Best position, y, in grid steps, signed; as `best_x`.
     pub best_y: Wire<In>,
-    /// Move of the sweep, as in [`Taylor`](super::taylor::Taylor): x in bits 1:0, y in bits 3:2, halving in bit 4.
+    /// Move of the sweep, as in [`Taylor`](super::taylor::Taylor), x in bits 1:0, y in bits 3:2, halving in bit 4;
+    /// valid from the cycle after `set_up` until the next.
     pub step: Wire<Out>,
     /// The sweep is the last: it only moves to the best position.
     pub last: Signal<Out, Bit>,
@@ -52,15 +54,16 @@ pub struct SearchSequencer {
     pub next_last: Signal<Out, Bit>,
     /// The next sweep may be set up without waiting for the comparison of this one.
     pub chains: Signal<Out, Bit>,
-    /// Buffer to read.
+    /// Buffer to read; valid from the cycle after `set_up` until the next.
     pub source: Wire<Out>,
-    /// First address of the buffer that the next sweep reads, one cycle after that buffer is known.
+    /// First address of the buffer that the next sweep reads; one cycle after that buffer is known.
     pub next_base: Wire<Out>,
-    /// Buffer to write, one cycle after the other outputs.
+    /// Buffer to write; valid from two cycles after `set_up` to one cycle after the next.
     pub target: Wire<Out>,
-    /// Word of the sweep (`Fields`).
+    /// Word of the sweep (`Fields`); valid from two cycles after `set_up` until the next.
     pub sweep: Wire<Out>,
-    /// Squared radius of the search disc in grid steps of the level.
+    /// Squared radius of the search disc in grid steps of the level; valid from the cycle after `set_up` until the
+    /// next.
     pub radius: Wire<Out>,
     kernel: Body,
 }

@@ -49,7 +49,8 @@ pub struct Store {
     pub write_data: Wire<In>,
     /// Buffer to read; valid with `read_address`.
     pub read_buffer: Wire<In>,
-    /// Address of the step to read: 0 in the cycle after `begins`, then one more after each cycle with `counts`.
+    /// Address of the step to read, 0 in the cycle after `begins`, then one more after each cycle with `counts`; taken
+    /// in every cycle.
     pub read_address: Wire<In>,
     /// A buffer is read from the next cycle on; loads `next_base` into the read addresses.
     pub begins: Signal<In, Bit>,
@@ -57,7 +58,7 @@ pub struct Store {
     pub counts: Signal<In, Bit>,
     /// First address of that buffer in the memory (`base`); valid with `begins`.
     pub next_base: Wire<In>,
-    /// The polynomials of a step, [`latency`] cycles after `read_address`.
+    /// The polynomials of a step; [`latency`] cycles after `read_address`.
     pub read_data: Wire<Out>,
     kernel: Body,
 }
@@ -172,11 +173,11 @@ fn kernel(step: &PolynomialWord, quads: usize, fill_bits: usize, apart: bool) ->
         let fills = fill_index.is(index as u64);
         let last = write_data.slice(step.offset(index), step.lanes * width);
         let before = |at: usize| {
-            let held = k.register(&format!("held{index}_{at}"), last.ty());
+            let part = k.register(&format!("part{index}_{at}"), last.ty());
             if let Some(written) = written {
-                k.when(write & written.is(at as u64), || held.set(last));
+                k.when(write & written.is(at as u64), || part.set(last));
             }
-            *held
+            *part
         };
         let mut quad: Vec<Expr> = (0..steps(step) - 1).map(before).collect();
         quad.push(last);
@@ -292,7 +293,7 @@ mod tests {
         out: [[Option<u64>; 2]; 2],
         shown: [Option<u64>; 2],
         /// Steps of a quad that were written last, by coefficient.
-        held: [[Option<u64>; 4]; 2],
+        parts: [[Option<u64>; 4]; 2],
         /// Indices of the steps read, and the step chosen last.
         shows: [usize; LATENCY],
         step: [Option<u64>; 2],
@@ -341,10 +342,10 @@ mod tests {
                     self.asked.push((usize::from(self.apart), k, number(2), data));
                 }
                 if bit(4) {
-                    self.held[k][number(6) % steps] = Some(inputs[7].field(k * lanes * WIDTHS[0], lanes * width));
+                    self.parts[k][number(6) % steps] = Some(inputs[7].field(k * lanes * WIDTHS[0], lanes * width));
                 }
                 if bit(4) && number(6) % steps == steps - 1 && (self.apart || !bit(0)) {
-                    let of_step = |at: usize| self.held[k][at].map(|part| part << (at * lanes * width));
+                    let of_step = |at: usize| self.parts[k][at].map(|part| part << (at * lanes * width));
                     // The test writes every step before the last one first.
                     let data = (0..steps).map(|at| of_step(at).unwrap_or(0)).sum();
                     self.asked.push((0, k, (self.write_base + number(6) / steps) % end, data));
@@ -385,7 +386,7 @@ mod tests {
                 read: Default::default(),
                 out: Default::default(),
                 shown: Default::default(),
-                held: Default::default(),
+                parts: Default::default(),
                 shows: Default::default(),
                 step: Default::default(),
             };

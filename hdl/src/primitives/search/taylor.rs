@@ -15,12 +15,12 @@ use crate::wire::Wire;
 pub struct Taylor {
     /// Clock; registers change on its rising edge.
     pub clk: Signal<In, Clock>,
-    /// Bits 1:0: move along x, −1, 0 or 1, signed; bits 3:2: along y; bit 4: halve the grid step afterwards. Valid with
+    /// Move, bits 1:0 along x, −1, 0 or 1, signed, bits 3:2 along y, bit 4 halve the grid step afterwards; valid with
     /// `word`.
     pub step: Wire<In>,
-    /// Polynomials, one per lane.
+    /// Polynomials, one per lane; taken in every cycle.
     pub word: Wire<In>,
-    /// The polynomials about the new centre, four cycles later.
+    /// The polynomials about the new centre; four cycles after `word`.
     pub moved: Wire<Out>,
     kernel: Body,
 }

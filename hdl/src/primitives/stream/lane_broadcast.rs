@@ -9,15 +9,15 @@ use crate::wire::Wire;
 /// The sample on all four lanes, and the mask gated by `enable`; combinational.
 #[derive(LogicBlock)]
 pub struct LaneBroadcast {
-    /// A sample of `bits` bits.
+    /// A sample of `bits` bits; valid with `enable`.
     pub word: Wire<In>,
-    /// Lanes the sample is written to, one bit each.
+    /// Lanes the sample is written to, one bit each; valid with `enable`.
     pub mask: Wire<In>,
     /// Write in this cycle.
     pub enable: Signal<In, Bit>,
-    /// The sample on each of the four lanes.
+    /// The sample on each of the four lanes; combinational from `word`.
     pub quad: Wire<Out>,
-    /// Write enable of each lane.
+    /// Write enable of each lane; combinational from `enable`.
     pub write: Wire<Out>,
     kernel: Body,
 }

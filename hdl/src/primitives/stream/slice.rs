@@ -9,9 +9,9 @@ use crate::wire::Wire;
 /// The least significant bits of a wider word; combinational.
 #[derive(LogicBlock)]
 pub struct Slice {
-    /// The word of which the low bits are shown.
+    /// The word of which the low bits are shown; taken in every cycle.
     pub word: Wire<In>,
-    /// Its low bits.
+    /// Its low bits; combinational.
     pub low: Wire<Out>,
     kernel: Body,
 }

@@ -23,8 +23,8 @@ const INPUTS: [&str; 12] = [
     "rounded",
     "clipped",
     "round_done",
-    "mixed",
-    "mixed_valid",
+    "transformed",
+    "transformed_valid",
 ];
 
 fn word(inputs: &[Word], name: &str) -> Word {
@@ -97,7 +97,7 @@ impl Machine {
             next.seen |= magnitude_bits(self.signed(inputs, "row_word"));
             next.stored = if s.stored == end_of_words { 0 } else { s.stored + 1 };
         }
-        if (self.is_folding() && bit(inputs, "mixed_valid")) || self.rescaled(inputs) {
+        if (self.is_folding() && bit(inputs, "transformed_valid")) || self.rescaled(inputs) {
             next.written = if s.written == end_of_words { 0 } else { s.written + 1 };
             if self.rescaled(inputs) && s.written == end_of_words {
                 next.vector += 1;
@@ -177,10 +177,10 @@ impl Machine {
     fn operand(&self, inputs: &[Word]) -> i64 {
         let f = &self.formats;
         let low = f.input_low_bits;
-        let mixed = self.signed(inputs, "mixed");
+        let transformed = self.signed(inputs, "transformed");
         match self.state.step {
-            FOLD_HIGH => mixed >> low,
-            FOLD_LOW => (mixed & ((1 << low) - 1)) << (f.limb_align - low),
+            FOLD_HIGH => transformed >> low,
+            FOLD_LOW => (transformed & ((1 << low) - 1)) << (f.limb_align - low),
             _ => {
                 let word = self.signed(inputs, "rounded");
                 saturate(round_shift(word, SEARCH_EXTRA_BITS), f.data_bits).0
@@ -205,7 +205,7 @@ impl Machine {
         };
         let issue = matches!(s.step, FIRST | OTHERS) && !s.draining && s.gap == 0;
         let instruction = self.program[(s.product as usize).min(self.program.len() - 1)];
-        let (folded, rescaled) = (self.is_folding() && bit(inputs, "mixed_valid"), self.rescaled(inputs));
+        let (folded, rescaled) = (self.is_folding() && bit(inputs, "transformed_valid"), self.rescaled(inputs));
         let write = folded || rescaled && s.vector < operand_vectors(f.degree) as u64;
         let vector = match s.step {
             FOLD_HIGH => 0,
@@ -225,7 +225,7 @@ impl Machine {
             ("unrounded", (self.reset, unrounded)),
             ("round_shift", (self.started && round, shift as i64)),
             ("round", (self.started, i64::from(round))),
-            ("mix", always(bit(inputs, "round_done") && s.step != 0)),
+            ("transform", always(bit(inputs, "round_done") && s.step != 0)),
             ("issue", always(issue)),
             ("last", (issue, i64::from(instruction.last && s.column == f.quads as u64 - 1))),
             ("address", (issue, matrix as i64)),

@@ -1,9 +1,9 @@
 //! A device that flips one of its bits at a given cycle.
 
 use dermis_hdl::device::{Device, Inputs, Outputs};
+use dermis_hdl::state::StateElement;
 
 use super::super::verilator::Verilated;
-use super::state_bits::StateElement;
 
 /// One bit of one word of a register or memory.
 #[derive(Clone, Copy)]

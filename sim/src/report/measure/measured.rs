@@ -12,7 +12,7 @@ use dermis_golden::frame::{Forces, Frame};
 use dermis_golden::partition::Case;
 use dermis_golden::reconstruct::Reconstruction;
 use dermis_golden::scene::{Condition, Scene};
-use dermis_hdl::usage::Usage;
+use dermis_hdl::usage::StageUsage;
 
 use super::clock::clock;
 use super::timing::Timing;
@@ -80,7 +80,7 @@ pub struct BitTrue {
     /// from the model.
     pub cycles: u64,
     /// Resources of each stage.
-    pub usage: BTreeMap<String, Usage>,
+    pub usage: StageUsage,
 }
 
 /// Measurements of a scene in one case.

@@ -12,13 +12,13 @@
 //! | rescale | the same | a 2^r = w |
 //! | unfold | v_ij (mu_max/3)^(i+j) per taxel | w/4 |
 //! | search | the golden model's μ | mu_max/384 |
-//! | force | p at the bit-true model's μ | w/4 |
+//! | forces | p at the bit-true model's μ | w/4 |
 //! | send | the golden model's forces | that of the force word |
 //!
 //! Shares are relative to the frame's largest value in physical units, so that a subarray with little load, in whose
 //! small LSB rounding looks large, does not dominate.
 //!
-//! Stage `force` thus shows the error of the arithmetic alone, stage `send` the error of arithmetic and search.
+//! Stage `forces` thus shows the error of the arithmetic alone, stage `send` the error of arithmetic and search.
 
 use dermis_golden::board::EngineKind;
 use dermis_golden::fixed::stages::pass::join_limbs;
@@ -50,7 +50,7 @@ pub struct StageRow {
     pub max_share: f64,
     /// RMS difference over the stage's largest value.
     pub rms_share: f64,
-    /// Bits needed by the largest word, sign included.
+    /// Bits needed by the largest word of the stage, sign included.
     pub used_bits: u32,
     /// Width of the word in bits.
     pub has_bits: u32,
@@ -87,15 +87,19 @@ pub fn stages(measured: &Measured, index: usize) -> Vec<StageRow> {
     let reference = FloatReference::new(measured, bit_true, index);
     let f = &bit_true.model.formats();
     let sum = |pick: fn(&Status) -> u32| reference.status.iter().map(pick).sum::<u32>();
+    let accumulator = match bit_true.model.board.engine {
+        EngineKind::Parallel => f.lane_bits,
+        EngineKind::Serial => f.acc_bits,
+    };
     let bits = [
         ("receive", f.code_bits, 0),
         ("normalise", f.input_bits, 0),
         ("fold", f.fold_bits, 0),
-        ("pass", f.acc_bits, 0),
+        ("pass", accumulator, 0),
         ("rescale", f.vector_bits, sum(|status| status.rescale_saturations)),
         ("unfold", f.vector_bits + 2, 0),
         ("search", bit_length(MU_STEPS as u64) + 1, 0),
-        ("force", f.search_bits[0], 0),
+        ("forces", f.search_bits[0], 0),
         ("send", 32, reference.status.first().map_or(0, |status| status.force_saturations)),
     ];
     let row = |(stage, has_bits, saturations)| {
@@ -109,7 +113,12 @@ pub fn stages(measured: &Measured, index: usize) -> Vec<StageRow> {
             .fold(0.0, |peak: f64, (value, lsb)| peak.max((value * lsb).abs()));
         let share = |value: f64| if peak > 0.0 { value / peak } else { 0.0 };
         let rms = |squares: f64| (squares / compared.words.len().max(1) as f64).sqrt();
-        let used = compared.words.iter().map(|word| bit_length((word ^ (word >> 63)) as u64) + 1).max();
+        // Compared is the sum of both limbs; the words of the stage are those of each.
+        let words = match stage {
+            "pass" => reference.words(stage).concat(),
+            _ => compared.words.clone(),
+        };
+        let used = words.iter().map(|word| bit_length((word ^ (word >> 63)) as u64) + 1).max();
         StageRow {
             scene: measured.scene.name.clone(),
             case: measured.scene.partition.case.to_string(),
@@ -236,7 +245,7 @@ impl<'a> FloatReference<'a> {
         match stage {
             "normalise" => return stress().map(|quad| in_lsb(quad, code)).collect(),
             "fold" => return stress().map(|quad| in_lsb(hadamard(quad), code)).collect(),
-            "force" => {
+            "forces" => {
                 let step = scene.search.mu_max / MU_STEPS as f64;
                 let p = family.eval(status.position.map(|position| f64::from(position) * step));
                 return layout.pack(&p).into_iter().map(|quad| in_lsb(quad, word / 4.0)).collect();
@@ -315,5 +324,11 @@ mod tests {
             assert!(stage == "search" || row.rms_share < 0.25, "{what}");
         }
         assert!(rows.iter().filter(|row| row.stage == "pass").all(|row| row.rms_lsb > 0.0));
+        // The lanes' accumulators are narrower than the sum of both limbs.
+        for measured in &measured {
+            let formats = measured.bit_true.as_ref().unwrap().model.formats();
+            let pass = stages(measured, 0).into_iter().find(|row| row.stage == "pass").unwrap();
+            assert!(pass.has_bits == formats.lane_bits && pass.has_bits < formats.acc_bits, "{pass:?}");
+        }
     }
 }

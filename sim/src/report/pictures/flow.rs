@@ -112,7 +112,7 @@ fn stages(model: &Model) -> Vec<(Place, Stage)> {
             (1, 3),
             subarray("search", &[format!("p(μ) of degree {}", formats.degree), sweeps, format!("{HALVINGS} halvings")]),
         ),
-        ((2, 0), frame("force", &[text("fx = μ1 p, fy = μ2 p"), text("fz = p, threshold")])),
+        ((2, 0), frame("forces", &[text("fx = μ1 p, fy = μ2 p"), text("fz = p, threshold")])),
         (
             (2, 1),
             frame(
@@ -120,7 +120,7 @@ fn stages(model: &Model) -> Vec<(Place, Stage)> {
                 &[format!("{} force beats,", model.force_beats()), format!("{} status beats", model.status_beats())],
             ),
         ),
-        ((2, 2), frame("forces", &[text("fx fy fz per taxel,"), text("flags per subarray")])),
+        ((2, 2), frame("output", &[text("fx fy fz per taxel,"), text("flags per subarray")])),
     ]
 }
 

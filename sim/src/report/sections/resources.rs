@@ -2,7 +2,7 @@
 
 use anyhow::Result;
 use dermis_hdl::explain::explain;
-use dermis_hdl::usage::{total, Usage, STAGES};
+use dermis_hdl::usage::{total, Usage};
 
 use super::super::document::{count, text_cell, Cell, Item, Picture, Section, Table};
 use super::super::measure::{BitTrue, Measured, Options};
@@ -69,8 +69,8 @@ fn stage_rows(m: &Measured, bit_true: &BitTrue) -> Vec<Vec<Cell>> {
         row.extend(usage.counts().map(|n| count(n as u64)));
         row
     };
-    let present = STAGES.iter().filter_map(|stage| Some(row(stage, bit_true.usage.get(*stage)?)));
-    present.chain([row("all", &total(&bit_true.usage))]).collect()
+    let stages = bit_true.usage.iter().map(|(stage, usage)| row(stage, usage));
+    stages.chain([row("all", &total(&bit_true.usage))]).collect()
 }
 
 fn left_out(chosen: Vec<(&Measured, &BitTrue)>, options: &Options) -> Result<Table> {

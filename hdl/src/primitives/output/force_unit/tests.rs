@@ -2,7 +2,7 @@
 
 use std::collections::VecDeque;
 
-use dermis_golden::fixed::stages::force::{force, mu_word};
+use dermis_golden::fixed::stages::forces::{force, mu_word};
 use dermis_golden::fixed::stages::send::{
     FLAG_COEFFICIENTS, FLAG_CONDITION, FLAG_FOUND, FLAG_FRAMING, FLAG_NO_CONTACT,
 };

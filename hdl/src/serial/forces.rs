@@ -1,4 +1,4 @@
-//! Stages `force` and `send`: one product at a time, a beat every
+//! Stages `forces` and `send`: one product at a time, a beat every
 //! [`BEAT`](dermis_golden::fixed::plan::serial::BEAT) cycles.
 //!
 //! ```text
@@ -33,18 +33,18 @@ const CYCLES: usize = 20;
 
 /// Values in, beats out; timing in the module docs.
 #[derive(LogicBlock)]
-pub struct Force {
+pub struct Forces {
     /// Clock; registers change on its rising edge.
     pub clk: Signal<In, Clock>,
     /// Synchronous reset, active high.
     pub rst: Signal<In, Bit>,
     /// All values are in the bank: start sending.
     pub start: Signal<In, Bit>,
-    /// Row-major index of the taxel to read.
+    /// Row-major index of the taxel to read; valid from the cycle after `start` until the frame's last force.
     pub index: Wire<Out>,
-    /// Place 4·quad + lane of that taxel, one cycle after `index`.
+    /// Place 4·quad + lane of that taxel; one cycle after `index`.
     pub place: Wire<In>,
-    /// Index of the taxel's polynomial, combinational from `place`.
+    /// Index of the taxel's polynomial; combinational from `place`.
     pub wanted: Wire<Out>,
     /// Value p(μ*) of the taxel, signed; one cycle after `wanted`.
     pub value: Wire<In>,
@@ -68,9 +68,9 @@ pub struct Force {
     pub saturations: Wire<In>,
     /// A frame starts: its cycle count restarts.
     pub frame_begin: Signal<In, Bit>,
-    /// Product for the rounder, signed.
+    /// Product for the rounder, signed; its force word is on `rounded` four cycles later.
     pub product: Wire<Out>,
-    /// Right shift for the rounder.
+    /// Right shift for the rounder; valid with `product`.
     pub round_shift: Wire<Out>,
     /// Word from the rounder, 32 bits signed; four cycles after `product`.
     pub rounded: Wire<In>,
@@ -90,7 +90,7 @@ pub struct Force {
 }
 
 kernel_block!(
-    Force,
+    Forces,
     clock clk,
     inputs [
         rst, start, place, value, best_x, best_y, score, found, condition, framing, normalise, rescale, saturations,
@@ -116,7 +116,7 @@ struct Sizes {
     taxels: u64,
 }
 
-impl Force {
+impl Forces {
     /// With the widths of `formats`; `threshold` is in force LSBs, the rounder takes words of `unrounded` bits.
     pub fn new(formats: &Formats, threshold: i64, unrounded: usize) -> Self {
         let f = formats;
@@ -135,7 +135,7 @@ impl Force {
             threshold,
             taxels: 4 * f.quads as u64,
         };
-        let block = Force {
+        let block = Forces {
             clk: Default::default(),
             rst: Default::default(),
             start: Default::default(),
@@ -208,7 +208,7 @@ impl<'k> Status<'k> {
 
 fn kernel(sizes: Sizes) -> Kernel {
     let Sizes { places, value: value_bits, .. } = sizes;
-    let k = Builder::new("force");
+    let k = Builder::new("forces");
     let (rst, start) = (k.input("rst", 1), k.input("start", 1));
     let (place, value) = (k.input("place", places), k.input("value", sizes.word));
     let best = ["best_x", "best_y"].map(|name| k.input(name, position_bits()));

@@ -1,4 +1,4 @@
-//! Stage `force`: p(μ*) to forces in the units of the output stream.
+//! Stage `forces`: p(μ*) to forces in the units of the output stream.
 //!
 //! ```text
 //! μ = (X·mu_step) / 2^MU_ROUND                fx = μ1 p,  fy = μ2 p,  fz = p

@@ -1,4 +1,4 @@
-//! Stage `force`: p(μ*) by step of the search into a memory; from there, force words by taxel into the output queue.
+//! Stage `forces`: p(μ*) by step of the search into a memory; from there, force words by taxel into the output queue.
 
 use dermis_golden::fixed::plan::resources::Holds;
 use dermis_golden::fixed::Model;
@@ -12,7 +12,7 @@ use crate::wire::Wire;
 
 /// Values in by step, a quad or a part of it; beats out in the order in which `send` requests them.
 #[derive(LogicBlock)]
-pub struct Force {
+pub struct Forces {
     /// Clock; registers change on its rising edge.
     pub clk: Signal<In, Clock>,
     /// Synchronous reset, active high.
@@ -80,14 +80,14 @@ pub struct Force {
     leaving: Queue,
 }
 
-impl Force {
+impl Forces {
     /// With the widths of `model`.
     pub fn new(model: &Model) -> Self {
         let formats = model.formats();
         let words = formats.sweep_steps(frame_quads(model.cases()));
         let (address, value) = (count_bits(words), formats.search_width * formats.search_bits[0] as usize);
         let unit = ForceUnit::new(model);
-        Force {
+        Forces {
             clk: Default::default(),
             rst: Default::default(),
             which: Wire::new(unit.which.width()),
@@ -127,7 +127,7 @@ impl Force {
     }
 }
 
-impl Logic for Force {
+impl Logic for Forces {
     #[hdl_gen]
     fn update(&mut self) {
         self.quads.clk.next = self.clk.val();
