@@ -43,6 +43,8 @@ mod core_file;
 mod error;
 mod generate;
 mod ports;
+#[cfg(test)]
+mod scenes;
 mod simulate;
 mod taps;
 

@@ -87,7 +87,7 @@ fn kernel(timing: Phase) -> Kernel {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::language::testbench::{check, simulated, Reference};
+    use crate::language::testbench::{check, Reference, Subject};
     use crate::wire::Word;
 
     const BAUD: u32 = 1_000_000;
@@ -173,7 +173,7 @@ mod tests {
     fn bytes_are_sampled_in_the_middle_of_their_bits() {
         let (block, all) = (UartReceiver::new(BAUD, CLOCK_HZ), stimulus(300));
         check(block.kernel.kernel(), &all, &mut Sampler::default());
-        let outputs = simulated(block.kernel.kernel(), &all);
+        let outputs = Subject::from(block.kernel.kernel()).simulated(&all);
         let count = |k: usize| outputs.iter().filter(|outputs| outputs[k].number() == 1).count();
         assert!(count(1) > 150 && count(2) > 10, "{} bytes, {} broken", count(1), count(2));
     }
