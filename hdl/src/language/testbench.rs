@@ -104,11 +104,11 @@ pub(crate) fn check_with_defects<'a, R: Reference>(
     subject: impl Fn(&[Change]) -> Subject<'a>,
     stimulus: &[Vec<Word>],
     reference: impl Fn() -> R,
-    defects: impl IntoIterator<Item = Change>,
+    defects: &[Change],
 ) {
     check(subject(&[]), stimulus, &mut reference());
     for defect in defects {
-        let found = difference(subject(std::slice::from_ref(&defect)), stimulus, &mut reference());
+        let found = difference(subject(std::slice::from_ref(defect)), stimulus, &mut reference());
         assert!(found.is_some(), "not found: {defect}");
     }
 }

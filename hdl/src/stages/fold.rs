@@ -256,6 +256,6 @@ mod tests {
             Change::value("", "memory__write", |k| k.named("normalised_later__q")),
             Change::value("", "frees__d", |k| k.named("ending")),
         ];
-        check_with_defects(subject, &stimulus, || Folding::new(&model), defects);
+        check_with_defects(subject, &stimulus, || Folding::new(&model), &defects);
     }
 }

@@ -167,7 +167,7 @@ mod tests {
                 Change::value("", "last", |k| k.named("line_end")),
             ];
             let reference = || Taxels { cases: model.cases(), lanes, passed: None };
-            check_with_defects(subject, &stimulus, reference, defects);
+            check_with_defects(subject, &stimulus, reference, &defects);
         }
     }
 }
