@@ -124,20 +124,19 @@ fn kernel(taxels: usize, bits: usize, power: usize) -> Kernel {
 }
 
 #[cfg(test)]
-mod tests {
+pub(crate) mod tests {
     use super::*;
     use crate::language::testbench::{check, random_word, Reference};
     use crate::wire::Word;
 
-    const TAXELS: usize = 5;
-    const BITS: usize = 9;
-    const POWER: u32 = 2;
-
     /// Sums, the taxel and frame of the next word, the beats in the block.
     #[derive(Default)]
-    struct Sums {
-        sums: [i64; TAXELS],
-        taxel: usize,
+    pub(crate) struct Sums {
+        bits: usize,
+        power: u32,
+        sums: Vec<i64>,
+        /// The taxel of the next word.
+        pub(crate) taxel: usize,
         frame: usize,
         missed: bool,
         held: Option<(i64, bool, bool)>,
@@ -146,9 +145,14 @@ mod tests {
     }
 
     impl Sums {
+        /// Of 2^`power` frames of `taxels` words of `bits` bits.
+        pub(crate) fn new(taxels: usize, bits: usize, power: u32) -> Self {
+            Sums { bits, power, sums: vec![0; taxels], ..Sums::default() }
+        }
+
         /// Adds a word: its sum, whether it leaves, and whether it is the last.
         fn add(&mut self, word: i64, tlast: bool) -> (i64, bool, bool) {
-            let (at_end, final_frame) = (self.taxel + 1 == TAXELS, self.frame + 1 == 1 << POWER);
+            let (at_end, final_frame) = (self.taxel + 1 == self.sums.len(), self.frame + 1 == 1 << self.power);
             let early = tlast && !at_end;
             let sum = word + if self.frame == 0 { 0 } else { self.sums[self.taxel] };
             self.sums[self.taxel] = sum;
@@ -158,7 +162,7 @@ mod tests {
                 (self.frame, self.missed) = (0, false);
             } else if at_end {
                 self.missed = !final_frame && (self.missed || !tlast);
-                self.frame = (self.frame + 1) % (1 << POWER);
+                self.frame = (self.frame + 1) % (1 << self.power);
             }
             beat
         }
@@ -170,7 +174,7 @@ mod tests {
             let moves = self.offered.is_none() || ready;
             vec![
                 self.reset.then(|| Word::from(self.offered.is_some())),
-                self.offered.map(|(sum, _)| Word::of_fields(&[sum], BITS + POWER as usize)),
+                self.offered.map(|(sum, _)| Word::of_fields(&[sum], self.bits + self.power as usize)),
                 self.offered.map(|(_, last)| Word::from(last)),
                 self.reset.then(|| Word::from(moves && !rst)),
             ]
@@ -181,19 +185,23 @@ mod tests {
             if self.offered.is_none() || ready {
                 self.offered = self.held.take().and_then(|(sum, leaves, last)| leaves.then_some((sum, last)));
                 if valid && !rst {
-                    self.held = Some(self.add(inputs[1].signed(0, BITS), tlast));
+                    self.held = Some(self.add(inputs[1].signed(0, self.bits), tlast));
                 }
             }
             if rst {
-                *self = Sums { sums: self.sums, reset: true, ..Sums::default() };
+                let sums = std::mem::take(&mut self.sums);
+                *self = Sums { bits: self.bits, power: self.power, sums, reset: true, ..Sums::default() };
             }
         }
     }
 
     #[test]
     fn frames_are_added_up_and_framing_errors_restart_the_sum() {
+        const TAXELS: usize = 5;
+        const BITS: usize = 9;
+        const POWER: u32 = 2;
         let mut random = fastrand::Rng::with_seed(5);
-        let mut sums = Sums::default();
+        let mut sums = Sums::new(TAXELS, BITS, POWER);
         let stimulus: Vec<Vec<Word>> = (0..6000)
             .map(|cycle| {
                 let rst = cycle < 3 || random.u16(..400) == 0;
@@ -207,6 +215,6 @@ mod tests {
             })
             .collect();
         let average = Average::new(TAXELS, BITS, POWER);
-        check(average.kernel.kernel(), &stimulus, &mut Sums::default());
+        check(average.kernel.kernel(), &stimulus, &mut Sums::new(TAXELS, BITS, POWER));
     }
 }
