@@ -375,8 +375,9 @@ mod tests {
     fn rows_are_the_products_of_the_model() {
         let several = model(8, 8, "[partition]\ncases = [0, 1]\n[fixed]\nlanes = 16\n");
         let shared = model(6, 6, "[search]\nmu_max = 0.005\n");
-        assert!(several.formats().groups > 1 && shared.formats().shared_a && shared.storage().listed);
-        for model in [several, shared] {
+        let streamed = model(4, 6, "[search]\nmu_max = 0.1\ndegree = 2\n");
+        assert!(several.formats().groups > 1 && shared.formats().shared_a && streamed.storage().streamed);
+        for model in [several, shared, streamed] {
             let subject = |changes: &[Change]| {
                 block_subject!(
                     Pass::new(&model),
