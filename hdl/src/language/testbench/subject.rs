@@ -26,14 +26,18 @@ pub(crate) struct Subject<'a> {
     pub(super) verilog: String,
     /// Name and text of the files that the Verilog reads.
     pub(super) files: Vec<(String, String)>,
-    /// One clock cycle with these inputs: the outputs before its rising edge.
-    cycle: Box<dyn FnMut(&[Word]) -> Vec<Word> + 'a>,
+    run: Box<dyn FnMut(&[Word]) -> Vec<Word> + 'a>,
 }
 
 impl Subject<'_> {
+    /// One clock cycle of the simulation inside Rust with these inputs: the outputs before its rising edge.
+    pub(crate) fn cycle(&mut self, inputs: &[Word]) -> Vec<Word> {
+        (self.run)(inputs)
+    }
+
     /// The outputs of every cycle in the simulation inside Rust.
     pub(crate) fn simulated(&mut self, stimulus: &[Vec<Word>]) -> Vec<Vec<Word>> {
-        stimulus.iter().map(|inputs| (self.cycle)(inputs)).collect()
+        stimulus.iter().map(|inputs| self.cycle(inputs)).collect()
     }
 }
 
@@ -67,7 +71,7 @@ impl<'a> From<&'a Kernel> for Subject<'a> {
             verilog: format!("{head}\n{}\nendmodule\n", kernel.verilog()),
             files: kernel.memory_files(),
             clock: kernel.clock.clone(),
-            cycle: Box::new(cycle),
+            run: Box::new(cycle),
             inputs,
             outputs,
         }
@@ -125,7 +129,7 @@ impl<'a> Subject<'a> {
             clock: Some("clk".to_owned()),
             verilog: hierarchy.verilog("dut", &Attributes::new(), &|_, _| None),
             files,
-            cycle: Box::new(cycle),
+            run: Box::new(cycle),
             inputs: in_pins,
             outputs: out_pins,
         }
