@@ -283,7 +283,7 @@ mod tests {
             inputs
         };
         let reset = [vec![Word::from(true)], vec![Word::default(); 23]].concat();
-        let all = (0..frames).flat_map(|_| 0..offers + 230).map(|at| cycle(at));
+        let all = (0..frames).flat_map(|_| 0..offers + 230).map(&mut cycle);
         [reset.clone(), reset].into_iter().chain(all).collect()
     }
 

@@ -17,6 +17,9 @@ pub(super) type Pin = (String, usize);
 /// Takes ports by their name.
 pub(crate) type Visit<'a> = dyn FnMut(&'static str, &mut dyn Port) + 'a;
 
+/// One clock cycle with these inputs: the outputs before its rising edge.
+type Cycle<'a> = dyn FnMut(&[Word]) -> Vec<Word> + 'a;
+
 /// Ports, a simulation inside Rust and the Verilog of the same design.
 pub(crate) struct Subject<'a> {
     pub(super) clock: Option<String>,
@@ -26,7 +29,7 @@ pub(crate) struct Subject<'a> {
     pub(super) verilog: String,
     /// Name and text of the files that the Verilog reads.
     pub(super) files: Vec<(String, String)>,
-    run: Box<dyn FnMut(&[Word]) -> Vec<Word> + 'a>,
+    run: Box<Cycle<'a>>,
 }
 
 impl Subject<'_> {
