@@ -274,8 +274,10 @@ pub(crate) mod tests {
         pub(crate) fn beat(&self, random: &mut fastrand::Rng, cycle: usize) -> [Word; 4] {
             let rst = cycle < 2 || random.u16(..700) == 0;
             let last = (self.codes.len() + 1 == self.model.scene.sensor.taxels()) ^ (random.u8(..150) == 0);
-            let code = random.u64(..) >> (64 - self.model.formats().input_bits) >> random.u32(..12);
-            [rst.into(), code.into(), (random.u8(..4) > 0).into(), last.into()]
+            let bits = self.model.formats().input_bits as usize;
+            // Small ones are within the noise.
+            let code = Word::of_fields(&[random.i64(..) >> (64 - bits) >> random.usize(..bits)], bits);
+            [rst.into(), code, (random.u8(..4) > 0).into(), last.into()]
         }
     }
 
