@@ -8,11 +8,13 @@
 //!
 //! What is derived from what:
 //! - *Kernels of the [`language`]*, the blocks with a field `kernel`: rust-hdl's simulation, the body of the Verilog
-//!   module, memories and the estimate of the logic come from one graph of typed expressions. Each is tested
-//!   against plain integers in its own simulation and under Verilator, every output, every cycle.
+//!   module, memories and the estimate of the logic come from one graph of typed expressions.
 //! - *`#[hdl_gen]` blocks*, which connect others: engines, most stages and the link's top levels. rust-hdl simulates
 //!   them, and the assignments that it reads off the same Rust become a kernel too ([`language::Hierarchy`]), from which
 //!   Verilog and estimate follow. They hold single-bit control and connections.
+//! - *Tests*: each of both stands beside a test against plain integers, in rust-hdl's simulation or the kernel's own and
+//!   under Verilator, every output, every cycle, except the engines and the board tops: whole frames test these against
+//!   the bit-true model, in both simulations too.
 //! - rust-hdl's probe gives the hierarchy; all modules are printed by the [`language`], with the memories placed as the
 //!   bit-true model plans them. No block has a second description, and nothing reads Verilog back.
 //! - Widths, names and directions of ports in the guide come from the built engine, their meaning from the comments of
@@ -44,6 +46,8 @@ mod core_file;
 mod error;
 mod generate;
 mod ports;
+#[cfg(test)]
+mod scenes;
 mod simulate;
 mod stage_list;
 mod taps;

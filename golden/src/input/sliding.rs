@@ -22,7 +22,7 @@ pub fn most_frames(average: u32) -> usize {
 pub fn gain_shift(frame: usize, average: u32) -> u32 {
     // 2^g is the power of two nearest to the number: the next one where the second bit is set.
     let floor = frame.max(1).ilog2();
-    let second_bit = (2 * frame >> floor & 1) as u32;
+    let second_bit = ((2 * frame) >> floor & 1) as u32;
     (floor + second_bit).min(average)
 }
 

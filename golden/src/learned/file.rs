@@ -107,14 +107,14 @@ pub(super) fn encode(network: &Network, signature: &Signature) -> Result<Vec<u8>
     for layer in &network.layers {
         bytes.extend(layer.largest.to_le_bytes());
         bytes.extend(layer.bias.iter().flat_map(|bias| bias.to_le_bytes()));
-        for (weights, row) in layer.weights.iter().flat_map(|weights| weights.row_iter().map(move |row| (weights, row))) {
+        for row in layer.weights.iter().flat_map(|weights| weights.row_iter()) {
             let scale = scale(row);
             bytes.extend(scale.to_le_bytes());
-            let number = |col: usize| match col < weights.ncols() && scale > 0.0 {
+            let number = |col: usize| match col < row.ncols() && scale > 0.0 {
                 true => ((row[col] / scale).round() as i32 + ZERO) as u32,
                 false => ZERO as u32,
             };
-            for col in (0..weights.ncols()).step_by(2) {
+            for col in (0..row.ncols()).step_by(2) {
                 bytes.extend(&(number(col) | number(col + 1) << 12).to_le_bytes()[..3]);
             }
         }

@@ -308,9 +308,10 @@ mod tests {
         let slope = Mat::from_fn(OUTPUTS, 2, |_, _| 1.0f32);
         descend(&mut moved, &mut moments, &network.activations(inputs.clone()), &slope, 1e-3, 0);
         let mut compared = 0;
-        for k in 0..network.layers.len() {
+        for (k, moments) in moments.iter().enumerate() {
             for parity in 0..4 {
-                let (rows, cols) = (network.layers[k].weights[parity].nrows(), network.layers[k].weights[parity].ncols());
+                let weights = &network.layers[k].weights[parity];
+                let (rows, cols) = (weights.nrows(), weights.ncols());
                 for (row, col) in (0..rows).flat_map(|row| (0..cols).map(move |col| (row, col))) {
                     let at = |step: f32| {
                         let mut other = network.clone();
@@ -319,7 +320,7 @@ mod tests {
                     };
                     let wanted = (at(1e-2) - at(-1e-2)) / 2e-2;
                     let step = |network: &Network| network.layers[k].weights[parity][(row, col)];
-                    let own = moments[k].weights[parity][0][col * rows + row] / (1.0 - DECAY[0]);
+                    let own = moments.weights[parity][0][col * rows + row] / (1.0 - DECAY[0]);
                     assert!((own - wanted).abs() < 0.02 * wanted.abs().max(0.1), "{k} {parity}: {own} {wanted}");
                     if wanted.abs() > 0.1 {
                         assert_eq!((step(&moved) - step(&network)).signum(), -wanted.signum());

@@ -1,14 +1,17 @@
-//! Runs a kernel in its own simulation and under Verilator against a reference in plain integers: every output, every
-//! cycle.
+//! Runs a kernel, or a block with the blocks inside it, in its simulation and under Verilator against a reference in plain
+//! integers: every output, every cycle.
 
+mod memory;
 mod program;
+mod subject;
 
 use std::collections::VecDeque;
 
-use super::kernel::{Kernel, Role, Type};
-use super::simulate::Simulation;
+use super::change::Change;
 use crate::wire::Word;
+pub(crate) use memory::MemoryReference;
 pub(crate) use program::verilated;
+pub(crate) use subject::Subject;
 
 /// A reference in plain integers.
 pub(crate) trait Reference {
@@ -62,65 +65,72 @@ pub(crate) fn random_word(random: &mut fastrand::Rng, bits: usize) -> Word {
     word
 }
 
-/// Name and width of the ports of a kernel: inputs, driven ports.
-fn ports(kernel: &Kernel) -> [Vec<(&str, Type)>; 2] {
-    let of = |is_output: bool| {
-        let own = move |signal: &&super::kernel::Signal| {
-            if is_output {
-                signal.output
-            } else {
-                signal.role == Role::Input
-            }
-        };
-        kernel.signals.iter().filter(own).map(|signal| (signal.name.as_str(), signal.ty)).collect()
-    };
-    [of(false), of(true)]
-}
-
-/// The outputs of every cycle in the kernel's simulation.
-pub(crate) fn simulated(kernel: &Kernel, stimulus: &[Vec<Word>]) -> Vec<Vec<Word>> {
-    let [inputs, outputs] = ports(kernel);
-    let mut simulation = Simulation::new(kernel);
-    let mut all = Vec::new();
-    for fields in stimulus {
-        for (field, (name, ty)) in fields.iter().zip(&inputs) {
-            let slot = simulation.slot_of(kernel, name).unwrap();
-            simulation.set(slot, &field.limbs()[..ty.bits.div_ceil(64)]);
-        }
-        simulation.show();
-        let value = |(name, ty): &(&str, Type)| {
-            let mut word = Word::default();
-            let limbs = ty.bits.div_ceil(64);
-            let slot = simulation.slot_of(kernel, name).unwrap();
-            // A signed number has its sign above its width.
-            for (limb, value) in simulation.get(slot, limbs).iter().enumerate() {
-                word.set(64 * limb, (ty.bits - 64 * limb).min(64), *value);
-            }
-            word
-        };
-        all.push(outputs.iter().map(value).collect());
-        simulation.clock();
-    }
-    all
-}
-
-/// Checks both simulations of a kernel against `reference`; inputs and outputs in the order of the kernel's signals.
-pub(crate) fn check(kernel: &Kernel, stimulus: &[Vec<Word>], reference: &mut dyn Reference) {
-    assert!(kernel.errors().is_empty(), "{:?}", kernel.errors());
-    let [_, outputs] = ports(kernel);
-    let runs = [("simulation", simulated(kernel, stimulus)), ("verilator", verilated(kernel, stimulus))];
+/// The first difference between `reference` and one of the simulations of `subject`; inputs and outputs in the order of
+/// its ports.
+pub(crate) fn difference<'a>(
+    subject: impl Into<Subject<'a>>,
+    stimulus: &[Vec<Word>],
+    reference: &mut dyn Reference,
+) -> Option<String> {
+    let mut subject = subject.into();
+    let runs = [("simulation", subject.simulated(stimulus)), ("verilator", verilated(&subject, stimulus))];
     let mut compared = 0;
     for (cycle, inputs) in stimulus.iter().enumerate() {
         let expected = reference.outputs(inputs);
+        assert_eq!(expected.len(), subject.outputs.len(), "a value for every output");
         for (name, run) in &runs {
-            for (k, (output, _)) in outputs.iter().enumerate() {
-                if let Some(expected) = expected[k] {
-                    assert_eq!(run[cycle][k], expected, "{name}, cycle {cycle}, {output}");
-                    compared += 1;
+            for ((output, _), (value, expected)) in subject.outputs.iter().zip(run[cycle].iter().zip(&expected)) {
+                let Some(expected) = expected else { continue };
+                compared += 1;
+                if value != expected {
+                    return Some(format!("{name}, cycle {cycle}, {output}: {value:?}, not {expected:?}"));
                 }
             }
         }
         reference.clock(inputs);
     }
     assert!(compared > stimulus.len(), "hardly anything is defined");
+    None
 }
+
+/// Checks both simulations of `subject` against `reference`.
+pub(crate) fn check<'a>(subject: impl Into<Subject<'a>>, stimulus: &[Vec<Word>], reference: &mut dyn Reference) {
+    let difference = difference(subject, stimulus, reference);
+    assert!(difference.is_none(), "{}", difference.unwrap_or_default());
+}
+
+/// Checks a subject without change, and that the check finds each of `defects`.
+pub(crate) fn check_with_defects<'a, R: Reference>(
+    subject: impl Fn(&[Change]) -> Subject<'a>,
+    stimulus: &[Vec<Word>],
+    reference: impl Fn() -> R,
+    defects: &[Change],
+) {
+    check(subject(&[]), stimulus, &mut reference());
+    for defect in defects {
+        let found = difference(subject(std::slice::from_ref(defect)), stimulus, &mut reference());
+        assert!(found.is_some(), "not found: {defect}");
+    }
+}
+
+/// A block with the blocks inside it as a [`Subject`], its Verilog with seeded defects; `clk` is its clock.
+///
+/// ```text
+/// block_subject!(Queue::new(8), &[], inputs [rst, write, word], outputs [room, m_axis_tvalid])
+/// ```
+macro_rules! block_subject {
+    ($block:expr, $changes:expr, inputs [$($input:ident),* $(,)?], outputs [$($output:ident),* $(,)?] $(,)?) => {
+        $crate::language::testbench::Subject::of_block(
+            $block,
+            $changes,
+            |block| &mut block.clk,
+            |block, visit| {
+                $(visit(stringify!($input), &mut block.$input);)*
+            },
+            |block, visit| {
+                $(visit(stringify!($output), &mut block.$output);)*
+            },
+        )
+    };
+}
+pub(crate) use block_subject;

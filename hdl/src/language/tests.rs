@@ -1,6 +1,6 @@
 mod errors;
 
-use super::testbench::{check, random_words, simulated, verilated, Reference};
+use super::testbench::{check, random_words, verilated, Reference, Subject};
 use super::*;
 use crate::wire::Word;
 
@@ -399,7 +399,7 @@ fn a_changed_kernel_differs_under_verilator() {
         bound(k.finish(), &[("sum", 8)])
     };
     let stimulus = random_words(50, &[8]);
-    let expected = simulated(&adder(3), &stimulus);
-    assert_eq!(verilated(&adder(3), &stimulus), expected);
-    assert_ne!(verilated(&adder(2), &stimulus), expected);
+    let expected = Subject::from(&adder(3)).simulated(&stimulus);
+    assert_eq!(verilated(&Subject::from(&adder(3)), &stimulus), expected);
+    assert_ne!(verilated(&Subject::from(&adder(2)), &stimulus), expected);
 }

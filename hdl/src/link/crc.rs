@@ -82,7 +82,7 @@ fn kernel() -> Kernel {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::language::testbench::{check, simulated, Reference};
+    use crate::language::testbench::{check, Reference, Subject};
     use crate::wire::Word;
 
     /// The CRC of the bytes so far, inverted, bit by bit as in its definition.
@@ -147,7 +147,11 @@ mod tests {
         assert_eq!(!crc_32(b"123456789"), 0xcbf4_3926);
         let (block, all) = (Crc::default(), stimulus(6000));
         check(block.kernel.kernel(), &all, &mut Bytes::default());
-        let right = simulated(block.kernel.kernel(), &all).iter().filter(|outputs| outputs[2].number() == 1).count();
+        let right = Subject::from(block.kernel.kernel())
+            .simulated(&all)
+            .iter()
+            .filter(|outputs| outputs[2].number() == 1)
+            .count();
         assert!(right > 20, "{right} cycles with a correct CRC");
     }
 
@@ -160,7 +164,7 @@ mod tests {
         let crc = 0xcbf4_3926u32.to_le_bytes();
         let mut all = vec![vec![Word::from(true), Word::default(), Word::default()]];
         all.extend(b"123456789".iter().copied().chain(crc.map(|octet| !octet)).flat_map(load));
-        let outputs = simulated(Crc::default().kernel.kernel(), &all);
+        let outputs = Subject::from(Crc::default().kernel.kernel()).simulated(&all);
         // The low byte before each byte of the CRC is that byte; its inverse clears the register.
         for (at, &octet) in crc.iter().enumerate() {
             let cycle = 1 + (9 + at) * (CYCLES as usize + 1);

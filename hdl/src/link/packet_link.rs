@@ -231,3 +231,6 @@ impl Logic for PacketLink {
         self.dropped.next = self.parser.bad.val() | self.ingress.overrun.val() | self.requests.overrun.val();
     }
 }
+
+#[cfg(test)]
+mod tests;

@@ -145,7 +145,7 @@ fn kernel(frame_bytes: usize, frame_kinds: &[u8]) -> Kernel {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::language::testbench::{check, simulated, Reference};
+    use crate::language::testbench::{check, Reference, Subject};
     use crate::wire::Word;
 
     /// Collects a packet and checks it as a whole.
@@ -294,7 +294,8 @@ mod tests {
                 ],
             );
             check(block.kernel(), &all, &mut Packet::of(frame_bytes));
-            let faults: Vec<u64> = simulated(block.kernel(), &all).iter().map(|outputs| outputs[1].number()).collect();
+            let faults: Vec<u64> =
+                Subject::from(block.kernel()).simulated(&all).iter().map(|outputs| outputs[1].number()).collect();
             assert!([FRAMING, CRC, UNKNOWN, LENGTH].iter().all(|fault| faults.contains(fault)));
         }
     }

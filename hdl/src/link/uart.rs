@@ -70,3 +70,51 @@ impl Logic for Uart {
         self.uart_tx.next = self.transmitter.line.val();
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::language::testbench::{block_subject, check_with_defects, Reference};
+    use crate::language::Change;
+    use crate::link::uart_receiver::tests::{stimulus, Sampler, BAUD, CLOCK_HZ};
+    use crate::link::uart_transmitter::tests::Sending;
+    use crate::wire::Word;
+
+    /// Both directions, which do not know of each other. Inputs: reset, line, byte to send, whether there is one.
+    #[derive(Default)]
+    struct Both {
+        receiver: Sampler,
+        transmitter: Sending,
+    }
+
+    impl Reference for Both {
+        fn outputs(&mut self, inputs: &[Word]) -> Vec<Option<Word>> {
+            let sent = self.transmitter.outputs(&[inputs[0], inputs[2], inputs[3]]);
+            [sent, self.receiver.outputs(&inputs[..2])].concat()
+        }
+
+        fn clock(&mut self, inputs: &[Word]) {
+            self.transmitter.clock(&[inputs[0], inputs[2], inputs[3]]);
+            self.receiver.clock(&inputs[..2]);
+        }
+    }
+
+    #[test]
+    fn bytes_go_both_ways_at_once() {
+        let mut random = fastrand::Rng::with_seed(13);
+        let mut send = || [Word::from(u64::from(random.u8(..))), Word::from(random.u8(..8) == 0)];
+        let all: Vec<Vec<Word>> = stimulus(100).into_iter().map(|inputs| [&inputs[..], &send()].concat()).collect();
+        let mut identity = Identity::default();
+        (identity.bit_rate, identity.clock_hz) = (BAUD, CLOCK_HZ);
+        let subject = |changes: &[Change]| {
+            block_subject!(
+                Uart::new(&identity),
+                changes,
+                inputs [rst, uart_rx, send_data, send_valid],
+                outputs [uart_tx, send_ready, data, valid, broken],
+            )
+        };
+        let defects = [Change::value("", "transmitter__rst", |k| k.constant(1, 0))];
+        check_with_defects(subject, &all, Both::default, &defects);
+    }
+}

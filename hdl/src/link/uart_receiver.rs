@@ -85,17 +85,17 @@ fn kernel(timing: Phase) -> Kernel {
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use super::*;
-    use crate::language::testbench::{check, simulated, Reference};
+    use crate::language::testbench::{check, Reference, Subject};
     use crate::wire::Word;
 
-    const BAUD: u32 = 1_000_000;
-    const CLOCK_HZ: u32 = 9_300_000;
+    pub const BAUD: u32 = 1_000_000;
+    pub const CLOCK_HZ: u32 = 9_300_000;
 
     /// Samples bits in their middle, with the time in fractions of a bit.
     #[derive(Default)]
-    struct Sampler {
+    pub struct Sampler {
         line: Vec<bool>,
         armed: bool,
         /// Bits still to come, time since the last one, bits so far.
@@ -146,8 +146,8 @@ mod tests {
         }
     }
 
-    /// Bytes with rates up to 2 % off, glitches, missing stop bits, pauses, resets.
-    fn stimulus(bytes: usize) -> Vec<Vec<Word>> {
+    /// Bytes with rates up to 2 % off, glitches, missing stop bits, pauses, resets: the inputs reset and line.
+    pub fn stimulus(bytes: usize) -> Vec<Vec<Word>> {
         let mut random = fastrand::Rng::with_seed(9);
         let mut levels = vec![true; 30];
         for _ in 0..bytes {
@@ -173,7 +173,7 @@ mod tests {
     fn bytes_are_sampled_in_the_middle_of_their_bits() {
         let (block, all) = (UartReceiver::new(BAUD, CLOCK_HZ), stimulus(300));
         check(block.kernel.kernel(), &all, &mut Sampler::default());
-        let outputs = simulated(block.kernel.kernel(), &all);
+        let outputs = Subject::from(block.kernel.kernel()).simulated(&all);
         let count = |k: usize| outputs.iter().filter(|outputs| outputs[k].number() == 1).count();
         assert!(count(1) > 150 && count(2) > 10, "{} bytes, {} broken", count(1), count(2));
     }

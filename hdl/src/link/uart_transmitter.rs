@@ -72,17 +72,15 @@ fn kernel(timing: Phase) -> Kernel {
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use super::*;
     use crate::language::testbench::{check, Reference};
+    use crate::link::uart_receiver::tests::{BAUD, CLOCK_HZ};
     use crate::wire::Word;
-
-    const BAUD: u32 = 700_000;
-    const CLOCK_HZ: u32 = 5_000_000;
 
     /// The byte that is sent and the cycles since it was accepted; the line one cycle later.
     #[derive(Default)]
-    struct Sending {
+    pub struct Sending {
         byte: Option<(u8, u64)>,
         line: Option<bool>,
     }

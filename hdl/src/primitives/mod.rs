@@ -29,7 +29,11 @@ pub use arithmetic::lanes::{Lanes, MEMORY_FILE};
 pub use arithmetic::leading_one::by_leading_one;
 pub use arithmetic::rescaler::{Rescaler, SATURATION_BITS};
 pub use arithmetic::unfolder::Unfolder;
+#[cfg(test)]
+pub(crate) use frame::average::tests::Sums;
 pub use frame::average::Average;
+#[cfg(test)]
+pub(crate) use frame::calibrate::tests::Table;
 pub use frame::calibrate::{Calibrate, CALIBRATION_FILE};
 pub use frame::dead_taxel_mask::DeadTaxelMask;
 pub use frame::frame_stats::FrameStats;
@@ -37,6 +41,8 @@ pub use memory::delay::{BitDelay, Delay};
 pub use memory::dff::Dff;
 pub use memory::enable_register::EnableRegister;
 pub use memory::ram::Ram;
+#[cfg(test)]
+pub(crate) use output::force_unit::tests::Requests;
 pub use output::force_unit::{ForceUnit, STEPS as FORCE_STEPS};
 pub use output::frame_cycles::{FrameCycles, CYCLE_BITS};
 pub use output::parts_begun::PartsBegun;
@@ -57,6 +63,8 @@ pub use search::sum::Sum;
 pub use search::sweep::{position_bits, BUFFER_BITS};
 pub use search::taylor::{Taylor, LATENCY as TAYLOR_LATENCY};
 pub use stream::lane_broadcast::LaneBroadcast;
+#[cfg(test)]
+pub(crate) use stream::queue::tests::List;
 pub use stream::queue::{Queue, PLACES as QUEUE_PLACES};
 pub use stream::register_slice::RegisterSlice;
 pub use stream::slice::Slice;

@@ -133,3 +133,87 @@ impl Logic for Receive {
             & !self.rst.val();
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use dermis_golden::fixed::stages::receive::receive;
+    use dermis_golden::fixed::Model;
+
+    use super::*;
+    use crate::language::testbench::{block_subject, check_with_defects, MemoryReference, Reference};
+    use crate::language::Change;
+    use crate::scenes::model;
+    use crate::stages::Reception;
+    use crate::wire::Word;
+
+    struct Buffer<'a> {
+        model: &'a Model,
+        reception: Reception,
+        memory: MemoryReference<i32>,
+    }
+
+    impl<'a> Buffer<'a> {
+        fn new(model: &'a Model) -> Self {
+            let memory = MemoryReference::new(model.scene.sensor.taxels(), 1);
+            Buffer { model, reception: Reception::new(model), memory }
+        }
+    }
+
+    impl Reference for Buffer<'_> {
+        fn outputs(&mut self, inputs: &[Word]) -> Vec<Option<Word>> {
+            let bits = self.model.formats().input_bits as usize;
+            let whole = self.reception.is_whole();
+            let stats = whole.then(|| receive(&self.reception.codes, self.model.noise_floor));
+            vec![
+                Some((inputs[0].number() == 0 && !whole).into()),
+                Some(self.reception.accepted(inputs).is_some().into()),
+                Some(whole.into()),
+                self.memory.shown().map(|code| Word::of_fields(&[code.into()], bits)),
+                stats.map(|stats| stats.magnitude.into()),
+                stats.map(|stats| stats.positive.into()),
+                stats.map(|stats| stats.negative.into()),
+                Some(self.reception.framing.into()),
+            ]
+        }
+
+        fn clock(&mut self, inputs: &[Word]) {
+            let [free, reported] = [4, 6].map(|input| inputs[input].number() == 1);
+            let (at, code) = (self.reception.codes.len(), self.reception.accepted(inputs));
+            self.memory.clock(Some(inputs[5].number() as usize), code.map(|code| (at, code)));
+            self.reception.clock(inputs, free, reported);
+        }
+    }
+
+    #[test]
+    fn frames_are_written_and_their_statistics_gathered() {
+        let model = model(
+            4,
+            6,
+            "[hardware]\nboard = \"icebreaker\"\n[search]\nnoise_floor_MPa = 0.002\n[input]\nfull_scale_MPa = 1.0\n",
+        );
+        let mut random = fastrand::Rng::with_seed(8);
+        let mut buffer = Buffer::new(&model);
+        let cycle = |cycle: usize| {
+            let beat = buffer.reception.beat(&mut random, cycle);
+            let free = buffer.reception.is_whole() && random.u8(..40) == 0;
+            let address = random.u64(..model.scene.sensor.taxels() as u64);
+            let inputs = [&beat[..], &[free.into(), address.into(), (random.u8(..20) == 0).into()]].concat();
+            buffer.clock(&inputs);
+            inputs
+        };
+        let stimulus: Vec<Vec<Word>> = (0..5000).map(cycle).collect();
+        let subject = |changes: &[Change]| {
+            block_subject!(
+                Receive::new(model.formats(), model.noise_floor),
+                changes,
+                inputs [rst, s_axis_tdata, s_axis_tvalid, s_axis_tlast, free, read_address, reported],
+                outputs [s_axis_tready, accept, full, word, magnitude, positive, negative, framing],
+            )
+        };
+        let defects = [
+            Change::value("", "stats__clear", |k| k.named("rst") | k.named("free")),
+            Change::value("", "broken__d", |k| k.named("early")),
+        ];
+        check_with_defects(subject, &stimulus, || Buffer::new(&model), &defects);
+    }
+}

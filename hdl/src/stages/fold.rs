@@ -152,3 +152,110 @@ impl Logic for Fold {
         self.readable.next = self.begins.q.val();
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use std::collections::VecDeque;
+
+    use dermis_golden::fixed::stages::fold::fold;
+
+    use super::*;
+    use crate::language::testbench::{block_subject, check_with_defects, random_word, MemoryReference, Reference};
+    use crate::language::Change;
+    use crate::scenes::model;
+    use crate::wire::Word;
+
+    /// The quads of a subarray on their way.
+    struct Folding<'a> {
+        model: &'a Model,
+        /// Index in its subarray of the quad that is read in this cycle, and of those of the cycles before; none before
+        /// the first reset.
+        quads: VecDeque<Option<usize>>,
+        /// Address in the frame of the quad that is read.
+        frame: Option<usize>,
+        freed: bool,
+        folded: Option<Word>,
+        memory: MemoryReference<Word>,
+    }
+
+    impl<'a> Folding<'a> {
+        fn new(model: &'a Model) -> Self {
+            let quads = model.cases().iter().map(|case| case.formats.quads).max().unwrap();
+            let memory = MemoryReference::new(quads, 2);
+            Folding { model, quads: VecDeque::new(), frame: None, freed: false, folded: None, memory }
+        }
+
+        /// The quad that was read so many cycles earlier.
+        fn earlier(&self, cycles: usize) -> Option<usize> {
+            self.quads.get(cycles).copied().flatten()
+        }
+    }
+
+    impl Reference for Folding<'_> {
+        fn outputs(&mut self, inputs: &[Word]) -> Vec<Option<Word>> {
+            let case = &self.model.cases()[inputs[1].number() as usize];
+            let known = |bit: bool| (!self.quads.is_empty()).then(|| bit.into());
+            vec![
+                self.frame.map(|at| Word::from(at as u64)),
+                known(self.freed),
+                known(self.earlier(4).is_some()),
+                self.folded,
+                known(self.earlier(5).is_some()),
+                known(self.earlier(6) == Some(case.storage.lead)),
+                self.memory.shown(),
+            ]
+        }
+
+        fn clock(&mut self, inputs: &[Word]) {
+            let [rst, which, begin_frame, start, last_part, _, read] =
+                [0, 1, 2, 3, 4, 5, 6].map(|input| inputs[input].number() as usize);
+            let (formats, count) = (self.model.formats(), self.model.cases()[which].formats.quads);
+            let now = self.earlier(0);
+            self.memory.clock(Some(read), self.earlier(5).zip(self.folded));
+            let codes = [0, 1, 2, 3].map(|lane| inputs[5].signed(lane, formats.input_bits as usize));
+            self.folded = Some(Word::of_fields(&fold(&[codes])[0], formats.input_bits as usize + 2));
+            self.frame = match begin_frame {
+                1 => Some(0),
+                _ => self.frame.map(|at| (at + usize::from(now.is_some())) % frame_quads(self.model.cases())),
+            };
+            self.freed = now == Some(count - 1) && last_part == 1;
+            self.quads.push_front(if start == 1 { Some(0) } else { now.map(|at| at + 1).filter(|&at| at < count) });
+            self.quads.truncate(7);
+            if rst == 1 {
+                (self.quads, self.freed) = (vec![None; 7].into(), false);
+            }
+        }
+    }
+
+    #[test]
+    fn quads_are_read_folded_and_written() {
+        let model = model(8, 8, "[partition]\ncases = [0, 1]\n");
+        let formats = model.formats();
+        let mut random = fastrand::Rng::with_seed(6);
+        let mut which = 0;
+        let cycle = |cycle: usize| {
+            let rst = cycle == 0 || random.u8(..250) == 0;
+            if rst {
+                which = random.u64(..2);
+            }
+            let begin_frame = cycle == 1 || random.u8(..60) == 0;
+            let bits = [rst.into(), which, begin_frame.into(), (random.u8(..25) == 0).into(), random.bool().into()];
+            let normalised = random_word(&mut random, 4 * formats.input_bits as usize);
+            bits.map(Word::from).into_iter().chain([normalised, random.u64(..formats.quads as u64).into()]).collect()
+        };
+        let stimulus: Vec<Vec<Word>> = (0..5000).map(cycle).collect();
+        let subject = |changes: &[Change]| {
+            block_subject!(
+                Fold::new(&model),
+                changes,
+                inputs [rst, which, begin_frame, start, last_part, normalised, read_address],
+                outputs [quad_address, free, normalised_valid, folded, folded_valid, readable, read_quad],
+            )
+        };
+        let defects = [
+            Change::value("", "memory__write", |k| k.named("normalised_later__q")),
+            Change::value("", "frees__d", |k| k.named("ending")),
+        ];
+        check_with_defects(subject, &stimulus, || Folding::new(&model), &defects);
+    }
+}

@@ -179,3 +179,140 @@ impl Logic for Forces {
         self.m_axis_tdata.next = self.leaving.m_axis_tdata.val();
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::language::testbench::{block_subject, check_with_defects, random_word, MemoryReference, Reference};
+    use crate::language::Change;
+    use crate::primitives::{List, Requests};
+    use crate::scenes::model;
+    use crate::wire::Word;
+
+    /// Memory, force unit and queue. Inputs: those of the force unit with values in place of its quad, then whether they
+    /// are valid, address, ready.
+    struct Integers {
+        values: MemoryReference<Word>,
+        /// Step of the next values.
+        step: usize,
+        asked: usize,
+        unit: Requests,
+        leaving: List,
+    }
+
+    /// Place of the values among the inputs.
+    const VALUES: usize = 9;
+
+    impl Integers {
+        fn new(model: &Model) -> Self {
+            Integers {
+                values: MemoryReference::new(steps(model), 2),
+                step: 0,
+                asked: 0,
+                unit: Requests::new(model.clone()),
+                leaving: List::default(),
+            }
+        }
+
+        /// The queue has room for another beat.
+        fn has_room(&mut self) -> bool {
+            self.leaving.outputs(&[])[0].is_some_and(|room| room.number() == 1)
+        }
+    }
+
+    fn steps(model: &Model) -> usize {
+        model.formats().sweep_steps(frame_quads(model.cases()))
+    }
+
+    impl Reference for Integers {
+        fn outputs(&mut self, _: &[Word]) -> Vec<Option<Word>> {
+            self.leaving.outputs(&[])
+        }
+
+        fn clock(&mut self, inputs: &[Word]) {
+            let [valid, address, ready] = [22, 23, 24].map(|input| inputs[input]);
+            let mut of_unit = inputs[..22].to_vec();
+            of_unit[VALUES] = self.values.shown().unwrap_or_default();
+            let [beat, written, last] = [0, 1, 2].map(|output| self.unit.outputs(&of_unit)[output].unwrap_or_default());
+            self.leaving.clock(&[inputs[0], inputs[5], written, last, beat, ready]);
+            self.unit.clock(&of_unit);
+            let write = (valid.number() == 1).then_some((self.step, inputs[VALUES]));
+            self.values.clock(Some(self.asked), write);
+            self.asked = address.number() as usize;
+            self.step = if inputs[2].number() == 1 { 0 } else { self.step + valid.number() as usize };
+        }
+    }
+
+    /// Frames: all values and subarrays are stored, then beats requested at random, first forces, as far
+    /// as there is room.
+    fn stimulus(model: &Model, frames: usize) -> Vec<Vec<Word>> {
+        let block = Forces::new(model);
+        let mut random = fastrand::Rng::with_seed(15);
+        let mut forces = Integers::new(model);
+        let (parts, steps) = (model.parts().len(), steps(model));
+        let offers = 2 + steps + parts + 4;
+        let mut cycle = |at: usize| {
+            let offer = (offers..offers + 200).contains(&at) && random.u8(..8) > 0 && forces.has_room();
+            // Small values are below the threshold or round to zero, large ones saturate.
+            let v = model.formats().search_bits[0] as usize;
+            let values: Vec<i64> =
+                (0..model.formats().search_width).map(|_| random.i64(..) >> random.usize(64 - v..64)).collect();
+            let inputs = vec![
+                (at == 0 && random.bool()).into(),
+                Word::default(),
+                (at == 1).into(),
+                (2 + steps..2 + steps + parts).contains(&at).into(),
+                (at.saturating_sub(2 + steps) as u64 % parts as u64).into(),
+                offer.into(),
+                if at < offers + 20 || random.bool() { Word::default() } else { random.u64(..4).into() },
+                random.u64(..parts as u64).into(),
+                random.u64(..model.formats().search_width as u64).into(),
+                Word::of_fields(&values, v),
+                random_word(&mut random, position_bits()),
+                random_word(&mut random, position_bits()),
+                random.u64(..u64::from(model.formats().input_bits)).into(),
+                random.u64(..1 << block.rescale.width()).into(),
+                random.bool().into(),
+                random.bool().into(),
+                random.bool().into(),
+                random.bool().into(),
+                Word::default(),
+                random_word(&mut random, block.score.width()),
+                random_word(&mut random, SATURATION_BITS),
+                random_word(&mut random, CYCLE_BITS),
+                (2..2 + steps).contains(&at).into(),
+                random.u64(..steps as u64).into(),
+                random.bool().into(),
+            ];
+            forces.clock(&inputs);
+            inputs
+        };
+        let reset = [vec![Word::from(true)], vec![Word::default(); 24]].concat();
+        let all = (0..frames).flat_map(|_| 0..offers + 230).map(&mut cycle);
+        [reset.clone(), reset].into_iter().chain(all).collect()
+    }
+
+    #[test]
+    fn values_are_stored_and_beats_leave_as_they_were_requested() {
+        let mut model = model(4, 4, "[search]\nmu_max = 0.05\n[partition]\nrows = 2\ncols = 1\n");
+        model.threshold = 1000;
+        let stimulus = stimulus(&model, 20);
+        let subject = |changes: &[Change]| {
+            block_subject!(
+                Forces::new(&model),
+                changes,
+                inputs [
+                    rst, which, begin_frame, start, part, offer, beat, beat_part, lane, values, position_x, position_y,
+                    normalise, rescale, condition, found, framing, damaged, frames, score, saturations, cycles, values_valid,
+                    address, m_axis_tready,
+                ],
+                outputs [room, m_axis_tvalid, m_axis_tlast, m_axis_tdata],
+            )
+        };
+        let defects = [
+            Change::value("", "store__read_address", |k| k.named("address")),
+            Change::value("", "leaving__reserve", |k| k.named("unit__valid")),
+        ];
+        check_with_defects(subject, &stimulus, || Integers::new(&model), &defects);
+    }
+}

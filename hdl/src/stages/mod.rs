@@ -30,6 +30,8 @@ pub use forces::Forces;
 pub use normalise::Normalise;
 pub use pass::Pass;
 pub use prepare::Prepare;
+#[cfg(test)]
+pub(crate) use receive::tests::Reception;
 pub use receive::{Receive, ReceivePorts};
 pub use rescale::Rescale;
 pub use resultants::Resultants;

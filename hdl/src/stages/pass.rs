@@ -163,3 +163,235 @@ impl Logic for Pass {
         self.damaged.next = self.lanes.damaged.val();
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use std::collections::{BTreeMap, VecDeque};
+
+    use dermis_golden::fixed::stages::pass::{pass, Operands};
+    use dermis_golden::fixed::words::schedule::{accumulations, Operand};
+    use dermis_golden::fixed::CasePlan;
+
+    use super::*;
+    use crate::language::testbench::{block_subject, check_with_defects, random_word, Reference};
+    use crate::language::Change;
+    use crate::scenes::model;
+    use crate::wire::Word;
+
+    /// A column of a product, which one cycle issues.
+    #[derive(Clone, Copy)]
+    struct Column {
+        accumulation: usize,
+        group: usize,
+        /// Operand vectors that must be readable; none where the operand is the input.
+        needs: usize,
+        /// Address of the operand's quad.
+        quad: usize,
+        /// Last of its accumulation.
+        last: bool,
+    }
+
+    /// The columns of a subarray in order.
+    fn columns(case: &CasePlan) -> Vec<Column> {
+        let mut all: Vec<Column> = Vec::new();
+        for (accumulation, (_, products)) in accumulations(&case.formats).iter().enumerate() {
+            for group in 0..case.formats.groups {
+                for product in products {
+                    let needs = match product.operand {
+                        Operand::Vector(index) => index + 1,
+                        Operand::InputHigh | Operand::InputLow => 0,
+                    };
+                    let quads = case.storage.columns_of(product.matrix, group);
+                    all.extend(quads.iter().map(|&quad| Column { accumulation, group, needs, quad, last: false }));
+                }
+                all.last_mut().unwrap().last = true;
+            }
+        }
+        all
+    }
+
+    /// Inputs: reset, case, start, quad of the input, quad of a v_ij, whether it is valid.
+    struct Passes<'a> {
+        model: &'a Model,
+        columns: Vec<Vec<Column>>,
+        cycle: usize,
+        case: usize,
+        /// The next column, while a subarray runs, and the first cycle in which it may be issued.
+        next: Option<(usize, usize)>,
+        /// The column issued in the cycle before, in the cycle before that, and so on.
+        issued: VecDeque<Option<Column>>,
+        /// The input as far as it was read, and the quads of the v_ij that are operands.
+        input: Vec<[i64; 4]>,
+        quads: Vec<[i64; 4]>,
+        /// Accumulation and row by the cycle in which they leave; none before the first reset.
+        rows: Option<BTreeMap<usize, (usize, usize)>>,
+    }
+
+    impl<'a> Passes<'a> {
+        fn new(model: &'a Model) -> Self {
+            let columns = model.cases().iter().map(columns).collect();
+            let (input, quads) = (vec![[0; 4]; model.formats().quads], Vec::new());
+            let issued = VecDeque::new();
+            Passes { model, columns, cycle: 0, case: 0, next: None, issued, input, quads, rows: None }
+        }
+
+        fn case(&self) -> &'a CasePlan {
+            &self.model.cases()[self.case]
+        }
+
+        /// Cycles from the issue of a column to its address.
+        fn latency(&self) -> usize {
+            if self.case().storage.listed {
+                3
+            } else {
+                1
+            }
+        }
+
+        /// The address that was read from the input memory so many cycles ago.
+        fn input_address(&self, cycles: usize) -> Option<usize> {
+            let column = self.issued.get(self.latency() - 1 + cycles).copied().flatten();
+            column.filter(|column| column.needs == 0).map(|column| column.quad)
+        }
+
+        /// The column that is issued in this cycle.
+        fn issue(&self) -> Option<Column> {
+            let (at, free) = self.next?;
+            let storage = &self.case().storage;
+            let quads = self.case().formats.quads;
+            let readable = if storage.streamed { self.quads.len().div_ceil(quads) } else { self.quads.len() / quads };
+            let column = self.columns[self.case][at];
+            (free <= self.cycle && column.needs <= readable).then_some(column)
+        }
+
+        fn row(&self, accumulation: usize, row: usize) -> [i64; 4] {
+            let CasePlan { formats, quantised, .. } = self.case();
+            let mut operands = Operands::of_input(&self.input[..formats.quads], formats);
+            operands.vectors = self.quads.chunks(formats.quads).map(<[_]>::to_vec).collect();
+            pass(formats, quantised, self.case().layout(), &accumulations(formats)[accumulation].1, &operands)[row]
+        }
+    }
+
+    impl Reference for Passes<'_> {
+        fn outputs(&mut self, _: &[Word]) -> Vec<Option<Word>> {
+            let formats = self.model.formats();
+            let leaves = |cycle: usize| Some(self.rows.as_ref()?.contains_key(&cycle).into());
+            let row = self.rows.as_ref().and_then(|rows| rows.get(&self.cycle));
+            vec![
+                self.input_address(0).map(|address| Word::from(address as u64)),
+                row.map(|&(accumulation, row)| {
+                    Word::of_fields(&self.row(accumulation, row), formats.lane_bits as usize)
+                }),
+                leaves(self.cycle),
+                leaves(self.cycle + 2),
+                Some(Word::default()),
+            ]
+        }
+
+        fn clock(&mut self, inputs: &[Word]) {
+            let formats = self.model.formats();
+            let quad = |input: usize, bits: u32| [0, 1, 2, 3].map(|parity| inputs[input].signed(parity, bits as usize));
+            let [rst, which, start, valid] = [0, 1, 2, 5].map(|input| inputs[input].number() as usize);
+            if let Some(address) = self.input_address(2) {
+                self.input[address] = quad(3, formats.fold_bits);
+            }
+            let issued = self.issue();
+            if let Some(column) = issued {
+                let own = &self.case().formats;
+                let first = column.group * own.lanes_per_parity;
+                if column.last {
+                    let count = own.lanes_per_parity.min(own.quads - first);
+                    let leave = self.cycle + self.latency() + 7;
+                    let rows = (0..count).map(|row| (leave + row, (column.accumulation, first + row)));
+                    self.rows.iter_mut().for_each(|all| all.extend(rows.clone()));
+                }
+                let free = self.cycle + 1 + if column.last { self.case().storage.pause } else { 0 };
+                let at = self.next.map_or(0, |(at, _)| at + 1);
+                self.next = (at < self.columns[self.case].len()).then_some((at, free));
+            }
+            self.issued.push_front(issued);
+            self.issued.truncate(8);
+            if valid == 1 && self.quads.len() < operand_vectors(formats.degree) * self.case().formats.quads {
+                self.quads.push(quad(4, formats.data_bits));
+            }
+            self.cycle += 1;
+            if start == 1 {
+                (self.case, self.next, self.quads) = (which, Some((0, self.cycle)), Vec::new());
+            }
+            if rst == 1 {
+                (self.next, self.rows, self.issued) = (None, Some(BTreeMap::new()), VecDeque::new());
+            }
+        }
+    }
+
+    /// Subarrays with random inputs, whose v_ij arrive one quad per cycle after random pauses; some are cut by a reset.
+    fn stimulus(model: &Model, subarrays: usize) -> Vec<Vec<Word>> {
+        let formats = model.formats();
+        let mut random = fastrand::Rng::with_seed(16);
+        let mut passes = Passes::new(model);
+        let mut all: Vec<Vec<Word>> = Vec::new();
+        let mut cut = true;
+        for _ in 0..subarrays {
+            let which = random.usize(..model.cases().len());
+            let quads = model.cases()[which].formats.quads;
+            let input: Vec<Word> =
+                (0..quads).map(|_| random_word(&mut random, 4 * formats.fold_bits as usize)).collect();
+            let end = if random.u8(..5) == 0 { random.usize(..200) } else { usize::MAX };
+            // A reset, the start of the subarray, then its cycles.
+            let (mut at, mut pause, mut sent) = (0, random.usize(1..100), 0);
+            loop {
+                let idle =
+                    passes.next.is_none() && passes.rows.iter().flatten().all(|(&cycle, _)| cycle < passes.cycle);
+                let vectors = operand_vectors(formats.degree) + 1;
+                if at > 12 && (at > end || (idle && sent == vectors * quads)) {
+                    break;
+                }
+                let valid = at > 12 && pause == 0 && sent < vectors * quads;
+                let read = passes.input_address(2).and_then(|address| input.get(address).copied());
+                let inputs = vec![
+                    (at == 0 && cut).into(),
+                    Word::from(which as u64),
+                    (at == 12).into(),
+                    read.unwrap_or_else(|| random_word(&mut random, 4 * formats.fold_bits as usize)),
+                    random_word(&mut random, 4 * formats.data_bits as usize),
+                    valid.into(),
+                ];
+                passes.clock(&inputs);
+                all.push(inputs);
+                at += 1;
+                sent += usize::from(valid);
+                pause = if valid && sent % quads == 0 {
+                    random.usize(1..100)
+                } else {
+                    pause.saturating_sub(usize::from(at > 12))
+                };
+            }
+            cut = end < usize::MAX;
+        }
+        all
+    }
+
+    #[test]
+    fn rows_are_the_products_of_the_model() {
+        let several = model(8, 8, "[partition]\ncases = [0, 1]\n[fixed]\nlanes = 16\n");
+        let shared = model(6, 6, "[search]\nmu_max = 0.005\n");
+        let streamed = model(4, 6, "[search]\nmu_max = 0.1\ndegree = 2\n");
+        assert!(several.formats().groups > 1 && shared.formats().shared_a && streamed.storage().streamed);
+        for model in [several, shared, streamed] {
+            let subject = |changes: &[Change]| {
+                block_subject!(
+                    Pass::new(&model),
+                    changes,
+                    inputs [rst, which, start, input_quad, vector_quad, vector_valid],
+                    outputs [input_address, quad, quad_valid, quad_soon, damaged],
+                )
+            };
+            let defects = [
+                Change::value("", "select__source", |k| k.named("pass_program__source")),
+                Change::value("", "operand_writer__clear", |k| k.named("rst")),
+            ];
+            let defects = if model.cases().len() == 2 { &defects[..] } else { &[] };
+            check_with_defects(subject, &stimulus(&model, 20), || Passes::new(&model), defects);
+        }
+    }
+}

@@ -82,3 +82,98 @@ impl Logic for Prepare {
         self.frames.next = self.average.frames.val();
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::language::testbench::{
+        block_subject, check, check_with_defects, random_word, random_words, Pipeline, Reference, Subject,
+    };
+    use crate::language::Change;
+    use crate::primitives::{Sums, Table};
+    use crate::scenes::model;
+    use crate::wire::Word;
+
+    /// Calibration, then the sums. Inputs of the stage and of both: reset, data, valid, last, ready.
+    struct Prepared {
+        table: Table,
+        sums: Sums,
+    }
+
+    impl Prepared {
+        fn new(model: &Model) -> Self {
+            let (input, bits) = (&model.prepare, model.formats().code_bits as usize);
+            let zero = input.zero.as_deref().unwrap();
+            let sums = Sums::new(zero.len(), bits, input.average);
+            Prepared { table: Table::new(zero, input.gain.as_deref(), bits), sums }
+        }
+
+        /// The inputs of calibration and sums.
+        fn inputs(&mut self, inputs: &[Word]) -> [Vec<Word>; 2] {
+            // Whether the sums take a word does not depend on the word.
+            let ready = self.sums.outputs(inputs)[3].unwrap_or_default();
+            let table = [&inputs[..4], &[ready]].concat();
+            let [valid, last, data] = [1, 2, 3].map(|output| self.table.outputs(&table)[output].unwrap_or_default());
+            [table, vec![inputs[0], data, valid, last, inputs[4]]]
+        }
+    }
+
+    impl Reference for Prepared {
+        fn outputs(&mut self, inputs: &[Word]) -> Vec<Option<Word>> {
+            let [table, sums] = self.inputs(inputs);
+            let sums = self.sums.outputs(&sums);
+            [&self.table.outputs(&table)[..1], &sums[..3], &sums[4..]].concat()
+        }
+
+        fn clock(&mut self, inputs: &[Word]) {
+            let [table, sums] = self.inputs(inputs);
+            self.table.clock(&table);
+            self.sums.clock(&sums);
+        }
+    }
+
+    fn subject(model: &Model, changes: &[Change]) -> Subject<'static> {
+        block_subject!(
+            Prepare::new(model),
+            changes,
+            inputs [rst, s_axis_tdata, s_axis_tvalid, s_axis_tlast, m_axis_tready],
+            outputs [s_axis_tready, m_axis_tvalid, m_axis_tdata, m_axis_tlast, frames],
+        )
+    }
+
+    #[test]
+    fn codes_are_calibrated_then_averaged() {
+        let mut model = model(2, 3, "[input]\naverage = 2\nfull_scale_MPa = 1.0\n");
+        let (taxels, bits) = (model.scene.sensor.taxels(), model.formats().code_bits as usize);
+        let mut random = fastrand::Rng::with_seed(14);
+        let half = 1 << (bits - 1);
+        model.prepare.zero = Some((0..taxels).map(|_| random.i32(-half..half)).collect());
+        model.prepare.gain = Some((0..taxels).map(|_| random.i32(-(1 << 17)..1 << 17)).collect());
+        let mut beats = 0;
+        let cycle = |cycle: usize| {
+            let rst = cycle < 3 || random.u16(..400) == 0;
+            let [offered, ready] = [(); 2].map(|()| random.u8(..8) > 0);
+            // Mostly frames of the right length.
+            beats = if rst { 0 } else { beats + usize::from(offered) };
+            let last = if random.u8(..60) == 0 { random.bool() } else { beats % taxels == 0 };
+            vec![rst.into(), random_word(&mut random, bits), offered.into(), last.into(), ready.into()]
+        };
+        let stimulus: Vec<Vec<Word>> = (0..6000).map(cycle).collect();
+        let defects = [
+            Change::value("", "average__rst", |k| k.constant(1, 0)),
+            Change::value("", "calibrate__m_axis_tready", |k| k.named("m_axis_tready")),
+        ];
+        check_with_defects(|changes| subject(&model, changes), &stimulus, || Prepared::new(&model), &defects);
+    }
+
+    #[test]
+    fn without_options_the_stream_passes() {
+        let model = model(2, 3, "");
+        let stimulus = random_words(500, &[1, model.formats().code_bits as usize, 1, 1, 1]);
+        let of = |inputs: &[Word]| {
+            let stream = [4, 2, 1, 3].map(|input| Some(inputs[input]));
+            stream.into_iter().chain([Some(Word::default())]).collect()
+        };
+        check(subject(&model, &[]), &stimulus, &mut Pipeline::new(0, 5, of));
+    }
+}

@@ -214,3 +214,169 @@ impl Logic for Receive {
             & !self.rst.val();
     }
 }
+
+#[cfg(test)]
+pub(crate) mod tests {
+    use dermis_golden::fixed::stages::receive::receive;
+
+    use super::*;
+    use crate::language::testbench::{block_subject, check_with_defects, MemoryReference, Reference};
+    use crate::language::Change;
+    use crate::scenes::{model, Place};
+    use crate::wire::Word;
+
+    /// The frame that arrives at a frame buffer of any layout.
+    pub(crate) struct Reception {
+        model: Model,
+        /// The codes accepted, 0 for dead taxels.
+        pub(crate) codes: Vec<i32>,
+        /// `tlast` was early or missing.
+        pub(crate) framing: bool,
+    }
+
+    impl Reception {
+        pub(crate) fn new(model: &Model) -> Self {
+            Reception { model: model.clone(), codes: Vec::new(), framing: false }
+        }
+
+        /// All taxels have been accepted, and the buffer has not been freed.
+        pub(crate) fn is_whole(&self) -> bool {
+            self.codes.len() == self.model.scene.sensor.taxels()
+        }
+
+        /// The code that is accepted; inputs: reset, code, valid, last.
+        pub(crate) fn accepted(&self, inputs: &[Word]) -> Option<i32> {
+            let bits = self.model.formats().input_bits as usize;
+            let taken = inputs[2].number() == 1 && inputs[0].number() == 0 && !self.is_whole();
+            let dead = self.model.dead.contains(&self.codes.len());
+            taken.then(|| if dead { 0 } else { inputs[1].signed(0, bits) as i32 })
+        }
+
+        /// A clock edge with the same inputs. Gives the taxel that goes to the buffer and its code.
+        pub(crate) fn clock(&mut self, inputs: &[Word], free: bool, reported: bool) -> Option<(usize, i32)> {
+            let taken = self.accepted(inputs);
+            let last = inputs[3].number() == 1;
+            self.framing &= !reported;
+            if let Some(code) = taken {
+                self.codes.push(code);
+                self.framing |= last != self.is_whole();
+            }
+            let (early, taxel) = (last && !self.is_whole(), self.codes.len());
+            if inputs[0].number() == 1 {
+                *self = Reception::new(&self.model);
+            } else if free || (taken.is_some() && early) {
+                self.codes.clear();
+            }
+            taken.filter(|_| !early).map(|code| (taxel - 1, code))
+        }
+
+        /// Random beats, `tlast` wrong every now and then, and resets: the first four inputs.
+        pub(crate) fn beat(&self, random: &mut fastrand::Rng, cycle: usize) -> [Word; 4] {
+            let rst = cycle < 2 || random.u16(..700) == 0;
+            let last = (self.codes.len() + 1 == self.model.scene.sensor.taxels()) ^ (random.u8(..150) == 0);
+            let bits = self.model.formats().input_bits as usize;
+            // Small ones are within the noise.
+            let code = Word::of_fields(&[random.i64(..) >> (64 - bits) >> random.usize(..bits)], bits);
+            [rst.into(), code, (random.u8(..4) > 0).into(), last.into()]
+        }
+    }
+
+    struct Buffer {
+        reception: Reception,
+        /// Index of the case in whose layout frames are stored.
+        case: usize,
+        /// The whole frame is in the buffer.
+        full: bool,
+        /// The taxel accepted in the cycle before, and its code.
+        taxel: Option<(usize, i32)>,
+        lanes: [MemoryReference<i32>; 4],
+    }
+
+    impl Buffer {
+        fn case(&self) -> &CasePlan {
+            &self.reception.model.cases()[self.case]
+        }
+
+        fn new(model: &Model, case: usize) -> Self {
+            let quads = frame_quads(&model.cases()[case..][..1]);
+            let lanes = [(); 4].map(|()| MemoryReference::new(quads, 2));
+            Buffer { reception: Reception::new(model), case, full: false, taxel: None, lanes }
+        }
+    }
+
+    impl Reference for Buffer {
+        fn outputs(&mut self, inputs: &[Word]) -> Vec<Option<Word>> {
+            let (model, taken) = (&self.reception.model, self.reception.accepted(inputs));
+            let bits = model.formats().input_bits as usize;
+            let code = |code: i32, bits: usize| Word::of_fields(&[i64::from(code)], bits);
+            let ready = inputs[0].number() == 0 && !self.reception.is_whole();
+            let lanes: Option<Vec<i64>> = self.lanes.iter().map(|lane| lane.shown().map(i64::from)).collect();
+            let part = self.case().parts.get(inputs[6].number() as usize).filter(|_| self.full);
+            let stats = part.map(|part| {
+                let codes: Vec<i32> = part.indices(&model.scene.sensor).map(|at| self.reception.codes[at]).collect();
+                receive(&codes, model.noise_floor)
+            });
+            vec![
+                Some(ready.into()),
+                Some(taken.is_some().into()),
+                taken.map(|taken| code(taken, bits)),
+                Some(self.full.into()),
+                Some(0.into()),
+                lanes.map(|lanes| Word::of_fields(&lanes, bits)),
+                stats.map(|stats| stats.magnitude.into()),
+                stats.map(|stats| stats.positive.into()),
+                stats.map(|stats| stats.negative.into()),
+                Some(self.reception.framing.into()),
+            ]
+        }
+
+        fn clock(&mut self, inputs: &[Word]) {
+            let [rst, free, reported] = [0, 4, 7].map(|input| inputs[input].number() == 1);
+            let taxel = self.taxel.map(|(taxel, code)| (Place::of(self.case(), taxel), code));
+            for (lane, memory) in self.lanes.iter_mut().enumerate() {
+                let written = taxel.as_ref().filter(|(place, _)| place.mask >> lane & 1 == 1);
+                memory.clock(Some(inputs[5].number() as usize), written.map(|(place, code)| (place.quad, *code)));
+            }
+            self.full = self.reception.is_whole() && !free && !rst;
+            self.taxel = self.reception.clock(inputs, free, reported);
+        }
+    }
+
+    #[test]
+    fn frames_are_written_as_quads_and_their_statistics_gathered() {
+        let noise = "[search]\nnoise_floor_MPa = 0.002\n[input]\nfull_scale_MPa = 1.0\n";
+        // The second of two cases, and a sensor with dead taxels.
+        let parts = model(10, 14, &format!("[partition]\ncases = [0, 1]\n{noise}"));
+        let dead = model(5, 7, &format!("{noise}dead = [[0, 3], [4, 6]]\n"));
+        assert!(parts.noise_floor > 0 && dead.dead.len() == 2);
+        for (model, case, defect) in [
+            (parts, 1, Change::value("", "stats_part__d", |k| k.named("part"))),
+            (dead, 0, Change::value("", "dead_taxels__clear", |k| k.named("rst"))),
+        ] {
+            let mut random = fastrand::Rng::with_seed(7);
+            let mut buffer = Buffer::new(&model, case);
+            let count = buffer.case().parts.len();
+            let quads = count * buffer.case().formats.quads;
+            let cycle = |cycle: usize| {
+                let beat = buffer.reception.beat(&mut random, cycle);
+                let free = buffer.full && random.u8(..40) == 0;
+                let [address, part] = [quads, count].map(|limit| Word::from(random.u64(..limit as u64)));
+                let inputs = [&beat[..], &[free.into(), address, part, (random.u8(..20) == 0).into()]].concat();
+                buffer.clock(&inputs);
+                inputs
+            };
+            let stimulus: Vec<Vec<Word>> = (0..6000).map(cycle).collect();
+            let subject = |changes: &[Change]| {
+                block_subject!(
+                    Receive::new(&model, case),
+                    changes,
+                    inputs [rst, s_axis_tdata, s_axis_tvalid, s_axis_tlast, free, quad_address, part, reported],
+                    outputs [
+                        s_axis_tready, accept, taken_word, full, which, quad, magnitude, positive, negative, framing
+                    ],
+                )
+            };
+            check_with_defects(subject, &stimulus, || Buffer::new(&model, case), &[defect]);
+        }
+    }
+}

@@ -188,3 +188,178 @@ impl Logic for Rescale {
         self.saturations.next = self.rescaler.saturations.val();
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use std::collections::BTreeMap;
+
+    use dermis_golden::fixed::stages::pass::join_limbs;
+    use dermis_golden::fixed::stages::rescale::{operand, raw_length, rescale, shift};
+
+    use super::*;
+    use crate::language::testbench::{block_subject, check_with_defects, Reference};
+    use crate::language::Change;
+    use crate::scenes::model;
+    use crate::wire::Word;
+
+    /// Cycles from the last row of v_00 to its first word, and from a later row to its word.
+    const LATENCY: [usize; 2] = [7, 3];
+
+    struct Rescaling<'a> {
+        model: &'a Model,
+        cycle: usize,
+        /// The rows of v_00 so far; none when it is complete.
+        rows: Option<Vec<[i64; 4]>>,
+        /// The subarray's shift, from the cycle of its first word on.
+        shift: Option<(usize, u32)>,
+        saturations: u32,
+        /// Words by the cycle in which they are output; none before the first reset.
+        words: Option<BTreeMap<usize, [i64; 4]>>,
+    }
+
+    impl<'a> Rescaling<'a> {
+        fn new(model: &'a Model) -> Self {
+            Rescaling { model, cycle: 0, rows: None, shift: None, saturations: 0, words: None }
+        }
+
+        /// Rows of v_00 of case `which`.
+        fn rows(&self, which: usize) -> usize {
+            let limbs = if self.model.formats().limb_align > 0 { 2 } else { 1 };
+            limbs * self.model.cases()[which].formats.quads
+        }
+
+        /// All words have been output two cycles ago.
+        fn is_idle(&self) -> bool {
+            self.words.iter().flatten().all(|(&cycle, _)| cycle + 2 <= self.cycle)
+        }
+    }
+
+    impl Reference for Rescaling<'_> {
+        fn outputs(&mut self, _: &[Word]) -> Vec<Option<Word>> {
+            let formats = self.model.formats();
+            let words = |cycle: Option<usize>| {
+                let all = self.words.as_ref()?;
+                Some(cycle.and_then(|cycle| all.get(&cycle).copied()))
+            };
+            let (word, last) = (words(Some(self.cycle)), words(self.cycle.checked_sub(1)));
+            let operands =
+                last.flatten().map(|words| Word::of_fields(&operand(formats, &[words])[0], formats.data_bits as usize));
+            let shift =
+                self.shift.filter(|(from, _)| *from <= self.cycle).map(|(_, shift)| Word::from(u64::from(shift)));
+            vec![
+                word.flatten().map(|words| Word::of_fields(&words, formats.vector_bits as usize)),
+                word.map(|word| word.is_some().into()),
+                operands,
+                last.map(|last| last.is_some().into()),
+                shift,
+                shift.filter(|_| self.is_idle()).map(|_| Word::from(u64::from(self.saturations))),
+            ]
+        }
+
+        fn clock(&mut self, inputs: &[Word]) {
+            let [rst, which, start, _, valid] = [0, 1, 2, 3, 4].map(|input| inputs[input].number() as usize);
+            let formats = self.model.formats();
+            let quad = [0, 1, 2, 3].map(|parity| inputs[3].signed(parity, formats.lane_bits as usize));
+            let all = self.rows(which);
+            let mut words = self.words.take();
+            if let (1, Some(due)) = (valid, &mut words) {
+                let mut add = |rows: &[[i64; 4]], shift: u32, latency: usize| {
+                    let (words, saturations) = rescale(formats, rows, shift);
+                    due.extend((self.cycle + latency..).zip(words));
+                    self.saturations += saturations;
+                };
+                match self.rows.take() {
+                    None => add(&[quad], formats.a_shift, LATENCY[1]),
+                    Some(mut rows) => {
+                        rows.push(quad);
+                        if rows.len() < all {
+                            self.rows = Some(rows);
+                        } else {
+                            let limbs: Vec<_> =
+                                rows.chunks(self.model.cases()[which].formats.quads).map(<[_]>::to_vec).collect();
+                            let raw = join_limbs(formats, &limbs);
+                            let shift = shift(formats, raw_length(&raw));
+                            add(&raw, shift, LATENCY[0]);
+                            self.shift = Some((self.cycle + LATENCY[0], shift));
+                        }
+                    }
+                }
+            }
+            if start == 1 {
+                (self.rows, self.shift, self.saturations) = (Some(Vec::new()), None, 0);
+            }
+            if rst == 1 {
+                (self.rows, self.shift, words) = (None, None, Some(BTreeMap::new()));
+            }
+            self.words = words;
+            self.cycle += 1;
+        }
+    }
+
+    /// Subarrays: v_00, then rows of other v_ij, with gaps and resets.
+    fn stimulus(model: &Model, subarrays: usize) -> Vec<Vec<Word>> {
+        let formats = model.formats();
+        let mut random = fastrand::Rng::with_seed(12);
+        // Reset, case, start, a row.
+        let mut cycles: Vec<(bool, usize, bool, bool)> = vec![(true, 0, false, false)];
+        for _ in 0..subarrays {
+            let which = random.usize(..model.cases().len());
+            let quads = model.cases()[which].formats.quads;
+            let (gaps, first) = (random.u8(..4), cycles.len());
+            cycles.push((false, which, true, false));
+            cycles.extend([(false, which, false, false); 4]);
+            let rows = |cycles: &mut Vec<_>, random: &mut fastrand::Rng, count: usize| {
+                for _ in 0..count {
+                    let gap = if random.u8(..4) < gaps { random.usize(..4) } else { 0 };
+                    cycles.extend(vec![(false, which, false, false); gap]);
+                    cycles.push((false, which, false, true));
+                }
+            };
+            rows(&mut cycles, &mut random, Rescaling::new(model).rows(which));
+            cycles.extend(vec![(false, which, false, false); quads + LATENCY[0]]);
+            let more = random.usize(..60);
+            rows(&mut cycles, &mut random, more);
+            cycles.extend([(false, which, false, false); 8]);
+            if random.u8(..5) == 0 {
+                cycles.truncate(random.usize(first + 1..cycles.len()));
+                cycles.push((true, which, false, false));
+            }
+        }
+        let magnitude = formats.acc_bits.min(formats.lane_bits + formats.limb_align) - formats.limb_align - 2;
+        let mut quieter = 0;
+        let inputs = |cycle: usize| {
+            let (rst, which, start, valid) = cycles[cycle];
+            let soon = cycles.get(cycle + 2).is_some_and(|(.., valid)| *valid);
+            if start {
+                quieter = random.u32(..magnitude);
+            }
+            let quad = [(); 4].map(|()| random.i64(-(1 << magnitude)..1 << magnitude) >> quieter);
+            let quad = Word::of_fields(&quad, formats.lane_bits as usize);
+            vec![rst.into(), Word::from(which as u64), start.into(), quad, valid.into(), soon.into()]
+        };
+        (0..cycles.len()).map(inputs).collect()
+    }
+
+    #[test]
+    fn v_00_is_measured_and_shifted_and_later_rows_pass() {
+        let two_limbs = model(8, 8, "[partition]\ncases = [0, 1]\n");
+        let one_limb = model(4, 4, "[fixed]\ninput_bits = 12\ninverse_bits = 18\n");
+        assert!(two_limbs.formats().limb_align > 0 && one_limb.formats().limb_align == 0);
+        for model in [two_limbs, one_limb] {
+            let subject = |changes: &[Change]| {
+                block_subject!(
+                    Rescale::new(&model),
+                    changes,
+                    inputs [rst, which, start, quad, quad_valid, quad_soon],
+                    outputs [words, words_valid, operands, operands_valid, shift, saturations],
+                )
+            };
+            let defects = [
+                Change::value("", "raw__write_address", |k| k.named("rows__value")),
+                Change::value("", "length__clear", |k| k.named("rst")),
+            ];
+            let defects = if model.cases().len() == 2 { &defects[..] } else { &[] };
+            check_with_defects(subject, &stimulus(&model, 60), || Rescaling::new(&model), defects);
+        }
+    }
+}

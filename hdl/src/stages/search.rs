@@ -393,3 +393,6 @@ impl Logic for Search {
         self.taken.next = self.best.taken.val();
     }
 }
+
+#[cfg(test)]
+mod tests;

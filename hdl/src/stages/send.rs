@@ -136,3 +136,105 @@ impl Logic for Send {
         self.done.next = self.out.q.val();
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::language::testbench::{block_subject, check_with_defects, Reference};
+    use crate::language::Change;
+    use crate::scenes::{model, Place};
+    use crate::wire::Word;
+
+    struct Sending<'a> {
+        model: &'a Model,
+        /// The next beat of the frame: its taxels, then its status beats.
+        beat: Option<usize>,
+        /// Subarrays of the frame whose values have begun.
+        begun: usize,
+        done: Option<bool>,
+    }
+
+    impl<'a> Sending<'a> {
+        fn new(model: &'a Model) -> Self {
+            Sending { model, beat: None, begun: 0, done: None }
+        }
+
+        /// Code, subarray and, of a force, the taxel's place, of the beat that is requested.
+        fn request(&self, inputs: &[Word]) -> Option<(usize, usize, Option<Place>)> {
+            let case = &self.model.cases()[inputs[1].number() as usize];
+            let beat = self.beat.filter(|_| inputs[7].number() == 1)?;
+            match beat.checked_sub(self.model.scene.sensor.taxels()) {
+                Some(status) => Some((1 + status % STATUS_BEATS, status / STATUS_BEATS, None)),
+                None => {
+                    let place = Place::of(case, beat);
+                    (place.part < self.begun).then_some((0, place.part, Some(place)))
+                }
+            }
+        }
+    }
+
+    impl Reference for Sending<'_> {
+        fn outputs(&mut self, inputs: &[Word]) -> Vec<Option<Word>> {
+            let request = self.request(inputs);
+            let width = self.model.formats().search_width;
+            let place = request.as_ref().and_then(|(.., place)| Some(place.as_ref()?.word(width)));
+            let number = |number: usize| Word::from(number as u64);
+            vec![
+                Some(request.is_some().into()),
+                request.as_ref().map(|(beat, ..)| number(*beat)),
+                request.as_ref().map(|(_, part, _)| number(*part)),
+                place.map(|(address, _)| number(address)),
+                place.map(|(_, lane)| number(lane)),
+                self.done.map(Word::from),
+            ]
+        }
+
+        fn clock(&mut self, inputs: &[Word]) {
+            let [rst, which, start, begins, valid, ready, last] =
+                [0, 1, 2, 3, 4, 5, 6].map(|input| inputs[input].number());
+            let beats = self.model.scene.sensor.taxels() + self.model.cases()[which as usize].status_beats();
+            let next = self.beat.map(|beat| beat + usize::from(self.request(inputs).is_some()));
+            self.beat = if start == 1 { Some(0) } else { next.filter(|&beat| beat < beats) };
+            self.begun = if start == 1 { 1 } else { self.begun + begins as usize };
+            self.done = Some(valid & ready & last == 1);
+            if rst == 1 {
+                (self.beat, self.done) = (None, Some(false));
+            }
+        }
+    }
+
+    #[test]
+    fn forces_are_requested_as_their_values_begin_and_status_beats_follow() {
+        let model = model(10, 14, "[partition]\ncases = [0, 1, 2, 3]\n");
+        let mut random = fastrand::Rng::with_seed(9);
+        let mut sending = Sending::new(&model);
+        let mut which = 0;
+        let cycle = |cycle: usize| {
+            let rst = cycle < 2 || random.u16(..1000) == 0;
+            let start = !rst && sending.beat.is_none() && random.u8(..10) == 0;
+            if start {
+                which = random.usize(..model.cases().len());
+            }
+            let more = sending.beat.is_some() && sending.begun < model.cases()[which].parts.len();
+            let bits = [start, start || (more && random.u8(..80) == 0), random.bool(), random.bool(), random.bool()];
+            let bits = bits.into_iter().chain([random.u8(..4) > 0]).map(Word::from);
+            let inputs: Vec<Word> = [Word::from(rst), Word::from(which as u64)].into_iter().chain(bits).collect();
+            sending.clock(&inputs);
+            inputs
+        };
+        let stimulus: Vec<Vec<Word>> = (0..8000).map(cycle).collect();
+        let subject = |changes: &[Change]| {
+            block_subject!(
+                Send::new(&model),
+                changes,
+                inputs [rst, which, start, begins, m_axis_tvalid, m_axis_tready, m_axis_tlast, room],
+                outputs [offer, beat, part, address, lane, done],
+            )
+        };
+        let defects = [
+            Change::value("", "released__part", |k| k.named("parts__value")),
+            Change::value("", "finish", |k| k.named("step") & k.named("status__q") & k.named("words__last")),
+        ];
+        check_with_defects(subject, &stimulus, || Sending::new(&model), &defects);
+    }
+}

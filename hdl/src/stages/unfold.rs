@@ -117,3 +117,119 @@ impl Logic for Unfold {
         self.done.next = self.finish.q.val();
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use std::collections::VecDeque;
+
+    use dermis_golden::fixed::stages::unfold::unfold;
+    use dermis_golden::fixed::words::schedule::EXPONENTS;
+
+    use super::*;
+    use crate::language::testbench::{block_subject, check_with_defects, random_word, Reference};
+    use crate::language::Change;
+    use crate::scenes::model;
+    use crate::wire::Word;
+
+    /// What becomes of a quad.
+    #[derive(Clone, Copy)]
+    struct Quad {
+        vector: usize,
+        address: usize,
+        taxels: [i64; 4],
+        last: bool,
+    }
+
+    struct Unfolding<'a> {
+        model: &'a Model,
+        /// Number of the next quad of the subarray.
+        next: usize,
+        /// The quad of the cycle before, that of the cycle before it, and so on; none before the first reset.
+        quads: VecDeque<Option<Quad>>,
+    }
+
+    impl<'a> Unfolding<'a> {
+        fn new(model: &'a Model) -> Self {
+            Unfolding { model, next: 0, quads: VecDeque::new() }
+        }
+
+        /// The quad of these words, the next of the subarray.
+        fn quad(&self, which: usize, words: [i64; 4]) -> Quad {
+            let formats = &self.model.cases()[which].formats;
+            let (vector, address) = (self.next / formats.quads, self.next % formats.quads);
+            let [a, b, c, d] = unfold(&[words], EXPONENTS[vector].0 + EXPONENTS[vector].1)[0];
+            let last = self.next + 1 == vectors(formats.degree) * formats.quads;
+            match is_transposed(&schedule(formats)[vector]) {
+                false => Quad { vector, address, taxels: [a, b, c, d], last },
+                true => {
+                    let address = self.model.layout().transposed(address);
+                    Quad { vector, address, taxels: [a, c, b, d], last }
+                }
+            }
+        }
+    }
+
+    impl Reference for Unfolding<'_> {
+        fn outputs(&mut self, _: &[Word]) -> Vec<Option<Word>> {
+            let bits = self.model.formats().vector_bits as usize + 2;
+            let [now, before] = [1, 2].map(|cycles| self.quads.get(cycles).copied());
+            let quad = now.flatten();
+            vec![
+                quad.map(|quad| Word::of_fields(&quad.taxels, bits)),
+                now.map(|now| now.is_some().into()),
+                quad.map(|quad| Word::from(quad.vector as u64)),
+                quad.map(|quad| Word::from(quad.address as u64)),
+                before.map(|before| before.is_some_and(|quad| quad.last).into()),
+            ]
+        }
+
+        fn clock(&mut self, inputs: &[Word]) {
+            let [rst, which, start, _, valid] = [0, 1, 2, 3, 4].map(|input| inputs[input].number() as usize);
+            let formats = &self.model.cases()[which].formats;
+            let words = [0, 1, 2, 3].map(|parity| inputs[3].signed(parity, formats.vector_bits as usize));
+            self.quads.push_front((valid == 1).then(|| self.quad(which, words)));
+            self.quads.truncate(3);
+            let all = vectors(formats.degree) * formats.quads;
+            self.next = if start == 1 { 0 } else { (self.next + valid) % all };
+            if rst == 1 {
+                self.quads = vec![None; 3].into();
+            }
+        }
+    }
+
+    #[test]
+    fn quads_of_all_vectors_become_coefficients_of_taxels() {
+        let shared = model(6, 6, "[search]\nmu_max = 0.005\n");
+        assert!(shared.formats().shared_a);
+        for model in [shared, model(8, 8, "[partition]\ncases = [0, 1]\n")] {
+            let bits = 4 * model.formats().vector_bits as usize;
+            let mut random = fastrand::Rng::with_seed(11);
+            let mut which = 0;
+            let cycle = |cycle: usize| {
+                let rst = cycle == 0 || random.u16(..500) == 0;
+                let start = cycle == 1 || random.u16(..150) == 0;
+                if start {
+                    which = random.usize(..model.cases().len());
+                }
+                let valid = cycle > 1 && !start && random.u8(..5) > 0;
+                let words = random_word(&mut random, bits);
+                vec![rst.into(), Word::from(which as u64), start.into(), words, valid.into()]
+            };
+            let stimulus: Vec<Vec<Word>> = (0..4000).map(cycle).collect();
+            let subject = |changes: &[Change]| {
+                block_subject!(
+                    Unfold::new(&model),
+                    changes,
+                    inputs [rst, which, start, words, words_valid],
+                    outputs [taxels, taxels_valid, index, address, done],
+                )
+            };
+            let defects = [
+                Change::value("", "transposed__index", |k| k.named("index_first__q")),
+                Change::value("", "finish__d", |k| k.named("quad_end")),
+            ];
+            let defects = if model.formats().shared_a { &defects[..] } else { &[] };
+            check_with_defects(subject, &stimulus, || Unfolding::new(&model), defects);
+        }
+    }
+}

@@ -101,3 +101,74 @@ impl Logic for Scan {
         self.mask.next = self.quad_address.mask.val();
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::language::testbench::{block_subject, check_with_defects, Reference};
+    use crate::language::Change;
+    use crate::scenes::{model, Place};
+    use crate::wire::Word;
+
+    fn taxels(case: &CasePlan) -> usize {
+        case.parts.len() * case.layout().rows * case.layout().cols
+    }
+
+    /// The number of taxels passed; undefined before the first `clear`. Inputs: the case, clear, enable.
+    struct Taxels<'a> {
+        cases: &'a [CasePlan],
+        lanes: usize,
+        passed: Option<usize>,
+    }
+
+    impl Reference for Taxels<'_> {
+        fn outputs(&mut self, inputs: &[Word]) -> Vec<Option<Word>> {
+            let Some(taxel) = self.passed else { return vec![None; 5] };
+            let case = &self.cases[inputs[0].number() as usize];
+            let place = Place::of(case, taxel);
+            let (address, lane) = place.word(self.lanes);
+            let last = usize::from(taxel + 1 == taxels(case));
+            let values = [last, address, place.part, lane, usize::from(place.mask)];
+            values.map(|value| Some(Word::from(value as u64))).into()
+        }
+
+        fn clock(&mut self, inputs: &[Word]) {
+            let [which, clear, enable] = [0, 1, 2].map(|input| inputs[input].number() as usize);
+            let count = taxels(&self.cases[which]);
+            self.passed = if clear == 1 { Some(0) } else { self.passed.map(|taxel| (taxel + enable) % count) };
+        }
+    }
+
+    #[test]
+    fn taxels_come_row_major_with_the_places_of_their_subarray() {
+        let model = model(10, 14, "[partition]\ncases = [0, 1, 2, 3]\n");
+        for lanes in [4, 1] {
+            let mut random = fastrand::Rng::with_seed(lanes as u64);
+            let (mut which, mut left) = (0, 1);
+            let mut cycle = || {
+                left -= 1;
+                // Another case after a `clear`; every second time after the array was passed more than once.
+                let inputs = [which, u64::from(left == 0), u64::from(random.u8(..8) > 0)];
+                if left == 0 {
+                    (which, left) = (random.u64(..model.cases().len() as u64), random.usize(1..400));
+                }
+                inputs.map(Word::from).into()
+            };
+            let stimulus: Vec<Vec<Word>> = (0..4000).map(|_| cycle()).collect();
+            let subject = |changes: &[Change]| {
+                block_subject!(
+                    Scan::new(model.cases(), lanes),
+                    changes,
+                    inputs [which, clear, enable],
+                    outputs [last, address, part, lane, mask],
+                )
+            };
+            let defects = [
+                Change::value("", "row__enable", |k| k.named("enable") & k.named("col__last")),
+                Change::value("", "last", |k| k.named("line_end")),
+            ];
+            let reference = || Taxels { cases: model.cases(), lanes, passed: None };
+            check_with_defects(subject, &stimulus, reference, &defects);
+        }
+    }
+}

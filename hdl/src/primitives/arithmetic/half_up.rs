@@ -21,3 +21,32 @@ pub fn saturate<'k>(k: &'k Builder, moved: Expr<'k>, word: usize) -> (Expr<'k>, 
     let sign = moved.top();
     (clips.mux(sign.concat((!sign).repeat(word - 1)), half_up), clips)
 }
+
+#[cfg(test)]
+mod tests {
+    use dermis_golden::fixed::words::arith;
+
+    use super::*;
+    use crate::language::testbench::{check, Pipeline};
+    use crate::language::Body;
+    use crate::wire::Word;
+
+    #[test]
+    fn every_value_is_rounded_half_up_and_saturated() {
+        const MOVED: usize = 9;
+        for word in [4, 7] {
+            let k = Builder::combinational("half_up");
+            let (value, clips) = saturate(&k, k.input("moved", MOVED), word);
+            k.wire("value", value);
+            k.wire("clipped", clips);
+            let body = Body::new(k.finish(), &[("moved", MOVED)], &[("value", word), ("clipped", 1)]);
+            let of = |inputs: &[Word]| {
+                let half_up = arith::round_shift(inputs[0].signed(0, MOVED), 1);
+                let (value, clipped) = arith::saturate(half_up, word as u32);
+                vec![Some(Word::of_fields(&[value], word)), Some(clipped.into())]
+            };
+            let all: Vec<Vec<Word>> = (0..1 << MOVED).map(|moved: u64| vec![moved.into()]).collect();
+            check(body.kernel(), &all, &mut Pipeline::new(0, 2, of));
+        }
+    }
+}

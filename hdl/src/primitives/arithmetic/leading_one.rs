@@ -18,3 +18,26 @@ pub fn by_leading_one<'k>(
     let term = |at: usize| first(at).repeat(bits) & k.constant(bits, value(at) as u64);
     range.map(term).reduce(|all, term| all | term).unwrap_or(k.constant(bits, 0))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::language::testbench::{check, Pipeline};
+    use crate::language::Body;
+    use crate::wire::Word;
+
+    #[test]
+    fn every_word_selects_the_constant_of_its_leading_one() {
+        const BITS: usize = 9;
+        let (range, value) = (2..BITS, |at: usize| (3 * at + 5) % 16);
+        let k = Builder::combinational("leading_one");
+        k.wire("value", by_leading_one(&k, k.input("word", BITS), range.clone(), 4, value));
+        let body = Body::new(k.finish(), &[("word", BITS)], &[("value", 4)]);
+        let of = |inputs: &[Word]| {
+            let leading = inputs[0].number().checked_ilog2().map(|at| at as usize).filter(|at| range.contains(at));
+            vec![Some(Word::from(leading.map_or(0, value) as u64))]
+        };
+        let all: Vec<Vec<Word>> = (0..1 << BITS).map(|word: u64| vec![word.into()]).collect();
+        check(body.kernel(), &all, &mut Pipeline::new(0, 1, of));
+    }
+}

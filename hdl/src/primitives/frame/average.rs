@@ -136,4 +136,4 @@ fn kernel(taxels: usize, bits: usize, power: usize) -> Kernel {
 }
 
 #[cfg(test)]
-mod tests;
+pub(crate) mod tests;

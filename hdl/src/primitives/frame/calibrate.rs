@@ -135,7 +135,7 @@ fn kernel(zero: &[i32], gain: Option<&[i32]>, taxels: usize, bits: usize) -> Ker
 }
 
 #[cfg(test)]
-mod tests {
+pub(crate) mod tests {
     use std::collections::VecDeque;
 
     use dermis_golden::fixed::words::arith::{round_shift, saturate};
@@ -144,16 +144,23 @@ mod tests {
     use crate::language::testbench::{check, random_word, Reference};
     use crate::wire::Word;
 
-    const TAXELS: usize = 6;
-    const BITS: usize = 8;
-
     /// The arithmetic in integers, and the beats in the block.
-    struct Table {
+    pub(crate) struct Table {
+        bits: usize,
         zero: Vec<i32>,
         gain: Option<Vec<i32>>,
         taxel: usize,
         pipe: VecDeque<Option<(i64, bool)>>,
         reset: bool,
+    }
+
+    impl Table {
+        /// For codes of `bits` bits.
+        pub(crate) fn new(zero: &[i32], gain: Option<&[i32]>, bits: usize) -> Self {
+            let pipe = vec![None; if gain.is_some() { 4 } else { 2 }].into();
+            let (zero, gain) = (zero.to_vec(), gain.map(<[i32]>::to_vec));
+            Table { bits, zero, gain, taxel: 0, pipe, reset: false }
+        }
     }
 
     impl Reference for Table {
@@ -165,7 +172,7 @@ mod tests {
                 bit((leaving.is_none() || ready) && !rst),
                 bit(leaving.is_some()),
                 leaving.map(|(_, last)| Word::from(last)),
-                leaving.map(|(stress, _)| Word::of_fields(&[stress], BITS)),
+                leaving.map(|(stress, _)| Word::of_fields(&[stress], self.bits)),
             ]
         }
 
@@ -173,11 +180,11 @@ mod tests {
             let [rst, valid, last, ready] = [0, 2, 3, 4].map(|k| inputs[k].number() == 1);
             if self.pipe[0].is_none() || ready {
                 let taken = valid.then(|| {
-                    let difference = inputs[1].signed(0, BITS) - i64::from(self.zero[self.taxel]);
+                    let difference = inputs[1].signed(0, self.bits) - i64::from(self.zero[self.taxel]);
                     let gain = self.gain.as_ref().map(|gain| i64::from(gain[self.taxel]));
                     let stress = gain.map_or(difference, |gain| round_shift(difference * gain, GAIN_FRACTION));
-                    self.taxel = if last || self.taxel + 1 == TAXELS { 0 } else { self.taxel + 1 };
-                    (saturate(stress, BITS as u32).0, last)
+                    self.taxel = if last || self.taxel + 1 == self.zero.len() { 0 } else { self.taxel + 1 };
+                    (saturate(stress, self.bits as u32).0, last)
                 });
                 self.pipe.push_back(taken);
                 self.pipe.pop_front();
@@ -191,6 +198,8 @@ mod tests {
 
     #[test]
     fn codes_are_calibrated_with_their_taxel_s_words() {
+        const TAXELS: usize = 6;
+        const BITS: usize = 8;
         let mut random = fastrand::Rng::with_seed(7);
         let zero: Vec<i32> = (0..TAXELS).map(|_| random.i32(-128..128)).collect();
         let gain: Vec<i32> = (0..TAXELS).map(|_| random.i32(-(1 << 17)..1 << 17)).collect();
@@ -202,14 +211,9 @@ mod tests {
                 vec![rst.into(), random_word(&mut random, BITS), offered, last, ready]
             })
             .collect();
-        for (gain, steps) in [(None, 2), (Some(gain), 4)] {
-            let block = Calibrate::of(Some(&zero), gain.as_deref(), TAXELS, BITS);
-            let pipe = vec![None; steps].into();
-            check(
-                block.kernel.kernel(),
-                &stimulus,
-                &mut Table { zero: zero.clone(), gain, taxel: 0, pipe, reset: false },
-            );
+        for gain in [None, Some(&gain[..])] {
+            let block = Calibrate::of(Some(&zero), gain, TAXELS, BITS);
+            check(block.kernel.kernel(), &stimulus, &mut Table::new(&zero, gain, BITS));
         }
     }
 }

@@ -127,39 +127,33 @@ impl Shape {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::language::testbench::{check, random_words, Reference};
+    use crate::language::testbench::{check, random_words, MemoryReference, Reference};
     use crate::simulate::settles;
     use crate::wire::Word;
 
     const SHAPE: Shape = Shape { depth: 11, fields: 3, bits: 30, behind: false, left_out: false, holds: Vec::new() };
 
-    /// Fields of the memory and of the registers behind it.
-    struct Fields {
-        behind: bool,
-        memory: Vec<[Option<u64>; 3]>,
-        read: [Option<u64>; 3],
-        shown: [Option<u64>; 3],
-    }
+    /// Each field is a memory of its own.
+    struct Fields([MemoryReference<u64>; 3]);
 
     impl Reference for Fields {
         fn outputs(&mut self, _: &[Word]) -> Vec<Option<Word>> {
-            let shown = if self.behind { self.shown } else { self.read };
-            let known = shown.iter().all(Option::is_some);
-            vec![known.then(|| Word::of_fields(&shown.map(|field| field.unwrap_or_default() as i64), SHAPE.bits))]
+            let mut word = Some(Word::default());
+            for (index, field) in self.0.iter().enumerate() {
+                word = word.zip(field.shown()).map(|(mut word, field)| {
+                    word.set(index * SHAPE.bits, SHAPE.bits, field);
+                    word
+                });
+            }
+            vec![word]
         }
 
         fn clock(&mut self, inputs: &[Word]) {
-            if inputs[3].number() == 1 {
-                self.shown = self.read;
-                self.read = self.memory[inputs[4].number() as usize];
-                if inputs[1].number() == inputs[4].number() {
-                    let written = (0..SHAPE.fields).filter(|&field| inputs[0].field(field, 1) == 1);
-                    written.for_each(|field| self.read[field] = None);
-                }
-            }
-            for field in (0..SHAPE.fields).filter(|&field| inputs[0].field(field, 1) == 1) {
-                let place = &mut self.memory[inputs[1].number() as usize][field];
-                *place = Some(inputs[2].field(field * SHAPE.bits, SHAPE.bits));
+            let [to, from] = [1, 4].map(|address| inputs[address].number() as usize);
+            for (index, field) in self.0.iter_mut().enumerate() {
+                let word = (to, inputs[2].field(index * SHAPE.bits, SHAPE.bits));
+                let read = (inputs[3].number() == 1).then_some(from);
+                field.clock(read, (inputs[0].field(index, 1) == 1).then_some(word));
             }
         }
     }
@@ -171,8 +165,7 @@ mod tests {
             [1, 4].iter().for_each(|&address| inputs[address] = Word::from(inputs[address].number() % 11));
         }
         for behind in [false, true] {
-            let memory = vec![[None; 3]; SHAPE.depth];
-            let mut fields = Fields { behind, memory, read: [None; 3], shown: [None; 3] };
+            let mut fields = Fields([0, 1, 2].map(|_| MemoryReference::new(SHAPE.depth, 1 + usize::from(behind))));
             let block = Ram::of(Shape { behind, ..SHAPE });
             check(block.kernel.kernel(), &stimulus, &mut fields);
         }

@@ -423,4 +423,4 @@ impl<'k> Component<'k> {
 }
 
 #[cfg(test)]
-mod tests;
+pub(crate) mod tests;

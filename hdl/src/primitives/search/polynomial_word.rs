@@ -58,9 +58,44 @@ impl PolynomialWord {
         let each = (0..self.widths.len()).flat_map(|k| polynomials.iter().map(move |polynomial| polynomial[k]));
         concat(&each.rev().collect::<Vec<_>>())
     }
+}
 
-    /// Verilog part select of coefficient `k` of lane `lane` (an expression) in `word`.
-    pub fn select(&self, word: &str, k: usize, lane: &str) -> String {
-        format!("{word}[{} + {lane} * {} +: {}]", self.offset(k), self.widths[k], self.widths[k])
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::language::testbench::{check, random_words, Pipeline};
+    use crate::language::{Body, Builder};
+
+    #[test]
+    fn coefficients_of_all_lanes_lie_side_by_side() {
+        let layout = PolynomialWord::new(3, &[20, 7, 43]);
+        assert_eq!((layout.offset(1), layout.offset(2), layout.bits()), (60, 81, 210));
+        let mut word = Word::default();
+        let polynomials: [Polynomial; 3] =
+            [[1, -2, 3], [-4, 63, -6], [7, -64, 9]].map(|[a, b, c]| [a, b, c, 0, 0, 0, 0, 0, 0, 0]);
+        polynomials.iter().enumerate().for_each(|(lane, polynomial)| layout.put(&mut word, lane, polynomial));
+        assert_eq!([0, 1, 2].map(|lane| layout.get(&word, lane)), polynomials);
+        // Coefficient 1 of lane 2, by hand.
+        assert_eq!(word.field(3 * 20 + 2 * 7, 7), 64);
+    }
+
+    #[test]
+    fn a_kernel_takes_polynomials_apart_and_joins_them() {
+        let layout = PolynomialWord::new(2, &[20, 7, 33]);
+        let k = Builder::combinational("exchange");
+        let word = k.input("word", layout.bits());
+        let lane = |lane: usize| (0..3).map(|n| layout.coefficient(word, n, lane).unsigned()).collect();
+        k.wire("exchanged", layout.join(&[lane(1), lane(0)]));
+        let body = Body::new(k.finish(), &[("word", layout.bits())], &[("exchanged", layout.bits())]);
+        let of = |inputs: &[Word]| {
+            let mut exchanged = Word::default();
+            // Offset and width of the coefficients of lane 0.
+            for (offset, bits) in [(0, 20), (40, 7), (54, 33)] {
+                exchanged.set(offset, bits, inputs[0].field(offset + bits, bits));
+                exchanged.set(offset + bits, bits, inputs[0].field(offset, bits));
+            }
+            vec![Some(exchanged)]
+        };
+        check(body.kernel(), &random_words(300, &[layout.bits()]), &mut Pipeline::new(0, 1, of));
     }
 }

@@ -105,7 +105,7 @@ fn kernel(bits: usize) -> Kernel {
 }
 
 #[cfg(test)]
-mod tests {
+pub(crate) mod tests {
     use std::collections::VecDeque;
 
     use super::*;
@@ -116,7 +116,7 @@ mod tests {
 
     /// A list of beats, the number of places promised, the beat on the output.
     #[derive(Default)]
-    struct List {
+    pub(crate) struct List {
         reserved: usize,
         waiting: VecDeque<(Word, bool)>,
         offered: Option<(Word, bool)>,

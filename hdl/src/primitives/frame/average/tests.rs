@@ -11,9 +11,12 @@ const POWER: u32 = 2;
 
 /// Sums, the taxel and frame of the next word, the beats in the block.
 #[derive(Default)]
-struct Sums {
-    sums: [i64; TAXELS],
-    taxel: usize,
+pub(crate) struct Sums {
+    bits: usize,
+    power: u32,
+    sums: Vec<i64>,
+    /// The taxel of the next word.
+    pub(crate) taxel: usize,
     frame: usize,
     missed: bool,
     held: Option<(i64, bool, bool)>,
@@ -22,9 +25,14 @@ struct Sums {
 }
 
 impl Sums {
+    /// Of 2^`power` frames of `taxels` words of `bits` bits.
+    pub(crate) fn new(taxels: usize, bits: usize, power: u32) -> Self {
+        Sums { bits, power, sums: vec![0; taxels], ..Sums::default() }
+    }
+
     /// Adds a word: its sum, whether it leaves, and whether it is the last.
     fn add(&mut self, word: i64, tlast: bool) -> (i64, bool, bool) {
-        let (at_end, final_frame) = (self.taxel + 1 == TAXELS, self.frame + 1 == 1 << POWER);
+        let (at_end, final_frame) = (self.taxel + 1 == self.sums.len(), self.frame + 1 == 1 << self.power);
         let early = tlast && !at_end;
         let sum = word + if self.frame == 0 { 0 } else { self.sums[self.taxel] };
         self.sums[self.taxel] = sum;
@@ -34,7 +42,7 @@ impl Sums {
             (self.frame, self.missed) = (0, false);
         } else if at_end {
             self.missed = !final_frame && (self.missed || !tlast);
-            self.frame = (self.frame + 1) % (1 << POWER);
+            self.frame = (self.frame + 1) % (1 << self.power);
         }
         beat
     }
@@ -46,7 +54,7 @@ impl Reference for Sums {
         let moves = self.offered.is_none() || ready;
         vec![
             self.reset.then(|| Word::from(self.offered.is_some())),
-            self.offered.map(|(sum, _)| Word::of_fields(&[sum], BITS + POWER as usize)),
+            self.offered.map(|(sum, _)| Word::of_fields(&[sum], self.bits + self.power as usize)),
             self.offered.map(|(_, last)| Word::from(last)),
             self.reset.then(|| Word::from(moves && !rst)),
             Some(Word::from(0)),
@@ -58,11 +66,12 @@ impl Reference for Sums {
         if self.offered.is_none() || ready {
             self.offered = self.held.take().and_then(|(sum, leaves, last)| leaves.then_some((sum, last)));
             if valid && !rst {
-                self.held = Some(self.add(inputs[1].signed(0, BITS), tlast));
+                self.held = Some(self.add(inputs[1].signed(0, self.bits), tlast));
             }
         }
         if rst {
-            *self = Sums { sums: self.sums, reset: true, ..Sums::default() };
+            let sums = std::mem::take(&mut self.sums);
+            *self = Sums { bits: self.bits, power: self.power, sums, reset: true, ..Sums::default() };
         }
     }
 }
@@ -70,7 +79,7 @@ impl Reference for Sums {
 #[test]
 fn frames_are_added_up_and_framing_errors_restart_the_sum() {
     let mut random = fastrand::Rng::with_seed(5);
-    let mut sums = Sums::default();
+    let mut sums = Sums::new(TAXELS, BITS, POWER);
     let stimulus: Vec<Vec<Word>> = (0..6000)
         .map(|cycle| {
             let rst = cycle < 3 || random.u16(..400) == 0;
@@ -84,7 +93,7 @@ fn frames_are_added_up_and_framing_errors_restart_the_sum() {
         })
         .collect();
     let average = Average::new(TAXELS, BITS, POWER, MeanKind::Block);
-    check(average.kernel.kernel(), &stimulus, &mut Sums::default());
+    check(average.kernel.kernel(), &stimulus, &mut Sums::new(TAXELS, BITS, POWER));
 }
 
 /// A word on its way through the block: mean, `tlast`, number of frames.

@@ -6,18 +6,11 @@ use dermis_golden::fixed::stages::forces::{force, mu_word};
 use dermis_golden::fixed::stages::send::{
     FLAG_COEFFICIENTS, FLAG_CONDITION, FLAG_FOUND, FLAG_FRAMING, FLAG_NO_CONTACT,
 };
-use dermis_golden::scene::Scene;
 
 use super::*;
 use crate::language::testbench::{check, random_word, Reference};
+use crate::scenes::model;
 use crate::wire::Word;
-
-fn model(side: usize, more: &str) -> Model {
-    let text = format!(
-        "name = \"force\"\n[sensor]\nrows = {side}\ncols = {side}\npitch_x_mm = 4.0\npitch_y_mm = 4.0\nthickness_mm = 3.0\n{more}"
-    );
-    Model::new(&Scene::parse(&text, "force.toml").unwrap()).unwrap()
-}
 
 /// A request, and its value once it has been read.
 #[derive(Clone, Copy, Debug)]
@@ -52,7 +45,7 @@ struct Frame {
 }
 
 /// The model's force on every request.
-struct Requests {
+pub(crate) struct Requests {
     model: Model,
     /// Requests of the last cycles, the latest first.
     pipe: VecDeque<Option<Entry>>,
@@ -63,7 +56,7 @@ struct Requests {
 }
 
 impl Requests {
-    fn new(model: Model) -> Self {
+    pub(crate) fn new(model: Model) -> Self {
         let parts = model.cases().iter().map(|case| case.parts.len()).max().unwrap();
         let (pipe, parts) = (vec![None; ASKED].into(), vec![Part::default(); parts]);
         Requests { model, pipe, frame: Frame::default(), parts, output: None, reset: false }
@@ -200,7 +193,7 @@ fn stimulus(model: &Model, block: &ForceUnit, cycles: usize) -> Vec<Vec<Word>> {
 }
 
 fn is_the_model_s(side: usize, more: &str, threshold: i64) {
-    let mut model = model(side, more);
+    let mut model = model(side, side, more);
     model.threshold = threshold;
     let block = ForceUnit::new(&model);
     check(block.kernel.kernel(), &stimulus(&model, &block, 6000), &mut Requests::new(model));

@@ -1,0 +1,140 @@
+//! What a test drives: a kernel alone, or a block with the blocks inside it.
+
+use rust_hdl::core::check_error::check_all;
+use rust_hdl::prelude::*;
+
+use crate::language::change::Change;
+use crate::language::hierarchy::{Attributes, Hierarchy};
+use crate::language::kernel::{Kernel, Role, Signal as KernelSignal};
+use crate::language::simulate::Simulation;
+use crate::language::Port;
+use crate::simulate::settles;
+use crate::wire::Word;
+
+/// A port: name, width in bits.
+pub(super) type Pin = (String, usize);
+
+/// Takes ports by their name.
+pub(crate) type Visit<'a> = dyn FnMut(&'static str, &mut dyn Port) + 'a;
+
+/// One clock cycle with these inputs: the outputs before its rising edge.
+type Cycle<'a> = dyn FnMut(&[Word]) -> Vec<Word> + 'a;
+
+/// Ports, a simulation inside Rust and the Verilog of the same design.
+pub(crate) struct Subject<'a> {
+    pub(super) clock: Option<String>,
+    pub(super) inputs: Vec<Pin>,
+    pub(super) outputs: Vec<Pin>,
+    /// With the top module `dut`.
+    pub(super) verilog: String,
+    /// Name and text of the files that the Verilog reads.
+    pub(super) files: Vec<(String, String)>,
+    run: Box<Cycle<'a>>,
+}
+
+impl Subject<'_> {
+    /// One clock cycle of the simulation inside Rust with these inputs: the outputs before its rising edge.
+    pub(crate) fn cycle(&mut self, inputs: &[Word]) -> Vec<Word> {
+        (self.run)(inputs)
+    }
+
+    /// The outputs of every cycle in the simulation inside Rust.
+    pub(crate) fn simulated(&mut self, stimulus: &[Vec<Word>]) -> Vec<Vec<Word>> {
+        stimulus.iter().map(|inputs| self.cycle(inputs)).collect()
+    }
+}
+
+/// A kernel in its own simulation; inputs and outputs in the order of its signals.
+impl<'a> From<&'a Kernel> for Subject<'a> {
+    fn from(kernel: &'a Kernel) -> Self {
+        assert!(kernel.errors().is_empty(), "{:?}", kernel.errors());
+        let pins = |is_own: fn(&KernelSignal) -> bool| -> Vec<Pin> {
+            let own = kernel.signals.iter().filter(|signal| is_own(signal));
+            own.map(|signal| (signal.name.clone(), signal.ty.bits)).collect()
+        };
+        let (inputs, outputs) = (pins(|signal| signal.role == Role::Input), pins(|signal| signal.output));
+        let names = kernel.clock.iter().chain(inputs.iter().chain(&outputs).map(|(name, _)| name));
+        let head = kernel.header("dut", names.map(String::as_str), &|_| None);
+        let mut simulation = Simulation::new(kernel);
+        let places = |pins: &[Pin]| -> Vec<(usize, usize)> {
+            pins.iter().map(|(name, bits)| (simulation.slot_of(kernel, name).unwrap(), *bits)).collect()
+        };
+        let (read, driven) = (places(&inputs), places(&outputs));
+        let cycle = move |words: &[Word]| {
+            for (word, &(slot, bits)) in words.iter().zip(&read) {
+                simulation.set(slot, &word.limbs()[..bits.div_ceil(64)]);
+            }
+            simulation.show();
+            let outputs =
+                driven.iter().map(|&(slot, bits)| word(simulation.get(slot, bits.div_ceil(64)), bits)).collect();
+            simulation.clock();
+            outputs
+        };
+        Subject {
+            verilog: format!("{head}\n{}\nendmodule\n", kernel.verilog()),
+            files: kernel.memory_files(),
+            clock: kernel.clock.clone(),
+            run: Box::new(cycle),
+            inputs,
+            outputs,
+        }
+    }
+}
+
+/// The low `bits` bits of a number: a signed one has its sign above its width.
+fn word(limbs: &[u64], bits: usize) -> Word {
+    let mut word = Word::default();
+    for (limb, &value) in limbs.iter().enumerate() {
+        word.set(64 * limb, (bits - 64 * limb).min(64), value);
+    }
+    word
+}
+
+impl<'a> Subject<'a> {
+    /// A block with the blocks inside it, in rust-hdl's simulation; its Verilog with these `changes`. The ports in the order
+    /// in which `inputs` and `outputs` name them. `block_subject!` calls it.
+    pub(crate) fn of_block<B: Block + 'a>(
+        mut block: B,
+        changes: &[Change],
+        clock: fn(&mut B) -> &mut Signal<In, Clock>,
+        inputs: fn(&mut B, &mut Visit),
+        outputs: fn(&mut B, &mut Visit),
+    ) -> Self {
+        block.connect_all();
+        check_all(&block).unwrap();
+        let hierarchy = Hierarchy::of(&block);
+        hierarchy.check().unwrap();
+        let mut pins = |visit: fn(&mut B, &mut Visit)| {
+            let mut pins: Vec<Pin> = Vec::new();
+            visit(&mut block, &mut |name, port| pins.push((name.to_owned(), port.port_bits())));
+            pins
+        };
+        let (in_pins, out_pins) = (pins(inputs), pins(outputs));
+        let hierarchy = hierarchy.changed(changes).unwrap();
+        let files = hierarchy.kernels().flat_map(|(_, kernel)| kernel.memory_files()).collect();
+        let cycle = move |words: &[Word]| {
+            let mut words = words.iter();
+            inputs(&mut block, &mut |_, port| port.write(words.next().unwrap().limbs()));
+            let settle = |block: &mut B, level: bool| {
+                clock(block).next = level.into();
+                assert!(settles(block));
+            };
+            settle(&mut block, false);
+            let mut values = Vec::new();
+            outputs(&mut block, &mut |_, port| {
+                let bits = port.port_bits();
+                port.read(&mut |limbs| values.push(word(limbs, bits)));
+            });
+            settle(&mut block, true);
+            values
+        };
+        Subject {
+            clock: Some("clk".to_owned()),
+            verilog: hierarchy.verilog("dut", &Attributes::new(), &|_, _| None),
+            files,
+            run: Box::new(cycle),
+            inputs: in_pins,
+            outputs: out_pins,
+        }
+    }
+}

@@ -1,0 +1,44 @@
+//! Small scenes for tests, and where their taxels are in the memories.
+
+use dermis_golden::fixed::{CasePlan, Model};
+use dermis_golden::scene::Scene;
+use dermis_golden::symmetry::quads::Quads;
+
+/// The model of a sensor of `rows` × `cols` taxels; `more` is the rest of the scene file.
+pub(crate) fn model(rows: usize, cols: usize, more: &str) -> Model {
+    let text = format!(
+        "name = \"small\"\n[sensor]\nrows = {rows}\ncols = {cols}\npitch_x_mm = 2.0\npitch_y_mm = 2.0\n\
+         thickness_mm = 2.0\n{more}"
+    );
+    Model::new(&Scene::parse(&text, "small.toml").unwrap()).unwrap()
+}
+
+/// Where a taxel of the array is.
+pub(crate) struct Place {
+    /// Index of its subarray.
+    pub part: usize,
+    /// Address of its quad, over all subarrays.
+    pub quad: usize,
+    /// Lane from which it is read.
+    pub lane: usize,
+    /// Lanes to which it is written, one bit each.
+    pub mask: u8,
+}
+
+impl Place {
+    /// Of the taxel of row-major index `taxel`.
+    pub(crate) fn of(case: &CasePlan, taxel: usize) -> Place {
+        let (layout, grid) = (case.layout(), case.grid());
+        let (row, col) = (taxel / (layout.cols * grid.cols), taxel % (layout.cols * grid.cols));
+        let part = row / layout.rows * grid.cols + col / layout.cols;
+        let location = layout.locate(row % layout.rows, col % layout.cols);
+        let quad = part * layout.len() + location.address;
+        Place { part, quad, lane: location.lane, mask: location.mask }
+    }
+
+    /// Address and lane in a memory of words of `lanes` lanes.
+    pub(crate) fn word(&self, lanes: usize) -> (usize, usize) {
+        let lane = Quads::LANES * self.quad + self.lane;
+        (lane / lanes, lane % lanes)
+    }
+}
