@@ -190,7 +190,7 @@ mod tests {
     fn network() -> (Network, Signature) {
         let mut scene = Scene::builtin("sensor-1").unwrap();
         (scene.sensor.rows, scene.sensor.cols) = (2, 2);
-        (Network::random(&[5, 5, OUTPUT_CHANNELS], &mut Random::new(1)), Signature::of(&scene))
+        (Network::random(&[4, 5, OUTPUT_CHANNELS], &mut Random::new(1)), Signature::of(&scene))
     }
 
     #[test]
@@ -208,7 +208,7 @@ mod tests {
             }
         }
         // Weights that are whole numbers of the scale stay as they are.
-        assert_eq!(decode(&encode(&read, &own).unwrap(), "f").unwrap().0.widths(), [5, 5, 2]);
+        assert_eq!(decode(&encode(&read, &own).unwrap(), "f").unwrap().0.widths(), [4, 5, 2]);
     }
 
     #[test]
