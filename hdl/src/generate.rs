@@ -1,7 +1,6 @@
 //! Generation of the engine as files: Verilog, memory files, lint waivers, core file, manifest, C header.
 
-use std::collections::{BTreeMap, BTreeSet};
-use std::fmt::Write as _;
+use std::collections::BTreeMap;
 
 use dermis_golden::fixed::plan::interval::frame_interval;
 use dermis_golden::fixed::plan::resources::Memory;
@@ -27,6 +26,7 @@ use crate::simulate::{design, stages};
 use crate::state::{state_elements, StateElement};
 use crate::taps::taps;
 use crate::usage::{by_stage, total, PlacedMemory, StageUsage, Usage};
+use crate::waivers::waivers;
 
 /// The generated hardware of one scene.
 #[derive(Clone, Debug)]
@@ -165,20 +165,6 @@ pub(crate) fn attributes(memories: &[PlacedMemory]) -> Attributes {
 pub(crate) fn top_name(scene: &str) -> String {
     let tame = |c: char| if c.is_ascii_alphanumeric() { c } else { '_' };
     format!("dermis_{}", scene.chars().map(tame).collect::<String>())
-}
-
-/// Waivers of Verilator warnings: those that hold for every scene, and the signals of the taps that only a test bench reads.
-fn waivers(hierarchy: &Hierarchy, taps: &[Tap]) -> String {
-    let unread: BTreeSet<&str> =
-        hierarchy.kernels().find(|(path, _)| path.is_empty()).map_or_else(BTreeSet::new, |(_, top)| top.unread());
-    let signals = taps.iter().flat_map(|tap| tap.valid.iter().chain(tap.word.iter().map(|signal| &signal.name)));
-    let observed: BTreeSet<&str> = signals.map(String::as_str).filter(|name| unread.contains(name)).collect();
-    let mut text = include_str!("waivers.vlt").to_owned();
-    text.push_str("// \"Signal is not used\": taps that the test bench observes; synthesis removes them.\n");
-    for name in observed {
-        let _ = writeln!(text, "lint_off -rule UNUSEDSIGNAL -file \"*.v\" -match \"Signal is not used: '{name}'\"");
-    }
-    text
 }
 
 fn header(model: &Model, top: &str) -> String {

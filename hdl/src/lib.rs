@@ -51,6 +51,7 @@ mod scenes;
 mod simulate;
 mod stage_list;
 mod taps;
+mod waivers;
 
 pub use error::HdlError;
 pub use generate::{generate, generate_changed, Generated, Refused};
