@@ -495,3 +495,6 @@ impl Logic for Engine {
         self.m_axis_tlast.next = self.resultants.m_axis_tlast.val();
     }
 }
+
+#[cfg(test)]
+pub(crate) mod tests;

@@ -13,8 +13,8 @@
 //!   them, and the assignments that it reads off the same Rust become a kernel too ([`language::Hierarchy`]), from which
 //!   Verilog and estimate follow. They hold single-bit control and connections.
 //! - *Tests*: each of both stands beside a test against plain integers, in rust-hdl's simulation or the kernel's own and
-//!   under Verilator, every output, every cycle, except the engines and the board tops: whole frames test these against
-//!   the bit-true model, in both simulations too.
+//!   under Verilator, every output, every cycle, except the board tops: packets of whole frames test these against the
+//!   bit-true model, in both simulations too.
 //! - rust-hdl's probe gives the hierarchy; all modules are printed by the [`language`], with the memories placed as the
 //!   bit-true model plans them. No block has a second description, and nothing reads Verilog back.
 //! - Widths, names and directions of ports in the guide come from the built engine, their meaning from the comments of
