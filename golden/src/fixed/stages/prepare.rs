@@ -14,9 +14,9 @@
 //! | b | `input_bits` = `code_bits` + k | that over 2^k |
 //!
 //! Without a table the gain is 1 and nothing is multiplied. Each sample is rounded once; the sum keeps all its bits. A
-//! sliding mean ([`sliding`], with g) is rounded to its k more bits with every frame, which adds as much noise as the
-//! converter's own rounding; the first frame, and constant readings from then on, it holds exactly. c is 1 in every second
-//! frame, which rounds halves down in place of up, so that they do not add up to a bias.
+//! sliding mean ([`sliding`](crate::input::sliding), with g) is rounded to its k more bits with every frame, which adds as
+//! much noise as the converter's own rounding; the first frame, and constant readings from then on, it holds exactly. c is
+//! 1 in every second frame, which rounds halves down in place of up, so that they do not add up to a bias.
 
 use crate::fixed::error::FixedError;
 use crate::fixed::words::arith::{round_shift, saturate};
