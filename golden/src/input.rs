@@ -140,11 +140,6 @@ impl Input {
         Ok(mean)
     }
 
-    /// Number of frames that a sliding mean of `frames` frames holds, by its noise; `None` where the mean does not slide.
-    pub fn frames_held(&self, frames: usize) -> Option<usize> {
-        self.spec.slides().then(|| frames.min(sliding::most_frames(self.spec.average)))
-    }
-
     /// The zero of each taxel in the readings' unit, row-major: the scene's tare frame, else the table's offset.
     pub fn zero(&self) -> Option<&[f64]> {
         self.scale.as_ref().map(|(zero, _)| zero.as_slice())

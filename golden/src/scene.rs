@@ -326,6 +326,11 @@ impl InputSpec {
         self.mean == MeanKind::Sliding
     }
 
+    /// Number of frames that a sliding mean of `frames` frames holds, by its noise; `None` where the mean does not slide.
+    pub fn frames_held(&self, frames: usize) -> Option<usize> {
+        self.slides().then(|| frames.min(sliding::most_frames(self.average)))
+    }
+
     /// The frames of each result, where `frames` arrive after a reset: blocks of 2^average of them, or all up to each.
     pub fn frames_of_results<'a, T>(&self, frames: &'a [T]) -> Vec<&'a [T]> {
         match self.mean {

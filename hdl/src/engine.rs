@@ -167,7 +167,7 @@ impl Engine {
         let which = count_bits(counts.len());
         let (prepare, normalise, rescale) = (Prepare::new(model), Normalise::new(bits), Rescale::new(model));
         let forces = Forces::new(model);
-        let frames = || EnableRegister::new(prepare.frames.width()).constant(!model.prepare.slides());
+        let frames = || EnableRegister::new(prepare.frames.width()).constant(!model.scene.input.slides());
         let mut engine = Engine {
             clk: Default::default(),
             rst: Default::default(),

@@ -256,7 +256,7 @@ fn manifest(
                 "framing": FLAG_FRAMING,
                 "coefficients": model.has_coefficient_check().then_some(FLAG_COEFFICIENTS),
                 "case_shift": model.chooses().then_some(CASE_SHIFT),
-                "frames_shift": model.prepare.slides().then_some(FRAMES_SHIFT),
+                "frames_shift": model.scene.input.slides().then_some(FRAMES_SHIFT),
             },
         },
         "sizes": {

@@ -12,8 +12,8 @@ use std::path::{Path, PathBuf};
 use dermis_golden::write::{write, FileError};
 use tempfile::TempDir;
 
-/// Locks `folder` until the value is dropped: whoever wants to build the same one meanwhile, in this process or another,
-/// waits, and then finds it built.
+/// Exclusive lock on `folder`, released when the value is dropped. Another thread or process that locks the same folder
+/// blocks until then.
 ///
 /// # Errors
 /// [`FileError`]: the lock, a file beside the folder, cannot be created.

@@ -105,7 +105,7 @@ impl Model {
             result.error = frame.resultant_N.map(|truth| Errors::new(truth, resultant_N));
             result.extra.resultants = resultants;
         }
-        if self.prepare.slides() {
+        if self.scene.input.slides() {
             // As the device says, which alone knows of its resets.
             result.extra.mean_frames = status.first().map(|beat| (beat[2] as u32 >> FRAMES_SHIFT) as usize);
         }

@@ -15,7 +15,6 @@ use super::stages::search::Best;
 use super::stages::send::{Status, CASE_SHIFT, FLAG_CONDITION, FLAG_FOUND, FLAG_NO_CONTACT, FRAMES_SHIFT};
 use super::subarray::SubarrayTrace;
 use crate::board::EngineKind;
-use crate::input::sliding::most_frames;
 use crate::partition::Subarray;
 
 /// The words that one stage passed on for a frame, in the hardware's order.
@@ -64,10 +63,7 @@ impl Model {
         let cycles = Cycles::of_case(self, case, &searched);
         let sending = BeatCycles::new(self, case, &searched);
         let number = if self.chooses() { case.number() } else { 0 };
-        let frames = match self.prepare.slides() {
-            true => prepared.frames.min(most_frames(self.prepare.average)) as u32,
-            false => 0,
-        };
+        let frames = self.scene.input.frames_held(prepared.frames).unwrap_or(0) as u32;
 
         let mut forces = vec![Force::default(); sensor.taxels()];
         for (part, solved) in case.parts.iter().zip(&solved) {

@@ -132,7 +132,7 @@ impl Golden {
     pub fn run_averaged(&self, frames: &[Frame]) -> Result<Reconstruction, GoldenError> {
         let mean = self.input.average(&self.scene, frames)?;
         let mut result = self.run_readings(frames, &mean, self.input.noise_of_mean_MPa(frames.len()))?;
-        result.extra.mean_frames = self.input.frames_held(frames.len());
+        result.extra.mean_frames = self.scene.input.frames_held(frames.len());
         Ok(result)
     }
 

@@ -10,8 +10,7 @@
 //! power of two is a shift, and b/s has its largest entry between a half and one. c_λ makes the deconvolved stress of a
 //! force on the middle cell as large as the stress.
 //!
-//! The noise is no input: told ln(σ/s) as well, a network was no better at any noise from none to 1 % (6 000 steps,
-//! sensor-1). It reads the noise off the stress.
+//! The noise is no input: the network reads it off the stress.
 //!
 //! | | shape | unit |
 //! |---|---|---|

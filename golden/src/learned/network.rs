@@ -17,7 +17,7 @@
 
 use crate::random::Random;
 use crate::symmetry::folded::{EVEN, ODD_X, ODD_Y};
-use crate::symmetry::parity::sign;
+use crate::symmetry::parity::hadamard;
 use faer::linalg::matmul::matmul;
 use faer::{Accum, Mat, Par};
 
@@ -33,13 +33,14 @@ pub(super) const LN_SIGMA: [f32; 2] = [-7.0, 0.5];
 /// Channels × frames for each parity, or for each mirror image.
 pub(super) type Parities = [Mat<f32>; 4];
 
-/// Mirror images from parities, and back: ½ Σ sign · entry.
+/// Mirror images from parities, and back: half their Hadamard transform.
 pub(super) fn exchanged(of: &Parities) -> Parities {
-    std::array::from_fn(|to| {
-        Mat::from_fn(of[0].nrows(), of[0].ncols(), |row, col| {
-            (0..4).map(|from| 0.5 * sign(to, from) as f32 * of[from][(row, col)]).sum()
-        })
-    })
+    let mut to = of.each_ref().map(|own| Mat::zeros(own.nrows(), own.ncols()));
+    for (row, col) in (0..of[0].ncols()).flat_map(|col| (0..of[0].nrows()).map(move |row| (row, col))) {
+        let sums = hadamard(of.each_ref().map(|own| own[(row, col)]));
+        to.iter_mut().zip(sums).for_each(|(own, sum)| own[(row, col)] = 0.5 * sum);
+    }
+    to
 }
 
 /// One layer.

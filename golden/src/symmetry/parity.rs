@@ -4,6 +4,8 @@
 //! the entry changes its sign under the mirror. A matrix that commutes with the mirrors up to a sign takes an entry of
 //! parity p to one of parity p XOR flip.
 
+use std::ops::{Add, Sub};
+
 use super::quads::Quads;
 
 /// Bit of the column parity, which Ax flips.
@@ -25,5 +27,32 @@ pub fn sign(parity: usize, lane: usize) -> f64 {
         1.0
     } else {
         -1.0
+    }
+}
+
+/// The four-point Hadamard butterfly `f_p = Σ_l (−1)^{p·l} x_l`, unnormalised: the words grow by two bits.
+///
+/// Index `2·(row bit) + (column bit)`: on input the images of a taxel under the two mirrors, on output the parities.
+/// Applied twice it multiplies by four, which [`unfold`](crate::fixed::stages::unfold) takes into account.
+pub fn hadamard<T: Copy + Add<Output = T> + Sub<Output = T>>(x: [T; 4]) -> [T; 4] {
+    let [a, b, c, d] = x;
+    [a + b + c + d, a - b + c - d, a + b - c - d, a - b - c + d]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    #[test]
+    fn a_transform_by_hand() {
+        assert_eq!(hadamard([1, 2, 3, 4]), [10, -2, -4, 0]);
+    }
+
+    proptest! {
+        #[test]
+        fn hadamard_twice_is_four_times(x in prop::array::uniform4(-(1i64 << 30)..(1i64 << 30))) {
+            prop_assert_eq!(hadamard(hadamard(x)), x.map(|v| 4 * v));
+        }
     }
 }

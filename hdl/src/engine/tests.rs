@@ -5,7 +5,7 @@ use std::collections::VecDeque;
 use dermis_golden::fixed::Model;
 
 use super::Engine;
-use crate::language::testbench::{block_subject, check_with_defects, random_word, Reference};
+use crate::language::testbench::{check_with_defects, random_word, Reference};
 use crate::language::Change;
 use crate::scenes::model;
 use crate::wire::Word;
@@ -72,6 +72,19 @@ impl Reference for Frames {
     }
 }
 
+/// An engine as the subject of a test, its ports in the order of [`Frames`].
+macro_rules! engine_subject {
+    ($engine:expr, $changes:expr) => {
+        $crate::language::testbench::block_subject!(
+            $engine,
+            $changes,
+            inputs [rst, s_axis_tdata, s_axis_tvalid, s_axis_tlast, m_axis_tready],
+            outputs [s_axis_tready, m_axis_tvalid, m_axis_tdata, m_axis_tlast],
+        )
+    };
+}
+pub(crate) use engine_subject;
+
 /// Random frames with gaps, each after the last beat of the one before; some are cut off by a reset, while they arrive or
 /// are computed.
 pub(crate) fn stimulus(model: &Model, frames: usize) -> Vec<Vec<Word>> {
@@ -109,14 +122,7 @@ fn beats_leave_in_the_cycles_of_the_model() {
     let several = "[search]\nmu_max = 0.3\n[partition]\nrows = 1\ncols = 2\n";
     for (rows, cols, more) in [(4, 4, "[search]\nmu_max = 0.3\n"), (2, 4, several)] {
         let model = model(rows, cols, more);
-        let subject = |changes: &[Change]| {
-            block_subject!(
-                Engine::new(&model),
-                changes,
-                inputs [rst, s_axis_tdata, s_axis_tvalid, s_axis_tlast, m_axis_tready],
-                outputs [s_axis_tready, m_axis_tvalid, m_axis_tdata, m_axis_tlast],
-            )
-        };
+        let subject = |changes: &[Change]| engine_subject!(Engine::new(&model), changes);
         let defects = [Change::value("", "search__enabled", |k| k.constant(1, 0))];
         check_with_defects(subject, &stimulus(&model, 7), || Frames::new(model.clone()), &defects);
     }

@@ -299,22 +299,15 @@ impl Logic for Engine {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::engine::tests::{stimulus, Frames};
-    use crate::language::testbench::{block_subject, check_with_defects};
+    use crate::engine::tests::{engine_subject, stimulus, Frames};
+    use crate::language::testbench::check_with_defects;
     use crate::language::Change;
     use crate::scenes::model;
 
     #[test]
     fn beats_leave_in_the_cycles_of_the_model() {
         let model = model(4, 4, "[search]\nmu_max = 0.3\n[hardware]\nboard = \"icebreaker\"\n");
-        let subject = |changes: &[Change]| {
-            block_subject!(
-                Engine::new(&model),
-                changes,
-                inputs [rst, s_axis_tdata, s_axis_tvalid, s_axis_tlast, m_axis_tready],
-                outputs [s_axis_tready, m_axis_tvalid, m_axis_tdata, m_axis_tlast],
-            )
-        };
+        let subject = |changes: &[Change]| engine_subject!(Engine::new(&model), changes);
         let defects = [Change::value("", "m_axis_tlast", |k| k.constant(1, 0))];
         check_with_defects(subject, &stimulus(&model, 4), || Frames::new(model.clone()), &defects);
     }

@@ -10,7 +10,7 @@ use crate::wire::Wire;
 /// ```text
 /// word, valid (four of a quad) --> four accumulators --> transformed, one after the other
 /// ```
-/// Accumulator p adds (−1)^{p·l} times word l, as [`hadamard`](dermis_golden::fixed::words::arith::hadamard). The first
+/// Accumulator p adds (−1)^{p·l} times word l, as [`hadamard`](dermis_golden::symmetry::parity::hadamard). The first
 /// sum leaves in the cycle after the last word; the next quad may start when the fourth has left.
 #[derive(LogicBlock)]
 pub struct SerialButterfly {
@@ -88,7 +88,7 @@ fn kernel(bits: usize) -> Kernel {
 
 #[cfg(test)]
 mod tests {
-    use dermis_golden::fixed::words::arith::hadamard;
+    use dermis_golden::symmetry::parity::hadamard;
 
     use super::*;
     use crate::language::testbench::{check, Reference};

@@ -155,11 +155,6 @@ impl Prepare {
         prepared
     }
 
-    /// Whether the mean slides.
-    pub fn slides(&self) -> bool {
-        self.mean == MeanKind::Sliding
-    }
-
     /// Latency in cycles between the input stream and `receive`.
     pub fn latency(&self) -> u64 {
         let calibrate = match (&self.zero, &self.gain) {

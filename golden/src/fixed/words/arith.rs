@@ -4,8 +4,6 @@
 //! *half up*, `⌊x / 2ˢ + 1/2⌋`: one adder in hardware. At exact ties it is biased by half a unit, which is below every
 //! error bound used here.
 
-use std::ops::{Add, Sub};
-
 /// Width of the signed word that holds every integer of magnitude `bound` or less, in bits.
 ///
 /// `bound = 2ᵏ` needs k + 2 bits, because +2ᵏ must fit as well.
@@ -46,15 +44,6 @@ pub fn bit_length(x: u64) -> u32 {
     64 - x.leading_zeros()
 }
 
-/// The four-point Hadamard butterfly `f_p = Σ_l (−1)^{p·l} x_l`, unnormalised: the words grow by two bits.
-///
-/// Index `2·(row bit) + (column bit)`: on input the images of a taxel under the two mirrors, on output the parities.
-/// Applied twice it multiplies by four, which [`unfold`](crate::fixed::stages::unfold) takes into account.
-pub fn hadamard<T: Copy + Add<Output = T> + Sub<Output = T>>(x: [T; 4]) -> [T; 4] {
-    let [a, b, c, d] = x;
-    [a + b + c + d, a - b + c - d, a + b - c - d, a - b - c + d]
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -71,7 +60,6 @@ mod tests {
         assert_eq!(bit_length(magnitude_bits(-8)), 3);
         assert_eq!(bit_length(magnitude_bits(8)), 4);
         assert_eq!(signed_bits(8), 5);
-        assert_eq!(hadamard([1, 2, 3, 4]), [10, -2, -4, 0]);
     }
 
     /// ⌊x/2ˢ + 1/2⌋ as the `fixed` crate computes it.
@@ -111,11 +99,6 @@ mod tests {
             let bits = bit_length(magnitude_bits(i64::from(x))) + 1;
             prop_assert!(!saturate(i64::from(x), bits).1);
             prop_assert!(bits == 1 || saturate(i64::from(x), bits - 1).1);
-        }
-
-        #[test]
-        fn hadamard_twice_is_four_times(x in prop::array::uniform4(-(1i64 << 30)..(1i64 << 30))) {
-            prop_assert_eq!(hadamard(hadamard(x)), x.map(|v| 4 * v));
         }
     }
 }

@@ -148,9 +148,9 @@ pub fn quantise(folded: &[Vec<Flipped<f64>>], bits: u32) -> Vec<Blocks> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::fixed::words::arith::hadamard;
     use crate::matrices::Matrices;
     use crate::sensor::Sensor;
+    use crate::symmetry::parity::hadamard;
 
     /// Folding, multiplying by blocks and unfolding is the dense product, for even and odd sizes.
     #[test]

@@ -60,7 +60,7 @@ fn less<'k>(a: Expr<'k>, b: Expr<'k>) -> Expr<'k> {
 
 #[cfg(test)]
 mod tests {
-    use dermis_golden::fixed::words::arith::hadamard;
+    use dermis_golden::symmetry::parity::hadamard;
 
     use super::*;
     use crate::language::testbench::{check, random_words, Pipeline};

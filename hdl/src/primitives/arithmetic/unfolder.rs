@@ -70,7 +70,8 @@ fn kernel(bits: usize, vectors: usize) -> Kernel {
 
 #[cfg(test)]
 mod tests {
-    use dermis_golden::fixed::words::arith::{hadamard, round_shift};
+    use dermis_golden::fixed::words::arith::round_shift;
+    use dermis_golden::symmetry::parity::hadamard;
 
     use super::*;
     use crate::language::testbench::{check, random_word, Pipeline};

@@ -162,7 +162,7 @@ impl ForceUnit {
             base_shift: force_shift(f, 0, 0).into(),
             threshold: model.threshold.clamp(0, 1 << WORD) as u64,
             checks: model.has_coefficient_check(),
-            frames_bits: model.prepare.slides().then(|| frames_bits(model.prepare.average)),
+            frames_bits: model.scene.input.slides().then(|| frames_bits(model.prepare.average)),
             counts: model.cases().iter().map(|case| case.parts.len()).collect(),
             numbers: model.cases().iter().map(number).collect(),
         };

@@ -49,7 +49,7 @@ impl Sample {
 
     /// The same codes as the second reconstruction after a reset, behind `first`.
     pub(crate) fn behind(&self, model: &Model, first: &Sample) -> Sample {
-        match model.prepare.slides() {
+        match model.scene.input.slides() {
             false => self.clone(),
             true => Sample::after(model, self.codes.clone(), &mut model.prepare.run(&first.codes)),
         }

@@ -89,7 +89,7 @@ impl<'a> Scoreboard<'a> {
         if at_end && self.accepted == codes.len() {
             self.outcome.frames_in += 1;
             let flagged = std::mem::take(&mut self.framing_error);
-            let sample = match self.model.prepare.slides() {
+            let sample = match self.model.scene.input.slides() {
                 false => Cow::Borrowed(&self.samples[sample]),
                 true => Cow::Owned(Sample::after(self.model, codes.clone(), &mut self.mean)),
             };

@@ -23,11 +23,12 @@
 use dermis_golden::board::EngineKind;
 use dermis_golden::fixed::stages::pass::join_limbs;
 use dermis_golden::fixed::stages::send::{Status, STATUS_BEATS};
-use dermis_golden::fixed::words::arith::{bit_length, hadamard};
+use dermis_golden::fixed::words::arith::bit_length;
 use dermis_golden::fixed::words::formats::{Formats, MU_STEPS, SEARCH_EXTRA_BITS};
 use dermis_golden::fixed::words::schedule::{by_limbs, is_transposed, schedule, EXPONENTS};
 use dermis_golden::float::pass::Polynomial;
 use dermis_golden::reception::full_scale;
+use dermis_golden::symmetry::parity::hadamard;
 
 use super::measured::{BitTrue, Measured};
 

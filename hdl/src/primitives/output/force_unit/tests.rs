@@ -71,7 +71,7 @@ impl Requests {
             condition,
             found,
             damaged: damaged && self.model.has_coefficient_check(),
-            frames: if self.model.prepare.slides() { inputs[18].number() as u32 } else { 0 },
+            frames: if self.model.scene.input.slides() { inputs[18].number() as u32 } else { 0 },
             score: if found { inputs[19].signed(0, self.model.formats().score_bits as usize) as i32 } else { 0 },
             saturations: inputs[20].number() as u32,
         };
