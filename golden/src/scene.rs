@@ -139,8 +139,10 @@ pub enum EstimatorKind {
     Search,
     /// The μ that makes the stress most probable, [`crate::evidence`].
     Evidence,
-    /// The μ of a trained network, [`crate::learned`].
+    /// The μ of a trained network, [`crate::learned`], and the forces that are most probable at that μ.
     Learned,
+    /// The μ of a trained network, and p(μ) as the search has it: `learned` as the hardware computes it.
+    Network,
     /// `evidence` where it implements the scene, with the network if there is one; else `search`.
     #[default]
     Auto,
@@ -407,10 +409,11 @@ impl Default for HardwareSpec {
 
 impl EstimatorKind {
     /// Every estimator with its name in a scene file, the default first.
-    pub const NAMES: [(&'static str, EstimatorKind); 4] = [
+    pub const NAMES: [(&'static str, EstimatorKind); 5] = [
         ("auto", EstimatorKind::Auto),
         ("evidence", EstimatorKind::Evidence),
         ("learned", EstimatorKind::Learned),
+        ("network", EstimatorKind::Network),
         ("search", EstimatorKind::Search),
     ];
 
@@ -448,9 +451,13 @@ impl Scene {
         }
     }
 
-    /// The scene as the hardware and its bit-true model take it, with the estimator `search`.
+    /// The scene as the hardware and its bit-true model take it: `learned` becomes `network`, all others `search`.
     pub fn for_hardware(&self) -> Scene {
-        let search = SearchSpec { estimator: EstimatorKind::Search, ..self.search.clone() };
+        let estimator = match self.search.estimator {
+            EstimatorKind::Learned | EstimatorKind::Network => EstimatorKind::Network,
+            EstimatorKind::Auto | EstimatorKind::Evidence | EstimatorKind::Search => EstimatorKind::Search,
+        };
+        let search = SearchSpec { estimator, ..self.search.clone() };
         Scene { search, ..self.clone() }
     }
 

@@ -5,6 +5,7 @@
 
 use super::forces::threshold;
 use super::golden::{CaseOutcome, EngineInput, Golden};
+use super::objective::NO_SHEAR;
 use crate::checks::COUNTS_FROM;
 use crate::evidence::{ContactEstimate, Evidence};
 use crate::frame::Frame;
@@ -42,6 +43,3 @@ fn shear_spread(contacts: &[ContactEstimate]) -> Option<f64> {
     let counts = contacts.iter().filter(|contact| contact.force_N[2] >= COUNTS_FROM * total);
     counts.map(spread).filter(|spread| spread.is_finite()).reduce(f64::max)
 }
-
-/// Share of the normal force below which a shear counts as none.
-const NO_SHEAR: f64 = 0.01;

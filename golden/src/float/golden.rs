@@ -6,6 +6,7 @@
 //! | adaptive | the whole array first, to find the contacts; then the case that `adaptive` chooses |
 //! | contacts | the whole array first; then its regions, each with its own μ |
 
+use super::by_network::ByNetwork;
 use super::forces::{force, threshold};
 use super::objective::taxels::Taxels;
 use super::objective::{of_kind, Estimate, Objective, SearchInput};
@@ -85,6 +86,8 @@ pub(super) struct CaseOutcome {
     pub truncation: Vec<f64>,
     /// Largest misfit of a subarray's fitted shape, see [`Estimate::shape_misfit`].
     pub shape_misfit: Option<f64>,
+    /// Largest relative standard deviation of a subarray's shear, see [`Estimate::shear_spread`].
+    pub shear_spread: Option<f64>,
 }
 
 /// A scene or frame cannot be reconstructed.
@@ -126,7 +129,7 @@ pub enum GoldenError {
 fn evidence(scene: &Scene) -> Result<Option<Evidence>, LearnedError> {
     let advised = |combined| Ok(Some(Evidence::new(scene).advised_by(Learned::of_scene(scene)?, combined)));
     match scene.estimator() {
-        EstimatorKind::Search => Ok(None),
+        EstimatorKind::Search | EstimatorKind::Network => Ok(None),
         EstimatorKind::Learned => advised(false),
         _ if scene.search.estimator == EstimatorKind::Auto && scene.search.network.is_some() => match advised(true) {
             Err(LearnedError::Mismatch { .. }) => Ok(Some(Evidence::new(scene))),
@@ -149,7 +152,10 @@ impl Golden {
             let shared = Matrices::of(scene, &shape, MAX_FLOAT_DEGREE)?;
             let orthogonal_form = scene.search.form == Form::Orthogonal;
             let orthogonal = orthogonal_form.then(|| Orthogonal::new(&shared)).transpose()?;
-            let objective = of_kind(scene.search.objective, &shape, scene.medium);
+            let objective = match scene.estimator() {
+                EstimatorKind::Network => Box::new(ByNetwork::new(scene)?),
+                _ => of_kind(scene.search.objective, &shape, scene.medium),
+            };
             Ok(Tiling { case, parts, shared, masked: Vec::new(), orthogonal, objective }.mask(&scene.input.dead)?)
         };
         let cases = match scene.partition.case {
@@ -218,9 +224,10 @@ impl Golden {
     }
 
     pub(super) fn finish(&self, frame: &Frame, outcome: CaseOutcome) -> Reconstruction {
-        let CaseOutcome { subarrays, forces, flags, truncation, shape_misfit } = outcome;
+        let CaseOutcome { subarrays, forces, flags, truncation, shape_misfit, shear_spread } = outcome;
         let mut result = assemble(&self.scene, frame, "golden", subarrays, forces, flags);
         result.checks.shape_misfit = shape_misfit;
+        result.checks.shear_spread = shear_spread;
         result.extra.truncation = Some(truncation).filter(|truncation| !truncation.is_empty());
         result
     }
@@ -245,6 +252,8 @@ impl Golden {
             let own = threshold(x, self.scene.threshold.min_force_N);
             let misfit = estimate.and_then(|estimate| estimate.shape_misfit(&b, input.noise_MPa));
             outcome.shape_misfit = [outcome.shape_misfit, misfit].into_iter().flatten().reduce(f64::max);
+            let spread = estimate.and_then(|estimate| estimate.shear_spread());
+            outcome.shear_spread = [outcome.shear_spread, spread].into_iter().flatten().reduce(f64::max);
             if searched && estimate.is_none() {
                 outcome.flags.push(Flag::NoCompression);
             }

@@ -17,7 +17,7 @@
 //!
 //! The driver: [`Golden`] runs the stages for each subarray of a scene (`golden`), between the input and the output
 //! options (`run`, with `unipolar` for readings that a sensor clips). `adaptive` and `by_contacts` have the partitions
-//! that depend on the frame, `by_evidence` the estimators that take the place of the search.
+//! that depend on the frame, `by_evidence` and `by_network` the estimators that take the place of the search.
 
 pub mod contacts;
 pub mod forces;
@@ -32,6 +32,7 @@ mod adaptive;
 mod bonded_tests;
 mod by_contacts;
 mod by_evidence;
+mod by_network;
 mod golden;
 #[cfg(test)]
 mod golden_tests;

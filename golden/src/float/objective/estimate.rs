@@ -20,7 +20,7 @@ pub trait Objective {
     /// objective may have its own method.
     fn find(&self, input: &SearchInput) -> Option<Estimate> {
         let found = search(input.family, input.mu_max, &|p| self.score(p))?;
-        Some(Estimate { found, load_N: None })
+        Some(Estimate { found, load_N: None, sigma: None })
     }
 }
 
@@ -46,12 +46,17 @@ pub struct Estimate {
     pub found: SearchResult,
     /// Normal load in N to which the forces are scaled; `None` leaves them as they are.
     pub load_N: Option<f64>,
+    /// Standard deviation of μ, [x, y], if the estimator knows it.
+    pub sigma: Option<[f64; 2]>,
 }
 
 /// Ratio of a Hertz contact's radius to that of the disc where its pressure exceeds [`COUNTS_FROM`]: (1 − 0.3²)^−½.
 const RIM: f64 = 1.05;
 /// Radius in depths from which on a contact is wide: the fits of ellipses then take more nodes and a wider start.
 pub(super) const WIDE_FROM: f64 = 2.5;
+
+/// Ratio to the normal force below which a shear counts as none.
+pub(crate) const NO_SHEAR: f64 = 0.01;
 
 /// Fraction of the largest p₀ that a taxel must exceed to count for the centre.
 const COUNTS_FROM: f64 = 0.3;
@@ -96,6 +101,13 @@ impl SearchInput<'_> {
 }
 
 impl Estimate {
+    /// Standard deviation of the shear over its size, if σ is known. Below [`NO_SHEAR`] a shear counts as none, and its
+    /// standard deviation is taken over that.
+    pub fn shear_spread(&self) -> Option<f64> {
+        let [x, y] = self.found.mu;
+        self.sigma.map(|[sx, sy]| sx.hypot(sy) / x.hypot(y).max(NO_SHEAR))
+    }
+
     /// Root mean square of the misfit over what the noise and the fit's own error explain, for the estimate of a fit;
     /// above 1 the contact is of another shape or the noise larger than stated.
     pub fn shape_misfit(&self, b: &[f64], noise_MPa: f64) -> Option<f64> {
@@ -126,6 +138,6 @@ impl Estimate {
         // The position on the search grid, rounded towards 0.
         let unit = f64::from(RADIUS) / mu_max.max(f64::MIN_POSITIVE);
         let position = mu.map(|mu| (mu * unit) as i32);
-        Some(Estimate { found: SearchResult { mu, position, objective, evaluations }, load_N: Some(load) })
+        Some(Estimate { found: SearchResult { mu, position, objective, evaluations }, load_N: Some(load), sigma: None })
     }
 }

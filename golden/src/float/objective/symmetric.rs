@@ -141,7 +141,7 @@ impl Objective for Symmetric {
         let found = search(input.family, input.mu_max, &|p| self.score(p))?;
         let [x, y] = self.peak(&input.family.eval(found.mu));
         let Some(fit) = self.refine(input, [x, y, found.mu[0], found.mu[1]]) else {
-            return Some(Estimate { found, load_N: None });
+            return Some(Estimate { found, load_N: None, sigma: None });
         };
         let load = fit.loads[0];
         let evaluations = found.evaluations + fit.evaluations;

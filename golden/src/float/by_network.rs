@@ -1,0 +1,49 @@
+//! By network: μ as a trained network knows it, in the place of a search.
+//!
+//! p(μ) is then that of the search. The estimator `learned` takes the same μ, but the most probable forces at it.
+//!
+//! | | shape | unit |
+//! |---|---|---|
+//! | in: b of the whole array | n | MPa |
+//! | out: μ with its standard deviations | 2 | – |
+//! | out: objective, ln of the density at μ | scalar | – |
+
+use super::objective::{Estimate, Objective, SearchInput};
+use super::search::{SearchResult, RADIUS};
+use crate::learned::{Learned, LearnedError, OneContact};
+use crate::scene::Scene;
+
+/// The network of a scene, asked for the whole array.
+pub(super) struct ByNetwork {
+    network: Learned,
+    alive: Vec<bool>,
+}
+
+impl ByNetwork {
+    /// The network that a scene names.
+    ///
+    /// # Errors
+    /// As [`Learned::of_scene`].
+    pub fn new(scene: &Scene) -> Result<ByNetwork, LearnedError> {
+        let Scene { sensor, input, .. } = scene;
+        let alive = (0..sensor.taxels()).map(|taxel| !input.is_dead([taxel / sensor.cols, taxel % sensor.cols]));
+        Ok(ByNetwork { network: Learned::of_scene(scene)?, alive: alive.collect() })
+    }
+}
+
+impl Objective for ByNetwork {
+    /// No candidate is compared: that Σp presses is all that counts.
+    fn score(&self, p: &[f64]) -> Option<f64> {
+        let sum: f64 = p.iter().sum();
+        (sum > 0.0 && sum.is_finite()).then_some(0.0)
+    }
+
+    fn find(&self, input: &SearchInput) -> Option<Estimate> {
+        let told = self.network.shear(&OneContact { b: input.b, alive: &self.alive, centre_mm: [0.0; 2] });
+        self.score(&input.family.eval(told.mean))?;
+        let position = told.mean.map(|mu| (mu * f64::from(RADIUS) / input.mu_max).round() as i32);
+        let objective = -told.sigma.iter().map(|sigma| (sigma * std::f64::consts::TAU.sqrt()).ln()).sum::<f64>();
+        let found = SearchResult { mu: told.mean, position, objective, evaluations: 1 };
+        Some(Estimate { found, load_N: None, sigma: Some(told.sigma) })
+    }
+}
