@@ -16,6 +16,7 @@
 //! | `network` | layers with the mirror symmetry |
 //! | `frames`, `training` | drawn frames; loss and Adam |
 //! | `file` | bytes, signature |
+//! | `composed` | the layers as plain matrices of the stress, for the hardware |
 //!
 //! A mirrored frame has the mirrored μ because no layer can do otherwise; in parities that costs a quarter of the products.
 //!
@@ -24,6 +25,7 @@
 //! | in: stress of one contact | taxels | MPa |
 //! | out: μ with standard deviations | 2 | – |
 
+mod composed;
 mod error;
 mod features;
 mod file;
@@ -34,8 +36,10 @@ mod tests;
 mod training;
 mod window;
 
+pub use composed::ComposedLayer;
 pub use error::LearnedError;
 pub use file::Signature;
+pub(crate) use network::{LN_SIGMA, PLACES};
 pub use training::{Stage, Training};
 pub use window::{Place, Window};
 

@@ -341,6 +341,11 @@ impl InputSpec {
         }
     }
 
+    /// For each taxel of `sensor`, row-major, whether it is not dead.
+    pub fn alive(&self, sensor: &Sensor) -> Vec<bool> {
+        (0..sensor.taxels()).map(|taxel| !self.is_dead([taxel / sensor.cols, taxel % sensor.cols])).collect()
+    }
+
     /// Whether a taxel, [row, col], is dead.
     pub fn is_dead(&self, taxel: [usize; 2]) -> bool {
         self.dead.binary_search(&taxel).is_ok()

@@ -5,12 +5,13 @@ use super::model::Model;
 use super::plan::contents::CasePlan;
 use super::stages::resultants;
 use super::stages::send::{
-    Status, CASE_SHIFT, FLAG_COEFFICIENTS, FLAG_CONDITION, FLAG_FOUND, FLAG_NO_CONTACT, FRAMES_SHIFT, STATUS_BEATS,
+    ln_sigma_of_word, Status, CASE_SHIFT, FLAG_COEFFICIENTS, FLAG_CONDITION, FLAG_FOUND, FLAG_NO_CONTACT, FRAMES_SHIFT, STATUS_BEATS,
 };
 use super::words::formats::{LOG_FRACTION, MU_STEPS};
 use crate::checks::Checks;
 use crate::errors::Errors;
 use crate::flags::{frame_flags, Flag};
+use crate::float::objective::Estimate;
 use crate::frame::{Forces, Frame};
 use crate::input::Input;
 
@@ -75,6 +76,7 @@ impl Model {
         let sensor = &self.scene.sensor;
         let mut flags = frame_flags(&self.scene, frame, &codes, input.noise_of_mean_MPa(readings.len()));
         let mut subarrays = Vec::with_capacity(case.parts.len());
+        let mut shear_spread = None;
         for (part, beats) in case.parts.iter().zip(status.chunks(STATUS_BEATS)) {
             let Some(status) = Status::of_beats(beats) else { continue };
             let own = part.gather(sensor, &codes.codes);
@@ -93,7 +95,12 @@ impl Model {
             }
             let received = Received { condition_met: met, ..received };
             let mu = status.position.map(|x| f64::from(x) * step);
-            let score = found.then(|| -f64::from(status.score) / f64::from(1u32 << LOG_FRACTION));
+            let estimate = (found && self.has_network()).then(|| self.estimate(&status, mu));
+            shear_spread = shear_spread.or(estimate.and_then(|estimate| estimate.shear_spread()));
+            let score = match estimate {
+                Some(estimate) => Some(estimate.found.objective),
+                None => found.then(|| -f64::from(status.score) / f64::from(1u32 << LOG_FRACTION)),
+            };
             subarrays.push(SubarrayResult::new(part, &received, mu, score));
         }
         let mut result = assemble(&self.scene, frame, engine, subarrays, forces, flags);
@@ -114,9 +121,16 @@ impl Model {
             result.extra.taken = Some(CaseChoice { case: case.case.to_string(), reason, refused: Vec::new() });
         }
         let full_scale_share = input.full_scale_share(readings);
-        let checks = Checks { full_scale_share, ..result.figures(&self.scene, frame) };
+        let checks = Checks { full_scale_share, shear_spread, ..result.figures(&self.scene, frame) };
         result.add_checks(&self.scene, checks);
         Ok(result)
+    }
+
+    /// What the network said of μ, from a status with this `mu`.
+    fn estimate(&self, status: &Status, mu: [f64; 2]) -> Estimate {
+        let unit = 1.0 / MU_STEPS as f64;
+        let sigma = ln_sigma_of_word(status.score).map(|ln| (f64::from(ln) * unit).exp() * self.scene.search.mu_max);
+        Estimate::told(mu, sigma, status.position)
     }
 
     /// The case that a frame's status names; of a scene with one case, that case.

@@ -7,6 +7,7 @@ use thiserror::Error;
 use crate::board::BoardError;
 use crate::frame::FrameError;
 use crate::input::InputError;
+use crate::learned::LearnedError;
 use crate::matrices::MatricesError;
 use crate::partition::{Case, PartitionError};
 use crate::scene::SceneError;
@@ -63,6 +64,9 @@ pub enum FixedError {
     /// A file named by the input options cannot be used, or the frames do not fit them.
     #[error(transparent)]
     Input(#[from] InputError),
+    /// The network that the scene names cannot be used.
+    #[error(transparent)]
+    Learned(#[from] LearnedError),
     /// A device sent a wrong number of beats for the scene.
     #[error("{what}: got {got} beats, expected {expected}")]
     Beats {

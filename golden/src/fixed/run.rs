@@ -103,14 +103,20 @@ impl Model {
             quads("normalise", |s| &s.normalised),
             quads("fold", |s| &s.folded),
             quads("pass", |s| &s.passed),
+            quads("estimate", |s| &s.estimated),
             quads("rescale", |s| &s.rescaled),
+            quads("relax", |s| &s.relaxed),
             quads("unfold", |s| &s.unfolded),
             Stage { name: "search", words: sweeps.map(candidate).collect() },
             quads("forces", |s| &s.found.values),
         ];
         split_values(&mut stages, self.formats().search_width);
         let choice = if self.chooses() { choose::LATENCY } else { 0 };
-        stages.retain(|stage| self.chooses() || stage.name != "choose");
+        stages.retain(|stage| match stage.name {
+            "choose" => self.chooses(),
+            "estimate" | "relax" => self.has_network(),
+            _ => true,
+        });
         Trace {
             beats: match self.sends_resultants() {
                 false => forces.iter().map(|f| f.words).collect(),

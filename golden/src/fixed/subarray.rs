@@ -1,12 +1,17 @@
 //! One subarray: the stages from frame buffer to force memory.
 
 use super::plan::contents::{CasePlan, Plan};
+use super::stages::estimate::{estimate, images, Estimate};
 use super::stages::pass::{join_limbs, pass, swap, Operands};
 use super::stages::search::{search, Block, SearchResult};
-use super::stages::{fold, forces, normalise, receive, rescale, unfold};
-use super::words::formats::force_shift;
-use super::words::schedule::{by_limbs, is_transposed, schedule, EXPONENTS};
+use super::stages::send::ln_sigma_word;
+use super::stages::{fold, forces, normalise, receive, relax, rescale, unfold};
+use super::words::formats::{force_shift, Formats};
+use super::words::network::WordNetwork;
+use super::words::quantised::Quantised;
+use super::words::schedule::{by_limbs, is_transposed, layer, schedule, EXPONENTS};
 use crate::board::EngineKind;
+use crate::symmetry::quads::Quads;
 
 /// The quads that a stage passes on.
 type QuadStream = Vec<[i64; 4]>;
@@ -20,7 +25,7 @@ pub struct SubarrayTrace {
     pub normalise: u32,
     /// Right shift of `rescale`.
     pub rescale: u32,
-    /// Number of words that `rescale` saturated.
+    /// Number of words that `rescale` saturated, with a network also `estimate` and `relax`.
     pub saturations: u32,
     /// Result of the search, with p(μ*).
     pub found: SearchResult,
@@ -30,8 +35,12 @@ pub struct SubarrayTrace {
     pub folded: QuadStream,
     /// Output of `pass`: one quad per row and accumulation.
     pub passed: QuadStream,
+    /// Output of `estimate`: operands of the images of each layer; empty without a network.
+    pub estimated: QuadStream,
     /// Output of `rescale`.
     pub rescaled: QuadStream,
+    /// Output of `relax`: p after each step; empty without a network.
+    pub relaxed: QuadStream,
     /// Output of `unfold`.
     pub unfolded: QuadStream,
 }
@@ -50,8 +59,11 @@ impl SubarrayTrace {
 
         let mut operands = Operands::of_input(&folded, formats);
         let (mut passed, mut rescaled, mut unfolded) = (Vec::new(), Vec::new(), Vec::new());
+        let (mut estimated, mut relaxed) = (Vec::new(), Vec::new());
         let (mut right, mut saturations) = (0, 0);
         let mut polynomials = vec![[[0i64; 10]; 4]; formats.quads];
+        let mut told = Estimate::default();
+        let (mut first, mut values) = (Vec::new(), Vec::new());
         for (k, products) in schedule(formats).iter().enumerate() {
             let limbs: Vec<QuadStream> =
                 by_limbs(products).iter().map(|part| pass(formats, quantised, layout, part, &operands)).collect();
@@ -62,6 +74,28 @@ impl SubarrayTrace {
             let shift = if k == 0 { right } else { formats.a_shift };
             let (words, clipped) = rescale::rescale(formats, &accumulators, shift);
             saturations += clipped;
+            match plan.board.engine {
+                EngineKind::Parallel => passed.extend(limbs.concat()),
+                EngineKind::Serial => passed.extend(accumulators),
+            }
+            rescaled.extend(&words);
+            if let Some(network) = &quantised.network {
+                let previous = if k == 0 { vec![[0; 4]; formats.quads] } else { first.clone() };
+                let (sums, next, clipped) = relax::relax(formats, &previous, &words);
+                saturations += clipped;
+                operands.vectors.push(next);
+                relaxed.extend(&sums);
+                values = unfold::unfold(&sums, 0);
+                unfolded.extend(&values);
+                if k == 0 {
+                    first = sums;
+                    told = ask(formats, network, layout, quantised, &mut operands, &mut estimated);
+                    saturations += told.saturations;
+                    told.position = if condition { told.position } else { [0; 2] };
+                    operands.position = told.position.map(i64::from);
+                }
+                continue;
+            }
             operands.vectors.push(rescale::operand(formats, &words));
             // A transposed result is transposed back on its way to the search memory.
             let transposed = is_transposed(products);
@@ -75,15 +109,15 @@ impl SubarrayTrace {
                     w[k] = value;
                 }
             }
-            match plan.board.engine {
-                EngineKind::Parallel => passed.extend(limbs.concat()),
-                EngineKind::Serial => passed.extend(accumulators),
-            }
-            rescaled.extend(words);
             unfolded.extend(taxels);
         }
-        let searching = condition && plan.searches();
-        let found = search(layout, Block::new(layout, polynomials), searching);
+        let found = match plan.has_network() {
+            true => {
+                let score = condition.then(|| i64::from(ln_sigma_word(told.ln_sigma)));
+                SearchResult { sweeps: Vec::new(), position: told.position, score, values }
+            }
+            false => search(layout, Block::new(layout, polynomials), condition && plan.searches()),
+        };
         SubarrayTrace {
             condition,
             normalise: left,
@@ -93,7 +127,9 @@ impl SubarrayTrace {
             normalised,
             folded,
             passed,
+            estimated,
             rescaled,
+            relaxed,
             unfolded,
         }
     }
@@ -106,4 +142,29 @@ impl SubarrayTrace {
         let values = case.layout().unpack(&self.found.values);
         values.into_iter().map(|value| forces::force(formats, value, mu, shift, threshold)).collect()
     }
+}
+
+/// μ by the network; the images of its layers become operands. Those of whole groups of rows are passed on, zeros beyond the
+/// last.
+fn ask(
+    formats: &Formats,
+    network: &WordNetwork,
+    layout: Quads,
+    quantised: &Quantised,
+    operands: &mut Operands,
+    estimated: &mut QuadStream,
+) -> Estimate {
+    let mut saturations = 0;
+    for index in 0..network.layers.len() - 1 {
+        let rows = pass(formats, quantised, layout, &layer(index), operands);
+        let (next, clipped) = images(formats, network.shift, &rows);
+        saturations += clipped;
+        let lanes = formats.lanes_per_parity;
+        estimated.extend(&next);
+        estimated.extend(vec![[0; 4]; next.len().next_multiple_of(lanes) - next.len()]);
+        operands.layers.push(next);
+    }
+    let rows = pass(formats, quantised, layout, &layer(network.layers.len() - 1), operands);
+    let told = estimate(network.shift, &rows);
+    Estimate { saturations: saturations + told.saturations, ..told }
 }

@@ -9,7 +9,7 @@
 //! | out: objective, ln of the density at μ | scalar | – |
 
 use super::objective::{Estimate, Objective, SearchInput};
-use super::search::{SearchResult, RADIUS};
+use super::search::RADIUS;
 use crate::learned::{Learned, LearnedError, OneContact};
 use crate::scene::Scene;
 
@@ -25,9 +25,7 @@ impl ByNetwork {
     /// # Errors
     /// As [`Learned::of_scene`].
     pub fn new(scene: &Scene) -> Result<ByNetwork, LearnedError> {
-        let Scene { sensor, input, .. } = scene;
-        let alive = (0..sensor.taxels()).map(|taxel| !input.is_dead([taxel / sensor.cols, taxel % sensor.cols]));
-        Ok(ByNetwork { network: Learned::of_scene(scene)?, alive: alive.collect() })
+        Ok(ByNetwork { network: Learned::of_scene(scene)?, alive: scene.input.alive(&scene.sensor) })
     }
 }
 
@@ -42,8 +40,6 @@ impl Objective for ByNetwork {
         let told = self.network.shear(&OneContact { b: input.b, alive: &self.alive, centre_mm: [0.0; 2] });
         self.score(&input.family.eval(told.mean))?;
         let position = told.mean.map(|mu| (mu * f64::from(RADIUS) / input.mu_max).round() as i32);
-        let objective = -told.sigma.iter().map(|sigma| (sigma * std::f64::consts::TAU.sqrt()).ln()).sum::<f64>();
-        let found = SearchResult { mu: told.mean, position, objective, evaluations: 1 };
-        Some(Estimate { found, load_N: None, sigma: Some(told.sigma) })
+        Some(Estimate::told(told.mean, told.sigma, position))
     }
 }

@@ -31,13 +31,13 @@ use faer::{Accum, Col, Mat, Par};
 /// λ of the deconvolutions.
 const LEVELS: [f64; 2] = [0.15, 0.04];
 /// Factor of b/s and its deconvolutions, whose entries are then about 1.
-const AMPLITUDE: f32 = 4.0;
+pub(super) const AMPLITUDE: f32 = 4.0;
 
 /// The deconvolutions of a window.
 pub(super) struct Features {
     quads: Quads,
     /// c_λ p_λ of each parity for all λ, stacked: (Q · levels) × Q.
-    inverse: Parities,
+    pub(super) inverse: Parities,
 }
 
 /// Frames of one window.

@@ -24,11 +24,11 @@ use faer::{Accum, Mat, Par};
 /// Channels of the last layer.
 pub(super) const OUTPUT_CHANNELS: usize = 2;
 /// Number of outputs.
-pub(super) const OUTPUTS: usize = 4;
+pub(crate) const OUTPUTS: usize = 4;
 /// Parity and channel of each output.
-pub(super) const PLACES: [(usize, usize); OUTPUTS] = [(ODD_X, 0), (ODD_Y, 0), (EVEN, 0), (EVEN, 1)];
+pub(crate) const PLACES: [(usize, usize); OUTPUTS] = [(ODD_X, 0), (ODD_Y, 0), (EVEN, 0), (EVEN, 1)];
 /// Range of ln σ, σ in units of mu_max.
-pub(super) const LN_SIGMA: [f32; 2] = [-7.0, 0.5];
+pub(crate) const LN_SIGMA: [f32; 2] = [-7.0, 0.5];
 
 /// Channels × frames for each parity, or for each mirror image.
 pub(super) type Parities = [Mat<f32>; 4];

@@ -7,14 +7,15 @@
 //! | `search.mu_max`, `output.forces` | all | with "adaptive" above 0 and "taxels" |
 //! | `search.objective` | all; with "adaptive" and "contacts" "sparse" | "sparse" |
 //! | `search.degree` | all | 1 … 3 |
-//! | `search.estimator` | all; "evidence" and "learned" as below | "search", which they take for the others as well |
+//! | `search.estimator` | all; "evidence" and "learned" as below | "search", which they take for the others as well, and "learned" as "network" |
 //! | `search.form` | all, "orthogonal" up to [`crate::float::orthogonal::MAX_TAXELS`] taxels | "oblique" |
 //! | `input.dead` | all; with "orthogonal" none | with one subarray |
 //! | `input.unipolar` | all; with "orthogonal" none | none |
 //!
 //! The estimators "evidence" and "learned" take no objective but the default, no "orthogonal" form, mu_max above 0,
 //! partition 0 or "contacts", since they find the contacts themselves, and a pitch of up to 3 thicknesses, on a bonded
-//! layer 1.5. "auto" takes "evidence" for these scenes and "search" for the others.
+//! layer 1.5. "network", and "learned" in hardware, takes case 0 of up to 144 taxels, mu_max above 0, no "search_width", not the
+//! serial engine. "auto" takes "evidence" for these scenes and "search" for the others.
 //!
 //! Dead taxels in hardware: Cz⁺, Ax and Ay are multiplied by Π ([`crate::matrices::Matrices::without`]). The broken
 //! mirror symmetry takes up to four products instead of one ([`crate::fixed::words::coefficients`]). A subarray with a
@@ -25,6 +26,7 @@
 //! rejected values always reports the same one.
 
 use super::{CoefficientCheck, EstimatorKind, ForceOutput, Form, Medium, ObjectiveKind, Scene, SceneError};
+use crate::learned::{Place, Window};
 use crate::matrices::MAX_DEGREE;
 use crate::partition::Case;
 use crate::symmetry::quads::Quads;
@@ -101,6 +103,37 @@ impl Scene {
                 "none, or partition.case = 0",
             ),
             rule(input.unipolar, "input.unipolar", "true".to_string(), "false"),
+        ])?;
+        match self.for_hardware().estimator() {
+            EstimatorKind::Network => self.require_network(),
+            _ => Ok(()),
+        }
+    }
+
+    /// Checks that a network can give the μ of the whole array and p(μ) be that of the series.
+    fn require_network(&self) -> Result<(), SceneError> {
+        let (search, sensor) = (&self.search, &self.sensor);
+        let rule = |refused, field, value, available| Rule { refused, field, value, available };
+        self.require([
+            rule(
+                self.partition.case != Case::WHOLE,
+                "partition.case",
+                self.partition.case.to_string(),
+                "0, with search.estimator = learned",
+            ),
+            rule(
+                Window::of(sensor).place != Place::Array,
+                "sensor.rows",
+                sensor.rows.to_string(),
+                "with sensor.cols up to 144 taxels, with search.estimator = learned",
+            ),
+            rule(search.mu_max == 0.0, "search.mu_max", "0".to_string(), "above 0, with search.estimator = learned"),
+            rule(
+                self.hardware.search_width.is_some(),
+                "hardware.search_width",
+                self.hardware.search_width.unwrap_or_default().to_string(),
+                "left out, with search.estimator = learned: nothing is searched",
+            ),
         ])
     }
 
@@ -114,6 +147,12 @@ impl Scene {
         let even = "an even number on a board with the serial engine";
         let none = "none on a board with the serial engine";
         self.require([
+            rule(
+                self.for_hardware().estimator() == EstimatorKind::Network,
+                "search.estimator",
+                self.search.estimator.name().to_string(),
+                "search on a board with the serial engine",
+            ),
             rule(sensor.rows % 2 != 0, "sensor.rows", sensor.rows.to_string(), even),
             rule(sensor.cols % 2 != 0, "sensor.cols", sensor.cols.to_string(), even),
             rule(
@@ -174,6 +213,9 @@ impl Scene {
             .filter(|_| matches!(self.search.estimator, EstimatorKind::Evidence | EstimatorKind::Learned))
         {
             return self.require([refusal]);
+        }
+        if self.estimator() == EstimatorKind::Network {
+            self.require_network()?;
         }
         self.require([
             rule(

@@ -10,7 +10,7 @@
 //! fourth cycle after the `last` product, and are cleared with the fourth; the first product of the next row follows
 //! the last one by five cycles at the earliest.
 
-use dermis_golden::fixed::plan::resources::{operand_vectors, Holds};
+use dermis_golden::fixed::plan::resources::Holds;
 use dermis_golden::fixed::plan::serial::{coefficients, first_vector, OPERAND_BITS, WIDE};
 use dermis_golden::fixed::words::schedule::Kind;
 use dermis_golden::fixed::Model;
@@ -103,7 +103,7 @@ impl Pass {
             align: f.limb_align as usize,
             acc_bits: f.acc_bits as usize,
             address_bits: 2 + 2 * bits,
-            operand_bits: count_bits(first_vector(f) + operand_vectors(f.degree)) + bits,
+            operand_bits: count_bits(first_vector(f) + f.operand_vectors()) + bits,
         };
         let block = Pass {
             clk: Default::default(),

@@ -8,7 +8,6 @@
 //! ```
 //! Each step ends with [`DRAIN`] cycles, in which its last words reach their memory.
 
-use dermis_golden::fixed::plan::resources::operand_vectors;
 use dermis_golden::fixed::plan::serial::{first_vector, operand_index, DRAIN, OPERAND_BITS, ROW_GAP, WIDE};
 use dermis_golden::fixed::words::formats::{Formats, SEARCH_EXTRA_BITS};
 use dermis_golden::fixed::words::schedule::{schedule, Kind, Product};
@@ -148,7 +147,7 @@ impl PassSequencer {
     pub fn new(formats: &Formats, unrounded: usize, rounded: usize) -> Self {
         let f = formats;
         let (quads, words) = (count_bits(f.quads), count_bits(4 * f.quads));
-        let vectors = count_bits(first_vector(f) + operand_vectors(f.degree));
+        let vectors = count_bits(first_vector(f) + f.operand_vectors());
         let block = PassSequencer {
             clk: Default::default(),
             rst: Default::default(),
@@ -209,7 +208,7 @@ fn program(f: &Formats) -> Vec<Instruction> {
     let instruction = |(product, last): (Product, bool)| Instruction {
         matrix: WIDE.iter().position(|&kind| kind == product.matrix.kind).unwrap_or(0),
         low: product.matrix.kind == Kind::InverseLow,
-        operand: operand_index(f, product.operand),
+        operand: operand_index(f, product),
         flip: product.matrix.kind == Kind::Ay,
         align: product.align,
         last,
@@ -222,7 +221,7 @@ fn build<'k>(k: &'k Builder, f: &Formats, program: &[Instruction], unrounded: us
     let (quads, words) = (count_bits(f.quads), count_bits(4 * f.quads));
     let (count, operands) = (program.len(), OPERAND_BITS as usize);
     let pc = count_bits(count + 1);
-    let vectors = count_bits(first_vector(f) + operand_vectors(f.degree));
+    let vectors = count_bits(first_vector(f) + f.operand_vectors());
     let (acc, code_bits, data) = (f.acc_bits as usize, f.input_bits as usize, f.data_bits as usize);
     let seen_bits = acc.max(code_bits) - 1;
     let (low, extra) = (f.input_low_bits as usize, SEARCH_EXTRA_BITS as usize);
@@ -298,7 +297,7 @@ fn build<'k>(k: &'k Builder, f: &Formats, program: &[Instruction], unrounded: us
         let end = wraps(*written, 4 * f.quads - 1);
         written.set(end.mux(zero(words), written.plus(1)));
         // The vectors of the highest degree are not kept: the count stays at their first.
-        k.when(rescaled & end & !vector.is(operand_vectors(f.degree) as u64), || vector.set(vector.plus(1)));
+        k.when(rescaled & end & !vector.is(f.operand_vectors() as u64), || vector.set(vector.plus(1)));
     });
     wait_count.set(draining.mux(wait_count.plus(1), zero(4)));
     let (after_fold, freed) = if low == 0 { (FIRST, FOLD_HIGH) } else { (FOLD_LOW, FOLD_LOW) };
@@ -383,7 +382,7 @@ fn build<'k>(k: &'k Builder, f: &Formats, program: &[Instruction], unrounded: us
     k.wire("operand_address", field(vectors, &|i| i.operand).concat(*column));
     k.wire("flip", set(&|i| i.flip));
     k.wire("align", set(&|i| i.align));
-    let kept = vector.less(k.constant(vectors, operand_vectors(f.degree) as u64));
+    let kept = vector.less(k.constant(vectors, f.operand_vectors() as u64));
     k.wire("write", folded | rescaled & kept);
     let target =
         is(FOLD_HIGH).mux(zero(vectors), is(FOLD_LOW).mux(k.constant(vectors, 1), vector.plus(first_vector(f) as u64)));

@@ -45,7 +45,8 @@ pub fn read_addresses(case: &CasePlan) -> Vec<usize> {
         first..first + storage.columns_of(matrix, group).len()
     };
     let steps = accumulations(formats).into_iter().flat_map(|(_, products)| {
-        (0..formats.groups).flat_map(move |group| products.clone().into_iter().map(move |p| (p.matrix, group)))
+        let groups = products.first().map_or(0, |product| storage.groups_of(product.matrix));
+        (0..groups).flat_map(move |group| products.clone().into_iter().map(move |p| (p.matrix, group)))
     });
     steps.flat_map(|(matrix, group)| of(matrix, group)).collect()
 }

@@ -132,9 +132,14 @@ impl Plan {
         seen.choose(&self.grids(), self.scene.partition.condition, self.noise_floor)
     }
 
-    /// Whether the hardware has a μ search, that is `search.mu_max` is above 0.
+    /// Whether the hardware has a μ search: `search.mu_max` is above 0, and no network gives μ.
     pub fn searches(&self) -> bool {
-        self.formats().degree > 0
+        self.formats().degree > 0 && !self.has_network()
+    }
+
+    /// Whether a network gives μ.
+    pub fn has_network(&self) -> bool {
+        self.formats().has_network()
     }
 
     /// Whether the scene asks for the coefficient check.

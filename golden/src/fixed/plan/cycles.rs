@@ -9,6 +9,8 @@
 //! pass     the kept columns of each product, at most Q, waiting until a step's operand has been finished, or, where
 //!          it is read as it is written, begun; a pause after each accumulation
 //! rescale  v_00 is replayed once its exponent is known: Q more
+//! network  after v_00 the columns of each layer and its bias, for each group of rows; the next layer waits for all rows;
+//!          steps of relax wait for μ
 //! search   with S = 4 Q / W steps for W taxels per cycle, and a cycle more in each latency below for W < 4:
 //!          7 coarse sweeps of S, at least (S + 21)/2; the eighth and 7 halvings of S + 24; one of S + 8
 //!          (the last alone when nothing is searched)
@@ -27,7 +29,7 @@ use crate::board::EngineKind;
 use crate::fixed::stages::choose;
 use crate::fixed::stages::search::COARSE_CENTRES;
 use crate::fixed::words::formats::{Formats, HALVINGS};
-use crate::fixed::words::schedule::accumulations;
+use crate::fixed::words::schedule::{accumulations, Operand, Product, Target};
 use crate::symmetry::quads::Quads;
 
 /// Cycles from the last input beat to the start of the frame.
@@ -41,6 +43,14 @@ const LANES: u64 = 8;
 const COLUMNS: u64 = 2;
 /// Cycles from a row until it can be read as an operand: rescaler, operand memory.
 const OPERAND: u64 = 5;
+/// Additional cycles for the product of an operand and μ, where there is a network.
+const SCALE: u64 = 2;
+/// Additional cycles for the sum with v_00 in `relax`, where there is a network.
+const RELAX: u64 = 3;
+/// Cycles from a row of a hidden layer until its images can be read as an operand.
+const IMAGES: u64 = 6;
+/// Cycles from the last row of the last layer until μ can be read.
+const ESTIMATE: u64 = 29;
 /// Cycles from the last raw row of v_00 to its first replayed row.
 const REPLAY: u64 = 4;
 /// Cycles from the last row to the start of the search: rescaler, unfold, memory.
@@ -211,7 +221,8 @@ pub(super) fn forces(plan: &Plan, case: &CasePlan, values: &[u64]) -> Vec<u64> {
 
 /// Cycles from the start of a subarray until its passes are complete.
 pub(super) fn passes(case: &CasePlan) -> u64 {
-    timeline(&case.formats, &case.storage).last_row + UNFOLD
+    let CasePlan { formats, storage, .. } = case;
+    timeline(formats, storage).last_row + if formats.has_network() { RELAX } else { 0 } + UNFOLD
 }
 
 /// Cycles from the hand-over of a subarray to the end of its values; `searching`: it is searched.
@@ -251,36 +262,53 @@ struct Timeline {
 }
 
 fn timeline(formats: &Formats, storage: &Storage) -> Timeline {
-    let quads = formats.quads as u64;
-    let last_rows = quads - (formats.groups as u64 - 1) * formats.lanes_per_parity as u64;
-    let lanes = LANES + if storage.listed { COLUMNS } else { 0 };
+    let (quads, per_parity) = (formats.quads as u64, formats.lanes_per_parity as u64);
+    let network = formats.has_network();
+    let lanes = LANES + if storage.listed { COLUMNS } else { 0 } + if network { SCALE } else { 0 };
     let first_issue = FOLD + storage.lead as u64;
     // `free` is the first cycle in which a product can be issued.
     let (mut now, mut free, mut products_done) = (first_issue, first_issue, 0);
-    let mut finished: Vec<u64> = Vec::new();
+    // When the vectors, the images of the layers, and at the end μ can be read.
+    let (mut vectors, mut layers): (Vec<u64>, Vec<u64>) = Default::default();
     let mut last_row = 0;
-    for (k, products) in &accumulations(formats) {
-        for group in 0..formats.groups {
+    for (target, products) in &accumulations(formats) {
+        // Rows of all groups but the last, where the rows of a vector end with the last quad.
+        let groups = products.first().map_or(0, |product| storage.groups_of(product.matrix));
+        let last_rows = match target {
+            Target::Vector(_) => quads - (groups as u64 - 1) * per_parity,
+            Target::Layer(_) => per_parity,
+        };
+        let readable = |product: &Product| match (product.operand, target) {
+            (_, Target::Vector(0)) | (Operand::One, _) => 0,
+            (Operand::InputHigh | Operand::InputLow, _) => vectors[0],
+            (Operand::Vector(index), _) => vectors[index].max(layers.last().copied().unwrap_or(0)),
+            (Operand::Layer(index), _) => layers[index],
+        };
+        for group in 0..groups {
             now = free;
             for product in products {
-                if *k > 0 {
-                    now = now.max(finished[product.operand_index()]);
-                }
+                now = now.max(readable(product));
                 let columns = storage.columns_of(product.matrix, group).len() as u64;
-                let rows = if group + 1 == formats.groups { last_rows } else { formats.lanes_per_parity as u64 };
+                let rows = if group + 1 == groups { last_rows } else { per_parity };
                 products_done += 4 * columns * rows;
                 now += columns;
             }
             free = now + storage.pause as u64;
         }
         last_row = now - 1 + lanes + last_rows - 1;
-        if *k == 0 {
-            last_row += REPLAY - 1 + quads;
+        let streamed = if storage.streamed { quads - 1 } else { 0 };
+        match *target {
+            Target::Vector(vector) => {
+                if vector == 0 {
+                    last_row += REPLAY - 1 + quads;
+                }
+                // The accumulation of the high limbs completes v_00.
+                vectors.truncate(vector);
+                vectors.push(last_row - streamed + OPERAND + if network { RELAX } else { 0 });
+            }
+            Target::Layer(layer) if layer + 1 < formats.layers.len() => layers.push(last_row + IMAGES),
+            Target::Layer(_) => layers.push(last_row + ESTIMATE),
         }
-        // The accumulation of the high limbs completes v_00.
-        finished.truncate(*k);
-        let read_from = if storage.streamed { last_row + 1 - quads } else { last_row };
-        finished.push(read_from + OPERAND);
     }
     Timeline { first_issue, last_issue: now - 1, products: products_done, last_row }
 }

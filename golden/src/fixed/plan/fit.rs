@@ -7,7 +7,7 @@ use super::widths::{Shape, Widths};
 use crate::board::{Board, EngineKind};
 use crate::fixed::words::formats::{Formats, MULTIPLIER_BITS};
 use crate::fixed::words::quantised::Quantised;
-use crate::fixed::words::schedule::{schedule, Kind, Matrix};
+use crate::fixed::words::schedule::{Kind, Matrix};
 use crate::scene::Scene;
 
 /// Fewest lanes per parity; with fewer, the lanes would wait for the accumulators to be shifted out.
@@ -26,7 +26,7 @@ pub struct Design {
 /// Lays out the coefficient memory of a scene's cases and counts the resources, whether `board` has them or not.
 pub fn fit(scene: &Scene, shapes: &[Shape], board: &Board, widths: Widths) -> (Vec<Design>, Resources) {
     let Widths { formats, quantised } = widths;
-    let order = storage_order(&schedule(&formats));
+    let order = storage_order(&formats);
     let (laid_out, resources) = match board.engine {
         EngineKind::Serial => serial::fit(&formats, &order, &quantised[0], board),
         EngineKind::Parallel => parallel(&formats, &order, &quantised, scene, shapes, board),
@@ -51,11 +51,17 @@ fn parallel(
     board: &Board,
 ) -> (Vec<LaidOut>, Resources) {
     let (quads, prune_bits) = (formats.quads, scene.fixed.prune_bits);
+    let network = quantised.iter().find_map(|quantised| quantised.network.as_ref());
+    // Rows of a layer leave before the next ones are complete.
+    let most = network.and_then(|network| network.layers.iter().map(|layer| layer.inputs + 1).min()).unwrap_or(quads);
+    let most = most.min(quads);
     let largest = |quantised: &Quantised| quantised.inverse.coefficients().map(|c| c.abs()).max().unwrap_or(0);
     let threshold = |quantised: &Quantised, matrix: Matrix| match matrix.kind {
+        _ if network.is_some() => 0,
         Kind::InverseHigh | Kind::InverseLow => largest(quantised) >> prune_bits,
         Kind::Ax => 2f64.powi(quantised.ax.exponent - prune_bits as i32) as i64,
         Kind::Ay => 2f64.powi(quantised.ay.exponent - prune_bits as i32) as i64,
+        Kind::Layer(_) | Kind::Bias(_) => 0,
     };
     let narrow_may = formats.inverse_low_bits > 0 && shapes.len() == 1;
     let with = |groups: usize, narrow: bool| {
@@ -78,13 +84,13 @@ fn parallel(
     };
     let product = board.multipliers_for(MULTIPLIER_BITS, MULTIPLIER_BITS);
     // The multipliers of the other blocks do not depend on the number of lanes.
-    let all = with(1, false);
-    let others = all.1.multipliers() - 4 * quads * product;
+    let all = with(quads.div_ceil(most), false);
+    let others = all.1.multipliers() - 4 * all.0[0].formats.lanes_per_parity * product;
     let left = (board.multipliers as usize).saturating_sub(others);
-    let least = MIN_LANES.min(quads);
+    let least = MIN_LANES.min(most);
     let per_parity = match scene.fixed.lanes {
-        Some(lanes) => (lanes as usize / 4).clamp(1, quads)..=(lanes as usize / 4).clamp(1, quads),
-        None => least..=(left / (4 * product)).clamp(least, quads),
+        Some(lanes) => (lanes as usize / 4).clamp(1, most)..=(lanes as usize / 4).clamp(1, most),
+        None => least..=(left / (4 * product)).clamp(least, most),
     };
     let mut groups: Vec<usize> = per_parity.rev().map(|lanes| quads.div_ceil(lanes)).collect();
     groups.dedup();

@@ -13,6 +13,7 @@
 //! | pass | coefficients; list of their columns | words × 18 · lanes; words × address, twice where Ax is used for Ay |
 //! | pass | low limbs of Cz⁺, where the words would not fit otherwise | a power of two × `limb_align` · lanes |
 //! | rescale | raw v_00 | Q × 4 · `acc_bits` |
+//! | relax | v_00 to which the products are added | Q × 4 · `vector_bits` |
 //! | search | polynomials, one memory per coefficient | 3 buffers of Q × 4 · `search_bits` |
 //! | search | the next subarray's, or the next frame's where block RAM suffices | Q × 4 · `search_bits` |
 //! | force | p(μ*) | subarrays · 4 Q / W × W · `search_bits`, W the taxels per cycle of the search |
@@ -25,7 +26,7 @@ use crate::fixed::stages::prepare::GAIN_BITS;
 use crate::fixed::stages::resultants::POSITION_BITS;
 use crate::fixed::words::arith::{bit_length, signed_bits};
 use crate::fixed::words::formats::{Formats, FORCE_BITS, HALVINGS, MULTIPLIER_BITS};
-use crate::fixed::words::schedule::vectors;
+use crate::fixed::words::network::POSITION_BITS as MU_BITS;
 use crate::scene::{ForceOutput, Scene};
 
 /// Number of polynomial buffers between which the sweeps of the search alternate.
@@ -59,6 +60,8 @@ pub enum Holds {
     Columns,
     /// Accumulators that wait for their shift.
     Raw,
+    /// v_00 in parities, for `relax`.
+    First,
     /// Coefficient of this index of the polynomials, in the buffers of the search.
     Polynomials(usize),
     /// The same at the start of the search.
@@ -95,6 +98,7 @@ impl std::fmt::Display for Holds {
             Holds::LowCoefficients => write!(f, "low coefficients"),
             Holds::Columns => write!(f, "columns"),
             Holds::Raw => write!(f, "raw words"),
+            Holds::First => write!(f, "v_00"),
             Holds::Polynomials(index) => write!(f, "polynomials, coefficient {index}"),
             Holds::Start(index) => write!(f, "polynomials at the start, coefficient {index}"),
             Holds::Bank(bank) => write!(f, "polynomials, bank {bank}"),
@@ -154,9 +158,19 @@ pub fn position_bits() -> usize {
     signed_bits(4 << HALVINGS) as usize
 }
 
-/// Number of v_ij that later passes read: all but those of the highest degree.
-pub fn operand_vectors(degree: usize) -> usize {
-    degree.checked_sub(1).map_or(0, vectors)
+/// Length in quads of each vector that later passes read, in the order in which they are written: with a search the v_ij; with
+/// a network v_00, the images of each hidden layer, one quad when μ is known, then p after each step but the last.
+pub fn operand_lengths(formats: &Formats) -> Vec<usize> {
+    let vectors = vec![formats.quads; formats.operand_vectors()];
+    match formats.layers.split_last() {
+        None => vectors,
+        Some((_, hidden)) => {
+            let lanes = formats.lanes_per_parity;
+            // The rows of whole groups are written.
+            let images = hidden.iter().map(|rows| rows.div_ceil(lanes) * lanes);
+            vectors[..1].iter().copied().chain(images).chain([1]).chain(vectors[1..].iter().copied()).collect()
+        }
+    }
 }
 
 impl Resources {
@@ -205,7 +219,8 @@ impl Resources {
         }
         memories.push(memory(Holds::Folded, quads, quad(f.fold_bits)));
         if f.degree > 0 {
-            memories.push(memory(Holds::Operands(0), operand_vectors(f.degree) * quads, quad(f.data_bits)));
+            // Of several cases the largest is the first.
+            memories.push(memory(Holds::Operands(0), operand_lengths(f).iter().sum(), quad(f.data_bits)));
         }
         memories.push(memory(Holds::Coefficients, wide, word_bits(f)));
         if narrow > 0 {
@@ -218,7 +233,11 @@ impl Resources {
             memories.push(memory(Holds::Columns, words, addresses * count_bits(quads)));
         }
         memories.push(memory(Holds::Raw, quads, quad(f.acc_bits)));
-        for (k, &bits) in f.search_bits.iter().enumerate().filter(|_| f.degree > 0) {
+        if f.has_network() {
+            memories.push(memory(Holds::First, quads, quad(f.vector_bits)));
+        }
+        let searches = f.degree > 0 && !f.has_network();
+        for (k, &bits) in f.search_bits.iter().enumerate().filter(|_| searches) {
             memories.push(memory(Holds::Polynomials(k), SEARCH_BUFFERS * quads, quad(bits)));
             if overlaps {
                 memories.push(memory(Holds::Start(k), quads, quad(bits)));
@@ -230,13 +249,20 @@ impl Resources {
             Some(_) => board.multipliers_for(f.code_bits + 1, GAIN_BITS),
             None => 0,
         };
+        // Operands times μ, and the size of μ.
+        let (scale, size) = match f.has_network() {
+            true => (4 * board.multipliers_for(f.data_bits, MU_BITS), 2 * board.multipliers_for(MU_BITS, MU_BITS)),
+            false => (0, 0),
+        };
+        let lane = board.multipliers_for(MULTIPLIER_BITS, MULTIPLIER_BITS);
         let multipliers = vec![
             ("prepare", calibrate),
-            ("pass", 4 * f.lanes_per_parity * board.multipliers_for(MULTIPLIER_BITS, MULTIPLIER_BITS)),
+            ("pass", 4 * f.lanes_per_parity * lane + scale),
+            ("estimate", size),
             ("forces", force_multipliers(f, board)),
             ("resultants", resultant_multipliers(scene, board)),
         ];
-        Resources { memories, multipliers, overlaps: overlaps && f.degree > 0 }
+        Resources { memories, multipliers, overlaps: overlaps && searches }
     }
 
     /// With memories of at most `shallow` words in distributed RAM until the block RAMs suffice: those first that take the

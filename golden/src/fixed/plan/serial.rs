@@ -15,7 +15,7 @@
 //! The polynomials are stored in two single-port memories. A sweep reads one and writes the other, so neither needs a
 //! second port; the polynomial about the best centre stays in its own region until a better one is found.
 
-use super::resources::{count_bits, operand_vectors, Holds, Memory, Resources};
+use super::resources::{count_bits, Holds, Memory, Resources};
 use super::storage::{LaidOut, Storage};
 use crate::board::Board;
 use crate::fixed::stages::search::COARSE_CENTRES;
@@ -73,12 +73,12 @@ pub fn first_vector(formats: &Formats) -> usize {
     1 + usize::from(formats.input_low_bits > 0)
 }
 
-/// Index of an operand in the operand memory.
-pub fn operand_index(formats: &Formats, operand: Operand) -> usize {
-    match operand {
-        Operand::InputHigh => 0,
+/// Index of a product's operand in the operand memory; this engine has no network.
+pub fn operand_index(formats: &Formats, product: &Product) -> usize {
+    match product.operand {
         Operand::InputLow => 1,
         Operand::Vector(index) => first_vector(formats) + index,
+        Operand::InputHigh | Operand::Layer(_) | Operand::One => 0,
     }
 }
 
@@ -90,7 +90,7 @@ pub const WIDE: [Kind; 3] = [Kind::InverseHigh, Kind::Ax, Kind::Ay];
 pub fn coefficients(formats: &Formats, quantised: &Quantised, kind: Kind) -> Vec<[i64; 4]> {
     let side = 1 << count_bits(formats.quads);
     // The serial engine has no dead taxels: the only flip is that of the mirror symmetry.
-    let own = &quantised.of_kind(kind).flips[0].parity;
+    let own = &quantised.flips(kind)[0].parity;
     let word = |at: usize| {
         let (i, j) = (at / side, at % side);
         let inside = i < formats.quads && j < formats.quads;
@@ -134,7 +134,7 @@ fn resources(f: &Formats, board: &Board) -> Resources {
         ..memory(holds, words, bits)
     };
     // Each is stored twice: for the lane of its own parity and for that of the flipped parity.
-    let operands = 2 << (count_bits(first_vector(f) + operand_vectors(f.degree)) + count_bits(f.quads));
+    let operands = 2 << (count_bits(first_vector(f) + f.operand_vectors()) + count_bits(f.quads));
     let bank = 2 << (count_bits(polynomials(f)) + 4);
     let mut memories = vec![
         memory(Holds::Frame { case: 0, lane: 0 }, taxels, f.input_bits as usize),

@@ -10,10 +10,12 @@
 //!
 //! On a square subarray of square pitch, Ay is Ax with x and y exchanged. At degree 1, where no v_ij adds both, Ay is
 //! not stored: v_01 is the Ax pass over the transposed v_00, and the result is transposed.
+//!
+//! The layers of a network are further matrices of other sizes, each with its own number of groups.
 
 use crate::fixed::words::formats::{Formats, MULTIPLIER_BITS};
 use crate::fixed::words::quantised::{coefficient, Quantised};
-use crate::fixed::words::schedule::{accumulations, Kind, Matrix, Product};
+use crate::fixed::words::schedule::{accumulations, layer, schedule, Kind, Matrix, Product, Target};
 
 /// Least number of cycles from a quad's row of low limbs to its row of high limbs: the first is written one cycle after
 /// it arrives, and read two before the other does.
@@ -61,10 +63,11 @@ fn rows(group: usize, per_parity: usize, quads: usize) -> std::ops::Range<usize>
     group * per_parity..((group + 1) * per_parity).min(quads)
 }
 
-/// The matrices of a schedule in the order of their first use.
-pub fn storage_order(schedule: &[Vec<Product>]) -> Vec<Matrix> {
+/// The matrices of the passes in the order of their first use, then those of the network.
+pub fn storage_order(formats: &Formats) -> Vec<Matrix> {
     let mut order = Vec::new();
-    for product in schedule.iter().flatten() {
+    let layers: Vec<Product> = (0..formats.layers.len()).flat_map(layer).collect();
+    for product in schedule(formats).iter().flatten().chain(&layers) {
         if !order.contains(&product.matrix) {
             order.push(product.matrix);
         }
@@ -77,22 +80,24 @@ impl Storage {
     /// which coefficients are negligible.
     pub fn new(limits: Vec<(Matrix, i64)>, quantised: &Quantised, quads: usize, per_parity: usize) -> Self {
         let kept = |matrix, limit, group| {
-            let blocks = quantised.blocks(matrix);
+            let (blocks, [all, width]) = (quantised.blocks(matrix), quantised.size(matrix, quads));
             let matters = |&j: &usize| {
                 blocks
                     .parity
                     .iter()
-                    .any(|block| rows(group, per_parity, quads).any(|i| block[i * quads + j].abs() >= limit))
+                    .any(|block| rows(group, per_parity, all).any(|i| block[i * width + j].abs() >= limit))
             };
             // At least as many columns as a group has rows: the rows of an accumulation leave before the next one ends.
-            let mut columns: Vec<usize> = (0..quads).filter(matters).collect();
-            let others: Vec<usize> = (0..quads).filter(|j| !columns.contains(j)).collect();
+            let mut columns: Vec<usize> = (0..width).filter(matters).collect();
+            let others: Vec<usize> = (0..width).filter(|j| !columns.contains(j)).collect();
             columns.extend(others.into_iter().take(per_parity.saturating_sub(columns.len())));
             columns.sort_unstable();
             columns
         };
-        let groups = quads.div_ceil(per_parity);
-        let of = |&(matrix, limit): &(Matrix, i64)| (0..groups).map(|group| kept(matrix, limit, group)).collect();
+        let groups = |matrix| quantised.size(matrix, quads)[0].div_ceil(per_parity);
+        let of = |&(matrix, limit): &(Matrix, i64)| {
+            (0..groups(matrix)).map(|group| kept(matrix, limit, group)).collect()
+        };
         let columns = limits.iter().map(of).collect();
         let matrices = limits.into_iter().map(|(matrix, _)| matrix).collect();
         Storage { matrices, columns, base: 0, listed: false, streamed: false, pause: 1, lead: 0, narrow: 0 }
@@ -123,7 +128,8 @@ impl Storage {
     pub fn share<'a>(cases: impl Iterator<Item = (&'a mut Storage, Formats)>) {
         let mut cases: Vec<(&mut Storage, Formats)> = cases.collect();
         let listed = cases.iter().any(|(storage, formats)| formats.shared_a || storage.is_pruned(formats.quads));
-        let streamed = !listed && cases.iter().all(|(_, formats)| formats.groups == 1 && formats.quads > 1);
+        let whole = |formats: &Formats| formats.groups == 1 && formats.quads > 1 && !formats.has_network();
+        let streamed = !listed && cases.iter().all(|(_, formats)| whole(formats));
         let least = cases.iter().map(|(_, formats)| formats.quads).min().unwrap_or(BETWEEN);
         let pause = BETWEEN.saturating_sub(least).max(1);
         let mut base = 0;
@@ -137,7 +143,7 @@ impl Storage {
     /// How far the products with the input are ahead of one that reads its quads in order, one per cycle from the first.
     fn lead_of_input(&self, formats: &Formats) -> usize {
         let (mut issued, mut lead) = (0, 0);
-        for (_, products) in accumulations(formats).iter().filter(|(vector, _)| *vector == 0) {
+        for (_, products) in accumulations(formats).iter().filter(|(target, _)| *target == Target::Vector(0)) {
             for group in 0..formats.groups {
                 for &column in products.iter().flat_map(|product| self.columns_of(product.matrix, group)) {
                     lead = column.saturating_sub(issued).max(lead);
@@ -146,6 +152,11 @@ impl Storage {
             }
         }
         lead
+    }
+
+    /// Number of groups of rows of a matrix.
+    pub fn groups_of(&self, matrix: Matrix) -> usize {
+        self.matrices.iter().position(|&m| m == matrix).map_or(0, |index| self.columns[index].len())
     }
 
     /// The kept columns of a matrix for a group of rows, ascending.
@@ -172,9 +183,12 @@ impl Storage {
         self.columns.iter().flatten().map(Vec::len).sum()
     }
 
-    /// Whether any column was pruned; `quads` is the number of columns of a matrix.
+    /// Whether any column was pruned; `quads` is the number of columns of a matrix of the passes. Those of a network are
+    /// never pruned.
     pub fn is_pruned(&self, quads: usize) -> bool {
-        self.columns.iter().flatten().any(|columns| columns.len() < quads)
+        let of_passes = |kind| !matches!(kind, Kind::Layer(_) | Kind::Bias(_));
+        let own = self.matrices.iter().zip(&self.columns).filter(|(matrix, _)| of_passes(matrix.kind));
+        own.flat_map(|(_, groups)| groups).any(|columns| columns.len() < quads)
     }
 
     /// The column of each word of the case.
@@ -202,11 +216,11 @@ impl Storage {
     pub fn memory(&self, formats: &Formats, quantised: &Quantised) -> Vec<Vec<i64>> {
         let lanes = formats.lanes_per_parity;
         let word = |matrix: Matrix, group: usize, j: usize| -> Vec<i64> {
-            let own = quantised.blocks(matrix);
+            let (own, [rows, columns]) = (quantised.blocks(matrix), quantised.size(matrix, formats.quads));
             (0..4)
                 .flat_map(|parity| (0..lanes).map(move |k| (parity, group * lanes + k)))
-                .map(|(parity, i)| match i < formats.quads {
-                    true => coefficient(formats, matrix.kind, own.parity[parity][i * formats.quads + j]),
+                .map(|(parity, i)| match i < rows {
+                    true => coefficient(formats, matrix.kind, own.parity[parity][i * columns + j]),
                     false => 0,
                 })
                 .collect()

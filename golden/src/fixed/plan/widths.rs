@@ -12,10 +12,13 @@ use crate::fixed::words::coefficients::{parity_blocks, quantise, Blocks, Flipped
 use crate::fixed::words::formats::{
     Formats, FORCE_BITS, LOG_FRACTION, MULTIPLIER_BITS, MU_ROUND, MU_STEPS, SEARCH_EXTRA_BITS,
 };
+use crate::fixed::stages::send::LN_SIGMA_BITS;
+use crate::fixed::words::network::WordNetwork;
 use crate::fixed::words::quantised::Quantised;
 use crate::fixed::words::schedule::{vectors, EXPONENTS};
+use crate::learned::{ComposedLayer, Learned};
 use crate::matrices::Matrices;
-use crate::scene::Scene;
+use crate::scene::{EstimatorKind, Scene};
 use crate::symmetry::parity::{FLIP_X, FLIP_Y};
 use crate::symmetry::quads::Quads;
 
@@ -60,21 +63,23 @@ pub fn widths(scene: &Scene, shapes: &[Shape], board: &Board) -> Result<Widths, 
     // Narrower multipliers have narrower operands; the remaining bits of inverse and input go into low limbs.
     let operand_bits = MULTIPLIER_BITS.min(board.multiplier_bits);
     let (data_bits, coef_bits) = (spec.data_bits.min(operand_bits), spec.coef_bits.min(operand_bits));
-    let quantised = quantised(scene, shapes, coef_bits)?;
+    let mut quantised = quantised(scene, shapes, coef_bits)?;
+    let composed = composed(scene)?;
     // The largest of a bound over all cases.
     let bound = |of: &dyn Fn(&Quantised, usize) -> u64| {
         let each = quantised.iter().zip(shapes).map(|(quantised, shape)| of(quantised, shape.quads().len()));
         each.max().unwrap_or(0)
     };
     // The same in all cases: a scene with dead taxels, which break the symmetry, has one case and one subarray.
-    let Quantised { inverse, ax, ay } = &quantised[0];
+    let Quantised { inverse, ax, ay, .. } = &quantised[0];
     let flips = Flips { inverse: inverse.flips(), ax: ax.flips(), ay: ay.flips() };
 
     let sensor = &largest.matrices.sensor;
     // Where all subarrays are square, one matrix is used for both axes.
     let square = sensor.rows == sensor.cols && sensor.pitch_x_mm == sensor.pitch_y_mm;
     let serial = board.engine == EngineKind::Serial;
-    let shared_a = !serial && degree == 1 && square && shapes.len() == 1 && flips.are_symmetric();
+    let shared_a =
+        !serial && degree == 1 && square && shapes.len() == 1 && flips.are_symmetric() && composed.is_empty();
 
     let input_bits = spec.input_bits + scene.input.average;
     let fold_bits = input_bits + 2;
@@ -121,6 +126,7 @@ pub fn widths(scene: &Scene, shapes: &[Shape], board: &Board) -> Result<Widths, 
     let each = quantised.iter().zip(shapes);
     let growths: Vec<Vec<f64>> =
         each.map(|(q, shape)| growth(&q.ax, &q.ay, shape.quads().len(), EXPONENTS.len())).collect();
+    let headroom = if composed.is_empty() { 0 } else { headroom(&growths, degree) };
     let growth = |k: usize| growths.iter().map(|growth| growth[k]).fold(0.0, f64::max);
     let taxel_max = 1u64 << (vector_bits + 1);
     let used = vectors(degree);
@@ -132,29 +138,33 @@ pub fn widths(scene: &Scene, shapes: &[Shape], board: &Board) -> Result<Widths, 
         .collect();
     let shifted: Vec<u64> = (0..used).map(|k| reach(&coefficients, k)).collect();
     let taxels = (sensor.rows * sensor.cols) as u64;
-    // Without a search v_00 keeps its unfolded width.
+    // Without a search p keeps its unfolded width.
     let search_bits: Vec<u32> = match degree {
         0 => vec![vector_bits + 2],
+        _ if !composed.is_empty() => vec![vector_bits + 2],
         _ => shifted.iter().map(|&bound| signed_bits(bound)).collect(),
     };
     let sum_bits: Vec<u32> = shifted.iter().map(|&bound| signed_bits(bound * taxels)).collect();
 
     // A logarithm is below 2^6; the difference of two sums of `taxels` of them needs a sign.
-    let score_bits = signed_bits(taxels << (6 + LOG_FRACTION));
+    // With a network its word holds two ln σ.
+    let score_bits = if composed.is_empty() { signed_bits(taxels << (6 + LOG_FRACTION)) } else { 2 * LN_SIGMA_BITS };
     // 18 bits of μ; fz, with its factor 1, needs no more fraction than that.
     let mu_fraction = (f64::from((1 << 17) - 1) / scene.search.mu_max).log2().floor().min(17.0) as u32;
     let mu_step = (scene.search.mu_max / MU_STEPS as f64 * 2f64.powi((mu_fraction + MU_ROUND) as i32)).round() as i64;
 
     let raw_length_max = bit_length(raw_bound);
-    let rescale_max = raw_length_max.saturating_sub(vector_bits - 1);
-    let headroom = FORCE_BITS - search_bits[0];
+    let rescale_max = raw_length_max.saturating_sub(vector_bits - 1 - headroom);
+    let force_headroom = FORCE_BITS - search_bits[0];
     let count = largest.quads().len();
     let formats = Formats {
         degree,
         quads: count,
         lanes_per_parity: count,
         groups: 1,
-        search_width: search_width(scene, board, degree, shapes),
+        search_width: if composed.is_empty() { search_width(scene, board, degree, shapes) } else { Quads::LANES },
+        layers: composed.iter().map(|layer| layer.bias[0].len()).collect(),
+        headroom,
         shared_a,
         flips,
         code_bits: spec.input_bits,
@@ -180,9 +190,32 @@ pub fn widths(scene: &Scene, shapes: &[Shape], board: &Board) -> Result<Widths, 
         mu_fraction,
         mu_step,
         // Taxels are in quarters of a vector's LSB; the largest rescale must still fit the force word.
-        force_exponent: raw_shift as i32 - inverse_exponent - 2 + rescale_max as i32 - headroom as i32,
+        force_exponent: raw_shift as i32 - inverse_exponent - 2 + rescale_max as i32 - force_headroom as i32,
     };
+    if !composed.is_empty() {
+        let network = WordNetwork::new(&formats, &composed);
+        let missing = FixedError::Format { what: "network", needs: formats.lane_bits + 1, has: formats.lane_bits };
+        quantised[0].network = Some(network.ok_or(missing)?);
+    }
     Ok(Widths { formats, quantised })
+}
+
+/// The layers of the network that gives μ; none with a search.
+fn composed(scene: &Scene) -> Result<Vec<ComposedLayer>, FixedError> {
+    match scene.search.estimator {
+        EstimatorKind::Network => Ok(Learned::of_scene(scene)?.composed(&scene.input.alive(&scene.sensor))),
+        _ => Ok(Vec::new()),
+    }
+}
+
+/// Bits by which p may be larger than v_00 after `steps` of `relax`: Σ r^k, r the norm of the product of a step at any μ.
+fn headroom(growths: &[Vec<f64>], steps: usize) -> u32 {
+    // The scaled matrices hold 4/3 of mu_max; |μ| is at most that.
+    let of = |growth: &Vec<f64>| -> f64 {
+        let largest = 0.75 * growth[1].hypot(growth[2]);
+        (0..=steps as i32).map(|k| largest.powi(k)).sum()
+    };
+    growths.iter().map(of).fold(1.0, f64::max).log2().ceil() as u32
 }
 
 /// Taxels that the search computes per cycle: the scene's number, else the board's. What is not searched passes on in
@@ -215,7 +248,8 @@ fn quantised(scene: &Scene, shapes: &[Shape], coef_bits: u32) -> Result<Vec<Quan
     let pairs: Vec<_> = shapes.iter().flat_map(pair).collect();
     let mut inverses = quantise(&inverses, spec.inverse_bits).into_iter();
     let mut pairs = quantise(&pairs, coef_bits).into_iter();
-    let mut next = || Some(Quantised { inverse: inverses.next()?, ax: pairs.next()?, ay: pairs.next()? });
+    let mut next =
+        || Some(Quantised { inverse: inverses.next()?, ax: pairs.next()?, ay: pairs.next()?, network: None });
     shapes.iter().map(|_| next().ok_or(FixedError::Internal("as many matrices out as in"))).collect()
 }
 

@@ -10,10 +10,16 @@
 //! The product of the two low limbs, below 2^−22 of the largest result, is left out. The smaller low limb is stored
 //! shifted left (a, c), so that both mixed products have the same weight. Where neither factor has a low limb, v_00 is
 //! the sum of the high limbs.
+//!
+//! The layers of a network are matrices as well, of other sizes; `relax` multiplies its operands by μ first.
 
+use std::borrow::Cow;
+
+use super::relax;
 use crate::fixed::words::formats::Formats;
+use crate::fixed::words::network::ONE;
 use crate::fixed::words::quantised::{coefficient, Quantised};
-use crate::fixed::words::schedule::{Matrix, Operand, Product};
+use crate::fixed::words::schedule::{Axis, Matrix, Operand, Product};
 use crate::symmetry::quads::Quads;
 
 /// A folded input or v_ij, four parities per quad.
@@ -28,6 +34,10 @@ pub struct Operands {
     pub input_low: Vector,
     /// Finished v_ij, `data_bits` wide.
     pub vectors: Vec<Vector>,
+    /// Images of the network's finished layers, as operands.
+    pub layers: Vec<Vector>,
+    /// Position of μ, [x, y], by which the operands of `relax` are multiplied.
+    pub position: [i64; 2],
 }
 
 impl Operands {
@@ -39,20 +49,30 @@ impl Operands {
         Operands {
             input_high: folded.iter().map(|quad| quad.map(|f| f >> low)).collect(),
             input_low: folded.iter().map(|quad| quad.map(|f| (f & mask) << align)).collect(),
-            vectors: Vec::new(),
+            ..Operands::default()
         }
     }
 
-    fn get(&self, operand: Operand) -> &Vector {
-        match operand {
+    /// The quads that a product multiplies.
+    fn get(&self, layout: Quads, product: &Product) -> Cow<'_, [[i64; 4]]> {
+        let quads = match product.operand {
             Operand::InputHigh => &self.input_high,
             Operand::InputLow => &self.input_low,
             Operand::Vector(index) => &self.vectors[index],
+            Operand::Layer(index) => &self.layers[index],
+            Operand::One => return Cow::Owned(vec![[ONE; 4]]),
+        };
+        let scaled = |axis: usize| quads.iter().map(|&quad| relax::scaled(quad, self.position[axis])).collect();
+        match product.factor {
+            Some(Axis::X) => Cow::Owned(scaled(0)),
+            Some(Axis::Y) => Cow::Owned(scaled(1)),
+            None if product.transposed => Cow::Owned(transpose(layout, quads)),
+            None => Cow::Borrowed(quads),
         }
     }
 }
 
-/// Adds up `products` of one v_ij without a shift: one accumulator per quad and parity, in row order.
+/// Adds up the `products` of one accumulation without a shift: one accumulator per row and parity, in order.
 ///
 /// A transposed product reads its operand with x and y exchanged, and so is its result.
 pub fn pass(
@@ -62,17 +82,17 @@ pub fn pass(
     products: &[Product],
     operands: &Operands,
 ) -> Vector {
-    let quads = formats.quads;
-    let mut accumulators = vec![[0i64; 4]; quads];
+    let rows = products.first().map_or(0, |product| quantised.size(product.matrix, formats.quads)[0]);
+    let mut accumulators = vec![[0i64; 4]; rows];
     for product in products {
-        let source = operands.get(product.operand);
         let Matrix { kind, flip } = product.matrix;
+        let [_, columns] = quantised.size(product.matrix, formats.quads);
         let own = quantised.blocks(product.matrix);
-        let source = if product.transposed { &transpose(layout, source) } else { source };
+        let source = operands.get(layout, product);
         for (i, row) in accumulators.iter_mut().enumerate() {
             for (target, acc) in row.iter_mut().enumerate() {
                 for (j, quad) in source.iter().enumerate() {
-                    *acc += coefficient(formats, kind, own.parity[target][i * quads + j]) * quad[target ^ flip];
+                    *acc += coefficient(formats, kind, own.parity[target][i * columns + j]) * quad[target ^ flip];
                 }
             }
         }

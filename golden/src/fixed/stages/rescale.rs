@@ -14,9 +14,9 @@ pub fn raw_length(raw: &[[i64; 4]]) -> u32 {
     bit_length(raw.iter().flatten().fold(0, |seen, &acc| seen | magnitude_bits(acc)))
 }
 
-/// Right shift from a raw v_00 of `raw_length` bits to `vector_bits`.
+/// Right shift from a raw v_00 of `raw_length` bits to the full length of a word.
 pub fn shift(formats: &Formats, raw_length: u32) -> u32 {
-    raw_length.saturating_sub(formats.vector_bits - 1)
+    raw_length.saturating_sub(formats.full_length())
 }
 
 /// Shifts accumulators right by `shift`, rounds and saturates; returns the words and how many saturated.

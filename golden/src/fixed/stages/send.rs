@@ -9,6 +9,9 @@
 //! | 0 | μ1 in mu_max/384 | μ2 in mu_max/384 | flags, see [`Status`] |
 //! | 1 | score, 2^−6 | right shift of `rescale` | left shift of `normalise` |
 //! | 2 | saturations of `rescale` | saturations of `forces` | cycles to the first output beat, see [`Status::cycles`] |
+//!
+//! With a network the score is a word of two ln σ instead, that of μ1 in the lower half, in 1/384, σ in units of mu_max
+//! ([`ln_sigma_word`]); the saturations of `estimate` and `relax` are counted with those of `rescale`.
 
 use serde::Serialize;
 
@@ -17,7 +20,7 @@ pub const STATUS_BEATS: usize = 3;
 
 /// Flag bit: the centroid condition of the scene is met.
 pub const FLAG_CONDITION: u32 = 1;
-/// Flag bit: the search found a candidate with Σp > 0.
+/// Flag bit: the search found a candidate with Σp > 0; with a network, it gave μ.
 pub const FLAG_FOUND: u32 = 1 << 1;
 /// Flag bit: no taxel's |fz| reaches the threshold, or all are zero.
 pub const FLAG_NO_CONTACT: u32 = 1 << 2;
@@ -31,6 +34,19 @@ pub const CASE_SHIFT: u32 = 8;
 /// Position of the number of frames in a sliding mean, 13 bits, among the flags; 0 where the mean does not slide.
 pub const FRAMES_SHIFT: u32 = 16;
 
+/// Width of ln σ in the word of two.
+pub const LN_SIGMA_BITS: u32 = 16;
+
+/// The word of two ln σ, [x, y].
+pub fn ln_sigma_word([x, y]: [i32; 2]) -> i32 {
+    y << LN_SIGMA_BITS | x & ((1 << LN_SIGMA_BITS) - 1)
+}
+
+/// The two ln σ of a word.
+pub fn ln_sigma_of_word(word: i32) -> [i32; 2] {
+    [i32::from(word as i16), word >> LN_SIGMA_BITS]
+}
+
 /// The decoded status of a subarray in one frame.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct Status {
@@ -39,7 +55,7 @@ pub struct Status {
     /// OR of the `FLAG_*` bits; with several cases, also the paper's number of the chosen case from bit [`CASE_SHIFT`]
     /// on; with a sliding mean, the number of frames that it holds from bit [`FRAMES_SHIFT`] on.
     pub flags: u32,
-    /// Score at μ* in LSBs of 2^−6 bit, 0 if the search found nothing.
+    /// Score at μ* in LSBs of 2^−6 bit, 0 if the search found nothing; with a network the word of two ln σ.
     pub score: i32,
     /// Right shift of `rescale`.
     pub rescale: u32,
@@ -86,6 +102,13 @@ impl Status {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn two_ln_sigma_read_back() {
+        for pair in [[-1200, 190], [3, -2688], [0, -1]] {
+            assert_eq!(ln_sigma_of_word(ln_sigma_word(pair)), pair);
+        }
+    }
 
     #[test]
     fn beats_read_back() {

@@ -19,12 +19,14 @@
 //! | v_ij, taxels, in the search | `search_bits[k]` | 27 and less | a quarter of `vector_bits`' |
 //! | Σ over taxels of v_ij | `sum_bits[k]` | | the same |
 //! | log2 | `LOG_FRACTION` fraction bits | 6 | 2^−6 |
+//! | image of a neuron, after ReLU | `image_bits` | 15 | of its layer, [`network`](super::network) |
 //! | μ | 18 | | 2^−`mu_fraction` |
 //! | force | 32 | | `force_exponent` |
 
 use serde::Serialize;
 
 use super::coefficients::Flips;
+use super::schedule::vectors;
 use crate::symmetry::quads::Quads;
 
 /// Operand width of the multipliers in bits; a board with narrower multipliers has its own.
@@ -61,6 +63,12 @@ pub struct Formats {
     pub groups: usize,
     /// Taxels that the search computes per cycle, W: 4, 2 or 1; 4 without a search.
     pub search_width: usize,
+    /// Rows of each layer of the network that gives μ, the last with those of the outputs; empty with a search.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub layers: Vec<usize>,
+    /// Bits by which p(μ) may be larger than v_00; 0 with a search, whose words grow.
+    #[serde(skip_serializing_if = "is_zero")]
+    pub headroom: u32,
     /// Ay is Ax with x and y exchanged and is not stored.
     pub shared_a: bool,
     /// Parity flips of the matrices; serialised where the mirror symmetry is broken.
@@ -115,7 +123,45 @@ pub struct Formats {
     pub force_exponent: i32,
 }
 
+fn is_zero(count: &u32) -> bool {
+    *count == 0
+}
+
 impl Formats {
+    /// Whether a network gives μ, and [`relax`](crate::fixed::stages::relax) p(μ), instead of a search.
+    pub fn has_network(&self) -> bool {
+        !self.layers.is_empty()
+    }
+
+    /// Number of vectors that leave `rescale`: v_00, then the other v_ij of the polynomial, or with a network a product
+    /// for each step of `relax`.
+    pub fn vectors(&self) -> usize {
+        match self.has_network() {
+            true => 1 + self.degree,
+            false => vectors(self.degree),
+        }
+    }
+
+    /// How many of these vectors later passes read: with a search all but those of the highest degree, with a network all
+    /// but the last.
+    pub fn operand_vectors(&self) -> usize {
+        match (self.degree, self.has_network()) {
+            (0, _) => 0,
+            (degree, true) => degree,
+            (degree, false) => vectors(degree - 1),
+        }
+    }
+
+    /// Bit length to which v_00 is brought.
+    pub fn full_length(&self) -> u32 {
+        self.vector_bits - 1 - self.headroom
+    }
+
+    /// Width of the image of a neuron, without a sign: four of them add up to an operand.
+    pub fn image_bits(&self) -> u32 {
+        self.data_bits - 3
+    }
+
     /// Steps of a sweep of the search over `quads` quads, one per cycle: `search_width` taxels each.
     pub fn sweep_steps(&self, quads: usize) -> usize {
         quads * (Quads::LANES / self.search_width)
@@ -125,7 +171,7 @@ impl Formats {
 /// The right shift of the force stage for a subarray shifted left by `normalise` and right by `rescale`: the fraction
 /// of the μ word plus the distance of the subarray's exponent from that of the force word.
 pub fn force_shift(formats: &Formats, normalise: u32, rescale: u32) -> u32 {
-    let rescale_max = formats.raw_length_max.saturating_sub(formats.vector_bits - 1);
+    let rescale_max = formats.raw_length_max.saturating_sub(formats.full_length());
     let headroom = FORCE_BITS - formats.search_bits[0];
     (formats.mu_fraction + rescale_max + normalise).saturating_sub(headroom + rescale).min(FORCE_SHIFT_MAX)
 }

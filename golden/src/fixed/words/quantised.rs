@@ -2,6 +2,7 @@
 
 use super::coefficients::{Blocks, Flipped};
 use super::formats::Formats;
+use super::network::WordNetwork;
 use super::schedule::{Kind, Matrix};
 
 /// Quantised matrices of one subarray shape.
@@ -13,35 +14,52 @@ pub struct Quantised {
     pub ax: Blocks,
     /// −Ay·(4/3)·mu_max.
     pub ay: Blocks,
+    /// The network that gives μ, if there is one.
+    pub network: Option<WordNetwork>,
 }
 
 impl Quantised {
-    /// The matrix of which a matrix of `kind` holds the coefficients; both limbs of Cz⁺ hold those of one.
-    pub fn of_kind(&self, kind: Kind) -> &Blocks {
+    /// The blocks of what `kind` names, flip by flip; both limbs of Cz⁺ have those of one.
+    pub fn flips(&self, kind: Kind) -> &[Flipped<i64>] {
+        let layer = |layer: usize| self.network.as_ref().and_then(|network| network.layers.get(layer));
         match kind {
-            Kind::InverseHigh | Kind::InverseLow => &self.inverse,
-            Kind::Ax => &self.ax,
-            Kind::Ay => &self.ay,
+            Kind::InverseHigh | Kind::InverseLow => &self.inverse.flips,
+            Kind::Ax => &self.ax.flips,
+            Kind::Ay => &self.ay.flips,
+            Kind::Layer(index) => layer(index).map_or(&[], |layer| std::slice::from_ref(&layer.weights)),
+            Kind::Bias(index) => layer(index).map_or(&[], |layer| std::slice::from_ref(&layer.bias)),
         }
     }
 
     /// The blocks of a stored matrix.
     ///
     /// # Panics
-    /// If the matrix has no such flip; a schedule lists only flips that exist.
+    /// If there is no such matrix; a schedule lists only those that exist.
     pub fn blocks(&self, matrix: Matrix) -> &Flipped<i64> {
-        let own = self.of_kind(matrix.kind).flips.iter().find(|own| own.flip == matrix.flip);
-        own.expect("a flip of the schedule")
+        let own = self.flips(matrix.kind).iter().find(|own| own.flip == matrix.flip);
+        own.expect("a matrix of the schedule")
     }
 
-    /// The blocks of a stored matrix, to change them; `None` if the matrix has no such flip.
+    /// The blocks of a stored matrix of the passes, to change them; `None` if there is no such flip, and for a network.
     pub fn blocks_mut(&mut self, matrix: Matrix) -> Option<&mut Flipped<i64>> {
         let blocks = match matrix.kind {
             Kind::InverseHigh | Kind::InverseLow => &mut self.inverse,
             Kind::Ax => &mut self.ax,
             Kind::Ay => &mut self.ay,
+            Kind::Layer(_) | Kind::Bias(_) => return None,
         };
         blocks.flips.iter_mut().find(|own| own.flip == matrix.flip)
+    }
+
+    /// Rows and columns of the blocks of a stored matrix, for a subarray of `quads` quads.
+    pub fn size(&self, matrix: Matrix, quads: usize) -> [usize; 2] {
+        let own = |layer: usize| self.network.as_ref().map(|network| &network.layers[layer]);
+        let size = match matrix.kind {
+            Kind::InverseHigh | Kind::InverseLow | Kind::Ax | Kind::Ay => Some([quads; 2]),
+            Kind::Layer(layer) => own(layer).map(|layer| [layer.outputs, layer.inputs]),
+            Kind::Bias(layer) => own(layer).map(|layer| [layer.outputs, 1]),
+        };
+        size.unwrap_or_default()
     }
 }
 
@@ -51,6 +69,6 @@ pub fn coefficient(formats: &Formats, kind: Kind, c: i64) -> i64 {
     match kind {
         Kind::InverseHigh => c >> low,
         Kind::InverseLow => (c & ((1 << low) - 1)) << (formats.limb_align - low),
-        Kind::Ax | Kind::Ay => c,
+        Kind::Ax | Kind::Ay | Kind::Layer(_) | Kind::Bias(_) => c,
     }
 }

@@ -8,6 +8,9 @@
 //! The lanes of the parallel engine are plain multiply-accumulators and shift nothing: the products of v_00 with a low
 //! limb are one [accumulation](accumulations), those of the high limbs another, and their rows are added once, in front
 //! of `rescale`. The serial engine has one accumulator of each parity and shifts in front of it.
+//!
+//! With a network there is no polynomial: after v_00 come the layers of the [network](super::network), each a product and
+//! its bias, then the steps of [`relax`](crate::fixed::stages::relax), whose operands are multiplied by μ1 or μ2.
 
 use super::coefficients::Flips;
 use super::formats::Formats;
@@ -32,6 +35,10 @@ pub enum Kind {
     Ax,
     /// −Ay·(4/3)·mu_max.
     Ay,
+    /// Weights of a layer of the network.
+    Layer(usize),
+    /// Biases of a layer of the network, one column.
+    Bias(usize),
 }
 
 /// A matrix in the coefficient memory: the blocks of one parity flip.
@@ -50,8 +57,30 @@ pub enum Operand {
     InputHigh,
     /// Low limb of the folded input.
     InputLow,
-    /// v_ij, by its index in [`EXPONENTS`].
+    /// v_ij, by its index in [`EXPONENTS`]; with a network v_00, or p after so many steps of `relax`.
     Vector(usize),
+    /// Images of a hidden layer's neurons, after ReLU.
+    Layer(usize),
+    /// One quad of [`ONE`](super::network::ONE)s, the operand of the biases.
+    One,
+}
+
+/// The result of an accumulation.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Target {
+    /// A vector for `rescale`, by its number: [`Formats::vectors`].
+    Vector(usize),
+    /// A layer of the network.
+    Layer(usize),
+}
+
+/// A scalar that an operand is multiplied by: the position of μ on an axis, over 512.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Axis {
+    /// μ1.
+    X,
+    /// μ2.
+    Y,
 }
 
 /// One matrix-vector product.
@@ -65,19 +94,49 @@ pub struct Product {
     pub align: bool,
     /// Whether operand and result have x and y exchanged.
     pub transposed: bool,
+    /// What the operand is multiplied by first.
+    pub factor: Option<Axis>,
 }
 
-/// The products of every v_ij, in order of [`EXPONENTS`].
+/// The products of every vector that leaves `rescale`: the v_ij in order of [`EXPONENTS`]; with a network v_00, then those
+/// of each step of `relax`.
 pub fn schedule(formats: &Formats) -> Vec<Vec<Product>> {
     let limbs = (formats.input_low_bits > 0, formats.inverse_low_bits > 0);
-    products(formats.degree, limbs, formats.shared_a, &formats.flips)
+    match formats.has_network() {
+        false => products(formats.degree, limbs, formats.shared_a, &formats.flips),
+        true => {
+            let first = products(0, limbs, false, &formats.flips);
+            first.into_iter().chain((0..formats.degree).map(|step| shear(step, &formats.flips))).collect()
+        }
+    }
 }
 
-/// The products of every accumulation of the parallel engine's lanes, with the index of their v_ij in [`EXPONENTS`]; of
-/// v_00 that of the low limbs comes first.
-pub fn accumulations(formats: &Formats) -> Vec<(usize, Vec<Product>)> {
-    let of = |(k, products): (usize, Vec<Product>)| by_limbs(&products).into_iter().map(move |part| (k, part));
-    schedule(formats).into_iter().enumerate().flat_map(of).collect()
+/// The products of a step of `relax`: −(μ1 Ax + μ2 Ay) p.
+fn shear(step: usize, flips: &Flips) -> Vec<Product> {
+    let of = |kind, axis, flips: &[usize]| -> Vec<Product> {
+        let product = |&flip| Product { factor: Some(axis), ..Product::of(kind, flip, Operand::Vector(step)) };
+        flips.iter().map(product).collect()
+    };
+    [of(Kind::Ax, Axis::X, &flips.ax), of(Kind::Ay, Axis::Y, &flips.ay)].concat()
+}
+
+/// The products of a layer of the network.
+pub fn layer(layer: usize) -> Vec<Product> {
+    let inputs = layer.checked_sub(1).map_or(Operand::InputHigh, Operand::Layer);
+    vec![Product::of(Kind::Layer(layer), 0, inputs), Product::of(Kind::Bias(layer), 0, Operand::One)]
+}
+
+/// The products of every accumulation of the parallel engine's lanes, with their result; of v_00 that of the low limbs
+/// comes first, the layers of a network come after v_00.
+pub fn accumulations(formats: &Formats) -> Vec<(Target, Vec<Product>)> {
+    let of = |(k, products): (usize, Vec<Product>)| {
+        by_limbs(&products).into_iter().map(move |part| (Target::Vector(k), part))
+    };
+    let mut vectors = schedule(formats).into_iter().enumerate();
+    let mut all: Vec<_> = vectors.by_ref().take(1).flat_map(of).collect();
+    all.extend((0..formats.layers.len()).map(|index| (Target::Layer(index), layer(index))));
+    all.extend(vectors.flat_map(of));
+    all
 }
 
 /// The products of one v_ij by their shift: those of low limbs, if there are any, then the others.
@@ -90,7 +149,7 @@ pub fn by_limbs(products: &[Product]) -> Vec<Vec<Product>> {
 /// Ax is used for Ay; `flips` of the matrices.
 pub fn products(degree: usize, limbs: (bool, bool), shared_a: bool, flips: &Flips) -> Vec<Vec<Product>> {
     let of = |kind, flips: &[usize], operand, align, transposed| -> Vec<Product> {
-        let product = |&flip| Product { matrix: Matrix { kind, flip }, operand, align, transposed };
+        let product = |&flip| Product { align, transposed, ..Product::of(kind, flip, operand) };
         flips.iter().map(product).collect()
     };
     let mut first = of(Kind::InverseHigh, &flips.inverse, Operand::InputHigh, true, false);
@@ -124,11 +183,16 @@ pub fn is_transposed(products: &[Product]) -> bool {
 }
 
 impl Product {
-    /// Index of the operand's v_ij; 0 for the limbs of the input.
+    /// A plain product.
+    fn of(kind: Kind, flip: usize, operand: Operand) -> Product {
+        Product { matrix: Matrix { kind, flip }, operand, align: false, transposed: false, factor: None }
+    }
+
+    /// Index of the operand's v_ij; 0 for all other operands.
     pub fn operand_index(&self) -> usize {
         match self.operand {
             Operand::Vector(index) => index,
-            Operand::InputHigh | Operand::InputLow => 0,
+            Operand::InputHigh | Operand::InputLow | Operand::Layer(_) | Operand::One => 0,
         }
     }
 }

@@ -101,6 +101,14 @@ impl SearchInput<'_> {
 }
 
 impl Estimate {
+    /// What a network says of μ: its mean, standard deviation, and the mean's position on the search grid. The objective is ln
+    /// of the density at the mean.
+    pub fn told(mu: [f64; 2], sigma: [f64; 2], position: [i32; 2]) -> Estimate {
+        let objective = -sigma.iter().map(|sigma| (sigma * std::f64::consts::TAU.sqrt()).ln()).sum::<f64>();
+        let found = SearchResult { mu, position, objective, evaluations: 1 };
+        Estimate { found, load_N: None, sigma: Some(sigma) }
+    }
+
     /// Standard deviation of the shear over its size, if σ is known. Below [`NO_SHEAR`] a shear counts as none, and its
     /// standard deviation is taken over that.
     pub fn shear_spread(&self) -> Option<f64> {

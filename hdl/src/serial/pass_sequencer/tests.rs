@@ -206,7 +206,7 @@ impl Machine {
         let issue = matches!(s.step, FIRST | OTHERS) && !s.draining && s.gap == 0;
         let instruction = self.program[(s.product as usize).min(self.program.len() - 1)];
         let (folded, rescaled) = (self.is_folding() && bit(inputs, "transformed_valid"), self.rescaled(inputs));
-        let write = folded || rescaled && s.vector < operand_vectors(f.degree) as u64;
+        let write = folded || rescaled && s.vector < f.operand_vectors() as u64;
         let vector = match s.step {
             FOLD_HIGH => 0,
             FOLD_LOW => 1,
