@@ -39,7 +39,8 @@ mod window;
 pub use composed::ComposedLayer;
 pub use error::LearnedError;
 pub use file::Signature;
-pub(crate) use network::{LN_SIGMA, PLACES};
+pub(crate) use network::LN_SIGMA;
+pub use network::PLACES;
 pub use training::{Stage, Training};
 pub use window::{Place, Window};
 

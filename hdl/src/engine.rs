@@ -5,6 +5,9 @@
 //!  s_axis -->  |  frame buffer         |      ^________|  v_ij             |                  |--> m_axis
 //!              '--- magnitude, signs --'                                   '--- μ, score -----'
 //! ```
+//! Where a network gives μ, rows of its layers go from `pass` to `estimate`, whose images are operands again; `relax`, between
+//! `rescale` and `unfold`, adds v_00 to the products of each step. In other scenes both are wires.
+//!
 //! Overlaps shorten the frame interval:
 //! - While a frame is computed, the next is received; the frame buffer is free as soon as `fold` has read it.
 //! - While one subarray is searched, the v_ij of the next are computed, or those of the next frame's first.
@@ -23,11 +26,13 @@ use dermis_golden::symmetry::quads::Quads;
 use rust_hdl::prelude::*;
 
 use crate::ports::one_of;
-use crate::primitives::{count_bits, largest, BitDelay, CaseCounter, Dff, EnableRegister, FrameCycles};
+use crate::primitives::{
+    count_bits, largest, BitDelay, CaseCounter, Dff, EnableRegister, FrameCycles, SATURATION_BITS,
+};
 use crate::stage_list::engine;
 use crate::stages::{
-    Banks, Fold, Forces, Normalise, Pass, Prepare, Receive, ReceivePorts, Rescale, Resultants, Search, SearchPorts,
-    Send, Unfold, Unsearched,
+    Banks, Estimate, Fold, Forces, Normalise, Pass, Prepare, Receive, ReceivePorts, Relax, Rescale, Resultants, Search,
+    SearchPorts, Send, Unfold, Unsearched,
 };
 use crate::wire::Wire;
 
@@ -104,7 +109,9 @@ engine! {
             normalise: Normalise => "stages/normalise.rs",
             fold: Fold => "stages/fold.rs",
             pass: Pass => "stages/pass.rs",
+            estimate: Estimate => "stages/estimate.rs",
             rescale: Rescale => "stages/rescale.rs",
+            relax: Relax => "stages/relax.rs",
             unfold: Unfold => "stages/unfold.rs",
             search: SearchStage => "stages/search.rs",
             forces: Forces => "stages/forces.rs",
@@ -145,6 +152,7 @@ engine! {
             both_signs: Constant<Bit>,
             ahead: Constant<Bit>,
             single: Constant<Bit>,
+            told: Constant<Bit>,
             begin_frame: Signal<Local, Bit>,
             start: Signal<Local, Bit>,
             leaves: Signal<Local, Bit>,
@@ -182,6 +190,8 @@ impl Engine {
             receive: ReceiveStage::new(model),
             fold: Fold::new(model),
             pass: Pass::new(model),
+            estimate: Estimate::new(model),
+            relax: Relax::new(formats),
             unfold: Unfold::new(model),
             search: SearchStage::new(model),
             forces,
@@ -206,7 +216,7 @@ impl Engine {
             searched_part: EnableRegister::new(count_bits(largest(&counts))),
             searched_normalise: EnableRegister::new(normalise.shift.width()),
             searched_rescale: EnableRegister::new(rescale.shift.width()),
-            searched_saturations: EnableRegister::new(rescale.saturations.width()),
+            searched_saturations: EnableRegister::new(SATURATION_BITS),
             searched_damaged: EnableRegister::new(1).constant(!model.has_coefficient_check()),
             received_frames: frames(),
             frame_frames: frames(),
@@ -223,6 +233,7 @@ impl Engine {
             both_signs: Constant::new(model.scene.partition.condition == Condition::BothSigns),
             ahead: Constant::new(model.resources.overlaps),
             single: Constant::new(counts.iter().all(|&count| count == 1)),
+            told: Constant::new(model.has_network()),
             begin_frame: Default::default(),
             start: Default::default(),
             leaves: Default::default(),
@@ -247,7 +258,11 @@ impl Logic for Engine {
         self.normalise.clk.next = self.clk.val();
         self.fold.clk.next = self.clk.val();
         self.pass.clk.next = self.clk.val();
+        self.estimate.clk.next = self.clk.val();
+        self.estimate.rst.next = self.rst.val();
         self.rescale.clk.next = self.clk.val();
+        self.relax.clk.next = self.clk.val();
+        self.relax.rst.next = self.rst.val();
         self.unfold.clk.next = self.clk.val();
         self.search.clk.next = self.clk.val();
         self.forces.clk.next = self.clk.val();
@@ -370,7 +385,7 @@ impl Logic for Engine {
         self.searched_rescale.keep.next = self.handed.q.val();
         self.searched_rescale.word.next = self.rescale.shift.val();
         self.searched_saturations.keep.next = self.handed.q.val();
-        self.searched_saturations.word.next = self.rescale.saturations.val();
+        self.searched_saturations.word.next = self.relax.saturations.val();
         self.searched_damaged.keep.next = self.handed.q.val();
         self.searched_damaged.word.next = self.pass.damaged.val();
 
@@ -435,11 +450,26 @@ impl Logic for Engine {
         self.rescale.quad.next = self.pass.quad.val();
         self.rescale.quad_valid.next = self.pass.quad_valid.val();
         self.rescale.quad_soon.next = self.pass.quad_soon.val();
-        self.pass.vector_quad.next = self.rescale.operands.val();
-        self.pass.vector_valid.next = self.rescale.operands_valid.val();
+        self.estimate.start.next = self.start.val();
+        self.estimate.enabled.next = self.condition.q.val();
+        self.estimate.quad.next = self.pass.quad.val();
+        self.estimate.valid.next = self.pass.layer_valid.val();
+        self.relax.start.next = self.start.val();
+        self.relax.words.next = self.rescale.words.val();
+        self.relax.words_valid.next = self.rescale.words_valid.val();
+        self.relax.short.next = self.rescale.operands.val();
+        self.relax.short_valid.next = self.rescale.operands_valid.val();
+        self.relax.rescaled.next = self.rescale.saturations.val();
+        self.relax.images.next = self.estimate.operands.val();
+        self.relax.images_valid.next = self.estimate.operands_valid.val();
+        self.relax.estimated.next = self.estimate.saturations.val();
+        self.pass.vector_quad.next = self.relax.operands.val();
+        self.pass.vector_valid.next = self.relax.operands_valid.val();
+        self.pass.position_x.next = self.estimate.position_x.val();
+        self.pass.position_y.next = self.estimate.position_y.val();
         self.unfold.start.next = self.start.val();
-        self.unfold.words.next = self.rescale.words.val();
-        self.unfold.words_valid.next = self.rescale.words_valid.val();
+        self.unfold.words.next = self.relax.sums.val();
+        self.unfold.words_valid.next = self.relax.sums_valid.val();
 
         comment!("unfold -> search");
         self.search.fill_quad.next = self.unfold.taxels.val();
@@ -467,6 +497,12 @@ impl Logic for Engine {
         self.forces.position_y.next = self.search.best_y.val();
         self.forces.score.next = self.search.score.val();
         self.forces.found.next = self.search.found.val();
+        if self.told.val() {
+            self.forces.position_x.next = self.estimate.position_x.val();
+            self.forces.position_y.next = self.estimate.position_y.val();
+            self.forces.score.next = self.estimate.ln_sigma.val();
+            self.forces.found.next = self.searched_condition.q.val();
+        }
         self.forces.normalise.next = self.searched_normalise.kept.val();
         self.forces.rescale.next = self.searched_rescale.kept.val();
         self.forces.saturations.next = self.searched_saturations.kept.val();

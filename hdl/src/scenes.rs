@@ -1,16 +1,32 @@
 //! Small scenes for tests, and where their taxels are in the memories.
 
 use dermis_golden::fixed::{CasePlan, Model};
+use dermis_golden::learned::{Learned, Training};
 use dermis_golden::scene::Scene;
 use dermis_golden::symmetry::quads::Quads;
 
 /// The model of a sensor of `rows` × `cols` taxels; `more` is the rest of the scene file.
 pub(crate) fn model(rows: usize, cols: usize, more: &str) -> Model {
+    Model::new(&scene(rows, cols, more)).unwrap()
+}
+
+fn scene(rows: usize, cols: usize, more: &str) -> Scene {
     let text = format!(
         "name = \"small\"\n[sensor]\nrows = {rows}\ncols = {cols}\npitch_x_mm = 2.0\npitch_y_mm = 2.0\n\
          thickness_mm = 2.0\n{more}"
     );
-    Model::new(&Scene::parse(&text, "small.toml").unwrap()).unwrap()
+    Scene::parse(&text, "small.toml").unwrap()
+}
+
+/// The model of such a sensor with a network of these hidden layers, hardly trained; `more` adds to table `[search]`.
+pub(crate) fn learned(rows: usize, cols: usize, hidden: &[usize], more: &str) -> Model {
+    let mut scene = scene(rows, cols, &format!("[search]\nestimator = \"learned\"\n{more}"));
+    let training = Training { steps: 20, batch: 16, contacts: 40, hidden: hidden.to_vec(), ..Training::default() };
+    let trained = Learned::train(&scene, &training, &|_| ()).unwrap();
+    let file = tempfile::NamedTempFile::new().unwrap();
+    std::fs::write(file.path(), trained.bytes).unwrap();
+    scene.search.network = Some(file.path().to_owned());
+    Model::new(&scene).unwrap()
 }
 
 /// Where a taxel of the array is.

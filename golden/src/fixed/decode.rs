@@ -5,7 +5,8 @@ use super::model::Model;
 use super::plan::contents::CasePlan;
 use super::stages::resultants;
 use super::stages::send::{
-    ln_sigma_of_word, Status, CASE_SHIFT, FLAG_COEFFICIENTS, FLAG_CONDITION, FLAG_FOUND, FLAG_NO_CONTACT, FRAMES_SHIFT, STATUS_BEATS,
+    ln_sigma_of_word, Status, CASE_SHIFT, FLAG_COEFFICIENTS, FLAG_CONDITION, FLAG_FOUND, FLAG_NO_CONTACT, FRAMES_SHIFT,
+    STATUS_BEATS,
 };
 use super::words::formats::{LOG_FRACTION, MU_STEPS};
 use crate::checks::Checks;

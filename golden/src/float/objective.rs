@@ -31,8 +31,8 @@ pub(crate) mod taxels;
 
 pub use auto::Auto;
 pub use compressive::Compressive;
-pub use estimate::{Estimate, Objective, SearchInput};
 pub(crate) use estimate::NO_SHEAR;
+pub use estimate::{Estimate, Objective, SearchInput};
 pub(crate) use fit::misfit_limit;
 pub use patch::Patch;
 pub use sparse::{Sparse, EPSILON};

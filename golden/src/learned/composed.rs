@@ -92,7 +92,11 @@ mod tests {
             let image = |lane| {
                 Mat::from_fn(quads.len(), 1, |quad, _| {
                     let taxel = quads.taxel(quad, lane);
-                    if alive[taxel] { (frame.stress_MPa[taxel] / s) as f32 } else { 0.0 }
+                    if alive[taxel] {
+                        (frame.stress_MPa[taxel] / s) as f32
+                    } else {
+                        0.0
+                    }
                 })
             };
             let mut inputs = exchanged(&std::array::from_fn(image));
@@ -108,7 +112,8 @@ mod tests {
                 });
                 inputs = outputs;
                 if index + 1 < layers.len() {
-                    let images = exchanged(&inputs).map(|own| Mat::from_fn(own.nrows(), 1, |k, _| own[(k, 0)].max(0.0)));
+                    let images =
+                        exchanged(&inputs).map(|own| Mat::from_fn(own.nrows(), 1, |k, _| own[(k, 0)].max(0.0)));
                     inputs = exchanged(&images);
                 }
             }

@@ -7,7 +7,7 @@ use dermis_golden::fixed::Model;
 use super::Engine;
 use crate::language::testbench::{check_with_defects, random_word, Reference};
 use crate::language::Change;
-use crate::scenes::model;
+use crate::scenes::{learned, model};
 use crate::wire::Word;
 
 /// Width of a component of a force, in bits.
@@ -126,4 +126,16 @@ fn beats_leave_in_the_cycles_of_the_model() {
         let defects = [Change::value("", "search__enabled", |k| k.constant(1, 0))];
         check_with_defects(subject, &stimulus(&model, 7), || Frames::new(model.clone()), &defects);
     }
+}
+
+#[test]
+fn with_a_network_beats_leave_in_the_cycles_of_the_model() {
+    let model = learned(4, 5, &[13, 7], "mu_max = 0.3\n");
+    assert!(model.has_network() && !model.searches() && model.formats().degree > 1);
+    let subject = |changes: &[Change]| engine_subject!(Engine::new(&model), changes);
+    let defects = [
+        Change::value("", "estimate__enabled", |k| k.constant(1, 0)),
+        Change::value("", "relax__images_valid", |k| k.constant(1, 0)),
+    ];
+    check_with_defects(subject, &stimulus(&model, 7), || Frames::new(model.clone()), &defects);
 }

@@ -208,7 +208,7 @@ fn program(f: &Formats) -> Vec<Instruction> {
     let instruction = |(product, last): (Product, bool)| Instruction {
         matrix: WIDE.iter().position(|&kind| kind == product.matrix.kind).unwrap_or(0),
         low: product.matrix.kind == Kind::InverseLow,
-        operand: operand_index(f, product),
+        operand: operand_index(f, &product),
         flip: product.matrix.kind == Kind::Ay,
         align: product.align,
         last,

@@ -3,19 +3,22 @@
 //!
 //! `prepare`, `receive`, `fold`, `pass`, `rescale`, `unfold`, `search`, `forces` and `send` connect
 //! [primitives](crate::primitives) by `#[hdl_gen]`: single-bit control and connections. `normalise`, `choose`, `banks`,
-//! `unsearched` and `resultants` are [kernels](crate::language).
+//! `estimate`, `relax`, `unsearched` and `resultants` are [kernels](crate::language).
 //!
 //! `banks` (with `choose`) stands in the place of `receive` where the case is chosen per frame; `unsearched` in that of
-//! `search` in a scene without one. Both pairs have the same ports.
+//! `search` in a scene without one. Both pairs have the same ports. `estimate` and `relax` work where a network gives μ; in other
+//! scenes they are wires.
 
 mod banks;
 mod choose;
+mod estimate;
 mod fold;
 mod forces;
 mod normalise;
 mod pass;
 mod prepare;
 mod receive;
+mod relax;
 mod rescale;
 mod resultants;
 mod search;
@@ -25,6 +28,7 @@ mod unsearched;
 
 pub use banks::Banks;
 pub use choose::Choose;
+pub use estimate::Estimate;
 pub use fold::Fold;
 pub use forces::Forces;
 pub use normalise::Normalise;
@@ -33,6 +37,7 @@ pub use prepare::Prepare;
 #[cfg(test)]
 pub(crate) use receive::tests::Reception;
 pub use receive::{Receive, ReceivePorts};
+pub use relax::Relax;
 pub use rescale::Rescale;
 pub use resultants::Resultants;
 pub use search::{Search, SearchPorts};

@@ -2,16 +2,16 @@
 //!
 //! The schedule issues one column per cycle. It waits for one to three cycles after each accumulation and where the operand of a
 //! step is not complete yet; where quads are written and read in order, until its first quad has been written. From issue
-//! to operands: addresses (1 cycle, 3 with a column list), memories (2), selection of limb and parity (1); then the
-//! lanes.
+//! to operands: addresses (1 cycle, 3 with a column list), memories (2), selection of limb and parity (1), with a network the
+//! product with μ (2); then the lanes.
 
-use dermis_golden::fixed::plan::resources::{operand_vectors, Holds};
+use dermis_golden::fixed::plan::resources::{operand_lengths, Holds};
 use dermis_golden::fixed::Model;
 use rust_hdl::prelude::*;
 
 use crate::primitives::{
-    control_bits, count_bits, BitDelay, Counter, Delay, Dff, Lanes, OperandSelect, OperandWriter, PassProgram, Ram,
-    Slice, SOURCE_BITS,
+    count_bits, longest, position_bits, BitDelay, Control, Counter, Delay, Dff, Lanes, OperandScale, OperandSelect,
+    OperandWriter, PassProgram, Ram, Slice, FACTOR_BITS, SOURCE_BITS,
 };
 use crate::wire::Wire;
 
@@ -30,12 +30,19 @@ pub struct Pass {
     pub input_address: Wire<Out>,
     /// Four parities of that quad, `fold_bits` each, signed; two cycles after `input_address`.
     pub input_quad: Wire<In>,
-    /// Four parities of a finished v_ij, `data_bits` each, signed, quads in order; valid with `vector_valid`.
+    /// Four parities of a finished v_ij, of the images of a layer, or of p, `data_bits` each, signed, quads in order; valid with
+    /// `vector_valid`.
     pub vector_quad: Wire<In>,
     /// `vector_quad` holds a quad.
     pub vector_valid: Signal<In, Bit>,
+    /// Position of μ1 in mu_max/384, signed; valid from the quad of operands that says so, with a network.
+    pub position_x: Wire<In>,
+    /// Position of μ2, as `position_x`.
+    pub position_y: Wire<In>,
     /// Accumulators of one row for the four parities, `lane_bits` each, signed; valid with `quad_valid`.
     pub quad: Wire<Out>,
+    /// `quad` holds a row of a layer of a network; `quad_valid` is low.
+    pub layer_valid: Signal<Out, Bit>,
     /// `quad` holds a row.
     pub quad_valid: Signal<Out, Bit>,
     /// `quad` holds a row two cycles later.
@@ -49,12 +56,15 @@ pub struct Pass {
     vectors: Ram,
     operand_writer: OperandWriter,
     source: Delay,
+    factor: Delay,
     control: Delay,
     valid: BitDelay,
     select: OperandSelect,
+    scale: OperandScale,
     /// The MAC lanes.
     pub lanes: Lanes,
     low_address: Slice,
+    coefficient_address: Delay,
     issue: Signal<Local, Bit>,
     column_end: Signal<Local, Bit>,
 }
@@ -66,8 +76,11 @@ impl Pass {
         let quads = formats.quads;
         let pass_program = PassProgram::new(model);
         let lanes = Lanes::new(model);
-        let operands = operand_vectors(formats.degree);
+        let network = model.has_network();
+        let lengths: Vec<Vec<usize>> = model.cases().iter().map(|case| operand_lengths(&case.formats)).collect();
+        let operands: usize = lengths[0].iter().sum();
         let vectors = |memory: Ram| if operands == 0 { memory.left_out() } else { memory };
+        let scaling = OperandScale::latency(network);
         let parity_bits = 4 * formats.data_bits as usize;
         Pass {
             clk: Default::default(),
@@ -78,25 +91,25 @@ impl Pass {
             input_quad: Wire::new(4 * formats.fold_bits as usize),
             vector_quad: Wire::new(parity_bits),
             vector_valid: Default::default(),
+            position_x: Wire::new(position_bits()),
+            position_y: Wire::new(position_bits()),
             quad: Wire::new(4 * formats.lane_bits as usize),
+            layer_valid: Default::default(),
             quad_valid: Default::default(),
             quad_soon: Default::default(),
             damaged: Wire::new(1),
-            column: Counter::new(quads),
+            column: Counter::new(longest(model)),
             running: Default::default(),
             low_address: Slice::new(pass_program.operand_address.width(), count_bits(quads)),
-            vectors: vectors(Ram::new(operands.max(1) * quads, 1, parity_bits))
-                .holding([Holds::Operands(0)])
-                .registered(),
-            operand_writer: OperandWriter::new(
-                operands,
-                &model.cases().iter().map(|case| case.formats.quads).collect::<Vec<_>>(),
-                model.first().storage.streamed,
-            ),
+            vectors: vectors(Ram::new(operands.max(quads), 1, parity_bits)).holding([Holds::Operands(0)]).registered(),
+            operand_writer: OperandWriter::new(&lengths, model.first().storage.streamed),
             source: Delay::new(SOURCE_BITS, 2),
-            control: Delay::new(control_bits(model), 3),
-            valid: BitDelay::new(3 + pass_program.latency()),
+            factor: Delay::new(FACTOR_BITS, 3),
+            control: Delay::new(Control::new(model).bits(), 3 + scaling),
+            valid: BitDelay::new(3 + scaling + pass_program.latency()),
+            coefficient_address: Delay::new(pass_program.coefficient_address.width(), scaling),
             select: OperandSelect::new(formats),
+            scale: OperandScale::new(network),
             pass_program,
             lanes,
             issue: Default::default(),
@@ -117,6 +130,9 @@ impl Logic for Pass {
         self.control.clk.next = self.clk.val();
         self.valid.clk.next = self.clk.val();
         self.select.clk.next = self.clk.val();
+        self.scale.clk.next = self.clk.val();
+        self.factor.clk.next = self.clk.val();
+        self.coefficient_address.clk.next = self.clk.val();
         self.lanes.clk.next = self.clk.val();
         self.valid.rst.next = self.rst.val();
         self.lanes.rst.next = self.rst.val();
@@ -153,13 +169,21 @@ impl Logic for Pass {
         self.control.d.next = self.pass_program.control.val();
         self.valid.d.next = self.issue.val();
 
-        self.lanes.address.next = self.pass_program.coefficient_address.val();
-        self.lanes.operands.next = self.select.operands.val();
+        self.factor.d.next = self.pass_program.factor.val();
+        self.scale.factor.next = self.factor.q.val();
+        self.scale.operands.next = self.select.operands.val();
+        self.scale.position_x.next = self.position_x.val();
+        self.scale.position_y.next = self.position_y.val();
+
+        self.coefficient_address.d.next = self.pass_program.coefficient_address.val();
+        self.lanes.address.next = self.coefficient_address.q.val();
+        self.lanes.operands.next = self.scale.scaled.val();
         self.lanes.valid.next = self.valid.q.val();
         self.lanes.control.next = self.control.q.val();
         self.quad.next = self.lanes.quad.val();
         self.quad_valid.next = self.lanes.quad_valid.val();
         self.quad_soon.next = self.lanes.quad_soon.val();
+        self.layer_valid.next = self.lanes.layer_valid.val();
         self.damaged.next = self.lanes.damaged.val();
     }
 }
@@ -169,13 +193,13 @@ mod tests {
     use std::collections::{BTreeMap, VecDeque};
 
     use dermis_golden::fixed::stages::pass::{pass, Operands};
-    use dermis_golden::fixed::words::schedule::{accumulations, Operand};
+    use dermis_golden::fixed::words::schedule::{accumulations, Operand, Target};
     use dermis_golden::fixed::CasePlan;
 
     use super::*;
     use crate::language::testbench::{block_subject, check_with_defects, random_word, Reference};
     use crate::language::Change;
-    use crate::scenes::model;
+    use crate::scenes::{learned, model};
     use crate::wire::Word;
 
     /// A column of a product, which one cycle issues.
@@ -183,7 +207,10 @@ mod tests {
     struct Column {
         accumulation: usize,
         group: usize,
-        /// Operand vectors that must be readable; none where the operand is the input.
+        /// Whether it is one of a layer, and whether the operand is the input.
+        layer: bool,
+        input: bool,
+        /// Operand vectors that must be readable.
         needs: usize,
         /// Address of the operand's quad.
         quad: usize,
@@ -194,15 +221,21 @@ mod tests {
     /// The columns of a subarray in order.
     fn columns(case: &CasePlan) -> Vec<Column> {
         let mut all: Vec<Column> = Vec::new();
-        for (accumulation, (_, products)) in accumulations(&case.formats).iter().enumerate() {
-            for group in 0..case.formats.groups {
+        // The images of hidden layers and μ come between v_00 and the other vectors.
+        let layers = case.formats.layers.len();
+        for (accumulation, (target, products)) in accumulations(&case.formats).iter().enumerate() {
+            let layer = matches!(target, Target::Layer(_));
+            for group in 0..case.storage.groups_of(products[0].matrix) {
                 for product in products {
                     let needs = match product.operand {
-                        Operand::Vector(index) => index + 1,
-                        Operand::InputHigh | Operand::InputLow => 0,
+                        Operand::Vector(index) => index + layers + 1,
+                        Operand::Layer(index) => index + 2,
+                        Operand::InputHigh | Operand::InputLow => usize::from(layer),
+                        Operand::One => 0,
                     };
-                    let quads = case.storage.columns_of(product.matrix, group);
-                    all.extend(quads.iter().map(|&quad| Column { accumulation, group, needs, quad, last: false }));
+                    let input = matches!(product.operand, Operand::InputHigh | Operand::InputLow);
+                    let column = |&quad| Column { accumulation, group, layer, input, needs, quad, last: false };
+                    all.extend(case.storage.columns_of(product.matrix, group).iter().map(column));
                 }
                 all.last_mut().unwrap().last = true;
             }
@@ -210,7 +243,7 @@ mod tests {
         all
     }
 
-    /// Inputs: reset, case, start, quad of the input, quad of a v_ij, whether it is valid.
+    /// Inputs: reset, case, start, quad of the input, quad of an operand, whether it is valid, position of μ1, of μ2.
     struct Passes<'a> {
         model: &'a Model,
         columns: Vec<Vec<Column>>,
@@ -220,9 +253,10 @@ mod tests {
         next: Option<(usize, usize)>,
         /// The column issued in the cycle before, in the cycle before that, and so on.
         issued: VecDeque<Option<Column>>,
-        /// The input as far as it was read, and the quads of the v_ij that are operands.
+        /// The input as far as it was read, and the quads of the operands; the position of μ.
         input: Vec<[i64; 4]>,
         quads: Vec<[i64; 4]>,
+        position: [i64; 2],
         /// Accumulation and row by the cycle in which they leave; none before the first reset.
         rows: Option<BTreeMap<usize, (usize, usize)>>,
     }
@@ -232,7 +266,8 @@ mod tests {
             let columns = model.cases().iter().map(columns).collect();
             let (input, quads) = (vec![[0; 4]; model.formats().quads], Vec::new());
             let issued = VecDeque::new();
-            Passes { model, columns, cycle: 0, case: 0, next: None, issued, input, quads, rows: None }
+            let position = [0; 2];
+            Passes { model, columns, cycle: 0, case: 0, next: None, issued, input, quads, position, rows: None }
         }
 
         fn case(&self) -> &'a CasePlan {
@@ -248,18 +283,28 @@ mod tests {
             }
         }
 
+        /// Quads of each operand vector.
+        fn lengths(&self) -> Vec<usize> {
+            operand_lengths(&self.case().formats)
+        }
+
         /// The address that was read from the input memory so many cycles ago.
         fn input_address(&self, cycles: usize) -> Option<usize> {
             let column = self.issued.get(self.latency() - 1 + cycles).copied().flatten();
-            column.filter(|column| column.needs == 0).map(|column| column.quad)
+            column.filter(|column| column.input).map(|column| column.quad)
         }
 
         /// The column that is issued in this cycle.
         fn issue(&self) -> Option<Column> {
             let (at, free) = self.next?;
             let storage = &self.case().storage;
-            let quads = self.case().formats.quads;
-            let readable = if storage.streamed { self.quads.len().div_ceil(quads) } else { self.quads.len() / quads };
+            let mut first = 0;
+            let readable = self.lengths().into_iter().filter(|length| {
+                let needed = if storage.streamed { first + 1 } else { first + length };
+                first += length;
+                self.quads.len() >= needed
+            });
+            let readable = readable.count();
             let column = self.columns[self.case][at];
             (free <= self.cycle && column.needs <= readable).then_some(column)
         }
@@ -267,23 +312,45 @@ mod tests {
         fn row(&self, accumulation: usize, row: usize) -> [i64; 4] {
             let CasePlan { formats, quantised, .. } = self.case();
             let mut operands = Operands::of_input(&self.input[..formats.quads], formats);
-            operands.vectors = self.quads.chunks(formats.quads).map(<[_]>::to_vec).collect();
-            pass(formats, quantised, self.case().layout(), &accumulations(formats)[accumulation].1, &operands)[row]
+            let mut left = &self.quads[..];
+            let hidden = formats.layers.len().saturating_sub(1);
+            for (number, length) in self.lengths().into_iter().enumerate() {
+                let (quads, rest) = left.split_at(length.min(left.len()));
+                left = rest;
+                match number {
+                    _ if number > 0 && number <= hidden => {
+                        operands.layers.push(quads[..formats.layers[number - 1].min(quads.len())].to_vec());
+                    }
+                    _ if hidden > 0 && number == hidden + 1 => {}
+                    _ => operands.vectors.push(quads.to_vec()),
+                }
+            }
+            operands.position = self.position;
+            let all =
+                pass(formats, quantised, self.case().layout(), &accumulations(formats)[accumulation].1, &operands);
+            // Of a layer the rows of whole groups leave.
+            all.get(row).copied().unwrap_or_default()
         }
     }
 
     impl Reference for Passes<'_> {
         fn outputs(&mut self, _: &[Word]) -> Vec<Option<Word>> {
             let formats = self.model.formats();
-            let leaves = |cycle: usize| Some(self.rows.as_ref()?.contains_key(&cycle).into());
+            let layer =
+                |accumulation: usize| matches!(accumulations(&self.case().formats)[accumulation].0, Target::Layer(_));
+            let leaves = |cycle: usize, of_layer: bool| {
+                let row = self.rows.as_ref()?.get(&cycle);
+                Some(row.is_some_and(|&(accumulation, _)| layer(accumulation) == of_layer).into())
+            };
             let row = self.rows.as_ref().and_then(|rows| rows.get(&self.cycle));
             vec![
                 self.input_address(0).map(|address| Word::from(address as u64)),
                 row.map(|&(accumulation, row)| {
                     Word::of_fields(&self.row(accumulation, row), formats.lane_bits as usize)
                 }),
-                leaves(self.cycle),
-                leaves(self.cycle + 2),
+                leaves(self.cycle, false),
+                leaves(self.cycle + 2, false),
+                leaves(self.cycle, true),
                 Some(Word::default()),
             ]
         }
@@ -300,8 +367,9 @@ mod tests {
                 let own = &self.case().formats;
                 let first = column.group * own.lanes_per_parity;
                 if column.last {
-                    let count = own.lanes_per_parity.min(own.quads - first);
-                    let leave = self.cycle + self.latency() + 7;
+                    let last = if column.layer { usize::MAX } else { own.quads };
+                    let count = own.lanes_per_parity.min(last - first);
+                    let leave = self.cycle + self.latency() + 7 + OperandScale::latency(own.has_network());
                     let rows = (0..count).map(|row| (leave + row, (column.accumulation, first + row)));
                     self.rows.iter_mut().for_each(|all| all.extend(rows.clone()));
                 }
@@ -310,10 +378,11 @@ mod tests {
                 self.next = (at < self.columns[self.case].len()).then_some((at, free));
             }
             self.issued.push_front(issued);
-            self.issued.truncate(8);
-            if valid == 1 && self.quads.len() < operand_vectors(formats.degree) * self.case().formats.quads {
+            self.issued.truncate(10);
+            if valid == 1 && self.quads.len() < self.lengths().iter().sum() {
                 self.quads.push(quad(4, formats.data_bits));
             }
+            self.position = [6, 7].map(|input| inputs[input].signed(0, position_bits()));
             self.cycle += 1;
             if start == 1 {
                 (self.case, self.next, self.quads) = (which, Some((0, self.cycle)), Vec::new());
@@ -339,14 +408,25 @@ mod tests {
             let end = if random.u8(..5) == 0 { random.usize(..200) } else { usize::MAX };
             // A reset, the start of the subarray, then its cycles.
             let (mut at, mut pause, mut sent) = (0, random.usize(1..100), 0);
+            let position = [(); 2].map(|()| Word::of_fields(&[random.i64(-384..=384)], position_bits()));
+            // The ends of the vectors, and one more vector that is no operand.
+            let mut ends: Vec<usize> = operand_lengths(&model.cases()[which].formats);
+            ends.push(quads);
+            let ends: Vec<usize> = ends
+                .iter()
+                .scan(0, |end, length| {
+                    *end += length;
+                    Some(*end)
+                })
+                .collect();
             loop {
                 let idle =
                     passes.next.is_none() && passes.rows.iter().flatten().all(|(&cycle, _)| cycle < passes.cycle);
-                let vectors = operand_vectors(formats.degree) + 1;
-                if at > 12 && (at > end || (idle && sent == vectors * quads)) {
+                let whole = ends[ends.len() - 1];
+                if at > 12 && (at > end || (idle && sent == whole)) {
                     break;
                 }
-                let valid = at > 12 && pause == 0 && sent < vectors * quads;
+                let valid = at > 12 && pause == 0 && sent < whole;
                 let read = passes.input_address(2).and_then(|address| input.get(address).copied());
                 let inputs = vec![
                     (at == 0 && cut).into(),
@@ -355,12 +435,14 @@ mod tests {
                     read.unwrap_or_else(|| random_word(&mut random, 4 * formats.fold_bits as usize)),
                     random_word(&mut random, 4 * formats.data_bits as usize),
                     valid.into(),
+                    position[0],
+                    position[1],
                 ];
                 passes.clock(&inputs);
                 all.push(inputs);
                 at += 1;
                 sent += usize::from(valid);
-                pause = if valid && sent % quads == 0 {
+                pause = if valid && ends.contains(&sent) {
                     random.usize(1..100)
                 } else {
                     pause.saturating_sub(usize::from(at > 12))
@@ -377,13 +459,14 @@ mod tests {
         let shared = model(6, 6, "[search]\nmu_max = 0.005\n");
         let streamed = model(4, 6, "[search]\nmu_max = 0.1\ndegree = 2\n");
         assert!(several.formats().groups > 1 && shared.formats().shared_a && streamed.storage().streamed);
-        for model in [several, shared, streamed] {
+        let network = learned(4, 5, &[13, 7], "mu_max = 0.3\n");
+        for model in [several, shared, streamed, network] {
             let subject = |changes: &[Change]| {
                 block_subject!(
                     Pass::new(&model),
                     changes,
-                    inputs [rst, which, start, input_quad, vector_quad, vector_valid],
-                    outputs [input_address, quad, quad_valid, quad_soon, damaged],
+                    inputs [rst, which, start, input_quad, vector_quad, vector_valid, position_x, position_y],
+                    outputs [input_address, quad, quad_valid, quad_soon, layer_valid, damaged],
                 )
             };
             let defects = [

@@ -7,7 +7,6 @@
 //! compared. The last sweep only moves to the best position: its constant coefficients are p(μ*).
 
 use dermis_golden::fixed::plan::cycles::{coarse_period, values_delay, SET_UP, SHORTEST_SWEEP};
-use dermis_golden::fixed::words::schedule::vectors;
 use dermis_golden::fixed::{CasePlan, Model};
 use dermis_golden::symmetry::quads::Quads;
 use rust_hdl::prelude::*;
@@ -128,7 +127,7 @@ impl SearchPorts {
             fill_which: Wire::new(count_bits(model.cases().len())),
             fill_quad: Wire::new(4 * (formats.vector_bits as usize + 2)),
             fill: Default::default(),
-            fill_index: Wire::new(count_bits(vectors(formats.degree))),
+            fill_index: Wire::new(count_bits(formats.vectors())),
             fill_address: Wire::new(count_bits(formats.quads)),
             start: Default::default(),
             enabled: Default::default(),

@@ -1,6 +1,6 @@
 //! Stage `unfold`: words of v_ij back to taxels, coefficient by coefficient into the search memory.
 
-use dermis_golden::fixed::words::schedule::{is_transposed, schedule, vectors};
+use dermis_golden::fixed::words::schedule::{is_transposed, schedule, EXPONENTS};
 use dermis_golden::fixed::Model;
 use rust_hdl::prelude::*;
 
@@ -51,7 +51,10 @@ impl Unfold {
         let across = schedule(formats).iter().enumerate().filter(|(_, p)| is_transposed(p)).map(|(k, _)| k).collect();
         let quads: Vec<usize> = model.cases().iter().map(|case| case.formats.quads).collect();
         let bits = formats.vector_bits as usize;
-        let count = vectors(formats.degree);
+        let count = formats.vectors();
+        // With a network every vector is p itself.
+        let degree = |(i, j): (u32, u32)| if formats.has_network() { 0 } else { i + j };
+        let degrees: Vec<u32> = EXPONENTS[..count].iter().map(|&exponents| degree(exponents)).collect();
         let (index, address) = (count_bits(count), count_bits(formats.quads));
         Unfold {
             clk: Default::default(),
@@ -67,7 +70,7 @@ impl Unfold {
             done: Default::default(),
             quads: CaseCounter::new(&quads),
             vectors: Counter::new(count),
-            unfolder: Unfolder::new(bits, count),
+            unfolder: Unfolder::new(bits, &degrees),
             transposed: TransposedPlace::new(model.layout(), bits + 2, count, across),
             index_first: Delay::new(index, 1),
             index_later: Delay::new(index, 1),
@@ -123,7 +126,6 @@ mod tests {
     use std::collections::VecDeque;
 
     use dermis_golden::fixed::stages::unfold::unfold;
-    use dermis_golden::fixed::words::schedule::EXPONENTS;
 
     use super::*;
     use crate::language::testbench::{block_subject, check_with_defects, random_word, Reference};
@@ -158,7 +160,7 @@ mod tests {
             let formats = &self.model.cases()[which].formats;
             let (vector, address) = (self.next / formats.quads, self.next % formats.quads);
             let [a, b, c, d] = unfold(&[words], EXPONENTS[vector].0 + EXPONENTS[vector].1)[0];
-            let last = self.next + 1 == vectors(formats.degree) * formats.quads;
+            let last = self.next + 1 == formats.vectors() * formats.quads;
             match is_transposed(&schedule(formats)[vector]) {
                 false => Quad { vector, address, taxels: [a, b, c, d], last },
                 true => {
@@ -189,7 +191,7 @@ mod tests {
             let words = [0, 1, 2, 3].map(|parity| inputs[3].signed(parity, formats.vector_bits as usize));
             self.quads.push_front((valid == 1).then(|| self.quad(which, words)));
             self.quads.truncate(3);
-            let all = vectors(formats.degree) * formats.quads;
+            let all = formats.vectors() * formats.quads;
             self.next = if start == 1 { 0 } else { (self.next + valid) % all };
             if rst == 1 {
                 self.quads = vec![None; 3].into();

@@ -1,6 +1,6 @@
-//! In the place of stage `search` in a scene without a search: μ is 0 and the values are v_00.
+//! In the place of stage `search` in a scene without a search: μ is 0 or that of a network, and the values are p.
 //!
-//! The coefficients that `unfold` delivers are p itself and pass on directly as values; `start` says that all have
+//! What `unfold` delivers is p itself, with a network after each step of `relax`; the last passes on directly as values; `start` says that all have
 //! arrived. Since the force memory is written while the passes run, a frame is not computed before the previous one has
 //! been sent.
 
@@ -12,7 +12,7 @@ use crate::kernel_block;
 use crate::language::{Body, Builder, Kernel};
 use crate::ports::has_ports;
 
-/// `fill_quad` leaves as `values` in the same cycle; `settled`, `values_begin` and `done` are `start` one cycle later.
+/// The `fill_quad`s of the last vector leave as `values` in the same cycle; `settled`, `values_begin` and `done` are `start` one cycle later.
 /// The inputs that only a search needs are unused; the outputs that describe its result are constant 0.
 #[derive(LogicBlock)]
 pub struct Unsearched {
@@ -35,26 +35,27 @@ kernel_block!(
 impl Unsearched {
     /// With the widths of `model`.
     pub fn new(model: &Model) -> Self {
-        Unsearched::with(SearchPorts::new(model))
+        Unsearched::with(SearchPorts::new(model), model.formats().vectors())
     }
 
-    fn with(ports: SearchPorts) -> Self {
-        let kernel = kernel(&ports);
+    fn with(ports: SearchPorts, vectors: usize) -> Self {
+        let kernel = kernel(&ports, vectors);
         Unsearched { ports, kernel: Body::default() }.bind(kernel)
     }
 }
 
-fn kernel(ports: &SearchPorts) -> Kernel {
+fn kernel(ports: &SearchPorts, vectors: usize) -> Kernel {
     let k = Builder::new("unsearched");
     let (rst, start) = (k.input("rst", 1), k.input("start", 1));
     k.input("which", ports.which.width());
     k.input("fill_which", ports.fill_which.width());
-    k.input("fill_index", ports.fill_index.width());
+    let index = k.input("fill_index", ports.fill_index.width());
     k.input("fill_address", ports.fill_address.width());
     k.input("enabled", 1);
     k.input("ready", 1);
     k.wire("values", k.input("fill_quad", ports.fill_quad.width()));
-    k.wire("values_valid", k.input("fill", 1));
+    let fill = k.input("fill", 1);
+    k.wire("values_valid", if vectors > 1 { fill & index.is(vectors as u64 - 1) } else { fill });
     let began = k.delay("began", start & !rst);
     for name in ["settled", "values_begin", "done"] {
         k.wire(name, began);

@@ -27,6 +27,7 @@ use super::serial;
 use super::storage::Storage;
 use crate::board::EngineKind;
 use crate::fixed::stages::choose;
+use crate::fixed::stages::estimate::REDUCTIONS;
 use crate::fixed::stages::search::COARSE_CENTRES;
 use crate::fixed::words::formats::{Formats, HALVINGS};
 use crate::fixed::words::schedule::{accumulations, Operand, Product, Target};
@@ -48,9 +49,12 @@ const SCALE: u64 = 2;
 /// Additional cycles for the sum with v_00 in `relax`, where there is a network.
 const RELAX: u64 = 3;
 /// Cycles from a row of a hidden layer until its images can be read as an operand.
-const IMAGES: u64 = 6;
-/// Cycles from the last row of the last layer until μ can be read.
-const ESTIMATE: u64 = 29;
+const IMAGES: u64 = 5;
+/// Cycles from the first row of the last layer until μ can be read, beyond its reductions: second row 1, output 1, saturation
+/// 1, operand 1.
+const ESTIMATE: u64 = 4;
+/// Cycles of each reduction of μ.
+const REDUCTION: u64 = 2;
 /// Cycles from the last raw row of v_00 to its first replayed row.
 const REPLAY: u64 = 4;
 /// Cycles from the last row to the start of the search: rescaler, unfold, memory.
@@ -307,7 +311,10 @@ fn timeline(formats: &Formats, storage: &Storage) -> Timeline {
                 vectors.push(last_row - streamed + OPERAND + if network { RELAX } else { 0 });
             }
             Target::Layer(layer) if layer + 1 < formats.layers.len() => layers.push(last_row + IMAGES),
-            Target::Layer(_) => layers.push(last_row + ESTIMATE),
+            Target::Layer(_) => {
+                let first_row = now - 1 + lanes;
+                layers.push(first_row + ESTIMATE + REDUCTION * REDUCTIONS as u64);
+            }
         }
     }
     Timeline { first_issue, last_issue: now - 1, products: products_done, last_row }

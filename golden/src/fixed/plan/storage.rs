@@ -95,9 +95,8 @@ impl Storage {
             columns
         };
         let groups = |matrix| quantised.size(matrix, quads)[0].div_ceil(per_parity);
-        let of = |&(matrix, limit): &(Matrix, i64)| {
-            (0..groups(matrix)).map(|group| kept(matrix, limit, group)).collect()
-        };
+        let of =
+            |&(matrix, limit): &(Matrix, i64)| (0..groups(matrix)).map(|group| kept(matrix, limit, group)).collect();
         let columns = limits.iter().map(of).collect();
         let matrices = limits.into_iter().map(|(matrix, _)| matrix).collect();
         Storage { matrices, columns, base: 0, listed: false, streamed: false, pause: 1, lead: 0, narrow: 0 }

@@ -7,12 +7,12 @@ use faer::Mat;
 
 use crate::board::{Board, EngineKind};
 use crate::fixed::error::FixedError;
+use crate::fixed::stages::send::LN_SIGMA_BITS;
 use crate::fixed::words::arith::{bit_length, signed_bits};
 use crate::fixed::words::coefficients::{parity_blocks, quantise, Blocks, Flipped, Flips};
 use crate::fixed::words::formats::{
     Formats, FORCE_BITS, LOG_FRACTION, MULTIPLIER_BITS, MU_ROUND, MU_STEPS, SEARCH_EXTRA_BITS,
 };
-use crate::fixed::stages::send::LN_SIGMA_BITS;
 use crate::fixed::words::network::WordNetwork;
 use crate::fixed::words::quantised::Quantised;
 use crate::fixed::words::schedule::{vectors, EXPONENTS};

@@ -12,7 +12,8 @@ use super::pass::Vector;
 use crate::fixed::words::arith::{round_shift, saturate};
 use crate::fixed::words::formats::{Formats, MU_STEPS};
 use crate::fixed::words::network::{LAST_SHIFT, OUTPUT_BITS, POSITION_BITS};
-use crate::learned::{LN_SIGMA, PLACES};
+use crate::learned::LN_SIGMA;
+pub use crate::learned::PLACES as OUTPUTS;
 use crate::symmetry::parity::hadamard;
 
 /// Times that a position may be reduced; a word of [`POSITION_BITS`] on both axes is in the disc after 22.
@@ -55,7 +56,7 @@ pub fn ln_sigma_range() -> [i64; 2] {
 pub fn estimate(shift: u32, rows: &[[i64; 4]]) -> Estimate {
     let mut saturations = 0;
     let mut output = |place: usize, bits: u32| {
-        let (parity, row) = PLACES[place];
+        let (parity, row) = OUTPUTS[place];
         let (word, clipped) = saturate(round_shift(rows[row][parity], shift + LAST_SHIFT), bits);
         saturations += u32::from(clipped);
         word

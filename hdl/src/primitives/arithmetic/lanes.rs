@@ -10,7 +10,7 @@ use crate::kernel_block;
 use crate::language::{concat, Body, Builder, Contents, Expr, Kernel, MemoryPort, Net, Type};
 use crate::primitives::address::case_counter::{largest, value_by_case};
 use crate::primitives::address::counter::count_bits;
-use crate::primitives::pass::pass_program::control_bits;
+use crate::primitives::pass::pass_program::Control;
 use crate::wire::Wire;
 
 const M: usize = MULTIPLIER_BITS as usize;
@@ -42,8 +42,7 @@ pub struct Lanes {
     pub operands: Wire<In>,
     /// `operands` and `control` are valid: one product per lane to accumulate.
     pub valid: Signal<In, Bit>,
-    /// From bit 0: last product of an accumulation; with the coefficient check also first product of a subarray. Valid
-    /// with `valid`.
+    /// Last product of an accumulation, and what else [`Control`] has. Valid with `valid`.
     pub control: Wire<In>,
     /// Accumulators of one row for the four parities, `lane_bits` each, signed; valid with `quad_valid`.
     pub quad: Wire<Out>,
@@ -51,6 +50,8 @@ pub struct Lanes {
     pub quad_valid: Signal<Out, Bit>,
     /// `quad` holds a row two cycles later.
     pub quad_soon: Signal<Out, Bit>,
+    /// `quad` holds a row of a layer of a network; `quad_valid` is low. Constant 0 without a network.
+    pub layer_valid: Signal<Out, Bit>,
     /// The signature of the coefficients read since the subarray's first product is wrong, 1 bit; valid from three
     /// cycles after its last product. Constant 0 without the check.
     pub damaged: Wire<Out>,
@@ -66,7 +67,7 @@ kernel_block!(
     Lanes,
     clock clk,
     inputs [rst, which, address, operands, valid, control],
-    outputs [quad, quad_valid, quad_soon, damaged]
+    outputs [quad, quad_valid, quad_soon, layer_valid, damaged]
 );
 
 /// Sizes of the lanes.
@@ -85,7 +86,7 @@ struct Shape {
     narrow: (usize, usize),
     /// Expected signatures of the cases, with the coefficient check.
     signatures: Option<Vec<u32>>,
-    control_bits: usize,
+    control: Control,
 }
 
 impl Lanes {
@@ -101,7 +102,7 @@ impl Lanes {
             memory: cases.iter().flat_map(words).collect(),
             narrow: (model.first().storage.narrow, formats.limb_align as usize),
             signatures: model.has_coefficient_check().then(|| cases.iter().map(signature).collect()),
-            control_bits: control_bits(model),
+            control: Control::new(model),
         })
     }
 
@@ -113,10 +114,11 @@ impl Lanes {
             address: Wire::new(count_bits(shape.memory.len())),
             operands: Wire::new(4 * M),
             valid: Default::default(),
-            control: Wire::new(shape.control_bits),
+            control: Wire::new(shape.control.bits()),
             quad: Wire::new(4 * shape.lane_bits),
             quad_valid: Default::default(),
             quad_soon: Default::default(),
+            layer_valid: Default::default(),
             damaged: Wire::new(1),
             kernel: Body::default(),
         };
@@ -172,7 +174,7 @@ impl Shape {
         let k = Builder::new("lanes");
         let (rst, which) = (k.input("rst", 1), k.input("which", count_bits(self.groups.len())));
         let (address, operands) = (k.input("address", count_bits(self.memory.len())), k.input("operands", 4 * M));
-        let (valid, control) = (k.input("valid", 1), k.input("control", self.control_bits));
+        let (valid, control) = (k.input("valid", 1), k.input("control", self.control.bits()));
         let coefficients = self.coefficients(&k, address);
 
         let later = |name: &str, value| {
@@ -183,14 +185,33 @@ impl Shape {
         let valid1 = later("valid1", valid);
         let ends = k.wire("ends", valid & control.at(0));
         let captured = later("captured", ends);
-        let rows = self.rows(&k, which, rst, captured);
+        let of_layer = self.control.layer_at().map(|bit| k.delay("of_layer", control.at(bit)));
+        let rows = self.rows(&k, which, rst, of_layer.map_or(captured, |of_layer| captured & !of_layer));
+        let rows = match of_layer {
+            None => rows,
+            Some(of_layer) => of_layer.mux(k.constant(rows.bits(), self.per_parity as u64), rows),
+        };
         let left = k.state("left", Type::unsigned(rows.bits()), rst, 0);
         let more = k.wire("more", left.any());
         k.when(more, || left.set(left.minus(1)));
         k.when(captured, || left.set(rows));
         k.comment("Not written as left > 1, which is constant where left has one bit.");
-        let quad_soon = later("quad_soon", captured | (more & !left.is(1)));
-        later("quad_valid", later("quad_next", quad_soon));
+        let soon = captured | (more & !left.is(1));
+        match of_layer {
+            None => {
+                later("quad_valid", later("quad_next", later("quad_soon", soon)));
+                k.wire("layer_valid", k.constant(1, 0));
+            }
+            Some(of_layer) => {
+                // Whose rows leave, until the next accumulation has been captured.
+                let leaving = k.state("leaving_layer", bit, rst, 0);
+                k.when(captured, || leaving.set(of_layer));
+                let soon = later("row_soon", soon);
+                let quad_soon = k.wire("quad_soon", soon & !*leaving);
+                later("quad_valid", later("quad_next", quad_soon));
+                later("layer_valid", later("layer_next", soon & *leaving));
+            }
+        }
 
         self.check(&k, which, control, || later("valid2", valid1), coefficients);
         let shared = Shared { coefficients, operands, adds: valid1, ends };
@@ -272,7 +293,7 @@ impl Shape {
         };
         let odd_lanes = k.delay("odd_lanes", parities(coefficients, M));
         let odd_fours = k.delay("odd_fours", parities(odd_lanes, 4));
-        let opens1 = k.delay("opens1", control.at(1));
+        let opens1 = k.delay("opens1", control.at(self.control.opens_at().unwrap_or(0)));
         let opens2 = k.delay("opens2", opens1);
         k.comment("Signature of the coefficients read, compared with the expected one.");
         let signature = k.register("signature", Type::unsigned(32));
@@ -341,7 +362,7 @@ mod tests {
             memory,
             narrow: (0, 0),
             signatures: Some(vec![0x1234_5678, 0xabcd_ef01]),
-            control_bits: 2,
+            control: Control { layers: false, opens: true },
         }
     }
 
@@ -366,6 +387,8 @@ mod tests {
         left: usize,
         /// Whether a row leaves in two cycles, in one, now; `None` before the first reset.
         leaves: Option<[bool; 3]>,
+        /// Whether those are rows of a layer.
+        of_layer: [bool; 3],
         group: usize,
         signature: Option<u32>,
     }
@@ -386,11 +409,14 @@ mod tests {
             let per_parity = self.shape.per_parity;
             let heads = |chain: &Vec<i64>| [0, 1, 2, 3].map(|parity| chain[parity * per_parity]);
             let shows = self.leaves.is_some_and(|[_, _, now]| now);
+            let row =
+                |of: usize, layer: bool| self.leaves.map(|leaves| Word::from(leaves[of] && self.of_layer[of] == layer));
             let quad = self.chain.as_ref().filter(|_| shows).map(heads);
             let expected = self.shape.signatures.as_ref().map(|all| all[inputs[1].number() as usize]);
             vec![
-                self.leaves.map(|[soon, _, _]| Word::from(soon)),
-                self.leaves.map(|[_, _, now]| Word::from(now)),
+                row(0, false),
+                row(2, false),
+                row(2, true),
                 self.signature.map(|signature| Word::from(Some(signature) != expected)),
                 quad.map(|heads| Word::of_fields(&heads, self.shape.lane_bits)),
             ]
@@ -410,14 +436,23 @@ mod tests {
             }
             if added.valid {
                 self.accumulate(&added);
-                let start = if added.control & 2 == 2 { Some(START) } else { self.signature };
+                let opens = self.shape.control.opens_at().is_some_and(|bit| added.control >> bit & 1 == 1);
+                let start = if opens { Some(START) } else { self.signature };
                 self.signature = start.map(|signature| step(signature, parity(&self.shape.memory[added.word])));
             }
             self.left = self.left.saturating_sub(1);
+            let [soon, next, _] = self.of_layer;
+            self.of_layer = [soon, soon, next];
             if ends(&captured) {
                 let case = inputs[1].number() as usize;
-                self.group = (self.group + 1) % self.shape.groups[case];
-                self.left = if self.group == 0 { self.shape.last_rows[case] } else { per_parity };
+                let layer = self.shape.control.layer_at().is_some_and(|bit| captured.control >> bit & 1 == 1);
+                self.of_layer[0] = layer;
+                if layer {
+                    self.left = per_parity;
+                } else {
+                    self.group = (self.group + 1) % self.shape.groups[case];
+                    self.left = if self.group == 0 { self.shape.last_rows[case] } else { per_parity };
+                }
             }
             self.leaves = self.leaves.map(|[soon, next, _]| [self.left > 0, soon, next]);
             self.pipe.rotate_left(1);
@@ -449,7 +484,10 @@ mod tests {
             let valid = !rst && since > 0 && random.u8(..4) > 0;
             let last = since > shape.per_parity && random.u8(..4) == 0;
             let opens = first && random.bool();
-            let control = u64::from(last) | u64::from(opens) << 1;
+            let mut control = u64::from(last);
+            for (bit, set) in [(shape.control.layer_at(), random.bool()), (shape.control.opens_at(), opens)] {
+                control |= bit.map_or(0, |bit| u64::from(set) << bit);
+            }
             since = if valid && last { 0 } else { since + 1 };
             if valid {
                 first = last;
@@ -480,6 +518,12 @@ mod tests {
         is_equal(shape);
     }
 
+    #[test]
+    fn rows_of_layers_leave_apart() {
+        let shape = Shape { control: Control { layers: true, opens: true }, ..shape() };
+        is_equal(Shape { groups: vec![1, 2], ..shape });
+    }
+
     fn is_equal(shape: Shape) {
         let block = Lanes::of(&shape);
         let stimulus = stimulus(&shape, 6000);
@@ -490,6 +534,7 @@ mod tests {
             chain: None,
             left: 0,
             leaves: None,
+            of_layer: [false; 3],
             group: 0,
             signature: None,
             shape,

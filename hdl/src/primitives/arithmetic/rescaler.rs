@@ -118,9 +118,7 @@ impl Shape {
         let clips = (clipped3.at(0) + clipped3.at(1)) + (clipped3.at(2) + clipped3.at(3));
         let clips = k.delay("clips", clips);
         let saturations = k.state("saturations", Type::unsigned(SATURATION_BITS), clear, 0);
-        let count = k.wire("count", *saturations + clips);
-        let most = k.constant(SATURATION_BITS, (1 << SATURATION_BITS) - 1);
-        saturations.set(count.top().mux(most, count.low(SATURATION_BITS)));
+        saturations.set(saturating_sum(&k, "count", *saturations, clips));
         k.finish()
     }
 
@@ -135,11 +133,23 @@ impl Shape {
         let clipped = k.wire("clipped", clips);
         let most = moved.top().concat((!moved.top()).repeat(self.word - 1));
         let word = k.delay("word", clipped.mux(most, half_up));
-        let operand = k.wire("short", word.signed().shift_right(SEARCH_EXTRA_BITS as usize - 1).round_shift(1));
-        let overflow = k.wire("overflow", operand.top().differs(operand.at(self.data - 1)));
-        let most = k.constant(self.data, (1 << (self.data - 1)) - 1);
-        [word, k.delay("operand", overflow.mux(most, operand.low(self.data))), clipped]
+        [word, operand_of(k, word, self.data), clipped]
     }
+}
+
+/// The operand of `data` bits from a word, registered: rounded, clamped where rounding would exceed the operand.
+pub fn operand_of<'k>(k: &'k Builder, word: Expr<'k>, data: usize) -> Expr<'k> {
+    let operand = k.wire("short", word.signed().shift_right(SEARCH_EXTRA_BITS as usize - 1).round_shift(1));
+    let overflow = k.wire("overflow", operand.top().differs(operand.at(data - 1)));
+    let most = k.constant(data, (1 << (data - 1)) - 1);
+    k.delay("operand", overflow.mux(most, operand.low(data)))
+}
+
+/// Sum of two counts of saturations, the largest count where it is larger.
+pub fn saturating_sum<'k>(k: &'k Builder, name: &str, one: Expr<'k>, other: Expr<'k>) -> Expr<'k> {
+    let count = k.wire(name, one + other);
+    let most = k.constant(SATURATION_BITS, (1 << SATURATION_BITS) - 1);
+    count.top().mux(most, count.low(SATURATION_BITS))
 }
 
 #[cfg(test)]

@@ -1,6 +1,5 @@
 //! Parities of a v_ij back to taxels, scaled to the units of the search.
 
-use dermis_golden::fixed::words::schedule::EXPONENTS;
 use rust_hdl::prelude::*;
 
 use crate::kernel_block;
@@ -25,37 +24,37 @@ pub struct Unfolder {
 kernel_block!(Unfolder, clock clk, inputs [quad, index], outputs [taxels]);
 
 impl Unfolder {
-    /// For parities of `bits` bits of `vectors` v_ij.
-    pub fn new(bits: usize, vectors: usize) -> Self {
+    /// For parities of `bits` bits of vectors with these total degrees i + j.
+    pub fn new(bits: usize, degrees: &[u32]) -> Self {
         let block = Unfolder {
             clk: Default::default(),
             quad: Wire::new(4 * bits),
-            index: Wire::new(count_bits(vectors)),
+            index: Wire::new(count_bits(degrees.len())),
             taxels: Wire::new(4 * (bits + 2)),
             kernel: Body::default(),
         };
-        block.bind(kernel(bits, vectors))
+        block.bind(kernel(bits, degrees))
     }
 }
 
-/// Right shift of v_ij of this index: 4^(i+j).
-fn shift(index: usize, vectors: usize) -> u32 {
-    EXPONENTS[..vectors].get(index).map_or(0, |(i, j)| 2 * (i + j))
+/// Right shift of the vector of this index: 4^(i+j).
+fn shift(index: usize, degrees: &[u32]) -> u32 {
+    degrees.get(index).map_or(0, |degree| 2 * degree)
 }
 
 /// The four-point Hadamard butterfly of four signed fields, two bits wider.
-fn hadamard<'k>(quad: Expr<'k>) -> [Expr<'k>; 4] {
+pub(crate) fn hadamard<'k>(quad: Expr<'k>) -> [Expr<'k>; 4] {
     let bits = quad.bits() / 4;
     let wide = bits + 2;
     let [a, b, c, d] = [0, 1, 2, 3].map(|lane| quad.slice(lane * bits, bits).signed().extend(wide));
     [a + b + c + d, a - b + c - d, a + b - c - d, a - b - c + d].map(|sum| sum.resize(wide))
 }
 
-fn kernel(bits: usize, vectors: usize) -> Kernel {
+fn kernel(bits: usize, degrees: &[u32]) -> Kernel {
     let wide = bits + 2;
     let k = Builder::new("unfolder");
-    let (quad, index) = (k.input("quad", 4 * bits), k.input("index", count_bits(vectors)));
-    let shifts: Vec<u64> = (0..1 << index.bits()).map(|index| shift(index, vectors).into()).collect();
+    let (quad, index) = (k.input("quad", 4 * bits), k.input("index", count_bits(degrees.len())));
+    let shifts: Vec<u64> = (0..1 << index.bits()).map(|index| shift(index, degrees).into()).collect();
     let amount = k.wire("amount", index.table(3, &shifts));
     let sums = hadamard(quad);
     let taxel = |lane: usize| {
@@ -71,6 +70,7 @@ fn kernel(bits: usize, vectors: usize) -> Kernel {
 #[cfg(test)]
 mod tests {
     use dermis_golden::fixed::words::arith::round_shift;
+    use dermis_golden::fixed::words::schedule::EXPONENTS;
     use dermis_golden::symmetry::parity::hadamard;
 
     use super::*;
@@ -81,11 +81,11 @@ mod tests {
 
     #[test]
     fn taxels_are_those_of_the_model() {
-        let vectors = EXPONENTS.len();
-        let block = Unfolder::new(BITS, vectors);
+        let degrees = EXPONENTS.map(|(i, j)| i + j);
+        let block = Unfolder::new(BITS, &degrees);
         let mut random = fastrand::Rng::with_seed(9);
         let quads: Vec<(Word, usize)> =
-            (0..2000).map(|_| (random_word(&mut random, 4 * BITS), random.usize(..vectors))).collect();
+            (0..2000).map(|_| (random_word(&mut random, 4 * BITS), random.usize(..degrees.len()))).collect();
         // The index follows its quad by a cycle.
         let stimulus: Vec<Vec<Word>> =
             (1..quads.len()).map(|n| vec![quads[n].0, Word::from(quads[n - 1].1 as u64)]).collect();
@@ -93,7 +93,7 @@ mod tests {
         let taxels = |inputs: &[Word]| {
             at += 1;
             let quad = std::array::from_fn(|lane| inputs[0].signed(lane, BITS));
-            let all = hadamard(quad).map(|sum| round_shift(sum, shift(quads[at].1, vectors)));
+            let all = hadamard(quad).map(|sum| round_shift(sum, shift(quads[at].1, &degrees)));
             vec![Some(Word::of_fields(&all, BITS + 2))]
         };
         check(block.kernel.kernel(), &stimulus, &mut Pipeline::new(2, 1, taxels));

@@ -7,7 +7,7 @@ use crate::language::{Body, Builder, Kernel, Type};
 use crate::primitives::address::counter::count_bits;
 use crate::wire::Wire;
 
-/// A word delayed by `depth` cycles. Data, therefore without reset.
+/// A word delayed by `depth` cycles, with 0 on wires. Data, therefore without reset.
 #[derive(LogicBlock)]
 pub struct Delay {
     /// Clock; registers change on its rising edge.
@@ -22,7 +22,7 @@ pub struct Delay {
 kernel_block!(Delay, clock clk, inputs [d], outputs [q]);
 
 impl Delay {
-    /// Delays words of `bits` bits by `depth` ≥ 1 cycles.
+    /// Delays words of `bits` bits by `depth` cycles.
     pub fn new(bits: usize, depth: usize) -> Self {
         let (d, q) = (Wire::new(bits), Wire::new(bits));
         let block = Delay { clk: Default::default(), d, q, kernel: Body::default() };
@@ -33,6 +33,10 @@ impl Delay {
 fn kernel(bits: usize, depth: usize) -> Kernel {
     let k = Builder::new("delay");
     let first = k.input("d", bits);
+    if depth == 0 {
+        k.wire("q", first);
+        return k.finish();
+    }
     let last = (1..depth).fold(first, |value, number| k.delay(&format!("pipe{number}"), value));
     k.delay("q", last);
     k.finish()

@@ -1,10 +1,11 @@
 //! Operands of the MAC lanes: a limb of the input or a v_ij, its parities permuted as the matrix needs them.
 
 use dermis_golden::fixed::words::formats::{Formats, MULTIPLIER_BITS};
+use dermis_golden::fixed::words::network::ONE;
 use rust_hdl::prelude::*;
 
 use crate::kernel_block;
-use crate::language::{concat, Body, Builder, Kernel};
+use crate::language::{concat, Body, Builder, Expr, Kernel};
 use crate::primitives::pass::pass_program::SOURCE_BITS;
 use crate::wire::Wire;
 
@@ -17,7 +18,7 @@ pub struct OperandSelect {
     pub input_quad: Wire<In>,
     /// Four parities of a v_ij, `data_bits` each, signed; taken in every cycle.
     pub vector_quad: Wire<In>,
-    /// Selection: bits 1:0 kind, 0 = v_ij, 1 = high limb of the input, 2 = low limb, bits 3:2 flip, lane group t gets
+    /// Selection: bits 1:0 kind, 0 = v_ij, 1 = high limb of the input, 2 = low limb, 3 = one, with a network, bits 3:2 flip, lane group t gets
     /// parity t XOR flip, bit 4 parities 1 and 2 (x and y) are exchanged first; valid with the quads.
     pub source: Wire<In>,
     /// Operand of each lane group, four times 18 bits, signed; one cycle after the quads.
@@ -38,6 +39,8 @@ struct Shape {
     low: usize,
     /// Position of the low limb's top in the multiplier's operand.
     align: usize,
+    /// Whether an operand may be one.
+    one: bool,
 }
 
 impl OperandSelect {
@@ -48,6 +51,7 @@ impl OperandSelect {
             data: formats.data_bits as usize,
             low: formats.input_low_bits as usize,
             align: formats.limb_align as usize,
+            one: formats.has_network(),
         };
         OperandSelect::of(shape)
     }
@@ -77,7 +81,9 @@ impl Shape {
                 0 => k.constant(M, 0),
                 bits => input.slice(p * self.fold, bits).shift_left(self.align - bits).resize(M),
             };
-            k.wire(&format!("q{p}"), source.low(2).case(&[(1, high), (2, low)], vector))
+            let one = self.one.then(|| (3, k.constant(M, ONE as u64)));
+            let others: Vec<(u64, Expr)> = [(1, high), (2, low)].into_iter().chain(one).collect();
+            k.wire(&format!("q{p}"), source.low(2).case(&others, vector))
         };
         let [q0, q1, q2, q3] = [0, 1, 2, 3].map(parity);
         k.comment("Parities 1 and 2 exchanged if source[4]; then parity t XOR flip, bit 0 (s to r), then bit 1.");
@@ -98,7 +104,8 @@ mod tests {
 
     #[test]
     fn each_lane_group_gets_its_limb_of_its_parity() {
-        for shape in [Shape { fold: 26, data: 18, low: 9, align: 17 }, Shape { fold: 14, data: 16, low: 0, align: 0 }] {
+        let wide = Shape { fold: 26, data: 18, low: 9, align: 17, one: false };
+        for shape in [wide, Shape { fold: 14, data: 16, low: 0, align: 0, one: false }, Shape { one: true, ..wide }] {
             let of = |inputs: &[Word]| {
                 let control = inputs[2].number();
                 let flip = (control >> 2 & 3) as usize;
@@ -108,6 +115,7 @@ mod tests {
                     match control & 3 {
                         1 => folded >> shape.low,
                         2 => (folded & ((1 << shape.low) - 1)) << (shape.align - shape.low),
+                        3 if shape.one => ONE,
                         _ => inputs[1].signed(source, shape.data),
                     }
                 });

@@ -4,7 +4,7 @@ use rust_hdl::prelude::*;
 
 use crate::kernel_block;
 use crate::language::{Body, Builder, Kernel, Type};
-use crate::primitives::address::case_counter::{largest, value_by_case};
+use crate::primitives::address::case_counter::value_by_case;
 use crate::primitives::address::counter::count_bits;
 use crate::wire::Wire;
 
@@ -33,42 +33,58 @@ pub struct OperandWriter {
 kernel_block!(OperandWriter, clock clk, inputs [which, clear, valid], outputs [address, keep, finished]);
 
 impl OperandWriter {
-    /// `vectors` operand vectors per subarray, of `quads[case]` quads each; `streamed`, only with two quads or more: a
-    /// vector is read from its first quad on, one quad per cycle, while one quad per cycle is written.
-    pub fn new(vectors: usize, quads: &[usize], streamed: bool) -> Self {
+    /// `lengths[case]` are the quads of each vector, as many vectors in every case; where there are several cases, all vectors of
+    /// one are as long. `streamed`, only with two quads or more: a vector is read from its first quad on, one quad per cycle,
+    /// while one quad per cycle is written.
+    pub fn new(lengths: &[Vec<usize>], streamed: bool) -> Self {
+        let vectors = lengths.first().map_or(0, Vec::len);
         let block = OperandWriter {
             clk: Default::default(),
-            which: Wire::new(count_bits(quads.len())),
+            which: Wire::new(count_bits(lengths.len())),
             clear: Default::default(),
             valid: Default::default(),
-            address: Wire::new(count_bits(vectors.max(1) * largest(quads))),
+            address: Wire::new(count_bits(words(lengths))),
             keep: Default::default(),
             finished: Wire::new(count_bits(vectors + 1)),
             kernel: Body::default(),
         };
-        block.bind(kernel(vectors, quads, streamed))
+        block.bind(kernel(lengths, streamed))
     }
 }
 
-fn kernel(vectors: usize, quads: &[usize], streamed: bool) -> Kernel {
+/// Number of words of the operand memory.
+fn words(lengths: &[Vec<usize>]) -> usize {
+    lengths.iter().map(|case| case.iter().sum()).max().unwrap_or(0)
+}
+
+fn kernel(lengths: &[Vec<usize>], streamed: bool) -> Kernel {
     let k = Builder::new("operand_writer");
-    let which = k.input("which", count_bits(quads.len()));
+    let which = k.input("which", count_bits(lengths.len()));
     let (clear, valid) = (k.input("clear", 1), k.input("valid", 1));
-    let most = vectors * largest(quads);
+    let (vectors, most) = (lengths.first().map_or(0, Vec::len), words(lengths));
     let (address_bits, finished_bits) = (count_bits(most), count_bits(vectors + 1));
     if vectors == 0 {
         k.comment("No v_ij is an operand of a later pass.");
-        let address_bits = count_bits(largest(quads));
         for (port, bits) in [("address", address_bits), ("keep", 1), ("finished", finished_bits)] {
             k.wire(port, k.constant(bits, 0));
         }
         return k.finish();
     }
-    let quad = k.state("quad", Type::unsigned(count_bits(largest(quads))), clear, 0);
+    let longest = lengths.iter().flatten().copied().max().unwrap_or(1);
+    let quad = k.state("quad", Type::unsigned(count_bits(longest)), clear, 0);
     let address = k.state("address", Type::unsigned(address_bits), clear, 0);
     let finished = k.state("finished", Type::unsigned(finished_bits), clear, 0);
-    let ends: Vec<usize> = quads.iter().map(|quads| quads - 1).collect();
-    let last_quad = k.wire("last_quad", quad.equals(value_by_case(&k, which, &ends, quad.bits())));
+    let last = match lengths {
+        [own] if own.iter().any(|length| *length != own[0]) => {
+            let lasts: Vec<u64> = own.iter().map(|length| *length as u64 - 1).collect();
+            finished.table(quad.bits(), &padded(lasts, finished_bits))
+        }
+        _ => {
+            let ends: Vec<usize> = lengths.iter().map(|own| own[0] - 1).collect();
+            value_by_case(&k, which, &ends, quad.bits())
+        }
+    };
+    let last_quad = k.wire("last_quad", quad.equals(last));
     let all = finished.is(vectors as u64);
     let full = match streamed {
         true => {
@@ -88,30 +104,45 @@ fn kernel(vectors: usize, quads: &[usize], streamed: bool) -> Kernel {
     k.finish()
 }
 
+/// A table with zeros up to all that an index of `bits` bits reaches.
+fn padded(mut table: Vec<u64>, bits: usize) -> Vec<u64> {
+    table.resize(1 << bits, 0);
+    table
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::language::testbench::{check, Reference};
     use crate::wire::Word;
 
-    const VECTORS: usize = 3;
-    const QUADS: [usize; 2] = [5, 3];
-
     /// The number of quads written; undefined before the first `clear`.
-    struct Count {
+    struct Count<'a> {
+        lengths: &'a [Vec<usize>],
         quads: Option<usize>,
         streamed: bool,
     }
 
-    impl Reference for Count {
+    impl Count<'_> {
+        /// Vectors that can be read once `seen` quads have been written.
+        fn finished(&self, lengths: &[usize], seen: usize) -> usize {
+            let mut first = 0;
+            let readable = lengths.iter().filter(|length| {
+                let needed = if self.streamed { first + 1 } else { first + **length };
+                first += **length;
+                seen >= needed
+            });
+            readable.count()
+        }
+    }
+
+    impl Reference for Count<'_> {
         fn outputs(&mut self, inputs: &[Word]) -> Vec<Option<Word>> {
-            let quads = QUADS[inputs[0].number() as usize];
-            let keep = self.quads.map(|seen| inputs[2].number() == 1 && seen < VECTORS * quads);
+            let lengths = &self.lengths[inputs[0].number() as usize];
+            let keep = self.quads.map(|seen| inputs[2].number() == 1 && seen < lengths.iter().sum());
             vec![
                 self.quads.filter(|_| keep == Some(true)).map(|seen| Word::from(seen as u64)),
-                self.quads
-                    .map(|seen| if self.streamed { seen.div_ceil(quads) } else { seen / quads } as u64)
-                    .map(Word::from),
+                self.quads.map(|seen| Word::from(self.finished(lengths, seen) as u64)),
                 keep.map(Word::from),
             ]
         }
@@ -127,19 +158,23 @@ mod tests {
 
     #[test]
     fn quads_are_counted_to_the_last_vector_of_each_case() {
-        let mut random = fastrand::Rng::with_seed(2);
-        let mut case = 0;
-        let stimulus = (0..3000).map(|cycle| {
-            let clear = cycle == 0 || random.u8(..50) == 0;
-            let inputs = vec![Word::from(case), clear.into(), (random.u8(..3) > 0).into()];
-            // The case changes after `clear` only.
-            case = if clear { random.u64(..2) } else { case };
-            inputs
-        });
-        let stimulus: Vec<_> = stimulus.collect();
-        for streamed in [false, true] {
-            let block = OperandWriter::new(VECTORS, &QUADS, streamed);
-            check(block.kernel.kernel(), &stimulus, &mut Count { quads: None, streamed });
+        let cases: [(&[Vec<usize>], &[bool]); 2] =
+            [(&[vec![5; 3], vec![3; 3]], &[false, true]), (&[vec![5, 12, 8, 1, 5]], &[false])];
+        for (lengths, streamed) in cases {
+            let mut random = fastrand::Rng::with_seed(2);
+            let mut case = 0;
+            let stimulus = (0..3000).map(|cycle| {
+                let clear = cycle == 0 || random.u8(..60) == 0;
+                let inputs = vec![Word::from(case), clear.into(), (random.u8(..3) > 0).into()];
+                // The case changes after `clear` only.
+                case = if clear { random.u64(..lengths.len() as u64) } else { case };
+                inputs
+            });
+            let stimulus: Vec<_> = stimulus.collect();
+            for &streamed in streamed {
+                let block = OperandWriter::new(lengths, streamed);
+                check(block.kernel.kernel(), &stimulus, &mut Count { lengths, quads: None, streamed });
+            }
         }
     }
 }

@@ -1,7 +1,7 @@
 //! Schedule of the matrix passes as a table of instructions.
 
-use dermis_golden::fixed::plan::resources::{operand_vectors, Holds};
-use dermis_golden::fixed::words::schedule::{accumulations, Operand};
+use dermis_golden::fixed::plan::resources::{operand_lengths, Holds};
+use dermis_golden::fixed::words::schedule::{accumulations, Axis, Operand, Target};
 use dermis_golden::fixed::{CasePlan, Model};
 use rust_hdl::prelude::*;
 
@@ -19,12 +19,16 @@ pub struct Step {
     pub columns: usize,
     /// First address in the operand memory.
     pub operand: usize,
-    /// Operand: 0 = v_ij, 1 = high limb of the input, 2 = low limb.
+    /// Operand: 0 = from the operand memory, 1 = high limb of the input, 2 = low limb, 3 = one.
     pub kind: u64,
     /// Source parity = target parity XOR `flip`.
     pub flip: u64,
     /// The operand is read with x and y exchanged.
     pub transposed: bool,
+    /// What the operand is multiplied by: 0 = nothing, 1 = μ1, 2 = μ2.
+    pub factor: u64,
+    /// The accumulation is that of a layer of a network.
+    pub layer: bool,
     /// Last product of an accumulation.
     pub last: bool,
     /// First step of a subarray.
@@ -38,14 +42,24 @@ pub struct Step {
 /// The steps of one case: for each accumulation, for each group of rows, its products.
 pub fn unroll(case: &CasePlan) -> Vec<Step> {
     let CasePlan { formats, storage, .. } = case;
+    let lengths = operand_lengths(formats);
+    // Number in the operand memory of v_00 or of p after some steps of relax, where layers and μ are between the two.
+    let network = formats.layers.len();
+    let number = |vector: usize| if vector == 0 { 0 } else { vector + network };
+    let first = |number: usize| lengths[..number].iter().sum::<usize>();
     let mut steps = Vec::new();
-    for (_, products) in accumulations(formats) {
-        for group in 0..formats.groups {
+    for (target, products) in accumulations(formats) {
+        let groups = products.first().map_or(0, |product| storage.groups_of(product.matrix));
+        for group in 0..groups {
             for (index, product) in products.iter().enumerate() {
-                let (kind, operand, needs) = match product.operand {
-                    Operand::Vector(k) => (0, k * formats.quads, k + 1),
-                    Operand::InputHigh => (1, 0, 0),
-                    Operand::InputLow => (2, 0, 0),
+                let (kind, operand, needs) = match (product.operand, target) {
+                    (Operand::Vector(k), _) => (0, first(number(k)), number(k).max(network) + 1),
+                    (Operand::Layer(layer), _) => (0, first(layer + 1), layer + 2),
+                    // The first layer waits for v_00, so that one vector is written after the other.
+                    (Operand::InputHigh, Target::Layer(_)) => (1, 0, 1),
+                    (Operand::InputHigh, Target::Vector(_)) => (1, 0, 0),
+                    (Operand::InputLow, _) => (2, 0, 0),
+                    (Operand::One, _) => (3, 0, 0),
                 };
                 steps.push(Step {
                     coefficients: storage.address_of(product.matrix, group),
@@ -54,6 +68,8 @@ pub fn unroll(case: &CasePlan) -> Vec<Step> {
                     kind,
                     flip: product.matrix.flip as u64,
                     transposed: product.transposed,
+                    factor: product.factor.map_or(0, |axis| if axis == Axis::X { 1 } else { 2 }),
+                    layer: matches!(target, Target::Layer(_)),
                     last: index + 1 == products.len(),
                     opens: steps.is_empty(),
                     ends: false,
@@ -66,6 +82,11 @@ pub fn unroll(case: &CasePlan) -> Vec<Step> {
         step.ends = true;
     }
     steps
+}
+
+/// Number of columns of the longest step of any case.
+pub fn longest(model: &Model) -> usize {
+    model.cases().iter().flat_map(unroll).map(|step| step.columns).max().unwrap_or(1).max(model.formats().quads)
 }
 
 /// Position in the step's columns in; addresses and control out, one cycle later, or three where a column list is read.
@@ -104,25 +125,57 @@ pub struct PassProgram {
     /// Operand selection as in [`OperandSelect`](super::operand_select::OperandSelect): kind, flip, exchange, from bit 0; with the
     /// addresses.
     pub source: Wire<Out>,
-    /// Control of [`Lanes`](crate::primitives::arithmetic::lanes::Lanes) from bit 0: last product of an accumulation; with the
-    /// coefficient check also first product of a subarray; with the addresses.
+    /// Factor of the operand as in [`OperandScale`](super::operand_scale::OperandScale); with the addresses. Constant 0 without
+    /// a network.
+    pub factor: Wire<Out>,
+    /// Control of [`Lanes`](crate::primitives::arithmetic::lanes::Lanes), see [`Control`]; with the addresses.
     pub control: Wire<Out>,
     kernel: Body,
 }
+
+/// The control word of the lanes: bit 0 is the last product of an accumulation; the others are there where they are needed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Control {
+    /// Whether a bit says that the accumulation is that of a layer.
+    pub layers: bool,
+    /// Whether a bit says that the product is the first of a subarray, for the coefficient check.
+    pub opens: bool,
+}
+
+impl Control {
+    /// The word of `model`.
+    pub fn new(model: &Model) -> Self {
+        Control { layers: model.has_network(), opens: model.has_coefficient_check() }
+    }
+
+    /// Width in bits.
+    pub fn bits(self) -> usize {
+        1 + usize::from(self.layers) + usize::from(self.opens)
+    }
+
+    /// Bit of the layers.
+    pub fn layer_at(self) -> Option<usize> {
+        self.layers.then_some(1)
+    }
+
+    /// Bit of the first product.
+    pub fn opens_at(self) -> Option<usize> {
+        self.opens.then_some(1 + usize::from(self.layers))
+    }
+}
+
+/// Width of `factor`, in bits.
+pub const FACTOR_BITS: usize = 2;
 
 kernel_block!(
     PassProgram,
     clock clk,
     inputs [which, start, advance, column, finished],
-    outputs [ready, last, ends, coefficient_address, operand_address, source, control]
+    outputs [ready, last, ends, coefficient_address, operand_address, source, factor, control]
 );
 
 /// File of the column list, one line per word of the coefficient memory.
 pub const COLUMN_FILE: &str = "columns.hex";
-/// Width of `control`, in bits.
-pub fn control_bits(model: &Model) -> usize {
-    1 + usize::from(model.has_coefficient_check())
-}
 /// Width of `source`, in bits.
 pub const SOURCE_BITS: usize = 5;
 
@@ -136,17 +189,19 @@ struct Shape {
     across: bool,
     /// Cycles without a product after each accumulation, 1 to 3.
     pause: usize,
-    /// Words of the coefficient memory, quads of a subarray, operand vectors.
+    /// Words of the coefficient memory, columns of the longest step, words and vectors of the operand memory.
     words: usize,
-    quads: usize,
+    columns: usize,
+    operands: usize,
     vectors: usize,
-    control_bits: usize,
+    control: Control,
 }
 
 impl PassProgram {
     /// The schedule of `model`.
     pub fn new(model: &Model) -> Self {
         let (formats, cases) = (model.formats(), model.cases());
+        let lengths = operand_lengths(formats);
         let pair = |case: &CasePlan, j| [j, if formats.shared_a { case.layout().transposed(j) } else { j }];
         let pairs = |case: &CasePlan| case.storage.column_list().iter().map(|&j| pair(case, j)).collect::<Vec<_>>();
         PassProgram::of(&Shape {
@@ -155,9 +210,10 @@ impl PassProgram {
             across: formats.shared_a,
             pause: model.first().storage.pause,
             words: cases.iter().map(|case| case.storage.words()).sum(),
-            quads: formats.quads,
-            vectors: operand_vectors(formats.degree),
-            control_bits: control_bits(model),
+            columns: longest(model),
+            operands: lengths.iter().sum::<usize>().max(formats.quads),
+            vectors: lengths.len(),
+            control: Control::new(model),
         })
     }
 
@@ -167,15 +223,16 @@ impl PassProgram {
             which: Wire::new(count_bits(shape.steps.len())),
             start: Default::default(),
             advance: Default::default(),
-            column: Wire::new(count_bits(shape.quads)),
+            column: Wire::new(count_bits(shape.columns)),
             finished: Wire::new(count_bits(shape.vectors + 1)),
             ready: Default::default(),
             last: Default::default(),
             ends: Default::default(),
             coefficient_address: Wire::new(count_bits(shape.words)),
-            operand_address: Wire::new(count_bits(shape.vectors.max(1) * shape.quads)),
+            operand_address: Wire::new(count_bits(shape.operands)),
             source: Wire::new(SOURCE_BITS),
-            control: Wire::new(shape.control_bits),
+            factor: Wire::new(FACTOR_BITS),
+            control: Wire::new(shape.control.bits()),
             kernel: Body::default(),
         };
         block.bind(shape.kernel())
@@ -197,11 +254,14 @@ impl PassProgram {
 
 impl Shape {
     /// Widths of the fields of an instruction, from bit 0: last, kind and flip and transposed as in
-    /// `source`, ends, final column, needs, operand, coefficients.
-    fn fields(&self) -> [usize; 7] {
-        let (columns, needs) = (count_bits(self.quads), count_bits(self.vectors + 1));
-        let operand = count_bits(self.vectors.max(1) * self.quads);
-        [1, SOURCE_BITS, 1, columns, needs, operand, count_bits(self.words)]
+    /// `source`, ends, final column, needs, operand, coefficients; with a network also factor and layer.
+    fn fields(&self) -> Vec<usize> {
+        let (columns, needs) = (count_bits(self.columns), count_bits(self.vectors + 1));
+        let mut all = vec![1, SOURCE_BITS, 1, columns, needs, count_bits(self.operands), count_bits(self.words)];
+        if self.control.layers {
+            all.extend([FACTOR_BITS, 1]);
+        }
+        all
     }
 
     /// The instruction of `step`.
@@ -210,7 +270,7 @@ impl Shape {
         let [last, ends] = [step.last, step.ends].map(u64::from);
         let numbers = [step.columns - 1, step.needs, step.operand, step.coefficients].map(|number| number as u64);
         let [columns, needs, operand, coefficients] = numbers;
-        let all = [last, source, ends, columns, needs, operand, coefficients];
+        let all = [last, source, ends, columns, needs, operand, coefficients, step.factor, u64::from(step.layer)];
         all.into_iter().zip(self.fields()).rev().fold(0, |word, (field, bits)| word << bits | field)
     }
 
@@ -234,12 +294,14 @@ impl Shape {
         let k = Builder::new("pass_program");
         let which = k.input("which", count_bits(self.steps.len()));
         let (start, advance) = (k.input("start", 1), k.input("advance", 1));
-        let (column, finished) = (k.input("column", count_bits(self.quads)), k.input("finished", self.fields()[4]));
+        let (column, finished) = (k.input("column", count_bits(self.columns)), k.input("finished", self.fields()[4]));
         let step = k.register("step", Type::unsigned(count_bits(largest_of(&self.steps))));
-        let names = ["last_product", "selects", "ends", "final_column", "needs", "o_base", "c_base"];
+        let names =
+            ["last_product", "selects", "ends", "final_column", "needs", "o_base", "c_base", "multiplies", "of_layer"];
         let registers: Vec<Net> =
             names.iter().zip(self.fields()).map(|(name, bits)| k.register(name, Type::unsigned(bits))).collect();
-        let &[last_product, selects, ends, final_column, needs, o_base, c_base] = &registers[..] else {
+        let &[last_product, selects, ends, final_column, needs, o_base, c_base, ref of_network @ ..] = &registers[..]
+        else {
             unreachable!("one register per field")
         };
         let asked = k.wire("asked", (start | *ends).mux(k.constant(step.bits(), 0), step.plus(1)));
@@ -260,29 +322,33 @@ impl Shape {
         let pauses = pauses.reduce(|one, other| one | other).unwrap_or(k.constant(1, 0));
         k.wire("ready", !(pauses | finished.less(*needs)));
         let last = k.wire("last", column.equals(*final_column));
-        let opens = (self.control_bits == 2).then(|| step.is(0) & column.is(0));
-        let flags: Vec<Expr> = opens.into_iter().chain([*last_product & last]).collect();
+        let opens = self.control.opens.then(|| step.is(0) & column.is(0));
+        let layer = of_network.get(1).map(Net::get);
+        let flags: Vec<Expr> = opens.into_iter().chain(layer).chain([*last_product & last]).collect();
         let flags = k.wire("flags", concat(&flags));
-        self.addresses(&k, column, [*c_base, *o_base], *selects, flags);
+        let factor = of_network.first().map(Net::get);
+        self.addresses(&k, column, [*c_base, *o_base], [Some(*selects), factor, Some(flags)]);
         k.finish()
     }
 
-    /// The registers from column to addresses and control.
+    /// The registers from column to addresses, and of source, factor and control, which go with them; constant 0 for what there
+    /// is not.
     fn addresses<'k>(
         &self,
         k: &'k Builder,
         column: Expr<'k>,
-        bases: [Expr<'k>; 2],
-        source: Expr<'k>,
-        control: Expr<'k>,
+        [c_base, o_base]: [Expr<'k>; 2],
+        with: [Option<Expr<'k>>; 3],
     ) {
-        let [c_base, o_base] = bases;
+        const NAMES: [&str; 3] = ["source", "factor", "control"];
         let coefficients = (c_base + column).low(c_base.bits());
+        let operand = |base: Expr<'k>, column: Expr<'k>| (base + column).low(o_base.bits());
         if self.list.is_empty() {
             k.delay("coefficient_address", coefficients);
-            k.delay("operand_address", (o_base + column).low(o_base.bits()));
-            k.delay("source", source);
-            k.delay("control", control);
+            k.delay("operand_address", operand(o_base, column));
+            for (name, value) in NAMES.into_iter().zip(with) {
+                value.map_or_else(|| k.wire(name, k.constant(FACTOR_BITS, 0)), |value| k.delay(name, value));
+            }
             return;
         }
         let bits = column.bits();
@@ -300,18 +366,18 @@ impl Shape {
         };
         let [c_address1, c_address2] = twice("c_address", coefficients);
         let [_, o_base2] = twice("o_base", o_base);
-        let [_, source2] = twice("source", source);
-        let [_, control2] = twice("control", control);
+        let with2 = [0, 1, 2].map(|k| with[k].map(|value| twice(NAMES[k], value)[1]));
         let pair = k.delay("pair", columns.read(c_address1));
-        let kept = match self.across {
-            true => source2.at(4).mux(pair.slice(bits, bits), pair.low(bits)),
-            false => pair,
+        let kept = match (self.across, with2[0]) {
+            (true, Some(source2)) => source2.at(4).mux(pair.slice(bits, bits), pair.low(bits)),
+            _ => pair,
         };
         let kept = k.wire("kept", kept);
         k.delay("coefficient_address", c_address2);
-        k.delay("operand_address", (o_base2 + kept).low(o_base.bits()));
-        k.delay("source", source2);
-        k.delay("control", control2);
+        k.delay("operand_address", operand(o_base2, kept));
+        for (name, value) in NAMES.into_iter().zip(with2) {
+            value.map_or_else(|| k.wire(name, k.constant(FACTOR_BITS, 0)), |value| k.delay(name, value));
+        }
     }
 }
 
@@ -332,15 +398,17 @@ mod tests {
     const VECTORS: usize = 2;
 
     /// Two cases of steps with random fields, with or without a column list.
-    fn shape(listed: bool, control_bits: usize) -> Shape {
+    fn shape(listed: bool, control: Control) -> Shape {
         let mut random = fastrand::Rng::with_seed(6);
         let mut step = |index: usize, count: usize| Step {
             coefficients: random.usize(..40),
             columns: random.usize(1..=QUADS),
             operand: random.usize(..VECTORS) * QUADS,
-            kind: random.u64(..3),
+            kind: random.u64(..4),
             flip: random.u64(..4),
             transposed: random.bool(),
+            factor: if control.layers { random.u64(..3) } else { 0 },
+            layer: control.layers && random.bool(),
             last: random.bool(),
             opens: index == 0,
             ends: index + 1 == count,
@@ -355,9 +423,10 @@ mod tests {
             across: listed,
             pause: 1 + usize::from(listed),
             words: 47,
-            quads: QUADS,
+            columns: QUADS,
+            operands: VECTORS * QUADS,
             vectors: VECTORS,
-            control_bits,
+            control,
         }
     }
 
@@ -367,20 +436,22 @@ mod tests {
         now: Option<(Step, usize)>,
         /// Whether each of the cycles of the pause before ended an accumulation.
         ended: VecDeque<Option<bool>>,
-        pipe: VecDeque<[Option<Word>; 4]>,
+        pipe: VecDeque<[Option<Word>; 5]>,
     }
 
     impl Program {
         /// Addresses, selection and control for `column` of the present step.
-        fn put(&self, column: usize) -> [Option<Word>; 4] {
-            let Some((step, _)) = &self.now else { return [None; 4] };
+        fn put(&self, column: usize) -> [Option<Word>; 5] {
+            let Some((step, _)) = &self.now else { return [None; 5] };
             let address = step.coefficients + column;
             let quad = self.shape.list.get(address).map_or(column, |pair| pair[usize::from(step.transposed)]);
             let source = step.kind | step.flip << 2 | u64::from(step.transposed) << 4;
             let last = step.last && column + 1 == step.columns;
-            let opens = step.opens && column == 0 && self.shape.control_bits == 2;
-            let control = u64::from(opens) << 1 | u64::from(last);
-            [address as u64, (step.operand + quad) as u64, source, control].map(|word| Some(Word::from(word)))
+            let Control { layers, opens } = self.shape.control;
+            let opens = u64::from(opens && step.opens && column == 0) << usize::from(layers);
+            let control = (opens | u64::from(step.layer)) << 1 | u64::from(last);
+            [address as u64, (step.operand + quad) as u64, source, step.factor, control]
+                .map(|word| Some(Word::from(word)))
         }
     }
 
@@ -426,10 +497,10 @@ mod tests {
             vec![case.into(), start.into(), (cycle > 4 && random.u8(..3) == 0).into(), column.into(), finished.into()]
         };
         let stimulus: Vec<Vec<Word>> = (0..3000).map(inputs).collect();
-        for (listed, control_bits) in [(false, 1), (true, 2)] {
-            let shape = shape(listed, control_bits);
+        for (listed, layers, opens) in [(false, false, false), (true, false, true), (false, true, true)] {
+            let shape = shape(listed, Control { layers, opens });
             let block = PassProgram::of(&shape);
-            let pipe = vec![[None; 4]; block.latency()].into();
+            let pipe = vec![[None; 5]; block.latency()].into();
             check(
                 block.kernel.kernel(),
                 &stimulus,

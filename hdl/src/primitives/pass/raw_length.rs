@@ -35,10 +35,11 @@ pub fn shift_bits(formats: &Formats) -> usize {
 impl RawLength {
     /// With the widths of `formats`.
     pub fn new(formats: &Formats) -> Self {
-        RawLength::of(formats.acc_bits as usize, formats.vector_bits as usize)
+        RawLength::of(formats.acc_bits as usize, formats.full_length() as usize)
     }
 
-    fn of(acc: usize, word: usize) -> Self {
+    /// For accumulators of `acc` bits that are brought to a length of `full` bits, without a sign.
+    fn of(acc: usize, full: usize) -> Self {
         let block = RawLength {
             clk: Default::default(),
             clear: Default::default(),
@@ -47,15 +48,15 @@ impl RawLength {
             shift: Wire::new(count_bits(acc)),
             kernel: Body::default(),
         };
-        block.bind(kernel(acc, word))
+        block.bind(kernel(acc, full))
     }
 }
 
-fn kernel(acc: usize, word: usize) -> Kernel {
+fn kernel(acc: usize, full: usize) -> Kernel {
     let k = Builder::new("raw_length");
     let [clear, accept] = ["clear", "accept"].map(|name| k.input(name, 1));
     // The quad comes from an adder.
-    let (quad, full) = (k.delay("taken", k.input("quad", 4 * acc)), word - 1);
+    let quad = k.delay("taken", k.input("quad", 4 * acc));
     let seen = k.state("seen", Type::unsigned(acc - 1), clear, 0);
     let magnitude = |lane: usize| {
         let (low, sign) = (quad.slice(lane * acc, acc - 1), quad.at(lane * acc + acc - 1));
@@ -76,7 +77,7 @@ mod tests {
     use crate::wire::Word;
 
     const ACC: usize = 40;
-    const WORD: usize = 24;
+    const FULL: usize = 23;
 
     /// The quad of the cycle before, the OR of the magnitudes since `clear`, and the shift one cycle later.
     #[derive(Default)]
@@ -92,7 +93,7 @@ mod tests {
         }
 
         fn clock(&mut self, inputs: &[Word]) {
-            self.shift = self.seen.map(|seen| bit_length(seen).saturating_sub(WORD as u32 - 1));
+            self.shift = self.seen.map(|seen| bit_length(seen).saturating_sub(FULL as u32));
             let heeded = self.seen.zip(self.before).map(|(seen, (accept, all))| if accept { seen | all } else { seen });
             self.seen = if inputs[0].number() == 1 { Some(0) } else { heeded };
             let all = (0..4).fold(0, |all, lane| all | magnitude_bits(inputs[2].signed(lane, ACC)));
@@ -111,7 +112,7 @@ mod tests {
             vec![clear.into(), random.bool().into(), Word::of_fields(&quad, ACC)]
         };
         let stimulus: Vec<Vec<Word>> = (0..4000).map(&mut inputs).collect();
-        let block = RawLength::of(ACC, WORD);
+        let block = RawLength::of(ACC, FULL);
         check(block.kernel.kernel(), &stimulus, &mut Seen::default());
     }
 }

@@ -174,7 +174,7 @@ fn stimulus(model: &Model, subarrays: usize) -> Vec<Vec<Word>> {
             cycle(true, None, false, false);
         }
         let mut values = fastrand::Rng::with_seed(subarray as u64);
-        for index in 0..vectors(formats.degree) {
+        for index in 0..formats.vectors() {
             // A quarter of the range, so that no coefficient overflows wherever the centre is moved.
             let most = 1 << (formats.search_bits[index] - 3);
             for address in 0..quads {

@@ -1,0 +1,118 @@
+//! Operands of the MAC lanes times μ, for the steps of `relax`.
+
+use dermis_golden::fixed::stages::relax::POSITION_SHIFT;
+use dermis_golden::fixed::words::formats::MULTIPLIER_BITS;
+use rust_hdl::prelude::*;
+
+use crate::kernel_block;
+use crate::language::{concat, Body, Builder, Kernel};
+use crate::primitives::pass::pass_program::FACTOR_BITS;
+use crate::primitives::search::sweep::position_bits;
+use crate::wire::Wire;
+
+/// Operands in; the same, times the position of μ1 or μ2 over 512 and rounded half up if `factor` says so,
+/// [`latency`](OperandScale::latency) cycles later. Without a network there is no factor, and the operands pass on wires.
+#[derive(LogicBlock)]
+pub struct OperandScale {
+    /// Clock; registers change on its rising edge.
+    pub clk: Signal<In, Clock>,
+    /// Operand of each lane group, four times 18 bits, signed; taken in every cycle.
+    pub operands: Wire<In>,
+    /// 0 = unchanged, 1 = times μ1, 2 = times μ2; valid with `operands`.
+    pub factor: Wire<In>,
+    /// Position of μ1 in mu_max/384, signed; valid with a `factor` of 1.
+    pub position_x: Wire<In>,
+    /// Position of μ2 in mu_max/384, signed; valid with a `factor` of 2.
+    pub position_y: Wire<In>,
+    /// The operands, four times 18 bits, signed.
+    pub scaled: Wire<Out>,
+    kernel: Body,
+}
+
+kernel_block!(OperandScale, clock clk, inputs [operands, factor, position_x, position_y], outputs [scaled]);
+
+const M: usize = MULTIPLIER_BITS as usize;
+/// Cycles from `operands` to `scaled` where there is a network.
+const LATENCY: usize = 2;
+
+impl OperandScale {
+    /// `wanted`: there is a network.
+    pub fn new(wanted: bool) -> Self {
+        let block = OperandScale {
+            clk: Default::default(),
+            operands: Wire::new(4 * M),
+            factor: Wire::new(FACTOR_BITS),
+            position_x: Wire::new(position_bits()),
+            position_y: Wire::new(position_bits()),
+            scaled: Wire::new(4 * M),
+            kernel: Body::default(),
+        };
+        block.bind(kernel(wanted))
+    }
+
+    /// Cycles from `operands` to `scaled`.
+    pub fn latency(wanted: bool) -> usize {
+        if wanted {
+            LATENCY
+        } else {
+            0
+        }
+    }
+}
+
+fn kernel(wanted: bool) -> Kernel {
+    let k = Builder::new("operand_scale");
+    let (operands, factor) = (k.input("operands", 4 * M), k.input("factor", FACTOR_BITS));
+    let [x, y] = ["position_x", "position_y"].map(|name| k.input(name, position_bits()).signed());
+    if !wanted {
+        k.comment("Nothing is multiplied by μ.");
+        k.wire("scaled", operands);
+        return k.finish();
+    }
+    let position = k.wire("position", factor.at(1).mux(y, x));
+    let scales = k.delay("scales", factor.any());
+    let kept = k.delay("kept", operands);
+    let scaled = |parity: usize| {
+        let operand = operands.slice(parity * M, M).signed();
+        let product = k.delay(&format!("product_{parity}"), operand * position);
+        let rounded = product.round_shift(POSITION_SHIFT as usize).low(M);
+        scales.mux(rounded.unsigned(), kept.slice(parity * M, M))
+    };
+    k.delay("scaled", concat(&[3, 2, 1, 0].map(scaled)));
+    k.finish()
+}
+
+#[cfg(test)]
+mod tests {
+    use dermis_golden::fixed::stages::relax::scaled;
+
+    use super::*;
+    use crate::language::testbench::{check, Pipeline};
+    use crate::wire::Word;
+
+    #[test]
+    fn operands_are_multiplied_by_the_position_of_their_axis() {
+        for wanted in [true, false] {
+            let mut random = fastrand::Rng::with_seed(21);
+            let mut inputs = |_| {
+                let operands = [(); 4].map(|()| random.i64(-(1 << (M - 1))..1 << (M - 1)));
+                let [x, y] = [(); 2].map(|()| Word::of_fields(&[random.i64(-384..=384)], position_bits()));
+                let factor = if wanted { random.u64(..3) } else { 0 };
+                vec![Word::of_fields(&operands, M), Word::from(factor), x, y]
+            };
+            let stimulus: Vec<Vec<Word>> = (0..3000).map(&mut inputs).collect();
+            let of = |inputs: &[Word]| {
+                let operands = [0, 1, 2, 3].map(|parity| inputs[0].signed(parity, M));
+                let position = |input: usize| inputs[input].signed(0, position_bits());
+                let all = match inputs[1].number() {
+                    0 => operands,
+                    1 => scaled(operands, position(2)),
+                    _ => scaled(operands, position(3)),
+                };
+                vec![Some(Word::of_fields(&all, M))]
+            };
+            let block = OperandScale::new(wanted);
+            check(block.kernel.kernel(), &stimulus, &mut Pipeline::new(OperandScale::latency(wanted), 1, of));
+        }
+    }
+}

@@ -1,0 +1,256 @@
+//! Stage `estimate`: rows of the layers of a network in, images of the hidden layers as operands out, then μ.
+//!
+//! ```text
+//! row -> round -> butterfly -> ReLU, saturate -> butterfly -> operand      hidden layers, four cycles
+//! row -> round -> saturate -> reduced to the disc of mu_max -> μ           first two rows of the last layer
+//! ```
+//! A position outside the disc is reduced every second cycle: squares in one, comparison and reduction in the other. μ is
+//! known after a fixed number of cycles, whatever it is.
+
+use dermis_golden::fixed::stages::estimate::{ln_sigma_range, OUTPUTS, REDUCTIONS, REDUCTION_SHIFT};
+use dermis_golden::fixed::stages::send::LN_SIGMA_BITS;
+use dermis_golden::fixed::words::formats::MU_STEPS;
+use dermis_golden::fixed::words::network::{LAST_SHIFT, OUTPUT_BITS, POSITION_BITS};
+use dermis_golden::fixed::Model;
+use rust_hdl::prelude::*;
+
+use crate::kernel_block;
+use crate::language::{concat, Body, Builder, Expr, Kernel, Net, Type};
+use crate::primitives::{count_bits, hadamard, position_bits, saturating_sum, SATURATION_BITS};
+use crate::wire::Wire;
+
+/// Rows of accumulators in; operands of the hidden layers four cycles later; μ and its σ after the second row of the last
+/// layer. One more quad of operands, of no meaning, says that μ is known.
+///
+/// Without a network all outputs are constant 0.
+#[derive(LogicBlock)]
+pub struct Estimate {
+    /// Clock; registers change on its rising edge.
+    pub clk: Signal<In, Clock>,
+    /// Synchronous reset, active high.
+    pub rst: Signal<In, Bit>,
+    /// A subarray starts: the rows of its first layer come next, and its saturations are counted from 0.
+    pub start: Signal<In, Bit>,
+    /// Otherwise μ is 0; constant from `start` until the next.
+    pub enabled: Signal<In, Bit>,
+    /// Accumulators of one row for the four parities, `lane_bits` each, signed; valid with `valid`.
+    pub quad: Wire<In>,
+    /// `quad` holds a row of a layer.
+    pub valid: Signal<In, Bit>,
+    /// Images of four neurons in parities, `data_bits` each, signed; valid with `operands_valid`.
+    pub operands: Wire<Out>,
+    /// `operands` holds a quad, or μ is known.
+    pub operands_valid: Signal<Out, Bit>,
+    /// `operands` holds a quad of images.
+    pub images_valid: Signal<Out, Bit>,
+    /// Position of μ1 in mu_max/384, signed; valid from the last `operands_valid` until the next `start`.
+    pub position_x: Wire<Out>,
+    /// Position of μ2, as `position_x`.
+    pub position_y: Wire<Out>,
+    /// ln of the standard deviation of μ1 over mu_max in the lower half, of μ2 in the upper, signed, in 1/384; as `position_x`.
+    pub ln_sigma: Wire<Out>,
+    /// Number of saturated images and outputs of this subarray, 16 bits, stays at the largest count; final with μ.
+    pub saturations: Wire<Out>,
+    kernel: Body,
+}
+
+kernel_block!(
+    Estimate,
+    clock clk,
+    inputs [rst, start, enabled, quad, valid],
+    outputs [operands, operands_valid, images_valid, position_x, position_y, ln_sigma, saturations]
+);
+
+/// What decides the circuit.
+#[derive(Clone, Copy, Debug)]
+struct Shape {
+    lane_bits: usize,
+    data_bits: usize,
+    /// Width of the word of both ln σ, which stands in the place of the score.
+    score_bits: usize,
+    /// The network; none in a scene with a search.
+    network: Option<Layers>,
+}
+
+/// Sizes of a network.
+#[derive(Clone, Copy, Debug)]
+struct Layers {
+    /// Rows of all hidden layers, of whole groups.
+    hidden: usize,
+    /// Right shift of the hidden layers.
+    shift: usize,
+}
+
+impl Estimate {
+    /// For the network of `model`.
+    pub fn new(model: &Model) -> Self {
+        let formats = model.formats();
+        let hidden = || -> usize {
+            let (_, hidden) = formats.layers.split_last().unwrap_or((&0, &[]));
+            hidden.iter().map(|rows| rows.next_multiple_of(formats.lanes_per_parity)).sum()
+        };
+        let network = model.quantised().network.as_ref();
+        Estimate::of(Shape {
+            lane_bits: formats.lane_bits as usize,
+            data_bits: formats.data_bits as usize,
+            score_bits: formats.score_bits as usize,
+            network: network.map(|network| Layers { hidden: hidden(), shift: network.shift as usize }),
+        })
+    }
+
+    fn of(shape: Shape) -> Self {
+        let block = Estimate {
+            clk: Default::default(),
+            rst: Default::default(),
+            start: Default::default(),
+            enabled: Default::default(),
+            quad: Wire::new(4 * shape.lane_bits),
+            valid: Default::default(),
+            operands: Wire::new(4 * shape.data_bits),
+            operands_valid: Default::default(),
+            images_valid: Default::default(),
+            position_x: Wire::new(position_bits()),
+            position_y: Wire::new(position_bits()),
+            ln_sigma: Wire::new(shape.score_bits),
+            saturations: Wire::new(SATURATION_BITS),
+            kernel: Body::default(),
+        };
+        block.bind(shape.kernel())
+    }
+}
+
+/// A signed number saturated to `bits` bits, and whether that changed it.
+fn saturated<'k>(k: &'k Builder, value: Expr<'k>, bits: usize) -> (Expr<'k>, Expr<'k>) {
+    if value.bits() <= bits {
+        return (value.signed().extend(bits).unsigned(), k.constant(1, 0));
+    }
+    let above = value.slice(bits - 1, value.bits() - bits + 1);
+    let clips = above.any() & !above.all();
+    let sign = value.top();
+    (clips.mux(sign.concat((!sign).repeat(bits - 1)), value.low(bits)), clips)
+}
+
+/// A signed number within `range`.
+fn clamped<'k>(k: &'k Builder, value: Expr<'k>, [least, most]: [i64; 2]) -> Expr<'k> {
+    let [least, most] = [least, most].map(|limit| k.signed_constant(value.bits(), limit));
+    let value = value.signed();
+    value.less(least).mux(least, most.less(value).mux(most, value))
+}
+
+impl Shape {
+    fn kernel(self) -> Kernel {
+        let k = Builder::new("estimate");
+        let [rst, start, enabled] = ["rst", "start", "enabled"].map(|name| k.input(name, 1));
+        let (quad, valid) = (k.input("quad", 4 * self.lane_bits), k.input("valid", 1));
+        let Some(Layers { hidden, shift }) = self.network else {
+            k.comment("There is no network.");
+            k.wire("operands", k.constant(4 * self.data_bits, 0));
+            k.wire("operands_valid", k.constant(1, 0));
+            k.wire("images_valid", k.constant(1, 0));
+            for name in ["position_x", "position_y"] {
+                k.wire(name, k.constant(position_bits(), 0));
+            }
+            k.wire("ln_sigma", k.constant(self.score_bits, 0));
+            k.wire("saturations", k.constant(SATURATION_BITS, 0));
+            return k.finish();
+        };
+        let bit = Type::unsigned(1);
+        let later = |name: &str, value: Expr| {
+            let state = k.state(name, bit, rst, 0);
+            state.set(value);
+            state.get()
+        };
+        let row = k.state("row", Type::unsigned(count_bits(hidden + 3)), rst | start, 0);
+        let [is_first, is_second] = [0, 1].map(|own| row.is((hidden + own) as u64));
+        let ended = k.wire("ended", row.is(hidden as u64 + 2));
+        k.when(valid & !ended, || row.set(row.plus(1)));
+        let is_hidden = k.wire("is_hidden", row.less(k.constant(row.bits(), hidden as u64)));
+        let accumulator = |parity: usize| quad.slice(parity * self.lane_bits, self.lane_bits).signed();
+
+        k.comment("Hidden layers: images above zero, in parities again.");
+        let rounded =
+            |parity: usize| k.delay(&format!("rounded_{parity}"), accumulator(parity).round_shift(shift)).unsigned();
+        let parities = k.wire("rounded", concat(&[3, 2, 1, 0].map(rounded)));
+        let images = self.data_bits - 3;
+        let images: Vec<(Expr, Expr)> = (0..4)
+            .map(|lane| {
+                let sum = k.delay(&format!("sum_{lane}"), hadamard(parities)[lane]);
+                let clips =
+                    k.wire(&format!("clips_{lane}"), !sum.top() & sum.slice(images, sum.bits() - 1 - images).any());
+                let image = sum.top().mux(k.constant(images, 0), sum.low(images).unsigned() | clips.repeat(images));
+                (k.delay(&format!("image_{lane}"), k.constant(1, 0).concat(image)), clips)
+            })
+            .collect();
+        let all = k.wire("images", concat(&[3, 2, 1, 0].map(|lane: usize| images[lane].0)));
+        let operands = hadamard(all).map(|sum| sum.unsigned());
+        k.delay("operands", concat(&[3, 2, 1, 0].map(|parity: usize| operands[parity])));
+        let valid2 = later("valid2", later("valid1", valid & is_hidden));
+        let images_valid = later("images_valid", later("valid3", valid2));
+
+        k.comment("Last layer: μ from its first row, ln σ from its first and second.");
+        let first = later("first", valid & is_first);
+        let second = later("second", valid & is_second);
+        let output = |place: usize, bits: u32| {
+            let (parity, row) = OUTPUTS[place];
+            let name = format!("output_{place}");
+            let value = k.delay(&name, accumulator(parity).round_shift(shift + LAST_SHIFT as usize));
+            let (value, clips) = saturated(&k, value, bits as usize);
+            (value, [first, second][row] & clips)
+        };
+        let outputs = [POSITION_BITS, POSITION_BITS, OUTPUT_BITS, OUTPUT_BITS];
+        let outputs: Vec<(Expr, Expr)> = (0..4).map(|place| output(place, outputs[place])).collect();
+        let ln_sigma: Vec<Expr> = [2, 3]
+            .map(|place| {
+                let (_, row) = OUTPUTS[place];
+                let register = k.register(&format!("ln_{place}"), Type::signed(OUTPUT_BITS as usize));
+                k.when([first, second][row], || register.set(clamped(&k, outputs[place].0, ln_sigma_range())));
+                register.get().extend(LN_SIGMA_BITS as usize).unsigned()
+            })
+            .into();
+        k.wire("ln_sigma", ln_sigma[1].concat(ln_sigma[0]));
+        let known = self.position(&k, [first, second], later, [outputs[0].0, outputs[1].0], enabled);
+        k.wire("operands_valid", images_valid | known);
+
+        let image_clips = k.delay(
+            "image_clips",
+            valid2.mux(concat(&[0, 1, 2, 3].map(|lane: usize| images[lane].1)), k.constant(4, 0)),
+        );
+        let output_clips = k.delay("output_clips", concat(&[0, 1, 2, 3].map(|place: usize| outputs[place].1)));
+        let clips = image_clips | output_clips;
+        let clips = k.delay("clips", (clips.at(0) + clips.at(1)) + (clips.at(2) + clips.at(3)));
+        let saturations = k.state("saturations", Type::unsigned(SATURATION_BITS), start, 0);
+        saturations.set(saturating_sum(&k, "count", *saturations, clips));
+        k.finish()
+    }
+
+    /// The position of μ, taken with `first` and reduced from `second` on; high for one cycle when it is known.
+    fn position<'k>(
+        self,
+        k: &'k Builder,
+        [first, second]: [Expr<'k>; 2],
+        later: impl Fn(&str, Expr<'k>) -> Expr<'k>,
+        outputs: [Expr<'k>; 2],
+        enabled: Expr<'k>,
+    ) -> Expr<'k> {
+        let axes: Vec<Net> = ["x", "y"].map(|name| k.register(name, Type::signed(POSITION_BITS as usize))).into();
+        let left = k.register("left", Type::unsigned(count_bits(2 * REDUCTIONS + 1)));
+        let runs = k.wire("runs", left.any());
+        k.when(runs, || left.set(left.minus(1)));
+        k.when(second, || left.set(k.constant(left.bits(), 2 * REDUCTIONS as u64)));
+        let squares =
+            [0, 1].map(|axis| k.delay(&format!("square_{axis}"), axes[axis].get() * axes[axis].get()).unsigned());
+        let square = k.wire("square", squares[0] + squares[1]);
+        let outside = k.wire("outside", k.constant(square.bits(), (MU_STEPS * MU_STEPS) as u64).less(square));
+        // The squares are those of the positions in the odd cycles before.
+        let reduces = k.wire("reduces", runs & left.at(0) & outside);
+        for axis in [0, 1] {
+            let position = axes[axis].get();
+            let less = (position - position.round_shift(REDUCTION_SHIFT as usize)).low(POSITION_BITS as usize).signed();
+            k.when(reduces, || axes[axis].set(less));
+            k.when(first, || axes[axis].set(outputs[axis].signed()));
+            let wide = position.extend(position_bits()).unsigned();
+            k.wire(["position_x", "position_y"][axis], wide & enabled.repeat(position_bits()));
+        }
+        later("known", left.is(1))
+    }
+}

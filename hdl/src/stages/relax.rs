@@ -1,0 +1,171 @@
+//! Stage `relax`: with a network, adds v_00 to the products of each step; its sums are p, and the operands of the next step.
+//!
+//! With a search words and operands pass on wires: v_ij are summed by the search.
+
+use dermis_golden::fixed::plan::resources::Holds;
+use dermis_golden::fixed::words::formats::Formats;
+use rust_hdl::prelude::*;
+
+use crate::kernel_block;
+use crate::language::{concat, Body, Builder, Contents, Expr, Kernel, Type};
+use crate::primitives::{count_bits, operand_of, saturating_sum, SATURATION_BITS};
+use crate::wire::Wire;
+
+/// Words of `rescale` in, the first Q of a subarray v_00; their sums with v_00 three cycles later, the operands four. Those of
+/// `estimate` pass on to the same memory.
+#[derive(LogicBlock)]
+pub struct Relax {
+    /// Clock; registers change on its rising edge.
+    pub clk: Signal<In, Clock>,
+    /// Synchronous reset, active high.
+    pub rst: Signal<In, Bit>,
+    /// A subarray starts: v_00 comes next, and saturations are counted from 0.
+    pub start: Signal<In, Bit>,
+    /// Four parities, `vector_bits` each, signed; valid with `words_valid`.
+    pub words: Wire<In>,
+    /// `words` holds a quad.
+    pub words_valid: Signal<In, Bit>,
+    /// The same, `data_bits` each; valid with `short_valid`. Read without a network only.
+    pub short: Wire<In>,
+    /// `short` holds a quad.
+    pub short_valid: Signal<In, Bit>,
+    /// Operands of `estimate`, `data_bits` each; valid with `images_valid`.
+    pub images: Wire<In>,
+    /// `images` holds a quad; never together with one of the own operands.
+    pub images_valid: Signal<In, Bit>,
+    /// Saturations of `rescale` in this subarray.
+    pub rescaled: Wire<In>,
+    /// Saturations of `estimate` in this subarray.
+    pub estimated: Wire<In>,
+    /// Four parities of p, or of v_ij, `vector_bits` each, signed; valid with `sums_valid`.
+    pub sums: Wire<Out>,
+    /// `sums` holds a quad.
+    pub sums_valid: Signal<Out, Bit>,
+    /// The same as operands, `data_bits` each, or those of `estimate`; valid with `operands_valid`.
+    pub operands: Wire<Out>,
+    /// `operands` holds a quad.
+    pub operands_valid: Signal<Out, Bit>,
+    /// All saturations of this subarray, 16 bits, stays at the largest count; final four cycles after the last sum.
+    pub saturations: Wire<Out>,
+    kernel: Body,
+}
+
+kernel_block!(
+    Relax,
+    clock clk,
+    inputs [rst, start, words, words_valid, short, short_valid, images, images_valid, rescaled, estimated],
+    outputs [sums, sums_valid, operands, operands_valid, saturations]
+);
+
+/// Widths and number of quads.
+#[derive(Clone, Copy)]
+struct Shape {
+    word: usize,
+    data: usize,
+    quads: usize,
+    network: bool,
+}
+
+impl Relax {
+    /// With the widths of `formats`.
+    pub fn new(formats: &Formats) -> Self {
+        Relax::of(Shape {
+            word: formats.vector_bits as usize,
+            data: formats.data_bits as usize,
+            quads: formats.quads,
+            network: formats.has_network(),
+        })
+    }
+
+    fn of(shape: Shape) -> Self {
+        let block = Relax {
+            clk: Default::default(),
+            rst: Default::default(),
+            start: Default::default(),
+            words: Wire::new(4 * shape.word),
+            words_valid: Default::default(),
+            short: Wire::new(4 * shape.data),
+            short_valid: Default::default(),
+            images: Wire::new(4 * shape.data),
+            images_valid: Default::default(),
+            rescaled: Wire::new(SATURATION_BITS),
+            estimated: Wire::new(SATURATION_BITS),
+            sums: Wire::new(4 * shape.word),
+            sums_valid: Default::default(),
+            operands: Wire::new(4 * shape.data),
+            operands_valid: Default::default(),
+            saturations: Wire::new(SATURATION_BITS),
+            kernel: Body::default(),
+        };
+        block.bind(shape.kernel())
+    }
+}
+
+impl Shape {
+    fn kernel(self) -> Kernel {
+        let k = Builder::new("relax");
+        let [rst, start] = ["rst", "start"].map(|name| k.input(name, 1));
+        let (words, valid) = (k.input("words", 4 * self.word), k.input("words_valid", 1));
+        let (short, short_valid) = (k.input("short", 4 * self.data), k.input("short_valid", 1));
+        let (images, images_valid) = (k.input("images", 4 * self.data), k.input("images_valid", 1));
+        let [rescaled, estimated] = ["rescaled", "estimated"].map(|name| k.input(name, SATURATION_BITS));
+        if !self.network {
+            k.comment("Without a network all passes on.");
+            for (name, value) in [
+                ("sums", words),
+                ("sums_valid", valid),
+                ("operands", short),
+                ("operands_valid", short_valid),
+                ("saturations", rescaled),
+            ] {
+                k.wire(name, value);
+            }
+            return k.finish();
+        }
+        let bit = Type::unsigned(1);
+        let quad = k.state("quad", Type::unsigned(count_bits(self.quads)), rst | start, 0);
+        let adds = k.state("adds", bit, rst | start, 0);
+        let last = k.wire("last", quad.is(self.quads as u64 - 1));
+        k.when(valid, || quad.set(last.mux(k.constant(quad.bits(), 0), quad.plus(1))));
+        k.when(valid & last, || adds.set(k.constant(1, 1)));
+        let memory = k.memory("first", self.quads, 4 * self.word, Contents::Undefined).holds(Holds::First);
+        memory.write(valid & !*adds, *quad, words);
+        let first = k.delay("first_out", k.delay("first_read", memory.read(*quad)));
+
+        let later = |name: &str, value: Expr| {
+            let state = k.state(name, bit, rst, 0);
+            state.set(value);
+            state.get()
+        };
+        let twice = |name: &str, value| k.delay(&format!("{name}2"), k.delay(&format!("{name}1"), value));
+        let (words2, adds2) = (twice("words", words), twice("adds", *adds));
+        let valid2 = later("valid2", later("valid1", valid));
+        later("sums_valid", valid2);
+        let own_valid = later("own_valid", k.named("sums_valid"));
+        let lane = |parity: usize| {
+            k.scope(&format!("parity_{parity}"), || {
+                let at = parity * self.word;
+                let own = words2.slice(at, self.word).signed();
+                let sum = own + (first.slice(at, self.word) & adds2.repeat(self.word)).signed();
+                let clips = k.wire("clips", sum.top().differs(sum.at(self.word - 1)));
+                let most = sum.top().concat((!sum.top()).repeat(self.word - 1));
+                let word = k.delay("sum", clips.mux(most, sum.low(self.word).unsigned()));
+                [word, operand_of(&k, word, self.data), clips]
+            })
+        };
+        let lanes: Vec<[Expr; 3]> = (0..4).rev().map(lane).collect();
+        let [sums, own, clipped] = [0, 1, 2].map(|n| concat(&lanes.iter().map(|lane| lane[n]).collect::<Vec<_>>()));
+        k.wire("sums", sums);
+        k.wire("operands", images_valid.mux(images, own));
+        k.wire("operands_valid", own_valid | images_valid);
+
+        let clipped3 = k.delay("clipped3", valid2.mux(clipped, k.constant(4, 0)));
+        let clips = (clipped3.at(0) + clipped3.at(1)) + (clipped3.at(2) + clipped3.at(3));
+        let clips = k.delay("clips", clips);
+        let relaxed = k.state("relaxed", Type::unsigned(SATURATION_BITS), start, 0);
+        relaxed.set(saturating_sum(&k, "count", *relaxed, clips));
+        let others = k.delay("others", saturating_sum(&k, "all_others", rescaled, estimated));
+        k.delay("saturations", saturating_sum(&k, "total", others, *relaxed));
+        k.finish()
+    }
+}
