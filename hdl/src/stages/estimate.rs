@@ -208,7 +208,7 @@ impl Shape {
             })
             .into();
         k.wire("ln_sigma", ln_sigma[1].concat(ln_sigma[0]));
-        let known = self.position(&k, [first, second], later, [outputs[0].0, outputs[1].0], enabled);
+        let known = self.position(&k, [first, second], later, [outputs[0].0, outputs[1].0], [rst | start, enabled]);
         k.wire("operands_valid", images_valid | known);
 
         let image_clips = k.delay(
@@ -230,10 +230,10 @@ impl Shape {
         [first, second]: [Expr<'k>; 2],
         later: impl Fn(&str, Expr<'k>) -> Expr<'k>,
         outputs: [Expr<'k>; 2],
-        enabled: Expr<'k>,
+        [restarts, enabled]: [Expr<'k>; 2],
     ) -> Expr<'k> {
         let axes: Vec<Net> = ["x", "y"].map(|name| k.register(name, Type::signed(POSITION_BITS as usize))).into();
-        let left = k.register("left", Type::unsigned(count_bits(2 * REDUCTIONS + 1)));
+        let left = k.state("left", Type::unsigned(count_bits(2 * REDUCTIONS + 1)), restarts, 0);
         let runs = k.wire("runs", left.any());
         k.when(runs, || left.set(left.minus(1)));
         k.when(second, || left.set(k.constant(left.bits(), 2 * REDUCTIONS as u64)));
@@ -252,5 +252,133 @@ impl Shape {
             k.wire(["position_x", "position_y"][axis], wide & enabled.repeat(position_bits()));
         }
         later("known", left.is(1))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::collections::BTreeMap;
+
+    use dermis_golden::fixed::stages::estimate::{estimate, images};
+    use dermis_golden::fixed::stages::send::ln_sigma_word;
+
+    use super::*;
+    use crate::language::testbench::{check, Reference};
+    use crate::scenes::learned;
+    use crate::wire::Word;
+
+    /// Cycles from a row to its operands, and from the second row of the last layer until μ is known.
+    const LATENCY: [usize; 2] = [4, 2 + 2 * REDUCTIONS];
+
+    /// Inputs: reset, start, whether μ is wanted, a row, whether there is one.
+    struct Rows<'a> {
+        model: &'a Model,
+        hidden: usize,
+        cycle: usize,
+        rows: Vec<[i64; 4]>,
+        enabled: bool,
+        /// Operands by the cycle in which they are output; none before the first reset.
+        operands: Option<BTreeMap<usize, [i64; 4]>>,
+        saturations: u32,
+        /// The cycle in which μ is known, and what it is then.
+        known: Option<(usize, [Word; 3])>,
+    }
+
+    impl<'a> Rows<'a> {
+        fn new(model: &'a Model, hidden: usize) -> Self {
+            let (operands, known) = (None, None);
+            Rows { model, hidden, cycle: 0, rows: Vec::new(), enabled: false, operands, saturations: 0, known }
+        }
+
+        fn told(&self) -> [Word; 3] {
+            let shift = self.model.quantised().network.as_ref().unwrap().shift;
+            let told = estimate(shift, &self.rows[self.hidden..]);
+            let position =
+                told.position.map(|x| Word::of_fields(&[if self.enabled { x.into() } else { 0 }], position_bits()));
+            [position[0], position[1], Word::of_fields(&[ln_sigma_word(told.ln_sigma).into()], 32)]
+        }
+    }
+
+    impl Reference for Rows<'_> {
+        fn outputs(&mut self, _: &[Word]) -> Vec<Option<Word>> {
+            let due = self.operands.as_ref().map(|all| all.get(&self.cycle).copied());
+            let known = self.known.filter(|(cycle, _)| *cycle <= self.cycle);
+            let now = self.known.is_some_and(|(cycle, _)| cycle == self.cycle);
+            let bits = self.model.formats().data_bits as usize;
+            let of = |n: usize| known.map(|(_, told)| told[n]);
+            vec![
+                due.flatten().map(|quad| Word::of_fields(&quad, bits)),
+                due.map(|quad| quad.is_some().into()),
+                of(2),
+                of(0),
+                of(1),
+                due.map(|quad| (quad.is_some() || now).into()),
+                known.map(|_| u64::from(self.saturations).into()),
+            ]
+        }
+
+        fn clock(&mut self, inputs: &[Word]) {
+            let [rst, start, enabled, valid] = [0, 1, 2, 4].map(|input| inputs[input].number() == 1);
+            let formats = self.model.formats();
+            let network = self.model.quantised().network.as_ref().unwrap();
+            self.enabled = enabled;
+            if valid && self.rows.len() < self.hidden + 2 {
+                let row = [0, 1, 2, 3].map(|parity| inputs[3].signed(parity, formats.lane_bits as usize));
+                self.rows.push(row);
+                if self.rows.len() <= self.hidden {
+                    let (quads, saturations) = images(formats, network.shift, &[row]);
+                    self.saturations += saturations;
+                    self.operands.iter_mut().for_each(|all| {
+                        all.insert(self.cycle + LATENCY[0], quads[0]);
+                    });
+                } else if self.rows.len() == self.hidden + 2 {
+                    self.saturations += estimate(network.shift, &self.rows[self.hidden..]).saturations;
+                    self.known = Some((self.cycle + LATENCY[1], self.told()));
+                }
+            }
+            if start || rst {
+                (self.rows, self.known, self.saturations) = (Vec::new(), None, 0);
+            }
+            if rst {
+                self.operands = Some(BTreeMap::new());
+            }
+            self.cycle += 1;
+        }
+    }
+
+    #[test]
+    fn rows_become_images_and_then_an_estimate() {
+        let model = learned(4, 5, &[7], "mu_max = 0.3\n");
+        let formats = model.formats();
+        let hidden = 7usize.next_multiple_of(formats.lanes_per_parity);
+        let (bits, shift) = (formats.lane_bits as usize, model.quantised().network.as_ref().unwrap().shift);
+        let mut random = fastrand::Rng::with_seed(23);
+        let mut stimulus: Vec<Vec<Word>> = Vec::new();
+        let mut enabled = false;
+        for frame in 0..60 {
+            let mut put = |rst: bool, start: bool, row: Option<[i64; 4]>| {
+                let word = Word::of_fields(&row.unwrap_or_default(), bits);
+                stimulus.push(vec![rst.into(), start.into(), enabled.into(), word, row.is_some().into()]);
+                // From the cycle after the start on.
+                enabled = if start { frame % 4 > 0 } else { enabled };
+            };
+            put(frame % 5 == 0, false, None);
+            put(false, true, None);
+            (0..6).for_each(|_| put(false, false, None));
+            for row in 0..hidden + 2 + random.usize(..4) {
+                (0..random.usize(..3)).for_each(|_| put(false, false, None));
+                // Words of all sizes, some of which saturate.
+                let large = if row < hidden { formats.image_bits() } else { LAST_SHIFT + POSITION_BITS };
+                let limit = 1i64 << (shift + large - random.u32(..6)).min(formats.lane_bits - 1);
+                put(false, false, Some([(); 4].map(|()| random.i64(-limit..limit))));
+            }
+            let wait = if frame % 7 == 6 { random.usize(..30) } else { LATENCY[1] + 10 };
+            (0..wait).for_each(|_| put(false, false, None));
+            if wait < LATENCY[1] {
+                put(true, false, None);
+            }
+        }
+        let block = Estimate::new(&model);
+        check(block.kernel.kernel(), &stimulus, &mut Rows::new(&model, hidden));
     }
 }

@@ -169,3 +169,150 @@ impl Shape {
         k.finish()
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use dermis_golden::fixed::words::arith::saturate;
+
+    use super::*;
+    use crate::language::testbench::{check, random_word, Reference};
+    use crate::wire::Word;
+
+    const SHAPE: Shape = Shape { word: 22, data: 18, quads: 5, network: true };
+
+    /// Inputs in the order of the block.
+    #[derive(Default)]
+    struct Sums {
+        /// v_00 so far; the words on their way, each as it came in, and how many of the sums before were saturated.
+        first: Vec<[i64; 4]>,
+        /// Sums of the cycle before, of the one before that, and so on; none before the first reset.
+        sums: Option<std::collections::VecDeque<Option<([i64; 4], u32)>>>,
+        seen: usize,
+        total: u32,
+        /// Cycles since the last sum entered or another count changed, and the other counts.
+        quiet: usize,
+        others: u64,
+    }
+
+    fn short(word: i64) -> i64 {
+        saturate((word + 8) >> 4, SHAPE.data as u32).0
+    }
+
+    impl Reference for Sums {
+        fn outputs(&mut self, inputs: &[Word]) -> Vec<Option<Word>> {
+            let before = |cycles: usize| Some(self.sums.as_ref()?.get(cycles - 1).copied().flatten());
+            let images = inputs[7].number() == 1;
+            let (sum, own) = (before(3), before(4));
+            let operands = match (images, own.flatten()) {
+                (true, _) => Some(inputs[6]),
+                (false, own) => own.map(|(sum, _)| Word::of_fields(&sum.map(short), SHAPE.data)),
+            };
+            let others = inputs[8].number() + inputs[9].number();
+            self.quiet = if others == self.others { self.quiet } else { 0 };
+            self.others = others;
+            let total = u64::from(self.total) + others;
+            vec![
+                sum.map(|sum| sum.is_some().into()),
+                sum.flatten().map(|(sum, _)| Word::of_fields(&sum, SHAPE.word)),
+                operands,
+                own.map(|own| (own.is_some() || images).into()),
+                (self.sums.is_some() && self.quiet > 8).then(|| total.min(0xffff).into()),
+            ]
+        }
+
+        fn clock(&mut self, inputs: &[Word]) {
+            let [rst, start, valid] = [0, 1, 3].map(|input| inputs[input].number() == 1);
+            self.quiet += 1;
+            let mut entered = None;
+            if valid {
+                let words = [0, 1, 2, 3].map(|parity| inputs[2].signed(parity, SHAPE.word));
+                let mut clipped = 0;
+                let sum = match self.seen < SHAPE.quads {
+                    true => {
+                        self.first.push(words);
+                        words
+                    }
+                    false => {
+                        let first = self.first[self.seen % SHAPE.quads];
+                        [0, 1, 2, 3].map(|parity| {
+                            let (sum, clips) = saturate(words[parity] + first[parity], SHAPE.word as u32);
+                            clipped += u32::from(clips);
+                            sum
+                        })
+                    }
+                };
+                (self.seen, self.total, self.quiet) = (self.seen + 1, self.total + clipped, 0);
+                entered = Some((sum, clipped));
+            }
+            if let Some(sums) = &mut self.sums {
+                sums.push_front(entered);
+                sums.truncate(5);
+            }
+            if start || rst {
+                (self.first, self.seen, self.total, self.quiet) = (Vec::new(), 0, 0, 0);
+            }
+            if rst {
+                self.sums = Some(vec![None; 5].into());
+            }
+        }
+    }
+
+    /// Subarrays of v_00 and some steps, with gaps; some are cut off by a reset.
+    fn stimulus() -> Vec<Vec<Word>> {
+        let mut random = fastrand::Rng::with_seed(31);
+        let mut stimulus = Vec::new();
+        for frame in 0..60 {
+            let counts =
+                [(); 2].map(|()| Word::from(if frame % 9 == 8 { random.u64(..0xffff) } else { random.u64(..9) }));
+            let mut put = |random: &mut fastrand::Rng, rst: bool, start: bool, valid: bool, images: bool| {
+                let word = random_word(random, 4 * SHAPE.word);
+                let [short, own] = [(); 2].map(|()| random_word(random, 4 * SHAPE.data));
+                stimulus.push(vec![
+                    rst.into(),
+                    start.into(),
+                    word,
+                    valid.into(),
+                    short,
+                    false.into(),
+                    own,
+                    images.into(),
+                    counts[0],
+                    counts[1],
+                ]);
+            };
+            put(&mut random, frame % 4 == 0, false, false, false);
+            put(&mut random, false, true, false, false);
+            for _ in 0..SHAPE.quads * random.usize(1..5) {
+                put(&mut random, false, false, true, false);
+                (0..random.usize(..3)).for_each(|_| put(&mut random, false, false, false, false));
+            }
+            for after in 0..20 {
+                let images = after > 5 && random.bool();
+                put(&mut random, false, false, false, images);
+            }
+        }
+        stimulus
+    }
+
+    #[test]
+    fn the_products_of_each_step_are_added_to_v_00() {
+        check(Relax::of(SHAPE).kernel.kernel(), &stimulus(), &mut Sums::default());
+    }
+
+    /// Words, their operands and their count, on wires.
+    struct Wires;
+
+    impl Reference for Wires {
+        fn outputs(&mut self, inputs: &[Word]) -> Vec<Option<Word>> {
+            [2, 3, 4, 5, 8].map(|input| Some(inputs[input])).into()
+        }
+
+        fn clock(&mut self, _: &[Word]) {}
+    }
+
+    #[test]
+    fn without_a_network_all_passes_on() {
+        let block = Relax::of(Shape { network: false, ..SHAPE });
+        check(block.kernel.kernel(), &stimulus(), &mut Wires);
+    }
+}
