@@ -35,17 +35,19 @@ use std::path::PathBuf;
 
 use dermis_golden::fixed::Model;
 use dermis_golden::frame::Frame;
-use dermis_golden::scene::Scene;
+use dermis_golden::learned::{Learned, Training};
+use dermis_golden::scene::{EstimatorKind, Scene};
 use dermis_hdl::generate;
 use dermis_sim::cosim::drive::Stimulus;
 use dermis_sim::cosim::hardware::{Hardware, Simulator};
 use dermis_sim::cosim::{run, DeviceUnderTest, Findings, Vector};
+use tempfile::NamedTempFile;
 
 /// Findings that a failed assertion shows.
 const SHOWN: usize = 3;
 
 /// Scenes verified on the shipped frames.
-pub const SCENES: [&str; 2] = ["sensor-1", "eight-by-eight"];
+pub const SCENES: [&str; 3] = ["sensor-1", "sensor-1-noisy", "eight-by-eight"];
 
 /// A built-in scene and its shipped half-space frames.
 ///
@@ -56,6 +58,22 @@ pub fn scene(name: &str) -> (Scene, Vec<Frame>) {
     let frames = Frame::shipped(&scene);
     assert!(!frames.is_empty(), "{name} has no frames");
     (scene, frames)
+}
+
+/// A scene whose μ comes from a network with hidden layers of these widths, which is hardly trained; `text` is the scene
+/// without its estimator.
+///
+/// # Panics
+/// If there is no such scene or network.
+pub fn with_network(text: &str, hidden: &[usize]) -> (Scene, NamedTempFile) {
+    let mut scene = Scene::parse(text, "network.toml").expect("a scene");
+    scene.search.estimator = EstimatorKind::Learned;
+    let training = Training { steps: 20, batch: 16, contacts: 40, hidden: hidden.to_vec(), ..Training::default() };
+    let trained = Learned::train(&scene, &training, &|_| ()).expect("a network");
+    let file = NamedTempFile::new().expect("a temporary file");
+    std::fs::write(file.path(), trained.bytes).expect("a file");
+    scene.search.network = Some(file.path().to_owned());
+    (scene, file)
 }
 
 /// The Verilog of a scene's engine without its comments, which name stages that a scene may lack.

@@ -14,12 +14,14 @@ use super::outcome::{Outcome, Summary};
 use super::statistic::quantile;
 use super::support_bound::{Reading, SupportBound};
 use super::StudyError;
+use crate::fixed::Model;
 use crate::float::Golden;
 use crate::frame::Frame;
 use crate::generator::converter::Converter;
 use crate::generator::draws::{DrawOptions, DrawnFrame, Draws, Shape};
 use crate::generator::support::Kernels;
 use crate::random::Random;
+use crate::reconstruct::Reconstruction;
 use crate::scene::{EstimatorKind, ObjectiveKind, Scene};
 use rayon::prelude::*;
 use serde::Serialize;
@@ -41,6 +43,8 @@ pub enum Candidate {
     Estimator(EstimatorKind),
     /// The search with an objective.
     Objective(ObjectiveKind),
+    /// The scene's hardware: its bit-true model.
+    Hardware,
 }
 
 /// Parameters of a study over shapes.
@@ -113,6 +117,9 @@ pub struct ShapeRow {
 impl Candidate {
     /// Name of the estimator in scenes; for the search with that of the objective.
     pub fn name(self, scene: &Scene) -> String {
+        if self == Candidate::Hardware {
+            return "hardware".to_owned();
+        }
         let search = self.stated(scene).search;
         match search.estimator {
             EstimatorKind::Search => format!("search {}", search.objective.name()),
@@ -124,7 +131,7 @@ impl Candidate {
     pub fn stated(self, scene: &Scene) -> Scene {
         let mut scene = scene.clone();
         match self {
-            Candidate::Scene => {}
+            Candidate::Scene | Candidate::Hardware => {}
             Candidate::Estimator(kind) => scene.search.estimator = kind,
             Candidate::Objective(kind) => {
                 scene.search.estimator = EstimatorKind::Search;
@@ -185,7 +192,7 @@ pub(super) fn readings(drawn: &[DrawnFrame], converter: &Converter, stated: &Sce
     drawn.par_iter().enumerate().map(|(number, drawn)| read((number, drawn))).collect()
 }
 
-/// Reconstructs every reading; `step` is called after each.
+/// Reconstructs every reading by the golden model; `step` is called after each.
 pub(super) fn outcomes(
     scene: &Scene,
     drawn: &[DrawnFrame],
@@ -193,8 +200,32 @@ pub(super) fn outcomes(
     step: &(dyn Fn() + Sync),
 ) -> Result<Vec<Outcome>, StudyError> {
     let engine = Golden::new(scene)?;
+    outcomes_of(&|frame| Ok(engine.run(frame)?), drawn, readings, step)
+}
+
+/// Reconstructs every reading by the bit-true model, which reads each frame as codes of its own full scale unless the scene
+/// states one.
+fn outcomes_of_hardware(
+    scene: &Scene,
+    drawn: &[DrawnFrame],
+    readings: &[Frame],
+    step: &(dyn Fn() + Sync),
+) -> Result<Vec<Outcome>, StudyError> {
+    // The noise floor is a word of the hardware, which needs a full scale; none is told per frame.
+    let mut scene = scene.clone();
+    scene.search.noise_floor_MPa = 0.0;
+    let engine = Model::new(&scene)?;
+    outcomes_of(&|frame| Ok(engine.reconstruct(frame)?), drawn, readings, step)
+}
+
+fn outcomes_of(
+    run: &(dyn Fn(&Frame) -> Result<Reconstruction, StudyError> + Sync),
+    drawn: &[DrawnFrame],
+    readings: &[Frame],
+    step: &(dyn Fn() + Sync),
+) -> Result<Vec<Outcome>, StudyError> {
     let one = |(drawn, reading): (&DrawnFrame, &Frame)| {
-        let outcome = Outcome::new(drawn, &engine.run(reading)?);
+        let outcome = Outcome::new(drawn, &run(reading)?);
         step();
         Ok(outcome)
     };
@@ -249,7 +280,11 @@ pub fn shape_study(
         let mut all = vec![("none".to_owned(), baseline.collect::<Vec<_>>())];
         for &candidate in &study.candidates {
             let named = candidate.stated(&stated);
-            all.push((candidate.name(&stated), outcomes(&named, &drawn, &readings, &step)?));
+            let outcomes = match candidate {
+                Candidate::Hardware => outcomes_of_hardware(&named, &drawn, &readings, &step)?,
+                _ => outcomes(&named, &drawn, &readings, &step)?,
+            };
+            all.push((candidate.name(&stated), outcomes));
         }
         for (estimator, outcomes) in &all {
             for shape in groups(study) {

@@ -3,6 +3,7 @@
 use super::bound::Bound;
 use super::contact::{ContactStress, HertzContact};
 use super::statistic::quantile;
+use crate::fixed::FixedError;
 use crate::float::{Golden, GoldenError};
 use crate::frame::{Frame, FrameError};
 use crate::generator::GeneratorError;
@@ -75,6 +76,9 @@ pub enum StudyError {
     /// The scene cannot be reconstructed.
     #[error(transparent)]
     Golden(#[from] GoldenError),
+    /// The scene has no bit-true model, or a frame no result in it.
+    #[error(transparent)]
+    Fixed(#[from] FixedError),
     /// A frame is not finite.
     #[error(transparent)]
     Frame(#[from] FrameError),

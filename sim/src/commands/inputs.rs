@@ -11,7 +11,7 @@
 use anyhow::{bail, Result};
 use clap::Args;
 use dermis_golden::frame::Frame;
-use dermis_golden::scene::Scene;
+use dermis_golden::scene::{EstimatorKind, Scene};
 
 /// `--frame` value for the stress of the paper's Eq. 2.
 pub const EQ2: &str = "eq2";
@@ -36,8 +36,11 @@ impl BoardOverride {
 pub(super) fn note_estimator(scene: &Scene) {
     let (golden, hardware) = (scene.estimator(), scene.for_hardware().estimator());
     if golden != hardware {
-        let (golden, hardware) = (golden.name(), hardware.name());
-        eprintln!("{}: the hardware has no estimator {golden} and takes {hardware} with sparse", scene.name);
+        let taken = match hardware {
+            EstimatorKind::Network => "the μ of the network with the p(μ) of the series",
+            _ => "search with sparse",
+        };
+        eprintln!("{}: the hardware has no estimator {} and takes {taken}", scene.name, golden.name());
     }
 }
 

@@ -74,6 +74,9 @@ struct ShapeArguments {
     /// Estimator, repeatable; default: what the scene names.
     #[arg(long = "estimator", value_name = "NAME", value_parser = estimator, requires = "shapes")]
     estimators: Vec<EstimatorKind>,
+    /// Also the scene's hardware, by its bit-true model.
+    #[arg(long, requires = "shapes", conflicts_with = "sensitivity")]
+    hardware: bool,
     /// Number of contacts of a frame.
     #[arg(long, value_name = "N", default_value_t = 1, requires = "shapes")]
     contacts: usize,
@@ -156,6 +159,9 @@ fn over_shapes(arguments: &Arguments, scene: &Scene, shapes: &[Shape], format: F
         estimators.chain(arguments.objectives.iter().copied().map(Candidate::Objective)).collect();
     if candidates.is_empty() {
         candidates.push(Candidate::Scene);
+    }
+    if own.hardware {
+        candidates.push(Candidate::Hardware);
     }
     let (draws, told, by_shape) = (arguments.draws, !own.unstated, own.coverage);
     let mut wanted = ShapeStudy { draws, options, told, candidates, by_shape, ..Default::default() };

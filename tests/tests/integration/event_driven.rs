@@ -7,6 +7,8 @@ use std::path::Path;
 use std::process::{Child, ChildStdin, ChildStdout, Command, Stdio};
 
 use dermis_golden::fixed::Model;
+use dermis_golden::frame::Frame;
+use dermis_golden::scene::Scene;
 use dermis_hdl::device::{Device, Inputs, Outputs, Tap};
 use dermis_hdl::language::Change;
 use dermis_hdl::{generate_changed, Generated};
@@ -15,7 +17,7 @@ use dermis_sim::cosim::drive::Stimulus;
 use dermis_sim::cosim::hardware::Hardware;
 use dermis_sim::cosim::{run, DeviceUnderTest, Findings, Vector};
 use dermis_tests::tools::folder_of;
-use dermis_tests::{assert_equal, build_dir, scene};
+use dermis_tests::{assert_equal, build_dir, scene, with_network};
 use tempfile::TempDir;
 
 /// Bits of an output word.
@@ -156,9 +158,12 @@ fn simulate(hardware: &Hardware, vectors: &[Vector], stimulus: Stimulus) -> (Fin
 fn setup(frames: usize, search_width: usize) -> (Hardware, Vec<Vector>) {
     let (mut scene, shipped) = scene("eight-by-eight");
     scene.hardware.search_width = Some(search_width);
-    let hardware = Hardware::new(Model::new(&scene).unwrap(), &build_dir()).unwrap();
-    let vector = |frame| hardware.vector(std::slice::from_ref(frame)).unwrap();
-    let vectors = shipped.iter().take(frames).map(vector).collect();
+    of_scene(&scene, &shipped[..frames])
+}
+
+fn of_scene(scene: &Scene, frames: &[Frame]) -> (Hardware, Vec<Vector>) {
+    let hardware = Hardware::new(Model::new(scene).unwrap(), &build_dir()).unwrap();
+    let vectors = frames.iter().map(|frame| hardware.vector(std::slice::from_ref(frame)).unwrap()).collect();
     (hardware, vectors)
 }
 
@@ -168,6 +173,20 @@ fn words_and_cycles_are_those_of_the_model_and_nothing_is_undefined() {
         [(3, 4, Stimulus::FullSpeed), (3, 4, Stimulus::Stalls { seed: 1 }), (1, 1, Stimulus::FullSpeed)]
     {
         let (hardware, vectors) = setup(frames, search_width);
+        let (findings, undefined) = simulate(&hardware, &vectors, stimulus);
+        assert_equal(&findings, stimulus);
+        assert!(undefined.is_empty(), "{stimulus}: {} {:?}", undefined.len(), &undefined[..undefined.len().min(9)]);
+    }
+}
+
+#[test]
+fn with_a_network_nothing_is_undefined_either() {
+    let text =
+        "name = \"network\"\n[sensor]\nrows = 4\ncols = 5\npitch_x_mm = 2.0\npitch_y_mm = 2.0\nthickness_mm = 2.0\n";
+    let (scene, _file) = with_network(text, &[13, 7]);
+    let frames = [Frame::eq2(&scene.sensor), Frame::from_stress("plain", &scene.sensor, vec![0.1; 20]).unwrap()];
+    let (hardware, vectors) = of_scene(&scene, &frames);
+    for stimulus in [Stimulus::FullSpeed, Stimulus::Stalls { seed: 2 }] {
         let (findings, undefined) = simulate(&hardware, &vectors, stimulus);
         assert_equal(&findings, stimulus);
         assert!(undefined.is_empty(), "{stimulus}: {} {:?}", undefined.len(), &undefined[..undefined.len().min(9)]);

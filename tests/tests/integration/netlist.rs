@@ -8,7 +8,7 @@ use dermis_sim::cosim::drive::Stimulus;
 use dermis_sim::cosim::hardware::{Hardware, Simulator};
 use dermis_sim::cosim::{Findings, Vector};
 use dermis_sim::drawn_frames::{DrawnFrames, Shapes};
-use dermis_tests::{build_dir, compare};
+use dermis_tests::{build_dir, compare, with_network};
 
 /// Small enough for synthesis and compilation within a minute. Without a search nine tenths of the cells are gone;
 /// limbs, matrix passes and force unit remain.
@@ -18,10 +18,13 @@ const SCENE: &str = "name = \"netlist\"\n[sensor]\nrows = 4\ncols = 4\npitch_x_m
 
 fn setup(board: &str, mu_max: &str) -> (Hardware, Vec<Frame>) {
     let text = format!("{SCENE}mu_max = {mu_max}\n[hardware]\nboard = \"{board}\"\n");
-    let scene = Scene::parse(&text, "netlist").unwrap();
+    of_scene(&Scene::parse(&text, "netlist").unwrap())
+}
+
+fn of_scene(scene: &Scene) -> (Hardware, Vec<Frame>) {
     let frames = DrawnFrames { frames: 4, contacts: vec![1], shapes: Shapes::Elliptic, touching: false, seed: 1 };
-    let frames = frames.draw(&scene).unwrap();
-    (Hardware::new(Model::for_frames(&scene, &frames).unwrap(), &build_dir()).unwrap(), frames)
+    let frames = frames.draw(scene).unwrap();
+    (Hardware::new(Model::for_frames(scene, &frames).unwrap(), &build_dir()).unwrap(), frames)
 }
 
 fn findings(hardware: &Hardware, frames: &[Frame], simulator: Simulator) -> Findings {
@@ -45,6 +48,15 @@ fn the_netlist_equals_the_model_and_a_sign_that_tools_read_differently_is_found(
 #[test]
 fn the_netlist_of_the_serial_engine_equals_the_model_and_a_sign_that_tools_read_differently_is_found() {
     netlist_and_defect("icebreaker", "0.05", "forces");
+}
+
+#[test]
+fn the_netlist_of_a_network_equals_the_model() {
+    let (scene, _file) = with_network(&format!("{SCENE}mu_max = 0.05\n"), &[5]);
+    let (hardware, frames) = of_scene(&scene);
+    assert!(hardware.model.has_network());
+    let netlist = findings(&hardware, &frames, Simulator::Netlist);
+    assert!(netlist.is_equal(), "{:?}", netlist.kept);
 }
 
 /// The output is that of block `last`.

@@ -38,6 +38,12 @@ fn block_rams_and_multipliers_are_those_of_yosys() {
         ),
         // All of the paper's cases, chosen per frame.
         small("cases", "[partition]\ncases = [0, 1, 2, 3]\n[search]\nmu_max = 0.1\ndegree = 1\n[fixed]\nlanes = 12\n"),
+        // A network: its layers, the scale of operands, the size of μ.
+        {
+            let mut scene = Scene::builtin("sensor-1-noisy").unwrap();
+            scene.fixed.lanes = Some(16);
+            Model::new(&scene).unwrap()
+        },
         // A lane word that is no multiple of a block RAM's; deep coefficients.
         small("deep", "[search]\nmu_max = 0.1\ndegree = 1\n[fixed]\nlanes = 12\ninput_bits = 16\n"),
     ];

@@ -1,6 +1,6 @@
 //! Proofs for the blocks between the streams: rounding of the rescaler, queues, and the link's output.
 
-use dermis_golden::fixed::plan::resources::{count_bits, operand_vectors};
+use dermis_golden::fixed::plan::resources::count_bits;
 use dermis_golden::fixed::stages::send::STATUS_BEATS;
 use dermis_golden::fixed::words::formats::SEARCH_EXTRA_BITS;
 use dermis_golden::fixed::Model;
@@ -91,7 +91,7 @@ fn forces_that_wait_leave_in_order() {
 #[test]
 fn operand_vectors_stay_inside_their_memory() {
     let model = model("");
-    let (vectors, quads) = (operand_vectors(model.formats().degree), model.formats().quads);
+    let (vectors, quads) = (model.formats().operand_vectors(), model.formats().quads);
     let finished = count_bits(vectors + 1);
     let given = vec![
         ("ADDRESS", number(count_bits(vectors * quads))),
