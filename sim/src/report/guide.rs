@@ -26,6 +26,10 @@ use crate::cosim::block_timing::{timing, traces, SCENE};
 use crate::jobs::Interrupt;
 use crate::progress::Progress;
 
+/// The scene of the stages that only a network needs.
+const NOISY: &str = "sensor-1-noisy";
+/// These stages.
+const OF_NETWORK: [&str; 2] = ["estimate", "relax"];
 /// The frame with two feet, and the scene of its sensor.
 const FEET: (&str, &str) = ("s4-plantar-two-feet", "sensor-4");
 
@@ -52,8 +56,13 @@ pub fn fixed_pictures(build: &Path) -> Result<Vec<PictureFile>> {
     let mut files = vec![flow()?, feet()?];
     let scene = Scene::builtin(SCENE)?;
     let stages = traces(&scene, build)?;
-    for stage in stages.iter().filter(|trace| !trace.block.instance.contains(SEPARATOR)) {
+    let own = |trace: &&Trace| !OF_NETWORK.contains(&trace.block.name);
+    for stage in stages.iter().filter(|trace| !trace.block.instance.contains(SEPARATOR)).filter(own) {
         files.push(timing_picture(&scene.name, stage)?);
+    }
+    let noisy = Scene::builtin(NOISY)?;
+    for stage in traces(&noisy, build)?.iter().filter(|trace| OF_NETWORK.contains(&trace.block.name)) {
+        files.push(timing_picture(&noisy.name, stage)?);
     }
     let mut choosing = scene;
     choosing.partition.case = Case::Adaptive;
