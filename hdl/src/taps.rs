@@ -181,7 +181,7 @@ streams!(engine::Engine {
     normalise: fold.normalised_valid => [signed normalise.shifted; TAXELS],
     fold: fold.folded_valid => [signed fold.folded; PARITIES],
     pass: pass.quad_valid => [signed pass.quad; PARITIES],
-    estimate if told.val: estimate.images_valid => [signed estimate.operands; PARITIES],
+    estimate if told.val: estimate.operands_valid => [signed estimate.operands; PARITIES],
     rescale: rescale.words_valid => [signed rescale.words; PARITIES],
     relax if told.val: relax.sums_valid => [signed relax.sums; PARITIES],
     unfold: unfold.taxels_valid => [signed unfold.taxels; TAXELS],

@@ -35,7 +35,8 @@ pub struct SubarrayTrace {
     pub folded: QuadStream,
     /// Output of `pass`: one quad per row and accumulation.
     pub passed: QuadStream,
-    /// Output of `estimate`: operands of the images of each layer; empty without a network.
+    /// Output of `estimate`: operands of the images of each layer, then the positions of μ and two zeros; empty without a
+    /// network.
     pub estimated: QuadStream,
     /// Output of `rescale`.
     pub rescaled: QuadStream,
@@ -93,6 +94,7 @@ impl SubarrayTrace {
                     saturations += told.saturations;
                     told.position = if condition { told.position } else { [0; 2] };
                     operands.position = told.position.map(i64::from);
+                    estimated.push([operands.position[0], operands.position[1], 0, 0]);
                 }
                 continue;
             }

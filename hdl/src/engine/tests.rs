@@ -130,12 +130,16 @@ fn beats_leave_in_the_cycles_of_the_model() {
 
 #[test]
 fn with_a_network_beats_leave_in_the_cycles_of_the_model() {
-    let model = learned(4, 5, &[13, 7], "mu_max = 0.3\n");
-    assert!(model.has_network() && !model.searches() && model.formats().degree > 1);
-    let subject = |changes: &[Change]| engine_subject!(Engine::new(&model), changes);
-    let defects = [
-        Change::value("", "estimate__enabled", |k| k.constant(1, 0)),
-        Change::value("", "relax__images_valid", |k| k.constant(1, 0)),
-    ];
-    check_with_defects(subject, &stimulus(&model, 7), || Frames::new(model.clone()), &defects);
+    let narrow =
+        "mu_max = 0.05\n[fixed]\nlanes = 4\ninput_bits = 18\ndata_bits = 12\ncoef_bits = 12\ninverse_bits = 20\n";
+    for (cols, hidden, more) in [(5, vec![13, 7], "mu_max = 0.3\n"), (4, vec![5], narrow)] {
+        let model = learned(4, cols, &hidden, more);
+        assert!(model.has_network() && !model.searches());
+        let subject = |changes: &[Change]| engine_subject!(Engine::new(&model), changes);
+        let defects = [
+            Change::value("", "estimate__enabled", |k| k.constant(1, 0)),
+            Change::value("", "relax__images_valid", |k| k.constant(1, 0)),
+        ];
+        check_with_defects(subject, &stimulus(&model, 7), || Frames::new(model.clone()), &defects);
+    }
 }

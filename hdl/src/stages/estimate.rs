@@ -20,7 +20,7 @@ use crate::primitives::{count_bits, hadamard, position_bits, saturating_sum, SAT
 use crate::wire::Wire;
 
 /// Rows of accumulators in; operands of the hidden layers four cycles later; μ and its σ after the second row of the last
-/// layer. One more quad of operands, of no meaning, says that μ is known.
+/// layer. One more quad, of both positions and two zeros, says that μ is known; no product reads it.
 ///
 /// Without a network all outputs are constant 0.
 #[derive(LogicBlock)]
@@ -37,12 +37,10 @@ pub struct Estimate {
     pub quad: Wire<In>,
     /// `quad` holds a row of a layer.
     pub valid: Signal<In, Bit>,
-    /// Images of four neurons in parities, `data_bits` each, signed; valid with `operands_valid`.
+    /// Images of four neurons in parities, or the positions of μ, `data_bits` each, signed; valid with `operands_valid`.
     pub operands: Wire<Out>,
     /// `operands` holds a quad, or μ is known.
     pub operands_valid: Signal<Out, Bit>,
-    /// `operands` holds a quad of images.
-    pub images_valid: Signal<Out, Bit>,
     /// Position of μ1 in mu_max/384, signed; valid from the last `operands_valid` until the next `start`.
     pub position_x: Wire<Out>,
     /// Position of μ2, as `position_x`.
@@ -58,7 +56,7 @@ kernel_block!(
     Estimate,
     clock clk,
     inputs [rst, start, enabled, quad, valid],
-    outputs [operands, operands_valid, images_valid, position_x, position_y, ln_sigma, saturations]
+    outputs [operands, operands_valid, position_x, position_y, ln_sigma, saturations]
 );
 
 /// What decides the circuit.
@@ -108,7 +106,6 @@ impl Estimate {
             valid: Default::default(),
             operands: Wire::new(4 * shape.data_bits),
             operands_valid: Default::default(),
-            images_valid: Default::default(),
             position_x: Wire::new(position_bits()),
             position_y: Wire::new(position_bits()),
             ln_sigma: Wire::new(shape.score_bits),
@@ -146,7 +143,6 @@ impl Shape {
             k.comment("There is no network.");
             k.wire("operands", k.constant(4 * self.data_bits, 0));
             k.wire("operands_valid", k.constant(1, 0));
-            k.wire("images_valid", k.constant(1, 0));
             for name in ["position_x", "position_y"] {
                 k.wire(name, k.constant(position_bits(), 0));
             }
@@ -183,7 +179,7 @@ impl Shape {
             .collect();
         let all = k.wire("images", concat(&[3, 2, 1, 0].map(|lane: usize| images[lane].0)));
         let operands = hadamard(all).map(|sum| sum.unsigned());
-        k.delay("operands", concat(&[3, 2, 1, 0].map(|parity: usize| operands[parity])));
+        let images_out = k.delay("images_out", concat(&[3, 2, 1, 0].map(|parity: usize| operands[parity])));
         let valid2 = later("valid2", later("valid1", valid & is_hidden));
         let images_valid = later("images_valid", later("valid3", valid2));
 
@@ -209,6 +205,9 @@ impl Shape {
             .into();
         k.wire("ln_sigma", ln_sigma[1].concat(ln_sigma[0]));
         let known = self.position(&k, [first, second], later, [outputs[0].0, outputs[1].0], [rst | start, enabled]);
+        let told = ["position_y", "position_x"].map(|name| k.named(name).signed().extend(self.data_bits).unsigned());
+        let told = k.constant(2 * self.data_bits, 0).concat(concat(&told));
+        k.wire("operands", known.mux(told, images_out));
         k.wire("operands_valid", images_valid | known);
 
         let image_clips = k.delay(
@@ -306,12 +305,15 @@ mod tests {
             let now = self.known.is_some_and(|(cycle, _)| cycle == self.cycle);
             let bits = self.model.formats().data_bits as usize;
             let of = |n: usize| known.map(|(_, told)| told[n]);
+            let positions = known.filter(|_| now).map(|(_, told)| {
+                let [x, y] = [0, 1].map(|axis| told[axis].signed(0, position_bits()));
+                Word::of_fields(&[x, y, 0, 0], bits)
+            });
             vec![
-                due.flatten().map(|quad| Word::of_fields(&quad, bits)),
-                due.map(|quad| quad.is_some().into()),
                 of(2),
                 of(0),
                 of(1),
+                positions.or(due.flatten().map(|quad| Word::of_fields(&quad, bits))),
                 due.map(|quad| (quad.is_some() || now).into()),
                 known.map(|_| u64::from(self.saturations).into()),
             ]

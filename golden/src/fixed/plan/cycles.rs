@@ -50,9 +50,8 @@ const SCALE: u64 = 2;
 const RELAX: u64 = 3;
 /// Cycles from a row of a hidden layer until its images can be read as an operand.
 const IMAGES: u64 = 5;
-/// Cycles from the first row of the last layer until μ can be read, beyond its reductions: second row 1, output 1, saturation
-/// 1, operand 1.
-const ESTIMATE: u64 = 4;
+/// Cycles from the second row of the last layer until μ can be read, beyond its reductions: output 1, saturation 1, operand 1.
+const ESTIMATE: u64 = 3;
 /// Cycles of each reduction of μ.
 const REDUCTION: u64 = 2;
 /// Cycles from the last raw row of v_00 to its first replayed row.
@@ -312,8 +311,9 @@ fn timeline(formats: &Formats, storage: &Storage) -> Timeline {
             }
             Target::Layer(layer) if layer + 1 < formats.layers.len() => layers.push(last_row + IMAGES),
             Target::Layer(_) => {
-                let first_row = now - 1 + lanes;
-                layers.push(first_row + ESTIMATE + REDUCTION * REDUCTIONS as u64);
+                // With one lane per parity it is the first of a group of its own.
+                let second_row = now - 1 + lanes + u64::from(per_parity > 1);
+                layers.push(second_row + ESTIMATE + REDUCTION * REDUCTIONS as u64);
             }
         }
     }
