@@ -174,6 +174,7 @@ fn run(arguments: &Arguments) -> Result<(String, bool)> {
             let scene = target.apply(Scene::load(scene)?);
             let terminal = PseudoTerminal::of(&Hardware::new(Model::new(&scene)?, build_dir)?)?;
             print(&format!("{}\n", terminal.path().display()))?;
+            eprintln!("{}: simulated; rates and times at the port are the simulation's", scene.name);
             terminal.wait()?;
             Ok((String::new(), true))
         }

@@ -126,7 +126,7 @@ impl HardwareCheck {
 
 /// One line on a folder that is intact.
 pub fn build_check(build: &BuildCheck) -> String {
-    format!("{}: {} files match manifest.json\n", build.target, build.files)
+    format!("{}: {} files match manifest.json, and manifest.json its checksum\n", build.target, build.files)
 }
 
 /// What was found of a scene.
