@@ -7,9 +7,10 @@
 //! |---|---|---|
 //! | in: scene | – | noise as stated or shown by tare frames, of the mean of its frames; mu_max |
 //! | in: peak | MPa | largest stress of a press; `None`: the scene's full scale |
-//! | out: rows | – | the baseline, the scene's estimator, and where asked for that of the hardware |
+//! | out: rows | – | the baseline, the scene's estimator, and where asked for the hardware |
 //!
-//! The frames are stress already: calibration, tare and averaging are left out, their noise is in the level. The ratio of
+//! The frames are stress already: calibration, tare and averaging are left out, their noise is in the level; so is the
+//! threshold, since the loads are scaled. The ratio of
 //! shear to load is that of [`DrawOptions`], in proportion to the scene's mu_max.
 
 use super::{shape_study, Candidate, ShapeRow, ShapeStudy, StudyError};
@@ -17,7 +18,7 @@ use crate::float::GoldenError;
 use crate::generator::converter::Converter;
 use crate::generator::draws::DrawOptions;
 use crate::input::Input;
-use crate::scene::{InputSpec, ObjectiveKind, Scene, SearchSpec};
+use crate::scene::{InputSpec, Scene, SearchSpec, ThresholdSpec};
 
 /// What to draw.
 #[derive(Clone, Debug, PartialEq)]
@@ -28,7 +29,7 @@ pub struct Expectation {
     pub draws: usize,
     /// Seed of contacts and noise.
     pub seed: u64,
-    /// Whether the search with `sparse`, which the hardware has, is compared as well.
+    /// Whether the hardware is compared as well, by its bit-true model.
     pub with_hardware: bool,
 }
 
@@ -85,6 +86,7 @@ pub fn expected(
     let InputSpec { dead, unipolar, gain_spread, plausible_MPa, .. } = scene.input.clone();
     bare.input = InputSpec { dead, unipolar, gain_spread, plausible_MPa, ..InputSpec::default() };
     bare.search.noise_floor_MPa = 0.0;
+    bare.threshold = ThresholdSpec::default();
     let converter = Converter { gain_spread, unipolar, ..Converter::default() };
     let mut options = DrawOptions { seed: asked.seed, converter, ..DrawOptions::default() };
     let SearchSpec { mu_max, .. } = scene.search;
@@ -92,10 +94,7 @@ pub fn expected(
         options.ratio = options.ratio.map(|ratio| ratio * mu_max / SearchSpec::default().mu_max);
     }
     let mut candidates = vec![Candidate::Estimator(scene.estimator())];
-    let hardware = Candidate::Objective(ObjectiveKind::Sparse);
-    if asked.with_hardware && hardware.name(scene) != candidates[0].name(scene) {
-        candidates.push(hardware);
-    }
+    candidates.extend(asked.with_hardware.then_some(Candidate::Hardware));
     let share = noise.share();
     let levels = share.map_or_else(|| ShapeStudy::default().levels, |share| vec![share]);
     // A scene without a stated noise is not told it: the golden model finds it in the frame.
@@ -130,23 +129,22 @@ mod tests {
     }
 
     #[test]
-    fn less_noise_has_smaller_errors_and_the_search_has_larger_ones() {
+    fn less_noise_has_smaller_errors_and_the_hardware_has_larger_ones() {
         let mut scene = Scene::builtin("eight-by-eight").unwrap();
         let mut median = |noise: f64, estimator: usize| {
             scene.search.noise_floor_MPa = noise;
             rows(&scene, Some(0.1))[estimator].summary.tangential.median.value
         };
-        let (quiet, noisy, search) = (median(1e-6, 1), median(1e-3, 1), median(1e-4, 2));
-        assert!(quiet < noisy && quiet < search, "{quiet} {noisy} {search}");
+        let (quiet, noisy, hardware) = (median(1e-6, 1), median(1e-3, 1), median(1e-4, 2));
+        assert!(quiet < noisy && quiet < hardware, "{quiet} {noisy} {hardware}");
     }
 
     #[test]
     fn without_a_stated_noise_the_errors_are_those_of_several_levels() {
         let mut scene = Scene::builtin("eight-by-eight").unwrap();
-        scene.search.estimator = crate::scene::EstimatorKind::Search;
+        scene.threshold.min_force_N = 0.01;
         let rows = rows(&scene, None);
-        // The scene's estimator is that of the hardware: one row beside the baseline.
-        assert_eq!(rows.len(), 2 * ShapeStudy::default().levels.len());
+        assert_eq!(rows.len(), 3 * ShapeStudy::default().levels.len());
         assert!(rows.iter().all(|row| !row.told));
     }
 }

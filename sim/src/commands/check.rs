@@ -15,7 +15,7 @@ use dermis_golden::noise::expected::{expected, Expectation, StatedNoise};
 use dermis_golden::scene::Scene;
 use dermis_hdl::{explain::explain, generate, manifest};
 
-use super::inputs::BoardOverride;
+use super::inputs::{estimator_instead, BoardOverride};
 use crate::progress::Progress;
 use crate::report::{self, BuildCheck, HardwareCheck, SceneCheck};
 
@@ -120,7 +120,5 @@ fn check_scene(arguments: &Arguments) -> Result<SceneCheck> {
 fn hardware(scene: &Scene, model: &Model) -> Result<HardwareCheck> {
     let features = explain(model)?;
     let left_out = features.iter().filter(|feature| !feature.present).map(|feature| feature.feature).collect();
-    let other = scene.for_hardware().estimator().name();
-    let instead = (scene.estimator().name() != other).then_some(other);
-    Ok(HardwareCheck::new(model, &generate(model)?.usage, instead, left_out))
+    Ok(HardwareCheck::new(model, &generate(model)?.usage, estimator_instead(scene), left_out))
 }
