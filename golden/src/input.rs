@@ -14,9 +14,12 @@
 //! | `dead = [[row, col], …]` | taxels left out of the inverse, whatever they read: [`crate::matrices::Matrices::without`] |
 //! | `unipolar = true` | a reading of zero or less is only an upper bound of the stress, filled by [`crate::float`] |
 //!
+//! The table is made from recordings under known loads by [`known_loads`].
+//!
 //! Paths are relative to the scene's file. The known forces of a frame are passed through unchanged.
 
 pub mod calibration;
+pub mod known_loads;
 pub mod sliding;
 pub mod tare;
 #[cfg(test)]

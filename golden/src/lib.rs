@@ -102,3 +102,4 @@ pub mod write;
 mod random;
 #[cfg(test)]
 mod reference;
+mod suggest;

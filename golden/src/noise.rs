@@ -20,6 +20,7 @@
 pub mod bound;
 pub mod contact;
 pub mod coverage;
+pub mod expected;
 pub mod matching;
 pub mod outcome;
 mod sensitivity;

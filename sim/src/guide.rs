@@ -30,6 +30,7 @@ pages! {
     "index.md" index,
     "your-sensor.md" your_sensor,
     "recordings.md" recordings,
+    "files.md" files,
     "accuracy.md" accuracy,
     "limits.md" limits,
     "partitions.md" partitions,

@@ -1,5 +1,7 @@
 //! Runs a list of tasks on several threads until one fails or the user interrupts.
 
+use std::io::Read;
+use std::os::unix::net::UnixStream;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::Arc;
 
@@ -8,6 +10,7 @@ use rayon::prelude::*;
 use rayon::ThreadPoolBuilder;
 use signal_hook::consts::{SIGINT, SIGTERM};
 use signal_hook::flag;
+use signal_hook::low_level::pipe;
 use thiserror::Error;
 
 use crate::progress::Progress;
@@ -31,11 +34,19 @@ impl Interrupt {
     /// A handler cannot be registered.
     pub fn on_signals() -> Result<Interrupt> {
         let interrupt = Interrupt::default();
+        let (mut woken, wakes) = UnixStream::pair()?;
         for signal in [SIGINT, SIGTERM] {
             // The order matters: on the first signal the shutdown handler must find the flag unset.
             flag::register_conditional_shutdown(signal, SECOND_INTERRUPT_EXIT, interrupt.0.clone())?;
             flag::register(signal, interrupt.0.clone())?;
+            pipe::register(signal, wakes.try_clone()?)?;
         }
+        // A handler must not write by itself; tasks that run are not stopped and may take half a minute.
+        std::thread::spawn(move || {
+            if woken.read_exact(&mut [0]).is_ok() {
+                eprintln!("interrupted: the tasks that run are ended first; a second signal ends them at once");
+            }
+        });
         Ok(interrupt)
     }
 

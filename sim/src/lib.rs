@@ -1,11 +1,12 @@
 //! Simulation, board flow and reports of the generated hardware, and the `dermis` command line.
 //!
-//! Five folders; each uses only those above it and the files beside the folders.
+//! Six folders; each uses only those above it and the files beside the folders.
 //!
 //! | folder | holds |
 //! |---|---|
 //! | [`flow`] | board flow: netlist and bitstream with open tools, compared with committed baselines |
 //! | [`cosim`] | co-simulation: the hardware under Verilator and rust-hdl, compared with the bit-true model, stressed, with faults |
+//! | [`stream`] | frames from standard input, a file, a serial port or UDP, answered line by line |
 //! | [`mod@link`] | the host end of a board's link, of real and of simulated boards |
 //! | [`report`] | measurements, and text, JSON, CSV, pictures and pages of all results |
 //! | [`commands`] | command-line arguments, commands, exit codes |
@@ -33,3 +34,4 @@ pub mod link;
 mod progress;
 pub mod report;
 pub mod run_log;
+pub mod stream;

@@ -98,7 +98,7 @@ pub(super) fn pieces(index: usize, contact: &Contact) -> Result<Vec<Piece>, Gene
         return fail("centre_mm", format!("{centre_mm:?}"), "two finite numbers");
     }
     let Some(normal) = contact.normal_N.filter(|n| *n > 0.0 && n.is_finite()) else {
-        return fail("normal_N", format!("{:?}", contact.normal_N), "a finite number above 0");
+        return fail("normal_N", stated(contact.normal_N), "a finite number above 0");
     };
     let shear = contact.tangential_N.unwrap_or_default();
     if !shear.iter().all(|t| t.is_finite()) {
@@ -148,7 +148,7 @@ pub(super) fn pieces(index: usize, contact: &Contact) -> Result<Vec<Piece>, Gene
             let friction = contact.friction.unwrap_or(f64::NAN);
             // A NaN fails the comparison.
             if !(friction > ratio && friction.is_finite()) {
-                let value = format!("{:?}", contact.friction);
+                let value = stated(contact.friction);
                 return fail("friction", value, "given and above the ratio of tangential to normal load");
             }
             return Ok(partial_slip(piece, both(sizes), force, friction));
@@ -206,4 +206,9 @@ fn partial_slip(
         piece(PressureShape::Hertz, half_mm, [tx * limit, ty * limit, normal]),
         piece(PressureShape::Hertz, half_mm.map(|a| a * stick), [tx * stick_share, ty * stick_share, 0.0]),
     ]
+}
+
+/// A number for a message.
+fn stated(number: Option<f64>) -> String {
+    number.map_or_else(|| "none".to_string(), |number| number.to_string())
 }

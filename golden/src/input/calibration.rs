@@ -81,6 +81,15 @@ impl Calibration {
         Calibration { offset: vec![0.0; taxels], gain: vec![1.0; taxels] }
     }
 
+    /// The table as text, which [`Calibration::parse`] reads back to the same numbers.
+    pub fn to_csv(&self, sensor: &Sensor) -> String {
+        let line = |(k, (offset, gain)): (usize, (&f64, &f64))| {
+            format!("{},{},{offset},{gain}\n", k / sensor.cols, k % sensor.cols)
+        };
+        let lines: String = self.offset.iter().zip(&self.gain).enumerate().map(line).collect();
+        format!("{HEADER}\n{lines}")
+    }
+
     /// Reads the table of a sensor from a file.
     ///
     /// # Errors

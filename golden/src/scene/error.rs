@@ -6,14 +6,14 @@ use thiserror::Error;
 #[derive(Debug, Error)]
 pub enum SceneError {
     /// The name is neither that of a built-in scene nor that of a file.
-    #[error("no scene {name:?}: not a file, and not built in ({}); did you mean {nearest:?}?", builtins.join(", "))]
+    #[error("no scene {name:?}: not a file, and not built in ({}){}", builtins.join(", "), did_you_mean(*nearest))]
     NotFound {
         /// The name or path given.
         name: String,
         /// Every built-in name.
         builtins: Vec<&'static str>,
-        /// The most similar built-in name.
-        nearest: &'static str,
+        /// The built-in name that it resembles, if one does.
+        nearest: Option<&'static str>,
     },
     /// The file exists but cannot be read as text.
     #[error("{file}: cannot be read: {source}")]
@@ -42,14 +42,14 @@ pub enum SceneError {
         message: String,
     },
     /// The schema has no such field.
-    #[error("{file}: unknown field {field}; the nearest valid field is {nearest}")]
+    #[error("{file}: unknown field {field}; {hint}")]
     UnknownField {
         /// Path or built-in name.
         file: String,
         /// The field with its table, `table.field`.
         field: String,
-        /// The most similar valid field.
-        nearest: String,
+        /// The valid field that it resembles, else the valid ones of its table.
+        hint: String,
     },
     /// A required field is missing.
     #[error("{file}: {field} is missing; it must be {allowed}")]
@@ -85,4 +85,9 @@ pub enum SceneError {
         /// The values implemented.
         available: &'static str,
     },
+}
+
+/// A suggestion as it follows the list of names.
+fn did_you_mean(nearest: Option<&str>) -> String {
+    nearest.map_or(String::new(), |nearest| format!("; did you mean {nearest:?}?"))
 }

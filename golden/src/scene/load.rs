@@ -1,6 +1,7 @@
 //! Loading scenes: built-in ones by name, others from files.
 
 use super::{Scene, SceneError};
+use crate::suggest::{distance, nearest};
 use std::io::Read;
 
 /// Largest scene file in bytes.
@@ -73,7 +74,8 @@ fn read(path: &str) -> std::io::Result<String> {
 
 fn not_found(name: &str) -> SceneError {
     let builtins = Scene::builtin_names();
-    let likeness = |other: &&&str| strsim::jaro_winkler(name, other);
-    let nearest = builtins.iter().max_by(|a, b| likeness(a).total_cmp(&likeness(b)));
-    SceneError::NotFound { name: name.to_string(), nearest: nearest.copied().unwrap_or_default(), builtins }
+    // A built-in scene is often taken for a file of that name.
+    let word = name.strip_suffix(".toml").unwrap_or(name);
+    let nearest = nearest(builtins.iter().copied(), |builtin| distance(word, builtin));
+    SceneError::NotFound { name: name.to_string(), nearest, builtins }
 }

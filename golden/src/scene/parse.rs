@@ -94,7 +94,11 @@ fn syntax(text: &str, origin: &str, error: &toml::de::Error) -> SceneError {
     SceneError::Syntax {
         file: origin.to_string(),
         line: 1 + text.as_bytes()[..end].iter().filter(|&&byte| byte == b'\n').count(),
-        message: error.message().to_string(),
+        message: match error.message() {
+            // The reader names a type of its own.
+            wide if wide.contains("as i128") => "an integer has more than 64 bits".to_string(),
+            message => message.to_string(),
+        },
     }
 }
 

@@ -1,8 +1,12 @@
 //! Typed reading of a TOML table, with errors that name file, field, value and what is allowed.
 
 use super::SceneError;
+use crate::suggest::{distance, nearest};
 use std::ops::RangeInclusive;
 use toml::{Table, Value};
+
+/// Letters that the shorter of two names must exceed to count as the beginning of the other.
+const LEAST_PREFIX: usize = 3;
 
 /// A scene file being read.
 pub(super) struct Reader<'a> {
@@ -22,11 +26,8 @@ impl<'a> Reader<'a> {
             schema.iter().flat_map(move |(table, fields)| fields.iter().map(move |field| path(table, field)))
         };
         let unknown = |field: String| {
-            let tables = schema.iter().map(|(table, _)| table.to_string());
-            let known = paths().chain(tables.filter(|table| !table.is_empty()));
-            let nearest = nearest_path(&field, known);
-            let file = self.file.to_string();
-            SceneError::UnknownField { file, field, nearest }
+            let hint = hint(&field, schema);
+            SceneError::UnknownField { file: self.file.to_string(), field, hint }
         };
         for (name, value) in self.root {
             let Some((_, fields)) = schema.iter().find(|(t, _)| t == name && !t.is_empty()) else {
@@ -147,11 +148,23 @@ fn join(table: &str, field: &str) -> String {
     }
 }
 
-/// The known path most similar to `path`. The field's own name counts most, so that a field in the wrong table is
-/// found; the table breaks ties.
-fn nearest_path(path: &str, known: impl Iterator<Item = String>) -> String {
-    let last = |path: &str| path.rsplit('.').next().unwrap_or(path).to_string();
-    let likeness =
-        |other: &String| strsim::jaro_winkler(&last(path), &last(other)) + 0.1 * strsim::jaro_winkler(path, other);
-    known.max_by(|a, b| likeness(a).total_cmp(&likeness(b))).unwrap_or_default()
+/// What an unknown `path` resembles, else what its table has. The field's own name counts first, so that a field in the
+/// wrong table is found; a name that begins with the typed one, or it
+/// with the name, counts as near.
+fn hint(path: &str, schema: &[(&str, &[&str])]) -> String {
+    let (table, name) = path.rsplit_once('.').unwrap_or(("", path));
+    let tables = || schema.iter().map(|(table, _)| *table).filter(|table| !table.is_empty());
+    let fields = schema.iter().flat_map(|(table, fields)| fields.iter().map(move |field| (*table, *field)));
+    let known = fields.chain(tables().map(|table| ("", table)));
+    let key = |(of, known): &(&str, &str)| {
+        let begins = name.len().min(known.len()) > LEAST_PREFIX && (known.starts_with(name) || name.starts_with(known));
+        Some((if begins { 0 } else { distance(name, known)? }, *of != table))
+    };
+    match nearest(known, key) {
+        Some((of, name)) => format!("the nearest valid field is {}", join(of, name)),
+        None => match schema.iter().find(|(of, _)| *of == table && !of.is_empty()) {
+            Some((table, fields)) => format!("[{table}] has {}", fields.join(", ")),
+            None => format!("a scene has name, [{}]", tables().collect::<Vec<_>>().join("], [")),
+        },
+    }
 }

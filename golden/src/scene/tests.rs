@@ -112,6 +112,15 @@ fn builtins_are_complete_and_distinct() {
 fn an_unknown_scene_names_the_nearest() {
     let text = Scene::load("sensor1").unwrap_err().to_string();
     assert!(text.contains("eight-by-eight") && text.ends_with("did you mean \"sensor-1\"?"), "{text}");
+    let text = Scene::load("missing/sensor-3.toml").unwrap_err().to_string();
+    assert!(text.ends_with("eight-by-eight)"), "{text}");
+    let text = Scene::load("sensor-3.toml").unwrap_err().to_string();
+    assert!(text.ends_with("did you mean \"sensor-3\"?"), "{text}");
+    // Better none than a wrong one.
+    for name in ["nope.toml", "sensor-9", "pad"] {
+        let text = Scene::load(name).unwrap_err().to_string();
+        assert!(!text.contains("did you mean"), "{text}");
+    }
 }
 
 #[test]
@@ -121,6 +130,9 @@ fn unknown_fields_name_the_nearest() {
         ("[fixed]\nmu_max = 1", "unknown field fixed.mu_max; the nearest valid field is search.mu_max"),
         ("[serach]\nmu_max = 1", "unknown field serach; the nearest valid field is search"),
         ("[input]\nfull_scale = 1", "unknown field input.full_scale; the nearest valid field is input.full_scale_MPa"),
+        // As near to pitch_x_mm as to pitch_y_mm.
+        ("[threshold]\npitch_mm = 1", "unknown field threshold.pitch_mm; [threshold] has min_force_N"),
+        ("[taxel]\nrows = 1", "unknown field taxel; a scene has name, [sensor], [medium], [partition], [search], [inverse], [threshold], [fixed], [hardware], [input], [output]"),
     ];
     for (more, wanted) in cases {
         assert_eq!(message(more), format!("my.toml: {wanted}"));

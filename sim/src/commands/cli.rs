@@ -16,7 +16,7 @@ use clap::{Parser, Subcommand};
 use dermis_golden::fixed::{FixedError, Model};
 use dermis_golden::matrices::cache;
 use dermis_golden::scene::Scene;
-use dermis_hdl::{manifest, HdlError};
+use dermis_hdl::HdlError;
 
 use super::inputs::BoardOverride;
 use crate::cosim::hardware::{DeviceTimeout, Hardware};
@@ -37,6 +37,8 @@ struct Arguments {
 }
 
 const EXAMPLES: &str = "Examples:
+  dermis new pad.toml --rows 16 --cols 12 --pitch 3 --thickness 2.5   a scene for your sensor
+  dermis check sensor-1                              degree, expected errors, whether the board holds it
   dermis reconstruct sensor-1                        the scene's first shipped frame, golden model
   dermis reconstruct --frame press.json --json       scene from the sensor in the frame file
   dermis reconstruct sensor-1 --engine rtl           the same in the generated hardware, under Verilator
@@ -63,13 +65,12 @@ enum Command {
     Build(super::build::Arguments),
     /// Make the bitstream of a scene for its board with open tools.
     Bitstream(super::bitstream::Arguments),
-    /// Check the files of a generated folder against manifest.json, and manifest.json against its checksum.
-    #[command(after_help = "Example:
-  dermis check build/sensor-1/rtl")]
-    Check {
-        /// Folder written by `dermis build`.
-        folder: PathBuf,
-    },
+    /// Check a scene: model, board, expected errors; or a generated folder against its manifest.json.
+    Check(super::check::Arguments),
+    /// Write a scene for a new sensor, with comments; asks for what is missing.
+    New(super::new::Arguments),
+    /// Make the calibration table of a sensor from recordings under known stresses.
+    Calibrate(super::calibrate::Arguments),
     /// Send frames to a board and receive forces.
     Host(super::host::Arguments),
     /// Simulate a board on a pseudo-terminal, to run `dermis host` without hardware.
@@ -164,16 +165,16 @@ fn run(arguments: &Arguments) -> Result<(String, bool)> {
         Command::Build(arguments) => Ok((super::build::run(arguments, build_dir)?, true)),
         Command::Cosim(arguments) => super::cosim::run(arguments, build_dir),
         Command::Bitstream(arguments) => super::bitstream::run(arguments, build_dir),
-        Command::Check { folder } => {
-            let files = manifest::check(folder)?;
-            Ok((format!("{}: {files} files match manifest.json\n", folder.display()), true))
-        }
+        Command::Check(arguments) => Ok((super::check::run(arguments)?, true)),
+        Command::New(arguments) => Ok((super::new::run(arguments)?, true)),
+        Command::Calibrate(arguments) => Ok((super::calibrate::run(arguments)?, true)),
         Command::Block(arguments) => Ok((super::block::run(arguments, build_dir)?, true)),
         Command::Host(arguments) => super::host::run(arguments),
         Command::Board { scene, target } => {
             let scene = target.apply(Scene::load(scene)?);
             let terminal = PseudoTerminal::of(&Hardware::new(Model::new(&scene)?, build_dir)?)?;
             print(&format!("{}\n", terminal.path().display()))?;
+            eprintln!("{}: simulated; rates and times at the port are the simulation's", scene.name);
             terminal.wait()?;
             Ok((String::new(), true))
         }

@@ -4,7 +4,7 @@ use std::path::Path;
 use std::time::Instant;
 
 use anyhow::Result;
-use clap::Args;
+use clap::{value_parser, Args};
 use dermis_golden::fixed::Model;
 use dermis_golden::frame::Frame;
 use dermis_golden::scene::Scene;
@@ -23,8 +23,8 @@ pub struct Arguments {
     #[arg(default_value = "sensor-1")]
     scene: String,
     /// Number of faults, one per run.
-    #[arg(long, value_name = "N", default_value_t = 1000)]
-    count: usize,
+    #[arg(long, value_name = "N", default_value_t = 1000, value_parser = value_parser!(u32).range(1..))]
+    count: u32,
     /// Seed of bits, cycles and frames.
     #[arg(long, default_value_t = 1)]
     seed: u64,
@@ -63,7 +63,7 @@ pub fn run(arguments: &Arguments, build: &Path) -> Result<(String, bool)> {
     let hardware = Hardware::new(Model::for_frames(&scene, &frames)?, build)?;
     let Arguments { scene: name, count, seed, .. } = arguments;
     let begun = Instant::now();
-    let rows = inject_faults(&hardware, &frames, *count, *seed)?;
+    let rows = inject_faults(&hardware, &frames, *count as usize, *seed)?;
     let mut log = RunLog::new(&format!("dermis faults {name} --count {count} --seed {seed}"));
     // The classes take turns, so each is charged a third of the time.
     let seconds = begun.elapsed().as_secs_f64() / CLASSES.len() as f64;

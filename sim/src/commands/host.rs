@@ -77,6 +77,10 @@ pub fn run(arguments: &Arguments) -> Result<(String, bool)> {
     let tare = arguments.tare.as_ref().map(|path| Frame::load(path, Some(&scene))).transpose()?;
     tare.as_ref().map_or(Ok(()), |tare| tare.check(&scene))?;
     let baud = arguments.baud.unwrap_or(model.board.uart_baud);
+    let simulated = is_pseudo_terminal(&arguments.port);
+    if simulated && arguments.baud.is_some() {
+        eprintln!("{}: a pseudo-terminal has no bit rate: --baud has no effect", arguments.port);
+    }
     let client = open(&arguments.port, baud, Duration::from_millis(arguments.timeout))?;
     let mut session = Session::new(client, model, tare.as_ref(), arguments.forces, arguments.check)?;
     let before = session.client.counters()?;
@@ -87,7 +91,8 @@ pub fn run(arguments: &Arguments) -> Result<(String, bool)> {
     };
     let rate = sent.answered as f64 / begun.elapsed().as_secs_f64();
     let after = session.client.counters()?;
-    let summary = summary(&session.identity, sent.answered, rate, session.client.link_errors, &before, &after);
+    let rate = Rate { rate, simulated };
+    let summary = summary(&session.identity, sent.answered, &rate, session.client.link_errors, &before, &after);
     if arguments.stream {
         eprint!("{summary}");
     }
@@ -124,10 +129,28 @@ fn send_frames<P: std::io::Read + std::io::Write>(session: &mut Session<P>, fram
     Ok(FramesSent { text, equal, answered: frames.len(), refused: 0 })
 }
 
+/// Whether a port is a pseudo-terminal, as `dermis board` opens one.
+fn is_pseudo_terminal(port: &str) -> bool {
+    std::fs::canonicalize(port).is_ok_and(|path| path.starts_with("/dev/pts"))
+}
+
+/// Frames per second, of a board or of a simulation.
+struct Rate {
+    rate: f64,
+    simulated: bool,
+}
+
+impl std::fmt::Display for Rate {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let of = if self.simulated { " in the simulation, not on a board" } else { "" };
+        write!(f, "{:.1} per second{of}", self.rate)
+    }
+}
+
 fn summary(
     identity: &Identity,
     count: usize,
-    rate: f64,
+    rate: &Rate,
     errors: LinkErrors,
     before: &Counters,
     after: &Counters,
@@ -135,7 +158,7 @@ fn summary(
     let since = |field: fn(&Counters) -> u16| field(after).wrapping_sub(field(before));
     format!(
         "board           {}×{} taxels, {} bit codes, {} MHz, scene {:08x}{}\n\
-         frames          {count}, {rate:.1} per second\n\
+         frames          {count}, {rate}\n\
          host            {} requests sent again, {} answers damaged\n\
          board dropped   {} framing, {} CRC, {} unknown type, {} length, {} overrun\n",
         identity.rows,

@@ -32,15 +32,19 @@ impl BoardOverride {
     }
 }
 
+/// What the hardware takes in place of the scene's estimator; `None` where it has that.
+pub(super) fn estimator_instead(scene: &Scene) -> Option<&'static str> {
+    match scene.for_hardware().estimator() {
+        same if same == scene.estimator() => None,
+        EstimatorKind::Network => Some("the μ of the network with the p(μ) of the series"),
+        _ => Some("search with sparse"),
+    }
+}
+
 /// One line on standard error where the hardware takes another estimator than the scene.
 pub(super) fn note_estimator(scene: &Scene) {
-    let (golden, hardware) = (scene.estimator(), scene.for_hardware().estimator());
-    if golden != hardware {
-        let taken = match hardware {
-            EstimatorKind::Network => "the μ of the network with the p(μ) of the series",
-            _ => "search with sparse",
-        };
-        eprintln!("{}: the hardware has no estimator {} and takes {taken}", scene.name, golden.name());
+    if let Some(taken) = estimator_instead(scene) {
+        eprintln!("{}: the hardware has no estimator {} and takes {taken}", scene.name, scene.estimator().name());
     }
 }
 

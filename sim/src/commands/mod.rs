@@ -6,6 +6,8 @@
 //! | [`bitstream`] | `dermis bitstream`: synthesis, place and route, compared with committed baselines |
 //! | [`block`] | `dermis block`: ports, Verilog and drawn timing of the blocks |
 //! | [`build`] | `dermis build`: generates the Verilog of a scene |
+//! | [`calibrate`] | `dermis calibrate`: a calibration table from recordings under known stresses |
+//! | [`check`] | `dermis check`: what to expect of a scene; whether a generated folder is intact |
 //! | [`cosim`] | `dermis cosim`: compares simulated hardware with the bit-true model |
 //! | [`mod@faults`] | `dermis faults`: flips single bits and counts the outcomes |
 //! | [`mod@generate`] | `dermis generate`: frames with known forces from described contacts |
@@ -13,8 +15,10 @@
 //! | [`host`] | `dermis host`: sends frames to a board over a serial port and reads back forces |
 //! | [`mod@import`] | `dermis import`: recordings of real arrays as scene and frames |
 //! | [`inputs`] | scene and frames from command-line arguments |
+//! | [`new`] | `dermis new`: a scene for a new sensor |
 //! | [`mod@noise`] | `dermis noise`: errors under noise beside the Cramér–Rao bound |
 //! | [`reconstruct`] | `dermis reconstruct`: the forces of one frame, by a model or the hardware |
+//! | `reconstruct_stream` | `dermis reconstruct --stream`: frames as lines, results as lines of JSON |
 //! | [`mod@report`] | `dermis report`: measures, assembles the sections, writes the files |
 //! | [`stability`] | `dermis stability`: errors against condition number, extreme frames |
 //! | [`mod@stress`] | `dermis stress`: both streams under gaps, wrong `tlast` and resets |
@@ -25,6 +29,8 @@
 pub mod bitstream;
 pub mod block;
 pub mod build;
+pub mod calibrate;
+pub mod check;
 mod cli;
 pub mod cosim;
 pub mod faults;
@@ -33,8 +39,10 @@ pub mod guide_pages;
 pub mod host;
 pub mod import;
 pub mod inputs;
+pub mod new;
 pub mod noise;
 pub mod reconstruct;
+mod reconstruct_stream;
 pub mod report;
 pub mod stability;
 pub mod stress;

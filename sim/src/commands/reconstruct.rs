@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use anyhow::Result;
+use anyhow::{anyhow, bail, Result};
 use clap::{Args, ValueEnum};
 use dermis_golden::fixed::Model;
 use dermis_golden::float::Golden;
@@ -12,6 +12,7 @@ use dermis_golden::reconstruct::Reconstruction;
 use dermis_golden::scene::Scene;
 
 use super::inputs::{note_estimator, resolve_one, BoardOverride};
+use super::reconstruct_stream::StreamArguments;
 use crate::compare::{comparable_forces, difference};
 use crate::cosim::hardware::Hardware;
 use crate::progress::Progress;
@@ -23,7 +24,14 @@ use crate::report;
   dermis reconstruct sensor-1
   dermis reconstruct sensor-1 --frame press.csv --engine fixed
   dermis reconstruct my-scene.toml --frame eq2 --json
-  dermis reconstruct averaging.toml --frame 1.csv --frame 2.csv     the mean of 2 frames, input.average = 1")]
+  dermis reconstruct sensor-1 --stream <frames.csv >forces.ndjson
+  dermis reconstruct sensor-1 --stream=udp:127.0.0.1:9000 --latest --brief
+  dermis reconstruct averaging.toml --frame 1.csv --frame 2.csv     the mean of 2 frames, input.average = 1
+
+A stream has one frame per line: taxels separated by commas, row-major, or {\"id\": 7, \"stress_MPa\": [0.1, ...]}. Every
+line is answered by one of JSON: sequence, line, received_s, answered_s, dropped, and the fields of --json; a bad line by
+its number and the error. The noise must be stated: it is not found from a stream's frames where the search finds the
+shear.")]
 pub struct Arguments {
     /// Built-in name or path of a scene; optional if the frame file contains its sensor.
     scene: Option<String>,
@@ -37,6 +45,8 @@ pub struct Arguments {
     /// Print the result as JSON and nothing else.
     #[arg(long)]
     json: bool,
+    #[command(flatten)]
+    stream: StreamArguments,
     #[command(flatten)]
     target: BoardOverride,
 }
@@ -56,7 +66,16 @@ enum Engine {
 /// # Errors
 /// Wrong input, a scene without hardware where that is asked for, no Verilator.
 pub fn run(arguments: &Arguments, build_dir: &Path) -> Result<String> {
-    let Arguments { scene, frames, engine, json, target } = arguments;
+    let Arguments { scene, frames, engine, json, stream, target } = arguments;
+    if stream.wanted() {
+        let fixed = match engine {
+            Engine::Golden => false,
+            Engine::Fixed => true,
+            Engine::Rtl => bail!("--engine rtl: a stream takes golden or fixed"),
+        };
+        let named = scene.as_deref().ok_or_else(|| anyhow!("--stream: name the scene"))?;
+        return stream.run(&target.apply(Scene::load(named)?), fixed);
+    }
     let (scene, frames) = resolve_one(scene.as_deref(), frames)?;
     let scene = target.apply(scene);
     // Large matrices take seconds.

@@ -2,12 +2,12 @@
 
 use std::path::Path;
 
-use anyhow::Result;
+use anyhow::{bail, Result};
 use clap::Args;
+use dermis_golden::frame::Frame;
 use dermis_golden::partition::Case;
 use dermis_golden::scene::Scene;
 
-use super::inputs::resolve;
 use crate::cosim::hardware::Simulator;
 use crate::cosim::verify::{verify, Verified};
 use crate::drawn_frames::DrawnFrames;
@@ -50,12 +50,21 @@ pub fn run(arguments: &Arguments, build_dir: &Path) -> Result<(String, bool)> {
         return Ok((table(scenes, cases, drawn, *format)?, true));
     }
     let verify = |name: &String| -> Result<Verified> {
-        let (scene, frames) = resolve(Some(name), &[])?;
+        let (scene, frames) = shipped(name, "dermis cosim takes them with --frame")?;
         verify(&scene, &frames, &[Simulator::Verilator, Simulator::RustHdl], build_dir)
     };
     let all = scenes.iter().map(verify).collect::<Result<Vec<_>>>()?;
     let equal = all.iter().all(|v| v.findings.is_equal());
     Ok((report::scenes(&all), equal))
+}
+
+/// A scene with its shipped frames; `otherwise` says where others come from.
+fn shipped(name: &str, otherwise: &str) -> Result<(Scene, Vec<Frame>)> {
+    let scene = Scene::load(name)?;
+    match Frame::shipped(&scene) {
+        none if none.is_empty() => bail!("scene {}: no frame is shipped for {}: {otherwise}", scene.name, scene.sensor),
+        frames => Ok((scene, frames)),
+    }
 }
 
 /// The error table of the named scenes, or of all built-in ones.
@@ -71,7 +80,7 @@ fn table(scenes: &[String], cases: &[Case], drawn: &DrawnFrames, format: Format)
             let frames = drawn.draw(&scene)?;
             (scene, frames)
         } else {
-            resolve(Some(name), &[])?
+            shipped(name, "draw some with --fresh")?
         };
         let bar = Progress::steps(&format!("{}: errors", scene.name), (cases.len() * frames.len()) as u64);
         let mut done = 0;

@@ -197,9 +197,19 @@ pub struct Shares {
     pub hang: f64,
     /// A wrong beat that the device does not report.
     pub silent: f64,
+    /// 95 % confidence interval of `silent`.
+    pub silent_interval: [f64; 2],
     /// Silent, with a force error above [`LARGE`].
     pub large: f64,
+    /// 95 % confidence interval of `large`.
+    pub large_interval: [f64; 2],
 }
+
+/// Standard deviations from the middle to the ends of an interval of 95 %.
+const NORMAL_95: f64 = 1.96;
+/// Hits, and as many misses, that are added to those of a stage for its variance (Agresti and Coull): a stage without a
+/// hit is not taken for one that has none.
+const ADDED: f64 = 2.0;
 
 impl Shares {
     /// The stages' shares, weighted by their bits; `None` where the class has no bits or none was flipped.
@@ -210,6 +220,15 @@ impl Shares {
         let share = |count: fn(&Row) -> usize| {
             flipped().map(|row| row.bits as f64 * count(row) as f64 / row.flips as f64).sum::<f64>() / weight as f64
         };
+        let interval = |count: fn(&Row) -> usize| {
+            let variance = |row: &Row| {
+                let trials = row.flips as f64 + 2.0 * ADDED;
+                let likely = (count(row) as f64 + ADDED) / trials;
+                (row.bits as f64 / weight as f64).powi(2) * likely * (1.0 - likely) / trials
+            };
+            let half = NORMAL_95 * flipped().map(variance).sum::<f64>().sqrt();
+            [share(count) - half, share(count) + half].map(|end| end.clamp(0.0, 1.0))
+        };
         (weight > 0).then(|| Shares {
             bits: of_class().map(|row| row.bits).sum(),
             flips: flipped().map(|row| row.flips).sum(),
@@ -217,7 +236,48 @@ impl Shares {
             detected: share(|row| row.detected),
             hang: share(|row| row.hang),
             silent: share(|row| row.silent),
+            silent_interval: interval(|row| row.silent),
             large: share(|row| row.large),
+            large_interval: interval(|row| row.large),
         })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn intervals_hold_the_share_as_often_as_they_say() {
+        // Stages of unlike size and share; 100 flips each.
+        const STAGES: [(usize, f64); 3] = [(100, 0.3), (1000, 0.02), (5000, 0.1)];
+        let row = |(bits, silent)| Row {
+            class: StorageClass::Rom,
+            stage: "fold",
+            signals: 1,
+            bits,
+            flips: 100,
+            distinct_bits: 100,
+            harmless: 100 - silent,
+            detected: 0,
+            hang: 0,
+            silent,
+            large: 0,
+            largest_error: 0.0,
+            not_recovered: 0,
+        };
+        let all: usize = STAGES.iter().map(|(bits, _)| bits).sum();
+        let truth: f64 = STAGES.iter().map(|(bits, share)| *bits as f64 * share).sum::<f64>() / all as f64;
+        let mut random = fastrand::Rng::with_seed(5);
+        let held = (0..1000).filter(|_| {
+            let rows = STAGES.map(|(bits, share)| row((bits, (0..100).filter(|_| random.f64() < share).count())));
+            let shares = Shares::of(&rows, StorageClass::Rom).unwrap();
+            let [low, high] = shares.silent_interval;
+            // No flip had a large error, which does not prove that none has.
+            assert!(shares.large_interval[0] == 0.0 && (0.01..0.05).contains(&shares.large_interval[1]), "{shares:?}");
+            assert!(low <= shares.silent && shares.silent <= high);
+            low <= truth && truth <= high
+        });
+        assert!((925..=990).contains(&held.count()));
     }
 }

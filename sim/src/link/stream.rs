@@ -5,24 +5,14 @@ use std::time::{SystemTime, UNIX_EPOCH};
 
 use anyhow::{anyhow, Result};
 use dermis_golden::frame::Frame;
-use serde::{Deserialize, Serialize};
+use serde::Serialize;
 use serde_json::Value;
 
 use super::answer::PhysicalAnswer;
 use super::error::HostError;
 use super::session::Session;
-
-/// Longest input line in bytes; 65536 taxels of 25 characters take 1.6 MB.
-const LONGEST_LINE: u64 = 4 << 20;
-
-/// An input line.
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-struct Request {
-    #[serde(default)]
-    id: Value,
-    stress_MPa: Vec<f64>,
-}
+use crate::stream::line::{self, NoFrame};
+use crate::stream::LONGEST_LINE;
 
 /// An output line with an answer.
 #[derive(Serialize)]
@@ -39,7 +29,7 @@ struct Reply {
 #[derive(Serialize)]
 struct Refusal {
     id: Value,
-    line: usize,
+    line: u64,
     error: String,
 }
 
@@ -65,19 +55,16 @@ pub(crate) fn run<P: Read + Write>(
     output: &mut dyn Write,
 ) -> Result<FramesSent> {
     let mut sent = FramesSent { text: String::new(), equal: true, answered: 0, refused: 0 };
-    for index in 0.. {
-        let mut line = String::new();
-        // Bounded, so that an endless line cannot exhaust the memory.
-        let read = (&mut *input).take(LONGEST_LINE + 1).read_line(&mut line);
-        match read.map_err(|error| anyhow!("standard input, line {}: {error}", index + 1))? {
-            0 => break,
-            bytes if bytes as u64 > LONGEST_LINE => {
-                return Err(anyhow!("standard input, line {}: over {LONGEST_LINE} bytes", index + 1))
-            }
-            _ if line.trim().is_empty() => continue,
-            _ => (),
-        }
-        let text = match answer(session, &line) {
+    let mut bytes = Vec::new();
+    for number in 1.. {
+        let text =
+            match line::read(input, &mut bytes).map_err(|error| anyhow!("standard input, line {number}: {error}"))? {
+                None => break,
+                Some(false) => Err((Value::Null, anyhow!("over {LONGEST_LINE} bytes"))),
+                Some(true) if bytes.iter().all(u8::is_ascii_whitespace) => continue,
+                Some(true) => answer(session, &bytes, number),
+            };
+        let text = match text {
             Ok(reply) => {
                 sent.equal &= reply.answer.equal != Some(false);
                 sent.answered += 1;
@@ -87,7 +74,7 @@ pub(crate) fn run<P: Read + Write>(
             Err((_, error)) if error.is::<HostError>() => return Err(error),
             Err((id, error)) => {
                 sent.refused += 1;
-                serde_json::to_string(&Refusal { id, line: index + 1, error: error.to_string() })?
+                serde_json::to_string(&Refusal { id, line: number, error: error.to_string() })?
             }
         };
         match writeln!(output, "{text}").and_then(|()| output.flush()) {
@@ -104,12 +91,15 @@ fn seconds(time: SystemTime) -> f64 {
 }
 
 /// The answer to one line, or its id (null if it cannot be parsed) with the error.
-fn answer<P: Read + Write>(session: &mut Session<P>, line: &str) -> Result<Reply, (Value, anyhow::Error)> {
-    let request: Request = serde_json::from_str(line).map_err(|error| (Value::Null, error.into()))?;
-    let id = request.id.clone();
-    let name = id.as_str().map_or_else(|| id.to_string(), str::to_owned);
-    let frame = Frame::from_stress(&name, &session.model.scene.sensor, request.stress_MPa);
-    frame.map_err(anyhow::Error::from).and_then(|frame| reply(session, &id, &frame)).map_err(|error| (id, error))
+fn answer<P: Read + Write>(
+    session: &mut Session<P>,
+    bytes: &[u8],
+    number: u64,
+) -> Result<Reply, (Value, anyhow::Error)> {
+    let text = std::str::from_utf8(bytes).map_err(|error| (Value::Null, error.into()))?;
+    let (id, frame) = line::frame(text, number, &session.model.scene.sensor)
+        .map_err(|NoFrame { id, reason }| (id, anyhow!(reason)))?;
+    reply(session, &id, &frame).map_err(|error| (id, error))
 }
 
 fn reply<P: Read + Write>(session: &mut Session<P>, id: &Value, frame: &Frame) -> Result<Reply> {

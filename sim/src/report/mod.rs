@@ -9,7 +9,9 @@
 //! [`BUDGET_US`] minus the time.
 
 mod bitstream_report;
+mod calibration;
 mod cases;
+mod check;
 mod csv;
 #[cfg(test)]
 mod csv_reader;
@@ -38,7 +40,9 @@ pub(crate) mod table;
 pub mod tabulate;
 
 pub use bitstream_report::{bitstream, summaries, BitstreamReport, Summary};
+pub use calibration::calibration;
 pub use cases::cases;
+pub use check::{build_check, scene_check, BuildCheck, HardwareCheck, SceneCheck};
 pub use errors::errors;
 pub use extremes::extremes;
 pub use faults::faults;

@@ -85,6 +85,8 @@ fn the_program_sends_checks_tares_and_streams() {
     assert_eq!(all.status.code(), Some(0), "{}", text(&all.stderr));
     let shown = text(&all.stdout);
     assert_eq!(shown.matches("against model   equal, every bit\n").count(), 5, "{shown}");
+    assert!(shown.contains(" per second in the simulation, not on a board\n"), "{shown}");
+    assert_eq!(text(&all.stderr), "");
     assert!(shown.contains("board dropped   0 framing, 0 CRC, 0 unknown type, 0 length, 0 overrun\n"), "{shown}");
 
     let folder = tempfile::tempdir().unwrap();
@@ -99,7 +101,8 @@ fn the_program_sends_checks_tares_and_streams() {
     assert!(text(&forces.stdout).contains("engine board\n"), "{}", text(&forces.stdout));
 
     // A frame minus itself as tare is zero.
-    let nothing = host(&terminal, scene, &["--tare", &frame, &frame], "");
+    let nothing = host(&terminal, scene, &["--baud", "9600", "--tare", &frame, &frame], "");
+    assert!(text(&nothing.stderr).contains("a pseudo-terminal has no bit rate: --baud has no effect\n"));
     assert!(text(&nothing.stdout).contains("no-contact"), "{}", text(&nothing.stdout));
 
     let line = format!("{{\"id\": [7], \"stress_MPa\": {stress:?}}}\n");

@@ -12,5 +12,6 @@ mod guide_links;
 mod host;
 mod page;
 mod report;
+mod stream;
 mod toy;
 mod writes;

@@ -186,7 +186,9 @@ fn an_interruption_keeps_earlier_files() {
     rustix::process::kill_process(pid, rustix::process::Signal::INT).unwrap();
     let output = child.wait_with_output().unwrap();
     let message = String::from_utf8(output.stderr).unwrap();
-    assert_eq!((output.status.code(), message.as_str()), (Some(130), "error: interrupted; nothing was written\n"));
+    let said = "interrupted: the tasks that run are ended first; a second signal ends them at once\n\
+                error: interrupted; nothing was written\n";
+    assert_eq!((output.status.code(), message.as_str()), (Some(130), said));
     assert_eq!(files(&out), [out.join("report.html")]);
     assert_eq!(fs::read_to_string(out.join("report.html")).unwrap(), "of before");
 }

@@ -1,0 +1,42 @@
+//! Rate of `dermis reconstruct --stream`: lines of CSV in, lines of JSON out, in memory, all arithmetic on one core.
+//!
+//! ```text
+//! make bench, or: cargo bench --package dermis-sim --bench stream
+//! ```
+//! The estimator `search` must answer at least [`LEAST`] frames of 10×10 taxels per second; the scene's own takes longer.
+
+use std::io::{Cursor, Read};
+use std::time::Instant;
+
+use anyhow::ensure;
+use dermis_golden::frame::Frame;
+use dermis_golden::scene::Scene;
+use dermis_sim::stream::{run, Engine, Policy, StreamOptions};
+
+/// Least rate of the search, in frames per second.
+const LEAST: f64 = 2000.0;
+
+fn rate(scene: &Scene, fixed: bool, frames: usize) -> anyhow::Result<f64> {
+    let engine = Engine::new(scene, fixed)?;
+    let shipped = Frame::shipped(scene);
+    let line = |frame: &Frame| frame.stress_MPa.iter().map(f64::to_string).collect::<Vec<_>>().join(",") + "\n";
+    let text: String = shipped.iter().cycle().take(frames).map(line).collect();
+    let input: Box<dyn Read + Send> = Box::new(Cursor::new(text.into_bytes()));
+    let options = StreamOptions { queue: 64, policy: Policy::All, brief: false };
+    let begin = Instant::now();
+    let counts = run(scene, &engine, (input, "memory"), options, &mut std::io::sink())?;
+    ensure!(counts.answered == frames as u64, "{counts:?}");
+    Ok(frames as f64 / begin.elapsed().as_secs_f64())
+}
+
+fn main() -> anyhow::Result<()> {
+    rayon::ThreadPoolBuilder::new().num_threads(1).build_global()?;
+    let scene = Scene::builtin("sensor-1")?;
+    let searching = scene.for_hardware();
+    let search = rate(&searching, false, 4000)?;
+    println!("sensor-1, stream: golden search {search:.0} frames/s");
+    println!("sensor-1, stream: fixed search {:.0} frames/s", rate(&searching, true, 400)?);
+    println!("sensor-1, stream: golden {} {:.0} frames/s", scene.estimator().name(), rate(&scene, false, 100)?);
+    ensure!(search >= LEAST, "the search answers {search:.0} frames/s, less than {LEAST}");
+    Ok(())
+}

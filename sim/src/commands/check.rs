@@ -1,0 +1,124 @@
+//! `dermis check`: what is wrong with a scene and what to expect of it, or whether a generated folder is intact.
+//!
+//! | target | checked as |
+//! |---|---|
+//! | a built-in name, a file | a scene: the floating-point model, the hardware on its board, errors on drawn frames |
+//! | a folder | a build: its files against manifest.json, manifest.json against its checksum |
+
+use std::path::Path;
+
+use anyhow::{anyhow, bail, Result};
+use clap::{value_parser, Args};
+use dermis_golden::fixed::{FixedError, Model};
+use dermis_golden::float::Golden;
+use dermis_golden::noise::expected::{expected, Expectation, StatedNoise};
+use dermis_golden::scene::Scene;
+use dermis_hdl::{explain::explain, generate, manifest};
+
+use super::inputs::{estimator_instead, BoardOverride};
+use crate::progress::Progress;
+use crate::report::{self, BuildCheck, HardwareCheck, SceneCheck};
+
+/// Arguments of `dermis check`.
+#[derive(Args, Debug)]
+#[command(after_help = EXAMPLES)]
+pub struct Arguments {
+    /// Built-in name or file of a scene, or a folder written by `dermis build`.
+    target: String,
+    /// Largest stress of a press in MPa, for the noise as a share of it; default: the scene's full scale.
+    #[arg(long, value_name = "MPA")]
+    peak: Option<f64>,
+    /// Drawn frames for the expected errors.
+    #[arg(long, default_value_t = 20, value_parser = value_parser!(u32).range(1..=100_000))]
+    draws: u32,
+    /// Seed of the drawn frames and their noise.
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+    /// Print JSON and nothing else.
+    #[arg(long)]
+    json: bool,
+    #[command(flatten)]
+    board: BoardOverride,
+}
+
+const EXAMPLES: &str = "Examples:
+  dermis check my-scene.toml                         degree, expected errors, whether the board holds it
+  dermis check my-scene.toml --peak 0.1 --draws 50   presses of 0.1 MPa
+  dermis check eight-by-eight --target-board icebreaker --json
+  dermis check build/sensor-1/rtl                    the files of a build against manifest.json
+
+A built-in name or a file is checked as a scene, a folder as a build. A scene that only the floating-point model takes is
+no error: the reason is printed. The expected errors are those of drawn contacts of any shape, at the noise that the scene
+states or its tare frames show, else at several levels; with shear in proportion to search.mu_max.";
+
+/// Runs the command.
+///
+/// # Errors
+/// A scene that cannot be loaded or that the floating-point model refuses, a damaged build; the message says as what the
+/// target was checked.
+pub fn run(arguments: &Arguments) -> Result<String> {
+    let target = &arguments.target;
+    let builtin = Scene::builtin_names().contains(&target.as_str());
+    if !builtin && Path::new(target).is_dir() {
+        let files = manifest::check(Path::new(target)).map_err(|e| anyhow!("checked as a build (a folder): {e}"))?;
+        let build = BuildCheck { target: target.clone(), checked_as: "build", files };
+        return text(arguments, &build, report::build_check);
+    }
+    if let Some(peak) = arguments.peak.filter(|peak| !(peak.is_finite() && *peak > 0.0)) {
+        bail!("--peak {peak}: must be a finite stress above 0 MPa");
+    }
+    text(arguments, &check_scene(arguments)?, report::scene_check)
+}
+
+fn text<T: serde::Serialize>(arguments: &Arguments, checked: &T, print: fn(&T) -> String) -> Result<String> {
+    match arguments.json {
+        true => Ok(serde_json::to_string(checked)? + "\n"),
+        false => Ok(print(checked)),
+    }
+}
+
+fn check_scene(arguments: &Arguments) -> Result<SceneCheck> {
+    let refused = |error: anyhow::Error| anyhow!("checked as a scene: {error}");
+    let scene = arguments.board.apply(Scene::load(&arguments.target).map_err(|error| refused(error.into()))?);
+    let bar = Progress::steps(&format!("{}: drawn frames", scene.name), 0);
+    let golden = Golden::new(&scene).map_err(|error| refused(error.into()))?;
+    let noise = StatedNoise::of(&scene, arguments.peak)?;
+    let (hardware, hardware_refused) = match Model::new(&scene) {
+        Ok(model) => (Some(hardware(&scene, &model)?), None),
+        Err(defect @ (FixedError::Internal(_) | FixedError::Beats { .. })) => return Err(defect.into()),
+        Err(reason) => (None, Some(reason.to_string())),
+    };
+    let (peak_MPa, with_hardware) = (arguments.peak, hardware.is_some());
+    let asked = Expectation { peak_MPa, draws: arguments.draws as usize, seed: arguments.seed, with_hardware };
+    // A tiny array has no room for the contacts; the rest of the check still stands.
+    let errors = expected(&scene, &asked, &noise, &|done, total| bar.set_of(done as u64, total as u64));
+    let (errors, not_drawn) = match errors {
+        Ok(errors) => (errors, None),
+        Err(reason) => (Vec::new(), Some(reason.to_string())),
+    };
+    let matrices = golden.matrices();
+    Ok(SceneCheck {
+        target: arguments.target.clone(),
+        checked_as: "scene",
+        estimator: scene.estimator().name(),
+        degree: matrices.degree,
+        spectral_radius: matrices.spectral_radius,
+        mu_max: scene.search.mu_max,
+        dead: scene.input.dead.clone(),
+        board: scene.hardware.board.clone(),
+        scene: scene.name,
+        sensor: scene.sensor,
+        hardware,
+        hardware_refused,
+        noise,
+        errors,
+        not_drawn,
+    })
+}
+
+/// The hardware of a scene on its board; the model's own scene has the estimator of the hardware already.
+fn hardware(scene: &Scene, model: &Model) -> Result<HardwareCheck> {
+    let features = explain(model)?;
+    let left_out = features.iter().filter(|feature| !feature.present).map(|feature| feature.feature).collect();
+    Ok(HardwareCheck::new(model, &generate(model)?.usage, estimator_instead(scene), left_out))
+}

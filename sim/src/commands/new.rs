@@ -1,0 +1,242 @@
+//! `dermis new`: a scene for a new sensor, as a commented file.
+//!
+//! What the options leave out is asked on a terminal; elsewhere the missing option is an error. The scene is written only
+//! if it can be read back and the floating-point model takes it.
+
+use std::fmt::Write as _;
+use std::io::{BufRead, IsTerminal, Write};
+use std::path::PathBuf;
+use std::str::FromStr;
+
+use anyhow::{anyhow, bail, Result};
+use clap::Args;
+use dermis_golden::float::Golden;
+use dermis_golden::scene::{Scene, SearchSpec};
+use dermis_golden::write::write;
+
+/// Arguments of `dermis new`.
+#[derive(Args, Debug)]
+#[command(after_help = "Examples:
+  dermis new pad.toml --rows 16 --cols 12 --pitch 3 --thickness 2.5
+  dermis new strip.toml --rows 4 --cols 20 --pitch 5,4 --thickness 3 --noise 0.0002 --full-scale 0.25
+  dermis new skin.toml --rows 8 --cols 8 --pitch 4 --thickness 4 --bonded 0.48 --friction 0.5
+
+On a terminal, what is left out is asked; an existing file is not replaced.")]
+pub struct Arguments {
+    /// File to write; its name without the ending is the scene's.
+    file: PathBuf,
+    /// Rows of taxels.
+    #[arg(long)]
+    rows: Option<usize>,
+    /// Columns of taxels.
+    #[arg(long)]
+    cols: Option<usize>,
+    /// Distance of the taxels in mm along columns and rows; one number: the same along both.
+    #[arg(long, value_name = "X,Y")]
+    pitch: Option<Pitch>,
+    /// Thickness of the cover in mm, which is the depth of the taxels.
+    #[arg(long, value_name = "MM")]
+    thickness: Option<f64>,
+    /// Standard deviation of one reading in MPa.
+    #[arg(long, value_name = "MPA")]
+    noise: Option<f64>,
+    /// Stress of the largest reading in MPa.
+    #[arg(long, value_name = "MPA")]
+    full_scale: Option<f64>,
+    /// Largest ratio of shear to normal force.
+    #[arg(long, value_name = "MU")]
+    friction: Option<f64>,
+    /// The cover is bonded to a rigid base and has this Poisson ratio; default: a half-space.
+    #[arg(long, value_name = "POISSON")]
+    bonded: Option<f64>,
+    /// Board for the hardware.
+    #[arg(long, value_name = "NAME")]
+    board: Option<String>,
+}
+
+/// Distance of the taxels in mm along columns and rows.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Pitch([f64; 2]);
+
+impl FromStr for Pitch {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Pitch, String> {
+        let numbers: Option<Vec<f64>> = text.split(',').map(|number| number.trim().parse().ok()).collect();
+        match numbers.as_deref() {
+            Some([both]) => Ok(Pitch([*both; 2])),
+            Some([x, y]) => Ok(Pitch([*x, *y])),
+            _ => Err("one number in mm, or two separated by a comma".to_owned()),
+        }
+    }
+}
+
+/// Runs the command.
+///
+/// # Errors
+/// A missing option where nothing can be asked, a value out of range, a scene that the floating-point model refuses, a
+/// file that exists or cannot be written.
+pub fn run(arguments: &Arguments) -> Result<String> {
+    let file = arguments.file.display().to_string();
+    if arguments.file.exists() {
+        bail!("{file}: exists already; dermis check {file} says what it contains");
+    }
+    let stdin = std::io::stdin();
+    let text = match stdin.is_terminal() {
+        true => scene_text(arguments, &mut Asker::Terminal(&mut stdin.lock(), &mut std::io::stderr()))?,
+        false => scene_text(arguments, &mut Asker::Nobody)?,
+    };
+    // Refused here with the field's name, rather than written.
+    Golden::new(&Scene::parse(&text, &file)?).map_err(|error| anyhow!("{file}: {error}"))?;
+    write(&arguments.file, text.as_bytes())?;
+    Ok(format!("{file}\nnext: dermis check {file}\n"))
+}
+
+/// Where missing values come from.
+enum Asker<'a> {
+    /// Questions and answers.
+    Terminal(&'a mut dyn BufRead, &'a mut dyn Write),
+    /// A missing value is an error.
+    Nobody,
+}
+
+impl Asker<'_> {
+    /// The value of an option that a scene needs.
+    fn required<T: FromStr + Clone>(&mut self, given: &Option<T>, option: &str, question: &str) -> Result<T> {
+        match given {
+            Some(value) => Ok(value.clone()),
+            None => self.ask(question)?.ok_or_else(|| anyhow!("--{option} is missing: {question}")),
+        }
+    }
+
+    /// The value of an option that a scene can do without; an empty answer leaves it out.
+    fn optional<T: FromStr + Clone>(&mut self, given: &Option<T>, question: &str) -> Result<Option<T>> {
+        match given {
+            Some(value) => Ok(Some(value.clone())),
+            None => self.ask(&format!("{question}; empty: unknown")),
+        }
+    }
+
+    /// Asks until the answer can be read; `None` for an empty one, or without a terminal.
+    fn ask<T: FromStr>(&mut self, question: &str) -> Result<Option<T>> {
+        let Asker::Terminal(input, output) = self else { return Ok(None) };
+        loop {
+            write!(output, "{question}: ").and_then(|()| output.flush())?;
+            let mut line = String::new();
+            if input.read_line(&mut line)? == 0 || line.trim().is_empty() {
+                return Ok(None);
+            }
+            match line.trim().parse() {
+                Ok(value) => return Ok(Some(value)),
+                Err(_) => writeln!(output, "{:?} is not understood", line.trim())?,
+            }
+        }
+    }
+}
+
+/// The scene as a commented file.
+fn scene_text(arguments: &Arguments, asker: &mut Asker) -> Result<String> {
+    let rows = asker.required(&arguments.rows, "rows", "number of rows")?;
+    let cols = asker.required(&arguments.cols, "cols", "number of columns")?;
+    let Pitch([x, y]) =
+        asker.required(&arguments.pitch, "pitch", "pitch in mm, along columns and rows: X,Y or one number")?;
+    let thickness = asker.required(&arguments.thickness, "thickness", "thickness of the cover in mm")?;
+    let noise = asker.optional(&arguments.noise, "standard deviation of one reading in MPa")?;
+    let full_scale = asker.optional(&arguments.full_scale, "stress of the largest reading in MPa")?;
+    let mut text = format!(
+        "# Written by `dermis new`. Fields left out have the defaults of the guide's page \"your sensor\".\n\n\
+         [sensor]\nrows = {rows}\ncols = {cols}\n\
+         pitch_x_mm = {x:?}       # along the columns\n\
+         pitch_y_mm = {y:?}       # along the rows\n\
+         thickness_mm = {thickness:?}     # of the cover: the depth at which stress is read\n"
+    );
+    if let Some(poisson) = arguments.bonded {
+        write!(text, "\n[medium]\nkind = \"bonded-layer\"\npoisson = {poisson:?}\n")?;
+    }
+    text += "\n[search]\n";
+    match arguments.friction {
+        Some(friction) => writeln!(text, "mu_max = {friction:?}           # largest ratio of shear to normal force")?,
+        None => writeln!(
+            text,
+            "# mu_max = {:?}         # largest ratio of shear to normal force",
+            SearchSpec::default().mu_max
+        )?,
+    }
+    match noise {
+        Some(noise) => writeln!(text, "noise_floor_MPa = {noise:?}  # standard deviation of one reading")?,
+        None => {
+            text += "# noise_floor_MPa =    # standard deviation of one reading; `dermis check` then knows the errors to expect\n"
+        }
+    }
+    text += "\n[input]\n";
+    match full_scale {
+        Some(full_scale) => writeln!(text, "full_scale_MPa = {full_scale:?}  # stress of the largest reading")?,
+        None => {
+            text +=
+                "# full_scale_MPa =     # stress of the largest reading; hardware needs it beside the fields below\n"
+        }
+    }
+    text += "# calibration = \"table.csv\"    # offset and gain of each taxel, from `dermis calibrate`\n\
+             # tare = \"zero.csv\"            # frames without contact: the zero, and the noise where it is not stated\n\
+             # dead = [[0, 0]]              # row and column, from 0, of taxels to leave out\n";
+    if let Some(board) = &arguments.board {
+        write!(text, "\n[hardware]\nboard = {}\n", format_args!("{board:?}"))?;
+    }
+    Ok(text)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use clap::Parser;
+
+    #[derive(Parser)]
+    struct Command {
+        #[command(flatten)]
+        arguments: Arguments,
+    }
+
+    /// The text for some options and answers, and the questions.
+    fn written(options: &[&str], answers: &str) -> (Result<String>, String) {
+        let arguments = Command::parse_from([&["new", "pad.toml"], options].concat()).arguments;
+        let (mut input, mut output) = (answers.as_bytes(), Vec::new());
+        let text = scene_text(&arguments, &mut Asker::Terminal(&mut input, &mut output));
+        (text, String::from_utf8(output).unwrap())
+    }
+
+    #[test]
+    fn answers_and_options_give_the_same_scene() {
+        let options = ["--rows", "4", "--cols", "6", "--pitch", "3,2.5", "--thickness", "2", "--noise", "0.001"];
+        let (by_options, questions) = written(&options, "");
+        assert_eq!(questions, "stress of the largest reading in MPa; empty: unknown: ");
+        let (by_answers, questions) = written(&[], "4\nsix\n6\n3,2.5\n2\n0.001\n\n");
+        assert!(questions.contains("number of columns: \"six\" is not understood\nnumber of columns: "), "{questions}");
+        let text = by_options.unwrap();
+        assert_eq!(text, by_answers.unwrap());
+        let scene = Scene::parse(&text, "pad.toml").unwrap();
+        assert_eq!((scene.sensor.rows, scene.sensor.cols, scene.sensor.pitch_y_mm), (4, 6, 2.5));
+        assert_eq!((scene.search.noise_floor_MPa, scene.input.full_scale_MPa), (0.001, None));
+    }
+
+    #[test]
+    fn every_option_reaches_the_scene_and_comments_hold_the_defaults() {
+        let needed = ["--rows", "4", "--cols", "4", "--pitch", "4", "--thickness", "4"];
+        let more = ["--full-scale", "0.3", "--friction", "0.4", "--bonded", "0.45", "--board", "icebreaker"];
+        let scene = Scene::parse(&written(&[needed, more].concat(), "").0.unwrap(), "pad.toml").unwrap();
+        assert_eq!((scene.input.full_scale_MPa, scene.search.mu_max), (Some(0.3), 0.4));
+        assert_eq!(
+            (scene.hardware.board.as_str(), scene.medium.to_string().as_str()),
+            ("icebreaker", "bonded-layer, poisson 0.45")
+        );
+        let scene = Scene::parse(&written(&needed, "").0.unwrap(), "pad.toml").unwrap();
+        assert_eq!(scene, Scene::of_sensor(&scene.sensor, "pad"));
+    }
+
+    #[test]
+    fn without_a_terminal_the_missing_option_is_named() {
+        let arguments = Command::parse_from(["new", "pad.toml", "--rows", "4"]).arguments;
+        let error = scene_text(&arguments, &mut Asker::Nobody).unwrap_err().to_string();
+        assert_eq!(error, "--cols is missing: number of columns");
+        assert!(written(&["--rows", "4"], "4\n").0.unwrap_err().to_string().starts_with("--pitch is missing"));
+    }
+}

@@ -1,0 +1,82 @@
+//! `dermis reconstruct --stream`: frames as lines, results as lines of JSON.
+
+use std::time::Instant;
+
+use anyhow::{anyhow, bail, Result};
+use clap::{value_parser, Args};
+use dermis_golden::scene::Scene;
+
+use super::inputs::note_estimator;
+use crate::stream::{run, Engine, Policy, Source, StreamOptions};
+
+/// Lines that wait with `--all`: a hundredth of a second at several kilohertz.
+const QUEUE_OF_ALL: u32 = 64;
+/// Lines that wait with `--latest`.
+const QUEUE_OF_LATEST: u32 = 1;
+
+/// Options of a stream.
+#[derive(Args, Debug)]
+pub(super) struct StreamArguments {
+    /// Reconstruct frames line by line: from standard input, or from =udp:HOST:PORT, a serial port, or a file that grows,
+    /// which is followed until the program is interrupted.
+    #[arg(long, value_name = "SOURCE", num_args = 0..=1, require_equals = true, default_missing_value = "-",
+          conflicts_with_all = ["frames", "json"])]
+    stream: Option<Source>,
+    /// Answer every line; reading waits while the queue is full. The default.
+    #[arg(long, requires = "stream")]
+    all: bool,
+    /// Drop the oldest waiting line while the queue is full, and count it.
+    #[arg(long, requires = "stream", conflicts_with = "all")]
+    latest: bool,
+    /// Lines that may wait; default: 64, with --latest 1.
+    #[arg(long, value_name = "N", requires = "stream", value_parser = value_parser!(u32).range(1..=4096))]
+    queue: Option<u32>,
+    /// Leave out the forces of the taxels.
+    #[arg(long, requires = "stream")]
+    brief: bool,
+    /// Bit rate of a serial port; default: that of the scene's board.
+    #[arg(long, value_name = "BIT/S", requires = "stream")]
+    baud: Option<u32>,
+}
+
+impl StreamArguments {
+    /// Whether a stream is to be reconstructed.
+    pub(super) fn wanted(&self) -> bool {
+        self.stream.is_some()
+    }
+
+    /// Answers every line on standard output; the text is empty.
+    ///
+    /// # Errors
+    /// A scene without that engine, a source that cannot be read, lines that were refused.
+    pub(super) fn run(&self, scene: &Scene, fixed: bool) -> Result<String> {
+        let Some(source) = &self.stream else { return Ok(String::new()) };
+        if fixed {
+            note_estimator(scene);
+        }
+        let engine = Engine::new(scene, fixed)?;
+        let policy = if self.latest { Policy::Latest } else { Policy::All };
+        let queue = self.queue.unwrap_or(if self.latest { QUEUE_OF_LATEST } else { QUEUE_OF_ALL });
+        let baud = match self.baud {
+            Some(baud) => baud,
+            None => dermis_golden::board::Board::load(&scene.hardware.board)?.uart_baud,
+        };
+        let (input, address) = source.open(baud).map_err(|error| anyhow!("--stream: {error}"))?;
+        if let Some(address) = address {
+            eprintln!("{}: listening on udp:{address}", scene.name);
+        }
+        let options = StreamOptions { queue: queue as usize, policy, brief: self.brief };
+        let begun = Instant::now();
+        let counts = run(scene, &engine, (input, source.name()), options, &mut std::io::stdout().lock())?;
+        let rate = counts.answered as f64 / begun.elapsed().as_secs_f64();
+        let (answered, refused, dropped) = (counts.answered, counts.refused, counts.dropped);
+        eprintln!(
+            "{}: {answered} results, {rate:.1} per second; {refused} lines refused, {dropped} dropped",
+            scene.name
+        );
+        if refused > 0 {
+            bail!("{}: {refused} of {} lines were refused", source.name(), refused + answered);
+        }
+        Ok(String::new())
+    }
+}

@@ -1,0 +1,187 @@
+//! What `dermis check` finds, as JSON and as text.
+
+use dermis_golden::fixed::{Cycles, Model};
+use dermis_golden::noise::expected::StatedNoise;
+use dermis_golden::noise::ShapeRow;
+use dermis_golden::sensor::Sensor;
+use dermis_hdl::usage::{total, StageUsage, Usage};
+use serde::Serialize;
+
+use super::document::percent_text;
+use super::table::markdown;
+use super::BUDGET_US;
+
+/// A generated folder.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct BuildCheck {
+    /// As given.
+    pub target: String,
+    /// `build`.
+    pub checked_as: &'static str,
+    /// Number of files that match manifest.json.
+    pub files: usize,
+}
+
+/// A scene.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct SceneCheck {
+    /// As given.
+    pub target: String,
+    /// `scene`.
+    pub checked_as: &'static str,
+    /// The scene's name.
+    pub scene: String,
+    /// The array.
+    pub sensor: Sensor,
+    /// The floating-point model's estimator, by its name in scenes.
+    pub estimator: &'static str,
+    /// Degree of the series in μ.
+    pub degree: usize,
+    /// r, which tells how fast the series converges.
+    pub spectral_radius: f64,
+    /// Largest ratio of shear to normal force.
+    pub mu_max: f64,
+    /// Taxels that are left out, [row, col].
+    pub dead: Vec<[usize; 2]>,
+    /// Name of the board.
+    pub board: String,
+    /// The hardware; `None` if it is refused.
+    pub hardware: Option<HardwareCheck>,
+    /// Why the hardware is refused.
+    pub hardware_refused: Option<String>,
+    /// Noise, and the stress that it is compared with.
+    #[serde(flatten)]
+    pub noise: StatedNoise,
+    /// Errors on drawn frames.
+    pub errors: Vec<ShapeRow>,
+    /// Why there are none.
+    pub not_drawn: Option<String>,
+}
+
+/// A scene's hardware on its board.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct HardwareCheck {
+    /// Degree of the series in μ.
+    pub degree: usize,
+    /// What the hardware takes in place of the scene's estimator.
+    pub estimator_instead: Option<&'static str>,
+    /// Optional features that the scene does not use.
+    pub left_out: Vec<&'static str>,
+    /// Resources.
+    #[serde(flatten)]
+    pub usage: Usage,
+    /// The same as shares of the board, in %: block RAMs, multipliers, flip-flops, LUTs.
+    pub of_board_percent: [f64; 4],
+    /// Cycles from the first input beat to the last output beat.
+    pub cycles: u64,
+    /// The engine's clock in MHz.
+    pub clock_MHz: f64,
+    /// Time of the cycles in µs.
+    pub time_us: f64,
+}
+
+impl HardwareCheck {
+    /// The hardware of a model.
+    pub fn new(
+        model: &Model,
+        usage: &StageUsage,
+        estimator_instead: Option<&'static str>,
+        left_out: Vec<&'static str>,
+    ) -> Self {
+        let (board, usage, cycles) = (&model.board, total(usage), Cycles::longest(model).total);
+        HardwareCheck {
+            degree: model.formats().degree,
+            estimator_instead,
+            left_out,
+            of_board_percent: usage.shares(board),
+            usage,
+            cycles,
+            clock_MHz: board.clock_MHz,
+            time_us: board.microseconds(cycles),
+        }
+    }
+
+    fn text(&self, board: &str) -> String {
+        let HardwareCheck { cycles, clock_MHz, time_us, .. } = self;
+        let names = ["block RAMs", "multipliers", "flip-flops*", "LUTs*"];
+        let counts: Vec<String> = (names.iter().zip(self.usage.counts()).zip(self.of_board_percent))
+            .map(|((name, count), share)| format!("{count} {name} ({share:.0} %)"))
+            .collect();
+        let verdict = if self.of_board_percent.iter().all(|share| *share <= 100.0) { "fits" } else { "may not fit" };
+        let mut text = format!("board       {verdict} {board}: {}; * estimated\n", counts.join(", "));
+        let margin = if *time_us <= BUDGET_US as f64 { "within" } else { "over" };
+        text += &format!(
+            "time        at most {cycles} cycles = {time_us:.2} µs at {clock_MHz} MHz, {margin} the budget of {BUDGET_US} µs\n"
+        );
+        if let Some(instead) = self.estimator_instead {
+            text += &format!("left out    by the hardware: the scene's estimator; it takes {instead}\n");
+        }
+        if !self.left_out.is_empty() {
+            text +=
+                &format!("left out    of the hardware, as the scene does not use it: {}\n", self.left_out.join(", "));
+        }
+        text
+    }
+}
+
+/// One line on a folder that is intact.
+pub fn build_check(build: &BuildCheck) -> String {
+    format!("{}: {} files match manifest.json, and manifest.json its checksum\n", build.target, build.files)
+}
+
+/// What was found of a scene.
+pub fn scene_check(check: &SceneCheck) -> String {
+    let SceneCheck { scene, sensor, estimator, degree, spectral_radius: r, mu_max, board, .. } = check;
+    let mut text = format!("scene       {scene}: {sensor}\n");
+    text += &format!("model       estimator {estimator}, degree {degree} (r = {r:.3} at mu_max = {mu_max})\n");
+    if !check.dead.is_empty() {
+        let dead: Vec<String> = check.dead.iter().map(|[row, col]| format!("{row},{col}")).collect();
+        text += &format!("left out    dead taxels {}\n", dead.join(" "));
+    }
+    match (&check.hardware, &check.hardware_refused) {
+        (Some(hardware), _) => {
+            if hardware.degree != *degree {
+                text += &format!("hardware    degree {}\n", hardware.degree);
+            }
+            text += &hardware.text(board);
+        }
+        (None, reason) => text += &format!("hardware    none: {}\n", reason.as_deref().unwrap_or_default()),
+    }
+    text += &noise(&check.noise);
+    match &check.not_drawn {
+        Some(reason) => text += &format!("errors      none: {reason}\n"),
+        None => text += &errors(&check.errors),
+    }
+    text
+}
+
+fn noise(noise: &StatedNoise) -> String {
+    let missing = "errors at several levels below";
+    match (noise.noise_MPa, noise.peak_MPa, noise.share()) {
+        (Some(noise), Some(peak), Some(share)) => {
+            format!("noise       {noise} MPa = {} of {peak} MPa\n", percent_text(share))
+        }
+        (Some(noise), _, _) => {
+            format!("noise       {noise} MPa; of what press is unknown (input.full_scale_MPa, --peak): {missing}\n")
+        }
+        (None, _, _) => {
+            format!("noise       not stated (search.noise_floor_MPa, or frames of input.tare): {missing}\n")
+        }
+    }
+}
+
+/// Errors of drawn frames: median and 90 % quantile.
+fn errors(rows: &[ShapeRow]) -> String {
+    let draws = rows.first().map_or(0, |row| row.summary.draws);
+    let head = ["noise", "estimator", "e_t median", "e_t 90 %", "e_n median", "e_n 90 %", "flagged"];
+    let cells = rows.iter().map(|row| {
+        let of = &row.summary;
+        let spreads = [of.tangential.median, of.tangential.ninety, of.normal.median, of.normal.ninety, of.flagged];
+        let numbers = spreads.map(|interval| percent_text(interval.value));
+        [vec![percent_text(row.noise), row.estimator.clone()], numbers.to_vec()].concat()
+    });
+    format!(
+        "errors      of {draws} drawn contacts of any shape; none: no shear, Σ b·area\n\n{}",
+        markdown(&head, cells.collect())
+    )
+}

@@ -1,0 +1,292 @@
+//! Reconstruction of a stream: one result or refusal per line, in the order of the lines.
+
+use std::io::{BufReader, ErrorKind, Read, Write};
+use std::sync::Arc;
+use std::time::{SystemTime, UNIX_EPOCH};
+
+use anyhow::{anyhow, bail, Result};
+use dermis_golden::fixed::Model;
+use dermis_golden::float::Golden;
+use dermis_golden::frame::{Forces, Frame};
+use dermis_golden::reconstruct::Reconstruction;
+use dermis_golden::scene::Scene;
+use serde::Serialize;
+
+use super::line;
+use super::queue::{Policy, Queue};
+
+/// What reconstructs.
+pub enum Engine {
+    /// The floating-point model.
+    Golden(Box<Golden>),
+    /// The bit-true model.
+    Fixed(Box<Model>),
+}
+
+/// How a stream is read and answered.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct StreamOptions {
+    /// Lines that wait for reconstruction, at least one.
+    pub queue: usize,
+    /// What happens where that many wait.
+    pub policy: Policy,
+    /// Leave out the forces of taxels.
+    pub brief: bool,
+}
+
+/// What a stream had.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Counts {
+    /// Results.
+    pub answered: u64,
+    /// Lines without a frame, or whose frame has no result.
+    pub refused: u64,
+    /// Lines dropped by [`Policy::Latest`].
+    pub dropped: u64,
+}
+
+/// A line as it was received.
+struct Received {
+    number: u64,
+    time: SystemTime,
+    /// `None` if it is too long.
+    bytes: Option<Vec<u8>>,
+}
+
+/// An output line with a result.
+#[derive(Serialize)]
+struct Answer<'a> {
+    sequence: u64,
+    line: u64,
+    received_s: f64,
+    answered_s: f64,
+    dropped: u64,
+    #[serde(flatten)]
+    result: &'a Reconstruction,
+}
+
+/// An output line for an input line without a result.
+#[derive(Serialize)]
+struct Refusal<'a> {
+    line: u64,
+    error: &'a str,
+}
+
+impl Engine {
+    /// The engine of a scene that takes blocks of frames.
+    ///
+    /// # Errors
+    /// A sliding mean, a scene that the model refuses.
+    pub fn new(scene: &Scene, fixed: bool) -> Result<Engine> {
+        if scene.input.slides() {
+            bail!("scene {}: input.mean = \"sliding\" is not available in a stream: block", scene.name);
+        }
+        match fixed {
+            false => Ok(Engine::Golden(Box::new(Golden::new(scene)?))),
+            true => Ok(Engine::Fixed(Box::new(Model::new(scene)?))),
+        }
+    }
+
+    fn reconstruct(&self, frames: &[Frame]) -> Result<Reconstruction> {
+        match self {
+            Engine::Golden(golden) => Ok(golden.run_averaged(frames)?),
+            Engine::Fixed(model) => Ok(model.reconstruct_averaged(frames)?),
+        }
+    }
+}
+
+/// Answers every line of `input`, called `name` in errors, until it ends or `output` is closed.
+///
+/// # Errors
+/// Input or output that fails; a bad line is none.
+pub fn run(
+    scene: &Scene,
+    engine: &Engine,
+    (input, name): (Box<dyn Read + Send>, &str),
+    options: StreamOptions,
+    output: &mut dyn Write,
+) -> Result<Counts> {
+    let queue = Arc::new(Queue::new(options.queue, options.policy));
+    let reader = {
+        let queue = Arc::clone(&queue);
+        // Not joined where the output is closed first: the read may never return.
+        std::thread::spawn(move || {
+            let outcome = read_all(input, &queue);
+            queue.close();
+            outcome
+        })
+    };
+    let mut stream = Stream { scene, engine, brief: options.brief, waiting: Vec::new(), counts: Counts::default() };
+    loop {
+        let (received, dropped) = queue.pop();
+        stream.counts.dropped = dropped;
+        let Some(received) = received else { break };
+        let Some(text) = stream.answer(&received)? else { continue };
+        match output.write_all(text.as_bytes()).and_then(|()| output.flush()) {
+            Err(error) if error.kind() == ErrorKind::BrokenPipe => {
+                queue.close();
+                return Ok(stream.counts);
+            }
+            Err(error) => return Err(anyhow!("standard output: {error}")),
+            Ok(()) => (),
+        }
+    }
+    match reader.join() {
+        Ok(outcome) => outcome.map_err(|error| anyhow!("{name}: {error}"))?,
+        Err(_) => bail!("{name}: the thread that reads it has ended"),
+    }
+    Ok(stream.counts)
+}
+
+/// Reads all lines into the queue; blank ones only count.
+fn read_all(input: Box<dyn Read + Send>, queue: &Queue<Received>) -> std::io::Result<()> {
+    let (mut input, mut line) = (BufReader::new(input), Vec::new());
+    for number in 1.. {
+        let Some(complete) = line::read(&mut input, &mut line)? else { break };
+        if complete && line.iter().all(u8::is_ascii_whitespace) {
+            continue;
+        }
+        let bytes = complete.then(|| std::mem::take(&mut line));
+        if !queue.push(Received { number, time: SystemTime::now(), bytes }) {
+            break;
+        }
+    }
+    Ok(())
+}
+
+/// The state of a stream.
+struct Stream<'a> {
+    scene: &'a Scene,
+    engine: &'a Engine,
+    brief: bool,
+    /// Frames of a block that is not complete.
+    waiting: Vec<Frame>,
+    counts: Counts,
+}
+
+impl Stream<'_> {
+    /// The output line for a line; `None` for a frame that does not complete its block.
+    fn answer(&mut self, received: &Received) -> Result<Option<String>> {
+        let result = self.frame(received).and_then(|frame| {
+            self.waiting.push(frame);
+            if self.waiting.len() < self.scene.input.frames_per_result() {
+                return Ok(None);
+            }
+            let frames = std::mem::take(&mut self.waiting);
+            self.engine.reconstruct(&frames).map(Some).map_err(|error| error.to_string())
+        });
+        let line = received.number;
+        let text = match result {
+            Ok(None) => return Ok(None),
+            Ok(Some(mut result)) => {
+                if self.brief {
+                    result.forces_N = Forces::default();
+                }
+                let (sequence, dropped) = (self.counts.answered, self.counts.dropped);
+                self.counts.answered += 1;
+                let [received_s, answered_s] = [received.time, SystemTime::now()].map(seconds);
+                serde_json::to_string(&Answer { sequence, line, received_s, answered_s, dropped, result: &result })?
+            }
+            Err(error) => {
+                self.counts.refused += 1;
+                serde_json::to_string(&Refusal { line, error: &error })?
+            }
+        };
+        Ok(Some(text + "\n"))
+    }
+
+    fn frame(&self, received: &Received) -> Result<Frame, String> {
+        let bytes = received.bytes.as_ref().ok_or_else(|| format!("over {} bytes", line::LONGEST_LINE))?;
+        let text = std::str::from_utf8(bytes).map_err(|error| error.to_string())?;
+        match line::frame(text, received.number, &self.scene.sensor) {
+            Ok((_, frame)) => Ok(frame),
+            Err(none) => Err(none.reason),
+        }
+    }
+}
+
+fn seconds(time: SystemTime) -> f64 {
+    time.duration_since(UNIX_EPOCH).map_or(0.0, |since| since.as_secs_f64())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use serde_json::Value;
+
+    fn answers(scene: &Scene, fixed: bool, input: String, options: StreamOptions) -> (Counts, Vec<Value>) {
+        let engine = Engine::new(scene, fixed).unwrap();
+        let input: Box<dyn Read + Send> = Box::new(std::io::Cursor::new(input.into_bytes()));
+        let mut output = Vec::new();
+        let counts = run(scene, &engine, (input, "memory"), options, &mut output).unwrap();
+        let text = String::from_utf8(output).unwrap();
+        (counts, text.lines().map(|line| serde_json::from_str(line).unwrap()).collect())
+    }
+
+    const ALL: StreamOptions = StreamOptions { queue: 4, policy: Policy::All, brief: false };
+
+    fn scene() -> Scene {
+        Scene::builtin("eight-by-eight").unwrap().for_hardware()
+    }
+
+    fn csv(frame: &Frame) -> String {
+        frame.stress_MPa.iter().map(f64::to_string).collect::<Vec<_>>().join(",") + "\n"
+    }
+
+    #[test]
+    fn results_are_those_of_the_engines_and_bad_lines_are_numbered() {
+        let (scene, frames) = (scene(), Frame::shipped(&scene()));
+        let input = format!("{}\nx,1\n{}{{\"id\": 1}}\n", csv(&frames[0]), csv(&frames[1]));
+        for fixed in [false, true] {
+            let (counts, answers) = answers(&scene, fixed, input.clone(), ALL);
+            assert_eq!(counts, Counts { answered: 2, refused: 2, dropped: 0 });
+            let lines: Vec<u64> = answers.iter().map(|answer| answer["line"].as_u64().unwrap()).collect();
+            assert_eq!(lines, [1, 3, 4, 5]);
+            assert_eq!(answers[1]["error"], "value 1: \"x\" is not a finite number");
+            assert!(answers[3]["error"].as_str().unwrap().starts_with("missing field `stress_MPa`"));
+            for (answer, frame, sequence) in [(&answers[0], &frames[0], 0), (&answers[2], &frames[1], 1)] {
+                let plain = Frame { resultant_N: None, ..frame.clone() };
+                let result = match fixed {
+                    false => Golden::new(&scene).unwrap().run(&plain).unwrap(),
+                    true => Model::new(&scene).unwrap().reconstruct(&plain).unwrap(),
+                };
+                let wanted: Value = serde_json::to_value(&result).unwrap();
+                assert_eq!((&answer["forces_N"], &answer["flags"]), (&wanted["forces_N"], &wanted["flags"]));
+                assert_eq!(answer["sequence"], sequence);
+                assert!(answer["answered_s"].as_f64() >= answer["received_s"].as_f64());
+            }
+        }
+    }
+
+    #[test]
+    fn a_block_of_frames_gives_one_result_and_brief_leaves_out_the_taxels() {
+        let (mut scene, frames) = (scene(), Frame::shipped(&scene()));
+        scene.input.average = 1;
+        let input = csv(&frames[0]) + &csv(&frames[1]) + &csv(&frames[2]);
+        let (counts, answers) = answers(&scene, false, input, StreamOptions { brief: true, ..ALL });
+        assert_eq!((counts.answered, answers.len(), &answers[0]["line"]), (1, 1, &Value::from(2)));
+        assert_eq!(answers[0]["forces_N"]["fz"], Value::Array(Vec::new()));
+        let mean = Golden::new(&scene).unwrap().run_averaged(&frames[..2]).unwrap().resultant_N;
+        assert_eq!(answers[0]["resultant_N"], serde_json::to_value(mean).unwrap());
+    }
+
+    #[test]
+    fn a_sliding_mean_is_refused_by_its_field() {
+        let mut scene = scene();
+        scene.input.mean = dermis_golden::scene::MeanKind::Sliding;
+        scene.input.average = 2;
+        let error = Engine::new(&scene, false).err().unwrap().to_string();
+        assert!(error.contains("input.mean = \"sliding\""), "{error}");
+    }
+
+    #[test]
+    fn the_latest_of_many_lines_are_answered_and_the_others_counted() {
+        let (scene, frames) = (scene(), Frame::shipped(&scene()));
+        let options = StreamOptions { queue: 1, policy: Policy::Latest, brief: true };
+        let (counts, answers) = answers(&scene, false, csv(&frames[0]).repeat(2000), options);
+        assert_eq!(counts.answered + counts.dropped, 2000);
+        assert!(counts.dropped > 0);
+        // The newest line is never dropped.
+        assert_eq!(answers.last().unwrap()["line"], 2000);
+    }
+}

@@ -1,0 +1,36 @@
+//! Streams of frames without a board: lines in, lines of JSON out, in order and with bounded memory.
+//!
+//! ```text
+//! standard input, growing file, serial port, UDP ── lines ── queue of N lines ── frames ── engine ── NDJSON
+//!                          own thread                 full: wait, or drop the oldest
+//! ```
+//!
+//! | in, one line each | |
+//! |---|---|
+//! | `{"id": 7, "stress_MPa": [0.1, …]}` | row-major; `id` may be left out |
+//! | `0.1,0.2,…` | row-major, separated by commas |
+//!
+//! | out, one line each | |
+//! |---|---|
+//! | result | `sequence` from 0, `line` of its last frame from 1, `received_s`, `answered_s` since 1970, `dropped` lines so far; then the fields of [`Reconstruction`](dermis_golden::reconstruct::Reconstruction) |
+//! | refusal | `line`, `error`; the stream goes on |
+//!
+//! With `input.average = k` 2^k frames give one result. A line is at most [`LONGEST_LINE`] bytes, so a queue of N lines
+//! takes at most N times that.
+//!
+//! | module | does |
+//! |---|---|
+//! | [`line`] | a line of bounded length, and the frame in it |
+//! | [`queue`] | the queue between the two threads |
+//! | [`source`] | where lines come from |
+//! | [`answers`] | reconstruction, results and refusals |
+
+pub mod answers;
+pub(crate) mod line;
+pub mod queue;
+pub mod source;
+
+pub use answers::{run, Counts, Engine, StreamOptions};
+pub use line::LONGEST_LINE;
+pub use queue::Policy;
+pub use source::Source;

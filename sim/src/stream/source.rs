@@ -1,0 +1,201 @@
+//! Where lines come from: standard input, a file that grows, a serial port, UDP; all are read as bytes.
+//!
+//! | written | source | ends |
+//! |---|---|---|
+//! | `-` | standard input | with it |
+//! | `udp:HOST:PORT` | datagrams of one or more whole lines, sent to this address | never |
+//! | a character device | a serial port | with an error, when it is unplugged |
+//! | a regular file | the file from its start, then what is added; from its start again if it becomes shorter | never |
+//! | a pipe | the pipe | with it |
+
+use std::fs::File;
+use std::io::{Error, ErrorKind, Read, Result, Seek};
+use std::net::UdpSocket;
+use std::os::unix::fs::FileTypeExt;
+use std::path::Path;
+use std::str::FromStr;
+use std::time::Duration;
+
+use serialport::SerialPort;
+
+/// How often a file that grows is looked at.
+const POLL: Duration = Duration::from_millis(5);
+/// Wait for a byte of a serial port, after which it is tried again.
+const SERIAL_WAIT: Duration = Duration::from_millis(200);
+/// Largest datagram in bytes.
+const DATAGRAM: usize = 1 << 16;
+
+/// A source as it is written.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Source {
+    /// `-`
+    StandardInput,
+    /// `udp:HOST:PORT`
+    Udp(String),
+    /// A file, a pipe or a serial port.
+    Path(String),
+}
+
+impl FromStr for Source {
+    type Err = String;
+
+    fn from_str(text: &str) -> std::result::Result<Source, String> {
+        match text.strip_prefix("udp:") {
+            Some(address) if address.rsplit_once(':').is_some_and(|(_, port)| port.parse::<u16>().is_ok()) => {
+                Ok(Source::Udp(address.to_owned()))
+            }
+            Some(address) => Err(format!("udp:{address}: wanted udp:HOST:PORT")),
+            None if text == "-" => Ok(Source::StandardInput),
+            None => Ok(Source::Path(text.to_owned())),
+        }
+    }
+}
+
+impl Source {
+    /// Opens the source; `baud` is the bit rate of a serial port. Of UDP also the address at which it listens.
+    ///
+    /// # Errors
+    /// The error of the operating system, with the source's name.
+    pub fn open(&self, baud: u32) -> Result<(Box<dyn Read + Send>, Option<std::net::SocketAddr>)> {
+        let named = |name: &str, error: Error| Error::new(error.kind(), format!("{name}: {error}"));
+        match self {
+            Source::StandardInput => Ok((Box::new(std::io::stdin()), None)),
+            Source::Udp(address) => {
+                let socket = UdpSocket::bind(address).map_err(|error| named(address, error))?;
+                let local = socket.local_addr().ok();
+                Ok((Box::new(Datagrams { socket, buffer: Vec::new(), used: 0 }), local))
+            }
+            Source::Path(path) => {
+                let kind = std::fs::metadata(path).map_err(|error| named(path, error))?.file_type();
+                let opened: Box<dyn Read + Send> = if kind.is_char_device() {
+                    let port = serialport::new(path, baud).timeout(SERIAL_WAIT).open();
+                    Box::new(Serial(port.map_err(|error| named(path, error.into()))?))
+                } else {
+                    let file = File::open(Path::new(path)).map_err(|error| named(path, error))?;
+                    match kind.is_file() {
+                        true => Box::new(Growing { file, at: 0 }),
+                        false => Box::new(file),
+                    }
+                };
+                Ok((opened, None))
+            }
+        }
+    }
+
+    /// The source's name in messages.
+    pub fn name(&self) -> &str {
+        match self {
+            Source::StandardInput => "standard input",
+            Source::Udp(address) => address,
+            Source::Path(path) => path,
+        }
+    }
+}
+
+/// A file that another program adds to.
+struct Growing {
+    file: File,
+    /// Bytes read.
+    at: u64,
+}
+
+impl Read for Growing {
+    fn read(&mut self, buffer: &mut [u8]) -> Result<usize> {
+        loop {
+            let bytes = self.file.read(buffer)?;
+            if bytes > 0 {
+                self.at += bytes as u64;
+                return Ok(bytes);
+            }
+            if self.file.metadata()?.len() < self.at {
+                self.file.rewind()?;
+                self.at = 0;
+            } else {
+                std::thread::sleep(POLL);
+            }
+        }
+    }
+}
+
+/// A serial port, which has no end.
+struct Serial(Box<dyn SerialPort>);
+
+impl Read for Serial {
+    fn read(&mut self, buffer: &mut [u8]) -> Result<usize> {
+        loop {
+            match self.0.read(buffer) {
+                Err(error) if matches!(error.kind(), ErrorKind::TimedOut | ErrorKind::Interrupted) => (),
+                other => return other,
+            }
+        }
+    }
+}
+
+/// Datagrams, each ended as a line.
+struct Datagrams {
+    socket: UdpSocket,
+    buffer: Vec<u8>,
+    /// Bytes of the buffer that were read.
+    used: usize,
+}
+
+impl Read for Datagrams {
+    fn read(&mut self, buffer: &mut [u8]) -> Result<usize> {
+        while self.used == self.buffer.len() {
+            self.buffer.resize(DATAGRAM, 0);
+            let bytes = self.socket.recv(&mut self.buffer)?;
+            self.buffer.truncate(bytes);
+            self.used = 0;
+            if bytes > 0 && self.buffer.last() != Some(&b'\n') {
+                self.buffer.push(b'\n');
+            }
+        }
+        let bytes = buffer.len().min(self.buffer.len() - self.used);
+        buffer[..bytes].copy_from_slice(&self.buffer[self.used..self.used + bytes]);
+        self.used += bytes;
+        Ok(bytes)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::io::{BufRead, BufReader, Write};
+
+    #[test]
+    fn sources_are_read_as_written() {
+        let source = |text: &str| text.parse::<Source>();
+        assert_eq!(source("-"), Ok(Source::StandardInput));
+        assert_eq!(source("udp:[::1]:9000"), Ok(Source::Udp("[::1]:9000".into())));
+        assert_eq!(source("udp:9000"), Err("udp:9000: wanted udp:HOST:PORT".into()));
+        assert_eq!(source("/dev/ttyUSB0"), Ok(Source::Path("/dev/ttyUSB0".into())));
+        let absent = source("absent.csv").unwrap().open(9600).err().unwrap().to_string();
+        assert!(absent.starts_with("absent.csv: No such file"), "{absent}");
+    }
+
+    #[test]
+    fn datagrams_become_lines() {
+        let (opened, address) = "udp:127.0.0.1:0".parse::<Source>().unwrap().open(0).unwrap();
+        let sender = UdpSocket::bind("127.0.0.1:0").unwrap();
+        for datagram in ["1,2", "", "3\n4\n"] {
+            sender.send_to(datagram.as_bytes(), address.unwrap()).unwrap();
+        }
+        let lines: Vec<String> = BufReader::new(opened).lines().take(3).map(Result::unwrap).collect();
+        assert_eq!(lines, ["1,2", "3", "4"]);
+    }
+
+    #[test]
+    fn a_file_is_followed_and_begun_again_when_cut() {
+        let mut file = tempfile::NamedTempFile::new().unwrap();
+        let source: Source = file.path().to_str().unwrap().parse().unwrap();
+        write!(file, "first\nsec").unwrap();
+        let mut lines = BufReader::new(source.open(0).unwrap().0).lines();
+        assert_eq!(lines.next().unwrap().unwrap(), "first");
+        writeln!(file, "ond").unwrap();
+        assert_eq!(lines.next().unwrap().unwrap(), "second");
+        file.as_file().set_len(0).unwrap();
+        file.rewind().unwrap();
+        writeln!(file, "new").unwrap();
+        assert_eq!(lines.next().unwrap().unwrap(), "new");
+    }
+}

@@ -1,0 +1,147 @@
+//! `dermis reconstruct --stream` as a user runs it: from standard input, a file that grows, UDP and a serial port.
+
+use std::fs::OpenOptions;
+use std::io::{BufRead, BufReader, Read, Write};
+use std::net::UdpSocket;
+use std::process::{Child, ChildStderr, ChildStdout, Command, Stdio};
+
+use dermis_golden::float::Golden;
+use dermis_golden::frame::Frame;
+use dermis_golden::scene::Scene;
+use serde_json::Value;
+
+const SCENE: &str = "eight-by-eight";
+
+fn dermis(more: &[&str]) -> Child {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_dermis"));
+    command.args(["reconstruct", SCENE]).args(more);
+    command.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap()
+}
+
+/// Stdout line by line, as JSON.
+fn answers(child: &mut Child) -> impl Iterator<Item = Value> {
+    let lines = BufReader::new(child.stdout.take().unwrap() as ChildStdout).lines();
+    lines.map(|line| serde_json::from_str(&line.unwrap()).unwrap())
+}
+
+fn frames() -> Vec<Frame> {
+    Frame::shipped(&Scene::builtin(SCENE).unwrap())
+}
+
+fn line(frame: &Frame) -> String {
+    frame.stress_MPa.iter().map(f64::to_string).collect::<Vec<_>>().join(",") + "\n"
+}
+
+/// The resultant that `dermis reconstruct --json` has for a frame.
+fn resultant(frame: &Frame) -> Value {
+    let golden = Golden::new(&Scene::builtin(SCENE).unwrap()).unwrap();
+    serde_json::to_value(golden.run(frame).unwrap().resultant_N).unwrap()
+}
+
+#[test]
+fn a_bad_line_is_answered_by_its_number_and_the_stream_goes_on() {
+    let frames = frames();
+    let mut child = dermis(&["--stream"]);
+    let mut input = child.stdin.take().unwrap();
+    let mut answers = answers(&mut child);
+    // Each line is answered before the next one is sent.
+    for (number, frame) in [(1, &frames[0]), (2, &frames[1])] {
+        input.write_all(line(frame).as_bytes()).unwrap();
+        let answer = answers.next().unwrap();
+        assert_eq!((&answer["line"], &answer["resultant_N"]), (&Value::from(number), &resultant(frame)));
+        assert!(answer["contacts"][0]["sigma_N"].is_array(), "{answer}");
+    }
+    input.write_all(b"1,2\n").unwrap();
+    assert_eq!(
+        answers.next().unwrap(),
+        serde_json::json!({"line": 3, "error": "line 3: stress_MPa has 2 values, wanted 64"})
+    );
+    input.write_all(line(&frames[2]).as_bytes()).unwrap();
+    assert_eq!(answers.next().unwrap()["sequence"], 2);
+    drop(input);
+    assert_eq!(answers.next(), None);
+    let output = child.wait_with_output().unwrap();
+    let stderr = String::from_utf8(output.stderr).unwrap();
+    assert_eq!(output.status.code(), Some(2));
+    assert!(stderr.ends_with("error: standard input: 1 of 4 lines were refused\n"), "{stderr}");
+}
+
+#[test]
+fn an_output_that_is_closed_ends_the_stream() {
+    let mut child = dermis(&["--stream", "--brief"]);
+    drop(child.stdout.take());
+    let mut input = child.stdin.take().unwrap();
+    input.write_all(line(&frames()[0]).as_bytes()).unwrap();
+    // Standard input is still open.
+    assert!(child.wait().unwrap().success());
+}
+
+#[test]
+fn a_file_that_grows_is_followed() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("log.csv");
+    let frames = frames();
+    let mut file = OpenOptions::new().create(true).append(true).open(&path).unwrap();
+    file.write_all(line(&frames[0]).as_bytes()).unwrap();
+    let mut child = dermis(&[&format!("--stream={}", path.display()), "--brief"]);
+    let mut answers = answers(&mut child);
+    assert_eq!(answers.next().unwrap()["line"], 1);
+    let text = line(&frames[1]);
+    let (first, rest) = text.split_at(20);
+    file.write_all(first.as_bytes()).unwrap();
+    file.write_all(rest.as_bytes()).unwrap();
+    let answer = answers.next().unwrap();
+    assert_eq!((&answer["line"], &answer["resultant_N"]), (&Value::from(2), &resultant(&frames[1])));
+    child.kill().unwrap();
+    child.wait().unwrap();
+}
+
+#[test]
+fn udp_is_answered_at_the_address_that_is_printed() {
+    let mut child = dermis(&["--stream=udp:127.0.0.1:0", "--latest", "--queue", "2", "--engine", "fixed"]);
+    let mut stderr = BufReader::new(child.stderr.take().unwrap() as ChildStderr).lines();
+    let address = stderr.find_map(|line| line.unwrap().split_once("listening on udp:").map(|(_, a)| a.to_owned()));
+    let sender = UdpSocket::bind("127.0.0.1:0").unwrap();
+    let mut answers = answers(&mut child);
+    for (sequence, frame) in frames()[..2].iter().enumerate() {
+        sender.send_to(line(frame).as_bytes(), address.as_ref().unwrap()).unwrap();
+        let answer = answers.next().unwrap();
+        assert_eq!((&answer["sequence"], &answer["engine"]), (&Value::from(sequence), &Value::from("fixed")));
+    }
+    child.kill().unwrap();
+    child.wait().unwrap();
+}
+
+#[test]
+fn a_serial_port_is_read() {
+    use rustix::pty::{grantpt, openpt, ptsname, unlockpt, OpenptFlags};
+    let ours = openpt(OpenptFlags::RDWR | OpenptFlags::NOCTTY).unwrap();
+    grantpt(&ours).unwrap();
+    unlockpt(&ours).unwrap();
+    let port = ptsname(&ours, Vec::new()).unwrap().into_string().unwrap();
+    // Held open, so that the terminal exists before the program opens it and after.
+    let _theirs = OpenOptions::new().read(true).write(true).open(&port).unwrap();
+    let mut child = dermis(&[&format!("--stream={port}"), "--baud", "115200", "--brief"]);
+    let mut answers = answers(&mut child);
+    let frames = frames();
+    // The first line waits in the terminal until the port is open, which may discard what came before.
+    let mut ours = std::fs::File::from(ours);
+    let answer = std::thread::scope(|scope| {
+        let (answered, waiting) = std::sync::mpsc::channel::<()>();
+        let (ours, frames) = (&mut ours, &frames);
+        scope.spawn(move || {
+            while waiting.recv_timeout(std::time::Duration::from_millis(300)).is_err() {
+                ours.write_all(b"\n").unwrap();
+                ours.write_all(line(&frames[0]).as_bytes()).unwrap();
+            }
+        });
+        let answer = answers.find(|answer| answer["error"].is_null()).unwrap();
+        answered.send(()).unwrap();
+        answer
+    });
+    assert_eq!(answer["resultant_N"], resultant(&frames[0]));
+    child.kill().unwrap();
+    let mut rest = String::new();
+    child.stderr.take().unwrap().read_to_string(&mut rest).unwrap();
+    child.wait().unwrap();
+}
