@@ -1,5 +1,6 @@
-// ULX3S: PLL and pins around the board top. `dermis bitstream` defines DERMIS_TOP, the top's module name, and DERMIS_SPI or
-// DERMIS_UART, its link. Pins are in ulx3s-85f.lpf, named as in the board's manual, those of the SPI by function.
+// ULX3S: pins around the board top, whose PLL is in ecp5-pll.v. `dermis bitstream` defines DERMIS_TOP, the top's module
+// name, and DERMIS_SPI or DERMIS_UART, its link. Pins are in ulx3s-85f.lpf, named as in the board's manual, those of the
+// SPI by function.
 module board (
   input wire clk_25mhz,
   input wire fire1,
@@ -17,36 +18,7 @@ module board (
 );
   wire clk, locked;
 
-  // 25 MHz to 100 MHz, the board file's clock_MHz; the oscillator of the PLL runs at 600 MHz (400 to 800 are allowed).
-  (* FREQUENCY_PIN_CLKI = "25", FREQUENCY_PIN_CLKOP = "100" *)
-  EHXPLLL #(
-    .CLKI_DIV(1),
-    .CLKFB_DIV(4),
-    .CLKOP_DIV(6),
-    .CLKOP_CPHASE(2),
-    .CLKOP_FPHASE(0),
-    .CLKOP_ENABLE("ENABLED"),
-    .FEEDBK_PATH("CLKOP"),
-    .PLLRST_ENA("DISABLED"),
-    .INTFB_WAKE("DISABLED"),
-    .STDBY_ENABLE("DISABLED"),
-    .DPHASE_SOURCE("DISABLED"),
-    .OUTDIVIDER_MUXA("DIVA")
-  ) pll (
-    .CLKI(clk_25mhz),
-    .CLKFB(clk),
-    .CLKOP(clk),
-    .LOCK(locked),
-    .RST(1'b0),
-    .STDBY(1'b0),
-    .PHASESEL0(1'b0),
-    .PHASESEL1(1'b0),
-    .PHASEDIR(1'b1),
-    .PHASESTEP(1'b1),
-    .PHASELOADREG(1'b1),
-    .PLLWAKESYNC(1'b0),
-    .ENCLKOP(1'b0)
-  );
+  pll_25_to_100 pll (.clk_25mhz(clk_25mhz), .clk(clk), .locked(locked));
 
   // Held high: low would let the WiFi module's boot loader take over the board.
   assign wifi_gpio0 = 1'b1;

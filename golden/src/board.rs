@@ -6,6 +6,7 @@
 //! |---|---|---|
 //! | `engine` | | `"parallel"` (default) or `"serial"`: [`EngineKind`] |
 //! | `device`, `family`, `size`, `package`, `speed_grade` | | as the place and route tool names them |
+//! | `verilog` | | files of `constraints`, which boards can share |
 //! | `input_clock_MHz` | MHz | oscillator on the board |
 //! | `clock_MHz` | MHz | clock of the engine: a design target until place and route has measured it |
 //! | `uart_baud` | bit/s | bit rate of the UART |
@@ -19,8 +20,8 @@
 //! | `seeds`, `placers` | | place and route is tried with seeds 1, 2, … and each placer until one converges |
 //! | `place_minutes` | min | time limit of one try |
 //!
-//! The files of the same name with another ending are the board's Verilog (`.v`: pins and PLL around the top module)
-//! and its pin constraints.
+//! Beside it stand the board's Verilog (pins and PLL around the top module: the files of `verilog`, or that of the same name
+//! with the ending `.v`) and, under the same name with another ending, its pin constraints.
 
 use include_dir::{include_dir, Dir};
 use serde::{Deserialize, Serialize};
@@ -64,6 +65,9 @@ pub struct Board {
     pub package: String,
     /// Speed grade.
     pub speed_grade: u32,
+    /// The board's Verilog, files of `constraints`; empty: the file of the board's name.
+    #[serde(default)]
+    pub verilog: Vec<String>,
     /// Oscillator on the board, MHz, > 0.
     pub input_clock_MHz: f64,
     /// Clock of the engine, MHz, > 0.
@@ -184,18 +188,28 @@ impl Board {
         Board::parse(name, file.contents_utf8().unwrap_or_default())
     }
 
-    /// The board's Verilog and its pin constraints: file names and texts.
+    /// The board's Verilog: file names and texts.
     ///
     /// # Errors
     /// [`BoardError::Invalid`], which names the missing file.
-    pub fn files(&self) -> Result<[(String, &'static str); 2], BoardError> {
-        let file = |ending: &str| {
-            let name = format!("{}.{ending}", self.name);
-            let missing = || BoardError::Invalid { name: self.name.clone(), reason: format!("needs {name} beside it") };
-            let text = FILES.get_file(&name).and_then(|file| file.contents_utf8()).ok_or_else(missing)?;
-            Ok((name, text))
-        };
-        Ok([file("v")?, file(self.family.pin_file_extension())?])
+    pub fn verilog_files(&self) -> Result<Vec<(String, &'static str)>, BoardError> {
+        let own = [format!("{}.v", self.name)];
+        let names = if self.verilog.is_empty() { &own[..] } else { &self.verilog };
+        names.iter().map(|name| self.file(name)).collect()
+    }
+
+    /// The board's pin constraints: file name and text.
+    ///
+    /// # Errors
+    /// [`BoardError::Invalid`], which names the missing file.
+    pub fn pin_file(&self) -> Result<(String, &'static str), BoardError> {
+        self.file(&format!("{}.{}", self.name, self.family.pin_file_extension()))
+    }
+
+    fn file(&self, name: &str) -> Result<(String, &'static str), BoardError> {
+        let missing = || BoardError::Invalid { name: self.name.clone(), reason: format!("needs {name} beside it") };
+        let text = FILES.get_file(name).and_then(|file| file.contents_utf8()).ok_or_else(missing)?;
+        Ok((name.to_owned(), text))
     }
 
     /// Names of all boards, sorted.
@@ -280,7 +294,17 @@ mod tests {
         for name in Board::names() {
             let board = Board::load(name).unwrap();
             assert_eq!(board.name, name);
-            assert!(board.files().unwrap().iter().all(|(_, text)| !text.is_empty()));
+            let verilog = board.verilog_files().unwrap();
+            assert!(verilog.iter().any(|(_, text)| text.contains("module board (")), "{name}");
+            // Every port has its site.
+            let (_, pins) = board.pin_file().unwrap();
+            let ports = verilog.iter().filter_map(|(_, text)| text.split_once("module board (")?.1.split_once(");"));
+            let ports: Vec<&str> = ports
+                .flat_map(|(ports, _)| ports.lines())
+                .filter_map(|l| l.rsplit_once("wire "))
+                .map(|(_, port)| port.trim_end_matches(',').rsplit(' ').next().unwrap_or_default())
+                .collect();
+            assert!(!ports.is_empty() && ports.iter().all(|port| pins.contains(port)), "{name}: {ports:?}");
         }
         // 100 MHz: one cycle is 10 ns.
         let board = Board::load("ulx3s-85f").unwrap();
@@ -296,6 +320,14 @@ mod tests {
             [1, 2, 1, 5]
         );
         assert_eq!([board.multipliers_for(27, 18), board.multipliers_for(18, 18)], [2, 1]);
+    }
+
+    #[test]
+    fn a_missing_verilog_file_is_named() {
+        let text = FILES.get_file("colorlight-i5.toml").unwrap().contents_utf8().unwrap();
+        let board = Board::parse("x", &text.replace("colorlight.v", "colourlight.v")).unwrap();
+        let error = board.verilog_files().unwrap_err().to_string();
+        assert_eq!(error, "constraints/x.toml: needs colourlight.v beside it");
     }
 
     #[test]

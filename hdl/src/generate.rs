@@ -86,7 +86,7 @@ impl Generated {
 pub(crate) fn usage(model: &Model) -> Result<StageUsage, HdlError> {
     let engine = design(model)?;
     let hierarchy = Hierarchy::of(&*engine);
-    Ok(by_stage(model, &hierarchy, &placed(&hierarchy, model)?))
+    Ok(by_stage(model, &hierarchy, &placed(&hierarchy, model)?, None))
 }
 
 /// Generates the hardware of `model`. The same model always gives the same bytes.
@@ -109,7 +109,7 @@ pub fn generate_changed(model: &Model, changes: &[Change]) -> Result<Generated, 
     let memories = placed(&hierarchy, model)?;
     let verilog =
         header(model, &top) + &hierarchy.verilog(&top, &attributes(&memories), &port_comments(model.board.engine));
-    let usage = by_stage(model, &hierarchy, &memories);
+    let usage = by_stage(model, &hierarchy, &memories, None);
     let dropped = refused(model)?;
     let manifest = manifest(model, &top, &usage, &memories, &dropped);
     let taps = taps(&*engine);
@@ -216,6 +216,15 @@ fn case(model: &Model, case: &CasePlan) -> serde_json::Value {
     })
 }
 
+/// The manifest's resources.
+pub(crate) fn resources(usage: &StageUsage, memories: &[PlacedMemory]) -> serde_json::Value {
+    json!({
+        "total": total(usage),
+        "stages": usage.iter().copied().collect::<BTreeMap<_, _>>(),
+        "memories": memories,
+    })
+}
+
 fn manifest(
     model: &Model,
     top: &str,
@@ -266,11 +275,7 @@ fn manifest(
             "columns_left_out": model.cases().iter().any(|case| case.storage.is_pruned(case.formats.quads)),
             "coefficient_word_bits": word_bits(f),
         },
-        "resources": {
-            "total": total(usage),
-            "stages": usage.iter().copied().collect::<BTreeMap<_, _>>(),
-            "memories": memories,
-        },
+        "resources": resources(usage, memories),
         "cycles": cycles(|searched| Cycles::of(model, searched), model.parts().len()),
         "frame_interval": frame_interval(model, model.first()),
         "cases": model.chooses().then(|| model.cases().iter().map(|own| case(model, own)).collect::<Vec<_>>()),

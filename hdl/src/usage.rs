@@ -1,11 +1,11 @@
 //! Resources of a generated design by stage: block RAMs and multipliers exact, flip-flops and LUTs estimated.
 
 use dermis_golden::board::Board;
-use dermis_golden::fixed::plan::resources::Memory;
+use dermis_golden::fixed::plan::resources::Memory as Planned;
 use dermis_golden::fixed::Model;
 use serde::Serialize;
 
-use crate::language::{distributed_luts, Hierarchy, SEPARATOR};
+use crate::language::{distributed_luts, Hierarchy, Memory, SEPARATOR};
 use crate::simulate;
 use crate::stage_list::{Stage, CONTROL};
 
@@ -45,11 +45,11 @@ pub struct PlacedMemory {
     pub array: String,
     /// What it holds, its size, and the RAMs that it takes.
     #[serde(flatten)]
-    pub planned: Memory,
+    pub planned: Planned,
 }
 
 impl PlacedMemory {
-    pub(crate) fn new(block: &str, array: &str, planned: &Memory) -> Self {
+    pub(crate) fn new(block: &str, array: &str, planned: &Planned) -> Self {
         PlacedMemory { block: block.to_owned(), array: array.to_owned(), planned: planned.clone() }
     }
 }
@@ -63,7 +63,8 @@ impl std::ops::AddAssign for Usage {
     }
 }
 
-/// Usage by stage in the order of the data flow; last that of the blocks outside any stage, as `engine`.
+/// Usage by stage in the order of the data flow; then that of the engine's blocks outside any stage, as `engine`, and of a
+/// board that of the blocks around the engine, as `link`.
 pub type StageUsage = Vec<(&'static str, Usage)>;
 
 /// The stage of the block with instance path `block`; `engine` if it belongs to none.
@@ -72,22 +73,40 @@ pub(crate) fn stage(stages: &[Stage], block: &str) -> &'static str {
     stages.iter().find(|stage| Some(stage.name) == instance).map_or(CONTROL, |stage| stage.name)
 }
 
-/// Usage of each stage of the engine of `model`.
-pub(crate) fn by_stage(model: &Model, hierarchy: &Hierarchy, memories: &[PlacedMemory]) -> StageUsage {
+/// The row of the blocks around the engine.
+const LINK: &str = "link";
+
+/// Usage of each stage of the engine of `model`, and in the hierarchy of a board, where the engine is the instance
+/// `engine`, of the link.
+pub(crate) fn by_stage(
+    model: &Model,
+    hierarchy: &Hierarchy,
+    memories: &[PlacedMemory],
+    engine: Option<&str>,
+) -> StageUsage {
     let list = simulate::stages(model.board.engine);
-    let names = list.iter().map(|stage| stage.name).chain([CONTROL]);
+    let names = list.iter().map(|stage| stage.name).chain([CONTROL]).chain(engine.map(|_| LINK));
     let mut all: StageUsage = names.map(|name| (name, Usage::default())).collect();
-    let mut add = |block: &str, usage: Usage| {
-        let own = stage(list, block);
-        all.iter_mut().filter(|(name, _)| *name == own).for_each(|(_, sum)| *sum += usage);
+    let row_of = |block: &str| match engine.map(|engine| block.strip_prefix(engine)) {
+        None => stage(list, block),
+        Some(Some(inside)) => stage(list, inside.strip_prefix(SEPARATOR).unwrap_or_default()),
+        Some(None) => LINK,
+    };
+    let mut add = |row: &str, usage: Usage| {
+        all.iter_mut().filter(|(name, _)| *name == row).for_each(|(_, sum)| *sum += usage);
     };
     for (block, kernel) in hierarchy.kernels() {
-        let own = memories.iter().filter(|memory| memory.block == block).map(|memory| memory.array.as_str());
-        let logic = kernel.logic(&own.collect());
-        add(block, Usage { flip_flops: logic.flip_flops, luts: logic.luts.round() as usize, ..Usage::default() });
+        let planned = memories.iter().filter(|memory| memory.block == block).map(|memory| memory.array.as_str());
+        // Of the memories that no plan has, those of the link, some are to be block RAM.
+        let others = kernel.memories().iter().filter(|memory| memory.style.as_deref() == Some("block"));
+        let unplanned = |memory: &&Memory| memory.label.is_none();
+        let block_rams = others.clone().filter(unplanned).map(|m| model.board.block_rams_for(m.words, m.bits)).sum();
+        let logic = kernel.logic(&planned.chain(others.map(|memory| memory.name.as_str())).collect());
+        let luts = logic.luts.round() as usize;
+        add(row_of(block), Usage { block_rams, flip_flops: logic.flip_flops, luts, ..Usage::default() });
     }
     for PlacedMemory { block, planned, .. } in memories {
-        add(block, Usage { block_rams: planned.block_rams, luts: luts_of(planned), ..Usage::default() });
+        add(row_of(block), Usage { block_rams: planned.block_rams, luts: luts_of(planned), ..Usage::default() });
     }
     for &(stage, multipliers) in &model.resources.multipliers {
         add(stage, Usage { multipliers, ..Usage::default() });
@@ -102,7 +121,7 @@ pub fn total(stages: &StageUsage) -> Usage {
     sum
 }
 
-fn luts_of(memory: &Memory) -> usize {
+fn luts_of(memory: &Planned) -> usize {
     match (memory.block_rams, memory.large_rams) {
         (0, 0) => distributed_luts(memory.words, memory.bits),
         _ => 0,

@@ -159,7 +159,7 @@ fn wrong_values_name_what_is_allowed() {
         ("[hardware]\nlink = \"i2c\"", "\"uart\" or \"spi\""),
         ("[hardware]\ncoefficient_check = \"parity\"", "\"none\" or \"signature\""),
         ("[hardware]\nsearch_width = 3", "hardware.search_width = 3 is not allowed; it must be 4, 2 or 1"),
-        ("[hardware]\nboard = \"ulx4m\"", "\"icebreaker\" or \"ulx3s-85f\""),
+        ("[hardware]\nboard = \"ulx4m\"", "\"colorlight-i5\" or \"colorlight-i9\" or \"icebreaker\" or \"ulx3s-85f\""),
         ("[input]\nfull_scale_MPa = 0", "above 0"),
         ("[input]\naverage = 13", "from 0 to 12"),
         (

@@ -2,8 +2,8 @@
 //!
 //! | node | four-input LUTs |
 //! |---|---|
-//! | sum, difference, comparison by size | 1 per bit |
-//! | multiplexer | 6/7 per bit; 1/2 with a constant; none where a register keeps its value or is reset |
+//! | sum, difference, comparison by size | 1 per bit, and 4 where the carry chain begins and ends |
+//! | multiplexer | 6/7 per bit; 1/2 with a constant; none where 16 register bits or more keep their value or are reset by it |
 //! | multiplexers between up to 16 constants | 1 per bit |
 //! | and, or, exclusive or | 1/4 per bit: mostly merged into another node |
 //! | equality | 1/2 per bit, 1/4 with a constant |
@@ -15,16 +15,22 @@
 //! The costs were fitted to what Yosys 0.23 needs for each block by itself. Of all blocks together, flattened, it shares
 //! and removes a part ([`FLATTENED`]). The tests state how far the estimate is from Yosys.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 
-use super::kernel::{Binary, Kernel, Node, NodeId, Unary};
+use super::kernel::{Binary, Kernel, Node, NodeId, Role, Unary};
 
 /// A distributed RAM cell of the ECP5: words, bits per word, LUTs.
 const CELL: [usize; 3] = [16, 4, 6];
 
 /// LUTs of a flattened design over those of its blocks by themselves: measured 0.82 (one block search of degree 1) to 0.86
 /// (`sensor-1`).
-const FLATTENED: f64 = 0.85;
+pub(super) const FLATTENED: f64 = 0.85;
+
+/// LUTs by which place and route connects both ends of a carry chain to other logic.
+const CHAIN_ENDS: f64 = 4.0;
+
+/// Fewest flip-flops that share an enable or a reset: our flow makes logic of smaller groups (`sim/src/flow/family.rs`).
+const SMALLEST_GROUP: usize = 16;
 
 /// Logic of a block.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -45,7 +51,8 @@ impl Kernel {
     /// Logic of the block. The memories named in `placed` are counted elsewhere, with their output registers.
     pub(crate) fn logic(&self, placed: &BTreeSet<&str>) -> Logic {
         let mut logic = Logic::default();
-        let mut free = BTreeSet::new();
+        // Multiplexers by which registers are kept or reset, and the flip-flops that each condition so steers.
+        let (mut steering, mut steered) = (Vec::new(), BTreeMap::<NodeId, usize>::new());
         for (id, signal, _) in self.registers() {
             let own = self.interned[&(Node::Signal(id), signal.ty)];
             let next = signal.value.unwrap_or(own);
@@ -60,17 +67,21 @@ impl Kernel {
             if !of_memory {
                 logic.flip_flops += signal.ty.bits;
             }
-            // Enable and reset are inputs of the flip-flop.
             let mut outer = next;
-            while let Node::Mux(_, a, b) = self.nodes[outer].0 {
+            while let Node::Mux(condition, a, b) = self.nodes[outer].0 {
                 let inner = if a == own || self.is_constant(a) { b } else { a };
                 if inner == a && b != own && !self.is_constant(b) {
                     break;
                 }
-                free.insert(outer);
+                steering.push((outer, condition));
+                *steered.entry(condition).or_default() += signal.ty.bits;
                 outer = inner;
             }
         }
+        // Enable and reset are inputs of the flip-flop.
+        let enough = |condition: &NodeId| steered[condition] >= SMALLEST_GROUP || self.is_input(*condition);
+        let mut free: BTreeSet<NodeId> =
+            steering.iter().filter(|(_, condition)| enough(condition)).map(|(mux, _)| *mux).collect();
         let values: Vec<NodeId> = self.signals.iter().filter_map(|signal| signal.value).collect();
         let order = self.order(&[values, self.edge_roots()].concat()).unwrap_or_default();
         // Inner multiplexers of a table are in the same LUT as the outer one.
@@ -83,6 +94,11 @@ impl Kernel {
             logic.luts += distributed_luts(memory.words, memory.bits) as f64;
         }
         logic
+    }
+
+    /// Whether the node is an input of the block, which registers of other blocks may share.
+    fn is_input(&self, node: NodeId) -> bool {
+        matches!(self.nodes[node].0, Node::Signal(id) if matches!(self.signals[id].role, Role::Input))
     }
 
     fn is_constant(&self, node: NodeId) -> bool {
@@ -102,8 +118,8 @@ impl Kernel {
         let bits = |id: NodeId| self.ty(id).bits as f64;
         let constant = |id: NodeId| self.is_constant(id);
         match &self.nodes[node].0 {
-            Node::Binary(Binary::Add | Binary::Sub, ..) => bits(node),
-            Node::Binary(Binary::Less, a, b) => bits(*a).max(bits(*b)),
+            Node::Binary(Binary::Add | Binary::Sub, ..) => bits(node) + CHAIN_ENDS,
+            Node::Binary(Binary::Less, a, b) => bits(*a).max(bits(*b)) + CHAIN_ENDS,
             Node::Binary(Binary::Equal, a, b) => bits(*a) * if constant(*a) || constant(*b) { 0.25 } else { 0.5 },
             Node::Binary(Binary::And | Binary::Or | Binary::Xor, ..) => 0.25 * bits(node),
             Node::Binary(Binary::ShiftLeft | Binary::ShiftRight, _, by) => 1.5 * bits(node) * bits(*by),

@@ -7,9 +7,13 @@ use serde_json::json;
 use super::board_top::board_top;
 use crate::describe::{comments, port_comments};
 use crate::error::HdlError;
-use crate::generate::{attributes, placed, top_name, Generated};
+use crate::generate::{attributes, placed, resources, top_name, Generated};
 use crate::language::{Change, Hierarchy};
 use crate::manifest::GeneratedFile;
+use crate::usage::by_stage;
+
+/// The instance of the engine in a board's top.
+const ENGINE: &str = "engine";
 
 /// The link in the header comment of the top module: its name, and its pins.
 fn link_text(link: LinkKind, bit_rate: u32) -> (&'static str, String) {
@@ -57,7 +61,7 @@ pub fn generate_board_changed(model: &Model, changes: &[Change]) -> Result<Gener
     let of_engine = port_comments(model.board.engine);
     let comment = |path: &str, port: &str| match (path, path.strip_prefix("engine__")) {
         ("", _) => comments(include_str!("board_top.rs")).remove(port),
-        ("engine", _) => of_engine("", port),
+        (ENGINE, _) => of_engine("", port),
         (_, own) => of_engine(own?, port),
     };
     let verilog = hierarchy.verilog(&top, &attributes(&memories), &comment);
@@ -90,7 +94,9 @@ pub fn generate_board_changed(model: &Model, changes: &[Change]) -> Result<Gener
     });
     let mut manifest = engine.manifest.clone();
     manifest["top"] = json!(top);
-    let mut board = Generated { files: files.collect(), top, memories, taps: Vec::new(), manifest, ..engine };
+    let usage = by_stage(model, &hierarchy, &memories, Some(ENGINE));
+    manifest["resources"] = resources(&usage, &memories);
+    let mut board = Generated { files: files.collect(), top, memories, taps: Vec::new(), manifest, usage, ..engine };
     board.seal();
     Ok(board)
 }

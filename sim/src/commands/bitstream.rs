@@ -4,10 +4,11 @@ use std::path::Path;
 
 use anyhow::{ensure, Result};
 use clap::Args;
+use dermis_golden::board::SEARCH_WIDTHS;
 use dermis_golden::fixed::Model;
 use dermis_golden::scene::Scene;
 
-use crate::flow::baseline::{Baselines, FILE};
+use crate::flow::baseline::{with_search_width, Baselines, FILE};
 use crate::flow::bitstream::{make, Effort};
 use crate::progress::Progress;
 use crate::report::{self, BitstreamReport, Summary};
@@ -17,6 +18,7 @@ use crate::report::{self, BitstreamReport, Summary};
 #[command(after_help = "Examples:
   dermis bitstream eight-by-eight
   dermis bitstream eight-by-eight --board icebreaker
+  dermis bitstream sensor-1 --search-width 2         a variant with half the search, with baselines of its own
   dermis bitstream sensor-1 --seeds 5 --jobs 2 --update-baselines
   dermis bitstream --committed --board ulx3s-85f")]
 pub struct Arguments {
@@ -26,6 +28,9 @@ pub struct Arguments {
     /// Board to use instead of the scene's: the name of a file in constraints.
     #[arg(long, value_name = "NAME")]
     board: Option<String>,
+    /// Taxels per cycle of the search, in the place of the scene's or the board's; SCENE-width-N is the variant's name.
+    #[arg(long, value_name = "N", value_parser = search_width)]
+    search_width: Option<usize>,
     /// Number of place-and-route seeds; default: from the board's file.
     #[arg(long, value_parser = clap::value_parser!(u32).range(1..))]
     seeds: Option<u32>,
@@ -39,8 +44,13 @@ pub struct Arguments {
     #[arg(long)]
     json: bool,
     /// Print the table of constraints/baselines.json, of SCENE or all built-in ones, and run no tool.
-    #[arg(long, conflicts_with_all = ["seeds", "jobs", "update_baselines", "json"])]
+    #[arg(long, conflicts_with_all = ["search_width", "seeds", "jobs", "update_baselines", "json"])]
     committed: bool,
+}
+
+fn search_width(text: &str) -> Result<usize, String> {
+    let width = text.parse().ok().filter(|width| SEARCH_WIDTHS.contains(width));
+    width.ok_or_else(|| format!("must be one of {}", SEARCH_WIDTHS.map(|width| width.to_string()).join(", ")))
 }
 
 /// Makes the bitstream: the text for stdout, and whether the clock is met without a regression against the baseline.
@@ -55,6 +65,10 @@ pub fn run(arguments: &Arguments, build_dir: &Path) -> Result<(String, bool)> {
     if let Some(board) = &arguments.board {
         scene.hardware.board.clone_from(board);
     }
+    let scene = match arguments.search_width {
+        Some(width) => with_search_width(scene, width),
+        None => scene,
+    };
     let model = Model::new(&scene)?;
     let Arguments { seeds, jobs, update_baselines, .. } = *arguments;
     let made = make(&model, build_dir, Effort { seeds, jobs, update_baselines })?;
@@ -68,14 +82,10 @@ pub fn run(arguments: &Arguments, build_dir: &Path) -> Result<(String, bool)> {
 fn committed(scene: Option<&str>, board: Option<&str>) -> Result<String> {
     let _progress = Progress::start("models of the baselines");
     let mut all = Vec::new();
-    for (on, scenes) in Baselines::committed().0 {
-        for (name, baseline) in scenes {
-            let named = scene.is_none_or(|scene| scene == name) && board.is_none_or(|board| board == on);
-            if named && Scene::builtin_names().contains(&name.as_str()) {
-                let mut scene = Scene::builtin(&name)?;
-                scene.hardware.board.clone_from(&on);
-                all.push(Summary::new(&Model::new(&scene)?, baseline));
-            }
+    for (of, baseline) in Baselines::committed().built_in() {
+        let named = scene.is_none_or(|scene| scene == of.name) && board.is_none_or(|board| board == of.hardware.board);
+        if named {
+            all.push(Summary::new(&Model::new(&of)?, baseline.clone()));
         }
     }
     ensure!(!all.is_empty(), "{FILE}: no baseline of scene {scene:?} on board {board:?}");

@@ -9,6 +9,7 @@ use std::path::Path;
 use serde::{Deserialize, Serialize};
 
 use super::tools::ToolError;
+use dermis_golden::scene::Scene;
 use dermis_golden::write::write;
 
 /// Path of the file, relative to the repository's root.
@@ -98,10 +99,48 @@ impl Baselines {
         Ok(write(path, text.as_bytes())?)
     }
 
+    /// The built-in scenes that have a baseline, each on its board and with its search width; the tests' own are left out.
+    pub fn built_in(&self) -> Vec<(Scene, &Baseline)> {
+        let all =
+            self.0.iter().flat_map(|(on, scenes)| scenes.iter().map(move |(name, baseline)| (on, name, baseline)));
+        let on_board = |(on, name, baseline): (&String, &String, _)| {
+            let mut scene = built_in(name)?;
+            scene.hardware.board.clone_from(on);
+            Some((scene, baseline))
+        };
+        all.filter_map(on_board).collect()
+    }
+
     /// The baseline of a scene on a board.
     pub fn get(&self, board: &str, scene: &str) -> Option<&Baseline> {
         self.0.get(board)?.get(scene)
     }
+}
+
+/// Between the name of a scene and its search width, in the name of a variant.
+const WIDTH: &str = "-width-";
+
+/// The scene with `width` taxels per cycle in its search: a variant with a name, a folder and baselines of its own.
+pub fn with_search_width(mut scene: Scene, width: usize) -> Scene {
+    scene.name.push_str(&format!("{WIDTH}{width}"));
+    scene.hardware.search_width = Some(width);
+    scene
+}
+
+/// The built-in scene, or variant of one, of this name.
+fn built_in(name: &str) -> Option<Scene> {
+    let (base, width) = match name.rsplit_once(WIDTH) {
+        Some((base, width)) => (base, Some(width.parse().ok()?)),
+        None => (name, None),
+    };
+    if !Scene::builtin_names().contains(&base) {
+        return None;
+    }
+    let scene = Scene::builtin(base).ok()?;
+    Some(match width {
+        Some(width) => with_search_width(scene, width),
+        None => scene,
+    })
 }
 
 #[cfg(test)]
@@ -124,6 +163,19 @@ mod tests {
     #[test]
     fn the_committed_file_is_whole() {
         assert_eq!(serde_json::from_str::<Baselines>(COMMITTED).unwrap(), Baselines::committed());
+    }
+
+    #[test]
+    fn a_variant_is_found_by_its_name_and_a_scene_of_the_tests_is_not() {
+        let variant = with_search_width(Scene::builtin("sensor-1").unwrap(), 2);
+        assert_eq!(variant.name, "sensor-1-width-2");
+        let mut all = Baselines::default();
+        let on = all.0.entry("ulx3s-85f".into()).or_default();
+        for name in ["sensor-1", &variant.name, "tiny", "sensor-1-width-x"] {
+            on.insert(name.into(), baseline());
+        }
+        let scenes: Vec<Scene> = all.built_in().into_iter().map(|(scene, _)| scene).collect();
+        assert_eq!(scenes, [Scene::builtin("sensor-1").unwrap(), variant]);
     }
 
     #[test]

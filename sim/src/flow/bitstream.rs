@@ -87,7 +87,9 @@ fn check_constraints(board: &Board, placed: &Placed) -> Result<()> {
     let differs = |has: f64, wants: f64| (has / wants - 1.0).abs() > 1e-3;
     let (file, has, wants) = (&board.name, placed.engine.constraint, board.clock_MHz);
     if differs(has, wants) {
-        return Err(anyhow!("constraints/{file}.v: its PLL gives {has} MHz, {file}.toml says clock_MHz = {wants}"));
+        return Err(anyhow!(
+            "constraints/{file}.toml: clock_MHz = {wants}, but the PLL of its Verilog gives {has} MHz"
+        ));
     }
     if let (Some((pin, clock)), Some(wants)) = (placed.link, board.spi_MHz) {
         let (pins, has) = (board.family.pin_file_extension(), clock.constraint);
@@ -103,16 +105,16 @@ fn check_constraints(board: &Board, placed: &Placed) -> Result<()> {
 fn synthesise(model: &Model, folder: &Path) -> Result<PackedRegisters> {
     let _progress = Progress::start(&format!("{}: synthesis", model.scene.name));
     let generated = generate_board(model)?;
-    let board_files = model.board.files()?;
+    let (verilog, pins) = (model.board.verilog_files()?, model.board.pin_file()?);
     std::fs::create_dir_all(folder).map_err(ToolError::io(folder))?;
     let own = generated.files.iter().map(|file| (&file.name, file.text.as_str()));
-    for (name, text) in own.chain(board_files.iter().map(|(name, text)| (name, *text))) {
+    for (name, text) in own.chain(verilog.iter().chain([&pins]).map(|(name, text)| (name, *text))) {
         let path = folder.join(name);
         write(&path, text.as_bytes())?;
     }
     let link = model.scene.hardware.link.name().to_uppercase();
-    let (top, board) = (&generated.top, &model.board.name);
-    let read = format!("-D DERMIS_TOP={top} -D DERMIS_{link} {board}.v {top}.v");
+    let (top, names) = (&generated.top, verilog.iter().map(|(name, _)| name.as_str()).collect::<Vec<_>>().join(" "));
+    let read = format!("-D DERMIS_TOP={top} -D DERMIS_{link} {names} {top}.v");
     let packed = synthesis::synthesise(folder, model.board.family, &read, TOP)?;
     if let Some(blocks) = &model.board.multiplier_blocks {
         synthesis::edit(folder, |netlist| floor_plan::assign_sites(netlist, TOP, blocks))?;
@@ -213,7 +215,7 @@ mod tests {
             check_constraints(&board, &placed).map_err(|error| error.to_string())
         };
         assert_eq!(check(25.505, 25.0), Ok(()));
-        let wanted = "constraints/icebreaker.v: its PLL gives 12 MHz, icebreaker.toml says clock_MHz = 25.5";
+        let wanted = "constraints/icebreaker.toml: clock_MHz = 25.5, but the PLL of its Verilog gives 12 MHz";
         assert_eq!(check(12.0, 25.0), Err(wanted.to_string()));
         let wanted = "constraints/icebreaker.pcf: spi_sclk is constrained to 12 MHz, icebreaker.toml says spi_MHz = 25";
         assert_eq!(check(25.5, 12.0), Err(wanted.to_string()));

@@ -6,8 +6,9 @@ use std::path::Path;
 use std::process::Command;
 
 use dermis_golden::fixed::Model;
-use dermis_golden::scene::Scene;
-use dermis_sim::flow::baseline::Baselines;
+use dermis_hdl::link::generate_board;
+use dermis_hdl::usage::{total, Usage};
+use dermis_sim::flow::baseline::{Baseline, Baselines};
 
 use crate::fake;
 
@@ -35,19 +36,38 @@ fn makes_a_bitstream_without_regression(name: &str) {
     assert!(bitstream.windows(PREAMBLE.len()).any(|window| window == PREAMBLE));
 }
 
-/// Block RAMs of the link: the packet counters.
-const LINK_BLOCK_RAMS: usize = 1;
+/// Largest relative error of the estimated LUTs against place and route.
+const NEAR: f64 = 0.10;
 
-/// Place and route of these takes too long for a test; a baseline of other hardware shows by its exact counts.
+/// In what a baseline is not of the hardware that `usage` counts; the LUTs of the estimate over those routed, signed.
+fn differences(baseline: &Baseline, usage: &Usage) -> Vec<String> {
+    let [block_rams, multipliers, _, luts] = usage.counts().map(|count| count as u64);
+    let error = luts as f64 / baseline.luts as f64 - 1.0;
+    let all = [
+        (baseline.multipliers != multipliers, format!("{multipliers} multipliers, routed {}", baseline.multipliers)),
+        (baseline.block_rams != block_rams, format!("{block_rams} block RAMs, routed {}", baseline.block_rams)),
+        (error.abs() > NEAR, format!("{luts} LUTs, routed {}: {:+.1} %", baseline.luts, 100.0 * error)),
+    ];
+    all.into_iter().filter(|(differs, _)| *differs).map(|(_, text)| text).collect()
+}
+
+/// Place and route of most takes too long for a test; a baseline of other hardware shows by its exact counts.
 #[test]
-fn the_baselines_of_large_scenes_are_of_the_hardware_generated_now() {
-    let (board, baselines) = ("ulx3s-85f", Baselines::committed());
+fn the_baselines_are_of_the_hardware_generated_now() {
+    let baselines = Baselines::committed();
+    let built_in = baselines.built_in();
     for name in ["eight-by-eight", "sensor-1", "sensor-2", "sensor-3", "sensor-4"] {
-        let baseline = baselines.get(board, name).expect(name);
-        let model = Model::new(&Scene::builtin(name).unwrap()).unwrap();
-        assert_eq!(model.board.name, board);
-        let planned = [model.resources.multipliers(), model.resources.block_rams() + LINK_BLOCK_RAMS];
-        assert_eq!([baseline.multipliers, baseline.block_rams].map(|count| count as usize), planned, "{name}");
+        assert!(built_in.iter().any(|(scene, _)| scene.name == name && scene.hardware.board == "ulx3s-85f"), "{name}");
+    }
+    for (scene, baseline) in built_in {
+        let usage = total(&generate_board(&Model::new(&scene).unwrap()).unwrap().usage);
+        let wrong = differences(baseline, &usage);
+        assert!(wrong.is_empty(), "{} on {}: {wrong:?}", scene.name, scene.hardware.board);
+        // An error in either direction is found, and a count that is wrong by one.
+        let more = |share: f64| Baseline { luts: (usage.luts as f64 * share) as u64, ..baseline.clone() };
+        assert_eq!([0.90, 1.12].map(|share| differences(&more(share), &usage).len()), [1, 1]);
+        let one = Usage { block_rams: usage.block_rams + 1, multipliers: usage.multipliers + 1, ..usage };
+        assert_eq!(differences(baseline, &one).len(), 2);
     }
 }
 

@@ -10,7 +10,7 @@ use std::process::Command;
 use rayon::prelude::*;
 
 /// Examples that are not run here; some are covered by other tests, named by their file.
-const NOT_RUN: [(&str, &str); 37] = [
+const NOT_RUN: [(&str, &str); 38] = [
     ("dermis reconstruct sensor-1 --stream=udp:127.0.0.1:9000 --latest --brief", "has no end; stream.rs"),
     ("dermis host --port /dev/ttyUSB0 press.json", BOARD),
     ("dermis host --port /dev/ttyUSB0 --scene sensor-1", BOARD),
@@ -46,6 +46,7 @@ const NOT_RUN: [(&str, &str); 37] = [
     ("dermis report --paper", "repeats of 48×48: minutes; make report"),
     ("dermis bitstream eight-by-eight", PLACED),
     ("dermis bitstream eight-by-eight --board icebreaker", PLACED),
+    ("dermis bitstream sensor-1 --search-width 2", PLACED),
     ("dermis bitstream sensor-1 --seeds 5 --jobs 2 --update-baselines", PLACED),
     ("dermis cosim eight-by-eight --device netlist", "synthesis takes minutes; netlist.rs"),
 ];
