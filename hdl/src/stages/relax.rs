@@ -172,6 +172,8 @@ impl Shape {
 
 #[cfg(test)]
 mod tests {
+    use std::collections::VecDeque;
+
     use dermis_golden::fixed::words::arith::saturate;
 
     use super::*;
@@ -180,13 +182,16 @@ mod tests {
 
     const SHAPE: Shape = Shape { word: 22, data: 18, quads: 5, network: true };
 
+    /// A sum, and how many of its words were saturated.
+    type Sum = ([i64; 4], u32);
+
     /// Inputs in the order of the block.
     #[derive(Default)]
     struct Sums {
         /// v_00 so far; the words on their way, each as it came in, and how many of the sums before were saturated.
         first: Vec<[i64; 4]>,
         /// Sums of the cycle before, of the one before that, and so on; none before the first reset.
-        sums: Option<std::collections::VecDeque<Option<([i64; 4], u32)>>>,
+        sums: Option<VecDeque<Option<Sum>>>,
         seen: usize,
         total: u32,
         /// Cycles since the last sum entered or another count changed, and the other counts.
