@@ -160,7 +160,7 @@ boards!(SerialBoardTop, SerialSpiBoardTop, serial::Engine);
 
 /// The board of `model`, after rust-hdl's checks.
 pub(super) fn board_top(model: &Model) -> Result<Box<dyn Board>, HdlError> {
-    if !model.searches() {
+    if model.formats().degree == 0 {
         return Err(HdlError::Unsupported {
             field: "search.mu_max",
             value: model.scene.search.mu_max.to_string(),

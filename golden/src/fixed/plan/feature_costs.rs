@@ -11,7 +11,7 @@ use crate::fixed::words::formats::MULTIPLIER_BITS;
 use crate::input::sliding::most_frames;
 use crate::matrices::MAX_DEGREE;
 use crate::partition::{subarrays, Case};
-use crate::scene::{CoefficientCheck, ForceOutput, MeanKind, Scene, SearchSpec};
+use crate::scene::{CoefficientCheck, EstimatorKind, ForceOutput, MeanKind, Scene, SearchSpec};
 use crate::symmetry::quads::Quads;
 
 /// An optional feature of the hardware.
@@ -81,9 +81,14 @@ pub fn features(plan: &Plan) -> Vec<Feature> {
     let degree = plan.formats().degree;
     let mu_max = SearchSpec::default().mu_max;
     let own = format!("mu_max = {}", scene.search.mu_max);
-    add("search", degree > 0, set(degree > 0, own, &format!("mu_max = {mu_max}")), &|| {
-        plain(&with(&|s| s.search.mu_max = mu_max))
+    let back = if degree > 0 { scene.search.mu_max } else { mu_max };
+    add("search", plan.searches(), set(degree > 0, own, &format!("mu_max = {mu_max}")), &|| {
+        plain(&with(&|s| (s.search.mu_max, s.search.estimator) = (back, EstimatorKind::Search)))
     });
+    if plan.has_network() {
+        let layers: Vec<String> = plan.formats().layers.iter().map(usize::to_string).collect();
+        add("network", true, format!("layers of {} rows", layers.join(", ")), &|| plain(scene));
+    }
     if degree > 0 {
         let cubic = degree == MAX_DEGREE;
         add("polynomial of degree 3", cubic, "degree 3".into(), &|| {
@@ -92,7 +97,7 @@ pub fn features(plan: &Plan) -> Vec<Feature> {
     }
     let width = plan.formats().search_width;
     // The serial engine searches one taxel at a time; where the case is chosen per frame, it is four.
-    let chosen = degree > 0 && !plan.chooses() && plan.board.engine == EngineKind::Parallel;
+    let chosen = plan.searches() && !plan.chooses() && plan.board.engine == EngineKind::Parallel;
     if chosen {
         add("search width", width == Quads::LANES, format!("{} taxels per cycle", Quads::LANES), &|| {
             plain(&with(&|s| s.hardware.search_width = Some(Quads::LANES)))

@@ -8,7 +8,7 @@ use dermis_golden::fixed::{FixedError, Model, Trace};
 use dermis_golden::float::Golden;
 use dermis_golden::frame::Frame;
 use dermis_golden::partition::{subarrays, Case};
-use dermis_golden::scene::Scene;
+use dermis_golden::scene::{EstimatorKind, Scene};
 use dermis_hdl::generate;
 
 use super::measured::{BitTrue, ContactCount, Engine, Measured, Options};
@@ -24,7 +24,8 @@ const QUICK_TAXELS: usize = 1200;
 /// beyond.
 const QUICK_LITERAL: usize = 200;
 
-/// Measures scenes in cases on their shipped frames, in the order given; cases that do not divide an array are skipped.
+/// Measures scenes in cases on their shipped frames, in the order given; cases that do not divide an array, or that a network
+/// does not take, are skipped.
 ///
 /// # Errors
 /// A scene that the golden model refuses or that has no shipped frames, no Verilator, an interruption.
@@ -35,7 +36,8 @@ pub fn measure(scenes: &[Scene], cases: &[Case], options: &Options) -> Result<Ve
         if frames.is_empty() {
             return Err(anyhow!("scene {}: no frame is shipped for {}", scene.name, scene.sensor));
         }
-        for &case in cases {
+        let network = scene.for_hardware().estimator() == EstimatorKind::Network;
+        for &case in cases.iter().filter(|case| !network || **case == Case::WHOLE) {
             let mut scene = scene.clone();
             (scene.partition.case, scene.partition.condition) = (case, options.condition);
             let largest = match case {
@@ -106,9 +108,10 @@ fn bit_true(model: Model, frames: &[Frame], options: &Options) -> Result<BitTrue
     Ok(bit_true)
 }
 
-/// The quick variant co-simulates the two scenes of `make run`.
+/// The quick variant co-simulates the scenes of `make run`.
 fn is_simulated(scene: &Scene, options: &Options) -> bool {
-    let first = scene.partition.case == Case::WHOLE && ["sensor-1", "eight-by-eight"].contains(&scene.name.as_str());
+    let first = scene.partition.case == Case::WHOLE
+        && ["sensor-1", "sensor-1-noisy", "eight-by-eight"].contains(&scene.name.as_str());
     options.simulate && (!options.quick || first)
 }
 

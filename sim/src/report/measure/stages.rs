@@ -10,6 +10,7 @@
 //! | normalise, fold | b, its parities | LSB of `receive` / 2^s = c |
 //! | pass | parities of Cz⁺b; of v_ij (4/3 mu_max)^(i+j) | c 2^(raw_shift − inverse_exponent) = a; a 2^(r + 4 − a_exponent) |
 //! | rescale | the same | a 2^r = w |
+//! | relax | p after each step at the μ of the network | w |
 //! | unfold | v_ij (mu_max/3)^(i+j) per taxel | w/4 |
 //! | search | the golden model's μ | mu_max/384 |
 //! | forces | p at the bit-true model's μ | w/4 |
@@ -25,7 +26,7 @@ use dermis_golden::fixed::stages::pass::join_limbs;
 use dermis_golden::fixed::stages::send::{Status, STATUS_BEATS};
 use dermis_golden::fixed::words::arith::bit_length;
 use dermis_golden::fixed::words::formats::{Formats, MU_STEPS, SEARCH_EXTRA_BITS};
-use dermis_golden::fixed::words::schedule::{by_limbs, is_transposed, schedule, EXPONENTS};
+use dermis_golden::fixed::words::schedule::{by_limbs, is_transposed, schedule, vectors, EXPONENTS};
 use dermis_golden::float::pass::Polynomial;
 use dermis_golden::reception::full_scale;
 use dermis_golden::symmetry::parity::hadamard;
@@ -98,6 +99,7 @@ pub fn stages(measured: &Measured, index: usize) -> Vec<StageRow> {
         ("fold", f.fold_bits, 0),
         ("pass", accumulator, 0),
         ("rescale", f.vector_bits, sum(|status| status.rescale_saturations)),
+        ("relax", f.vector_bits, 0),
         ("unfold", f.vector_bits + 2, 0),
         ("search", bit_length(MU_STEPS as u64) + 1, 0),
         ("forces", f.search_bits[0], 0),
@@ -253,6 +255,9 @@ impl<'a> FloatReference<'a> {
             }
             _ => {}
         }
+        if f.has_network() {
+            return self.relaxed(stage, part, [raw, word]);
+        }
         let scale = 4.0 / 3.0 * scene.search.mu_max;
         let mut all = Vec::new();
         for (k, products) in schedule(f).iter().enumerate() {
@@ -281,6 +286,34 @@ impl<'a> FloatReference<'a> {
     }
 }
 
+impl FloatReference<'_> {
+    /// The same for the steps of `relax`: v_00, then p or the products that are added to v_00; `raw` and `word` are LSBs.
+    fn relaxed(&self, stage: &str, part: usize, [raw, word]: [f64; 2]) -> Vec<([f64; 4], f64)> {
+        let (f, layout) = (self.formats(), self.bit_true.model.layout());
+        let step = self.measured.scene.search.mu_max / MU_STEPS as f64;
+        let mu = self.status[part].position.map(|position| f64::from(position) * step);
+        // After so many steps p has the terms up to that degree.
+        let after = |degree: usize| {
+            let coefficients = self.families[part].coefficients[..vectors(degree)].to_vec();
+            Polynomial { degree, coefficients }.eval(mu)
+        };
+        let first = after(0);
+        let of_step = |steps: usize| {
+            let product = steps > 0 && matches!(stage, "pass" | "rescale");
+            let p = after(steps).into_iter().zip(&first).map(|(p, first)| if product { p - first } else { p });
+            let lsb = match stage {
+                "pass" if steps == 0 => raw,
+                "pass" => word * 2f64.powi(SEARCH_EXTRA_BITS as i32 - f.a_exponent),
+                "unfold" => word / 4.0,
+                _ => word,
+            };
+            let quads = layout.pack(&p.collect::<Vec<_>>());
+            quads.into_iter().map(move |quad| in_lsb(if stage == "unfold" { quad } else { hadamard(quad) }, lsb))
+        };
+        (0..=f.degree).flat_map(of_step).collect()
+    }
+}
+
 /// Converts a quad to LSBs; returns it with the LSB.
 fn in_lsb(quad: [f64; 4], lsb: f64) -> ([f64; 4], f64) {
     (quad.map(|value| value / lsb), lsb)
@@ -306,7 +339,8 @@ mod tests {
         };
         let cases = |numbers: &[i64]| numbers.iter().filter_map(|n| Case::numbered(*n)).collect::<Vec<_>>();
         let scenes = |names: &[&str]| names.iter().map(|name| Scene::builtin(name).unwrap()).collect::<Vec<_>>();
-        let mut measured = measure(&scenes(&["sensor-1", "eight-by-eight"]), &cases(&[0, 1, 3]), &options).unwrap();
+        let mut measured =
+            measure(&scenes(&["sensor-1", "sensor-1-noisy", "eight-by-eight"]), &cases(&[0, 1, 3]), &options).unwrap();
         measured.extend(measure(&scenes(&["sensor-4"]), &cases(&[1]), &options).unwrap());
         // sensor-4 fits the board in case 1, where Ay is Ax transposed.
         let rows: Vec<StageRow> = measured.iter().flat_map(|measured| stages(measured, 0)).collect();
