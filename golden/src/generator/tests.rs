@@ -144,7 +144,7 @@ fn refusals_name_contact_field_and_value() {
         (Contact { size_mm: vec![], ..good.clone() }, "size_mm = [] is not allowed; it must be [a]"),
         (Contact { size_mm: vec![f64::NAN], ..good.clone() }, "size_mm = [NaN]"),
         (Contact { shape: text("ring"), size_mm: vec![2.0, 3.0], ..good.clone() }, "below outer"),
-        (Contact { normal_N: Some(-1.0), ..good.clone() }, "normal_N = Some(-1.0)"),
+        (Contact { normal_N: Some(-1.0), ..good.clone() }, "normal_N = -1 is"),
         (Contact { centre_mm: Some([f64::INFINITY, 0.0]), ..good.clone() }, "centre_mm"),
         (Contact { centre_mm: Some([500.0, 0.0]), ..good.clone() }, "centre_mm"),
         (Contact { kind_of_slip: text("stick"), ..good.clone() }, "kind_of_slip = \"stick\""),

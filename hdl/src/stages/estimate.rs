@@ -43,9 +43,10 @@ pub struct Estimate {
     pub operands_valid: Signal<Out, Bit>,
     /// Position of μ1 in mu_max/384, signed; valid from the last `operands_valid` until the next `start`.
     pub position_x: Wire<Out>,
-    /// Position of μ2, as `position_x`.
+    /// Position of μ2 in mu_max/384, signed; valid as `position_x`.
     pub position_y: Wire<Out>,
-    /// ln of the standard deviation of μ1 over mu_max in the lower half, of μ2 in the upper, signed, in 1/384; as `position_x`.
+    /// ln of the standard deviation of μ1 over mu_max in the lower half, of μ2 in the upper, signed, in 1/384; valid as
+    /// `position_x`.
     pub ln_sigma: Wire<Out>,
     /// Number of saturated images and outputs of this subarray, 16 bits, stays at the largest count; final with μ.
     pub saturations: Wire<Out>,

@@ -35,9 +35,9 @@ pub struct Pass {
     pub vector_quad: Wire<In>,
     /// `vector_quad` holds a quad.
     pub vector_valid: Signal<In, Bit>,
-    /// Position of μ1 in mu_max/384, signed; valid from the quad of operands that says so, with a network.
+    /// Position of μ1 in mu_max/384, signed, with a network; valid from the quad of operands that says so.
     pub position_x: Wire<In>,
-    /// Position of μ2, as `position_x`.
+    /// Position of μ2 in mu_max/384, signed, with a network; valid as `position_x`.
     pub position_y: Wire<In>,
     /// Accumulators of one row for the four parities, `lane_bits` each, signed; valid with `quad_valid`.
     pub quad: Wire<Out>,

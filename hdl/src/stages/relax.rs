@@ -25,7 +25,7 @@ pub struct Relax {
     pub words: Wire<In>,
     /// `words` holds a quad.
     pub words_valid: Signal<In, Bit>,
-    /// The same, `data_bits` each; valid with `short_valid`. Read without a network only.
+    /// The same, `data_bits` each, which passes on without a network; valid with `short_valid`.
     pub short: Wire<In>,
     /// `short` holds a quad.
     pub short_valid: Signal<In, Bit>,
@@ -33,9 +33,9 @@ pub struct Relax {
     pub images: Wire<In>,
     /// `images` holds a quad; never together with one of the own operands.
     pub images_valid: Signal<In, Bit>,
-    /// Saturations of `rescale` in this subarray.
+    /// Saturations of `rescale` in this subarray; taken in every cycle.
     pub rescaled: Wire<In>,
-    /// Saturations of `estimate` in this subarray.
+    /// Saturations of `estimate` in this subarray; taken in every cycle.
     pub estimated: Wire<In>,
     /// Four parities of p, or of v_ij, `vector_bits` each, signed; valid with `sums_valid`.
     pub sums: Wire<Out>,
