@@ -15,7 +15,7 @@
 
 use std::borrow::Cow;
 
-use super::relax;
+use crate::fixed::words::arith::round_shift;
 use crate::fixed::words::formats::Formats;
 use crate::fixed::words::network::ONE;
 use crate::fixed::words::quantised::{coefficient, Quantised};
@@ -62,14 +62,22 @@ impl Operands {
             Operand::Layer(index) => &self.layers[index],
             Operand::One => return Cow::Owned(vec![[ONE; 4]]),
         };
-        let scaled = |axis: usize| quads.iter().map(|&quad| relax::scaled(quad, self.position[axis])).collect();
+        let of_axis = |axis: usize| quads.iter().map(|&quad| scaled(quad, self.position[axis])).collect();
         match product.factor {
-            Some(Axis::X) => Cow::Owned(scaled(0)),
-            Some(Axis::Y) => Cow::Owned(scaled(1)),
+            Some(Axis::X) => Cow::Owned(of_axis(0)),
+            Some(Axis::Y) => Cow::Owned(of_axis(1)),
             None if product.transposed => Cow::Owned(transpose(layout, quads)),
             None => Cow::Borrowed(quads),
         }
     }
+}
+
+/// Right shift of an operand times a position.
+pub const POSITION_SHIFT: u32 = 9;
+
+/// An operand times μ.
+pub fn scaled(quad: [i64; 4], position: i64) -> [i64; 4] {
+    quad.map(|word| round_shift(word * position, POSITION_SHIFT))
 }
 
 /// Adds up the `products` of one accumulation without a shift: one accumulator per row and parity, in order.
@@ -121,4 +129,16 @@ pub fn transpose(layout: Quads, quads: &[[i64; 4]]) -> Vector {
 /// A quad with its two mirrors exchanged.
 pub fn swap([a, b, c, d]: [i64; 4]) -> [i64; 4] {
     [a, c, b, d]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_operand_is_scaled_by_the_position() {
+        // 384/512 of the word, half up.
+        assert_eq!(scaled([512, -512, 3, -2], 384), [384, -384, 2, -1]);
+        assert_eq!(scaled([131_071, 1, 0, 0], -384), [-98_303, -1, 0, 0]);
+    }
 }

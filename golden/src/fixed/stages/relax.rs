@@ -8,16 +8,8 @@
 
 use super::pass::Vector;
 use super::rescale::operand;
-use crate::fixed::words::arith::{round_shift, saturate};
+use crate::fixed::words::arith::saturate;
 use crate::fixed::words::formats::Formats;
-
-/// Right shift of an operand times a position.
-pub const POSITION_SHIFT: u32 = 9;
-
-/// An operand times μ.
-pub fn scaled(quad: [i64; 4], position: i64) -> [i64; 4] {
-    quad.map(|word| round_shift(word * position, POSITION_SHIFT))
-}
 
 /// The sum of v_00 and the rescaled products of a step, its operands, and the number of words that saturated.
 pub fn relax(formats: &Formats, first: &[[i64; 4]], products: &[[i64; 4]]) -> (Vector, Vector, u32) {
@@ -40,11 +32,16 @@ pub fn relax(formats: &Formats, first: &[[i64; 4]], products: &[[i64; 4]]) -> (V
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::fixed::words::arith::range;
 
     #[test]
-    fn an_operand_is_scaled_by_the_position() {
-        // 384/512 of the word, half up.
-        assert_eq!(scaled([512, -512, 3, -2], 384), [384, -384, 2, -1]);
-        assert_eq!(scaled([131_071, 1, 0, 0], -384), [-98_303, -1, 0, 0]);
+    fn sums_saturate_and_are_counted() {
+        let model = crate::fixed::Model::new(&crate::scene::Scene::builtin("sensor-1-noisy").unwrap()).unwrap();
+        let formats = model.formats();
+        let (least, most) = range(formats.vector_bits);
+        let (sums, operands, saturations) = relax(formats, &[[most, least, 32, -7]], &[[1, -1, 15, 7]]);
+        assert_eq!((sums, saturations), (vec![[most, least, 47, 0]], 2));
+        // Sixteen of a word's LSBs, rounded; the largest word would round beyond the operand.
+        assert_eq!(operands, [[range(formats.data_bits).1, range(formats.data_bits).0, 3, 0]]);
     }
 }

@@ -26,7 +26,6 @@
 use serde::Serialize;
 
 use super::coefficients::Flips;
-use super::schedule::vectors;
 use crate::symmetry::quads::Quads;
 
 /// Operand width of the multipliers in bits; a board with narrower multipliers has its own.
@@ -121,6 +120,11 @@ pub struct Formats {
     pub mu_step: i64,
     /// LSB of a force word is 2^`force_exponent` · code LSB in MPa · 1 N/MPa.
     pub force_exponent: i32,
+}
+
+/// Number of v_ij for a polynomial of `degree`.
+pub fn vectors(degree: usize) -> usize {
+    (degree + 1) * (degree + 2) / 2
 }
 
 fn is_zero(count: &u32) -> bool {

@@ -13,16 +13,12 @@
 //! its bias, then the steps of [`relax`](crate::fixed::stages::relax), whose operands are multiplied by μ1 or μ2.
 
 use super::coefficients::Flips;
+pub use super::formats::vectors;
 use super::formats::Formats;
 
 /// (i, j) of the v_ij up to degree 3, in order of computation.
 pub const EXPONENTS: [(u32, u32); 10] =
     [(0, 0), (1, 0), (0, 1), (2, 0), (1, 1), (0, 2), (3, 0), (2, 1), (1, 2), (0, 3)];
-
-/// Number of v_ij for a polynomial of `degree`.
-pub fn vectors(degree: usize) -> usize {
-    (degree + 1) * (degree + 2) / 2
-}
 
 /// Contents of a matrix in the coefficient memory.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -1,6 +1,6 @@
 //! Operands of the MAC lanes times μ, for the steps of `relax`.
 
-use dermis_golden::fixed::stages::relax::POSITION_SHIFT;
+use dermis_golden::fixed::stages::pass::POSITION_SHIFT;
 use dermis_golden::fixed::words::formats::MULTIPLIER_BITS;
 use rust_hdl::prelude::*;
 
@@ -84,7 +84,7 @@ fn kernel(wanted: bool) -> Kernel {
 
 #[cfg(test)]
 mod tests {
-    use dermis_golden::fixed::stages::relax::scaled;
+    use dermis_golden::fixed::stages::pass::scaled;
 
     use super::*;
     use crate::language::testbench::{check, Pipeline};
