@@ -109,7 +109,7 @@ impl Estimate {
         Estimate { found, load_N: None, sigma: Some(sigma) }
     }
 
-    /// Standard deviation of the shear over its size, if σ is known. Below [`NO_SHEAR`] a shear counts as none, and its
+    /// Standard deviation of the shear over its size, if σ is known. Below 0.01 a shear counts as none, and its
     /// standard deviation is taken over that.
     pub fn shear_spread(&self) -> Option<f64> {
         let [x, y] = self.found.mu;
