@@ -152,7 +152,7 @@ fn refusals_name_contact_field_and_value() {
             Contact { kind_of_slip: text("none"), tangential_N: Some([1.0, 0.0]), ..good.clone() },
             "tangential_N = [1.0, 0.0]",
         ),
-        (Contact { kind_of_slip: text("partial-slip"), ..good.clone() }, "friction = None"),
+        (Contact { kind_of_slip: text("partial-slip"), ..good.clone() }, "friction = none is"),
         (
             Contact { shape: text("flat-punch"), kind_of_slip: text("partial-slip"), ..good.clone() },
             "full-sliding but for Hertz",
