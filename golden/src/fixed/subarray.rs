@@ -157,16 +157,15 @@ fn ask(
     estimated: &mut QuadStream,
 ) -> Estimate {
     let mut saturations = 0;
-    for index in 0..network.layers.len() - 1 {
-        let rows = pass(formats, quantised, layout, &layer(index), operands);
-        let (next, clipped) = images(formats, network.shift, &rows);
+    for (index, rows) in formats.hidden_rows().enumerate() {
+        let accumulators = pass(formats, quantised, layout, &layer(index), operands);
+        let (next, clipped) = images(formats, network.shift, &accumulators);
         saturations += clipped;
-        let lanes = formats.lanes_per_parity;
         estimated.extend(&next);
-        estimated.extend(vec![[0; 4]; next.len().next_multiple_of(lanes) - next.len()]);
+        estimated.extend(vec![[0; 4]; rows - next.len()]);
         operands.layers.push(next);
     }
-    let rows = pass(formats, quantised, layout, &layer(network.layers.len() - 1), operands);
+    let rows = pass(formats, quantised, layout, &layer(formats.layers.len() - 1), operands);
     let told = estimate(network.shift, &rows);
     Estimate { saturations: saturations + told.saturations, ..told }
 }

@@ -5,7 +5,7 @@
 
 use super::forces::threshold;
 use super::golden::{CaseOutcome, EngineInput, Golden};
-use super::objective::NO_SHEAR;
+use super::objective::relative_spread;
 use crate::checks::COUNTS_FROM;
 use crate::evidence::{ContactEstimate, Evidence};
 use crate::frame::Frame;
@@ -38,7 +38,7 @@ fn shear_spread(contacts: &[ContactEstimate]) -> Option<f64> {
     let total: f64 = contacts.iter().map(|contact| contact.force_N[2]).sum();
     let spread = |contact: &ContactEstimate| {
         let ([x, y, normal], [sx, sy, _]) = (contact.force_N, contact.sigma_N);
-        sx.hypot(sy) / x.hypot(y).max(NO_SHEAR * normal)
+        relative_spread([x, y], [sx, sy], normal)
     };
     let counts = contacts.iter().filter(|contact| contact.force_N[2] >= COUNTS_FROM * total);
     counts.map(spread).filter(|spread| spread.is_finite()).reduce(f64::max)

@@ -31,7 +31,7 @@ pub(crate) mod taxels;
 
 pub use auto::Auto;
 pub use compressive::Compressive;
-pub(crate) use estimate::NO_SHEAR;
+pub(crate) use estimate::relative_spread;
 pub use estimate::{Estimate, Objective, SearchInput};
 pub(crate) use fit::misfit_limit;
 pub use patch::Patch;

@@ -16,7 +16,7 @@ use rust_hdl::prelude::*;
 
 use crate::kernel_block;
 use crate::language::{concat, Body, Builder, Expr, Kernel, Net, Type};
-use crate::primitives::{count_bits, hadamard, position_bits, saturating_sum, SATURATION_BITS};
+use crate::primitives::{count_bits, count_saturations, hadamard, position_bits, SATURATION_BITS};
 use crate::wire::Wire;
 
 /// Rows of accumulators in; operands of the hidden layers four cycles later; μ and its σ after the second row of the last
@@ -84,16 +84,13 @@ impl Estimate {
     /// For the network of `model`.
     pub fn new(model: &Model) -> Self {
         let formats = model.formats();
-        let hidden = || -> usize {
-            let (_, hidden) = formats.layers.split_last().unwrap_or((&0, &[]));
-            hidden.iter().map(|rows| rows.next_multiple_of(formats.lanes_per_parity)).sum()
-        };
         let network = model.quantised().network.as_ref();
         Estimate::of(Shape {
             lane_bits: formats.lane_bits as usize,
             data_bits: formats.data_bits as usize,
             score_bits: formats.score_bits as usize,
-            network: network.map(|network| Layers { hidden: hidden(), shift: network.shift as usize }),
+            network: network
+                .map(|network| Layers { hidden: formats.hidden_rows().sum(), shift: network.shift as usize }),
         })
     }
 
@@ -216,10 +213,7 @@ impl Shape {
             valid2.mux(concat(&[0, 1, 2, 3].map(|lane: usize| images[lane].1)), k.constant(4, 0)),
         );
         let output_clips = k.delay("output_clips", concat(&[0, 1, 2, 3].map(|place: usize| outputs[place].1)));
-        let clips = image_clips | output_clips;
-        let clips = k.delay("clips", (clips.at(0) + clips.at(1)) + (clips.at(2) + clips.at(3)));
-        let saturations = k.state("saturations", Type::unsigned(SATURATION_BITS), start, 0);
-        saturations.set(saturating_sum(&k, "count", *saturations, clips));
+        count_saturations(&k, "saturations", start, image_clips | output_clips);
         k.finish()
     }
 

@@ -225,7 +225,7 @@ mod tests {
         let layers = case.formats.layers.len();
         for (accumulation, (target, products)) in accumulations(&case.formats).iter().enumerate() {
             let layer = matches!(target, Target::Layer(_));
-            for group in 0..case.storage.groups_of(products[0].matrix) {
+            for group in 0..case.storage.groups_of(products) {
                 for product in products {
                     let needs = match product.operand {
                         Operand::Vector(index) => index + layers + 1,

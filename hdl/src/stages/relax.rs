@@ -8,7 +8,7 @@ use rust_hdl::prelude::*;
 
 use crate::kernel_block;
 use crate::language::{concat, Body, Builder, Contents, Expr, Kernel, Type};
-use crate::primitives::{count_bits, operand_of, saturating_sum, SATURATION_BITS};
+use crate::primitives::{count_bits, count_saturations, operand_of, saturating_sum, SATURATION_BITS};
 use crate::wire::Wire;
 
 /// Words of `rescale` in, the first Q of a subarray v_00; their sums with v_00 three cycles later, the operands four. Those of
@@ -160,12 +160,9 @@ impl Shape {
         k.wire("operands_valid", own_valid | images_valid);
 
         let clipped3 = k.delay("clipped3", valid2.mux(clipped, k.constant(4, 0)));
-        let clips = (clipped3.at(0) + clipped3.at(1)) + (clipped3.at(2) + clipped3.at(3));
-        let clips = k.delay("clips", clips);
-        let relaxed = k.state("relaxed", Type::unsigned(SATURATION_BITS), start, 0);
-        relaxed.set(saturating_sum(&k, "count", *relaxed, clips));
+        let relaxed = count_saturations(&k, "relaxed", start, clipped3);
         let others = k.delay("others", saturating_sum(&k, "all_others", rescaled, estimated));
-        k.delay("saturations", saturating_sum(&k, "total", others, *relaxed));
+        k.delay("saturations", saturating_sum(&k, "total", others, relaxed));
         k.finish()
     }
 }

@@ -45,7 +45,7 @@ pub fn read_addresses(case: &CasePlan) -> Vec<usize> {
         first..first + storage.columns_of(matrix, group).len()
     };
     let steps = accumulations(formats).into_iter().flat_map(|(_, products)| {
-        let groups = products.first().map_or(0, |product| storage.groups_of(product.matrix));
+        let groups = storage.groups_of(&products);
         (0..groups).flat_map(move |group| products.clone().into_iter().map(move |p| (p.matrix, group)))
     });
     steps.flat_map(|(matrix, group)| of(matrix, group)).collect()

@@ -134,7 +134,7 @@ impl Plan {
 
     /// Whether the hardware has a μ search: `search.mu_max` is above 0, and no network gives μ.
     pub fn searches(&self) -> bool {
-        self.formats().degree > 0 && !self.has_network()
+        self.formats().searches()
     }
 
     /// Whether a network gives μ.

@@ -276,7 +276,7 @@ fn timeline(formats: &Formats, storage: &Storage) -> Timeline {
     let mut last_row = 0;
     for (target, products) in &accumulations(formats) {
         // Rows of all groups but the last, where the rows of a vector end with the last quad.
-        let groups = products.first().map_or(0, |product| storage.groups_of(product.matrix));
+        let groups = storage.groups_of(products);
         let last_rows = match target {
             Target::Vector(_) => quads - (groups as u64 - 1) * per_parity,
             Target::Layer(_) => per_parity,

@@ -162,14 +162,11 @@ pub fn position_bits() -> usize {
 /// a network v_00, the images of each hidden layer, one quad when μ is known, then p after each step but the last.
 pub fn operand_lengths(formats: &Formats) -> Vec<usize> {
     let vectors = vec![formats.quads; formats.operand_vectors()];
-    match formats.layers.split_last() {
-        None => vectors,
-        Some((_, hidden)) => {
-            let lanes = formats.lanes_per_parity;
-            // The rows of whole groups are written.
-            let images = hidden.iter().map(|rows| rows.div_ceil(lanes) * lanes);
-            vectors[..1].iter().copied().chain(images).chain([1]).chain(vectors[1..].iter().copied()).collect()
+    match (formats.has_network(), vectors.split_first()) {
+        (true, Some((&first, steps))) => {
+            [first].into_iter().chain(formats.hidden_rows()).chain([1]).chain(steps.iter().copied()).collect()
         }
+        _ => vectors,
     }
 }
 
@@ -236,7 +233,7 @@ impl Resources {
         if f.has_network() {
             memories.push(memory(Holds::First, quads, quad(f.vector_bits)));
         }
-        let searches = f.degree > 0 && !f.has_network();
+        let searches = f.searches();
         for (k, &bits) in f.search_bits.iter().enumerate().filter(|_| searches) {
             memories.push(memory(Holds::Polynomials(k), SEARCH_BUFFERS * quads, quad(bits)));
             if overlaps {

@@ -153,9 +153,10 @@ impl Storage {
         lead
     }
 
-    /// Number of groups of rows of a matrix.
-    pub fn groups_of(&self, matrix: Matrix) -> usize {
-        self.matrices.iter().position(|&m| m == matrix).map_or(0, |index| self.columns[index].len())
+    /// Number of groups of rows of an accumulation, the same for the matrices of all its products.
+    pub fn groups_of(&self, products: &[Product]) -> usize {
+        let index = products.first().and_then(|product| self.matrices.iter().position(|&m| m == product.matrix));
+        index.map_or(0, |index| self.columns[index].len())
     }
 
     /// The kept columns of a matrix for a group of rows, ascending.

@@ -137,6 +137,17 @@ impl Formats {
         !self.layers.is_empty()
     }
 
+    /// Whether μ is searched: the polynomial has a degree, and no network gives μ.
+    pub fn searches(&self) -> bool {
+        self.degree > 0 && !self.has_network()
+    }
+
+    /// Rows that leave the lanes for each hidden layer of the network: those of whole groups.
+    pub fn hidden_rows(&self) -> impl Iterator<Item = usize> + '_ {
+        let hidden = self.layers.split_last().map_or(&[][..], |(_, hidden)| hidden);
+        hidden.iter().map(|rows| rows.next_multiple_of(self.lanes_per_parity))
+    }
+
     /// Number of vectors that leave `rescale`: v_00, then the other v_ij of the polynomial, or with a network a product
     /// for each step of `relax`.
     pub fn vectors(&self) -> usize {

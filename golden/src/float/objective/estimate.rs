@@ -56,7 +56,13 @@ const RIM: f64 = 1.05;
 pub(super) const WIDE_FROM: f64 = 2.5;
 
 /// Ratio to the normal force below which a shear counts as none.
-pub(crate) const NO_SHEAR: f64 = 0.01;
+const NO_SHEAR: f64 = 0.01;
+
+/// Standard deviation `sigma` of the shear, [x, y], over its size. Below 0.01 of `normal` a shear counts as none, and its
+/// standard deviation is taken over that.
+pub(crate) fn relative_spread(shear: [f64; 2], sigma: [f64; 2], normal: f64) -> f64 {
+    sigma[0].hypot(sigma[1]) / shear[0].hypot(shear[1]).max(NO_SHEAR * normal)
+}
 
 /// Fraction of the largest p₀ that a taxel must exceed to count for the centre.
 const COUNTS_FROM: f64 = 0.3;
@@ -109,11 +115,9 @@ impl Estimate {
         Estimate { found, load_N: None, sigma: Some(sigma) }
     }
 
-    /// Standard deviation of the shear over its size, if σ is known. Below 0.01 a shear counts as none, and its
-    /// standard deviation is taken over that.
+    /// Standard deviation of the shear over its size, that of a hundredth of the normal force at least, if σ is known.
     pub fn shear_spread(&self) -> Option<f64> {
-        let [x, y] = self.found.mu;
-        self.sigma.map(|[sx, sy]| sx.hypot(sy) / x.hypot(y).max(NO_SHEAR))
+        self.sigma.map(|sigma| relative_spread(self.found.mu, sigma, 1.0))
     }
 
     /// Root mean square of the misfit over what the noise and the fit's own error explain, for the estimate of a fit;

@@ -115,10 +115,7 @@ impl Shape {
         k.wire("operands", operands);
 
         let clipped3 = k.delay("clipped3", valid2.mux(clipped, k.constant(4, 0)));
-        let clips = (clipped3.at(0) + clipped3.at(1)) + (clipped3.at(2) + clipped3.at(3));
-        let clips = k.delay("clips", clips);
-        let saturations = k.state("saturations", Type::unsigned(SATURATION_BITS), clear, 0);
-        saturations.set(saturating_sum(&k, "count", *saturations, clips));
+        count_saturations(&k, "saturations", clear, clipped3);
         k.finish()
     }
 
@@ -143,6 +140,14 @@ pub fn operand_of<'k>(k: &'k Builder, word: Expr<'k>, data: usize) -> Expr<'k> {
     let overflow = k.wire("overflow", operand.top().differs(operand.at(data - 1)));
     let most = k.constant(data, (1 << (data - 1)) - 1);
     k.delay("operand", overflow.mux(most, operand.low(data)))
+}
+
+/// State `name`: the number of bits of `clipped`, four in each cycle, that were 1 since `clear`; two cycles later.
+pub fn count_saturations<'k>(k: &'k Builder, name: &str, clear: Expr<'k>, clipped: Expr<'k>) -> Expr<'k> {
+    let clips = k.delay("clips", (clipped.at(0) + clipped.at(1)) + (clipped.at(2) + clipped.at(3)));
+    let count = k.state(name, Type::unsigned(SATURATION_BITS), clear, 0);
+    count.set(saturating_sum(k, "count", *count, clips));
+    *count
 }
 
 /// Sum of two counts of saturations, the largest count where it is larger.

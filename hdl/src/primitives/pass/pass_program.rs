@@ -49,8 +49,7 @@ pub fn unroll(case: &CasePlan) -> Vec<Step> {
     let first = |number: usize| lengths[..number].iter().sum::<usize>();
     let mut steps = Vec::new();
     for (target, products) in accumulations(formats) {
-        let groups = products.first().map_or(0, |product| storage.groups_of(product.matrix));
-        for group in 0..groups {
+        for group in 0..storage.groups_of(&products) {
             for (index, product) in products.iter().enumerate() {
                 let (kind, operand, needs) = match (product.operand, target) {
                     (Operand::Vector(k), _) => (0, first(number(k)), number(k).max(network) + 1),
