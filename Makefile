@@ -92,7 +92,8 @@ fuzz: ## run 10^7 mutated inputs through the file readers, 10^5 frames through b
 stress: ## stress the streams: 4*10^6 cycles each of stalls, wrong tlast and resets
 	DERMIS_STRESS_CYCLES=4000000 $(CARGO) test --release -p dermis-tests --test integration -- streams:: --nocapture
 
-nightly: netlist fuzz stress ## run the long variants of the tests, one after the other
+nightly: fuzz ## run all variants of the tests, those too that `make test` leaves out
+	DERMIS_NIGHTLY=1 DERMIS_STRESS_CYCLES=4000000 $(CARGO) test --release -p dermis-tests --test integration -- --include-ignored
 
 train: program ## train the network of SCENE for search.estimator = "learned" (a quarter of an hour)
 	mkdir -p $(BUILD)

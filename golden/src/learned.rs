@@ -56,7 +56,10 @@ use std::path::Path;
 const LARGEST_FILE: u64 = 64 << 20;
 
 /// Networks that are part of the program: `search.network` without its folder, and bytes.
-const SHIPPED: [(&str, &[u8]); 1] = [("dermis:sensor-1", include_bytes!("../scenes/sensor-1.network"))];
+const SHIPPED: [(&str, &[u8]); 2] = [
+    ("dermis:sensor-1", include_bytes!("../scenes/sensor-1.network")),
+    ("dermis:sensor-1-unipolar", include_bytes!("../scenes/sensor-1-unipolar.network")),
+];
 
 /// A trained network, ready for the array of a scene.
 pub struct Learned {

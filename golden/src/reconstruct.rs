@@ -49,6 +49,9 @@ pub struct SubarrayResult {
     pub tension_centroid_mm: Option<[f64; 2]>,
     /// Ratio of shear to normal force, [x, y]; 0 if not searched.
     pub mu: [f64; 2],
+    /// Standard deviation of μ, [x, y]; absent where the estimator gives none.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub mu_sigma: Option<[f64; 2]>,
     /// The objective at μ; `None` if no search was made or no candidate was admissible.
     pub objective_value: Option<f64>,
 }
@@ -149,6 +152,7 @@ impl SubarrayResult {
             compression_centroid_mm: received.compression_centroid_mm,
             tension_centroid_mm: received.tension_centroid_mm,
             mu,
+            mu_sigma: None,
             objective_value,
         }
     }

@@ -13,7 +13,7 @@
 //! | | `condition` ("loaded"; "both-signs") |
 //! | `[search]` | `objective` ("sparse"; …), `mu_max` (0.6; 0, or 0.001 … 2), `noise_floor_MPa` (0) |
 //! | | `form` ("oblique"; "orthogonal"), `estimator` ("auto"; "evidence", "learned", "search"), `degree` (none; 1 … 8) |
-//! | | `network` (none; a file, or "dermis:sensor-1") |
+//! | | `network` (none; a file, or "dermis:sensor-1", "dermis:sensor-1-unipolar") |
 //! | `[inverse]` | `kind` ("tsvd"; "tikhonov", "exact"), `level` (floor of format and noise; 0 … 1, both excluded) |
 //! | `[threshold]` | `min_force_N` (0) |
 //! | `[fixed]` | `input_bits` (20; 8 … 24), `data_bits` (18; 12 … 18), `coef_bits` (18; 8 … 18) |

@@ -111,6 +111,14 @@ pub fn assert_equal(findings: &Findings, what: impl Display) {
     assert!(findings.is_equal(), "{what}: {} {first:#?}", findings.count);
 }
 
+/// The variants that a test takes: all of them in `make nightly`, which sets `DERMIS_NIGHTLY`, else the first `few`.
+pub fn variants<T>(all: &[T], few: usize) -> &[T] {
+    match std::env::var_os("DERMIS_NIGHTLY") {
+        Some(_) => all,
+        None => &all[..few.min(all.len())],
+    }
+}
+
 /// Number of trials of a test: the value of an environment variable, else the default of a normal run.
 ///
 /// # Panics

@@ -102,7 +102,8 @@ impl Model {
                 Some(estimate) => Some(estimate.found.objective),
                 None => found.then(|| -f64::from(status.score) / f64::from(1u32 << LOG_FRACTION)),
             };
-            subarrays.push(SubarrayResult::new(part, &received, mu, score));
+            let mu_sigma = estimate.and_then(|estimate| estimate.sigma);
+            subarrays.push(SubarrayResult { mu_sigma, ..SubarrayResult::new(part, &received, mu, score) });
         }
         let mut result = assemble(&self.scene, frame, engine, subarrays, forces, flags);
         if self.sends_resultants() {

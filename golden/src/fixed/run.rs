@@ -9,7 +9,7 @@ use super::plan::cycles::{BeatCycles, Cycles};
 use super::stages::choose;
 use super::stages::forces::Force;
 use super::stages::prepare::Prepared;
-use super::stages::receive::mask_dead;
+use super::stages::receive::mask;
 use super::stages::resultants::{self, sums};
 use super::stages::search::Best;
 use super::stages::send::{Status, CASE_SHIFT, FLAG_CONDITION, FLAG_FOUND, FLAG_NO_CONTACT, FRAMES_SHIFT};
@@ -53,7 +53,7 @@ impl Model {
 
     /// Computes one reconstruction from the words of the frame buffer.
     pub fn run_prepared(&self, prepared: &Prepared) -> Trace {
-        let codes = &mask_dead(&prepared.words, &self.dead);
+        let codes = &mask(&prepared.words, &self.dead, self.scene.input.unipolar);
         let chosen = self.choose(codes);
         let case = &self.cases()[chosen];
         let sensor = &self.scene.sensor;

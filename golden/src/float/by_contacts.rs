@@ -10,14 +10,18 @@
 //! | out: forces | 3 × n | N |
 //! | out: regions | μ, centre, load, taxels | –, mm, N |
 
+use super::contacts::by_network::Told;
 use super::contacts::{Contacts, MeasuredStress, Solver};
 use super::forces::threshold;
-use super::golden::{EngineInput, Golden};
-use super::objective::{Objective, Sparse};
+use super::golden::{CaseOutcome, EngineInput, Golden};
+use super::objective::Objective;
+use super::objective::{relative_spread, Sparse};
 use super::pass::Polynomial;
 use super::search::search;
 use super::segment::Segments;
+use crate::checks::COUNTS_FROM;
 use crate::frame::{Forces, Frame};
+use crate::learned::Learned;
 use crate::reconstruct::{Reconstruction, Region};
 use crate::scene::Condition;
 use crate::sensor::Sensor;
@@ -36,6 +40,16 @@ impl Golden {
         Some(solver.solve(&family, found))
     }
 
+    /// The contacts of a frame with the μ that the network knows.
+    fn ask_contacts(&self, network: &Learned, input: &EngineInput) -> Told {
+        let (scene, matrices) = (&self.scene, self.matrices());
+        let family = Polynomial::of_degree(matrices, input.stress_MPa, 0);
+        let (mu_max, p0) = (scene.search.mu_max, family.v(0, 0));
+        let searched = |segments: &Segments, region: usize| self.meets_condition(input, segments, region);
+        let solver = Solver { matrices, mu_max, objective: &Sparse::default(), p0, stress: None, searched: &searched };
+        solver.by_network(network, input.stress_MPa, &scene.input.alive(&scene.sensor))
+    }
+
     /// Whether the taxels of a region meet the scene's condition.
     fn meets_condition(&self, input: &EngineInput, segments: &Segments, region: usize) -> bool {
         let own = || (0..input.codes.len()).filter(move |&k| segments.labels[k] == region).map(|k| input.codes[k]);
@@ -49,23 +63,45 @@ impl Golden {
     /// Reconstructs a frame with one region per contact.
     pub(super) fn contacts(&self, frame: &Frame, input: &EngineInput) -> Reconstruction {
         let scene = &self.scene;
-        let mut outcome = self.subarrays(input, self.whole());
-        let Some(contacts) = self.find_contacts(input) else {
-            return self.finish(frame, outcome);
+        let (mut outcome, contacts, sigma) = match &self.network {
+            Some(network) => {
+                let Told { contacts, sigma } = self.ask_contacts(network, input);
+                (CaseOutcome::default(), contacts, Some(sigma))
+            }
+            None => {
+                let outcome = self.subarrays(input, self.whole());
+                match self.find_contacts(input) {
+                    Some(contacts) => (outcome, contacts, None),
+                    None => return self.finish(frame, outcome),
+                }
+            }
         };
         let (x, truncation) = self.whole().apply_form(input.stress_MPa, contacts.forces());
         outcome.truncation = truncation.into_iter().collect();
         let forces = threshold(x, scene.threshold.min_force_N);
         let met: Vec<bool> =
             (0..contacts.segments.count).map(|k| self.meets_condition(input, &contacts.segments, k)).collect();
-        let own = regions(&scene.sensor, &contacts, &met, &forces);
+        let mut own = regions(&scene.sensor, &contacts, &met, &forces);
         outcome.forces = forces;
+        if let Some(sigma) = sigma {
+            outcome.subarrays = vec![self.array_of(input, outcome.forces.resultant())];
+            outcome.shear_spread = largest_spread(&own, &sigma);
+            own.iter_mut().zip(sigma).for_each(|(region, sigma)| region.mu_sigma = sigma);
+        }
         let mut result = self.finish(frame, outcome);
         result.extra.regions = Some(own);
         result.extra.sweeps = Some(contacts.sweeps);
         result.extra.converged = Some(contacts.converged);
         result
     }
+}
+
+/// Standard deviation of the shear over its size, the largest of all regions with a share of the load.
+fn largest_spread(regions: &[Region], sigma: &[Option<[f64; 2]>]) -> Option<f64> {
+    let total: f64 = regions.iter().map(|region| region.load_N[2]).sum();
+    let counts = |region: &Region| region.load_N[2] >= COUNTS_FROM * total;
+    let known = regions.iter().zip(sigma).filter(|(region, _)| counts(region));
+    known.filter_map(|(region, sigma)| sigma.map(|sigma| relative_spread(region.mu, sigma, 1.0))).reduce(f64::max)
 }
 
 /// The regions of a frame, from the solved contacts and the reported forces; `met[k]`: whether region k meets the
@@ -84,6 +120,7 @@ fn regions(sensor: &Sensor, contacts: &Contacts, met: &[bool], forces: &Forces) 
         Region {
             centroid_condition: met[k],
             mu: contacts.mu(k),
+            mu_sigma: None,
             objective_value: contacts.found[k].map(|found| found.objective),
             centre_mm: (weight > 0.0).then(|| moment.map(|sum| sum / weight)),
             load_N: [sum(&forces.fx), sum(&forces.fy), sum(&forces.fz)],

@@ -15,20 +15,23 @@ use crate::reconstruct::{Reconstruction, SubarrayResult};
 impl Golden {
     /// Estimates the contacts of calibrated stress, clipped readings as they are.
     pub(super) fn by_evidence(&self, evidence: &Evidence, frame: &Frame, input: &EngineInput) -> Reconstruction {
-        let (rows, cols) = (self.scene.sensor.rows, self.scene.sensor.cols);
-        let part = Subarray { row0: 0, col0: 0, rows, cols };
-        let received = self.receive(input, &part);
         let estimate = evidence.solve(input.stress_MPa, (input.noise_MPa > 0.0).then_some(input.noise_MPa));
         let forces = threshold(estimate.forces_N, self.scene.threshold.min_force_N);
-        let [x, y, normal] = forces.resultant();
-        let mu = if normal > 0.0 { [x / normal, y / normal] } else { [0.0; 2] };
-        let subarrays = vec![SubarrayResult::new(&part, &received, mu, None)];
+        let subarrays = vec![self.array_of(input, forces.resultant())];
         let mut result = self.finish(frame, CaseOutcome { subarrays, forces, ..CaseOutcome::default() });
         result.checks.noise_MPa = Some(estimate.noise_MPa);
         result.checks.misfit_probability = estimate.misfit_probability;
         result.checks.shear_spread = shear_spread(&estimate.contacts);
         result.extra.contacts = Some(estimate.contacts);
         result
+    }
+
+    /// The array as one subarray that is not searched; its μ is the ratio of the resultants.
+    pub(super) fn array_of(&self, input: &EngineInput, [x, y, normal]: [f64; 3]) -> SubarrayResult {
+        let (rows, cols) = (self.scene.sensor.rows, self.scene.sensor.cols);
+        let part = Subarray { row0: 0, col0: 0, rows, cols };
+        let mu = if normal > 0.0 { [x / normal, y / normal] } else { [0.0; 2] };
+        SubarrayResult::new(&part, &self.receive(input, &part), mu, None)
     }
 }
 

@@ -33,6 +33,7 @@
 //!
 //! With one region the result is that of one μ for the whole array, to the bit.
 
+pub(super) mod by_network;
 mod ellipses;
 
 use super::objective::taxels::Taxels;

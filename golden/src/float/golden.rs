@@ -36,6 +36,8 @@ pub struct Golden {
     pub(super) taxels: Option<Taxels>,
     /// The estimator `evidence`, if the scene takes it.
     pub(super) evidence: Option<Evidence>,
+    /// The network that is asked for each contact, with `contacts`.
+    pub(super) network: Option<Learned>,
 }
 
 /// A partition into equal rectangles with its matrices.
@@ -153,7 +155,7 @@ impl Golden {
             let orthogonal_form = scene.search.form == Form::Orthogonal;
             let orthogonal = orthogonal_form.then(|| Orthogonal::new(&shared)).transpose()?;
             let objective = match scene.estimator() {
-                EstimatorKind::Network => Box::new(ByNetwork::new(scene)?),
+                EstimatorKind::Network if case == scene.partition.case => Box::new(ByNetwork::new(scene)?),
                 _ => of_kind(scene.search.objective, &shape, scene.medium),
             };
             Ok(Tiling { case, parts, shared, masked: Vec::new(), orthogonal, objective }.mask(&scene.input.dead)?)
@@ -177,7 +179,9 @@ impl Golden {
             None => evidence,
             Some(shares) => evidence.with_noise_shares(shares),
         });
-        Ok(Golden { scene: scene.clone(), input, tilings, taxels, evidence })
+        let asked = scene.estimator() == EstimatorKind::Network && scene.partition.case == Case::Contacts;
+        let network = asked.then(|| Learned::of_scene(scene)).transpose()?;
+        Ok(Golden { scene: scene.clone(), input, tilings, taxels, evidence, network })
     }
 
     /// The matrices of the first subarray; with `adaptive` and `contacts` those of the whole array.
@@ -262,7 +266,9 @@ impl Golden {
             part.scatter(sensor, &own.fz, &mut outcome.forces.fz);
             let found = estimate.map(|estimate| estimate.found);
             let (mu, objective) = (found.map_or([0.0; 2], |found| found.mu), found.map(|found| found.objective));
-            outcome.subarrays.push(SubarrayResult::new(part, &received, mu, objective));
+            let mu_sigma = estimate.and_then(|estimate| estimate.sigma);
+            let own = SubarrayResult::new(part, &received, mu, objective);
+            outcome.subarrays.push(SubarrayResult { mu_sigma, ..own });
         }
         outcome
     }

@@ -2,7 +2,9 @@
 
 use super::*;
 use crate::flags::Flag;
-use crate::frame::{Forces, Frame};
+use crate::frame::{Contact, Forces, Frame};
+use crate::generator::generate;
+use crate::learned::{Learned, Training};
 use crate::partition::{Case, Grid, Subarray};
 use crate::reconstruct::{assemble, Reconstruction, SubarrayResult};
 use crate::scene::Condition;
@@ -209,6 +211,7 @@ fn the_case_is_counted_from_the_subarrays() {
         compression_centroid_mm: None,
         tension_centroid_mm: None,
         mu: [0.0; 2],
+        mu_sigma: None,
         objective_value: None,
     };
     let results = parts.iter().map(result).collect();
@@ -216,6 +219,47 @@ fn the_case_is_counted_from_the_subarrays() {
     let whole = assemble(&scene, &hertz(), "fixed", results, Forces::zeros(100), flags);
     assert_eq!(whole.case, Grid { rows: 1, cols: 2 });
     assert_eq!(whole.flags, [Flag::NoContact, Flag::Saturated]);
+}
+
+/// With a network that has hardly been trained: contacts are told apart, their forces explain the stress, and the error of
+/// each shear is below the shear.
+#[test]
+fn contacts_by_network_explain_the_stress() {
+    let text =
+        "name = \"two\"\n[sensor]\nrows = 16\ncols = 16\npitch_x_mm = 3.0\npitch_y_mm = 3.0\nthickness_mm = 3.0\n\
+                [partition]\ncase = \"contacts\"\n[search]\nestimator = \"network\"\n";
+    let mut scene = Scene::parse(text, "two").unwrap();
+    let training = Training { steps: 400, batch: 48, contacts: 200, hidden: vec![24, 12], ..Default::default() };
+    let file = tempfile::NamedTempFile::new().unwrap();
+    std::fs::write(file.path(), Learned::train(&scene, &training, &|_| ()).unwrap().bytes).unwrap();
+    scene.search.network = Some(file.path().to_owned());
+    let contact = |x: f64, shear: [f64; 2]| Contact {
+        shape: Some("hertz-ellipse".to_string()),
+        centre_mm: Some([x, 2.0]),
+        size_mm: vec![6.0, 5.0, 0.0],
+        normal_N: Some(4.0),
+        tangential_N: Some(shear),
+        ..Default::default()
+    };
+    let contacts = [contact(-11.0, [1.4, 0.0]), contact(11.0, [0.0, -1.2])];
+    let frame = generate("two", &scene.sensor, scene.medium, &contacts).unwrap();
+    let golden = Golden::new(&scene).unwrap();
+    let result = golden.run(&frame).unwrap();
+    let regions = result.extra.regions.unwrap();
+    assert_eq!((regions.len(), result.extra.sweeps), (2, Some(crate::float::contacts::by_network::ROUNDS)));
+    for (region, truth) in regions.iter().zip([[1.4, 0.0], [0.0, -1.2]]) {
+        let [x, y, normal] = region.load_N;
+        let off = (x - truth[0]).hypot(y - truth[1]);
+        assert!(off < 0.6 * truth[0].hypot(truth[1]) && (normal - 4.0).abs() < 0.2, "{:?}", region.load_N);
+        assert!(region.mu_sigma.is_some_and(|sigma| sigma.iter().all(|sigma| *sigma > 0.0 && *sigma < 0.5)));
+    }
+    assert!(result.checks.shear_spread.is_some_and(|spread| spread > 0.0));
+    let (matrices, mut rest) = (golden.matrices(), frame.stress_MPa.clone());
+    let forces = result.forces_N;
+    for (matrix, forces) in [(&matrices.cx, &forces.fx), (&matrices.cy, &forces.fy), (&matrices.cz, &forces.fz)] {
+        crate::symmetry::folded::accumulate(matrix, forces, -1.0, &mut rest);
+    }
+    assert!(rest.iter().all(|rest| rest.abs() < 1e-4 * frame.peak_MPa()), "{rest:?}");
 }
 
 proptest! {

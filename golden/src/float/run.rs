@@ -17,7 +17,7 @@ use crate::frame::Frame;
 use crate::matrices::Matrices;
 use crate::partition::Subarray;
 use crate::reconstruct::{Reconstruction, Unipolar};
-use crate::scene::{ForceOutput, Scene};
+use crate::scene::{EstimatorKind, ForceOutput, Scene};
 
 impl Golden {
     /// Reconstructs one frame; its values are readings if the scene has a calibration or tare file, else stress in MPa.
@@ -59,9 +59,11 @@ impl Golden {
         let frame = self.input.calibrate(mean);
         // Evidence takes clipped readings as they are, and its load does not come from Cz⁺b.
         let searched = self.evidence.is_none();
-        let (filled, report) = match self.scene.input.unipolar && searched {
-            true => self.filled(&frame),
-            false => (frame.clone(), None),
+        let (filled, report) = match (self.scene.input.unipolar && searched, self.scene.estimator()) {
+            (false, _) => (frame.clone(), None),
+            // The network has been trained on them, and knows what the missing tension does to the load.
+            (true, EstimatorKind::Network) => (clipped(&frame), None),
+            (true, _) => self.filled(&frame),
         };
         let mut result = self.reconstruct_stress(&filled, noise_MPa)?;
         let misfit = |report| Unipolar { misfit: misfit(&self.scene, &frame, &result.forces_N), ..report };
@@ -93,8 +95,7 @@ impl Golden {
     /// The frame with tension in place of clipped readings, and its report without the misfit.
     fn filled(&self, frame: &Frame) -> (Frame, Option<Unipolar>) {
         let Scene { sensor, input, search, .. } = &self.scene;
-        let mut filled = frame.clone();
-        filled.stress_MPa.iter_mut().for_each(|b| *b = b.max(0.0));
+        let mut filled = clipped(frame);
         let mut report = Unipolar { clipped: 0, pulled: 0, evaluations: 0, misfit: 0.0 };
         for (part, matrices) in self.parts() {
             let b = part.gather(sensor, &filled.stress_MPa);
@@ -143,4 +144,11 @@ impl Golden {
     pub fn stress(&self, frames: &[Frame]) -> Result<Frame, GoldenError> {
         Ok(self.input.calibrate(&self.input.average(&self.scene, frames)?))
     }
+}
+
+/// The frame as a unipolar array reads it: no tension.
+fn clipped(frame: &Frame) -> Frame {
+    let mut clipped = frame.clone();
+    clipped.stress_MPa.iter_mut().for_each(|b| *b = b.max(0.0));
+    clipped
 }

@@ -164,6 +164,7 @@ fn every_shipped_file_parses_and_belongs_to_its_scene() {
     let counts = [
         ("sensor-1", 8),
         ("sensor-1-noisy", 8),
+        ("sensor-1-unipolar", 8),
         ("sensor-2", 9),
         ("sensor-3", 7),
         ("sensor-4", 3),

@@ -19,28 +19,54 @@ pub struct FoundContact {
     pub centre_mm: [f64; 2],
     /// Force in N, [x, y, normal].
     pub force_N: [f64; 3],
-    /// Standard deviation of the force in N, if the estimator gives it.
-    pub sigma_N: Option<[f64; 3]>,
+    /// Standard deviation of the force, if the estimator gives it.
+    pub sigma_N: Option<ForceSigma>,
+}
+
+/// Standard deviation of a force.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ForceSigma {
+    /// N, [x, y].
+    pub shear: [f64; 2],
+    /// N; `None` where the estimator gives that of μ only.
+    pub normal: Option<f64>,
+}
+
+impl ForceSigma {
+    /// That of the shear μ·`normal_N` for the standard deviation of μ; that of the normal force, which is a few tenths of a
+    /// percent, is not in it.
+    fn of_mu(mu_sigma: Option<[f64; 2]>, normal_N: f64) -> Option<ForceSigma> {
+        mu_sigma.map(|sigma| ForceSigma { shear: sigma.map(|sigma| sigma * normal_N), normal: None })
+    }
 }
 
 /// The contacts of a result: those of `evidence`, its regions, or the whole array as one.
 pub fn found(result: &Reconstruction) -> Vec<FoundContact> {
     if let Some(contacts) = &result.extra.contacts {
-        let contact = |own: &ContactEstimate| FoundContact {
-            centre_mm: own.centre_mm,
-            force_N: own.force_N,
-            sigma_N: Some(own.sigma_N),
+        let contact = |own: &ContactEstimate| {
+            let [x, y, normal] = own.sigma_N;
+            let sigma_N = Some(ForceSigma { shear: [x, y], normal: Some(normal) });
+            FoundContact { centre_mm: own.centre_mm, force_N: own.force_N, sigma_N }
         };
         return contacts.iter().map(contact).collect();
     }
     match &result.extra.regions {
         Some(regions) => {
             let contact = |region: &crate::reconstruct::Region| {
-                Some(FoundContact { centre_mm: region.centre_mm?, force_N: region.load_N, sigma_N: None })
+                let sigma_N = ForceSigma::of_mu(region.mu_sigma, region.load_N[2]);
+                Some(FoundContact { centre_mm: region.centre_mm?, force_N: region.load_N, sigma_N })
             };
             regions.iter().filter_map(contact).collect()
         }
-        None => vec![FoundContact { centre_mm: [0.0; 2], force_N: result.resultant_N, sigma_N: None }],
+        None => {
+            // Of several subarrays each has a μ of its own.
+            let mu_sigma = match result.subarrays.as_slice() {
+                [one] => one.mu_sigma,
+                _ => None,
+            };
+            let sigma_N = ForceSigma::of_mu(mu_sigma, result.resultant_N[2]);
+            vec![FoundContact { centre_mm: [0.0; 2], force_N: result.resultant_N, sigma_N }]
+        }
     }
 }
 

@@ -1,6 +1,6 @@
 //! Outcome: the errors of one reconstruction of a drawn frame, and their summary over many.
 
-use super::coverage::Coverage;
+use super::coverage::{Coverage, Deviation};
 use super::matching::{found, partners};
 use super::statistic::{ErrorSpread, Interval};
 use crate::errors::Errors;
@@ -18,12 +18,15 @@ pub struct Outcome {
     pub tangential: Option<f64>,
     /// e_n of the resultant.
     pub normal: Option<f64>,
+    /// Tangential error of the resultant over the sum of all contacts' tangential forces; the sum of shears that cancel is
+    /// no measure.
+    pub over_all: Option<f64>,
     /// e_t of each contact.
     pub contact_tangential: Vec<f64>,
     /// Whether the result has a flag.
     pub flagged: bool,
-    /// |F − F_ref|/σ of each contact along x, y and normal; empty without standard deviations.
-    pub deviations: Vec<[f64; 3]>,
+    /// |F − F_ref|/σ of each contact; empty without standard deviations.
+    pub deviations: Vec<Deviation>,
 }
 
 /// Errors over many frames.
@@ -35,6 +38,8 @@ pub struct Summary {
     pub tangential: ErrorSpread,
     /// e_n of the resultant, a fraction.
     pub normal: ErrorSpread,
+    /// Tangential error of the resultant over the sum of all contacts' tangential forces, where frames have several.
+    pub over_all: Option<ErrorSpread>,
     /// e_t of each contact, where frames have several.
     pub contact_tangential: Option<ErrorSpread>,
     /// Share of frames with a flag.
@@ -51,6 +56,7 @@ impl Outcome {
             shape: drawn.truth[0].shape,
             tangential: errors.tangential,
             normal: errors.normal,
+            over_all: over_all(drawn, result.resultant_N),
             contact_tangential: Vec::new(),
             flagged: !result.flags.is_empty(),
             deviations: Vec::new(),
@@ -59,7 +65,9 @@ impl Outcome {
             let force_N = partner.map_or([0.0; 3], |found| found.force_N);
             outcome.contact_tangential.extend(Errors::new(truth.force_N, force_N).tangential);
             if let Some(sigma_N) = partner.and_then(|found| found.sigma_N) {
-                outcome.deviations.push([0, 1, 2].map(|k| (force_N[k] - truth.force_N[k]).abs() / sigma_N[k]));
+                let off = |axis: usize, sigma: f64| (force_N[axis] - truth.force_N[axis]).abs() / sigma;
+                let shear = [off(0, sigma_N.shear[0]), off(1, sigma_N.shear[1])];
+                outcome.deviations.push(Deviation { shear, normal: sigma_N.normal.map(|sigma| off(2, sigma)) });
             }
         }
         outcome
@@ -75,6 +83,7 @@ impl Outcome {
             shape: drawn.truth[0].shape,
             tangential: errors.tangential,
             normal: errors.normal,
+            over_all: over_all(drawn, [0.0; 3]),
             contact_tangential: drawn.truth.iter().filter_map(alone).collect(),
             flagged: false,
             deviations: Vec::new(),
@@ -82,17 +91,25 @@ impl Outcome {
     }
 }
 
+/// Tangential error of a resultant over the sum of all contacts' tangential forces; `None` if there are none.
+fn over_all(drawn: &DrawnFrame, [x, y, _]: [f64; 3]) -> Option<f64> {
+    let sum: f64 = drawn.truth.iter().map(|contact| contact.force_N[0].hypot(contact.force_N[1])).sum();
+    (sum > 0.0).then(|| (x - drawn.total_N[0]).hypot(y - drawn.total_N[1]) / sum)
+}
+
 impl Summary {
     /// Of some frames.
     pub fn of(outcomes: &[&Outcome]) -> Summary {
         let all = |of: fn(&Outcome) -> Option<f64>| -> Vec<f64> { outcomes.iter().filter_map(|o| of(o)).collect() };
         let contacts: Vec<f64> = outcomes.iter().flat_map(|o| o.contact_tangential.iter().copied()).collect();
-        let deviations: Vec<&[[f64; 3]]> = outcomes.iter().map(|o| o.deviations.as_slice()).collect();
+        let several = contacts.len() > outcomes.len();
+        let deviations: Vec<&[Deviation]> = outcomes.iter().map(|o| o.deviations.as_slice()).collect();
         Summary {
             draws: outcomes.len(),
             tangential: ErrorSpread::of(&all(|o| o.tangential)),
             normal: ErrorSpread::of(&all(|o| o.normal)),
-            contact_tangential: (contacts.len() > outcomes.len()).then(|| ErrorSpread::of(&contacts)),
+            over_all: several.then(|| ErrorSpread::of(&all(|o| o.over_all))),
+            contact_tangential: several.then(|| ErrorSpread::of(&contacts)),
             flagged: Interval::share(&outcomes.iter().map(|o| vec![o.flagged]).collect::<Vec<_>>()),
             coverage: Coverage::of(&deviations),
         }

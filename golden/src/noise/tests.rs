@@ -4,7 +4,7 @@ use super::*;
 use crate::generator::converter::Converter;
 use crate::generator::draws::{DrawOptions, Shape};
 use crate::partition::Case;
-use crate::scene::{ObjectiveKind, PartitionSpec, Scene};
+use crate::scene::{EstimatorKind, ObjectiveKind, PartitionSpec, Scene};
 
 /// Medians of few contacts scatter; the ratios of the full study are below 1.3.
 const RATIO: f64 = 1.5;
@@ -129,6 +129,9 @@ fn several_contacts_have_their_own_errors() {
     let own = rows[1].summary.contact_tangential.unwrap();
     assert!(own.median.value < 0.2, "{own:?}");
     assert_eq!(rows[0].summary.contact_tangential.unwrap().median.value, 1.0);
+    // Without any shear the error is the resultant's share of all shears, which cancel in part.
+    let over_all = [0, 1].map(|row| rows[row].summary.over_all.unwrap().median.value);
+    assert!(over_all[1] < 0.2 && (0.2..1.0).contains(&over_all[0]), "{over_all:?}");
 }
 
 #[test]
@@ -174,4 +177,17 @@ fn what_is_stated_wrongly_costs_accuracy() {
     // A bonded layer read as a half-space loses half of the shear.
     assert!(of("half-space for bonded layer", None) > 0.2);
     assert!(of("gain spread", Some(0.10)) > of("gain spread", Some(0.005)));
+}
+
+/// One σ of the network covers 55 to 80 % of the shears, in floating point and in hardware.
+#[test]
+fn standard_deviations_of_the_network_are_honest() {
+    let scene = Scene::builtin("sensor-1-noisy").unwrap();
+    let candidates = vec![Candidate::Estimator(EstimatorKind::Network), Candidate::Hardware];
+    let wanted = ShapeStudy { levels: vec![0.002, 0.01], draws: 100, told: false, candidates, ..Default::default() };
+    for row in shape_study(&scene, &wanted, &|_, _| ()).unwrap().iter().filter(|row| row.estimator != "none") {
+        let coverage = row.summary.coverage.unwrap();
+        assert!((0.55..0.8).contains(&coverage.within_1.value), "{} {}: {coverage:?}", row.estimator, row.noise);
+        assert_eq!((coverage.frames, coverage.normal_within_1), (100, None));
+    }
 }

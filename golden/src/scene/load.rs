@@ -8,9 +8,10 @@ use std::io::Read;
 const LARGEST_FILE: u64 = 1 << 20;
 
 /// Built-in scenes: name and TOML text.
-const BUILTINS: [(&str, &str); 6] = [
+const BUILTINS: [(&str, &str); 7] = [
     ("sensor-1", include_str!("../../scenes/sensor-1.toml")),
     ("sensor-1-noisy", include_str!("../../scenes/sensor-1-noisy.toml")),
+    ("sensor-1-unipolar", include_str!("../../scenes/sensor-1-unipolar.toml")),
     ("sensor-2", include_str!("../../scenes/sensor-2.toml")),
     ("sensor-3", include_str!("../../scenes/sensor-3.toml")),
     ("sensor-4", include_str!("../../scenes/sensor-4.toml")),

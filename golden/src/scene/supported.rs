@@ -10,7 +10,7 @@
 //! | `search.estimator` | all; "evidence" and "learned" as below | "search", which they take for the others as well, and "learned" as "network" |
 //! | `search.form` | all, "orthogonal" up to [`crate::float::orthogonal::MAX_TAXELS`] taxels | "oblique" |
 //! | `input.dead` | all; with "orthogonal" none | with one subarray |
-//! | `input.unipolar` | all; with "orthogonal" none | none |
+//! | `input.unipolar` | all; with "orthogonal" none | with `search.estimator` "learned" |
 //!
 //! The estimators "evidence" and "learned" take no objective but the default, no "orthogonal" form, mu_max above 0,
 //! partition 0 or "contacts", since they find the contacts themselves, and a pitch of up to 3 thicknesses, on a bonded
@@ -102,7 +102,12 @@ impl Scene {
                 self.dead(),
                 "none, or partition.case = 0",
             ),
-            rule(input.unipolar, "input.unipolar", "true".to_string(), "false"),
+            rule(
+                input.unipolar && self.for_hardware().estimator() != EstimatorKind::Network,
+                "input.unipolar",
+                "true".to_string(),
+                "false, or search.estimator = learned",
+            ),
         ])?;
         match self.for_hardware().estimator() {
             EstimatorKind::Network => self.require_network(),
@@ -116,13 +121,13 @@ impl Scene {
         let rule = |refused, field, value, available| Rule { refused, field, value, available };
         self.require([
             rule(
-                self.partition.case != Case::WHOLE,
+                !matches!(self.partition.case, Case::WHOLE | Case::Contacts),
                 "partition.case",
                 self.partition.case.to_string(),
                 "0, with search.estimator = learned",
             ),
             rule(
-                Window::of(sensor).place != Place::Array,
+                self.partition.case == Case::WHOLE && Window::of(sensor).place != Place::Array,
                 "sensor.rows",
                 sensor.rows.to_string(),
                 "with sensor.cols up to 144 taxels, with search.estimator = learned",

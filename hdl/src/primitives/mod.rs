@@ -36,8 +36,8 @@ pub use frame::average::Average;
 #[cfg(test)]
 pub(crate) use frame::calibrate::tests::Table;
 pub use frame::calibrate::{Calibrate, CALIBRATION_FILE};
-pub use frame::dead_taxel_mask::DeadTaxelMask;
 pub use frame::frame_stats::FrameStats;
+pub use frame::input_mask::InputMask;
 pub use memory::delay::{BitDelay, Delay};
 pub use memory::dff::Dff;
 pub use memory::enable_register::EnableRegister;

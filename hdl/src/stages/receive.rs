@@ -11,7 +11,7 @@ use rust_hdl::prelude::*;
 
 use crate::ports::{has_ports, ports};
 use crate::primitives::{
-    count_bits, frame_quads, largest, BitDelay, DeadTaxelMask, Delay, Dff, FrameStats, LaneBroadcast, Ram, Scan,
+    count_bits, frame_quads, largest, BitDelay, Delay, Dff, FrameStats, InputMask, LaneBroadcast, Ram, Scan,
 };
 use crate::wire::Wire;
 
@@ -25,7 +25,7 @@ use crate::wire::Wire;
 pub struct Receive {
     ports: ReceivePorts,
     scan: Scan,
-    dead_taxels: DeadTaxelMask,
+    input_mask: InputMask,
     broadcast: LaneBroadcast,
     frame: Ram,
     stats: FrameStats,
@@ -59,7 +59,7 @@ ports! {
         pub s_axis_tlast: Signal<In, Bit>,
         /// A beat is accepted in this cycle.
         pub accept: Signal<Out, Bit>,
-        /// The accepted code, 0 for a dead taxel; valid with `accept`.
+        /// The accepted code, 0 for a dead taxel and for tension of a unipolar array; valid with `accept`.
         pub taken_word: Wire<Out>,
         /// The frame buffer holds a whole frame, and `which` is its case; high until `free`.
         pub full: Signal<Out, Bit>,
@@ -128,7 +128,7 @@ impl Receive {
         Receive {
             ports: ReceivePorts::new(std::slice::from_ref(own)),
             scan: Scan::new(std::slice::from_ref(own), Quads::LANES),
-            dead_taxels: DeadTaxelMask::new(bits, taxels, &model.dead),
+            input_mask: InputMask::new(bits, taxels, &model.dead, model.scene.input.unipolar),
             broadcast: LaneBroadcast::new(bits),
             frame: Ram::new(quads, 4, bits).holding((0..4).map(|lane| Holds::Frame { case, lane })).registered(),
             stats: FrameStats::new(bits, model.noise_floor, count),
@@ -151,7 +151,7 @@ impl Logic for Receive {
     #[hdl_gen]
     fn update(&mut self) {
         self.scan.clk.next = self.clk.val();
-        self.dead_taxels.clk.next = self.clk.val();
+        self.input_mask.clk.next = self.clk.val();
         self.frame.clk.next = self.clk.val();
         self.stats.clk.next = self.clk.val();
         self.stats_enable.clk.next = self.clk.val();
@@ -174,11 +174,11 @@ impl Logic for Receive {
         self.scan.which.next = false.into();
         self.scan.enable.next = self.taken.val();
         self.scan.clear.next = self.rst.val() | self.early.val();
-        self.dead_taxels.enable.next = self.taken.val();
-        self.dead_taxels.clear.next = self.rst.val() | self.early.val();
-        self.dead_taxels.word.next = self.s_axis_tdata.val();
-        self.taken_word.next = self.dead_taxels.kept.val();
-        self.stats_code.d.next = self.dead_taxels.kept.val();
+        self.input_mask.enable.next = self.taken.val();
+        self.input_mask.clear.next = self.rst.val() | self.early.val();
+        self.input_mask.word.next = self.s_axis_tdata.val();
+        self.taken_word.next = self.input_mask.kept.val();
+        self.stats_code.d.next = self.input_mask.kept.val();
         self.stats_mask.d.next = self.scan.mask.val();
         self.stats_address.d.next = self.scan.address.val();
         self.broadcast.word.next = self.stats_code.q.val();
@@ -248,8 +248,10 @@ pub(crate) mod tests {
         pub(crate) fn accepted(&self, inputs: &[Word]) -> Option<i32> {
             let bits = self.model.formats().input_bits as usize;
             let taken = inputs[2].number() == 1 && inputs[0].number() == 0 && !self.is_whole();
+            let code = inputs[1].signed(0, bits) as i32;
             let dead = self.model.dead.contains(&self.codes.len());
-            taken.then(|| if dead { 0 } else { inputs[1].signed(0, bits) as i32 })
+            let tension = self.model.scene.input.unipolar && code < 0;
+            taken.then_some(if dead || tension { 0 } else { code })
         }
 
         /// A clock edge with the same inputs. Gives the taxel that goes to the buffer and its code.
@@ -351,7 +353,7 @@ pub(crate) mod tests {
         assert!(parts.noise_floor > 0 && dead.dead.len() == 2);
         for (model, case, defect) in [
             (parts, 1, Change::value("", "stats_part__d", |k| k.named("part"))),
-            (dead, 0, Change::value("", "dead_taxels__clear", |k| k.named("rst"))),
+            (dead, 0, Change::value("", "input_mask__clear", |k| k.named("rst"))),
         ] {
             let mut random = fastrand::Rng::with_seed(7);
             let mut buffer = Buffer::new(&model, case);

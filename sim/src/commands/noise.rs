@@ -67,8 +67,8 @@ pub struct Arguments {
 /// Options of the study over shapes.
 #[derive(Args, Debug)]
 struct ShapeArguments {
-    /// Draw these shapes in turn: all, table (all but asymmetric), or of hertz, punch, ring, rectangle, tilted,
-    /// asymmetric, separated by commas.
+    /// Draw these shapes in turn, those of a frame's contacts differ: mixed or all, table (all but asymmetric), or of hertz,
+    /// punch, ring, rectangle, tilted, asymmetric, separated by commas.
     #[arg(long, value_name = "SHAPES", value_parser = shapes)]
     shapes: Option<Shapes>,
     /// Estimator, repeatable; default: what the scene names.
@@ -89,7 +89,7 @@ struct ShapeArguments {
     /// Frames without contact whose noisy mean is subtracted; 0: none.
     #[arg(long, value_name = "N", default_value_t = 0, requires = "shapes")]
     tare_frames: usize,
-    /// The sensor reads tension as zero.
+    /// The sensor reads tension as zero; default: what the scene says.
     #[arg(long, requires = "shapes")]
     unipolar: bool,
     /// The scene does not state noise and gain spread.
@@ -144,7 +144,7 @@ fn over_shapes(arguments: &Arguments, scene: &Scene, shapes: &[Shape], format: F
         drift: own.drift,
         tare_frames: own.tare_frames,
         frames: arguments.frames.unwrap_or(1),
-        unipolar: own.unipolar,
+        unipolar: own.unipolar || scene.input.unipolar,
         ..Default::default()
     };
     let options = DrawOptions {
@@ -201,7 +201,7 @@ fn named<T: Copy>(name: &str, names: &[(&str, T)]) -> Result<T, String> {
 /// Parses a list of shapes.
 fn shapes(text: &str) -> Result<Shapes> {
     match text {
-        "all" => Ok(Shapes(Shape::NAMES.map(|(_, shape)| shape).to_vec())),
+        "all" | "mixed" => Ok(Shapes(Shape::NAMES.map(|(_, shape)| shape).to_vec())),
         "table" => Ok(Shapes(Shape::TABLE.to_vec())),
         list => {
             let shape = |name: &str| named(name.trim(), &Shape::NAMES).map_err(|known| anyhow!("{name:?}: {known}"));

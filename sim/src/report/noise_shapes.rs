@@ -36,10 +36,10 @@ fn text(rows: &[ShapeRow]) -> String {
     let mut head =
         vec!["noise", "estimator", "e_t median", "e_t 90 %", "e_n median", "e_n 90 %", "flagged", "bound e_t", "90 %"];
     if several {
-        head.extend(["each contact's e_t median", "90 %"]);
+        head.extend(["e_t over Σ median", "90 %", "each contact's e_t median", "90 %"]);
     }
     let line = |row: &ShapeRow| {
-        let Summary { tangential, normal, contact_tangential, flagged, .. } = &row.summary;
+        let Summary { tangential, normal, over_all, contact_tangential, flagged, .. } = &row.summary;
         let mut cells = vec![
             of(row.noise),
             row.estimator.clone(),
@@ -52,10 +52,11 @@ fn text(rows: &[ShapeRow]) -> String {
             of(row.bound.tangential[1]),
         ];
         if several {
-            let own = |of: fn(&ErrorSpread) -> &Interval| {
-                contact_tangential.as_ref().map_or("-".into(), |e| with_interval(of(e)))
-            };
-            cells.extend([own(|e| &e.median), own(|e| &e.ninety)]);
+            for spread in [over_all, contact_tangential] {
+                let own =
+                    |of: fn(&ErrorSpread) -> &Interval| spread.as_ref().map_or("-".into(), |e| with_interval(of(e)));
+                cells.extend([own(|e| &e.median), own(|e| &e.ninety)]);
+            }
         }
         cells
     };
@@ -66,6 +67,9 @@ fn text(rows: &[ShapeRow]) -> String {
          shear at all, Σ b·area for the normal force; flagged: share of frames with a flag; bound: Cramér–Rao, support \
          known, smooth pressure\n",
     );
+    if several {
+        text.push_str("over Σ: tangential error of the resultant over the sum of all contacts' tangential forces\n");
+    }
     text
 }
 
@@ -84,20 +88,22 @@ fn conditions(rows: &[ShapeRow]) -> String {
     )
 }
 
-/// Median and nine-of-ten errors: a line per noise level, a column per estimator, then the bound.
+/// Median and nine-of-ten errors: a line per noise level, a column per estimator, then the bound. With several contacts
+/// they are those over the sum of all tangential forces, and the bound, which is of the resultant's shear, is left out.
 pub fn shape_medians(rows: &[ShapeRow]) -> String {
+    let bound = rows.iter().all(|row| row.contacts == 1);
     let lines: Vec<&[ShapeRow]> = rows.chunk_by(|a, b| a.noise == b.noise).collect();
     let names = lines.first().into_iter().flat_map(|line| line.iter()).map(|row| format!("`{}`", row.estimator));
     let head: Vec<String> =
-        std::iter::once("noise".to_owned()).chain(names).chain(["Cramér–Rao bound".to_owned()]).collect();
+        std::iter::once("noise".to_owned()).chain(names).chain(bound.then(|| "Cramér–Rao bound".to_owned())).collect();
     let pair = |median: f64, ninety: f64| format!("{} / {}", of(median), of(ninety));
     let line = |rows: &[ShapeRow]| {
         let own = |row: &ShapeRow| {
-            let spread = &row.summary.tangential;
+            let spread = row.summary.over_all.as_ref().unwrap_or(&row.summary.tangential);
             pair(spread.median.value, spread.ninety.value)
         };
         let [median, ninety] = rows[0].bound.tangential;
-        let cells = rows.iter().map(own).chain([pair(median, ninety)]);
+        let cells = rows.iter().map(own).chain(bound.then(|| pair(median, ninety)));
         std::iter::once(of(rows[0].noise)).chain(cells).collect()
     };
     let head: Vec<&str> = head.iter().map(String::as_str).collect();
@@ -109,17 +115,17 @@ pub fn coverage(rows: &[ShapeRow]) -> String {
     let head = ["noise", "estimator", "shape", "frames", "1 σ", "2 σ", "normal 1 σ", "normal 2 σ", "beyond 3 σ"];
     let line = |row: &ShapeRow| {
         let coverage = row.summary.coverage.as_ref();
-        let share = |of: fn(&Coverage) -> &Interval| coverage.map_or("-".into(), |c| with_interval(of(c)));
+        let share = |of: fn(&Coverage) -> Option<&Interval>| coverage.and_then(of).map_or("-".into(), with_interval);
         vec![
             of(row.noise),
             row.estimator.clone(),
             row.shape.to_owned(),
             coverage.map_or("-".into(), |coverage| coverage.frames.to_string()),
-            share(|c| &c.within_1),
-            share(|c| &c.within_2),
-            share(|c| &c.normal_within_1),
-            share(|c| &c.normal_within_2),
-            share(|c| &c.beyond_3),
+            share(|c| Some(&c.within_1)),
+            share(|c| Some(&c.within_2)),
+            share(|c| c.normal_within_1.as_ref()),
+            share(|c| c.normal_within_2.as_ref()),
+            share(|c| Some(&c.beyond_3)),
         ]
     };
     let rows: Vec<&ShapeRow> = rows.iter().filter(|row| row.estimator != "none").collect();
@@ -188,25 +194,37 @@ pub fn sensitivity(rows: &[SensitivityRow], level: f64, format: Format) -> Resul
 fn summary_head() -> String {
     let interval = |name: &str| format!("{name},{name}_low,{name}_high");
     let coverage = ["within_1", "within_2", "normal_within_1", "normal_within_2", "beyond_3"];
-    let names = ["et_median", "et_90", "en_median", "en_90", "contact_et_median", "contact_et_90", "flagged"];
+    let names = [
+        "et_median",
+        "et_90",
+        "en_median",
+        "en_90",
+        "over_all_median",
+        "over_all_90",
+        "contact_et_median",
+        "contact_et_90",
+        "flagged",
+    ];
     let all: Vec<String> = names.iter().chain(&coverage).map(|name| interval(name)).collect();
     format!("draws,{}", all.join(","))
 }
 
 fn summary_csv(summary: &Summary) -> String {
-    let Summary { draws, tangential, normal, contact_tangential: own, flagged, coverage } = summary;
+    let Summary { draws, tangential, normal, over_all, contact_tangential: own, flagged, coverage } = summary;
     let intervals = [
         Some(tangential.median),
         Some(tangential.ninety),
         Some(normal.median),
         Some(normal.ninety),
+        over_all.map(|over_all| over_all.median),
+        over_all.map(|over_all| over_all.ninety),
         own.map(|own| own.median),
         own.map(|own| own.ninety),
         Some(*flagged),
         coverage.map(|c| c.within_1),
         coverage.map(|c| c.within_2),
-        coverage.map(|c| c.normal_within_1),
-        coverage.map(|c| c.normal_within_2),
+        coverage.and_then(|c| c.normal_within_1),
+        coverage.and_then(|c| c.normal_within_2),
         coverage.map(|c| c.beyond_3),
     ];
     let cell =
@@ -251,8 +269,8 @@ mod tests {
             frames: 7,
             within_1: interval(0.25),
             within_2: interval(0.5),
-            normal_within_1: interval(0.125),
-            normal_within_2: interval(0.375),
+            normal_within_1: Some(interval(0.125)),
+            normal_within_2: Some(interval(0.375)),
             beyond_3: interval(0.0625),
         };
         ShapeRow {
@@ -268,6 +286,7 @@ mod tests {
                 draws: 20,
                 tangential: spread(0.03),
                 normal: spread(0.01),
+                over_all: Some(spread(0.04)),
                 contact_tangential: Some(spread(0.05)),
                 flagged: interval(0.1),
                 coverage: covered.then_some(coverage),
@@ -280,12 +299,16 @@ mod tests {
     fn csv_reads_back() {
         let rows = [row("none", 1e-4, false), row("search sparse", 1e-4, true)];
         let (head, records) = csv_reader::csv(&shapes(&rows, Format::Csv).unwrap());
-        assert_eq!((head.len(), records.len()), (8 + 1 + 36 + 4, 2));
+        assert_eq!((head.len(), records.len()), (8 + 1 + 42 + 4, 2));
         let of = |record: &Vec<String>, name: &str| csv_reader::field(&head, record, name).to_owned();
         assert_eq!(of(&records[1], "estimator"), "search sparse");
-        for (name, wanted) in
-            [("et_median", 0.03), ("et_90_low", 0.045), ("contact_et_90", 0.15), ("bound_en_90", 0.002)]
-        {
+        for (name, wanted) in [
+            ("et_median", 0.03),
+            ("et_90_low", 0.045),
+            ("over_all_median", 0.04),
+            ("contact_et_90", 0.15),
+            ("bound_en_90", 0.002),
+        ] {
             assert!((of(&records[0], name).parse::<f64>().unwrap() - wanted).abs() < 1e-12, "{name}");
         }
         assert_eq!((of(&records[0], "within_1").as_str(), of(&records[1], "beyond_3").as_str()), ("", "0.0625"));
@@ -304,10 +327,17 @@ mod tests {
     fn tables_by_hand() {
         let rows =
             [row("none", 1e-4, false), row("auto", 1e-4, true), row("none", 0.01, false), row("auto", 0.01, true)];
-        let medians = shape_medians(&rows);
-        let line = medians.lines().nth(2).unwrap().split_whitespace().collect::<Vec<_>>().join(" ");
-        assert_eq!(line, "| 0.01 % | 3.00 % / 9.00 % | 3.00 % / 9.00 % | 2.00 % / 4.00 % |");
-        assert_eq!(medians.lines().count(), 4);
+        let third = |rows: &[ShapeRow]| {
+            let medians = shape_medians(rows);
+            assert_eq!(medians.lines().count(), 4);
+            medians.lines().nth(2).unwrap().split_whitespace().collect::<Vec<_>>().join(" ")
+        };
+        assert_eq!(third(&rows), "| 0.01 % | 4.00 % / 12.00 % | 4.00 % / 12.00 % |");
+        let single = rows.clone().map(|row| {
+            let summary = Summary { over_all: None, contact_tangential: None, ..row.summary };
+            ShapeRow { contacts: 1, summary, ..row }
+        });
+        assert_eq!(third(&single), "| 0.01 % | 3.00 % / 9.00 % | 3.00 % / 9.00 % | 2.00 % / 4.00 % |");
         let covered = coverage(&rows);
         assert!(!covered.contains("none") && covered.contains("| 25.00 % (12.500–50.000) |"), "{covered}");
         assert!(
@@ -323,6 +353,6 @@ mod tests {
         let text = sensitivity(std::slice::from_ref(&off), 1e-3, Format::Markdown).unwrap();
         assert!(text.contains("| pitch          | +5 % | bonded-layer, poisson 0.48 |"), "{text}");
         let (head, records) = csv_reader::csv(&sensitivity(&[off], 1e-3, Format::Csv).unwrap());
-        assert_eq!((head.len(), records[0].len()), (4 + 1 + 36, 41));
+        assert_eq!((head.len(), records[0].len()), (4 + 1 + 42, 47));
     }
 }

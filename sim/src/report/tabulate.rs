@@ -218,6 +218,7 @@ mod tests {
         let region = |x: f64, load_N: [f64; 3]| Region {
             centroid_condition: true,
             mu: [0.0; 2],
+            mu_sigma: None,
             objective_value: None,
             centre_mm: Some([x, 0.0]),
             load_N,

@@ -135,7 +135,7 @@ fn receive_holds_whole_frames() {
     let place = |k: usize| format!("      {}'d{k}: own = 8'd{};\n", bits + 2, quads.taxel(k / 4, k % 4));
     let defects = vec![
         // A dead taxel keeps its code; a lane is written without a beat.
-        Change::value("receive__dead_taxels", "kept", |k| k.named("word")),
+        Change::value("receive__input_mask", "kept", |k| k.named("word")),
         Change::value("receive", "frame__write", |k| k.named("scan__mask")),
     ];
     let given = vec![

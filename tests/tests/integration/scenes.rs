@@ -9,7 +9,7 @@ use dermis_golden::scene::Scene;
 use dermis_sim::cosim::drive::Stimulus;
 use dermis_sim::cosim::hardware::{Hardware, Simulator};
 use dermis_sim::cosim::verify::verify;
-use dermis_tests::{assert_equal, build_dir, compare};
+use dermis_tests::{assert_equal, build_dir, compare, with_network};
 use proptest::prelude::*;
 
 /// Name, and the difference from a default scene of 6×6 taxels.
@@ -104,6 +104,26 @@ fn unlike_scenes_are_equal() {
         }
     }
     assert_eq!(intervals, SCENES.len() - 1, "all but the one with thresholds");
+}
+
+/// Tension reads as zero, in the model and in the hardware, also beside a dead taxel.
+#[test]
+fn a_unipolar_array_is_equal() {
+    let text = "name = \"unipolar\"\n[sensor]\nrows = 4\ncols = 5\npitch_x_mm = 2.0\npitch_y_mm = 2.0\n\
+                thickness_mm = 2.0\n[input]\nunipolar = true\ndead = [[1, 2]]\n";
+    let (scene, _file) = with_network(text, &[9]);
+    let frames = frames(&scene);
+    let simulators = [Simulator::Verilator, Simulator::RustHdl];
+    assert_equal(&verify(&scene, &frames, &simulators, &build_dir()).unwrap().findings, text);
+    let model = Model::for_frames(&scene, &frames).unwrap();
+    let mut clipped = 0;
+    for frame in &frames {
+        let codes = model.readings(std::slice::from_ref(frame)).unwrap();
+        let none: Vec<i32> = codes.iter().map(|&code| code.max(0)).collect();
+        clipped += usize::from(none != codes);
+        assert_eq!(model.run(&codes), model.run(&none));
+    }
+    assert!(clipped >= 2, "{clipped} frames with tension");
 }
 
 proptest! {

@@ -4,7 +4,8 @@
 //! |---|---|
 //! | out | the OR of all magnitudes (for [`normalise`](super::normalise)), both sign conditions, the same codes as quads |
 //!
-//! The code of a dead taxel is replaced by 0, for the magnitude, the signs and the passes.
+//! The code of a dead taxel is replaced by 0, and so is a negative one of a unipolar array, which reads no tension: for
+//! the magnitude, the signs and the passes.
 //!
 //! Signs are compared with the noise floor in codes: `c > floor`, `c < −floor`, as in the golden model on the same
 //! codes.
@@ -33,9 +34,11 @@ impl Received {
     }
 }
 
-/// The codes of an array with 0 for each of the `dead` taxels (row-major indices).
-pub fn mask_dead(codes: &[i32], dead: &[usize]) -> Vec<i32> {
-    codes.iter().enumerate().map(|(taxel, &code)| if dead.contains(&taxel) { 0 } else { code }).collect()
+/// The codes of an array with 0 for each of the `dead` taxels (row-major indices) and, if it is `unipolar`, for each
+/// negative code.
+pub fn mask(codes: &[i32], dead: &[usize], unipolar: bool) -> Vec<i32> {
+    let masked = |taxel: usize, code: i32| dead.contains(&taxel) || (unipolar && code < 0);
+    codes.iter().enumerate().map(|(taxel, &code)| if masked(taxel, code) { 0 } else { code }).collect()
 }
 
 /// Magnitude and signs of one subarray's `codes`; the noise floor `floor` is in codes, ≥ 0.
@@ -56,6 +59,7 @@ mod tests {
         assert_eq!(receive(&[5, -3, 0], 3), Received { magnitude: 7, positive: true, negative: false });
         assert_eq!(receive(&[0, 0], 0), Received::default());
         assert!(receive(&[-1], 0).negative);
-        assert_eq!(mask_dead(&[7, -8, 9], &[1]), [7, 0, 9]);
+        assert_eq!(mask(&[7, -8, -9], &[1], false), [7, 0, -9]);
+        assert_eq!(mask(&[7, 8, -9], &[1], true), [7, 0, 0]);
     }
 }

@@ -2,6 +2,6 @@
 
 pub(crate) mod average;
 pub(crate) mod calibrate;
-pub(crate) mod dead_taxel_mask;
 pub(crate) mod frame_stats;
+pub(crate) mod input_mask;
 pub(crate) mod sliding_mean;
