@@ -12,6 +12,9 @@ towards higher columns, y towards higher rows, both from the array's centre.
 """
 
 from ._dermis import (
+    Answers,
+    Board,
+    BoardError,
     Contact,
     Errors,
     Frame,
@@ -19,10 +22,14 @@ from ._dermis import (
     Reconstruction,
     Reconstructions,
     Scene,
+    Stage,
     errors,
 )
 
 __all__ = [
+    "Answers",
+    "Board",
+    "BoardError",
     "Contact",
     "Errors",
     "Frame",
@@ -30,5 +37,6 @@ __all__ = [
     "Reconstruction",
     "Reconstructions",
     "Scene",
+    "Stage",
     "errors",
 ]

@@ -1,6 +1,6 @@
 """Types of the native module; `dermis` hands everything on."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from os import PathLike
 from typing import Any, Literal, TypedDict, final, overload, type_check_only
 
@@ -8,6 +8,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 __all__ = [
+    "Answers",
+    "Board",
+    "BoardError",
     "Contact",
     "Errors",
     "Frame",
@@ -15,12 +18,14 @@ __all__ = [
     "Reconstruction",
     "Reconstructions",
     "Scene",
+    "Stage",
     "errors",
 ]
 
 _Engine = Literal["golden", "fixed"]
 
 class InputError(ValueError): ...
+class BoardError(OSError): ...
 
 @type_check_only
 class _ContactDescription(TypedDict, total=False):
@@ -49,7 +54,7 @@ class Errors:
 @final
 class Frame:
     @staticmethod
-    def load(path: str | PathLike[str], scene: Scene | None = None) -> Frame: ...
+    def load(path: str | PathLike[str]) -> Frame: ...
     @property
     def id(self) -> str: ...
     @property
@@ -157,6 +162,16 @@ class Scene:
     def reconstruct(
         self, frames: ArrayLike, engine: _Engine = "golden", *, find_noise: bool = True
     ) -> Reconstruction | Reconstructions: ...
+    def trace(self, frame: Frame | ArrayLike) -> list[Stage]: ...
+    def noise(
+        self,
+        *,
+        levels: Sequence[float] | None = None,
+        draws: int = 200,
+        seed: int = 1,
+        objectives: Sequence[str] | None = None,
+        frames: int = 64,
+    ) -> list[dict[str, Any]]: ...
     def generate(
         self,
         contacts: Sequence[_ContactDescription] | None = None,
@@ -177,5 +192,47 @@ class Scene:
         stuck: Sequence[tuple[tuple[int, int], float]] = ...,
         id: str = "generated",
     ) -> Frame: ...
+
+@final
+class Stage:
+    @property
+    def name(self) -> str: ...
+    @property
+    def unit(self) -> str: ...
+    @property
+    def bits(self) -> int: ...
+    @property
+    def words(self) -> NDArray[np.int64]: ...
+    @property
+    def lsb(self) -> NDArray[np.float64]: ...
+    @property
+    def fixed(self) -> NDArray[np.float64]: ...
+    @property
+    def floating(self) -> NDArray[np.float64]: ...
+
+@final
+class Board:
+    def __new__(
+        cls,
+        port: str,
+        scene: Scene,
+        *,
+        baud: int | None = None,
+        timeout_s: float = 1.0,
+        check: bool = False,
+        tare: Frame | None = None,
+    ) -> Board: ...
+    def reconstruct(self, frame: Frame | ArrayLike) -> Reconstruction: ...
+    def stream(self, frames: Iterable[Frame | ArrayLike]) -> Answers: ...
+    @property
+    def link_errors(self) -> tuple[int, int]: ...
+    def close(self) -> None: ...
+    def __enter__(self) -> Board: ...
+    def __exit__(self, _kind: object, _error: object, _traceback: object, /) -> None: ...
+
+@final
+class Answers:
+    def __iter__(self) -> Answers: ...
+    def __next__(self) -> Reconstruction: ...
 
 def errors(reference_N: ArrayLike, value_N: ArrayLike) -> Errors: ...

@@ -4,7 +4,7 @@ use dermis_golden::frame::Forces;
 use numpy::{PyArray1, PyArray2, PyArray3, PyArrayDyn, PyArrayMethods, PyReadonlyArrayDyn, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 
-use crate::errors::input;
+use crate::exceptions::input;
 
 /// Kinds of NumPy's types that are real numbers: signed and unsigned integers, floating point.
 const REAL: [&str; 3] = ["i", "u", "f"];

@@ -5,7 +5,7 @@ use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
 use crate::arrays::{numbers, vector};
-use crate::errors::input;
+use crate::exceptions::input;
 
 /// The keys.
 const KEYS: [&str; 8] =

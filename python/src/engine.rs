@@ -15,7 +15,7 @@ use dermis_golden::reconstruct::Reconstruction;
 use dermis_golden::scene::Scene;
 use pyo3::PyErr;
 
-use crate::errors::{fixed, input, not_allowed};
+use crate::exceptions::{fixed, input, not_allowed};
 
 /// Which model computes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -107,17 +107,15 @@ impl Ready {
     /// # Errors
     /// `InputError` for frames that the model refuses.
     pub fn reconstruct(&self, scene: &Scene, frames: &[Frame], find_noise: bool) -> Result<Reconstruction, PyErr> {
-        let (mut result, stress, scene) = match self {
-            Ready::Golden(golden) => {
-                let result = golden.run_averaged(frames).map_err(input)?;
-                (result, golden.stress(frames).map_err(input)?, scene)
-            }
-            Ready::Fixed(model) => {
-                let result = model.reconstruct_averaged(frames).map_err(fixed)?;
-                (result, model.stress(frames).map_err(fixed)?, &model.scene)
-            }
+        let (mut result, scene) = match self {
+            Ready::Golden(golden) => (golden.run_averaged(frames).map_err(input)?, scene),
+            Ready::Fixed(model) => (model.reconstruct_averaged(frames).map_err(fixed)?, &model.scene),
         };
         if find_noise {
+            let stress = match self {
+                Ready::Golden(golden) => golden.stress(frames).map_err(input)?,
+                Ready::Fixed(model) => model.stress(frames).map_err(fixed)?,
+            };
             result.find_noise(scene, &stress).map_err(input)?;
         }
         Ok(result)

@@ -10,7 +10,7 @@ use pyo3::prelude::*;
 use pyo3::types::{PyList, PyTuple};
 
 use crate::arrays::{array, cube, grid, interleaved, numbers, shape};
-use crate::errors::input;
+use crate::exceptions::input;
 
 /// The stress on every taxel at one moment, with its true forces where they are known.
 #[pyclass(frozen, module = "dermis")]
@@ -30,22 +30,15 @@ impl Frame {
 
 #[pymethods]
 impl Frame {
-    /// Read a frame from a .json or .csv file.
-    ///
-    /// Parameters
-    /// ----------
-    /// path : str or os.PathLike
-    /// scene : Scene, optional
-    ///     Gives the sensor of a file without one, as every CSV file is.
+    /// Read a frame from a .json file that has its sensor; Scene.load_frames reads the others.
     ///
     /// Raises
     /// ------
     /// InputError
     ///     A file that cannot be read; the message names file, line and field.
     #[staticmethod]
-    #[pyo3(signature = (path, scene = None))]
-    fn load(path: PathBuf, scene: Option<&crate::scene::Scene>) -> PyResult<Frame> {
-        Ok(Stress::load(path, scene.map(|scene| scene.spec())).map_err(input)?.into())
+    fn load(path: PathBuf) -> PyResult<Frame> {
+        Ok(Stress::load(path, None).map_err(input)?.into())
     }
 
     /// Name of the frame.

@@ -9,12 +9,16 @@
 //! | module | does |
 //! |---|---|
 //! | [`arrays`] | arrays of numbers to and from Python |
-//! | [`errors`] | errors of the crates as Python exceptions; relative errors of a force |
+//! | [`errors`] | relative errors of a force |
+//! | [`exceptions`] | errors of the crates as Python exceptions |
 //! | [`frame`] | frames with known forces, and frames from arrays |
 //! | [`contact`] | contacts as dictionaries |
 //! | [`engine`] | the two models of a scene, built when they are first needed |
 //! | [`reconstruction`] | results |
 //! | [`scene`] | scenes, and what is computed of them |
+//! | [`trace`] | the stages of a frame, integers beside floating point |
+//! | [`noise`] | errors under noise |
+//! | [`board`] | a board on a serial port |
 //!
 //! The interpreter is released while a model computes. `python/dermis/_dermis.pyi` has the types, which a test compares with
 //! this module.
@@ -23,22 +27,32 @@
 #![allow(non_snake_case)]
 
 pub mod arrays;
+pub mod board;
 pub mod contact;
 pub mod engine;
 pub mod errors;
+pub mod exceptions;
 pub mod frame;
+pub mod noise;
 pub mod reconstruction;
 pub mod scene;
+pub mod trace;
 
 /// What Python imports as `dermis._dermis`; the package `dermis` hands it on.
 #[pyo3::pymodule]
 mod _dermis {
     #[pymodule_export]
-    use crate::errors::{errors, Errors, InputError};
+    use crate::board::{Answers, Board, BoardError};
+    #[pymodule_export]
+    use crate::errors::{errors, Errors};
+    #[pymodule_export]
+    use crate::exceptions::InputError;
     #[pymodule_export]
     use crate::frame::Frame;
     #[pymodule_export]
     use crate::reconstruction::{Contact, Reconstruction, Reconstructions};
     #[pymodule_export]
     use crate::scene::Scene;
+    #[pymodule_export]
+    use crate::trace::Stage;
 }

@@ -13,7 +13,7 @@ use std::path::PathBuf;
 use crate::arrays::cube;
 use crate::contact::contacts;
 use crate::engine::{Engine, Models};
-use crate::errors::{input, not_allowed};
+use crate::exceptions::{input, not_allowed};
 use crate::frame::{frames, Frame, Frames};
 use crate::reconstruction::{Reconstruction, Reconstructions};
 
@@ -34,13 +34,17 @@ impl Scene {
         &self.spec
     }
 
-    fn lengths(&self) -> [usize; 2] {
+    /// Rows and columns.
+    pub fn lengths(&self) -> [usize; 2] {
         [self.spec.sensor.rows, self.spec.sensor.cols]
     }
 }
 
-/// A whole number of at least 0.
-fn count<T: TryFrom<i64>>(field: &str, value: i64) -> PyResult<T> {
+/// An argument called `field` as a whole number of at least 0.
+///
+/// # Errors
+/// `InputError` for a negative number or one that is too large.
+pub fn count<T: TryFrom<i64>>(field: &str, value: i64) -> PyResult<T> {
     T::try_from(value).map_err(|_| not_allowed(field, value, "a whole number of at least 0"))
 }
 
