@@ -7,7 +7,7 @@
 >>> result.resultant_N.round(2)
 array([ 1.  , -0.5 ,  5.02])
 
-Units are mm, N and MPa; compression is positive. Arrays are row-major: [rows, cols] or [time, rows, cols]. x points
+Units are mm, N and MPa; compression is positive. Arrays are row-major: (rows, cols) or (time, rows, cols). x points
 towards higher columns, y towards higher rows, both from the array's centre.
 """
 

@@ -54,12 +54,12 @@ pub fn shape(lengths: &[usize]) -> String {
     }
 }
 
-/// An array of shape [n].
+/// An array of shape (n,).
 pub fn array<'py, const N: usize>(py: Python<'py>, values: [f64; N]) -> Bound<'py, PyArray1<f64>> {
     PyArray1::from_slice(py, &values)
 }
 
-/// Row-major values as an array of shape [rows, cols].
+/// Row-major values as an array of shape (rows, cols).
 ///
 /// # Errors
 /// Another number of values.

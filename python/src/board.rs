@@ -123,7 +123,7 @@ impl Board {
     ///
     /// Parameters
     /// ----------
-    /// frame : array of shape [rows, cols], or Frame
+    /// frame : array of shape (rows, cols), or Frame
     ///     As in Scene.reconstruct.
     ///
     /// Raises
@@ -142,7 +142,7 @@ impl Board {
     ///
     /// Parameters
     /// ----------
-    /// frames : iterable of arrays of shape [rows, cols], or of Frame
+    /// frames : iterable of arrays of shape (rows, cols), or of Frame
     ///     Also one that never ends, such as a generator that reads a sensor.
     ///
     /// Returns

@@ -51,9 +51,9 @@ impl Errors {
 ///
 /// Parameters
 /// ----------
-/// reference_N : array of shape [3]
+/// reference_N : array of shape (3,)
 ///     The true force in N: x, y, normal.
-/// value_N : array of shape [3]
+/// value_N : array of shape (3,)
 ///     The force found in N.
 ///
 /// Raises

@@ -47,19 +47,19 @@ impl Frame {
         &self.0.id
     }
 
-    /// Normal stress in MPa, shape [rows, cols]; compression is positive.
+    /// Normal stress in MPa, shape (rows, cols); compression is positive.
     #[getter]
     fn stress_MPa<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
         grid(py, &self.0.stress_MPa, self.lengths())
     }
 
-    /// True force of all contacts in N, shape [3]: x, y, normal; None where it is not known.
+    /// True force of all contacts in N, shape (3,): x, y, normal; None where it is not known.
     #[getter]
     fn resultant_N<'py>(&self, py: Python<'py>) -> Option<Bound<'py, PyArray1<f64>>> {
         self.0.resultant_N.map(|force| array(py, force))
     }
 
-    /// True force on each taxel's cell in N, shape [rows, cols, 3]; None where it is not known.
+    /// True force on each taxel's cell in N, shape (rows, cols, 3); None where it is not known.
     #[getter]
     fn cell_forces_N<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyArray3<f64>>>> {
         let [rows, cols] = self.lengths();
@@ -86,7 +86,7 @@ pub struct Frames {
     pub single: bool,
 }
 
-/// The frames of the argument `frames`: an array of shape [rows, cols] or [time, rows, cols], a `Frame`, a list of them.
+/// The frames of the argument `frames`: an array of shape (rows, cols) or (time, rows, cols), a `Frame`, a list of them.
 ///
 /// # Errors
 /// `InputError` for another shape or type, or a number that is not finite.

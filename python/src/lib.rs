@@ -1,7 +1,7 @@
 //! The Python package `dermis`: scenes, reconstructions and boards on NumPy arrays.
 //!
 //! ```text
-//! array [rows, cols] or [time, rows, cols] ── frame ── Golden, Model ── reconstruction ── arrays, contacts, flags
+//! array (rows, cols) or (time, rows, cols) ── frame ── Golden, Model ── reconstruction ── arrays, contacts, flags
 //! ```
 //! Everything is computed by the crates of this workspace; here values are only converted. What a result or error says
 //! is what the program `dermis` says of the same input.

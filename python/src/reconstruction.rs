@@ -71,31 +71,31 @@ impl From<&Region> for Contact {
 
 #[pymethods]
 impl Contact {
-    /// Centre of pressure in mm from the array's centre, shape [2]: x, y; None without compressive forces.
+    /// Centre of pressure in mm from the array's centre, shape (2,): x, y; None without compressive forces.
     #[getter]
     fn centre_mm<'py>(&self, py: Python<'py>) -> Option<Bound<'py, PyArray1<f64>>> {
         self.centre_mm.map(|centre| array(py, centre))
     }
 
-    /// Ratio of shear to normal force, shape [2]: x, y.
+    /// Ratio of shear to normal force, shape (2,): x, y.
     #[getter]
     fn mu<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
         array(py, self.mu)
     }
 
-    /// Force in N, shape [3]: x, y, normal.
+    /// Force in N, shape (3,): x, y, normal.
     #[getter]
     fn force_N<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
         array(py, self.force_N)
     }
 
-    /// Standard deviation of the force in N, shape [3]; None where the estimator gives none.
+    /// Standard deviation of the force in N, shape (3,); None where the estimator gives none.
     #[getter]
     fn sigma_N<'py>(&self, py: Python<'py>) -> Option<Bound<'py, PyArray1<f64>>> {
         self.sigma_N.map(|sigma| array(py, sigma))
     }
 
-    /// Covariance of mu, shape [2, 2]; None where the estimator gives none.
+    /// Covariance of mu, shape (2, 2); None where the estimator gives none.
     #[getter]
     fn mu_covariance<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyArray2<f64>>>> {
         self.mu_covariance.map(|[xx, xy, yy]| grid(py, &[xx, xy, xy, yy], [2, 2])).transpose()
@@ -149,7 +149,7 @@ impl Reconstruction {
         &self.result.engine
     }
 
-    /// Force on each taxel in N, shape [rows, cols, 3]: x, y, normal; None with output.forces = "resultants".
+    /// Force on each taxel in N, shape (rows, cols, 3): x, y, normal; None with output.forces = "resultants".
     #[getter]
     fn forces_N<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyArray3<f64>>>> {
         let forces = &self.result.forces_N;
@@ -157,7 +157,7 @@ impl Reconstruction {
         given.then(|| cube(py, interleaved(forces).collect(), [self.rows, self.cols, 3])).transpose()
     }
 
-    /// Sum of the forces in N, shape [3]: x, y, normal.
+    /// Sum of the forces in N, shape (3,): x, y, normal.
     #[getter]
     fn resultant_N<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
         array(py, self.result.resultant_N)
@@ -244,7 +244,7 @@ impl Reconstructions {
         Ok(PyList::new(py, all)?.try_iter()?.into_any())
     }
 
-    /// Force on each taxel in N, shape [time, rows, cols, 3]: x, y, normal; None with output.forces = "resultants".
+    /// Force on each taxel in N, shape (time, rows, cols, 3): x, y, normal; None with output.forces = "resultants".
     #[getter]
     fn forces_N<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyArray4<f64>>>> {
         if self.results.iter().any(|result| result.forces_N.fz.is_empty()) {
@@ -255,7 +255,7 @@ impl Reconstructions {
         PyArray1::from_vec(py, forces).reshape(lengths).map(Some)
     }
 
-    /// Sum of the forces of each result in N, shape [time, 3]: x, y, normal.
+    /// Sum of the forces of each result in N, shape (time, 3): x, y, normal.
     #[getter]
     fn resultant_N<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
         let forces: Vec<f64> = self.results.iter().flat_map(|result| result.resultant_N).collect();

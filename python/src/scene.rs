@@ -130,7 +130,7 @@ impl Scene {
         self.spec.sensor.thickness_mm
     }
 
-    /// Centre of each taxel in mm from the array's centre, shape [rows, cols, 2]: x, y.
+    /// Centre of each taxel in mm from the array's centre, shape (rows, cols, 2): x, y.
     #[getter]
     fn positions_mm<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray3<f64>>> {
         let [rows, cols] = self.lengths();
@@ -175,7 +175,7 @@ impl Scene {
     ///
     /// Parameters
     /// ----------
-    /// frames : array of shape [rows, cols] or [time, rows, cols], Frame, or list of Frame
+    /// frames : array of shape (rows, cols) or (time, rows, cols), Frame, or list of Frame
     ///     Normal stress in MPa, compression positive; readings if the scene names a calibration or tare file.
     /// engine : "golden" or "fixed", default "golden"
     ///     The floating-point model, or the integers of the hardware bit for bit. Where the scene states no full scale

@@ -42,25 +42,25 @@ impl Stage {
         self.bits
     }
 
-    /// The integers, shape [words], in the hardware's order.
+    /// The integers, shape (words,), in the hardware's order.
     #[getter]
     fn words<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<i64>> {
         self.words.to_pyarray(py)
     }
 
-    /// What one step of each word is worth, shape [words].
+    /// What one step of each word is worth, shape (words,).
     #[getter]
     fn lsb<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
         self.lsb.to_pyarray(py)
     }
 
-    /// The integers as what they stand for, words * lsb, shape [words].
+    /// The integers as what they stand for, words * lsb, shape (words,).
     #[getter]
     fn fixed<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
         PyArray1::from_iter(py, self.words.iter().zip(&self.lsb).map(|(word, lsb)| *word as f64 * lsb))
     }
 
-    /// The same values in floating point, from the unquantised stress with unrounded matrices, shape [words].
+    /// The same values in floating point, from the unquantised stress with unrounded matrices, shape (words,).
     #[getter]
     fn floating<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
         self.floating.to_pyarray(py)
@@ -80,7 +80,7 @@ impl Scene {
     ///
     /// Parameters
     /// ----------
-    /// frame : array of shape [rows, cols], or Frame
+    /// frame : array of shape (rows, cols), or Frame
     ///
     /// Returns
     /// -------
