@@ -73,9 +73,12 @@ docs: ## build the documentation, warnings are errors
 	@echo '== docs'
 	RUSTDOCFLAGS="-D warnings" $(CARGO) doc --workspace --no-deps
 
-bench: setup ## time a golden reconstruction, and rust-hdl's simulation against Verilator's
+bench: setup ## time a golden reconstruction, rust-hdl's simulation against Verilator's, and Python against Rust
 	$(CARGO) bench --package dermis-golden
 	$(CARGO) bench --package dermis-sim
+	python3 -m venv --clear $(VENV)-release
+	$(VENV)-release/bin/pip install -q --disable-pip-version-check -c python/requirements.txt ./python
+	DERMIS_PYTHON=$(abspath $(VENV))-release/bin/python $(CARGO) bench --package dermis-python
 
 build: program ## generate the hardware of SCENE
 	$(DERMIS) --build-dir $(BUILD) build $(SCENE)
