@@ -11,11 +11,13 @@ VERILATOR ?= verilator
 CARGO_TARGET_DIR ?= target
 DERMIS     = $(CARGO_TARGET_DIR)/release/dermis
 PACKAGES   = verilator iverilog yosys nextpnr-ice40 fpga-icestorm g++ make chromium python3-venv
+# A clean environment for the Python package and its tests.
+VENV       = $(BUILD)/python
 # The short report: make report QUICK=1
 QUICK     ?=
 
 .DEFAULT_GOAL := help
-.PHONY: help setup tools program run test fmt clippy unit lint quick docs bench build cosim bitstream report guide netlist fuzz stress nightly train clean
+.PHONY: help setup tools program run test fmt clippy unit lint quick python docs bench build cosim bitstream report guide netlist fuzz stress nightly train clean
 
 help: ## list the targets
 	@sed -n 's/^\([a-z]*\):.*## /\1	/p' $(MAKEFILE_LIST) | expand -t 10
@@ -36,7 +38,7 @@ program: setup
 run: program ## co-simulate SCENES on their shipped frames and print the table
 	$(DERMIS) --build-dir $(BUILD) table --cosim $(SCENES)
 
-test: setup fmt clippy unit quick docs ## run all checks, as .ci/run does
+test: setup fmt clippy unit quick python docs ## run all checks, as .ci/run does
 
 fmt: ## check the formatting
 	@echo '== fmt'
@@ -58,13 +60,25 @@ quick: setup ## write the short report to build/report-quick
 	@echo '== quick report'
 	$(CARGO) run --quiet --bin dermis -- --build-dir $(BUILD) report --quick --out $(BUILD)/report-quick
 
+# The profile of the other tests, whose compiled crates are used again; `pip install ./python` alone takes release.
+python: setup ## build the Python package, install it into a new environment, build/python, and test it there
+	@echo '== python'
+	$(CARGO) build --quiet --bin dermis
+	python3 -m venv --clear $(VENV)
+	$(VENV)/bin/pip install -q --disable-pip-version-check -r python/requirements.txt
+	MATURIN_PEP517_ARGS='--profile dev' $(VENV)/bin/pip install -q --disable-pip-version-check ./python
+	DERMIS=$(abspath $(CARGO_TARGET_DIR))/debug/dermis $(VENV)/bin/python -m pytest python
+
 docs: ## build the documentation, warnings are errors
 	@echo '== docs'
 	RUSTDOCFLAGS="-D warnings" $(CARGO) doc --workspace --no-deps
 
-bench: setup ## time a golden reconstruction, and rust-hdl's simulation against Verilator's
+bench: setup ## time a golden reconstruction, rust-hdl's simulation against Verilator's, and Python against Rust
 	$(CARGO) bench --package dermis-golden
 	$(CARGO) bench --package dermis-sim
+	python3 -m venv --clear $(VENV)-release
+	$(VENV)-release/bin/pip install -q --disable-pip-version-check -c python/requirements.txt ./python
+	DERMIS_PYTHON=$(abspath $(VENV))-release/bin/python $(CARGO) bench --package dermis-python
 
 build: program ## generate the hardware of SCENE
 	$(DERMIS) --build-dir $(BUILD) build $(SCENE)

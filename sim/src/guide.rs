@@ -31,6 +31,7 @@ pages! {
     "your-sensor.md" your_sensor,
     "recordings.md" recordings,
     "files.md" files,
+    "python.md" python,
     "accuracy.md" accuracy,
     "limits.md" limits,
     "partitions.md" partitions,

@@ -48,6 +48,7 @@ pub use extremes::extremes;
 pub use faults::faults;
 pub use guide::{fixed_pictures, time_picture, timing_picture, PictureFile};
 pub use host::{equality, link_times, resultants, wire_times};
+pub use measure::{trace, ComparedWords};
 pub use noise::{noise, noise_medians};
 pub use noise_shapes::{coverage, sensitivity, shape_medians, shapes};
 pub use ports::{blocks, ports};

@@ -8,8 +8,10 @@ use std::path::{Path, PathBuf};
 /// The phrases, from the repository's root.
 const LIST: &str = "tests/words.txt";
 /// Text files by the end of their name.
-const ENDINGS: [&str; 12] =
-    [".rs", ".md", ".toml", ".v", ".vlt", ".cpp", ".sh", ".case", ".yml", ".lpf", ".pcf", "Makefile"];
+const ENDINGS: [&str; 15] = [
+    ".rs", ".md", ".toml", ".v", ".vlt", ".cpp", ".py", ".pyi", ".ipynb", ".sh", ".case", ".yml", ".lpf", ".pcf",
+    "Makefile",
+];
 /// Folders that hold no text of ours.
 const SKIPPED: [&str; 4] = ["target", "build", "data", "corpus"];
 /// What a line of a comment, or of a table, may begin with.

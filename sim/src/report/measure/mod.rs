@@ -32,5 +32,5 @@ pub use noise::noise;
 pub use objective_map::{objective_map, ObjectiveMap};
 pub use recordings::{recorded, Recorded, MOST_FRAMES};
 pub use stability::{conditions, extremes};
-pub use stages::{stages, StageRow};
+pub use stages::{stages, trace, ComparedWords, StageRow};
 pub use sweep::{sweep, SweepPoint};

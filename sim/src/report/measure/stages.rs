@@ -21,17 +21,23 @@
 //!
 //! Stage `forces` thus shows the error of the arithmetic alone, stage `send` the error of arithmetic and search.
 
+use anyhow::{bail, Result};
 use dermis_golden::board::EngineKind;
 use dermis_golden::fixed::stages::pass::join_limbs;
 use dermis_golden::fixed::stages::send::{Status, STATUS_BEATS};
 use dermis_golden::fixed::words::arith::bit_length;
 use dermis_golden::fixed::words::formats::{Formats, MU_STEPS, SEARCH_EXTRA_BITS};
 use dermis_golden::fixed::words::schedule::{by_limbs, is_transposed, schedule, vectors, EXPONENTS};
+use dermis_golden::fixed::{Model, Trace};
 use dermis_golden::float::pass::Polynomial;
+use dermis_golden::float::Golden;
+use dermis_golden::frame::Frame;
 use dermis_golden::reception::full_scale;
+use dermis_golden::reconstruct::Reconstruction;
+use dermis_golden::scene::Scene;
 use dermis_golden::symmetry::parity::hadamard;
 
-use super::measured::{BitTrue, Measured};
+use super::measured::Measured;
 
 /// One stage of one frame.
 #[derive(Clone, Debug, PartialEq)]
@@ -60,19 +66,23 @@ pub struct StageRow {
     pub saturations: u32,
 }
 
-/// Words with their floating-point references in LSB, and the value of an LSB.
-#[derive(Default)]
-struct ComparedWords {
-    words: Vec<i64>,
-    values: Vec<f64>,
-    lsb: Vec<f64>,
+/// Words of a stage with their floating-point references in LSB, and the value of an LSB.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct ComparedWords {
+    /// The integers.
+    pub words: Vec<i64>,
+    /// The reference of each, in its LSB.
+    pub values: Vec<f64>,
+    /// What an LSB of each is worth: MPa up to `fold`, then N; of `search` the step of μ.
+    pub lsb: Vec<f64>,
 }
 
 impl ComparedWords {
-    fn add(&mut self, words: impl IntoIterator<Item = i64>, values: impl IntoIterator<Item = f64>) {
+    /// Adds words with a common LSB.
+    fn add(&mut self, words: impl IntoIterator<Item = i64>, values: impl IntoIterator<Item = f64>, lsb: f64) {
         self.words.extend(words);
         self.values.extend(values);
-        self.lsb.resize(self.words.len(), 1.0);
+        self.lsb.resize(self.words.len(), lsb);
     }
 
     /// Adds a quad of words with a common LSB.
@@ -86,25 +96,13 @@ impl ComparedWords {
 /// All stages of a frame in pipeline order; empty without bit-true model.
 pub fn stages(measured: &Measured, index: usize) -> Vec<StageRow> {
     let Ok(bit_true) = &measured.bit_true else { return Vec::new() };
-    let reference = FloatReference::new(measured, bit_true, index);
-    let f = &bit_true.model.formats();
-    let sum = |pick: fn(&Status) -> u32| reference.status.iter().map(pick).sum::<u32>();
-    let accumulator = match bit_true.model.board.engine {
-        EngineKind::Parallel => f.lane_bits,
-        EngineKind::Serial => f.acc_bits,
-    };
-    let bits = [
-        ("receive", f.code_bits, 0),
-        ("normalise", f.input_bits, 0),
-        ("fold", f.fold_bits, 0),
-        ("pass", accumulator, 0),
-        ("rescale", f.vector_bits, sum(|status| status.rescale_saturations)),
-        ("relax", f.vector_bits, 0),
-        ("unfold", f.vector_bits + 2, 0),
-        ("search", bit_length(MU_STEPS as u64) + 1, 0),
-        ("forces", f.search_bits[0], 0),
-        ("send", 32, reference.status.first().map_or(0, |status| status.force_saturations)),
-    ];
+    let reference = FloatReference::new(
+        &bit_true.model,
+        &measured.engine,
+        &measured.frames[index],
+        &measured.golden[index],
+        &bit_true.traces[index],
+    );
     let row = |(stage, has_bits, saturations)| {
         let compared = reference.compared_words(stage);
         let off = || compared.words.iter().zip(&compared.values).map(|(word, value)| (*word as f64 - value).abs());
@@ -136,14 +134,37 @@ pub fn stages(measured: &Measured, index: usize) -> Vec<StageRow> {
             saturations,
         }
     };
-    bits.into_iter().map(row).filter(|row| row.used_bits > 0).collect()
+    reference.bits().into_iter().map(row).filter(|row| row.used_bits > 0).collect()
+}
+
+/// The words of every stage of one frame beside their references: name, width in bits, words; in pipeline order.
+///
+/// # Errors
+/// A scene without hardware, one whose frames are averaged or whose case is chosen per frame, a frame of another sensor.
+pub fn trace(scene: &Scene, frame: &Frame) -> Result<Vec<(&'static str, u32, ComparedWords)>> {
+    if scene.input.average > 0 {
+        bail!("scene {}: input.average = {}: stages are compared without averaging", scene.name, scene.input.average);
+    }
+    let engine = Golden::new(&scene.for_hardware())?;
+    let frames = std::slice::from_ref(frame);
+    let model = Model::for_frames(scene, frames)?;
+    if model.chooses() {
+        bail!("scene {}: partition.case = {}: stages are compared in one case", scene.name, scene.partition.case);
+    }
+    let (golden, trace) = (engine.run(frame)?, model.run(&model.readings(frames)?));
+    let stress = model.stress(frames)?;
+    let reference = FloatReference::new(&model, &engine, &stress, &golden, &trace);
+    let compared = reference.bits().map(|(stage, bits, _)| (stage, bits, reference.compared_words(stage)));
+    Ok(compared.into_iter().filter(|(_, _, compared)| !compared.words.is_empty()).collect())
 }
 
 /// Floating-point reference of a frame.
 struct FloatReference<'a> {
-    measured: &'a Measured,
-    bit_true: &'a BitTrue,
-    index: usize,
+    model: &'a Model,
+    /// The frame's stress.
+    frame: &'a Frame,
+    golden: &'a Reconstruction,
+    trace: &'a Trace,
     status: Vec<Status>,
     /// Stress of one LSB of a code.
     code_MPa: f64,
@@ -152,37 +173,63 @@ struct FloatReference<'a> {
 }
 
 impl<'a> FloatReference<'a> {
-    fn new(measured: &'a Measured, bit_true: &'a BitTrue, index: usize) -> Self {
-        let (model, frame) = (&bit_true.model, &measured.frames[index]);
-        let beats = &bit_true.traces[index].status;
+    fn new(
+        model: &'a Model,
+        engine: &'a Golden,
+        frame: &'a Frame,
+        golden: &'a Reconstruction,
+        trace: &'a Trace,
+    ) -> Self {
         let stress = |part: &dermis_golden::partition::Subarray| part.gather(&model.scene.sensor, &frame.stress_MPa);
-        let family = |b: Vec<f64>| Polynomial::of_degree(measured.engine.matrices(), &b, model.formats().degree);
+        let family = |b: Vec<f64>| Polynomial::of_degree(engine.matrices(), &b, model.formats().degree);
         FloatReference {
-            measured,
-            bit_true,
-            index,
-            status: beats.chunks(STATUS_BEATS).filter_map(Status::of_beats).collect(),
+            model,
+            frame,
+            golden,
+            trace,
+            status: trace.status.chunks(STATUS_BEATS).filter_map(Status::of_beats).collect(),
             code_MPa: full_scale(&model.scene, frame) / model.prepare.largest(),
             families: model.parts().iter().map(|part| family(stress(part))).collect(),
         }
     }
 
     fn formats(&self) -> &Formats {
-        self.bit_true.model.formats()
+        self.model.formats()
+    }
+
+    /// Stages, widths of their words, and numbers of saturated words.
+    fn bits(&self) -> [(&'static str, u32, u32); 10] {
+        let f = self.formats();
+        let sum = |pick: fn(&Status) -> u32| self.status.iter().map(pick).sum::<u32>();
+        let accumulator = match self.model.board.engine {
+            EngineKind::Parallel => f.lane_bits,
+            EngineKind::Serial => f.acc_bits,
+        };
+        [
+            ("receive", f.code_bits, 0),
+            ("normalise", f.input_bits, 0),
+            ("fold", f.fold_bits, 0),
+            ("pass", accumulator, 0),
+            ("rescale", f.vector_bits, sum(|status| status.rescale_saturations)),
+            ("relax", f.vector_bits, 0),
+            ("unfold", f.vector_bits + 2, 0),
+            ("search", bit_length(MU_STEPS as u64) + 1, 0),
+            ("forces", f.search_bits[0], 0),
+            ("send", 32, self.status.first().map_or(0, |status| status.force_saturations)),
+        ]
     }
 
     /// The words of a stage, of all subarrays in order; four fields per quad.
     fn words(&self, stage: &str) -> &[Vec<i64>] {
-        let stages = &self.bit_true.traces[self.index].stages;
-        stages.iter().find(|s| s.name == stage).map_or(&[], |s| &s.words)
+        self.trace.stages.iter().find(|s| s.name == stage).map_or(&[], |s| &s.words)
     }
 
     fn compared_words(&self, stage: &str) -> ComparedWords {
         let mut compared = ComparedWords::default();
         match stage {
             "receive" => {
-                let values = self.measured.frames[self.index].stress_MPa.iter().map(|b| b / self.code_MPa);
-                compared.add(self.words(stage).iter().flatten().copied(), values);
+                let values = self.frame.stress_MPa.iter().map(|b| b / self.code_MPa);
+                compared.add(self.words(stage).iter().flatten().copied(), values, self.code_MPa);
             }
             "search" => self.search(&mut compared),
             "send" => self.send(&mut compared),
@@ -201,7 +248,7 @@ impl<'a> FloatReference<'a> {
 
     /// The rows of `pass` of one subarray, those of v_00 with all their limbs.
     fn joined(&self, words: &[Vec<i64>]) -> Vec<Vec<i64>> {
-        let (f, engine) = (self.formats(), self.bit_true.model.board.engine);
+        let (f, engine) = (self.formats(), self.model.board.engine);
         let limbs = if engine == EngineKind::Parallel { by_limbs(&schedule(f)[0]).len() } else { 1 };
         let quads: Vec<[i64; 4]> = words.iter().map(|word| [0, 1, 2, 3].map(|parity| word[parity])).collect();
         let (first, later) = quads.split_at(limbs * f.quads);
@@ -211,37 +258,37 @@ impl<'a> FloatReference<'a> {
 
     /// Adds μ of every subarray that was searched.
     fn search(&self, compared: &mut ComparedWords) {
-        let step = self.measured.scene.search.mu_max / MU_STEPS as f64;
-        let golden = &self.measured.golden[self.index].subarrays;
+        let step = self.model.scene.search.mu_max / MU_STEPS as f64;
+        let golden = &self.golden.subarrays;
         for (status, golden) in self.status.iter().zip(golden).filter(|(_, golden)| golden.objective_value.is_some()) {
-            compared.add(status.position.map(i64::from), golden.mu.map(|mu| mu / step));
+            compared.add(status.position.map(i64::from), golden.mu.map(|mu| mu / step), step);
         }
     }
 
     /// Adds the output forces.
     fn send(&self, compared: &mut ComparedWords) {
-        let model = &self.bit_true.model;
+        let model = self.model;
         if model.sends_resultants() {
             return;
         }
         let lsb_N = model.force_lsb_N(self.code_MPa * model.prepare.largest());
-        let forces = &self.measured.golden[self.index].forces_N;
-        let beats = &self.bit_true.traces[self.index].beats;
+        let forces = &self.golden.forces_N;
+        let beats = &self.trace.beats;
         for (k, axis) in [&forces.fx, &forces.fy, &forces.fz].into_iter().enumerate() {
-            compared.add(beats.iter().map(|beat| i64::from(beat[k])), axis.iter().map(|f| f / lsb_N));
+            compared.add(beats.iter().map(|beat| i64::from(beat[k])), axis.iter().map(|f| f / lsb_N), lsb_N);
         }
     }
 
     /// The reference values of a stage of one subarray in quads, in LSB, each with its LSB in MPa or N.
     fn quads(&self, stage: &str, part: usize) -> Vec<([f64; 4], f64)> {
-        let (f, model, status) = (self.formats(), &self.bit_true.model, &self.status[part]);
+        let (f, model, status) = (self.formats(), self.model, &self.status[part]);
         let layout = model.layout();
-        let scene = &self.measured.scene;
+        let scene = &self.model.scene;
         let code = self.code_MPa / 2f64.powi(status.normalise as i32);
         let raw = code * 2f64.powi(f.raw_shift as i32 - f.inverse_exponent);
         let word = raw * 2f64.powi(status.rescale as i32);
         let stress = || {
-            let b = model.parts()[part].gather(&scene.sensor, &self.measured.frames[self.index].stress_MPa);
+            let b = model.parts()[part].gather(&scene.sensor, &self.frame.stress_MPa);
             layout.pack(&b).into_iter()
         };
         let family = &self.families[part];
@@ -289,8 +336,8 @@ impl<'a> FloatReference<'a> {
 impl FloatReference<'_> {
     /// The same for the steps of `relax`: v_00, then p or the products that are added to v_00; `raw` and `word` are LSBs.
     fn relaxed(&self, stage: &str, part: usize, [raw, word]: [f64; 2]) -> Vec<([f64; 4], f64)> {
-        let (f, layout) = (self.formats(), self.bit_true.model.layout());
-        let step = self.measured.scene.search.mu_max / MU_STEPS as f64;
+        let (f, layout) = (self.formats(), self.model.layout());
+        let step = self.model.scene.search.mu_max / MU_STEPS as f64;
         let mu = self.status[part].position.map(|position| f64::from(position) * step);
         // After so many steps p has the terms up to that degree.
         let after = |degree: usize| {
@@ -325,7 +372,7 @@ mod tests {
     use super::*;
     use crate::jobs::Interrupt;
     use dermis_golden::partition::Case;
-    use dermis_golden::scene::{Condition, Scene};
+    use dermis_golden::scene::Condition;
 
     #[test]
     fn every_stage_is_near_its_float_in_every_case() {

@@ -1,0 +1,58 @@
+//! The Python package `dermis`: scenes, reconstructions and boards on NumPy arrays.
+//!
+//! ```text
+//! array (rows, cols) or (time, rows, cols) ── frame ── Golden, Model ── reconstruction ── arrays, contacts, flags
+//! ```
+//! Everything is computed by the crates of this workspace; here values are only converted. What a result or error says
+//! is what the program `dermis` says of the same input.
+//!
+//! | module | does |
+//! |---|---|
+//! | [`arrays`] | arrays of numbers to and from Python |
+//! | [`errors`] | relative errors of a force |
+//! | [`exceptions`] | errors of the crates as Python exceptions |
+//! | [`frame`] | frames with known forces, and frames from arrays |
+//! | [`contact`] | contacts as dictionaries |
+//! | [`engine`] | the two models of a scene, built when they are first needed |
+//! | [`reconstruction`] | results |
+//! | [`scene`] | scenes, and what is computed of them |
+//! | [`trace`] | the stages of a frame, integers beside floating point |
+//! | [`noise`] | errors under noise |
+//! | [`board`] | a board on a serial port |
+//!
+//! The interpreter is released while a model computes. `python/dermis/_dermis.pyi` has the types, which a test compares with
+//! this module.
+#![deny(missing_docs)]
+// Names carry their unit as SI writes it, here and in Python: `stress_MPa`, `resultant_N`.
+#![allow(non_snake_case)]
+
+pub mod arrays;
+pub mod board;
+pub mod contact;
+pub mod engine;
+pub mod errors;
+pub mod exceptions;
+pub mod frame;
+pub mod noise;
+pub mod reconstruction;
+pub mod scene;
+pub mod trace;
+
+/// What Python imports as `dermis._dermis`; the package `dermis` hands it on.
+#[pyo3::pymodule]
+mod _dermis {
+    #[pymodule_export]
+    use crate::board::{Answers, Board, BoardError};
+    #[pymodule_export]
+    use crate::errors::{errors, Errors};
+    #[pymodule_export]
+    use crate::exceptions::InputError;
+    #[pymodule_export]
+    use crate::frame::Frame;
+    #[pymodule_export]
+    use crate::reconstruction::{Contact, Reconstruction, Reconstructions};
+    #[pymodule_export]
+    use crate::scene::Scene;
+    #[pymodule_export]
+    use crate::trace::Stage;
+}

@@ -1,0 +1,280 @@
+//! Results: of one frame, and of frames in the order of time.
+
+use std::sync::Arc;
+
+use dermis_golden::evidence::ContactEstimate;
+use dermis_golden::flags::Flag;
+use dermis_golden::reconstruct::{Reconstruction as Solved, Region};
+use numpy::{PyArray1, PyArray2, PyArray3, PyArray4, PyArrayMethods};
+use pyo3::exceptions::{PyIndexError, PyRuntimeError};
+use pyo3::prelude::*;
+use pyo3::types::{PyAny, PyDict, PyList};
+use serde::Serialize;
+
+use crate::arrays::{array, cube, grid, interleaved};
+use crate::errors::Errors;
+
+/// JSON of a value.
+///
+/// # Errors
+/// A number that JSON cannot represent: a defect of Dermis.
+pub fn json(value: &impl Serialize) -> PyResult<String> {
+    serde_json::to_string(value).map_err(|error| PyRuntimeError::new_err(error.to_string()))
+}
+
+/// A value as the dictionaries, lists and numbers of its JSON.
+///
+/// # Errors
+/// As [`json`].
+pub fn plain<'py>(py: Python<'py>, value: &impl Serialize) -> PyResult<Bound<'py, PyAny>> {
+    py.import("json")?.call_method1("loads", (json(value)?,))
+}
+
+fn flags<'py>(py: Python<'py>, flags: &[Flag]) -> PyResult<Bound<'py, PyAny>> {
+    plain(py, &flags)
+}
+
+/// One contact of a result.
+#[pyclass(frozen, module = "dermis")]
+pub struct Contact {
+    centre_mm: Option<[f64; 2]>,
+    mu: [f64; 2],
+    force_N: [f64; 3],
+    sigma_N: Option<[f64; 3]>,
+    /// xx, xy, yy.
+    mu_covariance: Option<[f64; 3]>,
+}
+
+impl From<&ContactEstimate> for Contact {
+    fn from(found: &ContactEstimate) -> Contact {
+        Contact {
+            centre_mm: Some(found.centre_mm),
+            mu: found.mu,
+            force_N: found.force_N,
+            sigma_N: Some(found.sigma_N),
+            mu_covariance: Some(found.mu_covariance),
+        }
+    }
+}
+
+impl From<&Region> for Contact {
+    fn from(region: &Region) -> Contact {
+        Contact {
+            centre_mm: region.centre_mm,
+            mu: region.mu,
+            force_N: region.load_N,
+            sigma_N: None,
+            mu_covariance: None,
+        }
+    }
+}
+
+#[pymethods]
+impl Contact {
+    /// Centre of pressure in mm from the array's centre, shape (2,): x, y; None without compressive forces.
+    #[getter]
+    fn centre_mm<'py>(&self, py: Python<'py>) -> Option<Bound<'py, PyArray1<f64>>> {
+        self.centre_mm.map(|centre| array(py, centre))
+    }
+
+    /// Ratio of shear to normal force, shape (2,): x, y.
+    #[getter]
+    fn mu<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        array(py, self.mu)
+    }
+
+    /// Force in N, shape (3,): x, y, normal.
+    #[getter]
+    fn force_N<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        array(py, self.force_N)
+    }
+
+    /// Standard deviation of the force in N, shape (3,); None where the estimator gives none.
+    #[getter]
+    fn sigma_N<'py>(&self, py: Python<'py>) -> Option<Bound<'py, PyArray1<f64>>> {
+        self.sigma_N.map(|sigma| array(py, sigma))
+    }
+
+    /// Covariance of mu, shape (2, 2); None where the estimator gives none.
+    #[getter]
+    fn mu_covariance<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyArray2<f64>>>> {
+        self.mu_covariance.map(|[xx, xy, yy]| grid(py, &[xx, xy, xy, yy], [2, 2])).transpose()
+    }
+
+    fn __repr__(&self) -> String {
+        let [x, y, normal] = self.force_N;
+        let sigma = self.sigma_N.map_or("None".to_owned(), |[x, y, z]| format!("[{x:.3}, {y:.3}, {z:.3}]"));
+        format!("Contact(force_N=[{x:.3}, {y:.3}, {normal:.3}], sigma_N={sigma})")
+    }
+}
+
+/// The forces of one frame.
+#[pyclass(frozen, module = "dermis")]
+pub struct Reconstruction {
+    result: Arc<Solved>,
+    rows: usize,
+    cols: usize,
+}
+
+impl Reconstruction {
+    /// A result on an array of `rows` by `cols` taxels.
+    pub fn new(result: Arc<Solved>, [rows, cols]: [usize; 2]) -> Reconstruction {
+        Reconstruction { result, rows, cols }
+    }
+}
+
+/// The contacts of a result, where it tells them apart.
+fn contacts(result: &Solved) -> Option<Vec<Contact>> {
+    let estimated = result.extra.contacts.as_ref().map(|all| all.iter().map(Contact::from).collect());
+    estimated.or_else(|| result.extra.regions.as_ref().map(|all| all.iter().map(Contact::from).collect()))
+}
+
+#[pymethods]
+impl Reconstruction {
+    /// Name of the scene.
+    #[getter]
+    fn scene(&self) -> &str {
+        &self.result.scene
+    }
+
+    /// Name of the frame.
+    #[getter]
+    fn frame(&self) -> &str {
+        &self.result.frame
+    }
+
+    /// What computed it: "golden", "fixed" or "board".
+    #[getter]
+    fn engine(&self) -> &str {
+        &self.result.engine
+    }
+
+    /// Force on each taxel in N, shape (rows, cols, 3): x, y, normal; None with output.forces = "resultants".
+    #[getter]
+    fn forces_N<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyArray3<f64>>>> {
+        let forces = &self.result.forces_N;
+        let given = !forces.fz.is_empty();
+        given.then(|| cube(py, interleaved(forces).collect(), [self.rows, self.cols, 3])).transpose()
+    }
+
+    /// Sum of the forces in N, shape (3,): x, y, normal.
+    #[getter]
+    fn resultant_N<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        array(py, self.result.resultant_N)
+    }
+
+    /// The contacts: with standard deviations from the estimators "evidence" and "learned", without from
+    /// partition.case = "contacts"; None where the contacts are not told apart.
+    #[getter]
+    fn contacts(&self) -> Option<Vec<Contact>> {
+        contacts(&self.result)
+    }
+
+    /// Errors relative to the frame's known force; None where that is not known.
+    #[getter]
+    fn error(&self) -> Option<Errors> {
+        self.result.error.map(Errors)
+    }
+
+    /// Limitations of the result, as the guide's page on robustness lists them.
+    #[getter]
+    fn flags<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        flags(py, &self.result.flags)
+    }
+
+    /// The figures behind the flags; one that was not computed is absent.
+    #[getter]
+    fn checks<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        Ok(plain(py, &self.result.checks)?.cast_into::<PyDict>()?)
+    }
+
+    /// The result as `dermis reconstruct --json` prints it.
+    fn to_json(&self) -> PyResult<String> {
+        json(&*self.result)
+    }
+
+    /// The fields of `to_json` as dictionaries and lists.
+    fn to_dict<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        Ok(plain(py, &*self.result)?.cast_into::<PyDict>()?)
+    }
+
+    fn __repr__(&self) -> PyResult<String> {
+        let [x, y, normal] = self.result.resultant_N;
+        let flags = json(&self.result.flags)?;
+        Ok(format!("Reconstruction(resultant_N=[{x:.3}, {y:.3}, {normal:.3}], flags={flags})"))
+    }
+}
+
+/// The results of frames in the order of time.
+#[pyclass(frozen, module = "dermis")]
+pub struct Reconstructions {
+    results: Vec<Arc<Solved>>,
+    rows: usize,
+    cols: usize,
+}
+
+impl Reconstructions {
+    /// Results on an array of `rows` by `cols` taxels.
+    pub fn new(results: Vec<Arc<Solved>>, [rows, cols]: [usize; 2]) -> Reconstructions {
+        Reconstructions { results, rows, cols }
+    }
+
+    fn one(&self, result: &Arc<Solved>) -> Reconstruction {
+        Reconstruction::new(Arc::clone(result), [self.rows, self.cols])
+    }
+}
+
+#[pymethods]
+impl Reconstructions {
+    fn __len__(&self) -> usize {
+        self.results.len()
+    }
+
+    fn __getitem__(&self, index: isize) -> PyResult<Reconstruction> {
+        let length = self.results.len();
+        let counted = if index < 0 { index.checked_add_unsigned(length) } else { Some(index) };
+        let place = counted.and_then(|index| usize::try_from(index).ok());
+        let result = place.and_then(|index| self.results.get(index));
+        let absent = || PyIndexError::new_err(format!("index {index} of {length} results"));
+        result.map(|result| self.one(result)).ok_or_else(absent)
+    }
+
+    fn __iter__<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        let all: Vec<Reconstruction> = self.results.iter().map(|result| self.one(result)).collect();
+        Ok(PyList::new(py, all)?.try_iter()?.into_any())
+    }
+
+    /// Force on each taxel in N, shape (time, rows, cols, 3): x, y, normal; None with output.forces = "resultants".
+    #[getter]
+    fn forces_N<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyArray4<f64>>>> {
+        if self.results.iter().any(|result| result.forces_N.fz.is_empty()) {
+            return Ok(None);
+        }
+        let forces: Vec<f64> = self.results.iter().flat_map(|result| interleaved(&result.forces_N)).collect();
+        let lengths = [self.results.len(), self.rows, self.cols, 3];
+        PyArray1::from_vec(py, forces).reshape(lengths).map(Some)
+    }
+
+    /// Sum of the forces of each result in N, shape (time, 3): x, y, normal.
+    #[getter]
+    fn resultant_N<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        let forces: Vec<f64> = self.results.iter().flat_map(|result| result.resultant_N).collect();
+        grid(py, &forces, [self.results.len(), 3])
+    }
+
+    /// The contacts of each result, as in Reconstruction.
+    #[getter]
+    fn contacts(&self) -> Vec<Option<Vec<Contact>>> {
+        self.results.iter().map(|result| contacts(result)).collect()
+    }
+
+    /// The flags of each result.
+    #[getter]
+    fn flags<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        plain(py, &self.results.iter().map(|result| &result.flags).collect::<Vec<_>>())
+    }
+
+    fn __repr__(&self) -> String {
+        format!("Reconstructions({} of {}×{} taxels)", self.results.len(), self.rows, self.cols)
+    }
+}

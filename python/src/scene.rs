@@ -1,0 +1,317 @@
+//! Scenes, and what is computed of them.
+
+use std::sync::Arc;
+
+use dermis_golden::frame::{Frame as Stress, FrameError};
+use dermis_golden::generator::converter::Converter;
+use dermis_golden::generator::{generate, random_contacts, Draw, Shapes};
+use dermis_golden::scene::Scene as Spec;
+use numpy::PyArray3;
+use pyo3::prelude::*;
+use std::path::PathBuf;
+
+use crate::arrays::cube;
+use crate::contact::contacts;
+use crate::engine::{Engine, Models};
+use crate::exceptions::{input, not_allowed};
+use crate::frame::{frames, Frame, Frames};
+use crate::reconstruction::{Reconstruction, Reconstructions};
+
+/// A sensor and the method that reconstructs its forces.
+#[pyclass(frozen, module = "dermis")]
+pub struct Scene {
+    spec: Spec,
+    models: Models,
+}
+
+impl Scene {
+    fn new(spec: Spec) -> Scene {
+        Scene { spec, models: Models::default() }
+    }
+
+    /// The scene itself.
+    pub fn spec(&self) -> &Spec {
+        &self.spec
+    }
+
+    /// Rows and columns.
+    pub fn lengths(&self) -> [usize; 2] {
+        [self.spec.sensor.rows, self.spec.sensor.cols]
+    }
+}
+
+/// An argument called `field` as a whole number of at least 0.
+///
+/// # Errors
+/// `InputError` for a negative number or one that is too large.
+pub fn count<T: TryFrom<i64>>(field: &str, value: i64) -> PyResult<T> {
+    T::try_from(value).map_err(|_| not_allowed(field, value, "a whole number of at least 0"))
+}
+
+/// The taxel of an argument called `field`.
+fn taxel(field: &str, [row, col]: [i64; 2]) -> PyResult<[usize; 2]> {
+    Ok([count(field, row)?, count(field, col)?])
+}
+
+/// The shapes of random contacts by their name on the command line.
+fn shapes_named(name: &str) -> PyResult<Shapes> {
+    match name {
+        "elliptic" => Ok(Shapes::Elliptic),
+        "other" => Ok(Shapes::Other),
+        _ => Err(not_allowed("shapes", format!("{name:?}"), "\"elliptic\" or \"other\"")),
+    }
+}
+
+#[pymethods]
+impl Scene {
+    /// Make a scene from the text of a scene file.
+    ///
+    /// Parameters
+    /// ----------
+    /// text : str
+    ///     TOML; the guide's page "your sensor" has every field.
+    /// origin : str, default "scene.toml"
+    ///     Path that stands in errors, and beside which the files are that the scene names.
+    ///
+    /// Raises
+    /// ------
+    /// InputError
+    ///     A field that is unknown, missing or out of range.
+    #[staticmethod]
+    #[pyo3(signature = (text, origin = "scene.toml"))]
+    fn from_toml(text: &str, origin: &str) -> PyResult<Scene> {
+        Ok(Scene::new(Spec::parse(text, origin).map_err(input)?))
+    }
+
+    /// Load a scene by built-in name or by the path of its file, as the commands take it.
+    ///
+    /// Raises
+    /// ------
+    /// InputError
+    ///     Neither a built-in name nor a file, or a field of the file.
+    #[staticmethod]
+    fn from_name(name: &str) -> PyResult<Scene> {
+        Ok(Scene::new(Spec::load(name).map_err(input)?))
+    }
+
+    /// Names of the built-in scenes.
+    #[staticmethod]
+    fn builtin() -> Vec<&'static str> {
+        Spec::builtin_names()
+    }
+
+    /// Name of the scene.
+    #[getter]
+    fn name(&self) -> &str {
+        &self.spec.name
+    }
+
+    /// Number of rows, along y.
+    #[getter]
+    fn rows(&self) -> usize {
+        self.spec.sensor.rows
+    }
+
+    /// Number of columns, along x.
+    #[getter]
+    fn cols(&self) -> usize {
+        self.spec.sensor.cols
+    }
+
+    /// Distance of neighbouring taxels in mm: along x, along y.
+    #[getter]
+    fn pitch_mm(&self) -> (f64, f64) {
+        (self.spec.sensor.pitch_x_mm, self.spec.sensor.pitch_y_mm)
+    }
+
+    /// Depth of the taxels under the surface in mm.
+    #[getter]
+    fn thickness_mm(&self) -> f64 {
+        self.spec.sensor.thickness_mm
+    }
+
+    /// Centre of each taxel in mm from the array's centre, shape (rows, cols, 2): x, y.
+    #[getter]
+    fn positions_mm<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray3<f64>>> {
+        let [rows, cols] = self.lengths();
+        let of_row = |row| (0..cols).flat_map(move |col| self.spec.sensor.position_mm(row, col));
+        cube(py, (0..rows).flat_map(of_row).collect(), [rows, cols, 2])
+    }
+
+    /// Name of the estimator that the floating-point model takes, as in search.estimator.
+    #[getter]
+    fn estimator(&self) -> &'static str {
+        self.spec.estimator().name()
+    }
+
+    /// Number of frames that one result takes: 2^average of a block, 1 of a sliding mean.
+    #[getter]
+    fn frames_per_result(&self) -> usize {
+        self.spec.input.frames_per_result()
+    }
+
+    /// The frames that Dermis has for the scene's sensor, with their known forces.
+    #[getter]
+    fn frames(&self) -> Vec<Frame> {
+        Stress::shipped(&self.spec).into_iter().map(Frame::from).collect()
+    }
+
+    /// Read all frames of a .csv or .json file, or of a folder of them.
+    ///
+    /// Raises
+    /// ------
+    /// InputError
+    ///     A file that cannot be read, or is of another sensor.
+    fn load_frames(&self, path: PathBuf) -> PyResult<Vec<Frame>> {
+        let checked = |frame: Stress| -> Result<Frame, FrameError> {
+            frame.check(&self.spec)?;
+            Ok(frame.into())
+        };
+        let frames = Stress::load_all(path, Some(&self.spec)).map_err(input)?;
+        frames.into_iter().map(|frame| checked(frame).map_err(input)).collect()
+    }
+
+    /// Reconstruct the forces of one frame, or of frames in the order of time.
+    ///
+    /// Parameters
+    /// ----------
+    /// frames : array of shape (rows, cols) or (time, rows, cols), Frame, or list of Frame
+    ///     Normal stress in MPa, compression positive; readings if the scene names a calibration or tare file.
+    /// engine : "golden" or "fixed", default "golden"
+    ///     The floating-point model, or the integers of the hardware bit for bit. Where the scene states no full scale
+    ///     and "fixed" needs one, it takes the largest stress of all `frames`.
+    /// find_noise : bool, default True
+    ///     Where the search finds the shear and the scene states no noise: find the noise from the frame, and flag the
+    ///     shear that it hides. This takes longer than the search itself. `dermis reconstruct` does it, a stream does not.
+    ///
+    /// Returns
+    /// -------
+    /// Reconstruction
+    ///     Of one frame; equal to what `dermis reconstruct` prints, to the last bit.
+    /// Reconstructions
+    ///     Of frames with an axis of time, a sequence: one result per frame; with input.average = k one per 2^k frames;
+    ///     with input.mean = "sliding" one per frame, of the mean of all frames up to it.
+    ///
+    /// Raises
+    /// ------
+    /// InputError
+    ///     An argument of another shape or type, a scene or frame that the model refuses.
+    #[pyo3(signature = (frames, engine = "golden", *, find_noise = true))]
+    fn reconstruct<'py>(
+        &self,
+        py: Python<'py>,
+        frames: &Bound<'py, PyAny>,
+        engine: &str,
+        find_noise: bool,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        let engine: Engine = engine.parse()?;
+        let Frames { frames, single } = self::frames(&self.spec, frames)?;
+        let ready = py.detach(|| self.models.ready(engine, &self.spec, &frames))?;
+        let one = |frames: &[Stress]| py.detach(|| ready.reconstruct(&self.spec, frames, find_noise));
+        if single {
+            let result = Reconstruction::new(Arc::new(one(&frames)?), self.lengths());
+            return Ok(Bound::new(py, result)?.into_any());
+        }
+        let mut results = Vec::new();
+        for frames in self.spec.input.frames_of_results(&frames) {
+            results.push(Arc::new(one(frames)?));
+            // Ctrl-C ends a long call.
+            py.check_signals()?;
+        }
+        Ok(Bound::new(py, Reconstructions::new(results, self.lengths()))?.into_any())
+    }
+
+    /// Compute a frame with known forces, as the scene's sensor reads it.
+    ///
+    /// Parameters
+    /// ----------
+    /// contacts : list of dict, optional
+    ///     Contacts with the keys of a frame file: shape, centre_mm, size_mm, normal_N, tangential_N, kind_of_slip,
+    ///     friction, rotation_rad; `dermis generate --help` lists the shapes.
+    /// random : int, default 0
+    ///     Number of random contacts, beside those described.
+    /// shapes : "elliptic" or "other", default "elliptic"
+    ///     Shapes of the random contacts.
+    /// touching : bool, default False
+    ///     Place random contacts so that they touch each other.
+    /// seed : int, default 1
+    ///     Seed of random contacts and of the noise.
+    /// noise, gain_spread, drift : float, default 0
+    ///     Standard deviations: of the noise of one frame over max |b|, of the taxels' gains, of the taxels' zeros since
+    ///     the tare over max |b|.
+    /// tare_frames : int, default 0
+    ///     Frames without contact whose noisy mean is subtracted; 0: none.
+    /// frames : int, default 1
+    ///     Frames that are averaged, each with its own noise.
+    /// unipolar : bool, default False
+    ///     Whether tension reads as zero.
+    /// bits : int, optional
+    ///     Width of the codes to which the stress is rounded; 2 to 24.
+    /// full_scale_MPa : float, optional
+    ///     Stress of the largest code; default: the frame's peak.
+    /// dead : list of (row, col), optional
+    ///     Taxels that read zero.
+    /// stuck : list of ((row, col), float), optional
+    ///     Taxels that always read the given stress in MPa.
+    /// id : str, default "generated"
+    ///     Name of the frame.
+    ///
+    /// Raises
+    /// ------
+    /// InputError
+    ///     No contact, a contact that is inconsistent or beside the array, an option out of range.
+    #[allow(clippy::too_many_arguments)]
+    #[pyo3(signature = (contacts = None, *, random = 0, shapes = "elliptic", touching = false, seed = 1, noise = 0.0,
+        gain_spread = 0.0, drift = 0.0, tare_frames = 0, frames = 1, unipolar = false, bits = None,
+        full_scale_MPa = None, dead = Vec::new(), stuck = Vec::new(), id = "generated"))]
+    fn generate(
+        &self,
+        py: Python<'_>,
+        contacts: Option<&Bound<'_, PyAny>>,
+        random: i64,
+        shapes: &str,
+        touching: bool,
+        seed: i64,
+        noise: f64,
+        gain_spread: f64,
+        drift: f64,
+        tare_frames: i64,
+        frames: i64,
+        unipolar: bool,
+        bits: Option<i64>,
+        full_scale_MPa: Option<f64>,
+        dead: Vec<[i64; 2]>,
+        stuck: Vec<([i64; 2], f64)>,
+        id: &str,
+    ) -> PyResult<Frame> {
+        let mut all = contacts.map_or(Ok(Vec::new()), self::contacts)?;
+        let seed = count("seed", seed)?;
+        let draw = Draw { count: count("random", random)?, shapes: shapes_named(shapes)?, touching, seed };
+        let converter = Converter {
+            noise,
+            gain_spread,
+            drift,
+            tare_frames: count("tare_frames", tare_frames)?,
+            frames: count("frames", frames)?,
+            unipolar,
+            bits: bits.map(|bits| count("bits", bits)).transpose()?,
+            full_scale_MPa,
+            dead: dead.into_iter().map(|place| taxel("dead", place)).collect::<PyResult<_>>()?,
+            stuck: stuck
+                .into_iter()
+                .map(|(place, reads)| Ok((taxel("stuck", place)?, reads)))
+                .collect::<PyResult<_>>()?,
+            seed,
+        };
+        py.detach(|| {
+            all.extend(random_contacts(&self.spec.sensor, draw));
+            let frame = generate(id, &self.spec.sensor, self.spec.medium, &all).map_err(input)?;
+            Ok(converter.convert(&frame).map_err(input)?.into())
+        })
+    }
+
+    fn __repr__(&self) -> String {
+        let [rows, cols] = self.lengths();
+        format!("Scene({:?}, {rows}×{cols}, estimator {:?})", self.spec.name, self.estimator())
+    }
+}

@@ -1,0 +1,76 @@
+"""A board: a simulated one on a pseudo-terminal, whose forces are those of the bit-true model."""
+
+import os
+import subprocess
+from collections.abc import Iterator
+
+import numpy as np
+import pytest
+
+import dermis
+from conftest import ROOT
+
+SCENE = "eight-by-eight"
+# The board that the tests of `dermis host` have simulated before.
+BOARD = "icebreaker"
+
+
+def scene_on_the_board() -> dermis.Scene:
+    """The scene with that board, as --target-board gives it."""
+    text = (ROOT / "golden" / "scenes" / f"{SCENE}.toml").read_text()
+    return dermis.Scene.from_toml(f'{text}\n[hardware]\nboard = "{BOARD}"\n', SCENE)
+
+
+@pytest.fixture
+def port() -> Iterator[str]:
+    """The port of `dermis board`."""
+    command = [os.environ["DERMIS"], "--build-dir", str(ROOT / "build"), "board", SCENE, "--target-board", BOARD]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True) as board:
+        yield board.stdout.readline().strip()
+        board.kill()
+
+
+def test_a_board_answers_every_frame(port: str) -> None:
+    scene = scene_on_the_board()
+    stress = [np.random.default_rng(seed).random((scene.rows, scene.cols)) * 0.1 for seed in range(3)]
+
+    def sensor() -> Iterator[np.ndarray]:
+        yield from stress
+
+    with dermis.Board(port, scene, check=True, timeout_s=5) as board:
+        answers = board.stream(sensor())
+        assert iter(answers) is answers
+        for frame, answer in zip(stress, answers, strict=True):
+            # Like a stream, a board's answer has no noise found from the frame.
+            model = scene.reconstruct(frame, "fixed", find_noise=False)
+            assert np.array_equal(answer.forces_N, model.forces_N)
+            assert (answer.engine, answer.contacts, answer.flags) == ("board", None, model.flags)
+        again = board.reconstruct(stress[0])
+        assert np.array_equal(again.forces_N, scene.reconstruct(stress[0], "fixed", find_noise=False).forces_N)
+        assert board.link_errors == (0, 0)
+        with pytest.raises(dermis.InputError, match="frame: wanted one frame"):
+            board.reconstruct(np.stack(stress))
+        with pytest.raises(dermis.InputError, match="frames has shape"):
+            next(board.stream([np.zeros((2, 3))]))
+        with pytest.raises(dermis.BoardError, match=f"{port}: "):
+            dermis.Board(port, scene)
+    with pytest.raises(dermis.BoardError, match="the board is closed"):
+        board.reconstruct(stress[0])
+    # A frame minus itself as tare is zero.
+    pressed = scene.generate(random=1, seed=2)
+    with dermis.Board(port, scene, tare=pressed, timeout_s=5) as tared:
+        assert "no-contact" in tared.reconstruct(pressed).flags
+    with pytest.raises(dermis.BoardError, match="built for another scene"):
+        dermis.Board(port, dermis.Scene.from_name("sensor-1"), timeout_s=5)
+
+
+def test_what_is_no_board_is_named() -> None:
+    scene = scene_on_the_board()
+    with pytest.raises(dermis.BoardError, match="/dev/absent: ") as error:
+        dermis.Board("/dev/absent", scene)
+    assert isinstance(error.value, OSError)
+    with pytest.raises(dermis.InputError, match="timeout_s = -1"):
+        dermis.Board("/dev/absent", scene, timeout_s=-1)
+    spi = dermis.Scene.from_name(str(ROOT / "sim" / "tests" / "scenes" / "tiny-spi.toml"))
+    with pytest.raises(dermis.InputError, match="SPI|spi"):
+        dermis.Board("/dev/absent", spi)

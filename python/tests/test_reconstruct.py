@@ -1,0 +1,136 @@
+"""Results: equal to the command's to the last bit, whole in every form of input, and with nothing that is not known."""
+
+import threading
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import dermis
+from conftest import dermis as program
+
+
+@pytest.mark.parametrize("engine", ["golden", "fixed"])
+@pytest.mark.parametrize("name", ["sensor-1", "sensor-1-noisy", "eight-by-eight"])
+def test_the_result_is_that_of_the_command(name: str, engine: str) -> None:
+    scene = dermis.Scene.from_name(name)
+    frame = scene.frames[0]
+    printed = program("reconstruct", name, "--engine", engine, "--json")
+    result = scene.reconstruct(frame, engine)
+    assert result.to_json() + "\n" == printed
+    # The same numbers in arrays.
+    fields = result.to_dict()
+    forces = np.stack([np.array(fields["forces_N"][axis]) for axis in ("fx", "fy", "fz")], axis=-1)
+    assert np.array_equal(result.forces_N, forces.reshape(scene.rows, scene.cols, 3))
+    assert result.resultant_N.tolist() == fields["resultant_N"]
+    assert (result.flags, result.scene, result.engine) == (fields["flags"], name, engine)
+    assert result.error.tangential == fields["error"]["tangential"]
+
+
+def test_the_noise_that_the_command_finds_is_found(tmp_path: Path, searching: str) -> None:
+    scene = dermis.Scene.from_toml(searching, "pad.toml")
+    frame = scene.generate(random=1, seed=3, noise=5e-4)
+    (tmp_path / "pad.toml").write_text(searching)
+    (tmp_path / "frame.json").write_text(frame.to_json())
+    files = [str(tmp_path / "pad.toml"), "--frame", str(tmp_path / "frame.json")]
+    for engine in ("golden", "fixed"):
+        # Text alone has the name of its origin; of a file it is that of the file.
+        own = dermis.Scene.from_name(files[0])
+        loaded = dermis.Frame.load(files[2])
+        result = own.reconstruct(loaded, engine)
+        assert result.to_json() + "\n" == program("reconstruct", *files, "--engine", engine, "--json")
+        assert "shear-unreliable" in result.flags and result.checks["noise_MPa"] > 0
+        quick = own.reconstruct(loaded, engine, find_noise=False)
+        assert "noise_MPa" not in quick.checks
+        assert np.array_equal(quick.forces_N, result.forces_N)
+    assert np.array_equal(scene.reconstruct(frame).forces_N, own.reconstruct(frame).forces_N)
+
+
+SMALL = "[sensor]\nrows = 8\ncols = 8\npitch_x_mm = 4\npitch_y_mm = 4\nthickness_mm = 3\n"
+# With a stated noise, none is looked for.
+SEARCH = '[search]\nestimator = "search"\nnoise_floor_MPa = 1e-9\n'
+
+
+def test_every_form_of_a_frame_gives_the_same() -> None:
+    scene = dermis.Scene.from_toml(SMALL + SEARCH)
+    frames = [frame.stress_MPa for frame in scene.frames]
+    whole = scene.reconstruct(np.stack(frames))
+    assert (len(whole), whole.forces_N.shape, whole.resultant_N.shape) == (5, (5, 8, 8, 3), (5, 3))
+    for index, stress in enumerate(frames):
+        one = scene.reconstruct(stress)
+        assert np.array_equal(one.forces_N, whole.forces_N[index])
+        assert np.array_equal(one.forces_N, whole[index].forces_N)
+        assert np.array_equal(one.resultant_N, whole.resultant_N[index])
+        assert one.flags == whole.flags[index]
+        assert whole[index].frame == f"frame {index}"
+        for other in (np.asfortranarray(stress), stress.tolist(), np.pad(stress, 1)[1:-1, 1:-1]):
+            assert np.array_equal(scene.reconstruct(other).forces_N, one.forces_N)
+    assert [np.array_equal(a.forces_N, b.forces_N) for a, b in zip(whole, scene.reconstruct(scene.frames))] == [True] * 5
+    assert np.array_equal(whole[-1].forces_N, whole[4].forces_N)
+    single = frames[0].astype(np.float32)
+    assert np.array_equal(scene.reconstruct(single).forces_N, scene.reconstruct(single.astype(float)).forces_N)
+    assert scene.reconstruct(np.zeros((0, 8, 8))).forces_N.shape == (0, 8, 8, 3)
+    with pytest.raises(IndexError, match="index 5 of 5 results"):
+        whole[5]
+
+
+def test_what_an_engine_does_not_give_is_absent() -> None:
+    scene = dermis.Scene.from_name("sensor-1")
+    frame = scene.generate([{"shape": "hertz-circle", "size_mm": [4], "normal_N": 5, "tangential_N": [1, -0.5]}], noise=1e-3)
+    golden, fixed = scene.reconstruct(frame), scene.reconstruct(frame, "fixed")
+    [contact] = golden.contacts
+    [[again]] = scene.reconstruct([frame]).contacts
+    assert contact.force_N.tolist() == again.force_N.tolist()
+    assert (contact.sigma_N > 0).all() and contact.sigma_N.shape == (3,)
+    assert np.linalg.eigvalsh(contact.mu_covariance).min() > 0
+    assert np.abs(contact.force_N - frame.resultant_N).max() < 5 * contact.sigma_N.max()
+    assert np.linalg.norm(contact.centre_mm) < 1
+    assert fixed.contacts is None and "shear_spread" not in fixed.checks
+    assert scene.reconstruct(frame.stress_MPa).error is None
+    # Regions tell contacts apart, without standard deviations.
+    text = "[sensor]\nrows = 10\ncols = 10\npitch_x_mm = 2\npitch_y_mm = 4\nthickness_mm = 3\n"
+    regions = dermis.Scene.from_toml(text + '[partition]\ncase = "contacts"\n[search]\nestimator = "search"\n')
+    [contact] = regions.reconstruct(frame).contacts
+    assert contact.sigma_N is None and contact.mu_covariance is None and contact.force_N[2] > 1
+    resultants = dermis.Scene.from_toml(text + '[output]\nforces = "resultants"\n').reconstruct(frame)
+    assert resultants.forces_N is None and resultants.resultant_N[2] > 1
+
+
+def test_blocks_and_sliding_means_have_their_frames() -> None:
+    text = SMALL + SEARCH + "[input]\naverage = 1\n"
+    scene = dermis.Scene.from_toml(text)
+    stress = np.stack([frame.stress_MPa for frame in dermis.Scene.from_name("eight-by-eight").frames[:4]])
+    blocks = scene.reconstruct(stress)
+    assert (len(blocks), scene.frames_per_result) == (2, 2)
+    plain = dermis.Scene.from_toml(text.replace("average = 1", "average = 0"))
+    assert np.allclose(blocks.resultant_N[0], plain.reconstruct(stress[:2].mean(axis=0)).resultant_N, rtol=1e-3)
+    with pytest.raises(dermis.InputError, match=r"input.average = 1"):
+        scene.reconstruct(stress[:3])
+    with pytest.raises(dermis.InputError, match=r"input.average = 1"):
+        scene.reconstruct(stress[0])
+    sliding = dermis.Scene.from_toml(text + 'mean = "sliding"\n').reconstruct(stress)
+    assert [result.to_dict()["mean_frames"] for result in sliding] == [1, 2, 3, 3]
+
+
+def test_the_interpreter_is_free_while_a_model_computes() -> None:
+    scene = dermis.Scene.from_name("sensor-3")
+    frame = scene.frames[0]
+    scene.reconstruct(frame)
+    times: list[float] = []
+
+    def compute() -> None:
+        begin = time.perf_counter()
+        scene.reconstruct(frame)
+        times.append(time.perf_counter() - begin)
+
+    thread = threading.Thread(target=compute)
+    # Before the start, which may return only when the frame is done if the interpreter is held.
+    longest, last = 0.0, time.perf_counter()
+    thread.start()
+    while thread.is_alive():
+        now = time.perf_counter()
+        longest, last = max(longest, now - last), now
+    longest = max(longest, time.perf_counter() - last)
+    # Were it held, this thread would stand still until the frame is done.
+    assert longest < times[0] / 3, (longest, times)
