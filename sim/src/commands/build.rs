@@ -21,7 +21,8 @@ use crate::report;
   dermis build sensor-1 --out rtl
   dermis build sensor-4 --explain
   dermis build sensor-1 --board                      engine, link and packets, ready for place and route
-  dermis build eight-by-eight --target-board icebreaker     the serial engine, for small devices")]
+  dermis build eight-by-eight --target-board icebreaker     the serial engine, for small devices
+  dermis build eight-by-eight --target-board ./my-board.toml      a board of your own")]
 pub struct Arguments {
     /// Built-in name or path of a scene.
     scene: String,

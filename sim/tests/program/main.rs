@@ -3,6 +3,7 @@
 //! One program, so that it is linked once and its tests fill all processors to the end.
 
 mod bitstream;
+mod boards;
 mod cli;
 mod contract;
 mod examples;
