@@ -58,6 +58,9 @@ fn build(scene: &Scene, out: &Path, board: bool, with_features: bool) -> Result<
     let progress = Progress::start(&format!("{}: model and Verilog", scene.name));
     let model = Model::new(scene)?;
     let mut generated = if board { generate_board(&model)? } else { generate(&model)? };
+    if !board {
+        generated.add_integration(&model);
+    }
     let explained = explain(&model)?;
     generated.add_explained(&explained);
     drop(progress);

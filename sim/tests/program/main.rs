@@ -14,5 +14,6 @@ mod host;
 mod page;
 mod report;
 mod stream;
+mod testbench;
 mod toy;
 mod writes;
