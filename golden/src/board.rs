@@ -1,17 +1,21 @@
-//! Boards: the device for which a design is generated, from `constraints/<board>.toml`.
+//! Boards: the device for which a design is generated.
 //!
-//! The files are embedded in the program.
+//! A board is a TOML file: one of `constraints`, which are built into the program, or a user's, by its path. It names a
+//! device ([`Device`]), whose figures count where the file does not state its own, for example a smaller budget.
 //!
 //! | field | unit | meaning |
 //! |---|---|---|
-//! | `engine` | | `"parallel"` (default) or `"serial"`: [`EngineKind`] |
-//! | `device`, `family`, `size`, `package`, `speed_grade` | | as the place and route tool names them |
-//! | `verilog` | | files of `constraints`, which boards can share |
+//! | `description` | | one line |
+//! | `device` | | a [`Device`]; without it `family`, `luts`, `flip_flops`, `multipliers` and `block_rams` are needed |
+//! | `engine` | | `"parallel"` or `"serial"`: [`EngineKind`] |
+//! | `family`, `size`, `package`, `speed_grade` | | as the place and route tool names them |
+//! | `pins`, `verilog` | | pin file and Verilog beside the file; boards can share them; none: an engine without pins |
 //! | `input_clock_MHz` | MHz | oscillator on the board |
 //! | `clock_MHz` | MHz | clock of the engine: a design target until place and route has measured it |
-//! | `uart_baud` | bit/s | bit rate of the UART |
+//! | `uart_baud` | bit/s | bit rate of the UART; absent if the board has no pins for it |
 //! | `spi_MHz` | MHz | highest clock of the SPI, which place and route must meet; absent if the board has no pins for it |
-//! | `multipliers`, `multiplier_bits` | , bits | signed multipliers and the width of their operands |
+//! | `multipliers`, `multiplier_bits` | , bits | signed multipliers and the widths of their operands, the wider first |
+//! | `multiplier_part_bits` | bits | width of each further part of an operand that is wider |
 //! | `multiplier_blocks` | tiles | positions of the multipliers, [`MultiplierBlocks`]; if absent, the placer chooses them |
 //! | `block_rams`, `block_ram_shapes` | , [words, bits] | block RAMs and their configurations |
 //! | `distributed_words` | words | largest memory in distributed RAM: always; if block RAM is short |
@@ -19,17 +23,25 @@
 //! | `luts`, `flip_flops` | | logic cells, for estimated utilisation |
 //! | `seeds`, `placers` | | place and route is tried with seeds 1, 2, … and each placer until one converges |
 //! | `place_minutes` | min | time limit of one try |
-//!
-//! Beside it stand the board's Verilog (pins and PLL around the top module: the files of `verilog`, or that of the same name
-//! with the ending `.v`) and, under the same name with another ending, its pin constraints.
 
-use include_dir::{include_dir, Dir};
+mod error;
+mod family;
+mod files;
+mod reader;
+#[cfg(test)]
+mod tests;
+
+use std::path::Path;
+
 use serde::{Deserialize, Serialize};
-use thiserror::Error;
+use toml::Value;
+
+pub use error::BoardError;
+pub use family::{Device, Family};
+use files::Folder;
+use reader::Reader;
 
 use crate::symmetry::quads::Quads;
-
-static FILES: Dir = include_dir!("$CARGO_MANIFEST_DIR/../constraints");
 
 /// The engine of a board; both do the same arithmetic with different schedules.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -47,39 +59,44 @@ pub enum EngineKind {
 #[serde(deny_unknown_fields)]
 #[allow(non_snake_case)]
 pub struct Board {
-    /// Name of the file, and of `hardware.board` in a scene.
-    #[serde(skip_deserializing)]
+    /// Name of the file without its ending.
+    #[serde(skip)]
     pub name: String,
-    /// Description in one line.
+    /// Description in one line; the name if the file has none.
+    #[serde(default)]
     pub description: String,
     /// The engine for this board.
     #[serde(default)]
     pub engine: EngineKind,
-    /// Ordering code of the device.
-    pub device: String,
+    /// The device, by the name of a [`Device`]; `None` if the file states all figures itself.
+    pub device: Option<String>,
     /// Device family.
     pub family: Family,
-    /// Size within the family, e.g. `85k`.
-    pub size: String,
+    /// Size within the family, e.g. `85k`; present where there are pins, as the package.
+    pub size: Option<String>,
     /// Package name.
-    pub package: String,
-    /// Speed grade.
-    pub speed_grade: u32,
-    /// The board's Verilog, files of `constraints`; empty: the file of the board's name.
+    pub package: Option<String>,
+    /// Speed grade; `None` where the family has one only.
+    pub speed_grade: Option<u32>,
+    /// The board's Verilog: names of files beside the board's, at least one where there are pins.
     #[serde(default)]
     pub verilog: Vec<String>,
+    /// Name of the pin file beside the board's; `None` for an engine without pins.
+    pub pins: Option<String>,
     /// Oscillator on the board, MHz, > 0.
-    pub input_clock_MHz: f64,
+    pub input_clock_MHz: Option<f64>,
     /// Clock of the engine, MHz, > 0.
     pub clock_MHz: f64,
-    /// Bit rate of the UART, bit/s, > 0.
-    pub uart_baud: u32,
+    /// Bit rate of the UART, bit/s, > 0; `None` where the board has no pins for it.
+    pub uart_baud: Option<u32>,
     /// Highest clock of the SPI, MHz, > 0; `None` where the board has no pins for it.
     pub spi_MHz: Option<f64>,
     /// Number of multipliers.
     pub multipliers: u32,
-    /// Width of a multiplier's signed operands in bits.
-    pub multiplier_bits: u32,
+    /// Widths of a multiplier's signed operands in bits, the wider first.
+    pub multiplier_bits: [u32; 2],
+    /// Width in bits of each further part of an operand that is wider than the multiplier's.
+    pub multiplier_part_bits: u32,
     /// Positions of the multipliers; `None` leaves those of the lanes to the placer.
     pub multiplier_blocks: Option<MultiplierBlocks>,
     /// Number of block RAMs.
@@ -107,6 +124,12 @@ pub struct Board {
     pub placers: Vec<String>,
     /// Time limit of one try of place and route, min, > 0.
     pub place_minutes: u32,
+    /// The board's own file.
+    #[serde(skip)]
+    own: Reader,
+    /// Where its files are.
+    #[serde(skip)]
+    folder: Folder,
 }
 
 /// Taxels per cycle that the search of the parallel engine can compute, the default first: a quad or a part of it.
@@ -136,126 +159,182 @@ impl MultiplierBlocks {
     }
 }
 
-/// A device family, whose members share their tools.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Family {
-    /// Lattice ECP5.
-    Ecp5,
-    /// Lattice iCE40.
-    Ice40,
-}
-
-impl Family {
-    /// File name extension of the pin constraints.
-    pub fn pin_file_extension(self) -> &'static str {
-        match self {
-            Family::Ecp5 => "lpf",
-            Family::Ice40 => "pcf",
-        }
-    }
-}
-
-/// A board cannot be used.
-#[derive(Clone, Debug, PartialEq, Eq, Error)]
-pub enum BoardError {
-    /// There is no board of this name.
-    #[error("hardware.board = \"{name}\": unknown board; there are: {known}")]
-    Unknown {
-        /// The name given.
-        name: String,
-        /// The known names, separated by commas.
-        known: String,
-    },
-    /// The board's file is invalid or another file is missing.
-    #[error("constraints/{name}.toml: {reason}")]
-    Invalid {
-        /// The board's name.
-        name: String,
-        /// The reason.
-        reason: String,
-    },
-}
+/// Fields that neither a family nor a default gives.
+const REQUIRED: [&str; 5] = ["clock_MHz", "luts", "flip_flops", "multipliers", "block_rams"];
+/// Ending of a board's file.
+const ENDING: &str = ".toml";
 
 impl Board {
-    /// The board called `name`.
+    /// The board called `name`, or of the file `name` if that ends with `.toml`.
     ///
     /// # Errors
-    /// [`BoardError::Unknown`], which lists the known boards; [`BoardError::Invalid`] for an invalid file.
+    /// [`BoardError::Unknown`], which lists the known boards; [`BoardError::Unreadable`], [`BoardError::Invalid`] and
+    /// [`BoardError::Missing`] for a wrong file.
     pub fn load(name: &str) -> Result<Board, BoardError> {
-        let unknown = || BoardError::Unknown { name: name.to_owned(), known: Board::names().join(", ") };
-        let file = FILES.get_file(format!("{name}.toml")).ok_or_else(unknown)?;
-        Board::parse(name, file.contents_utf8().unwrap_or_default())
+        if Board::is_file(name) {
+            let path = Path::new(name);
+            let folder = Folder::At(path.parent().unwrap_or(Path::new("")).to_owned());
+            let part = |part: Option<&std::ffi::OsStr>| part.unwrap_or_default().to_string_lossy().into_owned();
+            return Board::read(folder, &part(path.file_name()), &part(path.file_stem()), name);
+        }
+        if !Board::names().contains(&name) {
+            return Err(BoardError::Unknown { name: name.to_owned(), known: Board::names().join(", ") });
+        }
+        let file = format!("{name}{ENDING}");
+        let path = Folder::BuiltIn.path().join(&file).display().to_string();
+        Board::read(Folder::BuiltIn, &file, name, &path)
+    }
+
+    /// Whether `name` is the path of a board's file, and not the name of a built-in board.
+    pub fn is_file(name: &str) -> bool {
+        name.ends_with(ENDING)
+    }
+
+    /// Names of the built-in boards, sorted.
+    pub fn names() -> Vec<&'static str> {
+        files::built_in_names()
+    }
+
+    /// Path of the board's file as it was given; of a built-in board relative to the repository's root.
+    pub fn file(&self) -> &str {
+        &self.own.file
+    }
+
+    /// The folder of the board's file.
+    pub fn folder(&self) -> &Path {
+        self.folder.path()
     }
 
     /// The board's Verilog: file names and texts.
     ///
     /// # Errors
     /// [`BoardError::Invalid`], which names the missing file.
-    pub fn verilog_files(&self) -> Result<Vec<(String, &'static str)>, BoardError> {
-        let own = [format!("{}.v", self.name)];
-        let names = if self.verilog.is_empty() { &own[..] } else { &self.verilog };
-        names.iter().map(|name| self.file(name)).collect()
+    pub fn verilog_files(&self) -> Result<Vec<(String, String)>, BoardError> {
+        self.verilog.iter().map(|name| self.beside("verilog", name)).collect()
     }
 
     /// The board's pin constraints: file name and text.
     ///
     /// # Errors
-    /// [`BoardError::Invalid`], which names the missing file.
-    pub fn pin_file(&self) -> Result<(String, &'static str), BoardError> {
-        self.file(&format!("{}.{}", self.name, self.family.pin_file_extension()))
-    }
-
-    fn file(&self, name: &str) -> Result<(String, &'static str), BoardError> {
-        let missing = || BoardError::Invalid { name: self.name.clone(), reason: format!("needs {name} beside it") };
-        let text = FILES.get_file(name).and_then(|file| file.contents_utf8()).ok_or_else(missing)?;
-        Ok((name.to_owned(), text))
-    }
-
-    /// Names of all boards, sorted.
-    pub fn names() -> Vec<&'static str> {
-        let stems = FILES.files().filter(|f| f.path().extension().is_some_and(|e| e == "toml"));
-        let mut names: Vec<_> = stems.filter_map(|f| f.path().file_stem()?.to_str()).collect();
-        names.sort_unstable();
-        names
-    }
-
-    fn parse(name: &str, text: &str) -> Result<Board, BoardError> {
-        let invalid = |reason: String| BoardError::Invalid { name: name.to_owned(), reason };
-        let board: Board = toml::from_str(text).map_err(|e| invalid(e.to_string()))?;
-        let clocks = [("input_clock_MHz", board.input_clock_MHz), ("clock_MHz", board.clock_MHz)];
-        for (field, value) in clocks.into_iter().chain(board.spi_MHz.map(|rate| ("spi_MHz", rate))) {
-            if !(value.is_finite() && value > 0.0) {
-                return Err(invalid(format!("{field} = {value}: must be positive")));
+    /// [`BoardError::Missing`] without pins; [`BoardError::Invalid`] if the file cannot be read, or of a family for which
+    /// no bitstream is made.
+    pub fn pin_file(&self) -> Result<(String, String), BoardError> {
+        match (&self.pins, self.family.pin_file_extension()) {
+            (Some(name), _) => self.beside("pins", name),
+            (None, Some(ending)) => {
+                let allowed = format!("the pin file beside this one, a .{ending}, for a bitstream");
+                Err(BoardError::Missing { file: self.own.file.clone(), field: "pins", allowed })
+            }
+            (None, None) => {
+                let (field, family) = (if self.device.is_some() { "device" } else { "family" }, self.family.name());
+                let reason =
+                    format!("{field}: place and route of family {family} is not run here, so there is no bitstream");
+                Err(self.invalid(field, reason))
             }
         }
-        if board.block_ram_shapes.is_empty() || board.block_ram_shapes.iter().flatten().any(|&size| size == 0) {
-            return Err(invalid(format!("block_ram_shapes = {:?}: must be [words, bits]", board.block_ram_shapes)));
+    }
+
+    /// The board as a file that states every field.
+    ///
+    /// # Errors
+    /// A value that TOML cannot hold; there is none.
+    pub fn to_toml(&self) -> Result<String, toml::ser::Error> {
+        toml::to_string(self)
+    }
+
+    /// The error for what is wrong with the board, at the line of `field`.
+    pub fn invalid(&self, field: &str, reason: String) -> BoardError {
+        BoardError::Invalid { file: self.own.file.clone(), line: self.own.line(field), reason }
+    }
+
+    /// Path of a file beside the board's.
+    pub fn path_of(&self, name: &str) -> String {
+        self.folder.path().join(name).display().to_string()
+    }
+
+    /// Name without its folder, and text of the file that `field` names.
+    fn beside(&self, field: &str, name: &str) -> Result<(String, String), BoardError> {
+        let told = |error: std::io::Error| self.invalid(field, format!("{field}: {}: {error}", self.path_of(name)));
+        let text = self.folder.read(name).map_err(told)?;
+        Ok((name.rsplit('/').next().unwrap_or(name).to_owned(), text))
+    }
+
+    /// Reads the file `file` of `folder`; `path` is its path in messages.
+    fn read(folder: Folder, file: &str, name: &str, path: &str) -> Result<Board, BoardError> {
+        let unreadable =
+            |error: std::io::Error| BoardError::Unreadable { file: path.into(), reason: error.to_string() };
+        let text = folder.read(file).map_err(unreadable)?;
+        Ok(Board { folder, ..Board::parse(name, path, &text)? })
+    }
+
+    /// The board called `name` from the text of its file, whose path is `file`; files beside it are not read.
+    ///
+    /// # Errors
+    /// [`BoardError::Invalid`] and [`BoardError::Missing`].
+    pub fn parse(name: &str, file: &str, text: &str) -> Result<Board, BoardError> {
+        let own = Reader::new(file, text)?;
+        let device = device(&own)?;
+        let mut table = match &device {
+            Some(device) => device.figures.clone(),
+            None => family::of_all_devices(family(&own)?)?,
+        };
+        table.extend(own.table.clone());
+        if let Some(field) = REQUIRED.into_iter().find(|field| !table.contains_key(*field)) {
+            return Err(own.missing(field));
         }
-        if board.large_rams > 0 && board.large_ram_shape.contains(&0) {
-            return Err(invalid(format!("large_ram_shape = {:?}: must be [words, bits]", board.large_ram_shape)));
+        let mut board: Board = serde_path_to_error::deserialize(Value::Table(table.clone())).map_err(|error| {
+            let path = error.path().to_string();
+            let field = path.split(['.', '[']).next().unwrap_or_default();
+            own.wrong(field, table.get(field).unwrap_or(&Value::String(error.inner().message().to_owned())))
+        })?;
+        if let Some(field) = board.wrong_field(device.as_ref()) {
+            return Err(table.get(field).map_or_else(|| own.missing(field), |value| own.wrong(field, value)));
         }
-        let counts = [
-            ("uart_baud", board.uart_baud),
-            ("seeds", board.seeds),
-            ("place_minutes", board.place_minutes),
-            ("placers", board.placers.len() as u32),
+        if board.description.is_empty() {
+            name.clone_into(&mut board.description);
+        }
+        Ok(Board { name: name.to_owned(), own, ..board })
+    }
+
+    /// The first field whose value is out of range or does not suit the others.
+    fn wrong_field(&self, device: Option<&Device>) -> Option<&'static str> {
+        let positive = |value: f64| value.is_finite() && value > 0.0;
+        let is_name =
+            |name: &str| !name.is_empty() && name.chars().all(|c| c.is_ascii_alphanumeric() || "._-/".contains(c));
+        let ending = self.family.pin_file_extension();
+        let is_pin_file = |name: &str| ending.is_some_and(|ending| name.ends_with(&format!(".{ending}")));
+        let needed = |there: bool| there || self.pins.is_none();
+        let in_device = |field: &str, count: u32| device.is_none_or(|device| i64::from(count) <= device.count(field));
+        let [wide, narrow] = self.multiplier_bits;
+        let blocks = self.multiplier_blocks.as_ref().map(MultiplierBlocks::multipliers);
+        let rules = [
+            ("clock_MHz", positive(self.clock_MHz)),
+            ("input_clock_MHz", self.input_clock_MHz.is_none_or(positive)),
+            ("uart_baud", self.uart_baud != Some(0)),
+            ("spi_MHz", self.spi_MHz.is_none_or(positive)),
+            ("pins", self.pins.as_ref().is_none_or(|name| is_name(name) && is_pin_file(name))),
+            ("verilog", self.verilog.iter().all(|name| is_name(name)) && needed(!self.verilog.is_empty())),
+            ("size", needed(self.size.is_some())),
+            ("package", needed(self.package.is_some())),
+            ("luts", self.luts > 0 && in_device("luts", self.luts)),
+            ("flip_flops", self.flip_flops > 0 && in_device("flip_flops", self.flip_flops)),
+            ("multipliers", in_device("multipliers", self.multipliers)),
+            ("multiplier_bits", narrow >= 2 && wide >= narrow),
+            ("multiplier_part_bits", (1..=narrow).contains(&self.multiplier_part_bits)),
+            ("multiplier_blocks", blocks.is_none_or(|placed| placed > 0 && placed >= self.multipliers as usize)),
+            ("block_rams", in_device("block_rams", self.block_rams)),
+            (
+                "block_ram_shapes",
+                !self.block_ram_shapes.is_empty() && !self.block_ram_shapes.as_flattened().contains(&0),
+            ),
+            ("large_rams", in_device("large_rams", self.large_rams)),
+            ("large_ram_shape", self.large_rams == 0 || !self.large_ram_shape.contains(&0)),
+            ("search_width", SEARCH_WIDTHS.contains(&self.search_width)),
+            ("seeds", self.seeds > 0),
+            ("placers", needed(!self.placers.is_empty())),
+            ("place_minutes", self.place_minutes > 0),
         ];
-        if let Some((field, _)) = counts.iter().find(|(_, count)| *count == 0) {
-            return Err(invalid(format!("{field} = 0: must be positive")));
-        }
-        let placed = board.multiplier_blocks.as_ref().map(MultiplierBlocks::multipliers);
-        if let Some(placed) = placed.filter(|&placed| placed == 0 || placed != board.multipliers as usize) {
-            let has = board.multipliers;
-            return Err(invalid(format!("multiplier_blocks: has {placed} multipliers, multipliers = {has}")));
-        }
-        if !SEARCH_WIDTHS.contains(&board.search_width) {
-            return Err(invalid(format!("search_width = {}: must be 4, 2 or 1", board.search_width)));
-        }
-        if board.multiplier_bits < 2 {
-            return Err(invalid(format!("multiplier_bits = {}: must be at least 2", board.multiplier_bits)));
-        }
-        Ok(Board { name: name.to_owned(), ..board })
+        rules.into_iter().find(|(_, right)| !right).map(|(field, _)| field)
     }
 
     /// Number of block RAMs for a memory of `words` words of `bits` bits, in the configuration that takes the fewest. A
@@ -273,9 +352,11 @@ impl Board {
     }
 
     /// Number of multipliers for a product of signed operands of `a` and `b` bits, each split into as few parts as
-    /// possible.
+    /// possible; the wider operand takes the wider input, as in Yosys.
     pub fn multipliers_for(&self, a: u32, b: u32) -> usize {
-        (a.div_ceil(self.multiplier_bits) * b.div_ceil(self.multiplier_bits)) as usize
+        let parts = |bits: u32, width: u32| 1 + bits.saturating_sub(width).div_ceil(self.multiplier_part_bits);
+        let [wide, narrow] = self.multiplier_bits;
+        (parts(a.max(b), wide) * parts(a.min(b), narrow)) as usize
     }
 
     /// Duration of `cycles` cycles of the engine's clock in µs.
@@ -284,81 +365,27 @@ impl Board {
     }
 }
 
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn every_shipped_board_loads() {
-        assert!(Board::names().contains(&"ulx3s-85f"));
-        for name in Board::names() {
-            let board = Board::load(name).unwrap();
-            assert_eq!(board.name, name);
-            let verilog = board.verilog_files().unwrap();
-            assert!(verilog.iter().any(|(_, text)| text.contains("module board (")), "{name}");
-            // Every port has its site.
-            let (_, pins) = board.pin_file().unwrap();
-            let ports = verilog.iter().filter_map(|(_, text)| text.split_once("module board (")?.1.split_once(");"));
-            let ports: Vec<&str> = ports
-                .flat_map(|(ports, _)| ports.lines())
-                .filter_map(|l| l.rsplit_once("wire "))
-                .map(|(_, port)| port.trim_end_matches(',').rsplit(' ').next().unwrap_or_default())
-                .collect();
-            assert!(!ports.is_empty() && ports.iter().all(|port| pins.contains(port)), "{name}: {ports:?}");
+/// The device that a board's file names.
+fn device(own: &Reader) -> Result<Option<Device>, BoardError> {
+    let Some(named) = own.table.get("device") else { return Ok(None) };
+    let all = Device::all()?;
+    let Some(device) = all.iter().find(|device| named.as_str() == Some(&device.name)) else {
+        let names: Vec<_> = all.iter().map(|device| format!("{:?}", device.name)).collect();
+        let instead = "or left out, with family and the device's counts in this file";
+        return Err(own.wrong_for("device", named, &format!("{}; {instead}", names.join(", "))));
+    };
+    match own.table.get("family") {
+        Some(family) if family.as_str() != Some(device.family.name()) => {
+            let allowed = format!("{:?}, that of {}", device.family.name(), device.name);
+            Err(own.wrong_for("family", family, &allowed))
         }
-        // 100 MHz: one cycle is 10 ns.
-        let board = Board::load("ulx3s-85f").unwrap();
-        assert_eq!(board.microseconds(100), 1.0);
-        // Two lanes share a block RAM up to 512 words; 27 bits are split into two parts of 18.
-        assert_eq!(
-            [(512, 36), (513, 36), (1025, 72), (2048, 9)].map(|(w, b)| board.block_rams_for(w, b)),
-            [1, 2, 6, 1]
-        );
-        // Three parts of 6 bits share a word of 18; Yosys 0.23 takes as many for each of these.
-        assert_eq!(
-            [(2853, 6), (1500, 20), (5000, 3), (1100, 54)].map(|(w, b)| board.block_rams_for(w, b)),
-            [1, 2, 1, 5]
-        );
-        assert_eq!([board.multipliers_for(27, 18), board.multipliers_for(18, 18)], [2, 1]);
+        _ => Ok(Some(device.clone())),
     }
+}
 
-    #[test]
-    fn a_missing_verilog_file_is_named() {
-        let text = FILES.get_file("colorlight-i5.toml").unwrap().contents_utf8().unwrap();
-        let board = Board::parse("x", &text.replace("colorlight.v", "colourlight.v")).unwrap();
-        let error = board.verilog_files().unwrap_err().to_string();
-        assert_eq!(error, "constraints/x.toml: needs colourlight.v beside it");
-    }
-
-    #[test]
-    fn an_unknown_board_lists_the_known_ones() {
-        let error = Board::load("ulx3s").unwrap_err().to_string();
-        assert!(error.contains("\"ulx3s\"") && error.contains("ulx3s-85f"), "{error}");
-    }
-
-    #[test]
-    fn a_clock_of_zero_names_file_field_and_value() {
-        let text = FILES.get_file("ulx3s-85f.toml").unwrap().contents_utf8().unwrap();
-        let error = Board::parse("x", &text.replace("clock_MHz = 100.0", "clock_MHz = 0.0")).unwrap_err();
-        assert_eq!(error.to_string(), "constraints/x.toml: clock_MHz = 0: must be positive");
-    }
-
-    #[test]
-    fn a_search_width_that_divides_no_quad_is_refused() {
-        let text = FILES.get_file("ulx3s-85f.toml").unwrap().contents_utf8().unwrap();
-        let with = |width: usize| Board::parse("x", &format!("search_width = {width}\n{text}"));
-        assert_eq!(with(2).unwrap().search_width, 2);
-        let error = with(3).unwrap_err().to_string();
-        assert_eq!(error, "constraints/x.toml: search_width = 3: must be 4, 2 or 1");
-    }
-
-    #[test]
-    fn blocks_that_hold_another_number_of_multipliers_are_refused() {
-        let text = FILES.get_file("ulx3s-85f.toml").unwrap().contents_utf8().unwrap();
-        for (rows, held) in [("[10, 34]", 104), ("[]", 0)] {
-            let error = Board::parse("x", &text.replace("rows = [10, 34, 58]", &format!("rows = {rows}"))).unwrap_err();
-            let told = format!("constraints/x.toml: multiplier_blocks: has {held} multipliers, multipliers = 156");
-            assert_eq!(error.to_string(), told);
-        }
-    }
+/// The family that a board's file names where it names no device.
+fn family(own: &Reader) -> Result<Family, BoardError> {
+    let named = own.table.get("family").ok_or_else(|| own.missing("device"))?;
+    let family = Family::NAMES.into_iter().find(|(name, _)| named.as_str() == Some(name));
+    family.map(|(_, family)| family).ok_or_else(|| own.wrong("family", named))
 }

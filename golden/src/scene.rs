@@ -227,7 +227,7 @@ pub enum CoefficientCheck {
 /// Table `[hardware]`.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct HardwareSpec {
-    /// One of [`crate::board::Board::names`].
+    /// One of [`crate::board::Board::names`], or the path of a board's file, relative to the working folder.
     pub board: String,
     /// The link between the board and its host.
     pub link: LinkKind,

@@ -1,14 +1,19 @@
 //! FuseSoC core file (CAPI 2) of generated hardware, through which other designs depend on it by name.
 
-/// `<top>.core` for the generated files named `files`.
+use dermis_golden::board::Family;
+
+use crate::testbench::SUFFIX;
+
+/// `<top>.core` for the generated files named `files` and those of the testbench, `bench`.
 ///
-/// Memory files are copied into the tool's work folder, where `$readmemh` looks for them. Target `lint` runs Verilator
-/// with the generated waivers.
-pub(crate) fn core_file(top: &str, scene: &str, files: &[&str]) -> String {
-    let of = |ending: &str, kind: fn(&str) -> String| {
+/// Memory files are copied into the tool's work folder, where `$readmemh` looks for them. Target `sim` runs the testbench
+/// in Icarus, `lint` Verilator with the generated waivers, `synth` Yosys for the board's `family`.
+pub(crate) fn core_file(top: &str, scene: &str, family: Family, files: &[String], bench: &[String]) -> String {
+    let of = |files: &[String], ending: &str, kind: fn(&str) -> String| {
         let chosen = files.iter().filter(|name| name.ends_with(ending));
         chosen.map(|name| format!("      - {name}: {{{}}}\n", kind(name))).collect::<String>()
     };
+    let memory = |name: &str| format!("file_type: user, copyto: {name}");
     format!(
         "\
 CAPI=2:
@@ -20,10 +25,18 @@ filesets:
     files:
 {verilog}{memories}  waivers:
     files:
-{waivers}targets:
+{waivers}  testbench:
+    files:
+{testbench}{vectors}targets:
   default:
     filesets: [rtl]
     toplevel: {top}
+  sim:
+    filesets: [rtl, testbench]
+    toplevel: {top}{SUFFIX}
+    flow: sim
+    flow_options:
+      tool: icarus
   lint:
     filesets: [waivers, rtl]
     toplevel: {top}
@@ -31,11 +44,26 @@ filesets:
     flow_options:
       tool: verilator
       verilator_options: [-Wall]
+  synth:
+    filesets: [rtl]
+    toplevel: {top}
+    flow: generic
+    flow_options:
+      tool: yosys
+      arch: {arch}
+      output_format: json
 ",
         version = env!("CARGO_PKG_VERSION"),
-        verilog = of(".v", |_| "file_type: verilogSource".to_owned()),
-        memories = of(".hex", |name| format!("file_type: user, copyto: {name}")),
-        waivers = of(".vlt", |_| "file_type: vlt".to_owned()),
+        verilog = of(files, ".v", |_| "file_type: verilogSource".to_owned()),
+        memories = of(files, ".hex", memory),
+        waivers = of(files, ".vlt", |_| "file_type: vlt".to_owned()),
+        testbench = of(bench, ".sv", |_| "file_type: systemVerilogSource".to_owned()),
+        vectors = of(bench, ".hex", memory),
+        arch = match family {
+            Family::Ecp5 => "ecp5",
+            Family::Ice40 => "ice40",
+            Family::Artix7 => "xilinx",
+        },
     )
 }
 
@@ -45,11 +73,15 @@ mod tests {
 
     #[test]
     fn every_file_stands_where_its_kind_belongs() {
-        let text = core_file("dermis_a", "a", &["dermis_a.v", "dermis_a.vlt", "manifest.json", "coefficients.hex"]);
+        let owned = |names: &[&str]| names.iter().map(|name| name.to_string()).collect::<Vec<_>>();
+        let files = owned(&["dermis_a.v", "dermis_a.vlt", "manifest.json", "coefficients.hex"]);
+        let text =
+            core_file("dermis_a", "a", Family::Ice40, &files, &owned(&["dermis_a_tb.sv", "dermis_a_tb_codes.hex"]));
         let after = |start: &str| text.split_once(start).map(|(_, rest)| rest.lines().nth(1).unwrap_or_default());
         assert_eq!(after("  rtl:\n"), Some("      - dermis_a.v: {file_type: verilogSource}"));
         assert_eq!(after("  waivers:\n"), Some("      - dermis_a.vlt: {file_type: vlt}"));
         assert!(text.contains("      - coefficients.hex: {file_type: user, copyto: coefficients.hex}\n"));
-        assert!(!text.contains("manifest.json"));
+        assert_eq!(after("  testbench:\n"), Some("      - dermis_a_tb.sv: {file_type: systemVerilogSource}"));
+        assert!(text.contains("      arch: ice40\n") && !text.contains("manifest.json"));
     }
 }

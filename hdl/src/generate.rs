@@ -1,4 +1,4 @@
-//! Generation of the engine as files: Verilog, memory files, lint waivers, core file, manifest, C header.
+//! Generation of the engine as files: Verilog, memory files, lint waivers, manifest, C header.
 
 use std::collections::BTreeMap;
 
@@ -15,7 +15,6 @@ use dermis_golden::partition::Case;
 use serde::Serialize;
 use serde_json::json;
 
-use crate::core_file::core_file;
 use crate::describe::port_comments;
 use crate::device::Tap;
 use crate::error::HdlError;
@@ -33,7 +32,7 @@ use crate::waivers::waivers;
 pub struct Generated {
     /// Name of the top module.
     pub top: String,
-    /// `<top>.v`, memory files, `<top>.vlt`, `<top>.core`, `manifest.json`, `dermis_link.h`.
+    /// `<top>.v`, memory files, `<top>.vlt`, `manifest.json`, `dermis_link.h`; more by [`Generated::add_integration`].
     pub files: Vec<GeneratedFile>,
     /// The memories that the model plans, with their places in the hardware.
     pub memories: Vec<PlacedMemory>,
@@ -121,9 +120,6 @@ pub fn generate_changed(model: &Model, changes: &[Change]) -> Result<Generated, 
         file("dermis_link.h".to_string(), c_header()),
     ];
     files.extend(engine.memory_files().into_iter().map(|(name, text)| file(name.to_string(), text)));
-    let names: Vec<&str> = files.iter().map(|file| file.name.as_str()).collect();
-    let core = core_file(&top, &model.scene.name, &names);
-    files.push(file(format!("{top}.core"), core));
     let mut generated = Generated { top, files, memories, taps, state, manifest, usage, dropped };
     generated.seal();
     Ok(generated)

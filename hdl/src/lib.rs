@@ -45,12 +45,15 @@ pub mod wire;
 mod core_file;
 mod error;
 mod generate;
+mod integration;
 mod ports;
 #[cfg(test)]
 mod scenes;
 mod simulate;
 mod stage_list;
 mod taps;
+mod testbench;
+mod vivado;
 mod waivers;
 
 pub use error::HdlError;

@@ -10,6 +10,7 @@
 //! | `flipped_bit` | one wrong bit in a coefficient, a vector or the expected output is found |
 //! | `choice` | several cases in one design: equality in mixed order, wrong constants found, benefit of the choice |
 //! | `resources` | block RAMs and multipliers equal Yosys's counts, flip-flops and LUTs are close |
+//! | `artix` | accumulators inside the DSP48E1, block RAMs and multipliers as Yosys counts them, the script for Vivado |
 //! | `extreme` | zero, saturated, 1e±9 of full scale, at edges and corners: equal in hardware |
 //! | `fuzz` | readers, and the path from a scene to forces, on mutated and random input; counts for the report |
 //! | `explain` | disabled features are not in the Verilog, and what that saves; errors suggest changes that fit |

@@ -29,10 +29,10 @@ pub enum LinkError {
         bytes: usize,
     },
     /// The bit rate is too high for the board's clock.
-    #[error("constraints/{board}.toml: {field} = {value}: the clock of {clock_MHz} MHz takes at most {most}")]
+    #[error("{file}: {field} = {value}: the clock of {clock_MHz} MHz takes at most {most}")]
     TooFast {
-        /// The board's name.
-        board: String,
+        /// The board's file.
+        file: String,
         /// Field of its file.
         field: &'static str,
         /// Its bit rate in the field's unit.
@@ -42,12 +42,18 @@ pub enum LinkError {
         /// The highest bit rate in the field's unit.
         most: f64,
     },
-    /// The scene asks for SPI on a board without pins for it.
-    #[error(
-        "hardware.link = \"spi\": board {board} has no pins for it (no spi_MHz in constraints/{board}.toml); it has \"uart\""
-    )]
+    /// The scene asks for a link for which its board has no pins.
+    #[error("hardware.link = {link:?}: board {board} has no pins for it (no {field} in {file}); it has {others}")]
     NoPins {
+        /// The link.
+        link: &'static str,
         /// The board's name.
         board: String,
+        /// The board's file.
+        file: String,
+        /// Field of its file with the bit rate.
+        field: &'static str,
+        /// The links that the board has.
+        others: String,
     },
 }

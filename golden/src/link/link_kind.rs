@@ -62,19 +62,32 @@ impl LinkKind {
     /// # Errors
     /// [`LinkError::NoPins`], or [`LinkError::TooFast`] if the board's clock is too slow.
     pub fn bit_rate(self, board: &Board) -> Result<u32, LinkError> {
-        let clock_hz = board.clock_MHz * 1e6;
-        // The field, its value, the largest allowed value, and Hz per unit of both.
-        let (field, value, most, unit) = match (self, board.spi_MHz) {
-            (LinkKind::Uart, _) => ("uart_baud", f64::from(board.uart_baud), clock_hz / MIN_CYCLES_PER_BIT, 1.0),
-            (LinkKind::Spi, Some(rate)) => ("spi_MHz", rate, board.clock_MHz * SPI_BITS / MIN_CYCLES_PER_BYTE, 1e6),
-            (LinkKind::Spi, None) => return Err(LinkError::NoPins { board: board.name.clone() }),
+        let clock_MHz = board.clock_MHz;
+        // The field, the largest allowed value, and Hz per unit of both.
+        let (field, most, unit) = match self {
+            LinkKind::Uart => ("uart_baud", clock_MHz * 1e6 / MIN_CYCLES_PER_BIT, 1.0),
+            LinkKind::Spi => ("spi_MHz", clock_MHz * SPI_BITS / MIN_CYCLES_PER_BYTE, 1e6),
+        };
+        let file = board.file().to_owned();
+        let Some(value) = self.rate(board) else {
+            let others = Self::NAMES.iter().filter(|(_, kind)| kind.rate(board).is_some());
+            let others: Vec<_> = others.map(|(name, _)| format!("{name:?}")).collect();
+            let others = if others.is_empty() { "no link".to_owned() } else { others.join(", ") };
+            return Err(LinkError::NoPins { link: self.name(), board: board.name.clone(), file, field, others });
         };
         if value > most {
             let most = (most * 10.0).floor() / 10.0;
-            let (board, clock_MHz) = (board.name.clone(), board.clock_MHz);
-            return Err(LinkError::TooFast { board, field, value, clock_MHz, most });
+            return Err(LinkError::TooFast { file, field, value, clock_MHz, most });
         }
         Ok((value * unit).round() as u32)
+    }
+
+    /// The rate that the board's file states, in the unit of its field.
+    fn rate(self, board: &Board) -> Option<f64> {
+        match self {
+            LinkKind::Uart => board.uart_baud.map(f64::from),
+            LinkKind::Spi => board.spi_MHz,
+        }
     }
 
     /// Duration in ms of a packet of `payload` bytes at `bit_rate` bit/s; each byte that must be escaped adds one more.

@@ -113,7 +113,7 @@ fn the_hash_tells_scenes_apart_and_clocks_not() {
     };
     let hashes = [scene_hash(&plain), calibrated(0, 1 << 16), calibrated(1, 1 << 16), calibrated(0, 1 << 15)];
     assert!((1..4).all(|k| !hashes[..k].contains(&hashes[k])), "{hashes:?}");
-    faster.board.uart_baud = 10_000_000;
+    faster.board.uart_baud = Some(10_000_000);
     let error = Identity::of(&faster).unwrap_err().to_string();
     let wanted = "constraints/ulx3s-85f.toml: uart_baud = 10000000: the clock of 50 MHz takes at most 6250000";
     assert_eq!(error, wanted);
@@ -135,6 +135,11 @@ fn the_boards_clock_and_pins_limit_the_spi() {
     let wanted = "hardware.link = \"spi\": board ulx3s-85f has no pins for it (no spi_MHz in \
                   constraints/ulx3s-85f.toml); it has \"uart\"";
     assert_eq!(of(None), Err(wanted.to_string()));
+    // A board without any pins.
+    let text = "device = \"LFE5U-85F\"\nclock_MHz = 100.0\n";
+    model.board = crate::board::Board::parse("alone", "alone.toml", text).unwrap();
+    let wanted = "hardware.link = \"spi\": board alone has no pins for it (no spi_MHz in alone.toml); it has no link";
+    assert_eq!(Identity::of(&model).unwrap_err().to_string(), wanted);
 }
 
 #[test]

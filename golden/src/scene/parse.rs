@@ -81,7 +81,7 @@ impl Scene {
             inverse: inverse(&reader)?,
             threshold: threshold(&reader)?,
             fixed: fixed(&reader)?,
-            hardware: hardware(&reader)?,
+            hardware: hardware(&reader, origin)?,
             input: input(&reader, origin, &sensor)?,
             output: output(&reader)?,
             sensor,
@@ -296,17 +296,28 @@ fn lanes(reader: &Reader) -> Result<Option<u32>, SceneError> {
     Ok(reader.typed("fixed.lanes", read, "a multiple of 4 from 4 to 1024")?.map(|lanes| lanes as u32))
 }
 
-fn hardware(reader: &Reader) -> Result<HardwareSpec, SceneError> {
-    let boards: Vec<_> = Board::names().into_iter().map(|board| (board, Some(board))).collect();
-    let board = reader.choice("hardware.board", &boards)?;
-    let board = board.map_or_else(|| HardwareSpec::default().board, str::to_string);
+fn hardware(reader: &Reader, origin: &str) -> Result<HardwareSpec, SceneError> {
     let checks = [("none", CoefficientCheck::None), ("signature", CoefficientCheck::Signature)];
     Ok(HardwareSpec {
-        board,
+        board: board(reader, origin)?,
         link: reader.choice("hardware.link", &LinkKind::NAMES)?,
         coefficient_check: reader.choice("hardware.coefficient_check", &checks)?,
         search_width: search_width(reader)?,
     })
+}
+
+/// A built-in board's name, or the path of a file, which the scene gives relative to its own folder.
+fn board(reader: &Reader, origin: &str) -> Result<String, SceneError> {
+    let Some(value) = reader.value("hardware.board") else { return Ok(HardwareSpec::default().board) };
+    match value.as_str() {
+        Some(name) if Board::names().contains(&name) => Ok(name.to_owned()),
+        Some(file) if Board::is_file(file) => Ok(Path::new(origin).with_file_name(file).display().to_string()),
+        _ => {
+            let names: Vec<_> = Board::names().into_iter().map(|name| format!("{name:?}")).collect();
+            let own = "or the path of a board's file, which ends with .toml";
+            Err(reader.wrong("hardware.board", value, format!("{}, {own}", names.join(" or "))))
+        }
+    }
 }
 
 fn search_width(reader: &Reader) -> Result<Option<usize>, SceneError> {

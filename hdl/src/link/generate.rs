@@ -86,8 +86,7 @@ pub fn generate_board_changed(model: &Model, changes: &[Change]) -> Result<Gener
     );
     let engine_file = format!("{}.v", engine.top);
     let waivers = format!("{}.vlt", engine.top);
-    let core_file = format!("{}.core", engine.top);
-    let files = engine.files.iter().filter(|file| file.name != core_file).cloned().map(|file| match file {
+    let files = engine.files.iter().cloned().map(|file| match file {
         file if file.name == engine_file => GeneratedFile { name: format!("{top}.v"), text: text.clone() },
         file if file.name == waivers => GeneratedFile { name: format!("{top}.vlt"), ..file },
         file => file,

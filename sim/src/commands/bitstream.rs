@@ -8,7 +8,7 @@ use dermis_golden::board::SEARCH_WIDTHS;
 use dermis_golden::fixed::Model;
 use dermis_golden::scene::Scene;
 
-use crate::flow::baseline::{with_search_width, Baselines, FILE};
+use crate::flow::baseline::{with_search_width, Baselines};
 use crate::flow::bitstream::{make, Effort};
 use crate::progress::Progress;
 use crate::report::{self, BitstreamReport, Summary};
@@ -18,6 +18,7 @@ use crate::report::{self, BitstreamReport, Summary};
 #[command(after_help = "Examples:
   dermis bitstream eight-by-eight
   dermis bitstream eight-by-eight --board icebreaker
+  dermis bitstream eight-by-eight --board ./my-board.toml      a board of your own
   dermis bitstream sensor-1 --search-width 2         a variant with half the search, with baselines of its own
   dermis bitstream sensor-1 --seeds 5 --jobs 2 --update-baselines
   dermis bitstream --committed --board ulx3s-85f")]
@@ -25,8 +26,8 @@ pub struct Arguments {
     /// Built-in name or path of a scene.
     #[arg(required_unless_present = "committed")]
     scene: Option<String>,
-    /// Board to use instead of the scene's: the name of a file in constraints.
-    #[arg(long, value_name = "NAME")]
+    /// Board to use instead of the scene's: a name that `dermis boards` lists, or the path of a file that ends with .toml.
+    #[arg(long, visible_alias = "target-board", value_name = "BOARD")]
     board: Option<String>,
     /// Taxels per cycle of the search, in the place of the scene's or the board's; SCENE-width-N is the variant's name.
     #[arg(long, value_name = "N", value_parser = search_width)]
@@ -37,7 +38,7 @@ pub struct Arguments {
     /// Number of seeds to run in parallel; each takes a core and about 1 GB of memory.
     #[arg(long, default_value_t = 2, value_parser = clap::value_parser!(u32).range(1..))]
     jobs: u32,
-    /// If the clock is met, write the results into constraints/baselines.json instead of comparing with it.
+    /// If the clock is met, write the results into baselines.json beside the board's file instead of comparing with it.
     #[arg(long)]
     update_baselines: bool,
     /// Print the result as JSON and nothing else.
@@ -88,6 +89,6 @@ fn committed(scene: Option<&str>, board: Option<&str>) -> Result<String> {
             all.push(Summary::new(&Model::new(&of)?, baseline.clone()));
         }
     }
-    ensure!(!all.is_empty(), "{FILE}: no baseline of scene {scene:?} on board {board:?}");
+    ensure!(!all.is_empty(), "no committed baseline of scene {scene:?} on board {board:?}");
     Ok(report::summaries(&all))
 }

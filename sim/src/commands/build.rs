@@ -21,7 +21,8 @@ use crate::report;
   dermis build sensor-1 --out rtl
   dermis build sensor-4 --explain
   dermis build sensor-1 --board                      engine, link and packets, ready for place and route
-  dermis build eight-by-eight --target-board icebreaker     the serial engine, for small devices")]
+  dermis build eight-by-eight --target-board icebreaker     the serial engine, for small devices
+  dermis build eight-by-eight --target-board ./my-board.toml      a board of your own")]
 pub struct Arguments {
     /// Built-in name or path of a scene.
     scene: String,
@@ -57,6 +58,9 @@ fn build(scene: &Scene, out: &Path, board: bool, with_features: bool) -> Result<
     let progress = Progress::start(&format!("{}: model and Verilog", scene.name));
     let model = Model::new(scene)?;
     let mut generated = if board { generate_board(&model)? } else { generate(&model)? };
+    if !board {
+        generated.add_integration(&model);
+    }
     let explained = explain(&model)?;
     generated.add_explained(&explained);
     drop(progress);

@@ -44,6 +44,7 @@ const EXAMPLES: &str = "Examples:
   dermis reconstruct sensor-1 --engine rtl           the same in the generated hardware, under Verilator
   dermis build eight-by-eight --out rtl              Verilog, memory files, manifest.json
   dermis bitstream eight-by-eight                    synthesis, place and route for its board
+  dermis boards                                      built-in boards and known devices
   dermis host --port /dev/ttyUSB0 press.json         send a frame to a board, print the resultants
   dermis block fold                                  ports of a stage: width, meaning, validity
   dermis cosim sensor-1                              all shipped frames, model against hardware
@@ -82,6 +83,8 @@ enum Command {
         #[command(flatten)]
         target: BoardOverride,
     },
+    /// List the built-in boards and the known devices, or print every field of one board.
+    Boards(super::boards::Arguments),
     /// Print the ports of a block, its Verilog, or draw its timing.
     Block(super::block::Arguments),
     /// Compare simulated hardware with the bit-true model, stage by stage and cycle by cycle.
@@ -169,6 +172,7 @@ fn run(arguments: &Arguments) -> Result<(String, bool)> {
         Command::New(arguments) => Ok((super::new::run(arguments)?, true)),
         Command::Calibrate(arguments) => Ok((super::calibrate::run(arguments)?, true)),
         Command::Block(arguments) => Ok((super::block::run(arguments, build_dir)?, true)),
+        Command::Boards(arguments) => Ok((super::boards::run(arguments)?, true)),
         Command::Host(arguments) => super::host::run(arguments),
         Command::Board { scene, target } => {
             let scene = target.apply(Scene::load(scene)?);

@@ -7,7 +7,7 @@ use anyhow::{bail, Result};
 use clap::Args;
 use dermis_golden::fixed::Model;
 use dermis_golden::frame::Frame;
-use dermis_golden::link::{Counters, Identity, Kind};
+use dermis_golden::link::{Counters, Identity, Kind, LinkKind};
 use dermis_golden::reception::full_scale;
 use dermis_golden::scene::Scene;
 
@@ -76,7 +76,10 @@ pub fn run(arguments: &Arguments) -> Result<(String, bool)> {
     let model = Model::new(&scene)?;
     let tare = arguments.tare.as_ref().map(|path| Frame::load(path, Some(&scene))).transpose()?;
     tare.as_ref().map_or(Ok(()), |tare| tare.check(&scene))?;
-    let baud = arguments.baud.unwrap_or(model.board.uart_baud);
+    let baud = match arguments.baud {
+        Some(baud) => baud,
+        None => LinkKind::Uart.bit_rate(&model.board)?,
+    };
     let simulated = is_pseudo_terminal(&arguments.port);
     if simulated && arguments.baud.is_some() {
         eprintln!("{}: a pseudo-terminal has no bit rate: --baud has no effect", arguments.port);

@@ -19,8 +19,8 @@ pub const EQ2: &str = "eq2";
 /// The option `--target-board`, which replaces a scene's board.
 #[derive(Args, Clone, Debug, Default)]
 pub struct BoardOverride {
-    /// Board to use instead of the scene's: the name of a file in constraints.
-    #[arg(long, value_name = "NAME")]
+    /// Board to use instead of the scene's: a name that `dermis boards` lists, or the path of a file that ends with .toml.
+    #[arg(long, value_name = "BOARD")]
     target_board: Option<String>,
 }
 

@@ -5,6 +5,7 @@
 //! |---|---|
 //! | [`bitstream`] | `dermis bitstream`: synthesis, place and route, compared with committed baselines |
 //! | [`block`] | `dermis block`: ports, Verilog and drawn timing of the blocks |
+//! | [`boards`] | `dermis boards`: built-in boards and known devices, or every field of one board |
 //! | [`build`] | `dermis build`: generates the Verilog of a scene |
 //! | [`calibrate`] | `dermis calibrate`: a calibration table from recordings under known stresses |
 //! | [`check`] | `dermis check`: what to expect of a scene; whether a generated folder is intact |
@@ -28,6 +29,7 @@
 
 pub mod bitstream;
 pub mod block;
+pub mod boards;
 pub mod build;
 pub mod calibrate;
 pub mod check;

@@ -5,11 +5,12 @@
 
 use std::fmt::Write as _;
 use std::io::{BufRead, IsTerminal, Write};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
 use anyhow::{anyhow, bail, Result};
 use clap::Args;
+use dermis_golden::board::Board;
 use dermis_golden::float::Golden;
 use dermis_golden::scene::{Scene, SearchSpec};
 use dermis_golden::write::write;
@@ -49,8 +50,8 @@ pub struct Arguments {
     /// The cover is bonded to a rigid base and has this Poisson ratio; default: a half-space.
     #[arg(long, value_name = "POISSON")]
     bonded: Option<f64>,
-    /// Board for the hardware.
-    #[arg(long, value_name = "NAME")]
+    /// Board for the hardware: a name that `dermis boards` lists, or the path of a file that ends with .toml.
+    #[arg(long, value_name = "BOARD")]
     board: Option<String>,
 }
 
@@ -180,9 +181,21 @@ fn scene_text(arguments: &Arguments, asker: &mut Asker) -> Result<String> {
              # tare = \"zero.csv\"            # frames without contact: the zero, and the noise where it is not stated\n\
              # dead = [[0, 0]]              # row and column, from 0, of taxels to leave out\n";
     if let Some(board) = &arguments.board {
+        let board = board_beside(board, &arguments.file)?;
         write!(text, "\n[hardware]\nboard = {}\n", format_args!("{board:?}"))?;
     }
     Ok(text)
+}
+
+/// The board as the scene `file` names it: the path of a board's file relative to the scene's folder, where that is the
+/// working folder, else absolute.
+fn board_beside(board: &str, file: &Path) -> Result<String> {
+    let here = file.parent().is_none_or(|folder| folder.as_os_str().is_empty());
+    if here || !Board::is_file(board) {
+        return Ok(board.to_owned());
+    }
+    let path = std::path::absolute(board).map_err(|error| anyhow!("--board {board}: {error}"))?;
+    Ok(path.display().to_string())
 }
 
 #[cfg(test)]
@@ -228,6 +241,11 @@ mod tests {
             (scene.hardware.board.as_str(), scene.medium.to_string().as_str()),
             ("icebreaker", "bonded-layer, poisson 0.45")
         );
+        // The file of a board is found from the scene's folder.
+        let beside = |file: &str| board_beside("boards/own.toml", Path::new(file)).unwrap();
+        assert_eq!(beside("pad.toml"), "boards/own.toml");
+        let absolute = std::env::current_dir().unwrap().join("boards/own.toml").display().to_string();
+        assert_eq!(beside("scenes/pad.toml"), absolute);
         let scene = Scene::parse(&written(&needed, "").0.unwrap(), "pad.toml").unwrap();
         assert_eq!(scene, Scene::of_sensor(&scene.sensor, "pad"));
     }

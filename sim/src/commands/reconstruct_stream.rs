@@ -58,7 +58,7 @@ impl StreamArguments {
         let policy = if self.latest { Policy::Latest } else { Policy::All };
         let queue = self.queue.unwrap_or(if self.latest { QUEUE_OF_LATEST } else { QUEUE_OF_ALL });
         let baud = match self.baud {
-            Some(baud) => baud,
+            Some(baud) => Some(baud),
             None => dermis_golden::board::Board::load(&scene.hardware.board)?.uart_baud,
         };
         let (input, address) = source.open(baud).map_err(|error| anyhow!("--stream: {error}"))?;

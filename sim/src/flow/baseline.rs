@@ -1,25 +1,33 @@
-//! Committed results of place and route by board and scene: `constraints/baselines.json`.
+//! Results of place and route by board and scene: `baselines.json` beside the boards' files, for the built-in boards the
+//! committed `constraints/baselines.json`.
+//!
 //!
 //! `dermis bitstream --update-baselines` writes the file if the clock is met. Without that option `dermis bitstream`
 //! fails if its result is slower or larger than the baseline, beyond the tolerances below.
 
 use std::collections::BTreeMap;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
 
 use super::tools::ToolError;
+use dermis_golden::board::Board;
 use dermis_golden::scene::Scene;
 use dermis_golden::write::write;
 
-/// Path of the file, relative to the repository's root.
-pub const FILE: &str = "constraints/baselines.json";
+/// Name of the file, beside the board's.
+const FILE: &str = "baselines.json";
 /// Content of the file when this program was built.
 const COMMITTED: &str = include_str!("../../../constraints/baselines.json");
 /// Allowed relative loss of the best seed's clock; about the scatter of place and route.
 const SLOWER: f64 = 0.10;
 /// Allowed relative increase of look-up tables and flip-flops; tool versions differ by less.
 const LARGER: f64 = 0.05;
+
+/// Path of the baselines of a board; of a built-in one relative to the repository's root.
+pub fn path(board: &Board) -> PathBuf {
+    board.folder().join(FILE)
+}
 
 /// Result of a scene on a board.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]

@@ -2,16 +2,17 @@
 
 use std::path::{Path, PathBuf};
 
-use anyhow::{anyhow, Result};
+use anyhow::{anyhow, bail, Result};
 use dermis_golden::board::Board;
 use dermis_golden::fixed::Model;
 use dermis_golden::scene::Scene;
 use dermis_golden::write::write;
 use dermis_hdl::link::generate_board;
 
-use super::baseline::{Baseline, Baselines, FILE};
-use super::family::{flow, pack_arguments, place_arguments, Flow, YOSYS};
+use super::baseline::{self, Baseline, Baselines};
+use super::family::{flow, Flow, Routing, YOSYS};
 use super::floor_plan;
+use super::pins::check_pins;
 use super::register_packing::PackedRegisters;
 use super::synthesis::{self, NETLIST};
 use super::timing::{Fmax, Placed};
@@ -20,7 +21,7 @@ use crate::compare::median;
 use crate::jobs::{parallel, Interrupt};
 use crate::progress::Progress;
 
-/// Name of the outermost module, in `constraints/<board>.v`, which instantiates the board top.
+/// Name of the outermost module, in the board's Verilog, which instantiates the board top.
 const TOP: &str = "board";
 
 /// A scene placed and routed for its board.
@@ -49,34 +50,48 @@ pub struct Effort {
     pub update_baselines: bool,
 }
 
+/// A design on its way to a bitstream.
+struct Design<'a> {
+    model: &'a Model,
+    routing: &'a Routing,
+    /// Folder of all files.
+    folder: &'a Path,
+    /// Name of the pin file.
+    pins: &'a str,
+}
+
 /// Makes the bitstream of `model` in the folder `<build_dir>/<scene>/<board>`.
 ///
 /// # Errors
+/// [`BoardError`](dermis_golden::board::BoardError): a board without pins or with files that do not suit it.
 /// [`ToolError`]: a tool is missing or failed; no seed that could be routed, a clock that differs from the board's file.
 pub fn make(model: &Model, build_dir: &Path, effort: Effort) -> Result<Made> {
     let (scene, board) = (&model.scene, &model.board);
+    let (pins, _) = board.pin_file()?;
     let flow = flow(board.family);
-    for tool in [YOSYS, flow.place, flow.pack] {
+    let Some(routing) = &flow.routing else { bail!("{}: no place and route of {}", board.file(), board.family.name()) };
+    for tool in [YOSYS, routing.place, routing.pack] {
         tool.version()?;
     }
     let folder = build_dir.join(&scene.name).join(&board.name);
     let packed = synthesise(model, &folder)?;
     let seeds = effort.seeds.unwrap_or(board.seeds);
-    let placed = place(model, &flow, &folder, seeds, effort.jobs)?;
+    let design = Design { model, routing, folder: &folder, pins: &pins };
+    let placed = place(&design, seeds, effort.jobs)?;
     let better =
         |a: &Placed, b: &Placed| a.is_met().cmp(&b.is_met()).then(a.engine.achieved.total_cmp(&b.engine.achieved));
     let (best_seed, best) = placed.iter().max_by(|(_, a), (_, b)| better(a, b)).ok_or_else(|| {
         anyhow!("{}: none of {seeds} seeds could be placed and routed; logs in {}", scene.name, folder.display())
     })?;
     check_constraints(board, best)?;
-    let product = format!("{}.{}", scene.name, flow.bitstream);
+    let product = format!("{}.{}", scene.name, routing.bitstream);
     let achieved = summarise_seeds(&flow, &placed, best);
     let of = |(name, clock): (&str, Fmax)| format!("{name} {:.1} MHz of {} MHz", clock.achieved, clock.constraint);
     let mut failures: Vec<String> = best.clocks().filter(|(_, clock)| !clock.is_met()).map(of).collect();
     let met = failures.is_empty();
     if met {
-        let arguments = pack_arguments(board.family, &format!("{}.config", seed_prefix(*best_seed)), &product);
-        flow.pack.run(&folder, &arguments, "pack.log", synthesis::MINUTES)?;
+        let arguments = routing.pack_arguments(&format!("{}.config", seed_prefix(*best_seed)), &product);
+        routing.pack.run(&folder, &arguments, "pack.log", synthesis::MINUTES)?;
     }
     failures.extend(compare_or_update_baselines(effort.update_baselines && met, board, scene, &achieved)?);
     Ok(Made { achieved, packed, link_clock: best.link, bitstream: met.then(|| folder.join(product)), failures })
@@ -85,17 +100,16 @@ pub fn make(model: &Model, build_dir: &Path, effort: Effort) -> Result<Made> {
 /// Checks that the clock constraints seen by place and route are those of the board's file.
 fn check_constraints(board: &Board, placed: &Placed) -> Result<()> {
     let differs = |has: f64, wants: f64| (has / wants - 1.0).abs() > 1e-3;
-    let (file, has, wants) = (&board.name, placed.engine.constraint, board.clock_MHz);
+    let (has, wants) = (placed.engine.constraint, board.clock_MHz);
     if differs(has, wants) {
-        return Err(anyhow!(
-            "constraints/{file}.toml: clock_MHz = {wants}, but the PLL of its Verilog gives {has} MHz"
-        ));
+        let reason = format!("clock_MHz = {wants}, but the PLL of its Verilog gives {has} MHz");
+        return Err(board.invalid("clock_MHz", reason).into());
     }
     if let (Some((pin, clock)), Some(wants)) = (placed.link, board.spi_MHz) {
-        let (pins, has) = (board.family.pin_file_extension(), clock.constraint);
+        let (pins, has) = (board.path_of(board.pins.as_deref().unwrap_or_default()), clock.constraint);
         if differs(has, wants) {
-            let pins = format!("constraints/{file}.{pins}: {pin} is constrained to {has} MHz");
-            return Err(anyhow!("{pins}, {file}.toml says spi_MHz = {wants}"));
+            let reason = format!("spi_MHz = {wants}, but {pins} constrains {pin} to {has} MHz");
+            return Err(board.invalid("spi_MHz", reason).into());
         }
     }
     Ok(())
@@ -105,27 +119,33 @@ fn check_constraints(board: &Board, placed: &Placed) -> Result<()> {
 fn synthesise(model: &Model, folder: &Path) -> Result<PackedRegisters> {
     let _progress = Progress::start(&format!("{}: synthesis", model.scene.name));
     let generated = generate_board(model)?;
-    let (verilog, pins) = (model.board.verilog_files()?, model.board.pin_file()?);
+    let board = &model.board;
+    let (verilog, pins) = (board.verilog_files()?, board.pin_file()?);
     std::fs::create_dir_all(folder).map_err(ToolError::io(folder))?;
-    let own = generated.files.iter().map(|file| (&file.name, file.text.as_str()));
-    for (name, text) in own.chain(verilog.iter().chain([&pins]).map(|(name, text)| (name, *text))) {
-        let path = folder.join(name);
-        write(&path, text.as_bytes())?;
+    let own = generated.files.iter().map(|file| (&file.name, &file.text));
+    let boards = verilog.iter().chain([&pins]).map(|(name, text)| (name, text));
+    if let Some((name, _)) = boards.clone().find(|(name, _)| own.clone().any(|(own, _)| own == *name)) {
+        let reason = format!("verilog: {name}: a generated file has this name; it must be another one");
+        return Err(board.invalid("verilog", reason).into());
+    }
+    for (name, text) in own.chain(boards) {
+        write(&folder.join(name), text.as_bytes())?;
     }
     let link = model.scene.hardware.link.name().to_uppercase();
     let (top, names) = (&generated.top, verilog.iter().map(|(name, _)| name.as_str()).collect::<Vec<_>>().join(" "));
-    let read = format!("-D DERMIS_TOP={top} -D DERMIS_{link} {names} {top}.v");
-    let packed = synthesis::synthesise(folder, model.board.family, &read, TOP)?;
-    if let Some(blocks) = &model.board.multiplier_blocks {
+    let of_board = format!("-D DERMIS_TOP={top} -D DERMIS_{link} {names}");
+    check_pins(board, folder, &of_board, TOP, &pins.1)?;
+    let packed = synthesis::synthesise(folder, board.family, &format!("{of_board} {top}.v"), TOP)?;
+    if let Some(blocks) = &board.multiplier_blocks {
         synthesis::edit(folder, |netlist| floor_plan::assign_sites(netlist, TOP, blocks))?;
     }
     Ok(packed)
 }
 
 /// Places and routes with seeds 1 … `seeds`, `jobs` at a time; returns the seeds that completed.
-fn place(model: &Model, flow: &Flow, folder: &Path, seeds: u32, jobs: u32) -> Result<Vec<(u32, Placed)>> {
-    let what = format!("{}: place and route", model.board.name);
-    let place = |seed| match place_seed(model, flow, folder, seed) {
+fn place(design: &Design, seeds: u32, jobs: u32) -> Result<Vec<(u32, Placed)>> {
+    let what = format!("{}: place and route", design.model.board.name);
+    let place = |seed| match place_seed(design, seed) {
         // A seed that does not converge is skipped as long as there are others.
         Err(ToolError::Late { .. } | ToolError::Failed { .. }) if seeds > 1 => Ok(None),
         placed => Ok(Some((seed, placed?))),
@@ -140,13 +160,14 @@ fn seed_prefix(seed: u32) -> String {
 }
 
 /// Places and routes one seed with the first of the board's placers that converges.
-fn place_seed(model: &Model, flow: &Flow, folder: &Path, seed: u32) -> Result<Placed, ToolError> {
+fn place_seed(design: &Design, seed: u32) -> Result<Placed, ToolError> {
+    let Design { model, routing, folder, pins } = design;
     let board = &model.board;
     let name = seed_prefix(seed);
-    let mut last = Err(ToolError::Missing { tool: flow.place.name });
+    let mut last = Err(ToolError::Missing { tool: routing.place.name });
     for placer in &board.placers {
-        let arguments = place_arguments(board, NETLIST, seed, placer, &name);
-        last = flow.place.run(folder, &arguments, &format!("{name}.{placer}.log"), board.place_minutes);
+        let arguments = routing.place_arguments(board, [NETLIST, pins], seed, placer, &name);
+        last = routing.place.run(folder, &arguments, &format!("{name}.{placer}.log"), board.place_minutes);
         if last.is_ok() {
             break;
         }
@@ -175,11 +196,11 @@ fn summarise_seeds(flow: &Flow, placed: &[(u32, Placed)], best: &Placed) -> Base
 
 /// Writes the baseline, or returns the regressions against it.
 fn compare_or_update_baselines(update: bool, board: &Board, scene: &Scene, achieved: &Baseline) -> Result<Vec<String>> {
-    let path = Path::new(FILE);
-    let mut all = Baselines::read(path)?;
+    let path = baseline::path(board);
+    let mut all = Baselines::read(&path)?;
     if update {
         all.0.entry(board.name.clone()).or_default().insert(scene.name.clone(), achieved.clone());
-        all.write(path)?;
+        all.write(&path)?;
         return Ok(Vec::new());
     }
     Ok(all.get(&board.name, &scene.name).map_or_else(Vec::new, |was| was.regressions(achieved)))
@@ -215,9 +236,10 @@ mod tests {
             check_constraints(&board, &placed).map_err(|error| error.to_string())
         };
         assert_eq!(check(25.505, 25.0), Ok(()));
-        let wanted = "constraints/icebreaker.toml: clock_MHz = 25.5, but the PLL of its Verilog gives 12 MHz";
+        let wanted = "constraints/icebreaker.toml, line 14: clock_MHz = 25.5, but the PLL of its Verilog gives 12 MHz";
         assert_eq!(check(12.0, 25.0), Err(wanted.to_string()));
-        let wanted = "constraints/icebreaker.pcf: spi_sclk is constrained to 12 MHz, icebreaker.toml says spi_MHz = 25";
+        let wanted = "constraints/icebreaker.toml, line 19: spi_MHz = 25, but constraints/icebreaker.pcf constrains \
+                      spi_sclk to 12 MHz";
         assert_eq!(check(25.5, 12.0), Err(wanted.to_string()));
     }
 }

@@ -9,10 +9,8 @@ pub const YOSYS: Tool = Tool { name: "yosys" };
 
 /// Tools and cell names of a family.
 pub struct Flow {
-    /// The tool for place and route.
-    pub place: Tool,
-    /// The tool that packs a configuration into a bitstream.
-    pub pack: Tool,
+    /// What makes a bitstream of the netlist; `None` where place and route is not run.
+    pub routing: Option<Routing>,
     /// Yosys commands; `{top}` stands for the top module, `{netlist}` for the file to write.
     pub synthesis: &'static str,
     /// Prefix of the cell names counted as look-up tables, in the report of place and route or in the netlist; includes
@@ -24,6 +22,22 @@ pub struct Flow {
     pub multiplier: &'static str,
     /// Prefix of block RAM cells.
     pub block_ram: &'static str,
+}
+
+/// Tools that make a bitstream of a netlist.
+pub struct Routing {
+    /// The tool for place and route.
+    pub place: Tool,
+    /// The tool that packs a configuration into a bitstream.
+    pub pack: Tool,
+    /// Option of place and route for the pin file.
+    pub pins: &'static str,
+    /// Option of place and route for the speed grade; `None` where the family has one only.
+    pub speed_grade: Option<&'static str>,
+    /// Option of place and route for the configuration that it writes.
+    pub configuration: &'static str,
+    /// Options of the packer.
+    pub pack_options: &'static [&'static str],
     /// File extension of the bitstream.
     pub bitstream: &'static str,
 }
@@ -32,8 +46,15 @@ pub struct Flow {
 pub fn flow(family: Family) -> Flow {
     match family {
         Family::Ecp5 => Flow {
-            place: Tool { name: "nextpnr-ecp5" },
-            pack: Tool { name: "ecppack" },
+            routing: Some(Routing {
+                place: Tool { name: "nextpnr-ecp5" },
+                pack: Tool { name: "ecppack" },
+                pins: "--lpf",
+                speed_grade: Some("--speed"),
+                configuration: "--textcfg",
+                pack_options: &["--compress"],
+                bitstream: "bit",
+            }),
             // -nowidelut: look-up tables joined by a slice's multiplexers are placed as one; single ones can be placed
             // closer to their neighbours. -minsrst, -mince: resets and enables of fewer than 16 flip-flops become
             // logic, because a tile has few reset and enable signals and many small groups would restrict placement.
@@ -45,11 +66,17 @@ pub fn flow(family: Family) -> Flow {
             flip_flop: "TRELLIS_FF",
             multiplier: "MULT18X18D",
             block_ram: "DP16KD",
-            bitstream: "bit",
         },
         Family::Ice40 => Flow {
-            place: Tool { name: "nextpnr-ice40" },
-            pack: Tool { name: "icepack" },
+            routing: Some(Routing {
+                place: Tool { name: "nextpnr-ice40" },
+                pack: Tool { name: "icepack" },
+                pins: "--pcf",
+                speed_grade: None,
+                configuration: "--asc",
+                pack_options: &[],
+                bitstream: "bin",
+            }),
             // Each of these options saves half a percent of the cells.
             synthesis: "synth_ice40 -dsp -abc2 -dff -top {top} -json {netlist}",
             // A logic cell holds a look-up table, a carry and a flip-flop, hence the number of logic cells is counted.
@@ -57,34 +84,46 @@ pub fn flow(family: Family) -> Flow {
             flip_flop: "SB_DFF",
             multiplier: "ICESTORM_DSP",
             block_ram: "ICESTORM_RAM",
-            bitstream: "bin",
+        },
+        Family::Artix7 => Flow {
+            routing: None,
+            synthesis: "synth_xilinx -family xc7 -top {top}; write_json {netlist}",
+            lut: "LUT",
+            flip_flop: "FD",
+            multiplier: "DSP48E1",
+            block_ram: "RAMB",
         },
     }
 }
 
-/// Arguments of place and route for one seed and placer; output files begin with `name`.
-pub fn place_arguments(board: &Board, netlist: &str, seed: u32, placer: &str, name: &str) -> Vec<String> {
-    let Board { size, package, speed_grade, .. } = board;
-    let seed = seed.to_string();
-    let pins = format!("{}.{}", board.name, board.family.pin_file_extension());
-    let (report, configuration) = (format!("{name}.report.json"), format!("{name}.config"));
-    let (size, speed) = (format!("--{size}"), speed_grade.to_string());
-    let mut arguments = match board.family {
-        Family::Ecp5 => {
-            vec![&size, "--package", package, "--speed", &speed, "--lpf", &pins, "--textcfg", &configuration]
+impl Routing {
+    /// Arguments of place and route of the file `netlist` with the pin file `pins`, for one seed and placer; output files
+    /// begin with `name`.
+    pub fn place_arguments(
+        &self,
+        board: &Board,
+        [netlist, pins]: [&str; 2],
+        seed: u32,
+        placer: &str,
+        name: &str,
+    ) -> Vec<String> {
+        // Present wherever there are pins.
+        let part = |part: &Option<String>| part.clone().unwrap_or_default();
+        let (size, package) = (format!("--{}", part(&board.size)), part(&board.package));
+        let (report, configuration) = (format!("{name}.report.json"), format!("{name}.config"));
+        let seed = seed.to_string();
+        let mut arguments = vec![&*size, "--package", &*package, self.pins, pins, self.configuration, &*configuration];
+        let speed = board.speed_grade.map(|speed| speed.to_string());
+        if let (Some(option), Some(speed)) = (self.speed_grade, &speed) {
+            arguments.extend([option, &**speed]);
         }
-        Family::Ice40 => vec![&size, "--package", package, "--pcf", &pins, "--asc", &configuration],
-    };
-    arguments.extend(["--json", netlist, "--seed", &seed, "--placer", placer, "--report", &report]);
-    arguments.push("--timing-allow-fail");
-    arguments.into_iter().map(str::to_owned).collect()
-}
+        arguments.extend(["--json", netlist, "--seed", &seed, "--placer", placer, "--report", &report]);
+        arguments.push("--timing-allow-fail");
+        arguments.into_iter().map(str::to_owned).collect()
+    }
 
-/// Arguments of the tool that packs a configuration into a bitstream.
-pub fn pack_arguments(family: Family, configuration: &str, bitstream: &str) -> Vec<String> {
-    let arguments = match family {
-        Family::Ecp5 => vec!["--compress", configuration, bitstream],
-        Family::Ice40 => vec![configuration, bitstream],
-    };
-    arguments.into_iter().map(str::to_owned).collect()
+    /// Arguments of the tool that packs a configuration into a bitstream.
+    pub fn pack_arguments(&self, configuration: &str, bitstream: &str) -> Vec<String> {
+        [self.pack_options, &[configuration, bitstream]].concat().into_iter().map(str::to_owned).collect()
+    }
 }

@@ -3,7 +3,7 @@
 //! ```text
 //! scene -> board top (Verilog) --yosys--> netlist --register packing, floor plan--> netlist
 //!     netlist --nextpnr, several seeds--> best --pack--> bitstream
-//!             ^-- pins, PLL of constraints     |--> cells, clocks -> table, baselines
+//!             ^-- pins, PLL of the board       |--> cells, clocks -> table, baselines
 //! ```
 //! All files and one log per tool lie in `<build-dir>/<scene>/<board>/`.
 
@@ -12,6 +12,7 @@ pub mod bitstream;
 pub mod family;
 pub mod floor_plan;
 pub mod netlist;
+pub mod pins;
 pub mod register_packing;
 pub mod synthesis;
 pub mod timing;

@@ -46,6 +46,7 @@ const WAIVED: [&str; 9] = [
 /// # Errors
 /// [`ToolError`]: no Yosys, a Yosys without its cell models, or a design that it refuses.
 pub fn netlist(generated: &Generated, family: Family, cache: &Path) -> Result<Generated, ToolError> {
+    let cells = cells(family)?;
     // Only what Yosys reads is part of the cache key.
     let read: Vec<&GeneratedFile> = generated.files.iter().filter(|file| is_read(&file.name)).collect();
     let texts: Vec<(&str, &str)> = read.iter().map(|file| (file.name.as_str(), file.text.as_str())).collect();
@@ -61,7 +62,7 @@ pub fn netlist(generated: &Generated, family: Family, cache: &Path) -> Result<Ge
     let file = |name: &str, text: String| GeneratedFile { name: name.to_owned(), text };
     let waivers = format!("`verilator_config\n{waivers}");
     Ok(Generated {
-        files: vec![file(VERILOG, text), file("cells.v", cells(family)?), file("netlist.vlt", waivers)],
+        files: vec![file(VERILOG, text), file("cells.v", cells), file("netlist.vlt", waivers)],
         taps: Vec::new(),
         ..generated.clone()
     })
@@ -86,11 +87,13 @@ fn make(files: &[&GeneratedFile], top: &str, family: Family, folder: &Path) -> R
     Ok(artifact_cache::publish(work, folder, VERILOG)?)
 }
 
-/// Simulation models of the family's cells: Yosys's, or this program's where Yosys has only a black box.
+/// Simulation models of the family's cells: Yosys's, or this program's where Yosys has only a black box. Those of
+/// Artix-7 were not tried.
 fn cells(family: Family) -> Result<String, ToolError> {
     let (folder, own) = match family {
         Family::Ecp5 => ("ecp5", ECP5_CELLS),
         Family::Ice40 => ("ice40", ICE40_DEFINES),
+        Family::Artix7 => return Err(ToolError::NoModels { family: family.name() }),
     };
     let share = YOSYS.share()?.join(folder);
     let path = share.join("cells_sim.v");

@@ -26,8 +26,8 @@ pub fn synthesise(folder: &Path, family: Family, read: &str, top: &str) -> Resul
     run(folder, format!("read_verilog {read}; {commands}"), "synthesis.log")?;
     match family {
         Family::Ecp5 => edit(folder, |netlist| pack_registers(netlist, top)),
-        // Yosys already moves registers into SB_MAC16.
-        Family::Ice40 => Ok(PackedRegisters::default()),
+        // Yosys already moves registers into SB_MAC16 and DSP48E1.
+        Family::Ice40 | Family::Artix7 => Ok(PackedRegisters::default()),
     }
 }
 

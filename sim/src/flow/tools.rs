@@ -52,6 +52,12 @@ pub enum ToolError {
         /// What is wrong with it.
         reason: String,
     },
+    /// There are no models with which a netlist of the family can be simulated.
+    #[error("the netlist of a device of family {family} cannot be simulated; it must be \"ecp5\" or \"ice40\"")]
+    NoModels {
+        /// The family.
+        family: &'static str,
+    },
     /// A file could not be read or written.
     #[error(transparent)]
     File(#[from] FileError),

@@ -9,6 +9,7 @@
 //! [`BUDGET_US`] minus the time.
 
 mod bitstream_report;
+mod board_list;
 mod calibration;
 mod cases;
 mod check;
@@ -40,6 +41,7 @@ pub(crate) mod table;
 pub mod tabulate;
 
 pub use bitstream_report::{bitstream, summaries, BitstreamReport, Summary};
+pub use board_list::{boards, BoardList, NamedBoard};
 pub use calibration::calibration;
 pub use cases::cases;
 pub use check::{build_check, scene_check, BuildCheck, HardwareCheck, SceneCheck};

@@ -52,11 +52,11 @@ impl FromStr for Source {
 }
 
 impl Source {
-    /// Opens the source; `baud` is the bit rate of a serial port. Of UDP also the address at which it listens.
+    /// Opens the source; `baud` is the bit rate of a serial port, which only that needs. Of UDP also the address at which it listens.
     ///
     /// # Errors
     /// The error of the operating system, with the source's name.
-    pub fn open(&self, baud: u32) -> Result<(Box<dyn Read + Send>, Option<std::net::SocketAddr>)> {
+    pub fn open(&self, baud: Option<u32>) -> Result<(Box<dyn Read + Send>, Option<std::net::SocketAddr>)> {
         let named = |name: &str, error: Error| Error::new(error.kind(), format!("{name}: {error}"));
         match self {
             Source::StandardInput => Ok((Box::new(std::io::stdin()), None)),
@@ -68,6 +68,8 @@ impl Source {
             Source::Path(path) => {
                 let kind = std::fs::metadata(path).map_err(|error| named(path, error))?.file_type();
                 let opened: Box<dyn Read + Send> = if kind.is_char_device() {
+                    let unknown = "a serial port needs --baud, because the scene's board has no uart_baud";
+                    let baud = baud.ok_or_else(|| named(path, Error::new(ErrorKind::InvalidInput, unknown)))?;
                     let port = serialport::new(path, baud).timeout(SERIAL_WAIT).open();
                     Box::new(Serial(port.map_err(|error| named(path, error.into()))?))
                 } else {
@@ -169,13 +171,13 @@ mod tests {
         assert_eq!(source("udp:[::1]:9000"), Ok(Source::Udp("[::1]:9000".into())));
         assert_eq!(source("udp:9000"), Err("udp:9000: wanted udp:HOST:PORT".into()));
         assert_eq!(source("/dev/ttyUSB0"), Ok(Source::Path("/dev/ttyUSB0".into())));
-        let absent = source("absent.csv").unwrap().open(9600).err().unwrap().to_string();
+        let absent = source("absent.csv").unwrap().open(Some(9600)).err().unwrap().to_string();
         assert!(absent.starts_with("absent.csv: No such file"), "{absent}");
     }
 
     #[test]
     fn datagrams_become_lines() {
-        let (opened, address) = "udp:127.0.0.1:0".parse::<Source>().unwrap().open(0).unwrap();
+        let (opened, address) = "udp:127.0.0.1:0".parse::<Source>().unwrap().open(None).unwrap();
         let sender = UdpSocket::bind("127.0.0.1:0").unwrap();
         for datagram in ["1,2", "", "3\n4\n"] {
             sender.send_to(datagram.as_bytes(), address.unwrap()).unwrap();
@@ -189,7 +191,7 @@ mod tests {
         let mut file = tempfile::NamedTempFile::new().unwrap();
         let source: Source = file.path().to_str().unwrap().parse().unwrap();
         write!(file, "first\nsec").unwrap();
-        let mut lines = BufReader::new(source.open(0).unwrap().0).lines();
+        let mut lines = BufReader::new(source.open(None).unwrap().0).lines();
         assert_eq!(lines.next().unwrap().unwrap(), "first");
         writeln!(file, "ond").unwrap();
         assert_eq!(lines.next().unwrap().unwrap(), "second");

@@ -9,8 +9,10 @@ use std::process::Command;
 
 use rayon::prelude::*;
 
+use crate::boards::write_example;
+
 /// Examples that are not run here; some are covered by other tests, named by their file.
-const NOT_RUN: [(&str, &str); 38] = [
+const NOT_RUN: [(&str, &str); 39] = [
     ("dermis reconstruct sensor-1 --stream=udp:127.0.0.1:9000 --latest --brief", "has no end; stream.rs"),
     ("dermis host --port /dev/ttyUSB0 press.json", BOARD),
     ("dermis host --port /dev/ttyUSB0 --scene sensor-1", BOARD),
@@ -45,6 +47,7 @@ const NOT_RUN: [(&str, &str); 38] = [
     ("dermis report --recording build/recordings/walk", IMPORTED),
     ("dermis report --paper", "repeats of 48×48: minutes; make report"),
     ("dermis bitstream eight-by-eight", PLACED),
+    ("dermis bitstream eight-by-eight --board ./my-board.toml", PLACED),
     ("dermis bitstream eight-by-eight --board icebreaker", PLACED),
     ("dermis bitstream sensor-1 --search-width 2", PLACED),
     ("dermis bitstream sensor-1 --seeds 5 --jobs 2 --update-baselines", PLACED),
@@ -92,6 +95,7 @@ fn all_examples() -> BTreeSet<String> {
 
 /// Creates the files that examples name.
 fn prepare(work: &Path) {
+    write_example(work);
     let scene =
         fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("../golden/scenes/sensor-1.toml")).unwrap();
     fs::write(work.join("my-scene.toml"), &scene).unwrap();

@@ -8,6 +8,7 @@ use std::time::Duration;
 
 use dermis_golden::fixed::Model;
 use dermis_golden::frame::Frame;
+use dermis_golden::link::LinkKind;
 use dermis_golden::scene::Scene;
 use dermis_sim::cosim::hardware::Hardware;
 use dermis_sim::link::{open, Session};
@@ -18,7 +19,7 @@ const BAUD: u32 = 12_500_000;
 
 fn model() -> Model {
     let mut model = Model::new(&Scene::builtin("eight-by-eight").unwrap()).unwrap();
-    model.board.uart_baud = BAUD;
+    model.board.uart_baud = Some(BAUD);
     model
 }
 
@@ -133,7 +134,7 @@ fn the_host_sums_the_forces_of_a_board_that_does_not() {
     let model = Model::new(&scene).unwrap();
     let build = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../build");
     let terminal = PseudoTerminal::of(&Hardware::new(model.clone(), &build).unwrap()).unwrap();
-    let baud = model.board.uart_baud;
+    let baud = LinkKind::Uart.bit_rate(&model.board).unwrap();
     let client = open(&terminal.path().to_string_lossy(), baud, Duration::from_millis(5000)).unwrap();
     let mut session = Session::new(client, model, None, false, true).unwrap();
     let (_, answer) = session.request(&Frame::shipped(&scene)[0]).unwrap();

@@ -3,6 +3,7 @@
 //! One program, so that it is linked once and its tests fill all processors to the end.
 
 mod bitstream;
+mod boards;
 mod cli;
 mod contract;
 mod examples;
@@ -13,5 +14,6 @@ mod host;
 mod page;
 mod report;
 mod stream;
+mod testbench;
 mod toy;
 mod writes;

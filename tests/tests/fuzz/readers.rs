@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use dermis_golden::board::Board;
 use dermis_golden::frame::Frame;
 use dermis_golden::import::{import, Format, Settings, Unit};
 use dermis_golden::input::calibration::Calibration;
@@ -13,8 +14,9 @@ use dermis_hdl::manifest;
 /// The folder of a reader's seeds, and the reader, which returns whether it accepted the bytes.
 type Target = (&'static str, fn(&[u8]) -> bool);
 /// All readers.
-pub const TARGETS: [Target; 10] = [
+pub const TARGETS: [Target; 11] = [
     ("scene", scene),
+    ("board", board),
     ("frame.json", json),
     ("frame.csv", csv),
     ("calibration", calibration),
@@ -46,6 +48,19 @@ fn scene(bytes: &[u8]) -> bool {
             assert!(scene.sensor.check().is_ok() && !scene.name.is_empty() && !scene.name.contains(['/', '\n']));
             let level = scene.inversion().level;
             assert!((0.0..1.0).contains(&level), "{level}");
+            true
+        }
+        Err(error) => {
+            assert!(error.to_string().starts_with("fuzz.toml"), "{error}");
+            false
+        }
+    }
+}
+
+fn board(bytes: &[u8]) -> bool {
+    match Board::parse("fuzz", "fuzz.toml", &String::from_utf8_lossy(bytes)) {
+        Ok(board) => {
+            assert!(board.clock_MHz > 0.0 && board.block_rams_for(1000, 18) > 0 && board.multipliers_for(40, 20) > 0);
             true
         }
         Err(error) => {

@@ -99,7 +99,7 @@ impl Board {
     fn of(mut questions: Questions, simulators: &[Simulator]) -> Board {
         let model = &mut questions.model;
         let baud = (model.board.clock_MHz * 1e6) as u32 / CYCLES_PER_BIT;
-        model.board.uart_baud = baud;
+        model.board.uart_baud = Some(baud);
         let silence = Cycles::longest(model).total + 1_000;
         let clock_hz = Identity::of(model).unwrap().clock_hz;
         let uart = HostUart::new(device(model, simulators), baud, clock_hz);

@@ -7,6 +7,7 @@ use std::fs;
 use std::path::Path;
 
 mod accuracy;
+mod artix;
 mod choice;
 mod circles;
 mod coefficients;

@@ -61,7 +61,7 @@ pub fn widths(scene: &Scene, shapes: &[Shape], board: &Board) -> Result<Widths, 
     let largest = shapes.first().ok_or(FixedError::Internal("a scene has a case"))?;
     let degree = shapes.iter().map(|shape| shape.matrices.degree).max().unwrap_or(0);
     // Narrower multipliers have narrower operands; the remaining bits of inverse and input go into low limbs.
-    let operand_bits = MULTIPLIER_BITS.min(board.multiplier_bits);
+    let operand_bits = MULTIPLIER_BITS.min(board.multiplier_bits[1]);
     let (data_bits, coef_bits) = (spec.data_bits.min(operand_bits), spec.coef_bits.min(operand_bits));
     let mut quantised = quantised(scene, shapes, coef_bits)?;
     let composed = composed(scene)?;

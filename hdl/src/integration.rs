@@ -1,0 +1,28 @@
+//! Files for an integrator, beside the generated hardware: testbench, FuseSoC core file, script for Vivado.
+
+use dermis_golden::board::Family;
+use dermis_golden::fixed::Model;
+
+use crate::core_file::core_file;
+use crate::generate::Generated;
+use crate::manifest::GeneratedFile;
+use crate::testbench::testbench;
+use crate::vivado;
+
+impl Generated {
+    /// Adds the files for an integrator: `<top>_tb.sv` with its memory files, `<top>.core`, and `<top>_vivado.tcl` for a
+    /// device of Xilinx.
+    pub fn add_integration(&mut self, model: &Model) {
+        let (top, scene) = (self.top.clone(), &model.scene.name);
+        let bench = testbench(model, &top);
+        let names = |files: &[GeneratedFile]| files.iter().map(|file| file.name.clone()).collect::<Vec<_>>();
+        let core = core_file(&top, scene, model.board.family, &names(&self.files), &names(&bench));
+        self.files.extend(bench);
+        self.files.push(GeneratedFile { name: format!("{top}.core"), text: core });
+        if model.board.family == Family::Artix7 {
+            let text = vivado::script(&top, scene, &model.board);
+            self.files.push(GeneratedFile { name: format!("{top}_vivado.tcl"), text });
+        }
+        self.seal();
+    }
+}
