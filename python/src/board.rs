@@ -112,7 +112,8 @@ impl Board {
         let session = py.detach(|| {
             require_uart(spec, "host").map_err(input)?;
             let model = Model::new(spec).map_err(fixed)?;
-            let baud = baud.unwrap_or(model.board.uart_baud);
+            let unknown = "baud: wanted a number, because the scene's board has no uart_baud";
+            let baud = baud.or(model.board.uart_baud).ok_or_else(|| input(unknown))?;
             let client = open(port, baud, timeout).map_err(|error| failure(error.into()))?;
             Session::new(client, model, tare.map(|tare| tare.0.as_ref()), true, check).map_err(failure)
         })?;
