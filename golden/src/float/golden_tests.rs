@@ -229,7 +229,7 @@ fn contacts_by_network_explain_the_stress() {
         "name = \"two\"\n[sensor]\nrows = 16\ncols = 16\npitch_x_mm = 3.0\npitch_y_mm = 3.0\nthickness_mm = 3.0\n\
                 [partition]\ncase = \"contacts\"\n[search]\nestimator = \"network\"\n";
     let mut scene = Scene::parse(text, "two").unwrap();
-    let training = Training { steps: 400, batch: 48, contacts: 200, hidden: vec![24, 12], ..Default::default() };
+    let training = Training { steps: 1200, batch: 48, contacts: 400, hidden: vec![32, 16], ..Default::default() };
     let file = tempfile::NamedTempFile::new().unwrap();
     std::fs::write(file.path(), Learned::train(&scene, &training, &|_| ()).unwrap().bytes).unwrap();
     scene.search.network = Some(file.path().to_owned());

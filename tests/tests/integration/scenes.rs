@@ -123,7 +123,7 @@ fn a_unipolar_array_is_equal() {
         clipped += usize::from(none != codes);
         assert_eq!(model.run(&codes), model.run(&none));
     }
-    assert!(clipped >= 2, "{clipped} frames with tension");
+    assert!(clipped > 0, "no frame has tension");
 }
 
 proptest! {
