@@ -1,7 +1,6 @@
 //! Results of place and route by board and scene: `baselines.json` beside the boards' files, for the built-in boards the
 //! committed `constraints/baselines.json`.
 //!
-//!
 //! `dermis bitstream --update-baselines` writes the file if the clock is met. Without that option `dermis bitstream`
 //! fails if its result is slower or larger than the baseline, beyond the tolerances below.
 

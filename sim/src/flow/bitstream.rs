@@ -10,7 +10,7 @@ use dermis_golden::write::write;
 use dermis_hdl::link::generate_board;
 
 use super::baseline::{self, Baseline, Baselines};
-use super::family::{flow, Flow, Routing, YOSYS};
+use super::family::{flow, Routing, YOSYS};
 use super::floor_plan;
 use super::pins::check_pins;
 use super::register_packing::PackedRegisters;
@@ -68,8 +68,9 @@ struct Design<'a> {
 pub fn make(model: &Model, build_dir: &Path, effort: Effort) -> Result<Made> {
     let (scene, board) = (&model.scene, &model.board);
     let (pins, _) = board.pin_file()?;
-    let flow = flow(board.family);
-    let Some(routing) = &flow.routing else { bail!("{}: no place and route of {}", board.file(), board.family.name()) };
+    let Some(routing) = &flow(board.family).routing else {
+        bail!("{}: no place and route of {}", board.file(), board.family.name())
+    };
     for tool in [YOSYS, routing.place, routing.pack] {
         tool.version()?;
     }
@@ -85,7 +86,7 @@ pub fn make(model: &Model, build_dir: &Path, effort: Effort) -> Result<Made> {
     })?;
     check_constraints(board, best)?;
     let product = format!("{}.{}", scene.name, routing.bitstream);
-    let achieved = summarise_seeds(&flow, &placed, best);
+    let achieved = summarise_seeds(routing, &placed, best);
     let of = |(name, clock): (&str, Fmax)| format!("{name} {:.1} MHz of {} MHz", clock.achieved, clock.constraint);
     let mut failures: Vec<String> = best.clocks().filter(|(_, clock)| !clock.is_met()).map(of).collect();
     let met = failures.is_empty();
@@ -178,15 +179,15 @@ fn place_seed(design: &Design, seed: u32) -> Result<Placed, ToolError> {
 }
 
 /// Clock figures over all seeds, and the cells of the `best`.
-fn summarise_seeds(flow: &Flow, placed: &[(u32, Placed)], best: &Placed) -> Baseline {
+fn summarise_seeds(routing: &Routing, placed: &[(u32, Placed)], best: &Placed) -> Baseline {
     // The median is taken of periods: of an even number of seeds it is then the slower of the two middle ones.
     let periods = || placed.iter().map(|(_, placed)| 1.0 / placed.engine.achieved);
     let rounded = |clock: f64| (clock * 10.0).round() / 10.0;
     Baseline {
-        luts: best.count(flow.lut),
-        flip_flops: best.count(flow.flip_flop),
-        multipliers: best.count(flow.multiplier),
-        block_rams: best.count(flow.block_ram),
+        luts: best.count(routing.lut),
+        flip_flops: best.count(routing.flip_flop),
+        multipliers: best.count(routing.multiplier),
+        block_rams: best.count(routing.block_ram),
         best_MHz: rounded(best.engine.achieved),
         median_MHz: rounded(median(periods().collect()).map_or(best.engine.achieved, |period| 1.0 / period)),
         worst_MHz: rounded(1.0 / periods().fold(0.0, f64::max)),
@@ -218,8 +219,9 @@ mod tests {
     #[test]
     fn the_median_of_two_seeds_is_the_slower_one() {
         let seeds = [(1, placed(94.52)), (2, placed(107.2)), (3, placed(101.0))];
+        let routing = flow(dermis_golden::board::Family::Ecp5).routing.unwrap();
         let clocks = |seeds: &[(u32, Placed)]| {
-            let achieved = summarise_seeds(&flow(dermis_golden::board::Family::Ecp5), seeds, &seeds[1].1);
+            let achieved = summarise_seeds(&routing, seeds, &seeds[1].1);
             [achieved.best_MHz, achieved.median_MHz, achieved.worst_MHz]
         };
         assert_eq!(clocks(&seeds), [107.2, 101.0, 94.5]);

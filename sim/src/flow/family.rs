@@ -7,24 +7,15 @@ use super::tools::Tool;
 /// The synthesis tool of all families.
 pub const YOSYS: Tool = Tool { name: "yosys" };
 
-/// Tools and cell names of a family.
+/// Tools of a family.
 pub struct Flow {
     /// What makes a bitstream of the netlist; `None` where place and route is not run.
     pub routing: Option<Routing>,
     /// Yosys commands; `{top}` stands for the top module, `{netlist}` for the file to write.
     pub synthesis: &'static str,
-    /// Prefix of the cell names counted as look-up tables, in the report of place and route or in the netlist; includes
-    /// carry cells and distributed RAM.
-    pub lut: &'static str,
-    /// Prefix of flip-flop cells.
-    pub flip_flop: &'static str,
-    /// Prefix of multiplier cells.
-    pub multiplier: &'static str,
-    /// Prefix of block RAM cells.
-    pub block_ram: &'static str,
 }
 
-/// Tools that make a bitstream of a netlist.
+/// Tools that make a bitstream of a netlist, and names of the cells that are then counted.
 pub struct Routing {
     /// The tool for place and route.
     pub place: Tool,
@@ -40,6 +31,15 @@ pub struct Routing {
     pub pack_options: &'static [&'static str],
     /// File extension of the bitstream.
     pub bitstream: &'static str,
+    /// Prefix of the cell names counted as look-up tables, in the report of place and route or in the netlist; includes
+    /// carry cells and distributed RAM.
+    pub lut: &'static str,
+    /// Prefix of flip-flop cells.
+    pub flip_flop: &'static str,
+    /// Prefix of multiplier cells.
+    pub multiplier: &'static str,
+    /// Prefix of block RAM cells.
+    pub block_ram: &'static str,
 }
 
 /// The flow of a family.
@@ -54,6 +54,10 @@ pub fn flow(family: Family) -> Flow {
                 configuration: "--textcfg",
                 pack_options: &["--compress"],
                 bitstream: "bit",
+                lut: "TRELLIS_COMB",
+                flip_flop: "TRELLIS_FF",
+                multiplier: "MULT18X18D",
+                block_ram: "DP16KD",
             }),
             // -nowidelut: look-up tables joined by a slice's multiplexers are placed as one; single ones can be placed
             // closer to their neighbours. -minsrst, -mince: resets and enables of fewer than 16 flip-flops become
@@ -62,10 +66,6 @@ pub fn flow(family: Family) -> Flow {
                 dfflegalize -minsrst 16 -mince 16 -cell $_DFF_?_ 01 -cell $_DFF_?P?_ r -cell $_SDFF_?P?_ r \
                 -cell $_DFFE_??_ 01 -cell $_DFFE_?P??_ r -cell $_SDFFE_?P??_ r; \
                 synth_ecp5 -nowidelut -run map_ffs: -json {netlist}",
-            lut: "TRELLIS_COMB",
-            flip_flop: "TRELLIS_FF",
-            multiplier: "MULT18X18D",
-            block_ram: "DP16KD",
         },
         Family::Ice40 => Flow {
             routing: Some(Routing {
@@ -76,23 +76,18 @@ pub fn flow(family: Family) -> Flow {
                 configuration: "--asc",
                 pack_options: &[],
                 bitstream: "bin",
+                // A logic cell holds a look-up table, a carry and a flip-flop, hence the number of logic cells is counted.
+                lut: "ICESTORM_LC",
+                flip_flop: "SB_DFF",
+                multiplier: "ICESTORM_DSP",
+                block_ram: "ICESTORM_RAM",
             }),
             // Each of these options saves half a percent of the cells.
             synthesis: "synth_ice40 -dsp -abc2 -dff -top {top} -json {netlist}",
-            // A logic cell holds a look-up table, a carry and a flip-flop, hence the number of logic cells is counted.
-            lut: "ICESTORM_LC",
-            flip_flop: "SB_DFF",
-            multiplier: "ICESTORM_DSP",
-            block_ram: "ICESTORM_RAM",
         },
-        Family::Artix7 => Flow {
-            routing: None,
-            synthesis: "synth_xilinx -family xc7 -top {top}; write_json {netlist}",
-            lut: "LUT",
-            flip_flop: "FD",
-            multiplier: "DSP48E1",
-            block_ram: "RAMB",
-        },
+        Family::Artix7 => {
+            Flow { routing: None, synthesis: "synth_xilinx -family xc7 -top {top}; write_json {netlist}" }
+        }
     }
 }
 

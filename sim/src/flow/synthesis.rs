@@ -22,13 +22,18 @@ pub const MINUTES: u32 = 60;
 /// # Errors
 /// [`ToolError`]: no Yosys, a design that it refuses, files that cannot be used.
 pub fn synthesise(folder: &Path, family: Family, read: &str, top: &str) -> Result<PackedRegisters, ToolError> {
-    let commands = flow(family).synthesis.replace("{top}", top).replace("{netlist}", NETLIST);
+    let commands = commands(family, top);
     run(folder, format!("read_verilog {read}; {commands}"), "synthesis.log")?;
     match family {
         Family::Ecp5 => edit(folder, |netlist| pack_registers(netlist, top)),
         // Yosys already moves registers into SB_MAC16 and DSP48E1.
         Family::Ice40 | Family::Artix7 => Ok(PackedRegisters::default()),
     }
+}
+
+/// Yosys commands that synthesise the module `top`, once it is read, to [`NETLIST`].
+pub fn commands(family: Family, top: &str) -> String {
+    flow(family).synthesis.replace("{top}", top).replace("{netlist}", NETLIST)
 }
 
 /// Runs a Yosys script in `folder`; its output goes to the file `log`.

@@ -9,8 +9,7 @@ use dermis_golden::fixed::Model;
 use dermis_golden::scene::Scene;
 use dermis_hdl::language::Change;
 use dermis_hdl::{generate, generate_changed, Generated};
-use dermis_sim::flow::family::flow;
-use dermis_sim::flow::synthesis::NETLIST;
+use dermis_sim::flow::synthesis::{commands, NETLIST};
 use dermis_tests::tools::{self, folder_of, yosys};
 use serde_json::Value;
 
@@ -35,14 +34,14 @@ fn model(lanes: usize) -> Model {
 fn accumulators(generated: &Generated) -> usize {
     let (folder, top) = (folder_of(generated), &generated.top);
     let lanes = format!("{top}__pass__lanes");
-    let commands = flow(Family::Artix7).synthesis.replace("{top}", &lanes).replace("{netlist}", NETLIST);
+    let commands = commands(Family::Artix7, &lanes);
     yosys(folder.path(), &format!("read_verilog {top}.v; {commands}")).unwrap();
     let netlist: Value = serde_json::from_slice(&fs::read(folder.path().join(NETLIST)).unwrap()).unwrap();
     let cells = netlist["modules"][&lanes]["cells"].as_object().unwrap().values();
     let registered =
         |cell: &Value, register: &str| cell["parameters"][register].as_str().is_some_and(|value| value.ends_with('1'));
     let adds = |cell: &Value| (4..7).map(|bit| &cell["connections"]["OPMODE"][bit]).eq(ADDS_TO_RESULT.iter());
-    let all = cells.filter(|cell| cell["type"] == flow(Family::Artix7).multiplier);
+    let all = cells.filter(|cell| cell["type"] == "DSP48E1");
     all.filter(|cell| adds(cell) && registered(cell, "MREG") && registered(cell, "PREG")).count()
 }
 

@@ -13,8 +13,7 @@ use dermis_golden::fixed::Model;
 use dermis_golden::scene::Scene;
 use dermis_hdl::usage::total;
 use dermis_hdl::{generate, Generated};
-use dermis_sim::flow::family::flow;
-use dermis_sim::flow::synthesis::{cells, NETLIST};
+use dermis_sim::flow::synthesis::{cells, commands, NETLIST};
 use dermis_tests::tools::{self, folder_of, yosys};
 use serde_json::Value;
 
@@ -75,7 +74,7 @@ fn flip_flops_and_luts_are_near_those_of_yosys() {
     // Low degree: with a search, but Yosys takes a minute less.
     let generated = generate(&small("near", "[search]\nmu_max = 0.1\ndegree = 1\n[fixed]\nlanes = 8\n")).unwrap();
     let (folder, top) = (folder_of(&generated), &generated.top);
-    let commands = flow(Family::Ecp5).synthesis.replace("{top}", top).replace("{netlist}", NETLIST);
+    let commands = commands(Family::Ecp5, top);
     yosys(folder.path(), &format!("read_verilog {top}.v; {commands}")).unwrap();
     let cells = cells(folder.path(), top).unwrap();
     let cells = |name: &str| cells.get(name).map_or(0, |&count| count as usize);
