@@ -11,32 +11,5 @@ Units are mm, N and MPa; compression is positive. Arrays are row-major: (rows, c
 towards higher columns, y towards higher rows, both from the array's centre.
 """
 
-from ._dermis import (
-    Answers,
-    Board,
-    BoardError,
-    Contact,
-    Errors,
-    Frame,
-    InputError,
-    Reconstruction,
-    Reconstructions,
-    Scene,
-    Stage,
-    errors,
-)
-
-__all__ = [
-    "Answers",
-    "Board",
-    "BoardError",
-    "Contact",
-    "Errors",
-    "Frame",
-    "InputError",
-    "Reconstruction",
-    "Reconstructions",
-    "Scene",
-    "Stage",
-    "errors",
-]
+from ._dermis import *
+from ._dermis import __all__ as __all__

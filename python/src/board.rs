@@ -5,6 +5,7 @@ use std::time::Duration;
 
 use dermis_golden::fixed::Model;
 use dermis_golden::frame::Frame as Stress;
+use dermis_golden::link::LinkKind;
 use dermis_sim::link::{open, require_uart, HostError, Session};
 use pyo3::exceptions::{PyOSError, PyRuntimeError};
 use pyo3::prelude::*;
@@ -112,8 +113,7 @@ impl Board {
         let session = py.detach(|| {
             require_uart(spec, "host").map_err(input)?;
             let model = Model::new(spec).map_err(fixed)?;
-            let unknown = "baud: wanted a number, because the scene's board has no uart_baud";
-            let baud = baud.or(model.board.uart_baud).ok_or_else(|| input(unknown))?;
+            let baud = baud.map_or_else(|| LinkKind::Uart.bit_rate(&model.board), Ok).map_err(input)?;
             let client = open(port, baud, timeout).map_err(|error| failure(error.into()))?;
             Session::new(client, model, tare.map(|tare| tare.0.as_ref()), true, check).map_err(failure)
         })?;
