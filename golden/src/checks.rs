@@ -37,6 +37,14 @@ pub const LOUD: f64 = 0.1;
 /// Standard deviation of a shear, over its size, above which it is not resolved.
 pub const NOT_RESOLVED: f64 = 1.0 / 3.0;
 
+/// The largest relative spread of a shear among contacts that count, each with its normal force in N and its spread, where
+/// that is known.
+pub(crate) fn largest_spread(contacts: &[(f64, Option<f64>)]) -> Option<f64> {
+    let total: f64 = contacts.iter().map(|(normal, _)| normal).sum();
+    let counts = contacts.iter().filter(|(normal, _)| *normal >= COUNTS_FROM * total);
+    counts.filter_map(|(_, spread)| *spread).filter(|spread| spread.is_finite()).reduce(f64::max)
+}
+
 /// The figures behind the flags of one result.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default)]

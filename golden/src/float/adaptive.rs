@@ -50,7 +50,7 @@ struct Extent {
 /// The bounding rectangles of all contacts.
 fn extents(sensor: &Sensor, p: &[f64], segments: &Segments) -> Vec<Extent> {
     let extent = |region: usize| {
-        let own = || (0..p.len()).filter(|&k| segments.labels[k] == region);
+        let own = || segments.taxels(region);
         let largest = own().map(|k| p[k]).fold(0.0, f64::max);
         let empty = Extent { x: [f64::INFINITY, f64::NEG_INFINITY], y: [f64::INFINITY, f64::NEG_INFINITY] };
         own().filter(|&k| largest > 0.0 && p[k] >= CELL_SHARE * largest).fold(empty, |extent, k| {

@@ -19,10 +19,10 @@ use super::objective::{relative_spread, Sparse};
 use super::pass::Polynomial;
 use super::search::search;
 use super::segment::Segments;
-use crate::checks::COUNTS_FROM;
+use crate::checks::largest_spread;
 use crate::frame::{Forces, Frame};
 use crate::learned::Learned;
-use crate::reconstruct::{Reconstruction, Region};
+use crate::reconstruct::{Reconstruction, Region, Resultant};
 use crate::scene::Condition;
 use crate::sensor::Sensor;
 
@@ -52,7 +52,7 @@ impl Golden {
 
     /// Whether the taxels of a region meet the scene's condition.
     fn meets_condition(&self, input: &EngineInput, segments: &Segments, region: usize) -> bool {
-        let own = || (0..input.codes.len()).filter(move |&k| segments.labels[k] == region).map(|k| input.codes[k]);
+        let own = || segments.taxels(region).map(|k| input.codes[k]);
         let (above, below) = (own().any(|code| code > input.floor), own().any(|code| code < -input.floor));
         match self.scene.partition.condition {
             Condition::Loaded => above || below,
@@ -85,8 +85,11 @@ impl Golden {
         outcome.forces = forces;
         if let Some(sigma) = sigma {
             outcome.subarrays = vec![self.array_of(input, outcome.forces.resultant())];
-            outcome.shear_spread = largest_spread(&own, &sigma);
             own.iter_mut().zip(sigma).for_each(|(region, sigma)| region.mu_sigma = sigma);
+            let spread = |region: &Region| {
+                (region.load_N[2], region.mu_sigma.map(|sigma| relative_spread(region.mu, sigma, 1.0)))
+            };
+            outcome.shear_spread = largest_spread(&own.iter().map(spread).collect::<Vec<_>>());
         }
         let mut result = self.finish(frame, outcome);
         result.extra.regions = Some(own);
@@ -96,34 +99,19 @@ impl Golden {
     }
 }
 
-/// Standard deviation of the shear over its size, the largest of all regions with a share of the load.
-fn largest_spread(regions: &[Region], sigma: &[Option<[f64; 2]>]) -> Option<f64> {
-    let total: f64 = regions.iter().map(|region| region.load_N[2]).sum();
-    let counts = |region: &Region| region.load_N[2] >= COUNTS_FROM * total;
-    let known = regions.iter().zip(sigma).filter(|(region, _)| counts(region));
-    known.filter_map(|(region, sigma)| sigma.map(|sigma| relative_spread(region.mu, sigma, 1.0))).reduce(f64::max)
-}
-
 /// The regions of a frame, from the solved contacts and the reported forces; `met[k]`: whether region k meets the
 /// condition.
 fn regions(sensor: &Sensor, contacts: &Contacts, met: &[bool], forces: &Forces) -> Vec<Region> {
     let region = |k: usize| {
-        let taxels: Vec<usize> = (0..sensor.taxels()).filter(|&t| contacts.segments.labels[t] == k).collect();
-        let sum = |axis: &[f64]| taxels.iter().map(|&t| axis[t]).sum();
-        let (mut moment, mut weight) = ([0.0; 2], 0.0);
-        for &taxel in &taxels {
-            let at = sensor.position_mm(taxel / sensor.cols, taxel % sensor.cols);
-            let fz = forces.fz[taxel].max(0.0);
-            weight += fz;
-            moment = [moment[0] + fz * at[0], moment[1] + fz * at[1]];
-        }
+        let taxels: Vec<usize> = contacts.segments.taxels(k).collect();
+        let Resultant { force_N: load_N, centre_mm } = Resultant::of(sensor, forces, taxels.iter().copied());
         Region {
             centroid_condition: met[k],
             mu: contacts.mu(k),
             mu_sigma: None,
             objective_value: contacts.found[k].map(|found| found.objective),
-            centre_mm: (weight > 0.0).then(|| moment.map(|sum| sum / weight)),
-            load_N: [sum(&forces.fx), sum(&forces.fy), sum(&forces.fz)],
+            centre_mm,
+            load_N,
             taxels,
         }
     };

@@ -6,7 +6,7 @@
 use super::forces::threshold;
 use super::golden::{CaseOutcome, EngineInput, Golden};
 use super::objective::relative_spread;
-use crate::checks::COUNTS_FROM;
+use crate::checks::largest_spread;
 use crate::evidence::{ContactEstimate, Evidence};
 use crate::frame::Frame;
 use crate::partition::Subarray;
@@ -38,11 +38,9 @@ impl Golden {
 /// Standard deviation of the shear over its size, the largest of all contacts with a share of the load. Below a
 /// hundredth of the normal force a shear counts as none, and its standard deviation is taken over that.
 fn shear_spread(contacts: &[ContactEstimate]) -> Option<f64> {
-    let total: f64 = contacts.iter().map(|contact| contact.force_N[2]).sum();
     let spread = |contact: &ContactEstimate| {
         let ([x, y, normal], [sx, sy, _]) = (contact.force_N, contact.sigma_N);
-        relative_spread([x, y], [sx, sy], normal)
+        (normal, Some(relative_spread([x, y], [sx, sy], normal)))
     };
-    let counts = contacts.iter().filter(|contact| contact.force_N[2] >= COUNTS_FROM * total);
-    counts.map(spread).filter(|spread| spread.is_finite()).reduce(f64::max)
+    largest_spread(&contacts.iter().map(spread).collect::<Vec<_>>())
 }

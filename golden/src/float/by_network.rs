@@ -9,7 +9,6 @@
 //! | out: objective, ln of the density at μ | scalar | – |
 
 use super::objective::{Estimate, Objective, SearchInput};
-use super::search::RADIUS;
 use crate::learned::{Learned, LearnedError, OneContact};
 use crate::scene::Scene;
 
@@ -39,7 +38,6 @@ impl Objective for ByNetwork {
     fn find(&self, input: &SearchInput) -> Option<Estimate> {
         let told = self.network.shear(&OneContact { b: input.b, alive: &self.alive, centre_mm: [0.0; 2] });
         self.score(&input.family.eval(told.mean))?;
-        let position = told.mean.map(|mu| (mu * f64::from(RADIUS) / input.mu_max).round() as i32);
-        Some(Estimate::told(told.mean, told.sigma, position))
+        Some(Estimate::of_network(&told, input.mu_max))
     }
 }

@@ -183,10 +183,7 @@ impl Solver<'_> {
 
     /// The state with new regions, each with the μ that its strongest taxel had.
     fn with_regions(&self, state: &Contacts, segments: Segments) -> Contacts {
-        let strongest = |region: usize| {
-            let own = (0..state.p.len()).filter(|&k| segments.labels[k] == region);
-            own.max_by(|&a, &b| state.p[a].total_cmp(&state.p[b]))
-        };
+        let strongest = |region: usize| segments.taxels(region).max_by(|&a, &b| state.p[a].total_cmp(&state.p[b]));
         let old = |region| strongest(region).and_then(|taxel| state.found[state.segments.labels[taxel]]);
         Contacts { found: (0..segments.count).map(old).collect(), segments, ..state.clone() }
     }

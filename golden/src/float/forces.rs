@@ -11,6 +11,8 @@
 //! Fed by `pass` and `search`; its forces are scattered into the array's by `reconstruct`.
 
 use crate::frame::Forces;
+use crate::matrices::Matrices;
+use crate::symmetry::folded::accumulate;
 
 /// Forces in N of one subarray, row-major in it, from normal forces `p` in N and `mu`; those with |fz| < `min_force_N`
 /// are zero.
@@ -27,6 +29,15 @@ pub fn threshold(mut forces: Forces, min_force_N: f64) -> Forces {
         }
     }
     forces
+}
+
+/// What forces leave of the stress `b` in MPa: b − Cx fx − Cy fy − Cz fz.
+pub(crate) fn residual(matrices: &Matrices, b: &[f64], forces: &Forces) -> Vec<f64> {
+    let mut rest = b.to_vec();
+    for (c, f) in [(&matrices.cx, &forces.fx), (&matrices.cy, &forces.fy), (&matrices.cz, &forces.fz)] {
+        accumulate(c, f, -1.0, &mut rest);
+    }
+    rest
 }
 
 #[cfg(test)]

@@ -148,6 +148,9 @@ impl Golden {
     /// Any [`GoldenError`] except `Frame` and `TooStrong`.
     pub fn new(scene: &Scene) -> Result<Golden, GoldenError> {
         scene.require_golden()?;
+        // With `contacts` the network is asked for each contact, else it is the objective of the whole array.
+        let asked = scene.estimator() == EstimatorKind::Network && scene.partition.case == Case::Contacts;
+        let network = asked.then(|| Learned::of_scene(scene)).transpose()?;
         let tiling = |case: Case| -> Result<Tiling, GoldenError> {
             let parts = subarrays(case, &scene.sensor)?;
             let shape = parts[0].sensor(&scene.sensor);
@@ -155,7 +158,7 @@ impl Golden {
             let orthogonal_form = scene.search.form == Form::Orthogonal;
             let orthogonal = orthogonal_form.then(|| Orthogonal::new(&shared)).transpose()?;
             let objective = match scene.estimator() {
-                EstimatorKind::Network if case == scene.partition.case => Box::new(ByNetwork::new(scene)?),
+                EstimatorKind::Network if network.is_none() => Box::new(ByNetwork::new(scene)?),
                 _ => of_kind(scene.search.objective, &shape, scene.medium),
             };
             Ok(Tiling { case, parts, shared, masked: Vec::new(), orthogonal, objective }.mask(&scene.input.dead)?)
@@ -179,8 +182,6 @@ impl Golden {
             None => evidence,
             Some(shares) => evidence.with_noise_shares(shares),
         });
-        let asked = scene.estimator() == EstimatorKind::Network && scene.partition.case == Case::Contacts;
-        let network = asked.then(|| Learned::of_scene(scene)).transpose()?;
         Ok(Golden { scene: scene.clone(), input, tilings, taxels, evidence, network })
     }
 

@@ -2,6 +2,7 @@
 
 use super::*;
 use crate::flags::Flag;
+use crate::float::forces::residual;
 use crate::frame::{Contact, Forces, Frame};
 use crate::generator::generate;
 use crate::learned::{Learned, Training};
@@ -254,11 +255,7 @@ fn contacts_by_network_explain_the_stress() {
         assert!(region.mu_sigma.is_some_and(|sigma| sigma.iter().all(|sigma| *sigma > 0.0 && *sigma < 0.5)));
     }
     assert!(result.checks.shear_spread.is_some_and(|spread| spread > 0.0));
-    let (matrices, mut rest) = (golden.matrices(), frame.stress_MPa.clone());
-    let forces = result.forces_N;
-    for (matrix, forces) in [(&matrices.cx, &forces.fx), (&matrices.cy, &forces.fy), (&matrices.cz, &forces.fz)] {
-        crate::symmetry::folded::accumulate(matrix, forces, -1.0, &mut rest);
-    }
+    let rest = residual(golden.matrices(), &frame.stress_MPa, &result.forces_N);
     assert!(rest.iter().all(|rest| rest.abs() < 1e-4 * frame.peak_MPa()), "{rest:?}");
 }
 

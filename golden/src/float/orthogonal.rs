@@ -114,7 +114,7 @@ pub fn truncation(x: &Forces, w: &Forces) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::float::forces::force;
+    use crate::float::forces::{force, residual};
     use crate::float::pass::{solve_direct, Polynomial};
     use crate::frame::Frame;
     use crate::scene::Scene;
@@ -146,11 +146,7 @@ mod tests {
             let bound = ratio.powi(matrices.degree as i32 + 1) / (1.0 - ratio) + AGREE;
             assert!(truncation(&x, &w) <= bound, "{sensor}, {mu:?}: {:e} {bound:e}", truncation(&x, &w));
             // For any w, C x = b.
-            let mut rest: Vec<f64> = b.iter().map(|b| -b).collect();
-            for (c, f) in [(&matrices.cx, &x.fx), (&matrices.cy, &x.fy), (&matrices.cz, &x.fz)] {
-                accumulate(c, f, 1.0, &mut rest);
-            }
-            assert!(rest.iter().all(|rest| rest.abs() <= ROUNDING * frame.peak_MPa()));
+            assert!(residual(&matrices, b, &x).iter().all(|rest| rest.abs() <= ROUNDING * frame.peak_MPa()));
         }
     }
 

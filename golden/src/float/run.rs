@@ -61,7 +61,7 @@ impl Golden {
         let searched = self.evidence.is_none();
         let (filled, report) = match (self.scene.input.unipolar && searched, self.scene.estimator()) {
             (false, _) => (frame.clone(), None),
-            // The network has been trained on them, and knows what the missing tension does to the load.
+            // The network has been trained on them, and without noise Σp of Cz⁺b hardly depends on the missing tension.
             (true, EstimatorKind::Network) => (clipped(&frame), None),
             (true, _) => self.filled(&frame),
         };

@@ -42,6 +42,11 @@ impl Segments {
         Segments { labels: vec![0; taxels], count: 1 }
     }
 
+    /// The taxels of a region, ascending.
+    pub fn taxels(&self, region: usize) -> impl Iterator<Item = usize> + '_ {
+        (0..self.labels.len()).filter(move |&taxel| self.labels[taxel] == region)
+    }
+
     /// Renumbers arbitrary region labels, one per taxel, in the order of their first taxels.
     pub fn numbered(labels: &[usize]) -> Segments {
         let mut names: Vec<usize> = Vec::new();

@@ -23,7 +23,7 @@ pub struct Resultant {
 
 impl Resultant {
     /// The resultant of `forces`, row-major over the array, on some of its taxels.
-    pub(super) fn of(sensor: &Sensor, forces: &Forces, taxels: impl Iterator<Item = usize>) -> Resultant {
+    pub(crate) fn of(sensor: &Sensor, forces: &Forces, taxels: impl Iterator<Item = usize>) -> Resultant {
         let (mut force_N, mut pressed, mut moment) = ([0.0; 3], 0.0, [0.0; 2]);
         for k in taxels {
             let own = [forces.fx[k], forces.fy[k], forces.fz[k]];

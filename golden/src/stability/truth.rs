@@ -12,11 +12,10 @@
 
 use super::extended;
 use crate::errors::Errors;
-use crate::float::forces::force;
+use crate::float::forces::{force, residual};
 use crate::frame::{Forces, Frame};
 use crate::matrices::Matrices;
 use crate::scene::Scene;
-use crate::symmetry::folded::accumulate;
 use serde::Serialize;
 
 /// Errors of one number format.
@@ -80,10 +79,7 @@ impl Truth {
     /// The errors of the forces reconstructed from the sheared frame, with a given forward error.
     pub(super) fn figures(&self, matrices: &Matrices, forward: f64, forces: &Forces) -> FormatErrors {
         let b = &self.sheared.stress_MPa;
-        let mut rest = b.clone();
-        for (c, f) in [(&matrices.cx, &forces.fx), (&matrices.cy, &forces.fy), (&matrices.cz, &forces.fz)] {
-            accumulate(c, f, -1.0, &mut rest);
-        }
+        let rest = residual(matrices, b, forces);
         let errors = self.sheared.resultant_N.map(|truth| Errors::new(truth, forces.resultant()));
         FormatErrors {
             forward,

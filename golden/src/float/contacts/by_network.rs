@@ -14,12 +14,11 @@
 //! | out: p, regions, μ of each with standard deviations | n, n, count × 2 | N, –, – |
 
 use super::{Contacts, Solver};
+use crate::float::forces::residual;
 use crate::float::objective::Estimate;
-use crate::float::search::RADIUS;
-use crate::float::segment::{segment, Segments, WIDTH};
-use crate::frame::Forces;
+use crate::float::segment::{segment, WIDTH};
 use crate::learned::{Gaussian, Learned, OneContact};
-use crate::symmetry::folded::accumulate;
+use crate::reconstruct::Resultant;
 
 /// Rounds in which every contact is asked for its μ.
 pub const ROUNDS: usize = 3;
@@ -44,18 +43,19 @@ impl Solver<'_> {
             if round > 0 {
                 contacts = self.with_regions(&contacts, segment(sensor, &contacts.p, WIDTH));
             }
-            let searched = |region: &usize| (self.searched)(&contacts.segments, *region);
-            let told: Vec<Option<Gaussian>> = (0..contacts.segments.count)
-                .map(|region| {
-                    Some(region).filter(searched).map(|region| {
-                        let stress = if round == 0 { b.to_vec() } else { self.without_others(&contacts, region, b) };
-                        let centre_mm = self.centre_mm(&contacts, region);
-                        network.shear(&OneContact { b: &stress, alive, centre_mm })
-                    })
-                })
-                .collect();
-            let estimate = |told: &Option<Gaussian>| told.map(|told| self.estimate(&told).found);
-            contacts.found = told.iter().map(estimate).collect();
+            let ask = |region: usize| {
+                let stress = match round {
+                    0 => b.to_vec(),
+                    _ => self.without_others(&contacts, region, b),
+                };
+                let centre_mm = self.centre_mm(&contacts, region);
+                network.shear(&OneContact { b: &stress, alive, centre_mm })
+            };
+            let searched = |region: usize| (self.searched)(&contacts.segments, region);
+            let told: Vec<Option<Gaussian>> =
+                (0..contacts.segments.count).map(|region| searched(region).then(|| ask(region))).collect();
+            let found = |told: &Gaussian| Estimate::of_network(told, self.mu_max).found;
+            contacts.found = told.iter().map(|told| told.as_ref().map(found)).collect();
             sigma = told.iter().map(|told| told.map(|told| told.sigma)).collect();
             self.relax(&mut contacts);
             contacts.sweeps += 1;
@@ -63,35 +63,18 @@ impl Solver<'_> {
         Told { contacts, sigma }
     }
 
-    /// What the network says, as an estimate.
-    fn estimate(&self, told: &Gaussian) -> Estimate {
-        let position = told.mean.map(|mu| (mu * f64::from(RADIUS) / self.mu_max).round() as i32);
-        Estimate::told(told.mean, told.sigma, position)
-    }
-
     /// The stress `b` without that of the forces on the other regions.
     fn without_others(&self, contacts: &Contacts, region: usize, b: &[f64]) -> Vec<f64> {
-        let Forces { mut fx, mut fy, mut fz } = contacts.forces();
-        for (taxel, _) in contacts.segments.labels.iter().enumerate().filter(|(_, label)| **label == region) {
-            (fx[taxel], fy[taxel], fz[taxel]) = (0.0, 0.0, 0.0);
+        let mut others = contacts.forces();
+        for taxel in contacts.segments.taxels(region) {
+            (others.fx[taxel], others.fy[taxel], others.fz[taxel]) = (0.0, 0.0, 0.0);
         }
-        let mut rest = b.to_vec();
-        let matrices = self.matrices;
-        for (matrix, forces) in [(&matrices.cx, &fx), (&matrices.cy, &fy), (&matrices.cz, &fz)] {
-            accumulate(matrix, forces, -1.0, &mut rest);
-        }
-        rest
+        residual(self.matrices, b, &others)
     }
 
-    /// Centre of the compressive forces on a region in mm from the array's centre.
+    /// Centre of the compressive forces on a region in mm from the array's centre, which stands for that of none.
     fn centre_mm(&self, contacts: &Contacts, region: usize) -> [f64; 2] {
-        let (sensor, Segments { labels, .. }) = (&self.matrices.sensor, &contacts.segments);
-        let (mut weight, mut moment) = (f64::MIN_POSITIVE, [0.0; 2]);
-        for taxel in (0..labels.len()).filter(|&taxel| labels[taxel] == region) {
-            let (at, p) = (sensor.position_mm(taxel / sensor.cols, taxel % sensor.cols), contacts.p[taxel].max(0.0));
-            weight += p;
-            moment = [moment[0] + p * at[0], moment[1] + p * at[1]];
-        }
-        moment.map(|moment| moment / weight)
+        let own = Resultant::of(&self.matrices.sensor, &contacts.forces(), contacts.segments.taxels(region));
+        own.centre_mm.unwrap_or_default()
     }
 }

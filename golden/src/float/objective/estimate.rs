@@ -9,6 +9,7 @@
 use super::fit::misfit_limit;
 use crate::float::pass::Polynomial;
 use crate::float::search::{search, SearchResult, RADIUS};
+use crate::learned::Gaussian;
 use crate::sensor::Sensor;
 
 /// A score for candidates; the search takes the largest.
@@ -113,6 +114,12 @@ impl Estimate {
         let objective = -sigma.iter().map(|sigma| (sigma * std::f64::consts::TAU.sqrt()).ln()).sum::<f64>();
         let found = SearchResult { mu, position, objective, evaluations: 1 };
         Estimate { found, load_N: None, sigma: Some(sigma) }
+    }
+
+    /// What a network says of μ, at the nearest position of the search grid.
+    pub fn of_network(told: &Gaussian, mu_max: f64) -> Estimate {
+        let position = told.mean.map(|mu| (mu * f64::from(RADIUS) / mu_max).round() as i32);
+        Estimate::told(told.mean, told.sigma, position)
     }
 
     /// Standard deviation of the shear over its size, that of a hundredth of the normal force at least, if σ is known.

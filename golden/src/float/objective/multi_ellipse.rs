@@ -117,7 +117,7 @@ impl Model for MultiEllipse<'_> {
 pub(crate) fn start_parameters(sensor: &Sensor, p: &[f64], segments: &Segments) -> Vec<f64> {
     let least = (0.5 * sensor.thickness_mm).powi(2);
     let start = |region: usize| -> Option<[f64; PARAMETERS]> {
-        let own = || (0..p.len()).filter(|&k| segments.labels[k] == region);
+        let own = || segments.taxels(region);
         let largest = own().map(|k| p[k]).fold(0.0, f64::max);
         if largest <= 0.0 {
             return None;
