@@ -110,7 +110,9 @@ fn kernel(registered: bool) -> Kernel {
     let [high, middle, low] = [2, 1, 0].map(|word| answer.slice(32 * word, 32));
     let word = k.wire("answer_word", index.at(3).mux(high, index.at(2).mux(middle, low)));
     let half = index.at(1).mux(word.slice(16, 16), word.low(16));
-    let both = stage("both", is_answer.mux(half, entry));
+    // The block RAM of the counters is slow and far away: nothing stands between it and its register.
+    let both = is_answer.mux(stage("answer_half", half), stage("kept_entry", entry));
+    let both = k.wire("both", both);
     let valid = stage("valid", is_answer.mux(answer_valid, entry_valid));
     let last = stage("last", is_answer.mux(answer_last, source.at(0) | *second));
     stage("octet", index.at(0).mux(both.slice(8, 8), both.low(8)));
@@ -127,8 +129,8 @@ mod tests {
     use crate::language::testbench::{check, Reference};
     use crate::wire::Word;
 
-    /// Byte, whether its word is valid, whether it is the last; the last of the registers first.
-    type Byte = (u64, bool, bool);
+    /// Data, whether its word is valid, whether it is the last.
+    type Selected<T> = (T, bool, bool);
 
     /// Selects from whole words; with registers, the index selects one byte of two in the second cycle.
     #[derive(Default)]
@@ -136,26 +138,27 @@ mod tests {
         registered: bool,
         second: Option<bool>,
         was_taken: Option<bool>,
-        half: Option<Byte>,
-        byte: Option<(Byte, bool)>,
+        /// Two bytes of the answer and those of the entry.
+        halves: Option<Selected<[u64; 2]>>,
+        byte: Option<(Selected<u64>, bool)>,
     }
 
     impl Selection {
-        fn half(&self, inputs: &[Word]) -> Option<Byte> {
+        fn halves(&self, inputs: &[Word]) -> Option<Selected<[u64; 2]>> {
             let (source, index) = (inputs[0].number() as usize, inputs[3].number() as usize);
+            let halves = [inputs[7].field(16 * (index / 2), 16), inputs[5].number()];
+            let entry_valid = inputs[6].number() == 1;
             match source {
-                IDENTITY => Some((inputs[5].number(), inputs[6].number() == 1, self.second?)),
-                COUNTERS => Some((inputs[5].number(), inputs[6].number() == 1, true)),
-                _ => {
-                    let half = inputs[7].field(16 * (index / 2), 16);
-                    Some((half, inputs[8].number() == 1, inputs[9].number() == 1))
-                }
+                IDENTITY => Some((halves, entry_valid, self.second?)),
+                COUNTERS => Some((halves, entry_valid, true)),
+                _ => Some((halves, inputs[8].number() == 1, inputs[9].number() == 1)),
             }
         }
 
-        fn byte(inputs: &[Word], half: Byte) -> (Byte, bool) {
-            let byte = half.0 >> (8 * (inputs[3].number() & 1)) & 0xff;
-            ((byte, half.1, half.2), inputs[0].number() & 1 == 0)
+        fn byte(inputs: &[Word], ([answer, entry], valid, last): Selected<[u64; 2]>) -> (Selected<u64>, bool) {
+            let half = if inputs[0].number() >= 2 { answer } else { entry };
+            let byte = half >> (8 * (inputs[3].number() & 1)) & 0xff;
+            ((byte, valid, last), inputs[0].number() & 1 == 0)
         }
     }
 
@@ -165,7 +168,7 @@ mod tests {
             let address = self.second.map(|second| Word::from((source & 1) << 4 | u64::from(second) << 3 | index >> 1));
             let byte = match self.registered {
                 true => self.byte,
-                false => self.half(inputs).map(|half| Selection::byte(inputs, half)),
+                false => self.halves(inputs).map(|halves| Selection::byte(inputs, halves)),
             };
             vec![
                 address,
@@ -178,8 +181,8 @@ mod tests {
         }
 
         fn clock(&mut self, inputs: &[Word]) {
-            self.byte = self.half.map(|half| Selection::byte(inputs, half));
-            self.half = self.half(inputs);
+            self.byte = self.halves.map(|halves| Selection::byte(inputs, halves));
+            self.halves = self.halves(inputs);
             let taken = inputs[4].number() == 1;
             let counts = if self.registered { self.was_taken } else { Some(taken) };
             self.was_taken = Some(taken);

@@ -3,7 +3,7 @@
 //! The schedule issues one column per cycle. It waits for one to three cycles after each accumulation and where the operand of a
 //! step is not complete yet; where quads are written and read in order, until its first quad has been written. From issue
 //! to operands: addresses (1 cycle, 3 with a column list), memories (2), selection of limb and parity (1), with a network the
-//! product with μ (2); then the lanes.
+//! product with μ (3); then the lanes.
 
 use dermis_golden::fixed::plan::resources::{operand_lengths, Holds};
 use dermis_golden::fixed::Model;

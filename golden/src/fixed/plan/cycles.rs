@@ -45,7 +45,7 @@ const COLUMNS: u64 = 2;
 /// Cycles from a row until it can be read as an operand: rescaler, operand memory.
 const OPERAND: u64 = 5;
 /// Additional cycles for the product of an operand and μ, where there is a network.
-const SCALE: u64 = 2;
+const SCALE: u64 = 3;
 /// Additional cycles for the sum with v_00 in `relax`, where there is a network.
 const RELAX: u64 = 3;
 /// Cycles from a row of a hidden layer until its images can be read as an operand.

@@ -33,7 +33,7 @@ kernel_block!(OperandScale, clock clk, inputs [operands, factor, position_x, pos
 
 const M: usize = MULTIPLIER_BITS as usize;
 /// Cycles from `operands` to `scaled` where there is a network.
-const LATENCY: usize = 2;
+const LATENCY: usize = 3;
 
 impl OperandScale {
     /// `wanted`: there is a network.
@@ -69,11 +69,13 @@ fn kernel(wanted: bool) -> Kernel {
         k.wire("scaled", operands);
         return k.finish();
     }
-    let position = k.wire("position", factor.at(1).mux(y, x));
-    let scales = k.delay("scales", factor.any());
-    let kept = k.delay("kept", operands);
+    k.comment("Operands and μ are registered in front of the multipliers: both come from far away.");
+    let taken = k.delay("taken", operands);
+    let position = k.delay("position", factor.at(1).mux(y, x));
+    let scales = k.delay("scales", k.delay("multiplies", factor.any()));
+    let kept = k.delay("kept", taken);
     let scaled = |parity: usize| {
-        let operand = operands.slice(parity * M, M).signed();
+        let operand = taken.slice(parity * M, M).signed();
         let product = k.delay(&format!("product_{parity}"), operand * position);
         let rounded = product.round_shift(POSITION_SHIFT as usize).low(M);
         scales.mux(rounded.unsigned(), kept.slice(parity * M, M))
