@@ -18,6 +18,7 @@
 //! | `streams` | gaps, back-pressure, wrong `tlast`, a reset at every cycle: nothing lost or invented, the next frame correct |
 //! | `coefficients` | the coefficient check: no false alarm, every tried flip flagged, absent by default |
 //! | `faults` | flipped bits in ROM, RAM and registers: every bit is reachable, outcomes add up, a reset recovers |
+//! | `features` | tests, program and Python package compile the same crates once |
 //! | `proofs` | formal proofs: handshakes and queues lose, invent and change nothing, words saturate |
 //! | `link` | the board's UART and SPI: answers, counters, recovery; Verilator = rust-hdl, pin by pin |
 //! | `synthesis` | Yosys reads the Verilog without latch or undriven signal |
