@@ -98,7 +98,7 @@ pub fn build_dir() -> PathBuf {
 /// # Panics
 /// If the device cannot be built.
 pub fn compare(hardware: &Hardware, simulator: Simulator, vectors: &[Vector], stimulus: Stimulus) -> Findings {
-    let mut device = hardware.device(simulator).expect("a device");
+    let mut device = hardware.device_for(simulator, vectors, 1).expect("a device");
     let (taps, vectors) = hardware.observable(simulator, vectors);
     let dut = DeviceUnderTest { name: simulator.name(), device: device.as_mut(), taps: &taps };
     run(dut, &vectors, stimulus).0
