@@ -18,6 +18,7 @@
 //! | `streams` | gaps, back-pressure, wrong `tlast`, a reset at every cycle: nothing lost or invented, the next frame correct |
 //! | `coefficients` | the coefficient check: no false alarm, every tried flip flagged, absent by default |
 //! | `faults` | flipped bits in ROM, RAM and registers: every bit is reachable, outcomes add up, a reset recovers |
+//! | `features` | tests, program and Python package compile the same crates once |
 //! | `proofs` | formal proofs: handshakes and queues lose, invent and change nothing, words saturate |
 //! | `link` | the board's UART and SPI: answers, counters, recovery; Verilator = rust-hdl, pin by pin |
 //! | `synthesis` | Yosys reads the Verilog without latch or undriven signal |
@@ -97,7 +98,7 @@ pub fn build_dir() -> PathBuf {
 /// # Panics
 /// If the device cannot be built.
 pub fn compare(hardware: &Hardware, simulator: Simulator, vectors: &[Vector], stimulus: Stimulus) -> Findings {
-    let mut device = hardware.device(simulator).expect("a device");
+    let mut device = hardware.device_for(simulator, vectors, 1).expect("a device");
     let (taps, vectors) = hardware.observable(simulator, vectors);
     let dut = DeviceUnderTest { name: simulator.name(), device: device.as_mut(), taps: &taps };
     run(dut, &vectors, stimulus).0

@@ -6,7 +6,7 @@ use dermis_golden::link::LinkKind;
 use dermis_hdl::link::{BoardDevice, BoardOutputs};
 use dermis_hdl::Generated;
 
-use super::verilator::{Design, VerilatedBench, VerilatorError};
+use super::verilator::{Design, Optimisation, VerilatedBench, VerilatorError};
 
 /// Length of the bench's vector `out` in 32-bit words, the shim's minimum.
 const OUT_WORDS: usize = 4;
@@ -34,7 +34,8 @@ impl VerilatedBoard {
              .alive(out[1]), .busy(out[2]), .error(out[3]));\nendmodule\n"
         );
         let files = generated.files.iter().map(|f| (f.name.as_str(), f.text.as_str())).collect();
-        let design = Design { top, files, taps: &[], input_bits: 1, writable_state: false };
+        let design =
+            Design { top, files, taps: &[], input_bits: 1, writable_state: false, optimisation: Optimisation::On };
         VerilatedBench::new(&design, &bench, OUT_WORDS, cache).map(VerilatedBoard)
     }
 }

@@ -20,7 +20,7 @@ use thiserror::Error;
 use super::against_model::Vector;
 use super::board::VerilatedBoard;
 use super::drive::{record, InputFrame, Stimulus};
-use super::verilator::{Design, Verilated, VerilatorError};
+use super::verilator::{Design, Optimisation, Verilated, VerilatorError};
 use crate::flow::netlist::netlist;
 
 /// Cycles without a transfer after which a reconstruction is aborted; far above any scene's latency.
@@ -80,17 +80,30 @@ impl Hardware {
         Ok(Hardware { model, generated, cache: build.join("verilator") })
     }
 
-    /// Starts a simulation.
+    /// Starts a simulation of many cycles.
     ///
     /// # Errors
     /// No Verilator, a design that a simulator refuses, or files that cannot be written.
     pub fn device(&self, simulator: Simulator) -> Result<Box<dyn Device>> {
+        self.device_with(simulator, Optimisation::On)
+    }
+
+    /// Starts a simulation that compares `vectors` in so many `runs`, and compiles it accordingly.
+    ///
+    /// # Errors
+    /// As [`Hardware::device`].
+    pub fn device_for(&self, simulator: Simulator, vectors: &[Vector], runs: usize) -> Result<Box<dyn Device>> {
+        let cycles = vectors.iter().map(|vector| vector.expected.cycles.total).sum::<u64>() * runs as u64;
+        self.device_with(simulator, Optimisation::of_cycles(cycles))
+    }
+
+    fn device_with(&self, simulator: Simulator, optimisation: Optimisation) -> Result<Box<dyn Device>> {
         Ok(match simulator {
-            Simulator::Verilator => Box::new(self.verilated(&self.generated, false)?),
+            Simulator::Verilator => Box::new(self.verilated(&self.generated, false, optimisation)?),
             Simulator::RustHdl => self::simulator(&self.model)?,
             Simulator::Netlist => {
                 let netlist = netlist(&self.generated, self.model.board.family, &self.cache)?;
-                Box::new(self.verilated(&netlist, false)?)
+                Box::new(self.verilated(&netlist, false, optimisation)?)
             }
         })
     }
@@ -100,10 +113,15 @@ impl Hardware {
     /// # Errors
     /// As [`Hardware::device`].
     pub fn device_with_writable_state(&self) -> Result<Verilated, VerilatorError> {
-        self.verilated(&self.generated, true)
+        self.verilated(&self.generated, true, Optimisation::On)
     }
 
-    fn verilated(&self, generated: &Generated, writable_state: bool) -> Result<Verilated, VerilatorError> {
+    fn verilated(
+        &self,
+        generated: &Generated,
+        writable_state: bool,
+        optimisation: Optimisation,
+    ) -> Result<Verilated, VerilatorError> {
         let files = generated.files.iter().map(|f| (f.name.as_str(), f.text.as_str()));
         let design = Design {
             top: &generated.top,
@@ -111,6 +129,7 @@ impl Hardware {
             taps: &generated.taps,
             input_bits: self.model.formats().code_bits,
             writable_state,
+            optimisation,
         };
         Verilated::new(&design, &self.cache)
     }
@@ -186,7 +205,7 @@ impl Hardware {
     pub fn reconstruct(&self, frames: &[Frame]) -> Result<Reconstruction> {
         let vectors = self.vectors(frames)?;
         let inputs: Vec<InputFrame> = vectors.iter().map(Vector::input).collect();
-        let mut device = self.device(Simulator::Verilator)?;
+        let mut device = self.device_for(Simulator::Verilator, &vectors, 1)?;
         let recording = record(device.as_mut(), 0, &inputs, Stimulus::FullSpeed, WATCHDOG);
         if let Some(timeout) = recording.timeout {
             let frame = frames.last().map_or_else(String::new, |frame| frame.id.clone());

@@ -131,7 +131,7 @@ fn simulate(
         Simulator::Verilator => &[Stimulus::FullSpeed, Stimulus::BackToBack, Stimulus::Stalls { seed: SEED }],
         Simulator::RustHdl | Simulator::Netlist => &[Stimulus::FullSpeed],
     };
-    let mut device = hardware.device(simulator)?;
+    let mut device = hardware.device_for(simulator, vectors, stimuli.len())?;
     let (taps, vectors) = hardware.observable(simulator, vectors);
     let mut full_speed = Vec::new();
     for &stimulus in stimuli {

@@ -7,7 +7,7 @@ use std::path::PathBuf;
 use dermis_golden::fixed::{Cycles, Stage, Trace};
 use dermis_hdl::device::{Device, Inputs, Outputs, Tap, TapSignal};
 use dermis_sim::cosim::drive::{record, InputFrame, Stimulus, Times};
-use dermis_sim::cosim::verilator::{Design, Verilated, VerilatorError};
+use dermis_sim::cosim::verilator::{Design, Optimisation, Verilated, VerilatorError};
 use dermis_sim::cosim::{compare_recording, run, DeviceUnderTest, Findings, Vector, KEPT_PER_FRAME};
 
 const TOY: &str = include_str!("../toy/toy.v");
@@ -34,7 +34,9 @@ fn cache() -> PathBuf {
 
 fn toy_with(verilog: &str, gain: &str) -> Result<Verilated, VerilatorError> {
     let files = vec![("toy.v", verilog), ("gain.hex", gain)];
-    Verilated::new(&Design { top: "toy", files, taps: &taps(), input_bits: 12, writable_state: false }, &cache())
+    let optimisation = Optimisation::Off;
+    let design = Design { top: "toy", files, taps: &taps(), input_bits: 12, writable_state: false, optimisation };
+    Verilated::new(&design, &cache())
 }
 
 fn toy() -> Verilated {

@@ -17,6 +17,7 @@ mod event_driven;
 mod explain;
 mod extreme;
 mod faults;
+mod features;
 mod flipped_bit;
 mod framing;
 mod link;
