@@ -72,6 +72,8 @@ class Contact:
     @property
     def mu(self) -> NDArray[np.float64]: ...
     @property
+    def mu_sigma(self) -> NDArray[np.float64] | None: ...
+    @property
     def force_N(self) -> NDArray[np.float64]: ...
     @property
     def sigma_N(self) -> NDArray[np.float64] | None: ...
@@ -170,7 +172,16 @@ class Scene:
         draws: int = 200,
         seed: int = 1,
         objectives: Sequence[str] | None = None,
-        frames: int = 64,
+        frames: int | None = None,
+        shapes: str | None = None,
+        estimators: Sequence[str] | None = None,
+        contacts: int | None = None,
+        gain_spread: float | None = None,
+        drift: float | None = None,
+        tare_frames: int | None = None,
+        unipolar: bool | None = None,
+        stated: bool | None = None,
+        hardware: bool | None = None,
     ) -> list[dict[str, Any]]: ...
     def generate(
         self,

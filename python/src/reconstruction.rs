@@ -39,6 +39,7 @@ fn flags<'py>(py: Python<'py>, flags: &[Flag]) -> PyResult<Bound<'py, PyAny>> {
 pub struct Contact {
     centre_mm: Option<[f64; 2]>,
     mu: [f64; 2],
+    mu_sigma: Option<[f64; 2]>,
     force_N: [f64; 3],
     sigma_N: Option<[f64; 3]>,
     /// xx, xy, yy.
@@ -50,6 +51,7 @@ impl From<&ContactEstimate> for Contact {
         Contact {
             centre_mm: Some(found.centre_mm),
             mu: found.mu,
+            mu_sigma: Some([0, 2].map(|axis| found.mu_covariance[axis].sqrt())),
             force_N: found.force_N,
             sigma_N: Some(found.sigma_N),
             mu_covariance: Some(found.mu_covariance),
@@ -62,6 +64,7 @@ impl From<&Region> for Contact {
         Contact {
             centre_mm: region.centre_mm,
             mu: region.mu,
+            mu_sigma: region.mu_sigma,
             force_N: region.load_N,
             sigma_N: None,
             mu_covariance: None,
@@ -81,6 +84,12 @@ impl Contact {
     #[getter]
     fn mu<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
         array(py, self.mu)
+    }
+
+    /// Standard deviation of mu, shape (2,); None where the estimator gives none.
+    #[getter]
+    fn mu_sigma<'py>(&self, py: Python<'py>) -> Option<Bound<'py, PyArray1<f64>>> {
+        self.mu_sigma.map(|sigma| array(py, sigma))
     }
 
     /// Force in N, shape (3,): x, y, normal.
@@ -163,8 +172,8 @@ impl Reconstruction {
         array(py, self.result.resultant_N)
     }
 
-    /// The contacts: with standard deviations from the estimators "evidence" and "learned", without from
-    /// partition.case = "contacts"; None where the contacts are not told apart.
+    /// The contacts: with standard deviations of the force from the estimators "evidence" and "learned"; with
+    /// partition.case = "contacts" of mu alone, where the estimator has them; None where the contacts are not told apart.
     #[getter]
     fn contacts(&self) -> Option<Vec<Contact>> {
         contacts(&self.result)

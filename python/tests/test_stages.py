@@ -56,3 +56,20 @@ def test_noise_is_that_of_the_command() -> None:
         scene.noise(draws=0)
     with pytest.raises(dermis.InputError, match="noise = 2 is not allowed"):
         scene.noise(levels=[2.0], draws=1)
+
+
+def test_noise_over_shapes_is_that_of_the_command() -> None:
+    scene = dermis.Scene.from_name("eight-by-eight")
+    rows = scene.noise(
+        shapes="tilted,ring", levels=[0.001], draws=2, estimators=["search"], contacts=2, gain_spread=0.01, unipolar=True,
+        stated=False, frames=2,
+    )
+    options = "--shapes tilted,ring --level 0.001 --draws 2 --estimator search --contacts 2 --gain-spread 0.01 --unipolar"
+    assert rows == json.loads(program("noise", "eight-by-eight", *options.split(), "--unstated", "--frames", "2", "--json"))
+    assert {row["estimator"] for row in rows} == {"search sparse", "none"} and rows[0]["unipolar"] and not rows[0]["told"]
+    with pytest.raises(dermis.InputError, match='shapes = "blob": one of hertz, '):
+        scene.noise(shapes="ring,blob")
+    with pytest.raises(dermis.InputError, match='estimators = "none" is not allowed; it must be of '):
+        scene.noise(shapes="ring", estimators=["none"])
+    with pytest.raises(dermis.InputError, match="drift needs shapes"):
+        scene.noise(drift=0.1)

@@ -11,7 +11,7 @@ use std::time::Instant;
 use anyhow::ensure;
 use dermis_golden::frame::Frame;
 use dermis_golden::scene::Scene;
-use dermis_sim::stream::{run, Engine, Policy, StreamOptions};
+use dermis_sim::stream::{as_lines, run, Engine, Policy, StreamOptions};
 
 /// Least rate of the search, in frames per second.
 const LEAST: f64 = 2000.0;
@@ -24,7 +24,7 @@ fn rate(scene: &Scene, fixed: bool, frames: usize) -> anyhow::Result<f64> {
     let input: Box<dyn Read + Send> = Box::new(Cursor::new(text.into_bytes()));
     let options = StreamOptions { queue: 64, policy: Policy::All, brief: false };
     let begin = Instant::now();
-    let counts = run(scene, &engine, (input, "memory"), options, &mut std::io::sink())?;
+    let counts = run(scene, &engine, (input, "memory"), options, &mut as_lines(&mut std::io::sink()))?;
     ensure!(counts.answered == frames as u64, "{counts:?}");
     Ok(frames as f64 / begin.elapsed().as_secs_f64())
 }

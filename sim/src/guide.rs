@@ -30,6 +30,7 @@ pages! {
     "index.md" index,
     "your-sensor.md" your_sensor,
     "recordings.md" recordings,
+    "live.md" live,
     "files.md" files,
     "python.md" python,
     "accuracy.md" accuracy,

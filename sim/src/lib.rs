@@ -1,6 +1,6 @@
 //! Simulation, board flow and reports of the generated hardware, and the `dermis` command line.
 //!
-//! Six folders; each uses only those above it and the files beside the folders.
+//! Seven folders; each uses only those above it and the files beside the folders.
 //!
 //! | folder | holds |
 //! |---|---|
@@ -9,6 +9,7 @@
 //! | [`stream`] | frames from standard input, a file, a serial port or UDP, answered line by line |
 //! | [`mod@link`] | the host end of a board's link, of real and of simulated boards |
 //! | [`report`] | measurements, and text, JSON, CSV, pictures and pages of all results |
+//! | [`live`] | a page in the browser that shows the newest result of a stream or of a drawn finger |
 //! | [`commands`] | command-line arguments, commands, exit codes |
 //!
 //! | beside them | does |
@@ -31,6 +32,7 @@ pub mod flow;
 pub mod guide;
 pub mod jobs;
 pub mod link;
+pub mod live;
 mod progress;
 pub mod report;
 pub mod run_log;

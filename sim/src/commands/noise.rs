@@ -17,7 +17,7 @@ use crate::progress::Progress;
 use crate::report::{self, Format};
 
 /// Frames averaged in the second half of the table of elliptic contacts.
-const AVERAGED: usize = 64;
+pub const AVERAGED: usize = 64;
 /// Noise level of the table of sensitivities.
 const SENSITIVITY_LEVEL: f64 = 1e-3;
 
@@ -200,12 +200,20 @@ fn named<T: Copy>(name: &str, names: &[(&str, T)]) -> Result<T, String> {
 
 /// Parses a list of shapes.
 fn shapes(text: &str) -> Result<Shapes> {
+    shapes_named(text).map(Shapes)
+}
+
+/// The shapes of a list as `--shapes` takes it: names separated by commas, `mixed`, `all` or `table`.
+///
+/// # Errors
+/// An unknown name.
+pub fn shapes_named(text: &str) -> Result<Vec<Shape>> {
     match text {
-        "all" | "mixed" => Ok(Shapes(Shape::NAMES.map(|(_, shape)| shape).to_vec())),
-        "table" => Ok(Shapes(Shape::TABLE.to_vec())),
+        "all" | "mixed" => Ok(Shape::NAMES.map(|(_, shape)| shape).to_vec()),
+        "table" => Ok(Shape::TABLE.to_vec()),
         list => {
             let shape = |name: &str| named(name.trim(), &Shape::NAMES).map_err(|known| anyhow!("{name:?}: {known}"));
-            Ok(Shapes(list.split(',').map(shape).collect::<Result<_>>()?))
+            list.split(',').map(shape).collect()
         }
     }
 }

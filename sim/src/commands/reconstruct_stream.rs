@@ -1,13 +1,14 @@
 //! `dermis reconstruct --stream`: frames as lines, results as lines of JSON.
 
+use std::io::Read;
 use std::time::Instant;
 
 use anyhow::{anyhow, bail, Result};
-use clap::{value_parser, Args};
+use clap::{value_parser, Args, ValueEnum};
 use dermis_golden::scene::Scene;
 
 use super::inputs::note_estimator;
-use crate::stream::{run, Engine, Policy, Source, StreamOptions};
+use crate::stream::{as_lines, run, Engine, Policy, Source, StreamOptions};
 
 /// Lines that wait with `--all`: a hundredth of a second at several kilohertz.
 const QUEUE_OF_ALL: u32 = 64;
@@ -57,17 +58,10 @@ impl StreamArguments {
         let engine = Engine::new(scene, fixed)?;
         let policy = if self.latest { Policy::Latest } else { Policy::All };
         let queue = self.queue.unwrap_or(if self.latest { QUEUE_OF_LATEST } else { QUEUE_OF_ALL });
-        let baud = match self.baud {
-            Some(baud) => Some(baud),
-            None => dermis_golden::board::Board::load(&scene.hardware.board)?.uart_baud,
-        };
-        let (input, address) = source.open(baud).map_err(|error| anyhow!("--stream: {error}"))?;
-        if let Some(address) = address {
-            eprintln!("{}: listening on udp:{address}", scene.name);
-        }
+        let (input, name) = open(source, scene, self.baud)?;
         let options = StreamOptions { queue: queue as usize, policy, brief: self.brief };
         let begun = Instant::now();
-        let counts = run(scene, &engine, (input, source.name()), options, &mut std::io::stdout().lock())?;
+        let counts = run(scene, &engine, (input, &name), options, &mut as_lines(&mut std::io::stdout().lock()))?;
         let rate = counts.answered as f64 / begun.elapsed().as_secs_f64();
         let (answered, refused, dropped) = (counts.answered, counts.refused, counts.dropped);
         eprintln!(
@@ -75,8 +69,33 @@ impl StreamArguments {
             scene.name
         );
         if refused > 0 {
-            bail!("{}: {refused} of {} lines were refused", source.name(), refused + answered);
+            bail!("{name}: {refused} of {} lines were refused", refused + answered);
         }
         Ok(String::new())
     }
+}
+
+/// The model of a stream.
+#[derive(ValueEnum, Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum SoftwareEngine {
+    /// The floating-point model.
+    Golden,
+    /// The bit-true integer model.
+    Fixed,
+}
+
+/// Opens a source of lines; a serial port without `baud` takes the bit rate of the scene's board. Gives its name too.
+///
+/// # Errors
+/// A source that cannot be opened, an unknown board.
+pub(super) fn open(source: &Source, scene: &Scene, baud: Option<u32>) -> Result<(Box<dyn Read + Send>, String)> {
+    let baud = match baud {
+        Some(baud) => Some(baud),
+        None => dermis_golden::board::Board::load(&scene.hardware.board)?.uart_baud,
+    };
+    let (input, address) = source.open(baud).map_err(|error| anyhow!("--stream: {error}"))?;
+    if let Some(address) = address {
+        eprintln!("{}: listening on udp:{address}", scene.name);
+    }
+    Ok((input, source.name().to_owned()))
 }

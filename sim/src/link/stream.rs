@@ -1,7 +1,7 @@
 //! `dermis host --stream`: frames and answers as lines of JSON.
 
 use std::io::{BufRead, ErrorKind, Read, Write};
-use std::time::{SystemTime, UNIX_EPOCH};
+use std::time::SystemTime;
 
 use anyhow::{anyhow, Result};
 use dermis_golden::frame::Frame;
@@ -12,7 +12,7 @@ use super::answer::PhysicalAnswer;
 use super::error::HostError;
 use super::session::Session;
 use crate::stream::line::{self, NoFrame};
-use crate::stream::LONGEST_LINE;
+use crate::stream::{seconds, LONGEST_LINE};
 
 /// An output line with an answer.
 #[derive(Serialize)]
@@ -84,10 +84,6 @@ pub(crate) fn run<P: Read + Write>(
         }
     }
     Ok(sent)
-}
-
-fn seconds(time: SystemTime) -> f64 {
-    time.duration_since(UNIX_EPOCH).map_or(0.0, |since| since.as_secs_f64())
 }
 
 /// The answer to one line, or its id (null if it cannot be parsed) with the error.

@@ -36,7 +36,7 @@ pub(crate) mod sections;
 mod stability;
 mod stress;
 pub mod study;
-mod style;
+pub(crate) mod style;
 pub(crate) mod table;
 pub mod tabulate;
 

@@ -53,23 +53,56 @@ struct Received {
     bytes: Option<Vec<u8>>,
 }
 
-/// An output line with a result.
+/// What a line gave; as JSON an output line.
 #[derive(Serialize)]
-struct Answer<'a> {
-    sequence: u64,
-    line: u64,
-    received_s: f64,
-    answered_s: f64,
-    dropped: u64,
-    #[serde(flatten)]
-    result: &'a Reconstruction,
+#[serde(untagged)]
+pub enum Outcome<'a> {
+    /// Of the last line of a block.
+    Answer(Answer<'a>),
+    /// Of a line without a result.
+    Refusal(Refusal<'a>),
 }
 
-/// An output line for an input line without a result.
+/// A result.
 #[derive(Serialize)]
-struct Refusal<'a> {
-    line: u64,
-    error: &'a str,
+pub struct Answer<'a> {
+    /// Number of the result, from 0.
+    pub sequence: u64,
+    /// Number of its last line, from 1.
+    pub line: u64,
+    /// Seconds since 1970 when that line was read.
+    pub received_s: f64,
+    /// Seconds since 1970 when the result was ready.
+    pub answered_s: f64,
+    /// Lines dropped so far.
+    pub dropped: u64,
+    /// The frame of that line; no part of the output line.
+    #[serde(skip)]
+    pub frame: &'a Frame,
+    /// The result.
+    #[serde(flatten)]
+    pub result: &'a Reconstruction,
+}
+
+/// A line without a result.
+#[derive(Serialize)]
+pub struct Refusal<'a> {
+    /// Number of the line, from 1.
+    pub line: u64,
+    /// What is wrong.
+    pub error: &'a str,
+}
+
+/// What takes the outcomes, in the order of the lines; the error [`ErrorKind::BrokenPipe`] ends a stream without error.
+pub type Output<'a> = dyn FnMut(&Outcome) -> std::io::Result<()> + 'a;
+
+/// Writes each outcome as a line of JSON.
+pub fn as_lines(output: &mut dyn Write) -> impl FnMut(&Outcome) -> std::io::Result<()> + '_ {
+    move |outcome| {
+        let text = serde_json::to_string(outcome)? + "\n";
+        output.write_all(text.as_bytes())?;
+        output.flush()
+    }
 }
 
 impl Engine {
@@ -87,7 +120,11 @@ impl Engine {
         }
     }
 
-    fn reconstruct(&self, frames: &[Frame]) -> Result<Reconstruction> {
+    /// The result of a block of frames.
+    ///
+    /// # Errors
+    /// Frames that the model refuses.
+    pub fn reconstruct(&self, frames: &[Frame]) -> Result<Reconstruction> {
         match self {
             Engine::Golden(golden) => Ok(golden.run_averaged(frames)?),
             Engine::Fixed(model) => Ok(model.reconstruct_averaged(frames)?),
@@ -104,7 +141,7 @@ pub fn run(
     engine: &Engine,
     (input, name): (Box<dyn Read + Send>, &str),
     options: StreamOptions,
-    output: &mut dyn Write,
+    output: &mut Output,
 ) -> Result<Counts> {
     let queue = Arc::new(Queue::new(options.queue, options.policy));
     let reader = {
@@ -121,13 +158,12 @@ pub fn run(
         let (received, dropped) = queue.pop();
         stream.counts.dropped = dropped;
         let Some(received) = received else { break };
-        let Some(text) = stream.answer(&received)? else { continue };
-        match output.write_all(text.as_bytes()).and_then(|()| output.flush()) {
+        match stream.answer(&received, output) {
             Err(error) if error.kind() == ErrorKind::BrokenPipe => {
                 queue.close();
                 return Ok(stream.counts);
             }
-            Err(error) => return Err(anyhow!("standard output: {error}")),
+            Err(error) => return Err(anyhow!("output: {error}")),
             Ok(()) => (),
         }
     }
@@ -165,34 +201,35 @@ struct Stream<'a> {
 }
 
 impl Stream<'_> {
-    /// The output line for a line; `None` for a frame that does not complete its block.
-    fn answer(&mut self, received: &Received) -> Result<Option<String>> {
+    /// Hands on what a line gave; nothing for a frame that does not complete its block.
+    fn answer(&mut self, received: &Received, output: &mut Output) -> std::io::Result<()> {
         let result = self.frame(received).and_then(|frame| {
-            self.waiting.push(frame);
+            self.waiting.push(frame.clone());
             if self.waiting.len() < self.scene.input.frames_per_result() {
                 return Ok(None);
             }
             let frames = std::mem::take(&mut self.waiting);
-            self.engine.reconstruct(&frames).map(Some).map_err(|error| error.to_string())
+            let result = self.engine.reconstruct(&frames).map_err(|error| error.to_string())?;
+            Ok(Some((frame, result)))
         });
         let line = received.number;
-        let text = match result {
-            Ok(None) => return Ok(None),
-            Ok(Some(mut result)) => {
+        match result {
+            Ok(None) => Ok(()),
+            Ok(Some((frame, mut result))) => {
                 if self.brief {
                     result.forces_N = Forces::default();
                 }
                 let (sequence, dropped) = (self.counts.answered, self.counts.dropped);
                 self.counts.answered += 1;
                 let [received_s, answered_s] = [received.time, SystemTime::now()].map(seconds);
-                serde_json::to_string(&Answer { sequence, line, received_s, answered_s, dropped, result: &result })?
+                let (frame, result) = (&frame, &result);
+                output(&Outcome::Answer(Answer { sequence, line, received_s, answered_s, dropped, frame, result }))
             }
             Err(error) => {
                 self.counts.refused += 1;
-                serde_json::to_string(&Refusal { line, error: &error })?
+                output(&Outcome::Refusal(Refusal { line, error: &error }))
             }
-        };
-        Ok(Some(text + "\n"))
+        }
     }
 
     fn frame(&self, received: &Received) -> Result<Frame, String> {
@@ -205,7 +242,8 @@ impl Stream<'_> {
     }
 }
 
-fn seconds(time: SystemTime) -> f64 {
+/// Seconds since 1970.
+pub fn seconds(time: SystemTime) -> f64 {
     time.duration_since(UNIX_EPOCH).map_or(0.0, |since| since.as_secs_f64())
 }
 
@@ -218,7 +256,7 @@ mod tests {
         let engine = Engine::new(scene, fixed).unwrap();
         let input: Box<dyn Read + Send> = Box::new(std::io::Cursor::new(input.into_bytes()));
         let mut output = Vec::new();
-        let counts = run(scene, &engine, (input, "memory"), options, &mut output).unwrap();
+        let counts = run(scene, &engine, (input, "memory"), options, &mut as_lines(&mut output)).unwrap();
         let text = String::from_utf8(output).unwrap();
         (counts, text.lines().map(|line| serde_json::from_str(line).unwrap()).collect())
     }

@@ -30,7 +30,7 @@ pub(crate) mod line;
 pub mod queue;
 pub mod source;
 
-pub use answers::{run, Counts, Engine, StreamOptions};
+pub use answers::{as_lines, run, seconds, Answer, Counts, Engine, Outcome, Output, Refusal, StreamOptions};
 pub use line::LONGEST_LINE;
 pub use queue::Policy;
 pub use source::Source;

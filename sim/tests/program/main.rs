@@ -4,6 +4,7 @@
 
 mod bitstream;
 mod boards;
+mod browser;
 mod cli;
 mod contract;
 mod examples;
@@ -11,6 +12,7 @@ mod fake;
 mod guide;
 mod guide_links;
 mod host;
+mod live;
 mod page;
 mod report;
 mod stream;

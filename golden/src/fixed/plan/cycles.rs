@@ -53,7 +53,7 @@ const IMAGES: u64 = 5;
 /// Cycles from the second row of the last layer until μ can be read, beyond its reductions: output 1, saturation 1, operand 1.
 const ESTIMATE: u64 = 3;
 /// Cycles of each reduction of μ.
-const REDUCTION: u64 = 2;
+const REDUCTION: u64 = 4;
 /// Cycles from the last raw row of v_00 to its first replayed row.
 const REPLAY: u64 = 4;
 /// Cycles from the last row to the start of the search: rescaler, unfold, memory.

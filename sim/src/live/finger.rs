@@ -1,0 +1,152 @@
+//! The finger: frames of the contact that the page's mouse describes, with their exact forces.
+//!
+//! | the page's mouse | the contact |
+//! |---|---|
+//! | pressed | a Hertzian circle there, with the normal force of the page's slider |
+//! | dragged | a tangential force along the way from where it was pressed, up to friction; beyond it the contact slides |
+//! | released | none: a frame of zeros |
+
+use std::sync::{Mutex, PoisonError};
+use std::time::{Duration, Instant, SystemTime};
+
+use anyhow::Result;
+use dermis_golden::frame::{Contact, Forces, Frame};
+use dermis_golden::generator::converter::Converter;
+use dermis_golden::generator::generate;
+use dermis_golden::scene::Scene;
+use serde::Deserialize;
+
+use crate::stream::{seconds, Answer, Engine, Outcome, Output};
+
+/// Radius of the finger over the larger pitch: some dozen taxels are pressed.
+const RADIUS_IN_PITCHES: f64 = 2.0;
+/// Largest normal force in N that is taken from the page.
+const MOST_N: f64 = 1000.0;
+
+/// What the page's mouse does.
+#[derive(Clone, Copy, Debug, Deserialize, PartialEq)]
+#[serde(deny_unknown_fields)]
+pub struct Finger {
+    /// Centre in mm from the array's centre, [x, y].
+    pub centre_mm: [f64; 2],
+    /// Force in N, [x, y, normal].
+    pub force_N: [f64; 3],
+}
+
+impl Finger {
+    /// The finger in a request's body; `null` is none.
+    ///
+    /// # Errors
+    /// Anything but `null` or two finite coordinates on the array and a force with a positive normal part.
+    pub fn read(body: &[u8], scene: &Scene) -> Result<Option<Finger>, String> {
+        let finger: Option<Finger> = serde_json::from_slice(body).map_err(|error| error.to_string())?;
+        let Some(Finger { centre_mm, force_N }) = finger else { return Ok(None) };
+        let half = scene.sensor.half_mm();
+        if (0..2).any(|axis| centre_mm[axis].abs() > half[axis] || !centre_mm[axis].is_finite()) {
+            return Err(format!("centre_mm = {centre_mm:?} is not allowed: up to ±{half:?}, on the array"));
+        }
+        if force_N.iter().any(|force| !force.is_finite() || force.abs() > MOST_N) || force_N[2] <= 0.0 {
+            return Err(format!("force_N = {force_N:?} is not allowed: up to {MOST_N}, the normal one above 0"));
+        }
+        Ok(finger)
+    }
+
+    fn contact(&self, scene: &Scene) -> Contact {
+        let [x, y, normal] = self.force_N;
+        Contact {
+            shape: Some("hertz-circle".into()),
+            centre_mm: Some(self.centre_mm),
+            size_mm: vec![RADIUS_IN_PITCHES * scene.sensor.pitch_x_mm.max(scene.sensor.pitch_y_mm)],
+            normal_N: Some(normal),
+            tangential_N: Some([x, y]),
+            ..Contact::default()
+        }
+    }
+}
+
+/// The finger as it was last described.
+#[derive(Default)]
+pub struct Hand(Mutex<Option<Finger>>);
+
+impl Hand {
+    /// Takes what the mouse does now.
+    pub fn set(&self, finger: Option<Finger>) {
+        *self.0.lock().unwrap_or_else(PoisonError::into_inner) = finger;
+    }
+
+    fn now(&self) -> Option<Finger> {
+        *self.0.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Draws, reconstructs and shows a frame in every `period`, or as soon as the one before is done; `noise` is its
+    /// standard deviation over the largest stress.
+    ///
+    /// # Errors
+    /// A scene that generator or engine refuse, an output that fails.
+    pub fn run(&self, scene: &Scene, engine: &Engine, noise: f64, period: Duration, output: &mut Output) -> Result<()> {
+        for sequence in 0.. {
+            let begun = Instant::now();
+            let received_s = seconds(SystemTime::now());
+            let frame = self.frame(scene, noise, sequence)?;
+            let frames = vec![frame.clone(); scene.input.frames_per_result()];
+            let result = engine.reconstruct(&frames)?;
+            let answered_s = seconds(SystemTime::now());
+            let (line, frame, result) = (sequence + 1, &frame, &result);
+            output(&Outcome::Answer(Answer { sequence, line, received_s, answered_s, dropped: 0, frame, result }))?;
+            std::thread::sleep(period.saturating_sub(begun.elapsed()));
+        }
+        Ok(())
+    }
+
+    /// The frame of the finger now.
+    fn frame(&self, scene: &Scene, noise: f64, seed: u64) -> Result<Frame> {
+        let id = format!("finger {seed}");
+        let Some(finger) = self.now() else {
+            let taxels = scene.sensor.taxels();
+            let mut frame = Frame::from_stress(&id, &scene.sensor, vec![0.0; taxels])?;
+            (frame.resultant_N, frame.cell_forces_N) = (Some([0.0; 3]), Some(Forces::zeros(taxels)));
+            return Ok(frame);
+        };
+        let frame = generate(&id, &scene.sensor, scene.medium, &[finger.contact(scene)])?;
+        let (frames, unipolar) = (scene.input.frames_per_result(), scene.input.unipolar);
+        Ok(Converter { noise, frames, unipolar, seed, ..Converter::default() }.convert(&frame)?)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_finger_is_read_and_what_is_wrong_is_named() {
+        let scene = Scene::builtin("eight-by-eight").unwrap();
+        let read = |text: &str| Finger::read(text.as_bytes(), &scene);
+        assert_eq!(read("null"), Ok(None));
+        let finger = Finger { centre_mm: [1.0, -2.0], force_N: [0.5, 0.0, 2.0] };
+        assert_eq!(read("{\"centre_mm\": [1, -2], \"force_N\": [0.5, 0, 2]}"), Ok(Some(finger)));
+        for (text, wanted) in [
+            ("{\"centre_mm\": [1e9, 0], \"force_N\": [0, 0, 1]}", "centre_mm = [1000000000.0, 0.0] is not allowed"),
+            ("{\"centre_mm\": [0, 0], \"force_N\": [0, 0, 0]}", "force_N = [0.0, 0.0, 0.0] is not allowed"),
+            ("{\"centre_mm\": [0, 0], \"force_N\": [0, 2000, 1]}", "force_N = [0.0, 2000.0, 1.0] is not allowed"),
+            ("{\"centre_mm\": [0, 0]}", "missing field `force_N`"),
+            ("{\"force\": 1}", "unknown field `force`"),
+            ("", "EOF"),
+        ] {
+            let error = read(text).unwrap_err();
+            assert!(error.starts_with(wanted), "{error}");
+        }
+    }
+
+    #[test]
+    fn the_frame_has_the_forces_of_the_finger() {
+        let scene = Scene::builtin("eight-by-eight").unwrap();
+        let hand = Hand::default();
+        let none = hand.frame(&scene, 0.01, 0).unwrap();
+        assert_eq!((none.peak_MPa(), none.resultant_N), (0.0, Some([0.0; 3])));
+        hand.set(Some(Finger { centre_mm: [1.0, -2.0], force_N: [0.5, 0.0, 2.0] }));
+        let [one, same, other] = [1, 1, 2].map(|seed| hand.frame(&scene, 0.01, seed).unwrap());
+        assert_eq!(one.resultant_N, Some([0.5, 0.0, 2.0]));
+        assert_eq!(one.stress_MPa, same.stress_MPa);
+        assert_ne!(one.stress_MPa, other.stress_MPa);
+    }
+}

@@ -1,0 +1,225 @@
+const SECONDS = 10, RATE_SECONDS = 2, FRICTION = 0.5, SHADES = 20;
+const { rows, cols, pitch_mm: [pitchX, pitchY] } = KNOWN;
+const HIGH = pitchY / pitchX; // height of a cell; its width is 1
+const at = id => document.getElementById(id);
+const text = (element, content) => { if (element.textContent !== content) element.textContent = content; };
+const svg = (parent, name, attributes = {}) => {
+  const element = document.createElementNS("http://www.w3.org/2000/svg", name);
+  for (const [key, value] of Object.entries(attributes)) element.setAttribute(key, value);
+  return parent.appendChild(element);
+};
+const place = ([x, y]) => [x / pitchX + cols / 2, y / pitchX + rows * HIGH / 2];
+const digits = value => Number(value).toPrecision(3);
+
+/** Path of an arrow. */
+function arrow(x, y, dx, dy, head) {
+  const length = Math.hypot(dx, dy), k = Math.min(head, length) / (length || 1);
+  const side = s => `L${(x + dx - k * (dx + s * dy)).toFixed(3)} ${(y + dy - k * (dy - s * dx)).toFixed(3)}`;
+  const tip = `${(x + dx).toFixed(3)} ${(y + dy).toFixed(3)}`;
+  return `M${x.toFixed(3)} ${y.toFixed(3)}L${tip}${side(0.6)}M${tip}${side(-0.6)}`;
+}
+
+/** A map of the array: stress as colours, forces of taxels as arrows, contacts as thick ones with error bars. */
+class ArrayMap {
+  constructor(figure) {
+    this.svg = figure.querySelector("svg");
+    this.svg.setAttribute("viewBox", `0 0 ${cols} ${rows * HIGH}`);
+    // One path for all cells of a shade: an element per cell takes the browser several times as long.
+    this.shades = ["minus", "plus"].map(sign => Array.from({ length: SHADES }, (_, k) =>
+      svg(this.svg, "path", { class: sign, "fill-opacity": (k + 1) / SHADES })));
+    const lines = (count, line) => Array.from({ length: count + 1 }, (_, k) => line(k)).join("");
+    svg(this.svg, "path", { class: "grid", d: lines(cols, c => `M${c} 0v${rows * HIGH}`)
+      + lines(rows, r => `M0 ${r * HIGH}h${cols}`) });
+    this.arrows = svg(this.svg, "path", { class: "arrows" });
+    this.contact = svg(this.svg, "path", { class: "contact" });
+    this.bars = svg(this.svg, "path", { class: "bars" });
+  }
+
+  draw(stress, peak, forces, longest, contacts, largest) {
+    const cells = this.shades.map(sign => sign.map(() => ""));
+    for (let k = 0; k < stress.length; k++) {
+      const share = peak > 0 ? stress[k] / peak : 0;
+      // The square root makes small values visible, in particular tension.
+      const shade = Math.round(SHADES * Math.sqrt(Math.min(1, Math.abs(share))));
+      if (shade > 0) cells[share > 0 ? 1 : 0][shade - 1] += `M${k % cols} ${Math.floor(k / cols) * HIGH}h1v${HIGH}h-1`;
+    }
+    this.shades.forEach((sign, s) => sign.forEach((path, k) => path.setAttribute("d", cells[s][k])));
+    let path = "";
+    for (let k = 0; k < (forces.fx || []).length; k++) {
+      const [fx, fy] = [forces.fx[k], forces.fy[k]];
+      if (longest > 0 && Math.hypot(fx, fy) > 0.03 * longest) {
+        path += arrow(k % cols + 0.5, (Math.floor(k / cols) + 0.5) * HIGH, fx / longest, fy / longest, 0.3);
+      }
+    }
+    this.arrows.setAttribute("d", path);
+    let [thick, bars] = ["", ""];
+    const scale = largest > 0 ? 0.3 * cols / largest : 0;
+    for (const { centre, force, sigma } of contacts) {
+      if (!centre) continue;
+      const [x, y] = place(centre), tip = [x + scale * force[0], y + scale * force[1]];
+      thick += arrow(x, y, tip[0] - x, tip[1] - y, 0.6);
+      if (sigma) {
+        const [sx, sy] = [scale * sigma[0], scale * sigma[1]];
+        bars += `M${tip[0] - sx} ${tip[1]}h${2 * sx}M${tip[0]} ${tip[1] - sy}v${2 * sy}`;
+      }
+    }
+    this.contact.setAttribute("d", thick);
+    this.bars.setAttribute("d", bars);
+  }
+}
+
+const found = new ArrayMap(at("found")), real = new ArrayMap(at("true"));
+let history = []; // of the last seconds: when drawn, when received, number, forces, peaks
+
+/** The contacts of a result; one of the whole array where it has none. */
+function contactsOf(result) {
+  const named = result.contacts && result.contacts.map(c => ({ centre: c.centre_mm, force: c.force_N, sigma: c.sigma_N }))
+    || result.regions && result.regions.map(r => ({ centre: r.centre_mm, force: r.load_N }))
+    || result.resultants && result.resultants.map(r => ({ centre: r.centre_mm, force: r.force_N }));
+  return named || result.subarrays.length === 1
+    && [{ centre: result.subarrays[0].compression_centroid_mm, force: result.resultant_N }] || [];
+}
+
+function table(picture, contacts) {
+  const rows = contacts.map((c, k) => [`contact ${k + 1}`, c.force, c.sigma]);
+  rows.push(["found, sum", picture.result.resultant_N]);
+  if (picture.truth) rows.push(["true, sum", picture.truth.resultant_N]);
+  const body = at("forces");
+  while (body.rows.length > rows.length) body.deleteRow(-1);
+  rows.forEach(([name, force, sigma], k) => {
+    const row = body.rows[k] || body.insertRow();
+    [name, ...force.map((f, axis) => f.toFixed(3) + (sigma ? ` ± ${sigma[axis].toFixed(3)}` : ""))]
+      .forEach((content, column) => text(row.cells[column] || row.insertCell(), content));
+  });
+}
+
+const plot = at("plot"), lines = {};
+for (const y of [10, 80, 150]) svg(plot, "line", { x1: 46, x2: 598, y1: y, y2: y });
+const marks = [14, 84, 150].map(y => svg(plot, "text", { x: 2, y }));
+for (const kind of ["true", "found"]) {
+  lines[kind] = ["x", "y", "z"].map(axis => svg(plot, "polyline", { class: `${axis} ${kind}` }));
+}
+
+function drawPlot(now) {
+  const all = history.flatMap(h => [...h.found, ...(h.true || [])]);
+  const low = Math.min(0, ...all), high = Math.max(low + 1e-3, ...all);
+  [high, (low + high) / 2, low].forEach((value, k) => text(marks[k], digits(value)));
+  for (const [kind, three] of Object.entries(lines)) {
+    const known = history.filter(h => h[kind]);
+    three.forEach((line, axis) => line.setAttribute("points", known.map(h =>
+      `${Math.round(598 - 552 * (now - h.drawn) / SECONDS)},${(150 - 140 * (h[kind][axis] - low) / (high - low)).toFixed(1)}`)
+      .join(" ")));
+  }
+}
+
+const lengths = forces => (forces.fx || []).map((fx, k) => Math.hypot(fx, forces.fy[k]));
+const most = values => values.reduce((most, value) => Math.max(most, Math.abs(value)), 0);
+
+/** Draws a picture; the time is in seconds. */
+function draw(picture, now) {
+  const { result, truth, stress_MPa: stress } = picture, contacts = contactsOf(result);
+  const sums = [result.resultant_N, ...contacts.map(c => c.force), ...(truth ? [truth.resultant_N] : [])];
+  history.push({
+    drawn: now, received: picture.received_s, sequence: picture.sequence,
+    found: result.resultant_N, true: truth && truth.resultant_N, peak: most(stress),
+    longest: most([...lengths(result.forces_N), ...lengths(truth || {})]),
+    largest: most(sums.map(([x, y]) => Math.hypot(x, y))),
+  });
+  history = history.filter(h => now - h.drawn <= SECONDS);
+  const [peak, longest, largest] = ["peak", "longest", "largest"].map(key => most(history.map(h => h[key])));
+  found.draw(stress, peak, result.forces_N, longest, contacts, largest);
+  at("true").hidden = at("dashed").hidden = !truth;
+  if (truth) real.draw(stress, peak, truth, longest, [], largest);
+  text(at("scale"), `Full colour ${digits(peak)} MPa: pressure red, tension blue. Longest thin arrow ${digits(longest)} N, `
+    + `a taxel's tangential force; thick arrow: a contact's, up to ${digits(largest)} N, with one standard deviation. `
+    + `Scales: the largest of the last ${SECONDS} s.`);
+  table(picture, contacts);
+  const flags = result.flags.join();
+  if (at("flags").dataset.flags !== flags) {
+    at("flags").dataset.flags = flags;
+    at("flags").replaceChildren(...result.flags.map(flag => {
+      const chip = document.createElement("span");
+      chip.textContent = flag;
+      return chip;
+    }));
+  }
+  drawPlot(now);
+}
+
+/** Rates over the last two seconds, times of the newest picture. */
+function state(picture, now, drawing) {
+  const recent = history.filter(h => now - h.drawn <= RATE_SECONDS), [first, last] = [recent[0], recent.at(-1)];
+  const per = (count, seconds) => seconds > 0 ? (count / seconds).toFixed(1) : "–";
+  text(at("state"), `frame ${picture.sequence} · ${picture.result.engine} · `
+    + `${per(last.sequence - first.sequence, last.received - first.received)} results/s · `
+    + `${per(recent.length - 1, last.drawn - first.drawn)} drawn/s · `
+    + `reconstruction ${(1e3 * (picture.answered_s - picture.received_s)).toFixed(1)} ms · `
+    + `frame to screen ${(1e3 * (Date.now() / 1e3 - picture.received_s)).toFixed(0)} ms · `
+    + `drawing ${drawing.toFixed(1)} ms · ${picture.dropped} dropped · ${picture.refused} refused`
+    + (picture.refusal ? ` (${picture.refusal})` : ""));
+}
+
+async function follow() {
+  for (let seen = 0; ;) {
+    await new Promise(requestAnimationFrame);
+    try {
+      const answer = await fetch(`/newest?after=${seen}`);
+      if (answer.status === 204) continue;
+      if (!answer.ok) throw new Error(await answer.text());
+      seen = Number(answer.headers.get("Number"));
+      const picture = await answer.json(), begun = performance.now();
+      draw(picture, begun / 1e3);
+      document.body.getBoundingClientRect(); // the browser's layout is part of the time
+      state(picture, begun / 1e3, performance.now() - begun);
+    } catch (error) {
+      text(at("state"), `no connection to dermis live (${error.message}); trying again`);
+      await new Promise(done => setTimeout(done, 1000));
+    }
+  }
+}
+
+/** The mouse as finger: sticks where it is pressed until the drag reaches the friction, then slides after the mouse. */
+function finger() {
+  const reach = 0.25 * Math.min(cols * pitchX, rows * pitchY), slider = at("press").querySelector("input");
+  let [pressed, mouse, stuck, sent, busy] = [false, [0, 0], [0, 0], "null", false];
+  const send = async () => {
+    const normal = Number(slider.value), force = stuck.map((s, axis) => FRICTION * normal * (mouse[axis] - s) / reach);
+    const wanted = JSON.stringify(pressed ? { centre_mm: stuck, force_N: [...force, normal] } : null);
+    text(at("press").querySelector("output"), `${normal.toFixed(1)} N`);
+    if (busy || wanted === sent) return;
+    busy = true;
+    try {
+      await fetch("/finger", { method: "POST", body: sent = wanted });
+    } catch {
+      sent = ""; // follow() reports it
+    }
+    busy = false;
+    // What the mouse did meanwhile.
+    if (sent) send();
+  };
+  const move = event => {
+    const box = found.svg.getScreenCTM().inverse(), p = new DOMPoint(event.clientX, event.clientY).matrixTransform(box);
+    const within = (value, most) => Math.min(Math.max(value, 0), most);
+    mouse = [(within(p.x, cols) - cols / 2) * pitchX, (within(p.y, rows * HIGH) - rows * HIGH / 2) * pitchX];
+  };
+  const follow = () => {
+    const away = Math.hypot(mouse[0] - stuck[0], mouse[1] - stuck[1]);
+    if (away > reach) stuck = stuck.map((s, axis) => mouse[axis] - (mouse[axis] - s) * reach / away);
+    send();
+  };
+  found.svg.classList.add("finger");
+  found.svg.addEventListener("pointerdown", event => {
+    found.svg.setPointerCapture(event.pointerId);
+    move(event);
+    [pressed, stuck] = [true, mouse];
+    send();
+  });
+  found.svg.addEventListener("pointermove", event => { if (pressed) { move(event); follow(); } });
+  for (const end of ["pointerup", "pointercancel"]) found.svg.addEventListener(end, () => { pressed = false; send(); });
+  slider.addEventListener("input", send);
+  at("press").hidden = false;
+  send();
+}
+
+if (KNOWN.finger) finger();
+follow();

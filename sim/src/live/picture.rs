@@ -1,0 +1,94 @@
+//! A result as the page gets it.
+
+use dermis_golden::frame::Frame;
+use dermis_golden::reconstruct::Reconstruction;
+use serde::Serialize;
+
+use super::newest::Newest;
+use crate::stream::{Answer, Outcome};
+
+/// The newest result with its frame.
+#[derive(Serialize)]
+pub struct Picture<'a> {
+    /// Number of the result, from 0.
+    pub sequence: u64,
+    /// Seconds since 1970 when the frame was there.
+    pub received_s: f64,
+    /// Seconds since 1970 when the result was ready.
+    pub answered_s: f64,
+    /// Lines dropped so far, because a newer one was there.
+    pub dropped: u64,
+    /// Lines refused so far.
+    pub refused: u64,
+    /// Number and error of the last refused line.
+    pub refusal: Option<&'a str>,
+    /// Stress of each taxel in MPa, row-major.
+    pub stress_MPa: &'a [f64],
+    /// The result.
+    pub result: &'a Reconstruction,
+    /// What is known about the forces.
+    pub truth: Option<Truth<'a>>,
+}
+
+/// The known forces of a generated frame.
+#[derive(Serialize)]
+pub struct Truth<'a> {
+    /// Sum in N, [x, y, normal].
+    resultant_N: [f64; 3],
+    /// Force along x on each taxel's cell, N.
+    fx: &'a [f64],
+    /// Force along y on each taxel's cell, N.
+    fy: &'a [f64],
+    /// Normal force on each taxel's cell, N.
+    fz: &'a [f64],
+}
+
+impl<'a> Truth<'a> {
+    /// The known forces of a frame, if it has any.
+    fn of(frame: &'a Frame) -> Option<Truth<'a>> {
+        let cells = frame.cell_forces_N.as_ref()?;
+        Some(Truth { resultant_N: frame.resultant_N?, fx: &cells.fx, fy: &cells.fy, fz: &cells.fz })
+    }
+}
+
+/// Shows outcomes of a stream: answers at once, refusals with the answer that follows.
+pub struct Show<'a> {
+    newest: &'a Newest,
+    refused: u64,
+    refusal: Option<String>,
+}
+
+impl<'a> Show<'a> {
+    /// Shows them as the `newest` picture.
+    pub fn new(newest: &'a Newest) -> Self {
+        Show { newest, refused: 0, refusal: None }
+    }
+
+    /// Shows one outcome.
+    ///
+    /// # Errors
+    /// A result that cannot be written as JSON.
+    pub fn outcome(&mut self, outcome: &Outcome) -> std::io::Result<()> {
+        match outcome {
+            Outcome::Refusal(refusal) => {
+                self.refused += 1;
+                self.refusal = Some(format!("line {}: {}", refusal.line, refusal.error));
+            }
+            Outcome::Answer(Answer { sequence, received_s, answered_s, dropped, frame, result, .. }) => {
+                let picture = Picture {
+                    sequence: *sequence,
+                    received_s: *received_s,
+                    answered_s: *answered_s,
+                    dropped: *dropped,
+                    refused: self.refused,
+                    refusal: self.refusal.as_deref(),
+                    stress_MPa: &frame.stress_MPa,
+                    result,
+                    truth: Truth::of(frame),
+                };
+                self.newest.publish(serde_json::to_string(&picture)?);
+            }
+        }
+        Ok(())
+    }
+}
