@@ -73,7 +73,7 @@ docs: ## build the documentation, warnings are errors
 	@echo '== docs'
 	RUSTDOCFLAGS="-D warnings" $(CARGO) doc --workspace --no-deps
 
-bench: setup ## time a golden reconstruction, rust-hdl's simulation against Verilator's, and Python against Rust
+bench: setup ## time a golden reconstruction, rust-hdl's simulation against Verilator's, Python against Rust, and the drawing of the live page
 	$(CARGO) bench --package dermis-golden
 	$(CARGO) bench --package dermis-sim
 	python3 -m venv --clear $(VENV)-release

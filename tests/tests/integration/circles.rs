@@ -370,7 +370,12 @@ fn the_layers_of_fixed_are_in_order() {
 
 #[test]
 fn the_layers_of_sim_are_in_order() {
-    in_order(&modules("dermis_sim", "sim"), &[], &["flow", "cosim", "stream", "link", "report", "commands"], false);
+    in_order(
+        &modules("dermis_sim", "sim"),
+        &[],
+        &["flow", "cosim", "stream", "link", "report", "live", "commands"],
+        false,
+    );
 }
 
 #[test]
