@@ -196,11 +196,14 @@ impl Shape {
         };
         let outputs = [POSITION_BITS, POSITION_BITS, OUTPUT_BITS, OUTPUT_BITS];
         let outputs: Vec<(Expr, Expr)> = (0..4).map(|place| output(place, outputs[place])).collect();
+        let ln_told = [later("ln_first", first), later("ln_second", second)];
         let ln_sigma: Vec<Expr> = [2, 3]
             .map(|place| {
                 let (_, row) = OUTPUTS[place];
                 let register = k.register(&format!("ln_{place}"), Type::signed(OUTPUT_BITS as usize));
-                k.when([first, second][row], || register.set(clamped(&k, outputs[place].0, ln_sigma_range())));
+                // It is needed with μ, much later.
+                let value = k.delay(&format!("saturated_{place}"), outputs[place].0);
+                k.when(ln_told[row], || register.set(clamped(&k, value, ln_sigma_range())));
                 register.get().extend(LN_SIGMA_BITS as usize).unsigned()
             })
             .into();
